@@ -1,0 +1,1 @@
+#include "core/height_grid.h"

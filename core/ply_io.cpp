@@ -1,0 +1,1 @@
+#include "core/ply_io.h"

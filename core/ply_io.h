@@ -1,0 +1,32 @@
+#pragma once
+
+#include <filesystem>
+#include <string>
+#include <string_view>
+#include <vector>
+
+#include "core/point_cloud.h"
+
+namespace groundray {
+
+/// A point cloud and the comment lines of its header.
+struct PlyFile {
+  PointCloud cloud;
+  std::vector<std::string> comments;
+};
+
+/// Writes the cloud as the element `vertex` of a binary little-endian PLY file, a property for each column, in order.
+/// Appears only when whole.
+/// @throws Error if the file cannot be written, or a comment holds a line break.
+/// @see Turk, The PLY Polygon File Format (1994).
+void write_ply(const std::filesystem::path& path, const PointCloud& cloud, const std::vector<std::string>& comments);
+
+/// Reads the element `vertex` of a PLY file (binary little or big endian, or ASCII); list properties of other elements
+/// are skipped over.
+/// @throws Error naming file, line and rule if it is not one, is cut short, or holds what cannot be read.
+PlyFile read_ply(const std::filesystem::path& path);
+
+/// As read_ply, of bytes already in memory; `name` stands for the file in messages.
+PlyFile parse_ply(std::string_view bytes, const std::string& name);
+
+}  // namespace groundray

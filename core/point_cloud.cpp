@@ -1,0 +1,35 @@
+#include "core/point_cloud.h"
+
+#include <fmt/ranges.h>
+
+#include <algorithm>
+
+#include "core/error.h"
+
+namespace groundray {
+
+bool PointCloud::has(std::string_view name) const {
+  return std::ranges::find(columns_, name, &Column::name) != columns_.end();
+}
+
+PointCloud::AnyValues& PointCloud::add_values(std::string name, AnyValues values) {
+  if (has(name)) throw Error("point cloud: there is a column '{}' already", name);
+  columns_.push_back({std::move(name), std::move(values)});
+  return columns_.back().values;
+}
+
+const PointCloud::AnyValues& PointCloud::find(std::string_view name) const {
+  const auto column = std::ranges::find(columns_, name, &Column::name);
+  if (column == columns_.end()) {
+    std::vector<std::string_view> names;
+    for (const Column& each : columns_) names.push_back(each.name);
+    throw Error("point cloud: there is no column '{}'; there are: {}", name, fmt::join(names, ", "));
+  }
+  return column->values;
+}
+
+void PointCloud::throw_type_mismatch(std::string_view name) {
+  throw Error("point cloud: the column '{}' holds numbers of another type than asked for", name);
+}
+
+}  // namespace groundray

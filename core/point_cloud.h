@@ -1,0 +1,78 @@
+#pragma once
+
+#include <cstddef>
+#include <cstdint>
+#include <memory>
+#include <span>
+#include <string>
+#include <string_view>
+#include <type_traits>
+#include <utility>
+#include <variant>
+#include <vector>
+
+namespace groundray {
+
+/// An allocator that leaves new numbers unset: a column is written once, by whoever resized it.
+template <typename T>
+struct UnsetAllocator : std::allocator<T> {
+  template <typename U>
+  struct rebind {
+    using other = UnsetAllocator<U>;
+  };
+  template <typename U>
+  void construct(U* place) noexcept(std::is_nothrow_default_constructible_v<U>) {
+    ::new (static_cast<void*>(place)) U;
+  }
+  template <typename U, typename... Args>
+  void construct(U* place, Args&&... args) {
+    ::new (static_cast<void*>(place)) U(std::forward<Args>(args)...);
+  }
+};
+
+/// A table of points: named columns of one length, each of one numeric type (structure of arrays).
+class PointCloud {
+ public:
+  template <typename T>
+  using Values = std::vector<T, UnsetAllocator<T>>;
+  using AnyValues = std::variant<Values<float>, Values<double>, Values<std::uint8_t>, Values<std::uint16_t>,
+                                 Values<std::uint32_t>, Values<std::int8_t>, Values<std::int16_t>, Values<std::int32_t>>;
+  struct Column {
+    std::string name;
+    AnyValues values;
+  };
+
+  /// A table of `rows` rows and no column.
+  explicit PointCloud(std::size_t rows = 0) : rows_(rows) {}
+
+  std::size_t rows() const { return rows_; }
+  const std::vector<Column>& columns() const { return columns_; }
+
+  /// Adds a column and returns its `rows()` values, unset, to be filled. The span stays valid as columns are added.
+  /// @throws Error if there is a column of that name.
+  template <typename T>
+  std::span<T> add(std::string name) {
+    return std::get<Values<T>>(add_values(std::move(name), Values<T>(rows_)));
+  }
+
+  /// Returns the values of the column `name`.
+  /// @throws Error if there is none, or if it holds another type than T.
+  template <typename T>
+  std::span<const T> column(std::string_view name) const {
+    const auto* values = std::get_if<Values<T>>(&find(name));
+    if (values == nullptr) throw_type_mismatch(name);
+    return *values;
+  }
+
+  bool has(std::string_view name) const;
+
+ private:
+  AnyValues& add_values(std::string name, AnyValues values);
+  const AnyValues& find(std::string_view name) const;
+  [[noreturn]] static void throw_type_mismatch(std::string_view name);
+
+  std::size_t rows_ = 0;
+  std::vector<Column> columns_;
+};
+
+}  // namespace groundray

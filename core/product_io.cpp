@@ -1,0 +1,1 @@
+#include "core/product_io.h"

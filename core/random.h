@@ -1,0 +1,37 @@
+#pragma once
+
+#include <array>
+#include <cstdint>
+#include <glm/vec2.hpp>
+
+namespace groundray {
+
+/// The one number a user chooses; everything random in a dataset follows from it.
+struct Seed {
+  std::uint64_t value = 0;
+};
+
+/// What a random number is for. Each stream of a pulse is independent of the others.
+enum class RandomStream : std::uint32_t { RangeNoise = 0 };
+
+/// Names one random block: equal keys give equal numbers on any thread, in any order.
+struct RandomKey {
+  Seed seed;
+  std::uint32_t sensor = 0;
+  std::uint32_t frame = 0;
+  std::uint32_t pulse = 0;
+  std::uint32_t sub_ray = 0;
+  RandomStream stream = RandomStream::RangeNoise;
+};
+
+/// Returns 128 random bits that are a function of `key` alone.
+/// @see Salmon et al., Parallel random numbers: as easy as 1, 2, 3 (2011): Philox4x32-10.
+std::array<std::uint32_t, 4> random_bits(const RandomKey& key) noexcept;
+
+/// Returns two independent numbers, uniform in the open interval (0, 1), of 52 bits each.
+glm::dvec2 random_uniform(const RandomKey& key) noexcept;
+
+/// Returns two independent numbers of mean 0 and standard deviation 1 (Box-Muller).
+glm::dvec2 random_normal(const RandomKey& key) noexcept;
+
+}  // namespace groundray

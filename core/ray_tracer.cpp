@@ -1,0 +1,1 @@
+#include "core/ray_tracer.h"

@@ -1,0 +1,39 @@
+#pragma once
+
+#include <chrono>
+#include <vector>
+
+#include "core/pose.h"
+
+namespace groundray {
+
+/// The path of a frame B through a frame A: poses X_AB at given times, joined by motions of constant body velocity
+/// (constant twist). Immutable; any number of threads may read it.
+class Trajectory {
+ public:
+  struct Sample {
+    std::chrono::nanoseconds time{0};
+    Pose pose;
+  };
+
+  /// @throws Error if `samples` is empty, a time does not lie after the one before, or a pose is not finite or not
+  ///         a rotation (quaternion norm off 1 by more than 1e-6); norms are set to 1.
+  explicit Trajectory(std::vector<Sample> samples);
+
+  std::chrono::nanoseconds begin_time() const { return samples_.front().time; }
+  std::chrono::nanoseconds end_time() const { return samples_.back().time; }
+  const std::vector<Sample>& samples() const { return samples_; }
+
+  /// Returns the pose at `time`.
+  /// @throws Error if `time` lies outside [begin_time(), end_time()].
+  Pose pose_at(std::chrono::nanoseconds time) const;
+
+  /// Returns the path of a frame C that is fixed in B: X_AC = X_AB * X_BC at every time.
+  Trajectory mounted(const Pose& X_BC) const;
+
+ private:
+  std::vector<Sample> samples_;
+  std::vector<Screw> screws_;  // from each sample to the next
+};
+
+}  // namespace groundray

@@ -1,0 +1,1 @@
+#include "sensors/scan_pattern.h"

@@ -1,0 +1,1 @@
+#include "sensors/spec_io.h"

@@ -1,0 +1,30 @@
+#pragma once
+
+#include <filesystem>
+#include <string>
+#include <vector>
+
+#include "sensors/scene_spec.h"
+
+namespace groundray {
+
+/// Reads a scene file (docs/scene.md). Relative paths in it are relative to its folder; a preset's name is looked up in
+/// `preset_folder`.
+/// @throws Error listing every fault as file:line:column with the rule and a suggestion: unknown or repeated keys,
+///         missing keys, wrong types or units, values out of range, unknown presets.
+SceneSpec load_scene(const std::filesystem::path& path, const std::filesystem::path& preset_folder);
+
+/// As load_scene, of a text already in memory; `path` stands for the file in messages and relative paths.
+SceneSpec parse_scene(const std::string& text, const std::filesystem::path& path,
+                      const std::filesystem::path& preset_folder);
+
+/// Reads a lidar preset (docs/sensors.md). @throws Error as load_scene.
+LidarSpec load_lidar(const std::filesystem::path& path);
+
+/// As load_lidar, of a text already in memory; `path` stands for the file in messages.
+LidarSpec parse_lidar(const std::string& text, const std::filesystem::path& path);
+
+/// Returns the names of the presets in a folder, sorted.
+std::vector<std::string> preset_names(const std::filesystem::path& preset_folder);
+
+}  // namespace groundray

@@ -1,0 +1,1 @@
+#include "terrain/dem_io.h"

@@ -1,0 +1,23 @@
+#include "test/support/temporary_folder.h"
+
+#include <stdlib.h>
+
+#include <stdexcept>
+#include <string>
+
+namespace groundray::testing {
+
+TemporaryFolder::TemporaryFolder() {
+  std::string name = (std::filesystem::temp_directory_path() / "groundray-test-XXXXXX").string();
+  if (mkdtemp(name.data()) == nullptr) throw std::runtime_error("cannot make the folder " + name);
+  path_ = name;
+}
+
+TemporaryFolder::~TemporaryFolder() {
+  std::error_code ignored;
+  std::filesystem::remove_all(path_, ignored);
+}
+
+std::filesystem::path data_folder() { return std::filesystem::path(GROUNDRAY_SOURCE_DIR) / "data"; }
+
+}  // namespace groundray::testing
