@@ -87,6 +87,10 @@ class HeightGrid {
   /// Returns the unit normal of a facet's plane in D, pointing up.
   glm::dvec3 normal(const FacetPlane& plane) const noexcept;
 
+  /// Returns how far the ray is above the surface at t metres along it, metres; NaN over holes. Over the rim the
+  /// outermost facets go on.
+  double clearance_m(const GridRay& ray, double t_m) const noexcept;
+
   /// Returns the first crossing from above in [t_begin_m, t_end_m], decided facet by facet in double: along the ray the
   /// surface is linear between crossings of the lines u, v and u+v = whole number. Crossings from below are none.
   std::optional<Crossing> first_crossing(const GridRay& ray, double t_begin_m, double t_end_m) const noexcept;

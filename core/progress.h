@@ -1,20 +1,23 @@
 #pragma once
 
 #include <chrono>
+#include <cstddef>
 #include <cstdint>
 #include <cstdio>
 #include <string>
 
 namespace groundray {
 
-/// Reports long work: on a terminal one line that is redrawn with rate and time left, elsewhere a plain line now and
-/// then. One thread at a time may call it.
+/// Reports long work: on a terminal one line, `scans 3/10, 2.1/s, 3 s left`, redrawn at most ten
+/// times a second; elsewhere a plain line at most every 5 s; and one at the end. Faults of the
+/// stream are ignored, for the work matters more. One thread at a time may call it.
 class Progress {
  public:
-  /// @param out    where to report; nullptr for nowhere.
+  /// @param out    where to report; nullptr for nowhere. Must outlive this.
   /// @param label  what is being done: "scans".
   /// @param total  how many steps there are.
   Progress(std::FILE* out, std::string label, std::uint64_t total);
+  /// Ends the line if work stopped early, so that what is printed next begins a line of its own.
   ~Progress();
   Progress(const Progress&) = delete;
   Progress& operator=(const Progress&) = delete;
@@ -23,10 +26,14 @@ class Progress {
   void update(std::uint64_t done);
 
  private:
+  void draw(const std::string& line);
+
   std::FILE* out_;
   bool terminal_;
+  bool finished_ = false;
   std::string label_;
   std::uint64_t total_;
+  std::size_t drawn_width_ = 0;
   std::chrono::steady_clock::time_point begin_;
   std::chrono::steady_clock::time_point reported_;
 };

@@ -65,7 +65,8 @@ class RayTracer {
   /// @param hits  as many as there are rays.
   void trace(std::span<const Ray> rays, std::span<Hit> hits) const noexcept;
 
-  const std::vector<Level>& levels() const;
+  /// The height grid of a level.
+  const HeightGrid& grid(std::uint32_t level) const;
 
   /// Bytes that Embree holds for the scenes, vertices included.
   std::size_t memory_bytes() const;

@@ -1,0 +1,33 @@
+#pragma once
+
+#include <cstdint>
+#include <filesystem>
+#include <vector>
+
+#include "apps/groundray/world.h"
+
+namespace groundray {
+
+/// The folder that a run fills (docs/formats.md). Made anew, or taken up again where an earlier run of the same scene,
+/// seed and version stopped.
+class Dataset {
+ public:
+  /// Writes poses, calibration and dataset.yaml.
+  /// @throws Error if the folder cannot be written, or holds anything else than a dataset of this very run.
+  Dataset(const std::filesystem::path& folder, const World& world);
+
+  std::filesystem::path scan_path(const PlacedLidar& lidar, std::int64_t frame) const;
+  std::filesystem::path preview_path(const PlacedLidar& lidar, std::int64_t frame) const;
+
+  /// Whether a frame is there; frames appear only when whole.
+  bool has(const PlacedLidar& lidar, std::int64_t frame) const;
+
+  /// Brings dataset.yaml's record of which frames are done up to date.
+  void record() const;
+
+ private:
+  std::filesystem::path folder_;
+  const World& world_;
+};
+
+}  // namespace groundray

@@ -1,0 +1,158 @@
+#include "apps/groundray/preview.h"
+
+#include <algorithm>
+#include <array>
+#include <cmath>
+#include <glm/common.hpp>
+#include <glm/geometric.hpp>
+#include <numbers>
+#include <span>
+#include <vector>
+
+namespace groundray {
+namespace {
+
+constexpr int kWidth = 900;
+constexpr int kGap = 8;
+
+using Colour = glm::dvec3;  // 0 to 1
+
+void paint(Image8& image, int x, int y, const Colour& colour) {
+  if (x < 0 || y < 0 || x >= image.width() || y >= image.height()) return;
+  const auto pixel = image.at(x, y);
+  for (int i = 0; i < 3; ++i) {
+    pixel[static_cast<std::size_t>(i)] = static_cast<std::uint8_t>(std::clamp(colour[i], 0.0, 1.0) * 255 + 0.5);
+  }
+}
+
+// Near is yellow, far is violet, by five colours of the viridis map.
+Colour range_colour(double range_m, double far_m) {
+  static constexpr std::array<std::array<double, 3>, 5> map = {{{0.993, 0.906, 0.144},
+                                                                {0.369, 0.789, 0.383},
+                                                                {0.128, 0.567, 0.551},
+                                                                {0.229, 0.322, 0.546},
+                                                                {0.267, 0.005, 0.329}}};
+  const double place = std::clamp(range_m / far_m, 0.0, 1.0) * (map.size() - 1);
+  const auto i = std::min(static_cast<std::size_t>(place), map.size() - 2);
+  const auto colour = [&](std::size_t k) { return Colour(map[k][0], map[k][1], map[k][2]); };
+  return glm::mix(colour(i), colour(i + 1), place - static_cast<double>(i));
+}
+
+// The range below which a share of the echoes lies.
+double quantile_m(std::span<const double> ranges_m, double share) {
+  if (ranges_m.empty()) return 1;
+  std::vector<double> sorted(ranges_m.begin(), ranges_m.end());
+  const auto at = sorted.begin() + static_cast<std::ptrdiff_t>(share * static_cast<double>(sorted.size() - 1));
+  std::nth_element(sorted.begin(), at, sorted.end());
+  return *at;
+}
+
+// For each ring number its place from the top.
+std::vector<int> ring_places(const SpinningPattern& pattern) {
+  std::vector<Beam> beams = pattern.beams;
+  std::ranges::stable_sort(beams, std::ranges::greater{}, &Beam::elevation_rad);
+  std::vector<int> places(std::ranges::max(beams, {}, &Beam::ring).ring + std::size_t{1}, 0);
+  for (std::size_t i = 0; i < beams.size(); ++i) places[beams[i].ring] = static_cast<int>(i);
+  return places;
+}
+
+int band_height(const SpinningPattern& pattern) {
+  return std::max(2, 160 / static_cast<int>(pattern.beams.size()));
+}
+
+void draw_ranges(Image8& image, const PointCloud& scan, const SpinningPattern& pattern, double far_m) {
+  const auto x = scan.column<float>("x");
+  const auto y = scan.column<float>("y");
+  const auto ring = scan.column<std::uint16_t>("ring");
+  const auto range_m = scan.column<double>("range_true");
+  const std::vector<int> places = ring_places(pattern);
+  const int height = band_height(pattern);
+  for (std::size_t i = 0; i < scan.rows(); ++i) {
+    const double turn = 0.5 - std::atan2(y[i], x[i]) / (2 * std::numbers::pi);
+    const int column = std::min(static_cast<int>(turn * kWidth), kWidth - 1);
+    for (int k = 0; k < height; ++k) {
+      paint(image, column, places[ring[i]] * height + k, range_colour(range_m[i], far_m));
+    }
+  }
+}
+
+// A square of the map, north up.
+struct MapWindow {
+  glm::dvec2 centre_m;
+  double half_m;
+  int top;
+
+  glm::dvec2 point(int x, int y) const {
+    const glm::dvec2 share((x + 0.5) / kWidth * 2 - 1, 1 - (y + 0.5) / kWidth * 2);
+    return centre_m + share * half_m;
+  }
+  glm::ivec2 pixel(glm::dvec2 p) const {
+    const glm::dvec2 share = (p - centre_m) / half_m;
+    return {static_cast<int>(std::floor((share.x + 1) / 2 * kWidth)),
+            top + static_cast<int>(std::floor((1 - share.y) / 2 * kWidth))};
+  }
+};
+
+void draw_hillshade(Image8& image, const MapWindow& window, const HeightGrid& ground) {
+  const glm::dvec3 sun = glm::normalize(glm::dvec3(-1, 1, 1.4));  // from the north-west, as maps have it
+  const double reach_m = std::max(2 * window.half_m / kWidth, 0.5 * std::abs(ground.step_m().x));
+  for (int y = 0; y < kWidth; ++y) {
+    for (int x = 0; x < kWidth; ++x) {
+      const glm::dvec2 p = window.point(x, y);
+      const auto west = ground.height_m_at(p - glm::dvec2(reach_m, 0));
+      const auto east = ground.height_m_at(p + glm::dvec2(reach_m, 0));
+      const auto south = ground.height_m_at(p - glm::dvec2(0, reach_m));
+      const auto north = ground.height_m_at(p + glm::dvec2(0, reach_m));
+      Colour colour(0.12, 0.14, 0.2);  // no ground here
+      if (west && east && south && north) {
+        const glm::dvec3 up(*west - *east, *south - *north, 2 * reach_m);
+        colour = Colour(0.25 + 0.6 * std::max(0.0, glm::dot(glm::normalize(up), sun)));
+      }
+      paint(image, x, window.top + y, colour);
+    }
+  }
+}
+
+void draw_points(Image8& image, const MapWindow& window, const PointCloud& scan, double far_m) {
+  const auto x = scan.column<double>("world_x");
+  const auto y = scan.column<double>("world_y");
+  const auto range_m = scan.column<double>("range_true");
+  for (std::size_t i = 0; i < scan.rows(); ++i) {
+    const glm::ivec2 at = window.pixel({x[i], y[i]});
+    if (at.y >= window.top) paint(image, at.x, at.y, range_colour(range_m[i], far_m));
+  }
+}
+
+// A red dot where the sensor is, and a line to where it looks.
+void draw_sensor(Image8& image, const MapWindow& window, const Pose& X_DS) {
+  const glm::dvec3 forward = X_DS.rotation * glm::dvec3(1, 0, 0);
+  for (int step = 0; step <= 200; ++step) {
+    const double ahead_m = window.half_m * 0.1 * step / 200;
+    const glm::ivec2 at = window.pixel(glm::dvec2(X_DS.translation_m + forward * ahead_m));
+    const int radius = step == 0 ? 4 : 1;
+    for (int dy = -radius; dy <= radius; ++dy) {
+      for (int dx = -radius; dx <= radius; ++dx) {
+        if (dx * dx + dy * dy <= radius * radius) paint(image, at.x + dx, at.y + dy, {0.9, 0.1, 0.1});
+      }
+    }
+  }
+}
+
+}  // namespace
+
+Image8 draw_preview(const PointCloud& scan, const PlacedLidar& lidar, const Dem& dem, std::int64_t frame) {
+  const SpinningPattern& pattern = lidar.spec.lidar.pattern;
+  const int ranges_height = band_height(pattern) * static_cast<int>(pattern.beams.size());
+  Image8 image(kWidth, ranges_height + kGap + kWidth, 3);
+  const auto range_m = scan.column<double>("range_true");
+  const double far_m = std::max(quantile_m(range_m, 0.95), 1.0);
+  const Pose X_DS = lidar.X_DS.pose_at(lidar.lidar.pattern().stamp(frame));
+  const MapWindow window{glm::dvec2(X_DS.translation_m), std::max(far_m * 1.1, 10.0), ranges_height + kGap};
+  draw_ranges(image, scan, pattern, far_m);
+  draw_hillshade(image, window, dem.grid);
+  draw_points(image, window, scan, far_m);
+  draw_sensor(image, window, X_DS);
+  return image;
+}
+
+}  // namespace groundray

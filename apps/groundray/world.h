@@ -1,0 +1,37 @@
+#pragma once
+
+#include <cstdint>
+#include <filesystem>
+#include <vector>
+
+#include "core/trajectory.h"
+#include "sensors/scene_spec.h"
+#include "terrain/dem.h"
+
+namespace groundray {
+
+/// One lidar of a run: what it is, where it goes, how often it scans.
+struct PlacedLidar {
+  MountedLidar spec;
+  Lidar lidar;
+  Trajectory X_DS;
+  std::int64_t sweeps = 0;  ///< whole sweeps within the run
+};
+
+/// A scene spec with its files read and its paths laid: all that is needed to run it.
+struct World {
+  SceneSpec spec;
+  Dem dem;
+  Trajectory X_DB;
+  std::vector<PlacedLidar> lidars;
+};
+
+/// The folder with groundray's own data: $GROUNDRAY_DATA, or beside the installed program, or of the source tree.
+std::filesystem::path data_folder();
+
+/// Loads a scene and everything it names.
+/// @throws Error if a file is at fault, the platform's path ends before the run, a sensor is below ground on its way,
+///         or a run is too short for one sweep.
+World load_world(const std::filesystem::path& scene);
+
+}  // namespace groundray

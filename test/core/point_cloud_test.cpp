@@ -1,0 +1,35 @@
+#include "core/point_cloud.h"
+
+#include <gmock/gmock.h>
+#include <gtest/gtest.h>
+
+#include "core/error.h"
+
+namespace groundray {
+namespace {
+
+using ::testing::ElementsAre;
+using ::testing::HasSubstr;
+using ::testing::ThrowsMessage;
+
+TEST(PointCloud, ColumnsKeepTheirValuesAsOthersAreAdded) {
+  PointCloud cloud(2);
+  const auto x = cloud.add<float>("x");
+  for (int i = 0; i < 50; ++i) cloud.add<double>("c" + std::to_string(i));
+  x[0] = 1;
+  x[1] = 2;
+  EXPECT_THAT(cloud.column<float>("x"), ElementsAre(1, 2));
+  EXPECT_EQ(cloud.columns().size(), 51u);
+}
+
+TEST(PointCloud, SaysWhatIsWrongWithAColumn) {
+  PointCloud cloud(1);
+  cloud.add<float>("x");
+  EXPECT_THAT([&] { cloud.add<float>("x"); }, ThrowsMessage<Error>(HasSubstr("a column 'x' already")));
+  EXPECT_THAT([&] { cloud.column<double>("x"); }, ThrowsMessage<Error>(HasSubstr("'x' holds numbers of another type")));
+  EXPECT_THAT([&] { cloud.column<float>("y"); },
+              ThrowsMessage<Error>(HasSubstr("there is no column 'y'; there are: x")));
+}
+
+}  // namespace
+}  // namespace groundray

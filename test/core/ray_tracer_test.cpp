@@ -1,0 +1,277 @@
+#include "core/ray_tracer.h"
+
+#include <fmt/format.h>
+#include <gtest/gtest.h>
+
+#include <algorithm>
+#include <cmath>
+#include <glm/common.hpp>
+#include <glm/geometric.hpp>
+#include <iostream>
+
+#include "core/error.h"
+#include "core/random.h"
+#include "terrain/dem_io.h"
+#include "terrain/terrain_scene.h"
+#include "test/support/reference_tracer.h"
+#include "test/support/sample_terrain.h"
+#include "test/support/temporary_folder.h"
+
+namespace groundray {
+namespace {
+
+using testing::fractal;
+using testing::proof_size;
+using testing::random_rays;
+using testing::ReferenceHit;
+using testing::trace_reference;
+using testing::with_holes;
+
+struct Terrain {
+  const char* name;
+  HeightGrid grid;
+};
+
+std::vector<Terrain> terrains() {
+  return {{"jacksboro", load_dem(testing::data_folder() / "terrain/jacksboro.tif").grid},
+          {"prairie_1m", load_dem(testing::data_folder() / "terrain/prairie_1m.tif").grid},
+          {"fractal with holes", with_holes(fractal(513, 5, 400, Seed{3}), 400, 6, Seed{4})}};
+}
+
+RayTracer tracer(const HeightGrid& grid, Tracing tracing, const std::string& device = "") {
+  return {{full_resolution_level(grid)}, float_frame_origin({0, 0, grid.max_height_m()}), tracing, device};
+}
+
+std::vector<Hit> trace(const RayTracer& tracer, const std::vector<Ray>& rays) {
+  std::vector<Hit> hits(rays.size());
+  tracer.trace(rays, hits);
+  return hits;
+}
+
+// The promise of design: 1e-9 relative and absolute. A ray that meets its facet at less than a millionth of a radian
+// multiplies the rounding of a height (an ulp of 4096 m) by the inverse of that angle.
+bool agrees(const std::optional<ReferenceHit>& expected, const Hit& hit) {
+  if (expected.has_value() != static_cast<bool>(hit)) return false;
+  return !expected || std::abs(expected->range_m - hit.range_m) <= 1e-9 * expected->range_m + 1e-9;
+}
+
+// Slack of the float frame (see docs/surface.md): 16 * 2^-24 * max|p_L|.
+double float_slack_m(const HeightGrid& grid) {
+  const glm::dvec2 a = grid.origin_m();
+  const glm::dvec2 b = a + glm::dvec2(grid.columns() - 1, grid.rows() - 1) * grid.step_m();
+  const glm::dvec3 p_DL = float_frame_origin({0, 0, grid.max_height_m()});
+  const double z_m = std::max(std::abs(grid.min_height_m() - p_DL.z), std::abs(grid.max_height_m() - p_DL.z));
+  return 16 * 0x1p-24 * glm::length(glm::dvec3(glm::max(glm::abs(a), glm::abs(b)), z_m));
+}
+
+// Whether a ray moved by at most `slack_m` is decided by the oracle as `hit` says: then the ray passes a silhouette
+// within that distance.
+bool passes_silhouette(const HeightGrid& grid, const Ray& ray, const Hit& hit, double slack_m) {
+  const glm::dvec3 side = glm::normalize(glm::cross(ray.direction, glm::dvec3(0.1234, 0.5, 0.77)));
+  const glm::dvec3 up = glm::cross(side, ray.direction);
+  for (const double distance_m : {slack_m, slack_m / 2, slack_m / 8, slack_m / 32}) {
+    for (int i = 0; i < 16; ++i) {
+      Ray moved = ray;
+      moved.origin += (side * std::cos(i * 0.3927) + up * std::sin(i * 0.3927)) * distance_m;
+      const auto expected = trace_reference(grid, moved);
+      if (expected.has_value() != static_cast<bool>(hit)) continue;
+      if (!expected || std::abs(expected->range_m - hit.range_m) <= 0.01 + 1e-4 * hit.range_m) return true;
+    }
+  }
+  return false;
+}
+
+TEST(RayTracerProof, ExactTracingEqualsTheReferenceOnEveryRandomRay) {
+  for (const auto& [name, grid] : terrains()) {
+    const auto rays = random_rays(grid, proof_size(20'000, 100'000), Seed{11});
+    const auto hits = trace(tracer(grid, Tracing::Exact), rays);
+    std::size_t met = 0;
+    for (std::size_t i = 0; i < rays.size(); ++i) {
+      const auto expected = trace_reference(grid, rays[i]);
+      met += expected ? 1 : 0;
+      ASSERT_TRUE(agrees(expected, hits[i]))
+          << name << " ray " << i << fmt::format(": {:.12g}", expected ? expected->range_m : -1.)
+          << fmt::format(" against {:.12g}", hits[i].range_m);
+    }
+    EXPECT_GT(met, rays.size() / 3) << name;
+  }
+}
+
+TEST(RayTracerProof, FastTracingDiffersOnlyAtSilhouettes) {
+  for (const auto& [name, grid] : terrains()) {
+    const auto rays = random_rays(grid, proof_size(20'000, 1'000'000), Seed{12});
+    const auto fast = trace(tracer(grid, Tracing::Fast), rays);
+    const auto exact = trace(tracer(grid, Tracing::Exact), rays);  // equals the reference: shown above
+    std::size_t different = 0;
+    for (std::size_t i = 0; i < rays.size(); ++i) {
+      if (fast[i].range_m == exact[i].range_m) continue;
+      if (fast[i] && exact[i] && std::abs(fast[i].range_m - exact[i].range_m) <= 1e-9 * exact[i].range_m + 1e-9) continue;
+      ++different;
+      EXPECT_TRUE(passes_silhouette(grid, rays[i], fast[i], float_slack_m(grid)))
+          << name << " ray " << i << fmt::format(": {} against {}", fast[i].range_m, exact[i].range_m);
+    }
+    EXPECT_LE(static_cast<double>(different), 5e-6 * static_cast<double>(rays.size()) + 0.5) << name;
+    RecordProperty(fmt::format("different_{}", name), static_cast<int>(different));
+  }
+}
+
+// Points where facets meet: samples, and points on column lines, row lines and diagonals.
+std::vector<glm::dvec3> seam_points(const HeightGrid& grid, std::size_t count, Seed seed) {
+  std::vector<glm::dvec3> points(count);
+  for (std::size_t i = 0; i < count; ++i) {
+    const auto bits = random_bits({seed, 0, 0, static_cast<std::uint32_t>(i)});
+    const int column = 1 + static_cast<int>(bits[0] % static_cast<unsigned>(grid.columns() - 3));
+    const int row = 1 + static_cast<int>(bits[1] % static_cast<unsigned>(grid.rows() - 3));
+    const glm::ivec2 ends[4][2] = {{{0, 0}, {0, 0}}, {{0, 0}, {1, 0}}, {{0, 0}, {0, 1}}, {{1, 0}, {0, 1}}};
+    const auto& [from, to] = ends[bits[2] % 4];
+    const double share = bits[3] * 0x1p-32;
+    const auto sample = [&](const glm::ivec2& step) {
+      const glm::ivec2 at = glm::ivec2(column, row) + step;
+      return glm::dvec3(grid.origin_m() + glm::dvec2(at) * grid.step_m(), grid.height_m(at.x, at.y));
+    };
+    points[i] = glm::mix(sample(from), sample(to), share);
+  }
+  return points;
+}
+
+TEST(RayTracerProof, RaysAimedAtVerticesEdgesAndDiagonalsDoNotLeak) {
+  const HeightGrid grid = fractal(513, 5, 400, Seed{3});
+  const auto targets = seam_points(grid, proof_size(100'000, 1'000'000), Seed{21});
+  std::vector<Ray> rays(targets.size());
+  for (std::size_t i = 0; i < rays.size(); ++i) {
+    const glm::dvec2 turn = random_uniform({Seed{22}, 0, 0, static_cast<std::uint32_t>(i)});
+    const double steepness = 0.02 + turn.y * turn.y;
+    const glm::dvec3 back(std::cos(6.2832 * turn.x), std::sin(6.2832 * turn.x), steepness);
+    rays[i].origin = targets[i] + back * (40 / steepness);
+    rays[i].direction = glm::normalize(targets[i] - rays[i].origin);
+  }
+  for (const Tracing tracing : {Tracing::Exact, Tracing::Fast}) {
+    const double slack_m = tracing == Tracing::Exact ? 1e-9 : float_slack_m(grid);
+    const auto hits = trace(tracer(grid, tracing), rays);
+    std::size_t early = 0;
+    for (std::size_t i = 0; i < rays.size(); ++i) {
+      const double target_m = glm::length(targets[i] - rays[i].origin);
+      if (hits[i].range_m <= target_m * (1 + 1e-9) + 1e-6) continue;
+      // It went on beyond the point it was aimed at: right only if it grazed a silhouette there.
+      ++early;
+      ASSERT_TRUE(passes_silhouette(grid, rays[i], hits[i], slack_m)) << "ray " << i << " leaks";
+    }
+    EXPECT_LT(early, rays.size() / 20) << "nearly every ray should stop where it was aimed at";
+  }
+}
+
+TEST(RayTracer, VerticalRaysHitEverySampleAndEveryEdge) {
+  const HeightGrid grid = fractal(65, 2, 30, Seed{5});
+  const auto targets = seam_points(grid, 20'000, Seed{6});
+  std::vector<Ray> rays;
+  for (const glm::dvec3& target : targets) rays.push_back({{glm::dvec2(target), 500}, {0, 0, -1}});
+  for (const Tracing tracing : {Tracing::Exact, Tracing::Fast}) {
+    const auto hits = trace(tracer(grid, tracing), rays);
+    for (std::size_t i = 0; i < rays.size(); ++i) {
+      // An ulp of 64 m across, times a slope of at most 10.
+      ASSERT_NEAR(hits[i].range_m, 500 - targets[i].z, 1e-12 * 500) << i;
+    }
+  }
+}
+
+TEST(RayTracer, RaysThatStartBelowTheSurfaceAreDecidedAsTheReferenceDoes) {
+  const HeightGrid grid = with_holes(fractal(257, 5, 300, Seed{7}), 200, 5, Seed{8});
+  auto rays = random_rays(grid, 20'000, Seed{9});
+  for (Ray& ray : rays) {
+    ray.origin.z = grid.height_m_at(glm::dvec2(ray.origin)).value_or(0) - 5;
+    ray.direction.z = std::abs(ray.direction.z);
+  }
+  for (const Tracing tracing : {Tracing::Exact, Tracing::Fast}) {
+    const auto hits = trace(tracer(grid, tracing), rays);
+    std::size_t met = 0;
+    for (std::size_t i = 0; i < rays.size(); ++i) {
+      const auto expected = trace_reference(grid, rays[i]);
+      met += expected ? 1 : 0;
+      ASSERT_TRUE(agrees(expected, hits[i]) || (tracing == Tracing::Fast &&
+                                                passes_silhouette(grid, rays[i], hits[i], float_slack_m(grid))))
+          << i;
+    }
+    EXPECT_GT(met, 500u) << "some come up into the open and meet the next slope";
+  }
+}
+
+TEST(RayTracer, SurfaceIsOneSided) {
+  const HeightGrid flat({3, 3}, {0, 0}, {10, 10}, std::vector<float>(9, 5));
+  const std::vector<Ray> rays = {{{4, 4, 0}, {0, 0, 1}}, {{4, 4, 9}, {0, 0, -1}}, {{4, 4, 0}, {0, 0, -1}}};
+  for (const Tracing tracing : {Tracing::Exact, Tracing::Fast}) {
+    const auto hits = trace(tracer(flat, tracing), rays);
+    EXPECT_FALSE(hits[0]);
+    EXPECT_EQ(hits[1].range_m, 4);
+    EXPECT_EQ(hits[1].normal, glm::vec3(0, 0, 1));
+    EXPECT_FALSE(hits[2]);
+  }
+}
+
+TEST(RayTracer, HitsBeyondTheFarEndOfARayAreNone) {
+  const HeightGrid flat({3, 3}, {0, 0}, {10, 10}, std::vector<float>(9, 5));
+  for (const Tracing tracing : {Tracing::Exact, Tracing::Fast}) {
+    const auto hits = trace(tracer(flat, tracing), {{{4, 4, 9}, {0, 0, -1}, 3.999999}, {{4, 4, 9}, {0, 0, -1}, 4.000001}});
+    EXPECT_FALSE(hits[0]);
+    EXPECT_TRUE(hits[1]);
+  }
+}
+
+TEST(RayTracer, LevelsAreTracedInOrderAndActAsOneSurface) {
+  const HeightGrid whole = fractal(129, 5, 200, Seed{13});
+  const auto half = [&](int first) {
+    std::vector<float> heights;
+    for (int row = 0; row < whole.rows(); ++row) {
+      for (int column = first; column <= first + 64; ++column) heights.push_back(whole.height_m(column, row));
+    }
+    return HeightGrid({65, whole.rows()}, whole.origin_m() + glm::dvec2(first * whole.step_m().x, 0), whole.step_m(),
+                      std::move(heights));
+  };
+  auto rays = random_rays(whole, 20'000, Seed{14});
+  std::erase_if(rays, [](const Ray& ray) { return ray.origin.x > 0 || ray.direction.x < 0; });  // west to east
+  for (const Tracing tracing : {Tracing::Exact, Tracing::Fast}) {
+    const RayTracer halves({full_resolution_level(half(0)), full_resolution_level(half(64))}, {0, 0, 0}, tracing);
+    const auto expected = trace(tracer(whole, tracing), rays);
+    const auto hits = trace(halves, rays);
+    std::size_t in_second = 0;
+    for (std::size_t i = 0; i < rays.size(); ++i) {
+      // Grid coordinates of the second half start anew: an ulp or two of 640 m at grazing incidence.
+      if (expected[i]) ASSERT_NEAR(hits[i].range_m, expected[i].range_m, 1e-9 * expected[i].range_m + 1e-9) << i;
+      ASSERT_EQ(static_cast<bool>(hits[i]), static_cast<bool>(expected[i])) << i;
+      in_second += hits[i] && hits[i].level == 1 ? 1 : 0;
+    }
+    EXPECT_GT(in_second, 500u);
+  }
+}
+
+TEST(RayTracerProof, InstructionSetsAgree) {
+  const HeightGrid grid = with_holes(fractal(513, 5, 400, Seed{3}), 100, 6, Seed{4});
+  const auto rays = random_rays(grid, proof_size(200'000, 1'000'000), Seed{31});
+  std::vector<std::string> sets = {"max_isa=sse4.2", "max_isa=avx2"};
+  if (__builtin_cpu_supports("avx512f") && __builtin_cpu_supports("avx512vl")) {
+    sets.push_back("max_isa=avx512");
+  } else {
+    std::cout << "NOTE: this processor has no AVX-512; SSE4.2 and AVX2 are compared alone\n";
+  }
+  for (const Tracing tracing : {Tracing::Exact, Tracing::Fast}) {
+    const auto expected = trace(tracer(grid, tracing, sets.front()), rays);
+    for (const std::string& set : sets) {
+      const auto hits = trace(tracer(grid, tracing, set), rays);
+      std::size_t different = 0;
+      for (std::size_t i = 0; i < rays.size(); ++i) different += hits[i].range_m != expected[i].range_m ? 1 : 0;
+      const double allowed = tracing == Tracing::Exact ? 0 : 5e-6 * static_cast<double>(rays.size());
+      EXPECT_LE(static_cast<double>(different), allowed) << set;
+    }
+  }
+}
+
+TEST(RayTracer, SurfaceWithoutAnyHeightIsRefused) {
+  const float hole = std::numeric_limits<float>::quiet_NaN();
+  EXPECT_THROW(tracer(HeightGrid({2, 2}, {0, 0}, {1, 1}, {hole, hole, hole, hole}), Tracing::Fast), Error);
+}
+
+TEST(FloatFrame, LiesOnALatticeOf2048MetresNearTheViewpoint) {
+  EXPECT_EQ(float_frame_origin({1000, -1030, 1023}), glm::dvec3(0, -2048, 0));
+}
+
+}  // namespace
+}  // namespace groundray
