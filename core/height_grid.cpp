@@ -51,7 +51,8 @@ class Lines {
   double next_m_ = std::numeric_limits<double>::infinity();
 };
 
-// How far a ray is above the surface, where it can be asked cheaply: on lines, where two samples decide.
+// How far a ray is above the surface, where it can be asked cheaply: on lines, where two samples
+// decide.
 class Clearance {
  public:
   Clearance(const HeightGrid& grid, const GridRay& ray) : grid_(grid), ray_(ray) {}
@@ -88,7 +89,8 @@ class Clearance {
     const int column = std::clamp(cell(u, grid_.columns()), std::max(0, sum - grid_.rows() + 1),
                                   std::min(grid_.columns() - 2, sum - 1));
     const int row = sum - 1 - column;
-    return above_m(t_m, grid_.height_m(column, row + 1), grid_.height_m(column + 1, row), u - column);
+    return above_m(t_m, grid_.height_m(column, row + 1), grid_.height_m(column + 1, row),
+                   u - column);
   }
 
  private:
@@ -117,17 +119,21 @@ void clip(double start, double slope, double high, double& t_begin_m, double& t_
 
 }  // namespace
 
-HeightGrid::HeightGrid(glm::ivec2 size, glm::dvec2 origin_m, glm::dvec2 step_m, std::vector<float> heights_m)
-    : size_(size), origin_m_(origin_m), step_m_(step_m) {
+HeightGrid::HeightGrid(glm::ivec2 size, glm::dvec2 origin_m, glm::dvec2 step_m,
+                       std::vector<float> heights_m)
+    : size_(size), origin_m_(origin_m), step_m_(step_m), cells_per_m_(1.0 / step_m) {
   Violations broken("height grid");
-  broken.unless(size.x >= 2 && size.y >= 2, "{} x {} samples; a surface needs at least 2 x 2", size.x, size.y);
-  broken.unless(std::isfinite(step_m.x) && std::isfinite(step_m.y) && step_m.x != 0 && step_m.y != 0,
-                "step = ({}, {}) m must be finite and not 0", step_m.x, step_m.y);
-  broken.unless(std::isfinite(origin_m.x) && std::isfinite(origin_m.y), "origin = ({}, {}) m must be finite",
-                origin_m.x, origin_m.y);
-  broken.unless(size.x < 0 || size.y < 0 ||
-                    heights_m.size() == static_cast<std::size_t>(size.x) * static_cast<std::size_t>(size.y),
-                "{} heights for {} x {} samples", heights_m.size(), size.x, size.y);
+  broken.unless(size.x >= 2 && size.y >= 2, "{} x {} samples; a surface needs at least 2 x 2",
+                size.x, size.y);
+  broken.unless(
+      std::isfinite(step_m.x) && std::isfinite(step_m.y) && step_m.x != 0 && step_m.y != 0,
+      "step = ({}, {}) m must be finite and not 0", step_m.x, step_m.y);
+  broken.unless(std::isfinite(origin_m.x) && std::isfinite(origin_m.y),
+                "origin = ({}, {}) m must be finite", origin_m.x, origin_m.y);
+  broken.unless(
+      size.x < 0 || size.y < 0 ||
+          heights_m.size() == static_cast<std::size_t>(size.x) * static_cast<std::size_t>(size.y),
+      "{} heights for {} x {} samples", heights_m.size(), size.x, size.y);
   const HeightRange range = range_of(heights_m);
   broken.unless(heights_m.empty() || range.holes == heights_m.size() ||
                     (std::isfinite(range.low_m) && std::isfinite(range.high_m)),
@@ -153,11 +159,13 @@ std::optional<double> HeightGrid::height_m_at(glm::dvec2 p) const noexcept {
 
 GridRay HeightGrid::to_grid(const glm::dvec3& origin, const glm::dvec3& direction) const noexcept {
   const glm::dvec2 at = to_grid(glm::dvec2(origin));
-  return {at.x, at.y, origin.z, direction.x / step_m_.x, direction.y / step_m_.y, direction.z};
+  return {at.x,       at.y, origin.z, direction.x * cells_per_m_.x, direction.y * cells_per_m_.y,
+          direction.z};
 }
 
 glm::dvec3 HeightGrid::normal(const FacetPlane& plane) const noexcept {
-  return glm::normalize(glm::dvec3(-plane.u_slope_m / step_m_.x, -plane.v_slope_m / step_m_.y, 1));
+  return glm::normalize(
+      glm::dvec3(-plane.u_slope_m * cells_per_m_.x, -plane.v_slope_m * cells_per_m_.y, 1));
 }
 
 std::optional<glm::dvec2> HeightGrid::overlap(const GridRay& ray, double far_m) const noexcept {
@@ -173,7 +181,8 @@ double HeightGrid::clearance_m(const GridRay& ray, double t_m) const noexcept {
   return Clearance(*this, ray).inside_m(t_m);
 }
 
-std::optional<Crossing> HeightGrid::first_crossing(const GridRay& ray, double t_begin_m, double t_end_m) const noexcept {
+std::optional<Crossing> HeightGrid::first_crossing(const GridRay& ray, double t_begin_m,
+                                                   double t_end_m) const noexcept {
   const auto part = overlap(ray, t_end_m);
   if (!part) return std::nullopt;
   t_begin_m = std::max(t_begin_m, part->x);

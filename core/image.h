@@ -9,7 +9,8 @@
 
 namespace groundray {
 
-/// Pixels of `channels` values each, row by row from the top; integer coordinates are pixel centres.
+/// Pixels of `channels` values each, row by row from the top; integer coordinates are pixel
+/// centres.
 template <typename T>
 class Image {
  public:
@@ -19,7 +20,8 @@ class Image {
   /// @throws Error unless every dimension is positive.
   Image(int width, int height, int channels) : width_(width), height_(height), channels_(channels) {
     if (width <= 0 || height <= 0 || channels <= 0) {
-      throw Error("image of {} x {} px with {} channels: every dimension must be positive", width, height, channels);
+      throw Error("image of {} x {} px with {} channels: every dimension must be positive", width,
+                  height, channels);
     }
     values_.resize(static_cast<std::size_t>(width) * static_cast<std::size_t>(height) *
                    static_cast<std::size_t>(channels));
@@ -30,7 +32,9 @@ class Image {
   int channels() const { return channels_; }
 
   /// The `channels()` values of one pixel.
-  std::span<T> at(int x, int y) { return {values_.data() + index(x, y), static_cast<std::size_t>(channels_)}; }
+  std::span<T> at(int x, int y) {
+    return {values_.data() + index(x, y), static_cast<std::size_t>(channels_)};
+  }
   std::span<const T> at(int x, int y) const {
     return {values_.data() + index(x, y), static_cast<std::size_t>(channels_)};
   }
@@ -41,7 +45,8 @@ class Image {
 
  private:
   std::size_t index(int x, int y) const {
-    return (static_cast<std::size_t>(y) * static_cast<std::size_t>(width_) + static_cast<std::size_t>(x)) *
+    return (static_cast<std::size_t>(y) * static_cast<std::size_t>(width_) +
+            static_cast<std::size_t>(x)) *
            static_cast<std::size_t>(channels_);
   }
 

@@ -23,7 +23,8 @@ const PointCloud::AnyValues& PointCloud::find(std::string_view name) const {
   if (column == columns_.end()) {
     std::vector<std::string_view> names;
     for (const Column& each : columns_) names.push_back(each.name);
-    throw Error("point cloud: there is no column '{}'; there are: {}", name, fmt::join(names, ", "));
+    throw Error("point cloud: there is no column '{}'; there are: {}", name,
+                fmt::join(names, ", "));
   }
   return column->values;
 }

@@ -35,8 +35,9 @@ class PointCloud {
  public:
   template <typename T>
   using Values = std::vector<T, UnsetAllocator<T>>;
-  using AnyValues = std::variant<Values<float>, Values<double>, Values<std::uint8_t>, Values<std::uint16_t>,
-                                 Values<std::uint32_t>, Values<std::int8_t>, Values<std::int16_t>, Values<std::int32_t>>;
+  using AnyValues = std::variant<Values<float>, Values<double>, Values<std::uint8_t>,
+                                 Values<std::uint16_t>, Values<std::uint32_t>, Values<std::int8_t>,
+                                 Values<std::int16_t>, Values<std::int32_t>>;
   struct Column {
     std::string name;
     AnyValues values;
@@ -48,7 +49,8 @@ class PointCloud {
   std::size_t rows() const { return rows_; }
   const std::vector<Column>& columns() const { return columns_; }
 
-  /// Adds a column and returns its `rows()` values, unset, to be filled. The span stays valid as columns are added.
+  /// Adds a column and returns its `rows()` values, unset, to be filled. The span stays valid as
+  /// columns are added.
   /// @throws Error if there is a column of that name.
   template <typename T>
   std::span<T> add(std::string name) {

@@ -1,8 +1,7 @@
 #include "core/pose.h"
 
-#include <glm/geometric.hpp>
-
 #include <cmath>
+#include <glm/geometric.hpp>
 
 namespace groundray {
 

@@ -7,7 +7,7 @@ namespace groundray {
 
 /// A rigid motion, read X_AB: the pose of frame B in frame A. X_AC = X_AB * X_BC.
 struct Pose {
-  glm::dquat rotation{1, 0, 0, 0};   ///< R_AB, a unit quaternion (w, x, y, z).
+  glm::dquat rotation{1, 0, 0, 0};    ///< R_AB, a unit quaternion (w, x, y, z).
   glm::dvec3 translation_m{0, 0, 0};  ///< p_AB: from A's origin to B's, in A.
 
   friend bool operator==(const Pose&, const Pose&) = default;
@@ -22,13 +22,16 @@ glm::dvec3 operator*(const Pose& X_AB, const glm::dvec3& p_BQ);
 /// Returns X_BA.
 Pose inverse(const Pose& X_AB);
 
-/// Returns the rotation that turns by `yaw_rad` about z, then `pitch_rad` about the new y, then `roll_rad` about the
-/// new x (x forward, y left, z up: positive pitch lowers the nose, positive roll lowers the right side).
+/// Returns the rotation that turns by `yaw_rad` about z, then `pitch_rad` about the new y, then
+/// `roll_rad` about the new x (x forward, y left, z up: positive pitch lowers the nose, positive
+/// roll lowers the right side).
 glm::dquat rotation_from_yaw_pitch_roll(double yaw_rad, double pitch_rad, double roll_rad);
 
-/// A motion at constant body velocity: B starts at the identity and after a fraction s of the way is at `at(s)`.
-/// Holds the exponential map of one twist, laid out so that a point on the way costs one sine and cosine.
-/// @see Murray, Li, Sastry, A Mathematical Introduction to Robotic Manipulation (1994), section 2.3.
+/// A motion at constant body velocity: B starts at the identity and after a fraction s of the way
+/// is at `at(s)`. Holds the exponential map of one twist, laid out so that a point on the way costs
+/// one sine and cosine.
+/// @see Murray, Li, Sastry, A Mathematical Introduction to Robotic Manipulation (1994),
+/// section 2.3.
 class Screw {
  public:
   /// The motion with at(0) = identity and at(1) = `end`, turning by at most pi.
@@ -38,9 +41,9 @@ class Screw {
   Pose at(double s) const;
 
  private:
-  glm::dvec3 axis_;          // unit, or zero for a pure translation
-  double angle_rad_ = 0;     // over s in [0, 1]
-  glm::dvec3 along_m_;       // p(s) = along s + sine sin(angle s) + versine (1 - cos(angle s))
+  glm::dvec3 axis_;       // unit, or zero for a pure translation
+  double angle_rad_ = 0;  // over s in [0, 1]
+  glm::dvec3 along_m_;    // p(s) = along s + sine sin(angle s) + versine (1 - cos(angle s))
   glm::dvec3 sine_m_{0};
   glm::dvec3 versine_m_{0};
 };

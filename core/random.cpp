@@ -20,9 +20,10 @@ double open_unit(std::uint32_t high, std::uint32_t low) noexcept {
 std::array<std::uint32_t, 4> random_bits(const RandomKey& key) noexcept {
   // A sensor has at most 2^20 sub-rays of a pulse and 2^12 streams, so both share a counter word.
   const r123::Philox4x32::ctr_type counter = {
-      {key.frame, key.pulse, key.sub_ray << 12 | static_cast<std::uint32_t>(key.stream), key.sensor}};
-  const r123::Philox4x32::key_type words = {
-      {static_cast<std::uint32_t>(key.seed.value), static_cast<std::uint32_t>(key.seed.value >> 32)}};
+      {key.frame, key.pulse, key.sub_ray << 12 | static_cast<std::uint32_t>(key.stream),
+       key.sensor}};
+  const r123::Philox4x32::key_type words = {{static_cast<std::uint32_t>(key.seed.value),
+                                             static_cast<std::uint32_t>(key.seed.value >> 32)}};
   const auto block = r123::Philox4x32{}(counter, words);
   return {block[0], block[1], block[2], block[3]};
 }

@@ -1,5 +1,6 @@
-// Embree answers in float which surface a ray meets and roughly where; everything that is reported is then decided in
-// double on the height grid (docs/surface.md). The adapter covers Embree 3.13 and Embree 4.
+// Embree answers in float which surface a ray meets and roughly where; everything that is reported
+// is then decided in double on the height grid (docs/surface.md). The adapter covers Embree 3.13
+// and Embree 4.
 #include "core/ray_tracer.h"
 
 #if GROUNDRAY_EMBREE >= 4
@@ -25,9 +26,9 @@ namespace {
 
 constexpr unsigned kBlocks = 0;  // geometry ids in every level scene
 constexpr unsigned kFacets = 1;
-constexpr int kExactCells = 8;         // side of a user primitive in exact tracing
-constexpr double kWalkCells = 1.5;     // how far round Embree's hit the facet is looked for
-constexpr double kInsideMargin = 1e-9;  // cells; far above rounding, far below any facet
+constexpr int kExactCells = 8;           // side of a user primitive in exact tracing
+constexpr double kWalkCells = 1.5;       // how far round Embree's hit the facet is looked for
+constexpr double kInsideMargin = 1e-9;   // cells; far above rounding, far below any facet
 constexpr float kFloatSlack = 0x1p-20f;  // relative: covers float ranges against double ones
 
 #if GROUNDRAY_EMBREE >= 4
@@ -36,7 +37,8 @@ using QueryContext = RTCRayQueryContext;
 using QueryContext = RTCIntersectContext;
 #endif
 
-// A ray as tracing one level needs it: in double, and in float from where it enters the level's box.
+// A ray as tracing one level needs it: in double, and in float from where it enters the level's
+// box.
 struct LevelRay {
   GridRay grid;
   double enter_m = 0;
@@ -69,7 +71,8 @@ struct PacketOf<16> {
 };
 
 template <int W, typename RayHit>
-void intersect_packet(const int* valid, RTCScene scene, Query& query, RayHit& packet, bool coherent) noexcept {
+void intersect_packet(const int* valid, RTCScene scene, Query& query, RayHit& packet,
+                      bool coherent) noexcept {
 #if GROUNDRAY_EMBREE >= 4
   rtcInitRayQueryContext(&query.context);
   RTCIntersectArguments arguments;
@@ -83,7 +86,8 @@ void intersect_packet(const int* valid, RTCScene scene, Query& query, RayHit& pa
   if constexpr (W == 16) rtcIntersect16(valid, scene, &packet, how);
 #else
   rtcInitIntersectContext(&query.context);
-  query.context.flags = coherent ? RTC_INTERSECT_CONTEXT_FLAG_COHERENT : RTC_INTERSECT_CONTEXT_FLAG_INCOHERENT;
+  query.context.flags =
+      coherent ? RTC_INTERSECT_CONTEXT_FLAG_COHERENT : RTC_INTERSECT_CONTEXT_FLAG_INCOHERENT;
   auto* const how = &query.context;
   if constexpr (W == 1) rtcIntersect1(scene, how, &packet);
   if constexpr (W == 4) rtcIntersect4(valid, scene, how, &packet);
@@ -93,7 +97,8 @@ void intersect_packet(const int* valid, RTCScene scene, Query& query, RayHit& pa
   (void)valid;
 }
 
-// Embree's traversal wants denormals flushed; the mode of the caller's thread comes back at the end.
+// Embree's traversal wants denormals flushed; the mode of the caller's thread comes back at the
+// end.
 class FlushDenormals {
  public:
   FlushDenormals() noexcept : before_(_mm_getcsr()) { _mm_setcsr(before_ | 0x8040); }
@@ -128,11 +133,13 @@ float far_float(double range_m, float slack_m) noexcept {
 
 glm::dvec3 sample_L(const LevelScene& level, int column, int row, double height_m) noexcept {
   const HeightGrid& grid = level.level.grid;
-  return glm::dvec3(grid.origin_m() + glm::dvec2(column, row) * grid.step_m(), height_m) - level.p_DL;
+  return glm::dvec3(grid.origin_m() + glm::dvec2(column, row) * grid.step_m(), height_m) -
+         level.p_DL;
 }
 
 // Narrows [begin_m, end_m] to where start + t slope lies in [low, high].
-void clip(double start, double slope, double low, double high, double& begin_m, double& end_m) noexcept {
+void clip(double start, double slope, double low, double high, double& begin_m,
+          double& end_m) noexcept {
   if (slope == 0) {
     if (start < low || high < start) end_m = -std::numeric_limits<double>::infinity();
     return;
@@ -165,7 +172,8 @@ void intersect_tile(const RTCIntersectFunctionNArguments* arguments) {
     const auto crossing = level.level.grid.first_crossing(ray.grid, begin_m, end_m);
     if (!crossing || !(crossing->range_m < best.range_m)) continue;
     best = *crossing;
-    // The float range only prunes: Embree may go on a little beyond the true one, never stop before it.
+    // The float range only prunes: Embree may go on a little beyond the true one, never stop before
+    // it.
     float& far_m = RTCRayN_tfar(rays, arguments->N, i);
     far_m = std::min(far_m, far_float(best.range_m - ray.enter_m, level.slack_m));
     RTCHitN_geomID(hits, arguments->N, i) = arguments->geomID;
@@ -177,7 +185,8 @@ void tile_bounds(const RTCBoundsFunctionArguments* arguments) {
   const auto& level = *static_cast<const LevelScene*>(arguments->geometryUserPtr);
   const HeightGrid& grid = level.level.grid;
   const glm::ivec2 first = level.tiles[arguments->primID];
-  const glm::ivec2 last = glm::min(first + kExactCells, glm::ivec2(grid.columns(), grid.rows()) - 1);
+  const glm::ivec2 last =
+      glm::min(first + kExactCells, glm::ivec2(grid.columns(), grid.rows()) - 1);
   float low_m = std::numeric_limits<float>::infinity();
   float high_m = -low_m;
   for (int row = first.y; row <= last.y; ++row) {
@@ -201,7 +210,8 @@ void tile_bounds(const RTCBoundsFunctionArguments* arguments) {
 
 // The tiles that hold a part of the level.
 std::vector<glm::ivec2> occupied_tiles(const Level& level) {
-  const glm::ivec2 count = (glm::ivec2(level.grid.columns(), level.grid.rows()) - 2) / kExactCells + 1;
+  const glm::ivec2 count =
+      (glm::ivec2(level.grid.columns(), level.grid.rows()) - 2) / kExactCells + 1;
   std::vector<bool> occupied(static_cast<std::size_t>(count.x) * static_cast<std::size_t>(count.y));
   const auto mark = [&](glm::ivec2 tile) {
     occupied[static_cast<std::size_t>(tile.y) * static_cast<std::size_t>(count.x) +
@@ -209,7 +219,8 @@ std::vector<glm::ivec2> occupied_tiles(const Level& level) {
   };
   for (const Level::Block& block : level.blocks) {
     const glm::ivec2 first = glm::ivec2(block.column, block.row) / kExactCells;
-    const glm::ivec2 last = glm::ivec2(block.column + block.columns - 2, block.row + block.rows - 2) / kExactCells;
+    const glm::ivec2 last =
+        glm::ivec2(block.column + block.columns - 2, block.row + block.rows - 2) / kExactCells;
     for (int row = first.y; row <= last.y; ++row) {
       for (int column = first.x; column <= last.x; ++column) mark({column, row});
     }
@@ -246,7 +257,8 @@ void build_exact(RTCDevice device, LevelScene& level) {
 RTCBuffer new_vertices(RTCDevice device, const LevelScene& level) {
   const HeightGrid& grid = level.level.grid;
   const auto samples = grid.heights_m().size();
-  RTCBuffer vertices = rtcNewBuffer(device, samples * sizeof(glm::vec3) + 16);  // Embree reads 16 bytes at a time
+  RTCBuffer vertices =
+      rtcNewBuffer(device, samples * sizeof(glm::vec3) + 16);  // Embree reads 16 bytes at a time
   auto* out = static_cast<glm::vec3*>(rtcGetBufferData(vertices));
   if (out == nullptr) return vertices;
   for (int row = 0; row < grid.rows(); ++row) {
@@ -264,25 +276,28 @@ void build_fast(RTCDevice device, LevelScene& level) {
   RTCBuffer vertices = new_vertices(device, level);
   if (!level.level.blocks.empty()) {
     RTCGeometry geometry = rtcNewGeometry(device, RTC_GEOMETRY_TYPE_GRID);
-    rtcSetGeometryBuffer(geometry, RTC_BUFFER_TYPE_VERTEX, 0, RTC_FORMAT_FLOAT3, vertices, 0, sizeof(glm::vec3),
-                         samples);
-    auto* grids = static_cast<RTCGrid*>(rtcSetNewGeometryBuffer(geometry, RTC_BUFFER_TYPE_GRID, 0, RTC_FORMAT_GRID,
-                                                                sizeof(RTCGrid), level.level.blocks.size()));
+    rtcSetGeometryBuffer(geometry, RTC_BUFFER_TYPE_VERTEX, 0, RTC_FORMAT_FLOAT3, vertices, 0,
+                         sizeof(glm::vec3), samples);
+    auto* grids = static_cast<RTCGrid*>(rtcSetNewGeometryBuffer(geometry, RTC_BUFFER_TYPE_GRID, 0,
+                                                                RTC_FORMAT_GRID, sizeof(RTCGrid),
+                                                                level.level.blocks.size()));
     for (const Level::Block& block : level.level.blocks) {
-      *grids++ = {static_cast<unsigned>(block.row) * columns + static_cast<unsigned>(block.column), columns,
-                  static_cast<unsigned short>(block.columns), static_cast<unsigned short>(block.rows)};
+      *grids++ = {static_cast<unsigned>(block.row) * columns + static_cast<unsigned>(block.column),
+                  columns, static_cast<unsigned short>(block.columns),
+                  static_cast<unsigned short>(block.rows)};
     }
     attach(level.scene, geometry, kBlocks);
   }
   if (!level.level.facets.empty()) {
     RTCGeometry geometry = rtcNewGeometry(device, RTC_GEOMETRY_TYPE_TRIANGLE);
-    rtcSetGeometryBuffer(geometry, RTC_BUFFER_TYPE_VERTEX, 0, RTC_FORMAT_FLOAT3, vertices, 0, sizeof(glm::vec3),
-                         samples);
+    rtcSetGeometryBuffer(geometry, RTC_BUFFER_TYPE_VERTEX, 0, RTC_FORMAT_FLOAT3, vertices, 0,
+                         sizeof(glm::vec3), samples);
     auto* indices = static_cast<glm::uvec3*>(
-        rtcSetNewGeometryBuffer(geometry, RTC_BUFFER_TYPE_INDEX, 0, RTC_FORMAT_UINT3, sizeof(glm::uvec3),
-                                level.level.facets.size()));
+        rtcSetNewGeometryBuffer(geometry, RTC_BUFFER_TYPE_INDEX, 0, RTC_FORMAT_UINT3,
+                                sizeof(glm::uvec3), level.level.facets.size()));
     for (const Facet& facet : level.level.facets) {
-      const unsigned first = static_cast<unsigned>(facet.row) * columns + static_cast<unsigned>(facet.column);
+      const unsigned first =
+          static_cast<unsigned>(facet.row) * columns + static_cast<unsigned>(facet.column);
       const unsigned apex = facet.half == Facet::Half::Near ? first : first + columns + 1;
       *indices++ = {apex, first + 1, first + columns};
     }
@@ -291,29 +306,21 @@ void build_fast(RTCDevice device, LevelScene& level) {
   rtcReleaseBuffer(vertices);
 }
 
-// Whether the ray meets the level's box, and if so its part inside it, in double and in float.
-bool enter(const LevelScene& level, const Ray& ray, LevelRay& out) noexcept {
-  const HeightGrid& grid = level.level.grid;
-  out.grid = grid.to_grid(ray.origin, ray.direction);
-  out.enter_m = 0;
-  out.leave_m = ray.far_m;
-  constexpr double rim = 1e-6;  // cells, so that rays along the border are inside
-  clip(out.grid.u0, out.grid.du, -rim, grid.columns() - 1 + rim, out.enter_m, out.leave_m);
-  clip(out.grid.v0, out.grid.dv, -rim, grid.rows() - 1 + rim, out.enter_m, out.leave_m);
-  clip(out.grid.z0, out.grid.dz, grid.min_height_m() - level.slack_m, grid.max_height_m() + level.slack_m, out.enter_m,
-       out.leave_m);
-  if (!(out.enter_m <= out.leave_m)) return false;
-  out.origin = glm::vec3(ray.origin + ray.direction * out.enter_m - level.p_DL);
-  out.direction = glm::vec3(ray.direction);
-  out.far = far_float(out.leave_m - out.enter_m, level.slack_m);
-  return true;
-}
-
 FloatHit intersect_one(const LevelScene& level, const LevelRay& ray, double from_m,
                        const glm::vec3& direction) noexcept {
   RTCRayHit one{};
-  one.ray = {ray.origin.x, ray.origin.y, ray.origin.z, static_cast<float>(from_m - ray.enter_m),
-             direction.x, direction.y, direction.z, 0, ray.far, ~0u, 0, 0};
+  one.ray = {ray.origin.x,
+             ray.origin.y,
+             ray.origin.z,
+             static_cast<float>(from_m - ray.enter_m),
+             direction.x,
+             direction.y,
+             direction.z,
+             0,
+             ray.far,
+             ~0u,
+             0,
+             0};
   one.hit.geomID = RTC_INVALID_GEOMETRY_ID;
   Query query{};
   intersect_packet<1>(nullptr, level.scene, query, one, false);
@@ -331,23 +338,17 @@ Facet facet_of(const LevelScene& level, const FloatHit& hit) noexcept {
   return {block.column + column, block.row + row, far_half ? Facet::Half::Far : Facet::Half::Near};
 }
 
-// Whether the ray, seen from its origin, comes down on `facet` well inside its edges at `range_m`.
-bool meets_inside(const GridRay& ray, const Facet& facet, double range_m) noexcept {
-  const double u = ray.u0 + range_m * ray.du - facet.column;
-  const double v = ray.v0 + range_m * ray.dv - facet.row;
-  if (facet.half == Facet::Half::Near) return std::min({u, v, 1 - (u + v)}) > kInsideMargin;
-  return std::min({1 - u, 1 - v, u + v - 1}) > kInsideMargin;
-}
-
 bool ends_below(const LevelScene& level, const LevelRay& ray) noexcept {
   const double end_z_m = ray.grid.z0 + ray.leave_m * ray.grid.dz;
   if (end_z_m >= level.level.grid.max_height_m()) return false;
-  return end_z_m < level.level.grid.min_height_m() || level.level.grid.clearance_m(ray.grid, ray.leave_m) < 0;
+  return end_z_m < level.level.grid.min_height_m() ||
+         level.level.grid.clearance_m(ray.grid, ray.leave_m) < 0;
 }
 
 glm::vec3 one_ulp_off(const glm::vec3& direction) noexcept {
   constexpr float up = std::numeric_limits<float>::infinity();
-  return {std::nextafter(direction.x, up), std::nextafter(direction.y, up), std::nextafter(direction.z, up)};
+  return {std::nextafter(direction.x, up), std::nextafter(direction.y, up),
+          std::nextafter(direction.z, up)};
 }
 
 bool from_behind(const LevelScene& level, const LevelRay& ray, const FloatHit& hit) noexcept {
@@ -355,10 +356,12 @@ bool from_behind(const LevelScene& level, const LevelRay& ray, const FloatHit& h
   return ray.grid.dz > plane.u_slope_m * ray.grid.du + plane.v_slope_m * ray.grid.dv;
 }
 
-// Decides a ray that is not settled by the facet that Embree hit: at an edge, from behind, or a miss that ends below.
-// The last two may be a leak through a vertex or an edge, which a direction one ulp off rarely shares. If they stay, the
-// ray came through a hole, began below ground, or leaked twice: the facets along it are then asked one by one.
-std::optional<Crossing> search(const LevelScene& level, const LevelRay& ray, FloatHit hit) noexcept {
+// Decides a ray that is not settled by the facet that Embree hit: at an edge, from behind, or a
+// miss that ends below. The last two may be a leak through a vertex or an edge, which a direction
+// one ulp off rarely shares. If they stay, the ray came through a hole, began below ground, or
+// leaked twice: the facets along it are then asked one by one.
+std::optional<Crossing> search(const LevelScene& level, const LevelRay& ray,
+                               FloatHit hit) noexcept {
   const HeightGrid& grid = level.level.grid;
   const double reach_m = kWalkCells / std::max(std::abs(ray.grid.du), std::abs(ray.grid.dv));
   double from_m = ray.enter_m;
@@ -373,80 +376,210 @@ std::optional<Crossing> search(const LevelScene& level, const LevelRay& ray, Flo
     }
     const double at_m = ray.enter_m + hit.range_m;
     const double end_m = std::min(at_m + reach_m, ray.leave_m);
-    if (auto crossing = grid.first_crossing(ray.grid, std::max(from_m, at_m - reach_m), end_m)) return crossing;
+    if (auto crossing = grid.first_crossing(ray.grid, std::max(from_m, at_m - reach_m), end_m))
+      return crossing;
     if (!(from_m < end_m && end_m < ray.leave_m)) return std::nullopt;
     from_m = end_m;
     hit = intersect_one(level, ray, from_m, ray.direction);
   }
 }
 
-std::optional<Crossing> decide(const LevelScene& level, const LevelRay& ray, const FloatHit& hit) noexcept {
-  if (hit.geometry != RTC_INVALID_GEOMETRY_ID) {
-    const Facet facet = facet_of(level, hit);
-    const FacetPlane plane = level.level.grid.plane(facet);
-    const double closing = plane.u_slope_m * ray.grid.du + plane.v_slope_m * ray.grid.dv - ray.grid.dz;
-    const double range_m = intersect(ray.grid, plane);
-    if (closing > 0 && ray.enter_m <= range_m && range_m <= ray.leave_m && meets_inside(ray.grid, facet, range_m)) {
-      return Crossing{range_m, facet};
-    }
-  } else if (!ends_below(level, ray)) {
-    return std::nullopt;
-  }
-  return search(level, ray, hit);
-}
-
+// A packet of rays on their way through one level, each number in an array over the lanes so that
+// the loops below become vector instructions. Lanes beyond the last ray repeat it and are not
+// valid.
 template <int W>
 struct Packet {
+  using Doubles = std::array<double, W>;
+
   alignas(64) typename PacketOf<W>::Type floats;
   alignas(64) std::array<int, W> valid;
-  std::array<LevelRay, W> rays;
-  std::array<Crossing, W> crossings;  // exact tracing fills these
+  alignas(64) Doubles u0, v0, z0, du, dv, dz;  // as GridRay
+  Doubles enter_m, leave_m;
+  Doubles height_m, u_slope_m, v_slope_m, column, row;  // facet of the hit, and its plane
+  Doubles range_m, inside;
+  std::array<Facet, W> facets;
+  std::array<LevelRay, W> exact_rays;  // exact tracing only
+  std::array<Crossing, W> crossings;
 
-  void put(int lane, const LevelRay& ray) noexcept {
-    auto& out = floats.ray;
-    out.org_x[lane] = ray.origin.x;
-    out.org_y[lane] = ray.origin.y;
-    out.org_z[lane] = ray.origin.z;
-    out.dir_x[lane] = ray.direction.x;
-    out.dir_y[lane] = ray.direction.y;
-    out.dir_z[lane] = ray.direction.z;
-    out.tnear[lane] = 0;
-    out.tfar[lane] = ray.far;
-    out.time[lane] = 0;
-    out.mask[lane] = ~0u;
-    out.id[lane] = static_cast<unsigned>(lane);
-    out.flags[lane] = 0;
-    floats.hit.geomID[lane] = RTC_INVALID_GEOMETRY_ID;
+  LevelRay level_ray(int lane) const noexcept {
+    const auto i = static_cast<std::size_t>(lane);
+    return {{u0[i], v0[i], z0[i], du[i], dv[i], dz[i]},
+            enter_m[i],
+            leave_m[i],
+            {floats.ray.org_x[i], floats.ray.org_y[i], floats.ray.org_z[i]},
+            {floats.ray.dir_x[i], floats.ray.dir_y[i], floats.ray.dir_z[i]},
+            far_float(leave_m[i] - enter_m[i], 0)};
   }
   FloatHit hit(int lane) const noexcept {
-    return {floats.hit.geomID[lane], floats.hit.primID[lane], floats.hit.u[lane], floats.hit.v[lane],
-            floats.ray.tfar[lane]};
+    return {floats.hit.geomID[lane], floats.hit.primID[lane], floats.hit.u[lane],
+            floats.hit.v[lane], floats.ray.tfar[lane]};
+  }
+  void take(int lane, const Facet& facet, const FacetPlane& plane) noexcept {
+    const auto i = static_cast<std::size_t>(lane);
+    facets[i] = facet;
+    column[i] = facet.column;
+    row[i] = facet.row;
+    height_m[i] = plane.height_m;
+    u_slope_m[i] = plane.u_slope_m;
+    v_slope_m[i] = plane.v_slope_m;
   }
 };
 
+// Brings the rays into the level's grid and into L, cut to the part inside the level's box. Returns
+// whether any has one.
 template <int W>
-void trace_level(const LevelScene& level, std::uint32_t number, Tracing tracing, std::span<const Ray> rays,
-                 std::span<Hit> hits, Packet<W>& packet) noexcept {
-  const int count = static_cast<int>(rays.size());
-  int open = 0;
+bool enter(const LevelScene& level, std::span<const Ray> rays, std::span<const Hit> hits,
+           Packet<W>& packet) noexcept {
+  const HeightGrid& grid = level.level.grid;
+  constexpr double rim = 1e-6;  // cells, so that rays along the border are inside
+  const glm::dvec3 low(-rim, -rim, grid.min_height_m() - level.slack_m);
+  const glm::dvec3 high(grid.columns() - 1 + rim, grid.rows() - 1 + rim,
+                        grid.max_height_m() + level.slack_m);
+  auto& out = packet.floats.ray;
+  std::array<std::array<double, W>, 6> in;
+  for (std::size_t i = 0; i < W; ++i) {
+    const Ray& ray = rays[std::min(i, rays.size() - 1)];
+    in[0][i] = ray.origin.x;
+    in[1][i] = ray.origin.y;
+    in[2][i] = ray.origin.z;
+    in[3][i] = ray.direction.x;
+    in[4][i] = ray.direction.y;
+    in[5][i] = ray.direction.z;
+    packet.leave_m[i] = ray.far_m;
+  }
+  const glm::dvec2 origin_m = grid.origin_m();
+  const glm::dvec2 per_m = grid.cells_per_m();
+  for (std::size_t i = 0; i < W; ++i) {
+    packet.u0[i] = (in[0][i] - origin_m.x) * per_m.x;
+    packet.v0[i] = (in[1][i] - origin_m.y) * per_m.y;
+    packet.z0[i] = in[2][i];
+    packet.du[i] = in[3][i] * per_m.x;
+    packet.dv[i] = in[4][i] * per_m.y;
+    packet.dz[i] = in[5][i];
+  }
+  for (std::size_t i = 0; i < W; ++i) {
+    const double iu = 1 / packet.du[i], iv = 1 / packet.dv[i], iz = 1 / packet.dz[i];
+    const double ua = (low.x - packet.u0[i]) * iu, ub = (high.x - packet.u0[i]) * iu;
+    const double va = (low.y - packet.v0[i]) * iv, vb = (high.y - packet.v0[i]) * iv;
+    const double za = (low.z - packet.z0[i]) * iz, zb = (high.z - packet.z0[i]) * iz;
+    const double begin_m =
+        std::max(std::max(std::min(ua, ub), std::min(va, vb)), std::max(std::min(za, zb), 0.0));
+    packet.leave_m[i] = std::min(std::min(std::max(ua, ub), std::max(va, vb)),
+                                 std::min(std::max(za, zb), packet.leave_m[i]));
+    packet.enter_m[i] = begin_m;
+    out.org_x[i] = static_cast<float>(in[0][i] + in[3][i] * begin_m - level.p_DL.x);
+    out.org_y[i] = static_cast<float>(in[1][i] + in[4][i] * begin_m - level.p_DL.y);
+    out.org_z[i] = static_cast<float>(in[2][i] + in[5][i] * begin_m - level.p_DL.z);
+    out.dir_x[i] = static_cast<float>(in[3][i]);
+    out.dir_y[i] = static_cast<float>(in[4][i]);
+    out.dir_z[i] = static_cast<float>(in[5][i]);
+    out.tnear[i] = 0;
+    out.tfar[i] = far_float(packet.leave_m[i] - begin_m, level.slack_m);
+    out.time[i] = 0;
+    out.mask[i] = ~0u;
+    out.id[i] = static_cast<unsigned>(i);
+    out.flags[i] = 0;
+    packet.floats.hit.geomID[i] = RTC_INVALID_GEOMETRY_ID;
+  }
+  bool any = false;
+  for (std::size_t i = 0; i < W; ++i) {
+    const bool open = i < rays.size() && !hits[i] && packet.enter_m[i] <= packet.leave_m[i];
+    packet.valid[i] = open ? -1 : 0;
+    any |= open;
+  }
+  return any;
+}
+
+// Meets each ray with the plane of the facet that Embree hit, and finds how far inside the facet
+// that is (cells); negative if it is not, or if the plane is met from behind.
+template <int W>
+void meet_planes(Packet<W>& packet) noexcept {
+  for (std::size_t i = 0; i < W; ++i) {
+    const double above_m = packet.z0[i] - (packet.height_m[i] + packet.u_slope_m[i] * packet.u0[i] +
+                                           packet.v_slope_m[i] * packet.v0[i]);
+    const double closing =
+        -(packet.dz[i] - (packet.u_slope_m[i] * packet.du[i] + packet.v_slope_m[i] * packet.dv[i]));
+    const double range_m = above_m / closing;
+    const double u = packet.u0[i] + range_m * packet.du[i] - packet.column[i];
+    const double v = packet.v0[i] + range_m * packet.dv[i] - packet.row[i];
+    const double near_half = std::min(std::min(u, v), 1 - (u + v));
+    const double far_half = std::min(std::min(1 - u, 1 - v), (u + v) - 1);
+    const double along_m = std::min(range_m - packet.enter_m[i], packet.leave_m[i] - range_m);
+    packet.range_m[i] = range_m;
+    packet.inside[i] = closing > 0 && along_m >= 0
+                           ? (packet.facets[i].half == Facet::Half::Near ? near_half : far_half)
+                           : -1.0;
+  }
+}
+
+template <int W>
+void decide_fast(const LevelScene& level, Packet<W>& packet) noexcept {
   for (int lane = 0; lane < W; ++lane) {
-    packet.valid[lane] = lane < count && !hits[lane] && enter(level, rays[lane], packet.rays[lane]) ? -1 : 0;
-    if (packet.valid[lane] == 0) continue;
-    packet.put(lane, packet.rays[lane]);
-    packet.crossings[lane] = {};
-    ++open;
+    const bool hit = packet.valid[static_cast<std::size_t>(lane)] != 0 &&
+                     packet.floats.hit.geomID[lane] != RTC_INVALID_GEOMETRY_ID;
+    const Facet facet = hit ? facet_of(level, packet.hit(lane)) : Facet{};
+    packet.take(lane, facet, level.level.grid.plane(facet));
   }
-  if (open == 0) return;
-  Query query{{}, packet.rays.data(), packet.crossings.data()};
+  meet_planes(packet);
+  for (int lane = 0; lane < W; ++lane) {
+    const auto i = static_cast<std::size_t>(lane);
+    if (packet.valid[i] == 0) continue;
+    const FloatHit hit = packet.hit(lane);
+    const bool met = hit.geometry != RTC_INVALID_GEOMETRY_ID;
+    if (met && packet.inside[i] > kInsideMargin) continue;
+    const LevelRay ray = packet.level_ray(lane);
+    const auto crossing = met || ends_below(level, ray) ? search(level, ray, hit) : std::nullopt;
+    packet.range_m[i] = crossing ? crossing->range_m : std::numeric_limits<double>::infinity();
+    if (crossing) packet.take(lane, crossing->facet, level.level.grid.plane(crossing->facet));
+  }
+}
+
+template <int W>
+void decide_exact(const LevelScene& level, Packet<W>& packet) noexcept {
+  for (int lane = 0; lane < W; ++lane) {
+    const Crossing& crossing = packet.crossings[static_cast<std::size_t>(lane)];
+    packet.range_m[static_cast<std::size_t>(lane)] = crossing.range_m;
+    packet.take(lane, crossing.facet, level.level.grid.plane(crossing.facet));
+  }
+}
+
+template <int W>
+void report(const LevelScene& level, std::uint32_t number, const Packet<W>& packet,
+            std::span<Hit> hits) noexcept {
+  const glm::dvec2 per_m = level.level.grid.cells_per_m();
+  std::array<std::array<float, W>, 3> normals;
+  for (std::size_t i = 0; i < W; ++i) {
+    const double x = -packet.u_slope_m[i] * per_m.x;
+    const double y = -packet.v_slope_m[i] * per_m.y;
+    const double scale = 1 / std::sqrt(x * x + y * y + 1);
+    normals[0][i] = static_cast<float>(x * scale);
+    normals[1][i] = static_cast<float>(y * scale);
+    normals[2][i] = static_cast<float>(scale);
+  }
+  for (std::size_t i = 0; i < hits.size(); ++i) {
+    if (packet.valid[i] == 0 || !(packet.range_m[i] < std::numeric_limits<double>::infinity()))
+      continue;
+    hits[i] = {packet.range_m[i], {normals[0][i], normals[1][i], normals[2][i]}, number};
+  }
+}
+
+template <int W>
+void trace_level(const LevelScene& level, std::uint32_t number, Tracing tracing,
+                 std::span<const Ray> rays, std::span<Hit> hits, Packet<W>& packet) noexcept {
+  if (!enter(level, rays, hits, packet)) return;
+  if (tracing == Tracing::Exact) {
+    for (int lane = 0; lane < W; ++lane)
+      packet.exact_rays[static_cast<std::size_t>(lane)] = packet.level_ray(lane);
+    packet.crossings.fill({});
+  }
+  Query query{{}, packet.exact_rays.data(), packet.crossings.data()};
   intersect_packet<W>(packet.valid.data(), level.scene, query, packet.floats, true);
-  for (int lane = 0; lane < count; ++lane) {
-    if (packet.valid[lane] == 0) continue;
-    std::optional<Crossing> crossing = packet.crossings[lane];
-    if (tracing == Tracing::Fast) crossing = decide(level, packet.rays[lane], packet.hit(lane));
-    if (!crossing || !(crossing->range_m < std::numeric_limits<double>::infinity())) continue;
-    const FacetPlane plane = level.level.grid.plane(crossing->facet);
-    hits[lane] = {crossing->range_m, glm::vec3(level.level.grid.normal(plane)), number};
+  if (tracing == Tracing::Exact) {
+    decide_exact(level, packet);
+  } else {
+    decide_fast(level, packet);
   }
+  report(level, number, packet, hits);
 }
 
 }  // namespace
@@ -473,7 +606,8 @@ struct RayTracer::Impl {
     if (std::isnan(grid.min_height_m())) throw Error("ray tracer: a level has no height at all");
     const glm::dvec3 a = sample_L(level, 0, 0, grid.min_height_m());
     const glm::dvec3 b = sample_L(level, grid.columns() - 1, grid.rows() - 1, grid.max_height_m());
-    level.slack_m = static_cast<float>(16 * 0x1p-24 * glm::length(glm::max(glm::abs(a), glm::abs(b))));
+    level.slack_m =
+        static_cast<float>(16 * 0x1p-24 * glm::length(glm::max(glm::abs(a), glm::abs(b))));
     level.scene = rtcNewScene(device);
     rtcSetSceneFlags(level.scene, RTC_SCENE_FLAG_ROBUST);
     rtcSetSceneBuildQuality(level.scene, RTC_BUILD_QUALITY_MEDIUM);
@@ -494,7 +628,8 @@ struct RayTracer::Impl {
       const auto out = hits.subspan(begin, count);
       std::ranges::fill(out, Hit{});
       for (std::size_t i = 0; i < scenes.size(); ++i) {
-        trace_level<W>(scenes[i], static_cast<std::uint32_t>(i), tracing, rays.subspan(begin, count), out, packet);
+        trace_level<W>(scenes[i], static_cast<std::uint32_t>(i), tracing,
+                       rays.subspan(begin, count), out, packet);
       }
     }
   }
@@ -505,15 +640,19 @@ RayTracer::RayTracer(std::vector<Level> levels, const glm::dvec3& p_DL, Tracing 
     : impl_(std::make_unique<Impl>()) {
   impl_->tracing = tracing;
   impl_->device = rtcNewDevice(device_config.c_str());
-  if (impl_->device == nullptr) throw Error("ray tracer: Embree makes no device for the settings '{}'", device_config);
+  if (impl_->device == nullptr)
+    throw Error("ray tracer: Embree makes no device for the settings '{}'", device_config);
   rtcSetDeviceMemoryMonitorFunction(
       impl_->device,
       [](void* counter, ssize_t bytes, bool) {
-        static_cast<std::atomic<std::ptrdiff_t>*>(counter)->fetch_add(bytes, std::memory_order_relaxed);
+        static_cast<std::atomic<std::ptrdiff_t>*>(counter)->fetch_add(bytes,
+                                                                      std::memory_order_relaxed);
         return true;
       },
       &impl_->bytes);
-  const auto native = [&](RTCDeviceProperty property) { return rtcGetDeviceProperty(impl_->device, property) != 0; };
+  const auto native = [&](RTCDeviceProperty property) {
+    return rtcGetDeviceProperty(impl_->device, property) != 0;
+  };
   if (native(RTC_DEVICE_PROPERTY_NATIVE_RAY16_SUPPORTED)) {
     impl_->width = 16;
   } else if (native(RTC_DEVICE_PROPERTY_NATIVE_RAY8_SUPPORTED)) {
@@ -537,16 +676,22 @@ void RayTracer::trace(std::span<const Ray> rays, std::span<Hit> hits) const noex
   impl_->trace<4>(rays, hits);
 }
 
-const HeightGrid& RayTracer::grid(std::uint32_t level) const { return impl_->scenes.at(level).level.grid; }
+const HeightGrid& RayTracer::grid(std::uint32_t level) const {
+  return impl_->scenes.at(level).level.grid;
+}
 
-std::size_t RayTracer::memory_bytes() const { return static_cast<std::size_t>(impl_->bytes.load()); }
+std::size_t RayTracer::memory_bytes() const {
+  return static_cast<std::size_t>(impl_->bytes.load());
+}
 
 std::string RayTracer::description() const {
   const auto version = rtcGetDeviceProperty(impl_->device, RTC_DEVICE_PROPERTY_VERSION);
-  return fmt::format("Embree {}.{}.{}, packets of {}", version / 10000, version / 100 % 100, version % 100,
-                     impl_->width);
+  return fmt::format("Embree {}.{}.{}, packets of {}", version / 10000, version / 100 % 100,
+                     version % 100, impl_->width);
 }
 
-glm::dvec3 float_frame_origin(const glm::dvec3& viewpoint) { return glm::round(viewpoint / 2048.0) * 2048.0; }
+glm::dvec3 float_frame_origin(const glm::dvec3& viewpoint) {
+  return glm::round(viewpoint / 2048.0) * 2048.0;
+}
 
 }  // namespace groundray

@@ -13,9 +13,11 @@
 
 namespace groundray {
 
-/// How rays are decided. Ranges are the same in both: within 1e-9 * range + 1e-9 m of the reference surface.
+/// How rays are decided. Ranges are the same in both: within 1e-9 * range + 1e-9 m of the reference
+/// surface.
 enum class Tracing {
-  Fast,   ///< Embree chooses the facet: at most 5e-6 of rays, those that graze a silhouette, may choose otherwise
+  Fast,   ///< Embree chooses the facet: at most 5e-6 of rays, those that graze a silhouette, may
+          ///< choose otherwise
   Exact,  ///< every facet is decided in double
 };
 
@@ -28,13 +30,17 @@ struct Ray {
 
 /// What a ray meets first.
 struct Hit {
-  double range_m = std::numeric_limits<double>::infinity();  ///< along the ray; infinite if it meets nothing
-  glm::vec3 normal{0};                                       ///< of the facet, unit, in D, facing up
-  std::uint32_t level = 0;                                   ///< index of the level that was hit
-  explicit operator bool() const noexcept { return range_m < std::numeric_limits<double>::infinity(); }
+  double range_m =
+      std::numeric_limits<double>::infinity();  ///< along the ray; infinite if it meets nothing
+  glm::vec3 normal{0};                          ///< of the facet, unit, in D, facing up
+  std::uint32_t level = 0;                      ///< index of the level that was hit
+  explicit operator bool() const noexcept {
+    return range_m < std::numeric_limits<double>::infinity();
+  }
 };
 
-/// What one level scene is made of: parts of a height grid. Samples shared by two parts are one vertex.
+/// What one level scene is made of: parts of a height grid. Samples shared by two parts are one
+/// vertex.
 struct Level {
   /// A rectangle of samples without holes, traced as one grid primitive.
   struct Block {
@@ -48,20 +54,23 @@ struct Level {
   std::vector<Facet> facets;  ///< facets outside the blocks
 };
 
-/// Traces rays through an ordered list of level scenes: each level in turn, until one is hit. All of Embree is in here.
-/// Immutable; any number of threads may trace at once.
+/// Traces rays through an ordered list of level scenes: each level in turn, until one is hit. All
+/// of Embree is in here. Immutable; any number of threads may trace at once.
 class RayTracer {
  public:
   /// @param levels         finest first; a ray must pass them in this order.
-  /// @param p_DL           origin of the float frame L that Embree works in, in D; keep it near the sensors.
+  /// @param p_DL           origin of the float frame L that Embree works in, in D; keep it near the
+  /// sensors.
   /// @param device_config  passed to rtcNewDevice, for example "max_isa=avx2".
   /// @throws Error if Embree refuses: its message, and what was being built.
-  RayTracer(std::vector<Level> levels, const glm::dvec3& p_DL, Tracing tracing, const std::string& device_config = "");
+  RayTracer(std::vector<Level> levels, const glm::dvec3& p_DL, Tracing tracing,
+            const std::string& device_config = "");
   ~RayTracer();
   RayTracer(RayTracer&&) noexcept;
   RayTracer& operator=(RayTracer&&) noexcept;
 
-  /// Finds the first hit of each ray from above. Neighbouring rays should be alike: they are traced in packets.
+  /// Finds the first hit of each ray from above. Neighbouring rays should be alike: they are traced
+  /// in packets.
   /// @param hits  as many as there are rays.
   void trace(std::span<const Ray> rays, std::span<Hit> hits) const noexcept;
 
@@ -79,7 +88,8 @@ class RayTracer {
   std::unique_ptr<Impl> impl_;
 };
 
-/// Returns the point of the 2048 m lattice nearest to `viewpoint` (D): the origin that L takes for it.
+/// Returns the point of the 2048 m lattice nearest to `viewpoint` (D): the origin that L takes for
+/// it.
 glm::dvec3 float_frame_origin(const glm::dvec3& viewpoint);
 
 }  // namespace groundray

@@ -12,7 +12,8 @@ struct SurfaceTruth {
   std::uint32_t instance = 0;  ///< 0 is "no object"
 };
 
-/// The world as sensors see it: everything that rays can meet, and what is known about it. Immutable once built.
+/// The world as sensors see it: everything that rays can meet, and what is known about it.
+/// Immutable once built.
 struct Scene {
   RayTracer rays;
   SurfaceTruth terrain;

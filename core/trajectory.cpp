@@ -22,7 +22,8 @@ Trajectory::Trajectory(std::vector<Sample> samples) : samples_(std::move(samples
     auto& [rotation, translation_m] = samples_[i].pose;
     const double norm = glm::length(rotation);
     broken.unless(std::abs(norm - 1) <= 1e-6,
-                  "pose {} has a quaternion of norm {}; it must be 1 within 1e-6: are its four values in the order "
+                  "pose {} has a quaternion of norm {}; it must be 1 within 1e-6: are its four "
+                  "values in the order "
                   "the format asks for?",
                   i, norm);
     broken.unless(std::isfinite(translation_m.x + translation_m.y + translation_m.z),
@@ -43,14 +44,16 @@ Trajectory::Trajectory(std::vector<Sample> samples) : samples_(std::move(samples
 
 Pose Trajectory::pose_at(std::chrono::nanoseconds time) const {
   if (time < begin_time() || end_time() < time) {
-    throw Error("trajectory: it is asked for {} s but covers [{}, {}] s; extend it or shorten the run", seconds(time),
-                seconds(begin_time()), seconds(end_time()));
+    throw Error(
+        "trajectory: it is asked for {} s but covers [{}, {}] s; extend it or shorten the run",
+        seconds(time), seconds(begin_time()), seconds(end_time()));
   }
   const auto after = std::ranges::upper_bound(samples_, time, {}, &Sample::time);
   if (after == samples_.end()) return samples_.back().pose;
   const auto i = static_cast<std::size_t>(after - samples_.begin()) - 1;
   const auto span = static_cast<double>((samples_[i + 1].time - samples_[i].time).count());
-  return samples_[i].pose * screws_[i].at(static_cast<double>((time - samples_[i].time).count()) / span);
+  return samples_[i].pose *
+         screws_[i].at(static_cast<double>((time - samples_[i].time).count()) / span);
 }
 
 Trajectory Trajectory::mounted(const Pose& X_BC) const {

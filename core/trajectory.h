@@ -7,8 +7,8 @@
 
 namespace groundray {
 
-/// The path of a frame B through a frame A: poses X_AB at given times, joined by motions of constant body velocity
-/// (constant twist). Immutable; any number of threads may read it.
+/// The path of a frame B through a frame A: poses X_AB at given times, joined by motions of
+/// constant body velocity (constant twist). Immutable; any number of threads may read it.
 class Trajectory {
  public:
   struct Sample {
@@ -16,7 +16,8 @@ class Trajectory {
     Pose pose;
   };
 
-  /// @throws Error if `samples` is empty, a time does not lie after the one before, or a pose is not finite or not
+  /// @throws Error if `samples` is empty, a time does not lie after the one before, or a pose is
+  /// not finite or not
   ///         a rotation (quaternion norm off 1 by more than 1e-6); norms are set to 1.
   explicit Trajectory(std::vector<Sample> samples);
 

@@ -14,7 +14,8 @@
 namespace groundray {
 namespace {
 
-constexpr std::size_t kChunkPulses = 4096;  // traced at once by a thread; a multiple of every packet width
+constexpr std::size_t kChunkPulses =
+    4096;  // traced at once by a thread; a multiple of every packet width
 
 // A row of the scan to be.
 struct Echo {
@@ -45,7 +46,8 @@ glm::dmat3 turn_about_z(double angle_rad) {
   return {{cosine, sine, 0}, {-sine, cosine, 0}, {0, 0, 1}};
 }
 
-// One sweep being made. Chunks of firing sequences are independent of each other and of the order in which they are cast.
+// One sweep being made. Chunks of firing sequences are independent of each other and of the order
+// in which they are cast.
 class Sweep {
  public:
   Sweep(const ScanPattern& pattern, const Trajectory& X_DS, std::int64_t number)
@@ -55,18 +57,21 @@ class Sweep {
         sequences_(static_cast<std::size_t>(pattern.first_sequence(number + 1) - first_)),
         stamp_(pattern.stamp(number)) {
     if (stamp_ < X_DS.begin_time() || X_DS.end_time() < pattern.last_firing(number)) {
-      throw Error("lidar: sweep {} fires from {:.6f} s to {:.6f} s but the sensor's trajectory covers [{:.6f}, {:.6f}] s",
-                  number, 1e-9 * static_cast<double>(stamp_.count()),
-                  1e-9 * static_cast<double>(pattern.last_firing(number).count()),
-                  1e-9 * static_cast<double>(X_DS.begin_time().count()),
-                  1e-9 * static_cast<double>(X_DS.end_time().count()));
+      throw Error(
+          "lidar: sweep {} fires from {:.6f} s to {:.6f} s but the sensor's trajectory covers "
+          "[{:.6f}, {:.6f}] s",
+          number, 1e-9 * static_cast<double>(stamp_.count()),
+          1e-9 * static_cast<double>(pattern.last_firing(number).count()),
+          1e-9 * static_cast<double>(X_DS.begin_time().count()),
+          1e-9 * static_cast<double>(X_DS.end_time().count()));
     }
   }
 
   std::size_t sequences() const { return sequences_; }
 
   HeadPose head(std::size_t sequence, const ScanPattern::Volley& volley) const {
-    const double time_s = pattern_.firing_time_s(first_ + static_cast<std::int64_t>(sequence), volley);
+    const double time_s =
+        pattern_.firing_time_s(first_ + static_cast<std::int64_t>(sequence), volley);
     const std::chrono::nanoseconds time = to_nanoseconds(time_s);
     const Pose X_DS = X_DS_.pose_at(time);
     const glm::dmat3 R_SH = turn_about_z(pattern_.spin_rad(time_s));
@@ -82,8 +87,8 @@ class Sweep {
   std::chrono::nanoseconds stamp_;
 };
 
-// What one thread needs to cast a chunk. Rays are kept beam by beam, each beam's in order of azimuth: neighbours of a
-// packet are then alike.
+// What one thread needs to cast a chunk. Rays are kept beam by beam, each beam's in order of
+// azimuth: neighbours of a packet are then alike.
 struct Chunk {
   std::vector<HeadPose> heads;
   std::vector<Ray> rays;
@@ -96,7 +101,8 @@ Lidar::Lidar(const LidarSpec& spec)
     : pattern_(spec.pattern), gate_(spec.gate), range_noise_sigma_m_(spec.range_noise_sigma_m) {
   Violations broken(spec.model.empty() ? "lidar" : spec.model);
   broken.unless(gate_.near_m >= 0 && gate_.near_m < gate_.far_m,
-                "range gate [{}, {}] m is empty or begins below 0: are near and far swapped?", gate_.near_m, gate_.far_m);
+                "range gate [{}, {}] m is empty or begins below 0: are near and far swapped?",
+                gate_.near_m, gate_.far_m);
   broken.unless(range_noise_sigma_m_ >= 0 && std::isfinite(range_noise_sigma_m_),
                 "range noise of {} m must be finite and not negative", range_noise_sigma_m_);
   broken.throw_if_any();
@@ -114,14 +120,16 @@ PointCloud Lidar::scan(const Scene& scene, const Trajectory& X_DS, std::int64_t 
   tbb::parallel_for(std::size_t{0}, chunks, [&](std::size_t chunk_number) {
     const std::size_t begin = chunk_number * per_chunk;
     const std::size_t count = std::min(per_chunk, sweep.sequences() - begin);
-    Chunk chunk{std::vector<HeadPose>(count * volleys.size()), std::vector<Ray>(count * shots.size()),
-                std::vector<Hit>(count * shots.size())};
+    Chunk chunk{std::vector<HeadPose>(count * volleys.size()),
+                std::vector<Ray>(count * shots.size()), std::vector<Hit>(count * shots.size())};
     for (std::size_t k = 0; k < count; ++k) {
       for (std::size_t v = 0; v < volleys.size(); ++v) {
-        const HeadPose& head = chunk.heads[k * volleys.size() + v] = sweep.head(begin + k, volleys[v]);
-        for (auto s = static_cast<std::size_t>(volleys[v].begin); s < static_cast<std::size_t>(volleys[v].end); ++s) {
-          chunk.rays[s * count + k] = {head.p_DS + head.R_DH * shots[s].origin_m, head.R_DH * shots[s].direction,
-                                       gate_.far_m};
+        const HeadPose& head = chunk.heads[k * volleys.size() + v] =
+            sweep.head(begin + k, volleys[v]);
+        for (auto s = static_cast<std::size_t>(volleys[v].begin);
+             s < static_cast<std::size_t>(volleys[v].end); ++s) {
+          chunk.rays[s * count + k] = {head.p_DS + head.R_DH * shots[s].origin_m,
+                                       head.R_DH * shots[s].direction, gate_.far_m};
         }
       }
     }
@@ -131,21 +139,26 @@ PointCloud Lidar::scan(const Scene& scene, const Trajectory& X_DS, std::int64_t 
     for (std::size_t k = 0; k < count; ++k) {
       for (std::size_t v = 0; v < volleys.size(); ++v) {
         const HeadPose& head = chunk.heads[k * volleys.size() + v];
-        for (auto s = static_cast<std::size_t>(volleys[v].begin); s < static_cast<std::size_t>(volleys[v].end); ++s) {
+        for (auto s = static_cast<std::size_t>(volleys[v].begin);
+             s < static_cast<std::size_t>(volleys[v].end); ++s) {
           const Hit& hit = chunk.hits[s * count + k];
           if (!hit || hit.range_m < gate_.near_m) continue;
           const Ray& ray = chunk.rays[s * count + k];
           double reported_m = hit.range_m;
           if (range_noise_sigma_m_ > 0) {
             const auto pulse = static_cast<std::uint32_t>((begin + k) * shots.size() + s);
-            reported_m += range_noise_sigma_m_ *
-                          random_normal({seed, sensor_number, static_cast<std::uint32_t>(number), pulse}).x;
+            reported_m +=
+                range_noise_sigma_m_ *
+                random_normal({seed, sensor_number, static_cast<std::uint32_t>(number), pulse}).x;
           }
           const glm::vec3 direction(ray.direction);
-          out.push_back({hit.range_m, ray.origin + ray.direction * hit.range_m,
-                         glm::vec3(head.R_SH * (shots[s].origin_m + shots[s].direction * reported_m)), hit.normal,
-                         std::atan2(glm::length(glm::cross(direction, hit.normal)), -glm::dot(direction, hit.normal)),
-                         head.time_s, shots[s].ring});
+          out.push_back(
+              {hit.range_m, ray.origin + ray.direction * hit.range_m,
+               glm::vec3(head.R_SH * (shots[s].origin_m + shots[s].direction * reported_m)),
+               hit.normal,
+               std::atan2(glm::length(glm::cross(direction, hit.normal)),
+                          -glm::dot(direction, hit.normal)),
+               head.time_s, shots[s].ring});
         }
       }
     }

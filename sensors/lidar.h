@@ -20,13 +20,14 @@ struct RangeGate {
 
 /// Everything that makes one spinning lidar.
 struct LidarSpec {
-  std::string model;            ///< for people: "Velodyne VLP-16"
+  std::string model;  ///< for people: "Velodyne VLP-16"
   SpinningPattern pattern;
   RangeGate gate;
   double range_noise_sigma_m = 0;  ///< of a Gaussian along the beam; 0 for none
 };
 
-/// A scanning time-of-flight lidar, one ray for each pulse. Immutable, so any number of threads may scan with one.
+/// A scanning time-of-flight lidar, one ray for each pulse. Immutable, so any number of threads may
+/// scan with one.
 class Lidar {
  public:
   /// @throws Error listing every field of `spec` that is out of bounds.
@@ -34,10 +35,11 @@ class Lidar {
 
   const ScanPattern& pattern() const { return pattern_; }
 
-  /// Returns the echoes of one sweep, a row for each, in firing order. Columns (see docs/formats.md):
-  /// x y z (float, m, S as the beam fired), intensity, time (float, s since the sweep's stamp), ring, return_index,
-  /// return_count, world_x world_y world_z (double, m, D), range_true (double, m, from where the beam left), nx ny nz
-  /// (float, D), incidence (float, rad), label, instance, error_estimate (float, m).
+  /// Returns the echoes of one sweep, a row for each, in firing order. Columns (see
+  /// docs/formats.md): x y z (float, m, S as the beam fired), intensity, time (float, s since the
+  /// sweep's stamp), ring, return_index, return_count, world_x world_y world_z (double, m, D),
+  /// range_true (double, m, from where the beam left), nx ny nz (float, D), incidence (float, rad),
+  /// label, instance, error_estimate (float, m).
   /// @param X_DS   path of sensor S through D; must cover the sweep.
   /// @param sweep  which turn of the head since time 0.
   /// @param sensor_number  tells sensors of one dataset apart in the random numbers.

@@ -8,13 +8,16 @@
 
 namespace groundray {
 
-/// Reads a scene file (docs/scene.md). Relative paths in it are relative to its folder; a preset's name is looked up in
-/// `preset_folder`.
-/// @throws Error listing every fault as file:line:column with the rule and a suggestion: unknown or repeated keys,
-///         missing keys, wrong types or units, values out of range, unknown presets.
+/// Reads a scene file (docs/scene.md). Relative paths in it are relative to its folder; a preset's
+/// name is looked up in `preset_folder`. The files that a scene names are not opened here, lidar
+/// files excepted.
+/// @throws Error with a line for each fault, in the order of the file: path:line:column, the key,
+///         its value, the rule and a likely fix. Faults are unknown, repeated and missing keys,
+///         wrong types, values out of range, unknown presets, and whatever is not YAML.
 SceneSpec load_scene(const std::filesystem::path& path, const std::filesystem::path& preset_folder);
 
-/// As load_scene, of a text already in memory; `path` stands for the file in messages and relative paths.
+/// As load_scene, of a text already in memory; `path` stands for the file in messages and in the
+/// paths that are relative to it.
 SceneSpec parse_scene(const std::string& text, const std::filesystem::path& path,
                       const std::filesystem::path& preset_folder);
 
@@ -24,7 +27,7 @@ LidarSpec load_lidar(const std::filesystem::path& path);
 /// As load_lidar, of a text already in memory; `path` stands for the file in messages.
 LidarSpec parse_lidar(const std::string& text, const std::filesystem::path& path);
 
-/// Returns the names of the presets in a folder, sorted.
+/// Returns the names of the presets in a folder, sorted. @throws Error if it cannot be read.
 std::vector<std::string> preset_names(const std::filesystem::path& preset_folder);
 
 }  // namespace groundray

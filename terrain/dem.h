@@ -11,8 +11,8 @@ namespace groundray {
 struct Dem {
   HeightGrid grid;
   glm::dvec3 origin_w_m{0};  ///< D's origin in W, the coordinates of the DEM's CRS: whole metres
-  std::string crs_wkt;       ///< W's coordinate reference system; empty if the file names none
-  std::string crs_name;      ///< for people: "NAD83 / UTM zone 15N (EPSG:26915)"; "local (no CRS)" if none
+  std::string crs_wkt;       ///< W's coordinate reference system, WKT2:2019; empty if none is named
+  std::string crs_name;      ///< for people: "NAD83 / UTM zone 15N (EPSG:26915)"; "local (no CRS)"
 };
 
 }  // namespace groundray

@@ -11,17 +11,23 @@ namespace groundray {
 
 /// How a vehicle drives over the ground.
 struct GroundPathSpec {
-  std::vector<glm::dvec2> waypoints_m;     ///< in D; the path is a smooth curve through them, in order
-  double speed_m_s = 1;                    ///< along the curve
-  double height_m = 0;                     ///< of body frame B's origin above the ground below it
-  glm::dvec2 footprint_m{2, 1.5};          ///< wheel base and track: the ground under the wheels sets pitch and roll
-  std::chrono::nanoseconds duration{0};    ///< how long to drive
+  std::vector<glm::dvec2> waypoints_m;  ///< in D; the path is a smooth curve through them, in order
+  double speed_m_s = 1;                 ///< along the curve, in plan
+  double height_m = 0;             ///< of body frame B's origin above the ground right below it
+  glm::dvec2 footprint_m{2, 1.5};  ///< wheel base and track, in plan
+  std::chrono::nanoseconds duration{0};  ///< how long to drive
 };
 
-/// Returns the path X_DB of a vehicle that follows the ground: a centripetal Catmull-Rom curve through the waypoints at
-/// constant speed, at a height over the ground, pitching and rolling with it. One pose each 10 ms.
-/// @throws Error if the waypoints are fewer than two or too close, the curve is shorter than the drive, or a wheel
+/// Returns the path X_DB of a vehicle that follows the ground for [0, duration]: a pose each 10 ms
+/// and one at the end. In plan it runs at constant speed along a centripetal Catmull-Rom curve
+/// through the waypoints, heading along the tangent; the curve starts and ends along its first and
+/// last chord. Pitch and roll are those of the plane that best fits the ground under the four
+/// wheels.
+/// @throws Error if a value is out of bounds, waypoints lie closer than 1 cm, the curve turns back
+///         on itself at a waypoint or is shorter than the drive, or the vehicle's centre or a wheel
 ///         would stand outside the DEM or in a hole.
+/// @see Yuksel, Schaefer, Keyser, Parameterization and applications of Catmull-Rom curves (2011):
+///      the centripetal curve has no cusps or loops between waypoints.
 Trajectory build_ground_path(const HeightGrid& ground, const GroundPathSpec& spec);
 
 }  // namespace groundray

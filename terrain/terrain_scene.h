@@ -6,8 +6,8 @@
 
 namespace groundray {
 
-/// Returns the whole surface at full resolution as one level: tiles without holes as grid blocks, the facets of
-/// other tiles one by one.
+/// Returns the whole surface at full resolution as one level: tiles without holes as grid blocks,
+/// the facets of other tiles one by one.
 Level full_resolution_level(const HeightGrid& grid);
 
 }  // namespace groundray

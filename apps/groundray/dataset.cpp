@@ -38,15 +38,17 @@ std::string yaml_text(std::string_view text) {
 std::string header(const World& world) {
   const glm::dvec3 origin_m = world.dem.origin_w_m;
   std::string text = fmt::format(
-      "groundray_dataset: 1\nversion: {}\nseed: {}\ntracing: {}\norigin_w_m: [{}, {}, {}]\ncrs: {}\ncrs_wkt: {}\nscene: "
+      "groundray_dataset: 1\nversion: {}\nseed: {}\ntracing: {}\norigin_w_m: [{}, {}, {}]\ncrs: "
+      "{}\ncrs_wkt: {}\nscene: "
       "{}\nsensors:\n",
-      yaml_text(GROUNDRAY_VERSION), world.spec.seed.value, world.spec.tracing == Tracing::Fast ? "fast" : "exact",
-      origin_m.x, origin_m.y, origin_m.z, yaml_text(world.dem.crs_name), yaml_text(world.dem.crs_wkt),
-      yaml_text(world.spec.text));
+      yaml_text(GROUNDRAY_VERSION), world.spec.seed.value,
+      world.spec.tracing == Tracing::Fast ? "fast" : "exact", origin_m.x, origin_m.y, origin_m.z,
+      yaml_text(world.dem.crs_name), yaml_text(world.dem.crs_wkt), yaml_text(world.spec.text));
   for (std::size_t i = 0; i < world.lidars.size(); ++i) {
     const MountedLidar& spec = world.lidars[i].spec;
-    text += fmt::format("  - {{name: {}, kind: lidar, number: {}, model: {}, source: {}, frames: {}}}\n", spec.name, i,
-                        yaml_text(spec.lidar.model), yaml_text(spec.source), world.lidars[i].sweeps);
+    text += fmt::format(
+        "  - {{name: {}, kind: lidar, number: {}, model: {}, source: {}, frames: {}}}\n", spec.name,
+        i, yaml_text(spec.lidar.model), yaml_text(spec.source), world.lidars[i].sweeps);
   }
   return text;
 }
@@ -56,19 +58,23 @@ std::string calibration(const PlacedLidar& placed) {
   const SpinningPattern& pattern = lidar.pattern;
   const Pose& X_BS = placed.spec.X_BS;
   std::string text = fmt::format(
-      "model: {}\nframe: \"x forward, y left, z up\"\nX_BS:  # pose of the sensor in the body\n  translation_m: [{}, {}, "
+      "model: {}\nframe: \"x forward, y left, z up\"\nX_BS:  # pose of the sensor in the body\n  "
+      "translation_m: [{}, {}, "
       "{}]\n  rotation_xyzw: [{}, {}, {}, {}]\nrotation_rate_hz: {}\nsense: {}\nstart_azimuth_deg: "
-      "{}\nfiring_period_us: {}\nrange_gate_m: [{}, {}]\nrange_noise_sigma_m: {}\nbeam_columns: [ring, elevation_deg, "
+      "{}\nfiring_period_us: {}\nrange_gate_m: [{}, {}]\nrange_noise_sigma_m: {}\nbeam_columns: "
+      "[ring, elevation_deg, "
       "azimuth_offset_deg, origin_x_m, origin_y_m, origin_z_m, firing_time_us]\nbeams:\n",
-      yaml_text(lidar.model), X_BS.translation_m.x, X_BS.translation_m.y, X_BS.translation_m.z, X_BS.rotation.x,
-      X_BS.rotation.y, X_BS.rotation.z, X_BS.rotation.w, pattern.rate_hz,
+      yaml_text(lidar.model), X_BS.translation_m.x, X_BS.translation_m.y, X_BS.translation_m.z,
+      X_BS.rotation.x, X_BS.rotation.y, X_BS.rotation.z, X_BS.rotation.w, pattern.rate_hz,
       pattern.sense == SpinningPattern::Sense::Clockwise ? "clockwise" : "counter_clockwise",
       degrees(pattern.start_azimuth_rad), pattern.firing_period_s * 1e6, lidar.gate.near_m,
-      std::isinf(lidar.gate.far_m) ? ".inf" : fmt::format("{}", lidar.gate.far_m), lidar.range_noise_sigma_m);
+      std::isinf(lidar.gate.far_m) ? ".inf" : fmt::format("{}", lidar.gate.far_m),
+      lidar.range_noise_sigma_m);
   for (const Beam& beam : pattern.beams) {
-    text += fmt::format("- [{}, {:.9g}, {:.9g}, {:.9g}, {:.9g}, {:.9g}, {:.9g}]\n", beam.ring,
-                        degrees(beam.elevation_rad), degrees(beam.azimuth_offset_rad), beam.origin_m.x, beam.origin_m.y,
-                        beam.origin_m.z, beam.firing_time_s * 1e6);
+    text +=
+        fmt::format("- [{}, {:.9g}, {:.9g}, {:.9g}, {:.9g}, {:.9g}, {:.9g}]\n", beam.ring,
+                    degrees(beam.elevation_rad), degrees(beam.azimuth_offset_rad), beam.origin_m.x,
+                    beam.origin_m.y, beam.origin_m.z, beam.firing_time_s * 1e6);
   }
   return text;
 }
@@ -77,7 +83,8 @@ void make_folder(const fs::path& folder) {
   std::error_code failure;
   fs::create_directories(folder, failure);
   if (failure) {
-    throw Error("{}: cannot make this folder: {}; choose another one with -o", folder.string(), failure.message());
+    throw Error("{}: cannot make this folder: {}; choose another one with -o", folder.string(),
+                failure.message());
   }
 }
 
@@ -86,13 +93,17 @@ void check_same_run(const fs::path& folder, const World& world) {
   if (!fs::exists(folder, ignored) || fs::is_empty(folder, ignored)) return;
   const fs::path record = folder / "dataset.yaml";
   if (!fs::exists(record, ignored)) {
-    throw Error("{}: the folder is not empty and holds no dataset.yaml; choose a new folder with -o", folder.string());
+    throw Error(
+        "{}: the folder is not empty and holds no dataset.yaml; choose a new folder with -o",
+        folder.string());
   }
   const std::string before = read_text(record);
   if (before.substr(0, before.find(kFrames)) + "\n" != header(world)) {
-    throw Error("{}: the folder holds a dataset of another scene, seed or version; choose a new folder with -o or "
-                "remove this one",
-                folder.string());
+    throw Error(
+        "{}: the folder holds a dataset of another scene, seed or version; choose a new folder "
+        "with -o or "
+        "remove this one",
+        folder.string());
   }
 }
 
@@ -119,7 +130,9 @@ fs::path Dataset::preview_path(const PlacedLidar& lidar, std::int64_t frame) con
   return folder_ / "lidar" / lidar.spec.name / fmt::format("{:06}_preview.png", frame);
 }
 
-bool Dataset::has(const PlacedLidar& lidar, std::int64_t frame) const { return fs::exists(scan_path(lidar, frame)); }
+bool Dataset::has(const PlacedLidar& lidar, std::int64_t frame) const {
+  return fs::exists(scan_path(lidar, frame));
+}
 
 void Dataset::record() const {
   std::string text = header(world_);
@@ -127,7 +140,8 @@ void Dataset::record() const {
   text += kFrames;
   for (const PlacedLidar& lidar : world_.lidars) {
     for (std::int64_t frame = 0; frame < lidar.sweeps; ++frame) {
-      text += fmt::format("  - {{sensor: {}, frame: {}, stamp_s: {:.9f}, state: {}}}\n", lidar.spec.name, frame,
+      text += fmt::format("  - {{sensor: {}, frame: {}, stamp_s: {:.9f}, state: {}}}\n",
+                          lidar.spec.name, frame,
                           1e-9 * static_cast<double>(lidar.lidar.pattern().stamp(frame).count()),
                           has(lidar, frame) ? "done" : "pending");
     }

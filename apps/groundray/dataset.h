@@ -8,12 +8,13 @@
 
 namespace groundray {
 
-/// The folder that a run fills (docs/formats.md). Made anew, or taken up again where an earlier run of the same scene,
-/// seed and version stopped.
+/// The folder that a run fills (docs/formats.md). Made anew, or taken up again where an earlier run
+/// of the same scene, seed and version stopped.
 class Dataset {
  public:
   /// Writes poses, calibration and dataset.yaml.
-  /// @throws Error if the folder cannot be written, or holds anything else than a dataset of this very run.
+  /// @throws Error if the folder cannot be written, or holds anything else than a dataset of this
+  /// very run.
   Dataset(const std::filesystem::path& folder, const World& world);
 
   std::filesystem::path scan_path(const PlacedLidar& lidar, std::int64_t frame) const;

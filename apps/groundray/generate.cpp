@@ -35,8 +35,8 @@ struct Tally {
   std::chrono::duration<double> scanning{0};
 };
 
-// Makes scenes as frames ask for them: the float frame L follows the viewpoint over its lattice, so that a frame's bytes
-// depend on the frame alone.
+// Makes scenes as frames ask for them: the float frame L follows the viewpoint over its lattice, so
+// that a frame's bytes depend on the frame alone.
 class SceneFor {
  public:
   explicit SceneFor(const World& world) : world_(world) {}
@@ -45,8 +45,9 @@ class SceneFor {
     const glm::dvec3 p_DL = float_frame_origin(viewpoint);
     if (!scene_ || p_DL != p_DL_) {
       scene_.reset();  // before the next one is built: two would need twice the memory
-      scene_.emplace(Scene{RayTracer({full_resolution_level(world_.dem.grid)}, p_DL, world_.spec.tracing),
-                           {world_.spec.terrain.label, 0}});
+      scene_.emplace(
+          Scene{RayTracer({full_resolution_level(world_.dem.grid)}, p_DL, world_.spec.tracing),
+                {world_.spec.terrain.label, 0}});
       p_DL_ = p_DL;
     }
     return *scene_;
@@ -58,16 +59,18 @@ class SceneFor {
   std::optional<Scene> scene_;
 };
 
-void make_frame(const World& world, const Dataset& dataset, std::uint32_t sensor_number, std::int64_t frame,
-                SceneFor& scene_for, Tally& tally) {
+void make_frame(const World& world, const Dataset& dataset, std::uint32_t sensor_number,
+                std::int64_t frame, SceneFor& scene_for, Tally& tally) {
   const PlacedLidar& lidar = world.lidars[sensor_number];
   const ScanPattern& pattern = lidar.lidar.pattern();
   const Scene& scene = scene_for(lidar.X_DS.pose_at(pattern.stamp(frame)).translation_m);
   const auto begin = Clock::now();
-  const PointCloud scan = lidar.lidar.scan(scene, lidar.X_DS, frame, world.spec.seed, sensor_number);
+  const PointCloud scan =
+      lidar.lidar.scan(scene, lidar.X_DS, frame, world.spec.seed, sensor_number);
   tally.scanning += Clock::now() - begin;
   tally.points += scan.rows();
-  tally.pulses += static_cast<std::uint64_t>(pattern.first_sequence(frame + 1) - pattern.first_sequence(frame)) *
+  tally.pulses += static_cast<std::uint64_t>(pattern.first_sequence(frame + 1) -
+                                             pattern.first_sequence(frame)) *
                   pattern.shots().size();
   ++tally.scans;
 
@@ -77,11 +80,12 @@ void make_frame(const World& world, const Dataset& dataset, std::uint32_t sensor
             {fmt::format("origin_w {} {} {}", origin_m.x, origin_m.y, origin_m.z)});
 }
 
-void say(const World& world, const std::filesystem::path& out, const Tally& tally, std::uint64_t there_before) {
+void say(const World& world, const std::filesystem::path& out, const Tally& tally,
+         std::uint64_t there_before) {
   if (there_before > 0) fmt::print("{} scans were there already\n", there_before);
   if (tally.scans > 0) {
-    fmt::print("{} scans, {} points of {} pulses, {:.2f} M rays/s\n", tally.scans, tally.points, tally.pulses,
-               1e-6 * static_cast<double>(tally.pulses) / tally.scanning.count());
+    fmt::print("{} scans, {} points of {} pulses, {:.2f} M rays/s\n", tally.scans, tally.points,
+               tally.pulses, 1e-6 * static_cast<double>(tally.pulses) / tally.scanning.count());
   }
   fmt::print("dataset: {}\n", out.string());
   for (const PlacedLidar& lidar : world.lidars) {

@@ -40,16 +40,17 @@ void print_scene(const World& world) {
     const ScanPattern& pattern = lidar.lidar.pattern();
     const auto pulses = static_cast<double>(pattern.first_sequence(lidar.sweeps)) *
                         static_cast<double>(pattern.shots().size());
-    fmt::print("lidar     {}: {}, {} scans of about {:.0f} pulses, at most {:.1f} MiB of PLY\n", lidar.spec.name,
-               lidar.spec.lidar.model, lidar.sweeps, pulses / static_cast<double>(lidar.sweeps),
-               pulses * 88 / (1 << 20));
+    fmt::print("lidar     {}: {}, {} scans of about {:.0f} pulses, at most {:.1f} MiB of PLY\n",
+               lidar.spec.name, lidar.spec.lidar.model, lidar.sweeps,
+               pulses / static_cast<double>(lidar.sweeps), pulses * 88 / (1 << 20));
   }
 }
 
 }  // namespace
 
 void print_info(const std::filesystem::path& file) {
-  if (file.extension() == ".yaml" || file.extension() == ".yml") return print_scene(load_world(file));
+  if (file.extension() == ".yaml" || file.extension() == ".yml")
+    return print_scene(load_world(file));
   const DemInfo info = inspect_dem(file);
   fmt::print("format    {}, {}\n", info.driver, info.sample_type);
   print_dem(load_dem(file));

@@ -21,7 +21,8 @@ void paint(Image8& image, int x, int y, const Colour& colour) {
   if (x < 0 || y < 0 || x >= image.width() || y >= image.height()) return;
   const auto pixel = image.at(x, y);
   for (int i = 0; i < 3; ++i) {
-    pixel[static_cast<std::size_t>(i)] = static_cast<std::uint8_t>(std::clamp(colour[i], 0.0, 1.0) * 255 + 0.5);
+    pixel[static_cast<std::size_t>(i)] =
+        static_cast<std::uint8_t>(std::clamp(colour[i], 0.0, 1.0) * 255 + 0.5);
   }
 }
 
@@ -42,7 +43,8 @@ Colour range_colour(double range_m, double far_m) {
 double quantile_m(std::span<const double> ranges_m, double share) {
   if (ranges_m.empty()) return 1;
   std::vector<double> sorted(ranges_m.begin(), ranges_m.end());
-  const auto at = sorted.begin() + static_cast<std::ptrdiff_t>(share * static_cast<double>(sorted.size() - 1));
+  const auto at =
+      sorted.begin() + static_cast<std::ptrdiff_t>(share * static_cast<double>(sorted.size() - 1));
   std::nth_element(sorted.begin(), at, sorted.end());
   return *at;
 }
@@ -60,7 +62,8 @@ int band_height(const SpinningPattern& pattern) {
   return std::max(2, 160 / static_cast<int>(pattern.beams.size()));
 }
 
-void draw_ranges(Image8& image, const PointCloud& scan, const SpinningPattern& pattern, double far_m) {
+void draw_ranges(Image8& image, const PointCloud& scan, const SpinningPattern& pattern,
+                 double far_m) {
   const auto x = scan.column<float>("x");
   const auto y = scan.column<float>("y");
   const auto ring = scan.column<std::uint16_t>("ring");
@@ -94,7 +97,8 @@ struct MapWindow {
 };
 
 void draw_hillshade(Image8& image, const MapWindow& window, const HeightGrid& ground) {
-  const glm::dvec3 sun = glm::normalize(glm::dvec3(-1, 1, 1.4));  // from the north-west, as maps have it
+  const glm::dvec3 sun =
+      glm::normalize(glm::dvec3(-1, 1, 1.4));  // from the north-west, as maps have it
   const double reach_m = std::max(2 * window.half_m / kWidth, 0.5 * std::abs(ground.step_m().x));
   for (int y = 0; y < kWidth; ++y) {
     for (int x = 0; x < kWidth; ++x) {
@@ -119,7 +123,11 @@ void draw_points(Image8& image, const MapWindow& window, const PointCloud& scan,
   const auto range_m = scan.column<double>("range_true");
   for (std::size_t i = 0; i < scan.rows(); ++i) {
     const glm::ivec2 at = window.pixel({x[i], y[i]});
-    if (at.y >= window.top) paint(image, at.x, at.y, range_colour(range_m[i], far_m));
+    for (const glm::ivec2 step :
+         {glm::ivec2(0, 0), glm::ivec2(1, 0), glm::ivec2(0, 1), glm::ivec2(1, 1)}) {
+      if (at.y < window.top) continue;
+      paint(image, at.x + step.x, at.y + step.y, range_colour(range_m[i], far_m));
+    }
   }
 }
 
@@ -132,7 +140,8 @@ void draw_sensor(Image8& image, const MapWindow& window, const Pose& X_DS) {
     const int radius = step == 0 ? 4 : 1;
     for (int dy = -radius; dy <= radius; ++dy) {
       for (int dx = -radius; dx <= radius; ++dx) {
-        if (dx * dx + dy * dy <= radius * radius) paint(image, at.x + dx, at.y + dy, {0.9, 0.1, 0.1});
+        if (dx * dx + dy * dy <= radius * radius)
+          paint(image, at.x + dx, at.y + dy, {0.9, 0.1, 0.1});
       }
     }
   }
@@ -140,14 +149,16 @@ void draw_sensor(Image8& image, const MapWindow& window, const Pose& X_DS) {
 
 }  // namespace
 
-Image8 draw_preview(const PointCloud& scan, const PlacedLidar& lidar, const Dem& dem, std::int64_t frame) {
+Image8 draw_preview(const PointCloud& scan, const PlacedLidar& lidar, const Dem& dem,
+                    std::int64_t frame) {
   const SpinningPattern& pattern = lidar.spec.lidar.pattern;
   const int ranges_height = band_height(pattern) * static_cast<int>(pattern.beams.size());
   Image8 image(kWidth, ranges_height + kGap + kWidth, 3);
   const auto range_m = scan.column<double>("range_true");
   const double far_m = std::max(quantile_m(range_m, 0.95), 1.0);
   const Pose X_DS = lidar.X_DS.pose_at(lidar.lidar.pattern().stamp(frame));
-  const MapWindow window{glm::dvec2(X_DS.translation_m), std::max(far_m * 1.1, 10.0), ranges_height + kGap};
+  const MapWindow window{glm::dvec2(X_DS.translation_m), std::max(far_m * 1.1, 10.0),
+                         ranges_height + kGap};
   draw_ranges(image, scan, pattern, far_m);
   draw_hillshade(image, window, dem.grid);
   draw_points(image, window, scan, far_m);

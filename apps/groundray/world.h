@@ -26,11 +26,13 @@ struct World {
   std::vector<PlacedLidar> lidars;
 };
 
-/// The folder with groundray's own data: $GROUNDRAY_DATA, or beside the installed program, or of the source tree.
+/// The folder with groundray's own data: $GROUNDRAY_DATA, or beside the installed program, or of
+/// the source tree.
 std::filesystem::path data_folder();
 
 /// Loads a scene and everything it names.
-/// @throws Error if a file is at fault, the platform's path ends before the run, a sensor is below ground on its way,
+/// @throws Error if a file is at fault, the platform's path ends before the run, a sensor is below
+/// ground on its way,
 ///         or a run is too short for one sweep.
 World load_world(const std::filesystem::path& scene);
 

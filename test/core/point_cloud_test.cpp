@@ -25,8 +25,10 @@ TEST(PointCloud, ColumnsKeepTheirValuesAsOthersAreAdded) {
 TEST(PointCloud, SaysWhatIsWrongWithAColumn) {
   PointCloud cloud(1);
   cloud.add<float>("x");
-  EXPECT_THAT([&] { cloud.add<float>("x"); }, ThrowsMessage<Error>(HasSubstr("a column 'x' already")));
-  EXPECT_THAT([&] { cloud.column<double>("x"); }, ThrowsMessage<Error>(HasSubstr("'x' holds numbers of another type")));
+  EXPECT_THAT([&] { cloud.add<float>("x"); },
+              ThrowsMessage<Error>(HasSubstr("a column 'x' already")));
+  EXPECT_THAT([&] { cloud.column<double>("x"); },
+              ThrowsMessage<Error>(HasSubstr("'x' holds numbers of another type")));
   EXPECT_THAT([&] { cloud.column<float>("y"); },
               ThrowsMessage<Error>(HasSubstr("there is no column 'y'; there are: x")));
 }

@@ -15,19 +15,22 @@ namespace {
 
 Pose random_pose(std::uint32_t number, double reach_m) {
   const auto at = [&](std::uint32_t k) { return random_normal({Seed{1}, k, 0, number}); };
-  return {glm::normalize(glm::dquat(at(0).x, at(0).y, at(1).x, at(1).y)), glm::dvec3(at(2), at(3).x) * reach_m};
+  return {glm::normalize(glm::dquat(at(0).x, at(0).y, at(1).x, at(1).y)),
+          glm::dvec3(at(2), at(3).x) * reach_m};
 }
 
 // Largest difference in where two poses take points within a metre of the origin, metres.
 double distance_m(const Pose& a, const Pose& b) {
   double worst = 0;
-  for (const glm::dvec3& p : {glm::dvec3(0), glm::dvec3(1, 0, 0), glm::dvec3(0, 1, 0), glm::dvec3(0, 0, 1)}) {
+  for (const glm::dvec3& p :
+       {glm::dvec3(0), glm::dvec3(1, 0, 0), glm::dvec3(0, 1, 0), glm::dvec3(0, 0, 1)}) {
     worst = std::max(worst, glm::length(a * p - b * p));
   }
   return worst;
 }
 
-// exp of the twist (v, w) as the power series of its 4 x 4 matrix: nothing shared with the closed form.
+// exp of the twist (v, w) as the power series of its 4 x 4 matrix: nothing shared with the closed
+// form.
 Pose exponential(const glm::dvec3& v, const glm::dvec3& w) {
   const glm::dmat4 twist = glm::transpose(
       glm::dmat4(0, -w.z, w.y, v.x, w.z, 0, -w.x, v.y, -w.y, w.x, 0, v.z, 0, 0, 0, 0));
@@ -45,7 +48,8 @@ TEST(Pose, ProductTakesPointsThroughBothFrames) {
     const Pose X_AB = random_pose(2 * i, 10);
     const Pose X_BC = random_pose(2 * i + 1, 10);
     const glm::dvec3 p_CQ(1, -2, 3);
-    EXPECT_LT(glm::length((X_AB * X_BC) * p_CQ - X_AB * (X_BC * p_CQ)), 1e-13 * 50);  // a few ulps of 50 m
+    EXPECT_LT(glm::length((X_AB * X_BC) * p_CQ - X_AB * (X_BC * p_CQ)),
+              1e-13 * 50);  // a few ulps of 50 m
     EXPECT_LT(distance_m(inverse(X_AB) * X_AB, Pose{}), 1e-13 * 50);
   }
 }

@@ -11,7 +11,8 @@ namespace {
 
 // Known answers of philox4x32-10 published with Random123 (kat_vectors).
 TEST(Random, IsPhilox) {
-  EXPECT_EQ(random_bits({}), (std::array<std::uint32_t, 4>{0x6627e8d5, 0xe169c58d, 0xbc57ac4c, 0x9b00dbd8}));
+  EXPECT_EQ(random_bits({}),
+            (std::array<std::uint32_t, 4>{0x6627e8d5, 0xe169c58d, 0xbc57ac4c, 0x9b00dbd8}));
 }
 
 TEST(Random, EveryPartOfTheKeyMatters) {

@@ -16,14 +16,16 @@ using namespace std::chrono_literals;
 using ::testing::HasSubstr;
 using ::testing::ThrowsMessage;
 
-// A car on a circle of radius r, turning left at a constant rate: the closed form of a constant twist.
+// A car on a circle of radius r, turning left at a constant rate: the closed form of a constant
+// twist.
 Pose on_circle(double radius_m, double angle_rad) {
   return {rotation_from_yaw_pitch_roll(angle_rad, 0, 0),
           {radius_m * std::sin(angle_rad), radius_m * (1 - std::cos(angle_rad)), 1}};
 }
 
 TEST(Trajectory, KeepsToACircleBetweenItsPoses) {
-  const Trajectory X_AB({{0s, on_circle(50, 0)}, {1s, on_circle(50, 0.4)}, {3s, on_circle(50, 1.2)}});
+  const Trajectory X_AB(
+      {{0s, on_circle(50, 0)}, {1s, on_circle(50, 0.4)}, {3s, on_circle(50, 1.2)}});
   for (int k = 0; k <= 300; ++k) {
     const Pose expected = on_circle(50, 0.004 * k);
     const Pose pose = X_AB.pose_at(10ms * k);
@@ -45,18 +47,20 @@ TEST(Trajectory, MountedSensorMovesAsTheBodyTakesIt) {
 TEST(Trajectory, RefusesTimesOutsideItsSpan) {
   const Trajectory X_AB({{1s, {}}, {2s, {}}});
   EXPECT_NO_THROW(X_AB.pose_at(2s));
-  EXPECT_THAT([&] { X_AB.pose_at(2s + 1ns); },
-              ThrowsMessage<Error>(AllOf(HasSubstr("2.000000001 s"), HasSubstr("covers [1, 2] s"))));
+  EXPECT_THAT(
+      [&] { X_AB.pose_at(2s + 1ns); },
+      ThrowsMessage<Error>(AllOf(HasSubstr("2.000000001 s"), HasSubstr("covers [1, 2] s"))));
   EXPECT_THAT([&] { X_AB.pose_at(0s); }, ThrowsMessage<Error>(HasSubstr("covers [1, 2] s")));
 }
 
 TEST(Trajectory, ListsEveryBadPoseAtOnce) {
-  EXPECT_THAT(([] {
-                Trajectory({{0s, {}}, {0s, {}}, {1s, {glm::dquat(1, 1, 0, 0), {}}}, {500ms, {}}});
-              }),
-              ThrowsMessage<Error>(AllOf(HasSubstr("pose 1 at 0 s does not lie after pose 0"),
-                                         HasSubstr("pose 2 has a quaternion of norm 1.414"),
-                                         HasSubstr("pose 3 at 0.5 s does not lie after pose 2 at 1 s"))));
+  EXPECT_THAT(
+      ([] {
+        Trajectory({{0s, {}}, {0s, {}}, {1s, {glm::dquat(1, 1, 0, 0), {}}}, {500ms, {}}});
+      }),
+      ThrowsMessage<Error>(AllOf(HasSubstr("pose 1 at 0 s does not lie after pose 0"),
+                                 HasSubstr("pose 2 has a quaternion of norm 1.414"),
+                                 HasSubstr("pose 3 at 0.5 s does not lie after pose 2 at 1 s"))));
   EXPECT_THAT([] { Trajectory({}); }, ThrowsMessage<Error>(HasSubstr("no pose")));
 }
 

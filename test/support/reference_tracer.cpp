@@ -46,7 +46,8 @@ Triangle triangle(const HeightGrid& grid, const Located& at) {
     return {Real(column), Real(row), Real(grid.heights_m()[index])};
   };
   const int apex = at.far_half ? 1 : 0;
-  return {{sample(at.column + apex, at.row + apex), sample(at.column + 1, at.row), sample(at.column, at.row + 1)}};
+  return {{sample(at.column + apex, at.row + apex), sample(at.column + 1, at.row),
+           sample(at.column, at.row + 1)}};
 }
 
 // The next t at which the coordinate is a whole number, after the k-th one from `from`.
@@ -58,7 +59,8 @@ struct Stops {
     next_whole = line.slope > 0 ? std::floor(here) + 1 : std::ceil(here) - 1;
   }
   Real next() const {
-    return line.slope == 0 ? std::numeric_limits<Real>::infinity() : (next_whole - line.start) / line.slope;
+    return line.slope == 0 ? std::numeric_limits<Real>::infinity()
+                           : (next_whole - line.start) / line.slope;
   }
   void pass() { next_whole += line.slope > 0 ? 1 : -1; }
 };
@@ -88,8 +90,9 @@ std::optional<ReferenceHit> trace_reference(const HeightGrid& grid, const Ray& r
 
   std::array<Stops, 3> stops{Stops(u, begin), Stops(v, begin), Stops(w, begin)};
   for (Real t = begin; t < end;) {
-    Stops& first = *std::min_element(stops.begin(), stops.end(),
-                                     [](const Stops& a, const Stops& b) { return a.next() < b.next(); });
+    Stops& first =
+        *std::min_element(stops.begin(), stops.end(),
+                          [](const Stops& a, const Stops& b) { return a.next() < b.next(); });
     const Real next = std::min(first.next(), end);
     first.pass();
     const Real middle = (t + next) / 2;
@@ -98,8 +101,8 @@ std::optional<ReferenceHit> trace_reference(const HeightGrid& grid, const Ray& r
     const Real above = z.at(t) - facet.height(u.at(t), v.at(t));
     const Real after = z.at(next) - facet.height(u.at(next), v.at(next));
     if (above >= 0 && after < 0) {
-      return ReferenceHit{static_cast<double>(t + (next - t) * above / (above - after)), at.column, at.row,
-                          at.far_half};
+      return ReferenceHit{static_cast<double>(t + (next - t) * above / (above - after)), at.column,
+                          at.row, at.far_half};
     }
     t = next;
   }

@@ -7,9 +7,10 @@
 
 namespace groundray::testing {
 
-/// The definition of the reference surface turned into code with nothing else in mind: every cell that the ray passes
-/// over is visited in order, every triangle is a plane through its three samples, all in long double. Shares no code
-/// with the library, slow, the oracle of every ray test.
+/// The definition of the reference surface turned into code with nothing else in mind: every cell
+/// that the ray passes over is visited in order, every triangle is a plane through its three
+/// samples, all in long double. Shares no code with the library, slow, the oracle of every ray
+/// test.
 struct ReferenceHit {
   double range_m = 0;
   int column = 0;

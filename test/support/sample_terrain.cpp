@@ -12,7 +12,8 @@ namespace groundray::testing {
 namespace {
 
 glm::dvec2 uniform(Seed seed, std::size_t index, std::uint32_t of = 0) {
-  return random_uniform({seed, of, static_cast<std::uint32_t>(index >> 32), static_cast<std::uint32_t>(index)});
+  return random_uniform(
+      {seed, of, static_cast<std::uint32_t>(index >> 32), static_cast<std::uint32_t>(index)});
 }
 
 }  // namespace
@@ -20,7 +21,9 @@ glm::dvec2 uniform(Seed seed, std::size_t index, std::uint32_t of = 0) {
 HeightGrid fractal(int samples, double step_m, double relief_m, Seed seed) {
   const auto n = static_cast<std::size_t>(samples);
   std::vector<float> heights(n * n);
-  const auto at = [&](std::size_t column, std::size_t row) -> float& { return heights[row * n + column]; };
+  const auto at = [&](std::size_t column, std::size_t row) -> float& {
+    return heights[row * n + column];
+  };
   const double roughness = std::exp2(-0.95);  // Hurst exponent 0.95
   double scale_m = relief_m / 2;
   const auto noise = [&](std::size_t column, std::size_t row) {
@@ -31,7 +34,8 @@ HeightGrid fractal(int samples, double step_m, double relief_m, Seed seed) {
     for (std::size_t row = half; row < n; row += block) {
       for (std::size_t column = half; column < n; column += block) {
         const float mean = (at(column - half, row - half) + at(column + half, row - half) +
-                            at(column - half, row + half) + at(column + half, row + half)) / 4;
+                            at(column - half, row + half) + at(column + half, row + half)) /
+                           4;
         at(column, row) = static_cast<float>(mean + noise(column, row));
       }
     }
@@ -41,12 +45,16 @@ HeightGrid fractal(int samples, double step_m, double relief_m, Seed seed) {
         const float right = column + half < n ? at(column + half, row) : at(column - half, row);
         const float above = row >= half ? at(column, row - half) : at(column, row + half);
         const float below = row + half < n ? at(column, row + half) : at(column, row - half);
-        at(column, row) = static_cast<float>((left + right + above + below) / 4 + noise(column, row) / 1.4);
+        at(column, row) =
+            static_cast<float>((left + right + above + below) / 4 + noise(column, row) / 1.4);
       }
     }
   }
   const double reach_m = step_m * (samples - 1) / 2;
-  return {{samples, samples}, {-reach_m + 0.313, reach_m - 0.425}, {step_m, -step_m}, std::move(heights)};
+  return {{samples, samples},
+          {-reach_m + 0.313, reach_m - 0.425},
+          {step_m, -step_m},
+          std::move(heights)};
 }
 
 HeightGrid with_holes(const HeightGrid& grid, int count, int radius, Seed seed) {
@@ -57,7 +65,8 @@ HeightGrid with_holes(const HeightGrid& grid, int count, int radius, Seed seed) 
     const int row = static_cast<int>(place.y * grid.rows());
     const int reach = hole % (radius + 1);
     for (int r = std::max(0, row - reach); r <= std::min(grid.rows() - 1, row + reach); ++r) {
-      for (int c = std::max(0, column - reach); c <= std::min(grid.columns() - 1, column + reach); ++c) {
+      for (int c = std::max(0, column - reach); c <= std::min(grid.columns() - 1, column + reach);
+           ++c) {
         if ((c - column) * (c - column) + (r - row) * (r - row) > reach * reach) continue;
         heights[static_cast<std::size_t>(r) * static_cast<std::size_t>(grid.columns()) +
                 static_cast<std::size_t>(c)] = std::numeric_limits<float>::quiet_NaN();
@@ -80,7 +89,8 @@ std::vector<Ray> random_rays(const HeightGrid& grid, std::size_t count, Seed see
     const double cosine = std::sqrt(std::max(0.0, 1 - sine * sine));
     const double azimuth_rad = 2 * std::numbers::pi * turn.y;
     rays[i].origin = {p, ground_m + 0.2 + 300 * other.x * other.x * other.x};
-    rays[i].direction = glm::normalize(glm::dvec3(cosine * std::cos(azimuth_rad), cosine * std::sin(azimuth_rad), sine));
+    rays[i].direction = glm::normalize(
+        glm::dvec3(cosine * std::cos(azimuth_rad), cosine * std::sin(azimuth_rad), sine));
   }
   return rays;
 }

@@ -9,7 +9,8 @@
 
 namespace groundray::testing {
 
-/// A fractal landscape of (2^k + 1)^2 samples by midpoint displacement, centred on D's origin, north to south rows.
+/// A fractal landscape of (2^k + 1)^2 samples by midpoint displacement, centred on D's origin,
+/// north to south rows.
 /// @param relief_m  about the difference between its highest and lowest point.
 /// @see Fournier, Fussell, Carpenter, Computer rendering of stochastic models (1982).
 HeightGrid fractal(int samples, double step_m, double relief_m, Seed seed);
@@ -17,7 +18,8 @@ HeightGrid fractal(int samples, double step_m, double relief_m, Seed seed);
 /// The grid with round holes of up to `radius` samples and single missing samples.
 HeightGrid with_holes(const HeightGrid& grid, int count, int radius, Seed seed);
 
-/// Rays that start up to 300 m above the surface, a few outside the grid, and look everywhere, most of them down.
+/// Rays that start up to 300 m above the surface, a few outside the grid, and look everywhere, most
+/// of them down.
 std::vector<Ray> random_rays(const HeightGrid& grid, std::size_t count, Seed seed);
 
 /// How large a proof is: `full` under `./dev prove`, otherwise `reduced`.

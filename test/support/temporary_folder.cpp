@@ -2,6 +2,7 @@
 
 #include <stdlib.h>
 
+#include <cstdlib>
 #include <stdexcept>
 #include <string>
 
@@ -19,5 +20,10 @@ TemporaryFolder::~TemporaryFolder() {
 }
 
 std::filesystem::path data_folder() { return std::filesystem::path(GROUNDRAY_SOURCE_DIR) / "data"; }
+
+std::filesystem::path shared_data_folder() {
+  if (const char* chosen = std::getenv("GROUNDRAY_SHARED_DATA")) return chosen;
+  return std::filesystem::path(GROUNDRAY_SOURCE_DIR).parent_path() / "shared/data";
+}
 
 }  // namespace groundray::testing

@@ -22,4 +22,8 @@ class TemporaryFolder {
 /// The folder of the project's own data files.
 std::filesystem::path data_folder();
 
+/// The folder of large public data sets that some tests use, which need not exist: the
+/// environment's GROUNDRAY_SHARED_DATA, or shared/data beside the repository.
+std::filesystem::path shared_data_folder();
+
 }  // namespace groundray::testing

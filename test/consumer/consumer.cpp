@@ -1,0 +1,29 @@
+// Uses something of each library, through the installed headers alone.
+#include <groundray/core/pose.h>
+#include <groundray/core/ray_tracer.h>
+#include <groundray/sensors/scan_pattern.h>
+#include <groundray/terrain/terrain_scene.h>
+
+#include <cmath>
+#include <cstdio>
+#include <numbers>
+#include <span>
+
+int main() {
+  using namespace groundray;
+  const Pose X_AB{.translation_m = {0, 0, 2}};
+  const bool halfway = std::abs(Screw(X_AB).at(0.5).translation_m.z - 1) < 1e-15;
+
+  const HeightGrid slope({2, 2}, {0, 0}, {1, -1}, {0, 1, 0, 1});  // rises 1 m to the east
+  const RayTracer tracer({full_resolution_level(slope)}, {0, 0, 0}, Tracing::Exact);
+  const Ray down{.origin = {0.25, -0.5, 2.25}};
+  Hit hit;
+  tracer.trace(std::span(&down, 1), std::span(&hit, 1));
+  const bool below = std::abs(hit.range_m - 2) < 1e-8;
+
+  const ScanPattern scan({.rate_hz = 10, .firing_period_s = 1e-3, .beams = {Beam{}}});
+  const bool turned = std::abs(scan.spin_rad(0.025) - 1.5 * std::numbers::pi) < 1e-12;
+
+  std::printf("halfway %d, below %d, turned %d\n", halfway, below, turned);
+  return halfway && below && turned ? 0 : 1;
+}

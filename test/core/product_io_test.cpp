@@ -1,0 +1,432 @@
+#include "core/product_io.h"
+
+#include <OpenEXR/ImfThreading.h>
+#include <gmock/gmock.h>
+#include <gtest/gtest.h>
+#include <png.h>
+#include <sys/mount.h>
+
+#include <bit>
+#include <cerrno>
+#include <chrono>
+#include <cstring>
+#include <fstream>
+#include <iterator>
+#include <limits>
+#include <locale>
+#include <random>
+
+#include "core/error.h"
+#include "test/support/file_size_limit.h"
+#include "test/support/temporary_folder.h"
+
+#if __has_include(<ImathBox.h>)  // which every header of a class of OpenEXR's includes
+#include <OpenEXR/ImfArray.h>
+#include <OpenEXR/ImfChannelList.h>
+#include <OpenEXR/ImfFrameBuffer.h>
+#include <OpenEXR/ImfHeader.h>
+#include <OpenEXR/ImfInputFile.h>
+#endif
+
+namespace groundray {
+namespace {
+
+namespace fs = std::filesystem;
+using std::chrono::nanoseconds;
+using ::testing::AllOf;
+using ::testing::ElementsAre;
+using testing::FileSizeLimit;
+using ::testing::HasSubstr;
+using ::testing::IsEmpty;
+using ::testing::Not;
+using testing::TemporaryFolder;
+
+std::vector<std::string> names_in(const fs::path& folder) {
+  std::vector<std::string> names;
+  for (const auto& entry : fs::directory_iterator(folder)) names.push_back(entry.path().filename());
+  return names;
+}
+
+std::string bytes_of(const fs::path& path) {
+  std::ifstream file(path, std::ios::binary);
+  return {std::istreambuf_iterator<char>(file), {}};
+}
+
+template <typename F>
+std::string message_of(F&& f) {
+  try {
+    f();
+  } catch (const Error& error) {
+    return error.what();
+  }
+  return "no Error was thrown";
+}
+
+/// A file system of 64 KiB in memory, where this process may mount one.
+class SmallDisk {
+ public:
+  SmallDisk() : reason_(mount("groundray", path(), "tmpfs", 0, "size=64k") == 0 ? 0 : errno) {}
+  ~SmallDisk() {
+    if (reason_ == 0) umount2(path(), MNT_DETACH);
+  }
+  SmallDisk(const SmallDisk&) = delete;
+  SmallDisk& operator=(const SmallDisk&) = delete;
+  const char* path() const { return folder_.path().c_str(); }
+  /// Why there is none: an errno, or 0.
+  int reason() const { return reason_; }
+
+ private:
+  TemporaryFolder folder_;
+  int reason_;
+};
+
+TEST(WriteWhole, ReplacesWhatWasThere) {
+  const TemporaryFolder folder;
+  write_text(folder / "a.txt", "a long first text");
+  write_text(folder / "a.txt", "second");
+  EXPECT_EQ(bytes_of(folder / "a.txt"), "second");
+  EXPECT_THAT(names_in(folder.path()), ElementsAre("a.txt"));
+}
+
+TEST(WriteWhole, LeavesTheOldFileAloneIfTheWriterThrows) {
+  const TemporaryFolder folder;
+  write_text(folder / "a.txt", "old");
+  const auto fail = [](const fs::path& aside) {
+    std::ofstream(aside) << "half";
+    throw Error("the writer failed");
+  };
+  EXPECT_EQ(message_of([&] { write_whole(folder / "a.txt", fail); }), "the writer failed");
+  EXPECT_EQ(bytes_of(folder / "a.txt"), "old");
+  EXPECT_THAT(names_in(folder.path()), ElementsAre("a.txt"));
+}
+
+TEST(WriteWhole, DoesNotShowTheFileBeforeItIsWhole) {
+  const TemporaryFolder folder;
+  write_whole(folder / "a.txt", [&](const fs::path& aside) {
+    std::ofstream(aside) << "all";
+    EXPECT_FALSE(fs::exists(folder / "a.txt"));
+  });
+  EXPECT_EQ(bytes_of(folder / "a.txt"), "all");
+}
+
+TEST(WriteWhole, SucceedsOverTheLeftoverOfAnInterruptedRun) {
+  const TemporaryFolder folder;
+  std::ofstream(folder / "a.txt.part") << "half of something longer";
+  write_text(folder / "a.txt", "all");
+  EXPECT_EQ(bytes_of(folder / "a.txt"), "all");
+  EXPECT_THAT(names_in(folder.path()), ElementsAre("a.txt"));
+}
+
+TEST(WriteWhole, SaysThatTheFolderIsMissing) {
+  const TemporaryFolder folder;
+  EXPECT_THAT(message_of([&] { write_text(folder / "no/a.txt", "text"); }),
+              AllOf(HasSubstr("no/a.txt: cannot be written: No such file or directory"),
+                    HasSubstr("make its folder first")));
+}
+
+TEST(WriteWhole, SaysThatThePathRunsThroughAFile) {
+  const TemporaryFolder folder;
+  write_text(folder / "file", "text");
+  EXPECT_THAT(message_of([&] { write_text(folder / "file/a.txt", "text"); }),
+              AllOf(HasSubstr("file/a.txt: cannot be written: Not a directory"),
+                    HasSubstr("a part of its path is a file")));
+}
+
+TEST(WriteWhole, SaysThatTheNameIsTooLong) {
+  const TemporaryFolder folder;
+  EXPECT_THAT(message_of([&] { write_text(folder / std::string(300, 'a'), "text"); }),
+              AllOf(HasSubstr("File name too long"), HasSubstr("choose a shorter name")));
+}
+
+TEST(WriteWhole, ReplacesNoFolderAndNoDevice) {
+  const TemporaryFolder folder;
+  EXPECT_THAT(message_of([&] { write_text(folder.path(), "text"); }),
+              HasSubstr("is a folder or a device"));
+  EXPECT_THAT(message_of([&] { write_text("/dev/null", "text"); }),
+              HasSubstr("is a folder or a device"));
+  EXPECT_TRUE(fs::is_character_file("/dev/null"));
+}
+
+TEST(WriteWhole, LeavesNothingBehindBeyondTheFileSizeLimit) {
+  const TemporaryFolder folder;
+  const FileSizeLimit limit(10000);
+  EXPECT_THAT(message_of([&] { write_text(folder / "a.txt", std::string(10001, 'a')); }),
+              AllOf(HasSubstr("a.txt: cannot be written: File too large"), HasSubstr("ulimit -f")));
+  EXPECT_THAT(names_in(folder.path()), IsEmpty());
+  write_text(folder / "a.txt", std::string(10000, 'a'));
+  EXPECT_EQ(fs::file_size(folder / "a.txt"), 10000u);
+}
+
+TEST(WriteWhole, LeavesNothingBehindOnAFullDisk) {
+  const SmallDisk disk;
+  if (disk.reason() != 0)
+    GTEST_SKIP() << "no tmpfs can be mounted here: " << std::strerror(disk.reason());
+  EXPECT_THAT(
+      message_of([&] { write_text(fs::path(disk.path()) / "a.txt", std::string(100'000, 'a')); }),
+      AllOf(HasSubstr("a.txt: cannot be written: No space left on device"),
+            HasSubstr("free some space")));
+  EXPECT_THAT(names_in(disk.path()), IsEmpty());
+}
+
+TEST(ReadText, ReturnsEveryByte) {
+  const TemporaryFolder folder;
+  std::string text;  // sizes about those of its buffer
+  for (const std::size_t size : {0, 1, 65535, 65536, 65537, 1'000'000}) {
+    while (text.size() < size) text += static_cast<char>(text.size() * 7 % 256);
+    write_text(folder / "a", text);
+    EXPECT_EQ(read_text(folder / "a"), text);
+  }
+}
+
+TEST(ReadText, SaysWhyItCannot) {
+  const TemporaryFolder folder;
+  EXPECT_THAT(message_of([&] { read_text(folder / "a"); }),
+              HasSubstr("a: cannot be read: No such file or directory; check its name"));
+  EXPECT_THAT(message_of([&] { read_text(folder.path()); }),
+              HasSubstr("cannot be read: Is a directory"));
+}
+
+TEST(WritePng, KeepsEveryPixel) {
+  const TemporaryFolder folder;
+  std::mt19937 random(1);
+  const std::pair<int, png_uint_32> formats[] = {
+      {1, PNG_FORMAT_GRAY}, {3, PNG_FORMAT_RGB}, {4, PNG_FORMAT_RGBA}};
+  for (const auto& [channels, format] : formats) {
+    Image8 image(37, 23, channels);
+    for (std::uint8_t& value : image.values()) value = static_cast<std::uint8_t>(random());
+    write_png(folder / "a.png", image);
+    png_image png{};
+    png.version = PNG_IMAGE_VERSION;
+    ASSERT_NE(png_image_begin_read_from_file(&png, (folder / "a.png").c_str()), 0) << png.message;
+    EXPECT_EQ(png.width, 37u);
+    EXPECT_EQ(png.height, 23u);
+    EXPECT_EQ(png.format, format);
+    std::vector<std::uint8_t> read(PNG_IMAGE_SIZE(png));
+    ASSERT_NE(png_image_finish_read(&png, nullptr, read.data(), 0, nullptr), 0) << png.message;
+    EXPECT_TRUE(std::ranges::equal(read, image.values())) << channels << " channels";
+  }
+}
+
+TEST(WritePng, RefusesTwoChannels) {
+  const TemporaryFolder folder;
+  EXPECT_THAT(message_of([&] { write_png(folder / "a.png", Image8(2, 2, 2)); }),
+              HasSubstr("must have 1, 3 or 4 channels; this one has 2"));
+  EXPECT_THAT(names_in(folder.path()), IsEmpty());
+}
+
+ImageF odd_floats() {
+  using Limits = std::numeric_limits<float>;
+  ImageF image(19, 40, 3);  // more rows than the 16 of a block
+  std::mt19937 random(2);
+  for (float& value : image.values())
+    value = std::bit_cast<float>(static_cast<std::uint32_t>(random()));
+  const float odd[] = {-0.0f, Limits::infinity(), Limits::quiet_NaN(), Limits::denorm_min(),
+                       Limits::max()};
+  std::ranges::copy(odd, image.values().begin());
+  return image;
+}
+
+TEST(WriteExr, KeepsEveryBitOfEveryChannel) {
+#if !__has_include(<ImathBox.h>)
+  GTEST_SKIP()
+      << "OpenEXR's headers were not on the include path: link core_test with OpenEXR::OpenEXR";
+#else
+  const TemporaryFolder folder;
+  const ImageF image = odd_floats();
+  const std::vector<std::string> names{"Z", "R", "normal.x"};
+  write_exr(folder / "a.exr", image, names);
+  Imf::InputFile file((folder / "a.exr").c_str());
+  EXPECT_EQ(file.header().compression(), Imf::ZIP_COMPRESSION);
+  ASSERT_EQ(file.header().dataWindow(), Imath::Box2i({0, 0}, {18, 39}));
+  for (int channel = 0; channel < 3; ++channel) {
+    const std::string& name = names[static_cast<std::size_t>(channel)];
+    ASSERT_NE(file.header().channels().findChannel(name), nullptr) << name;
+    EXPECT_EQ(file.header().channels().findChannel(name)->type, Imf::FLOAT);
+    Imf::Array2D<float> pixels(40, 19);
+    Imf::FrameBuffer buffer;
+    buffer.insert(name, Imf::Slice(Imf::FLOAT, reinterpret_cast<char*>(&pixels[0][0]), 4, 4 * 19));
+    file.setFrameBuffer(buffer);
+    file.readPixels(0, 39);
+    for (int y = 0; y < 40; ++y) {
+      for (int x = 0; x < 19; ++x) {
+        const float written = image.at(x, y)[static_cast<std::size_t>(channel)];
+        ASSERT_EQ(std::bit_cast<std::uint32_t>(pixels[y][x]), std::bit_cast<std::uint32_t>(written))
+            << name << " at " << x << ", " << y;
+      }
+    }
+  }
+#endif
+}
+
+TEST(WriteExr, GivesEqualBytesForAnyNumberOfThreads) {
+  const TemporaryFolder folder;
+  const int before = Imf::globalThreadCount();
+  for (const int threads : {0, 1, 4}) {
+    Imf::setGlobalThreadCount(threads);
+    write_exr(folder / std::to_string(threads), odd_floats(), {"R", "G", "B"});
+  }
+  Imf::setGlobalThreadCount(before);
+  EXPECT_EQ(bytes_of(folder / "1"), bytes_of(folder / "0"));
+  EXPECT_EQ(bytes_of(folder / "4"), bytes_of(folder / "0"));
+}
+
+TEST(WriteExr, RefusesNamesThatDoNotMatch) {
+  const TemporaryFolder folder;
+  const auto write = [&](const ImageF& image, const std::vector<std::string>& channels) {
+    return message_of([&] { write_exr(folder / "a.exr", image, channels); });
+  };
+  EXPECT_THAT(write(ImageF(2, 2, 3), {"R", "G"}), HasSubstr("there are 2 names for 3 channels"));
+  EXPECT_THAT(write(ImageF(2, 2, 3), {"R", "", "R"}),
+              AllOf(HasSubstr("a channel needs a name"), HasSubstr("two channels are named 'R'")));
+  EXPECT_THAT(write(ImageF(), {}), HasSubstr("the image is empty"));
+  EXPECT_THAT(names_in(folder.path()), IsEmpty());
+}
+
+TEST(WriteExr, LeavesNothingBehindBeyondTheFileSizeLimit) {
+  const TemporaryFolder folder;
+  const FileSizeLimit limit(1000);
+  EXPECT_THAT(message_of([&] {
+                write_exr(folder / "a.exr", odd_floats(), {"R", "G", "B"});
+              }),
+              HasSubstr("File too large"));
+  EXPECT_THAT(names_in(folder.path()), IsEmpty());
+}
+
+std::int64_t time_of(const std::string& word) {
+  return parse_tum(word + " 0 0 0 0 0 0 1\n", "t").begin_time().count();
+}
+
+TEST(Tum, TimesAreExactDecimals) {
+  EXPECT_EQ(time_of("1600000000.123456789"), 1'600'000'000'123'456'789);
+  EXPECT_EQ(time_of("1.600000000123456789e+09"), 1'600'000'000'123'456'789);
+  EXPECT_EQ(time_of("16000000001234567890E-10"), 1'600'000'000'123'456'789);
+  EXPECT_EQ(time_of("0.000000001"), 1);
+  EXPECT_EQ(time_of("-0.5"), -500'000'000);
+  EXPECT_EQ(time_of("+3."), 3'000'000'000);
+  EXPECT_EQ(time_of(".25"), 250'000'000);
+  EXPECT_EQ(time_of("000000000000000000000000000007"), 7'000'000'000);
+  EXPECT_EQ(time_of("0e999"), 0);
+  EXPECT_EQ(time_of("0.1234567894"), 123'456'789);
+  EXPECT_EQ(time_of("0.1234567895"), 123'456'790);
+  EXPECT_EQ(time_of("9e-10"), 1);
+  EXPECT_EQ(time_of("4e-10"), 0);
+  EXPECT_EQ(time_of("9e-30000"), 0);
+  EXPECT_EQ(time_of("4600000000"), 4'600'000'000'000'000'000);
+}
+
+TEST(Tum, RefusesTimesThatAreNoneOrTooLarge) {
+  for (const char* word :
+       {"4.7e9", "-4.7e9", "1403636579758555392", "1e30", "1e99999", "18446744073.709551617", "nan",
+        "inf", "1e", "e5", ".", "-", "--1", "+-1", "1.2.3", "0x10", "1,5", "1s"}) {
+    EXPECT_THAT(message_of([&] { time_of(word); }),
+                HasSubstr(std::string("t:1: t = \"") + word + "\" must be"));
+  }
+}
+
+Trajectory winding_path() {
+  std::mt19937_64 random(3);
+  std::normal_distribution<double> normal;
+  std::vector<Trajectory::Sample> samples;
+  nanoseconds time(-5'000'000'001);
+  for (int i = 0; i < 1000; ++i) {
+    const glm::dquat rotation(normal(random), normal(random), normal(random), normal(random));
+    const glm::dvec3 position(normal(random) * 1e7, normal(random), normal(random) * 1e-300);
+    samples.push_back({time, {glm::normalize(rotation), position}});
+    time += nanoseconds(1 + static_cast<std::int64_t>(random() % 20'000'000));
+  }
+  samples.push_back({nanoseconds(1'600'000'000'123'456'789), {}});
+  return Trajectory(std::move(samples));
+}
+
+TEST(Tum, ReadingGivesWhatWasWritten) {
+  const TemporaryFolder folder;
+  const Trajectory written = winding_path();
+  write_tum(folder / "a.tum", written, "X_WS\nseconds metres");
+  EXPECT_THAT(bytes_of(folder / "a.tum"),
+              ::testing::StartsWith("# X_WS\n# seconds metres\n-5.000000001 "));
+  const Trajectory read = read_tum(folder / "a.tum");
+  ASSERT_EQ(read.samples().size(), written.samples().size());
+  for (std::size_t i = 0; i < read.samples().size(); ++i) {
+    const auto& [time, pose] = written.samples()[i];
+    EXPECT_EQ(read.samples()[i].time, time);
+    EXPECT_EQ(read.samples()[i].pose.translation_m, pose.translation_m);
+    // Setting the norm to 1, twice: each rounds the norm and a quotient.
+    constexpr double tolerance = 4 * std::numeric_limits<double>::epsilon();
+    EXPECT_LE(glm::length(read.samples()[i].pose.rotation - pose.rotation), tolerance);
+  }
+}
+
+TEST(Tum, ReadsCommentsBlankLinesAndCarriageReturns) {
+  const Trajectory path = parse_tum(
+      "# t x y z qx qy qz qw\r\n\r\n  # more\n 1 2\t3 4 0 0 0 1 \r\n\n2 5 6 7 1 0 0 0", "t");
+  ASSERT_EQ(path.samples().size(), 2u);
+  EXPECT_EQ(path.samples()[0].pose, (Pose{{1, 0, 0, 0}, {2, 3, 4}}));
+  EXPECT_EQ(path.samples()[1].pose, (Pose{{0, 1, 0, 0}, {5, 6, 7}}));
+}
+
+TEST(Tum, AcceptsQuaternionsOfFourDecimals) {
+  const Trajectory path =
+      parse_tum("1305031098.6659 1.3563 0.6305 1.6380 0.6132 0.5962 -0.3311 -0.3986", "fr1_xyz");
+  EXPECT_NEAR(glm::length(path.samples()[0].pose.rotation), 1, 1e-15);
+}
+
+TEST(Tum, NamesEveryBadLineAndItsRule) {
+  const char* const text =
+      "0 0 0 0 0 0 0 1\n"
+      "1 0 0 0 0 0 1\n"
+      "2 0 nan 0 0 0 0 1\n"
+      "3 0 0 inf 0 0 0 1\n"
+      "4 0 0 0 0 0 0 x1\x1b\n"
+      "5 0 0 0 0 0 0 1.1\n"
+      "6 0 0 0 0 0 0 1\n"
+      "6 0 0 0 0 0 0 1\n"
+      "5.999999999 0 0 0 0 0 0 1\n"
+      "7 0 0 0 0 0 0 1 9\n"
+      "8 0 0 1e999 0 0 0 1\n";
+  EXPECT_EQ(message_of([&] { parse_tum(text, "a.tum"); }),
+            "a.tum:2: it has 7 values; it must have 8: t x y z qx qy qz qw\n"
+            "a.tum:3: y = \"nan\" must be a finite number\n"
+            "a.tum:4: z = \"inf\" must be a finite number\n"
+            "a.tum:5: qw = \"x1\\x1b\" must be a finite number\n"
+            "a.tum:6: the quaternion qx qy qz qw has norm 1.1; it must be 1: is qw the last of the "
+            "four?\n"
+            "a.tum:8: t = 6.000000000 s does not lie after the 6.000000000 s of a line above; "
+            "times must increase\n"
+            "a.tum:9: t = 5.999999999 s does not lie after the 6.000000000 s of a line above; "
+            "times must increase\n"
+            "a.tum:10: it has 9 values; it must have 8: t x y z qx qy qz qw\n"
+            "a.tum:11: z = \"1e999\" must be a finite number");
+}
+
+TEST(Tum, KeepsTheMessageShortForAFileOfAnotherKind) {
+  std::string text;
+  for (int i = 0; i < 1000; ++i) text += "v 0 0 0\n";
+  EXPECT_THAT(message_of([&] { parse_tum(text, "a.obj"); }),
+              AllOf(HasSubstr("a.obj:100: it has 4 values"), Not(HasSubstr("a.obj:101")),
+                    HasSubstr("\nand 900 more")));
+}
+
+TEST(Tum, SaysThatAFileHoldsNoPose) {
+  EXPECT_THAT(message_of([] { parse_tum("# nothing\n", "a.tum"); }),
+              HasSubstr("a.tum: it holds no pose"));
+}
+
+struct Comma : std::numpunct<char> {
+  char do_decimal_point() const override { return ','; }
+  char do_thousands_sep() const override { return '.'; }
+  std::string do_grouping() const override { return "\3"; }
+};
+
+TEST(Tum, DoesNotDependOnTheLocale) {
+  const TemporaryFolder folder;
+  const Trajectory path = parse_tum("12345.5 1234.5 0 0 0 0 0 1", "t");
+  const std::locale before = std::locale::global(std::locale(std::locale(), new Comma));
+  write_tum(folder / "a.tum", path, "");
+  const Trajectory read = read_tum(folder / "a.tum");
+  std::locale::global(before);
+  EXPECT_EQ(bytes_of(folder / "a.tum"), "12345.500000000 1234.5 0 0 0 0 0 1\n");
+  EXPECT_EQ(read.samples()[0].pose, path.samples()[0].pose);
+}
+
+}  // namespace
+}  // namespace groundray

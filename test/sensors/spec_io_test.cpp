@@ -1,0 +1,388 @@
+#include "sensors/spec_io.h"
+
+#include <gmock/gmock.h>
+#include <gtest/gtest.h>
+
+#include <cmath>
+#include <fstream>
+#include <glm/gtc/quaternion.hpp>
+#include <glm/trigonometric.hpp>
+
+#include "core/error.h"
+#include "test/support/temporary_folder.h"
+
+namespace groundray {
+namespace {
+
+using groundray::testing::data_folder;
+using groundray::testing::TemporaryFolder;
+using ::testing::AllOf;
+using ::testing::HasSubstr;
+using ::testing::Not;
+using ::testing::StartsWith;
+using ::testing::ThrowsMessage;
+
+constexpr const char* kScene = R"(groundray: 1
+seed: 18446744073709551615
+duration_s: 1.5
+tracing: exact
+terrain:
+  dem: ../terrain/prairie.tif
+  nodata: -32767
+  reproject_to: utm
+  label: 40
+platform:
+  drive:
+    waypoints_m: [[0, 0], [40, 10.5]]
+    speed_m_s: 20
+    height_m: 0.4
+    footprint_m: [2.5, 1.6]
+lidars:
+  - name: top
+    preset: velodyne_vlp16
+    mount:
+      translation_m: [1, 0, 1.6]
+      yaw_deg: 90
+    rate_hz: 20
+    range_gate_m: [0.4, 50]
+    range_noise_sigma_m: 0.02
+)";
+
+constexpr const char* kLidar = R"(groundray_lidar: 1
+model: Two beams
+rotation:
+  rate_hz: 10
+  sense: counter_clockwise
+  start_azimuth_deg: 180
+firing_period_us: 100
+range_gate_m:
+  near: 0.3
+beam_columns: [ring, elevation_deg, azimuth_offset_deg, origin_z_m, firing_time_us]
+beams:
+  - [1, -30, 2, 0.01, 0]
+  - [0, +3.0e1, -2, 0, 50]
+sources:
+  beams: a made-up lidar
+)";
+
+// Returns `text` with the first `old` replaced; both must hold whole lines for the line numbers to
+// stay.
+std::string with(std::string text, std::string_view old, std::string_view fresh) {
+  const auto place = text.find(old);
+  if (place == std::string::npos) throw std::logic_error("no such text: " + std::string(old));
+  return text.replace(place, old.size(), fresh);
+}
+
+SceneSpec parse(const std::string& text) {
+  return parse_scene(text, "scenes/prairie.yaml", data_folder() / "sensors");
+}
+
+// What parse_scene says of the scene above with one text replaced.
+std::string complaint(std::string_view old, std::string_view fresh) {
+  try {
+    parse(with(kScene, old, fresh));
+  } catch (const Error& error) {
+    return error.what();
+  }
+  return "no complaint";
+}
+
+std::string lidar_complaint(std::string_view old, std::string_view fresh) {
+  try {
+    parse_lidar(with(kLidar, old, fresh), "mine.yaml");
+  } catch (const Error& error) {
+    return error.what();
+  }
+  return "no complaint";
+}
+
+TEST(SceneFile, ReadsEveryKey) {
+  const SceneSpec scene = parse(kScene);
+  EXPECT_EQ(scene.text, kScene);
+  EXPECT_EQ(scene.seed.value, 18446744073709551615u);
+  EXPECT_EQ(scene.duration_s, 1.5);
+  EXPECT_EQ(scene.tracing, Tracing::Exact);
+  EXPECT_EQ(scene.terrain.dem, "terrain/prairie.tif");
+  EXPECT_EQ(scene.terrain.options.nodata, -32767);
+  EXPECT_EQ(scene.terrain.options.reproject_to, "utm");
+  EXPECT_EQ(scene.terrain.label, 40);
+  const auto& drive = std::get<DrivenPath>(scene.platform);
+  EXPECT_THAT(drive.waypoints_m, ::testing::ElementsAre(glm::dvec2(0, 0), glm::dvec2(40, 10.5)));
+  EXPECT_EQ(drive.speed_m_s, 20);
+  EXPECT_EQ(drive.height_m, 0.4);
+  EXPECT_EQ(drive.footprint_m, glm::dvec2(2.5, 1.6));
+  ASSERT_EQ(scene.lidars.size(), 1u);
+  const MountedLidar& top = scene.lidars[0];
+  EXPECT_EQ(top.name, "top");
+  EXPECT_EQ(top.source, "velodyne_vlp16");
+  EXPECT_EQ(top.lidar.model, "Velodyne VLP-16 (Puck)");
+  EXPECT_EQ(top.lidar.pattern.rate_hz, 20);
+  EXPECT_EQ(top.lidar.gate.near_m, 0.4);
+  EXPECT_EQ(top.lidar.gate.far_m, 50);
+  EXPECT_EQ(top.lidar.range_noise_sigma_m, 0.02);
+  EXPECT_EQ(top.X_BS.translation_m, glm::dvec3(1, 0, 1.6));
+  const glm::dvec3 forward = top.X_BS.rotation * glm::dvec3(1, 0, 0);  // yaw 90 looks to the left
+  EXPECT_NEAR(forward.x, 0, 1e-15);
+  EXPECT_NEAR(forward.y, 1, 1e-15);
+}
+
+TEST(SceneFile, FillsInWhatIsOptional) {
+  const SceneSpec scene = parse(R"(
+groundray: 1
+seed: 0
+duration_s: 1
+terrain: {dem: /data/dem.tif}
+platform: {trajectory: path.tum}
+lidars: [{name: a, preset: hesai_xt32, mount: {}}]
+)");
+  EXPECT_EQ(scene.tracing, Tracing::Fast);
+  EXPECT_EQ(scene.terrain.dem, "/data/dem.tif");
+  EXPECT_EQ(scene.terrain.options.nodata, std::nullopt);
+  EXPECT_EQ(scene.terrain.options.reproject_to, "");
+  EXPECT_EQ(scene.terrain.label, 1);
+  EXPECT_EQ(std::get<RecordedPath>(scene.platform).tum, "scenes/path.tum");
+  EXPECT_EQ(scene.lidars[0].X_BS, Pose{});
+  EXPECT_EQ(scene.lidars[0].lidar.pattern.rate_hz, 10);
+  EXPECT_EQ(scene.lidars[0].lidar.range_noise_sigma_m, 0);
+}
+
+TEST(SceneFile, FindsALidarFileBesideTheScene) {
+  const TemporaryFolder folder;
+  std::ofstream(folder / "mine.yaml") << kLidar;
+  std::ofstream(folder / "scene.yaml") << with(kScene, "preset: velodyne_vlp16", "file: mine.yaml");
+  const SceneSpec scene = load_scene(folder / "scene.yaml", folder / "there_is_no_preset_folder");
+  EXPECT_EQ(scene.lidars[0].lidar.model, "Two beams");
+  EXPECT_EQ(scene.lidars[0].source, "mine.yaml");
+}
+
+TEST(SceneFile, ListsAllItsFaultsInTheOrderOfTheFile) {
+  const std::string text =
+      with(with(kScene, "duration_s: 1.5", "duration_s: -1"), "speed_m_s: 20", "speed_km_h: 20");
+  EXPECT_THAT(
+      [&] { parse(with(text, "rate_hz: 20", "rate_hz: often")); },
+      ThrowsMessage<Error>(
+          "scenes/prairie.yaml:3:13: key 'duration_s': is -1, but must be > 0 and at most 1e6\n"
+          "scenes/prairie.yaml:13:5: key 'speed_km_h': unknown; did you mean 'speed_m_s'?\n"
+          "scenes/prairie.yaml:22:14: key 'rate_hz': is 'often', but must be a number: write it "
+          "bare, in the "
+          "unit of the key"));
+}
+
+TEST(SceneFile, SuggestsTheKeyThatWasMeant) {
+  EXPECT_THAT(complaint("range_gate_m", "range_gate_km"),
+              HasSubstr(":23:5: key 'range_gate_km': unknown; did you mean 'range_gate_m'?"));
+  EXPECT_THAT(complaint("tracing", "tracng"),
+              HasSubstr(":4:1: key 'tracng': unknown; did you mean 'tracing'?"));
+  EXPECT_THAT(complaint("yaw_deg: 90", "yaw: 90"),
+              HasSubstr(":21:7: key 'yaw': unknown; did you mean 'yaw_deg'?"));
+  EXPECT_THAT(complaint("label: 40", "colour: 40"),
+              ::testing::EndsWith(":9:3: key 'colour': unknown"));
+}
+
+TEST(SceneFile, NamesAMisspeltKeyOnceAndNotAsMissingToo) {
+  EXPECT_THAT(complaint("dem:", "dme:"),
+              AllOf(HasSubstr("did you mean 'dem'?"), Not(HasSubstr("missing"))));
+}
+
+TEST(SceneFile, RefusesMissingAndRepeatedKeys) {
+  EXPECT_THAT(complaint("seed: 18446744073709551615\n", ""),
+              HasSubstr("prairie.yaml:1:1: key 'seed': missing"));
+  EXPECT_THAT(complaint("label: 40", "dem: other.tif"),
+              HasSubstr(":9:3: key 'dem': repeated; it was given in line 6"));
+}
+
+TEST(SceneFile, RefusesValuesOfTheWrongType) {
+  EXPECT_THAT(complaint("speed_m_s: 20", "speed_m_s: 20 m/s"),
+              HasSubstr(":13:16: key 'speed_m_s': is '20 m/s', but must be a number"));
+  EXPECT_THAT(complaint("speed_m_s: 20", "speed_m_s: '20'"),
+              HasSubstr(":13:16: key 'speed_m_s': is '20', but must be a number"));
+  EXPECT_THAT(complaint("speed_m_s: 20", "speed_m_s:"),
+              HasSubstr(":13:5: key 'speed_m_s': is empty, but must be a number"));
+  EXPECT_THAT(complaint("yaw_deg: 90", "yaw_deg: [90]"),
+              HasSubstr(":21:16: key 'yaw_deg': is a list of 1, but must be a number"));
+  EXPECT_THAT(
+      complaint("[1, 0, 1.6]", "[1, 0]"),
+      HasSubstr(":20:22: key 'translation_m': is a list of 2, but must be a list of 3 numbers"));
+  EXPECT_THAT(complaint("[40, 10.5]", "[40, north]"),
+              HasSubstr(":12:32: key 'waypoints_m': is 'north', but must be a number"));
+  EXPECT_THAT(
+      complaint("platform:\n", "platform: []\nold:\n"),
+      HasSubstr(":10:11: key 'platform': is a list of 0, but must be a map of keys and values"));
+  EXPECT_THAT(complaint("dem: ../terrain/prairie.tif", "dem: {file: a.tif}"),
+              HasSubstr(":6:8: key 'dem': is a map, but must be a text"));
+}
+
+TEST(SceneFile, RefusesNumbersThatAreNotFinite) {
+  for (const char* number : {".nan", ".inf", "-.INF", "1e999"}) {
+    EXPECT_THAT(complaint("height_m: 0.4", std::string("height_m: ") + number),
+                HasSubstr(":14:15: key 'height_m': is '" + std::string(number) +
+                          "', but must be a finite number"));
+  }
+}
+
+TEST(SceneFile, RefusesValuesOutOfRange) {
+  EXPECT_THAT(complaint("groundray: 1", "groundray: 2"),
+              HasSubstr(":1:12: key 'groundray': is 2, but this groundray reads format 1 alone"));
+  EXPECT_THAT(complaint("seed: 18446744073709551615", "seed: 18446744073709551616"),
+              HasSubstr(":2:7: key 'seed': is '18446744073709551616', but must be a whole number "
+                        "from 0 to 18446744073709551615"));
+  EXPECT_THAT(
+      complaint("label: 40", "label: 65536"),
+      HasSubstr(":9:10: key 'label': is '65536', but must be a whole number from 0 to 65535"));
+  EXPECT_THAT(complaint("[2.5, 1.6]", "[2.5, 0]"),
+              HasSubstr(":15:24: key 'footprint_m': is 0, but must be > 0"));
+  EXPECT_THAT(complaint("[[0, 0], [40, 10.5]]", "[[0, 0]]"),
+              HasSubstr(":12:18: key 'waypoints_m': has 1 points, but a drive needs at least two"));
+  EXPECT_THAT(
+      complaint("[0.4, 50]", "[50, 0.4]"),
+      HasSubstr(":23:19: key 'range_gate_m': [50, 0.4] is empty: are near and far swapped?"));
+  EXPECT_THAT(complaint("sigma_m: 0.02", "sigma_m: -0.02"),
+              HasSubstr(":24:26: key 'range_noise_sigma_m': is -0.02, but must be >= 0"));
+  EXPECT_THAT(complaint("rate_hz: 20", "rate_hz: 20000"),
+              HasSubstr(":22:14: key 'rate_hz': makes 0.904225 firing sequences in a turn"));
+  EXPECT_THAT(complaint("tracing: exact", "tracing: exakt"),
+              HasSubstr(":4:10: key 'tracing': is 'exakt', but must be one of fast, exact; did you "
+                        "mean 'exact'?"));
+}
+
+TEST(SceneFile, RefusesAnUnknownPresetAndListsTheKnown) {
+  EXPECT_THAT(complaint("velodyne_vlp16", "velodyne_vlp-16"),
+              AllOf(HasSubstr(":18:13: key 'preset': 'velodyne_vlp-16' is not in "),
+                    HasSubstr("did you mean 'velodyne_vlp16'?; it has hesai_pandar64, hesai_xt32, "
+                              "ouster_os0_128")));
+}
+
+TEST(SceneFile, TakesExactlyOnePathAndOneLidarSource) {
+  EXPECT_THAT(
+      complaint("platform:\n", "platform:\n  trajectory: path.tum\n"),
+      HasSubstr(":11:3: key 'platform': must have exactly one of 'trajectory' and 'drive'"));
+  EXPECT_THAT(complaint("preset: velodyne_vlp16", "file: mine.yaml\n    preset: velodyne_vlp16"),
+              HasSubstr(":17:5: key 'lidars': must have exactly one of 'preset' and 'file'"));
+}
+
+TEST(SceneFile, NamesEachLidarOnceAndForAFile) {
+  EXPECT_THAT(complaint("name: top", "name: to/p"),
+              HasSubstr(":17:11: key 'name': is 'to/p', but names files"));
+  EXPECT_THAT(complaint("lidars:\n", "lidars:\n  - {name: top, preset: hesai_xt32, mount: {}}\n"),
+              HasSubstr(":18:5: key 'name': 'top' is taken by an earlier lidar"));
+}
+
+TEST(SceneFile, NeedsALidar) {
+  EXPECT_THAT([] { parse("groundray: 1\nlidars: []\n"); },
+              ThrowsMessage<Error>(HasSubstr(":2:9: key 'lidars': is an empty list")));
+}
+
+TEST(SceneFile, PassesOnTheFaultsOfALidarFile) {
+  const TemporaryFolder folder;
+  std::ofstream(folder / "mine.yaml") << with(kLidar, "rate_hz: 10", "rate_hz: 0");
+  EXPECT_THAT(
+      [&] {
+        parse_scene(with(kScene, "preset: velodyne_vlp16", "file: mine.yaml"),
+                    folder / "scene.yaml", "");
+      },
+      ThrowsMessage<Error>(
+          AllOf(HasSubstr("scene.yaml:18:11: key 'file': the lidar cannot be read:\n"),
+                HasSubstr("mine.yaml:4:12: key 'rate_hz': is 0, but must be > 0"))));
+}
+
+TEST(SceneFile, RefusesWhatIsNotYaml) {
+  EXPECT_THAT(complaint("[[0, 0], [40, 10.5]]", "[[0, 0], [40, 10.5]"),
+              AllOf(StartsWith("scenes/prairie.yaml:"), HasSubstr(": not YAML: ")));
+  EXPECT_THAT(complaint("seed:", "seed: : :"), StartsWith("scenes/prairie.yaml:2:"));
+  EXPECT_THAT([] { parse("# nothing\n"); },
+              ThrowsMessage<Error>("scenes/prairie.yaml:1:1: the file is empty"));
+  EXPECT_THAT([] { parse("just a text"); },
+              ThrowsMessage<Error>(
+                  HasSubstr("scenes/prairie.yaml:1:1: is 'just a text', but must be a map")));
+  EXPECT_THAT([] { parse(std::string(kScene) + "---\nseed: 1\n"); },
+              ThrowsMessage<Error>(HasSubstr(":26:1: a second document begins")));
+}
+
+TEST(SceneFile, RefusesBombsOfAliasesAndDepth) {
+  EXPECT_THAT([] { parse("a: &a [1]\nb: [*a, *a]\n"); },
+              ThrowsMessage<Error>(
+                  HasSubstr("scenes/prairie.yaml:2:5: aliases (*name) are not allowed here")));
+  EXPECT_THAT([] { parse(std::string(33, '[') + std::string(33, ']')); },
+              ThrowsMessage<Error>(HasSubstr("scenes/prairie.yaml:1:33: nested deeper")));
+  EXPECT_THAT([] { parse(std::string(100'000, '[')); },
+              ThrowsMessage<Error>(HasSubstr("nested deeper")));
+  std::string steps;
+  for (std::size_t i = 0; i < 1000; ++i) steps += std::string(i, ' ') + "a:\n";
+  EXPECT_THAT([&] { parse(steps); }, ThrowsMessage<Error>(HasSubstr("nested deeper")));
+}
+
+TEST(SceneFile, ThatIsNotThereIsNamed) {
+  const TemporaryFolder folder;
+  EXPECT_THAT([&] { load_scene(folder / "none.yaml", ""); },
+              ThrowsMessage<Error>(HasSubstr("none.yaml: there is no such file")));
+  EXPECT_THAT([&] { load_scene(folder.path(), ""); },
+              ThrowsMessage<Error>(HasSubstr("there is no such file")));
+}
+
+TEST(LidarFile, ReadsEveryKey) {
+  const LidarSpec lidar = parse_lidar(kLidar, "mine.yaml");
+  EXPECT_EQ(lidar.model, "Two beams");
+  EXPECT_EQ(lidar.pattern.rate_hz, 10);
+  EXPECT_EQ(lidar.pattern.sense, SpinningPattern::Sense::CounterClockwise);
+  EXPECT_DOUBLE_EQ(lidar.pattern.start_azimuth_rad, glm::radians(180.));
+  EXPECT_DOUBLE_EQ(lidar.pattern.firing_period_s, 1e-4);
+  EXPECT_EQ(lidar.gate.near_m, 0.3);
+  EXPECT_EQ(lidar.gate.far_m, std::numeric_limits<double>::infinity());
+  ASSERT_EQ(lidar.pattern.beams.size(), 2u);
+  const Beam& beam = lidar.pattern.beams[1];
+  EXPECT_EQ(beam.ring, 0);
+  EXPECT_DOUBLE_EQ(beam.elevation_rad, glm::radians(30.));
+  EXPECT_DOUBLE_EQ(beam.azimuth_offset_rad, glm::radians(-2.));
+  EXPECT_EQ(lidar.pattern.beams[0].origin_m, glm::dvec3(0, 0, 0.01));
+  EXPECT_DOUBLE_EQ(beam.firing_time_s, 50e-6);
+}
+
+TEST(LidarFile, RefusesBeamsThatDoNotFitTheirColumns) {
+  EXPECT_THAT(
+      lidar_complaint("0.01, 0]", "0.01]"),
+      HasSubstr("mine.yaml:12:5: key 'beams': is a list of 4, but must be a list of 5 numbers"));
+  EXPECT_THAT(lidar_complaint("[1, -30", "[1.5, -30"),
+              HasSubstr(":12:6: key 'ring': is 1.5, but must be a whole number from 0 to 65535"));
+  EXPECT_THAT(lidar_complaint("-30", "-91"),
+              HasSubstr(":12:9: key 'elevation_deg': is -91, but must be from -90 to 90"));
+  EXPECT_THAT(lidar_complaint("0, 50]", "0, 100]"),
+              HasSubstr(":13:5: key 'beams': firing_time_us must be less than firing_period_us"));
+  EXPECT_THAT(lidar_complaint("0, 50]", "0, -1]"),
+              HasSubstr(":13:24: key 'firing_time_us': is -1, but must be >= 0"));
+}
+
+TEST(LidarFile, RefusesColumnsThatAreUnknownMissingOrRepeated) {
+  EXPECT_THAT(lidar_complaint("elevation_deg", "elevation_rad"),
+              HasSubstr(":10:22: key 'beam_columns': 'elevation_rad' is not a column of beams; did "
+                        "you mean 'elevation_deg'?"));
+  EXPECT_THAT(lidar_complaint("firing_time_us]", "origin_x_m]"),
+              HasSubstr(":10:15: key 'beam_columns': lacks firing_time_us"));
+  EXPECT_THAT(lidar_complaint("firing_time_us]", "ring]"),
+              HasSubstr("key 'beam_columns': 'ring' is repeated"));
+}
+
+TEST(LidarFile, RefusesValuesOutOfRange) {
+  EXPECT_THAT(
+      lidar_complaint("counter_clockwise", "ccw"),
+      HasSubstr(":5:10: key 'sense': is 'ccw', but must be one of clockwise, counter_clockwise"));
+  EXPECT_THAT(lidar_complaint("firing_period_us: 100", "firing_period_us: 1e-9"),
+              HasSubstr(":7:19: key 'firing_period_us': makes 1e+14 firing sequences in a turn, "
+                        "but must make 1 to 1000000"));
+  EXPECT_THAT(lidar_complaint("near: 0.3", "near: 3\n  far: 2"),
+              HasSubstr(":9:3: key 'range_gate_m': near must be less than far"));
+  EXPECT_THAT(lidar_complaint("a made-up lidar", "[a made-up lidar]"),
+              HasSubstr(":15:10: key 'beams': is a list of 1, but must be a text"));
+  EXPECT_THAT(lidar_complaint("  - [1, -30, 2, 0.01, 0]\n  - [0, +3.0e1, -2, 0, 50]\n", "  []\n"),
+              HasSubstr("key 'beams': has no rows"));
+}
+
+TEST(PresetNames, AreSortedAndWithoutExtension) {
+  const TemporaryFolder folder;
+  for (const char* name : {"b.yaml", "a.yaml", "notes.txt"}) std::ofstream(folder / name) << "x";
+  EXPECT_THAT(preset_names(folder.path()), ::testing::ElementsAre("a", "b"));
+  EXPECT_THAT([&] { preset_names(folder / "none"); },
+              ThrowsMessage<Error>(HasSubstr("none: the folder of presets cannot be read")));
+}
+
+}  // namespace
+}  // namespace groundray
