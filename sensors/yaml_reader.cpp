@@ -11,12 +11,14 @@
 #include <cmath>
 #include <map>
 #include <numeric>
+#include <ranges>
 #include <sstream>
 
 namespace groundray::yaml {
 namespace {
 
 constexpr std::size_t kDeepest = 32;
+constexpr std::size_t kMostListed = 200;
 
 // Builds the tree of one document. Its own, because YAML::Node tells neither aliases nor repeated
 // keys.
@@ -179,8 +181,11 @@ void Faults::throw_if_any() {
   if (faults_.empty()) return;
   std::ranges::stable_sort(faults_, {}, [](const Fault& f) { return std::pair(f.line, f.column); });
   std::vector<std::string_view> messages;
-  for (const Fault& fault : faults_) messages.push_back(fault.message);
-  throw Error("{}", fmt::join(messages, "\n"));
+  for (const Fault& fault : faults_ | std::views::take(kMostListed)) {
+    messages.push_back(fault.message);
+  }
+  const std::string more = fmt::format("\n... and {} more", faults_.size() - messages.size());
+  throw Error("{}{}", fmt::join(messages, "\n"), faults_.size() > kMostListed ? more : "");
 }
 
 std::optional<double> number(const Node& node, std::string_view key, Rule rule, Faults& faults) {

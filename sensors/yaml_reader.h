@@ -51,7 +51,8 @@ class Faults {
     note(node, key, fmt::format(format, std::forward<Args>(args)...));
   }
 
-  /// @throws Error with a line for each fault, in the order of the file, if there is any.
+  /// @throws Error with a line for each fault, in the order of the file, if there is any; after 200
+  ///         it only counts them.
   void throw_if_any();
 
  private:

@@ -86,7 +86,7 @@ std::string wkt_of(const OGRSpatialReference& crs) {
 
 std::string shell_word(const std::string& word) {
   const auto is_plain = [](unsigned char c) {
-    return std::isalnum(c) != 0 || std::string_view("_./:+-").find(c) != std::string_view::npos;
+    return std::isalnum(c) != 0 || std::string_view("_./:+-=").find(c) != std::string_view::npos;
   };
   if (!word.empty() && std::ranges::all_of(word, is_plain)) return word;
   std::string text = "'";
@@ -256,12 +256,10 @@ double height_unit_m(GDALRasterBand& band, const OGRSpatialReference& crs) {
   if (is("us survey foot", "us survey feet", "us ft", "ftus", "foot us", "sft")) {
     return 1200.0 / 3937;
   }
-  if (is("km")) return 1000;
-  if (is("dm")) return 0.1;
   if (is("cm")) return 0.01;
   if (is("mm")) return 0.001;
   throw Error(
-      "its heights are in '{}', not in a unit of length known here (m, ft, us-ft, km, dm, "
+      "its heights are in '{}', not in a unit of length known here (m, ft, us-ft, "
       "cm, mm); say which with gdal_edit.py -units",
       band.GetUnitType());
 }

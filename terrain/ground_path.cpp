@@ -96,7 +96,7 @@ class Curve {
   }
 
  private:
-  static constexpr int kPieces = 32;  // of each segment, short enough for the quadrature
+  static constexpr int kPieces = 64;  // of each segment, short enough for the quadrature
   struct Piece {
     Cubic cubic;
     double t;        // where it begins on its segment

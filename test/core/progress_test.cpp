@@ -3,10 +3,12 @@
 #include <fcntl.h>
 #include <gmock/gmock.h>
 #include <gtest/gtest.h>
+#include <poll.h>
 #include <stdlib.h>
 #include <unistd.h>
 
 #include <algorithm>
+#include <array>
 #include <chrono>
 #include <memory>
 
@@ -34,7 +36,7 @@ std::string text_of(std::FILE* file) {
 /// A terminal that keeps what is drawn on it.
 class Terminal {
  public:
-  Terminal() : screen_(posix_openpt(O_RDWR | O_NOCTTY | O_NONBLOCK)) {
+  Terminal() : screen_(posix_openpt(O_RDWR | O_NOCTTY)) {
     if (screen_ >= 0 && grantpt(screen_) == 0 && unlockpt(screen_) == 0) {
       file_.reset(std::fopen(ptsname(screen_), "w"));
     }
@@ -43,11 +45,16 @@ class Terminal {
   Terminal(const Terminal&) = delete;
   Terminal& operator=(const Terminal&) = delete;
   std::FILE* file() const { return file_.get(); }
+  /// All that was drawn; the kernel may hand it over in pieces, a little later.
   std::string text() const {
-    std::fflush(file());
-    std::string text(65536, '\0');
-    const ssize_t size = read(screen_, text.data(), text.size());
-    text.resize(static_cast<std::size_t>(std::max<ssize_t>(size, 0)));
+    std::string text;
+    std::array<char, 4096> piece;
+    pollfd ready{screen_, POLLIN, 0};
+    while (poll(&ready, 1, 200) > 0) {
+      const ssize_t size = read(screen_, piece.data(), piece.size());
+      if (size <= 0) break;
+      text.append(piece.data(), static_cast<std::size_t>(size));
+    }
     return text;
   }
 

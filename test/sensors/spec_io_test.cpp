@@ -168,6 +168,14 @@ TEST(SceneFile, ListsAllItsFaultsInTheOrderOfTheFile) {
           "unit of the key"));
 }
 
+TEST(SceneFile, CountsFaultsBeyond200) {
+  std::string text;
+  for (int i = 0; i < 250; ++i) text += "nonsense" + std::to_string(i) + ": 1\n";
+  EXPECT_THAT([&] { parse(text); },  // 250 unknown keys and six missing ones
+              ThrowsMessage<Error>(AllOf(HasSubstr(":194:1: key 'nonsense193': unknown"),
+                                         ::testing::EndsWith("\n... and 56 more"))));
+}
+
 TEST(SceneFile, SuggestsTheKeyThatWasMeant) {
   EXPECT_THAT(complaint("range_gate_m", "range_gate_km"),
               HasSubstr(":23:5: key 'range_gate_km': unknown; did you mean 'range_gate_m'?"));

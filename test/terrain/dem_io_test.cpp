@@ -7,12 +7,14 @@
 #include <gtest/gtest.h>
 #include <ogr_srs_api.h>
 
+#include <algorithm>
 #include <array>
 #include <cmath>
 #include <cstdlib>
 #include <fstream>
 #include <limits>
 #include <memory>
+#include <numbers>
 #include <vector>
 
 #include "core/error.h"
@@ -29,6 +31,7 @@ using ::testing::Pointwise;
 using testing::shared_data_folder;
 using testing::TemporaryFolder;
 
+constexpr float kHole = std::numeric_limits<float>::quiet_NaN();
 constexpr double kNan = std::numeric_limits<double>::quiet_NaN();
 constexpr std::array kUtmTransform{500000.25, 2.0, 0.0, 5150000.75, 0.0, -3.0};
 constexpr const char* kUtm = "EPSG:32631";
@@ -48,12 +51,13 @@ struct Picture {
   double scale = 1;
   double offset = 0;
 
-  Dataset in_memory() const { return made_by("MEM", ""); }
   void save_tiff(const std::filesystem::path& path) const { made_by("GTiff", path); }
-  void save_as(const char* driver, const std::filesystem::path& path) const {
-    const Dataset source = in_memory();
+  void save_as(const char* driver, const std::filesystem::path& path,
+               std::vector<const char*> options = {}) const {
+    const Dataset source = made_by("MEM", "");
+    options.push_back(nullptr);
     const Dataset copy(GDALCreateCopy(GDALGetDriverByName(driver), path.c_str(), source.get(), 0,
-                                      nullptr, nullptr, nullptr),
+                                      options.data(), nullptr, nullptr),
                        &GDALClose);
     if (copy == nullptr) throw std::runtime_error(std::string("GDAL cannot write ") + driver);
   }
@@ -463,14 +467,17 @@ TEST_F(DemIo, ReprojectingToWhatIsNoPlaneIsRefused) {
               HasSubstr("it names no CRS to reproject it from"));
 }
 
-// Every length that cuts off a sample: the reader must not make heights up for what is missing.
 TEST_F(DemIo, AFileCutShortIsRefused) {
-  Picture picture{.columns = 64, .rows = 64, .values = {}, .type = GDT_Int16};
+  Picture picture{.columns = 64,
+                  .rows = 64,
+                  .values = {},
+                  .geotransform = std::array{499995.0, 30.0, 0.0, 4400025.0, 0.0, -30.0},
+                  .type = GDT_Int16};
   for (int i = 0; i < 64 * 64; ++i) picture.values.push_back((i * 7919) % 4001);
   picture.save_tiff(tiff_);
   picture.save_as("AAIGrid", folder_ / "dem.asc");
   picture.save_as("USGSDEM", folder_ / "usgs.dem");
-  picture.save_as("netCDF", folder_ / "dem.nc");
+  picture.save_as("netCDF", folder_ / "dem.nc", {"FORMAT=NC4"});
   picture.type = GDT_UInt16;
   picture.save_as("PNG", folder_ / "dem.png");
   for (const char* name : {"dem.tif", "dem.asc", "usgs.dem", "dem.nc", "dem.png"}) {
@@ -497,6 +504,127 @@ TEST_F(DemIo, TheHeaderTellsSizeFormatTypeAndCrs) {
   EXPECT_EQ(info.driver, "GTiff");
   EXPECT_EQ(info.sample_type, "Int16");
   EXPECT_EQ(info.crs_name, "WGS 84 / UTM zone 31N (EPSG:32631)");
+}
+
+TEST(DemIoData, ThePrairieIsWholeAndOneMetreApart) {
+  const Dem dem = load_dem(testing::data_folder() / "terrain/prairie_1m.tif");
+  EXPECT_EQ(dem.grid.columns(), 400);
+  EXPECT_EQ(dem.grid.rows(), 400);
+  EXPECT_EQ(dem.grid.hole_count(), 0u);
+  EXPECT_EQ(dem.grid.step_m(), glm::dvec2(1, -1));
+  EXPECT_EQ(dem.origin_w_m, glm::dvec3(429452, 5150685, 0));
+  EXPECT_EQ(dem.crs_name, "NAD83 / UTM zone 15N (EPSG:26915)");
+}
+
+// Metres per degree at 36.589583 N by the series of the U.S. Defense Mapping Agency, for WGS 84:
+// within 1 cm.
+TEST(DemIoData, JacksborosCellsAreThreeSecondsOfArcInMetres) {
+  const Dem dem = load_dem(testing::data_folder() / "terrain/jacksboro.tif");
+  EXPECT_EQ(dem.grid.columns(), 403);
+  EXPECT_EQ(dem.grid.rows(), 344);
+  EXPECT_EQ(dem.grid.min_height_m(), 236);
+  EXPECT_EQ(dem.grid.max_height_m(), 1076);
+  const double latitude = 36.58958333 * std::numbers::pi / 180;
+  const double latitude_degree_m =
+      111132.92 - 559.82 * std::cos(2 * latitude) + 1.175 * std::cos(4 * latitude);
+  const double longitude_degree_m = 111412.84 * std::cos(latitude) - 93.5 * std::cos(3 * latitude) +
+                                    0.118 * std::cos(5 * latitude);
+  constexpr double degrees = 1 / 1200.0;
+  EXPECT_NEAR(dem.grid.step_m().x / degrees, longitude_degree_m, 0.1);
+  EXPECT_NEAR(dem.grid.step_m().y / degrees, -latitude_degree_m, 0.1);
+  EXPECT_EQ(dem.origin_w_m, glm::dvec3(0));
+}
+
+// What GDAL itself reads, as the oracle.
+std::vector<float> gdal_values(const std::filesystem::path& path) {
+  const Dataset dataset(GDALOpen(path.c_str(), GA_ReadOnly), &GDALClose);
+  const int columns = GDALGetRasterXSize(dataset.get());
+  const int rows = GDALGetRasterYSize(dataset.get());
+  std::vector<float> values(static_cast<std::size_t>(columns) * static_cast<std::size_t>(rows));
+  EXPECT_EQ(GDALRasterIO(GDALGetRasterBand(dataset.get(), 1), GF_Read, 0, 0, columns, rows,
+                         values.data(), columns, rows, GDT_Float32, 0, 0),
+            CE_None);
+  return values;
+}
+
+class SharedDem : public ::testing::Test {
+ protected:
+  void SetUp() override {
+    if (!std::filesystem::exists(dems_))
+      GTEST_SKIP() << "there are no public DEMs in " << dems_ << "; set GROUNDRAY_SHARED_DATA";
+  }
+
+  static void expect_values(const Dem& dem, const std::filesystem::path& path, float nodata) {
+    std::vector<float> expected = gdal_values(path);
+    std::ranges::replace(expected, nodata, kHole);
+    EXPECT_EQ(dem.grid.hole_count(), static_cast<std::size_t>(std::ranges::count_if(
+                                         expected, [](float z) { return std::isnan(z); })));
+    EXPECT_TRUE(std::ranges::equal(dem.grid.heights_m(), expected, [](float a, float b) {
+      return a == b || (std::isnan(a) && std::isnan(b));
+    }));
+  }
+
+  std::filesystem::path dems_ = shared_data_folder() / "dem";
+};
+
+TEST_F(SharedDem, BigTujunga) {
+  const auto path = dems_ / "bigtujunga_30m/bigtujunga.tif";
+  const Dem dem = load_dem(path);
+  EXPECT_EQ(dem.crs_name, "WGS 84 / UTM zone 11N (EPSG:32611)");
+  EXPECT_EQ(dem.grid.step_m(), glm::dvec2(30, -30));
+  EXPECT_EQ(dem.origin_w_m, glm::dvec3(394269, 3798273, 0));
+  expect_values(dem, path, 32767);
+}
+
+TEST_F(SharedDem, LidarGroundWithDeclaredHoles) {
+  const auto path = dems_ / "lidar_dsm_dtm_2m/dtm.tif";
+  const Dem dem = load_dem(path);
+  EXPECT_EQ(dem.grid.step_m(), glm::dvec2(2, -2));
+  EXPECT_EQ(p_W(dem, 0, 0), glm::dvec2(321499, 4298017));
+  EXPECT_GT(dem.grid.hole_count(), 0u);
+  expect_values(dem, path, -9999);
+}
+
+// The file's own TIFFTAG_MINSAMPLEVALUE and TIFFTAG_MAXSAMPLEVALUE.
+TEST_F(SharedDem, CraterLakesUndeclaredNodataIsKeptOutOfTheWarp) {
+  const auto path = dems_ / "crater_lake_dem_and_image/craterlake-elev-16bit-30m.tif";
+  EXPECT_THAT(error_of(path, {.nodata = -32767}), HasSubstr("gdalwarp -t_srs EPSG:32610 "));
+  EXPECT_THAT(error_of(path, {.nodata = -32767}), HasSubstr("-srcnodata -32767 "));
+  const Dem dem = load_dem(path, {.nodata = -32767, .reproject_to = "utm"});
+  EXPECT_EQ(dem.crs_name, "WGS 84 / UTM zone 10N (EPSG:32610)");
+  EXPECT_NEAR(dem.grid.min_height_m(), 1289, 1);
+  EXPECT_NEAR(dem.grid.max_height_m(), 1880, 1);
+}
+
+TEST_F(SharedDem, EdgeCasesOfGazebo) {
+  const auto folder = dems_ / "gz_common_edge_cases";
+  const Dem moon = load_dem(folder / "dem_moon.tif");
+  EXPECT_EQ(moon.crs_name, "Moon2000_npole");
+  EXPECT_EQ(moon.origin_w_m, glm::dvec3(-53710, -51090, 0));
+  expect_values(moon, folder / "dem_moon.tif", kHole);
+  expect_values(load_dem(folder / "dem_nodata.dem"), folder / "dem_nodata.dem", -32767);
+  const Dem nan = load_dem(folder / "dem_nodata_nan.nc");
+  EXPECT_GT(nan.grid.hole_count(), 0u);
+  expect_values(nan, folder / "dem_nodata_nan.nc", kHole);
+  for (const char* name : {"dem_landscape.tif", "dem_portrait.tif", "dem_squared.tif"}) {
+    EXPECT_THAT(error_of(folder / name), HasSubstr("gdalwarp -t_srs EPSG:32610 "));
+  }
+}
+
+TEST_F(SharedDem, TheMoonIsOfferedAMapOfItsOwn) {
+  EXPECT_THAT(error_of(dems_ / "moon_gld100_8193/moon_gld100_8193.tif"),
+              HasSubstr("-t_srs '+proj=tmerc +lat_0=30.0020 +lon_0=16.0020 +R=1737400 "));
+}
+
+TEST_F(SharedDem, ASrtmTileLoadsOutOfItsArchive) {
+  const std::string path =
+      "/vsizip/" + (dems_ / "srtm3_sierra_nevada/N37W004.hgt.zip/N37W004.hgt").string();
+  EXPECT_THAT(error_of(path), HasSubstr(path + " N37W004_metric.tif"));
+  const Dem dem = load_dem(path, {.reproject_to = "utm"});
+  EXPECT_EQ(dem.crs_name, "WGS 84 / UTM zone 30N (EPSG:32630)");
+  const std::vector<float> source = gdal_values(path);
+  EXPECT_GE(dem.grid.min_height_m(), std::ranges::min(source));
+  EXPECT_LE(dem.grid.max_height_m(), std::ranges::max(source));
 }
 
 }  // namespace

@@ -1,0 +1,293 @@
+"""The program as a user meets it: datasets that other people's tools read, and bad input."""
+
+import math
+import os
+import re
+import resource
+import shutil
+import signal
+import subprocess
+import time
+from pathlib import Path
+
+import numpy as np
+import pytest
+import yaml
+from plyfile import PlyData
+
+ROOT = Path(__file__).resolve().parents[2]
+PROGRAM = ROOT / "build/release/bin/groundray"
+PRAIRIE = ROOT / "data/terrain/prairie_1m.tif"
+
+COLUMNS = {
+    "x": "f4", "y": "f4", "z": "f4", "intensity": "f4", "time": "f4", "ring": "u2",
+    "return_index": "u1", "return_count": "u1",
+    "world_x": "f8", "world_y": "f8", "world_z": "f8", "range_true": "f8",
+    "nx": "f4", "ny": "f4", "nz": "f4", "incidence": "f4",
+    "label": "u2", "instance": "u4", "error_estimate": "f4",
+}  # fmt: skip
+
+SCENE = """\
+groundray: 1
+seed: 7
+duration_s: 0.3
+terrain: {dem: DEM}
+platform:
+  drive:
+    waypoints_m: [[429440, 5150660], [429448, 5150668], [429456, 5150671], [429470, 5150676]]
+    speed_m_s: 10
+    height_m: 0.5
+lidars:
+  - {name: top, preset: velodyne_vlp16, mount: {translation_m: [0, 0, 1.5], pitch_deg: 3}}
+""".replace("DEM", str(PRAIRIE))
+
+
+def groundray(*arguments, **options):
+    return subprocess.run(
+        [PROGRAM, *map(str, arguments)], capture_output=True, text=True, timeout=300, **options
+    )
+
+
+def generate(folder, scene=SCENE, out="out", **options):
+    (folder / "scene.yaml").write_text(scene)
+    return groundray("generate", folder / "scene.yaml", "-o", folder / out, **options)
+
+
+def refused(result, *words):
+    """The run failed with one message that holds all the words, and no trace of a crash."""
+    assert result.returncode == 1, result
+    assert result.stderr.startswith("groundray: "), result.stderr
+    for word in words:
+        assert word in result.stderr, result.stderr
+    return True
+
+
+def files(folder):
+    return {p.relative_to(folder): p.read_bytes() for p in folder.rglob("*") if p.is_file()}
+
+
+@pytest.fixture(scope="module")
+def dataset(tmp_path_factory):
+    folder = tmp_path_factory.mktemp("dataset")
+    result = generate(folder)
+    assert result.returncode == 0, result.stderr
+    return folder / "out"
+
+
+def heights_of(dem, folder):
+    """Samples and geotransform of a DEM, as GDAL's own program writes them out."""
+    grid = folder / "grid.asc"
+    subprocess.run(
+        ["gdal_translate", "-q", "-of", "AAIGrid", "-co", "SIGNIFICANT_DIGITS=12", dem, grid], check=True
+    )
+    head = dict(line.split() for line in grid.read_text().splitlines()[:5])
+    skip = 6 if "NODATA" in grid.read_text()[:300].upper() else 5
+    heights = np.loadtxt(grid, skiprows=skip)
+    cell = float(head["cellsize"])
+    west = float(head["xllcorner"]) + cell / 2
+    north = float(head["yllcorner"]) + cell * (heights.shape[0] - 0.5)
+    return heights, west, north, cell
+
+
+def test_every_column_is_there_with_its_type(dataset):
+    for frame in range(3):
+        vertex = PlyData.read(dataset / f"lidar/top/{frame:06}.ply")["vertex"]
+        assert {p.name: p.val_dtype for p in vertex.properties} == COLUMNS
+        assert vertex.count > 5000
+
+
+def test_points_lie_on_the_surface_that_gdal_reads(dataset, tmp_path):
+    heights, west, north, cell = heights_of(PRAIRIE, tmp_path)
+    ply = PlyData.read(dataset / "lidar/top/000001.ply")
+    origin = np.array([float(v) for v in ply.comments[0].split()[1:]])
+    points = ply["vertex"]
+    # Columns and rows from the difference to the first sample, so that nothing is lost at UTM's size.
+    u = (points["world_x"] - (west - origin[0])) / cell
+    v = ((north - origin[1]) - points["world_y"]) / cell
+    c, r = np.floor(u).astype(int), np.floor(v).astype(int)
+    fu, fv = u - c, v - r
+    a, b = heights[r, c], heights[r, c + 1]
+    d, e = heights[r + 1, c], heights[r + 1, c + 1]
+    near = a + (b - a) * fu + (d - a) * fv
+    far = e + (d - e) * (1 - fu) + (b - e) * (1 - fv)
+    surface = np.where(fu + fv > 1, far, near)
+    # The ASCII grid's corner has about 1e-9 m of rounding at a northing of 5e6 m; slopes are below 2.
+    assert np.abs(points["world_z"] - surface).max() < 1e-8
+
+
+def test_pose_file_takes_sensor_points_to_the_world(dataset):
+    poses = np.loadtxt(dataset / "poses/top.tum")
+    record = yaml.safe_load((dataset / "dataset.yaml").read_text())
+    for frame in record["frames"]:
+        points = PlyData.read(dataset / f"lidar/top/{frame['frame']:06}.ply")["vertex"]
+        t = frame["stamp_s"] + points["time"].astype(float)
+        i = np.clip(np.searchsorted(poses[:, 0], t, side="right") - 1, 0, len(poses) - 2)
+        s = (t - poses[i, 0]) / (poses[i + 1, 0] - poses[i, 0])
+        # Linear position and normalised linear quaternion: what any reader would do between poses 10 ms apart.
+        p = poses[i, 1:4] + s[:, None] * (poses[i + 1, 1:4] - poses[i, 1:4])
+        q = poses[i, 4:8] + s[:, None] * (poses[i + 1, 4:8] - poses[i, 4:8])
+        q /= np.linalg.norm(q, axis=1)[:, None]
+        local = np.stack([points["x"], points["y"], points["z"]], axis=1).astype(float)
+        twice = 2 * np.cross(q[:, :3], local)
+        world = p + local + q[:, 3:] * twice + np.cross(q[:, :3], twice)
+        truth = np.stack([points["world_x"], points["world_y"], points["world_z"]], axis=1)
+        assert np.abs(world - truth).max() < 1e-4
+
+
+def test_record_says_what_there_is(dataset):
+    record = yaml.safe_load((dataset / "dataset.yaml").read_text())
+    assert record["seed"] == 7
+    assert record["scene"] == SCENE
+    assert record["origin_w_m"] == [429452, 5150685, 0]
+    assert [f["state"] for f in record["frames"]] == ["done"] * 3
+    assert [f["stamp_s"] for f in record["frames"]] == pytest.approx([0, 0.1, 0.2], abs=6e-5)
+    calibration = yaml.safe_load((dataset / "calibration/top.yaml").read_text())
+    assert len(calibration["beams"]) == 16
+    pitch = calibration["X_BS"]["rotation_xyzw"]
+    assert pitch == pytest.approx([0, math.sin(math.radians(1.5)), 0, math.cos(math.radians(1.5))])
+    assert (dataset / "lidar/top/000000_preview.png").read_bytes().startswith(b"\x89PNG")
+
+
+def test_same_seed_gives_the_same_bytes(dataset, tmp_path):
+    assert generate(tmp_path).returncode == 0
+    assert files(tmp_path / "out") == files(dataset)
+
+
+def test_run_goes_on_where_it_stopped_and_ends_with_the_same_bytes(dataset, tmp_path):
+    shutil.copytree(dataset, tmp_path / "out")
+    for name in ("000001.ply", "000002.ply", "000002_preview.png"):
+        (tmp_path / "out/lidar/top" / name).unlink()
+    result = generate(tmp_path)
+    assert result.returncode == 0, result.stderr
+    assert "1 scans were there already" in result.stdout
+    assert files(tmp_path / "out") == files(dataset)
+
+
+def test_interrupt_leaves_whole_frames_and_exit_code_130(dataset, tmp_path):
+    (tmp_path / "scene.yaml").write_text(SCENE.replace("0.3", "2.5").replace("speed_m_s: 10", "speed_m_s: 4"))
+    out = tmp_path / "out"
+    run = subprocess.Popen(
+        [PROGRAM, "generate", tmp_path / "scene.yaml", "-o", out], stderr=subprocess.PIPE, text=True
+    )
+    deadline = time.monotonic() + 60
+    while not (out / "lidar/top/000002.ply").exists() and time.monotonic() < deadline:
+        time.sleep(0.005)
+    run.send_signal(signal.SIGINT)
+    _, said = run.communicate(timeout=60)
+    assert run.returncode == 130, said
+    assert "goes on" in said
+    names = sorted(p.name for p in (out / "lidar/top").iterdir())
+    assert all(re.fullmatch(r"\d{6}(\.ply|_preview\.png)", name) for name in names), names
+    for scan in (out / "lidar/top").glob("*.ply"):
+        PlyData.read(scan)
+    states = [f["state"] for f in yaml.safe_load((out / "dataset.yaml").read_text())["frames"]]
+    assert "done" in states
+    assert "pending" in states
+
+
+def test_folder_of_another_run_is_left_alone(dataset, tmp_path):
+    shutil.copytree(dataset, tmp_path / "out")
+    assert refused(generate(tmp_path, SCENE.replace("seed: 7", "seed: 8")), "another scene, seed")
+    assert files(tmp_path / "out") == files(dataset)
+    (tmp_path / "mine").mkdir()
+    (tmp_path / "mine/notes.txt").write_text("keep")
+    assert refused(generate(tmp_path, out="mine"), "not empty", "choose a new folder")
+
+
+@pytest.mark.parametrize(
+    ("change", "words"),
+    [
+        (("speed_m_s: 10", "speed_m_s: 10\n    sped: 3"), ["scene.yaml:9:5", "sped"]),
+        (("velodyne_vlp16", "velodyne_vlp61"), ["velodyne_vlp61", "velodyne_vlp16"]),
+        (("pitch_deg: 3}", "pitch_deg: 3}, range_gate_m: [-1, 50]"), ["range_gate_m", "-1"]),
+        (("prairie_1m.tif", "no_such.tif"), ["no_such.tif"]),
+        (("height_m: 0.5", "height_m: -3"), ["height_m"]),
+        (("translation_m: [0, 0, 1.5]", "translation_m: [0, 0, -2]"), ["below the ground"]),
+        (("[429440, 5150660]", "[499440, 5150660]"), ["outside"]),
+        (("duration_s: 0.3", "duration_s: 30"), ["waypoints"]),
+        (("duration_s: 0.3", "duration_s: 0.05"), ["shorter than one sweep"]),
+    ],
+)
+def test_a_fault_in_the_scene_is_named(tmp_path, change, words):
+    assert change[0] in SCENE
+    assert refused(generate(tmp_path, SCENE.replace(*change)), *words)
+    assert not (tmp_path / "out").exists()
+
+
+@pytest.mark.parametrize(
+    ("lines", "words"),
+    [
+        (["0 429440 5150660 400 0 0 0 1", "0.1 429441 5150660 400 0 0 0 1"], ["lasts 0.100 s"]),
+        (["0 0 0 0 0 0 0 1", "1 0 0 0 0 0 0 1", "0.5 0 0 0 0 0 0 1"], ["path.tum", ":3:"]),
+        (["0 429440 5150660 100 0 0 0 1", "1 429441 5150660 100 0 0 0 1"], ["below the ground"]),
+    ],
+)
+def test_a_fault_in_the_trajectory_is_named(tmp_path, lines, words):
+    (tmp_path / "path.tum").write_text("\n".join(lines) + "\n")
+    scene = re.sub(r"platform:.*?lidars:", "platform: {trajectory: path.tum}\nlidars:", SCENE, flags=re.S)
+    assert refused(generate(tmp_path, scene), *words)
+
+
+def test_recorded_trajectory_with_epoch_times_starts_at_zero(tmp_path):
+    lines = [f"{1600000000 + 0.1 * k:.1f} {429440 + k} 5150660 412 0 0 0 1" for k in range(6)]
+    (tmp_path / "path.tum").write_text("\n".join(lines) + "\n")
+    scene = re.sub(r"platform:.*?lidars:", "platform: {trajectory: path.tum}\nlidars:", SCENE, flags=re.S)
+    result = generate(tmp_path, scene)
+    assert result.returncode == 0, result.stderr
+    poses = np.loadtxt(tmp_path / "out/poses/top.tum")
+    assert poses[:, 0] == pytest.approx([0, 0.1, 0.2, 0.3, 0.4, 0.5])
+    assert poses[3, 1] == pytest.approx(429443 - 429452)
+
+
+def test_output_that_cannot_be_written_is_an_error(tmp_path):
+    (tmp_path / "file").write_text("")
+    assert refused(generate(tmp_path, out="file/out"), "file/out", "cannot make this folder")
+
+
+def test_full_disk_is_an_error_and_leaves_no_half_file(tmp_path):
+    """A limit on file size makes every scan fail while it is written, as a full disk does."""
+    limit = lambda: resource.setrlimit(resource.RLIMIT_FSIZE, (200_000, 200_000))  # noqa: E731
+    result = generate(tmp_path, preexec_fn=limit)
+    assert refused(result, "000000")
+    assert not [p for p in (tmp_path / "out/lidar/top").iterdir() if p.suffix != ".png"]
+
+
+@pytest.mark.skipif(os.geteuid() != 0, reason="mounting a small disk needs root")
+def test_disk_without_space_is_an_error_and_leaves_no_half_file(tmp_path):
+    disk = tmp_path / "disk"
+    disk.mkdir()
+    mount = ["mount", "-t", "tmpfs", "-o", "size=400k", "tmpfs", disk]
+    if subprocess.run(mount, capture_output=True, check=False).returncode != 0:
+        pytest.skip("mounting a small disk is not permitted here")
+    try:
+        assert refused(generate(tmp_path, out="disk/out"), "No space left on device")
+        assert not [p for p in (disk / "out/lidar/top").iterdir() if p.suffix != ".png"]
+    finally:
+        subprocess.run(["umount", disk], check=True)
+
+
+def test_wrong_usage_is_exit_code_2():
+    assert groundray().returncode == 2
+    assert groundray("generate").returncode == 2
+    assert groundray("generate", "x.yaml", "-o", "y", "--fast").returncode == 2
+    assert groundray("frobnicate").returncode == 2
+
+
+def test_help_and_version_are_enough_to_begin_with():
+    said = groundray("--help")
+    assert said.returncode == 0
+    for word in ("generate", "info", "Exit codes", "first_light.yaml"):
+        assert word in said.stdout
+    assert re.fullmatch(r"groundray \d+\.\d+\.\d+\n", groundray("--version").stdout)
+
+
+def test_info_tells_of_a_dem_and_of_a_scene(tmp_path):
+    said = groundray("info", PRAIRIE).stdout
+    for word in ("400 x 400", "26915", "1 x 1 m", "379.659 to 410.759", "holes     0", "MiB"):
+        assert word in said
+    (tmp_path / "scene.yaml").write_text(SCENE)
+    said = groundray("info", tmp_path / "scene.yaml").stdout
+    for word in ("VLP-16", "3 scans", "prairie_1m.tif"):
+        assert word in said
+    assert refused(groundray("info", tmp_path / "nothing.tif"), "nothing.tif")
+    assert refused(groundray("info", Path(__file__)), "generate_test.py")

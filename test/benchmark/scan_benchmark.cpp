@@ -1,0 +1,163 @@
+// What a whole scan costs against the rays alone. Both run in turn in every iteration, so that
+// their ratio is of one moment of one machine.
+#include <benchmark/benchmark.h>
+
+#include <chrono>
+#include <cmath>
+#include <cstdlib>
+#include <filesystem>
+#include <fstream>
+#include <glm/geometric.hpp>
+#include <glm/gtc/quaternion.hpp>
+
+#include "sensors/lidar.h"
+#include "sensors/spec_io.h"
+#include "terrain/terrain_scene.h"
+#include "test/benchmark/raw_embree.h"
+#include "test/support/sample_terrain.h"
+#include "test/support/temporary_folder.h"
+
+namespace groundray::benchmark {
+namespace {
+
+using namespace std::chrono_literals;
+using Clock = std::chrono::steady_clock;
+
+double seconds_since(Clock::time_point begin) {
+  return std::chrono::duration<double>(Clock::now() - begin).count();
+}
+
+const HeightGrid& ground() {
+  static const HeightGrid grid = testing::fractal(4097, 5, 1500, Seed{12345});
+  return grid;
+}
+
+// 10 m/s over the middle of the ground, swaying.
+const Trajectory& ride() {
+  static const Trajectory path = [] {
+    std::vector<Trajectory::Sample> samples;
+    for (int k = 0; k <= 100; ++k) {
+      const glm::dvec2 p(0.1 * k, 0.02 * k);
+      samples.push_back(
+          {10ms * k,
+           {rotation_from_yaw_pitch_roll(0.2, 0.05 * std::sin(0.1 * k), 0.05 * std::cos(0.1 * k)),
+            {p, *ground().height_m_at(p) + 2.5}}});
+    }
+    return Trajectory(std::move(samples));
+  }();
+  return path;
+}
+
+Scene scene(Tracing tracing) {
+  return {RayTracer({full_resolution_level(ground())}, {0, 0, 0}, tracing), {}};
+}
+
+LidarSpec vls128() { return load_lidar(testing::data_folder() / "sensors/velodyne_vls128.yaml"); }
+
+// The rays of one sweep, beam by beam in blocks of 32 firing sequences: the order that suits
+// packets best.
+std::vector<Ray> rays_of_sweep(const ScanPattern& pattern, double far_m) {
+  std::vector<Ray> rays;
+  const std::int64_t end = pattern.first_sequence(1);
+  for (std::int64_t block = 0; block < end; block += 32) {
+    for (const ScanPattern::Volley& volley : pattern.volleys()) {
+      for (int shot = volley.begin; shot < volley.end; ++shot) {
+        for (std::int64_t k = block; k < std::min(end, block + 32); ++k) {
+          const double time_s = pattern.firing_time_s(k, volley);
+          const Pose X_DS = ride().pose_at(std::chrono::nanoseconds(std::llround(1e9 * time_s)));
+          const glm::dquat R_SH = glm::angleAxis(pattern.spin_rad(time_s), glm::dvec3(0, 0, 1));
+          const auto& [direction, origin_m, ring] = pattern.shots()[static_cast<std::size_t>(shot)];
+          rays.push_back({X_DS * (R_SH * origin_m), X_DS.rotation * (R_SH * direction), far_m});
+        }
+      }
+    }
+  }
+  return rays;
+}
+
+// For other programs to trace the same rays over the same samples: raw doubles and floats, see
+// open3d_baseline.py.
+void export_case(const std::filesystem::path& folder, std::span<const Ray> rays) {
+  std::filesystem::create_directories(folder);
+  std::ofstream samples(folder / "heights.f32", std::ios::binary);
+  const auto heights_m = ground().heights_m();
+  samples.write(reinterpret_cast<const char*>(heights_m.data()),
+                static_cast<std::streamsize>(heights_m.size_bytes()));
+  std::ofstream out(folder / "rays.f64", std::ios::binary);
+  for (const Ray& ray : rays) {
+    out.write(reinterpret_cast<const char*>(&ray.origin), sizeof(ray.origin));
+    out.write(reinterpret_cast<const char*>(&ray.direction), sizeof(ray.direction));
+  }
+  std::ofstream frame(folder / "frame.txt");
+  frame.precision(17);
+  frame << ground().columns() << ' ' << ground().rows() << ' ' << ground().origin_m().x << ' '
+        << ground().origin_m().y << ' ' << ground().step_m().x << ' ' << ground().step_m().y
+        << '\n';
+}
+
+void scan_vls128(::benchmark::State& state) {
+  const LidarSpec spec = vls128();
+  const Lidar lidar(spec);
+  const Scene world = scene(Tracing::Fast);
+  const auto rays = rays_of_sweep(lidar.pattern(), spec.gate.far_m);
+  if (const char* folder = std::getenv("GROUNDRAY_BENCH_EXPORT")) export_case(folder, rays);
+  RawEmbree raw(ground(), rays);
+
+  std::size_t met = 0;
+  for (const float range_m : raw.trace()) met += range_m < spec.gate.far_m ? 1 : 0;
+  const std::size_t rows = lidar.scan(world, ride(), 0, Seed{7}, 0).rows();
+  // Floats alone decide otherwise at silhouettes, and where a hit lies within a float's breadth of
+  // the gate.
+  if (std::abs(static_cast<double>(met) - static_cast<double>(rows)) >
+      1e-4 * static_cast<double>(rows)) {
+    return state.SkipWithError("the scan and raw Embree disagree on how many rays hit");
+  }
+  double raw_s = 0, scan_s = 0;
+  for (auto _ : state) {
+    auto begin = Clock::now();
+    ::benchmark::DoNotOptimize(raw.trace());
+    raw_s += seconds_since(begin);
+    begin = Clock::now();
+    ::benchmark::DoNotOptimize(lidar.scan(world, ride(), 0, Seed{7}, 0));
+    const double this_s = seconds_since(begin);
+    scan_s += this_s;
+    state.SetIterationTime(this_s);
+  }
+  const double traced = static_cast<double>(rays.size()) * static_cast<double>(state.iterations());
+  state.counters["Mrays/s"] = 1e-6 * traced / scan_s;
+  state.counters["raw_Mrays/s"] = 1e-6 * traced / raw_s;
+  state.counters["of_raw"] = raw_s / scan_s;
+}
+BENCHMARK(scan_vls128)->UseManualTime()->Unit(::benchmark::kMillisecond)->MinTime(4);
+
+void exact_against_fast(::benchmark::State& state) {
+  const LidarSpec spec = vls128();
+  const auto rays = rays_of_sweep(ScanPattern(spec.pattern), spec.gate.far_m);
+  const Lidar lidar(spec);
+  const Scene fast = scene(Tracing::Fast);
+  const Scene exact = scene(Tracing::Exact);
+  const PointCloud a = lidar.scan(fast, ride(), 0, Seed{7}, 0);
+  const PointCloud b = lidar.scan(exact, ride(), 0, Seed{7}, 0);
+  if (std::abs(static_cast<double>(a.rows()) - static_cast<double>(b.rows())) >
+      5e-6 * static_cast<double>(rays.size()) + 1) {
+    return state.SkipWithError("exact and fast tracing disagree");
+  }
+  double fast_s = 0, exact_s = 0;
+  for (auto _ : state) {
+    auto begin = Clock::now();
+    ::benchmark::DoNotOptimize(lidar.scan(fast, ride(), 0, Seed{7}, 0));
+    fast_s += seconds_since(begin);
+    begin = Clock::now();
+    ::benchmark::DoNotOptimize(lidar.scan(exact, ride(), 0, Seed{7}, 0));
+    const double this_s = seconds_since(begin);
+    exact_s += this_s;
+    state.SetIterationTime(this_s);
+  }
+  state.counters["Mrays/s"] =
+      1e-6 * static_cast<double>(rays.size()) * static_cast<double>(state.iterations()) / exact_s;
+  state.counters["of_fast"] = fast_s / exact_s;
+}
+BENCHMARK(exact_against_fast)->UseManualTime()->Unit(::benchmark::kMillisecond)->MinTime(4);
+
+}  // namespace
+}  // namespace groundray::benchmark
