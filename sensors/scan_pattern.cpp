@@ -11,8 +11,8 @@
 namespace groundray {
 namespace {
 
-constexpr double kTurn = 2 * std::numbers::pi;
-constexpr double kToleranceTurns = 1e-9;
+constexpr double full_turn_rad = 2 * std::numbers::pi;
+constexpr double tolerance_turns = 1e-9;
 
 void check(const SpinningPattern& pattern) {
   Violations broken("SpinningPattern");
@@ -23,9 +23,9 @@ void check(const SpinningPattern& pattern) {
   broken.unless(period_s > 0 && std::isfinite(period_s),
                 "firing_period_s = {} must be positive and finite", period_s);
   const double sequences = 1 / (rate_hz * period_s);
-  broken.unless(sequences >= 1 - kToleranceTurns && sequences <= ScanPattern::kMostSequences,
+  broken.unless(sequences >= 1 - tolerance_turns && sequences <= ScanPattern::most_sequences,
                 "a turn has {} firing sequences, but must have 1 to {}: is the period in seconds?",
-                sequences, ScanPattern::kMostSequences);
+                sequences, ScanPattern::most_sequences);
   broken.unless(std::isfinite(pattern.start_azimuth_rad), "start_azimuth_rad = {} must be finite",
                 pattern.start_azimuth_rad);
   broken.unless(!pattern.beams.empty(), "beams: there must be at least one");
@@ -60,9 +60,10 @@ std::chrono::nanoseconds nearest_nanosecond(double time_s) {
 
 // Returns the angle in [0, 2 pi).
 double wrapped(double angle_rad) {
-  const double angle = std::fmod(angle_rad, kTurn);
-  const double positive = angle < 0 ? angle + kTurn : angle;
-  return positive < kTurn ? positive : 0;  // a tiny negative angle rounds up to the whole turn
+  const double angle = std::fmod(angle_rad, full_turn_rad);
+  const double positive = angle < 0 ? angle + full_turn_rad : angle;
+  return positive < full_turn_rad ? positive
+                                  : 0;  // a tiny negative angle rounds up to the whole turn
 }
 
 }  // namespace
@@ -87,11 +88,11 @@ ScanPattern::ScanPattern(const SpinningPattern& pattern)
 }
 
 std::int64_t ScanPattern::first_sequence(std::int64_t sweep) const {
-  constexpr double kEpsilon = std::numeric_limits<double>::epsilon();
+  constexpr double epsilon = std::numeric_limits<double>::epsilon();
   const double turns = static_cast<double>(sweep);
-  const double tolerance_turns =
-      kToleranceTurns + 4 * kEpsilon * turns;  // the roundings here and of the rate and period
-  const double sequence = std::ceil((turns - tolerance_turns) / (rate_hz_ * firing_period_s_));
+  const double early_turns =
+      tolerance_turns + 4 * epsilon * turns;  // the roundings here and of the rate and period
+  const double sequence = std::ceil((turns - early_turns) / (rate_hz_ * firing_period_s_));
   return std::max<std::int64_t>(0, static_cast<std::int64_t>(sequence));
 }
 
@@ -99,7 +100,7 @@ double ScanPattern::spin_rad(double time_s) const {
   const double whole_turns = std::floor(signed_rate_hz_ * time_s);
   const double fraction =
       std::fma(signed_rate_hz_, time_s, -whole_turns);  // one rounding, at any time
-  return wrapped(start_azimuth_rad_ + kTurn * fraction);
+  return wrapped(start_azimuth_rad_ + full_turn_rad * fraction);
 }
 
 std::chrono::nanoseconds ScanPattern::stamp(std::int64_t sweep) const {

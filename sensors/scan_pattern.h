@@ -48,7 +48,7 @@ class ScanPattern {
   };
 
   /// A turn of the head holds from 1 to this many firing sequences.
-  static constexpr double kMostSequences = 1e6;
+  static constexpr double most_sequences = 1e6;
 
   /// @throws Error listing every field of `pattern` that is out of bounds.
   explicit ScanPattern(const SpinningPattern& pattern);

@@ -17,25 +17,25 @@ namespace groundray {
 namespace {
 
 namespace fs = std::filesystem;
+using yaml::any_number;
 using yaml::Faults;
-using yaml::kAny;
-using yaml::kNotNegative;
-using yaml::kPositive;
 using yaml::Map;
 using yaml::Need;
 using yaml::Node;
+using yaml::not_negative;
+using yaml::positive;
 using yaml::Rule;
 
-constexpr Rule kDuration{[](double value) { return value > 0 && value <= 1e6; },
-                         "must be > 0 and at most 1e6"};
-constexpr Rule kElevation{[](double value) { return std::abs(value) <= 90; },
-                          "must be from -90 to 90"};
+constexpr Rule duration_rule{[](double value) { return value > 0 && value <= 1e6; },
+                             "must be > 0 and at most 1e6"};
+constexpr Rule elevation_rule{[](double value) { return std::abs(value) <= 90; },
+                              "must be from -90 to 90"};
 
 std::string read_file(const fs::path& path) {
-  constexpr std::uintmax_t kLargest = 16u << 20;
+  constexpr std::uintmax_t largest_file_bytes = 16u << 20;
   std::error_code fault;
   if (!fs::is_regular_file(path, fault)) throw Error("{}: there is no such file", path.string());
-  if (fs::file_size(path, fault) > kLargest) {
+  if (fs::file_size(path, fault) > largest_file_bytes) {
     throw Error("{}: larger than any file of groundray (16 MiB)", path.string());
   }
   std::ifstream file(path, std::ios::binary);
@@ -54,9 +54,9 @@ void check_version(Map& root, std::string_view key, Faults& faults) {
 void check_turn(const Node& node, std::string_view key, const SpinningPattern& pattern,
                 Faults& faults) {
   const double sequences = 1 / (pattern.rate_hz * pattern.firing_period_s);
-  if (sequences < 1 - 1e-9 || sequences > ScanPattern::kMostSequences) {
+  if (sequences < 1 - 1e-9 || sequences > ScanPattern::most_sequences) {
     faults.add(node, key, "makes {:.6g} firing sequences in a turn, but must make 1 to {}",
-               sequences, ScanPattern::kMostSequences);
+               sequences, ScanPattern::most_sequences);
   }
 }
 
@@ -68,30 +68,31 @@ struct BeamColumn {
   bool required;
 };
 
-constexpr Rule kRing{
+constexpr Rule ring_rule{
     [](double value) { return value >= 0 && value <= 65535 && value == std::floor(value); },
     "must be a whole number from 0 to 65535"};
-constexpr std::array kBeamColumns{
-    BeamColumn{"ring", kRing, [](Beam& b, double v) { b.ring = static_cast<std::uint16_t>(v); },
+constexpr std::array beam_columns{
+    BeamColumn{"ring", ring_rule, [](Beam& b, double v) { b.ring = static_cast<std::uint16_t>(v); },
                true},
-    BeamColumn{"elevation_deg", kElevation,
+    BeamColumn{"elevation_deg", elevation_rule,
                [](Beam& b, double v) { b.elevation_rad = glm::radians(v); }, true},
-    BeamColumn{"azimuth_offset_deg", kAny,
+    BeamColumn{"azimuth_offset_deg", any_number,
                [](Beam& b, double v) { b.azimuth_offset_rad = glm::radians(v); }, false},
-    BeamColumn{"origin_x_m", kAny, [](Beam& b, double v) { b.origin_m.x = v; }, false},
-    BeamColumn{"origin_y_m", kAny, [](Beam& b, double v) { b.origin_m.y = v; }, false},
-    BeamColumn{"origin_z_m", kAny, [](Beam& b, double v) { b.origin_m.z = v; }, false},
-    BeamColumn{"firing_time_us", kNotNegative, [](Beam& b, double v) { b.firing_time_s = v / 1e6; },
+    BeamColumn{"origin_x_m", any_number, [](Beam& b, double v) { b.origin_m.x = v; }, false},
+    BeamColumn{"origin_y_m", any_number, [](Beam& b, double v) { b.origin_m.y = v; }, false},
+    BeamColumn{"origin_z_m", any_number, [](Beam& b, double v) { b.origin_m.z = v; }, false},
+    BeamColumn{"firing_time_us", not_negative, [](Beam& b, double v) { b.firing_time_s = v / 1e6; },
                true},
 };
 
 std::vector<BeamColumn> read_columns(Map& root, Faults& faults) {
   std::vector<std::string> free;
-  for (const BeamColumn& column : kBeamColumns) free.emplace_back(column.name);
+  free.reserve(beam_columns.size());
+  for (const BeamColumn& column : beam_columns) free.emplace_back(column.name);
   std::vector<BeamColumn> columns;
   for (const Node& item : root.list("beam_columns", Need::Required)) {
-    const auto column = std::ranges::find(kBeamColumns, item.text, &BeamColumn::name);
-    if (column == kBeamColumns.end()) {
+    const auto column = std::ranges::find(beam_columns, item.text, &BeamColumn::name);
+    if (column == beam_columns.end()) {
       faults.add(item, "beam_columns", "{} is not a column of beams{}", yaml::shown(item),
                  yaml::suggestion(item.text, free));
     } else if (std::erase(free, item.text) == 0) {
@@ -111,7 +112,7 @@ std::vector<Beam> read_beams(Map& root, double period_s, Faults& faults) {
     faults.add(*at, "beams", "has no rows, but a lidar needs at least one beam");
   }
   if (!names || columns.size() != names->items.size() || columns.empty()) return {};
-  for (const BeamColumn& column : kBeamColumns) {
+  for (const BeamColumn& column : beam_columns) {
     if (column.required && std::ranges::count(columns, column.name, &BeamColumn::name) == 0) {
       faults.add(*names, "beam_columns", "lacks {}", column.name);
     }
@@ -119,7 +120,7 @@ std::vector<Beam> read_beams(Map& root, double period_s, Faults& faults) {
   std::vector<Beam> beams;
   std::vector<double> values(columns.size());
   for (const Node& row : rows) {
-    if (!yaml::numbers(row, "beams", values, kAny, faults)) continue;
+    if (!yaml::numbers(row, "beams", values, any_number, faults)) continue;
     Beam beam;
     for (std::size_t i = 0; i < columns.size(); ++i) {
       if (!columns[i].rule.holds(values[i])) {
@@ -144,7 +145,7 @@ LidarSpec read_lidar(const Node& node, Faults& faults) {
   check_version(root, "groundray_lidar", faults);
   root.read_text("model", Need::Required, lidar.model);
   if (auto rotation = root.map("rotation", Need::Required)) {
-    rotation->read_number("rate_hz", Need::Required, pattern.rate_hz, kPositive);
+    rotation->read_number("rate_hz", Need::Required, pattern.rate_hz, positive);
     rotation->read_choice<SpinningPattern::Sense>(
         "sense", Need::Required, pattern.sense,
         {{"clockwise", SpinningPattern::Sense::Clockwise},
@@ -155,12 +156,12 @@ LidarSpec read_lidar(const Node& node, Faults& faults) {
     rotation->close();
   }
   double period_us = 0;
-  const Node* period = root.read_number("firing_period_us", Need::Required, period_us, kPositive);
+  const Node* period = root.read_number("firing_period_us", Need::Required, period_us, positive);
   pattern.firing_period_s = period_us / 1e6;
   if (period) check_turn(*period, "firing_period_us", pattern, faults);
   if (auto gate = root.map("range_gate_m", Need::Optional)) {
-    gate->read_number("near", Need::Optional, lidar.gate.near_m, kNotNegative);
-    gate->read_number("far", Need::Optional, lidar.gate.far_m, kPositive);
+    gate->read_number("near", Need::Optional, lidar.gate.near_m, not_negative);
+    gate->read_number("far", Need::Optional, lidar.gate.far_m, positive);
     if (lidar.gate.near_m >= lidar.gate.far_m) {
       faults.add(gate->node(), "range_gate_m", "near must be less than far: are they swapped?");
     }
@@ -198,7 +199,7 @@ DrivenPath read_drive(Map drive, Faults& faults) {
   const auto waypoints = drive.list("waypoints_m", Need::Required);
   for (const Node& waypoint : waypoints) {
     std::array<double, 2> p{};
-    if (yaml::numbers(waypoint, "waypoints_m", p, kAny, faults)) {
+    if (yaml::numbers(waypoint, "waypoints_m", p, any_number, faults)) {
       path.waypoints_m.emplace_back(p[0], p[1]);
     }
   }
@@ -206,10 +207,10 @@ DrivenPath read_drive(Map drive, Faults& faults) {
     faults.add(*at, "waypoints_m", "has {} points, but a drive needs at least two",
                waypoints.size());
   }
-  drive.read_number("speed_m_s", Need::Required, path.speed_m_s, kPositive);
-  drive.read_number("height_m", Need::Required, path.height_m, kNotNegative);
+  drive.read_number("speed_m_s", Need::Required, path.speed_m_s, positive);
+  drive.read_number("height_m", Need::Required, path.height_m, not_negative);
   std::array<double, 2> footprint{path.footprint_m.x, path.footprint_m.y};
-  drive.read_numbers("footprint_m", Need::Optional, footprint, kPositive);
+  drive.read_numbers("footprint_m", Need::Optional, footprint, positive);
   path.footprint_m = {footprint[0], footprint[1]};
   drive.close();
   return path;
@@ -293,19 +294,19 @@ MountedLidar read_mounted(Map entry, const fs::path& path, const fs::path& prese
   read_source(entry, path, preset_folder, mounted, faults);
   if (auto mount = entry.map("mount", Need::Required)) mounted.X_BS = read_mount(std::move(*mount));
   LidarSpec& lidar = mounted.lidar;
-  const Node* rate = entry.read_number("rate_hz", Need::Optional, lidar.pattern.rate_hz, kPositive);
+  const Node* rate = entry.read_number("rate_hz", Need::Optional, lidar.pattern.rate_hz, positive);
   if (rate && lidar.pattern.firing_period_s > 0) {
     check_turn(*rate, "rate_hz", lidar.pattern, faults);
   }
   std::array<double, 2> gate{};
-  if (const Node* at = entry.read_numbers("range_gate_m", Need::Optional, gate, kNotNegative)) {
+  if (const Node* at = entry.read_numbers("range_gate_m", Need::Optional, gate, not_negative)) {
     if (gate[0] >= gate[1]) {
       faults.add(*at, "range_gate_m", "[{}, {}] is empty: are near and far swapped?", gate[0],
                  gate[1]);
     }
     lidar.gate = {gate[0], gate[1]};
   }
-  entry.read_number("range_noise_sigma_m", Need::Optional, lidar.range_noise_sigma_m, kNotNegative);
+  entry.read_number("range_noise_sigma_m", Need::Optional, lidar.range_noise_sigma_m, not_negative);
   entry.close();
   return mounted;
 }
@@ -344,7 +345,7 @@ SceneSpec parse_scene(const std::string& text, const fs::path& path,
   Map root(node, "", faults);
   check_version(root, "groundray", faults);
   root.read_whole("seed", Need::Required, scene.seed.value);
-  root.read_number("duration_s", Need::Required, scene.duration_s, kDuration);
+  root.read_number("duration_s", Need::Required, scene.duration_s, duration_rule);
   root.read_choice<Tracing>("tracing", Need::Optional, scene.tracing,
                             {{"fast", Tracing::Fast}, {"exact", Tracing::Exact}});
   if (auto terrain = root.map("terrain", Need::Required)) {

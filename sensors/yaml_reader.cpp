@@ -17,8 +17,8 @@
 namespace groundray::yaml {
 namespace {
 
-constexpr std::size_t kDeepest = 32;
-constexpr std::size_t kMostListed = 200;
+constexpr std::size_t deepest_level = 32;
+constexpr std::size_t most_listed = 200;
 
 // Builds the tree of one document. Its own, because YAML::Node tells neither aliases nor repeated
 // keys.
@@ -72,7 +72,7 @@ class TreeBuilder : public YAML::EventHandler {
   }
 
   void begin(Node node, const YAML::Mark& mark) {
-    if (open_.size() == kDeepest) refuse(mark, "nested deeper than any file of groundray");
+    if (open_.size() == deepest_level) refuse(mark, "nested deeper than any file of groundray");
     open_.push_back(&append(std::move(node)));
   }
 
@@ -91,22 +91,22 @@ bool is_scalar(const Node& node) {
 
 // Returns a text as a message shows it: short, and on one line.
 std::string excerpt(std::string_view text) {
-  constexpr std::size_t kLongest = 40;
-  std::string shown(text.substr(0, kLongest));
+  constexpr std::size_t longest = 40;
+  std::string shown(text.substr(0, longest));
   std::ranges::replace_if(
       shown, [](unsigned char c) { return c < ' ' || c == 127; }, '?');
-  return shown + (text.size() > kLongest ? "..." : "");
+  return shown + (text.size() > longest ? "..." : "");
 }
 
 // Returns the number that a text spells, infinities and NaN included.
 std::optional<double> spelled_number(std::string_view text) {
-  constexpr std::array<std::string_view, 3> kNotFinite{".inf", "-.inf", ".nan"};
+  constexpr std::array<std::string_view, 3> not_finite{".inf", "-.inf", ".nan"};
   std::string lower(text);
   std::ranges::transform(lower, lower.begin(), [](char c) {
     return c >= 'A' && c <= 'Z' ? static_cast<char>(c + 32) : c;
   });
   if (lower.starts_with('+') && !lower.starts_with("+-")) lower.erase(0, 1);
-  if (std::ranges::count(kNotFinite, lower) > 0) return std::numeric_limits<double>::quiet_NaN();
+  if (std::ranges::count(not_finite, lower) > 0) return std::numeric_limits<double>::quiet_NaN();
   double value = 0;
   const auto [end, fault] = std::from_chars(lower.data(), lower.data() + lower.size(), value);
   if (end != lower.data() + lower.size() || fault == std::errc::invalid_argument)
@@ -117,11 +117,11 @@ std::optional<double> spelled_number(std::string_view text) {
 
 // Returns a key without the words at its end that are units.
 std::string_view without_unit(std::string_view key) {
-  constexpr std::array<std::string_view, 25> kUnits{
+  constexpr std::array<std::string_view, 25> units{
       "m",  "km",  "cm",  "mm",  "um",   "nm",  "ft",  "s",   "ms",  "us", "ns", "min", "h",
       "hz", "khz", "rpm", "rad", "mrad", "deg", "kmh", "kph", "mph", "px", "w",  "kt"};
   for (auto cut = key.rfind('_'); cut != std::string_view::npos && cut > 0; cut = key.rfind('_')) {
-    if (std::ranges::count(kUnits, key.substr(cut + 1)) == 0) break;
+    if (std::ranges::count(units, key.substr(cut + 1)) == 0) break;
     key = key.substr(0, cut);
   }
   return key;
@@ -181,11 +181,11 @@ void Faults::throw_if_any() {
   if (faults_.empty()) return;
   std::ranges::stable_sort(faults_, {}, [](const Fault& f) { return std::pair(f.line, f.column); });
   std::vector<std::string_view> messages;
-  for (const Fault& fault : faults_ | std::views::take(kMostListed)) {
+  for (const Fault& fault : faults_ | std::views::take(most_listed)) {
     messages.push_back(fault.message);
   }
   const std::string more = fmt::format("\n... and {} more", faults_.size() - messages.size());
-  throw Error("{}{}", fmt::join(messages, "\n"), faults_.size() > kMostListed ? more : "");
+  throw Error("{}{}", fmt::join(messages, "\n"), faults_.size() > most_listed ? more : "");
 }
 
 std::optional<double> number(const Node& node, std::string_view key, Rule rule, Faults& faults) {

@@ -72,9 +72,9 @@ struct Rule {
   bool (*holds)(double value);
   const char* words;
 };
-inline constexpr Rule kAny{[](double) { return true; }, ""};
-inline constexpr Rule kPositive{[](double value) { return value > 0; }, "must be > 0"};
-inline constexpr Rule kNotNegative{[](double value) { return value >= 0; }, "must be >= 0"};
+inline constexpr Rule any_number{[](double) { return true; }, ""};
+inline constexpr Rule positive{[](double value) { return value > 0; }, "must be > 0"};
+inline constexpr Rule not_negative{[](double value) { return value >= 0; }, "must be >= 0"};
 
 enum class Need { Required, Optional };
 
@@ -89,10 +89,10 @@ class Map {
   /// Returns the value of a key; null if it is not there.
   const Node* find(std::string_view key, Need need);
 
-  const Node* read_number(std::string_view key, Need need, double& into, Rule rule = kAny);
+  const Node* read_number(std::string_view key, Need need, double& into, Rule rule = any_number);
   /// Reads a list of exactly as many numbers as `into` holds.
   const Node* read_numbers(std::string_view key, Need need, std::span<double> into,
-                           Rule rule = kAny);
+                           Rule rule = any_number);
   /// Reads a text: any scalar that is not empty.
   const Node* read_text(std::string_view key, Need need, std::string& into);
   /// Reads a whole number in [0, max of T].

@@ -26,8 +26,8 @@
 namespace groundray {
 namespace {
 
-constexpr std::int64_t kMaxSamples = std::int64_t{1} << 31;
-constexpr float kHole = std::numeric_limits<float>::quiet_NaN();
+constexpr std::int64_t max_samples = std::int64_t{1} << 31;
+constexpr float hole = std::numeric_limits<float>::quiet_NaN();
 
 // A DEM on its way from file to Dem.
 struct Raster {
@@ -85,8 +85,9 @@ std::string wkt_of(const OGRSpatialReference& crs) {
 }
 
 std::string shell_word(const std::string& word) {
-  const auto is_plain = [](unsigned char c) {
-    return std::isalnum(c) != 0 || std::string_view("_./:+-=").find(c) != std::string_view::npos;
+  const auto is_plain = [](char c) {
+    return std::isalnum(static_cast<unsigned char>(c)) != 0 ||
+           std::string_view("_./:+-=").find(c) != std::string_view::npos;
   };
   if (!word.empty() && std::ranges::all_of(word, is_plain)) return word;
   std::string text = "'";
@@ -125,9 +126,9 @@ GDALRasterBand& height_band(GDALDataset& dataset) {
                 GDALGetDataTypeName(band.GetRasterDataType()));
   broken.unless(columns >= 2 && rows >= 2, "it has {} x {} samples; a surface needs 2 x 2 or more",
                 columns, rows);
-  broken.unless(std::int64_t{columns} * rows <= kMaxSamples,
+  broken.unless(std::int64_t{columns} * rows <= max_samples,
                 "it has {} x {} samples, more than the {} that fit; cut out a part:{}", columns,
-                rows, kMaxSamples,
+                rows, max_samples,
                 command(dataset, "gdal_translate -srcwin 0 0 32768 32768", "_part.tif"));
   broken.throw_if_any();
   return band;
@@ -277,7 +278,7 @@ CPLErr cut_holes(GDALRasterBand& mask, std::vector<float>& heights) {
     if (result != CE_None) return result;
     const auto end = height + static_cast<std::ptrdiff_t>(rows) * columns;
     for (auto value = values.begin(); height != end; ++height, ++value) {
-      if (*value == 0) *height = kHole;
+      if (*value == 0) *height = hole;
     }
   }
   return CE_None;
@@ -306,7 +307,7 @@ std::vector<float> read_values(GDALRasterBand& band) {
 
 std::vector<float> read_heights(GDALRasterBand& band, std::optional<double> nodata, double unit_m) {
   std::vector<float> heights = read_values(band);
-  if (nodata) std::ranges::replace(heights, static_cast<float>(*nodata), kHole);
+  if (nodata) std::ranges::replace(heights, static_cast<float>(*nodata), hole);
   const double scale = band.GetScale() * unit_m;
   const double offset_m = band.GetOffset() * unit_m;
   if (scale != 1 || offset_m != 0) {
@@ -339,7 +340,7 @@ GDALDatasetUniquePtr dataset_over(Raster& raster) {
   dataset->AddBand(GDT_Float32, band.List());
   dataset->SetGeoTransform(raster.geotransform.data());
   dataset->SetSpatialRef(&raster.crs);
-  dataset->GetRasterBand(1)->SetNoDataValue(kHole);
+  dataset->GetRasterBand(1)->SetNoDataValue(hole);
   return dataset;
 }
 

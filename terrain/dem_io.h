@@ -28,12 +28,12 @@ struct DemOptions {
 /// geotransform as well has cells of 1 m, its first row in the north and its south-western corner
 /// at (0, 0). D's origin is the centre of the raster rounded to whole metres, at height 0.
 ///
-/// A warp interpolates bilinearly (within half a cell of a hole or the edge, between the samples that
-/// there are) to square cells about as large as the file's, their size rounded to two digits. Heights
-/// stay above the file's own vertical datum.
+/// A warp interpolates bilinearly (within half a cell of a hole or the edge, between the samples
+/// that there are) to square cells about as large as the file's, their size rounded to two digits.
+/// Heights stay above the file's own vertical datum.
 ///
-/// A file cut short is an error; only the library of classic netCDF (not netCDF-4) hides it and gives
-/// zeros.
+/// A file cut short is an error; only the library of classic netCDF (not netCDF-4) hides it and
+/// gives zeros.
 ///
 /// Heights take 4 bytes for each sample, twice that during a warp. Any number of threads may load.
 /// @throws Error that names the file, for one that is missing, no raster or cut short; without

@@ -16,8 +16,8 @@ namespace {
 using namespace std::chrono_literals;
 using Seconds = std::chrono::duration<double>;
 
-constexpr std::chrono::nanoseconds kStep = 10ms;
-constexpr double kLeastSpacing_m = 0.01;
+constexpr std::chrono::nanoseconds pose_spacing = 10ms;
+constexpr double least_spacing_m = 0.01;
 
 // p(t) = c0 + c1 t + c2 t^2 + c3 t^3 for t in [0, 1].
 struct Cubic {
@@ -71,10 +71,10 @@ class Curve {
     p.push_back(2.0 * waypoints_m[n - 1] - waypoints_m[n - 2]);
     for (std::size_t i = 0; i + 1 < n; ++i) {
       const Cubic cubic = catmull_rom({p[i], p[i + 1], p[i + 2], p[i + 3]});
-      for (int piece = 0; piece < kPieces; ++piece) {
-        const double t = static_cast<double>(piece) / kPieces;
+      for (int piece = 0; piece < pieces_per_segment; ++piece) {
+        const double t = static_cast<double>(piece) / pieces_per_segment;
         pieces_.push_back({cubic, t, length_m_});
-        length_m_ += cubic.length_m(t, t + 1.0 / kPieces);
+        length_m_ += cubic.length_m(t, t + 1.0 / pieces_per_segment);
       }
     }
   }
@@ -89,14 +89,14 @@ class Curve {
       const double rest_m = s_m - piece.start_m - piece.cubic.length_m(piece.t, t);
       if (std::abs(rest_m) <= 1e-14 * length_m_) break;
       t = std::clamp(t + rest_m / glm::length(piece.cubic.velocity(t)), piece.t,
-                     piece.t + 1.0 / kPieces);
+                     piece.t + 1.0 / pieces_per_segment);
     }
     const glm::dvec2 along = piece.cubic.velocity(t);
     return {piece.cubic.at(t), std::atan2(along.y, along.x)};
   }
 
  private:
-  static constexpr int kPieces = 64;  // of each segment, short enough for the quadrature
+  static constexpr int pieces_per_segment = 64;  // of each segment, short enough for the quadrature
   struct Piece {
     Cubic cubic;
     double t;        // where it begins on its segment
@@ -156,10 +156,10 @@ void check_waypoints(std::span<const glm::dvec2> p, Violations& broken) {
                   p[i].x, p[i].y);
     if (i == 0) continue;
     const double chord_m = glm::distance(p[i - 1], p[i]);
-    broken.unless(!(chord_m < kLeastSpacing_m),
+    broken.unless(!(chord_m < least_spacing_m),
                   "waypoints_m[{}] lies {} m from the one before; it must lie {} m off or more: is "
                   "it there twice?",
-                  i, chord_m, kLeastSpacing_m);
+                  i, chord_m, least_spacing_m);
     if (i + 1 == p.size()) continue;
     const glm::dvec2 in = glm::normalize(p[i] - p[i - 1]);
     const glm::dvec2 out = glm::normalize(p[i + 1] - p[i]);
@@ -196,7 +196,7 @@ Trajectory build_ground_path(const HeightGrid& ground, const GroundPathSpec& spe
 
   const Vehicle vehicle(ground, spec.height_m, spec.footprint_m);
   std::vector<Trajectory::Sample> samples;
-  for (std::chrono::nanoseconds time = 0ns;; time += kStep) {
+  for (std::chrono::nanoseconds time = 0ns;; time += pose_spacing) {
     time = std::min(time, spec.duration);
     samples.push_back(
         {time, vehicle.stand_at(curve.at(spec.speed_m_s * Seconds(time).count()), time)});

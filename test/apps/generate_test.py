@@ -78,7 +78,8 @@ def heights_of(dem, folder):
     """Samples and geotransform of a DEM, as GDAL's own program writes them out."""
     grid = folder / "grid.asc"
     subprocess.run(
-        ["gdal_translate", "-q", "-of", "AAIGrid", "-co", "SIGNIFICANT_DIGITS=12", dem, grid], check=True
+        ["gdal_translate", "-q", "-of", "AAIGrid", "-co", "SIGNIFICANT_DIGITS=12", dem, grid],
+        check=True,
     )
     head = dict(line.split() for line in grid.read_text().splitlines()[:5])
     skip = 6 if "NODATA" in grid.read_text()[:300].upper() else 5
@@ -101,7 +102,7 @@ def test_points_lie_on_the_surface_that_gdal_reads(dataset, tmp_path):
     ply = PlyData.read(dataset / "lidar/top/000001.ply")
     origin = np.array([float(v) for v in ply.comments[0].split()[1:]])
     points = ply["vertex"]
-    # Columns and rows from the difference to the first sample, so that nothing is lost at UTM's size.
+    # Counted from the first sample's place in D, so that nothing is lost at UTM's size.
     u = (points["world_x"] - (west - origin[0])) / cell
     v = ((north - origin[1]) - points["world_y"]) / cell
     c, r = np.floor(u).astype(int), np.floor(v).astype(int)
@@ -111,7 +112,7 @@ def test_points_lie_on_the_surface_that_gdal_reads(dataset, tmp_path):
     near = a + (b - a) * fu + (d - a) * fv
     far = e + (d - e) * (1 - fu) + (b - e) * (1 - fv)
     surface = np.where(fu + fv > 1, far, near)
-    # The ASCII grid's corner has about 1e-9 m of rounding at a northing of 5e6 m; slopes are below 2.
+    # The ASCII grid's corner has 1e-9 m of rounding at a northing of 5e6 m; slopes are below 2.
     assert np.abs(points["world_z"] - surface).max() < 1e-8
 
 
@@ -123,7 +124,7 @@ def test_pose_file_takes_sensor_points_to_the_world(dataset):
         t = frame["stamp_s"] + points["time"].astype(float)
         i = np.clip(np.searchsorted(poses[:, 0], t, side="right") - 1, 0, len(poses) - 2)
         s = (t - poses[i, 0]) / (poses[i + 1, 0] - poses[i, 0])
-        # Linear position and normalised linear quaternion: what any reader would do between poses 10 ms apart.
+        # Linear position and normalised linear quaternion: what any reader would do.
         p = poses[i, 1:4] + s[:, None] * (poses[i + 1, 1:4] - poses[i, 1:4])
         q = poses[i, 4:8] + s[:, None] * (poses[i + 1, 4:8] - poses[i, 4:8])
         q /= np.linalg.norm(q, axis=1)[:, None]
@@ -164,7 +165,9 @@ def test_run_goes_on_where_it_stopped_and_ends_with_the_same_bytes(dataset, tmp_
 
 
 def test_interrupt_leaves_whole_frames_and_exit_code_130(dataset, tmp_path):
-    (tmp_path / "scene.yaml").write_text(SCENE.replace("0.3", "2.5").replace("speed_m_s: 10", "speed_m_s: 4"))
+    (tmp_path / "scene.yaml").write_text(
+        SCENE.replace("0.3", "2.5").replace("speed_m_s: 10", "speed_m_s: 4")
+    )
     out = tmp_path / "out"
     run = subprocess.Popen(
         [PROGRAM, "generate", tmp_path / "scene.yaml", "-o", out], stderr=subprocess.PIPE, text=True
@@ -224,14 +227,18 @@ def test_a_fault_in_the_scene_is_named(tmp_path, change, words):
 )
 def test_a_fault_in_the_trajectory_is_named(tmp_path, lines, words):
     (tmp_path / "path.tum").write_text("\n".join(lines) + "\n")
-    scene = re.sub(r"platform:.*?lidars:", "platform: {trajectory: path.tum}\nlidars:", SCENE, flags=re.S)
+    scene = re.sub(
+        r"platform:.*?lidars:", "platform: {trajectory: path.tum}\nlidars:", SCENE, flags=re.S
+    )
     assert refused(generate(tmp_path, scene), *words)
 
 
 def test_recorded_trajectory_with_epoch_times_starts_at_zero(tmp_path):
     lines = [f"{1600000000 + 0.1 * k:.1f} {429440 + k} 5150660 412 0 0 0 1" for k in range(6)]
     (tmp_path / "path.tum").write_text("\n".join(lines) + "\n")
-    scene = re.sub(r"platform:.*?lidars:", "platform: {trajectory: path.tum}\nlidars:", SCENE, flags=re.S)
+    scene = re.sub(
+        r"platform:.*?lidars:", "platform: {trajectory: path.tum}\nlidars:", SCENE, flags=re.S
+    )
     result = generate(tmp_path, scene)
     assert result.returncode == 0, result.stderr
     poses = np.loadtxt(tmp_path / "out/poses/top.tum")

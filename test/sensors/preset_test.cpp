@@ -41,7 +41,7 @@ struct Golden {
   glm::dvec3 p_SQ;
   friend void PrintTo(const Golden& golden, std::ostream* out) { *out << golden.name; }
 };
-const Golden kGolden[] = {
+const Golden golden_points[] = {
     {"velodyne_vlp16", 16, 15, 34.56, {15.7945257, -11.1237601, 5.1651809}},       // laser 15
     {"velodyne_vlp32c", 32, 17, 0, {17.1485943, -10.2861013, -0.3490481}},         // laser 1
     {"velodyne_hdl32e", 32, 16, 1.152, {16.1353791, -11.3638161, -3.2424103}},     // laser 1
@@ -60,7 +60,7 @@ const Golden kGolden[] = {
 class GoldenPoint : public ::testing::TestWithParam<Golden> {};
 
 TEST_P(GoldenPoint, IsWhereTheVendorsFormulaPutsIt) {
-  constexpr double kTolerance = 1e-6;  // beam origins in the files are rounded to the micrometre
+  constexpr double tolerance = 1e-6;  // beam origins in the files are rounded to the micrometre
   const Golden& golden = GetParam();
   const SpinningPattern spinning = preset(golden.name).pattern;
   const ScanPattern pattern(spinning);
@@ -73,12 +73,12 @@ TEST_P(GoldenPoint, IsWhereTheVendorsFormulaPutsIt) {
 
   const double spin = pattern.spin_rad(35.15625 / 360 / spinning.rate_hz);
   const glm::dvec3 p_HQ = shot->origin_m + 20. * shot->direction;
-  EXPECT_NEAR(p_HQ.x * std::cos(spin) - p_HQ.y * std::sin(spin), golden.p_SQ.x, kTolerance);
-  EXPECT_NEAR(p_HQ.x * std::sin(spin) + p_HQ.y * std::cos(spin), golden.p_SQ.y, kTolerance);
-  EXPECT_NEAR(p_HQ.z, golden.p_SQ.z, kTolerance);
+  EXPECT_NEAR(p_HQ.x * std::cos(spin) - p_HQ.y * std::sin(spin), golden.p_SQ.x, tolerance);
+  EXPECT_NEAR(p_HQ.x * std::sin(spin) + p_HQ.y * std::cos(spin), golden.p_SQ.y, tolerance);
+  EXPECT_NEAR(p_HQ.z, golden.p_SQ.z, tolerance);
 }
 
-INSTANTIATE_TEST_SUITE_P(Presets, GoldenPoint, ::testing::ValuesIn(kGolden),
+INSTANTIATE_TEST_SUITE_P(Presets, GoldenPoint, ::testing::ValuesIn(golden_points),
                          [](const auto& golden) {
                            return std::string(golden.param.name) + "_ring" +
                                   std::to_string(golden.param.ring);
@@ -86,7 +86,7 @@ INSTANTIATE_TEST_SUITE_P(Presets, GoldenPoint, ::testing::ValuesIn(kGolden),
 
 TEST(Preset, EveryFileHasAGoldenPoint) {
   std::set<std::string> tested;
-  for (const Golden& golden : kGolden) tested.insert(golden.name);
+  for (const Golden& golden : golden_points) tested.insert(golden.name);
   EXPECT_THAT(preset_names(data_folder() / "sensors"), ::testing::ElementsAreArray(tested));
 }
 

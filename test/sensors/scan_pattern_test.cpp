@@ -18,8 +18,8 @@ using ::testing::AllOf;
 using ::testing::HasSubstr;
 using ::testing::ThrowsMessage;
 
-constexpr double kPi = std::numbers::pi;
-constexpr double kEpsilon = std::numeric_limits<double>::epsilon();
+constexpr double pi = std::numbers::pi;
+constexpr double epsilon = std::numeric_limits<double>::epsilon();
 
 SpinningPattern one_beam(double rate_hz, double period_us) {
   return {.rate_hz = rate_hz, .firing_period_s = period_us / 1e6, .beams = {Beam{}}};
@@ -56,11 +56,11 @@ TEST(ScanPattern, BeamsThatFireTogetherAreOneVolley) {
 
 TEST(ScanPattern, PointsBeamsUpByElevationAndLeftByAzimuthOffset) {
   SpinningPattern pattern = one_beam(10, 100);
-  pattern.beams = {{.elevation_rad = kPi / 6, .azimuth_offset_rad = kPi / 2}};
+  pattern.beams = {{.elevation_rad = pi / 6, .azimuth_offset_rad = pi / 2}};
   const glm::dvec3 direction = ScanPattern(pattern).shots()[0].direction;
-  EXPECT_NEAR(direction.x, 0, 2 * kEpsilon);  // one rounding of each angle, sine and product
-  EXPECT_NEAR(direction.y, std::sqrt(0.75), 2 * kEpsilon);
-  EXPECT_NEAR(direction.z, 0.5, 2 * kEpsilon);
+  EXPECT_NEAR(direction.x, 0, 2 * epsilon);  // one rounding of each angle, sine and product
+  EXPECT_NEAR(direction.y, std::sqrt(0.75), 2 * epsilon);
+  EXPECT_NEAR(direction.z, 0.5, 2 * epsilon);
 }
 
 TEST(ScanPattern, TurnsOf1024EqualColumnsBeginAtEvery1024thSequence) {
@@ -99,18 +99,18 @@ TEST(ScanPattern, StampsAreTheFirstAndLastFiringsToTheNanosecond) {
 
 TEST(ScanPattern, ClockwiseHeadsTurnFromForwardToTheRight) {
   SpinningPattern pattern = one_beam(10, 100);
-  EXPECT_DOUBLE_EQ(ScanPattern(pattern).spin_rad(0.025), 1.5 * kPi);
+  EXPECT_DOUBLE_EQ(ScanPattern(pattern).spin_rad(0.025), 1.5 * pi);
   pattern.sense = SpinningPattern::Sense::CounterClockwise;
-  EXPECT_DOUBLE_EQ(ScanPattern(pattern).spin_rad(0.025), 0.5 * kPi);
-  pattern.start_azimuth_rad = -kPi;
-  EXPECT_DOUBLE_EQ(ScanPattern(pattern).spin_rad(0.025), 1.5 * kPi);
+  EXPECT_DOUBLE_EQ(ScanPattern(pattern).spin_rad(0.025), 0.5 * pi);
+  pattern.start_azimuth_rad = -pi;
+  EXPECT_DOUBLE_EQ(ScanPattern(pattern).spin_rad(0.025), 1.5 * pi);
 }
 
 // Rate and time are binary fractions, so their product is a whole number over 2^30, known without
 // rounding. It has more bits than a double: rounded, it would be up to 6e-9 rad off after 10^6 s.
 TEST(ScanPattern, SpinStaysAccurateAfterDays) {
-  constexpr double kTolerance =
-      4 * kPi * kEpsilon;  // one rounding of the fraction and one of the angle
+  constexpr double tolerance =
+      4 * pi * epsilon;  // one rounding of the fraction and one of the angle
   SpinningPattern pattern = one_beam(10211. / 1024, 100);
   pattern.sense = SpinningPattern::Sense::CounterClockwise;
   const ScanPattern scan(pattern);
@@ -118,9 +118,9 @@ TEST(ScanPattern, SpinStaysAccurateAfterDays) {
   for (int i = 0; i < 100'000; ++i) {
     const std::uint64_t time = random() >> 24;  // in 2^-20 s
     const std::uint64_t fraction = 10211 * time % (1u << 30);
-    const double expected = 2 * kPi * std::ldexp(static_cast<double>(fraction), -30);
+    const double expected = 2 * pi * std::ldexp(static_cast<double>(fraction), -30);
     const double spin = scan.spin_rad(std::ldexp(static_cast<double>(time), -20));
-    ASSERT_LE(std::abs(std::remainder(spin - expected, 2 * kPi)), kTolerance) << time;
+    ASSERT_LE(std::abs(std::remainder(spin - expected, 2 * pi)), tolerance) << time;
   }
 }
 
@@ -129,7 +129,7 @@ TEST(ScanPattern, SpinIsNeverAWholeTurn) {
   for (const double time_s :
        {0., 1e-300, 1e-20, 1e-17, 0.1, std::nextafter(0.1, 0), std::nextafter(0.1, 1)}) {
     EXPECT_GE(scan.spin_rad(time_s), 0) << time_s;
-    EXPECT_LT(scan.spin_rad(time_s), 2 * kPi) << time_s;
+    EXPECT_LT(scan.spin_rad(time_s), 2 * pi) << time_s;
   }
 }
 

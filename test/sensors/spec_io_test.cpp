@@ -22,7 +22,7 @@ using ::testing::Not;
 using ::testing::StartsWith;
 using ::testing::ThrowsMessage;
 
-constexpr const char* kScene = R"(groundray: 1
+constexpr const char* scene_text = R"(groundray: 1
 seed: 18446744073709551615
 duration_s: 1.5
 tracing: exact
@@ -48,7 +48,7 @@ lidars:
     range_noise_sigma_m: 0.02
 )";
 
-constexpr const char* kLidar = R"(groundray_lidar: 1
+constexpr const char* lidar_text = R"(groundray_lidar: 1
 model: Two beams
 rotation:
   rate_hz: 10
@@ -80,7 +80,7 @@ SceneSpec parse(const std::string& text) {
 // What parse_scene says of the scene above with one text replaced.
 std::string complaint(std::string_view old, std::string_view fresh) {
   try {
-    parse(with(kScene, old, fresh));
+    parse(with(scene_text, old, fresh));
   } catch (const Error& error) {
     return error.what();
   }
@@ -89,7 +89,7 @@ std::string complaint(std::string_view old, std::string_view fresh) {
 
 std::string lidar_complaint(std::string_view old, std::string_view fresh) {
   try {
-    parse_lidar(with(kLidar, old, fresh), "mine.yaml");
+    parse_lidar(with(lidar_text, old, fresh), "mine.yaml");
   } catch (const Error& error) {
     return error.what();
   }
@@ -97,8 +97,8 @@ std::string lidar_complaint(std::string_view old, std::string_view fresh) {
 }
 
 TEST(SceneFile, ReadsEveryKey) {
-  const SceneSpec scene = parse(kScene);
-  EXPECT_EQ(scene.text, kScene);
+  const SceneSpec scene = parse(scene_text);
+  EXPECT_EQ(scene.text, scene_text);
   EXPECT_EQ(scene.seed.value, 18446744073709551615u);
   EXPECT_EQ(scene.duration_s, 1.5);
   EXPECT_EQ(scene.tracing, Tracing::Exact);
@@ -148,16 +148,17 @@ lidars: [{name: a, preset: hesai_xt32, mount: {}}]
 
 TEST(SceneFile, FindsALidarFileBesideTheScene) {
   const TemporaryFolder folder;
-  std::ofstream(folder / "mine.yaml") << kLidar;
-  std::ofstream(folder / "scene.yaml") << with(kScene, "preset: velodyne_vlp16", "file: mine.yaml");
+  std::ofstream(folder / "mine.yaml") << lidar_text;
+  std::ofstream(folder / "scene.yaml")
+      << with(scene_text, "preset: velodyne_vlp16", "file: mine.yaml");
   const SceneSpec scene = load_scene(folder / "scene.yaml", folder / "there_is_no_preset_folder");
   EXPECT_EQ(scene.lidars[0].lidar.model, "Two beams");
   EXPECT_EQ(scene.lidars[0].source, "mine.yaml");
 }
 
 TEST(SceneFile, ListsAllItsFaultsInTheOrderOfTheFile) {
-  const std::string text =
-      with(with(kScene, "duration_s: 1.5", "duration_s: -1"), "speed_m_s: 20", "speed_km_h: 20");
+  const std::string text = with(with(scene_text, "duration_s: 1.5", "duration_s: -1"),
+                                "speed_m_s: 20", "speed_km_h: 20");
   EXPECT_THAT(
       [&] { parse(with(text, "rate_hz: 20", "rate_hz: often")); },
       ThrowsMessage<Error>(
@@ -282,10 +283,10 @@ TEST(SceneFile, NeedsALidar) {
 
 TEST(SceneFile, PassesOnTheFaultsOfALidarFile) {
   const TemporaryFolder folder;
-  std::ofstream(folder / "mine.yaml") << with(kLidar, "rate_hz: 10", "rate_hz: 0");
+  std::ofstream(folder / "mine.yaml") << with(lidar_text, "rate_hz: 10", "rate_hz: 0");
   EXPECT_THAT(
       [&] {
-        parse_scene(with(kScene, "preset: velodyne_vlp16", "file: mine.yaml"),
+        parse_scene(with(scene_text, "preset: velodyne_vlp16", "file: mine.yaml"),
                     folder / "scene.yaml", "");
       },
       ThrowsMessage<Error>(
@@ -302,7 +303,7 @@ TEST(SceneFile, RefusesWhatIsNotYaml) {
   EXPECT_THAT([] { parse("just a text"); },
               ThrowsMessage<Error>(
                   HasSubstr("scenes/prairie.yaml:1:1: is 'just a text', but must be a map")));
-  EXPECT_THAT([] { parse(std::string(kScene) + "---\nseed: 1\n"); },
+  EXPECT_THAT([] { parse(std::string(scene_text) + "---\nseed: 1\n"); },
               ThrowsMessage<Error>(HasSubstr(":26:1: a second document begins")));
 }
 
@@ -328,7 +329,7 @@ TEST(SceneFile, ThatIsNotThereIsNamed) {
 }
 
 TEST(LidarFile, ReadsEveryKey) {
-  const LidarSpec lidar = parse_lidar(kLidar, "mine.yaml");
+  const LidarSpec lidar = parse_lidar(lidar_text, "mine.yaml");
   EXPECT_EQ(lidar.model, "Two beams");
   EXPECT_EQ(lidar.pattern.rate_hz, 10);
   EXPECT_EQ(lidar.pattern.sense, SpinningPattern::Sense::CounterClockwise);

@@ -1,7 +1,7 @@
 #include "terrain/dem_io.h"
 
 #include <cpl_conv.h>
-#include <fmt/ranges.h>
+#include <fmt/format.h>
 #include <gdal.h>
 #include <gmock/gmock.h>
 #include <gtest/gtest.h>
@@ -31,10 +31,10 @@ using ::testing::Pointwise;
 using testing::shared_data_folder;
 using testing::TemporaryFolder;
 
-constexpr float kHole = std::numeric_limits<float>::quiet_NaN();
-constexpr double kNan = std::numeric_limits<double>::quiet_NaN();
-constexpr std::array kUtmTransform{500000.25, 2.0, 0.0, 5150000.75, 0.0, -3.0};
-constexpr const char* kUtm = "EPSG:32631";
+constexpr float hole = std::numeric_limits<float>::quiet_NaN();
+constexpr double missing = std::numeric_limits<double>::quiet_NaN();
+constexpr std::array utm_transform{500000.25, 2.0, 0.0, 5150000.75, 0.0, -3.0};
+constexpr const char* utm_31 = "EPSG:32631";
 
 using Dataset = std::unique_ptr<void, decltype(&GDALClose)>;
 
@@ -43,8 +43,8 @@ struct Picture {
   int columns = 3;
   int rows = 2;
   std::vector<double> values{1, 2, 3, 4, 5, 6};  // band by band
-  std::optional<std::array<double, 6>> geotransform = kUtmTransform;
-  std::string crs = kUtm;
+  std::optional<std::array<double, 6>> geotransform = utm_transform;
+  std::string crs = utm_31;
   GDALDataType type = GDT_Float32;
   std::optional<double> nodata;
   std::string unit;
@@ -64,8 +64,8 @@ struct Picture {
 
   Dataset made_by(const char* driver, const std::filesystem::path& path) const {
     GDALAllRegister();
-    const int samples = columns * rows;
-    const int bands = static_cast<int>(values.size()) / samples;
+    const std::ptrdiff_t samples = std::ptrdiff_t{columns} * rows;
+    const int bands = static_cast<int>(std::ssize(values) / samples);
     Dataset dataset(
         GDALCreate(GDALGetDriverByName(driver), path.c_str(), columns, rows, bands, type, nullptr),
         &GDALClose);
@@ -171,7 +171,7 @@ TEST_F(DemIo, RowsMayRunNorthwards) {
 }
 
 TEST_F(DemIo, NodataDeclaredUndeclaredAndNanAreHoles) {
-  Picture{.values = {1, -9999, kNan, -32767, 5, 6}, .nodata = -9999}.save_tiff(tiff_);
+  Picture{.values = {1, -9999, missing, -32767, 5, 6}, .nodata = -9999}.save_tiff(tiff_);
   EXPECT_THAT(heights(load_dem(tiff_)), ElementsAre(1, IsNan(), IsNan(), -32767, 5, 6));
   EXPECT_THAT(heights(load_dem(tiff_, {.nodata = -32767})),
               ElementsAre(1, IsNan(), IsNan(), IsNan(), 5, 6));
@@ -262,7 +262,8 @@ TEST_F(DemIo, ReadsAVirtualMosaic) {
 }
 
 TEST_F(DemIo, ReadsNetCdf) {
-  Picture{.values = {1, 2, kNan, 4, 5, 6}, .nodata = kNan}.save_as("netCDF", folder_ / "dem.nc");
+  Picture{.values = {1, 2, missing, 4, 5, 6}, .nodata = missing}.save_as("netCDF",
+                                                                         folder_ / "dem.nc");
   const Dem dem = load_dem(folder_ / "dem.nc");
   EXPECT_THAT(heights(dem), ElementsAre(1, 2, IsNan(), 4, 5, 6));
   EXPECT_EQ(p_W(dem, 0, 0), glm::dvec2(500001.25, 5149999.25));
@@ -395,7 +396,7 @@ TEST_F(DemIo, AnotherBodyIsProjectedOnItsOwnRadius) {
 
 TEST_F(DemIo, NothingIsResampledInTheCrsThatIsAskedFor) {
   Picture{}.save_tiff(tiff_);
-  EXPECT_THAT(heights(load_dem(tiff_, {.reproject_to = kUtm})), ElementsAre(1, 2, 3, 4, 5, 6));
+  EXPECT_THAT(heights(load_dem(tiff_, {.reproject_to = utm_31})), ElementsAre(1, 2, 3, 4, 5, 6));
 }
 
 TEST_F(DemIo, ARotatedRasterIsRefusedWithTheLineThatStraightensIt) {
@@ -403,14 +404,14 @@ TEST_F(DemIo, ARotatedRasterIsRefusedWithTheLineThatStraightensIt) {
                   .rows = 20,
                   .values = std::vector<double>(400, 7),
                   .geotransform = std::array{0.0, 8.0, 6.0, 0.0, 6.0, -8.0}};
-  for (const char* crs : {"", kUtm}) {
+  for (const char* crs : {"", utm_31}) {
     picture.crs = crs;
     picture.save_tiff(tiff_);
     const std::string message = error_of(tiff_);
     EXPECT_THAT(message, HasSubstr("its geotransform is rotated or sheared"));
     EXPECT_THAT(message, HasSubstr("gdalwarp -tr 10 10 -r bilinear"));
   }
-  const Dem dem = load_dem(tiff_, {.reproject_to = kUtm});
+  const Dem dem = load_dem(tiff_, {.reproject_to = utm_31});
   EXPECT_EQ(dem.grid.step_m(), glm::dvec2(10, -10));
   EXPECT_EQ(dem.grid.height_m_at(glm::dvec2(140, -20) - glm::dvec2(dem.origin_w_m)), 7);
   EXPECT_EQ(dem.grid.height_m_at(glm::dvec2(10, 90) - glm::dvec2(dem.origin_w_m)), std::nullopt);
@@ -556,7 +557,7 @@ class SharedDem : public ::testing::Test {
 
   static void expect_values(const Dem& dem, const std::filesystem::path& path, float nodata) {
     std::vector<float> expected = gdal_values(path);
-    std::ranges::replace(expected, nodata, kHole);
+    std::ranges::replace(expected, nodata, hole);
     EXPECT_EQ(dem.grid.hole_count(), static_cast<std::size_t>(std::ranges::count_if(
                                          expected, [](float z) { return std::isnan(z); })));
     EXPECT_TRUE(std::ranges::equal(dem.grid.heights_m(), expected, [](float a, float b) {
@@ -601,11 +602,11 @@ TEST_F(SharedDem, EdgeCasesOfGazebo) {
   const Dem moon = load_dem(folder / "dem_moon.tif");
   EXPECT_EQ(moon.crs_name, "Moon2000_npole");
   EXPECT_EQ(moon.origin_w_m, glm::dvec3(-53710, -51090, 0));
-  expect_values(moon, folder / "dem_moon.tif", kHole);
+  expect_values(moon, folder / "dem_moon.tif", hole);
   expect_values(load_dem(folder / "dem_nodata.dem"), folder / "dem_nodata.dem", -32767);
-  const Dem nan = load_dem(folder / "dem_nodata_nan.nc");
-  EXPECT_GT(nan.grid.hole_count(), 0u);
-  expect_values(nan, folder / "dem_nodata_nan.nc", kHole);
+  const Dem holed = load_dem(folder / "dem_nodata_nan.nc");
+  EXPECT_GT(holed.grid.hole_count(), 0u);
+  expect_values(holed, folder / "dem_nodata_nan.nc", hole);
   for (const char* name : {"dem_landscape.tif", "dem_portrait.tif", "dem_squared.tif"}) {
     EXPECT_THAT(error_of(folder / name), HasSubstr("gdalwarp -t_srs EPSG:32610 "));
   }

@@ -18,21 +18,21 @@ namespace {
 using namespace std::chrono_literals;
 using ::testing::HasSubstr;
 
-constexpr int kSize = 101;
-constexpr double kEast = 0.25;     // slopes of the plane
-constexpr double kNorth = -0.125;  // both exact in float, as are all heights
+constexpr int side_samples = 101;
+constexpr double east_slope = 0.25;     // slopes of the plane
+constexpr double north_slope = -0.125;  // both exact in float, as are all heights
 
-double plane_m(double x, double y) { return 10 + kEast * x + kNorth * y; }
+double plane_m(double x, double y) { return 10 + east_slope * x + north_slope * y; }
 
 // 100 m x 100 m about D's origin, 1 m apart, north up.
 HeightGrid ground_of(auto height_m) {
   std::vector<float> heights;
-  for (int row = 0; row < kSize; ++row) {
-    for (int column = 0; column < kSize; ++column) {
+  for (int row = 0; row < side_samples; ++row) {
+    for (int column = 0; column < side_samples; ++column) {
       heights.push_back(static_cast<float>(height_m(column - 50.0, 50.0 - row)));
     }
   }
-  return HeightGrid({kSize, kSize}, {-50, 50}, {1, -1}, heights);
+  return HeightGrid({side_samples, side_samples}, {-50, 50}, {1, -1}, heights);
 }
 
 HeightGrid tilted_plane() { return ground_of(plane_m); }
@@ -80,7 +80,7 @@ TEST(GroundPath, TheLastPoseStandsAtTheEndOfTheDrive) {
 // On a plane the body's axes are known without angles: z is the normal, and x lies above the
 // heading.
 TEST(GroundPath, OnATiltedPlaneTheBodyLiesInThePlane) {
-  const glm::dvec3 normal = glm::normalize(glm::dvec3(-kEast, -kNorth, 1));
+  const glm::dvec3 normal = glm::normalize(glm::dvec3(-east_slope, -north_slope, 1));
   constexpr double tolerance =
       1e-13;  // a few roundings of slopes taken over 2 m of heights near 20 m
   const Trajectory path = build_ground_path(tilted_plane(), bends());

@@ -1,10 +1,9 @@
 """Other people's PLY readers see every column of a scan as groundray wrote it.
 
-GROUNDRAY_SAMPLE_PLY names the scan. The oracle is numpy, given the layout that the
-documentation promises.
+The oracle is numpy, given the layout that docs/formats.md promises.
 """
 
-import os
+import subprocess
 from pathlib import Path
 from types import ModuleType
 
@@ -21,11 +20,13 @@ COLUMNS = np.dtype(
 
 
 @pytest.fixture(scope="module")
-def sample() -> Path:
-    path = os.environ.get("GROUNDRAY_SAMPLE_PLY")
-    if not path:
-        pytest.skip("GROUNDRAY_SAMPLE_PLY names no scan to read")
-    return Path(path)
+def sample(tmp_path_factory: pytest.TempPathFactory) -> Path:
+    root = Path(__file__).resolve().parents[2]
+    out = tmp_path_factory.mktemp("scan") / "out"
+    program = root / "build/release/bin/groundray"
+    scene = root / "data/scenes/first_light.yaml"
+    subprocess.run([program, "generate", scene, "-o", out], check=True, capture_output=True)
+    return out / "lidar/top/000000.ply"
 
 
 @pytest.fixture(scope="module")
