@@ -106,17 +106,6 @@ class Clearance {
   const GridRay& ray_;
 };
 
-void clip(double start, double slope, double high, double& t_begin_m, double& t_end_m) {
-  if (slope == 0) {
-    if (start < 0 || high < start) t_end_m = -1;
-    return;
-  }
-  const double a = -start / slope;
-  const double b = (high - start) / slope;
-  t_begin_m = std::max(t_begin_m, std::min(a, b));
-  t_end_m = std::min(t_end_m, std::max(a, b));
-}
-
 }  // namespace
 
 HeightGrid::HeightGrid(glm::ivec2 size, glm::dvec2 origin_m, glm::dvec2 step_m,
@@ -171,8 +160,8 @@ glm::dvec3 HeightGrid::normal(const FacetPlane& plane) const noexcept {
 std::optional<glm::dvec2> HeightGrid::overlap(const GridRay& ray, double far_m) const noexcept {
   double t_begin_m = 0;
   double t_end_m = far_m;
-  clip(ray.u0, ray.du, size_.x - 1, t_begin_m, t_end_m);
-  clip(ray.v0, ray.dv, size_.y - 1, t_begin_m, t_end_m);
+  clip_range(ray.u0, ray.du, 0, size_.x - 1, t_begin_m, t_end_m);
+  clip_range(ray.v0, ray.dv, 0, size_.y - 1, t_begin_m, t_end_m);
   if (!(t_begin_m <= t_end_m)) return std::nullopt;
   return glm::dvec2(t_begin_m, t_end_m);
 }

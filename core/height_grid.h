@@ -1,5 +1,6 @@
 #pragma once
 
+#include <algorithm>
 #include <cstddef>
 #include <cstdint>
 #include <glm/vec2.hpp>
@@ -120,6 +121,21 @@ class HeightGrid {
   double max_height_m_ = std::numeric_limits<double>::quiet_NaN();
   std::size_t hole_count_ = 0;
 };
+
+/// Narrows [begin_m, end_m] to where start + t slope lies in [low, high]; leaves it empty (begin >
+/// end) if nowhere.
+inline void clip_range(double start, double slope, double low, double high, double& begin_m,
+                       double& end_m) noexcept {
+  if (slope == 0) {
+    if (start < low || high < start) end_m = -std::numeric_limits<double>::infinity();
+    return;
+  }
+  const double inverse = 1 / slope;
+  const double a = (low - start) * inverse;
+  const double b = (high - start) * inverse;
+  begin_m = std::max(begin_m, std::min(a, b));
+  end_m = std::min(end_m, std::max(a, b));
+}
 
 /// Returns where `ray` meets `plane`, metres along the ray; negative, infinite or NaN where it does
 /// not.

@@ -58,12 +58,11 @@ std::chrono::nanoseconds nearest_nanosecond(double time_s) {
   return std::chrono::nanoseconds(std::llround(time_s * 1e9));
 }
 
-// Returns the angle in [0, 2 pi).
+// Returns the angle in [0, 2 pi). A tiny negative one would round up to the whole turn.
 double wrapped(double angle_rad) {
   const double angle = std::fmod(angle_rad, full_turn_rad);
   const double positive = angle < 0 ? angle + full_turn_rad : angle;
-  return positive < full_turn_rad ? positive
-                                  : 0;  // a tiny negative angle rounds up to the whole turn
+  return positive < full_turn_rad ? positive : 0;
 }
 
 }  // namespace
@@ -90,16 +89,16 @@ ScanPattern::ScanPattern(const SpinningPattern& pattern)
 std::int64_t ScanPattern::first_sequence(std::int64_t sweep) const {
   constexpr double epsilon = std::numeric_limits<double>::epsilon();
   const double turns = static_cast<double>(sweep);
-  const double early_turns =
-      tolerance_turns + 4 * epsilon * turns;  // the roundings here and of the rate and period
+  // Rate, period, their product and the quotient are rounded once each.
+  const double early_turns = tolerance_turns + 4 * epsilon * turns;
   const double sequence = std::ceil((turns - early_turns) / (rate_hz_ * firing_period_s_));
   return std::max<std::int64_t>(0, static_cast<std::int64_t>(sequence));
 }
 
 double ScanPattern::spin_rad(double time_s) const {
   const double whole_turns = std::floor(signed_rate_hz_ * time_s);
-  const double fraction =
-      std::fma(signed_rate_hz_, time_s, -whole_turns);  // one rounding, at any time
+  // The product is not rounded before the whole turns are gone, so days do not wear the angle down.
+  const double fraction = std::fma(signed_rate_hz_, time_s, -whole_turns);
   return wrapped(start_azimuth_rad_ + full_turn_rad * fraction);
 }
 

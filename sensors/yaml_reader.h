@@ -5,6 +5,7 @@
 #include <concepts>
 #include <cstdint>
 #include <filesystem>
+#include <initializer_list>
 #include <limits>
 #include <optional>
 #include <span>
@@ -149,7 +150,7 @@ bool is_text(const Node& node, std::string_view key, Faults& faults);
 /// letters off.
 std::optional<std::string> nearest(std::string_view word,
                                    const std::vector<std::string>& candidates);
-/// Returns ", did you mean 'x'?" for the nearest candidate, or nothing.
+/// Returns "; did you mean 'x'?" for the nearest candidate, or nothing.
 std::string suggestion(std::string_view word, const std::vector<std::string>& candidates);
 
 }  // namespace groundray::yaml

@@ -1,23 +1,20 @@
 #include "test/benchmark/raw_embree.h"
 
-#if GROUNDRAY_EMBREE >= 4
-#include <embree4/rtcore.h>
-#else
-#include <embree3/rtcore.h>
-#endif
-#include <immintrin.h>
 #include <tbb/blocked_range.h>
 #include <tbb/parallel_for.h>
 
 #include <algorithm>
 #include <limits>
 
+#include "core/embree_adapter.h"
 #include "terrain/terrain_scene.h"
 
 namespace groundray::benchmark {
 
-template <int W, typename RayHit>
+template <int W>
 struct Packets {
+  using RayHit = typename PacketOf<W>::Type;
+
   std::vector<RayHit> filled;
 
   void fill(std::span<const Ray> rays) {
@@ -45,27 +42,13 @@ struct Packets {
   void trace(RTCScene scene, std::vector<float>& ranges_m) {
     tbb::parallel_for(
         tbb::blocked_range<std::size_t>(0, filled.size(), 512), [&](const auto& range) {
-          _mm_setcsr(_mm_getcsr() | 0x8040);
+          const FlushDenormals flush;
           alignas(64) int valid[W];
           std::fill_n(valid, W, -1);
-#if GROUNDRAY_EMBREE >= 4
-          RTCIntersectArguments how;
-          rtcInitIntersectArguments(&how);
-          how.flags = RTC_RAY_QUERY_FLAG_COHERENT;
-#else
-      RTCIntersectContext how;
-      rtcInitIntersectContext(&how);
-      how.flags = RTC_INTERSECT_CONTEXT_FLAG_COHERENT;
-#endif
+          QueryContext context;
           for (std::size_t i = range.begin(); i < range.end(); ++i) {
             RayHit packet = filled[i];
-#if GROUNDRAY_EMBREE >= 4
-            if constexpr (W == 16) rtcIntersect16(valid, scene, &packet, &how);
-            if constexpr (W == 8) rtcIntersect8(valid, scene, &packet, &how);
-#else
-        if constexpr (W == 16) rtcIntersect16(valid, scene, &how, &packet);
-        if constexpr (W == 8) rtcIntersect8(valid, scene, &how, &packet);
-#endif
+            intersect<W>(scene, valid, packet, context, Coherence::Coherent);
             for (std::size_t lane = 0; lane < W && i * W + lane < ranges_m.size(); ++lane) {
               ranges_m[i * W + lane] = packet.hit.geomID[lane] == RTC_INVALID_GEOMETRY_ID
                                            ? std::numeric_limits<float>::infinity()
@@ -80,8 +63,8 @@ struct RawEmbree::Impl {
   RTCDevice device = rtcNewDevice(nullptr);
   RTCScene scene = rtcNewScene(device);
   bool wide = rtcGetDeviceProperty(device, RTC_DEVICE_PROPERTY_NATIVE_RAY16_SUPPORTED) != 0;
-  Packets<8, RTCRayHit8> eights;
-  Packets<16, RTCRayHit16> sixteens;
+  Packets<8> eights;
+  Packets<16> sixteens;
   std::vector<float> ranges_m;
 };
 

@@ -39,7 +39,9 @@ struct Golden {
   std::uint16_t ring;
   double firing_time_us;
   glm::dvec3 p_SQ;
-  friend void PrintTo(const Golden& golden, std::ostream* out) { *out << golden.name; }
+  friend std::ostream& operator<<(std::ostream& out, const Golden& golden) {
+    return out << golden.name;
+  }
 };
 const Golden golden_points[] = {
     {"velodyne_vlp16", 16, 15, 34.56, {15.7945257, -11.1237601, 5.1651809}},       // laser 15

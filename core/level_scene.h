@@ -1,0 +1,53 @@
+#pragma once
+
+#include <cstdint>
+#include <glm/vec2.hpp>
+#include <glm/vec3.hpp>
+#include <vector>
+
+#include "core/embree_adapter.h"
+#include "core/ray_tracer.h"
+
+namespace groundray {
+
+/// Geometry ids in the scene of a level.
+enum LevelGeometry : unsigned { kBlocks = 0, kFacets = 1 };
+
+/// A level as Embree holds it. Embree keeps pointers to it: it must not move once built.
+struct LevelScene {
+  Level level;
+  glm::dvec3 p_DL{0};
+  RTCScene scene = nullptr;
+  std::vector<glm::ivec2> tiles;  ///< first cells of the user primitives of exact tracing
+  float slack_m = 0;              ///< 16 * 2^-24 * max|p_L|: covers rounding to floats
+};
+
+/// A ray as tracing one level needs it: in double, and in float from where it enters the level's
+/// box.
+struct LevelRay {
+  GridRay grid;
+  double enter_m = 0;
+  double leave_m = 0;
+  glm::vec3 origin{0};  ///< in L
+  glm::vec3 direction{0};
+  float far = 0;  ///< metres from the float origin
+};
+
+/// The double side of a packet: what exact tracing reads and fills, by lane.
+struct ExactQuery {
+  QueryContext context;  ///< first, so that Embree's pointer to it is a pointer to this
+  const LevelRay* rays;
+  Crossing* crossings;
+};
+
+/// Builds the scene of `level` for `tracing`: grids and triangles, or tiles that are decided in
+/// double.
+/// @throws Error if the level has no height.
+void build_level_scene(RTCDevice device, Tracing tracing, LevelScene& level);
+
+/// Returns a bound in float for a range in double, never short of it.
+inline float far_float(double range_m, float slack_m) noexcept {
+  return static_cast<float>(range_m) * (1 + 0x1p-20f) + slack_m;
+}
+
+}  // namespace groundray
