@@ -11,7 +11,7 @@
 namespace groundray {
 namespace {
 
-constexpr int kTileCells = 8;  // side of a user primitive in exact tracing
+constexpr int tile_cells = 8;  // side of a user primitive in exact tracing
 
 glm::dvec3 sample_L(const LevelScene& level, int column, int row, double height_m) noexcept {
   const HeightGrid& grid = level.level.grid;
@@ -24,7 +24,7 @@ void intersect_tile(const RTCIntersectFunctionNArguments* arguments) {
   const auto& level = *static_cast<const LevelScene*>(arguments->geometryUserPtr);
   const auto& query = *reinterpret_cast<const ExactQuery*>(arguments->context);
   const glm::dvec2 low = glm::dvec2(level.tiles[arguments->primID]) - 0.5;
-  const glm::dvec2 high = low + glm::dvec2(kTileCells + 1);
+  const glm::dvec2 high = low + glm::dvec2(tile_cells + 1);
   RTCRayN* const rays = RTCRayHitN_RayN(arguments->rayhit, arguments->N);
   RTCHitN* const hits = RTCRayHitN_HitN(arguments->rayhit, arguments->N);
   for (unsigned i = 0; i < arguments->N; ++i) {
@@ -53,7 +53,7 @@ void tile_bounds(const RTCBoundsFunctionArguments* arguments) {
   const auto& level = *static_cast<const LevelScene*>(arguments->geometryUserPtr);
   const HeightGrid& grid = level.level.grid;
   const glm::ivec2 first = level.tiles[arguments->primID];
-  const glm::ivec2 last = glm::min(first + kTileCells, glm::ivec2(grid.columns(), grid.rows()) - 1);
+  const glm::ivec2 last = glm::min(first + tile_cells, glm::ivec2(grid.columns(), grid.rows()) - 1);
   float low_m = std::numeric_limits<float>::infinity();
   float high_m = -low_m;
   for (int row = first.y; row <= last.y; ++row) {
@@ -78,27 +78,27 @@ void tile_bounds(const RTCBoundsFunctionArguments* arguments) {
 // The tiles that hold a part of the level.
 std::vector<glm::ivec2> occupied_tiles(const Level& level) {
   const glm::ivec2 count =
-      (glm::ivec2(level.grid.columns(), level.grid.rows()) - 2) / kTileCells + 1;
+      (glm::ivec2(level.grid.columns(), level.grid.rows()) - 2) / tile_cells + 1;
   std::vector<bool> occupied(static_cast<std::size_t>(count.x) * static_cast<std::size_t>(count.y));
   const auto mark = [&](glm::ivec2 tile) {
     occupied[static_cast<std::size_t>(tile.y) * static_cast<std::size_t>(count.x) +
              static_cast<std::size_t>(tile.x)] = true;
   };
   for (const Level::Block& block : level.blocks) {
-    const glm::ivec2 first = glm::ivec2(block.column, block.row) / kTileCells;
+    const glm::ivec2 first = glm::ivec2(block.column, block.row) / tile_cells;
     const glm::ivec2 last =
-        glm::ivec2(block.column + block.columns - 2, block.row + block.rows - 2) / kTileCells;
+        glm::ivec2(block.column + block.columns - 2, block.row + block.rows - 2) / tile_cells;
     for (int row = first.y; row <= last.y; ++row) {
       for (int column = first.x; column <= last.x; ++column) mark({column, row});
     }
   }
-  for (const Facet& facet : level.facets) mark(glm::ivec2(facet.column, facet.row) / kTileCells);
+  for (const Facet& facet : level.facets) mark(glm::ivec2(facet.column, facet.row) / tile_cells);
   std::vector<glm::ivec2> tiles;
   for (int row = 0; row < count.y; ++row) {
     for (int column = 0; column < count.x; ++column) {
       if (occupied[static_cast<std::size_t>(row) * static_cast<std::size_t>(count.x) +
                    static_cast<std::size_t>(column)]) {
-        tiles.push_back(glm::ivec2(column, row) * kTileCells);
+        tiles.push_back(glm::ivec2(column, row) * tile_cells);
       }
     }
   }
@@ -118,7 +118,7 @@ void build_exact(RTCDevice device, LevelScene& level) {
   rtcSetGeometryUserData(geometry, &level);
   rtcSetGeometryBoundsFunction(geometry, tile_bounds, nullptr);
   rtcSetGeometryIntersectFunction(geometry, intersect_tile);
-  attach(level.scene, geometry, kBlocks);
+  attach(level.scene, geometry, block_geometry);
 }
 
 RTCBuffer new_vertices(RTCDevice device, const LevelScene& level) {
@@ -153,7 +153,7 @@ void build_fast(RTCDevice device, LevelScene& level) {
                   columns, static_cast<unsigned short>(block.columns),
                   static_cast<unsigned short>(block.rows)};
     }
-    attach(level.scene, geometry, kBlocks);
+    attach(level.scene, geometry, block_geometry);
   }
   if (!level.level.facets.empty()) {
     RTCGeometry geometry = rtcNewGeometry(device, RTC_GEOMETRY_TYPE_TRIANGLE);
@@ -168,7 +168,7 @@ void build_fast(RTCDevice device, LevelScene& level) {
       const unsigned apex = facet.half == Facet::Half::Near ? first : first + columns + 1;
       *indices++ = {apex, first + 1, first + columns};
     }
-    attach(level.scene, geometry, kFacets);
+    attach(level.scene, geometry, facet_geometry);
   }
   rtcReleaseBuffer(vertices);
 }

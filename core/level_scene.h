@@ -11,7 +11,8 @@
 namespace groundray {
 
 /// Geometry ids in the scene of a level.
-enum LevelGeometry : unsigned { kBlocks = 0, kFacets = 1 };
+inline constexpr unsigned block_geometry = 0;
+inline constexpr unsigned facet_geometry = 1;
 
 /// A level as Embree holds it. Embree keeps pointers to it: it must not move once built.
 struct LevelScene {

@@ -18,8 +18,8 @@
 namespace groundray {
 namespace {
 
-constexpr double kWalkCells = 1.5;      // how far round Embree's hit the facet is looked for
-constexpr double kInsideMargin = 1e-9;  // cells; far above rounding, far below any facet
+constexpr double walk_cells = 1.5;      // how far round Embree's hit the facet is looked for
+constexpr double inside_margin = 1e-9;  // cells; far above rounding, far below any facet
 
 // Where Embree says a ray hits.
 struct FloatHit {
@@ -51,7 +51,7 @@ FloatHit intersect_one(const LevelScene& level, const LevelRay& ray, double from
 }
 
 Facet facet_of(const LevelScene& level, const FloatHit& hit) noexcept {
-  if (hit.geometry == kFacets) return level.level.facets[hit.primitive];
+  if (hit.geometry == facet_geometry) return level.level.facets[hit.primitive];
   const Level::Block& block = level.level.blocks[hit.primitive];
   const float u = hit.u * static_cast<float>(block.columns - 1);
   const float v = hit.v * static_cast<float>(block.rows - 1);
@@ -86,7 +86,7 @@ bool from_behind(const LevelScene& level, const LevelRay& ray, const FloatHit& h
 std::optional<Crossing> search(const LevelScene& level, const LevelRay& ray,
                                FloatHit hit) noexcept {
   const HeightGrid& grid = level.level.grid;
-  const double reach_m = kWalkCells / std::max(std::abs(ray.grid.du), std::abs(ray.grid.dv));
+  const double reach_m = walk_cells / std::max(std::abs(ray.grid.du), std::abs(ray.grid.dv));
   double from_m = ray.enter_m;
   for (bool retried = false;;) {
     const bool miss = hit.geometry == RTC_INVALID_GEOMETRY_ID;
@@ -249,7 +249,7 @@ void decide_fast(const LevelScene& level, Packet<W>& packet) noexcept {
     if (packet.valid[i] == 0) continue;
     const FloatHit hit = packet.hit(lane);
     const bool met = hit.geometry != RTC_INVALID_GEOMETRY_ID;
-    if (met && packet.inside[i] > kInsideMargin) continue;
+    if (met && packet.inside[i] > inside_margin) continue;
     const LevelRay ray = packet.level_ray(lane);
     const auto crossing = met || ends_below(level, ray) ? search(level, ray, hit) : std::nullopt;
     packet.range_m[i] = crossing ? crossing->range_m : std::numeric_limits<double>::infinity();

@@ -14,7 +14,7 @@
 namespace groundray {
 namespace {
 
-constexpr std::size_t kChunkPulses =
+constexpr std::size_t chunk_pulses =
     4096;  // traced at once by a thread; a multiple of every packet width
 
 // A row of the scan to be.
@@ -113,7 +113,7 @@ PointCloud Lidar::scan(const Scene& scene, const Trajectory& X_DS, std::int64_t 
   const Sweep sweep(pattern_, X_DS, number);
   const auto shots = pattern_.shots();
   const auto volleys = pattern_.volleys();
-  const std::size_t per_chunk = std::max<std::size_t>(1, kChunkPulses / shots.size());
+  const std::size_t per_chunk = std::max<std::size_t>(1, chunk_pulses / shots.size());
   const std::size_t chunks = (sweep.sequences() + per_chunk - 1) / per_chunk;
   std::vector<std::vector<Echo>> echoes(chunks);
 

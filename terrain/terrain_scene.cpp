@@ -6,7 +6,7 @@
 namespace groundray {
 namespace {
 
-constexpr int kTileCells = 64;
+constexpr int tile_cells = 64;
 
 bool has_hole(const HeightGrid& grid, const Level::Block& block) {
   for (int row = block.row; row < block.row + block.rows; ++row) {
@@ -33,10 +33,10 @@ void append_facets(const HeightGrid& grid, const Level::Block& block, std::vecto
 Level full_resolution_level(const HeightGrid& grid) {
   Level level{grid, {}, {}};
   const bool whole = grid.hole_count() == 0;
-  for (int row = 0; row < grid.rows() - 1; row += kTileCells) {
-    for (int column = 0; column < grid.columns() - 1; column += kTileCells) {
-      const Level::Block block{column, row, std::min(kTileCells, grid.columns() - 1 - column) + 1,
-                               std::min(kTileCells, grid.rows() - 1 - row) + 1};
+  for (int row = 0; row < grid.rows() - 1; row += tile_cells) {
+    for (int column = 0; column < grid.columns() - 1; column += tile_cells) {
+      const Level::Block block{column, row, std::min(tile_cells, grid.columns() - 1 - column) + 1,
+                               std::min(tile_cells, grid.rows() - 1 - row) + 1};
       if (whole || !has_hole(grid, block)) {
         level.blocks.push_back(block);
       } else {

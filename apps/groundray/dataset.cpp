@@ -15,7 +15,7 @@ namespace {
 
 namespace fs = std::filesystem;
 
-constexpr std::string_view kFrames = "\nframes:\n";  // what precedes it says what run this is
+constexpr std::string_view frames = "\nframes:\n";  // what precedes it says what run this is
 
 double degrees(double angle_rad) { return angle_rad * 180 / std::numbers::pi; }
 
@@ -98,7 +98,7 @@ void check_same_run(const fs::path& folder, const World& world) {
         folder.string());
   }
   const std::string before = read_text(record);
-  if (before.substr(0, before.find(kFrames)) + "\n" != header(world)) {
+  if (before.substr(0, before.find(frames)) + "\n" != header(world)) {
     throw Error(
         "{}: the folder holds a dataset of another scene, seed or version; choose a new folder "
         "with -o or "
@@ -137,7 +137,7 @@ bool Dataset::has(const PlacedLidar& lidar, std::int64_t frame) const {
 void Dataset::record() const {
   std::string text = header(world_);
   text.pop_back();
-  text += kFrames;
+  text += frames;
   for (const PlacedLidar& lidar : world_.lidars) {
     for (std::int64_t frame = 0; frame < lidar.sweeps; ++frame) {
       text += fmt::format("  - {{sensor: {}, frame: {}, stamp_s: {:.9f}, state: {}}}\n",

@@ -11,7 +11,7 @@ namespace groundray {
 namespace {
 
 // Height, float vertex, Embree's grid BVH: measured by `./dev bench`, see docs/accuracy.md.
-constexpr double kBytesPerSample = 37;
+constexpr double bytes_per_sample = 37;
 
 void print_dem(const Dem& dem) {
   const HeightGrid& grid = dem.grid;
@@ -27,7 +27,7 @@ void print_dem(const Dem& dem) {
   fmt::print("heights   {:.3f} to {:.3f} m\n", grid.min_height_m(), grid.max_height_m());
   fmt::print("holes     {} samples ({:.2f} %)\n", grid.hole_count(),
              100 * static_cast<double>(grid.hole_count()) / samples);
-  fmt::print("memory    about {:.0f} MiB to trace\n", samples * kBytesPerSample / (1 << 20));
+  fmt::print("memory    about {:.0f} MiB to trace\n", samples * bytes_per_sample / (1 << 20));
 }
 
 void print_scene(const World& world) {

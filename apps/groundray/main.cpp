@@ -12,7 +12,10 @@
 
 namespace {
 
-enum ExitCode { kDone = 0, kFailed = 1, kWrongUsage = 2, kInterrupted = 130 };
+constexpr int done = 0;
+constexpr int failed = 1;
+constexpr int wrong_usage = 2;
+constexpr int interrupted = 130;
 
 int run(int argc, char** argv) {
   CLI::App app(
@@ -47,19 +50,20 @@ int run(int argc, char** argv) {
   try {
     app.parse(argc, argv);
   } catch (const CLI::ParseError& error) {
-    return app.exit(error) == 0 ? kDone : kWrongUsage;
+    return app.exit(error) == 0 ? done : wrong_usage;
   }
   if (info->parsed()) {
     groundray::print_info(file);
-    return kDone;
+    return done;
   }
-  return groundray::generate(scene, out) == groundray::RunEnd::Done ? kDone : kInterrupted;
+  return groundray::generate(scene, out) == groundray::RunEnd::Done ? done : interrupted;
 }
 
 }  // namespace
 
 int main(int argc, char** argv) {
-  std::signal(SIGXFSZ, SIG_IGN);  // a limit on file size is then an error of the write, with a message
+  std::signal(SIGXFSZ,
+              SIG_IGN);  // a limit on file size is then an error of the write, with a message
   try {
     return run(argc, argv);
   } catch (const std::bad_alloc&) {
@@ -69,5 +73,5 @@ int main(int argc, char** argv) {
   } catch (const std::exception& error) {
     fmt::print(stderr, "groundray: {}\n", error.what());
   }
-  return kFailed;
+  return failed;
 }

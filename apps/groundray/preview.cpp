@@ -12,8 +12,8 @@
 namespace groundray {
 namespace {
 
-constexpr int kWidth = 900;
-constexpr int kGap = 8;
+constexpr int width = 900;
+constexpr int gap = 8;
 
 using Colour = glm::dvec3;  // 0 to 1
 
@@ -72,7 +72,7 @@ void draw_ranges(Image8& image, const PointCloud& scan, const SpinningPattern& p
   const int height = band_height(pattern);
   for (std::size_t i = 0; i < scan.rows(); ++i) {
     const double turn = 0.5 - std::atan2(y[i], x[i]) / (2 * std::numbers::pi);
-    const int column = std::min(static_cast<int>(turn * kWidth), kWidth - 1);
+    const int column = std::min(static_cast<int>(turn * width), width - 1);
     for (int k = 0; k < height; ++k) {
       paint(image, column, places[ring[i]] * height + k, range_colour(range_m[i], far_m));
     }
@@ -86,22 +86,22 @@ struct MapWindow {
   int top;
 
   glm::dvec2 point(int x, int y) const {
-    const glm::dvec2 share((x + 0.5) / kWidth * 2 - 1, 1 - (y + 0.5) / kWidth * 2);
+    const glm::dvec2 share((x + 0.5) / width * 2 - 1, 1 - (y + 0.5) / width * 2);
     return centre_m + share * half_m;
   }
   glm::ivec2 pixel(glm::dvec2 p) const {
     const glm::dvec2 share = (p - centre_m) / half_m;
-    return {static_cast<int>(std::floor((share.x + 1) / 2 * kWidth)),
-            top + static_cast<int>(std::floor((1 - share.y) / 2 * kWidth))};
+    return {static_cast<int>(std::floor((share.x + 1) / 2 * width)),
+            top + static_cast<int>(std::floor((1 - share.y) / 2 * width))};
   }
 };
 
 void draw_hillshade(Image8& image, const MapWindow& window, const HeightGrid& ground) {
   const glm::dvec3 sun =
       glm::normalize(glm::dvec3(-1, 1, 1.4));  // from the north-west, as maps have it
-  const double reach_m = std::max(2 * window.half_m / kWidth, 0.5 * std::abs(ground.step_m().x));
-  for (int y = 0; y < kWidth; ++y) {
-    for (int x = 0; x < kWidth; ++x) {
+  const double reach_m = std::max(2 * window.half_m / width, 0.5 * std::abs(ground.step_m().x));
+  for (int y = 0; y < width; ++y) {
+    for (int x = 0; x < width; ++x) {
       const glm::dvec2 p = window.point(x, y);
       const auto west = ground.height_m_at(p - glm::dvec2(reach_m, 0));
       const auto east = ground.height_m_at(p + glm::dvec2(reach_m, 0));
@@ -153,12 +153,12 @@ Image8 draw_preview(const PointCloud& scan, const PlacedLidar& lidar, const Dem&
                     std::int64_t frame) {
   const SpinningPattern& pattern = lidar.spec.lidar.pattern;
   const int ranges_height = band_height(pattern) * static_cast<int>(pattern.beams.size());
-  Image8 image(kWidth, ranges_height + kGap + kWidth, 3);
+  Image8 image(width, ranges_height + gap + width, 3);
   const auto range_m = scan.column<double>("range_true");
   const double far_m = std::max(quantile_m(range_m, 0.95), 1.0);
   const Pose X_DS = lidar.X_DS.pose_at(lidar.lidar.pattern().stamp(frame));
   const MapWindow window{glm::dvec2(X_DS.translation_m), std::max(far_m * 1.1, 10.0),
-                         ranges_height + kGap};
+                         ranges_height + gap};
   draw_ranges(image, scan, pattern, far_m);
   draw_hillshade(image, window, dem.grid);
   draw_points(image, window, scan, far_m);

@@ -17,7 +17,7 @@ namespace {
 using ::testing::HasSubstr;
 using ::testing::ThrowsMessage;
 
-constexpr float kHole = std::numeric_limits<float>::quiet_NaN();
+constexpr float hole = std::numeric_limits<float>::quiet_NaN();
 
 TEST(HeightGrid, CellIsSplitFromTheNextColumnToTheNextRow) {
   // Only the corner (1, 1) is raised: the near half stays flat, on the far half height grows with u
@@ -50,7 +50,7 @@ TEST(HeightGrid, NormalIsPerpendicularToTheFacetAndPointsUp) {
 }
 
 TEST(HeightGrid, TrianglesThatTouchAHoleDoNotExist) {
-  const HeightGrid grid({2, 2}, {0, 0}, {1, 1}, {0, 0, 0, kHole});
+  const HeightGrid grid({2, 2}, {0, 0}, {1, 1}, {0, 0, 0, hole});
   EXPECT_TRUE(grid.height_m_at({0.2, 0.2}));
   EXPECT_FALSE(grid.height_m_at({0.8, 0.8}));
   EXPECT_EQ(grid.hole_count(), 1u);
