@@ -12,6 +12,13 @@ bool PointCloud::has(std::string_view name) const {
   return std::ranges::find(columns_, name, &Column::name) != columns_.end();
 }
 
+void PointCloud::truncate(std::size_t rows) {
+  rows_ = std::min(rows_, rows);
+  for (Column& column : columns_) {
+    std::visit([&](auto& values) { values.resize(rows_); }, column.values);
+  }
+}
+
 PointCloud::AnyValues& PointCloud::add_values(std::string name, AnyValues values) {
   if (has(name)) throw Error("point cloud: there is a column '{}' already", name);
   columns_.push_back({std::move(name), std::move(values)});

@@ -68,6 +68,9 @@ class PointCloud {
 
   bool has(std::string_view name) const;
 
+  /// Drops all rows from `rows` on.
+  void truncate(std::size_t rows);
+
  private:
   AnyValues& add_values(std::string name, AnyValues values);
   const AnyValues& find(std::string_view name) const;

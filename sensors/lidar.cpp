@@ -1,13 +1,16 @@
 #include "sensors/lidar.h"
 
-#include <tbb/parallel_for.h>
+#include <tbb/concurrent_queue.h>
+#include <tbb/parallel_pipeline.h>
+#include <tbb/task_arena.h>
 
 #include <algorithm>
 #include <cmath>
 #include <glm/geometric.hpp>
 #include <glm/gtc/quaternion.hpp>
 #include <glm/mat3x3.hpp>
-#include <numeric>
+#include <span>
+#include <vector>
 
 #include "core/error.h"
 
@@ -23,7 +26,8 @@ struct Echo {
   glm::dvec3 p_DQ;
   glm::vec3 p_SQ;
   glm::vec3 normal;
-  float incidence_rad;
+  float cos_incidence;
+  float sin_incidence;
   float time_s;
   std::uint16_t ring;
 };
@@ -87,13 +91,127 @@ class Sweep {
   std::chrono::nanoseconds stamp_;
 };
 
-// What one thread needs to cast a chunk. Rays are kept beam by beam, each beam's in order of
-// azimuth: neighbours of a packet are then alike.
-struct Chunk {
-  std::vector<HeadPose> heads;
-  std::vector<Ray> rays;
-  std::vector<Hit> hits;
+// The columns of a scan, to be filled row by row.
+struct Rows {
+  explicit Rows(PointCloud& cloud)
+      : x(cloud.add<float>("x")),
+        y(cloud.add<float>("y")),
+        z(cloud.add<float>("z")),
+        intensity(cloud.add<float>("intensity")),
+        time_s(cloud.add<float>("time")),
+        ring(cloud.add<std::uint16_t>("ring")),
+        return_index(cloud.add<std::uint8_t>("return_index")),
+        return_count(cloud.add<std::uint8_t>("return_count")),
+        world_x(cloud.add<double>("world_x")),
+        world_y(cloud.add<double>("world_y")),
+        world_z(cloud.add<double>("world_z")),
+        range_true(cloud.add<double>("range_true")),
+        nx(cloud.add<float>("nx")),
+        ny(cloud.add<float>("ny")),
+        nz(cloud.add<float>("nz")),
+        incidence(cloud.add<float>("incidence")),
+        label(cloud.add<std::uint16_t>("label")),
+        instance(cloud.add<std::uint32_t>("instance")),
+        error_estimate(cloud.add<float>("error_estimate")) {}
+
+  void write(std::size_t row, const Echo& echo, const SurfaceTruth& surface) const {
+    x[row] = echo.p_SQ.x;
+    y[row] = echo.p_SQ.y;
+    z[row] = echo.p_SQ.z;
+    intensity[row] = echo.cos_incidence;
+    time_s[row] = echo.time_s;
+    ring[row] = echo.ring;
+    return_index[row] = 1;
+    return_count[row] = 1;
+    world_x[row] = echo.p_DQ.x;
+    world_y[row] = echo.p_DQ.y;
+    world_z[row] = echo.p_DQ.z;
+    range_true[row] = echo.range_m;
+    nx[row] = echo.normal.x;
+    ny[row] = echo.normal.y;
+    nz[row] = echo.normal.z;
+    incidence[row] = std::atan2(echo.sin_incidence, echo.cos_incidence);
+    label[row] = surface.label;
+    instance[row] = surface.instance;
+    error_estimate[row] = 0;
+  }
+
+  std::span<float> x, y, z, intensity, time_s;
+  std::span<std::uint16_t> ring;
+  std::span<std::uint8_t> return_index, return_count;
+  std::span<double> world_x, world_y, world_z, range_true;
+  std::span<float> nx, ny, nz, incidence;
+  std::span<std::uint16_t> label;
+  std::span<std::uint32_t> instance;
+  std::span<float> error_estimate;
 };
+
+// A few firing sequences on their way through the pipeline. Its buffers are used again and again.
+struct Chunk {
+  std::size_t begin = 0;  // first sequence, of the sweep
+  std::size_t count = 0;
+  std::size_t first_row = 0;
+  std::vector<HeadPose> heads;  // by sequence and volley
+  std::vector<Ray> rays;        // by shot and sequence: neighbours in azimuth make alike packets
+  std::vector<Hit> hits;
+  std::vector<Echo> echoes;
+};
+
+// Calls `act(sequence in the chunk, shot, head)` for every pulse of a chunk, in firing order.
+template <typename Act>
+void for_each_pulse(const ScanPattern& pattern, const Chunk& chunk, const Act& act) {
+  const auto volleys = pattern.volleys();
+  for (std::size_t k = 0; k < chunk.count; ++k) {
+    for (std::size_t v = 0; v < volleys.size(); ++v) {
+      const HeadPose& head = chunk.heads[k * volleys.size() + v];
+      for (int shot = volleys[v].begin; shot < volleys[v].end; ++shot) {
+        act(k, static_cast<std::size_t>(shot), head);
+      }
+    }
+  }
+}
+
+void cast(const Sweep& sweep, const ScanPattern& pattern, const RayTracer& tracer, double far_m,
+          Chunk& chunk) {
+  const auto shots = pattern.shots();
+  chunk.heads.clear();
+  for (std::size_t k = 0; k < chunk.count; ++k) {
+    for (const ScanPattern::Volley& volley : pattern.volleys()) {
+      chunk.heads.push_back(sweep.head(chunk.begin + k, volley));
+    }
+  }
+  chunk.rays.resize(chunk.count * shots.size());
+  chunk.hits.resize(chunk.rays.size());
+  for_each_pulse(pattern, chunk, [&](std::size_t k, std::size_t shot, const HeadPose& head) {
+    chunk.rays[shot * chunk.count + k] = {head.p_DS + head.R_DH * shots[shot].origin_m,
+                                          head.R_DH * shots[shot].direction, far_m};
+  });
+  tracer.trace(chunk.rays, chunk.hits);
+}
+
+// Turns the hits of a chunk into echoes, in firing order.
+void receive(const ScanPattern& pattern, double near_m, double range_noise_sigma_m,
+             const RandomKey& sweep_key, Chunk& chunk) {
+  const auto shots = pattern.shots();
+  chunk.echoes.clear();
+  for_each_pulse(pattern, chunk, [&](std::size_t k, std::size_t shot, const HeadPose& head) {
+    const Hit& hit = chunk.hits[shot * chunk.count + k];
+    if (!hit || hit.range_m < near_m) return;
+    const Ray& ray = chunk.rays[shot * chunk.count + k];
+    double reported_m = hit.range_m;
+    if (range_noise_sigma_m > 0) {
+      RandomKey key = sweep_key;
+      key.pulse = static_cast<std::uint32_t>((chunk.begin + k) * shots.size() + shot);
+      reported_m += range_noise_sigma_m * random_normal(key).x;
+    }
+    const glm::vec3 direction(ray.direction);
+    chunk.echoes.push_back(
+        {hit.range_m, ray.origin + ray.direction * hit.range_m,
+         glm::vec3(head.R_SH * (shots[shot].origin_m + shots[shot].direction * reported_m)),
+         hit.normal, -glm::dot(direction, hit.normal),
+         glm::length(glm::cross(direction, hit.normal)), head.time_s, shots[shot].ring});
+  });
+}
 
 }  // namespace
 
@@ -111,106 +229,54 @@ Lidar::Lidar(const LidarSpec& spec)
 PointCloud Lidar::scan(const Scene& scene, const Trajectory& X_DS, std::int64_t number, Seed seed,
                        std::uint32_t sensor_number) const {
   const Sweep sweep(pattern_, X_DS, number);
-  const auto shots = pattern_.shots();
-  const auto volleys = pattern_.volleys();
-  const std::size_t per_chunk = std::max<std::size_t>(1, chunk_pulses / shots.size());
-  const std::size_t chunks = (sweep.sequences() + per_chunk - 1) / per_chunk;
-  std::vector<std::vector<Echo>> echoes(chunks);
+  const std::size_t per_chunk = std::max<std::size_t>(1, chunk_pulses / pattern_.shots().size());
+  const RandomKey key{seed, sensor_number, static_cast<std::uint32_t>(number)};
+  PointCloud cloud(sweep.sequences() * pattern_.shots().size());
+  const Rows rows(cloud);
 
-  tbb::parallel_for(std::size_t{0}, chunks, [&](std::size_t chunk_number) {
-    const std::size_t begin = chunk_number * per_chunk;
-    const std::size_t count = std::min(per_chunk, sweep.sequences() - begin);
-    Chunk chunk{std::vector<HeadPose>(count * volleys.size()),
-                std::vector<Ray>(count * shots.size()), std::vector<Hit>(count * shots.size())};
-    for (std::size_t k = 0; k < count; ++k) {
-      for (std::size_t v = 0; v < volleys.size(); ++v) {
-        const HeadPose& head = chunk.heads[k * volleys.size() + v] =
-            sweep.head(begin + k, volleys[v]);
-        for (auto s = static_cast<std::size_t>(volleys[v].begin);
-             s < static_cast<std::size_t>(volleys[v].end); ++s) {
-          chunk.rays[s * count + k] = {head.p_DS + head.R_DH * shots[s].origin_m,
-                                       head.R_DH * shots[s].direction, gate_.far_m};
-        }
-      }
+  // Chunks are cast in any order and written in any order; in between each learns, in firing order,
+  // where its rows begin.
+  const auto live = 2 * static_cast<std::size_t>(tbb::this_task_arena::max_concurrency());
+  std::vector<Chunk> chunks(live);
+  tbb::concurrent_bounded_queue<Chunk*> idle;
+  for (Chunk& chunk : chunks) idle.push(&chunk);
+  std::size_t next_sequence = 0;
+  std::size_t next_row = 0;
+  const auto take = [&](tbb::flow_control& flow) -> Chunk* {
+    if (next_sequence == sweep.sequences()) {
+      flow.stop();
+      return nullptr;
     }
-    scene.rays.trace(chunk.rays, chunk.hits);
-    auto& out = echoes[chunk_number];
-    out.reserve(chunk.rays.size());
-    for (std::size_t k = 0; k < count; ++k) {
-      for (std::size_t v = 0; v < volleys.size(); ++v) {
-        const HeadPose& head = chunk.heads[k * volleys.size() + v];
-        for (auto s = static_cast<std::size_t>(volleys[v].begin);
-             s < static_cast<std::size_t>(volleys[v].end); ++s) {
-          const Hit& hit = chunk.hits[s * count + k];
-          if (!hit || hit.range_m < gate_.near_m) continue;
-          const Ray& ray = chunk.rays[s * count + k];
-          double reported_m = hit.range_m;
-          if (range_noise_sigma_m_ > 0) {
-            const auto pulse = static_cast<std::uint32_t>((begin + k) * shots.size() + s);
-            reported_m +=
-                range_noise_sigma_m_ *
-                random_normal({seed, sensor_number, static_cast<std::uint32_t>(number), pulse}).x;
-          }
-          const glm::vec3 direction(ray.direction);
-          out.push_back(
-              {hit.range_m, ray.origin + ray.direction * hit.range_m,
-               glm::vec3(head.R_SH * (shots[s].origin_m + shots[s].direction * reported_m)),
-               hit.normal,
-               std::atan2(glm::length(glm::cross(direction, hit.normal)),
-                          -glm::dot(direction, hit.normal)),
-               head.time_s, shots[s].ring});
-        }
-      }
+    Chunk* chunk = nullptr;
+    idle.pop(chunk);
+    chunk->begin = next_sequence;
+    chunk->count = std::min(per_chunk, sweep.sequences() - next_sequence);
+    next_sequence += chunk->count;
+    return chunk;
+  };
+  const auto measure = [&](Chunk* chunk) {
+    cast(sweep, pattern_, scene.rays, gate_.far_m, *chunk);
+    receive(pattern_, gate_.near_m, range_noise_sigma_m_, key, *chunk);
+    return chunk;
+  };
+  const auto place = [&](Chunk* chunk) {
+    chunk->first_row = next_row;
+    next_row += chunk->echoes.size();
+    return chunk;
+  };
+  const auto write = [&](Chunk* chunk) {
+    for (std::size_t i = 0; i < chunk->echoes.size(); ++i) {
+      rows.write(chunk->first_row + i, chunk->echoes[i], scene.terrain);
     }
-  });
-
-  std::vector<std::size_t> first_row(chunks + 1, 0);
-  for (std::size_t i = 0; i < chunks; ++i) first_row[i + 1] = first_row[i] + echoes[i].size();
-  PointCloud cloud(first_row.back());
-  const auto x = cloud.add<float>("x");
-  const auto y = cloud.add<float>("y");
-  const auto z = cloud.add<float>("z");
-  const auto intensity = cloud.add<float>("intensity");
-  const auto time_s = cloud.add<float>("time");
-  const auto ring = cloud.add<std::uint16_t>("ring");
-  const auto return_index = cloud.add<std::uint8_t>("return_index");
-  const auto return_count = cloud.add<std::uint8_t>("return_count");
-  const auto world_x = cloud.add<double>("world_x");
-  const auto world_y = cloud.add<double>("world_y");
-  const auto world_z = cloud.add<double>("world_z");
-  const auto range_true = cloud.add<double>("range_true");
-  const auto nx = cloud.add<float>("nx");
-  const auto ny = cloud.add<float>("ny");
-  const auto nz = cloud.add<float>("nz");
-  const auto incidence = cloud.add<float>("incidence");
-  const auto label = cloud.add<std::uint16_t>("label");
-  const auto instance = cloud.add<std::uint32_t>("instance");
-  const auto error_estimate = cloud.add<float>("error_estimate");
-  tbb::parallel_for(std::size_t{0}, chunks, [&](std::size_t chunk_number) {
-    std::size_t row = first_row[chunk_number];
-    for (const Echo& echo : echoes[chunk_number]) {
-      x[row] = echo.p_SQ.x;
-      y[row] = echo.p_SQ.y;
-      z[row] = echo.p_SQ.z;
-      intensity[row] = std::cos(echo.incidence_rad);
-      time_s[row] = echo.time_s;
-      ring[row] = echo.ring;
-      return_index[row] = 1;
-      return_count[row] = 1;
-      world_x[row] = echo.p_DQ.x;
-      world_y[row] = echo.p_DQ.y;
-      world_z[row] = echo.p_DQ.z;
-      range_true[row] = echo.range_m;
-      nx[row] = echo.normal.x;
-      ny[row] = echo.normal.y;
-      nz[row] = echo.normal.z;
-      incidence[row] = echo.incidence_rad;
-      label[row] = scene.terrain.label;
-      instance[row] = scene.terrain.instance;
-      error_estimate[row] = 0;
-      ++row;
-    }
-  });
+    idle.push(chunk);
+  };
+  using tbb::filter_mode;
+  tbb::parallel_pipeline(live,
+                         tbb::make_filter<void, Chunk*>(filter_mode::serial_in_order, take) &
+                             tbb::make_filter<Chunk*, Chunk*>(filter_mode::parallel, measure) &
+                             tbb::make_filter<Chunk*, Chunk*>(filter_mode::serial_in_order, place) &
+                             tbb::make_filter<Chunk*, void>(filter_mode::parallel, write));
+  cloud.truncate(next_row);
   return cloud;
 }
 
