@@ -175,6 +175,23 @@ void build_fast(RTCDevice device, LevelScene& level) {
 
 }  // namespace
 
+MaxHeights::MaxHeights(const HeightGrid& grid)
+    : tiles_((glm::ivec2(grid.columns(), grid.rows()) - 2) / tile_cells + 1) {
+  heights_m_.reserve(static_cast<std::size_t>(tiles_.x) * static_cast<std::size_t>(tiles_.y));
+  for (int top = 0; top < grid.rows() - 1; top += tile_cells) {
+    for (int left = 0; left < grid.columns() - 1; left += tile_cells) {
+      float high_m = -std::numeric_limits<float>::infinity();
+      for (int row = top; row <= std::min(top + tile_cells, grid.rows() - 1); ++row) {
+        for (int column = left; column <= std::min(left + tile_cells, grid.columns() - 1);
+             ++column) {
+          high_m = std::max(high_m, grid.height_m(column, row));
+        }
+      }
+      heights_m_.push_back(high_m);
+    }
+  }
+}
+
 void build_level_scene(RTCDevice device, Tracing tracing, LevelScene& level) {
   const HeightGrid& grid = level.level.grid;
   if (std::isnan(grid.min_height_m())) throw Error("ray tracer: a level has no height at all");
@@ -182,6 +199,7 @@ void build_level_scene(RTCDevice device, Tracing tracing, LevelScene& level) {
   const glm::dvec3 b = sample_L(level, grid.columns() - 1, grid.rows() - 1, grid.max_height_m());
   level.slack_m =
       static_cast<float>(16 * 0x1p-24 * glm::length(glm::max(glm::abs(a), glm::abs(b))));
+  level.max_heights = MaxHeights(grid);
   level.scene = rtcNewScene(device);
   rtcSetSceneFlags(level.scene, RTC_SCENE_FLAG_ROBUST);
   rtcSetSceneBuildQuality(level.scene, RTC_BUILD_QUALITY_MEDIUM);

@@ -1,6 +1,7 @@
 #pragma once
 
-#include <cstdint>
+#include <algorithm>
+#include <cstddef>
 #include <glm/vec2.hpp>
 #include <glm/vec3.hpp>
 #include <vector>
@@ -14,13 +15,35 @@ namespace groundray {
 inline constexpr unsigned block_geometry = 0;
 inline constexpr unsigned facet_geometry = 1;
 
+/// The highest sample of each tile of 64 x 64 cells, its rim included; holes count as lowest.
+class MaxHeights {
+ public:
+  MaxHeights() = default;
+  explicit MaxHeights(const HeightGrid& grid);
+
+  /// Returns a height that the surface round a point (grid coordinates, clamped to the grid) does
+  /// not exceed.
+  float at(double u, double v) const noexcept {
+    const int column = std::clamp(static_cast<int>(u) / tile_cells, 0, tiles_.x - 1);
+    const int row = std::clamp(static_cast<int>(v) / tile_cells, 0, tiles_.y - 1);
+    return heights_m_[static_cast<std::size_t>(row) * static_cast<std::size_t>(tiles_.x) +
+                      static_cast<std::size_t>(column)];
+  }
+
+ private:
+  static constexpr int tile_cells = 64;
+  glm::ivec2 tiles_{0};
+  std::vector<float> heights_m_;
+};
+
 /// A level as Embree holds it. Embree keeps pointers to it: it must not move once built.
 struct LevelScene {
   Level level;
   glm::dvec3 p_DL{0};
   RTCScene scene = nullptr;
   std::vector<glm::ivec2> tiles;  ///< first cells of the user primitives of exact tracing
-  float slack_m = 0;              ///< 16 * 2^-24 * max|p_L|: covers rounding to floats
+  MaxHeights max_heights;
+  float slack_m = 0;  ///< 16 * 2^-24 * max|p_L|: covers rounding to floats
 };
 
 /// A ray as tracing one level needs it: in double, and in float from where it enters the level's

@@ -61,11 +61,14 @@ Facet facet_of(const LevelScene& level, const FloatHit& hit) noexcept {
   return {block.column + column, block.row + row, far_half ? Facet::Half::Far : Facet::Half::Near};
 }
 
-bool ends_below(const LevelScene& level, const LevelRay& ray) noexcept {
-  const double end_z_m = ray.grid.z0 + ray.leave_m * ray.grid.dz;
-  if (end_z_m >= level.level.grid.max_height_m()) return false;
-  return end_z_m < level.level.grid.min_height_m() ||
-         level.level.grid.clearance_m(ray.grid, ray.leave_m) < 0;
+// Whether the ray is below the surface where it leaves the level's box; most are far above, which
+// one look tells.
+bool ends_below(const LevelScene& level, const GridRay& ray, double leave_m) noexcept {
+  const double z_m = ray.z0 + leave_m * ray.dz;
+  const bool high =
+      z_m >= level.max_heights.at(ray.u0 + leave_m * ray.du, ray.v0 + leave_m * ray.dv);
+  return !high &&
+         (z_m < level.level.grid.min_height_m() || level.level.grid.clearance_m(ray, leave_m) < 0);
 }
 
 glm::vec3 one_ulp_off(const glm::vec3& direction) noexcept {
@@ -90,7 +93,7 @@ std::optional<Crossing> search(const LevelScene& level, const LevelRay& ray,
   double from_m = ray.enter_m;
   for (bool retried = false;;) {
     const bool miss = hit.geometry == RTC_INVALID_GEOMETRY_ID;
-    if (miss && !ends_below(level, ray)) return std::nullopt;
+    if (miss && !ends_below(level, ray.grid, ray.leave_m)) return std::nullopt;
     if (miss || from_behind(level, ray, hit)) {
       if (retried) return grid.first_crossing(ray.grid, from_m, ray.leave_m);
       retried = true;
@@ -124,9 +127,13 @@ struct Packet {
   std::array<LevelRay, W> exact_rays;  // exact tracing only
   std::array<Crossing, W> crossings;
 
+  GridRay grid_ray(int lane) const noexcept {
+    const auto i = static_cast<std::size_t>(lane);
+    return {u0[i], v0[i], z0[i], du[i], dv[i], dz[i]};
+  }
   LevelRay level_ray(int lane) const noexcept {
     const auto i = static_cast<std::size_t>(lane);
-    return {{u0[i], v0[i], z0[i], du[i], dv[i], dz[i]},
+    return {grid_ray(lane),
             enter_m[i],
             leave_m[i],
             {floats.ray.org_x[i], floats.ray.org_y[i], floats.ray.org_z[i]},
@@ -250,8 +257,8 @@ void decide_fast(const LevelScene& level, Packet<W>& packet) noexcept {
     const FloatHit hit = packet.hit(lane);
     const bool met = hit.geometry != RTC_INVALID_GEOMETRY_ID;
     if (met && packet.inside[i] > inside_margin) continue;
-    const LevelRay ray = packet.level_ray(lane);
-    const auto crossing = met || ends_below(level, ray) ? search(level, ray, hit) : std::nullopt;
+    const bool open = met || ends_below(level, packet.grid_ray(lane), packet.leave_m[i]);
+    const auto crossing = open ? search(level, packet.level_ray(lane), hit) : std::nullopt;
     packet.range_m[i] = crossing ? crossing->range_m : std::numeric_limits<double>::infinity();
     if (crossing) packet.take(lane, crossing->facet, level.level.grid.plane(crossing->facet));
   }
@@ -364,7 +371,7 @@ RayTracer::RayTracer(std::vector<Level> levels, const glm::dvec3& p_DL, Tracing 
   }
   impl_->scenes.reserve(levels.size());  // Embree keeps pointers to them
   for (Level& level : levels) {
-    impl_->scenes.push_back({std::move(level), p_DL, nullptr, {}, 0});
+    impl_->scenes.push_back({.level = std::move(level), .p_DL = p_DL});
     build_level_scene(impl_->device, tracing, impl_->scenes.back());
     impl_->check("building a level");
   }
