@@ -121,9 +121,10 @@ struct Packet {
   alignas(64) std::array<int, W> valid;
   alignas(64) Doubles u0, v0, z0, du, dv, dz;  // as GridRay
   Doubles enter_m, leave_m;
-  Doubles height_m, u_slope_m, v_slope_m, column, row;  // facet of the hit, and its plane
+  Doubles column, row, side;  // facet of the hit; side is 1 for the near half, -1 for the far one
+  Doubles apex_m, east_m, south_m;         // heights of its samples
+  Doubles height_m, u_slope_m, v_slope_m;  // its plane
   Doubles range_m, inside;
-  std::array<Facet, W> facets;
   std::array<LevelRay, W> exact_rays;  // exact tracing only
   std::array<Crossing, W> crossings;
 
@@ -144,14 +145,27 @@ struct Packet {
     return {floats.hit.geomID[lane], floats.hit.primID[lane], floats.hit.u[lane],
             floats.hit.v[lane], floats.ray.tfar[lane]};
   }
-  void take(int lane, const Facet& facet, const FacetPlane& plane) noexcept {
+  void take(int lane, const HeightGrid& grid, const Facet& facet) noexcept {
     const auto i = static_cast<std::size_t>(lane);
-    facets[i] = facet;
+    const int apex = facet.half == Facet::Half::Near ? 0 : 1;
     column[i] = facet.column;
     row[i] = facet.row;
-    height_m[i] = plane.height_m;
-    u_slope_m[i] = plane.u_slope_m;
-    v_slope_m[i] = plane.v_slope_m;
+    side[i] = 1 - 2 * apex;
+    apex_m[i] = grid.height_m(facet.column + apex, facet.row + apex);
+    east_m[i] = grid.height_m(facet.column + 1, facet.row);
+    south_m[i] = grid.height_m(facet.column, facet.row + 1);
+  }
+  // As HeightGrid::plane, operation by operation: ranges must not depend on who computes them.
+  void find_planes() noexcept {
+    for (std::size_t i = 0; i < W; ++i) {
+      const bool near_half = side[i] > 0;
+      const double u_m = near_half ? east_m[i] - apex_m[i] : apex_m[i] - south_m[i];
+      const double v_m = near_half ? south_m[i] - apex_m[i] : apex_m[i] - east_m[i];
+      const double corner_m = near_half ? apex_m[i] : east_m[i] + south_m[i] - apex_m[i];
+      u_slope_m[i] = u_m;
+      v_slope_m[i] = v_m;
+      height_m[i] = corner_m - (u_m * column[i] + v_m * row[i]);
+    }
   }
 };
 
@@ -230,27 +244,34 @@ void meet_planes(Packet<W>& packet) noexcept {
     const double closing =
         -(packet.dz[i] - (packet.u_slope_m[i] * packet.du[i] + packet.v_slope_m[i] * packet.dv[i]));
     const double range_m = above_m / closing;
+    const double side = packet.side[i];
+    const double offset =
+        (1 - side) / 2;  // the far half is the near half turned round: 1 - u, 1 - v
     const double u = packet.u0[i] + range_m * packet.du[i] - packet.column[i];
     const double v = packet.v0[i] + range_m * packet.dv[i] - packet.row[i];
-    const double near_half = std::min(std::min(u, v), 1 - (u + v));
-    const double far_half = std::min(std::min(1 - u, 1 - v), (u + v) - 1);
+    const double inside =
+        std::min(std::min(offset + side * u, offset + side * v), side * (1 - (u + v)));
     const double along_m = std::min(range_m - packet.enter_m[i], packet.leave_m[i] - range_m);
     packet.range_m[i] = range_m;
-    packet.inside[i] = closing > 0 && along_m >= 0
-                           ? (packet.facets[i].half == Facet::Half::Near ? near_half : far_half)
-                           : -1.0;
+    packet.inside[i] = std::min(along_m, closing) > 0 ? inside : -1.0;
   }
 }
 
 template <int W>
 void decide_fast(const LevelScene& level, Packet<W>& packet) noexcept {
+  const HeightGrid& grid = level.level.grid;
+  bool any_hit = false;
   for (int lane = 0; lane < W; ++lane) {
-    const bool hit = packet.valid[static_cast<std::size_t>(lane)] != 0 &&
-                     packet.floats.hit.geomID[lane] != RTC_INVALID_GEOMETRY_ID;
-    const Facet facet = hit ? facet_of(level, packet.hit(lane)) : Facet{};
-    packet.take(lane, facet, level.level.grid.plane(facet));
+    const FloatHit hit = packet.hit(lane);
+    const bool met = packet.valid[static_cast<std::size_t>(lane)] != 0 &&
+                     hit.geometry != RTC_INVALID_GEOMETRY_ID;
+    packet.take(lane, grid, met ? facet_of(level, hit) : Facet{});
+    any_hit |= met;
   }
-  meet_planes(packet);
+  if (any_hit) {
+    packet.find_planes();
+    meet_planes(packet);
+  }
   for (int lane = 0; lane < W; ++lane) {
     const auto i = static_cast<std::size_t>(lane);
     if (packet.valid[i] == 0) continue;
@@ -260,7 +281,7 @@ void decide_fast(const LevelScene& level, Packet<W>& packet) noexcept {
     const bool open = met || ends_below(level, packet.grid_ray(lane), packet.leave_m[i]);
     const auto crossing = open ? search(level, packet.level_ray(lane), hit) : std::nullopt;
     packet.range_m[i] = crossing ? crossing->range_m : std::numeric_limits<double>::infinity();
-    if (crossing) packet.take(lane, crossing->facet, level.level.grid.plane(crossing->facet));
+    if (crossing) packet.take(lane, grid, crossing->facet);
   }
 }
 
@@ -269,13 +290,21 @@ void decide_exact(const LevelScene& level, Packet<W>& packet) noexcept {
   for (int lane = 0; lane < W; ++lane) {
     const Crossing& crossing = packet.crossings[static_cast<std::size_t>(lane)];
     packet.range_m[static_cast<std::size_t>(lane)] = crossing.range_m;
-    packet.take(lane, crossing.facet, level.level.grid.plane(crossing.facet));
+    packet.take(lane, level.level.grid, crossing.facet);
   }
 }
 
 template <int W>
-void report(const LevelScene& level, std::uint32_t number, const Packet<W>& packet,
+void report(const LevelScene& level, std::uint32_t number, Packet<W>& packet,
             std::span<Hit> hits) noexcept {
+  bool any = false;
+  for (std::size_t i = 0; i < W; ++i) {
+    packet.range_m[i] =
+        packet.valid[i] != 0 ? packet.range_m[i] : std::numeric_limits<double>::infinity();
+    any |= packet.range_m[i] < std::numeric_limits<double>::infinity();
+  }
+  if (!any) return;
+  packet.find_planes();  // again: a search may have changed a facet
   const glm::dvec2 per_m = level.level.grid.cells_per_m();
   std::array<std::array<float, W>, 3> normals;
   for (std::size_t i = 0; i < W; ++i) {
@@ -287,8 +316,7 @@ void report(const LevelScene& level, std::uint32_t number, const Packet<W>& pack
     normals[2][i] = static_cast<float>(scale);
   }
   for (std::size_t i = 0; i < hits.size(); ++i) {
-    if (packet.valid[i] == 0 || !(packet.range_m[i] < std::numeric_limits<double>::infinity()))
-      continue;
+    if (!(packet.range_m[i] < std::numeric_limits<double>::infinity())) continue;
     hits[i] = {packet.range_m[i], {normals[0][i], normals[1][i], normals[2][i]}, number};
   }
 }

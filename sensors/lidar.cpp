@@ -182,10 +182,17 @@ void cast(const Sweep& sweep, const ScanPattern& pattern, const RayTracer& trace
   }
   chunk.rays.resize(chunk.count * shots.size());
   chunk.hits.resize(chunk.rays.size());
-  for_each_pulse(pattern, chunk, [&](std::size_t k, std::size_t shot, const HeadPose& head) {
-    chunk.rays[shot * chunk.count + k] = {head.p_DS + head.R_DH * shots[shot].origin_m,
-                                          head.R_DH * shots[shot].direction, far_m};
-  });
+  const auto volleys = pattern.volleys();
+  auto* ray = chunk.rays.data();
+  for (std::size_t v = 0; v < volleys.size(); ++v) {
+    for (int shot = volleys[v].begin; shot < volleys[v].end; ++shot) {
+      const auto& [direction, origin_m, ring] = shots[static_cast<std::size_t>(shot)];
+      for (std::size_t k = 0; k < chunk.count; ++k) {
+        const HeadPose& head = chunk.heads[k * volleys.size() + v];
+        *ray++ = {head.p_DS + head.R_DH * origin_m, head.R_DH * direction, far_m};
+      }
+    }
+  }
   tracer.trace(chunk.rays, chunk.hits);
 }
 

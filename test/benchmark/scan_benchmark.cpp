@@ -32,12 +32,13 @@ const HeightGrid& ground() {
   return grid;
 }
 
-// 10 m/s over the middle of the ground, swaying.
+// 10 m/s, swaying, from a place where 60 % of the pulses return: the median of 100 random places on
+// this ground.
 const Trajectory& ride() {
   static const Trajectory path = [] {
     std::vector<Trajectory::Sample> samples;
     for (int k = 0; k <= 100; ++k) {
-      const glm::dvec2 p(0.1 * k, 0.02 * k);
+      const glm::dvec2 p(5000 + 0.1 * k, -1000 + 0.02 * k);
       samples.push_back(
           {10ms * k,
            {rotation_from_yaw_pitch_roll(0.2, 0.05 * std::sin(0.1 * k), 0.05 * std::cos(0.1 * k)),

@@ -92,37 +92,39 @@ TEST(RayTracerProof, ExactTracingEqualsTheReferenceOnEveryRandomRay) {
     const auto rays = random_rays(grid, proof_size(20'000, 100'000), Seed{11});
     const auto hits = trace(tracer(grid, Tracing::Exact), rays);
     std::size_t met = 0;
+    double worst = 0;
     for (std::size_t i = 0; i < rays.size(); ++i) {
       const auto expected = trace_reference(grid, rays[i]);
-      met += expected ? 1 : 0;
       ASSERT_TRUE(agrees(expected, hits[i]))
           << name << " ray " << i << fmt::format(": {:.12g}", expected ? expected->range_m : -1.)
           << fmt::format(" against {:.12g}", hits[i].range_m);
+      if (!expected) continue;
+      ++met;
+      worst = std::max(
+          worst, std::abs(expected->range_m - hits[i].range_m) / (1e-9 * expected->range_m + 1e-9));
     }
     EXPECT_GT(met, rays.size() / 3) << name;
+    std::cout << fmt::format("{}: {} rays, {} hits, largest error {:.1e} of what is allowed\n",
+                             name, rays.size(), met, worst);
   }
 }
 
 TEST(RayTracerProof, FastTracingDiffersOnlyAtSilhouettes) {
   for (const auto& [name, grid] : terrains()) {
-    const auto rays = random_rays(grid, proof_size(20'000, 1'000'000), Seed{12});
+    const auto rays = random_rays(grid, proof_size(100'000, 10'000'000), Seed{12});
     const auto fast = trace(tracer(grid, Tracing::Fast), rays);
     const auto exact =
         trace(tracer(grid, Tracing::Exact), rays);  // equals the reference: shown above
     std::size_t different = 0;
     for (std::size_t i = 0; i < rays.size(); ++i) {
       if (fast[i].range_m == exact[i].range_m) continue;
-      if (fast[i] && exact[i] &&
-          std::abs(fast[i].range_m - exact[i].range_m) <= 1e-9 * exact[i].range_m + 1e-9)
-        continue;
       ++different;
       EXPECT_TRUE(passes_silhouette(grid, rays[i], fast[i], float_slack_m(grid)))
           << name << " ray " << i
           << fmt::format(": {} against {}", fast[i].range_m, exact[i].range_m);
     }
-    EXPECT_LE(static_cast<double>(different), 5e-6 * static_cast<double>(rays.size()) + 0.5)
-        << name;
-    RecordProperty(fmt::format("different_{}", name), static_cast<int>(different));
+    EXPECT_LE(static_cast<double>(different), 5e-6 * static_cast<double>(rays.size())) << name;
+    std::cout << fmt::format("{}: {} of {} rays decided otherwise\n", name, different, rays.size());
   }
 }
 
