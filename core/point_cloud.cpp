@@ -19,9 +19,9 @@ void PointCloud::truncate(std::size_t rows) {
   }
 }
 
-PointCloud::AnyValues& PointCloud::add_values(std::string name, AnyValues values) {
+PointCloud::AnyValues& PointCloud::add_values(std::string_view name, AnyValues values) {
   if (has(name)) throw Error("point cloud: there is a column '{}' already", name);
-  columns_.push_back({std::move(name), std::move(values)});
+  columns_.push_back({std::string(name), std::move(values)});
   return columns_.back().values;
 }
 

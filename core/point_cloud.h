@@ -53,8 +53,8 @@ class PointCloud {
   /// columns are added.
   /// @throws Error if there is a column of that name.
   template <typename T>
-  std::span<T> add(std::string name) {
-    return std::get<Values<T>>(add_values(std::move(name), Values<T>(rows_)));
+  std::span<T> add(std::string_view name) {
+    return std::get<Values<T>>(add_values(name, Values<T>(rows_)));
   }
 
   /// Returns the values of the column `name`.
@@ -72,7 +72,7 @@ class PointCloud {
   void truncate(std::size_t rows);
 
  private:
-  AnyValues& add_values(std::string name, AnyValues values);
+  AnyValues& add_values(std::string_view name, AnyValues values);
   const AnyValues& find(std::string_view name) const;
   [[noreturn]] static void throw_type_mismatch(std::string_view name);
 

@@ -22,7 +22,7 @@ void paint(Image8& image, int x, int y, const Colour& colour) {
   const auto pixel = image.at(x, y);
   for (int i = 0; i < 3; ++i) {
     pixel[static_cast<std::size_t>(i)] =
-        static_cast<std::uint8_t>(std::clamp(colour[i], 0.0, 1.0) * 255 + 0.5);
+        static_cast<std::uint8_t>(std::lround(std::clamp(colour[i], 0.0, 1.0) * 255));
   }
 }
 

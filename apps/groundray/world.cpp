@@ -79,7 +79,7 @@ std::filesystem::path data_folder() {
   if (const char* chosen = std::getenv("GROUNDRAY_DATA")) return chosen;
   std::error_code ignored;
   const auto program = std::filesystem::read_symlink("/proc/self/exe", ignored);
-  const auto installed = program.parent_path().parent_path() / "share/groundray";
+  auto installed = program.parent_path().parent_path() / "share/groundray";
   if (std::filesystem::exists(installed / "sensors", ignored)) return installed;
   return GROUNDRAY_SOURCE_DATA;
 }

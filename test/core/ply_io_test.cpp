@@ -1,5 +1,6 @@
 #include "core/ply_io.h"
 
+#include <fmt/format.h>
 #include <gmock/gmock.h>
 #include <gtest/gtest.h>
 
@@ -262,8 +263,8 @@ TEST(ReadPly, RefusesCountsBeyondTheBytesBeforeItAllocates) {
   for (const char* format : {"ascii", "binary_little_endian", "binary_big_endian"}) {
     for (const char* count :
          {"3", "1000000000000", "4611686018427387904", "18446744073709551615"}) {
-      const std::string start = "ply\nformat "s + format + " 1.0\n";
-      const std::string rest = " "s + count + "\nproperty int x\nend_header\n1 2\n\n";
+      const std::string start = fmt::format("ply\nformat {} 1.0\n", format);
+      const std::string rest = fmt::format(" {}\nproperty int x\nend_header\n1 2\n\n", count);
       EXPECT_THAT(fault_in(start + "element vertex" + rest), HasSubstr("is the file cut short?"))
           << format;
       EXPECT_THAT(

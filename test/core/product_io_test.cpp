@@ -237,7 +237,8 @@ TEST(WriteExr, KeepsEveryBitOfEveryChannel) {
     EXPECT_EQ(file.header().channels().findChannel(name)->type, Imf::FLOAT);
     Imf::Array2D<float> pixels(40, 19);
     Imf::FrameBuffer buffer;
-    buffer.insert(name, Imf::Slice(Imf::FLOAT, reinterpret_cast<char*>(&pixels[0][0]), 4, 4 * 19));
+    buffer.insert(name, Imf::Slice(Imf::FLOAT, reinterpret_cast<char*>(&pixels[0][0]), 4,
+                                   std::size_t{4} * 19));
     file.setFrameBuffer(buffer);
     file.readPixels(0, 39);
     for (int y = 0; y < 40; ++y) {

@@ -273,7 +273,7 @@ TEST(RayTracerProof, InstructionSetsAgree) {
   const auto rays = random_rays(grid, proof_size(200'000, 1'000'000), Seed{31});
   std::vector<std::string> sets = {"max_isa=sse4.2", "max_isa=avx2"};
   if (__builtin_cpu_supports("avx512f") && __builtin_cpu_supports("avx512vl")) {
-    sets.push_back("max_isa=avx512");
+    sets.emplace_back("max_isa=avx512");
   } else {
     std::cout << "NOTE: this processor has no AVX-512; SSE4.2 and AVX2 are compared alone\n";
   }

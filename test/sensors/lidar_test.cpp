@@ -125,11 +125,11 @@ TEST(Lidar, EveryPointLiesOnTheSurfaceAtItsRangeFromWhereItsBeamLeft) {
       // 1e-7 m of it.
       const auto time =
           lidar.pattern().stamp(3) + std::chrono::nanoseconds(std::llround(1e9 * time_s[i]));
-      const Pose X = X_DS.pose_at(time);
+      const Pose X_DS_now = X_DS.pose_at(time);
       const glm::dvec3 p_DO =
-          beam_origin(spec.pattern, ring[i], 1e-9 * static_cast<double>(time.count()), X);
+          beam_origin(spec.pattern, ring[i], 1e-9 * static_cast<double>(time.count()), X_DS_now);
       ASSERT_NEAR(range_m[i], glm::length(p_DQ - p_DO), 3e-7) << name << i;
-      ASSERT_LT(glm::length(X * glm::dvec3(x[i], y[i], z[i]) - p_DQ), 1e-4) << name << i;
+      ASSERT_LT(glm::length(X_DS_now * glm::dvec3(x[i], y[i], z[i]) - p_DQ), 1e-4) << name << i;
       ASSERT_GE(time_s[i], last_time_s);
       last_time_s = time_s[i];
     }
