@@ -64,12 +64,13 @@ class Clearance {
     const int row = cell(v, grid_.rows());
     return {column, row, u - column + (v - row) > 1 ? Facet::Half::Far : Facet::Half::Near};
   }
-  double inside_m(double t_m) const {
-    const FacetPlane plane = grid_.plane(facet(t_m));
+  FacetPlane plane(const Facet& facet) const { return grid_.plane(facet); }
+  double over_m(const FacetPlane& plane, double t_m) const {
     const double u = ray_.u0 + t_m * ray_.du;
     const double v = ray_.v0 + t_m * ray_.dv;
     return height_m(t_m) - (plane.height_m + plane.u_slope_m * u + plane.v_slope_m * v);
   }
+  double inside_m(double t_m) const { return over_m(plane(facet(t_m)), t_m); }
   double on_column_m(double t_m, double line) const {
     const double v = ray_.v0 + t_m * ray_.dv;
     const int row = cell(v, grid_.rows());
@@ -83,9 +84,10 @@ class Clearance {
     return above_m(t_m, grid_.height_m(column, row), grid_.height_m(column + 1, row), u - column);
   }
   double on_diagonal_m(double t_m, double line) const {
+    const int sum = static_cast<int>(line);
+    // The lines through the first and the last sample only touch a corner of the grid.
+    if (sum < 1 || sum > grid_.columns() + grid_.rows() - 3) return inside_m(t_m);
     const double u = ray_.u0 + t_m * ray_.du;
-    // Lines that only touch a corner, and rounding at the rim, count as the diagonal next to them.
-    const int sum = std::clamp(static_cast<int>(line), 1, grid_.columns() + grid_.rows() - 3);
     const int column = std::clamp(cell(u, grid_.columns()), std::max(0, sum - grid_.rows() + 1),
                                   std::min(grid_.columns() - 2, sum - 1));
     const int row = sum - 1 - column;
@@ -105,6 +107,17 @@ class Clearance {
   const HeightGrid& grid_;
   const GridRay& ray_;
 };
+
+// Whether the facet between two neighbouring lines is crossed from above. On a line next to a hole
+// the height may be unknown where the facet's own is not (a ray along the line); then the facet's
+// plane is asked at both ends.
+bool comes_down(const Clearance& clearance, const Facet& facet, double begin_m,
+                double above_begin_m, double end_m, double above_end_m) {
+  if (!std::isnan(above_begin_m) && !std::isnan(above_end_m))
+    return above_begin_m >= 0 && above_end_m < 0;
+  const FacetPlane plane = clearance.plane(facet);
+  return clearance.over_m(plane, begin_m) >= 0 && clearance.over_m(plane, end_m) < 0;
+}
 
 }  // namespace
 
@@ -205,12 +218,12 @@ std::optional<Crossing> HeightGrid::first_crossing(const GridRay& ray, double t_
       above_m = clearance.on_diagonal_m(t_m, diagonals.line());
       diagonals.advance();
     }
-    if (above_before_m >= 0 && above_m < 0) {  // never true beside a hole, where heights are NaN
-      const Facet facet = clearance.facet((before_m + t_m) / 2);
-      const double range_m = intersect(ray, plane(facet));
-      if (std::isnan(range_m)) continue;
-      return Crossing{std::clamp(range_m, std::min(before_m, t_m), std::max(before_m, t_m)), facet};
-    }
+    if (above_before_m < 0 || above_m >= 0) continue;  // stays below, stays above, or comes up
+    const Facet facet = clearance.facet((before_m + t_m) / 2);
+    if (!comes_down(clearance, facet, before_m, above_before_m, t_m, above_m)) continue;
+    const double range_m = intersect(ray, plane(facet));
+    if (std::isnan(range_m)) continue;
+    return Crossing{std::clamp(range_m, std::min(before_m, t_m), std::max(before_m, t_m)), facet};
   }
   return std::nullopt;
 }

@@ -121,13 +121,19 @@ void build_exact(RTCDevice device, LevelScene& level) {
   attach(level.scene, geometry, block_geometry);
 }
 
+template <typename T>
+T* checked(void* memory) {
+  if (memory == nullptr)
+    throw Error("ray tracer: there is not enough memory for a level's geometry");
+  return static_cast<T*>(memory);
+}
+
 RTCBuffer new_vertices(RTCDevice device, const LevelScene& level) {
   const HeightGrid& grid = level.level.grid;
   const auto samples = grid.heights_m().size();
   RTCBuffer vertices =
       rtcNewBuffer(device, samples * sizeof(glm::vec3) + 16);  // Embree reads 16 bytes at a time
-  auto* out = static_cast<glm::vec3*>(rtcGetBufferData(vertices));
-  if (out == nullptr) return vertices;
+  auto* out = checked<glm::vec3>(vertices == nullptr ? nullptr : rtcGetBufferData(vertices));
   for (int row = 0; row < grid.rows(); ++row) {
     for (int column = 0; column < grid.columns(); ++column) {
       const float height_m = grid.height_m(column, row);
@@ -145,9 +151,9 @@ void build_fast(RTCDevice device, LevelScene& level) {
     RTCGeometry geometry = rtcNewGeometry(device, RTC_GEOMETRY_TYPE_GRID);
     rtcSetGeometryBuffer(geometry, RTC_BUFFER_TYPE_VERTEX, 0, RTC_FORMAT_FLOAT3, vertices, 0,
                          sizeof(glm::vec3), samples);
-    auto* grids = static_cast<RTCGrid*>(rtcSetNewGeometryBuffer(geometry, RTC_BUFFER_TYPE_GRID, 0,
-                                                                RTC_FORMAT_GRID, sizeof(RTCGrid),
-                                                                level.level.blocks.size()));
+    auto* grids =
+        checked<RTCGrid>(rtcSetNewGeometryBuffer(geometry, RTC_BUFFER_TYPE_GRID, 0, RTC_FORMAT_GRID,
+                                                 sizeof(RTCGrid), level.level.blocks.size()));
     for (const Level::Block& block : level.level.blocks) {
       *grids++ = {static_cast<unsigned>(block.row) * columns + static_cast<unsigned>(block.column),
                   columns, static_cast<unsigned short>(block.columns),
@@ -159,7 +165,7 @@ void build_fast(RTCDevice device, LevelScene& level) {
     RTCGeometry geometry = rtcNewGeometry(device, RTC_GEOMETRY_TYPE_TRIANGLE);
     rtcSetGeometryBuffer(geometry, RTC_BUFFER_TYPE_VERTEX, 0, RTC_FORMAT_FLOAT3, vertices, 0,
                          sizeof(glm::vec3), samples);
-    auto* indices = static_cast<glm::uvec3*>(
+    auto* indices = checked<glm::uvec3>(
         rtcSetNewGeometryBuffer(geometry, RTC_BUFFER_TYPE_INDEX, 0, RTC_FORMAT_UINT3,
                                 sizeof(glm::uvec3), level.level.facets.size()));
     for (const Facet& facet : level.level.facets) {

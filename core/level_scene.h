@@ -54,7 +54,7 @@ struct LevelRay {
   double leave_m = 0;
   glm::vec3 origin{0};  ///< in L
   glm::vec3 direction{0};
-  float far = 0;  ///< metres from the float origin
+  float far_m = 0;  ///< from the float origin
 };
 
 /// The double side of a packet: what exact tracing reads and fills, by lane.

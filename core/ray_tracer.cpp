@@ -40,7 +40,7 @@ FloatHit intersect_one(const LevelScene& level, const LevelRay& ray, double from
              direction.y,
              direction.z,
              0,
-             ray.far,
+             ray.far_m,
              ~0u,
              0,
              0};

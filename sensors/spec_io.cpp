@@ -178,7 +178,12 @@ LidarSpec read_lidar(const Node& node, Faults& faults) {
   return lidar;
 }
 
+// Names that GDAL knows how to open but that are no paths (/vsizip/..., NETCDF:"..."), stay as they
+// are.
 fs::path beside(const fs::path& file, const std::string& relative) {
+  const std::size_t colon = relative.find(':');
+  if (relative.starts_with("/vsi") || (colon != std::string::npos && colon < relative.find('/')))
+    return relative;
   return (file.parent_path() / relative).lexically_normal();
 }
 

@@ -7,6 +7,20 @@ namespace groundray {
 namespace {
 
 constexpr int tile_cells = 64;
+constexpr int part_cells =
+    8;  // of a tile with holes: a triangle takes thirteen times the memory that it takes in a grid
+
+// Calls `act` for every block of up to `cells` x `cells` cells that `whole` is made of.
+template <typename Act>
+void for_each_tile(const Level::Block& whole, int cells, const Act& act) {
+  for (int row = 0; row < whole.rows - 1; row += cells) {
+    for (int column = 0; column < whole.columns - 1; column += cells) {
+      act(Level::Block{whole.column + column, whole.row + row,
+                       std::min(cells, whole.columns - 1 - column) + 1,
+                       std::min(cells, whole.rows - 1 - row) + 1});
+    }
+  }
+}
 
 bool has_hole(const HeightGrid& grid, const Level::Block& block) {
   for (int row = block.row; row < block.row + block.rows; ++row) {
@@ -33,17 +47,20 @@ void append_facets(const HeightGrid& grid, const Level::Block& block, std::vecto
 Level full_resolution_level(const HeightGrid& grid) {
   Level level{grid, {}, {}};
   const bool whole = grid.hole_count() == 0;
-  for (int row = 0; row < grid.rows() - 1; row += tile_cells) {
-    for (int column = 0; column < grid.columns() - 1; column += tile_cells) {
-      const Level::Block block{column, row, std::min(tile_cells, grid.columns() - 1 - column) + 1,
-                               std::min(tile_cells, grid.rows() - 1 - row) + 1};
-      if (whole || !has_hole(grid, block)) {
-        level.blocks.push_back(block);
-      } else {
-        append_facets(grid, block, level.facets);
-      }
+  const Level::Block all{0, 0, grid.columns(), grid.rows()};
+  for_each_tile(all, tile_cells, [&](const Level::Block& tile) {
+    if (whole || !has_hole(grid, tile)) {
+      level.blocks.push_back(tile);
+      return;
     }
-  }
+    for_each_tile(tile, part_cells, [&](const Level::Block& part) {
+      if (has_hole(grid, part)) {
+        append_facets(grid, part, level.facets);
+      } else {
+        level.blocks.push_back(part);
+      }
+    });
+  });
   return level;
 }
 

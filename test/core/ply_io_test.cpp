@@ -265,12 +265,13 @@ TEST(ReadPly, RefusesCountsBeyondTheBytesBeforeItAllocates) {
          {"3", "1000000000000", "4611686018427387904", "18446744073709551615"}) {
       const std::string start = fmt::format("ply\nformat {} 1.0\n", format);
       const std::string rest = fmt::format(" {}\nproperty int x\nend_header\n1 2\n\n", count);
-      EXPECT_THAT(fault_in(start + "element vertex" + rest), HasSubstr("is the file cut short?"))
+      EXPECT_THAT(fault_in(fmt::format("{}element vertex{}", start, rest)),
+                  HasSubstr("is the file cut short?"))
           << format;
-      EXPECT_THAT(
-          fault_in(start + "element edge" + rest.substr(0, rest.find("end_header")) +
-                   "element vertex 1\nproperty int y\n" + rest.substr(rest.find("end_header"))),
-          HasSubstr("is the file cut short?"))
+      EXPECT_THAT(fault_in(fmt::format("{}element edge{}element vertex 1\nproperty int y\n{}",
+                                       start, rest.substr(0, rest.find("end_header")),
+                                       rest.substr(rest.find("end_header")))),
+                  HasSubstr("is the file cut short?"))
           << format;
     }
   }

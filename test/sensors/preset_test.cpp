@@ -2,7 +2,6 @@
 #include <gtest/gtest.h>
 
 #include <cmath>
-#include <cstdlib>
 #include <fstream>
 #include <glm/trigonometric.hpp>
 #include <iterator>
@@ -18,6 +17,7 @@ namespace groundray {
 namespace {
 
 using groundray::testing::data_folder;
+using groundray::testing::shared_data_folder;
 
 LidarSpec preset(const std::string& name) {
   return load_lidar(data_folder() / "sensors" / (name + ".yaml"));
@@ -118,9 +118,7 @@ TEST(Preset, VelodyneRingsRiseAndOthersFallWithElevation) {
 
 // Tables that vendors and drivers publish, where they are at hand: yaml or json, which is yaml too.
 yaml::Node published(const std::string& name) {
-  const char* folder = std::getenv("GROUNDRAY_SHARED_DATA");
-  const auto path = (folder ? std::filesystem::path(folder) : data_folder() / "../../shared/data") /
-                    "lidar" / name;
+  const auto path = shared_data_folder() / "lidar" / name;
   std::ifstream file(path);
   if (!file) return {};
   return yaml::parse(std::string(std::istreambuf_iterator<char>(file), {}), path);
