@@ -2,8 +2,14 @@
 
 #include <fmt/format.h>
 
+#include <chrono>
 #include <cmath>
+#include <cstddef>
+#include <cstdint>
+#include <cstdlib>
+#include <glm/vec4.hpp>
 #include <numbers>
+#include <span>
 #include <string>
 #include <string_view>
 
@@ -16,6 +22,21 @@ namespace {
 namespace fs = std::filesystem;
 
 constexpr std::string_view frames = "\nframes:\n";  // what precedes it says what run this is
+
+// FNV-1a over the numbers that a run starts from: tells runs apart whose scene files read the same.
+class Fingerprint {
+ public:
+  template <typename T>
+  void add(std::span<const T> values) {
+    for (const std::byte byte : std::as_bytes(values)) {
+      value_ = (value_ ^ std::to_integer<std::uint64_t>(byte)) * 0x100000001b3;
+    }
+  }
+  std::uint64_t value() const { return value_; }
+
+ private:
+  std::uint64_t value_ = 0xcbf29ce484222325;
+};
 
 double degrees(double angle_rad) { return angle_rad * 180 / std::numbers::pi; }
 
@@ -33,24 +54,6 @@ std::string yaml_text(std::string_view text) {
     }
   }
   return out + "\"";
-}
-
-std::string header(const World& world) {
-  const glm::dvec3 origin_m = world.dem.origin_w_m;
-  std::string text = fmt::format(
-      "groundray_dataset: 1\nversion: {}\nseed: {}\ntracing: {}\norigin_w_m: [{}, {}, {}]\ncrs: "
-      "{}\ncrs_wkt: {}\nscene: "
-      "{}\nsensors:\n",
-      yaml_text(GROUNDRAY_VERSION), world.spec.seed.value,
-      world.spec.tracing == Tracing::Fast ? "fast" : "exact", origin_m.x, origin_m.y, origin_m.z,
-      yaml_text(world.dem.crs_name), yaml_text(world.dem.crs_wkt), yaml_text(world.spec.text));
-  for (std::size_t i = 0; i < world.lidars.size(); ++i) {
-    const MountedLidar& spec = world.lidars[i].spec;
-    text += fmt::format(
-        "  - {{name: {}, kind: lidar, number: {}, model: {}, source: {}, frames: {}}}\n", spec.name,
-        i, yaml_text(spec.lidar.model), yaml_text(spec.source), world.lidars[i].sweeps);
-  }
-  return text;
 }
 
 std::string calibration(const PlacedLidar& placed) {
@@ -79,6 +82,49 @@ std::string calibration(const PlacedLidar& placed) {
   return text;
 }
 
+// Seconds to the nanosecond, whatever the clock's epoch.
+std::string decimal_seconds(std::chrono::nanoseconds time) {
+  const std::int64_t count = time.count();
+  return fmt::format("{}{}.{:09}", count < 0 ? "-" : "", std::abs(count / 1'000'000'000),
+                     std::abs(count % 1'000'000'000));
+}
+
+std::uint64_t fingerprint(const World& world) {
+  static_assert(sizeof(Trajectory::Sample) == 8 * sizeof(double),
+                "no padding, whose bytes are anything");
+  Fingerprint print;
+  print.add(world.dem.grid.heights_m());
+  const glm::dvec4 frame(world.dem.grid.origin_m(), world.dem.grid.step_m());
+  print.add(std::span<const glm::dvec4>(&frame, 1));
+  for (const PlacedLidar& lidar : world.lidars) {
+    print.add(std::span(lidar.X_DS.samples()));
+    print.add(std::span<const char>(calibration(lidar)));
+  }
+  return print.value();
+}
+
+std::string header(const World& world) {
+  const glm::dvec3 origin_m = world.dem.origin_w_m;
+  std::string text = fmt::format(
+      "groundray_dataset: 1\nversion: {}\nseed: {}\ntracing: {}\ninputs: "
+      "\"{:016x}\"\ntime_origin_s: {}\n"
+      "origin_w_m: [{}, {}, {}]\ncrs: "
+      "{}\ncrs_wkt: {}\nscene: "
+      "{}\nsensors:\n",
+      yaml_text(GROUNDRAY_VERSION), world.spec.seed.value,
+      world.spec.tracing == Tracing::Fast ? "fast" : "exact", fingerprint(world),
+      decimal_seconds(world.begin), origin_m.x, origin_m.y, origin_m.z,
+      yaml_text(world.dem.crs_name), yaml_text(world.dem.crs_wkt), yaml_text(world.spec.text));
+  for (std::size_t i = 0; i < world.lidars.size(); ++i) {
+    const MountedLidar& spec = world.lidars[i].spec;
+    text += fmt::format(
+        "  - {{name: {}, kind: lidar, number: {}, model: {}, source: {}, frames: {}}}\n",
+        yaml_text(spec.name), i, yaml_text(spec.lidar.model), yaml_text(spec.source),
+        world.lidars[i].sweeps);
+  }
+  return text;
+}
+
 void make_folder(const fs::path& folder) {
   std::error_code failure;
   fs::create_directories(folder, failure);
@@ -88,7 +134,7 @@ void make_folder(const fs::path& folder) {
   }
 }
 
-void check_same_run(const fs::path& folder, const World& world) {
+void check_same_run(const fs::path& folder, const std::string& header) {
   std::error_code ignored;
   if (!fs::exists(folder, ignored) || fs::is_empty(folder, ignored)) return;
   const fs::path record = folder / "dataset.yaml";
@@ -98,9 +144,10 @@ void check_same_run(const fs::path& folder, const World& world) {
         folder.string());
   }
   const std::string before = read_text(record);
-  if (before.substr(0, before.find(frames)) + "\n" != header(world)) {
+  if (before.substr(0, before.find(frames)) + "\n" != header) {
     throw Error(
-        "{}: the folder holds a dataset of another scene, seed or version; choose a new folder "
+        "{}: the folder holds a dataset of another scene, DEM, trajectory, sensor, seed or "
+        "version; choose a new folder "
         "with -o or "
         "remove this one",
         folder.string());
@@ -109,9 +156,11 @@ void check_same_run(const fs::path& folder, const World& world) {
 
 }  // namespace
 
-Dataset::Dataset(const fs::path& folder, const World& world) : folder_(folder), world_(world) {
-  check_same_run(folder, world);
+Dataset::Dataset(const fs::path& folder, const World& world)
+    : folder_(folder), world_(world), header_(header(world)) {
+  check_same_run(folder, header_);
   make_folder(folder);
+  record();  // first: a folder with it can be taken up again
   for (const char* name : {"poses", "calibration", "lidar"}) make_folder(folder / name);
   for (const PlacedLidar& lidar : world.lidars) {
     make_folder(folder / "lidar" / lidar.spec.name);
@@ -119,7 +168,6 @@ Dataset::Dataset(const fs::path& folder, const World& world) : folder_(folder), 
               "sensor S in D: t [s] x y z [m] qx qy qz qw");
     write_text(folder / "calibration" / (lidar.spec.name + ".yaml"), calibration(lidar));
   }
-  record();
 }
 
 fs::path Dataset::scan_path(const PlacedLidar& lidar, std::int64_t frame) const {
@@ -135,13 +183,13 @@ bool Dataset::has(const PlacedLidar& lidar, std::int64_t frame) const {
 }
 
 void Dataset::record() const {
-  std::string text = header(world_);
+  std::string text = header_;
   text.pop_back();
   text += frames;
   for (const PlacedLidar& lidar : world_.lidars) {
     for (std::int64_t frame = 0; frame < lidar.sweeps; ++frame) {
       text += fmt::format("  - {{sensor: {}, frame: {}, stamp_s: {:.9f}, state: {}}}\n",
-                          lidar.spec.name, frame,
+                          yaml_text(lidar.spec.name), frame,
                           1e-9 * static_cast<double>(lidar.lidar.pattern().stamp(frame).count()),
                           has(lidar, frame) ? "done" : "pending");
     }

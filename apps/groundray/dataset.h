@@ -2,6 +2,7 @@
 
 #include <cstdint>
 #include <filesystem>
+#include <string>
 #include <vector>
 
 #include "apps/groundray/world.h"
@@ -29,6 +30,7 @@ class Dataset {
  private:
   std::filesystem::path folder_;
   const World& world_;
+  std::string header_;  // what dataset.yaml says of the run itself
 };
 
 }  // namespace groundray

@@ -6,6 +6,7 @@
 #include <csignal>
 #include <cstdio>
 #include <optional>
+#include <vector>
 
 #include "apps/groundray/dataset.h"
 #include "apps/groundray/preview.h"
@@ -59,14 +60,29 @@ class SceneFor {
   std::optional<Scene> scene_;
 };
 
-void make_frame(const World& world, const Dataset& dataset, std::uint32_t sensor_number,
-                std::int64_t frame, SceneFor& scene_for, Tally& tally) {
-  const PlacedLidar& lidar = world.lidars[sensor_number];
+struct Frame {
+  std::uint32_t sensor = 0;  // index of the lidar
+  std::int64_t number = 0;
+};
+
+std::vector<Frame> missing_frames(const World& world, const Dataset& dataset) {
+  std::vector<Frame> frames;
+  for (std::uint32_t sensor = 0; sensor < world.lidars.size(); ++sensor) {
+    for (std::int64_t number = 0; number < world.lidars[sensor].sweeps; ++number) {
+      if (!dataset.has(world.lidars[sensor], number)) frames.push_back({sensor, number});
+    }
+  }
+  return frames;
+}
+
+void make_frame(const World& world, const Dataset& dataset, const Frame& which, SceneFor& scene_for,
+                Tally& tally) {
+  const auto [sensor, frame] = which;
+  const PlacedLidar& lidar = world.lidars[sensor];
   const ScanPattern& pattern = lidar.lidar.pattern();
   const Scene& scene = scene_for(lidar.X_DS.pose_at(pattern.stamp(frame)).translation_m);
   const auto begin = Clock::now();
-  const PointCloud scan =
-      lidar.lidar.scan(scene, lidar.X_DS, frame, world.spec.seed, sensor_number);
+  const PointCloud scan = lidar.lidar.scan(scene, lidar.X_DS, frame, world.spec.seed, sensor);
   tally.scanning += Clock::now() - begin;
   tally.points += scan.rows();
   tally.pulses += static_cast<std::uint64_t>(pattern.first_sequence(frame + 1) -
@@ -80,9 +96,10 @@ void make_frame(const World& world, const Dataset& dataset, std::uint32_t sensor
             {fmt::format("origin_w {} {} {}", origin_m.x, origin_m.y, origin_m.z)});
 }
 
-void say(const World& world, const std::filesystem::path& out, const Tally& tally,
-         std::uint64_t there_before) {
-  if (there_before > 0) fmt::print("{} scans were there already\n", there_before);
+void say(const World& world, const std::filesystem::path& out, const Tally& tally) {
+  std::uint64_t scans = 0;
+  for (const PlacedLidar& lidar : world.lidars) scans += static_cast<std::uint64_t>(lidar.sweeps);
+  if (tally.scans < scans) fmt::print("{} scans were there already\n", scans - tally.scans);
   if (tally.scans > 0) {
     fmt::print("{} scans, {} points of {} pulses, {:.2f} M rays/s\n", tally.scans, tally.points,
                tally.pulses, 1e-6 * static_cast<double>(tally.pulses) / tally.scanning.count());
@@ -101,30 +118,26 @@ RunEnd generate(const std::filesystem::path& scene, const std::filesystem::path&
   std::signal(SIGTERM, stop_in_order);
   const World world = load_world(scene);
   const Dataset dataset(out, world);
-  std::uint64_t total = 0;
-  for (const PlacedLidar& lidar : world.lidars) total += static_cast<std::uint64_t>(lidar.sweeps);
-
+  const std::vector<Frame> frames = missing_frames(world, dataset);
   SceneFor scene_for(world);
   Tally tally;
-  std::uint64_t there_before = 0;
-  Progress progress(stderr, "scans", total);
-  for (std::uint32_t sensor = 0; sensor < world.lidars.size(); ++sensor) {
-    for (std::int64_t frame = 0; frame < world.lidars[sensor].sweeps; ++frame) {
-      if (stop_requested != 0) {
-        dataset.record();
-        fmt::print(stderr, "\ninterrupted; the same command goes on from here\n");
-        return RunEnd::Interrupted;
-      }
-      if (dataset.has(world.lidars[sensor], frame)) {
-        ++there_before;
-      } else {
-        make_frame(world, dataset, sensor, frame, scene_for, tally);
-      }
-      progress.update(there_before + tally.scans);
+  try {
+    Progress progress(stderr, "scans", frames.size());
+    for (const Frame& frame : frames) {
+      if (stop_requested != 0) break;
+      make_frame(world, dataset, frame, scene_for, tally);
+      progress.update(tally.scans);
     }
+  } catch (...) {
+    dataset.record();
+    throw;
   }
   dataset.record();
-  say(world, out, tally, there_before);
+  if (tally.scans < frames.size()) {
+    fmt::print(stderr, "\ninterrupted; the same command goes on from here\n");
+    return RunEnd::Interrupted;
+  }
+  say(world, out, tally);
   return RunEnd::Done;
 }
 

@@ -1,8 +1,11 @@
 #include "apps/groundray/world.h"
 
+#include <algorithm>
 #include <chrono>
 #include <cmath>
 #include <cstdlib>
+#include <glm/common.hpp>
+#include <glm/geometric.hpp>
 #include <utility>
 #include <variant>
 
@@ -22,9 +25,11 @@ double seconds(std::chrono::nanoseconds time) {
   return std::chrono::duration<double>(time).count();
 }
 
-Trajectory lay_path(const RecordedPath& path, const SceneSpec& spec, const Dem& dem) {
+// The path in D, from time 0 on; `begin` is told when that was on the recorder's clock.
+Trajectory lay_path(const RecordedPath& path, const SceneSpec& spec, const Dem& dem,
+                    std::chrono::nanoseconds& begin) {
   std::vector<Trajectory::Sample> samples = read_tum(path.tum).samples();
-  const auto begin = samples.front().time;
+  begin = samples.front().time;
   for (auto& [time, X_WB] : samples) {
     time -= begin;
     X_WB.translation_m -= dem.origin_w_m;
@@ -38,39 +43,64 @@ Trajectory lay_path(const RecordedPath& path, const SceneSpec& spec, const Dem& 
   return Trajectory(std::move(samples));
 }
 
-Trajectory lay_path(const DrivenPath& path, const SceneSpec& spec, const Dem& dem) {
-  constexpr std::chrono::milliseconds margin{10};
-  GroundPathSpec drive{
-      {}, path.speed_m_s, path.height_m, path.footprint_m, run_time(spec) + margin};
+Trajectory lay_path(const DrivenPath& path, const SceneSpec& spec, const Dem& dem,
+                    std::chrono::nanoseconds& /*begin*/) {
+  GroundPathSpec drive{{}, path.speed_m_s, path.height_m, path.footprint_m, run_time(spec)};
   for (const glm::dvec2& p_W : path.waypoints_m)
     drive.waypoints_m.push_back(p_W - glm::dvec2(dem.origin_w_m));
   return build_ground_path(dem.grid, drive);
 }
 
-void check_above_ground(const PlacedLidar& placed, const Dem& dem) {
-  for (const auto& [time, X_DS] : placed.X_DS.samples()) {
-    const glm::dvec3 p_DS = X_DS.translation_m;
+// Firing sequences keep a time of their own, so the last sweep of a run may end up to one of them
+// after it: the path goes on that long as it last moved.
+Trajectory extended(const Trajectory& path, const SceneSpec& spec) {
+  double longest_s = 0;
+  for (const MountedLidar& lidar : spec.lidars)
+    longest_s = std::max(longest_s, lidar.lidar.pattern.firing_period_s);
+  const auto more = std::chrono::nanoseconds(std::llround(1e9 * longest_s) + 1);
+  std::vector<Trajectory::Sample> samples = path.samples();
+  const auto [time, X_DB] = samples.back();
+  Pose onwards;
+  if (samples.size() > 1) {
+    const auto& [time_before, X_DB_before] = samples[samples.size() - 2];
+    onwards = Screw(inverse(X_DB_before) * X_DB).at(seconds(more) / seconds(time - time_before));
+  }
+  samples.push_back({time + more, X_DB * onwards});
+  return Trajectory(std::move(samples));
+}
+
+// How far a point is from the DEM's rectangle, in plan, metres.
+double distance_m(const HeightGrid& grid, const glm::dvec3& p) {
+  const glm::dvec2 a = grid.origin_m();
+  const glm::dvec2 b = a + glm::dvec2(grid.columns() - 1, grid.rows() - 1) * grid.step_m();
+  return glm::distance(glm::clamp(glm::dvec2(p), glm::min(a, b), glm::max(a, b)), glm::dvec2(p));
+}
+
+// Looks at the sensor every 10 ms of the run: it must be above ground, and at least once in reach
+// of the DEM.
+void check_place(const PlacedLidar& placed, const Dem& dem, std::chrono::nanoseconds run) {
+  bool in_reach = false;
+  for (std::chrono::nanoseconds time{0}; time <= run; time += std::chrono::milliseconds(10)) {
+    const glm::dvec3 p_DS = placed.X_DS.pose_at(time).translation_m;
+    in_reach |= distance_m(dem.grid, p_DS) <= placed.spec.lidar.gate.far_m;
     const auto ground_m = dem.grid.height_m_at(glm::dvec2(p_DS));
     if (!ground_m || p_DS.z > *ground_m) continue;
+    const glm::dvec3 p_WS = p_DS + dem.origin_w_m;
     throw Error(
         "lidar '{}': at {:.3f} s it is {:.3f} m below the ground, at ({:.3f}, {:.3f}, {:.3f}) m in "
         "W; raise its "
         "mount or the platform's height, or check that the trajectory and the DEM share a vertical "
         "datum",
-        placed.spec.name, seconds(time), *ground_m - p_DS.z, p_DS.x + dem.origin_w_m.x,
-        p_DS.y + dem.origin_w_m.y, p_DS.z + dem.origin_w_m.z);
+        placed.spec.name, seconds(time), *ground_m - p_DS.z, p_WS.x, p_WS.y, p_WS.z);
   }
-}
-
-// The sweeps that begin within the run and whose every beam fires while the trajectory lasts.
-// Sweeps of a sensor that runs free end a little after their turn, so a drive is laid a little
-// longer than the run.
-std::int64_t whole_sweeps(const PlacedLidar& placed, double duration_s) {
-  const double turns = duration_s * placed.spec.lidar.pattern.rate_hz;
-  auto sweeps = static_cast<std::int64_t>(std::floor(turns + 1e-9));
-  while (sweeps > 0 && placed.lidar.pattern().last_firing(sweeps - 1) > placed.X_DS.end_time())
-    --sweeps;
-  return sweeps;
+  if (in_reach) return;
+  const glm::dvec3 p_DS = placed.X_DS.samples().front().pose.translation_m;
+  const glm::dvec3 p_WS = p_DS + dem.origin_w_m;
+  throw Error(
+      "lidar '{}': it starts at ({:.3f}, {:.3f}) m in W, {:.0f} m from the DEM, and never comes "
+      "within its range of "
+      "it; is the trajectory in the DEM's CRS, {}?",
+      placed.spec.name, p_WS.x, p_WS.y, distance_m(dem.grid, p_DS), dem.crs_name);
 }
 
 }  // namespace
@@ -87,21 +117,24 @@ std::filesystem::path data_folder() {
 World load_world(const std::filesystem::path& scene) {
   SceneSpec spec = load_scene(scene, data_folder() / "sensors");
   Dem dem = load_dem(spec.terrain.dem, spec.terrain.options);
-  Trajectory X_DB =
-      std::visit([&](const auto& path) { return lay_path(path, spec, dem); }, spec.platform);
+  std::chrono::nanoseconds begin{0};
+  const Trajectory X_DB = extended(
+      std::visit([&](const auto& path) { return lay_path(path, spec, dem, begin); }, spec.platform),
+      spec);
   std::vector<PlacedLidar> lidars;
   for (const MountedLidar& mounted : spec.lidars) {
-    PlacedLidar placed{mounted, Lidar(mounted.lidar), X_DB.mounted(mounted.X_BS), 0};
-    placed.sweeps = whole_sweeps(placed, spec.duration_s);
-    if (placed.sweeps == 0) {
+    // Turns that a double only approximates (0.3 s at 10 Hz) count as whole.
+    const double turns = spec.duration_s * mounted.lidar.pattern.rate_hz;
+    const auto sweeps = static_cast<std::int64_t>(std::floor(turns + 1e-9));
+    if (sweeps == 0) {
       throw Error(
           "lidar '{}': a run of {} s is shorter than one sweep at {} Hz; lengthen duration_s",
           mounted.name, spec.duration_s, mounted.lidar.pattern.rate_hz);
     }
-    check_above_ground(placed, dem);
-    lidars.push_back(std::move(placed));
+    lidars.push_back({mounted, Lidar(mounted.lidar), X_DB.mounted(mounted.X_BS), sweeps});
+    check_place(lidars.back(), dem, run_time(spec));
   }
-  return {std::move(spec), std::move(dem), std::move(X_DB), std::move(lidars)};
+  return {std::move(spec), std::move(dem), begin, std::move(lidars)};
 }
 
 }  // namespace groundray

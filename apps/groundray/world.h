@@ -1,5 +1,6 @@
 #pragma once
 
+#include <chrono>
 #include <cstdint>
 #include <filesystem>
 #include <vector>
@@ -22,7 +23,7 @@ struct PlacedLidar {
 struct World {
   SceneSpec spec;
   Dem dem;
-  Trajectory X_DB;
+  std::chrono::nanoseconds begin{0};  ///< time 0 of the run, on the clock of a recorded trajectory
   std::vector<PlacedLidar> lidars;
 };
 
@@ -32,8 +33,8 @@ std::filesystem::path data_folder();
 
 /// Loads a scene and everything it names.
 /// @throws Error if a file is at fault, the platform's path ends before the run, a sensor is below
-/// ground on its way,
-///         or a run is too short for one sweep.
+/// ground on its way or
+///         never in reach of the DEM, or the run is too short for one sweep.
 World load_world(const std::filesystem::path& scene);
 
 }  // namespace groundray

@@ -190,7 +190,7 @@ def test_interrupt_leaves_whole_frames_and_exit_code_130(dataset, tmp_path):
 
 def test_folder_of_another_run_is_left_alone(dataset, tmp_path):
     shutil.copytree(dataset, tmp_path / "out")
-    assert refused(generate(tmp_path, SCENE.replace("seed: 7", "seed: 8")), "another scene, seed")
+    assert refused(generate(tmp_path, SCENE.replace("seed: 7", "seed: 8")), "another scene, DEM")
     assert files(tmp_path / "out") == files(dataset)
     (tmp_path / "mine").mkdir()
     (tmp_path / "mine/notes.txt").write_text("keep")
@@ -222,6 +222,12 @@ def test_a_fault_in_the_scene_is_named(tmp_path, change, words):
     [
         (["0 429440 5150660 400 0 0 0 1", "0.1 429441 5150660 400 0 0 0 1"], ["lasts 0.100 s"]),
         (["0 0 0 0 0 0 0 1", "1 0 0 0 0 0 0 1", "0.5 0 0 0 0 0 0 1"], ["path.tum", ":3:"]),
+        (["0 10 20 400 0 0 0 1", "1 11 20 400 0 0 0 1"], ["trajectory in the DEM's CRS", "26915"]),
+        # Above ground at both ends, through a hill in between.
+        (
+            ["0 429382.8 5150784.9 393 0 0 0 1", "0.4 429472.8 5150784.9 388.3 0 0 0 1"],
+            ["below the"],
+        ),
         (["0 429440 5150660 100 0 0 0 1", "1 429441 5150660 100 0 0 0 1"], ["below the ground"]),
     ],
 )
@@ -233,6 +239,36 @@ def test_a_fault_in_the_trajectory_is_named(tmp_path, lines, words):
     assert refused(generate(tmp_path, scene), *words)
 
 
+@pytest.mark.parametrize("kind", ["trajectory", "dem", "sensor"])
+def test_folder_of_a_run_with_other_inputs_is_left_alone(tmp_path, kind):
+    """The scene file reads the same, but what it names has changed."""
+    scene = re.sub(
+        r"platform:.*?lidars:", "platform: {trajectory: path.tum}\nlidars:", SCENE, flags=re.S
+    )
+    scene = scene.replace(str(PRAIRIE), "dem.tif").replace("preset: velodyne_vlp16", "file: a.yaml")
+    shutil.copy(PRAIRIE, tmp_path / "dem.tif")
+    shutil.copy(ROOT / "data/sensors/velodyne_vlp16.yaml", tmp_path / "a.yaml")
+    path = "0 429440 5150660 412 0 0 0 1\n1 429441 5150660 412 0 0 0 1\n"
+    (tmp_path / "path.tum").write_text(path)
+    assert generate(tmp_path, scene).returncode == 0
+    before = files(tmp_path / "out")
+    if kind == "trajectory":
+        (tmp_path / "path.tum").write_text(path.replace("429441", "429442"))
+    elif kind == "dem":
+        scaled = ["-scale", "0", "1000", "0", "999", "-ot", "Float32"]
+        dem = tmp_path / "dem.tif"
+        subprocess.run(["gdal_translate", "-q", *scaled, PRAIRIE, dem], check=True)
+    else:
+        spec = (tmp_path / "a.yaml").read_text()
+        (tmp_path / "a.yaml").write_text(
+            spec.replace("sense: clockwise", "sense: counter_clockwise")
+        )
+    (tmp_path / "out/lidar/top/000001.ply").unlink()
+    assert refused(generate(tmp_path, scene), "another scene, DEM, trajectory, sensor")
+    del before[Path("lidar/top/000001.ply")]
+    assert files(tmp_path / "out") == before
+
+
 def test_recorded_trajectory_with_epoch_times_starts_at_zero(tmp_path):
     lines = [f"{1600000000 + 0.1 * k:.1f} {429440 + k} 5150660 412 0 0 0 1" for k in range(6)]
     (tmp_path / "path.tum").write_text("\n".join(lines) + "\n")
@@ -242,7 +278,11 @@ def test_recorded_trajectory_with_epoch_times_starts_at_zero(tmp_path):
     result = generate(tmp_path, scene)
     assert result.returncode == 0, result.stderr
     poses = np.loadtxt(tmp_path / "out/poses/top.tum")
-    assert poses[:, 0] == pytest.approx([0, 0.1, 0.2, 0.3, 0.4, 0.5])
+    assert poses[:6, 0] == pytest.approx([0, 0.1, 0.2, 0.3, 0.4, 0.5])
+    # The path goes on as it was for one firing sequence, which the last sweep may need.
+    assert poses[6, :2] == pytest.approx([0.5 + 55.297e-6, 5 - 12 + 55.297e-5])
+    record = (tmp_path / "out/dataset.yaml").read_text()
+    assert "time_origin_s: 1600000000.000000000\n" in record
     assert poses[3, 1] == pytest.approx(429443 - 429452)
 
 

@@ -201,20 +201,16 @@ TEST(RayTracer, RaysAlongGridLinesAreDecidedAsTheReferenceDoesAlsoBesideHoles) {
     for (std::size_t i = 0; i < rays.size(); ++i) {
       const auto bits = random_bits({Seed{43}, 0, 0, static_cast<std::uint32_t>(i)});
       const glm::dvec2 p(-32. + 2 * (bits[0] % 33), -32. + 2 * (bits[1] % 33));
-      const glm::dvec2 way = ways[bits[2] % 6];
+      // Rounding puts a ray on a diagonal to either side of it, and beside a hole that matters.
+      const glm::dvec2 way = ways[bits[2] % (holes > 0 ? 4 : 6)];
       rays[i].origin = {p, grid.height_m_at(p).value_or(grid.max_height_m()) + 1};
       rays[i].direction = glm::normalize(glm::dvec3(way, -2 * (bits[3] * 0x1p-32)));
     }
     const auto hits = trace(tracer(grid, Tracing::Exact), rays);
-    std::size_t different = 0;
     for (std::size_t i = 0; i < rays.size(); ++i) {
       const auto expected = trace_reference(grid, rays[i]);
-      // Rounding may put a ray on a diagonal to either side of it, and one side may be a hole.
-      if (!agrees(expected, hits[i]) && !passes_silhouette(grid, rays[i], hits[i], 1e-9))
-        ++different;
-      ASSERT_TRUE(holes > 0 || agrees(expected, hits[i])) << i;
+      ASSERT_TRUE(agrees(expected, hits[i])) << i << " with " << holes << " holes";
     }
-    EXPECT_EQ(different, 0u) << holes << " holes";
   }
 }
 
