@@ -50,7 +50,7 @@ FloatHit intersect_one(const LevelScene& level, const LevelRay& ray, double from
   return {one.hit.geomID, one.hit.primID, one.hit.u, one.hit.v, one.ray.tfar};
 }
 
-Facet facet_of(const LevelScene& level, const FloatHit& hit) noexcept {
+inline Facet facet_of(const LevelScene& level, const FloatHit& hit) noexcept {
   if (hit.geometry == facet_geometry) return level.level.facets[hit.primitive];
   const Level::Block& block = level.level.blocks[hit.primitive];
   const float u = hit.u * static_cast<float>(block.columns - 1);

@@ -20,7 +20,7 @@ namespace {
 constexpr std::size_t chunk_pulses =
     4096;  // traced at once by a thread; a multiple of every packet width
 
-// A row of the scan to be.
+// What a row says, besides what holds for all.
 struct Echo {
   double range_m;
   glm::dvec3 p_DQ;
@@ -34,7 +34,7 @@ struct Echo {
 
 // What the echoes of one volley share.
 struct HeadPose {
-  glm::dmat3 R_SH;
+  double cos_spin, sin_spin;
   glm::dmat3 R_DH;
   glm::dvec3 p_DS;
   float time_s;
@@ -42,12 +42,6 @@ struct HeadPose {
 
 std::chrono::nanoseconds to_nanoseconds(double seconds) {
   return std::chrono::nanoseconds(std::llround(seconds * 1e9));
-}
-
-glm::dmat3 turn_about_z(double angle_rad) {
-  const double sine = std::sin(angle_rad);
-  const double cosine = std::cos(angle_rad);
-  return {{cosine, sine, 0}, {-sine, cosine, 0}, {0, 0, 1}};
 }
 
 // One sweep being made. Chunks of firing sequences are independent of each other and of the order
@@ -78,8 +72,14 @@ class Sweep {
         pattern_.firing_time_s(first_ + static_cast<std::int64_t>(sequence), volley);
     const std::chrono::nanoseconds time = to_nanoseconds(time_s);
     const Pose X_DS = X_DS_.pose_at(time);
-    const glm::dmat3 R_SH = turn_about_z(pattern_.spin_rad(time_s));
-    return {R_SH, glm::mat3_cast(X_DS.rotation) * R_SH, X_DS.translation_m,
+    const double spin_rad = pattern_.spin_rad(time_s);
+    const double cosine = std::cos(spin_rad);
+    const double sine = std::sin(spin_rad);
+    const glm::dmat3 R_DS = glm::mat3_cast(X_DS.rotation);
+    return {cosine,
+            sine,
+            {R_DS[0] * cosine + R_DS[1] * sine, R_DS[1] * cosine - R_DS[0] * sine, R_DS[2]},
+            X_DS.translation_m,
             static_cast<float>(1e-9 * static_cast<double>((time - stamp_).count()))};
   }
 
@@ -150,11 +150,11 @@ struct Rows {
 struct Chunk {
   std::size_t begin = 0;  // first sequence, of the sweep
   std::size_t count = 0;
+  std::size_t echoes = 0;  // how many of its pulses return
   std::size_t first_row = 0;
   std::vector<HeadPose> heads;  // by sequence and volley
   std::vector<Ray> rays;        // by shot and sequence: neighbours in azimuth make alike packets
   std::vector<Hit> hits;
-  std::vector<Echo> echoes;
 };
 
 // Calls `act(sequence in the chunk, shot, head)` for every pulse of a chunk, in firing order.
@@ -187,20 +187,23 @@ void cast(const Sweep& sweep, const ScanPattern& pattern, const RayTracer& trace
   for (std::size_t v = 0; v < volleys.size(); ++v) {
     for (int shot = volleys[v].begin; shot < volleys[v].end; ++shot) {
       const auto& [direction, origin_m, ring] = shots[static_cast<std::size_t>(shot)];
+      const bool central = origin_m == glm::dvec3(0);
       for (std::size_t k = 0; k < chunk.count; ++k) {
         const HeadPose& head = chunk.heads[k * volleys.size() + v];
-        *ray++ = {head.p_DS + head.R_DH * origin_m, head.R_DH * direction, far_m};
+        *ray++ = {central ? head.p_DS : head.p_DS + head.R_DH * origin_m, head.R_DH * direction,
+                  far_m};
       }
     }
   }
   tracer.trace(chunk.rays, chunk.hits);
 }
 
-// Turns the hits of a chunk into echoes, in firing order.
-void receive(const ScanPattern& pattern, double near_m, double range_noise_sigma_m,
-             const RandomKey& sweep_key, Chunk& chunk) {
+// Writes the echoes of a chunk, in firing order.
+void write(const ScanPattern& pattern, double near_m, double range_noise_sigma_m,
+           const RandomKey& sweep_key, const SurfaceTruth& surface, const Chunk& chunk,
+           const Rows& rows) {
   const auto shots = pattern.shots();
-  chunk.echoes.clear();
+  std::size_t row = chunk.first_row;
   for_each_pulse(pattern, chunk, [&](std::size_t k, std::size_t shot, const HeadPose& head) {
     const Hit& hit = chunk.hits[shot * chunk.count + k];
     if (!hit || hit.range_m < near_m) return;
@@ -211,12 +214,15 @@ void receive(const ScanPattern& pattern, double near_m, double range_noise_sigma
       key.pulse = static_cast<std::uint32_t>((chunk.begin + k) * shots.size() + shot);
       reported_m += range_noise_sigma_m * random_normal(key).x;
     }
+    const glm::dvec3 p_HQ = shots[shot].origin_m + shots[shot].direction * reported_m;
+    const glm::vec3 p_SQ(head.cos_spin * p_HQ.x - head.sin_spin * p_HQ.y,
+                         head.sin_spin * p_HQ.x + head.cos_spin * p_HQ.y, p_HQ.z);
     const glm::vec3 direction(ray.direction);
-    chunk.echoes.push_back(
-        {hit.range_m, ray.origin + ray.direction * hit.range_m,
-         glm::vec3(head.R_SH * (shots[shot].origin_m + shots[shot].direction * reported_m)),
-         hit.normal, -glm::dot(direction, hit.normal),
-         glm::length(glm::cross(direction, hit.normal)), head.time_s, shots[shot].ring});
+    rows.write(row++,
+               {hit.range_m, ray.origin + ray.direction * hit.range_m, p_SQ, hit.normal,
+                -glm::dot(direction, hit.normal), glm::length(glm::cross(direction, hit.normal)),
+                head.time_s, shots[shot].ring},
+               surface);
   });
 }
 
@@ -263,18 +269,17 @@ PointCloud Lidar::scan(const Scene& scene, const Trajectory& X_DS, std::int64_t 
   };
   const auto measure = [&](Chunk* chunk) {
     cast(sweep, pattern_, scene.rays, gate_.far_m, *chunk);
-    receive(pattern_, gate_.near_m, range_noise_sigma_m_, key, *chunk);
+    chunk->echoes = static_cast<std::size_t>(std::ranges::count_if(
+        chunk->hits, [&](const Hit& hit) { return hit && hit.range_m >= gate_.near_m; }));
     return chunk;
   };
   const auto place = [&](Chunk* chunk) {
     chunk->first_row = next_row;
-    next_row += chunk->echoes.size();
+    next_row += chunk->echoes;
     return chunk;
   };
-  const auto write = [&](Chunk* chunk) {
-    for (std::size_t i = 0; i < chunk->echoes.size(); ++i) {
-      rows.write(chunk->first_row + i, chunk->echoes[i], scene.terrain);
-    }
+  const auto finish = [&](Chunk* chunk) {
+    write(pattern_, gate_.near_m, range_noise_sigma_m_, key, scene.terrain, *chunk, rows);
     idle.push(chunk);
   };
   using tbb::filter_mode;
@@ -282,7 +287,7 @@ PointCloud Lidar::scan(const Scene& scene, const Trajectory& X_DS, std::int64_t 
                          tbb::make_filter<void, Chunk*>(filter_mode::serial_in_order, take) &
                              tbb::make_filter<Chunk*, Chunk*>(filter_mode::parallel, measure) &
                              tbb::make_filter<Chunk*, Chunk*>(filter_mode::serial_in_order, place) &
-                             tbb::make_filter<Chunk*, void>(filter_mode::parallel, write));
+                             tbb::make_filter<Chunk*, void>(filter_mode::parallel, finish));
   cloud.truncate(next_row);
   return cloud;
 }
