@@ -226,6 +226,53 @@ void write(const ScanPattern& pattern, double near_m, double range_noise_sigma_m
   });
 }
 
+// Cuts the sequences into chunks and takes each through `measure`, which counts its echoes, and
+// `finish`, which writes them. Both run on any thread in any order; in between each chunk learns,
+// in firing order, where its rows begin. Few chunks are alive at a time. Returns the number of
+// rows.
+template <typename Measure, typename Finish>
+std::size_t stream_chunks(std::size_t sequences, std::size_t per_chunk, const Measure& measure,
+                          const Finish& finish) {
+  const auto live = 2 * static_cast<std::size_t>(tbb::this_task_arena::max_concurrency());
+  std::vector<Chunk> chunks(live);
+  tbb::concurrent_bounded_queue<Chunk*> idle;
+  for (Chunk& chunk : chunks) idle.push(&chunk);
+  std::size_t next_sequence = 0;
+  std::size_t next_row = 0;
+  const auto take = [&](tbb::flow_control& flow) -> Chunk* {
+    if (next_sequence == sequences) {
+      flow.stop();
+      return nullptr;
+    }
+    Chunk* chunk = nullptr;
+    idle.pop(chunk);
+    chunk->begin = next_sequence;
+    chunk->count = std::min(per_chunk, sequences - next_sequence);
+    next_sequence += chunk->count;
+    return chunk;
+  };
+  const auto measured = [&](Chunk* chunk) {
+    measure(*chunk);
+    return chunk;
+  };
+  const auto placed = [&](Chunk* chunk) {
+    chunk->first_row = next_row;
+    next_row += chunk->echoes;
+    return chunk;
+  };
+  const auto finished = [&](Chunk* chunk) {
+    finish(*chunk);
+    idle.push(chunk);
+  };
+  using tbb::filter_mode;
+  tbb::parallel_pipeline(
+      live, tbb::make_filter<void, Chunk*>(filter_mode::serial_in_order, take) &
+                tbb::make_filter<Chunk*, Chunk*>(filter_mode::parallel, measured) &
+                tbb::make_filter<Chunk*, Chunk*>(filter_mode::serial_in_order, placed) &
+                tbb::make_filter<Chunk*, void>(filter_mode::parallel, finished));
+  return next_row;
+}
+
 }  // namespace
 
 Lidar::Lidar(const LidarSpec& spec)
@@ -246,49 +293,17 @@ PointCloud Lidar::scan(const Scene& scene, const Trajectory& X_DS, std::int64_t 
   const RandomKey key{seed, sensor_number, static_cast<std::uint32_t>(number)};
   PointCloud cloud(sweep.sequences() * pattern_.shots().size());
   const Rows rows(cloud);
-
-  // Chunks are cast in any order and written in any order; in between each learns, in firing order,
-  // where its rows begin.
-  const auto live = 2 * static_cast<std::size_t>(tbb::this_task_arena::max_concurrency());
-  std::vector<Chunk> chunks(live);
-  tbb::concurrent_bounded_queue<Chunk*> idle;
-  for (Chunk& chunk : chunks) idle.push(&chunk);
-  std::size_t next_sequence = 0;
-  std::size_t next_row = 0;
-  const auto take = [&](tbb::flow_control& flow) -> Chunk* {
-    if (next_sequence == sweep.sequences()) {
-      flow.stop();
-      return nullptr;
-    }
-    Chunk* chunk = nullptr;
-    idle.pop(chunk);
-    chunk->begin = next_sequence;
-    chunk->count = std::min(per_chunk, sweep.sequences() - next_sequence);
-    next_sequence += chunk->count;
-    return chunk;
-  };
-  const auto measure = [&](Chunk* chunk) {
-    cast(sweep, pattern_, scene.rays, gate_.far_m, *chunk);
-    chunk->echoes = static_cast<std::size_t>(std::ranges::count_if(
-        chunk->hits, [&](const Hit& hit) { return hit && hit.range_m >= gate_.near_m; }));
-    return chunk;
-  };
-  const auto place = [&](Chunk* chunk) {
-    chunk->first_row = next_row;
-    next_row += chunk->echoes;
-    return chunk;
-  };
-  const auto finish = [&](Chunk* chunk) {
-    write(pattern_, gate_.near_m, range_noise_sigma_m_, key, scene.terrain, *chunk, rows);
-    idle.push(chunk);
-  };
-  using tbb::filter_mode;
-  tbb::parallel_pipeline(live,
-                         tbb::make_filter<void, Chunk*>(filter_mode::serial_in_order, take) &
-                             tbb::make_filter<Chunk*, Chunk*>(filter_mode::parallel, measure) &
-                             tbb::make_filter<Chunk*, Chunk*>(filter_mode::serial_in_order, place) &
-                             tbb::make_filter<Chunk*, void>(filter_mode::parallel, finish));
-  cloud.truncate(next_row);
+  const std::size_t count = stream_chunks(
+      sweep.sequences(), per_chunk,
+      [&](Chunk& chunk) {
+        cast(sweep, pattern_, scene.rays, gate_.far_m, chunk);
+        chunk.echoes = static_cast<std::size_t>(std::ranges::count_if(
+            chunk.hits, [&](const Hit& hit) { return hit && hit.range_m >= gate_.near_m; }));
+      },
+      [&](const Chunk& chunk) {
+        write(pattern_, gate_.near_m, range_noise_sigma_m_, key, scene.terrain, chunk, rows);
+      });
+  cloud.truncate(count);
   return cloud;
 }
 
