@@ -7,8 +7,8 @@ namespace groundray {
 namespace {
 
 constexpr int tile_cells = 64;
-constexpr int part_cells =
-    8;  // of a tile with holes: a triangle takes thirteen times the memory that it takes in a grid
+// Side of the parts of a tile with holes: a triangle takes ten times its memory in a grid.
+constexpr int part_cells = 8;
 
 // Calls `act` for every block of up to `cells` x `cells` cells that `whole` is made of.
 template <typename Act>
