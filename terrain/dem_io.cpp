@@ -51,7 +51,8 @@ GDALDatasetUniquePtr open(const std::filesystem::path& path) {
   GDALDatasetUniquePtr dataset(
       GDALDataset::Open(path.c_str(), GDAL_OF_RASTER | GDAL_OF_VERBOSE_ERROR));
   if (dataset == nullptr) {
-    const std::string why = CPLGetLastErrorMsg();
+    std::string why = CPLGetLastErrorMsg();
+    if (why.ends_with('.')) why.pop_back();
     for (const char* missing : {"No such file", "does not exist"}) {
       if (why.find(missing) != std::string::npos) throw Error("there is no such file");
     }
