@@ -10,6 +10,7 @@
 #include <iostream>
 
 #include "core/error.h"
+#include "core/product_io.h"
 #include "core/random.h"
 #include "terrain/dem_io.h"
 #include "terrain/terrain_scene.h"
@@ -29,13 +30,39 @@ using testing::with_holes;
 
 struct Terrain {
   const char* name;
-  HeightGrid grid;
+  Dem dem;
 };
 
+// The grid as a file in the middle of a UTM zone (an ESRI ASCII grid), loaded as any other DEM is.
+Dem at_utm(const HeightGrid& grid) {
+  const testing::TemporaryFolder folder;
+  std::string text = fmt::format(
+      "ncols {}\nnrows {}\nxllcorner 498765.4321\nyllcorner 5123456.789\ndx {:.17g}\ndy {:.17g}\n"
+      "NODATA_value -9999\n",
+      grid.columns(), grid.rows(), std::abs(grid.step_m().x), std::abs(grid.step_m().y));
+  for (const float height_m : grid.heights_m()) {
+    text += std::isnan(height_m) ? "-9999 " : fmt::format("{:#.9g} ", height_m);
+  }
+  write_text(folder / "utm.asc", text + "\n");
+  return load_dem(folder / "utm.asc");
+}
+
 std::vector<Terrain> terrains() {
-  return {{"jacksboro", load_dem(testing::data_folder() / "terrain/jacksboro.tif").grid},
-          {"prairie_1m", load_dem(testing::data_folder() / "terrain/prairie_1m.tif").grid},
-          {"fractal with holes", with_holes(fractal(513, 5, 400, Seed{3}), 400, 6, Seed{4})}};
+  const auto data = testing::data_folder() / "terrain";
+  return {
+      {"jacksboro", at_utm(load_dem(data / "jacksboro.tif").grid)},
+      {"prairie_1m", load_dem(data / "prairie_1m.tif")},
+      {"fractal with holes", at_utm(with_holes(fractal(513, 5, 400, Seed{3}), 400, 6, Seed{4}))}};
+}
+
+// Random rays as a user has them: in W, from where they are brought to D.
+std::vector<Ray> random_rays_in_world(const Dem& dem, std::size_t count, Seed seed) {
+  std::vector<Ray> rays = random_rays(dem.grid, count, seed);
+  for (Ray& ray : rays) {
+    const glm::dvec3 p_W = ray.origin + dem.origin_w_m;
+    ray.origin = p_W - dem.origin_w_m;
+  }
+  return rays;
 }
 
 RayTracer tracer(const HeightGrid& grid, Tracing tracing, const std::string& device = "") {
@@ -88,8 +115,10 @@ bool passes_silhouette(const HeightGrid& grid, const Ray& ray, const Hit& hit, d
 }
 
 TEST(RayTracerProof, ExactTracingEqualsTheReferenceOnEveryRandomRay) {
-  for (const auto& [name, grid] : terrains()) {
-    const auto rays = random_rays(grid, proof_size(20'000, 100'000), Seed{11});
+  for (const auto& [name, dem] : terrains()) {
+    const HeightGrid& grid = dem.grid;
+    ASSERT_GT(dem.origin_w_m.y, 5e6) << "not at UTM coordinates";
+    const auto rays = random_rays_in_world(dem, proof_size(20'000, 100'000), Seed{11});
     const auto hits = trace(tracer(grid, Tracing::Exact), rays);
     std::size_t met = 0;
     double worst = 0;
@@ -110,8 +139,9 @@ TEST(RayTracerProof, ExactTracingEqualsTheReferenceOnEveryRandomRay) {
 }
 
 TEST(RayTracerProof, FastTracingDiffersOnlyAtSilhouettes) {
-  for (const auto& [name, grid] : terrains()) {
-    const auto rays = random_rays(grid, proof_size(100'000, 10'000'000), Seed{12});
+  for (const auto& [name, dem] : terrains()) {
+    const HeightGrid& grid = dem.grid;
+    const auto rays = random_rays_in_world(dem, proof_size(100'000, 10'000'000), Seed{12});
     const auto fast = trace(tracer(grid, Tracing::Fast), rays);
     const auto exact =
         trace(tracer(grid, Tracing::Exact), rays);  // equals the reference: shown above
