@@ -1,7 +1,9 @@
 #pragma once
 
 #include <algorithm>
+#include <bit>
 #include <cstddef>
+#include <cstdint>
 #include <glm/vec2.hpp>
 #include <glm/vec3.hpp>
 #include <vector>
@@ -15,19 +17,19 @@ namespace groundray {
 inline constexpr unsigned block_geometry = 0;
 inline constexpr unsigned facet_geometry = 1;
 
-/// The highest sample of each tile of 64 x 64 cells, its rim included; holes count as lowest.
+/// The highest point of each tile of 64 x 64 points, its rim included; holes count as lowest.
 class MaxHeights {
  public:
   MaxHeights() = default;
-  explicit MaxHeights(const HeightGrid& grid);
+  explicit MaxHeights(const HeightArray& heights);
 
-  /// Returns a height that the surface round a point (grid coordinates, clamped to the grid) does
-  /// not exceed.
-  float at(double u, double v) const noexcept {
-    const int column = std::clamp(static_cast<int>(u) / tile_cells, 0, tiles_.x - 1);
-    const int row = std::clamp(static_cast<int>(v) / tile_cells, 0, tiles_.y - 1);
-    return heights_m_[static_cast<std::size_t>(row) * static_cast<std::size_t>(tiles_.x) +
-                      static_cast<std::size_t>(column)];
+  /// Returns a height that the surface round a point does not exceed. The point is counted in the
+  /// array's columns and rows, and clamped to them.
+  float at(double column, double row) const noexcept {
+    const int x = std::clamp(static_cast<int>(column) / tile_cells, 0, tiles_.x - 1);
+    const int y = std::clamp(static_cast<int>(row) / tile_cells, 0, tiles_.y - 1);
+    return heights_m_[static_cast<std::size_t>(y) * static_cast<std::size_t>(tiles_.x) +
+                      static_cast<std::size_t>(x)];
   }
 
  private:
@@ -36,14 +38,83 @@ class MaxHeights {
   std::vector<float> heights_m_;
 };
 
-/// A level as Embree holds it. Embree keeps pointers to it: it must not move once built.
-struct LevelScene {
+/// A triangle of the surface by its cell.
+struct Facet {
+  std::int32_t column = 0, row = 0;  // the cell's first sample, in the DEM
+  std::int8_t step_exponent = 0;     // the cell is 2^this cells of the DEM wide and high
+  Half half = Half::Near;
+  float deviation_m = 0;
+};
+
+/// What one triangle of Embree's stands for.
+struct TriangleFacet {
+  Facet facet;
+  bool whole = false;  // half of an ordinary cell, so its plane can be met at once
+};
+
+/// What one grid of Embree's stands for: ordinary cells.
+struct GridBlock {
+  std::int32_t column = 0, row = 0;    // its first sample, in the DEM
+  std::int8_t step_exponent = 0;       // of the cells that decide
+  std::int32_t columns = 0, rows = 0;  // how many of those
+  float deviation_m = 0;
+};
+
+/// A level as Embree holds it, and as double arithmetic looks things up. Embree keeps pointers to
+/// it: it does not move once built.
+struct LevelScene::Impl {
+  Impl(const RayDevice& with, Level content, const glm::dvec3& origin, Tracing how);
+  ~Impl();
+  Impl(const Impl&) = delete;
+  Impl& operator=(const Impl&) = delete;
+
+  RayDevice device;
   Level level;
   glm::dvec3 p_DL{0};
+  Tracing tracing = Tracing::Fast;
   RTCScene scene = nullptr;
-  std::vector<glm::ivec2> tiles;  ///< first cells of the user primitives of exact tracing
+
+  glm::ivec2 last{0};  // the DEM's sample at the window's last point
+  int step_exponent = 0;
+  int block_exponent = 0;  // a block is the finest leaf: 2^this cells of the DEM
+  glm::ivec2 blocks{0};
+  std::vector<std::int32_t> leaf_of_block;  // -1 outside the level's leaves
+  float deviation_m = 0;
+  std::size_t triangle_count = 0;
+  std::size_t bridging_leaves = 0;
+
+  std::vector<GridBlock> grids;  // by primitive
+  std::vector<TriangleFacet> triangles;
   MaxHeights max_heights;
-  float slack_m = 0;  ///< 16 * 2^-24 * max|p_L|: covers rounding to floats
+  float slack_m = 0;  // 16 * 2^-24 * max|p_L|: covers rounding to floats
+
+  bool contains(int column, int row) const noexcept {  // a cell of the DEM
+    return level.first.x <= column && column < last.x && level.first.y <= row && row < last.y;
+  }
+  /// The height of a sample of the DEM that is a point of the level.
+  float height_m(int column, int row) const noexcept {
+    return level.heights(
+        column == last.x ? level.heights.size().x - 1 : (column - level.first.x) >> step_exponent,
+        row == last.y ? level.heights.size().y - 1 : (row - level.first.y) >> step_exponent);
+  }
+  const Leaf* leaf_at(int column, int row) const noexcept {
+    const int x = (column - level.first.x) >> block_exponent;
+    const int y = (row - level.first.y) >> block_exponent;
+    const std::int32_t leaf =
+        leaf_of_block[static_cast<std::size_t>(y) * static_cast<std::size_t>(blocks.x) +
+                      static_cast<std::size_t>(x)];
+    return leaf < 0 ? nullptr : &level.leaves[static_cast<std::size_t>(leaf)];
+  }
+  /// The exponent of the cells that decide in a leaf: the level's own where the leaf does not
+  /// deviate, so that its ranges are those of the full resolution to the last bit.
+  int deciding_exponent(const Leaf& leaf) const noexcept {
+    return leaf.deviation_m == 0 && !leaf.has_holes
+               ? step_exponent
+               : std::countr_zero(static_cast<unsigned>(leaf.step));
+  }
+  /// The cell of 2^exponent cells of the DEM in a leaf that holds a cell of the DEM; thinned sides
+  /// are heeded if the cells are the leaf's own.
+  Cell cell_at(const Leaf& leaf, int exponent, int column, int row) const noexcept;
 };
 
 /// A ray as tracing one level needs it: in double, and in float from where it enters the level's
@@ -57,17 +128,13 @@ struct LevelRay {
   float far_m = 0;  ///< from the float origin
 };
 
-/// The double side of a packet: what exact tracing reads and fills, by lane.
-struct ExactQuery {
-  QueryContext context;  ///< first, so that Embree's pointer to it is a pointer to this
-  const LevelRay* rays;
-  Crossing* crossings;
+/// Where a ray crosses the surface from above.
+struct Crossing {
+  double range_m = std::numeric_limits<double>::infinity();
+  FacetPlane plane;
+  float deviation_m = 0;
+  std::uint32_t level = 0;
 };
-
-/// Builds the scene of `level` for `tracing`: grids and triangles, or tiles that are decided in
-/// double.
-/// @throws Error if the level has no height.
-void build_level_scene(RTCDevice device, Tracing tracing, LevelScene& level);
 
 /// Returns a bound in float for a range in double, never short of it.
 inline float far_float(double range_m, float slack_m) noexcept {

@@ -12,32 +12,19 @@
 #include <variant>
 
 #include "core/error.h"
+#include "core/ply_header.h"
 #include "core/product_io.h"
 #include "core/text_lines.h"
 
 namespace groundray {
 namespace {
 
-static_assert(std::endian::native == std::endian::little, "rows are written as they lie in memory");
-
 constexpr std::size_t block_bytes = 1 << 18;  // rows and columns of one block stay in the cache
-
-constexpr std::size_t type_count = std::variant_size_v<PointCloud::AnyValues>;
-
-/// The written name of each type of PointCloud::AnyValues, then the other one in use.
-constexpr std::array<std::array<std::string_view, 2>, type_count> type_names{{{"float", "float32"},
-                                                                              {"double", "float64"},
-                                                                              {"uchar", "uint8"},
-                                                                              {"ushort", "uint16"},
-                                                                              {"uint", "uint32"},
-                                                                              {"char", "int8"},
-                                                                              {"short", "int16"},
-                                                                              {"int", "int32"}}};
 
 /// Returns f(T{}) for the type T of index `type` in PointCloud::AnyValues.
 template <std::size_t I = 0, typename F>
 auto with_type(std::size_t type, const F& f) {
-  if constexpr (I + 1 < type_count) {
+  if constexpr (I + 1 < ply_type_count) {
     if (type != I) return with_type<I + 1>(type, f);
   }
   return f(typename std::variant_alternative_t<I, PointCloud::AnyValues>::value_type{});
@@ -47,31 +34,16 @@ std::size_t size_of(std::size_t type) {
   return with_type(type, [](auto value) { return sizeof value; });
 }
 
-std::size_t type_of(std::string_view name) {
-  const auto is_named = [name](const auto& names) {
-    return std::ranges::find(names, name) != names.end();
-  };
-  const auto found = std::ranges::find_if(type_names, is_named);
-  if (found == type_names.end()) {
-    throw Error(
-        "there is no type {:?}; there are char, uchar, short, ushort, int, uint, float and double",
-        name);
-  }
-  return static_cast<std::size_t>(found - type_names.begin());
-}
-
 bool is_visible(std::string_view name) {
   return !name.empty() && std::ranges::all_of(name, [](char c) { return '!' <= c && c <= '~'; });
 }
 
 std::string header_of(const PointCloud& cloud, const std::vector<std::string>& comments) {
-  std::string text = "ply\nformat binary_little_endian 1.0\n";
-  for (const std::string& comment : comments) text += "comment " + comment + "\n";
-  text += fmt::format("element vertex {}\n", cloud.rows());
+  PlyElement vertex{"vertex", cloud.rows(), {}};
   for (const auto& [name, values] : cloud.columns()) {
-    text += fmt::format("property {} {}\n", type_names[values.index()][0], name);
+    vertex.properties.push_back({name, values.index(), std::nullopt});
   }
-  return text + "end_header\n";
+  return ply_header(comments, {vertex});
 }
 
 void gather_rows(const PointCloud& cloud, std::size_t first, std::size_t rows, std::size_t stride,
@@ -89,21 +61,9 @@ void gather_rows(const PointCloud& cloud, std::size_t first, std::size_t rows, s
 
 enum class Format { Ascii, LittleEndian, BigEndian };
 
-struct Property {
-  std::string name;
-  std::size_t type = 0;                   // index in PointCloud::AnyValues
-  std::optional<std::size_t> count_type;  // of a list
-};
-
-struct Element {
-  std::string name;
-  std::uint64_t rows = 0;
-  std::vector<Property> properties;
-};
-
 struct Header {
   std::optional<Format> format;
-  std::vector<Element> elements;
+  std::vector<PlyElement> elements;
   std::vector<std::string> comments;
 };
 
@@ -117,33 +77,33 @@ Format parse_format(const std::vector<std::string_view>& words) {
       "the format must be ascii, binary_little_endian or binary_big_endian, and the version 1.0");
 }
 
-Element parse_element(const std::vector<std::string_view>& words) {
+PlyElement parse_element(const std::vector<std::string_view>& words) {
   if (words.size() != 3) throw Error("an element must have a name and a count");
   const auto rows = number_of<std::uint64_t>(words[2]);
   if (!rows) throw Error("the count {:?} must be a whole number >= 0 and < 2^64", words[2]);
   return {std::string(words[1]), *rows, {}};
 }
 
-Property parse_property(const std::vector<std::string_view>& words) {
-  if (words.size() == 3) return {std::string(words[2]), type_of(words[1]), std::nullopt};
+PlyProperty parse_property(const std::vector<std::string_view>& words) {
+  if (words.size() == 3) return {std::string(words[2]), ply_type_of(words[1]), std::nullopt};
   if (words.size() != 5 || words[1] != "list") {
     throw Error("a property must be '<type> <name>' or 'list <type of count> <type> <name>'");
   }
-  const std::size_t count_type = type_of(words[2]);
+  const std::size_t count_type = ply_type_of(words[2]);
   if (with_type(count_type, [](auto value) { return std::is_floating_point_v<decltype(value)>; })) {
     throw Error("the length of a list must be of an integer type, not {}", words[2]);
   }
-  return {std::string(words[4]), type_of(words[3]), count_type};
+  return {std::string(words[4]), ply_type_of(words[3]), count_type};
 }
 
-void add_property(Header& header, Property property) {
+void add_property(Header& header, PlyProperty property) {
   if (header.elements.empty()) throw Error("a property must follow its element");
-  Element& element = header.elements.back();
+  PlyElement& element = header.elements.back();
   if (property.count_type && element.name == "vertex") {
     throw Error("the property '{}' of element vertex is a list; a point has single numbers only",
                 property.name);
   }
-  if (std::ranges::find(element.properties, property.name, &Property::name) !=
+  if (std::ranges::find(element.properties, property.name, &PlyProperty::name) !=
       element.properties.end()) {
     throw Error("the element {} has two properties '{}'", element.name, property.name);
   }
@@ -160,8 +120,9 @@ void parse_header_line(std::string_view line, Header& header) {
     if (header.format) throw Error("there is a format already");
     header.format = parse_format(words);
   } else if (keyword == "element") {
-    Element element = parse_element(words);
-    if (std::ranges::find(header.elements, element.name, &Element::name) != header.elements.end()) {
+    PlyElement element = parse_element(words);
+    if (std::ranges::find(header.elements, element.name, &PlyElement::name) !=
+        header.elements.end()) {
       throw Error("there is an element '{}' already", element.name);
     }
     header.elements.push_back(std::move(element));
@@ -183,22 +144,22 @@ Header parse_header(TextLines& lines) {
     parse_header_line(*line, header);
   }
   if (!header.format) throw Error("the header must name a format");
-  if (std::ranges::find(header.elements, "vertex", &Element::name) == header.elements.end()) {
+  if (std::ranges::find(header.elements, "vertex", &PlyElement::name) == header.elements.end()) {
     throw Error("the header must have an element vertex");
   }
   return header;
 }
 
 /// The least that a row takes: lists are empty, and an ASCII value is a digit and a blank.
-std::size_t least_row_bytes(const Element& element, Format format) {
+std::size_t least_row_bytes(const PlyElement& element, Format format) {
   std::size_t bytes = 0;
-  for (const Property& property : element.properties) {
+  for (const PlyProperty& property : element.properties) {
     bytes += format == Format::Ascii ? 2 : size_of(property.count_type.value_or(property.type));
   }
   return bytes;
 }
 
-void check_fits(const Element& element, Format format, std::size_t bytes) {
+void check_fits(const PlyElement& element, Format format, std::size_t bytes) {
   const std::size_t row_bytes = least_row_bytes(element, format);
   if (row_bytes == 0 && element.rows > 0)
     throw Error("the element {} has no property", element.name);
@@ -218,13 +179,13 @@ T load(const char* from, Format format) {
   return std::bit_cast<T>(bytes);
 }
 
-void skip_binary(const Element& element, Format format, std::string_view& bytes) {
+void skip_binary(const PlyElement& element, Format format, std::string_view& bytes) {
   const auto drop = [&](std::uint64_t count, std::size_t size) {
     if (count > bytes.size() / size) throw Error("the element {} is cut short", element.name);
     bytes.remove_prefix(count * size);
   };
   for (std::uint64_t row = 0; row < element.rows; ++row) {
-    for (const Property& property : element.properties) {
+    for (const PlyProperty& property : element.properties) {
       std::uint64_t count = 1;
       if (property.count_type) {
         const char* const at = bytes.data();
@@ -242,9 +203,9 @@ void skip_binary(const Element& element, Format format, std::string_view& bytes)
 }
 
 /// Adds a column for each property and returns where the values of each begin.
-std::vector<void*> add_columns(const Element& vertex, PointCloud& cloud) {
+std::vector<void*> add_columns(const PlyElement& vertex, PointCloud& cloud) {
   std::vector<void*> columns;
-  for (const Property& property : vertex.properties) {
+  for (const PlyProperty& property : vertex.properties) {
     columns.push_back(with_type(property.type, [&](auto value) -> void* {
       return cloud.add<decltype(value)>(property.name).data();
     }));
@@ -252,7 +213,7 @@ std::vector<void*> add_columns(const Element& vertex, PointCloud& cloud) {
   return columns;
 }
 
-void scatter_rows(std::string_view bytes, Format format, const Element& vertex,
+void scatter_rows(std::string_view bytes, Format format, const PlyElement& vertex,
                   const std::vector<void*>& columns) {
   const std::size_t stride = least_row_bytes(vertex, format);
   const std::size_t rows_per_block = block_bytes / (stride + 1) + 1;
@@ -271,7 +232,7 @@ void scatter_rows(std::string_view bytes, Format format, const Element& vertex,
   }
 }
 
-void parse_rows(TextLines& lines, const Element& vertex, const std::vector<void*>& columns) {
+void parse_rows(TextLines& lines, const PlyElement& vertex, const std::vector<void*>& columns) {
   for (std::size_t row = 0; row < vertex.rows; ++row) {
     const auto line = lines.next();
     if (!line || !lines.ended()) throw Error("the last line lacks its end: is the file cut short?");
@@ -285,7 +246,7 @@ void parse_rows(TextLines& lines, const Element& vertex, const std::vector<void*
         const auto number = number_of<decltype(value)>(words[i]);
         if (!number) {
           throw Error("{} = {:?} is no number of type {}", vertex.properties[i].name,
-                      words[i].substr(0, 40), type_names[vertex.properties[i].type][0]);
+                      words[i].substr(0, 40), ply_type_names[vertex.properties[i].type][0]);
         }
         static_cast<decltype(value)*>(columns[i])[row] = *number;
       });

@@ -1,18 +1,15 @@
 // Embree answers in float which surface a ray meets and roughly where; everything that is reported
-// is then decided in double on the height grid (docs/surface.md).
+// is then decided in double on the samples (docs/surface.md).
 #include "core/ray_tracer.h"
 
-#include <fmt/format.h>
-
 #include <algorithm>
-#include <atomic>
 #include <cmath>
 #include <glm/common.hpp>
 #include <glm/geometric.hpp>
 #include <utility>
 
+#include "core/device.h"
 #include "core/error.h"
-#include "core/level_scene.h"
 #include "core/ray_packet.h"
 
 namespace groundray {
@@ -21,7 +18,53 @@ namespace {
 constexpr double walk_cells = 1.5;      // how far round Embree's hit the facet is looked for
 constexpr double inside_margin = 1e-9;  // cells; far above rounding, far below any facet
 
-FloatHit intersect_one(const LevelScene& level, const LevelRay& ray, double from_m,
+}  // namespace
+
+struct RayTracer::Impl {
+  RayDevice device;
+  std::vector<LevelScene> scenes;
+  Surface surface;
+  RTCScene all = nullptr;  // the levels as instances; none if there is but one
+  std::vector<Target> targets;
+  Target everything;
+
+  Impl(const RayDevice& device, std::vector<LevelScene> levels);
+  ~Impl() {
+    if (all != nullptr) rtcReleaseScene(all);
+  }
+  Impl(const Impl&) = delete;
+  Impl& operator=(const Impl&) = delete;
+
+  const LevelScene::Impl& level(std::size_t number) const noexcept { return scenes[number].impl(); }
+  const LevelScene::Impl& level_of(const Target& target, const FloatHit& hit) const noexcept {
+    return target.is_all ? level(hit.instance) : *target.level;
+  }
+
+  bool ends_below(const Target& target, const GridRay& ray, double leave_m) const noexcept;
+  bool from_behind(const Target& target, const LevelRay& ray, const FloatHit& hit) const noexcept;
+  std::optional<Crossing> search(const Target& target, const LevelRay& ray,
+                                 FloatHit hit) const noexcept;
+  template <int W>
+  void decide_fast(const Target& target, Packet<W>& packet) const noexcept;
+  template <int W>
+  void trace_target(const Target& target, std::span<Hit> hits, Packet<W>& packet) const noexcept;
+  template <int W>
+  bool start_inside(const Packet<W>& packet) const noexcept;
+  template <int W>
+  void trace_packet(Packet<W>& packet, std::span<Hit> hits) const noexcept;
+  template <int W>
+  void trace(std::span<const Ray> rays, std::span<Hit> hits) const noexcept;
+  double deviation_to(std::size_t number) const noexcept;
+  template <int W>
+  void meet_lifted(Packet<W>& packet, double sign, std::span<Hit> met) const noexcept;
+  template <int W>
+  void bound_errors(std::span<const Ray> rays, std::span<const Hit> hits,
+                    std::span<double> bounds_m) const noexcept;
+};
+
+namespace {
+
+FloatHit intersect_one(const Target& target, const LevelRay& ray, double from_m,
                        const glm::vec3& direction) noexcept {
   RTCRayHit one{};
   one.ray = {ray.origin.x,
@@ -37,30 +80,27 @@ FloatHit intersect_one(const LevelScene& level, const LevelRay& ray, double from
              0,
              0};
   one.hit.geomID = RTC_INVALID_GEOMETRY_ID;
+  one.hit.instID[0] = RTC_INVALID_GEOMETRY_ID;
   QueryContext context;
-  intersect<1>(level.scene, nullptr, one, context, Coherence::Incoherent);
-  return {one.hit.geomID, one.hit.primID, one.hit.u, one.hit.v, one.ray.tfar};
+  intersect<1>(target.scene, nullptr, one, context, Coherence::Incoherent);
+  return {one.hit.geomID, one.hit.primID, one.hit.instID[0], one.hit.u, one.hit.v, one.ray.tfar};
 }
 
-inline Facet facet_of(const LevelScene& level, const FloatHit& hit) noexcept {
-  if (hit.geometry == facet_geometry) return level.level.facets[hit.primitive];
-  const Level::Block& block = level.level.blocks[hit.primitive];
-  const float u = hit.u * static_cast<float>(block.columns - 1);
-  const float v = hit.v * static_cast<float>(block.rows - 1);
-  const int column = std::clamp(static_cast<int>(u), 0, block.columns - 2);
-  const int row = std::clamp(static_cast<int>(v), 0, block.rows - 2);
+inline Facet facet_of(const LevelScene::Impl& level, const FloatHit& hit) noexcept {
+  if (hit.geometry == facet_geometry) return level.triangles[hit.primitive].facet;
+  const GridBlock& grid = level.grids[hit.primitive];
+  const float u = hit.u * static_cast<float>(grid.columns);
+  const float v = hit.v * static_cast<float>(grid.rows);
+  const int column = std::clamp(static_cast<int>(u), 0, grid.columns - 1);
+  const int row = std::clamp(static_cast<int>(v), 0, grid.rows - 1);
   const bool far_half = u - static_cast<float>(column) + (v - static_cast<float>(row)) > 1;
-  return {block.column + column, block.row + row, far_half ? Facet::Half::Far : Facet::Half::Near};
+  return {grid.column + (column << grid.step_exponent), grid.row + (row << grid.step_exponent),
+          grid.step_exponent, far_half ? Half::Far : Half::Near, grid.deviation_m};
 }
 
-// Whether the ray is below the surface where it leaves the level's box; most are far above, which
-// one look tells.
-bool ends_below(const LevelScene& level, const GridRay& ray, double leave_m) noexcept {
-  const double z_m = ray.z0 + leave_m * ray.dz;
-  const bool high =
-      z_m >= level.max_heights.at(ray.u0 + leave_m * ray.du, ray.v0 + leave_m * ray.dv);
-  return !high &&
-         (z_m < level.level.grid.min_height_m() || level.level.grid.clearance_m(ray, leave_m) < 0);
+// Whether the plane of Embree's facet can be met at once.
+inline bool is_whole(const LevelScene::Impl& level, const FloatHit& hit) noexcept {
+  return hit.geometry == block_geometry || level.triangles[hit.primitive].whole;
 }
 
 glm::vec3 one_ulp_off(const glm::vec3& direction) noexcept {
@@ -69,8 +109,79 @@ glm::vec3 one_ulp_off(const glm::vec3& direction) noexcept {
           std::nextafter(direction.z, up)};
 }
 
-bool from_behind(const LevelScene& level, const LevelRay& ray, const FloatHit& hit) noexcept {
-  const FacetPlane plane = level.level.grid.plane(facet_of(level, hit));
+Target target_of(const LevelScene& scene, std::uint32_t number) {
+  const LevelScene::Impl& level = scene.impl();
+  return {.scene = level.scene,
+          .level = &level,
+          .number = number,
+          .min_m = level.level.heights.min_m(),
+          .max_m = level.level.heights.max_m(),
+          .slack_m = level.slack_m};
+}
+
+// All levels as instances under one scene, for rays that do not pass them in order. The transform
+// is the identity: any other would round the rays of each level in its own way.
+RTCScene instance_all(const RayDevice& device, const std::vector<LevelScene>& levels) {
+  RTCScene all = new_scene(device);
+  for (unsigned i = 0; i < levels.size(); ++i) {
+    RTCGeometry instance = rtcNewGeometry(handle(device), RTC_GEOMETRY_TYPE_INSTANCE);
+    rtcSetGeometryInstancedScene(instance, levels[i].impl().scene);
+    rtcCommitGeometry(instance);
+    rtcAttachGeometryByID(all, instance, i);
+    rtcReleaseGeometry(instance);
+  }
+  rtcCommitScene(all);
+  return all;
+}
+
+Surface surface_of(const std::vector<LevelScene>& scenes) {
+  std::vector<const LevelScene::Impl*> levels;
+  for (const LevelScene& scene : scenes) levels.push_back(&scene.impl());
+  return Surface(std::move(levels));
+}
+
+}  // namespace
+
+RayTracer::Impl::Impl(const RayDevice& with, std::vector<LevelScene> levels)
+    : device(with), scenes(std::move(levels)), surface(surface_of(scenes)) {
+  for (std::uint32_t i = 0; i < scenes.size(); ++i) targets.push_back(target_of(scenes[i], i));
+  if (std::ranges::all_of(targets, [](const Target& target) { return std::isnan(target.min_m); }))
+    throw Error("ray tracer: the terrain has no height at all");
+  everything = targets.back();
+  if (scenes.size() == 1) return;
+  all = instance_all(device, scenes);
+  check(device, "joining the levels");
+  everything.scene = all;
+  everything.is_all = true;
+  for (const Target& target : targets) {
+    everything.min_m = std::fmin(everything.min_m, target.min_m);
+    everything.max_m = std::fmax(everything.max_m, target.max_m);
+    everything.slack_m = std::max(everything.slack_m, target.slack_m);
+  }
+}
+
+// Whether the ray is below the surface where it leaves the target's box; most are far above, which
+// one look tells.
+bool RayTracer::Impl::ends_below(const Target& target, const GridRay& ray,
+                                 double leave_m) const noexcept {
+  const double z_m = ray.z0 + leave_m * ray.dz;
+  if (!target.is_all) {
+    const Level& level = target.level->level;
+    const double column = (ray.u0 + leave_m * ray.du - level.first.x) / level.step;
+    const double row = (ray.v0 + leave_m * ray.dv - level.first.y) / level.step;
+    if (z_m >= target.level->max_heights.at(column, row)) return false;
+  }
+  return z_m < target.min_m || surface.clearance_m(ray, leave_m) < 0;
+}
+
+bool RayTracer::Impl::from_behind(const Target& target, const LevelRay& ray,
+                                  const FloatHit& hit) const noexcept {
+  const LevelScene::Impl& level = level_of(target, hit);
+  const Facet facet = facet_of(level, hit);
+  const Leaf* leaf = level.leaf_at(facet.column, facet.row);
+  if (leaf == nullptr) return false;
+  const Cell cell = level.cell_at(*leaf, facet.step_exponent, facet.column, facet.row);
+  const FacetPlane plane = cell.plane(facet.half);
   return ray.grid.dz > plane.u_slope_m * ray.grid.du + plane.v_slope_m * ray.grid.dv;
 }
 
@@ -78,149 +189,199 @@ bool from_behind(const LevelScene& level, const LevelRay& ray, const FloatHit& h
 // miss that ends below. The last two may be a leak through a vertex or an edge, which a direction
 // one ulp off rarely shares. If they stay, the ray came through a hole, began below ground, or
 // leaked twice: the facets along it are then asked one by one.
-std::optional<Crossing> search(const LevelScene& level, const LevelRay& ray,
-                               FloatHit hit) noexcept {
-  const HeightGrid& grid = level.level.grid;
-  const double reach_m = walk_cells / std::max(std::abs(ray.grid.du), std::abs(ray.grid.dv));
+std::optional<Crossing> RayTracer::Impl::search(const Target& target, const LevelRay& ray,
+                                                FloatHit hit) const noexcept {
+  const double cells_per_m = std::max(std::abs(ray.grid.du), std::abs(ray.grid.dv));
   double from_m = ray.enter_m;
   for (bool retried = false;;) {
     const bool miss = hit.geometry == RTC_INVALID_GEOMETRY_ID;
-    if (miss && !ends_below(level, ray.grid, ray.leave_m)) return std::nullopt;
-    if (miss || from_behind(level, ray, hit)) {
-      if (retried) return grid.first_crossing(ray.grid, from_m, ray.leave_m);
+    if (miss && !ends_below(target, ray.grid, ray.leave_m)) return std::nullopt;
+    if (miss || from_behind(target, ray, hit)) {
+      if (retried) return surface.first_crossing(ray.grid, from_m, ray.leave_m);
       retried = true;
-      hit = intersect_one(level, ray, from_m, one_ulp_off(ray.direction));
+      hit = intersect_one(target, ray, from_m, one_ulp_off(ray.direction));
       continue;
     }
+    const int step = 1 << facet_of(level_of(target, hit), hit).step_exponent;
+    const double reach_m = walk_cells * step / cells_per_m;
     const double at_m = ray.enter_m + hit.range_m;
     const double end_m = std::min(at_m + reach_m, ray.leave_m);
-    if (auto crossing = grid.first_crossing(ray.grid, std::max(from_m, at_m - reach_m), end_m))
+    if (auto crossing = surface.first_crossing(ray.grid, std::max(from_m, at_m - reach_m), end_m))
       return crossing;
     if (!(from_m < end_m && end_m < ray.leave_m)) return std::nullopt;
     from_m = end_m;
-    hit = intersect_one(level, ray, from_m, ray.direction);
+    hit = intersect_one(target, ray, from_m, ray.direction);
   }
 }
 
 template <int W>
-void decide_fast(const LevelScene& level, Packet<W>& packet) noexcept {
-  const HeightGrid& grid = level.level.grid;
-  bool any_hit = false;
+void RayTracer::Impl::decide_fast(const Target& target, Packet<W>& packet) const noexcept {
+  std::array<bool, W> whole{};
+  bool any_whole = false;
   for (int lane = 0; lane < W; ++lane) {
+    const auto i = static_cast<std::size_t>(lane);
     const FloatHit hit = packet.hit(lane);
-    const bool met = packet.valid[static_cast<std::size_t>(lane)] != 0 &&
-                     hit.geometry != RTC_INVALID_GEOMETRY_ID;
-    packet.take(lane, grid, met ? facet_of(level, hit) : Facet{});
-    any_hit |= met;
+    if (packet.valid[i] != 0 && hit.geometry != RTC_INVALID_GEOMETRY_ID) {
+      const LevelScene::Impl& level = level_of(target, hit);
+      packet.level[i] = target.is_all ? hit.instance : target.number;
+      if (is_whole(level, hit)) {
+        whole[i] = any_whole = true;
+        packet.take(lane, level, facet_of(level, hit));
+      }
+    }
+    packet.inside[i] = -1;
   }
-  if (any_hit) {
+  if (any_whole) {
     packet.find_planes();
     meet_planes(packet);
   }
   for (int lane = 0; lane < W; ++lane) {
     const auto i = static_cast<std::size_t>(lane);
-    if (packet.valid[i] == 0) continue;
+    if (packet.valid[i] == 0 || (whole[i] && packet.inside[i] > inside_margin)) continue;
     const FloatHit hit = packet.hit(lane);
-    const bool met = hit.geometry != RTC_INVALID_GEOMETRY_ID;
-    if (met && packet.inside[i] > inside_margin) continue;
-    const bool open = met || ends_below(level, packet.grid_ray(lane), packet.leave_m[i]);
-    const auto crossing = open ? search(level, packet.level_ray(lane), hit) : std::nullopt;
-    packet.range_m[i] = crossing ? crossing->range_m : std::numeric_limits<double>::infinity();
-    if (crossing) packet.take(lane, grid, crossing->facet);
+    const bool open = hit.geometry != RTC_INVALID_GEOMETRY_ID ||
+                      ends_below(target, packet.grid_ray(lane), packet.leave_m[i]);
+    packet.take(
+        lane, open ? search(target, packet.level_ray(lane), hit).value_or(Crossing{}) : Crossing{});
   }
 }
 
 template <int W>
-void decide_exact(const LevelScene& level, Packet<W>& packet) noexcept {
-  for (int lane = 0; lane < W; ++lane) {
-    const Crossing& crossing = packet.crossings[static_cast<std::size_t>(lane)];
-    packet.range_m[static_cast<std::size_t>(lane)] = crossing.range_m;
-    packet.take(lane, level.level.grid, crossing.facet);
-  }
-}
-
-template <int W>
-void trace_level(const LevelScene& level, std::uint32_t number, Tracing tracing,
-                 std::span<const Ray> rays, std::span<Hit> hits, Packet<W>& packet) noexcept {
-  if (!enter(level, rays, hits, packet)) return;
-  if (tracing == Tracing::Exact) {
+void RayTracer::Impl::trace_target(const Target& target, std::span<Hit> hits,
+                                   Packet<W>& packet) const noexcept {
+  if (!enter(target, hits, packet)) return;
+  const bool exact = target.level->tracing == Tracing::Exact;
+  if (exact) {
     for (int lane = 0; lane < W; ++lane)
       packet.exact_rays[static_cast<std::size_t>(lane)] = packet.level_ray(lane);
     packet.crossings.fill({});
   }
-  ExactQuery query{{}, packet.exact_rays.data(), packet.crossings.data()};
-  intersect<W>(level.scene, packet.valid.data(), packet.floats, query.context, Coherence::Coherent);
-  if (tracing == Tracing::Exact) {
-    decide_exact(level, packet);
+  ExactQuery query{{}, &surface, packet.exact_rays.data(), packet.crossings.data()};
+  intersect<W>(target.scene, packet.valid.data(), packet.floats, query.context,
+               Coherence::Coherent);
+  if (exact) {
+    for (int lane = 0; lane < W; ++lane)
+      packet.take(lane, packet.crossings[static_cast<std::size_t>(lane)]);
   } else {
-    decide_fast(level, packet);
+    decide_fast(target, packet);
   }
-  report(level, number, packet, hits);
+  report(target.level->level.frame, packet, hits);
 }
 
-}  // namespace
-
-struct RayTracer::Impl {
-  RTCDevice device = nullptr;
-  Tracing tracing = Tracing::Fast;
-  int width = 4;
-  std::vector<LevelScene> scenes;
-  std::atomic<std::ptrdiff_t> bytes{0};
-
-  ~Impl() {
-    for (const LevelScene& scene : scenes) rtcReleaseScene(scene.scene);
-    rtcReleaseDevice(device);
+// Whether all rays start over the finest window, so that they pass the levels in order.
+template <int W>
+bool RayTracer::Impl::start_inside(const Packet<W>& packet) const noexcept {
+  if (scenes.size() == 1) return true;
+  const glm::ivec2 low = level(0).level.first;
+  const glm::ivec2 high = level(0).last;
+  bool inside = true;
+  for (std::size_t i = 0; i < W; ++i) {
+    inside &= low.x <= packet.u0[i] && packet.u0[i] <= high.x && low.y <= packet.v0[i] &&
+              packet.v0[i] <= high.y;
   }
+  return inside;
+}
 
-  void check(std::string_view doing) const {
-    if (rtcGetDeviceError(device) == RTC_ERROR_NONE) return;
-    throw Error("ray tracer: Embree failed while {}; is there enough memory?", doing);
+template <int W>
+void RayTracer::Impl::trace_packet(Packet<W>& packet, std::span<Hit> hits) const noexcept {
+  std::ranges::fill(hits, Hit{});
+  if (!start_inside(packet)) return trace_target(everything, hits, packet);
+  for (const Target& target : targets) {
+    trace_target(target, hits, packet);
+    if (std::ranges::all_of(hits, [](const Hit& hit) { return static_cast<bool>(hit); })) return;
   }
+}
 
-  template <int W>
-  void trace(std::span<const Ray> rays, std::span<Hit> hits) const noexcept {
-    Packet<W> packet;
-    for (std::size_t begin = 0; begin < rays.size(); begin += W) {
-      const std::size_t count = std::min<std::size_t>(W, rays.size() - begin);
-      const auto out = hits.subspan(begin, count);
-      std::ranges::fill(out, Hit{});
-      for (std::size_t i = 0; i < scenes.size(); ++i) {
-        trace_level<W>(scenes[i], static_cast<std::uint32_t>(i), tracing,
-                       rays.subspan(begin, count), out, packet);
+template <int W>
+void RayTracer::Impl::trace(std::span<const Ray> rays, std::span<Hit> hits) const noexcept {
+  Packet<W> packet;
+  for (std::size_t begin = 0; begin < rays.size(); begin += W) {
+    const std::size_t count = std::min<std::size_t>(W, rays.size() - begin);
+    take_rays(level(0).level.frame, rays.subspan(begin, count), packet);
+    trace_packet(packet, hits.subspan(begin, count));
+  }
+}
+
+// Finds where rays meet the surface when they are lifted by `sign` times the deviation of whatever
+// level they are over, and by a little more than Embree's slack. A ray that is below the surface
+// where the lift changes meets it there.
+template <int W>
+void RayTracer::Impl::meet_lifted(Packet<W>& packet, double sign,
+                                  std::span<Hit> met) const noexcept {
+  std::ranges::fill(met, Hit{});
+  packet.inner_m.fill(0);
+  const auto pass = [&](Target target, double deviation_m) {
+    target.lift_m = sign * (deviation_m + 2.0 * target.slack_m);
+    const auto begin_m = packet.inner_m;
+    trace_target(target, met, packet);
+    if (target.number == 0 || target.is_all) return;
+    for (std::size_t i = 0; i < met.size(); ++i) {
+      if (!(begin_m[i] <= packet.far_m[i] && begin_m[i] < met[i].range_m)) continue;
+      GridRay ray = packet.grid_ray(static_cast<int>(i));
+      ray.z0 = packet.z_m[i] + target.lift_m;
+      if (surface.clearance_m(ray, begin_m[i]) < 0) met[i].range_m = begin_m[i];
+    }
+  };
+  if (!start_inside(packet)) return pass(everything, deviation_to(scenes.size() - 1));
+  for (const Target& target : targets) pass(target, target.level->deviation_m);
+}
+
+double RayTracer::Impl::deviation_to(std::size_t number) const noexcept {
+  float deviation_m = 0;
+  for (std::size_t i = 0; i <= number; ++i)
+    deviation_m = std::max(deviation_m, level(i).deviation_m);
+  return deviation_m;
+}
+
+// The reference lies within the levels' deviations of the surface. So a ray that starts above both
+// meets the reference no sooner than the surface when lowered by as much, and no later than when
+// raised.
+template <int W>
+void RayTracer::Impl::bound_errors(std::span<const Ray> rays, std::span<const Hit> hits,
+                                   std::span<double> bounds_m) const noexcept {
+  constexpr double infinity = std::numeric_limits<double>::infinity();
+  Packet<W> packet;
+  std::array<Hit, W> lowered, raised;
+  for (std::size_t begin = 0; begin < rays.size(); begin += W) {
+    const std::size_t count = std::min<std::size_t>(W, rays.size() - begin);
+    take_rays(level(0).level.frame, rays.subspan(begin, count), packet);
+    const bool in_order = start_inside(packet);
+    std::array<double, W> deviation_m{};
+    for (std::size_t i = 0; i < count; ++i) {
+      const Hit& hit = hits[begin + i];
+      deviation_m[i] = deviation_to(hit && in_order ? hit.level : scenes.size() - 1);
+    }
+    if (std::ranges::any_of(deviation_m, [](double any_m) { return any_m > 0; })) {
+      meet_lifted(packet, -1, std::span(lowered).first(count));
+      meet_lifted(packet, 1, std::span(raised).first(count));
+    }
+    for (std::size_t i = 0; i < count; ++i) {
+      double& bound_m = bounds_m[begin + i] = 0;
+      if (deviation_m[i] == 0) continue;
+      const double range_m = hits[begin + i].range_m;
+      packet.lifted_m[i] = packet.z_m[i] - (deviation_m[i] + 2.0 * everything.slack_m);
+      const double end_m = std::min(raised[i].range_m, packet.far_m[i]);
+      if (surface.is_uncertain(packet.grid_ray(static_cast<int>(i)), end_m)) {
+        bound_m = infinity;
+      } else if (hits[begin + i]) {
+        bound_m = std::max(range_m - lowered[i].range_m, raised[i].range_m - range_m) +
+                  (1e-9 * range_m + 1e-9);  // and what ranges themselves promise
+      } else {
+        bound_m = lowered[i] ? infinity : 0;
       }
     }
   }
-};
+}
+
+RayTracer::RayTracer(const RayDevice& device, std::vector<LevelScene> levels)
+    : impl_(std::make_unique<Impl>(device, std::move(levels))) {}
 
 RayTracer::RayTracer(std::vector<Level> levels, const glm::dvec3& p_DL, Tracing tracing,
-                     const std::string& device_config)
-    : impl_(std::make_unique<Impl>()) {
-  impl_->tracing = tracing;
-  impl_->device = rtcNewDevice(device_config.c_str());
-  if (impl_->device == nullptr)
-    throw Error("ray tracer: Embree makes no device for the settings '{}'", device_config);
-  rtcSetDeviceMemoryMonitorFunction(
-      impl_->device,
-      [](void* counter, ssize_t bytes, bool) {
-        static_cast<std::atomic<std::ptrdiff_t>*>(counter)->fetch_add(bytes,
-                                                                      std::memory_order_relaxed);
-        return true;
-      },
-      &impl_->bytes);
-  const auto native = [&](RTCDeviceProperty property) {
-    return rtcGetDeviceProperty(impl_->device, property) != 0;
-  };
-  if (native(RTC_DEVICE_PROPERTY_NATIVE_RAY16_SUPPORTED)) {
-    impl_->width = 16;
-  } else if (native(RTC_DEVICE_PROPERTY_NATIVE_RAY8_SUPPORTED)) {
-    impl_->width = 8;
-  }
-  impl_->scenes.reserve(levels.size());  // Embree keeps pointers to them
-  for (Level& level : levels) {
-    impl_->scenes.push_back({.level = std::move(level), .p_DL = p_DL});
-    build_level_scene(impl_->device, tracing, impl_->scenes.back());
-    impl_->check("building a level");
-  }
+                     const std::string& device_config) {
+  const RayDevice device(device_config);
+  std::vector<LevelScene> scenes;
+  for (Level& level : levels) scenes.emplace_back(device, std::move(level), p_DL, tracing);
+  impl_ = std::make_unique<Impl>(device, std::move(scenes));
 }
 
 RayTracer::~RayTracer() = default;
@@ -229,24 +390,23 @@ RayTracer& RayTracer::operator=(RayTracer&&) noexcept = default;
 
 void RayTracer::trace(std::span<const Ray> rays, std::span<Hit> hits) const noexcept {
   const FlushDenormals flush;
-  if (impl_->width == 16) return impl_->trace<16>(rays, hits);
-  if (impl_->width == 8) return impl_->trace<8>(rays, hits);
+  const int width = impl_->device.impl().width;
+  if (width == 16) return impl_->trace<16>(rays, hits);
+  if (width == 8) return impl_->trace<8>(rays, hits);
   impl_->trace<4>(rays, hits);
 }
 
-const HeightGrid& RayTracer::grid(std::uint32_t level) const {
-  return impl_->scenes.at(level).level.grid;
+void RayTracer::bound_errors(std::span<const Ray> rays, std::span<const Hit> hits,
+                             std::span<double> bounds_m) const noexcept {
+  const FlushDenormals flush;
+  const int width = impl_->device.impl().width;
+  if (width == 16) return impl_->bound_errors<16>(rays, hits, bounds_m);
+  if (width == 8) return impl_->bound_errors<8>(rays, hits, bounds_m);
+  impl_->bound_errors<4>(rays, hits, bounds_m);
 }
 
-std::size_t RayTracer::memory_bytes() const {
-  return static_cast<std::size_t>(impl_->bytes.load());
-}
-
-std::string RayTracer::description() const {
-  const auto version = rtcGetDeviceProperty(impl_->device, RTC_DEVICE_PROPERTY_VERSION);
-  return fmt::format("Embree {}.{}.{}, packets of {}", version / 10000, version / 100 % 100,
-                     version % 100, impl_->width);
-}
+std::span<const LevelScene> RayTracer::levels() const noexcept { return impl_->scenes; }
+const RayDevice& RayTracer::device() const noexcept { return impl_->device; }
 
 glm::dvec3 float_frame_origin(const glm::dvec3& viewpoint) {
   return glm::round(viewpoint / 2048.0) * 2048.0;

@@ -2,6 +2,7 @@
 
 #include <cstddef>
 #include <cstdint>
+#include <glm/vec2.hpp>
 #include <glm/vec3.hpp>
 #include <limits>
 #include <memory>
@@ -10,11 +11,12 @@
 #include <vector>
 
 #include "core/height_grid.h"
+#include "core/leaf.h"
 
 namespace groundray {
 
-/// How rays are decided. Ranges are the same in both: within 1e-9 * range + 1e-9 m of the reference
-/// surface.
+/// How rays are decided. Ranges are the same in both: within 1e-9 * range + 1e-9 m of the surface
+/// that the levels make.
 enum class Tracing {
   Fast,   ///< Embree chooses the facet: at most 5e-6 of rays, those that graze a silhouette, may
           ///< choose otherwise
@@ -33,36 +35,75 @@ struct Hit {
   double range_m =
       std::numeric_limits<double>::infinity();  ///< along the ray; infinite if it meets nothing
   glm::vec3 normal{0};                          ///< of the facet, unit, in D, facing up
-  std::uint32_t level = 0;                      ///< index of the level that was hit
+  float deviation_m = 0;    ///< of the leaf: how far it may be from the reference, vertically
+  std::uint32_t level = 0;  ///< index of the level that was hit
   explicit operator bool() const noexcept {
     return range_m < std::numeric_limits<double>::infinity();
   }
 };
 
-/// What one level scene is made of: parts of a height grid. Samples shared by two parts are one
-/// vertex.
+/// The part of a terrain that one level scene holds: leaves of its quadtree, and the samples that
+/// they stand on. Its window is the rectangle of those samples.
 struct Level {
-  /// A rectangle of samples without holes, traced as one grid primitive.
-  struct Block {
-    int column = 0;
-    int row = 0;
-    int columns = 0;  ///< samples, 2 to 32767
-    int rows = 0;
-  };
-  HeightGrid grid;
-  std::vector<Block> blocks;
-  std::vector<Facet> facets;  ///< facets outside the blocks
+  GridFrame frame;           ///< of the DEM; the same for all levels of a tracer
+  HeightArray heights;       ///< every step-th sample of the DEM from `first` on; where the window
+                             ///< reaches the DEM's last column or row, that is its last
+  glm::ivec2 first{0};       ///< the DEM's sample at heights(0, 0): multiples of step
+  int step = 1;              ///< of the finest leaves; a power of two
+  int leaf_cells = 8;        ///< side of a leaf in its own cells; a power of two
+  std::vector<Leaf> leaves;  ///< they tile the window without the next finer level's
 };
 
-/// Traces rays through an ordered list of level scenes: each level in turn, until one is hit. All
-/// of Embree is in here. Immutable; any number of threads may trace at once.
+/// Embree, started once and shared by the scenes made with it.
+class RayDevice {
+ public:
+  /// @param config  passed to rtcNewDevice, for example "max_isa=avx2".
+  /// @throws Error if Embree refuses it.
+  explicit RayDevice(const std::string& config = "");
+
+  /// Bytes that Embree holds for the scenes that live, vertices included.
+  std::size_t memory_bytes() const;
+
+  /// Which Embree this is, and how wide its packets are: "Embree 3.13.5, packets of 8".
+  std::string description() const;
+
+  struct Impl;
+  const Impl& impl() const noexcept { return *impl_; }
+
+ private:
+  std::shared_ptr<const Impl> impl_;
+};
+
+/// A level, built for tracing. Immutable; copies share it.
+class LevelScene {
+ public:
+  /// @param p_DL  origin of the float frame L that Embree works in, in D; keep it near the sensors.
+  /// @throws Error if the level has no height, or Embree fails: its message.
+  LevelScene(const RayDevice& device, Level level, const glm::dvec3& p_DL, Tracing tracing);
+
+  const Level& level() const noexcept;
+  const glm::dvec3& p_DL() const noexcept;
+  Tracing tracing() const noexcept;
+  /// Largest deviation of its leaves, metres.
+  float deviation_m() const noexcept;
+  std::size_t triangle_count() const noexcept;
+  /// Leaves that bridge holes: coarser than the DEM, with some of its samples missing.
+  std::size_t bridging_leaves() const noexcept;
+
+  struct Impl;
+  const Impl& impl() const noexcept { return *impl_; }
+
+ private:
+  std::shared_ptr<const Impl> impl_;
+};
+
+/// Traces rays through nested level scenes that make one surface. All of Embree is in here.
+/// Immutable; any number of threads may trace at once.
 class RayTracer {
  public:
-  /// @param levels         finest first; a ray must pass them in this order.
-  /// @param p_DL           origin of the float frame L that Embree works in, in D; keep it near the
-  /// sensors.
-  /// @param device_config  passed to rtcNewDevice, for example "max_isa=avx2".
-  /// @throws Error if Embree refuses: its message, and what was being built.
+  /// @param levels  finest first, each window inside the next; same frame, L and tracing.
+  RayTracer(const RayDevice& device, std::vector<LevelScene> levels);
+  /// The same, from levels of its own.
   RayTracer(std::vector<Level> levels, const glm::dvec3& p_DL, Tracing tracing,
             const std::string& device_config = "");
   ~RayTracer();
@@ -70,18 +111,23 @@ class RayTracer {
   RayTracer& operator=(RayTracer&&) noexcept;
 
   /// Finds the first hit of each ray from above. Neighbouring rays should be alike: they are traced
-  /// in packets.
+  /// in packets. Rays that start over the finest window pass the levels one after the other; others
+  /// meet them all at once.
   /// @param hits  as many as there are rays.
   void trace(std::span<const Ray> rays, std::span<Hit> hits) const noexcept;
 
-  /// The height grid of a level.
-  const HeightGrid& grid(std::uint32_t level) const;
+  /// Bounds how far each hit may be from that on the reference surface, metres along the ray.
+  /// Infinite where the reference may be met nowhere or much further: behind a silhouette within
+  /// the levels' deviations, over holes that coarse cells bridge, and for a ray that starts within
+  /// the deviation of the ground. The bound of a miss is 0, or infinite if the reference may be
+  /// met.
+  /// @param hits    of the same rays, as trace finds them.
+  /// @param bounds  as many as there are rays.
+  void bound_errors(std::span<const Ray> rays, std::span<const Hit> hits,
+                    std::span<double> bounds_m) const noexcept;
 
-  /// Bytes that Embree holds for the scenes, vertices included.
-  std::size_t memory_bytes() const;
-
-  /// Which Embree this is, and how wide its packets are: "Embree 3.13.5, packets of 8".
-  std::string description() const;
+  std::span<const LevelScene> levels() const noexcept;
+  const RayDevice& device() const noexcept;
 
  private:
   struct Impl;

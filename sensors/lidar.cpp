@@ -9,6 +9,7 @@
 #include <glm/geometric.hpp>
 #include <glm/gtc/quaternion.hpp>
 #include <glm/mat3x3.hpp>
+#include <limits>
 #include <span>
 #include <vector>
 
@@ -30,6 +31,7 @@ struct Echo {
   float sin_incidence;
   float time_s;
   std::uint16_t ring;
+  float deviation_m;
 };
 
 // What the echoes of one volley share.
@@ -93,7 +95,7 @@ class Sweep {
 
 // The columns of a scan, to be filled row by row.
 struct Rows {
-  explicit Rows(PointCloud& cloud)
+  Rows(PointCloud& cloud, LidarSpec::ErrorBound with)
       : x(cloud.add<float>("x")),
         y(cloud.add<float>("y")),
         z(cloud.add<float>("z")),
@@ -112,7 +114,9 @@ struct Rows {
         incidence(cloud.add<float>("incidence")),
         label(cloud.add<std::uint16_t>("label")),
         instance(cloud.add<std::uint32_t>("instance")),
-        error_estimate(cloud.add<float>("error_estimate")) {}
+        error_estimate(cloud.add<float>("error_estimate")) {
+    if (with == LidarSpec::ErrorBound::Report) error_bound = cloud.add<float>("error_bound");
+  }
 
   void write(std::size_t row, const Echo& echo, const SurfaceTruth& surface) const {
     x[row] = echo.p_SQ.x;
@@ -133,7 +137,9 @@ struct Rows {
     incidence[row] = std::atan2(echo.sin_incidence, echo.cos_incidence);
     label[row] = surface.label;
     instance[row] = surface.instance;
-    error_estimate[row] = 0;
+    // The surface may be this much higher or lower; along the beam that is this much.
+    error_estimate[row] =
+        echo.deviation_m == 0 ? 0 : echo.deviation_m * echo.normal.z / echo.cos_incidence;
   }
 
   std::span<float> x, y, z, intensity, time_s;
@@ -144,6 +150,7 @@ struct Rows {
   std::span<std::uint16_t> label;
   std::span<std::uint32_t> instance;
   std::span<float> error_estimate;
+  std::span<float> error_bound;  // empty if nobody asked
 };
 
 // A few firing sequences on their way through the pipeline. Its buffers are used again and again.
@@ -155,6 +162,7 @@ struct Chunk {
   std::vector<HeadPose> heads;  // by sequence and volley
   std::vector<Ray> rays;        // by shot and sequence: neighbours in azimuth make alike packets
   std::vector<Hit> hits;
+  std::vector<double> bounds_m;  // of the hits' ranges, if somebody asked
 };
 
 // Calls `act(sequence in the chunk, shot, head)` for every pulse of a chunk, in firing order.
@@ -198,6 +206,12 @@ void cast(const Sweep& sweep, const ScanPattern& pattern, const RayTracer& trace
   tracer.trace(chunk.rays, chunk.hits);
 }
 
+float rounded_up(double value) {
+  const auto nearest = static_cast<float>(value);
+  return nearest < value ? std::nextafter(nearest, std::numeric_limits<float>::infinity())
+                         : nearest;
+}
+
 // Writes the echoes of a chunk, in firing order.
 void write(const ScanPattern& pattern, double near_m, double range_noise_sigma_m,
            const RandomKey& sweep_key, const SurfaceTruth& surface, const Chunk& chunk,
@@ -221,8 +235,10 @@ void write(const ScanPattern& pattern, double near_m, double range_noise_sigma_m
     rows.write(row++,
                {hit.range_m, ray.origin + ray.direction * hit.range_m, p_SQ, hit.normal,
                 -glm::dot(direction, hit.normal), glm::length(glm::cross(direction, hit.normal)),
-                head.time_s, shots[shot].ring},
+                head.time_s, shots[shot].ring, hit.deviation_m},
                surface);
+    if (rows.error_bound.empty()) return;
+    rows.error_bound[row - 1] = rounded_up(chunk.bounds_m[shot * chunk.count + k]);
   });
 }
 
@@ -276,7 +292,10 @@ std::size_t stream_chunks(std::size_t sequences, std::size_t per_chunk, const Me
 }  // namespace
 
 Lidar::Lidar(const LidarSpec& spec)
-    : pattern_(spec.pattern), gate_(spec.gate), range_noise_sigma_m_(spec.range_noise_sigma_m) {
+    : pattern_(spec.pattern),
+      gate_(spec.gate),
+      range_noise_sigma_m_(spec.range_noise_sigma_m),
+      error_bound_(spec.error_bound) {
   Violations broken(spec.model.empty() ? "lidar" : spec.model);
   broken.unless(gate_.near_m >= 0 && gate_.near_m < gate_.far_m,
                 "range gate [{}, {}] m is empty or begins below 0: are near and far swapped?",
@@ -292,11 +311,15 @@ PointCloud Lidar::scan(const Scene& scene, const Trajectory& X_DS, std::int64_t 
   const std::size_t per_chunk = std::max<std::size_t>(1, chunk_pulses / pattern_.shots().size());
   const RandomKey key{seed, sensor_number, static_cast<std::uint32_t>(number)};
   PointCloud cloud(sweep.sequences() * pattern_.shots().size());
-  const Rows rows(cloud);
+  const Rows rows(cloud, error_bound_);
   const std::size_t count = stream_chunks(
       sweep.sequences(), per_chunk,
       [&](Chunk& chunk) {
         cast(sweep, pattern_, scene.rays, gate_.far_m, chunk);
+        if (error_bound_ == LidarSpec::ErrorBound::Report) {
+          chunk.bounds_m.resize(chunk.rays.size());
+          scene.rays.bound_errors(chunk.rays, chunk.hits, chunk.bounds_m);
+        }
         chunk.echoes = static_cast<std::size_t>(std::ranges::count_if(
             chunk.hits, [&](const Hit& hit) { return hit && hit.range_m >= gate_.near_m; }));
       },

@@ -24,6 +24,9 @@ struct LidarSpec {
   SpinningPattern pattern;
   RangeGate gate;
   double range_noise_sigma_m = 0;  ///< of a Gaussian along the beam; 0 for none
+  /// Whether scans bound how far each range is from the reference surface, which takes two more
+  /// rays where the terrain is simplified.
+  enum class ErrorBound { Omit, Report } error_bound = ErrorBound::Omit;
 };
 
 /// A scanning time-of-flight lidar, one ray for each pulse. Immutable, so any number of threads may
@@ -39,7 +42,8 @@ class Lidar {
   /// docs/formats.md): x y z (float, m, S as the beam fired), intensity, time (float, s since the
   /// sweep's stamp), ring, return_index, return_count, world_x world_y world_z (double, m, D),
   /// range_true (double, m, from where the beam left), nx ny nz (float, D), incidence (float, rad),
-  /// label, instance, error_estimate (float, m).
+  /// label, instance, error_estimate (float, m) and, if asked for, error_bound (float, m; see
+  /// RayTracer::bound_errors).
   /// @param X_DS   path of sensor S through D; must cover the sweep.
   /// @param sweep  which turn of the head since time 0.
   /// @param sensor_number  tells sensors of one dataset apart in the random numbers.
@@ -51,6 +55,7 @@ class Lidar {
   ScanPattern pattern_;
   RangeGate gate_;
   double range_noise_sigma_m_;
+  LidarSpec::ErrorBound error_bound_;
 };
 
 }  // namespace groundray

@@ -12,6 +12,7 @@
 #include "core/ray_tracer.h"
 #include "sensors/lidar.h"
 #include "terrain/dem_io.h"
+#include "terrain/terrain.h"
 
 namespace groundray {
 
@@ -20,6 +21,7 @@ struct TerrainSpec {
   std::filesystem::path dem;  ///< absolute, or relative to the working directory
   DemOptions options;
   std::uint16_t label = 1;  ///< semantic class of the ground
+  TerrainDetail detail;
 };
 
 /// A platform that follows a recorded path: body B in W, TUM form.

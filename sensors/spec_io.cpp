@@ -195,6 +195,11 @@ TerrainSpec read_terrain(Map terrain, const fs::path& path) {
   if (terrain.read_number("nodata", Need::Optional, nodata)) spec.options.nodata = nodata;
   terrain.read_text("reproject_to", Need::Optional, spec.options.reproject_to);
   terrain.read_whole("label", Need::Optional, spec.label);
+  terrain.read_number("tolerance_m", Need::Optional, spec.detail.tolerance_m, not_negative);
+  double tolerance_mrad = 0;
+  terrain.read_number("tolerance_mrad", Need::Optional, tolerance_mrad, not_negative);
+  spec.detail.tolerance_rad = tolerance_mrad / 1000;
+  terrain.read_whole("memory_mib", Need::Optional, spec.detail.memory_mib);
   terrain.close();
   return spec;
 }
@@ -312,6 +317,9 @@ MountedLidar read_mounted(Map entry, const fs::path& path, const fs::path& prese
     lidar.gate = {gate[0], gate[1]};
   }
   entry.read_number("range_noise_sigma_m", Need::Optional, lidar.range_noise_sigma_m, not_negative);
+  entry.read_choice<LidarSpec::ErrorBound>(
+      "error_bound", Need::Optional, lidar.error_bound,
+      {{"omit", LidarSpec::ErrorBound::Omit}, {"report", LidarSpec::ErrorBound::Report}});
   entry.close();
   return mounted;
 }

@@ -35,7 +35,8 @@ struct DemOptions {
 /// A file cut short is an error; only the library of classic netCDF (not netCDF-4) hides it and
 /// gives zeros.
 ///
-/// Heights take 4 bytes for each sample, twice that during a warp. Any number of threads may load.
+/// Heights take 4 bytes for each sample. GDAL's cache of blocks is limited to 64 MiB, unless
+/// GDAL_CACHEMAX is set. Any number of threads may load.
 /// @throws Error that names the file, for one that is missing, no raster or cut short; without
 ///         heights; smaller than 2 x 2 or larger than 2^31 samples; of several bands or complex
 ///         numbers; with infinite heights or heights in an unknown unit; placed by ground control

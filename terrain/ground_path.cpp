@@ -109,7 +109,7 @@ class Curve {
 // A vehicle on the ground: poses from the heights below its centre and its wheels.
 class Vehicle {
  public:
-  Vehicle(const HeightGrid& ground, double height_m, glm::dvec2 footprint_m)
+  Vehicle(const Ground& ground, double height_m, glm::dvec2 footprint_m)
       : ground_(ground), height_m_(height_m), footprint_m_(footprint_m) {}
 
   Pose stand_at(const Curve::Point& point, std::chrono::nanoseconds time) const {
@@ -135,16 +135,16 @@ class Vehicle {
  private:
   double ground_m(glm::dvec2 p, const char* part, std::chrono::nanoseconds time) const {
     if (const auto z_m = ground_.height_m_at(p)) return *z_m;
-    const glm::dvec2 uv = ground_.to_grid(p);
-    const bool inside =
-        0 <= uv.x && uv.x <= ground_.columns() - 1 && 0 <= uv.y && uv.y <= ground_.rows() - 1;
+    const glm::dvec2 uv = ground_.frame().to_grid(p);
+    const glm::dvec2 last(ground_.frame().samples - 1);
+    const bool inside = 0 <= uv.x && uv.x <= last.x && 0 <= uv.y && uv.y <= last.y;
     throw Error(
         "ground path: at {:.2f} s the vehicle's {} would stand {} at ({:.3f}, {:.3f}) m in D; move "
         "the waypoints",
         Seconds(time).count(), part, inside ? "in a hole of the DEM" : "outside the DEM", p.x, p.y);
   }
 
-  const HeightGrid& ground_;
+  const Ground& ground_;
   double height_m_;
   glm::dvec2 footprint_m_;
 };
@@ -172,7 +172,7 @@ void check_waypoints(std::span<const glm::dvec2> p, Violations& broken) {
 
 }  // namespace
 
-Trajectory build_ground_path(const HeightGrid& ground, const GroundPathSpec& spec) {
+Trajectory build_ground_path(const Ground& ground, const GroundPathSpec& spec) {
   const auto is_positive = [](double x) { return std::isfinite(x) && x > 0; };
   const double duration_s = Seconds(spec.duration).count();
   Violations broken("ground path");

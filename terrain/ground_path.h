@@ -4,8 +4,8 @@
 #include <glm/vec2.hpp>
 #include <vector>
 
-#include "core/height_grid.h"
 #include "core/trajectory.h"
+#include "terrain/ground.h"
 
 namespace groundray {
 
@@ -28,6 +28,6 @@ struct GroundPathSpec {
 ///         would stand outside the DEM or in a hole.
 /// @see Yuksel, Schaefer, Keyser, Parameterization and applications of Catmull-Rom curves (2011):
 ///      the centripetal curve has no cusps or loops between waypoints.
-Trajectory build_ground_path(const HeightGrid& ground, const GroundPathSpec& spec);
+Trajectory build_ground_path(const Ground& ground, const GroundPathSpec& spec);
 
 }  // namespace groundray

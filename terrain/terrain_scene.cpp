@@ -6,62 +6,63 @@
 namespace groundray {
 namespace {
 
-constexpr int tile_cells = 64;
-// Side of the parts of a tile with holes: a triangle takes ten times its memory in a grid.
-constexpr int part_cells = 8;
+constexpr int leaf_cells = 8;
 
-// Calls `act` for every block of up to `cells` x `cells` cells that `whole` is made of.
-template <typename Act>
-void for_each_tile(const Level::Block& whole, int cells, const Act& act) {
-  for (int row = 0; row < whole.rows - 1; row += cells) {
-    for (int column = 0; column < whole.columns - 1; column += cells) {
-      act(Level::Block{whole.column + column, whole.row + row,
-                       std::min(cells, whole.columns - 1 - column) + 1,
-                       std::min(cells, whole.rows - 1 - row) + 1});
+struct Content {
+  bool any = false;
+  bool all = true;
+};
+
+Content content(const HeightGrid& grid, glm::ivec2 low, glm::ivec2 high) {
+  Content found;
+  for (int row = low.y; row <= high.y; ++row) {
+    for (int column = low.x; column <= high.x; ++column) {
+      const bool hole = std::isnan(grid.height_m(column, row));
+      found.any |= !hole;
+      found.all &= !hole;
     }
   }
+  return found;
 }
 
-bool has_hole(const HeightGrid& grid, const Level::Block& block) {
-  for (int row = block.row; row < block.row + block.rows; ++row) {
-    for (int column = block.column; column < block.column + block.columns; ++column) {
-      if (std::isnan(grid.height_m(column, row))) return true;
-    }
-  }
-  return false;
-}
-
-void append_facets(const HeightGrid& grid, const Level::Block& block, std::vector<Facet>& facets) {
-  for (int row = block.row; row < block.row + block.rows - 1; ++row) {
-    for (int column = block.column; column < block.column + block.columns - 1; ++column) {
-      for (const Facet::Half half : {Facet::Half::Near, Facet::Half::Far}) {
-        const Facet facet{column, row, half};
-        if (!std::isnan(grid.plane(facet).height_m)) facets.push_back(facet);
-      }
-    }
-  }
+// Heights are told apart by where they lie in memory: clipmaps share those that did not change.
+bool is_same(const Level& a, const Level& b) {
+  return a.first == b.first && a.step == b.step &&
+         a.heights.heights_m().data() == b.heights.heights_m().data() && a.leaves == b.leaves;
 }
 
 }  // namespace
 
 Level full_resolution_level(const HeightGrid& grid) {
-  Level level{grid, {}, {}};
-  const bool whole = grid.hole_count() == 0;
-  const Level::Block all{0, 0, grid.columns(), grid.rows()};
-  for_each_tile(all, tile_cells, [&](const Level::Block& tile) {
-    if (whole || !has_hole(grid, tile)) {
-      level.blocks.push_back(tile);
-      return;
+  Level level{.frame = grid.frame(), .heights = grid.samples(), .leaf_cells = leaf_cells};
+  const glm::ivec2 last(grid.columns() - 1, grid.rows() - 1);
+  for (int row = 0; row < last.y; row += leaf_cells) {
+    for (int column = 0; column < last.x; column += leaf_cells) {
+      const glm::ivec2 low(column, row);
+      const Content found = grid.hole_count() == 0
+                                ? Content{true, true}
+                                : content(grid, low, glm::min(low + leaf_cells, last));
+      if (found.any) level.leaves.push_back({column, row, 1, 0, !found.all});
     }
-    for_each_tile(tile, part_cells, [&](const Level::Block& part) {
-      if (has_hole(grid, part)) {
-        append_facets(grid, part, level.facets);
-      } else {
-        level.blocks.push_back(part);
-      }
-    });
-  });
+  }
   return level;
+}
+
+RayTracer build_tracer(const Clipmap& clipmap, const glm::dvec3& p_DL, Tracing tracing,
+                       const RayTracer* previous) {
+  const RayDevice device = previous != nullptr ? previous->device() : RayDevice();
+  std::vector<LevelScene> scenes;
+  for (const Level& level : clipmap.levels()) {
+    const LevelScene* known = nullptr;
+    if (previous != nullptr) {
+      for (const LevelScene& scene : previous->levels()) {
+        if (scene.p_DL() == p_DL && scene.tracing() == tracing && is_same(scene.level(), level))
+          known = &scene;
+      }
+    }
+    scenes.push_back(known != nullptr ? *known : LevelScene(device, level, p_DL, tracing));
+  }
+  return {device, std::move(scenes)};
 }
 
 }  // namespace groundray

@@ -7,7 +7,6 @@
 #include <cstddef>
 #include <cstdint>
 #include <cstdlib>
-#include <glm/vec4.hpp>
 #include <numbers>
 #include <span>
 #include <string>
@@ -93,9 +92,7 @@ std::uint64_t fingerprint(const World& world) {
   static_assert(sizeof(Trajectory::Sample) == 8 * sizeof(double),
                 "no padding, whose bytes are anything");
   Fingerprint print;
-  print.add(world.dem.grid.heights_m());
-  const glm::dvec4 frame(world.dem.grid.origin_m(), world.dem.grid.step_m());
-  print.add(std::span<const glm::dvec4>(&frame, 1));
+  print.add(std::span<const char>(world.terrain.fingerprint()));
   for (const PlacedLidar& lidar : world.lidars) {
     print.add(std::span(lidar.X_DS.samples()));
     print.add(std::span<const char>(calibration(lidar)));
@@ -104,7 +101,7 @@ std::uint64_t fingerprint(const World& world) {
 }
 
 std::string header(const World& world) {
-  const glm::dvec3 origin_m = world.dem.origin_w_m;
+  const glm::dvec3 origin_m = world.terrain.header().origin_w_m;
   std::string text = fmt::format(
       "groundray_dataset: 1\nversion: {}\nseed: {}\ntracing: {}\ninputs: "
       "\"{:016x}\"\ntime_origin_s: {}\n"
@@ -114,7 +111,8 @@ std::string header(const World& world) {
       yaml_text(GROUNDRAY_VERSION), world.spec.seed.value,
       world.spec.tracing == Tracing::Fast ? "fast" : "exact", fingerprint(world),
       decimal_seconds(world.begin), origin_m.x, origin_m.y, origin_m.z,
-      yaml_text(world.dem.crs_name), yaml_text(world.dem.crs_wkt), yaml_text(world.spec.text));
+      yaml_text(world.terrain.header().crs_name), yaml_text(world.terrain.header().crs_wkt),
+      yaml_text(world.spec.text));
   for (std::size_t i = 0; i < world.lidars.size(); ++i) {
     const MountedLidar& spec = world.lidars[i].spec;
     text += fmt::format(

@@ -6,6 +6,7 @@
 #include <csignal>
 #include <cstdio>
 #include <optional>
+#include <utility>
 #include <vector>
 
 #include "apps/groundray/dataset.h"
@@ -36,27 +37,36 @@ struct Tally {
   std::chrono::duration<double> scanning{0};
 };
 
-// Makes scenes as frames ask for them: the float frame L follows the viewpoint over its lattice, so
-// that a frame's bytes depend on the frame alone.
+// Makes scenes as frames ask for them: the float frame L follows the sensor over its lattice, the
+// levels of the terrain follow its positions during the frame, so that a frame's bytes depend on
+// the frame alone.
 class SceneFor {
  public:
   explicit SceneFor(const World& world) : world_(world) {}
 
-  const Scene& operator()(const glm::dvec3& viewpoint) {
-    const glm::dvec3 p_DL = float_frame_origin(viewpoint);
-    if (!scene_ || p_DL != p_DL_) {
+  const Scene& operator()(const PlacedLidar& lidar, std::int64_t frame) {
+    const glm::dvec3 p_DL =
+        float_frame_origin(lidar.X_DS.pose_at(lidar.lidar.pattern().stamp(frame)).translation_m);
+    const HeightGrid* whole = world_.terrain.whole();
+    if (whole == nullptr) {
+      const SensorBox sensors = sensor_box(lidar, frame);
+      clipmap_ =
+          clipmap_ ? clipmap_->moved_to(sensors) : world_.terrain.clipmap(sensors, world_.reach_m);
+      take(build_tracer(*clipmap_, p_DL, world_.spec.tracing, scene_ ? &scene_->rays : nullptr));
+    } else if (!scene_ || p_DL != p_DL_) {
       scene_.reset();  // before the next one is built: two would need twice the memory
-      scene_.emplace(
-          Scene{RayTracer({full_resolution_level(world_.dem.grid)}, p_DL, world_.spec.tracing),
-                {world_.spec.terrain.label, 0}});
-      p_DL_ = p_DL;
+      take({{full_resolution_level(*whole)}, p_DL, world_.spec.tracing});
     }
+    p_DL_ = p_DL;
     return *scene_;
   }
 
  private:
+  void take(RayTracer rays) { scene_ = Scene{std::move(rays), {world_.spec.terrain.label, 0}}; }
+
   const World& world_;
   glm::dvec3 p_DL_{0};
+  std::optional<Clipmap> clipmap_;
   std::optional<Scene> scene_;
 };
 
@@ -80,7 +90,7 @@ void make_frame(const World& world, const Dataset& dataset, const Frame& which, 
   const auto [sensor, frame] = which;
   const PlacedLidar& lidar = world.lidars[sensor];
   const ScanPattern& pattern = lidar.lidar.pattern();
-  const Scene& scene = scene_for(lidar.X_DS.pose_at(pattern.stamp(frame)).translation_m);
+  const Scene& scene = scene_for(lidar, frame);
   const auto begin = Clock::now();
   const PointCloud scan = lidar.lidar.scan(scene, lidar.X_DS, frame, world.spec.seed, sensor);
   tally.scanning += Clock::now() - begin;
@@ -90,8 +100,9 @@ void make_frame(const World& world, const Dataset& dataset, const Frame& which, 
                   pattern.shots().size();
   ++tally.scans;
 
-  const glm::dvec3 origin_m = world.dem.origin_w_m;
-  write_png(dataset.preview_path(lidar, frame), draw_preview(scan, lidar, world.dem, frame));
+  const glm::dvec3 origin_m = world.terrain.header().origin_w_m;
+  write_png(dataset.preview_path(lidar, frame),
+            draw_preview(scan, lidar, world.terrain.ground(), frame));
   write_ply(dataset.scan_path(lidar, frame), scan,
             {fmt::format("origin_w {} {} {}", origin_m.x, origin_m.y, origin_m.z)});
 }

@@ -3,55 +3,88 @@
 #include <fmt/format.h>
 
 #include <cstdio>
+#include <optional>
 
 #include "apps/groundray/world.h"
+#include "terrain/certificate.h"
+#include "terrain/dem_file.h"
 #include "terrain/dem_io.h"
 #include "terrain/terrain_scene.h"
 
 namespace groundray {
 namespace {
 
-// Measured on Embree's scenes of 1025 x 1025 and 4097 x 4097 samples: its share for each cell of a
-// grid, and for each single triangle, index and facet included. Besides, a sample takes its height
-// and a vertex of three floats.
-constexpr double bytes_per_cell = 20.2;
-constexpr double bytes_per_facet = 104;
-constexpr double bytes_per_sample = 16;
+constexpr double mib = 1 << 20;
 
-double traced_mib(const HeightGrid& grid) {
-  const Level level = full_resolution_level(grid);
-  double cells = 0;
-  for (const Level::Block& block : level.blocks) {
-    cells += static_cast<double>(block.columns - 1) * static_cast<double>(block.rows - 1);
-  }
-  return (static_cast<double>(grid.heights_m().size()) * bytes_per_sample + cells * bytes_per_cell +
-          static_cast<double>(level.facets.size()) * bytes_per_facet) /
-         (1 << 20);
+void print_frame(const GridFrame& frame, const glm::dvec3& origin_w_m) {
+  const glm::dvec2 step_m = glm::abs(frame.step_m);
+  const glm::dvec2 cells(frame.samples - 1);
+  const glm::dvec2 centre_m = glm::dvec2(origin_w_m) + frame.origin_m + cells * frame.step_m / 2.0;
+  fmt::print("centre    {:.3f}, {:.3f} m\n", centre_m.x, centre_m.y);
+  fmt::print("extent    {:.1f} x {:.1f} m\n", step_m.x * cells.x, step_m.y * cells.y);
+  fmt::print("cell      {:.6g} x {:.6g} m\n", step_m.x, step_m.y);
 }
 
-void print_surface(const Dem& dem) {
-  const HeightGrid& grid = dem.grid;
-  const glm::dvec2 step_m = glm::abs(grid.step_m());
-  const glm::dvec2 centre_m = glm::dvec2(dem.origin_w_m) + grid.origin_m() +
-                              glm::dvec2(grid.columns() - 1, grid.rows() - 1) * grid.step_m() / 2.0;
-  fmt::print("centre    {:.3f}, {:.3f} m\n", centre_m.x, centre_m.y);
-  fmt::print("extent    {:.1f} x {:.1f} m\n", step_m.x * (grid.columns() - 1),
-             step_m.y * (grid.rows() - 1));
-  fmt::print("cell      {:.6g} x {:.6g} m\n", step_m.x, step_m.y);
+void print_heights(const HeightGrid& grid) {
+  const double samples = static_cast<double>(grid.heights_m().size());
   fmt::print("heights   {:.3f} to {:.3f} m\n", grid.min_height_m(), grid.max_height_m());
-  fmt::print(
-      "holes     {} samples ({:.2f} %)\n", grid.hole_count(),
-      100 * static_cast<double>(grid.hole_count()) / static_cast<double>(grid.heights_m().size()));
-  fmt::print("memory    about {:.0f} MiB to trace\n", traced_mib(grid));
+  fmt::print("holes     {} samples ({:.2f} %)\n", grid.hole_count(),
+             100 * static_cast<double>(grid.hole_count()) / samples);
+}
+
+void print_certificate(const DemFile& dem) {
+  const std::optional<Certificate> certificate = Certificate::open(dem);
+  if (!certificate) {
+    fmt::print("certified no; `groundray terrain certify` does\n");
+    return;
+  }
+  const LevelSummary& root = certificate->levels().back();
+  fmt::print("certified yes, in {}: one cell for all of it is within {:.6g} m\n",
+             certificate->folder().string(), root.max_deviation_m);
 }
 
 // What the header tells comes first: it may be all there is to tell of a DEM that cannot be traced.
-void print_dem(const std::filesystem::path& file) {
-  const DemInfo info = inspect_dem(file);
+void print_dem(const std::filesystem::path& path) {
+  const DemInfo info = inspect_dem(path);
   fmt::print("format    {}, {}\nsize      {} x {} samples\nCRS       {}\n", info.driver,
              info.sample_type, info.columns, info.rows, info.crs_name);
   std::fflush(stdout);
-  print_surface(load_dem(file));
+  const DemFile dem(path);
+  const DemHeader& header = dem.header();
+  print_frame({header.samples, header.origin_m, header.step_m, 1.0 / header.step_m},
+              header.origin_w_m);
+  const double traced_mib = Terrain::whole_bytes(header.samples) / mib;
+  if (traced_mib < TerrainDetail{}.memory_mib) print_heights(load_dem(path).grid);
+  fmt::print("memory    about {:.0f} MiB to trace as a whole\n", traced_mib);
+  print_certificate(dem);
+}
+
+// The surface round the first frame's sensors.
+void print_levels(const World& world) {
+  const Terrain& terrain = world.terrain;
+  const PlacedLidar& first = world.lidars.front();
+  const SensorBox sensors = sensor_box(first, 0);
+  const glm::dvec3 p_DL =
+      float_frame_origin(first.X_DS.pose_at(std::chrono::nanoseconds(0)).translation_m);
+  const RayTracer rays =
+      terrain.whole() != nullptr
+          ? RayTracer({full_resolution_level(*terrain.whole())}, p_DL, world.spec.tracing)
+          : build_tracer(terrain.clipmap(sensors, world.reach_m), p_DL, world.spec.tracing);
+  std::size_t triangles = 0;
+  double bytes = static_cast<double>(rays.device().memory_bytes());
+  fmt::print("levels    round the first frame; deviation is the certified bound, in height\n");
+  fmt::print("  {:>10} {:>21} {:>12} {:>12} {:>9}\n", "cell m", "window m", "triangles",
+             "deviation m", "bridging");
+  for (const LevelScene& scene : rays.levels()) {
+    const Level& level = scene.level();
+    const glm::dvec2 cell_m = glm::abs(terrain.frame().step_m) * static_cast<double>(level.step);
+    const glm::dvec2 window_m = glm::dvec2(level.heights.size() - 1) * cell_m;
+    fmt::print("  {:>10.6g} {:>10.0f} x {:>8.0f} {:>12} {:>12.4g} {:>9}\n", cell_m.x, window_m.x,
+               window_m.y, scene.triangle_count(), scene.deviation_m(), scene.bridging_leaves());
+    triangles += scene.triangle_count();
+    bytes += 4.0 * static_cast<double>(level.heights.heights_m().size());
+  }
+  fmt::print("triangles {} in {:.0f} MiB\n", triangles, bytes / mib);
 }
 
 void print_scene(const World& world) {
@@ -59,8 +92,10 @@ void print_scene(const World& world) {
   fmt::print("duration  {} s, {} tracing\n", world.spec.duration_s,
              world.spec.tracing == Tracing::Fast ? "fast" : "exact");
   fmt::print("terrain   {}\n", world.spec.terrain.dem.string());
-  fmt::print("CRS       {}\n", world.dem.crs_name);
-  print_surface(world.dem);
+  fmt::print("CRS       {}\n", world.terrain.header().crs_name);
+  print_frame(world.terrain.frame(), world.terrain.header().origin_w_m);
+  if (world.terrain.whole() != nullptr) print_heights(*world.terrain.whole());
+  print_levels(world);
   for (const PlacedLidar& lidar : world.lidars) {
     const ScanPattern& pattern = lidar.lidar.pattern();
     const auto pulses = static_cast<double>(pattern.first_sequence(lidar.sweeps)) *

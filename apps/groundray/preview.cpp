@@ -96,10 +96,11 @@ struct MapWindow {
   }
 };
 
-void draw_hillshade(Image8& image, const MapWindow& window, const HeightGrid& ground) {
+void draw_hillshade(Image8& image, const MapWindow& window, const Ground& ground) {
   const glm::dvec3 sun =
       glm::normalize(glm::dvec3(-1, 1, 1.4));  // from the north-west, as maps have it
-  const double reach_m = std::max(2 * window.half_m / width, 0.5 * std::abs(ground.step_m().x));
+  const double reach_m =
+      std::max(2 * window.half_m / width, 0.5 * std::abs(ground.frame().step_m.x));
   for (int y = 0; y < width; ++y) {
     for (int x = 0; x < width; ++x) {
       const glm::dvec2 p = window.point(x, y);
@@ -149,7 +150,7 @@ void draw_sensor(Image8& image, const MapWindow& window, const Pose& X_DS) {
 
 }  // namespace
 
-Image8 draw_preview(const PointCloud& scan, const PlacedLidar& lidar, const Dem& dem,
+Image8 draw_preview(const PointCloud& scan, const PlacedLidar& lidar, const Ground& ground,
                     std::int64_t frame) {
   const SpinningPattern& pattern = lidar.spec.lidar.pattern;
   const int ranges_height = band_height(pattern) * static_cast<int>(pattern.beams.size());
@@ -160,7 +161,7 @@ Image8 draw_preview(const PointCloud& scan, const PlacedLidar& lidar, const Dem&
   const MapWindow window{glm::dvec2(X_DS.translation_m), std::max(far_m * 1.1, 10.0),
                          ranges_height + gap};
   draw_ranges(image, scan, pattern, far_m);
-  draw_hillshade(image, window, dem.grid);
+  draw_hillshade(image, window, ground);
   draw_points(image, window, scan, far_m);
   draw_sensor(image, window, X_DS);
   return image;

@@ -3,14 +3,18 @@
 #include <algorithm>
 #include <chrono>
 #include <cmath>
+#include <cstdio>
 #include <cstdlib>
 #include <glm/common.hpp>
 #include <glm/geometric.hpp>
+#include <limits>
+#include <optional>
 #include <utility>
 #include <variant>
 
 #include "core/error.h"
 #include "core/product_io.h"
+#include "core/progress.h"
 #include "sensors/spec_io.h"
 #include "terrain/ground_path.h"
 
@@ -26,13 +30,13 @@ double seconds(std::chrono::nanoseconds time) {
 }
 
 // The path in D, from time 0 on; `begin` is told when that was on the recorder's clock.
-Trajectory lay_path(const RecordedPath& path, const SceneSpec& spec, const Dem& dem,
+Trajectory lay_path(const RecordedPath& path, const SceneSpec& spec, const Terrain& terrain,
                     std::chrono::nanoseconds& begin) {
   std::vector<Trajectory::Sample> samples = read_tum(path.tum).samples();
   begin = samples.front().time;
   for (auto& [time, X_WB] : samples) {
     time -= begin;
-    X_WB.translation_m -= dem.origin_w_m;
+    X_WB.translation_m -= terrain.header().origin_w_m;
   }
   if (samples.back().time < run_time(spec)) {
     throw Error(
@@ -43,12 +47,12 @@ Trajectory lay_path(const RecordedPath& path, const SceneSpec& spec, const Dem& 
   return Trajectory(std::move(samples));
 }
 
-Trajectory lay_path(const DrivenPath& path, const SceneSpec& spec, const Dem& dem,
+Trajectory lay_path(const DrivenPath& path, const SceneSpec& spec, const Terrain& terrain,
                     std::chrono::nanoseconds& /*begin*/) {
   GroundPathSpec drive{{}, path.speed_m_s, path.height_m, path.footprint_m, run_time(spec)};
   for (const glm::dvec2& p_W : path.waypoints_m)
-    drive.waypoints_m.push_back(p_W - glm::dvec2(dem.origin_w_m));
-  return build_ground_path(dem.grid, drive);
+    drive.waypoints_m.push_back(p_W - glm::dvec2(terrain.header().origin_w_m));
+  return build_ground_path(terrain.ground(), drive);
 }
 
 // Firing sequences keep a time of their own, so the last sweep of a run may end up to one of them
@@ -70,22 +74,22 @@ Trajectory extended(const Trajectory& path, const SceneSpec& spec) {
 }
 
 // How far a point is from the DEM's rectangle, in plan, metres.
-double distance_m(const HeightGrid& grid, const glm::dvec3& p) {
-  const glm::dvec2 a = grid.origin_m();
-  const glm::dvec2 b = a + glm::dvec2(grid.columns() - 1, grid.rows() - 1) * grid.step_m();
+double distance_m(const GridFrame& frame, const glm::dvec3& p) {
+  const glm::dvec2 a = frame.origin_m;
+  const glm::dvec2 b = frame.to_D(frame.samples - 1);
   return glm::distance(glm::clamp(glm::dvec2(p), glm::min(a, b), glm::max(a, b)), glm::dvec2(p));
 }
 
 // Looks at the sensor every 10 ms of the run: it must be above ground, and at least once in reach
 // of the DEM.
-void check_place(const PlacedLidar& placed, const Dem& dem, std::chrono::nanoseconds run) {
+void check_place(const PlacedLidar& placed, const Terrain& terrain, std::chrono::nanoseconds run) {
   bool in_reach = false;
   for (std::chrono::nanoseconds time{0}; time <= run; time += std::chrono::milliseconds(10)) {
     const glm::dvec3 p_DS = placed.X_DS.pose_at(time).translation_m;
-    in_reach |= distance_m(dem.grid, p_DS) <= placed.spec.lidar.gate.far_m;
-    const auto ground_m = dem.grid.height_m_at(glm::dvec2(p_DS));
+    in_reach |= distance_m(terrain.frame(), p_DS) <= placed.spec.lidar.gate.far_m;
+    const auto ground_m = terrain.ground().height_m_at(glm::dvec2(p_DS));
     if (!ground_m || p_DS.z > *ground_m) continue;
-    const glm::dvec3 p_WS = p_DS + dem.origin_w_m;
+    const glm::dvec3 p_WS = p_DS + terrain.header().origin_w_m;
     throw Error(
         "lidar '{}': at {:.3f} s it is {:.3f} m below the ground, at ({:.3f}, {:.3f}, {:.3f}) m in "
         "W; raise its "
@@ -95,15 +99,50 @@ void check_place(const PlacedLidar& placed, const Dem& dem, std::chrono::nanosec
   }
   if (in_reach) return;
   const glm::dvec3 p_DS = placed.X_DS.samples().front().pose.translation_m;
-  const glm::dvec3 p_WS = p_DS + dem.origin_w_m;
+  const glm::dvec3 p_WS = p_DS + terrain.header().origin_w_m;
   throw Error(
       "lidar '{}': it starts at ({:.3f}, {:.3f}) m in W, {:.0f} m from the DEM, and never comes "
       "within its range of "
       "it; is the trajectory in the DEM's CRS, {}?",
-      placed.spec.name, p_WS.x, p_WS.y, distance_m(dem.grid, p_DS), dem.crs_name);
+      placed.spec.name, p_WS.x, p_WS.y, distance_m(terrain.frame(), p_DS),
+      terrain.header().crs_name);
+}
+
+// Says how far a long preparation is; most take no time that is worth a word.
+Terrain load_terrain(const TerrainSpec& spec) {
+  constexpr std::uint64_t steps = 1000;
+  std::optional<Progress> progress;
+  return {spec.dem, spec.options, spec.detail, [&](double share) {
+            if (!progress) progress.emplace(stderr, "certifying the terrain", steps);
+            progress->update(static_cast<std::uint64_t>(share * steps));
+          }};
+}
+
+double largest_reach_m(const std::vector<PlacedLidar>& lidars) {
+  double reach_m = 0;
+  for (const PlacedLidar& lidar : lidars) {
+    for (std::int64_t sweep = 0; sweep < lidar.sweeps; ++sweep) {
+      const SensorBox box = sensor_box(lidar, sweep);
+      reach_m = std::max(reach_m, glm::distance(glm::dvec2(box.low_m), glm::dvec2(box.high_m)) / 2);
+    }
+  }
+  return reach_m;
 }
 
 }  // namespace
+
+SensorBox sensor_box(const PlacedLidar& lidar, std::int64_t sweep) {
+  constexpr std::chrono::milliseconds spacing(10);
+  const std::chrono::nanoseconds end = lidar.lidar.pattern().last_firing(sweep);
+  SensorBox box{glm::dvec3(std::numeric_limits<double>::infinity()),
+                glm::dvec3(-std::numeric_limits<double>::infinity())};
+  for (std::chrono::nanoseconds time = lidar.lidar.pattern().stamp(sweep);; time += spacing) {
+    time = std::min(time, end);
+    const glm::dvec3 p_DS = lidar.X_DS.pose_at(time).translation_m;
+    box = {glm::min(box.low_m, p_DS), glm::max(box.high_m, p_DS)};
+    if (time == end) return box;
+  }
+}
 
 std::filesystem::path data_folder() {
   if (const char* chosen = std::getenv("GROUNDRAY_DATA")) return chosen;
@@ -116,11 +155,12 @@ std::filesystem::path data_folder() {
 
 World load_world(const std::filesystem::path& scene) {
   SceneSpec spec = load_scene(scene, data_folder() / "sensors");
-  Dem dem = load_dem(spec.terrain.dem, spec.terrain.options);
+  Terrain terrain = load_terrain(spec.terrain);
   std::chrono::nanoseconds begin{0};
-  const Trajectory X_DB = extended(
-      std::visit([&](const auto& path) { return lay_path(path, spec, dem, begin); }, spec.platform),
-      spec);
+  const Trajectory X_DB =
+      extended(std::visit([&](const auto& path) { return lay_path(path, spec, terrain, begin); },
+                          spec.platform),
+               spec);
   std::vector<PlacedLidar> lidars;
   for (const MountedLidar& mounted : spec.lidars) {
     // Turns that a double only approximates (0.3 s at 10 Hz) count as whole.
@@ -132,9 +172,10 @@ World load_world(const std::filesystem::path& scene) {
           mounted.name, spec.duration_s, mounted.lidar.pattern.rate_hz);
     }
     lidars.push_back({mounted, Lidar(mounted.lidar), X_DB.mounted(mounted.X_BS), sweeps});
-    check_place(lidars.back(), dem, run_time(spec));
+    check_place(lidars.back(), terrain, run_time(spec));
   }
-  return {std::move(spec), std::move(dem), begin, std::move(lidars)};
+  const double reach_m = largest_reach_m(lidars);
+  return {std::move(spec), std::move(terrain), begin, std::move(lidars), reach_m};
 }
 
 }  // namespace groundray

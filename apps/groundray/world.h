@@ -7,7 +7,7 @@
 
 #include "core/trajectory.h"
 #include "sensors/scene_spec.h"
-#include "terrain/dem.h"
+#include "terrain/terrain.h"
 
 namespace groundray {
 
@@ -22,10 +22,14 @@ struct PlacedLidar {
 /// A scene spec with its files read and its paths laid: all that is needed to run it.
 struct World {
   SceneSpec spec;
-  Dem dem;
+  Terrain terrain;
   std::chrono::nanoseconds begin{0};  ///< time 0 of the run, on the clock of a recorded trajectory
   std::vector<PlacedLidar> lidars;
+  double reach_m = 0;  ///< from the middle of any sweep's sensor positions to the farthest, in plan
 };
+
+/// Returns the box of a lidar's positions during a sweep, in D.
+SensorBox sensor_box(const PlacedLidar& lidar, std::int64_t sweep);
 
 /// The folder with groundray's own data: $GROUNDRAY_DATA, or beside the installed program, or of
 /// the source tree.

@@ -7,7 +7,6 @@
 #include <limits>
 
 #include "core/embree_adapter.h"
-#include "terrain/terrain_scene.h"
 
 namespace groundray::benchmark {
 
@@ -70,8 +69,7 @@ struct RawEmbree::Impl {
 
 RawEmbree::RawEmbree(const HeightGrid& grid, std::span<const Ray> rays)
     : impl_(std::make_unique<Impl>()) {
-  const Level level = full_resolution_level(grid);
-  const auto columns = static_cast<unsigned>(grid.columns());
+  constexpr int tile_cells = 64;
   const std::size_t samples = grid.heights_m().size();
   RTCGeometry geometry = rtcNewGeometry(impl_->device, RTC_GEOMETRY_TYPE_GRID);
   auto* vertex = static_cast<float*>(rtcSetNewGeometryBuffer(
@@ -84,13 +82,20 @@ RawEmbree::RawEmbree(const HeightGrid& grid, std::span<const Ray> rays)
       *vertex++ = grid.height_m(column, row);
     }
   }
-  auto* out = static_cast<RTCGrid*>(rtcSetNewGeometryBuffer(
-      geometry, RTC_BUFFER_TYPE_GRID, 0, RTC_FORMAT_GRID, sizeof(RTCGrid), level.blocks.size()));
-  for (const Level::Block& block : level.blocks) {
-    *out++ = {static_cast<unsigned>(block.row) * columns + static_cast<unsigned>(block.column),
-              columns, static_cast<unsigned short>(block.columns),
-              static_cast<unsigned short>(block.rows)};
+  std::vector<RTCGrid> tiles;
+  const auto count = [](int first, int samples) {
+    return static_cast<unsigned short>(std::min(tile_cells + 1, samples - first));
+  };
+  for (int row = 0; row < grid.rows() - 1; row += tile_cells) {
+    for (int column = 0; column < grid.columns() - 1; column += tile_cells) {
+      tiles.push_back({static_cast<unsigned>(row * grid.columns() + column),
+                       static_cast<unsigned>(grid.columns()), count(column, grid.columns()),
+                       count(row, grid.rows())});
+    }
   }
+  std::ranges::copy(tiles, static_cast<RTCGrid*>(rtcSetNewGeometryBuffer(
+                               geometry, RTC_BUFFER_TYPE_GRID, 0, RTC_FORMAT_GRID, sizeof(RTCGrid),
+                               tiles.size())));
   rtcCommitGeometry(geometry);
   rtcAttachGeometry(impl_->scene, geometry);
   rtcReleaseGeometry(geometry);

@@ -43,7 +43,7 @@ TEST(HeightGrid, HeightsEqualTheReferenceEverywhere) {
 
 TEST(HeightGrid, NormalIsPerpendicularToTheFacetAndPointsUp) {
   const HeightGrid grid({2, 2}, {0, 0}, {2, -4}, {1, 3, 7, 2});  // rows run to the south
-  const glm::dvec3 n = grid.normal(grid.plane({0, 0, Facet::Half::Near}));
+  const glm::dvec3 n = grid.frame().normal(grid.cell(0, 0).plane(Half::Near));
   EXPECT_NEAR(glm::dot(n, glm::dvec3(2, 0, 2)), 0, 1e-15);
   EXPECT_NEAR(glm::dot(n, glm::dvec3(0, -4, 6)), 0, 1e-15);
   EXPECT_GT(n.z, 0);
@@ -54,8 +54,6 @@ TEST(HeightGrid, TrianglesThatTouchAHoleDoNotExist) {
   EXPECT_TRUE(grid.height_m_at({0.2, 0.2}));
   EXPECT_FALSE(grid.height_m_at({0.8, 0.8}));
   EXPECT_EQ(grid.hole_count(), 1u);
-  const GridRay through = grid.to_grid({0.8, 0.8, 5}, {0, 0, -1});
-  EXPECT_FALSE(grid.first_crossing(through, 0, 10));
 }
 
 TEST(HeightGrid, RefusesWhatIsNoSurfaceAndSaysWhy) {

@@ -1,0 +1,266 @@
+#include "core/mesh_io.h"
+
+#include <fmt/format.h>
+
+#include <algorithm>
+#include <array>
+#include <cmath>
+#include <cstdint>
+#include <functional>
+#include <glm/common.hpp>
+#include <iterator>
+#include <limits>
+#include <string_view>
+#include <vector>
+
+#include "core/error.h"
+#include "core/ply_header.h"
+#include "core/product_io.h"
+
+namespace groundray {
+namespace {
+
+constexpr std::size_t rows_per_block = 1 << 13;  // some 200 kB: they stay in the cache
+
+/// Colours of levels 0, 1, ...; after the last come the first again.
+constexpr std::array<std::array<std::uint8_t, 3>, 8> level_colours{{{68, 119, 170},
+                                                                    {102, 204, 238},
+                                                                    {34, 136, 51},
+                                                                    {204, 187, 68},
+                                                                    {238, 102, 119},
+                                                                    {170, 51, 119},
+                                                                    {187, 187, 187},
+                                                                    {85, 85, 85}}};
+
+/// Rows of a file, and what appends rows [first, last) to a block of it.
+struct Table {
+  std::size_t rows = 0;
+  std::function<void(std::size_t first, std::size_t last, std::string& block)> append;
+};
+
+void write_tables(const std::filesystem::path& path, const std::string& header,
+                  const std::vector<Table>& tables) {
+  std::string block = header;
+  std::size_t table = 0, row = 0;
+  bool begun = false;
+  write_blocks(path, [&]() -> std::string_view {
+    if (!std::exchange(begun, true)) return block;
+    block.clear();
+    while (table < tables.size() && row == tables[table].rows) {
+      ++table;
+      row = 0;
+    }
+    if (table < tables.size()) {
+      const std::size_t end = std::min(row + rows_per_block, tables[table].rows);
+      tables[table].append(row, end, block);
+      row = end;
+    }
+    return block;
+  });
+}
+
+template <typename T>
+void append_bytes(std::string& out, const T& value) {
+  out.append(reinterpret_cast<const char*>(&value), sizeof value);
+}
+
+void check(const std::filesystem::path& path, const TriangleMesh& mesh) {
+  Violations broken(path.string());
+  broken.unless(mesh.levels.empty() || mesh.levels.size() == mesh.triangles.size(),
+                "there are {} levels for {} triangles; each needs one, or none has any",
+                mesh.levels.size(), mesh.triangles.size());
+  constexpr double most_m = std::numeric_limits<float>::max();  // glTF holds floats
+  const auto bad_vertex = std::ranges::find_if_not(mesh.vertices_m, [](const glm::dvec3& p) {
+    return std::abs(p.x) <= most_m && std::abs(p.y) <= most_m && std::abs(p.z) <= most_m;
+  });
+  broken.unless(bad_vertex == mesh.vertices_m.end(), "vertex {} must have a finite position",
+                bad_vertex - mesh.vertices_m.begin());
+  const auto bad_triangle = std::ranges::find_if(mesh.triangles, [&](const glm::uvec3& t) {
+    return std::max({t.x, t.y, t.z}) >= mesh.vertices_m.size();
+  });
+  broken.unless(bad_triangle == mesh.triangles.end(),
+                "triangle {} names a vertex beyond the last of {}",
+                bad_triangle - mesh.triangles.begin(), mesh.vertices_m.size());
+  broken.throw_if_any();
+}
+
+/// As lines of comment, short and of ASCII alone: some readers of PLY hold 255 characters, others
+/// refuse all else.
+std::vector<std::string> lines_of(const Georeference& georeference) {
+  constexpr std::size_t most = 200;
+  const glm::dvec3& origin_m = georeference.origin_w_m;
+  std::vector<std::string> lines{
+      fmt::format("origin_w {} {} {}", origin_m.x, origin_m.y, origin_m.z)};
+  const auto printable = [](const std::string& text) {
+    std::string out;
+    for (const char c : text) {
+      if (' ' <= c && c <= '~') {
+        out += c;
+      } else {
+        out += fmt::format("\\x{:02x}", static_cast<unsigned char>(c));
+      }
+    }
+    return out;
+  };
+  if (!georeference.crs_name.empty()) lines.push_back("crs " + printable(georeference.crs_name));
+  const std::string wkt = printable(georeference.crs_wkt);
+  for (std::size_t begin = 0; begin < wkt.size();) {
+    std::size_t end = std::min(begin + most, wkt.size());
+    // A reader may drop blanks at either end of a line.
+    while (end < wkt.size() && end > begin + 1 && (wkt[end - 1] == ' ' || wkt[end] == ' ')) --end;
+    lines.push_back("crs_wkt " + wkt.substr(begin, end - begin));
+    begin = end;
+  }
+  return lines;
+}
+
+std::string json_string(std::string_view text) {
+  std::string out = "\"";
+  for (const char c : text) {
+    if (c == '"' || c == '\\') out += '\\';
+    if (static_cast<unsigned char>(c) < 0x20) {
+      out += fmt::format("\\u{:04x}", static_cast<unsigned>(c));
+    } else {
+      out += c;
+    }
+  }
+  return out + '"';
+}
+
+std::string json_array(const glm::dvec3& p) { return fmt::format("[{},{},{}]", p.x, p.y, p.z); }
+
+/// Describes a buffer of the vertices as floats and then the indices.
+std::string gltf_json(const TriangleMesh& mesh, const Georeference& georeference,
+                      std::size_t vertex_bytes, std::size_t index_bytes) {
+  glm::vec3 low(mesh.vertices_m.at(0)), high(low);
+  for (const glm::dvec3& p : mesh.vertices_m) {
+    low = glm::min(low, glm::vec3(p));
+    high = glm::max(high, glm::vec3(p));
+  }
+  std::string json = R"({"asset":{"version":"2.0","generator":"groundray"},"scene":0,)";
+  json += fmt::format(
+      R"("scenes":[{{"nodes":[0],"extras":{{"origin_w_m":{},"crs_name":{},"crs_wkt":{}}}}}],)",
+      json_array(georeference.origin_w_m), json_string(georeference.crs_name),
+      json_string(georeference.crs_wkt));
+  // Column by column: glTF's x is D's x, its y is D's z, and its z is D's -y.
+  json += R"("nodes":[{"mesh":0,"matrix":[1,0,0,0,0,0,-1,0,0,1,0,0,0,0,0,1]}],)";
+  json += R"("meshes":[{"primitives":[{"attributes":{"POSITION":0},"indices":1,"material":0}]}],)";
+  json += R"("materials":[{"pbrMetallicRoughness":{"baseColorFactor":[0.5,0.45,0.35,1],)"
+          R"("metallicFactor":0,"roughnessFactor":1}}],)";
+  json += fmt::format(
+      R"("accessors":[{{"bufferView":0,"componentType":5126,"type":"VEC3","count":{},)"
+      R"("min":{},"max":{}}},{{"bufferView":1,"componentType":5125,"type":"SCALAR","count":{}}}],)",
+      mesh.vertices_m.size(), json_array(low), json_array(high), 3 * mesh.triangles.size());
+  json += fmt::format(R"("bufferViews":[{{"buffer":0,"byteLength":{},"target":34962}},)"
+                      R"({{"buffer":0,"byteOffset":{},"byteLength":{},"target":34963}}],)",
+                      vertex_bytes, vertex_bytes, index_bytes);
+  json += fmt::format(R"("buffers":[{{"byteLength":{}}}]}})", vertex_bytes + index_bytes);
+  json.resize((json.size() + 3) / 4 * 4, ' ');
+  return json;
+}
+
+/// All that precedes the content of the binary chunk.
+std::string glb_header(const std::filesystem::path& path, const std::string& json,
+                       std::size_t binary_bytes) {
+  const std::size_t bytes = 12 + 8 + json.size() + 8 + binary_bytes;
+  if (bytes > std::numeric_limits<std::uint32_t>::max()) {
+    throw Error("{}: {} bytes are more than a .glb can hold, 2^32 - 1; write .ply", path.string(),
+                bytes);
+  }
+  std::string header = "glTF";
+  append_bytes(header, std::uint32_t{2});
+  append_bytes(header, static_cast<std::uint32_t>(bytes));
+  append_bytes(header, static_cast<std::uint32_t>(json.size()));
+  header += "JSON" + json;
+  append_bytes(header, static_cast<std::uint32_t>(binary_bytes));
+  header.append("BIN\0", 4);
+  return header;
+}
+
+}  // namespace
+
+void write_mesh(const std::filesystem::path& path, const TriangleMesh& mesh,
+                const Georeference& georeference) {
+  const std::string form = path.extension().string();
+  if (form == ".ply") return write_ply(path, mesh, georeference);
+  if (form == ".obj") return write_obj(path, mesh, georeference);
+  if (form == ".glb") return write_glb(path, mesh, georeference);
+  throw Error("{}: the name of a mesh must end in .ply, .obj or .glb", path.string());
+}
+
+void write_ply(const std::filesystem::path& path, const TriangleMesh& mesh,
+               const Georeference& georeference) {
+  check(path, mesh);
+  const auto property = [](std::string_view type, std::string_view name) {
+    return PlyProperty{std::string(name), ply_type_of(type), std::nullopt};
+  };
+  const PlyElement vertex{
+      "vertex",
+      mesh.vertices_m.size(),
+      {property("double", "x"), property("double", "y"), property("double", "z")}};
+  PlyElement face{"face", mesh.triangles.size(), {property("uint", "vertex_indices")}};
+  face.properties[0].count_type = ply_type_of("uchar");
+  if (!mesh.levels.empty()) {
+    for (const auto* name : {"level", "red", "green", "blue"}) {
+      face.properties.push_back(property("uchar", name));
+    }
+  }
+  const auto append_vertices = [&](std::size_t first, std::size_t last, std::string& block) {
+    for (std::size_t i = first; i < last; ++i) append_bytes(block, mesh.vertices_m[i]);
+  };
+  const auto append_faces = [&](std::size_t first, std::size_t last, std::string& block) {
+    for (std::size_t i = first; i < last; ++i) {
+      append_bytes(block, std::uint8_t{3});
+      append_bytes(block, mesh.triangles[i]);
+      if (mesh.levels.empty()) continue;
+      append_bytes(block, mesh.levels[i]);
+      append_bytes(block, level_colours[mesh.levels[i] % level_colours.size()]);
+    }
+  };
+  write_tables(path, ply_header(lines_of(georeference), {vertex, face}),
+               {{vertex.rows, append_vertices}, {face.rows, append_faces}});
+}
+
+void write_obj(const std::filesystem::path& path, const TriangleMesh& mesh,
+               const Georeference& georeference) {
+  check(path, mesh);
+  std::string header;
+  for (const std::string& line : lines_of(georeference)) header += "# " + line + "\n";
+  const auto append_vertices = [&](std::size_t first, std::size_t last, std::string& block) {
+    for (std::size_t i = first; i < last; ++i) {
+      const glm::dvec3& p = mesh.vertices_m[i];
+      fmt::format_to(std::back_inserter(block), "v {} {} {}\n", p.x, p.y, p.z);
+    }
+  };
+  const auto append_faces = [&](std::size_t first, std::size_t last, std::string& block) {
+    for (std::size_t i = first; i < last; ++i) {
+      const glm::u64vec3 t = glm::u64vec3(mesh.triangles[i]) + std::uint64_t{1};  // counted from 1
+      fmt::format_to(std::back_inserter(block), "f {} {} {}\n", t.x, t.y, t.z);
+    }
+  };
+  write_tables(path, header,
+               {{mesh.vertices_m.size(), append_vertices}, {mesh.triangles.size(), append_faces}});
+}
+
+void write_glb(const std::filesystem::path& path, const TriangleMesh& mesh,
+               const Georeference& georeference) {
+  check(path, mesh);
+  if (mesh.triangles.empty()) {
+    throw Error("{}: glTF cannot hold a mesh without a triangle; write .ply", path.string());
+  }
+  const auto append_vertices = [&](std::size_t first, std::size_t last, std::string& block) {
+    for (std::size_t i = first; i < last; ++i) append_bytes(block, glm::vec3(mesh.vertices_m[i]));
+  };
+  const auto append_indices = [&](std::size_t first, std::size_t last, std::string& block) {
+    for (std::size_t i = first; i < last; ++i) append_bytes(block, mesh.triangles[i]);
+  };
+  const std::size_t vertex_bytes = sizeof(glm::vec3) * mesh.vertices_m.size();
+  const std::size_t index_bytes = sizeof(glm::uvec3) * mesh.triangles.size();
+  const std::string header = glb_header(
+      path, gltf_json(mesh, georeference, vertex_bytes, index_bytes), vertex_bytes + index_bytes);
+  write_tables(
+      path, header,
+      {{mesh.vertices_m.size(), append_vertices}, {mesh.triangles.size(), append_indices}});
+}
+
+}  // namespace groundray

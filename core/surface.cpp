@@ -1,0 +1,294 @@
+#include "core/surface.h"
+
+#include <algorithm>
+#include <cmath>
+#include <limits>
+
+namespace groundray {
+namespace {
+
+constexpr double nan = std::numeric_limits<double>::quiet_NaN();
+constexpr double infinity = std::numeric_limits<double>::infinity();
+
+// The points of a leaf, thinned along the sides that face coarser leaves.
+class LeafPoints {
+ public:
+  LeafPoints(const LevelScene::Impl& level, const Leaf& leaf, int exponent)
+      : level_(level), leaf_(leaf), exponent_(exponent) {
+    thinned_ = (1 << exponent) == leaf.step ? leaf.coarser : 0;
+  }
+  int column(int i) const { return std::min(leaf_.column + (i << exponent_), last().x); }
+  int row(int j) const { return std::min(leaf_.row + (j << exponent_), last().y); }
+  double height_m(int i, int j) const {
+    if (thinned_ != 0) {
+      if (is_dropped_in_row(i, j)) return between(column(i - 1), column(i), column(i + 1), row(j));
+      if (is_dropped_in_column(i, j)) return below(row(j - 1), row(j), row(j + 1), column(i));
+    }
+    return level_.height_m(column(i), row(j));
+  }
+  // Where a leaf meets one of twice the cells, one cell of each pair is split the other way.
+  Cell::Split split(int i, int j) const {
+    const int end = level_.level.leaf_cells - 1;
+    const bool other =
+        thinned_ != 0 &&
+        ((j == 0 && is_thinned(Leaf::North) && i % 2 == 0 && column(i + 1) < last().x) ||
+         (i == 0 && is_thinned(Leaf::West) && j % 2 == 0 && row(j + 1) < last().y) ||
+         (j == end && is_thinned(Leaf::South) && i % 2 == 1) ||
+         (i == end && is_thinned(Leaf::East) && j % 2 == 1));
+    return other ? Cell::Split::NorthWestToSouthEast : Cell::Split::NorthEastToSouthWest;
+  }
+
+ private:
+  glm::ivec2 last() const { return level_.level.frame.samples - 1; }
+  bool is_thinned(Leaf::Side side) const { return (thinned_ & side) != 0; }
+  bool is_dropped_in_row(int i, int j) const {
+    return i % 2 == 1 && column(i) < last().x &&
+           ((j == 0 && is_thinned(Leaf::North)) ||
+            (j == level_.level.leaf_cells && is_thinned(Leaf::South)));
+  }
+  bool is_dropped_in_column(int i, int j) const {
+    return j % 2 == 1 && row(j) < last().y &&
+           ((i == 0 && is_thinned(Leaf::West)) ||
+            (i == level_.level.leaf_cells && is_thinned(Leaf::East)));
+  }
+  double between(int before, int at, int after, int row) const {
+    const double a_m = level_.height_m(before, row);
+    return a_m + (level_.height_m(after, row) - a_m) *
+                     (static_cast<double>(at - before) / (after - before));
+  }
+  double below(int before, int at, int after, int column) const {
+    const double a_m = level_.height_m(column, before);
+    return a_m + (level_.height_m(column, after) - a_m) *
+                     (static_cast<double>(at - before) / (after - before));
+  }
+
+  const LevelScene::Impl& level_;
+  const Leaf& leaf_;
+  int exponent_;
+  unsigned thinned_ = 0;
+};
+
+// The t at which a ray leaves a range of coordinates.
+double exit_m(double start, double slope, double per_index_m, int low, int high) {
+  if (slope == 0) return infinity;
+  return ((slope > 0 ? high : low) - start) * per_index_m;
+}
+
+FacetPlane plane_at(const Cell& cell, const GridRay& ray, double t_m) {
+  return cell.plane(cell.half_at(ray.u0 + t_m * ray.du, ray.v0 + t_m * ray.dv));
+}
+
+int next_index(double slope, int low, int high) { return slope > 0 ? high : low - 1; }
+
+}  // namespace
+
+Cell LevelScene::Impl::cell_at(const Leaf& leaf, int exponent, int column, int row) const noexcept {
+  const int size = 1 << exponent;
+  const glm::ivec2 low(column & -size, row & -size);  // leaves stand on multiples of their step
+  if (leaf.coarser == 0 && low.x + size <= last.x && low.y + size <= last.y) {
+    const int points = size >> step_exponent;
+    const int x = (low.x - level.first.x) >> step_exponent;
+    const int y = (low.y - level.first.y) >> step_exponent;
+    const HeightArray& heights = level.heights;
+    return {low.x,
+            low.y,
+            size,
+            size,
+            heights(x, y),
+            heights(x + points, y),
+            heights(x, y + points),
+            heights(x + points, y + points)};
+  }
+  const LeafPoints points(*this, leaf, exponent);
+  const int i = (column - leaf.column) >> exponent;
+  const int j = (row - leaf.row) >> exponent;
+  Cell cell;
+  cell.column = points.column(i);
+  cell.row = points.row(j);
+  cell.width = points.column(i + 1) - cell.column;
+  cell.height = points.row(j + 1) - cell.row;
+  cell.nw = points.height_m(i, j);
+  cell.ne = points.height_m(i + 1, j);
+  cell.sw = points.height_m(i, j + 1);
+  cell.se = points.height_m(i + 1, j + 1);
+  cell.split = points.split(i, j);
+  return cell;
+}
+
+Surface::Surface(std::vector<const LevelScene::Impl*> levels) : levels_(std::move(levels)) {
+  for (const LevelScene::Impl* level : levels_)
+    has_holes_ |= level->level.heights.hole_count() > 0 || level->bridging_leaves > 0;
+}
+
+Surface::Place Surface::place_at(int column, int row) const noexcept {
+  std::uint32_t number = 0;
+  while (number + 1 < levels_.size() && !levels_[number]->contains(column, row)) ++number;
+  const LevelScene::Impl& level = *levels_[number];
+  if (const Leaf* leaf = level.leaf_at(column, row)) {
+    const int exponent = level.deciding_exponent(*leaf);
+    return {leaf, number, exponent, level.cell_at(*leaf, exponent, column, row)};
+  }
+  const glm::ivec2 first = level.level.first;
+  const int mask = (1 << level.block_exponent) - 1;
+  Cell none{column - ((column - first.x) & mask), row - ((row - first.y) & mask)};
+  none.width = std::min(mask + 1, level.last.x - none.column);
+  none.height = std::min(mask + 1, level.last.y - none.row);
+  none.nw = none.ne = none.sw = none.se = nan;
+  return {nullptr, number, 0, none};
+}
+
+void Surface::move(Place& place, int column, int row) const noexcept {
+  if (place.leaf != nullptr) {
+    const LevelScene::Impl& level = *levels_[place.level];
+    const auto size = static_cast<unsigned>(level.level.leaf_cells * place.leaf->step);
+    if (static_cast<unsigned>(column - place.leaf->column) < size &&
+        static_cast<unsigned>(row - place.leaf->row) < size) {
+      place.cell = level.cell_at(*place.leaf, place.exponent, column, row);
+      return;
+    }
+  }
+  place = place_at(column, row);
+}
+
+Surface::Place Surface::start(const GridRay& ray, double t_m) const noexcept {
+  const LevelScene::Impl& all = *levels_.back();
+  const auto index = [&](double coordinate, int low, int high) {
+    return std::clamp(static_cast<int>(std::floor(coordinate)), low, high - 1);
+  };
+  return place_at(index(ray.u0 + t_m * ray.du, all.level.first.x, all.last.x),
+                  index(ray.v0 + t_m * ray.dv, all.level.first.y, all.last.y));
+}
+
+template <typename Act>
+void Surface::walk(const GridRay& ray, double t_begin_m, double t_end_m,
+                   const Act& act) const noexcept {
+  const LevelScene::Impl& all = *levels_.back();
+  const glm::ivec2 first = all.level.first;
+  clip_range(ray.u0, ray.du, first.x, all.last.x, t_begin_m, t_end_m);
+  clip_range(ray.v0, ray.dv, first.y, all.last.y, t_begin_m, t_end_m);
+  if (!(t_begin_m <= t_end_m)) return;
+  Place place = start(ray, t_begin_m);
+  const double per_column_m = 1 / ray.du;
+  const double per_row_m = 1 / ray.dv;
+  for (double t_m = t_begin_m;;) {
+    const Cell& cell = place.cell;
+    const double column_exit_m =
+        exit_m(ray.u0, ray.du, per_column_m, cell.column, cell.column + cell.width);
+    const double row_exit_m = exit_m(ray.v0, ray.dv, per_row_m, cell.row, cell.row + cell.height);
+    const double leave_m = std::max(t_m, std::min(column_exit_m, row_exit_m));
+    if (act(place, t_m, std::min(leave_m, t_end_m)) || !(leave_m < t_end_m)) return;
+    int column, row;
+    if (column_exit_m <= row_exit_m) {
+      column = next_index(ray.du, cell.column, cell.column + cell.width);
+      row = std::clamp(static_cast<int>(std::floor(ray.v0 + leave_m * ray.dv)), cell.row,
+                       cell.row + cell.height - 1);
+      if (column < first.x || column >= all.last.x) return;
+    } else {
+      row = next_index(ray.dv, cell.row, cell.row + cell.height);
+      column = std::clamp(static_cast<int>(std::floor(ray.u0 + leave_m * ray.du)), cell.column,
+                          cell.column + cell.width - 1);
+      if (row < first.y || row >= all.last.y) return;
+    }
+    t_m = leave_m;
+    move(place, column, row);
+  }
+}
+
+double Surface::clearance_m(const GridRay& ray, double t_m) const noexcept {
+  const Cell cell = start(ray, t_m).cell;
+  const double u = ray.u0 + t_m * ray.du;
+  const double v = ray.v0 + t_m * ray.dv;
+  return groundray::clearance_m(ray, cell.plane(cell.half_at(u, v)), t_m);
+}
+
+namespace {
+
+// Follows a ray through the triangles of cell after cell. The clearance at the border of two
+// triangles is computed once, so that no crossing falls between them.
+class Descent {
+ public:
+  explicit Descent(const GridRay& ray) : ray_(ray) {}
+
+  // Returns whether the ray comes down through the cell in [t_in, t_out]; range and plane then say
+  // where.
+  bool meets(const Cell& cell, double t_in, double t_out) {
+    if (passes_clear(cell, t_in, t_out)) return false;
+    const double turn_m = diagonal_m(cell);
+    if (t_in < turn_m && turn_m < t_out)
+      return meets_half(cell, t_in, turn_m) || meets_half(cell, turn_m, t_out);
+    return meets_half(cell, t_in, t_out);
+  }
+  double range_m() const { return range_m_; }
+  const FacetPlane& plane() const { return plane_; }
+
+ private:
+  // Most cells are far below the ray.
+  bool passes_clear(const Cell& cell, double t_in, double t_out) {
+    const double low_m = std::min(ray_.z0 + t_in * ray_.dz, ray_.z0 + t_out * ray_.dz);
+    if (!(low_m > cell.nw && low_m > cell.ne && low_m > cell.sw && low_m > cell.se)) return false;
+    above_m_ = 1;  // by some amount
+    return true;
+  }
+  double diagonal_m(const Cell& cell) const {
+    const double sign = cell.split == Cell::Split::NorthEastToSouthWest ? 1 : -1;
+    const double offset = sign > 0 ? 1 : 0;
+    const double across = (ray_.u0 - cell.column) / cell.width;
+    const double down = (ray_.v0 - cell.row) / cell.height;
+    return (offset - (across + sign * down)) /
+           (ray_.du / cell.width + sign * (ray_.dv / cell.height));
+  }
+  bool meets_half(const Cell& cell, double t_in, double t_out) {
+    const double middle_m = std::isinf(t_out) ? t_in : (t_in + t_out) / 2;
+    const FacetPlane plane = plane_at(cell, ray_, middle_m);
+    const double in_m = std::isnan(above_m_) ? clearance_m(ray_, plane, t_in) : above_m_;
+    // A ray without end goes straight down or up over one triangle.
+    const double out_m = std::isinf(t_out) ? ray_.dz : clearance_m(ray_, plane, t_out);
+    above_m_ = out_m;
+    if (!(in_m >= 0 && out_m < 0)) return false;
+    const double range_m = intersect(ray_, plane);
+    if (std::isnan(range_m)) return false;
+    range_m_ = std::clamp(range_m, t_in, t_out);
+    plane_ = plane;
+    return true;
+  }
+
+  const GridRay& ray_;
+  double above_m_ = nan;  // clearance at the border that the ray passed last
+  double range_m_ = 0;
+  FacetPlane plane_;
+};
+
+}  // namespace
+
+std::optional<Crossing> Surface::first_crossing(const GridRay& ray, double t_begin_m,
+                                                double t_end_m) const noexcept {
+  Descent descent(ray);
+  std::optional<Crossing> crossing;
+  walk(ray, t_begin_m, t_end_m, [&](const Place& place, double t_in, double t_out) {
+    if (!descent.meets(place.cell, t_in, t_out)) return false;
+    crossing = {descent.range_m(), descent.plane(), place.leaf->deviation_m, place.level};
+    return true;
+  });
+  return crossing;
+}
+
+bool Surface::is_uncertain(const GridRay& lowered, double t_end_m) const noexcept {
+  bool uncertain = false;
+  bool over_surface = false;
+  walk(lowered, 0, t_end_m, [&](const Place& place, double t_in, double t_out) {
+    const double low_m = std::min(lowered.z0 + t_in * lowered.dz, lowered.z0 + t_out * lowered.dz);
+    if (place.leaf != nullptr && place.leaf->has_holes && place.leaf->step > 1)
+      uncertain |= low_m <= place.leaf->high_m;
+    if (!over_surface) {
+      const double middle_m = std::isinf(t_out) ? t_in : (t_in + t_out) / 2;
+      uncertain |=
+          groundray::clearance_m(lowered, plane_at(place.cell, lowered, middle_m), t_in) < 0;
+    }
+    // Between holes both halves of each cell are asked for.
+    over_surface = !std::isnan(place.cell.nw + place.cell.ne + place.cell.sw + place.cell.se);
+    return uncertain || (over_surface && !has_holes_);
+  });
+  return uncertain;
+}
+
+}  // namespace groundray

@@ -1,0 +1,27 @@
+#pragma once
+
+#include <algorithm>
+#include <cstddef>
+#include <glm/vec2.hpp>
+
+namespace groundray::passes {
+
+/// A window of nodes cut into runs of a row: an index each.
+struct NodeRuns {
+  static constexpr int length = 64;
+  glm::ivec2 size{0};
+
+  struct Run {
+    int row, begin, end;  ///< from the window's first node
+  };
+  std::size_t in_row() const noexcept {
+    return static_cast<std::size_t>((size.x + length - 1) / length);
+  }
+  std::size_t count() const noexcept { return in_row() * static_cast<std::size_t>(size.y); }
+  Run at(std::size_t index) const noexcept {
+    const int begin = static_cast<int>(index % in_row()) * length;
+    return {static_cast<int>(index / in_row()), begin, std::min(begin + length, size.x)};
+  }
+};
+
+}  // namespace groundray::passes

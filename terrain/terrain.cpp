@@ -1,0 +1,92 @@
+#include "terrain/terrain.h"
+
+#include <fmt/format.h>
+
+#include <cmath>
+#include <cstddef>
+#include <span>
+#include <string_view>
+#include <utility>
+
+#include "core/error.h"
+#include "terrain/byte_hash.h"
+#include "terrain/deviation.h"
+
+namespace groundray {
+namespace {
+
+constexpr std::size_t tile_cache_bytes = std::size_t{64} << 20;
+
+std::size_t memory_bytes(const TerrainDetail& detail) {
+  return std::size_t{detail.memory_mib} << 20;
+}
+
+template <typename T>
+std::string_view bytes_of(std::span<const T> values) {
+  return {reinterpret_cast<const char*>(values.data()), values.size_bytes()};
+}
+
+GridFrame frame_of(const DemHeader& header) {
+  return {header.samples, header.origin_m, header.step_m, 1.0 / header.step_m};
+}
+
+}  // namespace
+
+struct Terrain::Loaded {
+  DemHeader header;
+  std::variant<HeightGrid, Tiles> content;
+  Ground ground;
+  std::string fingerprint;
+};
+
+Terrain::Loaded Terrain::load(const std::filesystem::path& path, const DemOptions& options,
+                              const TerrainDetail& detail, const Progress& progress) {
+  DemFile file(path, options);
+  const DemHeader header = file.header();
+  if (whole_bytes(header.samples) > static_cast<double>(memory_bytes(detail))) {
+    const std::string text = file.fingerprint();
+    Certificate certificate = Certificate::open_or_make(file, {.progress = progress});
+    const Tiles tiles =
+        std::make_shared<FileTiles>(std::move(file), std::move(certificate), tile_cache_bytes);
+    return {header, tiles, Ground(tiles, frame_of(header)),
+            fmt::format("{:016x}", byte_hash(text))};
+  }
+  const HeightGrid grid = load_dem(path, options).grid;
+  const double place[] = {grid.origin_m().x, grid.origin_m().y, grid.step_m().x, grid.step_m().y};
+  const std::string fingerprint =
+      fmt::format("{:016x}{:016x}", byte_hash(bytes_of(grid.heights_m())),
+                  byte_hash(bytes_of(std::span<const double>(place))));
+  if (detail.tolerance_m == 0 && detail.tolerance_rad == 0)
+    return {header, grid, Ground(grid), fingerprint};
+  std::vector<NodeLevel> levels = certify(grid, Certificate::block_cells, NodeDetail::Full);
+  return {header, std::make_shared<MemoryTiles>(grid, std::move(levels)), Ground(grid),
+          fingerprint};
+}
+
+Terrain::Terrain(const std::filesystem::path& dem, const DemOptions& options,
+                 const TerrainDetail& detail, const Progress& progress)
+    : Terrain(load(dem, options, detail, progress), detail) {}
+
+Terrain::Terrain(Loaded loaded, const TerrainDetail& detail)
+    : header_(std::move(loaded.header)),
+      detail_(detail),
+      content_(std::move(loaded.content)),
+      ground_(std::move(loaded.ground)),
+      fingerprint_(std::move(loaded.fingerprint)) {}
+
+double Terrain::whole_bytes(glm::ivec2 samples) noexcept {
+  constexpr double bytes_per_sample = 36;  // measured
+  return bytes_per_sample * samples.x * samples.y;
+}
+
+Clipmap Terrain::clipmap(const SensorBox& sensors, double reach_m) const {
+  return {std::get<Tiles>(content_),
+          frame(),
+          {.tolerance_m = detail_.tolerance_m,
+           .angle_rad = detail_.tolerance_rad,
+           .memory_bytes = memory_bytes(detail_),
+           .reach_m = reach_m},
+          sensors};
+}
+
+}  // namespace groundray

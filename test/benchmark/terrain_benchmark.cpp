@@ -1,0 +1,156 @@
+// From heights to a mesh: CPU time of all threads, memory, and what a textbook quadtree takes.
+#include <benchmark/benchmark.h>
+#include <malloc.h>
+
+#include <algorithm>
+#include <array>
+#include <cstdint>
+#include <cstdlib>
+#include <ctime>
+#include <filesystem>
+#include <fstream>
+#include <string>
+#include <vector>
+
+#include "terrain/deviation.h"
+#include "terrain/terrain_mesh.h"
+#include "test/benchmark/pointer_quadtree.h"
+#include "test/support/mesh_oracle.h"
+#include "test/support/mesh_topology.h"
+#include "test/support/sample_terrain.h"
+
+namespace groundray::benchmark {
+namespace {
+
+constexpr int block_cells = 2;
+
+double cpu_s() { return static_cast<double>(std::clock()) / CLOCKS_PER_SEC; }
+
+const HeightGrid& ground() {
+  static const HeightGrid grid = testing::fractal(4097, 5, 1500, Seed{12345});
+  return grid;
+}
+
+// The most memory that the process has held since `forget_peak`, bytes.
+void forget_peak() {
+  malloc_trim(0);
+  std::ofstream("/proc/self/clear_refs") << "5";
+}
+double peak_bytes() {
+  std::ifstream status("/proc/self/status");
+  for (std::string line; std::getline(status, line);) {
+    if (line.starts_with("VmHWM:")) return 1024 * std::stod(line.substr(6));
+  }
+  return 0;
+}
+
+// For other programs to mesh the same samples: see terrain_peers.py.
+void export_case(const std::filesystem::path& folder) {
+  std::filesystem::create_directories(folder);
+  std::ofstream(folder / "size.txt") << ground().columns() << ' ' << ground().rows() << '\n';
+  const auto heights_m = ground().heights_m();
+  std::ofstream(folder / "heights.f32", std::ios::binary)
+      .write(reinterpret_cast<const char*>(heights_m.data()),
+             static_cast<std::streamsize>(heights_m.size_bytes()));
+}
+
+// The whole way: certify every node, select, balance, emit.
+void terrain_mesh(::benchmark::State& state) {
+  if (const char* folder = std::getenv("GROUNDRAY_BENCH_EXPORT")) export_case(folder);
+  const MeshBound bound{.tolerance_m = static_cast<double>(state.range(0))};
+  {
+    const TerrainMesh mesh = build_terrain_mesh(ground(), bound, block_cells);
+    const auto found = testing::largest_deviation(ground(), mesh.vertices, mesh.triangles);
+    if (found.largest_m > bound.tolerance_m * (1 + 1e-15))
+      return state.SkipWithError("the mesh is too far off");
+    if (!testing::topology_faults(ground(), mesh.vertices, mesh.triangles).empty()) {
+      return state.SkipWithError("the mesh does not conform");
+    }
+    state.counters["largest_m"] = found.largest_m;
+    state.counters["triangles"] = static_cast<double>(mesh.triangles.size());
+  }
+  double bytes = 0;
+  for (auto _ : state) {
+    forget_peak();
+    const double begin_s = cpu_s();
+    ::benchmark::DoNotOptimize(build_terrain_mesh(ground(), bound, block_cells));
+    state.SetIterationTime(cpu_s() - begin_s);
+    bytes = std::max(bytes, peak_bytes());
+  }
+  state.counters["peak_MB"] = 1e-6 * bytes;  // with the 67 MB of heights, and the program itself
+}
+BENCHMARK(terrain_mesh)
+    ->ArgName("tolerance_m")
+    ->Arg(5)
+    ->Arg(1)
+    ->UseManualTime()
+    ->Unit(::benchmark::kMillisecond)
+    ->Iterations(5);
+
+// Triangles as a sorted list of the samples at their corners, the least first.
+std::vector<std::array<std::int64_t, 3>> triangles_of(const TerrainMesh& mesh) {
+  std::vector<std::array<std::int64_t, 3>> triangles;
+  for (const glm::uvec3& t : mesh.triangles) {
+    std::array<std::int64_t, 3> corners{};
+    for (std::size_t i = 0; i < 3; ++i) {
+      const glm::ivec2 p = mesh.vertices[t[static_cast<int>(i)]];
+      corners[i] = (std::int64_t{p.y} << 32) + p.x;
+    }
+    std::ranges::rotate(corners, std::ranges::min_element(corners));
+    triangles.push_back(corners);
+  }
+  std::ranges::sort(triangles);
+  return triangles;
+}
+
+// Counts the passes that are run, and notes when the one after the first `skipped` begins.
+struct PassClock {
+  std::size_t skipped = 0;
+  std::size_t passes = 0;
+  double begin_s = 0;
+
+  PassRunner runner() {
+    return [this](std::size_t count, const auto& work) {
+      if (passes++ == skipped) begin_s = cpu_s();
+      run_in_parallel(count, work);
+    };
+  }
+};
+
+// Selection, balance and emission alone, both from the same keys: of ours, what comes after the
+// passes of `certify`. Both run in turn in every iteration, so that their ratio is of one moment of
+// one machine.
+void terrain_against_pointer_quadtree(::benchmark::State& state) {
+  const auto tolerance_m = static_cast<double>(state.range(0));
+  PassClock certifying;
+  const auto levels = certify(ground(), block_cells, NodeDetail::KeysOnly, certifying.runner());
+  const MeshBound bound{.tolerance_m = tolerance_m};
+  const auto ours = triangles_of(build_terrain_mesh(ground(), bound, block_cells));
+  if (ours != triangles_of(mesh_by_pointers(ground(), levels, block_cells, tolerance_m))) {
+    return state.SkipWithError("the meshes differ");
+  }
+  double ours_s = 0, pointers_s = 0;
+  for (auto _ : state) {
+    PassClock clock{.skipped = certifying.passes};
+    ::benchmark::DoNotOptimize(build_terrain_mesh(ground(), bound, block_cells, clock.runner()));
+    const double this_s = cpu_s() - clock.begin_s;
+    ours_s += this_s;
+    const double begin_s = cpu_s();
+    ::benchmark::DoNotOptimize(mesh_by_pointers(ground(), levels, block_cells, tolerance_m));
+    pointers_s += cpu_s() - begin_s;
+    state.SetIterationTime(this_s);
+  }
+  state.counters["triangles"] = static_cast<double>(ours.size());
+  state.counters["pointers_ms"] = 1e3 * pointers_s / static_cast<double>(state.iterations());
+  state.counters["times_faster"] = pointers_s / ours_s;
+}
+BENCHMARK(terrain_against_pointer_quadtree)
+    ->ArgName("tolerance_m")
+    ->Arg(5)
+    ->Arg(1)
+    ->UseManualTime()
+    ->Unit(::benchmark::kMillisecond)
+    ->MinTime(2);
+
+}  // namespace
+}  // namespace groundray::benchmark

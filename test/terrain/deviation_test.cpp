@@ -1,0 +1,534 @@
+#include "terrain/deviation.h"
+
+#include <gmock/gmock.h>
+#include <gtest/gtest.h>
+
+#include <algorithm>
+#include <array>
+#include <bit>
+#include <cmath>
+#include <glm/common.hpp>
+#include <limits>
+#include <vector>
+
+#include "core/error.h"
+#include "core/leaf.h"
+#include "core/random.h"
+#include "test/support/shuffled_runner.h"
+
+namespace groundray {
+namespace {
+
+using ::testing::HasSubstr;
+using Real = long double;
+
+constexpr float nan = std::numeric_limits<float>::quiet_NaN();
+
+double uniform(Seed seed, std::size_t index) {
+  return random_uniform({seed, 0, 0, static_cast<std::uint32_t>(index)}).x;
+}
+
+// Heights in steps of 1/8 m, so that sums in the product code are exact in double.
+HeightGrid noise(glm::ivec2 size, Seed seed, double hole_share = 0) {
+  std::vector<float> heights(static_cast<std::size_t>(size.x * size.y));
+  for (std::size_t i = 0; i < heights.size(); ++i) {
+    heights[i] = static_cast<float>(std::floor(uniform(seed, i) * 800) / 8);
+    if (uniform(Seed{seed.value + 1000}, i) < hole_share) heights[i] = nan;
+  }
+  return {size, {3, 4}, {2, -2}, heights};
+}
+
+// ---- The oracle: triangles as the templates are drawn, clipped against those of the reference.
+
+struct Point {
+  Real x, y;
+};
+using Triangle = std::array<glm::ivec2, 3>;  // samples
+
+struct Plane {
+  Real at_0, along_x, along_y;
+  Plane(const HeightGrid& grid, const Triangle& t) {
+    std::array<Real, 3> z{};
+    for (std::size_t i = 0; i < 3; ++i) z[i] = Real(grid.height_m(t[i].x, t[i].y));
+    const glm::ivec2 p = t[1] - t[0];
+    const glm::ivec2 q = t[2] - t[0];
+    const Real area = Real(p.x) * q.y - Real(p.y) * q.x;
+    along_x = ((z[1] - z[0]) * q.y - (z[2] - z[0]) * p.y) / area;
+    along_y = ((z[2] - z[0]) * p.x - (z[1] - z[0]) * q.x) / area;
+    at_0 = z[0] - along_x * t[0].x - along_y * t[0].y;
+  }
+  Real operator()(Point p) const { return at_0 + along_x * p.x + along_y * p.y; }
+};
+
+bool exists(const HeightGrid& grid, const Triangle& t) {
+  return std::ranges::none_of(t, [&](auto p) { return std::isnan(grid.height_m(p.x, p.y)); });
+}
+
+// What a triangle and another have in common (Sutherland, Hodgman): corners of a polygon.
+std::vector<Point> common_part(const Triangle& a, const Triangle& b) {
+  std::vector<Point> polygon;
+  for (const glm::ivec2& p : a) polygon.push_back({Real(p.x), Real(p.y)});
+  const auto cross = [](glm::ivec2 p, glm::ivec2 q) { return p.x * q.y - p.y * q.x; };
+  const int turn = cross(b[1] - b[0], b[2] - b[0]) > 0 ? 1 : -1;
+  for (std::size_t side = 0; side < 3; ++side) {
+    const glm::ivec2 from = b[side];
+    const glm::ivec2 along = b[(side + 1) % 3] - from;
+    const auto inside = [&](Point p) {
+      return turn * (along.x * (p.y - from.y) - along.y * (p.x - from.x));
+    };
+    std::vector<Point> rest;
+    for (std::size_t i = 0; i < polygon.size(); ++i) {
+      const Point p = polygon[i];
+      const Point q = polygon[(i + 1) % polygon.size()];
+      const Real in_p = inside(p);
+      const Real in_q = inside(q);
+      if (in_p >= 0) rest.push_back(p);
+      if ((in_p > 0 && in_q < 0) || (in_p < 0 && in_q > 0)) {
+        const Real t = in_p / (in_p - in_q);
+        rest.push_back({p.x + t * (q.x - p.x), p.y + t * (q.y - p.y)});
+      }
+    }
+    polygon = rest;
+  }
+  return polygon;
+}
+
+// Largest vertical distance between a triangle of the mesh and the reference surface.
+Real distance(const HeightGrid& grid, const Triangle& mesh) {
+  if (!exists(grid, mesh)) return 0;
+  const auto [left, right] = std::minmax({mesh[0].x, mesh[1].x, mesh[2].x});
+  const auto [top, bottom] = std::minmax({mesh[0].y, mesh[1].y, mesh[2].y});
+  const Plane plane(grid, mesh);
+  Real worst = 0;
+  for (int r = top; r < bottom; ++r) {
+    for (int c = left; c < right; ++c) {
+      const Triangle near{{{c, r}, {c, r + 1}, {c + 1, r}}};
+      const Triangle far{{{c + 1, r + 1}, {c, r + 1}, {c + 1, r}}};
+      for (const Triangle& facet : {near, far}) {
+        if (!exists(grid, facet)) continue;
+        const Plane reference(grid, facet);
+        for (const Point p : common_part(mesh, facet)) {
+          worst = std::max(worst, std::abs(plane(p) - reference(p)));
+        }
+      }
+    }
+  }
+  return worst;
+}
+
+// The triangles of a block of cells under one template, on points of its own lattice: ordinary
+// cells and, in each pair of a thinned side, T1, T2 and T3 as drawn in the north, turned for other
+// sides.
+std::vector<Triangle> triangles_of(glm::ivec2 cells, unsigned thinned) {
+  std::vector<Triangle> triangles;
+  std::vector<glm::ivec2> dropped;
+  std::vector<glm::ivec2> paired;  // cells
+  const auto draw = [&](int length, auto place, auto cell) {
+    for (int c = 0; c + 1 < length; c += 2) {
+      const auto o = [&](int along) { return place(c, along, 0); };
+      const auto i = [&](int along) { return place(c, along, 1); };
+      triangles.push_back({o(0), i(1), i(0)});
+      triangles.push_back({o(0), o(2), i(1)});
+      triangles.push_back({o(2), i(1), i(2)});
+      dropped.push_back(o(1));
+      paired.push_back(cell(c));
+      paired.push_back(cell(c + 1));
+    }
+  };
+  using P = glm::ivec2;
+  const int right = cells.x;
+  const int bottom = cells.y;
+  if ((thinned & Leaf::North) != 0) {
+    draw(
+        cells.x, [](int c, int a, int in) { return P(c + a, in); }, [](int c) { return P(c, 0); });
+  }
+  if ((thinned & Leaf::West) != 0) {
+    draw(
+        cells.y, [](int c, int a, int in) { return P(in, c + a); }, [](int c) { return P(0, c); });
+  }
+  if ((thinned & Leaf::South) != 0) {
+    draw(
+        cells.x, [&](int c, int a, int in) { return P(c + 2 - a, bottom - in); },
+        [&](int c) { return P(c, bottom - 1); });
+  }
+  if ((thinned & Leaf::East) != 0) {
+    draw(
+        cells.y, [&](int c, int a, int in) { return P(right - in, c + 2 - a); },
+        [&](int c) { return P(right - 1, c); });
+  }
+  for (int r = 0; r < cells.y; ++r) {
+    for (int c = 0; c < cells.x; ++c) {
+      if (std::ranges::count(paired, P(c, r)) > 0) continue;
+      triangles.push_back({P(c, r), P(c, r + 1), P(c + 1, r)});
+      triangles.push_back({P(c + 1, r + 1), P(c, r + 1), P(c + 1, r)});
+    }
+  }
+  // Where sides meet, one's triangles give way to the other's, or both draw the same.
+  std::erase_if(triangles, [&](const Triangle& t) {
+    return std::ranges::any_of(t, [&](P p) { return std::ranges::count(dropped, p) > 0; });
+  });
+  const auto before = [](P p, P q) { return std::pair(p.x, p.y) < std::pair(q.x, q.y); };
+  for (Triangle& t : triangles) std::ranges::sort(t, before);
+  const auto is_before = [&](const Triangle& s, const Triangle& t) {
+    return std::ranges::lexicographical_compare(s, t, before);
+  };
+  std::ranges::sort(triangles, is_before);
+  triangles.erase(std::ranges::unique(triangles).begin(), triangles.end());
+  return triangles;
+}
+
+TEST(DeviationOracle, TheTrianglesOfEachTemplateFillTheBlock) {
+  for (const glm::ivec2 cells : {glm::ivec2{2, 2}, {4, 4}, {8, 8}}) {
+    for (unsigned thinned = 0; thinned < 16; ++thinned) {
+      int twice_area = 0;
+      for (const Triangle& t : triangles_of(cells, thinned)) {
+        const glm::ivec2 p = t[1] - t[0];
+        const glm::ivec2 q = t[2] - t[0];
+        twice_area += std::abs(p.x * q.y - p.y * q.x);
+      }
+      EXPECT_EQ(twice_area, 2 * cells.x * cells.y) << cells.x << " " << thinned;
+    }
+  }
+}
+
+struct NodeOracle {
+  Real full = 0, all = 0;
+};
+
+// Deviations of a node over all templates that its neighbours can ask for.
+NodeOracle certify_slowly(const HeightGrid& grid, const Lattice& lattice, int level,
+                          glm::ivec2 node) {
+  const glm::ivec2 first = node * lattice.block_cells;
+  const glm::ivec2 whole = lattice.cells(level);
+  const glm::ivec2 cells{std::min(lattice.block_cells, whole.x - first.x),
+                         std::min(lattice.block_cells, whole.y - first.y)};
+  const unsigned possible = (first.y > 0 ? Leaf::North : 0) | (first.x > 0 ? Leaf::West : 0) |
+                            (first.y + cells.y < whole.y ? Leaf::South : 0) |
+                            (first.x + cells.x < whole.x ? Leaf::East : 0);
+  NodeOracle worst;
+  for (unsigned thinned = 0; thinned < 16; ++thinned) {
+    if ((thinned & ~possible) != 0) continue;
+    for (Triangle t : triangles_of(cells, thinned)) {
+      for (glm::ivec2& p : t) p = lattice.sample(level, first + p);
+      worst.all = std::max(worst.all, distance(grid, t));
+    }
+    if (thinned == 0) worst.full = worst.all;
+  }
+  return worst;
+}
+
+// In cells whose sides are no powers of two the product code rounds two or three times, by 2^-53 of
+// 100 m at most; elsewhere it is exact, and the oracle's long doubles round a thousandth of that.
+constexpr Real tolerance = 4e-14L;
+
+// What is certified is the next float up.
+void expect_rounded_up(float certified, Real exact) {
+  EXPECT_GE(certified, exact - tolerance);
+  EXPECT_LE(std::nextafter(certified, -1.F), exact + tolerance);
+}
+
+struct Samples {
+  glm::ivec2 first, last;
+};
+
+Samples samples_of(const Lattice& lattice, int level, glm::ivec2 node) {
+  return {lattice.sample(level, node * lattice.block_cells),
+          lattice.sample(level, (node + 1) * lattice.block_cells)};
+}
+
+template <typename Act>
+void for_each_sample(const Samples& samples, const Act& act) {
+  for (int r = samples.first.y; r <= samples.last.y; ++r) {
+    for (int c = samples.first.x; c <= samples.last.x; ++c) act(c, r);
+  }
+}
+
+// Whether a node has samples, or edges between samples, that belong to no facet of it.
+bool has_strays(const HeightGrid& grid, const Samples& node) {
+  const auto facet = [&](glm::ivec2 cell, bool is_far) {
+    if (cell.x < node.first.x || cell.y < node.first.y || cell.x >= node.last.x ||
+        cell.y >= node.last.y) {
+      return false;
+    }
+    const int apex = is_far ? 1 : 0;
+    return exists(grid, {{cell + apex, cell + glm::ivec2(0, 1), cell + glm::ivec2(1, 0)}});
+  };
+  bool found = false;
+  for_each_sample(node, [&](int c, int r) {
+    const auto has = [&](int column, int row) {
+      return column <= node.last.x && row <= node.last.y && column >= node.first.x &&
+             !std::isnan(grid.height_m(column, row));
+    };
+    if (!has(c, r)) return;
+    const bool any = facet({c, r}, false) || facet({c - 1, r - 1}, true) ||
+                     facet({c - 1, r}, false) || facet({c - 1, r}, true) ||
+                     facet({c, r - 1}, false) || facet({c, r - 1}, true);
+    found |= !any;
+    found |= has(c + 1, r) && !facet({c, r}, false) && !facet({c, r - 1}, true);
+    found |= has(c, r + 1) && !facet({c, r}, false) && !facet({c - 1, r}, true);
+    found |= has(c - 1, r + 1) && !facet({c - 1, r}, false) && !facet({c - 1, r}, true);
+  });
+  return found;
+}
+
+template <typename Act>
+void for_each_node(const Lattice& lattice, const Act& act) {
+  for (int level = 0; level <= lattice.top_level(); ++level) {
+    const glm::ivec2 nodes = lattice.nodes(level);
+    for (int j = 0; j < nodes.y; ++j) {
+      for (int i = 0; i < nodes.x; ++i) act(level, glm::ivec2{i, j}, std::size_t(j * nodes.x + i));
+    }
+  }
+}
+
+void expect_certified(const HeightGrid& grid, int block_cells) {
+  const Lattice lattice{{grid.columns(), grid.rows()}, block_cells};
+  const auto levels = certify(grid, block_cells, NodeDetail::Full);
+  ASSERT_EQ(levels.size(), std::size_t(lattice.top_level() + 1));
+  for_each_node(lattice, [&](int level, glm::ivec2 node, std::size_t index) {
+    SCOPED_TRACE(fmt::format("B = {}, level {}, node {}, {}", block_cells, level, node.x, node.y));
+    const NodeLevel& found = levels[std::size_t(level)];
+    const NodeOracle expected = certify_slowly(grid, lattice, level, node);
+    expect_rounded_up(found.deviation_m[index], expected.all);
+    expect_rounded_up(found.full_m[index], expected.full);
+  });
+}
+
+class DeviationsOf : public ::testing::TestWithParam<glm::ivec2> {};
+
+TEST_P(DeviationsOf, NodesAreTheLargestDistancesToTheReferenceOverAllTemplates) {
+  for (const int block_cells : {2, 4, 8}) expect_certified(noise(GetParam(), Seed{1}), block_cells);
+}
+
+INSTANTIATE_TEST_SUITE_P(Sizes, DeviationsOf,
+                         ::testing::Values(glm::ivec2{2, 2}, glm::ivec2{2, 9}, glm::ivec2{9, 2},
+                                           glm::ivec2{7, 5}, glm::ivec2{13, 17}, glm::ivec2{20, 14},
+                                           glm::ivec2{33, 33}, glm::ivec2{50, 37}));
+
+// Heights that are half way between what the two ways of splitting a cell of level `level` give,
+// and a little off: samples deviate little, so that the worst place is where edges cross.
+HeightGrid between_diagonals(glm::ivec2 size, int level, Seed seed) {
+  const Lattice lattice{size, 2};
+  const HeightGrid corners = noise(size, seed);
+  std::vector<float> heights;
+  for (int r = 0; r < size.y; ++r) {
+    for (int c = 0; c < size.x; ++c) {
+      const glm::ivec2 cell = glm::min(glm::ivec2(c, r) >> level, lattice.cells(level) - 1);
+      const glm::ivec2 first = lattice.sample(level, cell);
+      const glm::ivec2 last = lattice.sample(level, cell + 1);
+      const double x = double(c - first.x) / (last.x - first.x);
+      const double y = double(r - first.y) / (last.y - first.y);
+      const double nw = corners.height_m(first.x, first.y);
+      const double ne = corners.height_m(last.x, first.y);
+      const double sw = corners.height_m(first.x, last.y);
+      const double se = corners.height_m(last.x, last.y);
+      const double anti = x + y < 1 ? nw + x * (ne - nw) + y * (sw - nw)
+                                    : se + (1 - x) * (sw - se) + (1 - y) * (ne - se);
+      const double main =
+          x > y ? nw + x * (ne - nw) + y * (se - ne) : nw + x * (se - sw) + y * (sw - nw);
+      const double off = uniform(Seed{seed.value + 50}, heights.size()) - 0.5;
+      const bool is_corner = (x == 0 || x == 1) && (y == 0 || y == 1);
+      const double height = is_corner ? anti : (anti + main) / 2 + 4 * off;
+      heights.push_back(static_cast<float>(std::round(height * 64) / 64));
+    }
+  }
+  return {size, {0, 0}, {1, 1}, heights};
+}
+
+TEST(Deviation, CrossingsOfEdgesCountWhereSamplesDeviateLess) {
+  expect_certified(between_diagonals({21, 22}, 1, Seed{2}), 2);
+  expect_certified(between_diagonals({33, 35}, 2, Seed{3}), 2);
+  expect_certified(between_diagonals({55, 52}, 3, Seed{4}), 2);
+  expect_certified(between_diagonals({14, 12}, 3, Seed{5}), 2);
+}
+
+TEST(Deviation, WhereHolesAreDeviationsAreThoseWhereBothSurfacesExist) {
+  int compared = 0;
+  int with_strays = 0;
+  for (const std::uint64_t seed : {1, 2, 3}) {
+    const HeightGrid grid = noise({23, 18}, Seed{seed}, 0.01);
+    for (const int block_cells : {2, 4}) {
+      const Lattice lattice{{23, 18}, block_cells};
+      const auto levels = certify(grid, block_cells, NodeDetail::Full);
+      for_each_node(lattice, [&](int level, glm::ivec2 node, std::size_t index) {
+        SCOPED_TRACE(fmt::format("seed {}, level {}, node {}, {}", seed, level, node.x, node.y));
+        const NodeLevel& found = levels[std::size_t(level)];
+        const NodeOracle expected = certify_slowly(grid, lattice, level, node);
+        EXPECT_GE(found.deviation_m[index], expected.all - tolerance);
+        EXPECT_GE(found.full_m[index], expected.full - tolerance);
+        if (has_strays(grid, samples_of(lattice, level, node))) {
+          ++with_strays;
+        } else {
+          ++compared;
+          expect_rounded_up(found.deviation_m[index], expected.all);
+          expect_rounded_up(found.full_m[index], expected.full);
+        }
+      });
+    }
+  }
+  EXPECT_GT(compared, 4 * with_strays);
+}
+
+TEST(Deviation, KeysAreSaturatedAndTellHolesAndHeightsAreThoseOfTheSamples) {
+  for (const double hole_share : {0.0, 0.1, 0.8, 1.0}) {
+    const HeightGrid grid = noise({45, 30}, Seed{4}, hole_share);
+    const Lattice lattice{{45, 30}, 2};
+    const auto levels = certify(grid, 2, NodeDetail::Full);
+    for_each_node(lattice, [&](int level, glm::ivec2 node, std::size_t index) {
+      const NodeLevel& found = levels[std::size_t(level)];
+      constexpr float infinity = std::numeric_limits<float>::infinity();
+      float low = infinity;
+      float high = -infinity;
+      int missing = 0;
+      for_each_sample(samples_of(lattice, level, node), [&](int c, int r) {
+        const float height = grid.height_m(c, r);
+        low = std::fmin(low, height);
+        high = std::fmax(high, height);
+        missing += std::isnan(height) ? 1 : 0;
+      });
+      EXPECT_EQ(found.low_m[index], low);
+      EXPECT_EQ(found.high_m[index], high);
+      if (low > high) {
+        EXPECT_LT(found.key_m[index], 0);
+      } else if (missing > 0) {
+        EXPECT_EQ(found.key_m[index], infinity);
+      } else {
+        float key = found.deviation_m[index];
+        const glm::ivec2 below = level > 0 ? lattice.nodes(level - 1) : glm::ivec2(0);
+        for (int r = 2 * node.y; r < std::min(2 * node.y + 2, below.y); ++r) {
+          for (int c = 2 * node.x; c < std::min(2 * node.x + 2, below.x); ++c) {
+            key = std::max(key, levels[std::size_t(level - 1)].key_m[std::size_t(r * below.x + c)]);
+          }
+        }
+        EXPECT_EQ(found.key_m[index], key);
+      }
+    });
+  }
+}
+
+bool same_bytes(const std::vector<float>& a, const std::vector<float>& b) {
+  return std::ranges::equal(
+      a, b, {}, [](float x) { return std::bit_cast<std::uint32_t>(x); },
+      [](float x) { return std::bit_cast<std::uint32_t>(x); });
+}
+
+void expect_same(const std::vector<NodeLevel>& a, const std::vector<NodeLevel>& b) {
+  ASSERT_EQ(a.size(), b.size());
+  for (std::size_t level = 0; level < a.size(); ++level) {
+    SCOPED_TRACE(level);
+    EXPECT_EQ(a[level].size, b[level].size);
+    EXPECT_TRUE(same_bytes(a[level].key_m, b[level].key_m));
+    EXPECT_TRUE(same_bytes(a[level].deviation_m, b[level].deviation_m));
+    EXPECT_TRUE(same_bytes(a[level].full_m, b[level].full_m));
+    EXPECT_TRUE(same_bytes(a[level].low_m, b[level].low_m));
+    EXPECT_TRUE(same_bytes(a[level].high_m, b[level].high_m));
+  }
+}
+
+TEST(Deviation, KeysAloneAreThoseOfAWholeCertificate) {
+  const HeightGrid grid = noise({90, 61}, Seed{5}, 0.01);
+  auto levels = certify(grid, 2, NodeDetail::Full);
+  for (NodeLevel& level : levels) {
+    level = {level.size, level.key_m, {}, {}, {}, {}};
+  }
+  expect_same(levels, certify(grid, 2, NodeDetail::KeysOnly));
+}
+
+// A window of the DEM, copied to memory of its own.
+struct Copy {
+  std::vector<float> heights_m;
+  HeightWindow window;
+  Copy(glm::ivec2 first, glm::ivec2 size, auto height_at) {
+    for (int r = 0; r < size.y; ++r) {
+      for (int c = 0; c < size.x; ++c) heights_m.push_back(height_at(first + glm::ivec2(c, r)));
+    }
+    window = {first, size, heights_m.data(), size.x};
+  }
+};
+
+// Certifies a DEM from pieces: its columns and rows of cells are cut at `cuts`.
+std::vector<NodeLevel> certify_in_pieces(const HeightGrid& grid, int block_cells,
+                                         const std::vector<int>& column_cuts,
+                                         const std::vector<int>& row_cuts) {
+  const Lattice lattice{{grid.columns(), grid.rows()}, block_cells};
+  std::vector<NodeLevel> levels;
+  for (int level = 0; level <= lattice.top_level(); ++level) {
+    levels.push_back(unknown_nodes(lattice.nodes(level), NodeDetail::Full));
+    for (std::size_t j = row_cuts.size() - 1; j > 0; --j) {
+      for (std::size_t i = 1; i < column_cuts.size(); ++i) {
+        const glm::ivec2 first{column_cuts[i - 1], row_cuts[j - 1]};
+        const glm::ivec2 last{column_cuts[i], row_cuts[j]};
+        const Copy samples(first, last - first + 1,
+                           [&](glm::ivec2 p) { return grid.height_m(p.x, p.y); });
+        const int side = block_cells << level;
+        const glm::ivec2 first_point = first / side * block_cells;
+        const glm::ivec2 last_point = ((last - 1) / side + 1) * block_cells;
+        const glm::ivec2 end{std::min(last_point.x, lattice.cells(level).x) + 1,
+                             std::min(last_point.y, lattice.cells(level).y) + 1};
+        const Copy points(first_point, end - first_point, [&](glm::ivec2 p) {
+          const glm::ivec2 at = lattice.sample(level, p);
+          return grid.height_m(at.x, at.y);
+        });
+        accumulate_deviations(lattice, level, samples.window, points.window, {0, 0}, levels.back());
+      }
+    }
+    if (level > 0) {
+      saturate_keys(levels.back(), {0, 0}, levels[std::size_t(level - 1)], {0, 0});
+    }
+  }
+  return levels;
+}
+
+TEST(Deviation, ACertificateIsTheSameHoweverTheDemIsCut) {
+  for (const double hole_share : {0.0, 0.001}) {
+    const HeightGrid grid = noise({603, 517}, Seed{6}, hole_share);
+    for (const int block_cells : {2, 8}) {
+      const auto whole = certify(grid, block_cells, NodeDetail::Full);
+      expect_same(whole, certify_in_pieces(grid, block_cells, {0, 602}, {0, 516}));
+      expect_same(whole, certify_in_pieces(grid, block_cells, {0, 1, 37, 256, 411, 602},
+                                           {0, 13, 14, 300, 516}));
+    }
+  }
+}
+
+TEST(Deviation, CutAtTheNodesOfLevel5TheLastBitIsTheSameToo) {
+  std::vector<float> heights(300 * 290);
+  for (std::size_t i = 0; i < heights.size(); ++i) {
+    const double u = uniform(Seed{7}, i);
+    heights[i] = static_cast<float>(1000 * u * std::exp2(-60 * uniform(Seed{8}, i)));
+  }
+  const HeightGrid grid({300, 290}, {0, 0}, {1, -1}, heights);
+  expect_same(certify(grid, 2, NodeDetail::Full),
+              certify_in_pieces(grid, 2, {0, 64, 256, 299}, {0, 128, 192, 289}));
+}
+
+TEST(Deviation, TheOrderOfIndicesAndTheNumberOfThreadsChangeNothing) {
+  const HeightGrid grid = noise({555, 403}, Seed{9}, 0.0005);
+  for (const int block_cells : {2, 8}) {
+    const auto expected = certify(grid, block_cells, NodeDetail::Full);
+    for (const std::uint64_t seed : {1, 2, 3}) {
+      expect_same(expected, certify(grid, block_cells, NodeDetail::Full,
+                                    groundray::testing::shuffled_runner(Seed{seed})));
+    }
+    for (const int threads : {1, 2, 5}) {
+      expect_same(expected, certify(grid, block_cells, NodeDetail::Full,
+                                    groundray::testing::threaded_runner(threads)));
+    }
+  }
+}
+
+TEST(Deviation, OddBlocksAreRefused) {
+  const HeightGrid grid = noise({5, 5}, Seed{1});
+  for (const int block_cells : {-2, 0, 1, 7}) {
+    try {
+      certify(grid, block_cells, NodeDetail::Full);
+      ADD_FAILURE() << block_cells;
+    } catch (const Error& error) {
+      EXPECT_THAT(error.what(),
+                  HasSubstr(fmt::format("block_cells = {} must be even", block_cells)));
+    }
+  }
+}
+
+}  // namespace
+}  // namespace groundray
