@@ -216,7 +216,7 @@ std::vector<std::filesystem::path> certificate_folders(const DemFile& dem) {
   const auto full = is_file ? std::filesystem::absolute(dem.path()) : dem.path();
   if (is_file) {
     const std::string variant = wishes.empty() ? "" : fmt::format(".{:016x}", byte_hash(wishes));
-    folders.push_back(full.string() + variant + ".groundray");
+    folders.emplace_back(full.string() + variant + ".groundray");
   }
   const char* cache = std::getenv("XDG_CACHE_HOME");
   const char* home = std::getenv("HOME");

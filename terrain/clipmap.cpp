@@ -16,7 +16,7 @@ namespace {
 constexpr int block_cells = Certificate::block_cells;
 constexpr int unit_nodes = 2;  // windows are aligned to nodes of the next coarser level
 constexpr int unit_cells = unit_nodes * block_cells;
-constexpr int smallest_half = 2;        // units from the viewpoint to a window's side
+constexpr int smallest_half = 2;       // units from the viewpoint to a window's side
 constexpr double bytes_per_cell = 40;  // measured: see docs/terrain.md
 
 int ceil_div(int a, int b) { return (a + b - 1) / b; }
@@ -197,16 +197,11 @@ Rectangle Clipmap::Plan::window(int level, const glm::dvec2& centre) const {
           glm::min((middle + units) * unit_nodes, nodes)};
 }
 
+// Widened as windows are aligned, so that sensors may move a little and change nothing.
 MeshBound Clipmap::Plan::bound(const SensorBox& sensors) const {
-  const glm::dvec2 cell_m = glm::abs(frame.step_m);
-  const glm::dvec2 a = frame.to_grid(glm::dvec2(sensors.low_m)) * cell_m;
-  const glm::dvec2 b = frame.to_grid(glm::dvec2(sensors.high_m)) * cell_m;
-  return {settings.tolerance_m,
-          settings.angle_rad,
-          {glm::min(a, b), sensors.low_m.z},
-          {glm::max(a, b), sensors.high_m.z},
-          cell_m,
-          unit_nodes};
+  MeshBound bound = bound_from(sensors, frame, settings.tolerance_m, settings.angle_rad);
+  bound.widened_to_nodes = unit_nodes;
+  return bound;
 }
 
 // A level's tiles in slots that they share with those that lie a multiple of the window's width

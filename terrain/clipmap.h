@@ -8,6 +8,7 @@
 #include <vector>
 
 #include "core/ray_tracer.h"
+#include "terrain/sensor_box.h"
 #include "terrain/tile_source.h"
 
 namespace groundray {
@@ -20,11 +21,6 @@ struct ClipmapSettings {
   /// to fit; Level::leaves then say what deviation is left.
   std::size_t memory_bytes = std::numeric_limits<std::size_t>::max();
   double reach_m = 0;  ///< no sensor is farther from its frame's viewpoint, in plan
-};
-
-/// Where a frame's sensors are: the box of their positions, in D. Its centre is the viewpoint.
-struct SensorBox {
-  glm::dvec3 low_m{0}, high_m{0};
 };
 
 /// Square windows of a terrain, nested round a viewer: level l's says where cells of 2^l cells of

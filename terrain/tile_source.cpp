@@ -66,6 +66,11 @@ std::shared_ptr<Tile> empty_tile() {
   return tile;
 }
 
+std::size_t index_of(glm::ivec2 place, int columns) {
+  return static_cast<std::size_t>(place.y) * static_cast<std::size_t>(columns) +
+         static_cast<std::size_t>(place.x);
+}
+
 // Copies rows of `size` values into a square of `side`.
 void copy_rows(const float* from, std::ptrdiff_t stride, glm::ivec2 size, float* to, int side) {
   for (int row = 0; row < size.y; ++row) {
@@ -123,8 +128,7 @@ std::shared_ptr<const Tile> MemoryTiles::tile(const TileName& name) const {
   for (int row = 0; row < points.size.y; ++row) {
     for (int column = 0; column < points.size.x; ++column) {
       const glm::ivec2 sample = lattice_.sample(name.level, points.first + glm::ivec2(column, row));
-      tile->heights_m[static_cast<std::size_t>(row * Tile::points + column)] =
-          grid_.height_m(sample.x, sample.y);
+      tile->heights_m[index_of({column, row}, Tile::points)] = grid_.height_m(sample.x, sample.y);
     }
   }
   const Window nodes = nodes_of(lattice_, name);

@@ -9,6 +9,7 @@
 
 #include "apps/groundray/generate.h"
 #include "apps/groundray/info.h"
+#include "apps/groundray/terrain_commands.h"
 #include "core/error.h"
 
 namespace {
@@ -48,6 +49,44 @@ int run(int argc, char** argv) {
           "or a scene (.yaml): what it would make")
       ->required();
 
+  auto* terrain = app.add_subcommand("terrain", "Work on a DEM");
+  terrain->require_subcommand(1);
+  groundray::DemOptions dem_options;
+  const auto add_dem = [&](CLI::App* command) {
+    command
+        ->add_option("DEM", file, "Any raster of heights that GDAL reads (GeoTIFF, VRT, HGT, ...)")
+        ->required();
+    command->add_option("--nodata", dem_options.nodata,
+                        "A height that means 'none', besides the one that the file declares");
+    command->add_option("--reproject-to", dem_options.reproject_to,
+                        "A CRS to warp to, such as EPSG:32631, or utm for the zone that fits");
+  };
+  groundray::MeshRequest request;
+  std::vector<double> viewpoint;
+  double angle_mrad = 0;
+  auto* mesh = terrain->add_subcommand(
+      "mesh", "Write a DEM as triangles, none farther from it than asked, without cracks");
+  add_dem(mesh);
+  mesh->add_option("-o,--output", out, "Mesh to write: .ply (doubles), .obj or .glb")->required();
+  mesh->add_option("--max-error-m", request.max_error_m,
+                   "Largest vertical distance from the DEM's surface, anywhere")
+      ->required()
+      ->check(CLI::NonNegativeNumber);
+  auto* angle =
+      mesh->add_option("--angle-mrad", angle_mrad,
+                       "Allow so many milliradians, seen from --viewpoint, where that is more")
+          ->check(CLI::NonNegativeNumber);
+  auto* from = mesh->add_option("--viewpoint", viewpoint, "X,Y,Z in the DEM's CRS, metres")
+                   ->delimiter(',')
+                   ->expected(3)
+                   ->needs(angle);
+  angle->needs(from);
+  auto* certify = terrain->add_subcommand(
+      "certify",
+      "Work out how far each node of the DEM's quadtree deviates, keep that beside the DEM, and "
+      "print a summary; `generate` uses it for DEMs larger than memory");
+  add_dem(certify);
+
   try {
     app.parse(argc, argv);
   } catch (const CLI::ParseError& error) {
@@ -55,6 +94,16 @@ int run(int argc, char** argv) {
   }
   if (info->parsed()) {
     groundray::print_info(file);
+    return done;
+  }
+  if (certify->parsed()) {
+    groundray::certify_terrain(file, dem_options);
+    return done;
+  }
+  if (mesh->parsed()) {
+    if (!viewpoint.empty()) request.viewpoint = {viewpoint[0], viewpoint[1], viewpoint[2]};
+    request.angle_rad = angle_mrad / 1000;
+    groundray::mesh_terrain(file, dem_options, request, out);
     return done;
   }
   return groundray::generate(scene, out) == groundray::RunEnd::Done ? done : interrupted;

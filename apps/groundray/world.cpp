@@ -3,18 +3,16 @@
 #include <algorithm>
 #include <chrono>
 #include <cmath>
-#include <cstdio>
 #include <cstdlib>
 #include <glm/common.hpp>
 #include <glm/geometric.hpp>
 #include <limits>
-#include <optional>
 #include <utility>
 #include <variant>
 
+#include "apps/groundray/certifying.h"
 #include "core/error.h"
 #include "core/product_io.h"
-#include "core/progress.h"
 #include "sensors/spec_io.h"
 #include "terrain/ground_path.h"
 
@@ -110,12 +108,8 @@ void check_place(const PlacedLidar& placed, const Terrain& terrain, std::chrono:
 
 // Says how far a long preparation is; most take no time that is worth a word.
 Terrain load_terrain(const TerrainSpec& spec) {
-  constexpr std::uint64_t steps = 1000;
-  std::optional<Progress> progress;
-  return {spec.dem, spec.options, spec.detail, [&](double share) {
-            if (!progress) progress.emplace(stderr, "certifying the terrain", steps);
-            progress->update(static_cast<std::uint64_t>(share * steps));
-          }};
+  Certifying progress;
+  return {spec.dem, spec.options, spec.detail, [&](double share) { progress.update(share); }};
 }
 
 double largest_reach_m(const std::vector<PlacedLidar>& lidars) {

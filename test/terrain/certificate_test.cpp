@@ -170,7 +170,7 @@ TEST_F(CertificateTest, HoldsBitForBitWhatCertifyingInMemoryGives) {
     const int tile_cells = std::array{8, 16, 64, 4096}[i % 4];
     const auto made = Certificate::open_or_make(DemFile(path_), {.tile_cells = tile_cells});
     expect_certifies(made, terrains[i].grid, terrains[i].name);
-    expect_certifies(certificate(), terrains[i].grid, terrains[i].name + " reopened");
+    if (i % 4 == 3) expect_certifies(certificate(), terrains[i].grid, "reopened");
   }
   EXPECT_EQ(made_, 0);
 }
@@ -357,6 +357,8 @@ TEST_F(CertificateTest, ReprojectedHeightsAreCertifiedToo) {
 }
 
 TEST_F(CertificateTest, FilesCutShortMissingOrDamagedAreNeverUsed) {
+  const HeightGrid small = testing::white_noise({66, 66}, 50, Seed{7});
+  testing::save_geotiff(small, path_);
   certificate();
   const auto files = files_in(beside_);
   ASSERT_EQ(files.size(), 9u);  // certificate.txt, nodes.tif, seven levels of heights
@@ -369,14 +371,14 @@ TEST_F(CertificateTest, FilesCutShortMissingOrDamagedAreNeverUsed) {
     EXPECT_TRUE(is_open());
   };
   for (const auto& file : files) {
-    for (const double part : {0.0, 0.3, 0.7, 0.99}) {
+    for (const double part : {0.0, 0.5, 0.99}) {
       const auto size = static_cast<double>(std::filesystem::file_size(file));
       std::filesystem::resize_file(file, static_cast<std::uintmax_t>(part * size));
       expect_made_anew(file, fmt::format(" cut to {}", part));
     }
     std::filesystem::remove(file);
     expect_made_anew(file, " removed");
-    for (const int at : {0, 4, 9}) {
+    for (const int at : {0, 9}) {
       std::fstream bytes(file, std::ios::in | std::ios::out | std::ios::binary);
       bytes.seekg(at);
       const int byte = bytes.get();
@@ -386,7 +388,7 @@ TEST_F(CertificateTest, FilesCutShortMissingOrDamagedAreNeverUsed) {
       expect_made_anew(file, fmt::format(" with byte {} flipped", at));
     }
   }
-  expect_certifies(certificate(), grid_, "made anew");
+  expect_certifies(certificate(), small, "made anew");
 }
 
 TEST_F(CertificateTest, ADamagedTileIsAnErrorWhenItIsRead) {
@@ -537,7 +539,7 @@ TEST_F(CertificateTest, OneOfManyMakesItAndTheOthersWait) {
 }
 
 TEST_F(CertificateTest, ADemWithoutAnyHeightIsRefused) {
-  const std::vector<float> none(40 * 40, std::numeric_limits<float>::quiet_NaN());
+  const std::vector<float> none(1600, std::numeric_limits<float>::quiet_NaN());
   testing::save_geotiff(HeightGrid({40, 40}, {0, 0}, {1, -1}, none), path_);
   EXPECT_THAT(error_of([&] { certificate(); }),
               HasSubstr(path_.string() + ": none of its 40 x 40 samples has a height"));

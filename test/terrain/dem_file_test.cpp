@@ -21,7 +21,6 @@ namespace {
 
 using testing::GeoTiff;
 using ::testing::HasSubstr;
-using ::testing::Not;
 using ::testing::StartsWith;
 using testing::TemporaryFolder;
 

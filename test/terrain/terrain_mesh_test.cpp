@@ -1,0 +1,210 @@
+#include "terrain/terrain_mesh.h"
+
+#include <fmt/format.h>
+#include <gmock/gmock.h>
+#include <gtest/gtest.h>
+
+#include <algorithm>
+#include <array>
+#include <cmath>
+#include <limits>
+#include <tuple>
+#include <utility>
+#include <vector>
+
+#include "core/error.h"
+#include "core/random.h"
+#include "terrain/deviation.h"
+#include "test/support/leaf_triangles.h"
+#include "test/support/mesh_topology.h"
+#include "test/support/sample_terrain.h"
+#include "test/support/shuffled_runner.h"
+
+namespace groundray {
+namespace {
+
+using ::testing::HasSubstr;
+using ::testing::IsEmpty;
+
+constexpr double infinity = std::numeric_limits<double>::infinity();
+
+// A piece of a fractal landscape, of any size.
+HeightGrid landscape(glm::ivec2 size, Seed seed, glm::dvec2 step_m = {4, -4}) {
+  const HeightGrid square = groundray::testing::fractal(129, 4, 120, seed);
+  std::vector<float> heights;
+  for (int r = 0; r < size.y; ++r) {
+    for (int c = 0; c < size.x; ++c) heights.push_back(square.height_m(c, r));
+  }
+  return {size, {10, 20}, step_m, heights};
+}
+
+HeightGrid with_holes(const HeightGrid& grid) {
+  return groundray::testing::with_holes(grid, 9, 3, Seed{5});
+}
+
+std::vector<MeshBound> some_bounds() {
+  return {{.tolerance_m = 0},
+          {.tolerance_m = 0.5},
+          {.tolerance_m = 4},
+          {.tolerance_m = infinity},
+          {.tolerance_m = 0.2, .angle_rad = 0.02, .low_m = {90, 70, 10}, .high_m = {120, 70, 30}}};
+}
+
+// A triangle by its samples in some order that does not depend on which comes first, and its level.
+using Place = std::array<std::pair<int, int>, 3>;
+using Piece = std::pair<Place, int>;
+
+Piece piece(glm::ivec2 a, glm::ivec2 b, glm::ivec2 c, int level) {
+  Place place{{{a.x, a.y}, {b.x, b.y}, {c.x, c.y}}};
+  std::ranges::sort(place);
+  return {place, level};
+}
+
+std::vector<Piece> pieces_of(const TerrainMesh& mesh) {
+  std::vector<Piece> pieces;
+  for (std::size_t i = 0; i < mesh.triangles.size(); ++i) {
+    const glm::uvec3 t = mesh.triangles[i];
+    pieces.push_back(
+        piece(mesh.vertices[t.x], mesh.vertices[t.y], mesh.vertices[t.z], mesh.levels[i]));
+  }
+  std::ranges::sort(pieces);
+  return pieces;
+}
+
+// What the leaves of the certificate stand for, drawn by test/support.
+std::vector<Piece> pieces_of_leaves(const HeightGrid& grid, MeshBound bound, int block_cells) {
+  bound.cell_m = {std::abs(grid.step_m().x), std::abs(grid.step_m().y)};
+  const Lattice lattice{{grid.columns(), grid.rows()}, block_cells};
+  const auto levels = certify(grid, block_cells, NodeDetail::Full);
+  std::vector<NodeWindow> windows;
+  for (const NodeLevel& level : levels) windows.push_back(whole_window(level));
+  const Selection selection = select_nodes(lattice, windows, bound);
+  std::vector<Piece> pieces;
+  for (int level = 0; level <= lattice.top_level(); ++level) {
+    const auto leaves = list_leaves(selection, windows, level, level);
+    for (const auto& [a, b, c] : groundray::testing::leaf_triangles(grid, leaves, block_cells)) {
+      pieces.push_back(piece(a, b, c, level));
+    }
+  }
+  std::ranges::sort(pieces);
+  return pieces;
+}
+
+TEST(TerrainMesh, ItsTrianglesAreThoseThatItsLeavesStandFor) {
+  for (const glm::ivec2 size :
+       {glm::ivec2{2, 2}, {5, 4}, {33, 33}, {70, 41}, {100, 3}, {90, 129}}) {
+    const HeightGrid whole = landscape(size, Seed{1});
+    for (const HeightGrid& grid : {whole, with_holes(whole)}) {
+      for (const int block_cells : {2, 4, 6, 8}) {
+        for (const MeshBound& bound : some_bounds()) {
+          SCOPED_TRACE(fmt::format("{} x {}, {} holes, B = {}, {} m, {} rad", size.x, size.y,
+                                   grid.hole_count(), block_cells, bound.tolerance_m,
+                                   bound.angle_rad));
+          const TerrainMesh mesh = build_terrain_mesh(grid, bound, block_cells);
+          EXPECT_TRUE(pieces_of(mesh) == pieces_of_leaves(grid, bound, block_cells));
+          EXPECT_THAT(groundray::testing::topology_faults(grid, mesh.vertices, mesh.triangles),
+                      IsEmpty());
+        }
+      }
+    }
+  }
+}
+
+TEST(TerrainMesh, TrianglesRunCounterClockwiseAsSeenFromAboveWhereverRowsAndColumnsRun) {
+  for (const glm::dvec2 step_m : {glm::dvec2{2, -2}, {2, 3}, {-2, 3}, {-1, -3}}) {
+    const HeightGrid grid = with_holes(landscape({60, 50}, Seed{2}, step_m));
+    const TerrainMesh mesh = build_terrain_mesh(grid, {.tolerance_m = 1}, 4);
+    ASSERT_GT(mesh.triangles.size(), 100u);
+    for (const glm::uvec3& t : mesh.triangles) {
+      const glm::dvec2 a = glm::dvec2(mesh.vertices[t.y] - mesh.vertices[t.x]) * step_m;
+      const glm::dvec2 b = glm::dvec2(mesh.vertices[t.z] - mesh.vertices[t.x]) * step_m;
+      EXPECT_GT(a.x * b.y - a.y * b.x, 0);
+    }
+  }
+}
+
+TEST(TerrainMesh, WithoutABoundItIsTwoTriangles) {
+  for (const glm::ivec2 size : {glm::ivec2{2, 2}, {129, 129}, {100, 7}, {3, 90}}) {
+    const TerrainMesh mesh =
+        build_terrain_mesh(landscape(size, Seed{3}), {.tolerance_m = infinity});
+    EXPECT_EQ(mesh.triangles.size(), 2u);
+    EXPECT_EQ(mesh.vertices.size(), 4u);
+  }
+}
+
+TEST(TerrainMesh, APlaneIsTwoTrianglesThoughNothingMayDeviate) {
+  for (const glm::ivec2 size : {glm::ivec2{2, 2}, {129, 65}, {100, 7}, {3, 90}, {50, 77}}) {
+    std::vector<float> heights;
+    for (int r = 0; r < size.y; ++r) {
+      for (int c = 0; c < size.x; ++c) heights.push_back(static_cast<float>(3 * c - 2 * r + 7));
+    }
+    const HeightGrid plane(size, {0, 0}, {1, 1}, heights);
+    for (const int block_cells : {2, 8}) {
+      EXPECT_EQ(build_terrain_mesh(plane, {.tolerance_m = 0}, block_cells).triangles.size(), 2u);
+    }
+  }
+}
+
+TEST(TerrainMesh, ASampleWithoutATriangleIsNoVertex) {
+  const float nan = std::numeric_limits<float>::quiet_NaN();
+  // Of 4 x 3 samples, the last column and the north-western corner are cut off from any triangle.
+  const HeightGrid grid({4, 3}, {0, 0}, {1, -1},
+                        {1, nan, nan, 1,  //
+                         nan, 1, 1, nan,  //
+                         1, 1, 1, nan});
+  const TerrainMesh mesh = build_terrain_mesh(grid, {.tolerance_m = 100});
+  EXPECT_EQ(pieces_of(mesh),
+            (std::vector<Piece>{piece({0, 2}, {1, 2}, {1, 1}, 0), piece({1, 1}, {1, 2}, {2, 1}, 0),
+                                piece({1, 2}, {2, 2}, {2, 1}, 0)}));
+  EXPECT_EQ(mesh.vertices.size(), 5u);
+}
+
+TEST(TerrainMesh, CellsOfTheBoundAreThoseOfTheGrid) {
+  const HeightGrid grid = landscape({90, 80}, Seed{4}, {3, -5});
+  MeshBound bound{.angle_rad = 0.01, .low_m = {90, 70, 10}, .high_m = {120, 70, 30}};
+  const TerrainMesh expected = build_terrain_mesh(grid, bound);
+  bound.cell_m = {1e9, 0};
+  EXPECT_EQ(build_terrain_mesh(grid, bound).vertices, expected.vertices);
+}
+
+TEST(TerrainMesh, TheOrderOfIndicesAndTheNumberOfThreadsChangeNothing) {
+  const HeightGrid grid = with_holes(landscape({129, 120}, Seed{6}));
+  const auto runners = [] {
+    std::vector<PassRunner> all;
+    for (const std::uint64_t seed : {1, 2, 3}) {
+      all.push_back(groundray::testing::shuffled_runner(Seed{seed}));
+    }
+    for (const int threads : {1, 2, 5}) {
+      all.push_back(groundray::testing::threaded_runner(threads));
+    }
+    return all;
+  }();
+  for (const MeshBound& bound : some_bounds()) {
+    for (const int block_cells : {2, 8}) {
+      const TerrainMesh expected = build_terrain_mesh(grid, bound, block_cells);
+      for (const PassRunner& runner : runners) {
+        const TerrainMesh found = build_terrain_mesh(grid, bound, block_cells, runner);
+        EXPECT_TRUE(std::tie(found.vertices, found.triangles, found.levels) ==
+                    std::tie(expected.vertices, expected.triangles, expected.levels));
+      }
+    }
+  }
+}
+
+TEST(TerrainMesh, WhatIsNoBoundOrNoBlockIsRefused) {
+  const HeightGrid grid = landscape({9, 9}, Seed{7});
+  const auto message = [&](const MeshBound& bound, int block_cells) -> std::string {
+    try {
+      build_terrain_mesh(grid, bound, block_cells);
+    } catch (const Error& error) {
+      return error.what();
+    }
+    return "no error";
+  };
+  EXPECT_THAT(message({}, 3), HasSubstr("block_cells = 3 must be even"));
+  EXPECT_THAT(message({.tolerance_m = -2}, 2), HasSubstr("tolerance_m = -2 must be 0 or more"));
+  EXPECT_THAT(message({.angle_rad = -1}, 2), HasSubstr("angle_rad = -1 must be 0 or more"));
+}
+
+}  // namespace
+}  // namespace groundray
