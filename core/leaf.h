@@ -17,7 +17,7 @@ struct Leaf {
   std::uint8_t coarser = 0;  ///< sides whose neighbour's cells are twice as wide
   bool has_holes = false;    ///< some of its samples, or of the DEM's below it, are missing
   float deviation_m = 0;     ///< largest vertical distance between it and the reference surface
-  float high_m = 0;          ///< highest sample of the DEM in it; read only where there are holes
+  float high_m = 0;          ///< highest sample of the DEM in it
   friend bool operator==(const Leaf&, const Leaf&) = default;
 };
 

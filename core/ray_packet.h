@@ -31,7 +31,6 @@ struct Target {
   bool is_all = false;
   double min_m = 0, max_m = 0;  // heights
   float slack_m = 0;
-  double lift_m = 0;  // added to the height of the rays
 };
 
 // A packet of rays, each number in an array over the lanes so that the loops below become vector
@@ -44,7 +43,6 @@ struct Packet {
   alignas(64) std::array<int, W> valid;
   alignas(64) Doubles x_m, y_m, z_m, dx, dy, dz, far_m;  // the rays as given, in D
   Doubles u0, v0, du, dv;                                // and over the grid
-  Doubles lifted_m;                                      // z as this target has it
   Doubles inner_m;  // where they leave the window of the level before
   Doubles enter_m, leave_m;
   Doubles column, row, side;  // facet of the hit; side is 1 for the near half, -1 for the far one
@@ -59,7 +57,7 @@ struct Packet {
 
   GridRay grid_ray(int lane) const noexcept {
     const auto i = static_cast<std::size_t>(lane);
-    return {u0[i], v0[i], lifted_m[i], du[i], dv[i], dz[i]};
+    return {u0[i], v0[i], z_m[i], du[i], dv[i], dz[i]};
   }
   LevelRay level_ray(int lane) const noexcept {
     const auto i = static_cast<std::size_t>(lane);
@@ -141,7 +139,7 @@ void enter_box(const Target& target, Packet<W>& packet) noexcept {
   const double bottom_m = target.min_m - target.slack_m;
   const double top_m = target.max_m + target.slack_m;
   for (std::size_t i = 0; i < W; ++i) {
-    const double z_m = packet.lifted_m[i] = packet.z_m[i] + target.lift_m;
+    const double z_m = packet.z_m[i];
     const double iu = 1 / packet.du[i];
     const double iv = 1 / packet.dv[i];
     const double iz = 1 / packet.dz[i];
@@ -166,7 +164,7 @@ void fill_floats(const Target& target, Packet<W>& packet) noexcept {
     const double begin_m = packet.enter_m[i];
     out.org_x[i] = static_cast<float>(packet.x_m[i] + packet.dx[i] * begin_m - p_DL.x);
     out.org_y[i] = static_cast<float>(packet.y_m[i] + packet.dy[i] * begin_m - p_DL.y);
-    out.org_z[i] = static_cast<float>(packet.lifted_m[i] + packet.dz[i] * begin_m - p_DL.z);
+    out.org_z[i] = static_cast<float>(packet.z_m[i] + packet.dz[i] * begin_m - p_DL.z);
     out.dir_x[i] = static_cast<float>(packet.dx[i]);
     out.dir_y[i] = static_cast<float>(packet.dy[i]);
     out.dir_z[i] = static_cast<float>(packet.dz[i]);
@@ -201,8 +199,8 @@ template <int W>
 void meet_planes(Packet<W>& packet) noexcept {
   for (std::size_t i = 0; i < W; ++i) {
     const double above_m =
-        packet.lifted_m[i] - (packet.height_m[i] + packet.u_slope_m[i] * packet.u0[i] +
-                              packet.v_slope_m[i] * packet.v0[i]);
+        packet.z_m[i] - (packet.height_m[i] + packet.u_slope_m[i] * packet.u0[i] +
+                         packet.v_slope_m[i] * packet.v0[i]);
     const double closing =
         -(packet.dz[i] - (packet.u_slope_m[i] * packet.du[i] + packet.v_slope_m[i] * packet.dv[i]));
     const double range_m = above_m / closing;

@@ -54,12 +54,6 @@ struct RayTracer::Impl {
   void trace_packet(Packet<W>& packet, std::span<Hit> hits) const noexcept;
   template <int W>
   void trace(std::span<const Ray> rays, std::span<Hit> hits) const noexcept;
-  double deviation_to(std::size_t number) const noexcept;
-  template <int W>
-  void meet_lifted(Packet<W>& packet, double sign, std::span<Hit> met) const noexcept;
-  template <int W>
-  void bound_errors(std::span<const Ray> rays, std::span<const Hit> hits,
-                    std::span<double> bounds_m) const noexcept;
 };
 
 namespace {
@@ -302,77 +296,6 @@ void RayTracer::Impl::trace(std::span<const Ray> rays, std::span<Hit> hits) cons
   }
 }
 
-// Finds where rays meet the surface when they are lifted by `sign` times the deviation of whatever
-// level they are over, and by a little more than Embree's slack. A ray that is below the surface
-// where the lift changes meets it there.
-template <int W>
-void RayTracer::Impl::meet_lifted(Packet<W>& packet, double sign,
-                                  std::span<Hit> met) const noexcept {
-  std::ranges::fill(met, Hit{});
-  packet.inner_m.fill(0);
-  const auto pass = [&](Target target, double deviation_m) {
-    target.lift_m = sign * (deviation_m + 2.0 * target.slack_m);
-    const auto begin_m = packet.inner_m;
-    trace_target(target, met, packet);
-    if (target.number == 0 || target.is_all) return;
-    for (std::size_t i = 0; i < met.size(); ++i) {
-      if (!(begin_m[i] <= packet.far_m[i] && begin_m[i] < met[i].range_m)) continue;
-      GridRay ray = packet.grid_ray(static_cast<int>(i));
-      ray.z0 = packet.z_m[i] + target.lift_m;
-      if (surface.clearance_m(ray, begin_m[i]) < 0) met[i].range_m = begin_m[i];
-    }
-  };
-  if (!start_inside(packet)) return pass(everything, deviation_to(scenes.size() - 1));
-  for (const Target& target : targets) pass(target, target.level->deviation_m);
-}
-
-double RayTracer::Impl::deviation_to(std::size_t number) const noexcept {
-  float deviation_m = 0;
-  for (std::size_t i = 0; i <= number; ++i)
-    deviation_m = std::max(deviation_m, level(i).deviation_m);
-  return deviation_m;
-}
-
-// The reference lies within the levels' deviations of the surface. So a ray that starts above both
-// meets the reference no sooner than the surface when lowered by as much, and no later than when
-// raised.
-template <int W>
-void RayTracer::Impl::bound_errors(std::span<const Ray> rays, std::span<const Hit> hits,
-                                   std::span<double> bounds_m) const noexcept {
-  constexpr double infinity = std::numeric_limits<double>::infinity();
-  Packet<W> packet;
-  std::array<Hit, W> lowered, raised;
-  for (std::size_t begin = 0; begin < rays.size(); begin += W) {
-    const std::size_t count = std::min<std::size_t>(W, rays.size() - begin);
-    take_rays(level(0).level.frame, rays.subspan(begin, count), packet);
-    const bool in_order = start_inside(packet);
-    std::array<double, W> deviation_m{};
-    for (std::size_t i = 0; i < count; ++i) {
-      const Hit& hit = hits[begin + i];
-      deviation_m[i] = deviation_to(hit && in_order ? hit.level : scenes.size() - 1);
-    }
-    if (std::ranges::any_of(deviation_m, [](double any_m) { return any_m > 0; })) {
-      meet_lifted(packet, -1, std::span(lowered).first(count));
-      meet_lifted(packet, 1, std::span(raised).first(count));
-    }
-    for (std::size_t i = 0; i < count; ++i) {
-      double& bound_m = bounds_m[begin + i] = 0;
-      if (deviation_m[i] == 0) continue;
-      const double range_m = hits[begin + i].range_m;
-      packet.lifted_m[i] = packet.z_m[i] - (deviation_m[i] + 2.0 * everything.slack_m);
-      const double end_m = std::min(raised[i].range_m, packet.far_m[i]);
-      if (surface.is_uncertain(packet.grid_ray(static_cast<int>(i)), end_m)) {
-        bound_m = infinity;
-      } else if (hits[begin + i]) {
-        bound_m = std::max(range_m - lowered[i].range_m, raised[i].range_m - range_m) +
-                  (1e-9 * range_m + 1e-9);  // and what ranges themselves promise
-      } else {
-        bound_m = lowered[i] ? infinity : 0;
-      }
-    }
-  }
-}
-
 RayTracer::RayTracer(const RayDevice& device, std::vector<LevelScene> levels)
     : impl_(std::make_unique<Impl>(device, std::move(levels))) {}
 
@@ -398,11 +321,22 @@ void RayTracer::trace(std::span<const Ray> rays, std::span<Hit> hits) const noex
 
 void RayTracer::bound_errors(std::span<const Ray> rays, std::span<const Hit> hits,
                              std::span<double> bounds_m) const noexcept {
-  const FlushDenormals flush;
-  const int width = impl_->device.impl().width;
-  if (width == 16) return impl_->bound_errors<16>(rays, hits, bounds_m);
-  if (width == 8) return impl_->bound_errors<8>(rays, hits, bounds_m);
-  impl_->bound_errors<4>(rays, hits, bounds_m);
+  constexpr double infinity = std::numeric_limits<double>::infinity();
+  const GridFrame& frame = impl_->level(0).level.frame;
+  for (std::size_t i = 0; i < rays.size(); ++i) {
+    const auto band =
+        impl_->surface.band(frame.to_grid(rays[i].origin, rays[i].direction), rays[i].far_m);
+    const double range_m = hits[i].range_m;
+    const double rounding_m = 1e-9 * range_m + 1e-9;  // what ranges themselves promise
+    if (!band.is_certain) {
+      bounds_m[i] = infinity;
+    } else if (!hits[i]) {
+      bounds_m[i] = band.near_m < infinity ? infinity : 0;
+    } else {
+      const double error_m = std::max(range_m - band.near_m, band.far_m - range_m);
+      bounds_m[i] = band.is_exact && error_m <= rounding_m ? 0 : error_m + rounding_m;
+    }
+  }
 }
 
 std::span<const LevelScene> RayTracer::levels() const noexcept { return impl_->scenes; }

@@ -116,13 +116,14 @@ class RayTracer {
   /// @param hits  as many as there are rays.
   void trace(std::span<const Ray> rays, std::span<Hit> hits) const noexcept;
 
-  /// Bounds how far each hit may be from that on the reference surface, metres along the ray.
-  /// Infinite where the reference may be met nowhere or much further: behind a silhouette within
-  /// the levels' deviations, over holes that coarse cells bridge, and for a ray that starts within
-  /// the deviation of the ground. The bound of a miss is 0, or infinite if the reference may be
-  /// met.
-  /// @param hits    of the same rays, as trace finds them.
-  /// @param bounds  as many as there are rays.
+  /// Bounds how far each range may be from that of the reference surface, metres along the ray,
+  /// whatever the mode of tracing. Infinite where the reference may be met much further on or
+  /// nowhere: past a silhouette within the leaves' deviations, over holes that coarse cells bridge,
+  /// and for a ray that starts within the deviation of the ground. The bound of a miss is 0, or
+  /// infinite if the reference may be met. Rays are followed leaf by leaf in double; that takes
+  /// some times as long as tracing them.
+  /// @param hits      of the same rays, as trace finds them.
+  /// @param bounds_m  as many as there are rays.
   void bound_errors(std::span<const Ray> rays, std::span<const Hit> hits,
                     std::span<double> bounds_m) const noexcept;
 

@@ -115,10 +115,7 @@ Cell LevelScene::Impl::cell_at(const Leaf& leaf, int exponent, int column, int r
   return cell;
 }
 
-Surface::Surface(std::vector<const LevelScene::Impl*> levels) : levels_(std::move(levels)) {
-  for (const LevelScene::Impl* level : levels_)
-    has_holes_ |= level->level.heights.hole_count() > 0 || level->bridging_leaves > 0;
-}
+Surface::Surface(std::vector<const LevelScene::Impl*> levels) : levels_(std::move(levels)) {}
 
 Surface::Place Surface::place_at(int column, int row) const noexcept {
   std::uint32_t number = 0;
@@ -159,8 +156,21 @@ Surface::Place Surface::start(const GridRay& ray, double t_m) const noexcept {
                   index(ray.v0 + t_m * ray.dv, all.level.first.y, all.last.y));
 }
 
-template <typename Act>
-void Surface::walk(const GridRay& ray, double t_begin_m, double t_end_m,
+Surface::Extent Surface::cell_extent(const Place& place) noexcept {
+  return {place.cell.column, place.cell.row, place.cell.width, place.cell.height};
+}
+
+Surface::Extent Surface::leaf_extent(const Place& place) const noexcept {
+  if (place.leaf == nullptr) return cell_extent(place);
+  const Level& level = levels_[place.level]->level;
+  const int side = level.leaf_cells * place.leaf->step;
+  const glm::ivec2 last = level.frame.samples - 1;
+  return {place.leaf->column, place.leaf->row, std::min(side, last.x - place.leaf->column),
+          std::min(side, last.y - place.leaf->row)};
+}
+
+template <typename ExtentOf, typename Act>
+void Surface::walk(const GridRay& ray, double t_begin_m, double t_end_m, const ExtentOf& extent_of,
                    const Act& act) const noexcept {
   const LevelScene::Impl& all = *levels_.back();
   const glm::ivec2 first = all.level.first;
@@ -171,22 +181,22 @@ void Surface::walk(const GridRay& ray, double t_begin_m, double t_end_m,
   const double per_column_m = 1 / ray.du;
   const double per_row_m = 1 / ray.dv;
   for (double t_m = t_begin_m;;) {
-    const Cell& cell = place.cell;
+    const Extent at = extent_of(place);
     const double column_exit_m =
-        exit_m(ray.u0, ray.du, per_column_m, cell.column, cell.column + cell.width);
-    const double row_exit_m = exit_m(ray.v0, ray.dv, per_row_m, cell.row, cell.row + cell.height);
+        exit_m(ray.u0, ray.du, per_column_m, at.column, at.column + at.width);
+    const double row_exit_m = exit_m(ray.v0, ray.dv, per_row_m, at.row, at.row + at.height);
     const double leave_m = std::max(t_m, std::min(column_exit_m, row_exit_m));
     if (act(place, t_m, std::min(leave_m, t_end_m)) || !(leave_m < t_end_m)) return;
     int column, row;
     if (column_exit_m <= row_exit_m) {
-      column = next_index(ray.du, cell.column, cell.column + cell.width);
-      row = std::clamp(static_cast<int>(std::floor(ray.v0 + leave_m * ray.dv)), cell.row,
-                       cell.row + cell.height - 1);
+      column = next_index(ray.du, at.column, at.column + at.width);
+      row = std::clamp(static_cast<int>(std::floor(ray.v0 + leave_m * ray.dv)), at.row,
+                       at.row + at.height - 1);
       if (column < first.x || column >= all.last.x) return;
     } else {
-      row = next_index(ray.dv, cell.row, cell.row + cell.height);
-      column = std::clamp(static_cast<int>(std::floor(ray.u0 + leave_m * ray.du)), cell.column,
-                          cell.column + cell.width - 1);
+      row = next_index(ray.dv, at.row, at.row + at.height);
+      column = std::clamp(static_cast<int>(std::floor(ray.u0 + leave_m * ray.du)), at.column,
+                          at.column + at.width - 1);
       if (row < first.y || row >= all.last.y) return;
     }
     t_m = leave_m;
@@ -203,6 +213,15 @@ double Surface::clearance_m(const GridRay& ray, double t_m) const noexcept {
 
 namespace {
 
+// Where a ray passes from one triangle of a cell to the other.
+double diagonal_m(const Cell& cell, const GridRay& ray) {
+  const double sign = cell.split == Cell::Split::NorthEastToSouthWest ? 1 : -1;
+  const double offset = sign > 0 ? 1 : 0;
+  const double across = (ray.u0 - cell.column) / cell.width;
+  const double down = (ray.v0 - cell.row) / cell.height;
+  return (offset - (across + sign * down)) / (ray.du / cell.width + sign * (ray.dv / cell.height));
+}
+
 // Follows a ray through the triangles of cell after cell. The clearance at the border of two
 // triangles is computed once, so that no crossing falls between them.
 class Descent {
@@ -213,7 +232,7 @@ class Descent {
   // where.
   bool meets(const Cell& cell, double t_in, double t_out) {
     if (passes_clear(cell, t_in, t_out)) return false;
-    const double turn_m = diagonal_m(cell);
+    const double turn_m = diagonal_m(cell, ray_);
     if (t_in < turn_m && turn_m < t_out)
       return meets_half(cell, t_in, turn_m) || meets_half(cell, turn_m, t_out);
     return meets_half(cell, t_in, t_out);
@@ -228,14 +247,6 @@ class Descent {
     if (!(low_m > cell.nw && low_m > cell.ne && low_m > cell.sw && low_m > cell.se)) return false;
     above_m_ = 1;  // by some amount
     return true;
-  }
-  double diagonal_m(const Cell& cell) const {
-    const double sign = cell.split == Cell::Split::NorthEastToSouthWest ? 1 : -1;
-    const double offset = sign > 0 ? 1 : 0;
-    const double across = (ray_.u0 - cell.column) / cell.width;
-    const double down = (ray_.v0 - cell.row) / cell.height;
-    return (offset - (across + sign * down)) /
-           (ray_.du / cell.width + sign * (ray_.dv / cell.height));
   }
   bool meets_half(const Cell& cell, double t_in, double t_out) {
     const double middle_m = std::isinf(t_out) ? t_in : (t_in + t_out) / 2;
@@ -264,7 +275,7 @@ std::optional<Crossing> Surface::first_crossing(const GridRay& ray, double t_beg
                                                 double t_end_m) const noexcept {
   Descent descent(ray);
   std::optional<Crossing> crossing;
-  walk(ray, t_begin_m, t_end_m, [&](const Place& place, double t_in, double t_out) {
+  walk(ray, t_begin_m, t_end_m, cell_extent, [&](const Place& place, double t_in, double t_out) {
     if (!descent.meets(place.cell, t_in, t_out)) return false;
     crossing = {descent.range_m(), descent.plane(), place.leaf->deviation_m, place.level};
     return true;
@@ -272,23 +283,105 @@ std::optional<Crossing> Surface::first_crossing(const GridRay& ray, double t_beg
   return crossing;
 }
 
-bool Surface::is_uncertain(const GridRay& lowered, double t_end_m) const noexcept {
-  bool uncertain = false;
-  bool over_surface = false;
-  walk(lowered, 0, t_end_m, [&](const Place& place, double t_in, double t_out) {
-    const double low_m = std::min(lowered.z0 + t_in * lowered.dz, lowered.z0 + t_out * lowered.dz);
-    if (place.leaf != nullptr && place.leaf->has_holes && place.leaf->step > 1)
-      uncertain |= low_m <= place.leaf->high_m;
-    if (!over_surface) {
-      const double middle_m = std::isinf(t_out) ? t_in : (t_in + t_out) / 2;
-      uncertain |=
-          groundray::clearance_m(lowered, plane_at(place.cell, lowered, middle_m), t_in) < 0;
+namespace {
+
+// Follows a ray down through the band within which the reference lies round the surface.
+class BandDescent {
+ public:
+  BandDescent(const GridRay& ray, Surface::Band& band) : ray_(ray), band_(band) {}
+
+  // Takes the ray through one cell. Returns whether all is known.
+  bool pass(const Cell& cell, double deviation_m, double t_in, double t_out) {
+    const double turn_m = diagonal_m(cell, ray_);
+    if (t_in < turn_m && turn_m < t_out)
+      return pass_half(cell, deviation_m, t_in, turn_m) ||
+             pass_half(cell, deviation_m, turn_m, t_out);
+    return pass_half(cell, deviation_m, t_in, t_out);
+  }
+  void pass_clear() {
+    over_surface_ = true;
+    is_below_ = false;
+  }
+  void pass_hole() { over_surface_ = false; }
+
+ private:
+  bool pass_half(const Cell& cell, double deviation_m, double t_in, double t_out) {
+    const double middle_m = std::isinf(t_out) ? t_in : (t_in + t_out) / 2;
+    const FacetPlane plane = plane_at(cell, ray_, middle_m);
+    const double in_m = clearance_m(ray_, plane, t_in);
+    over_surface_ &= !std::isnan(in_m);
+    if (std::isnan(in_m)) return false;
+    if (!over_surface_) {
+      if (std::abs(in_m) < deviation_m) return give_up();
+      is_below_ = in_m < 0;
+      over_surface_ = true;
     }
-    // Between holes both halves of each cell are asked for.
-    over_surface = !std::isnan(place.cell.nw + place.cell.ne + place.cell.sw + place.cell.se);
-    return uncertain || (over_surface && !has_holes_);
+    if (is_below_) {  // until it comes up; nothing is met from below
+      is_below_ = out_m(plane, t_out) < 0;
+      return deviation_m > 0 && out_m(plane, t_out) > -deviation_m && give_up();
+    }
+    const double near_m = falls_to(deviation_m, plane, in_m, t_in, t_out);
+    if (near_m < infinity && deviation_m > 0) band_.is_exact = false;
+    band_.near_m = std::min(band_.near_m, near_m);
+    band_.far_m = falls_to(-deviation_m, plane, in_m, t_in, t_out);
+    return band_.far_m < infinity;
+  }
+  bool give_up() {
+    band_.is_certain = false;
+    return true;
+  }
+  double out_m(const FacetPlane& plane, double t_out) const {
+    return std::isinf(t_out) ? ray_.dz * infinity : clearance_m(ray_, plane, t_out);
+  }
+  // Where in [t_in, t_out] the clearance falls below `level_m`.
+  double falls_to(double level_m, const FacetPlane& plane, double in_m, double t_in,
+                  double t_out) const {
+    if (in_m < level_m) return t_in;
+    if (!(out_m(plane, t_out) < level_m)) return infinity;
+    GridRay lifted = ray_;
+    lifted.z0 -= level_m;
+    return std::clamp(intersect(lifted, plane), t_in, t_out);
+  }
+
+  const GridRay& ray_;
+  Surface::Band& band_;
+  bool over_surface_ = false;
+  bool is_below_ = false;
+};
+
+}  // namespace
+
+Surface::Band Surface::band(const GridRay& ray, double t_end_m) const noexcept {
+  Band band;
+  BandDescent descent(ray, band);
+  const auto leaf_extent_of = [this](const Place& place) { return leaf_extent(place); };
+  walk(ray, 0, t_end_m, leaf_extent_of, [&](const Place& place, double t_in, double t_out) {
+    if (place.leaf == nullptr) {
+      descent.pass_hole();
+      return false;
+    }
+    const Leaf& leaf = *place.leaf;
+    const double low_m = std::min(ray.z0 + t_in * ray.dz, ray.z0 + t_out * ray.dz);
+    if (low_m > leaf.high_m + leaf.deviation_m) {
+      if (leaf.has_holes) {
+        descent.pass_hole();
+      } else {
+        descent.pass_clear();
+      }
+      return false;
+    }
+    if (leaf.has_holes && leaf.step > 1) {
+      band.is_certain = false;
+      return true;
+    }
+    bool done = false;
+    walk(ray, t_in, t_out, cell_extent, [&](const Place& cell, double from_m, double to_m) {
+      done = descent.pass(cell.cell, leaf.deviation_m, from_m, to_m);
+      return done;
+    });
+    return done;
   });
-  return uncertain;
+  return band;
 }
 
 }  // namespace groundray

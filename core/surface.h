@@ -24,10 +24,17 @@ class Surface {
   std::optional<Crossing> first_crossing(const GridRay& ray, double t_begin_m,
                                          double t_end_m) const noexcept;
 
-  /// Whether a ray, lowered by how far the reference may be from the surface, tells nothing of what
-  /// happens on the reference within [0, t_end_m]: it begins below the surface, comes below it
-  /// over a hole, or passes low over a leaf that bridges holes of the DEM.
-  bool is_uncertain(const GridRay& lowered, double t_end_m) const noexcept;
+  /// Where a ray meets the reference surface, as far as this one tells: the reference is nowhere
+  /// farther from a leaf than the leaf's deviation.
+  struct Band {
+    double near_m = std::numeric_limits<double>::infinity();  ///< no sooner than here
+    double far_m = std::numeric_limits<double>::infinity();   ///< no later than here
+    bool is_certain = true;  ///< false if the reference may be met anywhere, or not at all
+    bool is_exact = true;    ///< no leaf that matters deviates
+  };
+  /// Returns that for [0, t_end_m]. Nothing is certain of a ray that begins within the deviation of
+  /// the ground, comes that low over a hole, or low over a leaf that bridges holes of the DEM.
+  Band band(const GridRay& ray, double t_end_m) const noexcept;
 
  private:
   struct Place {
@@ -39,12 +46,18 @@ class Surface {
   Place place_at(int column, int row) const noexcept;
   void move(Place& place, int column, int row) const noexcept;
   Place start(const GridRay& ray, double t_m) const noexcept;
-  /// Calls act(place, t_in, t_out) for each cell along the ray until it returns true.
-  template <typename Act>
-  void walk(const GridRay& ray, double t_begin_m, double t_end_m, const Act& act) const noexcept;
+  // A rectangle of whole cells of the DEM.
+  struct Extent {
+    int column, row, width, height;
+  };
+  static Extent cell_extent(const Place& place) noexcept;
+  Extent leaf_extent(const Place& place) const noexcept;
+  // Calls act(place, t_in, t_out) for each extent_of(place) along the ray until it returns true.
+  template <typename ExtentOf, typename Act>
+  void walk(const GridRay& ray, double t_begin_m, double t_end_m, const ExtentOf& extent_of,
+            const Act& act) const noexcept;
 
   std::vector<const LevelScene::Impl*> levels_;
-  bool has_holes_ = false;
 };
 
 }  // namespace groundray

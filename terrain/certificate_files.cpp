@@ -67,7 +67,7 @@ std::string node_text(const NodeLevel& node) {
                      node.low_m[0], node.high_m[0]);
 }
 
-// Reads the numbers at the odd or all places of a line; false if some are none.
+// Sets `value` to the number that a word is; false if it is none.
 template <typename T>
 bool read_number(const std::vector<std::string_view>& words, std::size_t index, T& value) {
   const auto number = index < words.size() ? number_of<T>(words[index]) : std::nullopt;

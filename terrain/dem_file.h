@@ -48,8 +48,8 @@ class DemFile {
   std::vector<float> read(glm::ivec2 first, glm::ivec2 size) const;
 
   /// Returns what the heights follow from, as lines of text: path, options, header, size and time
-  /// of each file involved (all those of a mosaic), and a hash of samples at fixed places. Equal
-  /// texts mean equal heights as far as that can be told without reading all of them.
+  /// of each file involved (those that a mosaic names), and a hash of samples at fixed places.
+  /// Equal texts mean equal heights as far as that can be told without reading all of them.
   /// @throws Error if the samples cannot be read.
   std::string fingerprint() const;
 

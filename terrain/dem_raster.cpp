@@ -20,16 +20,6 @@ constexpr float hole = std::numeric_limits<float>::quiet_NaN();
 constexpr int max_samples_per_side = 1 << 30;
 constexpr GIntBig cache_bytes = GIntBig{64} << 20;
 
-// GDAL's own limit is a share of the machine's memory: too much for a program that promises to stay
-// small beside a raster larger than memory.
-void bound_cache() {
-  static std::once_flag once;
-  std::call_once(once, [] {
-    const bool is_chosen = CPLGetConfigOption("GDAL_CACHEMAX", nullptr) != nullptr;
-    if (!is_chosen && GDALGetCacheMax64() > cache_bytes) GDALSetCacheMax64(cache_bytes);
-  });
-}
-
 // Returns the band that marks holes beside the band of heights, if there is one.
 GDALRasterBand* alpha_band(GDALDataset& dataset) {
   if (dataset.GetRasterCount() != 2) return nullptr;
@@ -121,6 +111,16 @@ void refuse_infinite(const Strip& strip) {
 
 }  // namespace
 
+void start_gdal() {
+  // GDAL's registration is not for several threads at once.
+  static std::once_flag once;
+  std::call_once(once, [] {
+    GDALAllRegister();
+    const bool is_chosen = CPLGetConfigOption("GDAL_CACHEMAX", nullptr) != nullptr;
+    if (!is_chosen && GDALGetCacheMax64() > cache_bytes) GDALSetCacheMax64(cache_bytes);
+  });
+}
+
 glm::dvec2 RasterHeader::centre() const {
   const auto& gt = geotransform;
   const glm::dvec2 half = glm::dvec2(samples) / 2.0;
@@ -128,8 +128,7 @@ glm::dvec2 RasterHeader::centre() const {
 }
 
 GDALDatasetUniquePtr open_raster(const std::filesystem::path& path) {
-  GDALAllRegister();
-  bound_cache();
+  start_gdal();
   GDALDatasetUniquePtr dataset(
       GDALDataset::Open(path.c_str(), GDAL_OF_RASTER | GDAL_OF_VERBOSE_ERROR));
   if (dataset == nullptr) {

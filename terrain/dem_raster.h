@@ -28,8 +28,11 @@ struct RasterHeader {
   glm::dvec2 centre() const;
 };
 
-/// Opens a dataset of at least one band. GDAL's cache of blocks, by default a share of the memory,
-/// is cut down to 64 MiB, unless GDAL_CACHEMAX sets it. @throws Error if there is none.
+/// Loads GDAL's drivers, once; and cuts its cache of blocks, by default a share of the machine's
+/// memory, down to 64 MiB, unless GDAL_CACHEMAX sets it. Comes before all other use of GDAL.
+void start_gdal();
+
+/// Opens a dataset of at least one band. @throws Error if there is none.
 GDALDatasetUniquePtr open_raster(const std::filesystem::path& path);
 
 /// @throws Error if the grid has no place, or cells without area.

@@ -2,6 +2,7 @@
 
 #include <algorithm>
 #include <cmath>
+#include <limits>
 
 namespace groundray {
 namespace {
@@ -11,6 +12,7 @@ constexpr int leaf_cells = 8;
 struct Content {
   bool any = false;
   bool all = true;
+  float high_m = -std::numeric_limits<float>::infinity();
 };
 
 Content content(const HeightGrid& grid, glm::ivec2 low, glm::ivec2 high) {
@@ -20,6 +22,7 @@ Content content(const HeightGrid& grid, glm::ivec2 low, glm::ivec2 high) {
       const bool hole = std::isnan(grid.height_m(column, row));
       found.any |= !hole;
       found.all &= !hole;
+      found.high_m = std::max(found.high_m, grid.height_m(column, row));
     }
   }
   return found;
@@ -39,10 +42,8 @@ Level full_resolution_level(const HeightGrid& grid) {
   for (int row = 0; row < last.y; row += leaf_cells) {
     for (int column = 0; column < last.x; column += leaf_cells) {
       const glm::ivec2 low(column, row);
-      const Content found = grid.hole_count() == 0
-                                ? Content{true, true}
-                                : content(grid, low, glm::min(low + leaf_cells, last));
-      if (found.any) level.leaves.push_back({column, row, 1, 0, !found.all});
+      const Content found = content(grid, low, glm::min(low + leaf_cells, last));
+      if (found.any) level.leaves.push_back({column, row, 1, 0, !found.all, 0, found.high_m});
     }
   }
   return level;

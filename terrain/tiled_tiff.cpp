@@ -67,7 +67,7 @@ bool is_as_specified(GDALDataset& dataset, const TiffSpec& spec) {
 
 TiledTiffWriter::TiledTiffWriter(const std::filesystem::path& path, const TiffSpec& spec)
     : path_(path), spec_(spec) {
-  GDALAllRegister();
+  start_gdal();
   const CPLErrorHandlerPusher quiet(CPLQuietErrorHandler);
   CPLErrorReset();
   GDALDriver& driver = *GetGDALDriverManager()->GetDriverByName("GTiff");

@@ -87,10 +87,10 @@ struct MarkVerticesPass {
       const glm::ivec2 point = tree.point(around, at);
       const glm::ivec2 large_cell{point.x - corner % 2, point.y - corner / 2};
       const bool is_main = around.block.splits_along_main(large_cell.x, large_cell.y);
+      // A half without this corner has the diagonal, which makes another half of it and this
+      // corner.
       for (const Corner half : {NorthWest, NorthEast, SouthWest, SouthEast}) {
-        const bool has_corner = half + corner != 3;
-        if (is_main != is_of_anti_diagonal(half) && has_corner &&
-            tree.half_exists(around, large_cell, half)) {
+        if (is_main != is_of_anti_diagonal(half) && tree.half_exists(around, large_cell, half)) {
           return true;
         }
       }

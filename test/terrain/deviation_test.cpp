@@ -491,6 +491,31 @@ TEST(Deviation, ACertificateIsTheSameHoweverTheDemIsCut) {
   }
 }
 
+// A node of 2 x 2 cells of 256. Its south-eastern cell has its corners at 0 m along the main
+// diagonal and at -128 m along the other. Heights are half way between the two ways of splitting
+// it, no more than 64 m from either; but 1/16 m lower on both sides of the main diagonal in the row
+// before its middle, where that ridge, at 0 m, crosses the edge between those two samples.
+TEST(Deviation, ACrossingInTheMiddleOfALargeNodeCounts) {
+  const auto height_m = [](int c, int r) -> double {
+    const double x = (c - 256) / 256.0;
+    const double y = (r - 256) / 256.0;
+    const double anti = -128 * (x + y < 1 ? x + y : 2 - x - y);
+    if (c < 256 && r < 256) return 0;
+    if (c < 256 || r < 256) return -256 * std::max(x, y) * (1 - (r < 256 ? r : c) / 512.0);
+    const double main = -128 * std::abs(x - y);
+    const bool is_lower = (c == 384 && r == 383) || (c == 383 && r == 384);
+    return c > 512 || r > 512 ? 0 : (anti + main) / 2 - (is_lower ? 0.0625 : 0);
+  };
+  std::vector<float> heights;
+  for (int r = 0; r < 530; ++r) {
+    for (int c = 0; c < 530; ++c) heights.push_back(static_cast<float>(height_m(c, r)));
+  }
+  const HeightGrid grid({530, 530}, {0, 0}, {1, 1}, heights);
+  const NodeLevel level = certify(grid, 2, NodeDetail::Full)[8];
+  EXPECT_EQ(level.full_m[0], 64);
+  EXPECT_EQ(level.deviation_m[0], 64.0625F);
+}
+
 TEST(Deviation, CutAtTheNodesOfLevel5TheLastBitIsTheSameToo) {
   std::vector<float> heights(300 * 290);
   for (std::size_t i = 0; i < heights.size(); ++i) {
