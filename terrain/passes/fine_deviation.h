@@ -29,10 +29,11 @@ inline double worst_of_fine_pair(const float* outer, std::ptrdiff_t along, std::
 }
 
 /// Level 0: returns the largest deviation of a node's templates, metres.
-inline double worst_of_level_0(const float* corner, std::ptrdiff_t stride, int cells) noexcept {
+inline double worst_of_level_0(const float* corner, std::ptrdiff_t stride,
+                               std::ptrdiff_t cells) noexcept {
   const float* last = corner + cells * (stride + 1);
   double worst = 0;
-  for (int c = 0; c < cells; c += 2) {
+  for (std::ptrdiff_t c = 0; c < cells; c += 2) {
     worst = worst_of_fine_pair(corner + c, 1, stride, worst);
     worst = worst_of_fine_pair(corner + c * stride, stride, 1, worst);
     worst = worst_of_fine_pair(last - c, -1, -stride, worst);
@@ -54,16 +55,17 @@ inline double worst_of_cell_of_2(const float* corner, std::ptrdiff_t stride,
 }
 
 /// Level 1: returns twice the largest deviation of the full block.
-inline double worst_of_block_of_2(const float* corner, std::ptrdiff_t stride, int cells) noexcept {
+inline double worst_of_block_of_2(const float* corner, std::ptrdiff_t stride,
+                                  std::ptrdiff_t cells) noexcept {
   double worst = 0;
-  for (int row = 0; row < cells; ++row) {
-    for (int column = 0; column < cells; ++column) {
+  for (std::ptrdiff_t row = 0; row < cells; ++row) {
+    for (std::ptrdiff_t column = 0; column < cells; ++column) {
       worst = worst_of_cell_of_2(corner + 2 * (row * stride + column), stride, worst);
     }
   }
   const float* south = corner + 2 * cells * stride;
   const float* east = corner + 2 * cells;
-  for (int c = 0; c < 2 * cells; c += 2) {
+  for (std::ptrdiff_t c = 0; c < 2 * cells; c += 2) {
     worst = larger(worst, twice_off_middle(south[c], south[c + 2], south[c + 1]));
     const float* at = east + c * stride;
     worst = larger(worst, twice_off_middle(at[0], at[2 * stride], at[stride]));
@@ -91,10 +93,10 @@ inline double worst_of_pair_of_2(const float* outer, std::ptrdiff_t along, std::
 
 /// Level 1: returns 4 times the largest deviation of a node's thinned borders.
 inline double worst_of_borders_of_2(const float* corner, std::ptrdiff_t stride,
-                                    int cells) noexcept {
+                                    std::ptrdiff_t cells) noexcept {
   const float* last = corner + 2 * cells * (stride + 1);
   double worst = 0;
-  for (int c = 0; c < 2 * cells; c += 4) {
+  for (std::ptrdiff_t c = 0; c < 2 * cells; c += 4) {
     worst = worst_of_pair_of_2(corner + c, 1, stride, worst);
     worst = worst_of_pair_of_2(corner + c * stride, stride, 1, worst);
     worst = worst_of_pair_of_2(last - c, -1, -stride, worst);
@@ -107,21 +109,21 @@ inline double worst_of_borders_of_2(const float* corner, std::ptrdiff_t stride,
 struct FineRun {
   const float* corner;  ///< north-western sample of the first
   std::ptrdiff_t stride;
-  int count;
+  std::ptrdiff_t count;
   NodeArrays nodes;
   std::size_t out;  ///< where the first node is in the arrays
 
   void add_level_0() const noexcept {
     float* const key = nodes.key_m + out;
 #pragma omp simd
-    for (int i = 0; i < count; ++i) {
+    for (std::ptrdiff_t i = 0; i < count; ++i) {
       key[i] = rounded_up(worst_of_level_0(corner + 2 * i, stride, 2));
     }
     if (nodes.deviation_m == nullptr) return;
-    for (int i = 0; i < count; ++i) {
+    for (std::ptrdiff_t i = 0; i < count; ++i) {
       const std::size_t at = out + static_cast<std::size_t>(i);
       nodes.deviation_m[at] = key[i];
-      for (int sample = 0; sample < 9; ++sample) {
+      for (std::ptrdiff_t sample = 0; sample < 9; ++sample) {
         const float height = corner[2 * i + sample % 3 + sample / 3 * stride];
         nodes.low_m[at] = height < nodes.low_m[at] ? height : nodes.low_m[at];
         nodes.high_m[at] = height > nodes.high_m[at] ? height : nodes.high_m[at];
@@ -132,13 +134,13 @@ struct FineRun {
   void add_level_1() const noexcept {
     float* const key = nodes.key_m + out;
 #pragma omp simd
-    for (int i = 0; i < count; ++i) {
+    for (std::ptrdiff_t i = 0; i < count; ++i) {
       const double full = 0.5 * worst_of_block_of_2(corner + 4 * i, stride, 2);
       const double thinned = 0.25 * worst_of_borders_of_2(corner + 4 * i, stride, 2);
       key[i] = rounded_up(larger(full, thinned));
     }
     if (nodes.deviation_m == nullptr) return;
-    for (int i = 0; i < count; ++i) {
+    for (std::ptrdiff_t i = 0; i < count; ++i) {
       const std::size_t at = out + static_cast<std::size_t>(i);
       nodes.deviation_m[at] = key[i];
       nodes.full_m[at] = rounded_up(0.5 * worst_of_block_of_2(corner + 4 * i, stride, 2));

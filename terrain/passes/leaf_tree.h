@@ -141,7 +141,8 @@ struct LeafTree {
 
   // Marks of a leaf's points: bits, row by row.
   std::size_t mark_bit(int column, int row) const noexcept {
-    return static_cast<std::size_t>(row * (block_cells + 1) + column);
+    return static_cast<std::size_t>(row) * (static_cast<std::size_t>(block_cells) + 1) +
+           static_cast<std::size_t>(column);
   }
   std::size_t mark_words() const noexcept { return (mark_bit(0, block_cells + 1) + 63) / 64; }
   /// How many of leaf `which`'s marks come before a bit.

@@ -126,6 +126,20 @@ TEST(SceneFile, ReadsEveryKey) {
   EXPECT_NEAR(forward.y, 1, 1e-15);
 }
 
+TEST(SceneFile, ReadsHowFinelyTerrainIsTraced) {
+  const std::string text =
+      with(with(scene_text, "label: 40",
+                "label: 40\n  tolerance_m: 0.05\n  tolerance_mrad: 0.3\n  memory_mib: 512"),
+           "range_noise_sigma_m", "error_bound: report\n    range_noise_sigma_m");
+  const SceneSpec scene = parse(text);
+  EXPECT_EQ(scene.terrain.detail.tolerance_m, 0.05);
+  EXPECT_EQ(scene.terrain.detail.tolerance_rad, 0.3e-3);
+  EXPECT_EQ(scene.terrain.detail.memory_mib, 512u);
+  EXPECT_EQ(scene.lidars[0].lidar.error_bound, LidarSpec::ErrorBound::Report);
+  EXPECT_THAT(complaint("label: 40", "tolerance_m: -1"), HasSubstr("key 'tolerance_m': is -1"));
+  EXPECT_THAT(complaint("label: 40", "memory_mib: 5000000000"), HasSubstr("key 'memory_mib'"));
+}
+
 TEST(SceneFile, FillsInWhatIsOptional) {
   const SceneSpec scene = parse(R"(
 groundray: 1

@@ -276,7 +276,8 @@ void for_each_node(const Lattice& lattice, const Act& act) {
   for (int level = 0; level <= lattice.top_level(); ++level) {
     const glm::ivec2 nodes = lattice.nodes(level);
     for (int j = 0; j < nodes.y; ++j) {
-      for (int i = 0; i < nodes.x; ++i) act(level, glm::ivec2{i, j}, std::size_t(j * nodes.x + i));
+      for (int i = 0; i < nodes.x; ++i)
+        act(level, glm::ivec2{i, j}, std::size_t(j) * std::size_t(nodes.x) + std::size_t(i));
     }
   }
 }
@@ -397,7 +398,8 @@ TEST(Deviation, KeysAreSaturatedAndTellHolesAndHeightsAreThoseOfTheSamples) {
         const glm::ivec2 below = level > 0 ? lattice.nodes(level - 1) : glm::ivec2(0);
         for (int r = 2 * node.y; r < std::min(2 * node.y + 2, below.y); ++r) {
           for (int c = 2 * node.x; c < std::min(2 * node.x + 2, below.x); ++c) {
-            key = std::max(key, levels[std::size_t(level - 1)].key_m[std::size_t(r * below.x + c)]);
+            key = std::max(key, levels[std::size_t(level - 1)]
+                                    .key_m[std::size_t(r) * std::size_t(below.x) + std::size_t(c)]);
           }
         }
         EXPECT_EQ(found.key_m[index], key);
@@ -517,7 +519,7 @@ TEST(Deviation, ACrossingInTheMiddleOfALargeNodeCounts) {
 }
 
 TEST(Deviation, CutAtTheNodesOfLevel5TheLastBitIsTheSameToo) {
-  std::vector<float> heights(300 * 290);
+  std::vector<float> heights(std::size_t{300} * 290);
   for (std::size_t i = 0; i < heights.size(); ++i) {
     const double u = uniform(Seed{7}, i);
     heights[i] = static_cast<float>(1000 * u * std::exp2(-60 * uniform(Seed{8}, i)));

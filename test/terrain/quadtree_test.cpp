@@ -75,7 +75,7 @@ struct Known {
     part = {end - first, {}, {}, {}, {}, {}};
     for (int r = first.y; r < end.y; ++r) {
       for (int c = first.x; c < end.x; ++c) {
-        const auto at = std::size_t(r * all.size.x + c);
+        const auto at = std::size_t(r) * std::size_t(all.size.x) + std::size_t(c);
         part.key_m.push_back(all.key_m[at]);
         part.deviation_m.push_back(all.deviation_m[at]);
         part.full_m.push_back(all.full_m[at]);
@@ -103,7 +103,8 @@ struct Known {
     }
   }
   std::size_t index(const Node& node) const {
-    return std::size_t(node.row * levels[std::size_t(node.level)].size.x + node.column);
+    return std::size_t(node.row) * std::size_t(levels[std::size_t(node.level)].size.x) +
+           std::size_t(node.column);
   }
   const NodeLevel& of(const Node& node) const { return levels[std::size_t(node.level)]; }
 };

@@ -1,0 +1,176 @@
+"""Terrain of any size from the command line, judged against runs at full resolution."""
+
+import os
+import re
+import shutil
+import subprocess
+from pathlib import Path
+
+import numpy as np
+import pytest
+from plyfile import PlyData
+
+ROOT = Path(__file__).resolve().parents[2]
+PROGRAM = ROOT / "build/release/bin/groundray"
+PRAIRIE = ROOT / "data/terrain/prairie_1m.tif"
+JACKSBORO = ROOT / "data/terrain/jacksboro.tif"
+
+SCENE = """\
+groundray: 1
+seed: 7
+duration_s: 0.2
+terrain: {dem: DEM, DETAIL}
+platform:
+  drive:
+    waypoints_m: [[429440, 5150660], [429448, 5150668], [429456, 5150671], [429470, 5150676]]
+    speed_m_s: 10
+    height_m: 0.5
+lidars:
+  - name: top
+    preset: velodyne_vlp16
+    error_bound: report
+    mount: {translation_m: [0, 0, 1.5], pitch_deg: 3}
+"""
+
+
+def groundray(*arguments, **options):
+    return subprocess.run(
+        [PROGRAM, *map(str, arguments)], capture_output=True, text=True, timeout=300, **options
+    )
+
+
+def generate(folder, dem, detail, out, **options):
+    text = SCENE.replace("DEM", str(dem)).replace("DETAIL", detail)
+    (folder / f"{out}.yaml").write_text(text)
+    result = groundray("generate", folder / f"{out}.yaml", "-o", folder / out, **options)
+    assert result.returncode == 0, result.stderr
+    return [PlyData.read(p)["vertex"] for p in sorted((folder / out).glob("lidar/top/*.ply"))]
+
+
+@pytest.fixture(scope="module")
+def whole(tmp_path_factory):
+    return generate(tmp_path_factory.mktemp("whole"), PRAIRIE, "label: 1", "whole")
+
+
+@pytest.fixture
+def dem(tmp_path):
+    """A copy, for its certificate is made beside it."""
+    return Path(shutil.copy(PRAIRIE, tmp_path))
+
+
+def check_against_whole(scans, whole):
+    """Every range differs from that at full resolution by no more than its bound."""
+    moved = bounded = total = 0
+    for scan, truth in zip(scans, whole, strict=True):
+        ranges = {
+            (t, ring): r
+            for t, ring, r in zip(truth["time"], truth["ring"], truth["range_true"], strict=True)
+        }
+        for t, ring, r, bound in zip(
+            scan["time"], scan["ring"], scan["range_true"], scan["error_bound"], strict=True
+        ):
+            error = abs(r - ranges.get((t, ring), np.inf))
+            assert error <= bound
+            moved += error > 1e-6
+            bounded += np.isfinite(bound)
+            total += 1
+    assert bounded > 0.5 * total
+    return moved / total
+
+
+def test_bounds_are_zero_at_full_resolution(whole):
+    for scan in whole:
+        assert (scan["error_bound"] == 0).all()
+        assert (scan["error_estimate"] == 0).all()
+
+
+def test_error_bound_holds_for_every_echo_of_a_simplified_terrain(tmp_path, dem, whole):
+    scans = generate(tmp_path, dem, "tolerance_m: 0.3, tolerance_mrad: 1", "coarse")
+    assert check_against_whole(scans, whole) > 0.2
+    assert not list(tmp_path.glob("*.groundray")), "a DEM that fits in memory needs no certificate"
+
+
+def test_dem_that_exceeds_its_memory_is_served_from_its_certificate(tmp_path, dem, whole):
+    scans = generate(tmp_path, dem, "memory_mib: 3", "capped")
+    assert (tmp_path / "prairie_1m.tif.groundray/certificate.txt").exists()
+    assert check_against_whole(scans, whole) < 0.5
+    one = {0}  # the same bytes on a single processor
+    generate(
+        tmp_path, dem, "memory_mib: 3", "single", preexec_fn=lambda: os.sched_setaffinity(0, one)
+    )
+    for ply in sorted((tmp_path / "capped/lidar/top").glob("*.ply")):
+        assert ply.read_bytes() == (tmp_path / "single/lidar/top" / ply.name).read_bytes()
+
+
+def test_frames_do_not_depend_on_those_before(tmp_path, dem):
+    generate(tmp_path, dem, "memory_mib: 3, tolerance_mrad: 0.5", "run")
+    last = tmp_path / "run/lidar/top/000001.ply"
+    before = last.read_bytes()
+    last.unlink()
+    generate(tmp_path, dem, "memory_mib: 3, tolerance_mrad: 0.5", "run")
+    assert last.read_bytes() == before
+
+
+def test_info_tells_levels_triangles_and_bound(tmp_path, dem):
+    (tmp_path / "s.yaml").write_text(
+        SCENE.replace("DEM", str(dem)).replace("DETAIL", "memory_mib: 3")
+    )
+    said = groundray("info", tmp_path / "s.yaml")
+    assert said.returncode == 0, said.stderr
+    rows = re.findall(r"^ +([\d.]+) +\d+ x +\d+ +(\d+) +([\d.e-]+) +(\d+)$", said.stdout, re.M)
+    assert [float(row[0]) for row in rows] == [2.0**k for k in range(len(rows))]
+    assert len(rows) > 1
+    total = int(re.search(r"^triangles (\d+)", said.stdout, re.M)[1])
+    assert total == sum(int(row[1]) for row in rows)
+
+
+def test_certify_prints_how_far_each_level_deviates(tmp_path):
+    dem = Path(shutil.copy(JACKSBORO, tmp_path))
+    first = groundray("terrain", "certify", dem)
+    assert first.returncode == 0, first.stderr
+    again = groundray("terrain", "certify", dem)
+    assert again.stdout == first.stdout
+    assert again.stderr == "", "nothing is certified twice"
+    rows = [line.split() for line in first.stdout.splitlines() if re.match(r" *\d+ ", line)]
+    raw = tmp_path / "dem.bin"
+    subprocess.run(["gdal_translate", "-q", "-of", "ENVI", "-ot", "Float64", dem, raw], check=True)
+    heights = np.fromfile(raw, "<f8").reshape(344, 403)
+    # The root is one cell: two triangles over everything.
+    v, u = np.mgrid[0:1:344j, 0:1:403j]
+    nw, ne, sw, se = heights[0, 0], heights[0, -1], heights[-1, 0], heights[-1, -1]
+    near = nw + u * (ne - nw) + v * (sw - nw)
+    far = se + (1 - u) * (sw - se) + (1 - v) * (ne - se)
+    at_samples = np.abs(np.where(u + v <= 1, near, far) - heights).max()
+    # Between samples, along the root's diagonal, it may be a little more.
+    assert at_samples <= float(rows[-1][5]) <= at_samples + 20
+
+
+@pytest.mark.parametrize(
+    ("arguments", "words"),
+    [
+        (["-o", "m.stl", "--max-error-m", "1"], ".ply, .obj or .glb"),
+        (["-o", "no/such/folder/m.ply", "--max-error-m", "1"], "m.ply"),
+    ],
+)
+def test_mesh_refuses_what_cannot_be(tmp_path, arguments, words):
+    said = groundray("terrain", "mesh", JACKSBORO, *arguments, cwd=tmp_path)
+    assert said.returncode == 1
+    assert said.stderr.startswith("groundray: ")
+    assert words in said.stderr
+    assert not list(tmp_path.iterdir())
+
+
+@pytest.mark.parametrize(
+    "arguments",
+    [
+        ["-o", "m.ply"],
+        ["-o", "m.ply", "--max-error-m", "-1"],
+        ["-o", "m.ply", "--max-error-m", "1", "--viewpoint", "1,2,3"],
+        ["-o", "m.ply", "--max-error-m", "1", "--angle-mrad", "1"],
+        ["-o", "m.ply", "--max-error-m", "1", "--angle-mrad", "1", "--viewpoint", "1,2"],
+    ],
+)
+def test_mesh_says_how_it_is_used(tmp_path, arguments):
+    said = groundray("terrain", "mesh", JACKSBORO, *arguments, cwd=tmp_path)
+    assert said.returncode == 2
+    assert not list(tmp_path.iterdir())
