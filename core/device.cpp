@@ -49,6 +49,19 @@ RTCScene new_scene(const RayDevice& device) {
   return scene;
 }
 
+RTCScene instance_all(const RayDevice& device, std::span<const RTCScene> scenes) {
+  RTCScene all = new_scene(device);
+  for (unsigned i = 0; i < scenes.size(); ++i) {
+    RTCGeometry instance = rtcNewGeometry(handle(device), RTC_GEOMETRY_TYPE_INSTANCE);
+    rtcSetGeometryInstancedScene(instance, scenes[i]);
+    rtcCommitGeometry(instance);
+    rtcAttachGeometryByID(all, instance, i);
+    rtcReleaseGeometry(instance);
+  }
+  rtcCommitScene(all);
+  return all;
+}
+
 void check(const RayDevice& device, std::string_view doing) {
   if (rtcGetDeviceError(handle(device)) == RTC_ERROR_NONE) return;
   throw Error("ray tracer: Embree failed while {}; is there enough memory?", doing);

@@ -2,6 +2,7 @@
 
 #include <atomic>
 #include <cstddef>
+#include <span>
 #include <string_view>
 
 #include "core/embree_adapter.h"
@@ -21,6 +22,10 @@ inline RTCDevice handle(const RayDevice& device) noexcept { return device.impl()
 
 /// Returns an empty scene as all of ours are: robust.
 RTCScene new_scene(const RayDevice& device);
+
+/// Returns a scene of scenes, numbered as they come. Their transforms are the identity: any other
+/// would round the rays in each of them in its own way.
+RTCScene instance_all(const RayDevice& device, std::span<const RTCScene> scenes);
 
 /// @throws Error if Embree failed since it was asked last.
 void check(const RayDevice& device, std::string_view doing);

@@ -3,258 +3,18 @@
 #include <tbb/parallel_for.h>
 
 #include <algorithm>
-#include <array>
 #include <cmath>
 #include <glm/common.hpp>
 #include <glm/geometric.hpp>
 #include <limits>
+#include <map>
 #include <utility>
 
 #include "core/device.h"
-#include "core/error.h"
-#include "core/exact_query.h"
+#include "core/leaf_cells.h"
 
 namespace groundray {
 namespace {
-
-glm::dvec3 point_L(const LevelScene::Impl& level, int column, int row, double height_m) noexcept {
-  return glm::dvec3(level.level.frame.to_D({column, row}), height_m) - level.p_DL;
-}
-
-// The cells of a leaf: how many, and where their points stand.
-struct LeafCells {
-  const LevelScene::Impl& level;
-  const Leaf& leaf;
-  int exponent = std::countr_zero(static_cast<unsigned>(leaf.step));
-  int columns = count(leaf.column, level.last.x);
-  int rows = count(leaf.row, level.last.y);
-
-  int count(int first, int last) const {
-    return std::min(level.level.leaf_cells, (last - first + leaf.step - 1) >> exponent);
-  }
-  int column(int i) const { return std::min(leaf.column + (i << exponent), level.last.x); }
-  int row(int j) const { return std::min(leaf.row + (j << exponent), level.last.y); }
-  float height_m(glm::ivec2 point) const { return level.height_m(column(point.x), row(point.y)); }
-  bool thins(Leaf::Side side) const { return (leaf.coarser & side) != 0; }
-  /// Whether a point is left out for a coarser neighbour.
-  bool drops(glm::ivec2 p) const {
-    const glm::ivec2 dem_last = level.level.frame.samples - 1;
-    return (p.x % 2 == 1 && column(p.x) < dem_last.x &&
-            ((p.y == 0 && thins(Leaf::North)) || (p.y == rows && thins(Leaf::South)))) ||
-           (p.y % 2 == 1 && row(p.y) < dem_last.y &&
-            ((p.x == 0 && thins(Leaf::West)) || (p.x == columns && thins(Leaf::East))));
-  }
-  /// The cells that are neither narrower nor beside a thinned side: [low, high).
-  std::pair<glm::ivec2, glm::ivec2> ordinary() const {
-    if (leaf.has_holes) return {glm::ivec2(0), glm::ivec2(0)};
-    const bool narrow_x = column(columns) - column(columns - 1) < leaf.step;
-    const bool narrow_y = row(rows) - row(rows - 1) < leaf.step;
-    return {{thins(Leaf::West) ? 1 : 0, thins(Leaf::North) ? 1 : 0},
-            {columns - (thins(Leaf::East) || narrow_x ? 1 : 0),
-             rows - (thins(Leaf::South) || narrow_y ? 1 : 0)}};
-  }
-};
-
-// What Embree is given besides points, gathered leaf by leaf. Each leaf has its own points, so that
-// a leaf of any step is one dense grid.
-struct Primitives {
-  std::vector<RTCGrid> grids;
-  std::vector<glm::uvec3> triangles;
-};
-
-// A triangle's corners by their place in the leaf; a dropped point gives way to the next one along
-// the border.
-void add_triangle(const LeafCells& cells, unsigned first_point, glm::ivec2 cell, Half half,
-                  bool other_split, LevelScene::Impl& out, Primitives& primitives) {
-  const glm::ivec2 nw = cell, ne = cell + glm::ivec2(1, 0), sw = cell + glm::ivec2(0, 1),
-                   se = cell + 1;
-  const bool is_near = half == Half::Near;
-  std::array<glm::ivec2, 3> corners =
-      other_split ? std::array{nw, se, is_near ? ne : sw} : std::array{ne, sw, is_near ? nw : se};
-  bool whole = !other_split && !(cells.leaf.deviation_m == 0 && !cells.leaf.has_holes);
-  whole &= cells.column(cell.x + 1) - cells.column(cell.x) == cells.leaf.step &&
-           cells.row(cell.y + 1) - cells.row(cell.y) == cells.leaf.step;
-  for (glm::ivec2& corner : corners) {
-    if (!cells.drops(corner)) continue;
-    if (!other_split) return;  // the pair's other cell brings this triangle
-    whole = false;
-    const glm::ivec2 inward = cell + cell + 1 - corner;  // the cell's corner across
-    const bool along_row = corner.x % 2 == 1 && (corner.y == 0 || corner.y == cells.rows);
-    corner += along_row ? glm::ivec2(corner.x - inward.x, 0) : glm::ivec2(0, corner.y - inward.y);
-  }
-  glm::uvec3 triangle;
-  for (int k = 0; k < 3; ++k) {
-    const glm::ivec2 corner = corners[static_cast<std::size_t>(k)];
-    if (std::isnan(cells.height_m(corner))) return;
-    triangle[k] = first_point + static_cast<unsigned>(corner.y * (cells.columns + 1) + corner.x);
-  }
-  primitives.triangles.push_back(triangle);
-  out.triangles.push_back({{cells.column(cell.x), cells.row(cell.y),
-                            static_cast<std::int8_t>(cells.exponent), half, cells.leaf.deviation_m},
-                           whole});
-}
-
-void write_points(const LeafCells& cells, const LevelScene::Impl& level, glm::vec3* out) {
-  for (int j = 0; j <= cells.rows; ++j) {
-    for (int i = 0; i <= cells.columns; ++i) {
-      const float height_m = cells.height_m({i, j});
-      *out++ = glm::vec3(
-          point_L(level, cells.column(i), cells.row(j), std::isnan(height_m) ? 0 : height_m));
-    }
-  }
-}
-
-void add_leaf(const LeafCells& cells, unsigned first_point, LevelScene::Impl& out,
-              Primitives& primitives) {
-  const Leaf& leaf = cells.leaf;
-  const auto stride = static_cast<unsigned>(cells.columns + 1);
-  const auto [low, high] = cells.ordinary();
-  const glm::ivec2 size = glm::max(high - low, 0);
-  const bool has_grid = size.x > 0 && size.y > 0;
-  if (has_grid) {
-    const int exponent = out.deciding_exponent(leaf);
-    primitives.grids.push_back(
-        {first_point + static_cast<unsigned>(low.y) * stride + static_cast<unsigned>(low.x), stride,
-         static_cast<unsigned short>(size.x + 1), static_cast<unsigned short>(size.y + 1)});
-    out.grids.push_back({cells.column(low.x), cells.row(low.y), static_cast<std::int8_t>(exponent),
-                         size.x << (cells.exponent - exponent),
-                         size.y << (cells.exponent - exponent), leaf.deviation_m});
-  }
-  for (int j = 0; j < cells.rows; ++j) {
-    for (int i = 0; i < cells.columns; ++i) {
-      if (has_grid && low.x <= i && i < high.x && low.y <= j && j < high.y) {
-        i = high.x - 1;  // the grid has these
-        continue;
-      }
-      const Cell cell = out.cell_at(leaf, cells.exponent, cells.column(i), cells.row(j));
-      const bool other_split = cell.split != Cell::Split::NorthEastToSouthWest;
-      add_triangle(cells, first_point, {i, j}, Half::Near, other_split, out, primitives);
-      add_triangle(cells, first_point, {i, j}, Half::Far, other_split, out, primitives);
-    }
-  }
-}
-
-void attach(RTCScene scene, RTCGeometry geometry, unsigned id) {
-  rtcCommitGeometry(geometry);
-  rtcAttachGeometryByID(scene, geometry, id);
-  rtcReleaseGeometry(geometry);
-}
-
-template <typename T>
-T* checked(void* memory) {
-  if (memory == nullptr)
-    throw Error("ray tracer: there is not enough memory for a level's geometry");
-  return static_cast<T*>(memory);
-}
-
-template <typename T>
-void copy_to_buffer(RTCGeometry geometry, RTCBufferType type, RTCFormat format,
-                    const std::vector<T>& values) {
-  std::ranges::copy(values, checked<T>(rtcSetNewGeometryBuffer(geometry, type, 0, format, sizeof(T),
-                                                               values.size())));
-}
-
-void build_fast(RTCDevice device, LevelScene::Impl& level) {
-  const std::vector<Leaf>& leaves = level.level.leaves;
-  std::vector<unsigned> first_points(leaves.size());
-  std::size_t point_count = 0;
-  for (std::size_t n = 0; n < leaves.size(); ++n) {
-    const LeafCells cells{level, leaves[n]};
-    first_points[n] = static_cast<unsigned>(point_count);
-    point_count +=
-        static_cast<std::size_t>(cells.columns + 1) * static_cast<std::size_t>(cells.rows + 1);
-  }
-  if (point_count > std::numeric_limits<unsigned>::max())
-    throw Error("ray tracer: a level has {} points, more than Embree counts", point_count);
-  RTCBuffer buffer = rtcNewBuffer(
-      device, point_count * sizeof(glm::vec3) + 16);  // Embree reads 16 bytes at a time
-  auto* points = checked<glm::vec3>(buffer == nullptr ? nullptr : rtcGetBufferData(buffer));
-  tbb::parallel_for(std::size_t{0}, leaves.size(), [&](std::size_t n) {
-    write_points({level, leaves[n]}, level, points + first_points[n]);
-  });
-  Primitives primitives;
-  for (std::size_t n = 0; n < leaves.size(); ++n)
-    add_leaf({level, leaves[n]}, first_points[n], level, primitives);
-  const auto add = [&](RTCGeometryType type, unsigned id, auto kind, RTCFormat format,
-                       const auto& list) {
-    if (list.empty()) return;
-    RTCGeometry geometry = rtcNewGeometry(device, type);
-    rtcSetGeometryBuffer(geometry, RTC_BUFFER_TYPE_VERTEX, 0, RTC_FORMAT_FLOAT3, buffer, 0,
-                         sizeof(glm::vec3), point_count);
-    copy_to_buffer(geometry, kind, format, list);
-    attach(level.scene, geometry, id);
-  };
-  add(RTC_GEOMETRY_TYPE_GRID, block_geometry, RTC_BUFFER_TYPE_GRID, RTC_FORMAT_GRID,
-      primitives.grids);
-  add(RTC_GEOMETRY_TYPE_TRIANGLE, facet_geometry, RTC_BUFFER_TYPE_INDEX, RTC_FORMAT_UINT3,
-      primitives.triangles);
-  rtcReleaseBuffer(buffer);
-}
-
-void leaf_bounds(const RTCBoundsFunctionArguments* arguments) {
-  const auto& level = *static_cast<const LevelScene::Impl*>(arguments->geometryUserPtr);
-  const LeafCells cells{level, level.level.leaves[arguments->primID]};
-  float low_m = std::numeric_limits<float>::infinity();
-  float high_m = -low_m;
-  for (int j = 0; j <= cells.rows; ++j) {
-    for (int i = 0; i <= cells.columns; ++i) {
-      low_m = std::min(low_m, cells.height_m({i, j}));
-      high_m = std::max(high_m, cells.height_m({i, j}));
-    }
-  }
-  const glm::dvec3 a = point_L(level, cells.column(0), cells.row(0), low_m);
-  const glm::dvec3 b = point_L(level, cells.column(cells.columns), cells.row(cells.rows), high_m);
-  const glm::vec3 low = glm::vec3(glm::min(a, b)) - level.slack_m;
-  const glm::vec3 high = glm::vec3(glm::max(a, b)) + level.slack_m;
-  RTCBounds& bounds = *arguments->bounds_o;
-  bounds.lower_x = low.x;
-  bounds.lower_y = low.y;
-  bounds.lower_z = low.z;
-  bounds.upper_x = high.x;
-  bounds.upper_y = high.y;
-  bounds.upper_z = high.z;
-}
-
-// Reports the first crossing over one leaf for each ray of a packet, in double.
-void intersect_leaf(const RTCIntersectFunctionNArguments* arguments) {
-  const auto& level = *static_cast<const LevelScene::Impl*>(arguments->geometryUserPtr);
-  const auto& query = *reinterpret_cast<const ExactQuery*>(arguments->context);
-  const LeafCells cells{level, level.level.leaves[arguments->primID]};
-  constexpr double rim = 0.5;  // cells of the DEM
-  const glm::dvec2 low = glm::dvec2(cells.column(0), cells.row(0)) - rim;
-  const glm::dvec2 high = glm::dvec2(cells.column(cells.columns), cells.row(cells.rows)) + rim;
-  RTCRayN* const rays = RTCRayHitN_RayN(arguments->rayhit, arguments->N);
-  RTCHitN* const hits = RTCRayHitN_HitN(arguments->rayhit, arguments->N);
-  for (unsigned i = 0; i < arguments->N; ++i) {
-    if (arguments->valid[i] == 0) continue;
-    const unsigned lane = RTCRayN_id(rays, arguments->N, i);
-    const LevelRay& ray = query.rays[lane];
-    Crossing& best = query.crossings[lane];
-    double begin_m = ray.enter_m;
-    double end_m = std::min(ray.leave_m, best.range_m);
-    clip_range(ray.grid.u0, ray.grid.du, low.x, high.x, begin_m, end_m);
-    clip_range(ray.grid.v0, ray.grid.dv, low.y, high.y, begin_m, end_m);
-    if (!(begin_m <= end_m)) continue;
-    const auto crossing = query.surface->first_crossing(ray.grid, begin_m, end_m);
-    if (!crossing || !(crossing->range_m < best.range_m)) continue;
-    best = *crossing;
-    // The float range only prunes: Embree may go on a little beyond the true one, never stop before
-    // it.
-    float& far_m = RTCRayN_tfar(rays, arguments->N, i);
-    far_m = std::min(far_m, far_float(best.range_m - ray.enter_m, level.slack_m));
-    RTCHitN_geomID(hits, arguments->N, i) = arguments->geomID;
-    RTCHitN_primID(hits, arguments->N, i) = arguments->primID;
-  }
-}
-
-void build_exact(RTCDevice device, LevelScene::Impl& level) {
-  RTCGeometry geometry = rtcNewGeometry(device, RTC_GEOMETRY_TYPE_USER);
-  rtcSetGeometryUserPrimitiveCount(geometry, static_cast<unsigned>(level.level.leaves.size()));
-  rtcSetGeometryUserData(geometry, &level);
-  rtcSetGeometryBoundsFunction(geometry, leaf_bounds, nullptr);
-  rtcSetGeometryIntersectFunction(geometry, intersect_leaf);
-  attach(level.scene, geometry, block_geometry);
-}
 
 // A point that is left out joins two triangles.
 std::size_t count_triangles(const LeafCells& cells) {
@@ -299,6 +59,19 @@ void map_leaves(LevelScene::Impl& level) {
   }
 }
 
+struct PlaceOrder {
+  bool operator()(glm::ivec2 a, glm::ivec2 b) const { return a.y != b.y ? a.y < b.y : a.x < b.x; }
+};
+
+// The leaves by the part that they belong to: that with their first sample.
+std::map<glm::ivec2, std::vector<Leaf>, PlaceOrder> by_part(const Level& level) {
+  std::map<glm::ivec2, std::vector<Leaf>, PlaceOrder> parts;
+  const int side = level.part_cells * level.step;
+  for (const Leaf& leaf : level.leaves)
+    parts[side == 0 ? glm::ivec2(0) : glm::ivec2(leaf.column, leaf.row) / side].push_back(leaf);
+  return parts;
+}
+
 }  // namespace
 
 MaxHeights::MaxHeights(const HeightArray& heights) : tiles_((heights.size() - 2) / tile_cells + 1) {
@@ -316,7 +89,8 @@ MaxHeights::MaxHeights(const HeightArray& heights) : tiles_((heights.size() - 2)
   }
 }
 
-LevelScene::Impl::Impl(const RayDevice& with, Level content, const glm::dvec3& origin, Tracing how)
+LevelScene::Impl::Impl(const RayDevice& with, Level content, const glm::dvec3& origin, Tracing how,
+                       const Impl* previous)
     : device(with), level(std::move(content)), p_DL(origin), tracing(how) {
   map_leaves(*this);
   max_heights = MaxHeights(level.heights);
@@ -325,21 +99,48 @@ LevelScene::Impl::Impl(const RayDevice& with, Level content, const glm::dvec3& o
       point_L(*this, level.first.x, level.first.y, empty ? 0 : level.heights.min_m());
   const glm::dvec3 b = point_L(*this, last.x, last.y, empty ? 0 : level.heights.max_m());
   slack_m = static_cast<float>(16 * 0x1p-24 * glm::length(glm::max(glm::abs(a), glm::abs(b))));
-  scene = new_scene(device);
-  if (tracing == Tracing::Exact) {
-    build_exact(handle(device), *this);
+  make_parts(previous);
+  if (parts.size() == 1) {
+    scene = parts.front()->scene;
+    rtcRetainScene(scene);
   } else {
-    build_fast(handle(device), *this);
+    std::vector<RTCScene> scenes;
+    for (const auto& part : parts) scenes.push_back(part->scene);
+    scene = instance_all(device, scenes);
   }
-  rtcCommitScene(scene);
   check(device, "building a level");
 }
 
-LevelScene::Impl::~Impl() { rtcReleaseScene(scene); }
+// Takes over the parts of `previous` whose leaves are the same, and builds the others.
+void LevelScene::Impl::make_parts(const Impl* previous) {
+  std::map<glm::ivec2, std::shared_ptr<const LevelPart>, PlaceOrder> known;
+  if (previous != nullptr && previous->p_DL == p_DL && previous->tracing == tracing &&
+      previous->level.step == level.step && previous->level.part_cells == level.part_cells) {
+    for (const auto& part : previous->parts) known[part->place] = part;
+  }
+  auto leaves = by_part(level);
+  std::vector<std::pair<std::size_t, glm::ivec2>> missing;
+  for (const auto& [place, list] : leaves) {
+    const auto part = known.find(place);
+    const bool serves =
+        part != known.end() && part->second->leaves == list && slack_m <= part->second->slack_m;
+    if (!serves) missing.emplace_back(parts.size(), place);
+    parts.push_back(serves ? part->second : nullptr);
+  }
+  tbb::parallel_for(std::size_t{0}, missing.size(), [&](std::size_t n) {
+    const auto& [index, place] = missing[n];
+    parts[index] = build_part(*this, place, std::move(leaves.find(place)->second));
+  });
+}
+
+LevelScene::Impl::~Impl() {
+  if (scene != nullptr) rtcReleaseScene(scene);
+}
 
 LevelScene::LevelScene(const RayDevice& device, Level level, const glm::dvec3& p_DL,
-                       Tracing tracing)
-    : impl_(std::make_shared<const Impl>(device, std::move(level), p_DL, tracing)) {}
+                       Tracing tracing, const LevelScene* previous)
+    : impl_(std::make_shared<const Impl>(device, std::move(level), p_DL, tracing,
+                                         previous != nullptr ? &previous->impl() : nullptr)) {}
 
 const Level& LevelScene::level() const noexcept { return impl_->level; }
 const glm::dvec3& LevelScene::p_DL() const noexcept { return impl_->p_DL; }

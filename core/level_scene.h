@@ -6,6 +6,7 @@
 #include <cstdint>
 #include <glm/vec2.hpp>
 #include <glm/vec3.hpp>
+#include <memory>
 #include <vector>
 
 #include "core/embree_adapter.h"
@@ -60,10 +61,36 @@ struct GridBlock {
   float deviation_m = 0;
 };
 
-/// A level as Embree holds it, and as double arithmetic looks things up. Embree keeps pointers to
-/// it: it does not move once built.
+/// A part of a level as Embree holds it. Embree keeps pointers to it: it does not move once built.
+struct LevelPart {
+  LevelPart() = default;
+  ~LevelPart();
+  LevelPart(const LevelPart&) = delete;
+  LevelPart& operator=(const LevelPart&) = delete;
+
+  RTCScene scene = nullptr;
+  glm::ivec2 place{0};  // which part of the DEM
+  std::vector<Leaf> leaves;
+  std::vector<GridBlock> grids;  // by primitive
+  std::vector<TriangleFacet> triangles;
+
+  // Exact tracing alone:
+  struct Area {
+    glm::ivec2 first{0}, last{0};  // samples of the DEM
+  };
+  std::vector<Area> areas;                      // of the leaves
+  float slack_m = 0;                            // by how much their boxes are padded
+  const LevelScene::Impl* built_for = nullptr;  // while it is built
+};
+
+/// Builds a part of `level` that consists of `leaves`.
+std::shared_ptr<const LevelPart> build_part(const LevelScene::Impl& level, glm::ivec2 place,
+                                            std::vector<Leaf> leaves);
+
+/// A level as double arithmetic looks things up, and its parts.
 struct LevelScene::Impl {
-  Impl(const RayDevice& with, Level content, const glm::dvec3& origin, Tracing how);
+  Impl(const RayDevice& with, Level content, const glm::dvec3& origin, Tracing how,
+       const Impl* previous);
   ~Impl();
   Impl(const Impl&) = delete;
   Impl& operator=(const Impl&) = delete;
@@ -72,7 +99,8 @@ struct LevelScene::Impl {
   Level level;
   glm::dvec3 p_DL{0};
   Tracing tracing = Tracing::Fast;
-  RTCScene scene = nullptr;
+  RTCScene scene = nullptr;  // of the only part, or of all parts as instances
+  std::vector<std::shared_ptr<const LevelPart>> parts;
 
   glm::ivec2 last{0};  // the DEM's sample at the window's last point
   int step_exponent = 0;
@@ -82,12 +110,10 @@ struct LevelScene::Impl {
   float deviation_m = 0;
   std::size_t triangle_count = 0;
   std::size_t bridging_leaves = 0;
-
-  std::vector<GridBlock> grids;  // by primitive
-  std::vector<TriangleFacet> triangles;
   MaxHeights max_heights;
   float slack_m = 0;  // 16 * 2^-24 * max|p_L|: covers rounding to floats
 
+  void make_parts(const Impl* previous);
   bool contains(int column, int row) const noexcept {  // a cell of the DEM
     return level.first.x <= column && column < last.x && level.first.y <= row && row < last.y;
   }

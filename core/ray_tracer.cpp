@@ -6,6 +6,7 @@
 #include <cmath>
 #include <glm/common.hpp>
 #include <glm/geometric.hpp>
+#include <mutex>
 #include <utility>
 
 #include "core/device.h"
@@ -24,9 +25,17 @@ struct RayTracer::Impl {
   RayDevice device;
   std::vector<LevelScene> scenes;
   Surface surface;
-  RTCScene all = nullptr;  // the levels as instances; none if there is but one
   std::vector<Target> targets;
-  Target everything;
+  // All levels at once, for rays that do not pass them in order: built when the first such ray
+  // comes. A place for each instance.
+  struct PartPlace {
+    std::uint32_t level = 0;
+    const LevelPart* part = nullptr;
+  };
+  mutable std::once_flag asked_for_all;
+  mutable RTCScene all = nullptr;
+  mutable Target everything;
+  std::vector<PartPlace> places;
 
   Impl(const RayDevice& device, std::vector<LevelScene> levels);
   ~Impl() {
@@ -36,9 +45,13 @@ struct RayTracer::Impl {
   Impl& operator=(const Impl&) = delete;
 
   const LevelScene::Impl& level(std::size_t number) const noexcept { return scenes[number].impl(); }
-  const LevelScene::Impl& level_of(const Target& target, const FloatHit& hit) const noexcept {
-    return target.is_all ? level(hit.instance) : *target.level;
+  // Which level and part a hit is on.
+  PartPlace place_of(const Target& target, const FloatHit& hit) const noexcept {
+    if (target.is_all) return places[hit.instance];
+    const auto& parts = target.level->parts;
+    return {target.number, parts[parts.size() == 1 ? 0 : hit.instance].get()};
   }
+  const Target& join_levels() const noexcept;
 
   bool ends_below(const Target& target, const GridRay& ray, double leave_m) const noexcept;
   bool from_behind(const Target& target, const LevelRay& ray, const FloatHit& hit) const noexcept;
@@ -80,9 +93,9 @@ FloatHit intersect_one(const Target& target, const LevelRay& ray, double from_m,
   return {one.hit.geomID, one.hit.primID, one.hit.instID[0], one.hit.u, one.hit.v, one.ray.tfar};
 }
 
-inline Facet facet_of(const LevelScene::Impl& level, const FloatHit& hit) noexcept {
-  if (hit.geometry == facet_geometry) return level.triangles[hit.primitive].facet;
-  const GridBlock& grid = level.grids[hit.primitive];
+inline Facet facet_of(const LevelPart& part, const FloatHit& hit) noexcept {
+  if (hit.geometry == facet_geometry) return part.triangles[hit.primitive].facet;
+  const GridBlock& grid = part.grids[hit.primitive];
   const float u = hit.u * static_cast<float>(grid.columns);
   const float v = hit.v * static_cast<float>(grid.rows);
   const int column = std::clamp(static_cast<int>(u), 0, grid.columns - 1);
@@ -93,8 +106,8 @@ inline Facet facet_of(const LevelScene::Impl& level, const FloatHit& hit) noexce
 }
 
 // Whether the plane of Embree's facet can be met at once.
-inline bool is_whole(const LevelScene::Impl& level, const FloatHit& hit) noexcept {
-  return hit.geometry == block_geometry || level.triangles[hit.primitive].whole;
+inline bool is_whole(const LevelPart& part, const FloatHit& hit) noexcept {
+  return hit.geometry == block_geometry || part.triangles[hit.primitive].whole;
 }
 
 glm::vec3 one_ulp_off(const glm::vec3& direction) noexcept {
@@ -113,21 +126,6 @@ Target target_of(const LevelScene& scene, std::uint32_t number) {
           .slack_m = level.slack_m};
 }
 
-// All levels as instances under one scene, for rays that do not pass them in order. The transform
-// is the identity: any other would round the rays of each level in its own way.
-RTCScene instance_all(const RayDevice& device, const std::vector<LevelScene>& levels) {
-  RTCScene all = new_scene(device);
-  for (unsigned i = 0; i < levels.size(); ++i) {
-    RTCGeometry instance = rtcNewGeometry(handle(device), RTC_GEOMETRY_TYPE_INSTANCE);
-    rtcSetGeometryInstancedScene(instance, levels[i].impl().scene);
-    rtcCommitGeometry(instance);
-    rtcAttachGeometryByID(all, instance, i);
-    rtcReleaseGeometry(instance);
-  }
-  rtcCommitScene(all);
-  return all;
-}
-
 Surface surface_of(const std::vector<LevelScene>& scenes) {
   std::vector<const LevelScene::Impl*> levels;
   for (const LevelScene& scene : scenes) levels.push_back(&scene.impl());
@@ -142,16 +140,22 @@ RayTracer::Impl::Impl(const RayDevice& with, std::vector<LevelScene> levels)
   if (std::ranges::all_of(targets, [](const Target& target) { return std::isnan(target.min_m); }))
     throw Error("ray tracer: the terrain has no height at all");
   everything = targets.back();
-  if (scenes.size() == 1) return;
-  all = instance_all(device, scenes);
-  check(device, "joining the levels");
-  everything.scene = all;
   everything.is_all = true;
-  for (const Target& target : targets) {
-    everything.min_m = std::fmin(everything.min_m, target.min_m);
-    everything.max_m = std::fmax(everything.max_m, target.max_m);
-    everything.slack_m = std::max(everything.slack_m, target.slack_m);
+  for (std::uint32_t i = 0; i < scenes.size(); ++i) {
+    for (const auto& part : level(i).parts) places.push_back({i, part.get()});
+    everything.min_m = std::fmin(everything.min_m, targets[i].min_m);
+    everything.max_m = std::fmax(everything.max_m, targets[i].max_m);
+    everything.slack_m = std::max(everything.slack_m, targets[i].slack_m);
   }
+}
+
+const Target& RayTracer::Impl::join_levels() const noexcept {
+  std::call_once(asked_for_all, [this] {
+    std::vector<RTCScene> parts;
+    for (const PartPlace& place : places) parts.push_back(place.part->scene);
+    everything.scene = all = instance_all(device, parts);
+  });
+  return everything;
 }
 
 // Whether the ray is below the surface where it leaves the target's box; most are far above, which
@@ -170,11 +174,12 @@ bool RayTracer::Impl::ends_below(const Target& target, const GridRay& ray,
 
 bool RayTracer::Impl::from_behind(const Target& target, const LevelRay& ray,
                                   const FloatHit& hit) const noexcept {
-  const LevelScene::Impl& level = level_of(target, hit);
-  const Facet facet = facet_of(level, hit);
-  const Leaf* leaf = level.leaf_at(facet.column, facet.row);
+  const PartPlace place = place_of(target, hit);
+  const Facet facet = facet_of(*place.part, hit);
+  const LevelScene::Impl& on = level(place.level);
+  const Leaf* leaf = on.leaf_at(facet.column, facet.row);
   if (leaf == nullptr) return false;
-  const Cell cell = level.cell_at(*leaf, facet.step_exponent, facet.column, facet.row);
+  const Cell cell = on.cell_at(*leaf, facet.step_exponent, facet.column, facet.row);
   const FacetPlane plane = cell.plane(facet.half);
   return ray.grid.dz > plane.u_slope_m * ray.grid.du + plane.v_slope_m * ray.grid.dv;
 }
@@ -196,7 +201,7 @@ std::optional<Crossing> RayTracer::Impl::search(const Target& target, const Leve
       hit = intersect_one(target, ray, from_m, one_ulp_off(ray.direction));
       continue;
     }
-    const int step = 1 << facet_of(level_of(target, hit), hit).step_exponent;
+    const int step = 1 << facet_of(*place_of(target, hit).part, hit).step_exponent;
     const double reach_m = walk_cells * step / cells_per_m;
     const double at_m = ray.enter_m + hit.range_m;
     const double end_m = std::min(at_m + reach_m, ray.leave_m);
@@ -216,11 +221,11 @@ void RayTracer::Impl::decide_fast(const Target& target, Packet<W>& packet) const
     const auto i = static_cast<std::size_t>(lane);
     const FloatHit hit = packet.hit(lane);
     if (packet.valid[i] != 0 && hit.geometry != RTC_INVALID_GEOMETRY_ID) {
-      const LevelScene::Impl& level = level_of(target, hit);
-      packet.level[i] = target.is_all ? hit.instance : target.number;
-      if (is_whole(level, hit)) {
+      const PartPlace place = place_of(target, hit);
+      packet.level[i] = place.level;
+      if (is_whole(*place.part, hit)) {
         whole[i] = any_whole = true;
-        packet.take(lane, level, facet_of(level, hit));
+        packet.take(lane, level(place.level), facet_of(*place.part, hit));
       }
     }
     packet.inside[i] = -1;
@@ -279,7 +284,7 @@ bool RayTracer::Impl::start_inside(const Packet<W>& packet) const noexcept {
 template <int W>
 void RayTracer::Impl::trace_packet(Packet<W>& packet, std::span<Hit> hits) const noexcept {
   std::ranges::fill(hits, Hit{});
-  if (!start_inside(packet)) return trace_target(everything, hits, packet);
+  if (!start_inside(packet)) return trace_target(join_levels(), hits, packet);
   for (const Target& target : targets) {
     trace_target(target, hits, packet);
     if (std::ranges::all_of(hits, [](const Hit& hit) { return static_cast<bool>(hit); })) return;

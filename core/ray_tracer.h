@@ -45,12 +45,15 @@ struct Hit {
 /// The part of a terrain that one level scene holds: leaves of its quadtree, and the samples that
 /// they stand on. Its window is the rectangle of those samples.
 struct Level {
-  GridFrame frame;           ///< of the DEM; the same for all levels of a tracer
-  HeightArray heights;       ///< every step-th sample of the DEM from `first` on; where the window
-                             ///< reaches the DEM's last column or row, that is its last
-  glm::ivec2 first{0};       ///< the DEM's sample at heights(0, 0): multiples of step
-  int step = 1;              ///< of the finest leaves; a power of two
-  int leaf_cells = 8;        ///< side of a leaf in its own cells; a power of two
+  GridFrame frame;      ///< of the DEM; the same for all levels of a tracer
+  HeightArray heights;  ///< every step-th sample of the DEM from `first` on; where the window
+                        ///< reaches the DEM's last column or row, that is its last
+  glm::ivec2 first{0};  ///< the DEM's sample at heights(0, 0): multiples of step
+  int step = 1;         ///< of the finest leaves; a power of two
+  int leaf_cells = 8;   ///< side of a leaf in its own cells; a power of two
+  /// Side of the parts that are built, and taken over, one by one, in cells of `step`; a power of
+  /// two, or 0 for one part.
+  int part_cells = 0;
   std::vector<Leaf> leaves;  ///< they tile the window without the next finer level's
 };
 
@@ -78,8 +81,12 @@ class RayDevice {
 class LevelScene {
  public:
   /// @param p_DL  origin of the float frame L that Embree works in, in D; keep it near the sensors.
-  /// @throws Error if the level has no height, or Embree fails: its message.
-  LevelScene(const RayDevice& device, Level level, const glm::dvec3& p_DL, Tracing tracing);
+  /// @param previous  a scene of the same level of the same DEM, of which parts with the same
+  /// leaves
+  ///                  are taken over; or null.
+  /// @throws Error if Embree fails: its message.
+  LevelScene(const RayDevice& device, Level level, const glm::dvec3& p_DL, Tracing tracing,
+             const LevelScene* previous = nullptr);
 
   const Level& level() const noexcept;
   const glm::dvec3& p_DL() const noexcept;

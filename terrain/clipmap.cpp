@@ -15,6 +15,8 @@ namespace {
 
 constexpr int block_cells = Certificate::block_cells;
 constexpr int unit_nodes = 2;  // windows are aligned to nodes of the next coarser level
+constexpr int part_cells =
+    32;  // small enough that a snap builds little, large enough to trace well
 constexpr int unit_cells = unit_nodes * block_cells;
 constexpr int smallest_half = 2;       // units from the viewpoint to a window's side
 constexpr double bytes_per_cell = 40;  // measured: see docs/terrain.md
@@ -334,6 +336,7 @@ void Clipmap::select_leaves(const SensorBox& sensors) {
                        .first = window.first_point() << level,
                        .step = 1 << level,
                        .leaf_cells = block_cells,
+                       .part_cells = part_cells,
                        .leaves = {}});
   }
   for (const Leaf& leaf : list_leaves(selection, nodes, plan_->finest, top)) {

@@ -55,6 +55,13 @@ struct DemFile::Opened {
 
 namespace {
 
+// Returns a file's name from the root of the file system; what names no file stays as it is.
+std::string full_name(const std::filesystem::path& path) {
+  std::error_code ignored;
+  if (!std::filesystem::exists(path, ignored)) return path.string();
+  return std::filesystem::absolute(path).lexically_normal().string();
+}
+
 // Returns a line for each file that the dataset is made of. Statistics and overviews are none of
 // them: viewers add them, and what else is written there shows in the header.
 std::string files_text(GDALDataset& dataset) {
@@ -65,7 +72,7 @@ std::string files_text(GDALDataset& dataset) {
     if (name.ends_with(".aux.xml") || name.ends_with(".ovr")) continue;
     VSIStatBufL state;
     if (VSIStatL(files[i], &state) != 0) state = {};
-    text += fmt::format("file {} {} bytes, time {}.{:09}\n", name, state.st_size,
+    text += fmt::format("file {} {} bytes, time {}.{:09}\n", full_name(files[i]), state.st_size,
                         state.st_mtim.tv_sec, state.st_mtim.tv_nsec);
   }
   return text;
@@ -129,17 +136,13 @@ std::vector<float> DemFile::read(glm::ivec2 first, glm::ivec2 size) const {
 
 std::string DemFile::fingerprint() const {
   const std::uint64_t samples = sample_hash(*this);
-  const std::filesystem::path& path = opened_->path;
-  std::error_code ignored;
-  const bool is_file = std::filesystem::exists(path, ignored);
-  const std::filesystem::path full = is_file ? std::filesystem::absolute(path) : path;
   const RasterHeader& raster = opened_->raster;
   const std::lock_guard lock(opened_->one_at_a_time);
   return fmt::format(
       "path {}\nreproject_to '{}'\nsize {} x {}\ngeotransform {}\ncrs {:016x}\nstored {}\n{}"
       "samples {:016x}\n",
-      full.lexically_normal().string(), opened_->options.reproject_to, raster.samples.x,
-      raster.samples.y, fmt::join(raster.geotransform, " "), byte_hash(wkt_of(raster.crs)),
+      full_name(opened_->path), opened_->options.reproject_to, raster.samples.x, raster.samples.y,
+      fmt::join(raster.geotransform, " "), byte_hash(wkt_of(raster.crs)),
       opened_->heights->conversion(), files_text(*opened_->dataset), samples);
 }
 

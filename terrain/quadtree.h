@@ -19,9 +19,9 @@ struct NodeWindow {
   glm::ivec2 first{0};  ///< even, as is the end unless it is the lattice's
   glm::ivec2 size{0};
   const float* key_m = nullptr;
-  const float* low_m = nullptr;  ///< low_m and high_m: only where the bound has an angle
+  const float* low_m = nullptr;  ///< low_m and high_m: needed where the bound has an angle
   const float* high_m = nullptr;
-  const float* deviation_m = nullptr;  ///< deviation_m and full_m: only for list_leaves
+  const float* deviation_m = nullptr;  ///< deviation_m and full_m: for list_leaves
   const float* full_m = nullptr;
 };
 
@@ -41,18 +41,17 @@ struct MeshBound {
   int widened_to_nodes = 0;
 };
 
-/// What select_nodes says of a node, as bits; the lowest four are the sides of a leaf that are
-/// thinned for a coarser neighbour (Leaf::Side).
-enum NodeState : std::uint8_t {
-  AllSides = 15,
-  Split = 16,   ///< its children stand in its place
-  Tight = 32,   ///< exceeds its bound but cannot be split; not thinned where that can be helped
-  IsLeaf = 64,  ///< is part of the mesh
-  Holed = 128,  ///< some or all samples of the DEM in it are missing
-};
-
 /// A restricted quadtree: the state of each node of each level's window, row by row.
 struct Selection {
+  /// What is said of a node, as bits. The lowest four are the sides of a leaf that are thinned for
+  /// a coarser neighbour (Leaf::Side).
+  enum State : std::uint8_t {
+    AllSides = 15,
+    Split = 16,   ///< its children stand in its place
+    Tight = 32,   ///< exceeds its bound but cannot be split; not thinned where that can be helped
+    IsLeaf = 64,  ///< is part of the mesh
+    Holed = 128,  ///< some or all samples of the DEM in it are missing
+  };
   struct Level {
     glm::ivec2 first{0};
     glm::ivec2 size{0};
@@ -84,7 +83,8 @@ Selection select_nodes(const Lattice& lattice, std::span<const NodeWindow> windo
                        const MeshBound& bound, const PassRunner& runner = run_in_parallel);
 
 /// Lists the leaves of levels first_level to last_level, finer ones first, each level's row by row.
-/// Leaves without any height are left out.
+/// Leaves without any height are left out; deviations and highest samples that `windows` do not
+/// have are 0.
 /// @param windows  as given to select_nodes.
 std::vector<Leaf> list_leaves(const Selection& selection, std::span<const NodeWindow> windows,
                               int first_level, int last_level,

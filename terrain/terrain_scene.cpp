@@ -57,11 +57,12 @@ RayTracer build_tracer(const Clipmap& clipmap, const glm::dvec3& p_DL, Tracing t
     const LevelScene* known = nullptr;
     if (previous != nullptr) {
       for (const LevelScene& scene : previous->levels()) {
-        if (scene.p_DL() == p_DL && scene.tracing() == tracing && is_same(scene.level(), level))
-          known = &scene;
+        if (scene.level().step == level.step) known = &scene;
       }
     }
-    scenes.push_back(known != nullptr ? *known : LevelScene(device, level, p_DL, tracing));
+    const bool same = known != nullptr && known->p_DL() == p_DL && known->tracing() == tracing &&
+                      is_same(known->level(), level);
+    scenes.push_back(same ? *known : LevelScene(device, level, p_DL, tracing, known));
   }
   return {device, std::move(scenes)};
 }

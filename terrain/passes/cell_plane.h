@@ -52,12 +52,12 @@ inline bool exists(Corner half, const Corners& at) noexcept {
 }
 
 /// Returns how far a main diagonal lies from the middles of the DEM's diagonals that it crosses, at
-/// most, in cells [begin, end) along it. `heights` is its first sample.
+/// most, in cells [begin, end) along it. `heights` is the first sample of cell `begin`.
 inline double worst_of_main_diagonal(const float* heights, std::ptrdiff_t stride, int begin,
                                      int end, double from, double slope, double weight) noexcept {
   double worst = 0;
   for (int i = begin; i < end; ++i) {
-    const float* upper = heights + i * (stride + 1);
+    const float* upper = heights + (i - begin) * (stride + 1);
     const double reference = (static_cast<double>(upper[1]) + upper[stride]) * weight;
     worst = larger(worst, std::abs(from + (2 * i + 1) * slope - reference));
   }

@@ -20,13 +20,13 @@ struct Band {
   int cell_end = 0;
 };
 
-/// Returns the larger of `worst` and the largest |start + x slope - scale heights[x]| for begin <=
-/// x < end; samples that are missing do not count.
+/// Returns the larger of `worst` and the largest |start + x slope - scale height| over the samples
+/// begin <= x < end of a row; `heights` is the first of these. Missing ones do not count.
 inline double worst_in_row(const float* heights, int begin, int end, double start, double slope,
                            double scale, double worst) noexcept {
 #pragma omp simd reduction(max : worst)
   for (int x = begin; x < end; ++x) {
-    const double distance = std::abs(start + x * slope - scale * heights[x]);
+    const double distance = std::abs(start + x * slope - scale * heights[x - begin]);
     worst = distance > worst ? distance : worst;
   }
   return worst;
@@ -71,9 +71,11 @@ struct HalfCell {
       int begin = 0;
       int end = shape.width + 1;
       narrow(half, dy, begin, end);
-      worst = worst_in_row(samples.at(first.x, first.y + dy), std::max(begin, x_begin),
-                           std::min(end, x_end), plane.start + dy * plane.slope_y, plane.slope_x,
-                           scale, worst);
+      begin = std::max(begin, x_begin);
+      end = std::min(end, x_end);
+      if (begin >= end) continue;
+      worst = worst_in_row(samples.at(first.x + begin, first.y + dy), begin, end,
+                           plane.start + dy * plane.slope_y, plane.slope_x, scale, worst);
     }
     return worst;
   }
@@ -98,55 +100,66 @@ struct HalfCell {
     const int begin = std::max({0, band.begin - first.y, samples.first.x - first.x});
     const int end = std::min(
         {shape.width, band.cell_end - first.y, samples.first.x + samples.size.x - 1 - first.x});
+    if (begin >= end) return 0;
     const double slope = (at[SouthEast] - at[NorthWest]) * shape.per_width * 0.5;
-    return worst_of_main_diagonal(samples.at(first.x, first.y), samples.row_stride, begin, end,
-                                  at[NorthWest], slope, 0.5 * at.factor);
+    return worst_of_main_diagonal(samples.at(first.x + begin, first.y + begin), samples.row_stride,
+                                  begin, end, at[NorthWest], slope, 0.5 * at.factor);
   }
 
-  // A diagonal of any other cell meets the DEM's rows, columns and diagonals: at `i / count` of its
-  // length, where one coordinate is whole and the other a fraction of `count` parts.
+  /// An edge of the DEM's, from sample (x, y) of the cell to (x + dx, y + dy), and a place on it:
+  /// `part` of `count` parts of the way.
+  struct EdgePlace {
+    std::int64_t x, y;
+    int dx, dy;
+    std::int64_t part, count;
+  };
+
+  // A diagonal of any other cell meets the DEM's rows, columns and diagonals.
   double along_diagonal(bool is_anti, const Corners& at) const noexcept {
     const std::int64_t w = shape.width;
     const std::int64_t h = shape.height;
+    const auto column_at = [&](std::int64_t i, std::int64_t count) {  // times count
+      return w * (is_anti ? count - i : i);
+    };
+    const double by_rows = walk(is_anti, at, h, [&](std::int64_t i) -> EdgePlace {
+      const std::int64_t x = column_at(i, h);
+      return {x / h, i, 1, 0, x % h, h};
+    });
+    const double by_columns = walk(is_anti, at, w, [&](std::int64_t i) -> EdgePlace {
+      return {is_anti ? w - i : i, h * i / w, 0, 1, h * i % w, w};
+    });
+    const std::int64_t count = is_anti ? std::abs(h - w) : h + w;
+    const double by_diagonals = walk(is_anti, at, count, [&](std::int64_t i) -> EdgePlace {
+      const std::int64_t x = column_at(i, count);
+      const std::int64_t sum = is_anti ? w + (h > w ? i : -i) : i;  // of x and y, which is whole
+      return {x / count, sum - x / count, 1, -1, x % count, count};
+    });
+    return larger(larger(by_rows * shape.per_height, by_columns * shape.per_width),
+                  by_diagonals * (is_anti ? shape.per_difference : shape.per_sum));
+  }
+
+  // Goes along a diagonal in `count` steps, as far as it may be in the band. Returns `count` times
+  // the largest distance from the edges of the DEM that `place_at` names for each step.
+  template <typename PlaceAt>
+  double walk(bool is_anti, const Corners& at, std::int64_t count,
+              const PlaceAt& place_at) const noexcept {
     const double from = is_anti ? at[NorthEast] : at[NorthWest];
     const double to = is_anti ? at[SouthWest] : at[SouthEast];
-    const auto mesh = [&](std::int64_t i, std::int64_t count) {
-      return from * static_cast<double>(count - i) + to * static_cast<double>(i);
-    };
+    const std::int64_t above = std::max(0, band.begin - first.y - 1);
+    const std::int64_t below = std::max(0, band.end - first.y + 1);
+    const std::int64_t end = std::min(count, below * count / shape.height + 1);
     double worst = 0;
-    for (std::int64_t i = 1; i < h; ++i) {
-      const std::int64_t x = w * (is_anti ? h - i : i);
-      const Edge row{x / h, i, 1, 0};
-      worst = larger(worst, crossing(row, x % h, h, mesh(i, h), at.factor) * shape.per_height);
-    }
-    for (std::int64_t i = 1; i < w; ++i) {
-      const std::int64_t y = h * i;
-      const Edge column{is_anti ? w - i : i, y / w, 0, 1};
-      worst = larger(worst, crossing(column, y % w, w, mesh(i, w), at.factor) * shape.per_width);
-    }
-    const std::int64_t count = is_anti ? std::abs(h - w) : h + w;
-    const double per_count = is_anti ? shape.per_difference : shape.per_sum;
-    for (std::int64_t i = 1; i < count; ++i) {  // where x + y is whole
-      const std::int64_t x = w * (is_anti ? count - i : i);
-      const std::int64_t sum = is_anti ? w + (h > w ? i : -i) : i;
-      const Edge diagonal{x / count, sum - x / count, 1, -1};
-      worst = larger(worst,
-                     crossing(diagonal, x % count, count, mesh(i, count), at.factor) * per_count);
+    for (std::int64_t i = std::max<std::int64_t>(1, above * count / shape.height); i < end; ++i) {
+      const double mesh = from * static_cast<double>(count - i) + to * static_cast<double>(i);
+      worst = larger(worst, crossing(place_at(i), mesh, at.factor));
     }
     return worst;
   }
 
-  /// An edge of the DEM's, from sample (x, y) of the cell to (x + dx, y + dy).
-  struct Edge {
-    std::int64_t x, y;
-    int dx, dy;
-  };
-
-  // Returns how far the mesh, at height `mesh / (count factor)`, lies from `part / count` of the
-  // way along the edge, times `count factor`.
-  double crossing(const Edge& edge, std::int64_t part, std::int64_t count, double mesh,
-                  int factor) const noexcept {
-    if (part == 0) return 0;  // a sample
+  // Returns how far the mesh, at height `mesh / (count factor)`, lies from a place on an edge,
+  // times `count factor`; 0 for edges that are not in the window or the band.
+  double crossing(const EdgePlace& edge, double mesh, int factor) const noexcept {
+    if (edge.part == 0) return 0;  // a sample
     const int column = first.x + static_cast<int>(edge.x);
     const int row = first.y + static_cast<int>(edge.y);
     if (column < samples.first.x || column + edge.dx >= samples.first.x + samples.size.x) return 0;
@@ -155,7 +168,7 @@ struct HalfCell {
     const double here = *samples.at(column, row);
     const double there = *samples.at(column + edge.dx, row + edge.dy);
     const double reference =
-        here * static_cast<double>(count - part) + there * static_cast<double>(part);
+        here * static_cast<double>(edge.count - edge.part) + there * static_cast<double>(edge.part);
     return larger(0, std::abs(mesh - factor * reference));
   }
 };

@@ -17,7 +17,7 @@ struct CountLeavesPass {
   std::uint32_t* counts;
 
   static bool is_listed(std::uint8_t state, float key_m) noexcept {
-    return (state & IsLeaf) != 0 && key_m >= 0;
+    return (state & Selection::IsLeaf) != 0 && key_m >= 0;
   }
 
   void operator()(std::size_t index) const noexcept {
@@ -48,13 +48,13 @@ struct ListLeavesPass {
     for (int x = run.begin; x < run.end; ++x) {
       const std::uint8_t state = states[row + x];
       if (!CountLeavesPass::is_listed(state, nodes.key_m[row + x])) continue;
-      const auto sides = static_cast<std::uint8_t>(state & AllSides);
+      const auto sides = static_cast<std::uint8_t>(state & Selection::AllSides);
       const float* const deviations = sides == 0 ? nodes.full_m : nodes.deviation_m;
       *out++ = {((nodes.first.x + x) * block_cells) << level,
                 ((nodes.first.y + run.row) * block_cells) << level,
                 1 << level,
                 sides,
-                (state & Holed) != 0,
+                (state & Selection::Holed) != 0,
                 deviations == nullptr ? 0 : deviations[row + x],
                 nodes.high_m == nullptr ? 0 : nodes.high_m[row + x]};
     }

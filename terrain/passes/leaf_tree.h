@@ -104,8 +104,8 @@ struct LeafTree {
       const glm::ivec2 node{(cell.x >> level) / block_cells, (cell.y >> level) / block_cells};
       const std::size_t index = node_index(level, node);
       const std::uint8_t state = levels[level].state[index];
-      if ((state & IsLeaf) != 0) return levels[level].leaf[index];
-      level += (state & Split) != 0 ? -1 : 1;
+      if ((state & Selection::IsLeaf) != 0) return levels[level].leaf[index];
+      level += (state & Selection::Split) != 0 ? -1 : 1;
     }
   }
   /// The leaf whose half-open square a sample lies in.

@@ -97,10 +97,10 @@ struct SplitPass {
       const bool exceeds = bound.exceeds(nodes, at, node);
       const bool splits =
           can_split(node) && (exceeds || straddles(x, run.row) || children_ask_for_it(node));
-      out[x] = static_cast<std::uint8_t>((splits    ? Split
-                                          : exceeds ? Tight
+      out[x] = static_cast<std::uint8_t>((splits    ? Selection::Split
+                                          : exceeds ? Selection::Tight
                                                     : 0) |
-                                         (is_holed ? Holed : 0));
+                                         (is_holed ? Selection::Holed : 0));
     }
   }
 
@@ -126,7 +126,7 @@ struct SplitPass {
     const int own = get(x, y) | get(x + 1, y) | get(x, y + 1) | get(x + 1, y + 1);
     const int others = get(x, y - 1) | get(x + 1, y - 1) | get(x, y + 2) | get(x + 1, y + 2) |
                        get(x - 1, y) | get(x - 1, y + 1) | get(x + 2, y) | get(x + 2, y + 1);
-    return ((own & Split) | (others & (Split | Tight))) != 0;
+    return ((own & Selection::Split) | (others & (Selection::Split | Selection::Tight))) != 0;
   }
   int get(int x, int y) const noexcept {
     return x < 0 || y < 0 || x >= children.size.x || y >= children.size.y ? 0 : children.row(y)[x];
@@ -146,12 +146,12 @@ struct LeafPass {
     const int row = states.first.y + run.row;
     for (int x = run.begin; x < run.end; ++x) {
       const int column = states.first.x + x;
-      if ((out[x] & Split) != 0 || !exists(column, row)) continue;
+      if ((out[x] & Selection::Split) != 0 || !exists(column, row)) continue;
       const bool north = row > 0 && !exists(column, row - 1);
       const bool south = row + 1 < all_nodes.y && !exists(column, row + 1);
       const bool west = column > 0 && !exists(column - 1, row);
       const bool east = column + 1 < all_nodes.x && !exists(column + 1, row);
-      out[x] = static_cast<std::uint8_t>(out[x] | IsLeaf | (north ? Leaf::North : 0) |
+      out[x] = static_cast<std::uint8_t>(out[x] | Selection::IsLeaf | (north ? Leaf::North : 0) |
                                          (east ? Leaf::East : 0) | (south ? Leaf::South : 0) |
                                          (west ? Leaf::West : 0));
     }
@@ -159,7 +159,7 @@ struct LeafPass {
 
  private:
   bool exists(int column, int row) const noexcept {
-    return parents.state == nullptr || (parents.at(column / 2, row / 2) & Split) != 0;
+    return parents.state == nullptr || (parents.at(column / 2, row / 2) & Selection::Split) != 0;
   }
 };
 

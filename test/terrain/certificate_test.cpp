@@ -190,7 +190,7 @@ TEST_F(CertificateTest, TilesOfAnySizeGiveTheSameValues) {
 
 TEST_F(CertificateTest, AnyNumberOfThreadsWritesTheSameBytes) {
   std::vector<std::string> bytes;
-  for (const std::size_t threads : {1, 2, 5}) {
+  for (const std::size_t threads : {1UL, 2UL, 5UL}) {
     const tbb::global_control limit(tbb::global_control::max_allowed_parallelism, threads);
     std::filesystem::remove_all(beside_);
     Certificate::open_or_make(DemFile(path_), {.tile_cells = 32});

@@ -281,6 +281,9 @@ TEST_F(DemFileTest, TheFingerprintIsThatOfEqualFiles) {
   picture_.save(tiff_);
   const std::string print = DemFile(tiff_).fingerprint();
   EXPECT_EQ(DemFile(tiff_).fingerprint(), print);
+  const auto relative = std::filesystem::relative(tiff_);
+  ASSERT_TRUE(relative.is_relative());
+  EXPECT_EQ(DemFile(relative).fingerprint(), print);
   // What viewers leave beside it changes nothing.
   write_text(folder_ / "dem.tif.aux.xml",
              "<PAMDataset><Metadata><MDI key=\"a\">b</MDI></Metadata></PAMDataset>");

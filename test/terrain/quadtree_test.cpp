@@ -17,12 +17,16 @@
 #include "core/random.h"
 #include "terrain/deviation.h"
 #include "test/support/shuffled_runner.h"
+#include "test/support/slow_quadtree.h"
 
 namespace groundray {
 namespace {
 
+using groundray::testing::bound_of;
+using groundray::testing::Known;
+using groundray::testing::Node;
+using groundray::testing::SlowQuadtree;
 using ::testing::HasSubstr;
-using Real = long double;
 
 constexpr float infinity = std::numeric_limits<float>::infinity();
 
@@ -49,202 +53,6 @@ HeightGrid hills(glm::ivec2 size, Seed seed, int holes = 0) {
   return {size, {0, 0}, {2, -3}, heights};
 }
 
-struct Node {
-  int level, column, row;
-  friend auto operator<=>(const Node&, const Node&) = default;
-};
-
-// A certificate of which windows are shown.
-struct Known {
-  Lattice lattice;
-  std::vector<NodeLevel> levels;
-  std::vector<NodeLevel> shown;  // what the windows point to
-  std::vector<NodeWindow> windows;
-
-  Known(const HeightGrid& grid, int block_cells)
-      : lattice{{grid.columns(), grid.rows()}, block_cells},
-        levels(certify(grid, block_cells, NodeDetail::Full)),
-        shown(levels) {
-    for (const NodeLevel& level : levels) windows.push_back(whole_window(level));
-  }
-  Known(const Known&) = delete;
-
-  void show(int level, glm::ivec2 first, glm::ivec2 end) {
-    const NodeLevel& all = levels[std::size_t(level)];
-    NodeLevel& part = shown[std::size_t(level)];
-    part = {end - first, {}, {}, {}, {}, {}};
-    for (int r = first.y; r < end.y; ++r) {
-      for (int c = first.x; c < end.x; ++c) {
-        const auto at = std::size_t(r) * std::size_t(all.size.x) + std::size_t(c);
-        part.key_m.push_back(all.key_m[at]);
-        part.deviation_m.push_back(all.deviation_m[at]);
-        part.full_m.push_back(all.full_m[at]);
-        part.low_m.push_back(all.low_m[at]);
-        part.high_m.push_back(all.high_m[at]);
-      }
-    }
-    windows[std::size_t(level)] = whole_window(part);
-    windows[std::size_t(level)].first = first;
-  }
-  // Nested windows round a place: `side` nodes wide, snapped to even ones.
-  void show_windows_round(glm::dvec2 place, int side) {
-    for (int level = 0; level < lattice.top_level(); ++level) {
-      const glm::ivec2 all = lattice.nodes(level);
-      if (all.x <= side && all.y <= side) break;
-      glm::ivec2 first;
-      glm::ivec2 end;
-      for (int axis = 0; axis < 2; ++axis) {
-        const int width = lattice.block_cells << level;
-        const int middle = int(place[axis]) / (2 * width) * 2;
-        first[axis] = std::clamp(middle - side / 2, 0, std::max(0, (all[axis] - side + 1) / 2 * 2));
-        end[axis] = std::min(first[axis] + side, all[axis]);
-      }
-      show(level, first, end);
-    }
-  }
-  std::size_t index(const Node& node) const {
-    return std::size_t(node.row) * std::size_t(levels[std::size_t(node.level)].size.x) +
-           std::size_t(node.column);
-  }
-  const NodeLevel& of(const Node& node) const { return levels[std::size_t(node.level)]; }
-};
-
-Real gap(Real low, Real high, Real other_low, Real other_high) {
-  return std::max({Real(0), other_low - high, low - other_high});
-}
-
-// max(tolerance, angle * distance), with a root.
-Real bound_of(const Known& known, const MeshBound& bound, const Node& node) {
-  if (bound.angle_rad == 0) return bound.tolerance_m;
-  const glm::ivec2 block = glm::ivec2(node.column, node.row) * known.lattice.block_cells;
-  const glm::ivec2 first = known.lattice.sample(node.level, block);
-  const glm::ivec2 last = known.lattice.sample(node.level, block + known.lattice.block_cells);
-  const std::size_t at = known.index(node);
-  // The sensors' box, widened to whole squares of nodes of this level.
-  std::array<Real, 3> low{};
-  std::array<Real, 3> high{};
-  for (int axis = 0; axis < 3; ++axis) {
-    const Real cell_m = axis < 2 ? bound.cell_m[axis] : std::min(bound.cell_m.x, bound.cell_m.y);
-    const Real unit_m =
-        cell_m * ((bound.widened_to_nodes * known.lattice.block_cells) << node.level);
-    const bool is_widened = unit_m > 0;
-    const auto i = static_cast<std::size_t>(axis);
-    low[i] = is_widened ? std::floor(bound.low_m[axis] / unit_m) * unit_m : bound.low_m[axis];
-    high[i] = is_widened ? std::ceil(bound.high_m[axis] / unit_m) * unit_m : bound.high_m[axis];
-  }
-  const Real x =
-      gap(first.x * Real(bound.cell_m.x), last.x * Real(bound.cell_m.x), low[0], high[0]);
-  const Real y =
-      gap(first.y * Real(bound.cell_m.y), last.y * Real(bound.cell_m.y), low[1], high[1]);
-  const Real z = gap(known.of(node).low_m[at], known.of(node).high_m[at], low[2], high[2]);
-  return std::max(Real(bound.tolerance_m), bound.angle_rad * std::sqrt(x * x + y * y + z * z));
-}
-
-// ---- The oracle: a set of leaves that are split one by one until nothing asks for it any more.
-class SlowTree {
- public:
-  SlowTree(const Known& known, const MeshBound& bound) : known_(known), bound_(bound) {
-    add({known.lattice.top_level(), 0, 0});
-    for (bool changed = true; changed;) {
-      changed = false;
-      for (const Node& leaf : std::vector<Node>(leaves_.begin(), leaves_.end())) {
-        if (can_split(leaf) && must_split(leaf)) {
-          changed = true;
-          split(leaf);
-        }
-      }
-    }
-  }
-  const std::set<Node>& leaves() const { return leaves_; }
-  int level_at(glm::ivec2 cell) const { return level_.at({cell.x, cell.y}); }
-
- private:
-  struct Rectangle {
-    glm::ivec2 first, end;  // cells of the DEM
-  };
-  Rectangle cells(const Node& node) const {
-    const int side = known_.lattice.block_cells << node.level;
-    const glm::ivec2 first = glm::ivec2(node.column, node.row) * side;
-    const glm::ivec2 last = known_.lattice.samples - 1;
-    return {first, {std::min(first.x + side, last.x), std::min(first.y + side, last.y)}};
-  }
-  void add(const Node& node) {
-    leaves_.insert(node);
-    const Rectangle at = cells(node);
-    for (int r = at.first.y; r < at.end.y; ++r) {
-      for (int c = at.first.x; c < at.end.x; ++c) level_[{c, r}] = node.level;
-    }
-  }
-  void split(const Node& node) {
-    leaves_.erase(node);
-    const glm::ivec2 all = known_.lattice.nodes(node.level - 1);
-    for (int r = 2 * node.row; r < std::min(2 * node.row + 2, all.y); ++r) {
-      for (int c = 2 * node.column; c < std::min(2 * node.column + 2, all.x); ++c) {
-        add({node.level - 1, c, r});
-      }
-    }
-  }
-  bool can_split(const Node& node) const {
-    if (node.level == 0) return false;
-    const NodeWindow& below = known_.windows[std::size_t(node.level - 1)];
-    const glm::ivec2 child = 2 * glm::ivec2(node.column, node.row) - below.first;
-    return child.x >= 0 && child.y >= 0 && child.x < below.size.x && child.y < below.size.y;
-  }
-  bool exceeds(const Node& node) const {
-    const float key = known_.of(node).key_m[known_.index(node)];
-    return key == infinity || key > bound_of(known_, bound_, node);
-  }
-  bool must_split(const Node& node) const {
-    return exceeds(node) || straddles_a_window(node) || has_too_fine_a_neighbour(node);
-  }
-  bool straddles_a_window(const Node& node) const {
-    const Rectangle at = cells(node);
-    for (int level = 0; level < node.level; ++level) {
-      const NodeWindow& window = known_.windows[std::size_t(level)];
-      if (window.size.x == 0) continue;
-      int inside = 0;
-      for (int r = at.first.y; r < at.end.y; ++r) {
-        for (int c = at.first.x; c < at.end.x; ++c) {
-          const glm::ivec2 fine = (glm::ivec2(c, r) >> level) / known_.lattice.block_cells;
-          const glm::ivec2 local = fine - window.first;
-          const bool is_in =
-              local.x >= 0 && local.y >= 0 && local.x < window.size.x && local.y < window.size.y;
-          inside += is_in ? 1 : 0;
-        }
-      }
-      const int all = (at.end.x - at.first.x) * (at.end.y - at.first.y);
-      if (inside != 0 && inside != all) return true;
-    }
-    return false;
-  }
-  bool has_too_fine_a_neighbour(const Node& node) const {
-    const Rectangle at = cells(node);
-    bool found = false;
-    const auto look = [&](int c, int r) {
-      const auto level = level_.find({c, r});
-      if (level == level_.end()) return;
-      const int side = known_.lattice.block_cells << level->second;
-      const Node neighbour{level->second, c / side, r / side};
-      found |= neighbour.level < node.level - 1 ||
-               (neighbour.level == node.level - 1 && exceeds(neighbour) && !can_split(neighbour));
-    };
-    for (int r = at.first.y; r < at.end.y; ++r) {
-      look(at.first.x - 1, r);
-      look(at.end.x, r);
-    }
-    for (int c = at.first.x; c < at.end.x; ++c) {
-      look(c, at.first.y - 1);
-      look(c, at.end.y);
-    }
-    return found;
-  }
-
-  const Known& known_;
-  const MeshBound& bound_;
-  std::set<Node> leaves_;
-  std::map<std::pair<int, int>, int> level_;  // of the leaf at each cell of the DEM
-};
-
 template <typename Act>
 void for_each_state(const Selection& selection, const Act& act) {
   for (std::size_t level = 0; level < selection.levels.size(); ++level) {
@@ -261,14 +69,14 @@ void for_each_state(const Selection& selection, const Act& act) {
 std::set<Node> leaves_of(const Selection& selection) {
   std::set<Node> leaves;
   for_each_state(selection, [&](const Node& node, unsigned state) {
-    if ((state & IsLeaf) != 0) leaves.insert(node);
+    if ((state & Selection::IsLeaf) != 0) leaves.insert(node);
   });
   return leaves;
 }
 
 // Sides of a leaf on whose other side the leaves are coarser; fails if they are coarser by more
 // than one level.
-unsigned coarser_sides(const SlowTree& tree, const Lattice& lattice, const Node& node) {
+unsigned coarser_sides(const SlowQuadtree& tree, const Lattice& lattice, const Node& node) {
   const glm::ivec2 block = glm::ivec2(node.column, node.row) * lattice.block_cells;
   const glm::ivec2 first = lattice.sample(node.level, block);
   const glm::ivec2 last = lattice.sample(node.level, block + lattice.block_cells);
@@ -305,14 +113,14 @@ std::vector<MeshBound> some_bounds() {
 }
 
 void expect_as_slow(const Known& known, const MeshBound& bound) {
-  const SlowTree expected(known, bound);
+  const SlowQuadtree expected(known, bound);
   const Selection selection = select_nodes(known.lattice, known.windows, bound);
   EXPECT_EQ(leaves_of(selection), expected.leaves());
   for_each_state(selection, [&](const Node& node, unsigned state) {
-    if ((state & IsLeaf) == 0) return;
-    EXPECT_EQ(state & AllSides, coarser_sides(expected, known.lattice, node));
+    if ((state & Selection::IsLeaf) == 0) return;
+    EXPECT_EQ(state & Selection::AllSides, coarser_sides(expected, known.lattice, node));
     const float key = known.of(node).key_m[known.index(node)];
-    EXPECT_EQ((state & Holed) != 0, key == infinity || key < 0);
+    EXPECT_EQ((state & Selection::Holed) != 0, key == infinity || key < 0);
   });
 }
 
@@ -357,9 +165,9 @@ TEST(Quadtree, WithWholeWindowsEveryLeafKeepsItsBound) {
     for (const MeshBound& bound : some_bounds()) {
       const Selection selection = select_nodes(known.lattice, known.windows, bound);
       for_each_state(selection, [&](const Node& node, unsigned state) {
-        if ((state & IsLeaf) == 0) return;
-        const bool is_thinned = (state & AllSides) != 0;
-        if ((state & Tight) != 0) {
+        if ((state & Selection::IsLeaf) == 0) return;
+        const bool is_thinned = (state & Selection::AllSides) != 0;
+        if ((state & Selection::Tight) != 0) {
           EXPECT_EQ(node.level, 0);
           EXPECT_FALSE(is_thinned);
         }
@@ -379,8 +187,8 @@ TEST(Quadtree, ASmallerBoundSplitsEveryNodeThatALargerOneDoes) {
     int more = 0;
     for_each_state(coarse, [&](const Node& node, unsigned state) {
       const unsigned other = fine.levels[std::size_t(node.level)].at({node.column, node.row});
-      EXPECT_LE(state & Split, other & Split);
-      more += (other & Split) != (state & Split) ? 1 : 0;
+      EXPECT_LE(state & Selection::Split, other & Selection::Split);
+      more += (other & Selection::Split) != (state & Selection::Split) ? 1 : 0;
     });
     EXPECT_GT(more, 0);
   };
@@ -397,9 +205,9 @@ TEST(Quadtree, LeavesAreListedFineToCoarseRowByRowWithWhatIsCertified) {
   std::vector<Leaf> expected;
   for_each_state(selection, [&](const Node& node, unsigned state) {
     const std::size_t at = known.index(node);
-    if ((state & IsLeaf) == 0 || known.of(node).low_m[at] == infinity) return;
+    if ((state & Selection::IsLeaf) == 0 || known.of(node).low_m[at] == infinity) return;
     const int side = 2 << node.level;
-    const auto sides = static_cast<std::uint8_t>(state & AllSides);
+    const auto sides = static_cast<std::uint8_t>(state & Selection::AllSides);
     expected.push_back({node.column * side, node.row * side, 1 << node.level, sides,
                         known.of(node).key_m[at] == infinity,
                         sides == 0 ? known.of(node).full_m[at] : known.of(node).deviation_m[at],
