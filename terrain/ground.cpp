@@ -13,10 +13,9 @@ Ground::Ground(std::shared_ptr<const TileSource> source, const GridFrame& frame)
         const glm::ivec2 which(column / Tile::cells, row / Tile::cells);
         const std::shared_ptr<const Tile> tile = source->tile({0, which});
         const auto height_m = [&](int right, int down) {
-          const int x = column - which.x * Tile::cells + right;
-          const int y = row - which.y * Tile::cells + down;
-          return static_cast<double>(
-              tile->heights_m[static_cast<std::size_t>(y * Tile::points + x)]);
+          const auto x = static_cast<std::size_t>(column - which.x * Tile::cells + right);
+          const auto y = static_cast<std::size_t>(row - which.y * Tile::cells + down);
+          return static_cast<double>(tile->heights_m[y * Tile::points + x]);
         };
         return Cell{column,         row,           1, 1, height_m(0, 0), height_m(1, 0),
                     height_m(0, 1), height_m(1, 1)};

@@ -57,7 +57,7 @@ ClipmapSettings windows_of_512(const Lattice& lattice) {
   std::size_t levels = 1;
   for (int level = 0; std::max(lattice.cells(level).x, lattice.cells(level).y) > 512; ++level)
     ++levels;
-  return {.memory_bytes = 40 * (std::size_t{512} * 512 + 512 * 32) * levels};
+  return {.memory_bytes = 40 * std::size_t{512} * (512 + 32) * levels};
 }
 
 // A path of one snap of level 0 each step: diagonal, straight, and round corners.
@@ -87,9 +87,9 @@ double megabytes(const RayTracer& tracer) {
   return 1e-6 * bytes;
 }
 
-void step_over(::benchmark::State& state, const TileSource& source, const GridFrame& frame,
-               std::shared_ptr<const TileSource> tiles) {
-  const auto settings = windows_of_512(source.lattice());
+void step_over(::benchmark::State& state, const GridFrame& frame,
+               const std::shared_ptr<const TileSource>& tiles) {
+  const auto settings = windows_of_512(tiles->lattice());
   std::vector<double> steps_s;
   for (auto _ : state) {
     steps_s.clear();
@@ -121,7 +121,7 @@ void terrain_step_moon(::benchmark::State& state) {
   if (path.empty()) return state.SkipWithError("skipped: the shared data has no Moon DEM");
   GridFrame frame;
   const auto tiles = open_tiles(path, frame);
-  step_over(state, *tiles, frame, tiles);
+  step_over(state, frame, tiles);
 }
 BENCHMARK(terrain_step_moon)->Unit(::benchmark::kMillisecond)->Iterations(1);
 
@@ -131,7 +131,7 @@ void terrain_step_65536(::benchmark::State& state) {
   if (path == nullptr) return state.SkipWithError("skipped: GROUNDRAY_BENCH_VRT is not set");
   GridFrame frame;
   const auto tiles = open_tiles(path, frame);
-  step_over(state, *tiles, frame, tiles);
+  step_over(state, frame, tiles);
 }
 BENCHMARK(terrain_step_65536)->Unit(::benchmark::kMillisecond)->Iterations(1);
 
@@ -140,7 +140,7 @@ void terrain_step_1025(::benchmark::State& state) {
   const HeightGrid grid = testing::fractal(1025, 100, 3000, Seed{1});
   const auto tiles = std::make_shared<const MemoryTiles>(
       grid, certify(grid, Certificate::block_cells, NodeDetail::Full));
-  step_over(state, *tiles, grid.frame(), tiles);
+  step_over(state, grid.frame(), tiles);
 }
 BENCHMARK(terrain_step_1025)->Unit(::benchmark::kMillisecond)->Iterations(1);
 
