@@ -90,10 +90,14 @@ struct Splitter {
     const auto at = static_cast<std::size_t>(level);
     const NodeRuns runs{windows[at].size};
     const auto [low_m, high_m] = sensor_box(level);
-    BoundTest test{bound.tolerance_m,   bound.angle_rad * bound.angle_rad,
-                   low_m,               high_m,
-                   bound.cell_m,        level,
-                   lattice.block_cells, lattice.samples - 1};
+    BoundTest test{bound.tolerance_m,
+                   bound.angle_rad * bound.angle_rad,
+                   low_m,
+                   high_m,
+                   bound.cell_m,
+                   level,
+                   lattice.block_cells,
+                   lattice.samples - 1};
     passes::SplitPass pass{runs, windows[at], view(selection.levels[at]), {}, test};
     if (level > 0) pass.children = view(selection.levels[at - 1]);
     std::vector<WindowSpan> columns;

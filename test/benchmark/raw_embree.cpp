@@ -83,8 +83,8 @@ RawEmbree::RawEmbree(const HeightGrid& grid, std::span<const Ray> rays)
     }
   }
   std::vector<RTCGrid> tiles;
-  const auto count = [](int first, int samples) {
-    return static_cast<unsigned short>(std::min(tile_cells + 1, samples - first));
+  const auto count = [](int first, int end) {
+    return static_cast<unsigned short>(std::min(tile_cells + 1, end - first));
   };
   for (int row = 0; row < grid.rows() - 1; row += tile_cells) {
     for (int column = 0; column < grid.columns() - 1; column += tile_cells) {

@@ -51,9 +51,9 @@ std::vector<Ray> rays_from(const glm::dvec3& p, std::size_t count, Seed seed) {
     const auto turn = random_uniform({seed, 0, 0, static_cast<std::uint32_t>(i)});
     const auto more = random_uniform({seed, 1, 0, static_cast<std::uint32_t>(i)});
     // Neighbours are alike, as a sensor's are; half look close to the horizon.
+    const std::size_t fan = i / 16;
     const double azimuth =
-        6.2831853 *
-        (static_cast<double>(i / 16) / (static_cast<double>(count) / 16) + 0.001 * turn.x);
+        6.2831853 * (16 * static_cast<double>(fan) / static_cast<double>(count) + 0.001 * turn.x);
     const double steepness = i % 32 < 16 ? 0.3 * turn.y * turn.y - 0.03 : 2 * turn.y;
     rays[i].origin = p + glm::dvec3(more - 0.5, 0.3 * turn.x);
     rays[i].direction =
@@ -68,7 +68,8 @@ HeightGrid partly_plane(int samples) {
   std::vector<float> heights(rough.heights_m().begin(), rough.heights_m().end());
   for (int row = 0; row < samples; ++row) {
     for (int column = 0; column < samples; ++column) {
-      float& height = heights[static_cast<std::size_t>(row * samples + column)];
+      float& height = heights[static_cast<std::size_t>(row) * static_cast<std::size_t>(samples) +
+                              static_cast<std::size_t>(column)];
       if (column < samples / 3) height = 64;
       if (row < samples / 3) height = 64.0f + 0.5f * static_cast<float>(column);
     }
