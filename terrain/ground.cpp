@@ -12,10 +12,11 @@ Ground::Ground(std::shared_ptr<const TileSource> source, const GridFrame& frame)
     : frame_(frame), cell_([source = std::move(source)](int column, int row) {
         const glm::ivec2 which(column / Tile::cells, row / Tile::cells);
         const std::shared_ptr<const Tile> tile = source->tile({0, which});
-        const auto height_m = [&](int right, int down) {
-          const auto x = static_cast<std::size_t>(column - which.x * Tile::cells + right);
-          const auto y = static_cast<std::size_t>(row - which.y * Tile::cells + down);
-          return static_cast<double>(tile->heights_m[y * Tile::points + x]);
+        const int x = column - which.x * Tile::cells;
+        const int y = row - which.y * Tile::cells;
+        const auto height_m = [&](int right, int down) -> double {
+          const int index = (y + down) * Tile::points + x + right;
+          return tile->heights_m[static_cast<std::size_t>(index)];
         };
         return Cell{column,         row,           1, 1, height_m(0, 0), height_m(1, 0),
                     height_m(0, 1), height_m(1, 1)};
