@@ -71,9 +71,9 @@ void expect_equal_bits(const PointCloud& actual, const PointCloud& expected) {
   ASSERT_EQ(actual.rows(), expected.rows());
   ASSERT_EQ(actual.columns().size(), expected.columns().size());
   for (std::size_t i = 0; i < actual.columns().size(); ++i) {
-    const auto& [name, values] = expected.columns()[i];
+    const std::string& name = expected.columns()[i].name;
     EXPECT_EQ(actual.columns()[i].name, name);
-    ASSERT_EQ(actual.columns()[i].values.index(), values.index()) << name;
+    ASSERT_EQ(actual.columns()[i].values.index(), expected.columns()[i].values.index()) << name;
     std::visit(
         [&](const auto& column) {
           const auto& read = std::get<std::decay_t<decltype(column)>>(actual.columns()[i].values);
@@ -82,7 +82,7 @@ void expect_equal_bits(const PointCloud& actual, const PointCloud& expected) {
           EXPECT_EQ(std::memcmp(read.data(), column.data(), column.size() * sizeof column[0]), 0)
               << name;
         },
-        values);
+        expected.columns()[i].values);
   }
 }
 
