@@ -134,8 +134,9 @@ void saturate_keys(NodeLevel& nodes, glm::ivec2 first_node, const NodeLevel& chi
 
 std::vector<NodeLevel> certify(const HeightGrid& grid, int block_cells, NodeDetail detail,
                                const PassRunner& runner) {
-  if (block_cells < 2 || block_cells % 2 != 0) {
-    throw Error("quadtree: block_cells = {} must be even and at least 2", block_cells);
+  if (block_cells < 2 || block_cells > Lattice::max_block_cells || block_cells % 2 != 0) {
+    throw Error("quadtree: block_cells = {} must be even, from 2 to {}", block_cells,
+                Lattice::max_block_cells);
   }
   const Lattice lattice{{grid.columns(), grid.rows()}, block_cells};
   const Heights samples{grid.heights_m().data(), grid.columns(), {0, 0}, lattice.samples};

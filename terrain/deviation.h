@@ -16,9 +16,9 @@ namespace groundray {
 enum class NodeDetail { KeysOnly, Full };
 
 /// Certifies every node of the quadtree over `grid`, which is wholly in memory.
-/// @param block_cells  cells along a node's side: even, at least 2.
+/// @param block_cells  cells along a node's side: even, from 2 to Lattice::max_block_cells.
 /// @return levels 0 to Lattice::top_level(), each whole; the same bits for any runner.
-/// @throws Error if block_cells is not even and positive.
+/// @throws Error if block_cells is none of these.
 std::vector<NodeLevel> certify(const HeightGrid& grid, int block_cells, NodeDetail detail,
                                const PassRunner& runner = run_in_parallel);
 

@@ -12,8 +12,10 @@ namespace groundray {
 /// block_cells cells of that level; node (i, j) of level k has the children (2i..2i+1, 2j..2j+1) of
 /// level k-1.
 struct Lattice {
+  static constexpr int max_block_cells = 64;
+
   glm::ivec2 samples{2};  ///< columns and rows of the DEM, each 2 to 2^30
-  int block_cells = 8;    ///< even
+  int block_cells = 8;    ///< even, at most max_block_cells
 
   /// The level at which the DEM is one cell: the root of the quadtree.
   int top_level() const noexcept {

@@ -23,8 +23,9 @@ struct TerrainMesh {
 /// At level l a triangle exists iff its samples do; nowhere else is the mesh farther than the bound
 /// from the reference surface, at samples or between them.
 /// @param bound        bound.cell_m is taken from the grid.
-/// @param block_cells  cells along a leaf's side: even; 2 gives the fewest triangles.
-/// @throws Error if block_cells is odd or not positive, the bound negative or not a number, or the
+/// @param block_cells  cells along a leaf's side: even, from 2 to Lattice::max_block_cells; 2
+///                     gives the fewest triangles.
+/// @throws Error if block_cells is none of these, the bound negative or not a number, or the
 ///         mesh has more vertices or triangles than 32 bits can number.
 TerrainMesh build_terrain_mesh(const HeightGrid& grid, const MeshBound& bound, int block_cells = 2,
                                const PassRunner& runner = run_in_parallel);

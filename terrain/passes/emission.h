@@ -6,6 +6,7 @@
 #include <glm/vec2.hpp>
 #include <glm/vec3.hpp>
 
+#include "terrain/lattice.h"
 #include "terrain/passes/leaf_tree.h"
 #include "terrain/passes/thin.h"
 
@@ -152,16 +153,31 @@ struct EmitTrianglesPass {
     const LeafTree& tree = numbers.tree;
     const LeafBlock leaf = tree.block_of(tree.leaves[index]);
     const bool has_holes = tree.leaves[index].has_holes;
+    std::uint32_t number[max_points];
+    for (int row = 0; row <= leaf.block.cells.y; ++row) {
+      for (int column = 0; column <= leaf.block.cells.x; ++column) {
+        if (leaf.block.drops(column, row)) continue;
+        if (has_holes && tree.is_missing(tree.sample(leaf, column, row))) continue;
+        number[place({column, row})] = numbers.of(index, leaf, {column, row});
+      }
+    }
     std::size_t out = first[index];
     for_each_triangle(leaf.block, [&](glm::ivec2 a, glm::ivec2 b, glm::ivec2 c) {
       if (has_holes && !tree.has_all(leaf, a, b, c)) return;
-      const std::uint32_t i = numbers.of(index, leaf, a);
-      const std::uint32_t j = numbers.of(index, leaf, b);
-      const std::uint32_t k = numbers.of(index, leaf, c);
+      const std::uint32_t i = number[place(a)];
+      const std::uint32_t j = number[place(b)];
+      const std::uint32_t k = number[place(c)];
       triangles[out] = is_mirrored ? glm::uvec3{i, k, j} : glm::uvec3{i, j, k};
       levels[out] = static_cast<std::uint8_t>(leaf.level);
       ++out;
     });
+  }
+
+ private:
+  static constexpr int max_points = (Lattice::max_block_cells + 1) * (Lattice::max_block_cells + 1);
+
+  int place(glm::ivec2 point) const noexcept {
+    return point.y * (numbers.tree.block_cells + 1) + point.x;
   }
 };
 

@@ -23,6 +23,8 @@ struct CountLeavesPass {
   void operator()(std::size_t index) const noexcept {
     const NodeRuns::Run run = runs.at(index);
     const std::ptrdiff_t row = static_cast<std::ptrdiff_t>(run.row) * runs.size.x;
+    counts[index] = 0;
+    if (!any_has(states + row + run.begin, run.end - run.begin, Selection::IsLeaf)) return;
     std::uint32_t count = 0;
     for (int x = run.begin; x < run.end; ++x) {
       count += is_listed(states[row + x], key_m[row + x]) ? 1 : 0;
@@ -44,6 +46,7 @@ struct ListLeavesPass {
   void operator()(std::size_t index) const noexcept {
     const NodeRuns::Run run = runs.at(index);
     const std::ptrdiff_t row = static_cast<std::ptrdiff_t>(run.row) * runs.size.x;
+    if (!any_has(states + row + run.begin, run.end - run.begin, Selection::IsLeaf)) return;
     Leaf* out = leaves + offsets[index];
     for (int x = run.begin; x < run.end; ++x) {
       const std::uint8_t state = states[row + x];

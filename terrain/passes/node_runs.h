@@ -2,6 +2,7 @@
 
 #include <algorithm>
 #include <cstddef>
+#include <cstdint>
 #include <glm/vec2.hpp>
 
 namespace groundray::passes {
@@ -23,5 +24,12 @@ struct NodeRuns {
     return {static_cast<int>(index / in_row()), begin, std::min(begin + length, size.x)};
   }
 };
+
+/// Whether any of `count` states has any of `bits`.
+inline bool any_has(const std::uint8_t* states, int count, std::uint8_t bits) noexcept {
+  std::uint8_t all = 0;
+  for (int i = 0; i < count; ++i) all |= states[i];
+  return (all & bits) != 0;
+}
 
 }  // namespace groundray::passes

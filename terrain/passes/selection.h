@@ -28,6 +28,17 @@ struct StateWindow {
     const int y = row - first.y;
     return x < 0 || y < 0 || x >= size.x || y >= size.y ? 0 : this->row(y)[x];
   }
+  /// Whether any node from column `begin` to before `end` of rows `first_row` to `last_row` has any
+  /// of `bits`.
+  bool any_has(int begin, int end, int first_row, int last_row, std::uint8_t bits) const noexcept {
+    const int x = std::max(begin - first.x, 0);
+    const int count = std::min(end - first.x, size.x) - x;
+    for (int y = std::max(first_row - first.y, 0); y <= std::min(last_row - first.y, size.y - 1);
+         ++y) {
+      if (passes::any_has(row(y) + x, count, bits)) return true;
+    }
+    return false;
+  }
 };
 
 /// The test of a node against its bound; without division or root, and such that whatever holds of
@@ -89,6 +100,7 @@ struct SplitPass {
   void operator()(std::size_t index) const noexcept {
     const NodeRuns::Run run = runs.at(index);
     std::uint8_t* const out = states.row(run.row);
+    if (stays_whole(run)) return std::fill(out + run.begin, out + run.end, std::uint8_t{0});
     for (int x = run.begin; x < run.end; ++x) {
       const glm::ivec2 node = nodes.first + glm::ivec2{x, run.row};
       const std::ptrdiff_t at = static_cast<std::ptrdiff_t>(run.row) * nodes.size.x + x;
@@ -105,6 +117,22 @@ struct SplitPass {
   }
 
  private:
+  /// Whether no node of the run has a reason to be split; most runs of fine levels.
+  bool stays_whole(const NodeRuns::Run& run) const noexcept {
+    const float* const key_m = nodes.key_m + static_cast<std::ptrdiff_t>(run.row) * nodes.size.x;
+    const auto tolerance_m = static_cast<float>(bound.tolerance_m);
+    bool is_reason = false;
+    for (int x = run.begin; x < run.end; ++x) {
+      is_reason |= !(key_m[x] >= 0 && key_m[x] < tolerance_m);
+    }
+    if (is_reason || columns != nullptr) return false;
+    const int first = nodes.first.x + run.begin;
+    const int last = nodes.first.x + run.end;
+    const int row = nodes.first.y + run.row;
+    return !children.any_has(2 * first - 1, 2 * last + 1, 2 * row - 1, 2 * row + 2,
+                             Selection::Split | Selection::Tight);
+  }
+
   bool can_split(glm::ivec2 node) const noexcept {
     const int x = 2 * node.x - children.first.x;
     const int y = 2 * node.y - children.first.y;
@@ -144,6 +172,7 @@ struct LeafPass {
     const NodeRuns::Run run = runs.at(index);
     std::uint8_t* const out = states.row(run.row);
     const int row = states.first.y + run.row;
+    if (!any_exists(states.first.x + run.begin, states.first.x + run.end, row)) return;
     for (int x = run.begin; x < run.end; ++x) {
       const int column = states.first.x + x;
       if ((out[x] & Selection::Split) != 0 || !exists(column, row)) continue;
@@ -160,6 +189,10 @@ struct LeafPass {
  private:
   bool exists(int column, int row) const noexcept {
     return parents.state == nullptr || (parents.at(column / 2, row / 2) & Selection::Split) != 0;
+  }
+  bool any_exists(int begin, int end, int row) const noexcept {
+    return parents.state == nullptr ||
+           parents.any_has(begin / 2, (end + 1) / 2, row / 2, row / 2, Selection::Split);
   }
 };
 
