@@ -72,6 +72,16 @@ std::map<glm::ivec2, std::vector<Leaf>, PlaceOrder> by_part(const Level& level) 
   return parts;
 }
 
+// The highest of a row's samples from `begin` to `end`, and of `high_m`; holes do not count.
+float highest(const HeightArray& heights, int row, int begin, int end, float high_m) {
+  const float* const samples =
+      heights.heights_m().data() + static_cast<std::ptrdiff_t>(row) * heights.size().x;
+#pragma omp simd reduction(max : high_m)
+  for (int column = begin; column <= end; ++column)
+    high_m = samples[column] > high_m ? samples[column] : high_m;
+  return high_m;
+}
+
 }  // namespace
 
 MaxHeights::MaxHeights(const HeightArray& heights) : tiles_((heights.size() - 2) / tile_cells + 1) {
@@ -80,10 +90,8 @@ MaxHeights::MaxHeights(const HeightArray& heights) : tiles_((heights.size() - 2)
   for (int top = 0; top < last.y; top += tile_cells) {
     for (int left = 0; left < last.x; left += tile_cells) {
       float high_m = -std::numeric_limits<float>::infinity();
-      for (int row = top; row <= std::min(top + tile_cells, last.y); ++row) {
-        for (int column = left; column <= std::min(left + tile_cells, last.x); ++column)
-          high_m = std::max(high_m, heights(column, row));
-      }
+      for (int row = top; row <= std::min(top + tile_cells, last.y); ++row)
+        high_m = highest(heights, row, left, std::min(left + tile_cells, last.x), high_m);
       heights_m_.push_back(high_m);
     }
   }
