@@ -18,6 +18,9 @@ struct Leaf {
   bool has_holes = false;    ///< some of its samples, or of the DEM's below it, are missing
   float deviation_m = 0;     ///< largest vertical distance between it and the reference surface
   float high_m = 0;          ///< highest sample of the DEM in it
+
+  /// Whether it may have surface where the DEM has none, or lack some of the DEM's.
+  constexpr bool bridges() const noexcept { return has_holes && (step > 1 || coarser != 0); }
   friend bool operator==(const Leaf&, const Leaf&) = default;
 };
 

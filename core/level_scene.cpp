@@ -54,7 +54,7 @@ void map_leaves(LevelScene::Impl& level) {
       }
     }
     level.deviation_m = std::max(level.deviation_m, leaf.deviation_m);
-    level.bridging_leaves += leaf.has_holes && leaf.step > 1 ? 1 : 0;
+    level.bridging_leaves += leaf.bridges() ? 1 : 0;
     level.triangle_count += count_triangles({level, leaf});
   }
 }

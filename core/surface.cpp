@@ -370,7 +370,7 @@ Surface::Band Surface::band(const GridRay& ray, double t_end_m) const noexcept {
       }
       return false;
     }
-    if (leaf.has_holes && leaf.step > 1) {
+    if (leaf.bridges()) {
       band.is_certain = false;
       return true;
     }

@@ -187,7 +187,7 @@ fs::path beside(const fs::path& file, const std::string& relative) {
   return (file.parent_path() / relative).lexically_normal();
 }
 
-TerrainSpec read_terrain(Map terrain, const fs::path& path) {
+TerrainSpec read_terrain(Map terrain, const fs::path& path, Faults& faults) {
   TerrainSpec spec;
   std::string dem;
   if (terrain.read_text("dem", Need::Required, dem)) spec.dem = beside(path, dem);
@@ -199,7 +199,10 @@ TerrainSpec read_terrain(Map terrain, const fs::path& path) {
   double tolerance_mrad = 0;
   terrain.read_number("tolerance_mrad", Need::Optional, tolerance_mrad, not_negative);
   spec.detail.tolerance_rad = tolerance_mrad / 1000;
-  terrain.read_whole("memory_mib", Need::Optional, spec.detail.memory_mib);
+  if (const Node* at = terrain.read_whole("memory_mib", Need::Optional, spec.detail.memory_mib);
+      at && spec.detail.memory_mib == 0) {
+    faults.add(*at, "memory_mib", "is 0, but must be at least 1");
+  }
   terrain.close();
   return spec;
 }
@@ -362,7 +365,7 @@ SceneSpec parse_scene(const std::string& text, const fs::path& path,
   root.read_choice<Tracing>("tracing", Need::Optional, scene.tracing,
                             {{"fast", Tracing::Fast}, {"exact", Tracing::Exact}});
   if (auto terrain = root.map("terrain", Need::Required)) {
-    scene.terrain = read_terrain(std::move(*terrain), path);
+    scene.terrain = read_terrain(std::move(*terrain), path, faults);
   }
   if (auto platform = root.map("platform", Need::Required)) {
     scene.platform = read_platform(std::move(*platform), path, faults);

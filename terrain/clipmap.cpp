@@ -19,7 +19,7 @@ constexpr int part_cells =
     32;  // small enough that a snap builds little, large enough to trace well
 constexpr int unit_cells = unit_nodes * block_cells;
 constexpr int smallest_half = 2;       // units from the viewpoint to a window's side
-constexpr double bytes_per_cell = 40;  // measured: see docs/terrain.md
+constexpr double bytes_per_cell = 40;  // measured, of terrain without holes
 
 int ceil_div(int a, int b) { return (a + b - 1) / b; }
 

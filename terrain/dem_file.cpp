@@ -9,6 +9,7 @@
 #include <cstdint>
 #include <glm/common.hpp>
 #include <mutex>
+#include <set>
 #include <string_view>
 #include <utility>
 
@@ -62,17 +63,29 @@ std::string full_name(const std::filesystem::path& path) {
   return std::filesystem::absolute(path).lexically_normal().string();
 }
 
-// Returns a line for each file that the dataset is made of. Statistics and overviews are none of
-// them: viewers add them, and what else is written there shows in the header.
-std::string files_text(GDALDataset& dataset) {
-  std::string text;
+// Adds the files that a dataset is made of. GDAL names those of a mosaic, but not what mosaics in
+// it are made of. Statistics and overviews are none of them: viewers add them, and what else is
+// written there shows in the header.
+void add_files(GDALDataset& dataset, std::set<std::string>& names) {
   const CPLStringList files(dataset.GetFileList(), TRUE);
   for (int i = 0; i < files.size(); ++i) {
     const std::string_view name = files[i];
     if (name.ends_with(".aux.xml") || name.ends_with(".ovr")) continue;
+    if (!names.insert(files[i]).second || !name.ends_with(".vrt")) continue;
+    const GDALDatasetUniquePtr inner(GDALDataset::Open(files[i], GDAL_OF_RASTER));
+    if (inner) add_files(*inner, names);
+  }
+}
+
+// Returns a line for each file that the dataset is made of.
+std::string files_text(GDALDataset& dataset) {
+  std::set<std::string> names;
+  add_files(dataset, names);
+  std::string text;
+  for (const std::string& name : names) {
     VSIStatBufL state;
-    if (VSIStatL(files[i], &state) != 0) state = {};
-    text += fmt::format("file {} {} bytes, time {}.{:09}\n", full_name(files[i]), state.st_size,
+    if (VSIStatL(name.c_str(), &state) != 0) state = {};
+    text += fmt::format("file {} {} bytes, time {}.{:09}\n", full_name(name), state.st_size,
                         state.st_mtim.tv_sec, state.st_mtim.tv_nsec);
   }
   return text;

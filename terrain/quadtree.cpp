@@ -26,6 +26,11 @@ std::size_t count_of(glm::ivec2 size) {
 void check(const MeshBound& bound) {
   Violations broken("mesh bound");
   broken.unless(bound.tolerance_m >= 0, "tolerance_m = {} must be 0 or more", bound.tolerance_m);
+  for (int axis = 0; axis < 3; ++axis) {
+    broken.unless(std::isfinite(bound.low_m[axis]) && std::isfinite(bound.high_m[axis]),
+                  "the viewpoint is [{}, {}] m along axis {}, and must be finite",
+                  bound.low_m[axis], bound.high_m[axis], axis);
+  }
   broken.unless(bound.angle_rad >= 0 && std::isfinite(bound.angle_rad),
                 "angle_rad = {} must be 0 or more, and finite", bound.angle_rad);
   broken.throw_if_any();

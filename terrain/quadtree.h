@@ -62,10 +62,6 @@ struct Selection {
       return state[static_cast<std::size_t>(local.y) * static_cast<std::size_t>(size.x) +
                    static_cast<std::size_t>(local.x)];
     }
-    bool contains(glm::ivec2 node) const noexcept {
-      return node.x >= first.x && node.y >= first.y && node.x < first.x + size.x &&
-             node.y < first.y + size.y;
-    }
   };
   Lattice lattice;
   std::vector<Level> levels;

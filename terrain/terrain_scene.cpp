@@ -7,7 +7,7 @@
 namespace groundray {
 namespace {
 
-constexpr int leaf_cells = 8;
+constexpr int leaf_cells = Certificate::block_cells;
 
 struct Content {
   bool any = false;

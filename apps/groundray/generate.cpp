@@ -3,13 +3,13 @@
 #include <fmt/format.h>
 
 #include <chrono>
-#include <csignal>
 #include <cstdio>
 #include <optional>
 #include <utility>
 #include <vector>
 
 #include "apps/groundray/dataset.h"
+#include "apps/groundray/interruption.h"
 #include "apps/groundray/preview.h"
 #include "apps/groundray/world.h"
 #include "core/ply_io.h"
@@ -21,14 +21,6 @@ namespace groundray {
 namespace {
 
 using Clock = std::chrono::steady_clock;
-
-volatile std::sig_atomic_t stop_requested = 0;
-
-// The first signal asks for an orderly end, the second ends the process as usual.
-void stop_in_order(int signal) {
-  stop_requested = 1;
-  std::signal(signal, SIG_DFL);
-}
 
 struct Tally {
   std::uint64_t scans = 0;
@@ -124,10 +116,12 @@ void say(const World& world, const std::filesystem::path& out, const Tally& tall
 
 }  // namespace
 
-RunEnd generate(const std::filesystem::path& scene, const std::filesystem::path& out) {
-  std::signal(SIGINT, stop_in_order);
-  std::signal(SIGTERM, stop_in_order);
+void generate(const std::filesystem::path& scene, const std::filesystem::path& out) {
   const World world = load_world(scene);
+  if (world.terrain.whole() == nullptr) {
+    // Says what memory is too small before anything is written.
+    world.terrain.clipmap(sensor_box(world.lidars.front(), 0), world.reach_m);
+  }
   const Dataset dataset(out, world);
   const std::vector<Frame> frames = missing_frames(world, dataset);
   SceneFor scene_for(world);
@@ -135,7 +129,7 @@ RunEnd generate(const std::filesystem::path& scene, const std::filesystem::path&
   try {
     Progress progress(stderr, "scans", frames.size());
     for (const Frame& frame : frames) {
-      if (stop_requested != 0) break;
+      if (is_interrupted()) break;
       make_frame(world, dataset, frame, scene_for, tally);
       progress.update(tally.scans);
     }
@@ -145,11 +139,9 @@ RunEnd generate(const std::filesystem::path& scene, const std::filesystem::path&
   }
   dataset.record();
   if (tally.scans < frames.size()) {
-    fmt::print(stderr, "\ninterrupted; the same command goes on from here\n");
-    return RunEnd::Interrupted;
+    throw Interrupted{};
   }
   say(world, out, tally);
-  return RunEnd::Done;
 }
 
 }  // namespace groundray

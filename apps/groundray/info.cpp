@@ -39,8 +39,13 @@ void print_certificate(const DemFile& dem) {
     return;
   }
   const LevelSummary& root = certificate->levels().back();
-  fmt::print("certified yes, in {}: one cell for all of it is within {:.6g} m\n",
-             certificate->folder().string(), root.max_deviation_m);
+  fmt::print("certified yes, in {}: ", certificate->folder().string());
+  if (root.mixed > 0) {
+    fmt::print("it has holes; {} of {} blocks of 8 x 8 cells meet one\n",
+               certificate->levels().front().mixed, certificate->levels().front().nodes);
+  } else {
+    fmt::print("one cell for all of it is within {:.6g} m\n", root.max_deviation_m);
+  }
 }
 
 // What the header tells comes first: it may be all there is to tell of a DEM that cannot be traced.

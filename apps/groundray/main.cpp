@@ -9,6 +9,7 @@
 
 #include "apps/groundray/generate.h"
 #include "apps/groundray/info.h"
+#include "apps/groundray/interruption.h"
 #include "apps/groundray/terrain_commands.h"
 #include "core/error.h"
 
@@ -106,7 +107,8 @@ int run(int argc, char** argv) {
     groundray::mesh_terrain(file, dem_options, request, out);
     return done;
   }
-  return groundray::generate(scene, out) == groundray::RunEnd::Done ? done : interrupted;
+  groundray::generate(scene, out);
+  return done;
 }
 
 }  // namespace
@@ -114,8 +116,12 @@ int run(int argc, char** argv) {
 int main(int argc, char** argv) {
   std::signal(SIGXFSZ,
               SIG_IGN);  // a limit on file size is then an error of the write, with a message
+  groundray::catch_interruptions();
   try {
     return run(argc, argv);
+  } catch (const groundray::Interrupted&) {
+    fmt::print(stderr, "\ngroundray: interrupted; the same command goes on, or begins anew\n");
+    return interrupted;
   } catch (const std::bad_alloc&) {
     fmt::print(stderr,
                "groundray: there is not enough memory; `groundray info` tells how much a DEM or "

@@ -10,6 +10,7 @@
 #include <utility>
 
 #include "apps/groundray/certifying.h"
+#include "apps/groundray/interruption.h"
 #include "core/mesh_io.h"
 #include "terrain/certificate.h"
 #include "terrain/dem_file.h"
@@ -50,6 +51,7 @@ void mesh_terrain(const std::filesystem::path& path, const DemOptions& options,
   const MeshBound bound =
       bound_from(sensors, dem.grid.frame(), request.max_error_m, request.angle_rad);
   const TriangleMesh mesh = place(build_terrain_mesh(dem.grid, bound), dem.grid);
+  stop_if_interrupted();
   write_mesh(out, mesh, {dem.origin_w_m, dem.crs_name, dem.crs_wkt});
   print_mesh(mesh, dem.grid);
   fmt::print("written to {}\n", out.string());

@@ -3,7 +3,9 @@
 import os
 import re
 import shutil
+import signal
 import subprocess
+import time
 from pathlib import Path
 
 import numpy as np
@@ -174,3 +176,57 @@ def test_mesh_says_how_it_is_used(tmp_path, arguments):
     said = groundray("terrain", "mesh", JACKSBORO, *arguments, cwd=tmp_path)
     assert said.returncode == 2
     assert not list(tmp_path.iterdir())
+
+
+def test_mesh_needs_a_viewpoint_that_is_somewhere(tmp_path):
+    result = groundray(
+        *("terrain", "mesh", JACKSBORO, "-o", tmp_path / "m.ply", "--max-error-m", 5),
+        *("--viewpoint", "nan,0,0", "--angle-mrad", 1),
+    )
+    assert result.returncode == 1
+    assert "must be finite" in result.stderr
+    assert not list(tmp_path.iterdir())
+
+
+def test_sparse_dem_far_from_the_sensor_is_traced(tmp_path):
+    """None of the few heights is a sample of the coarse levels that reach them."""
+    heights = np.full((400, 400), -9999.0)
+    heights[377:384, 377:384] = 50
+    grid = tmp_path / "island.asc"
+    header = "ncols 400\nnrows 400\nxllcorner 429400\nyllcorner 5150400\ncellsize 1\n"
+    with grid.open("w") as file:
+        file.write(header + "NODATA_value -9999\n")
+        np.savetxt(file, heights, fmt="%g")
+    dem = tmp_path / "island.tif"
+    subprocess.run(["gdal_translate", "-q", "-a_srs", "EPSG:32611", grid, dem], check=True)
+    (tmp_path / "path.tum").write_text("".join(f"{t} 429410 5150790 60 0 0 0 1\n" for t in (0, 10)))
+    text = SCENE.replace("DEM", str(dem)).replace("DETAIL", "memory_mib: 1")
+    driven = text[text.index("platform:") : text.index("lidars:")]
+    text = text.replace(driven, "platform: {trajectory: path.tum}\n")
+    (tmp_path / "scene.yaml").write_text(text)
+    result = groundray("generate", tmp_path / "scene.yaml", "-o", tmp_path / "out")
+    assert result.returncode == 0, result.stderr
+
+
+def test_interrupted_certification_leaves_nothing(tmp_path):
+    vrt = tmp_path / "big.vrt"
+    subprocess.run(
+        ["python3", ROOT / "test/benchmark/make_big_vrt.py", PRAIRIE, "24", vrt], check=True
+    )
+    process = subprocess.Popen(
+        [PROGRAM, "terrain", "certify", vrt], stderr=subprocess.PIPE, text=True
+    )
+    while not list(tmp_path.glob("*.part")) and process.poll() is None:
+        time.sleep(0.01)
+    process.send_signal(signal.SIGINT)
+    assert process.wait(timeout=60) == 130, process.stderr.read()
+    assert list(tmp_path.iterdir()) == [vrt]
+
+
+def test_memory_that_is_too_small_is_refused_before_anything_is_written(tmp_path, dem):
+    text = SCENE.replace("DEM", str(dem)).replace("DETAIL", "memory_mib: 0")
+    (tmp_path / "scene.yaml").write_text(text)
+    result = groundray("generate", tmp_path / "scene.yaml", "-o", tmp_path / "out")
+    assert result.returncode == 1
+    assert "must be at least 1" in result.stderr
+    assert not (tmp_path / "out").exists()

@@ -76,6 +76,15 @@ HeightGrid with_holes(const HeightGrid& grid, int count, int radius, Seed seed) 
   return {{grid.columns(), grid.rows()}, grid.origin_m(), grid.step_m(), std::move(heights)};
 }
 
+HeightGrid with_missing_samples(const HeightGrid& grid, double share, Seed seed) {
+  std::vector<float> heights(grid.heights_m().begin(), grid.heights_m().end());
+  for (std::size_t i = 0; i < heights.size(); ++i) {
+    if (random_uniform({seed, 0, 0, static_cast<std::uint32_t>(i)}).x < share)
+      heights[i] = std::numeric_limits<float>::quiet_NaN();
+  }
+  return {{grid.columns(), grid.rows()}, grid.origin_m(), grid.step_m(), std::move(heights)};
+}
+
 std::vector<Ray> random_rays(const HeightGrid& grid, std::size_t count, Seed seed) {
   const glm::dvec2 extent_m = glm::dvec2(grid.columns() - 1, grid.rows() - 1) * grid.step_m();
   std::vector<Ray> rays(count);

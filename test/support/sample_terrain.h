@@ -18,6 +18,9 @@ HeightGrid fractal(int samples, double step_m, double relief_m, Seed seed);
 /// The grid with round holes of up to `radius` samples and single missing samples.
 HeightGrid with_holes(const HeightGrid& grid, int count, int radius, Seed seed);
 
+/// The same heights, but each missing with a probability of `share`, whatever its neighbours.
+HeightGrid with_missing_samples(const HeightGrid& grid, double share, Seed seed);
+
 /// Rays that start up to 300 m above the surface, a few outside the grid, and look everywhere, most
 /// of them down.
 std::vector<Ray> random_rays(const HeightGrid& grid, std::size_t count, Seed seed);

@@ -1,6 +1,7 @@
 #include "test/support/shuffled_runner.h"
 
 #include <tbb/global_control.h>
+#include <tbb/task_arena.h>
 
 #include <algorithm>
 #include <cstdint>
@@ -27,7 +28,8 @@ PassRunner threaded_runner(int count) {
   return [count](std::size_t size, const auto& work) {
     const tbb::global_control limit(tbb::global_control::max_allowed_parallelism,
                                     static_cast<std::size_t>(count));
-    run_in_parallel(size, work);
+    tbb::task_arena arena(count);  // of so many threads, whatever the processor has
+    arena.execute([&] { run_in_parallel(size, work); });
   };
 }
 

@@ -1,5 +1,6 @@
 #include "terrain/certificate.h"
 
+#include <fmt/format.h>
 #include <gdal.h>
 #include <gmock/gmock.h>
 #include <gtest/gtest.h>
@@ -339,6 +340,19 @@ TEST_F(CertificateTest, IsMadeAnewWhenTheDemHasChanged) {
   testing::save_geotiff(other, path_);
   expect_certifies(certificate(), other, "changed");
   EXPECT_EQ(made_, 3);
+}
+
+TEST_F(CertificateTest, IsMadeAnewWhenAFileOfAMosaicOfMosaicsHasChanged) {
+  const auto inner = path_.parent_path() / "inner.vrt";
+  const auto outer = path_.parent_path() / "outer.vrt";
+  for (const auto& [from, to] : {std::pair(path_, inner), std::pair(inner, outer)}) {
+    const std::string command = fmt::format("gdalbuildvrt -q {} {}", to.string(), from.string());
+    ASSERT_EQ(std::system(command.c_str()), 0);
+  }
+  const std::string before = DemFile(outer).fingerprint();
+  EXPECT_EQ(DemFile(outer).fingerprint(), before);
+  std::filesystem::last_write_time(path_, std::filesystem::file_time_type::clock::now());
+  EXPECT_NE(DemFile(outer).fingerprint(), before);
 }
 
 TEST_F(CertificateTest, OtherOptionsHaveACertificateOfTheirOwn) {

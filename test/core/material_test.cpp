@@ -1,0 +1,94 @@
+#include "core/material.h"
+
+#include <gmock/gmock.h>
+#include <gtest/gtest.h>
+
+#include <cmath>
+#include <limits>
+#include <numbers>
+
+#include "core/error.h"
+
+namespace groundray {
+namespace {
+
+using ::testing::AllOf;
+using ::testing::HasSubstr;
+using ::testing::ThrowsMessage;
+
+constexpr double pi = std::numbers::pi;
+constexpr double epsilon = std::numeric_limits<double>::epsilon();
+
+Material lambertian(std::vector<SpectrumSample> spectrum) {
+  return {.name = "clay", .reflection = Lambertian{std::move(spectrum)}};
+}
+
+// What leaves a Lambertian surface over the hemisphere, per watt that meets it, is the integral of
+// f_r cos over solid angle: the reflectance, whatever the code takes f_r to be.
+TEST(Material, LambertianSendsItsReflectanceIntoTheHemisphere) {
+  constexpr int rings = 1000;
+  constexpr double step_rad = pi / 2 / rings;
+  // The midpoint rule errs by step^2 / 24 (pi / 2) times 4, the bound of the second derivative of
+  // the integrand, sin(2 theta).
+  constexpr double tolerance = step_rad * step_rad * pi / 12;
+  for (const double reflectance : {0., 0.1, 0.37, 1.}) {
+    const RetroBrdf brdf = retro_brdf(lambertian({{905, reflectance}}), 905);
+    double sum = 0;
+    for (int i = 0; i < rings; ++i) {
+      const double theta = (i + 0.5) * step_rad;
+      sum += retro_brdf_cos(brdf, std::cos(theta)) * 2 * pi * std::sin(theta) * step_rad;
+    }
+    EXPECT_NEAR(sum, reflectance, tolerance);
+  }
+}
+
+// Intensity I = R_A E A of a sheet of area A in a beam of cross-section a = A cos, illuminance
+// E = flux / a, where R_A falls with the cosine: so a watt of light brings back R_A watts per sr.
+TEST(Material, RetroReflectorReturnsItsCoefficientForEachWattWhateverTheIncidence) {
+  constexpr double coefficient = 250, flux_w = 3, area_m2 = 0.2;
+  const Material sheet{.name = "sheet", .reflection = RetroReflector{coefficient}};
+  for (const double incidence_rad : {0., 0.3, 1.2}) {
+    const double cosine = std::cos(incidence_rad);
+    const double illuminance = flux_w / (area_m2 * cosine);
+    const double intensity = coefficient * cosine * illuminance * area_m2;
+    EXPECT_NEAR(flux_w * retro_brdf_cos(retro_brdf(sheet, 1550), cosine), intensity,
+                8 * epsilon * intensity);  // six roundings
+  }
+}
+
+TEST(Material, SpectrumIsLinearBetweenItsSamples) {
+  const Material material = lambertian({{500, 0.1}, {600, 0.3}, {1000, 0.2}});
+  for (const auto& [wavelength_nm, reflectance] :
+       {SpectrumSample{500, 0.1}, SpectrumSample{525, 0.15}, SpectrumSample{600, 0.3},
+        SpectrumSample{900, 0.225}, SpectrumSample{1000, 0.2}}) {
+    EXPECT_NEAR(retro_brdf(material, wavelength_nm).diffuse_per_sr * pi, reflectance, 4 * epsilon);
+  }
+}
+
+TEST(Material, SpectrumIsNotExtrapolated) {
+  const Material material = lambertian({{500, 0.1}, {1000, 0.2}});
+  EXPECT_THAT([&] { retro_brdf(material, 1550); },
+              ThrowsMessage<Error>("Material 'clay': the spectrum reaches from 500 to 1000 nm, but "
+                                   "not to 1550 nm"));
+  EXPECT_THROW(retro_brdf(material, 499.9), Error);
+  EXPECT_THROW(retro_brdf(material, std::numeric_limits<double>::quiet_NaN()), Error);
+}
+
+TEST(Material, ErrorListsEveryFault) {
+  EXPECT_THAT(
+      [] {
+        check_material(lambertian({{500, 10}, {500, 0.2}, {-1, 0.2}}));
+      },
+      ThrowsMessage<Error>(
+          AllOf(HasSubstr("Material 'clay':"),
+                HasSubstr("spectrum[0].reflectance = 10 must be in [0, 1]: is it in percent?"),
+                HasSubstr("spectrum[1].wavelength_nm = 500 must be greater"),
+                HasSubstr("spectrum[2].wavelength_nm = -1 must be positive"))));
+  EXPECT_THAT([] { check_material(lambertian({})); },
+              ThrowsMessage<Error>(HasSubstr("at least one sample")));
+  EXPECT_THAT([] { check_material({.name = "sheet", .reflection = RetroReflector{0}}); },
+              ThrowsMessage<Error>(HasSubstr("coefficient_cd_lx_m2 = 0 must be positive")));
+}
+
+}  // namespace
+}  // namespace groundray
