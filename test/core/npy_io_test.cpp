@@ -21,7 +21,8 @@ TEST(WriteNpy, GivesTheBytesThatNumpyGives) {
   std::string expected = "\x93NUMPY";
   expected += std::string("\x01\x00\x76\x00", 4);
   expected += "{'descr': '<f4', 'fortran_order': False, 'shape': (3,), }";
-  expected += std::string(60, ' ') + "\n";
+  expected.append(60, ' ');
+  expected += '\n';
   expected.append(reinterpret_cast<const char*>(values.data()), sizeof values);
   EXPECT_EQ(read_text(path), expected);
 }
