@@ -93,11 +93,13 @@ MeshBound random_viewpoint(const HeightGrid& grid, std::uint32_t number) {
     return random_uniform({.seed = Seed{77}, .sensor = number, .frame = of});
   };
   const glm::dvec2 extent_m = glm::dvec2(grid.columns() - 1, grid.rows() - 1) * grid.step_m();
-  const double relief_m = grid.max_height_m() - grid.min_height_m();
+  const bool holes_only = !std::isfinite(grid.min_height_m());
+  const double floor_m = holes_only ? 0 : grid.min_height_m();
+  const double relief_m = holes_only ? 1 : grid.max_height_m() - floor_m;
   const glm::dvec2 place = (uniform(0) * 1.4 - 0.2) * glm::abs(extent_m);
   const double up = uniform(1).x;
   MeshBound bound;
-  bound.low_m = {place, grid.min_height_m() + relief_m * (up * up * 3 - 0.5)};
+  bound.low_m = {place, floor_m + relief_m * (up * up * 3 - 0.5)};
   bound.high_m = bound.low_m;
   if (number % 4 == 3) bound.high_m += 0.2 * glm::dvec3(uniform(2) * glm::abs(extent_m), relief_m);
   bound.angle_rad = std::pow(10.0, -4 + 2 * uniform(3).x);
