@@ -12,7 +12,13 @@ struct Seed {
 };
 
 /// What a random number is for. Each stream of a pulse is independent of the others.
-enum class RandomStream : std::uint32_t { RangeNoise = 0, EchoNoise, FalseAlarm };
+enum class RandomStream : std::uint32_t {
+  RangeNoise = 0,
+  EchoNoise,
+  FalseAlarm,
+  BeamTurn,
+  AngularJitter
+};
 
 /// Names one random block: equal keys give equal numbers on any thread, in any order.
 struct RandomKey {

@@ -1,270 +1,443 @@
 #include "sensors/lidar.h"
 
 #include <tbb/concurrent_queue.h>
+#include <tbb/parallel_for.h>
 #include <tbb/parallel_pipeline.h>
 #include <tbb/task_arena.h>
 
 #include <algorithm>
 #include <cmath>
 #include <glm/geometric.hpp>
-#include <glm/gtc/quaternion.hpp>
-#include <glm/mat3x3.hpp>
 #include <limits>
-#include <span>
-#include <vector>
 
 #include "core/error.h"
+#include "sensors/pulse_cast.h"
+#include "sensors/scan_columns.h"
 
 namespace groundray {
 namespace {
 
-constexpr std::size_t chunk_pulses =
-    4096;  // traced at once by a thread; a multiple of every packet width
+constexpr std::size_t chunk_rays = 2048;  // traced at once by a thread
+constexpr std::int64_t convergence_stride = 64;
+constexpr double nan = std::numeric_limits<double>::quiet_NaN();
 
-// What a row says, besides what holds for all.
-struct Echo {
-  double range_m;
-  glm::dvec3 p_DQ;
-  glm::vec3 p_SQ;
-  glm::vec3 normal;
-  float cos_incidence;
-  float sin_incidence;
-  float time_s;
-  std::uint16_t ring;
-  float deviation_m;
-};
-
-// What the echoes of one volley share.
-struct HeadPose {
-  double cos_spin, sin_spin;
-  glm::dmat3 R_DH;
-  glm::dvec3 p_DS;
-  float time_s;
-};
-
-std::chrono::nanoseconds to_nanoseconds(double seconds) {
-  return std::chrono::nanoseconds(std::llround(seconds * 1e9));
+SweepPath path_of(const ScanPattern& pattern, const Trajectory& X_DS, std::int64_t number) {
+  const std::chrono::nanoseconds stamp = pattern.stamp(number);
+  const std::chrono::nanoseconds end = pattern.last_firing(number);
+  if (stamp < X_DS.begin_time() || X_DS.end_time() < end) {
+    throw Error(
+        "lidar: sweep {} fires from {:.6f} s to {:.6f} s but the sensor's trajectory covers "
+        "[{:.6f}, {:.6f}] s",
+        number, 1e-9 * static_cast<double>(stamp.count()), 1e-9 * static_cast<double>(end.count()),
+        1e-9 * static_cast<double>(X_DS.begin_time().count()),
+        1e-9 * static_cast<double>(X_DS.end_time().count()));
+  }
+  return {pattern, X_DS, number, stamp};
 }
 
-// One sweep being made. Chunks of firing sequences are independent of each other and of the order
-// in which they are cast.
-class Sweep {
+// Pulses in a chunk: whole firing sequences, where these are short.
+std::int64_t pulses_per_chunk(const ScanPattern& pattern, std::size_t sub_rays) {
+  const auto most = static_cast<std::int64_t>(std::max<std::size_t>(chunk_rays / sub_rays, 16));
+  const std::int64_t stride = pattern.neighbour_stride();
+  return stride < most ? most / stride * stride : most;
+}
+
+BeamSpec with_one_level_more(BeamSpec beam) {
+  if (beam.sub_rays > 1 && beam.most_sub_rays < LaserBeam::sub_ray_limit) beam.most_sub_rays *= 2;
+  return beam;
+}
+
+std::optional<Light> light_of(const std::optional<LightSpec>& spec, const AtmosphereSpec& air,
+                              const RangeGate& gate) {
+  if (!spec) return std::nullopt;
+  return Light(*spec, air, gate);
+}
+
+std::optional<LightSpec> without_noise(std::optional<LightSpec> spec) {
+  if (spec && spec->receiver.noise) {
+    if (spec->receiver.threshold_w == 0)
+      spec->receiver.threshold_w = std::numeric_limits<double>::min();
+    spec->receiver.noise.reset();
+  }
+  return spec;
+}
+
+void check(const LidarSpec& spec) {
+  Violations broken(spec.model.empty() ? "lidar" : spec.model);
+  const RangeGate& gate = spec.gate;
+  broken.unless(gate.near_m >= 0 && gate.near_m < gate.far_m,
+                "range gate [{}, {}] m is empty or begins below 0: are near and far swapped?",
+                gate.near_m, gate.far_m);
+  broken.unless(spec.range_noise_sigma_m >= 0 && std::isfinite(spec.range_noise_sigma_m),
+                "range noise of {} m must be finite and not negative", spec.range_noise_sigma_m);
+  broken.unless(spec.angular_jitter_rad >= 0 && std::isfinite(spec.angular_jitter_rad),
+                "angular jitter of {} rad must be finite and not negative",
+                spec.angular_jitter_rad);
+  broken.unless(spec.light || spec.beam.sub_rays == 1,
+                "beam: {} sub-rays need light: only energy tells which of them make an echo",
+                spec.beam.sub_rays);
+  broken.unless(spec.light || spec.waveforms == LidarSpec::WaveformOutput::Omit,
+                "waveforms need light");
+  broken.throw_if_any();
+}
+
+// A row of a scan with light.
+struct LightRow {
+  EchoRow row;
+  Echo echo;
+};
+
+}  // namespace
+
+// A few pulses on their way through the pipeline. Its buffers are used again and again.
+struct Lidar::Chunk {
+  std::int64_t begin = 0, end = 0;  // pulses of the sweep
+  std::size_t rows = 0;             // how many echoes they have
+  std::size_t first_row = 0;
+  PulseCast cast;
+  std::vector<double> bounds_m;  // of all hits, if somebody asked
+  // With light alone:
+  Light::Workspace work;
+  std::vector<LightRow> light_rows;
+  std::vector<WaveformRun> runs;
+  std::vector<float> power_w;
+  Convergence convergence;
+  std::vector<Ray> rays_again;
+  std::vector<Hit> hits_again;
+
+  struct Missed {
+    std::uint32_t pulse;  // in the chunk
+    NoReturn reason;
+  };
+  std::vector<Missed> missed;
+};
+
+// One sweep being made.
+class Lidar::Sweep {
  public:
-  Sweep(const ScanPattern& pattern, const Trajectory& X_DS, std::int64_t number)
-      : pattern_(pattern),
-        X_DS_(X_DS),
-        first_(pattern.first_sequence(number)),
-        sequences_(static_cast<std::size_t>(pattern.first_sequence(number + 1) - first_)),
-        stamp_(pattern.stamp(number)) {
-    if (stamp_ < X_DS.begin_time() || X_DS.end_time() < pattern.last_firing(number)) {
-      throw Error(
-          "lidar: sweep {} fires from {:.6f} s to {:.6f} s but the sensor's trajectory covers "
-          "[{:.6f}, {:.6f}] s",
-          number, 1e-9 * static_cast<double>(stamp_.count()),
-          1e-9 * static_cast<double>(pattern.last_firing(number).count()),
-          1e-9 * static_cast<double>(X_DS.begin_time().count()),
-          1e-9 * static_cast<double>(X_DS.end_time().count()));
+  Sweep(const Lidar& lidar, const Scene& scene, const Trajectory& X_DS, std::int64_t number,
+        const RandomKey& key)
+      : lidar_(lidar),
+        spec_(lidar.spec_),
+        scene_(scene),
+        path_(path_of(lidar.pattern_, X_DS, number)),
+        key_(key),
+        pulses_(lidar.pattern_.pulses(number)),
+        settings_{lidar.beam_, lidar.last_level_, lidar.light_ ? lidar.light_->resolution_m() : 0,
+                  spec_.angular_jitter_rad,
+                  spec_.no_returns == LidarSpec::NoReturns::Report
+                      ? std::numeric_limits<double>::infinity()
+                      : spec_.gate.far_m + (lidar.light_ ? lidar.light_->resolution_m() : 0)} {
+    if (lidar.light_) {
+      brdf_ = retro_brdf(scene.materials.at(scene.terrain.material),
+                         lidar.light_->spec().wavelength_nm);
     }
+    if (spec_.points == LidarSpec::Points::AtStamp) X_SD_ = inverse(X_DS.pose_at(path_.stamp));
   }
 
-  std::size_t sequences() const { return sequences_; }
-
-  HeadPose head(std::size_t sequence, const ScanPattern::Volley& volley) const {
-    const double time_s =
-        pattern_.firing_time_s(first_ + static_cast<std::int64_t>(sequence), volley);
-    const std::chrono::nanoseconds time = to_nanoseconds(time_s);
-    const Pose X_DS = X_DS_.pose_at(time);
-    const double spin_rad = pattern_.spin_rad(time_s);
-    const double cosine = std::cos(spin_rad);
-    const double sine = std::sin(spin_rad);
-    const glm::dmat3 R_DS = glm::mat3_cast(X_DS.rotation);
-    return {cosine,
-            sine,
-            {R_DS[0] * cosine + R_DS[1] * sine, R_DS[1] * cosine - R_DS[0] * sine, R_DS[2]},
-            X_DS.translation_m,
-            static_cast<float>(1e-9 * static_cast<double>((time - stamp_).count()))};
-  }
+  LidarScan run();
 
  private:
-  const ScanPattern& pattern_;
-  const Trajectory& X_DS_;
-  std::int64_t first_;
-  std::size_t sequences_;
-  std::chrono::nanoseconds stamp_;
-};
-
-// The columns of a scan, to be filled row by row.
-struct Rows {
-  Rows(PointCloud& cloud, LidarSpec::ErrorBound with)
-      : x(cloud.add<float>("x")),
-        y(cloud.add<float>("y")),
-        z(cloud.add<float>("z")),
-        intensity(cloud.add<float>("intensity")),
-        time_s(cloud.add<float>("time")),
-        ring(cloud.add<std::uint16_t>("ring")),
-        return_index(cloud.add<std::uint8_t>("return_index")),
-        return_count(cloud.add<std::uint8_t>("return_count")),
-        world_x(cloud.add<double>("world_x")),
-        world_y(cloud.add<double>("world_y")),
-        world_z(cloud.add<double>("world_z")),
-        range_true(cloud.add<double>("range_true")),
-        nx(cloud.add<float>("nx")),
-        ny(cloud.add<float>("ny")),
-        nz(cloud.add<float>("nz")),
-        incidence(cloud.add<float>("incidence")),
-        label(cloud.add<std::uint16_t>("label")),
-        instance(cloud.add<std::uint32_t>("instance")),
-        error_estimate(cloud.add<float>("error_estimate")) {
-    if (with == LidarSpec::ErrorBound::Report) error_bound = cloud.add<float>("error_bound");
+  template <typename Finish>
+  void stream(const Finish& finish);
+  bool returns(const Hit& hit) const {
+    return hit && spec_.gate.near_m <= hit.range_m && hit.range_m <= spec_.gate.far_m;
   }
-
-  void write(std::size_t row, const Echo& echo, const SurfaceTruth& surface) const {
-    x[row] = echo.p_SQ.x;
-    y[row] = echo.p_SQ.y;
-    z[row] = echo.p_SQ.z;
-    intensity[row] = echo.cos_incidence;
-    time_s[row] = echo.time_s;
-    ring[row] = echo.ring;
-    return_index[row] = 1;
-    return_count[row] = 1;
-    world_x[row] = echo.p_DQ.x;
-    world_y[row] = echo.p_DQ.y;
-    world_z[row] = echo.p_DQ.z;
-    range_true[row] = echo.range_m;
-    nx[row] = echo.normal.x;
-    ny[row] = echo.normal.y;
-    nz[row] = echo.normal.z;
-    incidence[row] = std::atan2(echo.sin_incidence, echo.cos_incidence);
-    label[row] = surface.label;
-    instance[row] = surface.instance;
-    // The surface may be this much higher or lower; along the beam that is this much.
-    error_estimate[row] =
-        echo.deviation_m == 0 ? 0 : echo.deviation_m * echo.normal.z / echo.cos_incidence;
+  RandomKey key_of(std::int64_t pulse) const {
+    RandomKey key = key_;
+    key.pulse = static_cast<std::uint32_t>(pulse);
+    return key;
   }
+  void measure(Chunk& chunk) const;
+  void measure_rays(Chunk& chunk) const;
+  void measure_light(Chunk& chunk) const;
+  void keep_waveform(std::uint32_t pulse, Chunk& chunk) const;
+  void compare(std::size_t pulse, Chunk& chunk) const;
+  void place(Chunk& chunk);
+  void write(const Chunk& chunk, const ScanColumns& columns) const;
+  void add_rows(std::size_t pulse, Chunk& chunk) const;
+  void write_light();
+  EchoRow row_of(const Echo& echo, const PulseCast& cast, std::size_t pulse,
+                 double reported_m) const;
+  glm::vec3 reported_point(const PulseCast& cast, std::size_t pulse, double reported_m) const;
+  PointCloud no_returns() const;
 
-  std::span<float> x, y, z, intensity, time_s;
-  std::span<std::uint16_t> ring;
-  std::span<std::uint8_t> return_index, return_count;
-  std::span<double> world_x, world_y, world_z, range_true;
-  std::span<float> nx, ny, nz, incidence;
-  std::span<std::uint16_t> label;
-  std::span<std::uint32_t> instance;
-  std::span<float> error_estimate;
-  std::span<float> error_bound;  // empty if nobody asked
+  const Lidar& lidar_;
+  const LidarSpec& spec_;
+  const Scene& scene_;
+  SweepPath path_;
+  RandomKey key_;
+  std::int64_t pulses_;
+  PulseCast::Settings settings_;
+  RetroBrdf brdf_;
+  Pose X_SD_;
+
+  // Filled in firing order:
+  std::size_t next_row_ = 0;
+  std::vector<LightRow> light_rows_;
+  LidarScan scan_;
+  struct MissedPulse {
+    std::uint32_t pulse;
+    float time_s;
+    std::uint16_t ring;
+    glm::vec3 direction;
+    NoReturn reason;
+  };
+  std::vector<MissedPulse> missed_;
 };
 
-// A few firing sequences on their way through the pipeline. Its buffers are used again and again.
-struct Chunk {
-  std::size_t begin = 0;  // first sequence, of the sweep
-  std::size_t count = 0;
-  std::size_t echoes = 0;  // how many of its pulses return
-  std::size_t first_row = 0;
-  std::vector<HeadPose> heads;  // by sequence and volley
-  std::vector<Ray> rays;        // by shot and sequence: neighbours in azimuth make alike packets
-  std::vector<Hit> hits;
-  std::vector<double> bounds_m;  // of the hits' ranges, if somebody asked
-};
+void Lidar::Sweep::measure(Chunk& chunk) const {
+  chunk.cast.cast(path_, chunk.begin, chunk.end, settings_, key_, scene_.rays);
+  if (spec_.error_bound == LidarSpec::ErrorBound::Report) {
+    chunk.bounds_m.resize(chunk.cast.all_rays().size());
+    scene_.rays.bound_errors(chunk.cast.all_rays(), chunk.cast.all_hits(), chunk.bounds_m);
+  }
+  chunk.missed.clear();
+  lidar_.light_ ? measure_light(chunk) : measure_rays(chunk);
+}
 
-// Calls `act(sequence in the chunk, shot, head)` for every pulse of a chunk, in firing order.
-template <typename Act>
-void for_each_pulse(const ScanPattern& pattern, const Chunk& chunk, const Act& act) {
-  const auto volleys = pattern.volleys();
-  for (std::size_t k = 0; k < chunk.count; ++k) {
-    for (std::size_t v = 0; v < volleys.size(); ++v) {
-      const HeadPose& head = chunk.heads[k * volleys.size() + v];
-      for (int shot = volleys[v].begin; shot < volleys[v].end; ++shot) {
-        act(k, static_cast<std::size_t>(shot), head);
-      }
-    }
+void Lidar::Sweep::measure_rays(Chunk& chunk) const {
+  const auto hits = chunk.cast.all_hits();
+  chunk.rows = static_cast<std::size_t>(
+      std::ranges::count_if(hits, [this](const Hit& hit) { return returns(hit); }));
+  if (spec_.no_returns == LidarSpec::NoReturns::Omit) return;
+  for (std::uint32_t i = 0; i < chunk.cast.size(); ++i) {
+    const Hit& hit = hits[chunk.cast.range(i).first];
+    if (!returns(hit)) chunk.missed.push_back({i, hit ? NoReturn::OutOfGate : NoReturn::Sky});
   }
 }
 
-void cast(const Sweep& sweep, const ScanPattern& pattern, const RayTracer& tracer, double far_m,
-          Chunk& chunk) {
-  const auto shots = pattern.shots();
-  chunk.heads.clear();
-  for (std::size_t k = 0; k < chunk.count; ++k) {
-    for (const ScanPattern::Volley& volley : pattern.volleys()) {
-      chunk.heads.push_back(sweep.head(chunk.begin + k, volley));
-    }
+void Lidar::Sweep::measure_light(Chunk& chunk) const {
+  chunk.light_rows.clear();
+  chunk.runs.clear();
+  chunk.power_w.clear();
+  chunk.convergence = {};
+  const PulseCast& cast = chunk.cast;
+  for (std::uint32_t i = 0; i < cast.size(); ++i) {
+    const std::int64_t pulse = chunk.begin + i;
+    const auto bounds_m =
+        chunk.bounds_m.empty()
+            ? std::span<const double>()
+            : std::span(chunk.bounds_m).subspan(cast.range(i).first, cast.range(i).count);
+    lidar_.light_->receive(cast.rays(i), cast.hits(i), bounds_m, brdf_, key_of(pulse), chunk.work);
+    add_rows(i, chunk);
+    if (chunk.work.echoes.empty()) chunk.missed.push_back({i, chunk.work.reason});
+    if (spec_.waveforms == LidarSpec::WaveformOutput::Keep) keep_waveform(i, chunk);
+    if (pulse % convergence_stride == 0) compare(i, chunk);
   }
-  chunk.rays.resize(chunk.count * shots.size());
-  chunk.hits.resize(chunk.rays.size());
-  const auto volleys = pattern.volleys();
-  auto* ray = chunk.rays.data();
-  for (std::size_t v = 0; v < volleys.size(); ++v) {
-    for (int shot = volleys[v].begin; shot < volleys[v].end; ++shot) {
-      const auto& [direction, origin_m, ring] = shots[static_cast<std::size_t>(shot)];
-      const bool central = origin_m == glm::dvec3(0);
-      for (std::size_t k = 0; k < chunk.count; ++k) {
-        const HeadPose& head = chunk.heads[k * volleys.size() + v];
-        *ray++ = {central ? head.p_DS : head.p_DS + head.R_DH * origin_m, head.R_DH * direction,
-                  far_m};
-      }
-    }
-  }
-  tracer.trace(chunk.rays, chunk.hits);
 }
 
-float rounded_up(double value) {
-  const auto nearest = static_cast<float>(value);
-  return nearest < value ? std::nextafter(nearest, std::numeric_limits<float>::infinity())
-                         : nearest;
+void Lidar::Sweep::keep_waveform(std::uint32_t pulse, Chunk& chunk) const {
+  const Waveform& waveform = chunk.work.waveform;
+  for (const Waveform::Segment& segment : waveform.segments()) {
+    const auto power_w = waveform.power_w(segment);
+    chunk.runs.push_back({static_cast<std::uint32_t>(chunk.begin) + pulse,
+                          static_cast<std::uint32_t>(power_w.size()), chunk.power_w.size(),
+                          static_cast<double>(segment.bins.begin) * waveform.interval_s()});
+    chunk.power_w.insert(chunk.power_w.end(), power_w.begin(), power_w.end());
+  }
 }
 
-// Writes the echoes of a chunk, in firing order.
-void write(const ScanPattern& pattern, double near_m, double range_noise_sigma_m,
-           const RandomKey& sweep_key, const SurfaceTruth& surface, const Chunk& chunk,
-           const Rows& rows) {
-  const auto shots = pattern.shots();
+// Looks at what twice the sub-rays would have given, both without noise.
+void Lidar::Sweep::compare(std::size_t pulse, Chunk& chunk) const {
+  const PulseCast& cast = chunk.cast;
+  const int finer = cast.range(pulse).level + 1;
+  if (finer >= lidar_.beam_.levels()) return;
+  const Light& light = *lidar_.quiet_light_;
+  Light::Workspace& work = chunk.work;
+  light.receive(cast.rays(pulse), cast.hits(pulse), {}, brdf_, key_, work);
+  const std::size_t echoes = work.echoes.size();
+  const double first_m = echoes == 0 ? 0 : work.echoes[0].detection.range_m;
+  cast.cast_again(pulse, finer, lidar_.beam_, key_, scene_.rays, chunk.rays_again,
+                  chunk.hits_again);
+  light.receive(chunk.rays_again, chunk.hits_again, {}, brdf_, key_, work);
+  Convergence& seen = chunk.convergence;
+  ++seen.pulses;
+  if (work.echoes.size() != echoes) {
+    ++seen.changed;
+  } else if (echoes > 0) {
+    const double difference_m = std::abs(work.echoes[0].detection.range_m - first_m);
+    ++seen.compared;
+    seen.sum_squares_m2 += difference_m * difference_m;
+    seen.largest_m = std::max(seen.largest_m, difference_m);
+  }
+}
+
+// Runs for one chunk after the other, in firing order.
+void Lidar::Sweep::place(Chunk& chunk) {
+  chunk.first_row = next_row_;
+  next_row_ += chunk.rows;
+  light_rows_.insert(light_rows_.end(), chunk.light_rows.begin(), chunk.light_rows.end());
+  const PulseCast& cast = chunk.cast;
+  if (spec_.no_returns == LidarSpec::NoReturns::Report) {
+    for (const Chunk::Missed& missed : chunk.missed) {
+      missed_.push_back({static_cast<std::uint32_t>(chunk.begin) + missed.pulse,
+                         cast.pose(missed.pulse).time_s, cast.pulses().ring[missed.pulse],
+                         glm::vec3(cast.axis(missed.pulse).direction), missed.reason});
+    }
+  }
+  Waveforms& waveforms = scan_.waveforms;
+  for (WaveformRun run : chunk.runs) {
+    run.first_sample += waveforms.power_w.size();
+    waveforms.runs.push_back(run);
+  }
+  waveforms.power_w.insert(waveforms.power_w.end(), chunk.power_w.begin(), chunk.power_w.end());
+  Convergence& all = scan_.convergence;
+  all.pulses += chunk.convergence.pulses;
+  all.changed += chunk.convergence.changed;
+  all.compared += chunk.convergence.compared;
+  all.sum_squares_m2 += chunk.convergence.sum_squares_m2;
+  all.largest_m = std::max(all.largest_m, chunk.convergence.largest_m);
+}
+
+// Where the sensor says that it met something. It does not know of its jitter.
+glm::vec3 Lidar::Sweep::reported_point(const PulseCast& cast, std::size_t pulse,
+                                       double reported_m) const {
+  const PulseBatch& pulses = cast.pulses();
+  const glm::dvec3 p_SQ = pulses.origin_m[pulse] + pulses.direction[pulse] * reported_m;
+  if (spec_.points == LidarSpec::Points::AsFired) return glm::vec3(p_SQ);
+  const PulseCast::SensorPose& pose = cast.pose(pulse);
+  return glm::vec3(X_SD_ * (pose.p_DS + pose.R_DS * p_SQ));
+}
+
+void Lidar::Sweep::write(const Chunk& chunk, const ScanColumns& columns) const {
   std::size_t row = chunk.first_row;
-  for_each_pulse(pattern, chunk, [&](std::size_t k, std::size_t shot, const HeadPose& head) {
-    const Hit& hit = chunk.hits[shot * chunk.count + k];
-    if (!hit || hit.range_m < near_m) return;
-    const Ray& ray = chunk.rays[shot * chunk.count + k];
+  const PulseCast& cast = chunk.cast;
+  for (std::size_t i = 0; i < cast.size(); ++i) {
+    const std::size_t at = cast.range(i).first;
+    const Hit& hit = cast.all_hits()[at];
+    if (!returns(hit)) continue;
+    const Ray& ray = cast.all_rays()[at];
     double reported_m = hit.range_m;
-    if (range_noise_sigma_m > 0) {
-      RandomKey key = sweep_key;
-      key.pulse = static_cast<std::uint32_t>((chunk.begin + k) * shots.size() + shot);
-      reported_m += range_noise_sigma_m * random_normal(key).x;
+    if (spec_.range_noise_sigma_m > 0) {
+      reported_m += spec_.range_noise_sigma_m *
+                    random_normal(key_of(chunk.begin + static_cast<std::int64_t>(i))).x;
     }
-    const glm::dvec3 p_HQ = shots[shot].origin_m + shots[shot].direction * reported_m;
-    const glm::vec3 p_SQ(head.cos_spin * p_HQ.x - head.sin_spin * p_HQ.y,
-                         head.sin_spin * p_HQ.x + head.cos_spin * p_HQ.y, p_HQ.z);
     const glm::vec3 direction(ray.direction);
-    rows.write(row++,
-               {hit.range_m, ray.origin + ray.direction * hit.range_m, p_SQ, hit.normal,
-                -glm::dot(direction, hit.normal), glm::length(glm::cross(direction, hit.normal)),
-                head.time_s, shots[shot].ring, hit.deviation_m},
-               surface);
-    if (rows.error_bound.empty()) return;
-    rows.error_bound[row - 1] = rounded_up(chunk.bounds_m[shot * chunk.count + k]);
+    const float cos_incidence = -glm::dot(direction, hit.normal);
+    columns.write(row, {.point = reported_point(cast, i, reported_m),
+                        .intensity = cos_incidence,
+                        .time_s = cast.pose(i).time_s,
+                        .ring = cast.pulses().ring[i],
+                        .range_m = hit.range_m,
+                        .p_DQ = ray.origin + ray.direction * hit.range_m,
+                        .normal = hit.normal,
+                        .cos_incidence = cos_incidence,
+                        .sin_incidence = glm::length(glm::cross(direction, hit.normal)),
+                        .surface = scene_.terrain,
+                        .deviation_m = hit.deviation_m});
+    if (columns.has_bounds()) columns.write_bound(row, chunk.bounds_m[at]);
+    ++row;
+  }
+}
+
+EchoRow Lidar::Sweep::row_of(const Echo& echo, const PulseCast& cast, std::size_t pulse,
+                             double reported_m) const {
+  const Ray& axis = cast.axis(pulse);
+  const glm::vec3 direction(axis.direction);
+  EchoRow row{.point = reported_point(cast, pulse, reported_m),
+              .intensity = lidar_.light_->intensity(echo.detection),
+              .time_s = cast.pose(pulse).time_s,
+              .ring = cast.pulses().ring[pulse],
+              .range_m = echo.range_m,
+              .p_DQ = echo.p_DQ,
+              .normal = echo.normal,
+              .cos_incidence = -glm::dot(direction, echo.normal),
+              .sin_incidence = glm::length(glm::cross(direction, echo.normal)),
+              .surface = scene_.terrain,
+              .deviation_m = echo.deviation_m};
+  if (echo.kind != Echo::Kind::Surface) {  // there is no truth to tell
+    row.p_DQ = axis.origin + axis.direction * echo.detection.range_m;
+    row.range_m = nan;
+    row.normal = glm::vec3(static_cast<float>(nan));
+    row.cos_incidence = row.sin_incidence = static_cast<float>(nan);
+    row.surface = {};
+  }
+  return row;
+}
+
+void Lidar::Sweep::add_rows(std::size_t pulse, Chunk& chunk) const {
+  const std::vector<Echo>& echoes = chunk.work.echoes;
+  for (std::size_t k = 0; k < echoes.size(); ++k) {
+    double reported_m = lidar_.light_->reported_m(echoes[k].detection);
+    if (spec_.range_noise_sigma_m > 0) {
+      RandomKey key = key_of(chunk.begin + static_cast<std::int64_t>(pulse));
+      key.sub_ray = static_cast<std::uint32_t>(k);
+      reported_m += spec_.range_noise_sigma_m * random_normal(key).x;
+    }
+    EchoRow row = row_of(echoes[k], chunk.cast, pulse, reported_m);
+    row.return_index = static_cast<std::uint8_t>(k + 1);
+    row.return_count = static_cast<std::uint8_t>(echoes.size());
+    chunk.light_rows.push_back({row, echoes[k]});
+  }
+}
+
+void Lidar::Sweep::write_light() {
+  scan_.echoes = PointCloud(light_rows_.size());
+  const ScanColumns columns(scan_.echoes, spec_);
+  tbb::parallel_for(std::size_t{0}, light_rows_.size(), [&](std::size_t row) {
+    const auto& [echo_row, echo] = light_rows_[row];
+    columns.write(row, echo_row);
+    columns.write_light(row, echo, scene_.terrain);
+    if (columns.has_bounds()) columns.write_bound(row, echo.bound_m);
   });
 }
 
-// Cuts the sequences into chunks and takes each through `measure`, which counts its echoes, and
-// `finish`, which writes them. Both run on any thread in any order; in between each chunk learns,
-// in firing order, where its rows begin. Few chunks are alive at a time. Returns the number of
-// rows.
-template <typename Measure, typename Finish>
-std::size_t stream_chunks(std::size_t sequences, std::size_t per_chunk, const Measure& measure,
-                          const Finish& finish) {
+PointCloud Lidar::Sweep::no_returns() const {
+  PointCloud cloud(missed_.size());
+  if (spec_.no_returns == LidarSpec::NoReturns::Omit) return cloud;
+  const auto fill = [&](const char* name, auto value) {
+    using T = decltype(value(missed_.front()));
+    std::ranges::transform(missed_, cloud.add<T>(name).begin(), value);
+  };
+  fill("pulse", [](const MissedPulse& m) { return m.pulse; });
+  fill("time", [](const MissedPulse& m) { return m.time_s; });
+  fill("ring", [](const MissedPulse& m) { return m.ring; });
+  fill("dx", [](const MissedPulse& m) { return m.direction.x; });
+  fill("dy", [](const MissedPulse& m) { return m.direction.y; });
+  fill("dz", [](const MissedPulse& m) { return m.direction.z; });
+  fill("reason", [](const MissedPulse& m) { return static_cast<std::uint8_t>(m.reason); });
+  return cloud;
+}
+
+// Chunks are measured and written on any thread in any order; in between each is placed, in firing
+// order. Few are alive at a time. Without light a pulse has one echo at most, so there is room for
+// all rows from the start; else they are gathered first.
+LidarScan Lidar::Sweep::run() {
+  const bool has_light = lidar_.light_.has_value();
+  scan_.echoes = PointCloud(has_light ? 0 : static_cast<std::size_t>(pulses_));
+  std::optional<ScanColumns> columns;
+  if (!has_light) columns.emplace(scan_.echoes, spec_);
+  stream([&](const Chunk& chunk) {
+    if (columns) write(chunk, *columns);
+  });
+  if (has_light) {
+    write_light();
+    scan_.waveforms.interval_s = lidar_.light_->interval_s();
+  } else {
+    scan_.echoes.truncate(next_row_);
+  }
+  scan_.no_returns = no_returns();
+  return std::move(scan_);
+}
+
+template <typename Finish>
+void Lidar::Sweep::stream(const Finish& finish) {
+  const std::int64_t per_chunk = pulses_per_chunk(lidar_.pattern_, lidar_.beam_.sub_rays(0).size());
   const auto live = 2 * static_cast<std::size_t>(tbb::this_task_arena::max_concurrency());
   std::vector<Chunk> chunks(live);
   tbb::concurrent_bounded_queue<Chunk*> idle;
   for (Chunk& chunk : chunks) idle.push(&chunk);
-  std::size_t next_sequence = 0;
-  std::size_t next_row = 0;
+  std::int64_t next = 0;
   const auto take = [&](tbb::flow_control& flow) -> Chunk* {
-    if (next_sequence == sequences) {
+    if (next == pulses_) {
       flow.stop();
       return nullptr;
     }
     Chunk* chunk = nullptr;
     idle.pop(chunk);
-    chunk->begin = next_sequence;
-    chunk->count = std::min(per_chunk, sequences - next_sequence);
-    next_sequence += chunk->count;
+    chunk->begin = next;
+    chunk->end = next = std::min(next + per_chunk, pulses_);
     return chunk;
   };
   const auto measured = [&](Chunk* chunk) {
@@ -272,8 +445,7 @@ std::size_t stream_chunks(std::size_t sequences, std::size_t per_chunk, const Me
     return chunk;
   };
   const auto placed = [&](Chunk* chunk) {
-    chunk->first_row = next_row;
-    next_row += chunk->echoes;
+    place(*chunk);
     return chunk;
   };
   const auto finished = [&](Chunk* chunk) {
@@ -286,48 +458,22 @@ std::size_t stream_chunks(std::size_t sequences, std::size_t per_chunk, const Me
                 tbb::make_filter<Chunk*, Chunk*>(filter_mode::parallel, measured) &
                 tbb::make_filter<Chunk*, Chunk*>(filter_mode::serial_in_order, placed) &
                 tbb::make_filter<Chunk*, void>(filter_mode::parallel, finished));
-  return next_row;
 }
 
-}  // namespace
+Lidar::Lidar(const LidarSpec& spec, const AtmosphereSpec& air)
+    : spec_((check(spec), spec)),
+      pattern_(spec.pattern),
+      beam_(with_one_level_more(spec.beam)),
+      last_level_(beam_.levels() -
+                  (with_one_level_more(spec.beam).most_sub_rays > spec.beam.most_sub_rays ? 2 : 1)),
+      light_(light_of(spec.light, air, spec.gate)),
+      quiet_light_(light_of(without_noise(spec.light), air, spec.gate)) {}
 
-Lidar::Lidar(const LidarSpec& spec)
-    : pattern_(spec.pattern),
-      gate_(spec.gate),
-      range_noise_sigma_m_(spec.range_noise_sigma_m),
-      error_bound_(spec.error_bound) {
-  Violations broken(spec.model.empty() ? "lidar" : spec.model);
-  broken.unless(gate_.near_m >= 0 && gate_.near_m < gate_.far_m,
-                "range gate [{}, {}] m is empty or begins below 0: are near and far swapped?",
-                gate_.near_m, gate_.far_m);
-  broken.unless(range_noise_sigma_m_ >= 0 && std::isfinite(range_noise_sigma_m_),
-                "range noise of {} m must be finite and not negative", range_noise_sigma_m_);
-  broken.throw_if_any();
-}
-
-PointCloud Lidar::scan(const Scene& scene, const Trajectory& X_DS, std::int64_t number, Seed seed,
-                       std::uint32_t sensor_number) const {
-  const Sweep sweep(pattern_, X_DS, number);
-  const std::size_t per_chunk = std::max<std::size_t>(1, chunk_pulses / pattern_.shots().size());
-  const RandomKey key{seed, sensor_number, static_cast<std::uint32_t>(number)};
-  PointCloud cloud(sweep.sequences() * pattern_.shots().size());
-  const Rows rows(cloud, error_bound_);
-  const std::size_t count = stream_chunks(
-      sweep.sequences(), per_chunk,
-      [&](Chunk& chunk) {
-        cast(sweep, pattern_, scene.rays, gate_.far_m, chunk);
-        if (error_bound_ == LidarSpec::ErrorBound::Report) {
-          chunk.bounds_m.resize(chunk.rays.size());
-          scene.rays.bound_errors(chunk.rays, chunk.hits, chunk.bounds_m);
-        }
-        chunk.echoes = static_cast<std::size_t>(std::ranges::count_if(
-            chunk.hits, [&](const Hit& hit) { return hit && hit.range_m >= gate_.near_m; }));
-      },
-      [&](const Chunk& chunk) {
-        write(pattern_, gate_.near_m, range_noise_sigma_m_, key, scene.terrain, chunk, rows);
-      });
-  cloud.truncate(count);
-  return cloud;
+LidarScan Lidar::scan(const Scene& scene, const Trajectory& X_DS, std::int64_t number, Seed seed,
+                      std::uint32_t sensor_number) const {
+  return Sweep(*this, scene, X_DS, number,
+               {seed, sensor_number, static_cast<std::uint32_t>(number)})
+      .run();
 }
 
 }  // namespace groundray

@@ -3,14 +3,17 @@
 #include <cstdint>
 #include <filesystem>
 #include <glm/vec2.hpp>
+#include <optional>
 #include <string>
 #include <variant>
 #include <vector>
 
+#include "core/material.h"
 #include "core/pose.h"
 #include "core/random.h"
 #include "core/ray_tracer.h"
-#include "sensors/lidar.h"
+#include "sensors/atmosphere.h"
+#include "sensors/lidar_spec.h"
 #include "terrain/dem_io.h"
 #include "terrain/terrain.h"
 
@@ -20,7 +23,8 @@ namespace groundray {
 struct TerrainSpec {
   std::filesystem::path dem;  ///< absolute, or relative to the working directory
   DemOptions options;
-  std::uint16_t label = 1;  ///< semantic class of the ground
+  std::uint16_t label = 1;           ///< semantic class of the ground
+  std::optional<Material> material;  ///< there must be one if a lidar has light
   TerrainDetail detail;
 };
 
@@ -52,6 +56,7 @@ struct SceneSpec {
   Tracing tracing = Tracing::Fast;
   double duration_s = 0;
   TerrainSpec terrain;
+  AtmosphereSpec air;
   std::variant<RecordedPath, DrivenPath> platform;
   std::vector<MountedLidar> lidars;
 };

@@ -11,6 +11,8 @@
 #include <iterator>
 #include <set>
 
+#include "sensors/lidar_reader.h"
+#include "sensors/material_io.h"
 #include "sensors/yaml_reader.h"
 
 namespace groundray {
@@ -28,9 +30,6 @@ using yaml::Rule;
 
 constexpr Rule duration_rule{[](double value) { return value > 0 && value <= 1e6; },
                              "must be > 0 and at most 1e6"};
-constexpr Rule elevation_rule{[](double value) { return std::abs(value) <= 90; },
-                              "must be from -90 to 90"};
-
 std::string read_file(const fs::path& path) {
   constexpr std::uintmax_t largest_file_bytes = 16u << 20;
   std::error_code fault;
@@ -44,151 +43,45 @@ std::string read_file(const fs::path& path) {
   return text;
 }
 
-void check_version(Map& root, std::string_view key, Faults& faults) {
-  std::uint64_t version = 1;
-  if (const Node* at = root.read_whole(key, Need::Required, version); at && version != 1) {
-    faults.add(*at, key, "is {}, but this groundray reads format 1 alone", version);
+// A material is named by that of a file in data/materials, or by a file.
+std::optional<Material> read_material(Map& map, const fs::path& path, const fs::path& preset_folder,
+                                      Faults& faults) {
+  std::string name;
+  const Node* at = map.read_text("material", Need::Optional, name);
+  if (!at) return std::nullopt;
+  const fs::path folder = preset_folder.parent_path() / "materials";
+  try {
+    if (name.ends_with(".yaml")) return load_material(beside(path, name));
+    const auto names = preset_names(folder);
+    if (std::ranges::count(names, name) > 0) return load_material(folder / (name + ".yaml"));
+    faults.add(*at, "material", "{} is not in {}{}; it has {}", yaml::shown(*at), folder.string(),
+               yaml::suggestion(name, names), fmt::join(names, ", "));
+  } catch (const Error& fault) {
+    faults.add(*at, "material", "the material cannot be read:\n{}", fault.what());
   }
+  return std::nullopt;
 }
 
-void check_turn(const Node& node, std::string_view key, const SpinningPattern& pattern,
-                Faults& faults) {
-  const double sequences = 1 / (pattern.rate_hz * pattern.firing_period_s);
-  if (sequences < 1 - 1e-9 || sequences > ScanPattern::most_sequences) {
-    faults.add(node, key, "makes {:.6g} firing sequences in a turn, but must make 1 to {}",
-               sequences, ScanPattern::most_sequences);
-  }
+AtmosphereSpec read_air(Map map, Faults& faults) {
+  AtmosphereSpec air;
+  map.read_number("visibility_m", Need::Optional, air.visibility_m, positive);
+  map.read_choice<HazeLaw>("haze_law", Need::Optional, air.haze_law,
+                           {{"kruse", HazeLaw::Kruse}, {"kim", HazeLaw::Kim}});
+  map.read_number("fog_range_m", Need::Optional, air.fog_range_m, positive);
+  map.read_number("rain_mm_h", Need::Optional, air.rain_mm_h, not_negative);
+  map.read_number("backscatter_per_m_sr", Need::Optional, air.backscatter_per_m_sr, not_negative);
+  map.read_number("group_index", Need::Optional, air.group_index,
+                  Rule{[](double value) { return value >= 1; }, "must be 1 or more"});
+  if (std::isfinite(air.visibility_m) && std::isfinite(air.fog_range_m))
+    faults.add(map.node(), "weather", "has haze and fog: give one of visibility_m and fog_range_m");
+  map.close();
+  return air;
 }
 
-// A column of the beam table: where its number goes, and in which unit the file gives it.
-struct BeamColumn {
-  std::string_view name;
-  Rule rule;
-  void (*set)(Beam& beam, double value);
-  bool required;
-};
-
-constexpr Rule ring_rule{
-    [](double value) { return value >= 0 && value <= 65535 && value == std::floor(value); },
-    "must be a whole number from 0 to 65535"};
-constexpr std::array beam_columns{
-    BeamColumn{"ring", ring_rule, [](Beam& b, double v) { b.ring = static_cast<std::uint16_t>(v); },
-               true},
-    BeamColumn{"elevation_deg", elevation_rule,
-               [](Beam& b, double v) { b.elevation_rad = glm::radians(v); }, true},
-    BeamColumn{"azimuth_offset_deg", any_number,
-               [](Beam& b, double v) { b.azimuth_offset_rad = glm::radians(v); }, false},
-    BeamColumn{"origin_x_m", any_number, [](Beam& b, double v) { b.origin_m.x = v; }, false},
-    BeamColumn{"origin_y_m", any_number, [](Beam& b, double v) { b.origin_m.y = v; }, false},
-    BeamColumn{"origin_z_m", any_number, [](Beam& b, double v) { b.origin_m.z = v; }, false},
-    BeamColumn{"firing_time_us", not_negative, [](Beam& b, double v) { b.firing_time_s = v / 1e6; },
-               true},
-};
-
-std::vector<BeamColumn> read_columns(Map& root, Faults& faults) {
-  std::vector<std::string> free;
-  free.reserve(beam_columns.size());
-  for (const BeamColumn& column : beam_columns) free.emplace_back(column.name);
-  std::vector<BeamColumn> columns;
-  for (const Node& item : root.list("beam_columns", Need::Required)) {
-    const auto column = std::ranges::find(beam_columns, item.text, &BeamColumn::name);
-    if (column == beam_columns.end()) {
-      faults.add(item, "beam_columns", "{} is not a column of beams{}", yaml::shown(item),
-                 yaml::suggestion(item.text, free));
-    } else if (std::erase(free, item.text) == 0) {
-      faults.add(item, "beam_columns", "{} is repeated", yaml::shown(item));
-    } else {
-      columns.push_back(*column);
-    }
-  }
-  return columns;
-}
-
-std::vector<Beam> read_beams(Map& root, double period_s, Faults& faults) {
-  const Node* names = root.find("beam_columns", Need::Optional);
-  const std::vector<BeamColumn> columns = read_columns(root, faults);
-  const auto rows = root.list("beams", Need::Required);
-  if (const Node* at = root.find("beams", Need::Optional); at && rows.empty()) {
-    faults.add(*at, "beams", "has no rows, but a lidar needs at least one beam");
-  }
-  if (!names || columns.size() != names->items.size() || columns.empty()) return {};
-  for (const BeamColumn& column : beam_columns) {
-    if (column.required && std::ranges::count(columns, column.name, &BeamColumn::name) == 0) {
-      faults.add(*names, "beam_columns", "lacks {}", column.name);
-    }
-  }
-  std::vector<Beam> beams;
-  std::vector<double> values(columns.size());
-  for (const Node& row : rows) {
-    if (!yaml::numbers(row, "beams", values, any_number, faults)) continue;
-    Beam beam;
-    for (std::size_t i = 0; i < columns.size(); ++i) {
-      if (!columns[i].rule.holds(values[i])) {
-        faults.add(row.items[i], columns[i].name, "is {}, but {}", values[i],
-                   columns[i].rule.words);
-      } else {
-        columns[i].set(beam, values[i]);
-      }
-    }
-    if (period_s > 0 && beam.firing_time_s >= period_s) {
-      faults.add(row, "beams", "firing_time_us must be less than firing_period_us");
-    }
-    beams.push_back(beam);
-  }
-  return beams;
-}
-
-LidarSpec read_lidar(const Node& node, Faults& faults) {
-  LidarSpec lidar;
-  SpinningPattern& pattern = lidar.pattern;
-  Map root(node, "", faults);
-  check_version(root, "groundray_lidar", faults);
-  root.read_text("model", Need::Required, lidar.model);
-  if (auto rotation = root.map("rotation", Need::Required)) {
-    rotation->read_number("rate_hz", Need::Required, pattern.rate_hz, positive);
-    rotation->read_choice<SpinningPattern::Sense>(
-        "sense", Need::Required, pattern.sense,
-        {{"clockwise", SpinningPattern::Sense::Clockwise},
-         {"counter_clockwise", SpinningPattern::Sense::CounterClockwise}});
-    double start_azimuth_deg = 0;
-    rotation->read_number("start_azimuth_deg", Need::Required, start_azimuth_deg);
-    pattern.start_azimuth_rad = glm::radians(start_azimuth_deg);
-    rotation->close();
-  }
-  double period_us = 0;
-  const Node* period = root.read_number("firing_period_us", Need::Required, period_us, positive);
-  pattern.firing_period_s = period_us / 1e6;
-  if (period) check_turn(*period, "firing_period_us", pattern, faults);
-  if (auto gate = root.map("range_gate_m", Need::Optional)) {
-    gate->read_number("near", Need::Optional, lidar.gate.near_m, not_negative);
-    gate->read_number("far", Need::Optional, lidar.gate.far_m, positive);
-    if (lidar.gate.near_m >= lidar.gate.far_m) {
-      faults.add(gate->node(), "range_gate_m", "near must be less than far: are they swapped?");
-    }
-    gate->close();
-  }
-  pattern.beams = read_beams(root, pattern.firing_period_s, faults);
-  if (const Node* sources = root.find("sources", Need::Optional)) {
-    const Map texts(*sources, "sources", faults);
-    for (std::size_t i = 1; sources->kind == Node::Kind::Map && i < sources->items.size(); i += 2) {
-      yaml::is_text(sources->items[i], sources->items[i - 1].text, faults);
-    }
-  }
-  root.close();
-  return lidar;
-}
-
-// Names that GDAL knows how to open but that are no paths (/vsizip/..., NETCDF:"..."), stay as they
-// are.
-fs::path beside(const fs::path& file, const std::string& relative) {
-  const std::size_t colon = relative.find(':');
-  if (relative.starts_with("/vsi") || (colon != std::string::npos && colon < relative.find('/')))
-    return relative;
-  return (file.parent_path() / relative).lexically_normal();
-}
-
-TerrainSpec read_terrain(Map terrain, const fs::path& path, Faults& faults) {
+TerrainSpec read_terrain(Map terrain, const fs::path& path, const fs::path& preset_folder,
+                         Faults& faults) {
   TerrainSpec spec;
+  spec.material = read_material(terrain, path, preset_folder, faults);
   std::string dem;
   if (terrain.read_text("dem", Need::Required, dem)) spec.dem = beside(path, dem);
   double nodata = 0;
@@ -306,23 +199,7 @@ MountedLidar read_mounted(Map entry, const fs::path& path, const fs::path& prese
   }
   read_source(entry, path, preset_folder, mounted, faults);
   if (auto mount = entry.map("mount", Need::Required)) mounted.X_BS = read_mount(std::move(*mount));
-  LidarSpec& lidar = mounted.lidar;
-  const Node* rate = entry.read_number("rate_hz", Need::Optional, lidar.pattern.rate_hz, positive);
-  if (rate && lidar.pattern.firing_period_s > 0) {
-    check_turn(*rate, "rate_hz", lidar.pattern, faults);
-  }
-  std::array<double, 2> gate{};
-  if (const Node* at = entry.read_numbers("range_gate_m", Need::Optional, gate, not_negative)) {
-    if (gate[0] >= gate[1]) {
-      faults.add(*at, "range_gate_m", "[{}, {}] is empty: are near and far swapped?", gate[0],
-                 gate[1]);
-    }
-    lidar.gate = {gate[0], gate[1]};
-  }
-  entry.read_number("range_noise_sigma_m", Need::Optional, lidar.range_noise_sigma_m, not_negative);
-  entry.read_choice<LidarSpec::ErrorBound>(
-      "error_bound", Need::Optional, lidar.error_bound,
-      {{"omit", LidarSpec::ErrorBound::Omit}, {"report", LidarSpec::ErrorBound::Report}});
+  change_lidar(entry, mounted.lidar, faults);
   entry.close();
   return mounted;
 }
@@ -365,12 +242,21 @@ SceneSpec parse_scene(const std::string& text, const fs::path& path,
   root.read_choice<Tracing>("tracing", Need::Optional, scene.tracing,
                             {{"fast", Tracing::Fast}, {"exact", Tracing::Exact}});
   if (auto terrain = root.map("terrain", Need::Required)) {
-    scene.terrain = read_terrain(std::move(*terrain), path, faults);
+    scene.terrain = read_terrain(std::move(*terrain), path, preset_folder, faults);
   }
   if (auto platform = root.map("platform", Need::Required)) {
     scene.platform = read_platform(std::move(*platform), path, faults);
   }
+  if (auto weather = root.map("weather", Need::Optional))
+    scene.air = read_air(std::move(*weather), faults);
   scene.lidars = read_lidars(root, path, preset_folder, faults);
+  const auto has_light = [](const MountedLidar& mounted) {
+    return mounted.lidar.light.has_value();
+  };
+  if (!scene.terrain.material && std::ranges::any_of(scene.lidars, has_light)) {
+    faults.add(node, "terrain",
+               "must name a material, for a lidar has a laser: such as material: dry_soil");
+  }
   root.close();
   faults.throw_if_any();
   return scene;
@@ -381,7 +267,7 @@ LidarSpec load_lidar(const fs::path& path) { return parse_lidar(read_file(path),
 LidarSpec parse_lidar(const std::string& text, const fs::path& path) {
   const Node node = yaml::parse(text, path);
   Faults faults(path);
-  LidarSpec lidar = read_lidar(node, faults);
+  LidarSpec lidar = read_lidar(node, path, faults);
   faults.throw_if_any();
   return lidar;
 }

@@ -56,6 +56,8 @@ class Faults {
   ///         it only counts them.
   void throw_if_any();
 
+  std::size_t count() const { return faults_.size(); }
+
  private:
   struct Fault {
     int line;

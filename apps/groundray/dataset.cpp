@@ -55,29 +55,37 @@ std::string yaml_text(std::string_view text) {
   return out + "\"";
 }
 
-std::string calibration(const PlacedLidar& placed) {
-  const LidarSpec& lidar = placed.spec.lidar;
-  const SpinningPattern& pattern = lidar.pattern;
-  const Pose& X_BS = placed.spec.X_BS;
+std::string spinning_text(const SpinningPattern& pattern) {
   std::string text = fmt::format(
-      "model: {}\nframe: \"x forward, y left, z up\"\nX_BS:  # pose of the sensor in the body\n  "
-      "translation_m: [{}, {}, "
-      "{}]\n  rotation_xyzw: [{}, {}, {}, {}]\nrotation_rate_hz: {}\nsense: {}\nstart_azimuth_deg: "
-      "{}\nfiring_period_us: {}\nrange_gate_m: [{}, {}]\nrange_noise_sigma_m: {}\nbeam_columns: "
-      "[ring, elevation_deg, "
-      "azimuth_offset_deg, origin_x_m, origin_y_m, origin_z_m, firing_time_us]\nbeams:\n",
-      yaml_text(lidar.model), X_BS.translation_m.x, X_BS.translation_m.y, X_BS.translation_m.z,
-      X_BS.rotation.x, X_BS.rotation.y, X_BS.rotation.z, X_BS.rotation.w, pattern.rate_hz,
+      "rotation_rate_hz: {}\nsense: {}\nstart_azimuth_deg: {}\nfiring_period_us: {}\n"
+      "beam_columns: [ring, elevation_deg, azimuth_offset_deg, origin_x_m, origin_y_m, origin_z_m, "
+      "firing_time_us]\nbeams:\n",
+      pattern.rate_hz,
       pattern.sense == SpinningPattern::Sense::Clockwise ? "clockwise" : "counter_clockwise",
-      degrees(pattern.start_azimuth_rad), pattern.firing_period_s * 1e6, lidar.gate.near_m,
-      std::isinf(lidar.gate.far_m) ? ".inf" : fmt::format("{}", lidar.gate.far_m),
-      lidar.range_noise_sigma_m);
+      degrees(pattern.start_azimuth_rad), pattern.firing_period_s * 1e6);
   for (const Beam& beam : pattern.beams) {
     text +=
         fmt::format("- [{}, {:.9g}, {:.9g}, {:.9g}, {:.9g}, {:.9g}, {:.9g}]\n", beam.ring,
                     degrees(beam.elevation_rad), degrees(beam.azimuth_offset_rad), beam.origin_m.x,
                     beam.origin_m.y, beam.origin_m.z, beam.firing_time_s * 1e6);
   }
+  return text;
+}
+
+// Other patterns than spinning heads are told by the lidar's own file alone.
+std::string calibration(const PlacedLidar& placed) {
+  const LidarSpec& lidar = placed.spec.lidar;
+  const Pose& X_BS = placed.spec.X_BS;
+  std::string text = fmt::format(
+      "model: {}\nframe: \"x forward, y left, z up\"\nX_BS:  # pose of the sensor in the body\n  "
+      "translation_m: [{}, {}, {}]\n  rotation_xyzw: [{}, {}, {}, {}]\nrange_gate_m: [{}, {}]\n"
+      "range_noise_sigma_m: {}\n",
+      yaml_text(lidar.model), X_BS.translation_m.x, X_BS.translation_m.y, X_BS.translation_m.z,
+      X_BS.rotation.x, X_BS.rotation.y, X_BS.rotation.z, X_BS.rotation.w, lidar.gate.near_m,
+      std::isinf(lidar.gate.far_m) ? ".inf" : fmt::format("{}", lidar.gate.far_m),
+      lidar.range_noise_sigma_m);
+  if (const auto* spinning = std::get_if<SpinningPattern>(&lidar.pattern))
+    text += spinning_text(*spinning);
   return text;
 }
 
@@ -168,12 +176,17 @@ Dataset::Dataset(const fs::path& folder, const World& world)
   }
 }
 
+fs::path Dataset::product_path(const PlacedLidar& lidar, std::int64_t frame,
+                               std::string_view suffix) const {
+  return folder_ / "lidar" / lidar.spec.name / fmt::format("{:06}{}", frame, suffix);
+}
+
 fs::path Dataset::scan_path(const PlacedLidar& lidar, std::int64_t frame) const {
-  return folder_ / "lidar" / lidar.spec.name / fmt::format("{:06}.ply", frame);
+  return product_path(lidar, frame, ".ply");
 }
 
 fs::path Dataset::preview_path(const PlacedLidar& lidar, std::int64_t frame) const {
-  return folder_ / "lidar" / lidar.spec.name / fmt::format("{:06}_preview.png", frame);
+  return product_path(lidar, frame, "_preview.png");
 }
 
 bool Dataset::has(const PlacedLidar& lidar, std::int64_t frame) const {

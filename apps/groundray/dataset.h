@@ -3,6 +3,7 @@
 #include <cstdint>
 #include <filesystem>
 #include <string>
+#include <string_view>
 #include <vector>
 
 #include "apps/groundray/world.h"
@@ -19,6 +20,9 @@ class Dataset {
   Dataset(const std::filesystem::path& folder, const World& world);
 
   std::filesystem::path scan_path(const PlacedLidar& lidar, std::int64_t frame) const;
+  /// Of what goes with a scan: `suffix` follows the frame's number.
+  std::filesystem::path product_path(const PlacedLidar& lidar, std::int64_t frame,
+                                     std::string_view suffix) const;
   std::filesystem::path preview_path(const PlacedLidar& lidar, std::int64_t frame) const;
 
   /// Whether a frame is there; frames appear only when whole.

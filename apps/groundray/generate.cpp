@@ -2,9 +2,13 @@
 
 #include <fmt/format.h>
 
+#include <algorithm>
 #include <chrono>
+#include <cmath>
 #include <cstdio>
 #include <optional>
+#include <span>
+#include <string>
 #include <utility>
 #include <vector>
 
@@ -12,6 +16,7 @@
 #include "apps/groundray/interruption.h"
 #include "apps/groundray/preview.h"
 #include "apps/groundray/world.h"
+#include "core/npy_io.h"
 #include "core/ply_io.h"
 #include "core/product_io.h"
 #include "core/progress.h"
@@ -54,7 +59,10 @@ class SceneFor {
   }
 
  private:
-  void take(RayTracer rays) { scene_ = Scene{std::move(rays), {world_.spec.terrain.label, 0}}; }
+  void take(RayTracer rays) {
+    scene_ = Scene{std::move(rays), {.label = world_.spec.terrain.label}, {}};
+    if (world_.spec.terrain.material) scene_->materials = {*world_.spec.terrain.material};
+  }
 
   const World& world_;
   glm::dvec3 p_DL_{0};
@@ -77,6 +85,41 @@ std::vector<Frame> missing_frames(const World& world, const Dataset& dataset) {
   return frames;
 }
 
+// What a scan has beside its echoes, where asked for. The scan itself comes last: where it is, all
+// is.
+void write_extras(const Dataset& dataset, const PlacedLidar& lidar, std::int64_t frame,
+                  const LidarScan& scan) {
+  const LidarSpec& spec = lidar.spec.lidar;
+  if (spec.no_returns == LidarSpec::NoReturns::Report)
+    write_ply(dataset.product_path(lidar, frame, "_no_returns.ply"), scan.no_returns, {});
+  if (spec.waveforms == LidarSpec::WaveformOutput::Omit) return;
+  const Waveforms& waveforms = scan.waveforms;
+  write_npy(dataset.product_path(lidar, frame, "_wave.npy"), {{"", "<f4"}},
+            waveforms.power_w.size(), std::as_bytes(std::span(waveforms.power_w)));
+  static_assert(sizeof(WaveformRun) == 24);  // as the fields below say
+  write_npy(dataset.product_path(lidar, frame, "_wave_index.npy"),
+            {{"pulse", "<u4"}, {"count", "<u4"}, {"first_sample", "<u8"}, {"start_s", "<f8"}},
+            waveforms.runs.size(), std::as_bytes(std::span(waveforms.runs)));
+}
+
+std::vector<std::string> comments_of(const World& world, const LidarScan& scan) {
+  const glm::dvec3 origin_m = world.terrain.header().origin_w_m;
+  std::vector<std::string> comments{
+      fmt::format("origin_w {} {} {}", origin_m.x, origin_m.y, origin_m.z)};
+  const Convergence& seen = scan.convergence;
+  if (seen.pulses > 0) {
+    const double rms_m = std::sqrt(seen.sum_squares_m2 /
+                                   static_cast<double>(std::max<std::uint64_t>(seen.compared, 1)));
+    comments.push_back(
+        fmt::format("convergence of {} pulses: {} with another number of echoes, ranges of the "
+                    "others differ by {:.3g} m (rms), {:.3g} m at most",
+                    seen.pulses, seen.changed, rms_m, seen.largest_m));
+  }
+  if (scan.waveforms.interval_s > 0)
+    comments.push_back(fmt::format("waveform_interval_s {}", scan.waveforms.interval_s));
+  return comments;
+}
+
 void make_frame(const World& world, const Dataset& dataset, const Frame& which, SceneFor& scene_for,
                 Tally& tally) {
   const auto [sensor, frame] = which;
@@ -84,19 +127,16 @@ void make_frame(const World& world, const Dataset& dataset, const Frame& which, 
   const ScanPattern& pattern = lidar.lidar.pattern();
   const Scene& scene = scene_for(lidar, frame);
   const auto begin = Clock::now();
-  const PointCloud scan = lidar.lidar.scan(scene, lidar.X_DS, frame, world.spec.seed, sensor);
+  const LidarScan scan = lidar.lidar.scan(scene, lidar.X_DS, frame, world.spec.seed, sensor);
   tally.scanning += Clock::now() - begin;
-  tally.points += scan.rows();
-  tally.pulses += static_cast<std::uint64_t>(pattern.first_sequence(frame + 1) -
-                                             pattern.first_sequence(frame)) *
-                  pattern.shots().size();
+  tally.points += scan.echoes.rows();
+  tally.pulses += static_cast<std::uint64_t>(pattern.pulses(frame));
   ++tally.scans;
 
-  const glm::dvec3 origin_m = world.terrain.header().origin_w_m;
   write_png(dataset.preview_path(lidar, frame),
-            draw_preview(scan, lidar, world.terrain.ground(), frame));
-  write_ply(dataset.scan_path(lidar, frame), scan,
-            {fmt::format("origin_w {} {} {}", origin_m.x, origin_m.y, origin_m.z)});
+            draw_preview(scan.echoes, lidar, world.terrain.ground(), frame));
+  write_extras(dataset, lidar, frame, scan);
+  write_ply(dataset.scan_path(lidar, frame), scan.echoes, comments_of(world, scan));
 }
 
 void say(const World& world, const std::filesystem::path& out, const Tally& tally) {

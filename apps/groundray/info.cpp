@@ -103,8 +103,8 @@ void print_scene(const World& world) {
   print_levels(world);
   for (const PlacedLidar& lidar : world.lidars) {
     const ScanPattern& pattern = lidar.lidar.pattern();
-    const auto pulses = static_cast<double>(pattern.first_sequence(lidar.sweeps)) *
-                        static_cast<double>(pattern.shots().size());
+    const double pulses =
+        static_cast<double>(pattern.pulses(0)) * static_cast<double>(lidar.sweeps);
     fmt::print("lidar     {}: {}, {} scans of about {:.0f} pulses, at most {:.1f} MiB of PLY\n",
                lidar.spec.name, lidar.spec.lidar.model, lidar.sweeps,
                pulses / static_cast<double>(lidar.sweeps), pulses * 88 / (1 << 20));

@@ -41,41 +41,64 @@ Colour range_colour(double range_m, double far_m) {
 
 // The range below which a share of the echoes lies.
 double quantile_m(std::span<const double> ranges_m, double share) {
-  if (ranges_m.empty()) return 1;
-  std::vector<double> sorted(ranges_m.begin(), ranges_m.end());
+  std::vector<double> sorted;
+  std::ranges::copy_if(ranges_m, std::back_inserter(sorted),
+                       [](double range_m) { return !std::isnan(range_m); });
+  if (sorted.empty()) return 1;
   const auto at =
       sorted.begin() + static_cast<std::ptrdiff_t>(share * static_cast<double>(sorted.size() - 1));
   std::nth_element(sorted.begin(), at, sorted.end());
   return *at;
 }
 
-// For each ring number its place from the top.
-std::vector<int> ring_places(const SpinningPattern& pattern) {
-  std::vector<Beam> beams = pattern.beams;
-  std::ranges::stable_sort(beams, std::ranges::greater{}, &Beam::elevation_rad);
-  std::vector<int> places(std::ranges::max(beams, {}, &Beam::ring).ring + std::size_t{1}, 0);
-  for (std::size_t i = 0; i < beams.size(); ++i) places[beams[i].ring] = static_cast<int>(i);
-  return places;
-}
+// Rows of the range image: a band for each ring of a spinning head, from the top; else elevations,
+// from the highest point down to the lowest.
+struct RangeRows {
+  static constexpr int rows_of_elevations = 160;
+  std::vector<int> places;  // by ring
+  int height = rows_of_elevations;
+  int band = 1;
+  float low_rad = 0, high_rad = 0;
 
-int band_height(const SpinningPattern& pattern) {
-  return std::max(2, 160 / static_cast<int>(pattern.beams.size()));
-}
+  RangeRows(const PointCloud& scan, const PatternSpec& pattern) {
+    if (const auto* spinning = std::get_if<SpinningPattern>(&pattern)) {
+      std::vector<Beam> beams = spinning->beams;
+      std::ranges::stable_sort(beams, std::ranges::greater{}, &Beam::elevation_rad);
+      places.resize(std::ranges::max(beams, {}, &Beam::ring).ring + std::size_t{1});
+      for (std::size_t i = 0; i < beams.size(); ++i) places[beams[i].ring] = static_cast<int>(i);
+      band = std::max(2, rows_of_elevations / static_cast<int>(beams.size()));
+      height = band * static_cast<int>(beams.size());
+      return;
+    }
+    for (std::size_t i = 0; i < scan.rows(); ++i) {
+      const float now_rad = elevation_rad(scan, i);
+      low_rad = i == 0 ? now_rad : std::min(low_rad, now_rad);
+      high_rad = i == 0 ? now_rad : std::max(high_rad, now_rad);
+    }
+  }
 
-void draw_ranges(Image8& image, const PointCloud& scan, const SpinningPattern& pattern,
-                 double far_m) {
+  static float elevation_rad(const PointCloud& scan, std::size_t i) {
+    return std::atan2(scan.column<float>("z")[i],
+                      std::hypot(scan.column<float>("x")[i], scan.column<float>("y")[i]));
+  }
+  int row(const PointCloud& scan, std::size_t i) const {
+    if (!places.empty()) return places[scan.column<std::uint16_t>("ring")[i]] * band;
+    const float span_rad = std::max(high_rad - low_rad, 1e-6f);
+    const float share = (high_rad - elevation_rad(scan, i)) / span_rad;
+    return std::min(static_cast<int>(share * static_cast<float>(height)), height - 1);
+  }
+};
+
+void draw_ranges(Image8& image, const PointCloud& scan, const RangeRows& rows, double far_m) {
   const auto x = scan.column<float>("x");
   const auto y = scan.column<float>("y");
-  const auto ring = scan.column<std::uint16_t>("ring");
   const auto range_m = scan.column<double>("range_true");
-  const std::vector<int> places = ring_places(pattern);
-  const int height = band_height(pattern);
   for (std::size_t i = 0; i < scan.rows(); ++i) {
+    if (std::isnan(range_m[i])) continue;
     const double turn = 0.5 - std::atan2(y[i], x[i]) / (2 * std::numbers::pi);
     const int column = std::min(static_cast<int>(turn * width), width - 1);
-    for (int k = 0; k < height; ++k) {
-      paint(image, column, places[ring[i]] * height + k, range_colour(range_m[i], far_m));
-    }
+    for (int k = 0; k < rows.band; ++k)
+      paint(image, column, rows.row(scan, i) + k, range_colour(range_m[i], far_m));
   }
 }
 
@@ -152,15 +175,14 @@ void draw_sensor(Image8& image, const MapWindow& window, const Pose& X_DS) {
 
 Image8 draw_preview(const PointCloud& scan, const PlacedLidar& lidar, const Ground& ground,
                     std::int64_t frame) {
-  const SpinningPattern& pattern = lidar.spec.lidar.pattern;
-  const int ranges_height = band_height(pattern) * static_cast<int>(pattern.beams.size());
-  Image8 image(width, ranges_height + gap + width, 3);
+  const RangeRows rows(scan, lidar.spec.lidar.pattern);
+  Image8 image(width, rows.height + gap + width, 3);
   const auto range_m = scan.column<double>("range_true");
   const double far_m = std::max(quantile_m(range_m, 0.95), 1.0);
   const Pose X_DS = lidar.X_DS.pose_at(lidar.lidar.pattern().stamp(frame));
   const MapWindow window{glm::dvec2(X_DS.translation_m), std::max(far_m * 1.1, 10.0),
-                         ranges_height + gap};
-  draw_ranges(image, scan, pattern, far_m);
+                         rows.height + gap};
+  draw_ranges(image, scan, rows, far_m);
   draw_hillshade(image, window, ground);
   draw_points(image, window, scan, far_m);
   draw_sensor(image, window, X_DS);

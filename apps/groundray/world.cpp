@@ -53,13 +53,22 @@ Trajectory lay_path(const DrivenPath& path, const SceneSpec& spec, const Terrain
   return build_ground_path(terrain.ground(), drive);
 }
 
-// Firing sequences keep a time of their own, so the last sweep of a run may end up to one of them
-// after it: the path goes on that long as it last moved.
+// Sweeps that a double only approximates (0.3 s at 10 Hz) count as whole.
+std::int64_t whole_sweeps(const ScanPattern& pattern, const SceneSpec& spec) {
+  return static_cast<std::int64_t>(std::floor(spec.duration_s * pattern.sweep_rate_hz() + 1e-9));
+}
+
+// Firing sequences keep a time of their own, so the last sweep of a run may end after it: the path
+// goes on that long as it last moved.
 Trajectory extended(const Trajectory& path, const SceneSpec& spec) {
-  double longest_s = 0;
-  for (const MountedLidar& lidar : spec.lidars)
-    longest_s = std::max(longest_s, lidar.lidar.pattern.firing_period_s);
-  const auto more = std::chrono::nanoseconds(std::llround(1e9 * longest_s) + 1);
+  std::chrono::nanoseconds more(1);
+  for (const MountedLidar& lidar : spec.lidars) {
+    const ScanPattern pattern(lidar.lidar.pattern);
+    const std::int64_t sweeps = whole_sweeps(pattern, spec);
+    if (sweeps > 0)
+      more = std::max(
+          more, pattern.last_firing(sweeps - 1) - run_time(spec) + std::chrono::nanoseconds(1));
+  }
   std::vector<Trajectory::Sample> samples = path.samples();
   const auto [time, X_DB] = samples.back();
   Pose onwards;
@@ -157,15 +166,14 @@ World load_world(const std::filesystem::path& scene) {
                spec);
   std::vector<PlacedLidar> lidars;
   for (const MountedLidar& mounted : spec.lidars) {
-    // Turns that a double only approximates (0.3 s at 10 Hz) count as whole.
-    const double turns = spec.duration_s * mounted.lidar.pattern.rate_hz;
-    const auto sweeps = static_cast<std::int64_t>(std::floor(turns + 1e-9));
+    Lidar lidar(mounted.lidar, spec.air);
+    const std::int64_t sweeps = whole_sweeps(lidar.pattern(), spec);
     if (sweeps == 0) {
       throw Error(
           "lidar '{}': a run of {} s is shorter than one sweep at {} Hz; lengthen duration_s",
-          mounted.name, spec.duration_s, mounted.lidar.pattern.rate_hz);
+          mounted.name, spec.duration_s, lidar.pattern().sweep_rate_hz());
     }
-    lidars.push_back({mounted, Lidar(mounted.lidar), X_DB.mounted(mounted.X_BS), sweeps});
+    lidars.push_back({mounted, std::move(lidar), X_DB.mounted(mounted.X_BS), sweeps});
     check_place(lidars.back(), terrain, run_time(spec));
   }
   const double reach_m = largest_reach_m(lidars);

@@ -6,6 +6,7 @@
 #include <vector>
 
 #include "core/trajectory.h"
+#include "sensors/lidar.h"
 #include "sensors/scene_spec.h"
 #include "terrain/terrain.h"
 

@@ -279,8 +279,9 @@ def test_recorded_trajectory_with_epoch_times_starts_at_zero(tmp_path):
     assert result.returncode == 0, result.stderr
     poses = np.loadtxt(tmp_path / "out/poses/top.tum")
     assert poses[:6, 0] == pytest.approx([0, 0.1, 0.2, 0.3, 0.4, 0.5])
-    # The path goes on as it was for one firing sequence, which the last sweep may need.
-    assert poses[6, :2] == pytest.approx([0.5 + 55.297e-6, 5 - 12 + 55.297e-5])
+    # The path goes on as it was for what the last sweep lasts longer than the run: its sequence
+    # 5425 begins at 0.2999808 s, and its last laser fires 34.56 us later.
+    assert poses[6, :2] == pytest.approx([0.5 + 15.361e-6, 5 - 12 + 15.361e-5], abs=1e-8)
     record = (tmp_path / "out/dataset.yaml").read_text()
     assert "time_origin_s: 1600000000.000000000\n" in record
     assert poses[3, 1] == pytest.approx(429443 - 429452)

@@ -19,7 +19,7 @@ void write_scan(::benchmark::State& state) {
   const Scene scene{RayTracer({full_resolution_level(flat)}, {0, 0, 0}, Tracing::Fast), {}};
   const Trajectory X_DS({{0s, {{1, 0, 0, 0}, {0, 0, 2}}}, {1s, {{1, 0, 0, 0}, {0, 0, 2}}}});
   const Lidar lidar(load_lidar(testing::data_folder() / "sensors/velodyne_vls128.yaml"));
-  const PointCloud scan = lidar.scan(scene, X_DS, 0, Seed{7}, 0);
+  const PointCloud scan = lidar.scan(scene, X_DS, 0, Seed{7}, 0).echoes;
   const testing::TemporaryFolder folder;
   const auto path = folder / "scan.ply";
   write_ply(path, scan, {});

@@ -60,19 +60,23 @@ LidarSpec vls128() { return load_lidar(testing::data_folder() / "sensors/velodyn
 // The rays of one sweep, beam by beam in blocks of 32 firing sequences: the order that suits
 // packets best.
 std::vector<Ray> rays_of_sweep(const ScanPattern& pattern, const Trajectory& ride, double far_m) {
+  PulseBatch pulses;
+  pattern.fill(0, 0, pattern.pulses(0), pulses);
+  std::vector<Pose> poses(pulses.size());
+  for (const PulseBatch::Volley& volley : pulses.volleys) {
+    const std::chrono::nanoseconds time(std::llround(1e9 * volley.time_s));
+    std::fill(poses.begin() + static_cast<std::ptrdiff_t>(volley.begin),
+              poses.begin() + static_cast<std::ptrdiff_t>(volley.end), ride.pose_at(time));
+  }
   std::vector<Ray> rays;
-  const std::int64_t end = pattern.first_sequence(1);
-  for (std::int64_t block = 0; block < end; block += 32) {
-    for (const ScanPattern::Volley& volley : pattern.volleys()) {
-      for (int shot = volley.begin; shot < volley.end; ++shot) {
-        for (std::int64_t k = block; k < std::min(end, block + 32); ++k) {
-          const double time_s = pattern.firing_time_s(k, volley);
-          const Pose X_DS = ride.pose_at(std::chrono::nanoseconds(std::llround(1e9 * time_s)));
-          const glm::dquat R_SH = glm::angleAxis(pattern.spin_rad(time_s), glm::dvec3(0, 0, 1));
-          const auto& [direction, origin_m, ring] = pattern.shots()[static_cast<std::size_t>(shot)];
-          rays.push_back({X_DS * (R_SH * origin_m), X_DS.rotation * (R_SH * direction), far_m});
-        }
-      }
+  rays.reserve(pulses.size());
+  const auto stride = static_cast<std::size_t>(pattern.neighbour_stride());
+  for (std::size_t block = 0; block < pulses.size(); block += 32 * stride) {
+    const std::size_t end = std::min(pulses.size(), block + 32 * stride);
+    for (std::size_t shot = block; shot < block + stride; ++shot) {
+      for (std::size_t i = shot; i < end; i += stride)
+        rays.push_back(
+            {poses[i] * pulses.origin_m[i], poses[i].rotation * pulses.direction[i], far_m});
     }
   }
   return rays;
@@ -109,7 +113,7 @@ void scan_vls128(::benchmark::State& state, const glm::dvec2& place) {
 
   std::size_t met = 0;
   for (const float range_m : raw.trace()) met += range_m < spec.gate.far_m ? 1 : 0;
-  const std::size_t rows = lidar.scan(world, ride, 0, Seed{7}, 0).rows();
+  const std::size_t rows = lidar.scan(world, ride, 0, Seed{7}, 0).echoes.rows();
   // Floats alone decide otherwise at silhouettes, and where a hit lies within a float's breadth of
   // the gate.
   if (std::abs(static_cast<double>(met) - static_cast<double>(rows)) >
@@ -149,8 +153,8 @@ void exact_against_fast(::benchmark::State& state) {
   const Lidar lidar(spec);
   const Scene fast = scene(Tracing::Fast);
   const Scene exact = scene(Tracing::Exact);
-  const PointCloud a = lidar.scan(fast, ride, 0, Seed{7}, 0);
-  const PointCloud b = lidar.scan(exact, ride, 0, Seed{7}, 0);
+  const PointCloud a = lidar.scan(fast, ride, 0, Seed{7}, 0).echoes;
+  const PointCloud b = lidar.scan(exact, ride, 0, Seed{7}, 0).echoes;
   if (std::abs(static_cast<double>(a.rows()) - static_cast<double>(b.rows())) >
       5e-6 * static_cast<double>(rays.size()) + 1) {
     return state.SkipWithError("exact and fast tracing disagree");

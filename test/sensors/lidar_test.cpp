@@ -76,7 +76,7 @@ TEST(Lidar, EchoesOfFlatGroundLieInOnePlane) {
   const Lidar lidar(preset("velodyne_vlp16"));
   for (const float height_m : {0.5f, 2.0f, 20.0f}) {
     const PointCloud scan =
-        lidar.scan(scene_of(flat_ground(0)), still_at({0, 0, height_m}), 0, Seed{7}, 0);
+        lidar.scan(scene_of(flat_ground(0)), still_at({0, 0, height_m}), 0, Seed{7}, 0).echoes;
     ASSERT_GT(scan.rows(), 0u);
     const auto x = scan.column<float>("x");
     const auto z = scan.column<float>("z");
@@ -87,10 +87,11 @@ TEST(Lidar, EchoesOfFlatGroundLieInOnePlane) {
 
 TEST(Lidar, EveryBeamThatLooksDownReturnsOnceInEverySequence) {
   const Lidar lidar(preset("velodyne_vlp16"));
-  const PointCloud scan = lidar.scan(scene_of(flat_ground(0)), still_at({0, 0, 1}), 0, Seed{7}, 0);
+  const PointCloud scan =
+      lidar.scan(scene_of(flat_ground(0)), still_at({0, 0, 1}), 0, Seed{7}, 0).echoes;
   std::map<std::uint16_t, int> echoes;
   for (const std::uint16_t ring : scan.column<std::uint16_t>("ring")) ++echoes[ring];
-  const auto sequences = lidar.pattern().first_sequence(1);
+  const auto sequences = lidar.pattern().pulses(0) / 16;
   EXPECT_EQ(sequences, 1809);  // 0.1 s / 55.296 us = 1808.4
   EXPECT_EQ(echoes.size(),
             8u);  // rings 0 to 7 look 15 to 1 degrees down: 1 m high, the last reaches 57 m
@@ -104,7 +105,7 @@ TEST(Lidar, EveryPointLiesOnTheSurfaceAtItsRangeFromWhereItsBeamLeft) {
        {"velodyne_vlp16", "velodyne_hdl64e_s3", "velodyne_vls128", "ouster_os0_128"}) {
     const LidarSpec spec = preset(name);
     const Lidar lidar(spec);
-    const PointCloud scan = lidar.scan(scene_of(ground), X_DS, 3, Seed{7}, 0);
+    const PointCloud scan = lidar.scan(scene_of(ground), X_DS, 3, Seed{7}, 0).echoes;
     ASSERT_GT(scan.rows(), 5000u);
     const auto x = scan.column<float>("x"), y = scan.column<float>("y"),
                z = scan.column<float>("z");
@@ -126,8 +127,8 @@ TEST(Lidar, EveryPointLiesOnTheSurfaceAtItsRangeFromWhereItsBeamLeft) {
       const auto time =
           lidar.pattern().stamp(3) + std::chrono::nanoseconds(std::llround(1e9 * time_s[i]));
       const Pose X_DS_now = X_DS.pose_at(time);
-      const glm::dvec3 p_DO =
-          beam_origin(spec.pattern, ring[i], 1e-9 * static_cast<double>(time.count()), X_DS_now);
+      const glm::dvec3 p_DO = beam_origin(std::get<SpinningPattern>(spec.pattern), ring[i],
+                                          1e-9 * static_cast<double>(time.count()), X_DS_now);
       ASSERT_NEAR(range_m[i], glm::length(p_DQ - p_DO), 3e-7) << name << i;
       ASSERT_LT(glm::length(X_DS_now * glm::dvec3(x[i], y[i], z[i]) - p_DQ), 1e-4) << name << i;
       ASSERT_GE(time_s[i], last_time_s);
@@ -141,8 +142,8 @@ TEST(Lidar, ExactAndFastTracingGiveTheSameScan) {
       testing::with_holes(testing::fractal(513, 1, 60, Seed{1}), 20, 5, Seed{2});
   const Trajectory X_DS = still_at({0, 0, ground.max_height_m() + 2});
   const Lidar lidar(preset("velodyne_vls128"));
-  const PointCloud fast = lidar.scan(scene_of(ground), X_DS, 0, Seed{7}, 0);
-  const PointCloud exact = lidar.scan(scene_of(ground, Tracing::Exact), X_DS, 0, Seed{7}, 0);
+  const PointCloud fast = lidar.scan(scene_of(ground), X_DS, 0, Seed{7}, 0).echoes;
+  const PointCloud exact = lidar.scan(scene_of(ground, Tracing::Exact), X_DS, 0, Seed{7}, 0).echoes;
   // 240,000 pulses at 5e-6: at most one may differ; with this seed none does.
   ASSERT_EQ(fast.rows(), exact.rows());
   EXPECT_THAT(fast.column<double>("range_true"),
@@ -168,7 +169,7 @@ TEST(Lidar, SameBytesForAnyNumberOfThreads) {
     std::vector<PointCloud> scans;
     for (const std::size_t threads : {1, 2, 5}) {
       const tbb::global_control limit(tbb::global_control::max_allowed_parallelism, threads);
-      scans.push_back(lidar.scan(scene_of(ground, tracing), X_DS, 5, Seed{7}, 0));
+      scans.push_back(lidar.scan(scene_of(ground, tracing), X_DS, 5, Seed{7}, 0).echoes);
     }
     expect_same_bytes(scans[0], scans[1]);
     expect_same_bytes(scans[0], scans[2]);
@@ -178,9 +179,9 @@ TEST(Lidar, SameBytesForAnyNumberOfThreads) {
 TEST(Lidar, RangeNoiseIsGaussianAlongTheBeamAndLeavesTheTruthAlone) {
   LidarSpec spec = preset("velodyne_vlp16");
   const Scene scene = scene_of(flat_ground(0));
-  const PointCloud clean = Lidar(spec).scan(scene, still_at({0, 0, 2}), 0, Seed{7}, 0);
+  const PointCloud clean = Lidar(spec).scan(scene, still_at({0, 0, 2}), 0, Seed{7}, 0).echoes;
   spec.range_noise_sigma_m = 0.05;
-  const PointCloud noisy = Lidar(spec).scan(scene, still_at({0, 0, 2}), 0, Seed{7}, 0);
+  const PointCloud noisy = Lidar(spec).scan(scene, still_at({0, 0, 2}), 0, Seed{7}, 0).echoes;
   const auto truth = clean.column<double>("range_true");
   ASSERT_THAT(noisy.column<double>("range_true"), ::testing::ElementsAreArray(truth));
   double sum = 0, square = 0;
@@ -206,10 +207,10 @@ TEST(Lidar, NoiseDependsOnSeedSensorAndSweep) {
   const Scene scene = scene_of(flat_ground(0));
   const Trajectory X_DS = still_at({0, 0, 2});
   std::set<float> first;
-  first.insert(lidar.scan(scene, X_DS, 0, Seed{7}, 0).column<float>("z")[0]);
-  first.insert(lidar.scan(scene, X_DS, 0, Seed{8}, 0).column<float>("z")[0]);
-  first.insert(lidar.scan(scene, X_DS, 0, Seed{7}, 1).column<float>("z")[0]);
-  first.insert(lidar.scan(scene, X_DS, 1, Seed{7}, 0).column<float>("z")[0]);
+  first.insert(lidar.scan(scene, X_DS, 0, Seed{7}, 0).echoes.column<float>("z")[0]);
+  first.insert(lidar.scan(scene, X_DS, 0, Seed{8}, 0).echoes.column<float>("z")[0]);
+  first.insert(lidar.scan(scene, X_DS, 0, Seed{7}, 1).echoes.column<float>("z")[0]);
+  first.insert(lidar.scan(scene, X_DS, 1, Seed{7}, 0).echoes.column<float>("z")[0]);
   EXPECT_EQ(first.size(), 4u);
 }
 
@@ -217,7 +218,7 @@ TEST(Lidar, ReportsNothingOutsideItsGate) {
   LidarSpec spec = preset("velodyne_vlp16");
   spec.gate = {5, 20};
   const PointCloud scan =
-      Lidar(spec).scan(scene_of(flat_ground(0)), still_at({0, 0, 1}), 0, Seed{7}, 0);
+      Lidar(spec).scan(scene_of(flat_ground(0)), still_at({0, 0, 1}), 0, Seed{7}, 0).echoes;
   const auto range_m = scan.column<double>("range_true");
   ASSERT_GT(scan.rows(), 0u);
   EXPECT_THAT(range_m, ::testing::Each(::testing::AllOf(::testing::Ge(5), ::testing::Le(20))));
@@ -225,7 +226,8 @@ TEST(Lidar, ReportsNothingOutsideItsGate) {
 
 TEST(Lidar, CarriesIncidenceNormalAndLabels) {
   const PointCloud scan = Lidar(preset("velodyne_vlp16"))
-                              .scan(scene_of(flat_ground(0)), still_at({0, 0, 2}), 0, Seed{7}, 0);
+                              .scan(scene_of(flat_ground(0)), still_at({0, 0, 2}), 0, Seed{7}, 0)
+                              .echoes;
   const auto ring = scan.column<std::uint16_t>("ring");
   const auto incidence_rad = scan.column<float>("incidence");
   for (std::size_t i = 0; i < scan.rows(); ++i) {

@@ -73,6 +73,10 @@ std::string with(std::string text, std::string_view old, std::string_view fresh)
   return text.replace(place, old.size(), fresh);
 }
 
+const SpinningPattern& spinning(const LidarSpec& lidar) {
+  return std::get<SpinningPattern>(lidar.pattern);
+}
+
 SceneSpec parse(const std::string& text) {
   return parse_scene(text, "scenes/prairie.yaml", data_folder() / "sensors");
 }
@@ -116,7 +120,7 @@ TEST(SceneFile, ReadsEveryKey) {
   EXPECT_EQ(top.name, "top");
   EXPECT_EQ(top.source, "velodyne_vlp16");
   EXPECT_EQ(top.lidar.model, "Velodyne VLP-16 (Puck)");
-  EXPECT_EQ(top.lidar.pattern.rate_hz, 20);
+  EXPECT_EQ(spinning(top.lidar).rate_hz, 20);
   EXPECT_EQ(top.lidar.gate.near_m, 0.4);
   EXPECT_EQ(top.lidar.gate.far_m, 50);
   EXPECT_EQ(top.lidar.range_noise_sigma_m, 0.02);
@@ -156,7 +160,7 @@ lidars: [{name: a, preset: hesai_xt32, mount: {}}]
   EXPECT_EQ(scene.terrain.label, 1);
   EXPECT_EQ(std::get<RecordedPath>(scene.platform).tum, "scenes/path.tum");
   EXPECT_EQ(scene.lidars[0].X_BS, Pose{});
-  EXPECT_EQ(scene.lidars[0].lidar.pattern.rate_hz, 10);
+  EXPECT_EQ(spinning(scene.lidars[0].lidar).rate_hz, 10);
   EXPECT_EQ(scene.lidars[0].lidar.range_noise_sigma_m, 0);
 }
 
@@ -271,8 +275,8 @@ TEST(SceneFile, RefusesValuesOutOfRange) {
 TEST(SceneFile, RefusesAnUnknownPresetAndListsTheKnown) {
   EXPECT_THAT(complaint("velodyne_vlp16", "velodyne_vlp-16"),
               AllOf(HasSubstr(":18:13: key 'preset': 'velodyne_vlp-16' is not in "),
-                    HasSubstr("did you mean 'velodyne_vlp16'?; it has hesai_pandar64, hesai_xt32, "
-                              "ouster_os0_128")));
+                    HasSubstr("did you mean 'velodyne_vlp16'?; it has hesai_pandar64, hesai_qt128, "
+                              "hesai_xt32, ouster_os0_128")));
 }
 
 TEST(SceneFile, TakesExactlyOnePathAndOneLidarSource) {
@@ -345,18 +349,18 @@ TEST(SceneFile, ThatIsNotThereIsNamed) {
 TEST(LidarFile, ReadsEveryKey) {
   const LidarSpec lidar = parse_lidar(lidar_text, "mine.yaml");
   EXPECT_EQ(lidar.model, "Two beams");
-  EXPECT_EQ(lidar.pattern.rate_hz, 10);
-  EXPECT_EQ(lidar.pattern.sense, SpinningPattern::Sense::CounterClockwise);
-  EXPECT_DOUBLE_EQ(lidar.pattern.start_azimuth_rad, glm::radians(180.));
-  EXPECT_DOUBLE_EQ(lidar.pattern.firing_period_s, 1e-4);
+  EXPECT_EQ(spinning(lidar).rate_hz, 10);
+  EXPECT_EQ(spinning(lidar).sense, SpinningPattern::Sense::CounterClockwise);
+  EXPECT_DOUBLE_EQ(spinning(lidar).start_azimuth_rad, glm::radians(180.));
+  EXPECT_DOUBLE_EQ(spinning(lidar).firing_period_s, 1e-4);
   EXPECT_EQ(lidar.gate.near_m, 0.3);
   EXPECT_EQ(lidar.gate.far_m, std::numeric_limits<double>::infinity());
-  ASSERT_EQ(lidar.pattern.beams.size(), 2u);
-  const Beam& beam = lidar.pattern.beams[1];
+  ASSERT_EQ(spinning(lidar).beams.size(), 2u);
+  const Beam& beam = spinning(lidar).beams[1];
   EXPECT_EQ(beam.ring, 0);
   EXPECT_DOUBLE_EQ(beam.elevation_rad, glm::radians(30.));
   EXPECT_DOUBLE_EQ(beam.azimuth_offset_rad, glm::radians(-2.));
-  EXPECT_EQ(lidar.pattern.beams[0].origin_m, glm::dvec3(0, 0, 0.01));
+  EXPECT_EQ(spinning(lidar).beams[0].origin_m, glm::dvec3(0, 0, 0.01));
   EXPECT_DOUBLE_EQ(beam.firing_time_s, 50e-6);
 }
 

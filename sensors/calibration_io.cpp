@@ -1,0 +1,135 @@
+#include "sensors/calibration_io.h"
+
+#include <fmt/ranges.h>
+
+#include <algorithm>
+#include <cmath>
+#include <glm/trigonometric.hpp>
+#include <map>
+#include <optional>
+#include <set>
+
+#include "core/error.h"
+#include "core/product_io.h"
+#include "core/text_lines.h"
+#include "sensors/csv_cells.h"
+
+namespace groundray {
+namespace {
+
+namespace fs = std::filesystem;
+
+constexpr std::size_t most_beams = 65536;  // rings have 16 bits
+
+std::string lower(std::string_view text) {
+  std::string result(text);
+  std::ranges::transform(result, result.begin(), [](char c) {
+    return c >= 'A' && c <= 'Z' ? static_cast<char>(c - 'A' + 'a') : c;
+  });
+  return result;
+}
+
+struct HesaiColumns {
+  std::size_t channel, elevation, azimuth;
+};
+
+// Returns the columns if a line is the header.
+std::optional<HesaiColumns> hesai_header(const std::vector<std::string_view>& cells) {
+  std::map<std::string, std::size_t> at;
+  for (std::size_t i = 0; i < cells.size(); ++i) at.emplace(lower(cells[i]), i);
+  const auto channel = at.contains("channel") ? at.find("channel") : at.find("laser id");
+  const auto elevation = at.find("elevation");
+  const auto azimuth = at.find("azimuth");
+  if (channel == at.end() || elevation == at.end() || azimuth == at.end()) return std::nullopt;
+  return HesaiColumns{channel->second, elevation->second, azimuth->second};
+}
+
+Beam hesai_beam(const std::vector<std::string_view>& cells, const HesaiColumns& columns) {
+  const auto value = [&](std::size_t column, const char* name) {
+    if (column >= cells.size()) throw Error("it has no {}", name);
+    const auto number = number_of<double>(cells[column]);
+    if (!number || !std::isfinite(*number)) {
+      throw Error("{} = '{}' must be a finite number", name, cells[column].substr(0, 40));
+    }
+    return *number;
+  };
+  const double channel = value(columns.channel, "Channel");
+  const double elevation_deg = value(columns.elevation, "Elevation");
+  if (!(channel >= 1 && channel <= most_beams && channel == std::floor(channel))) {
+    throw Error("Channel = {} must be a whole number from 1 to {}", channel, most_beams);
+  }
+  if (!(std::abs(elevation_deg) <= 90)) {
+    throw Error("Elevation = {} must be from -90 to 90: are its columns swapped?", elevation_deg);
+  }
+  Beam beam;
+  beam.elevation_rad = glm::radians(elevation_deg);
+  // Hesai adds it to an azimuth that counts clockwise.
+  beam.azimuth_offset_rad = -glm::radians(value(columns.azimuth, "Azimuth"));
+  beam.ring = static_cast<std::uint16_t>(channel - 1);
+  return beam;
+}
+
+}  // namespace
+
+std::vector<Beam> parse_hesai_csv(std::string_view text, const fs::path& path) {
+  constexpr std::size_t most_faults = 100;
+  std::optional<HesaiColumns> columns;
+  std::vector<Beam> beams;
+  std::set<std::uint16_t> rings;
+  std::vector<std::string> faults;
+  TextLines lines(text);
+  while (const auto line = lines.next()) {
+    const auto cells = cells_of(*line);
+    if (line->empty() || (cells.size() == 1 && cells[0].empty())) continue;
+    if (!columns) {  // newer files begin with a line or two of their own
+      columns = hesai_header(cells);
+      continue;
+    }
+    if (lower(cells[0]).find_first_not_of("0123456789abcdef") == std::string::npos &&
+        cells.size() == 1) {
+      continue;  // the checksum at the end
+    }
+    try {
+      beams.push_back(hesai_beam(cells, *columns));
+      if (!rings.insert(beams.back().ring).second) {
+        throw Error("Channel {} is repeated", beams.back().ring + 1);
+      }
+    } catch (const Error& rule) {
+      faults.push_back(fmt::format("{}:{}: {}", path.string(), lines.number(), rule.what()));
+      if (faults.size() == most_faults) break;
+    }
+  }
+  if (!columns) {
+    throw Error(
+        "{}: no line names the columns Channel,Elevation,Azimuth: is it an angle correction"
+        " file of Hesai?",
+        path.string());
+  }
+  if (!faults.empty()) throw Error("{}", fmt::join(faults, "\n"));
+  if (beams.empty()) throw Error("{}: it holds no channel", path.string());
+  std::ranges::sort(beams, {}, &Beam::ring);
+  return beams;
+}
+
+std::vector<Beam> load_hesai_csv(const fs::path& path) {
+  return parse_hesai_csv(read_text(path), path);
+}
+
+SpinningPattern with_calibration(SpinningPattern pattern, std::span<const Beam> unit) {
+  Violations broken("calibration");
+  broken.unless(pattern.beams.size() == unit.size(),
+                "it has {} beams, but the pattern has {}: is it of another model?", unit.size(),
+                pattern.beams.size());
+  broken.unless(std::ranges::count(pattern.beams, 0, &Beam::loop) ==
+                    static_cast<std::ptrdiff_t>(pattern.beams.size()),
+                "the pattern fires in loops, so its beams are not in the file's order");
+  broken.throw_if_any();
+  for (std::size_t i = 0; i < unit.size(); ++i) {
+    const double firing_time_s = pattern.beams[i].firing_time_s;
+    pattern.beams[i] = unit[i];
+    pattern.beams[i].firing_time_s = firing_time_s;
+  }
+  return pattern;
+}
+
+}  // namespace groundray

@@ -1,0 +1,101 @@
+#pragma once
+
+#include <cstdint>
+#include <glm/vec3.hpp>
+#include <span>
+#include <vector>
+
+#include "core/material.h"
+#include "core/random.h"
+#include "core/ray_tracer.h"
+#include "sensors/atmosphere.h"
+#include "sensors/lidar_spec.h"
+#include "sensors/radar_equation.h"
+#include "sensors/receiver.h"
+
+namespace groundray {
+
+/// What came back of a pulse: an echo, and the truth about it.
+struct Echo {
+  /// Where an echo comes from.
+  enum class Kind : std::uint8_t { Surface, Air, FalseAlarm };
+  Detection detection;
+  Kind kind = Kind::Surface;
+  // Of the surface that most of its energy comes from, weighed by energy:
+  double range_m = 0;      ///< from where the beam leaves
+  glm::dvec3 p_DQ{0};      ///< in D
+  glm::vec3 normal{0};     ///< unit, axes of D
+  float share = 0;         ///< of the echo's energy
+  float second_share = 0;  ///< that of the surface with the most energy but for this one
+  float deviation_m = 0;   ///< the largest of its hits'
+  double bound_m = 0;      ///< the largest error bound of its hits, if these have any
+};
+
+/// Why a pulse has no echo.
+enum class NoReturn : std::uint8_t {
+  Sky,             ///< it meets nothing
+  OutOfGate,       ///< all that it meets is nearer or farther than the range gate
+  BelowThreshold,  ///< what comes back is too weak
+  Absorbed,        ///< and would not be but for the air
+};
+
+/// Energy, air and electronics of a lidar: from the hits of a pulse's sub-rays to echoes.
+/// Immutable, so any number of threads may use one.
+class Light {
+ public:
+  /// Buffers of one thread, for pulse after pulse.
+  struct Workspace {
+    std::vector<Arrival> arrivals;
+    Waveform waveform;
+    Detections detections;
+    std::vector<Echo> echoes;          ///< of the last pulse, by reported range
+    NoReturn reason = NoReturn::Sky;   ///< of the last pulse, if it has no echo
+    std::vector<double> energy_j;      ///< of each sub-ray, 0 where it met nothing
+    std::vector<std::uint32_t> order;  ///< the sub-rays that met something, by range
+    std::vector<float> air_w;
+  };
+
+  /// @throws Error listing what is out of bounds in `spec` and `air`.
+  Light(const LightSpec& spec, const AtmosphereSpec& air, const RangeGate& gate);
+
+  const LightSpec& spec() const { return spec_; }
+  double interval_s() const { return receiver_.interval_s(); }  ///< between a waveform's samples
+  /// How far apart the ranges of neighbouring sub-rays may be: c FWHM / 4.
+  double resolution_m() const { return resolution_m_; }
+
+  /// Finds the echoes of one pulse.
+  /// @param hits  one for each of `rays`, which share the pulse's energy equally.
+  /// @param bounds_m  of the hits' ranges; may be empty.
+  /// @param brdf  of what they hit.
+  void receive(std::span<const Ray> rays, std::span<const Hit> hits,
+               std::span<const double> bounds_m, const RetroBrdf& brdf, const RandomKey& key,
+               Workspace& work) const noexcept;
+
+  /// Returns what the sensor reports as the intensity of an echo.
+  float intensity(const Detection& detection) const noexcept;
+  /// Returns the range that the sensor reports, quantised.
+  double reported_m(const Detection& detection) const noexcept;
+
+ private:
+  void collect(std::span<const Ray> rays, std::span<const Hit> hits, const RetroBrdf& brdf,
+               Workspace& work) const noexcept;
+  void add_air(std::span<const Hit> hits, Workspace& work) const noexcept;
+  void tell_truth(std::span<const Ray> rays, std::span<const Hit> hits,
+                  std::span<const double> bounds_m, const Detection& detection,
+                  Workspace& work) const noexcept;
+  NoReturn reason_for_none(std::span<const Hit> hits, const Workspace& work) const noexcept;
+  void sample_air(const AtmosphereSpec& air);
+
+  LightSpec spec_;
+  RangeGate gate_;
+  Atmosphere atmosphere_;
+  RadarEquation radar_;
+  Receiver receiver_;
+  double resolution_m_;
+  double perpendicular_w_m2_;  // peak power times range squared, of a white Lambertian target
+  double sun_w_;               // of a white surface
+  std::int64_t first_air_bin_ = 0;
+  std::vector<float> air_w_;  // what the air sends back if nothing ends it, from that bin on
+};
+
+}  // namespace groundray

@@ -1,0 +1,133 @@
+#include "sensors/line_pattern.h"
+
+#include <algorithm>
+#include <cmath>
+#include <numbers>
+#include <vector>
+
+#include "core/error.h"
+
+namespace groundray {
+namespace {
+
+using Mirror = LinePattern::Mirror;
+
+constexpr double pi = std::numbers::pi;
+constexpr double tolerance = 1e-9;  // rates and angles are decimal figures that doubles approximate
+constexpr int most_facets = 1000;
+constexpr int most_lines = 1'000'000;
+
+// The part of a line's time in which its pulses are.
+double active_fraction(const LinePattern& pattern) {
+  if (pattern.mirror != Mirror::Polygon) return 1;
+  return std::abs(pattern.to_rad - pattern.from_rad) * pattern.facets / (4 * pi);
+}
+
+// A laser never fires faster than its rate, so the last pulse leaves room before the next line; a
+// polygon's dead time does so anyway, and its last pulse may be the end of the field of view.
+double pulses_of_line(const LinePattern& pattern) {
+  const double fraction = active_fraction(pattern);
+  const double steps = fraction * pattern.pulse_rate_hz / pattern.line_rate_hz;
+  return std::floor(steps * (1 + tolerance)) + (fraction < 1 - tolerance ? 1 : 0);
+}
+
+void check_polygon(const LinePattern& pattern, Violations& broken) {
+  if (pattern.mirror != Mirror::Polygon) {
+    broken.unless(pattern.facets == 0, "facets = {} is for polygons alone: leave it out",
+                  pattern.facets);
+    return;
+  }
+  broken.unless(pattern.facets >= 3 && pattern.facets <= most_facets,
+                "facets = {} must be from 3 to {}", pattern.facets, most_facets);
+  broken.unless(active_fraction(pattern) <= 1 + tolerance,
+                "a facet of {} sweeps {:.6g} rad, less than the {:.6g} rad from from_rad to to_rad",
+                pattern.facets, 4 * pi / pattern.facets,
+                std::abs(pattern.to_rad - pattern.from_rad));
+}
+
+void check(const LinePattern& pattern) {
+  Violations broken("LinePattern");
+  const auto positive = [&](double value, const char* name) {
+    broken.unless(value > 0 && std::isfinite(value), "{} = {} must be positive and finite", name,
+                  value);
+  };
+  positive(pattern.line_rate_hz, "line_rate_hz");
+  positive(pattern.pulse_rate_hz, "pulse_rate_hz");
+  for (const double angle_rad : {pattern.from_rad, pattern.to_rad}) {
+    broken.unless(std::abs(angle_rad) <= 2 * pi,
+                  "scan angle {} must be in [-2 pi, 2 pi]: is it in degrees?", angle_rad);
+  }
+  broken.unless(pattern.from_rad != pattern.to_rad, "from_rad = to_rad = {}: the line is empty",
+                pattern.from_rad);
+  broken.unless(std::isfinite(pattern.head_rate_hz), "head_rate_hz = {} must be finite",
+                pattern.head_rate_hz);
+  broken.unless(std::isfinite(pattern.head_start_rad), "head_start_rad = {} must be finite",
+                pattern.head_start_rad);
+  broken.unless(pattern.lines_per_sweep >= 1 && pattern.lines_per_sweep <= most_lines,
+                "lines_per_sweep = {} must be from 1 to {}", pattern.lines_per_sweep, most_lines);
+  check_polygon(pattern, broken);
+  const double pulses = pulses_of_line(pattern);
+  broken.unless(pulses >= 1 && pulses <= LineScan::most_pulses_per_line,
+                "a line has {} pulses, but must have 1 to {}: are the rates in Hz?", pulses,
+                LineScan::most_pulses_per_line);
+  broken.throw_if_any();
+}
+
+// The scan angle at a part of a line's time from 0 to 1; `back` in every other line of a mirror
+// that swings.
+double scan_angle_rad(const LinePattern& pattern, double part, bool back) {
+  const double from = back ? pattern.to_rad : pattern.from_rad;
+  const double to = back ? pattern.from_rad : pattern.to_rad;
+  if (pattern.mirror == Mirror::Sine) {
+    return (from + to) / 2 + (from - to) / 2 * std::cos(pi * part);
+  }
+  if (pattern.mirror == Mirror::Triangle) return from + (to - from) * part;
+  const double sweep_rad = std::copysign(4 * pi / pattern.facets, to - from);
+  return (from + to) / 2 + sweep_rad * (part - 0.5);
+}
+
+FiringCycle::Firing firing_at(LinePattern::Plane plane, double angle_rad) {
+  const double cosine = std::cos(angle_rad);
+  const double sine = std::sin(angle_rad);
+  FiringCycle::Firing firing;
+  if (plane == LinePattern::Plane::Upright) {
+    firing.shot.direction = {cosine, 0, sine};
+    firing.horizontal = {0, 1, 0};
+  } else {
+    firing.shot.direction = {0, sine, -cosine};
+    firing.horizontal = {0, cosine, sine};
+  }
+  return firing;
+}
+
+FiringCycle cycle_of(const LinePattern& pattern) {
+  check(pattern);
+  const auto pulses = static_cast<int>(pulses_of_line(pattern));
+  const double period_s = 1 / pattern.line_rate_hz;
+  const double begin_s = period_s * std::max(0., 1 - active_fraction(pattern)) / 2;
+  std::vector<FiringCycle::Firing> firings;
+  for (int line = 0; line < (pattern.mirror == Mirror::Polygon ? 1 : 2); ++line) {
+    for (int pulse = 0; pulse < pulses; ++pulse) {
+      const double time_s = begin_s + pulse / pattern.pulse_rate_hz;
+      const double angle_rad = scan_angle_rad(pattern, time_s * pattern.line_rate_hz, line == 1);
+      firings.push_back(firing_at(pattern.plane, angle_rad));
+      firings.back().sequence = line;
+      firings.back().firing_time_s = time_s;
+    }
+  }
+  return {std::move(firings), period_s, HeadTurn{pattern.head_rate_hz, pattern.head_start_rad}};
+}
+
+}  // namespace
+
+LineScan::LineScan(const LinePattern& pattern)
+    : lines_per_sweep_(pattern.lines_per_sweep),
+      cycle_(cycle_of(pattern)),
+      pulses_per_line_(static_cast<std::int64_t>(pulses_of_line(pattern))) {}
+
+void LineScan::fill(std::int64_t sweep, NumberRange pulses, PulseBatch& batch) const noexcept {
+  const std::int64_t before = sweep * this->pulses(sweep);
+  cycle_.fill({before + pulses.begin, before + pulses.end}, batch, 0);
+}
+
+}  // namespace groundray

@@ -1,0 +1,67 @@
+#include <fmt/format.h>
+
+#include <cstdio>
+#include <exception>
+#include <filesystem>
+#include <string>
+
+#include "sensors/calibration_io.h"
+#include "sensors/scan_pattern.h"
+#include "sensors/spec_io.h"
+
+namespace {
+
+namespace fs = std::filesystem;
+using groundray::Beam;
+using groundray::PatternSpec;
+using groundray::ScanPattern;
+using groundray::SpinningPattern;
+
+PatternSpec pattern_of(const fs::path& file) {
+  if (file.extension() == ".json") return groundray::load_ouster_metadata(file);
+  return groundray::load_lidar(file).pattern;
+}
+
+std::vector<Beam> unit_of(const fs::path& file) {
+  if (file.extension() == ".xml") return groundray::load_velodyne_xml(file);
+  if (file.extension() == ".csv") return groundray::load_hesai_csv(file);
+  return groundray::load_velodyne_yaml(file);
+}
+
+void print(const ScanPattern& scan, std::int64_t sweep) {
+  groundray::PulseBatch batch;
+  scan.fill(sweep, 0, scan.pulses(sweep), batch);
+  fmt::print("time_s,ring,dx,dy,dz,ox_m,oy_m,oz_m\n");
+  for (const auto& volley : batch.volleys) {
+    for (std::size_t i = volley.begin; i < volley.end; ++i) {
+      const glm::dvec3& d = batch.direction[i];
+      const glm::dvec3& o = batch.origin_m[i];
+      fmt::print("{:.12f},{},{:.17g},{:.17g},{:.17g},{:.17g},{:.17g},{:.17g}\n", volley.time_s,
+                 batch.ring[i], d.x, d.y, d.z, o.x, o.y, o.z);
+    }
+  }
+}
+
+}  // namespace
+
+// Prints the pulses of a sweep as CSV, for the checks in Python:
+//   print_pulses LIDAR SWEEP [UNIT]
+// LIDAR is a lidar file or the metadata of an Ouster; UNIT is a calibration that goes over it.
+int main(int argc, char** argv) {
+  if (argc != 3 && argc != 4) {
+    fmt::print(stderr, "usage: print_pulses LIDAR SWEEP [UNIT]\n");
+    return 2;
+  }
+  try {
+    PatternSpec pattern = pattern_of(argv[1]);
+    if (argc == 4) {
+      pattern = groundray::with_calibration(std::get<SpinningPattern>(std::move(pattern)),
+                                            unit_of(argv[3]));
+    }
+    print(ScanPattern(pattern), std::stoll(argv[2]));
+  } catch (const std::exception& fault) {
+    fmt::print(stderr, "{}\n", fault.what());
+    return 1;
+  }
+  return 0;
+}
