@@ -116,20 +116,39 @@ std::vector<Beam> load_hesai_csv(const fs::path& path) {
 }
 
 SpinningPattern with_calibration(SpinningPattern pattern, std::span<const Beam> unit) {
-  Violations broken("calibration");
-  broken.unless(pattern.beams.size() == unit.size(),
-                "it has {} beams, but the pattern has {}: is it of another model?", unit.size(),
-                pattern.beams.size());
-  broken.unless(std::ranges::count(pattern.beams, 0, &Beam::loop) ==
-                    static_cast<std::ptrdiff_t>(pattern.beams.size()),
-                "the pattern fires in loops, so its beams are not in the file's order");
-  broken.throw_if_any();
-  for (std::size_t i = 0; i < unit.size(); ++i) {
-    const double firing_time_s = pattern.beams[i].firing_time_s;
-    pattern.beams[i] = unit[i];
-    pattern.beams[i].firing_time_s = firing_time_s;
+  const bool loops = std::ranges::any_of(pattern.beams, [](const Beam& b) { return b.loop > 0; });
+  std::set<std::uint16_t> rings;
+  for (const Beam& beam : pattern.beams) rings.insert(beam.ring);
+  const std::size_t beams = loops ? rings.size() : pattern.beams.size();
+  if (beams != unit.size()) {
+    throw Error("calibration: it has {} beams, but the pattern has {}: is it of another model?",
+                unit.size(), beams);
+  }
+  for (std::size_t i = 0; i < pattern.beams.size(); ++i) {
+    Beam& beam = pattern.beams[i];
+    const auto own = loops ? std::ranges::find(unit, beam.ring, &Beam::ring)
+                           : unit.begin() + static_cast<std::ptrdiff_t>(i);
+    if (own == unit.end()) throw Error("calibration: it has no ring {}", beam.ring);
+    beam.elevation_rad = own->elevation_rad;
+    beam.azimuth_offset_rad = own->azimuth_offset_rad;
+    beam.origin_m = own->origin_m;
+    beam.ring = own->ring;
   }
   return pattern;
+}
+
+PatternSpec calibrated(const PatternSpec& pattern, const fs::path& file) {
+  const std::string extension = lower(file.extension().string());
+  if (extension == ".json") return load_ouster_metadata(file);
+  const auto* spinning = std::get_if<SpinningPattern>(&pattern);
+  if (!spinning) throw Error("{}: only the tables of spinning heads have units", file.string());
+  if (extension == ".xml") return with_calibration(*spinning, load_velodyne_xml(file));
+  if (extension == ".csv") return with_calibration(*spinning, load_hesai_csv(file));
+  if (extension == ".yaml" || extension == ".yml")
+    return with_calibration(*spinning, load_velodyne_yaml(file));
+  throw Error(
+      "{}: must be a Velodyne's .xml, .yaml or .yml, a Hesai's .csv or the .json of an Ouster",
+      file.string());
 }
 
 }  // namespace groundray

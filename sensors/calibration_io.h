@@ -6,7 +6,7 @@
 #include <string_view>
 #include <vector>
 
-#include "sensors/spinning_pattern.h"
+#include "sensors/scan_pattern.h"
 
 // The calibration files that vendors ship with one unit, understood as beams in the order of their
 // lasers, channels or rows. What each file's figures mean is in docs/lidar_patterns.md.
@@ -42,9 +42,16 @@ std::vector<Beam> parse_velodyne_yaml(std::string_view text, const std::filesyst
 std::vector<Beam> parse_velodyne_xml(std::string_view text, const std::filesystem::path& path);
 std::vector<Beam> parse_hesai_csv(std::string_view text, const std::filesystem::path& path);
 
-/// Returns `pattern` with the angles, origins and rings of `unit`, beam by beam in the order of the
-/// tables, and its own firing times and loops: a preset made into one unit.
-/// @throws Error if the numbers of beams differ, or if the pattern has loops.
+/// Returns `pattern` with the angles, origins and rings of `unit`, and its own firing times and
+/// loops: a preset made into one unit. Beams are matched by their order in the tables, those of a
+/// pattern with loops by their rings.
+/// @throws Error if the numbers of beams differ.
 SpinningPattern with_calibration(SpinningPattern pattern, std::span<const Beam> unit);
+
+/// Returns `pattern` as a unit's file has it, whose kind its extension tells: a Velodyne's .xml,
+/// .yaml or .yml and a Hesai's .csv make a preset that unit; an Ouster's .json replaces the
+/// pattern.
+/// @throws Error as the functions above do.
+PatternSpec calibrated(const PatternSpec& pattern, const std::filesystem::path& file);
 
 }  // namespace groundray

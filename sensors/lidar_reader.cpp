@@ -7,6 +7,9 @@
 #include <string>
 #include <utility>
 
+#include "core/error.h"
+#include "sensors/calibration_io.h"
+
 namespace groundray {
 namespace {
 
@@ -408,13 +411,6 @@ void read_physics(Map& map, LidarSpec& lidar, Faults& faults) {
 
 }  // namespace
 
-void check_version(Map& root, std::string_view key, Faults& faults) {
-  std::uint64_t version = 1;
-  if (const Node* at = root.read_whole(key, Need::Required, version); at && version != 1) {
-    faults.add(*at, key, "is {}, but this groundray reads format 1 alone", version);
-  }
-}
-
 // Names that GDAL knows how to open but that are no paths (/vsizip/..., NETCDF:"..."), stay as they
 // are.
 fs::path beside(const fs::path& file, const std::string& relative) {
@@ -427,7 +423,7 @@ fs::path beside(const fs::path& file, const std::string& relative) {
 LidarSpec read_lidar(const Node& node, const fs::path& path, Faults& faults) {
   LidarSpec lidar;
   Map root(node, "", faults);
-  check_version(root, "groundray_lidar", faults);
+  yaml::check_version(root, "groundray_lidar", faults);
   root.read_text("model", Need::Required, lidar.model);
   lidar.pattern = read_pattern(root, path, faults);
   if (auto gate = root.map("range_gate_m", Need::Optional)) {
@@ -449,7 +445,15 @@ LidarSpec read_lidar(const Node& node, const fs::path& path, Faults& faults) {
   return lidar;
 }
 
-void change_lidar(Map& entry, LidarSpec& lidar, Faults& faults) {
+void change_lidar(Map& entry, const fs::path& path, LidarSpec& lidar, Faults& faults) {
+  std::string unit;
+  if (const Node* at = entry.read_text("calibration", Need::Optional, unit)) {
+    try {
+      lidar.pattern = calibrated(lidar.pattern, beside(path, unit));
+    } catch (const Error& fault) {
+      faults.add(*at, "calibration", "the unit cannot be read:\n{}", fault.what());
+    }
+  }
   double rate_hz = 0;
   if (const Node* at = entry.read_number("rate_hz", Need::Optional, rate_hz, positive)) {
     if (auto* pattern = std::get_if<SpinningPattern>(&lidar.pattern)) {

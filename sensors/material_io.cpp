@@ -1,8 +1,6 @@
 #include "sensors/material_io.h"
 
 #include <cstdint>
-#include <fstream>
-#include <iterator>
 #include <utility>
 #include <vector>
 
@@ -22,19 +20,6 @@ using yaml::Rule;
 
 constexpr Rule share_rule{[](double value) { return value >= 0 && value <= 1; },
                           "must be from 0 to 1"};
-
-std::string read_file(const fs::path& path) {
-  constexpr std::uintmax_t largest_file_bytes = 16u << 20;
-  std::error_code fault;
-  if (!fs::is_regular_file(path, fault)) throw Error("{}: there is no such file", path.string());
-  if (fs::file_size(path, fault) > largest_file_bytes) {
-    throw Error("{}: larger than any file of groundray (16 MiB)", path.string());
-  }
-  std::ifstream file(path, std::ios::binary);
-  std::string text{std::istreambuf_iterator<char>(file), {}};
-  if (!file) throw Error("{}: cannot be read", path.string());
-  return text;
-}
 
 Lambertian read_lambertian(Map spectrum, Faults& faults) {
   const auto wavelengths = spectrum.list("wavelengths_nm", Need::Required);
@@ -72,19 +57,14 @@ void check_sources(Map& root, Faults& faults) {
 
 }  // namespace
 
-Material load_material(const fs::path& path) { return parse_material(read_file(path), path); }
+Material load_material(const fs::path& path) { return parse_material(yaml::read_file(path), path); }
 
 Material parse_material(const std::string& text, const fs::path& path) {
   const Node node = yaml::parse(text, path);
   Faults faults(path);
   Map root(node, "", faults);
   Material material;
-  std::uint64_t version = 1;
-  const Node* at = root.read_whole("groundray_material", Need::Required, version);
-  if (at && version != 1) {
-    faults.add(*at, "groundray_material", "is {}, but this groundray reads format 1 alone",
-               version);
-  }
+  yaml::check_version(root, "groundray_material", faults);
   root.read_text("name", Need::Required, material.name);
   auto spectrum = root.map("spectrum", Need::Optional);
   RetroReflector retro;

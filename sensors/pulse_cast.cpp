@@ -45,9 +45,9 @@ void PulseCast::lay_axes(const SweepPath& sweep, std::int64_t begin, const Setti
     for (std::size_t i = volley.begin; i < volley.end; ++i) {
       volley_of_[i] = static_cast<std::uint32_t>(poses_.size());
       const glm::dvec3& origin_m = pulses_.origin_m[i];
-      (alone_ ? rays_[ranges_[i].first] : axes_[i]) = {
-          origin_m == glm::dvec3(0) ? pose.p_DS : pose.p_DS + pose.R_DS * origin_m,
-          pose.R_DS * pulses_.direction[i], settings.far_m};
+      Ray& axis = alone_ ? rays_[ranges_[i].first] : axes_[i];
+      axis = {origin_m == glm::dvec3(0) ? pose.p_DS : pose.p_DS + pose.R_DS * origin_m,
+              pose.R_DS * pulses_.direction[i], settings.far_m};
       if (needs_horizontals) horizontals_[i] = pose.R_DS * pulses_.horizontal[i];
     }
     poses_.push_back(pose);

@@ -5,10 +5,8 @@
 #include <algorithm>
 #include <array>
 #include <cmath>
-#include <fstream>
 #include <glm/trigonometric.hpp>
 #include <glm/vec3.hpp>
-#include <iterator>
 #include <set>
 
 #include "sensors/lidar_reader.h"
@@ -30,18 +28,6 @@ using yaml::Rule;
 
 constexpr Rule duration_rule{[](double value) { return value > 0 && value <= 1e6; },
                              "must be > 0 and at most 1e6"};
-std::string read_file(const fs::path& path) {
-  constexpr std::uintmax_t largest_file_bytes = 16u << 20;
-  std::error_code fault;
-  if (!fs::is_regular_file(path, fault)) throw Error("{}: there is no such file", path.string());
-  if (fs::file_size(path, fault) > largest_file_bytes) {
-    throw Error("{}: larger than any file of groundray (16 MiB)", path.string());
-  }
-  std::ifstream file(path, std::ios::binary);
-  std::string text{std::istreambuf_iterator<char>(file), {}};
-  if (!file) throw Error("{}: cannot be read", path.string());
-  return text;
-}
 
 // A material is named by that of a file in data/materials, or by a file.
 std::optional<Material> read_material(Map& map, const fs::path& path, const fs::path& preset_folder,
@@ -199,7 +185,7 @@ MountedLidar read_mounted(Map entry, const fs::path& path, const fs::path& prese
   }
   read_source(entry, path, preset_folder, mounted, faults);
   if (auto mount = entry.map("mount", Need::Required)) mounted.X_BS = read_mount(std::move(*mount));
-  change_lidar(entry, mounted.lidar, faults);
+  change_lidar(entry, path, mounted.lidar, faults);
   entry.close();
   return mounted;
 }
@@ -223,10 +209,31 @@ std::vector<MountedLidar> read_lidars(Map& root, const fs::path& path,
   return lidars;
 }
 
+// What lasers need of the scene.
+void check_light(const SceneSpec& scene, const Node& node, Faults& faults) {
+  const bool air_returns =
+      scene.air.backscatter_per_m_sr > 0 || std::isfinite(scene.air.fog_range_m);
+  bool has_light = false;
+  for (const MountedLidar& mounted : scene.lidars) {
+    const auto& light = mounted.lidar.light;
+    has_light |= light.has_value();
+    if (light && air_returns && light->overlap.full_from_m == 0) {
+      faults.add(node, "lidars",
+                 "the receiver of '{}' needs overlap_m: [from, to], where it begins to see its "
+                 "beam: fog sends light back from everywhere",
+                 mounted.name);
+    }
+  }
+  if (has_light && !scene.terrain.material) {
+    faults.add(node, "terrain",
+               "must name a material, for a lidar has a laser: such as material: dry_soil");
+  }
+}
+
 }  // namespace
 
 SceneSpec load_scene(const fs::path& path, const fs::path& preset_folder) {
-  return parse_scene(read_file(path), path, preset_folder);
+  return parse_scene(yaml::read_file(path), path, preset_folder);
 }
 
 SceneSpec parse_scene(const std::string& text, const fs::path& path,
@@ -236,7 +243,7 @@ SceneSpec parse_scene(const std::string& text, const fs::path& path,
   SceneSpec scene;
   scene.text = text;
   Map root(node, "", faults);
-  check_version(root, "groundray", faults);
+  yaml::check_version(root, "groundray", faults);
   root.read_whole("seed", Need::Required, scene.seed.value);
   root.read_number("duration_s", Need::Required, scene.duration_s, duration_rule);
   root.read_choice<Tracing>("tracing", Need::Optional, scene.tracing,
@@ -250,19 +257,13 @@ SceneSpec parse_scene(const std::string& text, const fs::path& path,
   if (auto weather = root.map("weather", Need::Optional))
     scene.air = read_air(std::move(*weather), faults);
   scene.lidars = read_lidars(root, path, preset_folder, faults);
-  const auto has_light = [](const MountedLidar& mounted) {
-    return mounted.lidar.light.has_value();
-  };
-  if (!scene.terrain.material && std::ranges::any_of(scene.lidars, has_light)) {
-    faults.add(node, "terrain",
-               "must name a material, for a lidar has a laser: such as material: dry_soil");
-  }
+  check_light(scene, node, faults);
   root.close();
   faults.throw_if_any();
   return scene;
 }
 
-LidarSpec load_lidar(const fs::path& path) { return parse_lidar(read_file(path), path); }
+LidarSpec load_lidar(const fs::path& path) { return parse_lidar(yaml::read_file(path), path); }
 
 LidarSpec parse_lidar(const std::string& text, const fs::path& path) {
   const Node node = yaml::parse(text, path);

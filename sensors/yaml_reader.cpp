@@ -9,6 +9,8 @@
 #include <array>
 #include <charconv>
 #include <cmath>
+#include <fstream>
+#include <iterator>
 #include <map>
 #include <numeric>
 #include <ranges>
@@ -143,6 +145,20 @@ std::size_t edit_distance(std::string_view a, std::string_view b) {
 }
 
 }  // namespace
+
+std::string read_file(const std::filesystem::path& path) {
+  namespace fs = std::filesystem;
+  constexpr std::uintmax_t largest_file_bytes = 16u << 20;
+  std::error_code fault;
+  if (!fs::is_regular_file(path, fault)) throw Error("{}: there is no such file", path.string());
+  if (fs::file_size(path, fault) > largest_file_bytes) {
+    throw Error("{}: larger than any file of groundray (16 MiB)", path.string());
+  }
+  std::ifstream file(path, std::ios::binary);
+  std::string text{std::istreambuf_iterator<char>(file), {}};
+  if (!file) throw Error("{}: cannot be read", path.string());
+  return text;
+}
 
 Node parse(const std::string& text, const std::filesystem::path& path) {
   TreeBuilder tree(path);
@@ -340,6 +356,13 @@ std::optional<std::string> nearest(std::string_view word,
     }
   }
   return best;
+}
+
+void check_version(Map& root, std::string_view key, Faults& faults) {
+  std::uint64_t version = 1;
+  if (const Node* at = root.read_whole(key, Need::Required, version); at && version != 1) {
+    faults.add(*at, key, "is {}, but this groundray reads format 1 alone", version);
+  }
 }
 
 std::string suggestion(std::string_view word, const std::vector<std::string>& candidates) {

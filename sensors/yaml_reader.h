@@ -30,6 +30,9 @@ struct Node {
   std::vector<Node> items;  ///< of a List; of a Map, key and value by turns
 };
 
+/// Returns the text of a file of at most 16 MiB. @throws Error if it cannot.
+std::string read_file(const std::filesystem::path& path);
+
 /// Returns the one document of a text. Aliases are refused: a few lines of them can stand for
 /// gigabytes.
 /// @throws Error with `path` and position if the text is not YAML, empty, of two documents or
@@ -147,6 +150,9 @@ bool numbers(const Node& node, std::string_view key, std::span<double> into, Rul
              Faults& faults);
 /// Returns whether a value is a text that is not empty; else notes the fault.
 bool is_text(const Node& node, std::string_view key, Faults& faults);
+
+/// Reads the version of a format at `key`; notes a fault unless it is 1.
+void check_version(Map& root, std::string_view key, Faults& faults);
 
 /// Returns the candidate that was probably meant by `word`: the same but for the unit, or a few
 /// letters off.

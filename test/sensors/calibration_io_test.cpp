@@ -6,6 +6,7 @@
 
 #include <cmath>
 #include <filesystem>
+#include <fstream>
 #include <glm/geometric.hpp>
 #include <limits>
 #include <numbers>
@@ -232,6 +233,38 @@ TEST(Calibration, MakesAPresetIntoOneUnit) {
   }
   EXPECT_THAT([&] { with_calibration(pattern, std::span(unit).first(1)); },
               ThrowsMessage<Error>(HasSubstr("it has 1 beams, but the pattern has 2")));
+}
+
+TEST(Calibration, MatchesTheBeamsOfLoopsByTheirRings) {
+  SpinningPattern pattern{.firing_period_s = 1e-4};
+  pattern.beams = {{.firing_time_s = 1e-6, .ring = 1, .loop = 0},
+                   {.firing_time_s = 2e-6, .ring = 0, .loop = 1},
+                   {.firing_time_s = 3e-6, .ring = 1, .loop = 1}};
+  const auto unit = parse_hesai_csv("Channel,Elevation,Azimuth\n1,5,1\n2,-5,-2\n", "a.csv");
+  const SpinningPattern calibrated = with_calibration(pattern, unit);
+  for (std::size_t i = 0; i < 3; ++i) {
+    const Beam& beam = calibrated.beams[i];
+    EXPECT_EQ(beam.ring, pattern.beams[i].ring);
+    EXPECT_EQ(beam.loop, pattern.beams[i].loop);
+    EXPECT_EQ(beam.firing_time_s, pattern.beams[i].firing_time_s);
+    EXPECT_DOUBLE_EQ(beam.elevation_rad, (beam.ring == 0 ? 5 : -5) * degree);
+  }
+  EXPECT_THAT([&] { with_calibration(pattern, std::span(unit).first(1)); },
+              ThrowsMessage<Error>(HasSubstr("it has 1 beams, but the pattern has 2")));
+}
+
+TEST(Calibration, IsReadByTheExtensionOfItsFile) {
+  const testing::TemporaryFolder folder;
+  SpinningPattern pattern{.firing_period_s = 1e-4};
+  pattern.beams = {Beam{}, Beam{}};
+  std::ofstream(folder / "unit.YML") << two_lasers_yaml;
+  const PatternSpec unit = calibrated(pattern, folder / "unit.YML");
+  EXPECT_EQ(std::get<SpinningPattern>(unit).beams[1].elevation_rad,
+            parse_velodyne_yaml(two_lasers_yaml, "")[1].elevation_rad);
+  EXPECT_THAT([&] { calibrated(pattern, "unit.txt"); },
+              ThrowsMessage<Error>(HasSubstr("unit.txt: must be a Velodyne's .xml")));
+  EXPECT_THAT([&] { calibrated(LinePattern{}, "unit.csv"); },
+              ThrowsMessage<Error>(HasSubstr("only the tables of spinning heads have units")));
 }
 
 // Presets were made from these files by other means, and rounded: angles to 1e-4 degree, which

@@ -11,22 +11,8 @@
 
 namespace {
 
-namespace fs = std::filesystem;
-using groundray::Beam;
 using groundray::PatternSpec;
 using groundray::ScanPattern;
-using groundray::SpinningPattern;
-
-PatternSpec pattern_of(const fs::path& file) {
-  if (file.extension() == ".json") return groundray::load_ouster_metadata(file);
-  return groundray::load_lidar(file).pattern;
-}
-
-std::vector<Beam> unit_of(const fs::path& file) {
-  if (file.extension() == ".xml") return groundray::load_velodyne_xml(file);
-  if (file.extension() == ".csv") return groundray::load_hesai_csv(file);
-  return groundray::load_velodyne_yaml(file);
-}
 
 void print(const ScanPattern& scan, std::int64_t sweep) {
   groundray::PulseBatch batch;
@@ -53,11 +39,10 @@ int main(int argc, char** argv) {
     return 2;
   }
   try {
-    PatternSpec pattern = pattern_of(argv[1]);
-    if (argc == 4) {
-      pattern = groundray::with_calibration(std::get<SpinningPattern>(std::move(pattern)),
-                                            unit_of(argv[3]));
-    }
+    const std::filesystem::path lidar(argv[1]);
+    PatternSpec pattern = lidar.extension() == ".json" ? groundray::load_ouster_metadata(lidar)
+                                                       : groundray::load_lidar(lidar).pattern;
+    if (argc == 4) pattern = groundray::calibrated(pattern, argv[3]);
     print(ScanPattern(pattern), std::stoll(argv[2]));
   } catch (const std::exception& fault) {
     fmt::print(stderr, "{}\n", fault.what());

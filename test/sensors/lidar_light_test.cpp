@@ -1,0 +1,632 @@
+// Lidars with light, from the ray tracer to the columns of a scan.
+#include <gmock/gmock.h>
+#include <gtest/gtest.h>
+#include <tbb/global_control.h>
+
+#include <cmath>
+#include <functional>
+#include <glm/geometric.hpp>
+#include <glm/trigonometric.hpp>
+#include <numbers>
+#include <numeric>
+
+#include "core/error.h"
+#include "sensors/lidar.h"
+#include "sensors/spec_io.h"
+#include "terrain/terrain_scene.h"
+#include "test/support/sample_terrain.h"
+#include "test/support/temporary_folder.h"
+
+namespace groundray {
+namespace {
+
+using namespace std::chrono_literals;
+using ::testing::AllOf;
+using ::testing::Each;
+using ::testing::ElementsAre;
+using ::testing::HasSubstr;
+using ::testing::ThrowsMessage;
+
+constexpr double pi = std::numbers::pi;
+constexpr double c_m_s = speed_of_light_m_per_s;
+constexpr double pulse_energy_j = 1e-7;
+constexpr double aperture_m = 0.025;
+constexpr double fwhm_s = 5e-9;
+constexpr double sigma_s = fwhm_s / fwhm_per_sigma;
+constexpr double reflectance = 0.4;
+
+Scene scene_of(const HeightGrid& ground,
+               Material material = {"grey",
+                                    Lambertian{{{300, reflectance}, {2500, reflectance}}}}) {
+  return {RayTracer({full_resolution_level(ground)}, {0, 0, 0}, Tracing::Fast),
+          {.label = 3, .instance = 4, .material = 0},
+          {std::move(material)}};
+}
+
+HeightGrid flat_ground() {
+  return {{2, 2}, {-2000, -2000}, {4000, 4000}, std::vector<float>(4, 0.0f)};
+}
+
+// Ground at height 0 for x < edge_m, and at `height_m` beyond: a wall 0.1 mm thick, 4 m long.
+HeightGrid cliff(double edge_m, float height_m) {
+  constexpr int columns = 20'001;
+  std::vector<float> heights_m(2 * columns);
+  for (int i = 0; i < columns; ++i) {
+    const double x = -1 + 1e-4 * i;
+    heights_m[static_cast<std::size_t>(i)] = heights_m[static_cast<std::size_t>(i + columns)] =
+        x < edge_m - 1e-9 ? 0.0f : height_m;
+  }
+  return {{columns, 2}, {-1, -2}, {1e-4, 4}, std::move(heights_m)};
+}
+
+Trajectory still_at(const glm::dvec3& p) {
+  return Trajectory({{0s, {{1, 0, 0, 0}, p}}, {2s, {{1, 0, 0, 0}, p}}});
+}
+
+// Pulses in the x-z plane, by how far they look down: pi / 2 is straight down.
+PatternSpec looking_down(std::initializer_list<double> angles_rad) {
+  TablePattern pattern{.period_s = 1};
+  for (const double angle_rad : angles_rad) {
+    const double time_s = 1e-5 * static_cast<double>(pattern.shots.size());
+    pattern.shots.push_back({.time_s = time_s, .elevation_rad = -angle_rad});
+  }
+  return pattern;
+}
+
+LightSpec laser() {
+  LightSpec light;
+  light.wavelength_nm = 905;
+  light.optics = {.pulse_energy_j = pulse_energy_j, .aperture_diameter_m = aperture_m};
+  light.pulse = {.energy_j = pulse_energy_j, .fwhm_s = fwhm_s};
+  light.receiver.timing = ReceiverSpec::Timing::CentreOfGravity;
+  light.receiver.threshold_w = 1e-12;
+  light.receiver.returns = ReceiverSpec::Returns::All;
+  return light;
+}
+
+LidarSpec lidar_of(PatternSpec pattern, double divergence_rad, int sub_rays, int most_sub_rays) {
+  LidarSpec spec;
+  spec.model = "test";
+  spec.pattern = std::move(pattern);
+  spec.gate = {0.1, 2000};
+  spec.beam.divergence_rad = glm::dvec2(divergence_rad);
+  spec.beam.sub_rays = sub_rays;
+  spec.beam.most_sub_rays = most_sub_rays;
+  spec.light = laser();
+  spec.no_returns = LidarSpec::NoReturns::Report;
+  return spec;
+}
+
+LidarScan scan(const LidarSpec& spec, const Scene& scene, const glm::dvec3& sensor,
+               const AtmosphereSpec& air = {}) {
+  return Lidar(spec, air).scan(scene, still_at(sensor), 0, Seed{7}, 0);
+}
+
+float only(const LidarScan& scan, const char* column) {
+  EXPECT_EQ(scan.echoes.rows(), 1u);
+  return scan.echoes.rows() == 1 ? scan.echoes.column<float>(column)[0] : 0.0f;
+}
+
+double range_m(const PointCloud& cloud, std::size_t row) {
+  return glm::length(glm::dvec3(cloud.column<float>("x")[row], cloud.column<float>("y")[row],
+                                cloud.column<float>("z")[row]));
+}
+
+// Energy over the aperture's share of the hemisphere, and the peak of a Gaussian pulse.
+double plane_power_w(double range_m) {
+  const double energy_j =
+      pulse_energy_j * reflectance / pi * (pi / 4 * aperture_m * aperture_m) / (range_m * range_m);
+  return energy_j / (sigma_s * std::sqrt(2 * pi));
+}
+
+// 1e-3 is the promise. Of it the footprint takes 3 (w/R)^2 < 2e-6 at half a milliradian, floats and
+// sampling another 3e-6.
+TEST(LidarLight, PerpendicularPlaneReturnsThePowerOfTheRadarEquation) {
+  const Scene scene = scene_of(flat_ground());
+  const LidarSpec spec = lidar_of(looking_down({pi / 2}), 1e-3, 16, 16);
+  for (const double height_m : {5., 20., 80., 320.}) {
+    const LidarScan found = scan(spec, scene, {0, 0, height_m});
+    const double expected_w = plane_power_w(height_m);
+    EXPECT_NEAR(only(found, "amplitude"), expected_w, 1e-5 * expected_w) << height_m;
+    EXPECT_NEAR(only(found, "width"), fwhm_s, 1e-5 * fwhm_s);
+    EXPECT_EQ(only(found, "share"), 1);
+    EXPECT_EQ(only(found, "second_share"), 0);
+    EXPECT_EQ(found.echoes.column<std::uint8_t>("kind")[0], 0);
+    EXPECT_TRUE(std::isinf(only(found, "snr")));
+  }
+}
+
+// What a plane sends back over time, as the integral over a Gaussian beam that the ranges of its
+// directions, cosines and distances give. The trapezium rule in both slopes converges
+// exponentially; it ends where the irradiance is e^-24 of that on the axis.
+struct PlaneEcho {
+  std::vector<double> range_m, energy;
+  double mean_m = 0, variance_m2 = 0;
+
+  PlaneEcho(double incidence_rad, double axis_m, double divergence_rad) {
+    constexpr int steps = 400;
+    const double w = std::tan(divergence_rad / 2);
+    const glm::dvec3 normal(std::sin(incidence_rad), 0, std::cos(incidence_rad));
+    double sum = 0;
+    for (int i = -steps; i <= steps; ++i) {
+      for (int k = -40; k <= 40; ++k) {
+        const double x = w * std::sqrt(12.) * i / steps, y = w * std::sqrt(12.) * k / 40;
+        const glm::dvec3 direction = glm::normalize(glm::dvec3(x, y, 1));
+        const double cosine = glm::dot(direction, normal);
+        range_m.push_back(axis_m * normal.z / cosine);
+        energy.push_back(std::exp(-2 * (x * x + y * y) / (w * w)) * cosine /
+                         (range_m.back() * range_m.back()));
+        sum += energy.back();
+        mean_m += energy.back() * range_m.back();
+      }
+    }
+    mean_m /= sum;
+    for (std::size_t i = 0; i < range_m.size(); ++i) {
+      energy[i] /= sum;
+      variance_m2 += energy[i] * std::pow(range_m[i] - mean_m, 2);
+    }
+  }
+  double power(double at_m) const {  // of unit energy and Gaussian pulses, over range
+    const double sigma_m = c_m_s / 2 * sigma_s;
+    double sum = 0;
+    for (std::size_t i = 0; i < range_m.size(); ++i) {
+      const double z = (at_m - range_m[i]) / sigma_m;
+      if (std::abs(z) < 7) sum += energy[i] * std::exp(-z * z / 2);
+    }
+    return sum / (sigma_m * std::sqrt(2 * pi));
+  }
+  double peak_m() const {
+    double low_m = mean_m - 1, high_m = mean_m + 1;
+    while (high_m - low_m > 1e-6) {
+      const double a = low_m + (high_m - low_m) / 3, b = high_m - (high_m - low_m) / 3;
+      (power(a) < power(b) ? low_m : high_m) = power(a) < power(b) ? a : b;
+    }
+    return low_m;
+  }
+  double rise_m(double level) const {  // where power first reaches it
+    double low_m = mean_m - 10, high_m = peak_m();
+    while (high_m - low_m > 1e-6) {
+      const double middle_m = (low_m + high_m) / 2;
+      (power(middle_m) < level ? low_m : high_m) = middle_m;
+    }
+    return low_m;
+  }
+};
+
+constexpr double tilts_deg[] = {0, 20, 45, 60, 70, 77, 80, 83, 85, 86, 87};
+
+// 1 mm is the promise; 47 m and 3 mrad make 19 mm of walk at 87 degrees.
+TEST(LidarLight, TiltedPlaneIsOneEchoAtTheCentroidOfItsEnergy) {
+  const Scene scene = scene_of(flat_ground());
+  constexpr double axis_m = 47, divergence_rad = 3e-3;
+  for (const double tilt_deg : tilts_deg) {
+    const double tilt_rad = glm::radians(tilt_deg);
+    const PlaneEcho plane(tilt_rad, axis_m, divergence_rad);
+    const LidarSpec spec = lidar_of(looking_down({pi / 2 - tilt_rad}), divergence_rad, 64, 1024);
+    const LidarScan found = scan(spec, scene, {0, 0, axis_m * std::cos(tilt_rad)});
+    ASSERT_EQ(found.echoes.rows(), 1u) << tilt_deg;
+    EXPECT_NEAR(range_m(found.echoes, 0), plane.mean_m, 1e-3) << tilt_deg;
+    EXPECT_NEAR(found.echoes.column<double>("range_true")[0], plane.mean_m, 1e-3) << tilt_deg;
+    const double second_order_m =
+        axis_m * (1 - 2 * std::pow(divergence_rad / 4 * std::tan(tilt_rad), 2));
+    EXPECT_NEAR(plane.mean_m, second_order_m, 1e-3) << tilt_deg;
+    EXPECT_NEAR(found.echoes.column<float>("incidence")[0], tilt_rad, 1e-6);
+    EXPECT_EQ(found.echoes.column<float>("share")[0], 1);
+  }
+}
+
+TEST(LidarLight, TiltedPlaneIsTimedByItsOwnWaveform) {
+  const Scene scene = scene_of(flat_ground());
+  using Timing = ReceiverSpec::Timing;
+  for (const auto& [axis_m, divergence_rad] : {std::pair(47., 3e-3), std::pair(100., 0.3e-3)}) {
+    for (const double tilt_deg : {0., 45., 70., 77., 83., 87.}) {
+      const double tilt_rad = glm::radians(tilt_deg);
+      const PlaneEcho plane(tilt_rad, axis_m, divergence_rad);
+      const double peak = plane.power(plane.peak_m());
+      const PlaneEcho upright(0, axis_m, divergence_rad);
+      const glm::dvec3 sensor(0, 0, axis_m * std::cos(tilt_rad));
+      const auto found_m = [&](Timing timing, double threshold_w) {
+        LidarSpec spec = lidar_of(looking_down({pi / 2 - tilt_rad}), divergence_rad, 256, 4096);
+        spec.light->receiver.timing = timing;
+        spec.light->receiver.threshold_w = threshold_w;
+        const LidarScan found = scan(spec, scene, sensor);
+        EXPECT_EQ(found.echoes.rows(), 1u) << tilt_deg;
+        return found.echoes.rows() == 0 ? 0 : range_m(found.echoes, 0);
+      };
+      // Sensors take the time from half of the peak on a plane upright to the beam as 0.
+      const double half_m = c_m_s / 2 * fwhm_s / 2;
+      const LidarScan whole = scan(
+          lidar_of(looking_down({pi / 2 - tilt_rad}), divergence_rad, 64, 1024), scene, sensor);
+      const double threshold_w = 0.2 * only(whole, "amplitude");
+      EXPECT_NEAR(found_m(Timing::LeadingEdge, threshold_w), plane.rise_m(0.2 * peak) + half_m,
+                  1e-3)
+          << axis_m << ' ' << tilt_deg;
+      EXPECT_NEAR(found_m(Timing::ConstantFraction, threshold_w), plane.rise_m(0.5 * peak) + half_m,
+                  1e-3)
+          << axis_m << ' ' << tilt_deg;
+      EXPECT_NEAR(found_m(Timing::Peak, threshold_w), plane.peak_m(), 1e-3) << axis_m << tilt_deg;
+    }
+  }
+}
+
+// 1 % is the promise, of a Gaussian echo: beyond 83 degrees a 3 mrad beam's is skewed.
+TEST(LidarLight, TiltedPlaneWidensTheEchoByItsFootprint) {
+  const Scene scene = scene_of(flat_ground());
+  for (const auto& [axis_m, divergence_rad] : {std::pair(47., 3e-3), std::pair(200., 0.5e-3)}) {
+    for (const double tilt_deg : {0., 20., 45., 60., 70., 77., 80.}) {
+      const double tilt_rad = glm::radians(tilt_deg);
+      const LidarSpec spec = lidar_of(looking_down({pi / 2 - tilt_rad}), divergence_rad, 64, 1024);
+      const LidarScan found = scan(spec, scene, {0, 0, axis_m * std::cos(tilt_rad)});
+      const double w_m = axis_m * std::tan(divergence_rad / 2);
+      const double expected = sigma_s * sigma_s + std::pow(w_m * std::tan(tilt_rad) / c_m_s, 2);
+      EXPECT_NEAR(std::pow(only(found, "width") / fwhm_per_sigma, 2), expected, 0.01 * expected)
+          << axis_m << ' ' << tilt_deg;
+    }
+  }
+}
+
+double normal_share(double z) { return 0.5 * std::erfc(-z / std::numbers::sqrt2); }
+
+// Sub-rays decide shares to 2 n^-3/4, and the wall's thickness of 0.1 mm another 2e-3.
+TEST(LidarLight, StepEdgeSharesTheEnergyBetweenItsSurfaces) {
+  constexpr int sub_rays = 1024;
+  const double tolerance = 2 * std::pow(sub_rays, -0.75) + 2e-3;
+  constexpr double high_m = 50, divergence_rad = 2e-3;
+  const LidarSpec spec = lidar_of(looking_down({pi / 2}), divergence_rad, sub_rays, sub_rays);
+  for (const float step_m : {0.5f, 10.0f}) {
+    for (const double edge_m : {-0.04, -0.03, -0.02, -0.01, 0.}) {
+      const Scene scene = scene_of(cliff(edge_m, step_m));
+      const LidarScan found = scan(spec, scene, {0, 0, high_m + step_m});
+      const double w_m = high_m * std::tan(divergence_rad / 2);
+      const double near_share = normal_share(-2 * edge_m / w_m);
+      // The edge is not on the far side of the axis, so no ray meets the wall.
+      const double far_share = 1 - near_share;
+      const double near_energy = near_share;
+      const double far_energy = far_share * std::pow(high_m / (high_m + step_m), 2);
+      const double sum = near_energy + far_energy;
+      const PointCloud& echoes = found.echoes;
+      if (step_m < 0.75f) {  // closer than c FWHM / 2: one echo of a mixture
+        ASSERT_EQ(echoes.rows(), 1u) << edge_m;
+        const double best = near_energy / sum;
+        EXPECT_NEAR(echoes.column<float>("share")[0], best, tolerance) << edge_m;
+        EXPECT_NEAR(echoes.column<float>("second_share")[0], 1 - best, tolerance) << edge_m;
+        EXPECT_EQ(echoes.column<std::uint16_t>("second_label")[0], 3);
+        const double centre_m = (near_energy * high_m + far_energy * (high_m + step_m)) / sum;
+        EXPECT_NEAR(range_m(echoes, 0), centre_m, tolerance * step_m) << edge_m;
+        EXPECT_NEAR(echoes.column<double>("range_true")[0], high_m, 1e-4);
+      } else {
+        ASSERT_EQ(echoes.rows(), 2u) << edge_m;
+        const auto amplitude_w = echoes.column<float>("amplitude");
+        const double whole_w = plane_power_w(high_m);
+        EXPECT_NEAR(amplitude_w[0] / whole_w, near_energy, tolerance) << edge_m;
+        EXPECT_NEAR(amplitude_w[1] / whole_w, far_energy, tolerance) << edge_m;
+        EXPECT_THAT(echoes.column<float>("share"), Each(::testing::Ge(0.99f)));
+        EXPECT_THAT(echoes.column<std::uint8_t>("return_index"), ElementsAre(1, 2));
+        EXPECT_THAT(echoes.column<std::uint8_t>("return_count"), Each(2));
+      }
+    }
+  }
+}
+
+// Two Gaussians have two maxima from 2 sigma = 0.85 FWHM of delay on: 0.425 c FWHM = 0.64 m.
+TEST(LidarLight, StepEdgeIsTwoEchoesFromAboutHalfAPulseOn) {
+  const LidarSpec spec = lidar_of(looking_down({pi / 2}), 2e-3, 256, 256);
+  const auto echoes_of = [&](float step_m) {
+    return scan(spec, scene_of(cliff(0, step_m)), {0, 0, 50 + step_m / 2.0}).echoes.rows();
+  };
+  EXPECT_EQ(echoes_of(0.60f), 1u);
+  EXPECT_EQ(echoes_of(0.72f), 2u);
+  EXPECT_EQ(echoes_of(0.80f), 2u);
+}
+
+// A wall 5 mm wide and 3 cm beside the axis; sub-rays are 2.8 mm apart.
+TEST(LidarLight, ThinWallThatTheAxisMissesReturns) {
+  constexpr int columns = 2001;
+  std::vector<float> heights_m(2 * columns, 0.0f);
+  for (int i = 1030; i < 1035; ++i)
+    heights_m[static_cast<std::size_t>(i)] = heights_m[static_cast<std::size_t>(i + columns)] = 5;
+  const Scene scene = scene_of({{columns, 2}, {-1, -2}, {1e-3, 4}, std::move(heights_m)});
+  constexpr int sub_rays = 1024;
+  const LidarScan found =
+      scan(lidar_of(looking_down({pi / 2}), 2e-3, sub_rays, sub_rays), scene, {0, 0, 50});
+  ASSERT_EQ(found.echoes.rows(), 2u);
+  EXPECT_NEAR(range_m(found.echoes, 0), 45, 0.01);
+  const double w_m = 45 * std::tan(1e-3);
+  const double share = normal_share(2 * 0.0345 / w_m) - normal_share(2 * 0.0295 / w_m);
+  EXPECT_NEAR(found.echoes.column<float>("amplitude")[0] / plane_power_w(45), share,
+              2 * std::pow(sub_rays, -0.75));
+}
+
+TEST(LidarLight, PulsesWithoutEchoesSayWhy) {
+  const Scene scene = scene_of(flat_ground());
+  // Down at 40 m, up, down at 1.1 times that (out of the gate), and slanting: 400 m, too weak.
+  LidarSpec spec = lidar_of(looking_down({pi / 2, -0.5, 0.1, 1.2}), 1e-3, 64, 1024);
+  spec.gate = {41, 500};
+  spec.light->receiver.threshold_w = 1.5 * plane_power_w(300) * std::sin(0.1);
+  const LidarScan found = scan(spec, scene, {0, 0, 40});
+  EXPECT_EQ(found.echoes.rows(), 1u);
+  EXPECT_THAT(found.no_returns.column<std::uint32_t>("pulse"), ElementsAre(0, 1, 2));
+  EXPECT_THAT(found.no_returns.column<std::uint8_t>("reason"), ElementsAre(1, 0, 2));
+  EXPECT_NEAR(found.no_returns.column<float>("dz")[1], std::sin(0.5), 1e-7);
+  EXPECT_NEAR(found.no_returns.column<float>("dx")[1], std::cos(0.5), 1e-7);
+  EXPECT_NEAR(found.no_returns.column<float>("time")[2], 2e-5, 1e-12);
+  // Enough for the threshold, though the footprint lasts four pulses, but for 10 dB of rain.
+  spec.pattern = looking_down({0.1});
+  spec.light->receiver.threshold_w = 0.1 * plane_power_w(400) * std::sin(0.1);
+  EXPECT_EQ(scan(spec, scene, {0, 0, 40}).echoes.rows(), 1u);
+  const LidarScan rain = scan(spec, scene, {0, 0, 40}, {.rain_mm_h = 40});
+  EXPECT_EQ(rain.echoes.rows(), 0u);
+  EXPECT_THAT(rain.no_returns.column<std::uint8_t>("reason"), ElementsAre(3));
+}
+
+TEST(LidarLight, AirTakesItsShareBothWays) {
+  const Scene scene = scene_of(flat_ground());
+  const LidarSpec spec = lidar_of(looking_down({pi / 2}), 1e-3, 16, 16);
+  for (const double height_m : {30., 120.}) {
+    const AtmosphereSpec rain{.rain_mm_h = 10};
+    const double left = std::exp(-2 * rain_extinction_per_m(10) * height_m);
+    const double expected_w = left * plane_power_w(height_m);
+    EXPECT_NEAR(only(scan(spec, scene, {0, 0, height_m}, rain), "amplitude"), expected_w,
+                1e-5 * expected_w);
+  }
+}
+
+TEST(LidarLight, DenseFogIsAnEchoOfItsOwnWithoutASurface) {
+  const Scene scene = scene_of(flat_ground());
+  LidarSpec spec = lidar_of(looking_down({pi / 2}), 1e-3, 16, 16);
+  spec.light->overlap = {1, 4};
+  const LidarScan found = scan(spec, scene, {0, 0, 25}, {.fog_range_m = 20});
+  ASSERT_EQ(found.echoes.rows(), 2u);
+  EXPECT_THAT(found.echoes.column<std::uint8_t>("kind"), ElementsAre(1, 0));
+  EXPECT_LT(range_m(found.echoes, 0), 10);
+  EXPECT_TRUE(std::isnan(found.echoes.column<double>("range_true")[0]));
+  EXPECT_THAT(found.echoes.column<std::uint16_t>("label"), ElementsAre(0, 3));
+  EXPECT_NEAR(range_m(found.echoes, 1), 25, 0.02);  // the air before it pulls its centroid
+}
+
+TEST(LidarLight, IntensityIsOnTheSensorsScale) {
+  const Scene grey = scene_of(flat_ground());
+  const Scene sheeting = scene_of(flat_ground(), {"sheeting", RetroReflector{100}});
+  LidarSpec spec = lidar_of(looking_down({pi / 2}), 1e-3, 16, 16);
+  for (const double height_m : {10., 60.}) {
+    const auto intensity = [&](IntensitySpec::Scale scale, const Scene& scene) {
+      spec.light->intensity = {.scale = scale, .gain = 2};
+      return only(scan(spec, scene, {0, 0, height_m}), "intensity");
+    };
+    EXPECT_NEAR(intensity(IntensitySpec::Scale::Power, grey), 2 * plane_power_w(height_m),
+                1e-5 * 2 * plane_power_w(height_m));
+    EXPECT_NEAR(intensity(IntensitySpec::Scale::Reflectance, grey), reflectance, 1e-5);
+    EXPECT_EQ(intensity(IntensitySpec::Scale::EightBit, grey), 40);
+    // R_A of 100 / sr is pi 100 times a white Lambertian: off the scale.
+    EXPECT_NEAR(intensity(IntensitySpec::Scale::Reflectance, sheeting), 100 * pi, 1e-2);
+    EXPECT_EQ(intensity(IntensitySpec::Scale::EightBit, sheeting), 255);
+  }
+}
+
+TEST(LidarLight, RangesAreMultiplesOfTheirStep) {
+  LidarSpec spec = lidar_of(looking_down({pi / 2}), 1e-3, 16, 16);
+  spec.light->range_step_m = 0.004;
+  const LidarScan found = scan(spec, scene_of(flat_ground()), {0, 0, 30.0123});
+  EXPECT_NEAR(found.echoes.column<float>("z")[0], -30.012, 2e-6);
+}
+
+// A preset with all that is random.
+LidarSpec noisy() {
+  LidarSpec spec = load_lidar(testing::data_folder() / "sensors/velodyne_vlp16.yaml");
+  spec.beam.divergence_rad = {3e-3, 1.5e-3};
+  spec.beam.sub_rays = 16;
+  spec.beam.most_sub_rays = 64;
+  spec.beam.turn = BeamSpec::Turn::EachPulse;
+  spec.light = laser();
+  spec.light->receiver.threshold_w = 0;
+  spec.light->receiver.response_fwhm_s = 3e-9;
+  spec.light->receiver.noise = NoiseSpec{.nep_w_per_sqrt_hz = 1e-12,
+                                         .quantum_efficiency = 0.5,
+                                         .excess_noise_factor = 3,
+                                         .false_alarm_rate_hz = 2e3};
+  spec.light->overlap = {0.5, 3};
+  spec.light->sun = {.irradiance_w_m2_nm = 0.7, .filter_width_nm = 30, .field_of_view_sr = 1e-5};
+  spec.range_noise_sigma_m = 0.01;
+  spec.angular_jitter_rad = 1e-3;
+  spec.no_returns = LidarSpec::NoReturns::Report;
+  spec.waveforms = LidarSpec::WaveformOutput::Keep;
+  return spec;
+}
+
+Trajectory ride_over(const HeightGrid& ground) {
+  std::vector<Trajectory::Sample> samples;
+  for (int k = 0; k <= 20; ++k) {
+    const double t_s = 0.1 * k;
+    const glm::dvec2 p(20 * t_s, 5 * std::sin(t_s));
+    samples.push_back({100ms * k,
+                       {rotation_from_yaw_pitch_roll(0.8 * t_s, 0.1 * std::sin(5 * t_s), 0.05),
+                        {p, *ground.height_m_at(p) + 2.5}}});
+  }
+  return Trajectory(std::move(samples));
+}
+
+// NaNs equal themselves here.
+std::string_view bytes_of(const PointCloud::Column& column) {
+  return std::visit(
+      [](const auto& values) {
+        return std::string_view(reinterpret_cast<const char*>(values.data()),
+                                values.size() * sizeof(values[0]));
+      },
+      column.values);
+}
+
+void expect_same_bytes(const PointCloud& a, const PointCloud& b) {
+  ASSERT_EQ(a.rows(), b.rows());
+  for (std::size_t i = 0; i < a.columns().size(); ++i)
+    EXPECT_EQ(bytes_of(a.columns()[i]), bytes_of(b.columns()[i])) << a.columns()[i].name;
+}
+
+TEST(LidarLight, SameBytesForAnyNumberOfThreadsWithAllNoiseOn) {
+  const HeightGrid ground = testing::fractal(513, 1, 60, Seed{1});
+  const Lidar lidar(noisy(), {.visibility_m = 5000, .backscatter_per_m_sr = 1e-5});
+  const Trajectory X_DS = ride_over(ground);
+  std::vector<LidarScan> scans;
+  for (const std::size_t threads : {1, 2, 5}) {
+    const tbb::global_control limit(tbb::global_control::max_allowed_parallelism, threads);
+    scans.push_back(lidar.scan(scene_of(ground), X_DS, 3, Seed{7}, 0));
+  }
+  ASSERT_GT(scans[0].echoes.rows(), 5000u);
+  ASSERT_GT(scans[0].no_returns.rows(), 1000u);
+  const auto kinds = scans[0].echoes.column<std::uint8_t>("kind");
+  EXPECT_GT(std::ranges::count(kinds, 2), 0);  // false alarms
+  for (const LidarScan* other : {&scans[1], &scans[2]}) {
+    expect_same_bytes(scans[0].echoes, other->echoes);
+    expect_same_bytes(scans[0].no_returns, other->no_returns);
+    EXPECT_EQ(scans[0].waveforms.power_w, other->waveforms.power_w);
+    EXPECT_EQ(scans[0].convergence.sum_squares_m2, other->convergence.sum_squares_m2);
+  }
+}
+
+TEST(LidarLight, FalseAlarmsAndAirHaveNoTruth) {
+  const HeightGrid ground = testing::fractal(513, 1, 60, Seed{1});
+  const LidarScan found = Lidar(noisy()).scan(scene_of(ground), ride_over(ground), 3, Seed{7}, 0);
+  const auto kind = found.echoes.column<std::uint8_t>("kind");
+  const auto label = found.echoes.column<std::uint16_t>("label");
+  const auto truth_m = found.echoes.column<double>("range_true");
+  for (std::size_t i = 0; i < found.echoes.rows(); ++i) {
+    EXPECT_EQ(std::isnan(truth_m[i]), kind[i] != 0);
+    EXPECT_EQ(label[i], kind[i] == 0 ? 3 : 0);
+  }
+}
+
+// Sub-rays of a Gaussian lie within 3 radii of the axis (docs/lidar_beam.md); the mean of some of
+// them does all the more. Jitter is off: the axis is what the sensor reports.
+TEST(LidarLight, NoEchoLiesOutsideItsBeam) {
+  const HeightGrid ground = testing::fractal(513, 1, 60, Seed{1});
+  LidarSpec spec = noisy();
+  spec.light->receiver.noise.reset();
+  spec.light->receiver.threshold_w = 1e-12;
+  spec.angular_jitter_rad = 0;
+  const Trajectory X_DS = ride_over(ground);
+  const Lidar lidar(spec);
+  const LidarScan found = lidar.scan(scene_of(ground), X_DS, 3, Seed{7}, 0);
+  const auto time_s = found.echoes.column<float>("time");
+  for (std::size_t i = 0; i < found.echoes.rows(); ++i) {
+    const auto time =
+        lidar.pattern().stamp(3) + std::chrono::nanoseconds(std::llround(1e9 * time_s[i]));
+    const auto at = [&](auto x, auto y, auto z) { return glm::dvec3(x[i], y[i], z[i]); };
+    const PointCloud& e = found.echoes;
+    const glm::dvec3 p_SQ =
+        inverse(X_DS.pose_at(time)) *
+        at(e.column<double>("world_x"), e.column<double>("world_y"), e.column<double>("world_z"));
+    const glm::dvec3 axis =
+        glm::normalize(at(e.column<float>("x"), e.column<float>("y"), e.column<float>("z")));
+    const double off_rad = std::asin(glm::length(glm::cross(axis, glm::normalize(p_SQ))));
+    // A VLP-16 beam leaves up to 11 mm from the origin, which the axis through it does not know.
+    ASSERT_LT(off_rad, 3 * 1.5e-3 + 2 * 0.0112 / glm::length(p_SQ)) << i;
+  }
+}
+
+TEST(LidarLight, JitterTurnsBeamsWithoutTheSensorsKnowledge) {
+  constexpr double jitter_rad = 2e-3, height_m = 20;
+  TablePattern table{.period_s = 1};
+  for (int i = 0; i < 5000; ++i)
+    table.shots.push_back({.time_s = 1e-5 * i, .elevation_rad = -pi / 2});
+  LidarSpec spec = lidar_of(table, 1e-3, 16, 16);
+  spec.angular_jitter_rad = jitter_rad;
+  const LidarScan found = scan(spec, scene_of(flat_ground()), {0, 0, height_m});
+  ASSERT_EQ(found.echoes.rows(), 5000u);
+  for (const char* column : {"world_x", "world_y"}) {
+    double sum = 0, squares = 0;
+    for (const double value : found.echoes.column<double>(column)) {
+      const double z = value / height_m / jitter_rad;
+      sum += z;
+      squares += z * z;
+    }
+    EXPECT_NEAR(sum / 5000, 0, 5 / std::sqrt(5000)) << column;  // 5 standard errors: p = 6e-7
+    EXPECT_NEAR(squares / 5000, 1, 5 * std::sqrt(2. / 5000)) << column;
+  }
+  EXPECT_THAT(found.echoes.column<float>("x"), Each(::testing::FloatNear(0, 1e-5f)));
+}
+
+TEST(LidarLight, WaveformsHoldTheEnergyAtItsTime) {
+  LidarSpec spec = lidar_of(looking_down({pi / 2, -0.3, 0.6}), 1e-3, 16, 16);
+  spec.waveforms = LidarSpec::WaveformOutput::Keep;
+  const LidarScan found = scan(spec, scene_of(flat_ground()), {0, 0, 40});
+  const Waveforms& waveforms = found.waveforms;
+  ASSERT_EQ(waveforms.runs.size(), 2u);
+  const double ranges_m[] = {40, 40 / std::sin(0.6)};
+  for (std::size_t i = 0; i < 2; ++i) {
+    const WaveformRun& run = waveforms.runs[i];
+    EXPECT_EQ(run.pulse, 2 * i);
+    double energy_j = 0, moment = 0;
+    for (std::size_t k = 0; k < run.count; ++k) {
+      const double power_w = waveforms.power_w[run.first_sample + k];
+      energy_j += power_w * waveforms.interval_s;
+      moment += power_w * waveforms.interval_s *
+                (run.start_s + static_cast<double>(k) * waveforms.interval_s);
+    }
+    const double expected_j =
+        plane_power_w(ranges_m[i]) * sigma_s * std::sqrt(2 * pi) * (i == 0 ? 1 : std::sin(0.6));
+    EXPECT_NEAR(energy_j, expected_j, 1e-5 * expected_j) << i;
+    // At 0.6 rad the footprint brings the centroid 0.02 mm nearer.
+    EXPECT_NEAR(moment / energy_j * c_m_s / 2, ranges_m[i], 1e-4) << i;
+  }
+}
+
+TEST(LidarLight, PointsAtTheStampAreDeskewed) {
+  const HeightGrid ground = testing::fractal(513, 1, 60, Seed{1});
+  const Trajectory X_DS = ride_over(ground);
+  LidarSpec spec = load_lidar(testing::data_folder() / "sensors/velodyne_vlp16.yaml");
+  spec.points = LidarSpec::Points::AtStamp;
+  const Lidar lidar(spec);
+  const PointCloud e = lidar.scan(scene_of(ground), X_DS, 3, Seed{7}, 0).echoes;
+  const Pose X_DS_stamp = X_DS.pose_at(lidar.pattern().stamp(3));
+  ASSERT_GT(e.rows(), 5000u);
+  for (std::size_t i = 0; i < e.rows(); ++i) {
+    const glm::dvec3 p_SQ(e.column<float>("x")[i], e.column<float>("y")[i],
+                          e.column<float>("z")[i]);
+    const glm::dvec3 p_DQ(e.column<double>("world_x")[i], e.column<double>("world_y")[i],
+                          e.column<double>("world_z")[i]);
+    ASSERT_LT(glm::length(X_DS_stamp * p_SQ - p_DQ), 3e-5) << i;  // floats of 100 m
+  }
+}
+
+TEST(LidarLight, ConvergenceComparesEvery64thPulseWithTwiceItsSubRays) {
+  LidarSpec spec = noisy();
+  spec.beam.turn = BeamSpec::Turn::Fixed;
+  const auto of = [&](int sub_rays, const HeightGrid& ground, const Trajectory& X_DS) {
+    spec.beam.sub_rays = spec.beam.most_sub_rays = sub_rays;
+    return Lidar(spec).scan(scene_of(ground), X_DS, 0, Seed{7}, 0).convergence;
+  };
+  const HeightGrid rough = testing::fractal(513, 1, 60, Seed{1});
+  const Convergence few = of(16, rough, ride_over(rough));
+  const Convergence many = of(256, rough, ride_over(rough));
+  EXPECT_EQ(few.pulses, (16u * 1809 + 63) / 64);
+  EXPECT_EQ(many.pulses, few.pulses);
+  EXPECT_LE(few.compared + few.changed, few.pulses);  // the others have no echo either way
+  EXPECT_GT(few.changed, 0u);                         // edges
+  EXPECT_GT(few.largest_m, 1e-3);
+  // A plane's echo depends on the fourth moments of the beam alone. What is left is the sampling.
+  const Convergence flat = of(16, flat_ground(), still_at({0, 0, 2}));
+  EXPECT_EQ(flat.changed, 0u);
+  EXPECT_GT(flat.compared, 200u);
+  EXPECT_LT(flat.largest_m, 1e-6);
+}
+
+TEST(LidarLight, RefusesWhatNeedsLightOrASpectrum) {
+  LidarSpec spec = lidar_of(looking_down({1}), 1e-3, 16, 16);
+  spec.light.reset();
+  spec.waveforms = LidarSpec::WaveformOutput::Keep;
+  spec.angular_jitter_rad = -1;
+  EXPECT_THAT([&] { Lidar{spec}; },
+              ThrowsMessage<Error>(AllOf(HasSubstr("16 sub-rays need light"),
+                                         HasSubstr("waveforms need light"),
+                                         HasSubstr("angular jitter of -1 rad"))));
+  spec = lidar_of(looking_down({1}), 1e-3, 16, 16);
+  spec.light->wavelength_nm = 1550;
+  const Scene scene = scene_of(flat_ground(), {"narrow", Lambertian{{{400, 0.1}, {1000, 0.2}}}});
+  EXPECT_THAT(
+      [&] {
+        scan(spec, scene, {0, 0, 2});
+      },
+      ThrowsMessage<Error>(AllOf(HasSubstr("narrow"), HasSubstr("1550"))));
+}
+
+}  // namespace
+}  // namespace groundray
