@@ -43,6 +43,7 @@ class LaserBeam {
   struct SubRay {
     glm::dvec2 offset_m{0};
     glm::dvec2 slope{0};
+    double per_length = 1;  ///< 1 / |axis + h * slope.x + v * slope.y|
   };
   /// A turn about the axis, from h towards v.
   struct Rotation {
@@ -71,7 +72,9 @@ class LaserBeam {
       return glm::dvec2(by.cosine * p.x - by.sine * p.y, by.sine * p.x + by.cosine * p.y);
     };
     const Node& node = at(level).nodes[index];
-    return {waist_m_ * turn(node.place), tangent_ * turn(node.tilt)};
+    const glm::dvec2 slope = tangent_ * turn(node.tilt);
+    return {waist_m_ * turn(node.place), slope,
+            1 / std::sqrt(1 + slope.x * slope.x + slope.y * slope.y)};
   }
 
   /// Returns pairs of sub-rays (smaller index first, in ascending order, each pair once) that stay

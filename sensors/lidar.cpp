@@ -9,6 +9,7 @@
 #include <cmath>
 #include <glm/geometric.hpp>
 #include <limits>
+#include <utility>
 
 #include "core/error.h"
 #include "sensors/pulse_cast.h"
@@ -76,9 +77,18 @@ void check(const LidarSpec& spec) {
   broken.unless(spec.light || spec.beam.sub_rays == 1,
                 "beam: {} sub-rays need light: only energy tells which of them make an echo",
                 spec.beam.sub_rays);
+  broken.unless(!spec.light || !spec.light->receiver.noise || std::isfinite(gate.far_m),
+                "range gate ends nowhere, so noise alone makes endless false alarms: give its far "
+                "end");
   broken.unless(spec.light || spec.waveforms == LidarSpec::WaveformOutput::Omit,
                 "waveforms need light");
   broken.throw_if_any();
+}
+
+// Whether it matters what lies beyond the gate.
+bool sees_all(const LidarSpec& spec) {
+  return spec.no_returns == LidarSpec::NoReturns::Report ||
+         spec.waveforms == LidarSpec::WaveformOutput::Keep;
 }
 
 // A row of a scan with light.
@@ -125,7 +135,7 @@ class Lidar::Sweep {
         pulses_(lidar.pattern_.pulses(number)),
         settings_{lidar.beam_, lidar.last_level_, lidar.light_ ? lidar.light_->resolution_m() : 0,
                   spec_.angular_jitter_rad,
-                  spec_.no_returns == LidarSpec::NoReturns::Report
+                  sees_all(spec_)
                       ? std::numeric_limits<double>::infinity()
                       : spec_.gate.far_m + (lidar.light_ ? lidar.light_->resolution_m() : 0)} {
     if (lidar.light_) {
@@ -174,7 +184,11 @@ class Lidar::Sweep {
 
   // Filled in firing order:
   std::size_t next_row_ = 0;
-  std::vector<LightRow> light_rows_;
+  struct PlacedRows {
+    std::size_t first_row;
+    std::vector<LightRow> rows;
+  };
+  std::vector<PlacedRows> light_rows_;
   LidarScan scan_;
   struct MissedPulse {
     std::uint32_t pulse;
@@ -208,7 +222,8 @@ void Lidar::Sweep::measure_rays(Chunk& chunk) const {
 }
 
 void Lidar::Sweep::measure_light(Chunk& chunk) const {
-  chunk.light_rows.clear();
+  chunk.light_rows = {};  // Sweep::place took them
+  chunk.light_rows.reserve(chunk.cast.size());
   chunk.runs.clear();
   chunk.power_w.clear();
   chunk.convergence = {};
@@ -225,6 +240,7 @@ void Lidar::Sweep::measure_light(Chunk& chunk) const {
     if (spec_.waveforms == LidarSpec::WaveformOutput::Keep) keep_waveform(i, chunk);
     if (pulse % convergence_stride == 0) compare(i, chunk);
   }
+  chunk.rows = chunk.light_rows.size();
 }
 
 void Lidar::Sweep::keep_waveform(std::uint32_t pulse, Chunk& chunk) const {
@@ -267,7 +283,7 @@ void Lidar::Sweep::compare(std::size_t pulse, Chunk& chunk) const {
 void Lidar::Sweep::place(Chunk& chunk) {
   chunk.first_row = next_row_;
   next_row_ += chunk.rows;
-  light_rows_.insert(light_rows_.end(), chunk.light_rows.begin(), chunk.light_rows.end());
+  if (lidar_.light_) light_rows_.push_back({chunk.first_row, std::move(chunk.light_rows)});
   const PulseCast& cast = chunk.cast;
   if (spec_.no_returns == LidarSpec::NoReturns::Report) {
     for (const Chunk::Missed& missed : chunk.missed) {
@@ -290,9 +306,10 @@ void Lidar::Sweep::place(Chunk& chunk) {
   all.largest_m = std::max(all.largest_m, chunk.convergence.largest_m);
 }
 
-// Where the sensor says that it met something. It does not know of its jitter.
-glm::vec3 Lidar::Sweep::reported_point(const PulseCast& cast, std::size_t pulse,
-                                       double reported_m) const {
+// Where the sensor says that it met something. It does not know of its jitter. Inline: it runs for
+// every row.
+inline glm::vec3 Lidar::Sweep::reported_point(const PulseCast& cast, std::size_t pulse,
+                                              double reported_m) const {
   const PulseBatch& pulses = cast.pulses();
   const glm::dvec3 p_SQ = pulses.origin_m[pulse] + pulses.direction[pulse] * reported_m;
   if (spec_.points == LidarSpec::Points::AsFired) return glm::vec3(p_SQ);
@@ -359,12 +376,13 @@ EchoRow Lidar::Sweep::row_of(const Echo& echo, const PulseCast& cast, std::size_
 void Lidar::Sweep::add_rows(std::size_t pulse, Chunk& chunk) const {
   const std::vector<Echo>& echoes = chunk.work.echoes;
   for (std::size_t k = 0; k < echoes.size(); ++k) {
-    double reported_m = lidar_.light_->reported_m(echoes[k].detection);
+    double measured_m = echoes[k].detection.range_m;
     if (spec_.range_noise_sigma_m > 0) {
       RandomKey key = key_of(chunk.begin + static_cast<std::int64_t>(pulse));
       key.sub_ray = static_cast<std::uint32_t>(k);
-      reported_m += spec_.range_noise_sigma_m * random_normal(key).x;
+      measured_m += spec_.range_noise_sigma_m * random_normal(key).x;
     }
+    const double reported_m = lidar_.light_->reported_m(measured_m);
     EchoRow row = row_of(echoes[k], chunk.cast, pulse, reported_m);
     row.return_index = static_cast<std::uint8_t>(k + 1);
     row.return_count = static_cast<std::uint8_t>(echoes.size());
@@ -373,13 +391,16 @@ void Lidar::Sweep::add_rows(std::size_t pulse, Chunk& chunk) const {
 }
 
 void Lidar::Sweep::write_light() {
-  scan_.echoes = PointCloud(light_rows_.size());
+  scan_.echoes = PointCloud(next_row_);
   const ScanColumns columns(scan_.echoes, spec_);
-  tbb::parallel_for(std::size_t{0}, light_rows_.size(), [&](std::size_t row) {
-    const auto& [echo_row, echo] = light_rows_[row];
-    columns.write(row, echo_row);
-    columns.write_light(row, echo, scene_.terrain);
-    if (columns.has_bounds()) columns.write_bound(row, echo.bound_m);
+  tbb::parallel_for(std::size_t{0}, light_rows_.size(), [&](std::size_t chunk) {
+    std::size_t row = light_rows_[chunk].first_row;
+    for (const auto& [echo_row, echo] : light_rows_[chunk].rows) {
+      columns.write(row, echo_row);
+      columns.write_light(row, echo, scene_.terrain);
+      if (columns.has_bounds()) columns.write_bound(row, echo.bound_m);
+      ++row;
+    }
   });
 }
 

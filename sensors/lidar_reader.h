@@ -1,7 +1,6 @@
 #pragma once
 
 #include <filesystem>
-#include <string>
 
 #include "sensors/lidar_spec.h"
 #include "sensors/yaml_reader.h"
@@ -16,9 +15,5 @@ LidarSpec read_lidar(const yaml::Node& node, const std::filesystem::path& path,
 /// Reads what a scene says of a lidar besides its file. @param path  of the scene.
 void change_lidar(yaml::Map& entry, const std::filesystem::path& path, LidarSpec& lidar,
                   yaml::Faults& faults);
-
-/// Returns a path that is relative to a file's folder. Names that GDAL knows how to open but that
-/// are no paths (/vsizip/..., NETCDF:"...") stay as they are.
-std::filesystem::path beside(const std::filesystem::path& file, const std::string& relative);
 
 }  // namespace groundray

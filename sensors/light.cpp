@@ -1,11 +1,12 @@
 #include "sensors/light.h"
 
 #include <algorithm>
+#include <array>
 #include <cmath>
 #include <glm/geometric.hpp>
 #include <limits>
 #include <numbers>
-#include <numeric>
+#include <utility>
 
 namespace groundray {
 namespace {
@@ -25,6 +26,48 @@ struct SurfaceShare {
   std::size_t begin = 0, end = 0;  // in the order of ranges
   double energy_j = 0;
 };
+
+// Puts each of at most `most` hits where as many are nearer, without a branch to mispredict; false
+// if two are equally far.
+template <std::size_t most>
+bool sort_by_counting(std::span<const Hit> hits, std::vector<std::uint32_t>& order) {
+  std::array<double, most> range_m;
+  range_m.fill(std::numeric_limits<double>::infinity());
+  for (std::size_t i = 0; i < hits.size(); ++i) range_m[i] = hits[i].range_m;
+  std::array<std::int64_t, most> nearer{};
+  for (std::size_t j = 0; j < hits.size(); ++j) {
+    const double other_m = range_m[j];
+#pragma omp simd
+    for (std::size_t i = 0; i < most; ++i) nearer[i] += other_m < range_m[i] ? 1 : 0;
+  }
+  std::array<std::uint32_t, most + 1> sorted;
+  std::uint64_t taken = 0;
+  std::size_t met = 0;
+  for (std::uint32_t i = 0; i < hits.size(); ++i) {
+    sorted[static_cast<std::size_t>(nearer[i])] = i;  // misses are behind all others
+    taken |= std::uint64_t{1} << nearer[i];
+    met += hits[i] ? 1 : 0;
+  }
+  order.assign(sorted.begin(), sorted.begin() + static_cast<std::ptrdiff_t>(met));
+  return (~taken & ((std::uint64_t{1} << met) - 1)) == 0;
+}
+
+// Lists the hits by range, equal ones as they come.
+void sort_hits(std::span<const Hit> hits, std::vector<std::uint32_t>& order) {
+  if (hits.size() <= 16 && sort_by_counting<16>(hits, order)) return;
+  if (hits.size() <= 32 && sort_by_counting<32>(hits, order)) return;
+  order.clear();
+  for (std::uint32_t i = 0; i < hits.size(); ++i) {
+    if (hits[i]) order.push_back(i);
+  }
+  std::ranges::sort(order, {}, [&](std::uint32_t i) { return std::pair(hits[i].range_m, i); });
+}
+
+// exp(x) to 3e-11 of it for |x| below this.
+constexpr double small_exponent = 0.05;
+double exp_of_small(double x) {
+  return 1 + x * (1 + x * (1. / 2 + x * (1. / 6 + x * (1. / 24 + x * (1. / 120)))));
+}
 
 }  // namespace
 
@@ -62,19 +105,32 @@ void Light::sample_air(const AtmosphereSpec& air) {
 
 void Light::collect(std::span<const Ray> rays, std::span<const Hit> hits, const RetroBrdf& brdf,
                     Workspace& work) const noexcept {
+  sort_hits(hits, work.order);
+  const std::size_t count = work.order.size();
+  work.arrivals.resize(count);
+  if (count == 0) return;
+  Arrival* const arrivals = work.arrivals.data();
+  for (std::size_t k = 0; k < count; ++k) {
+    const std::uint32_t i = work.order[k];
+    const double cosine = std::max(-glm::dot(rays[i].direction, glm::dvec3(hits[i].normal)), 0.0);
+    arrivals[k] = {hits[i].range_m, retro_brdf_cos(brdf, cosine)};
+  }
   const double share = 1.0 / static_cast<double>(hits.size());
-  work.arrivals.clear();
-  work.order.clear();
-  work.energy_j.assign(hits.size(), 0);
-  for (std::uint32_t i = 0; i < hits.size(); ++i) {
-    const Hit& hit = hits[i];
-    if (!hit) continue;
-    const double cosine = std::max(-glm::dot(rays[i].direction, glm::dvec3(hit.normal)), 0.0);
-    work.arrivals.push_back(
-        {hit.range_m, radar_.received_energy_j(share, retro_brdf_cos(brdf, cosine), hit.range_m,
-                                               atmosphere_.transmission(hit.range_m))});
-    work.energy_j[i] = work.arrivals.back().energy_j;
-    work.order.push_back(i);
+  const auto receive = [&](Arrival& arrival, double transmission) {
+    arrival.energy_j =
+        radar_.received_energy_j(share, arrival.energy_j, arrival.range_m, transmission);
+  };
+  const double nearest_m = arrivals[0].range_m;
+  const double extinction_per_m = atmosphere_.extinction_per_m();
+  if (extinction_per_m * (arrivals[count - 1].range_m - nearest_m) < small_exponent) {
+    const double to_nearest = atmosphere_.transmission(nearest_m);  // one exponential serves all
+    for (std::size_t k = 0; k < count; ++k) {
+      const double exponent = extinction_per_m * (nearest_m - arrivals[k].range_m);
+      receive(arrivals[k], to_nearest * exp_of_small(exponent));
+    }
+  } else {
+    for (std::size_t k = 0; k < count; ++k)
+      receive(arrivals[k], atmosphere_.transmission(arrivals[k].range_m));
   }
 }
 
@@ -106,7 +162,6 @@ void Light::receive(std::span<const Ray> rays, std::span<const Hit> hits,
   const double lit = static_cast<double>(work.arrivals.size()) / static_cast<double>(hits.size());
   const double background_w = sun_w_ * std::numbers::pi * brdf.diffuse_per_sr * lit;
   receiver_.detect(work.waveform, gate_, {key, background_w}, work.detections);
-  std::ranges::sort(work.order, {}, [&](std::uint32_t i) { return hits[i].range_m; });
   work.echoes.clear();
   for (const Detection& detection : work.detections)
     tell_truth(rays, hits, bounds_m, detection, work);
@@ -118,7 +173,8 @@ void Light::receive(std::span<const Ray> rays, std::span<const Hit> hits,
 void Light::tell_truth(std::span<const Ray> rays, std::span<const Hit> hits,
                        std::span<const double> bounds_m, const Detection& detection,
                        Workspace& work) const noexcept {
-  Echo echo{.detection = detection};
+  Echo& echo = work.echoes.emplace_back();
+  echo.detection = detection;
   SurfaceShare best, second, now;
   double energy_j = 0;
   const auto close = [&](const SurfaceShare& surface) {
@@ -129,31 +185,33 @@ void Light::tell_truth(std::span<const Ray> rays, std::span<const Hit> hits,
       second = surface;
     }
   };
+  const auto arrival_s = [&](const Arrival& a) { return receiver_.arrival_s(a.range_m); };
+  const auto all_begin = work.arrivals.begin(), all_end = work.arrivals.end();
+  const auto begin = std::ranges::lower_bound(all_begin, all_end, detection.begin_s, {}, arrival_s);
+  const auto end = std::ranges::lower_bound(begin, all_end, detection.end_s, {}, arrival_s);
   double last_m = -std::numeric_limits<double>::infinity();
-  for (std::size_t k = 0; k < work.order.size(); ++k) {
-    const double range_m = hits[work.order[k]].range_m;
-    const double time_s = receiver_.arrival_s(range_m);
-    if (time_s < detection.begin_s || time_s >= detection.end_s) continue;
-    if (range_m - last_m > resolution_m_) {
+  for (auto arrival = begin; arrival != end; ++arrival) {
+    const auto k = static_cast<std::size_t>(arrival - all_begin);
+    if (arrival->range_m - last_m > resolution_m_) {
       close(now);
       now = {k, k, 0};
     }
-    last_m = range_m;
+    last_m = arrival->range_m;
     now.end = k + 1;
-    now.energy_j += work.energy_j[work.order[k]];
-    energy_j += work.energy_j[work.order[k]];
+    now.energy_j += arrival->energy_j;
+    energy_j += arrival->energy_j;
   }
   close(now);
   if (detection.kind == Detection::Kind::FalseAlarm || best.energy_j == 0) {
     echo.kind =
         detection.kind == Detection::Kind::FalseAlarm ? Echo::Kind::FalseAlarm : Echo::Kind::Air;
-    work.echoes.push_back(echo);
     return;
   }
   glm::dvec3 normal(0);
+  const double per_energy = 1 / best.energy_j;
   for (std::size_t k = best.begin; k < best.end; ++k) {
     const std::uint32_t i = work.order[k];
-    const double weight = work.energy_j[i] / best.energy_j;
+    const double weight = work.arrivals[k].energy_j * per_energy;
     echo.range_m += weight * hits[i].range_m;
     echo.p_DQ += weight * (rays[i].origin + rays[i].direction * hits[i].range_m);
     normal += weight * glm::dvec3(hits[i].normal);
@@ -163,7 +221,6 @@ void Light::tell_truth(std::span<const Ray> rays, std::span<const Hit> hits,
   echo.normal = glm::vec3(glm::normalize(normal));
   echo.share = static_cast<float>(best.energy_j / energy_j);
   echo.second_share = static_cast<float>(second.energy_j / energy_j);
-  work.echoes.push_back(echo);
 }
 
 NoReturn Light::reason_for_none(std::span<const Hit> hits, const Workspace& work) const noexcept {
@@ -177,14 +234,17 @@ NoReturn Light::reason_for_none(std::span<const Hit> hits, const Workspace& work
   float peak_w = 0;
   for (const Waveform::Segment& segment : work.waveform.segments())
     peak_w = std::max(peak_w, std::ranges::max(work.waveform.power_w(segment)));
+  // Only the second of one echo is not reported at all.
+  if (spec_.receiver.returns == ReceiverSpec::Returns::Second && peak_w > receiver_.threshold_w(0))
+    return NoReturn::Blanked;
   const double left = atmosphere_.transmission(nearest_m);
   return left < 1 && peak_w / (left * left) > receiver_.threshold_w(0) ? NoReturn::Absorbed
                                                                        : NoReturn::BelowThreshold;
 }
 
-double Light::reported_m(const Detection& detection) const noexcept {
+double Light::reported_m(double range_m) const noexcept {
   const double step_m = spec_.range_step_m;
-  return step_m > 0 ? std::round(detection.range_m / step_m) * step_m : detection.range_m;
+  return step_m > 0 ? std::round(range_m / step_m) * step_m : range_m;
 }
 
 float Light::intensity(const Detection& detection) const noexcept {

@@ -37,6 +37,7 @@ enum class NoReturn : std::uint8_t {
   OutOfGate,       ///< all that it meets is nearer or farther than the range gate
   BelowThreshold,  ///< what comes back is too weak
   Absorbed,        ///< and would not be but for the air
+  Blanked,         ///< an echo, but not one that the sensor is asked to report
 };
 
 /// Energy, air and electronics of a lidar: from the hits of a pulse's sub-rays to echoes.
@@ -45,13 +46,12 @@ class Light {
  public:
   /// Buffers of one thread, for pulse after pulse.
   struct Workspace {
-    std::vector<Arrival> arrivals;
+    std::vector<std::uint32_t> order;  ///< the sub-rays that met something, by range
+    std::vector<Arrival> arrivals;     ///< in that order
     Waveform waveform;
     Detections detections;
-    std::vector<Echo> echoes;          ///< of the last pulse, by reported range
-    NoReturn reason = NoReturn::Sky;   ///< of the last pulse, if it has no echo
-    std::vector<double> energy_j;      ///< of each sub-ray, 0 where it met nothing
-    std::vector<std::uint32_t> order;  ///< the sub-rays that met something, by range
+    std::vector<Echo> echoes;         ///< of the last pulse, by reported range
+    NoReturn reason = NoReturn::Sky;  ///< of the last pulse, if it has no echo
     std::vector<float> air_w;
   };
 
@@ -73,8 +73,8 @@ class Light {
 
   /// Returns what the sensor reports as the intensity of an echo.
   float intensity(const Detection& detection) const noexcept;
-  /// Returns the range that the sensor reports, quantised.
-  double reported_m(const Detection& detection) const noexcept;
+  /// Returns what the sensor reports of a range that it measures: the nearest of its steps.
+  double reported_m(double range_m) const noexcept;
 
  private:
   void collect(std::span<const Ray> rays, std::span<const Hit> hits, const RetroBrdf& brdf,

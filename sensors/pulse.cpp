@@ -16,8 +16,6 @@ constexpr double far_sigmas = 9;  // beyond it a smooth ramp equals the sharp on
 
 void check(const PulseSpec& spec) {
   Violations broken("pulse");
-  broken.unless(spec.energy_j > 0 && std::isfinite(spec.energy_j),
-                "energy_j = {} must be positive and finite", spec.energy_j);
   if (spec.shape.empty()) {
     broken.unless(spec.fwhm_s > 0 && std::isfinite(spec.fwhm_s),
                   "fwhm_s = {} must be positive and finite where there is no shape", spec.fwhm_s);

@@ -9,8 +9,7 @@ inline constexpr double fwhm_per_sigma = 2.3548200450309493;
 
 /// A laser pulse as it leaves: a Gaussian by its width, or a measured table.
 struct PulseSpec {
-  double energy_j = 0;  ///< must be positive
-  double fwhm_s = 0;    ///< full width at half maximum of a Gaussian; 0 if there is a table
+  double fwhm_s = 0;  ///< full width at half maximum of a Gaussian; 0 if there is a table
   /// Power on any scale at equal steps of time, linear between them and to 0 one step beyond the
   /// ends. Empty for a Gaussian.
   std::vector<double> shape;

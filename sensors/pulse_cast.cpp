@@ -9,16 +9,6 @@
 namespace groundray {
 namespace {
 
-// Where pulse `i` of `count` goes when every `stride`-th is its neighbour: neighbours side by side
-// make packets of rays that are alike.
-std::size_t slot_of(std::size_t i, std::size_t count, std::size_t stride) {
-  const std::size_t rows = (count + stride - 1) / stride;
-  const std::size_t full = count - (rows - 1) * stride;  // columns with all rows
-  const std::size_t column = i % stride;
-  return std::min(column, full) * rows + (column > full ? column - full : 0) * (rows - 1) +
-         i / stride;
-}
-
 RandomKey key_of(RandomKey sweep, std::int64_t pulse, RandomStream stream) {
   sweep.pulse = static_cast<std::uint32_t>(pulse);
   sweep.stream = stream;
@@ -79,13 +69,13 @@ void PulseCast::add_sub_rays(std::size_t pulse, int level, const LaserBeam& beam
         2 * std::numbers::pi * random_uniform(key_of(key, number, RandomStream::BeamTurn)).x;
     turn = {std::cos(angle_rad), std::sin(angle_rad)};
   }
-  for (std::size_t i = 0; i < sub_rays.size(); ++i) {
-    const LaserBeam::SubRay sub_ray = turns ? beam.turned(level, i, turn) : sub_rays[i];
-    out[i] = {
-        axis.origin + sub_ray.offset_m.x * horizontal + sub_ray.offset_m.y * vertical,
-        glm::normalize(axis.direction + sub_ray.slope.x * horizontal + sub_ray.slope.y * vertical),
-        axis.far_m};
-  }
+  const auto lay = [&](const LaserBeam::SubRay& to) -> Ray {
+    const glm::dvec3 along = axis.direction + to.slope.x * horizontal + to.slope.y * vertical;
+    return {axis.origin + to.offset_m.x * horizontal + to.offset_m.y * vertical,
+            along * to.per_length, axis.far_m};
+  };
+  for (std::size_t i = 0; i < sub_rays.size(); ++i)
+    out[i] = turns ? lay(beam.turned(level, i, turn)) : lay(sub_rays[i]);
 }
 
 void PulseCast::cast(const SweepPath& sweep, std::int64_t begin, std::int64_t end,
@@ -99,9 +89,11 @@ void PulseCast::cast(const SweepPath& sweep, std::int64_t begin, std::int64_t en
   ranges_.resize(count);
   const auto stride = static_cast<std::size_t>(std::clamp<std::int64_t>(
       sweep.pattern.neighbour_stride(), 1, static_cast<std::int64_t>(count)));
-  for (std::size_t i = 0; i < count; ++i) {
-    ranges_[i] = {static_cast<std::uint32_t>(sub_rays * slot_of(i, count, stride)),
-                  static_cast<std::uint32_t>(sub_rays), 0};
+  // Neighbours side by side make packets of rays that are alike.
+  std::size_t first = 0;
+  for (std::size_t column = 0; column < stride; ++column) {
+    for (std::size_t i = column; i < count; i += stride, first += sub_rays)
+      ranges_[i] = {static_cast<std::uint32_t>(first), static_cast<std::uint32_t>(sub_rays), 0};
   }
   lay_axes(sweep, begin, settings, key);
   for (std::size_t i = 0; i < count && !alone_; ++i)

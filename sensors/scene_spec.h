@@ -45,6 +45,7 @@ struct DrivenPath {
 struct MountedLidar {
   std::string name;    ///< names its files; letters, digits, '_' and '-'
   std::string source;  ///< the preset or file that it came from, as the scene says it
+  std::string text;    ///< of that file
   LidarSpec lidar;
   Pose X_BS;
 };

@@ -9,8 +9,10 @@
 #include <glm/vec3.hpp>
 #include <set>
 
+#include "sensors/lidar.h"
 #include "sensors/lidar_reader.h"
 #include "sensors/material_io.h"
+#include "sensors/pattern_reader.h"
 #include "sensors/yaml_reader.h"
 
 namespace groundray {
@@ -161,8 +163,9 @@ void read_source(Map& entry, const fs::path& path, const fs::path& preset_folder
                  fmt::join(names, ", "));
       return;
     }
-    mounted.lidar =
-        load_lidar(preset ? preset_folder / (node.text + ".yaml") : beside(path, node.text));
+    const fs::path place = preset ? preset_folder / (node.text + ".yaml") : beside(path, node.text);
+    mounted.text = yaml::read_file(place);
+    mounted.lidar = parse_lidar(mounted.text, place);
   } catch (const Error& fault) {
     faults.add(node, key, "the lidar cannot be read:\n{}", fault.what());
   }
@@ -209,8 +212,8 @@ std::vector<MountedLidar> read_lidars(Map& root, const fs::path& path,
   return lidars;
 }
 
-// What lasers need of the scene.
-void check_light(const SceneSpec& scene, const Node& node, Faults& faults) {
+// What no key alone can tell: whether the parts of a lidar, the air and the ground go together.
+void check_lidars(const SceneSpec& scene, const Node& node, Faults& faults) {
   const bool air_returns =
       scene.air.backscatter_per_m_sr > 0 || std::isfinite(scene.air.fog_range_m);
   bool has_light = false;
@@ -222,6 +225,14 @@ void check_light(const SceneSpec& scene, const Node& node, Faults& faults) {
                  "the receiver of '{}' needs overlap_m: [from, to], where it begins to see its "
                  "beam: fog sends light back from everywhere",
                  mounted.name);
+      continue;
+    }
+    try {
+      Lidar(mounted.lidar, scene.air);
+      if (light && scene.terrain.material)
+        retro_brdf(*scene.terrain.material, light->wavelength_nm);
+    } catch (const Error& fault) {
+      faults.add(node, "lidars", "'{}' cannot work: {}", mounted.name, fault.what());
     }
   }
   if (has_light && !scene.terrain.material) {
@@ -257,7 +268,7 @@ SceneSpec parse_scene(const std::string& text, const fs::path& path,
   if (auto weather = root.map("weather", Need::Optional))
     scene.air = read_air(std::move(*weather), faults);
   scene.lidars = read_lidars(root, path, preset_folder, faults);
-  check_light(scene, node, faults);
+  if (faults.count() == 0) check_lidars(scene, node, faults);
   root.close();
   faults.throw_if_any();
   return scene;

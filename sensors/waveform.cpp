@@ -1,7 +1,6 @@
 #include "sensors/waveform.h"
 
 #include <algorithm>
-#include <array>
 #include <cmath>
 #include <limits>
 
@@ -15,34 +14,9 @@ constexpr std::int64_t vector_bins = 8;
 std::int64_t vectors_down(std::int64_t bin) { return bin & -vector_bins; }
 std::int64_t vectors_up(std::int64_t bin) { return vectors_down(bin + vector_bins - 1); }
 
-// Puts each of at most `most` where as many are nearer, without a branch to mispredict; false if
-// two are equally far.
-template <std::size_t most>
-bool sort_by_counting(std::span<const Arrival> arrivals, std::span<Arrival> sorted) {
-  std::array<double, most> range_m{};
-  for (std::size_t i = 0; i < arrivals.size(); ++i) range_m[i] = arrivals[i].range_m;
-  std::array<std::int64_t, most> nearer{};
-  for (const Arrival& arrival : arrivals) {
-#pragma omp simd
-    for (std::size_t i = 0; i < most; ++i) nearer[i] += arrival.range_m < range_m[i] ? 1 : 0;
-  }
-  std::uint64_t taken = 0;
-  for (std::size_t i = 0; i < arrivals.size(); ++i) {
-    sorted[static_cast<std::size_t>(nearer[i])] = arrivals[i];
-    taken |= std::uint64_t{1} << nearer[i];
-  }
-  return taken == (std::uint64_t{1} << arrivals.size()) - 1;
-}
-
 // By range, then energy, so that a sum does not depend on how its parts were listed.
-void sort_arrivals(std::span<const Arrival> arrivals, std::vector<Arrival>& sorted) {
-  sorted.resize(arrivals.size());
-  if (arrivals.size() <= 16 && sort_by_counting<16>(arrivals, sorted)) return;
-  if (arrivals.size() <= 32 && sort_by_counting<32>(arrivals, sorted)) return;
-  std::ranges::copy(arrivals, sorted.begin());
-  std::ranges::sort(sorted, [](const Arrival& a, const Arrival& b) {
-    return a.range_m != b.range_m ? a.range_m < b.range_m : a.energy_j < b.energy_j;
-  });
+bool before(const Arrival& a, const Arrival& b) {
+  return a.range_m != b.range_m ? a.range_m < b.range_m : a.energy_j < b.energy_j;
 }
 
 }  // namespace
@@ -109,12 +83,16 @@ void Waveform::lay_out(Bins kept, std::int64_t width) {
 void PulseSampler::sample(std::span<const Arrival> arrivals, double s_per_m, Bins kept,
                           Waveform& waveform) const noexcept {
   waveform.interval_s_ = interval_s_;
-  sort_arrivals(arrivals, waveform.arrivals_);
+  if (!std::ranges::is_sorted(arrivals, before)) {
+    waveform.arrivals_.assign(arrivals.begin(), arrivals.end());
+    std::ranges::sort(waveform.arrivals_, before);
+    arrivals = waveform.arrivals_;
+  }
   waveform.pulses_.resize(arrivals.size());
   auto pulse = waveform.pulses_.begin();
   const double bins_per_m = s_per_m / interval_s_;
   const std::int64_t row_width = vector_bins + width_;
-  for (const Arrival& arrival : waveform.arrivals_) {
+  for (const Arrival& arrival : arrivals) {
     if (!(arrival.energy_j > 0)) continue;
     const double position = arrival.range_m * bins_per_m;
     const auto bin = static_cast<std::int64_t>(position);
@@ -128,14 +106,21 @@ void PulseSampler::sample(std::span<const Arrival> arrivals, double s_per_m, Bin
   }
   waveform.pulses_.erase(pulse, waveform.pulses_.end());
   waveform.lay_out(kept, width_);
-  for (const Waveform::Pulse& part : waveform.pulses_) {
-    const float* here = part.row;
-    const float* next = here + row_width;
-    const float of_this = part.here_j, of_next = part.next_j;
-    float* sum = waveform.samples_.data() + part.first_sample;
-    const std::int64_t width = width_;
+  // Two pulses that begin together are added at once.
+  const auto end = waveform.pulses_.end();
+  for (auto part = waveform.pulses_.begin(); part != end;) {
+    const Waveform::Pulse one = *part++;
+    Waveform::Pulse two = one;
+    two.here_j = two.next_j = 0;
+    if (part != end && part->first_sample == one.first_sample) two = *part++;
+    const float *a = one.row, *b = a + row_width, *c = two.row, *d = c + row_width;
+    float* const sum = waveform.samples_.data() + one.first_sample;
+    const std::int64_t width = width_ / vector_bins * vector_bins;
 #pragma omp simd
-    for (std::int64_t j = 0; j < width; ++j) sum[j] += of_this * here[j] + of_next * next[j];
+    for (std::int64_t j = 0; j < width; ++j) {
+      const float with_one = std::fma(one.next_j, b[j], std::fma(one.here_j, a[j], sum[j]));
+      sum[j] = std::fma(two.next_j, d[j], std::fma(two.here_j, c[j], with_one));
+    }
   }
 }
 

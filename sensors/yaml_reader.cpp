@@ -275,6 +275,14 @@ const Node* Map::read_number(std::string_view key, Need need, double& into, Rule
   return node;
 }
 
+const Node* Map::read_scaled(std::string_view key, Need need, double scale, double& into,
+                             Rule rule) {
+  double value = 0;
+  const Node* node = read_number(key, need, value, rule);
+  if (node) into = value * scale;
+  return node;
+}
+
 const Node* Map::read_numbers(std::string_view key, Need need, std::span<double> into, Rule rule) {
   const Node* node = find(key, need);
   return node && numbers(*node, key, into, rule, faults_) ? node : nullptr;

@@ -96,6 +96,9 @@ class Map {
   const Node* find(std::string_view key, Need need);
 
   const Node* read_number(std::string_view key, Need need, double& into, Rule rule = any_number);
+  /// Reads a number in a unit that is `scale` times that of `into`. The rule is of the number.
+  const Node* read_scaled(std::string_view key, Need need, double scale, double& into,
+                          Rule rule = not_negative);
   /// Reads a list of exactly as many numbers as `into` holds.
   const Node* read_numbers(std::string_view key, Need need, std::span<double> into,
                            Rule rule = any_number);

@@ -2,6 +2,7 @@
 
 #include <fmt/format.h>
 
+#include <array>
 #include <chrono>
 #include <cmath>
 #include <cstddef>
@@ -56,23 +57,27 @@ std::string yaml_text(std::string_view text) {
 }
 
 std::string spinning_text(const SpinningPattern& pattern) {
+  const auto& field = pattern.field_of_view;
+  const std::string view = field ? fmt::format("field_of_view_deg: [{}, {}]\n",
+                                               degrees(field->from_rad), degrees(field->to_rad))
+                                 : "";
   std::string text = fmt::format(
       "rotation_rate_hz: {}\nsense: {}\nstart_azimuth_deg: {}\nfiring_period_us: {}\n"
-      "beam_columns: [ring, elevation_deg, azimuth_offset_deg, origin_x_m, origin_y_m, origin_z_m, "
-      "firing_time_us]\nbeams:\n",
+      "{}beam_columns: [loop, ring, elevation_deg, azimuth_offset_deg, origin_x_m, origin_y_m, "
+      "origin_z_m, firing_time_us]\nbeams:\n",
       pattern.rate_hz,
       pattern.sense == SpinningPattern::Sense::Clockwise ? "clockwise" : "counter_clockwise",
-      degrees(pattern.start_azimuth_rad), pattern.firing_period_s * 1e6);
+      degrees(pattern.start_azimuth_rad), pattern.firing_period_s * 1e6, view);
   for (const Beam& beam : pattern.beams) {
     text +=
-        fmt::format("- [{}, {:.9g}, {:.9g}, {:.9g}, {:.9g}, {:.9g}, {:.9g}]\n", beam.ring,
-                    degrees(beam.elevation_rad), degrees(beam.azimuth_offset_rad), beam.origin_m.x,
-                    beam.origin_m.y, beam.origin_m.z, beam.firing_time_s * 1e6);
+        fmt::format("- [{}, {}, {:.9g}, {:.9g}, {:.9g}, {:.9g}, {:.9g}, {:.9g}]\n", beam.loop,
+                    beam.ring, degrees(beam.elevation_rad), degrees(beam.azimuth_offset_rad),
+                    beam.origin_m.x, beam.origin_m.y, beam.origin_m.z, beam.firing_time_s * 1e6);
   }
   return text;
 }
 
-// Other patterns than spinning heads are told by the lidar's own file alone.
+// All else is told by the text of the lidar's own file, and by the scene's.
 std::string calibration(const PlacedLidar& placed) {
   const LidarSpec& lidar = placed.spec.lidar;
   const Pose& X_BS = placed.spec.X_BS;
@@ -86,7 +91,7 @@ std::string calibration(const PlacedLidar& placed) {
       lidar.range_noise_sigma_m);
   if (const auto* spinning = std::get_if<SpinningPattern>(&lidar.pattern))
     text += spinning_text(*spinning);
-  return text;
+  return text + fmt::format("lidar_file: {}\n", yaml_text(placed.spec.text));
 }
 
 // Seconds to the nanosecond, whatever the clock's epoch.
@@ -94,6 +99,14 @@ std::string decimal_seconds(std::chrono::nanoseconds time) {
   const std::int64_t count = time.count();
   return fmt::format("{}{}.{:09}", count < 0 ? "-" : "", std::abs(count / 1'000'000'000),
                      std::abs(count % 1'000'000'000));
+}
+
+void add(const Material& material, Fingerprint& print) {
+  print.add(std::span<const char>(material.name));
+  if (const auto* matt = std::get_if<Lambertian>(&material.reflection))
+    print.add(std::span<const SpectrumSample>(matt->spectrum));
+  if (const auto* retro = std::get_if<RetroReflector>(&material.reflection))
+    print.add(std::span<const double>(&retro->coefficient_cd_lx_m2, 1));
 }
 
 std::uint64_t fingerprint(const World& world) {
@@ -104,7 +117,15 @@ std::uint64_t fingerprint(const World& world) {
   for (const PlacedLidar& lidar : world.lidars) {
     print.add(std::span(lidar.X_DS.samples()));
     print.add(std::span<const char>(calibration(lidar)));
+    if (const auto* table = std::get_if<TablePattern>(&lidar.spec.lidar.pattern)) {
+      for (const auto& [time_s, azimuth_rad, elevation_rad, ring, origin_m] : table->shots) {
+        const std::array numbers{time_s, azimuth_rad, elevation_rad};
+        print.add(std::span<const double>(numbers));
+        print.add(std::span<const std::uint16_t>(&ring, 1));
+      }
+    }
   }
+  if (world.spec.terrain.material) add(*world.spec.terrain.material, print);
   return print.value();
 }
 

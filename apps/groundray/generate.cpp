@@ -144,7 +144,7 @@ void say(const World& world, const std::filesystem::path& out, const Tally& tall
   for (const PlacedLidar& lidar : world.lidars) scans += static_cast<std::uint64_t>(lidar.sweeps);
   if (tally.scans < scans) fmt::print("{} scans were there already\n", scans - tally.scans);
   if (tally.scans > 0) {
-    fmt::print("{} scans, {} points of {} pulses, {:.2f} M rays/s\n", tally.scans, tally.points,
+    fmt::print("{} scans, {} points of {} pulses, {:.2f} M pulses/s\n", tally.scans, tally.points,
                tally.pulses, 1e-6 * static_cast<double>(tally.pulses) / tally.scanning.count());
   }
   fmt::print("dataset: {}\n", out.string());

@@ -70,7 +70,7 @@ LaserBeam::Rotation rotation(double psi_rad) { return {std::cos(psi_rad), std::s
 std::vector<glm::dvec2> footprint(const LaserBeam& beam, double range_m, double psi_rad = 0) {
   std::vector<glm::dvec2> points;
   for (std::size_t i = 0; i < beam.sub_rays(0).size(); ++i) {
-    const auto [offset_m, slope] = beam.turned(0, i, rotation(psi_rad));
+    const auto [offset_m, slope, per_length] = beam.turned(0, i, rotation(psi_rad));
     points.push_back(offset_m + range_m * slope);
   }
   return points;
@@ -143,7 +143,7 @@ TEST(LaserBeam, PointsAlongItsAxis) {
   for (const Shape& shape : every_shape) {
     const LaserBeam beam = beam_of(shape, 16);
     glm::dvec3 sum(0);
-    for (const auto& [offset_m, slope] : beam.sub_rays(0)) {
+    for (const auto& [offset_m, slope, per_length] : beam.sub_rays(0)) {
       sum += glm::dvec3(offset_m, 0) + 100. * glm::normalize(glm::dvec3(slope, 1));
     }
     EXPECT_LE(std::hypot(sum.x, sum.y), 1e-12 * sum.z) << shape.name;
@@ -374,7 +374,7 @@ TEST(LaserBeam, TiltedPlaneWidensThePulseByTheFootprint) {
       const double middle_s = 2 * plane_m / c_m_s;
       for (double t_s = -30e-9; t_s < 30e-9; t_s += 0.05e-9) {
         double waveform = 0;
-        for (const auto& [offset_m, slope] : beam.sub_rays(0)) {
+        for (const auto& [offset_m, slope, per_length] : beam.sub_rays(0)) {
           const glm::dvec3 direction = direction_of(slope);
           const double range_m = plane_m * normal.z / glm::dot(normal, direction);
           waveform += pulse(middle_s + t_s - 2 * range_m / c_m_s, sigma_s);
@@ -404,7 +404,7 @@ void expect_same_waveform(const LaserBeam& beam, const glm::dvec2& tangent,
       return pulse(middle_s + t_s - 2 * range_m(direction_of(slope)) / c_m_s, sigma_s);
     };
     double found = 0, expected = 0, weights = 0;
-    for (const auto& [offset_m, slope] : beam.sub_rays(0)) found += power(slope);
+    for (const auto& [offset_m, slope, per_length] : beam.sub_rays(0)) found += power(slope);
     found /= static_cast<double>(beam.sub_rays(0).size());
     for (int i = -steps; i <= steps; ++i) {
       for (int j = -steps; j <= steps; ++j) {

@@ -22,7 +22,7 @@ constexpr double c_m_per_s = 299'792'458;
 constexpr double background_w = 20e-9;
 constexpr RangeGate gate{2, 152};  // 1 us and 0.7 ns
 
-const PulseSpec laser{.energy_j = 1e-6, .fwhm_s = 4e-9};
+const PulseSpec laser{.fwhm_s = 4e-9};
 const double sigma_s = 5e-9 / (2 * std::sqrt(2 * std::numbers::ln2));
 const double response_s = 3e-9 / (2 * std::sqrt(2 * std::numbers::ln2));
 

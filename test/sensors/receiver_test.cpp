@@ -28,7 +28,7 @@ constexpr Timing timings[] = {Timing::LeadingEdge, Timing::ConstantFraction, Tim
 constexpr RangeGate gate{0, 5000};
 
 // 4 ns pulse, 3 ns response: 5 ns together.
-const PulseSpec laser{.energy_j = 1e-6, .fwhm_s = 4e-9};
+const PulseSpec laser{.fwhm_s = 4e-9};
 const double sigma_s = 5e-9 / (2 * std::sqrt(2 * std::numbers::ln2));
 const double response_s = 3e-9 / (2 * std::sqrt(2 * std::numbers::ln2));
 const double sigma_m = sigma_s * c_m_per_s / 2;
@@ -430,7 +430,7 @@ TEST(Receiver, IsTheSameForAnyOrderOfArrivals) {
 
 TEST(Receiver, MeasuredTableOfAGaussianGivesTheGaussiansRanges) {
   constexpr double step_s = 0.05e-9;
-  PulseSpec measured{.energy_j = 1e-6, .shape_step_s = step_s};
+  PulseSpec measured{.shape_step_s = step_s};
   for (int i = -240; i <= 240; ++i) {
     measured.shape.push_back(std::exp(-4 * std::numbers::ln2 * std::pow(i * step_s / 4e-9, 2)));
   }
@@ -449,8 +449,7 @@ TEST(Receiver, MeasuredTableOfAGaussianGivesTheGaussiansRanges) {
 }
 
 TEST(Receiver, RangesASkewedPulseToAPartOfABin) {
-  const PulseSpec skewed{.energy_j = 1e-6,
-                         .shape = {0, 2, 7, 10, 9, 7, 5, 3.5, 2.4, 1.6, 1, 0.5, 0.2, 0},
+  const PulseSpec skewed{.shape = {0, 2, 7, 10, 9, 7, 5, 3.5, 2.4, 1.6, 1, 0.5, 0.2, 0},
                          .shape_step_s = 0.7e-9};
   for (const Timing timing : timings) {
     const Receiver receiver(skewed, spec_of(timing));
