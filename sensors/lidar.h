@@ -60,10 +60,11 @@ class Lidar {
   /// docs/formats.md: x y z (float, m, S as the beam fired or at the stamp), intensity, time
   /// (float, s since the sweep's stamp), ring, return_index, return_count, world_x world_y world_z
   /// (double, m, D), range_true (double, m, from where the beam left), nx ny nz (float, D),
-  /// incidence (float, rad), label, instance, error_estimate (float, m), with light amplitude
-  /// (float, W), width (float, s), snr, kind, share, second_share and second_label, and, if asked
-  /// for, error_bound (float, m; see RayTracer::bound_errors). Pulses without an echo, if asked
-  /// for, have a row each in `no_returns`: pulse, time, ring, dx dy dz (float, axes of D), reason.
+  /// incidence (float, rad), label, instance, error_estimate (float, m), with light pulse
+  /// (of the sweep), amplitude (float, W), width (float, s), snr, kind, share, second_share and
+  /// second_label, and, if asked for, error_bound (float, m; see RayTracer::bound_errors). Pulses
+  /// without an echo, if asked for, have a row each in `no_returns`: pulse, time, ring, dx dy dz
+  /// (float, axes of D), reason.
   /// @param X_DS   path of sensor S through D; must cover the sweep.
   /// @param sweep  which one since time 0.
   /// @param sensor_number  tells sensors of one dataset apart in the random numbers.
@@ -72,9 +73,6 @@ class Lidar {
                  std::uint32_t sensor_number) const;
 
  private:
-  class Sweep;
-  struct Chunk;
-
   LidarSpec spec_;
   ScanPattern pattern_;
   LaserBeam beam_;  // with a level more than pulses use, to compare with

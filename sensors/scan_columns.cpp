@@ -35,6 +35,7 @@ ScanColumns::ScanColumns(PointCloud& cloud, const LidarSpec& spec)
       instance_(cloud.add<std::uint32_t>("instance")),
       error_estimate_(cloud.add<float>("error_estimate")) {
   if (spec.light) {
+    pulse_ = cloud.add<std::uint32_t>("pulse");
     amplitude_ = cloud.add<float>("amplitude");
     width_ = cloud.add<float>("width");
     snr_ = cloud.add<float>("snr");
@@ -47,8 +48,9 @@ ScanColumns::ScanColumns(PointCloud& cloud, const LidarSpec& spec)
     error_bound_ = cloud.add<float>("error_bound");
 }
 
-void ScanColumns::write_light(std::size_t row, const Echo& echo,
+void ScanColumns::write_light(std::size_t row, std::uint32_t pulse, const Echo& echo,
                               const SurfaceTruth& surface) const noexcept {
+  pulse_[row] = pulse;
   amplitude_[row] = static_cast<float>(echo.detection.power_w);
   width_[row] = static_cast<float>(echo.detection.width_s);
   snr_[row] = static_cast<float>(echo.detection.snr);

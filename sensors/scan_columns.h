@@ -34,7 +34,8 @@ class ScanColumns {
   ScanColumns(PointCloud& cloud, const LidarSpec& spec);
 
   void write(std::size_t row, const EchoRow& echo) const noexcept;
-  void write_light(std::size_t row, const Echo& echo, const SurfaceTruth& surface) const noexcept;
+  void write_light(std::size_t row, std::uint32_t pulse, const Echo& echo,
+                   const SurfaceTruth& surface) const noexcept;
   void write_bound(std::size_t row, double bound_m) const noexcept;
   bool has_bounds() const { return !error_bound_.empty(); }
 
@@ -48,6 +49,7 @@ class ScanColumns {
   std::span<std::uint32_t> instance_;
   std::span<float> error_estimate_;
   // With light alone:
+  std::span<std::uint32_t> pulse_;
   std::span<float> amplitude_, width_, snr_, share_, second_share_;
   std::span<std::uint8_t> kind_;
   std::span<std::uint16_t> second_label_;

@@ -228,7 +228,7 @@ void check_lidars(const SceneSpec& scene, const Node& node, Faults& faults) {
       continue;
     }
     try {
-      Lidar(mounted.lidar, scene.air);
+      const Lidar works(mounted.lidar, scene.air);
       if (light && scene.terrain.material)
         retro_brdf(*scene.terrain.material, light->wavelength_nm);
     } catch (const Error& fault) {

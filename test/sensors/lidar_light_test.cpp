@@ -44,14 +44,13 @@ HeightGrid flat_ground() {
 
 // Ground at height 0 for x < edge_m, and at `height_m` beyond: a wall 0.1 mm thick, 4 m long.
 HeightGrid cliff(double edge_m, float height_m) {
-  constexpr int columns = 20'001;
+  constexpr std::size_t columns = 20'001;
   std::vector<float> heights_m(2 * columns);
-  for (int i = 0; i < columns; ++i) {
-    const double x = -1 + 1e-4 * i;
-    heights_m[static_cast<std::size_t>(i)] = heights_m[static_cast<std::size_t>(i + columns)] =
-        x < edge_m - 1e-9 ? 0.0f : height_m;
+  for (std::size_t i = 0; i < columns; ++i) {
+    const double x = -1 + 1e-4 * static_cast<double>(i);
+    heights_m[i] = heights_m[i + columns] = x < edge_m - 1e-9 ? 0.0f : height_m;
   }
-  return {{columns, 2}, {-1, -2}, {1e-4, 4}, std::move(heights_m)};
+  return {{int(columns), 2}, {-1, -2}, {1e-4, 4}, std::move(heights_m)};
 }
 
 Trajectory still_at(const glm::dvec3& p) {
@@ -213,12 +212,12 @@ TEST(LidarLight, TiltedPlaneIsOneEchoAtTheCentroidOfItsEnergy) {
 TEST(LidarLight, TiltedPlaneIsTimedByItsOwnWaveform) {
   const Scene scene = scene_of(flat_ground());
   using Timing = ReceiverSpec::Timing;
-  for (const auto& [axis_m, divergence_rad] : {std::pair(47., 3e-3), std::pair(100., 0.3e-3)}) {
+  for (const auto& beam : {std::pair(47., 3e-3), std::pair(100., 0.3e-3)}) {
+    const double axis_m = beam.first, divergence_rad = beam.second;
     for (const double tilt_deg : {0., 45., 70., 77., 83., 87.}) {
       const double tilt_rad = glm::radians(tilt_deg);
       const PlaneEcho plane(tilt_rad, axis_m, divergence_rad);
       const double peak = plane.power(plane.peak_m());
-      const PlaneEcho upright(0, axis_m, divergence_rad);
       const glm::dvec3 sensor(0, 0, axis_m * std::cos(tilt_rad));
       const auto found_m = [&](Timing timing, double threshold_w) {
         LidarSpec spec = lidar_of(looking_down({pi / 2 - tilt_rad}), divergence_rad, 256, 4096);
@@ -316,11 +315,10 @@ TEST(LidarLight, StepEdgeIsTwoEchoesFromAboutHalfAPulseOn) {
 
 // A wall 5 mm wide and 3 cm beside the axis; sub-rays are 2.8 mm apart.
 TEST(LidarLight, ThinWallThatTheAxisMissesReturns) {
-  constexpr int columns = 2001;
+  constexpr std::size_t columns = 2001;
   std::vector<float> heights_m(2 * columns, 0.0f);
-  for (int i = 1030; i < 1035; ++i)
-    heights_m[static_cast<std::size_t>(i)] = heights_m[static_cast<std::size_t>(i + columns)] = 5;
-  const Scene scene = scene_of({{columns, 2}, {-1, -2}, {1e-3, 4}, std::move(heights_m)});
+  for (std::size_t i = 1030; i < 1035; ++i) heights_m[i] = heights_m[i + columns] = 5;
+  const Scene scene = scene_of({{int(columns), 2}, {-1, -2}, {1e-3, 4}, std::move(heights_m)});
   constexpr int sub_rays = 1024;
   const LidarScan found =
       scan(lidar_of(looking_down({pi / 2}), 2e-3, sub_rays, sub_rays), scene, {0, 0, 50});
