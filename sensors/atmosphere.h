@@ -29,6 +29,13 @@ struct Overlap {
   double full_from_m = 0;
 };
 
+/// Returns the share of the light from a range that the receiver sees.
+constexpr double overlap_share(const Overlap& overlap, double range_m) noexcept {
+  if (range_m <= overlap.none_below_m) return 0;
+  if (range_m >= overlap.full_from_m) return 1;
+  return (range_m - overlap.none_below_m) / (overlap.full_from_m - overlap.none_below_m);
+}
+
 /// The ranges at which the return of the air is summed up: steps from 0 on.
 struct SoftReturnGrid {
   double step_m = 0;

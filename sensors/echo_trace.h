@@ -40,6 +40,9 @@ class EchoTrace {
   Crossing first_rise(double level_w) const;
   /// Where it last rises to a level before the peak: the begin, if it is not below before.
   Crossing last_rise(double level_w) const;
+  /// Where the parabola at the peak rises to a level: how steep an echo is whose neighbour hides
+  /// its rise.
+  Crossing rise_before_peak(double level_w) const { return beside_peak(level_w, -1); }
   /// Where it first falls to a level after the peak: the end, if it never does.
   Crossing fall(double level_w) const;
   /// Ends of what is above a level about the peak, for widths: the logarithm of the power between

@@ -1,7 +1,7 @@
 #include "sensors/lidar.h"
 
+#include <bit>
 #include <cmath>
-#include <limits>
 
 #include "core/error.h"
 #include "sensors/lidar_sweep.h"
@@ -10,7 +10,10 @@ namespace groundray {
 namespace {
 
 BeamSpec with_one_level_more(BeamSpec beam) {
-  if (beam.sub_rays > 1 && beam.most_sub_rays < LaserBeam::sub_ray_limit) beam.most_sub_rays *= 2;
+  const bool doubles = beam.sub_rays > 1 && beam.most_sub_rays >= beam.sub_rays &&
+                       beam.most_sub_rays < LaserBeam::sub_ray_limit &&
+                       std::has_single_bit(static_cast<unsigned>(beam.most_sub_rays));
+  if (doubles) beam.most_sub_rays *= 2;
   return beam;
 }
 
@@ -20,12 +23,12 @@ std::optional<Light> light_of(const std::optional<LightSpec>& spec, const Atmosp
   return Light(*spec, air, gate);
 }
 
-std::optional<LightSpec> without_noise(std::optional<LightSpec> spec) {
-  if (spec && spec->receiver.noise) {
-    if (spec->receiver.threshold_w == 0)
-      spec->receiver.threshold_w = std::numeric_limits<double>::min();
-    spec->receiver.noise.reset();
-  }
+// The threshold stays where it is in the dark.
+std::optional<LightSpec> without_noise(const std::optional<Light>& light) {
+  if (!light) return std::nullopt;
+  LightSpec spec = light->spec();
+  spec.receiver.threshold_w = light->threshold_w();
+  spec.receiver.noise.reset();
   return spec;
 }
 
@@ -60,7 +63,7 @@ Lidar::Lidar(const LidarSpec& spec, const AtmosphereSpec& air)
       last_level_(beam_.levels() -
                   (with_one_level_more(spec.beam).most_sub_rays > spec.beam.most_sub_rays ? 2 : 1)),
       light_(light_of(spec.light, air, spec.gate)),
-      quiet_light_(light_of(without_noise(spec.light), air, spec.gate)) {}
+      quiet_light_(light_of(without_noise(light_), air, spec.gate)) {}
 
 LidarScan Lidar::scan(const Scene& scene, const Trajectory& X_DS, std::int64_t number, Seed seed,
                       std::uint32_t sensor_number) const {

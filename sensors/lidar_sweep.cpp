@@ -20,7 +20,8 @@
 namespace groundray {
 namespace {
 
-constexpr std::size_t chunk_rays = 2048;  // traced at once by a thread
+constexpr std::size_t chunk_rays = 2048;       // traced at once by a thread
+constexpr std::size_t most_rays = 256 * 1024;  // of a chunk whose pulses are all refined to the end
 constexpr std::int64_t convergence_stride = 64;
 constexpr double nan = std::numeric_limits<double>::quiet_NaN();
 
@@ -39,16 +40,20 @@ SweepPath path_of(const ScanPattern& pattern, const Trajectory& X_DS, std::int64
 }
 
 // Pulses in a chunk: whole firing sequences, where these are short.
-std::int64_t pulses_per_chunk(const ScanPattern& pattern, std::size_t sub_rays) {
-  const auto most = static_cast<std::int64_t>(std::max<std::size_t>(chunk_rays / sub_rays, 16));
+std::int64_t pulses_per_chunk(const ScanPattern& pattern, const LidarParts& lidar) {
+  const std::size_t first = lidar.beam.sub_rays(0).size();
+  const std::size_t last = lidar.beam.sub_rays(lidar.last_level).size();
+  const auto most = static_cast<std::int64_t>(
+      std::clamp<std::size_t>(std::max<std::size_t>(chunk_rays / first, 16), 1,
+                              std::max<std::size_t>(most_rays / last, 1)));
   const std::int64_t stride = pattern.neighbour_stride();
   return stride < most ? most / stride * stride : most;
 }
 
-// Whether it matters what lies beyond the gate.
-bool sees_all(const LidarSpec& spec) {
-  return spec.no_returns == LidarSpec::NoReturns::Report ||
-         spec.waveforms == LidarSpec::WaveformOutput::Keep;
+// Light sees what lies beyond the gate: its sunlight, its edges, the beginning of its echo.
+double rays_end_m(const LidarSpec& spec) {
+  const bool on = spec.light || spec.no_returns == LidarSpec::NoReturns::Report;
+  return on ? std::numeric_limits<double>::infinity() : spec.gate.far_m;
 }
 
 // A row of a scan with light.
@@ -93,10 +98,7 @@ class Sweep {
         key_(key),
         pulses_(lidar.pattern.pulses(number)),
         settings_{lidar.beam, lidar.last_level, lidar.light ? lidar.light->resolution_m() : 0,
-                  spec_.angular_jitter_rad,
-                  sees_all(spec_)
-                      ? std::numeric_limits<double>::infinity()
-                      : spec_.gate.far_m + (lidar.light ? lidar.light->resolution_m() : 0)} {
+                  spec_.angular_jitter_rad, rays_end_m(spec_)} {
     if (lidar.light) {
       brdf_ =
           retro_brdf(scene.materials.at(scene.terrain.material), lidar.light->spec().wavelength_nm);
@@ -404,7 +406,7 @@ LidarScan Sweep::run() {
 
 template <typename Finish>
 void Sweep::stream(const Finish& finish) {
-  const std::int64_t per_chunk = pulses_per_chunk(lidar_.pattern, lidar_.beam.sub_rays(0).size());
+  const std::int64_t per_chunk = pulses_per_chunk(lidar_.pattern, lidar_);
   const auto live = 2 * static_cast<std::size_t>(tbb::this_task_arena::max_concurrency());
   std::vector<Chunk> chunks(live);
   tbb::concurrent_bounded_queue<Chunk*> idle;

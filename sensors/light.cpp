@@ -6,6 +6,7 @@
 #include <glm/geometric.hpp>
 #include <limits>
 #include <numbers>
+#include <numeric>
 #include <utility>
 
 namespace groundray {
@@ -26,6 +27,35 @@ struct SurfaceShare {
   std::size_t begin = 0, end = 0;  // in the order of ranges
   double energy_j = 0;
 };
+
+struct EnergyShares {
+  SurfaceShare best, second;
+  double energy_j = 0;
+};
+
+// Arrivals [begin, end), by range, fall into surfaces where they are farther apart than two
+// surfaces can be told apart.
+EnergyShares shares_of(std::span<const Arrival> arrivals, std::size_t begin, std::size_t end,
+                       double resolution_m) {
+  EnergyShares shares;
+  SurfaceShare now;
+  const auto close = [&] {
+    if (now.energy_j > shares.best.energy_j) std::swap(now, shares.best);
+    if (now.energy_j > shares.second.energy_j) shares.second = now;
+  };
+  for (std::size_t k = begin; k < end; ++k) {
+    if (k > begin && arrivals[k].range_m - arrivals[k - 1].range_m > resolution_m) {
+      close();
+      now = {};
+    }
+    if (now.energy_j == 0) now.begin = k;
+    now.end = k + 1;
+    now.energy_j += arrivals[k].energy_j;
+    shares.energy_j += arrivals[k].energy_j;
+  }
+  close();
+  return shares;
+}
 
 // Puts each of at most `most` hits where as many are nearer, without a branch to mispredict; false
 // if two are equally far.
@@ -104,7 +134,7 @@ void Light::sample_air(const AtmosphereSpec& air) {
 }
 
 void Light::collect(std::span<const Ray> rays, std::span<const Hit> hits, const RetroBrdf& brdf,
-                    Workspace& work) const noexcept {
+                    double extinction_per_m, Workspace& work) const noexcept {
   sort_hits(hits, work.order);
   const std::size_t count = work.order.size();
   work.arrivals.resize(count);
@@ -117,20 +147,21 @@ void Light::collect(std::span<const Ray> rays, std::span<const Hit> hits, const 
   }
   const double share = 1.0 / static_cast<double>(hits.size());
   const auto receive = [&](Arrival& arrival, double transmission) {
+    const double seen = share * overlap_share(spec_.overlap, arrival.range_m);
     arrival.energy_j =
-        radar_.received_energy_j(share, arrival.energy_j, arrival.range_m, transmission);
+        seen > 0 ? radar_.received_energy_j(seen, arrival.energy_j, arrival.range_m, transmission)
+                 : 0;
   };
   const double nearest_m = arrivals[0].range_m;
-  const double extinction_per_m = atmosphere_.extinction_per_m();
   if (extinction_per_m * (arrivals[count - 1].range_m - nearest_m) < small_exponent) {
-    const double to_nearest = atmosphere_.transmission(nearest_m);  // one exponential serves all
+    const double to_nearest = std::exp(-extinction_per_m * nearest_m);  // one serves all
     for (std::size_t k = 0; k < count; ++k) {
       const double exponent = extinction_per_m * (nearest_m - arrivals[k].range_m);
       receive(arrivals[k], to_nearest * exp_of_small(exponent));
     }
   } else {
     for (std::size_t k = 0; k < count; ++k)
-      receive(arrivals[k], atmosphere_.transmission(arrivals[k].range_m));
+      receive(arrivals[k], std::exp(-extinction_per_m * arrivals[k].range_m));
   }
 }
 
@@ -148,10 +179,22 @@ void Light::add_air(std::span<const Hit> hits, Workspace& work) const noexcept {
   work.waveform.add(first_air_bin_, work.air_w);
 }
 
+double Light::air_energy_j(const Detection& detection, const Workspace& work) const noexcept {
+  if (air_w_.empty()) return 0;
+  const auto bin_of = [&](double time_s) {
+    const double bin = time_s / interval_s() - static_cast<double>(first_air_bin_);
+    return static_cast<std::ptrdiff_t>(
+        std::clamp(std::round(bin), 0.0, static_cast<double>(work.air_w.size())));
+  };
+  const auto first = work.air_w.begin();
+  return interval_s() *
+         std::accumulate(first + bin_of(detection.begin_s), first + bin_of(detection.end_s), 0.0);
+}
+
 void Light::receive(std::span<const Ray> rays, std::span<const Hit> hits,
                     std::span<const double> bounds_m, const RetroBrdf& brdf, const RandomKey& key,
                     Workspace& work) const noexcept {
-  collect(rays, hits, brdf, work);
+  collect(rays, hits, brdf, atmosphere_.extinction_per_m(), work);
   if (air_w_.empty()) {
     receiver_.sample(work.arrivals, work.waveform);
   } else {
@@ -165,44 +208,23 @@ void Light::receive(std::span<const Ray> rays, std::span<const Hit> hits,
   work.echoes.clear();
   for (const Detection& detection : work.detections)
     tell_truth(rays, hits, bounds_m, detection, work);
-  if (work.echoes.empty()) work.reason = reason_for_none(hits, work);
+  if (work.echoes.empty()) work.reason = reason_for_none(rays, hits, brdf, work);
 }
 
-// The hits within an echo, by range, fall into surfaces where they are farther apart than two
-// surfaces can be told apart.
 void Light::tell_truth(std::span<const Ray> rays, std::span<const Hit> hits,
                        std::span<const double> bounds_m, const Detection& detection,
                        Workspace& work) const noexcept {
   Echo& echo = work.echoes.emplace_back();
   echo.detection = detection;
-  SurfaceShare best, second, now;
-  double energy_j = 0;
-  const auto close = [&](const SurfaceShare& surface) {
-    if (surface.energy_j > best.energy_j) {
-      second = best;
-      best = surface;
-    } else if (surface.energy_j > second.energy_j) {
-      second = surface;
-    }
-  };
   const auto arrival_s = [&](const Arrival& a) { return receiver_.arrival_s(a.range_m); };
   const auto all_begin = work.arrivals.begin(), all_end = work.arrivals.end();
   const auto begin = std::ranges::lower_bound(all_begin, all_end, detection.begin_s, {}, arrival_s);
   const auto end = std::ranges::lower_bound(begin, all_end, detection.end_s, {}, arrival_s);
-  double last_m = -std::numeric_limits<double>::infinity();
-  for (auto arrival = begin; arrival != end; ++arrival) {
-    const auto k = static_cast<std::size_t>(arrival - all_begin);
-    if (arrival->range_m - last_m > resolution_m_) {
-      close(now);
-      now = {k, k, 0};
-    }
-    last_m = arrival->range_m;
-    now.end = k + 1;
-    now.energy_j += arrival->energy_j;
-    energy_j += arrival->energy_j;
-  }
-  close(now);
-  if (detection.kind == Detection::Kind::FalseAlarm || best.energy_j == 0) {
+  const auto [best, second, energy_j] =
+      shares_of(work.arrivals, static_cast<std::size_t>(begin - all_begin),
+                static_cast<std::size_t>(end - all_begin), resolution_m_);
+  const double air_j = air_energy_j(detection, work);
+  if (detection.kind == Detection::Kind::FalseAlarm || best.energy_j <= air_j) {
     echo.kind =
         detection.kind == Detection::Kind::FalseAlarm ? Echo::Kind::FalseAlarm : Echo::Kind::Air;
     return;
@@ -219,27 +241,31 @@ void Light::tell_truth(std::span<const Ray> rays, std::span<const Hit> hits,
     if (!bounds_m.empty()) echo.bound_m = std::max(echo.bound_m, bounds_m[i]);
   }
   echo.normal = glm::vec3(glm::normalize(normal));
-  echo.share = static_cast<float>(best.energy_j / energy_j);
-  echo.second_share = static_cast<float>(second.energy_j / energy_j);
+  echo.share = static_cast<float>(best.energy_j / (energy_j + air_j));
+  echo.second_share = static_cast<float>(second.energy_j / (energy_j + air_j));
 }
 
-NoReturn Light::reason_for_none(std::span<const Hit> hits, const Workspace& work) const noexcept {
+// May use the arrivals: nobody needs them any more.
+NoReturn Light::reason_for_none(std::span<const Ray> rays, std::span<const Hit> hits,
+                                const RetroBrdf& brdf, Workspace& work) const noexcept {
   if (work.order.empty()) return NoReturn::Sky;
-  double nearest_m = std::numeric_limits<double>::infinity();
-  for (const std::uint32_t i : work.order) {
-    const double range_m = hits[i].range_m;
-    if (gate_.near_m <= range_m && range_m <= gate_.far_m) nearest_m = std::min(nearest_m, range_m);
-  }
-  if (nearest_m == std::numeric_limits<double>::infinity()) return NoReturn::OutOfGate;
-  float peak_w = 0;
-  for (const Waveform::Segment& segment : work.waveform.segments())
-    peak_w = std::max(peak_w, std::ranges::max(work.waveform.power_w(segment)));
+  const auto outside = [&](const Arrival& arrival) {
+    return arrival.range_m < gate_.near_m || gate_.far_m < arrival.range_m;
+  };
+  if (std::ranges::all_of(work.arrivals, outside)) return NoReturn::OutOfGate;
+  const auto above_threshold = [&](const Waveform& waveform) {
+    return std::ranges::any_of(waveform.segments(), [&](const Waveform::Segment& segment) {
+      return std::ranges::max(waveform.power_w(segment)) > receiver_.threshold_w(0);
+    });
+  };
   // Only the second of one echo is not reported at all.
-  if (spec_.receiver.returns == ReceiverSpec::Returns::Second && peak_w > receiver_.threshold_w(0))
-    return NoReturn::Blanked;
-  const double left = atmosphere_.transmission(nearest_m);
-  return left < 1 && peak_w / (left * left) > receiver_.threshold_w(0) ? NoReturn::Absorbed
-                                                                       : NoReturn::BelowThreshold;
+  const bool second_alone = spec_.receiver.returns == ReceiverSpec::Returns::Second;
+  if (second_alone && above_threshold(work.waveform)) return NoReturn::Blanked;
+  if (atmosphere_.extinction_per_m() == 0) return NoReturn::BelowThreshold;
+  collect(rays, hits, brdf, 0, work);
+  std::erase_if(work.arrivals, outside);
+  receiver_.sample(work.arrivals, work.clear_waveform);
+  return above_threshold(work.clear_waveform) ? NoReturn::Absorbed : NoReturn::BelowThreshold;
 }
 
 double Light::reported_m(double range_m) const noexcept {

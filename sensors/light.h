@@ -25,7 +25,7 @@ struct Echo {
   double range_m = 0;      ///< from where the beam leaves
   glm::dvec3 p_DQ{0};      ///< in D
   glm::vec3 normal{0};     ///< unit, axes of D
-  float share = 0;         ///< of the echo's energy
+  float share = 0;         ///< of the echo's energy, that of the air included
   float second_share = 0;  ///< that of the surface with the most energy but for this one
   float deviation_m = 0;   ///< the largest of its hits'
   double bound_m = 0;      ///< the largest error bound of its hits, if these have any
@@ -52,14 +52,16 @@ class Light {
     Detections detections;
     std::vector<Echo> echoes;         ///< of the last pulse, by reported range
     NoReturn reason = NoReturn::Sky;  ///< of the last pulse, if it has no echo
-    std::vector<float> air_w;
+    std::vector<float> air_w;         ///< what the air sends back, from the first bin of it on
+    Waveform clear_waveform;          ///< as it would be without air
   };
 
   /// @throws Error listing what is out of bounds in `spec` and `air`.
   Light(const LightSpec& spec, const AtmosphereSpec& air, const RangeGate& gate);
 
   const LightSpec& spec() const { return spec_; }
-  double interval_s() const { return receiver_.interval_s(); }  ///< between a waveform's samples
+  double interval_s() const { return receiver_.interval_s(); }     ///< between a waveform's samples
+  double threshold_w() const { return receiver_.threshold_w(0); }  ///< of the receiver in the dark
   /// How far apart the ranges of neighbouring sub-rays may be: c FWHM / 4.
   double resolution_m() const { return resolution_m_; }
 
@@ -78,12 +80,14 @@ class Light {
 
  private:
   void collect(std::span<const Ray> rays, std::span<const Hit> hits, const RetroBrdf& brdf,
-               Workspace& work) const noexcept;
+               double extinction_per_m, Workspace& work) const noexcept;
   void add_air(std::span<const Hit> hits, Workspace& work) const noexcept;
   void tell_truth(std::span<const Ray> rays, std::span<const Hit> hits,
                   std::span<const double> bounds_m, const Detection& detection,
                   Workspace& work) const noexcept;
-  NoReturn reason_for_none(std::span<const Hit> hits, const Workspace& work) const noexcept;
+  NoReturn reason_for_none(std::span<const Ray> rays, std::span<const Hit> hits,
+                           const RetroBrdf& brdf, Workspace& work) const noexcept;
+  double air_energy_j(const Detection& detection, const Workspace& work) const noexcept;
   void sample_air(const AtmosphereSpec& air);
 
   LightSpec spec_;

@@ -158,7 +158,7 @@ LinePattern read_line(Map line) {
   line.read_whole("facets", Need::Optional, facets);
   line.read_whole("lines_per_sweep", Need::Optional, lines);
   pattern.facets = facets;
-  pattern.lines_per_sweep = static_cast<int>(std::min(lines, 1'000'000u));
+  pattern.lines_per_sweep = static_cast<int>(std::min(lines, 1'000'000'000u));
   line.read_number("head_rate_hz", Need::Optional, pattern.head_rate_hz);
   double start_deg = 0;
   line.read_number("head_start_deg", Need::Optional, start_deg);
@@ -226,7 +226,7 @@ TablePattern read_table(Map map, const fs::path& path) {
   map.close();
   if (!named || !sound) return {};
   TablePattern pattern = load_table(beside(path, file), period_s);
-  pattern.sweeps_per_period = static_cast<int>(std::min(sweeps, 1'000'000u));
+  pattern.sweeps_per_period = static_cast<int>(std::min(sweeps, 1'000'000'000u));
   return pattern;
 }
 

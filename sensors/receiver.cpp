@@ -22,8 +22,10 @@ using Returns = ReceiverSpec::Returns;
 
 constexpr double planck_j_s = 6.62607015e-34;  // exact by the definition of the kilogram
 constexpr double infinity = std::numeric_limits<double>::infinity();
-constexpr double automatic_interval = 0.25, longest_interval = 0.5;  // in sigmas of the pulse
-constexpr double hopeless_sigmas = 6;  // below the threshold: 1e-9 of such echoes would pass
+// In sigmas of the pulse:
+constexpr double automatic_interval = 0.25, longest_interval = 0.5, least_interval = 1e-3;
+constexpr double least_crossing = 0.1;  // of the threshold: noise so strong triggers by itself
+constexpr double hopeless_sigmas = 6;   // below the threshold: 1e-9 of such echoes would pass
 constexpr std::uint32_t most_alarms = 1u << 20;  // of a pulse; sub_ray has no more bits
 // The parabola through a maximum's samples rises above the middle one by exp(curvature / 8) at
 // most: 3 % for a Gaussian at half a sigma a bin. This is ample for pulses of any shape.
@@ -110,6 +112,9 @@ double interval_of(const ReceiverSpec& spec, const SystemPulse& pulse) {
                 "sample_interval_s = {} must be at most {}, half a sigma of the pulse as received: "
                 "0 chooses a quarter",
                 spec.sample_interval_s, longest_interval * sigma_s);
+  broken.unless(spec.sample_interval_s == 0 || spec.sample_interval_s >= least_interval * sigma_s,
+                "sample_interval_s = {} must be at least {}, a thousandth of that sigma",
+                spec.sample_interval_s, least_interval * sigma_s);
   broken.throw_if_any();
   return spec.sample_interval_s > 0 ? spec.sample_interval_s : automatic_interval * sigma_s;
 }
@@ -169,6 +174,9 @@ void choose(Returns returns, std::size_t most, Detections& found) {
   }
 }
 
+// How far noise moves the moment at which power passes a level; what does not pass it stays.
+double moved(double noise_w, double slope_w) { return slope_w > 0 ? noise_w / slope_w : 0; }
+
 // While a detection is being dealt with there is no other.
 void blank(double dead_m, Detections& found) {
   double ready_m = -infinity;
@@ -218,7 +226,10 @@ Receiver::Timed Receiver::timed(const EchoTrace& trace, double threshold_w, doub
   const double response_bins = response_sigma_s_ / interval_s();
   switch (spec_.timing) {
     case Timing::LeadingEdge:
-      return {trace.first_rise(threshold_w - noise_at(threshold_w) * normal).bin};
+      return {trace
+                  .first_rise(std::max(threshold_w - noise_at(threshold_w) * normal,
+                                       least_crossing * threshold_w))
+                  .bin};
     case Timing::ConstantFraction: {
       const double level_w = spec_.fraction * peak_w;
       const auto edge = trace.last_rise(level_w);
@@ -228,17 +239,21 @@ Receiver::Timed Receiver::timed(const EchoTrace& trace, double threshold_w, doub
       const double together = std::exp(-0.25 * apart * apart);
       const double variance_w2 =
           at_edge_w * at_edge_w + at_peak_w * at_peak_w - 2 * together * at_edge_w * at_peak_w;
-      return {edge.bin, std::sqrt(variance_w2) / edge.slope_w};
+      const double slope_w =
+          edge.slope_w > 0 ? edge.slope_w : trace.rise_before_peak(level_w).slope_w;
+      return {edge.bin, moved(std::sqrt(variance_w2), slope_w)};
     }
     case Timing::Peak:
       if (!spec_.noise) return {trace.peak_bin()};
       if (trace.clipped()) {
         const double left_w = trace.first_rise(peak_w).slope_w,
                      right_w = trace.fall(peak_w).slope_w;
-        return {trace.peak_bin(), 0.5 * noise_at(peak_w) * std::hypot(1 / left_w, 1 / right_w)};
+        const double noise_w = noise_at(peak_w);
+        return {trace.peak_bin(),
+                0.5 * std::hypot(moved(noise_w, left_w), moved(noise_w, right_w))};
       }
       return {trace.peak_bin(),
-              noise_at(peak_w) / (std::numbers::sqrt2 * response_bins * trace.curvature_w())};
+              moved(noise_at(peak_w), std::numbers::sqrt2 * response_bins * trace.curvature_w())};
     case Timing::CentreOfGravity:
       return centroid(trace, threshold_w, background_w);
   }

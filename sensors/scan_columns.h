@@ -1,5 +1,6 @@
 #pragma once
 
+#include <algorithm>
 #include <cmath>
 #include <cstdint>
 #include <glm/vec3.hpp>
@@ -78,8 +79,9 @@ inline void ScanColumns::write(std::size_t row, const EchoRow& echo) const noexc
   label_[row] = echo.surface.label;
   instance_[row] = echo.surface.instance;
   // The surface may be this much higher or lower; along the beam that is this much.
-  error_estimate_[row] =
-      echo.deviation_m == 0 ? 0 : echo.deviation_m * echo.normal.z / echo.cos_incidence;
+  error_estimate_[row] = echo.deviation_m == 0 ? 0
+                                               : echo.deviation_m * echo.normal.z /
+                                                     std::max(echo.cos_incidence, 1e-6f);
 }
 
 }  // namespace groundray

@@ -213,15 +213,17 @@ std::vector<MountedLidar> read_lidars(Map& root, const fs::path& path,
 }
 
 // What no key alone can tell: whether the parts of a lidar, the air and the ground go together.
-void check_lidars(const SceneSpec& scene, const Node& node, Faults& faults) {
+void check_lidars(const SceneSpec& scene, const Node& node, std::span<const Node> entries,
+                  Faults& faults) {
   const bool air_returns =
       scene.air.backscatter_per_m_sr > 0 || std::isfinite(scene.air.fog_range_m);
   bool has_light = false;
-  for (const MountedLidar& mounted : scene.lidars) {
+  for (std::size_t i = 0; i < scene.lidars.size(); ++i) {
+    const MountedLidar& mounted = scene.lidars[i];
     const auto& light = mounted.lidar.light;
     has_light |= light.has_value();
     if (light && air_returns && light->overlap.full_from_m == 0) {
-      faults.add(node, "lidars",
+      faults.add(entries[i], "lidars",
                  "the receiver of '{}' needs overlap_m: [from, to], where it begins to see its "
                  "beam: fog sends light back from everywhere",
                  mounted.name);
@@ -232,7 +234,7 @@ void check_lidars(const SceneSpec& scene, const Node& node, Faults& faults) {
       if (light && scene.terrain.material)
         retro_brdf(*scene.terrain.material, light->wavelength_nm);
     } catch (const Error& fault) {
-      faults.add(node, "lidars", "'{}' cannot work: {}", mounted.name, fault.what());
+      faults.add(entries[i], "lidars", "'{}' cannot work: {}", mounted.name, fault.what());
     }
   }
   if (has_light && !scene.terrain.material) {
@@ -268,7 +270,7 @@ SceneSpec parse_scene(const std::string& text, const fs::path& path,
   if (auto weather = root.map("weather", Need::Optional))
     scene.air = read_air(std::move(*weather), faults);
   scene.lidars = read_lidars(root, path, preset_folder, faults);
-  if (faults.count() == 0) check_lidars(scene, node, faults);
+  if (faults.count() == 0) check_lidars(scene, node, root.list("lidars", Need::Optional), faults);
   root.close();
   faults.throw_if_any();
   return scene;

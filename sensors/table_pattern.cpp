@@ -253,7 +253,6 @@ TablePattern parse_table(std::string_view text, const std::string& name, double 
 
 TableScan::TableScan(const TablePattern& pattern) : cycle_(cycle_of(pattern)) {
   const double sweep_s = pattern.period_s / pattern.sweeps_per_period;
-  Violations broken("TablePattern");
   for (int sweep = 0; sweep < pattern.sweeps_per_period; ++sweep) {
     // Times are decimal figures that doubles only approximate: a billionth early is on time.
     const auto first = std::ranges::lower_bound(pattern.shots, (sweep - 1e-9) * sweep_s, {},
@@ -263,10 +262,11 @@ TableScan::TableScan(const TablePattern& pattern) : cycle_(cycle_of(pattern)) {
   for (std::size_t sweep = 0; sweep < begins_.size(); ++sweep) {
     const std::int64_t end =
         sweep + 1 < begins_.size() ? begins_[sweep + 1] : cycle_.cycle_pulses();
-    broken.unless(begins_[sweep] < end, "sweep {} of {} has no pulse: ask for fewer sweeps", sweep,
+    if (begins_[sweep] == end) {
+      throw Error("TablePattern: sweep {} of {} has no pulse: ask for fewer sweeps", sweep,
                   begins_.size());
+    }
   }
-  broken.throw_if_any();
 }
 
 void TableScan::fill(std::int64_t sweep, NumberRange pulses, PulseBatch& batch) const noexcept {

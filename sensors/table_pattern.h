@@ -60,7 +60,7 @@ TablePattern parse_table(std::string_view text, const std::string& name, double 
 /// The pulses of a table. Sweep n is those that fire in part n mod sweeps_per_period of a period.
 class TableScan {
  public:
-  static constexpr int most_shots = 100'000'000;
+  static constexpr int most_shots = 4'000'000;
 
   /// @throws Error listing every field of `pattern` that is out of bounds, and sweeps without a
   ///         pulse.

@@ -103,11 +103,13 @@ void print_scene(const World& world) {
   print_levels(world);
   for (const PlacedLidar& lidar : world.lidars) {
     const ScanPattern& pattern = lidar.lidar.pattern();
+    const bool light = lidar.spec.lidar.light.has_value();
     const double pulses =
         static_cast<double>(pattern.pulses(0)) * static_cast<double>(lidar.sweeps);
-    fmt::print("lidar     {}: {}, {} scans of about {:.0f} pulses, at most {:.1f} MiB of PLY\n",
+    fmt::print("lidar     {}: {}, {} scans of about {:.0f} pulses, {} {:.1f} MiB of PLY\n",
                lidar.spec.name, lidar.spec.lidar.model, lidar.sweeps,
-               pulses / static_cast<double>(lidar.sweeps), pulses * 88 / (1 << 20));
+               pulses / static_cast<double>(lidar.sweeps), light ? "for one echo each" : "at most",
+               pulses * (light ? 113 : 88) / (1 << 20));
   }
 }
 

@@ -385,6 +385,42 @@ TEST(LidarLight, DenseFogIsAnEchoOfItsOwnWithoutASurface) {
   EXPECT_NEAR(range_m(found.echoes, 1), 25, 0.02);  // the air before it pulls its centroid
 }
 
+// A leading edge takes fog and ground for one, where power stays above the threshold between them.
+TEST(LidarLight, AnEchoOfFogIsNoSurfaceThoughItReachesTheGround) {
+  LidarSpec spec = lidar_of(looking_down({pi / 2}), 1e-3, 16, 16);
+  spec.light->overlap = {1, 2};
+  spec.light->receiver.timing = ReceiverSpec::Timing::LeadingEdge;
+  spec.light->receiver.threshold_w = 1e-9;
+  const LidarScan found = scan(spec, scene_of(flat_ground()), {0, 0, 8}, {.fog_range_m = 20});
+  ASSERT_EQ(found.echoes.rows(), 1u);
+  EXPECT_LT(range_m(found.echoes, 0), 3);
+  EXPECT_EQ(found.echoes.column<std::uint8_t>("kind")[0], 1);
+  EXPECT_TRUE(std::isnan(found.echoes.column<double>("range_true")[0]));
+}
+
+TEST(LidarLight, AbsorbedIsWhatClearAirWouldBringBack) {
+  const Scene scene = scene_of(flat_ground());
+  LidarSpec spec = lidar_of(looking_down({pi / 2}), 1e-3, 16, 16);
+  spec.light->overlap = {0.5, 1};
+  const auto reason = [&](double height_m, const AtmosphereSpec& air) {
+    const LidarScan found = scan(spec, scene, {0, 0, height_m}, air);
+    EXPECT_EQ(found.echoes.rows(), 0u);
+    return int(found.no_returns.column<std::uint8_t>("reason")[0]);
+  };
+  // Extinction of 80 powers of e each way: nothing is left even of a double's range in watts.
+  EXPECT_EQ(reason(1000, {.visibility_m = 50}), 3);
+  spec.light->receiver.threshold_w = 2 * plane_power_w(500);
+  EXPECT_EQ(reason(500, {.visibility_m = 50}), 2);  // too weak in clear air, too
+}
+
+TEST(LidarLight, SurfacesNearerThanTheOverlapAreSeenInPart) {
+  LidarSpec spec = lidar_of(looking_down({pi / 2}), 1e-3, 16, 16);
+  spec.light->overlap = {1, 3};
+  const LidarScan half = scan(spec, scene_of(flat_ground()), {0, 0, 2});
+  EXPECT_NEAR(only(half, "amplitude"), 0.5 * plane_power_w(2), 1e-5 * plane_power_w(2));
+  EXPECT_EQ(scan(spec, scene_of(flat_ground()), {0, 0, 0.9}).echoes.rows(), 0u);
+}
+
 TEST(LidarLight, IntensityIsOnTheSensorsScale) {
   const Scene grey = scene_of(flat_ground());
   const Scene sheeting = scene_of(flat_ground(), {"sheeting", RetroReflector{100}});
@@ -476,6 +512,13 @@ TEST(LidarLight, RefusesWhatNeedsLightOrASpectrum) {
   spec.light->receiver.response_fwhm_s = 1e-9;
   spec.light->receiver.noise = NoiseSpec{.nep_w_per_sqrt_hz = 1e-12};
   EXPECT_THAT([&] { Lidar{spec}; }, ThrowsMessage<Error>(HasSubstr("range gate ends nowhere")));
+  spec = lidar_of(looking_down({1}), 1e-3, 64, 32);
+  EXPECT_THAT([&] { Lidar{spec}; }, ThrowsMessage<Error>(HasSubstr("most_sub_rays = 32 must be")));
+  spec = lidar_of(looking_down({1}), 1e-3, 16, 96);
+  EXPECT_THAT([&] { Lidar{spec}; }, ThrowsMessage<Error>(HasSubstr("most_sub_rays = 96 must be")));
+  spec = lidar_of(looking_down({1}), 1e-3, 16, 16);
+  spec.light->receiver.sample_interval_s = 1e-29;
+  EXPECT_THAT([&] { Lidar{spec}; }, ThrowsMessage<Error>(HasSubstr("sample_interval_s = 1e-29")));
   spec = lidar_of(looking_down({1}), 1e-3, 16, 16);
   spec.light->wavelength_nm = 1550;
   const Scene scene = scene_of(flat_ground(), {"narrow", Lambertian{{{400, 0.1}, {1000, 0.2}}}});

@@ -101,6 +101,20 @@ TEST(LidarSweep, SameBytesForAnyNumberOfThreadsWithAllNoiseOn) {
   }
 }
 
+TEST(LidarSweep, EchoesDoNotDependOnWhatElseIsAskedFor) {
+  const HeightGrid ground = testing::fractal(513, 1, 60, Seed{1});
+  LidarSpec spec = noisy();
+  spec.gate = {2, 20};
+  const auto echoes = [&] {
+    return Lidar(spec).scan(scene_of(ground), ride_over(ground), 3, Seed{7}, 0).echoes;
+  };
+  const PointCloud with_all = echoes();
+  spec.no_returns = LidarSpec::NoReturns::Omit;
+  spec.waveforms = LidarSpec::WaveformOutput::Omit;
+  ASSERT_GT(with_all.rows(), 1000u);
+  expect_same_bytes(with_all, echoes());
+}
+
 TEST(LidarSweep, FalseAlarmsAndAirHaveNoTruth) {
   const HeightGrid ground = testing::fractal(513, 1, 60, Seed{1});
   const LidarScan found = Lidar(noisy()).scan(scene_of(ground), ride_over(ground), 3, Seed{7}, 0);

@@ -265,6 +265,32 @@ TEST(ReceiverNoise, JitterIsThatOfAPulseInNoise) {
   }
 }
 
+// Two echoes 0.9 m apart: the valley between them is above half of the second's peak, so nothing
+// rises through the level there. With a signal to noise ratio of 500 or more an edge of 5 ns moves
+// by millimetres.
+TEST(ReceiverNoise, JoinedEchoesStayWhereTheyAreWithoutIt) {
+  for (const Timing timing :
+       {Timing::LeadingEdge, Timing::ConstantFraction, Timing::Peak, Timing::CentreOfGravity}) {
+    ReceiverSpec spec = noisy(timing, 1e-6);
+    const Receiver receiver(laser, spec);
+    spec.noise.reset();
+    const Receiver quiet(laser, spec);
+    const double joules_per_watt = 1 / receiver.pulse().peak_per_s();
+    const Arrival arrivals[] = {{75, 1e-3 * joules_per_watt}, {75.9, 1.1e-3 * joules_per_watt}};
+    Waveform waveform;
+    receiver.sample(arrivals, waveform);
+    Detections exact, found;
+    quiet.detect(waveform, gate, {}, exact);
+    ASSERT_EQ(exact.size(), timing == Timing::LeadingEdge ? 1u : 2u);
+    for (std::uint32_t pulse = 0; pulse < 500; ++pulse) {
+      receiver.detect(waveform, gate, {{.seed = Seed{3}, .pulse = pulse}, background_w}, found);
+      ASSERT_EQ(found.size(), exact.size());
+      for (std::size_t i = 0; i < found.size(); ++i)
+        ASSERT_NEAR(found[i].range_m, exact[i].range_m, 0.02) << int(timing) << ' ' << i;
+    }
+  }
+}
+
 TEST(ReceiverNoise, AmplitudeVariesByTheNoiseAtThePeak) {
   constexpr std::uint32_t pulses = 20'000;
   const Receiver receiver(laser, noisy(Timing::Peak, 20e-9));
