@@ -20,8 +20,8 @@
 namespace groundray {
 namespace {
 
-constexpr std::size_t chunk_rays = 2048;       // traced at once by a thread
-constexpr std::size_t most_rays = 256 * 1024;  // of a chunk whose pulses are all refined to the end
+constexpr std::size_t chunk_rays = 2048;    // traced at once by a thread
+constexpr std::size_t most_rays = 262'144;  // of a chunk whose pulses are all refined to the end
 constexpr std::int64_t convergence_stride = 64;
 constexpr double nan = std::numeric_limits<double>::quiet_NaN();
 

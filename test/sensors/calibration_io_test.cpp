@@ -84,7 +84,7 @@ TEST(OusterMetadata, FiresTheColumnsOfTheWindowAlone) {
         // A window that wraps fires its end at the start of the turn.
         const int column = last < first ? (i <= last ? i : first + i - last - 1) : first + i;
         const double azimuth = std::numbers::pi - 2 * std::numbers::pi * column / 1024;
-        const glm::dvec3& d = batch.direction[static_cast<std::size_t>(3 * i + 1)];  // azimuth 0
+        const glm::dvec3& d = batch.direction[3 * static_cast<std::size_t>(i) + 1];  // azimuth 0
         ASSERT_NEAR(std::remainder(std::atan2(d.y, d.x) - azimuth, 2 * std::numbers::pi), 0, 1e-10);
       }
     }

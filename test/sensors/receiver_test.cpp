@@ -30,7 +30,6 @@ constexpr RangeGate gate{0, 5000};
 // 4 ns pulse, 3 ns response: 5 ns together.
 const PulseSpec laser{.fwhm_s = 4e-9};
 const double sigma_s = 5e-9 / (2 * std::sqrt(2 * std::numbers::ln2));
-const double response_s = 3e-9 / (2 * std::sqrt(2 * std::numbers::ln2));
 const double sigma_m = sigma_s * c_m_per_s / 2;
 const double joules_per_watt = sigma_s * std::sqrt(2 * std::numbers::pi);  // of a peak
 
@@ -288,7 +287,7 @@ TEST(Receiver, CentreOfGravityIsTheCentroidOfTheEnergyOfAnyCluster) {
   }
 }
 
-std::vector<Arrival> arrivals_of(std::vector<std::pair<double, double>> range_and_peak_w) {
+std::vector<Arrival> arrivals_of(const std::vector<std::pair<double, double>>& range_and_peak_w) {
   std::vector<Arrival> arrivals;
   for (const auto& [range_m, peak_w] : range_and_peak_w) {
     arrivals.push_back({range_m, peak_w * joules_per_watt});

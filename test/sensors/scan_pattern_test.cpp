@@ -173,10 +173,11 @@ PulseBatch sweep_of(const ScanPattern& scan, std::int64_t sweep) {
 SpinningPattern seven_beams() {
   SpinningPattern pattern{.rate_hz = 10, .start_azimuth_rad = 0.3, .firing_period_s = 55.296e-6};
   for (std::uint16_t i = 0; i < 7; ++i) {
+    const int pair = i / 2;
     pattern.beams.push_back({.elevation_rad = 0.1 * i - 0.3,
                              .azimuth_offset_rad = 0.02 * i,
                              .origin_m = {0.01 * i, 0.02, -0.03},
-                             .firing_time_s = 2.304e-6 * (i / 2),
+                             .firing_time_s = 2.304e-6 * pair,
                              .ring = i});
   }
   return pattern;

@@ -144,9 +144,9 @@ TEST(TablePattern, ARasterFiresRowByRowAtTheGivenTimes) {
   ASSERT_EQ(scan.pulses(0), 12);
   const PulseBatch batch = sweep_of(scan, 7);
   for (std::size_t i = 0; i < 12; ++i) {
-    const double row = static_cast<double>(i / 4);
-    const double column = static_cast<double>(i % 4);
-    EXPECT_EQ(batch.ring[i], i / 4);
+    const std::size_t ring = i / 4;
+    const auto row = static_cast<double>(ring), column = static_cast<double>(i % 4);
+    EXPECT_EQ(batch.ring[i], ring);
     EXPECT_NEAR(batch.volleys[i].time_s, 0.07 + 1e-3 * row + 1e-4 * column, 1e-16);
     const glm::dvec3& d = batch.direction[i];
     EXPECT_NEAR(std::atan2(d.y, d.x), (15 - 10 * column) * degree, 4 * epsilon);
@@ -167,8 +167,9 @@ TEST(TablePattern, AFlashFiresAllPixelsAtOnceThroughAPinhole) {
   EXPECT_DOUBLE_EQ(batch.volleys[0].time_s, 0.1);
   for (std::size_t i = 0; i < 40; ++i) {
     const glm::dvec3& d = batch.direction[i];
-    EXPECT_NEAR(d.y / d.x, 0.875 - 0.25 * static_cast<double>(i % 8), 8 * epsilon);
-    EXPECT_NEAR(d.z / d.x, 0.4 - 0.2 * static_cast<double>(i / 8), 8 * epsilon);
+    const auto row = i / 8, column = i % 8;
+    EXPECT_NEAR(d.y / d.x, 0.875 - 0.25 * static_cast<double>(column), 8 * epsilon);
+    EXPECT_NEAR(d.z / d.x, 0.4 - 0.2 * static_cast<double>(row), 8 * epsilon);
   }
 }
 
