@@ -246,6 +246,7 @@ void RayTracer::Impl::decide_fast(const Target& target, Packet<W>& packet) const
 template <int W>
 void RayTracer::Impl::trace_target(const Target& target, std::span<Hit> hits,
                                    Packet<W>& packet) const noexcept {
+  if (std::isnan(target.min_m)) return;  // it has no heights
   if (!enter(target, hits, packet)) return;
   const bool exact = target.level->tracing == Tracing::Exact;
   if (exact) {
