@@ -77,7 +77,7 @@ void check_noise(const ReceiverSpec& spec, Violations& broken) {
                 rate_hz, highest_hz);
 }
 
-const ReceiverSpec& checked(const ReceiverSpec& spec) {
+ReceiverSpec checked(const ReceiverSpec& spec) {
   Violations broken("receiver");
   broken.unless(finite_from(0, spec.response_fwhm_s),
                 "response_fwhm_s = {} must be finite and not negative", spec.response_fwhm_s);
