@@ -59,7 +59,12 @@ void read_pulse(Map& laser, PulseSpec& pulse, Faults& faults) {
     if (const auto value = yaml::number(node, "pulse_shape", not_negative, faults))
       pulse.shape.push_back(*value);
   }
-  laser.read_scaled("pulse_shape_step_ns", Need::Optional, 1e-9, pulse.shape_step_s, positive);
+  const Node* step =
+      laser.read_scaled("pulse_shape_step_ns", Need::Optional, 1e-9, pulse.shape_step_s, positive);
+  if (step != nullptr && pulse.shape.empty()) {
+    faults.add(*step, "pulse_shape_step_ns",
+               "is the step of pulse_shape: [power, ...], which is not there");
+  }
 }
 
 void read_laser(Map laser, LightSpec& light, Faults& faults) {
@@ -72,7 +77,7 @@ void read_laser(Map laser, LightSpec& light, Faults& faults) {
 
 void read_noise(Map map, LightSpec& light) {
   NoiseSpec noise;
-  map.read_number("nep_w_per_sqrt_hz", Need::Required, noise.nep_w_per_sqrt_hz, not_negative);
+  map.read_number("nep_w_per_sqrt_hz", Need::Required, noise.nep_w_per_sqrt_hz, positive);
   map.read_number("quantum_efficiency", Need::Optional, noise.quantum_efficiency, share_rule);
   map.read_number("excess_noise_factor", Need::Optional, noise.excess_noise_factor, at_least_one);
   map.read_number("false_alarm_rate_hz", Need::Optional, noise.false_alarm_rate_hz, not_negative);
@@ -110,7 +115,8 @@ void read_receiver(Map map, LightSpec& light) {
                            {"peak", Timing::Peak},
                            {"centre_of_gravity", Timing::CentreOfGravity}});
   map.read_number("threshold_w", Need::Optional, receiver.threshold_w, not_negative);
-  map.read_number("fraction", Need::Optional, receiver.fraction, share_rule);
+  map.read_number("fraction", Need::Optional, receiver.fraction,
+                  Rule{[](double value) { return value > 0 && value < 1; }, "must be > 0 and < 1"});
   using Returns = ReceiverSpec::Returns;
   map.read_choice<Returns>("returns", Need::Optional, receiver.returns,
                            {{"first", Returns::First},

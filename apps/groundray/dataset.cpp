@@ -8,6 +8,7 @@
 #include <cstddef>
 #include <cstdint>
 #include <cstdlib>
+#include <fstream>
 #include <numbers>
 #include <span>
 #include <string>
@@ -152,6 +153,16 @@ std::string header(const World& world) {
   return text;
 }
 
+// What the scan's header says of its convergence, as an entry of its frame; empty if nothing.
+std::string convergence_of(const fs::path& scan) {
+  std::ifstream file(scan);
+  const std::string begin = fmt::format("comment {}", convergence_comment);
+  for (std::string line; std::getline(file, line) && line != "end_header";) {
+    if (line.starts_with(begin)) return ", convergence: " + line.substr(begin.size());
+  }
+  return {};
+}
+
 void make_folder(const fs::path& folder) {
   std::error_code failure;
   fs::create_directories(folder, failure);
@@ -220,10 +231,12 @@ void Dataset::record() const {
   text += frames;
   for (const PlacedLidar& lidar : world_.lidars) {
     for (std::int64_t frame = 0; frame < lidar.sweeps; ++frame) {
-      text += fmt::format("  - {{sensor: {}, frame: {}, stamp_s: {:.9f}, state: {}}}\n",
+      const bool done = has(lidar, frame);
+      text += fmt::format("  - {{sensor: {}, frame: {}, stamp_s: {:.9f}, state: {}{}}}\n",
                           yaml_text(lidar.spec.name), frame,
                           1e-9 * static_cast<double>(lidar.lidar.pattern().stamp(frame).count()),
-                          has(lidar, frame) ? "done" : "pending");
+                          done ? "done" : "pending",
+                          done ? convergence_of(scan_path(lidar, frame)) : "");
     }
   }
   write_text(folder_ / "dataset.yaml", text);

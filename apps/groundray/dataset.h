@@ -10,6 +10,9 @@
 
 namespace groundray {
 
+/// What the comment of a scan with its convergence begins with; a YAML mapping follows.
+inline constexpr std::string_view convergence_comment = "convergence ";
+
 /// The folder that a run fills (docs/formats.md). Made anew, or taken up again where an earlier run
 /// of the same scene, seed and version stopped.
 class Dataset {

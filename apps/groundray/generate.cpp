@@ -111,9 +111,8 @@ std::vector<std::string> comments_of(const World& world, const LidarScan& scan) 
     const double rms_m = std::sqrt(seen.sum_squares_m2 /
                                    static_cast<double>(std::max<std::uint64_t>(seen.compared, 1)));
     comments.push_back(
-        fmt::format("convergence of {} pulses: {} with another number of echoes, ranges of the "
-                    "others differ by {:.3g} m (rms), {:.3g} m at most",
-                    seen.pulses, seen.changed, rms_m, seen.largest_m));
+        fmt::format("{}{{pulses: {}, other_echoes: {}, range_rms_m: {:.3g}, range_max_m: {:.3g}}}",
+                    convergence_comment, seen.pulses, seen.changed, rms_m, seen.largest_m));
   }
   if (scan.waveforms.interval_s > 0)
     comments.push_back(fmt::format("waveform_interval_s {}", scan.waveforms.interval_s));

@@ -7,6 +7,7 @@ from pathlib import Path
 
 import numpy as np
 import pytest
+import yaml
 from plyfile import PlyData
 
 ROOT = Path(__file__).resolve().parents[2]
@@ -31,6 +32,7 @@ class Scan:
         self.missed = PlyData.read(f"{stem}_no_returns.ply")["vertex"].data
         self.power_w = np.load(f"{stem}_wave.npy")
         self.index = np.load(f"{stem}_wave_index.npy")
+        self.record = yaml.safe_load((folder / "out/dataset.yaml").read_text())
 
     def comment(self, pattern):
         return next(m for line in self.comments if (m := re.fullmatch(pattern, line)))
@@ -103,12 +105,11 @@ def test_centroids_of_waveforms_are_the_ranges(exact):
 
 
 def test_convergence_is_told(exact):
-    told = exact.comment(
-        r"convergence of (\d+) pulses: (\d+) with another number of echoes, "
-        r"ranges of the others differ by (\S+) m \(rms\), (\S+) m at most"
-    )
-    assert int(told[1]) == 1809 * 16 // 64 + 1
-    assert float(told[3]) <= float(told[4]) < 0.1
+    told = yaml.safe_load(exact.comment(r"convergence (.*)")[1])
+    assert told["pulses"] == 1809 * 16 // 64 + 1
+    assert 0 <= told["other_echoes"] <= told["pulses"]
+    assert told["range_rms_m"] <= told["range_max_m"] < 0.1
+    assert exact.record["frames"][0]["convergence"] == told
 
 
 def test_another_laser_or_material_is_another_dataset(noisy, tmp_path):

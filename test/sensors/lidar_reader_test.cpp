@@ -198,6 +198,8 @@ TEST(LidarFile, RefusesPhysicsThatDoesNotGoTogether) {
               HasSubstr("key 'efficiency': is 90, but must be > 0 and at most 1"));
   EXPECT_THAT(physics_complaint("timing: constant_fraction", "timing: fraction"),
               HasSubstr("must be one of leading_edge, constant_fraction, peak, "));
+  EXPECT_THAT(physics_complaint("  pulse_shape: [0, 1, 3, 2, 0]\n", "  pulse_fwhm_ns: 5\n"),
+              HasSubstr("key 'pulse_shape_step_ns': is the step of pulse_shape"));
   EXPECT_THAT(physics_complaint("  pulse_shape: [0, 1, 3, 2, 0]\n  pulse_shape_step_ns: 1.5\n", ""),
               HasSubstr("fwhm"));
 }

@@ -356,7 +356,7 @@ TEST(SceneFile, NeedsAMaterialForALaserAndAnOverlapForFog) {
   EXPECT_EQ(scene_complaint(soil), "no complaint");
   EXPECT_THAT(scene_complaint(soil + "weather: {fog_range_m: 100}\n"),
               HasSubstr("the receiver of 'top' needs overlap_m"));
-  EXPECT_THAT(scene_complaint(with(soil, "pulse_fwhm_ns: 5", "pulse_shape_step_ns: 5")),
+  EXPECT_THAT(scene_complaint(with(soil, ", pulse_fwhm_ns: 5", "")),
               HasSubstr("key 'lidars': 'top' cannot work: pulse"));
   EXPECT_THAT(scene_complaint(with(soil, "wavelength_nm: 905", "wavelength_nm: 2400")),
               AllOf(HasSubstr("key 'lidars': 'top' cannot work: "), HasSubstr("2400")));
