@@ -1,27 +1,87 @@
 #include "core/material.h"
 
-#include <algorithm>
 #include <cmath>
 #include <numbers>
+#include <string_view>
 
+#include "core/bsdf.h"
 #include "core/error.h"
+#include "core/ggx.h"
+#include "core/oren_nayar.h"
 
 namespace groundray {
 namespace {
 
-void check(const Lambertian& surface, Violations& broken) {
-  const std::vector<SpectrumSample>& spectrum = surface.spectrum;
-  broken.unless(!spectrum.empty(), "spectrum: there must be at least one sample");
+constexpr double pi = std::numbers::pi;
+
+void check_order(const Spectrum& spectrum, std::string_view field, Violations& broken) {
+  broken.unless(!spectrum.empty(), "{}: there must be at least one sample", field);
   for (std::size_t i = 0; i < spectrum.size(); ++i) {
-    const auto [wavelength_nm, reflectance] = spectrum[i];
+    const double wavelength_nm = spectrum[i].wavelength_nm;
     broken.unless(wavelength_nm > 0 && std::isfinite(wavelength_nm),
-                  "spectrum[{}].wavelength_nm = {} must be positive and finite", i, wavelength_nm);
+                  "{}[{}].wavelength_nm = {} must be positive and finite", field, i, wavelength_nm);
     broken.unless(i == 0 || spectrum[i - 1].wavelength_nm < wavelength_nm,
-                  "spectrum[{}].wavelength_nm = {} must be greater than the one before: sort them",
+                  "{}[{}].wavelength_nm = {} must be greater than the one before: sort them", field,
                   i, wavelength_nm);
-    broken.unless(reflectance >= 0 && reflectance <= 1,
-                  "spectrum[{}].reflectance = {} must be in [0, 1]: is it in percent?", i,
-                  reflectance);
+  }
+}
+
+void check_shares(const Spectrum& spectrum, std::string_view field, Violations& broken) {
+  check_order(spectrum, field, broken);
+  for (std::size_t i = 0; i < spectrum.size(); ++i) {
+    const double value = spectrum[i].value;
+    broken.unless(value >= 0 && value <= 1,
+                  "{}[{}].value = {} must be in [0, 1]: is it in percent?", field, i, value);
+  }
+}
+
+void check_alpha(double alpha, Violations& broken) {
+  broken.unless(alpha >= 0.01 && alpha <= 1, "alpha = {} must be in [0.01, 1]", alpha);
+}
+
+void check(const Lambertian& surface, Violations& broken) {
+  check_shares(surface.spectrum, "spectrum", broken);
+}
+
+void check(const RoughDiffuse& surface, Violations& broken) {
+  check_shares(surface.spectrum, "spectrum", broken);
+  broken.unless(surface.roughness >= 0 && surface.roughness <= 1,
+                "roughness = {} must be in [0, 1]: it is no angle", surface.roughness);
+}
+
+void check(const Coated& surface, Violations& broken) {
+  check_shares(surface.spectrum, "spectrum", broken);
+  broken.unless(surface.refractive_index > 1 && surface.refractive_index <= 4,
+                "refractive_index = {} must be in (1, 4]", surface.refractive_index);
+  check_alpha(surface.alpha, broken);
+}
+
+void check(const Conductor& surface, Violations& broken) {
+  check_order(surface.refractive_index, "refractive_index", broken);
+  for (const auto& [wavelength_nm, n] : surface.refractive_index) {
+    broken.unless(n > 0 && std::isfinite(n), "refractive_index at {} nm = {} must be positive",
+                  wavelength_nm, n);
+  }
+  check_order(surface.extinction_coefficient, "extinction_coefficient", broken);
+  for (const auto& [wavelength_nm, k] : surface.extinction_coefficient) {
+    broken.unless(k >= 0 && std::isfinite(k),
+                  "extinction_coefficient at {} nm = {} must not be negative", wavelength_nm, k);
+  }
+  check_alpha(surface.alpha, broken);
+}
+
+// Both are linear between their samples, so their sum is greatest at one of them.
+void check(const PlantLeaf& leaf, Violations& broken) {
+  check_shares(leaf.reflectance, "reflectance", broken);
+  check_shares(leaf.transmittance, "transmittance", broken);
+  for (const Spectrum* spectrum : {&leaf.reflectance, &leaf.transmittance}) {
+    for (const SpectrumSample& sample : *spectrum) {
+      const double sum = value_at(leaf.reflectance, sample.wavelength_nm).value_or(0) +
+                         value_at(leaf.transmittance, sample.wavelength_nm).value_or(0);
+      broken.unless(!(sum > 1),
+                    "reflectance and transmittance at {} nm add up to {}: at most 1 can leave",
+                    sample.wavelength_nm, sum);
+    }
   }
 }
 
@@ -31,22 +91,39 @@ void check(const RetroReflector& surface, Violations& broken) {
                 "coefficient_cd_lx_m2 = {} must be positive and finite", coefficient);
 }
 
-double reflectance_at(const Material& material, const Lambertian& surface, double wavelength_nm) {
-  const std::vector<SpectrumSample>& spectrum = surface.spectrum;
-  const double first_nm = spectrum.front().wavelength_nm;
-  const double last_nm = spectrum.back().wavelength_nm;
-  if (!(first_nm <= wavelength_nm && wavelength_nm <= last_nm)) {
-    throw Error("Material '{}': the spectrum reaches from {} to {} nm, but not to {} nm",
-                material.name, first_nm, last_nm, wavelength_nm);
-  }
-  const auto above =
-      std::ranges::lower_bound(spectrum, wavelength_nm, {}, &SpectrumSample::wavelength_nm);
-  if (above->wavelength_nm == wavelength_nm) return above->reflectance;
-  const auto below = above - 1;
-  const double share =
-      (wavelength_nm - below->wavelength_nm) / (above->wavelength_nm - below->wavelength_nm);
-  return std::lerp(below->reflectance, above->reflectance, share);
+RetroBrdf retro(const LambertianBsdf& surface) { return {.diffuse_per_sr = surface.albedo.x / pi}; }
+
+RetroBrdf retro(const RoughDiffuseBsdf& surface) {
+  const double roughness = surface.roughness;
+  const double mean = oren_nayar::mean_share(roughness);
+  const double facets = oren_nayar::facet_albedo(surface.albedo.x, mean);
+  const double once = facets * oren_nayar::scale(roughness) / pi;
+  if (!(mean < 1)) return {.diffuse_per_sr = once};
+  RoughRetro rough{.grazing_per_sr = once * roughness,
+                   .shared_per_sr = facets * surface.albedo.x / (pi * (1 - mean))};
+  rough.share = CosineTable<float>([roughness](double cosine) {
+    return static_cast<float>(oren_nayar::share(cosine, roughness));
+  });
+  return {.diffuse_per_sr = once, .rough = rough};
 }
+
+RetroBrdf retro(const CoatedBsdf& surface) {
+  return {.rough = RoughRetro{.mirror = fresnel_reflectance(1, surface.refractive_index, 0),
+                              .alpha = surface.alpha,
+                              .shared_per_sr = surface.base_per_sr().x,
+                              .share = surface.mirrored}};
+}
+
+RetroBrdf retro(const ConductorBsdf& surface) {
+  return {.rough = RoughRetro{.mirror = double{surface.reflectance(1).x},
+                              .alpha = surface.alpha,
+                              .shared_per_sr = surface.shared_per_sr.x,
+                              .share = surface.once}};
+}
+
+RetroBrdf retro(const PlantLeafBsdf& leaf) { return {.diffuse_per_sr = leaf.reflectance.x / pi}; }
+
+RetroBrdf retro(const BlackBsdf&) { return {}; }
 
 }  // namespace
 
@@ -57,11 +134,18 @@ void check_material(const Material& material) {
 }
 
 RetroBrdf retro_brdf(const Material& material, double wavelength_nm) {
-  check_material(material);
-  if (const auto* surface = std::get_if<Lambertian>(&material.reflection)) {
-    return {.diffuse_per_sr = reflectance_at(material, *surface, wavelength_nm) / std::numbers::pi};
-  }
-  return {.retro_per_sr = std::get<RetroReflector>(material.reflection).coefficient_cd_lx_m2};
+  const Bsdf bsdf = bsdf_at(material, wavelength_nm);
+  if (const auto* sheet = std::get_if<RetroReflector>(&material.reflection))
+    return {.retro_per_sr = sheet->coefficient_cd_lx_m2};
+  return std::visit([](const auto& surface) { return retro(surface); }, bsdf.surface);
+}
+
+double rough_retro_brdf_cos(const RoughRetro& rough, double cos_incidence) noexcept {
+  const double let_pass = 1 - double{rough.share(cos_incidence)};
+  double sum = rough.grazing_per_sr * (1 - cos_incidence * cos_incidence) +
+               rough.shared_per_sr * let_pass * let_pass * cos_incidence;
+  if (rough.mirror > 0) sum += rough.mirror * ggx::retro_brdf_cos(cos_incidence, rough.alpha);
+  return sum;
 }
 
 }  // namespace groundray

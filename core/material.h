@@ -1,20 +1,46 @@
 #pragma once
 
+#include <optional>
 #include <string>
 #include <variant>
-#include <vector>
+
+#include "core/cosine_table.h"
+#include "core/spectrum.h"
 
 namespace groundray {
 
-/// One value of a spectrum.
-struct SpectrumSample {
-  double wavelength_nm = 0;  ///< in vacuum
-  double reflectance = 0;    ///< hemispherical: the share of the light that comes back, 0 to 1
-};
-
 /// A surface that looks equally bright from everywhere.
 struct Lambertian {
-  std::vector<SpectrumSample> spectrum;  ///< by ascending wavelength
+  Spectrum spectrum;  ///< hemispherical reflectance: the share of the light that comes back, 0 to 1
+};
+
+/// A matt surface of Lambertian facets, which looks flatter than a Lambertian one and brighter when
+/// lit from behind the viewer: the energy-preserving model of Oren and Nayar.
+/// @see docs/materials.md
+struct RoughDiffuse {
+  Spectrum spectrum;     ///< reflectance of the whole surface in light from everywhere, 0 to 1
+  double roughness = 0;  ///< 0, Lambertian, to 1
+};
+
+/// A Lambertian base under a clear coat with a rough surface: wet ground, varnish, gloss paint.
+struct Coated {
+  Spectrum spectrum;              ///< reflectance of the base where there is no coat, 0 to 1
+  double refractive_index = 1.5;  ///< of the coat, > 1 up to 4; the same at all wavelengths
+  double alpha = 0.1;             ///< width of the slopes of its facets (GGX), 0.01 to 1
+};
+
+/// A bare metal with a rough surface.
+struct Conductor {
+  Spectrum refractive_index;        ///< real part n of the index, > 0
+  Spectrum extinction_coefficient;  ///< imaginary part k, >= 0
+  double alpha = 0.1;               ///< width of the slopes of its facets (GGX), 0.01 to 1
+};
+
+/// A thin leaf, equal on both sides: it scatters light evenly to the side it came from and, less or
+/// more, to the other.
+struct PlantLeaf {
+  Spectrum reflectance;
+  Spectrum transmittance;  ///< with the reflectance at most 1
 };
 
 /// A surface that sends light back to its source: sheeting of glass beads or prisms.
@@ -27,31 +53,49 @@ struct RetroReflector {
 /// How a surface reflects.
 struct Material {
   std::string name;
-  std::variant<Lambertian, RetroReflector> reflection;
+  std::variant<Lambertian, RoughDiffuse, Coated, Conductor, PlantLeaf, RetroReflector> reflection;
 };
 
 /// @throws Error listing every field of `material` that is out of bounds: a spectrum must have
 ///         samples, by ascending wavelength, of reflectances from 0 to 1; a coefficient must be
-///         positive.
+///         positive; other bounds stand at the fields.
 void check_material(const Material& material);
+
+/// What a rough surface sends back to the source at one wavelength, in the terms that
+/// `retro_brdf_cos` adds up.
+struct RoughRetro {
+  double grazing_per_sr = 0;   ///< of rough diffuse surfaces, times the squared sine of incidence
+  double mirror = 0;           ///< reflectance of a facet across the beam
+  double alpha = 1;            ///< of GGX
+  double shared_per_sr = 0;    ///< of light that two shares below let pass, times their product
+  CosineTable<float> share{};  ///< of light that leaves at first scattering
+};
 
 /// What a material sends back to the source at one wavelength; see `retro_brdf_cos`.
 struct RetroBrdf {
-  double diffuse_per_sr = 0;  ///< f_r of a Lambertian: reflectance / pi
-  double retro_per_sr = 0;    ///< f_r cos of a retro-reflector: R_A
+  double diffuse_per_sr = 0;          ///< f_r of a Lambertian: reflectance / pi
+  double retro_per_sr = 0;            ///< f_r cos of a retro-reflector: R_A
+  std::optional<RoughRetro> rough{};  ///< of the kinds that depend on incidence otherwise
 };
 
 /// Returns what a material sends back at a wavelength; spectra are linear between their samples,
-/// and a retro-reflector is taken as the same at all wavelengths. Do this once for each lidar.
-/// @throws Error as check_material, or if the spectrum does not reach `wavelength_nm`.
+/// and a retro-reflector is taken as the same at all wavelengths. Takes some 20 ms for a rough
+/// surface: do this once for each lidar.
+/// @throws Error as check_material, or if a spectrum does not reach `wavelength_nm`.
 RetroBrdf retro_brdf(const Material& material, double wavelength_nm);
+
+/// Returns the part of `retro_brdf_cos` that is of roughness, 1/sr.
+double rough_retro_brdf_cos(const RoughRetro& rough, double cos_incidence) noexcept;
 
 /// Returns f_r cos, in 1/sr: the intensity that a surface sends back to the source for each watt of
 /// the source's light that hits it, where f_r is its BRDF back to the source and cos the cosine of
 /// incidence, in [0, 1].
 /// @see docs/materials.md: why R_A, not R_A cos, stands for a retro-reflector.
-constexpr double retro_brdf_cos(const RetroBrdf& brdf, double cos_incidence) noexcept {
-  return brdf.diffuse_per_sr * cos_incidence + brdf.retro_per_sr;
+inline double retro_brdf_cos(const RetroBrdf& brdf, double cos_incidence) noexcept {
+  const double matt_and_retro = brdf.diffuse_per_sr * cos_incidence + brdf.retro_per_sr;
+  if (!brdf.rough) [[likely]]
+    return matt_and_retro;
+  return matt_and_retro + rough_retro_brdf_cos(*brdf.rough, cos_incidence);
 }
 
 }  // namespace groundray

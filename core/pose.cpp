@@ -54,4 +54,10 @@ Pose Screw::at(double s) const {
   return {glm::dquat(cosine, axis_ * sine), translation};
 }
 
+Velocity Screw::velocity_at(double s) const {
+  const double angle = angle_rad_ * s;
+  return {along_m_ + angle_rad_ * (sine_m_ * std::cos(angle) + versine_m_ * std::sin(angle)),
+          axis_ * angle_rad_};
+}
+
 }  // namespace groundray

@@ -27,6 +27,12 @@ Pose inverse(const Pose& X_AB);
 /// roll lowers the right side).
 glm::dquat rotation_from_yaw_pitch_roll(double yaw_rad, double pitch_rad, double roll_rad);
 
+/// How a frame B moves in a frame A.
+struct Velocity {
+  glm::dvec3 linear_m_s{0};     ///< of B's origin, axes of A
+  glm::dvec3 angular_rad_s{0};  ///< axes of A
+};
+
 /// A motion at constant body velocity: B starts at the identity and after a fraction s of the way
 /// is at `at(s)`. Holds the exponential map of one twist, laid out so that a point on the way costs
 /// one sine and cosine.
@@ -39,6 +45,8 @@ class Screw {
 
   /// Returns the pose after the fraction `s`; s may lie outside [0, 1].
   Pose at(double s) const;
+  /// Returns how fast the pose changes there, with s for the time.
+  Velocity velocity_at(double s) const;
 
  private:
   glm::dvec3 axis_;       // unit, or zero for a pure translation

@@ -17,7 +17,10 @@ enum class RandomStream : std::uint32_t {
   EchoNoise,
   FalseAlarm,
   BeamTurn,
-  AngularJitter
+  AngularJitter,
+  Asset,
+  Scatter,
+  Relief
 };
 
 /// Names one random block: equal keys give equal numbers on any thread, in any order.

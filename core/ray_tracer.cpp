@@ -329,11 +329,14 @@ void RayTracer::bound_errors(std::span<const Ray> rays, std::span<const Hit> hit
   const GridFrame& frame = impl_->level(0).level.frame;
   for (std::size_t i = 0; i < rays.size(); ++i) {
     const auto band =
-        impl_->surface.band(frame.to_grid(rays[i].origin, rays[i].direction), rays[i].far_m);
+        impl_->surface.band(frame.to_grid(rays[i].origin, rays[i].direction),
+                            hits[i].object == 0 ? rays[i].far_m : hits[i].range_m);
     const double range_m = hits[i].range_m;
     const double rounding_m = 1e-9 * range_m + 1e-9;  // what ranges themselves promise
     if (!band.is_certain) {
       bounds_m[i] = infinity;
+    } else if (hits[i].object != 0) {
+      bounds_m[i] = band.near_m < range_m ? range_m - band.near_m + rounding_m : 0;
     } else if (!hits[i]) {
       bounds_m[i] = band.near_m < infinity ? infinity : 0;
     } else {

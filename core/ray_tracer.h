@@ -1,5 +1,6 @@
 #pragma once
 
+#include <chrono>
 #include <cstddef>
 #include <cstdint>
 #include <glm/vec2.hpp>
@@ -28,15 +29,17 @@ struct Ray {
   glm::dvec3 origin{0};
   glm::dvec3 direction{0, 0, -1};
   double far_m = std::numeric_limits<double>::infinity();  ///< hits beyond are none
+  std::chrono::nanoseconds time{0};                        ///< when objects that move are met
 };
 
 /// What a ray meets first.
 struct Hit {
   double range_m =
       std::numeric_limits<double>::infinity();  ///< along the ray; infinite if it meets nothing
-  glm::vec3 normal{0};                          ///< of the facet, unit, in D, facing up
-  float deviation_m = 0;    ///< of the leaf: how far it may be from the reference, vertically
-  std::uint32_t level = 0;  ///< index of the level that was hit
+  glm::vec3 normal{0};  ///< of the facet, unit, in D: of the ground up, of an object to the ray
+  float deviation_m = 0;     ///< of the leaf: how far it may be from the reference, vertically
+  std::uint32_t part = 0;    ///< index of the level that was hit; on an object, of the triangle
+  std::uint32_t object = 0;  ///< number of the object that was hit; 0 for the ground
   explicit operator bool() const noexcept {
     return range_m < std::numeric_limits<double>::infinity();
   }
@@ -127,9 +130,9 @@ class RayTracer {
   /// whatever the mode of tracing. Infinite where the reference may be met much further on or
   /// nowhere: past a silhouette within the leaves' deviations, over holes that coarse cells bridge,
   /// and for a ray that starts within the deviation of the ground. The bound of a miss is 0, or
-  /// infinite if the reference may be met. Rays are followed leaf by leaf in double; that takes
-  /// some times as long as tracing them.
-  /// @param hits      of the same rays, as trace finds them.
+  /// infinite if the reference may be met. An object is where it is, but the reference may hide it.
+  /// Rays are followed leaf by leaf in double; that takes some times as long as tracing them.
+  /// @param hits      of the same rays, as trace finds them, or an object's in front of that.
   /// @param bounds_m  as many as there are rays.
   void bound_errors(std::span<const Ray> rays, std::span<const Hit> hits,
                     std::span<double> bounds_m) const noexcept;

@@ -1,9 +1,11 @@
 #pragma once
 
 #include <cstdint>
+#include <span>
 #include <vector>
 
 #include "core/material.h"
+#include "core/object_tracer.h"
 #include "core/ray_tracer.h"
 
 namespace groundray {
@@ -11,16 +13,39 @@ namespace groundray {
 /// What the truth says of a surface besides its shape.
 struct SurfaceTruth {
   std::uint16_t label = 0;     ///< semantic class; 0 is "none"
-  std::uint32_t instance = 0;  ///< 0 is "no object"
+  std::uint32_t instance = 0;  ///< number of the object; 0 is the ground, or nothing
   std::uint16_t material = 0;  ///< index among the scene's
+};
+
+/// What is known of all objects of a model.
+struct ModelTruth {
+  std::uint16_t label = 0;
+  std::vector<std::uint16_t> materials;  ///< of each surface of the model, index among the scene's
 };
 
 /// The world as sensors see it: everything that rays can meet, and what is known about it.
 /// Immutable once built.
 struct Scene {
-  RayTracer rays;
+  RayTracer rays;  ///< the ground
   SurfaceTruth terrain;
   std::vector<Material> materials;  ///< none, if no lidar has light
+  ObjectTracer objects;
+  std::vector<ModelTruth> models;  ///< as many as `objects` has models
+
+  /// Finds what each ray meets first, of ground and objects.
+  /// @param hits  as many as there are rays.
+  void trace(std::span<const Ray> of, std::span<Hit> hits) const noexcept {
+    rays.trace(of, hits);
+    objects.trace(of, hits);
+  }
+
+  /// What is known of the surface that a ray met.
+  SurfaceTruth truth_of(const Hit& hit) const noexcept {
+    if (hit.object == 0) return terrain;
+    const std::uint32_t model = objects.model_of(hit.object);
+    const std::uint16_t surface = objects.models()[model].model().surface_of[hit.part];
+    return {models[model].label, hit.object, models[model].materials[surface]};
+  }
 };
 
 }  // namespace groundray

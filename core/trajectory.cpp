@@ -42,18 +42,37 @@ Trajectory::Trajectory(std::vector<Sample> samples) : samples_(std::move(samples
   }
 }
 
-Pose Trajectory::pose_at(std::chrono::nanoseconds time) const {
+Trajectory::Place Trajectory::place_of(std::chrono::nanoseconds time) const {
   if (time < begin_time() || end_time() < time) {
     throw Error(
         "trajectory: it is asked for {} s but covers [{}, {}] s; extend it or shorten the run",
         seconds(time), seconds(begin_time()), seconds(end_time()));
   }
   const auto after = std::ranges::upper_bound(samples_, time, {}, &Sample::time);
-  if (after == samples_.end()) return samples_.back().pose;
   const auto i = static_cast<std::size_t>(after - samples_.begin()) - 1;
-  const auto span = static_cast<double>((samples_[i + 1].time - samples_[i].time).count());
-  return samples_[i].pose *
-         screws_[i].at(static_cast<double>((time - samples_[i].time).count()) / span);
+  if (after == samples_.end()) return {i};
+  const std::chrono::nanoseconds span = samples_[i + 1].time - samples_[i].time;
+  return {
+      i, static_cast<double>((time - samples_[i].time).count()) / static_cast<double>(span.count()),
+      seconds(span)};
+}
+
+Pose Trajectory::pose_at(std::chrono::nanoseconds time) const {
+  const auto [i, share, span_s] = place_of(time);
+  return span_s == 0 ? samples_[i].pose : samples_[i].pose * screws_[i].at(share);
+}
+
+Velocity Trajectory::velocity_at(std::chrono::nanoseconds time) const {
+  auto [i, share, span_s] = place_of(time);
+  if (screws_.empty()) return {};
+  if (span_s == 0) {  // the end: as it was reached
+    --i;
+    share = 1;
+    span_s = seconds(samples_[i + 1].time - samples_[i].time);
+  }
+  const Velocity in_sample = screws_[i].velocity_at(share);
+  const glm::dquat& R_AB = samples_[i].pose.rotation;
+  return {R_AB * in_sample.linear_m_s / span_s, R_AB * in_sample.angular_rad_s / span_s};
 }
 
 Trajectory Trajectory::mounted(const Pose& X_BC) const {

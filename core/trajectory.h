@@ -1,6 +1,7 @@
 #pragma once
 
 #include <chrono>
+#include <cstddef>
 #include <vector>
 
 #include "core/pose.h"
@@ -28,11 +29,22 @@ class Trajectory {
   /// Returns the pose at `time`.
   /// @throws Error if `time` lies outside [begin_time(), end_time()].
   Pose pose_at(std::chrono::nanoseconds time) const;
+  /// Returns how B moves in A at `time`: at a sample, on the motion that begins there.
+  /// @throws Error as pose_at.
+  Velocity velocity_at(std::chrono::nanoseconds time) const;
 
   /// Returns the path of a frame C that is fixed in B: X_AC = X_AB * X_BC at every time.
   Trajectory mounted(const Pose& X_BC) const;
 
  private:
+  // A time on the motion that starts at a sample.
+  struct Place {
+    std::size_t sample = 0;
+    double share = 0;  // of the way to the next
+    double span_s = 0;
+  };
+  Place place_of(std::chrono::nanoseconds time) const;
+
   std::vector<Sample> samples_;
   std::vector<Screw> screws_;  // from each sample to the next
 };

@@ -208,14 +208,14 @@ std::string command(const std::filesystem::path& input, const std::string& progr
 }
 
 HeightReader::HeightReader(GDALDataset& dataset, const OGRSpatialReference& crs,
-                           std::optional<double> nodata)
+                           std::optional<double> nodata, std::optional<double> unit_m)
     : band_(&height_band(dataset)),
       alpha_(alpha_band(dataset)),
       mask_(band_->GetMaskFlags() == GMF_ALL_VALID ? nullptr : band_->GetMaskBand()),
       nodata_(nodata) {
-  const double unit_m = height_unit_m(*band_, crs);
-  scale_m_ = band_->GetScale() * unit_m;
-  offset_m_ = band_->GetOffset() * unit_m;
+  const double metres = unit_m ? *unit_m : height_unit_m(*band_, crs);
+  scale_m_ = band_->GetScale() * metres;
+  offset_m_ = band_->GetOffset() * metres;
 }
 
 void HeightReader::read(glm::ivec2 first, glm::ivec2 size, float* heights_m) const {

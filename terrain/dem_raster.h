@@ -57,8 +57,10 @@ class HeightReader {
  public:
   /// @param dataset  must outlive this.
   /// @param nodata   a stored value that means "no height", besides the declared one and NaN.
+  /// @param unit_m   the unit of the values, unless it is the dataset's to say.
   /// @throws Error if it is no grid of heights, or their unit is unknown.
-  HeightReader(GDALDataset& dataset, const OGRSpatialReference& crs, std::optional<double> nodata);
+  HeightReader(GDALDataset& dataset, const OGRSpatialReference& crs, std::optional<double> nodata,
+               std::optional<double> unit_m = {});
 
   /// Reads a window of the grid, row by row; NaN where there is no height: where GDAL's mask
   /// (declared nodata, a mask in the file or beside it) or the alpha band hides it. The values do

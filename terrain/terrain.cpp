@@ -11,6 +11,7 @@
 #include "core/error.h"
 #include "terrain/byte_hash.h"
 #include "terrain/deviation.h"
+#include "terrain/refined_tiles.h"
 
 namespace groundray {
 namespace {
@@ -37,42 +38,84 @@ struct Terrain::Loaded {
   std::variant<HeightGrid, Tiles> content;
   Ground ground;
   std::string fingerprint;
+  std::shared_ptr<const Relief> relief;
 };
 
-Terrain::Loaded Terrain::load(const std::filesystem::path& path, const DemOptions& options,
-                              const TerrainDetail& detail, const Progress& progress) {
+namespace {
+
+bool fits(glm::ivec2 samples, const TerrainDetail& detail) {
+  return Terrain::whole_bytes(samples) <= static_cast<double>(memory_bytes(detail));
+}
+
+// What the DEM is told apart by.
+std::string fingerprint_of(const HeightGrid& grid) {
+  const double place[] = {grid.origin_m().x, grid.origin_m().y, grid.step_m().x, grid.step_m().y};
+  return fmt::format("{:016x}{:016x}", byte_hash(bytes_of(grid.heights_m())),
+                     byte_hash(bytes_of(std::span<const double>(place))));
+}
+
+}  // namespace
+
+// Loads a DEM as whole or by tiles, as the surface that `relief` makes of it asks for.
+Terrain::Loaded Terrain::load_dem_alone(const std::filesystem::path& path,
+                                        const DemOptions& options, const TerrainDetail& detail,
+                                        const Progress& progress, const Relief* relief) {
   DemFile file(path, options);
   const DemHeader header = file.header();
-  if (whole_bytes(header.samples) > static_cast<double>(memory_bytes(detail))) {
+  if (!fits(header.samples, detail)) {
     const std::string text = file.fingerprint();
     Certificate certificate = Certificate::open_or_make(file, {.progress = progress});
     const Tiles tiles =
         std::make_shared<FileTiles>(std::move(file), std::move(certificate), tile_cache_bytes);
-    return {header, tiles, Ground(tiles, frame_of(header)),
-            fmt::format("{:016x}", byte_hash(text))};
+    return {header,
+            tiles,
+            Ground(tiles, frame_of(header)),
+            fmt::format("{:016x}", byte_hash(text)),
+            {}};
   }
   const HeightGrid grid = load_dem(path, options).grid;
-  const double place[] = {grid.origin_m().x, grid.origin_m().y, grid.step_m().x, grid.step_m().y};
-  const std::string fingerprint =
-      fmt::format("{:016x}{:016x}", byte_hash(bytes_of(grid.heights_m())),
-                  byte_hash(bytes_of(std::span<const double>(place))));
-  if (detail.tolerance_m == 0 && detail.tolerance_rad == 0)
-    return {header, grid, Ground(grid), fingerprint};
+  const bool is_whole = relief == nullptr || fits(relief->frame().samples, detail);
+  if (is_whole && detail.tolerance_m == 0 && detail.tolerance_rad == 0)
+    return {header, grid, Ground(grid), fingerprint_of(grid), {}};
   std::vector<NodeLevel> levels = certify(grid, Certificate::block_cells, NodeDetail::Full);
-  return {header, std::make_shared<MemoryTiles>(grid, std::move(levels)), Ground(grid),
-          fingerprint};
+  return {header,
+          std::make_shared<MemoryTiles>(grid, std::move(levels)),
+          Ground(grid),
+          fingerprint_of(grid),
+          {}};
+}
+
+Terrain::Loaded Terrain::load(const std::filesystem::path& path, const DemOptions& options,
+                              const TerrainDetail& detail, const Progress& progress,
+                              const std::optional<ReliefSpec>& spec) {
+  if (!spec) return load_dem_alone(path, options, detail, progress, nullptr);
+  const auto relief = std::make_shared<const Relief>(
+      *spec, frame_of(DemFile(path, options).header()), memory_bytes(detail));
+  Loaded loaded = load_dem_alone(path, options, detail, progress, relief.get());
+  if (const auto* grid = std::get_if<HeightGrid>(&loaded.content)) {
+    loaded.content = relief->refined(*grid);
+    loaded.ground = std::get<HeightGrid>(loaded.content);
+  } else {
+    loaded.content = std::make_shared<RefinedTiles>(std::get<Tiles>(loaded.content), relief);
+    loaded.ground = Ground(loaded.ground, relief);
+  }
+  loaded.fingerprint += fmt::format("{:016x}", relief->fingerprint());
+  loaded.relief = relief;
+  return loaded;
 }
 
 Terrain::Terrain(const std::filesystem::path& dem, const DemOptions& options,
-                 const TerrainDetail& detail, const Progress& progress)
-    : Terrain(load(dem, options, detail, progress), detail) {}
+                 const TerrainDetail& detail, const Progress& progress,
+                 const std::optional<ReliefSpec>& relief)
+    : Terrain(load(dem, options, detail, progress, relief), detail) {}
 
 Terrain::Terrain(Loaded loaded, const TerrainDetail& detail)
     : header_(std::move(loaded.header)),
       detail_(detail),
       content_(std::move(loaded.content)),
       ground_(std::move(loaded.ground)),
-      fingerprint_(std::move(loaded.fingerprint)) {}
+      fingerprint_(std::move(loaded.fingerprint)),
+      relief_(std::move(loaded.relief)) {}
 
 double Terrain::whole_bytes(glm::ivec2 samples) noexcept {
   constexpr double bytes_per_sample = 36;  // measured

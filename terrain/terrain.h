@@ -4,12 +4,14 @@
 #include <filesystem>
 #include <functional>
 #include <memory>
+#include <optional>
 #include <string>
 #include <variant>
 
 #include "terrain/clipmap.h"
 #include "terrain/dem_file.h"
 #include "terrain/ground.h"
+#include "terrain/relief.h"
 
 namespace groundray {
 
@@ -20,22 +22,28 @@ struct TerrainDetail {
   std::uint32_t memory_mib = 4096;  ///< for the surface that is traced, as in ClipmapSettings
 };
 
-/// A DEM ready for tracing: in memory as a whole if it fits there, else served from its file by
-/// tiles. Immutable; any number of threads may use it.
+/// A DEM ready for tracing, with relief on it if asked for: in memory as a whole if the surface
+/// fits there, else served by tiles, from its file if the DEM does not fit. Immutable; any number
+/// of threads may use it.
 class Terrain {
  public:
   /// Is told now and then which share of a long preparation is done, 0 to 1.
   using Progress = std::function<void(double share)>;
 
-  /// @throws Error as load_dem, DemFile and Certificate::open_or_make, and for a detail that is
-  ///         negative or not finite.
+  /// @throws Error as load_dem, DemFile, Certificate::open_or_make and Relief, and for a detail
+  /// that
+  ///         is negative or not finite.
   Terrain(const std::filesystem::path& dem, const DemOptions& options, const TerrainDetail& detail,
-          const Progress& progress = {});
+          const Progress& progress = {}, const std::optional<ReliefSpec>& relief = {});
 
+  /// Of the DEM itself.
   const DemHeader& header() const noexcept { return header_; }
+  /// The reference surface: the DEM's, or that with relief.
   const Ground& ground() const noexcept { return ground_; }
-  /// Where the samples stand in D.
+  /// Where its samples stand in D.
   const GridFrame& frame() const noexcept { return ground_.frame(); }
+  /// What lies on the DEM, or null.
+  const Relief* relief() const noexcept { return relief_.get(); }
 
   /// Stands for all heights: equal texts mean equal surfaces, as far as that can be told without
   /// reading a DEM larger than memory again.
@@ -57,13 +65,18 @@ class Terrain {
 
   Terrain(Loaded loaded, const TerrainDetail& detail);
   static Loaded load(const std::filesystem::path& path, const DemOptions& options,
-                     const TerrainDetail& detail, const Progress& progress);
+                     const TerrainDetail& detail, const Progress& progress,
+                     const std::optional<ReliefSpec>& relief);
+  static Loaded load_dem_alone(const std::filesystem::path& path, const DemOptions& options,
+                               const TerrainDetail& detail, const Progress& progress,
+                               const Relief* relief);
 
   DemHeader header_;
   TerrainDetail detail_;
   std::variant<HeightGrid, Tiles> content_;
   Ground ground_;
   std::string fingerprint_;
+  std::shared_ptr<const Relief> relief_;
 };
 
 }  // namespace groundray

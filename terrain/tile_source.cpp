@@ -56,16 +56,6 @@ void check_name(const Lattice& lattice, const TileName& name) {
               lattice.top_level(), count.x, count.y);
 }
 
-// Returns a tile without any height.
-std::shared_ptr<Tile> empty_tile() {
-  auto tile = std::make_shared<Tile>();
-  tile->heights_m.fill(hole);
-  tile->key_m.fill(-1);
-  tile->low_m.fill(infinity);
-  tile->high_m.fill(-infinity);
-  return tile;
-}
-
 std::size_t index_of(glm::ivec2 place, int columns) {
   return static_cast<std::size_t>(place.y) * static_cast<std::size_t>(columns) +
          static_cast<std::size_t>(place.x);
@@ -100,6 +90,16 @@ float largest_finite(const std::vector<float>& keys_m) {
 
 }  // namespace
 
+std::shared_ptr<Tile> empty_tile(const Lattice& lattice, const TileName& name) {
+  check_name(lattice, name);
+  auto tile = std::make_shared<Tile>();
+  tile->heights_m.fill(hole);
+  tile->key_m.fill(-1);
+  tile->low_m.fill(infinity);
+  tile->high_m.fill(-infinity);
+  return tile;
+}
+
 MemoryTiles::MemoryTiles(HeightGrid grid, std::vector<NodeLevel> levels)
     : grid_(std::move(grid)),
       levels_(std::move(levels)),
@@ -122,8 +122,7 @@ float MemoryTiles::max_key_m(int level) const {
 }
 
 std::shared_ptr<const Tile> MemoryTiles::tile(const TileName& name) const {
-  check_name(lattice_, name);
-  auto tile = empty_tile();
+  auto tile = empty_tile(lattice_, name);
   const Window points = points_of(lattice_, name);
   for (int row = 0; row < points.size.y; ++row) {
     for (int column = 0; column < points.size.x; ++column) {
@@ -216,8 +215,8 @@ class FileTiles::Cache {
 
   std::shared_ptr<const Tile> read_files(const TileName& name) const {
     try {
-      auto tile = empty_tile();
       const Lattice& lattice = certificate_.lattice();
+      auto tile = empty_tile(lattice, name);
       const Window points = points_of(lattice, name);
       const auto heights_m = name.level == 0
                                  ? dem_.read(points.first, points.size)

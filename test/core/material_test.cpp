@@ -6,6 +6,7 @@
 #include <cmath>
 #include <limits>
 #include <numbers>
+#include <string>
 
 #include "core/error.h"
 
@@ -81,13 +82,66 @@ TEST(Material, ErrorListsEveryFault) {
       },
       ThrowsMessage<Error>(
           AllOf(HasSubstr("Material 'clay':"),
-                HasSubstr("spectrum[0].reflectance = 10 must be in [0, 1]: is it in percent?"),
+                HasSubstr("spectrum[0].value = 10 must be in [0, 1]: is it in percent?"),
                 HasSubstr("spectrum[1].wavelength_nm = 500 must be greater"),
                 HasSubstr("spectrum[2].wavelength_nm = -1 must be positive"))));
   EXPECT_THAT([] { check_material(lambertian({})); },
               ThrowsMessage<Error>(HasSubstr("at least one sample")));
   EXPECT_THAT([] { check_material({.name = "sheet", .reflection = RetroReflector{0}}); },
               ThrowsMessage<Error>(HasSubstr("coefficient_cd_lx_m2 = 0 must be positive")));
+}
+
+TEST(Material, ErrorListsEveryFaultOfRoughSurfaces) {
+  const auto message_of = [](decltype(Material::reflection) reflection) {
+    try {
+      check_material({"thing", std::move(reflection)});
+    } catch (const Error& error) {
+      return std::string(error.what());
+    }
+    return std::string();
+  };
+  const Spectrum half{{400, 0.5}, {700, 0.5}};
+  EXPECT_THAT(message_of(RoughDiffuse{half, 30}), HasSubstr("roughness = 30 must be in [0, 1]"));
+  EXPECT_THAT(message_of(Coated{half, 1, 0}),
+              AllOf(HasSubstr("refractive_index = 1 must be in (1, 4]"),
+                    HasSubstr("alpha = 0 must be in [0.01, 1]")));
+  EXPECT_THAT(message_of(Conductor{{{500, -0.2}}, {{500, -3}}, 2}),
+              AllOf(HasSubstr("refractive_index at 500 nm = -0.2 must be positive"),
+                    HasSubstr("extinction_coefficient at 500 nm = -3 must not be negative"),
+                    HasSubstr("alpha = 2 must be in [0.01, 1]")));
+  EXPECT_THAT(message_of(Conductor{{}, half, 0.1}),
+              HasSubstr("refractive_index: there must be at least one sample"));
+  EXPECT_THAT(message_of(PlantLeaf{half, {{400, 0.4}, {500, 0.6}, {700, 0.4}}}),
+              HasSubstr("reflectance and transmittance at 500 nm add up to 1.1"));
+  EXPECT_EQ(message_of(PlantLeaf{half, half}), "");
+}
+
+// A mirror of facets across the beam: D(n) F / 4, with D(n) = 1 / (pi alpha^2).
+TEST(Material, MetalAcrossTheBeamSendsBackItsFacetsThatFaceIt) {
+  constexpr double n = 2.9, k = 3.1, alpha = 0.05;
+  const Material metal{"iron", Conductor{{{905, n}}, {{905, k}}, alpha}};
+  const double mirrored = ((n - 1) * (n - 1) + k * k) / ((n + 1) * (n + 1) + k * k);
+  const double expected = mirrored / (4 * pi * alpha * alpha);
+  // What is scattered more than once is less than a share of 0.01 spread over the hemisphere.
+  EXPECT_NEAR(retro_brdf_cos(retro_brdf(metal, 905), 1), expected, 1e-6 * expected + 0.01 / pi);
+}
+
+TEST(Material, LeafSendsBackItsReflectanceAlone) {
+  const Material leaf{"leaf", PlantLeaf{{{905, 0.45}}, {{905, 0.5}}}};
+  EXPECT_NEAR(retro_brdf_cos(retro_brdf(leaf, 905), 0.5), 0.45 * 0.5 / pi, epsilon);
+}
+
+// Fujii's form toward the source, s = sin^2, t = cos, without what is scattered more than once.
+TEST(Material, RoughGroundIsBrighterThanLambertianAtGrazingIncidence) {
+  const Spectrum dark{{905, 0.01}};
+  const double cosine = 0.2;
+  const double matt = retro_brdf_cos(retro_brdf({"matt", Lambertian{dark}}, 905), cosine);
+  const double rough = retro_brdf_cos(retro_brdf({"rough", RoughDiffuse{dark, 1}}, 905), cosine);
+  const double scale = 1 / (1.5 - 2 / (3 * pi));
+  const double mean = scale * (1 + 2. / 3 - 28 / (15 * pi));
+  // Light scattered twice is up to a share of 0.01 of it.
+  EXPECT_NEAR(rough / matt, scale / mean * (1 + (1 - cosine * cosine) / cosine),
+              0.01 * rough / matt);
 }
 
 }  // namespace

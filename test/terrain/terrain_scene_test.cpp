@@ -199,7 +199,7 @@ TEST(TerrainSceneProof, RaysFromAboveAtVerticesAndEdgesOfAllLevelsDoNotLeak) {
       if (at.x < 1e-6 || at.y < 1e-6 || at.x > 512 - 1e-6 || at.y > 512 - 1e-6) continue;
       ASSERT_NEAR(hits[i].range_m, glm::length(targets[i] - rays[i].origin), 1e-6)
           << "ray " << i << (tracing == Tracing::Fast ? " fast" : " exact");
-      on_coarse += hits[i].level > 0 ? 1 : 0;
+      on_coarse += hits[i].part > 0 ? 1 : 0;
     }
     EXPECT_GT(on_coarse, rays.size() / 10);
   }

@@ -1,0 +1,26 @@
+#pragma once
+
+#include <string>
+#include <string_view>
+
+#include "core/error.h"
+#include "core/image_io.h"
+
+namespace groundray {
+
+[[noreturn]] inline void throw_damaged(const std::string& name, std::string_view format,
+                                       std::string_view fault) {
+  throw Error("{}: it is cut short or damaged: {} ({}); copy or save it again", name, fault,
+              format);
+}
+
+inline void check_size(const std::string& name, std::int64_t width, std::int64_t height) {
+  if (width <= 0 || height <= 0 || width > most_image_pixels / height) {
+    throw Error(
+        "{}: it is {} x {} pixels; it must have at least one and at most {} (16384 x 16384): scale "
+        "it down or cut it up",
+        name, width, height, most_image_pixels);
+  }
+}
+
+}  // namespace groundray

@@ -1,0 +1,169 @@
+#include "core/image_io.h"
+
+#include <png.h>
+
+#include <algorithm>
+#include <array>
+#include <csetjmp>
+#include <cstdio>
+#include <cstring>
+#include <vector>
+
+#include "core/error.h"
+#include "core/image_faults.h"
+#include "core/product_io.h"
+// libjpeg's headers need <cstdio> before them.
+#include <jerror.h>
+#include <jpeglib.h>
+
+namespace groundray {
+namespace {
+
+using namespace std::string_view_literals;
+
+constexpr std::string_view png_magic = "\x89PNG\r\n\x1a\n"sv;
+constexpr std::string_view jpeg_magic = "\xff\xd8\xff"sv;
+
+/// libpng and libjpeg leave by longjmp, which must not pass a destructor: the steps that are
+/// attempted call them and own nothing.
+class PngReader {
+ public:
+  PngReader(std::string_view bytes, const std::string& name)
+      : name_(name),
+        rest_(bytes),
+        png_(png_create_read_struct(PNG_LIBPNG_VER_STRING, this, on_fault, ignore)),
+        info_(png_ != nullptr ? png_create_info_struct(png_) : nullptr) {
+    if (info_ == nullptr) throw_damaged(name_, "PNG", "no memory to read it");
+  }
+  ~PngReader() { png_destroy_read_struct(&png_, &info_, nullptr); }
+  PngReader(const PngReader&) = delete;
+  PngReader& operator=(const PngReader&) = delete;
+
+  Image8 read() {
+    attempt([this] {
+      png_set_user_limits(png_, PNG_UINT_31_MAX, PNG_UINT_31_MAX);
+      png_set_read_fn(png_, this, next);
+      png_read_info(png_, info_);
+    });
+    const png_uint_32 height = png_get_image_height(png_, info_);
+    check_size(name_, png_get_image_width(png_, info_), height);
+    attempt([this] {
+      png_set_expand(png_);
+      png_set_scale_16(png_);
+      png_set_interlace_handling(png_);
+      png_read_update_info(png_, info_);
+    });
+    Image8 image(static_cast<int>(png_get_image_width(png_, info_)), static_cast<int>(height),
+                 png_get_channels(png_, info_));
+    std::vector<png_bytep> rows;
+    for (int y = 0; y < image.height(); ++y) rows.push_back(image.at(0, y).data());
+    attempt([this, &rows] {
+      png_read_image(png_, rows.data());
+      png_read_end(png_, nullptr);
+    });
+    return image;
+  }
+
+ private:
+  template <typename Step>
+  void attempt(const Step& step) {
+    if (setjmp(png_jmpbuf(png_)) != 0) throw_damaged(name_, "PNG", fault_.data());
+    step();
+  }
+  [[noreturn]] static void on_fault(png_structp png, png_const_charp fault) {
+    auto& self = *static_cast<PngReader*>(png_get_error_ptr(png));
+    std::snprintf(self.fault_.data(), self.fault_.size(), "%s", fault);
+    png_longjmp(png, 1);
+  }
+  static void ignore(png_structp, png_const_charp) {}
+  static void next(png_structp png, png_bytep to, std::size_t size) {
+    auto& self = *static_cast<PngReader*>(png_get_io_ptr(png));
+    if (size > self.rest_.size()) png_error(png, "the file ends too soon");
+    std::memcpy(to, self.rest_.data(), size);
+    self.rest_.remove_prefix(size);
+  }
+
+  const std::string& name_;
+  std::string_view rest_;
+  std::array<char, 128> fault_{};
+  png_structp png_;
+  png_infop info_;
+};
+
+class JpegReader {
+ public:
+  JpegReader(std::string_view bytes, const std::string& name) : name_(name) {
+    jpeg_.err = jpeg_std_error(&faults_);
+    jpeg_.client_data = this;
+    faults_.error_exit = on_fault;
+    faults_.emit_message = on_warning;
+    attempt([&] {
+      jpeg_create_decompress(&jpeg_);
+      jpeg_mem_src(&jpeg_, reinterpret_cast<const unsigned char*>(bytes.data()), bytes.size());
+    });
+  }
+  ~JpegReader() { jpeg_destroy_decompress(&jpeg_); }
+  JpegReader(const JpegReader&) = delete;
+  JpegReader& operator=(const JpegReader&) = delete;
+
+  Image8 read() {
+    attempt([this] { jpeg_read_header(&jpeg_, TRUE); });
+    check_size(name_, jpeg_.image_width, jpeg_.image_height);
+    if (jpeg_.jpeg_color_space == JCS_CMYK || jpeg_.jpeg_color_space == JCS_YCCK) {
+      throw Error("{}: its colours are CMYK; they must be grey or RGB: convert the image", name_);
+    }
+    jpeg_.out_color_space = jpeg_.jpeg_color_space == JCS_GRAYSCALE ? JCS_GRAYSCALE : JCS_RGB;
+    attempt([this] { jpeg_start_decompress(&jpeg_); });
+    Image8 image(static_cast<int>(jpeg_.output_width), static_cast<int>(jpeg_.output_height),
+                 jpeg_.output_components);
+    attempt([this, &image] {
+      while (jpeg_.output_scanline < jpeg_.output_height) {
+        JSAMPROW row = image.at(0, static_cast<int>(jpeg_.output_scanline)).data();
+        jpeg_read_scanlines(&jpeg_, &row, 1);
+      }
+      jpeg_finish_decompress(&jpeg_);
+    });
+    return image;
+  }
+
+ private:
+  template <typename Step>
+  void attempt(const Step& step) {
+    if (setjmp(jump_) != 0) {
+      std::array<char, JMSG_LENGTH_MAX> fault{};
+      faults_.format_message(reinterpret_cast<j_common_ptr>(&jpeg_), fault.data());
+      throw_damaged(name_, "JPEG", fault.data());
+    }
+    step();
+  }
+  [[noreturn]] static void on_fault(j_common_ptr jpeg) {
+    std::longjmp(static_cast<JpegReader*>(jpeg->client_data)->jump_, 1);
+  }
+  /// libjpeg fills what is missing or unreadable with grey and only warns of it.
+  static void on_warning(j_common_ptr jpeg, int level) {
+    constexpr std::array harmless{JWRN_ADOBE_XFORM, JWRN_EXTRANEOUS_DATA, JWRN_JFIF_MAJOR,
+                                  JWRN_NOT_SEQUENTIAL, JWRN_TOO_MUCH_DATA};
+    const bool matters = std::ranges::find(harmless, jpeg->err->msg_code) == harmless.end();
+    if (level < 0 && matters) on_fault(jpeg);
+  }
+
+  const std::string& name_;
+  jpeg_decompress_struct jpeg_{};
+  jpeg_error_mgr faults_{};
+  std::jmp_buf jump_{};
+};
+
+}  // namespace
+
+Image8 read_image8(const std::filesystem::path& path) {
+  return parse_image8(read_text(path), path.string());
+}
+
+Image8 parse_image8(std::string_view bytes, const std::string& name) {
+  if (bytes.starts_with(png_magic)) return PngReader(bytes, name).read();
+  if (bytes.starts_with(jpeg_magic)) return JpegReader(bytes, name).read();
+  throw Error("{}: it is neither a PNG nor a JPEG image{}", name,
+              bytes.empty() ? ": it is empty" : ", whatever its name: convert it");
+}
+
+}  // namespace groundray

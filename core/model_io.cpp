@@ -1,0 +1,228 @@
+#include "core/model_io.h"
+
+#include <algorithm>
+#include <cctype>
+#include <charconv>
+#include <cmath>
+#include <cstdint>
+#include <glm/geometric.hpp>
+#include <limits>
+#include <string>
+#include <string_view>
+#include <system_error>
+#include <utility>
+#include <vector>
+
+#include "core/error.h"
+#include "core/obj_reader.h"
+#include "core/ply_reader.h"
+#include "core/polygon_soup.h"
+#include "core/product_io.h"
+#include "core/scene_check.h"
+#include "core/scene_file.h"
+
+namespace groundray {
+namespace {
+
+namespace fs = std::filesystem;
+using Surface = PolygonSoup::Surface;
+
+enum class Form { Obj, Ply, Stl, Gltf, Collada };
+
+Form form_of(const fs::path& path) {
+  std::string ending = path.extension().string();
+  std::ranges::transform(ending, ending.begin(),
+                         [](unsigned char c) { return static_cast<char>(std::tolower(c)); });
+  if (ending == ".obj") return Form::Obj;
+  if (ending == ".ply") return Form::Ply;
+  if (ending == ".stl") return Form::Stl;
+  if (ending == ".gltf" || ending == ".glb") return Form::Gltf;
+  if (ending == ".dae") return Form::Collada;
+  throw Error("{}: the name of a model must end in .obj, .ply, .stl, .gltf, .glb or .dae",
+              path.string());
+}
+
+/// The %41 of URIs as characters.
+std::string without_percents(std::string_view text) {
+  std::string out;
+  for (std::size_t i = 0; i < text.size(); ++i) {
+    unsigned code = 0;
+    const char* const digits = text.data() + i + 1;
+    if (text[i] == '%' && i + 2 < text.size() &&
+        std::from_chars(digits, digits + 2, code, 16).ptr == digits + 2) {
+      out += static_cast<char>(code);
+      i += 2;
+    } else {
+      out += text[i];
+    }
+  }
+  return out;
+}
+
+/// Looks beside the model for what it names, first by the path, then by the last name of that:
+/// folders of its author's machine are not here.
+/// @throws Error naming where it was looked for.
+fs::path find_beside(const fs::path& model, const std::string& written) {
+  std::string tried;
+  for (std::string name : {written, without_percents(written)}) {
+    if (name.starts_with("file://")) name.erase(0, 7);
+    std::ranges::replace(name, '\\', '/');
+    for (const fs::path& relative : {fs::path(name), fs::path(name).filename()}) {
+      const fs::path path = model.parent_path() / relative;
+      std::error_code ignored;
+      if (fs::is_regular_file(path, ignored)) return path;
+      const std::string words = "'" + path.string() + "'";
+      if (tried.find(words) == std::string::npos)
+        tried += (tried.empty() ? "" : " and no ") + words;
+    }
+  }
+  throw Error("{:?} is missing: there is no {}", written, tried);
+}
+
+void find_images(const fs::path& model, std::vector<Surface>& surfaces) {
+  Violations broken(model.string());
+  const auto find = [&](const Surface& surface, const char* what, const std::string& written,
+                        ModelImage& image) {
+    if (written.empty()) return;
+    try {
+      image.file = find_beside(model, written);
+    } catch (const Error& fault) {
+      broken.unless(false, "surface {:?}: its {} {}", surface.looks.name, what, fault.what());
+    }
+  };
+  for (Surface& surface : surfaces) {
+    if (surface.opacity == surface.albedo) surface.opacity.clear();  // its alpha says the same
+    find(surface, "albedo map", surface.albedo, surface.looks.albedo);
+    find(surface, "normal map", surface.normal, surface.looks.normal);
+    find(surface, "opacity map", surface.opacity, surface.looks.opacity);
+  }
+  broken.throw_if_any();
+}
+
+struct Reading {
+  PolygonSoup soup;
+  double metres_per_unit = 1;  // as the file says
+  double unit_of_soup_m = 1;
+  UpAxis up = UpAxis::Z;
+  std::size_t out_of_range = 0;  // polygons that are not even in the soup
+};
+
+Reading read_obj(const fs::path& path) {
+  const auto read_mtl = [&](const std::string& name) { return read_text(find_beside(path, name)); };
+  return {.soup = parse_obj(read_text(path), path.string(), read_mtl)};
+}
+
+Reading read_collada(const fs::path& path) {
+  const ColladaAsset asset = check_collada(read_text(path), path.string());
+  return {.soup = read_scene_file(path, SceneForm::Collada),
+          .metres_per_unit = asset.metres_per_unit,
+          .unit_of_soup_m = static_cast<float>(asset.metres_per_unit),
+          .up = asset.up};
+}
+
+/// assimp leaves out triangles whose indices are out of range and tells but its log, so they are
+/// counted against what the file says.
+Reading read_gltf(const fs::path& path) {
+  const std::size_t named = check_gltf(read_text(path), path.string());
+  Reading reading{.soup = read_scene_file(path, SceneForm::Gltf), .up = UpAxis::Y};
+  reading.out_of_range = named - std::min(named, reading.soup.faces);
+  return reading;
+}
+
+Reading read_file(const fs::path& path, Form form) {
+  switch (form) {
+    case Form::Obj:
+      return read_obj(path);
+    case Form::Ply:
+      return {.soup = parse_ply_faces(read_text(path), path.string())};
+    case Form::Stl:
+      return {.soup = read_scene_file(path, SceneForm::Stl)};
+    case Form::Gltf:
+      return read_gltf(path);
+    default:
+      return read_collada(path);
+  }
+}
+
+template <typename V>
+V turned_up(const V& v, UpAxis up) {
+  if (up == UpAxis::X) return {v.y, v.z, v.x};
+  if (up == UpAxis::Y) return {v.z, v.x, v.y};
+  return v;
+}
+
+void turn_and_scale(Reading& reading, const ModelOptions& options) {
+  const UpAxis up = options.up.value_or(reading.up);
+  const double scale =
+      options.metres_per_unit.value_or(reading.metres_per_unit) / reading.unit_of_soup_m;
+  for (glm::dvec3& p : reading.soup.positions) p = scale * turned_up(p, up);
+  for (glm::vec3& n : reading.soup.normals) n = turned_up(n, up);
+  reading.soup.rounding *= scale;
+}
+
+/// Moves to the model those surfaces that its triangles have, and numbers them anew.
+void take_surfaces(const fs::path& path, std::vector<Surface> surfaces, Model& model) {
+  std::vector<std::uint16_t> numbers(surfaces.size());
+  for (const std::uint16_t surface : model.surface_of) numbers[surface] = 1;
+  std::vector<Surface> used;
+  for (std::size_t i = 0; i < surfaces.size(); ++i) {
+    if (numbers[i] == 0) continue;
+    numbers[i] = static_cast<std::uint16_t>(used.size());
+    used.push_back(std::move(surfaces[i]));
+  }
+  for (std::uint16_t& surface : model.surface_of) surface = numbers[surface];
+  find_images(path, used);
+  for (Surface& surface : used) model.surfaces.push_back(std::move(surface.looks));
+}
+
+void refuse_faults(const fs::path& path, const ModelFile& file) {
+  const ModelFaults& faults = file.dropped;
+  Violations broken(path.string());
+  const auto none = [&](std::size_t count, const char* what) {
+    broken.unless(count == 0, "{} {}; repair the model, or have them dropped", count, what);
+  };
+  none(faults.out_of_range, "polygons name a vertex that is not there");
+  none(faults.not_finite, "polygons have a position or uv that is no finite number");
+  none(faults.degenerate, "polygons or triangles have no area");
+  none(faults.entangled, "polygons cross themselves");
+  const ModelBounds bounds = bounds_of(file.model.mesh);
+  const double size_m = glm::length(bounds.high_m - bounds.low_m);
+  broken.unless(
+      !(file.rounding_m > std::max(1e-6 * size_m, 1e-6)),
+      "positions came as floats and are rounded by up to {:.2g} m, too much for a size of "
+      "{:.3g} m; move the model to its origin, or write it as .obj or .ply with doubles",
+      file.rounding_m, size_m);
+  broken.throw_if_any();
+}
+
+}  // namespace
+
+ModelFile read_model(const fs::path& path, const ModelOptions& options) {
+  const double scale = options.metres_per_unit.value_or(1);
+  if (!(scale > 0 && std::isfinite(scale))) {
+    throw Error("{}: metres_per_unit = {} must be positive", path.string(), scale);
+  }
+  const Form form = form_of(path);
+  Reading reading = read_file(path, form);
+  PolygonSoup& soup = reading.soup;
+  turn_and_scale(reading, options);
+  if (soup.surfaces.size() > std::numeric_limits<std::uint16_t>::max()) {
+    throw Error("{}: there are {} surfaces, which must be below 2^16", path.string(),
+                soup.surfaces.size());
+  }
+  ModelFile file{.skipped = soup.skipped, .rounding_m = soup.rounding};
+  file.dropped.out_of_range = reading.out_of_range;
+  file.model = model_of(soup, file.dropped);
+  if (options.broken == BrokenParts::Refuse) refuse_faults(path, file);
+  if (file.model.mesh.triangles.empty()) {
+    throw Error(
+        "{}: there is no triangle; {} broken polygons were dropped, and {} points, lines or "
+        "curved patches skipped",
+        path.string(), file.dropped.total(), file.skipped);
+  }
+  take_surfaces(path, std::move(soup.surfaces), file.model);
+  check_model(file.model, path.string());
+  return file;
+}
+
+}  // namespace groundray

@@ -1,0 +1,228 @@
+#include "core/model_scene.h"
+
+#include <algorithm>
+#include <array>
+#include <cmath>
+#include <utility>
+
+#include "core/device.h"
+#include "core/error.h"
+#include "core/image_io.h"
+#include "core/level_scene.h"
+
+namespace groundray {
+namespace {
+
+constexpr int most_steps = 32;  // from triangle to triangle; Embree's is next to the right one
+
+std::optional<Texture> texture_of(const ModelImage& image, Encoding encoding) {
+  if (!image.exists()) return std::nullopt;
+  return Texture(image.file.empty() ? image.pixels : read_image8(image.file), encoding,
+                 Wrap::Repeat);
+}
+
+ModelScene::Impl::Textures textures_of(const ModelSurface& surface) {
+  ModelScene::Impl::Textures all{texture_of(surface.albedo, Encoding::Srgb),
+                                 texture_of(surface.normal, Encoding::Linear),
+                                 texture_of(surface.opacity, Encoding::Linear)};
+  if (all.opacity || (all.albedo && all.albedo->has_alpha()))
+    all.least_alpha = surface.least_alpha;
+  return all;
+}
+
+void attach(RTCScene scene, RTCGeometry geometry, unsigned id) {
+  rtcCommitGeometry(geometry);
+  rtcAttachGeometryByID(scene, geometry, id);
+  rtcReleaseGeometry(geometry);
+}
+
+// Lets rays through where a cut-out is clear.
+void filter_cut(const RTCFilterFunctionNArguments* arguments) {
+  const auto& model = *static_cast<const ModelScene::Impl*>(arguments->geometryUserPtr);
+  for (unsigned i = 0; i < arguments->N; ++i) {
+    if (arguments->valid[i] == 0) continue;
+    const double u = RTCHitN_u(arguments->hit, arguments->N, i);
+    const double v = RTCHitN_v(arguments->hit, arguments->N, i);
+    const std::uint32_t triangle = model.cut[RTCHitN_primID(arguments->hit, arguments->N, i)];
+    if (!model.is_opaque(triangle, {1 - u - v, u, v})) arguments->valid[i] = 0;
+  }
+}
+
+RTCBuffer vertices_of(const ModelScene::Impl& model) {
+  const auto& vertices_m = model.model.mesh.vertices_m;
+  RTCBuffer buffer = rtcNewBuffer(
+      handle(model.device), vertices_m.size() * sizeof(glm::vec3) + 16);  // Embree reads 16 bytes
+  auto* const out = buffer == nullptr ? nullptr : static_cast<glm::vec3*>(rtcGetBufferData(buffer));
+  if (out == nullptr) throw Error("ray tracer: there is not enough memory for a model's vertices");
+  std::ranges::transform(vertices_m, out, [&](const glm::dvec3& vertex_m) {
+    return glm::vec3(vertex_m - model.centre_m);
+  });
+  return buffer;
+}
+
+void add_triangles(const ModelScene::Impl& model, RTCBuffer vertices, unsigned id,
+                   const std::vector<std::uint32_t>& triangles) {
+  if (triangles.empty()) return;
+  RTCGeometry geometry = rtcNewGeometry(handle(model.device), RTC_GEOMETRY_TYPE_TRIANGLE);
+  rtcSetGeometryBuffer(geometry, RTC_BUFFER_TYPE_VERTEX, 0, RTC_FORMAT_FLOAT3, vertices, 0,
+                       sizeof(glm::vec3), model.model.mesh.vertices_m.size());
+  auto* const corners = static_cast<glm::uvec3*>(rtcSetNewGeometryBuffer(
+      geometry, RTC_BUFFER_TYPE_INDEX, 0, RTC_FORMAT_UINT3, sizeof(glm::uvec3), triangles.size()));
+  if (corners == nullptr)
+    throw Error("ray tracer: there is not enough memory for a model's triangles");
+  std::ranges::transform(triangles, corners, [&](std::uint32_t triangle) {
+    return model.model.mesh.triangles[triangle];
+  });
+  if (id == 1) {
+    rtcSetGeometryUserData(geometry, const_cast<ModelScene::Impl*>(&model));
+    rtcSetGeometryIntersectFilterFunction(geometry, filter_cut);
+  }
+  attach(model.scene, geometry, id);
+}
+
+void triangle_bounds(const RTCBoundsFunctionArguments* arguments) {
+  const auto& model = *static_cast<const ModelScene::Impl*>(arguments->geometryUserPtr);
+  const glm::uvec3& corners = model.model.mesh.triangles[arguments->primID];
+  glm::dvec3 low = model.model.mesh.vertices_m[corners.x];
+  glm::dvec3 high = low;
+  for (int k = 1; k < 3; ++k) {
+    low = glm::min(low, model.model.mesh.vertices_m[corners[k]]);
+    high = glm::max(high, model.model.mesh.vertices_m[corners[k]]);
+  }
+  const glm::vec3 padded_low = glm::vec3(low - model.centre_m) - model.slack_m;
+  const glm::vec3 padded_high = glm::vec3(high - model.centre_m) + model.slack_m;
+  *arguments->bounds_o = {padded_low.x,  padded_low.y,  padded_low.z,  0,
+                          padded_high.x, padded_high.y, padded_high.z, 0};
+}
+
+// Meets one triangle with each ray of a packet, in double. Of triangles that are equally far the
+// first counts.
+void intersect_triangle(const RTCIntersectFunctionNArguments* arguments) {
+  const auto& model = *static_cast<const ModelScene::Impl*>(arguments->geometryUserPtr);
+  const auto& query = *reinterpret_cast<const ModelQuery*>(arguments->context);
+  const std::uint32_t triangle = arguments->primID;
+  RTCRayN* const rays = RTCRayHitN_RayN(arguments->rayhit, arguments->N);
+  for (unsigned i = 0; i < arguments->N; ++i) {
+    if (arguments->valid[i] == 0) continue;
+    const unsigned lane = RTCRayN_id(rays, arguments->N, i);
+    const ModelRay& ray = query.rays[lane];
+    ModelCrossing& best = query.crossings[lane];
+    const glm::dvec3 edges = model.edges_of(triangle, ray);
+    if (!is_inside(edges)) continue;
+    const double t_m = model.range_m(triangle, ray);
+    const bool is_nearer = t_m < best.t_m || (t_m == best.t_m && triangle < best.triangle);
+    if (!(t_m >= 0 && is_nearer)) continue;
+    if (!model.is_opaque(triangle, model.shares(edges))) continue;
+    best = {t_m, triangle};
+    float& far_m = RTCRayN_tfar(rays, arguments->N, i);
+    far_m = std::min(far_m, far_float(t_m - query.enter_m[lane], model.slack_m));
+  }
+}
+
+void build_exact(ModelScene::Impl& model) {
+  RTCGeometry geometry = rtcNewGeometry(handle(model.device), RTC_GEOMETRY_TYPE_USER);
+  rtcSetGeometryUserPrimitiveCount(geometry,
+                                   static_cast<unsigned>(model.model.mesh.triangles.size()));
+  rtcSetGeometryUserData(geometry, &model);
+  rtcSetGeometryBoundsFunction(geometry, triangle_bounds, nullptr);
+  rtcSetGeometryIntersectFunction(geometry, intersect_triangle);
+  attach(model.scene, geometry, 0);
+}
+
+}  // namespace
+
+ModelScene::Impl::Impl(const RayDevice& with, Model content, Tracing how)
+    : device(with), model(std::move(content)), tracing(how) {
+  check_model(model, "model");
+  for (const ModelSurface& surface : model.surfaces)
+    textures.push_back(groundray::textures_of(surface));
+  neighbours = neighbours_of(model.mesh);
+  low_m = high_m = model.mesh.vertices_m[model.mesh.triangles[0].x];
+  for (const glm::uvec3& corners : model.mesh.triangles) {
+    for (int k = 0; k < 3; ++k) {
+      low_m = glm::min(low_m, model.mesh.vertices_m[corners[k]]);
+      high_m = glm::max(high_m, model.mesh.vertices_m[corners[k]]);
+    }
+  }
+  centre_m = (low_m + high_m) / 2.0;
+  radius_m = glm::length(glm::max(glm::abs(low_m), glm::abs(high_m)));
+  slack_m = static_cast<float>(16 * 0x1p-24 * glm::length(high_m - low_m));
+  for (std::uint32_t i = 0; i < model.mesh.triangles.size(); ++i)
+    (textures_of(i).least_alpha > 0 ? cut : solid).push_back(i);
+  scene = new_scene(device);
+  if (tracing == Tracing::Exact) {
+    build_exact(*this);
+  } else {
+    RTCBuffer vertices = vertices_of(*this);
+    add_triangles(*this, vertices, 0, solid);
+    add_triangles(*this, vertices, 1, cut);
+    rtcReleaseBuffer(vertices);
+  }
+  rtcCommitScene(scene);
+  check(device, "building a model");
+}
+
+ModelScene::Impl::~Impl() {
+  if (scene != nullptr) rtcReleaseScene(scene);
+}
+
+glm::dvec3 ModelScene::Impl::edges_of(std::uint32_t triangle, const ModelRay& ray) const noexcept {
+  const glm::uvec3& corners = model.mesh.triangles[triangle];
+  const glm::dvec3 a = model.mesh.vertices_m[corners.x] - ray.origin;
+  const glm::dvec3 b = model.mesh.vertices_m[corners.y] - ray.origin;
+  const glm::dvec3 c = model.mesh.vertices_m[corners.z] - ray.origin;
+  return {glm::dot(ray.direction, glm::cross(a, b)), glm::dot(ray.direction, glm::cross(b, c)),
+          glm::dot(ray.direction, glm::cross(c, a))};
+}
+
+glm::dvec3 ModelScene::Impl::normal(std::uint32_t triangle) const noexcept {
+  const glm::uvec3& corners = model.mesh.triangles[triangle];
+  const glm::dvec3& a = model.mesh.vertices_m[corners.x];
+  return glm::cross(model.mesh.vertices_m[corners.y] - a, model.mesh.vertices_m[corners.z] - a);
+}
+
+double ModelScene::Impl::range_m(std::uint32_t triangle, const ModelRay& ray) const noexcept {
+  const glm::dvec3 n = normal(triangle);
+  const glm::dvec3& a = model.mesh.vertices_m[model.mesh.triangles[triangle].x];
+  return glm::dot(n, a - ray.origin) / glm::dot(n, ray.direction);
+}
+
+bool ModelScene::Impl::is_opaque(std::uint32_t triangle, const glm::dvec3& shares) const noexcept {
+  const Textures& worn = textures_of(triangle);
+  if (worn.least_alpha == 0) return true;
+  const glm::uvec3& corners = model.mesh.triangles[triangle];
+  const glm::dvec2 uv = glm::dvec2(model.uv[corners.x]) * shares.x +
+                        glm::dvec2(model.uv[corners.y]) * shares.y +
+                        glm::dvec2(model.uv[corners.z]) * shares.z;
+  const Texture& cut_by = worn.opacity ? *worn.opacity : *worn.albedo;
+  const float alpha = cut_by.has_alpha() ? cut_by.alpha(uv) : cut_by.color(uv).x;
+  return alpha >= worn.least_alpha;
+}
+
+// Goes from triangle to triangle over the edge that the line passes on the wrong side of. Back over
+// the same edge means that the surface folds there: a silhouette, and the line passes outside.
+std::optional<ModelCrossing> ModelScene::Impl::settle(std::uint32_t triangle,
+                                                      const ModelRay& ray) const noexcept {
+  std::uint32_t before = no_neighbour;
+  for (int step = 0; step < most_steps; ++step) {
+    const glm::dvec3 edges = edges_of(triangle, ray);
+    if (is_inside(edges)) return ModelCrossing{range_m(triangle, ray), triangle};
+    const double sense = edges.x + edges.y + edges.z < 0 ? -1 : 1;
+    int worst = 0;
+    for (int k = 1; k < 3; ++k) {
+      if (sense * edges[k] < sense * edges[worst]) worst = k;
+    }
+    const std::uint32_t next = neighbours[triangle][worst];
+    if (next == no_neighbour || next == before) return std::nullopt;
+    before = triangle;
+    triangle = next;
+  }
+  return std::nullopt;
+}
+
+ModelScene::ModelScene(const RayDevice& device, Model model, Tracing tracing)
+    : impl_(std::make_shared<Impl>(device, std::move(model), tracing)) {}
+
+const Model& ModelScene::model() const noexcept { return impl_->model; }
+
+}  // namespace groundray

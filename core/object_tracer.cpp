@@ -1,0 +1,552 @@
+// Embree finds which objects a ray may meet; each is then met in its own frame, where floats are
+// fine enough to say which triangle, and that is decided in double.
+#include "core/object_tracer.h"
+
+#include <algorithm>
+#include <array>
+#include <cmath>
+#include <glm/gtc/matrix_inverse.hpp>
+#include <glm/mat3x3.hpp>
+#include <utility>
+
+#include "core/device.h"
+#include "core/error.h"
+#include "core/level_scene.h"
+#include "core/model_scene.h"
+
+namespace groundray {
+namespace {
+
+using std::chrono::nanoseconds;
+
+constexpr double infinity = std::numeric_limits<double>::infinity();
+constexpr unsigned placed_geometry = 0;
+constexpr unsigned moving_geometry = 1;
+
+// A box in D.
+struct Box {
+  glm::dvec3 low{infinity};
+  glm::dvec3 high{-infinity};
+  void add(const Box& other) noexcept {
+    low = glm::min(low, other.low);
+    high = glm::max(high, other.high);
+  }
+};
+
+// A stretch of a moving object's path.
+struct Stretch {
+  std::uint32_t object = 0;  // index among those that move
+  nanoseconds begin{0}, end{0};
+  Box box;
+};
+
+// How a ray enters O.
+struct IntoModel {
+  glm::dmat3 per_D{1};  // R_OD / scale
+  glm::dvec3 p_DO{0};
+};
+
+IntoModel into_model(const glm::dquat& R_DO, const glm::dvec3& p_DO, double scale) noexcept {
+  return {glm::transpose(glm::mat3_cast(R_DO)) * (1 / scale), p_DO};
+}
+
+// A packet of rays on its way through the objects, each number in an array over the lanes.
+template <int W>
+struct ObjectPacket {
+  using Doubles = std::array<double, W>;
+
+  alignas(64) typename PacketOf<W>::Type floats;
+  alignas(64) std::array<int, W> valid;
+  alignas(64) Doubles x_m, y_m, z_m, dx, dy, dz;
+  Doubles enter_m;  // where the float rays begin
+  std::array<nanoseconds, W> time;
+  // What they meet first:
+  Doubles best_m;
+  std::array<std::uint32_t, W> object, triangle;
+  std::array<glm::vec3, W> normal;
+};
+
+// The rays of a packet in a model's frame.
+template <int W>
+struct LocalPacket {
+  using Doubles = std::array<double, W>;
+
+  alignas(64) typename PacketOf<W>::Type floats;
+  alignas(64) std::array<int, W> valid;
+  alignas(64) Doubles x, y, z, dx, dy, dz;
+  Doubles enter_m, leave_m;
+  std::array<ModelRay, W> rays;  // exact tracing only
+  std::array<ModelCrossing, W> crossings;
+
+  ModelRay ray(std::size_t i) const noexcept { return {{x[i], y[i], z[i]}, {dx[i], dy[i], dz[i]}}; }
+};
+
+// What Embree's callbacks are given.
+template <int W>
+struct ObjectQuery {
+  QueryContext context;  // first, so that Embree's pointer to it is a pointer to this
+  ObjectPacket<W>* packet;
+};
+
+void check_objects(std::size_t models, std::span<const PlacedObject> placed,
+                   std::span<const MovingObject> moving) {
+  Violations broken("objects");
+  const auto check = [&](std::size_t number, double scale, std::uint32_t model) {
+    broken.unless(scale > 0 && std::isfinite(scale),
+                  "object {}: its scale = {} must be positive and finite", number, scale);
+    broken.unless(model < models, "object {}: model {} is not there; there are {}", number, model,
+                  models);
+  };
+  for (std::size_t i = 0; i < placed.size(); ++i) {
+    const PlacedObject& object = placed[i];
+    check(i + 1, object.scale, object.model);
+    broken.unless(std::isfinite(object.p_DO.x + object.p_DO.y + object.p_DO.z),
+                  "object {}: its position must be finite", i + 1);
+    broken.unless(std::abs(glm::length(object.R_DO) - 1) <= 1e-9,
+                  "object {}: its rotation has a quaternion of norm {}; it must be 1", i + 1,
+                  glm::length(object.R_DO));
+  }
+  for (std::size_t i = 0; i < moving.size(); ++i)
+    check(placed.size() + i + 1, moving[i].scale, moving[i].model);
+  broken.throw_if_any();
+}
+
+// Where a ray is inside a box, from `begin_m` on; leaves nothing (begin > end) if nowhere.
+void clip(const glm::dvec3& origin, const glm::dvec3& direction, const glm::dvec3& low,
+          const glm::dvec3& high, double& begin_m, double& end_m) noexcept {
+  for (int k = 0; k < 3; ++k) clip_range(origin[k], direction[k], low[k], high[k], begin_m, end_m);
+}
+
+}  // namespace
+
+struct ObjectTracer::Impl {
+  RayDevice device;
+  std::vector<ModelScene> models;
+  std::vector<PlacedObject> placed;
+  std::vector<MovingObject> moving;
+  std::vector<Stretch> stretches;
+  Box box;             // of all objects
+  glm::dvec3 p_DC{0};  // origin of the scene's floats: the middle of it
+  float slack_m = 0;   // covers rounding to floats
+  RTCScene scene = nullptr;
+
+  Impl(const RayDevice& with, std::vector<ModelScene> what, std::vector<PlacedObject> standing,
+       std::vector<MovingObject> going);
+  ~Impl() {
+    if (scene != nullptr) rtcReleaseScene(scene);
+  }
+  Impl(const Impl&) = delete;
+  Impl& operator=(const Impl&) = delete;
+
+  const ModelScene::Impl& model(std::uint32_t number) const noexcept {
+    return models[number].impl();
+  }
+  Box box_of(const PlacedObject& object) const noexcept;
+  void add_stretches(std::uint32_t object);
+  Pose pose(const MovingObject& object, nanoseconds time) const {
+    const Trajectory& X_DO = object.X_DO;
+    return X_DO.pose_at(std::clamp(time, X_DO.begin_time(), X_DO.end_time()));
+  }
+  RTCBounds bounds(const Box& of) const noexcept {
+    const glm::vec3 low = glm::vec3(of.low - p_DC) - slack_m;
+    const glm::vec3 high = glm::vec3(of.high - p_DC) + slack_m;
+    return {low.x, low.y, low.z, 0, high.x, high.y, high.z, 0};
+  }
+  void build();
+
+  template <int W>
+  static void meet_placed(const RTCIntersectFunctionNArguments* arguments);
+  template <int W>
+  static void meet_moving(const RTCIntersectFunctionNArguments* arguments);
+  static void placed_bounds(const RTCBoundsFunctionArguments* arguments);
+  static void moving_bounds(const RTCBoundsFunctionArguments* arguments);
+  template <int W>
+  void trace_packet(std::span<const Ray> rays, std::span<Hit> hits) const noexcept;
+  template <int W>
+  void trace(std::span<const Ray> rays, std::span<Hit> hits) const noexcept;
+};
+
+Box ObjectTracer::Impl::box_of(const PlacedObject& object) const noexcept {
+  const ModelScene::Impl& shape = model(object.model);
+  const glm::dmat3 R_DO = glm::mat3_cast(object.R_DO);
+  const glm::dvec3 half_m = (shape.high_m - shape.low_m) / 2.0;
+  const glm::dvec3 centre_m = object.p_DO + object.scale * (R_DO * shape.centre_m);
+  glm::dvec3 reach_m(0);
+  for (int k = 0; k < 3; ++k) reach_m += glm::abs(R_DO[k]) * half_m[k];
+  reach_m *= object.scale * (1 + 1e-12);
+  return {centre_m - reach_m, centre_m + reach_m};
+}
+
+// Between two poses the object's origin leaves the straight line between them by no more than the
+// height of the arc that turns by the same angle; a ball round it holds the rest.
+void ObjectTracer::Impl::add_stretches(std::uint32_t number) {
+  const MovingObject& object = moving[number];
+  const auto& samples = object.X_DO.samples();
+  const double ball_m = object.scale * model(object.model).radius_m;
+  const auto add = [&](nanoseconds begin, nanoseconds end, const Pose& a, const Pose& b) {
+    const double angle_rad =
+        2 * std::acos(std::min(std::abs(glm::dot(a.rotation, b.rotation)), 1.0));
+    const double arc_m =
+        glm::distance(a.translation_m, b.translation_m) / 2 * std::tan(angle_rad / 4);
+    const double pad_m = (ball_m + arc_m) * (1 + 1e-9);
+    stretches.push_back({number,
+                         begin,
+                         end,
+                         {glm::min(a.translation_m, b.translation_m) - pad_m,
+                          glm::max(a.translation_m, b.translation_m) + pad_m}});
+  };
+  const auto first = samples.front(), last = samples.back();
+  add(nanoseconds::min(), first.time, first.pose, first.pose);
+  for (std::size_t i = 0; i + 1 < samples.size(); ++i)
+    add(samples[i].time, samples[i + 1].time, samples[i].pose, samples[i + 1].pose);
+  add(last.time, nanoseconds::max(), last.pose, last.pose);
+}
+
+ObjectTracer::Impl::Impl(const RayDevice& with, std::vector<ModelScene> what,
+                         std::vector<PlacedObject> standing, std::vector<MovingObject> going)
+    : device(with), models(std::move(what)), placed(std::move(standing)), moving(std::move(going)) {
+  check_objects(models.size(), placed, moving);
+  for (const PlacedObject& object : placed) box.add(box_of(object));
+  for (std::uint32_t i = 0; i < moving.size(); ++i) add_stretches(i);
+  for (const Stretch& stretch : stretches) box.add(stretch.box);
+  p_DC = (box.low + box.high) / 2.0;
+  slack_m = static_cast<float>(16 * 0x1p-24 * glm::length(box.high - box.low));
+  build();
+}
+
+void ObjectTracer::Impl::placed_bounds(const RTCBoundsFunctionArguments* arguments) {
+  const auto& tracer = *static_cast<const Impl*>(arguments->geometryUserPtr);
+  *arguments->bounds_o = tracer.bounds(tracer.box_of(tracer.placed[arguments->primID]));
+}
+
+void ObjectTracer::Impl::moving_bounds(const RTCBoundsFunctionArguments* arguments) {
+  const auto& tracer = *static_cast<const Impl*>(arguments->geometryUserPtr);
+  *arguments->bounds_o = tracer.bounds(tracer.stretches[arguments->primID].box);
+}
+
+void ObjectTracer::Impl::build() {
+  scene = new_scene(device);
+  const auto add = [&](unsigned id, std::size_t count, RTCBoundsFunction bounds_of,
+                       RTCIntersectFunctionN meet) {
+    if (count == 0) return;
+    RTCGeometry geometry = rtcNewGeometry(handle(device), RTC_GEOMETRY_TYPE_USER);
+    rtcSetGeometryUserPrimitiveCount(geometry, static_cast<unsigned>(count));
+    rtcSetGeometryUserData(geometry, this);
+    rtcSetGeometryBoundsFunction(geometry, bounds_of, nullptr);
+    rtcSetGeometryIntersectFunction(geometry, meet);
+    rtcCommitGeometry(geometry);
+    rtcAttachGeometryByID(scene, geometry, id);
+    rtcReleaseGeometry(geometry);
+  };
+  const int width = device.impl().width;
+  add(placed_geometry, placed.size(), placed_bounds,
+      width == 16  ? meet_placed<16>
+      : width == 8 ? meet_placed<8>
+                   : meet_placed<4>);
+  add(moving_geometry, stretches.size(), moving_bounds,
+      width == 16  ? meet_moving<16>
+      : width == 8 ? meet_moving<8>
+                   : meet_moving<4>);
+  rtcCommitScene(scene);
+  check(device, "building the objects");
+}
+
+namespace {
+
+// Lays a ray into a model's frame.
+template <int W>
+inline void lay(const IntoModel& into, const ObjectPacket<W>& packet, std::size_t i,
+                LocalPacket<W>& local) noexcept {
+  const glm::dmat3& m = into.per_D;
+  const double x = packet.x_m[i] - into.p_DO.x;
+  const double y = packet.y_m[i] - into.p_DO.y;
+  const double z = packet.z_m[i] - into.p_DO.z;
+  local.x[i] = m[0].x * x + m[1].x * y + m[2].x * z;
+  local.y[i] = m[0].y * x + m[1].y * y + m[2].y * z;
+  local.z[i] = m[0].z * x + m[1].z * y + m[2].z * z;
+  local.dx[i] = m[0].x * packet.dx[i] + m[1].x * packet.dy[i] + m[2].x * packet.dz[i];
+  local.dy[i] = m[0].y * packet.dx[i] + m[1].y * packet.dy[i] + m[2].y * packet.dz[i];
+  local.dz[i] = m[0].z * packet.dx[i] + m[1].z * packet.dy[i] + m[2].z * packet.dz[i];
+}
+
+// Leaves the lanes valid that pass the model's box before what was met so far. The box is padded,
+// so that a ray along one of its sides, which makes NaNs here, is let in.
+template <int W>
+bool enter_box(const ModelScene::Impl& model, const ObjectPacket<W>& packet,
+               LocalPacket<W>& local) noexcept {
+  const glm::dvec3 low = model.low_m - double{model.slack_m};
+  const glm::dvec3 high = model.high_m + double{model.slack_m};
+  int any = 0;
+  for (std::size_t i = 0; i < W; ++i) {
+    const double ix = 1 / local.dx[i], iy = 1 / local.dy[i], iz = 1 / local.dz[i];
+    const double xa = (low.x - local.x[i]) * ix, xb = (high.x - local.x[i]) * ix;
+    const double ya = (low.y - local.y[i]) * iy, yb = (high.y - local.y[i]) * iy;
+    const double za = (low.z - local.z[i]) * iz, zb = (high.z - local.z[i]) * iz;
+    const double enter_m =
+        std::max(std::max(0.0, std::min(xa, xb)), std::max(std::min(ya, yb), std::min(za, zb)));
+    const double leave_m = std::min(std::min(packet.best_m[i], std::max(xa, xb)),
+                                    std::min(std::max(ya, yb), std::max(za, zb)));
+    const bool passes = enter_m <= leave_m;
+    local.valid[i] &= passes ? -1 : 0;
+    local.enter_m[i] = passes ? enter_m : 0;  // finite: Embree looks at all lanes
+    local.leave_m[i] = passes ? leave_m : 0;
+    any |= local.valid[i];
+  }
+  return any != 0;
+}
+
+template <int W>
+void fill_floats(const ModelScene::Impl& model, LocalPacket<W>& local) noexcept {
+  auto& out = local.floats.ray;
+  const glm::dvec3 centre_m = model.centre_m;
+  for (std::size_t i = 0; i < W; ++i) {
+    const double begin_m = local.enter_m[i];
+    out.org_x[i] = static_cast<float>(local.x[i] + local.dx[i] * begin_m - centre_m.x);
+    out.org_y[i] = static_cast<float>(local.y[i] + local.dy[i] * begin_m - centre_m.y);
+    out.org_z[i] = static_cast<float>(local.z[i] + local.dz[i] * begin_m - centre_m.z);
+    out.dir_x[i] = static_cast<float>(local.dx[i]);
+    out.dir_y[i] = static_cast<float>(local.dy[i]);
+    out.dir_z[i] = static_cast<float>(local.dz[i]);
+    out.tnear[i] = 0;
+    out.tfar[i] = far_float(local.leave_m[i] - begin_m, model.slack_m);
+    out.time[i] = 0;
+    out.mask[i] = ~0u;
+    out.id[i] = static_cast<unsigned>(i);
+    out.flags[i] = 0;
+    local.floats.hit.geomID[i] = RTC_INVALID_GEOMETRY_ID;
+    local.floats.hit.instID[0][i] = RTC_INVALID_GEOMETRY_ID;
+  }
+}
+
+// Goes on from where Embree's triangle was passed by.
+std::optional<ModelCrossing> search(const ModelScene::Impl& model, const ModelRay& ray,
+                                    double enter_m, double leave_m, float from_m) noexcept {
+  const glm::vec3 origin(ray.origin + ray.direction * enter_m - model.centre_m);
+  const glm::vec3 direction(ray.direction);
+  const float far_m = far_float(leave_m - enter_m, model.slack_m);
+  for (;;) {
+    RTCRayHit one{};
+    const float next_m = std::nextafter(from_m * (1 + 0x1p-22f), far_m);
+    one.ray = {origin.x,    origin.y, origin.z, next_m, direction.x, direction.y,
+               direction.z, 0,        far_m,    ~0u,    0,           0};
+    one.hit.geomID = RTC_INVALID_GEOMETRY_ID;
+    one.hit.instID[0] = RTC_INVALID_GEOMETRY_ID;
+    QueryContext context;
+    if (!(next_m < far_m)) return std::nullopt;
+    intersect<1>(model.scene, nullptr, one, context, Coherence::Incoherent);
+    if (one.hit.geomID == RTC_INVALID_GEOMETRY_ID) return std::nullopt;
+    if (auto found = model.settle(model.triangle_of(one.hit.geomID, one.hit.primID), ray))
+      return found;
+    from_m = one.ray.tfar;
+  }
+}
+
+// Where a lane meets the model.
+template <int W>
+std::optional<ModelCrossing> crossing_of(const ModelScene::Impl& model, const LocalPacket<W>& local,
+                                         std::size_t i) noexcept {
+  if (model.tracing == Tracing::Exact) {
+    if (local.crossings[i].t_m < infinity) return local.crossings[i];
+    return std::nullopt;
+  }
+  const auto& hit = local.floats.hit;
+  if (hit.geomID[i] == RTC_INVALID_GEOMETRY_ID) return std::nullopt;
+  const ModelRay ray = local.ray(i);
+  if (auto found = model.settle(model.triangle_of(hit.geomID[i], hit.primID[i]), ray)) return found;
+  return search(model, ray, local.enter_m[i], local.leave_m[i], local.floats.ray.tfar[i]);
+}
+
+// Meets a model with the valid lanes of `local`, each of which has come in its own way.
+template <int W>
+void meet(const ModelScene::Impl& model, std::uint32_t object,
+          const std::array<const IntoModel*, W>& into, LocalPacket<W>& local,
+          ObjectPacket<W>& packet) noexcept {
+  if (!enter_box(model, packet, local)) return;
+  fill_floats(model, local);
+  if (model.tracing == Tracing::Exact) {
+    for (std::size_t i = 0; i < W; ++i) local.rays[i] = local.ray(i);
+    local.crossings.fill({});
+  }
+  ModelQuery query{{}, local.rays.data(), local.enter_m.data(), local.crossings.data()};
+  intersect<W>(model.scene, local.valid.data(), local.floats, query.context, Coherence::Coherent);
+  for (std::size_t i = 0; i < W; ++i) {
+    if (local.valid[i] == 0) continue;
+    const auto crossing = crossing_of(model, local, i);
+    if (!crossing || !(crossing->t_m >= 0)) continue;
+    const bool is_nearer = crossing->t_m < packet.best_m[i] ||
+                           (crossing->t_m == packet.best_m[i] && object < packet.object[i]);
+    if (!is_nearer) continue;
+    const glm::dvec3 d_D(packet.dx[i], packet.dy[i], packet.dz[i]);
+    const glm::dvec3 up =
+        glm::normalize(glm::transpose(into[i]->per_D) * model.normal(crossing->triangle));
+    packet.best_m[i] = crossing->t_m;
+    packet.object[i] = object;
+    packet.triangle[i] = crossing->triangle;
+    packet.normal[i] = glm::vec3(glm::dot(up, d_D) > 0 ? -up : up);
+  }
+}
+
+// Lets Embree leave out what lies beyond the best so far.
+template <int W>
+void shorten(const RTCIntersectFunctionNArguments* arguments, const ObjectPacket<W>& packet,
+             float slack_m) noexcept {
+  RTCRayN* const rays = RTCRayHitN_RayN(arguments->rayhit, arguments->N);
+  for (unsigned i = 0; i < arguments->N; ++i) {
+    if (arguments->valid[i] == 0) continue;
+    const unsigned lane = RTCRayN_id(rays, arguments->N, i);
+    float& far_m = RTCRayN_tfar(rays, arguments->N, i);
+    far_m = std::min(far_m, far_float(packet.best_m[lane] - packet.enter_m[lane], slack_m));
+  }
+}
+
+// Calls act(lane) for the lanes that a callback is about.
+template <typename Act>
+void for_each_lane(const RTCIntersectFunctionNArguments* arguments, const Act& act) noexcept {
+  RTCRayN* const rays = RTCRayHitN_RayN(arguments->rayhit, arguments->N);
+  for (unsigned i = 0; i < arguments->N; ++i) {
+    if (arguments->valid[i] != 0) act(std::size_t{RTCRayN_id(rays, arguments->N, i)});
+  }
+}
+
+}  // namespace
+
+template <int W>
+void ObjectTracer::Impl::meet_placed(const RTCIntersectFunctionNArguments* arguments) {
+  const auto& tracer = *static_cast<const Impl*>(arguments->geometryUserPtr);
+  auto& packet = *reinterpret_cast<ObjectQuery<W>*>(arguments->context)->packet;
+  const PlacedObject& object = tracer.placed[arguments->primID];
+  const ModelScene::Impl& model = tracer.model(object.model);
+  const IntoModel into = into_model(object.R_DO, object.p_DO, object.scale);
+  std::array<const IntoModel*, W> all;
+  all.fill(&into);
+  LocalPacket<W> local;
+  local.valid.fill(0);
+  for_each_lane(arguments, [&](std::size_t lane) { local.valid[lane] = -1; });
+  for (std::size_t i = 0; i < W; ++i) lay(into, packet, i, local);
+  meet<W>(model, arguments->primID + 1, all, local, packet);
+  shorten(arguments, packet, tracer.slack_m);
+}
+
+template <int W>
+void ObjectTracer::Impl::meet_moving(const RTCIntersectFunctionNArguments* arguments) {
+  const auto& tracer = *static_cast<const Impl*>(arguments->geometryUserPtr);
+  auto& packet = *reinterpret_cast<ObjectQuery<W>*>(arguments->context)->packet;
+  const Stretch& stretch = tracer.stretches[arguments->primID];
+  const MovingObject& object = tracer.moving[stretch.object];
+  const ModelScene::Impl& model = tracer.model(object.model);
+  std::array<IntoModel, W> into;
+  std::array<const IntoModel*, W> all;
+  LocalPacket<W> local;
+  local.valid.fill(0);
+  for (std::size_t i = 0; i < W; ++i) lay(IntoModel{}, packet, i, local);
+  for_each_lane(arguments, [&](std::size_t lane) {
+    const nanoseconds time = packet.time[lane];
+    if (time < stretch.begin || stretch.end < time) return;
+    const Pose X_DO = tracer.pose(object, time);
+    into[lane] = into_model(X_DO.rotation, X_DO.translation_m, object.scale);
+    all[lane] = &into[lane];
+    local.valid[lane] = -1;
+    lay(into[lane], packet, lane, local);
+  });
+  const auto number = static_cast<std::uint32_t>(tracer.placed.size() + stretch.object + 1);
+  meet<W>(model, number, all, local, packet);
+  shorten(arguments, packet, tracer.slack_m);
+}
+
+template <int W>
+void ObjectTracer::Impl::trace_packet(std::span<const Ray> rays,
+                                      std::span<Hit> hits) const noexcept {
+  ObjectPacket<W> packet;
+  auto& out = packet.floats.ray;
+  bool any = false;
+  for (std::size_t i = 0; i < W; ++i) {
+    const Ray& ray = rays[std::min(i, rays.size() - 1)];
+    double begin_m = 0;
+    double end_m = i < rays.size() ? std::min(ray.far_m, hits[i].range_m) : -1.0;
+    packet.best_m[i] = end_m;
+    clip(ray.origin, ray.direction, box.low, box.high, begin_m, end_m);
+    packet.valid[i] = begin_m <= end_m ? -1 : 0;
+    if (packet.valid[i] == 0) begin_m = end_m = 0;
+    any |= packet.valid[i] != 0;
+    packet.enter_m[i] = begin_m;
+    packet.object[i] = ~0u;
+    packet.time[i] = ray.time;
+    packet.x_m[i] = ray.origin.x;
+    packet.y_m[i] = ray.origin.y;
+    packet.z_m[i] = ray.origin.z;
+    packet.dx[i] = ray.direction.x;
+    packet.dy[i] = ray.direction.y;
+    packet.dz[i] = ray.direction.z;
+    const glm::vec3 origin(ray.origin + ray.direction * begin_m - p_DC);
+    out.org_x[i] = origin.x;
+    out.org_y[i] = origin.y;
+    out.org_z[i] = origin.z;
+    out.dir_x[i] = static_cast<float>(ray.direction.x);
+    out.dir_y[i] = static_cast<float>(ray.direction.y);
+    out.dir_z[i] = static_cast<float>(ray.direction.z);
+    out.tnear[i] = 0;
+    out.tfar[i] = far_float(end_m - begin_m, slack_m);
+    out.time[i] = 0;
+    out.mask[i] = ~0u;
+    out.id[i] = static_cast<unsigned>(i);
+    out.flags[i] = 0;
+    packet.floats.hit.geomID[i] = RTC_INVALID_GEOMETRY_ID;
+    packet.floats.hit.instID[0][i] = RTC_INVALID_GEOMETRY_ID;
+  }
+  if (!any) return;
+  ObjectQuery<W> query{{}, &packet};
+  intersect<W>(scene, packet.valid.data(), packet.floats, query.context, Coherence::Coherent);
+  for (std::size_t i = 0; i < rays.size(); ++i) {
+    if (packet.object[i] == ~0u) continue;
+    hits[i] = {packet.best_m[i], packet.normal[i], 0, packet.triangle[i], packet.object[i]};
+  }
+}
+
+template <int W>
+void ObjectTracer::Impl::trace(std::span<const Ray> rays, std::span<Hit> hits) const noexcept {
+  for (std::size_t begin = 0; begin < rays.size(); begin += W) {
+    const std::size_t count = std::min<std::size_t>(W, rays.size() - begin);
+    trace_packet<W>(rays.subspan(begin, count), hits.subspan(begin, count));
+  }
+}
+
+ObjectTracer::ObjectTracer(const RayDevice& device, std::vector<ModelScene> models,
+                           std::vector<PlacedObject> placed, std::vector<MovingObject> moving)
+    : impl_(std::make_shared<Impl>(device, std::move(models), std::move(placed),
+                                   std::move(moving))) {}
+
+void ObjectTracer::trace(std::span<const Ray> rays, std::span<Hit> hits) const noexcept {
+  if (size() == 0) return;
+  const FlushDenormals flush;
+  const int width = impl_->device.impl().width;
+  if (width == 16) return impl_->trace<16>(rays, hits);
+  if (width == 8) return impl_->trace<8>(rays, hits);
+  impl_->trace<4>(rays, hits);
+}
+
+std::size_t ObjectTracer::size() const noexcept {
+  return impl_ == nullptr ? 0 : impl_->placed.size() + impl_->moving.size();
+}
+
+std::uint32_t ObjectTracer::model_of(std::uint32_t object) const noexcept {
+  const std::size_t index = object - 1;
+  return index < impl_->placed.size() ? impl_->placed[index].model
+                                      : impl_->moving[index - impl_->placed.size()].model;
+}
+
+std::span<const ModelScene> ObjectTracer::models() const noexcept {
+  if (impl_ == nullptr) return {};
+  return impl_->models;
+}
+
+glm::dvec3 ObjectTracer::velocity_m_s(std::uint32_t object, const glm::dvec3& p_DQ,
+                                      nanoseconds time) const noexcept {
+  const std::size_t index = object - 1;
+  if (index < impl_->placed.size()) return glm::dvec3(0);
+  const Trajectory& X_DO = impl_->moving[index - impl_->placed.size()].X_DO;
+  if (time < X_DO.begin_time() || X_DO.end_time() < time) return glm::dvec3(0);
+  const auto [linear_m_s, angular_rad_s] = X_DO.velocity_at(time);
+  return linear_m_s + glm::cross(angular_rad_s, p_DQ - X_DO.pose_at(time).translation_m);
+}
+
+}  // namespace groundray

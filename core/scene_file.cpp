@@ -1,0 +1,252 @@
+#include "core/scene_file.h"
+
+#include <assimp/BaseImporter.h>
+#include <assimp/GltfMaterial.h>
+#include <assimp/config.h>
+#include <assimp/importerdesc.h>
+#include <assimp/material.h>
+#include <assimp/scene.h>
+
+#include <algorithm>
+#include <assimp/Importer.hpp>
+#include <cmath>
+#include <cstdint>
+#include <exception>
+#include <glm/common.hpp>
+#include <glm/geometric.hpp>
+#include <glm/mat3x3.hpp>
+#include <glm/mat4x4.hpp>
+#include <initializer_list>
+#include <limits>
+#include <memory>
+#include <string>
+#include <string_view>
+#include <utility>
+#include <vector>
+
+#include "core/error.h"
+#include "core/image_io.h"
+
+namespace groundray {
+namespace {
+
+using Surface = PolygonSoup::Surface;
+
+/// Adds what assimp read to a soup. Whatever its indices say, nothing beyond an array is touched.
+class SceneReader {
+ public:
+  SceneReader(const aiScene& scene, SceneForm form, const std::string& name)
+      : scene_(scene),
+        form_(form),
+        name_(name),
+        surfaces_(scene.mNumMaterials + std::size_t{1}, PolygonSoup::none) {}
+
+  PolygonSoup read() && {
+    for (unsigned i = 0; i < scene_.mNumMeshes; ++i) {
+      const aiMesh& mesh = *scene_.mMeshes[i];
+      soup_.faces += static_cast<std::size_t>(
+          std::count_if(mesh.mFaces, mesh.mFaces + mesh.mNumFaces,
+                        [](const aiFace& face) { return face.mNumIndices > 2; }));
+    }
+    if (scene_.mRootNode != nullptr) add(*scene_.mRootNode, glm::dmat4(1), glm::dmat4(1), 1);
+    return std::move(soup_);
+  }
+
+ private:
+  /// @param M_FA       from the node's parent to the file's frame.
+  /// @param size       the product of the same matrices with all their numbers positive.
+  /// @param roundings  how many floats were multiplied: with `size` a bound of what they lost.
+  void add(const aiNode& node, const glm::dmat4& M_FA, const glm::dmat4& size, int roundings) {
+    glm::dmat4 own, own_size;
+    for (int row = 0; row < 4; ++row) {
+      for (int column = 0; column < 4; ++column) {
+        const auto value = static_cast<double>(
+            node.mTransformation[static_cast<unsigned>(row)][static_cast<unsigned>(column)]);
+        own[column][row] = value;
+        own_size[column][row] = std::abs(value);
+      }
+    }
+    const glm::dmat4 M_FN = M_FA * own, node_size = size * own_size;
+    if (own != glm::dmat4(1)) ++roundings;
+    for (unsigned i = 0; i < node.mNumMeshes; ++i) {
+      if (node.mMeshes[i] >= scene_.mNumMeshes) continue;
+      add(*scene_.mMeshes[node.mMeshes[i]], M_FN, node_size, roundings);
+    }
+    for (unsigned i = 0; i < node.mNumChildren; ++i) {
+      add(*node.mChildren[i], M_FN, node_size, roundings);
+    }
+  }
+
+  void add(const aiMesh& mesh, const glm::dmat4& M_FN, const glm::dmat4& size, int roundings) {
+    const std::uint32_t surface = surface_of(mesh.mMaterialIndex);
+    const aiVector3D* const uv = mesh.mTextureCoords[uv_channels_[surface]];
+    const glm::dmat3 linear(M_FN);
+    // glTF asks for mirrored nodes to be turned over, so that outside stays outside.
+    const bool is_mirrored = glm::determinant(linear) < 0;
+    const glm::dmat3 for_normals =
+        (is_mirrored ? -1.0 : 1.0) * glm::dmat3(glm::cross(linear[1], linear[2]),
+                                                glm::cross(linear[2], linear[0]),
+                                                glm::cross(linear[0], linear[1]));
+    // Those of STL are of the facets.
+    const aiVector3D* const normals = form_ == SceneForm::Stl ? nullptr : mesh.mNormals;
+    const PolygonSoup::Corner none;
+    const PolygonSoup::Corner first{
+        static_cast<std::uint32_t>(soup_.positions.size()),
+        uv != nullptr ? static_cast<std::uint32_t>(soup_.uv.size()) : none.uv,
+        normals != nullptr ? static_cast<std::uint32_t>(soup_.normals.size()) : none.normal};
+    for (unsigned i = 0; i < mesh.mNumVertices; ++i) {
+      add_position(vector_of(mesh.mVertices[i]), M_FN, size, roundings);
+      if (uv != nullptr) soup_.uv.emplace_back(uv[i].x, uv[i].y);
+      if (normals != nullptr) soup_.normals.emplace_back(for_normals * vector_of(normals[i]));
+    }
+    for (unsigned i = 0; i < mesh.mNumFaces; ++i) {
+      const aiFace& face = mesh.mFaces[i];
+      if (face.mNumIndices < 3) {
+        soup_.skipped += face.mNumIndices > 0 ? 1 : 0;
+        continue;
+      }
+      soup_.polygons.push_back({soup_.corners.size(), face.mNumIndices, surface});
+      for (unsigned k = 0; k < face.mNumIndices; ++k) {
+        const unsigned at = face.mIndices[is_mirrored ? face.mNumIndices - 1 - k : k];
+        PolygonSoup::Corner corner;
+        if (at < mesh.mNumVertices) {
+          corner.position = first.position + at;
+          if (uv != nullptr) corner.uv = first.uv + at;
+          if (normals != nullptr) corner.normal = first.normal + at;
+        }
+        soup_.corners.push_back(corner);
+      }
+    }
+  }
+
+  void add_position(const glm::dvec3& p_NQ, const glm::dmat4& M_FN, const glm::dmat4& size,
+                    int roundings) {
+    constexpr double half_ulp = std::numeric_limits<float>::epsilon() / 2.0;
+    const glm::dvec4 p(p_NQ, 1);
+    soup_.positions.emplace_back(M_FN * p);
+    const glm::dvec4 lost = size * glm::abs(p) * (half_ulp * roundings);
+    const double most = std::max({lost.x, lost.y, lost.z});
+    if (std::isfinite(most)) soup_.rounding = std::max(soup_.rounding, most);
+  }
+
+  static glm::dvec3 vector_of(const aiVector3D& v) { return {v.x, v.y, v.z}; }
+
+  /// Returns the number of the surface in the soup, of a mesh with this material.
+  std::uint32_t surface_of(unsigned material) {
+    auto& number = surfaces_[std::min(material, scene_.mNumMaterials)];
+    if (number == PolygonSoup::none) {
+      number = static_cast<std::uint32_t>(soup_.surfaces.size());
+      uv_channels_.push_back(0);
+      soup_.surfaces.push_back({.looks = {.name = "default"}});
+      if (material < scene_.mNumMaterials) read(*scene_.mMaterials[material]);
+    }
+    return number;
+  }
+
+  void read(const aiMaterial& material) {
+    Surface& surface = soup_.surfaces.back();
+    const auto image = [&](std::initializer_list<aiTextureType> types, ModelImage& pixels) {
+      return this->image(material, types, pixels);
+    };
+    surface.normal = image({aiTextureType_NORMALS, aiTextureType_HEIGHT}, surface.looks.normal);
+    surface.opacity = image({aiTextureType_OPACITY}, surface.looks.opacity);
+    // Last, for its uv are the surface's.
+    surface.albedo = image({aiTextureType_BASE_COLOR, aiTextureType_DIFFUSE}, surface.looks.albedo);
+    // Names and colours are assimp's own invention where the form has no materials.
+    if (form_ != SceneForm::Gltf && form_ != SceneForm::Collada) return;
+    surface.looks.name = material.GetName().C_Str();
+    aiColor4D color(1, 1, 1, 1);
+    if (form_ == SceneForm::Gltf) {
+      if (material.Get(AI_MATKEY_BASE_COLOR, color) != AI_SUCCESS) {
+        material.Get(AI_MATKEY_COLOR_DIFFUSE, color);
+      }
+      surface.looks.color = {color.r, color.g, color.b};
+      surface.looks.least_alpha = least_alpha(material, color.a);
+      return;
+    }
+    // Collada has a map in place of the colour.
+    if (surface.albedo.empty() && material.Get(AI_MATKEY_COLOR_DIFFUSE, color) == AI_SUCCESS) {
+      surface.looks.color = linear_color({color.r, color.g, color.b});
+    }
+  }
+
+  /// glTF's alpha is the map's times the factor's.
+  static float least_alpha(const aiMaterial& material, float factor) {
+    aiString mode("OPAQUE");
+    material.Get(AI_MATKEY_GLTF_ALPHAMODE, mode);
+    if (std::string_view(mode.C_Str()) == "BLEND") return 0.5f;
+    if (std::string_view(mode.C_Str()) != "MASK") return 0;
+    float cutoff = 0.5f;
+    material.Get(AI_MATKEY_GLTF_ALPHACUTOFF, cutoff);
+    return cutoff / std::max(factor, std::numeric_limits<float>::min());
+  }
+
+  /// Returns the name of the first image that there is of these types, or decodes it and returns
+  /// none if it came with the model.
+  std::string image(const aiMaterial& material, std::initializer_list<aiTextureType> types,
+                    ModelImage& pixels) {
+    for (const aiTextureType type : types) {
+      aiString name;
+      unsigned channel = 0;
+      if (material.GetTexture(type, 0, &name, nullptr, &channel) != AI_SUCCESS) continue;
+      if (name.length == 0) continue;
+      if (channel < AI_MAX_NUMBER_OF_TEXTURECOORDS) uv_channels_.back() = channel;
+      const aiTexture* const embedded = scene_.GetEmbeddedTexture(name.C_Str());
+      if (embedded == nullptr) return name.C_Str();
+      if (embedded->mHeight != 0)
+        throw Error("{}: image {} is not compressed", name_, name.C_Str());
+      pixels.pixels =
+          parse_image8({reinterpret_cast<const char*>(embedded->pcData), embedded->mWidth},
+                       name_ + ", image " + name.C_Str());
+      return {};
+    }
+    return {};
+  }
+
+  const aiScene& scene_;
+  const SceneForm form_;
+  const std::string& name_;
+  PolygonSoup soup_;
+  std::vector<std::uint32_t> surfaces_;  // of materials; the last of those without
+  std::vector<unsigned> uv_channels_;    // of surfaces
+};
+
+/// Leaves the importer but the one reader that the form asks for: a file is not to be guessed at.
+void keep_only(Assimp::Importer& importer, std::string_view reader) {
+  for (std::size_t i = importer.GetImporterCount(); i-- > 0;) {
+    if (reader == importer.GetImporterInfo(i)->mName) continue;
+    const std::unique_ptr<Assimp::BaseImporter> ours_then(importer.GetImporter(i));
+    importer.UnregisterLoader(ours_then.get());
+  }
+}
+
+std::string_view reader_of(SceneForm form) {
+  switch (form) {
+    case SceneForm::Stl:
+      return "Stereolithography (STL) Importer";
+    case SceneForm::Gltf:
+      return "glTF2 Importer";
+    default:
+      return "Collada Importer";
+  }
+}
+
+}  // namespace
+
+PolygonSoup read_scene_file(const std::filesystem::path& path, SceneForm form) {
+  const std::string name = path.string();
+  try {
+    Assimp::Importer importer;
+    keep_only(importer, reader_of(form));
+    importer.SetPropertyInteger(AI_CONFIG_IMPORT_COLLADA_IGNORE_UP_DIRECTION, 1);
+    const aiScene* const scene = importer.ReadFile(name, 0);
+    if (scene == nullptr) throw Error("{}: {}", name, importer.GetErrorString());
+    return SceneReader(*scene, form, name).read();
+  } catch (const Error&) {
+    throw;
+  } catch (const std::exception& fault) {
+    throw Error("{}: assimp cannot read it: {}", name, fault.what());
+  }
+}
+
+}  // namespace groundray

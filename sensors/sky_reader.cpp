@@ -1,0 +1,183 @@
+#include "sensors/sky_reader.h"
+
+#include <array>
+#include <chrono>
+#include <optional>
+#include <string>
+#include <string_view>
+#include <utility>
+
+#include "core/error.h"
+#include "sensors/pattern_reader.h"
+
+namespace groundray {
+namespace {
+
+namespace fs = std::filesystem;
+using yaml::Faults;
+using yaml::Map;
+using yaml::Need;
+using yaml::Node;
+using yaml::not_negative;
+using yaml::positive;
+using yaml::Rule;
+using Time = std::chrono::sys_time<std::chrono::milliseconds>;
+
+constexpr Rule share_rule{[](double value) { return value >= 0 && value <= 1; },
+                          "must be from 0 to 1"};
+
+// One number for all channels, or three.
+void read_rgb(Map& map, std::string_view key, Need need, Rule rule, Faults& faults,
+              glm::dvec3& into) {
+  const Node* node = map.find(key, need);
+  if (!node) return;
+  std::array<double, 3> rgb{};
+  if (node->kind != Node::Kind::List) {
+    if (const auto value = yaml::number(*node, key, rule, faults)) into = glm::dvec3(*value);
+  } else if (yaml::numbers(*node, key, rgb, rule, faults)) {
+    into = {rgb[0], rgb[1], rgb[2]};
+  }
+}
+
+ConstantSky read_constant(Map map, Faults& faults) {
+  ConstantSky sky;
+  read_rgb(map, "radiance_w_m2_sr", Need::Required, not_negative, faults, sky.radiance);
+  map.close();
+  return sky;
+}
+
+EnvironmentImage read_environment(Map map, const fs::path& path, Faults& faults) {
+  EnvironmentImage sky;
+  std::string image;
+  if (map.read_text("image", Need::Required, image)) sky.image = beside(path, image);
+  map.read_number("center_azimuth_deg", Need::Optional, sky.center_azimuth_deg);
+  double factor = 1, lux = 0;
+  const bool has_factor = map.find("radiance_factor", Need::Optional) != nullptr;
+  if (map.read_number("radiance_factor", Need::Optional, factor, positive))
+    sky.scale = RadianceScale{factor};
+  if (const Node* at = map.read_number("illuminance_lux", Need::Optional, lux, positive)) {
+    sky.scale = IlluminanceScale{lux};
+    if (has_factor)
+      faults.add(*at, "illuminance_lux", "and radiance_factor both scale the image: give one");
+  }
+  map.close();
+  return sky;
+}
+
+AnalyticSky read_analytic(Map map, Faults& faults) {
+  AnalyticSky sky;
+  read_rgb(map, "ground_albedo", Need::Optional, share_rule, faults, sky.ground_albedo);
+  map.close();
+  return sky;
+}
+
+// Returns the whole number that `digits` digits spell at the front of a text, and takes them away.
+std::optional<int> take_digits(std::string_view& text, std::size_t digits) {
+  if (text.size() < digits) return std::nullopt;
+  int value = 0;
+  for (const char c : text.substr(0, digits)) {
+    if (c < '0' || c > '9') return std::nullopt;
+    value = 10 * value + (c - '0');
+  }
+  text.remove_prefix(digits);
+  return value;
+}
+
+// Returns the time that "2003-10-17T19:30:30Z" spells, whole seconds; ISO 8601.
+std::optional<Time> parse_utc(std::string_view text) {
+  using namespace std::chrono;
+  std::array<int, 6> parts{};
+  constexpr std::string_view separators = "--T::Z";
+  for (std::size_t i = 0; i < parts.size(); ++i) {
+    const auto part = take_digits(text, i == 0 ? 4 : 2);
+    if (!part || text.empty() || text[0] != separators[i]) return std::nullopt;
+    parts[i] = *part;
+    text.remove_prefix(1);
+  }
+  const year_month_day date{year{parts[0]}, month{static_cast<unsigned>(parts[1])},
+                            day{static_cast<unsigned>(parts[2])}};
+  if (!text.empty() || !date.ok() || parts[3] > 23 || parts[4] > 59 || parts[5] > 59)
+    return std::nullopt;
+  return sys_days(date) + hours(parts[3]) + minutes(parts[4]) + seconds(parts[5]);
+}
+
+SunTime read_time(Map& map, Faults& faults) {
+  SunTime sun;
+  std::string text;
+  if (const Node* at = map.read_text("utc", Need::Required, text)) {
+    if (const auto utc = parse_utc(text)) {
+      sun.utc = *utc;
+    } else {
+      faults.add(*at, "utc", "is {}, but must be a time like 2026-06-21T10:30:00Z",
+                 yaml::shown(*at));
+    }
+  }
+  map.read_number("latitude_deg", Need::Required, sun.latitude_deg);
+  map.read_number("longitude_deg", Need::Required, sun.longitude_deg);
+  map.read_number("temperature_c", Need::Optional, sun.temperature_c);
+  return sun;
+}
+
+SunSpec read_sun(Map map, Faults& faults) {
+  SunSpec spec;
+  const bool timed = map.find("utc", Need::Optional) != nullptr;
+  const bool fixed = map.find("elevation_deg", Need::Optional) != nullptr;
+  if (timed == fixed && map.node().kind == Node::Kind::Map) {
+    faults.add(map.node(), "sun",
+               "must have either 'utc', 'latitude_deg' and 'longitude_deg', or 'azimuth_deg' and "
+               "'elevation_deg'");
+  }
+  if (timed) {
+    spec.position = read_time(map, faults);
+  } else {
+    SunAngles sun;
+    map.read_number("azimuth_deg", fixed ? Need::Required : Need::Optional, sun.azimuth_deg);
+    map.read_number("elevation_deg", Need::Optional, sun.elevation_deg);
+    map.read_number("distance_au", Need::Optional, sun.distance_au);
+    spec.position = sun;
+  }
+  map.read_choice<SunDisc>(
+      "disc", Need::Optional, spec.disc,
+      {{"uniform", SunDisc::Uniform}, {"limb_darkened", SunDisc::LimbDarkened}});
+  map.close();
+  return spec;
+}
+
+// What no key alone can tell: whether the sun and the sky can be built.
+void check_sky(const SkySpec& spec, const Node& node, Faults& faults) {
+  SkySpec without_image = spec;
+  if (std::holds_alternative<EnvironmentImage>(spec.dome)) without_image.dome = ConstantSky{};
+  try {
+    const Sky works(without_image);
+  } catch (const Error& fault) {
+    faults.add(node, "sky", "cannot be: {}", fault.what());
+  }
+}
+
+}  // namespace
+
+SkySpec read_sky(Map map, const fs::path& path, Faults& faults) {
+  const std::size_t faults_before = faults.count();
+  SkySpec spec;
+  auto constant = map.map("constant", Need::Optional);
+  auto environment = map.map("environment", Need::Optional);
+  auto analytic = map.map("analytic", Need::Optional);
+  if (constant.has_value() + environment.has_value() + analytic.has_value() > 1) {
+    faults.add(map.node(), "sky",
+               "must have at most one of 'constant', 'environment' and 'analytic'");
+  }
+  if (constant) spec.dome = read_constant(std::move(*constant), faults);
+  if (environment) spec.dome = read_environment(std::move(*environment), path, faults);
+  if (analytic) spec.dome = read_analytic(std::move(*analytic), faults);
+  if (auto sun = map.map("sun", Need::Optional)) spec.sun = read_sun(std::move(*sun), faults);
+  map.read_number("turbidity", Need::Optional, spec.air.turbidity, positive);
+  map.read_number("water_cm", Need::Optional, spec.air.water_cm, not_negative);
+  map.read_number("ozone_cm", Need::Optional, spec.air.ozone_cm, not_negative);
+  map.read_number("pressure_hpa", Need::Optional, spec.air.pressure_hpa, positive);
+  const Node& node = map.node();
+  map.close();
+  if (faults.count() == faults_before) check_sky(spec, node, faults);
+  return spec;
+}
+
+}  // namespace groundray

@@ -1,0 +1,32 @@
+#pragma once
+
+#include <optional>
+
+#include "core/model.h"
+#include "terrain/asset_random.h"
+
+namespace groundray {
+
+// The makers of each family: sizes as AssetSpec has them, all valid.
+
+Model make_rock(double size_m, double detail, AssetRandom random);
+Model make_stone(double size_m, double detail, AssetRandom random);
+Model make_sphere_target(double diameter_m, double detail);
+
+Model make_grass_tuft(double height_m, double detail, AssetRandom random);
+Model make_shrub(double height_m, double leaf_area_index, double detail, AssetRandom random);
+Model make_conifer(double height_m, double leaf_area_index, double detail, AssetRandom random);
+Model make_broadleaf_tree(double height_m, double leaf_area_index, double detail,
+                          AssetRandom random);
+
+Model make_fence_post(double height_m, double diameter_m, double detail);
+Model make_person_cylinder(double height_m, double diameter_m, double detail);
+Model make_wire(double span_m, double sag_m, double diameter_m, double detail);
+Model make_calibration_board(double width_m, double height_m, std::optional<double> square_m);
+
+Model make_vehicle(double length_m);
+
+/// Returns how many squares of a side lie along a length, or nothing if they do not fill it.
+std::optional<int> squares_along(double length_m, double square_m);
+
+}  // namespace groundray

@@ -1,0 +1,384 @@
+#include "core/object_tracer.h"
+
+#include <gmock/gmock.h>
+#include <gtest/gtest.h>
+
+#include <array>
+#include <cmath>
+#include <glm/geometric.hpp>
+#include <numbers>
+#include <random>
+
+#include "core/error.h"
+#include "test/support/solid.h"
+
+namespace groundray {
+namespace {
+
+using std::chrono::milliseconds;
+using std::chrono::nanoseconds;
+using ::testing::AllOf;
+using testing::box_model;
+using ::testing::HasSubstr;
+using testing::icosphere;
+
+constexpr double infinity = std::numeric_limits<double>::infinity();
+// What ranges promise.
+double tolerance_m(double range_m) { return 1e-9 * range_m + 1e-9; }
+
+glm::dvec3 random_direction(std::mt19937_64& random) {
+  std::normal_distribution<double> normal;
+  return glm::normalize(glm::dvec3(normal(random), normal(random), normal(random)));
+}
+
+Pose random_pose(std::mt19937_64& random, double reach_m) {
+  std::uniform_real_distribution<double> place(-reach_m, reach_m);
+  std::normal_distribution<double> normal;
+  return {
+      glm::normalize(glm::dquat(normal(random), normal(random), normal(random), normal(random))),
+      {place(random), place(random), place(random)}};
+}
+
+std::vector<Hit> trace(const ObjectTracer& tracer, std::span<const Ray> rays) {
+  std::vector<Hit> hits(rays.size());
+  tracer.trace(rays, hits);
+  return hits;
+}
+
+// The range of a solid that is the intersection of the half-spaces n . p <= d of O; convex, so a
+// line is inside between the last entry and the first exit.
+struct Slab {
+  glm::dvec3 n;
+  double d;
+};
+double convex_range_m(std::span<const Slab> slabs, const glm::dvec3& origin,
+                      const glm::dvec3& direction) {
+  double enter = 0, leave = infinity;
+  for (const Slab& slab : slabs) {
+    const double closing = glm::dot(slab.n, direction);
+    const double range = (slab.d - glm::dot(slab.n, origin)) / closing;
+    if (closing < 0) enter = std::max(enter, range);
+    if (closing > 0) leave = std::min(leave, range);
+    if (closing == 0 && glm::dot(slab.n, origin) > slab.d) return infinity;
+  }
+  return enter <= leave ? enter : infinity;
+}
+
+std::vector<Ray> rays_at(const glm::dvec3& target, double spread_m, double far_m, int count,
+                         std::mt19937_64& random) {
+  std::vector<Ray> rays;
+  std::uniform_real_distribution<double> off(-spread_m, spread_m);
+  std::uniform_real_distribution<double> distance(0.1 * far_m, far_m);
+  while (static_cast<int>(rays.size()) < count) {
+    const glm::dvec3 origin = target + random_direction(random) * distance(random);
+    const glm::dvec3 at = target + glm::dvec3(off(random), off(random), off(random));
+    rays.push_back({origin, glm::normalize(at - origin)});
+  }
+  return rays;
+}
+
+class ObjectTracing : public ::testing::TestWithParam<Tracing> {
+ protected:
+  RayDevice device_;
+};
+INSTANTIATE_TEST_SUITE_P(Modes, ObjectTracing, ::testing::Values(Tracing::Fast, Tracing::Exact),
+                         [](const auto& mode) {
+                           return mode.param == Tracing::Fast ? "Fast" : "Exact";
+                         });
+
+// D may lie far from what is looked at: coordinates of UTM's size leave 1e-9 m of a double, so
+// ranges are within some of these.
+TEST_P(ObjectTracing, TurnedAndScaledBoxesAreMetWhereTheirPlanesAre) {
+  std::mt19937_64 random(1);
+  const ModelScene box(device_, box_model({2, 1, 0.5}), GetParam());
+  const std::array<Slab, 6> slabs{{{{1, 0, 0}, 1},
+                                   {{-1, 0, 0}, 1},
+                                   {{0, 1, 0}, 0.5},
+                                   {{0, -1, 0}, 0.5},
+                                   {{0, 0, 1}, 0.25},
+                                   {{0, 0, -1}, 0.25}}};
+  for (const double reach_m : {0.0, 1e4, 5e6}) {
+    for (int turn = 0; turn < 10; ++turn) {
+      const Pose X_DO = random_pose(random, reach_m);
+      const double scale = turn % 2 == 0 ? 1 : 3.7;
+      const ObjectTracer tracer(device_, {box}, {{X_DO.translation_m, X_DO.rotation, scale, 0}},
+                                {});
+      const auto rays = rays_at(X_DO.translation_m, 2 * scale, 300, 500, random);
+      const auto hits = trace(tracer, rays);
+      const double rounding_m = 4 * 0x1p-53 * reach_m;
+      int met = 0;
+      for (std::size_t i = 0; i < rays.size(); ++i) {
+        const Pose X_OD = inverse(X_DO);
+        const double expected_m = convex_range_m(slabs, X_OD * rays[i].origin / scale,
+                                                 X_OD.rotation * rays[i].direction / scale);
+        ASSERT_EQ(hits[i].range_m < infinity, expected_m < infinity);
+        if (!hits[i]) continue;
+        ++met;
+        ASSERT_NEAR(hits[i].range_m, expected_m, tolerance_m(expected_m) + 10 * rounding_m);
+        EXPECT_LT(glm::dot(glm::dvec3(hits[i].normal), rays[i].direction), 0);
+        EXPECT_EQ(hits[i].object, 1u);
+      }
+      EXPECT_GT(met, 50);
+    }
+  }
+}
+
+// A tube of many sides: the planes of its sides and lids are its closed form.
+TEST_P(ObjectTracing, CylindersAreMetWhereTheirPlanesAre) {
+  std::mt19937_64 random(2);
+  constexpr int sides = 60;
+  const ModelScene tube(device_, testing::cylinder(0.25, 1.75, sides), GetParam());
+  std::vector<Slab> slabs{{{0, 0, 1}, 1.75}, {{0, 0, -1}, 0}};
+  for (int k = 0; k < sides; ++k) {
+    const double angle_rad = 2 * std::numbers::pi * (k + 0.5) / sides;
+    slabs.push_back(
+        {{std::cos(angle_rad), std::sin(angle_rad), 0}, 0.25 * std::cos(std::numbers::pi / sides)});
+  }
+  const Pose X_DO = random_pose(random, 2e4);
+  const ObjectTracer tracer(device_, {tube}, {{X_DO.translation_m, X_DO.rotation, 1, 0}}, {});
+  const auto rays = rays_at(X_DO * glm::dvec3(0, 0, 0.9), 0.8, 120, 20000, random);
+  const auto hits = trace(tracer, rays);
+  const Pose X_OD = inverse(X_DO);
+  for (std::size_t i = 0; i < rays.size(); ++i) {
+    const double expected_m =
+        convex_range_m(slabs, X_OD * rays[i].origin, X_OD.rotation * rays[i].direction);
+    ASSERT_EQ(hits[i].range_m < infinity, expected_m < infinity) << i;
+    if (!hits[i]) continue;
+    ASSERT_NEAR(hits[i].range_m, expected_m, tolerance_m(expected_m));
+  }
+}
+
+// Brute force in double: all triangles of all objects, moved to D.
+struct Nearest {
+  double range_m = infinity;
+  std::uint32_t object = 0;
+};
+Nearest nearest_of(std::span<const ModelScene> models, std::span<const PlacedObject> objects,
+                   const Ray& ray) {
+  Nearest best;
+  for (std::uint32_t n = 0; n < objects.size(); ++n) {
+    const PlacedObject& object = objects[n];
+    const TriangleMesh& mesh = models[object.model].model().mesh;
+    const auto at = [&](std::uint32_t vertex) {
+      return object.p_DO + object.R_DO * (object.scale * mesh.vertices_m[vertex]) - ray.origin;
+    };
+    for (const glm::uvec3& corners : mesh.triangles) {
+      const glm::dvec3 a = at(corners.x), b = at(corners.y), c = at(corners.z);
+      const glm::dvec3 normal = glm::cross(b - a, c - a);
+      const double range_m = glm::dot(normal, a) / glm::dot(normal, ray.direction);
+      if (!(range_m >= 0 && range_m < best.range_m)) continue;
+      const glm::dvec3 p = range_m * ray.direction;
+      const bool inside = glm::dot(glm::cross(b - a, p - a), normal) >= 0 &&
+                          glm::dot(glm::cross(c - b, p - b), normal) >= 0 &&
+                          glm::dot(glm::cross(a - c, p - c), normal) >= 0;
+      if (inside) best = {range_m, n + 1};
+    }
+  }
+  return best;
+}
+
+std::vector<PlacedObject> crowd(std::size_t count, std::size_t models, std::mt19937_64& random) {
+  std::vector<PlacedObject> objects;
+  std::uniform_real_distribution<double> scale(0.3, 3);
+  for (std::size_t i = 0; i < count; ++i) {
+    const Pose X_DO = random_pose(random, 15);
+    objects.push_back(
+        {X_DO.translation_m, X_DO.rotation, scale(random), static_cast<std::uint32_t>(i % models)});
+  }
+  return objects;
+}
+
+TEST_P(ObjectTracing, OfManyObjectsThatOverlapTheNearestIsMet) {
+  std::mt19937_64 random(3);
+  const std::vector<ModelScene> models{{device_, box_model({1, 1, 1}), GetParam()},
+                                       {device_, icosphere(0.7, 1), GetParam()}};
+  const auto objects = crowd(60, 2, random);
+  const ObjectTracer tracer(device_, models, objects, {});
+  const auto rays = rays_at(glm::dvec3(0), 15, 40, 3000, random);
+  const auto hits = trace(tracer, rays);
+  int otherwise = 0;
+  for (std::size_t i = 0; i < rays.size(); ++i) {
+    const Nearest expected = nearest_of(models, objects, rays[i]);
+    const bool same =
+        std::abs(hits[i].range_m - expected.range_m) <= tolerance_m(expected.range_m) ||
+        (!hits[i] && expected.range_m == infinity);
+    otherwise += same ? 0 : 1;
+    EXPECT_EQ(hits[i].object, same ? expected.object : 0);
+  }
+  EXPECT_EQ(otherwise, 0);
+}
+
+// A closed surface lets no ray pass: what starts inside meets it.
+TEST_P(ObjectTracing, NoRayLeaksThroughVerticesAndEdges) {
+  std::mt19937_64 random(4);
+  const Model sphere = icosphere(1, 3);
+  const ModelScene scene(device_, sphere, GetParam());
+  const Pose X_DO = random_pose(random, 3000);
+  const ObjectTracer tracer(device_, {scene}, {{X_DO.translation_m, X_DO.rotation, 2, 0}}, {});
+  std::vector<Ray> rays;
+  for (const glm::uvec3& corners : sphere.mesh.triangles) {
+    const glm::dvec3 a = sphere.mesh.vertices_m[corners.x], b = sphere.mesh.vertices_m[corners.y];
+    for (const glm::dvec3& at : {a, 0.5 * (a + b), 0.3 * a + 0.7 * b}) {
+      const glm::dvec3 target = X_DO * (2.0 * at);
+      const glm::dvec3 inside = X_DO * (0.8 * random_direction(random));
+      const glm::dvec3 outside = X_DO * (random_direction(random) * 0.2 + at * 60.0);
+      rays.push_back({inside, glm::normalize(target - inside)});
+      rays.push_back({outside, glm::normalize(target - outside)});
+    }
+  }
+  const auto hits = trace(tracer, rays);
+  for (std::size_t i = 0; i < rays.size(); ++i) {
+    ASSERT_TRUE(hits[i]) << i;
+    const double from_centre_m =
+        glm::distance(rays[i].origin + hits[i].range_m * rays[i].direction, X_DO.translation_m);
+    // The facets of the mesh lie between the ball through their vertices and 1.2 % inside.
+    ASSERT_GT(from_centre_m, 2 * 0.985);
+    ASSERT_LT(from_centre_m, 2 * (1 + 1e-9));
+  }
+}
+
+TEST_P(ObjectTracing, AMovingObjectIsMetWhereItIsAtTheRaysTime) {
+  std::mt19937_64 random(5);
+  const ModelScene ball(device_, icosphere(0.5, 2), GetParam());
+  std::vector<Trajectory::Sample> samples;
+  for (int k = 0; k <= 10; ++k) {
+    Pose X_DO = random_pose(random, 2);
+    X_DO.translation_m += glm::dvec3(100 + 3 * k, -50 + k, 2);
+    samples.push_back({milliseconds(100 * k), X_DO});
+  }
+  const Trajectory X_DO(samples);
+  const ObjectTracer tracer(device_, {ball}, {}, {{X_DO, 1.5, 0}});
+  const std::vector<ModelScene> models{ball};
+  std::uniform_int_distribution<std::int64_t> when(-50'000'000, 1'050'000'000);
+  int met = 0;
+  for (int packet = 0; packet < 200; ++packet) {
+    std::vector<Ray> rays;
+    for (int k = 0; k < 16; ++k) {
+      const nanoseconds time(when(random));
+      const nanoseconds at = std::clamp(time, X_DO.begin_time(), X_DO.end_time());
+      Ray ray = rays_at(X_DO.pose_at(at).translation_m, 0.8, 80, 1, random)[0];
+      ray.time = time;
+      rays.push_back(ray);
+    }
+    const auto hits = trace(tracer, rays);
+    for (std::size_t i = 0; i < rays.size(); ++i) {
+      const Pose X = X_DO.pose_at(std::clamp(rays[i].time, X_DO.begin_time(), X_DO.end_time()));
+      const std::vector<PlacedObject> still{{X.translation_m, X.rotation, 1.5, 0}};
+      const Nearest expected = nearest_of(models, still, rays[i]);
+      ASSERT_EQ(hits[i].range_m < infinity, expected.range_m < infinity);
+      if (!hits[i]) continue;
+      ++met;
+      ASSERT_NEAR(hits[i].range_m, expected.range_m, tolerance_m(expected.range_m));
+    }
+  }
+  EXPECT_GT(met, 1000);
+}
+
+// The same bits, whatever the width of the packets: exact tracing decides everything in double.
+TEST(ObjectTracer, ExactTracingIsTheSameOnEveryInstructionSet) {
+  std::mt19937_64 random(6);
+  const auto objects = crowd(40, 2, random);
+  const auto rays = rays_at(glm::dvec3(0), 15, 40, 5000, random);
+  std::vector<Hit> first;
+  for (const char* isa : {"max_isa=sse4.2", "max_isa=avx", "max_isa=avx2"}) {
+    const RayDevice device(isa);
+    const ObjectTracer tracer(device,
+                              {{device, box_model({1, 1, 1}), Tracing::Exact},
+                               {device, icosphere(0.7, 1), Tracing::Exact}},
+                              objects, {});
+    const auto hits = trace(tracer, rays);
+    if (first.empty()) first = hits;
+    for (std::size_t i = 0; i < rays.size(); ++i) {
+      ASSERT_EQ(hits[i].range_m, first[i].range_m);
+      ASSERT_EQ(hits[i].object, first[i].object);
+      ASSERT_EQ(hits[i].part, first[i].part);
+      ASSERT_EQ(hits[i].normal, first[i].normal);
+    }
+  }
+}
+
+TEST(ObjectTracer, LeavesNearerHitsAndFarObjects) {
+  const RayDevice device;
+  const ObjectTracer tracer(device, {{device, box_model({1, 1, 1}), Tracing::Fast}}, {{{10, 0, 0}}},
+                            {});
+  const std::vector<Ray> rays{{{0, 0, 0}, {1, 0, 0}},
+                              {{0, 0, 0}, {1, 0, 0}},
+                              {{0, 0, 0}, {1, 0, 0}, 9.4},
+                              {{10, 0.1, 0.2}, {1, 0, 0}}};
+  std::vector<Hit> hits(4);
+  hits[1].range_m = 9;
+  tracer.trace(rays, hits);
+  EXPECT_EQ(hits[0].range_m, 9.5);
+  EXPECT_EQ(hits[0].normal, glm::vec3(-1, 0, 0));
+  EXPECT_EQ(hits[1].range_m, 9);
+  EXPECT_EQ(hits[1].object, 0u);
+  EXPECT_FALSE(hits[2]);
+  EXPECT_EQ(hits[3].range_m, 0.5);  // from within
+  EXPECT_EQ(hits[3].normal, glm::vec3(-1, 0, 0));
+}
+
+// Alpha in chequers of a quarter: a ray passes where the texel is clear.
+TEST_P(ObjectTracing, CutOutsLetRaysThroughWhereTheyAreClear) {
+  Model sheet;
+  sheet.mesh.vertices_m = {{0, 0, 0}, {1, 0, 0}, {1, 1, 0}, {0, 1, 0}};
+  sheet.mesh.triangles = {{0, 1, 2}, {0, 2, 3}};
+  sheet.uv = {{0, 0}, {1, 0}, {1, 1}, {0, 1}};
+  sheet.surface_of = {0, 0};
+  sheet.surfaces.resize(1);
+  Image8 pixels(4, 4, 4);
+  const auto is_clear = [](int x, int y) { return (x + y) % 2 == 1; };
+  for (int y = 0; y < 4; ++y) {
+    for (int x = 0; x < 4; ++x) pixels.at(x, y)[3] = is_clear(x, y) ? 0 : 255;
+  }
+  sheet.surfaces[0].albedo.pixels = pixels;
+  const ModelScene scene(device_, sheet, GetParam());
+  const ObjectTracer tracer(device_, {scene}, {{{0, 0, 5}}, {{0, 0, 4}}}, {});
+  std::vector<Ray> rays;
+  for (int y = 0; y < 4; ++y) {
+    // Texels' middles, from above; row 0 is the image's uppermost, where v is largest.
+    for (int x = 0; x < 4; ++x) rays.push_back({{(x + 0.5) / 4, (3.5 - y) / 4, 10}, {0, 0, -1}});
+  }
+  const auto hits = trace(tracer, rays);
+  for (int y = 0; y < 4; ++y) {
+    for (int x = 0; x < 4; ++x) {
+      const Hit& hit = hits[static_cast<std::size_t>(4 * y + x)];
+      EXPECT_EQ(static_cast<bool>(hit), !is_clear(x, y)) << x << ' ' << y;
+      EXPECT_EQ(hit.range_m, is_clear(x, y) ? infinity : 5);
+    }
+  }
+}
+
+TEST(ObjectTracer, PointsOfATurningObjectMoveAsTheirPositionsChange) {
+  const RayDevice device;
+  const Pose begin{{1, 0, 0, 0}, {5, 6, 7}};
+  const Pose end{rotation_from_yaw_pitch_roll(0.8, 0.1, -0.2), {6, 5, 7.5}};
+  const Trajectory X_DO({{milliseconds(0), begin}, {milliseconds(500), end}});
+  const ObjectTracer tracer(device, {{device, box_model({1, 1, 1}), Tracing::Fast}}, {{}},
+                            {{X_DO, 1, 0}});
+  const glm::dvec3 p_OQ(0.3, -0.4, 0.5);
+  const auto at = [&](int ms) { return X_DO.pose_at(milliseconds(ms)) * p_OQ; };
+  for (const int ms : {100, 250, 400}) {
+    // Central differences are off by h^2 / 6 of the third derivative: radius x rate^3.
+    const glm::dvec3 expected = (at(ms + 1) - at(ms - 1)) / 2e-3;
+    const glm::dvec3 velocity = tracer.velocity_m_s(2, at(ms), milliseconds(ms));
+    EXPECT_LT(glm::distance(velocity, expected), 1e-5);
+  }
+  EXPECT_EQ(tracer.velocity_m_s(1, at(0), milliseconds(0)), glm::dvec3(0));
+  EXPECT_EQ(tracer.velocity_m_s(2, at(500), milliseconds(900)), glm::dvec3(0));
+}
+
+TEST(ObjectTracer, ListsWhatIsWrongWithObjects) {
+  const RayDevice device;
+  const std::vector<ModelScene> models{{device, box_model({1, 1, 1}), Tracing::Fast}};
+  try {
+    ObjectTracer(device, models, {{.scale = 0}, {.model = 3}, {.p_DO = {NAN, 0, 0}}}, {});
+    FAIL();
+  } catch (const Error& error) {
+    EXPECT_THAT(error.what(), AllOf(HasSubstr("object 1: its scale = 0 must be positive"),
+                                    HasSubstr("object 2: model 3 is not there; there are 1"),
+                                    HasSubstr("object 3: its position must be finite")));
+  }
+}
+
+}  // namespace
+}  // namespace groundray
