@@ -528,6 +528,8 @@ std::size_t ObjectTracer::size() const noexcept {
   return impl_ == nullptr ? 0 : impl_->placed.size() + impl_->moving.size();
 }
 
+bool ObjectTracer::any_moves() const noexcept { return impl_ != nullptr && !impl_->moving.empty(); }
+
 std::uint32_t ObjectTracer::model_of(std::uint32_t object) const noexcept {
   const std::size_t index = object - 1;
   return index < impl_->placed.size() ? impl_->placed[index].model

@@ -65,6 +65,7 @@ class ObjectTracer {
   void trace(std::span<const Ray> rays, std::span<Hit> hits) const noexcept;
 
   std::size_t size() const noexcept;  ///< how many objects there are
+  bool any_moves() const noexcept;
   /// The model of an object that was hit, index among the models.
   std::uint32_t model_of(std::uint32_t object) const noexcept;
   std::span<const ModelScene> models() const noexcept;

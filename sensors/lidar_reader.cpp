@@ -81,7 +81,9 @@ void read_noise(Map map, LightSpec& light) {
   map.read_number("quantum_efficiency", Need::Optional, noise.quantum_efficiency, share_rule);
   map.read_number("excess_noise_factor", Need::Optional, noise.excess_noise_factor, at_least_one);
   map.read_number("false_alarm_rate_hz", Need::Optional, noise.false_alarm_rate_hz, not_negative);
-  map.read_number("sun_w_m2_nm", Need::Optional, light.sun.irradiance_w_m2_nm, not_negative);
+  double sun_w_m2_nm = 0;
+  if (map.read_number("sun_w_m2_nm", Need::Optional, sun_w_m2_nm, not_negative))
+    light.sun.irradiance_w_m2_nm = sun_w_m2_nm;
   map.read_number("filter_width_nm", Need::Optional, light.sun.filter_width_nm, not_negative);
   double field_of_view_rad = 0;
   map.read_scaled(

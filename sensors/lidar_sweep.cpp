@@ -61,6 +61,8 @@ struct LightRow {
   EchoRow row;
   Echo echo;
   std::uint32_t pulse;
+  std::uint16_t second_label;
+  glm::vec3 velocity_m_s;
 };
 
 // A few pulses on their way through the pipeline. Its buffers are used again and again.
@@ -99,10 +101,7 @@ class Sweep {
         pulses_(lidar.pattern.pulses(number)),
         settings_{lidar.beam, lidar.last_level, lidar.light ? lidar.light->resolution_m() : 0,
                   spec_.angular_jitter_rad, rays_end_m(spec_)} {
-    if (lidar.light) {
-      brdf_ =
-          retro_brdf(scene.materials.at(scene.terrain.material), lidar.light->spec().wavelength_nm);
-    }
+    if (lidar.light) brdfs_.emplace(scene, lidar.light->spec().wavelength_nm);
     if (spec_.points == LidarSpec::Points::AtStamp) X_SD_ = inverse(X_DS.pose_at(path_.stamp));
   }
 
@@ -131,6 +130,8 @@ class Sweep {
   EchoRow row_of(const Echo& echo, const PulseCast& cast, std::size_t pulse,
                  double reported_m) const;
   glm::vec3 reported_point(const PulseCast& cast, std::size_t pulse, double reported_m) const;
+  glm::vec3 velocity_m_s(const Ray& ray, const Hit& hit) const;
+  glm::vec3 velocity_of(const Echo& echo, const PulseCast& cast, std::size_t pulse) const;
   PointCloud no_returns() const;
 
   const LidarParts& lidar_;
@@ -140,7 +141,7 @@ class Sweep {
   RandomKey key_;
   std::int64_t pulses_;
   PulseCast::Settings settings_;
-  RetroBrdf brdf_;
+  std::optional<RetroBrdfs> brdfs_;  // with light
   Pose X_SD_;
 
   // Filled in firing order:
@@ -162,7 +163,7 @@ class Sweep {
 };
 
 void Sweep::measure(Chunk& chunk) const {
-  chunk.cast.cast(path_, chunk.begin, chunk.end, settings_, key_, scene_.rays);
+  chunk.cast.cast(path_, chunk.begin, chunk.end, settings_, key_, scene_);
   if (spec_.error_bound == LidarSpec::ErrorBound::Report) {
     chunk.bounds_m.resize(chunk.cast.all_rays().size());
     scene_.rays.bound_errors(chunk.cast.all_rays(), chunk.cast.all_hits(), chunk.bounds_m);
@@ -195,7 +196,7 @@ void Sweep::measure_light(Chunk& chunk) const {
         chunk.bounds_m.empty()
             ? std::span<const double>()
             : std::span(chunk.bounds_m).subspan(cast.range(i).first, cast.range(i).count);
-    lidar_.light->receive(cast.rays(i), cast.hits(i), bounds_m, brdf_, key_of(pulse), chunk.work);
+    lidar_.light->receive(cast.rays(i), cast.hits(i), bounds_m, *brdfs_, key_of(pulse), chunk.work);
     add_rows(i, chunk);
     if (chunk.work.echoes.empty()) chunk.missed.push_back({i, chunk.work.reason});
     if (spec_.waveforms == LidarSpec::WaveformOutput::Keep) keep_waveform(i, chunk);
@@ -222,11 +223,11 @@ void Sweep::compare(std::size_t pulse, Chunk& chunk) const {
   if (finer >= lidar_.beam.levels()) return;
   const Light& light = *lidar_.quiet_light;
   Light::Workspace& work = chunk.work;
-  light.receive(cast.rays(pulse), cast.hits(pulse), {}, brdf_, key_, work);
+  light.receive(cast.rays(pulse), cast.hits(pulse), {}, *brdfs_, key_, work);
   const std::size_t echoes = work.echoes.size();
   const double first_m = echoes == 0 ? 0 : work.echoes[0].detection.range_m;
-  cast.cast_again(pulse, finer, lidar_.beam, key_, scene_.rays, chunk.rays_again, chunk.hits_again);
-  light.receive(chunk.rays_again, chunk.hits_again, {}, brdf_, key_, work);
+  cast.cast_again(pulse, finer, lidar_.beam, key_, scene_, chunk.rays_again, chunk.hits_again);
+  light.receive(chunk.rays_again, chunk.hits_again, {}, *brdfs_, key_, work);
   Convergence& seen = chunk.convergence;
   ++seen.pulses;
   if (work.echoes.size() != echoes) {
@@ -277,6 +278,20 @@ inline glm::vec3 Sweep::reported_point(const PulseCast& cast, std::size_t pulse,
   return glm::vec3(X_SD_ * (pose.p_DS + pose.R_DS * p_SQ));
 }
 
+// How fast the surface moves that a ray met.
+glm::vec3 Sweep::velocity_m_s(const Ray& ray, const Hit& hit) const {
+  if (hit.object == 0) return glm::vec3(0);
+  return glm::vec3(
+      scene_.objects.velocity_m_s(hit.object, ray.origin + ray.direction * hit.range_m, ray.time));
+}
+
+glm::vec3 Sweep::velocity_of(const Echo& echo, const PulseCast& cast, std::size_t pulse) const {
+  if (echo.kind != Echo::Kind::Surface) return glm::vec3(0);
+  const Hit& hit = cast.hits(pulse)[echo.hit];
+  if (hit.object == 0) return glm::vec3(0);
+  return glm::vec3(scene_.objects.velocity_m_s(hit.object, echo.p_DQ, cast.axis(pulse).time));
+}
+
 void Sweep::write(const Chunk& chunk, const ScanColumns& columns) const {
   std::size_t row = chunk.first_row;
   const PulseCast& cast = chunk.cast;
@@ -301,8 +316,9 @@ void Sweep::write(const Chunk& chunk, const ScanColumns& columns) const {
                         .normal = hit.normal,
                         .cos_incidence = cos_incidence,
                         .sin_incidence = glm::length(glm::cross(direction, hit.normal)),
-                        .surface = scene_.terrain,
+                        .surface = scene_.truth_of(hit),
                         .deviation_m = hit.deviation_m});
+    if (columns.has_motion()) columns.write_velocity(row, velocity_m_s(ray, hit));
     if (columns.has_bounds()) columns.write_bound(row, chunk.bounds_m[at]);
     ++row;
   }
@@ -321,7 +337,7 @@ EchoRow Sweep::row_of(const Echo& echo, const PulseCast& cast, std::size_t pulse
               .normal = echo.normal,
               .cos_incidence = -glm::dot(direction, echo.normal),
               .sin_incidence = glm::length(glm::cross(direction, echo.normal)),
-              .surface = scene_.terrain,
+              .surface = scene_.truth_of(cast.hits(pulse)[echo.hit]),
               .deviation_m = echo.deviation_m};
   if (echo.kind != Echo::Kind::Surface) {  // there is no truth to tell
     row.p_DQ = axis.origin + axis.direction * echo.detection.range_m;
@@ -348,18 +364,24 @@ void Sweep::add_rows(std::size_t pulse, Chunk& chunk) const {
     row.return_count = static_cast<std::uint8_t>(echoes.size());
     chunk.light_rows.push_back(
         {row, echoes[k],
-         static_cast<std::uint32_t>(chunk.begin) + static_cast<std::uint32_t>(pulse)});
+         static_cast<std::uint32_t>(chunk.begin) + static_cast<std::uint32_t>(pulse),
+         echoes[k].second_share > 0
+             ? scene_.truth_of(chunk.cast.hits(pulse)[echoes[k].second_hit]).label
+             : std::uint16_t{0},
+         velocity_of(echoes[k], chunk.cast, pulse)});
   }
 }
 
 void Sweep::write_light() {
   scan_.echoes = PointCloud(next_row_);
-  const ScanColumns columns(scan_.echoes, spec_);
+  const ScanColumns columns(scan_.echoes, spec_, scene_);
   tbb::parallel_for(std::size_t{0}, light_rows_.size(), [&](std::size_t chunk) {
     std::size_t row = light_rows_[chunk].first_row;
-    for (const auto& [echo_row, echo, pulse] : light_rows_[chunk].rows) {
+    for (const auto& [echo_row, echo, pulse, second_label, velocity_m_s] :
+         light_rows_[chunk].rows) {
       columns.write(row, echo_row);
-      columns.write_light(row, pulse, echo, scene_.terrain);
+      if (columns.has_motion()) columns.write_velocity(row, velocity_m_s);
+      columns.write_light(row, pulse, echo, second_label);
       if (columns.has_bounds()) columns.write_bound(row, echo.bound_m);
       ++row;
     }
@@ -390,7 +412,7 @@ LidarScan Sweep::run() {
   const bool has_light = lidar_.light != nullptr;
   scan_.echoes = PointCloud(has_light ? 0 : static_cast<std::size_t>(pulses_));
   std::optional<ScanColumns> columns;
-  if (!has_light) columns.emplace(scan_.echoes, spec_);
+  if (!has_light) columns.emplace(scan_.echoes, spec_, scene_);
   stream([&](const Chunk& chunk) {
     if (columns) write(chunk, *columns);
   });

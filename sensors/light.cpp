@@ -22,38 +22,52 @@ ReceiverSpec receiver_in(const LightSpec& spec, const AtmosphereSpec& air) {
   return receiver;
 }
 
-// What of an echo's energy comes from one surface.
-struct SurfaceShare {
-  std::size_t begin = 0, end = 0;  // in the order of ranges
-  double energy_j = 0;
-};
-
-struct EnergyShares {
-  SurfaceShare best, second;
-  double energy_j = 0;
-};
-
-// Arrivals [begin, end), by range, fall into surfaces where they are farther apart than two
-// surfaces can be told apart.
-EnergyShares shares_of(std::span<const Arrival> arrivals, std::size_t begin, std::size_t end,
-                       double resolution_m) {
-  EnergyShares shares;
-  SurfaceShare now;
-  const auto close = [&] {
-    if (now.energy_j > shares.best.energy_j) std::swap(now, shares.best);
-    if (now.energy_j > shares.second.energy_j) shares.second = now;
-  };
+// Parts arrivals [begin, end), which come by range, into surfaces: hits of one object whose ranges
+// are no farther apart than two surfaces can be told apart.
+void part_surfaces(std::span<const Hit> hits, std::size_t begin, std::size_t end,
+                   double resolution_m, Light::Workspace& work) {
+  work.surfaces.clear();
+  work.surface_of.resize(end - begin);
   for (std::size_t k = begin; k < end; ++k) {
-    if (k > begin && arrivals[k].range_m - arrivals[k - 1].range_m > resolution_m) {
-      close();
-      now = {};
+    const auto [range_m, energy_j] = work.arrivals[k];
+    const std::uint32_t object = hits[work.order[k]].object;
+    std::size_t at = work.surfaces.size();
+    while (at > 0 && !(work.surfaces[at - 1].object == object &&
+                       range_m - work.surfaces[at - 1].last_m <= resolution_m))
+      --at;
+    if (at == 0) {
+      work.surfaces.push_back({.object = object});
+      at = work.surfaces.size();
     }
-    if (now.energy_j == 0) now.begin = k;
-    now.end = k + 1;
-    now.energy_j += arrivals[k].energy_j;
-    shares.energy_j += arrivals[k].energy_j;
+    LitSurface& surface = work.surfaces[at - 1];
+    surface.last_m = range_m;
+    surface.energy_j += energy_j;
+    if (energy_j > surface.strongest_j) {
+      surface.strongest_j = energy_j;
+      surface.strongest = k;
+    }
+    work.surface_of[k - begin] = static_cast<std::uint32_t>(at - 1);
   }
-  close();
+}
+
+// The two surfaces that most of the energy comes from; nothing stands for none.
+struct EnergyShares {
+  LitSurface best, second;
+  std::size_t best_number = 0;
+  double energy_j = 0;
+};
+EnergyShares shares_of(std::span<const LitSurface> surfaces) {
+  EnergyShares shares;
+  for (std::size_t n = 0; n < surfaces.size(); ++n) {
+    shares.energy_j += surfaces[n].energy_j;
+    if (surfaces[n].energy_j > shares.best.energy_j) {
+      shares.second = shares.best;
+      shares.best = surfaces[n];
+      shares.best_number = n;
+    } else if (surfaces[n].energy_j > shares.second.energy_j) {
+      shares.second = surfaces[n];
+    }
+  }
   return shares;
 }
 
@@ -101,6 +115,12 @@ double exp_of_small(double x) {
 
 }  // namespace
 
+RetroBrdfs::RetroBrdfs(const Scene& scene, double wavelength_nm) : scene_(scene) {
+  for (const Material& material : scene.materials)
+    by_material_.push_back(retro_brdf(material, wavelength_nm));
+  ground_ = by_material_.at(scene.terrain.material);
+}
+
 Light::Light(const LightSpec& spec, const AtmosphereSpec& air, const RangeGate& gate)
     : spec_(spec),
       gate_(gate),
@@ -133,7 +153,7 @@ void Light::sample_air(const AtmosphereSpec& air) {
   }
 }
 
-void Light::collect(std::span<const Ray> rays, std::span<const Hit> hits, const RetroBrdf& brdf,
+void Light::collect(std::span<const Ray> rays, std::span<const Hit> hits, const RetroBrdfs& brdfs,
                     double extinction_per_m, Workspace& work) const noexcept {
   sort_hits(hits, work.order);
   const std::size_t count = work.order.size();
@@ -143,7 +163,7 @@ void Light::collect(std::span<const Ray> rays, std::span<const Hit> hits, const 
   for (std::size_t k = 0; k < count; ++k) {
     const std::uint32_t i = work.order[k];
     const double cosine = std::max(-glm::dot(rays[i].direction, glm::dvec3(hits[i].normal)), 0.0);
-    arrivals[k] = {hits[i].range_m, retro_brdf_cos(brdf, cosine)};
+    arrivals[k] = {hits[i].range_m, retro_brdf_cos(brdfs.of(hits[i]), cosine)};
   }
   const double share = 1.0 / static_cast<double>(hits.size());
   const auto receive = [&](Arrival& arrival, double transmission) {
@@ -192,9 +212,9 @@ double Light::air_energy_j(const Detection& detection, const Workspace& work) co
 }
 
 void Light::receive(std::span<const Ray> rays, std::span<const Hit> hits,
-                    std::span<const double> bounds_m, const RetroBrdf& brdf, const RandomKey& key,
+                    std::span<const double> bounds_m, const RetroBrdfs& brdfs, const RandomKey& key,
                     Workspace& work) const noexcept {
-  collect(rays, hits, brdf, atmosphere_.extinction_per_m(), work);
+  collect(rays, hits, brdfs, atmosphere_.extinction_per_m(), work);
   if (air_w_.empty()) {
     receiver_.sample(work.arrivals, work.waveform);
   } else {
@@ -202,13 +222,15 @@ void Light::receive(std::span<const Ray> rays, std::span<const Hit> hits,
                      {first_air_bin_, first_air_bin_ + static_cast<std::int64_t>(air_w_.size())});
     add_air(hits, work);
   }
-  const double lit = static_cast<double>(work.arrivals.size()) / static_cast<double>(hits.size());
-  const double background_w = sun_w_ * std::numbers::pi * brdf.diffuse_per_sr * lit;
+  double diffuse_per_sr = 0;
+  for (const std::uint32_t i : work.order) diffuse_per_sr += brdfs.of(hits[i]).diffuse_per_sr;
+  const double background_w =
+      sun_w_ * std::numbers::pi * diffuse_per_sr / static_cast<double>(hits.size());
   receiver_.detect(work.waveform, gate_, {key, background_w}, work.detections);
   work.echoes.clear();
   for (const Detection& detection : work.detections)
     tell_truth(rays, hits, bounds_m, detection, work);
-  if (work.echoes.empty()) work.reason = reason_for_none(rays, hits, brdf, work);
+  if (work.echoes.empty()) work.reason = reason_for_none(rays, hits, brdfs, work);
 }
 
 void Light::tell_truth(std::span<const Ray> rays, std::span<const Hit> hits,
@@ -220,9 +242,9 @@ void Light::tell_truth(std::span<const Ray> rays, std::span<const Hit> hits,
   const auto all_begin = work.arrivals.begin(), all_end = work.arrivals.end();
   const auto begin = std::ranges::lower_bound(all_begin, all_end, detection.begin_s, {}, arrival_s);
   const auto end = std::ranges::lower_bound(begin, all_end, detection.end_s, {}, arrival_s);
-  const auto [best, second, energy_j] =
-      shares_of(work.arrivals, static_cast<std::size_t>(begin - all_begin),
-                static_cast<std::size_t>(end - all_begin), resolution_m_);
+  const auto first = static_cast<std::size_t>(begin - all_begin);
+  part_surfaces(hits, first, static_cast<std::size_t>(end - all_begin), resolution_m_, work);
+  const auto [best, second, best_number, energy_j] = shares_of(work.surfaces);
   const double air_j = air_energy_j(detection, work);
   if (detection.kind == Detection::Kind::FalseAlarm || best.energy_j <= air_j) {
     echo.kind =
@@ -231,9 +253,10 @@ void Light::tell_truth(std::span<const Ray> rays, std::span<const Hit> hits,
   }
   glm::dvec3 normal(0);
   const double per_energy = 1 / best.energy_j;
-  for (std::size_t k = best.begin; k < best.end; ++k) {
-    const std::uint32_t i = work.order[k];
-    const double weight = work.arrivals[k].energy_j * per_energy;
+  for (std::size_t k = 0; k < work.surface_of.size(); ++k) {
+    if (work.surface_of[k] != best_number) continue;
+    const std::uint32_t i = work.order[first + k];
+    const double weight = work.arrivals[first + k].energy_j * per_energy;
     echo.range_m += weight * hits[i].range_m;
     echo.p_DQ += weight * (rays[i].origin + rays[i].direction * hits[i].range_m);
     normal += weight * glm::dvec3(hits[i].normal);
@@ -243,11 +266,13 @@ void Light::tell_truth(std::span<const Ray> rays, std::span<const Hit> hits,
   echo.normal = glm::vec3(glm::normalize(normal));
   echo.share = static_cast<float>(best.energy_j / (energy_j + air_j));
   echo.second_share = static_cast<float>(second.energy_j / (energy_j + air_j));
+  echo.hit = work.order[best.strongest];
+  if (second.energy_j > 0) echo.second_hit = work.order[second.strongest];
 }
 
 // May use the arrivals: nobody needs them any more.
 NoReturn Light::reason_for_none(std::span<const Ray> rays, std::span<const Hit> hits,
-                                const RetroBrdf& brdf, Workspace& work) const noexcept {
+                                const RetroBrdfs& brdfs, Workspace& work) const noexcept {
   if (work.order.empty()) return NoReturn::Sky;
   const auto outside = [&](const Arrival& arrival) {
     return arrival.range_m < gate_.near_m || gate_.far_m < arrival.range_m;
@@ -262,7 +287,7 @@ NoReturn Light::reason_for_none(std::span<const Ray> rays, std::span<const Hit> 
   const bool second_alone = spec_.receiver.returns == ReceiverSpec::Returns::Second;
   if (second_alone && above_threshold(work.waveform)) return NoReturn::Blanked;
   if (atmosphere_.extinction_per_m() == 0) return NoReturn::BelowThreshold;
-  collect(rays, hits, brdf, 0, work);
+  collect(rays, hits, brdfs, 0, work);
   std::erase_if(work.arrivals, outside);
   receiver_.sample(work.arrivals, work.clear_waveform);
   return above_threshold(work.clear_waveform) ? NoReturn::Absorbed : NoReturn::BelowThreshold;

@@ -7,13 +7,29 @@
 
 #include "core/material.h"
 #include "core/random.h"
-#include "core/ray_tracer.h"
+#include "core/scene.h"
 #include "sensors/atmosphere.h"
 #include "sensors/lidar_spec.h"
 #include "sensors/radar_equation.h"
 #include "sensors/receiver.h"
 
 namespace groundray {
+
+/// What the surfaces of a scene send back at a laser's wavelength.
+class RetroBrdfs {
+ public:
+  /// @throws Error as retro_brdf, of any of the scene's materials.
+  RetroBrdfs(const Scene& scene, double wavelength_nm);
+
+  const RetroBrdf& of(const Hit& hit) const noexcept {
+    return hit.object == 0 ? ground_ : by_material_[scene_.truth_of(hit).material];
+  }
+
+ private:
+  const Scene& scene_;
+  std::vector<RetroBrdf> by_material_;
+  RetroBrdf ground_;
+};
 
 /// What came back of a pulse: an echo, and the truth about it.
 struct Echo {
@@ -22,13 +38,15 @@ struct Echo {
   Detection detection;
   Kind kind = Kind::Surface;
   // Of the surface that most of its energy comes from, weighed by energy:
-  double range_m = 0;      ///< from where the beam leaves
-  glm::dvec3 p_DQ{0};      ///< in D
-  glm::vec3 normal{0};     ///< unit, axes of D
-  float share = 0;         ///< of the echo's energy, that of the air included
-  float second_share = 0;  ///< that of the surface with the most energy but for this one
-  float deviation_m = 0;   ///< the largest of its hits'
-  double bound_m = 0;      ///< the largest error bound of its hits, if these have any
+  double range_m = 0;            ///< from where the beam leaves
+  glm::dvec3 p_DQ{0};            ///< in D
+  glm::vec3 normal{0};           ///< unit, axes of D
+  float share = 0;               ///< of the echo's energy, that of the air included
+  float second_share = 0;        ///< that of the surface with the most energy but for this one
+  std::uint32_t hit = 0;         ///< of the surface, the strongest: index among the pulse's hits
+  std::uint32_t second_hit = 0;  ///< of the other surface, if it has a share
+  float deviation_m = 0;         ///< the largest of its hits'
+  double bound_m = 0;            ///< the largest error bound of its hits, if these have any
 };
 
 /// Why a pulse has no echo.
@@ -40,14 +58,25 @@ enum class NoReturn : std::uint8_t {
   Blanked,         ///< an echo, but not one that the sensor is asked to report
 };
 
+/// Hits of one object whose ranges follow each other closely.
+struct LitSurface {
+  std::uint32_t object = 0;
+  double last_m = 0;
+  double energy_j = 0;
+  double strongest_j = 0;
+  std::size_t strongest = 0;  ///< arrival
+};
+
 /// Energy, air and electronics of a lidar: from the hits of a pulse's sub-rays to echoes.
 /// Immutable, so any number of threads may use one.
 class Light {
  public:
   /// Buffers of one thread, for pulse after pulse.
   struct Workspace {
-    std::vector<std::uint32_t> order;  ///< the sub-rays that met something, by range
-    std::vector<Arrival> arrivals;     ///< in that order
+    std::vector<std::uint32_t> order;       ///< the sub-rays that met something, by range
+    std::vector<Arrival> arrivals;          ///< in that order
+    std::vector<LitSurface> surfaces;       ///< that an echo's energy comes from
+    std::vector<std::uint32_t> surface_of;  ///< of its arrivals
     Waveform waveform;
     Detections detections;
     std::vector<Echo> echoes;         ///< of the last pulse, by reported range
@@ -68,9 +97,9 @@ class Light {
   /// Finds the echoes of one pulse.
   /// @param hits  one for each of `rays`, which share the pulse's energy equally.
   /// @param bounds_m  of the hits' ranges; may be empty.
-  /// @param brdf  of what they hit.
+  /// @param brdfs  of what they hit.
   void receive(std::span<const Ray> rays, std::span<const Hit> hits,
-               std::span<const double> bounds_m, const RetroBrdf& brdf, const RandomKey& key,
+               std::span<const double> bounds_m, const RetroBrdfs& brdfs, const RandomKey& key,
                Workspace& work) const noexcept;
 
   /// Returns what the sensor reports as the intensity of an echo.
@@ -79,14 +108,14 @@ class Light {
   double reported_m(double range_m) const noexcept;
 
  private:
-  void collect(std::span<const Ray> rays, std::span<const Hit> hits, const RetroBrdf& brdf,
+  void collect(std::span<const Ray> rays, std::span<const Hit> hits, const RetroBrdfs& brdfs,
                double extinction_per_m, Workspace& work) const noexcept;
   void add_air(std::span<const Hit> hits, Workspace& work) const noexcept;
   void tell_truth(std::span<const Ray> rays, std::span<const Hit> hits,
                   std::span<const double> bounds_m, const Detection& detection,
                   Workspace& work) const noexcept;
   NoReturn reason_for_none(std::span<const Ray> rays, std::span<const Hit> hits,
-                           const RetroBrdf& brdf, Workspace& work) const noexcept;
+                           const RetroBrdfs& brdfs, Workspace& work) const noexcept;
   double air_energy_j(const Detection& detection, const Workspace& work) const noexcept;
   void sample_air(const AtmosphereSpec& air);
 

@@ -37,7 +37,7 @@ void PulseCast::lay_axes(const SweepPath& sweep, std::int64_t begin, const Setti
       const glm::dvec3& origin_m = pulses_.origin_m[i];
       Ray& axis = alone_ ? rays_[ranges_[i].first] : axes_[i];
       axis = {origin_m == glm::dvec3(0) ? pose.p_DS : pose.p_DS + pose.R_DS * origin_m,
-              pose.R_DS * pulses_.direction[i], settings.far_m};
+              pose.R_DS * pulses_.direction[i], settings.far_m, time};
       if (needs_horizontals) horizontals_[i] = pose.R_DS * pulses_.horizontal[i];
     }
     poses_.push_back(pose);
@@ -72,14 +72,14 @@ void PulseCast::add_sub_rays(std::size_t pulse, int level, const LaserBeam& beam
   const auto lay = [&](const LaserBeam::SubRay& to) -> Ray {
     const glm::dvec3 along = axis.direction + to.slope.x * horizontal + to.slope.y * vertical;
     return {axis.origin + to.offset_m.x * horizontal + to.offset_m.y * vertical,
-            along * to.per_length, axis.far_m};
+            along * to.per_length, axis.far_m, axis.time};
   };
   for (std::size_t i = 0; i < sub_rays.size(); ++i)
     out[i] = turns ? lay(beam.turned(level, i, turn)) : lay(sub_rays[i]);
 }
 
 void PulseCast::cast(const SweepPath& sweep, std::int64_t begin, std::int64_t end,
-                     const Settings& settings, const RandomKey& key, const RayTracer& tracer) {
+                     const Settings& settings, const RandomKey& key, const Scene& scene) {
   begin_ = begin;
   sweep.pattern.fill(sweep.number, begin, end, pulses_);
   const std::size_t count = pulses_.size();
@@ -99,8 +99,8 @@ void PulseCast::cast(const SweepPath& sweep, std::int64_t begin, std::int64_t en
   for (std::size_t i = 0; i < count && !alone_; ++i)
     add_sub_rays(i, 0, settings.beam, key, &rays_[ranges_[i].first]);
   hits_.resize(rays_.size());
-  tracer.trace(rays_, hits_);
-  if (settings.last_level > 0) refine(settings, key, tracer);
+  scene.trace(rays_, hits_);
+  if (settings.last_level > 0) refine(settings, key, scene);
 }
 
 bool PulseCast::is_coarse(std::size_t pulse, const Settings& settings) const {
@@ -114,7 +114,7 @@ bool PulseCast::is_coarse(std::size_t pulse, const Settings& settings) const {
                              });
 }
 
-void PulseCast::refine(const Settings& settings, const RandomKey& key, const RayTracer& tracer) {
+void PulseCast::refine(const Settings& settings, const RandomKey& key, const Scene& scene) {
   coarse_.clear();
   for (std::uint32_t i = 0; i < size(); ++i) {
     if (is_coarse(i, settings)) coarse_.push_back(i);
@@ -130,18 +130,18 @@ void PulseCast::refine(const Settings& settings, const RandomKey& key, const Ray
       add_sub_rays(i, level, settings.beam, key, &rays_[first]);
       first += sub_rays;
     }
-    tracer.trace(std::span(rays_).subspan(before), std::span(hits_).subspan(before));
+    scene.trace(std::span(rays_).subspan(before), std::span(hits_).subspan(before));
     std::erase_if(coarse_, [&](std::uint32_t i) { return !is_coarse(i, settings); });
   }
 }
 
 void PulseCast::cast_again(std::size_t pulse, int level, const LaserBeam& beam,
-                           const RandomKey& key, const RayTracer& tracer, std::vector<Ray>& rays,
+                           const RandomKey& key, const Scene& scene, std::vector<Ray>& rays,
                            std::vector<Hit>& hits) const {
   rays.resize(beam.sub_rays(level).size());
   hits.resize(rays.size());
   add_sub_rays(pulse, level, beam, key, rays.data());
-  tracer.trace(rays, hits);
+  scene.trace(rays, hits);
 }
 
 }  // namespace groundray

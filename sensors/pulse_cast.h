@@ -8,7 +8,7 @@
 #include <vector>
 
 #include "core/random.h"
-#include "core/ray_tracer.h"
+#include "core/scene.h"
 #include "core/trajectory.h"
 #include "sensors/beam.h"
 #include "sensors/lidar_spec.h"
@@ -47,7 +47,7 @@ class PulseCast {
   /// Casts pulses [begin, end) of a sweep.
   /// @param key  names the sweep.
   void cast(const SweepPath& sweep, std::int64_t begin, std::int64_t end, const Settings& settings,
-            const RandomKey& key, const RayTracer& tracer);
+            const RandomKey& key, const Scene& scene);
 
   std::size_t size() const { return pulses_.size(); }
   const PulseBatch& pulses() const { return pulses_; }
@@ -76,7 +76,7 @@ class PulseCast {
   /// Casts a pulse again with the sub-rays of a level; returns their rays and hits, which last
   /// until the next call.
   void cast_again(std::size_t pulse, int level, const LaserBeam& beam, const RandomKey& key,
-                  const RayTracer& tracer, std::vector<Ray>& rays, std::vector<Hit>& hits) const;
+                  const Scene& scene, std::vector<Ray>& rays, std::vector<Hit>& hits) const;
 
  private:
   void lay_axes(const SweepPath& sweep, std::int64_t begin, const Settings& settings,
@@ -84,7 +84,7 @@ class PulseCast {
   void add_sub_rays(std::size_t pulse, int level, const LaserBeam& beam, const RandomKey& key,
                     Ray* out) const;
   bool is_coarse(std::size_t pulse, const Settings& settings) const;
-  void refine(const Settings& settings, const RandomKey& key, const RayTracer& tracer);
+  void refine(const Settings& settings, const RandomKey& key, const Scene& scene);
 
   std::int64_t begin_ = 0;
   PulseBatch pulses_;

@@ -42,8 +42,9 @@ RadarEquation::RadarEquation(const LidarOptics& optics)
 
 double RadarEquation::solar_power_w(const SolarBackground& sun, double reflectance) const {
   Violations broken("SolarBackground");
-  broken.unless(sun.irradiance_w_m2_nm >= 0, "irradiance_w_m2_nm = {} must be >= 0",
-                sun.irradiance_w_m2_nm);
+  const double irradiance_w_m2_nm = sun.irradiance_w_m2_nm.value_or(0);
+  broken.unless(irradiance_w_m2_nm >= 0, "irradiance_w_m2_nm = {} must be >= 0",
+                irradiance_w_m2_nm);
   broken.unless(sun.filter_width_nm >= 0, "filter_width_nm = {} must be >= 0", sun.filter_width_nm);
   broken.unless(sun.field_of_view_sr >= 0 && sun.field_of_view_sr <= 2 * pi,
                 "field_of_view_sr = {} must be in [0, 2 pi]: is it in degrees?",
@@ -51,7 +52,7 @@ double RadarEquation::solar_power_w(const SolarBackground& sun, double reflectan
   broken.unless(reflectance >= 0 && reflectance <= 1, "reflectance = {} must be in [0, 1]",
                 reflectance);
   broken.throw_if_any();
-  const double radiance_w_m2_sr = sun.irradiance_w_m2_nm * sun.filter_width_nm * reflectance / pi;
+  const double radiance_w_m2_sr = irradiance_w_m2_nm * sun.filter_width_nm * reflectance / pi;
   return radiance_w_m2_sr * sun.field_of_view_sr * receiver_area_m2_ * receiver_efficiency_;
 }
 

@@ -1,5 +1,7 @@
 #pragma once
 
+#include <optional>
+
 namespace groundray {
 
 /// What the radar equation needs to know of a lidar's optics.
@@ -12,9 +14,11 @@ struct LidarOptics {
 
 /// Sunlight that a receiver sees on a diffuse surface.
 struct SolarBackground {
-  double irradiance_w_m2_nm = 0;  ///< of the surface by the sun at the laser's wavelength
-  double filter_width_nm = 0;     ///< equivalent width of the receiver's optical filter
-  double field_of_view_sr = 0;    ///< of one detector
+  /// Of the surface by the sun at the laser's wavelength; else that of the scene's sky on level
+  /// ground, or none.
+  std::optional<double> irradiance_w_m2_nm;
+  double filter_width_nm = 0;   ///< equivalent width of the receiver's optical filter
+  double field_of_view_sr = 0;  ///< of one detector
 };
 
 /// Returns the solid angle of a cone of full angle `angle_rad`, in [0, 2 pi]: sr.

@@ -14,7 +14,7 @@ float rounded_up(double value) {
 
 }  // namespace
 
-ScanColumns::ScanColumns(PointCloud& cloud, const LidarSpec& spec)
+ScanColumns::ScanColumns(PointCloud& cloud, const LidarSpec& spec, const Scene& scene)
     : x_(cloud.add<float>("x")),
       y_(cloud.add<float>("y")),
       z_(cloud.add<float>("z")),
@@ -44,12 +44,15 @@ ScanColumns::ScanColumns(PointCloud& cloud, const LidarSpec& spec)
     second_share_ = cloud.add<float>("second_share");
     second_label_ = cloud.add<std::uint16_t>("second_label");
   }
+  if (scene.objects.any_moves()) {
+    velocity_ = {cloud.add<float>("vx"), cloud.add<float>("vy"), cloud.add<float>("vz")};
+  }
   if (spec.error_bound == LidarSpec::ErrorBound::Report)
     error_bound_ = cloud.add<float>("error_bound");
 }
 
 void ScanColumns::write_light(std::size_t row, std::uint32_t pulse, const Echo& echo,
-                              const SurfaceTruth& surface) const noexcept {
+                              std::uint16_t second_label) const noexcept {
   pulse_[row] = pulse;
   amplitude_[row] = static_cast<float>(echo.detection.power_w);
   width_[row] = static_cast<float>(echo.detection.width_s);
@@ -57,7 +60,7 @@ void ScanColumns::write_light(std::size_t row, std::uint32_t pulse, const Echo& 
   kind_[row] = static_cast<std::uint8_t>(echo.kind);
   share_[row] = echo.share;
   second_share_[row] = echo.second_share;
-  second_label_[row] = echo.second_share > 0 ? surface.label : std::uint16_t{0};
+  second_label_[row] = second_label;
 }
 
 void ScanColumns::write_bound(std::size_t row, double bound_m) const noexcept {

@@ -1,6 +1,7 @@
 #pragma once
 
 #include <algorithm>
+#include <array>
 #include <cmath>
 #include <cstdint>
 #include <glm/vec3.hpp>
@@ -32,13 +33,17 @@ struct EchoRow {
 /// The columns of a scan, to be filled row by row. Each row is written by one thread.
 class ScanColumns {
  public:
-  ScanColumns(PointCloud& cloud, const LidarSpec& spec);
+  ScanColumns(PointCloud& cloud, const LidarSpec& spec, const Scene& scene);
 
   void write(std::size_t row, const EchoRow& echo) const noexcept;
   void write_light(std::size_t row, std::uint32_t pulse, const Echo& echo,
-                   const SurfaceTruth& surface) const noexcept;
+                   std::uint16_t second_label) const noexcept;
+  void write_velocity(std::size_t row, const glm::vec3& velocity_m_s) const noexcept {
+    for (std::size_t k = 0; k < 3; ++k) velocity_[k][row] = velocity_m_s[static_cast<int>(k)];
+  }
   void write_bound(std::size_t row, double bound_m) const noexcept;
   bool has_bounds() const { return !error_bound_.empty(); }
+  bool has_motion() const { return !velocity_[0].empty(); }
 
  private:
   std::span<float> x_, y_, z_, intensity_, time_s_;
@@ -54,6 +59,8 @@ class ScanColumns {
   std::span<float> amplitude_, width_, snr_, share_, second_share_;
   std::span<std::uint8_t> kind_;
   std::span<std::uint16_t> second_label_;
+  // Where objects move:
+  std::array<std::span<float>, 3> velocity_;
   // If asked for:
   std::span<float> error_bound_;
 };

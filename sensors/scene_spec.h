@@ -2,7 +2,6 @@
 
 #include <cstdint>
 #include <filesystem>
-#include <glm/vec2.hpp>
 #include <optional>
 #include <string>
 #include <variant>
@@ -14,7 +13,10 @@
 #include "core/ray_tracer.h"
 #include "sensors/atmosphere.h"
 #include "sensors/lidar_spec.h"
+#include "sensors/sky.h"
+#include "sensors/world_spec.h"
 #include "terrain/dem_io.h"
+#include "terrain/relief.h"
 #include "terrain/terrain.h"
 
 namespace groundray {
@@ -26,19 +28,7 @@ struct TerrainSpec {
   std::uint16_t label = 1;           ///< semantic class of the ground
   std::optional<Material> material;  ///< there must be one if a lidar has light
   TerrainDetail detail;
-};
-
-/// A platform that follows a recorded path: body B in W, TUM form.
-struct RecordedPath {
-  std::filesystem::path tum;
-};
-
-/// A platform that drives over the ground (see GroundPathSpec); waypoints in W, the CRS of the DEM.
-struct DrivenPath {
-  std::vector<glm::dvec2> waypoints_m;
-  double speed_m_s = 1;
-  double height_m = 0;
-  glm::dvec2 footprint_m{2, 1.5};
+  std::optional<ReliefSpec> relief;
 };
 
 /// A lidar and where it sits.
@@ -60,6 +50,9 @@ struct SceneSpec {
   AtmosphereSpec air;
   std::variant<RecordedPath, DrivenPath> platform;
   std::vector<MountedLidar> lidars;
+  std::vector<ObjectSpec> objects;
+  std::vector<ScatterLayer> scatter;
+  std::optional<SkySpec> sky;
 };
 
 }  // namespace groundray

@@ -11,8 +11,11 @@
 
 #include "sensors/lidar.h"
 #include "sensors/lidar_reader.h"
-#include "sensors/material_io.h"
+#include "sensors/material_reader.h"
+#include "sensors/object_reader.h"
 #include "sensors/pattern_reader.h"
+#include "sensors/relief_reader.h"
+#include "sensors/sky_reader.h"
 #include "sensors/yaml_reader.h"
 
 namespace groundray {
@@ -31,25 +34,6 @@ using yaml::Rule;
 constexpr Rule duration_rule{[](double value) { return value > 0 && value <= 1e6; },
                              "must be > 0 and at most 1e6"};
 
-// A material is named by that of a file in data/materials, or by a file.
-std::optional<Material> read_material(Map& map, const fs::path& path, const fs::path& preset_folder,
-                                      Faults& faults) {
-  std::string name;
-  const Node* at = map.read_text("material", Need::Optional, name);
-  if (!at) return std::nullopt;
-  const fs::path folder = preset_folder.parent_path() / "materials";
-  try {
-    if (name.ends_with(".yaml")) return load_material(beside(path, name));
-    const auto names = preset_names(folder);
-    if (std::ranges::count(names, name) > 0) return load_material(folder / (name + ".yaml"));
-    faults.add(*at, "material", "{} is not in {}{}; it has {}", yaml::shown(*at), folder.string(),
-               yaml::suggestion(name, names), fmt::join(names, ", "));
-  } catch (const Error& fault) {
-    faults.add(*at, "material", "the material cannot be read:\n{}", fault.what());
-  }
-  return std::nullopt;
-}
-
 AtmosphereSpec read_air(Map map, Faults& faults) {
   AtmosphereSpec air;
   map.read_number("visibility_m", Need::Optional, air.visibility_m, positive);
@@ -66,10 +50,13 @@ AtmosphereSpec read_air(Map map, Faults& faults) {
   return air;
 }
 
-TerrainSpec read_terrain(Map terrain, const fs::path& path, const fs::path& preset_folder,
+TerrainSpec read_terrain(Map terrain, const fs::path& path, const DataFolders& folders,
                          Faults& faults) {
   TerrainSpec spec;
-  spec.material = read_material(terrain, path, preset_folder, faults);
+  if (const Node* const node = terrain.find("material", Need::Optional))
+    spec.material = read_material(*node, "material", path, folders, faults);
+  if (auto relief = terrain.map("relief", Need::Optional))
+    spec.relief = read_relief(std::move(*relief), path, faults);
   std::string dem;
   if (terrain.read_text("dem", Need::Required, dem)) spec.dem = beside(path, dem);
   double nodata = 0;
@@ -86,28 +73,6 @@ TerrainSpec read_terrain(Map terrain, const fs::path& path, const fs::path& pres
   }
   terrain.close();
   return spec;
-}
-
-DrivenPath read_drive(Map drive, Faults& faults) {
-  DrivenPath path;
-  const auto waypoints = drive.list("waypoints_m", Need::Required);
-  for (const Node& waypoint : waypoints) {
-    std::array<double, 2> p{};
-    if (yaml::numbers(waypoint, "waypoints_m", p, any_number, faults)) {
-      path.waypoints_m.emplace_back(p[0], p[1]);
-    }
-  }
-  if (const Node* at = drive.find("waypoints_m", Need::Optional); at && waypoints.size() < 2) {
-    faults.add(*at, "waypoints_m", "has {} points, but a drive needs at least two",
-               waypoints.size());
-  }
-  drive.read_number("speed_m_s", Need::Required, path.speed_m_s, positive);
-  drive.read_number("height_m", Need::Required, path.height_m, not_negative);
-  std::array<double, 2> footprint{path.footprint_m.x, path.footprint_m.y};
-  drive.read_numbers("footprint_m", Need::Optional, footprint, positive);
-  path.footprint_m = {footprint[0], footprint[1]};
-  drive.close();
-  return path;
 }
 
 std::variant<RecordedPath, DrivenPath> read_platform(Map platform, const fs::path& path,
@@ -245,6 +210,22 @@ void check_lidars(const SceneSpec& scene, const Node& node, std::span<const Node
 
 }  // namespace
 
+namespace {
+
+// Lidars that do not say how much sunlight there is take that of the sky on level ground.
+void light_by_sky(SceneSpec& scene) {
+  if (!scene.sky || !scene.sky->sun) return;
+  const Sun sun(*scene.sky->sun, scene.sky->air);
+  for (MountedLidar& mounted : scene.lidars) {
+    auto& light = mounted.lidar.light;
+    if (!light || light->sun.irradiance_w_m2_nm) continue;
+    light->sun.irradiance_w_m2_nm =
+        solar_irradiance_w_m2_nm(sun, light->wavelength_nm) * std::max(sun.direction().z, 0.0);
+  }
+}
+
+}  // namespace
+
 SceneSpec load_scene(const fs::path& path, const fs::path& preset_folder) {
   return parse_scene(yaml::read_file(path), path, preset_folder);
 }
@@ -256,13 +237,14 @@ SceneSpec parse_scene(const std::string& text, const fs::path& path,
   SceneSpec scene;
   scene.text = text;
   Map root(node, "", faults);
+  const DataFolders folders{preset_folder};
   yaml::check_version(root, "groundray", faults);
   root.read_whole("seed", Need::Required, scene.seed.value);
   root.read_number("duration_s", Need::Required, scene.duration_s, duration_rule);
   root.read_choice<Tracing>("tracing", Need::Optional, scene.tracing,
                             {{"fast", Tracing::Fast}, {"exact", Tracing::Exact}});
   if (auto terrain = root.map("terrain", Need::Required)) {
-    scene.terrain = read_terrain(std::move(*terrain), path, preset_folder, faults);
+    scene.terrain = read_terrain(std::move(*terrain), path, folders, faults);
   }
   if (auto platform = root.map("platform", Need::Required)) {
     scene.platform = read_platform(std::move(*platform), path, faults);
@@ -270,6 +252,11 @@ SceneSpec parse_scene(const std::string& text, const fs::path& path,
   if (auto weather = root.map("weather", Need::Optional))
     scene.air = read_air(std::move(*weather), faults);
   scene.lidars = read_lidars(root, path, preset_folder, faults);
+  scene.objects = read_objects(root, path, folders, faults);
+  scene.scatter = read_scatter(root, path, folders, faults);
+  if (auto sky = root.map("sky", Need::Optional))
+    scene.sky = read_sky(std::move(*sky), path, faults);
+  if (faults.count() == 0) light_by_sky(scene);
   if (faults.count() == 0) check_lidars(scene, node, root.list("lidars", Need::Optional), faults);
   root.close();
   faults.throw_if_any();

@@ -64,7 +64,13 @@ void check_member(Violations& broken, const AssetSpec& spec, std::string_view na
                 high);
 }
 
-void check_spec(const AssetSpec& spec) {
+bool is_foliage(const ModelSurface& surface) {
+  return surface.name == "leaf" || surface.name == "broad_leaf" || surface.name == "dry_grass";
+}
+
+}  // namespace
+
+void check_asset(const AssetSpec& spec) {
   Violations broken("AssetSpec");
   const auto number = static_cast<std::size_t>(spec.kind);
   broken.unless(number < names.size(), "kind = {} is none of the {} that there are", number,
@@ -98,12 +104,6 @@ void check_spec(const AssetSpec& spec) {
   broken.throw_if_any();
 }
 
-bool is_foliage(const ModelSurface& surface) {
-  return surface.name == "leaf" || surface.name == "broad_leaf" || surface.name == "dry_grass";
-}
-
-}  // namespace
-
 std::span<const std::string_view> asset_names() { return names; }
 
 std::string_view asset_name(AssetKind kind) { return names[static_cast<std::size_t>(kind)]; }
@@ -116,7 +116,7 @@ AssetKind asset_kind(std::string_view name) {
 }
 
 Model make_asset(const AssetSpec& spec) {
-  check_spec(spec);
+  check_asset(spec);
   const KindRule& rule = rule_of(spec.kind);
   const double size_m = spec.size_m.value_or(rule.size_m);
   const double width_m = spec.width_m.value_or(rule.width_m);

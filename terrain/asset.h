@@ -52,13 +52,16 @@ std::string_view asset_name(AssetKind kind);
 /// @throws Error if there is none, with the names that there are.
 AssetKind asset_kind(std::string_view name);
 
+/// @throws Error listing every member of `spec` that is out of bounds or not of its kind.
+void check_asset(const AssetSpec& spec);
+
 /// Makes an object. Equal specs give equal bytes with the same build and C library.
 /// @return the object in O: x forward, z up, the origin on the ground that it stands on, in the
 ///         middle; a wire's origin lies in the middle between its ends. Rocks, plants and posts
 ///         reach below the ground, so that no gap shows on a slope. Leaves and blades are sheets of
 ///         one layer, to be seen from both sides; all else is closed, of one piece or several.
 ///         Surfaces have the names of built-in materials, but `white_paint` and `black_paint`.
-/// @throws Error listing every member of `spec` that is out of bounds or not of its kind.
+/// @throws Error as check_asset.
 /// @see docs/assets.md: shapes, dimensions and their sources.
 Model make_asset(const AssetSpec& spec);
 
