@@ -101,12 +101,11 @@ std::uint64_t key_of(glm::ivec2 cell, std::uint32_t number) {
       plants, Scatter::max_placements, max_per_m2);
 }
 
-// Returns the shortest turn that takes the z axis to a normal that looks up.
-glm::dquat turn_to(const glm::dvec3& normal) {
+}  // namespace
+
+glm::dquat tilt_to(const glm::dvec3& normal) {
   return glm::normalize(glm::dquat(1 + normal.z, -normal.y, normal.x, 0));
 }
-
-}  // namespace
 
 struct Scatter::Impl {
   Impl(Ground where, DensityMap wish, const ScatterSpec& wishes, Seed seed);
@@ -197,7 +196,7 @@ Placement Scatter::Impl::placed(const Dart& dart, const Footing& footing) const 
   placement.scale = share_in(spec.scale, u.x);
   placement.p_DO = footing.point - glm::dvec3(0, 0, spec.sink_m * placement.scale);
   placement.R_DO = {std::cos(half_yaw_rad), 0, 0, std::sin(half_yaw_rad)};
-  if (spec.stance == Stance::OnSlope) placement.R_DO = turn_to(footing.normal) * placement.R_DO;
+  if (spec.stance == Stance::OnSlope) placement.R_DO = tilt_to(footing.normal) * placement.R_DO;
   // The first whose share goes beyond: never one of weight 0.
   placement.prototype = static_cast<std::uint32_t>(std::ranges::upper_bound(shares_up_to, u.z) -
                                                    shares_up_to.begin());

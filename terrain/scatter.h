@@ -45,6 +45,9 @@ struct ScatterSpec {
   glm::dvec2 origin_w_m{0};  ///< D's origin in W: plants keep their place in W when the DEM is cut
 };
 
+/// Returns the shortest turn that takes the z axis to a unit normal that looks up.
+glm::dquat tilt_to(const glm::dvec3& normal);
+
 /// A plant's place. O is its own frame: z up the stem, the origin where that meets the ground.
 struct Placement {
   glm::dvec3 p_DO{0};

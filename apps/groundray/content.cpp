@@ -40,8 +40,9 @@ struct Gathered {
 class Materials {
  public:
   explicit Materials(const SceneSpec& spec)
-      : has_light_(std::ranges::any_of(
-            spec.lidars, [](const MountedLidar& mounted) { return mounted.lidar.light.has_value(); })) {
+      : has_light_(std::ranges::any_of(spec.lidars, [](const MountedLidar& mounted) {
+          return mounted.lidar.light.has_value();
+        })) {
     if (spec.terrain.material) all_.push_back(*spec.terrain.material);
   }
 
@@ -126,10 +127,10 @@ void add_object(const ObjectSpec& object, const SceneSpec& spec, const Terrain& 
     return;
   }
   const auto* recorded = std::get_if<RecordedPath>(&object.place);
-  into.moving.push_back(
-      {recorded != nullptr ? recorded_path(*recorded, terrain, begin)
-                           : driven_path(std::get<DrivenPath>(object.place), spec, terrain),
-       object.scale, model});
+  into.moving.push_back({recorded != nullptr ? recorded_path(*recorded, terrain, begin)
+                                             : driven_path(std::get<DrivenPath>(object.place),
+                                                           terrain, run_time(spec)),
+                         object.scale, model});
   into.moving_groups.push_back(
       {object.name, object.label, static_cast<std::uint32_t>(into.moving.size()), 1});
 }
@@ -148,13 +149,12 @@ void add_layer(const ScatterLayer& layer, const SceneSpec& spec, const Terrain& 
           ? DensityMap(layer.density_per_m2)
           : load_density_map(layer.density_map, {layer.density_per_m2, layer.nodata,
                                                  terrain.header().crs_wkt, origin_w_m});
-  const auto placements =
-      Scatter(terrain.ground(), density, scatter, spec.seed).placements();
+  const auto placements = Scatter(terrain.ground(), density, scatter, spec.seed).placements();
   const auto first = static_cast<std::uint32_t>(into.placed.size() + 1);
   into.placed.reserve(into.placed.size() + placements.size());
   for (const Placement& placement : placements) {
-    into.placed.push_back({placement.p_DO, placement.R_DO, placement.scale,
-                           first_model + placement.prototype});
+    into.placed.push_back(
+        {placement.p_DO, placement.R_DO, placement.scale, first_model + placement.prototype});
   }
   into.standing_groups.push_back(
       {layer.name, layer.label, first, static_cast<std::uint32_t>(placements.size())});

@@ -14,6 +14,7 @@
 #include <string>
 #include <string_view>
 
+#include "apps/groundray/fingerprint.h"
 #include "core/error.h"
 #include "core/product_io.h"
 
@@ -23,21 +24,6 @@ namespace {
 namespace fs = std::filesystem;
 
 constexpr std::string_view frames = "\nframes:\n";  // what precedes it says what run this is
-
-// FNV-1a over the numbers that a run starts from: tells runs apart whose scene files read the same.
-class Fingerprint {
- public:
-  template <typename T>
-  void add(std::span<const T> values) {
-    for (const std::byte byte : std::as_bytes(values)) {
-      value_ = (value_ ^ std::to_integer<std::uint64_t>(byte)) * 0x100000001b3;
-    }
-  }
-  std::uint64_t value() const { return value_; }
-
- private:
-  std::uint64_t value_ = 0xcbf29ce484222325;
-};
 
 double degrees(double angle_rad) { return angle_rad * 180 / std::numbers::pi; }
 
@@ -102,14 +88,6 @@ std::string decimal_seconds(std::chrono::nanoseconds time) {
                      std::abs(count % 1'000'000'000));
 }
 
-void add(const Material& material, Fingerprint& print) {
-  print.add(std::span<const char>(material.name));
-  if (const auto* matt = std::get_if<Lambertian>(&material.reflection))
-    print.add(std::span<const SpectrumSample>(matt->spectrum));
-  if (const auto* retro = std::get_if<RetroReflector>(&material.reflection))
-    print.add(std::span<const double>(&retro->coefficient_cd_lx_m2, 1));
-}
-
 std::uint64_t fingerprint(const World& world) {
   static_assert(sizeof(Trajectory::Sample) == 8 * sizeof(double),
                 "no padding, whose bytes are anything");
@@ -126,7 +104,8 @@ std::uint64_t fingerprint(const World& world) {
       }
     }
   }
-  if (world.spec.terrain.material) add(*world.spec.terrain.material, print);
+  for (const Material& material : world.content.materials) print.add_all(fingerprint_of(material));
+  print.add(std::span<const char>(world.content.fingerprint));
   return print.value();
 }
 
@@ -149,6 +128,11 @@ std::string header(const World& world) {
         "  - {{name: {}, kind: lidar, number: {}, model: {}, source: {}, frames: {}}}\n",
         yaml_text(spec.name), i, yaml_text(spec.lidar.model), yaml_text(spec.source),
         world.lidars[i].sweeps);
+  }
+  if (!world.content.groups.empty()) text += "objects:\n";
+  for (const Content::Group& group : world.content.groups) {
+    text += fmt::format("  - {{name: {}, label: {}, first_instance: {}, count: {}}}\n",
+                        yaml_text(group.name), group.label, group.first, group.count);
   }
   return text;
 }

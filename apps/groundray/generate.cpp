@@ -60,8 +60,12 @@ class SceneFor {
 
  private:
   void take(RayTracer rays) {
-    scene_ = Scene{std::move(rays), {.label = world_.spec.terrain.label}, {}};
-    if (world_.spec.terrain.material) scene_->materials = {*world_.spec.terrain.material};
+    const Content& content = world_.content;
+    scene_ = Scene{std::move(rays),
+                   {.label = world_.spec.terrain.label},
+                   content.materials,
+                   content.objects,
+                   content.models};
   }
 
   const World& world_;

@@ -11,17 +11,13 @@
 #include <variant>
 
 #include "apps/groundray/certifying.h"
+#include "apps/groundray/paths.h"
 #include "core/error.h"
 #include "core/product_io.h"
 #include "sensors/spec_io.h"
-#include "terrain/ground_path.h"
 
 namespace groundray {
 namespace {
-
-std::chrono::nanoseconds run_time(const SceneSpec& spec) {
-  return std::chrono::nanoseconds(std::llround(spec.duration_s * 1e9));
-}
 
 double seconds(std::chrono::nanoseconds time) {
   return std::chrono::duration<double>(time).count();
@@ -30,27 +26,20 @@ double seconds(std::chrono::nanoseconds time) {
 // The path in D, from time 0 on; `begin` is told when that was on the recorder's clock.
 Trajectory lay_path(const RecordedPath& path, const SceneSpec& spec, const Terrain& terrain,
                     std::chrono::nanoseconds& begin) {
-  std::vector<Trajectory::Sample> samples = read_tum(path.tum).samples();
-  begin = samples.front().time;
-  for (auto& [time, X_WB] : samples) {
-    time -= begin;
-    X_WB.translation_m -= terrain.header().origin_w_m;
-  }
-  if (samples.back().time < run_time(spec)) {
+  begin = read_tum(path.tum).begin_time();
+  Trajectory X_DB = recorded_path(path, terrain, begin);
+  if (X_DB.end_time() < run_time(spec)) {
     throw Error(
         "{}: the trajectory lasts {:.3f} s but the scene's duration_s is {} s; record longer or "
         "run shorter",
-        path.tum.string(), seconds(samples.back().time), spec.duration_s);
+        path.tum.string(), seconds(X_DB.end_time()), spec.duration_s);
   }
-  return Trajectory(std::move(samples));
+  return X_DB;
 }
 
 Trajectory lay_path(const DrivenPath& path, const SceneSpec& spec, const Terrain& terrain,
                     std::chrono::nanoseconds& /*begin*/) {
-  GroundPathSpec drive{{}, path.speed_m_s, path.height_m, path.footprint_m, run_time(spec)};
-  for (const glm::dvec2& p_W : path.waypoints_m)
-    drive.waypoints_m.push_back(p_W - glm::dvec2(terrain.header().origin_w_m));
-  return build_ground_path(terrain.ground(), drive);
+  return driven_path(path, terrain, run_time(spec));
 }
 
 // Sweeps that a double only approximates (0.3 s at 10 Hz) count as whole.
@@ -118,7 +107,8 @@ void check_place(const PlacedLidar& placed, const Terrain& terrain, std::chrono:
 // Says how far a long preparation is; most take no time that is worth a word.
 Terrain load_terrain(const TerrainSpec& spec) {
   Certifying progress;
-  return {spec.dem, spec.options, spec.detail, [&](double share) { progress.update(share); }};
+  return {spec.dem, spec.options, spec.detail, [&](double share) { progress.update(share); },
+          spec.relief};
 }
 
 double largest_reach_m(const std::vector<PlacedLidar>& lidars) {
@@ -177,7 +167,9 @@ World load_world(const std::filesystem::path& scene) {
     check_place(lidars.back(), terrain, run_time(spec));
   }
   const double reach_m = largest_reach_m(lidars);
-  return {std::move(spec), std::move(terrain), begin, std::move(lidars), reach_m};
+  Content content = build_content(spec, terrain, begin);
+  return {std::move(spec), std::move(terrain), begin, std::move(lidars),
+          reach_m,         std::move(content)};
 }
 
 }  // namespace groundray

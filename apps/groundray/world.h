@@ -5,6 +5,7 @@
 #include <filesystem>
 #include <vector>
 
+#include "apps/groundray/content.h"
 #include "core/trajectory.h"
 #include "sensors/lidar.h"
 #include "sensors/scene_spec.h"
@@ -27,6 +28,7 @@ struct World {
   std::chrono::nanoseconds begin{0};  ///< time 0 of the run, on the clock of a recorded trajectory
   std::vector<PlacedLidar> lidars;
   double reach_m = 0;  ///< from the middle of any sweep's sensor positions to the farthest, in plan
+  Content content;
 };
 
 /// Returns the box of a lidar's positions during a sweep, in D.
