@@ -98,7 +98,7 @@ LidarSpec with_light(LidarSpec spec, double pulse_energy_j) {
 }
 
 // The rays of sweep 0 as a lidar casts them.
-std::vector<Ray> sub_rays_of(const Ride& ride, const RayTracer& tracer) {
+std::vector<Ray> sub_rays_of(const Ride& ride, const Scene& scene) {
   const ScanPattern pattern(ride.spec.pattern);
   const LaserBeam beam(ride.spec.beam);
   const PulseCast::Settings settings{.beam = beam, .far_m = ride.spec.gate.far_m};
@@ -107,7 +107,7 @@ std::vector<Ray> sub_rays_of(const Ride& ride, const RayTracer& tracer) {
   const std::int64_t per_cast = 2048 / ride.spec.beam.sub_rays;
   for (std::int64_t begin = 0; begin < pattern.pulses(0); begin += per_cast) {
     const std::int64_t end = std::min(begin + per_cast, pattern.pulses(0));
-    cast.cast({pattern, ride.X_DS}, begin, end, settings, {}, tracer);
+    cast.cast({pattern, ride.X_DS}, begin, end, settings, {}, scene);
     rays.insert(rays.end(), cast.all_rays().begin(), cast.all_rays().end());
   }
   return rays;
@@ -151,7 +151,7 @@ bool agree(double a, double b, double tolerance) { return std::abs(a - b) <= tol
 void lidar_one_ray(::benchmark::State& state, Ride (*ride_of)()) {
   const Ride ride = ride_of();
   const Scene world = scene();
-  const auto rays = sub_rays_of(ride, world.rays);
+  const auto rays = sub_rays_of(ride, world);
   RawEmbree raw(ground(), rays);
   const RangeGate gate = ride.spec.gate;
   const double met = static_cast<double>(std::ranges::count_if(
@@ -226,7 +226,7 @@ void lidar_light(::benchmark::State& state, Ride (*ride_of)(), double pulse_ener
   ride.spec = with_light(ride.spec, pulse_energy_j);
   ride.spec.waveforms = waveforms;
   const Scene world = scene();
-  const auto rays = sub_rays_of(ride, world.rays);
+  const auto rays = sub_rays_of(ride, world);
   RawEmbree raw(ground(), rays);
   if (const char* fault = fault_of(ride, world)) return state.SkipWithError(fault);
   run(state, ride, world, raw, rays.size());
