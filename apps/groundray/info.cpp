@@ -92,6 +92,20 @@ void print_levels(const World& world) {
   fmt::print("triangles {} in {:.0f} MiB\n", triangles, bytes / mib);
 }
 
+void print_content(const Content& content) {
+  if (content.groups.empty()) return;
+  std::size_t triangles = 0;
+  for (const ModelScene& scene : content.objects.models())
+    triangles += scene.model().mesh.triangles.size();
+  for (const Content::Group& group : content.groups) {
+    fmt::print("objects   {}: {} of label {}, instances from {}\n", group.name, group.count,
+               group.label, group.first);
+  }
+  fmt::print("          {} models of {} triangles; {} objects in {:.1f} MiB\n",
+             content.models.size(), triangles, content.objects.size(),
+             static_cast<double>(content.memory_bytes) / mib);
+}
+
 void print_scene(const World& world) {
   fmt::print("seed      {}\n", world.spec.seed.value);
   fmt::print("duration  {} s, {} tracing\n", world.spec.duration_s,
@@ -101,6 +115,7 @@ void print_scene(const World& world) {
   print_frame(world.terrain.frame(), world.terrain.header().origin_w_m);
   if (world.terrain.whole() != nullptr) print_heights(*world.terrain.whole());
   print_levels(world);
+  print_content(world.content);
   for (const PlacedLidar& lidar : world.lidars) {
     const ScanPattern& pattern = lidar.lidar.pattern();
     const bool light = lidar.spec.lidar.light.has_value();

@@ -1,0 +1,139 @@
+// What objects cost: a million plants to build and to hold, lidar rays among them against the bare
+// ground, and leaves cut out by alpha against the same leaves whole. What is compared runs in turn
+// in every iteration, so that ratios are of one moment of one machine.
+#include <benchmark/benchmark.h>
+
+#include <algorithm>
+#include <chrono>
+#include <cmath>
+#include <ctime>
+
+#include "core/scene.h"
+#include "sensors/lidar.h"
+#include "sensors/pulse_cast.h"
+#include "sensors/spec_io.h"
+#include "terrain/asset.h"
+#include "terrain/scatter.h"
+#include "terrain/terrain_scene.h"
+#include "test/support/sample_terrain.h"
+#include "test/support/temporary_folder.h"
+
+namespace groundray::benchmark {
+namespace {
+
+using namespace std::chrono_literals;
+
+double processor_s() { return static_cast<double>(std::clock()) / CLOCKS_PER_SEC; }
+
+const HeightGrid& ground() {
+  static const HeightGrid grid = testing::fractal(1025, 1, 60, Seed{12345});
+  return grid;
+}
+
+std::vector<PlacedObject> plants(double per_m2) {
+  const Scatter scatter(ground(), DensityMap(per_m2), {.scale = {0.5, 1.5}}, Seed{3});
+  std::vector<PlacedObject> objects;
+  for (const Placement& at : scatter.placements())
+    objects.push_back({at.p_DO, at.R_DO, at.scale, at.prototype});
+  return objects;
+}
+
+Scene scene(Model model, std::vector<PlacedObject> objects) {
+  const RayDevice device;
+  std::vector<ModelScene> models{{device, std::move(model), Tracing::Fast}};
+  const std::size_t surfaces = models[0].model().surfaces.size();
+  return {RayTracer({full_resolution_level(ground())}, {0, 0, 0}, Tracing::Fast),
+          {.label = 1},
+          {},
+          {device, std::move(models), std::move(objects), {}},
+          {{2, std::vector<std::uint16_t>(surfaces)}}};
+}
+
+// The rays of a sweep of a VLS-128 two metres above the ground.
+std::vector<Ray> rays_of(const Scene& world) {
+  const LidarSpec spec = load_lidar(testing::data_folder() / "sensors/velodyne_vls128.yaml");
+  const ScanPattern pattern(spec.pattern);
+  const LaserBeam beam(spec.beam);
+  const Pose X_DS{{1, 0, 0, 0}, {0, 0, *ground().height_m_at({0, 0}) + 2}};
+  const Trajectory path({{0s, X_DS}, {1s, X_DS}});
+  PulseCast cast;
+  cast.cast({pattern, path}, 0, pattern.pulses(0), {.beam = beam, .far_m = spec.gate.far_m}, {},
+            world);
+  return {cast.all_rays().begin(), cast.all_rays().end()};
+}
+
+// Seconds of a processor that tracing takes on one thread.
+template <typename Trace>
+double time(const Trace& trace, std::span<const Ray> rays, std::vector<Hit>& hits) {
+  hits.resize(rays.size());
+  const double begin_s = processor_s();
+  trace(rays, hits);
+  return processor_s() - begin_s;
+}
+
+// What the issue of a lidar scene is: a plant of about 2,000 triangles on each square metre.
+void objects_build(::benchmark::State& state) {
+  const auto objects = plants(0.95);
+  for (auto _ : state) {
+    const RayDevice device;
+    const double begin_s = processor_s();
+    const ModelScene shrub(device, make_asset({.kind = AssetKind::Shrub}), Tracing::Fast);
+    const ObjectTracer tracer(device, {shrub}, objects, {});
+    state.SetIterationTime(processor_s() - begin_s);
+    const auto count = static_cast<double>(objects.size());
+    state.counters["objects"] = count;
+    state.counters["triangles"] = static_cast<double>(shrub.model().mesh.triangles.size());
+    state.counters["CPU_s"] = processor_s() - begin_s;
+    state.counters["B_each"] =
+        static_cast<double>(device.memory_bytes()) / count + sizeof(PlacedObject);
+  }
+}
+BENCHMARK(objects_build)->UseManualTime()->Iterations(1)->Unit(::benchmark::kMillisecond);
+
+void objects_among(::benchmark::State& state, AssetKind kind, double per_m2) {
+  const Scene world = scene(make_asset({.kind = kind}), plants(per_m2));
+  const auto rays = rays_of(world);
+  std::vector<Hit> hits, bare;
+  double with_s = 0, without_s = 0;
+  for (auto _ : state) {
+    with_s += time([&](auto of, auto& into) { world.trace(of, into); }, rays, hits);
+    without_s += time([&](auto of, auto& into) { world.rays.trace(of, into); }, rays, bare);
+  }
+  for (std::size_t i = 0; i < rays.size(); ++i) {
+    if (hits[i].range_m > bare[i].range_m)
+      return state.SkipWithError("an object took a ray further than the ground");
+  }
+  const double traced = static_cast<double>(rays.size()) * static_cast<double>(state.iterations());
+  state.counters["Mrays/CPU-s"] = 1e-6 * traced / with_s;
+  state.counters["of_bare"] = without_s / with_s;
+  state.counters["on_objects"] = static_cast<double>(std::ranges::count_if(
+                                     hits, [](const Hit& hit) { return hit.object != 0; })) /
+                                 static_cast<double>(rays.size());
+}
+BENCHMARK_CAPTURE(objects_among, grass, AssetKind::GrassTuft, 0.95)->MinTime(2);
+BENCHMARK_CAPTURE(objects_among, shrubs, AssetKind::Shrub, 0.05)->MinTime(2);
+BENCHMARK_CAPTURE(objects_among, conifers, AssetKind::Conifer, 0.01)->MinTime(2);
+
+void objects_alpha(::benchmark::State& state) {
+  const auto objects = plants(0.01);
+  Model whole = make_asset({.kind = AssetKind::Conifer});
+  for (ModelSurface& surface : whole.surfaces) surface.least_alpha = 0;
+  const Scene cut = scene(make_asset({.kind = AssetKind::Conifer}), objects);
+  const Scene opaque = scene(std::move(whole), objects);
+  const auto rays = rays_of(cut);
+  std::vector<Hit> of_cut, of_opaque;
+  double cut_s = 0, opaque_s = 0;
+  for (auto _ : state) {
+    cut_s += time([&](auto of, auto& into) { cut.trace(of, into); }, rays, of_cut);
+    opaque_s += time([&](auto of, auto& into) { opaque.trace(of, into); }, rays, of_opaque);
+  }
+  for (std::size_t i = 0; i < rays.size(); ++i) {
+    if (of_cut[i].range_m < of_opaque[i].range_m - 1e-6)
+      return state.SkipWithError("a leaf that is cut out hides what the whole leaf does not");
+  }
+  state.counters["of_opaque"] = cut_s / opaque_s;
+}
+BENCHMARK(objects_alpha)->MinTime(2);
+
+}  // namespace
+}  // namespace groundray::benchmark
