@@ -25,8 +25,7 @@ ModelScene::Impl::Textures textures_of(const ModelSurface& surface) {
   ModelScene::Impl::Textures all{texture_of(surface.albedo, Encoding::Srgb),
                                  texture_of(surface.normal, Encoding::Linear),
                                  texture_of(surface.opacity, Encoding::Linear)};
-  if (all.opacity || (all.albedo && all.albedo->has_alpha()))
-    all.least_alpha = surface.least_alpha;
+  if (all.opacity || (all.albedo && all.albedo->has_alpha())) all.least_alpha = surface.least_alpha;
   return all;
 }
 

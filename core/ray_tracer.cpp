@@ -328,9 +328,8 @@ void RayTracer::bound_errors(std::span<const Ray> rays, std::span<const Hit> hit
   constexpr double infinity = std::numeric_limits<double>::infinity();
   const GridFrame& frame = impl_->level(0).level.frame;
   for (std::size_t i = 0; i < rays.size(); ++i) {
-    const auto band =
-        impl_->surface.band(frame.to_grid(rays[i].origin, rays[i].direction),
-                            hits[i].object == 0 ? rays[i].far_m : hits[i].range_m);
+    const auto band = impl_->surface.band(frame.to_grid(rays[i].origin, rays[i].direction),
+                                          hits[i].object == 0 ? rays[i].far_m : hits[i].range_m);
     const double range_m = hits[i].range_m;
     const double rounding_m = 1e-9 * range_m + 1e-9;  // what ranges themselves promise
     if (!band.is_certain) {

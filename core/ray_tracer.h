@@ -36,9 +36,9 @@ struct Ray {
 struct Hit {
   double range_m =
       std::numeric_limits<double>::infinity();  ///< along the ray; infinite if it meets nothing
-  glm::vec3 normal{0};  ///< of the facet, unit, in D: of the ground up, of an object to the ray
-  float deviation_m = 0;     ///< of the leaf: how far it may be from the reference, vertically
-  std::uint32_t part = 0;    ///< index of the level that was hit; on an object, of the triangle
+  glm::vec3 normal{0};     ///< of the facet, unit, in D: of the ground up, of an object to the ray
+  float deviation_m = 0;   ///< of the leaf: how far it may be from the reference, vertically
+  std::uint32_t part = 0;  ///< index of the level that was hit; on an object, of the triangle
   std::uint32_t object = 0;  ///< number of the object that was hit; 0 for the ground
   explicit operator bool() const noexcept {
     return range_m < std::numeric_limits<double>::infinity();

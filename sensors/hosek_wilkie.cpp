@@ -17,7 +17,8 @@ constexpr int turbidities = 10, albedos = 2, nodes = 6, channels = 3, parameters
 constexpr double table[] = {
 #include <sky/hosek_wilkie_rgb.inc>
 };
-static_assert(std::size(table) == turbidities * albedos * nodes * channels * parameters);
+static_assert(std::size(table) ==
+              std::size_t{turbidities} * albedos * nodes * channels * parameters);
 
 // The Bernstein polynomials of the fifth degree: the model's curve over the sun's elevation.
 std::array<double, nodes> node_weights(double elevation_rad) {

@@ -85,7 +85,6 @@ std::optional<int> take_digits(std::string_view& text, std::size_t digits) {
 
 // Returns the time that "2003-10-17T19:30:30Z" spells, whole seconds; ISO 8601.
 std::optional<Time> parse_utc(std::string_view text) {
-  using namespace std::chrono;
   std::array<int, 6> parts{};
   constexpr std::string_view separators = "--T::Z";
   for (std::size_t i = 0; i < parts.size(); ++i) {
@@ -94,11 +93,13 @@ std::optional<Time> parse_utc(std::string_view text) {
     parts[i] = *part;
     text.remove_prefix(1);
   }
-  const year_month_day date{year{parts[0]}, month{static_cast<unsigned>(parts[1])},
-                            day{static_cast<unsigned>(parts[2])}};
+  const std::chrono::year_month_day date{std::chrono::year{parts[0]},
+                                         std::chrono::month{static_cast<unsigned>(parts[1])},
+                                         std::chrono::day{static_cast<unsigned>(parts[2])}};
   if (!text.empty() || !date.ok() || parts[3] > 23 || parts[4] > 59 || parts[5] > 59)
     return std::nullopt;
-  return sys_days(date) + hours(parts[3]) + minutes(parts[4]) + seconds(parts[5]);
+  return std::chrono::sys_days(date) + std::chrono::hours(parts[3]) +
+         std::chrono::minutes(parts[4]) + std::chrono::seconds(parts[5]);
 }
 
 SunTime read_time(Map& map, Faults& faults) {

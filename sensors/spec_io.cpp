@@ -22,7 +22,6 @@ namespace groundray {
 namespace {
 
 namespace fs = std::filesystem;
-using yaml::any_number;
 using yaml::Faults;
 using yaml::Map;
 using yaml::Need;

@@ -21,11 +21,10 @@ constexpr double delta_t_s = 69;
 constexpr double parallax_deg = 8.794 / 3600;  // of the sun at 1 au, on the horizon
 
 void check(Time utc, const Place& place) {
-  using namespace std::chrono;
-  const year_month_day date(floor<days>(utc));
+  const std::chrono::year_month_day date(std::chrono::floor<std::chrono::days>(utc));
   Violations broken("Sun");
-  broken.unless(date.year() >= 1900y && date.year() <= 2100y, "the year {} must be in [1900, 2100]",
-                static_cast<int>(date.year()));
+  broken.unless(date.year() >= std::chrono::year(1900) && date.year() <= std::chrono::year(2100),
+                "the year {} must be in [1900, 2100]", static_cast<int>(date.year()));
   broken.unless(std::abs(place.latitude_deg) <= 90, "latitude_deg = {} must be in [-90, 90]",
                 place.latitude_deg);
   broken.unless(std::abs(place.longitude_deg) <= 360, "longitude_deg = {} must be in [-360, 360]",
@@ -80,9 +79,9 @@ glm::dvec3 direction_of(double azimuth_rad, double elevation_rad) noexcept {
 
 SunPosition sun_position(Time utc, const Place& place) {
   check(utc, place);
-  using namespace std::chrono;
-  constexpr auto noon_of_j2000 = sys_days(2000y / January / 1) + 12h;
-  const double days = duration_cast<Days>(utc - noon_of_j2000).count();
+  constexpr auto noon_of_j2000 =
+      std::chrono::sys_days(std::chrono::year(2000) / 1 / 1) + std::chrono::hours(12);
+  const double days = std::chrono::duration_cast<Days>(utc - noon_of_j2000).count();
   const double centuries = days / days_per_century;
   const Geocentric sun = geocentric_sun(centuries + delta_t_s / (86400 * days_per_century));
   const double sidereal_deg = 280.46061837 + 360.98564736629 * days +

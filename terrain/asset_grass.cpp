@@ -29,7 +29,7 @@ void add_blade(AssetBuilder& builder, AssetRandom& random, std::uint16_t surface
   const double lean = random.between(0.03, 0.45), bend = random.between(0.1, 1.1);
   const double twist = 0.5 * random.normal();
   const glm::dvec3 across{-std::sin(azimuth), std::cos(azimuth), 0};
-  std::array<std::uint32_t, 2 * segment_count> pair{};
+  std::array<std::uint32_t, std::size_t{2} * segment_count> pair{};
   for (std::size_t i = 0; i <= segment_count; ++i) {
     const double s = static_cast<double>(i) / segment_count;
     const double tilt = lean + bend * s * s;  // from the vertical

@@ -71,8 +71,8 @@ struct Waves {
   // The largest wave numbers; that of two samples a wave is not used.
   glm::ivec2 last() const {
     const glm::dvec2 most = 1.0 / (spec.shortest_m * per_period_m);
-    return {static_cast<int>(std::min(most.x, size.x / 2 - 1.0)),
-            static_cast<int>(std::min(most.y, size.y / 2 - 1.0))};
+    return {static_cast<int>(std::min(most.x, size.x / 2.0 - 1)),
+            static_cast<int>(std::min(most.y, size.y / 2.0 - 1))};
   }
   // Power of a wave, but for a factor.
   double power(int m, int n) const {

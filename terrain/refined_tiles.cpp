@@ -16,7 +16,8 @@ using passes::rounded_up;
 constexpr float infinity = std::numeric_limits<float>::infinity();
 
 std::size_t index_of(glm::ivec2 place, int columns) {
-  return static_cast<std::size_t>(place.y * columns + place.x);
+  return static_cast<std::size_t>(place.y) * static_cast<std::size_t>(columns) +
+         static_cast<std::size_t>(place.x);
 }
 
 // What is known of a node from the surface of the DEM there.

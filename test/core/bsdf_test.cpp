@@ -20,7 +20,6 @@
 namespace groundray {
 namespace {
 
-using ::testing::HasSubstr;
 using ::testing::ThrowsMessage;
 
 constexpr double pi = std::numbers::pi;
@@ -179,7 +178,7 @@ struct Bins {
     const int i = std::min(static_cast<int>((w.z + 1) / 2 * cosines), cosines - 1);
     const double turn = std::atan2(w.y, w.x) / (2 * pi);
     const int k = std::min(static_cast<int>((turn - std::floor(turn)) * azimuths), azimuths - 1);
-    return static_cast<std::size_t>(i * azimuths + k);
+    return static_cast<std::size_t>(i) * azimuths + static_cast<std::size_t>(k);
   }
 };
 

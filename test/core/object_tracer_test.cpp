@@ -262,8 +262,9 @@ TEST_P(ObjectTracing, AMovingObjectIsMetWhereItIsAtTheRaysTime) {
     }
     const auto hits = trace(tracer, rays);
     for (std::size_t i = 0; i < rays.size(); ++i) {
-      const Pose X = X_DO.pose_at(std::clamp(rays[i].time, X_DO.begin_time(), X_DO.end_time()));
-      const std::vector<PlacedObject> still{{X.translation_m, X.rotation, 1.5, 0}};
+      const auto time = std::clamp(rays[i].time, X_DO.begin_time(), X_DO.end_time());
+      const Pose X_DB = X_DO.pose_at(time);
+      const std::vector<PlacedObject> still{{X_DB.translation_m, X_DB.rotation, 1.5, 0}};
       const Nearest expected = nearest_of(models, still, rays[i]);
       ASSERT_EQ(hits[i].range_m < infinity, expected.range_m < infinity);
       if (!hits[i]) continue;
@@ -341,7 +342,7 @@ TEST_P(ObjectTracing, CutOutsLetRaysThroughWhereTheyAreClear) {
   const auto hits = trace(tracer, rays);
   for (int y = 0; y < 4; ++y) {
     for (int x = 0; x < 4; ++x) {
-      const Hit& hit = hits[static_cast<std::size_t>(4 * y + x)];
+      const Hit& hit = hits[static_cast<std::size_t>(y) * 4 + static_cast<std::size_t>(x)];
       EXPECT_EQ(static_cast<bool>(hit), !is_clear(x, y)) << x << ' ' << y;
       EXPECT_EQ(hit.range_m, is_clear(x, y) ? infinity : 5);
     }
@@ -371,7 +372,8 @@ TEST(ObjectTracer, ListsWhatIsWrongWithObjects) {
   const RayDevice device;
   const std::vector<ModelScene> models{{device, box_model({1, 1, 1}), Tracing::Fast}};
   try {
-    ObjectTracer(device, models, {{.scale = 0}, {.model = 3}, {.p_DO = {NAN, 0, 0}}}, {});
+    const ObjectTracer tracer(device, models, {{.scale = 0}, {.model = 3}, {.p_DO = {NAN, 0, 0}}},
+                              {});
     FAIL();
   } catch (const Error& error) {
     EXPECT_THAT(error.what(), AllOf(HasSubstr("object 1: its scale = 0 must be positive"),

@@ -210,10 +210,10 @@ TEST(EnvironmentMap, DrawsAgreeWithTheirDensity) {
   constexpr int width = 12, height = 6, count = 400'000;
   const EnvironmentMap map(harsh_image(width, height), 0.4, RadianceScale{});
   const LatLongGrid grid(width, height, 0.4);
-  std::vector<double> seen(2 * width * 2 * (height + 1));
+  std::vector<double> seen(std::size_t{4} * width * (height + 1));
   const auto bin = [&](const LatLongPlace& at) {
     const int column = 2 * at.left + (at.across >= 0.5), row = 2 * at.patch_row + (at.sink >= 0.5);
-    return static_cast<std::size_t>(2 * width * row + column);
+    return static_cast<std::size_t>(row) * 2 * width + static_cast<std::size_t>(column);
   };
   std::mt19937_64 random(17);
   std::uniform_real_distribution<double> uniform(0, 1);

@@ -21,7 +21,10 @@ class Spectrum {
   Spectrum(const std::vector<double>& field, glm::ivec2 size) : size_(size) {
     std::vector<Complex> by_row(field.size());
     terms_.resize(field.size());
-    const auto at = [&](int x, int y) { return static_cast<std::size_t>(y * size.x + x); };
+    const auto at = [&](int x, int y) {
+      return static_cast<std::size_t>(y) * static_cast<std::size_t>(size.x) +
+             static_cast<std::size_t>(x);
+    };
     for (int y = 0; y < size.y; ++y) {
       for (int m = 0; m < size.x; ++m) {
         for (int x = 0; x < size.x; ++x) by_row[at(m, y)] += field[at(x, y)] * wave(m * x, size.x);
@@ -34,7 +37,9 @@ class Spectrum {
     }
   }
   Complex operator()(int m, int n) const {
-    return terms_[static_cast<std::size_t>(((n + size_.y) % size_.y) * size_.x + m)];
+    return terms_[static_cast<std::size_t>((n + size_.y) % size_.y) *
+                      static_cast<std::size_t>(size_.x) +
+                  static_cast<std::size_t>(m)];
   }
 
  private:
