@@ -5,8 +5,6 @@
 #include <glm/common.hpp>
 #include <glm/geometric.hpp>
 #include <limits>
-#include <numeric>
-#include <tuple>
 
 #include "core/error.h"
 
@@ -19,34 +17,14 @@ std::size_t first_breach(const std::vector<T>& all, const Rule& holds) {
   return static_cast<std::size_t>(std::ranges::find_if_not(all, holds) - all.begin());
 }
 
-bool less(const glm::dvec3& a, const glm::dvec3& b) {
-  return std::tie(a.x, a.y, a.z) < std::tie(b.x, b.y, b.z);
-}
-
-/// Numbers the vertices so that those at equal positions have equal numbers.
-std::vector<std::uint32_t> place_numbers(const std::vector<glm::dvec3>& vertices_m) {
-  std::vector<std::uint32_t> order(vertices_m.size());
-  std::iota(order.begin(), order.end(), 0u);
-  std::ranges::sort(
-      order, [&](std::uint32_t a, std::uint32_t b) { return less(vertices_m[a], vertices_m[b]); });
-  std::vector<std::uint32_t> places(vertices_m.size());
-  for (std::size_t i = 1; i < order.size(); ++i) {
-    places[order[i]] =
-        places[order[i - 1]] + (vertices_m[order[i]] != vertices_m[order[i - 1]] ? 1u : 0u);
-  }
-  return places;
-}
-
-struct Edge {
-  std::uint32_t low, high;  // places
-  std::uint32_t triangle;
-  int side;
-};
-
 }  // namespace
 
 void check_model(const Model& model, const std::string& name) {
-  const auto& [mesh, uv, normals, surface_of, surfaces] = model;
+  const TriangleMesh& mesh = model.mesh;
+  const auto& uv = model.uv;
+  const auto& normals = model.normals;
+  const auto& surface_of = model.surface_of;
+  const auto& surfaces = model.surfaces;
   const std::size_t vertices = mesh.vertices_m.size(), triangles = mesh.triangles.size();
   constexpr double most_m = std::numeric_limits<float>::max();
   const std::size_t bad_vertex = first_breach(mesh.vertices_m, [](const glm::dvec3& p) {
@@ -92,32 +70,6 @@ ModelBounds bounds_of(const TriangleMesh& mesh) {
     }
   }
   return bounds;
-}
-
-std::vector<glm::uvec3> neighbours_of(const TriangleMesh& mesh) {
-  const std::vector<std::uint32_t> places = place_numbers(mesh.vertices_m);
-  std::vector<Edge> edges;
-  edges.reserve(3 * mesh.triangles.size());
-  for (std::uint32_t i = 0; i < mesh.triangles.size(); ++i) {
-    for (int k = 0; k < 3; ++k) {
-      const std::uint32_t a = places[mesh.triangles[i][k]];
-      const std::uint32_t b = places[mesh.triangles[i][(k + 1) % 3]];
-      if (a != b) edges.push_back({std::min(a, b), std::max(a, b), i, k});
-    }
-  }
-  const auto ends = [](const Edge& e) { return std::tie(e.low, e.high); };
-  std::ranges::sort(edges, [&](const Edge& a, const Edge& b) { return ends(a) < ends(b); });
-  std::vector<glm::uvec3> neighbours(mesh.triangles.size(), glm::uvec3(no_neighbour));
-  for (auto first = edges.begin(); first != edges.end();) {
-    const auto last =
-        std::find_if(first, edges.end(), [&](const Edge& e) { return ends(e) != ends(*first); });
-    if (last - first == 2 && first->triangle != first[1].triangle) {
-      neighbours[first->triangle][first->side] = first[1].triangle;
-      neighbours[first[1].triangle][first[1].side] = first->triangle;
-    }
-    first = last;
-  }
-  return neighbours;
 }
 
 }  // namespace groundray

@@ -53,13 +53,4 @@ struct ModelBounds {
 /// Returns the least box round those vertices that a triangle of the mesh has, in its frame.
 ModelBounds bounds_of(const TriangleMesh& mesh);
 
-/// Stands for the triangle that is not there.
-constexpr std::uint32_t no_neighbour = 0xffffffff;
-
-/// Returns for each triangle the triangles across its edges; edge k runs from corner k to corner
-/// (k + 1) % 3. Edges are the same where their ends have equal positions, whichever way they run,
-/// so seams of texture do not part triangles. Borders have `no_neighbour`, and so have edges of
-/// more than two triangles and edges without length. O(n log n).
-std::vector<glm::uvec3> neighbours_of(const TriangleMesh& mesh);
-
 }  // namespace groundray

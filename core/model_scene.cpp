@@ -13,7 +13,10 @@
 namespace groundray {
 namespace {
 
-constexpr int most_steps = 32;  // from triangle to triangle; Embree's is next to the right one
+Model checked(Model model) {
+  check_model(model, "model");
+  return model;
+}
 
 std::optional<Texture> texture_of(const ModelImage& image, Encoding encoding) {
   if (!image.exists()) return std::nullopt;
@@ -131,11 +134,17 @@ void build_exact(ModelScene::Impl& model) {
 }  // namespace
 
 ModelScene::Impl::Impl(const RayDevice& with, Model content, Tracing how)
-    : device(with), model(std::move(content)), tracing(how) {
-  check_model(model, "model");
+    : device(with), model(checked(std::move(content))), tracing(how), stars(model.mesh) {
   for (const ModelSurface& surface : model.surfaces)
     textures.push_back(groundray::textures_of(surface));
-  neighbours = neighbours_of(model.mesh);
+  for (std::size_t i = 0; i < textures.size() && model.uv.empty(); ++i) {
+    if (textures[i].least_alpha > 0) {
+      throw Error(
+          "model: its surface '{}' is cut out by an image, but there are no uv to lay it on: give "
+          "the model uv, or take the image's alpha away",
+          model.surfaces[i].name);
+    }
+  }
   low_m = high_m = model.mesh.vertices_m[model.mesh.triangles[0].x];
   for (const glm::uvec3& corners : model.mesh.triangles) {
     for (int k = 0; k < 3; ++k) {
@@ -198,25 +207,28 @@ bool ModelScene::Impl::is_opaque(std::uint32_t triangle, const glm::dvec3& share
   return alpha >= worn.least_alpha;
 }
 
-// Goes from triangle to triangle over the edge that the line passes on the wrong side of. Back over
-// the same edge means that the surface folds there: a silhouette, and the line passes outside.
+std::optional<double> ModelScene::Impl::meet(std::uint32_t triangle,
+                                             const ModelRay& ray) const noexcept {
+  const glm::dvec3 edges = edges_of(triangle, ray);
+  if (!is_inside(edges)) return std::nullopt;
+  const double t_m = range_m(triangle, ray);
+  if (!(t_m >= 0) || !is_opaque(triangle, shares(edges))) return std::nullopt;
+  return t_m;
+}
+
+// Embree's floats are finer than triangles: what the ray meets has a corner in common.
 std::optional<ModelCrossing> ModelScene::Impl::settle(std::uint32_t triangle,
                                                       const ModelRay& ray) const noexcept {
-  std::uint32_t before = no_neighbour;
-  for (int step = 0; step < most_steps; ++step) {
-    const glm::dvec3 edges = edges_of(triangle, ray);
-    if (is_inside(edges)) return ModelCrossing{range_m(triangle, ray), triangle};
-    const double sense = edges.x + edges.y + edges.z < 0 ? -1 : 1;
-    int worst = 0;
-    for (int k = 1; k < 3; ++k) {
-      if (sense * edges[k] < sense * edges[worst]) worst = k;
+  if (const auto t_m = meet(triangle, ray)) return ModelCrossing{*t_m, triangle};
+  ModelCrossing best;
+  for (int k = 0; k < 3; ++k) {
+    for (const std::uint32_t other : stars.round(model.mesh.triangles[triangle][k])) {
+      const auto t_m = meet(other, ray);
+      if (t_m && *t_m < best.t_m) best = {*t_m, other};
     }
-    const std::uint32_t next = neighbours[triangle][worst];
-    if (next == no_neighbour || next == before) return std::nullopt;
-    before = triangle;
-    triangle = next;
   }
-  return std::nullopt;
+  if (best.t_m == std::numeric_limits<double>::infinity()) return std::nullopt;
+  return best;
 }
 
 ModelScene::ModelScene(const RayDevice& device, Model model, Tracing tracing)

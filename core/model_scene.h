@@ -9,6 +9,7 @@
 #include <optional>
 #include <vector>
 
+#include "core/corner_stars.h"
 #include "core/embree_adapter.h"
 #include "core/object_tracer.h"
 #include "core/texture.h"
@@ -40,8 +41,8 @@ struct ModelScene::Impl {
     std::optional<Texture> albedo, normal, opacity;
     float least_alpha = 0;  // below it the surface is cut out; 0 for nowhere
   };
-  std::vector<Textures> textures;         // by surface
-  std::vector<glm::uvec3> neighbours;     // of each triangle across its edges
+  std::vector<Textures> textures;  // by surface
+  CornerStars stars;
   std::vector<std::uint32_t> solid, cut;  // triangles by primitive: without and with an alpha
   glm::dvec3 low_m{0}, high_m{0};         // their box
   glm::dvec3 centre_m{0};                 // of it: the origin of the scene's floats
@@ -68,9 +69,13 @@ struct ModelScene::Impl {
   }
   bool is_opaque(std::uint32_t triangle, const glm::dvec3& shares) const noexcept;
 
-  /// Finds in double the triangle that a ray meets near one that Embree named; nothing if it passes
-  /// by.
+  /// Finds in double where a ray meets the surface by a triangle that Embree named: that one, or
+  /// the nearest of those that share a corner with it. Nothing if it passes them all by, begins
+  /// behind them, or goes through where they are cut out.
   std::optional<ModelCrossing> settle(std::uint32_t triangle, const ModelRay& ray) const noexcept;
+
+ private:
+  std::optional<double> meet(std::uint32_t triangle, const ModelRay& ray) const noexcept;
 };
 
 /// Whether a line passes inside all three edges of a triangle.

@@ -326,7 +326,7 @@ std::optional<ModelCrossing> search(const ModelScene::Impl& model, const ModelRa
   const float far_m = far_float(leave_m - enter_m, model.slack_m);
   for (;;) {
     RTCRayHit one{};
-    const float next_m = std::nextafter(from_m * (1 + 0x1p-22f), far_m);
+    const float next_m = from_m * (1 + 0x1p-22f) + 0x1p-6f * model.slack_m;
     one.ray = {origin.x,    origin.y, origin.z, next_m, direction.x, direction.y,
                direction.z, 0,        far_m,    ~0u,    0,           0};
     one.hit.geomID = RTC_INVALID_GEOMETRY_ID;
@@ -352,8 +352,14 @@ std::optional<ModelCrossing> crossing_of(const ModelScene::Impl& model, const Lo
   const auto& hit = local.floats.hit;
   if (hit.geomID[i] == RTC_INVALID_GEOMETRY_ID) return std::nullopt;
   const ModelRay ray = local.ray(i);
-  if (auto found = model.settle(model.triangle_of(hit.geomID[i], hit.primID[i]), ray)) return found;
-  return search(model, ray, local.enter_m[i], local.leave_m[i], local.floats.ray.tfar[i]);
+  const std::uint32_t named = model.triangle_of(hit.geomID[i], hit.primID[i]);
+  const float at_m = local.floats.ray.tfar[i];
+  const auto found = model.settle(named, ray);
+  if (found && found->triangle == named) return found;
+  // Another one beside it; something else may be in between.
+  const double end_m = found ? found->t_m : local.leave_m[i];
+  const auto between = search(model, ray, local.enter_m[i], end_m, at_m);
+  return between && (!found || between->t_m < found->t_m) ? between : found;
 }
 
 // Meets a model with the valid lanes of `local`, each of which has come in its own way.
@@ -438,10 +444,16 @@ void ObjectTracer::Impl::meet_moving(const RTCIntersectFunctionNArguments* argum
   std::array<const IntoModel*, W> all;
   LocalPacket<W> local;
   local.valid.fill(0);
+  const auto is_now = [&](std::size_t lane) {
+    return stretch.begin <= packet.time[lane] && packet.time[lane] <= stretch.end;
+  };
+  bool any = false;
+  for_each_lane(arguments, [&](std::size_t lane) { any |= is_now(lane); });
+  if (!any) return;
   for (std::size_t i = 0; i < W; ++i) lay(IntoModel{}, packet, i, local);
   for_each_lane(arguments, [&](std::size_t lane) {
     const nanoseconds time = packet.time[lane];
-    if (time < stretch.begin || stretch.end < time) return;
+    if (!is_now(lane)) return;
     const Pose X_DO = tracer.pose(object, time);
     into[lane] = into_model(X_DO.rotation, X_DO.translation_m, object.scale);
     all[lane] = &into[lane];

@@ -24,6 +24,7 @@
 #include "core/error.h"
 #include "core/mesh_io.h"
 #include "core/product_io.h"
+#include "test/support/mesh_neighbours.h"
 #include "test/support/temporary_folder.h"
 
 namespace groundray {
@@ -188,8 +189,8 @@ class ModelIo : public ::testing::Test {
     EXPECT_EQ(bounds.high_m, size);
     // A tetrahedron has a sixth of its box; inside out it would be negative.
     EXPECT_DOUBLE_EQ(six_volumes(model), size.x * size.y * size.z);
-    for (const glm::uvec3& sides : neighbours_of(model.mesh)) {
-      for (int k = 0; k < 3; ++k) EXPECT_NE(sides[k], no_neighbour);
+    for (const glm::uvec3& sides : testing::neighbours_of(model.mesh)) {
+      for (int k = 0; k < 3; ++k) EXPECT_NE(sides[k], testing::no_neighbour);
     }
   }
   TemporaryFolder folder_;
@@ -318,7 +319,7 @@ TEST_F(ModelIo, ObjVerticesAreJoinedWherePositionUvAndNormalAreEqual) {
             (std::vector<glm::uvec3>{{0, 1, 2}, {0, 2, 3}, {1, 4, 5}, {1, 5, 2}}));
   EXPECT_TRUE(joined.normals.empty());
   // Seams or not, the squares are neighbours.
-  EXPECT_EQ(neighbours_of(seam.mesh), neighbours_of(joined.mesh));
+  EXPECT_EQ(testing::neighbours_of(seam.mesh), testing::neighbours_of(joined.mesh));
 }
 
 TEST_F(ModelIo, CornersWithoutANormalHaveThatOfTheirTriangle) {
@@ -644,8 +645,8 @@ TEST_F(SharedModel, StanfordBunny) {
   EXPECT_EQ(bunny.model.mesh.vertices_m.size(), 34834u);  // of 35947, that triangles name
   // Of its edges 223 are of one face, and the others of two.
   std::size_t borders = 0;
-  for (const glm::uvec3& sides : neighbours_of(bunny.model.mesh)) {
-    for (int k = 0; k < 3; ++k) borders += sides[k] == no_neighbour;
+  for (const glm::uvec3& sides : testing::neighbours_of(bunny.model.mesh)) {
+    for (int k = 0; k < 3; ++k) borders += sides[k] == testing::no_neighbour;
   }
   EXPECT_EQ(borders, 223u);
 }
@@ -675,90 +676,6 @@ TEST_F(SharedModel, WarthogRobot) {
   const ModelBounds felt = bounds_of(read_model(robot / "tracks_collision.stl", drop).model.mesh);
   EXPECT_LT(glm::distance(seen.low_m, felt.low_m), 1e-6);
   EXPECT_LT(glm::distance(seen.high_m, felt.high_m), 1e-6);
-}
-
-class NeighbourOracle {
- public:
-  explicit NeighbourOracle(const TriangleMesh& mesh) : mesh_(mesh) {}
-  /// Every triangle is compared with every other.
-  std::uint32_t across(std::uint32_t triangle, int k) const {
-    std::uint32_t found = no_neighbour;
-    int sides = 0;
-    for (std::uint32_t i = 0; i < mesh_.triangles.size(); ++i) {
-      for (int j = 0; j < 3; ++j) {
-        if (ends(i, j) != ends(triangle, k)) continue;
-        ++sides;
-        if (i != triangle) found = i;
-      }
-    }
-    return sides == 2 ? found : no_neighbour;
-  }
-
- private:
-  std::set<std::tuple<double, double, double>> ends(std::uint32_t triangle, int k) const {
-    std::set<std::tuple<double, double, double>> all;
-    for (const int c : {k, (k + 1) % 3}) {
-      const glm::dvec3& p = mesh_.vertices_m[mesh_.triangles[triangle][c]];
-      all.emplace(p.x, p.y, p.z);
-    }
-    return all;
-  }
-  const TriangleMesh& mesh_;
-};
-
-TEST(Model, NeighboursAreThoseThatBruteForceFinds) {
-  std::mt19937 random(7);
-  for (int round = 0; round < 40; ++round) {
-    // Few places, some doubly named: there are borders, edges of three triangles, and slivers.
-    TriangleMesh mesh;
-    std::uniform_int_distribution<int> place(0, 2);
-    for (int i = 0; i < 20; ++i) {
-      mesh.vertices_m.emplace_back(place(random) * (i % 2 == 0 ? 1.0 : -1.0), place(random), 0.1);
-    }
-    std::uniform_int_distribution<std::uint32_t> vertex(0, 19);
-    for (int i = 0; i < 25; ++i) {
-      mesh.triangles.emplace_back(vertex(random), vertex(random), vertex(random));
-    }
-    const std::vector<glm::uvec3> neighbours = neighbours_of(mesh);
-    const NeighbourOracle oracle(mesh);
-    for (std::uint32_t i = 0; i < 25; ++i) {
-      for (int k = 0; k < 3; ++k) {
-        const glm::uvec3& t = mesh.triangles[i];
-        if (mesh.vertices_m[t[k]] == mesh.vertices_m[t[(k + 1) % 3]]) {
-          EXPECT_EQ(neighbours[i][k], no_neighbour);
-        } else {
-          EXPECT_EQ(neighbours[i][k], oracle.across(i, k)) << round << ", " << i << ", " << k;
-        }
-      }
-    }
-  }
-}
-
-TEST(Model, EveryEdgeOfAClosedMeshHasItsNeighbour) {
-  // A torus of 30 x 20 quads whose triangles share no vertex.
-  TriangleMesh mesh;
-  const auto place = [](int i, int j) {
-    const double a = 2 * std::numbers::pi * (i % 30) / 30, b = 2 * std::numbers::pi * (j % 20) / 20;
-    return glm::dvec3((3 + std::cos(b)) * std::cos(a), (3 + std::cos(b)) * std::sin(a),
-                      std::sin(b));
-  };
-  for (int i = 0; i < 30; ++i) {
-    for (int j = 0; j < 20; ++j) {
-      for (const auto& [u, v, w] : {std::tuple(0, 1, 3), std::tuple(0, 3, 2)}) {
-        const auto first = static_cast<std::uint32_t>(mesh.vertices_m.size());
-        for (const int c : {u, v, w}) mesh.vertices_m.push_back(place(i + c % 2, j + c / 2));
-        mesh.triangles.emplace_back(first, first + 1, first + 2);
-      }
-    }
-  }
-  const std::vector<glm::uvec3> neighbours = neighbours_of(mesh);
-  for (std::uint32_t i = 0; i < neighbours.size(); ++i) {
-    for (int k = 0; k < 3; ++k) {
-      ASSERT_NE(neighbours[i][k], no_neighbour);
-      const glm::uvec3& back = neighbours[neighbours[i][k]];
-      EXPECT_TRUE(back.x == i || back.y == i || back.z == i);
-    }
-  }
 }
 
 TEST(Model, CheckNamesEveryFault) {

@@ -194,7 +194,7 @@ TEST_P(ObjectTracing, OfManyObjectsThatOverlapTheNearestIsMet) {
                                        {device_, icosphere(0.7, 1), GetParam()}};
   const auto objects = crowd(60, 2, random);
   const ObjectTracer tracer(device_, models, objects, {});
-  const auto rays = rays_at(glm::dvec3(0), 15, 40, 3000, random);
+  const auto rays = rays_at(glm::dvec3(0), 15, 40, 1500, random);
   const auto hits = trace(tracer, rays);
   int otherwise = 0;
   for (std::size_t i = 0; i < rays.size(); ++i) {
@@ -234,6 +234,53 @@ TEST_P(ObjectTracing, NoRayLeaksThroughVerticesAndEdges) {
     // The facets of the mesh lie between the ball through their vertices and 1.2 % inside.
     ASSERT_GT(from_centre_m, 2 * 0.985);
     ASSERT_LT(from_centre_m, 2 * (1 + 1e-9));
+  }
+}
+
+// Exports often have each face twice, once turned over: every edge is then one of four triangles.
+TEST_P(ObjectTracing, NoRayLeaksThroughEdgesOfAModelWhoseFacesAreDoubled) {
+  std::mt19937_64 random(7);
+  Model sphere = icosphere(1, 3);
+  const std::size_t faces = sphere.mesh.triangles.size();
+  for (std::size_t i = 0; i < faces; ++i) {
+    const glm::uvec3 t = sphere.mesh.triangles[i];
+    sphere.mesh.triangles.emplace_back(t.x, t.z, t.y);
+  }
+  sphere.surface_of.resize(2 * faces);
+  const ObjectTracer tracer(device_, {{device_, sphere, GetParam()}}, {{{300, 20, 5}}}, {});
+  std::vector<Ray> rays;
+  for (std::size_t i = 0; i < faces; ++i) {
+    const glm::uvec3& t = sphere.mesh.triangles[i];
+    const glm::dvec3 a = sphere.mesh.vertices_m[t.x], b = sphere.mesh.vertices_m[t.y];
+    for (const double share : {0.0, 0.25, 0.5, 0.9}) {
+      const glm::dvec3 inside = glm::dvec3(300, 20, 5) + 0.5 * random_direction(random);
+      const glm::dvec3 target = glm::dvec3(300, 20, 5) + a + share * (b - a);
+      rays.push_back({inside, glm::normalize(target - inside)});
+    }
+  }
+  for (const Hit& hit : trace(tracer, rays)) ASSERT_TRUE(hit);
+}
+
+// What begins on a wall, or behind it by a rounding, goes on to the one across.
+TEST_P(ObjectTracing, RaysFromAWallMeetTheNextOne) {
+  const ObjectTracer tracer(device_, {{device_, box_model({2, 1, 0.5}), GetParam()}}, {{}}, {});
+  for (const double off_m : {1e-12, 1e-9, 1e-7, 1e-5}) {
+    const Ray ray{{-1 + off_m, 0.1, 0.1}, {1, 0, 0}};
+    const std::vector<Hit> hits = trace(tracer, {&ray, 1});
+    EXPECT_NEAR(hits[0].range_m, 2 - off_m, 1e-12);
+  }
+}
+
+TEST(ObjectTracer, CutOutsNeedUv) {
+  Model sheet = box_model({1, 1, 1});
+  sheet.surfaces[0].name = "leaf";
+  sheet.surfaces[0].albedo.pixels = Image8(2, 2, 4);
+  try {
+    const ModelScene scene(RayDevice(), sheet, Tracing::Fast);
+    FAIL();
+  } catch (const Error& error) {
+    EXPECT_THAT(error.what(),
+                HasSubstr("its surface 'leaf' is cut out by an image, but there are no uv"));
   }
 }
 
