@@ -91,37 +91,59 @@ void check(const RetroReflector& surface, Violations& broken) {
                 "coefficient_cd_lx_m2 = {} must be positive and finite", coefficient);
 }
 
-RetroBrdf retro(const LambertianBsdf& surface) { return {.diffuse_per_sr = surface.albedo.x / pi}; }
+// The mean of a share over light from everywhere.
+template <typename Share>
+double mean_of(const Share& share) {
+  constexpr int steps = 64;
+  double sum = 0;
+  for (int i = 0; i < steps; ++i) {
+    const double cosine = (i + 0.5) / steps;
+    sum += 2 * cosine * share(cosine) / steps;
+  }
+  return sum;
+}
+
+RetroBrdf retro(const LambertianBsdf& surface) {
+  return {.diffuse_per_sr = surface.albedo.x / pi, .albedo = surface.albedo.x};
+}
 
 RetroBrdf retro(const RoughDiffuseBsdf& surface) {
   const double roughness = surface.roughness;
   const double mean = oren_nayar::mean_share(roughness);
   const double facets = oren_nayar::facet_albedo(surface.albedo.x, mean);
   const double once = facets * oren_nayar::scale(roughness) / pi;
-  if (!(mean < 1)) return {.diffuse_per_sr = once};
+  if (!(mean < 1)) return {.diffuse_per_sr = once, .albedo = surface.albedo.x};
   RoughRetro rough{.grazing_per_sr = once * roughness,
                    .shared_per_sr = facets * surface.albedo.x / (pi * (1 - mean))};
   rough.share = CosineTable<float>([roughness](double cosine) {
     return static_cast<float>(oren_nayar::share(cosine, roughness));
   });
-  return {.diffuse_per_sr = once, .rough = rough};
+  return {.diffuse_per_sr = once, .rough = rough, .albedo = surface.albedo.x};
 }
 
 RetroBrdf retro(const CoatedBsdf& surface) {
+  const double mirrored = mean_of([&](double cosine) { return double{surface.mirrored(cosine)}; });
   return {.rough = RoughRetro{.mirror = fresnel_reflectance(1, surface.refractive_index, 0),
                               .alpha = surface.alpha,
                               .shared_per_sr = surface.base_per_sr().x,
-                              .share = surface.mirrored}};
+                              .share = surface.mirrored},
+          .albedo = mirrored + pi * surface.base_per_sr().x * (1 - mirrored) * (1 - mirrored)};
 }
 
 RetroBrdf retro(const ConductorBsdf& surface) {
+  const double once = mean_of([&](double cosine) { return double{surface.once(cosine)}; });
+  const double facet =
+      mean_of([&](double cosine) { return double{surface.reflectance(cosine).x}; });
   return {.rough = RoughRetro{.mirror = double{surface.reflectance(1).x},
                               .alpha = surface.alpha,
                               .shared_per_sr = surface.shared_per_sr.x,
-                              .share = surface.once}};
+                              .share = surface.once},
+          .albedo = once * facet + pi * surface.shared_per_sr.x * (1 - once) * (1 - once)};
 }
 
-RetroBrdf retro(const PlantLeafBsdf& leaf) { return {.diffuse_per_sr = leaf.reflectance.x / pi}; }
+RetroBrdf retro(const PlantLeafBsdf& leaf) {
+  return {.diffuse_per_sr = leaf.reflectance.x / pi, .albedo = leaf.reflectance.x};
+}
 
 RetroBrdf retro(const BlackBsdf&) { return {}; }
 

@@ -76,6 +76,7 @@ struct RetroBrdf {
   double diffuse_per_sr = 0;          ///< f_r of a Lambertian: reflectance / pi
   double retro_per_sr = 0;            ///< f_r cos of a retro-reflector: R_A
   std::optional<RoughRetro> rough{};  ///< of the kinds that depend on incidence otherwise
+  double albedo = 0;  ///< share of light from everywhere that comes back: what sunlight becomes
 };
 
 /// Returns what a material sends back at a wavelength; spectra are linear between their samples,

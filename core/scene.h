@@ -28,7 +28,7 @@ struct ModelTruth {
 struct Scene {
   RayTracer rays;  ///< the ground
   SurfaceTruth terrain;
-  std::vector<Material> materials;  ///< none, if no lidar has light
+  std::vector<Material> materials;  ///< those that the truth names; lidars with light need them
   ObjectTracer objects;
   std::vector<ModelTruth> models;  ///< as many as `objects` has models
 

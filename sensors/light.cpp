@@ -9,6 +9,8 @@
 #include <numeric>
 #include <utility>
 
+#include "core/error.h"
+
 namespace groundray {
 namespace {
 
@@ -118,7 +120,16 @@ double exp_of_small(double x) {
 RetroBrdfs::RetroBrdfs(const Scene& scene, double wavelength_nm) : scene_(scene) {
   for (const Material& material : scene.materials)
     by_material_.push_back(retro_brdf(material, wavelength_nm));
-  ground_ = by_material_.at(scene.terrain.material);
+  const auto check = [&](std::uint16_t material) {
+    if (material >= by_material_.size()) {
+      throw Error(
+          "scene: a surface is of material {}, but there are {}: a lidar with light needs all",
+          material, by_material_.size());
+    }
+  };
+  check(scene.terrain.material);
+  for (const ModelTruth& model : scene.models) std::ranges::for_each(model.materials, check);
+  ground_ = by_material_[scene.terrain.material];
 }
 
 Light::Light(const LightSpec& spec, const AtmosphereSpec& air, const RangeGate& gate)
@@ -222,10 +233,9 @@ void Light::receive(std::span<const Ray> rays, std::span<const Hit> hits,
                      {first_air_bin_, first_air_bin_ + static_cast<std::int64_t>(air_w_.size())});
     add_air(hits, work);
   }
-  double diffuse_per_sr = 0;
-  for (const std::uint32_t i : work.order) diffuse_per_sr += brdfs.of(hits[i]).diffuse_per_sr;
-  const double background_w =
-      sun_w_ * std::numbers::pi * diffuse_per_sr / static_cast<double>(hits.size());
+  double albedo = 0;
+  for (const std::uint32_t i : work.order) albedo += brdfs.of(hits[i]).albedo;
+  const double background_w = sun_w_ * albedo / static_cast<double>(hits.size());
   receiver_.detect(work.waveform, gate_, {key, background_w}, work.detections);
   work.echoes.clear();
   for (const Detection& detection : work.detections)

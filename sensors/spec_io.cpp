@@ -212,14 +212,19 @@ void check_lidars(const SceneSpec& scene, const Node& node, std::span<const Node
 namespace {
 
 // Lidars that do not say how much sunlight there is take that of the sky on level ground.
-void light_by_sky(SceneSpec& scene) {
+void light_by_sky(SceneSpec& scene, std::span<const Node> entries, Faults& faults) {
   if (!scene.sky || !scene.sky->sun) return;
   const Sun sun(*scene.sky->sun, scene.sky->air);
-  for (MountedLidar& mounted : scene.lidars) {
-    auto& light = mounted.lidar.light;
+  for (std::size_t i = 0; i < scene.lidars.size(); ++i) {
+    auto& light = scene.lidars[i].lidar.light;
     if (!light || light->sun.irradiance_w_m2_nm) continue;
-    light->sun.irradiance_w_m2_nm =
-        solar_irradiance_w_m2_nm(sun, light->wavelength_nm) * std::max(sun.direction().z, 0.0);
+    try {
+      light->sun.irradiance_w_m2_nm =
+          solar_irradiance_w_m2_nm(sun, light->wavelength_nm) * std::max(sun.direction().z, 0.0);
+    } catch (const Error& fault) {
+      faults.add(entries[i], "lidars", "the sun's light on '{}' is not known: {}; give sun_w_m2_nm",
+                 scene.lidars[i].name, fault.what());
+    }
   }
 }
 
@@ -255,8 +260,9 @@ SceneSpec parse_scene(const std::string& text, const fs::path& path,
   scene.scatter = read_scatter(root, path, folders, faults);
   if (auto sky = root.map("sky", Need::Optional))
     scene.sky = read_sky(std::move(*sky), path, faults);
-  if (faults.count() == 0) light_by_sky(scene);
-  if (faults.count() == 0) check_lidars(scene, node, root.list("lidars", Need::Optional), faults);
+  const auto entries = root.list("lidars", Need::Optional);
+  if (faults.count() == 0) light_by_sky(scene, entries, faults);
+  if (faults.count() == 0) check_lidars(scene, node, entries, faults);
   root.close();
   faults.throw_if_any();
   return scene;

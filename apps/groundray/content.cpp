@@ -1,6 +1,7 @@
 #include "apps/groundray/content.h"
 
 #include <fmt/format.h>
+#include <fmt/ranges.h>
 
 #include <algorithm>
 #include <cmath>
@@ -18,6 +19,7 @@
 #include "apps/groundray/paths.h"
 #include "apps/groundray/world.h"
 #include "core/error.h"
+#include "core/product_io.h"
 #include "sensors/material_io.h"
 #include "terrain/asset.h"
 #include "terrain/scatter.h"
@@ -39,15 +41,15 @@ struct Gathered {
 // Names of surfaces are those of built-in materials, unless the scene says otherwise.
 class Materials {
  public:
-  explicit Materials(const SceneSpec& spec)
-      : has_light_(std::ranges::any_of(spec.lidars, [](const MountedLidar& mounted) {
-          return mounted.lidar.light.has_value();
-        })) {
+  explicit Materials(const SceneSpec& spec) {
+    for (const MountedLidar& mounted : spec.lidars) {
+      if (mounted.lidar.light) wavelengths_nm_.push_back(mounted.lidar.light->wavelength_nm);
+    }
     if (spec.terrain.material) all_.push_back(*spec.terrain.material);
   }
 
   std::uint16_t index_of(const ModelSpec& model, const std::string& surface) {
-    if (!has_light_) return 0;
+    if (wavelengths_nm_.empty()) return 0;
     if (const auto found = model.materials.find(surface); found != model.materials.end())
       return add(found->second);
     if (model.material) return add(*model.material);
@@ -66,11 +68,13 @@ class Materials {
     for (std::size_t i = 0; i < all_.size(); ++i) {
       if (fingerprint_of(all_[i]) == print) return static_cast<std::uint16_t>(i);
     }
+    for (const double wavelength_nm : wavelengths_nm_)
+      retro_brdf(material, wavelength_nm);  // throws
     all_.push_back(material);
     return static_cast<std::uint16_t>(all_.size() - 1);
   }
 
-  bool has_light_;
+  std::vector<double> wavelengths_nm_;  // of lasers
   std::vector<Material> all_;
 };
 
@@ -80,10 +84,22 @@ Model load(const std::variant<AssetSpec, ModelSource>& source) {
   return read_model(file, options).model;
 }
 
+// Materials are given to surfaces that are there.
+void check_names(const ModelSpec& spec, const Model& model) {
+  for (const auto& [name, material] : spec.materials) {
+    if (std::ranges::count(model.surfaces, name, &ModelSurface::name) > 0) continue;
+    std::vector<std::string_view> names;
+    for (const ModelSurface& surface : model.surfaces) names.push_back(surface.name);
+    throw Error("materials names the surface '{}', but the model has {}", name,
+                fmt::join(names, ", "));
+  }
+}
+
 // Adds a model; returns its index.
 std::uint32_t add_model(const ModelSpec& spec, std::uint16_t label, const RayDevice& device,
                         Tracing tracing, Materials& materials, Gathered& into) {
   Model model = load(spec.source);
+  check_names(spec, model);
   ModelTruth truth{label, {}};
   for (const ModelSurface& surface : model.surfaces)
     truth.materials.push_back(materials.index_of(spec, surface.name));
@@ -177,11 +193,22 @@ std::string fingerprint_of(const Gathered& gathered) {
     print.add(std::span(model.mesh.vertices_m));
     print.add(std::span(model.mesh.triangles));
     print.add(std::span(model.uv));
+    print.add(std::span(model.surface_of));
+    for (const ModelSurface& surface : model.surfaces) {
+      print.add_all(surface.least_alpha);
+      for (const ModelImage* image : {&surface.albedo, &surface.opacity}) {
+        print.add(image->pixels.values());
+        if (!image->file.empty()) print.add(std::span<const char>(read_text(image->file)));
+      }
+    }
   }
   for (const auto& [p_DO, R_DO, scale, model] : gathered.placed) {
     print.add_all(p_DO, R_DO, scale, model);
   }
-  for (const MovingObject& object : gathered.moving) print.add(std::span(object.X_DO.samples()));
+  for (const auto& [X_DO, scale, model] : gathered.moving) {
+    print.add(std::span(X_DO.samples()));
+    print.add_all(scale, model);
+  }
   for (const ModelTruth& truth : gathered.truths) print.add(std::span(truth.materials));
   return fmt::format("{:016x}", print.value());
 }
