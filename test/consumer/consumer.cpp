@@ -4,9 +4,9 @@
 #include <groundray/sensors/scan_pattern.h>
 #include <groundray/terrain/terrain_scene.h>
 
+#include <chrono>
 #include <cmath>
 #include <cstdio>
-#include <numbers>
 #include <span>
 
 int main() {
@@ -21,8 +21,9 @@ int main() {
   tracer.trace(std::span(&down, 1), std::span(&hit, 1));
   const bool below = std::abs(hit.range_m - 2) < 1e-8;
 
-  const ScanPattern scan({.rate_hz = 10, .firing_period_s = 1e-3, .beams = {Beam{}}});
-  const bool turned = std::abs(scan.spin_rad(0.025) - 1.5 * std::numbers::pi) < 1e-12;
+  const ScanPattern scan(
+      SpinningPattern{.rate_hz = 10, .firing_period_s = 1e-3, .beams = {Beam{}}});
+  const bool turned = scan.pulses(0) == 100 && scan.stamp(3) == std::chrono::milliseconds(300);
 
   std::printf("halfway %d, below %d, turned %d\n", halfway, below, turned);
   return halfway && below && turned ? 0 : 1;
