@@ -94,7 +94,7 @@ class EarCutter {
   }
 
   bool is_ear(const Triangle& ear) {
-    const auto [a, b, c] = ear;
+    const std::size_t a = ear[0], b = ear[1], c = ear[2];
     if (!(turn(a, b, c) > 0)) return false;
     // A corner that the outline turns round stays so, and cannot be the only one within an ear.
     tests_ += blunt_.size();

@@ -4,7 +4,7 @@
 #include <span>
 #include <vector>
 
-#include "core/material.h"
+#include "core/materials.h"
 #include "core/object_tracer.h"
 #include "core/ray_tracer.h"
 
@@ -28,7 +28,7 @@ struct ModelTruth {
 struct Scene {
   RayTracer rays;  ///< the ground
   SurfaceTruth terrain;
-  std::vector<Material> materials;  ///< those that the truth names; lidars with light need them
+  Materials materials;  ///< those that the truth names; lidars with light need them
   ObjectTracer objects;
   std::vector<ModelTruth> models;  ///< as many as `objects` has models
 

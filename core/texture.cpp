@@ -306,7 +306,7 @@ glm::vec3 Texture::color(glm::dvec2 uv, const Footprint& footprint,
 float Texture::alpha(glm::dvec2 uv) const noexcept {
   if (!has_alpha()) return 1;
   if (alpha_.empty()) return bilinear(0, uv).w;
-  const auto& [width, height, unused] = levels_[0];
+  const int width = levels_[0].width, height = levels_[0].height;
   const Taps x = taps(wrapped(uv.x, wrap_), width, wrap_);
   const Taps y = taps(1 - wrapped(uv.y, wrap_), height, wrap_);
   const auto at = [&](int column, int row) {

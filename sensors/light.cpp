@@ -117,9 +117,8 @@ double exp_of_small(double x) {
 
 }  // namespace
 
-RetroBrdfs::RetroBrdfs(const Scene& scene, double wavelength_nm) : scene_(scene) {
-  for (const Material& material : scene.materials)
-    by_material_.push_back(retro_brdf(material, wavelength_nm));
+RetroBrdfs::RetroBrdfs(const Scene& scene, double wavelength_nm)
+    : scene_(scene), by_material_(scene.materials.retro_brdfs(wavelength_nm)) {
   const auto check = [&](std::uint16_t material) {
     if (material >= by_material_.size()) {
       throw Error(

@@ -27,7 +27,7 @@ class RetroBrdfs {
 
  private:
   const Scene& scene_;
-  std::vector<RetroBrdf> by_material_;
+  std::span<const RetroBrdf> by_material_;
   RetroBrdf ground_;
 };
 

@@ -263,7 +263,8 @@ std::vector<Placement> Scatter::placements(const Area& area, const PassRunner& r
   const Area within = area & impl_->area;
   if (within.is_empty() || impl_->density.max_per_m2() == 0) return {};
   impl_->refuse_too_many(within);
-  const auto [first, end] = impl_->cells_of(within);
+  const auto cells = impl_->cells_of(within);
+  const glm::ivec2 first = cells.first, end = cells.second;
   const glm::ivec2 tiles = (end - first + tile_cells - 1) / tile_cells;
   std::vector<std::vector<Placement>> found(static_cast<std::size_t>(tiles.x) *
                                             static_cast<std::size_t>(tiles.y));

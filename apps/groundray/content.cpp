@@ -39,9 +39,9 @@ struct Gathered {
 };
 
 // Names of surfaces are those of built-in materials, unless the scene says otherwise.
-class Materials {
+class Palette {
  public:
-  explicit Materials(const SceneSpec& spec) {
+  explicit Palette(const SceneSpec& spec) {
     for (const MountedLidar& mounted : spec.lidars) {
       if (mounted.lidar.light) wavelengths_nm_.push_back(mounted.lidar.light->wavelength_nm);
     }
@@ -97,12 +97,12 @@ void check_names(const ModelSpec& spec, const Model& model) {
 
 // Adds a model; returns its index.
 std::uint32_t add_model(const ModelSpec& spec, std::uint16_t label, const RayDevice& device,
-                        Tracing tracing, Materials& materials, Gathered& into) {
+                        Tracing tracing, Palette& palette, Gathered& into) {
   Model model = load(spec.source);
   check_names(spec, model);
   ModelTruth truth{label, {}};
   for (const ModelSurface& surface : model.surfaces)
-    truth.materials.push_back(materials.index_of(spec, surface.name));
+    truth.materials.push_back(palette.index_of(spec, surface.name));
   into.models.emplace_back(device, std::move(model), tracing);
   into.truths.push_back(std::move(truth));
   return static_cast<std::uint32_t>(into.models.size() - 1);
@@ -218,12 +218,12 @@ std::string fingerprint_of(const Gathered& gathered) {
 Content build_content(const SceneSpec& spec, const Terrain& terrain,
                       std::chrono::nanoseconds begin) {
   const RayDevice device;
-  Materials materials(spec);
+  Palette palette(spec);
   Gathered gathered;
   for (const ObjectSpec& object : spec.objects) {
     for_entry("object", object.name, [&] {
       add_object(object, spec, terrain, begin,
-                 add_model(object.model, object.label, device, spec.tracing, materials, gathered),
+                 add_model(object.model, object.label, device, spec.tracing, palette, gathered),
                  gathered);
     });
   }
@@ -231,7 +231,7 @@ Content build_content(const SceneSpec& spec, const Terrain& terrain,
     for_entry("layer", layer.name, [&] {
       const auto first = static_cast<std::uint32_t>(gathered.models.size());
       for (const ModelSpec& model : layer.models)
-        add_model(model, layer.label, device, spec.tracing, materials, gathered);
+        add_model(model, layer.label, device, spec.tracing, palette, gathered);
       add_layer(layer, spec, terrain, first, gathered);
     });
   }
@@ -243,7 +243,7 @@ Content build_content(const SceneSpec& spec, const Terrain& terrain,
     content.groups.push_back(std::move(group));
   }
   content.memory_bytes = gathered.placed.size() * sizeof(PlacedObject);
-  content.materials = materials.take();
+  content.materials = Materials(palette.take());
   content.models = std::move(gathered.truths);
   if (!gathered.placed.empty() || !gathered.moving.empty()) {
     content.objects = ObjectTracer(device, std::move(gathered.models), std::move(gathered.placed),

@@ -23,7 +23,7 @@ struct Content {
 
   ObjectTracer objects;
   std::vector<ModelTruth> models;
-  std::vector<Material> materials;  ///< of the ground, if it has one, and then of the models
+  Materials materials;  ///< of the ground, if it has one, and then of the models
   std::vector<Group> groups;
   std::string fingerprint;       ///< equal texts mean equal objects
   std::size_t memory_bytes = 0;  ///< of all that is traced

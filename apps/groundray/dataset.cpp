@@ -104,7 +104,8 @@ std::uint64_t fingerprint(const World& world) {
       }
     }
   }
-  for (const Material& material : world.content.materials) print.add_all(fingerprint_of(material));
+  for (const Material& material : world.content.materials.all())
+    print.add_all(fingerprint_of(material));
   print.add(std::span<const char>(world.content.fingerprint));
   return print.value();
 }

@@ -32,8 +32,7 @@ Material grey(const char* name, double reflectance) {
 // Ground of material 0 and label 3, objects of a model each, with labels 10, 11, ... and materials
 // 1, 2, ...
 Scene scene_of(Tracing tracing, const std::vector<Model>& models, std::vector<PlacedObject> placed,
-               std::vector<MovingObject> moving, std::vector<Material> materials = {},
-               float ground_m = -1000) {
+               std::vector<MovingObject> moving, Materials materials = {}, float ground_m = -1000) {
   const RayDevice device;
   std::vector<ModelScene> scenes;
   std::vector<ModelTruth> truths;
