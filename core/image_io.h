@@ -24,17 +24,21 @@ Image8 read_image8(const std::filesystem::path& path);
 /// As read_image8, of a file already in memory; `name` stands for it in messages.
 Image8 parse_image8(std::string_view bytes, const std::string& name);
 
-/// Reads a picture of light: Radiance (.hdr, RGBE) or OpenEXR (R, G, B or Y; of half, float or
+/// What the values of a picture stand for: light is not negative.
+enum class PictureOf { Light, Heights };
+
+/// Reads a picture of floats: Radiance (.hdr, RGBE) or OpenEXR (R, G, B or Y; of half, float or
 /// whole numbers).
 /// @return linear values: 1 (Y), 2 (Y, alpha), 3 (RGB) or 4 channels (RGB, alpha); those of a .hdr
 ///         divided by its EXPOSURE.
 /// @throws Error if the file is missing, no such picture, cut short, damaged, has other channels or
-///         more than most_image_pixels, or holds a value that is NaN, infinite or negative; the
-///         first such pixel is named.
+///         more than most_image_pixels, or holds a value that is NaN or infinite or, of light,
+///         negative; the first such pixel is named.
 /// @see Ward, Real pixels, Graphics Gems II (1991).
-ImageF read_image_f(const std::filesystem::path& path);
+ImageF read_image_f(const std::filesystem::path& path, PictureOf what = PictureOf::Light);
 
 /// As read_image_f, of a file already in memory; `name` stands for it in messages.
-ImageF parse_image_f(std::string_view bytes, const std::string& name);
+ImageF parse_image_f(std::string_view bytes, const std::string& name,
+                     PictureOf what = PictureOf::Light);
 
 }  // namespace groundray

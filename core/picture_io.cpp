@@ -240,26 +240,30 @@ ImageF parse_exr(std::string_view bytes, const std::string& name) {
   }
 }
 
-void check_light(const ImageF& image, const std::string& name) {
-  const auto is_bad = [](float value) { return !(value >= 0 && std::isfinite(value)); };
+void check_values(const ImageF& image, PictureOf what, const std::string& name) {
+  const auto is_bad = [what](float value) {
+    return !std::isfinite(value) || (what == PictureOf::Light && value < 0);
+  };
   const auto values = image.values();
   const auto bad = std::ranges::find_if(values, is_bad);
   if (bad == values.end()) return;
   const auto pixel = (bad - values.begin()) / image.channels();
   throw Error(
-      "{}: channel {} of the pixel in column {}, row {} (from 0, the top) is {}; light must be "
-      "finite and not negative: mend the picture",
+      "{}: channel {} of the pixel in column {}, row {} (from 0, the top) is {}; {}: mend the "
+      "picture",
       name, (bad - values.begin()) % image.channels(), pixel % image.width(), pixel / image.width(),
-      *bad);
+      *bad,
+      what == PictureOf::Light ? "light must be finite and not negative"
+                               : "heights must be finite");
 }
 
 }  // namespace
 
-ImageF read_image_f(const std::filesystem::path& path) {
-  return parse_image_f(read_text(path), path.string());
+ImageF read_image_f(const std::filesystem::path& path, PictureOf what) {
+  return parse_image_f(read_text(path), path.string(), what);
 }
 
-ImageF parse_image_f(std::string_view bytes, const std::string& name) {
+ImageF parse_image_f(std::string_view bytes, const std::string& name, PictureOf what) {
   std::optional<ImageF> image;
   if (bytes.starts_with(hdr_magic)) image = parse_hdr(bytes, name);
   if (bytes.starts_with(exr_magic)) image = parse_exr(bytes, name);
@@ -267,7 +271,7 @@ ImageF parse_image_f(std::string_view bytes, const std::string& name) {
     throw Error("{}: it is neither a Radiance (.hdr) nor an OpenEXR (.exr) picture{}", name,
                 bytes.empty() ? ": it is empty" : ", whatever its name: convert it");
   }
-  check_light(*image, name);
+  check_values(*image, what, name);
   return *std::move(image);
 }
 

@@ -1,6 +1,7 @@
 #include "sensors/relief_reader.h"
 
 #include <algorithm>
+#include <cctype>
 #include <string>
 #include <utility>
 
@@ -24,8 +25,9 @@ constexpr Rule hurst_rule{[](double value) { return value >= 0 && value <= 1; },
 
 // Heights are linear in what is stored: 0 to 1 of 8 bits.
 ImageF read_heights(const fs::path& path) {
-  const fs::path form = path.extension();
-  if (form == ".exr" || form == ".hdr") return read_image_f(path);
+  std::string form = path.extension().string();
+  std::ranges::transform(form, form.begin(), [](unsigned char c) { return std::tolower(c); });
+  if (form == ".exr" || form == ".hdr") return read_image_f(path, PictureOf::Heights);
   const Image8 bytes = read_image8(path);
   ImageF image(bytes.width(), bytes.height(), bytes.channels());
   std::ranges::transform(bytes.values(), image.values().begin(),

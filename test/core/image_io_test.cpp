@@ -254,6 +254,9 @@ TEST(ReadImageF, NamesTheFirstPixelThatIsNoLight) {
                 AllOf(HasSubstr("sky.exr: channel 1 of the pixel in column 3, row 2 (from 0, the "
                                 "top) is "),
                       HasSubstr("light must be finite and not negative")));
+    const std::string of_heights =
+        message_of([&] { parse_image_f(bytes, "relief.exr", PictureOf::Heights); });
+    EXPECT_EQ(of_heights.find("heights must be finite") == std::string::npos, bad == -0.25f);
   }
   const std::string bright = hdr_bytes("EXPOSURE=1e-30\n", 1, 1, "\x80\x40\x20\xff"s);
   EXPECT_THAT(message_of([&] { parse_image_f(bright, "sky.hdr"); }),
