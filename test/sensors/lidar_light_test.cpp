@@ -303,6 +303,27 @@ TEST(LidarLight, StepEdgeSharesTheEnergyBetweenItsSurfaces) {
 }
 
 // Two Gaussians have two maxima from 2 sigma = 0.85 FWHM of delay on: 0.425 c FWHM = 0.64 m.
+// Neither which surface the axis meets nor the nearest sub-ray decides: others return the first
+// echo as the second where the axis meets it, and as the strongest the surface of one strong
+// sub-ray.
+TEST(LidarLight, SecondAndStrongestAreOfSurfacesNotOfSubRays) {
+  const auto range_true_m = [](double edge_m, ReceiverSpec::Returns returns) {
+    LidarSpec spec = lidar_of(looking_down({pi / 2}), 2e-3, 256, 256);
+    spec.light->receiver.returns = returns;
+    const LidarScan found = scan(spec, scene_of(cliff(edge_m, 5)), {0, 0, 50});
+    EXPECT_EQ(found.echoes.rows(), 1u);
+    return found.echoes.rows() == 1 ? found.echoes.column<double>("range_true")[0] : 0.0;
+  };
+  // The beam's radius is 50 mm here and 45 mm on the high side; over it ranges grow by 25 um. With
+  // the edge 5 mm behind the axis most light comes from the high side, which the axis meets.
+  EXPECT_NEAR(range_true_m(-0.005, ReceiverSpec::Returns::Strongest), 45, 1e-4);
+  EXPECT_NEAR(range_true_m(-0.005, ReceiverSpec::Returns::Second), 50, 1e-4);
+  // With it 10 mm before the axis some 34 % of the light falls on the high side. That sends back
+  // (50 / 45)^2 as much of each sub-ray, and yet less than the rest.
+  EXPECT_NEAR(range_true_m(0.01, ReceiverSpec::Returns::Strongest), 50, 1e-4);
+  EXPECT_NEAR(range_true_m(0.01, ReceiverSpec::Returns::Second), 45, 1e-4);
+}
+
 TEST(LidarLight, StepEdgeIsTwoEchoesFromAboutHalfAPulseOn) {
   const LidarSpec spec = lidar_of(looking_down({pi / 2}), 2e-3, 256, 256);
   const auto echoes_of = [&](float step_m) {
