@@ -8,6 +8,14 @@
 
 namespace groundray {
 
+// How files of floats begin.
+inline constexpr std::string_view hdr_magic = "#?";
+inline constexpr std::string_view exr_magic = "\x76\x2f\x31\x01";
+
+inline bool is_image_f(std::string_view bytes) {
+  return bytes.starts_with(hdr_magic) || bytes.starts_with(exr_magic);
+}
+
 [[noreturn]] inline void throw_damaged(const std::string& name, std::string_view format,
                                        std::string_view fault) {
   throw Error("{}: it is cut short or damaged: {} ({}); copy or save it again", name, fault,

@@ -4,9 +4,11 @@
 
 #include <algorithm>
 #include <array>
+#include <bit>
 #include <csetjmp>
 #include <cstdio>
 #include <cstring>
+#include <limits>
 #include <vector>
 
 #include "core/error.h"
@@ -39,7 +41,9 @@ class PngReader {
   PngReader(const PngReader&) = delete;
   PngReader& operator=(const PngReader&) = delete;
 
-  Image8 read() {
+  /// With 8 or 16 bits a value, whatever the file has.
+  template <typename T>
+  Image<T> read() {
     attempt([this] {
       png_set_user_limits(png_, PNG_UINT_31_MAX, PNG_UINT_31_MAX);
       png_set_read_fn(png_, this, next);
@@ -49,14 +53,21 @@ class PngReader {
     check_size(name_, png_get_image_width(png_, info_), height);
     attempt([this] {
       png_set_expand(png_);
-      png_set_scale_16(png_);
+      if constexpr (sizeof(T) == 1) {
+        png_set_scale_16(png_);
+      } else {
+        png_set_expand_16(png_);
+        if constexpr (std::endian::native == std::endian::little) png_set_swap(png_);
+      }
       png_set_interlace_handling(png_);
       png_read_update_info(png_, info_);
     });
-    Image8 image(static_cast<int>(png_get_image_width(png_, info_)), static_cast<int>(height),
-                 png_get_channels(png_, info_));
+    Image<T> image(static_cast<int>(png_get_image_width(png_, info_)), static_cast<int>(height),
+                   png_get_channels(png_, info_));
     std::vector<png_bytep> rows;
-    for (int y = 0; y < image.height(); ++y) rows.push_back(image.at(0, y).data());
+    for (int y = 0; y < image.height(); ++y) {
+      rows.push_back(reinterpret_cast<png_bytep>(image.at(0, y).data()));
+    }
     attempt([this, &rows] {
       png_read_image(png_, rows.data());
       png_read_end(png_, nullptr);
@@ -153,6 +164,16 @@ class JpegReader {
   std::jmp_buf jump_{};
 };
 
+/// From 0 to 1 of what T holds; the whole numbers and their quotient round but once.
+template <typename T>
+ImageF fractions(const Image<T>& image) {
+  ImageF result(image.width(), image.height(), image.channels());
+  std::ranges::transform(image.values(), result.values().begin(), [](T value) {
+    return static_cast<float>(value) / static_cast<float>(std::numeric_limits<T>::max());
+  });
+  return result;
+}
+
 }  // namespace
 
 Image8 read_image8(const std::filesystem::path& path) {
@@ -160,9 +181,23 @@ Image8 read_image8(const std::filesystem::path& path) {
 }
 
 Image8 parse_image8(std::string_view bytes, const std::string& name) {
-  if (bytes.starts_with(png_magic)) return PngReader(bytes, name).read();
+  if (bytes.starts_with(png_magic)) return PngReader(bytes, name).read<std::uint8_t>();
   if (bytes.starts_with(jpeg_magic)) return JpegReader(bytes, name).read();
   throw Error("{}: it is neither a PNG nor a JPEG image{}", name,
+              bytes.empty() ? ": it is empty" : ", whatever its name: convert it");
+}
+
+ImageF read_heights(const std::filesystem::path& path) {
+  return parse_heights(read_text(path), path.string());
+}
+
+ImageF parse_heights(std::string_view bytes, const std::string& name) {
+  if (bytes.starts_with(png_magic)) {
+    return fractions(PngReader(bytes, name).read<std::uint16_t>());
+  }
+  if (bytes.starts_with(jpeg_magic)) return fractions(JpegReader(bytes, name).read());
+  if (is_image_f(bytes)) return parse_image_f(bytes, name, PictureOf::Heights);
+  throw Error("{}: it is no PNG, JPEG, OpenEXR (.exr) or Radiance (.hdr) picture{}", name,
               bytes.empty() ? ": it is empty" : ", whatever its name: convert it");
 }
 

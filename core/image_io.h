@@ -41,4 +41,13 @@ ImageF read_image_f(const std::filesystem::path& path, PictureOf what = PictureO
 ImageF parse_image_f(std::string_view bytes, const std::string& name,
                      PictureOf what = PictureOf::Light);
 
+/// Reads a picture of heights of any of these kinds, by its bytes: Radiance and OpenEXR as
+/// read_image_f, PNG and JPEG as values from 0 to 1: those of PNG with 16 bits in steps of 1/65535,
+/// those of fewer bits, palettes and JPEG as read_image8's in steps of 1/255.
+/// @throws Error as read_image8 and read_image_f.
+ImageF read_heights(const std::filesystem::path& path);
+
+/// As read_heights, of a file already in memory; `name` stands for it in messages.
+ImageF parse_heights(std::string_view bytes, const std::string& name);
+
 }  // namespace groundray

@@ -138,7 +138,8 @@ RetroBrdf retro(const ConductorBsdf& surface) {
                               .alpha = surface.alpha,
                               .shared_per_sr = surface.shared_per_sr.x,
                               .share = surface.once},
-          .albedo = once * facet + pi * surface.shared_per_sr.x * (1 - once) * (1 - once)};
+          .albedo = once * facet + pi * surface.shared_per_sr.x * (1 - once) * (1 - once),
+          .takes_tint = false};
 }
 
 RetroBrdf retro(const PlantLeafBsdf& leaf) {
@@ -158,16 +159,46 @@ void check_material(const Material& material) {
 RetroBrdf retro_brdf(const Material& material, double wavelength_nm) {
   const Bsdf bsdf = bsdf_at(material, wavelength_nm);
   if (const auto* sheet = std::get_if<RetroReflector>(&material.reflection))
-    return {.retro_per_sr = sheet->coefficient_cd_lx_m2};
+    return {.retro_per_sr = sheet->coefficient_cd_lx_m2, .takes_tint = false};
   return std::visit([](const auto& surface) { return retro(surface); }, bsdf.surface);
 }
 
-double rough_retro_brdf_cos(const RoughRetro& rough, double cos_incidence) noexcept {
+namespace {
+
+// What is not mirrored.
+double matt_brdf_cos(const RoughRetro& rough, double cos_incidence) noexcept {
   const double let_pass = 1 - double{rough.share(cos_incidence)};
-  double sum = rough.grazing_per_sr * (1 - cos_incidence * cos_incidence) +
-               rough.shared_per_sr * let_pass * let_pass * cos_incidence;
-  if (rough.mirror > 0) sum += rough.mirror * ggx::retro_brdf_cos(cos_incidence, rough.alpha);
-  return sum;
+  return rough.grazing_per_sr * (1 - cos_incidence * cos_incidence) +
+         rough.shared_per_sr * let_pass * let_pass * cos_incidence;
+}
+
+double mirror_brdf_cos(const RoughRetro& rough, double cos_incidence) noexcept {
+  return rough.mirror > 0 ? rough.mirror * ggx::retro_brdf_cos(cos_incidence, rough.alpha) : 0;
+}
+
+// How much brighter a surface can be: not so that more light comes back than there was.
+double possible_brightness(const RetroBrdf& brdf, double brightness) noexcept {
+  if (!brdf.takes_tint) return 1;
+  return brdf.albedo * brightness > 1 ? 1 / brdf.albedo : brightness;
+}
+
+}  // namespace
+
+double rough_retro_brdf_cos(const RoughRetro& rough, double cos_incidence) noexcept {
+  return matt_brdf_cos(rough, cos_incidence) + mirror_brdf_cos(rough, cos_incidence);
+}
+
+double tinted_retro_brdf_cos(const RetroBrdf& brdf, double cos_incidence,
+                             double brightness) noexcept {
+  const double factor = possible_brightness(brdf, brightness);
+  const double matt = factor * brdf.diffuse_per_sr * cos_incidence + brdf.retro_per_sr;
+  if (!brdf.rough) return matt;
+  return matt + factor * matt_brdf_cos(*brdf.rough, cos_incidence) +
+         mirror_brdf_cos(*brdf.rough, cos_incidence);
+}
+
+double tinted_albedo(const RetroBrdf& brdf, double brightness) noexcept {
+  return possible_brightness(brdf, brightness) * brdf.albedo;
 }
 
 }  // namespace groundray

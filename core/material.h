@@ -77,6 +77,7 @@ struct RetroBrdf {
   double retro_per_sr = 0;            ///< f_r cos of a retro-reflector: R_A
   std::optional<RoughRetro> rough{};  ///< of the kinds that depend on incidence otherwise
   double albedo = 0;  ///< share of light from everywhere that comes back: what sunlight becomes
+  bool takes_tint = true;  ///< false of metals and retro-reflectors
 };
 
 /// Returns what a material sends back at a wavelength; spectra are linear between their samples,
@@ -98,5 +99,15 @@ inline double retro_brdf_cos(const RetroBrdf& brdf, double cos_incidence) noexce
     return matt_and_retro;
   return matt_and_retro + rough_retro_brdf_cos(*brdf.rough, cos_incidence);
 }
+
+/// Returns the same of a surface that a texture makes brighter or darker: all but what its facets
+/// mirror, which is the same under any paint. Of rough and coated surfaces the light that is
+/// scattered more than once changes in proportion, too.
+/// @param brightness  see Tint; counts up to 1 / albedo, where all light comes back.
+double tinted_retro_brdf_cos(const RetroBrdf& brdf, double cos_incidence,
+                             double brightness) noexcept;
+
+/// Returns the share of light from everywhere that such a surface sends back.
+double tinted_albedo(const RetroBrdf& brdf, double brightness) noexcept;
 
 }  // namespace groundray

@@ -145,6 +145,7 @@ ModelScene::Impl::Impl(const RayDevice& with, Model content, Tracing how)
           model.surfaces[i].name);
     }
   }
+  find_means();
   low_m = high_m = model.mesh.vertices_m[model.mesh.triangles[0].x];
   for (const glm::uvec3& corners : model.mesh.triangles) {
     for (int k = 0; k < 3; ++k) {
@@ -198,10 +199,7 @@ double ModelScene::Impl::range_m(std::uint32_t triangle, const ModelRay& ray) co
 bool ModelScene::Impl::is_opaque(std::uint32_t triangle, const glm::dvec3& shares) const noexcept {
   const Textures& worn = textures_of(triangle);
   if (worn.least_alpha == 0) return true;
-  const glm::uvec3& corners = model.mesh.triangles[triangle];
-  const glm::dvec2 uv = glm::dvec2(model.uv[corners.x]) * shares.x +
-                        glm::dvec2(model.uv[corners.y]) * shares.y +
-                        glm::dvec2(model.uv[corners.z]) * shares.z;
+  const glm::dvec2 uv = uv_at(triangle, shares);
   const Texture& cut_by = worn.opacity ? *worn.opacity : *worn.albedo;
   const float alpha = cut_by.has_alpha() ? cut_by.alpha(uv) : cut_by.color(uv).x;
   return alpha >= worn.least_alpha;

@@ -40,6 +40,7 @@ struct ModelScene::Impl {
   struct Textures {
     std::optional<Texture> albedo, normal, opacity;
     float least_alpha = 0;  // below it the surface is cut out; 0 for nowhere
+    glm::vec3 mean{0};      // of albedo over all triangles that wear it
   };
   std::vector<Textures> textures;  // by surface
   CornerStars stars;
@@ -67,12 +68,19 @@ struct ModelScene::Impl {
   glm::dvec3 shares(const glm::dvec3& edges) const noexcept {
     return glm::dvec3(edges.y, edges.z, edges.x) / (edges.x + edges.y + edges.z);
   }
+  glm::dvec2 uv_at(std::uint32_t triangle, const glm::dvec3& shares) const noexcept {
+    const glm::uvec3& corners = model.mesh.triangles[triangle];
+    return glm::dvec2(model.uv[corners.x]) * shares.x + glm::dvec2(model.uv[corners.y]) * shares.y +
+           glm::dvec2(model.uv[corners.z]) * shares.z;
+  }
   bool is_opaque(std::uint32_t triangle, const glm::dvec3& shares) const noexcept;
 
   /// Finds in double where a ray meets the surface by a triangle that Embree named: that one, or
   /// the nearest of those that share a corner with it. Nothing if it passes them all by, begins
   /// behind them, or goes through where they are cut out.
   std::optional<ModelCrossing> settle(std::uint32_t triangle, const ModelRay& ray) const noexcept;
+
+  void find_means();  // of albedo images
 
  private:
   std::optional<double> meet(std::uint32_t triangle, const ModelRay& ray) const noexcept;

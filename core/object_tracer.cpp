@@ -366,6 +366,14 @@ std::uint32_t ObjectTracer::model_of(std::uint32_t object) const noexcept {
                                       : impl_->moving[index - impl_->placed.size()].model;
 }
 
+PlacedObject ObjectTracer::placed_at(std::uint32_t object, nanoseconds time) const noexcept {
+  const std::size_t index = object - 1;
+  if (index < impl_->placed.size()) return impl_->placed[index];
+  const MovingObject& moving = impl_->moving[index - impl_->placed.size()];
+  const Pose X_DO = impl_->pose(moving, time);
+  return {X_DO.translation_m, X_DO.rotation, moving.scale, moving.model};
+}
+
 std::span<const ModelScene> ObjectTracer::models() const noexcept {
   if (impl_ == nullptr) return {};
   return impl_->models;

@@ -8,8 +8,11 @@
 #include <span>
 #include <vector>
 
+#include "core/footprint.h"
 #include "core/model.h"
 #include "core/ray_tracer.h"
+#include "core/texture.h"
+#include "core/tint.h"
 #include "core/trajectory.h"
 
 namespace groundray {
@@ -22,6 +25,22 @@ class ModelScene {
   ModelScene(const RayDevice& device, Model model, Tracing tracing);
 
   const Model& model() const noexcept;
+  /// Of its textures; the device knows of the rest.
+  std::size_t texture_bytes() const noexcept;
+
+  /// Whether an image says how the surface of a triangle, or of any, varies in colour.
+  bool has_albedo(std::uint32_t triangle) const noexcept;
+  bool has_albedo() const noexcept;
+  /// Returns how the surface of a triangle varies at a point of it: from its mean over the model.
+  /// @param p_O  in the model's frame. @param patch_O  what is seen of the surface there.
+  Tint tint(std::uint32_t triangle, const glm::dvec3& p_O, const SurfacePatch& patch_O,
+            Filtering filtering) const noexcept;
+  /// Returns the normal to shade a point with, unit, in the model's frame: that of the vertices, if
+  /// they have any, and of the normal map on it.
+  /// @param normal_O  of the triangle, unit, on the side that is seen.
+  glm::dvec3 shading_normal(std::uint32_t triangle, const glm::dvec3& p_O,
+                            const glm::dvec3& normal_O, const SurfacePatch& patch_O,
+                            Filtering filtering) const noexcept;
 
   struct Impl;
   const Impl& impl() const noexcept { return *impl_; }
@@ -68,6 +87,9 @@ class ObjectTracer {
   bool any_moves() const noexcept;
   /// The model of an object that was hit, index among the models.
   std::uint32_t model_of(std::uint32_t object) const noexcept;
+  /// Where an object is at a time.
+  /// @param object  its number, from 1.
+  PlacedObject placed_at(std::uint32_t object, std::chrono::nanoseconds time) const noexcept;
   std::span<const ModelScene> models() const noexcept;
   /// Where a point that is fixed to an object moves, m/s in D; 0 for objects that stand.
   /// @param object  its number, from 1.

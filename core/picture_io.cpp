@@ -26,9 +26,6 @@ namespace {
 
 using namespace std::string_view_literals;
 
-constexpr std::string_view hdr_magic = "#?"sv;
-constexpr std::string_view exr_magic = "\x76\x2f\x31\x01"sv;
-
 /// What a Radiance picture says of itself before its pixels.
 struct HdrHeader {
   int width = 0, height = 0;

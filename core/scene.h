@@ -1,12 +1,17 @@
 #pragma once
 
+#include <array>
 #include <cstdint>
+#include <glm/vec3.hpp>
 #include <span>
 #include <vector>
 
+#include "core/ground_cover.h"
 #include "core/materials.h"
 #include "core/object_tracer.h"
 #include "core/ray_tracer.h"
+#include "core/texture.h"
+#include "core/tint.h"
 
 namespace groundray {
 
@@ -23,14 +28,26 @@ struct ModelTruth {
   std::vector<std::uint16_t> materials;  ///< of each surface of the model, index among the scene's
 };
 
+/// What a surface shows where a ray meets it: one material or, of ground, several.
+struct Appearance {
+  struct Part {
+    std::uint16_t material = 0;  ///< index among the scene's
+    float share = 1;             ///< of the surface; all parts' are 1
+    Tint tint;
+  };
+  std::array<Part, GroundCover::most_layers> parts;
+  std::uint32_t count = 0;
+};
+
 /// The world as sensors see it: everything that rays can meet, and what is known about it.
 /// Immutable once built.
 struct Scene {
-  RayTracer rays;  ///< the ground
-  SurfaceTruth terrain;
-  Materials materials;  ///< those that the truth names; lidars with light need them
+  RayTracer rays;        ///< the ground
+  SurfaceTruth terrain;  ///< unless `cover` says otherwise
+  Materials materials;   ///< those that the truth names; lidars with light need them
   ObjectTracer objects;
   std::vector<ModelTruth> models;  ///< as many as `objects` has models
+  GroundCover cover;
 
   /// Finds what each ray meets first, of ground and objects.
   /// @param hits  as many as there are rays.
@@ -39,13 +56,23 @@ struct Scene {
     objects.trace(of, hits);
   }
 
-  /// What is known of the surface that a ray met.
-  SurfaceTruth truth_of(const Hit& hit) const noexcept {
-    if (hit.object == 0) return terrain;
-    const std::uint32_t model = objects.model_of(hit.object);
-    const std::uint16_t surface = objects.models()[model].model().surface_of[hit.part];
-    return {models[model].label, hit.object, models[model].materials[surface]};
-  }
+  /// What is known of the surface that a ray met; of covered ground, the layer with the largest
+  /// share at that point.
+  SurfaceTruth truth_of(const Ray& ray, const Hit& hit) const noexcept;
+
+  /// Whether all of a material looks the same: there are no textures and no layers.
+  bool is_plain() const noexcept;
+
+  /// Returns what the surface shows that a ray met.
+  /// @param width_m  of the ray there, for the textures (see surface_patch).
+  Appearance appearance_of(const Ray& ray, const Hit& hit, double width_m,
+                           Filtering filtering) const noexcept;
+
+  /// Returns the normal to shade with, unit, in D, on the side that the ray comes from. Nothing but
+  /// light knows of it: ranges, and the normals of hits, are the facet's.
+  /// @param width_m  as above.
+  glm::dvec3 shading_normal_of(const Ray& ray, const Hit& hit, double width_m,
+                               Filtering filtering) const noexcept;
 };
 
 }  // namespace groundray

@@ -6,7 +6,7 @@
 #include <utility>
 #include <vector>
 
-#include "sensors/luminance.h"
+#include "core/luminance.h"
 
 namespace groundray {
 namespace {

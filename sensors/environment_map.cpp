@@ -12,7 +12,7 @@
 #include <vector>
 
 #include "core/error.h"
-#include "sensors/luminance.h"
+#include "core/luminance.h"
 
 namespace groundray {
 namespace {

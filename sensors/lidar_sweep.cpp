@@ -101,7 +101,7 @@ class Sweep {
         pulses_(lidar.pattern.pulses(number)),
         settings_{lidar.beam, lidar.last_level, lidar.light ? lidar.light->resolution_m() : 0,
                   spec_.angular_jitter_rad, rays_end_m(spec_)} {
-    if (lidar.light) brdfs_.emplace(scene, lidar.light->spec().wavelength_nm);
+    if (lidar.light) brdfs_.emplace(scene, lidar.light->spec().wavelength_nm, lidar.beam);
     if (spec_.points == LidarSpec::Points::AtStamp) X_SD_ = inverse(X_DS.pose_at(path_.stamp));
   }
 
@@ -130,6 +130,9 @@ class Sweep {
   EchoRow row_of(const Echo& echo, const PulseCast& cast, std::size_t pulse,
                  double reported_m) const;
   glm::vec3 reported_point(const PulseCast& cast, std::size_t pulse, double reported_m) const;
+  SurfaceTruth truth_at(const PulseCast& cast, std::size_t pulse, std::uint32_t hit) const {
+    return scene_.truth_of(cast.rays(pulse)[hit], cast.hits(pulse)[hit]);
+  }
   glm::vec3 velocity_m_s(const Ray& ray, const Hit& hit) const;
   glm::vec3 velocity_of(const Echo& echo, const PulseCast& cast, std::size_t pulse) const;
   PointCloud no_returns() const;
@@ -316,7 +319,7 @@ void Sweep::write(const Chunk& chunk, const ScanColumns& columns) const {
                         .normal = hit.normal,
                         .cos_incidence = cos_incidence,
                         .sin_incidence = glm::length(glm::cross(direction, hit.normal)),
-                        .surface = scene_.truth_of(hit),
+                        .surface = scene_.truth_of(ray, hit),
                         .deviation_m = hit.deviation_m});
     if (columns.has_motion()) columns.write_velocity(row, velocity_m_s(ray, hit));
     if (columns.has_bounds()) columns.write_bound(row, chunk.bounds_m[at]);
@@ -337,7 +340,7 @@ EchoRow Sweep::row_of(const Echo& echo, const PulseCast& cast, std::size_t pulse
               .normal = echo.normal,
               .cos_incidence = -glm::dot(direction, echo.normal),
               .sin_incidence = glm::length(glm::cross(direction, echo.normal)),
-              .surface = scene_.truth_of(cast.hits(pulse)[echo.hit]),
+              .surface = truth_at(cast, pulse, echo.hit),
               .deviation_m = echo.deviation_m};
   if (echo.kind != Echo::Kind::Surface) {  // there is no truth to tell
     row.p_DQ = axis.origin + axis.direction * echo.detection.range_m;
@@ -365,9 +368,8 @@ void Sweep::add_rows(std::size_t pulse, Chunk& chunk) const {
     chunk.light_rows.push_back(
         {row, echoes[k],
          static_cast<std::uint32_t>(chunk.begin) + static_cast<std::uint32_t>(pulse),
-         echoes[k].second_share > 0
-             ? scene_.truth_of(chunk.cast.hits(pulse)[echoes[k].second_hit]).label
-             : std::uint16_t{0},
+         echoes[k].second_share > 0 ? truth_at(chunk.cast, pulse, echoes[k].second_hit).label
+                                    : std::uint16_t{0},
          velocity_of(echoes[k], chunk.cast, pulse)});
   }
 }

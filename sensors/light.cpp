@@ -117,8 +117,11 @@ double exp_of_small(double x) {
 
 }  // namespace
 
-RetroBrdfs::RetroBrdfs(const Scene& scene, double wavelength_nm)
-    : scene_(scene), by_material_(scene.materials.retro_brdfs(wavelength_nm)) {
+RetroBrdfs::RetroBrdfs(const Scene& scene, double wavelength_nm, const LaserBeam& beam)
+    : scene_(scene),
+      by_material_(scene.materials.retro_brdfs(wavelength_nm)),
+      is_plain_(scene.is_plain()),
+      beam_(beam) {
   const auto check = [&](std::uint16_t material) {
     if (material >= by_material_.size()) {
       throw Error(
@@ -126,9 +129,28 @@ RetroBrdfs::RetroBrdfs(const Scene& scene, double wavelength_nm)
           material, by_material_.size());
     }
   };
-  check(scene.terrain.material);
   for (const ModelTruth& model : scene.models) std::ranges::for_each(model.materials, check);
+  for (const CoverLayer& layer : scene.cover.layers()) check(layer.material);
+  if (!scene.cover.empty()) return;
+  check(scene.terrain.material);
   ground_ = by_material_[scene.terrain.material];
+}
+
+// The square of the same variance as a sub-ray's share of a Gaussian beam has.
+RetroBrdfs::Reflection RetroBrdfs::varied_reflection(const Ray& ray, const Hit& hit, double cosine,
+                                                     std::size_t sub_rays) const noexcept {
+  const glm::dvec2 radius_m = beam_.radius_m(hit.range_m);
+  const double width_m = std::sqrt(3 * radius_m.x * radius_m.y / static_cast<double>(sub_rays));
+  const Appearance appearance = scene_.appearance_of(ray, hit, width_m, Filtering::Fast);
+  Reflection sum;
+  for (std::uint32_t i = 0; i < appearance.count; ++i) {
+    const auto& [material, share, tint] = appearance.parts[i];
+    const RetroBrdf& brdf = by_material_[material];
+    const double weight = share;
+    sum.retro_cos_per_sr += weight * tinted_retro_brdf_cos(brdf, cosine, tint.brightness);
+    sum.albedo += weight * tinted_albedo(brdf, tint.brightness);
+  }
+  return sum;
 }
 
 Light::Light(const LightSpec& spec, const AtmosphereSpec& air, const RangeGate& gate)
@@ -168,14 +190,17 @@ void Light::collect(std::span<const Ray> rays, std::span<const Hit> hits, const 
   sort_hits(hits, work.order);
   const std::size_t count = work.order.size();
   work.arrivals.resize(count);
+  work.sunlit = 0;
   if (count == 0) return;
   Arrival* const arrivals = work.arrivals.data();
   for (std::size_t k = 0; k < count; ++k) {
     const std::uint32_t i = work.order[k];
-    const double cosine = std::max(-glm::dot(rays[i].direction, glm::dvec3(hits[i].normal)), 0.0);
-    arrivals[k] = {hits[i].range_m, retro_brdf_cos(brdfs.of(hits[i]), cosine)};
+    const auto [retro_cos_per_sr, albedo] = brdfs.reflection_of(rays[i], hits[i], hits.size());
+    arrivals[k] = {hits[i].range_m, retro_cos_per_sr};
+    work.sunlit += albedo * sun_cosine(hits[i].normal);
   }
   const double share = 1.0 / static_cast<double>(hits.size());
+  work.sunlit *= share;
   const auto receive = [&](Arrival& arrival, double transmission) {
     const double seen = share * overlap_share(spec_.overlap, arrival.range_m);
     arrival.energy_j =
@@ -232,10 +257,7 @@ void Light::receive(std::span<const Ray> rays, std::span<const Hit> hits,
                      {first_air_bin_, first_air_bin_ + static_cast<std::int64_t>(air_w_.size())});
     add_air(hits, work);
   }
-  double albedo = 0;
-  for (const std::uint32_t i : work.order) albedo += brdfs.of(hits[i]).albedo;
-  const double background_w = sun_w_ * albedo / static_cast<double>(hits.size());
-  receiver_.detect(work.waveform, gate_, {key, background_w}, work.detections);
+  receiver_.detect(work.waveform, gate_, {key, sun_w_ * work.sunlit}, work.detections);
   work.echoes.clear();
   for (const Detection& detection : work.detections)
     tell_truth(rays, hits, bounds_m, detection, work);

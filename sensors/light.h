@@ -1,6 +1,8 @@
 #pragma once
 
+#include <algorithm>
 #include <cstdint>
+#include <glm/geometric.hpp>
 #include <glm/vec3.hpp>
 #include <span>
 #include <vector>
@@ -9,6 +11,7 @@
 #include "core/random.h"
 #include "core/scene.h"
 #include "sensors/atmosphere.h"
+#include "sensors/beam.h"
 #include "sensors/lidar_spec.h"
 #include "sensors/radar_equation.h"
 #include "sensors/receiver.h"
@@ -18,17 +21,35 @@ namespace groundray {
 /// What the surfaces of a scene send back at a laser's wavelength.
 class RetroBrdfs {
  public:
+  /// @param beam  for what a sub-ray sees of a texture.
   /// @throws Error as retro_brdf, of any of the scene's materials.
-  RetroBrdfs(const Scene& scene, double wavelength_nm);
+  RetroBrdfs(const Scene& scene, double wavelength_nm, const LaserBeam& beam);
 
-  const RetroBrdf& of(const Hit& hit) const noexcept {
-    return hit.object == 0 ? ground_ : by_material_[scene_.truth_of(hit).material];
+  /// What a surface does with light.
+  struct Reflection {
+    double retro_cos_per_sr = 0;  ///< f_r cos, see retro_brdf_cos
+    double albedo = 0;
+  };
+  /// Returns that of a surface that a sub-ray met.
+  /// @param sub_rays  how many the pulse has: each sees its share of the beam's area.
+  Reflection reflection_of(const Ray& ray, const Hit& hit, std::size_t sub_rays) const noexcept {
+    const double cosine = std::max(-glm::dot(ray.direction, glm::dvec3(hit.normal)), 0.0);
+    if (!is_plain_) [[unlikely]]
+      return varied_reflection(ray, hit, cosine, sub_rays);
+    const RetroBrdf& brdf =
+        hit.object == 0 ? ground_ : by_material_[scene_.truth_of(ray, hit).material];
+    return {retro_brdf_cos(brdf, cosine), brdf.albedo};
   }
 
  private:
+  Reflection varied_reflection(const Ray& ray, const Hit& hit, double cosine,
+                               std::size_t sub_rays) const noexcept;
+
   const Scene& scene_;
   std::span<const RetroBrdf> by_material_;
   RetroBrdf ground_;
+  bool is_plain_;
+  const LaserBeam& beam_;
 };
 
 /// What came back of a pulse: an echo, and the truth about it.
@@ -77,6 +98,7 @@ class Light {
     std::vector<Arrival> arrivals;          ///< in that order
     std::vector<LitSurface> surfaces;       ///< that an echo's energy comes from
     std::vector<std::uint32_t> surface_of;  ///< of its arrivals
+    double sunlit = 0;  ///< mean over sub-rays of albedo times cosine: the sunlight that is seen
     Waveform waveform;
     Detections detections;
     std::vector<Echo> echoes;         ///< of the last pulse, by reported range
@@ -110,6 +132,10 @@ class Light {
  private:
   void collect(std::span<const Ray> rays, std::span<const Hit> hits, const RetroBrdfs& brdfs,
                double extinction_per_m, Workspace& work) const noexcept;
+  double sun_cosine(const glm::vec3& normal) const noexcept {
+    if (!spec_.sun.direction) return 1;
+    return std::max(glm::dot(glm::dvec3(normal), *spec_.sun.direction), 0.0);
+  }
   void add_air(std::span<const Hit> hits, Workspace& work) const noexcept;
   void tell_truth(std::span<const Ray> rays, std::span<const Hit> hits,
                   std::span<const double> bounds_m, const Detection& detection,
@@ -126,7 +152,7 @@ class Light {
   Receiver receiver_;
   double resolution_m_;
   double perpendicular_w_m2_;  // peak power times range squared, of a white Lambertian target
-  double sun_w_;               // of a white surface
+  double sun_w_;               // of a white surface that faces the sun
   std::int64_t first_air_bin_ = 0;
   std::vector<float> air_w_;  // what the air sends back if nothing ends it, from that bin on
 };

@@ -7,6 +7,7 @@
 #include <utility>
 
 #include "core/error.h"
+#include "sensors/interval_reader.h"
 #include "sensors/pattern_reader.h"
 
 namespace groundray {
@@ -21,9 +22,6 @@ using yaml::Node;
 using yaml::not_negative;
 using yaml::positive;
 using yaml::Rule;
-
-constexpr Rule slope_rule{[](double value) { return value >= 0 && value <= 90; },
-                          "must be from 0 to 90"};
 
 // What every list of the reader below goes by.
 struct Reading {
@@ -129,15 +127,6 @@ std::variant<StandingObject, RecordedPath, DrivenPath> read_place(Map& entry, co
   if (recorded != nullptr) return RecordedPath{beside(with.path, tum)};
   if (drive) return read_drive(std::move(*drive), with.faults);
   return read_standing(entry);
-}
-
-Interval read_interval(Map& entry, std::string_view key, Interval interval, Rule rule,
-                       Faults& faults) {
-  std::array<double, 2> ends{interval.low, interval.high};
-  const Node* const at = entry.read_numbers(key, Need::Optional, ends, rule);
-  if (at != nullptr && ends[0] > ends[1])
-    faults.add(*at, key, "[{}, {}] is empty: are the two swapped?", ends[0], ends[1]);
-  return {ends[0], ends[1]};
 }
 
 Clearing read_clearing(Map entry, Faults& faults) {

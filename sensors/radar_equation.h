@@ -1,5 +1,6 @@
 #pragma once
 
+#include <glm/vec3.hpp>
 #include <optional>
 
 namespace groundray {
@@ -14,9 +15,11 @@ struct LidarOptics {
 
 /// Sunlight that a receiver sees on a diffuse surface.
 struct SolarBackground {
-  /// Of the surface by the sun at the laser's wavelength; else that of the scene's sky on level
-  /// ground, or none.
+  /// By the sun at the laser's wavelength: with a `direction`, of a plane across its rays; else of
+  /// all surfaces alike. Nothing for that of the scene's sun, or none.
   std::optional<double> irradiance_w_m2_nm;
+  /// To the sun, unit, in D; a surface has the irradiance times its cosine, and none facing away.
+  std::optional<glm::dvec3> direction;
   double filter_width_nm = 0;   ///< equivalent width of the receiver's optical filter
   double field_of_view_sr = 0;  ///< of one detector
 };

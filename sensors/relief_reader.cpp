@@ -1,7 +1,5 @@
 #include "sensors/relief_reader.h"
 
-#include <algorithm>
-#include <cctype>
 #include <string>
 #include <utility>
 
@@ -22,18 +20,6 @@ using yaml::Rule;
 
 constexpr Rule hurst_rule{[](double value) { return value >= 0 && value <= 1; },
                           "must be from 0 to 1"};
-
-// Heights are linear in what is stored: 0 to 1 of 8 bits.
-ImageF read_heights(const fs::path& path) {
-  std::string form = path.extension().string();
-  std::ranges::transform(form, form.begin(), [](unsigned char c) { return std::tolower(c); });
-  if (form == ".exr" || form == ".hdr") return read_image_f(path, PictureOf::Heights);
-  const Image8 bytes = read_image8(path);
-  ImageF image(bytes.width(), bytes.height(), bytes.channels());
-  std::ranges::transform(bytes.values(), image.values().begin(),
-                         [](std::uint8_t value) { return static_cast<float>(value) / 255; });
-  return image;
-}
 
 ImageRelief read_image_relief(Map map, const fs::path& path, Faults& faults) {
   ImageRelief relief;

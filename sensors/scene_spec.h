@@ -29,6 +29,9 @@ struct TerrainSpec {
   std::optional<Material> material;  ///< there must be one if a lidar has light
   TerrainDetail detail;
   std::optional<ReliefSpec> relief;
+  std::optional<GroundTextureSpec> texture;  ///< of that material
+  std::vector<CoverSpec> cover;              ///< over it, from the lowest to the uppermost
+  std::filesystem::path orthophoto;          ///< empty for none
 };
 
 /// A lidar and where it sits.

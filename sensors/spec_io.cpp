@@ -9,6 +9,7 @@
 #include <glm/vec3.hpp>
 #include <set>
 
+#include "sensors/cover_reader.h"
 #include "sensors/lidar.h"
 #include "sensors/lidar_reader.h"
 #include "sensors/material_reader.h"
@@ -56,6 +57,11 @@ TerrainSpec read_terrain(Map terrain, const fs::path& path, const DataFolders& f
     spec.material = read_material(*node, "material", path, folders, faults);
   if (auto relief = terrain.map("relief", Need::Optional))
     spec.relief = read_relief(std::move(*relief), path, faults);
+  spec.texture = read_ground_texture(terrain, path, faults);
+  spec.cover = read_cover(terrain, path, folders, faults);
+  std::string orthophoto;
+  if (terrain.read_text("orthophoto", Need::Optional, orthophoto))
+    spec.orthophoto = beside(path, orthophoto);
   std::string dem;
   if (terrain.read_text("dem", Need::Required, dem)) spec.dem = beside(path, dem);
   double nodata = 0;
@@ -207,11 +213,7 @@ void check_lidars(const SceneSpec& scene, const Node& node, std::span<const Node
   }
 }
 
-}  // namespace
-
-namespace {
-
-// Lidars that do not say how much sunlight there is take that of the sky on level ground.
+// Lidars that do not say how much sunlight there is take the sun of the sky.
 void light_by_sky(SceneSpec& scene, std::span<const Node> entries, Faults& faults) {
   if (!scene.sky || !scene.sky->sun) return;
   const Sun sun(*scene.sky->sun, scene.sky->air);
@@ -219,8 +221,8 @@ void light_by_sky(SceneSpec& scene, std::span<const Node> entries, Faults& fault
     auto& light = scene.lidars[i].lidar.light;
     if (!light || light->sun.irradiance_w_m2_nm) continue;
     try {
-      light->sun.irradiance_w_m2_nm =
-          solar_irradiance_w_m2_nm(sun, light->wavelength_nm) * std::max(sun.direction().z, 0.0);
+      light->sun.irradiance_w_m2_nm = solar_irradiance_w_m2_nm(sun, light->wavelength_nm);
+      light->sun.direction = sun.direction();
     } catch (const Error& fault) {
       faults.add(entries[i], "lidars", "the sun's light on '{}' is not known: {}; give sun_w_m2_nm",
                  scene.lidars[i].name, fault.what());

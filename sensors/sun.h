@@ -73,8 +73,8 @@ class Sun {
   SunDisc disc_;
 };
 
-/// Returns the irradiance, W/(m^2 nm), that the sun gives a plane across its rays: times the cosine
-/// of incidence it is SolarBackground::irradiance_w_m2_nm. 0 if the sun is not up.
+/// Returns the irradiance, W/(m^2 nm), that the sun gives a plane across its rays, as
+/// SolarBackground wants it with the sun's direction. 0 if the sun is not up.
 /// @throws Error unless the wavelength is in [300, 4000] nm.
 double solar_irradiance_w_m2_nm(const Sun& sun, double wavelength_nm);
 

@@ -10,6 +10,7 @@
 #include <variant>
 #include <vector>
 
+#include "core/ground_cover.h"
 #include "core/material.h"
 #include "core/model_io.h"
 #include "terrain/asset.h"
@@ -50,6 +51,24 @@ struct StandingObject {
   std::optional<double> height_m;  ///< else on the ground
   double yaw_deg = 0, pitch_deg = 0, roll_deg = 0;
   Stance stance = Stance::Upright;
+};
+
+/// Images that repeat over the ground.
+struct GroundTextureSpec {
+  std::filesystem::path albedo, normal;  ///< empty for none
+  double size_m = 1;                     ///< of one copy
+};
+
+/// A layer of the ground's cover.
+struct CoverSpec {
+  std::optional<Material> material;    ///< there must be one if a lidar has light
+  std::optional<std::uint16_t> label;  ///< else the terrain's
+  CoverLimits slope_rad{};
+  CoverLimits height_m{};      ///< in W
+  std::filesystem::path mask;  ///< empty for none
+  double mask_full = 1;        ///< the value of the mask that means all
+  std::optional<double> mask_nodata;
+  std::optional<GroundTextureSpec> texture;
 };
 
 /// One object.

@@ -148,14 +148,14 @@ GDALDatasetUniquePtr open_raster(const std::filesystem::path& path) {
   return dataset;
 }
 
-RasterHeader read_header(GDALDataset& dataset) {
+RasterHeader read_header(GDALDataset& dataset, const char* placing) {
   RasterHeader header;
   header.samples = {dataset.GetRasterXSize(), dataset.GetRasterYSize()};
   auto& gt = header.geotransform;
   if (dataset.GetGeoTransform(gt.data()) != CE_None) {
     if (dataset.GetGCPCount() > 0) {
       throw Error("it is placed by ground control points, not by a geotransform; run{}",
-                  command(dataset.GetDescription(), "gdalwarp -ot Float32", "_placed.tif"));
+                  command(dataset.GetDescription(), placing, "_placed.tif"));
     }
     // GDAL's default has rows run northwards, which would mirror a picture of heights.
     gt = {0, 1, 0, static_cast<double>(header.samples.y), 0, -1};

@@ -35,8 +35,9 @@ void start_gdal();
 /// Opens a dataset of at least one band. @throws Error if there is none.
 GDALDatasetUniquePtr open_raster(const std::filesystem::path& path);
 
+/// @param placing  the program that places a raster by its ground control points.
 /// @throws Error if the grid has no place, or cells without area.
-RasterHeader read_header(GDALDataset& dataset);
+RasterHeader read_header(GDALDataset& dataset, const char* placing = "gdalwarp -ot Float32");
 
 /// Returns the CRS's name for people: "NAD83 / UTM zone 15N (EPSG:26915)"; "local (no CRS)".
 std::string name_of(const OGRSpatialReference& crs);

@@ -14,9 +14,7 @@
 #include <utility>
 
 namespace groundray {
-namespace {
 
-// Says why `crs` cannot be W, a plane in metres; empty if it can.
 std::string why_not_metric(const OGRSpatialReference& crs) {
   if (crs.IsEmpty()) return {};
   const std::string subject = fmt::format("its CRS, {},", name_of(crs));
@@ -28,8 +26,6 @@ std::string why_not_metric(const OGRSpatialReference& crs) {
   return fmt::format("{} has the unit {} ({} m), not the metre", subject, unit, unit_m);
 }
 
-// Returns the UTM (near the poles UPS) zone of the raster's centre, or for another body than the
-// Earth a transverse Mercator about it, as gdalwarp -t_srs wants it.
 std::string fitting_crs(const RasterHeader& raster) {
   const double a_m = raster.crs.GetSemiMajor();
   const double b_m = raster.crs.GetSemiMinor();
@@ -60,6 +56,8 @@ std::string fitting_crs(const RasterHeader& raster) {
   const int zone = static_cast<int>(60 * (turns - std::floor(turns))) + 1;
   return fmt::format("EPSG:{}", (latitude_deg < 0 ? 32700 : 32600) + zone);
 }
+
+namespace {
 
 // Returns the options of gdalwarp that bring `dataset` to `target` (empty: keep its CRS, undo a
 // rotation) with square cells about as large as its own, heights unrounded and unshifted, and

@@ -9,6 +9,13 @@
 
 namespace groundray {
 
+/// Says why `crs` cannot be W, a plane in metres; empty if it can.
+std::string why_not_metric(const OGRSpatialReference& crs);
+
+/// Returns the UTM (near the poles UPS) zone of the raster's centre, or for another body than the
+/// Earth a transverse Mercator about it, as gdalwarp -t_srs wants it.
+std::string fitting_crs(const RasterHeader& raster);
+
 /// Refuses a raster whose samples are no grid of metres. @throws Error with the command that makes
 /// one of it.
 void check_placed(GDALDataset& dataset, const RasterHeader& header, std::optional<double> nodata);

@@ -5,17 +5,15 @@
 #include <cstddef>
 #include <cstdint>
 #include <glm/common.hpp>
-#include <memory>
 #include <utility>
 
 #include "core/error.h"
-#include "terrain/dem_raster.h"
-#include "terrain/dem_warp.h"
+#include "terrain/placed_raster.h"
 
 namespace groundray {
 namespace {
 
-constexpr std::int64_t max_pixels = std::int64_t{1} << 30;
+constexpr std::int64_t most_pixels = std::int64_t{1} << 30;
 
 bool is_density(double per_m2) { return per_m2 >= 0 && std::isfinite(per_m2); }
 
@@ -87,34 +85,12 @@ DensityMap load_density_map(const std::filesystem::path& path, const DensityOpti
     if (!is_density(options.factor_per_m2)) {
       throw Error("factor_per_m2 = {} must be 0 or more, and finite", options.factor_per_m2);
     }
-    const GDALDatasetUniquePtr dataset = open_raster(path);
-    RasterHeader header = read_header(*dataset);
-    const HeightReader values(*dataset, header.crs, options.nodata, /*unit_m=*/1);
-    std::unique_ptr<WarpedHeights> warped;
-    if (!options.crs_wkt.empty() && !header.crs.IsEmpty()) {
-      warped = reprojected(values, header, options.crs_wkt);
-    } else {
-      check_placed(*dataset, header, options.nodata);
-    }
-    if (warped) header = warped->header();
-    const glm::ivec2 size = header.samples;
-    if (std::int64_t{size.x} * size.y > max_pixels) {
-      throw Error("it has {} x {} pixels, more than the {} that fit; make them larger:{}", size.x,
-                  size.y, max_pixels,
-                  command(path, "gdal_translate -r average -outsize 16384 0", "_small.tif"));
-    }
-    std::vector<float> per_m2(static_cast<std::size_t>(size.x) * static_cast<std::size_t>(size.y));
-    if (warped) {
-      warped->read({0, 0}, size, per_m2.data());
-    } else {
-      values.read({0, 0}, size, per_m2.data());
-    }
-    for (float& density : per_m2) {
+    PlacedRaster raster = load_placed_raster(path, options.nodata, options.crs_wkt, most_pixels);
+    for (float& density : raster.values) {
       density = static_cast<float>(density * options.factor_per_m2);
     }
-    const auto& gt = header.geotransform;
-    return DensityMap(size, glm::dvec2(gt[0], gt[3]) - glm::dvec2(options.origin_w_m),
-                      {gt[1], gt[5]}, std::move(per_m2));
+    return DensityMap(raster.size, raster.corner_w_m - glm::dvec2(options.origin_w_m),
+                      raster.step_m, std::move(raster.values));
   });
 }
 

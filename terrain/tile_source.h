@@ -50,8 +50,8 @@ std::shared_ptr<Tile> empty_tile(const Lattice& lattice, const TileName& name);
 /// Returns a cell of the DEM from the tile of level 0 that it lies in.
 inline Cell cell_of(const Tile& tile, glm::ivec2 cell) {
   const glm::ivec2 place = cell % Tile::cells;
-  const float* const nw =
-      &tile.heights_m[static_cast<std::size_t>(place.y * Tile::points + place.x)];
+  const float* const nw = &tile.heights_m[static_cast<std::size_t>(place.y) * Tile::points +
+                                          static_cast<std::size_t>(place.x)];
   const float* const sw = nw + Tile::points;
   return {cell.x, cell.y, 1, 1, nw[0], nw[1], sw[0], sw[1]};
 }

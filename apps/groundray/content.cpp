@@ -15,12 +15,12 @@
 #include <utility>
 #include <variant>
 
+#include "apps/groundray/cover.h"
 #include "apps/groundray/fingerprint.h"
+#include "apps/groundray/palette.h"
 #include "apps/groundray/paths.h"
-#include "apps/groundray/world.h"
 #include "core/error.h"
 #include "core/product_io.h"
-#include "sensors/material_io.h"
 #include "terrain/asset.h"
 #include "terrain/scatter.h"
 
@@ -36,46 +36,6 @@ struct Gathered {
   std::vector<PlacedObject> placed;
   std::vector<MovingObject> moving;
   std::vector<Content::Group> standing_groups, moving_groups;
-};
-
-// Names of surfaces are those of built-in materials, unless the scene says otherwise.
-class Palette {
- public:
-  explicit Palette(const SceneSpec& spec) {
-    for (const MountedLidar& mounted : spec.lidars) {
-      if (mounted.lidar.light) wavelengths_nm_.push_back(mounted.lidar.light->wavelength_nm);
-    }
-    if (spec.terrain.material) all_.push_back(*spec.terrain.material);
-  }
-
-  std::uint16_t index_of(const ModelSpec& model, const std::string& surface) {
-    if (wavelengths_nm_.empty()) return 0;
-    if (const auto found = model.materials.find(surface); found != model.materials.end())
-      return add(found->second);
-    if (model.material) return add(*model.material);
-    const fs::path built_in = data_folder() / "materials" / (surface + ".yaml");
-    if (!surface.empty() && fs::exists(built_in)) return add(load_material(built_in));
-    throw Error(
-        "its surface '{}' has no material, but a lidar has a laser: give the entry material: NAME, "
-        "or materials: {{{}: NAME}}",
-        surface, surface);
-  }
-  std::vector<Material> take() { return std::move(all_); }
-
- private:
-  std::uint16_t add(const Material& material) {
-    const std::uint64_t print = fingerprint_of(material);
-    for (std::size_t i = 0; i < all_.size(); ++i) {
-      if (fingerprint_of(all_[i]) == print) return static_cast<std::uint16_t>(i);
-    }
-    for (const double wavelength_nm : wavelengths_nm_)
-      retro_brdf(material, wavelength_nm);  // throws
-    all_.push_back(material);
-    return static_cast<std::uint16_t>(all_.size() - 1);
-  }
-
-  std::vector<double> wavelengths_nm_;  // of lasers
-  std::vector<Material> all_;
 };
 
 Model load(const std::variant<AssetSpec, ModelSource>& source) {
@@ -186,8 +146,9 @@ void for_entry(std::string_view kind, const std::string& name, const Make& make)
   }
 }
 
-std::string fingerprint_of(const Gathered& gathered) {
+std::string fingerprint_of(const Gathered& gathered, std::uint64_t cover) {
   Fingerprint print;
+  print.add_all(cover);
   for (const ModelScene& scene : gathered.models) {
     const Model& model = scene.model();
     print.add(std::span(model.mesh.vertices_m));
@@ -220,6 +181,8 @@ Content build_content(const SceneSpec& spec, const Terrain& terrain,
   const RayDevice device;
   Palette palette(spec);
   Gathered gathered;
+  Content content;
+  LoadedCover ground = load_cover(spec.terrain, terrain, palette);
   for (const ObjectSpec& object : spec.objects) {
     for_entry("object", object.name, [&] {
       add_object(object, spec, terrain, begin,
@@ -235,15 +198,16 @@ Content build_content(const SceneSpec& spec, const Terrain& terrain,
       add_layer(layer, spec, terrain, first, gathered);
     });
   }
-  Content content;
-  content.fingerprint = fingerprint_of(gathered);
+  content.fingerprint = fingerprint_of(gathered, ground.fingerprint);
   content.groups = std::move(gathered.standing_groups);
   for (Content::Group& group : gathered.moving_groups) {
     group.first += static_cast<std::uint32_t>(gathered.placed.size());
     content.groups.push_back(std::move(group));
   }
-  content.memory_bytes = gathered.placed.size() * sizeof(PlacedObject);
-  content.materials = Materials(palette.take());
+  content.cover = std::move(ground.cover);
+  content.memory_bytes = ground.memory_bytes + gathered.placed.size() * sizeof(PlacedObject);
+  for (const ModelScene& scene : gathered.models) content.memory_bytes += scene.texture_bytes();
+  content.materials = palette.take();
   content.models = std::move(gathered.truths);
   if (!gathered.placed.empty() || !gathered.moving.empty()) {
     content.objects = ObjectTracer(device, std::move(gathered.models), std::move(gathered.placed),

@@ -11,7 +11,7 @@
 
 namespace groundray {
 
-/// What stands and moves in a scene, built for tracing.
+/// What stands and moves in a scene, and what the ground is made of, built for tracing.
 struct Content {
   /// Objects of one entry of the scene file, by number.
   struct Group {
@@ -21,11 +21,12 @@ struct Content {
     std::uint32_t count = 0;
   };
 
+  GroundCover cover;  ///< empty if the ground is of one material without an image
   ObjectTracer objects;
   std::vector<ModelTruth> models;
   Materials materials;  ///< of the ground, if it has one, and then of the models
   std::vector<Group> groups;
-  std::string fingerprint;       ///< equal texts mean equal objects
+  std::string fingerprint;       ///< equal texts mean equal objects and equal cover
   std::size_t memory_bytes = 0;  ///< of all that is traced
 };
 

@@ -61,11 +61,9 @@ class SceneFor {
  private:
   void take(RayTracer rays) {
     const Content& content = world_.content;
-    scene_ = Scene{std::move(rays),
-                   {.label = world_.spec.terrain.label},
-                   content.materials,
-                   content.objects,
-                   content.models};
+    scene_ = Scene{std::move(rays),   {.label = world_.spec.terrain.label},
+                   content.materials, content.objects,
+                   content.models,    content.cover};
   }
 
   const World& world_;

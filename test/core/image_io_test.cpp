@@ -2,6 +2,7 @@
 
 #include <gmock/gmock.h>
 #include <gtest/gtest.h>
+#include <png.h>
 #include <zlib.h>
 
 #include <array>
@@ -280,6 +281,91 @@ TEST(ReadImageF, SaysWhatIsWrongWithAFile) {
   EXPECT_THAT(message(hdr_bytes("EXPOSURE=0\n", 1, 1, "")), HasSubstr("must be positive"));
   EXPECT_THAT(message(hdr_bytes("", 2, 1, "\x01\x01\x01\x05"s)), HasSubstr("beyond its row"));
   EXPECT_THAT(message(hdr_bytes("", 8, 1, "\x02\x02\0\x09"s)), HasSubstr("another length"));
+}
+
+// The bytes of a PNG of 16 bits a value, written through libpng; values row by row.
+std::string png16_bytes(int width, int color_type, std::vector<std::uint16_t> values) {
+  std::string bytes;
+  png_structp png = png_create_write_struct(PNG_LIBPNG_VER_STRING, nullptr, nullptr, nullptr);
+  png_infop info = png_create_info_struct(png);
+  const auto append = [](png_structp to, png_bytep data, std::size_t size) {
+    static_cast<std::string*>(png_get_io_ptr(to))->append(reinterpret_cast<char*>(data), size);
+  };
+  png_set_write_fn(png, &bytes, append, [](png_structp) {});
+  const std::size_t in_row =
+      static_cast<std::size_t>(width) * (color_type == PNG_COLOR_TYPE_RGB ? 3 : 1);
+  const std::size_t height = values.size() / in_row;
+  png_set_IHDR(png, info, static_cast<png_uint_32>(width), static_cast<png_uint_32>(height), 16,
+               color_type, PNG_INTERLACE_ADAM7, PNG_COMPRESSION_TYPE_BASE, PNG_FILTER_TYPE_BASE);
+  png_write_info(png, info);
+  for (std::uint16_t& v : values) v = static_cast<std::uint16_t>(v << 8 | v >> 8);  // big-endian
+  std::vector<png_bytep> rows;
+  for (std::size_t y = 0; y < height; ++y) {
+    rows.push_back(reinterpret_cast<png_bytep>(values.data() + y * in_row));
+  }
+  png_write_image(png, rows.data());
+  png_write_end(png, info);
+  png_destroy_write_struct(&png, &info);
+  return bytes;
+}
+
+TEST(ReadHeights, KeepsAll16BitsOfAPng) {
+  std::vector<std::uint16_t> values;
+  for (int i = 0; i < 65536; ++i) values.push_back(static_cast<std::uint16_t>(i));
+  const ImageF grey = parse_heights(png16_bytes(256, PNG_COLOR_TYPE_GRAY, values), "a.png");
+  ASSERT_EQ(grey.width(), 256);
+  ASSERT_EQ(grey.height(), 256);
+  ASSERT_EQ(grey.channels(), 1);
+  for (int i = 0; i < 65536; ++i) {
+    ASSERT_EQ(grey.at(i % 256, i / 256)[0], static_cast<float>(i / 65535.0)) << i;
+  }
+  const ImageF rgb = parse_heights(
+      png16_bytes(2, PNG_COLOR_TYPE_RGB, {1, 256, 65535, 0x1234, 0x8000, 0}), "a.png");
+  ASSERT_EQ(rgb.channels(), 3);
+  EXPECT_THAT(rgb.values(), ElementsAre(1 / 65535.0f, 256 / 65535.0f, 1, 0x1234 / 65535.0f,
+                                        0x8000 / 65535.0f, 0));
+}
+
+TEST(ReadHeights, TakesFewerBitsAsPartsOf255) {
+  const TemporaryFolder folder;
+  Image8 image(256, 1, 1);
+  for (int i = 0; i < 256; ++i) image.at(i, 0)[0] = static_cast<std::uint8_t>(i);
+  write_png(folder / "a.exr", image);  // whatever its name
+  const ImageF read = read_heights(folder / "a.exr");
+  for (int i = 0; i < 256; ++i) EXPECT_EQ(read.at(i, 0)[0], static_cast<float>(i / 255.0));
+  const std::string jpeg = jpeg_bytes(ramps(1), JCS_GRAYSCALE);
+  const Image8 bytes = parse_image8(jpeg, "a.jpg");
+  const ImageF heights = parse_heights(jpeg, "a.png");
+  ASSERT_EQ(heights.values().size(), bytes.values().size());
+  for (std::size_t i = 0; i < bytes.values().size(); ++i) {
+    EXPECT_EQ(heights.values()[i], static_cast<float>(bytes.values()[i] / 255.0));
+  }
+}
+
+TEST(ReadHeights, TakesFloatsAsTheyAre) {
+  ImageF image(2, 1, 1);
+  image.at(0, 0)[0] = -12.5f;
+  image.at(1, 0)[0] = 1234.5678f;
+  EXPECT_THAT(parse_heights(exr_bytes(image, {"Y"}), "a.png").values(),
+              ElementsAre(-12.5f, 1234.5678f));
+  EXPECT_THAT(parse_heights(hdr_bytes("", 1, 1, "\x80\x40\x20\x81"), "a").values(),
+              ElementsAre(1, 0.5, 0.25));
+}
+
+TEST(ReadHeights, SaysWhatIsWrongWithAFile) {
+  const auto message = [](const std::string& bytes) {
+    return message_of([&] { parse_heights(bytes, "relief.tif"); });
+  };
+  EXPECT_THAT(message(""), AllOf(HasSubstr("relief.tif: it is no PNG, JPEG, OpenEXR"),
+                                 HasSubstr("it is empty")));
+  EXPECT_THAT(message("II*\0"s), HasSubstr("whatever its name: convert it"));
+  const std::string png = png16_bytes(2, PNG_COLOR_TYPE_GRAY, {1, 2, 3, 4});
+  for (std::size_t size = 8; size < png.size(); ++size) {
+    EXPECT_THAT(message(png.substr(0, size)), HasSubstr("relief.tif: it is cut short or damaged"));
+  }
+  ImageF image(1, 1, 1);
+  image.at(0, 0)[0] = std::numeric_limits<float>::infinity();
+  EXPECT_THAT(message(exr_bytes(image, {"Y"})), HasSubstr("heights must be finite"));
 }
 
 // Every beginning of a file is refused, and nothing but the Error tells of it.

@@ -14,7 +14,7 @@
 
 #include "core/error.h"
 #include "core/image_io.h"
-#include "sensors/luminance.h"
+#include "core/luminance.h"
 #include "test/support/temporary_folder.h"
 
 namespace groundray {

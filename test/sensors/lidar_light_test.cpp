@@ -130,6 +130,72 @@ TEST(LidarLight, PerpendicularPlaneReturnsThePowerOfTheRadarEquation) {
   }
 }
 
+// A checkerboard of two greys under a beam that covers many of its squares, or lies inside one.
+TEST(LidarLight, TexturesMakeGroundBrighterAndDarkerAboutItsMean) {
+  const float dark = 0.25f, bright = 0.75f;
+  ImageF image(2, 2, 1);
+  image.at(0, 0)[0] = image.at(1, 1)[0] = dark;  // the square beside D's origin to the south-east
+  image.at(1, 0)[0] = image.at(0, 1)[0] = bright;
+  const auto texture = std::make_shared<const Texture>(std::move(image), Wrap::Repeat);
+  const auto power_w = [&](double size_m, double height_m, const glm::dvec2& at) {
+    Scene scene = scene_of(flat_ground());
+    scene.cover = GroundCover({{.texture = GroundTexture{texture, nullptr, size_m}}}, nullptr, {});
+    const LidarSpec spec = lidar_of(looking_down({pi / 2}), 1e-3, 1024, 1024);
+    return only(scan(spec, scene, {at, height_m}), "amplitude");
+  };
+  // In the middle of squares of 50 m, between whose centres the image is linear: a Gaussian beam of
+  // 1/e^2 radius 0.1 m is 0.05 sqrt(2 / pi) m off the middle on average, in each direction.
+  const double slope = 1 - 0.05 * std::sqrt(2 / pi) / 25;
+  for (const auto& [y, contrast] : {std::pair{25.0, 0.5}, {-25.0, -0.5}}) {
+    EXPECT_NEAR(power_w(100, 200, {25, y}), (1 + contrast * slope * slope) * plane_power_w(200),
+                2e-5 * plane_power_w(200));
+  }
+  // Over squares of 0.5 mm, of which each of 1024 sub-rays sees some.
+  EXPECT_NEAR(power_w(0.001, 200, {0.3, 0.2}), plane_power_w(200), 1e-2 * plane_power_w(200));
+}
+
+TEST(LidarLight, SunlightIsByTheCosineOfEachSurface) {
+  const auto snr = [](double irradiance_w_m2_nm, std::optional<glm::dvec3> direction) {
+    LidarSpec spec = lidar_of(looking_down({pi / 2}), 1e-3, 16, 16);
+    spec.light->receiver.noise = NoiseSpec{.nep_w_per_sqrt_hz = 1e-14};
+    spec.light->receiver.response_fwhm_s = 2e-9;
+    spec.light->sun = {.irradiance_w_m2_nm = irradiance_w_m2_nm,
+                       .direction = direction,
+                       .filter_width_nm = 20,
+                       .field_of_view_sr = 1e-5};
+    return only(scan(spec, scene_of(flat_ground()), {0, 0, 50}), "snr");
+  };
+  const float dark = snr(0, {}), lit = snr(1, {});
+  EXPECT_LT(lit, 0.9f * dark);
+  EXPECT_EQ(snr(1, glm::dvec3(0, 0, 1)), lit);
+  EXPECT_EQ(snr(1, glm::dvec3(std::sqrt(0.75), 0, 0.5)), snr(0.5, {}));
+  EXPECT_EQ(snr(1, glm::dvec3(1, 0, 0)), dark);
+  EXPECT_EQ(snr(1, glm::dvec3(0, 0, -1)), dark);
+}
+
+TEST(LidarLight, LayersOfGroundMixByTheirShares) {
+  const auto grey = [](double value) {
+    return Material{"grey", Lambertian{{{300, value}, {2500, value}}}};
+  };
+  Scene scene{RayTracer({full_resolution_level(flat_ground())}, {0, 0, 0}, Tracing::Fast),
+              {},
+              {grey(0.1), grey(0.9)}};
+  const Texture third = [] {
+    ImageF image(1, 1, 1);
+    image.at(0, 0)[0] = 1.0f / 3;
+    return Texture(std::move(image), Wrap::Clamp);
+  }();
+  const auto mask = std::make_shared<const Drape>(Drape{third, {-100, -100}, {200, 200}});
+  scene.cover =
+      GroundCover({{.material = 0, .label = 1},
+                   {.material = 1, .label = 2, .height_m = {}, .mask = mask, .texture = {}}},
+                  nullptr, {});
+  const LidarScan found = scan(lidar_of(looking_down({pi / 2}), 1e-3, 16, 16), scene, {0, 0, 50});
+  const double mixed = (2.0 / 3 * 0.1 + 1.0 / 3 * 0.9) / reflectance;
+  EXPECT_NEAR(only(found, "amplitude"), mixed * plane_power_w(50), 1e-5 * plane_power_w(50));
+  EXPECT_EQ(found.echoes.column<std::uint16_t>("label")[0], 1);
+}
+
 // What a plane sends back over time, as the integral over a Gaussian beam that the ranges of its
 // directions, cosines and distances give. The trapezium rule in both slopes converges
 // exponentially; it ends where the irradiance is e^-24 of that on the axis.

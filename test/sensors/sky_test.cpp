@@ -13,7 +13,7 @@
 
 #include "core/error.h"
 #include "sensors/aerial_perspective.h"
-#include "sensors/luminance.h"
+#include "core/luminance.h"
 
 namespace groundray {
 namespace {

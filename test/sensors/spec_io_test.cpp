@@ -5,10 +5,13 @@
 
 #include <cmath>
 #include <fstream>
+#include <glm/geometric.hpp>
 #include <glm/gtc/quaternion.hpp>
 #include <glm/trigonometric.hpp>
+#include <numbers>
 
 #include "core/error.h"
+#include "sensors/solar_spectrum.h"
 #include "test/support/lidar_file.h"
 #include "test/support/temporary_folder.h"
 
@@ -168,8 +171,7 @@ TEST(SceneFile, SuggestsTheKeyThatWasMeant) {
               HasSubstr(":4:1: key 'tracng': unknown; did you mean 'tracing'?"));
   EXPECT_THAT(complaint("yaw_deg: 90", "yaw: 90"),
               HasSubstr(":21:7: key 'yaw': unknown; did you mean 'yaw_deg'?"));
-  EXPECT_THAT(complaint("label: 40", "colour: 40"),
-              ::testing::EndsWith(":9:3: key 'colour': unknown"));
+  EXPECT_THAT(complaint("label: 40", "hue: 40"), ::testing::EndsWith(":9:3: key 'hue': unknown"));
 }
 
 TEST(SceneFile, NamesAMisspeltKeyOnceAndNotAsMissingToo) {
@@ -386,6 +388,88 @@ TEST(PresetNames, AreSortedAndWithoutExtension) {
   EXPECT_THAT(preset_names(folder.path()), ::testing::ElementsAre("a", "b"));
   EXPECT_THAT([&] { preset_names(folder / "none"); },
               ThrowsMessage<Error>(HasSubstr("none: the folder of presets cannot be read")));
+}
+
+constexpr const char* covered =
+    R"(label: 40
+  material: dry_soil
+  texture: {albedo: soil.png, size_m: 2}
+  orthophoto: /maps/photo.tif
+  cover:
+    - material: gravel
+      label: 41
+      slope_deg: [20, 90]
+      slope_blend_deg: 5
+    - material: dry_grass
+      height_m: [100, 200]
+      height_blend_m: 10
+      mask: grass.tif
+      mask_full: 255
+      mask_nodata: 7
+      texture: {normal: blades.png, size_m: 0.5})";
+
+TEST(SceneFile, CoversTheGroundInLayers) {
+  const TerrainSpec terrain = parse(with(scene_text, "label: 40", covered)).terrain;
+  ASSERT_TRUE(terrain.texture);
+  EXPECT_EQ(terrain.texture->albedo.filename(), "soil.png");
+  EXPECT_TRUE(terrain.texture->normal.empty());
+  EXPECT_EQ(terrain.texture->size_m, 2);
+  EXPECT_EQ(terrain.orthophoto, "/maps/photo.tif");
+  ASSERT_EQ(terrain.cover.size(), 2u);
+  const CoverSpec &gravel = terrain.cover[0], &grass = terrain.cover[1];
+  EXPECT_EQ(gravel.material->name, "gravel");
+  EXPECT_EQ(gravel.label, 41);
+  EXPECT_NEAR(gravel.slope_rad.low, 0.349066, 1e-6);
+  EXPECT_TRUE(std::isinf(gravel.slope_rad.high));  // no slope is steeper than 90 degrees
+  EXPECT_NEAR(gravel.slope_rad.blend, 0.0872665, 1e-6);
+  EXPECT_TRUE(gravel.mask.empty());
+  EXPECT_EQ(grass.label, std::nullopt);
+  EXPECT_EQ(grass.height_m.low, 100);
+  EXPECT_EQ(grass.height_m.high, 200);
+  EXPECT_EQ(grass.height_m.blend, 10);
+  EXPECT_EQ(grass.mask.filename(), "grass.tif");
+  EXPECT_EQ(grass.mask_full, 255);
+  EXPECT_EQ(grass.mask_nodata, 7);
+  EXPECT_EQ(grass.texture->normal.filename(), "blades.png");
+}
+
+TEST(SceneFile, SaysWhatIsWrongWithACover) {
+  const auto complaint = [](const std::string& from, const std::string& to) {
+    return scene_complaint(with(with(scene_text, "label: 40", covered), from, to));
+  };
+  EXPECT_THAT(complaint("material: gravel", "material: gravle"),
+              HasSubstr("did you mean 'gravel'"));
+  EXPECT_THAT(complaint("slope_deg: [20, 90]", "slope_deg: [20, 91]"),
+              HasSubstr("must be from 0 to 90"));
+  EXPECT_THAT(complaint("height_m: [100, 200]", "height_m: [200, 100]"),
+              HasSubstr("key 'height_m': [200, 100] is empty"));
+  EXPECT_THAT(complaint("slope_deg: [20, 90]", ""),
+              HasSubstr("key 'slope_blend_deg': is about the limits of 'slope_deg'"));
+  EXPECT_THAT(complaint("mask: grass.tif", ""), HasSubstr("key 'mask_full': is about a 'mask'"));
+  EXPECT_THAT(complaint("mask_full: 255", "mask_full: 0"), HasSubstr("must be > 0"));
+  EXPECT_THAT(complaint("albedo: soil.png, ", ""),
+              HasSubstr("key 'texture': must have 'albedo' or 'normal', or both"));
+  std::string many = "label: 40\n  material: dry_soil\n  cover:\n";
+  for (int i = 0; i < 8; ++i) many += "    - {material: gravel}\n";
+  many.pop_back();
+  EXPECT_THAT(scene_complaint(with(scene_text, "label: 40", many)),
+              HasSubstr("key 'cover': has 8 layers, but at most 7 fit"));
+}
+
+TEST(SceneFile, LightsLidarsByItsSun) {
+  const std::string text = with(scene_text, "label: 40", "label: 40\n  material: dry_soil") +
+                           scene_physics + "sky: {sun: {azimuth_deg: 90, elevation_deg: 30}}\n";
+  const SolarBackground sun = parse(text).lidars[0].lidar.light->sun;
+  ASSERT_TRUE(sun.irradiance_w_m2_nm);
+  EXPECT_DOUBLE_EQ(*sun.irradiance_w_m2_nm,
+                   direct_irradiance_w_m2_nm(905, 30 * std::numbers::pi / 180, {}));
+  ASSERT_TRUE(sun.direction);
+  EXPECT_NEAR(glm::distance(*sun.direction, glm::dvec3(std::sqrt(0.75), 0, 0.5)), 0, 1e-12);
+  const std::string own = with(text, "threshold_w: 1e-9",
+                               "noise: {nep_w_per_sqrt_hz: 1e-12, "
+                               "sun_w_m2_nm: 0.3}, threshold_w: 1e-9");
+  EXPECT_EQ(parse(own).lidars[0].lidar.light->sun.irradiance_w_m2_nm, 0.3);
+  EXPECT_FALSE(parse(own).lidars[0].lidar.light->sun.direction);
 }
 
 }  // namespace

@@ -9,7 +9,7 @@
 #include <numbers>
 
 #include "core/error.h"
-#include "sensors/luminance.h"
+#include "core/luminance.h"
 
 namespace groundray {
 namespace {
