@@ -325,13 +325,19 @@ double fresnel_reflectance(double cosine, double n, double k) noexcept {
   const double c = std::clamp(cosine, 0.0, 1.0);
   const double c2 = c * c;
   const double s2 = 1 - c2;
-  const double difference = n * n - k * k - s2;
+  const double difference = (n - 1) * (n + 1) - k * k + c2;
   const double modulus = std::sqrt(difference * difference + 4 * n * n * k * k);
   // (modulus + difference) / 2 without the cancellation of a strong absorber
-  const double real2 =
-      difference > 0 ? (modulus + difference) / 2 : 2 * n * n * k * k / (modulus - difference);
+  double real2 = 0;
+  if (difference > 0) {
+    real2 = (modulus + difference) / 2;
+  } else if (modulus > difference) {
+    real2 = 2 * n * n * k * k / (modulus - difference);
+  }
   const double doubled = 2 * c * std::sqrt(real2);
-  const double across = (modulus + c2 - doubled) / (modulus + c2 + doubled);
+  const double sum = modulus + c2;
+  if (!(sum > 0)) return 0;  // light that grazes what is no surface, n = 1
+  const double across = (sum - doubled) / (sum + doubled);
   const double within =
       (c2 * modulus + s2 * s2 - doubled * s2) / (c2 * modulus + s2 * s2 + doubled * s2);
   return across * (1 + within) / 2;

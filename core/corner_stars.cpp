@@ -1,6 +1,7 @@
 #include "core/corner_stars.h"
 
 #include <algorithm>
+#include <array>
 #include <numeric>
 #include <tuple>
 
@@ -42,6 +43,31 @@ CornerStars::CornerStars(const TriangleMesh& mesh) : places_(place_numbers(mesh.
   std::vector<std::uint32_t> next = first_;
   for_each_corner(
       [&](std::uint32_t place, std::uint32_t triangle) { triangles_[next[place]++] = triangle; });
+  link_twins(mesh);
+}
+
+void CornerStars::link_twins(const TriangleMesh& mesh) {
+  struct Corners {
+    std::array<std::uint32_t, 3> places;  // ascending
+    std::uint32_t triangle;
+  };
+  std::vector<Corners> all(mesh.triangles.size());
+  for (std::uint32_t i = 0; i < all.size(); ++i) {
+    const glm::uvec3& t = mesh.triangles[i];
+    all[i] = {{places_[t.x], places_[t.y], places_[t.z]}, i};
+    std::ranges::sort(all[i].places);
+  }
+  std::ranges::sort(all, {}, [](const Corners& c) { return std::tie(c.places, c.triangle); });
+  for (std::size_t first = 0, end; first < all.size(); first = end) {
+    for (end = first + 1; end < all.size() && all[end].places == all[first].places;) ++end;
+    if (end == first + 1) continue;
+    if (twins_.empty()) {
+      twins_.resize(all.size());
+      std::iota(twins_.begin(), twins_.end(), 0u);
+    }
+    for (std::size_t i = first; i < end; ++i)
+      twins_[all[i].triangle] = all[i + 1 < end ? i + 1 : first].triangle;
+  }
 }
 
 }  // namespace groundray

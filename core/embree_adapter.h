@@ -8,6 +8,9 @@
 #endif
 #include <immintrin.h>
 
+#include <memory>
+#include <type_traits>
+
 namespace groundray {
 
 #if GROUNDRAY_EMBREE >= 4
@@ -15,6 +18,16 @@ using QueryContext = RTCRayQueryContext;
 #else
 using QueryContext = RTCIntersectContext;
 #endif
+
+/// Gives Embree's objects back.
+struct Release {
+  void operator()(RTCScene scene) const noexcept { rtcReleaseScene(scene); }
+  void operator()(RTCGeometry geometry) const noexcept { rtcReleaseGeometry(geometry); }
+  void operator()(RTCBuffer buffer) const noexcept { rtcReleaseBuffer(buffer); }
+};
+/// Owns an RTCScene, RTCGeometry or RTCBuffer.
+template <typename T>
+using Owned = std::unique_ptr<std::remove_pointer_t<T>, Release>;
 
 /// Embree's struct for packets of W rays, as PacketOf<W>::Type.
 template <int W>

@@ -26,10 +26,9 @@ void check_model(const Model& model, const std::string& name) {
   const auto& surface_of = model.surface_of;
   const auto& surfaces = model.surfaces;
   const std::size_t vertices = mesh.vertices_m.size(), triangles = mesh.triangles.size();
-  constexpr double most_m = std::numeric_limits<float>::max();
-  const std::size_t bad_vertex = first_breach(mesh.vertices_m, [](const glm::dvec3& p) {
-    return std::abs(p.x) <= most_m && std::abs(p.y) <= most_m && std::abs(p.z) <= most_m;
-  });
+  constexpr double most_m = 1e9;  // as objects
+  const std::size_t bad_vertex =
+      first_breach(mesh.vertices_m, [](const glm::dvec3& p) { return glm::length(p) <= most_m; });
   const std::size_t bad_triangle = first_breach(mesh.triangles, [&](const glm::uvec3& t) {
     return std::max({t.x, t.y, t.z}) < vertices;
   });
@@ -43,7 +42,10 @@ void check_model(const Model& model, const std::string& name) {
   broken.unless(triangles > 0, "there is no triangle");
   broken.unless(!surfaces.empty(), "there is no surface");
   broken.unless(mesh.levels.empty(), "a model has no levels");
-  broken.unless(bad_vertex == vertices, "vertex {} must have a finite position", bad_vertex);
+  broken.unless(
+      bad_vertex == vertices,
+      "vertex {} must have a finite position within {:.0e} m of the origin: is it in metres?",
+      bad_vertex, most_m);
   broken.unless(bad_triangle == triangles, "triangle {} names a vertex beyond the last of {}",
                 bad_triangle, vertices);
   broken.unless(uv.empty() || uv.size() == vertices, "there are {} uv for {} vertices", uv.size(),

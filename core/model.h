@@ -41,8 +41,8 @@ struct Model {
 
 /// @throws Error, with `name` at its head, naming every rule that the model breaks: there is a
 ///         triangle and a surface; vertices and surfaces that are named exist; positions are finite
-///         and within a float's reach; uv are finite and normals unit to 1e-3, one for each vertex
-///         or none; every triangle has a surface; and there are no levels.
+///         and within 1e9 m of the origin; uv are finite and normals unit to 1e-3, one for each
+///         vertex or none; every triangle has a surface; and there are no levels.
 void check_model(const Model& model, const std::string& name);
 
 /// A box along the axes; of nothing, `low_m` exceeds `high_m`.

@@ -32,29 +32,36 @@ ModelScene::Impl::Textures textures_of(const ModelSurface& surface) {
   return all;
 }
 
-void attach(RTCScene scene, RTCGeometry geometry, unsigned id) {
-  rtcCommitGeometry(geometry);
-  rtcAttachGeometryByID(scene, geometry, id);
-  rtcReleaseGeometry(geometry);
+Owned<RTCGeometry> new_geometry(const ModelScene::Impl& model, RTCGeometryType type) {
+  return Owned<RTCGeometry>(rtcNewGeometry(handle(model.device), type));
 }
 
-// Lets rays through where a cut-out is clear.
+void attach(const ModelScene::Impl& model, const Owned<RTCGeometry>& geometry, unsigned id) {
+  rtcCommitGeometry(geometry.get());
+  rtcAttachGeometryByID(model.scene.get(), geometry.get(), id);
+}
+
+// Lets rays through where a cut-out is clear. Embree's floats say too roughly where that is. Rays
+// that pass the triangle by in double are kept, for they may meet one beside it.
 void filter_cut(const RTCFilterFunctionNArguments* arguments) {
   const auto& model = *static_cast<const ModelScene::Impl*>(arguments->geometryUserPtr);
+  const auto& query = *reinterpret_cast<const ModelQuery*>(arguments->context);
   for (unsigned i = 0; i < arguments->N; ++i) {
     if (arguments->valid[i] == 0) continue;
-    const double u = RTCHitN_u(arguments->hit, arguments->N, i);
-    const double v = RTCHitN_v(arguments->hit, arguments->N, i);
+    const ModelRay& ray = query.rays[RTCRayN_id(arguments->ray, arguments->N, i)];
     const std::uint32_t triangle = model.cut[RTCHitN_primID(arguments->hit, arguments->N, i)];
-    if (!model.is_opaque(triangle, {1 - u - v, u, v})) arguments->valid[i] = 0;
+    const glm::dvec3 edges = model.edges_of(triangle, ray);
+    if (is_inside(edges) && !model.is_opaque(triangle, model.shares(edges)))
+      arguments->valid[i] = 0;
   }
 }
 
-RTCBuffer vertices_of(const ModelScene::Impl& model) {
+Owned<RTCBuffer> vertices_of(const ModelScene::Impl& model) {
   const auto& vertices_m = model.model.mesh.vertices_m;
-  RTCBuffer buffer = rtcNewBuffer(
-      handle(model.device), vertices_m.size() * sizeof(glm::vec3) + 16);  // Embree reads 16 bytes
-  auto* const out = buffer == nullptr ? nullptr : static_cast<glm::vec3*>(rtcGetBufferData(buffer));
+  Owned<RTCBuffer> buffer(rtcNewBuffer(
+      handle(model.device), vertices_m.size() * sizeof(glm::vec3) + 16));  // Embree reads 16 bytes
+  auto* const out =
+      buffer == nullptr ? nullptr : static_cast<glm::vec3*>(rtcGetBufferData(buffer.get()));
   if (out == nullptr) throw Error("ray tracer: there is not enough memory for a model's vertices");
   std::ranges::transform(vertices_m, out, [&](const glm::dvec3& vertex_m) {
     return glm::vec3(vertex_m - model.centre_m);
@@ -62,24 +69,25 @@ RTCBuffer vertices_of(const ModelScene::Impl& model) {
   return buffer;
 }
 
-void add_triangles(const ModelScene::Impl& model, RTCBuffer vertices, unsigned id,
+void add_triangles(const ModelScene::Impl& model, const Owned<RTCBuffer>& vertices, unsigned id,
                    const std::vector<std::uint32_t>& triangles) {
   if (triangles.empty()) return;
-  RTCGeometry geometry = rtcNewGeometry(handle(model.device), RTC_GEOMETRY_TYPE_TRIANGLE);
-  rtcSetGeometryBuffer(geometry, RTC_BUFFER_TYPE_VERTEX, 0, RTC_FORMAT_FLOAT3, vertices, 0,
-                       sizeof(glm::vec3), model.model.mesh.vertices_m.size());
-  auto* const corners = static_cast<glm::uvec3*>(rtcSetNewGeometryBuffer(
-      geometry, RTC_BUFFER_TYPE_INDEX, 0, RTC_FORMAT_UINT3, sizeof(glm::uvec3), triangles.size()));
+  const auto geometry = new_geometry(model, RTC_GEOMETRY_TYPE_TRIANGLE);
+  rtcSetGeometryBuffer(geometry.get(), RTC_BUFFER_TYPE_VERTEX, 0, RTC_FORMAT_FLOAT3, vertices.get(),
+                       0, sizeof(glm::vec3), model.model.mesh.vertices_m.size());
+  auto* const corners = static_cast<glm::uvec3*>(
+      rtcSetNewGeometryBuffer(geometry.get(), RTC_BUFFER_TYPE_INDEX, 0, RTC_FORMAT_UINT3,
+                              sizeof(glm::uvec3), triangles.size()));
   if (corners == nullptr)
     throw Error("ray tracer: there is not enough memory for a model's triangles");
   std::ranges::transform(triangles, corners, [&](std::uint32_t triangle) {
     return model.model.mesh.triangles[triangle];
   });
   if (id == 1) {
-    rtcSetGeometryUserData(geometry, const_cast<ModelScene::Impl*>(&model));
-    rtcSetGeometryIntersectFilterFunction(geometry, filter_cut);
+    rtcSetGeometryUserData(geometry.get(), const_cast<ModelScene::Impl*>(&model));
+    rtcSetGeometryIntersectFilterFunction(geometry.get(), filter_cut);
   }
-  attach(model.scene, geometry, id);
+  attach(model, geometry, id);
 }
 
 void triangle_bounds(const RTCBoundsFunctionArguments* arguments) {
@@ -97,8 +105,7 @@ void triangle_bounds(const RTCBoundsFunctionArguments* arguments) {
                           padded_high.x, padded_high.y, padded_high.z, 0};
 }
 
-// Meets one triangle with each ray of a packet, in double. Of triangles that are equally far the
-// first counts.
+// Meets one triangle with each ray of a packet, in double.
 void intersect_triangle(const RTCIntersectFunctionNArguments* arguments) {
   const auto& model = *static_cast<const ModelScene::Impl*>(arguments->geometryUserPtr);
   const auto& query = *reinterpret_cast<const ModelQuery*>(arguments->context);
@@ -111,24 +118,23 @@ void intersect_triangle(const RTCIntersectFunctionNArguments* arguments) {
     ModelCrossing& best = query.crossings[lane];
     const glm::dvec3 edges = model.edges_of(triangle, ray);
     if (!is_inside(edges)) continue;
-    const double t_m = model.range_m(triangle, ray);
-    const bool is_nearer = t_m < best.t_m || (t_m == best.t_m && triangle < best.triangle);
-    if (!(t_m >= 0 && is_nearer)) continue;
+    const ModelCrossing crossing{model.range_m(triangle, ray), triangle};
+    if (!(crossing.t_m >= 0 && crossing < best)) continue;
     if (!model.is_opaque(triangle, model.shares(edges))) continue;
-    best = {t_m, triangle};
+    best = crossing;
     float& far_m = RTCRayN_tfar(rays, arguments->N, i);
-    far_m = std::min(far_m, far_float(t_m - query.enter_m[lane], model.slack_m));
+    far_m = std::min(far_m, far_float(best.t_m - query.enter_m[lane], model.slack_m));
   }
 }
 
 void build_exact(ModelScene::Impl& model) {
-  RTCGeometry geometry = rtcNewGeometry(handle(model.device), RTC_GEOMETRY_TYPE_USER);
-  rtcSetGeometryUserPrimitiveCount(geometry,
+  const auto geometry = new_geometry(model, RTC_GEOMETRY_TYPE_USER);
+  rtcSetGeometryUserPrimitiveCount(geometry.get(),
                                    static_cast<unsigned>(model.model.mesh.triangles.size()));
-  rtcSetGeometryUserData(geometry, &model);
-  rtcSetGeometryBoundsFunction(geometry, triangle_bounds, nullptr);
-  rtcSetGeometryIntersectFunction(geometry, intersect_triangle);
-  attach(model.scene, geometry, 0);
+  rtcSetGeometryUserData(geometry.get(), &model);
+  rtcSetGeometryBoundsFunction(geometry.get(), triangle_bounds, nullptr);
+  rtcSetGeometryIntersectFunction(geometry.get(), intersect_triangle);
+  attach(model, geometry, 0);
 }
 
 }  // namespace
@@ -146,33 +152,24 @@ ModelScene::Impl::Impl(const RayDevice& with, Model content, Tracing how)
     }
   }
   find_means();
-  low_m = high_m = model.mesh.vertices_m[model.mesh.triangles[0].x];
-  for (const glm::uvec3& corners : model.mesh.triangles) {
-    for (int k = 0; k < 3; ++k) {
-      low_m = glm::min(low_m, model.mesh.vertices_m[corners[k]]);
-      high_m = glm::max(high_m, model.mesh.vertices_m[corners[k]]);
-    }
-  }
+  const ModelBounds bounds = bounds_of(model.mesh);
+  low_m = bounds.low_m;
+  high_m = bounds.high_m;
   centre_m = (low_m + high_m) / 2.0;
   radius_m = glm::length(glm::max(glm::abs(low_m), glm::abs(high_m)));
   slack_m = static_cast<float>(16 * 0x1p-24 * glm::length(high_m - low_m));
   for (std::uint32_t i = 0; i < model.mesh.triangles.size(); ++i)
     (textures_of(i).least_alpha > 0 ? cut : solid).push_back(i);
-  scene = new_scene(device);
+  scene.reset(new_scene(device));
   if (tracing == Tracing::Exact) {
     build_exact(*this);
   } else {
-    RTCBuffer vertices = vertices_of(*this);
+    const auto vertices = vertices_of(*this);
     add_triangles(*this, vertices, 0, solid);
     add_triangles(*this, vertices, 1, cut);
-    rtcReleaseBuffer(vertices);
   }
-  rtcCommitScene(scene);
+  rtcCommitScene(scene.get());
   check(device, "building a model");
-}
-
-ModelScene::Impl::~Impl() {
-  if (scene != nullptr) rtcReleaseScene(scene);
 }
 
 glm::dvec3 ModelScene::Impl::edges_of(std::uint32_t triangle, const ModelRay& ray) const noexcept {
@@ -205,27 +202,38 @@ bool ModelScene::Impl::is_opaque(std::uint32_t triangle, const glm::dvec3& share
   return alpha >= worn.least_alpha;
 }
 
-std::optional<double> ModelScene::Impl::meet(std::uint32_t triangle,
-                                             const ModelRay& ray) const noexcept {
+namespace {
+
+// Takes a triangle where a ray meets it before `best`.
+void take_nearer(const ModelScene::Impl& model, std::uint32_t triangle, const ModelRay& ray,
+                 const glm::dvec3& edges, ModelCrossing& best) noexcept {
+  if (!is_inside(edges)) return;
+  const ModelCrossing crossing{model.range_m(triangle, ray), triangle};
+  if (!(crossing.t_m >= 0 && crossing < best)) return;
+  if (model.is_opaque(triangle, model.shares(edges))) best = crossing;
+}
+
+}  // namespace
+
+ModelCrossing ModelScene::Impl::meet(std::uint32_t triangle, const ModelRay& ray) const noexcept {
   const glm::dvec3 edges = edges_of(triangle, ray);
-  if (!is_inside(edges)) return std::nullopt;
-  const double t_m = range_m(triangle, ray);
-  if (!(t_m >= 0) || !is_opaque(triangle, shares(edges))) return std::nullopt;
-  return t_m;
+  ModelCrossing best;
+  take_nearer(*this, triangle, ray, edges, best);
+  if (!best) return best;
+  if (edges.x == 0 || edges.y == 0 || edges.z == 0) return meet_beside(triangle, ray);
+  for (std::uint32_t i = stars.next_twin(triangle); i != triangle; i = stars.next_twin(i))
+    take_nearer(*this, i, ray, edges_of(i, ray), best);
+  return best;
 }
 
 // Embree's floats are finer than triangles: what the ray meets has a corner in common.
-std::optional<ModelCrossing> ModelScene::Impl::settle(std::uint32_t triangle,
-                                                      const ModelRay& ray) const noexcept {
-  if (const auto t_m = meet(triangle, ray)) return ModelCrossing{*t_m, triangle};
+ModelCrossing ModelScene::Impl::meet_beside(std::uint32_t triangle,
+                                            const ModelRay& ray) const noexcept {
   ModelCrossing best;
   for (int k = 0; k < 3; ++k) {
-    for (const std::uint32_t other : stars.round(model.mesh.triangles[triangle][k])) {
-      const auto t_m = meet(other, ray);
-      if (t_m && *t_m < best.t_m) best = {*t_m, other};
-    }
+    for (const std::uint32_t other : stars.round(model.mesh.triangles[triangle][k]))
+      take_nearer(*this, other, ray, edges_of(other, ray), best);
   }
-  if (best.t_m == std::numeric_limits<double>::infinity()) return std::nullopt;
   return best;
 }
 

@@ -24,13 +24,17 @@ struct ModelRay {
 
 /// Where a ray meets a model.
 struct ModelCrossing {
-  double t_m = std::numeric_limits<double>::infinity();
+  double t_m = std::numeric_limits<double>::infinity();  ///< infinite if nowhere
   std::uint32_t triangle = 0;
+  explicit operator bool() const noexcept { return t_m < std::numeric_limits<double>::infinity(); }
+  /// Of triangles that are equally far the first counts.
+  friend bool operator<(const ModelCrossing& a, const ModelCrossing& b) noexcept {
+    return a.t_m < b.t_m || (a.t_m == b.t_m && a.triangle < b.triangle);
+  }
 };
 
 struct ModelScene::Impl {
   Impl(const RayDevice& with, Model content, Tracing how);
-  ~Impl();
   Impl(const Impl&) = delete;
   Impl& operator=(const Impl&) = delete;
 
@@ -49,7 +53,7 @@ struct ModelScene::Impl {
   glm::dvec3 centre_m{0};                 // of it: the origin of the scene's floats
   double radius_m = 0;                    // of a ball round O that holds it
   float slack_m = 0;                      // covers rounding to floats
-  RTCScene scene = nullptr;
+  Owned<RTCScene> scene;
 
   const Textures& textures_of(std::uint32_t triangle) const noexcept {
     return textures[model.surface_of[triangle]];
@@ -75,15 +79,15 @@ struct ModelScene::Impl {
   }
   bool is_opaque(std::uint32_t triangle, const glm::dvec3& shares) const noexcept;
 
-  /// Finds in double where a ray meets the surface by a triangle that Embree named: that one, or
-  /// the nearest of those that share a corner with it. Nothing if it passes them all by, begins
-  /// behind them, or goes through where they are cut out.
-  std::optional<ModelCrossing> settle(std::uint32_t triangle, const ModelRay& ray) const noexcept;
+  /// Finds in double where a ray meets a triangle that Embree named: nowhere if it passes it by,
+  /// begins behind it, or goes through where it is cut out. Of triangles that the ray meets there
+  /// together, since all their corners are the same or it passes an edge or corner that they share,
+  /// the nearest counts, and of those that are equally far the first, as in exact tracing.
+  ModelCrossing meet(std::uint32_t triangle, const ModelRay& ray) const noexcept;
+  /// The same for the triangles that share a corner with one that Embree named.
+  ModelCrossing meet_beside(std::uint32_t triangle, const ModelRay& ray) const noexcept;
 
   void find_means();  // of albedo images
-
- private:
-  std::optional<double> meet(std::uint32_t triangle, const ModelRay& ray) const noexcept;
 };
 
 /// Whether a line passes inside all three edges of a triangle.
@@ -92,12 +96,13 @@ inline bool is_inside(const glm::dvec3& edges) noexcept {
          (edges.x <= 0 && edges.y <= 0 && edges.z <= 0 && edges.x + edges.y + edges.z < 0);
 }
 
-/// The double side of rays in a model's scene: what exact tracing reads and fills, by lane.
+/// The double side of rays in a model's scene, by lane: what callbacks read, and exact tracing
+/// fills.
 struct ModelQuery {
-  QueryContext context;  ///< first, so that Embree's pointer to it is a pointer to this
-  const ModelRay* rays = nullptr;
-  const double* enter_m = nullptr;     ///< where the float rays begin
-  ModelCrossing* crossings = nullptr;  ///< so far
+  QueryContext context;             ///< first, so that Embree's pointer to it is a pointer to this
+  const ModelRay* rays = nullptr;   ///< of exact tracing, and of models that are cut out
+  const double* enter_m = nullptr;  ///< where the float rays begin; exact tracing's
+  ModelCrossing* crossings = nullptr;  ///< so far; exact tracing's
 };
 
 }  // namespace groundray

@@ -27,9 +27,23 @@ std::string rest_of(std::string_view line, std::string_view first) {
   return std::string(line.substr(begin, line.find_last_not_of(" \t\r") + 1 - begin));
 }
 
+/// A name up to " #", or all of it: only who knows the names can tell a comment from a part of one.
+std::string without_comment(const std::string& name) {
+  constexpr std::string_view blanks = " \t";
+  std::size_t hash = name.find('#');
+  while (hash != std::string::npos && hash > 0 && blanks.find(name[hash - 1]) == blanks.npos) {
+    hash = name.find('#', hash + 1);
+  }
+  if (hash == std::string::npos) return name;
+  const std::string_view before = std::string_view(name).substr(0, hash);
+  return std::string(before.substr(0, before.find_last_not_of(blanks) + 1));
+}
+
 /// Calls `take(line, words)` for each line that says anything, and gives an Error of it the line.
 template <typename Take>
 void for_each_line(std::string_view text, const std::string& name, const Take& take) {
+  constexpr std::string_view byte_order_mark = "\xEF\xBB\xBF";  // of UTF-8
+  if (text.starts_with(byte_order_mark)) text.remove_prefix(byte_order_mark.size());
   TextLines lines(text);
   std::string joined;
   try {
@@ -158,6 +172,7 @@ class ObjReader {
   }
 
   PolygonSoup soup() && {
+    drop_comments();
     for (Surface& surface : soup_.surfaces) {
       const auto found = library_.find(surface.looks.name);
       if (found != library_.end()) surface = found->second;
@@ -200,15 +215,49 @@ class ObjReader {
     surface_ = found->second;
   }
 
+  /// Names all surfaces anew, up to their comments but for those that the library has in full, now
+  /// that all of it is read; what is then one name is one surface.
+  void drop_comments() {
+    const auto in_full = library_;
+    for (const auto& [name, surface] : in_full) {
+      const auto [added, is_new] = library_.try_emplace(without_comment(name), surface);
+      added->second.looks.name = added->first;
+    }
+    const std::vector<Surface> named = std::exchange(soup_.surfaces, {});
+    std::vector<std::uint32_t> number_now;
+    numbers_.clear();
+    for (const Surface& surface : named) {
+      const std::string& name = surface.looks.name;
+      use(in_full.contains(name) ? name : without_comment(name));
+      number_now.push_back(surface_);
+    }
+    for (auto& polygon : soup_.polygons) polygon.surface = number_now[polygon.surface];
+  }
+
+  void add(const std::string& name, const std::string& mtl) {
+    for (Surface& surface : parse_mtl(mtl, name)) {
+      library_.try_emplace(surface.looks.name, surface);
+    }
+  }
+
   /// One name, which may have blanks, or several without.
   void add_library(const std::string& all, const Words& words) {
-    const auto add = [&](const std::string& name) {
-      for (Surface& surface : parse_mtl(read_mtl_(name), name)) {
-        library_.try_emplace(surface.looks.name, surface);
+    const std::string name = without_comment(all);
+    if (name != all) {
+      std::optional<std::string> mtl;
+      try {
+        mtl = read_mtl_(all);
+      } catch (const Error&) {
+        // There is no such file, so the rest is a comment.
       }
-    };
-    if (words.size() == 2 || all.find(".mtl ") == std::string::npos) return add(all);
-    for (auto word = words.begin() + 1; word != words.end(); ++word) add(std::string(*word));
+      if (mtl) return add(all, *mtl);
+    }
+    if (words.size() == 2 || name.find(".mtl ") == std::string::npos) {
+      return add(name, read_mtl_(name));
+    }
+    for (auto word = words.begin() + 1; word != words.end(); ++word) {
+      add(std::string(*word), read_mtl_(std::string(*word)));
+    }
   }
 
   const std::function<std::string(const std::string&)>& read_mtl_;

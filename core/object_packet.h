@@ -12,7 +12,6 @@
 #include <glm/gtc/quaternion.hpp>
 #include <glm/mat3x3.hpp>
 #include <limits>
-#include <optional>
 
 #include "core/level_scene.h"
 #include "core/model_scene.h"
@@ -54,7 +53,7 @@ struct LocalPacket {
   alignas(64) std::array<int, W> valid;
   alignas(64) Doubles x, y, z, dx, dy, dz;
   Doubles enter_m, leave_m;
-  std::array<ModelRay, W> rays;  // exact tracing only
+  std::array<ModelRay, W> rays;  // for callbacks
   std::array<ModelCrossing, W> crossings;
 
   ModelRay ray(std::size_t i) const noexcept { return {{x[i], y[i], z[i]}, {dx[i], dy[i], dz[i]}}; }
@@ -126,8 +125,8 @@ void fill_floats(const ModelScene::Impl& model, LocalPacket<W>& local) noexcept 
 }
 
 // Goes on from where Embree's triangle was passed by.
-inline std::optional<ModelCrossing> search(const ModelScene::Impl& model, const ModelRay& ray,
-                                           double enter_m, double leave_m, float from_m) noexcept {
+inline ModelCrossing search(const ModelScene::Impl& model, const ModelRay& ray, double enter_m,
+                            double leave_m, float from_m) noexcept {
   const glm::vec3 origin(ray.origin + ray.direction * enter_m - model.centre_m);
   const glm::vec3 direction(ray.direction);
   const float far_m = far_float(leave_m - enter_m, model.slack_m);
@@ -138,35 +137,32 @@ inline std::optional<ModelCrossing> search(const ModelScene::Impl& model, const 
                direction.z, 0,        far_m,    ~0u,    0,           0};
     one.hit.geomID = RTC_INVALID_GEOMETRY_ID;
     one.hit.instID[0] = RTC_INVALID_GEOMETRY_ID;
-    QueryContext context;
-    if (!(next_m < far_m)) return std::nullopt;
-    intersect<1>(model.scene, nullptr, one, context, Coherence::Incoherent);
-    if (one.hit.geomID == RTC_INVALID_GEOMETRY_ID) return std::nullopt;
-    if (auto found = model.settle(model.triangle_of(one.hit.geomID, one.hit.primID), ray))
-      return found;
+    ModelQuery query{{}, &ray};
+    if (!(next_m < far_m)) return {};
+    intersect<1>(model.scene.get(), nullptr, one, query.context, Coherence::Incoherent);
+    if (one.hit.geomID == RTC_INVALID_GEOMETRY_ID) return {};
+    const std::uint32_t named = model.triangle_of(one.hit.geomID, one.hit.primID);
+    if (const auto met = model.meet(named, ray)) return met;
+    if (const auto met = model.meet_beside(named, ray)) return met;
     from_m = one.ray.tfar;
   }
 }
 
 // Where a lane meets the model.
 template <int W>
-std::optional<ModelCrossing> crossing_of(const ModelScene::Impl& model, const LocalPacket<W>& local,
-                                         std::size_t i) noexcept {
-  if (model.tracing == Tracing::Exact) {
-    if (local.crossings[i].t_m < std::numeric_limits<double>::infinity()) return local.crossings[i];
-    return std::nullopt;
-  }
+ModelCrossing crossing_of(const ModelScene::Impl& model, const LocalPacket<W>& local,
+                          std::size_t i) noexcept {
+  if (model.tracing == Tracing::Exact) return local.crossings[i];
   const auto& hit = local.floats.hit;
-  if (hit.geomID[i] == RTC_INVALID_GEOMETRY_ID) return std::nullopt;
+  if (hit.geomID[i] == RTC_INVALID_GEOMETRY_ID) return {};
   const ModelRay ray = local.ray(i);
   const std::uint32_t named = model.triangle_of(hit.geomID[i], hit.primID[i]);
   const float at_m = local.floats.ray.tfar[i];
-  const auto found = model.settle(named, ray);
-  if (found && found->triangle == named) return found;
-  // Another one beside it; something else may be in between.
-  const double end_m = found ? found->t_m : local.leave_m[i];
-  const auto between = search(model, ray, local.enter_m[i], end_m, at_m);
-  return between && (!found || between->t_m < found->t_m) ? between : found;
+  if (const auto met = model.meet(named, ray)) return met;
+  const auto beside = model.meet_beside(named, ray);
+  // Something else may be in between.
+  const double end_m = beside ? beside.t_m : local.leave_m[i];
+  return std::min(beside, search(model, ray, local.enter_m[i], end_m, at_m));
 }
 
 // Meets a model with the valid lanes of `local`, each of which has come in its own way.
@@ -176,25 +172,26 @@ void meet(const ModelScene::Impl& model, std::uint32_t object,
           ObjectPacket<W>& packet) noexcept {
   if (!enter_box(model, packet, local)) return;
   fill_floats(model, local);
-  if (model.tracing == Tracing::Exact) {
+  if (model.tracing == Tracing::Exact || !model.cut.empty()) {
     for (std::size_t i = 0; i < W; ++i) local.rays[i] = local.ray(i);
-    local.crossings.fill({});
   }
+  if (model.tracing == Tracing::Exact) local.crossings.fill({});
   ModelQuery query{{}, local.rays.data(), local.enter_m.data(), local.crossings.data()};
-  intersect<W>(model.scene, local.valid.data(), local.floats, query.context, Coherence::Coherent);
+  intersect<W>(model.scene.get(), local.valid.data(), local.floats, query.context,
+               Coherence::Coherent);
   for (std::size_t i = 0; i < W; ++i) {
     if (local.valid[i] == 0) continue;
     const auto crossing = crossing_of(model, local, i);
-    if (!crossing || !(crossing->t_m >= 0)) continue;
-    const bool is_nearer = crossing->t_m < packet.best_m[i] ||
-                           (crossing->t_m == packet.best_m[i] && object < packet.object[i]);
+    if (!crossing) continue;
+    const bool is_nearer = crossing.t_m < packet.best_m[i] ||
+                           (crossing.t_m == packet.best_m[i] && object < packet.object[i]);
     if (!is_nearer) continue;
     const glm::dvec3 d_D(packet.dx[i], packet.dy[i], packet.dz[i]);
     const glm::dvec3 up =
-        glm::normalize(glm::transpose(into[i]->per_D) * model.normal(crossing->triangle));
-    packet.best_m[i] = crossing->t_m;
+        glm::normalize(glm::transpose(into[i]->per_D) * model.normal(crossing.triangle));
+    packet.best_m[i] = crossing.t_m;
     packet.object[i] = object;
-    packet.triangle[i] = crossing->triangle;
+    packet.triangle[i] = crossing.triangle;
     packet.normal[i] = glm::vec3(glm::dot(up, d_D) > 0 ? -up : up);
   }
 }

@@ -20,6 +20,8 @@ using std::chrono::nanoseconds;
 constexpr double infinity = std::numeric_limits<double>::infinity();
 constexpr unsigned placed_geometry = 0;
 constexpr unsigned moving_geometry = 1;
+// Embree leaves out, in silence, what is beyond 1.8e18; and one far object makes all floats coarse.
+constexpr double most_m = 1e9;
 
 // A box in D.
 struct Box {
@@ -45,26 +47,36 @@ struct ObjectQuery {
   ObjectPacket<W>* packet;
 };
 
-void check_objects(std::size_t models, std::span<const PlacedObject> placed,
+void check_objects(std::span<const ModelScene> models, std::span<const PlacedObject> placed,
                    std::span<const MovingObject> moving) {
   Violations broken("objects");
-  const auto check = [&](std::size_t number, double scale, std::uint32_t model) {
-    broken.unless(scale > 0 && std::isfinite(scale),
-                  "object {}: its scale = {} must be positive and finite", number, scale);
-    broken.unless(model < models, "object {}: model {} is not there; there are {}", number, model,
-                  models);
+  const auto check = [&](std::size_t number, double scale, std::uint32_t model, double away_m) {
+    const bool scales = scale > 0 && std::isfinite(scale);
+    broken.unless(scales, "object {}: its scale = {} must be positive and finite", number, scale);
+    broken.unless(model < models.size(), "object {}: model {} is not there; there are {}", number,
+                  model, models.size());
+    if (!scales || model >= models.size() || std::isnan(away_m)) return;
+    const double reach_m = away_m + scale * models[model].impl().radius_m;
+    broken.unless(reach_m <= most_m,
+                  "object {}: it reaches {:.3g} m from the origin; it must stay within {:.0e} m: "
+                  "are its position and size in metres?",
+                  number, reach_m, most_m);
   };
   for (std::size_t i = 0; i < placed.size(); ++i) {
     const PlacedObject& object = placed[i];
-    check(i + 1, object.scale, object.model);
+    check(i + 1, object.scale, object.model, glm::length(object.p_DO));
     broken.unless(std::isfinite(object.p_DO.x + object.p_DO.y + object.p_DO.z),
                   "object {}: its position must be finite", i + 1);
     broken.unless(std::abs(glm::length(object.R_DO) - 1) <= 1e-9,
                   "object {}: its rotation has a quaternion of norm {}; it must be 1", i + 1,
                   glm::length(object.R_DO));
   }
-  for (std::size_t i = 0; i < moving.size(); ++i)
-    check(placed.size() + i + 1, moving[i].scale, moving[i].model);
+  for (std::size_t i = 0; i < moving.size(); ++i) {
+    double away_m = 0;
+    for (const Trajectory::Sample& sample : moving[i].X_DO.samples())
+      away_m = std::max(away_m, glm::length(sample.pose.translation_m));
+    check(placed.size() + i + 1, moving[i].scale, moving[i].model, away_m);
+  }
   broken.throw_if_any();
 }
 
@@ -85,13 +97,10 @@ struct ObjectTracer::Impl {
   Box box;             // of all objects
   glm::dvec3 p_DC{0};  // origin of the scene's floats: the middle of it
   float slack_m = 0;   // covers rounding to floats
-  RTCScene scene = nullptr;
+  Owned<RTCScene> scene;
 
   Impl(const RayDevice& with, std::vector<ModelScene> what, std::vector<PlacedObject> standing,
        std::vector<MovingObject> going);
-  ~Impl() {
-    if (scene != nullptr) rtcReleaseScene(scene);
-  }
   Impl(const Impl&) = delete;
   Impl& operator=(const Impl&) = delete;
 
@@ -162,7 +171,7 @@ void ObjectTracer::Impl::add_stretches(std::uint32_t number) {
 ObjectTracer::Impl::Impl(const RayDevice& with, std::vector<ModelScene> what,
                          std::vector<PlacedObject> standing, std::vector<MovingObject> going)
     : device(with), models(std::move(what)), placed(std::move(standing)), moving(std::move(going)) {
-  check_objects(models.size(), placed, moving);
+  check_objects(models, placed, moving);
   for (const PlacedObject& object : placed) box.add(box_of(object));
   for (std::uint32_t i = 0; i < moving.size(); ++i) add_stretches(i);
   for (const Stretch& stretch : stretches) box.add(stretch.box);
@@ -182,18 +191,17 @@ void ObjectTracer::Impl::moving_bounds(const RTCBoundsFunctionArguments* argumen
 }
 
 void ObjectTracer::Impl::build() {
-  scene = new_scene(device);
+  scene.reset(new_scene(device));
   const auto add = [&](unsigned id, std::size_t count, RTCBoundsFunction bounds_of,
                        RTCIntersectFunctionN meet) {
     if (count == 0) return;
-    RTCGeometry geometry = rtcNewGeometry(handle(device), RTC_GEOMETRY_TYPE_USER);
-    rtcSetGeometryUserPrimitiveCount(geometry, static_cast<unsigned>(count));
-    rtcSetGeometryUserData(geometry, this);
-    rtcSetGeometryBoundsFunction(geometry, bounds_of, nullptr);
-    rtcSetGeometryIntersectFunction(geometry, meet);
-    rtcCommitGeometry(geometry);
-    rtcAttachGeometryByID(scene, geometry, id);
-    rtcReleaseGeometry(geometry);
+    const Owned<RTCGeometry> geometry(rtcNewGeometry(handle(device), RTC_GEOMETRY_TYPE_USER));
+    rtcSetGeometryUserPrimitiveCount(geometry.get(), static_cast<unsigned>(count));
+    rtcSetGeometryUserData(geometry.get(), this);
+    rtcSetGeometryBoundsFunction(geometry.get(), bounds_of, nullptr);
+    rtcSetGeometryIntersectFunction(geometry.get(), meet);
+    rtcCommitGeometry(geometry.get());
+    rtcAttachGeometryByID(scene.get(), geometry.get(), id);
   };
   const int width = device.impl().width;
   add(placed_geometry, placed.size(), placed_bounds,
@@ -204,7 +212,7 @@ void ObjectTracer::Impl::build() {
       width == 16  ? meet_moving<16>
       : width == 8 ? meet_moving<8>
                    : meet_moving<4>);
-  rtcCommitScene(scene);
+  rtcCommitScene(scene.get());
   check(device, "building the objects");
 }
 
@@ -256,18 +264,18 @@ void ObjectTracer::Impl::meet_moving(const RTCIntersectFunctionNArguments* argum
   const auto& tracer = *static_cast<const Impl*>(arguments->geometryUserPtr);
   auto& packet = *reinterpret_cast<ObjectQuery<W>*>(arguments->context)->packet;
   const Stretch& stretch = tracer.stretches[arguments->primID];
+  const auto is_now = [&](std::size_t lane) {
+    return stretch.begin <= packet.time[lane] && packet.time[lane] <= stretch.end;
+  };
+  bool any = false;
+  for_each_lane(arguments, [&](std::size_t lane) { any |= is_now(lane); });
+  if (!any) return;  // as of most stretches
   const MovingObject& object = tracer.moving[stretch.object];
   const ModelScene::Impl& model = tracer.model(object.model);
   std::array<IntoModel, W> into;
   std::array<const IntoModel*, W> all;
   LocalPacket<W> local;
   local.valid.fill(0);
-  const auto is_now = [&](std::size_t lane) {
-    return stretch.begin <= packet.time[lane] && packet.time[lane] <= stretch.end;
-  };
-  bool any = false;
-  for_each_lane(arguments, [&](std::size_t lane) { any |= is_now(lane); });
-  if (!any) return;
   for (std::size_t i = 0; i < W; ++i) lay(IntoModel{}, packet, i, local);
   for_each_lane(arguments, [&](std::size_t lane) {
     const nanoseconds time = packet.time[lane];
@@ -325,7 +333,7 @@ void ObjectTracer::Impl::trace_packet(std::span<const Ray> rays,
   }
   if (!any) return;
   ObjectQuery<W> query{{}, &packet};
-  intersect<W>(scene, packet.valid.data(), packet.floats, query.context, Coherence::Coherent);
+  intersect<W>(scene.get(), packet.valid.data(), packet.floats, query.context, Coherence::Coherent);
   for (std::size_t i = 0; i < rays.size(); ++i) {
     if (packet.object[i] == ~0u) continue;
     hits[i] = {packet.best_m[i], packet.normal[i], 0, packet.triangle[i], packet.object[i]};

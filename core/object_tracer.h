@@ -66,15 +66,18 @@ struct MovingObject {
 };
 
 /// Traces rays through objects. Each is met in its own frame, so that ranges are as good far from
-/// the origin as near it: rays enter O in double. Surfaces are two-sided.
+/// the origin as near it: rays enter O in double. Surfaces are two-sided. Of objects that are
+/// equally far the first is met, and so of triangles; but of triangles in one plane that overlap in
+/// part, fast tracing may meet any.
 /// Immutable; any number of threads may trace at once.
 class ObjectTracer {
  public:
   /// Nothing to meet.
   ObjectTracer() = default;
   /// Numbers the objects from 1: those that stand first, as they come.
-  /// @throws Error listing objects with a scale that is not positive, a pose that is not finite, or
-  ///         a model that is not there; or if Embree fails: its message.
+  /// @throws Error listing objects with a scale that is not positive, a pose that is not finite, a
+  ///         model that is not there, or one that reaches further than 1e9 m from the origin; or if
+  ///         Embree fails: its message.
   ObjectTracer(const RayDevice& device, std::vector<ModelScene> models,
                std::vector<PlacedObject> placed, std::vector<MovingObject> moving);
 

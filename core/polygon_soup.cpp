@@ -11,6 +11,7 @@
 #include <unordered_map>
 
 #include "core/error.h"
+#include "core/srgb.h"
 
 namespace groundray {
 namespace {
@@ -194,8 +195,7 @@ glm::vec3 linear_color(const glm::dvec3& encoded) {
   glm::vec3 linear;
   for (int i = 0; i < 3; ++i) {
     const double value = encoded[i] > 0 ? std::min(encoded[i], 1.0) : 0;  // also of NaN
-    linear[i] = static_cast<float>(value <= 0.04045 ? value / 12.92
-                                                    : std::pow((value + 0.055) / 1.055, 2.4));
+    linear[i] = static_cast<float>(linear_of_srgb(value));
   }
   return linear;
 }

@@ -203,6 +203,7 @@ std::string read_text(const std::filesystem::path& path) {
 void write_png(const std::filesystem::path& path, const Image8& image) {
   png_image png{};
   png.version = PNG_IMAGE_VERSION;
+  png.flags = PNG_IMAGE_FLAG_FAST;  // half the time for a tenth more bytes
   png.width = static_cast<png_uint_32>(image.width());
   png.height = static_cast<png_uint_32>(image.height());
   switch (image.channels()) {

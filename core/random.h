@@ -6,7 +6,8 @@
 
 namespace groundray {
 
-/// The one number a user chooses; everything random in a dataset follows from it.
+/// The one number a user chooses: noise and where plants stand follow from it. What relief and
+/// models look like follows from a seed of their own.
 struct Seed {
   std::uint64_t value = 0;
 };

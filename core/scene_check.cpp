@@ -2,9 +2,14 @@
 
 #include <tinyxml2.h>
 
+#include <algorithm>
 #include <cstdint>
 #include <cstring>
+#include <functional>
+#include <map>
 #include <nlohmann/json.hpp>
+#include <utility>
+#include <vector>
 
 #include "core/error.h"
 #include "core/text_lines.h"
@@ -13,6 +18,59 @@ namespace groundray {
 namespace {
 
 using nlohmann::json;
+
+/// The parts of each node: its children, and the nodes that it has instances of.
+using NodeParts = std::vector<std::vector<std::size_t>>;
+
+/// Sees to it that going through all parts of a node comes to an end, as assimp takes for granted.
+class NodeWalk {
+ public:
+  NodeWalk(const NodeParts& parts, std::function<std::string(std::size_t)> name_of)
+      : parts_(parts), name_of_(std::move(name_of)), trees_(parts.size()) {}
+
+  void check() {
+    for (std::size_t node = 0; node < parts_.size(); ++node) walk(node, 0);
+  }
+
+ private:
+  static constexpr int most_levels = 1000;
+  static constexpr double most_nodes = 1e6;
+
+  /// A node with its parts, and theirs.
+  struct Tree {
+    enum class State { New, Open, Known } state = State::New;
+    int levels = 1;
+    double nodes = 1;  // each as often as it is a part
+  };
+
+  const Tree& walk(std::size_t node, int levels_above) {
+    Tree& tree = trees_[node];
+    if (tree.state == Tree::State::Open) {
+      throw Error("{} is a part of itself: take out the child or instance that leads back to it",
+                  name_of_(node));
+    }
+    if (levels_above + tree.levels > most_levels) {
+      throw Error("{} and its parts are nested more than {} deep", name_of_(node), most_levels);
+    }
+    if (tree.state == Tree::State::Known) return tree;
+    tree.state = Tree::State::Open;
+    for (const std::size_t part : parts_[node]) {
+      const Tree& below = walk(part, levels_above + 1);
+      tree.levels = std::max(tree.levels, below.levels + 1);
+      tree.nodes += below.nodes;
+    }
+    if (tree.nodes > most_nodes) {
+      throw Error("{} has more than {:g} parts with those of its instances", name_of_(node),
+                  most_nodes);
+    }
+    tree.state = Tree::State::Known;
+    return tree;
+  }
+
+  const NodeParts& parts_;
+  const std::function<std::string(std::size_t)> name_of_;
+  std::vector<Tree> trees_;
+};
 
 /// Returns the JSON of a .gltf, or of a .glb whose chunks lie within it.
 std::string_view json_of(std::string_view bytes) {
@@ -36,6 +94,24 @@ std::string_view json_of(std::string_view bytes) {
     at += chunk_header + length;
   }
   return bytes.substr(header + chunk_header, word(header));
+}
+
+/// Readers that go one call deeper for each level run out of stack; glTF itself needs some ten.
+void check_nesting(std::string_view text) {
+  constexpr int most_levels = 100;
+  int levels = 0;
+  bool is_string = false;
+  for (std::size_t i = 0; i < text.size(); ++i) {
+    const char c = text[i];
+    if (c == '"') is_string = !is_string;
+    if (is_string) {
+      if (c == '\\') ++i;  // what follows, a quotation mark too, is in the string
+      continue;
+    }
+    if (c == '[' || c == '{') ++levels;
+    if (c == ']' || c == '}') --levels;
+    if (levels > most_levels) throw Error("its JSON is nested more than {} deep", most_levels);
+  }
 }
 
 std::size_t components_of(const std::string& type) {
@@ -91,10 +167,78 @@ std::size_t triangles_of(const json& gltf) {
   return sum;
 }
 
-/// Finds unit and axis, and numbers that are none.
+void check_nodes(const json& gltf) {
+  const auto nodes = gltf.value("nodes", json::array());
+  NodeParts parts;
+  for (const json& node : nodes) {
+    auto& children = parts.emplace_back();
+    for (const json& child : node.value("children", json::array())) {
+      children.push_back(child.get<std::size_t>());
+      if (children.back() < nodes.size()) continue;
+      throw Error("node {} has the child {}, and there are {} nodes", parts.size() - 1,
+                  child.dump(), nodes.size());
+    }
+  }
+  NodeWalk(parts, [](std::size_t node) { return fmt::format("node {}", node); }).check();
+}
+
+/// The nodes of a Collada file and what they have instances of.
+class ColladaNodes {
+ public:
+  void enter(const tinyxml2::XMLElement& element) {
+    const std::size_t node = elements_.size();
+    const std::string id = text_of(element, "id");
+    if (!open_.empty()) {
+      parts_[open_.back()].push_back(node);
+    } else if (element.Name() == std::string_view("node")) {
+      library_.emplace(id, node);
+    }
+    named_.emplace(id, node);
+    if (text_of(element, "name") != id) named_.emplace(text_of(element, "name"), node);
+    elements_.push_back(&element);
+    parts_.emplace_back();
+    open_.push_back(node);
+  }
+
+  void leave() { open_.pop_back(); }
+
+  void add_instance(const tinyxml2::XMLElement& element) {
+    const std::string url = text_of(element, "url");
+    if (open_.empty() || !url.starts_with('#')) return;
+    instances_.emplace_back(open_.back(), url.substr(1));
+  }
+
+  void check() {
+    for (const auto& [node, name] : instances_) {
+      // assimp goes by id in the library, and then by id or name through the scene.
+      const auto [first, last] = (library_.contains(name) ? library_ : named_).equal_range(name);
+      for (auto it = first; it != last; ++it) parts_[node].push_back(it->second);
+    }
+    const auto name_of = [&](std::size_t node) {
+      return fmt::format("line {}: {} {:?}", elements_[node]->GetLineNum(), elements_[node]->Name(),
+                         text_of(*elements_[node], "id"));
+    };
+    NodeWalk(parts_, name_of).check();
+  }
+
+ private:
+  static std::string text_of(const tinyxml2::XMLElement& element, const char* attribute) {
+    const char* const text = element.Attribute(attribute);
+    return text != nullptr ? text : "";
+  }
+
+  std::vector<const tinyxml2::XMLElement*> elements_;
+  NodeParts parts_;
+  std::vector<std::size_t> open_;
+  std::multimap<std::string, std::size_t> library_, named_;
+  std::vector<std::pair<std::size_t, std::string>> instances_;
+};
+
+/// Finds unit and axis, nodes, and numbers that are none.
 class ColladaCheck : public tinyxml2::XMLVisitor {
  public:
   ColladaAsset asset;
+  ColladaNodes nodes;
 
   bool VisitEnter(const tinyxml2::XMLElement& element,  // NOLINT(readability-identifier-naming)
                   const tinyxml2::XMLAttribute* /*first*/) override {
@@ -108,6 +252,10 @@ class ColladaCheck : public tinyxml2::XMLVisitor {
     } else if (name == "up_axis") {
       if (text.find("X_UP") != std::string_view::npos) asset.up = UpAxis::X;
       if (text.find("Z_UP") != std::string_view::npos) asset.up = UpAxis::Z;
+    } else if (is_node(name)) {
+      nodes.enter(element);
+    } else if (name == "instance_node") {
+      nodes.add_instance(element);
     } else if (name == "p" || name == "vcount" || name == "h") {
       check_characters(element, text, "0123456789- \t\r\n");
     } else if (name == "float_array") {
@@ -119,7 +267,17 @@ class ColladaCheck : public tinyxml2::XMLVisitor {
     return true;
   }
 
+  bool VisitExit(
+      const tinyxml2::XMLElement& element) override {  // NOLINT(readability-identifier-naming)
+    if (is_node(element.Name())) nodes.leave();
+    return true;
+  }
+
  private:
+  static bool is_node(std::string_view element) {
+    return element == "node" || element == "visual_scene";
+  }
+
   static void check_characters(const tinyxml2::XMLElement& element, std::string_view text,
                                std::string_view all) {
     const std::size_t at = text.find_first_not_of(all);
@@ -133,8 +291,11 @@ class ColladaCheck : public tinyxml2::XMLVisitor {
 
 std::size_t check_gltf(std::string_view bytes, const std::string& name) {
   try {
-    const json gltf = json::parse(json_of(bytes));
+    const std::string_view text = json_of(bytes);
+    check_nesting(text);
+    const json gltf = json::parse(text);
     check_views(gltf);
+    check_nodes(gltf);
     return triangles_of(gltf);
   } catch (const json::exception& fault) {
     throw Error("{}: {}", name, fault.what());
@@ -151,6 +312,7 @@ ColladaAsset check_collada(std::string_view text, const std::string& name) {
   ColladaCheck check;
   try {
     document.Accept(&check);
+    check.nodes.check();
   } catch (const Error& fault) {
     throw Error("{}: {}", name, fault.what());
   }

@@ -170,14 +170,14 @@ class SceneReader {
     }
   }
 
-  /// glTF's alpha is the map's times the factor's.
+  /// glTF's alpha is the map's times the factor's, and what blends is cut out below a half.
   static float least_alpha(const aiMaterial& material, float factor) {
     aiString mode("OPAQUE");
     material.Get(AI_MATKEY_GLTF_ALPHAMODE, mode);
-    if (std::string_view(mode.C_Str()) == "BLEND") return 0.5f;
-    if (std::string_view(mode.C_Str()) != "MASK") return 0;
+    const bool is_mask = std::string_view(mode.C_Str()) == "MASK";
+    if (!is_mask && std::string_view(mode.C_Str()) != "BLEND") return 0;
     float cutoff = 0.5f;
-    material.Get(AI_MATKEY_GLTF_ALPHACUTOFF, cutoff);
+    if (is_mask) material.Get(AI_MATKEY_GLTF_ALPHACUTOFF, cutoff);
     return cutoff / std::max(factor, std::numeric_limits<float>::min());
   }
 

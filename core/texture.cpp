@@ -11,6 +11,7 @@
 #include <utility>
 
 #include "core/error.h"
+#include "core/srgb.h"
 
 namespace groundray {
 namespace {
@@ -30,9 +31,7 @@ const Table& srgb_table() {
   static const Table table = [] {
     Table values{};
     for (std::size_t i = 0; i < values.size(); ++i) {
-      const double c = static_cast<double>(i) / 255;
-      const double light = c <= 0.04045 ? c / 12.92 : std::pow((c + 0.055) / 1.055, 2.4);
-      values[i] = static_cast<float>(light);
+      values[i] = static_cast<float>(linear_of_srgb(static_cast<double>(i) / 255));
     }
     return values;
   }();

@@ -1,9 +1,10 @@
 """Draws docs/offroad_trail.png: the first second of data/scenes/offroad_trail.yaml by both lidars.
 
-pip install matplotlib numpy pillow plyfile
-groundray generate data/scenes/offroad_trail.yaml -o out/offroad_trail
-groundray terrain mesh data/terrain/prairie_1m.tif -o mesh.ply --max-error-m 0.15
-python3 docs/draw_trail.py out/offroad_trail mesh.ply docs/offroad_trail.png
+    pip install matplotlib numpy pillow plyfile
+    groundray generate data/scenes/offroad_trail.yaml -o out/offroad_trail
+    groundray terrain mesh data/terrain/prairie_1m.tif -o mesh.ply \
+        --max-error-m 0.15
+    python3 docs/draw_trail.py out/offroad_trail mesh.ply docs/offroad_trail.png
 """
 
 import pathlib

@@ -153,6 +153,28 @@ std::vector<Point> points_of(Layout layout, std::span<const int> tilt_shells,
   return points;
 }
 
+// Orders sub-rays so that those that go the same way are next to each other, by halves of halves:
+// packets of them are slim.
+void bundle(std::span<const glm::dvec2> ends, std::span<int> order) {
+  if (order.size() <= octet) return;
+  const auto end_of = [&](int i) { return ends[static_cast<std::size_t>(i)]; };
+  glm::dvec2 low = end_of(order[0]), high = low;
+  for (const int i : order) {
+    low = glm::min(low, end_of(i));
+    high = glm::max(high, end_of(i));
+  }
+  const int axis = high.x - low.x > high.y - low.y ? 0 : 1;
+  std::ranges::sort(order, {}, [&](int i) { return std::pair(end_of(i)[axis], i); });
+  bundle(ends, order.first(order.size() / 2));
+  bundle(ends, order.subspan(order.size() / 2));
+}
+
+std::vector<Point> sorted(const std::vector<Point>& points, std::span<const int> order) {
+  std::vector<Point> in_order;
+  for (const int i : order) in_order.push_back(points[static_cast<std::size_t>(i)]);
+  return in_order;
+}
+
 // The nearest points found so far: squared distance and index, nearest first.
 class Nearest {
  public:
@@ -223,14 +245,21 @@ LaserBeam::LaserBeam(const BeamSpec& spec)
     const int count = n / octet;
     const auto shells = tilt_shells(layout, spec.profile, count);
     const auto even = uniform_radii(count);
-    for (const Point& p : points_of(layout, shells, gaussian ? gaussian_radii(count) : even)) {
-      level.nodes.push_back({{p.x, p.y}, {p.z, p.w}});
+    const auto points = points_of(layout, shells, gaussian ? gaussian_radii(count) : even);
+    const bool spreads = tangent_ != glm::dvec2(0);
+    std::vector<glm::dvec2> ends;
+    for (const Point& p : points) {
+      ends.push_back(spreads ? tangent_ * glm::dvec2(p.z, p.w) : waist_m_ * glm::dvec2(p.x, p.y));
     }
+    std::vector<int> order(points.size());
+    std::iota(order.begin(), order.end(), 0);
+    bundle(ends, order);
+    for (const Point& p : sorted(points, order)) level.nodes.push_back({{p.x, p.y}, {p.z, p.w}});
     for (std::size_t i = 0; i < level.nodes.size(); ++i) {
       level.sub_rays.push_back(turned(levels() - 1, i, {}));
     }
     // Near in energy, not in space: the outermost shells are far apart.
-    level.neighbours = nearest_pairs(points_of(layout, shells, even));
+    level.neighbours = nearest_pairs(sorted(points_of(layout, shells, even), order));
   }
 }
 

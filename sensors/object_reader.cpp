@@ -184,6 +184,15 @@ ScatterLayer read_layer(Map entry, const Reading& with) {
   return layer;
 }
 
+// FNV-1a. A layer is named by it among random numbers, so that its plants do not depend on which
+// other layers there are.
+// @see http://www.isthe.com/chongo/tech/comp/fnv
+std::uint32_t hash_of(std::string_view name) {
+  std::uint32_t hash = 0x811c9dc5;
+  for (const char c : name) hash = (hash ^ static_cast<unsigned char>(c)) * 0x01000193;
+  return hash;
+}
+
 // Notes names that two entries share.
 class Names {
  public:
@@ -248,8 +257,15 @@ std::vector<ScatterLayer> read_scatter(Map& root, const fs::path& path, const Da
   Names names("layer", faults);
   for (const Node& node : root.list("scatter", Need::Optional)) {
     ScatterLayer layer = read_layer(Map(node, "scatter", faults), {path, folders, faults});
-    layer.scatter.layer = static_cast<std::uint32_t>(layers.size());
+    layer.scatter.layer = hash_of(layer.name);
     names.add(node, layer.name);
+    for (const ScatterLayer& other : layers) {
+      if (other.scatter.layer == layer.scatter.layer && other.name != layer.name) {
+        faults.add(node, "name",
+                   "'{}' has the same hash as '{}', so their plants would stand alike: rename one",
+                   layer.name, other.name);
+      }
+    }
     layers.push_back(std::move(layer));
   }
   return layers;

@@ -2,12 +2,15 @@
 
 #include <array>
 #include <chrono>
+#include <cstddef>
+#include <glm/trigonometric.hpp>
 #include <optional>
 #include <string>
 #include <string_view>
 #include <utility>
 
 #include "core/error.h"
+#include "core/image_io.h"
 #include "sensors/pattern_reader.h"
 
 namespace groundray {
@@ -46,10 +49,22 @@ ConstantSky read_constant(Map map, Faults& faults) {
   return sky;
 }
 
+// What the keys cannot tell: whether the image can be read, and is a sky.
+void check_image(const EnvironmentImage& sky, const Node& node, Faults& faults) {
+  try {
+    const EnvironmentMap works(read_image_f(sky.image), glm::radians(sky.center_azimuth_deg),
+                               sky.scale);
+  } catch (const Error& fault) {
+    faults.add(node, "image", "cannot be the sky:\n{}", fault.what());
+  }
+}
+
 EnvironmentImage read_environment(Map map, const fs::path& path, Faults& faults) {
   EnvironmentImage sky;
+  const std::size_t faults_before = faults.count();
   std::string image;
-  if (map.read_text("image", Need::Required, image)) sky.image = beside(path, image);
+  const Node* const at_image = map.read_text("image", Need::Required, image);
+  if (at_image) sky.image = beside(path, image);
   map.read_number("center_azimuth_deg", Need::Optional, sky.center_azimuth_deg);
   double factor = 1, lux = 0;
   const bool has_factor = map.find("radiance_factor", Need::Optional) != nullptr;
@@ -61,6 +76,7 @@ EnvironmentImage read_environment(Map map, const fs::path& path, Faults& faults)
       faults.add(*at, "illuminance_lux", "and radiance_factor both scale the image: give one");
   }
   map.close();
+  if (faults.count() == faults_before) check_image(sky, *at_image, faults);
   return sky;
 }
 
@@ -144,7 +160,8 @@ SunSpec read_sun(Map map, Faults& faults) {
   return spec;
 }
 
-// What no key alone can tell: whether the sun and the sky can be built.
+// What no key alone can tell: whether the sun and the sky can be built. An image is known to be
+// sound by then.
 void check_sky(const SkySpec& spec, const Node& node, Faults& faults) {
   SkySpec without_image = spec;
   if (std::holds_alternative<EnvironmentImage>(spec.dome)) without_image.dome = ConstantSky{};

@@ -111,11 +111,4 @@ glm::dvec3 direct_irradiance_rgb(double elevation_rad, const ClearAir& air) {
   return glm::max(sum, glm::dvec3(0));  // the reddest light near the horizon is outside of sRGB
 }
 
-glm::dvec3 extraterrestrial_irradiance_rgb() noexcept {
-  glm::dvec3 sum(0);
-  for (const Row& row : table)
-    sum += row.irradiance_w_m2_nm * glm::dvec3(row.rgb_nm[0], row.rgb_nm[1], row.rgb_nm[2]);
-  return sum;
-}
-
 }  // namespace groundray

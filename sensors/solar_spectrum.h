@@ -36,7 +36,4 @@ double direct_irradiance_w_m2_nm(double wavelength_nm, double elevation_rad, con
 /// @throws Error if the air is out of bounds.
 glm::dvec3 direct_irradiance_rgb(double elevation_rad, const ClearAir& air);
 
-/// Returns the same above the air.
-glm::dvec3 extraterrestrial_irradiance_rgb() noexcept;
-
 }  // namespace groundray

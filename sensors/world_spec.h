@@ -88,7 +88,7 @@ struct ScatterLayer {
   double density_per_m2 = 0;          ///< with a map, for each unit of its values
   std::filesystem::path density_map;  ///< empty for the same density everywhere
   std::optional<double> nodata;       ///< of the map
-  ScatterSpec scatter;                ///< clearings in W; its layer is its place in the list
+  ScatterSpec scatter;                ///< clearings in W; its layer is a hash of the name
 };
 
 }  // namespace groundray

@@ -30,6 +30,8 @@ struct KindRule {
   double sag_m = 0;
   double leaf_area_index = 0;
   bool has_squares = false;
+  bool has_variants = false;
+  bool has_detail = true;
 };
 
 // A wire is of aluminium 1/0 AWG (105.6 kcmil) in six strands round one of steel: three strands
@@ -37,17 +39,17 @@ struct KindRule {
 // buried. Leaf area indices: Asner et al. (2003), mean of all biomes 4.5 +- 2.5 without outliers,
 // temperate evergreen forests from 5.1.
 constexpr std::array<KindRule, 12> rules = {{
-    {.size_m = 0.8},
-    {.size_m = 0.15},
-    {.size_m = 0.35},
-    {.size_m = 1.2, .leaf_area_index = 3},
-    {.size_m = 12, .leaf_area_index = 5.1},
-    {.size_m = 9, .leaf_area_index = 4.5},
+    {.size_m = 0.8, .has_variants = true},
+    {.size_m = 0.15, .has_variants = true},
+    {.size_m = 0.35, .has_variants = true},
+    {.size_m = 1.2, .leaf_area_index = 3, .has_variants = true},
+    {.size_m = 12, .leaf_area_index = 5.1, .has_variants = true},
+    {.size_m = 9, .leaf_area_index = 4.5, .has_variants = true},
     {.size_m = 1.37, .width_m = 0.1},
     {.size_m = 50, .width_m = 0.0101, .sag_m = 1},
-    {.size_m = 5.265},
+    {.size_m = 5.265, .has_detail = false},
     {.size_m = 1.75, .width_m = 0.5},
-    {.size_m = 0.8, .width_m = 0.6, .has_squares = true},
+    {.size_m = 0.8, .width_m = 0.6, .has_squares = true, .has_detail = false},
     {.size_m = 0.145},
 }};
 
@@ -83,8 +85,14 @@ void check_asset(const AssetSpec& spec) {
   check_member(broken, spec, "square_m", spec.square_m, rule.has_squares, 1e-3, 1e3);
   check_member(broken, spec, "leaf_area_index", spec.leaf_area_index, rule.leaf_area_index > 0, 0.1,
                20);
-  broken.unless(spec.detail >= 0.25 && spec.detail <= 32, "detail = {} must be from 0.25 to 32",
-                spec.detail);
+  broken.unless(spec.seed.value == 0 || rule.has_variants,
+                "seed = {} (`variant` in a scene) is set, but a {} has no variants: leave it out",
+                spec.seed.value, asset_name(spec.kind));
+  broken.unless(spec.detail == 1 || rule.has_detail,
+                "detail = {} is set, but a {} always has the same triangles: leave it out",
+                spec.detail, asset_name(spec.kind));
+  broken.unless(!rule.has_detail || (spec.detail >= 0.25 && spec.detail <= 32),
+                "detail = {} must be from 0.25 to 32", spec.detail);
   const double size_m = spec.size_m.value_or(rule.size_m);
   const double width_m = spec.width_m.value_or(rule.width_m);
   if (spec.kind == AssetKind::Wire) {

@@ -38,8 +38,9 @@ struct AssetSpec {
   std::optional<double> sag_m{};     ///< of a wire: its lowest point under its ends; positive
   std::optional<double> square_m{};  ///< side of a board's squares; a board without is plain
   std::optional<double> leaf_area_index{};  ///< of a shrub or tree; see `FoliageArea`
-  Seed seed{};                              ///< which of the variants; targets have but one
-  double detail = 1;                        ///< number of triangles, as a multiple of the usual
+  Seed seed{};  ///< which of the variants of a rock, stone or plant; else 0
+  double detail =
+      1;  ///< number of triangles, as a multiple of the usual; 1 for vehicles and boards
 };
 
 /// Returns the names of all kinds, in their order: `rock`, `grass_tuft` and so on.

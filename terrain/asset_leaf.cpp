@@ -10,6 +10,7 @@
 #include <span>
 #include <utility>
 
+#include "core/srgb.h"
 #include "terrain/asset_builder.h"
 
 namespace groundray {
@@ -17,10 +18,6 @@ namespace {
 
 constexpr int image_size = 128;
 constexpr int alpha = 3;
-
-double to_linear(double srgb) {
-  return srgb <= 0.04045 ? srgb / 12.92 : std::pow((srgb + 0.055) / 1.055, 2.4);
-}
 
 // A leaf or a needle: a lens from its stalk to its tip.
 struct Blade {
@@ -155,7 +152,7 @@ ModelSurface spray_surface(SprayKind kind) {
   double sum = 0, count = 0;
   for (std::size_t i = 0; i < values.size(); i += 4) {
     if (values[i + alpha] < 128) continue;
-    sum += to_linear(values[i] / 255.0);
+    sum += linear_of_srgb(values[i] / 255.0);
     ++count;
   }
   surface.color *= static_cast<float>(count / sum);

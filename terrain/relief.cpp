@@ -61,7 +61,8 @@ void check(const ReliefSpec& spec) {
   const auto is_length = [](double value) { return value > 0 && std::isfinite(value); };
   Violations broken("relief");
   broken.unless(is_length(spec.cell_m), "cell_m = {} must be positive", spec.cell_m);
-  broken.unless(is_length(spec.period_m), "period_m = {} must be positive", spec.period_m);
+  broken.unless(is_length(spec.period_m) && spec.period_m <= 1e6,
+                "period_m = {:g} must be positive and at most 1e6", spec.period_m);
   broken.unless(spec.image || spec.fractal, "it needs an image, a fractal or both");
   if (spec.image) check(*spec.image, spec.cell_m, broken);
   if (spec.fractal) {
@@ -124,7 +125,7 @@ glm::ivec2 choose_period(const ReliefSpec& spec, glm::dvec2 cell_m, std::size_t 
   const double bytes = samples.x * samples.y * bytes_per_sample;
   if (bytes > static_cast<double>(memory_bytes)) {
     throw Error(
-        "relief: a period of {:.0f} x {:.0f} samples takes {:.0f} MiB, and {:.0f} are allowed; "
+        "relief: a period of {:g} x {:g} samples takes {:g} MiB, and {:g} are allowed; "
         "make period_m (now {:g}) shorter or cell_m (now {:g}) larger, or allow more memory",
         samples.x, samples.y, bytes / (1 << 20), static_cast<double>(memory_bytes) / (1 << 20),
         spec.period_m, spec.cell_m);

@@ -1,72 +1,32 @@
 #include "apps/groundray/content.h"
 
 #include <fmt/format.h>
-#include <fmt/ranges.h>
 
-#include <algorithm>
-#include <cmath>
-#include <filesystem>
-#include <glm/geometric.hpp>
+#include <chrono>
 #include <glm/trigonometric.hpp>
-#include <optional>
 #include <span>
 #include <string_view>
-#include <tuple>
 #include <utility>
 #include <variant>
 
 #include "apps/groundray/cover.h"
 #include "apps/groundray/fingerprint.h"
+#include "apps/groundray/model_library.h"
 #include "apps/groundray/palette.h"
 #include "apps/groundray/paths.h"
 #include "core/error.h"
-#include "core/product_io.h"
-#include "terrain/asset.h"
 #include "terrain/scatter.h"
 
 namespace groundray {
 namespace {
 
-namespace fs = std::filesystem;
-
 // What is gathered before it is built.
 struct Gathered {
-  std::vector<ModelScene> models;
-  std::vector<ModelTruth> truths;
+  ModelLibrary library;
   std::vector<PlacedObject> placed;
   std::vector<MovingObject> moving;
   std::vector<Content::Group> standing_groups, moving_groups;
 };
-
-Model load(const std::variant<AssetSpec, ModelSource>& source) {
-  if (const auto* asset = std::get_if<AssetSpec>(&source)) return make_asset(*asset);
-  const auto& [file, options] = std::get<ModelSource>(source);
-  return read_model(file, options).model;
-}
-
-// Materials are given to surfaces that are there.
-void check_names(const ModelSpec& spec, const Model& model) {
-  for (const auto& [name, material] : spec.materials) {
-    if (std::ranges::count(model.surfaces, name, &ModelSurface::name) > 0) continue;
-    std::vector<std::string_view> names;
-    for (const ModelSurface& surface : model.surfaces) names.push_back(surface.name);
-    throw Error("materials names the surface '{}', but the model has {}", name,
-                fmt::join(names, ", "));
-  }
-}
-
-// Adds a model; returns its index.
-std::uint32_t add_model(const ModelSpec& spec, std::uint16_t label, const RayDevice& device,
-                        Tracing tracing, Palette& palette, Gathered& into) {
-  Model model = load(spec.source);
-  check_names(spec, model);
-  ModelTruth truth{label, {}};
-  for (const ModelSurface& surface : model.surfaces)
-    truth.materials.push_back(palette.index_of(spec, surface.name));
-  into.models.emplace_back(device, std::move(model), tracing);
-  into.truths.push_back(std::move(truth));
-  return static_cast<std::uint32_t>(into.models.size() - 1);
-}
 
 glm::dvec3 to_D(const StandingObject& place, const Terrain& terrain) {
   const glm::dvec3 origin_w_m = terrain.header().origin_w_m;
@@ -88,10 +48,39 @@ PlacedObject stand(const StandingObject& place, const Terrain& terrain, double s
                       rotation_from_yaw_pitch_roll(angles_rad.x, angles_rad.y, angles_rad.z), scale,
                       model};
   if (place.stance == Stance::OnSlope) {
-    if (const auto facet = terrain.ground().facet_at(glm::dvec2(object.p_DO)))
-      object.R_DO = tilt_to(terrain.frame().normal(*facet)) * object.R_DO;
+    const auto facet = terrain.ground().facet_at(glm::dvec2(object.p_DO));
+    if (!facet) {
+      throw Error(
+          "there is no ground at ({}, {}) m in W for stance: on_slope to lean with: move at_m, or "
+          "take upright",
+          place.at_m.x, place.at_m.y);
+    }
+    object.R_DO = tilt_to(terrain.frame().normal(*facet)) * object.R_DO;
   }
   return object;
+}
+
+double seconds(std::chrono::nanoseconds time) {
+  return std::chrono::duration<double>(time).count();
+}
+
+Trajectory lay_path(const RecordedPath& path, const SceneSpec& spec, const Terrain& terrain,
+                    std::chrono::nanoseconds begin) {
+  Trajectory X_DO = recorded_path(path, terrain, begin);
+  const std::chrono::nanoseconds end = begin + run_time(spec);
+  if (X_DO.end_time() < std::chrono::nanoseconds(0) || run_time(spec) < X_DO.begin_time()) {
+    throw Error(
+        "{}: it lasts from {:.3f} s to {:.3f} s, and misses the run, from {:.3f} s to {:.3f} s; "
+        "are its times on the clock of the platform's trajectory?",
+        path.tum.string(), seconds(X_DO.begin_time() + begin), seconds(X_DO.end_time() + begin),
+        seconds(begin), seconds(end));
+  }
+  return X_DO;
+}
+
+Trajectory lay_path(const DrivenPath& path, const SceneSpec& spec, const Terrain& terrain,
+                    std::chrono::nanoseconds /*begin*/) {
+  return extended(driven_path(path, terrain, run_time(spec)), spec);
 }
 
 void add_object(const ObjectSpec& object, const SceneSpec& spec, const Terrain& terrain,
@@ -103,9 +92,9 @@ void add_object(const ObjectSpec& object, const SceneSpec& spec, const Terrain& 
     return;
   }
   const auto* recorded = std::get_if<RecordedPath>(&object.place);
-  into.moving.push_back({recorded != nullptr ? recorded_path(*recorded, terrain, begin)
-                                             : driven_path(std::get<DrivenPath>(object.place),
-                                                           terrain, run_time(spec)),
+  into.moving.push_back({recorded != nullptr
+                             ? lay_path(*recorded, spec, terrain, begin)
+                             : lay_path(std::get<DrivenPath>(object.place), spec, terrain, begin),
                          object.scale, model});
   into.moving_groups.push_back(
       {object.name, object.label, static_cast<std::uint32_t>(into.moving.size()), 1});
@@ -146,23 +135,28 @@ void for_entry(std::string_view kind, const std::string& name, const Make& make)
   }
 }
 
+void gather(const SceneSpec& spec, const Terrain& terrain, std::chrono::nanoseconds begin,
+            Palette& palette, Gathered& into) {
+  ModelLibrary& library = into.library;
+  for (const ObjectSpec& object : spec.objects) {
+    for_entry("object", object.name, [&] {
+      add_object(object, spec, terrain, begin, library.add(object.model, object.label, palette),
+                 into);
+    });
+  }
+  for (const ScatterLayer& layer : spec.scatter) {
+    for_entry("layer", layer.name, [&] {
+      const std::uint32_t first = library.size();
+      for (const ModelSpec& model : layer.models) library.add(model, layer.label, palette);
+      add_layer(layer, spec, terrain, first, into);
+    });
+  }
+}
+
 std::string fingerprint_of(const Gathered& gathered, std::uint64_t cover) {
   Fingerprint print;
   print.add_all(cover);
-  for (const ModelScene& scene : gathered.models) {
-    const Model& model = scene.model();
-    print.add(std::span(model.mesh.vertices_m));
-    print.add(std::span(model.mesh.triangles));
-    print.add(std::span(model.uv));
-    print.add(std::span(model.surface_of));
-    for (const ModelSurface& surface : model.surfaces) {
-      print.add_all(surface.least_alpha);
-      for (const ModelImage* image : {&surface.albedo, &surface.opacity}) {
-        print.add(image->pixels.values());
-        if (!image->file.empty()) print.add(std::span<const char>(read_text(image->file)));
-      }
-    }
-  }
+  gathered.library.add_to(print);
   for (const auto& [p_DO, R_DO, scale, model] : gathered.placed) {
     print.add_all(p_DO, R_DO, scale, model);
   }
@@ -170,7 +164,6 @@ std::string fingerprint_of(const Gathered& gathered, std::uint64_t cover) {
     print.add(std::span(X_DO.samples()));
     print.add_all(scale, model);
   }
-  for (const ModelTruth& truth : gathered.truths) print.add(std::span(truth.materials));
   return fmt::format("{:016x}", print.value());
 }
 
@@ -180,24 +173,11 @@ Content build_content(const SceneSpec& spec, const Terrain& terrain,
                       std::chrono::nanoseconds begin) {
   const RayDevice device;
   Palette palette(spec);
-  Gathered gathered;
+  Gathered gathered{.library = ModelLibrary(device, spec.tracing)};
+  const ModelLibrary& library = gathered.library;
   Content content;
   LoadedCover ground = load_cover(spec.terrain, terrain, palette);
-  for (const ObjectSpec& object : spec.objects) {
-    for_entry("object", object.name, [&] {
-      add_object(object, spec, terrain, begin,
-                 add_model(object.model, object.label, device, spec.tracing, palette, gathered),
-                 gathered);
-    });
-  }
-  for (const ScatterLayer& layer : spec.scatter) {
-    for_entry("layer", layer.name, [&] {
-      const auto first = static_cast<std::uint32_t>(gathered.models.size());
-      for (const ModelSpec& model : layer.models)
-        add_model(model, layer.label, device, spec.tracing, palette, gathered);
-      add_layer(layer, spec, terrain, first, gathered);
-    });
-  }
+  gather(spec, terrain, begin, palette, gathered);
   content.fingerprint = fingerprint_of(gathered, ground.fingerprint);
   content.groups = std::move(gathered.standing_groups);
   for (Content::Group& group : gathered.moving_groups) {
@@ -205,12 +185,13 @@ Content build_content(const SceneSpec& spec, const Terrain& terrain,
     content.groups.push_back(std::move(group));
   }
   content.cover = std::move(ground.cover);
-  content.memory_bytes = ground.memory_bytes + gathered.placed.size() * sizeof(PlacedObject);
-  for (const ModelScene& scene : gathered.models) content.memory_bytes += scene.texture_bytes();
+  content.memory_bytes =
+      ground.memory_bytes + library.memory_bytes() + gathered.placed.size() * sizeof(PlacedObject);
   content.materials = palette.take();
-  content.models = std::move(gathered.truths);
+  content.models = library.truths();
+  content.shapes = library.shapes();
   if (!gathered.placed.empty() || !gathered.moving.empty()) {
-    content.objects = ObjectTracer(device, std::move(gathered.models), std::move(gathered.placed),
+    content.objects = ObjectTracer(device, library.models(), std::move(gathered.placed),
                                    std::move(gathered.moving));
   }
   content.memory_bytes += device.memory_bytes();

@@ -24,16 +24,18 @@ struct Content {
   GroundCover cover;  ///< empty if the ground is of one material without an image
   ObjectTracer objects;
   std::vector<ModelTruth> models;
-  Materials materials;  ///< of the ground, if it has one, and then of the models
+  std::vector<ModelScene> shapes;  ///< what the models show, each once
+  Materials materials;             ///< of the ground, if it has one, and then of the models
   std::vector<Group> groups;
   std::string fingerprint;       ///< equal texts mean equal objects and equal cover
-  std::size_t memory_bytes = 0;  ///< of all that is traced
+  std::size_t memory_bytes = 0;  ///< of all of this, as it is traced
 };
 
 /// Loads and builds what a scene names.
 /// @param begin  time 0 of the run, on the clock of recorded paths.
-/// @throws Error that names the entry, if a file is at fault, an object has no ground under it or
-///         drives off it, or a surface has no material but a lidar has light.
+/// @throws Error that names the entry, if a file is at fault, an object has no ground under it,
+///         drives off it or has a path that misses the run, or a surface has no material but a
+///         lidar has light.
 Content build_content(const SceneSpec& spec, const Terrain& terrain,
                       std::chrono::nanoseconds begin);
 

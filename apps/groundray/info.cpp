@@ -1,9 +1,18 @@
 #include "apps/groundray/info.h"
 
 #include <fmt/format.h>
+#include <fmt/ranges.h>
 
+#include <algorithm>
+#include <cmath>
+#include <cstddef>
 #include <cstdio>
+#include <glm/trigonometric.hpp>
 #include <optional>
+#include <string>
+#include <string_view>
+#include <variant>
+#include <vector>
 
 #include "apps/groundray/world.h"
 #include "terrain/certificate.h"
@@ -92,18 +101,79 @@ void print_levels(const World& world) {
   fmt::print("triangles {} in {:.0f} MiB\n", triangles, bytes / mib);
 }
 
+// The lowest layer is the terrain itself.
+void print_cover(const TerrainSpec& terrain, const GroundCover& cover) {
+  for (std::size_t i = 0; i < cover.layers().size(); ++i) {
+    const CoverLayer& layer = cover.layers()[i];
+    const auto& material = i == 0 ? terrain.material : terrain.cover[i - 1].material;
+    fmt::print("cover     {} of label {}{}{}\n", material ? material->name : "no material",
+               layer.label,
+               layer.texture ? fmt::format(", with images of {} m", layer.texture->size_m) : "",
+               layer.mask != nullptr ? ", by a mask" : "");
+  }
+}
+
+// Materials are numbered for lasers alone.
+void print_materials(const World& world) {
+  const auto has_light = [](const PlacedLidar& lidar) {
+    return lidar.spec.lidar.light.has_value();
+  };
+  if (std::ranges::none_of(world.lidars, has_light)) return;
+  std::vector<std::string_view> names;
+  for (const Material& material : world.content.materials.all()) names.push_back(material.name);
+  fmt::print("materials {}\n", fmt::join(names, ", "));
+}
+
 void print_content(const Content& content) {
-  if (content.groups.empty()) return;
-  std::size_t triangles = 0;
-  for (const ModelScene& scene : content.objects.models())
-    triangles += scene.model().mesh.triangles.size();
   for (const Content::Group& group : content.groups) {
     fmt::print("objects   {}: {} of label {}, instances from {}\n", group.name, group.count,
                group.label, group.first);
   }
-  fmt::print("          {} models of {} triangles; {} objects in {:.1f} MiB\n",
-             content.models.size(), triangles, content.objects.size(),
-             static_cast<double>(content.memory_bytes) / mib);
+  if (!content.shapes.empty()) {
+    std::size_t triangles = 0;
+    for (const ModelScene& shape : content.shapes) triangles += shape.model().mesh.triangles.size();
+    fmt::print("models    {} of {} triangles for {} objects\n", content.shapes.size(), triangles,
+               content.objects.size());
+  }
+  if (content.memory_bytes > 0) {
+    fmt::print("memory    {:.1f} MiB of objects, textures and cover\n",
+               static_cast<double>(content.memory_bytes) / mib);
+  }
+}
+
+std::string words_for(const ConstantSky& sky, const ClearAir& /*air*/) {
+  return fmt::format("the same everywhere: ({}, {}, {}) W/(m2 sr)", sky.radiance.x, sky.radiance.y,
+                     sky.radiance.z);
+}
+std::string words_for(const EnvironmentImage& sky, const ClearAir& /*air*/) {
+  return sky.image.string();
+}
+std::string words_for(const AnalyticSky& /*sky*/, const ClearAir& air) {
+  return fmt::format("clear, of turbidity {}", air.turbidity);
+}
+
+void print_sky(const SkySpec& spec) {
+  fmt::print("sky       {}\n",
+             std::visit([&](const auto& dome) { return words_for(dome, spec.air); }, spec.dome));
+  if (!spec.sun) return;
+  const Sun sun(*spec.sun, spec.air);
+  const double azimuth_deg = glm::degrees(std::atan2(sun.direction().x, sun.direction().y));
+  fmt::print("sun       elevation {:.2f}, azimuth {:.2f} degrees in W\n",
+             glm::degrees(sun.elevation_rad()), azimuth_deg < 0 ? azimuth_deg + 360 : azimuth_deg);
+}
+
+void print_lidar(const PlacedLidar& lidar) {
+  const ScanPattern& pattern = lidar.lidar.pattern();
+  const auto& light = lidar.spec.lidar.light;
+  const double pulses = static_cast<double>(pattern.pulses(0)) * static_cast<double>(lidar.sweeps);
+  fmt::print("lidar     {}: {}, {} scans of about {:.0f} pulses, {} {:.1f} MiB of PLY\n",
+             lidar.spec.name, lidar.spec.lidar.model, lidar.sweeps,
+             pulses / static_cast<double>(lidar.sweeps), light ? "for one echo each" : "at most",
+             pulses * (light ? 113 : 88) / (1 << 20));
+  if (!light || !light->sun.irradiance_w_m2_nm) return;
+  fmt::print("          sunlight {:.4g} W/(m2 nm) at {} nm, {}\n", *light->sun.irradiance_w_m2_nm,
+             light->wavelength_nm,
+             light->sun.direction ? "across its rays" : "on all surfaces alike");
 }
 
 void print_scene(const World& world) {
@@ -115,17 +185,11 @@ void print_scene(const World& world) {
   print_frame(world.terrain.frame(), world.terrain.header().origin_w_m);
   if (world.terrain.whole() != nullptr) print_heights(*world.terrain.whole());
   print_levels(world);
+  print_cover(world.spec.terrain, world.content.cover);
   print_content(world.content);
-  for (const PlacedLidar& lidar : world.lidars) {
-    const ScanPattern& pattern = lidar.lidar.pattern();
-    const bool light = lidar.spec.lidar.light.has_value();
-    const double pulses =
-        static_cast<double>(pattern.pulses(0)) * static_cast<double>(lidar.sweeps);
-    fmt::print("lidar     {}: {}, {} scans of about {:.0f} pulses, {} {:.1f} MiB of PLY\n",
-               lidar.spec.name, lidar.spec.lidar.model, lidar.sweeps,
-               pulses / static_cast<double>(lidar.sweeps), light ? "for one echo each" : "at most",
-               pulses * (light ? 113 : 88) / (1 << 20));
-  }
+  print_materials(world);
+  if (world.spec.sky) print_sky(*world.spec.sky);
+  for (const PlacedLidar& lidar : world.lidars) print_lidar(lidar);
 }
 
 }  // namespace

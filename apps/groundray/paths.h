@@ -1,8 +1,10 @@
 #pragma once
 
 #include <chrono>
+#include <cstdint>
 
 #include "core/trajectory.h"
+#include "sensors/scan_pattern.h"
 #include "sensors/scene_spec.h"
 #include "terrain/terrain.h"
 
@@ -10,6 +12,14 @@ namespace groundray {
 
 /// How long a scene runs.
 std::chrono::nanoseconds run_time(const SceneSpec& spec);
+
+/// How many whole sweeps a scene's run has; those that a double only approximates (0.3 s at 10 Hz)
+/// count.
+std::int64_t whole_sweeps(const ScanPattern& pattern, const SceneSpec& spec);
+
+/// Returns a path that goes on as it last moved until the last sweep of the run has ended: firing
+/// sequences keep a time of their own, so that may be after the run.
+Trajectory extended(const Trajectory& path, const SceneSpec& spec);
 
 /// Returns a recorded path in D.
 /// @param begin  time 0 of the run, on the recorder's clock.

@@ -5,6 +5,7 @@
 #include <cmath>
 #include <glm/common.hpp>
 #include <glm/geometric.hpp>
+#include <limits>
 #include <numbers>
 #include <span>
 #include <vector>
@@ -119,23 +120,46 @@ struct MapWindow {
   }
 };
 
+// Heights at the points of a lattice with a pixel's pitch, which reaches beyond
+// the window by `reach` pixels; NaN where there is no ground.
+class HeightLattice {
+ public:
+  HeightLattice(const MapWindow& window, const Ground& ground, int reach)
+      : reach_(reach), side_(width + 2 * reach) {
+    heights_m_.reserve(static_cast<std::size_t>(side_) * static_cast<std::size_t>(side_));
+    for (int y = -reach; y < width + reach; ++y) {
+      for (int x = -reach; x < width + reach; ++x) {
+        heights_m_.push_back(ground.height_m_at(window.point(x, y))
+                                 .value_or(std::numeric_limits<double>::quiet_NaN()));
+      }
+    }
+  }
+  double at(int x, int y) const {
+    return heights_m_[static_cast<std::size_t>(y + reach_) * static_cast<std::size_t>(side_) +
+                      static_cast<std::size_t>(x + reach_)];
+  }
+
+ private:
+  int reach_, side_;
+  std::vector<double> heights_m_;
+};
+
 void draw_hillshade(Image8& image, const MapWindow& window, const Ground& ground) {
   const glm::dvec3 sun =
       glm::normalize(glm::dvec3(-1, 1, 1.4));  // from the north-west, as maps have it
-  const double reach_m =
-      std::max(2 * window.half_m / width, 0.5 * std::abs(ground.frame().step_m.x));
+  constexpr int farthest = 32;                 // pixels; cells of more show as facets
+  const double pixel_m = 2 * window.half_m / width;
+  const int reach = static_cast<int>(std::clamp(
+      std::ceil(0.5 * std::abs(ground.frame().step_m.x) / pixel_m), 1.0, double{farthest}));
+  const HeightLattice heights_m(window, ground, reach);
   for (int y = 0; y < width; ++y) {
     for (int x = 0; x < width; ++x) {
-      const glm::dvec2 p = window.point(x, y);
-      const auto west = ground.height_m_at(p - glm::dvec2(reach_m, 0));
-      const auto east = ground.height_m_at(p + glm::dvec2(reach_m, 0));
-      const auto south = ground.height_m_at(p - glm::dvec2(0, reach_m));
-      const auto north = ground.height_m_at(p + glm::dvec2(0, reach_m));
+      const glm::dvec3 up(heights_m.at(x - reach, y) - heights_m.at(x + reach, y),
+                          heights_m.at(x, y + reach) - heights_m.at(x, y - reach),
+                          2 * reach * pixel_m);
       Colour colour(0.12, 0.14, 0.2);  // no ground here
-      if (west && east && south && north) {
-        const glm::dvec3 up(*west - *east, *south - *north, 2 * reach_m);
+      if (std::isfinite(up.x + up.y))
         colour = Colour(0.25 + 0.6 * std::max(0.0, glm::dot(glm::normalize(up), sun)));
-      }
       paint(image, x, window.top + y, colour);
     }
   }

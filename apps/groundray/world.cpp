@@ -42,33 +42,6 @@ Trajectory lay_path(const DrivenPath& path, const SceneSpec& spec, const Terrain
   return driven_path(path, terrain, run_time(spec));
 }
 
-// Sweeps that a double only approximates (0.3 s at 10 Hz) count as whole.
-std::int64_t whole_sweeps(const ScanPattern& pattern, const SceneSpec& spec) {
-  return static_cast<std::int64_t>(std::floor(spec.duration_s * pattern.sweep_rate_hz() + 1e-9));
-}
-
-// Firing sequences keep a time of their own, so the last sweep of a run may end after it: the path
-// goes on that long as it last moved.
-Trajectory extended(const Trajectory& path, const SceneSpec& spec) {
-  std::chrono::nanoseconds more(1);
-  for (const MountedLidar& lidar : spec.lidars) {
-    const ScanPattern pattern(lidar.lidar.pattern);
-    const std::int64_t sweeps = whole_sweeps(pattern, spec);
-    if (sweeps > 0)
-      more = std::max(
-          more, pattern.last_firing(sweeps - 1) - run_time(spec) + std::chrono::nanoseconds(1));
-  }
-  std::vector<Trajectory::Sample> samples = path.samples();
-  const auto [time, X_DB] = samples.back();
-  Pose onwards;
-  if (samples.size() > 1) {
-    const auto& [time_before, X_DB_before] = samples[samples.size() - 2];
-    onwards = Screw(inverse(X_DB_before) * X_DB).at(seconds(more) / seconds(time - time_before));
-  }
-  samples.push_back({time + more, X_DB * onwards});
-  return Trajectory(std::move(samples));
-}
-
 // How far a point is from the DEM's rectangle, in plan, metres.
 double distance_m(const GridFrame& frame, const glm::dvec3& p) {
   const glm::dvec2 a = frame.origin_m;

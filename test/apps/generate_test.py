@@ -154,6 +154,34 @@ def test_same_seed_gives_the_same_bytes(dataset, tmp_path):
     assert files(tmp_path / "out") == files(dataset)
 
 
+WORLD = """\
+  relief: {cell_m: 0.25, period_m: 32, fractal: {rms_m: 0.02, shortest_m: 0.6, longest_m: 8}}
+  material: dry_soil
+objects:
+  - {name: rock, label: 4, asset: rock, size_m: 2, at_m: [429446, 5150670], stance: on_slope}
+  - name: car
+    label: 10
+    asset: vehicle
+    drive: {waypoints_m: [[429450, 5150665], [429470, 5150674]], speed_m_s: 9, height_m: 0}
+scatter:
+  - {name: grass, label: 2, density_per_m2: 0.3, min_distance_m: 0.3, models: [{asset: grass_tuft}]}
+"""
+
+
+def test_a_scene_of_objects_has_the_same_bytes_for_any_number_of_threads(tmp_path):
+    """TBB starts as many threads as the process may use processors."""
+    scene = SCENE.replace("duration_s: 0.3", "duration_s: 0.1")
+    scene = scene.replace(f"terrain: {{dem: {PRAIRIE}}}\n", f"terrain:\n  dem: {PRAIRIE}\n{WORLD}")
+    all_ = sorted(os.sched_getaffinity(0))
+    one = lambda: os.sched_setaffinity(0, all_[:1])  # noqa: E731
+    for out, before in (("one", one), ("all", None)):
+        result = generate(tmp_path, scene, out, preexec_fn=before)
+        assert result.returncode == 0, result.stderr
+    assert files(tmp_path / "one") == files(tmp_path / "all")
+    scan = PlyData.read(tmp_path / "one/lidar/top/000000.ply")["vertex"]
+    assert {1, 2, 4, 10} == set(np.unique(scan["label"]))
+
+
 def test_run_goes_on_where_it_stopped_and_ends_with_the_same_bytes(dataset, tmp_path):
     shutil.copytree(dataset, tmp_path / "out")
     for name in ("000001.ply", "000002.ply", "000002_preview.png"):

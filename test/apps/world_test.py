@@ -1,4 +1,4 @@
-"""Scenes with objects through the program: the trail that ships, read by NumPy and plyfile."""
+"""Scenes with a world through the program: shipped and small ones, read by NumPy and plyfile."""
 
 import os
 import re
@@ -18,7 +18,8 @@ SCENE = (ROOT / "data/scenes/offroad_trail.yaml").read_text()
 def run(command, scene, folder):
     text = scene.replace("../terrain/", f"{ROOT / 'data/terrain'}/")
     text = text.replace("file: rosette", f"file: {ROOT / 'data/scenes/rosette'}")
-    (folder / "scene.yaml").write_text(text.replace("duration_s: 1\n", "duration_s: 0.1\n"))
+    text = re.sub(r"^duration_s: .*", "duration_s: 0.1", text, flags=re.M)
+    (folder / "scene.yaml").write_text(text)
     arguments = [PROGRAM, command, folder / "scene.yaml"]
     if command == "generate":
         arguments += ["-o", folder / "out"]
@@ -180,3 +181,163 @@ def test_images_of_the_ground_that_are_missing_are_named(tmp_path):
         assert "none." in result.stderr
         assert "no such file" in result.stderr.lower()
         assert not (tmp_path / "out").exists()
+
+
+BARE = GROUND.replace("PLACE\n", "")
+
+
+def refused(scene, folder, *words):
+    """Nothing is written, and one message holds all the words."""
+    for command in ("info", "generate"):
+        result = run(command, scene, folder)
+        assert result.returncode == 1, result.stdout
+        for word in words:
+            assert word in result.stderr
+    assert not (folder / "out").exists()
+    return True
+
+
+def object_of(name, keys, label=5):
+    return f"  - {{name: {name}, label: {label}, {keys}}}\n"
+
+
+def test_the_quarry_has_its_relief(tmp_path):
+    scene = (ROOT / "data/scenes/quarry.yaml").read_text()
+    for long, short in {"tolerance_mrad: 0.5": "tolerance_mrad: 2", "rays: 64": "rays: 16"}.items():
+        assert long in scene
+        scene = scene.replace(long, short)
+    result = run("generate", scene, tmp_path)
+    assert result.returncode == 0, result.stderr
+    scan = PlyData.read(tmp_path / "out/lidar/mast/000000.ply")["vertex"].data
+    assert (scan["label"] == 1).all()
+    position = np.array([scan[c] for c in ("world_x", "world_y", "world_z")]).T
+    # The DEM's facets are 75 m wide: what a plane leaves of the ground nearby is relief, of 8 cm
+    # (rms) but for the waves that are longer than what is seen of it.
+    near = (scan["range_true"] < 12) & (scan["second_share"] == 0)
+    assert near.sum() > 300
+    plane = np.column_stack([position[near, :2] - position[near, :2].mean(0), np.ones(near.sum())])
+    height = position[near, 2]
+    rest = height - plane @ np.linalg.lstsq(plane, height, rcond=None)[0]
+    assert 0.04 < np.sqrt((rest**2).mean()) < 0.12
+
+
+def test_info_tells_what_a_scene_holds(tmp_path):
+    place = """  texture: {albedo: soil.png, size_m: 2}
+  cover:
+    - {material: gravel, label: 9, slope_deg: [10, 90]}"""
+    pixels = np.full((8, 8, 3), 128, np.uint8)
+    raw = tmp_path / "soil.pnm"
+    raw.write_bytes(b"P6\n8 8\n255\n" + pixels.tobytes())
+    subprocess.run(["gdal_translate", "-q", "-of", "PNG", raw, tmp_path / "soil.png"], check=True)
+    scene = GROUND.replace("PLACE", place) + "objects:\n"
+    scene += object_of("car", "asset: vehicle, at_m: [429460, 5150684]")
+    scene += """sky:
+  analytic: {}
+  turbidity: 4
+  sun: {azimuth_deg: 250, elevation_deg: 30}
+"""
+    result = run("info", scene, tmp_path)
+    assert result.returncode == 0, result.stderr
+    for line in (
+        "cover     dry_soil of label 1, with images of 2 m",
+        "cover     gravel of label 9",
+        "objects   car: 1 of label 5, instances from 1",
+        "models    1 of 1260 triangles for 1 objects",
+        "materials dry_soil, gravel, metal, asphalt, retro_reflector",
+        "sky       clear, of turbidity 4",
+        "sun       elevation 30.00, azimuth 250.00 degrees in W",
+    ):
+        assert line in result.stdout.splitlines(), result.stdout
+    sunlight = re.search(r"sunlight (\S+) W/\(m2 nm\) at 905 nm, across its rays", result.stdout)
+    assert 0.1 < float(sunlight[1]) < 0.9  # ASTM G173 has 0.64 at 42 degrees, in clearer air
+
+
+def memory_mib(text):
+    return float(re.search(r"memory +(\S+) MiB of objects", text)[1])
+
+
+def test_equal_models_are_loaded_once(tmp_path):
+    """Fifty trees take what one does, and each entry keeps its own label and material."""
+    tree = "asset: conifer, detail: 16, at_m: [%d, 5150690]"
+    one = BARE + "objects:\n" + object_of("tree", tree % 429440)
+    first = run("info", one, tmp_path)
+    assert first.returncode == 0, first.stderr
+    more = [object_of(f"tree{k}", tree % (429440 + k)) for k in range(49)]
+    layer = """scatter:
+  - name: grove
+    label: 8
+    density_per_m2: 0.001
+    models: [{asset: conifer, detail: 16}]
+"""
+    all_ = run("info", one + "".join(more) + layer, tmp_path)
+    assert all_.returncode == 0, all_.stderr
+    assert re.search(r"models    1 of \d+ triangles for \d+ objects", all_.stdout)
+    # A placed object takes some 100 bytes, and as many in Embree.
+    assert memory_mib(first.stdout) > 5
+    assert memory_mib(all_.stdout) < memory_mib(first.stdout) + 0.2
+
+
+def reflectance_at_905(name):
+    spectrum = yaml.safe_load((ROOT / f"data/materials/{name}.yaml").read_text())["spectrum"]
+    return np.interp(905, spectrum["wavelengths_nm"], spectrum["reflectances"])
+
+
+def test_equal_models_have_the_materials_of_their_entries(tmp_path):
+    board = "asset: calibration_board, size_m: 3, width_m: 3, yaw_deg: 180, at_m: [429458, %d]"
+    scene = BARE + "objects:\n"
+    scene += object_of("west", board % 5150687 + ", material: sand", 4)
+    scene += object_of("east", board % 5150681 + ", material: gravel", 5)
+    result = run("generate", scene, tmp_path)
+    assert result.returncode == 0, result.stderr
+    scan = PlyData.read(tmp_path / "out/lidar/top/000000.ply")["vertex"].data
+    matt = scan["intensity"] / np.cos(scan["incidence"])
+    seen = {}
+    for label in (4, 5):
+        whole = (scan["label"] == label) & (scan["share"] > 0.99)
+        assert whole.sum() > 50
+        seen[label] = np.median(matt[whole])
+    # Pulses on slanted surfaces have lower echoes; the two are slanted alike.
+    expected = reflectance_at_905("sand") / reflectance_at_905("gravel")
+    assert seen[4] / seen[5] == pytest.approx(expected, rel=0.01)
+
+
+def test_a_driven_object_moves_until_the_last_pulse(tmp_path):
+    """Seen from inside a ball that drives; the last sweep ends 9.7 us after the run."""
+    ball = """asset: sphere_target, size_m: 60, drive: {waypoints_m: [[429450, 5150684],
+    [429460, 5150684]], speed_m_s: 5, height_m: 0}"""
+    result = run("generate", BARE + "objects:\n" + object_of("ball", ball), tmp_path)
+    assert result.returncode == 0, result.stderr
+    scan = PlyData.read(tmp_path / "out/lidar/top/000000.ply")["vertex"].data
+    mine = scan["instance"] == 1
+    assert scan["time"][mine].max() > 0.1
+    speed = np.linalg.norm([scan[c][mine].astype(float) for c in ("vx", "vy", "vz")], axis=0)
+    assert speed.min() > 1
+
+
+def test_a_recorded_object_must_meet_the_run(tmp_path):
+    scene = BARE + "objects:\n" + object_of("car", "asset: vehicle, trajectory: car.tum")
+
+    def path(begin, end):
+        rows = [f"{t} {429440 + t} 5150690 400 0 0 0 1\n" for t in (begin, end)]
+        (tmp_path / "car.tum").write_text("".join(rows))
+
+    path(7, 9)
+    words = ["object 'car'", "car.tum", "from 7.000 s to 9.000 s", "from 0.000 s to 0.100 s"]
+    assert refused(scene, tmp_path, *words)
+    path(-3, -0.5)
+    assert refused(scene, tmp_path, "from -3.000 s to -0.500 s")
+    path(0.05, 9)
+    assert run("info", scene, tmp_path).returncode == 0
+
+
+def test_an_object_on_a_slope_needs_ground(tmp_path):
+    place = "asset: rock, at_m: [429000, 5150690], height_m: 400"
+    scene = BARE + "objects:\n" + object_of("far", place + ", stance: on_slope")
+    assert refused(scene, tmp_path, "object 'far'", "no ground at (429000, 5150690) m", "on_slope")
+    scene = BARE + "objects:\n" + object_of("far", place)
+    assert run("info", scene, tmp_path).returncode == 0
+
+
+def test_an_image_of_the_sky_that_is_missing_is_named(tmp_path):
+    scene = BARE + "sky: {environment: {image: none.hdr}}\n"
+    assert refused(scene, tmp_path, "scene.yaml:", "key 'image'", "none.hdr")

@@ -294,13 +294,29 @@ double fresnel_oracle(double cosine, std::complex<double> index) {
 }
 
 TEST(Fresnel, EqualsItsComplexForm) {
-  const std::complex<double> indices[] = {
-      {1.33, 0}, {1.5, 0}, {0.21, 3.272}, {2.9, 3.1}, {1e-10, 5}};
+  const std::complex<double> indices[] = {{1, 0},        {1.33, 0},  {1.5, 0},
+                                          {0.21, 3.272}, {2.9, 3.1}, {1e-10, 5}};
   for (const auto& index : indices) {
-    for (double cosine = 0; cosine <= 1; cosine += 0.01) {
+    // The complex form itself is 0 / 0 for light that grazes what is no surface.
+    for (double cosine = index == 1.0 ? 0.01 : 0; cosine <= 1; cosine += 0.01) {
       EXPECT_NEAR(fresnel_reflectance(cosine, index.real(), index.imag()),
                   fresnel_oracle(cosine, index), 1e-12);  // roundings near grazing light
     }
+  }
+}
+
+TEST(Fresnel, WhatHasTheIndexOfAirMirrorsNothing) {
+  for (const double cosine : {0.0, 1e-170, 1e-9, 1e-3, 0.5, 1.0})
+    EXPECT_EQ(fresnel_reflectance(cosine, 1, 0), 0) << cosine;
+}
+
+// To first order in r, the root of n^2 - sin^2, what is left is 1 - 4 r / cos - 2 r cos / n^2,
+// which is more than 1 - 6 r / (n^2 cos). Of a rounding of cos^2 r is 1.5e-8.
+TEST(Fresnel, IsWholeAtTheCriticalAngle) {
+  for (int i = 1; i < 64; ++i) {
+    const double n = i / 64.0, cosine = std::sqrt(1 - n * n);
+    const double tolerance = 6 * std::sqrt(epsilon) / (n * n * cosine);
+    EXPECT_NEAR(fresnel_reflectance(cosine, n, 0), 1, tolerance) << n;
   }
 }
 

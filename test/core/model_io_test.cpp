@@ -362,6 +362,43 @@ TEST_F(ModelIo, MtlGivesSurfaces) {
   EXPECT_EQ(model.surfaces[3].opacity.file, in("mask.png"));
 }
 
+TEST_F(ModelIo, AByteOrderMarkIsNoPartOfObjOrMtl) {
+  const std::string mark = "\xEF\xBB\xBF";
+  put("a.mtl", mark + "newmtl red\nKd 1 0 0\n");
+  // Without its first vertex the triangle would be of the three that follow.
+  const Model model = read("a.obj", mark +
+                                        "v 5 0 0\nv 1 0 0\nv 0 1 0\nv 0 0 1\nmtllib a.mtl\n"
+                                        "usemtl red\nf 1 2 3\n");
+  EXPECT_EQ(corner(model, 0, 0), glm::dvec3(5, 0, 0));
+  EXPECT_EQ(model.surfaces.at(0).color, glm::vec3(1, 0, 0));
+  EXPECT_THAT(refusal("a.obj", mark + "v 0 0\n"), HasSubstr("a.obj:1: v needs 3 numbers"));
+}
+
+TEST_F(ModelIo, CommentsAreNoPartOfNamesUnlessTheNameInFullIsKnown) {
+  put("c.mtl",
+      "newmtl rock # grey\nKd 0 1 0\nnewmtl rock #2\nKd 0 0 1\nnewmtl moss\t# green\nKd 1 0 0\n");
+  put("d #1.mtl", "newmtl d\nKd 0 0 0\n");
+  put("e.mtl", "newmtl e\nKd 0 0 0\n");
+  const Model model =
+      read("a.obj",
+           "v 0 0 0\nv 1 0 0\nv 0 1 0\n"
+           "usemtl rock # first\nf 1 2 3\nusemtl rock #2\nf 1 2 3\nusemtl rock\nf 1 2 3\n"
+           "usemtl moss # wet\nf 1 2 3\nusemtl no#comment\nf 1 2 3\nusemtl lost # here\nf 1 2 3\n"
+           "usemtl d\nf 1 2 3\nusemtl e\nf 1 2 3\n"
+           "mtllib c.mtl # after them\nmtllib d #1.mtl\nmtllib e.mtl c.mtl # two\n");
+  EXPECT_THAT(model.surface_of, ElementsAre(0, 1, 0, 2, 3, 4, 5, 6));
+  std::vector<std::string> names;
+  for (const ModelSurface& surface : model.surfaces) names.push_back(surface.name);
+  EXPECT_THAT(names, ElementsAre("rock", "rock #2", "moss", "no#comment", "lost", "d", "e"));
+  EXPECT_EQ(model.surfaces[0].color, glm::vec3(0, 1, 0));
+  EXPECT_EQ(model.surfaces[1].color, glm::vec3(0, 0, 1));
+  EXPECT_EQ(model.surfaces[2].color, glm::vec3(1, 0, 0));
+  EXPECT_EQ(model.surfaces[5].color, glm::vec3(0));
+  EXPECT_EQ(model.surfaces[6].color, glm::vec3(0));
+  EXPECT_THAT(refusal("a.obj", "mtllib no.mtl # lib\n"),
+              HasSubstr("a.obj:1: \"no.mtl\" is missing: there is no '"));
+}
+
 TEST_F(ModelIo, ObjFaultsNameFileAndLine) {
   EXPECT_THAT(refusal("a.obj", "v 0 0\n"), HasSubstr("a.obj:1: v needs 3 numbers"));
   EXPECT_THAT(refusal("a.obj", "# x\nv 0 0 1,5\n"), HasSubstr("a.obj:2: \"1,5\" is no number"));
@@ -404,6 +441,11 @@ TEST_F(ModelIo, GltfGivesSurfaces) {
                 .least_alpha,
             0.5f);
   EXPECT_EQ(surface(R"({"alphaMode":"BLEND"})").least_alpha, 0.5f);
+  // The map's alpha times 0.8 is a half where the map's is 0.625; a cutoff is of MASK alone.
+  EXPECT_FLOAT_EQ(surface(R"({"alphaMode":"BLEND","alphaCutoff":0.25,)"
+                          R"("pbrMetallicRoughness":{"baseColorFactor":[1,1,1,0.8]}})")
+                      .least_alpha,
+                  0.625f);
 }
 
 TEST_F(ModelIo, ImagesWithinAGlbAreDecoded) {
@@ -557,6 +599,88 @@ TEST_F(ModelIo, FilesThatAssimpDiesOfAreRefusedBefore) {
               AllOf(HasSubstr("a.dae: line "), HasSubstr("\"x 0\" in p is no number")));
   dae.replace(dae.find(R"( count="12")"), 11, "");
   EXPECT_THAT(refusal("a.dae", dae), HasSubstr("float_array must have a count"));
+}
+
+/// A .dae whose library has these nodes beside the wedge's scene.
+std::string with_library(const std::string& nodes, std::string dae) {
+  const std::string scenes = "<library_visual_scenes>";
+  return dae.insert(dae.find(scenes), "<library_nodes>" + nodes + "</library_nodes>");
+}
+std::string instance_of(const std::string& node) {
+  return "<instance_node url=\"#" + node + "\"/>";
+}
+std::string node(const std::string& id, const std::string& parts) {
+  return "<node id=\"" + id + "\">" + parts + "</node>";
+}
+
+// assimp 5.2 goes through them until its stack is used up.
+TEST_F(ModelIo, ColladaNodesThatArePartsOfThemselvesAreRefused) {
+  const auto expect = [&](const std::string& dae, const std::string& names) {
+    EXPECT_THAT(refusal("a.dae", dae), AllOf(HasSubstr("a.dae: line "), HasSubstr(names),
+                                             HasSubstr("is a part of itself")));
+  };
+  const auto library = [&](const std::string& nodes) {
+    return with_library(nodes, wedge_collada("", instance_of("a")));
+  };
+  expect(wedge_collada("", instance_of("n")), "node \"n\"");
+  expect(wedge_collada("", node("m", node("k", instance_of("n")))), "node \"n\"");
+  expect(wedge_collada("", instance_of("scene")), "visual_scene \"scene\"");
+  expect(library(node("a", instance_of("b")) + node("b", instance_of("a"))), "node \"a\"");
+  expect(library(node("a", node("c", instance_of("a")))), "node \"a\"");
+  // assimp takes the last of two of the same id, and a name where the library has no such id.
+  expect(library(node("a", instance_of("b")) + node("b", "") + node("b", instance_of("a"))),
+         "\"a\"");
+  expect(wedge_collada("", "<node name=\"x\">" + instance_of("x") + "</node>" + node("x", "")),
+         "node \"\"");
+}
+
+TEST_F(ModelIo, NodesMayHaveManyInstancesButNotWithoutEnd) {
+  // Each has the wedge twice over, so that the first has it 2^4 times; n has its own.
+  const auto doublings = [&](int count) {
+    std::string nodes;
+    for (int i = 0; i < count; ++i) {
+      const std::string next = instance_of(fmt::format("c{}", i + 1));
+      nodes += node(fmt::format("c{}", i), next + next);
+    }
+    nodes += node(fmt::format("c{}", count), "<instance_geometry url=\"#g\"/>");
+    return with_library(nodes, wedge_collada("", instance_of("c0")));
+  };
+  EXPECT_EQ(read("a.dae", doublings(4)).mesh.triangles.size(), 4u * (16 + 1));
+  EXPECT_THAT(refusal("a.dae", doublings(20)), HasSubstr("more than 1e+06 parts"));
+  // Many exporters name what has the instance as what it is of.
+  const std::string named =
+      with_library(node("a", "<instance_geometry url=\"#g\"/>"),
+                   wedge_collada("", "<node name=\"a\">" + instance_of("a") + "</node>"));
+  EXPECT_EQ(read("a.dae", named).mesh.triangles.size(), 8u);
+  std::string chain;
+  for (int i = 0; i < 20'000; ++i) {
+    chain += node(fmt::format("c{}", i), instance_of(fmt::format("c{}", i + 1)));
+  }
+  EXPECT_THAT(refusal("a.dae", with_library(chain, wedge_collada("", instance_of("c0")))),
+              HasSubstr("and its parts are nested more than 1000 deep"));
+}
+
+TEST_F(ModelIo, GltfThatIsNestedTooDeepIsRefused) {
+  put("wedge.bin", wedge_binary());
+  const auto nested = [&](std::size_t levels) {
+    // What is in a string does not count.
+    return wedge_gltf(R"({"mesh":0})", bin_file,
+                      R"(,"extras":["\\\"[[)" + std::string(200, '[') + R"(\\",)" +
+                          std::string(levels, '[') + std::string(levels, ']') + "]");
+  };
+  EXPECT_EQ(read("a.gltf", nested(98)).mesh.triangles.size(), 4u);
+  for (const std::size_t levels : {99, 200'000}) {
+    EXPECT_THAT(refusal("a.gltf", nested(levels)),
+                HasSubstr("a.gltf: its JSON is nested more than 100 deep"));
+  }
+  std::string chain;
+  for (int i = 1; i <= 20'000; ++i) chain += fmt::format(R"({{"children":[{}]}},)", i);
+  EXPECT_THAT(refusal("a.gltf", wedge_gltf(chain + R"({"mesh":0})", bin_file)),
+              HasSubstr("node 1000 and its parts are nested more than 1000 deep"));
+  EXPECT_THAT(refusal("a.gltf", wedge_gltf(R"({"mesh":0,"children":[0]})", bin_file)),
+              HasSubstr("node 0 is a part of itself"));
+  EXPECT_THAT(refusal("a.gltf", wedge_gltf(R"({"mesh":0,"children":[7]})", bin_file)),
+              HasSubstr("node 0 has the child 7, and there are 1 nodes"));
 }
 
 TEST_F(ModelIo, AMissingBufferIsRefused) {

@@ -21,6 +21,7 @@ using ::testing::AllOf;
 using testing::box_model;
 using ::testing::HasSubstr;
 using testing::icosphere;
+using ::testing::Not;
 
 constexpr double infinity = std::numeric_limits<double>::infinity();
 // What ranges promise.
@@ -396,6 +397,143 @@ TEST_P(ObjectTracing, CutOutsLetRaysThroughWhereTheyAreClear) {
   }
 }
 
+// Floats say where a ray meets a triangle to some 1e-7 of its size, which texels as fine as these
+// tell apart: 20 repeats of 512 chances, so 1e-4 of the rays. What counts is the closed form.
+TEST_P(ObjectTracing, CutOutsAreClearWhereTheirTexelsAre) {
+  std::mt19937_64 random(8);
+  Image8 pixels(512, 512, 2);
+  for (int y = 0; y < 512; ++y) {
+    for (int x = 0; x < 512; ++x) pixels.at(x, y)[1] = random() % 2 == 0 ? 0 : 255;
+  }
+  Model sheet;
+  sheet.mesh.vertices_m = {{-1, -1, 0}, {1, -1, 0}, {1, 1, 0}, {-1, 1, 0}};
+  sheet.mesh.triangles = {{0, 1, 2}, {0, 2, 3}};
+  sheet.uv = {{0, 0}, {20, 0}, {20, 20}, {0, 20}};
+  sheet.surface_of = {0, 0};
+  sheet.surfaces.resize(1);
+  sheet.surfaces[0].albedo.pixels = pixels;
+  const ObjectTracer tracer(device_, {{device_, sheet, GetParam()}}, {{}}, {});
+  std::uniform_real_distribution<double> within(-0.98, 0.98);
+  std::vector<Ray> rays(100'000);
+  for (Ray& ray : rays) {
+    ray.origin = {20 * within(random), 20 * within(random), 10};
+    ray.direction = glm::normalize(glm::dvec3(within(random), within(random), 0) - ray.origin);
+  }
+  const auto hits = trace(tracer, rays);
+  const Texture alpha(pixels, Encoding::Srgb, Wrap::Repeat);
+  int otherwise = 0;
+  for (std::size_t i = 0; i < rays.size(); ++i) {
+    const Ray& ray = rays[i];
+    const glm::dvec3 p = ray.origin - ray.origin.z / ray.direction.z * ray.direction;
+    otherwise +=
+        static_cast<bool>(hits[i]) == alpha.is_opaque(glm::dvec2(p.x + 1, p.y + 1) * 10.0) ? 0 : 1;
+  }
+  EXPECT_EQ(otherwise, 0);
+}
+
+// Facets at random in a box, and the same again with another surface.
+Model doubled(std::size_t facets, std::mt19937_64& random) {
+  std::uniform_real_distribution<double> place(-5, 5), off(-0.3, 0.3);
+  Model model;
+  for (std::uint32_t i = 0; i < facets; ++i) {
+    const glm::dvec3 centre(place(random), place(random), place(random));
+    for (int k = 0; k < 3; ++k)
+      model.mesh.vertices_m.push_back(centre + glm::dvec3(off(random), off(random), off(random)));
+    model.mesh.triangles.emplace_back(3 * i, 3 * i + 1, 3 * i + 2);
+  }
+  auto& triangles = model.mesh.triangles;
+  for (std::size_t i = 0; i < facets; ++i) triangles.push_back(triangles[i]);
+  model.surface_of.assign(facets, 0);
+  model.surface_of.resize(2 * facets, 1);
+  model.surfaces.resize(2);
+  return model;
+}
+
+std::vector<Hit> trace_alone(const Model& model, Tracing tracing, std::span<const Ray> rays) {
+  const RayDevice device;
+  return trace({device, {{device, model, tracing}}, {{}}, {}}, rays);
+}
+
+TEST_P(ObjectTracing, OfTwoTrianglesInOnePlaceTheFirstIsMet) {
+  std::mt19937_64 random(9);
+  constexpr std::size_t facets = 8000;
+  const Model shared = doubled(facets, random);
+  Model turned = shared;
+  for (std::size_t i = facets; i < 2 * facets; ++i)
+    std::swap(turned.mesh.triangles[i].y, turned.mesh.triangles[i].z);
+  Model apart = shared;  // with vertices of their own
+  for (std::size_t i = 0; i < 3 * facets; ++i)
+    apart.mesh.vertices_m.push_back(shared.mesh.vertices_m[i]);
+  for (std::size_t i = facets; i < 2 * facets; ++i) apart.mesh.triangles[i] += 3 * facets;
+  const auto rays = rays_at(glm::dvec3(0), 5, 40, 20'000, random);
+  for (const Model& model : {shared, turned, apart}) {
+    int met = 0;
+    for (const Hit& hit : trace_alone(model, GetParam(), rays)) {
+      if (!hit) continue;
+      ++met;
+      ASSERT_LT(hit.part, facets);
+    }
+    EXPECT_GT(met, 15'000);
+  }
+}
+
+// Another first corner rounds ranges otherwise, so that either of two may be the nearer.
+TEST(ObjectTracer, OfTwoTrianglesInOnePlaceFastAndExactTracingMeetTheSame) {
+  std::mt19937_64 random(10);
+  constexpr std::size_t facets = 8000;
+  Model model = doubled(facets, random);
+  for (std::size_t i = facets; i < 2 * facets; ++i) {
+    const glm::uvec3 t = model.mesh.triangles[i];
+    model.mesh.triangles[i] = {t.y, t.z, t.x};
+  }
+  const auto rays = rays_at(glm::dvec3(0), 5, 40, 20'000, random);
+  const auto fast = trace_alone(model, Tracing::Fast, rays);
+  const auto exact = trace_alone(model, Tracing::Exact, rays);
+  std::array<int, 2> met{};
+  for (std::size_t i = 0; i < rays.size(); ++i) {
+    ASSERT_EQ(fast[i].range_m, exact[i].range_m);
+    ASSERT_EQ(fast[i].part, exact[i].part);
+    if (exact[i]) ++met[model.surface_of[exact[i].part]];
+  }
+  EXPECT_GT(met[0] + met[1], 15'000);
+  EXPECT_GT(met[1], 1000);
+}
+
+// A board in squares whose corners doubles hold: rays that cross it there meet up to six triangles.
+TEST_P(ObjectTracing, OfTrianglesRoundAnEdgeOrCornerTheFirstIsMet) {
+  constexpr unsigned side = 16;
+  Model board;
+  for (unsigned y = 0; y <= side; ++y) {
+    for (unsigned x = 0; x <= side; ++x) board.mesh.vertices_m.emplace_back(x, y, 0);
+  }
+  for (unsigned cell = side * side; cell-- > 0;) {  // from the far end
+    const unsigned a = cell / side * (side + 1) + cell % side, b = a + side + 1;
+    board.mesh.triangles.emplace_back(a, a + 1, b + 1);
+    board.mesh.triangles.emplace_back(a, b + 1, b);
+  }
+  board.surface_of.resize(board.mesh.triangles.size());
+  board.surfaces.resize(1);
+  std::vector<Ray> rays;
+  for (unsigned y = 1; y < 2 * side; ++y) {
+    for (unsigned x = 1; x < 2 * side; ++x) rays.push_back({{x / 2.0, y / 2.0, 3}, {0, 0, -1}});
+  }
+  const auto hits = trace_alone(board, GetParam(), rays);
+  for (std::size_t i = 0; i < rays.size(); ++i) {
+    const glm::dvec3 p = rays[i].origin;
+    std::uint32_t first = 0;
+    for (;; ++first) {
+      const glm::uvec3& t = board.mesh.triangles[first];
+      const glm::dvec3 a = board.mesh.vertices_m[t.x], b = board.mesh.vertices_m[t.y],
+                       c = board.mesh.vertices_m[t.z];
+      if (glm::cross(b - a, p - a).z >= 0 && glm::cross(c - b, p - b).z >= 0 &&
+          glm::cross(a - c, p - c).z >= 0)
+        break;
+    }
+    ASSERT_EQ(hits[i].part, first) << p.x << ' ' << p.y;
+    ASSERT_EQ(hits[i].range_m, 3);
+  }
+}
+
 TEST(ObjectTracer, PointsOfATurningObjectMoveAsTheirPositionsChange) {
   const RayDevice device;
   const Pose begin{{1, 0, 0, 0}, {5, 6, 7}};
@@ -427,6 +565,58 @@ TEST(ObjectTracer, ListsWhatIsWrongWithObjects) {
                                     HasSubstr("object 2: model 3 is not there; there are 1"),
                                     HasSubstr("object 3: its position must be finite")));
   }
+}
+
+// Embree would leave out all objects in silence if one were beyond 1.8e18 m.
+TEST(ObjectTracer, ObjectsBeyondABillionMetresAreRefused) {
+  const RayDevice device;
+  const std::vector<ModelScene> models{{device, box_model({2, 2, 2}), Tracing::Fast}};
+  const Trajectory away(
+      {{milliseconds(0), Pose{}}, {milliseconds(100), {{1, 0, 0, 0}, {0, 2e9, 0}}}});
+  try {
+    const ObjectTracer tracer(
+        device, models,
+        {{.p_DO = {0, 0, -1e19}}, {.p_DO = {1e300, 0, 0}}, {.scale = 1e9}, {.p_DO = {5e8, 0, 0}}},
+        {{away}});
+    FAIL();
+  } catch (const Error& error) {
+    EXPECT_THAT(
+        error.what(),
+        AllOf(HasSubstr("object 1: it reaches 1e+19 m from the origin; it must stay within 1e+09 "
+                        "m: are its position and size in metres?"),
+              HasSubstr("object 2: it reaches inf m"), HasSubstr("object 3: it reaches 1.73e+09 m"),
+              Not(HasSubstr("object 4")), HasSubstr("object 5: it reaches 2e+09 m")));
+  }
+  const ObjectTracer far_apart(device, models, {{}, {.p_DO = {9.9e8, 0, 0}}}, {});
+  const std::vector<Ray> rays{{{0.1, 0.2, 5}, {0, 0, -1}}, {{9.9e8, 0.2, 5}, {0, 0, -1}}};
+  for (const Hit& hit : trace(far_apart, rays)) EXPECT_NEAR(hit.range_m, 4, 1e-8);
+}
+
+TEST(ObjectTracer, ModelsBeyondABillionMetresAreRefused) {
+  Model box = box_model({2, 2, 2});
+  box.mesh.vertices_m[5].y = 1.1e9;
+  try {
+    const ModelScene scene(RayDevice(), box, Tracing::Fast);
+    FAIL();
+  } catch (const Error& error) {
+    EXPECT_THAT(error.what(), HasSubstr("vertex 5 must have a finite position within 1e+09 m of "
+                                        "the origin: is it in metres?"));
+  }
+}
+
+// Embree is made to fail by names of structures that it does not have.
+TEST(ObjectTracer, WhatFailsToBuildIsGivenBack) {
+  for (const Tracing tracing : {Tracing::Fast, Tracing::Exact}) {
+    const RayDevice device("tri_accel=none,object_accel=none");
+    const std::size_t before = device.memory_bytes();
+    EXPECT_THROW(ModelScene(device, icosphere(1, 4), tracing), Error);
+    EXPECT_EQ(device.memory_bytes(), before);
+  }
+  const RayDevice device("object_accel=none");
+  const ModelScene ball(device, icosphere(1, 4), Tracing::Fast);
+  const std::size_t before = device.memory_bytes();
+  EXPECT_THROW(ObjectTracer(device, {ball}, std::vector<PlacedObject>(1000), {}), Error);
+  EXPECT_EQ(device.memory_bytes(), before);
 }
 
 }  // namespace

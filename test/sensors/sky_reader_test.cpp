@@ -3,20 +3,28 @@
 #include <gmock/gmock.h>
 #include <gtest/gtest.h>
 
+#include <filesystem>
+#include <fstream>
+#include <string>
+#include <string_view>
+
 #include "core/error.h"
+#include "test/support/temporary_folder.h"
 
 namespace groundray {
 namespace {
 
 using namespace std::chrono_literals;
+using namespace std::string_view_literals;
+using groundray::testing::TemporaryFolder;
 using ::testing::AllOf;
 using ::testing::HasSubstr;
 using ::testing::ThrowsMessage;
 
-SkySpec parse(const std::string& text) {
-  const yaml::Node node = yaml::parse(text, "scenes/sky.yaml");
-  yaml::Faults faults("scenes/sky.yaml");
-  SkySpec sky = read_sky(yaml::Map(node, "sky", faults), "scenes/sky.yaml", faults);
+SkySpec parse(const std::string& text, const std::filesystem::path& path = "scenes/sky.yaml") {
+  const yaml::Node node = yaml::parse(text, path);
+  yaml::Faults faults(path);
+  SkySpec sky = read_sky(yaml::Map(node, "sky", faults), path, faults);
   faults.throw_if_any();
   return sky;
 }
@@ -29,15 +37,48 @@ TEST(SkyReader, ReadsAConstantSky) {
   EXPECT_EQ(std::get<ConstantSky>(parse("turbidity: 2").dome).radiance, glm::dvec3(0));
 }
 
+// Writes a Radiance image of one column; `pixels` are R, G, B and exponent each.
+void write_hdr(const std::filesystem::path& file, std::string_view lines, std::string_view pixels) {
+  std::ofstream(file, std::ios::binary) << "#?RADIANCE\nFORMAT=32-bit_rle_rgbe\n"
+                                        << lines << "\n-Y " << pixels.size() / 4 << " +X 1\n"
+                                        << pixels;
+}
+
 TEST(SkyReader, ReadsAnEnvironmentImage) {
+  const TemporaryFolder folder;
+  write_hdr(folder / "forest.hdr", "", "\x80\x80\x80\x81\x40\x40\x40\x81"sv);
   const auto dome = std::get<EnvironmentImage>(
-      parse("environment: {image: forest.hdr, center_azimuth_deg: 30, illuminance_lux: 2e4}").dome);
-  EXPECT_EQ(dome.image, "scenes/forest.hdr");
+      parse("environment: {image: forest.hdr, center_azimuth_deg: 30, illuminance_lux: 2e4}",
+            folder / "sky.yaml")
+          .dome);
+  EXPECT_EQ(dome.image, folder / "forest.hdr");
   EXPECT_EQ(dome.center_azimuth_deg, 30);
   EXPECT_EQ(std::get<IlluminanceScale>(dome.scale).lux, 2e4);
-  const auto as_is = std::get<EnvironmentImage>(parse("environment: {image: /forest.hdr}").dome);
-  EXPECT_EQ(as_is.image, "/forest.hdr");
+  const std::string absolute = (folder / "forest.hdr").string();
+  const auto as_is =
+      std::get<EnvironmentImage>(parse("environment: {image: " + absolute + "}").dome);
+  EXPECT_EQ(as_is.image, absolute);
   EXPECT_EQ(std::get<RadianceScale>(as_is.scale).factor, 1);
+}
+
+TEST(SkyReader, EnvironmentImagesThatAreNoSkyAreRefusedWithTheirPlace) {
+  const TemporaryFolder folder;
+  const auto refused = [&](const std::string& keys, const std::string& why) {
+    EXPECT_THAT([&] { parse("turbidity: 2\nenvironment: {" + keys + "}", folder / "sky.yaml"); },
+                ThrowsMessage<Error>(AllOf(
+                    HasSubstr("sky.yaml:2:22: key 'image': cannot be the sky:\n"), HasSubstr(why))))
+        << keys;
+  };
+  refused("image: none.hdr", "none.hdr");
+  write_hdr(folder / "infinite.hdr", "EXPOSURE=1e-30\n", "\x80\x40\x20\xff"sv);
+  refused("image: infinite.hdr", "is inf; light must be finite");
+  write_hdr(folder / "dark.hdr", "", "\0\0\0\0"sv);
+  refused("image: dark.hdr", "every pixel is 0");
+  // Light from below alone.
+  write_hdr(folder / "turned.hdr", "", "\0\0\0\0\0\0\0\0\0\0\0\0\x80\x80\x80\x81"sv);
+  refused("image: turned.hdr, illuminance_lux: 1e4", "is it upside down?");
+  std::ofstream(folder / "text.hdr") << "no image";
+  refused("image: text.hdr", "text.hdr");
 }
 
 TEST(SkyReader, ReadsAClearSkyOfATimeAndPlace) {

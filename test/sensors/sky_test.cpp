@@ -12,8 +12,8 @@
 #include <random>
 
 #include "core/error.h"
-#include "sensors/aerial_perspective.h"
 #include "core/luminance.h"
+#include "sensors/aerial_perspective.h"
 
 namespace groundray {
 namespace {

@@ -466,7 +466,7 @@ TEST(SceneFile, LightsLidarsByItsSun) {
   ASSERT_TRUE(sun.direction);
   EXPECT_NEAR(glm::distance(*sun.direction, glm::dvec3(std::sqrt(0.75), 0, 0.5)), 0, 1e-12);
   const std::string own = with(text, "threshold_w: 1e-9",
-                               "noise: {nep_w_per_sqrt_hz: 1e-12, "
+                               "response_fwhm_ns: 3, noise: {nep_w_per_sqrt_hz: 1e-12, "
                                "sun_w_m2_nm: 0.3}, threshold_w: 1e-9");
   EXPECT_EQ(parse(own).lidars[0].lidar.light->sun.irradiance_w_m2_nm, 0.3);
   EXPECT_FALSE(parse(own).lidars[0].lidar.light->sun.direction);

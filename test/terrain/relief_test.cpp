@@ -30,6 +30,7 @@ namespace {
 using testing::certified_tiles;
 using testing::fractal;
 using ::testing::HasSubstr;
+using ::testing::MatchesRegex;
 using testing::proof_size;
 using testing::random_rays;
 using testing::sensor_at;
@@ -376,6 +377,9 @@ TEST(Relief, RefusesWhatIsOutOfBoundsAllAtOnce) {
   EXPECT_THAT([&] { Relief(rough(0.01, 50, 0.01), dem, std::size_t{64} << 20); },
               ThrowsMessage<Error>(AllOf(HasSubstr("8192 x 8192 samples takes 2048 MiB, and 64"),
                                          HasSubstr("period_m (now 50)"))));
+  EXPECT_THAT(
+      [&] { Relief(rough(0.5, 1e300, 0.1), dem, plenty); },
+      ThrowsMessage<Error>(HasSubstr("period_m = 1e+300 must be positive and at most 1e6")));
   spec = rough(0.5, 20, 0.1);
   spec.fractal->shortest_m = spec.fractal->longest_m = 9.99;
   EXPECT_THAT([&] { Relief(spec, dem, plenty); }, ThrowsMessage<Error>(HasSubstr("no wave")));

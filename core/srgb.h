@@ -1,0 +1,13 @@
+#pragma once
+
+#include <cmath>
+
+namespace groundray {
+
+/// Returns the linear value of one that is encoded as sRGB, both 0 to 1.
+/// @see IEC 61966-2-1.
+inline double linear_of_srgb(double encoded) noexcept {
+  return encoded <= 0.04045 ? encoded / 12.92 : std::pow((encoded + 0.055) / 1.055, 2.4);
+}
+
+}  // namespace groundray
