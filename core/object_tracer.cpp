@@ -33,12 +33,14 @@ struct Box {
   }
 };
 
-// A stretch of a moving object's path.
+// A stretch of a moving object's path, and all places that it takes meanwhile.
 struct Stretch {
-  std::uint32_t object = 0;  // index among those that move
   nanoseconds begin{0}, end{0};
   Box box;
 };
+
+// Embree's most: steps of time at which it is told of moving boxes.
+constexpr std::size_t most_time_steps = RTC_MAX_TIME_STEP_COUNT;
 
 // What Embree's callbacks are given.
 template <int W>
@@ -93,10 +95,13 @@ struct ObjectTracer::Impl {
   std::vector<ModelScene> models;
   std::vector<PlacedObject> placed;
   std::vector<MovingObject> moving;
-  std::vector<Stretch> stretches;
-  Box box;             // of all objects
-  glm::dvec3 p_DC{0};  // origin of the scene's floats: the middle of it
-  float slack_m = 0;   // covers rounding to floats
+  // Embree's times 0 to 1: from the first pose of any path to the last.
+  nanoseconds begin_time{0}, end_time{0};
+  std::size_t time_steps = 1;
+  std::vector<Box> moving_boxes;  // of all moving objects, at each step of time
+  Box box;                        // of all objects
+  glm::dvec3 p_DC{0};             // origin of the scene's floats: the middle of it
+  float slack_m = 0;              // covers rounding to floats
   Owned<RTCScene> scene;
 
   Impl(const RayDevice& with, std::vector<ModelScene> what, std::vector<PlacedObject> standing,
@@ -108,7 +113,20 @@ struct ObjectTracer::Impl {
     return models[number].impl();
   }
   Box box_of(const PlacedObject& object) const noexcept;
-  void add_stretches(std::uint32_t object);
+  std::vector<Stretch> stretches_of(const MovingObject& object) const;
+  void find_moving_boxes();
+  nanoseconds time_of(std::size_t step) const noexcept {
+    if (time_steps == 1) return begin_time;
+    const double share = static_cast<double>(step) / static_cast<double>(time_steps - 1);
+    return begin_time +
+           nanoseconds(std::llround(share * static_cast<double>((end_time - begin_time).count())));
+  }
+  float share_of(nanoseconds time) const noexcept {
+    if (begin_time == end_time) return 0;
+    const double share = static_cast<double>((time - begin_time).count()) /
+                         static_cast<double>((end_time - begin_time).count());
+    return static_cast<float>(std::clamp(share, 0.0, 1.0));
+  }
   Pose pose(const MovingObject& object, nanoseconds time) const {
     const Trajectory& X_DO = object.X_DO;
     return X_DO.pose_at(std::clamp(time, X_DO.begin_time(), X_DO.end_time()));
@@ -145,8 +163,8 @@ Box ObjectTracer::Impl::box_of(const PlacedObject& object) const noexcept {
 
 // Between two poses the object's origin leaves the straight line between them by no more than the
 // height of the arc that turns by the same angle; a ball round it holds the rest.
-void ObjectTracer::Impl::add_stretches(std::uint32_t number) {
-  const MovingObject& object = moving[number];
+std::vector<Stretch> ObjectTracer::Impl::stretches_of(const MovingObject& object) const {
+  std::vector<Stretch> stretches;
   const auto& samples = object.X_DO.samples();
   const double ball_m = object.scale * model(object.model).radius_m;
   const auto add = [&](nanoseconds begin, nanoseconds end, const Pose& a, const Pose& b) {
@@ -155,17 +173,52 @@ void ObjectTracer::Impl::add_stretches(std::uint32_t number) {
     const double arc_m =
         glm::distance(a.translation_m, b.translation_m) / 2 * std::tan(angle_rad / 4);
     const double pad_m = (ball_m + arc_m) * (1 + 1e-9);
-    stretches.push_back({number,
-                         begin,
+    stretches.push_back({begin,
                          end,
                          {glm::min(a.translation_m, b.translation_m) - pad_m,
                           glm::max(a.translation_m, b.translation_m) + pad_m}});
   };
   const auto first = samples.front(), last = samples.back();
+  std::vector<nanoseconds> times;
+  for (const Trajectory::Sample& sample : samples) times.push_back(sample.time);
+  for (std::size_t step = 0; step < time_steps; ++step) {
+    const nanoseconds time = time_of(step);
+    if (first.time < time && time < last.time) times.push_back(time);
+  }
+  std::ranges::sort(times);
   add(nanoseconds::min(), first.time, first.pose, first.pose);
-  for (std::size_t i = 0; i + 1 < samples.size(); ++i)
-    add(samples[i].time, samples[i + 1].time, samples[i].pose, samples[i + 1].pose);
+  for (std::size_t i = 0; i + 1 < times.size(); ++i)
+    add(times[i], times[i + 1], object.X_DO.pose_at(times[i]), object.X_DO.pose_at(times[i + 1]));
   add(last.time, nanoseconds::max(), last.pose, last.pose);
+  return stretches;
+}
+
+// Embree takes boxes as linear between steps of time. The box at a step holds all places of the
+// object from the step before to the next one, and a little more, since Embree's times are floats:
+// so the boxes of two steps both hold what lies between them.
+void ObjectTracer::Impl::find_moving_boxes() {
+  if (moving.empty()) return;
+  begin_time = nanoseconds::max();
+  end_time = nanoseconds::min();
+  for (const MovingObject& object : moving) {
+    begin_time = std::min(begin_time, object.X_DO.begin_time());
+    end_time = std::max(end_time, object.X_DO.end_time());
+  }
+  time_steps = begin_time == end_time ? 1 : most_time_steps;
+  const nanoseconds slack = (end_time - begin_time) / 1'000'000;
+  for (const MovingObject& object : moving) {
+    const std::vector<Stretch> stretches = stretches_of(object);
+    for (std::size_t step = 0; step < time_steps; ++step) {
+      const bool is_first = step == 0, is_last = step + 1 == time_steps;
+      const nanoseconds begin = is_first ? nanoseconds::min() : time_of(step - 1) - slack;
+      const nanoseconds end = is_last ? nanoseconds::max() : time_of(step + 1) + slack;
+      Box& all = moving_boxes.emplace_back();
+      for (const Stretch& stretch : stretches) {
+        if (stretch.begin <= end && begin <= stretch.end) all.add(stretch.box);
+      }
+      box.add(all);
+    }
+  }
 }
 
 ObjectTracer::Impl::Impl(const RayDevice& with, std::vector<ModelScene> what,
@@ -173,8 +226,7 @@ ObjectTracer::Impl::Impl(const RayDevice& with, std::vector<ModelScene> what,
     : device(with), models(std::move(what)), placed(std::move(standing)), moving(std::move(going)) {
   check_objects(models, placed, moving);
   for (const PlacedObject& object : placed) box.add(box_of(object));
-  for (std::uint32_t i = 0; i < moving.size(); ++i) add_stretches(i);
-  for (const Stretch& stretch : stretches) box.add(stretch.box);
+  find_moving_boxes();
   p_DC = (box.low + box.high) / 2.0;
   slack_m = static_cast<float>(16 * 0x1p-24 * glm::length(box.high - box.low));
   build();
@@ -187,16 +239,18 @@ void ObjectTracer::Impl::placed_bounds(const RTCBoundsFunctionArguments* argumen
 
 void ObjectTracer::Impl::moving_bounds(const RTCBoundsFunctionArguments* arguments) {
   const auto& tracer = *static_cast<const Impl*>(arguments->geometryUserPtr);
-  *arguments->bounds_o = tracer.bounds(tracer.stretches[arguments->primID].box);
+  const std::size_t box = arguments->primID * tracer.time_steps + arguments->timeStep;
+  *arguments->bounds_o = tracer.bounds(tracer.moving_boxes[box]);
 }
 
 void ObjectTracer::Impl::build() {
   scene.reset(new_scene(device));
-  const auto add = [&](unsigned id, std::size_t count, RTCBoundsFunction bounds_of,
-                       RTCIntersectFunctionN meet) {
+  const auto add = [&](unsigned id, std::size_t count, std::size_t steps,
+                       RTCBoundsFunction bounds_of, RTCIntersectFunctionN meet) {
     if (count == 0) return;
     const Owned<RTCGeometry> geometry(rtcNewGeometry(handle(device), RTC_GEOMETRY_TYPE_USER));
     rtcSetGeometryUserPrimitiveCount(geometry.get(), static_cast<unsigned>(count));
+    rtcSetGeometryTimeStepCount(geometry.get(), static_cast<unsigned>(steps));
     rtcSetGeometryUserData(geometry.get(), this);
     rtcSetGeometryBoundsFunction(geometry.get(), bounds_of, nullptr);
     rtcSetGeometryIntersectFunction(geometry.get(), meet);
@@ -204,11 +258,11 @@ void ObjectTracer::Impl::build() {
     rtcAttachGeometryByID(scene.get(), geometry.get(), id);
   };
   const int width = device.impl().width;
-  add(placed_geometry, placed.size(), placed_bounds,
+  add(placed_geometry, placed.size(), 1, placed_bounds,
       width == 16  ? meet_placed<16>
       : width == 8 ? meet_placed<8>
                    : meet_placed<4>);
-  add(moving_geometry, stretches.size(), moving_bounds,
+  add(moving_geometry, moving.size(), time_steps, moving_bounds,
       width == 16  ? meet_moving<16>
       : width == 8 ? meet_moving<8>
                    : meet_moving<4>);
@@ -263,14 +317,7 @@ template <int W>
 void ObjectTracer::Impl::meet_moving(const RTCIntersectFunctionNArguments* arguments) {
   const auto& tracer = *static_cast<const Impl*>(arguments->geometryUserPtr);
   auto& packet = *reinterpret_cast<ObjectQuery<W>*>(arguments->context)->packet;
-  const Stretch& stretch = tracer.stretches[arguments->primID];
-  const auto is_now = [&](std::size_t lane) {
-    return stretch.begin <= packet.time[lane] && packet.time[lane] <= stretch.end;
-  };
-  bool any = false;
-  for_each_lane(arguments, [&](std::size_t lane) { any |= is_now(lane); });
-  if (!any) return;  // as of most stretches
-  const MovingObject& object = tracer.moving[stretch.object];
+  const MovingObject& object = tracer.moving[arguments->primID];
   const ModelScene::Impl& model = tracer.model(object.model);
   std::array<IntoModel, W> into;
   std::array<const IntoModel*, W> all;
@@ -278,15 +325,13 @@ void ObjectTracer::Impl::meet_moving(const RTCIntersectFunctionNArguments* argum
   local.valid.fill(0);
   for (std::size_t i = 0; i < W; ++i) lay(IntoModel{}, packet, i, local);
   for_each_lane(arguments, [&](std::size_t lane) {
-    const nanoseconds time = packet.time[lane];
-    if (!is_now(lane)) return;
-    const Pose X_DO = tracer.pose(object, time);
+    const Pose X_DO = tracer.pose(object, packet.time[lane]);
     into[lane] = into_model(X_DO.rotation, X_DO.translation_m, object.scale);
     all[lane] = &into[lane];
     local.valid[lane] = -1;
     lay(into[lane], packet, lane, local);
   });
-  const auto number = static_cast<std::uint32_t>(tracer.placed.size() + stretch.object + 1);
+  const auto number = static_cast<std::uint32_t>(tracer.placed.size() + arguments->primID + 1);
   meet<W>(model, number, all, local, packet);
   shorten(arguments, packet, tracer.slack_m);
 }
@@ -324,7 +369,7 @@ void ObjectTracer::Impl::trace_packet(std::span<const Ray> rays,
     out.dir_z[i] = static_cast<float>(ray.direction.z);
     out.tnear[i] = 0;
     out.tfar[i] = far_float(end_m - begin_m, slack_m);
-    out.time[i] = 0;
+    out.time[i] = share_of(ray.time);
     out.mask[i] = ~0u;
     out.id[i] = static_cast<unsigned>(i);
     out.flags[i] = 0;

@@ -323,6 +323,34 @@ TEST_P(ObjectTracing, AMovingObjectIsMetWhereItIsAtTheRaysTime) {
   EXPECT_GT(met, 1000);
 }
 
+// Embree is told of far fewer steps of time than a recording has poses.
+TEST_P(ObjectTracing, ALongRecordingIsMetAtAnyTimeOfIt) {
+  std::mt19937_64 random(15);
+  const ModelScene ball(device_, icosphere(0.5, 2), GetParam());
+  std::vector<Trajectory::Sample> samples;
+  for (int k = 0; k <= 5000; ++k) {  // drives for a while, is parked, drives on
+    const double along_m = 0.1 * (k < 1000 ? k : k < 4000 ? 1000 : k - 3000);
+    const Pose X_DO{rotation_from_yaw_pitch_roll(0.01 * along_m, 0, 0),
+                    {along_m, 5 * std::sin(0.05 * along_m), 0}};
+    samples.push_back({milliseconds(10 * k), X_DO});
+  }
+  const Trajectory X_DO(samples);
+  const ObjectTracer tracer(device_, {ball}, {}, {{X_DO, 1, 0}});
+  std::uniform_int_distribution<std::int64_t> when(0, 50'000'000'000);
+  for (int i = 0; i < 3000; ++i) {
+    const nanoseconds time(when(random));
+    const glm::dvec3 centre = X_DO.pose_at(time).translation_m;
+    Ray ray = rays_at(centre, 0.2, 80, 1, random)[0];
+    ray.time = time;
+    const auto hits = trace(tracer, std::span(&ray, 1));
+    ASSERT_TRUE(hits[0]) << time.count();
+    // The facets lie between the ball and the one that their edges' middles touch.
+    const double radius_m = glm::distance(ray.origin + ray.direction * hits[0].range_m, centre);
+    ASSERT_GT(radius_m, 0.48);
+    ASSERT_LT(radius_m, 0.5 + 1e-9);
+  }
+}
+
 // The same bits, whatever the width of the packets: exact tracing decides everything in double.
 TEST(ObjectTracer, ExactTracingIsTheSameOnEveryInstructionSet) {
   std::mt19937_64 random(6);
