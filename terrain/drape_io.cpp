@@ -118,7 +118,7 @@ PhotoBands photo_bands(GDALDataset& dataset) {
       if (meaning(i) == color) named.push_back(i);
     }
   }
-  if (named.size() == 3) bands.colors = named;
+  if (named.size() == 3) bands.colors = std::move(named);
   return bands;
 }
 

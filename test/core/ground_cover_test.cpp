@@ -177,7 +177,7 @@ TEST(GroundCover, LayersWithoutBumpsKeepTheFacetsNormal) {
 }
 
 TEST(GroundCover, SaysWhatIsWrong) {
-  const auto make = [](std::vector<CoverLayer> layers) {
+  const auto make = [](const std::vector<CoverLayer>& layers) {
     return [layers] { GroundCover(layers, nullptr, {}); };
   };
   const auto nan = std::numeric_limits<double>::quiet_NaN();
