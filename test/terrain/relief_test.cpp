@@ -30,7 +30,6 @@ namespace {
 using testing::certified_tiles;
 using testing::fractal;
 using ::testing::HasSubstr;
-using ::testing::MatchesRegex;
 using testing::proof_size;
 using testing::random_rays;
 using testing::sensor_at;
