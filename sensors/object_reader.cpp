@@ -60,6 +60,17 @@ AssetSpec read_asset(Map& entry, const Node& name, Faults& faults) {
   return asset;
 }
 
+DisplacementSource read_displacement(Map map, const Reading& with) {
+  DisplacementSource displacement;
+  std::string image;
+  if (map.read_text("image", Need::Required, image)) displacement.image = beside(with.path, image);
+  map.read_number("amplitude_m", Need::Required, displacement.amplitude_m, positive);
+  map.read_number("middle", Need::Optional, displacement.middle);
+  map.read_number("cell_m", Need::Required, displacement.cell_m, positive);
+  map.close();
+  return displacement;
+}
+
 ModelSource read_file_source(Map& entry, const Node& file, const Reading& with) {
   ModelSource source;
   if (yaml::is_text(file, "model", with.faults)) source.file = beside(with.path, file.text);
@@ -70,6 +81,8 @@ ModelSource read_file_source(Map& entry, const Node& file, const Reading& with) 
     source.options.up = up;
   entry.read_choice<BrokenParts>("broken", Need::Optional, source.options.broken,
                                  {{"refuse", BrokenParts::Refuse}, {"drop", BrokenParts::Drop}});
+  if (auto map = entry.map("displacement", Need::Optional))
+    source.displacement = read_displacement(std::move(*map), with);
   return source;
 }
 

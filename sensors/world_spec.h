@@ -32,10 +32,19 @@ struct DrivenPath {
   glm::dvec2 footprint_m{2, 1.5};
 };
 
+/// An image that displaces a model's surface; see Displacement.
+struct DisplacementSource {
+  std::filesystem::path image;
+  double amplitude_m = 0;
+  double middle = 0.5;
+  double cell_m = 0;
+};
+
 /// A model in a file.
 struct ModelSource {
   std::filesystem::path file;
   ModelOptions options;
+  std::optional<DisplacementSource> displacement;
 };
 
 /// A model and what it is made of.

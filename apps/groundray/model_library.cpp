@@ -8,7 +8,9 @@
 #include <tuple>
 #include <utility>
 
+#include "core/displacement.h"
 #include "core/error.h"
+#include "core/image_io.h"
 #include "core/model_io.h"
 #include "core/product_io.h"
 #include "terrain/asset.h"
@@ -23,9 +25,10 @@ auto parts(const AssetSpec& spec) {
   return std::tuple(kind, size_m, width_m, sag_m, square_m, leaf_area_index, seed.value, detail);
 }
 auto parts(const ModelSource& source) {
-  const auto& [file, options] = source;
+  const auto& [file, options, displacement] = source;
   const auto& [metres_per_unit, up, broken] = options;
-  return std::tuple(file, metres_per_unit, up, broken);
+  const auto& [image, amplitude_m, middle, cell_m] = displacement.value_or(DisplacementSource{});
+  return std::tuple(file, metres_per_unit, up, broken, image, amplitude_m, middle, cell_m);
 }
 
 bool are_equal(const std::variant<AssetSpec, ModelSource>& a,
@@ -38,8 +41,15 @@ bool are_equal(const std::variant<AssetSpec, ModelSource>& a,
 
 Model make(const std::variant<AssetSpec, ModelSource>& source) {
   if (const auto* asset = std::get_if<AssetSpec>(&source)) return make_asset(*asset);
-  const auto& [file, options] = std::get<ModelSource>(source);
-  return read_model(file, options).model;
+  const auto& [file, options, displacement] = std::get<ModelSource>(source);
+  Model model = read_model(file, options).model;
+  if (!displacement) return model;
+  const auto& [image, amplitude_m, middle, cell_m] = *displacement;
+  try {
+    return displaced(model, {read_heights(image), amplitude_m, middle, cell_m});
+  } catch (const Error& fault) {
+    throw Error("{}: {}", file.string(), fault.what());
+  }
 }
 
 // Materials are given to surfaces that are there.

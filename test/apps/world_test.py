@@ -341,3 +341,48 @@ def test_an_object_on_a_slope_needs_ground(tmp_path):
 def test_an_image_of_the_sky_that_is_missing_is_named(tmp_path):
     scene = BARE + "sky: {environment: {image: none.hdr}}\n"
     assert refused(scene, tmp_path, "scene.yaml:", "key 'image'", "none.hdr")
+
+
+WALL = """objects:
+  - name: wall
+    label: 30
+    model: wall.obj
+    material: rock
+    at_m: [429460, 5150684]
+"""
+
+
+def test_a_displaced_model_stands_where_its_image_puts_it(tmp_path):
+    corners = ["0 -4 -2", "0 4 -2", "0 4 4", "0 -4 4"]  # seen from the west
+    (tmp_path / "wall.obj").write_text(
+        "".join(f"v {corner}\n" for corner in corners)
+        + "vt 0 0\nvt 1 0\nvt 1 1\nvt 0 1\nf 1/1 4/4 3/3 2/2\n"
+    )
+    geotiff(tmp_path / "grey.tif", np.full((4, 4, 1), 204, np.uint8))
+    subprocess.run(
+        ["gdal_translate", "-q", "-of", "PNG", tmp_path / "grey.tif", tmp_path / "grey.png"],
+        check=True,
+    )
+    scene = GROUND.replace("PLACE\n", "") + WALL
+    displacement = (
+        "    displacement: {image: grey.png, amplitude_m: 0.5, middle: 0.2, cell_m: 0.5}\n"
+    )
+    wests = []
+    for text in (scene, scene + displacement):
+        folder = tmp_path / str(len(wests))
+        folder.mkdir()
+        for file in ("wall.obj", "grey.png"):
+            (folder / file).write_bytes((tmp_path / file).read_bytes())
+        result = run("generate", text, folder)
+        assert result.returncode == 0, result.stderr
+        scan = PlyData.read(folder / "out/lidar/top/000000.ply")["vertex"].data
+        wests.append(scan["world_x"][scan["label"] == 30])
+        assert len(wests[-1]) > 500
+    # 204 of 255 is 0.8: 0.3 m towards the sensor. Beams of finite width: a few micrometres.
+    assert np.ptp(wests[0]) < 1e-5
+    assert np.abs(wests[1] - (wests[0].mean() - 0.3)).max() < 1e-5
+    fine = (scene + displacement).replace("cell_m: 0.5", "cell_m: 0.0005")
+    result = run("generate", fine, tmp_path)
+    assert result.returncode == 1
+    assert "object 'wall'" in result.stderr
+    assert "triangles, more than 16777216; give a larger cell_m" in result.stderr
