@@ -425,5 +425,25 @@ TEST(Texture, SaysWhatIsWrongWithItsImage) {
   EXPECT_THAT(message([&] { Texture(image, Wrap::Repeat); }), HasSubstr("not finite"));
 }
 
+TEST(Texture, MayHaveOnePixelOrRowsOfSixteenThousand) {
+  Image8 one(1, 1, 1);
+  one.at(0, 0)[0] = 255;
+  const Texture dot(std::move(one), Encoding::Linear, Wrap::Repeat);
+  EXPECT_EQ(dot.levels(), 1);
+  EXPECT_EQ(dot.color({0.3, -7.1}), glm::vec3(1));
+  EXPECT_EQ(dot.color({0.3, 0.2}, {{5, 0}, {0, 0.1}}, Filtering::Exact), glm::vec3(1));
+  constexpr int width = 16384, height = 128;
+  Image8 wide(width, height, 1);
+  wide.at(width - 1, height - 1)[0] = 255;
+  const Texture strip(std::move(wide), Encoding::Linear, Wrap::Repeat);
+  EXPECT_EQ(strip.levels(), 15);
+  const glm::dvec2 texel(1.0 / width, 1.0 / height);
+  EXPECT_EQ(strip.color({1 - texel.x / 2, texel.y / 2}).r, 1);
+  EXPECT_EQ(strip.color({1 - 1.5 * texel.x, texel.y / 2}).r, 0);
+  const Footprint eight{{8 * texel.x, 0}, {0, texel.y}};
+  EXPECT_NEAR(strip.color({1 - 4 * texel.x, texel.y / 2}, eight, Filtering::Exact).r, 0.125, 1e-6);
+  EXPECT_NEAR(strip.mean().r, 1.0 / (width * height), 1e-12);
+}
+
 }  // namespace
 }  // namespace groundray
