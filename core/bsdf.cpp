@@ -11,6 +11,7 @@
 #include "core/error.h"
 #include "core/ggx.h"
 #include "core/oren_nayar.h"
+#include "core/sobol.h"
 
 namespace groundray {
 namespace {
@@ -303,14 +304,39 @@ BsdfSample Bsdf::sample(const glm::dvec3& wo, const glm::dvec2& u) const noexcep
   return std::visit(choose, surface);
 }
 
+glm::dvec3 Bsdf::albedo() const noexcept {
+  if (const auto* matt = std::get_if<LambertianBsdf>(&surface)) return matt->albedo;
+  if (const auto* rough = std::get_if<RoughDiffuseBsdf>(&surface)) return rough->albedo;
+  if (const auto* leaf = std::get_if<PlantLeafBsdf>(&surface)) return leaf->reflectance;
+  if (const auto* coated = std::get_if<CoatedBsdf>(&surface)) {
+    const double mirrored = coated->mirrored.mean(), let_pass = 1 - mirrored;
+    return mirrored + pi * let_pass * let_pass * coated->base_per_sr();
+  }
+  constexpr std::uint32_t count = 1 << 16;
+  glm::dvec3 sum(0);
+  for (std::uint32_t i = 0; i < count; ++i) {
+    SobolPairs numbers(1, i);
+    const glm::dvec2 u = numbers.next();
+    // Light of everywhere falls in with the density of the cosine.
+    const double sine = std::sqrt(u.x), azimuth_rad = 2 * std::numbers::pi * u.y;
+    const glm::dvec3 from(sine * std::cos(azimuth_rad), sine * std::sin(azimuth_rad),
+                          std::sqrt(1 - u.x));
+    sum += sample(from, numbers.next()).weight;
+  }
+  return sum / static_cast<double>(count);
+}
+
 Bsdf Bsdf::tinted(const glm::dvec3& factor) const noexcept {
   Bsdf result = *this;
-  if (auto* matt = std::get_if<LambertianBsdf>(&result.surface)) matt->albedo *= factor;
-  if (auto* rough = std::get_if<RoughDiffuseBsdf>(&result.surface)) rough->albedo *= factor;
-  if (auto* coated = std::get_if<CoatedBsdf>(&result.surface)) coated->albedo *= factor;
+  const auto tint = [&](glm::dvec3& albedo) { albedo = glm::min(albedo * factor, glm::dvec3(1)); };
+  if (auto* matt = std::get_if<LambertianBsdf>(&result.surface)) tint(matt->albedo);
+  if (auto* rough = std::get_if<RoughDiffuseBsdf>(&result.surface)) tint(rough->albedo);
+  if (auto* coated = std::get_if<CoatedBsdf>(&result.surface)) tint(coated->albedo);
   if (auto* leaf = std::get_if<PlantLeafBsdf>(&result.surface)) {
-    leaf->reflectance *= factor;
-    leaf->transmittance *= factor;
+    const glm::dvec3 all = leaf->reflectance + leaf->transmittance;
+    const glm::dvec3 most = 1.0 / glm::max(all, glm::dvec3(1e-300));
+    leaf->reflectance *= glm::min(factor, most);
+    leaf->transmittance *= glm::min(factor, most);
   }
   return result;
 }

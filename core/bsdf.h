@@ -84,8 +84,11 @@ struct Bsdf {
   /// @param u  uniform in [0, 1)^2.
   BsdfSample sample(const glm::dvec3& wo, const glm::dvec2& u) const noexcept;
 
+  /// Returns the share of light from everywhere that comes back to the side it came from, to 1e-3.
+  glm::dvec3 albedo() const noexcept;
+
   /// Returns the same surface with its reflectance, of a coated one the base's, multiplied by what
-  /// a texture tells, from 0 to 1. Metals stay as they are.
+  /// a texture tells, >= 0, up to where all light comes back. Metals stay as they are.
   Bsdf tinted(const glm::dvec3& factor) const noexcept;
 };
 

@@ -57,6 +57,8 @@ class Image {
 };
 
 using Image8 = Image<std::uint8_t>;
+using Image16 = Image<std::uint16_t>;
+using Image32 = Image<std::uint32_t>;
 using ImageF = Image<float>;
 
 }  // namespace groundray

@@ -153,6 +153,10 @@ RetroBrdf retro(const BlackBsdf&) { return {}; }
 void check_material(const Material& material) {
   Violations broken("Material '" + material.name + "'");
   std::visit([&](const auto& surface) { check(surface, broken); }, material.reflection);
+  for (glm::length_t k = 0; k < 3; ++k) {
+    broken.unless(material.emitted[k] >= 0 && std::isfinite(material.emitted[k]),
+                  "emitted[{}] = {} must be finite and >= 0", k, material.emitted[k]);
+  }
   broken.throw_if_any();
 }
 

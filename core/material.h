@@ -1,5 +1,6 @@
 #pragma once
 
+#include <glm/vec3.hpp>
 #include <optional>
 #include <string>
 #include <variant>
@@ -50,15 +51,18 @@ struct RetroReflector {
   double coefficient_cd_lx_m2 = 0;
 };
 
-/// How a surface reflects.
+/// How a surface reflects, and what it shines with itself.
 struct Material {
   std::string name;
   std::variant<Lambertian, RoughDiffuse, Coated, Conductor, PlantLeaf, RetroReflector> reflection;
+  /// Radiance of its own, the same to all sides and from both: linear sRGB, W/(m^2 sr), see
+  /// docs/sky.md for the unit. Cameras see it; lidars do not.
+  glm::dvec3 emitted{0};
 };
 
 /// @throws Error listing every field of `material` that is out of bounds: a spectrum must have
 ///         samples, by ascending wavelength, of reflectances from 0 to 1; a coefficient must be
-///         positive; other bounds stand at the fields.
+///         positive; what is emitted finite and >= 0; other bounds stand at the fields.
 void check_material(const Material& material);
 
 /// What a rough surface sends back to the source at one wavelength, in the terms that

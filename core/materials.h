@@ -1,11 +1,15 @@
 #pragma once
 
 #include <cstddef>
+#include <cstdint>
+#include <glm/vec3.hpp>
 #include <initializer_list>
 #include <memory>
 #include <span>
+#include <variant>
 #include <vector>
 
+#include "core/bsdf.h"
 #include "core/material.h"
 
 namespace groundray {
@@ -23,6 +27,24 @@ class Materials {
   /// Returns what each sends back at a wavelength, found when it is asked for first.
   /// @throws Error as retro_brdf.
   std::span<const RetroBrdf> retro_brdfs(double wavelength_nm) const;
+
+  /// How a material scatters the colours of linear sRGB, and which share of light from everywhere
+  /// it sends back to the side it came from.
+  struct InColour {
+    std::vector<Bsdf> bsdfs;
+    std::vector<glm::vec3> albedos;
+
+    /// Returns the albedo of a material that a texture makes brighter or darker.
+    /// @param tint  as Bsdf::tinted.
+    glm::vec3 albedo(std::uint16_t material, const glm::vec3& tint) const noexcept {
+      const Bsdf& bsdf = bsdfs[material];
+      if (tint == glm::vec3(1) || std::holds_alternative<ConductorBsdf>(bsdf.surface))
+        return albedos[material];
+      return glm::vec3(bsdf.tinted(glm::dvec3(tint)).albedo());
+    }
+  };
+  /// Returns that of each, found when it is asked for first. @throws Error as bsdf_in_colour.
+  const InColour& in_colour() const;
 
  private:
   struct Impl;

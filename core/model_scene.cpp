@@ -172,13 +172,45 @@ ModelScene::Impl::Impl(const RayDevice& with, Model content, Tracing how)
   check(device, "building a model");
 }
 
+namespace {
+
+// A vertex as the ray sees it that comes down the third of three axes: its place across the ray,
+// rounded alike for all triangles that have it.
+struct Sheared {
+  glm::length_t x, y, z;
+  double x_slope, y_slope;
+  explicit Sheared(const glm::dvec3& direction) {
+    const glm::dvec3 size = glm::abs(direction);
+    z = size.x > size.y && size.x > size.z ? 0 : size.y > size.z ? 1 : 2;
+    x = (z + 1) % 3;
+    y = (z + 2) % 3;
+    x_slope = direction[x] / direction[z];
+    y_slope = direction[y] / direction[z];
+  }
+  glm::dvec2 operator()(const glm::dvec3& p) const noexcept {
+    return {p[x] - x_slope * p[z], p[y] - y_slope * p[z]};
+  }
+};
+
+// a x b, its sign exact: what rounding takes from the products comes back where they are equal.
+double cross(const glm::dvec2& a, const glm::dvec2& b) noexcept {
+  const double plus = a.x * b.y, minus = a.y * b.x;
+  if (plus != minus) return plus - minus;
+  return std::fma(a.x, b.y, -plus) - std::fma(a.y, b.x, -minus);
+}
+
+}  // namespace
+
+// Across the ray the triangles round a corner are wound round it by whole turns, if every sign is
+// right: one of them has the ray, whatever rounding does to the corners' places.
+// @see Woop, Benthin and Wald, Watertight ray/triangle intersection, JCGT 2(1) (2013).
 glm::dvec3 ModelScene::Impl::edges_of(std::uint32_t triangle, const ModelRay& ray) const noexcept {
   const glm::uvec3& corners = model.mesh.triangles[triangle];
-  const glm::dvec3 a = model.mesh.vertices_m[corners.x] - ray.origin;
-  const glm::dvec3 b = model.mesh.vertices_m[corners.y] - ray.origin;
-  const glm::dvec3 c = model.mesh.vertices_m[corners.z] - ray.origin;
-  return {glm::dot(ray.direction, glm::cross(a, b)), glm::dot(ray.direction, glm::cross(b, c)),
-          glm::dot(ray.direction, glm::cross(c, a))};
+  const Sheared across(ray.direction);
+  const glm::dvec2 a = across(model.mesh.vertices_m[corners.x] - ray.origin);
+  const glm::dvec2 b = across(model.mesh.vertices_m[corners.y] - ray.origin);
+  const glm::dvec2 c = across(model.mesh.vertices_m[corners.z] - ray.origin);
+  return {cross(a, b), cross(b, c), cross(c, a)};
 }
 
 glm::dvec3 ModelScene::Impl::normal(std::uint32_t triangle) const noexcept {

@@ -37,12 +37,9 @@ std::string read_text(const std::filesystem::path& path);
 /// @throws Error as write_whole, or for other channel counts.
 void write_png(const std::filesystem::path& path, const Image8& image);
 
-/// Writes a multi-channel float32 OpenEXR file, losslessly compressed. Equal images give equal
-/// bytes.
-/// @param channels  one name for each channel of `image`: "R", "G", "B", "Z", ...
-/// @throws Error as write_whole, or if the names do not match the channels or are not unique.
-void write_exr(const std::filesystem::path& path, const ImageF& image,
-               const std::vector<std::string>& channels);
+/// As above, of 16 bits a value: numbers, of which the file does not say what colours they are.
+/// @throws Error likewise.
+void write_png(const std::filesystem::path& path, const Image16& image);
 
 /// Reads a trajectory in TUM form: lines of `t x y z qx qy qz qw`, seconds and metres; # begins a
 /// comment. Times are read as decimals, exact to the nanosecond, within 4.6e9 s of zero.

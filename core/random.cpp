@@ -2,9 +2,11 @@
 
 #include <Random123/philox.h>
 
+#include <algorithm>
 #include <cmath>
 #include <glm/vec2.hpp>
 #include <numbers>
+#include <utility>
 
 namespace groundray {
 namespace {
@@ -38,6 +40,51 @@ glm::dvec2 random_normal(const RandomKey& key) noexcept {
   const double radius = std::sqrt(-2 * std::log(u.x));
   const double angle_rad = 2 * std::numbers::pi * u.y;
   return {radius * std::cos(angle_rad), radius * std::sin(angle_rad)};
+}
+
+namespace {
+
+// log(n!), by Stirling's series above 9: the next term is less than 1e-12.
+double log_factorial(double n) noexcept {
+  constexpr std::array<double, 10> small{1, 1, 2, 6, 24, 120, 720, 5040, 40320, 362880};
+  if (n < 10) return std::log(small[static_cast<std::size_t>(n)]);
+  const double m = n + 1, inverse = 1 / (m * m);
+  return (m - 0.5) * std::log(m) - m + 0.5 * std::log(2 * std::numbers::pi) +
+         (1.0 / 12 - inverse * (1.0 / 360 - inverse * (1.0 / 1260 - inverse / 1680))) / m;
+}
+
+// Counts how many arrivals fit, for means below 10.
+double poisson_by_inversion(const RandomKey& key, double mean) noexcept {
+  double left = random_uniform(key).x, probability = std::exp(-mean), count = 0;
+  while (left > probability && probability > 0) {
+    left -= probability;
+    probability *= mean / ++count;
+  }
+  return count;
+}
+
+}  // namespace
+
+double random_poisson(RandomKey key, double mean) noexcept {
+  if (!(mean > 0)) return 0;
+  mean = std::min(mean, 1e9);
+  if (mean < 10) return poisson_by_inversion(key, mean);
+  const double b = 0.931 + 2.53 * std::sqrt(mean), a = -0.059 + 0.02483 * b;
+  const double inverse_alpha = 1.1239 + 1.1328 / (b - 3.4);
+  const double sure = 0.9277 - 3.6224 / (b - 2);
+  for (;; ++key.sub_ray) {
+    const auto [u, v] = [&] {
+      const glm::dvec2 both = random_uniform(key);
+      return std::pair(both.x - 0.5, both.y);
+    }();
+    const double rest = 0.5 - std::abs(u);
+    const double count = std::floor((2 * a / rest + b) * u + mean + 0.43);
+    if (rest >= 0.07 && v <= sure) return count;
+    if (count < 0 || (rest < 0.013 && v > rest)) continue;
+    if (std::log(v * inverse_alpha / (a / (rest * rest) + b)) <=
+        count * std::log(mean) - mean - log_factorial(count))
+      return count;
+  }
 }
 
 }  // namespace groundray

@@ -21,7 +21,11 @@ enum class RandomStream : std::uint32_t {
   AngularJitter,
   Asset,
   Scatter,
-  Relief
+  Relief,
+  ShotNoise,
+  ReadNoise,
+  FixedPattern,
+  Paths
 };
 
 /// Names one random block: equal keys give equal numbers on any thread, in any order.
@@ -43,5 +47,12 @@ glm::dvec2 random_uniform(const RandomKey& key) noexcept;
 
 /// Returns two independent numbers of mean 0 and standard deviation 1 (Box-Muller).
 glm::dvec2 random_normal(const RandomKey& key) noexcept;
+
+/// Returns a number of Poisson's distribution, exact but for rounding, for means up to 1e9. Takes
+/// blocks of `key` with sub_ray and above.
+/// @param mean  >= 0; larger ones count as 1e9.
+/// @see Hoermann, The transformed rejection method for generating Poisson random variables,
+///      Insurance: Mathematics and Economics 12 (1993): PTRS.
+double random_poisson(RandomKey key, double mean) noexcept;
 
 }  // namespace groundray

@@ -60,13 +60,16 @@ struct RayTracer::Impl {
   template <int W>
   void decide_fast(const Target& target, Packet<W>& packet) const noexcept;
   template <int W>
-  void trace_target(const Target& target, std::span<Hit> hits, Packet<W>& packet) const noexcept;
+  void trace_target(const Target& target, Coherence coherence, std::span<Hit> hits,
+                    Packet<W>& packet) const noexcept;
   template <int W>
   bool start_inside(const Packet<W>& packet) const noexcept;
   template <int W>
-  void trace_packet(Packet<W>& packet, std::span<Hit> hits) const noexcept;
+  void rise(std::span<Hit> hits, Packet<W>& packet) const noexcept;
   template <int W>
-  void trace(std::span<const Ray> rays, std::span<Hit> hits) const noexcept;
+  void trace_packet(Coherence coherence, Packet<W>& packet, std::span<Hit> hits) const noexcept;
+  template <int W>
+  void trace(std::span<const Ray> rays, std::span<Hit> hits, Batch batch) const noexcept;
 };
 
 namespace {
@@ -114,6 +117,11 @@ glm::vec3 one_ulp_off(const glm::vec3& direction) noexcept {
   constexpr float up = std::numeric_limits<float>::infinity();
   return {std::nextafter(direction.x, up), std::nextafter(direction.y, up),
           std::nextafter(direction.z, up)};
+}
+
+Hit hit_of(const GridFrame& frame, const Crossing& crossing) noexcept {
+  return {crossing.range_m, glm::vec3(frame.normal(crossing.plane)), crossing.deviation_m,
+          crossing.level};
 }
 
 Target target_of(const LevelScene& scene, std::uint32_t number) {
@@ -244,7 +252,7 @@ void RayTracer::Impl::decide_fast(const Target& target, Packet<W>& packet) const
 }
 
 template <int W>
-void RayTracer::Impl::trace_target(const Target& target, std::span<Hit> hits,
+void RayTracer::Impl::trace_target(const Target& target, Coherence coherence, std::span<Hit> hits,
                                    Packet<W>& packet) const noexcept {
   if (std::isnan(target.min_m)) return;  // it has no heights
   if (!enter(target, hits, packet)) return;
@@ -255,8 +263,7 @@ void RayTracer::Impl::trace_target(const Target& target, std::span<Hit> hits,
     packet.crossings.fill({});
   }
   ExactQuery query{{}, &surface, packet.exact_rays.data(), packet.crossings.data()};
-  intersect<W>(target.scene, packet.valid.data(), packet.floats, query.context,
-               Coherence::Coherent);
+  intersect<W>(target.scene, packet.valid.data(), packet.floats, query.context, coherence);
   if (exact) {
     for (int lane = 0; lane < W; ++lane)
       packet.take(lane, packet.crossings[static_cast<std::size_t>(lane)]);
@@ -280,23 +287,40 @@ bool RayTracer::Impl::start_inside(const Packet<W>& packet) const noexcept {
   return inside;
 }
 
+// Brings rays that begin on the surface so far above it that floats do not see them below.
 template <int W>
-void RayTracer::Impl::trace_packet(Packet<W>& packet, std::span<Hit> hits) const noexcept {
-  std::ranges::fill(hits, Hit{});
-  if (!start_inside(packet)) return trace_target(join_levels(), hits, packet);
+void RayTracer::Impl::rise(std::span<Hit> hits, Packet<W>& packet) const noexcept {
+  const double above_m = 2.0 * everything.slack_m;
+  for (std::size_t i = 0; i < W; ++i) {
+    const GridRay ray = packet.grid_ray(static_cast<int>(i));
+    const auto [begin_m, crossing] = surface.rise(ray, above_m, packet.far_m[i]);
+    packet.inner_m[i] = begin_m;
+    if (crossing && i < hits.size()) hits[i] = hit_of(level(0).level.frame, *crossing);
+  }
+}
+
+template <int W>
+void RayTracer::Impl::trace_packet(Coherence coherence, Packet<W>& packet,
+                                   std::span<Hit> hits) const noexcept {
+  if (!start_inside(packet)) return trace_target(join_levels(), coherence, hits, packet);
   for (const Target& target : targets) {
-    trace_target(target, hits, packet);
+    trace_target(target, coherence, hits, packet);
     if (std::ranges::all_of(hits, [](const Hit& hit) { return static_cast<bool>(hit); })) return;
   }
 }
 
 template <int W>
-void RayTracer::Impl::trace(std::span<const Ray> rays, std::span<Hit> hits) const noexcept {
+void RayTracer::Impl::trace(std::span<const Ray> rays, std::span<Hit> hits,
+                            Batch batch) const noexcept {
+  const Coherence coherence =
+      batch == Batch::Scattered ? Coherence::Incoherent : Coherence::Coherent;
   Packet<W> packet;
+  std::ranges::fill(hits, Hit{});
   for (std::size_t begin = 0; begin < rays.size(); begin += W) {
     const std::size_t count = std::min<std::size_t>(W, rays.size() - begin);
     take_rays(level(0).level.frame, rays.subspan(begin, count), packet);
-    trace_packet(packet, hits.subspan(begin, count));
+    if (batch != Batch::Alike) rise(hits.subspan(begin, count), packet);
+    trace_packet(coherence, packet, hits.subspan(begin, count));
   }
 }
 
@@ -315,12 +339,12 @@ RayTracer::~RayTracer() = default;
 RayTracer::RayTracer(RayTracer&&) noexcept = default;
 RayTracer& RayTracer::operator=(RayTracer&&) noexcept = default;
 
-void RayTracer::trace(std::span<const Ray> rays, std::span<Hit> hits) const noexcept {
+void RayTracer::trace(std::span<const Ray> rays, std::span<Hit> hits, Batch batch) const noexcept {
   const FlushDenormals flush;
   const int width = impl_->device.impl().width;
-  if (width == 16) return impl_->trace<16>(rays, hits);
-  if (width == 8) return impl_->trace<8>(rays, hits);
-  impl_->trace<4>(rays, hits);
+  if (width == 16) return impl_->trace<16>(rays, hits, batch);
+  if (width == 8) return impl_->trace<8>(rays, hits, batch);
+  impl_->trace<4>(rays, hits, batch);
 }
 
 void RayTracer::bound_errors(std::span<const Ray> rays, std::span<const Hit> hits,

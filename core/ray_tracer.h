@@ -32,6 +32,13 @@ struct Ray {
   std::chrono::nanoseconds time{0};                        ///< when objects that move are met
 };
 
+/// What the rays of a batch are like: neighbours are traced in packets.
+enum class Batch {
+  Alike,         ///< neighbours begin near each other and run side by side
+  FromSurfaces,  ///< they run side by side from what rays have met before
+  Scattered,     ///< they begin there and run anywhere
+};
+
 /// What a ray meets first.
 struct Hit {
   double range_m =
@@ -120,11 +127,12 @@ class RayTracer {
   RayTracer(RayTracer&&) noexcept;
   RayTracer& operator=(RayTracer&&) noexcept;
 
-  /// Finds the first hit of each ray from above. Neighbouring rays should be alike: they are traced
-  /// in packets. Rays that start over the finest window pass the levels one after the other; others
-  /// meet them all at once.
+  /// Finds the first hit of each ray from above. Rays that start over the finest window pass the
+  /// levels one after the other; others meet them all at once.
   /// @param hits  as many as there are rays.
-  void trace(std::span<const Ray> rays, std::span<Hit> hits) const noexcept;
+  /// @param batch  for speed alone: what is met does not depend on it.
+  void trace(std::span<const Ray> rays, std::span<Hit> hits,
+             Batch batch = Batch::Alike) const noexcept;
 
   /// Bounds how far each range may be from that of the reference surface, metres along the ray,
   /// whatever the mode of tracing. Infinite where the reference may be met much further on or

@@ -51,8 +51,10 @@ struct Scene {
 
   /// Finds what each ray meets first, of ground and objects.
   /// @param hits  as many as there are rays.
-  void trace(std::span<const Ray> of, std::span<Hit> hits) const noexcept {
-    rays.trace(of, hits);
+  /// @param batch  for speed alone: what is met does not depend on it.
+  void trace(std::span<const Ray> of, std::span<Hit> hits,
+             Batch batch = Batch::Alike) const noexcept {
+    rays.trace(of, hits, batch);
     objects.trace(of, hits);
   }
 

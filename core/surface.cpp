@@ -222,6 +222,35 @@ double diagonal_m(const Cell& cell, const GridRay& ray) {
   return (offset - (across + sign * down)) / (ray.du / cell.width + sign * (ray.dv / cell.height));
 }
 
+// The first t from t_in on at which a ray is so far above both planes of a cell; infinite if never.
+double rises_to(const Cell& cell, const GridRay& ray, double above_m, double t_in) {
+  double rise_m = t_in;
+  for (const Half half : {Half::Near, Half::Far}) {
+    const FacetPlane plane = cell.plane(half);
+    const double lacks_m = above_m - clearance_m(ray, plane, t_in);
+    if (lacks_m <= 0 || std::isnan(lacks_m)) continue;
+    const double rate = ray.dz - (plane.u_slope_m * ray.du + plane.v_slope_m * ray.dv);
+    rise_m = rate > 0 ? std::max(rise_m, t_in + lacks_m / rate) : infinity;
+  }
+  return rise_m;
+}
+
+// The same where the ray begins, and stays, over one triangle of the cell; else NaN.
+double rises_over_one(const Cell& cell, const GridRay& ray, double above_m) {
+  const Half half = cell.half_at(ray.u0, ray.v0);
+  const FacetPlane plane = cell.plane(half);
+  const double begins_m = clearance_m(ray, plane, 0);
+  const double rate = ray.dz - (plane.u_slope_m * ray.du + plane.v_slope_m * ray.dv);
+  if (!(begins_m >= 0)) return nan;
+  if (begins_m >= above_m) return 0;
+  if (!(rate > 0)) return nan;
+  const double rise_m = (above_m - begins_m) / rate;
+  const double u = ray.u0 + rise_m * ray.du, v = ray.v0 + rise_m * ray.dv;
+  const bool stays = cell.column <= u && u <= cell.column + cell.width && cell.row <= v &&
+                     v <= cell.row + cell.height && cell.half_at(u, v) == half;
+  return stays ? rise_m : nan;
+}
+
 // Follows a ray through the triangles of cell after cell. The clearance at the border of two
 // triangles is computed once, so that no crossing falls between them.
 class Descent {
@@ -281,6 +310,25 @@ std::optional<Crossing> Surface::first_crossing(const GridRay& ray, double t_beg
     return true;
   });
   return crossing;
+}
+
+Surface::Rise Surface::rise(const GridRay& ray, double above_m, double t_end_m) const noexcept {
+  const Place first = start(ray, 0);
+  const double alone_m = rises_over_one(first.cell, ray, above_m);
+  if (alone_m <= t_end_m) return {alone_m, {}};
+  Descent descent(ray);
+  Rise rise;
+  walk(ray, 0, t_end_m, cell_extent, [&](const Place& place, double t_in, double t_out) {
+    const double rise_m = place.leaf == nullptr ? t_in : rises_to(place.cell, ray, above_m, t_in);
+    rise.begin_m = std::min(rise_m, t_out);
+    if (place.leaf != nullptr && descent.meets(place.cell, t_in, rise.begin_m)) {
+      rise.begin_m = descent.range_m();
+      rise.crossing = {descent.range_m(), descent.plane(), place.leaf->deviation_m, place.level};
+      return true;
+    }
+    return rise_m <= t_out;
+  });
+  return rise;
 }
 
 namespace {

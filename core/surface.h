@@ -24,6 +24,15 @@ class Surface {
   std::optional<Crossing> first_crossing(const GridRay& ray, double t_begin_m,
                                          double t_end_m) const noexcept;
 
+  /// How a ray that begins on the surface, or hardly above it, goes on.
+  struct Rise {
+    double begin_m = 0;                ///< it has met nothing up to here, or meets it here
+    std::optional<Crossing> crossing;  ///< what that is
+  };
+  /// Follows a ray, cell by cell, until it is `above_m` above the surface: from there on floats
+  /// place it on the right side.
+  Rise rise(const GridRay& ray, double above_m, double t_end_m) const noexcept;
+
   /// Where a ray meets the reference surface, as far as this one tells: the reference is nowhere
   /// farther from a leaf than the leaf's deviation.
   struct Band {

@@ -11,6 +11,8 @@ find_package(GDAL REQUIRED)
 find_package(yaml-cpp REQUIRED)
 find_package(nlohmann_json REQUIRED)
 find_package(tinyxml2 REQUIRED)
+# OpenCV is linked by the names of two of its libraries; its CMake files would need all of it.
+find_library(GROUNDRAY_OPENCV_IMGPROC opencv_imgproc REQUIRED)
 find_package(embree 4 QUIET)
 if(NOT embree_FOUND)
   find_package(embree 3.13 REQUIRED)

@@ -407,6 +407,20 @@ TEST(Bsdf, RoughDiffuseSurfaceKeepsItsReflectanceInLightFromEverywhere) {
   EXPECT_NEAR(mean, 0.3, 3e-4);  // midpoints: 1 / (4 steps^2) of 0.3, and the quadrature inside
 }
 
+// Midpoints of 24 cosines see each albedo's curve to 1 / (4 steps^2) of it; 1e-3 is promised.
+TEST(Bsdf, AlbedoIsTheShareOfLightFromEverywhereThatStaysOnItsSide) {
+  constexpr int steps = 24;
+  for (const Bsdf& bsdf : bsdfs_of(coloured_materials())) {
+    glm::dvec3 mean(0);
+    for (int i = 0; i < steps; ++i) {
+      const double cosine = (i + 0.5) / steps;
+      mean += 2 * cosine * albedo(bsdf, direction(cosine, 0)) / static_cast<double>(steps);
+    }
+    if (const auto* leaf = std::get_if<PlantLeafBsdf>(&bsdf.surface)) mean -= leaf->transmittance;
+    for (glm::length_t k = 0; k < 3; ++k) EXPECT_NEAR(bsdf.albedo()[k], mean[k], 1.5e-3);
+  }
+}
+
 TEST(Bsdf, RoughnessNoneIsLambertian) {
   const Bsdf smooth = bsdf_at(material("smooth", RoughDiffuse{flat(0.3), 0}), 905);
   for (std::uint32_t i = 0; i < 100; ++i) {

@@ -15,6 +15,7 @@
 #include <vector>
 
 #include "core/error.h"
+#include "core/exr_io.h"
 #include "core/product_io.h"
 #include "test/support/temporary_folder.h"
 // libjpeg's header needs <cstdio> before it.
@@ -63,7 +64,7 @@ std::string png_bytes(const Image8& image) {
 
 std::string exr_bytes(const ImageF& image, const std::vector<std::string>& channels) {
   const TemporaryFolder folder;
-  write_exr(folder / "a.exr", image, channels);
+  write_exr(folder / "a.exr", {{channels, &image}});
   return read_text(folder / "a.exr");
 }
 
@@ -208,7 +209,7 @@ TEST(ReadImageF, GivesBackWhatWasWrittenAsExr) {
     ImageF image(9, 5, static_cast<int>(channels.size()));
     float value = 0;
     for (float& v : image.values()) v = value += 0.37f;
-    write_exr(folder / "a.exr", image, channels);
+    write_exr(folder / "a.exr", {{channels, &image}});
     const ImageF read = read_image_f(folder / "a.exr");
     EXPECT_EQ(read.channels(), image.channels());
     EXPECT_EQ(read.width(), 9);

@@ -3,6 +3,7 @@
 #include <gtest/gtest.h>
 
 #include <cmath>
+#include <map>
 #include <set>
 #include <tuple>
 
@@ -48,6 +49,47 @@ TEST(Random, UniformNumbersStayInsideTheOpenInterval) {
     const glm::dvec2 u = random_uniform({Seed{6}, 0, 0, i});
     ASSERT_TRUE(0 < u.x && u.x < 1 && 0 < u.y && u.y < 1);
   }
+}
+
+// Pearson's chi-squared against the probabilities, in bins of at least 10 expected counts; their
+// statistic stays below its mean by 5 standard deviations (p = 3e-6 and less).
+TEST(RandomPoisson, HasPoissonsProbabilities) {
+  for (const double mean : {0.01, 0.7, 3.0, 9.99, 10.0, 35.0, 400.0}) {
+    constexpr int draws = 100'000;
+    std::map<int, int> counts;
+    for (std::uint32_t i = 0; i < draws; ++i)
+      ++counts[static_cast<int>(random_poisson({.seed = Seed{5}, .pulse = i}, mean))];
+    double chi2 = 0, expected = 0;
+    int bins = 0, seen = 0;
+    double left = draws;
+    for (int k = 0; left > 10; ++k) {
+      const double here = draws * std::exp(k * std::log(mean) - mean - std::lgamma(k + 1.0));
+      expected += here;
+      left -= here;
+      seen += counts[k];
+      if (expected < 10) continue;
+      chi2 += (seen - expected) * (seen - expected) / expected;
+      ++bins;
+      expected = 0;
+      seen = 0;
+    }
+    EXPECT_LT(chi2, bins + 5 * std::sqrt(2.0 * bins) + 5) << mean;
+  }
+}
+
+TEST(RandomPoisson, HasItsMeanAndVarianceAtLargeMeans) {
+  for (const double mean : {1e4, 1e7}) {
+    constexpr int draws = 20'000;
+    double sum = 0, squares = 0;
+    for (std::uint32_t i = 0; i < draws; ++i) {
+      const double off = random_poisson({.seed = Seed{6}, .pulse = i}, mean) - mean;
+      sum += off;
+      squares += off * off;
+    }
+    EXPECT_LT(std::abs(sum), 5 * std::sqrt(draws * mean));
+    EXPECT_NEAR(squares / draws, mean, 5 * mean * std::sqrt(2.0 / draws));
+  }
+  EXPECT_EQ(random_poisson({.seed = Seed{1}}, 0), 0);
 }
 
 }  // namespace

@@ -138,6 +138,51 @@ TEST(RayTracerProof, ExactTracingEqualsTheReferenceOnEveryRandomRay) {
   }
 }
 
+// Rays that leave what others met, a millionth of a metre above it, all over the hemisphere.
+std::vector<Ray> rays_from_surface(const HeightGrid& grid, std::size_t count, Seed seed) {
+  const RayTracer surface = tracer(grid, Tracing::Exact);
+  std::vector<Ray> rays;
+  for (const Ray& ray : random_rays(grid, count, seed)) {
+    Hit hit;
+    surface.trace({&ray, 1}, {&hit, 1});
+    if (!hit) continue;
+    const auto number = static_cast<std::uint32_t>(rays.size());
+    const glm::dvec2 u = random_uniform({.seed = seed, .pulse = number});
+    const double z = 2 * u.x - 1, radius = std::sqrt(1 - z * z);
+    const glm::dvec3 normal = glm::normalize(glm::dvec3(hit.normal));
+    glm::dvec3 direction(radius * std::cos(6.2831853 * u.y), radius * std::sin(6.2831853 * u.y), z);
+    if (glm::dot(direction, normal) < 0) direction = -direction;
+    rays.push_back({ray.origin + hit.range_m * ray.direction + 1e-6 * normal, direction});
+  }
+  return rays;
+}
+
+TEST(RayTracerProof, RaysFromTheSurfaceAreDecidedAsTheReferenceDoesInBatchesOfEveryKind) {
+  for (const auto& [name, dem] : terrains()) {
+    const HeightGrid& grid = dem.grid;
+    const auto rays = rays_from_surface(grid, proof_size(2'000, 100'000), Seed{12});
+    for (const Tracing tracing : {Tracing::Exact, Tracing::Fast}) {
+      const RayTracer surface = tracer(grid, tracing);
+      for (const Batch batch : {Batch::Alike, Batch::FromSurfaces, Batch::Scattered}) {
+        std::vector<Hit> hits(rays.size());
+        surface.trace(rays, hits, batch);
+        std::size_t met = 0;
+        for (std::size_t i = 0; i < rays.size(); ++i) {
+          const auto expected = trace_reference(grid, rays[i]);
+          met += expected.has_value();
+          ASSERT_TRUE(agrees(expected, hits[i]) ||
+                      (tracing == Tracing::Fast &&
+                       passes_silhouette(grid, rays[i], hits[i], float_slack_m(grid))))
+              << name << " ray " << i
+              << fmt::format(": {:.12g}", expected ? expected->range_m : -1.)
+              << fmt::format(" against {:.12g}", hits[i].range_m);
+        }
+        EXPECT_GT(met, rays.size() / 100) << name;
+      }
+    }
+  }
+}
+
 TEST(RayTracerProof, FastTracingDiffersOnlyAtSilhouettes) {
   for (const auto& [name, dem] : terrains()) {
     const HeightGrid& grid = dem.grid;
