@@ -1,5 +1,6 @@
 #include "sensors/material_io.h"
 
+#include <array>
 #include <optional>
 #include <utility>
 #include <vector>
@@ -162,6 +163,9 @@ Material parse_material(const std::string& text, const fs::path& path) {
   yaml::check_version(root, "groundray_material", faults);
   root.read_text("name", Need::Required, material.name);
   read_reflection(root, faults, material);
+  std::array<double, 3> emitted{};
+  root.read_numbers("emission_w_m2_sr", Need::Optional, emitted, not_negative);
+  material.emitted = {emitted[0], emitted[1], emitted[2]};
   check_sources(root, faults);
   root.close();
   faults.throw_if_any();

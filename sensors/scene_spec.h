@@ -12,6 +12,7 @@
 #include "core/random.h"
 #include "core/ray_tracer.h"
 #include "sensors/atmosphere.h"
+#include "sensors/camera/camera_spec.h"
 #include "sensors/lidar_spec.h"
 #include "sensors/sky.h"
 #include "sensors/world_spec.h"
@@ -43,6 +44,34 @@ struct MountedLidar {
   Pose X_BS;
 };
 
+/// A camera and where it sits.
+struct MountedCamera {
+  /// Images that a lidar triggers: one for each of its sweeps.
+  struct Trigger {
+    std::string lidar;
+    double delay_s = 0;  ///< from the sweep's stamp to the begin of the image
+  };
+
+  std::string name;    ///< as MountedLidar's, and different from all of theirs
+  std::string source;  ///< likewise
+  std::string text;    ///< of that file
+  CameraSpec camera;
+  Pose X_BC;
+  std::optional<Trigger> trigger;   ///< instead of the camera's own rate and first image
+  std::vector<std::string> lidars;  ///< whose echoes are shown in its images
+};
+
+/// Two cameras side by side.
+struct StereoSpec {
+  enum class Images {
+    AsMounted,
+    Rectified,  ///< as pinholes that look the same way, across their baseline
+  };
+  std::string name;
+  std::string left, right;  ///< names of cameras
+  Images images = Images::AsMounted;
+};
+
 /// A scene file, understood.
 struct SceneSpec {
   std::string text;  ///< the file as read
@@ -53,6 +82,8 @@ struct SceneSpec {
   AtmosphereSpec air;
   std::variant<RecordedPath, DrivenPath> platform;
   std::vector<MountedLidar> lidars;
+  std::vector<MountedCamera> cameras;
+  std::vector<StereoSpec> stereo;
   std::vector<ObjectSpec> objects;
   std::vector<ScatterLayer> scatter;
   std::optional<SkySpec> sky;

@@ -52,6 +52,8 @@ class Sky {
   glm::dvec3 radiance(const glm::dvec3& direction) const noexcept;
   /// Returns the same without the sun.
   glm::dvec3 dome_radiance(const glm::dvec3& direction) const noexcept;
+  /// Whether the dome is the same from everywhere.
+  bool is_constant_dome() const noexcept { return std::holds_alternative<ConstantSky>(dome_); }
   /// Returns what the dome shines with at the horizon below or above a direction.
   glm::dvec3 horizon_radiance(const glm::dvec3& direction) const noexcept;
 

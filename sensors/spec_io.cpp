@@ -1,18 +1,19 @@
 #include "sensors/spec_io.h"
 
-#include <fmt/ranges.h>
-
 #include <algorithm>
-#include <array>
 #include <cmath>
-#include <glm/trigonometric.hpp>
-#include <glm/vec3.hpp>
-#include <set>
+#include <span>
+#include <string_view>
+#include <system_error>
+#include <utility>
 
+#include "core/bsdf.h"
+#include "sensors/camera_reader.h"
 #include "sensors/cover_reader.h"
 #include "sensors/lidar.h"
 #include "sensors/lidar_reader.h"
 #include "sensors/material_reader.h"
+#include "sensors/mount_reader.h"
 #include "sensors/object_reader.h"
 #include "sensors/pattern_reader.h"
 #include "sensors/relief_reader.h"
@@ -97,91 +98,6 @@ std::variant<RecordedPath, DrivenPath> read_platform(Map platform, const fs::pat
   return result;
 }
 
-Pose read_mount(Map mount) {
-  Pose X_BS;
-  std::array<double, 3> translation{};
-  mount.read_numbers("translation_m", Need::Optional, translation);
-  X_BS.translation_m = {translation[0], translation[1], translation[2]};
-  glm::dvec3 angles_deg(0);
-  mount.read_number("yaw_deg", Need::Optional, angles_deg.x);
-  mount.read_number("pitch_deg", Need::Optional, angles_deg.y);
-  mount.read_number("roll_deg", Need::Optional, angles_deg.z);
-  mount.close();
-  const glm::dvec3 angles_rad = glm::radians(angles_deg);
-  X_BS.rotation = rotation_from_yaw_pitch_roll(angles_rad.x, angles_rad.y, angles_rad.z);
-  return X_BS;
-}
-
-// Reads the lidar that a scene's entry names by `preset` or `file`.
-void read_source(Map& entry, const fs::path& path, const fs::path& preset_folder,
-                 MountedLidar& mounted, Faults& faults) {
-  const Node* preset = entry.find("preset", Need::Optional);
-  const Node* file = entry.find("file", Need::Optional);
-  if (!preset == !file) {
-    faults.add(entry.node(), "lidars", "must have exactly one of 'preset' and 'file'");
-    return;
-  }
-  const Node& node = preset ? *preset : *file;
-  const std::string_view key = preset ? "preset" : "file";
-  if (!yaml::is_text(node, key, faults)) return;
-  mounted.source = node.text;
-  try {
-    const auto names = preset ? preset_names(preset_folder) : std::vector{node.text};
-    if (std::ranges::count(names, node.text) == 0) {
-      faults.add(node, key, "{} is not in {}{}; it has {}", yaml::shown(node),
-                 preset_folder.string(), yaml::suggestion(node.text, names),
-                 fmt::join(names, ", "));
-      return;
-    }
-    const fs::path place = preset ? preset_folder / (node.text + ".yaml") : beside(path, node.text);
-    mounted.text = yaml::read_file(place);
-    mounted.lidar = parse_lidar(mounted.text, place);
-  } catch (const Error& fault) {
-    faults.add(node, key, "the lidar cannot be read:\n{}", fault.what());
-  }
-}
-
-bool is_file_name(std::string_view name) {
-  return std::ranges::all_of(name, [](char c) {
-    return (c >= 'a' && c <= 'z') || (c >= 'A' && c <= 'Z') || (c >= '0' && c <= '9') || c == '_' ||
-           c == '-';
-  });
-}
-
-MountedLidar read_mounted(Map entry, const fs::path& path, const fs::path& preset_folder,
-                          Faults& faults) {
-  MountedLidar mounted;
-  if (const Node* at = entry.read_text("name", Need::Required, mounted.name);
-      at && !is_file_name(mounted.name)) {
-    faults.add(*at, "name", "is {}, but names files: use letters, digits, '_' and '-' alone",
-               yaml::shown(*at));
-  }
-  read_source(entry, path, preset_folder, mounted, faults);
-  if (auto mount = entry.map("mount", Need::Required)) mounted.X_BS = read_mount(std::move(*mount));
-  change_lidar(entry, path, mounted.lidar, faults);
-  entry.close();
-  return mounted;
-}
-
-std::vector<MountedLidar> read_lidars(Map& root, const fs::path& path,
-                                      const fs::path& preset_folder, Faults& faults) {
-  std::vector<MountedLidar> lidars;
-  std::set<std::string> names;
-  const auto entries = root.list("lidars", Need::Required);
-  for (const Node& entry : entries) {
-    lidars.push_back(read_mounted(Map(entry, "lidars", faults), path, preset_folder, faults));
-    const std::string& name = lidars.back().name;
-    if (!name.empty() && !names.insert(name).second) {
-      faults.add(entry, "name", "'{}' is taken by an earlier lidar: names must differ", name);
-    }
-  }
-  if (const Node* node = root.find("lidars", Need::Optional);
-      node && node->kind == Node::Kind::List && entries.empty()) {
-    faults.add(*node, "lidars", "is an empty list, but a scene needs at least one lidar");
-  }
-  return lidars;
-}
-
 // What no key alone can tell: whether the parts of a lidar, the air and the ground go together.
 void check_lidars(const SceneSpec& scene, const Node& node, std::span<const Node> entries,
                   Faults& faults) {
@@ -213,6 +129,44 @@ void check_lidars(const SceneSpec& scene, const Node& node, std::span<const Node
   }
 }
 
+// The ground's materials, from the lowest layer up.
+std::vector<const std::optional<Material>*> ground_materials(const TerrainSpec& terrain) {
+  std::vector<const std::optional<Material>*> materials{&terrain.material};
+  for (const CoverSpec& layer : terrain.cover) materials.push_back(&layer.material);
+  return materials;
+}
+
+// What cameras need of the scene.
+void check_cameras(const SceneSpec& scene, const Node& node, Faults& faults) {
+  if (scene.cameras.empty()) return;
+  const auto lit = std::ranges::find_if(
+      scene.cameras, [](const MountedCamera& mounted) { return needs_light(mounted.camera); });
+  if (lit != scene.cameras.end() && !scene.sky) {
+    faults.add(node, "sky",
+               "missing, but the camera '{}' sees light: give the scene a sky, or the camera "
+               "products without light, such as products: [truth]",
+               lit->name);
+  }
+  for (const std::optional<Material>* material : ground_materials(scene.terrain)) {
+    if (!*material) {
+      faults.add(node, "terrain",
+                 "must name a material, of each layer too, for the camera '{}' sees it: such as "
+                 "material: dry_soil",
+                 scene.cameras.front().name);
+      continue;
+    }
+    if ((*material)->emitted != glm::dvec3(0)) {
+      faults.add(node, "terrain", "of '{}' shines, but only objects can", (*material)->name);
+    }
+    try {
+      bsdf_in_colour(**material);
+    } catch (const Error& fault) {
+      faults.add(node, "terrain", "the camera '{}' cannot see it: {}", scene.cameras.front().name,
+                 fault.what());
+    }
+  }
+}
+
 // Lidars that do not say how much sunlight there is take the sun of the sky.
 void light_by_sky(SceneSpec& scene, std::span<const Node> entries, Faults& faults) {
   if (!scene.sky || !scene.sky->sun) return;
@@ -228,6 +182,23 @@ void light_by_sky(SceneSpec& scene, std::span<const Node> entries, Faults& fault
                  scene.lidars[i].name, fault.what());
     }
   }
+}
+
+// A camera's keys would all be unknown to a lidar.
+void refuse_camera(const Node& node, const fs::path& path) {
+  Faults faults(path);
+  const Node* const at = Map(node, "", faults).find("groundray_camera", Need::Optional);
+  if (!at) return;
+  faults.add(*at, "groundray_camera", "this is a camera, not a lidar: name it under 'cameras'");
+  faults.throw_if_any();
+}
+
+SensorKind kind_of(const fs::path& preset) {
+  constexpr std::string_view key = "groundray_camera:";
+  const std::string text = yaml::read_file(preset);
+  const bool is_camera =
+      text.starts_with(key) || text.find("\n" + std::string(key)) != std::string::npos;
+  return is_camera ? SensorKind::Camera : SensorKind::Lidar;
 }
 
 }  // namespace
@@ -257,7 +228,7 @@ SceneSpec parse_scene(const std::string& text, const fs::path& path,
   }
   if (auto weather = root.map("weather", Need::Optional))
     scene.air = read_air(std::move(*weather), faults);
-  scene.lidars = read_lidars(root, path, preset_folder, faults);
+  read_sensors(root, path, preset_folder, scene, faults);
   scene.objects = read_objects(root, path, folders, faults);
   scene.scatter = read_scatter(root, path, folders, faults);
   if (auto sky = root.map("sky", Need::Optional))
@@ -265,6 +236,7 @@ SceneSpec parse_scene(const std::string& text, const fs::path& path,
   const auto entries = root.list("lidars", Need::Optional);
   if (faults.count() == 0) light_by_sky(scene, entries, faults);
   if (faults.count() == 0) check_lidars(scene, node, entries, faults);
+  if (faults.count() == 0) check_cameras(scene, node, faults);
   root.close();
   faults.throw_if_any();
   return scene;
@@ -275,9 +247,22 @@ LidarSpec load_lidar(const fs::path& path) { return parse_lidar(yaml::read_file(
 LidarSpec parse_lidar(const std::string& text, const fs::path& path) {
   const Node node = yaml::parse(text, path);
   Faults faults(path);
+  refuse_camera(node, path);
   LidarSpec lidar = read_lidar(node, path, faults);
   faults.throw_if_any();
   return lidar;
+}
+
+CameraSpec load_camera(const fs::path& path) { return parse_camera(yaml::read_file(path), path); }
+
+CameraSpec parse_camera(const std::string& text, const fs::path& path) {
+  const Node node = yaml::parse(text, path);
+  Faults faults(path);
+  CameraSpec camera = read_camera(node, path, faults);
+  if (faults.count() == 0) check_rate(node, camera, faults);
+  if (faults.count() == 0) complete_camera(node, camera, faults);
+  faults.throw_if_any();
+  return camera;
 }
 
 std::vector<std::string> preset_names(const fs::path& preset_folder) {
@@ -291,6 +276,14 @@ std::vector<std::string> preset_names(const fs::path& preset_folder) {
                 fault.message());
   }
   std::ranges::sort(names);
+  return names;
+}
+
+std::vector<std::string> preset_names(const fs::path& preset_folder, SensorKind kind) {
+  std::vector<std::string> names = preset_names(preset_folder);
+  std::erase_if(names, [&](const std::string& name) {
+    return kind_of(preset_folder / (name + ".yaml")) != kind;
+  });
   return names;
 }
 

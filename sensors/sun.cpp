@@ -21,19 +21,26 @@ constexpr double limb_darkening[3][limb_powers] = {
 #include <sky/limb_darkening.inc>
 };
 
-// Radiance over its mean on the disc as it looks, of each channel. The disc's mean of mu^j is
-// 2 / (j + 2), for equal areas of it are equal steps of mu^2.
-glm::dvec3 relative_radiance(double mu) {
-  glm::dvec3 result;
-  for (int channel = 0; channel < 3; ++channel) {
-    double here = 0, mean = 0, power = 1;
-    for (int j = 0; j < limb_powers; ++j, power *= mu) {
-      here += limb_darkening[channel][j] * power;
-      mean += limb_darkening[channel][j] * 2 / (j + 2);
-    }
-    result[channel] = here / mean;
+// The means of the channels' polynomials over the disc as it looks: that of mu^j is 2 / (j + 2),
+// for equal areas of it are equal steps of mu^2.
+glm::dvec3 mean_darkening() {
+  glm::dvec3 mean(0);
+  for (glm::length_t channel = 0; channel < 3; ++channel) {
+    for (int j = 0; j < limb_powers; ++j) mean[channel] += limb_darkening[channel][j] * 2 / (j + 2);
   }
-  return result;
+  return mean;
+}
+
+// Radiance over its mean on the disc as it looks, of each channel.
+glm::dvec3 relative_radiance(double mu) {
+  static const glm::dvec3 mean = mean_darkening();
+  glm::dvec3 here(0);
+  for (glm::length_t channel = 0; channel < 3; ++channel) {
+    double power = 1;
+    for (int j = 0; j < limb_powers; ++j, power *= mu)
+      here[channel] += limb_darkening[channel][j] * power;
+  }
+  return here / mean;
 }
 
 SunPosition position_of(const SunSpec& spec, const ClearAir& air) {
@@ -73,43 +80,41 @@ Sun::Sun(const SunSpec& spec, const ClearAir& air) : air_(air), disc_(spec.disc)
   const SunPosition position = position_of(spec, air);
   direction_ = position.direction;
   distance_au_ = position.distance_au;
+  elevation_rad_ = std::atan2(direction_.z, std::hypot(direction_.x, direction_.y));
   radius_rad_ = std::asin(std::sin(radius_at_1_au_rad) / distance_au_);
   if (is_up()) {
     irradiance_ = direct_irradiance_rgb(elevation_rad(), air_) / (distance_au_ * distance_au_);
   }
+  const glm::dvec3 aside = std::abs(direction_.z) < 0.5 ? glm::dvec3(0, 0, 1) : glm::dvec3(1, 0, 0);
+  across_ = glm::normalize(glm::cross(aside, direction_));
+  up_ = glm::cross(direction_, across_);
+  depth_ = disc_depth(radius_rad_);
+  rim_squared_ = std::sin(radius_rad_) * std::sin(radius_rad_);
+  // Across the disc's centre the cosine-weighted solid angle is pi sin^2.
+  mean_radiance_ = irradiance_ / (pi * rim_squared_);
 }
 
-double Sun::elevation_rad() const noexcept {
-  return std::atan2(direction_.z, std::hypot(direction_.x, direction_.y));
-}
-
-double Sun::solid_angle_sr() const noexcept { return 2 * pi * disc_depth(radius_rad_); }
+double Sun::solid_angle_sr() const noexcept { return 2 * pi * depth_; }
 
 glm::dvec3 Sun::radiance(const glm::dvec3& direction) const noexcept {
   const double depth = versine(direction, direction_);
-  if (!is_up() || depth > disc_depth(radius_rad_)) return glm::dvec3(0);
-  // Across the disc's centre the cosine-weighted solid angle is pi sin^2, so this is its mean.
-  const double rim = std::sin(radius_rad_);
-  const glm::dvec3 mean = irradiance_ / (pi * rim * rim);
-  if (disc_ == SunDisc::Uniform) return mean;
-  const double off_center = depth * (2 - depth) / (rim * rim);  // sin^2 over that of the rim
-  return mean * relative_radiance(std::sqrt(std::max(1 - off_center, 0.0)));
+  if (!is_up() || depth > depth_) return glm::dvec3(0);
+  if (disc_ == SunDisc::Uniform) return mean_radiance_;
+  const double off_center = depth * (2 - depth) / rim_squared_;  // sin^2 over that of the rim
+  return mean_radiance_ * relative_radiance(std::sqrt(std::max(1 - off_center, 0.0)));
 }
 
 DirectionSample Sun::sample(const glm::dvec2& uniform) const noexcept {
   if (!is_up()) return {direction_, 0};
-  const double depth = uniform.x * disc_depth(radius_rad_);
+  const double depth = uniform.x * depth_;
   const double sine = std::sqrt(depth * (2 - depth));
   const double turn = 2 * pi * uniform.y;
-  const glm::dvec3 aside = std::abs(direction_.z) < 0.5 ? glm::dvec3(0, 0, 1) : glm::dvec3(1, 0, 0);
-  const glm::dvec3 u = glm::normalize(glm::cross(aside, direction_));
-  const glm::dvec3 v = glm::cross(direction_, u);
-  return {(1 - depth) * direction_ + sine * (std::cos(turn) * u + std::sin(turn) * v),
+  return {(1 - depth) * direction_ + sine * (std::cos(turn) * across_ + std::sin(turn) * up_),
           1 / solid_angle_sr()};
 }
 
 double Sun::pdf_per_sr(const glm::dvec3& direction) const noexcept {
-  if (!is_up() || versine(direction, direction_) > disc_depth(radius_rad_)) return 0;
+  if (!is_up() || versine(direction, direction_) > depth_) return 0;
   return 1 / solid_angle_sr();
 }
 

@@ -44,10 +44,10 @@ class Sun {
 
   /// To the centre of the disc, unit, axes of W (east, north, up).
   const glm::dvec3& direction() const noexcept { return direction_; }
-  double elevation_rad() const noexcept;
+  double elevation_rad() const noexcept { return elevation_rad_; }
   double angular_radius_rad() const noexcept { return radius_rad_; }
   double solid_angle_sr() const noexcept;
-  bool is_up() const noexcept { return elevation_rad() > -radius_rad_; }
+  bool is_up() const noexcept { return elevation_rad_ > -radius_rad_; }
 
   /// Irradiance of a plane across its rays, linear sRGB, W/m^2; see docs/sky.md for the unit.
   const glm::dvec3& irradiance() const noexcept { return irradiance_; }
@@ -68,9 +68,14 @@ class Sun {
   ClearAir air_;
   glm::dvec3 direction_;
   double distance_au_;
+  double elevation_rad_;
   double radius_rad_;
   glm::dvec3 irradiance_{0};
   SunDisc disc_;
+  glm::dvec3 across_, up_;    // with the direction, axes of the disc
+  double depth_;              // of the disc: 1 - cos of its radius
+  double rim_squared_;        // sin^2 of it
+  glm::dvec3 mean_radiance_;  // over the disc as it looks
 };
 
 /// Returns the irradiance, W/(m^2 nm), that the sun gives a plane across its rays, as

@@ -4,15 +4,12 @@
 #include <cmath>
 #include <cstddef>
 #include <glm/geometric.hpp>
-#include <numbers>
 
 #include "terrain/asset_builder.h"
 #include "terrain/asset_kinds.h"
 
 namespace groundray {
 namespace {
-
-constexpr double pi = std::numbers::pi;
 
 // Of blades, as shares of the tuft's height.
 constexpr double root_spread = 0.09, root_depth = 0.03, widest = 0.012;

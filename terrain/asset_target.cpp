@@ -2,7 +2,6 @@
 #include <algorithm>
 #include <cmath>
 #include <cstddef>
-#include <numbers>
 #include <vector>
 
 #include "terrain/asset_builder.h"
@@ -10,8 +9,6 @@
 
 namespace groundray {
 namespace {
-
-constexpr double pi = std::numbers::pi;
 
 // Even, and in quarters, so that the box is that of the circle.
 int sides_of(double at_usual, double detail) {

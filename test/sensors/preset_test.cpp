@@ -93,11 +93,12 @@ INSTANTIATE_TEST_SUITE_P(Presets, GoldenPoint, ::testing::ValuesIn(golden_points
 TEST(Preset, EveryFileHasAGoldenPoint) {
   std::set<std::string> tested;
   for (const Golden& golden : golden_points) tested.insert(golden.name);
-  EXPECT_THAT(preset_names(data_folder() / "sensors"), ::testing::ElementsAreArray(tested));
+  EXPECT_THAT(preset_names(data_folder() / "sensors", SensorKind::Lidar),
+              ::testing::ElementsAreArray(tested));
 }
 
 TEST(Preset, RingsAreNumberedFromZeroWithoutGaps) {
-  for (const std::string& name : preset_names(data_folder() / "sensors")) {
+  for (const std::string& name : preset_names(data_folder() / "sensors", SensorKind::Lidar)) {
     const auto beams = preset(name).beams;
     std::set<std::uint16_t> rings;
     for (const Beam& beam : beams) rings.insert(beam.ring);
@@ -109,7 +110,7 @@ TEST(Preset, RingsAreNumberedFromZeroWithoutGaps) {
 
 // But for the QT128, whose channels from 97 on are laid between others.
 TEST(Preset, VelodyneRingsRiseAndOthersFallWithElevation) {
-  for (const std::string& name : preset_names(data_folder() / "sensors")) {
+  for (const std::string& name : preset_names(data_folder() / "sensors", SensorKind::Lidar)) {
     auto beams = preset(name).beams;
     std::ranges::sort(beams, {}, &Beam::ring);
     if (name == "hesai_qt128") continue;

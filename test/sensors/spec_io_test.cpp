@@ -472,5 +472,172 @@ TEST(SceneFile, LightsLidarsByItsSun) {
   EXPECT_FALSE(parse(own).lidars[0].lidar.light->sun.direction);
 }
 
+constexpr const char* scene_cameras =
+    R"(cameras:
+  - name: left
+    preset: euroc_mav_cam0
+    mount: {translation_m: [1, 0.1, 1.2], yaw_deg: 90}
+    trigger: {lidar: top, delay_ms: 2.5}
+    project: [top]
+    shutter: {exposure_ms: 1}
+    aperture: {f_number: 2, focal_length_mm: 2.8, focus_m: 4}
+    sampling: {samples: 64}
+    products: [truth, flow]
+  - name: right
+    preset: euroc_mav_cam1
+    mount: {translation_m: [1, -0.1, 1.2]}
+    trigger: {lidar: top, delay_ms: 2.5}
+    products: [truth]
+  - name: road
+    preset: automotive_2mp3
+    mount: {}
+    rate_hz: 10
+    first_ms: 20
+    imager: {bits: 10, noise: off}
+    picture: {bits: 16}
+    products: [picture]
+stereo:
+  - {name: pair, left: left, right: right, images: rectified}
+)";
+
+std::string camera_scene() {
+  return with(scene_text, "label: 40", "label: 40\n  material: dry_soil") + scene_cameras +
+         "sky: {sun: {azimuth_deg: 90, elevation_deg: 30}}\n";
+}
+
+TEST(SceneFile, MountsCameras) {
+  const SceneSpec scene = parse(camera_scene());
+  ASSERT_EQ(scene.cameras.size(), 3u);
+  const MountedCamera &left = scene.cameras[0], &road = scene.cameras[2];
+  EXPECT_EQ(left.name, "left");
+  EXPECT_EQ(left.source, "euroc_mav_cam0");
+  EXPECT_THAT(left.text, HasSubstr("groundray_camera: 1"));
+  EXPECT_EQ(left.camera.size_px, glm::ivec2(752, 480));
+  EXPECT_EQ(left.camera.shutter.exposure_s, 1e-3);
+  EXPECT_EQ(left.camera.aperture->focus_m, 4);
+  EXPECT_EQ(left.camera.sampling.samples, 64);
+  EXPECT_THAT(left.camera.products,
+              ::testing::ElementsAre(CameraProduct::Truth, CameraProduct::Flow));
+  ASSERT_TRUE(left.trigger);
+  EXPECT_EQ(left.trigger->lidar, "top");
+  EXPECT_DOUBLE_EQ(left.trigger->delay_s, 2.5e-3);
+  EXPECT_THAT(left.lidars, ::testing::ElementsAre("top"));
+  EXPECT_FALSE(road.trigger);
+  EXPECT_EQ(road.camera.rate_hz, 10);
+  EXPECT_DOUBLE_EQ(road.camera.first_s, 20e-3);
+  EXPECT_EQ(road.camera.imager->bits, 10);
+  EXPECT_FALSE(road.camera.imager->noise);
+  EXPECT_EQ(road.camera.imager->black_dn, 168);  // the preset's
+  EXPECT_EQ(road.camera.picture.bits, 16);
+  ASSERT_EQ(scene.stereo.size(), 1u);
+  EXPECT_EQ(scene.stereo[0].name, "pair");
+  EXPECT_EQ(scene.stereo[0].left, "left");
+  EXPECT_EQ(scene.stereo[0].right, "right");
+  EXPECT_EQ(scene.stereo[0].images, StereoSpec::Images::Rectified);
+}
+
+// Axes of C in B by words: ahead is where the mount's x points, right its -y, down its -z.
+TEST(SceneFile, PointsCamerasAlongTheirMountsX) {
+  const auto expect_axes = [](const Pose& X_BC, const glm::dvec3& right, const glm::dvec3& down,
+                              const glm::dvec3& ahead) {
+    const double tolerance = 1e-15;  // three roundings of quaternions of sines and cosines
+    EXPECT_NEAR(glm::distance(X_BC.rotation * glm::dvec3(1, 0, 0), right), 0, tolerance);
+    EXPECT_NEAR(glm::distance(X_BC.rotation * glm::dvec3(0, 1, 0), down), 0, tolerance);
+    EXPECT_NEAR(glm::distance(X_BC.rotation * glm::dvec3(0, 0, 1), ahead), 0, tolerance);
+  };
+  const SceneSpec scene = parse(camera_scene());
+  expect_axes(scene.cameras[1].X_BC, {0, -1, 0}, {0, 0, -1}, {1, 0, 0});
+  expect_axes(scene.cameras[0].X_BC, {1, 0, 0}, {0, 0, -1}, {0, 1, 0});  // yaw 90: to the left
+  EXPECT_EQ(scene.cameras[0].X_BC.translation_m, glm::dvec3(1, 0.1, 1.2));
+}
+
+TEST(SceneFile, NeedsNoLidarIfItHasACamera) {
+  const std::string text = R"(groundray: 1
+seed: 0
+duration_s: 1
+terrain: {dem: /data/dem.tif, material: dry_soil}
+platform: {trajectory: path.tum}
+cameras: [{name: a, preset: tum_vi_cam0, mount: {}, products: [truth]}]
+)";
+  EXPECT_EQ(parse(text).cameras.size(), 1u);
+  EXPECT_THAT(scene_complaint(with(text, "cameras", "stereo")),
+              HasSubstr("key 'lidars': missing, but a scene needs at least one lidar or camera"));
+}
+
+TEST(SceneFile, SaysWhatIsWrongWithACamera) {
+  const auto complaint = [](std::string_view from, std::string_view to) {
+    return scene_complaint(with(camera_scene(), from, to));
+  };
+  EXPECT_EQ(scene_complaint(camera_scene()), "no complaint");
+  EXPECT_THAT(complaint("preset: automotive_2mp3", "preset: velodyne_vlp16"),
+              AllOf(HasSubstr("key 'preset': the camera cannot be read:"),
+                    HasSubstr("velodyne_vlp16.yaml:3:18: key 'groundray_lidar': this is a lidar, "
+                              "not a camera: name it under 'lidars'")));
+  EXPECT_THAT(complaint("preset: automotive_2mp3", "preset: automotive"),
+              Not(HasSubstr("key 'full_well_e': missing")));
+  EXPECT_THAT(complaint("preset: velodyne_vlp16", "preset: euroc_mav_cam0"),
+              AllOf(HasSubstr("key 'preset': the lidar cannot be read:"),
+                    HasSubstr("this is a camera, not a lidar: name it under 'cameras'")));
+  EXPECT_THAT(complaint("preset: euroc_mav_cam1", "preset: euroc_cam1"),
+              AllOf(HasSubstr("'euroc_cam1' is not in "),
+                    HasSubstr("it has action_camera, automotive_2mp3, euroc_mav_cam0"),
+                    Not(HasSubstr("velodyne"))));
+  EXPECT_THAT(complaint("name: right", "name: top"),
+              HasSubstr("key 'name': 'top' is taken by an earlier lidar: names must differ"));
+  EXPECT_THAT(complaint("name: pair", "name: left"),
+              HasSubstr("key 'name': 'left' is taken by an earlier camera"));
+  EXPECT_THAT(complaint("lidar: top", "lidar: tpo"),
+              HasSubstr("key 'lidar': is 'tpo', but the scene has the lidars top; did you mean"));
+  EXPECT_THAT(complaint("project: [top]", "project: [left]"),
+              HasSubstr("key 'project': is 'left', but the scene has the lidars top; that is a "
+                        "camera"));
+  EXPECT_THAT(complaint("project: [top]", "project: [top, top]"), HasSubstr("has 'top' twice"));
+  EXPECT_THAT(complaint("    project", "    rate_hz: 5\n    project"),
+              HasSubstr("key 'rate_hz': is of a camera that runs by itself"));
+  EXPECT_THAT(complaint("exposure_ms: 1", "exposure_ms: 0"),
+              HasSubstr("key 'exposure_ms': is 0, but must be > 0"));
+  EXPECT_THAT(complaint("    first_ms: 20", "    shutter: {exposure_ms: 101}"),
+              HasSubstr("key 'shutter': exposes for 101 ms, but an image begins every 100 ms"));
+  EXPECT_EQ(complaint("exposure_ms: 1", "exposure_ms: 101"), "no complaint");  // it is triggered
+  EXPECT_THAT(complaint("products: [truth, flow]", "products: [raw]"),
+              HasSubstr("key 'products': has 'raw', which needs an 'imager'"));
+}
+
+TEST(SceneFile, SaysWhatIsWrongWithAPair) {
+  const auto complaint = [](std::string_view from, std::string_view to) {
+    return scene_complaint(with(camera_scene(), from, to));
+  };
+  EXPECT_THAT(complaint("right: right", "right: rihgt"),
+              HasSubstr("key 'right': is 'rihgt', but the scene has the cameras left, right, road; "
+                        "did you mean 'right'?"));
+  EXPECT_THAT(complaint("right: right", "right: left"), HasSubstr("has the same camera twice"));
+  EXPECT_THAT(complaint("right: right", "right: road"),
+              HasSubstr("'left' and 'road' do not see at the same times"));
+  EXPECT_THAT(complaint("images: rectified", "images: rectifed"),
+              HasSubstr("must be one of as_mounted, rectified; did you mean 'rectified'?"));
+}
+
+TEST(SceneFile, NeedsAMaterialForCamerasAndASkyForThoseThatSeeLight) {
+  EXPECT_THAT(scene_complaint(with(camera_scene(), "  material: dry_soil\n", "")),
+              HasSubstr("key 'terrain': must name a material, of each layer too, for the camera"));
+  const std::string dark =
+      with(camera_scene(), "sky: {sun: {azimuth_deg: 90, elevation_deg: 30}}\n", "");
+  EXPECT_THAT(scene_complaint(dark), HasSubstr("key 'sky': missing, but the camera 'road' sees"));
+  EXPECT_EQ(scene_complaint(with(dark, "products: [picture]", "products: [truth]")),
+            "no complaint");
+  EXPECT_THAT(scene_complaint(with(dark, "products: [picture]", "products: [coverage]")),
+              HasSubstr("key 'sky': missing"));
+}
+
+TEST(PresetNames, AreOfTheKindAskedFor) {
+  const auto folder = data_folder() / "sensors";
+  const auto lidars = preset_names(folder, SensorKind::Lidar);
+  const auto cameras = preset_names(folder, SensorKind::Camera);
+  EXPECT_THAT(lidars, ::testing::Contains("sick_lms511"));
+  EXPECT_THAT(lidars, Not(::testing::Contains("tum_vi_cam1")));
+  EXPECT_THAT(cameras, ::testing::Contains("tum_vi_cam1"));
+  EXPECT_EQ(lidars.size() + cameras.size(), preset_names(folder).size());
+}
+
 }  // namespace
 }  // namespace groundray

@@ -153,6 +153,39 @@ TEST(TerrainSceneProof, RaysMeetTheSurfaceThatTheLeavesDefineAcrossSeamsToo) {
   }
 }
 
+// Alike is what the test above compares with the leaves.
+TEST(TerrainScene, RaysFromTheSurfaceMeetTheSameInBatchesOfEveryKindAcrossSeamsToo) {
+  for (const auto& [grid, settings] : small_cases()) {
+    const glm::dvec3 sensor = above(grid, {20, 30});
+    const Clipmap clipmap(certified_tiles(grid), grid.frame(), settings, sensor_at(sensor));
+    auto rays = rays_from(sensor, 2'000, Seed{58});
+    const auto others = random_rays(grid, 2'000, Seed{59});
+    rays.insert(rays.end(), others.begin(), others.end());
+    for (const Tracing tracing : modes) {
+      const RayTracer surface = build_tracer(clipmap, {0, 0, 0}, tracing);
+      const auto hits = trace(surface, rays);
+      std::vector<Ray> leaving;
+      for (std::size_t i = 0; i < rays.size(); ++i) {
+        if (!hits[i]) continue;
+        const glm::dvec3 normal(hits[i].normal);
+        const glm::dvec3 mirrored = glm::reflect(rays[(i * 7) % rays.size()].direction, normal);
+        const double side = glm::dot(mirrored, normal) < 0 ? -1 : 1;
+        leaving.push_back({rays[i].origin + hits[i].range_m * rays[i].direction + 1e-6 * normal,
+                           side * mirrored});
+      }
+      const auto expected = trace(surface, leaving);
+      for (const Batch batch : {Batch::FromSurfaces, Batch::Scattered}) {
+        std::vector<Hit> met(leaving.size());
+        surface.trace(leaving, met, batch);
+        std::size_t different = 0;
+        for (std::size_t i = 0; i < leaving.size(); ++i)
+          different += met[i].range_m != expected[i].range_m || met[i].part != expected[i].part;
+        EXPECT_LE(different, tracing == Tracing::Exact ? 0u : leaving.size() / 100'000 + 1);
+      }
+    }
+  }
+}
+
 // Points at samples, edges and within triangles of the mesh; many on seams between levels.
 std::vector<glm::dvec3> targets_on(const HeightGrid& grid,
                                    const std::vector<testing::SampleTriangle>& triangles,

@@ -1,0 +1,343 @@
+#include "sensors/camera/camera.h"
+
+#include <tbb/parallel_for.h>
+#include <tbb/task_arena.h>
+
+#include <algorithm>
+#include <bit>
+#include <cmath>
+#include <glm/geometric.hpp>
+#include <limits>
+#include <mutex>
+#include <numbers>
+#include <utility>
+#include <vector>
+
+#include "core/error.h"
+#include "core/luminance.h"
+#include "sensors/camera/pixel_patch.h"
+
+namespace groundray {
+namespace {
+
+using std::chrono::nanoseconds;
+
+constexpr int block_px = 4;  // side of the blocks of pixels that are traced one after the other
+constexpr std::size_t paths_at_once = 4096;
+
+nanoseconds time_of(double seconds) { return nanoseconds(std::llround(seconds * 1e9)); }
+
+// A point of the unit disc, by the map of squares to discs that keeps areas and neighbours.
+// @see Shirley and Chiu, A low distortion map between disk and square, JGT 2(3) (1997).
+glm::dvec2 on_disc(const glm::dvec2& u) {
+  const glm::dvec2 p = 2.0 * u - 1.0;
+  if (p.x == 0 && p.y == 0) return p;
+  constexpr double quarter = std::numbers::pi / 4;
+  const bool is_wide = std::abs(p.x) > std::abs(p.y);
+  const double radius = is_wide ? p.x : p.y;
+  const double angle_rad = is_wide ? quarter * (p.y / p.x) : quarter * (2 - p.x / p.y);
+  return radius * glm::dvec2(std::cos(angle_rad), std::sin(angle_rad));
+}
+
+// Which paths of a pixel are followed: those that its light is the mean of, or those before that
+// tell how many these must be. They share no numbers, so that the mean does not depend on what
+// they told.
+enum class Paths : std::uint32_t { OfMean, OfPilot };
+
+// Names the sequence of a pixel's paths in a frame.
+std::uint32_t sequence_of(const RandomKey& key, std::uint32_t pixel, Paths paths) {
+  return random_bits({.seed = key.seed,
+                      .sensor = key.sensor,
+                      .frame = key.frame,
+                      .pulse = pixel,
+                      .sub_ray = static_cast<std::uint32_t>(paths),
+                      .stream = RandomStream::Paths})[0];
+}
+
+// Sums over the paths of a pixel.
+struct Sums {
+  glm::dvec3 radiance{0}, squares{0};
+  int count = 0;
+  void add(const glm::dvec3& value) {
+    radiance += value;
+    squares += value * value;
+    ++count;
+  }
+  glm::dvec3 mean() const { return radiance / static_cast<double>(count); }
+  glm::dvec3 standard_error() const {
+    if (count < 2) return glm::dvec3(std::numeric_limits<double>::infinity());
+    const double n = count;
+    const glm::dvec3 spread = glm::max(squares / n - mean() * mean(), glm::dvec3(0));
+    return glm::sqrt(spread / (n - 1));
+  }
+};
+
+void check(const CameraSpec& spec) {
+  Violations broken("camera");
+  broken.unless(spec.rate_hz > 0 && std::isfinite(spec.rate_hz), "rate_hz = {} must be positive",
+                spec.rate_hz);
+  broken.unless(std::isfinite(spec.first_s), "first_s = {} must be finite", spec.first_s);
+  broken.unless(spec.shutter.exposure_s > 0 && spec.shutter.exposure_s <= 3600,
+                "exposure_s = {} must be positive and at most 3600", spec.shutter.exposure_s);
+  broken.unless(spec.shutter.row_s >= 0 && spec.shutter.row_s <= 1,
+                "row_s = {} must be from 0 to 1", spec.shutter.row_s);
+  const SamplingSpec& sampling = spec.sampling;
+  const auto is_power = [](int n) {
+    return n >= 1 && n <= 1 << 20 && std::has_single_bit(static_cast<unsigned>(n));
+  };
+  broken.unless(is_power(sampling.samples), "samples = {} must be a power of two up to 2^20",
+                sampling.samples);
+  broken.unless(is_power(sampling.most_samples) && sampling.most_samples >= sampling.samples,
+                "most_samples = {} must be a power of two, from samples up to 2^20",
+                sampling.most_samples);
+  broken.unless(sampling.relative_error >= 0 && std::isfinite(sampling.relative_error),
+                "relative_error = {} must be 0 or more", sampling.relative_error);
+  if (spec.aperture) {
+    const ApertureSpec& aperture = *spec.aperture;
+    broken.unless(aperture.focal_length_m > 0 && std::isfinite(aperture.focal_length_m),
+                  "focal_length_m = {} must be positive", aperture.focal_length_m);
+    broken.unless(aperture.f_number > 0 && std::isfinite(aperture.f_number),
+                  "f_number = {} must be positive", aperture.f_number);
+    broken.unless(!aperture.focus_m || *aperture.focus_m > aperture.focal_length_m,
+                  "focus_m = {} must be more than focal_length_m = {}",
+                  aperture.focus_m.value_or(0), aperture.focal_length_m);
+    broken.unless(aperture.transmission > 0 && aperture.transmission <= 1,
+                  "transmission = {} must be more than 0 and at most 1", aperture.transmission);
+    const glm::dvec3& v = aperture.vignetting;
+    broken.unless(std::isfinite(v.x + v.y + v.z), "vignetting = [{}, {}, {}] must be finite", v.x,
+                  v.y, v.z);
+  }
+  broken.throw_if_any();
+}
+
+CameraSpec checked(CameraSpec spec) {
+  check(spec);
+  return spec;
+}
+
+}  // namespace
+
+struct Camera::Directions {
+  std::once_flag asked_for;
+  std::vector<glm::dvec3> all;
+};
+
+Camera::Camera(const CameraSpec& spec)
+    : spec_(checked(spec)),
+      lens_(spec.lens, spec.size_px),
+      directions_(std::make_shared<Directions>()) {}
+
+std::span<const glm::dvec3> Camera::directions() const {
+  std::vector<glm::dvec3>& all = directions_->all;
+  const auto find = [&] {
+    const auto width = static_cast<std::size_t>(spec_.size_px.x);
+    all.resize(width * static_cast<std::size_t>(spec_.size_px.y));
+    // Isolated: a thread that waits here must not take on work that waits for it.
+    tbb::this_task_arena::isolate([&] {
+      tbb::parallel_for(0, spec_.size_px.y, [&](int row) {
+        std::vector<PixelRay> rays(width);
+        lens_.fill(row, row + 1, rays);
+        std::ranges::transform(rays, all.begin() + static_cast<std::ptrdiff_t>(width) * row,
+                               &PixelRay::direction);
+      });
+    });
+  };
+  std::call_once(directions_->asked_for, find);
+  return all;
+}
+
+nanoseconds Camera::duration() const noexcept {
+  return time_of(spec_.shutter.row_s * (spec_.size_px.y - 1) + spec_.shutter.exposure_s);
+}
+
+nanoseconds Camera::middle_of(double row) const noexcept {
+  return time_of(spec_.shutter.row_s * row + spec_.shutter.exposure_s / 2);
+}
+
+// Makes the light of some rows.
+class Camera::Rows {
+ public:
+  Rows(const Camera& camera, const PathTracer& light, const Trajectory& X_DC, nanoseconds begin,
+       const RandomKey& key, std::span<const std::uint16_t> labels, int first, int end,
+       Exposure& into)
+      : spec_(camera.spec_),
+        light_(light),
+        X_DC_(X_DC),
+        begin_(begin),
+        key_(key),
+        labels_(labels),
+        width_(spec_.size_px.x),
+        first_(first),
+        end_(end),
+        rays_(camera.lens_, first, end),
+        sums_(static_cast<std::size_t>(end - first) * static_cast<std::size_t>(width_)),
+        into_(into) {}
+
+  void expose() {
+    const std::vector<glm::ivec2> pixels = looking();
+    const SamplingSpec& sampling = spec_.sampling;
+    std::vector<int> counts(pixels.size(), sampling.samples);
+    if (sampling.most_samples > sampling.samples) {
+      for (const glm::ivec2& pixel : pixels) add_samples(pixel, sampling.samples, Paths::OfPilot);
+      trace(Paths::OfPilot);
+      std::ranges::transform(pixels, counts.begin(),
+                             [&](const glm::ivec2& pixel) { return needed(sums_of(pixel)); });
+      std::ranges::fill(sums_, Sums{});
+    }
+    for (std::size_t i = 0; i < pixels.size(); ++i)
+      add_samples(pixels[i], counts[i], Paths::OfMean);
+    trace(Paths::OfMean);
+    tell();
+  }
+
+ private:
+  Sums& sums_of(const glm::ivec2& pixel) {
+    return sums_[static_cast<std::size_t>(pixel.y - first_) * static_cast<std::size_t>(width_) +
+                 static_cast<std::size_t>(pixel.x)];
+  }
+  // Pixels whose centres look somewhere, block by block: neighbours' rays are alike.
+  std::vector<glm::ivec2> looking() const {
+    std::vector<glm::ivec2> pixels;
+    for (int left = 0; left < width_; left += block_px) {
+      for (int y = first_; y < end_; ++y) {
+        for (int x = left; x < std::min(left + block_px, width_); ++x) {
+          if (rays_.looks({x, y})) pixels.emplace_back(x, y);
+        }
+      }
+    }
+    return pixels;
+  }
+  // How many paths bring the error of a mean to what is asked for, by those of the pilot.
+  int needed(const Sums& pilot) const {
+    const SamplingSpec& sampling = spec_.sampling;
+    double error = luminance(pilot.standard_error());
+    int count = sampling.samples;
+    while (count < sampling.most_samples &&
+           !(error <= sampling.relative_error * luminance(pilot.mean()))) {
+      count *= 2;
+      error /= std::numbers::sqrt2;
+    }
+    return count;
+  }
+  void add_samples(const glm::ivec2& pixel, int count, Paths paths);
+  void trace(Paths paths);
+  void tell();
+
+  const CameraSpec& spec_;
+  const PathTracer& light_;
+  const Trajectory& X_DC_;
+  nanoseconds begin_;
+  const RandomKey& key_;
+  std::span<const std::uint16_t> labels_;
+  int width_, first_, end_;
+  RayRows rays_;
+  std::vector<Sums> sums_;
+  Exposure& into_;
+  std::vector<PathTracer::Sample> samples_;
+  std::vector<glm::ivec2> pixel_of_;  // of each sample
+  std::vector<glm::vec3> radiance_;
+  std::vector<std::uint16_t> seen_;  // label, of each sample
+  PathTracer::Workspace work_;
+};
+
+void Camera::Rows::add_samples(const glm::ivec2& pixel, int count, Paths paths) {
+  const PixelPatch patch = rays_.patch(pixel);
+  const std::uint32_t sequence =
+      sequence_of(key_, static_cast<std::uint32_t>(pixel.y * width_ + pixel.x), paths);
+  const ShutterSpec& shutter = spec_.shutter;
+  for (int i = 0; i < count; ++i) {
+    SobolPairs numbers(sequence, static_cast<std::uint32_t>(i));
+    auto direction = patch.direction(numbers.next() - 0.5);
+    const glm::dvec2 pupil = numbers.next();
+    const double share = numbers.next().x;
+    if (!direction) continue;
+    glm::dvec3 origin(0);
+    if (spec_.aperture && spec_.aperture->focus_m && direction->z > 0) {
+      const ApertureSpec& aperture = *spec_.aperture;
+      origin = glm::dvec3(on_disc(pupil) * (aperture.focal_length_m / aperture.f_number / 2), 0);
+      direction = glm::normalize(*direction - origin * (direction->z / *aperture.focus_m));
+    }
+    const nanoseconds time = begin_ + time_of(shutter.row_s * pixel.y + shutter.exposure_s * share);
+    const Pose X_DC = X_DC_.pose_at(time);
+    samples_.push_back(
+        {{X_DC * origin, X_DC.rotation * *direction, std::numeric_limits<double>::infinity(), time},
+         numbers});
+    pixel_of_.push_back(pixel);
+    if (samples_.size() == paths_at_once) trace(paths);
+  }
+}
+
+void Camera::Rows::trace(Paths paths) {
+  radiance_.resize(samples_.size());
+  const bool is_labelled = !labels_.empty() && paths == Paths::OfMean;
+  seen_.resize(is_labelled ? samples_.size() : 0);
+  light_.trace(samples_, radiance_, work_, seen_);
+  for (std::size_t i = 0; i < samples_.size(); ++i) {
+    sums_of(pixel_of_[i]).add(glm::dvec3(radiance_[i]));
+    if (!is_labelled) continue;
+    const auto label = std::ranges::lower_bound(labels_, seen_[i]);
+    if (label != labels_.end() && *label == seen_[i])
+      into_.coverage.at(pixel_of_[i].x,
+                        pixel_of_[i].y)[static_cast<std::size_t>(label - labels_.begin())] += 1;
+  }
+  samples_.clear();
+  pixel_of_.clear();
+}
+
+void Camera::Rows::tell() {
+  for (int y = first_; y < end_; ++y) {
+    for (int x = 0; x < width_; ++x) {
+      const Sums& sums = sums_of({x, y});
+      if (sums.count == 0) continue;
+      const glm::dvec3 mean = sums.mean(), error = sums.standard_error();
+      for (glm::length_t k = 0; k < 3; ++k) {
+        const auto channel = static_cast<std::size_t>(k);
+        into_.radiance.at(x, y)[channel] = static_cast<float>(mean[k]);
+        into_.standard_error.at(x, y)[channel] = static_cast<float>(error[k]);
+      }
+      into_.samples.at(x, y)[0] = static_cast<float>(sums.count);
+      if (labels_.empty()) continue;
+      for (float& share : into_.coverage.at(x, y)) share /= static_cast<float>(sums.count);
+    }
+  }
+}
+
+Exposure Camera::expose(const PathTracer& light, const Trajectory& X_DC, nanoseconds begin,
+                        const RandomKey& key, std::span<const std::uint16_t> labels,
+                        const std::function<void()>& check) const {
+  check_cover(X_DC, begin);
+  const int width = spec_.size_px.x, height = spec_.size_px.y;
+  Exposure exposure{
+      ImageF(width, height, 3), ImageF(width, height, 3), ImageF(width, height, 1),
+      labels.empty() ? ImageF() : ImageF(width, height, static_cast<int>(labels.size()))};
+  tbb::parallel_for(0, (height + block_px - 1) / block_px, [&](int block) {
+    if (check) check();
+    const int first = block * block_px;
+    Rows(*this, light, X_DC, begin, key, labels, first, std::min(first + block_px, height),
+         exposure)
+        .expose();
+  });
+  return exposure;
+}
+
+void Camera::check_cover(const Trajectory& X_DC, nanoseconds begin) const {
+  if (X_DC.begin_time() <= begin && begin + duration() <= X_DC.end_time()) return;
+  const auto seconds = [](nanoseconds time) { return 1e-9 * static_cast<double>(time.count()); };
+  throw Error(
+      "camera: an image is exposed from {:.6f} s to {:.6f} s but the camera's trajectory covers "
+      "[{:.6f}, {:.6f}] s",
+      seconds(begin), seconds(begin + duration()), seconds(X_DC.begin_time()),
+      seconds(X_DC.end_time()));
+}
+
+std::vector<std::uint16_t> labels_of(const Scene& scene) {
+  std::vector<std::uint16_t> labels{0};
+  if (scene.cover.empty()) labels.push_back(scene.terrain.label);
+  for (const CoverLayer& layer : scene.cover.layers()) labels.push_back(layer.label);
+  for (const ModelTruth& model : scene.models) labels.push_back(model.label);
+  std::ranges::sort(labels);
+  labels.erase(std::ranges::unique(labels).begin(), labels.end());
+  return labels;
+}
+
+}  // namespace groundray

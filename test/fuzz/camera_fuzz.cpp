@@ -1,0 +1,25 @@
+#include <cstddef>
+#include <cstdint>
+#include <string>
+
+#include "core/error.h"
+#include "sensors/camera/calibration.h"
+#include "sensors/camera/lens.h"
+#include "sensors/spec_io.h"
+
+// Whatever the bytes, reading them as a camera or as calibrations gives those or an Error, and a
+// lens that is read images the rays of its pixels or has none: no crash, no hang.
+extern "C" int LLVMFuzzerTestOneInput(const std::uint8_t* data, std::size_t size) {
+  const std::string text(reinterpret_cast<const char*>(data), size);
+  try {
+    const groundray::CameraSpec camera = groundray::parse_camera(text, "camera.yaml");
+    const groundray::Lens lens(camera.lens, camera.size_px);
+    if (const auto ray = lens.ray({0, 0})) lens.project(ray->direction);
+  } catch (const groundray::Error&) {
+  }
+  try {
+    groundray::parse_camera_calibrations(text, "calibration");
+  } catch (const groundray::Error&) {
+  }
+  return 0;
+}

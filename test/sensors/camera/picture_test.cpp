@@ -1,0 +1,180 @@
+#include "sensors/camera/picture.h"
+
+#include <gmock/gmock.h>
+#include <gtest/gtest.h>
+
+#include <algorithm>
+#include <array>
+#include <cmath>
+#include <limits>
+#include <random>
+
+#include "core/error.h"
+#include "core/srgb.h"
+
+namespace groundray {
+namespace {
+
+using ::testing::AllOf;
+using ::testing::Each;
+using ::testing::HasSubstr;
+using ::testing::ThrowsMessage;
+using enum PictureSpec::Encoding;
+
+constexpr std::array mosaics{ColorFilter::Rggb, ColorFilter::Bggr, ColorFilter::Grbg,
+                             ColorFilter::Gbrg};
+
+// What raw images of a colour are: the same number on all pixels that see the same.
+Image16 mosaic_of(ColorFilter filter, glm::ivec2 size_px, std::array<std::uint16_t, 3> color) {
+  Image16 raw(size_px.x, size_px.y, 1);
+  for (int y = 0; y < size_px.y; ++y) {
+    for (int x = 0; x < size_px.x; ++x)
+      raw.at(x, y)[0] = color[static_cast<std::size_t>(channel_of(filter, {x, y}))];
+  }
+  return raw;
+}
+
+TEST(Picture, OfAConstantColourIsConstantInEveryPixel) {
+  const ImagerSpec imager{.full_well_e = 1e4, .gain_dn_e = 0.4, .black_dn = 64};  // white: 4000
+  const PictureSpec spec{.encoding = Linear, .bits = 16, .gains = glm::dvec3(2, 1, 1.5)};
+  for (const ColorFilter filter : mosaics) {
+    ImagerSpec sensor = imager;
+    sensor.filter = filter;
+    const RawDeveloper developer(spec, sensor);
+    for (const glm::ivec2 size_px : {glm::ivec2(3, 3), glm::ivec2(37, 20), glm::ivec2(64, 5)}) {
+      const auto picture =
+          std::get<Image16>(developer.develop(mosaic_of(filter, size_px, {1064, 3064, 664})));
+      ASSERT_EQ(picture.channels(), 3);
+      for (int y = 0; y < size_px.y; ++y) {
+        for (int x = 0; x < size_px.x; ++x) {
+          ASSERT_EQ(picture.at(x, y)[0], 32768) << x << ", " << y;  // 2 * 1000 / 4000 of 65535
+          ASSERT_EQ(picture.at(x, y)[1], 49151) << x << ", " << y;
+          ASSERT_EQ(picture.at(x, y)[2], 14745) << x << ", " << y;
+        }
+      }
+    }
+  }
+}
+
+// A pixel that does not see a colour has the mean of the nearest that do: 2 or 4.
+double bilinear(const Image16& raw, ColorFilter filter, glm::ivec2 at, int channel) {
+  if (channel_of(filter, at) == channel) return raw.at(at.x, at.y)[0];
+  for (const int distance2 : {1, 2}) {
+    double sum = 0;
+    int count = 0;
+    for (int dy = -1; dy <= 1; ++dy) {
+      for (int dx = -1; dx <= 1; ++dx) {
+        const glm::ivec2 near(at.x + dx, at.y + dy);
+        if (dx * dx + dy * dy != distance2 || channel_of(filter, near) != channel) continue;
+        sum += raw.at(near.x, near.y)[0];
+        ++count;
+      }
+    }
+    if (count > 0) return sum / count;
+  }
+  return std::numeric_limits<double>::quiet_NaN();
+}
+
+TEST(Picture, InterpolatesColoursBilinearlyInsideOfAMosaic) {
+  std::mt19937 random(3);
+  Image16 raw(53, 31, 1);
+  for (std::uint16_t& value : raw.values()) value = static_cast<std::uint16_t>(random());
+  for (const ColorFilter filter : mosaics) {
+    const RawDeveloper developer({.encoding = Linear, .bits = 16, .gains = glm::dvec3(1)},
+                                 {.filter = filter, .full_well_e = 1e6, .bits = 16});
+    const auto picture = std::get<Image16>(developer.develop(raw));
+    for (int y = 1; y < 30; ++y) {
+      for (int x = 1; x < 52; ++x) {
+        for (int channel = 0; channel < 3; ++channel) {
+          // Means are rounded to the next number.
+          ASSERT_NEAR(picture.at(x, y)[static_cast<std::size_t>(channel)],
+                      bilinear(raw, filter, {x, y}, channel), 0.5)
+              << x << ", " << y << " channel " << channel;
+        }
+      }
+    }
+  }
+}
+
+// Sums of 12 bits keep their fractions: a mean of 2 or 4 numbers is exact.
+TEST(Picture, RoundsButOnce) {
+  Image16 raw(5, 5, 1);
+  raw.at(2, 1)[0] = 1;  // one of the four greens about (2, 2), red in RGGB
+  const RawDeveloper developer({.encoding = Linear, .bits = 16, .gains = glm::dvec3(1)},
+                               {.full_well_e = 4095, .gain_dn_e = 1});
+  const auto picture = std::get<Image16>(developer.develop(raw));
+  EXPECT_EQ(picture.at(2, 2)[1], 4);  // 65535 / 4095 / 4
+}
+
+TEST(Picture, EncodesAsIec61966Does) {
+  // Linear values and what they are encoded as, from the standard's two equations: at the ends, on
+  // both sides of where they meet, and at the 18 % of a grey card.
+  constexpr std::array<std::pair<double, double>, 6> table{{{0, 0},
+                                                            {0.001, 0.01292},
+                                                            {0.0031308, 0.0404499},
+                                                            {0.18, 0.461356},
+                                                            {0.5, 0.735357},
+                                                            {1, 1}}};
+  for (const auto& [linear, encoded] : table) EXPECT_NEAR(srgb_of_linear(linear), encoded, 5e-7);
+  // Each of the 256 codes comes back from its linear value, as 16 bits of a raw image.
+  const ImagerSpec sensor{
+      .filter = ColorFilter::Mono, .full_well_e = 65535, .gain_dn_e = 1, .bits = 16};
+  const RawDeveloper developer({.encoding = Srgb, .bits = 8}, sensor);
+  Image16 raw(256, 1, 1);
+  for (int code = 0; code < 256; ++code) {
+    raw.at(code, 0)[0] =
+        static_cast<std::uint16_t>(std::lround(65535 * linear_of_srgb(code / 255.0)));
+  }
+  const auto picture = std::get<Image8>(developer.develop(raw));
+  for (int code = 0; code < 256; ++code) EXPECT_EQ(picture.at(code, 0)[0], code);
+}
+
+// The whole way: light of equal red, green and blue through filters of different efficiency.
+TEST(Picture, ShowsGreySurfacesAsGreyAndFullPixelsAsWhite) {
+  for (const ColorFilter filter : mosaics) {
+    const ImagerSpec spec{
+        .filter = filter, .quantum_efficiency = {0.4, 0.6, 0.3}, .black_dn = 100, .noise = false};
+    const Imager imager(spec, 0.01);
+    const RawDeveloper developer({.encoding = Linear, .bits = 16}, spec);
+    EXPECT_EQ(developer.gains(), glm::dvec3(0.6 / 0.4, 1, 0.6 / 0.3));
+    const auto picture_in = [&](float w_m2) {
+      ImageF light(6, 6, 3);
+      std::ranges::fill(light.values(), w_m2);
+      return std::get<Image16>(
+          developer.develop(imager.digital(imager.electrons(imager.photons(light), {}), {})));
+    };
+    const Image16 grey = picture_in(0.02f), white = picture_in(10);
+    const double electrons = 0.02 * 3.45e-6 * 3.45e-6 * 0.01 / 3.5792e-19 * 0.6;
+    // Raw numbers are rounded: half of one of 3995 from black to the top, times the gain.
+    for (const std::uint16_t value : grey.values())
+      EXPECT_NEAR(value, 65535 * electrons * 0.4 / 3995, 65535 / 3995.0);
+    EXPECT_THAT(white.values(), Each(65535));
+  }
+}
+
+TEST(Picture, OfAMonochromeSensorIsGrey) {
+  ImagerSpec spec{.filter = ColorFilter::Mono, .full_well_e = 1e4, .gain_dn_e = 0.4};
+  Image16 raw(2, 1, 1);
+  raw.at(0, 0)[0] = 2000;
+  raw.at(1, 0)[0] = 4095;
+  const auto picture =
+      std::get<Image8>(RawDeveloper({.encoding = Linear, .bits = 8}, spec).develop(raw));
+  EXPECT_EQ(picture.channels(), 1);
+  EXPECT_THAT(picture.values(), ::testing::ElementsAre(128, 255));
+}
+
+TEST(Picture, SaysWhatIsWrong) {
+  EXPECT_THAT([] { RawDeveloper({.bits = 12, .gains = glm::dvec3(1, 0, 1)}, {}); },
+              ThrowsMessage<Error>(AllOf(HasSubstr("bits = 12 must be 8 or 16"),
+                                         HasSubstr("gain 0 must be positive"))));
+  EXPECT_THAT([] { RawDeveloper({}, {.full_well_e = 1, .gain_dn_e = 0.1}); },
+              ThrowsMessage<Error>(HasSubstr("raise gain_dn_e")));
+  const RawDeveloper developer({}, {});
+  EXPECT_THAT([&] { developer.develop(Image16(4, 4, 3)); },
+              ThrowsMessage<Error>(HasSubstr("has 1 channel, but this one 3")));
+  EXPECT_THAT([&] { developer.develop(Image16(4, 2, 1)); },
+              ThrowsMessage<Error>(HasSubstr("a mosaic of 4 x 2 px has not all colours")));
+}
+
+}  // namespace
+}  // namespace groundray
