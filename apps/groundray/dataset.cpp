@@ -2,6 +2,7 @@
 
 #include <fmt/format.h>
 
+#include <algorithm>
 #include <array>
 #include <chrono>
 #include <cmath>
@@ -14,7 +15,9 @@
 #include <string>
 #include <string_view>
 
+#include "apps/groundray/calibration_text.h"
 #include "apps/groundray/fingerprint.h"
+#include "apps/groundray/images.h"
 #include "core/error.h"
 #include "core/product_io.h"
 
@@ -25,67 +28,22 @@ namespace fs = std::filesystem;
 
 constexpr std::string_view frames = "\nframes:\n";  // what precedes it says what run this is
 
-double degrees(double angle_rad) { return angle_rad * 180 / std::numbers::pi; }
-
-// A double-quoted YAML scalar.
-std::string yaml_text(std::string_view text) {
-  std::string out = "\"";
-  for (const char c : text) {
-    if (c == '"' || c == '\\') out += '\\';
-    if (c == '\n') {
-      out += "\\n";
-    } else if (static_cast<unsigned char>(c) < 0x20) {
-      out += fmt::format("\\x{:02x}", static_cast<unsigned>(c));
-    } else {
-      out += c;
-    }
-  }
-  return out + "\"";
-}
-
-std::string spinning_text(const SpinningPattern& pattern) {
-  const auto& field = pattern.field_of_view;
-  const std::string view = field ? fmt::format("field_of_view_deg: [{}, {}]\n",
-                                               degrees(field->from_rad), degrees(field->to_rad))
-                                 : "";
-  std::string text = fmt::format(
-      "rotation_rate_hz: {}\nsense: {}\nstart_azimuth_deg: {}\nfiring_period_us: {}\n"
-      "{}beam_columns: [loop, ring, elevation_deg, azimuth_offset_deg, origin_x_m, origin_y_m, "
-      "origin_z_m, firing_time_us]\nbeams:\n",
-      pattern.rate_hz,
-      pattern.sense == SpinningPattern::Sense::Clockwise ? "clockwise" : "counter_clockwise",
-      degrees(pattern.start_azimuth_rad), pattern.firing_period_s * 1e6, view);
-  for (const Beam& beam : pattern.beams) {
-    text +=
-        fmt::format("- [{}, {}, {:.9g}, {:.9g}, {:.9g}, {:.9g}, {:.9g}, {:.9g}]\n", beam.loop,
-                    beam.ring, degrees(beam.elevation_rad), degrees(beam.azimuth_offset_rad),
-                    beam.origin_m.x, beam.origin_m.y, beam.origin_m.z, beam.firing_time_s * 1e6);
-  }
-  return text;
-}
-
-// All else is told by the text of the lidar's own file, and by the scene's.
-std::string calibration(const PlacedLidar& placed) {
-  const LidarSpec& lidar = placed.spec.lidar;
-  const Pose& X_BS = placed.spec.X_BS;
-  std::string text = fmt::format(
-      "model: {}\nframe: \"x forward, y left, z up\"\nX_BS:  # pose of the sensor in the body\n  "
-      "translation_m: [{}, {}, {}]\n  rotation_xyzw: [{}, {}, {}, {}]\nrange_gate_m: [{}, {}]\n"
-      "range_noise_sigma_m: {}\n",
-      yaml_text(lidar.model), X_BS.translation_m.x, X_BS.translation_m.y, X_BS.translation_m.z,
-      X_BS.rotation.x, X_BS.rotation.y, X_BS.rotation.z, X_BS.rotation.w, lidar.gate.near_m,
-      std::isinf(lidar.gate.far_m) ? ".inf" : fmt::format("{}", lidar.gate.far_m),
-      lidar.range_noise_sigma_m);
-  if (const auto* spinning = std::get_if<SpinningPattern>(&lidar.pattern))
-    text += spinning_text(*spinning);
-  return text + fmt::format("lidar_file: {}\n", yaml_text(placed.spec.text));
-}
-
 // Seconds to the nanosecond, whatever the clock's epoch.
 std::string decimal_seconds(std::chrono::nanoseconds time) {
   const std::int64_t count = time.count();
   return fmt::format("{}{}.{:09}", count < 0 ? "-" : "", std::abs(count / 1'000'000'000),
                      std::abs(count % 1'000'000'000));
+}
+
+// A lens by where some pixels look: it may come from a file that the camera's only names.
+void add_lens(const Lens& lens, Fingerprint& print) {
+  constexpr int steps = 8;
+  for (int i = 0; i <= steps * steps; ++i) {
+    const glm::dvec2 share(i % steps, i / steps);
+    const auto ray = lens.ray(share * glm::dvec2(lens.size_px() - 1) / double{steps});
+    const glm::dvec3 direction = ray ? ray->direction : glm::dvec3(0);
+    print.add_all(direction.x, direction.y, direction.z);
+  }
 }
 
 std::uint64_t fingerprint(const World& world) {
@@ -95,7 +53,7 @@ std::uint64_t fingerprint(const World& world) {
   print.add(std::span<const char>(world.terrain.fingerprint()));
   for (const PlacedLidar& lidar : world.lidars) {
     print.add(std::span(lidar.X_DS.samples()));
-    print.add(std::span<const char>(calibration(lidar)));
+    print.add(std::span<const char>(calibration_text(lidar)));
     if (const auto* table = std::get_if<TablePattern>(&lidar.spec.lidar.pattern)) {
       for (const auto& [time_s, azimuth_rad, elevation_rad, ring, origin_m] : table->shots) {
         const std::array numbers{time_s, azimuth_rad, elevation_rad};
@@ -103,6 +61,15 @@ std::uint64_t fingerprint(const World& world) {
         print.add(std::span<const std::uint16_t>(&ring, 1));
       }
     }
+  }
+  for (const PlacedCamera& camera : world.cameras) {
+    print.add(std::span(camera.X_DC.samples()));
+    print.add(std::span<const char>(calibration_text(camera)));
+    add_lens(camera.camera.lens(), print);
+  }
+  if (const auto& sky = world.spec.sky) {
+    if (const auto* environment = std::get_if<EnvironmentImage>(&sky->dome))
+      print.add(std::span<const char>(read_text(environment->image)));
   }
   for (const Material& material : world.content.materials.all())
     print.add_all(fingerprint_of(material));
@@ -129,6 +96,23 @@ std::string header(const World& world) {
         "  - {{name: {}, kind: lidar, number: {}, model: {}, source: {}, frames: {}}}\n",
         yaml_text(spec.name), i, yaml_text(spec.lidar.model), yaml_text(spec.source),
         world.lidars[i].sweeps);
+  }
+  for (std::size_t i = 0; i < world.cameras.size(); ++i) {
+    const MountedCamera& spec = world.cameras[i].spec;
+    text += fmt::format(
+        "  - {{name: {}, kind: camera, number: {}, model: {}, source: {}, frames: {}}}\n",
+        yaml_text(spec.name), world.lidars.size() + i, yaml_text(spec.camera.model),
+        yaml_text(spec.source), world.cameras[i].begins.size());
+  }
+  for (const StereoSpec& pair : world.spec.stereo) {
+    text += fmt::format("  - {{name: {}, kind: stereo, left: {}, right: {}, images: {}}}\n",
+                        yaml_text(pair.name), yaml_text(pair.left), yaml_text(pair.right),
+                        pair.images == StereoSpec::Images::Rectified ? "rectified" : "as_mounted");
+  }
+  if (!world.cameras.empty()) {
+    text += "materials:  # by number in images, from 1\n";
+    for (const Material& material : world.content.materials.all())
+      text += fmt::format("  - {}\n", yaml_text(material.name));
   }
   if (!world.content.groups.empty()) text += "objects:\n";
   for (const Content::Group& group : world.content.groups) {
@@ -184,12 +168,22 @@ Dataset::Dataset(const fs::path& folder, const World& world)
   check_same_run(folder, header_);
   make_folder(folder);
   record();  // first: a folder with it can be taken up again
-  for (const char* name : {"poses", "calibration", "lidar"}) make_folder(folder / name);
+  for (const char* name : {"poses", "calibration"}) make_folder(folder / name);
+  const auto write_calibration = [&](const std::string& name, const Trajectory& X_DS,
+                                     const char* comment, const std::string& text) {
+    write_tum(folder / "poses" / (name + ".tum"), X_DS, comment);
+    write_text(folder / "calibration" / (name + ".yaml"), text);
+  };
   for (const PlacedLidar& lidar : world.lidars) {
     make_folder(folder / "lidar" / lidar.spec.name);
-    write_tum(folder / "poses" / (lidar.spec.name + ".tum"), lidar.X_DS,
-              "sensor S in D: t [s] x y z [m] qx qy qz qw");
-    write_text(folder / "calibration" / (lidar.spec.name + ".yaml"), calibration(lidar));
+    write_calibration(lidar.spec.name, lidar.X_DS, "sensor S in D: t [s] x y z [m] qx qy qz qw",
+                      calibration_text(lidar));
+  }
+  for (const PlacedCamera& camera : world.cameras) {
+    make_folder(folder / "camera" / camera.spec.name);
+    write_calibration(camera.spec.name, camera.X_DC, "camera C in D: t [s] x y z [m] qx qy qz qw",
+                      calibration_text(camera));
+    write_exchange_calibrations(folder / "calibration" / camera.spec.name, camera);
   }
 }
 
@@ -198,30 +192,42 @@ fs::path Dataset::product_path(const PlacedLidar& lidar, std::int64_t frame,
   return folder_ / "lidar" / lidar.spec.name / fmt::format("{:06}{}", frame, suffix);
 }
 
-fs::path Dataset::scan_path(const PlacedLidar& lidar, std::int64_t frame) const {
-  return product_path(lidar, frame, ".ply");
-}
-
-fs::path Dataset::preview_path(const PlacedLidar& lidar, std::int64_t frame) const {
-  return product_path(lidar, frame, "_preview.png");
+fs::path Dataset::product_path(const PlacedCamera& camera, std::int64_t frame,
+                               std::string_view suffix) const {
+  return folder_ / "camera" / camera.spec.name / fmt::format("{:06}{}", frame, suffix);
 }
 
 bool Dataset::has(const PlacedLidar& lidar, std::int64_t frame) const {
-  return fs::exists(scan_path(lidar, frame));
+  return fs::exists(product_path(lidar, frame, scan_suffix));
+}
+
+bool Dataset::has(const PlacedCamera& camera, std::int64_t frame) const {
+  return std::ranges::all_of(image_suffixes(camera.spec), [&](const std::string& suffix) {
+    return fs::exists(product_path(camera, frame, suffix));
+  });
 }
 
 void Dataset::record() const {
   std::string text = header_;
   text.pop_back();
   text += frames;
+  const auto add = [&](const std::string& sensor, std::int64_t frame,
+                       std::chrono::nanoseconds stamp, bool is_done, const std::string& more) {
+    text += fmt::format("  - {{sensor: {}, frame: {}, stamp_s: {:.9f}, state: {}{}}}\n",
+                        yaml_text(sensor), frame, 1e-9 * static_cast<double>(stamp.count()),
+                        is_done ? "done" : "pending", more);
+  };
   for (const PlacedLidar& lidar : world_.lidars) {
     for (std::int64_t frame = 0; frame < lidar.sweeps; ++frame) {
-      const bool done = has(lidar, frame);
-      text += fmt::format("  - {{sensor: {}, frame: {}, stamp_s: {:.9f}, state: {}{}}}\n",
-                          yaml_text(lidar.spec.name), frame,
-                          1e-9 * static_cast<double>(lidar.lidar.pattern().stamp(frame).count()),
-                          done ? "done" : "pending",
-                          done ? convergence_of(scan_path(lidar, frame)) : "");
+      const bool is_done = has(lidar, frame);
+      add(lidar.spec.name, frame, lidar.lidar.pattern().stamp(frame), is_done,
+          is_done ? convergence_of(product_path(lidar, frame, scan_suffix)) : "");
+    }
+  }
+  for (const PlacedCamera& camera : world_.cameras) {
+    for (std::size_t i = 0; i < camera.begins.size(); ++i) {
+      const auto frame = static_cast<std::int64_t>(i);
+      add(camera.spec.name, frame, camera.begins[i], has(camera, frame), "");
     }
   }
   write_text(folder_ / "dataset.yaml", text);

@@ -12,6 +12,8 @@ namespace groundray {
 
 /// What the comment of a scan with its convergence begins with; a YAML mapping follows.
 inline constexpr std::string_view convergence_comment = "convergence ";
+/// What the names of scans end with.
+inline constexpr std::string_view scan_suffix = ".ply";
 
 /// The folder that a run fills (docs/formats.md). Made anew, or taken up again where an earlier run
 /// of the same scene, seed and version stopped.
@@ -22,14 +24,15 @@ class Dataset {
   /// very run.
   Dataset(const std::filesystem::path& folder, const World& world);
 
-  std::filesystem::path scan_path(const PlacedLidar& lidar, std::int64_t frame) const;
-  /// Of what goes with a scan: `suffix` follows the frame's number.
+  /// Returns the file of a product: `suffix` follows the frame's number.
   std::filesystem::path product_path(const PlacedLidar& lidar, std::int64_t frame,
                                      std::string_view suffix) const;
-  std::filesystem::path preview_path(const PlacedLidar& lidar, std::int64_t frame) const;
+  std::filesystem::path product_path(const PlacedCamera& camera, std::int64_t frame,
+                                     std::string_view suffix) const;
 
-  /// Whether a frame is there; frames appear only when whole.
+  /// Whether a frame is there: its scan, which comes last, or all that its image has.
   bool has(const PlacedLidar& lidar, std::int64_t frame) const;
+  bool has(const PlacedCamera& camera, std::int64_t frame) const;
 
   /// Brings dataset.yaml's record of which frames are done up to date.
   void record() const;

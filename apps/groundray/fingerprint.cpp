@@ -36,6 +36,7 @@ std::uint64_t fingerprint_of(const Material& material) {
   print.add(std::span<const char>(material.name));
   print.add_all(material.reflection.index());
   std::visit([&](const auto& kind) { add(kind, print); }, material.reflection);
+  print.add_all(material.emitted.r, material.emitted.g, material.emitted.b);
   return print.value();
 }
 

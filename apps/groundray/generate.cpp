@@ -13,6 +13,7 @@
 #include <vector>
 
 #include "apps/groundray/dataset.h"
+#include "apps/groundray/images.h"
 #include "apps/groundray/interruption.h"
 #include "apps/groundray/preview.h"
 #include "apps/groundray/world.h"
@@ -29,6 +30,10 @@ using Clock = std::chrono::steady_clock;
 
 struct Tally {
   std::uint64_t scans = 0;
+  std::uint64_t images = 0;
+  std::uint64_t pixels = 0;
+  ImageTally of_images;
+  std::chrono::duration<double> exposing{0};
   std::uint64_t points = 0;
   std::uint64_t pulses = 0;
   std::chrono::duration<double> scanning{0};
@@ -41,12 +46,11 @@ class SceneFor {
  public:
   explicit SceneFor(const World& world) : world_(world) {}
 
-  const Scene& operator()(const PlacedLidar& lidar, std::int64_t frame) {
-    const glm::dvec3 p_DL =
-        float_frame_origin(lidar.X_DS.pose_at(lidar.lidar.pattern().stamp(frame)).translation_m);
+  const Scene& operator()(const Exposed& frame) {
+    const glm::dvec3 p_DL = float_frame_origin(frame.X_DS->pose_at(frame.begin).translation_m);
     const HeightGrid* whole = world_.terrain.whole();
     if (whole == nullptr) {
-      const SensorBox sensors = sensor_box(lidar, frame);
+      const SensorBox sensors = sensor_box(frame);
       clipmap_ =
           clipmap_ ? clipmap_->moved_to(sensors) : world_.terrain.clipmap(sensors, world_.reach_m);
       take(build_tracer(*clipmap_, p_DL, world_.spec.tracing, scene_ ? &scene_->rays : nullptr));
@@ -73,7 +77,7 @@ class SceneFor {
 };
 
 struct Frame {
-  std::uint32_t sensor = 0;  // index of the lidar
+  std::uint32_t sensor = 0;  // number: lidars come first, for images may show their echoes
   std::int64_t number = 0;
 };
 
@@ -82,6 +86,13 @@ std::vector<Frame> missing_frames(const World& world, const Dataset& dataset) {
   for (std::uint32_t sensor = 0; sensor < world.lidars.size(); ++sensor) {
     for (std::int64_t number = 0; number < world.lidars[sensor].sweeps; ++number) {
       if (!dataset.has(world.lidars[sensor], number)) frames.push_back({sensor, number});
+    }
+  }
+  for (std::size_t i = 0; i < world.cameras.size(); ++i) {
+    const auto sensor = static_cast<std::uint32_t>(world.lidars.size() + i);
+    for (std::size_t k = 0; k < world.cameras[i].begins.size(); ++k) {
+      const auto number = static_cast<std::int64_t>(k);
+      if (!dataset.has(world.cameras[i], number)) frames.push_back({sensor, number});
     }
   }
   return frames;
@@ -121,12 +132,12 @@ std::vector<std::string> comments_of(const World& world, const LidarScan& scan) 
   return comments;
 }
 
-void make_frame(const World& world, const Dataset& dataset, const Frame& which, SceneFor& scene_for,
-                Tally& tally) {
+void make_scan(const World& world, const Dataset& dataset, const Frame& which, SceneFor& scene_for,
+               Tally& tally) {
   const auto [sensor, frame] = which;
   const PlacedLidar& lidar = world.lidars[sensor];
   const ScanPattern& pattern = lidar.lidar.pattern();
-  const Scene& scene = scene_for(lidar, frame);
+  const Scene& scene = scene_for(exposed(lidar, frame));
   const auto begin = Clock::now();
   const LidarScan scan = lidar.lidar.scan(scene, lidar.X_DS, frame, world.spec.seed, sensor);
   tally.scanning += Clock::now() - begin;
@@ -134,24 +145,56 @@ void make_frame(const World& world, const Dataset& dataset, const Frame& which, 
   tally.pulses += static_cast<std::uint64_t>(pattern.pulses(frame));
   ++tally.scans;
 
-  write_png(dataset.preview_path(lidar, frame),
+  write_png(dataset.product_path(lidar, frame, "_preview.png"),
             draw_preview(scan.echoes, lidar, world.terrain.ground(), frame));
   write_extras(dataset, lidar, frame, scan);
-  write_ply(dataset.scan_path(lidar, frame), scan.echoes, comments_of(world, scan));
+  write_ply(dataset.product_path(lidar, frame, scan_suffix), scan.echoes, comments_of(world, scan));
+}
+
+void make_frame(const World& world, const Dataset& dataset, const Frame& which, SceneFor& scene_for,
+                Tally& tally) {
+  if (which.sensor < world.lidars.size()) return make_scan(world, dataset, which, scene_for, tally);
+  const std::size_t camera = which.sensor - world.lidars.size();
+  const auto begin = Clock::now();
+  show_echoes(world, dataset, camera, which.number,
+              [&](const Exposed& frame) -> const Scene& { return scene_for(frame); });
+  const Scene& scene = scene_for(exposed(world.cameras[camera], which.number));
+  const ImageTally made = make_image(world, dataset, camera, which.number, scene);
+  tally.of_images.paths += made.paths;
+  tally.of_images.flows_left_out += made.flows_left_out;
+  tally.exposing += Clock::now() - begin;
+  const glm::ivec2 size_px = world.cameras[camera].spec.camera.size_px;
+  tally.pixels += static_cast<std::uint64_t>(size_px.x) * static_cast<std::uint64_t>(size_px.y);
+  ++tally.images;
 }
 
 void say(const World& world, const std::filesystem::path& out, const Tally& tally) {
-  std::uint64_t scans = 0;
+  std::uint64_t scans = 0, images = 0;
   for (const PlacedLidar& lidar : world.lidars) scans += static_cast<std::uint64_t>(lidar.sweeps);
+  for (const PlacedCamera& camera : world.cameras) images += camera.begins.size();
   if (tally.scans < scans) fmt::print("{} scans were there already\n", scans - tally.scans);
+  if (tally.images < images) fmt::print("{} images were there already\n", images - tally.images);
   if (tally.scans > 0) {
     fmt::print("{} scans, {} points of {} pulses, {:.2f} M pulses/s\n", tally.scans, tally.points,
                tally.pulses, 1e-6 * static_cast<double>(tally.pulses) / tally.scanning.count());
+  }
+  if (tally.images > 0) {
+    fmt::print("{} images, {:.1f} M pixels, {:.1f} M paths in {:.1f} s\n", tally.images,
+               1e-6 * static_cast<double>(tally.pixels),
+               1e-6 * static_cast<double>(tally.of_images.paths), tally.exposing.count());
+  }
+  if (tally.of_images.flows_left_out > 0) {
+    fmt::print("{} flows beyond 512 px are marked as unknown in KITTI's files\n",
+               tally.of_images.flows_left_out);
   }
   fmt::print("dataset: {}\n", out.string());
   for (const PlacedLidar& lidar : world.lidars) {
     fmt::print("  {}: scans and pictures (*_preview.png) in {}\n", lidar.spec.name,
                (out / "lidar" / lidar.spec.name).string());
+  }
+  for (const PlacedCamera& camera : world.cameras) {
+    fmt::print("  {}: images and pictures (*_preview.png) in {}\n", camera.spec.name,
+               (out / "camera" / camera.spec.name).string());
   }
 }
 
@@ -161,25 +204,25 @@ void generate(const std::filesystem::path& scene, const std::filesystem::path& o
   const World world = load_world(scene);
   if (world.terrain.whole() == nullptr) {
     // Says what memory is too small before anything is written.
-    world.terrain.clipmap(sensor_box(world.lidars.front(), 0), world.reach_m);
+    world.terrain.clipmap(sensor_box(first_frame(world)), world.reach_m);
   }
   const Dataset dataset(out, world);
   const std::vector<Frame> frames = missing_frames(world, dataset);
   SceneFor scene_for(world);
   Tally tally;
   try {
-    Progress progress(stderr, "scans", frames.size());
+    Progress progress(stderr, "frames", frames.size());
     for (const Frame& frame : frames) {
       if (is_interrupted()) break;
       make_frame(world, dataset, frame, scene_for, tally);
-      progress.update(tally.scans);
+      progress.update(tally.scans + tally.images);
     }
   } catch (...) {
     dataset.record();
     throw;
   }
   dataset.record();
-  if (tally.scans < frames.size()) {
+  if (tally.scans + tally.images < frames.size()) {
     throw Interrupted{};
   }
   say(world, out, tally);

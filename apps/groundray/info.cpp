@@ -76,10 +76,9 @@ void print_dem(const std::filesystem::path& path) {
 // The surface round the first frame's sensors.
 void print_levels(const World& world) {
   const Terrain& terrain = world.terrain;
-  const PlacedLidar& first = world.lidars.front();
-  const SensorBox sensors = sensor_box(first, 0);
-  const glm::dvec3 p_DL =
-      float_frame_origin(first.X_DS.pose_at(std::chrono::nanoseconds(0)).translation_m);
+  const Exposed first = first_frame(world);
+  const SensorBox sensors = sensor_box(first);
+  const glm::dvec3 p_DL = float_frame_origin(first.X_DS->pose_at(first.begin).translation_m);
   const RayTracer rays =
       terrain.whole() != nullptr
           ? RayTracer({full_resolution_level(*terrain.whole())}, p_DL, world.spec.tracing)
@@ -113,12 +112,12 @@ void print_cover(const TerrainSpec& terrain, const GroundCover& cover) {
   }
 }
 
-// Materials are numbered for lasers alone.
+// Materials are numbered for lasers and cameras.
 void print_materials(const World& world) {
   const auto has_light = [](const PlacedLidar& lidar) {
     return lidar.spec.lidar.light.has_value();
   };
-  if (std::ranges::none_of(world.lidars, has_light)) return;
+  if (world.cameras.empty() && std::ranges::none_of(world.lidars, has_light)) return;
   std::vector<std::string_view> names;
   for (const Material& material : world.content.materials.all()) names.push_back(material.name);
   fmt::print("materials {}\n", fmt::join(names, ", "));
@@ -176,6 +175,20 @@ void print_lidar(const PlacedLidar& lidar) {
              light->sun.direction ? "across its rays" : "on all surfaces alike");
 }
 
+void print_camera(const PlacedCamera& placed) {
+  const CameraSpec& camera = placed.spec.camera;
+  const double pixels = static_cast<double>(camera.size_px.x) * camera.size_px.y;
+  fmt::print("camera    {}: {}, {} images of {} x {} px in {:.4g} ms\n", placed.spec.name,
+             camera.model, placed.begins.size(), camera.size_px.x, camera.size_px.y,
+             1e-6 * static_cast<double>(placed.camera.duration().count()));
+  if (needs_light(camera)) {
+    fmt::print(
+        "          {} to {} paths a pixel of up to {} rays: {:.3g} M paths an image or more\n",
+        camera.sampling.samples, camera.sampling.most_samples, camera.sampling.depth,
+        1e-6 * pixels * camera.sampling.samples);
+  }
+}
+
 void print_scene(const World& world) {
   fmt::print("seed      {}\n", world.spec.seed.value);
   fmt::print("duration  {} s, {} tracing\n", world.spec.duration_s,
@@ -190,6 +203,7 @@ void print_scene(const World& world) {
   print_materials(world);
   if (world.spec.sky) print_sky(*world.spec.sky);
   for (const PlacedLidar& lidar : world.lidars) print_lidar(lidar);
+  for (const PlacedCamera& camera : world.cameras) print_camera(camera);
 }
 
 }  // namespace

@@ -22,8 +22,8 @@ constexpr int interrupted = 130;
 
 int run(int argc, char** argv) {
   CLI::App app(
-      "groundray makes lidar ground truth over real terrain: every point with its true place, "
-      "range and normal.");
+      "groundray makes ground truth of lidars and cameras over real terrain: every point and pixel "
+      "with its true place, range and normal.");
   app.footer(
       "A first run:  groundray generate data/scenes/first_light.yaml -o out/first_light\n"
       "Exit codes:   0 done, 1 failed, 2 wrong usage, 130 interrupted (the same command goes on)\n"
@@ -34,7 +34,7 @@ int run(int argc, char** argv) {
   std::filesystem::path scene;
   std::filesystem::path out;
   auto* generate = app.add_subcommand(
-      "generate", "Run a scene and write its dataset: scans, poses, calibration, pictures");
+      "generate", "Run a scene and write its dataset: scans, images, poses, calibration, pictures");
   generate->add_option("SCENE", scene, "Scene file (YAML, see docs/scene.md)")->required();
   generate
       ->add_option(

@@ -10,35 +10,13 @@
 #include <span>
 #include <vector>
 
+#include "apps/groundray/colour_map.h"
+
 namespace groundray {
 namespace {
 
 constexpr int width = 900;
 constexpr int gap = 8;
-
-using Colour = glm::dvec3;  // 0 to 1
-
-void paint(Image8& image, int x, int y, const Colour& colour) {
-  if (x < 0 || y < 0 || x >= image.width() || y >= image.height()) return;
-  const auto pixel = image.at(x, y);
-  for (int i = 0; i < 3; ++i) {
-    pixel[static_cast<std::size_t>(i)] =
-        static_cast<std::uint8_t>(std::lround(std::clamp(colour[i], 0.0, 1.0) * 255));
-  }
-}
-
-// Near is yellow, far is violet, by five colours of the viridis map.
-Colour range_colour(double range_m, double far_m) {
-  static constexpr std::array<std::array<double, 3>, 5> map = {{{0.993, 0.906, 0.144},
-                                                                {0.369, 0.789, 0.383},
-                                                                {0.128, 0.567, 0.551},
-                                                                {0.229, 0.322, 0.546},
-                                                                {0.267, 0.005, 0.329}}};
-  const double place = std::clamp(range_m / far_m, 0.0, 1.0) * (map.size() - 1);
-  const auto i = std::min(static_cast<std::size_t>(place), map.size() - 2);
-  const auto colour = [&](std::size_t k) { return Colour(map[k][0], map[k][1], map[k][2]); };
-  return glm::mix(colour(i), colour(i + 1), place - static_cast<double>(i));
-}
 
 // The range below which a share of the echoes lies.
 double quantile_m(std::span<const double> ranges_m, double share) {
@@ -99,7 +77,7 @@ void draw_ranges(Image8& image, const PointCloud& scan, const RangeRows& rows, d
     const double turn = 0.5 - std::atan2(y[i], x[i]) / (2 * std::numbers::pi);
     const int column = std::min(static_cast<int>(turn * width), width - 1);
     for (int k = 0; k < rows.band; ++k)
-      paint(image, column, rows.row(scan, i) + k, range_colour(range_m[i], far_m));
+      paint(image, column, rows.row(scan, i) + k, range_colour(range_m[i] / far_m));
   }
 }
 
@@ -174,7 +152,7 @@ void draw_points(Image8& image, const MapWindow& window, const PointCloud& scan,
     for (const glm::ivec2 step :
          {glm::ivec2(0, 0), glm::ivec2(1, 0), glm::ivec2(0, 1), glm::ivec2(1, 1)}) {
       if (at.y < window.top) continue;
-      paint(image, at.x + step.x, at.y + step.y, range_colour(range_m[i], far_m));
+      paint(image, at.x + step.x, at.y + step.y, range_colour(range_m[i] / far_m));
     }
   }
 }

@@ -1,5 +1,7 @@
 #include "apps/groundray/world.h"
 
+#include <fmt/format.h>
+
 #include <algorithm>
 #include <chrono>
 #include <cmath>
@@ -13,6 +15,7 @@
 #include "apps/groundray/certifying.h"
 #include "apps/groundray/paths.h"
 #include "core/error.h"
+#include "core/image_io.h"
 #include "core/product_io.h"
 #include "sensors/spec_io.h"
 
@@ -49,32 +52,36 @@ double distance_m(const GridFrame& frame, const glm::dvec3& p) {
   return glm::distance(glm::clamp(glm::dvec2(p), glm::min(a, b), glm::max(a, b)), glm::dvec2(p));
 }
 
-// Looks at the sensor every 10 ms of the run: it must be above ground, and at least once in reach
-// of the DEM.
-void check_place(const PlacedLidar& placed, const Terrain& terrain, std::chrono::nanoseconds run) {
+// Looks at a sensor every 10 ms of the run: it must be above ground, and at least once in reach of
+// the DEM.
+void check_place(const std::string& sensor, const Trajectory& X_DS, double reach_m,
+                 const Terrain& terrain, std::chrono::nanoseconds run) {
   bool in_reach = false;
   for (std::chrono::nanoseconds time{0}; time <= run; time += std::chrono::milliseconds(10)) {
-    const glm::dvec3 p_DS = placed.X_DS.pose_at(time).translation_m;
-    in_reach |= distance_m(terrain.frame(), p_DS) <= placed.spec.lidar.gate.far_m;
+    const glm::dvec3 p_DS = X_DS.pose_at(time).translation_m;
+    in_reach |= distance_m(terrain.frame(), p_DS) <= reach_m;
     const auto ground_m = terrain.ground().height_m_at(glm::dvec2(p_DS));
     if (!ground_m || p_DS.z > *ground_m) continue;
     const glm::dvec3 p_WS = p_DS + terrain.header().origin_w_m;
     throw Error(
-        "lidar '{}': at {:.3f} s it is {:.3f} m below the ground, at ({:.3f}, {:.3f}, {:.3f}) m in "
-        "W; raise its "
-        "mount or the platform's height, or check that the trajectory and the DEM share a vertical "
-        "datum",
-        placed.spec.name, seconds(time), *ground_m - p_DS.z, p_WS.x, p_WS.y, p_WS.z);
+        "{}: at {:.3f} s it is {:.3f} m below the ground, at ({:.3f}, {:.3f}, {:.3f}) m in W; "
+        "raise its mount or the platform's height, or check that the trajectory and the DEM share "
+        "a vertical datum",
+        sensor, seconds(time), *ground_m - p_DS.z, p_WS.x, p_WS.y, p_WS.z);
   }
   if (in_reach) return;
-  const glm::dvec3 p_DS = placed.X_DS.samples().front().pose.translation_m;
+  const glm::dvec3 p_DS = X_DS.samples().front().pose.translation_m;
   const glm::dvec3 p_WS = p_DS + terrain.header().origin_w_m;
   throw Error(
-      "lidar '{}': it starts at ({:.3f}, {:.3f}) m in W, {:.0f} m from the DEM, and never comes "
-      "within its range of "
-      "it; is the trajectory in the DEM's CRS, {}?",
-      placed.spec.name, p_WS.x, p_WS.y, distance_m(terrain.frame(), p_DS),
+      "{}: it starts at ({:.3f}, {:.3f}) m in W, {:.0f} m from the DEM, and never comes within "
+      "{:.0f} m of it; is the trajectory in the DEM's CRS, {}?",
+      sensor, p_WS.x, p_WS.y, distance_m(terrain.frame(), p_DS), reach_m,
       terrain.header().crs_name);
+}
+
+// A camera has no range: what is farther from the DEM than that is long is thought to be lost.
+double diagonal_m(const GridFrame& frame) {
+  return glm::distance(frame.to_D({0, 0}), frame.to_D(frame.samples - 1));
 }
 
 // Says how far a long preparation is; most take no time that is worth a word.
@@ -84,30 +91,76 @@ Terrain load_terrain(const TerrainSpec& spec) {
           spec.relief};
 }
 
-double largest_reach_m(const std::vector<PlacedLidar>& lidars) {
+double largest_reach_m(const std::vector<PlacedLidar>& lidars,
+                       const std::vector<PlacedCamera>& cameras) {
   double reach_m = 0;
+  const auto look = [&](const Exposed& frame) {
+    const SensorBox box = sensor_box(frame);
+    reach_m = std::max(reach_m, glm::distance(glm::dvec2(box.low_m), glm::dvec2(box.high_m)) / 2);
+  };
   for (const PlacedLidar& lidar : lidars) {
-    for (std::int64_t sweep = 0; sweep < lidar.sweeps; ++sweep) {
-      const SensorBox box = sensor_box(lidar, sweep);
-      reach_m = std::max(reach_m, glm::distance(glm::dvec2(box.low_m), glm::dvec2(box.high_m)) / 2);
-    }
+    for (std::int64_t sweep = 0; sweep < lidar.sweeps; ++sweep) look(exposed(lidar, sweep));
+  }
+  for (const PlacedCamera& camera : cameras) {
+    for (std::size_t i = 0; i < camera.begins.size(); ++i)
+      look(exposed(camera, static_cast<std::int64_t>(i)));
   }
   return reach_m;
 }
 
+std::vector<PlacedLidar> place_lidars(const SceneSpec& spec, const Trajectory& X_DB) {
+  std::vector<PlacedLidar> lidars;
+  for (const MountedLidar& mounted : spec.lidars) {
+    Lidar lidar(mounted.lidar, spec.air);
+    const std::int64_t sweeps = whole_sweeps(lidar.pattern(), spec);
+    if (sweeps == 0) {
+      throw Error(
+          "lidar '{}': a run of {} s is shorter than one sweep at {} Hz; lengthen duration_s",
+          mounted.name, spec.duration_s, lidar.pattern().sweep_rate_hz());
+    }
+    lidars.push_back({mounted, std::move(lidar), X_DB.mounted(mounted.X_BS), sweeps});
+  }
+  return lidars;
+}
+
+std::optional<Sky> load_sky(const SceneSpec& spec) {
+  if (!spec.sky) return std::nullopt;
+  const auto* environment = std::get_if<EnvironmentImage>(&spec.sky->dome);
+  return Sky(*spec.sky, environment != nullptr ? read_image_f(environment->image) : ImageF());
+}
+
+std::optional<AerialPerspective> air_of(const SceneSpec& spec) {
+  const AerialPerspective air(spec.air);
+  return air.extinction_per_m() == glm::dvec3(0) ? std::nullopt : std::optional(air);
+}
+
 }  // namespace
 
-SensorBox sensor_box(const PlacedLidar& lidar, std::int64_t sweep) {
+Exposed exposed(const PlacedLidar& lidar, std::int64_t sweep) {
+  const ScanPattern& pattern = lidar.lidar.pattern();
+  return {&lidar.X_DS, pattern.stamp(sweep), pattern.last_firing(sweep)};
+}
+
+Exposed exposed(const PlacedCamera& camera, std::int64_t image) {
+  const std::chrono::nanoseconds begin = camera.begins[static_cast<std::size_t>(image)];
+  return {&camera.X_DC, begin, begin + camera.camera.duration()};
+}
+
+SensorBox sensor_box(const Exposed& frame) {
   constexpr std::chrono::milliseconds spacing(10);
-  const std::chrono::nanoseconds end = lidar.lidar.pattern().last_firing(sweep);
   SensorBox box{glm::dvec3(std::numeric_limits<double>::infinity()),
                 glm::dvec3(-std::numeric_limits<double>::infinity())};
-  for (std::chrono::nanoseconds time = lidar.lidar.pattern().stamp(sweep);; time += spacing) {
-    time = std::min(time, end);
-    const glm::dvec3 p_DS = lidar.X_DS.pose_at(time).translation_m;
+  for (std::chrono::nanoseconds time = frame.begin;; time += spacing) {
+    time = std::min(time, frame.end);
+    const glm::dvec3 p_DS = frame.X_DS->pose_at(time).translation_m;
     box = {glm::min(box.low_m, p_DS), glm::max(box.high_m, p_DS)};
-    if (time == end) return box;
+    if (time == frame.end) return box;
   }
+}
+
+Exposed first_frame(const World& world) {
+  return world.lidars.empty() ? exposed(world.cameras.front(), 0)
+                              : exposed(world.lidars.front(), 0);
 }
 
 std::filesystem::path data_folder() {
@@ -127,22 +180,23 @@ World load_world(const std::filesystem::path& scene) {
       extended(std::visit([&](const auto& path) { return lay_path(path, spec, terrain, begin); },
                           spec.platform),
                spec);
-  std::vector<PlacedLidar> lidars;
-  for (const MountedLidar& mounted : spec.lidars) {
-    Lidar lidar(mounted.lidar, spec.air);
-    const std::int64_t sweeps = whole_sweeps(lidar.pattern(), spec);
-    if (sweeps == 0) {
-      throw Error(
-          "lidar '{}': a run of {} s is shorter than one sweep at {} Hz; lengthen duration_s",
-          mounted.name, spec.duration_s, lidar.pattern().sweep_rate_hz());
-    }
-    lidars.push_back({mounted, std::move(lidar), X_DB.mounted(mounted.X_BS), sweeps});
-    check_place(lidars.back(), terrain, run_time(spec));
+  std::vector<PlacedLidar> lidars = place_lidars(spec, X_DB);
+  std::vector<PlacedCamera> cameras = place_cameras(spec, X_DB);
+  for (const auto& [mounted, lidar, X_DS, sweeps] : lidars) {
+    check_place(fmt::format("lidar '{}'", mounted.name), X_DS, mounted.lidar.gate.far_m, terrain,
+                run_time(spec));
   }
-  const double reach_m = largest_reach_m(lidars);
+  for (const PlacedCamera& camera : cameras) {
+    check_place(fmt::format("camera '{}'", camera.spec.name), camera.X_DC,
+                diagonal_m(terrain.frame()), terrain, run_time(spec));
+  }
+  const double reach_m = largest_reach_m(lidars, cameras);
   Content content = build_content(spec, terrain, begin);
-  return {std::move(spec), std::move(terrain), begin, std::move(lidars),
-          reach_m,         std::move(content)};
+  std::optional<Sky> sky = load_sky(spec);
+  const std::optional<AerialPerspective> air = air_of(spec);
+  return {std::move(spec),    std::move(terrain), begin,
+          std::move(lidars),  std::move(cameras), reach_m,
+          std::move(content), std::move(sky),     air};
 }
 
 }  // namespace groundray

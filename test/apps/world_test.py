@@ -12,7 +12,8 @@ from plyfile import PlyData
 
 ROOT = Path(__file__).resolve().parents[2]
 PROGRAM = Path(os.environ.get("GROUNDRAY", ROOT / "build/release/bin/groundray"))
-SCENE = (ROOT / "data/scenes/offroad_trail.yaml").read_text()
+SHIPPED = ROOT / "data/scenes/offroad_trail.yaml"
+SCENE = SHIPPED.read_text().partition("\ncameras:\n")[0] + "\n"  # what lidars see of it
 
 
 def run(command, scene, folder):
@@ -68,6 +69,13 @@ def test_info_counts_what_stands_there(trail, tmp_path):
     assert result.returncode == 0, result.stderr
     for group in record["objects"]:
         assert f"{group['name']}: {group['count']} of label {group['label']}" in result.stdout
+
+
+def test_shipped_scene_has_a_stereo_pair_and_a_fisheye():
+    result = subprocess.run([PROGRAM, "info", SHIPPED], capture_output=True, text=True, timeout=300)
+    assert result.returncode == 0, result.stderr
+    for camera in ("left: Colour camera", "right: Colour camera", "fisheye: TUM VI"):
+        assert f"camera    {camera}" in result.stdout
 
 
 def test_a_laser_asks_for_materials(tmp_path):
