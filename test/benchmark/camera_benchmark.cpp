@@ -1,0 +1,282 @@
+// What cameras cost: the truth of an image against its rays alone, light by paths, and the table of
+// where pixels look. What is compared runs in turn in every iteration, so that ratios are of one
+// moment of one machine; times are those of all processors.
+#include <benchmark/benchmark.h>
+#include <tbb/parallel_for.h>
+
+#include <algorithm>
+#include <chrono>
+#include <cmath>
+#include <ctime>
+#include <glm/geometric.hpp>
+#include <numbers>
+#include <utility>
+
+#include "sensors/camera/image_truth.h"
+#include "sensors/camera/path_tracer.h"
+#include "terrain/terrain_scene.h"
+#include "test/benchmark/raw_embree.h"
+#include "test/support/camera_scene.h"
+#include "test/support/sample_terrain.h"
+
+namespace groundray::benchmark {
+namespace {
+
+using namespace std::chrono_literals;
+
+constexpr glm::ivec2 size_px(1920, 1080);
+constexpr double pixels = static_cast<double>(size_px.x) * size_px.y;
+constexpr double albedo = 0.4;
+
+// Seconds of processors that `act` takes, on all threads of this program.
+template <typename Act>
+double time(const Act& act) {
+  const std::clock_t begin = std::clock();
+  act();
+  return static_cast<double>(std::clock() - begin) / CLOCKS_PER_SEC;
+}
+
+const HeightGrid& ground() {
+  static const HeightGrid grid = testing::fractal(1025, 5, 375, Seed{12345});
+  return grid;
+}
+
+Scene scene() {
+  const Material soil{"soil", Lambertian{{{300, albedo}, {2500, albedo}}}};
+  return {RayTracer({full_resolution_level(ground())}, {0, 0, 0}, Tracing::Fast), {}, {soil}};
+}
+
+// A pinhole that sees 64 degrees, from where it stands.
+struct View {
+  Camera camera;
+  Trajectory X_DC;
+};
+
+View view(const glm::dvec3& from, const glm::dvec3& to) {
+  CameraSpec spec;
+  spec.size_px = size_px;
+  spec.lens = Pinhole{{glm::dvec2(1536), (glm::dvec2(size_px) - 1.0) / 2.0, 0}};
+  spec.sampling = {.samples = 4, .most_samples = 4, .depth = 3};
+  const Pose X_DC = testing::looking(from, to);
+  return {Camera(spec), Trajectory({{0s, X_DC}, {1s, X_DC}})};
+}
+
+// Two metres above the ground, looking slightly down.
+View driven() {
+  const glm::dvec3 from(0, 0, *ground().height_m_at({0, 0}) + 2);
+  return view(from, from + glm::dvec3(1, 0.2, -0.2));
+}
+
+// From above a corner over the whole landscape.
+View flown() {
+  const double half_m = -ground().origin_m().x;
+  return view({-0.7 * half_m, -0.7 * half_m, ground().max_height_m() + 0.1 * half_m},
+              {0.1 * half_m, 0.1 * half_m, ground().min_height_m()});
+}
+
+// Of the centres of pixels.
+std::vector<Ray> rays_of(const View& view) {
+  const Pose X_DC = view.X_DC.pose_at(0s);
+  std::vector<Ray> rays;
+  for (const glm::dvec3& direction : view.camera.directions())
+    rays.push_back({X_DC.translation_m, X_DC.rotation * direction});
+  return rays;
+}
+
+// As image_truth does: on all cores, by batches that stay in the cache.
+void trace(const Scene& world, std::span<const Ray> rays, std::span<Hit> hits) {
+  constexpr std::size_t at_once = 256;
+  tbb::parallel_for(std::size_t{0}, (rays.size() + at_once - 1) / at_once, [&](std::size_t batch) {
+    const std::size_t begin = batch * at_once, count = std::min(at_once, rays.size() - begin);
+    world.trace(rays.subspan(begin, count), hits.subspan(begin, count));
+  });
+}
+
+// Floats alone are off by some tenths of a millimetre, along slanting rays by more, and decide
+// otherwise at silhouettes.
+const char* fault_of(const ImageTruth& truth, std::span<const float> raw_m) {
+  double differ = 0;
+  for (std::size_t i = 0; i < raw_m.size(); ++i) {
+    const float range_m = truth.range_m.values()[i];
+    const glm::dvec3 p_DQ(truth.p_DQ.values()[3 * i], truth.p_DQ.values()[3 * i + 1],
+                          truth.p_DQ.values()[3 * i + 2]);
+    const bool is_sky = std::isinf(range_m);
+    if (is_sky != std::isinf(raw_m[i]) ||
+        (!is_sky && std::abs(range_m - raw_m[i]) > 0.01f + 1e-4f * range_m))
+      differ += 1;
+    if (!is_sky && std::abs(*ground().height_m_at({p_DQ.x, p_DQ.y}) - p_DQ.z) > 1e-5)
+      return "points of the truth are off the ground";
+  }
+  return differ > 1e-4 * pixels ? "the truth and raw Embree disagree" : nullptr;
+}
+
+void camera_truth(::benchmark::State& state, View (*view_of)()) {
+  const View view = view_of();
+  const Scene world = scene();
+  const auto rays = rays_of(view);
+  RawEmbree raw(ground(), rays);
+  std::vector<Hit> hits(rays.size());
+  ImageTruth truth;
+  const auto tell = [&] {
+    truth = image_truth(view.camera, world, world.materials.in_colour(), view.X_DC, {},
+                        std::move(truth));
+  };
+  tell();
+  if (const char* fault = fault_of(truth, raw.trace())) return state.SkipWithError(fault);
+  double raw_s = 0, trace_s = 0, truth_s = 0;
+  for (auto _ : state) {
+    raw_s += time([&] { ::benchmark::DoNotOptimize(raw.trace()); });
+    trace_s += time([&] { trace(world, rays, hits); });
+    const double this_s = time(tell);
+    state.SetIterationTime(this_s);
+    truth_s += this_s;
+  }
+  const auto met = static_cast<double>(std::ranges::count_if(hits, &Hit::operator bool));
+  const double images = static_cast<double>(state.iterations());
+  state.counters["ground"] = met / pixels;
+  state.counters["Mrays/CPU-s"] = 1e-6 * pixels * images / truth_s;
+  state.counters["of_raw"] = raw_s / truth_s;
+  state.counters["of_trace"] = trace_s / truth_s;
+  state.counters["trace_of_raw"] = raw_s / trace_s;
+}
+BENCHMARK_CAPTURE(camera_truth, driven, driven)
+    ->UseManualTime()
+    ->Unit(::benchmark::kMillisecond)
+    ->MinTime(2);
+BENCHMARK_CAPTURE(camera_truth, flown, flown)
+    ->UseManualTime()
+    ->Unit(::benchmark::kMillisecond)
+    ->MinTime(2);
+
+const Sky& sky() {
+  static const Sky sky(
+      {ConstantSky{{30, 40, 60}}, SunSpec{SunAngles{.azimuth_deg = 130, .elevation_deg = 30}}});
+  return sky;
+}
+
+// A direction in proportion to its cosine to `normal`.
+glm::dvec3 by_cosine(const glm::dvec3& normal, std::uint32_t number) {
+  const glm::dvec2 u = random_uniform({.seed = {5}, .pulse = number});
+  const double z = 1 - 2 * u.x, turn = 2 * std::numbers::pi * u.y, side = std::sqrt(1 - z * z);
+  return glm::normalize(normal + glm::dvec3(side * std::cos(turn), side * std::sin(turn), z));
+}
+
+// Green light along each ray that the sky sends directly or by one surface: by raw Embree, with one
+// ray to the middle of the sun and one to a random place of the dome.
+std::vector<double> direct_light(const Scene& world, std::span<const Ray> rays) {
+  std::vector<Hit> hits(rays.size());
+  world.trace(rays, hits);
+  const Sun& sun = *sky().sun();
+  std::vector<Ray> shadow;
+  for (std::size_t i = 0; i < rays.size(); ++i) {
+    const glm::dvec3 normal(hits[i] ? hits[i].normal : glm::vec3(0, 0, 1));
+    const glm::dvec3 p =
+        rays[i].origin + rays[i].direction * (hits[i] ? hits[i].range_m : 0) + 0.01 * normal;
+    shadow.push_back({p, sun.direction()});
+    shadow.push_back({p, by_cosine(normal, static_cast<std::uint32_t>(i))});
+  }
+  RawEmbree raw(ground(), shadow);
+  const auto met_m = raw.trace();
+  const double dome = sky().dome_radiance({0, 0, 1}).y;
+  std::vector<double> light;
+  for (std::size_t i = 0; i < rays.size(); ++i) {
+    const double cosine = std::max(glm::dot(glm::dvec3(hits[i].normal), sun.direction()), 0.0);
+    const double by_sun = sun.irradiance().y * cosine * std::isinf(met_m[2 * i]) / std::numbers::pi;
+    const double by_dome = dome * std::isinf(met_m[2 * i + 1]);
+    light.push_back(hits[i] ? albedo * (by_sun + by_dome) : dome);
+  }
+  return light;
+}
+
+// Compares some ten thousand rays: means within five of their standard errors, p = 6e-7.
+const char* fault_of(const View& view, const Scene& world) {
+  std::vector<Ray> rays;
+  const auto all = rays_of(view);
+  for (std::size_t i = 0; i < all.size(); i += 97) rays.push_back(all[i]);
+  std::vector<PathTracer::Sample> samples;
+  for (std::uint32_t i = 0; i < rays.size(); ++i)
+    samples.push_back({rays[i], SobolPairs(SobolPairs::mixed(i), 0)});
+  std::vector<glm::vec3> direct(rays.size()), bounced(rays.size());
+  PathTracer::Workspace work;
+  PathTracer(world, sky(), 2, std::nullopt).trace(samples, direct, work);
+  PathTracer(world, sky(), 3, std::nullopt).trace(samples, bounced, work);
+  const auto expected = direct_light(world, rays);
+  double sum = 0, squares = 0, more = 0, all_light = 0;
+  for (std::size_t i = 0; i < rays.size(); ++i) {
+    const double difference = double{direct[i].y} - expected[i];
+    sum += difference;
+    squares += difference * difference;
+    more += double{bounced[i].y} - double{direct[i].y};
+    all_light += expected[i];
+  }
+  if (std::abs(sum) > 5 * std::sqrt(squares)) return "sun and sky are not what raw Embree finds";
+  const bool is_bounced = 0 < more && more < albedo * all_light;
+  return is_bounced ? nullptr : "the light of the second surface is missing, or too much";
+}
+
+void camera_light(::benchmark::State& state, View (*view_of)()) {
+  const View view = view_of();
+  const Scene world = scene();
+  if (const char* fault = fault_of(view, world)) return state.SkipWithError(fault);
+  RawEmbree raw(ground(), rays_of(view));
+  const SamplingSpec& sampling = view.camera.spec().sampling;
+  const PathTracer light(world, sky(), sampling.depth, std::nullopt);
+  double raw_s = 0, light_s = 0;
+  for (auto _ : state) {
+    raw_s += time([&] { ::benchmark::DoNotOptimize(raw.trace()); });
+    const double this_s = time(
+        [&] { ::benchmark::DoNotOptimize(view.camera.expose(light, view.X_DC, 0s, {Seed{7}})); });
+    state.SetIterationTime(this_s);
+    light_s += this_s;
+  }
+  const double paths = pixels * sampling.samples * static_cast<double>(state.iterations());
+  const auto met = raw.trace();
+  state.counters["ground"] =
+      1 - static_cast<double>(std::ranges::count_if(met, [](float m) { return std::isinf(m); })) /
+              pixels;
+  state.counters["Mpaths/CPU-s"] = 1e-6 * paths / light_s;
+  state.counters["raw_Mrays/CPU-s"] = 1e-6 * paths / sampling.samples / raw_s;
+}
+BENCHMARK_CAPTURE(camera_light, driven, driven)
+    ->UseManualTime()
+    ->Unit(::benchmark::kMillisecond)
+    ->MinTime(4);
+BENCHMARK_CAPTURE(camera_light, flown, flown)
+    ->UseManualTime()
+    ->Unit(::benchmark::kMillisecond)
+    ->MinTime(4);
+
+// All fourteen coefficients. With the shorter focal length the lens folds within its image.
+void camera_table(::benchmark::State& state) {
+  const auto focal_px = static_cast<double>(state.range(0));
+  const double tau_x_rad = 0.035, tau_y_rad = -0.052;
+  const Lens lens(BrownConrady{{glm::dvec2(focal_px), (glm::dvec2(size_px) - 1.0) / 2.0, 0},
+                               {-0.30, 0.12, 1e-3, -5e-4, -0.02, 0.01, 0.02, 0, 1e-3, 5e-4, -1e-3,
+                                2e-4, tau_x_rad, tau_y_rad},
+                               sensor_homography(tau_x_rad, tau_y_rad)},
+                  size_px);
+  std::vector<PixelRay> rays(static_cast<std::size_t>(pixels));
+  lens.fill(0, size_px.y, rays);
+  double look = 0, farthest_px = 0;
+  for (std::size_t i = 0; i < rays.size(); ++i) {
+    if (rays[i].direction == glm::dvec3(0)) continue;
+    const auto at = lens.project(rays[i].direction);
+    if (!at) return state.SkipWithError("a pixel looks where the lens images nothing");
+    const glm::dvec2 pixel(i % size_px.x, i / size_px.x);
+    farthest_px = std::max(farthest_px, glm::distance(*at, pixel));
+    look += 1;
+  }
+  if (farthest_px > 1e-9) return state.SkipWithError("rays are not imaged at their pixels");
+  for (auto _ : state) state.SetIterationTime(time([&] { lens.fill(0, size_px.y, rays); }));
+  state.counters["look"] = look / pixels;
+  state.counters["farthest_px"] = farthest_px;
+}
+BENCHMARK(camera_table)
+    ->ArgName("focal_px")
+    ->Arg(1500)
+    ->Arg(1000)
+    ->UseManualTime()
+    ->Unit(::benchmark::kMillisecond);
+
+}  // namespace
+}  // namespace groundray::benchmark
