@@ -2,6 +2,7 @@
 
 #include <algorithm>
 #include <bit>
+#include <cmath>
 #include <cstddef>
 #include <cstdint>
 #include <glm/vec2.hpp>
@@ -161,6 +162,13 @@ struct Crossing {
   float deviation_m = 0;
   std::uint32_t level = 0;
 };
+
+/// Returns a component of a direction in float. Embree takes the reciprocal of anything below 1e-18
+/// for that of +1e-18, and then loses rays whose component is negative, if rays of the same packet
+/// have a positive one: such components are 0.
+inline float direction_float(double component) noexcept {
+  return std::abs(component) < 2e-18 ? 0.0F : static_cast<float>(component);
+}
 
 /// Returns a bound in float for a range in double, never short of it.
 inline float far_float(double range_m, float slack_m) noexcept {

@@ -110,9 +110,9 @@ void fill_floats(const ModelScene::Impl& model, LocalPacket<W>& local) noexcept 
     out.org_x[i] = static_cast<float>(local.x[i] + local.dx[i] * begin_m - centre_m.x);
     out.org_y[i] = static_cast<float>(local.y[i] + local.dy[i] * begin_m - centre_m.y);
     out.org_z[i] = static_cast<float>(local.z[i] + local.dz[i] * begin_m - centre_m.z);
-    out.dir_x[i] = static_cast<float>(local.dx[i]);
-    out.dir_y[i] = static_cast<float>(local.dy[i]);
-    out.dir_z[i] = static_cast<float>(local.dz[i]);
+    out.dir_x[i] = direction_float(local.dx[i]);
+    out.dir_y[i] = direction_float(local.dy[i]);
+    out.dir_z[i] = direction_float(local.dz[i]);
     out.tnear[i] = 0;
     out.tfar[i] = far_float(local.leave_m[i] - begin_m, model.slack_m);
     out.time[i] = 0;
@@ -128,7 +128,8 @@ void fill_floats(const ModelScene::Impl& model, LocalPacket<W>& local) noexcept 
 inline ModelCrossing search(const ModelScene::Impl& model, const ModelRay& ray, double enter_m,
                             double leave_m, float from_m) noexcept {
   const glm::vec3 origin(ray.origin + ray.direction * enter_m - model.centre_m);
-  const glm::vec3 direction(ray.direction);
+  const glm::vec3 direction(direction_float(ray.direction.x), direction_float(ray.direction.y),
+                            direction_float(ray.direction.z));
   const float far_m = far_float(leave_m - enter_m, model.slack_m);
   for (;;) {
     RTCRayHit one{};

@@ -364,9 +364,9 @@ void ObjectTracer::Impl::trace_packet(std::span<const Ray> rays,
     out.org_x[i] = origin.x;
     out.org_y[i] = origin.y;
     out.org_z[i] = origin.z;
-    out.dir_x[i] = static_cast<float>(ray.direction.x);
-    out.dir_y[i] = static_cast<float>(ray.direction.y);
-    out.dir_z[i] = static_cast<float>(ray.direction.z);
+    out.dir_x[i] = direction_float(ray.direction.x);
+    out.dir_y[i] = direction_float(ray.direction.y);
+    out.dir_z[i] = direction_float(ray.direction.z);
     out.tnear[i] = 0;
     out.tfar[i] = far_float(end_m - begin_m, slack_m);
     out.time[i] = share_of(ray.time);

@@ -165,9 +165,9 @@ void fill_floats(const Target& target, Packet<W>& packet) noexcept {
     out.org_x[i] = static_cast<float>(packet.x_m[i] + packet.dx[i] * begin_m - p_DL.x);
     out.org_y[i] = static_cast<float>(packet.y_m[i] + packet.dy[i] * begin_m - p_DL.y);
     out.org_z[i] = static_cast<float>(packet.z_m[i] + packet.dz[i] * begin_m - p_DL.z);
-    out.dir_x[i] = static_cast<float>(packet.dx[i]);
-    out.dir_y[i] = static_cast<float>(packet.dy[i]);
-    out.dir_z[i] = static_cast<float>(packet.dz[i]);
+    out.dir_x[i] = direction_float(packet.dx[i]);
+    out.dir_y[i] = direction_float(packet.dy[i]);
+    out.dir_z[i] = direction_float(packet.dz[i]);
     out.tnear[i] = 0;
     out.tfar[i] = far_float(packet.leave_m[i] - begin_m, target.slack_m);
     out.time[i] = 0;

@@ -10,6 +10,7 @@
 #include <random>
 
 #include "core/error.h"
+#include "test/support/margin.h"
 #include "test/support/solid.h"
 
 namespace groundray {
@@ -116,12 +117,37 @@ TEST_P(ObjectTracing, TurnedAndScaledBoxesAreMetWhereTheirPlanesAre) {
         if (!hits[i]) continue;
         ++met;
         ASSERT_NEAR(hits[i].range_m, expected_m, tolerance_m(expected_m) + 10 * rounding_m);
+        testing::record_margin(
+            "range", (hits[i].range_m - expected_m) / (tolerance_m(expected_m) + 10 * rounding_m),
+            1);
         EXPECT_LT(glm::dot(glm::dvec3(hits[i].normal), rays[i].direction), 0);
         EXPECT_EQ(hits[i].object, 1u);
       }
       EXPECT_GT(met, 50);
     }
   }
+}
+
+// The sub-rays of a beam along an axis: cos 90 degrees is 6e-17, times slopes of a thousandth.
+TEST_P(ObjectTracing, DirectionsThatAreAlmostAlongAnAxisMissNothing) {
+  const ModelScene box(device_, box_model({2, 1, 0.5}), GetParam());
+  std::vector<PlacedObject> boxes;
+  for (int i = -3; i <= 3; ++i)
+    boxes.push_back({glm::dvec3(20 + i, 3 * i, 0), glm::dquat(1, 0, 0, 0), 2, 0});
+  const ObjectTracer tracer(device_, {box}, boxes, {});
+  std::mt19937_64 random(2);
+  std::uniform_real_distribution<double> share(-1, 1), exponent(-45, -17);
+  std::vector<Ray> rays;
+  for (int i = 0; i < 1024; ++i) {
+    const auto tiny = [&] {
+      return std::copysign(std::pow(10.0, exponent(random)), share(random));
+    };
+    const double at = 3.0 * (i % 7 - 3);
+    rays.push_back({{0, at + 0.9 * share(random), 0.4 * share(random)}, {1, tiny(), tiny()}});
+  }
+  const auto hits = trace(tracer, rays);
+  for (std::size_t i = 0; i < rays.size(); ++i)
+    ASSERT_NEAR(hits[i].range_m, 20 + static_cast<double>(i % 7) - 3 - 2, 1e-7) << i;
 }
 
 // A tube of many sides: the planes of its sides and lids are its closed form.

@@ -14,6 +14,7 @@
 #include "core/random.h"
 #include "terrain/dem_io.h"
 #include "terrain/terrain_scene.h"
+#include "test/support/margin.h"
 #include "test/support/reference_tracer.h"
 #include "test/support/sample_terrain.h"
 #include "test/support/temporary_folder.h"
@@ -133,6 +134,7 @@ TEST(RayTracerProof, ExactTracingEqualsTheReferenceOnEveryRandomRay) {
           worst, std::abs(expected->range_m - hits[i].range_m) / (1e-9 * expected->range_m + 1e-9));
     }
     EXPECT_GT(met, rays.size() / 3) << name;
+    testing::record_margin("range error", worst, 1);
     std::cout << fmt::format("{}: {} rays, {} hits, largest error {:.1e} of what is allowed\n",
                              name, rays.size(), met, worst);
   }
@@ -199,6 +201,8 @@ TEST(RayTracerProof, FastTracingDiffersOnlyAtSilhouettes) {
           << fmt::format(": {} against {}", fast[i].range_m, exact[i].range_m);
     }
     EXPECT_LE(static_cast<double>(different), 5e-6 * static_cast<double>(rays.size())) << name;
+    testing::record_margin("different", static_cast<double>(different),
+                           5e-6 * static_cast<double>(rays.size()), "rays");
     std::cout << fmt::format("{}: {} of {} rays decided otherwise\n", name, different, rays.size());
   }
 }
@@ -289,6 +293,29 @@ TEST(RayTracer, RaysAlongGridLinesAreDecidedAsTheReferenceDoesAlsoBesideHoles) {
   }
 }
 
+// The sub-rays of a beam along an axis: cos 90 degrees is 6e-17, times slopes of a thousandth.
+TEST(RayTracer, DirectionsThatAreAlmostAlongAnAxisAreDecidedAsTheReferenceDoes) {
+  const HeightGrid grid = fractal(129, 2, 40, Seed{61});
+  std::vector<Ray> rays(4096);
+  for (std::size_t i = 0; i < rays.size(); ++i) {
+    const auto bits = random_bits({Seed{62}, 0, 0, static_cast<std::uint32_t>(i)});
+    const auto tiny = [&](std::uint32_t some) {
+      return ((some & 1) != 0 ? 1 : -1) * std::pow(10.0, -17 - static_cast<double>(some % 30));
+    };
+    const glm::dvec2 p = glm::dvec2(bits[0], bits[1]) * 0x1p-32 * 200.0 - 100.0;
+    const bool down = i % 64 < 32;
+    const double above_m = down ? 50 : 0.3;
+    rays[i].origin = {p, grid.height_m_at(p).value_or(0) + above_m};
+    rays[i].direction = down ? glm::dvec3(tiny(bits[2]), tiny(bits[3]), -1)
+                             : glm::dvec3(-1, tiny(bits[2]), tiny(bits[3]));
+  }
+  for (const Tracing tracing : {Tracing::Exact, Tracing::Fast}) {
+    const auto hits = trace(tracer(grid, tracing), rays);
+    for (std::size_t i = 0; i < rays.size(); ++i)
+      ASSERT_TRUE(agrees(trace_reference(grid, rays[i]), hits[i])) << i;
+  }
+}
+
 TEST(RayTracer, RaysThatStartBelowTheSurfaceAreDecidedAsTheReferenceDoes) {
   const HeightGrid grid = with_holes(fractal(257, 5, 300, Seed{7}), 200, 5, Seed{8});
   auto rays = random_rays(grid, 20'000, Seed{9});
@@ -353,6 +380,8 @@ TEST(RayTracerProof, InstructionSetsAgree) {
       const double allowed =
           tracing == Tracing::Exact ? 0 : 5e-6 * static_cast<double>(rays.size());
       EXPECT_LE(static_cast<double>(different), allowed) << set;
+      testing::record_margin(tracing == Tracing::Exact ? "different in `exact`" : "in `fast`",
+                             static_cast<double>(different), allowed, "rays");
     }
   }
 }
