@@ -1,5 +1,6 @@
 #pragma once
 
+#include <cstddef>
 #include <filesystem>
 #include <glm/vec3.hpp>
 #include <string>
@@ -40,5 +41,25 @@ void write_obj(const std::filesystem::path& path, const TriangleMesh& mesh,
 /// @see Khronos Group, glTF 2.0 Specification (2021): sections 3.4 and 4.4.
 void write_glb(const std::filesystem::path& path, const TriangleMesh& mesh,
                const Georeference& georeference);
+
+/// A mesh as read, and what was left out.
+struct MeshFile {
+  TriangleMesh mesh;          ///< in D; no levels
+  Georeference georeference;  ///< as write_mesh wrote it; of a file without, nothing and zero
+  std::size_t dropped = 0;    ///< polygons and triangles that are broken or have no area
+  std::size_t skipped = 0;    ///< points, lines and curved patches
+  /// Positions may differ by this much along each axis from those that the file means, for nodes
+  /// moved floats; 0 where positions are as the file spells them.
+  double rounding_m = 0;
+};
+
+/// Reads the triangles of a .ply, .obj, .stl, .gltf or .glb, whoever wrote it, in doubles where the
+/// file has doubles. Polygons are cut into triangles; what a mesh wears is not looked at. glTF's
+/// axes (y up) are turned to D's as write_glb turns them: what write_mesh wrote comes back.
+/// Vertices are in the order in which triangles first name them, and joined where position, uv and
+/// normal are equal.
+/// @throws Error if the name ends otherwise, the file cannot be read or holds no triangle, or what
+///         it says of its origin is no position.
+MeshFile read_mesh(const std::filesystem::path& path);
 
 }  // namespace groundray

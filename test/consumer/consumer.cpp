@@ -1,6 +1,7 @@
 // Uses something of each library, through the installed headers alone.
 #include <groundray/core/pose.h>
 #include <groundray/core/ray_tracer.h>
+#include <groundray/reconstruction/accuracy.h>
 #include <groundray/sensors/scan_pattern.h>
 #include <groundray/terrain/terrain_scene.h>
 
@@ -25,6 +26,10 @@ int main() {
       SpinningPattern{.rate_hz = 10, .firing_period_s = 1e-3, .beams = {Beam{}}});
   const bool turned = scan.pulses(0) == 100 && scan.stamp(3) == std::chrono::milliseconds(300);
 
-  std::printf("halfway %d, below %d, turned %d\n", halfway, below, turned);
-  return halfway && below && turned ? 0 : 1;
+  const TriangleMesh low{{{0, 0, 0}, {1, 0, 0}, {0, 1, 0}}, {{0, 1, 2}}};
+  const TriangleMesh high{{{0, 0, 2}, {1, 0, 2}, {0, 1, 2}}, {{0, 1, 2}}};
+  const bool apart = MeshDistance(high, low).largest(1e-9).at_most_m < 2 + 1e-9;
+
+  std::printf("halfway %d, below %d, turned %d, apart %d\n", halfway, below, turned, apart);
+  return halfway && below && turned && apart ? 0 : 1;
 }

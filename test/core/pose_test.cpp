@@ -9,6 +9,7 @@
 #include <numbers>
 
 #include "core/random.h"
+#include "test/support/margin.h"
 
 namespace groundray {
 namespace {
@@ -74,6 +75,8 @@ TEST(Screw, FollowsTheExponentialOfItsTwist) {
     const Screw screw(exponential(v, w));
     for (const double s : {0.0, 0.25, 0.5, 1.0, 1.5}) {
       EXPECT_LT(distance_m(screw.at(s), exponential(v * s, w * s)), 1e-12) << i << " at " << s;
+      testing::record_margin("pose", distance_m(screw.at(s), exponential(v * s, w * s)), 1e-12,
+                             "m");
     }
   }
 }

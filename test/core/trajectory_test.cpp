@@ -8,6 +8,7 @@
 #include <numbers>
 
 #include "core/error.h"
+#include "test/support/margin.h"
 
 namespace groundray {
 namespace {
@@ -30,6 +31,8 @@ TEST(Trajectory, KeepsToACircleBetweenItsPoses) {
     const Pose expected = on_circle(50, 0.004 * k);
     const Pose pose = X_AB.pose_at(10ms * k);
     EXPECT_LT(glm::length(pose.translation_m - expected.translation_m), 1e-12) << k;
+    testing::record_margin("place on a circle",
+                           glm::length(pose.translation_m - expected.translation_m), 1e-12, "m");
     EXPECT_NEAR(std::abs(glm::dot(pose.rotation, expected.rotation)), 1, 1e-15) << k;
   }
 }

@@ -1,0 +1,154 @@
+#include <algorithm>
+#include <cctype>
+#include <cmath>
+#include <cstdint>
+#include <nlohmann/json.hpp>
+#include <string>
+#include <string_view>
+#include <utility>
+
+#include "core/error.h"
+#include "core/mesh_io.h"
+#include "core/obj_reader.h"
+#include "core/ply_reader.h"
+#include "core/polygon_soup.h"
+#include "core/product_io.h"
+#include "core/scene_check.h"
+#include "core/scene_file.h"
+#include "core/text_lines.h"
+
+namespace groundray {
+namespace {
+
+namespace fs = std::filesystem;
+using nlohmann::json;
+
+struct Reading {
+  PolygonSoup soup;
+  Georeference georeference;
+  std::size_t dropped = 0;  // polygons that are not even in the soup
+};
+
+void check_origin(const glm::dvec3& origin_m) {
+  if (std::isfinite(origin_m.x) && std::isfinite(origin_m.y) && std::isfinite(origin_m.z)) return;
+  throw Error("origin_w = {} {} {} must be three finite numbers, metres", origin_m.x, origin_m.y,
+              origin_m.z);
+}
+
+/// Takes a line of those that write_ply and write_obj write; others are nothing to it.
+void read_comment(std::string_view comment, Georeference& georeference) {
+  const auto words = words_of(comment);
+  if (words.empty()) return;
+  const auto rest = [&] { return std::string(comment.substr(words[0].size() + 1)); };
+  if (words[0] == "origin_w") {
+    glm::dvec3 origin_m(std::nan(""));
+    for (std::size_t k = 0; k < 3 && words.size() == 4; ++k) {
+      if (const auto number = number_of<double>(words[k + 1]))
+        origin_m[static_cast<int>(k)] = *number;
+    }
+    check_origin(origin_m);
+    georeference.origin_w_m = origin_m;
+  } else if (words[0] == "crs" && words.size() > 1) {
+    georeference.crs_name = rest();
+  } else if (words[0] == "crs_wkt" && words.size() > 1) {
+    georeference.crs_wkt += rest();
+  }
+}
+
+/// Reads the comments at the head of a text, up to its first line that is content.
+Georeference georeference_of(std::string_view text, std::string_view mark, const fs::path& path) {
+  Georeference georeference;
+  TextLines lines(text);
+  for (auto line = lines.next(); line && *line != "end_header"; line = lines.next()) {
+    if (mark == "# " && !line->empty() && !line->starts_with('#')) break;
+    if (!line->starts_with(mark)) continue;
+    try {
+      read_comment(line->substr(mark.size()), georeference);
+    } catch (const Error& fault) {
+      throw Error("{}:{}: {}", path.string(), lines.number(), fault.what());
+    }
+  }
+  return georeference;
+}
+
+/// Reads the extras of the scene, of bytes that check_gltf found to be sound.
+Georeference gltf_georeference(std::string_view bytes) {
+  if (bytes.starts_with("glTF")) {
+    std::uint32_t length = 0;
+    bytes.copy(reinterpret_cast<char*>(&length), sizeof length, 12);
+    bytes = bytes.substr(20, length);
+  }
+  const json gltf = json::parse(bytes);
+  const std::size_t scene = gltf.value("scene", std::size_t{0});
+  Georeference georeference;
+  if (!gltf.contains("scenes") || scene >= gltf["scenes"].size()) return georeference;
+  const json& shown = gltf["scenes"][scene];
+  if (!shown.contains("extras") || !shown["extras"].is_object()) return georeference;
+  const json& extras = shown["extras"];
+  georeference.crs_name = extras.value("crs_name", "");
+  georeference.crs_wkt = extras.value("crs_wkt", "");
+  if (!extras.contains("origin_w_m")) return georeference;
+  for (int k = 0; k < 3; ++k)
+    georeference.origin_w_m[k] = extras["origin_w_m"].at(static_cast<std::size_t>(k)).get<double>();
+  check_origin(georeference.origin_w_m);
+  return georeference;
+}
+
+/// Assimp leaves out triangles whose indices are out of range: they are counted against what the
+/// file says.
+Reading read_gltf(const fs::path& path) {
+  const std::string bytes = read_text(path);
+  const std::size_t named = check_gltf(bytes, path.string());
+  Reading reading{.soup = read_scene_file(path, SceneForm::Gltf)};
+  for (glm::dvec3& p : reading.soup.positions) p = {p.x, -p.z, p.y};
+  for (glm::vec3& n : reading.soup.normals) n = {n.x, -n.z, n.y};
+  reading.dropped = named - std::min(named, reading.soup.faces);
+  try {
+    reading.georeference = gltf_georeference(bytes);
+  } catch (const json::exception& fault) {
+    throw Error("{}: the scene's extras: {}", path.string(), fault.what());
+  } catch (const Error& fault) {
+    throw Error("{}: the scene's extras: {}", path.string(), fault.what());
+  }
+  return reading;
+}
+
+Reading read_file(const fs::path& path) {
+  std::string form = path.extension().string();
+  std::ranges::transform(form, form.begin(),
+                         [](unsigned char c) { return static_cast<char>(std::tolower(c)); });
+  if (form == ".gltf" || form == ".glb") return read_gltf(path);
+  if (form == ".stl") return {.soup = read_scene_file(path, SceneForm::Stl)};
+  if (form == ".ply") {
+    const std::string bytes = read_text(path);
+    return {parse_ply_faces(bytes, path.string()), georeference_of(bytes, "comment ", path)};
+  }
+  if (form == ".obj") {
+    const std::string text = read_text(path);
+    const auto no_material = [](const std::string&) { return std::string(); };
+    return {parse_obj(text, path.string(), no_material), georeference_of(text, "# ", path)};
+  }
+  throw Error("{}: the name of a mesh must end in .ply, .obj, .stl, .gltf or .glb", path.string());
+}
+
+}  // namespace
+
+MeshFile read_mesh(const fs::path& path) {
+  Reading reading = read_file(path);
+  for (PolygonSoup::Polygon& polygon : reading.soup.polygons) polygon.surface = 0;
+  ModelFaults faults;
+  MeshFile file{.mesh = model_of(reading.soup, faults).mesh,
+                .georeference = std::move(reading.georeference),
+                .dropped = reading.dropped + faults.total(),
+                .skipped = reading.soup.skipped,
+                .rounding_m = reading.soup.rounding};
+  if (file.mesh.triangles.empty()) {
+    throw Error(
+        "{}: there is no triangle; {} broken polygons were dropped, and {} points, lines or "
+        "curved patches skipped",
+        path.string(), file.dropped, file.skipped);
+  }
+  return file;
+}
+
+}  // namespace groundray
