@@ -1,4 +1,4 @@
-#include "apps/groundray/interruption.h"
+#include "apps/interruption.h"
 
 #include <csignal>
 

@@ -16,7 +16,7 @@
 
 #include "core/error.h"
 
-// A strict reader of YAML for the specs, private to this library: it knows where each value stands,
+// A strict reader of YAML for the specs and the programs, not installed: it knows where each value stands,
 // and notes every fault of a file instead of stopping at the first.
 namespace groundray::yaml {
 

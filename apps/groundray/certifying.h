@@ -4,7 +4,7 @@
 #include <cstdio>
 #include <optional>
 
-#include "apps/groundray/interruption.h"
+#include "apps/interruption.h"
 #include "core/progress.h"
 
 namespace groundray {

@@ -14,7 +14,7 @@
 
 #include "apps/groundray/dataset.h"
 #include "apps/groundray/images.h"
-#include "apps/groundray/interruption.h"
+#include "apps/interruption.h"
 #include "apps/groundray/preview.h"
 #include "apps/groundray/world.h"
 #include "core/npy_io.h"
@@ -200,8 +200,9 @@ void say(const World& world, const std::filesystem::path& out, const Tally& tall
 
 }  // namespace
 
-void generate(const std::filesystem::path& scene, const std::filesystem::path& out) {
-  const World world = load_world(scene);
+void generate(const std::filesystem::path& scene, const std::filesystem::path& out,
+              std::optional<Seed> seed) {
+  const World world = load_world(scene, seed);
   if (world.terrain.whole() == nullptr) {
     // Says what memory is too small before anything is written.
     world.terrain.clipmap(sensor_box(first_frame(world)), world.reach_m);

@@ -14,7 +14,7 @@
 #include <variant>
 
 #include "apps/groundray/camera_preview.h"
-#include "apps/groundray/interruption.h"
+#include "apps/interruption.h"
 #include "core/exr_io.h"
 #include "core/flow_io.h"
 #include "core/luminance.h"

@@ -6,11 +6,12 @@
 #include <exception>
 #include <filesystem>
 #include <new>
+#include <optional>
 
 #include "apps/groundray/generate.h"
 #include "apps/groundray/info.h"
-#include "apps/groundray/interruption.h"
 #include "apps/groundray/terrain_commands.h"
+#include "apps/interruption.h"
 #include "core/error.h"
 
 namespace {
@@ -41,6 +42,9 @@ int run(int argc, char** argv) {
           "-o,--output", out,
           "Folder for the dataset; made if missing; a run that was interrupted goes on in it")
       ->required();
+  std::optional<std::uint64_t> seed;
+  generate->add_option("--seed", seed,
+                       "Instead of the scene's own: another draw of noise and scattered things");
 
   std::filesystem::path file;
   auto* info = app.add_subcommand("info", "Say what a file is and what it would take");
@@ -107,7 +111,7 @@ int run(int argc, char** argv) {
     groundray::mesh_terrain(file, dem_options, request, out);
     return done;
   }
-  groundray::generate(scene, out);
+  groundray::generate(scene, out, seed ? std::optional(groundray::Seed{*seed}) : std::nullopt);
   return done;
 }
 

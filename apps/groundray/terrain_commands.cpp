@@ -10,7 +10,7 @@
 #include <utility>
 
 #include "apps/groundray/certifying.h"
-#include "apps/groundray/interruption.h"
+#include "apps/interruption.h"
 #include "core/mesh_io.h"
 #include "terrain/certificate.h"
 #include "terrain/dem_file.h"

@@ -172,8 +172,9 @@ std::filesystem::path data_folder() {
   return GROUNDRAY_SOURCE_DATA;
 }
 
-World load_world(const std::filesystem::path& scene) {
+World load_world(const std::filesystem::path& scene, std::optional<Seed> seed) {
   SceneSpec spec = load_scene(scene, data_folder() / "sensors");
+  if (seed) spec.seed = *seed;
   Terrain terrain = load_terrain(spec.terrain);
   std::chrono::nanoseconds begin{0};
   const Trajectory X_DB =

@@ -60,6 +60,7 @@ std::filesystem::path data_folder();
 /// @throws Error if a file is at fault, the platform's path ends before the run, a sensor is below
 ///         ground on its way or never in reach of the DEM, the run is too short for one sweep or
 ///         one image, or a stereo pair cannot be rectified.
-World load_world(const std::filesystem::path& scene);
+/// @param seed  instead of the scene's own.
+World load_world(const std::filesystem::path& scene, std::optional<Seed> seed = std::nullopt);
 
 }  // namespace groundray

@@ -1,5 +1,7 @@
 #include "test/support/sample_terrain.h"
 
+#include <gtest/gtest.h>
+
 #include <algorithm>
 #include <cmath>
 #include <cstdlib>
@@ -106,7 +108,10 @@ std::vector<Ray> random_rays(const HeightGrid& grid, std::size_t count, Seed see
 
 std::size_t proof_size(std::size_t reduced, std::size_t full) {
   const char* asked = std::getenv("GROUNDRAY_PROOF");
-  return asked != nullptr && std::string_view(asked) == "full" ? full : reduced;
+  const bool is_full = asked != nullptr && std::string_view(asked) == "full";
+  if (::testing::UnitTest::GetInstance()->current_test_info() != nullptr)
+    ::testing::Test::RecordProperty("size", is_full ? "full" : "reduced");
+  return is_full ? full : reduced;
 }
 
 }  // namespace groundray::testing

@@ -1,0 +1,216 @@
+#include "apps/golden/compare/cloud_file.h"
+
+#include <fmt/format.h>
+#include <fmt/ranges.h>
+
+#include <algorithm>
+#include <array>
+#include <utility>
+
+#include "core/error.h"
+#include "core/npy_reader.h"
+#include "core/pcd_reader.h"
+#include "core/ply_io.h"
+#include "core/product_io.h"
+
+namespace groundray::golden {
+namespace {
+
+using Names = std::vector<std::string>;
+
+std::string lower(std::string text) {
+  for (char& c : text) {
+    if ('A' <= c && c <= 'Z') c = static_cast<char>(c - 'A' + 'a');
+  }
+  return text;
+}
+
+/// Names for `count` columns that have none.
+Names names_for(std::size_t count, const Names& asked) {
+  if (!asked.empty()) {
+    if (asked.size() == count) return asked;
+    throw Error("its points have {} numbers; {} columns are named: {}", count, asked.size(),
+                fmt::join(asked, ", "));
+  }
+  if (count < 3) throw Error("its points have {} numbers; at least x, y and z are needed", count);
+  Names names{"x", "y", "z", "intensity"};
+  names.resize(std::min<std::size_t>(count, 4));
+  for (std::size_t i = names.size(); i < count; ++i)
+    names.push_back(fmt::format("number {}", i + 1));
+  return names;
+}
+
+/// Moves the columns of `from` over, by the new names; a name that is empty leaves one out.
+void take_columns(const PointCloud& from, const std::vector<ColumnOrigin>& origins,
+                  const Names& names, CloudFile& to) {
+  for (std::size_t i = 0; i < names.size(); ++i) {
+    if (names[i].empty()) continue;
+    const PointCloud::Column& column = from.columns()[i];
+    const auto copy = [&](const auto& values) {
+      using T = typename std::decay_t<decltype(values)>::value_type;
+      std::ranges::copy(values, to.cloud.add<T>(names[i]).begin());
+    };
+    std::visit(copy, column.values);
+    for (const ColumnOrigin& origin : origins) {
+      if (origin.column == column.name) to.origins.push_back({names[i], origin.origin});
+    }
+  }
+}
+
+CloudFile of_ply(std::string_view bytes, const std::string& name) {
+  return {.form = "PLY", .cloud = parse_ply(bytes, name).cloud};
+}
+
+CloudFile of_pcd(std::string_view bytes, const std::string& name) {
+  PcdFile file = parse_pcd(bytes, name);
+  return {
+      .form = file.height > 1 ? fmt::format("PCD, {} x {} points", file.width, file.height) : "PCD",
+      .cloud = std::move(file.cloud),
+      .origins = std::move(file.origins),
+      .X_FS = file.X_FS};
+}
+
+/// Names the columns of an array as they shall be called in a cloud.
+Names names_of(const NpyArray& array, const Names& asked) {
+  if (array.is_structured) {
+    Names names;
+    for (const auto& column : array.cloud.columns()) names.push_back(column.name);
+    return names;
+  }
+  return names_for(array.cloud.columns().size(), asked);
+}
+
+CloudFile of_npy(const NpyArray& array, const Names& asked) {
+  CloudFile file{.form = "NumPy array", .cloud = PointCloud(array.cloud.rows())};
+  take_columns(array.cloud, array.origins, names_of(array, asked), file);
+  for (const std::string& field : array.unread) {
+    file.unread.push_back(fmt::format("{} (no numbers)", field));
+  }
+  return file;
+}
+
+bool holds_points(const NpyArray& array) {
+  static constexpr std::array<std::string_view, 14> names{
+      "xyz",    "points", "point", "positions",  "position", "pos",         "cloud",
+      "coords", "pcd",    "p_s",   "pointcloud", "vertices", "point_cloud", "arr_0"};
+  return std::ranges::find(names, lower(array.name)) != names.end() && array.shape.size() > 1;
+}
+
+/// Arrays of one length are the columns of a cloud: which length, those that hold points tell, or
+/// else an array called x.
+std::size_t rows_of(const NpzFile& file) {
+  for (const NpyArray& array : file.arrays) {
+    if (array.is_structured || holds_points(array) || lower(array.name) == "x") {
+      return array.cloud.rows();
+    }
+  }
+  Names names;
+  for (const NpyArray& array : file.arrays) names.push_back(array.name);
+  throw Error(
+      "none of its arrays holds points: call one xyz (n x 3), or three x, y, z; there are: {}",
+      fmt::join(names, ", "));
+}
+
+void list_unread(const NpzFile& arrays, CloudFile& file) {
+  for (const auto& [name, why] : arrays.unread) {
+    file.unread.push_back(fmt::format("{} ({})", name, why));
+  }
+}
+
+CloudFile of_npz(const NpzFile& arrays, const Names& asked) {
+  if (arrays.arrays.size() == 1) {
+    CloudFile file = of_npy(arrays.arrays[0], asked);
+    list_unread(arrays, file);
+    return file;
+  }
+  CloudFile file{.form = "NumPy archive", .cloud = PointCloud(rows_of(arrays))};
+  for (const NpyArray& array : arrays.arrays) {
+    if (array.cloud.rows() != file.cloud.rows()) {
+      file.unread.push_back(fmt::format("{} (of {} rows)", array.name, array.cloud.rows()));
+      continue;
+    }
+    Names names;
+    if (array.is_structured || holds_points(array)) {
+      names = names_of(array, asked);
+    } else if (array.shape.size() < 2) {
+      names = {array.name};
+    } else {
+      for (std::size_t i = 0; i < array.cloud.columns().size(); ++i) {
+        names.push_back(fmt::format("{}_{}", array.name, i));
+      }
+    }
+    take_columns(array.cloud, array.origins, names, file);
+  }
+  list_unread(arrays, file);
+  return file;
+}
+
+CloudFile of_floats(std::string_view bytes, const Names& asked) {
+  const Names names = asked.empty() ? Names{"x", "y", "z", "intensity"} : asked;
+  const std::size_t point_bytes = names.size() * sizeof(float);
+  if (bytes.size() % point_bytes != 0) {
+    throw Error(
+        "its {} bytes are no multiple of {}, for points of {} floats ({}): if they have others, "
+        "name the columns",
+        bytes.size(), point_bytes, names.size(), fmt::join(names, ", "));
+  }
+  CloudFile file{.form = fmt::format("KITTI's, {} floats a point", names.size()),
+                 .cloud = PointCloud(bytes.size() / point_bytes)};
+  for (std::size_t i = 0; i < names.size(); ++i) {
+    if (names[i].empty()) continue;
+    add_column(file.cloud, names[i], {bytes.data() + i * sizeof(float), point_bytes}, file.origins);
+  }
+  return file;
+}
+
+constexpr std::string_view las_advice =
+    R"py(convert it to PLY first, for instance by laspy and plyfile:
+  python3 -c "import laspy, numpy as np, plyfile; p = laspy.read('{0}'); n = ['x', 'y', 'z', 'intensity', 'return_number', 'classification'] + ['gps_time'] * ('gps_time' in p.point_format.dimension_names); a = np.rec.fromarrays([np.asarray(p[k]) for k in n], names=n); plyfile.PlyData([plyfile.PlyElement.describe(a, 'vertex')]).write('{1}')")py";
+
+/// Tells what to do with a file that is not read.
+[[noreturn]] void refuse(const std::filesystem::path& name, const std::string& ending) {
+  const std::string ply = std::filesystem::path(name).replace_extension(".ply").string();
+  if (ending == ".las" || ending == ".laz") {
+    throw Error("LAS is not read: {}", fmt::format(las_advice, name.string(), ply));
+  }
+  static constexpr std::array<std::pair<std::string_view, std::string_view>, 6> others{
+      {{".e57", "E57 is not read: save it as PLY by CloudCompare, or by pye57 and plyfile"},
+       {".pcap", "packets are not read: decode them to PLY or PCD by the sensor's own tools"},
+       {".bag", "ROS bags are not read: save the messages as PCD, as pcl_ros' bag_to_pcd does"},
+       {".db3", "ROS bags are not read: save the messages as PCD, as pcl_ros' bag_to_pcd does"},
+       {".mcap", "ROS bags are not read: save the messages as PCD, as pcl_ros' bag_to_pcd does"},
+       {".osf", "OSF is not read: save the scan as PLY or PCD by ouster-cli"}}};
+  for (const auto& [other, advice] : others) {
+    if (ending == other) throw Error("{}", advice);
+  }
+  throw Error("the ending {:?} is of no point file that is read: .ply, .pcd, .npy, .npz, .bin",
+              ending);
+}
+
+}  // namespace
+
+CloudFile parse_cloud(std::string_view bytes, const std::string& name,
+                      const std::vector<std::string>& columns) {
+  const std::string ending = lower(std::filesystem::path(name).extension().string());
+  if (ending == ".ply") return of_ply(bytes, name);
+  if (ending == ".pcd") return of_pcd(bytes, name);
+  const NpyArray array = ending == ".npy" ? parse_npy(bytes, name) : NpyArray{};
+  const NpzFile archive = ending == ".npz" ? parse_npz(bytes, name) : NpzFile{};
+  try {
+    if (ending == ".npy") return of_npy(array, columns);
+    if (ending == ".npz") return of_npz(archive, columns);
+    if (ending == ".bin") return of_floats(bytes, columns);
+    refuse(name, ending);
+  } catch (const Error& rule) {
+    throw Error("{}: {}", name, rule.what());
+  }
+}
+
+CloudFile read_cloud(const std::filesystem::path& path, const std::vector<std::string>& columns) {
+  const std::string ending = lower(path.extension().string());
+  static constexpr std::array<std::string_view, 5> read{".ply", ".pcd", ".npy", ".npz", ".bin"};
+  const bool is_read = std::ranges::find(read, ending) != read.end();
+  return parse_cloud(is_read ? read_text(path) : "", path.string(), columns);
+}
+
+}  // namespace groundray::golden

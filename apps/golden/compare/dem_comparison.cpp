@@ -1,0 +1,371 @@
+#include "apps/golden/compare/dem_comparison.h"
+
+#include <fmt/format.h>
+
+#include <algorithm>
+#include <array>
+#include <cmath>
+#include <cstddef>
+#include <glm/geometric.hpp>
+#include <glm/mat3x3.hpp>
+#include <glm/matrix.hpp>
+#include <glm/trigonometric.hpp>
+#include <limits>
+#include <optional>
+#include <utility>
+#include <vector>
+
+#include "apps/golden/compare/difference_picture.h"
+#include "apps/golden/compare/error_figures.h"
+#include "apps/golden/compare/image_layer.h"
+#include "core/cell.h"
+#include "core/error.h"
+
+namespace groundray::golden {
+namespace {
+
+constexpr double nothing = std::numeric_limits<double>::quiet_NaN();
+constexpr double same_place = 1e-6;  // of a cell: what geotransforms lose in text and floats
+
+/// Heights on the reference's grid; NaN where there is none.
+struct Heights {
+  GridFrame frame;
+  std::vector<double> m;
+
+  double operator()(int column, int row) const {
+    return m[static_cast<std::size_t>(row) * static_cast<std::size_t>(frame.samples.x) +
+             static_cast<std::size_t>(column)];
+  }
+  Cell cell(int column, int row) const {
+    return {column,
+            row,
+            1,
+            1,
+            (*this)(column, row),
+            (*this)(column + 1, row),
+            (*this)(column, row + 1),
+            (*this)(column + 1, row + 1)};
+  }
+};
+
+/// What is held against what.
+struct Pair {
+  Heights reference, other;
+  std::size_t beyond = 0;        // samples that lie beyond the other's extent
+  std::size_t interpolated = 0;  // samples between the other's
+
+  glm::ivec2 samples() const { return reference.frame.samples; }
+};
+
+bool is_whole(glm::dvec2 at) { return at == glm::round(at); }
+
+/// Returns `at` with coordinates that are whole but for rounding made whole.
+glm::dvec2 snapped(glm::dvec2 at) {
+  for (glm::length_t i = 0; i < 2; ++i) {
+    if (std::abs(at[i] - std::round(at[i])) <= same_place) at[i] = std::round(at[i]);
+  }
+  return at;
+}
+
+/// Returns the surface's height at grid coordinates that lie in the grid; NaN in a hole.
+double height_m_at(const HeightGrid& grid, glm::dvec2 at) {
+  if (is_whole(at)) return grid.height_m(static_cast<int>(at.x), static_cast<int>(at.y));
+  const Cell cell = grid.cell(std::min(static_cast<int>(at.x), grid.columns() - 2),
+                              std::min(static_cast<int>(at.y), grid.rows() - 2));
+  const FacetPlane plane = cell.plane(cell.half_at(at.x, at.y));
+  return plane.height_m + plane.u_slope_m * at.x + plane.v_slope_m * at.y;
+}
+
+Pair paired(const Dem& reference, const Dem& other) {
+  const HeightGrid& grid = reference.grid;
+  Pair pair{{grid.frame(), {grid.heights_m().begin(), grid.heights_m().end()}},
+            {grid.frame(), std::vector<double>(grid.heights_m().size(), nothing)}};
+  const glm::dvec2 shift_m(reference.origin_w_m - other.origin_w_m);
+  const glm::ivec2 last = other.grid.frame().samples - 1;
+  std::size_t index = 0;
+  for (int row = 0; row < grid.rows(); ++row) {
+    for (int column = 0; column < grid.columns(); ++column, ++index) {
+      const glm::dvec2 p = grid.frame().to_D({column, row}) + shift_m;
+      const glm::dvec2 at = snapped(other.grid.frame().to_grid(p));
+      if (!(0 <= at.x && at.x <= last.x && 0 <= at.y && at.y <= last.y)) {
+        ++pair.beyond;
+        continue;
+      }
+      if (!is_whole(at)) ++pair.interpolated;
+      pair.other.m[index] = height_m_at(other.grid, at);
+    }
+  }
+  const double up_m = other.origin_w_m.z - reference.origin_w_m.z;
+  for (double& height_m : pair.other.m) height_m += up_m;
+  return pair;
+}
+
+/// Slope along x and y of D, by central differences; one-sided beside holes and edges; NaN if
+/// neither side has a height.
+glm::dvec2 gradient(const Heights& heights, int column, int row) {
+  const auto along = [&](int dx, int dy, double step_m) {
+    const auto height_at = [&](int times) {
+      const int x = column + times * dx, y = row + times * dy;
+      const bool is_in =
+          x >= 0 && y >= 0 && x < heights.frame.samples.x && y < heights.frame.samples.y;
+      return is_in ? heights(x, y) : nothing;
+    };
+    const double before = height_at(-1), here = height_at(0), after = height_at(1);
+    if (std::isnan(before)) return (after - here) / step_m;
+    return std::isnan(after) ? (here - before) / step_m : (after - before) / (2 * step_m);
+  };
+  return {along(1, 0, heights.frame.step_m.x), along(0, 1, heights.frame.step_m.y)};
+}
+
+/// A sample that both have.
+struct Sample {
+  int column = 0, row = 0;
+  double error_m = 0;
+  glm::dvec2 slope{0};  // of the reference
+};
+
+std::vector<Sample> samples_of(const Pair& pair) {
+  std::vector<Sample> samples;
+  for (int row = 0; row < pair.samples().y; ++row) {
+    for (int column = 0; column < pair.samples().x; ++column) {
+      const double error_m = pair.other(column, row) - pair.reference(column, row);
+      if (std::isnan(error_m)) continue;
+      samples.push_back({column, row, error_m, gradient(pair.reference, column, row)});
+    }
+  }
+  return samples;
+}
+
+std::vector<double> errors_of(const std::vector<Sample>& samples) {
+  std::vector<double> errors_m(samples.size());
+  std::ranges::transform(samples, errors_m.begin(), &Sample::error_m);
+  return errors_m;
+}
+
+void tell_vertical(const Pair& pair, const glm::dvec3& origin_w_m,
+                   const std::vector<Sample>& samples, Section& into) {
+  const std::vector<double> errors_m = errors_of(samples);
+  const ErrorFigures figures = figures_of(errors_m);
+  tell_errors(into, "height", "m", errors_m);
+  tell(into, "height: median error", figures.median, "m");
+  tell(into, "height: NMAD, 1.4826 times the median of |error - median|", figures.nmad, "m");
+  if (figures.largest == 0) return;
+  const Sample& worst = samples[figures.worst];
+  const glm::dvec2 p_W =
+      pair.reference.frame.to_D({worst.column, worst.row}) + glm::dvec2(origin_w_m);
+  into.text += fmt::format(
+      "Heights are worst in column {}, row {} (east {:.3f} m, north {:.3f} m): {:.6g} m where the "
+      "reference has {:.6g} m.\n",
+      worst.column, worst.row, p_W.x, p_W.y, pair.other(worst.column, worst.row) + origin_w_m.z,
+      pair.reference(worst.column, worst.row) + origin_w_m.z);
+}
+
+void tell_by_slope(const std::vector<Sample>& samples, Section& into) {
+  constexpr std::array limits_deg{5.0, 10.0, 20.0, 30.0, 45.0, 90.0};
+  std::array<std::vector<double>, limits_deg.size()> classes;
+  for (const Sample& sample : samples) {
+    const double slope_deg = glm::degrees(std::atan(glm::length(sample.slope)));
+    for (std::size_t i = 0; i < limits_deg.size(); ++i) {
+      if (slope_deg > limits_deg[i]) continue;
+      classes[i].push_back(sample.error_m);
+      break;
+    }
+  }
+  Table table{"errors of height by the reference's slope (central differences)",
+              {"slope, deg", "samples", "mean, m", "RMS, m", "NMAD, m", "95 % below, m"},
+              {}};
+  double from_deg = 0;
+  for (std::size_t i = 0; i < limits_deg.size(); from_deg = limits_deg[i++]) {
+    if (classes[i].empty()) continue;
+    const ErrorFigures figures = figures_of(classes[i]);
+    table.rows.push_back({fmt::format("{} to {}", from_deg, limits_deg[i]),
+                          fmt::format("{}", figures.count), fmt::format("{:.5g}", figures.mean),
+                          fmt::format("{:.5g}", figures.rms), fmt::format("{:.5g}", figures.nmad),
+                          fmt::format("{:.5g}", figures.p95_size)});
+  }
+  into.tables.push_back(std::move(table));
+}
+
+/// Of both triangles of each cell that both surfaces have.
+void tell_slopes(const Pair& pair, Section& into) {
+  std::vector<double> angles_deg, slopes_deg;
+  const GridFrame& frame = pair.reference.frame;
+  for (int row = 0; row + 1 < pair.samples().y; ++row) {
+    for (int column = 0; column + 1 < pair.samples().x; ++column) {
+      const Cell of_reference = pair.reference.cell(column, row);
+      const Cell of_other = pair.other.cell(column, row);
+      for (const Half half : {Half::Near, Half::Far}) {
+        const glm::dvec3 a = frame.normal(of_reference.plane(half));
+        const glm::dvec3 b = frame.normal(of_other.plane(half));
+        if (std::isnan(a.z) || std::isnan(b.z)) continue;
+        angles_deg.push_back(
+            glm::degrees(std::atan2(glm::length(glm::cross(a, b)), glm::dot(a, b))));
+        const auto slope = [](glm::dvec3 n) { return std::atan2(std::hypot(n.x, n.y), n.z); };
+        slopes_deg.push_back(glm::degrees(slope(b) - slope(a)));
+      }
+    }
+  }
+  tell_errors(into, "slope of triangles", "deg", slopes_deg);
+  tell_sizes(into, "angle between triangles", "deg", angles_deg);
+}
+
+void tell_holes(const Pair& pair, Section& into) {
+  std::size_t only_reference = 0, only_other = 0, both = 0;
+  for (std::size_t i = 0; i < pair.other.m.size(); ++i) {
+    const bool is_hole = std::isnan(pair.reference.m[i]),
+               is_hole_of_other = std::isnan(pair.other.m[i]);
+    both += is_hole && is_hole_of_other ? 1 : 0;
+    only_reference += is_hole && !is_hole_of_other ? 1 : 0;
+    only_other += !is_hole && is_hole_of_other ? 1 : 0;
+  }
+  tell(into, "holes in the reference alone", static_cast<double>(only_reference), "samples");
+  tell(into, "holes in the other alone, and what lies beyond it", static_cast<double>(only_other),
+       "samples");
+  tell(into, "holes in both", static_cast<double>(both), "samples");
+  tell(into, "beyond the other's extent", static_cast<double>(pair.beyond), "samples");
+}
+
+/// Where the other lies, by least squares over e = c - slope . shift, and what share of the errors'
+/// variance that explains.
+struct Shift {
+  glm::dvec2 shift_m{0};
+  double explained = 0;
+};
+
+std::optional<Shift> fitted_shift(const std::vector<Sample>& samples) {
+  glm::dmat3 normal(0);
+  glm::dvec3 right(0);
+  double squares = 0, sum = 0, count = 0;
+  for (const Sample& sample : samples) {
+    if (std::isnan(sample.slope.x) || std::isnan(sample.slope.y)) continue;
+    const glm::dvec3 row(-sample.slope.x, -sample.slope.y, 1);
+    normal += glm::outerProduct(row, row);
+    right += row * sample.error_m;
+    squares += sample.error_m * sample.error_m;
+    sum += sample.error_m;
+    ++count;
+  }
+  if (count < 10 || !(std::abs(glm::determinant(normal)) > 0)) return std::nullopt;
+  const glm::dvec3 solution = glm::inverse(normal) * right;
+  const double about_mean = squares - sum * sum / count;
+  const double left = squares - glm::dot(solution, right);
+  if (!(about_mean > 0)) return std::nullopt;
+  return Shift{glm::dvec2(solution), 1 - left / about_mean};
+}
+
+void suspect_shift(const Pair& pair, const std::vector<Sample>& samples, Section& into) {
+  const auto fit = fitted_shift(samples);
+  if (!fit || !(fit->explained > 0.5)) return;
+  const glm::dvec2 cells = glm::abs(fit->shift_m * pair.reference.frame.cells_per_m);
+  const double most_cells = std::max(cells.x, cells.y);
+  if (!(0.05 < most_cells && most_cells < 3)) return;
+  into.text += fmt::format(
+      "THE OTHER SEEMS TO BE SHIFTED: by {:.3g} m to the east and {:.3g} m to the north ({:.2g} "
+      "and "
+      "{:.2g} cells), which explains {:.0f} % of the errors' variance. Half a cell is what "
+      "mistaking "
+      "pixel centres for corners makes (GeoTIFF's PixelIsArea and PixelIsPoint).\n",
+      fit->shift_m.x, fit->shift_m.y, cells.x, cells.y, 100 * fit->explained);
+}
+
+ImageLayer layer_of(const Heights& heights) {
+  ImageLayer layer{"height",
+                   LayerKind::Number,
+                   {"height"},
+                   {heights.frame.samples.x, heights.frame.samples.y, 1}};
+  std::ranges::copy(heights.m, layer.values.values().begin());
+  return layer;
+}
+
+void draw(const Pair& pair, Section& into) {
+  const ImageLayer reference = layer_of(pair.reference), other = layer_of(pair.other);
+  Image<double> differences = other.values;
+  for (std::size_t i = 0; i < pair.other.m.size(); ++i)
+    differences.values()[i] -= reference.values.values()[i];
+  draw_layers(reference, other, differences, " m", into);
+}
+
+void say_how(const Pair& pair, const Dem& other, Section& into) {
+  into.text +=
+      fmt::format("{} x {} samples of the reference, {} x {} of the other; ", pair.samples().x,
+                  pair.samples().y, other.grid.columns(), other.grid.rows());
+  into.text += pair.interpolated == 0
+                   ? "held against each other sample by sample.\n"
+                   : fmt::format(
+                         "at {} of the reference's samples the other's height is that of "
+                         "its triangles.\n",
+                         pair.interpolated);
+}
+
+/// How gdalwarp is told a reference system: by its EPSG code if it has one.
+std::string warp_words(const Dem& reference, const std::string& file) {
+  const std::size_t code = reference.crs_name.rfind("(EPSG:");
+  if (code != std::string::npos && reference.crs_name.ends_with(')'))
+    return "-t_srs " + reference.crs_name.substr(code + 1, reference.crs_name.size() - code - 2);
+  return fmt::format("-t_srs \"$(gdalsrsinfo -o wkt2_2018 --single-line '{}')\"", file);
+}
+
+void check_crs(const Dem& reference, const Dem& other, const std::string& reference_file,
+               const std::string& other_file) {
+  if (reference.crs_wkt.empty() || other.crs_wkt.empty() || reference.crs_wkt == other.crs_wkt)
+    return;
+  const bool has_code = reference.crs_name.find("(EPSG:") != std::string::npos;
+  if (has_code && reference.crs_name == other.crs_name) return;  // texts of other programs differ
+  throw Error(
+      "{}: its reference system is {} and that of {} is {}; they must be the same; run\n"
+      "  gdalwarp {} -r bilinear '{}' other_as_reference.tif",
+      other_file, other.crs_name, reference_file, reference.crs_name,
+      warp_words(reference, reference_file), other_file);
+}
+
+}  // namespace
+
+Section compare_dems(const std::filesystem::path& reference, const std::filesystem::path& other,
+                     const DemReadings& readings) {
+  const Dem of_reference = load_dem(reference, readings.reference);
+  const Dem of_other = load_dem(other, readings.other);
+  check_crs(of_reference, of_other, reference.string(), other.string());
+  Section section;
+  try {
+    section = compare_dems(of_reference, of_other,
+                           fmt::format("{} against {}", other.string(), reference.string()));
+  } catch (const Error& fault) {
+    throw Error("{} cannot be compared with {}: {}", other.string(), reference.string(),
+                fault.what());
+  }
+  if (of_reference.crs_wkt.empty() != of_other.crs_wkt.empty()) {
+    section.text +=
+        fmt::format("The {} names no reference system: it is taken as of the same as the {}.\n",
+                    of_other.crs_wkt.empty() ? "other" : "reference",
+                    of_other.crs_wkt.empty() ? "reference" : "other");
+  }
+  return section;
+}
+
+Section compare_dems(const Dem& reference, const Dem& other, const std::string& title) {
+  const Pair pair = paired(reference, other);
+  const std::vector<Sample> samples = samples_of(pair);
+  if (samples.empty()) {
+    const glm::dvec2 from = reference.grid.origin_m() + glm::dvec2(reference.origin_w_m);
+    const glm::dvec2 other_from = other.grid.origin_m() + glm::dvec2(other.origin_w_m);
+    throw Error(
+        "they do not overlap: the first sample of the reference lies at east {} m, north {} m, "
+        "that "
+        "of the other at east {} m, north {} m",
+        from.x, from.y, other_from.x, other_from.y);
+  }
+  Section section;
+  section.title = title;
+  say_how(pair, other, section);
+  tell(section, "samples that both have", static_cast<double>(samples.size()), "samples");
+  tell_holes(pair, section);
+  tell_vertical(pair, reference.origin_w_m, samples, section);
+  tell_by_slope(samples, section);
+  tell_slopes(pair, section);
+  suspect_shift(pair, samples, section);
+  draw(pair, section);
+  section.verdict = verdict_of(section.measures);
+  return section;
+}
+
+}  // namespace groundray::golden

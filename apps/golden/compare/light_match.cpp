@@ -1,0 +1,190 @@
+#include "apps/golden/compare/light_match.h"
+
+#include <fmt/format.h>
+
+#include <algorithm>
+#include <array>
+#include <boost/math/distributions/normal.hpp>
+#include <boost/math/distributions/students_t.hpp>
+#include <cmath>
+#include <cstddef>
+#include <limits>
+#include <string>
+
+#include "apps/golden/compare/error_figures.h"
+
+namespace groundray::golden {
+namespace {
+
+constexpr int block_px = 8;
+constexpr std::size_t colours = 3;
+// Two values that were rounded to floats; less is no difference.
+constexpr double float_rounding = 1.2e-7;
+
+/// An image's light and how sure it is.
+struct Light {
+  const ImageLayer* light;
+  const ImageLayer* error;    // or null: it is exact
+  const ImageLayer* samples;  // or null: very many
+
+  explicit Light(const ImageFile& file)
+      : light(file.find("RGB")), error(file.find("StdError")), samples(file.find("Samples")) {}
+
+  double variance(int x, int y, std::size_t k) const {
+    if (error == nullptr) return 0;
+    const double sigma = error->values.at(x, y)[k];
+    return sigma * sigma;
+  }
+  double freedom(int x, int y) const {
+    return samples == nullptr ? std::numeric_limits<double>::infinity()
+                              : samples->values.at(x, y)[0] - 1;
+  }
+};
+
+struct Pair {
+  Light reference, other;
+
+  double off(int x, int y, std::size_t k) const {
+    return other.light->values.at(x, y)[k] - reference.light->values.at(x, y)[k];
+  }
+  double rounding(int x, int y, std::size_t k) const {
+    return float_rounding * (std::abs(other.light->values.at(x, y)[k]) +
+                             std::abs(reference.light->values.at(x, y)[k]));
+  }
+  double variance(int x, int y, std::size_t k) const {
+    return reference.variance(x, y, k) + other.variance(x, y, k);
+  }
+  bool is_known(int x, int y, std::size_t k) const {
+    return std::isfinite(variance(x, y, k)) && std::isfinite(off(x, y, k));
+  }
+  /// Of both estimates together.
+  double freedom(int x, int y, std::size_t k) const {
+    const double a = reference.variance(x, y, k), b = other.variance(x, y, k);
+    const double parts = a * a / reference.freedom(x, y) + b * b / other.freedom(x, y);
+    return parts > 0 ? (a + b) * (a + b) / parts : std::numeric_limits<double>::infinity();
+  }
+};
+
+double significance_of_one(double level, std::size_t tests) {
+  return -std::expm1(std::log1p(-level) / static_cast<double>(std::max<std::size_t>(tests, 1)));
+}
+
+double normal_limit(double level, std::size_t tests) {
+  return boost::math::quantile(
+      boost::math::complement(boost::math::normal(), significance_of_one(level, tests) / 2));
+}
+
+/// Chance of a |t| as large, of the same light.
+double chance(double t, double freedom) {
+  if (std::isinf(freedom))
+    return 2 * boost::math::cdf(boost::math::complement(boost::math::normal(), t));
+  return 2 * boost::math::cdf(
+                 boost::math::complement(boost::math::students_t(std::max(freedom, 1.0)), t));
+}
+
+template <typename Each>
+void each_value(const Image<double>& image, const Each& each) {
+  for (int y = 0; y < image.height(); ++y) {
+    for (int x = 0; x < image.width(); ++x) {
+      for (std::size_t k = 0; k < colours; ++k) each(x, y, k);
+    }
+  }
+}
+
+/// What the tests of single values find.
+struct Values {
+  std::size_t tests = 0, beyond = 0, without_spread = 0;
+  std::vector<double> deviations;
+};
+
+Values test_values(const Pair& pair, double level) {
+  Values result;
+  const Image<double>& size = pair.reference.light->values;
+  each_value(size, [&](int x, int y, std::size_t k) {
+    if (pair.is_known(x, y, k)) ++result.tests;
+  });
+  const double one = significance_of_one(level, result.tests);
+  const double at_least = normal_limit(level, result.tests);  // Student's t has heavier tails
+  each_value(size, [&](int x, int y, std::size_t k) {
+    if (!pair.is_known(x, y, k)) return;
+    const double off = pair.off(x, y, k), sigma = std::sqrt(pair.variance(x, y, k));
+    const bool is_off = std::abs(off) > pair.rounding(x, y, k);
+    if (sigma == 0) {
+      if (is_off) ++result.without_spread;
+      return;
+    }
+    result.deviations.push_back(off / sigma);
+    const double t = std::abs(off) / sigma;
+    if (is_off && t > at_least && chance(t, pair.freedom(x, y, k)) < one) ++result.beyond;
+  });
+  return result;
+}
+
+/// How many standard errors the mean of some pixels is off.
+double deviations_of(const Pair& pair, std::size_t k, int x0, int y0, int width, int height) {
+  const Image<double>& size = pair.reference.light->values;
+  double off = 0, variance = 0, rounding = 0;
+  for (int y = y0; y < std::min(y0 + height, size.height()); ++y) {
+    for (int x = x0; x < std::min(x0 + width, size.width()); ++x) {
+      if (!pair.is_known(x, y, k)) continue;
+      off += pair.off(x, y, k);
+      variance += pair.variance(x, y, k);
+      rounding += pair.rounding(x, y, k);
+    }
+  }
+  if (std::abs(off) <= rounding) return 0;
+  return std::abs(off) / std::sqrt(variance);
+}
+
+void test_blocks(const Pair& pair, double level, const std::string& because, Section& into) {
+  const Image<double>& size = pair.reference.light->values;
+  double worst = 0;
+  std::size_t blocks = 0;
+  for (int y = 0; y < size.height(); y += block_px) {
+    for (int x = 0; x < size.width(); x += block_px) {
+      for (std::size_t k = 0; k < colours; ++k, ++blocks)
+        worst = std::max(worst, deviations_of(pair, k, x, y, block_px, block_px));
+    }
+  }
+  hold(into, fmt::format("RGB: worst of {} means of 8 x 8 pixels and a channel", blocks), worst,
+       "standard errors", normal_limit(level, blocks), because);
+}
+
+void test_channels(const Pair& pair, double level, const std::string& because, Section& into) {
+  const Image<double>& size = pair.reference.light->values;
+  constexpr std::array names{"R", "G", "B"};
+  for (std::size_t k = 0; k < colours; ++k) {
+    hold(into, fmt::format("RGB: mean of {} over the image", names[k]),
+         deviations_of(pair, k, 0, 0, size.width(), size.height()), "standard errors",
+         normal_limit(level, colours), because);
+  }
+}
+
+}  // namespace
+
+void match_light(const ImageFile& reference, const ImageFile& other,
+                 const Significance& significance, Section& into) {
+  const Pair pair{Light(reference), Light(other)};
+  if (pair.reference.error == nullptr && pair.other.error == nullptr) return;
+  const std::string because = fmt::format(
+      "significance {} of all tests of the kind (Šidák), from the standard errors of {}",
+      significance.level,
+      pair.reference.error == nullptr ? "the other image; the reference counts as exact"
+      : pair.other.error == nullptr   ? "the reference; the other image counts as exact"
+                                      : "both");
+  const Values values = test_values(pair, significance.level);
+  const double allowed =
+      std::floor(static_cast<double>(values.tests) * significance.beyond_share * (1 + 1e-12));
+  hold(into, "RGB: values that differ significantly", static_cast<double>(values.beyond),
+       fmt::format("of {}", values.tests), allowed, because);
+  test_blocks(pair, significance.level, because, into);
+  test_channels(pair, significance.level, because, into);
+  tell(into, "RGB: values that differ without any spread, not tested",
+       static_cast<double>(values.without_spread));
+  into.histograms.push_back(
+      histogram_of("RGB: difference, in standard errors (even light: a bell "
+                   "of width 1)",
+                   "", values.deviations, -6, 6));
+}
+
+}  // namespace groundray::golden

@@ -1,0 +1,101 @@
+#include "apps/golden/compare/pulses.h"
+
+#include <algorithm>
+#include <glm/geometric.hpp>
+#include <limits>
+#include <map>
+#include <numeric>
+#include <utility>
+
+#include "apps/golden/compare/direction_tree.h"
+
+namespace groundray::golden {
+namespace {
+
+constexpr std::uint32_t none = std::numeric_limits<std::uint32_t>::max();
+constexpr std::size_t most_returns = 16;  // of a pulse: sensors report up to five
+
+/// Numbers groups in the order of their first member.
+std::vector<std::uint32_t> groups_by(std::size_t count, const auto& key_of) {
+  std::map<decltype(key_of(0)), std::uint32_t> known;
+  std::vector<std::uint32_t> groups(count);
+  for (std::size_t i = 0; i < count; ++i) {
+    const auto next = static_cast<std::uint32_t>(known.size());
+    groups[i] = known.try_emplace(key_of(i), next).first->second;
+  }
+  return groups;
+}
+
+bool has_large_group(const std::vector<std::uint32_t>& groups) {
+  std::vector<std::size_t> sizes(groups.size());
+  return std::ranges::any_of(groups,
+                             [&](std::uint32_t group) { return ++sizes[group] > most_returns; });
+}
+
+std::vector<glm::dvec3> directions_of(const Scan& scan) {
+  std::vector<glm::dvec3> directions;
+  directions.reserve(scan.p_S.size());
+  for (const glm::dvec3& p : scan.p_S) directions.push_back(glm::normalize(p));
+  return directions;
+}
+
+/// Each return joins the first one before it that has its direction, and its ring and time.
+std::vector<std::uint32_t> groups_by_direction(const Scan& scan, const std::vector<double>* rings,
+                                               const std::vector<double>* times) {
+  const std::vector<glm::dvec3> directions = directions_of(scan);
+  const DirectionTree tree(directions);
+  std::vector<std::uint32_t> groups(directions.size(), none);
+  std::uint32_t count = 0;
+  for (std::uint32_t i = 0; i < groups.size(); ++i) {
+    std::uint32_t first = none;
+    tree.for_each_within(directions[i], same_pulse_rad, [&](std::uint32_t other, double) {
+      const bool is_alike = (rings == nullptr || (*rings)[other] == (*rings)[i]) &&
+                            (times == nullptr || (*times)[other] == (*times)[i]);
+      if (other < i && is_alike) first = std::min(first, other);
+    });
+    groups[i] = first == none ? count++ : groups[first];
+  }
+  return groups;
+}
+
+Pulses pulses_by(const Scan& scan, const std::vector<std::uint32_t>& groups,
+                 const std::vector<double>* rings, const std::vector<double>* times) {
+  Pulses pulses;
+  pulses.returns.resize(groups.size());
+  std::iota(pulses.returns.begin(), pulses.returns.end(), 0U);
+  std::ranges::stable_sort(pulses.returns, {}, [&](std::uint32_t i) { return groups[i]; });
+  for (std::size_t at = 0; at < groups.size(); ++at) {
+    const std::uint32_t i = pulses.returns[at];
+    if (groups[i] == pulses.size()) {
+      if (at > 0) pulses.begins.push_back(at);
+      pulses.directions.push_back(glm::normalize(scan.p_S[i]));
+      if (rings != nullptr) pulses.rings.push_back((*rings)[i]);
+      if (times != nullptr) pulses.times.push_back((*times)[i]);
+    }
+  }
+  if (!groups.empty()) pulses.begins.push_back(groups.size());
+  return pulses;
+}
+
+}  // namespace
+
+Pulses pulses_of(const Scan& scan) {
+  const std::size_t count = scan.p_S.size();
+  const auto* const rings = scan.find(Quantity::Ring);
+  const auto* times = scan.find(Quantity::Time);
+  std::vector<std::uint32_t> groups;
+  if (times != nullptr) {
+    groups = groups_by(count, [&](std::size_t i) {
+      return std::pair(rings == nullptr ? 0 : (*rings)[i], (*times)[i]);
+    });
+    if (rings != nullptr && has_large_group(groups)) times = nullptr;
+  }
+  if (const auto* const numbers = scan.find(Quantity::Pulse)) {
+    groups = groups_by(count, [numbers](std::size_t i) { return (*numbers)[i]; });
+  } else if (rings == nullptr || times == nullptr) {
+    groups = groups_by_direction(scan, rings, times);
+  }
+  return pulses_by(scan, groups, rings, times);
+}
+
+}  // namespace groundray::golden

@@ -1,0 +1,38 @@
+#include "apps/golden/report.h"
+
+#include <algorithm>
+#include <cmath>
+#include <cstddef>
+
+namespace groundray::golden {
+
+Verdict verdict_of(const std::vector<Measure>& measures) {
+  const auto any = [&](Verdict verdict) {
+    return std::ranges::find(measures, verdict, &Measure::verdict) != measures.end();
+  };
+  if (any(Verdict::Failed)) return Verdict::Failed;
+  return any(Verdict::Passed) ? Verdict::Passed : Verdict::Told;
+}
+
+Histogram histogram_of(std::string title, std::string unit, const std::vector<double>& values,
+                       double low, double high, std::size_t bins) {
+  Histogram histogram{.title = std::move(title),
+                      .unit = std::move(unit),
+                      .low = low,
+                      .high = high,
+                      .counts = std::vector<std::uint64_t>(bins)};
+  for (const double value : values) {
+    if (!std::isfinite(value)) continue;
+    if (value < low) {
+      ++histogram.below;
+    } else if (value > high || bins == 0 || !(high > low)) {
+      ++histogram.above;
+    } else {  // the last step is closed on both sides
+      const double place = (value - low) / (high - low) * static_cast<double>(bins);
+      ++histogram.counts[std::min(static_cast<std::size_t>(place), bins - 1)];
+    }
+  }
+  return histogram;
+}
+
+}  // namespace groundray::golden

@@ -1,0 +1,133 @@
+#include "apps/golden/suite/columns.h"
+
+#include <algorithm>
+#include <chrono>
+#include <cmath>
+#include <string>
+#include <type_traits>
+#include <utility>
+#include <variant>
+
+#include "core/error.h"
+#include "core/exr_reader.h"
+#include "core/image_io.h"
+#include "core/npy_reader.h"
+#include "core/ply_io.h"
+#include "core/product_io.h"
+
+namespace groundray::golden {
+namespace {
+
+// What formulas can name.
+std::string plain(std::string name) {
+  std::ranges::replace_if(
+      name, [](char c) { return c == '.' || c == '-'; }, '_');
+  if (name.empty() || (name.front() >= '0' && name.front() <= '9')) name.insert(0, "v");
+  return name;
+}
+
+template <typename T>
+constexpr Stored stored_as() {
+  if (std::is_same_v<T, double>) return Stored::Double;
+  return std::is_same_v<T, float> ? Stored::Float : Stored::Whole;
+}
+
+template <typename Values>
+Columns::Column column_of(std::string name, const Values& values) {
+  using T = std::remove_cvref_t<decltype(*values.begin())>;
+  return {plain(std::move(name)), std::vector<double>(values.begin(), values.end()),
+          stored_as<T>()};
+}
+
+Columns columns_of(const PointCloud& cloud) {
+  Columns columns{.rows = cloud.rows(), .all = {}};
+  for (const PointCloud::Column& column : cloud.columns()) {
+    std::visit([&](const auto& values) { columns.all.push_back(column_of(column.name, values)); },
+               column.values);
+  }
+  return columns;
+}
+
+std::size_t pixels_of(glm::ivec2 size_px) {
+  return static_cast<std::size_t>(size_px.x) * static_cast<std::size_t>(size_px.y);
+}
+
+Columns read_exr_columns(const std::filesystem::path& file) {
+  const ExrFile exr = read_exr(file);
+  const glm::ivec2 size_px(exr.width, exr.height);
+  Columns columns{.rows = pixels_of(size_px), .all = {}, .size_px = size_px};
+  for (const ExrChannel& channel : exr.channels) {
+    std::visit(
+        [&](const auto& image) { columns.all.push_back(column_of(channel.name, image.values())); },
+        channel.image);
+  }
+  return columns;
+}
+
+// The first byte after the size in a PNG's header.
+bool has_16_bits(const std::filesystem::path& file) {
+  constexpr std::size_t place = 24;
+  const std::string bytes = read_text(file);
+  return bytes.size() > place && bytes[place] == 16;
+}
+
+template <typename T>
+void add_channels(const Image<T>& image, double scale, Columns& columns) {
+  const auto channels = static_cast<std::size_t>(image.channels());
+  for (std::size_t k = 0; k < channels; ++k) {
+    std::vector<double> values(columns.rows);
+    for (std::size_t i = 0; i < columns.rows; ++i)
+      values[i] = std::round(scale * static_cast<double>(image.values()[i * channels + k]));
+    columns.all.push_back({"v" + std::to_string(k), std::move(values), Stored::Whole});
+  }
+}
+
+Columns read_png_columns(const std::filesystem::path& file) {
+  const auto columns_for = [](const auto& image, double scale) {
+    const glm::ivec2 size_px(image.width(), image.height());
+    Columns columns{.rows = pixels_of(size_px), .all = {}, .size_px = size_px};
+    add_channels(image, scale, columns);
+    return columns;
+  };
+  if (has_16_bits(file)) return columns_for(read_heights(file), 65535);
+  return columns_for(read_image8(file), 1);
+}
+
+Columns read_pose_columns(const std::filesystem::path& file) {
+  const Trajectory path = read_tum(file);
+  Columns columns{.rows = path.samples().size(), .all = {}};
+  using Sample = Trajectory::Sample;
+  const auto add = [&](const char* name, const auto& value_of) {
+    std::vector<double> values;
+    for (const Sample& pose : path.samples()) values.push_back(value_of(pose));
+    columns.all.push_back({name, std::move(values), Stored::Double});
+  };
+  add("time", [](const Sample& p) { return std::chrono::duration<double>(p.time).count(); });
+  add("x", [](const Sample& p) { return p.pose.translation_m.x; });
+  add("y", [](const Sample& p) { return p.pose.translation_m.y; });
+  add("z", [](const Sample& p) { return p.pose.translation_m.z; });
+  add("qx", [](const Sample& p) { return p.pose.rotation.x; });
+  add("qy", [](const Sample& p) { return p.pose.rotation.y; });
+  add("qz", [](const Sample& p) { return p.pose.rotation.z; });
+  add("qw", [](const Sample& p) { return p.pose.rotation.w; });
+  return columns;
+}
+
+}  // namespace
+
+const Columns::Column* Columns::find(std::string_view name) const {
+  const auto found = std::ranges::find(all, name, &Column::name);
+  return found == all.end() ? nullptr : &*found;
+}
+
+Columns read_columns(const std::filesystem::path& file) {
+  const std::string kind = file.extension().string();
+  if (kind == ".ply") return columns_of(read_ply(file).cloud);
+  if (kind == ".exr") return read_exr_columns(file);
+  if (kind == ".png") return read_png_columns(file);
+  if (kind == ".npy") return columns_of(read_npy(file).cloud);
+  if (kind == ".tum") return read_pose_columns(file);
+  throw Error("{}: must be .ply, .exr, .png, .npy or .tum", file.string());
+}
+
+}  // namespace groundray::golden

@@ -1,0 +1,37 @@
+#pragma once
+
+#include <cstddef>
+#include <filesystem>
+#include <glm/vec2.hpp>
+#include <string>
+#include <string_view>
+#include <vector>
+
+namespace groundray::golden {
+
+/// What the numbers of a column were stored as: how near the next one is.
+enum class Stored { Double, Float, Whole };
+
+/// Named columns of one length: the echoes of a scan, or the pixels of an image row by row.
+struct Columns {
+  struct Column {
+    std::string name;
+    std::vector<double> values;
+    Stored stored = Stored::Double;
+  };
+  std::size_t rows = 0;
+  std::vector<Column> all;
+  glm::ivec2 size_px{0};  ///< of an image; else 0
+
+  /// Returns a column by its name, or null.
+  const Column* find(std::string_view name) const;
+};
+
+/// Returns what a file of a dataset holds: the vertices of a PLY file, the channels of an EXR file
+/// or of a PNG (`v0`, `v1`, ..., as stored), the fields of a NumPy array, or the poses of a TUM
+/// file
+/// (`time`, `x` to `z`, `qx` to `qw`). Dots and dashes in names become underscores.
+/// @throws Error if the file is missing, damaged, or of another kind.
+Columns read_columns(const std::filesystem::path& file);
+
+}  // namespace groundray::golden

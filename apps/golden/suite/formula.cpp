@@ -1,0 +1,46 @@
+#include "apps/golden/suite/formula.h"
+
+#include <muParser.h>
+
+#include <cmath>
+#include <numbers>
+
+#include "core/error.h"
+
+namespace groundray::golden {
+namespace {
+
+double floor_of(double value) { return std::floor(value); }
+double cbrt_of(double value) { return std::cbrt(value); }
+double erf_of(double value) { return std::erf(value); }
+double mod_of(double x, double y) { return x - y * std::floor(x / y); }
+double hypot_of(double x, double y) { return std::hypot(x, y); }
+
+// muParser wants places that it could write to.
+void define(mu::Parser& parser, const std::string& name, const std::vector<double>& values) {
+  parser.DefineVar(name, const_cast<double*>(values.data()));
+}
+
+}  // namespace
+
+std::vector<double> evaluate(const std::string& formula, const Columns& columns) {
+  std::vector<double> values(columns.rows);
+  if (columns.rows == 0) return values;
+  try {
+    mu::Parser parser;
+    parser.DefineFun("floor", floor_of);
+    parser.DefineFun("cbrt", cbrt_of);
+    parser.DefineFun("erf", erf_of);
+    parser.DefineFun("hypot", hypot_of);
+    parser.DefineFun("mod", mod_of);
+    parser.DefineConst("pi", std::numbers::pi);
+    for (const Columns::Column& column : columns.all) define(parser, column.name, column.values);
+    parser.SetExpr(formula);
+    parser.Eval(values.data(), static_cast<int>(values.size()));
+  } catch (const mu::Parser::exception_type& fault) {
+    throw Error("formula '{}': {}", formula, fault.GetMsg());
+  }
+  return values;
+}
+
+}  // namespace groundray::golden

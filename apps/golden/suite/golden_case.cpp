@@ -1,0 +1,145 @@
+#include "apps/golden/suite/golden_case.h"
+
+#include <algorithm>
+#include <array>
+#include <optional>
+
+#include "core/error.h"
+#include "sensors/yaml_reader.h"
+
+namespace groundray::golden {
+namespace {
+
+using yaml::Faults;
+using yaml::Map;
+using yaml::Need;
+
+constexpr yaml::Rule a_share{[](double value) { return value > 0 && value <= 1; },
+                             "must be in (0, 1]"};
+
+template <typename Formulas>
+void read_formulas(Map& map, Formulas& check) {
+  map.read_text("is", Need::Required, check.is);
+  map.read_text("within", Need::Required, check.within);
+}
+
+std::vector<std::string> read_names(Map& map, const char* key, Faults& faults) {
+  std::vector<std::string> names;
+  for (const yaml::Node& item : map.list(key, Need::Required)) {
+    if (yaml::is_text(item, key, faults)) names.push_back(item.text);
+  }
+  return names;
+}
+
+std::optional<FigureCheck> read_figure(Map& map) {
+  using Kind = FigureCheck::Kind;
+  constexpr std::array<std::pair<const char*, Kind>, 4> kinds = {{{"mean", Kind::Mean},
+                                                                  {"deviation", Kind::Deviation},
+                                                                  {"smallest", Kind::Smallest},
+                                                                  {"largest", Kind::Largest}}};
+  FigureCheck check;
+  if (map.find("count", Need::Optional) != nullptr) {
+    map.read_text("count", Need::Required, check.is);
+    check.kind = Kind::Count;
+    check.within = "0";
+    return check;
+  }
+  for (const auto& entry : kinds) {
+    if (map.read_text(entry.first, Need::Optional, check.value) == nullptr) continue;
+    check.kind = entry.second;
+    read_formulas(map, check);
+    return check;
+  }
+  return std::nullopt;
+}
+
+void read_check(const yaml::Node& node, ProductChecks& product, Faults& faults) {
+  Map map(node, "checks", faults);
+  Check check{.what = {}, .because = {}, .line = node.line};
+  std::string whole;
+  if (RowsCheck rows; map.read_text("each", Need::Optional, rows.value) != nullptr) {
+    read_formulas(map, rows);
+    map.read_number("share", Need::Optional, rows.share, a_share);
+    check.what = rows;
+  } else if (map.read_text("exact", Need::Optional, whole) != nullptr) {
+    if (whole != "all") faults.add(node, "exact", "must be 'all'");
+    check.what = ExactCheck{};
+  } else if (map.find("statistical", Need::Optional) != nullptr) {
+    StatisticalCheck statistical{.columns = read_names(map, "statistical", faults)};
+    map.read_number("share", Need::Optional, statistical.share, a_share);
+    check.what = statistical;
+  } else if (const auto figure = read_figure(map)) {
+    check.what = *figure;
+  } else {
+    faults.add(node, "checks",
+               "must have one of each, count, mean, deviation, smallest, largest, exact and "
+               "statistical");
+  }
+  map.read_text("because", Need::Required, check.because);
+  map.close();
+  product.checks.push_back(std::move(check));
+}
+
+void read_product(const yaml::Node& node, GoldenCase& into, Faults& faults) {
+  Map map(node, "products", faults);
+  ProductChecks product;
+  map.read_text("file", Need::Required, product.product);
+  map.read_text("rows", Need::Optional, product.rows);
+  for (const yaml::Node& item : map.list("let", Need::Optional)) {
+    if (item.kind != yaml::Node::Kind::Map || item.items.size() != 2 ||
+        !yaml::is_text(item.items[1], "let", faults)) {
+      faults.add(item, "let", "must be a list of `name: formula`");
+      continue;
+    }
+    product.names.emplace_back(item.items[0].text, item.items[1].text);
+  }
+  for (const yaml::Node& item : map.list("checks", Need::Required))
+    read_check(item, product, faults);
+  map.close();
+  into.products.push_back(std::move(product));
+}
+
+bool is_wanted(const std::string& name, const std::vector<std::string>& filters) {
+  return filters.empty() || std::ranges::any_of(filters, [&](const std::string& filter) {
+           return name.find(filter) != std::string::npos;
+         });
+}
+
+}  // namespace
+
+GoldenCase read_case(const std::filesystem::path& folder) {
+  const std::filesystem::path file = folder / "case.yaml";
+  GoldenCase into{
+      .name = folder.filename().string(), .folder = folder, .title = {}, .products = {}};
+  const yaml::Node root = yaml::parse(yaml::read_file(file), file);
+  Faults faults(file);
+  Map map(root, "", faults);
+  yaml::check_version(map, "groundray_golden", faults);
+  map.read_text("title", Need::Required, into.title);
+  for (const yaml::Node& item : map.list("products", Need::Required))
+    read_product(item, into, faults);
+  map.close();
+  faults.throw_if_any();
+  return into;
+}
+
+std::vector<GoldenCase> read_cases(const std::filesystem::path& folder,
+                                   const std::vector<std::string>& filters) {
+  if (!std::filesystem::is_directory(folder)) {
+    throw Error("{}: there is no such folder of cases; name one by --cases", folder.string());
+  }
+  std::vector<std::filesystem::path> folders;
+  for (const auto& entry : std::filesystem::directory_iterator(folder)) {
+    if (std::filesystem::exists(entry.path() / "case.yaml") &&
+        is_wanted(entry.path().filename().string(), filters)) {
+      folders.push_back(entry.path());
+    }
+  }
+  if (folders.empty()) throw Error("{}: holds no case of that name", folder.string());
+  std::ranges::sort(folders);
+  std::vector<GoldenCase> cases;
+  for (const auto& each : folders) cases.push_back(read_case(each));
+  return cases;
+}
+
+}  // namespace groundray::golden

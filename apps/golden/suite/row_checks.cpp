@@ -1,0 +1,167 @@
+#include "apps/golden/suite/row_checks.h"
+
+#include <fmt/format.h>
+
+#include <algorithm>
+#include <cmath>
+#include <limits>
+#include <numeric>
+#include <vector>
+
+#include "apps/golden/suite/false_colour.h"
+#include "apps/golden/suite/formula.h"
+#include "core/error.h"
+
+namespace groundray::golden {
+namespace {
+
+struct Difference {
+  std::vector<double> of_rows;    // value - expected
+  std::vector<double> tolerance;  // of each
+  std::size_t beyond = 0;         // how many exceed it
+  std::size_t worst = 0;          // row of the largest share of its tolerance
+};
+
+// What is not finite must be equal; NaN is equal to NaN.
+double difference(double value, double expected) {
+  if (value == expected || (std::isnan(value) && std::isnan(expected))) return 0;
+  const double apart = value - expected;
+  return std::isfinite(apart) ? apart : std::numeric_limits<double>::infinity();
+}
+
+Difference differences(const std::vector<double>& values, const std::vector<double>& expected,
+                       std::vector<double> tolerance) {
+  Difference found{.of_rows = std::vector<double>(values.size()),
+                   .tolerance = std::move(tolerance)};
+  double largest = -1;
+  for (std::size_t i = 0; i < values.size(); ++i) {
+    const double apart = found.of_rows[i] = difference(values[i], expected[i]);
+    const bool holds = std::abs(apart) <= found.tolerance[i];
+    if (!holds) ++found.beyond;
+    // A tolerance of 0 that holds is used up to nothing, not to 0 / 0.
+    const double used = apart == 0 ? (holds ? 0 : std::numeric_limits<double>::infinity())
+                                   : std::abs(apart) / std::max(found.tolerance[i],
+                                                                std::numeric_limits<double>::min());
+    if (used > largest) {
+      largest = used;
+      found.worst = i;
+    }
+  }
+  return found;
+}
+
+void draw(const std::string& what, const std::vector<double>& values,
+          const std::vector<double>& expected, const Difference& found, const Columns& columns,
+          Section& into) {
+  const double widest = 2 * *std::ranges::max_element(found.tolerance, [](double a, double b) {
+                          return !(a >= b);
+                        });  // NaN is least
+  into.histograms.push_back(
+      histogram_of(what + ": value - expected", "", found.of_rows, -widest, widest));
+  if (columns.size_px.x == 0) return;
+  const auto [low, high] = finite_range(expected);
+  into.pictures.push_back({fmt::format("{}: expected, {:.6g} to {:.6g}", what, low, high),
+                           false_colour(expected, columns.size_px, low, high)});
+  into.pictures.push_back({what + ": actual", false_colour(values, columns.size_px, low, high)});
+  into.pictures.push_back({fmt::format("{}: difference, -{:.3g} to {:.3g}", what, widest, widest),
+                           false_colour(found.of_rows, columns.size_px, -widest, widest)});
+}
+
+double sum_of(const std::vector<double>& values) {
+  return std::accumulate(values.begin(), values.end(), 0.0);
+}
+
+double figure_of(FigureCheck::Kind kind, const std::vector<double>& values) {
+  const auto rows = static_cast<double>(values.size());
+  switch (kind) {
+    case FigureCheck::Kind::Count:
+      return rows;
+    case FigureCheck::Kind::Mean:
+      return sum_of(values) / rows;
+    case FigureCheck::Kind::Smallest:
+      return *std::ranges::min_element(values);
+    case FigureCheck::Kind::Largest:
+      return *std::ranges::max_element(values);
+    case FigureCheck::Kind::Deviation:
+      break;
+  }
+  const double mean = sum_of(values) / rows;
+  const double squares = std::accumulate(
+      values.begin(), values.end(), 0.0,
+      [&](double sum, double value) { return sum + (value - mean) * (value - mean); });
+  return std::sqrt(squares / (rows - 1));
+}
+
+const char* word_of(FigureCheck::Kind kind) {
+  switch (kind) {
+    case FigureCheck::Kind::Count:
+      return "number of rows";
+    case FigureCheck::Kind::Mean:
+      return "mean of";
+    case FigureCheck::Kind::Deviation:
+      return "standard deviation of";
+    case FigureCheck::Kind::Smallest:
+      return "smallest";
+    case FigureCheck::Kind::Largest:
+      break;
+  }
+  return "largest";
+}
+
+// The value of a formula of the number of rows.
+double number_of(const std::string& formula, std::size_t rows) {
+  const Columns one{.rows = 1, .all = {{"rows", {static_cast<double>(rows)}, Stored::Whole}}};
+  return evaluate(formula, one).front();
+}
+
+}  // namespace
+
+void check_rows(const RowsCheck& check, const std::string& because, const Columns& columns,
+                Section& into) {
+  const std::string what = fmt::format("{} = {}", check.value, check.is);
+  if (columns.rows == 0) throw Error("{}: there is no row to hold against it", what);
+  const std::vector<double> values = evaluate(check.value, columns);
+  const std::vector<double> expected = evaluate(check.is, columns);
+  const Difference found = differences(values, expected, evaluate(check.within, columns));
+  const double at_most = static_cast<double>(columns.rows) * (1 - check.share);
+  const auto beyond = static_cast<double>(found.beyond);
+  into.measures.push_back(
+      {.name = what + fmt::format(", rows beyond {}", check.within),
+       .value = beyond,
+       .unit = fmt::format("of {}", columns.rows),
+       .limit = std::floor(at_most * (1 + 1e-12)),
+       .because = because,
+       .verdict = beyond <= at_most * (1 + 1e-12) ? Verdict::Passed : Verdict::Failed});
+  into.measures.push_back(
+      {.name = fmt::format("at row {}, the worst: {:.17g} for {:.17g}; off by", found.worst,
+                           values[found.worst], expected[found.worst]),
+       .value = std::abs(found.of_rows[found.worst]),
+       .unit = "",
+       .limit = found.tolerance[found.worst],
+       .because = "",
+       .verdict = Verdict::Told});
+  draw(what, values, expected, found, columns, into);
+}
+
+void check_figure(const FigureCheck& check, const std::string& because, const Columns& columns,
+                  Section& into) {
+  const bool counts = check.kind == FigureCheck::Kind::Count;
+  if (!counts && columns.rows == 0)
+    throw Error("{} {}: there is no row", word_of(check.kind), check.value);
+  const std::vector<double> values =
+      counts ? std::vector<double>(columns.rows) : evaluate(check.value, columns);
+  const double figure = figure_of(check.kind, values);
+  const double expected = number_of(check.is, columns.rows);
+  const double tolerance = number_of(check.within, columns.rows);
+  const double apart = std::abs(difference(figure, expected));
+  into.measures.push_back(
+      {.name = fmt::format("{} {} = {}: {:.10g} for {:.10g}; off by", word_of(check.kind),
+                           check.value, check.is, figure, expected),
+       .value = apart,
+       .unit = "",
+       .limit = tolerance,
+       .because = because,
+       .verdict = apart <= tolerance ? Verdict::Passed : Verdict::Failed});
+}
+
+}  // namespace groundray::golden

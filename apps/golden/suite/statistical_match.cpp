@@ -1,0 +1,177 @@
+#include "apps/golden/suite/statistical_match.h"
+
+#include <fmt/format.h>
+
+#include <algorithm>
+#include <boost/math/distributions/normal.hpp>
+#include <boost/math/distributions/students_t.hpp>
+#include <cmath>
+
+#include "apps/golden/suite/false_colour.h"
+#include "core/error.h"
+
+namespace groundray::golden {
+namespace {
+
+constexpr double significance = 0.01;  // of each kind of test, as Mitsuba's tests take it
+constexpr int block_px = 8;
+// Below it a mean and an image, both stored as floats, do not tell a difference.
+constexpr double float_rounding = 2.4e-7;
+
+const Columns::Column& column_of(const Columns& columns, const std::string& name) {
+  const Columns::Column* column = columns.find(name);
+  if (column == nullptr) throw Error("there is no column {}", name);
+  return *column;
+}
+
+// Of each of so many tests.
+double significance_of_one(std::size_t tests) {
+  return -std::expm1(std::log1p(-significance) / static_cast<double>(tests));
+}
+
+// Two-sided limit of |t|.
+double student_limit(std::size_t tests) {
+  return boost::math::quantile(boost::math::complement(
+      boost::math::students_t(statistical_runs - 1), significance_of_one(tests) / 2));
+}
+
+double normal_limit(std::size_t tests) {
+  return boost::math::quantile(
+      boost::math::complement(boost::math::normal(), significance_of_one(tests) / 2));
+}
+
+struct Channel {
+  const std::vector<double>&actual, &mean, &variance;
+  glm::ivec2 size_px;
+
+  std::size_t index(int x, int y) const {
+    return static_cast<std::size_t>(y) * static_cast<std::size_t>(size_px.x) +
+           static_cast<std::size_t>(x);
+  }
+
+  // Of the mean of some pixels: how many standard deviations it is off. The stored mean has a
+  // variance too.
+  double deviations(int x0, int y0, int x1, int y1) const {
+    double off = 0, variances = 0, light = 0;
+    for (int y = y0; y < y1; ++y) {
+      for (int x = x0; x < x1; ++x) {
+        const std::size_t i = index(x, y);
+        off += actual[i] - mean[i];
+        variances += variance[i];
+        light += std::abs(mean[i]);
+      }
+    }
+    const double rounding = float_rounding * light;
+    if (!(std::abs(off) > rounding)) return std::isnan(off) ? INFINITY : 0;
+    return std::abs(off) /
+           std::sqrt(variances * (1 + 1.0 / statistical_runs) + rounding * rounding);
+  }
+};
+
+std::size_t blocks_along(int pixels) {
+  return static_cast<std::size_t>((pixels + block_px - 1) / block_px);
+}
+
+double largest_of_blocks(const Channel& channel) {
+  double largest = 0;
+  for (int y = 0; y < channel.size_px.y; y += block_px) {
+    for (int x = 0; x < channel.size_px.x; x += block_px) {
+      largest =
+          std::max(largest, channel.deviations(x, y, std::min(x + block_px, channel.size_px.x),
+                                               std::min(y + block_px, channel.size_px.y)));
+    }
+  }
+  return largest;
+}
+
+void tell(std::string name, double value, std::string unit, double limit,
+          const std::string& because, Section& into) {
+  into.measures.push_back({.name = std::move(name),
+                           .value = value,
+                           .unit = std::move(unit),
+                           .limit = limit,
+                           .because = because,
+                           .verdict = value <= limit ? Verdict::Passed : Verdict::Failed});
+}
+
+void draw(const std::string& name, const Channel& channel, const std::vector<double>& deviations,
+          Section& into) {
+  const auto [low, high] = finite_range(channel.mean);
+  into.pictures.push_back({fmt::format("{}: expected mean, {:.4g} to {:.4g}", name, low, high),
+                           false_colour(channel.mean, channel.size_px, low, high)});
+  into.pictures.push_back(
+      {name + ": actual", false_colour(channel.actual, channel.size_px, low, high)});
+  into.pictures.push_back({name + ": standard deviations off, 0 to 6",
+                           false_colour(deviations, channel.size_px, 0, 6)});
+  into.histograms.push_back(histogram_of(name + ": standard deviations off", "", deviations, 0, 8));
+}
+
+}  // namespace
+
+void Moments::add(const Columns& product) {
+  if (product.size_px.x == 0) throw Error("it is no image");
+  if (runs_ == 0) {
+    mean_ = {.rows = product.rows, .all = {}, .size_px = product.size_px};
+    for (const std::string& name : names_) {
+      for (const char* what : {"Mean_", "Variance_"})
+        mean_.all.push_back({what + name, std::vector<double>(product.rows), Stored::Float});
+    }
+  }
+  if (product.size_px != mean_.size_px) throw Error("its size differs from run to run");
+  ++runs_;
+  for (std::size_t k = 0; k < names_.size(); ++k) {
+    const auto& values = column_of(product, names_[k]).values;
+    auto& means = mean_.all[2 * k].values;
+    auto& squares = mean_.all[2 * k + 1].values;
+    for (std::size_t i = 0; i < values.size(); ++i) {  // Welford (1962)
+      const double off = values[i] - means[i];
+      means[i] += off / runs_;
+      squares[i] += off * (values[i] - means[i]);
+    }
+  }
+}
+
+Columns Moments::columns() const {
+  Columns columns = mean_;
+  for (std::size_t k = 1; k < columns.all.size(); k += 2) {
+    for (double& value : columns.all[k].values) value /= runs_ - 1;
+  }
+  return columns;
+}
+
+void check_statistically(const StatisticalCheck& check, const std::string& because,
+                         const Columns& image, const Columns& moments, Section& into) {
+  if (image.size_px != moments.size_px || image.size_px.x == 0) {
+    throw Error("it is {} x {} px; the stored image is {} x {} px", image.size_px.x,
+                image.size_px.y, moments.size_px.x, moments.size_px.y);
+  }
+  const std::size_t tests = image.rows * check.columns.size();
+  const double limit = student_limit(tests);
+  const std::size_t blocks =
+      blocks_along(image.size_px.x) * blocks_along(image.size_px.y) * check.columns.size();
+  std::size_t beyond = 0;
+  double of_blocks = 0, of_channels = 0;
+  for (const std::string& name : check.columns) {
+    const Channel channel{column_of(image, name).values, column_of(moments, "Mean_" + name).values,
+                          column_of(moments, "Variance_" + name).values, image.size_px};
+    std::vector<double> deviations(image.rows);
+    for (int y = 0; y < image.size_px.y; ++y) {
+      for (int x = 0; x < image.size_px.x; ++x)
+        deviations[channel.index(x, y)] = channel.deviations(x, y, x + 1, y + 1);
+    }
+    beyond += static_cast<std::size_t>(
+        std::ranges::count_if(deviations, [&](double value) { return value > limit; }));
+    of_blocks = std::max(of_blocks, largest_of_blocks(channel));
+    of_channels = std::max(of_channels, channel.deviations(0, 0, image.size_px.x, image.size_px.y));
+    draw(name, channel, deviations, into);
+  }
+  tell(fmt::format("values more than {:.2f} standard deviations off", limit),
+       static_cast<double>(beyond), fmt::format("of {}", tests),
+       std::floor(static_cast<double>(tests) * (1 - check.share) * (1 + 1e-12)), because, into);
+  tell(fmt::format("worst of {} blocks of 8 x 8 pixels", blocks), of_blocks, "standard deviations",
+       normal_limit(blocks), because, into);
+  tell("worst mean of a channel", of_channels, "standard deviations",
+       normal_limit(check.columns.size()), because, into);
+}
+
+}  // namespace groundray::golden

@@ -1,0 +1,231 @@
+"""`groundray-golden compare` on files that other people's software writes, and on bad ones."""
+
+import json
+import os
+import subprocess
+import sys
+from html.parser import HTMLParser
+from pathlib import Path
+
+import cv2
+import numpy as np
+import open3d as o3d
+import OpenEXR
+import pytest
+import trimesh
+from plyfile import PlyData, PlyElement
+
+ROOT = Path(__file__).resolve().parents[2]
+PROGRAM = Path(os.environ.get("GROUNDRAY", ROOT / "build/release/bin/groundray"))
+GOLDEN = PROGRAM.parent / "groundray-golden"
+DEM = ROOT / "data/terrain/prairie_1m.tif"
+
+
+def compare(reference, other, *options, out):
+    command = [GOLDEN, "compare", reference, other, "-o", out, *map(str, options)]
+    return subprocess.run(command, capture_output=True, text=True, timeout=300, check=False)
+
+
+def figures(reference, other, *options, out):
+    """Returns the figures by name, and all of the report."""
+    result = compare(reference, other, *options, out=out)
+    assert result.returncode in (0, 1), result.stderr
+    report = json.loads((out / "report.json").read_text())
+    (section,) = report["sections"]
+    page = HTMLParser()
+    page.feed((out / "report.html").read_text())
+    return {m["name"]: m["value"] for m in section["measures"]}, section, result
+
+
+@pytest.fixture(scope="module")
+def scan(tmp_path_factory):
+    """A dome of directions at 5 to 20 m: 16 rings of 200."""
+    rng = np.random.default_rng(5)
+    azimuth, elevation = np.meshgrid(
+        np.linspace(0, 2 * np.pi, 200, endpoint=False), np.radians(np.arange(-30, 2, 2))
+    )
+    direction = np.stack(
+        [
+            np.cos(elevation) * np.cos(azimuth),
+            np.cos(elevation) * np.sin(azimuth),
+            np.sin(elevation),
+        ],
+        -1,
+    ).reshape(-1, 3)
+    range_m = rng.uniform(5, 20, len(direction))
+    ring = np.repeat(np.arange(16), 200).astype(np.uint16)
+    return direction, range_m, ring
+
+
+def write_ply(path, points, **columns):
+    names = ["x", "y", "z", *columns]
+    arrays = [*points.T.astype(np.float32), *columns.values()]
+    rows = np.rec.fromarrays(arrays, names=",".join(names))
+    PlyData([PlyElement.describe(np.asarray(rows), "vertex")]).write(path)
+    return path
+
+
+def write_pcd(path, points):
+    cloud = o3d.geometry.PointCloud(o3d.utility.Vector3dVector(points))
+    o3d.io.write_point_cloud(str(path), cloud, compressed="compressed" in path.stem)
+    return path
+
+
+WRITERS = {
+    "theirs.ply": write_ply,
+    "theirs.pcd": write_pcd,
+    "compressed.pcd": write_pcd,
+    "theirs.npy": lambda path, points: np.save(path, points),
+    "theirs.npz": lambda path, points: np.savez_compressed(path, points=points),
+    "theirs.bin": lambda path, points: (
+        np.c_[points, np.ones(len(points))].astype("<f4").tofile(path)
+    ),
+}
+
+
+@pytest.mark.parametrize("name", WRITERS)
+def test_scans_of_any_form_have_the_errors_that_were_put_in(name, scan, tmp_path):
+    """5 cm too far, a tenth missing, in random order; floats of 20 m are 2e-6 m apart."""
+    direction, range_m, ring = scan
+    reference = write_ply(tmp_path / "reference.ply", direction * range_m[:, None], ring=ring)
+    kept = np.arange(len(range_m)) % 10 != 0
+    points = (direction * (range_m[:, None] + 0.05))[kept]
+    points = points[np.random.default_rng(1).permutation(len(points))]
+    WRITERS[name](tmp_path / name, points)
+    figure, _, _ = figures(reference, tmp_path / name, out=tmp_path / "out")
+    assert figure["pairs of returns"] == kept.sum()
+    assert figure["missing returns"] == (~kept).sum()
+    assert figure["extra returns"] == 0
+    assert figure["range error, mean"] == pytest.approx(0.05, abs=1e-6)
+    assert figure["range error, largest magnitude"] == pytest.approx(0.05, abs=5e-6)
+    assert figure["range error, standard deviation"] < 2e-6
+
+
+def test_limits_decide_the_exit_code(scan, tmp_path):
+    direction, range_m, ring = scan
+    reference = write_ply(tmp_path / "reference.ply", direction * range_m[:, None], ring=ring)
+    other = write_ply(tmp_path / "other.ply", direction * (range_m[:, None] + 0.05), ring=ring)
+    good = compare(reference, other, "--most-range-rms-m", 0.051, out=tmp_path / "out")
+    bad = compare(reference, other, "--most-range-rms-m", 0.049, out=tmp_path / "out")
+    assert (good.returncode, bad.returncode) == (0, 1)
+    assert "FAILED range error, RMS" in bad.stdout
+
+
+def test_the_unit_is_stated_and_not_guessed(scan, tmp_path):
+    direction, range_m, ring = scan
+    reference = write_ply(tmp_path / "reference.ply", direction * range_m[:, None], ring=ring)
+    other = write_ply(tmp_path / "other.ply", 1000 * direction * range_m[:, None], ring=ring)
+    wrong, section, _ = figures(reference, other, out=tmp_path / "out")
+    assert wrong["range error, median"] > 4000
+    assert "--unit-m" in section["text"] or "unit" in section["text"]
+    right, _, _ = figures(reference, other, "--unit-m", 0.001, out=tmp_path / "out")
+    assert abs(right["range error, largest magnitude"]) < 1e-5
+
+
+def write_exr(path, **channels):
+    header = {"compression": OpenEXR.ZIP_COMPRESSION, "type": OpenEXR.scanlineimage}
+    arrays = {name: np.asarray(value, np.float32) for name, value in channels.items()}
+    OpenEXR.File(header, arrays).write(str(path))
+    return path
+
+
+def test_images_have_the_errors_that_were_put_in(tmp_path):
+    rng = np.random.default_rng(3)
+    depth = rng.uniform(2, 30, (40, 60))
+    reference = write_exr(tmp_path / "reference.exr", Z=depth)
+    other = write_exr(tmp_path / "other.exr", Z=depth + 0.125)
+    figure, _, _ = figures(reference, other, out=tmp_path / "out")
+    (mean,) = (v for n, v in figure.items() if n.startswith("Z") and "mean error" in n)
+    assert mean == pytest.approx(0.125, abs=1e-6)
+
+
+def test_kitti_depths_are_read_as_asked(tmp_path):
+    depth = np.random.default_rng(3).uniform(2, 30, (40, 60))
+    reference = write_exr(tmp_path / "reference.exr", Z=depth)
+    cv2.imwrite(str(tmp_path / "other.png"), np.round(256 * depth).astype(np.uint16))
+    figure, _, _ = figures(
+        reference, tmp_path / "other.png", "--png", "kitti_depth", out=tmp_path / "out"
+    )
+    (largest,) = (v for n, v in figure.items() if n.startswith("Z") and "largest error" in n)
+    assert largest <= 0.5 / 256 + 1e-6
+
+
+def test_dems_have_the_errors_that_were_put_in(tmp_path):
+    lifted = tmp_path / "other.tif"
+    translate = ["gdal_translate", "-q", "-of", "GTiff", "-ot", "Float64"]
+    subprocess.run([*translate, "-a_offset", "0.25", DEM, lifted], check=True)
+    figure, _, _ = figures(DEM, lifted, out=tmp_path / "out")
+    assert figure["height: mean error"] == pytest.approx(0.25, abs=1e-6)
+    assert figure["height: largest error"] == pytest.approx(0.25, abs=1e-4)
+    assert figure["slope of triangles: largest error"] < 1e-3
+
+
+def test_meshes_have_the_distance_that_was_put_in(tmp_path):
+    """Two spheres of 1 and 1.05 m about one centre: 5 cm, but for the facets' sagitta."""
+    small, large = (trimesh.creation.icosphere(4, radius) for radius in (1, 1.05))
+    small.export(tmp_path / "small.ply")
+    large.export(tmp_path / "large.obj")
+    figure, _, _ = figures(tmp_path / "small.ply", tmp_path / "large.obj", out=tmp_path / "out")
+    low, high = (figure[f"Hausdorff distance, at {end}"] for end in ("least", "most"))
+    assert low <= high
+    assert low == pytest.approx(0.05, rel=0.05)
+    assert high - low < 1e-5
+
+
+def test_other_peoples_software_agrees(tmp_path):
+    """The example of docs/golden.md: Open3D traces the same surface in floats."""
+    pytest.importorskip("open3d")
+    command = [sys.executable, ROOT / "docs/compare_peers.py", tmp_path, PROGRAM.parent]
+    result = subprocess.run(command, capture_output=True, text=True, timeout=300, check=False)
+    assert result.returncode == 0, result.stdout + result.stderr
+    report = json.loads((tmp_path / "scan_report/report.json").read_text())
+    figure = {m["name"]: m["value"] for m in report["sections"][0]["measures"]}
+    assert figure["pairs of returns"] > 40_000
+    assert figure["missing returns"] == figure["extra returns"] == 0
+    # A float of 400 m is 3e-5 m apart, and grazing rays stretch that.
+    assert figure["range error, RMS"] < 1e-5
+    assert figure["range error, largest magnitude"] < 1e-3
+
+
+@pytest.mark.parametrize(
+    ("name", "content", "expected"),
+    [
+        ("empty.ply", b"", "empty.ply"),
+        (
+            "other.ply",
+            b"ply\nformat ascii 1.0\nelement vertex 1\nproperty float a\nend_header\n1\n",
+            "x",
+        ),
+        (
+            "cut.pcd",
+            b"VERSION .7\nFIELDS x y z\nSIZE 4 4 4\nTYPE F F F\nCOUNT 1 1 1\n"
+            b"WIDTH 9\nHEIGHT 1\nPOINTS 9\nDATA binary\nabc",
+            "cut.pcd",
+        ),
+        ("odd.bin", b"123", "16"),
+        ("theirs.las", b"LASF", "laspy"),
+        ("bad.npy", b"\x93NUMPY\x09", "bad.npy"),
+        ("bad.npz", b"PK\x03\x04", "bad.npz"),
+        ("what.xyz", b"1 2 3", "--as"),
+    ],
+)
+def test_garbage_is_one_clear_error(name, content, expected, scan, tmp_path):
+    direction, range_m, ring = scan
+    reference = write_ply(tmp_path / "reference.ply", direction * range_m[:, None], ring=ring)
+    (tmp_path / name).write_bytes(content)
+    options = [] if name == "what.xyz" else ["--as", "scan"]
+    first = tmp_path / name if name == "what.xyz" else reference
+    result = compare(first, tmp_path / name, *options, out=tmp_path / "out")
+    assert result.returncode == 1
+    assert expected in result.stderr
+    assert result.stderr.startswith("groundray-golden: ")
+    assert not (tmp_path / "out").exists()
+
+
+def test_images_of_two_sizes_are_refused(tmp_path):
+    a = write_exr(tmp_path / "a.exr", Z=np.ones((4, 5)))
+    b = write_exr(tmp_path / "b.exr", Z=np.ones((5, 4)))
+    result = compare(a, b, out=tmp_path / "out")
+    assert result.returncode == 1
+    assert "5 x 4" in result.stderr
+    assert "4 x 5" in result.stderr

@@ -1,0 +1,217 @@
+#include "apps/golden/compare/dem_comparison.h"
+
+#include <gmock/gmock.h>
+#include <gtest/gtest.h>
+
+#include <cmath>
+#include <limits>
+#include <numbers>
+#include <random>
+#include <string_view>
+
+#include "core/error.h"
+#include "core/product_io.h"
+#include "core/text_lines.h"
+#include "test/support/temporary_folder.h"
+
+namespace groundray::golden {
+namespace {
+
+using groundray::testing::TemporaryFolder;
+using ::testing::AllOf;
+using ::testing::ElementsAre;
+using ::testing::HasSubstr;
+using ::testing::Not;
+using ::testing::ThrowsMessage;
+
+constexpr float hole = std::numeric_limits<float>::quiet_NaN();
+
+/// A DEM of 2 m cells from north to south whose heights are what `height(x, y)` says, of D.
+template <typename Height>
+Dem dem(glm::ivec2 size, glm::dvec2 first_m, double step_m, const Height& height) {
+  std::vector<float> heights_m;
+  for (int row = 0; row < size.y; ++row) {
+    for (int column = 0; column < size.x; ++column)
+      heights_m.push_back(
+          static_cast<float>(height(first_m.x + column * step_m, first_m.y - row * step_m)));
+  }
+  return {HeightGrid(size, first_m, {step_m, -step_m}, std::move(heights_m)), {}, {}, {}};
+}
+
+/// With the height of one sample, or all, changed.
+template <typename Change>
+Dem changed(const Dem& from, const Change& change) {
+  std::vector<float> heights_m(from.grid.heights_m().begin(), from.grid.heights_m().end());
+  change(heights_m);
+  Dem result = from;
+  result.grid = HeightGrid(from.grid.frame().samples, from.grid.origin_m(), from.grid.step_m(),
+                           std::move(heights_m));
+  return result;
+}
+
+double hills(double x, double y) {
+  return 20 * std::sin(x / 17) + 15 * std::cos(y / 23) + 5 * std::sin((x + 2 * y) / 9);
+}
+
+double figure(const Section& section, const std::string& name) {
+  for (const Measure& measure : section.measures) {
+    if (measure.name == name) return measure.value;
+  }
+  ADD_FAILURE() << "there is no figure '" << name << "'";
+  return 0;
+}
+
+TEST(CompareDems, FindsNoDifferenceBetweenEqualOnes) {
+  const Dem one = dem({30, 20}, {0, 100}, 2, hills);
+  const Section section = compare_dems(one, one, "a");
+  for (const char* name : {"height: RMS error", "slope of triangles: largest error",
+                           "angle between triangles: largest",
+                           "holes in the other alone, and "
+                           "what lies beyond it"})
+    EXPECT_EQ(figure(section, name), 0) << name;
+  EXPECT_EQ(figure(section, "samples that both have"), 600);
+  EXPECT_THAT(section.text, AllOf(HasSubstr("sample by sample"), Not(HasSubstr("SHIFTED"))));
+  EXPECT_EQ(section.pictures.size(), 1u);
+}
+
+// On a plane of heights 0, with 0.5 m added everywhere, 2 m at a sample, and three holes.
+TEST(CompareDems, ReportsTheErrorsThatWereMade) {
+  const Dem flat = dem({20, 10}, {0, 0}, 2, [](double, double) { return 100.0; });
+  const Dem reference = changed(flat, [](std::vector<float>& heights) { heights[0] = hole; });
+  const Dem other = changed(flat, [](std::vector<float>& heights) {
+    for (float& height : heights) height += 0.5f;
+    heights[3 * 20 + 7] = 98;
+    heights[0] = heights[1] = heights[199] = hole;
+  });
+  const Section section = compare_dems(reference, other, "a");
+  EXPECT_EQ(figure(section, "samples that both have"), 197);
+  EXPECT_EQ(figure(section, "holes in both"), 1);
+  EXPECT_EQ(figure(section, "holes in the reference alone"), 0);
+  EXPECT_EQ(figure(section, "holes in the other alone, and what lies beyond it"), 2);
+  EXPECT_NEAR(figure(section, "height: mean error"), (196 * 0.5 - 2) / 197, 1e-12);
+  EXPECT_NEAR(figure(section, "height: RMS error"), std::sqrt((196 * 0.25 + 4) / 197), 1e-12);
+  EXPECT_NEAR(figure(section, "height: median error"), 0.5, 1e-12);
+  EXPECT_EQ(figure(section, "height: NMAD, 1.4826 times the median of |error - median|"), 0);
+  EXPECT_NEAR(figure(section, "height: largest error"), 2, 1e-12);
+  EXPECT_THAT(section.text, HasSubstr("Heights are worst in column 7, row 3 (east 14.000 m, north "
+                                      "-6.000 m): 98 m where the reference has 100 m."));
+  EXPECT_THAT(section.tables[0].rows,
+              ElementsAre(ElementsAre("0 to 5", "197", ::testing::_, ::testing::_, "0", "0.5")));
+}
+
+// The plane z = x tan(30 degrees) against z = x tan(40 degrees), and against its mirror.
+TEST(CompareDems, MeasuresSlopesOfTriangles) {
+  const auto tilted = [](double slope_deg) {
+    const double slope = std::tan(slope_deg * std::numbers::pi / 180);
+    return dem({8, 8}, {0, 0}, 2, [slope](double x, double) { return x * slope; });
+  };
+  const Section steeper = compare_dems(tilted(30), tilted(40), "a");
+  EXPECT_NEAR(figure(steeper, "slope of triangles: mean error"), 10, 1e-5);  // heights are floats
+  EXPECT_NEAR(figure(steeper, "angle between triangles: mean"), 10, 1e-5);
+  const Section mirrored = compare_dems(tilted(30), tilted(-30), "a");
+  EXPECT_NEAR(figure(mirrored, "slope of triangles: mean error"), 0, 1e-5);
+  EXPECT_NEAR(figure(mirrored, "angle between triangles: mean"), 60, 1e-5);
+  EXPECT_THAT(steeper.tables[0].rows[0][0], "20 to 30");
+}
+
+// A grid of half the step that has a height of its own between the samples of the coarse one: the
+// coarse reference sees its samples alone. The other way round the coarse one's triangles count,
+// split from north-east to south-west: in the middle of a cell that is the mean of those two.
+TEST(CompareDems, HoldsOtherGridsAgainstTheReferencesSamples) {
+  const auto saddle = [](double x, double y) { return x * y / 4; };
+  const Dem coarse = dem({2, 2}, {0, 2}, 2, saddle), fine = dem({3, 3}, {0, 2}, 1, saddle);
+  EXPECT_EQ(figure(compare_dems(coarse, fine, "a"), "height: largest error"), 0);
+  const Section section = compare_dems(fine, coarse, "a");
+  EXPECT_EQ(figure(section, "samples that both have"), 9);
+  EXPECT_THAT(section.text, HasSubstr("at 5 of the reference's samples the other's height is that "
+                                      "of its triangles"));
+  // North-east is 1 m, south-west 0; the saddle has 1/4 m there.
+  EXPECT_NEAR(figure(section, "height: largest error"), 0.25, 1e-12);
+  EXPECT_THAT(section.text, HasSubstr("column 1, row 1"));
+  EXPECT_NEAR(figure(section, "height: mean error"), 0.25 / 9, 1e-12);
+}
+
+TEST(CompareDems, FindsTheSamePlaceWhateverTheOriginAndExtent) {
+  const Dem whole = dem({30, 20}, {0, 100}, 2, hills);
+  Dem part = dem({10, 10}, {20, 90}, 2, hills);
+  part.grid = HeightGrid({10, 10}, {20 - 7 + 1e-7, 90 + 3 - 1e-7}, {2, -2},
+                         {part.grid.heights_m().begin(), part.grid.heights_m().end()});
+  part.origin_w_m = {7, -3, 0};
+  const Section section = compare_dems(whole, part, "a");
+  EXPECT_EQ(figure(section, "samples that both have"), 100);
+  EXPECT_EQ(figure(section, "beyond the other's extent"), 500);
+  EXPECT_EQ(figure(section, "height: largest error"), 0);
+  EXPECT_THAT(section.text, HasSubstr("sample by sample"));
+}
+
+TEST(CompareDems, SeesThatAllIsShiftedByHalfACell) {
+  const Dem reference = dem({60, 50}, {0, 100}, 2, hills);
+  const Dem shifted =
+      dem({60, 50}, {0, 100}, 2, [](double x, double y) { return hills(x - 1, y + 1) + 0.3; });
+  const Section section = compare_dems(reference, shifted, "a");
+  EXPECT_THAT(section.text,
+              AllOf(HasSubstr("THE OTHER SEEMS TO BE SHIFTED"), HasSubstr("PixelIs")));
+  // "by EAST m to the east and NORTH m to the north"
+  const std::string_view text = section.text;
+  const auto words = words_of(text.substr(text.find("by ", text.find("SHIFTED"))));
+  ASSERT_GT(words.size(), 7u);
+  const double east_m = number_of<double>(words[1]).value_or(0);
+  const double north_m = number_of<double>(words[7]).value_or(0);
+  EXPECT_NEAR(east_m, 1, 0.05);
+  EXPECT_NEAR(north_m, -1, 0.05);
+  std::mt19937 random(3);
+  std::normal_distribution<float> normal(0, 1);
+  const Dem noisy = changed(reference, [&](std::vector<float>& heights) {
+    for (float& height : heights) height += normal(random);
+  });
+  EXPECT_THAT(compare_dems(reference, noisy, "a").text, Not(HasSubstr("SHIFTED")));
+}
+
+/// Writes an ESRI ASCII grid, and a reference system if there is one.
+void write_asc(const TemporaryFolder& folder, const std::string& name, double x, double y,
+               const std::string& heights, const std::string& crs) {
+  write_text(folder / (name + ".asc"), "ncols 3\nnrows 2\nxllcorner " + std::to_string(x) +
+                                           "\nyllcorner " + std::to_string(y) +
+                                           "\ncellsize 2\nNODATA_value -9999\n" + heights + "\n");
+  if (!crs.empty()) write_text(folder / (name + ".prj"), crs);
+}
+
+std::string utm(int meridian_deg, int zone) {
+  return "PROJCS[\"WGS_1984_UTM_Zone_" + std::to_string(zone) +
+         "N\",GEOGCS[\"GCS_WGS_1984\",DATUM[\"D_WGS_1984\",SPHEROID[\"WGS_1984\",6378137.0,"
+         "298.257223563]],PRIMEM[\"Greenwich\",0.0],UNIT[\"Degree\",0.0174532925199433]],"
+         "PROJECTION[\"Transverse_Mercator\"],PARAMETER[\"False_Easting\",500000.0],PARAMETER["
+         "\"False_Northing\",0.0],PARAMETER[\"Central_Meridian\"," +
+         std::to_string(meridian_deg) +
+         ".0],PARAMETER[\"Scale_Factor\",0.9996],PARAMETER[\"Latitude_Of_Origin\",0.0],UNIT["
+         "\"Meter\",1.0]]";
+}
+
+TEST(CompareDems, ReadsFilesAndRefusesWhatDoesNotMatch) {
+  const TemporaryFolder folder;
+  write_asc(folder, "a", 500000, 5e6, "1 2 3\n4 5 6", utm(3, 31));
+  write_asc(folder, "b", 500000, 5e6, "1 2 3\n4 5 7", utm(3, 31));
+  write_asc(folder, "c", 500000, 5e6, "1 2 3\n4 -9999 6", "");
+  write_asc(folder, "d", 500000, 5e6, "1 2 3\n4 5 6", utm(9, 32));
+  write_asc(folder, "e", 500100, 5e6, "1 2 3\n4 5 6", utm(3, 31));
+  EXPECT_EQ(figure(compare_dems(folder / "a.asc", folder / "b.asc"), "height: largest error"), 1);
+  const Section without = compare_dems(folder / "a.asc", folder / "c.asc");
+  EXPECT_EQ(figure(without, "holes in the other alone, and what lies beyond it"), 1);
+  EXPECT_THAT(without.text, HasSubstr("The other names no reference system"));
+  EXPECT_THAT([&] { compare_dems(folder / "a.asc", folder / "d.asc"); },
+              ThrowsMessage<Error>(AllOf(HasSubstr("d.asc: its reference system is "),
+                                         HasSubstr("they must be the "
+                                                   "same; run"),
+                                         HasSubstr("gdalwarp -t_srs"), HasSubstr("31N"))));
+  EXPECT_THAT([&] { compare_dems(folder / "a.asc", folder / "e.asc"); },
+              ThrowsMessage<Error>(AllOf(HasSubstr("e.asc cannot be compared with"),
+                                         HasSubstr("they do not overlap"))));
+  write_text(folder / "f.asc", "garbage");
+  EXPECT_THAT([&] { compare_dems(folder / "a.asc", folder / "f.asc"); },
+              ThrowsMessage<Error>(HasSubstr("f.asc")));
+  EXPECT_THAT([&] { compare_dems("/nowhere.tif", folder / "a.asc"); },
+              ThrowsMessage<Error>(HasSubstr("/nowhere.tif")));
+}
+
+}  // namespace
+}  // namespace groundray::golden

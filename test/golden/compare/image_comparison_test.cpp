@@ -1,0 +1,358 @@
+#include "apps/golden/compare/image_comparison.h"
+
+#include <gmock/gmock.h>
+#include <gtest/gtest.h>
+
+#include <cmath>
+#include <limits>
+#include <numbers>
+#include <random>
+
+#include "apps/golden/compare/image_alignment.h"
+#include "apps/golden/compare/image_similarity.h"
+#include "core/error.h"
+#include "core/exr_io.h"
+#include "core/product_io.h"
+#include "test/support/temporary_folder.h"
+
+namespace groundray::golden {
+namespace {
+
+using groundray::testing::TemporaryFolder;
+using ::testing::AllOf;
+using ::testing::ElementsAre;
+using ::testing::HasSubstr;
+using ::testing::Not;
+using ::testing::ThrowsMessage;
+
+constexpr double infinity = std::numeric_limits<double>::infinity();
+
+/// A layer whose pixels are what `value(x, y, component)` says.
+template <typename Value>
+ImageLayer layer(const std::string& name, LayerKind kind, glm::ivec2 size_px, int channels,
+                 const Value& value) {
+  ImageLayer layer{name, kind, std::vector<std::string>(static_cast<std::size_t>(channels), name),
+                   Image<double>(size_px.x, size_px.y, channels)};
+  for (int y = 0; y < size_px.y; ++y) {
+    for (int x = 0; x < size_px.x; ++x) {
+      for (int k = 0; k < channels; ++k)
+        layer.values.at(x, y)[static_cast<std::size_t>(k)] = value(x, y, k);
+    }
+  }
+  return layer;
+}
+
+ImageFile image(std::vector<ImageLayer> layers) {
+  const Image<double>& first = layers.front().values;
+  return {{first.width(), first.height()}, std::move(layers)};
+}
+
+double figure(const Section& section, const std::string& name) {
+  for (const Measure& measure : section.measures) {
+    if (measure.name == name) return measure.value;
+  }
+  std::string names;
+  for (const Measure& measure : section.measures) names += measure.name + "\n";
+  ADD_FAILURE() << "there is no figure '" << name << "', but\n" << names;
+  return 0;
+}
+
+Section compare(const ImageFile& reference, const ImageFile& other) {
+  return compare_images(reference, other, {}, "images");
+}
+
+// 40 x 25 px: 20 px are sky in the reference, others in the other; one depth is 2 m off, all others
+// 5 cm.
+TEST(CompareImages, ReportsTheErrorsOfDepthsThatWereMade) {
+  const glm::ivec2 size_px(40, 25);
+  ImageFile reference =
+      image({layer("Z", LayerKind::Depth, size_px, 1, [](int, int, int) { return 10.0; })});
+  ImageFile other =
+      image({layer("Z", LayerKind::Depth, size_px, 1, [](int, int, int) { return 10.05; })});
+  for (int x = 0; x < 20; ++x) {
+    reference.layers[0].values.at(x, 0)[0] = infinity;
+    other.layers[0].values.at(x, 1)[0] = x % 2 == 0 ? 0 : 1e10;  // as others have it
+  }
+  other.layers[0].values.at(7, 9)[0] = 8;
+  const Section section = compare(reference, other);
+  EXPECT_EQ(figure(section, "Z: in both"), 960);
+  EXPECT_EQ(figure(section, "Z: in the reference alone"), 20);
+  EXPECT_EQ(figure(section, "Z: in the other alone"), 20);
+  EXPECT_NEAR(figure(section, "Z: mean error"), (959 * 0.05 - 2) / 960, 1e-12);
+  EXPECT_NEAR(figure(section, "Z: RMS error"), std::sqrt((959 * 0.0025 + 4) / 960), 1e-12);
+  EXPECT_NEAR(figure(section, "Z: median size of error"), 0.05, 1e-12);
+  EXPECT_NEAR(figure(section, "Z: 95th percentile of its size"), 0.05, 1e-12);
+  EXPECT_NEAR(figure(section, "Z: largest error"), 2, 1e-12);
+  EXPECT_NEAR(figure(section, "Z: median size of relative error"), 0.5, 1e-12);
+  EXPECT_NEAR(figure(section, "Z: share of errors beyond 1 %"), 100.0 / 960, 1e-12);
+  EXPECT_THAT(section.text, HasSubstr("Z is worst in column 7, row 9: 8 where the reference has "
+                                      "10."));
+  EXPECT_EQ(section.verdict, Verdict::Told);
+  EXPECT_EQ(section.pictures.size(), 3u);
+}
+
+TEST(CompareImages, FindsNoDifferenceBetweenEqualImages) {
+  const auto some = [](int x, int y, int k) { return std::sin(x + 2.0 * y + k) + 2; };
+  const ImageFile one = image({layer("Z", LayerKind::Depth, {20, 20}, 1, some),
+                               layer("RGB", LayerKind::Colour, {20, 20}, 3, some),
+                               layer("N", LayerKind::Normal, {20, 20}, 3, some),
+                               layer("FlowForward", LayerKind::Flow, {20, 20}, 2, some),
+                               layer("Label", LayerKind::Label, {20, 20}, 1, some),
+                               layer("P", LayerKind::Number, {20, 20}, 3, some)});
+  const Section section = compare(one, one);
+  for (const Measure& measure : section.measures) {
+    if (measure.name.find("error") == std::string::npos) continue;
+    EXPECT_EQ(measure.value, 0) << measure.name;
+  }
+  EXPECT_NEAR(figure(section, "RGB: structural similarity (SSIM) of luminance, an aid to the eye"),
+              1, 1e-12);
+  EXPECT_EQ(figure(section, "Label: share of equal pixels"), 100);
+  EXPECT_EQ(section.text, "");
+}
+
+TEST(CompareImages, MeasuresAnglesBetweenNormalsWhateverTheirLengths) {
+  const double tilt = 0.01;
+  const ImageFile reference = image({layer("N", LayerKind::Normal, {10, 10}, 3,
+                                           [](int, int, int k) { return k == 2 ? 1.0 : 0.0; })});
+  ImageFile other = image({layer("N", LayerKind::Normal, {10, 10}, 3, [&](int x, int, int k) {
+    const double angle = x == 0 ? std::numbers::pi - tilt : tilt;
+    return 2 * (k == 0 ? std::sin(angle) : k == 1 ? 0 : std::cos(angle));
+  })});
+  const Section section = compare(reference, other);
+  EXPECT_NEAR(figure(section, "N: angle: median"), tilt * 180 / std::numbers::pi, 1e-9);
+  EXPECT_NEAR(figure(section, "N: angle: largest"), 180 - tilt * 180 / std::numbers::pi, 1e-9);
+  EXPECT_NEAR(figure(section, "N: share on the other side"), 10, 1e-12);
+  for (double& value : other.layers[0].values.values()) value = -value;
+  EXPECT_THAT(compare(reference, other).text, HasSubstr("point to the other side"));
+}
+
+TEST(CompareImages, ReportsBiasNoiseAndPeakOfColours) {
+  const ImageFile reference = image({layer("Picture", LayerKind::Colour, {16, 16}, 3,
+                                           [](int, int, int k) { return 0.2 + 0.1 * k; })});
+  const ImageFile other =
+      image({layer("Picture", LayerKind::Colour, {16, 16}, 3,
+                   [](int x, int, int k) { return 0.2 + 0.1 * k + (x % 2 == 0 ? 0.03 : -0.01); })});
+  const Section section = compare(reference, other);
+  EXPECT_NEAR(figure(section, "Picture: mean error"), 0.01, 1e-12);
+  EXPECT_NEAR(figure(section, "Picture: RMS error"), std::sqrt(0.0005), 1e-12);
+  EXPECT_NEAR(figure(section, "Picture: PSNR, white being 1"), -10 * std::log10(0.0005), 1e-9);
+  EXPECT_NEAR(figure(section, "Picture: mean of other by mean of reference"), 0.31 / 0.3, 1e-12);
+  EXPECT_THAT(section.tables[0].rows[2],
+              ElementsAre("Picture", "0.4", "0.41", "0.01", "0.0223607"));
+}
+
+// The definition, window by window.
+TEST(StructuralSimilarity, IsWangsMeanOverWindows) {
+  std::mt19937 random(4);
+  std::uniform_real_distribution<double> uniform;
+  Image<double> a(17, 14, 1), b(17, 14, 1);
+  for (std::size_t i = 0; i < a.values().size(); ++i) {
+    a.values()[i] = uniform(random);
+    b.values()[i] = 0.7 * a.values()[i] + 0.3 * uniform(random);
+  }
+  double sum = 0;
+  for (int y = 5; y < 9; ++y) {
+    for (int x = 5; x < 12; ++x) {
+      double weights = 0, m = 0, n = 0, mm = 0, nn = 0, mn = 0;
+      for (int j = -5; j <= 5; ++j) {
+        for (int i = -5; i <= 5; ++i) {
+          const double w = std::exp(-(i * i + j * j) / 4.5);
+          const double u = a.at(x + i, y + j)[0], v = b.at(x + i, y + j)[0];
+          weights += w, m += w * u, n += w * v, mm += w * u * u, nn += w * v * v, mn += w * u * v;
+        }
+      }
+      m /= weights, n /= weights;
+      const double uu = mm / weights - m * m, vv = nn / weights - n * n, uv = mn / weights - m * n;
+      sum += (2 * m * n + 4e-4) * (2 * uv + 36e-4) / ((m * m + n * n + 4e-4) * (uu + vv + 36e-4));
+    }
+  }
+  EXPECT_NEAR(structural_similarity(a, b, 2), sum / 28, 1e-12);
+  EXPECT_NEAR(structural_similarity(a, a, 2), 1, 1e-12);
+  EXPECT_TRUE(
+      std::isnan(structural_similarity(Image<double>(10, 20, 1), Image<double>(10, 20, 1), 1)));
+}
+
+// Flow of 100 px and of 10 px, each 4 px off: the first within 5 %, the second an outlier.
+TEST(CompareImages, CountsOutliersOfFlowAsKittiDoes) {
+  const ImageFile reference =
+      image({layer("FlowForward", LayerKind::Flow, {10, 10}, 2, [](int x, int, int k) {
+        return k == 1 ? 0.0 : x < 3 ? 10.0 : 100.0;
+      })});
+  ImageFile other = reference;
+  for (int y = 0; y < 10; ++y) {
+    for (int x = 0; x < 10; ++x) other.layers[0].values.at(x, y)[1] = 4;
+  }
+  other.layers[0].values.at(9, 9)[0] = std::nan("");
+  const Section section = compare(reference, other);
+  EXPECT_NEAR(figure(section, "FlowForward: end-point error: mean"), 4, 1e-12);
+  EXPECT_NEAR(figure(section, "FlowForward: outliers as KITTI has them (Fl: beyond 3 px and 5 %)"),
+              100.0 * 30 / 99, 1e-12);
+  EXPECT_EQ(figure(section, "FlowForward: in the reference alone"), 1);
+  for (double& value : other.layers[0].values.values()) value = -value;
+  EXPECT_THAT(compare(reference, other).text, HasSubstr("with its sign reversed"));
+}
+
+TEST(CompareImages, TellsWhichLabelsAreTakenForWhich) {
+  const ImageFile reference =
+      image({layer("Label", LayerKind::Label, {10, 10}, 1, [](int, int y, int) { return y; })});
+  ImageFile other = reference;
+  for (int x = 0; x < 6; ++x) other.layers[0].values.at(x, 3)[0] = 8;
+  other.layers[0].values.at(0, 5)[0] = 1;
+  const Section section = compare(reference, other);
+  EXPECT_NEAR(figure(section, "Label: share of equal pixels"), 93, 1e-12);
+  EXPECT_THAT(section.tables[0].rows,
+              ElementsAre(ElementsAre("3", "8", "6"), ElementsAre("5", "1", "1")));
+}
+
+/// Light of mean 1 + `bias`, as estimated with known standard errors and 64 paths.
+ImageFile estimate(unsigned seed, double bias) {
+  std::mt19937 random(seed);
+  const auto sigma = [](int x, int y, int) { return 0.02 + 0.001 * ((x + y) % 10); };
+  return image(
+      {layer("RGB", LayerKind::Colour, {32, 24}, 3,
+             [&](int x, int y, int k) {
+               std::normal_distribution<double> normal(1 + bias, sigma(x, y, k));
+               return normal(random);
+             }),
+       layer("StdError", LayerKind::Number, {32, 24}, 3, sigma),
+       layer("Samples", LayerKind::Number, {32, 24}, 1, [](int, int, int) { return 64.0; })});
+}
+
+// At 1 % each, three kinds of tests (of channels, three) fail by chance in 3 % of runs: of 200 runs
+// 6, and 15 or more with a probability of 0.1 %.
+TEST(CompareImages, PassesLightThatIsTheSame) {
+  int failures = 0;
+  for (unsigned i = 0; i < 200; ++i) {
+    const Section section = compare(estimate(2 * i + 1, 0), estimate(2 * i + 2, 0));
+    if (section.verdict == Verdict::Failed) ++failures;
+  }
+  EXPECT_LE(failures, 14);
+}
+
+// A bias of 0.8 % is a quarter of the standard error of a difference of two values, but 6 of that
+// of a channel's mean.
+TEST(CompareImages, FailsLightThatIsEverywhereALittleWrong) {
+  const Section section = compare(estimate(1, 0), estimate(2, 0.008));
+  EXPECT_EQ(section.verdict, Verdict::Failed);
+  EXPECT_EQ(figure(section, "RGB: values that differ significantly"), 0);
+  EXPECT_GT(figure(section, "RGB: mean of G over the image"), 3);
+}
+
+TEST(CompareImages, FailsASingleWrongPixelAndSaysHowItTests) {
+  ImageFile other = estimate(2, 0);
+  other.layers[0].values.at(5, 6)[1] = 1.4;
+  const Section section = compare(estimate(1, 0), other);
+  EXPECT_EQ(section.verdict, Verdict::Failed);
+  EXPECT_EQ(figure(section, "RGB: values that differ significantly"), 1);
+  EXPECT_THAT(section.measures[section.measures.size() - 6].because,
+              AllOf(HasSubstr("significance 0.01"), HasSubstr("standard errors of both")));
+  other.layers.resize(1);
+  const Section exact = compare(estimate(1, 0), other);
+  EXPECT_THAT(exact.measures.back().name, HasSubstr("without any spread"));
+  EXPECT_THAT(exact.measures[exact.measures.size() - 2].because,
+              HasSubstr("the other image counts as exact"));
+}
+
+/// A scene of smooth light and edges.
+double scene(double x, double y) {
+  return 5 + std::sin(0.37 * x + 0.11 * y) + std::sin(0.23 * y - 0.3 * x) + (x > 20.7 ? 3 : 0);
+}
+
+TEST(Misalignment, FindsShiftsAndMirrors) {
+  const auto shifted = [](double dx, double dy) {
+    return layer("Z", LayerKind::Depth, {48, 40}, 1,
+                 [&](int x, int y, int) { return scene(x - dx, y - dy); });
+  };
+  const ImageLayer reference = shifted(0, 0);
+  const auto found = [&](const ImageLayer& other) {
+    const auto result = misalignment(reference.values, other.values);
+    return result ? result->what : "nothing";
+  };
+  EXPECT_EQ(found(reference), "nothing");
+  EXPECT_EQ(found(shifted(1, 0)), "moved by (-1, 0) px");
+  EXPECT_EQ(found(shifted(-0.5, -0.5)), "moved by (0.5, 0.5) px");
+  EXPECT_EQ(found(shifted(0, 0.5)), "moved by (0, -0.5) px");
+  EXPECT_EQ(found(layer("Z", LayerKind::Depth, {48, 40}, 1,
+                        [](int x, int y, int) { return scene(47 - x, y); })),
+            "mirrored left to right");
+  EXPECT_EQ(found(layer("Z", LayerKind::Depth, {48, 40}, 1,
+                        [](int x, int y, int) { return scene(x, 39 - y); })),
+            "mirrored top to bottom");
+  EXPECT_EQ(found(layer("Z", LayerKind::Depth, {48, 40}, 1,
+                        [](int x, int y, int) { return scene(47 - x, 39 - y); })),
+            "turned by 180 degrees");
+  ImageLayer scaled = reference;
+  for (double& value : scaled.values.values()) value *= 1.1;
+  EXPECT_EQ(found(scaled), "nothing");
+}
+
+TEST(Misalignment, IsNotSeenInNoise) {
+  std::mt19937 random(9);
+  std::normal_distribution<double> normal(10, 1);
+  const auto noise = [&](int, int, int) { return normal(random); };
+  for (int i = 0; i < 20; ++i) {
+    const ImageLayer a = layer("Y", LayerKind::Colour, {32, 32}, 1, noise);
+    const ImageLayer b = layer("Y", LayerKind::Colour, {32, 32}, 1, noise);
+    EXPECT_FALSE(misalignment(a.values, b.values));
+  }
+}
+
+TEST(CompareImages, SaysWhatSeemsToBeMisread) {
+  const auto at = [](double dx) {
+    return layer("Z", LayerKind::Depth, {48, 40}, 1,
+                 [&](int x, int y, int) { return scene(x - dx, y); });
+  };
+  EXPECT_THAT(compare(image({at(0)}), image({at(0.5)})).text,
+              AllOf(HasSubstr("SEEMS TO BE MISALIGNED"), HasSubstr("moved by (-0.5, 0) px")));
+  ImageLayer in_mm = at(0);
+  for (double& value : in_mm.values.values()) value *= 1000;
+  EXPECT_THAT(compare(image({at(0)}), image({in_mm})).text,
+              AllOf(HasSubstr("Z of the other is 1000 times the reference's"),
+                    Not(HasSubstr("MISALIGNED"))));
+  ImageLayer range = at(0);
+  range.name = "Distance";
+  for (int x = 0; x < 48; ++x) {
+    for (int y = 0; y < 40; ++y) range.values.at(x, y)[0] *= std::hypot(1, x / 48.0 - 0.5);
+  }
+  ImageLayer range_called_depth = range;
+  range_called_depth.name = "Z";
+  EXPECT_THAT(compare(image({at(0), range}), image({range_called_depth})).text,
+              HasSubstr("The other's Z is much nearer the reference's Distance"));
+}
+
+TEST(CompareImages, CountsErrorsBeyondTheBound) {
+  const auto constant = [](double value) { return [value](int, int, int) { return value; }; };
+  const ImageFile reference = image({layer("Distance", LayerKind::Depth, {4, 4}, 1, constant(10)),
+                                     layer("Bound", LayerKind::Number, {4, 4}, 1, constant(0.01))});
+  ImageFile other = image({layer("Distance", LayerKind::Depth, {4, 4}, 1, constant(10.009))});
+  other.layers[0].values.at(1, 1)[0] = 10.011;
+  EXPECT_EQ(figure(compare(reference, other), "Distance: errors beyond the reference's own bound"),
+            1);
+}
+
+TEST(CompareImages, ReadsFilesAndRefusesWhatDoesNotMatch) {
+  const TemporaryFolder folder;
+  ImageF wide(8, 4, 1), narrow(7, 4, 1);
+  for (float& value : wide.values()) value = 2;
+  write_exr(folder / "a.exr", {{{"Z"}, &wide}});
+  write_exr(folder / "b.exr", {{{"depth"}, &wide}});
+  write_exr(folder / "c.exr", {{{"Z"}, &narrow}});
+  write_exr(folder / "d.exr", {{{"foo"}, &wide}});
+  const Section section = compare_images(folder / "a.exr", folder / "b.exr");
+  EXPECT_EQ(figure(section, "Z: in both"), 32);
+  EXPECT_THAT(section.text, HasSubstr("Z is Z in the reference and depth in the other."));
+  EXPECT_THAT(section.title, AllOf(HasSubstr("b.exr against "), HasSubstr("a.exr")));
+  EXPECT_THAT([&] { compare_images(folder / "a.exr", folder / "c.exr"); },
+              ThrowsMessage<Error>(AllOf(HasSubstr("c.exr cannot be compared with"),
+                                         HasSubstr("it has 7 x 4 px and the reference 8 x 4"))));
+  EXPECT_THAT(
+      [&] { compare_images(folder / "a.exr", folder / "d.exr"); },
+      ThrowsMessage<Error>(HasSubstr("they have nothing in common: the reference has Z, the "
+                                     "other foo")));
+  write_text(folder / "e.exr", "garbage");
+  EXPECT_THAT([&] { compare_images(folder / "a.exr", folder / "e.exr"); },
+              ThrowsMessage<Error>(HasSubstr("e.exr: it is no image")));
+}
+
+}  // namespace
+}  // namespace groundray::golden
