@@ -16,8 +16,8 @@
 
 #include "core/error.h"
 
-// A strict reader of YAML for the specs and the programs, not installed: it knows where each value stands,
-// and notes every fault of a file instead of stopping at the first.
+// A strict reader of YAML for the specs and the programs, not installed: it knows where each value
+// stands, and notes every fault of a file instead of stopping at the first.
 namespace groundray::yaml {
 
 /// A value and where it stands in its file; line and column count from 1.

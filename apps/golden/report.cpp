@@ -3,6 +3,7 @@
 #include <algorithm>
 #include <cmath>
 #include <cstddef>
+#include <utility>
 
 namespace groundray::golden {
 
@@ -12,6 +13,25 @@ Verdict verdict_of(const std::vector<Measure>& measures) {
   };
   if (any(Verdict::Failed)) return Verdict::Failed;
   return any(Verdict::Passed) ? Verdict::Passed : Verdict::Told;
+}
+
+void tell(Section& into, std::string name, double value, std::string unit) {
+  into.measures.push_back({.name = std::move(name),
+                           .value = value,
+                           .unit = std::move(unit),
+                           .limit = {},
+                           .because = {},
+                           .verdict = Verdict::Told});
+}
+
+void hold(Section& into, std::string name, double value, std::string unit, double limit,
+          std::string because) {
+  into.measures.push_back({.name = std::move(name),
+                           .value = value,
+                           .unit = std::move(unit),
+                           .limit = limit,
+                           .because = std::move(because),
+                           .verdict = value <= limit ? Verdict::Passed : Verdict::Failed});
 }
 
 Histogram histogram_of(std::string title, std::string unit, const std::vector<double>& values,

@@ -71,6 +71,13 @@ struct Report {
 /// Failed if any measure failed, else Passed if any passed, else Told.
 Verdict verdict_of(const std::vector<Measure>& measures);
 
+/// Tells a figure that is held against nothing.
+void tell(Section& into, std::string name, double value, std::string unit = {});
+
+/// Holds a figure against a limit.
+void hold(Section& into, std::string name, double value, std::string unit, double limit,
+          std::string because);
+
 /// Returns the counts of the finite `values` in `bins` equal steps from `low` to `high`.
 Histogram histogram_of(std::string title, std::string unit, const std::vector<double>& values,
                        double low, double high, std::size_t bins = 60);

@@ -4,6 +4,7 @@
 #include <cmath>
 #include <glm/geometric.hpp>
 #include <limits>
+#include <numbers>
 #include <numeric>
 #include <utility>
 
@@ -13,7 +14,7 @@ namespace {
 /// The chord of an angle on the unit sphere, longer by what rounding may take off.
 double chord_of(double angle_rad) {
   constexpr double slack = 1 + 1e-12;
-  return 2 * std::sin(std::min(angle_rad, 3.141592653589793) / 2) * slack + 1e-15;
+  return 2 * std::sin(std::min(angle_rad, std::numbers::pi) / 2) * slack + 1e-15;
 }
 
 }  // namespace

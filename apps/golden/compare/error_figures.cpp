@@ -64,25 +64,6 @@ ErrorFigures figures_of(const std::vector<double>& errors) {
   return figures;
 }
 
-void tell(Section& into, std::string name, double value, std::string unit) {
-  into.measures.push_back({.name = std::move(name),
-                           .value = value,
-                           .unit = std::move(unit),
-                           .limit = {},
-                           .because = {},
-                           .verdict = Verdict::Told});
-}
-
-void hold(Section& into, std::string name, double value, std::string unit, double limit,
-          std::string because) {
-  into.measures.push_back({.name = std::move(name),
-                           .value = value,
-                           .unit = std::move(unit),
-                           .limit = limit,
-                           .because = std::move(because),
-                           .verdict = value <= limit ? Verdict::Passed : Verdict::Failed});
-}
-
 void tell_errors(Section& into, const std::string& name, const std::string& unit,
                  const std::vector<double>& errors) {
   const ErrorFigures figures = figures_of(errors);

@@ -29,13 +29,6 @@ ErrorFigures figures_of(const std::vector<double>& errors);
 /// Returns the value that a share of `values`, all finite, do not exceed; 0, of none.
 double quantile(std::vector<double> values, double share);
 
-/// Tells a figure that is held against nothing.
-void tell(Section& into, std::string name, double value, std::string unit = {});
-
-/// Holds a figure against a limit.
-void hold(Section& into, std::string name, double value, std::string unit, double limit,
-          std::string because);
-
 /// Tells bias, RMS, median, 95th percentile and largest error under `name`, and draws how the
 /// errors are spread, up to twice the 95th percentile.
 void tell_errors(Section& into, const std::string& name, const std::string& unit,

@@ -11,12 +11,12 @@
 #include <limits>
 #include <string>
 
-#include "apps/golden/compare/error_figures.h"
+#include "apps/golden/report.h"
+#include "apps/golden/significance.h"
 
 namespace groundray::golden {
 namespace {
 
-constexpr int block_px = 8;
 constexpr std::size_t colours = 3;
 // Two values that were rounded to floats; less is no difference.
 constexpr double float_rounding = 1.2e-7;
@@ -64,15 +64,6 @@ struct Pair {
     return parts > 0 ? (a + b) * (a + b) / parts : std::numeric_limits<double>::infinity();
   }
 };
-
-double significance_of_one(double level, std::size_t tests) {
-  return -std::expm1(std::log1p(-level) / static_cast<double>(std::max<std::size_t>(tests, 1)));
-}
-
-double normal_limit(double level, std::size_t tests) {
-  return boost::math::quantile(
-      boost::math::complement(boost::math::normal(), significance_of_one(level, tests) / 2));
-}
 
 /// Chance of a |t| as large, of the same light.
 double chance(double t, double freedom) {

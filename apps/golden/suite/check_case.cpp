@@ -81,12 +81,7 @@ struct Checker {
 };
 
 void fail(const std::string& what, const std::string& why, Section& into) {
-  into.measures.push_back({.name = fmt::format("{}: {}", what, why),
-                           .value = 1,
-                           .unit = "fault",
-                           .limit = 0,
-                           .because = "",
-                           .verdict = Verdict::Failed});
+  hold(into, fmt::format("{}: {}", what, why), 1, "fault", 0, "");
 }
 
 void check_product(const GoldenCase& golden, const ProductChecks& product,

@@ -123,15 +123,10 @@ void check_rows(const RowsCheck& check, const std::string& because, const Column
   const std::vector<double> values = evaluate(check.value, columns);
   const std::vector<double> expected = evaluate(check.is, columns);
   const Difference found = differences(values, expected, evaluate(check.within, columns));
-  const double at_most = static_cast<double>(columns.rows) * (1 - check.share);
-  const auto beyond = static_cast<double>(found.beyond);
-  into.measures.push_back(
-      {.name = what + fmt::format(", rows beyond {}", check.within),
-       .value = beyond,
-       .unit = fmt::format("of {}", columns.rows),
-       .limit = std::floor(at_most * (1 + 1e-12)),
-       .because = because,
-       .verdict = beyond <= at_most * (1 + 1e-12) ? Verdict::Passed : Verdict::Failed});
+  const double at_most = std::floor(static_cast<double>(columns.rows) * (1 - check.share) *
+                                    (1 + 1e-12));  // 1 - 0.9 is a little less than a tenth
+  hold(into, fmt::format("{}, rows beyond {}", what, check.within),
+       static_cast<double>(found.beyond), fmt::format("of {}", columns.rows), at_most, because);
   into.measures.push_back(
       {.name = fmt::format("at row {}, the worst: {:.17g} for {:.17g}; off by", found.worst,
                            values[found.worst], expected[found.worst]),
@@ -154,14 +149,10 @@ void check_figure(const FigureCheck& check, const std::string& because, const Co
   const double expected = number_of(check.is, columns.rows);
   const double tolerance = number_of(check.within, columns.rows);
   const double apart = std::abs(difference(figure, expected));
-  into.measures.push_back(
-      {.name = fmt::format("{} {} = {}: {:.10g} for {:.10g}; off by", word_of(check.kind),
-                           check.value, check.is, figure, expected),
-       .value = apart,
-       .unit = "",
-       .limit = tolerance,
-       .because = because,
-       .verdict = apart <= tolerance ? Verdict::Passed : Verdict::Failed});
+  hold(into,
+       fmt::format("{} {} = {}: {:.10g} for {:.10g}; off by", word_of(check.kind), check.value,
+                   check.is, figure, expected),
+       apart, "", tolerance, because);
 }
 
 }  // namespace groundray::golden

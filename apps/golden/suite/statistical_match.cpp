@@ -3,10 +3,10 @@
 #include <fmt/format.h>
 
 #include <algorithm>
-#include <boost/math/distributions/normal.hpp>
-#include <boost/math/distributions/students_t.hpp>
 #include <cmath>
 
+#include "apps/golden/compare/image_similarity.h"
+#include "apps/golden/significance.h"
 #include "apps/golden/suite/false_colour.h"
 #include "core/error.h"
 
@@ -14,7 +14,6 @@ namespace groundray::golden {
 namespace {
 
 constexpr double significance = 0.01;  // of each kind of test, as Mitsuba's tests take it
-constexpr int block_px = 8;
 // Below it a mean and an image, both stored as floats, do not tell a difference.
 constexpr double float_rounding = 2.4e-7;
 
@@ -22,22 +21,6 @@ const Columns::Column& column_of(const Columns& columns, const std::string& name
   const Columns::Column* column = columns.find(name);
   if (column == nullptr) throw Error("there is no column {}", name);
   return *column;
-}
-
-// Of each of so many tests.
-double significance_of_one(std::size_t tests) {
-  return -std::expm1(std::log1p(-significance) / static_cast<double>(tests));
-}
-
-// Two-sided limit of |t|.
-double student_limit(std::size_t tests) {
-  return boost::math::quantile(boost::math::complement(
-      boost::math::students_t(statistical_runs - 1), significance_of_one(tests) / 2));
-}
-
-double normal_limit(std::size_t tests) {
-  return boost::math::quantile(
-      boost::math::complement(boost::math::normal(), significance_of_one(tests) / 2));
 }
 
 struct Channel {
@@ -84,19 +67,18 @@ double largest_of_blocks(const Channel& channel) {
   return largest;
 }
 
-void tell(std::string name, double value, std::string unit, double limit,
-          const std::string& because, Section& into) {
-  into.measures.push_back({.name = std::move(name),
-                           .value = value,
-                           .unit = std::move(unit),
-                           .limit = limit,
-                           .because = because,
-                           .verdict = value <= limit ? Verdict::Passed : Verdict::Failed});
+Image<double> image_of(const std::vector<double>& values, glm::ivec2 size_px) {
+  Image<double> image(size_px.x, size_px.y, 1);
+  std::ranges::copy(values, image.values().begin());
+  return image;
 }
 
 void draw(const std::string& name, const Channel& channel, const std::vector<double>& deviations,
           Section& into) {
   const auto [low, high] = finite_range(channel.mean);
+  tell(into, name + ": structural similarity, an aid to the eye",
+       structural_similarity(image_of(channel.mean, channel.size_px),
+                             image_of(channel.actual, channel.size_px), high - low));
   into.pictures.push_back({fmt::format("{}: expected mean, {:.4g} to {:.4g}", name, low, high),
                            false_colour(channel.mean, channel.size_px, low, high)});
   into.pictures.push_back(
@@ -146,7 +128,7 @@ void check_statistically(const StatisticalCheck& check, const std::string& becau
                 image.size_px.y, moments.size_px.x, moments.size_px.y);
   }
   const std::size_t tests = image.rows * check.columns.size();
-  const double limit = student_limit(tests);
+  const double limit = student_limit(significance, tests, statistical_runs - 1);
   const std::size_t blocks =
       blocks_along(image.size_px.x) * blocks_along(image.size_px.y) * check.columns.size();
   std::size_t beyond = 0;
@@ -165,13 +147,13 @@ void check_statistically(const StatisticalCheck& check, const std::string& becau
     of_channels = std::max(of_channels, channel.deviations(0, 0, image.size_px.x, image.size_px.y));
     draw(name, channel, deviations, into);
   }
-  tell(fmt::format("values more than {:.2f} standard deviations off", limit),
+  hold(into, fmt::format("values more than {:.2f} standard deviations off", limit),
        static_cast<double>(beyond), fmt::format("of {}", tests),
-       std::floor(static_cast<double>(tests) * (1 - check.share) * (1 + 1e-12)), because, into);
-  tell(fmt::format("worst of {} blocks of 8 x 8 pixels", blocks), of_blocks, "standard deviations",
-       normal_limit(blocks), because, into);
-  tell("worst mean of a channel", of_channels, "standard deviations",
-       normal_limit(check.columns.size()), because, into);
+       std::floor(static_cast<double>(tests) * (1 - check.share) * (1 + 1e-12)), because);
+  hold(into, fmt::format("worst of {} blocks of 8 x 8 pixels", blocks), of_blocks,
+       "standard deviations", normal_limit(significance, blocks), because);
+  hold(into, "worst mean of a channel", of_channels, "standard deviations",
+       normal_limit(significance, check.columns.size()), because);
 }
 
 }  // namespace groundray::golden

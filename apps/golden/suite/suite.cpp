@@ -55,16 +55,11 @@ Section run_case(const GoldenCase& golden, const SuiteOptions& options) {
   const double took_s = std::chrono::duration<double>(Clock::now() - begin).count();
   Section section{.title = golden.name, .verdict = Verdict::Failed, .text = golden.title};
   if (fault) {
-    section.measures.push_back({.name = *fault,
-                                .value = 1,
-                                .unit = "fault",
-                                .limit = 0,
-                                .because = "a run ends without a fault",
-                                .verdict = Verdict::Failed});
+    hold(section, *fault, 1, "fault", 0, "a run ends without a fault");
   } else {
     section = check_case(golden, dataset);
   }
-  section.measures.push_back({.name = "time to generate", .value = took_s, .unit = "s"});
+  tell(section, "time to generate", took_s, "s");
   return section;
 }
 

@@ -34,7 +34,9 @@ std::vector<Verdict> match(const Columns& image, const Columns& moments) {
   Section section;
   check_statistically({.columns = {"R"}}, "", image, moments, section);
   std::vector<Verdict> verdicts;
-  for (const Measure& measure : section.measures) verdicts.push_back(measure.verdict);
+  for (const Measure& measure : section.measures) {
+    if (measure.limit) verdicts.push_back(measure.verdict);
+  }
   return verdicts;
 }
 
