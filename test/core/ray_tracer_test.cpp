@@ -380,8 +380,9 @@ TEST(RayTracerProof, InstructionSetsAgree) {
       const double allowed =
           tracing == Tracing::Exact ? 0 : 5e-6 * static_cast<double>(rays.size());
       EXPECT_LE(static_cast<double>(different), allowed) << set;
-      testing::record_margin(tracing == Tracing::Exact ? "different in `exact`" : "in `fast`",
-                             static_cast<double>(different), allowed, "rays");
+      testing::record_margin(
+          tracing == Tracing::Exact ? "different in `exact`" : "different in `fast`",
+          static_cast<double>(different), allowed, "rays");
     }
   }
 }

@@ -8,6 +8,7 @@
 #include <numbers>
 
 #include "core/error.h"
+#include "test/support/margin.h"
 
 namespace groundray {
 namespace {
@@ -168,6 +169,10 @@ TEST_P(SoftReturnOf, EachStepHasTheEnergyAndTheCentreOfItsIntegral) {
     // The promise.
     EXPECT_NEAR(next->energy_j, static_cast<double>(energy_j), 1e-9 * next->energy_j);
     EXPECT_NEAR(next->range_m, static_cast<double>(moment / energy_j), 1e-9 * next->range_m);
+    testing::record_margin("energy of a step", next->energy_j / static_cast<double>(energy_j) - 1,
+                           1e-9);
+    testing::record_margin("its range", next->range_m / static_cast<double>(moment / energy_j) - 1,
+                           1e-9);
     ++next;
   }
   EXPECT_EQ(next, returns.end());
@@ -213,6 +218,8 @@ TEST(Atmosphere, FogEchoEqualsTheIntegralOfTheLiteratureWithItsPulse) {
     }
     EXPECT_NEAR(static_cast<double>(power_w), static_cast<double>(expected_w),
                 error * soft_j / tau_s);
+    testing::record_margin("power",
+                           static_cast<double>(power_w - expected_w) / (error * soft_j / tau_s), 1);
     EXPECT_GT(static_cast<double>(expected_w), 10 * error * soft_j / tau_s) << range_m;
   }
 }

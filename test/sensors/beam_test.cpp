@@ -14,6 +14,7 @@
 #include <string_view>
 
 #include "core/error.h"
+#include "test/support/margin.h"
 
 namespace groundray {
 namespace {
@@ -122,6 +123,13 @@ TEST(LaserBeam, HasItsCentroidAndSecondMomentsExactlyAtEveryRangeHoweverTurned) 
     EXPECT_NEAR(found.variance.x, sigma_m.x * sigma_m.x, tolerance * sigma_m.x * sigma_m.x);
     EXPECT_NEAR(found.variance.y, sigma_m.y * sigma_m.y, tolerance * sigma_m.y * sigma_m.y);
     EXPECT_LE(std::abs(found.covariance), tolerance * sigma_m.x * sigma_m.y);
+    const glm::dvec2 centroid = glm::abs(found.centroid / sigma_m);
+    const glm::dvec2 variance = glm::abs(found.variance / (sigma_m * sigma_m) - 1.0);
+    testing::record_margin("centroid", std::max(centroid.x, centroid.y), tolerance);
+    testing::record_margin(
+        "second moments",
+        std::max({variance.x, variance.y, std::abs(found.covariance) / (sigma_m.x * sigma_m.y)}),
+        tolerance);
   };
   for (const Profile profile : {Profile::Gaussian, Profile::TopHat}) {
     for (const Shape& shape : every_shape) {
@@ -349,6 +357,8 @@ TEST(LaserBeam, ThinWiresReturnByTheThirdPowerAndSmallDiscsByTheFourth) {
   }
   EXPECT_NEAR(log_log_slope(wire), -3, 0.03);
   EXPECT_NEAR(log_log_slope(disc), -4, 0.04);
+  testing::record_margin("slope of wires", log_log_slope(wire) + 3, 0.03);
+  testing::record_margin("of discs", log_log_slope(disc) + 4, 0.04);
 }
 
 // What returns at `time_s` from a surface that a line from the origin in `direction` meets after

@@ -11,6 +11,7 @@
 #include "core/error.h"
 #include "sensors/lidar.h"
 #include "terrain/terrain_scene.h"
+#include "test/support/margin.h"
 
 namespace groundray {
 namespace {
@@ -122,6 +123,7 @@ TEST(LidarLight, PerpendicularPlaneReturnsThePowerOfTheRadarEquation) {
     const LidarScan found = scan(spec, scene, {0, 0, height_m});
     const double expected_w = plane_power_w(height_m);
     EXPECT_NEAR(only(found, "amplitude"), expected_w, 1e-5 * expected_w) << height_m;
+    testing::record_margin("power", only(found, "amplitude") / expected_w - 1, 1e-5);
     EXPECT_NEAR(only(found, "width"), fwhm_s, 1e-5 * fwhm_s);
     EXPECT_EQ(only(found, "share"), 1);
     EXPECT_EQ(only(found, "second_share"), 0);
@@ -267,6 +269,7 @@ TEST(LidarLight, TiltedPlaneIsOneEchoAtTheCentroidOfItsEnergy) {
     const LidarScan found = scan(spec, scene, {0, 0, axis_m * std::cos(tilt_rad)});
     ASSERT_EQ(found.echoes.rows(), 1u) << tilt_deg;
     EXPECT_NEAR(range_m(found.echoes, 0), plane.mean_m, 1e-3) << tilt_deg;
+    testing::record_margin("range", range_m(found.echoes, 0) - plane.mean_m, 1e-3, "m");
     EXPECT_NEAR(found.echoes.column<double>("range_true")[0], plane.mean_m, 1e-3) << tilt_deg;
     const double second_order_m =
         axis_m * (1 - 2 * std::pow(divergence_rad / 4 * std::tan(tilt_rad), 2));
@@ -299,13 +302,15 @@ TEST(LidarLight, TiltedPlaneIsTimedByItsOwnWaveform) {
       const LidarScan whole = scan(
           lidar_of(looking_down({pi / 2 - tilt_rad}), divergence_rad, 64, 1024), scene, sensor);
       const double threshold_w = 0.2 * only(whole, "amplitude");
-      EXPECT_NEAR(found_m(Timing::LeadingEdge, threshold_w), plane.rise_m(0.2 * peak) + half_m,
-                  1e-3)
-          << axis_m << ' ' << tilt_deg;
-      EXPECT_NEAR(found_m(Timing::ConstantFraction, threshold_w), plane.rise_m(0.5 * peak) + half_m,
-                  1e-3)
-          << axis_m << ' ' << tilt_deg;
-      EXPECT_NEAR(found_m(Timing::Peak, threshold_w), plane.peak_m(), 1e-3) << axis_m << tilt_deg;
+      const auto expect_timed = [&](const char* name, Timing timing, double expected_m) {
+        const double timed_m = found_m(timing, threshold_w);
+        EXPECT_NEAR(timed_m, expected_m, 1e-3) << axis_m << ' ' << tilt_deg;
+        testing::record_margin(name, timed_m - expected_m, 1e-3, "m");
+      };
+      expect_timed("leading edge", Timing::LeadingEdge, plane.rise_m(0.2 * peak) + half_m);
+      expect_timed("constant fraction", Timing::ConstantFraction,
+                   plane.rise_m(0.5 * peak) + half_m);
+      expect_timed("peak", Timing::Peak, plane.peak_m());
     }
   }
 }
@@ -320,8 +325,9 @@ TEST(LidarLight, TiltedPlaneWidensTheEchoByItsFootprint) {
       const LidarScan found = scan(spec, scene, {0, 0, axis_m * std::cos(tilt_rad)});
       const double w_m = axis_m * std::tan(divergence_rad / 2);
       const double expected = sigma_s * sigma_s + std::pow(w_m * std::tan(tilt_rad) / c_m_s, 2);
-      EXPECT_NEAR(std::pow(only(found, "width") / fwhm_per_sigma, 2), expected, 0.01 * expected)
-          << axis_m << ' ' << tilt_deg;
+      const double variance = std::pow(only(found, "width") / fwhm_per_sigma, 2);
+      EXPECT_NEAR(variance, expected, 0.01 * expected) << axis_m << ' ' << tilt_deg;
+      testing::record_margin("variance", variance / expected - 1, 0.01);
     }
   }
 }
@@ -350,6 +356,7 @@ TEST(LidarLight, StepEdgeSharesTheEnergyBetweenItsSurfaces) {
         ASSERT_EQ(echoes.rows(), 1u) << edge_m;
         const double best = near_energy / sum;
         EXPECT_NEAR(echoes.column<float>("share")[0], best, tolerance) << edge_m;
+        testing::record_margin("share", echoes.column<float>("share")[0] - best, tolerance);
         EXPECT_NEAR(echoes.column<float>("second_share")[0], 1 - best, tolerance) << edge_m;
         EXPECT_EQ(echoes.column<std::uint16_t>("second_label")[0], 3);
         const double centre_m = (near_energy * high_m + far_energy * (high_m + step_m)) / sum;
@@ -361,6 +368,8 @@ TEST(LidarLight, StepEdgeSharesTheEnergyBetweenItsSurfaces) {
         const double whole_w = plane_power_w(high_m);
         EXPECT_NEAR(amplitude_w[0] / whole_w, near_energy, tolerance) << edge_m;
         EXPECT_NEAR(amplitude_w[1] / whole_w, far_energy, tolerance) << edge_m;
+        testing::record_margin("energy of the far one", amplitude_w[1] / whole_w - far_energy,
+                               tolerance);
         EXPECT_THAT(echoes.column<float>("share"), Each(::testing::Ge(0.99f)));
         EXPECT_THAT(echoes.column<std::uint8_t>("return_index"), ElementsAre(1, 2));
         EXPECT_THAT(echoes.column<std::uint8_t>("return_count"), Each(2));
@@ -414,8 +423,9 @@ TEST(LidarLight, ThinWallThatTheAxisMissesReturns) {
   EXPECT_NEAR(range_m(found.echoes, 0), 45, 0.01);
   const double w_m = 45 * std::tan(1e-3);
   const double share = normal_share(2 * 0.0345 / w_m) - normal_share(2 * 0.0295 / w_m);
-  EXPECT_NEAR(found.echoes.column<float>("amplitude")[0] / plane_power_w(45), share,
-              2 * std::pow(sub_rays, -0.75));
+  const double found_share = found.echoes.column<float>("amplitude")[0] / plane_power_w(45);
+  EXPECT_NEAR(found_share, share, 2 * std::pow(sub_rays, -0.75));
+  testing::record_margin("energy", found_share - share, 2 * std::pow(sub_rays, -0.75));
 }
 
 TEST(LidarLight, PulsesWithoutEchoesSayWhy) {
@@ -455,8 +465,9 @@ TEST(LidarLight, AirTakesItsShareBothWays) {
     const AtmosphereSpec rain{.rain_mm_h = 10};
     const double left = std::exp(-2 * rain_extinction_per_m(10) * height_m);
     const double expected_w = left * plane_power_w(height_m);
-    EXPECT_NEAR(only(scan(spec, scene, {0, 0, height_m}, rain), "amplitude"), expected_w,
-                1e-5 * expected_w);
+    const double found_w = only(scan(spec, scene, {0, 0, height_m}, rain), "amplitude");
+    EXPECT_NEAR(found_w, expected_w, 1e-5 * expected_w);
+    testing::record_margin("power", found_w / expected_w - 1, 1e-5);
   }
 }
 
@@ -557,6 +568,8 @@ TEST(LidarLight, JitterTurnsBeamsWithoutTheSensorsKnowledge) {
     }
     EXPECT_NEAR(sum / 5000, 0, 5 / std::sqrt(5000)) << column;  // 5 standard errors: p = 6e-7
     EXPECT_NEAR(squares / 5000, 1, 5 * std::sqrt(2. / 5000)) << column;
+    testing::record_margin("mean", sum / 5000, 5 / std::sqrt(5000));
+    testing::record_margin("variance", squares / 5000 - 1, 5 * std::sqrt(2. / 5000));
   }
   EXPECT_THAT(found.echoes.column<float>("x"), Each(::testing::FloatNear(0, 1e-5f)));
 }
@@ -581,8 +594,10 @@ TEST(LidarLight, WaveformsHoldTheEnergyAtItsTime) {
     const double expected_j =
         plane_power_w(ranges_m[i]) * sigma_s * std::sqrt(2 * pi) * (i == 0 ? 1 : std::sin(0.6));
     EXPECT_NEAR(energy_j, expected_j, 1e-5 * expected_j) << i;
+    testing::record_margin("energy", energy_j / expected_j - 1, 1e-5);
     // At 0.6 rad the footprint brings the centroid 0.02 mm nearer.
     EXPECT_NEAR(moment / energy_j * c_m_s / 2, ranges_m[i], 1e-4) << i;
+    testing::record_margin("range", moment / energy_j * c_m_s / 2 - ranges_m[i], 1e-4, "m");
   }
 }
 

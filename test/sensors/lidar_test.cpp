@@ -13,6 +13,7 @@
 #include "core/error.h"
 #include "sensors/spec_io.h"
 #include "terrain/terrain_scene.h"
+#include "test/support/margin.h"
 #include "test/support/reference_tracer.h"
 #include "test/support/sample_terrain.h"
 #include "test/support/temporary_folder.h"
@@ -119,8 +120,9 @@ TEST(Lidar, EveryPointLiesOnTheSurfaceAtItsRangeFromWhereItsBeamLeft) {
     for (std::size_t i = 0; i < scan.rows(); ++i) {
       const glm::dvec3 p_DQ(wx[i], wy[i], wz[i]);
       const double slope = std::sqrt(1 / (double(nz[i]) * nz[i]) - 1);
-      ASSERT_NEAR(p_DQ.z, testing::reference_height_m(ground, p_DQ.x, p_DQ.y), 1e-9 * (1 + slope))
-          << name << i;
+      const double off_m = p_DQ.z - testing::reference_height_m(ground, p_DQ.x, p_DQ.y);
+      ASSERT_NEAR(off_m, 0, 1e-9 * (1 + slope)) << name << i;
+      testing::record_margin("distance to the surface", off_m / (1e-9 * (1 + slope)), 1);
 
       // The time column is a float: half an ulp of 0.1 s is 4 ns, 20 m/s and 63 rad/s on 0.2 m make
       // 1e-7 m of it.
@@ -131,6 +133,9 @@ TEST(Lidar, EveryPointLiesOnTheSurfaceAtItsRangeFromWhereItsBeamLeft) {
                                           1e-9 * static_cast<double>(time.count()), X_DS_now);
       ASSERT_NEAR(range_m[i], glm::length(p_DQ - p_DO), 3e-7) << name << i;
       ASSERT_LT(glm::length(X_DS_now * glm::dvec3(x[i], y[i], z[i]) - p_DQ), 1e-4) << name << i;
+      testing::record_margin("range_true", range_m[i] - glm::length(p_DQ - p_DO), 3e-7, "m");
+      testing::record_margin(
+          "points in S", glm::length(X_DS_now * glm::dvec3(x[i], y[i], z[i]) - p_DQ), 1e-4, "m");
       ASSERT_GE(time_s[i], last_time_s);
       last_time_s = time_s[i];
     }
@@ -198,6 +203,8 @@ TEST(Lidar, RangeNoiseIsGaussianAlongTheBeamAndLeavesTheTruthAlone) {
   const auto n = static_cast<double>(noisy.rows());
   EXPECT_NEAR(sum / n, 0, 5 / std::sqrt(n));  // 5 standard errors: p = 6e-7
   EXPECT_NEAR(square / n, 1, 5 * std::sqrt(2 / n));
+  testing::record_margin("mean", sum / n, 5 / std::sqrt(n));
+  testing::record_margin("variance", square / n - 1, 5 * std::sqrt(2 / n));
 }
 
 TEST(Lidar, NoiseDependsOnSeedSensorAndSweep) {

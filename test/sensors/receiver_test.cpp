@@ -10,6 +10,7 @@
 
 #include "core/error.h"
 #include "sensors/lidar.h"
+#include "test/support/margin.h"
 
 namespace groundray {
 namespace {
@@ -184,6 +185,7 @@ TEST(Receiver, RangesASingleArrivalExactly) {
       // parabola by its curvature over a bin, 1 / 8 or 1 / 2.
       const double widened = interval_s > 0 ? 3.9e-6 : 9.6e-7;
       EXPECT_LT(worst_m, 1e-6) << static_cast<int>(timing) << ' ' << interval_s;
+      testing::record_margin("range", worst_m, 1e-6, "m");
       EXPECT_LT(worst_w, (0.5 * widened + 0x1p-22) * 1e-6);
       EXPECT_LT(worst_s, (0.5 * widened + 0x1p-21) * 5e-9);
       EXPECT_LT(worst_j, (0x1p-22 + 1.4e-8) * 1e-6 * joules_per_watt);

@@ -23,6 +23,7 @@
 #include "core/random.h"
 #include "terrain/dem_io.h"
 #include "test/support/geotiff.h"
+#include "test/support/margin.h"
 #include "test/support/temporary_folder.h"
 
 namespace groundray {
@@ -167,8 +168,11 @@ int expect_warped(const Drape& drape, const Original& file, int bands, glm::dvec
       const double expected = (1 - t.y) * ((1 - t.x) * four[0] + t.x * four[1]) +
                               t.y * ((1 - t.x) * four[2] + t.x * four[3]);
       const auto [least, most] = std::ranges::minmax(four);
-      EXPECT_NEAR(stored(drape.image, at.x, at.y, band), expected, 0.501 + 0.02 * (most - least))
+      const double tolerance = 0.501 + 0.02 * (most - least);
+      EXPECT_NEAR(stored(drape.image, at.x, at.y, band), expected, tolerance)
           << at.x << " " << at.y;
+      testing::record_margin("texels",
+                             (stored(drape.image, at.x, at.y, band) - expected) / tolerance, 1);
     }
   }
   EXPECT_GT(inside, 0.6 * file.size.x * file.size.y);

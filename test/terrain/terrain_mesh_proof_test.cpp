@@ -14,6 +14,7 @@
 #include "terrain/dem_io.h"
 #include "terrain/terrain_mesh.h"
 #include "test/support/adversarial_terrain.h"
+#include "test/support/margin.h"
 #include "test/support/mesh_oracle.h"
 #include "test/support/mesh_topology.h"
 #include "test/support/sample_terrain.h"
@@ -71,6 +72,8 @@ void expect_keeps_its_promises(const HeightGrid& grid, const MeshBound& bound,
   const double heights_m = std::max(std::abs(grid.min_height_m()), std::abs(grid.max_height_m()));
   EXPECT_LE(found.largest_excess_m, rounding * heights_m)
       << found.largest_m << " m at (" << found.place.x << ", " << found.place.y << ")";
+  if (bound.angle_rad == 0 && bound.tolerance_m > 0)
+    testing::record_margin("deviation", found.largest_m, bound.tolerance_m, "m");
   EXPECT_EQ(found.over_missing, 0u) << found.missing_cell.x << ", " << found.missing_cell.y;
 }
 

@@ -15,6 +15,7 @@
 #include "core/error.h"
 #include "sensors/camera/lens.h"
 #include "test/support/lens_samples.h"
+#include "test/support/margin.h"
 #include "test/support/temporary_folder.h"
 
 namespace groundray {
@@ -371,6 +372,7 @@ TEST_F(PublishedCalibrations, AreReadAndInvertedToTheLastPixel) {
             const auto back = lens.project(rays[static_cast<std::size_t>(x)].direction);
             if (!back) ++blind;
             EXPECT_LT(back ? glm::distance(*back, {x, y}) : 0, 1e-9);
+            if (back) testing::record_margin("pixel", glm::distance(*back, {x, y}), 1e-9, "px");
             const auto fold = folds.find(name + " " + camera.name);
             EXPECT_TRUE(back ||
                         (fold != folds.end() && glm::distance({x, y}, fold->second.centre_px) >

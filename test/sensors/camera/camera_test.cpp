@@ -14,6 +14,7 @@
 #include "core/error.h"
 #include "test/support/camera_scene.h"
 #include "test/support/lens_samples.h"
+#include "test/support/margin.h"
 #include "test/support/solid.h"
 
 namespace groundray {
@@ -102,6 +103,8 @@ TEST(Camera, BlursWhatIsOutOfFocusToTheDiscOfAThinLens) {
         share_of_model(Camera(spec), right_half(depth_m), gliding(looking(here, ahead), {}));
     const Spread spread = spread_of(share, 0, 16);
     EXPECT_NEAR(4 * std::sqrt(spread.variance_px2), disc_px, 0.01 * disc_px);
+    testing::record_margin("disc out of focus", 4 * std::sqrt(spread.variance_px2) / disc_px - 1,
+                           0.01);
     EXPECT_NEAR(spread.mean_px, 31.5, 0.05);
   }
 }
@@ -134,6 +137,8 @@ TEST(Camera, BlursMotionOverSpeedTimesExposure) {
          {share_of_model(camera, right_half(10), path), share_of_model(camera, moving, still)}) {
       const Spread spread = spread_of(share, 0, 16);
       EXPECT_NEAR(std::sqrt(12 * spread.variance_px2), width_px, 0.01 * width_px);
+      testing::record_margin("motion blur", std::sqrt(12 * spread.variance_px2) / width_px - 1,
+                             0.01);
       EXPECT_NEAR(spread.mean_px, 31.5 + width_px / 2, 0.05);
     }
   }
@@ -157,6 +162,7 @@ TEST(Camera, RollsItsShutterRowByRow) {
     slope_px /= weight;
     // Some pixels of each row are mixed, to 1/256 each as stratified: 0.01 px, over 64 rows 1e-4.
     EXPECT_NEAR(slope_px, -500 * 8 * row_s / 10, 1e-3);
+    testing::record_margin("rolling shutter", slope_px + 500 * 8 * row_s / 10, 1e-3, "px a row");
   }
 }
 

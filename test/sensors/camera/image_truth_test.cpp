@@ -17,6 +17,7 @@
 #include "core/error.h"
 #include "test/support/camera_scene.h"
 #include "test/support/lens_samples.h"
+#include "test/support/margin.h"
 #include "test/support/solid.h"
 
 namespace groundray {
@@ -152,14 +153,19 @@ TEST_P(EveryLensInABox, SeesPointsOfTheWallsWhereTheyAreImaged) {
   // one model its image moves by 1e9 px for each radian.
   const double tolerance_px = GetParam().name == "rational 8, pole" ? 1e-4 : 1e-6;
   const auto images = images_by_opencv(GetParam().model, points);
-  for (std::size_t i = 0; i < images.size(); ++i)
+  for (std::size_t i = 0; i < images.size(); ++i) {
     ASSERT_LT(glm::distance(pixels[i], {images[i].x, images[i].y}), tolerance_px);
+    testing::record_margin("pixel", glm::distance(pixels[i], {images[i].x, images[i].y}),
+                           tolerance_px, "px");
+  }
   std::visit(
       [&]<typename Model>(const Model& model) {
         if constexpr (requires { image_by_hand(model, glm::dvec3()); }) {
           for (std::size_t i = 0; i < points.size(); ++i) {
             const glm::dvec3 p_C(points[i].x, points[i].y, points[i].z);
             ASSERT_LT(glm::distance(pixels[i], image_by_hand(model, p_C)), tolerance_px);
+            testing::record_margin("pixel", glm::distance(pixels[i], image_by_hand(model, p_C)),
+                                   tolerance_px, "px");
           }
         }
       },
@@ -188,7 +194,10 @@ TEST(ImageTruth, DepthAndRangeOfAPlaneAreTheClosedForms) {
       const glm::dvec3 m((x - 31.5) / 100, (y - 23.5) / 100, 1);
       const double depth_m = d_m / glm::dot(n_C, m), range_m = depth_m * glm::length(m);
       EXPECT_NEAR(truth.depth_m.at(x, y)[0], depth_m, float_rounding * depth_m);
+      testing::record_margin("Z of a plane", truth.depth_m.at(x, y)[0] / depth_m - 1,
+                             float_rounding);
       EXPECT_NEAR(truth.range_m.at(x, y)[0], range_m, float_rounding * range_m);
+      testing::record_margin("its range", truth.range_m.at(x, y)[0] / range_m - 1, float_rounding);
       const auto normal = truth.normal.at(x, y);
       EXPECT_LT(glm::distance(glm::dvec3(normal[0], normal[1], normal[2]), n_D), 1e-6);
       // The arc cosine of a float is blunt near 0; the angle is not.
@@ -372,6 +381,9 @@ TEST(ImageTruthFlow, OfAPlaneIsAHomographyThroughAnyDistortion) {
     // Offsets are floats of some 10 px.
     EXPECT_LT(glm::distance(flow(truth.forward, x, y), to - glm::dvec2(x, y)), 1e-5);
     EXPECT_LT(glm::distance(flow(truth.backward, x, y), to - glm::dvec2(x, y)), 1e-5);
+    testing::record_margin("flow of a plane",
+                           glm::distance(flow(truth.forward, x, y), to - glm::dvec2(x, y)), 1e-5,
+                           "px");
     const bool is_inside = -0.5 <= to.x && to.x < 63.5 && -0.5 <= to.y && to.y < 47.5;
     EXPECT_EQ(truth.forward.is_seen.at(x, y)[0], is_inside ? 1 : 0);
     inside += is_inside;
@@ -393,6 +405,7 @@ TEST(ImageTruthFlow, TellsWhatABoardInFrontHides) {
     const double near_m = p.x;
     const double du = 60 * 0.7 / near_m;  // to the right: the camera goes to the left
     EXPECT_NEAR(flow(truth.forward, x, y).x, du, 1e-5);
+    testing::record_margin("of a board", flow(truth.forward, x, y).x - du, 1e-5, "px");
     EXPECT_NEAR(flow(truth.forward, x, y).y, 0, 1e-5);
     const double eye_m = 0.7 + 0.7 * 0.0025;  // in the middle of the exposure
     const double at_y = eye_m + (p.y - eye_m) / 4, at_z = p.z / 4;
@@ -451,6 +464,8 @@ TEST(ImageTruthFlow, FollowsThingsThatMove) {
           glm::angleAxis(turning_rad_s * t, glm::dvec3(1, 0, 0)) * (p - glm::dvec3(10, 0, 0));
       const glm::dvec2 to(31.5 - 100 * then.y / then.x, 23.5 - 100 * then.z / then.x);
       EXPECT_LT(glm::distance(flow(*of, x, y), to - glm::dvec2(x, y)), 1e-5);
+      testing::record_margin("of what moves", glm::distance(flow(*of, x, y), to - glm::dvec2(x, y)),
+                             1e-5, "px");
     }
   });
   EXPECT_GT(on, 300);
@@ -493,6 +508,8 @@ TEST(ImageTruthFlow, SolvesForTheRowThatSees) {
       if (y + rows < 0 || y + rows > 47) return;  // rows beyond are taken at the last one's time
       EXPECT_NEAR(flow(truth.forward, x, y).x, 0, 1e-5);
       EXPECT_NEAR(flow(truth.forward, x, y).y, rows, 1e-5);
+      testing::record_margin("to rows of a rolling shutter", flow(truth.forward, x, y).y - rows,
+                             1e-5, "px");
     });
   }
 }

@@ -11,6 +11,7 @@
 #include <vector>
 
 #include "core/error.h"
+#include "test/support/margin.h"
 
 namespace groundray {
 namespace {
@@ -42,6 +43,7 @@ TEST(Irradiance, OfAPinholeFallsWithTheFourthPowerOfTheCosine) {
         const double cos = focal_px / std::hypot(x - 40, y - 30, focal_px);
         const double closed = 0.93 * pi / (4 * 2.8 * 2.8) * std::pow(cos, 4);
         ASSERT_NEAR(sr.at(x, y)[0], closed, tolerance * closed) << x << ", " << y;
+        testing::record_margin("pinholes", sr.at(x, y)[0] / closed - 1, tolerance);
       }
     }
   }
@@ -94,6 +96,7 @@ TEST(Irradiance, OfAFisheyeIsThatOfThePupilAndOfThePixelsSolidAngle) {
       constexpr double curvature = 2e-5;
       EXPECT_NEAR(turning.at(x, y)[0], pupil_px2 * sr, curvature * pupil_px2 * sr);
       EXPECT_NEAR(flat.at(x, y)[0], pupil_px2 * sr * cos, curvature * pupil_px2 * sr);
+      testing::record_margin("fisheye", turning.at(x, y)[0] / (pupil_px2 * sr) - 1, curvature);
       beyond += cos == 0;
     }
   }

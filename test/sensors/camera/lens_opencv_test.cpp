@@ -12,6 +12,7 @@
 #include "sensors/camera/calibration.h"
 #include "sensors/camera/lens.h"
 #include "test/support/lens_samples.h"
+#include "test/support/margin.h"
 
 // What OpenCV says, where its functions are of the same models.
 namespace groundray {
@@ -59,6 +60,8 @@ void expect_images(const Lens& lens, const std::vector<cv::Point3d>& points,
     const auto pixel = lens.project({points[i].x, points[i].y, points[i].z});
     ASSERT_TRUE(pixel);
     EXPECT_LT(glm::distance(*pixel, {images[i].x, images[i].y}), agreed_px);
+    testing::record_margin("pixel", glm::distance(*pixel, {images[i].x, images[i].y}), agreed_px,
+                           "px");
   }
 }
 

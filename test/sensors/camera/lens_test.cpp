@@ -16,6 +16,7 @@
 
 #include "core/error.h"
 #include "test/support/lens_samples.h"
+#include "test/support/margin.h"
 
 namespace groundray {
 namespace {
@@ -95,6 +96,7 @@ TEST_P(EveryLens, ImagesTheRayOfAPixelAtThePixel) {
     const auto back = lens.project(ray.direction);
     ASSERT_TRUE(back) << pixel.x << ", " << pixel.y;
     EXPECT_LT(glm::distance(*back, pixel), 1e-9 + rounding_px(ray)) << pixel.x << ", " << pixel.y;
+    testing::record_margin("pixel", glm::distance(*back, pixel), 1e-9 + rounding_px(ray), "px");
     EXPECT_NEAR(glm::length(ray.direction), 1, 4e-16);
     const auto far = lens.project(17.0 * ray.direction);
     ASSERT_TRUE(far);

@@ -15,6 +15,7 @@
 #include "sensors/lidar.h"
 #include "sensors/spec_io.h"
 #include "terrain/terrain_scene.h"
+#include "test/support/margin.h"
 #include "test/support/sample_terrain.h"
 #include "test/support/solid.h"
 #include "test/support/temporary_folder.h"
@@ -103,6 +104,8 @@ TEST(LidarImage, ShowsEchoesWhereAPinholeHasThemUnlessABoxIsInTheWay) {
       if (std::max(std::abs(u), std::abs(v)) < 1e4) {
         EXPECT_NEAR(echo.u_px, u, 1e-9);
         EXPECT_NEAR(echo.v_px, v, 1e-9);
+        testing::record_margin("pixel", std::max(std::abs(echo.u_px - u), std::abs(echo.v_px - v)),
+                               1e-9, "px");
       }
       EXPECT_NEAR(echo.depth_m, way.x, 1e-12);
       const bool is_inside = -0.5 <= u && u < 319.5 && -0.5 <= v && v < 239.5;

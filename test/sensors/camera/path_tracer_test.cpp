@@ -17,6 +17,7 @@
 #include "core/error.h"
 #include "core/random.h"
 #include "terrain/terrain_scene.h"
+#include "test/support/margin.h"
 #include "test/support/solid.h"
 
 namespace groundray {
@@ -181,6 +182,7 @@ TEST(PathTracer, WhiteThingsCannotBeSeenInEvenLight) {
     for (glm::length_t k = 0; k < 3; ++k) {
       const double off = std::abs(found.mean[k] - radiance);
       EXPECT_LT(off, 1e-3 * radiance) << white.name;
+      testing::record_margin("white things", off / radiance, 1e-3);
       EXPECT_LT(off, sigmas * found.standard_error[k] + 5e-4 * radiance) << white.name;
     }
     // Nothing but the surface itself draws directions: its paths do not differ.
@@ -200,6 +202,7 @@ TEST(PathTracer, GreyShiningInsidesAddUpRayByRay) {
     const double expected = shines * (1 - std::pow(reflects, depth)) / (1 - reflects);
     const auto found = light_along(light, ray_to({0.4, 0.3, -0.2}, {2, 1, 3}), 1 << 14);
     EXPECT_NEAR(found.mean.g, expected, 1e-3 * expected) << depth;
+    testing::record_margin("insides", found.mean.g / expected - 1, 1e-3);
     EXPECT_NEAR(found.mean.g, expected, sigmas * found.standard_error.g + 1e-6) << depth;
   }
 }
@@ -217,7 +220,10 @@ TEST(PathTracer, MattGroundInTheSunShinesByLambertsLaw) {
     const glm::dvec3 expected =
         sky.sun()->irradiance() * reflectance / pi * std::sin(sky.sun()->elevation_rad());
     const auto found = light_along(light, ray_to({3, 1, 2}, {0, 0, 0}), 1 << 16);
-    for (glm::length_t k = 0; k < 3; ++k) EXPECT_NEAR(found.mean[k] / expected[k], 1, 1e-5);
+    for (glm::length_t k = 0; k < 3; ++k) {
+      EXPECT_NEAR(found.mean[k] / expected[k], 1, 1e-5);
+      testing::record_margin("ground", found.mean[k] / expected[k] - 1, 1e-5);
+    }
     const double spread = found.standard_error.g * 256 / expected.g;
     const double tangent = 1 / std::tan(sky.sun()->elevation_rad());
     EXPECT_LT(spread, 0.51 * sky.sun()->angular_radius_rad() * tangent + 1e-5);
@@ -238,6 +244,8 @@ TEST(PathTracer, ASphereInTheSunBehindTheEyeShinesByLambertsLaw) {
     const double cosine = glm::normalize(glm::dvec3(x, 0.1, 4 - hit.range_m)).z;
     const auto found = light_along(light, ray, 1 << 15, i);
     EXPECT_NEAR(found.mean.g / (sky.sun()->irradiance().g / pi), cosine, 1e-5) << x;
+    testing::record_margin("a sphere", found.mean.g / (sky.sun()->irradiance().g / pi) - cosine,
+                           1e-5);
   }
 }
 
@@ -277,6 +285,7 @@ TEST(PathTracer, TheShadowOfAnEdgeIsAsWideAsTheSun) {
       const auto found =
           light_along(light, ray_to({x, -2, 1}, {x, 0, 0}), 1 << 13, std::uint32_t(i + 50));
       EXPECT_NEAR(found.mean.g / all, expected, tolerance) << s;
+      testing::record_margin("penumbra", found.mean.g / all - expected, tolerance);
     }
   }
 }
@@ -310,6 +319,12 @@ TEST(PathTracer, WallsHideTheirShareOfAnEvenSky) {
     const auto tilted =
         light_along(PathTracer(slope, sky, 2, {}), {glm::dvec3(0, 0, 2) + up, -up}, 1 << 14);
     EXPECT_NEAR(tilted.mean.g / radiance, (1 + std::cos(rises_rad)) / 2, tolerance) << rises_deg;
+    testing::record_margin(
+        "shares of the sky",
+        std::max({std::abs(one.mean.g / radiance - (1 + std::cos(rises_rad)) / 2),
+                  std::abs(two.mean.g / radiance - std::cos(rises_rad)),
+                  std::abs(tilted.mean.g / radiance - (1 + std::cos(rises_rad)) / 2)}),
+        tolerance);
   }
 }
 
@@ -376,6 +391,7 @@ TEST(PathTracer, ARectangleShinesByItsConfigurationFactor) {
     const double expected = shines * reflects * corner_share(2, 3, height_m);
     const auto found = light_along(light, ray_to({-height_m, 0, height_m / 2}, {0, 0, 0}), 1 << 15);
     EXPECT_NEAR(found.mean.g, expected, 2e-3 * expected) << height_m;
+    testing::record_margin("a rectangle", found.mean.g / expected - 1, 2e-3);
     EXPECT_NEAR(found.mean.g, expected, sigmas * found.standard_error.g + 3e-6 * expected);
     // Neither way of finding it can give more than the lamp's light times the reflectance.
     EXPECT_LE(found.most.g, 2 * shines * reflects);
@@ -438,6 +454,7 @@ TEST(PathTracer, LampsShineFromWhereTheyAreAtTheTimeOfTheRay) {
         0.9 * (20 * share(still.p_DO, still.R_DO, still.scale) + 3 * share(way, tilt, 1.5));
     const auto found = light_along(light, ray, 1 << 14);
     EXPECT_NEAR(found.mean.g, expected, 4e-3 * expected) << tenths;
+    testing::record_margin("lamps that move", found.mean.g / expected - 1, 4e-3);
     EXPECT_NEAR(found.mean.g, expected, sigmas * found.standard_error.g) << tenths;
   }
 }

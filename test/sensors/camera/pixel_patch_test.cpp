@@ -7,6 +7,7 @@
 #include <random>
 
 #include "test/support/lens_samples.h"
+#include "test/support/margin.h"
 
 namespace groundray {
 namespace {
@@ -44,6 +45,7 @@ TEST_P(PixelPatchOf, LooksWhereItsPlacesAreImaged) {
     }
   }
   EXPECT_LT(worst_px, PixelPatch::error_px);
+  testing::record_margin("place", worst_px, PixelPatch::error_px, "px");
 }
 
 INSTANTIATE_TEST_SUITE_P(Sample, PixelPatchOf, ::testing::ValuesIn(sample_lenses()),

@@ -15,6 +15,7 @@
 
 #include "sensors/camera/camera.h"
 #include "terrain/terrain_scene.h"
+#include "test/support/margin.h"
 
 namespace groundray {
 namespace {
@@ -201,7 +202,7 @@ void expect_found(const char* by, const std::vector<cv::Point2d>& found,
   for (std::size_t i = 0; i < found.size(); ++i)
     most = std::max(most, cv::norm(found[i] - said[i]));
   EXPECT_LT(most, found_px);
-  ::testing::Test::RecordProperty(by, fmt::format("{:.4f}", most));
+  testing::record_margin(fmt::format("corners by {}", by), most, found_px, "px");
 }
 
 CameraSpec fine(LensModel lens) { return camera_of(std::move(lens), small_px, 256, 1024); }
@@ -299,6 +300,7 @@ TEST(RenderedChessboard, LetsOpenCvFindTheLensOfBrownAndConrady) {
   for (int i = 0; i < 9; ++i) {
     const double in_sigmas = offs[static_cast<std::size_t>(i)] / sigma.at<double>(i);
     EXPECT_LT(std::abs(in_sigmas), most_sigmas) << i;
+    testing::record_margin("parameters", in_sigmas, most_sigmas, "standard deviations");
     RecordProperty(fmt::format("parameter {}", i),
                    fmt::format("{:.2f} of {:.2g}", in_sigmas, sigma.at<double>(i)));
   }
@@ -363,6 +365,7 @@ TEST(RenderedChessboard, LetsOpenCvFindTheFisheye) {
   for (int i = 0; i < 4; ++i) offs.push_back(coefficients[i] - k[static_cast<std::size_t>(i)]);
   for (std::size_t i = 0; i < offs.size(); ++i) {
     EXPECT_LT(std::abs(offs[i]), most_sigmas * sigma[i]) << i;
+    testing::record_margin("parameters", offs[i] / sigma[i], most_sigmas, "standard deviations");
     RecordProperty(fmt::format("parameter {}", i),
                    fmt::format("{:.2f} of {:.2g}", offs[i] / sigma[i], sigma[i]));
   }

@@ -13,6 +13,7 @@
 #include "sensors/camera/calibration.h"
 #include "sensors/camera/lens.h"
 #include "test/support/lens_samples.h"
+#include "test/support/margin.h"
 
 namespace groundray {
 namespace {
@@ -62,6 +63,10 @@ TEST(StereoRectification, ImagesAllPointsInEqualRowsAtFocalLengthTimesBaselineOv
       // Rotations are rounded to 1e-16 of f max(|x|, |y|, z) / z, some 1e3 px.
       EXPECT_NEAR(in_left->y, in_right->y, 1e-9);
       EXPECT_NEAR(in_left->x - in_right->x, pair.scale.focal_px.x * pair.baseline_m / z, 1e-9);
+      testing::record_margin("rows", in_left->y - in_right->y, 1e-9, "px");
+      testing::record_margin("disparity",
+                             in_left->x - in_right->x - pair.scale.focal_px.x * pair.baseline_m / z,
+                             1e-9, "px");
     }
   }
 }
@@ -113,6 +118,10 @@ TEST(StereoRectification, TurnsAPairAsOpenCvDoes) {
     // Half turns by Rodrigues and back are rounded a few times in either library.
     EXPECT_LT(cv::norm(left_turn, matrix_of(pair.R_LC), cv::NORM_INF), 1e-13);
     EXPECT_LT(cv::norm(right_turn, matrix_of(pair.R_RC), cv::NORM_INF), 1e-13);
+    testing::record_margin("turns",
+                           std::max(cv::norm(left_turn, matrix_of(pair.R_LC), cv::NORM_INF),
+                                    cv::norm(right_turn, matrix_of(pair.R_RC), cv::NORM_INF)),
+                           1e-13);
     EXPECT_NEAR(right_projection(0, 3) / right_projection(0, 0), -pair.baseline_m, 1e-14);
   }
 }
