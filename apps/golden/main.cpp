@@ -41,13 +41,15 @@ void print(const Section& section) {
   fmt::print("{} {}\n", section.verdict == Verdict::Passed ? "passed" : "FAILED", section.title);
   for (const Measure& measure : section.measures) {
     if (measure.verdict != Verdict::Failed) continue;
-    fmt::print("       {}: {:.6g} {}, but at most {:.6g}\n", measure.name, measure.value,
-               measure.unit, measure.limit.value_or(0));
+    fmt::print("       {}: {:.6g} {}, but at most {:.6g} because: {}\n", measure.name,
+               measure.value, measure.unit, measure.limit.value_or(0), measure.because);
   }
 }
 
 int run_suite(const fs::path& folder, const std::vector<std::string>& filters,
               const SuiteOptions& options) {
+  for (const char* name : {"report.html", "report.json", "junit.xml"})
+    fs::remove(options.out / name);  // those of another run say nothing of this one
   Report report =
       groundray::golden::run_cases(groundray::golden::read_cases(folder, filters), options);
   report.facts = {{"version", GROUNDRAY_VERSION},
@@ -67,8 +69,10 @@ int run_suite(const fs::path& folder, const std::vector<std::string>& filters,
 int accept(const fs::path& folder, const std::vector<std::string>& names,
            const SuiteOptions& options) {
   for (const std::string& name : names) {
-    groundray::golden::accept_case(groundray::golden::read_case(folder / name), options);
-    fmt::print("stored: {}\n", (folder / name / "expected").string());
+    const fs::path place =
+        (folder / name / "").parent_path();  // shells complete names with a slash
+    groundray::golden::accept_case(groundray::golden::read_case(place), options);
+    fmt::print("stored: {}\n", (place / "expected").string());
   }
   return done;
 }
@@ -113,6 +117,7 @@ int run(int argc, char** argv) {
     return app.exit(error) == 0 ? done : wrong_usage;
   }
   if (compare.is_asked_for()) return compare.run() == Verdict::Failed ? failed : done;
+  groundray::catch_interruptions();  // what is written by then stays whole
   return run_command->parsed() ? run_suite(folder, filters, options)
                                : accept(folder, names, options);
 }
@@ -120,7 +125,6 @@ int run(int argc, char** argv) {
 }  // namespace
 
 int main(int argc, char** argv) {
-  groundray::catch_interruptions();
   try {
     return run(argc, argv);
   } catch (const groundray::Interrupted&) {

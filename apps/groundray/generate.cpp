@@ -14,9 +14,9 @@
 
 #include "apps/groundray/dataset.h"
 #include "apps/groundray/images.h"
-#include "apps/interruption.h"
 #include "apps/groundray/preview.h"
 #include "apps/groundray/world.h"
+#include "apps/interruption.h"
 #include "core/npy_io.h"
 #include "core/ply_io.h"
 #include "core/product_io.h"

@@ -1,8 +1,12 @@
 """The golden suite as its users run it: it passes, finds what is wrong, and says where."""
 
+import json
 import os
 import shutil
+import signal
 import subprocess
+import sys
+import time
 import xml.etree.ElementTree as ET
 from html.parser import HTMLParser
 from pathlib import Path
@@ -13,6 +17,7 @@ ROOT = Path(__file__).resolve().parents[2]
 PROGRAM = Path(os.environ.get("GROUNDRAY", ROOT / "build/release/bin/groundray"))
 GOLDEN = PROGRAM.parent / "groundray-golden"
 CASES = ROOT / "test/golden"
+PYTHON = sys.executable
 
 
 def golden(*arguments, **options):
@@ -246,6 +251,93 @@ def test_accepting_stores_what_then_passes(tmp_path):
     assert "nothing to store" in refused.stderr
 
 
+def test_accepting_light_stores_moments_of_other_seeds(tmp_path):
+    cases = copy_of_cases(tmp_path)
+    out = tmp_path / "out"
+    replace(cases / "camera_blur/ahead.yaml", "samples: 64", "samples: 1")
+    assert golden("accept", "camera_blur/", "--cases", cases, "-o", out).returncode == 0
+    run = golden("run", "--cases", cases, "--filter", "camera_blur", "-o", out)
+    assert "standard deviations" not in run.stdout or run.returncode == 1
+    stored = (cases / "camera_blur/expected/camera/ahead/000000.moments.exr").read_bytes()
+    own = CASES / "camera_blur/expected/camera/ahead/000000.moments.exr"
+    assert stored != own.read_bytes()
+
+
+ROWS_LOST = """#!/usr/bin/env python3
+import subprocess, sys
+from pathlib import Path
+from plyfile import PlyData, PlyElement
+code = subprocess.run(["{program}", *sys.argv[1:]]).returncode
+for scan in Path(sys.argv[4]).glob("lidar/*/*.ply"):
+    ply = PlyData.read(scan)
+    kept = ply["vertex"].data[:3]
+    PlyData([PlyElement.describe(kept, "vertex")], comments=ply.comments).write(scan)
+sys.exit(code)
+"""
+
+
+def test_rows_that_are_lost_are_missed(tmp_path):
+    """Each row that is left is right, so only their number tells."""
+    program = tmp_path / "lossy"
+    program.write_text(ROWS_LOST.format(program=PROGRAM).replace("/usr/bin/env python3", PYTHON))
+    program.chmod(0o755)
+    result = golden(
+        "run", "--program", program, "--filter", "lidar", "over", "-o", tmp_path / "out"
+    )
+    assert result.returncode == 1
+    names = {case.parent.name for case in CASES.glob("*/case.yaml")}
+    asked = {name for name in names if "lidar" in name or "over" in name}
+    assert failures(tmp_path / "out/junit.xml") == asked
+
+
+def test_whatever_a_program_prints_the_reports_can_be_read(tmp_path):
+    program = tmp_path / "noisy"
+    program.write_text("#!/bin/sh\nprintf '\\033[31m\\001\\377 <&> bad'\nexit 3\n")
+    program.chmod(0o755)
+    out = tmp_path / "out"
+    result = golden("run", "--program", program, "--filter", "camera_flow", "-o", out)
+    assert result.returncode == 1
+    assert failures(out / "junit.xml") == {"camera_flow"}
+    (failure,) = ET.parse(out / "junit.xml").getroot().iter("failure")
+    assert "ended with code 3" in failure.get("message")
+    json.loads((out / "report.json").read_text())
+
+
+def test_one_run_at_a_time_writes_into_a_folder(tmp_path):
+    run = ("run", "--filter", "camera_lamp", "-o", tmp_path / "out")
+    with subprocess.Popen(
+        [GOLDEN, *run], stdout=subprocess.DEVNULL, stderr=subprocess.DEVNULL
+    ) as first:
+        deadline = time.monotonic() + 60
+        while not (tmp_path / "out/camera_lamp").exists() and time.monotonic() < deadline:
+            time.sleep(0.005)
+        second = golden(*run)
+        assert first.wait(60) == 0
+    assert second.returncode == 1
+    assert "another run writes there" in second.stderr
+
+
+def test_a_run_that_stops_leaves_no_report_of_an_earlier_one(tmp_path):
+    out = tmp_path / "out"
+    assert golden("run", "--filter", "camera_flow", "-o", out).returncode == 0
+    stopped = golden("run", "--filter", "camera_flow", "--program", "/nonexistent", "-o", out)
+    assert stopped.returncode == 1
+    assert "cannot be started" in stopped.stderr
+    assert not list(out.glob("*.html")) + list(out.glob("*.json")) + list(out.glob("*.xml"))
+
+
+def test_an_interrupt_ends_a_run(tmp_path):
+    command = [GOLDEN, "run", "-o", tmp_path / "out"]
+    quiet = {"stdout": subprocess.DEVNULL, "stderr": subprocess.DEVNULL}
+    with subprocess.Popen(command, **quiet, start_new_session=True) as run:
+        deadline = time.monotonic() + 60
+        while not list((tmp_path / "out").glob("*/log.txt")) and time.monotonic() < deadline:
+            time.sleep(0.005)
+        os.killpg(run.pid, signal.SIGINT)
+        assert run.wait(30) == 130
+    assert not (tmp_path / "out/report.json").exists()
+
+
 def test_wrong_usage_and_missing_folders_are_told(tmp_path):
     assert golden("run", "--jobs", "0").returncode == 2
     assert golden("judge").returncode == 2
@@ -254,4 +346,4 @@ def test_wrong_usage_and_missing_folders_are_told(tmp_path):
     assert "no such folder of cases" in missing.stderr
     unknown = golden("run", "--filter", "no_such_case")
     assert unknown.returncode == 1
-    assert "holds no case of that name" in unknown.stderr
+    assert "holds no case with 'no_such_case'" in unknown.stderr

@@ -2,6 +2,7 @@
 
 #include <fmt/format.h>
 
+#include <cmath>
 #include <exception>
 #include <string>
 #include <utility>
@@ -37,7 +38,10 @@ void name_places(Columns& columns) {
 void keep(const std::string& condition, Columns& columns) {
   const std::vector<double> kept = evaluate(condition, columns);
   std::size_t rows = 0;
-  for (const double is_kept : kept) rows += is_kept != 0 ? 1 : 0;
+  for (const double is_kept : kept) {
+    if (std::isnan(is_kept)) throw Error("rows: '{}' is no number in some row", condition);
+    rows += is_kept != 0 ? 1 : 0;
+  }
   for (Columns::Column& column : columns.all) {
     std::size_t to = 0;
     for (std::size_t from = 0; from < kept.size(); ++from) {

@@ -5,7 +5,9 @@
 #include <gnu/libc-version.h>
 
 #include <algorithm>
+#include <bit>
 #include <cmath>
+#include <cstdint>
 #include <limits>
 #include <vector>
 
@@ -14,6 +16,24 @@
 
 namespace groundray::golden {
 namespace {
+
+// FNV-1a over what the C library's functions return: it has several of each, for processors with
+// and without fused multiply-add.
+std::uint64_t print_of_functions() {
+  std::uint64_t print = 0xcbf29ce484222325;
+  const auto add = [&](double value) {
+    print = (print ^ std::bit_cast<std::uint64_t>(value)) * 0x100000001b3;
+  };
+  for (int i = 1; i <= 1000; ++i) {
+    const double x = i / 1000.5;
+    for (const double value :
+         {std::sin(9 * x), std::cos(9 * x), std::tan(x), std::asin(x), std::acos(x),
+          std::atan2(x, 0.3), std::exp(-5 * x), std::log(x), std::pow(x, 1.7), std::erf(x)}) {
+      add(value);
+    }
+  }
+  return print;
+}
 
 std::vector<std::string> names_of(const Columns& columns) {
   std::vector<std::string> names;
@@ -34,13 +54,18 @@ bool are_equal(double a, double b, Stored stored, Equal equal) {
 }  // namespace
 
 std::string made_with() {
-  return fmt::format("glibc {}, {} {}", gnu_get_libc_version(),
+  return fmt::format("glibc {}, {} {}, {}, functions {:016x}", gnu_get_libc_version(),
 #ifdef __clang__
-                     "clang", __clang_major__
+                     "clang", __clang_major__,
 #else
-                     "gcc", __GNUC__
+                     "gcc", __GNUC__,
 #endif
-  );
+#ifdef __x86_64__
+                     "x86_64",
+#else
+                     "another processor",
+#endif
+                     print_of_functions());
 }
 
 void check_equal(const Columns& columns, const Columns& stored, Equal equal,

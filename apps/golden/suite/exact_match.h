@@ -8,7 +8,8 @@
 
 namespace groundray::golden {
 
-/// The C library and compiler of this program, whose last bits stored files share.
+/// The C library, compiler and processor of this program, with a print of what the library's
+/// functions return here: stored files share their last bits.
 std::string made_with();
 
 /// Which values count as those that are stored.

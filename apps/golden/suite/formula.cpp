@@ -4,6 +4,7 @@
 
 #include <cmath>
 #include <numbers>
+#include <string_view>
 
 #include "core/error.h"
 
@@ -21,10 +22,26 @@ void define(mu::Parser& parser, const std::string& name, const std::vector<doubl
   parser.DefineVar(name, const_cast<double*>(values.data()));
 }
 
+// muParser would take `=` for an assignment, and of `a, b` the last value.
+void check_spelling(const std::string& formula) {
+  int depth = 0;
+  for (std::size_t i = 0; i < formula.size(); ++i) {
+    const char c = formula[i];
+    if (c == '(') ++depth;
+    if (c == ')') --depth;
+    if (c == ',' && depth <= 0) throw Error("formula '{}': has a comma between values", formula);
+    if (c != '=') continue;
+    const bool ends = i > 0 && std::string_view("=<>!").find(formula[i - 1]) != std::string::npos;
+    const bool begins = i + 1 < formula.size() && formula[i + 1] == '=';
+    if (!ends && !begins) throw Error("formula '{}': has '=': equal is '=='", formula);
+  }
+}
+
 }  // namespace
 
 std::vector<double> evaluate(const std::string& formula, const Columns& columns) {
   std::vector<double> values(columns.rows);
+  check_spelling(formula);
   if (columns.rows == 0) return values;
   try {
     mu::Parser parser;

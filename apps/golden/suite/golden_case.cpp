@@ -42,6 +42,7 @@ std::optional<FigureCheck> read_figure(Map& map) {
     map.read_text("count", Need::Required, check.is);
     check.kind = Kind::Count;
     check.within = "0";
+    map.read_text("within", Need::Optional, check.within);
     return check;
   }
   for (const auto& entry : kinds) {
@@ -66,6 +67,7 @@ void read_check(const yaml::Node& node, ProductChecks& product, Faults& faults) 
     check.what = ExactCheck{};
   } else if (map.find("statistical", Need::Optional) != nullptr) {
     StatisticalCheck statistical{.columns = read_names(map, "statistical", faults)};
+    if (statistical.columns.empty()) faults.add(node, "statistical", "must name a column");
     map.read_number("share", Need::Optional, statistical.share, a_share);
     check.what = statistical;
   } else if (const auto figure = read_figure(map)) {
@@ -78,6 +80,15 @@ void read_check(const yaml::Node& node, ProductChecks& product, Faults& faults) 
   map.read_text("because", Need::Required, check.because);
   map.close();
   product.checks.push_back(std::move(check));
+}
+
+bool sees_all_rows(const ProductChecks& product) {
+  return std::ranges::any_of(product.checks, [](const Check& check) {
+    const auto* figure = std::get_if<FigureCheck>(&check.what);
+    return std::holds_alternative<ExactCheck>(check.what) ||
+           std::holds_alternative<StatisticalCheck>(check.what) ||
+           (figure != nullptr && figure->kind == FigureCheck::Kind::Count);
+  });
 }
 
 void read_product(const yaml::Node& node, GoldenCase& into, Faults& faults) {
@@ -95,6 +106,10 @@ void read_product(const yaml::Node& node, GoldenCase& into, Faults& faults) {
   }
   for (const yaml::Node& item : map.list("checks", Need::Required))
     read_check(item, product, faults);
+  if (!sees_all_rows(product)) {
+    faults.add(node, "checks",
+               "must have a count, or exact or statistical: the others pass if rows are missing");
+  }
   map.close();
   into.products.push_back(std::move(product));
 }
@@ -118,6 +133,8 @@ GoldenCase read_case(const std::filesystem::path& folder) {
   map.read_text("title", Need::Required, into.title);
   for (const yaml::Node& item : map.list("products", Need::Required))
     read_product(item, into, faults);
+  if (into.products.empty() && faults.count() == 0)
+    faults.add(root, "products", "must have one at least");
   map.close();
   faults.throw_if_any();
   return into;
@@ -135,7 +152,13 @@ std::vector<GoldenCase> read_cases(const std::filesystem::path& folder,
       folders.push_back(entry.path());
     }
   }
-  if (folders.empty()) throw Error("{}: holds no case of that name", folder.string());
+  for (const std::string& filter : filters) {
+    if (std::ranges::none_of(folders, [&](const auto& each) {
+          return each.filename().string().find(filter) != std::string::npos;
+        }))
+      throw Error("{}: holds no case with '{}' in its name", folder.string(), filter);
+  }
+  if (folders.empty()) throw Error("{}: holds no case", folder.string());
   std::ranges::sort(folders);
   std::vector<GoldenCase> cases;
   for (const auto& each : folders) cases.push_back(read_case(each));

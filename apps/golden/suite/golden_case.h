@@ -60,7 +60,7 @@ struct GoldenCase {
 GoldenCase read_case(const std::filesystem::path& folder);
 
 /// Reads all cases of a folder whose names contain one of `filters` (all, if there is none), by
-/// name. @throws Error likewise; if there is none.
+/// name. @throws Error likewise; if there is none, or none for one of the filters.
 std::vector<GoldenCase> read_cases(const std::filesystem::path& folder,
                                    const std::vector<std::string>& filters);
 

@@ -6,6 +6,7 @@
 #include <unistd.h>
 
 #include <cerrno>
+#include <fstream>
 #include <system_error>
 
 #include "core/error.h"
@@ -35,6 +36,7 @@ class ToFile {
 }  // namespace
 
 int run_process(const std::vector<std::string>& command, const std::filesystem::path& log) {
+  if (!std::ofstream(log)) throw Error("{}: cannot be written", log.string());
   std::vector<char*> arguments;
   for (const std::string& word : command) arguments.push_back(const_cast<char*>(word.c_str()));
   arguments.push_back(nullptr);

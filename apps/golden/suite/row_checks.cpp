@@ -22,11 +22,16 @@ struct Difference {
   std::size_t worst = 0;          // row of the largest share of its tolerance
 };
 
-// What is not finite must be equal; NaN is equal to NaN.
+// What is infinite must be equal, and NaN is equal to nothing.
 double difference(double value, double expected) {
-  if (value == expected || (std::isnan(value) && std::isnan(expected))) return 0;
+  if (value == expected) return 0;
   const double apart = value - expected;
   return std::isfinite(apart) ? apart : std::numeric_limits<double>::infinity();
+}
+
+// A tolerance that is not finite allows nothing but equality.
+bool is_within(double apart, double tolerance) {
+  return apart == 0 ? tolerance >= 0 : std::isfinite(tolerance) && std::abs(apart) <= tolerance;
 }
 
 Difference differences(const std::vector<double>& values, const std::vector<double>& expected,
@@ -36,7 +41,7 @@ Difference differences(const std::vector<double>& values, const std::vector<doub
   double largest = -1;
   for (std::size_t i = 0; i < values.size(); ++i) {
     const double apart = found.of_rows[i] = difference(values[i], expected[i]);
-    const bool holds = std::abs(apart) <= found.tolerance[i];
+    const bool holds = is_within(apart, found.tolerance[i]);
     if (!holds) ++found.beyond;
     // A tolerance of 0 that holds is used up to nothing, not to 0 / 0.
     const double used = apart == 0 ? (holds ? 0 : std::numeric_limits<double>::infinity())
@@ -65,6 +70,12 @@ void draw(const std::string& what, const std::vector<double>& values,
   into.pictures.push_back({what + ": actual", false_colour(values, columns.size_px, low, high)});
   into.pictures.push_back({fmt::format("{}: difference, -{:.3g} to {:.3g}", what, widest, widest),
                            false_colour(found.of_rows, columns.size_px, -widest, widest)});
+}
+
+void refuse_nan(const std::string& formula, const std::vector<double>& values) {
+  const auto bad = std::ranges::find_if(values, [](double value) { return std::isnan(value); });
+  if (bad != values.end())
+    throw Error("formula '{}': is no number in row {}", formula, bad - values.begin());
 }
 
 double sum_of(const std::vector<double>& values) {
@@ -145,10 +156,12 @@ void check_figure(const FigureCheck& check, const std::string& because, const Co
     throw Error("{} {}: there is no row", word_of(check.kind), check.value);
   const std::vector<double> values =
       counts ? std::vector<double>(columns.rows) : evaluate(check.value, columns);
+  refuse_nan(check.value, values);
   const double figure = figure_of(check.kind, values);
   const double expected = number_of(check.is, columns.rows);
   const double tolerance = number_of(check.within, columns.rows);
   const double apart = std::abs(difference(figure, expected));
+  if (!std::isfinite(tolerance)) throw Error("within '{}': must be finite", check.within);
   hold(into,
        fmt::format("{} {} = {}: {:.10g} for {:.10g}; off by", word_of(check.kind), check.value,
                    check.is, figure, expected),

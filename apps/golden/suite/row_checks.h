@@ -6,12 +6,14 @@
 
 namespace groundray::golden {
 
-/// Holds each row's value against its formula; pictures show them if the rows are pixels. A value
-/// that is not finite must be equal. @throws Error as evaluate.
+/// Holds each row's value against its formula; pictures show them if the rows are pixels. An
+/// infinite value must be equal, and NaN passes nothing. @throws Error as evaluate; if there is no
+/// row.
 void check_rows(const RowsCheck& check, const std::string& because, const Columns& columns,
                 Section& into);
 
-/// Holds a figure of all rows against a number. @throws Error as evaluate; if there is no row.
+/// Holds a figure of all rows against a number. @throws Error as evaluate; if there is no row, or
+/// one whose value is NaN.
 void check_figure(const FigureCheck& check, const std::string& because, const Columns& columns,
                   Section& into);
 

@@ -23,6 +23,15 @@ const Columns::Column& column_of(const Columns& columns, const std::string& name
   return *column;
 }
 
+// What a sum of squares or a mean cannot be.
+void refuse_unsound(const Columns::Column& column) {
+  const bool is_variance = column.name.starts_with("Variance_");
+  for (const double value : column.values) {
+    if (!std::isfinite(value) || (is_variance && value < 0))
+      throw Error("{} has a value of {}, which tells nothing of an image", column.name, value);
+  }
+}
+
 struct Channel {
   const std::vector<double>&actual, &mean, &variance;
   glm::ivec2 size_px;
@@ -50,6 +59,16 @@ struct Channel {
            std::sqrt(variances * (1 + 1.0 / statistical_runs) + rounding * rounding);
   }
 };
+
+// How much of a channel's light must be wrong everywhere to be noticed in its mean.
+double noticeable_share(const Channel& channel, double limit) {
+  double light = 0, variances = 0;
+  for (std::size_t i = 0; i < channel.mean.size(); ++i) {
+    light += channel.mean[i];
+    variances += channel.variance[i];
+  }
+  return limit * std::sqrt(variances * (1 + 1.0 / statistical_runs)) / light;
+}
 
 std::size_t blocks_along(int pixels) {
   return static_cast<std::size_t>((pixels + block_px - 1) / block_px);
@@ -118,6 +137,7 @@ Columns Moments::columns() const {
   for (std::size_t k = 1; k < columns.all.size(); k += 2) {
     for (double& value : columns.all[k].values) value /= runs_ - 1;
   }
+  for (const Columns::Column& column : columns.all) refuse_unsound(column);
   return columns;
 }
 
@@ -136,6 +156,8 @@ void check_statistically(const StatisticalCheck& check, const std::string& becau
   for (const std::string& name : check.columns) {
     const Channel channel{column_of(image, name).values, column_of(moments, "Mean_" + name).values,
                           column_of(moments, "Variance_" + name).values, image.size_px};
+    refuse_unsound(column_of(moments, "Mean_" + name));
+    refuse_unsound(column_of(moments, "Variance_" + name));
     std::vector<double> deviations(image.rows);
     for (int y = 0; y < image.size_px.y; ++y) {
       for (int x = 0; x < image.size_px.x; ++x)
@@ -145,6 +167,8 @@ void check_statistically(const StatisticalCheck& check, const std::string& becau
         std::ranges::count_if(deviations, [&](double value) { return value > limit; }));
     of_blocks = std::max(of_blocks, largest_of_blocks(channel));
     of_channels = std::max(of_channels, channel.deviations(0, 0, image.size_px.x, image.size_px.y));
+    tell(into, name + ": would be noticed if all of it were off by",
+         100 * noticeable_share(channel, normal_limit(significance, check.columns.size())), "%");
     draw(name, channel, deviations, into);
   }
   hold(into, fmt::format("values more than {:.2f} standard deviations off", limit),

@@ -15,6 +15,9 @@
 namespace groundray::golden {
 namespace {
 
+// Of the runs behind moments: none that a scene would have, or the tested run would be one of them.
+constexpr std::uint64_t first_seed = 0x676f6c64656e0000;
+
 std::filesystem::path note_of(const GoldenCase& golden) {
   return golden.expected() / "made_with.txt";
 }
@@ -63,7 +66,6 @@ std::filesystem::path stored_moments(const GoldenCase& golden, const std::string
 }
 
 std::string stored_made_with(const GoldenCase& golden) {
-  if (!std::filesystem::exists(note_of(golden))) return {};
   std::string note = read_text(note_of(golden));
   while (!note.empty() && note.back() == '\n') note.pop_back();
   return note;
@@ -87,7 +89,7 @@ void store(const GoldenCase& golden,
   std::vector<Moments> moments;
   for (const auto& check : statistical) moments.emplace_back(check.second.columns);
   for (int k = 1; k <= statistical_runs; ++k) {
-    const std::filesystem::path dataset = run(static_cast<std::uint64_t>(k));
+    const std::filesystem::path dataset = run(first_seed + static_cast<std::uint64_t>(k));
     for (std::size_t i = 0; i < statistical.size(); ++i)
       moments[i].add(read_columns(dataset / statistical[i].first));
   }

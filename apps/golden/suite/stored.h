@@ -15,7 +15,7 @@ std::filesystem::path stored_file(const GoldenCase& golden, const std::string& p
 /// The EXR file of mean and variance that a product is held against.
 std::filesystem::path stored_moments(const GoldenCase& golden, const std::string& product);
 
-/// What the stored files were made with, as made_with says it; empty if nothing is stored.
+/// What the stored files were made with, as made_with says it. @throws Error if that is missing.
 std::string stored_made_with(const GoldenCase& golden);
 
 /// Stores what a case expects from now on: the files of one run, and the moments of

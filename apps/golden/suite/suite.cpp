@@ -1,7 +1,10 @@
 #include "apps/golden/suite/suite.h"
 
+#include <fcntl.h>
 #include <fmt/format.h>
+#include <sys/file.h>
 #include <tinyxml2.h>
+#include <unistd.h>
 
 #include <algorithm>
 #include <atomic>
@@ -26,9 +29,21 @@ namespace {
 
 using Clock = std::chrono::steady_clock;
 
+// A program that fails may print anything; XML and terminals want no control characters.
+std::string printable(std::string text) {
+  std::ranges::replace_if(
+      text,
+      [](char c) {
+        const auto byte = static_cast<unsigned char>(c);
+        return byte > 0x7e || (byte < 0x20 && c != '\n' && c != '\t');
+      },
+      '?');
+  return text;
+}
+
 std::string tail_of(const std::filesystem::path& log) {
   constexpr std::size_t most = 2000;
-  const std::string text = read_text(log);
+  const std::string text = printable(read_text(log));
   return text.size() <= most ? text : "..." + text.substr(text.size() - most);
 }
 
@@ -48,6 +63,28 @@ std::optional<std::string> make_dataset(const GoldenCase& golden, const SuiteOpt
   return fmt::format("groundray ended with code {}: {}", code, tail_of(log));
 }
 
+// Keeps other runs out of a folder while it lives.
+class FolderLock {
+ public:
+  explicit FolderLock(const std::filesystem::path& folder) {
+    std::filesystem::create_directories(folder);
+    const std::filesystem::path file = folder / ".lock";
+    descriptor_ = open(file.c_str(), O_RDWR | O_CREAT | O_CLOEXEC, 0644);
+    if (descriptor_ < 0)
+      throw Error("{}: cannot be written: choose another folder by -o", file.string());
+    if (flock(descriptor_, LOCK_EX | LOCK_NB) == 0) return;
+    close(descriptor_);
+    throw Error("{}: another run writes there: wait, or choose another folder by -o",
+                folder.string());
+  }
+  ~FolderLock() { close(descriptor_); }
+  FolderLock(const FolderLock&) = delete;
+  FolderLock& operator=(const FolderLock&) = delete;
+
+ private:
+  int descriptor_ = -1;
+};
+
 Section run_case(const GoldenCase& golden, const SuiteOptions& options) {
   const std::filesystem::path dataset = options.out / golden.name / "dataset";
   const auto begin = Clock::now();
@@ -55,7 +92,7 @@ Section run_case(const GoldenCase& golden, const SuiteOptions& options) {
   const double took_s = std::chrono::duration<double>(Clock::now() - begin).count();
   Section section{.title = golden.name, .verdict = Verdict::Failed, .text = golden.title};
   if (fault) {
-    hold(section, *fault, 1, "fault", 0, "a run ends without a fault");
+    hold(section, "groundray makes the dataset", 1, "fault", 0, *fault);
   } else {
     section = check_case(golden, dataset);
   }
@@ -91,6 +128,7 @@ void in_threads(std::size_t count, unsigned threads, const Work& work) {
 }  // namespace
 
 Report run_cases(const std::vector<GoldenCase>& cases, const SuiteOptions& options) {
+  const FolderLock lock(options.out);
   Report report{.title = "The golden suite of groundray", .facts = {}, .sections = {}};
   report.sections.resize(cases.size());
   Progress progress(stderr, "cases", cases.size());
@@ -106,6 +144,7 @@ Report run_cases(const std::vector<GoldenCase>& cases, const SuiteOptions& optio
 }
 
 void accept_case(const GoldenCase& golden, const SuiteOptions& options) {
+  const FolderLock lock(options.out);
   store(golden, [&](std::uint64_t seed) {
     const std::filesystem::path dataset = options.out / golden.name / "accepted";
     std::optional<std::uint64_t> own;
@@ -130,7 +169,7 @@ void write_junit(const std::filesystem::path& path, const Report& report) {
       ++tests;
       tinyxml2::XMLElement* test = suite->InsertNewChildElement("testcase");
       test->SetAttribute("classname", section.title.c_str());
-      test->SetAttribute("name", measure.name.c_str());
+      test->SetAttribute("name", printable(measure.name).c_str());
       if (measure.verdict == Verdict::Passed) continue;
       ++failures;
       const std::string message =

@@ -20,7 +20,7 @@ TEST(ErrorFigures, QuantilesAreThoseOfNumPy) {
   EXPECT_DOUBLE_EQ(quantile(values, 0.95), 7.95);
   EXPECT_DOUBLE_EQ(quantile(values, 1), 9);
   EXPECT_DOUBLE_EQ(quantile({7}, 0.3), 7);
-  EXPECT_DOUBLE_EQ(quantile({}, 0.5), 0);
+  EXPECT_TRUE(std::isnan(quantile({}, 0.5)));
 }
 
 TEST(ErrorFigures, AreWhatTheirNamesSay) {
@@ -36,7 +36,19 @@ TEST(ErrorFigures, AreWhatTheirNamesSay) {
   EXPECT_EQ(figures.worst, 1u);
   EXPECT_DOUBLE_EQ(figures.nmad, 1.4826);  // of 1, 7, 0, 0, 3
   EXPECT_EQ(figures_of({}).count, 0u);
-  EXPECT_EQ(figures_of({}).rms, 0);
+}
+
+TEST(ErrorFigures, OfNoErrorsAreNoNumbersAndAreNotTold) {
+  const ErrorFigures figures = figures_of({});
+  for (const double figure :
+       {figures.mean, figures.rms, figures.mean_size, figures.median, figures.median_size,
+        figures.p95_size, figures.p99_size, figures.largest, figures.nmad})
+    EXPECT_TRUE(std::isnan(figure));
+  Section section;
+  tell_errors(section, "a", "m", {});
+  tell_sizes(section, "b", "m", {});
+  EXPECT_TRUE(section.measures.empty());
+  EXPECT_TRUE(section.histograms.empty());
 }
 
 TEST(ErrorFigures, AreHeldAgainstTheirLimits) {
@@ -45,11 +57,13 @@ TEST(ErrorFigures, AreHeldAgainstTheirLimits) {
   hold(section, "b", 3, "m", 3, "why");
   hold(section, "c", std::nextafter(3, 4), "m", 3, "why");
   hold(section, "d", std::nan(""), "m", 3, "why");
+  fail(section, "e", 3, "m", "why");
   std::vector<Verdict> verdicts;
   for (const Measure& measure : section.measures) verdicts.push_back(measure.verdict);
-  EXPECT_THAT(verdicts,
-              ElementsAre(Verdict::Told, Verdict::Passed, Verdict::Failed, Verdict::Failed));
+  EXPECT_THAT(verdicts, ElementsAre(Verdict::Told, Verdict::Passed, Verdict::Failed,
+                                    Verdict::Failed, Verdict::Failed));
   EXPECT_EQ(section.measures[0].limit, std::nullopt);
+  EXPECT_EQ(section.measures[4].limit, std::nullopt);
   EXPECT_THAT(*section.measures[1].limit, DoubleEq(3));
 }
 

@@ -274,8 +274,12 @@ TEST(CompareScans, AScanWithoutReturnsLacksThemAll) {
   ScanOptions options;
   const Section section = compare_scans(reference, empty, options);
   EXPECT_EQ(value_of(section, "missing share of the reference's"), 1);
+  EXPECT_EQ(section.verdict, Verdict::Failed);
+  EXPECT_EQ(value_of(section, "pairs of returns"), 0);
   EXPECT_EQ(value_of(compare_scans(empty, reference, options), "extra returns"), 720);
-  EXPECT_EQ(value_of(compare_scans(empty, empty, options), "pairs of returns"), 0);
+  const Section both_empty = compare_scans(empty, empty, options);
+  EXPECT_EQ(value_of(both_empty, "pairs of returns"), 0);
+  EXPECT_EQ(both_empty.verdict, Verdict::Told);
   options.limits.range_rms_m = 1;
   EXPECT_EQ(compare_scans(reference, empty, options).verdict, Verdict::Failed);
 }
@@ -287,8 +291,10 @@ TEST(CompareScans, SaysWhatLooksLikeAnotherUnitOrFrame) {
     for (SampleReturn& r : other) r.range_m *= unit;
     return compare(reference, other, {"ring"}).text;
   };
-  EXPECT_THAT(text_at(1000), HasSubstr("Is sample in millimetres? Then tell unit_m = 0.001."));
-  EXPECT_THAT(text_at(1 / 0.3048), HasSubstr("Is sample in feet? Then tell unit_m = 0.3048."));
+  EXPECT_THAT(text_at(1000), HasSubstr("Is sample in millimetres? Then give its unit (--unit-m "
+                                       "0.001)."));
+  EXPECT_THAT(text_at(1 / 0.3048),
+              HasSubstr("Is sample in feet? Then give its unit (--unit-m 0.3048)."));
   EXPECT_THAT(text_at(0.02), HasSubstr("Units or frames differ"));
   EXPECT_THAT(text_at(1.5), Not(HasSubstr("WARNING")));
   const auto file = groundray::testing::file_of(reference, {"ring"});
@@ -297,7 +303,7 @@ TEST(CompareScans, SaysWhatLooksLikeAnotherUnitOrFrame) {
   const Scan other = scan_of(file, "other.ply", moved);
   EXPECT_THAT(
       compare_scans(scan_of(reference, {}), other, {.pairing = {.tolerance_rad = 0.02}}).text,
-      HasSubstr("Are they in the frame of the world?"));
+      AllOf(HasSubstr("Are they in the frame of the world?"), HasSubstr("(--sensor-pose)")));
 }
 
 TEST(CompareScans, SaysThatRingsAreCountedOtherwise) {
@@ -326,7 +332,7 @@ TEST(CompareScans, RefusesAToleranceThatIsNone) {
                 compare_scans(scan, scan,
                               {.pairing = {.rule = PairingRule::RingTime, .tolerance_s = 0}});
               }),
-              HasSubstr("tolerance_s = 0 must be positive"));
+              HasSubstr("the tolerance, 0, must be positive (--pair-s)"));
   EXPECT_THAT(
       message_of([&] { compare_scans(scan, scan, {.pairing = {.rule = PairingRule::Pulse}}); }),
       HasSubstr("to be paired by number of the pulse it must have a column pulse"));

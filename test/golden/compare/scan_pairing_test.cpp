@@ -4,6 +4,7 @@
 #include <gtest/gtest.h>
 
 #include <algorithm>
+#include <chrono>
 #include <cmath>
 #include <functional>
 #include <numbers>
@@ -22,6 +23,7 @@ using groundray::testing::sample_returns;
 using groundray::testing::SampleReturn;
 using groundray::testing::SampleReturns;
 using groundray::testing::scan_of;
+using ::testing::AllOf;
 using ::testing::ElementsAre;
 using ::testing::HasSubstr;
 using ::testing::IsEmpty;
@@ -138,7 +140,8 @@ TEST(PairScans, SaysWhyTimesAreNotUsed) {
   const Scan reference = scan_of(sample_returns(), {"ring", "time"});
   const Pairs apart = pair_scans(reference, scan_of(later, {"ring", "time"}), {});
   EXPECT_EQ(apart.rule, PairingRule::RingAzimuth);
-  EXPECT_THAT(apart.notes, ElementsAre(HasSubstr("Their times do not overlap")));
+  EXPECT_THAT(apart.notes, ElementsAre(AllOf(HasSubstr("Their times do not overlap"),
+                                             HasSubstr("(--time-zero-s)"))));
   for (SampleReturn& r : later) r.time_s = 0;
   const Pairs alike = pair_scans(reference, scan_of(later, {"ring", "time"}), {});
   EXPECT_EQ(alike.rule, PairingRule::RingAzimuth);
@@ -180,6 +183,61 @@ TEST(Pulses, JoinReturnsOfOneDirectionRingAndTime) {
   EXPECT_THAT(pulses.of(1), ElementsAre(3U));
   EXPECT_THAT(pulses.rings, ElementsAre(0, 1, 1));
   EXPECT_THAT(pulses_of(scan_of({}, {})).returns, IsEmpty());
+}
+
+// A return joins what is near the first of a pulse, not what is near any of it.
+TEST(Pulses, DoNotGrowAlongAChain) {
+  SampleReturns returns;
+  for (const double step : {0., 0.9, 1.8, 2.7, 0.1})
+    returns.push_back({.direction = direction_of(1 + step * same_pulse_rad, 0), .range_m = 5});
+  const Pulses pulses = pulses_of(scan_of(returns, {}));
+  ASSERT_EQ(pulses.size(), 2u);
+  EXPECT_THAT(pulses.of(0), ElementsAre(0U, 1U, 4U));
+  EXPECT_THAT(pulses.of(1), ElementsAre(2U, 3U));
+}
+
+TEST(Pulses, JoinWhatIsNearTheirFirstAsBruteForceDoes) {
+  std::mt19937_64 random(8);
+  std::uniform_real_distribution<double> unit(0, 10 * same_pulse_rad);
+  SampleReturns returns(400);
+  for (SampleReturn& r : returns) {
+    r = {.direction = direction_of(1 + unit(random), unit(random)), .range_m = 5};
+    r.ring = std::floor(2 * unit(random) / (10 * same_pulse_rad));
+  }
+  const Scan scan = scan_of(returns, {"ring"});
+  std::vector<std::vector<std::uint32_t>> expected;
+  for (std::uint32_t i = 0; i < returns.size(); ++i) {
+    const auto joined = std::ranges::find_if(expected, [&](const auto& pulse) {
+      return returns[pulse[0]].ring == returns[i].ring &&
+             angle_between(scan.p_S[pulse[0]], scan.p_S[i]) <= same_pulse_rad;
+    });
+    if (joined != expected.end()) {
+      joined->push_back(i);
+    } else {
+      expected.push_back({i});
+    }
+  }
+  const Pulses pulses = pulses_of(scan);
+  ASSERT_EQ(pulses.size(), expected.size());
+  for (std::size_t k = 0; k < expected.size(); ++k)
+    EXPECT_THAT(pulses.of(k), ::testing::ElementsAreArray(expected[k]));
+}
+
+// Pair by pair this would take minutes; the limit is a hundred times what it takes.
+TEST(PairScans, TakesNoTimeForABeamThatStandsStill) {
+  SampleReturns returns(60'000);
+  for (std::size_t i = 0; i < returns.size(); ++i) {
+    const auto number = static_cast<double>(i);
+    returns[i] = {.direction = direction_of(1, 0), .range_m = 5 + 1e-3 * number};
+    returns[i].time_s = 1e-6 * number;
+  }
+  const auto start = std::chrono::steady_clock::now();
+  const Scan still = scan_of(returns, {});
+  EXPECT_EQ(pair_scans(still, still, {}).returns.size(), returns.size());
+  EXPECT_EQ(pulses_of(scan_of(returns, {"time"})).size(), returns.size());
+  const Scan pulsed = scan_of(returns, {"ring", "time"});
+  EXPECT_EQ(pair_scans(pulsed, pulsed, {}).returns.size(), returns.size());
+  EXPECT_LT(std::chrono::steady_clock::now() - start, std::chrono::seconds(20));
 }
 
 }  // namespace

@@ -99,10 +99,11 @@ TEST(Scan, BringsPointsToTheSensorAndMetres) {
   EXPECT_THAT(*scan.find(Quantity::Intensity), ElementsAre(7));
   reading.X_FS = FileViewpoint{};
   EXPECT_THAT(message_of([&] { scan_of(file, "a", reading); }),
-              HasSubstr("it tells no viewpoint of its own"));
+              AllOf(HasSubstr("it tells no viewpoint of its own"), HasSubstr("(--sensor-pose)")));
   file.X_FS = Pose{.translation_m = {1, 0, 0}};  // in the file's unit
   EXPECT_EQ(scan_of(file, "a", reading).p_S[0], glm::dvec3(1, 2, 0));
-  EXPECT_THAT(scan_of(file, "a", {}).notes[0], HasSubstr("VIEWPOINT other than the origin"));
+  EXPECT_THAT(scan_of(file, "a", {}).notes[0],
+              AllOf(HasSubstr("VIEWPOINT other than the origin"), HasSubstr("(--viewpoint;")));
 }
 
 TEST(Scan, TakesTimesInTheUnitThatIsTold) {
@@ -119,7 +120,7 @@ TEST(Scan, TakesTimesInTheUnitThatIsTold) {
   const Scan asked = scan_of(one_point("t", std::uint32_t{5}), "a", {});
   EXPECT_EQ(asked.find(Quantity::Time), nullptr);
   EXPECT_THAT(asked.notes, ElementsAre(AllOf(HasSubstr("The column t of a does not say its unit"),
-                                             HasSubstr("give time_unit_s")),
+                                             HasSubstr("give it (--time-unit-s 1e-9")),
                                        HasSubstr("taken as in the sensor's frame")));
   EXPECT_THAT(asked.unused, ElementsAre("t"));
 }
@@ -173,9 +174,9 @@ TEST(Scan, NamesColumnsThatAreMissing) {
   EXPECT_THAT(
       message_of([&] { scan_of(file, "a.ply", {}); }),
       HasSubstr("a.ply: it has no column for z; did you mean 'zz'?; it has: x, Y, zz, red"));
-  EXPECT_THAT(
-      message_of([&] { scan_of(file, "a.ply", {.unit_m = 0, .time_unit_s = -1}); }),
-      AllOf(HasSubstr("unit_m = 0 must be positive"), HasSubstr("time_unit_s = -1 must be")));
+  EXPECT_THAT(message_of([&] { scan_of(file, "a.ply", {.unit_m = 0, .time_unit_s = -1}); }),
+              AllOf(HasSubstr("its unit, 0 m, must be positive (--unit-m)"),
+                    HasSubstr("its unit of time, -1 s, must be positive (--time-unit-s)")));
 }
 
 }  // namespace

@@ -50,6 +50,10 @@ TEST(Formula, ShowsWhatIsWrong) {
   EXPECT_THAT(message("x + rong"), testing::HasSubstr("\"rong\""));
   EXPECT_THAT(message("sin(x"), testing::HasSubstr("parenthesis"));
   EXPECT_THAT(message(""), testing::HasSubstr("formula ''"));
+  // Assignments would change the columns and be true, and of several values the last would count.
+  EXPECT_THAT(message("ring = 1"), testing::HasSubstr("equal is '=='"));
+  EXPECT_THAT(message("x, ring"), testing::HasSubstr("comma"));
+  EXPECT_EQ(message("ring == 1 || x <= 2 && x >= 1 && x != 7"), "");
 }
 
 TEST(Formula, OfNoRowsIsEmpty) { EXPECT_TRUE(evaluate("x", {.rows = 0}).empty()); }

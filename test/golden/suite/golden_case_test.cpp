@@ -69,6 +69,15 @@ TEST(GoldenCase, FaultsHaveTheirLine) {
       HasSubstr("within"));
   EXPECT_THAT(fault_of(head + "  - file: a.ply\n    checks:\n      - {exact: some, because: y}\n"),
               HasSubstr("must be 'all'"));
+  EXPECT_THAT(
+      fault_of(head +
+               "  - file: a.ply\n    checks:\n      - {mean: x, is: 1, within: 0, because: y}\n"),
+      HasSubstr("must have a count"));
+  EXPECT_THAT(
+      fault_of(head + "  - file: a.ply\n    checks:\n      - {statistical: [], because: y}\n"),
+      HasSubstr("must name a column"));
+  EXPECT_THAT(fault_of(head + "  - {file: a.ply, checks: []}\n"), HasSubstr("must have a count"));
+  EXPECT_THAT(fault_of("groundray_golden: 1\ntitle: A\nproducts: []\n"), HasSubstr("one at least"));
   EXPECT_THAT(fault_of("groundray_golden: 2\ntitle: A\nproducts: []\n"), HasSubstr("case.yaml:1"));
 }
 
@@ -86,6 +95,7 @@ TEST(GoldenCase, FoldersAreReadByNameAndFiltered) {
   EXPECT_EQ(all[0].name, "a_case");
   EXPECT_EQ(read_cases(folder.path(), {"b_"}).size(), 1U);
   EXPECT_THROW(read_cases(folder.path(), {"none"}), Error);
+  EXPECT_THROW(read_cases(folder.path(), {"b_", "none"}), Error);
   EXPECT_THROW(read_cases(folder / "missing", {}), Error);
 }
 

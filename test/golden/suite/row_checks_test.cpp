@@ -66,7 +66,27 @@ TEST(RowChecks, WhatIsNotFiniteMustBeEqual) {
   EXPECT_EQ(verdict(-infinity, "1 / 0"), Verdict::Failed);
   EXPECT_EQ(verdict(nan, "0"), Verdict::Failed);
   EXPECT_EQ(verdict(0, "0 / 0"), Verdict::Failed);
-  EXPECT_EQ(verdict(nan, "0 / 0"), Verdict::Passed);
+  EXPECT_EQ(verdict(nan, "0 / 0"), Verdict::Failed);  // NaN passes nothing
+}
+
+TEST(RowChecks, AnInfiniteToleranceAllowsNothingButEquality) {
+  const auto verdict = [](double value, const char* is) {
+    return rows_section({.value = "x", .is = is, .within = "1 / 0"}, column({value}))
+        .measures[0]
+        .verdict;
+  };
+  EXPECT_EQ(verdict(1, "0"), Verdict::Failed);
+  EXPECT_EQ(verdict(1, "1 / 0"), Verdict::Failed);
+  EXPECT_EQ(verdict(infinity, "1 / 0"), Verdict::Passed);
+  EXPECT_THROW(figure({.value = "x", .is = "0", .within = "1 / 0"}, column({1})), Error);
+}
+
+TEST(RowChecks, FiguresOfNaNAreFaults) {
+  using Kind = FigureCheck::Kind;
+  for (const Kind kind : {Kind::Mean, Kind::Deviation, Kind::Smallest, Kind::Largest}) {
+    EXPECT_THROW(figure({.kind = kind, .value = "x", .is = "1", .within = "9"}, column({1, nan})),
+                 Error);
+  }
 }
 
 TEST(RowChecks, AToleranceThatIsNoNumberHoldsNothing) {

@@ -4,6 +4,7 @@
 #include <gtest/gtest.h>
 
 #include <algorithm>
+#include <cmath>
 #include <random>
 
 #include "core/error.h"
@@ -83,6 +84,23 @@ TEST(StatisticalMatch, WithoutNoiseOnlyRoundingIsAllowed) {
   for (int k = 0; k < statistical_runs; ++k) moments.add(image(1));
   EXPECT_THAT(match(image(1 + 1e-7F), moments.columns()), testing::Each(Verdict::Passed));
   EXPECT_THAT(match(image(1 + 1e-5F), moments.columns()), testing::Contains(Verdict::Failed));
+}
+
+TEST(StatisticalMatch, RefusesMomentsThatTellNothing) {
+  for (const double bad : {std::nan(""), HUGE_VAL}) {
+    Columns moments = stored();
+    moments.all[1].values[7] = bad;
+    EXPECT_THROW(match(draw(1000), moments), Error);
+    Columns image = draw(1);
+    image.all[0].values[7] = bad;
+    Moments of_runs({"R"});
+    of_runs.add(image);
+    of_runs.add(draw(2));
+    EXPECT_THROW(of_runs.columns(), Error);
+    Columns odd = draw(1000);
+    odd.all[0].values[7] = bad;
+    EXPECT_THAT(match(odd, stored()), testing::Each(Verdict::Failed));
+  }
 }
 
 TEST(StatisticalMatch, RefusesAnotherSizeAndMissingColumns) {

@@ -1,0 +1,143 @@
+#include "apps/golden/compare/light_match.h"
+
+#include <gmock/gmock.h>
+#include <gtest/gtest.h>
+
+#include <algorithm>
+#include <cmath>
+#include <limits>
+#include <random>
+#include <string>
+
+#include "apps/golden/compare/image_comparison.h"
+#include "test/support/sample_image.h"
+
+namespace groundray::golden {
+namespace {
+
+using groundray::testing::figure;
+using groundray::testing::image;
+using groundray::testing::layer;
+using ::testing::AllOf;
+using ::testing::HasSubstr;
+
+constexpr double infinity = std::numeric_limits<double>::infinity();
+
+/// Where the limit of a figure comes from.
+std::string because(const Section& section, const std::string& name) {
+  const auto found = std::ranges::find(section.measures, name, &Measure::name);
+  return found == section.measures.end() ? "there is no such figure" : found->because;
+}
+
+Section compare(const ImageFile& reference, const ImageFile& other) {
+  return compare_images(reference, other, {}, "images");
+}
+
+/// Light of mean 1 + `bias`, as estimated with known standard errors and 64 paths.
+ImageFile estimate(unsigned seed, double bias) {
+  std::mt19937 random(seed);
+  const auto sigma = [](int x, int y, int) { return 0.02 + 0.001 * ((x + y) % 10); };
+  return image(
+      {layer("RGB", LayerKind::Colour, {32, 24}, 3,
+             [&](int x, int y, int k) {
+               std::normal_distribution<double> normal(1 + bias, sigma(x, y, k));
+               return normal(random);
+             }),
+       layer("StdError", LayerKind::Number, {32, 24}, 3, sigma),
+       layer("Samples", LayerKind::Number, {32, 24}, 1, [](int, int, int) { return 64.0; })});
+}
+
+// At 1 % each, three kinds of tests (of channels, three) fail by chance in 3 % of runs: of 200 runs
+// 6, and 15 or more with a probability of 0.1 %.
+TEST(CompareImages, PassesLightThatIsTheSame) {
+  int failures = 0;
+  for (unsigned i = 0; i < 200; ++i) {
+    const Section section = compare(estimate(2 * i + 1, 0), estimate(2 * i + 2, 0));
+    if (section.verdict == Verdict::Failed) ++failures;
+  }
+  EXPECT_LE(failures, 14);
+}
+
+// A bias of 0.8 % is a quarter of the standard error of a difference of two values, but 6 of that
+// of a channel's mean.
+TEST(CompareImages, FailsLightThatIsEverywhereALittleWrong) {
+  const Section section = compare(estimate(1, 0), estimate(2, 0.008));
+  EXPECT_EQ(section.verdict, Verdict::Failed);
+  EXPECT_EQ(figure(section, "RGB: values that differ significantly"), 0);
+  EXPECT_GT(figure(section, "RGB: mean of G over the image"), 3);
+}
+
+TEST(CompareImages, FailsASingleWrongPixelAndSaysHowItTests) {
+  ImageFile other = estimate(2, 0);
+  other.layers[0].values.at(5, 6)[1] = 1.4;
+  const Section section = compare(estimate(1, 0), other);
+  EXPECT_EQ(section.verdict, Verdict::Failed);
+  EXPECT_EQ(figure(section, "RGB: values that differ significantly"), 1);
+  EXPECT_THAT(because(section, "RGB: values that differ significantly"),
+              AllOf(HasSubstr("significance 0.01"), HasSubstr("standard errors of both")));
+  other.layers.resize(1);
+  const Section exact = compare(estimate(1, 0), other);
+  EXPECT_THAT(because(exact, "RGB: mean of B over the image"),
+              HasSubstr("the other image counts as exact"));
+}
+
+TEST(CompareImages, FailsLightThatIsNoNumberWhereTheReferenceHasIt) {
+  const std::string lost = "RGB: values or standard errors that are finite in the reference alone";
+  const std::string untested = "RGB: values that were not tested, being not finite";
+  const auto with = [](std::size_t layer, double value) {
+    ImageFile other = estimate(2, 0);
+    other.layers[layer].values.at(5, 6)[1] = value;
+    return other;
+  };
+  const ImageFile good = estimate(1, 0);
+  ASSERT_EQ(compare(good, estimate(2, 0)).verdict, Verdict::Passed);
+  for (const std::size_t layer : {0u, 1u}) {  // light, its standard errors
+    for (const double value : {std::nan(""), infinity, -infinity}) {
+      const Section section = compare(good, with(layer, value));
+      EXPECT_EQ(section.verdict, Verdict::Failed);
+      EXPECT_EQ(figure(section, lost), 1);
+      EXPECT_EQ(figure(section, untested), 1);
+      const Section of_reference = compare(with(layer, value), good);  // its own fault
+      EXPECT_EQ(of_reference.verdict, Verdict::Passed);
+      EXPECT_EQ(figure(of_reference, lost), 0);
+      EXPECT_EQ(figure(of_reference, untested), 1);
+    }
+  }
+}
+
+TEST(CompareImages, FailsLightOfWhichNothingCanBeTested) {
+  for (const std::size_t layer : {0u, 1u}) {
+    ImageFile nothing = estimate(2, 0);
+    std::ranges::fill(nothing.layers[layer].values.values(), std::nan(""));
+    for (const auto& reference : {estimate(1, 0), nothing}) {
+      const Section section = compare(reference, nothing);
+      EXPECT_EQ(section.verdict, Verdict::Failed);
+      EXPECT_EQ(figure(section, "RGB: values that could be tested"), 0);
+      EXPECT_EQ(figure(section, "RGB: values that were not tested, being not finite"), 32 * 24 * 3);
+    }
+  }
+}
+
+// Two of 2304 values: a share of a thousandth allows both.
+TEST(CompareImages, HoldsValuesWithoutSpreadToBeEqual) {
+  ImageFile reference = estimate(1, 0), other = estimate(2, 0);
+  for (ImageFile* file : {&reference, &other}) {
+    for (int x = 3; x < 6; ++x) {
+      file->layers[0].values.at(x, 4)[2] = 1;
+      file->layers[1].values.at(x, 4)[2] = 0;
+    }
+  }
+  const std::string name = "RGB: values that differ without any spread";
+  EXPECT_EQ(figure(compare(reference, other), name), 0);
+  other.layers[0].values.at(3, 4)[2] = 1 + 1e-7;  // the next float
+  other.layers[0].values.at(4, 4)[2] = 1 + 1e-4;
+  other.layers[0].values.at(5, 4)[2] = 1 - 1e-4;
+  const Section section = compare(reference, other);
+  EXPECT_EQ(figure(section, name), 2);
+  EXPECT_EQ(section.verdict, Verdict::Failed);
+  EXPECT_EQ(compare_images(reference, other, {.beyond_share = 1e-3}, "images").verdict,
+            Verdict::Passed);
+}
+
+}  // namespace
+}  // namespace groundray::golden
