@@ -4,7 +4,6 @@
 
 #include <algorithm>
 #include <array>
-#include <cmath>
 #include <cstdint>
 #include <functional>
 #include <glm/common.hpp>
@@ -14,6 +13,7 @@
 #include <vector>
 
 #include "core/error.h"
+#include "core/mesh_check.h"
 #include "core/ply_header.h"
 #include "core/product_io.h"
 
@@ -62,26 +62,6 @@ void write_tables(const std::filesystem::path& path, const std::string& header,
 template <typename T>
 void append_bytes(std::string& out, const T& value) {
   out.append(reinterpret_cast<const char*>(&value), sizeof value);
-}
-
-void check(const std::filesystem::path& path, const TriangleMesh& mesh) {
-  Violations broken(path.string());
-  broken.unless(mesh.levels.empty() || mesh.levels.size() == mesh.triangles.size(),
-                "there are {} levels for {} triangles; each needs one, or none has any",
-                mesh.levels.size(), mesh.triangles.size());
-  constexpr double most_m = std::numeric_limits<float>::max();  // glTF holds floats
-  const auto bad_vertex = std::ranges::find_if_not(mesh.vertices_m, [](const glm::dvec3& p) {
-    return std::abs(p.x) <= most_m && std::abs(p.y) <= most_m && std::abs(p.z) <= most_m;
-  });
-  broken.unless(bad_vertex == mesh.vertices_m.end(), "vertex {} must have a finite position",
-                bad_vertex - mesh.vertices_m.begin());
-  const auto bad_triangle = std::ranges::find_if(mesh.triangles, [&](const glm::uvec3& t) {
-    return std::max({t.x, t.y, t.z}) >= mesh.vertices_m.size();
-  });
-  broken.unless(bad_triangle == mesh.triangles.end(),
-                "triangle {} names a vertex beyond the last of {}",
-                bad_triangle - mesh.triangles.begin(), mesh.vertices_m.size());
-  broken.throw_if_any();
 }
 
 /// As lines of comment, short and of ASCII alone: some readers of PLY hold 255 characters, others
@@ -190,7 +170,7 @@ void write_mesh(const std::filesystem::path& path, const TriangleMesh& mesh,
 
 void write_ply(const std::filesystem::path& path, const TriangleMesh& mesh,
                const Georeference& georeference) {
-  check(path, mesh);
+  check_mesh(mesh, path.string(), EmptyMesh::Allow);
   const auto property = [](std::string_view type, std::string_view name) {
     return PlyProperty{std::string(name), ply_type_of(type), std::nullopt};
   };
@@ -223,7 +203,7 @@ void write_ply(const std::filesystem::path& path, const TriangleMesh& mesh,
 
 void write_obj(const std::filesystem::path& path, const TriangleMesh& mesh,
                const Georeference& georeference) {
-  check(path, mesh);
+  check_mesh(mesh, path.string(), EmptyMesh::Allow);
   std::string header;
   for (const std::string& line : lines_of(georeference)) header += "# " + line + "\n";
   const auto append_vertices = [&](std::size_t first, std::size_t last, std::string& block) {
@@ -244,7 +224,7 @@ void write_obj(const std::filesystem::path& path, const TriangleMesh& mesh,
 
 void write_glb(const std::filesystem::path& path, const TriangleMesh& mesh,
                const Georeference& georeference) {
-  check(path, mesh);
+  check_mesh(mesh, path.string(), EmptyMesh::Allow);
   if (mesh.triangles.empty()) {
     throw Error("{}: glTF cannot hold a mesh without a triangle; write .ply", path.string());
   }

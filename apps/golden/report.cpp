@@ -34,6 +34,15 @@ void hold(Section& into, std::string name, double value, std::string unit, doubl
                            .verdict = value <= limit ? Verdict::Passed : Verdict::Failed});
 }
 
+void fail(Section& into, std::string name, double value, std::string unit, std::string because) {
+  into.measures.push_back({.name = std::move(name),
+                           .value = value,
+                           .unit = std::move(unit),
+                           .limit = {},
+                           .because = std::move(because),
+                           .verdict = Verdict::Failed});
+}
+
 Histogram histogram_of(std::string title, std::string unit, const std::vector<double>& values,
                        double low, double high, std::size_t bins) {
   Histogram histogram{.title = std::move(title),

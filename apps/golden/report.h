@@ -24,7 +24,7 @@ struct Measure {
   std::string unit;                 ///< "m", "px", "rows"; empty for a plain number
   std::optional<double> limit;      ///< the value must not exceed it
   std::string because;              ///< where the limit comes from
-  Verdict verdict = Verdict::Told;  ///< Told unless there is a limit
+  Verdict verdict = Verdict::Told;  ///< without a limit it is Told, or Failed whatever the value
 };
 
 /// How often values fell into equal steps from `low` to `high`; those outside are counted apart.
@@ -77,6 +77,9 @@ void tell(Section& into, std::string name, double value, std::string unit = {});
 /// Holds a figure against a limit.
 void hold(Section& into, std::string name, double value, std::string unit, double limit,
           std::string because);
+
+/// Tells a figure that fails though there is no limit to it: there is nothing to hold.
+void fail(Section& into, std::string name, double value, std::string unit, std::string because);
 
 /// Returns the counts of the finite `values` in `bins` equal steps from `low` to `high`.
 Histogram histogram_of(std::string title, std::string unit, const std::vector<double>& values,

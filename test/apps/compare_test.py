@@ -117,7 +117,7 @@ def test_the_unit_is_stated_and_not_guessed(scan, tmp_path):
     other = write_ply(tmp_path / "other.ply", 1000 * direction * range_m[:, None], ring=ring)
     wrong, section, _ = figures(reference, other, out=tmp_path / "out")
     assert wrong["range error, median"] > 4000
-    assert "--unit-m" in section["text"] or "unit" in section["text"]
+    assert "in millimetres? Then give its unit (--unit-m 0.001)." in section["text"]
     right, _, _ = figures(reference, other, "--unit-m", 0.001, out=tmp_path / "out")
     assert abs(right["range error, largest magnitude"]) < 1e-5
 
@@ -190,23 +190,23 @@ def test_other_peoples_software_agrees(tmp_path):
 @pytest.mark.parametrize(
     ("name", "content", "expected"),
     [
-        ("empty.ply", b"", "empty.ply"),
+        ("empty.ply", b"", "empty.ply:0: the first line must be 'ply'"),
         (
             "other.ply",
             b"ply\nformat ascii 1.0\nelement vertex 1\nproperty float a\nend_header\n1\n",
-            "x",
+            "other.ply: it has no column for x;",
         ),
         (
             "cut.pcd",
             b"VERSION .7\nFIELDS x y z\nSIZE 4 4 4\nTYPE F F F\nCOUNT 1 1 1\n"
             b"WIDTH 9\nHEIGHT 1\nPOINTS 9\nDATA binary\nabc",
-            "cut.pcd",
+            "cut.pcd: 9 points of 12 bytes take 108 bytes, but 3 are there",
         ),
-        ("odd.bin", b"123", "16"),
-        ("theirs.las", b"LASF", "laspy"),
-        ("bad.npy", b"\x93NUMPY\x09", "bad.npy"),
-        ("bad.npz", b"PK\x03\x04", "bad.npz"),
-        ("what.xyz", b"1 2 3", "--as"),
+        ("odd.bin", b"123", "3 bytes are no multiple of 16"),
+        ("theirs.las", b"LASF", "LAS is not read: convert it to PLY first, for instance by laspy"),
+        ("bad.npy", b"\x93NUMPY\x09", "bad.npy: it does not begin as a NumPy array does"),
+        ("bad.npz", b"PK\x03\x04", "bad.npz: it lacks the end of a ZIP archive"),
+        ("what.xyz", b"1 2 3", "the name does not tell what it holds; say so by --as"),
     ],
 )
 def test_garbage_is_one_clear_error(name, content, expected, scan, tmp_path):
@@ -220,6 +220,78 @@ def test_garbage_is_one_clear_error(name, content, expected, scan, tmp_path):
     assert expected in result.stderr
     assert result.stderr.startswith("groundray-golden: ")
     assert not (tmp_path / "out").exists()
+
+
+@pytest.mark.parametrize("prefix", ["", "reference-"])
+def test_the_rotation_of_a_pose_has_length_one(prefix, scan, tmp_path):
+    """Three decimals are enough; what is longer or shorter is another thing."""
+    direction, range_m, ring = scan
+    reference = write_ply(tmp_path / "reference.ply", direction * range_m[:, None], ring=ring)
+    out = tmp_path / "out"
+    option = f"--{prefix}sensor-pose"
+    for wrong in ("0,0,0,0,0,0,0.9", "0,0,0,0,0,0,0", "0,0,0,0.707,0,0,0.71", "0,0,0,nan,0,0,1"):
+        result = compare(reference, reference, option, wrong, out=out)
+        assert result.returncode == 1, wrong
+        assert f"{option}: the length of its quaternion" in result.stderr
+        assert "qx,qy,qz,qw" in result.stderr
+    half_turn = "0,0,0,0,0,1.0005,0"
+    good = compare(reference, reference, option, half_turn, "--pair-mrad", 40, out=out)
+    assert good.returncode == 0, good.stderr
+
+
+def test_what_is_compared_is_asked_for_if_two_names_disagree(scan, tmp_path):
+    direction, range_m, ring = scan
+    points = direction * range_m[:, None]
+    reference = write_ply(tmp_path / "reference.ply", points, ring=ring)
+    trimesh.creation.icosphere(2).export(tmp_path / "sphere.ply")
+    write_exr(tmp_path / "image.exr", Z=np.ones((4, 5)))
+    for name, kind in [("sphere.ply", "a mesh"), ("image.exr", "an image")]:
+        result = compare(reference, tmp_path / name, out=tmp_path / "out")
+        assert result.returncode == 1
+        assert f"{name} {kind}: they must be of one kind" in result.stderr
+        assert "--as" in result.stderr
+    asked = compare(reference, tmp_path / "sphere.ply", "--as", "mesh", out=tmp_path / "out")
+    assert "reference.ply: there is no triangle" in asked.stderr
+    # What a name does not tell is what the reference is.
+    write_ply(tmp_path / "theirs.points", points)
+    untold = compare(reference, tmp_path / "theirs.points", out=tmp_path / "out")
+    assert "is of no point file that is read" in untold.stderr
+    (tmp_path / "model.dae").write_text("<COLLADA/>")
+    unread = compare(tmp_path / "model.dae", tmp_path / "model.dae", out=tmp_path / "out")
+    assert "the name does not tell what it holds" in unread.stderr
+
+
+def test_images_without_a_pixel_in_common_fail(tmp_path):
+    near, far = np.full((2, 20, 30), np.inf)
+    near[:, :15], far[:, 15:] = 5, 5
+    reference = write_exr(tmp_path / "a.exr", Z=near)
+    figure, section, result = figures(
+        reference, write_exr(tmp_path / "b.exr", Z=far), out=tmp_path / "out"
+    )
+    assert result.returncode == 1
+    assert "FAILED Z: in both: 0" in result.stdout
+    assert "nothing in common" in section["text"]
+    assert not any("error" in name for name in figure)
+
+
+def test_light_that_is_no_number_fails(tmp_path):
+    rng = np.random.default_rng(2)
+    names = "RGB"
+    sigma = {f"StdError.{k}": np.full((20, 30), 0.01) for k in names}
+
+    def light():
+        return {k: 1 + 0.01 * rng.standard_normal((20, 30)) for k in names}
+
+    reference = write_exr(tmp_path / "a.exr", **light(), **sigma)
+    broken = light()
+    broken["G"][3, 4] = np.nan
+    nothing = {k: np.full((20, 30), np.nan) for k in names}
+    for name, channels in [("broken.exr", broken), ("nothing.exr", nothing)]:
+        other = write_exr(tmp_path / name, **channels, **sigma)
+        result = compare(reference, other, out=tmp_path / "out")
+        assert result.returncode == 1, result.stdout
+        assert "FAILED RGB: values or standard errors that are finite" in result.stdout
+    assert "FAILED RGB: values that could be tested: 0 of 1800" in result.stdout
 
 
 def test_images_of_two_sizes_are_refused(tmp_path):

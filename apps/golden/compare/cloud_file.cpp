@@ -151,7 +151,7 @@ CloudFile of_floats(std::string_view bytes, const Names& asked) {
   if (bytes.size() % point_bytes != 0) {
     throw Error(
         "its {} bytes are no multiple of {}, for points of {} floats ({}): if they have others, "
-        "name the columns",
+        "name the columns (--columns; of the reference, --reference-columns)",
         bytes.size(), point_bytes, names.size(), fmt::join(names, ", "));
   }
   CloudFile file{.form = fmt::format("KITTI's, {} floats a point", names.size()),

@@ -32,8 +32,23 @@ bool has_faces(const fs::path& ply) {
   return false;
 }
 
+/// @param option  that gave the numbers x, y, z, qx, qy, qz, qw.
+Pose sensor_pose(const std::vector<double>& numbers, const std::string& option) {
+  constexpr double most_off = 1e-3;  // what three decimals leave
+  const glm::dquat rotation(numbers[6], numbers[3], numbers[4], numbers[5]);
+  const double norm = glm::length(rotation);
+  if (!(std::abs(norm - 1) <= most_off)) {
+    throw Error(
+        "{}: the length of its quaternion, the last four numbers, is {:.6g}; it must be 1: are "
+        "they in the order qx,qy,qz,qw?",
+        option, norm);
+  }
+  return {.rotation = rotation / norm, .translation_m = {numbers[0], numbers[1], numbers[2]}};
+}
+
 // Of the other file; the reference's, if it differs, begin with "reference-".
 struct ScanFlags {
+  std::string whose;  // "" or "reference-"
   double unit_m = 1;
   std::optional<double> time_unit_s;
   double time_zero_s = 0;
@@ -42,6 +57,7 @@ struct ScanFlags {
   std::vector<std::string> columns;
 
   void add(CLI::App* group, const std::string& prefix) {
+    whose = prefix;
     group->add_option("--" + prefix + "unit-m", unit_m, "Unit of x, y and z, in metres")
         ->check(CLI::PositiveNumber);
     group->add_option("--" + prefix + "time-unit-s", time_unit_s, "Unit of time, in seconds")
@@ -63,11 +79,7 @@ struct ScanFlags {
         .unit_m = unit_m, .time_unit_s = time_unit_s, .X_FS = {}, .columns = columns};
     reading.time_zero = std::chrono::nanoseconds(std::llround(time_zero_s * 1e9));
     if (viewpoint) reading.X_FS = FileViewpoint{};
-    if (!pose.empty()) {
-      reading.X_FS =
-          Pose{.rotation = glm::normalize(glm::dquat(pose[6], pose[3], pose[4], pose[5])),
-               .translation_m = {pose[0], pose[1], pose[2]}};
-    }
+    if (!pose.empty()) reading.X_FS = sensor_pose(pose, "--" + whose + "sensor-pose");
     return reading;
   }
 };
@@ -114,7 +126,10 @@ void add_dem_flags(CLI::App* group, const std::string& prefix, DemOptions& optio
 
 }  // namespace
 
-Subject subject_of(const fs::path& file) {
+namespace {
+
+/// Nothing if the name does not tell.
+std::optional<Subject> told_subject_of(const fs::path& file) {
   std::string ending = file.extension().string();
   std::ranges::transform(ending, ending.begin(),
                          [](unsigned char c) { return static_cast<char>(std::tolower(c)); });
@@ -124,10 +139,31 @@ Subject subject_of(const fs::path& file) {
   if (ending == ".ply") return has_faces(file) ? Subject::Mesh : Subject::Scan;
   if (is_one_of({".pcd", ".npy", ".npz", ".bin", ".las", ".laz", ".e57"})) return Subject::Scan;
   if (is_one_of({".exr", ".png", ".hdr", ".jpg", ".jpeg", ".flo", ".pfm"})) return Subject::Image;
-  if (is_one_of({".obj", ".glb", ".gltf", ".stl", ".dae"})) return Subject::Mesh;
+  if (is_one_of({".obj", ".glb", ".gltf", ".stl"})) return Subject::Mesh;
   if (is_one_of({".tif", ".tiff", ".asc", ".hgt", ".vrt", ".img", ".nc", ".dem"}))
     return Subject::Dem;
+  return std::nullopt;
+}
+
+std::string_view name_of(Subject subject) {
+  static constexpr std::array<std::string_view, 4> names{"a scan", "an image", "a DEM", "a mesh"};
+  return names[static_cast<std::size_t>(subject)];
+}
+
+}  // namespace
+
+Subject subject_of(const fs::path& file) {
+  if (const auto told = told_subject_of(file)) return *told;
   throw Error("{}: the name does not tell what it holds; say so by --as", file.string());
+}
+
+Subject subject_of(const fs::path& reference, const fs::path& other) {
+  const Subject subject = subject_of(reference);
+  const Subject of_other = told_subject_of(other).value_or(subject);
+  if (of_other == subject) return subject;
+  throw Error(
+      "{} seems to be {} and {} {}: they must be of one kind; if both are, say which by --as",
+      reference.string(), name_of(subject), other.string(), name_of(of_other));
 }
 
 struct CompareCommand::Options {
@@ -164,7 +200,7 @@ struct CompareCommand::Options {
   }
 
   Section compare() const {
-    switch (subject ? *subject : subject_of(reference)) {
+    switch (subject ? *subject : subject_of(reference, other)) {
       case Subject::Scan: {
         ScanOptions options{.reference = scan[1].reading(),
                             .other = scan[0].reading(),

@@ -100,6 +100,7 @@ Scale scale_of(const ImageLayer& layer, const Image<double>& image) {
     const double value = shown(layer, image.values().subspan(i, is_light ? 1 : channels));
     if (!std::isnan(value)) values.push_back(value);
   }
+  if (values.empty()) return {};
   Scale scale{quantile(values, 0.01), quantile(values, 0.99)};
   if (!(scale.high > scale.low)) scale.high = scale.low + 1;
   scale.is_logarithmic = layer.kind == LayerKind::Depth && scale.low > 0;

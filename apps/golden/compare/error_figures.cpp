@@ -2,10 +2,13 @@
 
 #include <algorithm>
 #include <cmath>
+#include <limits>
 #include <utility>
 
 namespace groundray::golden {
 namespace {
+
+constexpr double unknown = std::numeric_limits<double>::quiet_NaN();
 
 std::vector<double> sizes_of(const std::vector<double>& errors) {
   std::vector<double> sizes(errors.size());
@@ -15,7 +18,7 @@ std::vector<double> sizes_of(const std::vector<double>& errors) {
 
 /// As quantile, but puts the values in another order.
 double take_quantile(std::vector<double>& values, double share) {
-  if (values.empty()) return 0;
+  if (values.empty()) return unknown;
   const double place = share * static_cast<double>(values.size() - 1);
   const auto rank = static_cast<std::ptrdiff_t>(place);
   const auto at = values.begin() + rank;
@@ -36,8 +39,18 @@ double reach_of(const ErrorFigures& figures) {
 double quantile(std::vector<double> values, double share) { return take_quantile(values, share); }
 
 ErrorFigures figures_of(const std::vector<double>& errors) {
+  if (errors.empty()) {
+    return {.mean = unknown,
+            .rms = unknown,
+            .mean_size = unknown,
+            .median = unknown,
+            .median_size = unknown,
+            .p95_size = unknown,
+            .p99_size = unknown,
+            .largest = unknown,
+            .nmad = unknown};
+  }
   ErrorFigures figures{.count = errors.size()};
-  if (errors.empty()) return figures;
   double sum = 0, sizes = 0, squares = 0;
   for (std::size_t i = 0; i < errors.size(); ++i) {
     const double size = std::abs(errors[i]);
@@ -66,6 +79,7 @@ ErrorFigures figures_of(const std::vector<double>& errors) {
 
 void tell_errors(Section& into, const std::string& name, const std::string& unit,
                  const std::vector<double>& errors) {
+  if (errors.empty()) return;
   const ErrorFigures figures = figures_of(errors);
   tell(into, name + ": mean error", figures.mean, unit);
   tell(into, name + ": RMS error", figures.rms, unit);
@@ -81,6 +95,7 @@ void tell_errors(Section& into, const std::string& name, const std::string& unit
 
 void tell_sizes(Section& into, const std::string& name, const std::string& unit,
                 const std::vector<double>& sizes) {
+  if (sizes.empty()) return;
   const ErrorFigures figures = figures_of(sizes);
   tell(into, name + ": mean", figures.mean, unit);
   tell(into, name + ": RMS", figures.rms, unit);

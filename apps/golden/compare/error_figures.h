@@ -23,14 +23,14 @@ struct ErrorFigures {
   double nmad = 0;  ///< 1.4826 median |e - median|: the standard deviation, if errors are normal
 };
 
-/// @param errors  all finite. @return zeros, of none.
+/// @param errors  all finite. @return of none, NaN for all but the count.
 ErrorFigures figures_of(const std::vector<double>& errors);
 
-/// Returns the value that a share of `values`, all finite, do not exceed; 0, of none.
+/// Returns the value that a share of `values`, all finite, do not exceed; NaN, of none.
 double quantile(std::vector<double> values, double share);
 
 /// Tells bias, RMS, median, 95th percentile and largest error under `name`, and draws how the
-/// errors are spread, up to twice the 95th percentile.
+/// errors are spread, up to twice the 95th percentile; nothing if there is no error.
 void tell_errors(Section& into, const std::string& name, const std::string& unit,
                  const std::vector<double>& errors);
 

@@ -90,7 +90,8 @@ void suspect_meaning(const ImageFile& reference, const ImageFile& other, Section
     if (median_difference(*wrong, *of_other) < 0.1 * median_difference(*right, *of_other)) {
       into.text += fmt::format(
           "The other's {} is much nearer the reference's {}: Z is measured along the camera's "
-          "axis, Distance along the ray. Name the channel as what it is.\n",
+          "axis, Distance along the ray. Name the channel as what it is (--channels "
+          "THEIRS=OURS).\n",
           name, wrong->name);
     }
   }
@@ -102,12 +103,14 @@ void tell_beyond_bound(const ImageFile& reference, const ImageFile& other, Secti
   const ImageLayer *range = reference.find("Distance"), *bound = reference.find("Bound"),
                    *of_other = other.find("Distance");
   if (range == nullptr || bound == nullptr || of_other == nullptr) return;
-  std::size_t beyond = 0;
+  std::size_t both = 0, beyond = 0;
   for (std::size_t i = 0; i < range->values.values().size(); ++i) {
     const double a = range->values.values()[i], b = of_other->values.values()[i];
     if (!is_depth(a) || !is_depth(b)) continue;
+    ++both;
     if (std::abs(a - b) > bound->values.values()[i] + float_rounding * (a + b)) ++beyond;
   }
+  if (both == 0) return;
   tell(into, "Distance: errors beyond the reference's own bound", static_cast<double>(beyond),
        "px");
 }
@@ -152,7 +155,7 @@ Section compare_images(const ImageFile& reference, const ImageFile& other,
   if (!any) {
     throw Error(
         "they have nothing in common: the reference has {}, the other {}; say which channel "
-        "is which, and what a PNG holds",
+        "is which (--channels THEIRS=OURS), and what a PNG holds (--png)",
         names_of(reference), names_of(other));
   }
   tell_beyond_bound(reference, other, section);

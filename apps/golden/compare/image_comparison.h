@@ -18,7 +18,8 @@ struct ImageOptions {
 /// Holds an image against a reference, layer by layer as their kinds are: errors of depths, angles
 /// between normals, bias and noise of light (with standard errors: tests), end points of flow,
 /// labels that are equal. Says so if the other image seems to be shifted, mirrored, of another
-/// unit, or to mean something else. Only the tests of light are held against limits.
+/// unit, or to mean something else. Only the tests of light are held against limits; a layer of
+/// which no pixel is in both fails.
 /// @throws Error as read_image_file; if the sizes differ or there is no layer that both have.
 Section compare_images(const std::filesystem::path& reference, const std::filesystem::path& other,
                        const ImageOptions& options = {});

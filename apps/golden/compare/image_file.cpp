@@ -162,7 +162,7 @@ Channels read_png_channels(std::string_view bytes, const std::string& name, PngM
 
 /// Returns the floats after the head of a file, of which there must be so many.
 ImageF floats_after(std::string_view bytes, const std::string& name, std::int64_t width,
-                    std::int64_t height, int channels, bool is_swapped) {
+                    std::int64_t height, int channels, std::endian order) {
   if (width <= 0 || height <= 0 || width > most_image_pixels / height ||
       bytes.size() != static_cast<std::size_t>(width * height * channels) * sizeof(float)) {
     throw Error(
@@ -172,7 +172,7 @@ ImageF floats_after(std::string_view bytes, const std::string& name, std::int64_
   }
   ImageF image(static_cast<int>(width), static_cast<int>(height), channels);
   std::memcpy(image.values().data(), bytes.data(), bytes.size());
-  if (is_swapped) {
+  if (order != std::endian::native) {
     for (float& value : image.values())
       value = std::bit_cast<float>(__builtin_bswap32(std::bit_cast<std::uint32_t>(value)));
   }
@@ -186,7 +186,7 @@ Channels read_flo(std::string_view bytes, const std::string& name) {
     std::memcpy(&height, bytes.data() + 8, 4);
   }
   bytes.remove_prefix(std::min<std::size_t>(12, bytes.size()));
-  const ImageF image = floats_after(bytes, name, width, height, 2, false);
+  const ImageF image = floats_after(bytes, name, width, height, 2, std::endian::little);
   Channels channels = split(image, {"FlowForward.u", "FlowForward.v"}, [](float value) -> double {
     return std::abs(value) <= 1e9f ? value : nothing;  // as its authors mark what is unknown
   });
@@ -207,7 +207,8 @@ Channels read_pfm(std::string_view bytes, const std::string& name) {
   if (width <= 0 || height <= 0 || scale == 0 || !std::isfinite(scale)) {
     throw Error("{}: its head must be PF or Pf, WIDTH HEIGHT, and a scale, each on a line", name);
   }
-  const ImageF upside_down = floats_after(lines.rest(), name, width, height, channels, scale > 0);
+  const ImageF upside_down = floats_after(lines.rest(), name, width, height, channels,
+                                          scale > 0 ? std::endian::big : std::endian::little);
   ImageF image(width, height, channels);  // rows are stored from the bottom
   for (int y = 0; y < height; ++y) {
     const float* from = upside_down.at(0, height - 1 - y).data();

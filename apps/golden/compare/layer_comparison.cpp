@@ -77,15 +77,26 @@ Errors errors_of(const ImageLayer& reference, const ImageLayer& other,
   return errors;
 }
 
-void tell_presence(const std::string& name, const Errors& errors, Section& into) {
-  tell(into, name + ": in both", static_cast<double>(errors.all.size()), "px");
+/// Tells how many pixels have a value in either image.
+/// @return whether there are any in both; else says so, and fails unless neither has one.
+bool tell_presence(const std::string& name, const Errors& errors, Section& into) {
+  const std::size_t alone = errors.only_reference + errors.only_other;
+  if (errors.all.empty() && alone > 0) {
+    fail(into, name + ": in both", 0, "px", "without a pixel that both have, nothing is compared");
+  } else {
+    tell(into, name + ": in both", static_cast<double>(errors.all.size()), "px");
+  }
   tell(into, name + ": in the reference alone", static_cast<double>(errors.only_reference), "px");
   tell(into, name + ": in the other alone", static_cast<double>(errors.only_other), "px");
+  if (!errors.all.empty()) return true;
+  into.text +=
+      name + (alone > 0 ? ": the images have nothing in common, so there are no errors to tell.\n"
+                        : ": neither image has a value, so there are no errors to tell.\n");
+  return false;
 }
 
 void say_worst(const ImageLayer& reference, const ImageLayer& other, const Errors& errors,
                Section& into) {
-  if (errors.all.empty()) return;
   const glm::ivec2 at = errors.place(figures_of(errors.all).worst);
   if (errors.image.at(at.x, at.y)[0] == 0) return;
   const auto text = [&](const ImageLayer& layer) {
@@ -98,7 +109,6 @@ void say_worst(const ImageLayer& reference, const ImageLayer& other, const Error
 }
 
 double share_percent(const std::vector<double>& values, const std::function<bool(double)>& is) {
-  if (values.empty()) return 0;
   return 100.0 * static_cast<double>(std::ranges::count_if(values, is)) /
          static_cast<double>(values.size());
 }
@@ -106,10 +116,11 @@ double share_percent(const std::vector<double>& values, const std::function<bool
 /// Depths by the thousandfold are of another unit.
 void suspect_unit(const std::string& name, const std::vector<double>& ratios, Section& into) {
   const double ratio = quantile(ratios, 0.5);
-  if (ratios.empty() || (0.02 < ratio && ratio < 50)) return;
+  if (0.02 < ratio && ratio < 50) return;
   into.text += fmt::format(
-      "{} of the other is {:.4g} times the reference's at the median: is it in another unit? Say "
-      "which it is in.\n",
+      "{} of the other is {:.4g} times the reference's at the median: is it in another unit? Give "
+      "its unit (--depth-unit-m 0.001 for millimetres; of the reference, "
+      "--reference-depth-unit-m).\n",
       name, ratio);
 }
 
@@ -118,7 +129,7 @@ void compare_depths(const ImageLayer& reference, const ImageLayer& other, Sectio
   const auto is_there = [](Pixel pixel) { return is_depth(pixel[0]); };
   const Errors errors =
       errors_of(reference, other, is_there, [](Pixel a, Pixel b) { return b[0] - a[0]; });
-  tell_presence(name, errors, into);
+  if (!tell_presence(name, errors, into)) return;
   tell_errors(into, name, "m", errors.all);
   std::vector<double> relative, ratios;
   for (std::size_t i = 0; i < errors.all.size(); ++i) {
@@ -147,7 +158,7 @@ void compare_normals(const ImageLayer& reference, const ImageLayer& other, Secti
   const Errors errors = errors_of(
       reference, other, [](Pixel pixel) { return is_finite(pixel) && length(pixel) > 0; },
       angle_deg);
-  tell_presence(name, errors, into);
+  if (!tell_presence(name, errors, into)) return;
   tell_sizes(into, name + ": angle", "deg", errors.all);
   tell(into, name + ": share of angles beyond 1 deg",
        share_percent(errors.all, [](double angle) { return angle > 1; }), "%");
@@ -195,7 +206,7 @@ void tell_channels(const ImageLayer& reference, const ImageLayer& other, Section
       errors.push_back(b[i] - a[i]);
     }
     const ErrorFigures figures = figures_of(errors);
-    const double mean = errors.empty() ? 0 : sum / static_cast<double>(errors.size());
+    const double mean = sum / static_cast<double>(errors.size());
     table.rows.push_back({reference.channels[k], fmt::format("{:.6g}", mean),
                           fmt::format("{:.6g}", mean + figures.mean),
                           fmt::format("{:.6g}", figures.mean), fmt::format("{:.6g}", figures.rms)});
@@ -211,7 +222,7 @@ void compare_colours(const ImageLayer& reference, const ImageLayer& other, Secti
     return sum / static_cast<double>(a.size());
   };
   const Errors errors = errors_of(reference, other, is_finite, mean_error);
-  tell_presence(name, errors, into);
+  if (!tell_presence(name, errors, into)) return;
   std::vector<double> each, light;
   double sum = 0, sum_of_other = 0;
   for (const std::size_t pixel : errors.pixels) {
@@ -241,7 +252,7 @@ void compare_colours(const ImageLayer& reference, const ImageLayer& other, Secti
 void compare_flows(const ImageLayer& reference, const ImageLayer& other, Section& into) {
   const std::string& name = reference.name;
   const Errors errors = errors_of(reference, other, is_finite, distance);
-  tell_presence(name, errors, into);
+  if (!tell_presence(name, errors, into)) return;
   tell_sizes(into, name + ": end-point error", "px", errors.all);
   std::size_t outliers = 0;
   double reversed_px = 0, error_px = 0;
@@ -252,7 +263,7 @@ void compare_flows(const ImageLayer& reference, const ImageLayer& other, Section
     reversed_px += std::hypot(a[0] + b[0], a[1] + b[1]);
     error_px += errors.all[i];
   }
-  const auto count = static_cast<double>(std::max<std::size_t>(errors.all.size(), 1));
+  const auto count = static_cast<double>(errors.all.size());
   tell(into, name + ": outliers as KITTI has them (Fl: beyond 3 px and 5 %)",
        100 * static_cast<double>(outliers) / count, "%");
   say_worst(reference, other, errors, into);
@@ -305,7 +316,7 @@ void compare_numbers(const ImageLayer& reference, const ImageLayer& other, Secti
   const Errors errors = errors_of(reference, other, is_finite, [&](Pixel a, Pixel b) {
     return is_vector ? distance(a, b) : b[0] - a[0];
   });
-  tell_presence(name, errors, into);
+  if (!tell_presence(name, errors, into)) return;
   if (is_vector) {
     tell_sizes(into, name + ": difference", unit, errors.all);
   } else {

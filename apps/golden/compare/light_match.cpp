@@ -35,6 +35,9 @@ struct Light {
     const double sigma = error->values.at(x, y)[k];
     return sigma * sigma;
   }
+  bool is_known(int x, int y, std::size_t k) const {
+    return std::isfinite(light->values.at(x, y)[k]) && std::isfinite(variance(x, y, k));
+  }
   double freedom(int x, int y) const {
     return samples == nullptr ? std::numeric_limits<double>::infinity()
                               : samples->values.at(x, y)[0] - 1;
@@ -55,7 +58,7 @@ struct Pair {
     return reference.variance(x, y, k) + other.variance(x, y, k);
   }
   bool is_known(int x, int y, std::size_t k) const {
-    return std::isfinite(variance(x, y, k)) && std::isfinite(off(x, y, k));
+    return reference.is_known(x, y, k) && other.is_known(x, y, k);
   }
   /// Of both estimates together.
   double freedom(int x, int y, std::size_t k) const {
@@ -84,7 +87,9 @@ void each_value(const Image<double>& image, const Each& each) {
 
 /// What the tests of single values find.
 struct Values {
-  std::size_t tests = 0, beyond = 0, without_spread = 0;
+  std::size_t all = 0, tests = 0, lost = 0;    // lost: known in the reference alone
+  std::size_t unequal = 0;                     // or not finite
+  std::size_t beyond = 0, without_spread = 0;  // that differ, with some spread and with none
   std::vector<double> deviations;
 };
 
@@ -92,7 +97,10 @@ Values test_values(const Pair& pair, double level) {
   Values result;
   const Image<double>& size = pair.reference.light->values;
   each_value(size, [&](int x, int y, std::size_t k) {
+    ++result.all;
     if (pair.is_known(x, y, k)) ++result.tests;
+    if (!(std::abs(pair.off(x, y, k)) <= pair.rounding(x, y, k))) ++result.unequal;
+    if (pair.reference.is_known(x, y, k) && !pair.other.is_known(x, y, k)) ++result.lost;
   });
   const double one = significance_of_one(level, result.tests);
   const double at_least = normal_limit(level, result.tests);  // Student's t has heavier tails
@@ -125,6 +133,27 @@ double deviations_of(const Pair& pair, std::size_t k, int x0, int y0, int width,
   }
   if (std::abs(off) <= rounding) return 0;
   return std::abs(off) / std::sqrt(variance);
+}
+
+void hold_values(const Values& values, const Significance& significance, const std::string& because,
+                 Section& into) {
+  const auto tests = static_cast<double>(values.tests);
+  const double allowed = std::floor(tests * significance.beyond_share * (1 + 1e-12));
+  const std::string of_tests = fmt::format("of {}", values.tests);
+  if (values.tests == 0 && values.unequal > 0) {
+    fail(into, "RGB: values that could be tested", 0, fmt::format("of {}", values.all),
+         "nothing is tested where the light or its standard error is not finite in both");
+  }
+  hold(into, "RGB: values that differ significantly", static_cast<double>(values.beyond), of_tests,
+       allowed, because);
+  hold(into, "RGB: values that differ without any spread",
+       static_cast<double>(values.without_spread), of_tests, allowed,
+       "light whose standard error is 0 is the same, but for the rounding of floats");
+  hold(into, "RGB: values or standard errors that are finite in the reference alone",
+       static_cast<double>(values.lost), fmt::format("of {}", values.all), 0,
+       "what cannot be tested must not pass");
+  tell(into, "RGB: values that were not tested, being not finite",
+       static_cast<double>(values.all - values.tests));
 }
 
 void test_blocks(const Pair& pair, double level, const std::string& because, Section& into) {
@@ -164,14 +193,9 @@ void match_light(const ImageFile& reference, const ImageFile& other,
       : pair.other.error == nullptr   ? "the reference; the other image counts as exact"
                                       : "both");
   const Values values = test_values(pair, significance.level);
-  const double allowed =
-      std::floor(static_cast<double>(values.tests) * significance.beyond_share * (1 + 1e-12));
-  hold(into, "RGB: values that differ significantly", static_cast<double>(values.beyond),
-       fmt::format("of {}", values.tests), allowed, because);
+  hold_values(values, significance, because, into);
   test_blocks(pair, significance.level, because, into);
   test_channels(pair, significance.level, because, into);
-  tell(into, "RGB: values that differ without any spread, not tested",
-       static_cast<double>(values.without_spread));
   into.histograms.push_back(
       histogram_of("RGB: difference, in standard errors (even light: a bell "
                    "of width 1)",

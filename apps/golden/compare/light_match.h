@@ -16,6 +16,9 @@ struct Significance {
 /// and the mean of each channel, all blocks or channels at `level` together (Šidák's correction).
 /// Single values alone are blind for what is everywhere a little wrong. An image without standard
 /// errors counts as exact; if neither has any, nothing is tested.
+/// Values that are not finite, or whose standard errors are not, cannot be tested: they fail if
+/// they could be in the reference, or if there are no others and not all are equal. Values without
+/// any spread must be equal.
 /// @param reference, other  of the same size, both with RGB.
 /// @see Welch, The generalization of Student's problem, Biometrika 34 (1947); Šidák, Rectangular
 ///      confidence regions for the means of multivariate normal distributions (1967).

@@ -39,23 +39,25 @@ std::vector<glm::dvec3> directions_of(const Scan& scan) {
   return directions;
 }
 
-/// Each return joins the first one before it that has its direction, and its ring and time.
+/// Numbers groups of one direction, ring and time. Those of each ring and time are sought apart,
+/// for a beam that stands still has them all in one direction.
 std::vector<std::uint32_t> groups_by_direction(const Scan& scan, const std::vector<double>* rings,
                                                const std::vector<double>* times) {
   const std::vector<glm::dvec3> directions = directions_of(scan);
-  const DirectionTree tree(directions);
-  std::vector<std::uint32_t> groups(directions.size(), none);
-  std::uint32_t count = 0;
-  for (std::uint32_t i = 0; i < groups.size(); ++i) {
-    std::uint32_t first = none;
-    tree.for_each_within(directions[i], same_pulse_rad, [&](std::uint32_t other, double) {
-      const bool is_alike = (rings == nullptr || (*rings)[other] == (*rings)[i]) &&
-                            (times == nullptr || (*times)[other] == (*times)[i]);
-      if (other < i && is_alike) first = std::min(first, other);
-    });
-    groups[i] = first == none ? count++ : groups[first];
+  std::map<std::pair<double, double>, std::vector<std::uint32_t>> alike;
+  for (std::uint32_t i = 0; i < directions.size(); ++i) {
+    alike[{rings == nullptr ? 0 : (*rings)[i], times == nullptr ? 0 : (*times)[i]}].push_back(i);
   }
-  return groups;
+  std::vector<std::uint32_t> firsts(directions.size());
+  for (const auto& entry : alike) {
+    const std::vector<std::uint32_t>& members = entry.second;
+    std::vector<glm::dvec3> of_members;
+    of_members.reserve(members.size());
+    for (const std::uint32_t i : members) of_members.push_back(directions[i]);
+    const std::vector<std::uint32_t> found = firsts_of(of_members);
+    for (std::size_t i = 0; i < members.size(); ++i) firsts[members[i]] = members[found[i]];
+  }
+  return groups_by(firsts.size(), [&](std::size_t i) { return firsts[i]; });
 }
 
 Pulses pulses_by(const Scan& scan, const std::vector<std::uint32_t>& groups,
@@ -78,6 +80,19 @@ Pulses pulses_by(const Scan& scan, const std::vector<std::uint32_t>& groups,
 }
 
 }  // namespace
+
+std::vector<std::uint32_t> firsts_of(const std::vector<glm::dvec3>& directions) {
+  const DirectionTree tree(directions);
+  std::vector<std::uint32_t> firsts(directions.size(), none);
+  for (std::uint32_t i = 0; i < firsts.size(); ++i) {
+    if (firsts[i] != none) continue;
+    tree.for_each_within(directions[i], same_pulse_rad, [&](std::uint32_t other, double) {
+      if (firsts[other] == none) firsts[other] = i;
+    });
+    firsts[i] = i;  // also if it is no direction
+  }
+  return firsts;
+}
 
 Pulses pulses_of(const Scan& scan) {
   const std::size_t count = scan.p_S.size();

@@ -26,6 +26,11 @@ struct Pulses {
 /// Directions that differ by no more are one.
 constexpr double same_pulse_rad = 1e-5;
 
+/// Returns for each direction the first that it is one with: itself, or one before it that is the
+/// first of its own and at 1e-5 rad or less.
+/// @param directions  unit.
+std::vector<std::uint32_t> firsts_of(const std::vector<glm::dvec3>& directions);
+
 /// Returns the pulses of a scan by number, else by ring and time, else by direction. Times are left
 /// out if they do not tell pulses apart: more than 16 returns have one ring and time.
 Pulses pulses_of(const Scan& scan);

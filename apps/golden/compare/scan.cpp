@@ -52,9 +52,11 @@ class Reader {
   void check_units() const {
     const auto is_positive = [](double value) { return value > 0 && std::isfinite(value); };
     Violations broken(scan_.name);
-    broken.unless(is_positive(reading_.unit_m), "unit_m = {} must be positive", reading_.unit_m);
+    broken.unless(is_positive(reading_.unit_m), "its unit, {} m, must be positive (--unit-m)",
+                  reading_.unit_m);
     broken.unless(is_positive(reading_.time_unit_s.value_or(1)),
-                  "time_unit_s = {} must be positive", reading_.time_unit_s.value_or(1));
+                  "its unit of time, {} s, must be positive (--time-unit-s)",
+                  reading_.time_unit_s.value_or(1));
     broken.throw_if_any();
   }
 
@@ -135,9 +137,9 @@ class Reader {
     const auto [low, high] = finite_limits(numbers.values);
     if (!numbers.are_whole && !(high - low > longest_scan_s)) return 1;
     scan_.notes.push_back(fmt::format(
-        "The column {} of {} does not say its unit ({}), so it was not used: give time_unit_s, "
-        "such "
-        "as 1e-9 for nanoseconds.",
+        "The column {} of {} does not say its unit ({}), so it was not used: give it "
+        "(--time-unit-s "
+        "1e-9 for nanoseconds; of the reference, --reference-time-unit-s).",
         column.name, scan_.name,
         numbers.are_whole ? "whole numbers"
                           : fmt::format("as seconds, the scan would last {:.4g} s", high - low)));
@@ -246,8 +248,10 @@ class Reader {
     const Pose none;
     if (std::holds_alternative<FileViewpoint>(reading_.X_FS)) {
       if (!file_.X_FS) {
-        throw Error("{}: it tells no viewpoint of its own, as PCD files do: give the pose",
-                    scan_.name);
+        throw Error(
+            "{}: it tells no viewpoint of its own, as PCD files do: give the pose "
+            "(--sensor-pose)",
+            scan_.name);
       }
       X_FS = *file_.X_FS;
       X_FS.translation_m *= reading_.unit_m;  // in the file's unit
@@ -256,8 +260,8 @@ class Reader {
       if (file_.X_FS && *file_.X_FS != none && X_FS == none) {
         scan_.notes.push_back(
             fmt::format("{} has a VIEWPOINT other than the origin, which was not used: ask for it "
-                        "if its points "
-                        "are not in the sensor's frame.",
+                        "(--viewpoint; of the reference, --reference-viewpoint) if its points are "
+                        "not in the sensor's frame.",
                         scan_.name));
       }
     }

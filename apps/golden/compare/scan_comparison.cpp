@@ -92,7 +92,11 @@ Table table_of_columns(const Scan& reference, const Scan& other) {
 void tell_pairs(const Scan& reference, const Scan& other, const Pairs& pairs,
                 const ScanLimits& limits, Section& section) {
   const auto count = [](std::size_t value) { return static_cast<double>(value); };
-  tell(section, "pairs of returns", count(pairs.returns.size()));
+  if (pairs.returns.empty() && reference.p_S.size() + other.p_S.size() > 0) {
+    fail(section, "pairs of returns", 0, "", "without a pair, no range is compared");
+  } else {
+    tell(section, "pairs of returns", count(pairs.returns.size()));
+  }
   tell(section, "missing returns", count(pairs.missing.size()));
   tell_or_hold(section, "missing share of the reference's",
                share(pairs.missing.size(), reference.p_S.size()), "", limits.missing_share);

@@ -40,20 +40,22 @@ bool is_near(double ratio, double of, double tolerance) {
 std::string unit_doubt(const std::string& other, double ratio) {
   constexpr double feet_per_m = 1 / 0.3048;
   if (is_near(ratio, 1000, 0.5)) {
-    return fmt::format("Is {} in millimetres? Then tell unit_m = 0.001.", other);
+    return fmt::format("Is {} in millimetres? Then give its unit (--unit-m 0.001).", other);
   }
   if (is_near(ratio, 0.001, 0.5)) {
-    return fmt::format("Is {} in kilometres, or the reference in millimetres? Then tell unit_m.",
-                       other);
+    return fmt::format(
+        "Is {} in kilometres, or the reference in millimetres? Then give the unit "
+        "(--unit-m 1000, --reference-unit-m 0.001).",
+        other);
   }
   if (is_near(ratio, 100, 0.5)) {
-    return fmt::format("Is {} in centimetres? Then tell unit_m = 0.01.", other);
+    return fmt::format("Is {} in centimetres? Then give its unit (--unit-m 0.01).", other);
   }
   if (is_near(ratio, feet_per_m, 0.02)) {
-    return fmt::format("Is {} in feet? Then tell unit_m = 0.3048.", other);
+    return fmt::format("Is {} in feet? Then give its unit (--unit-m 0.3048).", other);
   }
   if (ratio > 10 || ratio < 0.1) {
-    return "Units or frames differ: tell unit_m, or the pose of the sensor (X_FS).";
+    return "Units or frames differ: give its unit (--unit-m) or the sensor's pose (--sensor-pose).";
   }
   return "";
 }
@@ -77,8 +79,8 @@ std::vector<std::string> doubts_about(const Scan& reference, const Scan& other) 
     doubts.push_back(fmt::format(
         "WARNING: the points of {} lie around a place {:.4g} m from that of the reference's, "
         "farther "
-        "than nine tenths of its ranges. Are they in the frame of the world? Then tell the pose of "
-        "the sensor (X_FS).",
+        "than nine tenths of its ranges. Are they in the frame of the world? Then give the pose of "
+        "the sensor (--sensor-pose).",
         other.name, offset_m));
   }
   return doubts;
@@ -102,7 +104,7 @@ std::vector<std::string> doubts_about(const Pairs& pairs, const ScanErrors& erro
         "WARNING: the median angle between pairs is {:.4g} rad, more than half of the spacing of "
         "the "
         "beams: the sensors are turned or move differently, or count rings, times or pulses "
-        "otherwise. Pair by direction to see.",
+        "otherwise. Pair by direction to see (--pair-by direction).",
         angle_rad));
   }
   constexpr double least_rad = 1e-6;

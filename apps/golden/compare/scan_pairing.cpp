@@ -12,6 +12,7 @@
 #include <numeric>
 #include <span>
 #include <tuple>
+#include <utility>
 
 #include "apps/golden/compare/direction_tree.h"
 #include "apps/golden/compare/pulses.h"
@@ -46,7 +47,7 @@ void add_candidate(Candidates& candidates, const Candidate& candidate, std::size
   if (candidates.size() > most_per_pulse * (pulses + 1)) {
     throw Error(
         "pairing: the tolerance lets each pulse have more than {} partners: take one of about half "
-        "of the spacing of the beams",
+        "of the spacing of the beams (--pair-mrad, --pair-s)",
         most_per_pulse);
   }
 }
@@ -103,8 +104,9 @@ void add_from_ring(const Ring& reference, const Ring& other, double tolerance, d
   }
 }
 
-double sound_tolerance(std::optional<double> asked, double step, const char* name) {
-  if (asked && !(*asked > 0)) throw Error("pairing: {} = {} must be positive", name, *asked);
+double sound_tolerance(std::optional<double> asked, double step, const char* option) {
+  if (asked && !(*asked > 0))
+    throw Error("pairing: the tolerance, {}, must be positive ({})", *asked, option);
   if (asked) return *asked;
   return std::isfinite(step) ? step / 2 : same_pulse_rad;  // a lone pulse has no spacing
 }
@@ -116,7 +118,7 @@ Candidates candidates_in_rings(const Pulses& reference, const Pulses& other,
   const auto other_rings = rings_of(other, places_of(other, pairs.rule));
   pairs.tolerance =
       sound_tolerance(is_by_time ? options.tolerance_s : options.tolerance_rad,
-                      median_step(reference_rings), is_by_time ? "tolerance_s" : "tolerance_rad");
+                      median_step(reference_rings), is_by_time ? "--pair-s" : "--pair-mrad");
   Candidates candidates;
   for (const auto& [number, ring] : reference_rings) {
     const auto same = other_rings.find(number);
@@ -129,20 +131,26 @@ Candidates candidates_in_rings(const Pulses& reference, const Pulses& other,
   return candidates;
 }
 
-/// The median angle from a pulse to its nearest; NaN of a lone one.
+/// The median angle from a pulse to its nearest; NaN of a lone one. Pulses of one direction have
+/// what the first of them has.
 double median_spacing(const Pulses& pulses) {
-  const DirectionTree tree(pulses.directions);
-  std::vector<double> spacings;
-  for (const glm::dvec3& direction : pulses.directions) {
-    const double spacing_rad = tree.nearest_beyond(direction, same_pulse_rad);
-    if (std::isfinite(spacing_rad)) spacings.push_back(spacing_rad);
+  const std::vector<std::uint32_t> firsts = firsts_of(pulses.directions);
+  std::vector<glm::dvec3> directions;
+  for (std::uint32_t i = 0; i < firsts.size(); ++i) {
+    if (firsts[i] == i) directions.push_back(pulses.directions[i]);
+  }
+  const DirectionTree tree(std::move(directions));
+  std::vector<double> of_first(firsts.size()), spacings;
+  for (std::uint32_t i = 0; i < firsts.size(); ++i) {
+    if (firsts[i] == i) of_first[i] = tree.nearest_beyond(pulses.directions[i], same_pulse_rad);
+    if (std::isfinite(of_first[firsts[i]])) spacings.push_back(of_first[firsts[i]]);
   }
   return median_of(std::move(spacings));
 }
 
 Candidates candidates_by_direction(const Pulses& reference, const Pulses& other,
                                    const PairingOptions& options, Pairs& pairs) {
-  pairs.tolerance = sound_tolerance(options.tolerance_rad, pairs.spacing_rad, "tolerance_rad");
+  pairs.tolerance = sound_tolerance(options.tolerance_rad, pairs.spacing_rad, "--pair-mrad");
   const DirectionTree tree(other.directions);
   Candidates candidates;
   for (std::uint32_t i = 0; i < reference.size(); ++i) {
@@ -189,8 +197,8 @@ PairingRule best_rule(const Scan& reference, const Pulses& a, const Scan& other,
   const bool tell_apart = !(a.times.empty() && a.size() > 0) && !(b.times.empty() && b.size() > 0);
   if (tell_apart && times_overlap(a.times, b.times)) return PairingRule::RingTime;
   notes.emplace_back(
-      tell_apart ? "Their times do not overlap, so they were not used: tell what the other's "
-                   "clock shows at the scan's stamp (time_zero)."
+      tell_apart ? "Their times do not overlap, so they were not used: give what the other's "
+                   "clock shows at the scan's stamp (--time-zero-s)."
                  : "Times of one of them do not tell pulses apart, so they were not used.");
   return PairingRule::RingAzimuth;
 }
@@ -225,31 +233,29 @@ std::vector<std::pair<std::uint32_t, std::uint32_t>> accept(Candidates candidate
   return pairs;
 }
 
-/// The returns of a pulse in the order that pairs them, each with what must agree: its index, or
-/// its place by range.
-std::vector<std::pair<double, std::uint32_t>> keyed_returns(const Scan& scan,
-                                                            std::span<const std::uint32_t> returns,
-                                                            bool is_by_index) {
-  std::vector<std::pair<double, std::uint32_t>> keyed;
-  for (const std::uint32_t i : returns) {
-    const double key =
-        is_by_index ? (*scan.find(Quantity::ReturnIndex))[i] : glm::length(scan.p_S[i]);
-    keyed.emplace_back(key, i);
-  }
+/// Returns of a pulse in the order that pairs them, each with what must agree.
+using KeyedReturns = std::vector<std::pair<double, std::uint32_t>>;
+
+KeyedReturns returns_by_index(const Scan& scan, std::span<const std::uint32_t> returns) {
+  KeyedReturns keyed;
+  for (const std::uint32_t i : returns)
+    keyed.emplace_back((*scan.find(Quantity::ReturnIndex))[i], i);
   std::ranges::sort(keyed);
-  if (!is_by_index) {
-    for (std::size_t place = 0; place < keyed.size(); ++place) {
-      keyed[place].first = static_cast<double>(place);
-    }
-  }
   return keyed;
 }
 
-void pair_returns(const Scan& reference, std::span<const std::uint32_t> reference_returns,
-                  const Scan& other, std::span<const std::uint32_t> other_returns, Pairs& pairs) {
-  const auto a = keyed_returns(reference, reference_returns, pairs.is_by_return_index);
-  const auto b = keyed_returns(other, other_returns, pairs.is_by_return_index);
-  for (auto i = a.begin(), j = b.begin(); i != a.end() && j != b.end();) {
+/// By their places in order of range.
+KeyedReturns returns_by_range(const Scan& scan, std::span<const std::uint32_t> returns) {
+  KeyedReturns keyed;
+  for (const std::uint32_t i : returns) keyed.emplace_back(glm::length(scan.p_S[i]), i);
+  std::ranges::sort(keyed);
+  for (std::size_t place = 0; place < keyed.size(); ++place)
+    keyed[place].first = static_cast<double>(place);
+  return keyed;
+}
+
+void pair_returns(const KeyedReturns& reference, const KeyedReturns& other, Pairs& pairs) {
+  for (auto i = reference.begin(), j = other.begin(); i != reference.end() && j != other.end();) {
     if (i->first == j->first) {
       pairs.returns.emplace_back((i++)->second, (j++)->second);
     } else {
@@ -286,7 +292,9 @@ Pairs pair_scans(const Scan& reference, const Scan& other, const PairingOptions&
                                                  : options.rule;
   if (pairs.rule == PairingRule::RingTime &&
       ((a.times.empty() && a.size() > 0) || (b.times.empty() && b.size() > 0))) {
-    throw Error("pairing: times do not tell the pulses apart: pair by ring and azimuth");
+    throw Error(
+        "pairing: times do not tell the pulses apart: pair by ring and azimuth "
+        "(--pair-by ring_azimuth)");
   }
   pairs.spacing_rad = median_spacing(a);
   Candidates candidates;
@@ -303,7 +311,9 @@ Pairs pair_scans(const Scan& reference, const Scan& other, const PairingOptions&
   pairs.paired_pulses = pulses.size();
   pairs.is_by_return_index = reference.find(Quantity::ReturnIndex) != nullptr &&
                              other.find(Quantity::ReturnIndex) != nullptr;
-  for (const auto& [i, j] : pulses) pair_returns(reference, a.of(i), other, b.of(j), pairs);
+  const auto& keyed = pairs.is_by_return_index ? returns_by_index : returns_by_range;
+  for (const auto& [i, j] : pulses)
+    pair_returns(keyed(reference, a.of(i)), keyed(other, b.of(j)), pairs);
   list_unpaired(reference, other, pairs);
   return pairs;
 }

@@ -195,6 +195,11 @@ TEST(CompareDems, ReadsFilesAndRefusesWhatDoesNotMatch) {
   write_asc(folder, "d", 500000, 5e6, "1 2 3\n4 5 6", utm(9, 32));
   write_asc(folder, "e", 500100, 5e6, "1 2 3\n4 5 6", utm(3, 31));
   EXPECT_EQ(figure(compare_dems(folder / "a.asc", folder / "b.asc"), "height: largest error"), 1);
+  write_asc(folder, "g", 500000, 5e6, "1 -9999 3\n-9999 5 -9999", utm(3, 31));
+  const Section no_triangle = compare_dems(folder / "a.asc", folder / "g.asc");
+  EXPECT_EQ(figure(no_triangle, "samples that both have"), 3);
+  for (const Measure& measure : no_triangle.measures)
+    EXPECT_THAT(measure.name, Not(HasSubstr("triangles")));
   const Section without = compare_dems(folder / "a.asc", folder / "c.asc");
   EXPECT_EQ(figure(without, "holes in the other alone, and what lies beyond it"), 1);
   EXPECT_THAT(without.text, HasSubstr("The other names no reference system"));

@@ -107,15 +107,30 @@ TEST(CompareImages, FailsLightThatIsNoNumberWhereTheReferenceHasIt) {
 
 TEST(CompareImages, FailsLightOfWhichNothingCanBeTested) {
   for (const std::size_t layer : {0u, 1u}) {
-    ImageFile nothing = estimate(2, 0);
-    std::ranges::fill(nothing.layers[layer].values.values(), std::nan(""));
-    for (const auto& reference : {estimate(1, 0), nothing}) {
-      const Section section = compare(reference, nothing);
+    const auto nothing = [layer](unsigned seed) {
+      ImageFile file = estimate(seed, 0);
+      std::ranges::fill(file.layers[layer].values.values(), std::nan(""));
+      return file;
+    };
+    for (const auto& reference : {estimate(1, 0), nothing(3)}) {
+      const Section section = compare(reference, nothing(2));
       EXPECT_EQ(section.verdict, Verdict::Failed);
       EXPECT_EQ(figure(section, "RGB: values that could be tested"), 0);
       EXPECT_EQ(figure(section, "RGB: values that were not tested, being not finite"), 32 * 24 * 3);
     }
   }
+}
+
+// The standard error of a single path is infinite.
+TEST(CompareImages, TakesSinglePathsForTheSameOnlyIfTheyAreEqual) {
+  ImageFile single = estimate(1, 0);
+  std::ranges::fill(single.layers[1].values.values(), infinity);
+  EXPECT_EQ(compare(single, single).verdict, Verdict::Passed);
+  ImageFile other = single;
+  other.layers[0].values.at(5, 6)[1] += 1e-4;
+  const Section section = compare(single, other);
+  EXPECT_EQ(section.verdict, Verdict::Failed);
+  EXPECT_EQ(figure(section, "RGB: values that could be tested"), 0);
 }
 
 // Two of 2304 values: a share of a thousandth allows both.
