@@ -50,11 +50,12 @@ Histogram histogram_of(std::string title, std::string unit, const std::vector<do
                       .low = low,
                       .high = high,
                       .counts = std::vector<std::uint64_t>(bins)};
+  const bool has_steps = bins > 0 && high > low && std::isfinite(high - low);
   for (const double value : values) {
     if (!std::isfinite(value)) continue;
     if (value < low) {
       ++histogram.below;
-    } else if (value > high || bins == 0 || !(high > low)) {
+    } else if (value > high || !has_steps) {
       ++histogram.above;
     } else {  // the last step is closed on both sides
       const double place = (value - low) / (high - low) * static_cast<double>(bins);

@@ -81,7 +81,8 @@ void hold(Section& into, std::string name, double value, std::string unit, doubl
 /// Tells a figure that fails though there is no limit to it: there is nothing to hold.
 void fail(Section& into, std::string name, double value, std::string unit, std::string because);
 
-/// Returns the counts of the finite `values` in `bins` equal steps from `low` to `high`.
+/// Returns the counts of the finite `values` in `bins` equal steps from `low` to `high`; without
+/// steps, as of infinite limits, all are above or below.
 Histogram histogram_of(std::string title, std::string unit, const std::vector<double>& values,
                        double low, double high, std::size_t bins = 60);
 

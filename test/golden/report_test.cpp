@@ -38,6 +38,14 @@ TEST(Report, OneFailureFailsAll) {
   EXPECT_EQ(verdict_of({passed, failed, told}), Verdict::Failed);
 }
 
+TEST(Report, HistogramsWithoutStepsCountEachValueAbove) {
+  constexpr double infinity = std::numeric_limits<double>::infinity();
+  for (const double high : {infinity, 0.0, std::nan("")}) {
+    const Histogram histogram = histogram_of("", "", {1, 2, std::nan("")}, -high, high, 4);
+    EXPECT_EQ(histogram.below + histogram.above, 2U) << high;
+  }
+}
+
 TEST(Report, HistogramsCountEachFiniteValueOnce) {
   const Histogram histogram = histogram_of(
       "t", "m", {-1.001, -1, -0.51, -0.5, 0, 0.999, 1, 1.001, 7, nan, infinity, -infinity}, -1, 1,

@@ -58,9 +58,10 @@ Difference differences(const std::vector<double>& values, const std::vector<doub
 void draw(const std::string& what, const std::vector<double>& values,
           const std::vector<double>& expected, const Difference& found, const Columns& columns,
           Section& into) {
-  const double widest = 2 * *std::ranges::max_element(found.tolerance, [](double a, double b) {
-                          return !(a >= b);
-                        });  // NaN is least
+  double widest = 0;
+  for (const double tolerance : found.tolerance) {
+    if (std::isfinite(tolerance)) widest = std::max(widest, 2 * tolerance);
+  }
   into.histograms.push_back(
       histogram_of(what + ": value - expected", "", found.of_rows, -widest, widest));
   if (columns.size_px.x == 0) return;
