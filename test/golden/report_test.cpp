@@ -39,9 +39,8 @@ TEST(Report, OneFailureFailsAll) {
 }
 
 TEST(Report, HistogramsWithoutStepsCountEachValueAbove) {
-  constexpr double infinity = std::numeric_limits<double>::infinity();
-  for (const double high : {infinity, 0.0, std::nan("")}) {
-    const Histogram histogram = histogram_of("", "", {1, 2, std::nan("")}, -high, high, 4);
+  for (const double high : {infinity, 0.0, nan}) {
+    const Histogram histogram = histogram_of("", "", {1, 2, nan}, -high, high, 4);
     EXPECT_EQ(histogram.below + histogram.above, 2U) << high;
   }
 }
