@@ -4,7 +4,7 @@
 #include <string>
 #include <vector>
 
-#include "apps/golden/compare/cloud_file.h"
+#include "apps/scan/cloud_file.h"
 #include "core/ply_io.h"
 
 /// Writes the columns of a point file as a PLY, bit for bit but for names with blanks, and prints
@@ -14,7 +14,7 @@ int main(int argc, char** argv) {
   if (argc < 3) return 2;
   try {
     const std::vector<std::string> columns(argv + 3, argv + argc);
-    const auto file = groundray::golden::read_cloud(argv[1], columns);
+    const auto file = groundray::read_cloud(argv[1], columns);
     for (const auto& [column, origin] : file.origins) fmt::print("origin {} {}\n", column, origin);
     for (const std::string& unread : file.unread) fmt::print("unread {}\n", unread);
     groundray::write_ply(argv[2], file.cloud, {});

@@ -8,7 +8,7 @@
 #include <utility>
 #include <vector>
 
-#include "apps/golden/compare/scan.h"
+#include "apps/scan/scan.h"
 
 namespace groundray::testing {
 
@@ -52,9 +52,9 @@ inline SampleReturns sample_returns() {
 
 /// Returns a file with columns x, y, z and those named of ring, time, return_index, intensity,
 /// label, incidence.
-inline golden::CloudFile file_of(const SampleReturns& returns,
+inline CloudFile file_of(const SampleReturns& returns,
                                  const std::vector<std::string>& names) {
-  golden::CloudFile file{.form = "made up", .cloud = PointCloud(returns.size())};
+  CloudFile file{.form = "made up", .cloud = PointCloud(returns.size())};
   const auto add = [&](const std::string& name, const auto& value_of) {
     const auto values = file.cloud.add<double>(name);
     for (std::size_t i = 0; i < returns.size(); ++i) values[i] = value_of(returns[i]);
@@ -77,8 +77,8 @@ inline golden::CloudFile file_of(const SampleReturns& returns,
   return file;
 }
 
-inline golden::Scan scan_of(const SampleReturns& returns, const std::vector<std::string>& names) {
-  return golden::scan_of(file_of(returns, names), "sample", {});
+inline Scan scan_of(const SampleReturns& returns, const std::vector<std::string>& names) {
+  return scan_of(file_of(returns, names), "sample", {});
 }
 
 }  // namespace groundray::testing

@@ -6,7 +6,7 @@
 #include <span>
 #include <vector>
 
-#include "apps/golden/compare/scan.h"
+#include "apps/scan/scan.h"
 
 namespace groundray::golden {
 

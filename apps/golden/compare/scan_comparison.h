@@ -3,7 +3,7 @@
 #include <filesystem>
 #include <optional>
 
-#include "apps/golden/compare/scan.h"
+#include "apps/scan/scan.h"
 #include "apps/golden/compare/scan_pairing.h"
 #include "apps/golden/report.h"
 

@@ -5,7 +5,7 @@
 #include <string>
 #include <vector>
 
-#include "apps/golden/compare/scan.h"
+#include "apps/scan/scan.h"
 #include "apps/golden/compare/scan_errors.h"
 #include "apps/golden/compare/scan_pairing.h"
 

@@ -6,7 +6,7 @@
 #include <string>
 #include <vector>
 
-#include "apps/golden/compare/scan.h"
+#include "apps/scan/scan.h"
 #include "apps/golden/compare/scan_pairing.h"
 #include "apps/golden/report.h"
 

@@ -8,7 +8,7 @@
 #include <utility>
 #include <vector>
 
-#include "apps/golden/compare/scan.h"
+#include "apps/scan/scan.h"
 
 namespace groundray::golden {
 

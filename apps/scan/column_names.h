@@ -5,7 +5,7 @@
 #include <string_view>
 #include <vector>
 
-namespace groundray::golden {
+namespace groundray {
 
 /// How a column was found.
 struct NamedColumn {
@@ -19,4 +19,4 @@ struct NamedColumn {
 std::optional<NamedColumn> find_column(const std::vector<std::string>& columns,
                                        std::string_view ours);
 
-}  // namespace groundray::golden
+}  // namespace groundray

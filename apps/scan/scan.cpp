@@ -1,4 +1,4 @@
-#include "apps/golden/compare/scan.h"
+#include "apps/scan/scan.h"
 
 #include <fmt/format.h>
 #include <fmt/ranges.h>
@@ -12,11 +12,11 @@
 #include <type_traits>
 #include <utility>
 
-#include "apps/golden/compare/column_names.h"
+#include "apps/scan/column_names.h"
 #include "core/error.h"
 #include "sensors/yaml_reader.h"
 
-namespace groundray::golden {
+namespace groundray {
 namespace {
 
 constexpr std::array<std::string_view, quantity_count> quantity_names{
@@ -291,4 +291,4 @@ Scan read_scan(const std::filesystem::path& path, const ScanReading& reading) {
   return scan_of(read_cloud(path, reading.columns), path.string(), reading);
 }
 
-}  // namespace groundray::golden
+}  // namespace groundray

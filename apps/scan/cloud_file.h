@@ -10,7 +10,7 @@
 #include "core/point_cloud.h"
 #include "core/pose.h"
 
-namespace groundray::golden {
+namespace groundray {
 
 /// A file of points as it is: its columns by its own names.
 struct CloudFile {
@@ -32,4 +32,4 @@ CloudFile read_cloud(const std::filesystem::path& path, const std::vector<std::s
 CloudFile parse_cloud(std::string_view bytes, const std::string& name,
                       const std::vector<std::string>& columns);
 
-}  // namespace groundray::golden
+}  // namespace groundray

@@ -1,4 +1,4 @@
-#include "apps/golden/compare/column_names.h"
+#include "apps/scan/column_names.h"
 
 #include <algorithm>
 #include <array>
@@ -7,7 +7,7 @@
 #include <span>
 #include <utility>
 
-namespace groundray::golden {
+namespace groundray {
 namespace {
 
 using Words = std::span<const std::string_view>;
@@ -106,4 +106,4 @@ std::optional<NamedColumn> find_column(const std::vector<std::string>& columns,
   return std::nullopt;
 }
 
-}  // namespace groundray::golden
+}  // namespace groundray

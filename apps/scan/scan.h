@@ -10,10 +10,10 @@
 #include <variant>
 #include <vector>
 
-#include "apps/golden/compare/cloud_file.h"
+#include "apps/scan/cloud_file.h"
 #include "core/pose.h"
 
-namespace groundray::golden {
+namespace groundray {
 
 /// The points' frame is the sensor's by the pose that the file itself tells (PCD's VIEWPOINT).
 struct FileViewpoint {};
@@ -83,4 +83,4 @@ Scan scan_of(const CloudFile& file, const std::string& name, const ScanReading& 
 /// Reads a file as read_cloud, and takes it as scan_of.
 Scan read_scan(const std::filesystem::path& path, const ScanReading& reading);
 
-}  // namespace groundray::golden
+}  // namespace groundray

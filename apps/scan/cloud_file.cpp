@@ -1,4 +1,4 @@
-#include "apps/golden/compare/cloud_file.h"
+#include "apps/scan/cloud_file.h"
 
 #include <fmt/format.h>
 #include <fmt/ranges.h>
@@ -13,7 +13,7 @@
 #include "core/ply_io.h"
 #include "core/product_io.h"
 
-namespace groundray::golden {
+namespace groundray {
 namespace {
 
 using Names = std::vector<std::string>;
@@ -213,4 +213,4 @@ CloudFile read_cloud(const std::filesystem::path& path, const std::vector<std::s
   return parse_cloud(is_read ? read_text(path) : "", path.string(), columns);
 }
 
-}  // namespace groundray::golden
+}  // namespace groundray

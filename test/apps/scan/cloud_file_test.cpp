@@ -1,4 +1,4 @@
-#include "apps/golden/compare/cloud_file.h"
+#include "apps/scan/cloud_file.h"
 
 #include <gmock/gmock.h>
 #include <gtest/gtest.h>
@@ -6,11 +6,11 @@
 #include <filesystem>
 #include <glm/geometric.hpp>
 
-#include "apps/golden/compare/scan.h"
+#include "apps/scan/scan.h"
 #include "core/error.h"
 #include "test/support/temporary_folder.h"
 
-namespace groundray::golden {
+namespace groundray {
 namespace {
 
 using namespace std::string_literals;
@@ -148,4 +148,4 @@ TEST(CloudFile, ReadsAScanOfARealSensor) {
 }
 
 }  // namespace
-}  // namespace groundray::golden
+}  // namespace groundray

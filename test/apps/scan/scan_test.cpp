@@ -1,15 +1,15 @@
-#include "apps/golden/compare/scan.h"
+#include "apps/scan/scan.h"
 
 #include <gmock/gmock.h>
 #include <gtest/gtest.h>
 
 #include <limits>
 
-#include "apps/golden/compare/column_names.h"
+#include "apps/scan/column_names.h"
 #include "core/error.h"
 #include "test/support/sample_scan.h"
 
-namespace groundray::golden {
+namespace groundray {
 namespace {
 
 using ::testing::AllOf;
@@ -180,4 +180,4 @@ TEST(Scan, NamesColumnsThatAreMissing) {
 }
 
 }  // namespace
-}  // namespace groundray::golden
+}  // namespace groundray
