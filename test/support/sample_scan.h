@@ -78,7 +78,7 @@ inline CloudFile file_of(const SampleReturns& returns,
 }
 
 inline Scan scan_of(const SampleReturns& returns, const std::vector<std::string>& names) {
-  return scan_of(file_of(returns, names), "sample", {});
+  return groundray::scan_of(file_of(returns, names), "sample", {});
 }
 
 }  // namespace groundray::testing

@@ -159,8 +159,8 @@ TEST(PairScans, PairsByNumberWhereBothCount) {
     a[i] = i;
     b[i] = i + 1;
   }
-  const Pairs pairs = pair_scans(golden::scan_of(reference_file, "a", {}),
-                                 golden::scan_of(other_file, "b", {}), {});
+  const Pairs pairs = pair_scans(groundray::scan_of(reference_file, "a", {}),
+                                 groundray::scan_of(other_file, "b", {}), {});
   EXPECT_EQ(pairs.rule, PairingRule::Pulse);
   ASSERT_EQ(pairs.returns.size(), 719u);
   EXPECT_EQ(pairs.returns[0], std::pair(1U, 0U));
