@@ -32,6 +32,7 @@ class EchoTrace {
   /// @param ceiling_w  power above it is clipped.
   EchoTrace(std::span<const float> power_w, double ceiling_w, const Lobe& lobe);
 
+  const Lobe& lobe() const { return lobe_; }
   bool clipped() const { return clipped_; }
   double peak_w() const { return peak_w_; }      ///< between samples, clipped
   double peak_bin() const { return peak_bin_; }  ///< of a clipped one, the middle of its plateau

@@ -62,9 +62,9 @@ class Lidar {
   /// (double, m, D), range_true (double, m, from where the beam left), nx ny nz (float, D),
   /// incidence (float, rad), label, instance, error_estimate (float, m), with light pulse
   /// (of the sweep), amplitude (float, W), width (float, s), snr, kind, share, second_share and
-  /// second_label, and, if asked for, error_bound (float, m; see RayTracer::bound_errors). Pulses
-  /// without an echo, if asked for, have a row each in `no_returns`: pulse, time, ring, dx dy dz
-  /// (float, axes of D), reason.
+  /// second_label, with noise range_sd (float, m), and, if asked for, error_bound (float, m; see
+  /// RayTracer::bound_errors). Pulses without an echo, if asked for, have a row each in
+  /// `no_returns`: pulse, time, ring, dx dy dz (float, axes of D), reason.
   /// @param X_DS   path of sensor S through D; must cover the sweep.
   /// @param sweep  which one since time 0.
   /// @param sensor_number  tells sensors of one dataset apart in the random numbers.

@@ -133,6 +133,10 @@ class Sweep {
   SurfaceTruth truth_at(const PulseCast& cast, std::size_t pulse, std::uint32_t hit) const {
     return scene_.truth_of(cast.rays(pulse)[hit], cast.hits(pulse)[hit]);
   }
+  double range_sd_m(const Echo& echo) const {
+    return lidar_.light->reported_sd_m(
+        std::hypot(echo.detection.range_sd_m, spec_.range_noise_sigma_m));
+  }
   glm::vec3 velocity_m_s(const Ray& ray, const Hit& hit) const;
   glm::vec3 velocity_of(const Echo& echo, const PulseCast& cast, std::size_t pulse) const;
   PointCloud no_returns() const;
@@ -321,6 +325,7 @@ void Sweep::write(const Chunk& chunk, const ScanColumns& columns) const {
                         .sin_incidence = glm::length(glm::cross(direction, hit.normal)),
                         .surface = scene_.truth_of(ray, hit),
                         .deviation_m = hit.deviation_m});
+    if (columns.has_range_sd()) columns.write_range_sd(row, spec_.range_noise_sigma_m);
     if (columns.has_motion()) columns.write_velocity(row, velocity_m_s(ray, hit));
     if (columns.has_bounds()) columns.write_bound(row, chunk.bounds_m[at]);
     ++row;
@@ -384,6 +389,7 @@ void Sweep::write_light() {
       columns.write(row, echo_row);
       if (columns.has_motion()) columns.write_velocity(row, velocity_m_s);
       columns.write_light(row, pulse, echo, second_label);
+      if (columns.has_range_sd()) columns.write_range_sd(row, range_sd_m(echo));
       if (columns.has_bounds()) columns.write_bound(row, echo.bound_m);
       ++row;
     }

@@ -329,6 +329,10 @@ double Light::reported_m(double range_m) const noexcept {
   return step_m > 0 ? std::round(range_m / step_m) * step_m : range_m;
 }
 
+double Light::reported_sd_m(double sd_m) const noexcept {
+  return std::hypot(sd_m, spec_.range_step_m / std::sqrt(12.0));
+}
+
 float Light::intensity(const Detection& detection) const noexcept {
   const IntensitySpec& spec = spec_.intensity;
   if (spec.scale == IntensitySpec::Scale::Power)

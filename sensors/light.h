@@ -128,6 +128,9 @@ class Light {
   float intensity(const Detection& detection) const noexcept;
   /// Returns what the sensor reports of a range that it measures: the nearest of its steps.
   double reported_m(double range_m) const noexcept;
+  /// Returns the standard deviation of what it reports of a range measured with this one: steps add
+  /// that of a uniform number.
+  double reported_sd_m(double sd_m) const noexcept;
 
  private:
   void collect(std::span<const Ray> rays, std::span<const Hit> hits, const RetroBrdfs& brdfs,

@@ -7,6 +7,7 @@
 
 #include "core/error.h"
 #include "sensors/echo_trace.h"
+#include "sensors/normal_spread.h"
 
 namespace groundray {
 
@@ -218,7 +219,14 @@ double Receiver::threshold_w(double background_w) const noexcept {
   return spec_.threshold_w > 0 ? spec_.threshold_w : threshold_sigmas_ * noise_w(0, background_w);
 }
 
-// `normal` is the noise's value over its standard deviation at the moment of a leading edge.
+// Where a leading edge triggers. `normal` is the noise's value there over its standard deviation.
+double Receiver::edge_bin(const EchoTrace& trace, double threshold_w, double background_w,
+                          double normal) const noexcept {
+  const double level_w = threshold_w - noise_w(threshold_w, background_w) * normal;
+  return trace.first_rise(std::max(level_w, least_crossing * threshold_w)).bin;
+}
+
+// A leading edge has its noise already, others are to get theirs.
 Receiver::Timed Receiver::timed(const EchoTrace& trace, double threshold_w, double background_w,
                                 double normal) const noexcept {
   const auto noise_at = [&](double power_w) { return noise_w(power_w, background_w); };
@@ -226,10 +234,7 @@ Receiver::Timed Receiver::timed(const EchoTrace& trace, double threshold_w, doub
   const double response_bins = response_sigma_s_ / interval_s();
   switch (spec_.timing) {
     case Timing::LeadingEdge:
-      return {trace
-                  .first_rise(std::max(threshold_w - noise_at(threshold_w) * normal,
-                                       least_crossing * threshold_w))
-                  .bin};
+      return {edge_bin(trace, threshold_w, background_w, normal)};
     case Timing::ConstantFraction: {
       const double level_w = spec_.fraction * peak_w;
       const auto edge = trace.last_rise(level_w);
@@ -276,6 +281,25 @@ Receiver::Timed Receiver::centroid(const EchoTrace& trace, double threshold_w,
   return {mean_bin, std::sqrt(coherence * variance_w2 * spread) / trace.sum_w()};
 }
 
+// With its noise. The standard deviation is that over all pulses that are detected.
+Receiver::Timed Receiver::reported(const EchoTrace& trace, double threshold_w, double background_w,
+                                   const glm::dvec2& normal) const noexcept {
+  const Timed at = timed(trace, threshold_w, background_w, normal.x);
+  if (!spec_.noise) return at;
+  if (spec_.timing == Timing::LeadingEdge) {
+    const double peak_w = trace.peak_w();
+    return {at.bin, deviation_above((threshold_w - peak_w) / noise_w(peak_w, background_w),
+                                    [&](double other) {
+                                      return edge_bin(trace, threshold_w, background_w, other);
+                                    })};
+  }
+  if (!(at.sigma_bins > 0)) return {at.bin};  // also where it is no number
+  const auto begin = static_cast<double>(trace.lobe().begin);
+  const auto end = static_cast<double>(trace.lobe().end);
+  return {std::clamp(at.bin + at.sigma_bins * normal.y, begin, end),
+          clamped_normal_deviation(at.sigma_bins, begin - at.bin, end - at.bin)};
+}
+
 void Receiver::detect(const Waveform& waveform, const RangeGate& gate, const PulseNoise& noise,
                       Detections& found) const noexcept {
   found.clear();
@@ -311,11 +335,11 @@ void Receiver::find_echoes(const Waveform& waveform, const PulseNoise& noise,
       const double noisy_w = trace.peak_w() + sigma_w * normal.x;
       if (!(noisy_w > threshold)) return;
       const double reported_w = std::min(noisy_w, spec_.saturation_w);
-      auto [bin, sigma_bins] = timed(trace, threshold, background, normal.x);
+      const Timed at = reported(trace, threshold, background, normal);
       const auto begin = static_cast<double>(lobe.begin), end = static_cast<double>(lobe.end);
-      if (sigma_bins > 0) bin = std::clamp(bin + sigma_bins * normal.y, begin, end);
       const auto first = static_cast<double>(segment.bins.begin);
-      found.push_back({.range_m = m_per_s_ * ((first + bin) * interval_s() - offset_s_),
+      found.push_back({.range_m = m_per_s_ * ((first + at.bin) * interval_s() - offset_s_),
+                       .range_sd_m = m_per_s_ * at.sigma_bins * interval_s(),
                        .power_w = reported_w,
                        .width_s = trace.width_bins() * interval_s(),
                        .energy_j = trace.sum_w() * interval_s() * reported_w / trace.peak_w(),
@@ -328,7 +352,8 @@ void Receiver::find_echoes(const Waveform& waveform, const PulseNoise& noise,
 
 // Crossings of the threshold by noise alone are a Poisson process, whose gaps are exponential. One
 // so high has the shape of the noise's autocorrelation, and its square exceeds the threshold's by
-// an exponential.
+// an exponential. Its standard deviation is what the sensor, which takes it for an echo, would
+// give a peak of that shape.
 void Receiver::add_false_alarms(const RangeGate& gate, const PulseNoise& noise,
                                 Detections& found) const noexcept {
   assert(std::isfinite(gate.far_m));
@@ -357,7 +382,8 @@ void Receiver::add_false_alarms(const RangeGate& gate, const PulseNoise& noise,
         std::min(std::sqrt(threshold * threshold - 2 * sigma_w * sigma_w * std::log(uniform.y)),
                  spec_.saturation_w);
     const double time_s = range_m / m_per_s_ + offset_s_;
-    found.push_back({range_m, power_w, width_s,
+    const double sd_s = std::numbers::sqrt2 * response_sigma_s_ * sigma_w / power_w;
+    found.push_back({range_m, m_per_s_ * sd_s, power_w, width_s,
                      power_w * 2 * response_sigma_s_ / std::numbers::inv_sqrtpi, power_w / sigma_w,
                      time_s, time_s, Detection::Kind::FalseAlarm});
   }

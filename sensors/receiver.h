@@ -1,5 +1,6 @@
 #pragma once
 
+#include <glm/vec2.hpp>
 #include <limits>
 #include <optional>
 #include <span>
@@ -57,11 +58,12 @@ struct PulseNoise {
 struct Detection {
   enum class Kind { Echo, FalseAlarm };
   double range_m = 0;
-  double power_w = 0;   ///< at its peak
-  double width_s = 0;   ///< full width at half of the peak
-  double energy_j = 0;  ///< between the minima beside it
-  double snr = 0;       ///< peak over the noise's standard deviation there; infinite without noise
-  double begin_s = 0;   ///< arrivals whose Receiver::arrival_s is in [begin_s, end_s) made it
+  double range_sd_m = 0;  ///< standard deviation of range_m by noise; 0 without it
+  double power_w = 0;     ///< at its peak
+  double width_s = 0;     ///< full width at half of the peak
+  double energy_j = 0;    ///< between the minima beside it
+  double snr = 0;      ///< peak over the noise's standard deviation there; infinite without noise
+  double begin_s = 0;  ///< arrivals whose Receiver::arrival_s is in [begin_s, end_s) made it
   double end_s = 0;
   Kind kind = Kind::Echo;
 };
@@ -99,6 +101,10 @@ class Receiver {
   Timed timed(const EchoTrace& trace, double threshold_w, double background_w,
               double normal) const noexcept;
   Timed centroid(const EchoTrace& trace, double threshold_w, double background_w) const noexcept;
+  double edge_bin(const EchoTrace& trace, double threshold_w, double background_w,
+                  double normal) const noexcept;
+  Timed reported(const EchoTrace& trace, double threshold_w, double background_w,
+                 const glm::dvec2& normal) const noexcept;
   void find_echoes(const Waveform& waveform, const PulseNoise& noise,
                    Detections& found) const noexcept;
   void add_false_alarms(const RangeGate& gate, const PulseNoise& noise,

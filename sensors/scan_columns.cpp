@@ -44,6 +44,8 @@ ScanColumns::ScanColumns(PointCloud& cloud, const LidarSpec& spec, const Scene& 
     second_share_ = cloud.add<float>("second_share");
     second_label_ = cloud.add<std::uint16_t>("second_label");
   }
+  if (spec.range_noise_sigma_m > 0 || (spec.light && spec.light->receiver.noise))
+    range_sd_ = cloud.add<float>("range_sd");
   if (scene.objects.any_moves()) {
     velocity_ = {cloud.add<float>("vx"), cloud.add<float>("vy"), cloud.add<float>("vz")};
   }

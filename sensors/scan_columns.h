@@ -42,7 +42,11 @@ class ScanColumns {
     for (std::size_t k = 0; k < 3; ++k) velocity_[k][row] = velocity_m_s[static_cast<int>(k)];
   }
   void write_bound(std::size_t row, double bound_m) const noexcept;
+  void write_range_sd(std::size_t row, double sd_m) const noexcept {
+    range_sd_[row] = static_cast<float>(sd_m);
+  }
   bool has_bounds() const { return !error_bound_.empty(); }
+  bool has_range_sd() const { return !range_sd_.empty(); }
   bool has_motion() const { return !velocity_[0].empty(); }
 
  private:
@@ -59,6 +63,8 @@ class ScanColumns {
   std::span<float> amplitude_, width_, snr_, share_, second_share_;
   std::span<std::uint8_t> kind_;
   std::span<std::uint16_t> second_label_;
+  // With noise:
+  std::span<float> range_sd_;
   // Where objects move:
   std::array<std::span<float>, 3> velocity_;
   // If asked for:

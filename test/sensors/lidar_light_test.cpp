@@ -2,11 +2,14 @@
 #include <gmock/gmock.h>
 #include <gtest/gtest.h>
 
+#include <algorithm>
 #include <cmath>
 #include <glm/geometric.hpp>
 #include <glm/trigonometric.hpp>
 #include <limits>
 #include <numbers>
+#include <utility>
+#include <vector>
 
 #include "core/error.h"
 #include "sensors/lidar.h"
@@ -548,6 +551,79 @@ TEST(LidarLight, RangesAreMultiplesOfTheirStep) {
   const double steps =
       scan(spec, scene_of(flat_ground()), {0, 0, 30.0123}).echoes.column<float>("z")[0] / 0.004;
   EXPECT_NEAR(steps, std::round(steps), 1e-3);
+}
+
+// Pulses over flat ground that meet it 20 to 100 m away, each elsewhere.
+LidarSpec noisy_sweep(ReceiverSpec::Timing timing) {
+  TablePattern table{.period_s = 1};
+  for (int i = 0; i < 2000; ++i)
+    table.shots.push_back({.time_s = 1e-5 * i, .elevation_rad = -std::asin(20 / (20 + 0.04 * i))});
+  LidarSpec spec = lidar_of(table, 1e-4, 16, 16);
+  ReceiverSpec& receiver = spec.light->receiver;
+  receiver.timing = timing;
+  receiver.response_fwhm_s = 3e-9;
+  receiver.threshold_w = 4e-8;
+  spec.light->optics.pulse_energy_j = 4e-7;
+  receiver.noise = NoiseSpec{.nep_w_per_sqrt_hz = 3e-13, .excess_noise_factor = 3};
+  return spec;
+}
+
+// Errors of what noise adds, over the standard deviation that each row has; the rows by that.
+std::vector<std::pair<float, double>> errors_in_deviations(const LidarSpec& noisy,
+                                                           std::uint64_t seeds) {
+  const Scene scene = scene_of(flat_ground());
+  LidarSpec quiet = noisy;
+  quiet.light->receiver.noise.reset();
+  quiet.light->range_step_m = quiet.range_noise_sigma_m = 0;
+  const PointCloud exact = scan(quiet, scene, {0, 0, 20}).echoes;
+  EXPECT_FALSE(exact.has("range_sd"));
+  const Lidar lidar(noisy);
+  std::vector<std::pair<float, double>> errors;
+  for (std::uint64_t seed = 0; seed < seeds; ++seed) {
+    const PointCloud found = lidar.scan(scene, still_at({0, 0, 20}), 0, Seed{seed}, 0).echoes;
+    EXPECT_EQ(found.rows(), exact.rows());
+    if (found.rows() != exact.rows()) return errors;
+    const auto range_sd_m = found.column<float>("range_sd");
+    for (std::size_t i = 0; i < found.rows(); ++i) {
+      errors.emplace_back(range_sd_m[i], (range_m(found, i) - range_m(exact, i)) / range_sd_m[i]);
+    }
+  }
+  std::ranges::sort(errors);
+  return errors;
+}
+
+// Squares of n normal numbers have the mean 1 and the standard error sqrt(2 / n), of uniform ones a
+// smaller; in each quarter by range_sd, so that it holds for echoes strong and weak. 5 standard
+// errors for each of 48 numbers: p = 3e-5. Echoes are 20 deviations of the noise high or more, at
+// which the mean is moved by its second order: by some percent of a deviation, and the square of
+// that.
+TEST(LidarLight, RangesSpreadByTheirStandardDeviations) {
+  using Timing = ReceiverSpec::Timing;
+  struct Besides {
+    double range_noise_sigma_m, range_step_m;
+  };
+  for (const Timing timing :
+       {Timing::LeadingEdge, Timing::ConstantFraction, Timing::Peak, Timing::CentreOfGravity}) {
+    for (const Besides& besides : {Besides{0, 0}, Besides{0.01, 0}, Besides{0.01, 0.05}}) {
+      LidarSpec spec = noisy_sweep(timing);
+      spec.range_noise_sigma_m = besides.range_noise_sigma_m;
+      spec.light->range_step_m = besides.range_step_m;
+      const auto errors = errors_in_deviations(spec, 10);
+      ASSERT_GE(errors.size(), 20'000u);
+      for (std::size_t quarter = 0; quarter < 4; ++quarter) {
+        const std::size_t n = errors.size() / 4;
+        double squares = 0;
+        for (std::size_t i = 0; i < n; ++i) {
+          const double z = errors[quarter * n + i].second;
+          squares += z * z / static_cast<double>(n);
+        }
+        const double tolerance = 5 * std::sqrt(2 / static_cast<double>(n));
+        EXPECT_NEAR(squares, 1, tolerance) << int(timing) << ' ' << besides.range_step_m << ' '
+                                           << quarter << ' ' << errors[quarter * n].first;
+        testing::record_margin("chi^2", squares - 1, tolerance);
+      }
+    }
+  }
 }
 
 TEST(LidarLight, JitterTurnsBeamsWithoutTheSensorsKnowledge) {

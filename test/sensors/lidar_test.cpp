@@ -203,6 +203,8 @@ TEST(Lidar, RangeNoiseIsGaussianAlongTheBeamAndLeavesTheTruthAlone) {
   const auto n = static_cast<double>(noisy.rows());
   EXPECT_NEAR(sum / n, 0, 5 / std::sqrt(n));  // 5 standard errors: p = 6e-7
   EXPECT_NEAR(square / n, 1, 5 * std::sqrt(2 / n));
+  EXPECT_THAT(noisy.column<float>("range_sd"), ::testing::Each(0.05f));
+  EXPECT_FALSE(clean.has("range_sd"));
   testing::record_margin("mean", sum / n, 5 / std::sqrt(n));
   testing::record_margin("variance", square / n - 1, 5 * std::sqrt(2 / n));
 }

@@ -1,0 +1,64 @@
+#pragma once
+
+#include <algorithm>
+#include <array>
+#include <cmath>
+
+namespace groundray {
+
+/// Returns the standard deviation of a normal number of mean 0 and this deviation, of which what
+/// leaves [lowest, highest] is put on its nearer end; in the unit of all three.
+double clamped_normal_deviation(double deviation, double lowest, double highest) noexcept;
+
+/// A place on one side of 0 and its weight in a quadrature rule; there is another on the other.
+struct QuadratureNode {
+  double position = 0, weight = 0;
+};
+/// Abramowitz and Stegun, Handbook of Mathematical Functions (1964), table 25.4: 16 points.
+inline constexpr std::array legendre_16{QuadratureNode{0.095012509837637440, 0.189450610455068496},
+                                        QuadratureNode{0.281603550779258913, 0.182603415044923589},
+                                        QuadratureNode{0.458016777657227386, 0.169156519395002538},
+                                        QuadratureNode{0.617876244402643748, 0.149595988816576732},
+                                        QuadratureNode{0.755404408355003034, 0.124628971255533872},
+                                        QuadratureNode{0.865631202387831744, 0.095158511682492785},
+                                        QuadratureNode{0.944575023073232576, 0.062253523938647893},
+                                        QuadratureNode{0.989400934991649933, 0.027152459411754095}};
+/// Mean over standard normal numbers by 5 points, one of them 0, which has the rest of the weight:
+/// positions sqrt(5 -+ sqrt(10)), weights (7 +- 2 sqrt(10)) / 60 (table 25.10).
+inline constexpr std::array hermite_5{QuadratureNode{1.355626179974266, 0.2220759220056126},
+                                      QuadratureNode{2.856970013872806, 0.01125741132772069}};
+
+/// Returns the standard deviation of value(z) over those standard normal numbers z that exceed
+/// `least`, by quadrature: to 1e-3 of itself for a smooth `value`, and to 2 % for one with a root's
+/// singularity beside `least`.
+template <typename Value>
+double deviation_above(double least, const Value& value) noexcept {
+  constexpr double reach = 5;  // the density falls by exp(-reach^2 / 2)
+  const bool is_whole = least <= -reach;
+  const double low = std::max(least, -reach);
+  const double high = std::hypot(std::max(low, 0.0), reach);
+  const double middle = is_whole ? 0 : 0.5 * (low + high), half = 0.5 * (high - low);
+  const double origin = value(middle);  // so that differences alone are squared
+  double weights = 0, sum = 0, squares = 0;
+  const auto add = [&](double z, double weight) {
+    const double offset = value(z) - origin;
+    weights += weight;
+    sum += weight * offset;
+    squares += weight * offset * offset;
+  };
+  if (is_whole) {
+    for (const QuadratureNode& node : hermite_5) {
+      for (const double z : {-node.position, node.position}) add(z, node.weight);
+    }
+    weights = 1;
+  } else {
+    for (const QuadratureNode& node : legendre_16) {
+      for (const double z : {middle - half * node.position, middle + half * node.position})
+        add(z, node.weight * std::exp(0.5 * (middle * middle - z * z)));
+    }
+  }
+  const double mean = sum / weights;
+  return std::sqrt(std::max(squares / weights - mean * mean, 0.0));
+}
+
+}  // namespace groundray
