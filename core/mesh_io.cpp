@@ -7,9 +7,13 @@
 #include <cstdint>
 #include <functional>
 #include <glm/common.hpp>
+#include <glm/geometric.hpp>
 #include <iterator>
 #include <limits>
+#include <optional>
 #include <string_view>
+#include <utility>
+#include <variant>
 #include <vector>
 
 #include "core/error.h"
@@ -157,6 +161,41 @@ std::string glb_header(const std::filesystem::path& path, const std::string& jso
   return header;
 }
 
+PlyProperty property(std::string_view type, std::string_view name) {
+  return {std::string(name), ply_type_of(type), std::nullopt};
+}
+
+/// Adds a property for each column. @throws Error if it cannot be one.
+void add_columns(const PointCloud& columns, PlyElement& element,
+                 const std::filesystem::path& path) {
+  if (!columns.columns().empty() && columns.rows() != element.rows) {
+    throw Error("{}: columns of {} rows are not of the element {}, which has {}", path.string(),
+                columns.rows(), element.name, element.rows);
+  }
+  for (const auto& [name, values] : columns.columns()) {
+    const bool is_visible =
+        !name.empty() && std::ranges::all_of(name, [](char c) { return '!' <= c && c <= '~'; });
+    const bool is_taken =
+        std::ranges::find(element.properties, name, &PlyProperty::name) != element.properties.end();
+    if (!is_visible || is_taken) {
+      throw Error("{}: the element {} cannot have a column {:?}: {}", path.string(), element.name,
+                  name, is_taken ? "it has one" : "names must be of visible ASCII characters");
+    }
+    element.properties.push_back({name, values.index(), std::nullopt});
+  }
+}
+
+/// Appends rows of what `append_row` appends and then the columns' values.
+template <typename AppendRow>
+void append_rows(const PointCloud& columns, std::size_t first, std::size_t last, std::string& block,
+                 const AppendRow& append_row) {
+  for (std::size_t i = first; i < last; ++i) {
+    append_row(i, block);
+    for (const PointCloud::Column& column : columns.columns())
+      std::visit([&](const auto& values) { append_bytes(block, values[i]); }, column.values);
+  }
+}
+
 }  // namespace
 
 void write_mesh(const std::filesystem::path& path, const TriangleMesh& mesh,
@@ -164,20 +203,22 @@ void write_mesh(const std::filesystem::path& path, const TriangleMesh& mesh,
   const std::string form = path.extension().string();
   if (form == ".ply") return write_ply(path, mesh, georeference);
   if (form == ".obj") return write_obj(path, mesh, georeference);
+  if (form == ".stl") return write_stl(path, mesh, georeference);
   if (form == ".glb") return write_glb(path, mesh, georeference);
-  throw Error("{}: the name of a mesh must end in .ply, .obj or .glb", path.string());
+  throw Error("{}: the name of a mesh must end in .ply, .obj, .stl or .glb", path.string());
 }
 
 void write_ply(const std::filesystem::path& path, const TriangleMesh& mesh,
                const Georeference& georeference) {
+  write_ply(path, mesh, georeference, MeshColumns());
+}
+
+void write_ply(const std::filesystem::path& path, const TriangleMesh& mesh,
+               const Georeference& georeference, const MeshColumns& columns) {
   check_mesh(mesh, path.string(), EmptyMesh::Allow);
-  const auto property = [](std::string_view type, std::string_view name) {
-    return PlyProperty{std::string(name), ply_type_of(type), std::nullopt};
-  };
-  const PlyElement vertex{
-      "vertex",
-      mesh.vertices_m.size(),
-      {property("double", "x"), property("double", "y"), property("double", "z")}};
+  PlyElement vertex{"vertex",
+                    mesh.vertices_m.size(),
+                    {property("double", "x"), property("double", "y"), property("double", "z")}};
   PlyElement face{"face", mesh.triangles.size(), {property("uint", "vertex_indices")}};
   face.properties[0].count_type = ply_type_of("uchar");
   if (!mesh.levels.empty()) {
@@ -185,17 +226,20 @@ void write_ply(const std::filesystem::path& path, const TriangleMesh& mesh,
       face.properties.push_back(property("uchar", name));
     }
   }
+  add_columns(columns.vertices, vertex, path);
+  add_columns(columns.triangles, face, path);
   const auto append_vertices = [&](std::size_t first, std::size_t last, std::string& block) {
-    for (std::size_t i = first; i < last; ++i) append_bytes(block, mesh.vertices_m[i]);
+    append_rows(columns.vertices, first, last, block,
+                [&](std::size_t i, std::string& row) { append_bytes(row, mesh.vertices_m[i]); });
   };
   const auto append_faces = [&](std::size_t first, std::size_t last, std::string& block) {
-    for (std::size_t i = first; i < last; ++i) {
-      append_bytes(block, std::uint8_t{3});
-      append_bytes(block, mesh.triangles[i]);
-      if (mesh.levels.empty()) continue;
-      append_bytes(block, mesh.levels[i]);
-      append_bytes(block, level_colours[mesh.levels[i] % level_colours.size()]);
-    }
+    append_rows(columns.triangles, first, last, block, [&](std::size_t i, std::string& row) {
+      append_bytes(row, std::uint8_t{3});
+      append_bytes(row, mesh.triangles[i]);
+      if (mesh.levels.empty()) return;
+      append_bytes(row, mesh.levels[i]);
+      append_bytes(row, level_colours[mesh.levels[i] % level_colours.size()]);
+    });
   };
   write_tables(path, ply_header(lines_of(georeference), {vertex, face}),
                {{vertex.rows, append_vertices}, {face.rows, append_faces}});
@@ -220,6 +264,35 @@ void write_obj(const std::filesystem::path& path, const TriangleMesh& mesh,
   };
   write_tables(path, header,
                {{mesh.vertices_m.size(), append_vertices}, {mesh.triangles.size(), append_faces}});
+}
+
+void write_stl(const std::filesystem::path& path, const TriangleMesh& mesh,
+               const Georeference& georeference) {
+  check_mesh(mesh, path.string(), EmptyMesh::Allow);
+  constexpr std::size_t header_bytes = 80;
+  std::string header = lines_of(georeference)[0];
+  if (header.size() > header_bytes) {
+    throw Error("{}: {:?} is longer than the {} characters of an STL's header; round the origin",
+                path.string(), header, header_bytes);
+  }
+  if (mesh.triangles.size() > std::numeric_limits<std::uint32_t>::max()) {
+    throw Error("{}: {} triangles are more than an .stl can hold, 2^32 - 1; write .ply",
+                path.string(), mesh.triangles.size());
+  }
+  header.resize(header_bytes, ' ');
+  append_bytes(header, static_cast<std::uint32_t>(mesh.triangles.size()));
+  const auto append_facets = [&](std::size_t first, std::size_t last, std::string& block) {
+    for (std::size_t i = first; i < last; ++i) {
+      const glm::uvec3& t = mesh.triangles[i];
+      const auto& at = mesh.vertices_m;
+      const glm::dvec3 area = glm::cross(at[t.y] - at[t.x], at[t.z] - at[t.x]);
+      const double length = glm::length(area);
+      append_bytes(block, length > 0 ? glm::vec3(area / length) : glm::vec3(0));
+      for (int k = 0; k < 3; ++k) append_bytes(block, glm::vec3(at[t[k]]));
+      append_bytes(block, std::uint16_t{0});
+    }
+  };
+  write_tables(path, header, {{mesh.triangles.size(), append_facets}});
 }
 
 void write_glb(const std::filesystem::path& path, const TriangleMesh& mesh,

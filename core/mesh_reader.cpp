@@ -2,14 +2,17 @@
 #include <cctype>
 #include <cmath>
 #include <cstdint>
+#include <fstream>
 #include <nlohmann/json.hpp>
 #include <string>
 #include <string_view>
 #include <utility>
 
 #include "core/error.h"
+#include "core/mesh_check.h"
 #include "core/mesh_io.h"
 #include "core/obj_reader.h"
+#include "core/ply_io.h"
 #include "core/ply_reader.h"
 #include "core/polygon_soup.h"
 #include "core/product_io.h"
@@ -56,7 +59,8 @@ void read_comment(std::string_view comment, Georeference& georeference) {
 }
 
 /// Reads the comments at the head of a text, up to its first line that is content.
-Georeference georeference_of(std::string_view text, std::string_view mark, const fs::path& path) {
+Georeference georeference_of(std::string_view text, std::string_view mark,
+                             const std::string& name) {
   Georeference georeference;
   TextLines lines(text);
   for (auto line = lines.next(); line && *line != "end_header"; line = lines.next()) {
@@ -65,8 +69,23 @@ Georeference georeference_of(std::string_view text, std::string_view mark, const
     try {
       read_comment(line->substr(mark.size()), georeference);
     } catch (const Error& fault) {
-      throw Error("{}:{}: {}", path.string(), lines.number(), fault.what());
+      throw Error("{}:{}: {}", name, lines.number(), fault.what());
     }
+  }
+  return georeference;
+}
+
+/// Reads the header of a binary STL, or what is there in a text.
+Georeference stl_georeference(const fs::path& path) {
+  std::string header(80, ' ');
+  std::ifstream file(path, std::ios::binary);
+  file.read(header.data(), static_cast<std::streamsize>(header.size()));
+  header.resize(std::min(header.find('\0'), header.size()));
+  Georeference georeference;
+  try {
+    if (file && header.starts_with("origin_w ")) read_comment(header, georeference);
+  } catch (const Error& fault) {
+    throw Error("{}: the header: {}", path.string(), fault.what());
   }
   return georeference;
 }
@@ -118,17 +137,28 @@ Reading read_file(const fs::path& path) {
   std::ranges::transform(form, form.begin(),
                          [](unsigned char c) { return static_cast<char>(std::tolower(c)); });
   if (form == ".gltf" || form == ".glb") return read_gltf(path);
-  if (form == ".stl") return {.soup = read_scene_file(path, SceneForm::Stl)};
+  if (form == ".stl")
+    return {.soup = read_scene_file(path, SceneForm::Stl), .georeference = stl_georeference(path)};
   if (form == ".ply") {
     const std::string bytes = read_text(path);
-    return {parse_ply_faces(bytes, path.string()), georeference_of(bytes, "comment ", path)};
+    return {parse_ply_faces(bytes, path.string()),
+            georeference_of(bytes, "comment ", path.string())};
   }
   if (form == ".obj") {
     const std::string text = read_text(path);
     const auto no_material = [](const std::string&) { return std::string(); };
-    return {parse_obj(text, path.string(), no_material), georeference_of(text, "# ", path)};
+    return {parse_obj(text, path.string(), no_material),
+            georeference_of(text, "# ", path.string())};
   }
   throw Error("{}: the name of a mesh must end in .ply, .obj, .stl, .gltf or .glb", path.string());
+}
+
+void check_some(const MeshFile& file, const std::string& name) {
+  if (!file.mesh.triangles.empty()) return;
+  throw Error(
+      "{}: there is no triangle; {} broken polygons were dropped, and {} points, lines or curved "
+      "patches skipped",
+      name, file.dropped, file.skipped);
 }
 
 }  // namespace
@@ -136,19 +166,34 @@ Reading read_file(const fs::path& path) {
 MeshFile read_mesh(const fs::path& path) {
   Reading reading = read_file(path);
   for (PolygonSoup::Polygon& polygon : reading.soup.polygons) polygon.surface = 0;
+  for (PolygonSoup::Corner& corner : reading.soup.corners) corner = {.position = corner.position};
   ModelFaults faults;
   MeshFile file{.mesh = model_of(reading.soup, faults).mesh,
                 .georeference = std::move(reading.georeference),
                 .dropped = reading.dropped + faults.total(),
                 .skipped = reading.soup.skipped,
                 .rounding_m = reading.soup.rounding};
-  if (file.mesh.triangles.empty()) {
-    throw Error(
-        "{}: there is no triangle; {} broken polygons were dropped, and {} points, lines or "
-        "curved patches skipped",
-        path.string(), file.dropped, file.skipped);
-  }
+  check_some(file, path.string());
   return file;
+}
+
+StoredMesh read_stored_mesh(const fs::path& path) {
+  return parse_stored_mesh(read_text(path), path.string());
+}
+
+StoredMesh parse_stored_mesh(std::string_view bytes, const std::string& name) {
+  PolygonSoup soup = parse_ply_faces(bytes, name);
+  for (PolygonSoup::Corner& corner : soup.corners) corner = {.position = corner.position};
+  ModelFaults faults;
+  StoredMesh stored;
+  stored.mesh = stored_mesh_of(soup, faults);
+  stored.georeference = georeference_of(bytes, "comment ", name);
+  stored.dropped = faults.total();
+  stored.skipped = soup.skipped;
+  stored.vertices = parse_ply(bytes, name).cloud;
+  check_some(stored, name);
+  check_mesh(stored.mesh, name, EmptyMesh::Refuse);
+  return stored;
 }
 
 }  // namespace groundray

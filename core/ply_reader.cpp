@@ -2,93 +2,18 @@
 
 #include <algorithm>
 #include <array>
-#include <bit>
 #include <cmath>
 #include <cstdint>
-#include <variant>
 #include <vector>
 
 #include "core/error.h"
 #include "core/ply_header.h"
 #include "core/ply_io.h"
+#include "core/ply_values.h"
 #include "core/text_lines.h"
 
 namespace groundray {
 namespace {
-
-/// Takes one number after the other from the rows of a PLY. Each fits a double.
-class PlyValues {
- public:
-  PlyValues(std::string_view bytes, std::string_view format)
-      : bytes_(bytes), is_ascii_(format == "ascii"), is_big_(format == "binary_big_endian") {}
-
-  double next(std::size_t type) {
-    if (is_ascii_) return next_word();
-    return next_binary(type, std::make_index_sequence<ply_type_count>());
-  }
-
-  std::size_t bytes_left() const { return bytes_.size(); }
-
- private:
-  double next_word() {
-    constexpr std::string_view blanks = " \t\r\n";
-    bytes_.remove_prefix(std::min(bytes_.find_first_not_of(blanks), bytes_.size()));
-    const std::string_view word = bytes_.substr(0, bytes_.find_first_of(blanks));
-    if (word.size() == bytes_.size()) throw Error("the last line lacks its end: is it cut short?");
-    bytes_.remove_prefix(word.size());
-    const auto value = number_of<double>(word);
-    if (!value) throw Error("{:?} is no number", word.substr(0, 40));
-    return *value;
-  }
-
-  template <std::size_t... I>
-  double next_binary(std::size_t type, std::index_sequence<I...> /*all types*/) {
-    double value = 0;
-    ((type == I ? void(value = take<std::variant_alternative_t<I, PointCloud::AnyValues>>())
-                : void()),
-     ...);
-    return value;
-  }
-
-  template <typename Values>
-  double take() {
-    using T = typename Values::value_type;
-    std::array<char, sizeof(T)> raw;
-    if (bytes_.size() < raw.size()) throw Error("the last row lacks its end: is it cut short?");
-    bytes_.copy(raw.data(), raw.size());
-    bytes_.remove_prefix(raw.size());
-    if (is_big_) std::ranges::reverse(raw);
-    return static_cast<double>(std::bit_cast<T>(raw));
-  }
-
-  std::string_view bytes_;
-  bool is_ascii_, is_big_;
-};
-
-struct Header {
-  std::string_view format;
-  std::vector<PlyElement> elements;
-};
-
-/// Of a header that parse_ply found to be sound.
-Header header_of(TextLines& lines) {
-  Header header;
-  for (auto line = lines.next(); line && *line != "end_header"; line = lines.next()) {
-    const auto words = words_of(*line);
-    if (words.empty()) continue;
-    if (words[0] == "format") header.format = words.at(1);
-    if (words[0] == "element") {
-      header.elements.push_back(
-          {std::string(words.at(1)), *number_of<std::uint64_t>(words.at(2)), {}});
-    }
-    if (words[0] == "property") {
-      PlyProperty property{std::string(words.back()), ply_type_of(words[words.size() - 2]), {}};
-      if (words.at(1) == "list") property.count_type = ply_type_of(words.at(2));
-      header.elements.back().properties.push_back(property);
-    }
-  }
-  return header;
-}
 
 /// Which number of a vertex a property is: 0 to 2 of its position, 3 to 5 of its normal, 6 and 7
 /// its uv; or -1.
@@ -165,12 +90,9 @@ void read_lists(const PlyElement& element, PlyValues& values, PolygonSoup& soup)
     indices.clear();
     uv.clear();
     for (const auto& [name, type, count_type] : element.properties) {
-      const double count = count_type ? values.next(*count_type) : 1;
-      if (!(count >= 0 && count <= static_cast<double>(values.bytes_left()))) {
-        throw Error("row {} of element {} has a list of {} numbers", row, element.name, count);
-      }
+      const std::size_t count = count_type ? values.next_count(*count_type, element.name, row) : 1;
       const bool are_indices = name == "vertex_indices" || name == "vertex_index";
-      for (double i = 0; i < count; ++i) {
+      for (std::size_t i = 0; i < count; ++i) {
         const double value = values.next(type);
         if (are_indices) indices.push_back(value);
         if (name == "texcoord") uv.push_back(value);
@@ -191,14 +113,11 @@ PolygonSoup parse_ply_faces(std::string_view bytes, const std::string& name) {
     if (comment.starts_with(texture)) soup.surfaces[0].albedo = comment.substr(texture.size());
   }
   TextLines lines(bytes);
-  const Header header = header_of(lines);
-  PlyValues values(lines.rest(), header.format);
+  const PlyLayout layout = ply_layout(lines);
+  PlyValues values(lines.rest(), layout.format);
   try {
-    for (const PlyElement& element : header.elements) {
-      if (element.rows > values.bytes_left()) {
-        throw Error("there cannot be {} rows of element {} in {} bytes: is it cut short?",
-                    element.rows, element.name, values.bytes_left());
-      }
+    for (const PlyElement& element : layout.elements) {
+      check_rows(element, values);
       if (element.name == "vertex") {
         read_vertices(element, values, soup);
       } else if (element.name == "tristrips" && element.rows > 0) {

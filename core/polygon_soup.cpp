@@ -189,20 +189,16 @@ bool is_sound(const PolygonSoup& soup, std::span<const Corner> corners, ModelFau
   return true;
 }
 
-}  // namespace
+/// A triangle of a polygon.
+struct Triangle {
+  std::array<Corner, 3> corners;
+  glm::dvec3 area;  // twice it, along the normal
+};
 
-glm::vec3 linear_color(const glm::dvec3& encoded) {
-  glm::vec3 linear;
-  for (int i = 0; i < 3; ++i) {
-    const double value = encoded[i] > 0 ? std::min(encoded[i], 1.0) : 0;  // also of NaN
-    linear[i] = static_cast<float>(linear_of_srgb(value));
-  }
-  return linear;
-}
-
-Model model_of(const PolygonSoup& soup, ModelFaults& faults) {
-  Model model;
-  VertexJoiner joiner(soup, model);
+/// Calls `take(polygon, triangle)` for the triangles that sound polygons are cut into, and counts
+/// faulty ones.
+template <typename Take>
+void for_each_triangle(const PolygonSoup& soup, ModelFaults& faults, const Take& take) {
   std::vector<glm::dvec3> outline;
   for (const Polygon& polygon : soup.polygons) {
     const auto corners = std::span(soup.corners).subspan(polygon.first, polygon.count);
@@ -218,18 +214,45 @@ Model model_of(const PolygonSoup& soup, ModelFaults& faults) {
       const glm::dvec3 area = area_of(outline[a], outline[b], outline[c]);
       if (area == glm::dvec3(0)) {
         ++faults.degenerate;
-        continue;
+      } else {
+        take(polygon, Triangle{{corners[a], corners[b], corners[c]}, area});
       }
-      const glm::vec3 flat(glm::normalize(area));
-      glm::uvec3 triangle;
-      triangle.x = joiner.join(corners[a], flat);
-      triangle.y = joiner.join(corners[b], flat);
-      triangle.z = joiner.join(corners[c], flat);
-      model.mesh.triangles.push_back(triangle);
-      model.surface_of.push_back(static_cast<std::uint16_t>(polygon.surface));
     }
   }
+}
+
+}  // namespace
+
+glm::vec3 linear_color(const glm::dvec3& encoded) {
+  glm::vec3 linear;
+  for (int i = 0; i < 3; ++i) {
+    const double value = encoded[i] > 0 ? std::min(encoded[i], 1.0) : 0;  // also of NaN
+    linear[i] = static_cast<float>(linear_of_srgb(value));
+  }
+  return linear;
+}
+
+Model model_of(const PolygonSoup& soup, ModelFaults& faults) {
+  Model model;
+  VertexJoiner joiner(soup, model);
+  for_each_triangle(soup, faults, [&](const Polygon& polygon, const Triangle& t) {
+    const glm::vec3 flat(glm::normalize(t.area));
+    glm::uvec3 triangle;
+    for (int k = 0; k < 3; ++k)
+      triangle[k] = joiner.join(t.corners[static_cast<std::size_t>(k)], flat);
+    model.mesh.triangles.push_back(triangle);
+    model.surface_of.push_back(static_cast<std::uint16_t>(polygon.surface));
+  });
   return model;
+}
+
+TriangleMesh stored_mesh_of(const PolygonSoup& soup, ModelFaults& faults) {
+  TriangleMesh mesh{.vertices_m = soup.positions};
+  for_each_triangle(soup, faults, [&](const Polygon&, const Triangle& t) {
+    const auto& [a, b, c] = t.corners;
+    mesh.triangles.emplace_back(a.position, b.position, c.position);
+  });
+  return mesh;
 }
 
 }  // namespace groundray

@@ -49,4 +49,8 @@ glm::vec3 linear_color(const glm::dvec3& encoded);
 /// most 2^16.
 Model model_of(const PolygonSoup& soup, ModelFaults& faults);
 
+/// Returns the shape alone, with all of the soup's positions as its vertices, used or not, in their
+/// order; polygons are cut and counted as by model_of.
+TriangleMesh stored_mesh_of(const PolygonSoup& soup, ModelFaults& faults);
+
 }  // namespace groundray

@@ -26,6 +26,7 @@
 
 #include "core/error.h"
 #include "core/image_io.h"
+#include "core/product_io.h"
 
 namespace groundray {
 namespace {
@@ -231,6 +232,18 @@ std::string_view reader_of(SceneForm form) {
   }
 }
 
+/// Returns the JSON of a .glb that has nothing else, whose buffers are all spelt within; nothing of
+/// other files. Assimp looks for the first buffer of a .glb beside the JSON whatever that says.
+/// @see Khronos Group, glTF 2.0 Specification (2021): section 4.4.3.3.
+std::string json_alone(const std::filesystem::path& path) {
+  const std::string bytes = read_text(path);
+  constexpr std::size_t header_bytes = 20;
+  if (!bytes.starts_with("glTF") || bytes.size() < header_bytes) return {};
+  std::uint32_t length = 0;
+  bytes.copy(reinterpret_cast<char*>(&length), sizeof length, 12);
+  return bytes.size() == header_bytes + length ? bytes.substr(header_bytes) : std::string();
+}
+
 }  // namespace
 
 PolygonSoup read_scene_file(const std::filesystem::path& path, SceneForm form) {
@@ -239,7 +252,10 @@ PolygonSoup read_scene_file(const std::filesystem::path& path, SceneForm form) {
     Assimp::Importer importer;
     keep_only(importer, reader_of(form));
     importer.SetPropertyInteger(AI_CONFIG_IMPORT_COLLADA_IGNORE_UP_DIRECTION, 1);
-    const aiScene* const scene = importer.ReadFile(name, 0);
+    const std::string json = form == SceneForm::Gltf ? json_alone(path) : std::string();
+    const aiScene* const scene =
+        json.empty() ? importer.ReadFile(name, 0)
+                     : importer.ReadFileFromMemory(json.data(), json.size(), 0, "gltf");
     if (scene == nullptr) throw Error("{}: {}", name, importer.GetErrorString());
     return SceneReader(*scene, form, name).read();
   } catch (const Error&) {

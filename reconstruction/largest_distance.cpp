@@ -18,7 +18,7 @@ namespace {
 // A part of a triangle, with a bound of the distances of all its points.
 struct Piece {
   std::array<Probe, 3> corners;
-  double bound_m = 0;
+  double bound_m = std::numeric_limits<double>::infinity();
   std::uint32_t triangle = 0;
   std::uint32_t depth = 0;
 };
@@ -46,9 +46,17 @@ double least_mixture(const Row& a, const Row& b) {
 // The distance from a triangle is convex, and so are mixtures of such distances: over a piece none
 // exceeds its largest at a corner. The distance from the surface is at most that from any triangle,
 // and at most any mixture.
+// Besides, no point of a triangle is farther from its nearest corner than the longest edge over the
+// root of 3, and the distance changes by no more than the place does.
 double bound_of(const ClosestPoint& to, const std::array<Probe, 3>& corners) {
   std::array<Row, 3> rows;
-  double bound_m = std::numeric_limits<double>::infinity();
+  double square_m2 = 0;
+  for (std::size_t i = 0; i < 3; ++i) {
+    const glm::dvec3 edge = corners[(i + 1) % 3].p - corners[i].p;
+    square_m2 = std::max(square_m2, glm::dot(edge, edge));
+  }
+  double bound_m = largest({corners[0].distance_m, corners[1].distance_m, corners[2].distance_m}) +
+                   std::sqrt(square_m2 / 3);
   for (std::size_t k = 0; k < 3; ++k) {
     const std::uint32_t triangle = corners[k].nearest;
     for (std::size_t i = 0; i < 3; ++i) {
@@ -186,29 +194,27 @@ std::vector<Probe> probe_vertices(const TriangleMesh& from, const ClosestPoint& 
 // on which thread is first.
 class FarthestSearch {
  public:
-  FarthestSearch(const ClosestPoint& to, double tolerance_m, double rounding_m)
-      : to_(to), splitter_(to, rounding_m), tolerance_m_(tolerance_m) {
-    found_.probe.distance_m = -1;
-  }
+  FarthestSearch(const ClosestPoint& to, const SearchLimits& limits, const FarthestProbe& so_far)
+      : to_(to),
+        // What is equally far to a hundredth of the tolerance need not be told apart.
+        splitter_(to, std::max(limits.rounding_m, 0.01 * limits.tolerance_m)),
+        limits_(limits),
+        found_(so_far) {}
 
-  void begin(const TriangleMesh& from) {
-    const std::vector<Probe> probes = probe_vertices(from, to_);
-    std::vector<Piece> pieces(from.triangles.size());
+  FarthestProbe search(std::vector<Piece> pieces) {
     tbb::parallel_for(std::size_t{0}, pieces.size(), [&](std::size_t i) {
-      const glm::uvec3& t = from.triangles[i];
-      Piece& piece = pieces[i];
-      piece.corners = {probes[t.x], probes[t.y], probes[t.z]};
-      piece.triangle = static_cast<std::uint32_t>(i);
-      piece.bound_m = bound_of(to_, piece.corners);
+      pieces[i].bound_m = std::min(pieces[i].bound_m, bound_of(to_, pieces[i].corners));
     });
     for (const Piece& piece : pieces) look_at(piece);
     open_ = std::move(pieces);
     settle();
+    while (!open_.empty() && found_.pieces < limits_.most_pieces) go_on();
+    found_.at_most_m = std::max(found_.at_most_m, found_.probe.distance_m);
+    for (const Piece& piece : open_) found_.at_most_m = std::max(found_.at_most_m, piece.bound_m);
+    return found_;
   }
 
-  bool is_done() const { return open_.empty(); }
-  std::size_t pieces() const { return found_.pieces; }
-
+ private:
   // Splits those pieces that may hold the largest distances.
   void go_on() {
     const std::size_t count = std::min(open_.size(), std::max<std::size_t>(4096, open_.size() / 4));
@@ -227,14 +233,6 @@ class FarthestSearch {
     settle();
   }
 
-  FarthestProbe result() const {
-    FarthestProbe found = found_;
-    found.at_most_m = std::max(found.at_most_m, found.probe.distance_m);
-    for (const Piece& piece : open_) found.at_most_m = std::max(found.at_most_m, piece.bound_m);
-    return found;
-  }
-
- private:
   void look_at(const Piece& piece) {
     ++found_.pieces;
     for (const Probe& corner : piece.corners) {
@@ -247,7 +245,7 @@ class FarthestSearch {
   // Lays aside what cannot be farther than what is found, but for the tolerance.
   void settle() {
     std::erase_if(open_, [&](const Piece& piece) {
-      if (piece.bound_m > found_.probe.distance_m + tolerance_m_) return false;
+      if (piece.bound_m > found_.probe.distance_m + limits_.tolerance_m) return false;
       found_.at_most_m = std::max(found_.at_most_m, piece.bound_m);
       return true;
     });
@@ -255,19 +253,39 @@ class FarthestSearch {
 
   const ClosestPoint& to_;
   Splitter splitter_;
-  double tolerance_m_;
+  SearchLimits limits_;
   FarthestProbe found_;
   std::vector<Piece> open_;
 };
 
 }  // namespace
 
-FarthestProbe find_farthest(const TriangleMesh& from, const ClosestPoint& to, double tolerance_m,
-                            double rounding_m, std::size_t most_pieces) {
-  FarthestSearch search(to, tolerance_m, rounding_m);
-  search.begin(from);
-  while (!search.is_done() && search.pieces() < most_pieces) search.go_on();
-  return search.result();
+FarthestProbe find_farthest(const TriangleMesh& from, const ClosestPoint& to,
+                            const SearchLimits& limits) {
+  const std::vector<Probe> probes = probe_vertices(from, to);
+  std::vector<Piece> pieces(from.triangles.size());
+  for (std::size_t i = 0; i < pieces.size(); ++i) {
+    const glm::uvec3& t = from.triangles[i];
+    pieces[i].corners = {probes[t.x], probes[t.y], probes[t.z]};
+    pieces[i].triangle = static_cast<std::uint32_t>(i);
+  }
+  FarthestProbe none;
+  none.probe.distance_m = -1;
+  return FarthestSearch(to, limits, none).search(std::move(pieces));
+}
+
+FarthestProbe find_farthest(const std::vector<SearchPiece>& pieces, const ClosestPoint& to,
+                            const FarthestProbe& so_far, const SearchLimits& limits) {
+  std::vector<Piece> begun(pieces.size());
+  tbb::parallel_for(std::size_t{0}, pieces.size(), [&](std::size_t i) {
+    begun[i].triangle = pieces[i].triangle;
+    begun[i].bound_m = pieces[i].at_most_m;
+    for (std::size_t k = 0; k < 3; ++k) {
+      const NearestPoint nearest = to.nearest(pieces[i].corners[k], pieces[i].near);
+      begun[i].corners[k] = {pieces[i].corners[k], nearest.distance_m, nearest.triangle};
+    }
+  });
+  return FarthestSearch(to, limits, so_far).search(std::move(begun));
 }
 
 }  // namespace groundray

@@ -14,6 +14,10 @@ find_package(nlohmann_json REQUIRED)
 find_package(tinyxml2 REQUIRED)
 # OpenCV is linked by the names of two of its libraries; its CMake files would need all of it.
 find_library(GROUNDRAY_OPENCV_IMGPROC opencv_imgproc REQUIRED)
+# CGAL is headers over these two; its CMake files would set flags for all sources and print.
+find_library(GROUNDRAY_GMP gmp REQUIRED)
+find_library(GROUNDRAY_MPFR mpfr REQUIRED)
+find_library(GROUNDRAY_OPENMESH OpenMeshCore REQUIRED)
 find_package(embree 4 QUIET)
 if(NOT embree_FOUND)
   find_package(embree 3.13 REQUIRED)

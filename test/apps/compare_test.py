@@ -172,6 +172,33 @@ def test_meshes_have_the_distance_that_was_put_in(tmp_path):
     assert high - low < 1e-5
 
 
+@pytest.mark.parametrize("form", ["ply", "obj", "stl", "glb"])
+def test_meshes_of_every_form_agree_as_far_as_they_overlap(tmp_path, form):
+    """Strips of 10 m and 8 m that have 6 m in common: what is beyond is as far as it reaches."""
+    for name, begin, end in (("truth", 0, 10), ("mesh", 4, 12)):
+        corners = [(begin, 0, 0), (end, 0, 0), (end, 0, 1), (begin, 0, 1)]  # glTF's y is up
+        if form != "glb":
+            corners = [(x, z, y) for x, y, z in corners]
+        faces = [(0, 1, 2), (0, 2, 3)]
+        strip = trimesh.Trimesh(corners, faces, process=False)
+        strip.export(tmp_path / f"{name}.{form}")
+    figure, _, _ = figures(
+        *(tmp_path / f"{name}.{form}" for name in ("truth", "mesh")),
+        *("--within-m", "0.5", "--within-m", "1"),
+        out=tmp_path / "out",
+    )
+    for within in (0.5, 1):
+        shares = [(6 + within) / 8, (6 + within) / 10]
+        shares.append(2 * shares[0] * shares[1] / sum(shares))
+        for name, share in zip(("precision", "completeness", "F1"), shares, strict=True):
+            said = [
+                figure[f"{name} within {within} m{end}"] for end in ("", ", at least", ", at most")
+            ]
+            assert said[0] == pytest.approx(100 * share, abs=0.1)
+            assert said[1] <= 100 * share <= said[2]
+    assert figure["other to reference: angle between normals, 99 % of the area up to"] == 0
+
+
 def test_other_peoples_software_agrees(tmp_path):
     """The example of docs/golden.md: Open3D traces the same surface in floats."""
     pytest.importorskip("open3d")

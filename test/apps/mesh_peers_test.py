@@ -22,7 +22,7 @@ FACE = np.dtype([("count", "u1"), ("vertices", "<u4", 3), ("level", "u1"), ("col
 @pytest.fixture(scope="module")
 def folder(tmp_path_factory: pytest.TempPathFactory) -> Path:
     out = tmp_path_factory.mktemp("mesh")
-    for form in ("ply", "obj", "glb"):
+    for form in ("ply", "obj", "stl", "glb"):
         command = [PROGRAM, "terrain", "mesh", DEM, "-o", out / f"mesh.{form}"]
         subprocess.run([*command, "--max-error-m", "0.5"], check=True, capture_output=True)
     return out
@@ -119,6 +119,20 @@ def test_open3d_reads_the_obj(folder: Path, mesh: Mesh) -> None:
     corners = np.asarray(read.vertices)[np.asarray(read.triangles)]  # it numbers vertices anew
     # It reads floats: half an ulp at 400 m.
     np.testing.assert_allclose(corners, mesh.vertices[mesh.faces], rtol=0, atol=2e-5)
+
+
+@pytest.mark.parametrize("reader", ["trimesh", "open3d"])
+def test_peers_read_the_stl(folder: Path, mesh: Mesh, reader: str) -> None:
+    path = folder / "mesh.stl"
+    if reader == "trimesh":
+        read = peer("trimesh").load(path, process=False)
+        corners = np.asarray(read.vertices)[np.asarray(read.faces)]
+    else:
+        read = peer("open3d").io.read_triangle_mesh(str(path))
+        corners = np.asarray(read.vertices)[np.asarray(read.triangles)]
+    np.testing.assert_array_equal(corners, mesh.vertices[mesh.faces].astype(np.float32))
+    header = path.read_bytes()[:80].decode("ascii")
+    assert header.rstrip() == "origin_w " + mesh.comment("origin_w")
 
 
 def test_trimesh_reads_the_glb(folder: Path, mesh: Mesh) -> None:

@@ -4,9 +4,12 @@
 #include <gmock/gmock.h>
 #include <gtest/gtest.h>
 
+#include <array>
 #include <cmath>
+#include <cstdint>
 #include <filesystem>
 #include <fstream>
+#include <glm/geometric.hpp>
 #include <iterator>
 #include <limits>
 #include <random>
@@ -195,6 +198,86 @@ Glb glb_of(const std::string& file) {
   return glb;
 }
 
+// The layout is 3D Systems': 80 bytes of text, a count, and 50 bytes for each facet.
+TEST_F(MeshIo, StlHoldsTheCornersOfEachTriangle) {
+  const TriangleMesh mesh = random_mesh();
+  write_stl(in("a.stl"), mesh, {{435000.125, 5150500, -0.001}, "x", "y"});
+  const std::string file = bytes_of(in("a.stl"));
+  ASSERT_EQ(file.size(), 84 + 50 * mesh.triangles.size());
+  EXPECT_THAT(file, StartsWith("origin_w 435000.125 5150500 -0.001    "));
+  std::string_view bytes = std::string_view(file).substr(80);
+  ASSERT_EQ(take<std::uint32_t>(bytes), mesh.triangles.size());
+  for (const glm::uvec3& t : mesh.triangles) {
+    const auto normal = take<glm::vec3>(bytes);
+    std::array<glm::dvec3, 3> p;
+    for (int k = 0; k < 3; ++k) {
+      p[static_cast<std::size_t>(k)] = mesh.vertices_m[t[k]];
+      ASSERT_EQ(take<glm::vec3>(bytes), glm::vec3(mesh.vertices_m[t[k]]));
+    }
+    EXPECT_EQ(take<std::uint16_t>(bytes), 0);
+    const glm::dvec3 area = glm::cross(p[1] - p[0], p[2] - p[0]);
+    if (area == glm::dvec3(0)) {
+      EXPECT_EQ(normal, glm::vec3(0));
+    } else {
+      ASSERT_LT(glm::length(glm::dvec3(normal) - glm::normalize(area)), 1e-7);
+    }
+  }
+  EXPECT_TRUE(bytes.empty());
+  const glm::dvec3 long_m(-1.2345678901234567e-100);
+  EXPECT_THAT(message_of([&] {
+                write_stl(in("b.stl"), mesh, {long_m, "", ""});
+              }),
+              HasSubstr("is longer than the 80 characters of an STL's header; round the origin"));
+}
+
+TEST_F(MeshIo, PlyHoldsColumnsOfVerticesAndTriangles) {
+  const TriangleMesh mesh = random_mesh();
+  MeshColumns columns{PointCloud(mesh.vertices_m.size()), PointCloud(mesh.triangles.size())};
+  const auto sd = columns.vertices.add<float>("sd_m");
+  const auto label = columns.vertices.add<std::uint16_t>("label");
+  const auto filled = columns.triangles.add<std::uint8_t>("filled");
+  for (std::size_t i = 0; i < sd.size(); ++i) {
+    sd[i] = static_cast<float>(i) / 7;
+    label[i] = static_cast<std::uint16_t>(3 * i);
+  }
+  for (std::size_t i = 0; i < filled.size(); ++i) filled[i] = i % 3 == 0;
+  write_ply(in("a.ply"), mesh, prairie, columns);
+  const std::string file = bytes_of(in("a.ply"));
+  std::string_view bytes = file;
+  bytes.remove_prefix(bytes.find("end_header\n") + 11);
+  EXPECT_THAT(file.substr(0, file.size() - bytes.size()),
+              HasSubstr("property double z\nproperty float sd_m\nproperty ushort label\n"));
+  for (std::size_t i = 0; i < sd.size(); ++i) {
+    ASSERT_EQ(take<glm::dvec3>(bytes), mesh.vertices_m[i]);
+    ASSERT_EQ(take<float>(bytes), sd[i]);
+    ASSERT_EQ(take<std::uint16_t>(bytes), label[i]);
+  }
+  for (std::size_t i = 0; i < filled.size(); ++i) {
+    ASSERT_EQ(take<std::uint8_t>(bytes), 3);
+    ASSERT_EQ(take<glm::uvec3>(bytes), mesh.triangles[i]);
+    ASSERT_EQ(take<std::uint8_t>(bytes), mesh.levels[i]);
+    bytes.remove_prefix(3);
+    ASSERT_EQ(take<std::uint8_t>(bytes), filled[i]);
+  }
+  EXPECT_TRUE(bytes.empty());
+}
+
+TEST_F(MeshIo, ColumnsThatCannotBeAreNamed) {
+  const TriangleMesh mesh = two_triangles();
+  const auto refusal = [&](std::size_t rows, const std::string& name) {
+    MeshColumns columns;
+    columns.triangles = PointCloud(rows);
+    columns.triangles.add<float>(name);
+    return message_of([&] { write_ply(in("a.ply"), mesh, prairie, columns); });
+  };
+  EXPECT_THAT(refusal(3, "a"),
+              HasSubstr("a.ply: columns of 3 rows are not of the element face, which has 2"));
+  EXPECT_THAT(refusal(2, "level"), HasSubstr("face cannot have a column \"level\": it has one"));
+  EXPECT_THAT(refusal(2, "a b"), HasSubstr("names must be of visible ASCII characters"));
+  EXPECT_THAT(refusal(2, ""), HasSubstr("names must be of visible ASCII characters"));
+  EXPECT_TRUE(std::filesystem::is_empty(folder_.path()));
+}
+
 TEST_F(MeshIo, GlbHoldsFloatsThenIndices) {
   const TriangleMesh mesh = random_mesh();
   write_glb(in("a.glb"), mesh, prairie);
@@ -215,17 +298,20 @@ TEST_F(MeshIo, GlbSaysWhereItsVerticesLie) {
 }
 
 TEST_F(MeshIo, TheNameSaysTheForm) {
-  for (const char* name : {"a.ply", "a.obj", "a.glb"}) {
+  for (const char* name : {"a.ply", "a.obj", "a.stl", "a.glb"}) {
     write_mesh(in(name), two_triangles(), prairie);
   }
   EXPECT_THAT(bytes_of(in("a.ply")), StartsWith("ply\n"));
   EXPECT_THAT(bytes_of(in("a.obj")), HasSubstr("\nv 0 0 1\nv 2.5 0 1.125\nv 0 -3 400\n"));
   EXPECT_THAT(bytes_of(in("a.glb")), StartsWith("glTF"));
-  EXPECT_THAT(message_of([&] { write_mesh(in("a.stl"), two_triangles(), prairie); }),
-              HasSubstr("a.stl: the name of a mesh must end in .ply, .obj or .glb"));
+  EXPECT_THAT(bytes_of(in("a.stl")), StartsWith("origin_w 435000 5150500 0 "));
+  EXPECT_THAT(message_of([&] { write_mesh(in("a.dae"), two_triangles(), prairie); }),
+              HasSubstr("a.dae: the name of a mesh must end in .ply, .obj, .stl or .glb"));
 }
 
 TEST_F(MeshIo, AnEmptyMeshIsAFileButForGlb) {
+  write_stl(in("a.stl"), {}, prairie);
+  EXPECT_EQ(bytes_of(in("a.stl")).size(), 84u);
   write_ply(in("a.ply"), {}, prairie);
   EXPECT_EQ(read_ply(in("a.ply")).cloud.rows(), 0u);
   write_obj(in("a.obj"), {}, prairie);
@@ -242,7 +328,7 @@ TEST_F(MeshIo, EveryFaultOfAMeshIsNamed) {
     mesh.vertices_m[2] = bad;
     mesh.triangles[1].y = 4;
     mesh.levels.push_back(1);
-    for (const char* name : {"a.ply", "a.obj", "a.glb"}) {
+    for (const char* name : {"a.ply", "a.obj", "a.stl", "a.glb"}) {
       const std::string message = message_of([&] { write_mesh(in(name), mesh, prairie); });
       EXPECT_THAT(message, HasSubstr("there are 3 levels for 2 triangles"));
       EXPECT_THAT(message, HasSubstr("vertex 2 must have a finite position within 1e+15 m"));
@@ -254,7 +340,7 @@ TEST_F(MeshIo, EveryFaultOfAMeshIsNamed) {
 
 TEST_F(MeshIo, NothingIsLeftWhereAFileCannotBeWritten) {
   const FileSizeLimit limit(1 << 16);
-  for (const char* name : {"a.ply", "a.obj", "a.glb"}) {
+  for (const char* name : {"a.ply", "a.obj", "a.stl", "a.glb"}) {
     EXPECT_THAT(message_of([&] { write_mesh(in(name), random_mesh(), prairie); }),
                 HasSubstr("cannot be written"));
   }

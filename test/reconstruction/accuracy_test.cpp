@@ -125,7 +125,7 @@ TEST(MeshDistance, OfParallelPlanesIsTheirGapHoweverTheyAreTiled) {
       const MeanDistance mean = distance.mean(0.5);
       EXPECT_NEAR(mean.mean.value_m, gap_m, 1e-12 + 1e-12 * gap_m);
       EXPECT_NEAR(mean.rms.value_m, gap_m, 1e-12 + 1e-12 * gap_m);
-      EXPECT_NEAR(mean.turn_rad, 0, 1e-12);
+      EXPECT_NEAR(mean.turn.mean_rad(), 0, 1e-12);
       EXPECT_NEAR(mean.area_m2, 100, 1e-9);
     }
   }
@@ -188,7 +188,7 @@ TEST(MeshDistance, BetweenBallsIsBetweenThatOfTheirSpheres) {
     const MeanDistance mean = distance.mean(0.05);
     EXPECT_GT(mean.mean.value_m, 0.5 - outer_depth_m);
     EXPECT_LT(mean.mean.value_m, 0.5 + inner_depth_m);
-    EXPECT_LT(mean.turn_rad, 0.2);
+    EXPECT_LT(mean.turn.mean_rad(), 0.2);
   }
 }
 
@@ -259,7 +259,7 @@ TEST(MeshDistance, OfARampHasTheMeansOfALinearFunction) {
       EXPECT_LE(length.at_least_m, length.value_m);
       EXPECT_GE(length.at_least_m, length.value_m - 0.29 * step_m);
     }
-    EXPECT_NEAR(mean.turn_rad, slope_rad, 1e-12);
+    EXPECT_NEAR(mean.turn.mean_rad(), slope_rad, 1e-12);
     double area_m2 = 0;
     for (const double bin_m2 : mean.bins_m2) area_m2 += bin_m2;
     EXPECT_NEAR(area_m2, length_m * 2, 1e-9);
@@ -329,7 +329,7 @@ TEST(MeshDistance, IsTheSameForAnyNumberOfThreads) {
       EXPECT_EQ((means[i].*length).at_least_m, (means[0].*length).at_least_m);
       EXPECT_EQ((means[i].*length).at_most_m, (means[0].*length).at_most_m);
     }
-    EXPECT_EQ(means[i].turn_rad, means[0].turn_rad);
+    EXPECT_EQ(means[i].turn.mean_rad(), means[0].turn.mean_rad());
     EXPECT_EQ(means[i].bins_m2, means[0].bins_m2);
     EXPECT_EQ(means[i].largest_m, means[0].largest_m);
   }

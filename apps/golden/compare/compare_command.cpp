@@ -4,10 +4,7 @@
 
 #include <algorithm>
 #include <array>
-#include <chrono>
-#include <cmath>
 #include <fstream>
-#include <glm/gtc/quaternion.hpp>
 #include <map>
 #include <string>
 #include <utility>
@@ -17,6 +14,7 @@
 #include "apps/golden/compare/image_comparison.h"
 #include "apps/golden/compare/mesh_comparison.h"
 #include "apps/golden/compare/scan_comparison.h"
+#include "apps/scan/scan_flags.h"
 #include "core/error.h"
 
 namespace groundray::golden {
@@ -31,58 +29,6 @@ bool has_faces(const fs::path& ply) {
   }
   return false;
 }
-
-/// @param option  that gave the numbers x, y, z, qx, qy, qz, qw.
-Pose sensor_pose(const std::vector<double>& numbers, const std::string& option) {
-  constexpr double most_off = 1e-3;  // what three decimals leave
-  const glm::dquat rotation(numbers[6], numbers[3], numbers[4], numbers[5]);
-  const double norm = glm::length(rotation);
-  if (!(std::abs(norm - 1) <= most_off)) {
-    throw Error(
-        "{}: the length of its quaternion, the last four numbers, is {:.6g}; it must be 1: are "
-        "they in the order qx,qy,qz,qw?",
-        option, norm);
-  }
-  return {.rotation = rotation / norm, .translation_m = {numbers[0], numbers[1], numbers[2]}};
-}
-
-// Of the other file; the reference's, if it differs, begin with "reference-".
-struct ScanFlags {
-  std::string whose;  // "" or "reference-"
-  double unit_m = 1;
-  std::optional<double> time_unit_s;
-  double time_zero_s = 0;
-  std::vector<double> pose;
-  bool viewpoint = false;
-  std::vector<std::string> columns;
-
-  void add(CLI::App* group, const std::string& prefix) {
-    whose = prefix;
-    group->add_option("--" + prefix + "unit-m", unit_m, "Unit of x, y and z, in metres")
-        ->check(CLI::PositiveNumber);
-    group->add_option("--" + prefix + "time-unit-s", time_unit_s, "Unit of time, in seconds")
-        ->check(CLI::PositiveNumber);
-    group->add_option("--" + prefix + "time-zero-s", time_zero_s,
-                      "What the clock shows at the scan's stamp");
-    auto* posed = group
-                      ->add_option("--" + prefix + "sensor-pose", pose,
-                                   "x,y,z,qx,qy,qz,qw of the sensor in the frame of the points")
-                      ->delimiter(',')
-                      ->expected(7);
-    group->add_flag("--" + prefix + "viewpoint", viewpoint, "The pose is PCD's VIEWPOINT")
-        ->excludes(posed);
-    group->add_option("--" + prefix + "columns", columns, "Names of columns that have none")
-        ->delimiter(',');
-  }
-  ScanReading reading() const {
-    ScanReading reading{
-        .unit_m = unit_m, .time_unit_s = time_unit_s, .X_FS = {}, .columns = columns};
-    reading.time_zero = std::chrono::nanoseconds(std::llround(time_zero_s * 1e9));
-    if (viewpoint) reading.X_FS = FileViewpoint{};
-    if (!pose.empty()) reading.X_FS = sensor_pose(pose, "--" + whose + "sensor-pose");
-    return reading;
-  }
-};
 
 struct ImageFlags {
   PngMeaning png = PngMeaning::Picture;
@@ -259,6 +205,11 @@ CompareCommand::CompareCommand(CLI::App& app)
                    "Between the bounds of largest distances")
       ->check(CLI::PositiveNumber);
   meshes->add_option("--step-m", into.mesh.step_m, "Between samples of mean distances")
+      ->check(CLI::PositiveNumber);
+  meshes
+      ->add_option("--within-m", into.mesh.within_m,
+                   "Tell precision, completeness and F1 within so much; may be given again")
+      ->delimiter(',')
       ->check(CLI::PositiveNumber);
 }
 

@@ -17,6 +17,7 @@
 #include "core/mesh_io.h"
 #include "core/model.h"
 #include "reconstruction/accuracy.h"
+#include "reconstruction/agreement.h"
 
 namespace groundray::golden {
 namespace {
@@ -29,6 +30,7 @@ struct Way {
   const TriangleMesh& from;
   LargestDistance largest;
   MeanDistance mean;
+  std::vector<AreaShare> within;
 };
 
 double size_m(const TriangleMesh& mesh) {
@@ -44,7 +46,10 @@ Way measured(const std::string& name, const TriangleMesh& from, const TriangleMe
   if (fineness.step_m == 0) fineness.step_m = distance.step_for_m(1e6);
   const LargestDistance largest = distance.largest(fineness.tolerance_m);
   const DistanceBins bins{.width_m = largest.at_most_m / bin_count, .count = bin_count};
-  return {name, from, largest, distance.mean(fineness.step_m, bins)};
+  Way way{name, from, largest, distance.mean(fineness.step_m, bins), {}};
+  if (!fineness.within_m.empty())
+    way.within = distance.within(fineness.within_m, {.step_m = fineness.step_m});
+  return way;
 }
 
 void tell_bounded(Section& into, const std::string& name, const BoundedLength& length) {
@@ -58,8 +63,32 @@ void tell_way(Section& into, const Way& way) {
   tell(into, way.name + ": largest distance, at most", way.largest.at_most_m, "m");
   tell_bounded(into, way.name + ": mean distance", way.mean.mean);
   tell_bounded(into, way.name + ": RMS distance", way.mean.rms);
-  tell(into, way.name + ": mean angle between normals", glm::degrees(way.mean.turn_rad), "deg");
+  const AngleSpread& turn = way.mean.turn;
+  const std::string angle = way.name + ": angle between normals";
+  tell(into, way.name + ": mean angle between normals", glm::degrees(turn.mean_rad()), "deg");
+  tell(into, way.name + ": RMS angle between normals", glm::degrees(turn.rms_rad()), "deg");
+  for (const int percent : {50, 90, 99}) {
+    tell(into, fmt::format("{}, {} % of the area up to", angle, percent),
+         glm::degrees(turn.percentile_rad(percent / 100.0)), "deg");
+  }
   tell(into, way.name + ": samples", static_cast<double>(way.mean.samples), "samples");
+}
+
+void tell_share(Section& into, const std::string& name, const AreaShare& share) {
+  tell(into, name, 100 * share.value, "%");
+  tell(into, name + ", at least", 100 * share.at_least, "%");
+  tell(into, name + ", at most", 100 * share.at_most, "%");
+}
+
+void tell_agreement(Section& into, const Way& there, const Way& back,
+                    const std::vector<double>& within_m) {
+  for (std::size_t k = 0; k < within_m.size(); ++k) {
+    const Agreement at{within_m[k], there.within[k], back.within[k]};
+    const std::string within = fmt::format(" within {} m", within_m[k]);
+    tell_share(into, "precision" + within, at.precision);
+    tell_share(into, "completeness" + within, at.completeness);
+    tell_share(into, "F1" + within, at.f1());
+  }
 }
 
 /// Counts areas in millionths of the whole.
@@ -177,6 +206,7 @@ Section compare_meshes(const TriangleMesh& reference, const TriangleMesh& other,
       "follow from a distance changing no more than the place does.";
   tell(section, "Hausdorff distance, at least", both.at_least_m, "m");
   tell(section, "Hausdorff distance, at most", both.at_most_m, "m");
+  tell_agreement(section, there, back, fineness.within_m);
   for (const Way& way : {there, back}) {
     tell_way(section, way);
     draw_spread(section, way);

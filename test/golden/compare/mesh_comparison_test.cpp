@@ -5,6 +5,7 @@
 
 #include <cmath>
 #include <filesystem>
+#include <numbers>
 #include <numeric>
 #include <string>
 
@@ -52,6 +53,29 @@ TEST(MeshComparison, OfTwoCubesIsThatOfFacesAndCorners) {
   EXPECT_NEAR(value_of(section, "other: area"), 37.5, 1e-9);
   EXPECT_EQ(value_of(section, "other: triangles"), 12);
   EXPECT_EQ(section.verdict, Verdict::Told);
+}
+
+// Of the outer's face of 2.5 m, a square of 2 m is 0.25 m away; strips beside it are up to 0.25 m
+// off its edges. From the inner, all is 0.25 m.
+TEST(MeshComparison, TellsPrecisionAndCompletenessWithinTolerances) {
+  const TriangleMesh inner = testing::box_model({2, 2, 2}).mesh;
+  const TriangleMesh outer = testing::box_model({2.5, 2.5, 2.5}).mesh;
+  const Section section =
+      compare_meshes(inner, outer, "cubes", {.step_m = 0.02, .within_m = {0.2, 0.26, 0.5}});
+  EXPECT_EQ(value_of(section, "precision within 0.2 m"), 0);
+  EXPECT_EQ(value_of(section, "completeness within 0.2 m"), 0);
+  EXPECT_EQ(value_of(section, "F1 within 0.2 m"), 0);
+  // Within 0.26 m are the points at most r = sqrt(0.26^2 - 0.25^2) off the square.
+  const double r = std::sqrt(0.26 * 0.26 - 0.25 * 0.25);
+  const double share = (4 + 8 * r + std::numbers::pi * r * r) / 6.25;
+  EXPECT_NEAR(value_of(section, "precision within 0.26 m"), 100 * share, 0.2);
+  EXPECT_LE(value_of(section, "precision within 0.26 m, at least"), 100 * share);
+  EXPECT_GE(value_of(section, "precision within 0.26 m, at most"), 100 * share);
+  EXPECT_EQ(value_of(section, "completeness within 0.26 m"), 100);
+  EXPECT_NEAR(value_of(section, "F1 within 0.26 m"), 100 * 2 * share / (1 + share), 0.2);
+  EXPECT_EQ(value_of(section, "F1 within 0.5 m"), 100);
+  EXPECT_EQ(value_of(section, "reference to other: angle between normals, 99 % of the area up to"),
+            0);
 }
 
 TEST(MeshComparison, TellsHowDistancesAreSpreadAndWhereTheyAreLargest) {
