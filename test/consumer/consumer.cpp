@@ -2,6 +2,7 @@
 #include <groundray/core/pose.h>
 #include <groundray/core/ray_tracer.h>
 #include <groundray/reconstruction/accuracy.h>
+#include <groundray/reconstruction/lindstrom_turk.h>
 #include <groundray/sensors/scan_pattern.h>
 #include <groundray/terrain/terrain_scene.h>
 
@@ -30,6 +31,9 @@ int main() {
   const TriangleMesh high{{{0, 0, 2}, {1, 0, 2}, {0, 1, 2}}, {{0, 1, 2}}};
   const bool apart = MeshDistance(high, low).largest(1e-9).at_most_m < 2 + 1e-9;
 
-  std::printf("halfway %d, below %d, turned %d, apart %d\n", halfway, below, turned, apart);
-  return halfway && below && turned && apart ? 0 : 1;
+  const bool reduced = reduce(low, 1).mesh.triangles.size() == 1;
+
+  std::printf("halfway %d, below %d, turned %d, apart %d, reduced %d\n", halfway, below, turned,
+              apart, reduced);
+  return halfway && below && turned && apart && reduced ? 0 : 1;
 }
