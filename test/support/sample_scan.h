@@ -52,8 +52,7 @@ inline SampleReturns sample_returns() {
 
 /// Returns a file with columns x, y, z and those named of ring, time, return_index, intensity,
 /// label, incidence.
-inline CloudFile file_of(const SampleReturns& returns,
-                                 const std::vector<std::string>& names) {
+inline CloudFile file_of(const SampleReturns& returns, const std::vector<std::string>& names) {
   CloudFile file{.form = "made up", .cloud = PointCloud(returns.size())};
   const auto add = [&](const std::string& name, const auto& value_of) {
     const auto values = file.cloud.add<double>(name);

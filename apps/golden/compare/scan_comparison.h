@@ -3,9 +3,9 @@
 #include <filesystem>
 #include <optional>
 
-#include "apps/scan/scan.h"
 #include "apps/golden/compare/scan_pairing.h"
 #include "apps/golden/report.h"
+#include "apps/scan/scan.h"
 
 namespace groundray::golden {
 

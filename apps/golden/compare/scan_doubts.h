@@ -5,9 +5,9 @@
 #include <string>
 #include <vector>
 
-#include "apps/scan/scan.h"
 #include "apps/golden/compare/scan_errors.h"
 #include "apps/golden/compare/scan_pairing.h"
+#include "apps/scan/scan.h"
 
 namespace groundray::golden {
 

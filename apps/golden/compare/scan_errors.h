@@ -6,9 +6,9 @@
 #include <string>
 #include <vector>
 
-#include "apps/scan/scan.h"
 #include "apps/golden/compare/scan_pairing.h"
 #include "apps/golden/report.h"
+#include "apps/scan/scan.h"
 
 namespace groundray::golden {
 
