@@ -4,6 +4,7 @@
 #include <cstddef>
 #include <cstdint>
 #include <glm/vec3.hpp>
+#include <limits>
 #include <vector>
 
 #include "core/closest_point.h"
@@ -31,7 +32,7 @@ struct SearchPiece {
   std::array<glm::dvec3, 3> corners;
   std::uint32_t triangle = 0;
   std::uint32_t near = 0;
-  double at_most_m = 0;  ///< what is known already
+  double at_most_m = std::numeric_limits<double>::infinity();  ///< what is known already
 };
 
 /// How long a search goes on.

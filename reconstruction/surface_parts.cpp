@@ -1,5 +1,7 @@
 #include "reconstruction/surface_parts.h"
 
+#include <tbb/parallel_for.h>
+
 #include <cmath>
 #include <glm/geometric.hpp>
 #include <limits>
@@ -81,6 +83,10 @@ double SurfaceParts::sum_rounding() const noexcept {
   // Adding up n numbers takes n ulp / 2 of the sum at most, weighing them one more each.
   constexpr double in_lot = 4e4;  // a row of a triangle cut into 1e9 parts takes half of it
   return (static_cast<double>(lots()) + in_lot) * std::numeric_limits<double>::epsilon();
+}
+
+void SurfaceParts::in_parallel(std::size_t count, const std::function<void(std::size_t)>& work) {
+  tbb::parallel_for(std::size_t{0}, count, work);
 }
 
 }  // namespace groundray

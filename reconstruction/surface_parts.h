@@ -1,11 +1,10 @@
 #pragma once
 
-#include <tbb/parallel_for.h>
-
 #include <algorithm>
 #include <array>
 #include <cstddef>
 #include <cstdint>
+#include <functional>
 #include <glm/vec3.hpp>
 #include <vector>
 
@@ -54,7 +53,7 @@ class SurfaceParts {
     constexpr std::size_t at_once = 256;  // lots that are kept
     for (std::size_t first = 0; first < lots(); first += at_once) {
       std::vector<Sums> some(std::min(at_once, lots() - first), empty);
-      tbb::parallel_for(std::size_t{0}, some.size(), [&](std::size_t i) {
+      in_parallel(some.size(), [&](std::size_t i) {
         for (std::size_t rows = lots_[first + i]; rows < lots_[first + i + 1]; ++rows)
           visit_rows(rows_[rows], some[i], visit);
       });
@@ -73,6 +72,9 @@ class SurfaceParts {
     std::uint32_t splits = 1;
     std::uint32_t begin = 0, end = 0;
   };
+
+  /// Calls `work(i)` for each i below `count`, several at once.
+  static void in_parallel(std::size_t count, const std::function<void(std::size_t)>& work);
 
   template <typename Sums, typename Visit>
   void visit_rows(const Rows& rows, Sums& sums, const Visit& visit) const {
