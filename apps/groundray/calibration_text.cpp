@@ -67,10 +67,11 @@ std::string calibration_text(const PlacedLidar& placed) {
   std::string text = fmt::format(
       "model: {}\nframe: \"x forward, y left, z up\"\nX_BS:  # pose of the sensor in the body\n{}"
       "range_gate_m: [{}, {}]\n"
-      "range_noise_sigma_m: {}\n",
+      "range_noise_sigma_m: {}\npoints: {}\n",
       yaml_text(lidar.model), pose_text(placed.spec.X_BS), lidar.gate.near_m,
       std::isinf(lidar.gate.far_m) ? ".inf" : fmt::format("{}", lidar.gate.far_m),
-      lidar.range_noise_sigma_m);
+      lidar.range_noise_sigma_m,
+      lidar.points == LidarSpec::Points::AsFired ? "as_fired" : "at_stamp");
   if (const auto* spinning = std::get_if<SpinningPattern>(&lidar.pattern))
     text += spinning_text(*spinning);
   return text + fmt::format("lidar_file: {}\n", yaml_text(placed.spec.text));

@@ -10,6 +10,7 @@
 
 #include "apps/groundray/generate.h"
 #include "apps/groundray/info.h"
+#include "apps/groundray/reconstruct_commands.h"
 #include "apps/groundray/terrain_commands.h"
 #include "apps/interruption.h"
 #include "core/error.h"
@@ -72,7 +73,8 @@ int run(int argc, char** argv) {
   auto* mesh = terrain->add_subcommand(
       "mesh", "Write a DEM as triangles, none farther from it than asked, without cracks");
   add_dem(mesh);
-  mesh->add_option("-o,--output", out, "Mesh to write: .ply (doubles), .obj or .glb")->required();
+  mesh->add_option("-o,--output", out, "Mesh to write: .ply (doubles), .obj, .stl or .glb")
+      ->required();
   mesh->add_option("--max-error-m", request.max_error_m,
                    "Largest vertical distance from the DEM's surface, anywhere")
       ->required()
@@ -92,10 +94,16 @@ int run(int argc, char** argv) {
       "print a summary; `generate` uses it for DEMs larger than memory");
   add_dem(certify);
 
+  const groundray::ReconstructCommands reconstruct(app);
+
   try {
     app.parse(argc, argv);
   } catch (const CLI::ParseError& error) {
     return app.exit(error) == 0 ? done : wrong_usage;
+  }
+  if (reconstruct.is_asked_for()) {
+    reconstruct.run();
+    return done;
   }
   if (info->parsed()) {
     groundray::print_info(file);

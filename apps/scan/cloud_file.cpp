@@ -67,7 +67,8 @@ CloudFile of_pcd(std::string_view bytes, const std::string& name) {
       .form = file.height > 1 ? fmt::format("PCD, {} x {} points", file.width, file.height) : "PCD",
       .cloud = std::move(file.cloud),
       .origins = std::move(file.origins),
-      .X_FS = file.X_FS};
+      .X_FS = file.X_FS,
+      .image = file.height > 1 ? ImageLayout{file.height, file.width} : ImageLayout{}};
 }
 
 /// Names the columns of an array as they shall be called in a cloud.
@@ -83,6 +84,7 @@ Names names_of(const NpyArray& array, const Names& asked) {
 CloudFile of_npy(const NpyArray& array, const Names& asked) {
   CloudFile file{.form = "NumPy array", .cloud = PointCloud(array.cloud.rows())};
   take_columns(array.cloud, array.origins, names_of(array, asked), file);
+  if (array.shape.size() == 3) file.image = {array.shape[0], array.shape[1]};
   for (const std::string& field : array.unread) {
     file.unread.push_back(fmt::format("{} (no numbers)", field));
   }
@@ -132,6 +134,7 @@ CloudFile of_npz(const NpzFile& arrays, const Names& asked) {
     Names names;
     if (array.is_structured || holds_points(array)) {
       names = names_of(array, asked);
+      if (array.shape.size() == 3) file.image = {array.shape[0], array.shape[1]};
     } else if (array.shape.size() < 2) {
       names = {array.name};
     } else {

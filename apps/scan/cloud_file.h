@@ -1,5 +1,6 @@
 #pragma once
 
+#include <cstdint>
 #include <filesystem>
 #include <optional>
 #include <string>
@@ -12,6 +13,11 @@
 
 namespace groundray {
 
+/// Of points that are an image, row by row; 0 by 0 of others.
+struct ImageLayout {
+  std::uint64_t rows = 0, columns = 0;
+};
+
 /// A file of points as it is: its columns by its own names.
 struct CloudFile {
   std::string form;  ///< for people: "PCD", "KITTI, four floats a point"
@@ -19,6 +25,7 @@ struct CloudFile {
   std::vector<ColumnOrigin> origins;  ///< what is to be added to columns of 64-bit whole numbers
   std::vector<std::string> unread;    ///< what else is in it, and why it is no column
   std::optional<Pose> X_FS;           ///< pose of the sensor in the points' frame, if it is told
+  ImageLayout image{};
 };
 
 /// Reads a cloud by the ending of its name: .ply, .pcd, .npy, .npz, and .bin (floats, little

@@ -40,8 +40,13 @@ constexpr std::array<std::string_view, 3> incidence_words{"incidence", "incidenc
 constexpr std::array<std::string_view, 6> range_words{"range",     "ranges", "distance",
                                                       "distances", "dist",   "r"};
 
+constexpr std::array<std::string_view, 7> column_words{
+    "column", "col", "columnid", "columnindex", "measurementid", "azimuthindex", "azimuthid"};
+constexpr std::array<std::string_view, 6> range_sd_words{
+    "rangesd", "rangesigma", "rangestd", "rangestddev", "rangestandarddeviation", "sigmarange"};
+
 Words words_for(std::string_view ours) {
-  const std::array<std::pair<std::string_view, Words>, 11> all{{{"x", x_words},
+  const std::array<std::pair<std::string_view, Words>, 13> all{{{"x", x_words},
                                                                 {"y", y_words},
                                                                 {"z", z_words},
                                                                 {"intensity", intensity_words},
@@ -51,7 +56,9 @@ Words words_for(std::string_view ours) {
                                                                 {"pulse", pulse_words},
                                                                 {"label", label_words},
                                                                 {"incidence", incidence_words},
-                                                                {"range", range_words}}};
+                                                                {"range", range_words},
+                                                                {"column", column_words},
+                                                                {"range_sd", range_sd_words}}};
   const auto found = std::ranges::find(all, ours, &std::pair<std::string_view, Words>::first);
   return found == all.end() ? Words() : found->second;
 }

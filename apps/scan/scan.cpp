@@ -20,7 +20,8 @@ namespace groundray {
 namespace {
 
 constexpr std::array<std::string_view, quantity_count> quantity_names{
-    "intensity", "ring", "time", "return_index", "pulse", "label", "incidence", "range"};
+    "intensity", "ring",      "time",  "return_index", "pulse",
+    "label",     "incidence", "range", "column",       "range_sd"};
 
 /// A column's values as doubles, and whether they are stored as whole numbers.
 struct Numbers {
@@ -283,6 +284,7 @@ Scan scan_of(const CloudFile& file, const std::string& name, const ScanReading& 
   Scan scan;
   scan.name = name;
   scan.form = file.form;
+  scan.image = file.image;
   Reader(file, reading, scan).read();
   return scan;
 }

@@ -36,9 +36,11 @@ enum class Quantity {
   Pulse,
   Label,
   Incidence,  ///< rad
-  Range       ///< as stored: held against the position alone
+  Range,      ///< as stored: held against the position alone
+  Column,     ///< of a scan whose beams lie on a grid of rings and columns
+  RangeSd     ///< m, standard deviation of the range
 };
-constexpr std::size_t quantity_count = 8;
+constexpr std::size_t quantity_count = 10;
 
 /// A column that was understood.
 struct ReadColumn {
@@ -60,6 +62,7 @@ struct NoReturns {
 struct Scan {
   std::string name, form;
   std::size_t rows = 0;          ///< of the file
+  ImageLayout image;             ///< of the file's rows
   std::vector<std::size_t> row;  ///< of each return: its row in the file
   std::vector<glm::dvec3> p_S;   ///< m
   std::array<std::optional<std::vector<double>>, quantity_count> values;  ///< by Quantity

@@ -3,6 +3,8 @@
 #include <gmock/gmock.h>
 #include <gtest/gtest.h>
 
+#include <algorithm>
+#include <cstdint>
 #include <limits>
 
 #include "apps/scan/column_names.h"
@@ -59,6 +61,10 @@ TEST(ColumnNames, AreKnownInEverySpelling) {
   EXPECT_EQ(found({"range_true"}, "range"), "none");
   EXPECT_EQ(found({"world_x", "nx"}, "x"), "none");
   EXPECT_EQ(found({"x"}, "no such name"), "none");
+  EXPECT_EQ(found({"Measurement_ID", "col"}, "column"), "col");
+  EXPECT_EQ(found({"measurement_id"}, "column"), "measurement_id");
+  EXPECT_EQ(found({"range", "range_sd"}, "range_sd"), "range_sd");
+  EXPECT_EQ(found({"range_sd"}, "range"), "none");
 }
 
 TEST(ColumnNames, TellTheUnitOfATime) {
@@ -66,6 +72,21 @@ TEST(ColumnNames, TellTheUnitOfATime) {
   EXPECT_EQ(find_column({"time_offset_us"}, "time")->unit_s, 1e-6);
   EXPECT_EQ(find_column({"time_s"}, "time")->unit_s, 1);
   EXPECT_EQ(find_column({"time_stamp"}, "time")->unit_s, std::nullopt);
+}
+
+TEST(Scan, TakesColumnsAndDeviationsOfItsReturnsAlone) {
+  CloudFile file{.form = "made up", .cloud = PointCloud(3), .image = {1, 3}};
+  const float x[] = {1, 0, 2}, sd[] = {0.01f, 0.02f, 0.03f};
+  const std::uint16_t columns[] = {7, 8, 9};
+  std::ranges::copy(x, file.cloud.add<float>("x").begin());
+  for (const char* name : {"y", "z"}) std::ranges::fill(file.cloud.add<float>(name), 0.f);
+  std::ranges::copy(columns, file.cloud.add<std::uint16_t>("column").begin());
+  std::ranges::copy(sd, file.cloud.add<float>("range_sd").begin());
+  const Scan scan = scan_of(file, "sample", {});
+  EXPECT_THAT(scan.row, ElementsAre(0, 2));
+  EXPECT_THAT(*scan.find(Quantity::Column), ElementsAre(7, 9));
+  EXPECT_THAT(*scan.find(Quantity::RangeSd), ElementsAre(0.01f, 0.03f));
+  EXPECT_EQ(scan.image.columns, 3);
 }
 
 TEST(Scan, SortsRowsThatAreNoReturns) {

@@ -1,0 +1,53 @@
+#pragma once
+
+#include <cstddef>
+#include <filesystem>
+#include <optional>
+#include <string>
+#include <utility>
+#include <vector>
+
+#include "apps/groundray/scan_files.h"
+#include "apps/groundray/scan_input.h"
+#include "reconstruction/hole_fill.h"
+#include "reconstruction/mesh_merge.h"
+#include "reconstruction/scan_mesh.h"
+#include "reconstruction/simplify.h"
+
+namespace groundray {
+
+/// Where results go.
+struct RebuildOutput {
+  std::filesystem::path mesh;
+  std::optional<std::filesystem::path> occlusion;          ///< what beams passed by
+  std::optional<std::filesystem::path> report;             ///< JSON
+  std::vector<std::pair<std::string, std::string>> facts;  ///< for the report
+};
+
+/// What is done to a mesh once it is there.
+struct Finishing {
+  std::optional<double> fill_m;  ///< holes up to this rim
+  std::optional<Halt> halt;      ///< simplify until then
+  SimplifyOptions simplify;
+  std::optional<double> sd_m;  ///< of vertices, where the mesh does not tell
+  std::size_t most_bytes = std::numeric_limits<std::size_t>::max();
+};
+
+/// How scans become one mesh.
+struct Meshing {
+  std::optional<ScreeningLimits> screening;  ///< else ground(), of range grids object()
+  std::optional<double> incidence_rad, longest_m, noise_sds;  ///< instead of its own
+  MergeLimits merging;
+  std::optional<double> perimeter_m;  ///< points without order: of a triangle, at most
+};
+
+/// Builds a mesh from scans, writes it and prints what was done. Nothing is written unless all is.
+/// @throws Error as the parts do.
+void rebuild_mesh(const ScanChoice& choice, const ScanTaking& taking, const Meshing& meshing,
+                  const Finishing& finishing, const RebuildOutput& output);
+
+/// Fills and simplifies a mesh of anybody's likewise.
+void finish_mesh(const std::filesystem::path& mesh, const Finishing& finishing,
+                 const RebuildOutput& output);
+
+}  // namespace groundray

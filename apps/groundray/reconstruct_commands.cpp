@@ -1,0 +1,312 @@
+#include "apps/groundray/reconstruct_commands.h"
+
+#include <array>
+#include <cmath>
+#include <filesystem>
+#include <map>
+#include <numbers>
+#include <optional>
+#include <string>
+#include <vector>
+
+#include "apps/groundray/rebuild.h"
+#include "apps/scan/scan_flags.h"
+#include "core/error.h"
+
+namespace groundray {
+namespace {
+
+namespace fs = std::filesystem;
+
+constexpr double radians_per_degree = std::numbers::pi / 180;
+
+std::optional<double> radians(const std::optional<double>& angle_deg) {
+  if (!angle_deg) return std::nullopt;
+  return *angle_deg * radians_per_degree;
+}
+
+enum class Preset { Ground, Strict, Object };
+
+// Which scans, and how their files are to be read.
+struct ScanOptions {
+  ScanChoice choice;
+  ScanTaking taking;
+  ScanFlags columns;
+  std::string frames = ":";
+  bool leaves_labels = false;
+
+  void add(CLI::App* command) {
+    CLI::App* scans = command->add_option_group("Scans");
+    scans->add_option("--sensor", choice.sensors, "Lidars of a dataset; all without it")
+        ->delimiter(',');
+    scans->add_option("--frames", frames, "A:B:STEP, from A on to before B: frames, or files");
+    add_poses(scans);
+    const std::map<std::string, ReturnChoice> choices{{"last", ReturnChoice::Last},
+                                                      {"strongest", ReturnChoice::Strongest},
+                                                      {"first", ReturnChoice::First}};
+    scans->add_option("--returns", taking.returns, "Which return of a pulse is taken")
+        ->transform(CLI::CheckedTransformer(choices))
+        ->option_text("last|strongest|first");
+    const std::map<std::string, GridSource> grids{{"beams", GridSource::Beams},
+                                                  {"file", GridSource::File}};
+    scans
+        ->add_option("--grid", taking.grid,
+                     "What makes points neighbours: rings and azimuths, or the file's own image")
+        ->transform(CLI::CheckedTransformer(grids))
+        ->option_text("beams|file");
+    scans
+        ->add_option("--range-sd-m", taking.range_sd_m,
+                     "Standard deviation of ranges, instead of what scans tell")
+        ->check(CLI::NonNegativeNumber);
+    scans->add_flag("--no-labels", leaves_labels, "Leave semantic classes out");
+    columns.add(scans, "");
+  }
+
+  void add_poses(CLI::App* scans) {
+    scans->add_option("--poses", choice.poses,
+                      "Poses of the sensor (TUM: t x y z qx qy qz qw) for files, or instead of a "
+                      "dataset's");
+    const std::map<std::string, PoseOrder> orders{{"line", PoseOrder::Line},
+                                                  {"name", PoseOrder::Name}};
+    scans
+        ->add_option("--pose-by", choice.order,
+                     "Which pose is a file's: that of its line, or by the stamp that is its name")
+        ->transform(CLI::CheckedTransformer(orders))
+        ->option_text("line|name");
+    const std::map<std::string, LidarSpec::Points> frames_of{
+        {"as_fired", LidarSpec::Points::AsFired}, {"at_stamp", LidarSpec::Points::AtStamp}};
+    scans
+        ->add_option("--points", choice.points,
+                     "In which frame points are: the sensor's as each was measured, or at the "
+                     "scan's stamp")
+        ->transform(CLI::CheckedTransformer(frames_of))
+        ->option_text("as_fired|at_stamp");
+  }
+
+  void close() {
+    choice.frames = parse_frames(frames);
+    taking.columns = columns.reading();
+    choice.conf_unit_m = taking.columns.unit_m;
+    if (leaves_labels) taking.labels = LabelUse::Leave;
+  }
+};
+
+// What is taken for surface, and for one surface.
+struct SurfaceOptions {
+  std::optional<Preset> preset;
+  std::optional<double> incidence_deg, longest_m, noise_sds;
+  std::optional<double> turned_deg, perimeter_m;
+  bool is_unorganised = false;
+  MergeLimits merging;
+
+  void add(CLI::App* command) {
+    CLI::App* surface = command->add_option_group("Surface");
+    const std::map<std::string, Preset> presets{
+        {"ground", Preset::Ground}, {"strict", Preset::Strict}, {"object", Preset::Object}};
+    surface
+        ->add_option("--preset", preset,
+                     "Between which returns there is surface: ground (88 deg, 3 m), strict (85 "
+                     "deg, 2 m), object (75.5 deg)")
+        ->transform(CLI::CheckedTransformer(presets))
+        ->option_text("ground|strict|object");
+    surface
+        ->add_option("--incidence-deg", incidence_deg, "Angle of incidence at most, instead of its")
+        ->check(CLI::Range(0.0, 90.0));
+    surface->add_option("--longest-m", longest_m, "Edges at most")->check(CLI::PositiveNumber);
+    surface
+        ->add_option("--noise-sds", noise_sds,
+                     "How many standard deviations of range an edge may owe to noise")
+        ->check(CLI::NonNegativeNumber);
+    auto* unorganised = surface->add_flag(
+        "--unorganised", is_unorganised,
+        "Points have no order: join them by CGAL's advancing front, scans and all at once");
+    surface->add_option("--perimeter-m", perimeter_m, "Of such a triangle, at most (3)")
+        ->check(CLI::PositiveNumber)
+        ->needs(unorganised);
+    surface
+        ->add_option("--merge-sds", merging.noise_sds,
+                     "How many standard deviations of both one surface may be apart in two scans")
+        ->check(CLI::NonNegativeNumber);
+    surface->add_option("--apart-m", merging.apart_m, "And this besides: what poses are off")
+        ->check(CLI::NonNegativeNumber);
+    surface->add_option("--turned-deg", turned_deg, "And how far it may be turned")
+        ->check(CLI::Range(0.0, 180.0));
+  }
+
+  Meshing meshing() const {
+    constexpr double usual_perimeter_m = 3;
+    Meshing meshing{.incidence_rad = radians(incidence_deg),
+                    .longest_m = longest_m,
+                    .noise_sds = noise_sds,
+                    .merging = merging};
+    if (turned_deg) meshing.merging.turned_rad = *turned_deg * radians_per_degree;
+    if (is_unorganised) meshing.perimeter_m = perimeter_m.value_or(usual_perimeter_m);
+    if (preset == Preset::Ground) meshing.screening = ScreeningLimits::ground();
+    if (preset == Preset::Strict) meshing.screening = ScreeningLimits::strict();
+    if (preset == Preset::Object) meshing.screening = ScreeningLimits::object();
+    return meshing;
+  }
+};
+
+// Where simplification halts: one of these.
+struct HaltOptions {
+  std::optional<double> vertical_m, error_m, border_m, sds, crease_deg;
+  std::optional<std::size_t> triangles;
+  bool at_knee = false;
+
+  enum class Need { One, None };
+
+  void add(CLI::App* command, Need need) {
+    CLI::App* halt = command->add_option_group(
+        "Simplify", "Until one of these; the error is measured and told in any case");
+    CLI::App* one = halt->add_option_group("Halt");
+    one->add_option("--max-vertical-error-m", vertical_m,
+                    "Of terrain: until a vertex would be farther above or below")
+        ->check(CLI::PositiveNumber);
+    one->add_option("--max-error-m", error_m, "Until a point of either would be farther away")
+        ->check(CLI::PositiveNumber);
+    one->add_option("--triangles", triangles, "Until so many are left")->check(CLI::PositiveNumber);
+    one->add_option("--noise-halt", sds,
+                    "Until the error is so many standard deviations of the measurements")
+        ->check(CLI::PositiveNumber);
+    one->add_flag("--knee", at_knee, "Until errors begin to rise faster than triangles go");
+    one->require_option(need == Need::One ? 1 : 0, 1);
+    halt->add_option("--border-m", border_m, "How far borders may move; else as the error")
+        ->check(CLI::NonNegativeNumber);
+    halt->add_option("--crease-deg", crease_deg, "Keep edges that are sharper (60)")
+        ->check(CLI::PositiveNumber);
+  }
+
+  std::optional<Halt> halt() const {
+    if (vertical_m) return VerticalBound{*vertical_m, border_m.value_or(*vertical_m)};
+    if (error_m) return DistanceBound{*error_m, border_m.value_or(*error_m)};
+    if (triangles) return FaceBudget{*triangles};
+    if (sds) return NoiseBound{*sds};
+    if (at_knee) return CostKnee{};
+    return std::nullopt;
+  }
+
+  SimplifyOptions options() const {
+    SimplifyOptions options;
+    if (crease_deg) options.crease_rad = *crease_deg * radians_per_degree;
+    return options;
+  }
+};
+
+// What all of them write, and how much memory they may take.
+struct OutputOptions {
+  RebuildOutput output;
+  std::optional<std::uint64_t> memory_mb;
+
+  void add(CLI::App* command) {
+    command
+        ->add_option("-o,--output", output.mesh,
+                     "Mesh to write: .ply (doubles, and what is known of vertices), .obj, .stl or "
+                     ".glb")
+        ->required();
+    command->add_option("--report", output.report, "JSON file for all figures");
+    command->add_option("--memory-mb", memory_mb, "Begin no work that would take more")
+        ->check(CLI::PositiveNumber);
+  }
+
+  void close(const std::string& command, const std::vector<fs::path>& inputs) {
+    std::string all;
+    for (const fs::path& input : inputs) all += (all.empty() ? "" : " ") + input.string();
+    output.facts = {{"version", GROUNDRAY_VERSION}, {"command", command}, {"input", all}};
+  }
+
+  void limit(Finishing& finishing) const {
+    constexpr std::size_t bytes_per_mb = 1'000'000;
+    if (memory_mb) finishing.most_bytes = *memory_mb * bytes_per_mb;
+  }
+};
+
+}  // namespace
+
+struct ReconstructCommands::Options {
+  CLI::App *all = nullptr, *mesh = nullptr, *simplify = nullptr, *fill = nullptr;
+  ScanOptions scans;
+  SurfaceOptions surface;
+  std::array<HaltOptions, 2> halt;  // of mesh, of simplify
+  std::array<OutputOptions, 3> out;
+  std::optional<double> fill_m, sd_m;
+  fs::path input;  // of simplify and fill
+
+  void add_mesh() {
+    mesh = all->add_subcommand("mesh", "Link scans to meshes, screen and merge them to one");
+    mesh->add_option("INPUT", scans.choice.inputs,
+                     "A dataset folder; or scans (.ply .pcd .npy .npz .bin); or a .conf of "
+                     "Stanford's range scans")
+        ->required();
+    out[0].add(mesh);
+    mesh->add_option("--occlusion", out[0].output.occlusion,
+                     "Mesh for what beams passed by: links that were not taken for surface");
+    scans.add(mesh);
+    surface.add(mesh);
+    add_fill(mesh)->required(false);
+    halt[0].add(mesh, HaltOptions::Need::None);
+  }
+
+  CLI::Option* add_fill(CLI::App* command) {
+    return command->add_option("--fill-m", fill_m, "Fill holes whose rim is no longer than this")
+        ->check(CLI::PositiveNumber);
+  }
+
+  void add_simplify() {
+    simplify = all->add_subcommand("simplify", "Simplify a mesh within bounds");
+    add_input(simplify);
+    out[1].add(simplify);
+    simplify->add_option("--sd-m", sd_m, "Standard deviation of vertices, if the mesh tells none")
+        ->check(CLI::PositiveNumber);
+    halt[1].add(simplify, HaltOptions::Need::One);
+  }
+
+  void add_filling() {
+    fill = all->add_subcommand("fill", "Fill the holes of a mesh");
+    add_input(fill);
+    out[2].add(fill);
+    add_fill(fill)->required();
+  }
+
+  void add_input(CLI::App* command) {
+    command->add_option("MESH", input, "Any .ply, .obj, .stl, .gltf or .glb")->required();
+  }
+
+  void run_mesh() {
+    scans.close();
+    out[0].close("reconstruct mesh", scans.choice.inputs);
+    Finishing finishing{
+        .fill_m = fill_m, .halt = halt[0].halt(), .simplify = halt[0].options(), .sd_m = {}};
+    out[0].limit(finishing);
+    rebuild_mesh(scans.choice, scans.taking, surface.meshing(), finishing, out[0].output);
+  }
+
+  void run_finish() {
+    const bool is_simplify = simplify->parsed();
+    OutputOptions& to = out[is_simplify ? 1 : 2];
+    to.close(is_simplify ? "reconstruct simplify" : "reconstruct fill", {input});
+    Finishing finishing{
+        .fill_m = fill_m, .halt = halt[1].halt(), .simplify = halt[1].options(), .sd_m = sd_m};
+    to.limit(finishing);
+    finish_mesh(input, finishing, to.output);
+  }
+};
+
+ReconstructCommands::ReconstructCommands(CLI::App& app) : options_(std::make_unique<Options>()) {
+  options_->all = app.add_subcommand("reconstruct", "Meshes from scans (docs/reconstruction.md)");
+  options_->all->require_subcommand(1);
+  options_->add_mesh();
+  options_->add_simplify();
+  options_->add_filling();
+}
+
+ReconstructCommands::~ReconstructCommands() = default;
+
+bool ReconstructCommands::is_asked_for() const { return options_->all->parsed(); }
+
+void ReconstructCommands::run() const {
+  if (options_->mesh->parsed()) return options_->run_mesh();
+  options_->run_finish();
+}
+
+}  // namespace groundray

@@ -1,0 +1,56 @@
+#include "apps/scan/scan_flags.h"
+
+#include <chrono>
+#include <cmath>
+#include <glm/gtc/quaternion.hpp>
+
+#include "core/error.h"
+
+namespace groundray {
+namespace {
+
+/// @param option  that gave the numbers x, y, z, qx, qy, qz, qw.
+Pose sensor_pose(const std::vector<double>& numbers, const std::string& option) {
+  constexpr double most_off = 1e-3;  // what three decimals leave
+  const glm::dquat rotation(numbers[6], numbers[3], numbers[4], numbers[5]);
+  const double norm = glm::length(rotation);
+  if (!(std::abs(norm - 1) <= most_off)) {
+    throw Error(
+        "{}: the length of its quaternion, the last four numbers, is {:.6g}; it must be 1: are "
+        "they in the order qx,qy,qz,qw?",
+        option, norm);
+  }
+  return {.rotation = rotation / norm, .translation_m = {numbers[0], numbers[1], numbers[2]}};
+}
+
+}  // namespace
+
+void ScanFlags::add(CLI::App* group, const std::string& prefix) {
+  whose_ = prefix;
+  group->add_option("--" + prefix + "unit-m", unit_m_, "Unit of x, y and z, in metres")
+      ->check(CLI::PositiveNumber);
+  group->add_option("--" + prefix + "time-unit-s", time_unit_s_, "Unit of time, in seconds")
+      ->check(CLI::PositiveNumber);
+  group->add_option("--" + prefix + "time-zero-s", time_zero_s_,
+                    "What the clock shows at the scan's stamp");
+  auto* posed = group
+                    ->add_option("--" + prefix + "sensor-pose", pose_,
+                                 "x,y,z,qx,qy,qz,qw of the sensor in the frame of the points")
+                    ->delimiter(',')
+                    ->expected(7);
+  group->add_flag("--" + prefix + "viewpoint", viewpoint_, "The pose is PCD's VIEWPOINT")
+      ->excludes(posed);
+  group->add_option("--" + prefix + "columns", columns_, "Names of columns that have none")
+      ->delimiter(',');
+}
+
+ScanReading ScanFlags::reading() const {
+  ScanReading reading{
+      .unit_m = unit_m_, .time_unit_s = time_unit_s_, .X_FS = {}, .columns = columns_};
+  reading.time_zero = std::chrono::nanoseconds(std::llround(time_zero_s_ * 1e9));
+  if (viewpoint_) reading.X_FS = FileViewpoint{};
+  if (!pose_.empty()) reading.X_FS = sensor_pose(pose_, "--" + whose_ + "sensor-pose");
+  return reading;
+}
+
+}  // namespace groundray

@@ -1,0 +1,31 @@
+#pragma once
+
+#include <CLI/CLI.hpp>
+#include <optional>
+#include <string>
+#include <vector>
+
+#include "apps/scan/scan.h"
+
+namespace groundray {
+
+/// What a command line says of files of points, beside their names.
+class ScanFlags {
+ public:
+  /// Adds the options to a group, each name with `prefix` after the dashes.
+  void add(CLI::App* group, const std::string& prefix);
+
+  /// @throws Error if the pose's quaternion is not of length 1.
+  ScanReading reading() const;
+
+ private:
+  std::string whose_;  // the prefix
+  double unit_m_ = 1;
+  std::optional<double> time_unit_s_;
+  double time_zero_s_ = 0;
+  std::vector<double> pose_;
+  bool viewpoint_ = false;
+  std::vector<std::string> columns_;
+};
+
+}  // namespace groundray
