@@ -51,7 +51,7 @@ glm::ivec2 BorderGrid::cell_of(const glm::dvec2& p_m) const noexcept {
 }
 
 bool BorderGrid::has_any(const CollapsibleMesh& mesh, const std::array<Entry, 3>& corners) const {
-  const auto& [a, b, c] = corners;
+  const Entry &a = corners[0], &b = corners[1], &c = corners[2];
   const glm::ivec2 low = cell_of(glm::min(a.p_m, glm::min(b.p_m, c.p_m)));
   const glm::ivec2 high = cell_of(glm::max(a.p_m, glm::max(b.p_m, c.p_m)));
   const auto is_within = [&](const Entry& entry) {

@@ -150,7 +150,7 @@ def test_certify_prints_how_far_each_level_deviates(tmp_path):
 @pytest.mark.parametrize(
     ("arguments", "words"),
     [
-        (["-o", "m.stl", "--max-error-m", "1"], ".ply, .obj or .glb"),
+        (["-o", "m.xyz", "--max-error-m", "1"], ".ply, .obj, .stl or .glb"),
         (["-o", "no/such/folder/m.ply", "--max-error-m", "1"], "m.ply"),
     ],
 )
