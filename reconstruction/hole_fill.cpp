@@ -130,14 +130,16 @@ class Filler {
 
   // Shortest first: where patches are in each other's way the shorter rim's stays.
   std::vector<Candidate> sort_out() {
-    std::vector<Candidate> candidates;
+    std::vector<std::size_t> chains;
     for (std::size_t i = 0; i < rims_.chains.size(); ++i) {
       rim_.push_back(rim_of(mesh_.shape, rims_.chains[i]));
       why_.push_back(why_left(mesh_.shape, pairs_, rims_.chains[i], rim_[i], limits_));
-      if (!why_[i]) candidates.push_back({.chain = i, .bridged = {rim_[i].vertices, {}}});
+      if (!why_[i]) chains.push_back(i);
     }
-    std::ranges::stable_sort(candidates, {},
-                             [&](const Candidate& c) { return rim_[c.chain].length_m; });
+    std::ranges::stable_sort(chains, {}, [&](std::size_t i) { return rim_[i].length_m; });
+    std::vector<Candidate> candidates;
+    for (const std::size_t i : chains)
+      candidates.push_back({.chain = i, .bridged = {rim_[i].vertices, {}}});
     return candidates;
   }
 
@@ -279,16 +281,18 @@ class Filler {
             .is_smooth = candidate.shape == PatchShape::Smooth};
   }
 
-  void report(std::vector<Candidate>& candidates, FilledMesh& out) {
+  void report(const std::vector<Candidate>& candidates, FilledMesh& out) {
     out.measured_vertices = mesh_.shape.vertices_m.size();
     out.measured_triangles = mesh_.shape.triangles.size();
-    std::ranges::sort(candidates, {}, &Candidate::chain);
-    for (const Candidate& candidate : candidates) {
-      if (candidate.is_done) {
-        out.filled.push_back(added(candidate));
-        for (const std::size_t outline : candidate.islands) why_[outline].reset();
+    std::vector<const Candidate*> by_chain;
+    for (const Candidate& candidate : candidates) by_chain.push_back(&candidate);
+    std::ranges::sort(by_chain, {}, &Candidate::chain);
+    for (const Candidate* const candidate : by_chain) {
+      if (candidate->is_done) {
+        out.filled.push_back(added(*candidate));
+        for (const std::size_t outline : candidate->islands) why_[outline].reset();
       } else {
-        why_[candidate.chain] = candidate.why;
+        why_[candidate->chain] = candidate->why;
       }
     }
     for (std::size_t i = 0; i < why_.size(); ++i) {
