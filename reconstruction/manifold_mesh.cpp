@@ -13,6 +13,10 @@ namespace {
 struct Buckets {
   std::vector<std::uint32_t> begins;  // of each bucket, and the end of the last
   std::vector<std::uint32_t> items;
+
+  std::span<const std::uint32_t> at(std::size_t bucket) const {
+    return std::span(items).subspan(begins[bucket], begins[bucket + 1] - begins[bucket]);
+  }
 };
 
 // `bucket_of` may say `none`: such a thing is left out.
@@ -31,6 +35,8 @@ Buckets sorted_in(std::size_t buckets, std::size_t things, const BucketOf& bucke
   return sorted;
 }
 
+bool is_degenerate(const glm::uvec3& t) { return t.x == t.y || t.y == t.z || t.z == t.x; }
+
 // The vertices beginning at the least: equal for triangles that differ in where they begin alone.
 std::array<std::uint32_t, 3> rotated(const glm::uvec3& t) {
   if (t.x <= t.y && t.x <= t.z) return {t.x, t.y, t.z};
@@ -38,23 +44,19 @@ std::array<std::uint32_t, 3> rotated(const glm::uvec3& t) {
   return {t.z, t.x, t.y};
 }
 
-void find_dropped(const TriangleMesh& mesh, EdgePairs& pairs) {
-  const auto& triangles = mesh.triangles;
+void find_dropped(std::span<const glm::uvec3> triangles, std::size_t vertices, EdgePairs& pairs) {
   pairs.is_dropped.assign(triangles.size(), false);
-  const Buckets by_least =
-      sorted_in(mesh.vertices_m.size(), triangles.size(),
-                [&](std::uint32_t i) { return rotated(triangles[i]).front(); });
+  const Buckets by_least = sorted_in(
+      vertices, triangles.size(), [&](std::uint32_t i) { return rotated(triangles[i]).front(); });
   std::vector<std::pair<std::array<std::uint32_t, 3>, std::uint32_t>> alike;
-  for (std::size_t bucket = 0; bucket < mesh.vertices_m.size(); ++bucket) {
+  for (std::size_t bucket = 0; bucket < vertices; ++bucket) {
     alike.clear();
-    for (std::uint32_t k = by_least.begins[bucket]; k < by_least.begins[bucket + 1]; ++k)
-      alike.emplace_back(rotated(triangles[by_least.items[k]]), by_least.items[k]);
+    for (const std::uint32_t i : by_least.at(bucket)) alike.emplace_back(rotated(triangles[i]), i);
     std::ranges::sort(alike);
     for (std::size_t k = 0; k < alike.size(); ++k) {
       const auto& [corners, triangle] = alike[k];
-      pairs.is_dropped[triangle] = corners[0] == corners[1] || corners[1] == corners[2] ||
-                                   corners[2] == corners[0] ||
-                                   (k > 0 && alike[k - 1].first == corners);
+      pairs.is_dropped[triangle] =
+          is_degenerate(triangles[triangle]) || (k > 0 && alike[k - 1].first == corners);
     }
   }
   pairs.dropped =
@@ -62,9 +64,10 @@ void find_dropped(const TriangleMesh& mesh, EdgePairs& pairs) {
 }
 
 // Pairs the half-edges that share both their ends.
-void pair_alike(const TriangleMesh& mesh, std::span<const HalfEdge> alike, EdgePairs& pairs) {
+void pair_alike(std::span<const glm::uvec3> triangles, std::span<const HalfEdge> alike,
+                EdgePairs& pairs) {
   if (alike.size() == 1) return;
-  if (alike.size() == 2 && corner_of(mesh, alike[0]) != corner_of(mesh, alike[1])) {
+  if (alike.size() == 2 && corner_of(triangles, alike[0]) != corner_of(triangles, alike[1])) {
     pairs.twins[alike[0]] = alike[1];
     pairs.twins[alike[1]] = alike[0];
     return;
@@ -75,30 +78,29 @@ void pair_alike(const TriangleMesh& mesh, std::span<const HalfEdge> alike, EdgeP
 
 }  // namespace
 
-EdgePairs pair_edges(const TriangleMesh& mesh) {
+EdgePairs pair_edges(std::span<const glm::uvec3> triangles, std::size_t vertices) {
   EdgePairs pairs;
-  const std::size_t half_edges = 3 * mesh.triangles.size();
+  const std::size_t half_edges = 3 * triangles.size();
   pairs.twins.assign(half_edges, none);
   pairs.is_tangled.assign(half_edges, false);
-  find_dropped(mesh, pairs);
-  const Buckets by_lesser = sorted_in(mesh.vertices_m.size(), half_edges, [&](HalfEdge h) {
-    return pairs.is_dropped[h / 3] ? none
-                                   : std::min(corner_of(mesh, h), corner_of(mesh, next_of(h)));
+  find_dropped(triangles, vertices, pairs);
+  const auto ends = [&](HalfEdge h) {
+    return std::minmax({corner_of(triangles, h), corner_of(triangles, next_of(h))});
+  };
+  const Buckets by_lesser = sorted_in(vertices, half_edges, [&](HalfEdge h) {
+    return pairs.is_dropped[h / 3] ? none : ends(h).first;
   });
   std::vector<std::pair<std::uint32_t, HalfEdge>> here;  // greater end first
   std::vector<HalfEdge> alike;
-  for (std::size_t bucket = 0; bucket < mesh.vertices_m.size(); ++bucket) {
+  for (std::size_t bucket = 0; bucket < vertices; ++bucket) {
     here.clear();
-    for (std::uint32_t k = by_lesser.begins[bucket]; k < by_lesser.begins[bucket + 1]; ++k) {
-      const HalfEdge h = by_lesser.items[k];
-      here.emplace_back(std::max(corner_of(mesh, h), corner_of(mesh, next_of(h))), h);
-    }
+    for (const HalfEdge h : by_lesser.at(bucket)) here.emplace_back(ends(h).second, h);
     std::ranges::sort(here);
     for (std::size_t k = 0; k < here.size();) {
       alike.clear();
       const std::uint32_t greater = here[k].first;
       for (; k < here.size() && here[k].first == greater; ++k) alike.push_back(here[k].second);
-      pair_alike(mesh, alike, pairs);
+      pair_alike(triangles, alike, pairs);
     }
   }
   return pairs;
@@ -110,78 +112,77 @@ HalfEdge next_border(const EdgePairs& pairs, HalfEdge border) {
   return h;
 }
 
-namespace {
-
-// Gives each fan of triangles round a vertex a vertex of its own; the first fan keeps the vertex.
-class FanSplitter {
- public:
-  FanSplitter(const TriangleMesh& mesh, const EdgePairs& pairs)
-      : mesh_(mesh), pairs_(pairs), fans_(3 * mesh.triangles.size(), none) {}
-
-  ManifoldMesh split() {
-    std::vector<bool> is_used(mesh_.vertices_m.size(), false);
-    std::vector<std::uint32_t> extra;  // sources of copies
-    for (HalfEdge h = 0; h < fans_.size(); ++h) {
-      if (pairs_.is_dropped[h / 3] || fans_[h] != none) continue;
-      const std::uint32_t vertex = corner_of(mesh_, h);
-      if (!is_used[vertex]) {
-        is_used[vertex] = true;
-        mark(h, vertex);
-      } else {
-        mark(h, static_cast<std::uint32_t>(mesh_.vertices_m.size() + extra.size()));
-        extra.push_back(vertex);
-      }
+std::vector<std::uint32_t> part_fans(std::vector<glm::uvec3>& triangles, std::size_t vertices,
+                                     const EdgePairs& pairs) {
+  std::vector<std::uint32_t> added;
+  std::vector<bool> is_taken(vertices, false), is_seen(3 * triangles.size(), false);
+  std::uint32_t vertex = none;
+  const auto take = [&](HalfEdge corner) {
+    is_seen[corner] = true;
+    triangles[corner / 3][static_cast<int>(corner % 3)] = vertex;
+  };
+  for (HalfEdge corner = 0; corner < is_seen.size(); ++corner) {
+    if (pairs.is_dropped[corner / 3] || is_seen[corner]) continue;
+    vertex = corner_of(triangles, corner);
+    if (is_taken[vertex]) {
+      added.push_back(vertex);
+      vertex = static_cast<std::uint32_t>(vertices + added.size() - 1);
+    } else {
+      is_taken[vertex] = true;
     }
-    return numbered(is_used, extra);
-  }
-
- private:
-  // Says for all corners of the fan at the beginning of `h` which vertex they get.
-  void mark(HalfEdge h, std::uint32_t vertex) {
-    for (HalfEdge to = h; to != none && fans_[to] == none;) {
-      fans_[to] = vertex;
-      to = pairs_.twins[before(to)];
-    }
-    for (HalfEdge to = pairs_.twins[h]; to != none && fans_[next_of(to)] == none;) {
-      fans_[next_of(to)] = vertex;
-      to = pairs_.twins[next_of(to)];
+    for (HalfEdge h = corner; h != none && !is_seen[h]; h = pairs.twins[before(h)]) take(h);
+    for (HalfEdge h = pairs.twins[corner]; h != none && !is_seen[next_of(h)];) {
+      take(next_of(h));
+      h = pairs.twins[next_of(h)];
     }
   }
+  return added;
+}
 
-  ManifoldMesh numbered(const std::vector<bool>& is_used,
-                        const std::vector<std::uint32_t>& extra) const {
-    ManifoldMesh out;
-    std::vector<std::uint32_t> numbers(is_used.size() + extra.size(), none);
-    const auto add = [&](std::size_t vertex, std::uint32_t source) {
-      numbers[vertex] = static_cast<std::uint32_t>(out.sources.size());
-      out.sources.push_back(source);
-      out.shape.vertices_m.push_back(mesh_.vertices_m[source]);
-    };
-    for (std::uint32_t i = 0; i < is_used.size(); ++i) {
-      if (is_used[i]) add(i, i);
-    }
-    for (std::size_t i = 0; i < extra.size(); ++i) add(is_used.size() + i, extra[i]);
-    for (std::size_t t = 0; t < mesh_.triangles.size(); ++t) {
-      if (pairs_.is_dropped[t]) continue;
-      out.shape.triangles.emplace_back(numbers[fans_[3 * t]], numbers[fans_[3 * t + 1]],
-                                       numbers[fans_[3 * t + 2]]);
-    }
-    out.tangled_edges = pairs_.tangled_edges;
-    out.dropped = pairs_.dropped;
-    out.copies = extra.size();
-    return out;
+std::size_t drop_conflicts(std::vector<glm::uvec3>& triangles, std::size_t vertices) {
+  const Buckets by_begin = sorted_in(vertices, 3 * triangles.size(),
+                                     [&](HalfEdge h) { return corner_of(triangles, h); });
+  std::vector<bool> is_out(triangles.size());
+  const auto runs_as_an_earlier = [&](HalfEdge h) {
+    const std::uint32_t end = corner_of(triangles, next_of(h));
+    const auto same = by_begin.at(corner_of(triangles, h));
+    return std::ranges::any_of(same, [&](HalfEdge other) {
+      return other / 3 < h / 3 && !is_out[other / 3] && corner_of(triangles, next_of(other)) == end;
+    });
+  };
+  for (std::uint32_t i = 0; i < triangles.size(); ++i)
+    is_out[i] = is_degenerate(triangles[i]) || runs_as_an_earlier(3 * i) ||
+                runs_as_an_earlier(3 * i + 1) || runs_as_an_earlier(3 * i + 2);
+  std::size_t kept = 0;
+  for (std::size_t i = 0; i < triangles.size(); ++i) {
+    if (!is_out[i]) triangles[kept++] = triangles[i];
   }
-
-  const TriangleMesh& mesh_;
-  const EdgePairs& pairs_;
-  std::vector<std::uint32_t> fans_;  // of each half-edge: the vertex at its beginning
-};
-
-}  // namespace
+  const std::size_t dropped = triangles.size() - kept;
+  triangles.resize(kept);
+  return dropped;
+}
 
 ManifoldMesh cut_to_manifold(const TriangleMesh& mesh) {
-  ManifoldMesh out = FanSplitter(mesh, pair_edges(mesh)).split();
-  out.pairs = pair_edges(out.shape);
+  const std::size_t vertices = mesh.vertices_m.size();
+  const EdgePairs pairs = pair_edges(mesh.triangles, vertices);
+  std::vector<glm::uvec3> triangles = mesh.triangles;
+  const std::vector<std::uint32_t> added = part_fans(triangles, vertices, pairs);
+  ManifoldMesh out{
+      .tangled_edges = pairs.tangled_edges, .dropped = pairs.dropped, .copies = added.size()};
+  std::vector<std::uint32_t> numbers(vertices + added.size(), none);
+  for (std::size_t i = 0; i < triangles.size(); ++i) {
+    if (pairs.is_dropped[i]) continue;
+    out.shape.triangles.push_back(triangles[i]);
+    for (int k = 0; k < 3; ++k) numbers[triangles[i][k]] = 0;  // it is used
+  }
+  for (std::uint32_t i = 0; i < numbers.size(); ++i) {
+    if (numbers[i] == none) continue;
+    numbers[i] = static_cast<std::uint32_t>(out.sources.size());
+    out.sources.push_back(i < vertices ? i : added[i - vertices]);
+    out.shape.vertices_m.push_back(mesh.vertices_m[out.sources.back()]);
+  }
+  for (glm::uvec3& t : out.shape.triangles) t = {numbers[t.x], numbers[t.y], numbers[t.z]};
+  out.pairs = pair_edges(out.shape.triangles, out.shape.vertices_m.size());
   return out;
 }
 

@@ -2,7 +2,9 @@
 
 #include <cstddef>
 #include <cstdint>
+#include <glm/vec3.hpp>
 #include <limits>
+#include <span>
 #include <vector>
 
 #include "core/mesh.h"
@@ -20,8 +22,8 @@ constexpr HalfEdge next_of(HalfEdge h) { return h % 3 == 2 ? h - 2 : h + 1; }
 constexpr HalfEdge before(HalfEdge h) { return h % 3 == 0 ? h + 2 : h - 1; }
 
 /// Returns the vertex at which a half-edge begins.
-inline std::uint32_t corner_of(const TriangleMesh& mesh, HalfEdge h) {
-  return mesh.triangles[h / 3][static_cast<int>(h % 3)];
+inline std::uint32_t corner_of(std::span<const glm::uvec3> triangles, HalfEdge h) {
+  return triangles[h / 3][static_cast<int>(h % 3)];
 }
 
 /// Which edges of a mesh are one surface's.
@@ -38,11 +40,23 @@ struct EdgePairs {
 /// Pairs the edges of triangles: an edge of two triangles that run it in opposite directions joins
 /// them. Any other is a border of each of its triangles. Triangles that name a vertex twice, and
 /// those that repeat another with the same winding, take no part.
-/// @param mesh  as check_mesh asks; of fewer than 1.4e9 triangles.
-EdgePairs pair_edges(const TriangleMesh& mesh);
+/// @param triangles  fewer than 1.4e9.
+/// @param vertices   how many there are: every corner's number is less.
+EdgePairs pair_edges(std::span<const glm::uvec3> triangles, std::size_t vertices);
 
 /// Returns the border that ends where `border` begins, round the triangles that are joined there.
 HalfEdge next_border(const EdgePairs& pairs, HalfEdge border);
+
+/// Gives each fan of triangles at a vertex a vertex of its own, but for the first, which keeps it.
+/// Returns of each vertex that is added the one whose place it has; they are numbered on from
+/// `vertices`.
+/// @param pairs  of the triangles.
+std::vector<std::uint32_t> part_fans(std::vector<glm::uvec3>& triangles, std::size_t vertices,
+                                     const EdgePairs& pairs);
+
+/// Leaves out triangles that name a vertex twice, and those that run along an edge as an earlier
+/// one does: no edge is tangled then. Returns how many.
+std::size_t drop_conflicts(std::vector<glm::uvec3>& triangles, std::size_t vertices);
 
 /// A mesh whose every edge has one or two triangles, wound alike, and every vertex one fan of them.
 struct ManifoldMesh {
@@ -54,8 +68,8 @@ struct ManifoldMesh {
   std::size_t copies = 0;              ///< vertices that were added, for theirs joined several fans
 };
 
-/// Cuts a mesh where it is no manifold. Nothing moves; what is a manifold stays as it is but for
-/// vertices that no triangle has.
+/// Cuts a mesh where it is no manifold. It must be as check_mesh asks. Nothing moves; what is a
+/// manifold stays as it is but for vertices that no triangle has.
 ManifoldMesh cut_to_manifold(const TriangleMesh& mesh);
 
 }  // namespace groundray

@@ -14,8 +14,8 @@
 #include "apps/groundray/stage.h"
 #include "core/error.h"
 #include "core/product_io.h"
-#include "reconstruction/advancing_front.h"
 #include "reconstruction/measured_mesh_io.h"
+#include "reconstruction/scan/advancing_front.h"
 
 namespace groundray {
 namespace {

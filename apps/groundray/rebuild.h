@@ -9,10 +9,10 @@
 
 #include "apps/groundray/scan_files.h"
 #include "apps/groundray/scan_input.h"
-#include "reconstruction/hole_fill.h"
-#include "reconstruction/mesh_merge.h"
-#include "reconstruction/scan_mesh.h"
-#include "reconstruction/simplify.h"
+#include "reconstruction/holes/hole_fill.h"
+#include "reconstruction/merge/mesh_merge.h"
+#include "reconstruction/scan/scan_mesh.h"
+#include "reconstruction/simplify/simplify.h"
 
 namespace groundray {
 

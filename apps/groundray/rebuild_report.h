@@ -9,10 +9,10 @@
 #include <vector>
 
 #include "core/mesh_io.h"
-#include "reconstruction/hole_fill.h"
-#include "reconstruction/mesh_merge.h"
-#include "reconstruction/simplify.h"
-#include "reconstruction/two_sided_error.h"
+#include "reconstruction/accuracy/two_sided_error.h"
+#include "reconstruction/holes/hole_fill.h"
+#include "reconstruction/merge/mesh_merge.h"
+#include "reconstruction/simplify/simplify.h"
 
 namespace groundray {
 

@@ -12,7 +12,7 @@
 
 #include "apps/groundray/packed_file.h"
 #include "core/error.h"
-#include "reconstruction/range_grid.h"
+#include "reconstruction/scan/range_grid.h"
 
 namespace groundray {
 namespace {

@@ -9,7 +9,7 @@
 
 #include "apps/groundray/scan_files.h"
 #include "apps/scan/scan.h"
-#include "reconstruction/organised_scan.h"
+#include "reconstruction/scan/organised_scan.h"
 
 namespace groundray {
 

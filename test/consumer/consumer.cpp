@@ -1,8 +1,8 @@
 // Uses something of each library, through the installed headers alone.
 #include <groundray/core/pose.h>
 #include <groundray/core/ray_tracer.h>
-#include <groundray/reconstruction/accuracy.h>
-#include <groundray/reconstruction/lindstrom_turk.h>
+#include <groundray/reconstruction/accuracy/accuracy.h>
+#include <groundray/reconstruction/simplify/lindstrom_turk.h>
 #include <groundray/sensors/scan_pattern.h>
 #include <groundray/terrain/terrain_scene.h>
 

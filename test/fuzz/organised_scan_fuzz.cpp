@@ -5,7 +5,7 @@
 #include <span>
 
 #include "core/error.h"
-#include "reconstruction/scan_mesh.h"
+#include "reconstruction/scan/scan_mesh.h"
 
 namespace {
 

@@ -3,8 +3,8 @@
 #include <string_view>
 
 #include "core/error.h"
-#include "reconstruction/range_grid.h"
-#include "reconstruction/scan_mesh.h"
+#include "reconstruction/scan/range_grid.h"
+#include "reconstruction/scan/scan_mesh.h"
 
 /// Whatever the bytes, parse_range_grid returns a scan that link takes or throws Error.
 extern "C" int LLVMFuzzerTestOneInput(const std::uint8_t* data, std::size_t size) {

@@ -14,6 +14,8 @@
 namespace groundray {
 namespace {
 
+using ::testing::Each;
+using ::testing::ElementsAre;
 using ::testing::IsEmpty;
 
 TriangleMesh some_points(std::size_t count) {
@@ -30,7 +32,7 @@ void expect_borders_close(const TriangleMesh& mesh, const EdgePairs& pairs) {
     } else {
       const HalfEdge next = next_border(pairs, h);
       EXPECT_EQ(pairs.twins[next], none);
-      EXPECT_EQ(corner_of(mesh, next_of(next)), corner_of(mesh, h));
+      EXPECT_EQ(corner_of(mesh.triangles, next_of(next)), corner_of(mesh.triangles, h));
     }
   }
 }
@@ -101,6 +103,51 @@ TEST(ManifoldMesh, IsASurfaceWhateverTheTriangles) {
     EXPECT_EQ(used.size(), cut.shape.vertices_m.size());
     for (std::size_t i = 0; i < cut.sources.size(); ++i)
       EXPECT_EQ(cut.shape.vertices_m[i], mesh.vertices_m[cut.sources[i]]);
+  }
+}
+
+TEST(EdgePairs, AreTheSameEdgeRunBack) {
+  const std::vector<glm::uvec3> triangles{{0, 1, 2}, {2, 1, 3}};
+  EXPECT_THAT(pair_edges(triangles, 4).twins, ElementsAre(none, 3, none, 1, none, none));
+}
+
+TEST(EdgePairs, AreNoneWhereThreeMeetOrWindingsDiffer) {
+  const std::vector<glm::uvec3> three{{0, 1, 2}, {1, 0, 3}, {1, 0, 4}};
+  EXPECT_THAT(pair_edges(three, 5).twins, Each(none));
+  const std::vector<glm::uvec3> against{{0, 1, 2}, {0, 1, 3}};
+  EXPECT_THAT(pair_edges(against, 4).twins, Each(none));
+}
+
+TEST(DropConflicts, LeavesOutLaterTrianglesAlongAnEdge) {
+  std::vector<glm::uvec3> triangles{{0, 1, 2}, {1, 0, 3}, {1, 0, 4}, {5, 5, 6}};
+  EXPECT_EQ(drop_conflicts(triangles, 7), 2u);
+  EXPECT_THAT(triangles, ElementsAre(glm::uvec3(0, 1, 2), glm::uvec3(1, 0, 3)));
+}
+
+TEST(PartFans, GivesEachAVertexOfItsOwn) {
+  std::vector<glm::uvec3> triangles{{0, 1, 2}, {0, 3, 4}, {0, 5, 6}, {0, 2, 7}};
+  EXPECT_THAT(part_fans(triangles, 8, pair_edges(triangles, 8)), ElementsAre(0, 0));
+  EXPECT_THAT(triangles, ElementsAre(glm::uvec3(0, 1, 2), glm::uvec3(8, 3, 4), glm::uvec3(9, 5, 6),
+                                     glm::uvec3(0, 2, 7)));
+}
+
+TEST(DropConflicts, AndPartFansMakeAnyTrianglesASurface) {
+  std::mt19937_64 random(1);
+  for (int i = 0; i < 200; ++i) {
+    const unsigned vertices = 4 + static_cast<unsigned>(i) % 30;
+    std::uniform_int_distribution<unsigned> any(0, vertices - 1);
+    TriangleMesh mesh = some_points(vertices);
+    for (int k = 0; k < 3 * i; ++k)
+      mesh.triangles.emplace_back(any(random), any(random), any(random));
+    const std::size_t before_it = mesh.triangles.size();
+    const std::size_t dropped = drop_conflicts(mesh.triangles, vertices);
+    EXPECT_EQ(mesh.triangles.size() + dropped, before_it);
+    const EdgePairs pairs = pair_edges(mesh.triangles, vertices);
+    EXPECT_EQ(pairs.tangled_edges + pairs.dropped, 0u);
+    const std::vector<std::uint32_t> added = part_fans(mesh.triangles, vertices, pairs);
+    mesh.vertices_m.resize(vertices + added.size());
+    EXPECT_THAT(testing::surface_faults(mesh), IsEmpty());
+    EXPECT_EQ(drop_conflicts(mesh.triangles, mesh.vertices_m.size()), 0u);
   }
 }
 

@@ -9,7 +9,7 @@
 #include <numbers>
 #include <vector>
 
-#include "reconstruction/organised_scan.h"
+#include "reconstruction/scan/organised_scan.h"
 
 namespace groundray::testing {
 

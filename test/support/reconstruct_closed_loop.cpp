@@ -13,10 +13,10 @@
 
 #include "core/mesh_io.h"
 #include "core/ply_io.h"
-#include "reconstruction/advancing_front.h"
-#include "reconstruction/mesh_merge.h"
-#include "reconstruction/organised_scan.h"
-#include "reconstruction/scan_mesh.h"
+#include "reconstruction/merge/mesh_merge.h"
+#include "reconstruction/scan/advancing_front.h"
+#include "reconstruction/scan/organised_scan.h"
+#include "reconstruction/scan/scan_mesh.h"
 #include "test/support/closed_loop_scene.h"
 
 namespace groundray::testing {

@@ -16,8 +16,8 @@
 #include "core/mesh_check.h"
 #include "core/mesh_io.h"
 #include "core/model.h"
-#include "reconstruction/accuracy.h"
-#include "reconstruction/agreement.h"
+#include "reconstruction/accuracy/accuracy.h"
+#include "reconstruction/accuracy/agreement.h"
 
 namespace groundray::golden {
 namespace {

@@ -1,0 +1,284 @@
+#include "reconstruction/merge/mesh_merge.h"
+
+#include <fmt/format.h>
+
+#include <algorithm>
+#include <cmath>
+#include <glm/common.hpp>
+#include <numbers>
+#include <numeric>
+#include <string>
+
+#include "core/error.h"
+#include "core/mesh_check.h"
+#include "core/model.h"
+#include "reconstruction/merge/consensus.h"
+#include "reconstruction/merge/cover_surface.h"
+#include "reconstruction/merge/quilt.h"
+#include "reconstruction/merge/redundant_faces.h"
+#include "reconstruction/merge/seen_through.h"
+#include "reconstruction/merge/sewing.h"
+
+namespace groundray {
+namespace {
+
+// Measured: of a triangle in its surface, the tree over it, the quilt and the patches.
+constexpr double bytes_each = 500;
+
+bool is_share(float value) { return 0 <= value && value <= 1; }
+bool is_length(float value) { return 0 <= value && std::isfinite(value); }
+
+void check(const ScanMesh& scan, std::size_t number) {
+  const std::string name = fmt::format("merge: scan {}", number);
+  const MeasuredMesh& mesh = scan.mesh;
+  check_mesh(mesh.shape, name, EmptyMesh::Allow);
+  Violations broken(name);
+  const auto has = [&](std::size_t count, std::size_t of, const char* what, const char* each) {
+    broken.unless(count == 0 || count == of, "{} {} for {} {}; each needs one, or none has any",
+                  count, what, of, each);
+  };
+  const std::size_t vertices = mesh.shape.vertices_m.size();
+  has(mesh.sd_m.size(), vertices, "standard deviations", "vertices");
+  has(mesh.labels.size(), vertices, "labels", "vertices");
+  has(mesh.confidence.size(), vertices, "confidences", "vertices");
+  has(scan.origins_m.size(), vertices, "origins of beams", "vertices");
+  has(scan.face_confidence.size(), mesh.shape.triangles.size(), "confidences", "triangles");
+  broken.unless(std::ranges::all_of(mesh.sd_m, is_length),
+                "each of sd_m must be finite and not negative");
+  broken.unless(std::ranges::all_of(mesh.confidence, is_share) &&
+                    std::ranges::all_of(scan.face_confidence, is_share),
+                "confidences must be from 0 to 1");
+  broken.throw_if_any();
+}
+
+void check(const MergeLimits& limits) {
+  Violations broken("merge: limits");
+  const auto is_at_least_0 = [&](double value, const char* name) {
+    broken.unless(value >= 0 && std::isfinite(value), "{} = {} must be finite and at least 0", name,
+                  value);
+  };
+  is_at_least_0(limits.noise_sds, "noise_sds");
+  is_at_least_0(limits.apart_m, "apart_m");
+  is_at_least_0(limits.interpolation, "interpolation");
+  broken.unless(limits.turned_rad > 0 && limits.turned_rad <= std::numbers::pi / 2,
+                "turned_rad = {} must be above 0 and at most pi/2: is it in degrees?",
+                limits.turned_rad);
+  broken.throw_if_any();
+}
+
+void check_memory(std::span<const ScanMesh> scans, const Work& work) {
+  double triangles = 0;
+  for (const ScanMesh& scan : scans)
+    triangles += static_cast<double>(scan.mesh.shape.triangles.size());
+  const double bytes = triangles * (bytes_each + 4 * static_cast<double>(scans.size()));
+  if (bytes <= static_cast<double>(work.most_bytes)) return;
+  throw Error(
+      "merge: {} triangles of {} scans take some {:.0f} MB, more than the {:.0f} MB allowed; "
+      "thin the scans out, or allow more",
+      triangles, scans.size(), bytes / 1e6, static_cast<double>(work.most_bytes) / 1e6);
+}
+
+/// Amid the scans: there, floats tell places well.
+glm::dvec3 middle_of(std::span<const ScanMesh* const> scans) {
+  ModelBounds all = bounds_of(scans.front()->mesh.shape);
+  for (const ScanMesh* scan : scans) {
+    const ModelBounds bounds = bounds_of(scan->mesh.shape);
+    all.low_m = glm::min(all.low_m, bounds.low_m);
+    all.high_m = glm::max(all.high_m, bounds.high_m);
+  }
+  return 0.5 * (all.low_m + all.high_m);
+}
+
+TriangleMesh moved(const TriangleMesh& mesh, const glm::dvec3& by_m) {
+  TriangleMesh out{.vertices_m = mesh.vertices_m, .triangles = mesh.triangles};
+  for (glm::dvec3& vertex_m : out.vertices_m) vertex_m += by_m;
+  return out;
+}
+
+/// Merges scans that are sound and have triangles.
+class Merging {
+ public:
+  Merging(std::vector<const ScanMesh*> scans, const MergeLimits& limits, const Work& work)
+      : scans_(std::move(scans)),
+        limits_{limits.noise_sds, limits.apart_m, std::cos(limits.turned_rad)},
+        origin_m_(middle_of(scans_)),
+        work_(work) {
+    for (const ScanMesh* scan : scans_) {
+      CoverSurface surface(moved(scan->mesh.shape, -origin_m_), scan->mesh.sd_m, limits_);
+      std::vector<float> worth = rate_faces(surface, scan->face_confidence);
+      rated_.push_back({std::move(surface), std::move(worth), {}});
+    }
+    if (scans_.size() > 1) note_seen_through(limits.interpolation);
+    report(0.1);
+    for (std::size_t s = 0; s < rated_.size(); ++s) covers_.push_back(find_covers(rated_, s));
+    note_shared();
+    report(0.4);
+    kept_ = keep_best_faces(rated_, covers_, limits.interpolation);
+    report(0.6);
+  }
+
+  MergedMesh run() {
+    Quilt quilt = sewn();
+    std::vector<ConsensusScan> asked;
+    for (std::size_t s = 0; s < scans_.size(); ++s) {
+      asked.push_back({&rated_[s], &scans_[s]->mesh, &covers_[s]});
+    }
+    if (scans_.size() > 1) {
+      counts_.filled = fill_slits(quilt, rated_);
+      report(0.9);
+      counts_.moved = move_to_consensus(quilt, asked);
+    }
+    MergedMesh merged{.mesh = finished(quilt), .counts = counts_};
+    report(1);
+    return merged;
+  }
+
+ private:
+  void report(double share) const {
+    if (work_.progress) work_.progress(share);
+  }
+
+  void note_seen_through(double interpolation) {
+    std::vector<BeamSurface> beams;
+    for (std::size_t s = 0; s < scans_.size(); ++s) {
+      beams.push_back({&rated_[s], scans_[s]->origins_m});
+      for (glm::dvec3& origin_m : beams.back().origins_m) origin_m -= origin_m_;
+    }
+    std::vector<std::vector<char>> passed = find_seen_through(beams, limits_, interpolation);
+    for (std::size_t s = 0; s < scans_.size(); ++s) {
+      counts_.seen_through += static_cast<std::size_t>(std::ranges::count(passed[s], char{1}));
+      rated_[s].is_refuted = std::move(passed[s]);
+    }
+  }
+
+  void note_shared() {
+    for (const ScanMesh* scan : scans_) is_shared_.emplace_back(scan->mesh.shape.vertices_m.size());
+    for (std::size_t s = 0; s < scans_.size(); ++s) {
+      for (std::uint32_t v = 0; v < is_shared_[s].size(); ++v) {
+        const std::span<const std::uint32_t> covers = covers_[s].of(v);
+        for (std::size_t other = 0; other < covers.size(); ++other) {
+          if (covers[other] == not_covered) continue;
+          is_shared_[s][v] = 1;
+          const glm::uvec3& t = scans_[other]->mesh.shape.triangles[covers[other]];
+          for (int k = 0; k < 3; ++k) is_shared_[other][t[k]] = 1;
+        }
+      }
+    }
+  }
+
+  /// Sews what is kept of the scans together, the largest first.
+  Quilt sewn() {
+    std::vector<std::pair<double, std::size_t>> order;  // area, negative, and number
+    for (std::size_t s = 0; s < scans_.size(); ++s) {
+      double area_m2 = 0;
+      for (std::uint32_t i = 0; i < kept_[s].size(); ++i)
+        area_m2 += kept_[s][i] != 0 ? rated_[s].surface.area_m2(i) : 0;
+      order.emplace_back(-area_m2, s);
+    }
+    std::ranges::sort(order);
+    Quilt quilt;
+    for (std::size_t i = 0; i < order.size(); ++i) {
+      const Quilt patch = kept_of(order[i].second);
+      const SewingCounts sewn = sew(quilt, patch, limits_);
+      counts_.redundant += sewn.covered;
+      counts_.clipped += sewn.clipped;
+      counts_.left_out += sewn.left_out;
+      report(0.6 + 0.25 * static_cast<double>(i + 1) / static_cast<double>(order.size()));
+    }
+    return quilt;
+  }
+
+  Quilt kept_of(std::size_t s) {
+    const MeasuredMesh& mesh = scans_[s]->mesh;
+    const CoverSurface& surface = rated_[s].surface;
+    Quilt quilt;
+    std::vector<std::uint32_t> numbers(mesh.shape.vertices_m.size(), no_vertex);
+    for (std::size_t i = 0; i < kept_[s].size(); ++i) {
+      if (kept_[s][i] == 0) {
+        if (!rated_[s].refutes(i)) ++counts_.redundant;
+        continue;
+      }
+      glm::uvec3 t = mesh.shape.triangles[i];
+      for (int k = 0; k < 3; ++k) {
+        const std::uint32_t v = t[k];
+        if (numbers[v] == no_vertex) {
+          numbers[v] = static_cast<std::uint32_t>(quilt.vertices.size());
+          quilt.vertices.push_back({.p = surface.mesh().vertices_m[v],
+                                    .normal = surface.normals()[v],
+                                    .sd_m = mesh.sd_m.empty() ? 0 : mesh.sd_m[v],
+                                    .confidence = mesh.confidence.empty() ? 1 : mesh.confidence[v],
+                                    .label = mesh.labels.empty() ? no_label : mesh.labels[v],
+                                    .scan = static_cast<std::uint32_t>(s),
+                                    .vertex = v,
+                                    .is_shared = is_shared_[s][v] != 0});
+        }
+        t[k] = numbers[v];
+      }
+      quilt.triangles.push_back(t);
+    }
+    return quilt;
+  }
+
+  /// Leaves out vertices that no triangle has, and goes back to the scans' frame.
+  MeasuredMesh finished(const Quilt& quilt) const {
+    const auto any = [&](auto MeasuredMesh::*values) {
+      return std::ranges::any_of(
+          scans_, [&](const ScanMesh* scan) { return !(scan->mesh.*values).empty(); });
+    };
+    const bool has_sd = any(&MeasuredMesh::sd_m), has_labels = any(&MeasuredMesh::labels),
+               has_confidence = any(&MeasuredMesh::confidence);
+    MeasuredMesh out;
+    std::vector<std::uint32_t> numbers(quilt.vertices.size(), no_vertex);
+    for (glm::uvec3 t : quilt.triangles) {
+      for (int k = 0; k < 3; ++k) {
+        std::uint32_t& number = numbers[t[k]];
+        if (number == no_vertex) {
+          const QuiltVertex& vertex = quilt.vertices[t[k]];
+          number = static_cast<std::uint32_t>(out.shape.vertices_m.size());
+          out.shape.vertices_m.push_back(place_of(vertex));
+          if (has_sd) out.sd_m.push_back(vertex.sd_m);
+          if (has_labels) out.labels.push_back(vertex.label);
+          if (has_confidence) out.confidence.push_back(vertex.confidence);
+        }
+        t[k] = number;
+      }
+      out.shape.triangles.push_back(t);
+    }
+    return out;
+  }
+
+  /// A scan's vertex that did not move is just where it was.
+  glm::dvec3 place_of(const QuiltVertex& vertex) const {
+    if (vertex.vertex == no_vertex) return vertex.p + origin_m_;
+    const glm::dvec3& p = scans_[vertex.scan]->mesh.shape.vertices_m[vertex.vertex];
+    return p + (vertex.p - (p - origin_m_));
+  }
+
+  static constexpr std::uint16_t no_label = 0;
+
+  std::vector<const ScanMesh*> scans_;
+  CoverLimits limits_;
+  glm::dvec3 origin_m_;
+  const Work& work_;
+  std::vector<RatedSurface> rated_;
+  std::vector<VertexCovers> covers_;
+  std::vector<std::vector<char>> is_shared_;  // vertices, as a QuiltVertex tells
+  std::vector<std::vector<char>> kept_;       // triangles
+  MergeCounts counts_;
+};
+
+}  // namespace
+
+MergedMesh merge(std::span<const ScanMesh> scans, const MergeLimits& limits, const Work& work) {
+  check(limits);
+  std::vector<const ScanMesh*> seen;
+  for (std::size_t i = 0; i < scans.size(); ++i) {
+    check(scans[i], i);
+    if (!scans[i].mesh.shape.triangles.empty()) seen.push_back(&scans[i]);
+  }
+  check_memory(scans, work);
+  if (seen.empty()) return {};
+  return Merging(std::move(seen), limits, work).run();
+}
+
+}  // namespace groundray

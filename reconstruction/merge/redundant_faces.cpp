@@ -1,0 +1,351 @@
+#include "reconstruction/merge/redundant_faces.h"
+
+#include <tbb/parallel_for.h>
+
+#include <algorithm>
+#include <array>
+#include <cmath>
+#include <glm/common.hpp>
+#include <glm/geometric.hpp>
+#include <limits>
+#include <tuple>
+
+namespace groundray {
+namespace {
+
+constexpr int smoothing_rounds = 10;
+constexpr int border_rings = 3;        // of triangles that are worth less
+constexpr std::size_t in_island = 64;  // triangles, at most
+constexpr std::size_t in_block = 512;  // neighbours in the list, which are near each other in space
+
+template <typename Visit>
+void for_blocks(std::size_t count, const Visit& visit) {
+  tbb::parallel_for(std::size_t{0}, (count + in_block - 1) / in_block, [&](std::size_t block) {
+    visit(block, block * in_block, std::min(count, (block + 1) * in_block));
+  });
+}
+
+/// How many triangles there are from each to the border, at most `border_rings`.
+std::vector<int> rings_to_border(const CoverSurface& surface) {
+  const std::vector<glm::uvec3>& triangles = surface.mesh().triangles;
+  std::vector<int> of_vertices(surface.mesh().vertices_m.size(), border_rings);
+  for (std::uint32_t v = 0; v < of_vertices.size(); ++v) {
+    if (surface.is_at_border(v)) of_vertices[v] = 0;
+  }
+  std::vector<int> of_triangles(triangles.size());
+  for (int round = 0; round < border_rings; ++round) {
+    for (std::size_t i = 0; i < triangles.size(); ++i) {
+      const glm::uvec3& t = triangles[i];
+      of_triangles[i] = std::min({of_vertices[t.x], of_vertices[t.y], of_vertices[t.z]});
+    }
+    for (std::size_t i = 0; i < triangles.size(); ++i) {
+      for (int k = 0; k < 3; ++k) {
+        int& rings = of_vertices[triangles[i][k]];
+        rings = std::min(rings, of_triangles[i] + 1);
+      }
+    }
+  }
+  return of_triangles;
+}
+
+/// Points of a triangle besides its corners, about `step_m` apart: rows between its shortest edge
+/// and the corner opposite.
+std::vector<glm::dvec3> places_in(const TriangleMesh& mesh, std::size_t triangle, double step_m) {
+  constexpr double most_rows = 16, most_in_row = 8;
+  const glm::uvec3& t = mesh.triangles[triangle];
+  std::array<glm::dvec3, 3> p{mesh.vertices_m[t.x], mesh.vertices_m[t.y], mesh.vertices_m[t.z]};
+  const auto length = [&](std::size_t k) { return glm::distance(p[k], p[(k + 1) % 3]); };
+  std::size_t shortest = 0;
+  for (const std::size_t k : {1, 2}) {
+    if (length(k) < length(shortest)) shortest = k;
+  }
+  std::ranges::rotate(p, p.begin() + static_cast<std::ptrdiff_t>(shortest));
+  const double rows = std::min(most_rows, std::floor(length(1) / step_m));
+  std::vector<glm::dvec3> places;
+  for (double row = 0; row <= rows; ++row) {
+    const glm::dvec3 a = glm::mix(p[0], p[2], row / (rows + 1));
+    const glm::dvec3 b = glm::mix(p[1], p[2], row / (rows + 1));
+    const double parts = std::min(most_in_row, std::floor(glm::distance(a, b) / step_m)) + 1;
+    const bool has_corners = row == 0;
+    for (double k = has_corners ? 1 : 0; k <= (has_corners ? parts - 1 : parts); ++k)
+      places.push_back(glm::mix(a, b, k / parts));
+  }
+  return places;
+}
+
+/// Covers of the places that triangles have besides their corners; those of one triangle begin at
+/// its number within the block.
+struct PlaceCovers {
+  std::vector<std::uint32_t> first, triangles;
+};
+
+/// Asks for one scan's triangles.
+class PlaceQuestions {
+ public:
+  PlaceQuestions(std::span<const RatedSurface> scans, std::span<const VertexCovers> covers,
+                 std::size_t scan, double interpolation)
+      : scans_(scans), covers_(covers[scan]), scan_(scan), interpolation_(interpolation) {}
+
+  /// Only of triangles whose corners are covered by ones worth as much at least: others are kept.
+  PlaceCovers of_block(std::size_t begin, std::size_t end) const {
+    PlaceCovers out{.first = {0}, .triangles = {}};
+    for (std::size_t i = begin; i < end; ++i) {
+      append(i, scans_[scan_].worth[i], out.triangles);
+      out.first.push_back(static_cast<std::uint32_t>(out.triangles.size()));
+    }
+    return out;
+  }
+
+  /// Appends the covers of a triangle's places, if each of its corners is covered by a triangle
+  /// that is worth as much as is said.
+  void append(std::size_t triangle, float least_worth, std::vector<std::uint32_t>& out) const {
+    const CoverSurface& own = scans_[scan_].surface;
+    const glm::uvec3& t = own.mesh().triangles[triangle];
+    const double step_m = step_over(t, least_worth);
+    const glm::dvec3 a = own.mesh().vertices_m[t.x], b = own.mesh().vertices_m[t.y],
+                     c = own.mesh().vertices_m[t.z];
+    const double longest_m =
+        std::max({glm::distance(a, b), glm::distance(b, c), glm::distance(c, a)});
+    if (!(longest_m >= step_m)) return;
+    const glm::vec3 sum = own.normals()[t.x] + own.normals()[t.y] + own.normals()[t.z];
+    const double sd_m = (own.sd_m(t.x) + own.sd_m(t.y) + own.sd_m(t.z)) / 3;
+    const MeasuredPlace place{.normal = glm::length(sum) > 0 ? glm::normalize(sum) : sum,
+                              .sd_m = sd_m};
+    for (const glm::dvec3& p : places_in(own.mesh(), triangle, step_m))
+      ask({p, place.normal, place.sd_m}, t, interpolation_ * longest_m, out);
+  }
+
+ private:
+  /// Infinite if a corner is not covered.
+  double step_over(const glm::uvec3& t, float least_worth) const {
+    constexpr double keep = std::numeric_limits<double>::infinity();
+    double step_m = keep;
+    for (int k = 0; k < 3; ++k) {
+      bool is_covered = false;
+      const std::span<const std::uint32_t> covers = covers_.of(t[k]);
+      for (std::size_t s = 0; s < covers.size(); ++s) {
+        if (covers[s] == not_covered) continue;
+        if (scans_[s].worth[covers[s]] < least_worth) continue;
+        is_covered = true;
+        step_m = std::min(step_m, 6 * std::sqrt(2 * scans_[s].surface.area_m2(covers[s])));
+      }
+      if (!is_covered) return keep;
+    }
+    return step_m;
+  }
+
+  void ask(const MeasuredPlace& place, const glm::uvec3& t, double slack_m,
+           std::vector<std::uint32_t>& out) const {
+    for (std::size_t s = 0; s < scans_.size(); ++s) {
+      std::uint32_t near = not_covered;
+      for (int k = 0; k < 3; ++k) near = std::min(near, covers_.of(t[k])[s]);
+      std::uint32_t found = not_covered;
+      if (near != not_covered) {
+        const CoverAnswer answer = scans_[s].surface.at(place, slack_m, near);
+        if (answer.cover == Cover::Inside) found = answer.nearest.triangle;
+      }
+      out.push_back(found);
+    }
+  }
+
+  std::span<const RatedSurface> scans_;
+  const VertexCovers& covers_;
+  std::size_t scan_;
+  double interpolation_;
+};
+
+struct RankedFace {
+  float worth = 0;
+  std::uint32_t scan = 0, triangle = 0;
+};
+
+std::vector<RankedFace> ranked(std::span<const RatedSurface> scans) {
+  std::vector<RankedFace> faces;
+  for (std::uint32_t s = 0; s < scans.size(); ++s) {
+    for (std::uint32_t i = 0; i < scans[s].worth.size(); ++i) {
+      if (!scans[s].refutes(i)) faces.push_back({scans[s].worth[i], s, i});
+    }
+  }
+  std::ranges::sort(faces, [](const RankedFace& a, const RankedFace& b) {
+    return std::tie(b.worth, a.scan, a.triangle) < std::tie(a.worth, b.scan, b.triangle);
+  });
+  return faces;
+}
+
+bool any_is_kept(std::span<const std::uint32_t> covers,
+                 const std::vector<std::vector<char>>& kept) {
+  for (std::size_t s = 0; s < covers.size(); ++s) {
+    if (covers[s] != not_covered && kept[s][covers[s]] != 0) return true;
+  }
+  return false;
+}
+
+/// Calls `visit` with each part of a surface that hangs together by edges, has at most `in_island`
+/// triangles and all of them kept, or all of them not; and tells whether it is on the border.
+template <typename Visit>
+void for_islands(const CoverSurface& surface, const std::vector<char>& kept, char is_kept,
+                 const Visit& visit) {
+  std::vector<char> is_seen(kept.size());
+  std::vector<std::uint32_t> part;
+  for (std::uint32_t begin = 0; begin < kept.size(); ++begin) {
+    if (is_seen[begin] != 0 || kept[begin] != is_kept) continue;
+    part.assign(1, begin);
+    is_seen[begin] = 1;
+    bool is_on_border = false;
+    for (std::size_t i = 0; i < part.size(); ++i) {
+      for (std::uint32_t e = 3 * part[i]; e < 3 * part[i] + 3; ++e) {
+        const std::uint32_t twin = surface.twins()[e];
+        is_on_border = is_on_border || twin == none;
+        if (twin == none || is_seen[twin / 3] != 0 || kept[twin / 3] != is_kept) continue;
+        is_seen[twin / 3] = 1;
+        part.push_back(twin / 3);
+      }
+    }
+    if (part.size() <= in_island) visit(part, is_on_border);
+  }
+}
+
+/// Decides which triangles stay.
+class Selection {
+ public:
+  Selection(std::span<const RatedSurface> scans, std::span<const VertexCovers> covers,
+            double interpolation)
+      : scans_(scans), covers_(covers), places_(scans.size()), kept_(scans.size()) {
+    for (std::size_t s = 0; s < scans.size(); ++s) {
+      const std::size_t triangles = scans[s].worth.size();
+      kept_[s].resize(triangles);
+      places_[s].resize((triangles + in_block - 1) / in_block);
+      questions_.emplace_back(scans, covers, s, interpolation);
+      for_blocks(triangles, [&](std::size_t block, std::size_t begin, std::size_t end) {
+        places_[s][block] = questions_[s].of_block(begin, end);
+      });
+    }
+  }
+
+  std::vector<std::vector<char>> run() && {
+    // The best come first, so that what is kept already is worth more.
+    for (const RankedFace& face : ranked(scans_))
+      kept_[face.scan][face.triangle] = is_redundant(face) ? 0 : 1;
+    for (std::size_t s = 0; s < scans_.size(); ++s) close_holes(s);
+    for (std::size_t s = 0; s < scans_.size(); ++s) remove_islands(s);
+    return std::move(kept_);
+  }
+
+ private:
+  bool is_redundant(const RankedFace& face) const {
+    const PlaceCovers& more = places_[face.scan][face.triangle / in_block];
+    const std::size_t i = face.triangle % in_block;
+    return are_corners_covered(face.scan, face.triangle) &&
+           are_covered(
+               std::span(more.triangles).subspan(more.first[i], more.first[i + 1] - more.first[i]));
+  }
+
+  bool are_corners_covered(std::size_t scan, std::size_t triangle) const {
+    const glm::uvec3& t = scans_[scan].surface.mesh().triangles[triangle];
+    return are_covered(covers_[scan].of(t.x)) && are_covered(covers_[scan].of(t.y)) &&
+           are_covered(covers_[scan].of(t.z));
+  }
+
+  /// Whether one of each place's covers is kept.
+  bool are_covered(std::span<const std::uint32_t> places) const {
+    for (std::size_t k = 0; k < places.size(); k += scans_.size()) {
+      if (!any_is_kept(places.subspan(k, scans_.size()), kept_)) return false;
+    }
+    return true;
+  }
+
+  void close_holes(std::size_t scan) {
+    for_islands(scans_[scan].surface, kept_[scan], 0,
+                [&](const std::vector<std::uint32_t>& part, bool is_on_border) {
+                  if (is_on_border) return;
+                  for (const std::uint32_t triangle : part)
+                    kept_[scan][triangle] = scans_[scan].refutes(triangle) ? 0 : 1;
+                });
+  }
+
+  void remove_islands(std::size_t scan) {
+    for_islands(scans_[scan].surface, kept_[scan], 1,
+                [&](const std::vector<std::uint32_t>& part, bool) {
+                  for (const std::uint32_t triangle : part) {
+                    std::vector<std::uint32_t> places;
+                    if (!are_corners_covered(scan, triangle)) continue;
+                    questions_[scan].append(triangle, 0, places);
+                    if (are_covered(places)) kept_[scan][triangle] = 0;
+                  }
+                });
+  }
+
+  std::span<const RatedSurface> scans_;
+  std::span<const VertexCovers> covers_;
+  std::vector<PlaceQuestions> questions_;         // about each scan
+  std::vector<std::vector<PlaceCovers>> places_;  // of each scan's blocks
+  std::vector<std::vector<char>> kept_;
+};
+
+}  // namespace
+
+std::vector<float> rate_faces(const CoverSurface& surface, std::span<const float> confidence) {
+  std::vector<float> worth(surface.mesh().triangles.size(), 1);
+  std::ranges::copy(confidence, worth.begin());
+  const std::vector<int> rings = rings_to_border(surface);
+  std::vector<float> before(worth.size());
+  for (int round = 0; round < smoothing_rounds; ++round) {
+    before = worth;
+    for (std::size_t i = 0; i < worth.size(); ++i) {
+      float sum = before[i], count = 1;
+      for (std::size_t k = 0; k < 3; ++k) {
+        const std::uint32_t twin = surface.twins()[3 * i + k];
+        if (twin == none) continue;
+        sum += before[twin / 3];
+        ++count;
+      }
+      worth[i] = sum / count;
+    }
+  }
+  for (std::size_t i = 0; i < worth.size(); ++i)
+    worth[i] *= static_cast<float>(rings[i] + 1) / (border_rings + 1);
+  return worth;
+}
+
+std::vector<float> worth_of_vertices(const RatedSurface& rated) {
+  const TriangleMesh& mesh = rated.surface.mesh();
+  std::vector<float> sums(mesh.vertices_m.size()), counts(sums.size());
+  for (std::size_t i = 0; i < mesh.triangles.size(); ++i) {
+    for (int k = 0; k < 3; ++k) {
+      sums[mesh.triangles[i][k]] += rated.worth[i];
+      ++counts[mesh.triangles[i][k]];
+    }
+  }
+  for (std::size_t v = 0; v < sums.size(); ++v) sums[v] /= std::max(1.f, counts[v]);
+  return sums;
+}
+
+VertexCovers find_covers(std::span<const RatedSurface> scans, std::size_t scan) {
+  const CoverSurface& own = scans[scan].surface;
+  const std::size_t vertices = own.mesh().vertices_m.size();
+  VertexCovers covers{scans.size(), std::vector(vertices * scans.size(), not_covered)};
+  for (std::size_t s = 0; s < scans.size(); ++s) {
+    if (s == scan) continue;
+    const CoverSurface& other = scans[s].surface;
+    for_blocks(vertices, [&](std::size_t, std::size_t begin, std::size_t end) {
+      std::uint32_t near = 0;
+      for (std::size_t v = begin; v < end; ++v) {
+        const auto vertex = static_cast<std::uint32_t>(v);
+        const CoverAnswer answer =
+            other.at({own.mesh().vertices_m[v], own.normals()[v], own.sd_m(vertex)}, 0, near);
+        near = answer.nearest.triangle;
+        if (answer.cover == Cover::Inside && !scans[s].refutes(near))
+          covers.triangles[v * scans.size() + s] = near;
+      }
+    });
+  }
+  return covers;
+}
+
+std::vector<std::vector<char>> keep_best_faces(std::span<const RatedSurface> scans,
+                                               std::span<const VertexCovers> covers,
+                                               double interpolation) {
+  return Selection(scans, covers, interpolation).run();
+}
+
+}  // namespace groundray

@@ -1,0 +1,159 @@
+#include "reconstruction/merge/seen_through.h"
+
+#include <tbb/parallel_for.h>
+
+#include <algorithm>
+#include <cmath>
+#include <glm/geometric.hpp>
+#include <utility>
+
+#include "core/model.h"
+#include "core/object_tracer.h"
+#include "core/ray_tracer.h"
+
+namespace groundray {
+namespace {
+
+constexpr std::size_t in_block = 512;  // beams
+
+// Noise moves vertices along beams, and across a triangle by less: most of those that are long for
+// their beams' spacing are seen at 60 degrees and more.
+constexpr double across = 0.5;
+
+double longest_edge_m(const TriangleMesh& mesh, const glm::uvec3& t) {
+  const glm::dvec3 &a = mesh.vertices_m[t.x], &b = mesh.vertices_m[t.y], &c = mesh.vertices_m[t.z];
+  return std::max({glm::distance(a, b), glm::distance(b, c), glm::distance(c, a)});
+}
+
+double largest_sd_m(const CoverSurface& surface, const glm::uvec3& t) {
+  return std::max({surface.sd_m(t.x), surface.sd_m(t.y), surface.sd_m(t.z)});
+}
+
+/// A beam and a triangle that it passed.
+struct Passage {
+  std::uint32_t beam = 0, triangle = 0;
+};
+
+/// One scan's long triangles, for other scans' beams to meet.
+class LongTriangles {
+ public:
+  LongTriangles(const RayDevice& device, const RatedSurface& rated, const CoverLimits& limits,
+                double interpolation)
+      : rated_(rated), own_(rated.surface), limits_(limits) {
+    const TriangleMesh& mesh = own_.mesh();
+    Model model;
+    model.mesh.vertices_m = mesh.vertices_m;
+    model.surfaces.resize(1);
+    for (std::uint32_t i = 0; i < mesh.triangles.size(); ++i) {
+      const glm::uvec3& t = mesh.triangles[i];
+      const double may_be_off_m = interpolation * longest_edge_m(mesh, t);
+      if (!(may_be_off_m > margin_m(0, largest_sd_m(own_, t)))) continue;
+      numbers_.push_back(i);
+      model.mesh.triangles.push_back(t);
+    }
+    if (numbers_.empty()) return;
+    model.surface_of.resize(numbers_.size());
+    tracer_ = ObjectTracer(device, {ModelScene(device, std::move(model), Tracing::Fast)},
+                           {PlacedObject{}}, {});
+  }
+
+  /// Returns what the beams of another scan have passed.
+  std::vector<Passage> passed_by(const BeamSurface& other) const {
+    if (numbers_.empty()) return {};
+    const std::size_t beams = other.origins_m.size(), blocks = (beams + in_block - 1) / in_block;
+    std::vector<std::vector<Passage>> passed(blocks);
+    tbb::parallel_for(std::size_t{0}, blocks, [&](std::size_t block) {
+      passed[block] = passed_by(other, block * in_block, std::min(beams, (block + 1) * in_block));
+    });
+    std::vector<Passage> all;
+    for (const std::vector<Passage>& part : passed) all.insert(all.end(), part.begin(), part.end());
+    return all;
+  }
+
+ private:
+  double margin_m(double sd_m, double other_sd_m) const {
+    return across * limits_.noise_sds * std::hypot(sd_m, other_sd_m) + limits_.apart_m;
+  }
+
+  std::vector<Passage> passed_by(const BeamSurface& other, std::size_t begin,
+                                 std::size_t end) const {
+    std::vector<Ray> rays(end - begin);
+    std::vector<Hit> hits(end - begin);
+    for (std::size_t v = begin; v < end; ++v) {
+      const glm::dvec3 along = other.rated->surface.mesh().vertices_m[v] - other.origins_m[v];
+      const double range_m = glm::length(along);
+      Ray& ray = rays[v - begin];
+      ray.origin = other.origins_m[v];
+      if (range_m > 0) ray.direction = along / range_m;
+      hits[v - begin].range_m = range_m;
+    }
+    tracer_.trace(rays, hits);
+    std::vector<Passage> passed;
+    for (std::size_t v = begin; v < end; ++v) {
+      if (hits[v - begin].object == 0) continue;
+      const Passage passage{static_cast<std::uint32_t>(v), numbers_[hits[v - begin].part]};
+      if (is_behind(other, passage.beam, passage.triangle)) passed.push_back(passage);
+    }
+    return passed;
+  }
+
+  bool is_behind(const BeamSurface& other, std::uint32_t vertex, std::uint32_t triangle) const {
+    const TriangleMesh& mesh = own_.mesh();
+    const glm::uvec3& t = mesh.triangles[triangle];
+    const glm::dvec3& a = mesh.vertices_m[t.x];
+    const glm::dvec3 normal = glm::cross(mesh.vertices_m[t.y] - a, mesh.vertices_m[t.z] - a);
+    const double off = glm::dot(other.rated->surface.mesh().vertices_m[vertex] - a, normal);
+    const double margin = margin_m(other.rated->surface.sd_m(vertex), largest_sd_m(own_, t));
+    return std::abs(off) > margin * glm::length(normal);
+  }
+
+  const RatedSurface& rated_;
+  const CoverSurface& own_;
+  CoverLimits limits_;
+  std::vector<std::uint32_t> numbers_;  // of the long ones among all
+  ObjectTracer tracer_;
+};
+
+/// Which vertices have a triangle that is marked.
+std::vector<char> at_marked(const TriangleMesh& mesh, const std::vector<char>& is_marked) {
+  std::vector<char> is_at(mesh.vertices_m.size());
+  for (std::size_t i = 0; i < is_marked.size(); ++i) {
+    for (int k = 0; k < 3 && is_marked[i] != 0; ++k) is_at[mesh.triangles[i][k]] = 1;
+  }
+  return is_at;
+}
+
+}  // namespace
+
+std::vector<std::vector<char>> find_seen_through(std::span<const BeamSurface> scans,
+                                                 const CoverLimits& limits, double interpolation) {
+  const std::size_t count = scans.size();
+  const RayDevice device;
+  std::vector<std::vector<Passage>> passages(count * count);  // of each scan's triangles and beams
+  std::vector<std::vector<char>> passed;
+  for (std::size_t s = 0; s < count; ++s) {
+    passed.emplace_back(scans[s].rated->worth.size());
+    const LongTriangles triangles(device, *scans[s].rated, limits, interpolation);
+    for (std::size_t other = 0; other < count; ++other) {
+      if (other == s) continue;
+      passages[s * count + other] = triangles.passed_by(scans[other]);
+      for (const Passage& passage : passages[s * count + other]) passed[s][passage.triangle] = 1;
+    }
+  }
+  std::vector<std::vector<char>> refuted;
+  for (std::size_t s = 0; s < count; ++s) refuted.emplace_back(passed[s].size());
+  for (std::size_t other = 0; other < count; ++other) {
+    const std::vector<char> in_doubt = at_marked(scans[other].rated->surface.mesh(), passed[other]);
+    const std::vector<float> worth = worth_of_vertices(*scans[other].rated);
+    for (std::size_t s = 0; s < count; ++s) {
+      for (const Passage& passage : passages[s * count + other]) {
+        if (in_doubt[passage.beam] == 0 ||
+            worth[passage.beam] > scans[s].rated->worth[passage.triangle])
+          refuted[s][passage.triangle] = 1;
+      }
+    }
+  }
+  return refuted;
+}
+
+}  // namespace groundray

@@ -1,0 +1,293 @@
+#include "reconstruction/merge/sewing.h"
+
+#include <algorithm>
+#include <array>
+#include <glm/geometric.hpp>
+#include <span>
+#include <tuple>
+#include <unordered_map>
+#include <utility>
+
+#include "reconstruction/merge/border_crossing.h"
+#include "reconstruction/merge/loop_triangulation.h"
+
+namespace groundray {
+namespace {
+
+constexpr double snap_share = 0.25;
+constexpr std::size_t most_steps = 64;  // along the border between an edge's crossing and the next
+constexpr std::size_t most_in_slit = 40;  // edges
+constexpr std::size_t most_in_fold = 8;   // edges of a slit whose sides overlap
+constexpr std::size_t least_round = 64;   // triangles that hang together round a fold: it is not
+                                          // the rim of a patch that is as small
+
+/// The vertex of the quilt that each crossing is put at; none where there is no border.
+std::vector<std::uint32_t> put_on_border(Quilt& quilt, const Quilt& patch,
+                                         std::span<const BorderCrossing> crossings) {
+  struct Stop {
+    std::uint32_t from, to;
+    double share;
+    std::size_t crossing;
+  };
+  std::vector<std::uint32_t> vertices(crossings.size(), no_vertex);
+  std::vector<Stop> stops;
+  std::vector<double> snap_m(crossings.size());
+  for (std::size_t i = 0; i < crossings.size(); ++i) {
+    const BorderCrossing& crossing = crossings[i];
+    if (crossing.from == no_vertex) continue;
+    stops.push_back({crossing.from, crossing.to, crossing.share, i});
+    snap_m[i] = snap_share * glm::distance(patch.vertices[crossing.inside].p,
+                                           patch.vertices[crossing.outside].p);
+  }
+  std::ranges::sort(stops, [](const Stop& a, const Stop& b) {
+    return std::tie(a.from, a.to, a.share, a.crossing) <
+           std::tie(b.from, b.to, b.share, b.crossing);
+  });
+  std::vector<EdgePlace> places;
+  std::vector<std::size_t> place_of(crossings.size());
+  for (const Stop& stop : stops) {
+    const std::uint32_t from = stop.from, to = stop.to;
+    const double length_m = glm::distance(quilt.vertices[from].p, quilt.vertices[to].p);
+    const double near_m = std::min(snap_m[stop.crossing], snap_share * length_m);
+    const bool follows = !places.empty() && places.back().from == from && places.back().to == to;
+    if (!(stop.share * length_m > near_m)) {
+      vertices[stop.crossing] = from;
+    } else if (!((1 - stop.share) * length_m > near_m)) {
+      vertices[stop.crossing] = to;
+    } else {
+      if (!follows || (stop.share - places.back().share) * length_m > near_m)
+        places.push_back({from, to, stop.share});
+      place_of[stop.crossing] = places.size();
+    }
+  }
+  const std::vector<std::uint32_t> added = split_edges(quilt, places);
+  for (const Stop& stop : stops) {
+    if (place_of[stop.crossing] > 0) vertices[stop.crossing] = added[place_of[stop.crossing] - 1];
+  }
+  return vertices;
+}
+
+/// For each vertex on the border, the one before it: triangles are on the left.
+std::vector<std::uint32_t> border_before(const Quilt& quilt) {
+  const std::vector<std::uint32_t> twins = pair_edges(quilt.triangles, quilt.vertices.size()).twins;
+  std::vector<std::uint32_t> before(quilt.vertices.size(), no_vertex);
+  for (std::uint32_t e = 0; e < twins.size(); ++e) {
+    if (twins[e] == none)
+      before[corner_of(quilt.triangles, next_of(e))] = corner_of(quilt.triangles, e);
+  }
+  return before;
+}
+
+/// Takes a patch's triangles over into a quilt.
+class Sewing {
+ public:
+  Sewing(Quilt& quilt, const Quilt& patch, const BorderCrossings& found)
+      : quilt_(quilt),
+        patch_(patch),
+        covers_(found.covers),
+        numbers_(patch.vertices.size(), no_vertex) {
+    const std::vector<std::uint32_t> at = put_on_border(quilt, patch, found.crossings);
+    for (std::size_t i = 0; i < at.size(); ++i)
+      crossings_[key_of(found.crossings[i].inside, found.crossings[i].outside)] = at[i];
+    before_ = border_before(quilt);
+  }
+
+  SewingCounts run() {
+    for (const glm::uvec3& t : patch_.triangles) add(t);
+    counts_.left_out = make_manifold(quilt_);
+    return counts_;
+  }
+
+ private:
+  static std::uint64_t key_of(std::uint32_t a, std::uint32_t b) {
+    return std::uint64_t{std::min(a, b)} << 32 | std::max(a, b);
+  }
+
+  void add(const glm::uvec3& t) {
+    std::array<bool, 3> is_in{};
+    int inside = 0;
+    for (std::size_t k = 0; k < 3; ++k) {
+      is_in[k] = covers_[t[static_cast<int>(k)]] == Cover::Inside;
+      inside += is_in[k] ? 1 : 0;
+    }
+    if (inside == 0) {
+      quilt_.triangles.emplace_back(taken(t.x), taken(t.y), taken(t.z));
+    } else if (inside == 3) {
+      ++counts_.covered;
+    } else {
+      int odd = 0;  // the corner that is alone
+      while (is_in[static_cast<std::size_t>(odd)] != (inside == 1)) ++odd;
+      clip({t[odd], t[(odd + 1) % 3], t[(odd + 2) % 3]}, inside == 1);
+    }
+  }
+
+  /// @param t  the first corner is inside and the others outside, or the other way about.
+  void clip(const glm::uvec3& t, bool is_first_inside) {
+    const std::uint32_t leaving = crossings_.at(key_of(t.x, t.y));
+    const std::uint32_t coming = crossings_.at(key_of(t.z, t.x));
+    if (leaving == no_vertex || coming == no_vertex) {
+      quilt_.triangles.emplace_back(taken(t.x), taken(t.y), taken(t.z));
+      return;
+    }
+    ++counts_.clipped;
+    std::vector<std::uint32_t> loop;
+    if (is_first_inside) {
+      loop = {taken(t.y), taken(t.z)};
+      append_border(coming, leaving, t, loop);
+    } else {
+      loop = {taken(t.x)};
+      append_border(leaving, coming, t, loop);
+    }
+    if (loop.size() >= 3) append(t, loop);
+  }
+
+  /// Appends the border's vertices from one to another, against its direction, both included; these
+  /// two alone where they are not near each other along it.
+  void append_border(std::uint32_t from, std::uint32_t to, const glm::uvec3& t,
+                     std::vector<std::uint32_t>& loop) const {
+    const auto p = [&](std::uint32_t v) { return patch_.vertices[v].p; };
+    const double most_m = 2 * (glm::distance(p(t.x), p(t.y)) + glm::distance(p(t.y), p(t.z)) +
+                               glm::distance(p(t.z), p(t.x)));
+    const std::size_t first = loop.size();
+    double length_m = 0;
+    loop.push_back(from);
+    for (std::uint32_t v = from; v != to;) {
+      const std::uint32_t next = before_[v];
+      if (next != no_vertex)
+        length_m += glm::distance(quilt_.vertices[v].p, quilt_.vertices[next].p);
+      if (next == no_vertex || length_m > most_m || loop.size() - first > most_steps) {
+        loop.resize(first + 1);
+        loop.push_back(to);
+        return;
+      }
+      loop.push_back(next);
+      v = next;
+    }
+  }
+
+  void append(const glm::uvec3& t, const std::vector<std::uint32_t>& loop) {
+    std::vector<glm::dvec3> points;
+    for (const std::uint32_t v : loop) points.push_back(quilt_.vertices[v].p);
+    const auto p = [&](std::uint32_t v) { return patch_.vertices[v].p; };
+    const glm::dvec3 normal = glm::cross(p(t.y) - p(t.x), p(t.z) - p(t.x));
+    const double length = glm::length(normal);
+    const LoopTriangles cut =
+        triangulate_loop(points, length > 0 ? normal / length : glm::dvec3(0));
+    for (const glm::uvec3& c : cut.triangles)
+      quilt_.triangles.emplace_back(loop[c.x], loop[c.y], loop[c.z]);
+  }
+
+  /// The number in the quilt of a vertex of the patch.
+  std::uint32_t taken(std::uint32_t vertex) {
+    if (numbers_[vertex] == no_vertex) {
+      numbers_[vertex] = static_cast<std::uint32_t>(quilt_.vertices.size());
+      quilt_.vertices.push_back(patch_.vertices[vertex]);
+    }
+    return numbers_[vertex];
+  }
+
+  Quilt& quilt_;
+  const Quilt& patch_;
+  const std::vector<Cover>& covers_;
+  std::vector<std::uint32_t> numbers_;
+  std::unordered_map<std::uint64_t, std::uint32_t> crossings_;
+  std::vector<std::uint32_t> before_;
+  SewingCounts counts_;
+};
+
+bool is_seen(const QuiltVertex& place, std::span<const RatedSurface> seen) {
+  return std::ranges::any_of(seen, [&](const RatedSurface& scan) {
+    const CoverAnswer answer = scan.surface.at({place.p, place.normal, place.sd_m}, 0, 0);
+    return answer.cover == Cover::Inside && !scan.refutes(answer.nearest.triangle);
+  });
+}
+
+/// Returns triangles for a loop as far as they are seen: those that face as their corners do; all
+/// if it may be a fold.
+std::vector<glm::uvec3> filling(const Quilt& quilt, const std::vector<std::uint32_t>& loop,
+                                bool may_be_fold, std::span<const RatedSurface> seen) {
+  glm::dvec3 normal(0);
+  std::vector<glm::dvec3> points;
+  for (const std::uint32_t v : loop) {
+    points.push_back(quilt.vertices[v].p);
+    normal += quilt.vertices[v].normal;
+  }
+  const double length = glm::length(normal);
+  std::vector<glm::uvec3> triangles;
+  for (const glm::uvec3& c :
+       triangulate_loop(points, length > 0 ? normal / length : normal).triangles) {
+    const glm::uvec3 t(loop[c.x], loop[c.y], loop[c.z]);
+    const QuiltVertex &x = quilt.vertices[t.x], &y = quilt.vertices[t.y], &z = quilt.vertices[t.z];
+    const QuiltVertex middle = between(between(x, y, 0.5), z, 1.0 / 3);
+    const double facing = glm::dot(glm::cross(y.p - x.p, z.p - x.p), glm::dvec3(middle.normal));
+    if ((facing > 0 || may_be_fold) && is_seen(middle, seen)) triangles.push_back(t);
+  }
+  return triangles;
+}
+
+/// For each vertex, how many triangles hang together with it.
+std::vector<std::uint32_t> triangles_round(const Quilt& quilt) {
+  const std::vector<std::uint32_t> twins = pair_edges(quilt.triangles, quilt.vertices.size()).twins;
+  std::vector<std::uint32_t> counts(quilt.vertices.size());
+  std::vector<char> is_seen(quilt.triangles.size());
+  std::vector<std::uint32_t> part;
+  for (std::uint32_t begin = 0; begin < is_seen.size(); ++begin) {
+    if (is_seen[begin] != 0) continue;
+    part.assign(1, begin);
+    is_seen[begin] = 1;
+    for (std::size_t i = 0; i < part.size(); ++i) {
+      for (std::uint32_t e = 3 * part[i]; e < 3 * part[i] + 3; ++e) {
+        if (twins[e] == none || is_seen[twins[e] / 3] != 0) continue;
+        is_seen[twins[e] / 3] = 1;
+        part.push_back(twins[e] / 3);
+      }
+    }
+    for (const std::uint32_t triangle : part) {
+      for (int k = 0; k < 3; ++k)
+        counts[quilt.triangles[triangle][k]] = static_cast<std::uint32_t>(part.size());
+    }
+  }
+  return counts;
+}
+
+}  // namespace
+
+SewingCounts sew(Quilt& quilt, Quilt patch, const CoverLimits& limits) {
+  if (quilt.triangles.empty()) {
+    quilt = std::move(patch);
+    return {.left_out = make_manifold(quilt)};
+  }
+  if (patch.triangles.empty()) return {};
+  TriangleMesh shared = mesh_of(quilt);
+  std::erase_if(shared.triangles, [&](const glm::uvec3& t) {
+    return !quilt.vertices[t.x].is_shared && !quilt.vertices[t.y].is_shared &&
+           !quilt.vertices[t.z].is_shared;
+  });
+  if (shared.triangles.empty()) shared.triangles.push_back(quilt.triangles.front());
+  const CoverSurface surface(std::move(shared), sds_of(quilt), limits);
+  const BorderCrossings found = find_border_crossings(patch, surface);
+  return Sewing(quilt, patch, found).run();
+}
+
+std::size_t fill_slits(Quilt& quilt, std::span<const RatedSurface> seen) {
+  const std::vector<std::uint32_t> before = border_before(quilt);
+  const std::vector<std::uint32_t> round = triangles_round(quilt);
+  std::vector<char> is_done(before.size());
+  std::size_t added = 0;
+  for (std::uint32_t begin = 0; begin < before.size(); ++begin) {
+    if (before[begin] == no_vertex || is_done[begin] != 0) continue;
+    std::vector<std::uint32_t> loop;
+    for (std::uint32_t v = begin; v != no_vertex && is_done[v] == 0; v = before[v]) {
+      is_done[v] = 1;
+      loop.push_back(v);
+    }
+    if (loop.size() < 3 || loop.size() > most_in_slit || before[loop.back()] != begin) continue;
+    const bool may_be_fold = loop.size() <= most_in_fold && round[begin] >= least_round;
+    const std::vector<glm::uvec3> triangles = filling(quilt, loop, may_be_fold, seen);
+    quilt.triangles.insert(quilt.triangles.end(), triangles.begin(), triangles.end());
+    added += triangles.size();
+  }
+  return added - make_manifold(quilt);
+}
+
+}  // namespace groundray

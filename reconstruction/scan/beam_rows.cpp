@@ -1,0 +1,214 @@
+#include "reconstruction/scan/beam_rows.h"
+
+#include <algorithm>
+#include <cmath>
+#include <cstddef>
+#include <functional>
+#include <limits>
+#include <numbers>
+#include <numeric>
+#include <utility>
+
+#include "core/error.h"
+
+namespace groundray {
+namespace {
+
+constexpr std::int64_t most_rows = 1'000'000;
+constexpr double clearness = 4;        // gaps between beams over those within
+constexpr double one_beam_rad = 2e-3;  // of a scanner in one plane
+constexpr double rounding_rad = 2e-7;  // of floats
+constexpr double jump_turns = 0.01;    // back, from ring to ring
+constexpr double most_spread = 0.5;    // of elevations in a ring, over gaps between rings
+constexpr double two_pi = 2 * std::numbers::pi;
+
+/// Returns the numbers that there are, in order, each once.
+std::vector<std::int32_t> distinct(std::span<const std::int32_t> numbers) {
+  std::vector<std::int32_t> sorted(numbers.begin(), numbers.end());
+  std::ranges::sort(sorted);
+  sorted.erase(std::unique(sorted.begin(), sorted.end()), sorted.end());
+  return sorted;
+}
+
+/// Returns the median elevation of each ring that there is.
+std::vector<double> medians(std::span<const std::int32_t> ring, std::size_t rings,
+                            std::span<const double> elevations_rad) {
+  std::vector<std::vector<double>> of_ring(rings);
+  for (std::size_t i = 0; i < ring.size(); ++i)
+    of_ring[static_cast<std::size_t>(ring[i])].push_back(elevations_rad[i]);
+  std::vector<double> median(rings);
+  for (std::size_t r = 0; r < rings; ++r) {
+    const auto middle = of_ring[r].begin() + static_cast<std::ptrdiff_t>(of_ring[r].size() / 2);
+    std::ranges::nth_element(of_ring[r], middle);
+    median[r] = *middle;
+  }
+  return median;
+}
+
+/// Returns the least gap between beams, of elevations in order: of all gaps by size, the beams' are
+/// those before the steepest fall. Nothing if that is not steep.
+std::optional<double> gap_between_beams(const std::vector<double>& sorted_rad) {
+  std::vector<double> gaps;
+  for (std::size_t i = 1; i < sorted_rad.size(); ++i)
+    gaps.push_back(sorted_rad[i] - sorted_rad[i - 1]);
+  std::ranges::sort(gaps, std::greater());
+  std::optional<double> least_rad;
+  double steepest = clearness;
+  for (std::size_t i = 0; i < gaps.size() && 4 * (i + 2) <= sorted_rad.size(); ++i) {
+    const double next_rad = i + 1 < gaps.size() ? gaps[i + 1] : 0;
+    const double fall = gaps[i] / std::max(next_rad, rounding_rad);
+    if (fall < steepest) continue;
+    steepest = fall;
+    least_rad = gaps[i];
+  }
+  return least_rad;
+}
+
+/// Numbers runs of returns between which azimuth jumps back or passes a seam, in turns.
+std::vector<std::int32_t> runs_of(std::span<const double> azimuths_rad, double sense, double seam) {
+  std::vector<std::int32_t> run(azimuths_rad.size(), 0);
+  double last = 0;
+  for (std::size_t i = 0; i < run.size(); ++i) {
+    const double turns = sense * (azimuths_rad[i] / two_pi - seam);
+    const double place = turns - std::floor(turns);
+    const double step = std::remainder(place - last, 1);
+    const bool is_new = place < last - jump_turns || step < -jump_turns;
+    if (i > 0) run[i] = run[i - 1] + (is_new ? 1 : 0);
+    last = place;
+  }
+  return run;
+}
+
+/// Returns the median difference of elevation from run to run, of those that are not short.
+double typical_gap(const std::vector<double>& median, const std::vector<std::size_t>& size,
+                   std::size_t returns) {
+  std::vector<double> apart;
+  double last = 0;
+  bool begun = false;
+  for (std::size_t r = 0; r < median.size(); ++r) {
+    if (4 * size[r] * median.size() < returns) continue;
+    if (begun) apart.push_back(std::abs(median[r] - last));
+    last = median[r];
+    begun = true;
+  }
+  if (apart.empty()) return 0;
+  const auto middle = apart.begin() + static_cast<std::ptrdiff_t>(apart.size() / 2);
+  std::ranges::nth_element(apart, middle);
+  return *middle;
+}
+
+/// Rings, and how far elevations are from their ring's median, in the mean over the returns, over
+/// how far rings are apart that follow each other.
+struct Turns {
+  std::vector<std::int32_t> ring;  // of each return
+  double spread = std::numeric_limits<double>::infinity();
+};
+
+/// Takes runs for rings; those that follow each other at one elevation are one: rings that look
+/// aside pass the seam sooner or later than others.
+Turns turns_of(std::vector<std::int32_t> run, std::span<const double> elevations_rad) {
+  const auto runs = static_cast<std::size_t>(run.back()) + 1;
+  if (runs < 2 || run.size() < 8 * runs) return {};
+  const std::vector<double> median = medians(run, runs, elevations_rad);
+  std::vector<std::size_t> size(runs, 0);
+  for (const std::int32_t r : run) ++size[static_cast<std::size_t>(r)];
+  const double gap_rad = typical_gap(median, size, run.size());
+  std::vector<std::int32_t> ring_of_run(runs, 0);
+  std::size_t largest = 0;  // run of the ring
+  for (std::size_t r = 1; r < runs; ++r) {
+    const bool is_new = std::abs(median[r] - median[largest]) > gap_rad / 4;
+    ring_of_run[r] = ring_of_run[r - 1] + (is_new ? 1 : 0);
+    if (is_new || size[r] > size[largest]) largest = r;
+  }
+  Turns turns{.ring = std::move(run)};
+  double sum = 0;
+  for (std::int32_t& r : turns.ring) r = ring_of_run[static_cast<std::size_t>(r)];
+  const auto rings = static_cast<std::size_t>(turns.ring.back()) + 1;
+  const std::vector<double> of_ring = medians(turns.ring, rings, elevations_rad);
+  for (std::size_t i = 0; i < turns.ring.size(); ++i)
+    sum += std::abs(elevations_rad[i] - of_ring[static_cast<std::size_t>(turns.ring[i])]);
+  if (gap_rad > 0) turns.spread = sum / static_cast<double>(turns.ring.size()) / gap_rad;
+  return turns;
+}
+
+}  // namespace
+
+BeamRows rows_of_rings(std::span<const std::int32_t> rings, std::span<const double> elevations_rad,
+                       RowOrder order) {
+  BeamRows rows;
+  if (rings.empty()) return rows;
+  const std::vector<std::int32_t> numbers = distinct(rings);
+  const std::int64_t span = std::int64_t{numbers.back()} - numbers.front() + 1;
+  const std::int64_t count =
+      order == RowOrder::Number ? span : static_cast<std::int64_t>(numbers.size());
+  if (count > most_rows) {
+    throw Error("rings from {} to {} would be {} rows; there can be {}: are they numbers of beams?",
+                numbers.front(), numbers.back(), count, most_rows);
+  }
+  rows.count = static_cast<int>(count);
+  rows.row.reserve(rings.size());
+  for (const std::int32_t ring : rings) {
+    rows.row.push_back(
+        order == RowOrder::Number
+            ? ring - numbers.front()
+            : static_cast<std::int32_t>(std::ranges::lower_bound(numbers, ring) - numbers.begin()));
+  }
+  if (order == RowOrder::Number) return rows;
+  const std::vector<double> median = medians(rows.row, numbers.size(), elevations_rad);
+  std::vector<std::int32_t> ring_of_row(numbers.size()), row_of_ring(numbers.size());
+  std::iota(ring_of_row.begin(), ring_of_row.end(), 0);
+  std::ranges::stable_sort(
+      ring_of_row, {}, [&](std::int32_t ring) { return median[static_cast<std::size_t>(ring)]; });
+  for (std::size_t r = 0; r < ring_of_row.size(); ++r)
+    row_of_ring[static_cast<std::size_t>(ring_of_row[r])] = static_cast<std::int32_t>(r);
+  for (std::int32_t& row : rows.row) row = row_of_ring[static_cast<std::size_t>(row)];
+  return rows;
+}
+
+std::optional<BeamRows> rows_of_elevations(std::span<const double> elevations_rad) {
+  BeamRows rows;
+  if (elevations_rad.empty()) return rows;
+  std::vector<double> sorted(elevations_rad.begin(), elevations_rad.end());
+  std::ranges::sort(sorted);
+  rows.row.assign(elevations_rad.size(), 0);
+  rows.count = 1;
+  if (sorted.back() - sorted.front() <= one_beam_rad) return rows;
+  const std::optional<double> least_rad = gap_between_beams(sorted);
+  if (!least_rad) return std::nullopt;
+  std::vector<double> firsts;  // lowest elevation of each beam but the first
+  double widest_rad = 0, first_rad = sorted.front();
+  for (std::size_t i = 1; i < sorted.size(); ++i) {
+    if (sorted[i] - sorted[i - 1] >= *least_rad) firsts.push_back(first_rad = sorted[i]);
+    widest_rad = std::max(widest_rad, sorted[i] - first_rad);
+  }
+  if (widest_rad * clearness > *least_rad) return std::nullopt;
+  for (std::size_t i = 0; i < elevations_rad.size(); ++i) {
+    rows.row[i] = static_cast<std::int32_t>(std::ranges::upper_bound(firsts, elevations_rad[i]) -
+                                            firsts.begin());
+  }
+  rows.count = static_cast<int>(firsts.size()) + 1;
+  return rows;
+}
+
+std::optional<BeamRows> rows_of_turns(std::span<const double> azimuths_rad,
+                                      std::span<const double> elevations_rad) {
+  const std::size_t count = azimuths_rad.size();
+  if (count == 0) return std::nullopt;
+  std::size_t forwards = 0, backwards = 0;
+  for (std::size_t i = 1; i < count; ++i) {
+    const double turned = std::remainder(azimuths_rad[i] - azimuths_rad[i - 1], two_pi);
+    ++(turned > 0 ? forwards : backwards);
+  }
+  if (std::max(forwards, backwards) * 10 < count * 9) return std::nullopt;
+  const double sense = forwards > backwards ? 1 : -1;
+  Turns best{.spread = most_spread};
+  // Rings begin ahead, behind or beside, or where the first return is.
+  for (const double seam : {0.0, 0.25, 0.5, 0.75, azimuths_rad[0] / two_pi - sense * 0.005}) {
+    Turns turns = turns_of(runs_of(azimuths_rad, sense, seam), elevations_rad);
+    if (turns.spread < best.spread) best = std::move(turns);
+  }
+  if (best.ring.empty()) return std::nullopt;
+  return rows_of_rings(best.ring, elevations_rad, RowOrder::Elevation);
+}
+
+}  // namespace groundray

@@ -1,0 +1,40 @@
+#include "reconstruction/scan/ascending_memory.h"
+
+#include <gtest/gtest.h>
+
+#include <cstdint>
+#include <list>
+#include <vector>
+
+namespace groundray {
+namespace {
+
+TEST(AscendingMemory, IsHandedOutInOrderHoweverMuchIsGivenBack) {
+  const AscendingMemory memory(100'000);
+  std::list<double, AscendingAllocator<double>> numbers;
+  const double* last = nullptr;
+  for (int i = 0; i < 1000; ++i) {
+    numbers.push_back(i);
+    EXPECT_TRUE(memory.owns(&numbers.back()));
+    EXPECT_LT(last, &numbers.back());
+    EXPECT_EQ(reinterpret_cast<std::uintptr_t>(&numbers.back()) % alignof(double), 0u);
+    last = &numbers.back();
+    if (i % 3 == 0) numbers.pop_front();
+  }
+}
+
+TEST(AscendingMemory, GoesOnElsewhereWhereItEnds) {
+  const AscendingMemory memory(100);
+  std::vector<int, AscendingAllocator<int>> few(10, 1), many(1000, 2);
+  EXPECT_TRUE(memory.owns(few.data()));
+  EXPECT_FALSE(memory.owns(many.data()));
+  EXPECT_EQ(many.back(), 2);
+}
+
+TEST(AscendingMemory, IsNotNeeded) {
+  const std::vector<int, AscendingAllocator<int>> numbers(1000, 3);
+  EXPECT_EQ(numbers.back(), 3);
+}
+
+}  // namespace
+}  // namespace groundray

@@ -1,0 +1,43 @@
+#include "reconstruction/simplify/cost_knee.h"
+
+#include <gtest/gtest.h>
+
+#include <cmath>
+
+namespace groundray {
+namespace {
+
+// Cost that grows as one power of 1 / triangles and then as a larger one has its knee where the
+// powers change: the curve is two straight lines in logarithms.
+TEST(CostKnee, IsWhereThePowerChanges) {
+  std::vector<CostStep> steps{{0, 10001}};
+  for (std::size_t triangles = 10000; triangles > 10; --triangles) {
+    const double share = 500.0 / static_cast<double>(triangles);
+    steps.push_back({share < 1 ? std::pow(share, 0.5) : std::pow(share, 4), triangles});
+  }
+  EXPECT_EQ(find_knee(steps), 500u);
+  // Steps that cost nothing, and cheap ones after dear ones, change nothing.
+  steps.insert(steps.begin(), {0, 12000});
+  steps.insert(steps.begin() + 9000, {1e-3, steps[8999].triangles});
+  EXPECT_EQ(find_knee(steps), 500u);
+}
+
+TEST(CostKnee, OfCostThatIsNothingIsTheEnd) {
+  EXPECT_EQ(find_knee({{0, 9}, {0, 7}, {0, 5}}), 5u);
+  EXPECT_EQ(find_knee({{0, 1}}), 1u);
+}
+
+// From where half of the triangles are left to where a thousandth is, whatever is before and after.
+TEST(CostKnee, IsThatOfTheMiddle) {
+  std::vector<CostStep> steps{{0, 10000}};
+  for (std::size_t triangles = 9999; triangles > 2; --triangles) {
+    const double share = 300.0 / static_cast<double>(triangles);
+    const double cost = share < 1 ? std::pow(share, 3) : std::pow(share, 0.7);
+    const bool is_amid = triangles <= 5000 && triangles >= 10;
+    steps.push_back({is_amid ? cost : (triangles > 5000 ? 1e-30 : 1e30), triangles});
+  }
+  EXPECT_EQ(find_knee(steps), 300u);
+}
+
+}  // namespace
+}  // namespace groundray

@@ -1,0 +1,248 @@
+#include <gtest/gtest.h>
+
+#include <cmath>
+#include <glm/geometric.hpp>
+#include <random>
+
+#include "reconstruction/simplify/simplify.h"
+#include "reconstruction/simplify/vector_to_edge.h"
+#include "test/support/plan_check.h"
+
+namespace groundray {
+namespace {
+
+using Random = std::mt19937_64;
+
+double uniform(Random& random, double low, double high) {
+  return std::uniform_real_distribution<double>(low, high)(random);
+}
+
+// A grid of cells of 1 m whose samples are aside by up to `jitter_m` each way; heights are those of
+// waves and noise. Cells of a disc are left out, if it has a radius.
+TriangleMesh random_terrain(int cells, double jitter_m, double noise_m, double hole_m,
+                            Random& random) {
+  TriangleMesh mesh;
+  const double phase = uniform(random, 0, 6);
+  for (int row = 0; row <= cells; ++row) {
+    for (int column = 0; column <= cells; ++column) {
+      glm::dvec3 p(column + uniform(random, -jitter_m, jitter_m),
+                   row + uniform(random, -jitter_m, jitter_m), 0);
+      p.z = 2 * std::sin(0.2 * p.x + phase) * std::cos(0.17 * p.y) +
+            uniform(random, -noise_m, noise_m);
+      mesh.vertices_m.push_back(p);
+    }
+  }
+  const auto side = static_cast<unsigned>(cells + 1);
+  for (unsigned row = 0; row + 1 < side; ++row) {
+    for (unsigned column = 0; column + 1 < side; ++column) {
+      if (std::hypot(column - 0.4 * cells, row - 0.6 * cells) < hole_m) continue;
+      const unsigned a = row * side + column, b = a + 1, c = a + side, d = c + 1;
+      if (random() % 2 == 0) {
+        mesh.triangles.insert(mesh.triangles.end(), {{a, b, c}, {b, d, c}});
+      } else {
+        mesh.triangles.insert(mesh.triangles.end(), {{a, b, d}, {a, d, c}});
+      }
+    }
+  }
+  return mesh;
+}
+
+std::vector<glm::dvec3> used_vertices(const TriangleMesh& mesh) {
+  std::vector<bool> is_used(mesh.vertices_m.size());
+  for (const glm::uvec3& t : mesh.triangles) is_used[t.x] = is_used[t.y] = is_used[t.z] = true;
+  std::vector<glm::dvec3> used;
+  for (std::size_t i = 0; i < is_used.size(); ++i) {
+    if (is_used[i]) used.push_back(mesh.vertices_m[i]);
+  }
+  return used;
+}
+
+// How far a point is from a border, and how far above or below its nearest place in the plan.
+struct FromBorder {
+  double aside_m = std::numeric_limits<double>::infinity();
+  double above_m = 0;
+};
+
+using Border = std::vector<std::pair<std::uint32_t, std::uint32_t>>;
+
+FromBorder from_border(const glm::dvec3& p, const TriangleMesh& mesh, const Border& border) {
+  FromBorder found;
+  for (const auto& [from, to] : border) {
+    const glm::dvec3 &a = mesh.vertices_m[from], &b = mesh.vertices_m[to];
+    const glm::dvec2 edge(b - a), d(p - a);
+    const double share = std::clamp(glm::dot(edge, d) / glm::dot(edge, edge), 0.0, 1.0);
+    const double aside_m = glm::length(d - share * edge);
+    if (aside_m >= found.aside_m) continue;
+    found = {aside_m, std::abs(a.z + share * (b.z - a.z) - p.z)};
+  }
+  return found;
+}
+
+TEST(SimplifyTerrain, APlaneBecomesTwoTriangles) {
+  TriangleMesh mesh;
+  Random random(1);
+  mesh = random_terrain(40, 0, 0, 0, random);
+  for (glm::dvec3& p : mesh.vertices_m) p.z = 0.3 * p.x - 0.7 * p.y + 12;
+  const Simplified result = simplify({mesh}, VerticalBound{.error_m = 1e-9});
+  EXPECT_EQ(result.mesh.shape.triangles.size(), 2u);
+  EXPECT_EQ(result.halted_by, HaltReason::Bound);
+  EXPECT_LE(result.error.largest().at_least_m, 1e-9);
+  EXPECT_LE(testing::check_plan(mesh.vertices_m, result.mesh.shape).largest_m, 1e-9);
+}
+
+// The evaluator looks for triangles above and below each vertex by itself.
+TEST(SimplifyTerrain, EveryVertexIsWithinTheBound) {
+  Random random(2);
+  for (int i = 0; i < 12; ++i) {
+    const bool is_even = i % 2 == 0;  // a border that runs straight stays where it was
+    const double hole_m = i % 3 == 2 ? 6 : 0;
+    const TriangleMesh mesh = random_terrain(48, is_even ? 0 : 0.2, 0.1 * (i % 4), hole_m, random);
+    const double error_m = std::exp2(-(i % 5)), border_m = is_even ? 0 : 0.25;
+    const Simplified result = simplify({mesh}, VerticalBound{error_m, border_m});
+    const TriangleMesh& coarse = result.mesh.shape;
+    EXPECT_LT(coarse.triangles.size(), mesh.triangles.size());
+    EXPECT_EQ(testing::manifold_faults(coarse), 0u);
+    const std::vector<glm::dvec3> vertices = used_vertices(mesh);
+    const Border border = testing::border_of(coarse);
+    const testing::PlanCheck check = testing::check_plan(vertices, coarse);
+    EXPECT_EQ(check.turned_over, 0u);
+    EXPECT_LE(check.largest_m, error_m * (1 + 1e-9));
+    if (is_even && hole_m == 0) {
+      EXPECT_EQ(check.uncovered, 0u);
+      EXPECT_NEAR(check.area_m2, 48 * 48, 1e-6);
+    }
+    const testing::PlanBins bins(coarse);
+    for (const glm::dvec3& p : vertices) {  // what is not covered is beside the border
+      if (!bins.heights_m(glm::dvec2(p)).empty()) continue;
+      const FromBorder beside = from_border(p, coarse, border);
+      EXPECT_LE(beside.aside_m, border_m + 1e-9);
+      EXPECT_LE(beside.above_m, error_m * (1 + 1e-9));
+    }
+  }
+}
+
+TEST(SimplifyTerrain, BordersAreWithinTheirBoundBothWays) {
+  Random random(3);
+  for (const double border_m : {0.0, 0.1, 0.7}) {
+    const TriangleMesh mesh = random_terrain(40, 0.2, 0.05, 7, random);
+    const Simplified result = simplify({mesh}, VerticalBound{.error_m = 0.5, .border_m = border_m});
+    const TriangleMesh& coarse = result.mesh.shape;
+    const Border before = testing::border_of(mesh), after = testing::border_of(coarse);
+    for (const auto& [from, to] : before)
+      EXPECT_LE(from_border(mesh.vertices_m[from], coarse, after).aside_m, border_m + 1e-9);
+    for (const auto& [from, to] : after) {
+      for (const double share : {0.0, 0.25, 0.5, 0.75}) {
+        const glm::dvec3 p = (1 - share) * coarse.vertices_m[from] + share * coarse.vertices_m[to];
+        EXPECT_LE(from_border(p, mesh, before).aside_m, border_m + 1e-9);
+      }
+    }
+    if (border_m == 0) {
+      EXPECT_EQ(after.size(), before.size());
+    } else {
+      EXPECT_LT(after.size(), before.size());
+    }
+  }
+}
+
+// Two holes with little between them, and tongues that nearly meet: borders that move by more must
+// not cross, so that no place is covered twice.
+TEST(SimplifyTerrain, BordersThatMoveDoNotCross) {
+  Random random(4);
+  for (int i = 0; i < 6; ++i) {
+    TriangleMesh mesh = random_terrain(40, 0.2, 0.05, 0, random);
+    std::erase_if(mesh.triangles, [&](const glm::uvec3&) { return random() % 5 == 0; });
+    const Simplified result = simplify({mesh}, VerticalBound{.error_m = 1, .border_m = 1.5});
+    const TriangleMesh& coarse = result.mesh.shape;
+    EXPECT_EQ(testing::manifold_faults(coarse), 0u);
+    EXPECT_EQ(testing::check_plan({}, coarse).turned_over, 0u);
+    const testing::PlanBins bins(coarse);
+    for (int k = 0; k < 2000; ++k) {
+      const glm::dvec2 p(uniform(random, 0, 40), uniform(random, 0, 40));
+      EXPECT_LE(bins.heights_m(p).size(), 1u) << p.x << ' ' << p.y;
+    }
+  }
+}
+
+TEST(SimplifyTerrain, NoiseIsTakenAwayAndAStepIsNot) {
+  Random random(5);
+  std::normal_distribution<double> noise(0, 0.02);
+  MeasuredMesh mesh{random_terrain(60, 0, 0, 0, random)};
+  for (glm::dvec3& p : mesh.shape.vertices_m)
+    p.z = std::clamp(noise(random), -0.05, 0.05) + (p.x < 30 ? 0 : 0.5);
+  mesh.sd_m.assign(mesh.shape.vertices_m.size(), 0.02f);
+  const Simplified result = simplify(mesh, NoiseBound{.sds = 3});
+  EXPECT_LT(result.mesh.shape.triangles.size(), 200u);
+  EXPECT_LE(testing::check_plan(mesh.shape.vertices_m, result.mesh.shape).largest_m, 0.06 + 1e-9);
+  EXPECT_EQ(result.mesh.sd_m.size(), result.mesh.shape.vertices_m.size());
+}
+
+TEST(SimplifyTerrain, EachVertexHasItsOwnNoise) {
+  Random random(6);
+  MeasuredMesh mesh{random_terrain(50, 0, 0.1, 0, random)};
+  for (const glm::dvec3& p : mesh.shape.vertices_m)
+    mesh.sd_m.push_back(static_cast<float>(p.x < 25 ? 0.001 : 0.2));
+  const Simplified result = simplify(mesh, NoiseBound{.sds = 2});
+  std::vector<glm::dvec3> exact, vague;
+  for (const glm::dvec3& p : mesh.shape.vertices_m) (p.x < 25 ? exact : vague).push_back(p);
+  EXPECT_LE(testing::check_plan(exact, result.mesh.shape).largest_m, 0.002 + 1e-9);
+  EXPECT_LE(testing::check_plan(vague, result.mesh.shape).largest_m, 0.4 + 1e-9);
+  EXPECT_LT(result.mesh.shape.triangles.size(), mesh.shape.triangles.size() * 6 / 10);
+}
+
+// Heights in 1/64 m and whole metres aside: positions are doubles wherever the mesh is.
+TEST(SimplifyTerrain, IsTheSameWhereverTheMeshIs) {
+  Random random(7);
+  TriangleMesh mesh = random_terrain(50, 0, 0.3, 5, random);
+  for (glm::dvec3& p : mesh.vertices_m) p.z = std::round(64 * p.z) / 64;
+  TriangleMesh away = mesh;
+  const glm::dvec3 by(512'345, 5'412'345, 1'234);
+  for (glm::dvec3& p : away.vertices_m) p += by;
+  const VerticalBound bound{.error_m = 0.4, .border_m = 0.5};
+  const Simplified here = simplify({mesh}, bound), there = simplify({away}, bound);
+  EXPECT_EQ(here.mesh.shape.triangles, there.mesh.shape.triangles);
+  EXPECT_EQ(here.sources, there.sources);
+  for (std::size_t i = 0; i < there.sources.size(); ++i)
+    EXPECT_EQ(there.mesh.shape.vertices_m[i], away.vertices_m[there.sources[i]]);
+}
+
+TEST(SimplifyTerrain, WhereLabelsChangeStaysWhereItWas) {
+  Random random(8);
+  MeasuredMesh mesh{random_terrain(60, 0.1, 0.02, 0, random)};
+  const auto label_at = [](const glm::dvec3& p) {
+    return static_cast<std::uint16_t>(p.x + 4 * std::sin(0.15 * p.y) < 30 ? 3 : 7);
+  };
+  for (const glm::dvec3& p : mesh.shape.vertices_m) mesh.labels.push_back(label_at(p));
+  const std::size_t odd_one = 61 * 30 + 45;
+  mesh.labels[odd_one] = 11;
+  const double border_m = 0.5;
+  const Simplified result = simplify(mesh, VerticalBound{.error_m = 2, .border_m = border_m});
+  const MeasuredMesh& coarse = result.mesh;
+  EXPECT_LT(coarse.shape.triangles.size(), mesh.shape.triangles.size() / 10);
+  EXPECT_EQ(std::count(coarse.labels.begin(), coarse.labels.end(), 11), 1);
+  // Farther from where labels change than a cell and the bound, corners all have the place's label.
+  for (std::size_t i = 0; i < mesh.labels.size(); ++i) {
+    const glm::dvec3& p = mesh.shape.vertices_m[i];
+    bool is_amid = glm::length(p - mesh.shape.vertices_m[odd_one]) > 3;
+    for (double angle = 0; angle < 6.3; angle += 0.5)
+      is_amid = is_amid &&
+                label_at(p + 2.2 * glm::dvec3(std::cos(angle), std::sin(angle), 0)) == label_at(p);
+    if (!is_amid) continue;
+    bool is_alike = false;  // of a triangle there
+    for (std::size_t k = 0; k < coarse.shape.triangles.size() && !is_alike; ++k) {
+      if (!testing::height_at(coarse.shape, k, glm::dvec2(p))) continue;
+      const glm::uvec3& t = coarse.shape.triangles[k];
+      is_alike = coarse.labels[t.x] == mesh.labels[i] && coarse.labels[t.y] == mesh.labels[i] &&
+                 coarse.labels[t.z] == mesh.labels[i];
+    }
+    EXPECT_TRUE(is_alike || testing::check_plan({p}, coarse.shape).uncovered == 1)
+        << p.x << ' ' << p.y;
+  }
+  SimplifyOptions ignoring;
+  ignoring.labels = LabelBorders::Ignore;
+  EXPECT_LT(simplify(mesh, VerticalBound{.error_m = 2, .border_m = border_m}, ignoring)
+                .mesh.shape.triangles.size(),
+            coarse.shape.triangles.size());
+}
+
+}  // namespace
+}  // namespace groundray
