@@ -20,7 +20,8 @@ struct DemOptions {
 };
 
 /// Loads a DEM through GDAL: GeoTIFF, HGT, ESRI ASCII, PNG, VRT, netCDF, USGS DEM and whatever else
-/// it reads as one band; its virtual paths (/vsizip/...) and names of subdatasets serve as well.
+/// it reads as one band, or whose first band has the name "elevation"; its virtual paths
+/// (/vsizip/...) and names of subdatasets serve as well.
 ///
 /// Samples are points at the centres of GDAL's pixels. The band's scale, offset and unit of height
 /// (feet and others become metres) are honoured. Holes are the declared nodata value, NaN, and what

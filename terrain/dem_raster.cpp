@@ -35,8 +35,10 @@ GDALRasterBand& height_band(GDALDataset& dataset) {
   const int rows = dataset.GetRasterYSize();
   const char* name = dataset.GetDescription();
   Violations broken("not a grid of heights");
-  broken.unless(bands == 1 || alpha_band(dataset) != nullptr,
-                "it has {} bands; there must be one (and may be an alpha band); choose it:{}",
+  const bool is_named = std::string_view(band.GetDescription()) == "elevation";
+  broken.unless(bands == 1 || alpha_band(dataset) != nullptr || is_named,
+                "it has {} bands; there must be one (and may be an alpha band), or the first one's "
+                "name be elevation; choose it:{}",
                 bands, command(name, "gdal_translate -b 1", "_band1.tif"));
   broken.unless(!GDALDataTypeIsComplex(band.GetRasterDataType()),
                 "its samples are complex numbers ({}); heights must be real",
