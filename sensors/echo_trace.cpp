@@ -152,6 +152,7 @@ void EchoTrace::add_up() {
 }
 
 double EchoTrace::mean_bin() const {
+  if (sum_w_ <= 0) return peak_bin_;  // it is all in the segment's last bin
   const float* power_w = power_w_.data() + lobe_.begin;
   const float ceiling_w = static_cast<float>(ceiling_w_);
   const int bins = static_cast<int>(lobe_.end - lobe_.begin);

@@ -53,7 +53,7 @@ class EchoTrace {
   /// other, and the echo's extent, where both are hidden.
   double width_bins() const;
   double sum_w() const { return sum_w_; }  ///< of the clipped power over its bins
-  /// Centroid of the clipped power.
+  /// Centroid of the clipped power; the peak, if there is power in the segment's last bin alone.
   double mean_bin() const;
   /// Mean of value(power) over the bins of an extent, weighed by (bin - centre)^2.
   template <typename Value>

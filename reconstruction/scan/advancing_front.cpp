@@ -35,18 +35,32 @@ using QueuedEdge = Tetrahedra::Vertex::Radius_ptr_type;  // how good its candida
 constexpr std::size_t bytes_each = 2000;                 // that a point takes, at most
 using Triple = std::array<std::size_t, 3>;
 
-// Numbers things by the order in which they are first asked for.
+// Numbers things by the order in which they are first asked for, as long as it is there.
+//
+// CGAL's queue is a std::set that makes its own std::less, and takes no other: there is no object
+// through which the numbers could be handed in, and what queued pointers point to is CGAL's to
+// change. So a comparison has to find its numbers by its thread. Those of another run on it, in a
+// call of progress, are apart.
 class Arrivals {
  public:
+  Arrivals() : outer_(current()) { current() = this; }
+  ~Arrivals() { current() = outer_; }
+  Arrivals(const Arrivals&) = delete;
+  Arrivals& operator=(const Arrivals&) = delete;
+
+  static Arrivals*& current() noexcept {
+    static thread_local Arrivals* arrivals = nullptr;
+    return arrivals;
+  }
+
   std::size_t number(const void* thing) {
     return numbers_.try_emplace(thing, numbers_.size()).first->second;
   }
 
  private:
+  Arrivals* outer_;
   std::unordered_map<const void*, std::size_t> numbers_;
 };
-
-thread_local Arrivals arrivals;
 
 }  // namespace
 }  // namespace groundray
@@ -58,8 +72,9 @@ struct std::less<groundray::QueuedEdge> {
   bool operator()(const groundray::QueuedEdge& a, const groundray::QueuedEdge& b) const {
     if (a.first != b.first) return a.first < b.first;
     if (a.second == b.second) return false;
-    const std::size_t number = groundray::arrivals.number(a.second);
-    return number < groundray::arrivals.number(b.second);
+    groundray::Arrivals& arrivals = *groundray::Arrivals::current();
+    const std::size_t number = arrivals.number(a.second);
+    return number < arrivals.number(b.second);
   }
 };
 
@@ -130,7 +145,7 @@ class Plausibility {
 
 std::vector<Triple> triangles_between(const std::vector<Point>& points, double longest_perimeter_m,
                                       const Work& work) {
-  arrivals = {};
+  const Arrivals arrivals;
   AscendingMemory memory(points.size() * bytes_each + 100'000);
   Tetrahedra tetrahedra;
   std::vector<std::pair<Point, std::size_t>> numbered;
@@ -141,7 +156,6 @@ std::vector<Triple> triangles_between(const std::vector<Point>& points, double l
   front.run();
   std::vector<Triple> triangles;
   CGAL::write_triple_indices(std::back_inserter(triangles), front);
-  arrivals = {};
   return triangles;
 }
 

@@ -7,15 +7,18 @@
 namespace groundray {
 
 /// Memory that is handed out in ascending order, for structures that compare addresses: what they
-/// do is then the same whatever was in memory before. One for each thread at a time.
+/// do is then the same whatever was in memory before. The thread's is the one made last: those who
+/// use it are told of no other, since CGAL's allocators are of a type alone.
 class AscendingMemory {
  public:
   /// @param bytes  that are there; what is asked for beyond comes from elsewhere.
   explicit AscendingMemory(std::size_t bytes)
-      : bytes_(bytes), block_(std::make_unique_for_overwrite<std::byte[]>(bytes)) {
+      : outer_(current()),
+        bytes_(bytes),
+        block_(std::make_unique_for_overwrite<std::byte[]>(bytes)) {
     current() = this;
   }
-  ~AscendingMemory() { current() = nullptr; }
+  ~AscendingMemory() { current() = outer_; }
   AscendingMemory(const AscendingMemory&) = delete;
   AscendingMemory& operator=(const AscendingMemory&) = delete;
 
@@ -40,6 +43,7 @@ class AscendingMemory {
   }
 
  private:
+  AscendingMemory* outer_;
   std::size_t bytes_, used_ = 0;
   std::unique_ptr<std::byte[]> block_;
 };

@@ -15,11 +15,13 @@ namespace groundray {
 namespace {
 
 constexpr std::int64_t most_rows = 1'000'000;
-constexpr double clearness = 4;        // gaps between beams over those within
-constexpr double one_beam_rad = 2e-3;  // of a scanner in one plane
-constexpr double rounding_rad = 2e-7;  // of floats
-constexpr double jump_turns = 0.01;    // back, from ring to ring
-constexpr double most_spread = 0.5;    // of elevations in a ring, over gaps between rings
+constexpr double clearness = 4;             // gaps between beams over those within
+constexpr double one_beam_rad = 2e-3;       // of a scanner in one plane
+constexpr double rounding_rad = 2e-7;       // of floats
+constexpr double jump_turns = 0.01;         // back, from ring to ring
+constexpr double most_spread = 0.5;         // of elevations in a ring, over gaps between rings
+constexpr std::size_t most_sectors = 36;    // of a turn, in which elevations are a ring's
+constexpr std::size_t sector_returns = 16;  // of a ring, in the mean
 constexpr double two_pi = 2 * std::numbers::pi;
 
 /// Returns the numbers that there are, in order, each once.
@@ -30,7 +32,7 @@ std::vector<std::int32_t> distinct(std::span<const std::int32_t> numbers) {
   return sorted;
 }
 
-/// Returns the median elevation of each ring that there is.
+/// Returns the median elevation of each ring; 0 of one without returns.
 std::vector<double> medians(std::span<const std::int32_t> ring, std::size_t rings,
                             std::span<const double> elevations_rad) {
   std::vector<std::vector<double>> of_ring(rings);
@@ -38,6 +40,7 @@ std::vector<double> medians(std::span<const std::int32_t> ring, std::size_t ring
     of_ring[static_cast<std::size_t>(ring[i])].push_back(elevations_rad[i]);
   std::vector<double> median(rings);
   for (std::size_t r = 0; r < rings; ++r) {
+    if (of_ring[r].empty()) continue;
     const auto middle = of_ring[r].begin() + static_cast<std::ptrdiff_t>(of_ring[r].size() / 2);
     std::ranges::nth_element(of_ring[r], middle);
     median[r] = *middle;
@@ -97,16 +100,44 @@ double typical_gap(const std::vector<double>& median, const std::vector<std::siz
   return *middle;
 }
 
-/// Rings, and how far elevations are from their ring's median, in the mean over the returns, over
-/// how far rings are apart that follow each other.
+/// Returns how far elevations are from their ring's median in their sector of the turn, in the
+/// mean.
+double spread_rad(std::span<const std::int32_t> ring, std::size_t rings, std::size_t sectors,
+                  std::span<const double> azimuths_rad, std::span<const double> elevations_rad) {
+  std::vector<std::int32_t> place(ring.size());
+  for (std::size_t i = 0; i < place.size(); ++i) {
+    const auto sector =
+        static_cast<std::size_t>(azimuths_rad[i] / two_pi * static_cast<double>(sectors));
+    place[i] = static_cast<std::int32_t>(static_cast<std::size_t>(ring[i]) * sectors +
+                                         std::min(sector, sectors - 1));
+  }
+  const std::vector<double> median = medians(place, rings * sectors, elevations_rad);
+  double sum = 0;
+  for (std::size_t i = 0; i < place.size(); ++i)
+    sum += std::abs(elevations_rad[i] - median[static_cast<std::size_t>(place[i])]);
+  return sum / static_cast<double>(place.size());
+}
+
+/// Rings, and how far elevations are from their ring's, over how far rings are apart that follow
+/// each other: of all returns of a ring, and of those in a part of the turn. Where the sensor
+/// drove, points at one stamp are seen from elsewhere than they were, here from higher and there
+/// from lower.
 struct Turns {
   std::vector<std::int32_t> ring;  // of each return
   double spread = std::numeric_limits<double>::infinity();
+  double local_spread = std::numeric_limits<double>::infinity();
+  double jumps =
+      0;  // of each ring: from return to return by more than half of what rings are apart
+
+  bool is_better_than(const Turns& other) const {
+    return spread + jumps < other.spread + other.jumps;
+  }
 };
 
 /// Takes runs for rings; those that follow each other at one elevation are one: rings that look
 /// aside pass the seam sooner or later than others.
-Turns turns_of(std::vector<std::int32_t> run, std::span<const double> elevations_rad) {
+Turns turns_of(std::vector<std::int32_t> run, std::span<const double> azimuths_rad,
+               std::span<const double> elevations_rad) {
   const auto runs = static_cast<std::size_t>(run.back()) + 1;
   if (runs < 2 || run.size() < 8 * runs) return {};
   const std::vector<double> median = medians(run, runs, elevations_rad);
@@ -121,14 +152,37 @@ Turns turns_of(std::vector<std::int32_t> run, std::span<const double> elevations
     if (is_new || size[r] > size[largest]) largest = r;
   }
   Turns turns{.ring = std::move(run)};
-  double sum = 0;
   for (std::int32_t& r : turns.ring) r = ring_of_run[static_cast<std::size_t>(r)];
   const auto rings = static_cast<std::size_t>(turns.ring.back()) + 1;
-  const std::vector<double> of_ring = medians(turns.ring, rings, elevations_rad);
-  for (std::size_t i = 0; i < turns.ring.size(); ++i)
-    sum += std::abs(elevations_rad[i] - of_ring[static_cast<std::size_t>(turns.ring[i])]);
-  if (gap_rad > 0) turns.spread = sum / static_cast<double>(turns.ring.size()) / gap_rad;
+  if (gap_rad <= 0) return turns;
+  std::size_t jumps = 0;
+  for (std::size_t i = 1; i < turns.ring.size(); ++i) {
+    jumps += turns.ring[i] == turns.ring[i - 1] &&
+             std::abs(elevations_rad[i] - elevations_rad[i - 1]) > gap_rad / 2;
+  }
+  turns.jumps = static_cast<double>(jumps) / static_cast<double>(rings);
+  const std::size_t sectors =
+      std::clamp<std::size_t>(turns.ring.size() / (sector_returns * rings), 1, most_sectors);
+  turns.spread = spread_rad(turns.ring, rings, 1, azimuths_rad, elevations_rad) / gap_rad;
+  turns.local_spread =
+      spread_rad(turns.ring, rings, sectors, azimuths_rad, elevations_rad) / gap_rad;
   return turns;
+}
+
+/// Takes rings that follow each other upwards or downwards, but for few, as they come: parallax may
+/// turn the elevations of neighbours round. Others are ordered by elevation.
+BeamRows rows_in_order(std::vector<std::int32_t> ring, std::span<const double> elevations_rad) {
+  const auto rings = static_cast<std::size_t>(ring.back()) + 1;
+  const std::vector<double> median = medians(ring, rings, elevations_rad);
+  std::size_t upwards = 0;
+  for (std::size_t r = 1; r < rings; ++r) upwards += median[r] > median[r - 1];
+  const std::size_t downwards = rings - 1 - upwards;
+  if (5 * std::min(upwards, downwards) > rings)
+    return rows_of_rings(ring, elevations_rad, RowOrder::Elevation);
+  if (downwards > upwards) {
+    for (std::int32_t& r : ring) r = static_cast<std::int32_t>(rings) - 1 - r;
+  }
+  return {std::move(ring), static_cast<int>(rings)};
 }
 
 }  // namespace
@@ -201,14 +255,14 @@ std::optional<BeamRows> rows_of_turns(std::span<const double> azimuths_rad,
   }
   if (std::max(forwards, backwards) * 10 < count * 9) return std::nullopt;
   const double sense = forwards > backwards ? 1 : -1;
-  Turns best{.spread = most_spread};
+  Turns best;
   // Rings begin ahead, behind or beside, or where the first return is.
   for (const double seam : {0.0, 0.25, 0.5, 0.75, azimuths_rad[0] / two_pi - sense * 0.005}) {
-    Turns turns = turns_of(runs_of(azimuths_rad, sense, seam), elevations_rad);
-    if (turns.spread < best.spread) best = std::move(turns);
+    Turns turns = turns_of(runs_of(azimuths_rad, sense, seam), azimuths_rad, elevations_rad);
+    if (turns.is_better_than(best)) best = std::move(turns);
   }
-  if (best.ring.empty()) return std::nullopt;
-  return rows_of_rings(best.ring, elevations_rad, RowOrder::Elevation);
+  if (!(best.local_spread <= most_spread)) return std::nullopt;
+  return rows_in_order(std::move(best.ring), elevations_rad);
 }
 
 }  // namespace groundray

@@ -28,8 +28,8 @@ std::optional<BeamRows> rows_of_elevations(std::span<const double> elevations_ra
 
 /// Tells beams apart by the order of the table, where one ring follows the other, as in KITTI's
 /// files: azimuth runs round once for each ring.
-/// @return nothing if it does not, or elevations within such rings differ by half as much as those
-///         of rings that follow each other.
+/// @return nothing if it does not, or elevations within a part of such a ring differ by half as
+///         much as those of rings that follow each other.
 /// @see Triess, Peter, Rist, Zöllner, Scan-based semantic segmentation of LiDAR point clouds: an
 ///      experimental study (2020): unfolding scans by their jumps in azimuth.
 std::optional<BeamRows> rows_of_turns(std::span<const double> azimuths_rad,

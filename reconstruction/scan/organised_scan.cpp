@@ -11,6 +11,8 @@
 #include "core/error.h"
 #include "reconstruction/scan/beam_columns.h"
 #include "reconstruction/scan/beam_rows.h"
+#include "reconstruction/scan/grid_check.h"
+#include "reconstruction/scan/sensor_motion.h"
 
 namespace groundray {
 namespace {
@@ -53,6 +55,7 @@ struct Beams {
   std::vector<std::uint32_t> source;  // row of the table
   std::vector<double> azimuth_rad;    // [0, 2 pi)
   std::vector<double> elevation_rad;
+  std::vector<double> plan_m;  // range as seen from above
   std::vector<double> range_m;
 };
 
@@ -68,7 +71,8 @@ Beams beams_of(const ScanReturns& returns) {
     if (azimuth_rad < 0) azimuth_rad += turn;
     beams.source.push_back(static_cast<std::uint32_t>(i));
     beams.azimuth_rad.push_back(azimuth_rad < turn ? azimuth_rad : 0);
-    beams.elevation_rad.push_back(std::atan2(way.z, std::hypot(way.x, way.y)));
+    beams.plan_m.push_back(std::hypot(way.x, way.y));
+    beams.elevation_rad.push_back(std::atan2(way.z, beams.plan_m.back()));
     beams.range_m.push_back(glm::length(way));
   }
   return beams;
@@ -99,19 +103,31 @@ BeamRows rows_of(const ScanReturns& returns, const Beams& beams, RowOrder order)
   return {picked(all.row, beams.source), all.count};
 }
 
+/// Returns azimuths that tell how rings look aside: of points at one stamp, without the parallax
+/// that the sensor's way to there brings.
+std::vector<double> azimuths_of(const std::vector<double>& clock, const Beams& beams,
+                                const BeamRows& rows, RowOrder order) {
+  if (order == RowOrder::Number) return beams.azimuth_rad;  // lines of an image
+  auto as_fired = azimuths_as_fired(clock, rows, {beams.azimuth_rad, beams.plan_m});
+  return as_fired ? *std::move(as_fired) : beams.azimuth_rad;
+}
+
 BeamColumns columns_of(const ScanReturns& returns, const Beams& beams, const BeamRows& rows,
                        RowOrder order) {
   if (!returns.columns.empty()) {
     const auto [first, last] = std::ranges::minmax(returns.columns);
-    return columns_of_numbers(picked(returns.columns, beams.source), first, last, rows,
-                              beams.azimuth_rad, order);
+    const std::vector<std::int32_t> numbers = picked(returns.columns, beams.source);
+    const std::vector<double> clock(numbers.begin(), numbers.end());
+    return columns_of_numbers(numbers, first, last, rows, azimuths_of(clock, beams, rows, order),
+                              order);
   }
   if (!returns.times_s.empty()) {
     const std::vector<double> times_s = picked(returns.times_s, beams.source);
     const bool are_times =
         std::ranges::all_of(times_s, [](double t) { return std::abs(t) <= longest_s; });
     if (are_times) {
-      if (auto columns = columns_of_times(times_s, rows, beams.azimuth_rad, order))
+      if (auto columns =
+              columns_of_times(times_s, rows, azimuths_of(times_s, beams, rows, order), order))
         return *std::move(columns);
     }
   }
@@ -221,23 +237,6 @@ std::vector<std::uint32_t> choose(const ScanReturns& returns, const Beams& beams
   return chosen;
 }
 
-/// Beams that were found by their elevations must look at the same columns, or they are none.
-void check_neighbours(const std::vector<std::uint32_t>& chosen, const BeamRows& rows,
-                      std::size_t columns) {
-  std::size_t used = 0, above = 0;
-  for (std::size_t i = 0; i < chosen.size(); ++i) {
-    if (chosen[i] == OrganisedScan::none) continue;
-    ++used;
-    above += i + columns < chosen.size() && chosen[i + columns] != OrganisedScan::none;
-  }
-  if (rows.count < 2 || used <= 64 || 10 * above >= used) return;
-  throw Error(
-      "the returns have no ring; their elevations seem to be of {} beams, but only {} of {} "
-      "returns "
-      "have one of the next beam above them: give the rings, or link them as points without order",
-      rows.count, above, used);
-}
-
 OrganisedScan empty_scan(int rows, int columns, bool with_labels) {
   const auto cells = static_cast<std::size_t>(rows) * static_cast<std::size_t>(columns);
   const glm::dvec3 nothing(std::numeric_limits<double>::quiet_NaN());
@@ -264,8 +263,6 @@ OrganisedReturns organise(const ScanReturns& returns, ReturnChoice choice, RowOr
   made.scan.is_round = columns.is_round;
   const Places places = places_of(rows, std::move(columns));
   const auto chosen = choose(returns, beams, places, choice, made.counts);
-  if (returns.rings.empty())
-    check_neighbours(chosen, rows, static_cast<std::size_t>(made.scan.columns));
   for (std::size_t i = 0; i < chosen.size(); ++i) {
     if (chosen[i] == OrganisedScan::none) continue;
     const std::uint32_t row = beams.source[chosen[i]];
@@ -275,6 +272,8 @@ OrganisedReturns organise(const ScanReturns& returns, ReturnChoice choice, RowOr
     if (!returns.sd_m.empty()) made.scan.sd_m[i] = returns.sd_m[row];
     if (!returns.labels.empty()) made.scan.labels[i] = returns.labels[row];
   }
+  if (returns.rings.empty()) check_rows_meet(made.scan);
+  if (order == RowOrder::Elevation) check_beams_turn(made.scan);
   return made;
 }
 

@@ -69,12 +69,13 @@ struct OrganisedReturns {
 /// ring follows the other. Columns are those given, or pulses at equal steps of time or else of
 /// azimuth: a step is the coarsest that is not rare among rings, and each ring may have a phase of
 /// its own. Where azimuth goes on from ring to ring, columns stand for azimuths: rings that the
-/// sensor turned aside are shifted by whole columns. A pulse without a return leaves a cell empty,
-/// and so does a gap in azimuth; one that comes early or late gets the cell beside it if that is
-/// empty. Takes n log n.
+/// sensor turned aside are shifted by whole columns. Points may be those of a moving sensor at one
+/// stamp, as if it had stood: with times or columns their azimuths are made those of the beams
+/// first. A pulse without a return leaves a cell empty, and so does a gap in azimuth; one that
+/// comes early or late gets the cell beside it if that is empty. Takes n log n.
 /// @throws Error if lists are of other lengths than the positions, what a choice needs is not
-///         given, or returns lie on no such grid: such clouds must be linked as points without
-///         order.
+///         given, or returns lie on no such grid, as those of a rosette: such clouds must be linked
+///         as points without order.
 OrganisedReturns organise(const ScanReturns& returns, ReturnChoice choice = ReturnChoice::Last,
                           RowOrder order = RowOrder::Elevation);
 

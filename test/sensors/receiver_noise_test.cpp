@@ -5,10 +5,12 @@
 
 #include <algorithm>
 #include <cmath>
+#include <cstdint>
 #include <functional>
 #include <numbers>
 #include <random>
 #include <set>
+#include <vector>
 
 #include "sensors/lidar.h"
 #include "sensors/receiver.h"
@@ -367,6 +369,36 @@ TEST(ReceiverNoise, JoinedEchoesTellThatTheirNeighbourHoldsThemIn) {
       EXPECT_NEAR(spread.found_m / spread.claimed_m, 1, 5 * spread.error + 1e-3)
           << int(timing) << ' ' << apart_m;
     }
+  }
+}
+
+// Power that comes from elsewhere may be as ragged as it likes, up to the last bin that is kept:
+// echoes without a width are where they are, and what is told of them are numbers.
+TEST(ReceiverNoise, EchoesOfOneBinHavePlacesAndSpreads) {
+  const Receiver receiver(laser, noisy(Timing::CentreOfGravity, 20e-9));
+  Waveform waveform;
+  Detections found;
+  const Arrival arrival{75, 1e-60};  // keeps bins, and adds nothing to them
+  const auto detect = [&](const std::function<float(std::int64_t)>& power_w) {
+    receiver.sample({&arrival, 1}, waveform);
+    const Bins bins = waveform.segments()[0].bins;
+    std::vector<float> more_w;
+    for (std::int64_t i = bins.begin; i < bins.end; ++i)
+      more_w.push_back(power_w(bins.end - 1 - i));
+    waveform.add(bins.begin, more_w);
+    receiver.detect(waveform, gate, {{.seed = Seed{3}}, 0}, found);
+    for (const Detection& echo : found) {
+      EXPECT_TRUE(gate.near_m <= echo.range_m && echo.range_m <= gate.far_m);
+      EXPECT_TRUE(echo.range_sd_m >= 0 && std::isfinite(echo.range_sd_m)) << echo.range_sd_m;
+    }
+  };
+  for (const std::int64_t place : {0, 1, 5}) {  // from the last bin on
+    detect([place](std::int64_t i) { return i == place ? 1e-6f : 0.f; });
+    ASSERT_EQ(found.size(), 1u) << place;
+  }
+  for (const int period : {2, 3, 4}) {
+    detect([period](std::int64_t i) { return i % period == 0 ? 1e-6f : 0.f; });
+    EXPECT_FALSE(found.empty()) << period;
   }
 }
 

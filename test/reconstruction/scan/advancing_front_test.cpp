@@ -187,6 +187,25 @@ TEST(AdvancingFront, GivesTheSameWhateverWasInMemory) {
   EXPECT_EQ(once.sources, again.sources);
 }
 
+// Ties and memory are told apart by thread: another run amid one must leave it alone, and one that
+// was ended amid must leave nothing behind.
+TEST(AdvancingFront, GivesTheSameAmidAnother) {
+  Points points_m = grid_points(80, 0);
+  for (const glm::dvec3& p : grid_points(70, 0.7)) points_m.push_back(p);
+  const Points inner_m = grid_points(20, 0);
+  const FrontMesh once = advance_front(points_m, 6), inner_once = advance_front(inner_m, 6);
+  int runs = 0;
+  const Work work{.progress = [&](double) {
+    ++runs;
+    EXPECT_EQ(advance_front(inner_m, 6).mesh.triangles, inner_once.mesh.triangles);
+  }};
+  EXPECT_EQ(advance_front(points_m, 6, {}, work).mesh.triangles, once.mesh.triangles);
+  EXPECT_GT(runs, 1);
+  const Work ended{.progress = [](double) { throw std::runtime_error("enough"); }};
+  EXPECT_THROW(advance_front(points_m, 6, {}, ended), std::runtime_error);
+  EXPECT_EQ(advance_front(inner_m, 6).mesh.triangles, inner_once.mesh.triangles);
+}
+
 TEST(AdvancingFront, RefusesWhatItCannotLink) {
   const auto message = [](const Points& points_m, double limit_m, const Points& origins_m,
                           const Work& work) {

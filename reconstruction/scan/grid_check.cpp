@@ -1,0 +1,100 @@
+#include "reconstruction/scan/grid_check.h"
+
+#include <algorithm>
+#include <cmath>
+#include <cstddef>
+#include <glm/geometric.hpp>
+#include <numbers>
+#include <vector>
+
+#include "core/error.h"
+
+namespace groundray {
+namespace {
+
+constexpr std::size_t few = 64;          // returns tell nothing of regularity
+constexpr std::size_t least_share = 4;   // one of this many may turn the other way
+constexpr std::size_t least_above = 10;  // one of this many must have one above
+constexpr double one_row_rad = 5e-2;     // of elevations, from the middle
+constexpr double degrees = 180 / std::numbers::pi;
+
+/// Counts of neighbours by how they turn.
+struct Turning {
+  std::size_t left = 0, right = 0;
+};
+
+Turning turning_of(const OrganisedScan& scan) {
+  const auto rows = static_cast<std::size_t>(scan.rows);
+  const auto columns = static_cast<std::size_t>(scan.columns);
+  const auto way_m = [&](std::size_t cell) { return scan.points_m[cell] - scan.origins_m[cell]; };
+  Turning turning;
+  for (std::size_t row = 0; row + 1 < rows; ++row) {
+    for (std::size_t column = 0; column + 1 < columns; ++column) {
+      const std::size_t cell = row * columns + column;
+      const double turn = glm::dot(way_m(cell), glm::cross(way_m(cell + 1), way_m(cell + columns)));
+      if (turn > 0) ++turning.left;  // NaN is neither
+      if (turn < 0) ++turning.right;
+    }
+  }
+  return turning;
+}
+
+/// How far elevations of returns are from their median, in the median.
+double spread_rad(const OrganisedScan& scan) {
+  std::vector<double> elevations_rad;
+  for (std::size_t i = 0; i < scan.points_m.size(); ++i) {
+    const glm::dvec3 way_m = scan.points_m[i] - scan.origins_m[i];
+    if (!std::isnan(way_m.x))
+      elevations_rad.push_back(std::atan2(way_m.z, std::hypot(way_m.x, way_m.y)));
+  }
+  if (elevations_rad.size() <= few) return 0;
+  const auto middle = [&] {
+    const auto at = elevations_rad.begin() + static_cast<std::ptrdiff_t>(elevations_rad.size() / 2);
+    std::ranges::nth_element(elevations_rad, at);
+    return *at;
+  };
+  const double median_rad = middle();
+  for (double& e : elevations_rad) e = std::abs(e - median_rad);
+  return middle();
+}
+
+}  // namespace
+
+void check_rows_meet(const OrganisedScan& scan) {
+  const auto columns = static_cast<std::size_t>(scan.columns);
+  const std::vector<std::uint32_t>& chosen = scan.returns;
+  std::size_t used = 0, above = 0;
+  for (std::size_t i = 0; i < chosen.size(); ++i) {
+    if (chosen[i] == OrganisedScan::none) continue;
+    ++used;
+    above += i + columns < chosen.size() && chosen[i + columns] != OrganisedScan::none;
+  }
+  if (scan.rows < 2 || used <= few || least_above * above >= used) return;
+  throw Error(
+      "the returns have no ring; their elevations seem to be of {} beams, but only {} of {} "
+      "returns have one of the next beam above them: give the rings, or link them as points "
+      "without order",
+      scan.rows, above, used);
+}
+
+void check_beams_turn(const OrganisedScan& scan) {
+  const Turning turning = turning_of(scan);
+  const std::size_t all = turning.left + turning.right;
+  const std::size_t fewer = std::min(turning.left, turning.right);
+  if (all > few && least_share * fewer > all) {
+    throw Error(
+        "the beams lie on no grid of rows and columns: of {} neighbours {} turn one way and {} the "
+        "other, as those of a rosette do, or of points that are not in the sensor's frame: give "
+        "the sensor's pose, or link them as points without order",
+        all, all - fewer, fewer);
+  }
+  if (scan.rows != 1) return;
+  const double spread = spread_rad(scan);
+  if (spread <= one_row_rad) return;
+  throw Error(
+      "all returns are of one ring, whose elevations are {:.1f} degrees from their middle: it is "
+      "no row of a grid: give the rings, or link them as points without order",
+      spread * degrees);
+}
+
+}  // namespace groundray
