@@ -71,8 +71,10 @@ class Consensus {
 
   std::uint32_t cover_of(const QuiltVertex& vertex, std::size_t s) const {
     if (vertex.vertex != no_vertex) return scans_[vertex.scan].covers->of(vertex.vertex)[s];
+    std::uint32_t near = scans_[vertex.scan].covers->of(vertex.nearest)[s];
+    if (near == not_covered) near = 0;
     const CoverAnswer answer =
-        scans_[s].rated->surface.at({vertex.p, vertex.normal, vertex.sd_m}, 0, 0);
+        scans_[s].rated->surface.at({vertex.p, vertex.normal, vertex.sd_m}, 0, near);
     return answer.cover == Cover::Inside ? answer.nearest.triangle : not_covered;
   }
 

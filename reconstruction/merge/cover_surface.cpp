@@ -62,7 +62,7 @@ glm::dvec3 shares_of_corners(const TriangleMesh& mesh, std::uint32_t triangle,
   return {1 - b - c, b, c};
 }
 
-CoverSurface::CoverSurface(TriangleMesh mesh, std::vector<float> sd_m, const CoverLimits& limits)
+CoverSurface::CoverSurface(TriangleMesh mesh, std::vector<float> sd_m, const CoverTolerance& limits)
     : nearest_(std::move(mesh)),
       sd_m_(std::move(sd_m)),
       limits_(limits),

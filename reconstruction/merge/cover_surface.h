@@ -33,7 +33,7 @@ struct MeasuredPlace {
 };
 
 /// What a surface may be off and still cover a place.
-struct CoverLimits {
+struct CoverTolerance {
   double noise_sds = 0, apart_m = 0;
   double least_cosine = 0;  ///< between normals
 };
@@ -48,7 +48,7 @@ class CoverSurface {
  public:
   /// @param mesh  has triangles, and keeps check_mesh's rules.
   /// @param sd_m  of each vertex, or empty for none.
-  CoverSurface(TriangleMesh mesh, std::vector<float> sd_m, const CoverLimits& limits);
+  CoverSurface(TriangleMesh mesh, std::vector<float> sd_m, const CoverTolerance& limits);
 
   /// @param slack_m  by which the place may be farther away than the limits say.
   /// @param near     a triangle, for speed alone.
@@ -59,6 +59,7 @@ class CoverSurface {
   /// Unit normals of the vertices, smooth.
   const std::vector<glm::vec3>& normals() const noexcept { return normals_; }
   double sd_m(std::uint32_t vertex) const noexcept { return sd_m_.empty() ? 0 : sd_m_[vertex]; }
+  std::span<const float> sds_m() const noexcept { return sd_m_; }  ///< as they were given
   bool is_at_border(std::uint32_t vertex) const noexcept { return is_at_border_[vertex] != 0; }
   double area_m2(std::uint32_t triangle) const noexcept;
 
@@ -67,7 +68,7 @@ class CoverSurface {
 
   ClosestPoint nearest_;
   std::vector<float> sd_m_;
-  CoverLimits limits_;
+  CoverTolerance limits_;
   std::vector<std::uint32_t> twins_;
   std::vector<char> is_at_border_;
   std::vector<glm::vec3> normals_;

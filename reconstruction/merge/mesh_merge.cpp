@@ -14,6 +14,7 @@
 #include "core/model.h"
 #include "reconstruction/merge/consensus.h"
 #include "reconstruction/merge/cover_surface.h"
+#include "reconstruction/merge/gap_bridge.h"
 #include "reconstruction/merge/quilt.h"
 #include "reconstruction/merge/redundant_faces.h"
 #include "reconstruction/merge/seen_through.h"
@@ -101,6 +102,7 @@ class Merging {
   Merging(std::vector<const ScanMesh*> scans, const MergeLimits& limits, const Work& work)
       : scans_(std::move(scans)),
         limits_{limits.noise_sds, limits.apart_m, std::cos(limits.turned_rad)},
+        interpolation_(limits.interpolation),
         origin_m_(middle_of(scans_)),
         work_(work) {
     for (const ScanMesh* scan : scans_) {
@@ -108,12 +110,12 @@ class Merging {
       std::vector<float> worth = rate_faces(surface, scan->face_confidence);
       rated_.push_back({std::move(surface), std::move(worth), {}});
     }
-    if (scans_.size() > 1) note_seen_through(limits.interpolation);
+    if (scans_.size() > 1) note_seen_through();
     report(0.1);
-    for (std::size_t s = 0; s < rated_.size(); ++s) covers_.push_back(find_covers(rated_, s));
-    note_shared();
+    covers_ = find_covers(rated_);
     report(0.4);
-    kept_ = keep_best_faces(rated_, covers_, limits.interpolation);
+    kept_ = keep_best_faces(rated_, covers_, interpolation_);
+    note_shared();
     report(0.6);
   }
 
@@ -124,6 +126,7 @@ class Merging {
       asked.push_back({&rated_[s], &scans_[s]->mesh, &covers_[s]});
     }
     if (scans_.size() > 1) {
+      counts_.bridged = bridge_gaps(quilt, beams_, limits_, interpolation_);
       counts_.filled = fill_slits(quilt, rated_);
       report(0.9);
       counts_.moved = move_to_consensus(quilt, asked);
@@ -138,31 +141,36 @@ class Merging {
     if (work_.progress) work_.progress(share);
   }
 
-  void note_seen_through(double interpolation) {
-    std::vector<BeamSurface> beams;
+  void note_seen_through() {
     for (std::size_t s = 0; s < scans_.size(); ++s) {
-      beams.push_back({&rated_[s], scans_[s]->origins_m});
-      for (glm::dvec3& origin_m : beams.back().origins_m) origin_m -= origin_m_;
+      beams_.push_back({&rated_[s], scans_[s]->origins_m});
+      for (glm::dvec3& origin_m : beams_.back().origins_m) origin_m -= origin_m_;
     }
-    std::vector<std::vector<char>> passed = find_seen_through(beams, limits_, interpolation);
+    std::vector<std::vector<char>> passed = find_seen_through(beams_, limits_, interpolation_);
     for (std::size_t s = 0; s < scans_.size(); ++s) {
       counts_.seen_through += static_cast<std::size_t>(std::ranges::count(passed[s], char{1}));
       rated_[s].is_refuted = std::move(passed[s]);
     }
   }
 
+  /// Notes which vertices are where kept triangles of two scans are.
   void note_shared() {
     for (const ScanMesh* scan : scans_) is_shared_.emplace_back(scan->mesh.shape.vertices_m.size());
     for (std::size_t s = 0; s < scans_.size(); ++s) {
-      for (std::uint32_t v = 0; v < is_shared_[s].size(); ++v) {
-        const std::span<const std::uint32_t> covers = covers_[s].of(v);
-        for (std::size_t other = 0; other < covers.size(); ++other) {
-          if (covers[other] == not_covered) continue;
-          is_shared_[s][v] = 1;
-          const glm::uvec3& t = scans_[other]->mesh.shape.triangles[covers[other]];
-          for (int k = 0; k < 3; ++k) is_shared_[other][t[k]] = 1;
-        }
+      for (std::uint32_t i = 0; i < kept_[s].size(); ++i) {
+        const glm::uvec3& t = scans_[s]->mesh.shape.triangles[i];
+        for (int k = 0; k < 3 && kept_[s][i] != 0; ++k) note_shared(s, t[k]);
       }
+    }
+  }
+
+  void note_shared(std::size_t s, std::uint32_t vertex) {
+    const std::span<const std::uint32_t> covers = covers_[s].of(vertex);
+    for (std::size_t other = 0; other < covers.size(); ++other) {
+      if (covers[other] == not_covered || kept_[other][covers[other]] == 0) continue;
+      is_shared_[s][vertex] = 1;
+      const glm::uvec3& t = scans_[other]->mesh.shape.triangles[covers[other]];
+      for (int k = 0; k < 3; ++k) is_shared_[other][t[k]] = 1;
     }
   }
 
@@ -210,6 +218,7 @@ class Merging {
                                     .label = mesh.labels.empty() ? no_label : mesh.labels[v],
                                     .scan = static_cast<std::uint32_t>(s),
                                     .vertex = v,
+                                    .nearest = v,
                                     .is_shared = is_shared_[s][v] != 0});
         }
         t[k] = numbers[v];
@@ -257,10 +266,12 @@ class Merging {
   static constexpr std::uint16_t no_label = 0;
 
   std::vector<const ScanMesh*> scans_;
-  CoverLimits limits_;
+  CoverTolerance limits_;
+  double interpolation_;
   glm::dvec3 origin_m_;
   const Work& work_;
   std::vector<RatedSurface> rated_;
+  std::vector<BeamSurface> beams_;
   std::vector<VertexCovers> covers_;
   std::vector<std::vector<char>> is_shared_;  // vertices, as a QuiltVertex tells
   std::vector<std::vector<char>> kept_;       // triangles

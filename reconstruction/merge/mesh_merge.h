@@ -24,6 +24,7 @@ struct MergeCounts {
   std::size_t seen_through = 0;  ///< triangles left out, for beams of another scan passed them
   std::size_t clipped = 0;       ///< triangles cut at borders of others
   std::size_t filled = 0;        ///< triangles added where cutting left slits
+  std::size_t bridged = 0;       ///< triangles added over gaps that single scans leave
   std::size_t moved = 0;         ///< vertices moved to the consensus of several scans
   /// Triangles left out for with them there would be no surface: edges of more than two triangles,
   /// neighbours of opposite windings, vertices named twice.
@@ -38,8 +39,9 @@ struct MergedMesh {
 };
 
 /// Merges scans that are in one frame. Where several saw the same surface the triangles of the one
-/// that saw it best are kept, the others' are cut at their border and share its vertices, and each
-/// vertex moves along its normal to where all scans have the surface in the mean.
+/// that saw it best are kept, the others' are cut at their border and share its vertices, gaps
+/// between borders that are no longer than the triangles beside them are bridged, and each vertex
+/// moves along its normal to where all scans have the surface in the mean. One scan stays as it is.
 /// Does not depend on the number of threads.
 /// @param scans  in any order, which matters where two are worth the same. Standard deviations,
 ///               labels and confidences are carried along if any scan has them; those of a scan

@@ -19,7 +19,8 @@ struct QuiltVertex {
   float sd_m = 0, confidence = 1;
   std::uint16_t label = 0;
   std::uint32_t scan = 0;
-  std::uint32_t vertex = no_vertex;  ///< of that scan; none if it lies on an edge
+  std::uint32_t vertex = no_vertex;   ///< of that scan; none if it lies on an edge
+  std::uint32_t nearest = no_vertex;  ///< of that scan, on the edge
   bool is_shared = true;  ///< another scan covers it, or a triangle of it covers another's
 };
 

@@ -21,7 +21,7 @@ constexpr std::size_t in_block = 512;  // neighbours in the list, which are near
 template <typename Visit>
 void for_blocks(std::size_t count, const Visit& visit) {
   tbb::parallel_for(std::size_t{0}, (count + in_block - 1) / in_block, [&](std::size_t block) {
-    visit(block, block * in_block, std::min(count, (block + 1) * in_block));
+    visit(block * in_block, std::min(count, (block + 1) * in_block));
   });
 }
 
@@ -73,84 +73,74 @@ std::vector<glm::dvec3> places_in(const TriangleMesh& mesh, std::size_t triangle
   return places;
 }
 
-/// Covers of the places that triangles have besides their corners; those of one triangle begin at
-/// its number within the block.
-struct PlaceCovers {
-  std::vector<std::uint32_t> first, triangles;
-};
-
-/// Asks for one scan's triangles.
+/// Tells whether triangles of one scan lie on what others keep, between their corners.
 class PlaceQuestions {
  public:
-  PlaceQuestions(std::span<const RatedSurface> scans, std::span<const VertexCovers> covers,
-                 std::size_t scan, double interpolation)
-      : scans_(scans), covers_(covers[scan]), scan_(scan), interpolation_(interpolation) {}
+  PlaceQuestions(std::span<const RatedSurface> scans, const VertexCovers& covers, std::size_t scan,
+                 double interpolation)
+      : scans_(scans), covers_(covers), own_(scans[scan].surface), interpolation_(interpolation) {}
 
-  /// Only of triangles whose corners are covered by ones worth as much at least: others are kept.
-  PlaceCovers of_block(std::size_t begin, std::size_t end) const {
-    PlaceCovers out{.first = {0}, .triangles = {}};
-    for (std::size_t i = begin; i < end; ++i) {
-      append(i, scans_[scan_].worth[i], out.triangles);
-      out.first.push_back(static_cast<std::uint32_t>(out.triangles.size()));
-    }
-    return out;
-  }
-
-  /// Appends the covers of a triangle's places, if each of its corners is covered by a triangle
-  /// that is worth as much as is said.
-  void append(std::size_t triangle, float least_worth, std::vector<std::uint32_t>& out) const {
-    const CoverSurface& own = scans_[scan_].surface;
-    const glm::uvec3& t = own.mesh().triangles[triangle];
-    const double step_m = step_over(t, least_worth);
-    const glm::dvec3 a = own.mesh().vertices_m[t.x], b = own.mesh().vertices_m[t.y],
-                     c = own.mesh().vertices_m[t.z];
+  /// Whether each place of a triangle besides its corners is covered by triangles that are kept, as
+  /// its corners are. There are such places where what covers these is finer.
+  bool are_covered(std::size_t triangle, const std::vector<std::vector<char>>& kept) const {
+    const glm::uvec3& t = own_.mesh().triangles[triangle];
+    const double step_m = step_over(t, kept);
+    const glm::dvec3 a = own_.mesh().vertices_m[t.x], b = own_.mesh().vertices_m[t.y],
+                     c = own_.mesh().vertices_m[t.z];
     const double longest_m =
         std::max({glm::distance(a, b), glm::distance(b, c), glm::distance(c, a)});
-    if (!(longest_m >= step_m)) return;
-    const glm::vec3 sum = own.normals()[t.x] + own.normals()[t.y] + own.normals()[t.z];
-    const double sd_m = (own.sd_m(t.x) + own.sd_m(t.y) + own.sd_m(t.z)) / 3;
-    const MeasuredPlace place{.normal = glm::length(sum) > 0 ? glm::normalize(sum) : sum,
-                              .sd_m = sd_m};
-    for (const glm::dvec3& p : places_in(own.mesh(), triangle, step_m))
-      ask({p, place.normal, place.sd_m}, t, interpolation_ * longest_m, out);
+    if (!(longest_m >= step_m)) return true;
+    const glm::vec3 sum = own_.normals()[t.x] + own_.normals()[t.y] + own_.normals()[t.z];
+    MeasuredPlace place{.normal = glm::length(sum) > 0 ? glm::normalize(sum) : sum,
+                        .sd_m = (own_.sd_m(t.x) + own_.sd_m(t.y) + own_.sd_m(t.z)) / 3};
+    std::vector<std::uint32_t> near = covers_near(t);
+    std::size_t first = 0;  // the scan that covered the place before: it is asked first, for speed
+    for (const glm::dvec3& p : places_in(own_.mesh(), triangle, step_m)) {
+      place.p = p;
+      if (!is_covered(place, interpolation_ * longest_m, kept, near, first)) return false;
+    }
+    return true;
   }
 
  private:
-  /// Infinite if a corner is not covered.
-  double step_over(const glm::uvec3& t, float least_worth) const {
-    constexpr double keep = std::numeric_limits<double>::infinity();
-    double step_m = keep;
+  double step_over(const glm::uvec3& t, const std::vector<std::vector<char>>& kept) const {
+    double step_m = std::numeric_limits<double>::infinity();
     for (int k = 0; k < 3; ++k) {
-      bool is_covered = false;
       const std::span<const std::uint32_t> covers = covers_.of(t[k]);
       for (std::size_t s = 0; s < covers.size(); ++s) {
-        if (covers[s] == not_covered) continue;
-        if (scans_[s].worth[covers[s]] < least_worth) continue;
-        is_covered = true;
-        step_m = std::min(step_m, 6 * std::sqrt(2 * scans_[s].surface.area_m2(covers[s])));
+        if (covers[s] == not_covered || kept[s][covers[s]] == 0) continue;
+        step_m = std::min(step_m, 24 * std::sqrt(2 * scans_[s].surface.area_m2(covers[s])));
       }
-      if (!is_covered) return keep;
     }
     return step_m;
   }
 
-  void ask(const MeasuredPlace& place, const glm::uvec3& t, double slack_m,
-           std::vector<std::uint32_t>& out) const {
-    for (std::size_t s = 0; s < scans_.size(); ++s) {
-      std::uint32_t near = not_covered;
-      for (int k = 0; k < 3; ++k) near = std::min(near, covers_.of(t[k])[s]);
-      std::uint32_t found = not_covered;
-      if (near != not_covered) {
-        const CoverAnswer answer = scans_[s].surface.at(place, slack_m, near);
-        if (answer.cover == Cover::Inside) found = answer.nearest.triangle;
-      }
-      out.push_back(found);
+  /// Of each scan, a triangle that covers a corner, if there is one.
+  std::vector<std::uint32_t> covers_near(const glm::uvec3& t) const {
+    std::vector<std::uint32_t> near(scans_.size());
+    for (std::size_t s = 0; s < near.size(); ++s)
+      near[s] = std::min({covers_.of(t.x)[s], covers_.of(t.y)[s], covers_.of(t.z)[s]});
+    return near;
+  }
+
+  bool is_covered(const MeasuredPlace& place, double slack_m,
+                  const std::vector<std::vector<char>>& kept, std::vector<std::uint32_t>& near,
+                  std::size_t& first) const {
+    for (std::size_t i = 0; i < near.size(); ++i) {
+      const std::size_t s = (first + i) % near.size();
+      if (near[s] == not_covered) continue;
+      const CoverAnswer answer = scans_[s].surface.at(place, slack_m, near[s]);
+      near[s] = answer.nearest.triangle;
+      if (answer.cover != Cover::Inside || kept[s][near[s]] == 0) continue;
+      first = s;
+      return true;
     }
+    return false;
   }
 
   std::span<const RatedSurface> scans_;
   const VertexCovers& covers_;
-  std::size_t scan_;
+  const CoverSurface& own_;
   double interpolation_;
 };
 
@@ -210,48 +200,29 @@ class Selection {
  public:
   Selection(std::span<const RatedSurface> scans, std::span<const VertexCovers> covers,
             double interpolation)
-      : scans_(scans), covers_(covers), places_(scans.size()), kept_(scans.size()) {
+      : scans_(scans), covers_(covers) {
     for (std::size_t s = 0; s < scans.size(); ++s) {
-      const std::size_t triangles = scans[s].worth.size();
-      kept_[s].resize(triangles);
-      places_[s].resize((triangles + in_block - 1) / in_block);
-      questions_.emplace_back(scans, covers, s, interpolation);
-      for_blocks(triangles, [&](std::size_t block, std::size_t begin, std::size_t end) {
-        places_[s][block] = questions_[s].of_block(begin, end);
-      });
+      kept_.emplace_back(scans[s].worth.size());
+      questions_.emplace_back(scans, covers[s], s, interpolation);
     }
   }
 
   std::vector<std::vector<char>> run() && {
     // The best come first, so that what is kept already is worth more.
     for (const RankedFace& face : ranked(scans_))
-      kept_[face.scan][face.triangle] = is_redundant(face) ? 0 : 1;
+      kept_[face.scan][face.triangle] = is_covered(face.scan, face.triangle) ? 0 : 1;
     for (std::size_t s = 0; s < scans_.size(); ++s) close_holes(s);
     for (std::size_t s = 0; s < scans_.size(); ++s) remove_islands(s);
     return std::move(kept_);
   }
 
  private:
-  bool is_redundant(const RankedFace& face) const {
-    const PlaceCovers& more = places_[face.scan][face.triangle / in_block];
-    const std::size_t i = face.triangle % in_block;
-    return are_corners_covered(face.scan, face.triangle) &&
-           are_covered(
-               std::span(more.triangles).subspan(more.first[i], more.first[i + 1] - more.first[i]));
-  }
-
-  bool are_corners_covered(std::size_t scan, std::size_t triangle) const {
+  /// Whether what is kept so far covers all of a triangle.
+  bool is_covered(std::size_t scan, std::size_t triangle) const {
     const glm::uvec3& t = scans_[scan].surface.mesh().triangles[triangle];
-    return are_covered(covers_[scan].of(t.x)) && are_covered(covers_[scan].of(t.y)) &&
-           are_covered(covers_[scan].of(t.z));
-  }
-
-  /// Whether one of each place's covers is kept.
-  bool are_covered(std::span<const std::uint32_t> places) const {
-    for (std::size_t k = 0; k < places.size(); k += scans_.size()) {
-      if (!any_is_kept(places.subspan(k, scans_.size()), kept_)) return false;
-    }
-    return true;
+    const VertexCovers& covers = covers_[scan];
+    return any_is_kept(covers.of(t.x), kept_) && any_is_kept(covers.of(t.y), kept_) &&
+           any_is_kept(covers.of(t.z), kept_) && questions_[scan].are_covered(triangle, kept_);
   }
 
   void close_holes(std::size_t scan) {
@@ -266,21 +237,32 @@ class Selection {
   void remove_islands(std::size_t scan) {
     for_islands(scans_[scan].surface, kept_[scan], 1,
                 [&](const std::vector<std::uint32_t>& part, bool) {
-                  for (const std::uint32_t triangle : part) {
-                    std::vector<std::uint32_t> places;
-                    if (!are_corners_covered(scan, triangle)) continue;
-                    questions_[scan].append(triangle, 0, places);
-                    if (are_covered(places)) kept_[scan][triangle] = 0;
-                  }
+                  for (const std::uint32_t triangle : part)
+                    if (is_covered(scan, triangle)) kept_[scan][triangle] = 0;
                 });
   }
 
   std::span<const RatedSurface> scans_;
   std::span<const VertexCovers> covers_;
-  std::vector<PlaceQuestions> questions_;         // about each scan
-  std::vector<std::vector<PlaceCovers>> places_;  // of each scan's blocks
+  std::vector<PlaceQuestions> questions_;  // about each scan
   std::vector<std::vector<char>> kept_;
 };
+
+/// Notes which vertices of a surface another scan covers.
+void note_covers(const CoverSurface& own, const RatedSurface& other, std::size_t number,
+                 VertexCovers& covers) {
+  for_blocks(own.mesh().vertices_m.size(), [&](std::size_t begin, std::size_t end) {
+    std::uint32_t near = 0;
+    for (std::size_t v = begin; v < end; ++v) {
+      const auto vertex = static_cast<std::uint32_t>(v);
+      const MeasuredPlace place{own.mesh().vertices_m[v], own.normals()[v], own.sd_m(vertex)};
+      const CoverAnswer answer = other.surface.at(place, 0, near);
+      near = answer.nearest.triangle;
+      if (answer.cover == Cover::Inside && !other.refutes(near))
+        covers.triangles[v * covers.scans + number] = near;
+    }
+  });
+}
 
 }  // namespace
 
@@ -320,24 +302,16 @@ std::vector<float> worth_of_vertices(const RatedSurface& rated) {
   return sums;
 }
 
-VertexCovers find_covers(std::span<const RatedSurface> scans, std::size_t scan) {
-  const CoverSurface& own = scans[scan].surface;
-  const std::size_t vertices = own.mesh().vertices_m.size();
-  VertexCovers covers{scans.size(), std::vector(vertices * scans.size(), not_covered)};
+std::vector<VertexCovers> find_covers(std::span<const RatedSurface> scans) {
+  std::vector<VertexCovers> covers;
+  for (const RatedSurface& scan : scans) {
+    const std::size_t vertices = scan.surface.mesh().vertices_m.size();
+    covers.push_back({scans.size(), std::vector(vertices * scans.size(), not_covered)});
+  }
   for (std::size_t s = 0; s < scans.size(); ++s) {
-    if (s == scan) continue;
-    const CoverSurface& other = scans[s].surface;
-    for_blocks(vertices, [&](std::size_t, std::size_t begin, std::size_t end) {
-      std::uint32_t near = 0;
-      for (std::size_t v = begin; v < end; ++v) {
-        const auto vertex = static_cast<std::uint32_t>(v);
-        const CoverAnswer answer =
-            other.at({own.mesh().vertices_m[v], own.normals()[v], own.sd_m(vertex)}, 0, near);
-        near = answer.nearest.triangle;
-        if (answer.cover == Cover::Inside && !scans[s].refutes(near))
-          covers.triangles[v * scans.size() + s] = near;
-      }
-    });
+    for (std::size_t by = 0; by < scans.size(); ++by) {
+      if (s != by) note_covers(scans[s].surface, scans[by], by, covers[s]);
+    }
   }
   return covers;
 }

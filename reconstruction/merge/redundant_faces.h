@@ -42,7 +42,8 @@ struct VertexCovers {
   }
 };
 
-VertexCovers find_covers(std::span<const RatedSurface> scans, std::size_t scan);
+/// Returns those of each scan.
+std::vector<VertexCovers> find_covers(std::span<const RatedSurface> scans);
 
 /// Returns for each scan which of its triangles to keep. A triangle is redundant where each place
 /// of it is covered by one that is kept, is another scan's, and is worth more, or as much in an

@@ -25,29 +25,25 @@ double longest_edge_m(const TriangleMesh& mesh, const glm::uvec3& t) {
   return std::max({glm::distance(a, b), glm::distance(b, c), glm::distance(c, a)});
 }
 
-double largest_sd_m(const CoverSurface& surface, const glm::uvec3& t) {
-  return std::max({surface.sd_m(t.x), surface.sd_m(t.y), surface.sd_m(t.z)});
-}
-
 /// A beam and a triangle that it passed.
 struct Passage {
   std::uint32_t beam = 0, triangle = 0;
 };
 
-/// One scan's long triangles, for other scans' beams to meet.
+/// A mesh's long triangles, for scans' beams to meet.
 class LongTriangles {
  public:
-  LongTriangles(const RayDevice& device, const RatedSurface& rated, const CoverLimits& limits,
-                double interpolation)
-      : rated_(rated), own_(rated.surface), limits_(limits) {
-    const TriangleMesh& mesh = own_.mesh();
+  /// @param mesh  is used later on, as is sd_m, which may be empty for 0.
+  LongTriangles(const RayDevice& device, const TriangleMesh& mesh, std::span<const float> sd_m,
+                const CoverTolerance& limits, double interpolation)
+      : mesh_(mesh), sd_m_(sd_m), limits_(limits) {
     Model model;
     model.mesh.vertices_m = mesh.vertices_m;
     model.surfaces.resize(1);
     for (std::uint32_t i = 0; i < mesh.triangles.size(); ++i) {
       const glm::uvec3& t = mesh.triangles[i];
       const double may_be_off_m = interpolation * longest_edge_m(mesh, t);
-      if (!(may_be_off_m > margin_m(0, largest_sd_m(own_, t)))) continue;
+      if (!(may_be_off_m > margin_m(0, largest_sd_m(t)))) continue;
       numbers_.push_back(i);
       model.mesh.triangles.push_back(t);
     }
@@ -71,6 +67,10 @@ class LongTriangles {
   }
 
  private:
+  double largest_sd_m(const glm::uvec3& t) const {
+    return sd_m_.empty() ? 0 : std::max({sd_m_[t.x], sd_m_[t.y], sd_m_[t.z]});
+  }
+
   double margin_m(double sd_m, double other_sd_m) const {
     return across * limits_.noise_sds * std::hypot(sd_m, other_sd_m) + limits_.apart_m;
   }
@@ -98,18 +98,17 @@ class LongTriangles {
   }
 
   bool is_behind(const BeamSurface& other, std::uint32_t vertex, std::uint32_t triangle) const {
-    const TriangleMesh& mesh = own_.mesh();
-    const glm::uvec3& t = mesh.triangles[triangle];
-    const glm::dvec3& a = mesh.vertices_m[t.x];
-    const glm::dvec3 normal = glm::cross(mesh.vertices_m[t.y] - a, mesh.vertices_m[t.z] - a);
+    const glm::uvec3& t = mesh_.triangles[triangle];
+    const glm::dvec3& a = mesh_.vertices_m[t.x];
+    const glm::dvec3 normal = glm::cross(mesh_.vertices_m[t.y] - a, mesh_.vertices_m[t.z] - a);
     const double off = glm::dot(other.rated->surface.mesh().vertices_m[vertex] - a, normal);
-    const double margin = margin_m(other.rated->surface.sd_m(vertex), largest_sd_m(own_, t));
+    const double margin = margin_m(other.rated->surface.sd_m(vertex), largest_sd_m(t));
     return std::abs(off) > margin * glm::length(normal);
   }
 
-  const RatedSurface& rated_;
-  const CoverSurface& own_;
-  CoverLimits limits_;
+  const TriangleMesh& mesh_;
+  std::span<const float> sd_m_;
+  CoverTolerance limits_;
   std::vector<std::uint32_t> numbers_;  // of the long ones among all
   ObjectTracer tracer_;
 };
@@ -126,14 +125,16 @@ std::vector<char> at_marked(const TriangleMesh& mesh, const std::vector<char>& i
 }  // namespace
 
 std::vector<std::vector<char>> find_seen_through(std::span<const BeamSurface> scans,
-                                                 const CoverLimits& limits, double interpolation) {
+                                                 const CoverTolerance& limits,
+                                                 double interpolation) {
   const std::size_t count = scans.size();
   const RayDevice device;
   std::vector<std::vector<Passage>> passages(count * count);  // of each scan's triangles and beams
   std::vector<std::vector<char>> passed;
   for (std::size_t s = 0; s < count; ++s) {
     passed.emplace_back(scans[s].rated->worth.size());
-    const LongTriangles triangles(device, *scans[s].rated, limits, interpolation);
+    const CoverSurface& surface = scans[s].rated->surface;
+    const LongTriangles triangles(device, surface.mesh(), surface.sds_m(), limits, interpolation);
     for (std::size_t other = 0; other < count; ++other) {
       if (other == s) continue;
       passages[s * count + other] = triangles.passed_by(scans[other]);
@@ -154,6 +155,18 @@ std::vector<std::vector<char>> find_seen_through(std::span<const BeamSurface> sc
     }
   }
   return refuted;
+}
+
+std::vector<char> find_passed(const TriangleMesh& mesh, std::span<const float> sd_m,
+                              std::span<const BeamSurface> scans, const CoverTolerance& tolerance,
+                              double interpolation) {
+  const RayDevice device;
+  const LongTriangles triangles(device, mesh, sd_m, tolerance, interpolation);
+  std::vector<char> is_passed(mesh.triangles.size());
+  for (const BeamSurface& scan : scans) {
+    for (const Passage& passage : triangles.passed_by(scan)) is_passed[passage.triangle] = 1;
+  }
+  return is_passed;
 }
 
 }  // namespace groundray

@@ -22,6 +22,13 @@ struct BeamSurface {
 /// between their corners are looked at: one beam is enough to tell that they bridge something.
 /// @param interpolation  how far, for each metre of its longest edge, that may be.
 std::vector<std::vector<char>> find_seen_through(std::span<const BeamSurface> scans,
-                                                 const CoverLimits& limits, double interpolation);
+                                                 const CoverTolerance& limits,
+                                                 double interpolation);
+
+/// Returns which of some triangles, long ones as above, beams of any scan have passed.
+/// @param sd_m  of each vertex.
+std::vector<char> find_passed(const TriangleMesh& mesh, std::span<const float> sd_m,
+                              std::span<const BeamSurface> scans, const CoverTolerance& tolerance,
+                              double interpolation);
 
 }  // namespace groundray

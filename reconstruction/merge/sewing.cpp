@@ -15,11 +15,11 @@ namespace groundray {
 namespace {
 
 constexpr double snap_share = 0.25;
-constexpr std::size_t most_steps = 64;  // along the border between an edge's crossing and the next
-constexpr std::size_t most_in_slit = 40;  // edges
-constexpr std::size_t most_in_fold = 8;   // edges of a slit whose sides overlap
-constexpr std::size_t least_round = 64;   // triangles that hang together round a fold: it is not
-                                          // the rim of a patch that is as small
+constexpr std::size_t most_steps = 64;   // along the border between an edge's crossing and the next
+constexpr std::size_t most_in_slit = 8;  // edges
+constexpr double narrow = 0.02;          // a slit's area by the square of its length round about
+constexpr double fold_share = 1.0 / 64;  // of the area that hangs together with a slit whose sides
+                                         // overlap, at most: what runs round more is its outline
 
 /// The vertex of the quilt that each crossing is put at; none where there is no border.
 std::vector<std::uint32_t> put_on_border(Quilt& quilt, const Quilt& patch,
@@ -202,40 +202,58 @@ bool is_seen(const QuiltVertex& place, std::span<const RatedSurface> seen) {
   });
 }
 
-/// Returns triangles for a loop as far as they are seen: those that face as their corners do; all
-/// if it may be a fold.
-std::vector<glm::uvec3> filling(const Quilt& quilt, const std::vector<std::uint32_t>& loop,
-                                bool may_be_fold, std::span<const RatedSurface> seen) {
-  glm::dvec3 normal(0);
+/// A loop of border edges with triangles on its right.
+struct Rim {
+  std::vector<std::uint32_t> vertices;
   std::vector<glm::dvec3> points;
-  for (const std::uint32_t v : loop) {
-    points.push_back(quilt.vertices[v].p);
-    normal += quilt.vertices[v].normal;
+  glm::dvec3 normal{0};  // unit, of the vertices in the mean
+  double area_m2 = 0;  // that it runs round, seen along the normal; negative if triangles are there
+
+  double length_m = 0;
+
+  Rim(const Quilt& quilt, std::vector<std::uint32_t> loop) : vertices(std::move(loop)) {
+    for (const std::uint32_t v : vertices) {
+      points.push_back(quilt.vertices[v].p);
+      normal += quilt.vertices[v].normal;
+    }
+    if (const double length = glm::length(normal); length > 0) normal /= length;
+    for (std::size_t i = 0; i < points.size(); ++i)
+      length_m += glm::distance(points[i], points[(i + 1) % points.size()]);
+    for (std::size_t i = 2; i < points.size(); ++i) {
+      area_m2 +=
+          0.5 * glm::dot(glm::cross(points[i - 1] - points[0], points[i] - points[0]), normal);
+    }
   }
-  const double length = glm::length(normal);
+};
+
+/// Returns triangles for a slit as far as they are seen. They may have no area, or fold over.
+std::vector<glm::uvec3> filling(const Quilt& quilt, const Rim& rim,
+                                std::span<const RatedSurface> seen) {
   std::vector<glm::uvec3> triangles;
-  for (const glm::uvec3& c :
-       triangulate_loop(points, length > 0 ? normal / length : normal).triangles) {
-    const glm::uvec3 t(loop[c.x], loop[c.y], loop[c.z]);
+  for (const glm::uvec3& c : triangulate_loop(rim.points, rim.normal).triangles) {
+    const glm::uvec3 t(rim.vertices[c.x], rim.vertices[c.y], rim.vertices[c.z]);
     const QuiltVertex &x = quilt.vertices[t.x], &y = quilt.vertices[t.y], &z = quilt.vertices[t.z];
-    const QuiltVertex middle = between(between(x, y, 0.5), z, 1.0 / 3);
-    const double facing = glm::dot(glm::cross(y.p - x.p, z.p - x.p), glm::dvec3(middle.normal));
-    if ((facing > 0 || may_be_fold) && is_seen(middle, seen)) triangles.push_back(t);
+    if (is_seen(between(between(x, y, 0.5), z, 1.0 / 3), seen)) triangles.push_back(t);
   }
   return triangles;
 }
 
-/// For each vertex, how many triangles hang together with it.
-std::vector<std::uint32_t> triangles_round(const Quilt& quilt) {
+/// For each vertex, the area of the triangles that hang together with it.
+std::vector<double> areas_round(const Quilt& quilt) {
   const std::vector<std::uint32_t> twins = pair_edges(quilt.triangles, quilt.vertices.size()).twins;
-  std::vector<std::uint32_t> counts(quilt.vertices.size());
+  std::vector<double> areas_m2(quilt.vertices.size());
   std::vector<char> is_seen(quilt.triangles.size());
   std::vector<std::uint32_t> part;
   for (std::uint32_t begin = 0; begin < is_seen.size(); ++begin) {
     if (is_seen[begin] != 0) continue;
     part.assign(1, begin);
     is_seen[begin] = 1;
+    double area_m2 = 0;
     for (std::size_t i = 0; i < part.size(); ++i) {
+      const glm::uvec3& t = quilt.triangles[part[i]];
+      const glm::dvec3& x = quilt.vertices[t.x].p;
+      area_m2 +=
+          0.5 * glm::length(glm::cross(quilt.vertices[t.y].p - x, quilt.vertices[t.z].p - x));
       for (std::uint32_t e = 3 * part[i]; e < 3 * part[i] + 3; ++e) {
         if (twins[e] == none || is_seen[twins[e] / 3] != 0) continue;
         is_seen[twins[e] / 3] = 1;
@@ -243,16 +261,15 @@ std::vector<std::uint32_t> triangles_round(const Quilt& quilt) {
       }
     }
     for (const std::uint32_t triangle : part) {
-      for (int k = 0; k < 3; ++k)
-        counts[quilt.triangles[triangle][k]] = static_cast<std::uint32_t>(part.size());
+      for (int k = 0; k < 3; ++k) areas_m2[quilt.triangles[triangle][k]] = area_m2;
     }
   }
-  return counts;
+  return areas_m2;
 }
 
 }  // namespace
 
-SewingCounts sew(Quilt& quilt, Quilt patch, const CoverLimits& limits) {
+SewingCounts sew(Quilt& quilt, Quilt patch, const CoverTolerance& limits) {
   if (quilt.triangles.empty()) {
     quilt = std::move(patch);
     return {.left_out = make_manifold(quilt)};
@@ -271,7 +288,7 @@ SewingCounts sew(Quilt& quilt, Quilt patch, const CoverLimits& limits) {
 
 std::size_t fill_slits(Quilt& quilt, std::span<const RatedSurface> seen) {
   const std::vector<std::uint32_t> before = border_before(quilt);
-  const std::vector<std::uint32_t> round = triangles_round(quilt);
+  const std::vector<double> round_m2 = areas_round(quilt);
   std::vector<char> is_done(before.size());
   std::size_t added = 0;
   for (std::uint32_t begin = 0; begin < before.size(); ++begin) {
@@ -282,8 +299,11 @@ std::size_t fill_slits(Quilt& quilt, std::span<const RatedSurface> seen) {
       loop.push_back(v);
     }
     if (loop.size() < 3 || loop.size() > most_in_slit || before[loop.back()] != begin) continue;
-    const bool may_be_fold = loop.size() <= most_in_fold && round[begin] >= least_round;
-    const std::vector<glm::uvec3> triangles = filling(quilt, loop, may_be_fold, seen);
+    const Rim rim(quilt, std::move(loop));
+    const double most_m2 = narrow * rim.length_m * rim.length_m;
+    if (rim.area_m2 > most_m2 || rim.area_m2 < -std::min(most_m2, fold_share * round_m2[begin]))
+      continue;
+    const std::vector<glm::uvec3> triangles = filling(quilt, rim, seen);
     quilt.triangles.insert(quilt.triangles.end(), triangles.begin(), triangles.end());
     added += triangles.size();
   }

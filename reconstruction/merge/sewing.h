@@ -24,9 +24,10 @@ struct SewingCounts {
 /// shared vertices cover others.
 /// @param quilt  a surface with borders, as make_manifold gives, and so it is again.
 /// @see Turk, Levoy, Zippered polygon meshes from range images (1994), section 4.2.
-SewingCounts sew(Quilt& quilt, Quilt patch, const CoverLimits& limits);
+SewingCounts sew(Quilt& quilt, Quilt patch, const CoverTolerance& limits);
 
-/// Fills slits: loops of few edges, where triangles between them are on a surface that was seen.
+/// Fills slits: narrow loops of at most eight edges, where triangles between them are on a surface
+/// that was seen. The sides of a slit may overlap a little; the outline of a patch is no slit.
 /// @param seen  the surfaces that were, but for what is refuted.
 /// @return the number of triangles added.
 std::size_t fill_slits(Quilt& quilt, std::span<const RatedSurface> seen);

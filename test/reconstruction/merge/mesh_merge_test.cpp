@@ -392,6 +392,115 @@ TEST(MeshMerge, TheSameScanTwiceIsThatScan) {
   EXPECT_NEAR(area_m2(merged.mesh.shape), 1, 1e-12);
 }
 
+// The least height of a triangle by its longest edge.
+double least_height_share(const TriangleMesh& mesh) {
+  double least = 1;
+  for (const glm::uvec3& t : mesh.triangles) {
+    const glm::dvec3 a = mesh.vertices_m[t.y] - mesh.vertices_m[t.x],
+                     b = mesh.vertices_m[t.z] - mesh.vertices_m[t.y], c = -a - b;
+    const double longest_m2 = std::max({glm::dot(a, a), glm::dot(b, b), glm::dot(c, c)});
+    least = std::min(least, glm::length(glm::cross(a, b)) / longest_m2);
+  }
+  return least;
+}
+
+// Outlines are as short as slits are, straight, and turned so that rounding decides which side of
+// it a corner is on. What is alone and far away makes it a merging of two.
+TEST(MeshMerge, OutlinesAreNotFilled) {
+  const std::vector<ScanMesh> away{scan_of({.middle = {90, 0}}, flat, 0.01)};
+  for (const glm::ivec2 cells : {glm::ivec2(1, 1), glm::ivec2(1, 7), glm::ivec2(2, 2),
+                                 glm::ivec2(4, 4), glm::ivec2(10, 9), glm::ivec2(3, 15)}) {
+    for (int k = 0; k < 10; ++k) {
+      const Patch patch{.middle = {0.1 * k, 0.03 * k},
+                        .size_m = glm::dvec2(cells) / 7.0,
+                        .yaw_rad = 0.37 * k,
+                        .cells = cells};
+      const auto slope = [&](const glm::dvec2& p) { return 0.3 * p.x + 0.1 * k * p.y; };
+      const std::vector<ScanMesh> scans{scan_of(patch, slope, 0.01), away[0]};
+      const MergedMesh merged = merge(scans, {});
+      EXPECT_EQ(merged.counts.filled, 0u) << cells.x << " x " << cells.y << " case " << k;
+      EXPECT_EQ(merged.mesh.shape.triangles.size(),
+                200 + 2 * static_cast<std::size_t>(cells.x * cells.y));
+      EXPECT_GT(least_height_share(merged.mesh.shape), 0.1);
+    }
+  }
+}
+
+// Two sheets of 2 m by 2 m with a gap between.
+std::vector<ScanMesh> sheets_apart(double gap_m) {
+  return {scan_of({.middle = {-1, 0}, .size_m = {2, 2}, .cells = {20, 20}}, flat, 0.002),
+          scan_of({.middle = {1 + gap_m, 0}, .size_m = {2, 2}, .cells = {20, 23}}, flat, 0.002)};
+}
+
+// The longest edges beside the gap are 0.132 and 0.141 m. Of a triangle over it the middle of one
+// side is at most half of 0.1 m from the corner opposite, measured along the gap, and an end half
+// of 0.087 m farther: across, no edge is longer than sqrt(0.08^2 + 0.0935^2) = 0.123 m.
+TEST(MeshMerge, GapsNoWiderThanTrianglesAreBridged) {
+  for (const double gap_m : {0.02, 0.05, 0.08}) {
+    const MergedMesh merged = merge(sheets_apart(gap_m), {});
+    EXPECT_THAT(surface_faults(merged.mesh.shape), IsEmpty());
+    EXPECT_NEAR(area_m2(merged.mesh.shape), 8 + 2 * gap_m, 1e-9) << gap_m;
+    EXPECT_EQ(merged.counts.bridged, 43u);  // one for each edge on either side
+    EXPECT_GT(least_height_share(merged.mesh.shape), 0.1);
+    const Patch all{.middle = {gap_m / 2, 0}, .size_m = {4 + gap_m, 2}};
+    const Faults faults = cover_faults(merged.mesh.shape, {all}, 0.001);
+    EXPECT_EQ(faults.bare, 0);
+    EXPECT_EQ(faults.doubled, 0);
+  }
+  for (const double gap_m : {0.15, 0.5}) {
+    const MergedMesh merged = merge(sheets_apart(gap_m), {});
+    EXPECT_NEAR(area_m2(merged.mesh.shape), 8, 1e-9);
+    EXPECT_EQ(merged.counts.bridged, 0u);
+  }
+}
+
+TEST(MeshMerge, GapsThatBeamsPassedStayOpen) {
+  constexpr double gap_m = 0.08;
+  std::vector<ScanMesh> scans = sheets_apart(gap_m);
+  const auto below = [](const glm::dvec2&) { return -1.0; };
+  scans.push_back(scan_of({.middle = {gap_m / 2, 0}, .size_m = {0.08, 2.8}, .cells = {8, 300}},
+                          below, 0.002, {gap_m / 2, 0, 3}));
+  const MergedMesh merged = merge(scans, {});
+  EXPECT_EQ(merged.counts.bridged, 0u);
+  EXPECT_NEAR(area_m2(merged.mesh.shape), 8 + 0.224, 1e-9);
+  scans.back().origins_m.clear();
+  EXPECT_EQ(merge(scans, {}).counts.bridged, 43u);
+}
+
+TEST(MeshMerge, GapsInCornersStayOpen) {
+  std::vector<ScanMesh> scans = sheets_apart(0.05);
+  for (glm::dvec3& p : scans[1].mesh.shape.vertices_m) p = {0.05, p.y, p.x};  // a wall
+  const MergedMesh merged = merge(scans, {});
+  EXPECT_EQ(merged.counts.bridged, 0u);
+  EXPECT_NEAR(area_m2(merged.mesh.shape), 8, 1e-9);
+}
+
+// Holes with rims of all shapes: what is bridged lies over nothing, and the sheet stays flat.
+TEST(MeshMerge, RaggedHolesAreBridgedOnceAtMost) {
+  Random random(21);
+  std::uniform_real_distribution<double> unit(0, 1);
+  const Patch patch{.size_m = {4, 4}, .cells = {60, 60}};
+  for (int i = 0; i < 10; i += 2) {
+    ScanMesh scan = scan_of(patch, flat, 0.002);
+    for (glm::dvec3& p : scan.mesh.shape.vertices_m)
+      p += glm::dvec3(0.02 * unit(random), 0.02 * unit(random), 0);
+    std::vector<glm::uvec3> triangles;
+    for (const glm::uvec3& t : scan.mesh.shape.triangles) {
+      if (unit(random) > 0.04 * i) triangles.push_back(t);
+    }
+    scan.mesh.shape.triangles = triangles;
+    scan.face_confidence.clear();
+    const double before_m2 = area_m2(scan.mesh.shape);
+    const MergedMesh merged = merge(std::vector{scan, scan_of({.middle = {90, 0}}, flat, 0)}, {});
+    EXPECT_THAT(surface_faults(merged.mesh.shape), IsEmpty());
+    const Faults faults = cover_faults(merged.mesh.shape, {patch}, 0.1);
+    EXPECT_EQ(faults.doubled, 0) << i;
+    EXPECT_LE(faults.bare, 0.01 + 0.6 * 0.04 * i);  // holes wider than what is beside them
+    EXPECT_GE(area_m2(merged.mesh.shape), before_m2 + 1 - 1e-9);
+    EXPECT_LE(area_m2(merged.mesh.shape), 17.2);  // 4.02 m squared, and 1 m2 away
+  }
+}
+
 // Hills, and a boulder's steep sides, seen from a random place: what is turned away, grazing or far
 // is not seen, so that borders are ragged.
 ScanMesh random_view(Random& random, double sd_m) {
