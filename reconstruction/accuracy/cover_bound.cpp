@@ -8,6 +8,7 @@
 #include <glm/vec2.hpp>
 #include <limits>
 #include <optional>
+#include <utility>
 
 namespace groundray {
 namespace {
@@ -43,6 +44,34 @@ struct Outline {
   }
 };
 
+/// Numbers in the order in which they were added, each once.
+class NumberSet {
+ public:
+  std::size_t size() const { return numbers_.size(); }
+  std::uint32_t operator[](std::size_t i) const { return numbers_[i]; }
+
+  void add(std::uint32_t number) {
+    if (2 * numbers_.size() >= slots_.size()) grow();
+    if (put(number)) numbers_.push_back(number);
+  }
+
+ private:
+  static constexpr std::uint32_t empty = std::numeric_limits<std::uint32_t>::max();
+
+  bool put(std::uint32_t number) {
+    std::size_t slot = std::size_t{number} * 2654435761u & (slots_.size() - 1);
+    while (slots_[slot] != empty && slots_[slot] != number) slot = (slot + 1) & (slots_.size() - 1);
+    return std::exchange(slots_[slot], number) == empty;
+  }
+
+  void grow() {
+    slots_.assign(std::max<std::size_t>(64, 4 * slots_.size()), empty);
+    for (const std::uint32_t number : numbers_) put(number);
+  }
+
+  std::vector<std::uint32_t> numbers_, slots_;
+};
+
 }  // namespace
 
 CoverBound::CoverBound(const TriangleMesh& mesh)
@@ -62,42 +91,48 @@ CoverBound::CoverBound(const TriangleMesh& mesh)
 }
 
 /// Goes from one triangle of the mesh to the next over all edges that cross the one below, its
-/// shadow shrunk by a millionth, for borders of both may lie over each other. If each edge that
-/// crosses it has a triangle on either side, nothing but single points could be without cover, and
-/// so nothing is: each point has one of the mesh along the direction, no farther than at corners of
-/// what two triangles have in common.
+/// shadow shrunk by so much, a millionth at most, for borders of both may lie over each other. If
+/// each edge that crosses it has a triangle on either side, nothing but single points could be
+/// without cover, and so nothing is: each point has one of the mesh along the direction, no farther
+/// than at corners of what two triangles have in common.
 class CoverBound::Walk {
  public:
   Walk(const CoverBound& cover, const std::array<glm::dvec3, 3>& corners,
-       const glm::dvec3& direction)
+       const glm::dvec3& direction, double shrunk_m)
       : cover_(cover), middle_((corners[0] + corners[1] + corners[2]) / 3.0) {
     up_ = glm::normalize(direction);
     const glm::dvec3 aside = std::abs(up_.x) < 0.6 ? glm::dvec3(1, 0, 0) : glm::dvec3(0, 1, 0);
     right_ = glm::normalize(glm::cross(aside, up_));
     ahead_ = glm::cross(up_, right_);
     for (std::size_t k = 0; k < 3; ++k) {
-      below_[k] = (1 - shrunk) * seen(corners[k]);
+      below_[k] = seen(corners[k]);
       radius_m_ = std::max(radius_m_, glm::length(below_[k]));
     }
+    const double shrunk = std::clamp(shrunk_m / radius_m_, 1e-10, 1e-6);
+    for (glm::dvec3& corner : below_) corner *= 1 - shrunk;
+    rest_m_ = 2 * shrunk * radius_m_;
     if (turn(below_[0], below_[1], below_[2]) < 0) std::swap(below_[1], below_[2]);
     const glm::dvec3 ab = below_[1] - below_[0], ac = below_[2] - below_[0];
     const double area = ab.x * ac.y - ab.y * ac.x;
     slope_ = {(ab.z * ac.y - ac.z * ab.y) / area, (ac.z * ab.x - ab.z * ac.x) / area};
   }
 
-  double bound_m(std::uint32_t start) {
+  /// Returns a bound of how much farther any point is than `most_m` says of the triangle there;
+  /// infinity if it is above `enough_m`.
+  template <typename Most>
+  double excess_m(std::uint32_t start, const Most& most_m, double enough_m,
+                  std::size_t most_triangles) {
     if (!(turn(below_[0], below_[1], below_[2]) > rounding(below_))) return infinity;
-    found_[count_++] = start;
-    for (std::size_t next = 0; next < count_; ++next) {
-      if (!go_on_from(found_[next]) || !is_met_) return infinity;
+    found_.add(start);
+    for (std::size_t next = 0; next < found_.size(); ++next) {
+      const std::uint32_t triangle = found_[next];
+      if (!go_on_from(triangle, most_m(triangle)) || !is_met_) return infinity;
+      if (!(excess_m_ <= enough_m) || found_.size() > most_triangles) return infinity;
     }
-    return highest_m_ + 2 * shrunk * radius_m_;
+    return excess_m_;
   }
 
  private:
-  static constexpr double shrunk = 1e-6;
-  static constexpr std::size_t most = 128;
-
   glm::dvec3 seen(const glm::dvec3& p) const {
     const glm::dvec3 from = p - middle_;
     return {glm::dot(from, right_), glm::dot(from, ahead_), glm::dot(from, up_)};
@@ -111,26 +146,27 @@ class CoverBound::Walk {
   }
 
   /// Takes the heights of a triangle and adds those beyond its edges. Returns whether it can.
-  bool go_on_from(std::uint32_t triangle) {
+  bool go_on_from(std::uint32_t triangle, double most_m) {
     const glm::uvec3& t = cover_.mesh_.triangles[triangle];
     Seen p;
     for (int k = 0; k < 3; ++k)
       p[static_cast<std::size_t>(k)] = seen(cover_.mesh_.vertices_m[t[k]]);
     const double slack = rounding(p);
     if (!(std::abs(turn(p[0], p[1], p[2])) > slack)) return false;
-    take_heights(p);
+    take_heights(p, most_m);
     for (int k = 0; k < 3; ++k) {
       const glm::dvec3 &a = p[static_cast<std::size_t>(k)],
                        &b = p[static_cast<std::size_t>((k + 1) % 3)];
       if (!may_cross(a, b, slack)) continue;
       const double inner = turn(a, b, p[static_cast<std::size_t>((k + 2) % 3)]);
       const auto beyond = across(triangle, t[k], t[(k + 1) % 3], inner);
-      if (!beyond || !add(*beyond)) return false;
+      if (!beyond) return false;
+      found_.add(*beyond);
     }
     return true;
   }
 
-  void take_heights(const Seen& p) {
+  void take_heights(const Seen& p, double most_m) {
     Outline common;
     for (const glm::dvec3& corner : p) common.add(corner);
     for (std::size_t k = 0; k < 3; ++k) common = common.left_of(below_[k], below_[(k + 1) % 3]);
@@ -139,7 +175,8 @@ class CoverBound::Walk {
       const glm::dvec3& q = common.points[i];
       const double under =
           below_[0].z + slope_.x * (q.x - below_[0].x) + slope_.y * (q.y - below_[0].y);
-      highest_m_ = std::max(highest_m_, std::abs(q.z - under));
+      const double height_m = std::abs(q.z - under) + rest_m_;
+      excess_m_ = std::max(excess_m_, height_m - most_m);
     }
   }
 
@@ -174,28 +211,28 @@ class CoverBound::Walk {
     return std::nullopt;
   }
 
-  bool add(std::uint32_t triangle) {
-    const auto end = found_.begin() + static_cast<std::ptrdiff_t>(count_);
-    if (std::find(found_.begin(), end, triangle) != end) return true;
-    if (count_ == most) return false;
-    found_[count_++] = triangle;
-    return true;
-  }
-
   const CoverBound& cover_;
   glm::dvec3 middle_, right_{0}, ahead_{0}, up_{0};
   Seen below_{};
   glm::dvec2 slope_{0};
-  double radius_m_ = 0, highest_m_ = 0;
+  double radius_m_ = 0, rest_m_ = 0, excess_m_ = -infinity;
   bool is_met_ = false;
-  std::array<std::uint32_t, most> found_;
-  std::size_t count_ = 0;
+  NumberSet found_;
 };
 
 double CoverBound::bound_m(const std::array<glm::dvec3, 3>& corners, const glm::dvec3& direction,
                            std::uint32_t start) const {
   if (!(glm::dot(direction, direction) > 0)) return infinity;
-  return Walk(*this, corners, direction).bound_m(start);
+  const auto nothing = [](std::uint32_t) { return 0.0; };
+  return Walk(*this, corners, direction, infinity).excess_m(start, nothing, infinity, 128);
+}
+
+bool CoverBound::is_within(const std::array<glm::dvec3, 3>& corners, const glm::dvec3& direction,
+                           std::uint32_t start,
+                           const std::function<double(std::uint32_t)>& most_m) const {
+  if (!(glm::dot(direction, direction) > 0)) return false;
+  return Walk(*this, corners, direction, 1e-3 * most_m(start)).excess_m(start, most_m, 0, 4096) <=
+         0;
 }
 
 }  // namespace groundray

@@ -2,6 +2,7 @@
 
 #include <array>
 #include <cstdint>
+#include <functional>
 #include <glm/vec3.hpp>
 #include <vector>
 
@@ -22,6 +23,13 @@ class CoverBound {
   /// @param start      triangle of the mesh near the middle.
   double bound_m(const std::array<glm::dvec3, 3>& corners, const glm::dvec3& direction,
                  std::uint32_t start) const;
+
+  /// Whether each of a triangle's points has one of the mesh along the direction that is no farther
+  /// than the triangle there allows. Not so, either, where `bound_m` is infinite, but for more
+  /// triangles.
+  /// @param most_m  what a triangle of the mesh allows, metres.
+  bool is_within(const std::array<glm::dvec3, 3>& corners, const glm::dvec3& direction,
+                 std::uint32_t start, const std::function<double(std::uint32_t)>& most_m) const;
 
  private:
   class Walk;

@@ -208,7 +208,9 @@ class FarthestSearch {
     for (const Piece& piece : pieces) look_at(piece);
     open_ = std::move(pieces);
     settle();
-    while (!open_.empty() && found_.pieces < limits_.most_pieces) go_on();
+    while (!open_.empty() && found_.pieces < limits_.most_pieces &&
+           found_.probe.distance_m <= limits_.enough_m)
+      go_on();
     found_.at_most_m = std::max(found_.at_most_m, found_.probe.distance_m);
     for (const Piece& piece : open_) found_.at_most_m = std::max(found_.at_most_m, piece.bound_m);
     return found_;

@@ -40,6 +40,7 @@ struct SearchLimits {
   double tolerance_m = 0;  ///< between the bounds
   double rounding_m = 0;   ///< of distances; differences below it mean nothing
   std::size_t most_pieces = 0;
+  double enough_m = std::numeric_limits<double>::infinity();  ///< no search beyond what is farther
 };
 
 /// Searches a surface for the point farthest from another by branch and bound, best first.

@@ -2,7 +2,6 @@
 
 #include <algorithm>
 #include <glm/geometric.hpp>
-#include <limits>
 
 #include "reconstruction/simplify/vector_to_edge.h"
 
@@ -13,24 +12,28 @@ DistanceRules::DistanceRules(Workpiece& piece, const ClosestPoint& original,
     : piece_(piece),
       original_(original),
       border_m_(border_m),
-      lists_(piece.mesh.numbers()),
-      shape_(piece, Overhang::Allow) {}
+      shape_(piece, Overhang::Allow),
+      stand_ins_(piece, original.mesh().triangles),
+      cover_(original.mesh()),
+      near_original_(original, cover_, [this](std::uint32_t triangle) {
+        const glm::uvec3& t = original_.mesh().triangles[triangle];
+        return static_cast<double>(
+            std::min({piece_.samples[t.x].tolerance_m, piece_.samples[t.y].tolerance_m,
+                      piece_.samples[t.z].tolerance_m}));
+      }) {}
 
-// Whether the fan is as near to a vertex as it must be, and which triangle of it is nearest.
-bool DistanceRules::is_near(std::uint32_t vertex, std::size_t& triangle) const {
-  const Sample& sample = piece_.samples[vertex];
-  const std::vector<glm::dvec3>& rim_m = shape_.rim_m();
-  double least_m = std::numeric_limits<double>::infinity();
-  if (shape_.fan().triangles == 0)
-    least_m = glm::length(vector_to_edge(sample.p_m, shape_.tip_m(), rim_m[0]));
-  for (std::size_t i = 0; i < shape_.fan().triangles; ++i) {
-    const double distance_m =
-        glm::length(vector_to_triangle(sample.p_m, shape_.tip_m(), rim_m[i], rim_m[i + 1]));
-    if (!(distance_m < least_m)) continue;
-    least_m = distance_m;
-    triangle = i;
+// Where the star's one triangle vanishes, the one beyond its outer edge stands for it.
+void DistanceRules::set_fan(const Star& star, std::size_t to) {
+  const Fan& fan = shape_.fan();
+  fan_.clear();
+  for (std::size_t i = fan.first; i < fan.first + fan.triangles; ++i) {
+    fan_.push_back(
+        {star.triangle(i % star.spokes.size()),
+         {star.ring[to], star.ring[i % star.ring.size()], star.ring[(i + 1) % star.ring.size()]}});
   }
-  return least_m <= static_cast<double>(sample.tolerance_m);
+  if (!fan_.empty()) return;
+  const std::uint32_t beyond = piece_.mesh.twin(next_of(star.spokes[0])) / 3;
+  fan_.push_back({beyond, piece_.mesh.corners(beyond)});
 }
 
 // Whether a line's new edge is near enough to all that left for it.
@@ -45,61 +48,11 @@ bool DistanceRules::keeps_line() {
   });
 }
 
-// Checks all that left for the star's triangles. What is too far once tends to be so again, so it
-// is looked at first.
-bool DistanceRules::keeps_samples(const Star& star) {
-  std::size_t nearest = 0;
-  for (std::size_t i = 0; i < star.spokes.size(); ++i) {
-    const std::uint32_t first = lists_.first(star.triangle(i));
-    if (first != none && !is_near(first, nearest)) return false;
-  }
-  for (std::size_t i = 0; i < star.spokes.size(); ++i) {
-    const std::uint32_t triangle = star.triangle(i);
-    std::uint32_t prior = none;
-    for (std::uint32_t vertex = lists_.first(triangle); vertex != none;) {
-      if (!is_near(vertex, nearest)) {
-        if (prior != none) lists_.bring_forward(piece_.samples, triangle, prior);
-        return false;
-      }
-      placed_.emplace_back(vertex, nearest);
-      prior = vertex;
-      vertex = piece_.samples[vertex].next;
-    }
-  }
-  return true;
-}
-
-bool DistanceRules::is_near_original(const glm::dvec3& p_m) {
-  const NearestPoint nearest = original_.nearest(p_m, near_);
-  near_ = nearest.triangle;
-  const glm::uvec3& t = original_.mesh().triangles[near_];
-  const float tolerance_m =
-      std::min({piece_.samples[t.x].tolerance_m, piece_.samples[t.y].tolerance_m,
-                piece_.samples[t.z].tolerance_m});
-  return nearest.distance_m <= static_cast<double>(tolerance_m);
-}
-
-// Takes samples of the fan's triangles: amid each, on edges that are new, then amid its corners'
-// parts.
 bool DistanceRules::is_near_original(const Star& star) {
   const std::vector<glm::dvec3>& rim_m = shape_.rim_m();
-  const glm::dvec3& tip_m = shape_.tip_m();
-  near_ = star.triangle(0);
-  const std::size_t triangles = shape_.fan().triangles;
-  for (std::size_t i = 0; i < triangles; ++i) {
-    if (!is_near_original((tip_m + rim_m[i] + rim_m[i + 1]) / 3.0)) return false;
-  }
-  const std::size_t last = star.is_open() ? triangles + 1 : triangles;
-  for (std::size_t i = star.is_open() ? 0 : 1; i < last; ++i) {
-    for (const double share : {0.5, 0.25, 0.75}) {
-      if (!is_near_original(tip_m + share * (rim_m[i] - tip_m))) return false;
-    }
-  }
-  for (std::size_t i = 0; i < triangles; ++i) {
-    const glm::dvec3 sum = tip_m + rim_m[i] + rim_m[i + 1];
-    for (const glm::dvec3& corner : {tip_m, rim_m[i], rim_m[i + 1]}) {
-      if (!is_near_original((sum + 3.0 * corner) / 6.0)) return false;
-    }
+  for (std::size_t i = 0; i < shape_.fan().triangles; ++i) {
+    if (!near_original_.holds({shape_.tip_m(), rim_m[i], rim_m[i + 1]}, star.triangle(0)))
+      return false;
   }
   return true;
 }
@@ -107,26 +60,16 @@ bool DistanceRules::is_near_original(const Star& star) {
 bool DistanceRules::allow(const Star& star, const FeatureLines::Crossing& crossing,
                           std::size_t to) {
   if (!shape_.allow(star, crossing, to)) return false;
-  placed_.clear();
   if (crossing.edges == 2) {
     piece_.lines.gather(star, crossing, to, line_);
     if (!keeps_line()) return false;
   }
-  std::size_t nearest = 0;
-  if (!is_near(star.centre, nearest)) return false;
-  placed_.emplace_back(star.centre, nearest);
-  return keeps_samples(star) && is_near_original(star);
+  set_fan(star, to);
+  return stand_ins_.allow(star, fan_) && is_near_original(star);
 }
 
 void DistanceRules::collapse(const Star& star, const FeatureLines::Crossing&, std::size_t) {
-  for (std::size_t i = 0; i < star.spokes.size(); ++i) lists_.clear(star.triangle(i));
-  // Where the star's one triangle vanishes, the one beyond its outer edge stands for it.
-  const std::uint32_t beyond = piece_.mesh.twin(next_of(star.spokes[0])) / 3;
-  for (const auto& [vertex, i] : placed_) {
-    const std::size_t triangle = (shape_.fan().first + i) % star.spokes.size();
-    lists_.add(piece_.samples, shape_.fan().triangles == 0 ? beyond : star.triangle(triangle),
-               vertex);
-  }
+  stand_ins_.collapse(star);
 }
 
 }  // namespace groundray

@@ -1,23 +1,20 @@
 #pragma once
 
 #include <cstddef>
-#include <cstdint>
-#include <glm/vec3.hpp>
 #include <optional>
-#include <utility>
 #include <vector>
 
 #include "core/closest_point.h"
+#include "reconstruction/accuracy/cover_bound.h"
+#include "reconstruction/simplify/near_surface.h"
 #include "reconstruction/simplify/shape_rules.h"
-#include "reconstruction/simplify/triangle_lists.h"
+#include "reconstruction/simplify/stand_ins.h"
 #include "reconstruction/simplify/workpiece.h"
 
 namespace groundray {
 
-/// Keeps a surface within every vertex' tolerance of it: each that left is kept with the triangle
-/// that is nearest to it, and checked against those that shall stand there instead. Samples of
-/// these must be as near to the original as the vertices of its triangle there tolerate. Between
-/// samples and vertices nothing is promised.
+/// Keeps a surface within tolerance of the original, and this of the surface, at every point: each
+/// triangle is proved before it comes to be. What cannot be proved by a few parts does not.
 class DistanceRules final : public CollapseRules {
  public:
   /// @param piece     must outlive this.
@@ -31,22 +28,21 @@ class DistanceRules final : public CollapseRules {
   void collapse(const Star& star, const FeatureLines::Crossing& crossing, std::size_t to) override;
 
  private:
-  bool is_near(std::uint32_t vertex, std::size_t& triangle) const;
+  void set_fan(const Star& star, std::size_t to);
   bool keeps_line();
-  bool keeps_samples(const Star& star);
   bool is_near_original(const Star& star);
-  bool is_near_original(const glm::dvec3& p_m);
 
   Workpiece& piece_;
   const ClosestPoint& original_;
   std::optional<double> border_m_;
-  TriangleLists lists_;
   ShapeRules shape_;
-  std::uint32_t near_ = 0;  // triangle of the original
+  StandIns stand_ins_;
+  CoverBound cover_;
+  NearSurface near_original_;
 
   // Of the collapse that is asked about:
+  std::vector<PlacedTriangle> fan_;
   FeatureLines::Merged line_;
-  std::vector<std::pair<std::uint32_t, std::size_t>> placed_;  // vertices and triangles of the fan
 };
 
 }  // namespace groundray

@@ -1,43 +1,19 @@
-// This file uses parts of CGAL that are under GPL-3.0-or-later: see the licence section of README.
 #include "reconstruction/simplify/lindstrom_turk.h"
 
-#include <CGAL/Simple_cartesian.h>
-#include <CGAL/Surface_mesh.h>
-#include <CGAL/Surface_mesh_simplification/Policies/Edge_collapse/Bounded_normal_change_filter.h>
-#include <CGAL/Surface_mesh_simplification/Policies/Edge_collapse/LindstromTurk_cost.h>
-#include <CGAL/Surface_mesh_simplification/Policies/Edge_collapse/LindstromTurk_placement.h>
-#include <CGAL/Surface_mesh_simplification/edge_collapse.h>
-
 #include <algorithm>
-#include <cmath>
 #include <glm/common.hpp>
 #include <glm/geometric.hpp>
 #include <limits>
 #include <numeric>
-#include <utility>
 
 #include "core/error.h"
 #include "core/mesh_check.h"
 #include "core/model.h"
-#include "reconstruction/half_edge_mesh.h"
 #include "reconstruction/manifold_mesh.h"
+#include "reconstruction/simplify/volume_collapse.h"
 
 namespace groundray {
 namespace {
-
-namespace sms = CGAL::Surface_mesh_simplification;
-using Point = CGAL::Simple_cartesian<double>::Point_3;
-using Mesh = CGAL::Surface_mesh<Point>;
-
-glm::dvec3 to_glm(const Point& p) { return {p.x(), p.y(), p.z()}; }
-
-// Whether a triangle is counter-clockwise from above, and by more than what moving it to its place
-// in the world rounds away.
-bool lies_flat(const glm::dvec3& a, const glm::dvec3& b, const glm::dvec3& c) {
-  const glm::dvec3 ab = b - a, ac = c - a, bc = c - b;
-  const double longest2 = std::max({glm::dot(ab, ab), glm::dot(ac, ac), glm::dot(bc, bc)});
-  return ab.x * ac.y - ab.y * ac.x > 1e-6 * longest2;
-}
 
 bool is_height_field(const TriangleMesh& mesh) {
   return std::ranges::all_of(mesh.triangles, [&](const glm::uvec3& t) {
@@ -46,62 +22,6 @@ bool is_height_field(const TriangleMesh& mesh) {
     return ab.x * ac.y - ab.y * ac.x > 0;
   });
 }
-
-// Refuses collapses that turn a triangle over or go far astray.
-class TurnFilter {
- public:
-  explicit TurnFilter(bool is_height_field) : is_height_field_(is_height_field) {}
-
-  // Place is std::optional or boost::optional of Point, as CGAL's version has it.
-  template <typename Profile, typename Place>
-  Place operator()(const Profile& profile, Place place) const {
-    place = normals_(profile, place);
-    if (!place || !is_near(profile, to_glm(*place))) return {};
-    if (is_height_field_ && !stays_flat(profile, to_glm(*place))) return {};
-    return place;
-  }
-
- private:
-  // Planes that are nearly parallel meet anywhere.
-  template <typename Profile>
-  static bool is_near(const Profile& profile, const glm::dvec3& place) {
-    const glm::dvec3 middle = 0.5 * (to_glm(profile.p0()) + to_glm(profile.p1()));
-    double reach2 = 0;
-    for (const auto& vertex : profile.link()) {
-      const glm::dvec3 to = to_glm(get(profile.vertex_point_map(), vertex)) - middle;
-      reach2 = std::max(reach2, glm::dot(to, to));
-    }
-    const glm::dvec3 moved = place - middle;
-    return glm::dot(moved, moved) <= 4 * reach2;  // NaN is not
-  }
-
-  template <typename Profile>
-  static bool stays_flat(const Profile& profile, const glm::dvec3& place) {
-    const auto& all = profile.triangles();
-    const auto gone = (profile.left_face_exists() ? 1 : 0) + (profile.right_face_exists() ? 1 : 0);
-    return std::all_of(all.begin() + gone, all.end(), [&](const auto& t) {
-      const auto& places = profile.vertex_point_map();  // the second vertex is the one that moves
-      return lies_flat(to_glm(get(places, t.v0)), place, to_glm(get(places, t.v2)));
-    });
-  }
-
-  sms::Bounded_normal_change_filter<> normals_;
-  bool is_height_field_;
-};
-
-class EnoughTriangles {
- public:
-  EnoughTriangles(const Mesh& mesh, std::size_t triangles) : mesh_(mesh), triangles_(triangles) {}
-
-  template <typename Cost, typename Profile, typename Count>
-  bool operator()(const Cost&, const Profile&, Count, Count) const {
-    return mesh_.number_of_faces() <= triangles_;
-  }
-
- private:
-  const Mesh& mesh_;
-  std::size_t triangles_;
-};
 
 // Vertices that went into others, as links from each to the one that took it in.
 struct Merges {
@@ -113,91 +33,33 @@ struct Merges {
   }
 };
 
-// Keeps account of collapses and reports progress.
-class Account {
- public:
-  Account(Merges& merges, const Mesh& mesh, std::size_t triangles, const Work& work)
-      : merges_(&merges), mesh_(&mesh), work_(&work) {
-    begin_ = static_cast<double>(mesh.number_of_faces());
-    end_ = static_cast<double>(triangles);
-  }
-
-  // NOLINTBEGIN(readability-identifier-naming): CGAL calls these.
-  void OnStarted(Mesh&) {}
-  void OnFinished(Mesh&) {}
-  template <typename Profile>
-  void OnStopConditionReached(const Profile&) {}
-  template <typename Profile>
-  void OnNonCollapsable(const Profile&) {}
-  template <typename Profile, typename Place>
-  void OnCollapsing(const Profile&, const Place&) {}
-
-  template <typename Profile, typename Cost>
-  void OnCollected(const Profile&, const Cost&) {
-    constexpr double share = 0.25;  // of the time, for the first look at all edges
-    tell(share * static_cast<double>(++seen_) / static_cast<double>(mesh_->number_of_edges()));
-  }
-
-  template <typename Profile, typename Cost, typename Count>
-  void OnSelected(const Profile&, const Cost&, Count, Count) {
-    ++seen_;
-    const double gone = begin_ - static_cast<double>(mesh_->number_of_faces());
-    tell(0.25 + 0.75 * gone / (begin_ - end_));
-  }
-
-  template <typename Profile>
-  void OnCollapsed(const Profile& profile, Mesh::Vertex_index kept) {
-    const auto gone = profile.v0() == kept ? profile.v1() : profile.v0();
-    merges_->into[gone] = kept;
-  }
-  // NOLINTEND(readability-identifier-naming)
-
- private:
-  void tell(double share) const {
-    if (seen_ % 4096 == 0 && work_->progress) work_->progress(std::min(share, 1.0));
-  }
-
-  Merges* merges_;  // CGAL copies visitors
-  const Mesh* mesh_;
-  const Work* work_;
-  std::size_t seen_ = 0;
-  double begin_ = 0, end_ = 0;
-};
-
 // The middle, with few digits, so that differences from it are exact for the most part.
 glm::dvec3 origin_amid(const TriangleMesh& mesh) {
   const ModelBounds bounds = bounds_of(mesh);
   return glm::round(0.5 * (bounds.low_m + bounds.high_m));
 }
 
-Mesh mesh_of(const ManifoldMesh& manifold, const glm::dvec3& origin_m) {
-  std::vector<glm::dvec3> points_m = manifold.shape.vertices_m;
-  for (glm::dvec3& p : points_m) p -= origin_m;
-  return half_edge_mesh<Mesh>(points_m, manifold.shape.triangles, manifold.pairs,
-                              [&](HalfEdge h) { return next_border(manifold.pairs, h); })
-      .mesh;
-}
-
 // Numbers what is left of `mesh` anew.
-void take_triangles(const Mesh& mesh, std::vector<std::uint32_t>& numbers, TriangleMesh& out) {
-  for (const auto vertex : mesh.vertices()) {
-    numbers[vertex] = static_cast<std::uint32_t>(out.vertices_m.size());
-    out.vertices_m.push_back(to_glm(mesh.point(vertex)));
+void take_triangles(const CollapsibleMesh& mesh, const std::vector<glm::dvec3>& places_m,
+                    std::vector<std::uint32_t>& numbers, TriangleMesh& out) {
+  for (std::uint32_t v = 0; v < numbers.size(); ++v) {
+    if (!mesh.has_vertex(v)) continue;
+    numbers[v] = static_cast<std::uint32_t>(out.vertices_m.size());
+    out.vertices_m.push_back(places_m[v]);
   }
-  for (const auto face : mesh.faces()) {
-    glm::uvec3 t;
-    int k = 0;
-    for (const auto vertex : vertices_around_face(mesh.halfedge(face), mesh))
-      t[k++] = numbers[vertex];
-    out.triangles.push_back(t);
+  for (std::uint32_t i = 0; i < mesh.numbers(); ++i) {
+    if (!mesh.has_triangle(i)) continue;
+    const glm::uvec3 t = mesh.corners(i);
+    out.triangles.emplace_back(numbers[t.x], numbers[t.y], numbers[t.z]);
   }
 }
 
-ReducedMesh result_of(const Mesh& mesh, const ManifoldMesh& manifold, Merges& merges,
-                      const TriangleMesh& original, const glm::dvec3& origin_m) {
+ReducedMesh result_of(const CollapsibleMesh& mesh, const std::vector<glm::dvec3>& places_m,
+                      const ManifoldMesh& manifold, Merges& merges, const TriangleMesh& original,
+                      const glm::dvec3& origin_m) {
   ReducedMesh out;
   std::vector<std::uint32_t> numbers(manifold.sources.size(), none);
-  take_triangles(mesh, numbers, out.mesh);
+  take_triangles(mesh, places_m, numbers, out.mesh);
   const std::size_t vertices = out.mesh.vertices_m.size();
   for (glm::dvec3& p : out.mesh.vertices_m) p += origin_m;
   out.sources.resize(vertices);
@@ -220,6 +82,26 @@ ReducedMesh result_of(const Mesh& mesh, const ManifoldMesh& manifold, Merges& me
   return out;
 }
 
+void collapse_to(std::size_t triangles, bool is_flat, const Work& work, CollapsibleMesh& mesh,
+                 std::vector<glm::dvec3>& places_m, Merges& merges) {
+  constexpr double looking = 0.1;  // of the time, at all edges first
+  const auto tell = [&](double share) {
+    if (work.progress) work.progress(share);
+  };
+  const std::size_t first = mesh.triangles();
+  VolumeCollapse collapse(mesh, places_m, is_flat ? Overhang::Refuse : Overhang::Allow,
+                          [&](double share) { tell(looking * share); });
+  for (std::size_t steps = 0; mesh.triangles() > triangles; ++steps) {
+    if (steps % 1024 == 0) {
+      tell(looking + (1 - looking) * static_cast<double>(first - mesh.triangles()) /
+                         static_cast<double>(first - triangles));
+    }
+    const auto merge = collapse.step();
+    if (!merge) break;
+    merges.into[merge->gone] = merge->kept;
+  }
+}
+
 void check_memory(const TriangleMesh& mesh, const Work& work) {
   constexpr std::size_t bytes_each = 500;  // triangle, measured
   if (mesh.triangles.size() > work.most_bytes / bytes_each) {
@@ -240,18 +122,14 @@ ReducedMesh reduce(const TriangleMesh& mesh, std::size_t triangles, const Work& 
   const ManifoldMesh manifold = cut_to_manifold(mesh);
   const bool is_flat = is_height_field(manifold.shape);
   const glm::dvec3 origin_m = origin_amid(mesh);
-  Mesh half_edges = mesh_of(manifold, origin_m);
+  std::vector<glm::dvec3> places_m = manifold.shape.vertices_m;
+  for (glm::dvec3& p : places_m) p -= origin_m;
+  CollapsibleMesh rest(manifold);
   Merges merges;
   merges.into.resize(manifold.sources.size());
   std::iota(merges.into.begin(), merges.into.end(), 0u);
-  if (half_edges.number_of_faces() > triangles) {
-    sms::edge_collapse(half_edges, EnoughTriangles(half_edges, triangles),
-                       CGAL::parameters::get_cost(sms::LindstromTurk_cost<Mesh>())
-                           .get_placement(sms::LindstromTurk_placement<Mesh>())
-                           .filter(TurnFilter(is_flat))
-                           .visitor(Account(merges, half_edges, triangles, work)));
-  }
-  ReducedMesh out = result_of(half_edges, manifold, merges, mesh, origin_m);
+  if (rest.triangles() > triangles) collapse_to(triangles, is_flat, work, rest, places_m, merges);
+  ReducedMesh out = result_of(rest, places_m, manifold, merges, mesh, origin_m);
   out.tangled_edges = manifold.tangled_edges;
   out.dropped = manifold.dropped;
   out.is_height_field = is_flat;

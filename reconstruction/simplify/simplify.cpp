@@ -235,6 +235,8 @@ Simplified Simplifier::measured(Simplified result, TriangleMesh local) const {
   result.mesh.sd_m = picked(mesh.sd_m, result.sources);
   result.mesh.labels = picked(mesh.labels, result.sources);
   result.mesh.confidence = picked(mesh.confidence, result.sources);
+  if (!original_.hangs_over() && overhanging_triangle(local) == none)
+    result.vertical = vertical_error(original_.surface().mesh().vertices_m, local);
   result.error =
       two_sided_error(original_.surface(), ClosestPoint(std::move(local)), options_.fineness);
   Stage{work_}.tell(1);

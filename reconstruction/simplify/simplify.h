@@ -3,10 +3,12 @@
 #include <cstddef>
 #include <cstdint>
 #include <numbers>
+#include <optional>
 #include <variant>
 #include <vector>
 
 #include "reconstruction/accuracy/two_sided_error.h"
+#include "reconstruction/accuracy/vertical_error.h"
 #include "reconstruction/measured_mesh.h"
 #include "reconstruction/work.h"
 
@@ -38,7 +40,8 @@ struct FaceBudget {
 
 /// Stop where the error reaches so many standard deviations of the measurements: what is finer is
 /// noise. Each vertex of the original is within so many of its own of the result: above or below
-/// where no triangle hangs over, as for VerticalBound, else in any direction. Borders likewise.
+/// where no triangle hangs over, as for VerticalBound. Else in any direction, and so is every other
+/// point, of both, within as many as vertices have there. Borders likewise.
 struct NoiseBound {
   double sds = 2;
 };
@@ -89,10 +92,13 @@ struct Simplified {
   std::vector<std::uint32_t> sources;  ///< of each vertex: which of the original, or the nearest
   HaltReason halted_by = HaltReason::Bound;
   MeshRepairs repairs;
-  /// Runs that it took, for a DistanceBound until the proof holds; if it does not for 20 of them
-  /// nothing is simplified.
+  /// Runs that it took, for a DistanceBound until a proof of the whole holds: one but for rounding,
+  /// as each collapse is proved; if it does not for 20 of them nothing is simplified.
   std::size_t rounds = 1;
   TwoSidedError error;  ///< `forth` from the original to the result, `back` from there
+  /// Of terrain, which hangs over neither before nor after: how far the original's vertices are
+  /// above or below the result.
+  std::optional<VerticalError> vertical;
 };
 
 /// Simplifies a mesh by collapsing edges, cheapest first, until `halt` says so. The same bytes for
@@ -104,7 +110,8 @@ struct Simplified {
 ///         than `work` allows.
 /// @see Garland, Heckbert, Surface simplification using quadric error metrics, SIGGRAPH (1997): the
 ///      order. Ciampalini, Cignoni, Montani, Scopigno, Multiresolution decimation based on global
-///      error, The Visual Computer 13 (1997): vertices kept with the triangles that stand for them.
+///      error, The Visual Computer 13 (1997): what was is kept with the triangles that stand for
+///      it.
 Simplified simplify(const MeasuredMesh& mesh, const Halt& halt, const SimplifyOptions& options = {},
                     const Work& work = {});
 

@@ -29,8 +29,8 @@ struct HaltCheck {
   void operator()(const NoiseBound& halt) const {
     broken.unless(halt.sds > 0 && std::isfinite(halt.sds), "sds = {} must be positive", halt.sds);
     broken.unless(!mesh.sd_m.empty(),
-                  "the mesh has no standard deviations (sd_m), which a NoiseBound is in: give it "
-                  "them, or a bound in metres");
+                  "the mesh has no standard deviations (sd_m) to tell noise by: give it them, or a "
+                  "bound in metres");
   }
   void operator()(const CostKnee&) const {}
 };
@@ -80,7 +80,7 @@ void refuse_overhang(const TriangleMesh& mesh, std::uint32_t triangle) {
   const glm::dvec3& p_m = mesh.vertices_m[t.x];
   throw Error(
       "simplify: triangle {} at ({}, {}, {}) hangs over: seen from above its corners must be "
-      "counter-clockwise for a vertical bound; ask for a DistanceBound instead",
+      "counter-clockwise for a bound of heights; bound distances in any direction instead",
       triangle, p_m.x, p_m.y, p_m.z);
 }
 

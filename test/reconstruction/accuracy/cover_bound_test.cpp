@@ -56,6 +56,36 @@ TEST(CoverBound, OfATiltedTriangleIsItsHighestCorner) {
   EXPECT_NEAR(cover.bound_m(corners, normal, start), glm::length(normal) / normal.z, 1e-4);
 }
 
+// As far as they allow, and no farther; each that covers some of it is asked.
+TEST(CoverBound, TellsWhetherTrianglesAllowTheDistance) {
+  const TriangleMesh plane = grid(50, [](double, double) { return 2.0; });
+  const CoverBound cover(plane);
+  const Corners corners{{{1, 1, 2.5}, {8, 1.3, 3}, {4, 9, 1.7}}};  // over 1400 triangles
+  const std::uint32_t start = nearest(ClosestPoint(plane), corners);
+  EXPECT_EQ(cover.bound_m(corners, up, start), infinity);
+  EXPECT_TRUE(cover.is_within(corners, up, start, [](std::uint32_t) { return 1.0001; }));
+  EXPECT_FALSE(cover.is_within(corners, up, start, [](std::uint32_t) { return 0.9999; }));
+  std::size_t asked = 0;
+  const auto allow = [&](std::uint32_t triangle) {
+    ++asked;
+    return plane.vertices_m[plane.triangles[triangle].x].y < 4.9 ? 1.001 : 0.51;
+  };
+  EXPECT_FALSE(
+      cover.is_within(corners, up, start, [&](std::uint32_t t) { return allow(t) - 0.1; }));
+  asked = 0;
+  EXPECT_TRUE(cover.is_within(corners, up, start, allow));
+  EXPECT_GT(asked, 1300u);
+}
+
+// Nothing is shrunk by more than what is allowed asks for.
+TEST(CoverBound, ToldFromASmallDistance) {
+  const TriangleMesh plane = grid(7, [](double, double) { return 2.0; });
+  const CoverBound cover(plane);
+  const Corners corners{{{0, 0, 2}, {10, 0, 2}, {0, 10, 2}}};
+  const std::uint32_t start = nearest(ClosestPoint(plane), corners);
+  EXPECT_TRUE(cover.is_within(corners, up, start, [](std::uint32_t) { return 1e-7; }));
+}
+
 TEST(CoverBound, IsThereWhereBordersLieOverEachOther) {
   const TriangleMesh fine = grid(16, [](double x, double) { return 0.01 * x * (10 - x); });
   const CoverBound cover(fine);

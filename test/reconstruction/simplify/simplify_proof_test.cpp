@@ -63,6 +63,7 @@ void expect_proved(const TerrainCase& of) {
   const TriangleMesh& coarse = result.mesh.shape;
   const double measuring_s = cpu_s();
   two_sided_error(of.mesh, coarse, SimplifyOptions().fineness);
+  vertical_error(of.mesh.vertices_m, coarse);
   const double measured_s = cpu_s() - measuring_s;
   const double share =
       static_cast<double>(coarse.triangles.size()) / static_cast<double>(of.mesh.triangles.size());
@@ -115,6 +116,7 @@ TEST(SimplifyProof, ARealScanIsWithinTheBoundBothWays) {
     EXPECT_LE(static_cast<double>(coarse.triangles.size()),
               most * static_cast<double>(bunny.triangles.size()));
     EXPECT_EQ(testing::manifold_faults(coarse), 0u);
+    EXPECT_EQ(result.rounds, 1u) << "what each collapse proves is proved again of all";
     const LargestDistance forth = MeshDistance(bunny, coarse).largest(tolerance_m);
     const LargestDistance back = MeshDistance(coarse, bunny).largest(tolerance_m);
     EXPECT_LE(hausdorff(forth, back).at_least_m, error_m);
@@ -142,15 +144,30 @@ TriangleMesh noisy_hills(int samples) {
 }
 
 // All that is taken: what runs need and what measuring the error needs.
-TEST(SimplifyProof, LargeMeshesTakeLittleMemory) {
-  const MeasuredMesh mesh{noisy_hills(static_cast<int>(testing::proof_size(513, 2238)))};
+void expect_little_memory(int samples, const Halt& halt) {
+  const MeasuredMesh mesh{noisy_hills(samples)};
   const auto triangles = static_cast<double>(mesh.shape.triangles.size());
   const double before = static_cast<double>(peak_bytes());
-  const Simplified result = simplify(mesh, VerticalBound{.error_m = 0.3});
+  const Simplified result = simplify(mesh, halt);
   const double each = (static_cast<double>(peak_bytes()) - before) / triangles;
   EXPECT_LE(each, 700);  // what `simplify` says that it takes
   EXPECT_LT(static_cast<double>(result.mesh.shape.triangles.size()), 0.1 * triangles);
   testing::record_margin("bytes of memory a triangle", each, 1000);
+}
+
+TEST(SimplifyProof, LargeMeshesTakeLittleMemory) {
+  const auto samples = static_cast<int>(testing::proof_size(513, 2238));
+  expect_little_memory(samples, VerticalBound{.error_m = 0.3});
+}
+
+TEST(SimplifyProof, LargeMeshesTakeLittleMemoryInAnyDirection) {
+  const auto samples = static_cast<int>(testing::proof_size(129, 708));
+  expect_little_memory(samples, DistanceBound{.error_m = 0.3, .border_m = 0.3});
+}
+
+TEST(SimplifyProof, LargeMeshesTakeLittleMemoryToABudget) {
+  const auto samples = static_cast<int>(testing::proof_size(513, 2238));
+  expect_little_memory(samples, FaceBudget{static_cast<std::size_t>(0.04 * samples * samples)});
 }
 
 }  // namespace

@@ -110,6 +110,8 @@ TEST(SimplifyTerrain, EveryVertexIsWithinTheBound) {
     if (is_even && hole_m == 0) {
       EXPECT_EQ(check.uncovered, 0u);
       EXPECT_NEAR(check.area_m2, 48 * 48, 1e-6);
+      EXPECT_NEAR(result.vertical.value().largest_m, check.largest_m, 1e-9);
+      EXPECT_NEAR(result.vertical.value().rms_m, check.rms_m, 1e-9);
     }
     const testing::PlanBins bins(coarse);
     for (const glm::dvec3& p : vertices) {  // what is not covered is beside the border

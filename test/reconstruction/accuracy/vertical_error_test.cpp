@@ -1,0 +1,70 @@
+#include "reconstruction/accuracy/vertical_error.h"
+
+#include <gmock/gmock.h>
+#include <gtest/gtest.h>
+
+#include <cmath>
+#include <glm/vec3.hpp>
+#include <random>
+#include <vector>
+
+#include "core/error.h"
+#include "test/support/plan_check.h"
+
+namespace groundray {
+namespace {
+
+const TriangleMesh slope{{{0, 0, 0}, {10, 0, 5}, {10, 10, 5}, {0, 10, 0}}, {{0, 1, 2}, {0, 2, 3}}};
+
+// The slope is z = x / 2.
+TEST(VerticalError, IsWhatPlanesSay) {
+  const std::vector<glm::dvec3> places_m{{2, 3, 1}, {4, 9, 3}, {6, 1, 1}, {8, 8, 4.5}};
+  const VerticalError error = vertical_error(places_m, slope);  // 0, 1 above, 2 below, 0.5 above
+  EXPECT_NEAR(error.largest_m, 2, 1e-14);
+  EXPECT_NEAR(error.mean_m, 3.5 / 4, 1e-14);
+  EXPECT_NEAR(error.rms_m, std::sqrt(5.25 / 4), 1e-14);
+  EXPECT_EQ(error.aside_m, 0);
+}
+
+TEST(VerticalError, BeyondTheBorderIsThatOfItsNearestPoint) {
+  const VerticalError error = vertical_error({{13, 14, 9}}, slope);
+  EXPECT_NEAR(error.aside_m, 5, 1e-14);
+  EXPECT_NEAR(error.largest_m, 4, 1e-14);
+}
+
+// Of a surface of many triangles, searched in another way.
+TEST(VerticalError, IsThatOfTheTriangleAboveOrBelow) {
+  std::mt19937_64 random(3);
+  std::uniform_real_distribution<double> place(0, 20), height(-1, 1), shift(-0.3, 0.3);
+  TriangleMesh rough;
+  for (int row = 0; row <= 20; ++row) {
+    for (int column = 0; column <= 20; ++column) {
+      const double x = column + shift(random), y = row + shift(random);
+      rough.vertices_m.emplace_back(x, y, height(random));
+    }
+  }
+  for (unsigned row = 0; row < 20; ++row) {
+    for (unsigned column = 0; column < 20; ++column) {
+      const unsigned a = row * 21 + column, b = a + 1, c = a + 21, d = c + 1;
+      rough.triangles.insert(rough.triangles.end(), {{a, b, c}, {b, d, c}});
+    }
+  }
+  std::vector<glm::dvec3> places_m;
+  for (int i = 0; i < 2000; ++i) {
+    const double x = 0.5 + 0.95 * place(random), y = 0.5 + 0.95 * place(random);
+    places_m.emplace_back(x, y, height(random));
+  }
+  const testing::PlanCheck check = testing::check_plan(places_m, rough);
+  ASSERT_EQ(check.uncovered, 0u);
+  const VerticalError error = vertical_error(places_m, rough);
+  EXPECT_NEAR(error.largest_m, check.largest_m, 1e-12);
+  EXPECT_NEAR(error.rms_m, check.rms_m, 1e-12);
+  EXPECT_EQ(error.aside_m, 0);
+}
+
+TEST(VerticalError, RefusesWhatIsNoSurface) {
+  EXPECT_THROW(vertical_error({{0, 0, 0}}, {}), Error);
+}
+
+}  // namespace
+}  // namespace groundray
