@@ -12,8 +12,9 @@ find_package(GDAL REQUIRED)
 find_package(yaml-cpp REQUIRED)
 find_package(nlohmann_json REQUIRED)
 find_package(tinyxml2 REQUIRED)
-# OpenCV is linked by the names of two of its libraries; its CMake files would need all of it.
+# OpenCV is linked by the names of a few of its libraries; its CMake files would need all of it.
 find_library(GROUNDRAY_OPENCV_IMGPROC opencv_imgproc REQUIRED)
+find_library(GROUNDRAY_OPENCV_CALIB3D opencv_calib3d REQUIRED)
 # CGAL is headers over these two; its CMake files would set flags for all sources and print.
 find_library(GROUNDRAY_GMP gmp REQUIRED)
 find_library(GROUNDRAY_MPFR mpfr REQUIRED)

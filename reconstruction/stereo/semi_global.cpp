@@ -1,0 +1,208 @@
+#include "reconstruction/stereo/semi_global.h"
+
+#include <tbb/parallel_invoke.h>
+
+#include <algorithm>
+#include <cmath>
+#include <limits>
+#include <opencv2/calib3d.hpp>
+#include <opencv2/core.hpp>
+#include <opencv2/imgproc.hpp>
+#ifdef GROUNDRAY_XIMGPROC
+#include <opencv2/ximgproc/disparity_filter.hpp>
+#endif
+#include <vector>
+
+namespace groundray {
+namespace {
+
+constexpr float nothing = std::numeric_limits<float>::quiet_NaN();
+constexpr int search_width_px = 320;
+constexpr int gradient_cap = 63;
+
+cv::Mat mat_of(const Image8& image) {
+  cv::Mat mat(image.height(), image.width(), CV_8UC1);
+  for (int y = 0; y < image.height(); ++y)
+    std::copy_n(image.at(0, y).data(), static_cast<std::size_t>(image.width()), mat.ptr(y));
+  return mat;
+}
+
+// SGBM wants a multiple of 16.
+int count_of(const DisparityRange& range) {
+  return (range.most_px - range.least_px + 16) / 16 * 16;
+}
+
+// The disparities, times 16, of the first image. Both are made wider, so that all of the first
+// one's pixels have all disparities.
+cv::Mat found_from(const cv::Mat& first, const cv::Mat& second, const DisparityRange& range,
+                   const MatchOptions& options) {
+  const int count = count_of(range);
+  const int before = std::max(0, range.least_px + count), after = std::max(0, -range.least_px);
+  cv::Mat wide_first, wide_second, wide;
+  cv::copyMakeBorder(first, wide_first, 0, 0, before, after, cv::BORDER_REPLICATE);
+  cv::copyMakeBorder(second, wide_second, 0, 0, before, after, cv::BORDER_REPLICATE);
+  const int area = options.block_px * options.block_px;
+  const auto matcher = cv::StereoSGBM::create(
+      range.least_px, count, options.block_px, options.step_cost * area, options.jump_cost * area,
+      -1, gradient_cap, options.uniqueness_percent, 0, 0,
+      options.paths == MatchOptions::Paths::Eight ? cv::StereoSGBM::MODE_HH
+                                                  : cv::StereoSGBM::MODE_SGBM);
+  matcher->compute(wide_first, wide_second, wide);
+  return wide.colRange(before, before + first.cols).clone();
+}
+
+ImageF pixels_of(const cv::Mat& found, const DisparityRange& range) {
+  ImageF result(found.cols, found.rows, 1);
+  for (int y = 0; y < found.rows; ++y) {
+    for (int x = 0; x < found.cols; ++x) {
+      const int value = found.at<short>(y, x);
+      result.at(x, y)[0] =
+          value < 16 * range.least_px ? nothing : static_cast<float>(value) / 16.0F;
+    }
+  }
+  return result;
+}
+
+Image8 shrunk(const Image8& image, int step) {
+  const cv::Mat full = mat_of(image);
+  const cv::Size size(std::max(1, full.cols / step), std::max(1, full.rows / step));
+  cv::Mat mat;
+  cv::resize(full, mat, size, 0, 0, cv::INTER_AREA);
+  Image8 small(size.width, size.height, 1);
+  for (int y = 0; y < size.height; ++y)
+    std::copy_n(mat.ptr(y), static_cast<std::size_t>(size.width), small.at(0, y).data());
+  return small;
+}
+
+// Whether a pixel of a shrunk image is not beside the rim of what is seen: both images' rims look
+// alike, wherever they are.
+bool is_seen_round(const Image8& seen, int x, int y, int step) {
+  constexpr int beside = 3;
+  for (int dy = -beside; dy <= beside; dy += beside) {
+    for (int dx = -beside; dx <= beside; dx += beside) {
+      const int column = std::clamp((x + dx) * step, 0, seen.width() - 1);
+      const int row = std::clamp((y + dy) * step, 0, seen.height() - 1);
+      if (seen.at(column, row)[0] == 0) return false;
+    }
+  }
+  return true;
+}
+
+#ifdef GROUNDRAY_XIMGPROC
+// As OpenCV keeps disparities, times `sign`.
+cv::Mat fixed(const ImageF& image, float sign, int none) {
+  cv::Mat mat(image.height(), image.width(), CV_16SC1);
+  for (int y = 0; y < mat.rows; ++y) {
+    for (int x = 0; x < mat.cols; ++x) {
+      const float value = image.at(x, y)[0];
+      mat.at<short>(y, x) =
+          static_cast<short>(std::isnan(value) ? none : std::lround(sign * value * 16));
+    }
+  }
+  return mat;
+}
+#endif
+
+}  // namespace
+
+SemiGlobalDisparity semi_global(const Image8& left, const Image8& right,
+                                const DisparityRange& range, const MatchOptions& options) {
+  const cv::Mat left_mat = mat_of(left), right_mat = mat_of(right);
+  SemiGlobalDisparity result;
+  tbb::parallel_invoke(
+      [&] { result.left_px = pixels_of(found_from(left_mat, right_mat, range, options), range); },
+      [&] {
+        // Mirrored, the right image is the left one of a pair with the same disparities.
+        cv::Mat left_mirrored, right_mirrored, found;
+        cv::flip(left_mat, left_mirrored, 1);
+        cv::flip(right_mat, right_mirrored, 1);
+        cv::flip(found_from(right_mirrored, left_mirrored, range, options), found, 1);
+        result.right_px = pixels_of(found, range);
+      });
+  return result;
+}
+
+std::uint64_t remove_speckles(ImageF& disparity_px, int pixels) {
+  cv::Mat fixed(disparity_px.height(), disparity_px.width(), CV_16SC1);
+  constexpr short none = std::numeric_limits<short>::min();
+  for (int y = 0; y < fixed.rows; ++y) {
+    for (int x = 0; x < fixed.cols; ++x) {
+      const float value = disparity_px.at(x, y)[0];
+      fixed.at<short>(y, x) =
+          std::isnan(value) ? none : static_cast<short>(std::lround(value * 16.0F));
+    }
+  }
+  cv::filterSpeckles(fixed, none, pixels, 16);
+  std::uint64_t removed = 0;
+  for (int y = 0; y < fixed.rows; ++y) {
+    for (int x = 0; x < fixed.cols; ++x) {
+      float& value = disparity_px.at(x, y)[0];
+      if (fixed.at<short>(y, x) != none || std::isnan(value)) continue;
+      value = nothing;
+      ++removed;
+    }
+  }
+  return removed;
+}
+
+std::optional<DisparityRange> common_range(const SearchedImage& left, const SearchedImage& right,
+                                           const MatchOptions& options) {
+  const int step = (left.grey.width() + search_width_px - 1) / search_width_px;
+  const Image8 small_left = shrunk(left.grey, step), small_right = shrunk(right.grey, step);
+  const DisparityRange all{-2, std::max(1, small_left.width() / 2)};
+  const SemiGlobalDisparity found = semi_global(small_left, small_right, all, options);
+  ImageF kept = found.left_px;
+  for (int y = 0; y < kept.height(); ++y) {
+    for (int x = 0; x < kept.width(); ++x) {
+      float& value = kept.at(x, y)[0];
+      const int there = std::isnan(value) ? -1 : x - static_cast<int>(std::lround(value));
+      if (there < 0 || there >= kept.width() ||
+          !(std::abs(found.right_px.at(there, y)[0] - value) <= 1) ||
+          !is_seen_round(left.seen, x, y, step) || !is_seen_round(right.seen, there, y, step))
+        value = nothing;
+    }
+  }
+  constexpr int least_pixels = 32;
+  remove_speckles(kept, least_pixels);
+  int least = all.most_px + 1, most = all.least_px - 1;
+  for (const float value : kept.values()) {
+    if (std::isnan(value)) continue;
+    least = std::min(least, static_cast<int>(std::floor(value)));
+    most = std::max(most, static_cast<int>(std::ceil(value)));
+  }
+  if (least > most) return std::nullopt;
+  return DisparityRange{(least - 1) * step, (most + 1) * step};
+}
+
+bool has_guided_smoothing() noexcept {
+#ifdef GROUNDRAY_XIMGPROC
+  return true;
+#else
+  return false;
+#endif
+}
+
+#ifdef GROUNDRAY_XIMGPROC
+ImageF smooth_guided(const Image8& left, const SemiGlobalDisparity& found,
+                     const DisparityRange& range) {
+  const int count = count_of(range);
+  const cv::Mat from_left = fixed(found.left_px, 1, 16 * (range.least_px - 1));
+  const cv::Mat from_right = fixed(found.right_px, -1, 16 * -(range.least_px + count));
+  const auto filter = cv::ximgproc::createDisparityWLSFilterGeneric(true);
+  // A tenth of OpenCV's smoothness and half of its tolerance of edges are best on Middlebury's
+  // Motorcycle, and twice the values or half of them not much worse.
+  filter->setLambda(200);
+  filter->setSigmaColor(0.8);
+  filter->setLRCthresh(24);  // 1.5 px
+  cv::Mat smooth;
+  filter->filter(from_left, mat_of(left), smooth, from_right,
+                 cv::Rect(0, 0, from_left.cols, from_left.rows));
+  return pixels_of(smooth, range);
+}
+#else
+ImageF smooth_guided(const Image8&, const SemiGlobalDisparity& found, const DisparityRange&) {
+  return found.left_px;
+}
+#endif
+
+}  // namespace groundray

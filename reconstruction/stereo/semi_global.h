@@ -1,0 +1,44 @@
+#pragma once
+
+#include <cstdint>
+#include <optional>
+
+#include "core/image.h"
+#include "reconstruction/stereo/disparity.h"
+
+namespace groundray {
+
+/// An image to search, 1 channel each.
+struct SearchedImage {
+  Image8 grey;
+  Image8 seen;
+};
+
+/// What semi-global matching finds: disparities of both images to 1/16 px, NaN where there is none.
+struct SemiGlobalDisparity {
+  ImageF left_px;
+  ImageF right_px;  ///< of the right image's pixels: u_left - u_right too
+};
+
+/// Matches two images of one size, from each side.
+/// @param range  of less than 2000 px on either side.
+/// @see Birchfield, Tomasi, A pixel dissimilarity measure that is insensitive to image sampling,
+///      PAMI 20 (1998): the costs of OpenCV's StereoSGBM
+SemiGlobalDisparity semi_global(const Image8& left, const Image8& right,
+                                const DisparityRange& range, const MatchOptions& options);
+
+/// Returns the disparities that two images have in common, found at a width of at most 320 px;
+/// nothing if there are none.
+std::optional<DisparityRange> common_range(const SearchedImage& left, const SearchedImage& right,
+                                           const MatchOptions& options);
+
+/// Removes patches of less than `pixels` whose disparities differ from pixel to pixel by no more
+/// than 1 px. @return how many pixels were removed.
+std::uint64_t remove_speckles(ImageF& disparity_px, int pixels);
+
+/// Returns the left disparities smoothed along the image's edges, with holes filled; as found if
+/// OpenCV came without ximgproc.
+ImageF smooth_guided(const Image8& left, const SemiGlobalDisparity& found,
+                     const DisparityRange& range);
+
+}  // namespace groundray

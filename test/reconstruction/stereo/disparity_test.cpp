@@ -1,0 +1,314 @@
+#include "reconstruction/stereo/disparity.h"
+
+#include <gmock/gmock.h>
+#include <gtest/gtest.h>
+#include <tbb/global_control.h>
+
+#include <algorithm>
+#include <bit>
+#include <cmath>
+#include <limits>
+#include <opencv2/core.hpp>
+#include <vector>
+
+#include "core/error.h"
+#include "test/support/margin.h"
+#include "test/support/wave_texture.h"
+
+namespace groundray {
+namespace {
+
+using testing::add_noise;
+using ::testing::HasSubstr;
+using ::testing::ThrowsMessage;
+using testing::WaveTexture;
+
+constexpr glm::ivec2 size_px{200, 120};
+constexpr float nothing = std::numeric_limits<float>::quiet_NaN();
+
+RectifiedImage seen_whole(ImageF grey) {
+  Image8 seen(grey.width(), grey.height(), 1);
+  std::ranges::fill(seen.values(), std::uint8_t{1});
+  return {std::move(grey), std::move(seen)};
+}
+
+struct Pair {
+  RectifiedImage left, right;
+};
+
+// A plane of disparities: at_px in the middle of the left image.
+struct Slant {
+  double at_px = 0, by_x = 0, by_y = 0;
+  double of(glm::dvec2 left) const {
+    return at_px + by_x * (left.x - size_px.x / 2.0) + by_y * (left.y - size_px.y / 2.0);
+  }
+  // The left place that a right pixel shows: u_right = u_left - of(left).
+  glm::dvec2 left_of(glm::dvec2 right) const {
+    const double x =
+        (right.x + at_px - by_x * size_px.x / 2.0 + by_y * (right.y - size_px.y / 2.0)) /
+        (1 - by_x);
+    return {x, right.y};
+  }
+};
+
+Pair pair_of(const Slant& slant, double noise = 0, double gain = 1, double offset = 0) {
+  const WaveTexture texture(3.5);
+  ImageF left = texture.image(size_px, [](glm::dvec2 place) { return place; });
+  ImageF right = texture.image(size_px, [&](glm::dvec2 place) { return slant.left_of(place); });
+  for (float& value : right.values()) value = static_cast<float>(gain * value + offset);
+  add_noise(left, noise, {1});
+  add_noise(right, noise, {2});
+  return {seen_whole(std::move(left)), seen_whole(std::move(right))};
+}
+
+struct Errors {
+  int count = 0, gross = 0;
+  double mean_px = 0, rms_px = 0, normalised = 0;
+};
+
+Errors errors_of(const DisparityMap& map, const Slant& slant) {
+  Errors errors;
+  for (int y = 0; y < size_px.y; ++y) {
+    for (int x = 0; x < size_px.x; ++x) {
+      const double found = map.disparity_px.at(x, y)[0];
+      if (std::isnan(found)) continue;
+      const double off = found - slant.of({x, y});
+      ++errors.count;
+      if (std::abs(off) > 1) {
+        ++errors.gross;
+        continue;
+      }
+      errors.mean_px += off;
+      errors.rms_px += off * off;
+      errors.normalised += std::pow(off / static_cast<double>(map.sd_px.at(x, y)[0]), 2);
+    }
+  }
+  const double fine = std::max(1, errors.count - errors.gross);
+  errors.mean_px /= fine;
+  errors.rms_px = std::sqrt(errors.rms_px / fine);
+  errors.normalised = std::sqrt(errors.normalised / fine);
+  return errors;
+}
+
+// Of images without noise, whatever the disparity's fraction.
+TEST(Disparity, IsFoundToAFewHundredthsOfAPixel) {
+  constexpr double tolerance_px = 0.03;  // of rounding to 255 steps in the search: none; splines
+  for (const Slant& slant : {Slant{12.0, 0, 0}, Slant{12.25, 0, 0}, Slant{12.5, 0, 0},
+                             Slant{15, 0.05, 0.1}, Slant{15, -0.08, 0.12}}) {
+    const Pair pair = pair_of(slant);
+    const Errors errors = errors_of(match(pair.left, pair.right, {.range = {{0, 47}}}), slant);
+    EXPECT_GT(errors.count, 0.8 * size_px.x * size_px.y) << slant.at_px;
+    EXPECT_LE(errors.gross, errors.count / 1000) << slant.at_px << " " << slant.by_x;
+    EXPECT_LT(errors.rms_px, tolerance_px) << slant.at_px << " " << slant.by_x;
+    EXPECT_LT(std::abs(errors.mean_px), tolerance_px / 3);
+    testing::record_margin("rms", errors.rms_px, tolerance_px, "px");
+  }
+}
+
+TEST(Disparity, DoesNotDependOnBrightnessOrContrast) {
+  const Slant slant{10.3, 0.02, 0.05};
+  const Pair pair = pair_of(slant, 0, 0.8, 0.07);
+  const Errors errors = errors_of(match(pair.left, pair.right, {.range = {{0, 31}}}), slant);
+  EXPECT_GT(errors.count, 0.8 * size_px.x * size_px.y);
+  EXPECT_LT(errors.rms_px, 0.03);
+}
+
+// White noise is what least squares are told to expect, so their own standard deviation, without
+// factor or floor, must be that of the errors. Splines between pixels keep 2/3 of the noise's
+// variance or so, hence the lower limit.
+TEST(Disparity, StatesTheEffectOfWhiteNoise) {
+  for (const double noise : {0.01, 0.03}) {
+    const Slant slant{14.4, 0.03, 0.06};
+    const Pair pair = pair_of(slant, noise);
+    const Errors errors = errors_of(
+        match(pair.left, pair.right, {.range = {{0, 31}}, .sd_factor = 1, .sd_floor_px = 0}),
+        slant);
+    EXPECT_GT(errors.count, 0.7 * size_px.x * size_px.y) << noise;
+    EXPECT_GT(errors.normalised, 0.75) << noise;
+    EXPECT_LT(errors.normalised, 1.3) << noise;
+    testing::record_margin("normalised error", errors.normalised - 1, 0.3);
+  }
+}
+
+// A near square hides a strip of what is behind it from the right camera: no disparity there.
+TEST(Disparity, HasNoneForWhatOneCameraSeesAlone) {
+  constexpr int left_edge = 90, right_edge = 130, top = 40, bottom = 80, near = 20, far = 8;
+  const WaveTexture back(3.5), front(3.5, {9});
+  const auto is_front = [&](double x, double y) {
+    return x >= left_edge && x < right_edge && y >= top && y < bottom;
+  };
+  ImageF left(size_px.x, size_px.y, 1), right = left;
+  for (int y = 0; y < size_px.y; ++y) {
+    for (int x = 0; x < size_px.x; ++x) {
+      left.at(x, y)[0] = static_cast<float>((is_front(x, y) ? front : back).at({x, y}));
+      right.at(x, y)[0] = static_cast<float>(is_front(x + near, y) ? front.at({x + near, y})
+                                                                   : back.at({x + far, y}));
+    }
+  }
+  const DisparityMap map = match(seen_whole(left), seen_whole(right), {.range = {{0, 31}}});
+  int hidden = 0, wrong = 0, found = 0;
+  for (int y = 0; y < size_px.y; ++y) {
+    for (int x = far; x < size_px.x; ++x) {
+      const float disparity_px = map.disparity_px.at(x, y)[0];
+      // Just left of the square: its right image covers what lies there.
+      if (y >= top && y < bottom && x >= left_edge - (near - far) && x < left_edge) {
+        hidden += std::isnan(disparity_px) ? 0 : 1;
+        continue;
+      }
+      if (std::isnan(disparity_px)) continue;
+      ++found;
+      if (std::abs(disparity_px - (is_front(x, y) ? near : far)) > 1) ++wrong;
+    }
+  }
+  EXPECT_LT(hidden, 0.2 * (near - far) * (bottom - top));
+  EXPECT_GT(found, 18000);
+  EXPECT_LT(wrong, 60);  // along 160 px of edges
+  EXPECT_GT(map.unmatched.inconsistent, 0U);
+}
+
+TEST(Disparity, FindsItsRangeByItself) {
+  for (const double at_px : {3.0, 40.0, 70.0}) {
+    const Slant slant{at_px, 0, 0.05};
+    const Pair pair = pair_of(slant);
+    const DisparityMap map = match(pair.left, pair.right);
+    EXPECT_LE(map.range.least_px, at_px - 3);
+    EXPECT_GE(map.range.most_px, at_px + 3);
+    EXPECT_LT(map.range.most_px - map.range.least_px, 40);
+    const Errors errors = errors_of(map, slant);
+    EXPECT_GT(errors.count, 0.9 * (size_px.x - at_px - 20) * size_px.y);
+    EXPECT_LT(errors.rms_px, 0.05);
+  }
+}
+
+TEST(Disparity, HasNoneWithoutTexture) {
+  ImageF grey(size_px.x, size_px.y, 1);
+  for (const float value : {0.0F, 0.5F, 1.0F}) {
+    std::ranges::fill(grey.values(), value);
+    for (const auto& range :
+         {std::optional<DisparityRange>{}, std::optional<DisparityRange>{{0, 31}}}) {
+      const DisparityMap map = match(seen_whole(grey), seen_whole(grey), {.range = range});
+      EXPECT_TRUE(
+          std::ranges::all_of(map.disparity_px.values(), [](float d) { return std::isnan(d); }));
+    }
+  }
+  // Nor where the texture does not change along rows.
+  const WaveTexture texture(3.5);
+  const ImageF stripes =
+      texture.image(size_px, [](glm::dvec2 place) { return glm::dvec2(0, place.y); });
+  const DisparityMap map = match(seen_whole(stripes), seen_whole(stripes), {.range = {{0, 31}}});
+  EXPECT_TRUE(
+      std::ranges::all_of(map.disparity_px.values(), [](float d) { return std::isnan(d); }));
+}
+
+// Two images that have nothing to do with each other.
+TEST(Disparity, IsRareBetweenImagesOfOtherThings) {
+  const RectifiedImage left =
+      seen_whole(WaveTexture(3.5).image(size_px, [](glm::dvec2 p) { return p; }));
+  const RectifiedImage right =
+      seen_whole(WaveTexture(3.5, {77}).image(size_px, [](glm::dvec2 p) { return p; }));
+  const DisparityMap map = match(left, right, {.range = {{0, 31}}});
+  const auto sure =
+      std::ranges::count_if(map.confidence.values(), [](float c) { return c > 0.5F; });
+  EXPECT_LT(sure, 0.02 * size_px.x * size_px.y);
+}
+
+TEST(Disparity, CountsWhyThereIsNone) {
+  Pair pair = pair_of({12, 0, 0});
+  for (int y = 0; y < size_px.y; ++y) {
+    for (int x = 0; x < 30; ++x) pair.left.seen.at(x, y)[0] = 0;
+    for (int x = 150; x < size_px.x; ++x) pair.right.grey.at(x, y)[0] = nothing;
+  }
+  const DisparityMap map = match(pair.left, pair.right, {.range = {{0, 31}}});
+  const auto given =
+      std::ranges::count_if(map.disparity_px.values(), [](float d) { return !std::isnan(d); });
+  const UnmatchedCounts& none = map.unmatched;
+  EXPECT_EQ(none.unseen, 30U * size_px.y);
+  EXPECT_EQ(none.unseen + none.ambiguous + none.inconsistent + none.speckle + none.unrefined +
+                static_cast<std::uint64_t>(given),
+            static_cast<std::uint64_t>(size_px.x * size_px.y));
+  for (int y = 0; y < size_px.y; ++y) {
+    EXPECT_TRUE(std::isnan(map.disparity_px.at(29, y)[0]));
+    EXPECT_TRUE(std::isnan(map.disparity_px.at(170, y)[0]));  // beyond what the right one shows
+  }
+}
+
+std::vector<std::uint32_t> bits_of(const ImageF& image) {
+  std::vector<std::uint32_t> bits;
+  for (const float value : image.values()) bits.push_back(std::bit_cast<std::uint32_t>(value));
+  return bits;
+}
+
+TEST(Disparity, IsTheSameForAnyNumberOfThreads) {
+  const Pair pair = pair_of({14.4, 0.03, 0.06}, 0.02);
+  const int threads_before = cv::getNumThreads();
+  std::vector<DisparityMap> maps;
+  for (const int threads : {1, 2, 7}) {
+    const tbb::global_control control(tbb::global_control::max_allowed_parallelism,
+                                      static_cast<std::size_t>(threads));
+    cv::setNumThreads(threads);
+    maps.push_back(match(pair.left, pair.right));
+  }
+  cv::setNumThreads(threads_before);
+  for (const DisparityMap& map : maps) {
+    EXPECT_EQ(bits_of(map.disparity_px), bits_of(maps[0].disparity_px));
+    EXPECT_EQ(bits_of(map.sd_px), bits_of(maps[0].sd_px));
+    EXPECT_EQ(bits_of(map.confidence), bits_of(maps[0].confidence));
+  }
+}
+
+TEST(Disparity, TakesImagesOfAnySize) {
+  const WaveTexture texture(3.5);
+  for (const glm::ivec2 size : {glm::ivec2(1, 1), glm::ivec2(1, 40), glm::ivec2(40, 1),
+                                glm::ivec2(3, 2), glm::ivec2(17, 9), glm::ivec2(900, 4)}) {
+    const RectifiedImage image =
+        seen_whole(texture.image(size, [](glm::dvec2 place) { return place; }));
+    for (const auto paths : {MatchOptions::Paths::Five, MatchOptions::Paths::Eight}) {
+      for (const auto& range :
+           {std::optional<DisparityRange>{}, std::optional<DisparityRange>{{-5, 31}},
+            std::optional<DisparityRange>{{100, 131}}}) {
+        const DisparityMap map = match(image, image, {.range = range, .paths = paths});
+        EXPECT_EQ(map.disparity_px.width(), size.x);
+        for (const float disparity_px : map.disparity_px.values())
+          EXPECT_TRUE(std::isnan(disparity_px) || std::abs(disparity_px) < 1);
+      }
+    }
+  }
+}
+
+TEST(Disparity, RangesFollowDepths) {
+  const PinholePair pair{.focal_px = 500, .size_px = size_px, .baseline_m = 0.2};
+  EXPECT_EQ(disparity_range(pair, 4.1, std::numeric_limits<double>::infinity()),
+            (DisparityRange{-1, 26}));
+  EXPECT_EQ(disparity_range(pair, 2, 8), (DisparityRange{11, 51}));
+  for (const auto& [nearest_m, farthest_m] :
+       {std::pair(0.0, 5.0), std::pair(3.0, 2.0), std::pair(-1.0, 2.0), std::pair(0.01, 2.0),
+        std::pair(1.0, std::nan(""))})
+    EXPECT_THAT([&] { disparity_range(pair, nearest_m, farthest_m); },
+                ThrowsMessage<Error>(HasSubstr("the nearest depth must be")));
+}
+
+TEST(Disparity, RefusesWhatCannotBeMatched) {
+  const Pair pair = pair_of({12, 0, 0});
+  const auto expect_refused = [&](const MatchOptions& options, const char* part) {
+    EXPECT_THAT([&] { match(pair.left, pair.right, options); },
+                ThrowsMessage<Error>(HasSubstr(part)));
+  };
+  expect_refused({.block_px = 4}, "block_px = 4 must be odd");
+  expect_refused({.window_px = 3}, "window_px = 3");
+  expect_refused({.step_cost = 40}, "below jump_cost = 32");
+  expect_refused({.uniqueness_percent = 100}, "uniqueness_percent = 100");
+  expect_refused({.left_right_px = -1}, "left_right_px = -1");
+  expect_refused({.speckle_px = -1}, "speckle_px = -1");
+  expect_refused({.sd_factor = -1}, "sd_factor = -1");
+  expect_refused({.most_sd_px = 0}, "most_sd_px = 0");
+  expect_refused({.range = {{5, 5}}}, "range = 5 to 5 px");
+  expect_refused({.range = {{0, 5000}}}, "range = 0 to 5000 px");
+  expect_refused({.range = {{0, 31}}, .most_bytes = 1000}, "ask for paths Five");
+  const RectifiedImage small = seen_whole(ImageF(199, 120, 1));
+  EXPECT_THAT([&] { match(pair.left, small); },
+              ThrowsMessage<Error>(HasSubstr("the right one 199 x 120")));
+  EXPECT_THAT([] { match({}, {}); }, ThrowsMessage<Error>(HasSubstr("must have pixels")));
+}
+
+}  // namespace
+}  // namespace groundray
