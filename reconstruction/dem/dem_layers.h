@@ -28,4 +28,7 @@ struct DemLayers {
   std::vector<float> slope_rad;      ///< of the surface, against the horizontal
 };
 
+/// Returns layers of which nothing is known: no sample has a source, and all else is 0 or NaN.
+DemLayers unknown_layers(const GridFrame& frame);
+
 }  // namespace groundray

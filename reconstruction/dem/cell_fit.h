@@ -1,0 +1,73 @@
+#pragma once
+
+// Private to the library: the ground of one cell from its points.
+#include <cstddef>
+#include <cstdint>
+#include <glm/vec2.hpp>
+#include <span>
+#include <vector>
+
+#include "reconstruction/dem/neighbour_plane.h"
+#include "reconstruction/dem/packed_point.h"
+
+namespace groundray {
+
+/// The ground at a cell's sample.
+struct CellHeight {
+  SurfacePlane plane;  ///< its height is above the reference
+  double variance_m2 = 0;
+  double chi2 = 0;                      ///< per degree of freedom; NaN where there is none
+  std::uint32_t lidar = 0, stereo = 0;  ///< points that count for something
+};
+
+/// Fits planes to the points of cells, one after the other.
+///
+/// A point's weight is 1 / variance, where the variance is that of its height and of its place
+/// times the slope, and the points of a group together weigh no more than what they have in common
+/// lets them: in all 1 / (1 / sum(1 / variance) + bias²), as generalised least squares would have
+/// it. Slopes are held to the neighbours' by what those know. The start has the median height and
+/// the neighbours' slope; residuals are in units of their sd, times 1.4826 of their median where
+/// that is above 1; Huber's weights (k = 1.345) come up to three times, then, with slope and
+/// scale of that, Tukey's (c = 4.685) up to five.
+///
+/// The variance is that of the linear estimate with the last weights: of the points' noise, times
+/// the fit's chi² per degree of freedom where that is above 1; of what groups have in common, each
+/// with its share of the weight, not lessened by how many points it has; and of the slope that the
+/// neighbours lend.
+/// @see Huber, Ronchetti, Robust statistics (2009), chapter 7.
+class CellFit {
+ public:
+  /// @param points       of the cell's ground, ascending; at least one.
+  /// @param step_m       of the frame.
+  /// @param reference    which heights are above, in steps of PackedPoint.
+  CellHeight operator()(std::span<const PackedPoint> points, const NeighbourPlane& neighbours,
+                        glm::dvec2 step_m, std::int32_t reference);
+
+ private:
+  struct Sums;
+  void unpack(std::span<const PackedPoint> points, glm::dvec2 step_m, std::int32_t reference);
+  void number_groups(std::span<const PackedPoint> points);
+  void weigh(const SurfacePlane& plane);
+  float kth_size(std::size_t k);
+  double median_height(const SurfacePlane& slopes);
+  double scale(const SurfacePlane& plane);
+  template <typename Robust>
+  Sums sum(const SurfacePlane& plane, double scale, const Robust& robust);
+  template <typename Robust>
+  void iterate(SurfacePlane& plane, const NeighbourPlane& neighbours, double scale, int rounds,
+               const Robust& robust);
+  void compare(const SurfacePlane& plane, double bias_m2, CellHeight& found) const;
+  CellHeight finish(const SurfacePlane& plane, const Sums& sums, const NeighbourPlane& neighbours,
+                    glm::dvec2 step_m);
+
+  std::size_t count_ = 0;   // points
+  std::size_t padded_ = 0;  // entries below, a whole number of vectors; those beyond weigh nothing
+  std::vector<float> x_m_, y_m_, z_m_, noise_m2_, across_m2_, bias_m_;
+  std::vector<float> variance_m2_, gain_, per_sd_, weight_, size_;
+  std::vector<std::uint32_t> group_;        // number of each point's group in the cell
+  std::vector<std::uint32_t> names_;        // of the groups
+  std::vector<std::uint32_t> table_;        // where to look for a name
+  std::vector<double> share_, bias_sum_m_;  // of each group
+};
+
+}  // namespace groundray

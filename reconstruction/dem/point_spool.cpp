@@ -1,0 +1,59 @@
+#include "reconstruction/dem/point_spool.h"
+
+#include <algorithm>
+#include <utility>
+
+namespace groundray {
+
+PointSpool::PointSpool(std::size_t bins, std::size_t most_bytes, std::filesystem::path folder)
+    : folder_(std::move(folder)), bins_(bins) {
+  constexpr std::size_t least = 51, most = 3276;  // points in 1 KB and in 64 KB
+  chunk_points_ =
+      std::clamp(most_bytes / (std::max<std::size_t>(bins, 1) * sizeof(PackedPoint)), least, most);
+  most_in_memory_ = most_bytes / (chunk_points_ * sizeof(PackedPoint));
+}
+
+std::uint64_t PointSpool::bytes_on_disk() const noexcept {
+  return on_disk_ * chunk_points_ * sizeof(PackedPoint);
+}
+
+// The first chunk of a bin grows by doubling, so that many bins of few points stay small.
+void PointSpool::make_room(Bin& bin) {
+  if (bin.room < chunk_points_) {
+    const std::size_t room = std::clamp<std::size_t>(2 * bin.room, 16, chunk_points_);
+    auto larger = std::make_unique_for_overwrite<PackedPoint[]>(room);
+    std::copy_n(bin.open.get(), bin.fill, larger.get());
+    bin.open = std::move(larger);
+    bin.room = room;
+    return;
+  }
+  bin.fill = 0;
+  bin.chunks.push_back(in_memory_.size() + on_disk_);
+  if (in_memory_.size() < most_in_memory_) {
+    in_memory_.push_back(std::move(bin.open));
+    bin.open = std::make_unique_for_overwrite<PackedPoint[]>(chunk_points_);
+    return;
+  }
+  if (!file_) file_ = std::make_unique<NamelessFile>(folder_);
+  file_->write(bytes_on_disk(), std::as_bytes(std::span(bin.open.get(), chunk_points_)));
+  ++on_disk_;
+}
+
+void PointSpool::read(std::size_t bin,
+                      const std::function<void(std::span<const PackedPoint>)>& visit) const {
+  const Bin& from = bins_[bin];
+  std::vector<PackedPoint> read_back;
+  for (const std::uint64_t chunk : from.chunks) {
+    if (chunk < in_memory_.size()) {
+      visit({in_memory_[chunk].get(), chunk_points_});
+      continue;
+    }
+    read_back.resize(chunk_points_);
+    file_->read((chunk - in_memory_.size()) * chunk_points_ * sizeof(PackedPoint),
+                std::as_writable_bytes(std::span(read_back)));
+    visit(read_back);
+  }
+  if (from.fill > 0) visit({from.open.get(), from.fill});
+}
+
+}  // namespace groundray

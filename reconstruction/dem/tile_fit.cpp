@@ -1,0 +1,283 @@
+#include "reconstruction/dem/tile_fit.h"
+
+#include <tbb/parallel_for.h>
+
+#include <algorithm>
+#include <array>
+#include <atomic>
+#include <cmath>
+#include <limits>
+#include <memory>
+#include <span>
+
+#include "reconstruction/dem/cell_fit.h"
+#include "reconstruction/dem/cell_tiling.h"
+#include "reconstruction/dem/neighbour_plane.h"
+#include "reconstruction/dem/order_statistic.h"
+
+namespace groundray {
+namespace {
+
+constexpr int rim = CellTiling::rim;
+constexpr int width = CellTiling::width;
+constexpr int enough_neighbours = 5;  // to contradict a cell's own points
+
+// Sorts the points of cells by height; those of one height by the rest.
+class CellSort {
+ public:
+  void operator()(std::span<PackedPoint> cell) {
+    if (cell.size() < 2) return;
+    points_.assign(cell.begin(), cell.end());
+    cell.size() <= few_numbers ? place_few(cell) : place_many(cell);
+    for (std::size_t from = 0, to = 1; to <= cell.size(); ++to) {
+      if (to < cell.size() && cell[to].height == cell[from].height) continue;
+      if (to - from > 1) std::sort(&cell[from], &cell[from] + (to - from));
+      from = to;
+    }
+  }
+
+ private:
+  // Each point goes where as many are before it as are lower, or as low and earlier.
+  void place_few(std::span<PackedPoint> cell) {
+    std::array<std::int32_t, few_numbers> heights{}, lower;
+    std::array<std::uint8_t, few_numbers> taken{};
+    for (std::size_t i = 0; i < cell.size(); ++i) heights[i] = cell[i].height;
+    count_below_each(heights.data(), cell.size(), lower.data());
+    for (std::size_t i = 0; i < points_.size(); ++i) {
+      const auto at = static_cast<std::size_t>(lower[i]);
+      cell[at + taken[at]++] = points_[i];
+    }
+  }
+  void place_many(std::span<PackedPoint> cell) {
+    constexpr std::uint32_t sign = 0x80000000U;
+    keys_.resize(cell.size());
+    for (std::size_t i = 0; i < cell.size(); ++i) {
+      const std::uint32_t height = static_cast<std::uint32_t>(cell[i].height) ^ sign;
+      keys_[i] = std::uint64_t{height} << 32U | i;
+    }
+    std::sort(keys_.begin(), keys_.end());
+    for (std::size_t i = 0; i < cell.size(); ++i) cell[i] = points_[keys_[i] & 0xFFFFFFFFU];
+  }
+
+  std::vector<std::uint64_t> keys_;
+  std::vector<PackedPoint> points_;
+};
+
+// The points of a tile cell by cell, those of a cell ascending, and what each cell looks like at
+// first sight.
+class TilePoints {
+ public:
+  TilePoints(const std::vector<PackedPoint>& points, glm::ivec2 size, const TileRules& rules);
+
+  std::span<const PackedPoint> cell(int column, int row) const noexcept {
+    const std::size_t at = index(column, row);
+    return {points_.get() + begins_[at], begins_[at + 1] - begins_[at]};
+  }
+  const GroundGuess* guess(int column, int row) const noexcept {
+    return &guesses_[index(column, row)];
+  }
+
+ private:
+  static std::size_t index(int column, int row) noexcept {
+    return static_cast<std::size_t>(row + rim) * width + static_cast<std::size_t>(column + rim);
+  }
+  void look_at(std::size_t cell, CellSort& sort, std::vector<CellSurface>& surfaces);
+
+  const TileRules& rules_;
+  double tallest_m_;
+  std::unique_ptr<PackedPoint[]> points_;
+  std::vector<std::uint32_t> begins_;
+  std::vector<GroundGuess> guesses_;
+};
+
+double tallest_ground_m(const TileRules& rules) {
+  return rules.steepest_slope * std::hypot(rules.step_m.x, rules.step_m.y);
+}
+
+TilePoints::TilePoints(const std::vector<PackedPoint>& points, glm::ivec2 size,
+                       const TileRules& rules)
+    : rules_(rules),
+      tallest_m_(tallest_ground_m(rules)),
+      points_(std::make_unique_for_overwrite<PackedPoint[]>(points.size())) {
+  const std::size_t cells = static_cast<std::size_t>(size.y + 2 * rim) * width;
+  begins_.assign(cells + 2, 0);
+  for (const PackedPoint& point : points) ++begins_[point.cell + std::size_t{2}];
+  for (std::size_t i = 2; i < begins_.size(); ++i) begins_[i] += begins_[i - 1];
+  for (const PackedPoint& point : points) points_[begins_[point.cell + std::size_t{1}]++] = point;
+  guesses_.resize(cells);
+  tbb::parallel_for(0, size.y + 2 * rim, [&](int row) {
+    CellSort sort;
+    std::vector<CellSurface> surfaces;
+    for (int column = 0; column < size.x + 2 * rim; ++column)
+      look_at(index(column - rim, row - rim), sort, surfaces);
+  });
+}
+
+// What the lowest surface that outliers do not explain is like: the mean of the middle half of its
+// points, which on a plane lies on the plane.
+GroundGuess first_guess(std::span<const PackedPoint> cell, const CellSurface& ground,
+                        glm::dvec2 step_m) {
+  const std::uint32_t quarter = ground.size() / 4, half = ground.size() - 2 * quarter;
+  double noise_m2 = 0, bias_m2 = 0, x = 0, y = 0, height = 0;
+  for (const PackedPoint& p : cell.subspan(ground.begin + quarter, half)) {
+    const double sd = unpacked_sd(p.sd), bias = unpacked_sd(p.bias);
+    noise_m2 += sd * sd;
+    bias_m2 += bias * bias;
+    x += double{PackedPoint::from_sample(p.x)};
+    y += double{PackedPoint::from_sample(p.y)};
+    height += p.height;
+  }
+  // Of normal errors the mean of the middle half has 1.2 times the variance of that of all.
+  const double n = half, shared_m2 = (1.2 * noise_m2 / n + bias_m2 / n) / ground.size();
+  return {height / n * PackedPoint::height_step_m, static_cast<float>(shared_m2 + 1e-8),
+          static_cast<float>(x / n * step_m.x), static_cast<float>(y / n * step_m.y)};
+}
+
+void TilePoints::look_at(std::size_t cell, CellSort& sort, std::vector<CellSurface>& surfaces) {
+  const std::span<PackedPoint> points(points_.get() + begins_[cell],
+                                      begins_[cell + 1] - begins_[cell]);
+  if (points.empty()) return;
+  sort(points);
+  find_surfaces(points, rules_.gap_m, surfaces);
+  const std::uint32_t credible =
+      rules_.outliers.credible(static_cast<std::uint32_t>(points.size()));
+  for (const CellSurface& surface : surfaces) {
+    if (surface.size() < credible) continue;
+    guesses_[cell] =
+        first_guess(points, lower_part(points, surface, credible, tallest_m_), rules_.step_m);
+    return;
+  }
+}
+
+// One row of cells.
+class RowFit {
+ public:
+  RowFit(const TilePoints& points, const TileRules& rules)
+      : points_(points), rules_(rules), tallest_m_(tallest_ground_m(rules)) {}
+
+  /// Returns whether the cell has ground, if it has points.
+  bool fit(int column, int row, std::size_t at, DemLayers& layers);
+
+ private:
+  bool is_credible(const CellSurface& surface) const;
+  bool agrees(double low_m, double high_m, double variance_m2, double give_m) const;
+  bool stands_clear(const CellSurface& wall) const;
+  CellSurface foot(const CellSurface& wall) const;
+  void fill(std::size_t at, const CellHeight& ground, double reference_m, DemLayers& layers) const;
+
+  const TilePoints& points_;
+  const TileRules& rules_;
+  double tallest_m_;
+  CellFit cell_fit_;
+  std::vector<CellSurface> surfaces_;
+  std::span<const PackedPoint> cell_;
+  NeighbourPlane around_;
+};
+
+double height_m(const PackedPoint& point) { return point.height * PackedPoint::height_step_m; }
+
+// Whether the neighbours' ground passes through these heights, give or take what they may err.
+bool RowFit::agrees(double low_m, double high_m, double variance_m2, double give_m) const {
+  give_m += 3 * std::sqrt(variance_m2 + around_.height_variance_m2);
+  return low_m - give_m <= around_.plane.height_m && around_.plane.height_m <= high_m + give_m;
+}
+
+// Whether neighbours tell that the foot of a wall or trunk is not seen.
+bool RowFit::stands_clear(const CellSurface& wall) const {
+  const double low_m = height_m(cell_[wall.begin]);
+  return around_.cells >= enough_neighbours && low_m > around_.plane.height_m &&
+         !agrees(low_m, low_m, 0, rules_.gap_m);
+}
+
+// The lower part of a wall or trunk, without what is above the ground that neighbours tell of, if
+// there are points below.
+CellSurface RowFit::foot(const CellSurface& wall) const {
+  constexpr std::uint32_t enough = 3;
+  if (around_.cells < enough_neighbours) return wall;
+  const double highest_m = around_.plane.height_m + 3 * std::sqrt(around_.height_variance_m2) +
+                           3 * total_sd_m(cell_[wall.begin]);
+  CellSurface foot = wall;
+  while (foot.size() > enough && height_m(cell_[foot.end - 1]) > highest_m) --foot.end;
+  return height_m(cell_[foot.end - 1]) > highest_m ? wall : foot;
+}
+
+// Few points are believed if neighbours, which must agree with each other, agree with them. Three
+// or more that outliers do not explain are, unless neighbours contradict; more yet in any case.
+bool RowFit::is_credible(const CellSurface& surface) const {
+  const std::uint32_t size = surface.size();
+  const std::uint32_t credible = rules_.outliers.credible(static_cast<std::uint32_t>(cell_.size()));
+  if (rules_.outliers.none() || (size >= 3 && size > credible)) return true;
+  const bool is_enough = size >= 3 && size >= credible;
+  const double most_m = is_enough ? 0.5 * tallest_m_ : rules_.gap_m / 3;
+  if (around_.cells < enough_neighbours || around_.scatter_m > most_m) return is_enough;
+  const double sd_m = total_sd_m(cell_[surface.begin]);
+  return agrees(height_m(cell_[surface.begin]), height_m(cell_[surface.end - 1]), sd_m * sd_m,
+                is_enough ? rules_.gap_m : 0);
+}
+
+bool RowFit::fit(int column, int row, std::size_t at, DemLayers& layers) {
+  cell_ = points_.cell(column, row);
+  if (cell_.empty()) return true;
+  find_surfaces(cell_, rules_.gap_m, surfaces_);
+  around_ = neighbour_plane(points_.guess(column, row), width, rules_.step_m, rules_.slope_sd);
+  std::erase_if(surfaces_, [this](const CellSurface& s) { return !is_credible(s); });
+  constexpr std::size_t most = std::numeric_limits<std::uint16_t>::max();
+  layers.surfaces[at] = static_cast<std::uint16_t>(std::min(surfaces_.size(), most));
+  if (surfaces_.empty()) return false;
+
+  const CellSurface& lowest = surfaces_.front();
+  CellSurface ground =
+      lower_part(cell_, lowest, rules_.outliers.credible(static_cast<std::uint32_t>(cell_.size())),
+                 tallest_m_);
+  if (ground.end < lowest.end) {
+    if (stands_clear(lowest)) {
+      layers.overhang_m[at] = static_cast<float>(height_m(cell_[lowest.begin]));
+      return false;
+    }
+    ground = foot(ground);
+  }
+  if (surfaces_.size() > 1)
+    layers.overhang_m[at] = static_cast<float>(height_m(cell_[surfaces_[1].begin]));
+  const std::int32_t reference = cell_[ground.begin + ground.size() / 2].height;
+  const CellHeight found =
+      cell_fit_(cell_.subspan(ground.begin, ground.size()), around_, rules_.step_m, reference);
+  fill(at, found, reference * PackedPoint::height_step_m, layers);
+  return true;
+}
+
+void RowFit::fill(std::size_t at, const CellHeight& ground, double reference_m,
+                  DemLayers& layers) const {
+  layers.elevation_m[at] = static_cast<float>(reference_m + ground.plane.height_m);
+  layers.variance_m2[at] = static_cast<float>(ground.variance_m2);
+  layers.chi2[at] = static_cast<float>(ground.chi2);
+  layers.lidar[at] = ground.lidar;
+  layers.stereo[at] = ground.stereo;
+  layers.source[at] = ground.stereo == 0  ? HeightSource::Lidar
+                      : ground.lidar == 0 ? HeightSource::Stereo
+                                          : HeightSource::Fused;
+  layers.to_data_m[at] = 0;
+  layers.slope_rad[at] =
+      static_cast<float>(std::atan(std::hypot(ground.plane.slope_x, ground.plane.slope_y)));
+}
+
+}  // namespace
+
+std::uint64_t fit_tile(std::vector<PackedPoint> points, glm::ivec2 size, glm::ivec2 first,
+                       const TileRules& rules, DemLayers& layers) {
+  const TilePoints sorted(points, size, rules);
+  std::vector<PackedPoint>().swap(points);
+  std::atomic<std::uint64_t> without_ground = 0;
+  tbb::parallel_for(0, size.y, [&](int row) {
+    RowFit fit(sorted, rules);
+    std::uint64_t missed = 0;
+    const auto begin =
+        static_cast<std::size_t>(first.y + row) * static_cast<std::size_t>(layers.frame.samples.x) +
+        static_cast<std::size_t>(first.x);
+    for (int column = 0; column < size.x; ++column)
+      missed += fit.fit(column, row, begin + static_cast<std::size_t>(column), layers) ? 0 : 1;
+    without_ground += missed;
+  });
+  return without_ground;
+}
+
+}  // namespace groundray

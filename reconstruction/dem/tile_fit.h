@@ -1,0 +1,31 @@
+#pragma once
+
+// Private to the library: the ground of all cells of a tile.
+#include <cstdint>
+#include <glm/vec2.hpp>
+#include <vector>
+
+#include "reconstruction/dem/cell_surfaces.h"
+#include "reconstruction/dem/dem_layers.h"
+#include "reconstruction/dem/packed_point.h"
+
+namespace groundray {
+
+/// What is to be made of a tile's points.
+struct TileRules {
+  glm::dvec2 step_m{1};
+  double gap_m = 0;
+  double steepest_slope = 0;
+  double slope_sd = 0;
+  OutlierRule outliers;
+};
+
+/// Fits each cell of a tile to its points and writes it to its place in `layers`.
+/// @param points  of the tile and its rim, in any order, which changes nothing.
+/// @param size    of the tile without its rim, in cells.
+/// @param first   the tile's first cell, in `layers`.
+/// @return how many cells have points, but no ground.
+std::uint64_t fit_tile(std::vector<PackedPoint> points, glm::ivec2 size, glm::ivec2 first,
+                       const TileRules& rules, DemLayers& layers);
+
+}  // namespace groundray
