@@ -8,6 +8,7 @@
 #include <new>
 #include <optional>
 
+#include "apps/groundray/fill_command.h"
 #include "apps/groundray/generate.h"
 #include "apps/groundray/info.h"
 #include "apps/groundray/reconstruct_commands.h"
@@ -94,6 +95,7 @@ int run(int argc, char** argv) {
       "print a summary; `generate` uses it for DEMs larger than memory");
   add_dem(certify);
 
+  const groundray::FillCommand fill(*terrain);
   const groundray::ReconstructCommands reconstruct(app);
 
   try {
@@ -103,6 +105,10 @@ int run(int argc, char** argv) {
   }
   if (reconstruct.is_asked_for()) {
     reconstruct.run();
+    return done;
+  }
+  if (fill.is_asked_for()) {
+    fill.run();
     return done;
   }
   if (info->parsed()) {

@@ -14,7 +14,7 @@
 #include <iterator>
 #include <unordered_map>
 
-#include "reconstruction/half_edge_mesh.h"
+#include "reconstruction/holes/half_edge_mesh.h"
 
 namespace groundray {
 namespace {

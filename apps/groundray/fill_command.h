@@ -1,0 +1,28 @@
+#pragma once
+
+#include <CLI/CLI.hpp>
+#include <memory>
+
+namespace groundray {
+
+/// The command `terrain fill`: fills the blank areas of a DEM.
+class FillCommand {
+ public:
+  /// Adds the command to `terrain`.
+  explicit FillCommand(CLI::App& terrain);
+  ~FillCommand();
+  FillCommand(const FillCommand&) = delete;
+  FillCommand& operator=(const FillCommand&) = delete;
+
+  bool is_asked_for() const;
+
+  /// Fills, writes and prints what was done.
+  /// @throws Error as load_dem, fill_dem and write_dem.
+  void run() const;
+
+ private:
+  struct Options;
+  std::unique_ptr<Options> options_;
+};
+
+}  // namespace groundray

@@ -1,0 +1,36 @@
+#pragma once
+
+#include <cstddef>
+#include <optional>
+#include <span>
+
+#include "reconstruction/dem/fill_law.h"
+#include "reconstruction/dem/hidden_piece.h"
+#include "reconstruction/dem/plate_form.h"
+#include "reconstruction/dem/plate_system.h"
+
+// How well holes are filled, found out where the ground is known; private to this library.
+namespace groundray {
+
+/// Of holes alike: what fills them best, and how well.
+struct FillTrial {
+  std::optional<PlateForm> form;  ///< nothing if there was too little ground to try it
+  std::optional<FillLaw> law;     ///< likewise; widened
+  std::size_t samples = 0;        ///< that were hidden, filled and compared
+  FillCover cover;                ///< of errors by laws from the other half of the trials
+  double widened_by = 1;          ///< what sd was multiplied by for it
+};
+
+/// Tries how well holes like some are filled: hides pieces of their shape elsewhere, where the
+/// ground is known, fills them by each of several forms and compares. The best form is the one
+/// whose squared errors are least, by the mean logarithm over pieces, unless a thin plate's are as
+/// small but for chance. Laws of sd follow
+/// from the errors by maximum likelihood; where errors of one half of the trials are larger than
+/// the law of the other says, sd is widened.
+/// @param holes  that are alike; not empty.
+/// @param form   to be tried alone, if given.
+/// @param usual_roughness_m  of the whole raster.
+FillTrial try_filling(const PlateRaster& raster, std::span<const TriedHole> holes,
+                      const std::optional<PlateForm>& form, double usual_roughness_m);
+
+}  // namespace groundray

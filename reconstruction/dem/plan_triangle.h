@@ -1,0 +1,46 @@
+#pragma once
+
+#include <algorithm>
+#include <array>
+#include <cmath>
+#include <glm/vec3.hpp>
+
+#include "core/grid_frame.h"
+
+// Samples below a triangle, private to this library.
+namespace groundray {
+
+/// Calls `visit(column, row, height_m)` for each sample of the frame in the triangle's plan, its
+/// border included; never for an upright one.
+template <typename Visit>
+void visit_samples(const GridFrame& frame, const std::array<glm::dvec3, 3>& corners_m,
+                   const Visit& visit) {
+  std::array<glm::dvec2, 3> p;
+  for (std::size_t k = 0; k < 3; ++k) p[k] = frame.to_grid(glm::dvec2(corners_m[k]));
+  const auto cross = [](glm::dvec2 a, glm::dvec2 b) { return a.x * b.y - a.y * b.x; };
+  const double area = cross(p[1] - p[0], p[2] - p[0]);
+  if (area == 0) return;
+  const auto [top, bottom] = std::minmax({p[0].y, p[1].y, p[2].y});
+  const auto [left, right] = std::minmax({p[0].x, p[1].x, p[2].x});
+  static constexpr double most = 1 << 30;  // what is beyond is outside of any frame
+  const auto first = [](double at) {
+    return static_cast<int>(std::ceil(std::clamp(at, 0.0, most)));
+  };
+  const auto last = [](double at, int count) {
+    return static_cast<int>(std::floor(std::clamp(at, -1.0, count - 1.0)));
+  };
+  for (int row = first(top); row <= last(bottom, frame.samples.y); ++row) {
+    for (int column = first(left); column <= last(right, frame.samples.x); ++column) {
+      const glm::dvec2 q(column, row);
+      const double b = cross(q - p[0], p[2] - p[0]) / area;
+      const double c = cross(p[1] - p[0], q - p[0]) / area;
+      constexpr double rounding = 1e-12;
+      if (b < -rounding || c < -rounding || b + c > 1 + rounding) continue;
+      visit(column, row,
+            corners_m[0].z + b * (corners_m[1].z - corners_m[0].z) +
+                c * (corners_m[2].z - corners_m[0].z));
+    }
+  }
+}
+
+}  // namespace groundray

@@ -1,0 +1,15 @@
+#include <cstddef>
+#include <cstdint>
+#include <string_view>
+
+#include "apps/groundray/range_conf.h"
+#include "core/error.h"
+
+/// Whatever the text, parse_conf returns poses or throws Error.
+extern "C" int LLVMFuzzerTestOneInput(const std::uint8_t* data, std::size_t size) {
+  try {
+    groundray::parse_conf({reinterpret_cast<const char*>(data), size}, "fuzz.conf");
+  } catch (const groundray::Error&) {
+  }
+  return 0;
+}

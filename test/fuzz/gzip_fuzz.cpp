@@ -1,0 +1,15 @@
+#include <cstddef>
+#include <cstdint>
+#include <string_view>
+
+#include "apps/groundray/packed_file.h"
+#include "core/error.h"
+
+/// Whatever the bytes, unpack returns what is in them or throws Error.
+extern "C" int LLVMFuzzerTestOneInput(const std::uint8_t* data, std::size_t size) {
+  try {
+    groundray::unpack({reinterpret_cast<const char*>(data), size}, "fuzz.gz");
+  } catch (const groundray::Error&) {
+  }
+  return 0;
+}
