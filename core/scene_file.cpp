@@ -232,6 +232,18 @@ std::string_view reader_of(SceneForm form) {
   }
 }
 
+/// Whether every URI of a glTF holds its data, instead of the name of a file.
+bool holds_all_data(std::string_view json) {
+  constexpr std::string_view key = "\"uri\"", blank = " \t\r\n";
+  for (std::size_t at = json.find(key); at != std::string_view::npos; at = json.find(key, at)) {
+    at = json.find_first_not_of(blank, at + key.size());
+    if (at == std::string_view::npos || json[at] != ':') continue;  // it is no key
+    at = json.find_first_not_of(blank, at + 1);
+    if (at == std::string_view::npos || !json.substr(at).starts_with("\"data:")) return false;
+  }
+  return true;
+}
+
 /// Returns the JSON of a .glb that has nothing else, whose buffers are all spelt within; nothing of
 /// other files. Assimp looks for the first buffer of a .glb beside the JSON whatever that says.
 /// @see Khronos Group, glTF 2.0 Specification (2021): section 4.4.3.3.
@@ -241,7 +253,9 @@ std::string json_alone(const std::filesystem::path& path) {
   if (!bytes.starts_with("glTF") || bytes.size() < header_bytes) return {};
   std::uint32_t length = 0;
   bytes.copy(reinterpret_cast<char*>(&length), sizeof length, 12);
-  return bytes.size() == header_bytes + length ? bytes.substr(header_bytes) : std::string();
+  if (bytes.size() != header_bytes + length) return {};
+  std::string json = bytes.substr(header_bytes);
+  return holds_all_data(json) ? json : std::string();
 }
 
 }  // namespace

@@ -12,7 +12,9 @@ import numpy as np
 import open3d as o3d
 from PIL import Image
 
-PIXELS = 640
+PIXELS = 960  # of a view as it is traced, on each side
+SHRUNK = 2  # and then made smaller, for smooth outlines
+SHADES = 64  # of each colour
 VIEWS_DEG = ((0, 10), (120, 10), (240, 25))  # azimuth and elevation
 FRONT = np.array([205, 205, 215.0])
 BACK = np.array([230, 90, 60.0])  # the inside, seen through holes
@@ -41,6 +43,17 @@ def view(scene: o3d.t.geometry.RaycastingScene, middle, size_m: float, azimuth, 
     return np.where(is_hit[..., None], shade, 255).astype(np.uint8)
 
 
+def palette() -> Image.Image:
+    """Both sides' colours from black on, and then to white: rims are mixed with what is behind."""
+    to_full = np.linspace(0, 1, SHADES)[:, None]
+    ramps = [
+        np.concatenate([to_full * side, side + to_full * (255 - side)]) for side in (FRONT, BACK)
+    ]
+    colours = Image.new("P", (1, 1))
+    colours.putpalette(np.concatenate(ramps).astype(np.uint8).ravel().tolist())
+    return colours
+
+
 def main() -> None:
     mesh = o3d.io.read_triangle_mesh(sys.argv[1])
     box = mesh.get_axis_aligned_bounding_box()
@@ -48,7 +61,8 @@ def main() -> None:
     scene.add_triangles(o3d.t.geometry.TriangleMesh.from_legacy(mesh))
     size_m = float(np.linalg.norm(box.get_extent()))
     views = [view(scene, box.get_center(), size_m, *angles) for angles in VIEWS_DEG]
-    Image.fromarray(np.hstack(views)).save(sys.argv[2], optimize=True)
+    picture = Image.fromarray(np.hstack(views)).reduce(SHRUNK)
+    picture.quantize(palette=palette(), dither=Image.Dither.NONE).save(sys.argv[2], optimize=True)
 
 
 if __name__ == "__main__":

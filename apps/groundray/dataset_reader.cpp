@@ -18,6 +18,9 @@ namespace {
 namespace fs = std::filesystem;
 using yaml::Need;
 
+constexpr yaml::Rule stamp_rule{[](double value) { return std::abs(value) < 9e9; },
+                                "must be within 9e9 s"};  // what nanoseconds hold
+
 // What a lidar's calibration says that its points cannot be used without. The rest is left alone.
 void read_calibration(const fs::path& path, RecordedLidar& lidar) {
   yaml::Faults faults(path);
@@ -81,7 +84,7 @@ class DatasetReader {
     bool is_done = false;
     frame.read_text("sensor", Need::Required, sensor);
     frame.read_whole("frame", Need::Required, number);
-    frame.read_number("stamp_s", Need::Required, stamp_s);
+    frame.read_number("stamp_s", Need::Required, stamp_s, stamp_rule);
     frame.read_choice("state", Need::Required, is_done, {{"done", true}, {"pending", false}});
     const auto lidar = std::ranges::find(dataset_.lidars, sensor, &RecordedLidar::name);
     if (lidar == dataset_.lidars.end()) return;  // a camera's

@@ -4,7 +4,6 @@
 
 #include <algorithm>
 #include <array>
-#include <cctype>
 #include <chrono>
 #include <glm/geometric.hpp>
 #include <span>
@@ -13,7 +12,6 @@
 #include "apps/groundray/rebuild_report.h"
 #include "apps/groundray/stage.h"
 #include "core/error.h"
-#include "core/product_io.h"
 #include "reconstruction/measured_mesh_io.h"
 #include "reconstruction/scan/advancing_front.h"
 
@@ -46,51 +44,6 @@ class Timing {
   std::string stage_;
   Clock::time_point begin_ = Clock::now();
 };
-
-// ----- output
-
-std::string ending_of(const fs::path& path) {
-  std::string ending = path.extension().string();
-  std::ranges::transform(ending, ending.begin(),
-                         [](unsigned char c) { return static_cast<char>(std::tolower(c)); });
-  return ending;
-}
-
-void check_folder(const fs::path& path) {
-  std::error_code ignored;
-  const fs::path folder = path.parent_path();
-  if (!folder.empty() && !fs::is_directory(folder, ignored))
-    throw Error("{}: there is no folder {} to write it in", path.string(), folder.string());
-}
-
-void check_mesh_name(const fs::path& path) {
-  static constexpr std::array<std::string_view, 4> endings{".ply", ".obj", ".stl", ".glb"};
-  if (std::ranges::find(endings, ending_of(path)) == endings.end()) {
-    throw Error("{}: the name of a mesh must end in .ply, .obj, .stl or .glb", path.string());
-  }
-  check_folder(path);
-}
-
-// Before work that may take long.
-void check_output(const RebuildOutput& output) {
-  check_mesh_name(output.mesh);
-  if (output.occlusion) check_mesh_name(*output.occlusion);
-  if (output.report) check_folder(*output.report);
-  if (output.occlusion == output.mesh || output.report == output.mesh)
-    throw Error("{}: two results cannot have one name", output.mesh.string());
-}
-
-// In a .ply each vertex tells where its beam began.
-void write_occlusion(const fs::path& path, const OcclusionFaces& faces,
-                     const Georeference& georeference) {
-  if (ending_of(path) != ".ply") return write_mesh(path, faces.shape, georeference);
-  MeshColumns columns{.vertices = PointCloud(faces.origins_m.size())};
-  for (int axis = 0; axis < 3; ++axis) {
-    const auto values = columns.vertices.add<double>(fmt::format("origin_{}", "xyz"[axis]));
-    for (std::size_t i = 0; i < values.size(); ++i) values[i] = faces.origins_m[i][axis];
-  }
-  write_ply(path, faces.shape, georeference, columns);
-}
 
 // ----- scans
 
@@ -134,17 +87,64 @@ double median_edge_m(std::span<const ScanMesh> scans) {
 }
 
 // How far apart one surface may be in two scans of which no noise is known: between points either
-// is a guess.
-MergeLimits limits_without_noise(std::span<const ScanMesh> scans, MergeLimits limits,
-                                 RebuildReport& report) {
+// is a guess, and range scans were registered to each other, to no better than their spacing.
+MergeLimits limits_without_noise(std::span<const ScanMesh> scans, const ScanFiles& files,
+                                 MergeLimits limits, RebuildReport& report) {
   constexpr double share = 0.1;
-  if (limits.apart_m > 0) return limits;
-  limits.apart_m = share * median_edge_m(scans);
+  const bool are_grids = std::ranges::all_of(files.scans, &ScanFile::is_range_grid);
+  limits.apart_m = (are_grids ? 1 : share) * median_edge_m(scans);
   report.notes.push_back(fmt::format(
-      "no noise is known of these scans: surfaces up to {:.3g} m apart, a tenth of the median "
-      "edge, are taken for one; --range-sd-m or --apart-m tell better",
-      limits.apart_m));
+      "no noise is known of these scans: surfaces up to {:.3g} m apart, {} the median edge, are "
+      "taken for one; --range-sd-m or --apart-m tell better",
+      limits.apart_m, are_grids ? "as long as" : "a tenth of"));
   return limits;
+}
+
+bool knows_noise(const MeasuredMesh& mesh) {
+  return std::ranges::any_of(mesh.sd_m, [](float sd_m) { return sd_m > 0; });
+}
+
+bool knows_noise(std::span<const ScanMesh> scans) {
+  return std::ranges::any_of(scans, [](const ScanMesh& scan) { return knows_noise(scan.mesh); });
+}
+
+// Some know theirs: the merge takes the others to be as noisy.
+void note_unknown_noise(std::span<const ScanMesh> scans, RebuildReport& report) {
+  const auto known =
+      std::ranges::count_if(scans, [](const ScanMesh& scan) { return knows_noise(scan.mesh); });
+  if (known == 0 || known == std::ssize(scans)) return;
+  report.notes.push_back(fmt::format(
+      "no noise is known of {} of the {} scans: they are taken to be as noisy as the others; "
+      "--range-sd-m tells better",
+      std::ssize(scans) - known, scans.size()));
+}
+
+bool is_noise_halt(const Finishing& finishing) {
+  return finishing.halt && std::holds_alternative<NoiseBound>(*finishing.halt);
+}
+
+void check_halt_without_noise(const Finishing& finishing) {
+  if (!is_noise_halt(finishing)) return;
+  throw Error(
+      "--noise-halt: no noise is known of these scans, neither from a column range_sd nor from the "
+      "sensor's calibration: give the standard deviation of ranges by --range-sd-m");
+}
+
+[[noreturn]] void fail_without_surface(const RebuildReport& report) {
+  const bool has_points =
+      std::ranges::any_of(report.scans, [](const ScanTally& scan) { return scan.used > 0; });
+  if (!has_points) throw Error("no scan has a return: all rows are missing or no numbers");
+  throw Error(
+      "no two returns of any scan were taken for one surface: are the poses and the unit right "
+      "(--unit-m)? `--preset`, `--longest-m` and `--range-sd-m` say what is surface; points that "
+      "are in no order need --unorganised, and maybe --perimeter-m");
+}
+
+// Each sentence once, however many scans it is true of.
+void add_notes(const std::vector<std::string>& notes, RebuildReport& report) {
+  for (const std::string& note : notes) {
+    if (std::ranges::find(report.notes, note) == report.notes.end()) report.notes.push_back(note);
+  }
 }
 
 // Links one scan after another; occlusion faces are kept where they are asked for.
@@ -158,6 +158,7 @@ std::vector<ScanMesh> link_scans(const ScanFiles& files, const ScanTaking& takin
   for (const ScanFile& file : files.scans) {
     stop_if_interrupted();
     const OrganisedInput input = read_organised(files, file, taking);
+    add_notes(input.notes, making.report);
     ScanMesh mesh = link(input.cells, limits_for(file, meshing));
     making.report.scans.push_back(
         {.name = file.name,
@@ -184,25 +185,25 @@ std::vector<ScanMesh> link_scans(const ScanFiles& files, const ScanTaking& takin
   return meshes;
 }
 
-void merge_scans(std::vector<ScanMesh> scans, const Meshing& meshing, const Finishing& finishing,
-                 Making& making) {
+void merge_scans(std::vector<ScanMesh> scans, const ScanFiles& files, const Meshing& meshing,
+                 const Finishing& finishing, Making& making) {
   std::erase_if(scans, [](const ScanMesh& scan) { return scan.mesh.shape.triangles.empty(); });
-  if (scans.empty()) {
-    throw Error(
-        "no two returns of any scan were taken for one surface: are the poses and the unit right "
-        "(--unit-m)? `--preset`, `--longest-m` and `--range-sd-m` say what is surface");
-  }
+  if (scans.empty()) fail_without_surface(making.report);
+  const bool has_noise = knows_noise(scans);
+  if (!has_noise) check_halt_without_noise(finishing);
+  note_unknown_noise(scans, making.report);
   if (scans.size() == 1) {
     making.mesh = std::move(scans[0].mesh);
     return;
   }
   const Timing timing(making.report, "merge");
   Stage stage("merging");
-  const bool knows_noise = std::ranges::any_of(scans, [](const ScanMesh& scan) {
-    return std::ranges::any_of(scan.mesh.sd_m, [](float sd_m) { return sd_m > 0; });
-  });
-  const MergeLimits limits =
-      knows_noise ? meshing.merging : limits_without_noise(scans, meshing.merging, making.report);
+  MergeLimits limits = meshing.merging;
+  if (meshing.apart_m) {
+    limits.apart_m = *meshing.apart_m;
+  } else if (!has_noise) {
+    limits = limits_without_noise(scans, files, limits, making.report);
+  }
   MergedMesh merged = merge(scans, limits, stage.work(finishing.most_bytes));
   stage.update(1);
   making.mesh = std::move(merged.mesh);
@@ -218,6 +219,7 @@ void join_points(const ScanFiles& files, const ScanTaking& taking, const Meshing
   for (const ScanFile& file : files.scans) {
     stop_if_interrupted();
     const PointInput scan = read_points(files, file, taking);
+    add_notes(scan.notes, making.report);
     const auto add = [](auto& to, const auto& from) {
       to.insert(to.end(), from.begin(), from.end());
     };
@@ -232,11 +234,19 @@ void join_points(const ScanFiles& files, const ScanTaking& taking, const Meshing
                                    .used = scan.points_m.size()});
   }
   if (!has_labels) all.labels.clear();
+  if (std::ranges::none_of(all.sd_m, [](float sd_m) { return sd_m > 0; }))
+    check_halt_without_noise(finishing);
   const Timing timing(making.report, "join");
   Stage stage("joining");
   FrontMesh joined = advance_front(all.points_m, *meshing.perimeter_m, all.origins_m,
                                    stage.work(finishing.most_bytes));
   stage.update(1);
+  if (joined.mesh.triangles.empty()) {
+    throw Error(
+        "no three of the {} points make a triangle whose perimeter is within {} m: are the unit "
+        "(--unit-m) and --perimeter-m right?",
+        all.points_m.size(), *meshing.perimeter_m);
+  }
   for (const std::uint32_t source : joined.sources) {
     making.mesh.sd_m.push_back(all.sd_m[source]);
     if (has_labels) making.mesh.labels.push_back(all.labels[source]);
@@ -259,36 +269,21 @@ void fill(const Finishing& finishing, Making& making) {
   making.report.holes = std::move(tally);
 }
 
-// What the library says of its own words, in the program's.
-std::string in_words_of_options(std::string message) {
-  static constexpr std::array<std::pair<std::string_view, std::string_view>, 2> words{
-      {{"a DistanceBound", "--max-error-m"}, {"a NoiseBound", "--noise-halt"}}};
-  for (const auto& [theirs, ours] : words) {
-    const std::size_t at = message.find(theirs);
-    if (at != std::string::npos) message.replace(at, theirs.size(), ours);
-  }
-  return message;
-}
-
 void simplify(const Finishing& finishing, Making& making) {
   if (!finishing.halt) return;
   const Timing timing(making.report, "simplify");
   Stage stage("simplifying");
   const std::size_t from = making.mesh.shape.triangles.size();
-  Simplified simplified;
-  try {
-    simplified = groundray::simplify(making.mesh, *finishing.halt, finishing.simplify,
-                                     stage.work(finishing.most_bytes));
-  } catch (const Error& error) {
-    throw Error("{}", in_words_of_options(error.what()));
-  }
+  Simplified simplified = groundray::simplify(making.mesh, *finishing.halt, finishing.simplify,
+                                              stage.work(finishing.most_bytes));
   stage.update(1);
   making.mesh = std::move(simplified.mesh);
   making.report.simplified = SimplifyTally{.from = from,
                                            .to = making.mesh.shape.triangles.size(),
                                            .halted_by = simplified.halted_by,
                                            .repairs = simplified.repairs,
-                                           .error = simplified.error};
+                                           .error = simplified.error,
+                                           .vertical = simplified.vertical};
 }
 
 double area_m2(const TriangleMesh& mesh) {
@@ -300,10 +295,16 @@ double area_m2(const TriangleMesh& mesh) {
   return twice_m2 / 2;
 }
 
+void take_noise(const Finishing& finishing, MeasuredMesh& mesh) {
+  if (finishing.sd_m)
+    mesh.sd_m.assign(mesh.shape.vertices_m.size(), static_cast<float>(*finishing.sd_m));
+  if (is_noise_halt(finishing) && !mesh.sd_m.empty() && !knows_noise(mesh)) {
+    throw Error(
+        "--noise-halt: the standard deviation (sd_m) of each vertex is 0: give another by --sd-m");
+  }
+}
+
 void finish(const Finishing& finishing, const RebuildOutput& output, Making& making) {
-  if (finishing.sd_m && making.mesh.sd_m.empty())
-    making.mesh.sd_m.assign(making.mesh.shape.vertices_m.size(),
-                            static_cast<float>(*finishing.sd_m));
   fill(finishing, making);
   simplify(finishing, making);
   RebuildReport& report = making.report;
@@ -312,35 +313,44 @@ void finish(const Finishing& finishing, const RebuildOutput& output, Making& mak
   report.triangles = making.mesh.shape.triangles.size();
   report.area_m2 = area_m2(making.mesh.shape);
   stop_if_interrupted();
-  if (output.occlusion) write_occlusion(*output.occlusion, making.occlusion, report.georeference);
-  if (output.report) write_json(*output.report, report);
-  write_measured_mesh(output.mesh, making.mesh, report.georeference);  // last: with it all is there
+  write_output(output, making.mesh, making.occlusion, report);
   print(report);
   fmt::print("written to {}\n", output.mesh.string());
+}
+
+// What its file holds besides triangles is told.
+void note_left_out(const MeasuredMeshFile& file, RebuildReport& report) {
+  if (file.dropped + file.skipped == 0) return;
+  report.notes.push_back(fmt::format(
+      "left out of the file: polygons and triangles that are broken or have no area: {}; points, "
+      "lines and curved patches: {}",
+      file.dropped, file.skipped));
 }
 
 }  // namespace
 
 void rebuild_mesh(const ScanChoice& choice, const ScanTaking& taking, const Meshing& meshing,
                   const Finishing& finishing, const RebuildOutput& output) {
-  check_output(output);
-  ScanFiles files = find_scans(choice);
+  const ScanFiles files = find_scans(choice);
+  check_output(output, files.read);
   Making making;
   making.report.georeference = files.georeference;
   making.report.notes = files.notes;
   if (meshing.perimeter_m) {
     join_points(files, taking, meshing, finishing, making);
   } else {
-    merge_scans(link_scans(files, taking, meshing, finishing, output, making), meshing, finishing,
-                making);
+    merge_scans(link_scans(files, taking, meshing, finishing, output, making), files, meshing,
+                finishing, making);
   }
   finish(finishing, output, making);
 }
 
 void finish_mesh(const fs::path& path, const Finishing& finishing, const RebuildOutput& output) {
-  check_output(output);
+  check_output(output, {&path, 1});
   MeasuredMeshFile file = read_measured_mesh(path);
   Making making{.mesh = std::move(file.mesh), .report = {.georeference = file.georeference}};
+  note_left_out(file, making.report);
+  take_noise(finishing, making.mesh);
   finish(finishing, output, making);
 }
 

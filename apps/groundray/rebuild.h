@@ -2,11 +2,10 @@
 
 #include <cstddef>
 #include <filesystem>
+#include <limits>
 #include <optional>
-#include <string>
-#include <utility>
-#include <vector>
 
+#include "apps/groundray/rebuild_output.h"
 #include "apps/groundray/scan_files.h"
 #include "apps/groundray/scan_input.h"
 #include "reconstruction/holes/hole_fill.h"
@@ -16,20 +15,12 @@
 
 namespace groundray {
 
-/// Where results go.
-struct RebuildOutput {
-  std::filesystem::path mesh;
-  std::optional<std::filesystem::path> occlusion;          ///< what beams passed by
-  std::optional<std::filesystem::path> report;             ///< JSON
-  std::vector<std::pair<std::string, std::string>> facts;  ///< for the report
-};
-
 /// What is done to a mesh once it is there.
 struct Finishing {
   std::optional<double> fill_m;  ///< holes up to this rim
   std::optional<Halt> halt;      ///< simplify until then
   SimplifyOptions simplify;
-  std::optional<double> sd_m;  ///< of vertices, where the mesh does not tell
+  std::optional<double> sd_m;  ///< of vertices, instead of what the mesh tells
   std::size_t most_bytes = std::numeric_limits<std::size_t>::max();
 };
 
@@ -38,6 +29,7 @@ struct Meshing {
   std::optional<ScreeningLimits> screening;  ///< else ground(), of range grids object()
   std::optional<double> incidence_rad, longest_m, noise_sds;  ///< instead of its own
   MergeLimits merging;
+  std::optional<double> apart_m;      ///< instead of its own; else a guess where no noise is known
   std::optional<double> perimeter_m;  ///< points without order: of a triangle, at most
 };
 

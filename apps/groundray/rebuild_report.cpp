@@ -74,11 +74,14 @@ ScanTally sum_of(const std::vector<ScanTally>& scans) {
   return sum;
 }
 
+// Scans that were joined, not linked, have no triangles of their own.
 void print_scans(const std::vector<ScanTally>& scans) {
   constexpr std::size_t most = 12;
   const auto print_row = [](const ScanTally& scan) {
+    const bool is_linked = scan.accepted + scan.rejected > 0;
     fmt::print("{:<24} {:>9} {:>9} {:>9} {:>9} {:>9}\n", scan.name, scan.rows, scan.used,
-               scan.other_returns + scan.crowded, scan.accepted, scan.rejected);
+               scan.other_returns + scan.crowded, is_linked ? fmt::to_string(scan.accepted) : "-",
+               is_linked ? fmt::to_string(scan.rejected) : "-");
   };
   fmt::print("{:<24} {:>9} {:>9} {:>9} {:>9} {:>9}\n", "scan", "rows", "returns", "left out",
              "faces", "rejected");
@@ -115,6 +118,12 @@ void print_simplified(const SimplifyTally& tally) {
   fmt::print(
       "error, both ways: largest {:.4g} to {:.4g} m, mean {:.4g} m, root mean square {:.4g} m\n",
       largest.at_least_m, largest.at_most_m, error.mean_m(), error.rms_m());
+  if (const auto& heights = tally.vertical) {
+    fmt::print("error of heights: largest {:.4g} m, mean {:.4g} m, root mean square {:.4g} m",
+               heights->largest_m, heights->mean_m, heights->rms_m);
+    if (heights->aside_m > 0) fmt::print("; the border went up to {:.4g} m in", heights->aside_m);
+    fmt::print("\n");
+  }
 }
 
 Json json_of(const BoundedLength& length) {
@@ -127,6 +136,13 @@ Json json_of(const OneSidedError& error) {
   return {{"largest", {{"at_least_m", error.at_least_m}, {"at_most_m", error.at_most_m}}},
           {"mean", json_of(error.mean)},
           {"rms", json_of(error.rms)}};
+}
+
+Json json_of(const VerticalError& error) {
+  return {{"largest_m", error.largest_m},
+          {"mean_m", error.mean_m},
+          {"rms_m", error.rms_m},
+          {"aside_m", error.aside_m}};
 }
 
 Json json_of(const ScanTally& scan) {
@@ -143,7 +159,8 @@ Json json_of(const ScanTally& scan) {
 Json json_of(const MergeCounts& counts) {
   return {{"redundant", counts.redundant}, {"seen_through", counts.seen_through},
           {"clipped", counts.clipped},     {"filled", counts.filled},
-          {"moved", counts.moved},         {"left_out", counts.left_out}};
+          {"bridged", counts.bridged},     {"moved", counts.moved},
+          {"left_out", counts.left_out}};
 }
 
 Json json_of(const HoleTally& holes) {
@@ -169,7 +186,8 @@ Json json_of(const SimplifyTally& tally) {
             {"parted_vertices", tally.repairs.parted_vertices}}},
           {"hausdorff", {{"at_least_m", hausdorff.at_least_m}, {"at_most_m", hausdorff.at_most_m}}},
           {"to_simplified", json_of(tally.error.forth)},
-          {"to_original", json_of(tally.error.back)}};
+          {"to_original", json_of(tally.error.back)},
+          {"vertical", tally.vertical ? json_of(*tally.vertical) : Json()}};
 }
 
 template <typename T>
@@ -184,9 +202,9 @@ void print(const RebuildReport& report) {
   if (const auto& merged = report.merged; merged && report.scans.size() > 1) {
     fmt::print(
         "merged: {} redundant triangles went and {} that others saw through, {} were clipped, {} "
-        "left out; {} filled slits, {} vertices moved\n",
+        "left out; {} filled slits and {} bridged gaps, {} vertices moved\n",
         merged->redundant, merged->seen_through, merged->clipped, merged->left_out, merged->filled,
-        merged->moved);
+        merged->bridged, merged->moved);
   }
   if (report.holes) print_holes(*report.holes);
   if (report.simplified) print_simplified(*report.simplified);

@@ -38,8 +38,9 @@ struct HoleTally {
 struct SimplifyTally {
   std::size_t from = 0, to = 0;  ///< triangles
   HaltReason halted_by = HaltReason::Bound;
-  MeshRepairs repairs;  ///< of the mesh before
-  TwoSidedError error;  ///< of the mesh before (first) and after (second)
+  MeshRepairs repairs;                    ///< of the mesh before
+  TwoSidedError error;                    ///< of the mesh before (first) and after (second)
+  std::optional<VerticalError> vertical;  ///< of terrain
 };
 
 /// All that a reconstruction did.

@@ -3,14 +3,16 @@
 #include <array>
 #include <cmath>
 #include <filesystem>
+#include <limits>
 #include <map>
 #include <numbers>
 #include <optional>
 #include <string>
 #include <vector>
 
+#include "apps/groundray/dem_command.h"
 #include "apps/groundray/rebuild.h"
-#include "apps/scan/scan_flags.h"
+#include "apps/groundray/scan_options.h"
 #include "core/error.h"
 
 namespace groundray {
@@ -27,75 +29,11 @@ std::optional<double> radians(const std::optional<double>& angle_deg) {
 
 enum class Preset { Ground, Strict, Object };
 
-// Which scans, and how their files are to be read.
-struct ScanOptions {
-  ScanChoice choice;
-  ScanTaking taking;
-  ScanFlags columns;
-  std::string frames = ":";
-  bool leaves_labels = false;
-
-  void add(CLI::App* command) {
-    CLI::App* scans = command->add_option_group("Scans");
-    scans->add_option("--sensor", choice.sensors, "Lidars of a dataset; all without it")
-        ->delimiter(',');
-    scans->add_option("--frames", frames, "A:B:STEP, from A on to before B: frames, or files");
-    add_poses(scans);
-    const std::map<std::string, ReturnChoice> choices{{"last", ReturnChoice::Last},
-                                                      {"strongest", ReturnChoice::Strongest},
-                                                      {"first", ReturnChoice::First}};
-    scans->add_option("--returns", taking.returns, "Which return of a pulse is taken")
-        ->transform(CLI::CheckedTransformer(choices))
-        ->option_text("last|strongest|first");
-    const std::map<std::string, GridSource> grids{{"beams", GridSource::Beams},
-                                                  {"file", GridSource::File}};
-    scans
-        ->add_option("--grid", taking.grid,
-                     "What makes points neighbours: rings and azimuths, or the file's own image")
-        ->transform(CLI::CheckedTransformer(grids))
-        ->option_text("beams|file");
-    scans
-        ->add_option("--range-sd-m", taking.range_sd_m,
-                     "Standard deviation of ranges, instead of what scans tell")
-        ->check(CLI::NonNegativeNumber);
-    scans->add_flag("--no-labels", leaves_labels, "Leave semantic classes out");
-    columns.add(scans, "");
-  }
-
-  void add_poses(CLI::App* scans) {
-    scans->add_option("--poses", choice.poses,
-                      "Poses of the sensor (TUM: t x y z qx qy qz qw) for files, or instead of a "
-                      "dataset's");
-    const std::map<std::string, PoseOrder> orders{{"line", PoseOrder::Line},
-                                                  {"name", PoseOrder::Name}};
-    scans
-        ->add_option("--pose-by", choice.order,
-                     "Which pose is a file's: that of its line, or by the stamp that is its name")
-        ->transform(CLI::CheckedTransformer(orders))
-        ->option_text("line|name");
-    const std::map<std::string, LidarSpec::Points> frames_of{
-        {"as_fired", LidarSpec::Points::AsFired}, {"at_stamp", LidarSpec::Points::AtStamp}};
-    scans
-        ->add_option("--points", choice.points,
-                     "In which frame points are: the sensor's as each was measured, or at the "
-                     "scan's stamp")
-        ->transform(CLI::CheckedTransformer(frames_of))
-        ->option_text("as_fired|at_stamp");
-  }
-
-  void close() {
-    choice.frames = parse_frames(frames);
-    taking.columns = columns.reading();
-    choice.conf_unit_m = taking.columns.unit_m;
-    if (leaves_labels) taking.labels = LabelUse::Leave;
-  }
-};
-
 // What is taken for surface, and for one surface.
 struct SurfaceOptions {
   std::optional<Preset> preset;
   std::optional<double> incidence_deg, longest_m, noise_sds;
-  std::optional<double> turned_deg, perimeter_m;
+  std::optional<double> turned_deg, perimeter_m, apart_m;
   bool is_unorganised = false;
   MergeLimits merging;
 
@@ -112,25 +50,25 @@ struct SurfaceOptions {
     surface
         ->add_option("--incidence-deg", incidence_deg, "Angle of incidence at most, instead of its")
         ->check(CLI::Range(0.0, 90.0));
-    surface->add_option("--longest-m", longest_m, "Edges at most")->check(CLI::PositiveNumber);
+    surface->add_option("--longest-m", longest_m, "Edges at most")->check(positive());
     surface
         ->add_option("--noise-sds", noise_sds,
                      "How many standard deviations of range an edge may owe to noise")
-        ->check(CLI::NonNegativeNumber);
+        ->check(not_negative());
     auto* unorganised = surface->add_flag(
         "--unorganised", is_unorganised,
         "Points have no order: join them by CGAL's advancing front, scans and all at once");
     surface->add_option("--perimeter-m", perimeter_m, "Of such a triangle, at most (3)")
-        ->check(CLI::PositiveNumber)
+        ->check(positive())
         ->needs(unorganised);
     surface
         ->add_option("--merge-sds", merging.noise_sds,
                      "How many standard deviations of both one surface may be apart in two scans")
-        ->check(CLI::NonNegativeNumber);
-    surface->add_option("--apart-m", merging.apart_m, "And this besides: what poses are off")
-        ->check(CLI::NonNegativeNumber);
+        ->check(not_negative());
+    surface->add_option("--apart-m", apart_m, "And this besides: what poses are off")
+        ->check(not_negative());
     surface->add_option("--turned-deg", turned_deg, "And how far it may be turned")
-        ->check(CLI::Range(0.0, 180.0));
+        ->check(positive() & CLI::Range(0.0, 90.0));
   }
 
   Meshing meshing() const {
@@ -138,7 +76,8 @@ struct SurfaceOptions {
     Meshing meshing{.incidence_rad = radians(incidence_deg),
                     .longest_m = longest_m,
                     .noise_sds = noise_sds,
-                    .merging = merging};
+                    .merging = merging,
+                    .apart_m = apart_m};
     if (turned_deg) meshing.merging.turned_rad = *turned_deg * radians_per_degree;
     if (is_unorganised) meshing.perimeter_m = perimeter_m.value_or(usual_perimeter_m);
     if (preset == Preset::Ground) meshing.screening = ScreeningLimits::ground();
@@ -162,22 +101,34 @@ struct HaltOptions {
     CLI::App* one = halt->add_option_group("Halt");
     one->add_option("--max-vertical-error-m", vertical_m,
                     "Of terrain: until a vertex would be farther above or below")
-        ->check(CLI::PositiveNumber);
+        ->check(positive());
     one->add_option("--max-error-m", error_m, "Until a point of either would be farther away")
-        ->check(CLI::PositiveNumber);
-    one->add_option("--triangles", triangles, "Until so many are left")->check(CLI::PositiveNumber);
+        ->check(positive());
+    one->add_option("--triangles", triangles, "Until so many are left")->check(positive());
     one->add_option("--noise-halt", sds,
                     "Until the error is so many standard deviations of the measurements")
-        ->check(CLI::PositiveNumber);
+        ->check(positive());
     one->add_flag("--knee", at_knee, "Until errors begin to rise faster than triangles go");
     one->require_option(need == Need::One ? 1 : 0, 1);
-    halt->add_option("--border-m", border_m, "How far borders may move; else as the error")
-        ->check(CLI::NonNegativeNumber);
-    halt->add_option("--crease-deg", crease_deg, "Keep edges that are sharper (60)")
-        ->check(CLI::PositiveNumber);
+    halt->add_option(
+            "--border-m", border_m,
+            "How far borders may move, under --max-error-m and --max-vertical-error-m; else "
+            "as the error")
+        ->check(not_negative());
+    halt->add_option("--crease-deg", crease_deg,
+                     "Keep edges that are sharper (60); 180 for none. Of --triangles only where "
+                     "labels are kept")
+        ->check(CLI::Range(0.0, 180.0));
   }
 
+  /// @throws Error if an option would do nothing.
   std::optional<Halt> halt() const {
+    if (border_m && !vertical_m && !error_m)
+      throw Error(
+          "--border-m: only --max-error-m and --max-vertical-error-m leave borders a bound");
+    const bool is_none = !vertical_m && !error_m && !triangles && !sds && !at_knee;
+    if (crease_deg && is_none)
+      throw Error("--crease-deg: nothing is simplified without an option that says until when");
     if (vertical_m) return VerticalBound{*vertical_m, border_m.value_or(*vertical_m)};
     if (error_m) return DistanceBound{*error_m, border_m.value_or(*error_m)};
     if (triangles) return FaceBudget{*triangles};
@@ -206,7 +157,7 @@ struct OutputOptions {
         ->required();
     command->add_option("--report", output.report, "JSON file for all figures");
     command->add_option("--memory-mb", memory_mb, "Begin no work that would take more")
-        ->check(CLI::PositiveNumber);
+        ->check(positive());
   }
 
   void close(const std::string& command, const std::vector<fs::path>& inputs) {
@@ -217,7 +168,9 @@ struct OutputOptions {
 
   void limit(Finishing& finishing) const {
     constexpr std::size_t bytes_per_mb = 1'000'000;
-    if (memory_mb) finishing.most_bytes = *memory_mb * bytes_per_mb;
+    constexpr std::size_t most = std::numeric_limits<std::size_t>::max();
+    if (memory_mb && *memory_mb < most / bytes_per_mb)
+      finishing.most_bytes = *memory_mb * bytes_per_mb;
   }
 };
 
@@ -229,6 +182,7 @@ struct ReconstructCommands::Options {
   SurfaceOptions surface;
   std::array<HaltOptions, 2> halt;  // of mesh, of simplify
   std::array<OutputOptions, 3> out;
+  std::optional<DemCommand> dem;
   std::optional<double> fill_m, sd_m;
   fs::path input;  // of simplify and fill
 
@@ -245,19 +199,26 @@ struct ReconstructCommands::Options {
     surface.add(mesh);
     add_fill(mesh)->required(false);
     halt[0].add(mesh, HaltOptions::Need::None);
+    CLI::Option* unorganised = mesh->get_option("--unorganised");
+    for (const char* of_grids :
+         {"--occlusion", "--returns", "--grid", "--preset", "--incidence-deg", "--longest-m",
+          "--noise-sds", "--merge-sds", "--apart-m", "--turned-deg"})
+      mesh->get_option(of_grids)->excludes(unorganised);
   }
 
   CLI::Option* add_fill(CLI::App* command) {
     return command->add_option("--fill-m", fill_m, "Fill holes whose rim is no longer than this")
-        ->check(CLI::PositiveNumber);
+        ->check(positive());
   }
 
   void add_simplify() {
     simplify = all->add_subcommand("simplify", "Simplify a mesh within bounds");
     add_input(simplify);
     out[1].add(simplify);
-    simplify->add_option("--sd-m", sd_m, "Standard deviation of vertices, if the mesh tells none")
-        ->check(CLI::PositiveNumber);
+    simplify
+        ->add_option("--sd-m", sd_m,
+                     "Standard deviation of vertices, instead of what the mesh tells")
+        ->check(positive());
     halt[1].add(simplify, HaltOptions::Need::One);
   }
 
@@ -293,11 +254,13 @@ struct ReconstructCommands::Options {
 };
 
 ReconstructCommands::ReconstructCommands(CLI::App& app) : options_(std::make_unique<Options>()) {
-  options_->all = app.add_subcommand("reconstruct", "Meshes from scans (docs/reconstruction.md)");
+  options_->all = app.add_subcommand(
+      "reconstruct", "Meshes and DEMs from scans (docs/reconstruction.md, docs/dem.md)");
   options_->all->require_subcommand(1);
   options_->add_mesh();
   options_->add_simplify();
   options_->add_filling();
+  options_->dem.emplace(*options_->all);
 }
 
 ReconstructCommands::~ReconstructCommands() = default;
@@ -306,6 +269,7 @@ bool ReconstructCommands::is_asked_for() const { return options_->all->parsed();
 
 void ReconstructCommands::run() const {
   if (options_->mesh->parsed()) return options_->run_mesh();
+  if (options_->dem->is_asked_for()) return options_->dem->run();
   options_->run_finish();
 }
 

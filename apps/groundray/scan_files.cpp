@@ -5,14 +5,12 @@
 
 #include <algorithm>
 #include <array>
-#include <charconv>
-#include <cmath>
 #include <fstream>
 #include <glm/common.hpp>
-#include <glm/gtc/quaternion.hpp>
 #include <utility>
 
 #include "apps/groundray/dataset_reader.h"
+#include "apps/groundray/range_conf.h"
 #include "core/error.h"
 #include "core/product_io.h"
 #include "core/text_lines.h"
@@ -25,8 +23,11 @@ namespace fs = std::filesystem;
 using std::chrono::nanoseconds;
 
 bool is_range_grid(const fs::path& path) {
-  if (path.extension() == ".gz") return true;  // as Stanford's come
-  if (path.extension() != ".ply") return false;
+  std::string ending = path.extension().string();
+  std::ranges::transform(ending, ending.begin(),
+                         [](unsigned char c) { return static_cast<char>(std::tolower(c)); });
+  if (ending == ".gz") return true;  // as Stanford's come
+  if (ending != ".ply") return false;
   std::ifstream file(path, std::ios::binary);
   for (std::string line; std::getline(file, line) && !line.starts_with("end_header");) {
     if (line.starts_with("element range_grid")) return true;
@@ -41,49 +42,16 @@ bool is_there(const fs::path& path) {
 
 // ----- Stanford's .conf
 
-// The rotation of a line takes D's axes to the scan's.
-Pose pose_of(const std::array<double, 7>& numbers) {
-  const glm::dquat rotation(numbers[6], numbers[3], numbers[4], numbers[5]);
-  return {.rotation = glm::conjugate(glm::normalize(rotation)),
-          .translation_m = {numbers[0], numbers[1], numbers[2]}};
-}
-
-ScanFile bmesh(const std::vector<std::string_view>& words, const fs::path& folder,
-               const std::string& place) {
-  constexpr std::size_t count = 9;
-  constexpr double most_off = 1e-3;  // what three decimals leave
-  std::array<double, 7> numbers{};
-  bool is_sound = words.size() == count;
-  for (std::size_t i = 0; is_sound && i < numbers.size(); ++i) {
-    const auto number = number_of<double>(words[i + 2]);
-    is_sound = number && std::isfinite(*number);
-    numbers[i] = number.value_or(0);
-  }
-  if (!is_sound)
-    throw Error("{}: it must be `bmesh FILE tx ty tz qx qy qz qw`, numbers all but the first",
-                place);
-  const double norm = std::hypot(std::hypot(numbers[3], numbers[4]), numbers[5], numbers[6]);
-  if (!(std::abs(norm - 1) <= most_off))
-    throw Error("{}: the length of its quaternion is {:.6g}; it must be 1", place, norm);
-  fs::path file = folder / words[1];
-  const fs::path packed = file.string() + ".gz";
-  if (!is_there(file) && is_there(packed)) file = packed;
-  return {.name = std::string(words[1]),
-          .file = file,
-          .X_DS = pose_of(numbers),
-          .is_range_grid = is_range_grid(file)};
-}
-
 ScanFiles scans_of_conf(const fs::path& path, double unit_m) {
-  const std::string text = read_text(path);
   ScanFiles files;
-  TextLines lines(text);
-  while (const auto line = lines.next()) {
-    const auto words = words_of(*line);
-    if (words.empty() || words[0] != "bmesh") continue;  // cameras and meshes are not for us
-    files.scans.push_back(
-        bmesh(words, path.parent_path(), fmt::format("{}:{}", path.string(), lines.number())));
-    files.scans.back().X_DS.translation_m *= unit_m;
+  for (const ConfScan& named : parse_conf(read_text(path), path.string())) {
+    fs::path file = path.parent_path() / named.file;
+    const fs::path packed = file.string() + ".gz";
+    if (!is_there(file) && is_there(packed)) file = packed;
+    ScanFile scan{.name = named.file, .file = file, .X_DS = named.X_DS};
+    scan.is_range_grid = is_range_grid(file);
+    scan.X_DS.translation_m *= unit_m;
+    files.scans.push_back(std::move(scan));
   }
   return files;
 }
@@ -92,7 +60,7 @@ ScanFiles scans_of_conf(const fs::path& path, double unit_m) {
 
 // The time that a name is: seconds with a point, else nanoseconds, of many digits.
 nanoseconds time_of_name(const fs::path& file) {
-  constexpr std::int64_t ns_per_s = 1'000'000'000;
+  constexpr std::int64_t ns_per_s = 1'000'000'000, most_s = 9'000'000'000;
   const std::string stem = file.stem().string();
   const std::size_t point = stem.find('.');
   const std::string_view whole = std::string_view(stem).substr(0, point);
@@ -100,13 +68,15 @@ nanoseconds time_of_name(const fs::path& file) {
   std::string digits = point == std::string::npos ? "" : stem.substr(point + 1, 9);
   const auto after = digits.empty() ? 0 : number_of<std::int64_t>(digits);
   constexpr std::size_t seconds_digits = 10, ns_digits = 19;
-  if (!before || !after || *before < 0 || *after < 0 || whole.size() > ns_digits) {
+  const bool is_ns = point == std::string::npos && whole.size() > seconds_digits;
+  if (!before || !after || *before < 0 || *after < 0 || whole.size() > ns_digits ||
+      (!is_ns && *before > most_s)) {
     throw Error(
         "{}: with --pose-by name the file's name must be its stamp: seconds such as "
         "1317354879.123456789.pcd, or nanoseconds such as 1317354879123456789.pcd",
         file.string());
   }
-  if (point == std::string::npos && whole.size() > seconds_digits) return nanoseconds(*before);
+  if (is_ns) return nanoseconds(*before);
   digits.resize(9, '0');
   return nanoseconds(*before * ns_per_s + number_of<std::int64_t>(digits).value_or(0));
 }
@@ -270,6 +240,22 @@ InputKind kind_of(const std::vector<fs::path>& inputs) {
   return first.extension() == ".conf" ? InputKind::Conf : InputKind::Files;
 }
 
+// None of these may be written over.
+std::vector<fs::path> files_read(const ScanChoice& choice, const ScanFiles& files, InputKind kind) {
+  std::vector<fs::path> read;
+  if (choice.poses) read.push_back(*choice.poses);
+  for (const ScanFile& scan : files.scans) read.push_back(scan.file);
+  if (kind == InputKind::Conf) read.push_back(choice.inputs[0]);
+  if (kind != InputKind::Dataset) return read;
+  read.push_back(choice.inputs[0] / "dataset.yaml");
+  for (const char* folder : {"poses", "calibration"}) {
+    std::error_code ignored;
+    for (const auto& entry : fs::directory_iterator(choice.inputs[0] / folder, ignored))
+      read.push_back(entry.path());
+  }
+  return read;
+}
+
 void check_options(const ScanChoice& choice, InputKind kind) {
   if (kind != InputKind::Dataset && !choice.sensors.empty())
     throw Error("--sensor: only datasets have sensors by name");
@@ -277,6 +263,8 @@ void check_options(const ScanChoice& choice, InputKind kind) {
     throw Error("--poses: {} has poses of its own", choice.inputs[0].string());
   if (kind == InputKind::Dataset && choice.order == PoseOrder::Name)
     throw Error("--pose-by name: a dataset knows the stamps of its scans");
+  if (choice.order == PoseOrder::Name && !choice.poses)
+    throw Error("--pose-by name: it says which of the poses is a file's: give them by --poses");
   if (choice.points == LidarSpec::Points::AsFired && kind != InputKind::Dataset &&
       choice.order != PoseOrder::Name) {
     throw Error(
@@ -323,6 +311,7 @@ ScanFiles find_scans(const ScanChoice& choice) {
   if (files.scans.empty())
     throw Error("{}: there is no scan among the frames asked for", choice.inputs[0].string());
   if (kind != InputKind::Dataset) choose_origin(files);
+  files.read = files_read(choice, files, kind);
   return files;
 }
 

@@ -63,9 +63,10 @@ struct ScanFile {
 /// The scans of a run.
 struct ScanFiles {
   std::vector<ScanFile> scans;
-  std::vector<Trajectory> paths;   ///< X_DS
-  Georeference georeference;       ///< of D
-  std::vector<std::string> notes;  ///< for people: what was left out
+  std::vector<Trajectory> paths;            ///< X_DS
+  Georeference georeference;                ///< of D
+  std::vector<std::filesystem::path> read;  ///< all files that say something of them
+  std::vector<std::string> notes;           ///< for people: what was left out
 };
 
 /// Finds the scans and where each was made. Poses farther than 10 km from their zero get an origin

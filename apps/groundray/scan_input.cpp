@@ -36,6 +36,13 @@ class SensorAt {
     if (file.points == LidarSpec::Points::AsFired)
       throw Error("{}: its points are as they were fired, but {}", file.file.string(), fault);
     X_DS_ = nullptr;
+    if (!times_s_.empty()) unused_ = fault;
+  }
+
+  /// Says why times of points at one stamp were of no use.
+  void add_note(std::vector<std::string>& notes) const {
+    if (unused_.empty()) return;
+    notes.push_back("the sensor's motion within scans was not used: " + unused_);
   }
 
   bool is_path() const { return X_DS_ != nullptr; }
@@ -51,7 +58,8 @@ class SensorAt {
   std::string take_times() {
     constexpr double slack_s = 1e-6;  // what floats round
     constexpr double most_s = 1e6;    // of one sweep: else the unit is another, or the clock
-    if (times_s_.empty()) return "they have no times";
+    if (times_s_.empty())
+      return "they have no times (a column of unknown unit needs --time-unit-s)";
     const auto since_stamp_s = [&](nanoseconds time) {
       return 1e-9 * static_cast<double>((time - file_.stamp).count());
     };
@@ -71,6 +79,7 @@ class SensorAt {
   const ScanFile& file_;
   const Trajectory* X_DS_ = nullptr;
   std::vector<double> times_s_;
+  std::string unused_;
 };
 
 // In S as each pulse was fired, wherever the file has them.
@@ -163,6 +172,14 @@ ScanReturns returns_of(const ScanFile& file, Scan& scan, const SensorAt& sensor,
 
 // Beams of range grids are parallel and have no times.
 OrganisedInput read_grid(const ScanFile& file, const ScanTaking& taking) {
+  const bool is_placed = !std::holds_alternative<Pose>(taking.columns.X_FS) ||
+                         std::get<Pose>(taking.columns.X_FS) != Pose();
+  if (is_placed || !taking.columns.columns.empty() || taking.grid == GridSource::File) {
+    throw Error(
+        "{}: --sensor-pose, --viewpoint, --columns and --grid say nothing of range grids, whose "
+        "beams are known",
+        file.file.string());
+  }
   const auto sd_m = static_cast<float>(taking.range_sd_m.value_or(0));
   OrganisedScan grid = parse_range_grid(read_packed(file.file), file.file.string(), {.sd_m = sd_m});
   const auto is_return = [](const glm::dvec3& p) { return !std::isnan(p.x); };
@@ -176,15 +193,27 @@ OrganisedInput read_grid(const ScanFile& file, const ScanTaking& taking) {
   return {.cells = place(std::move(grid), file.X_DS), .rows = returns, .returns = returns};
 }
 
+// As `organise`, and names the option that links points without order.
+OrganisedReturns organised_returns(const ScanReturns& returns, const ScanTaking& taking) {
+  const RowOrder order = taking.grid == GridSource::File ? RowOrder::Number : RowOrder::Elevation;
+  try {
+    return organise(returns, taking.returns, order);
+  } catch (const Error& error) {
+    const std::string_view what = error.what();
+    if (!what.ends_with("as points without order")) throw;
+    throw Error("{} (--unorganised)", what);
+  }
+}
+
 OrganisedInput organise_scan(const ScanFiles& files, const ScanFile& file,
                              const ScanTaking& taking) {
   if (file.is_range_grid) return read_grid(file, taking);
   Scan scan = read_scan(file.file, taking.columns);
   const SensorAt sensor(files, file, scan);
-  OrganisedInput input{.rows = scan.rows, .returns = scan.row.size()};
+  OrganisedInput input{.rows = scan.rows, .returns = scan.row.size(), .notes = scan.notes};
+  sensor.add_note(input.notes);
   const ScanReturns returns = returns_of(file, scan, sensor, taking);
-  const RowOrder order = taking.grid == GridSource::File ? RowOrder::Number : RowOrder::Elevation;
-  OrganisedReturns organised = organise(returns, taking.returns, order);
+  OrganisedReturns organised = organised_returns(returns, taking);
   input.counts = organised.counts;
   input.cells = sensor.is_path()
                     ? place(std::move(organised.scan), sensor.path(), file.stamp, sensor.times_s())
@@ -229,7 +258,9 @@ PointInput read_points(const ScanFiles& files, const ScanFile& file, const ScanT
     const SensorAt sensor(files, file, scan);
     PointInput input{.sd_m = sds_of(file, scan, taking),
                      .labels = labels_of(file, scan, taking),
-                     .rows = scan.rows};
+                     .rows = scan.rows,
+                     .notes = scan.notes};
+    sensor.add_note(input.notes);
     for (std::size_t i = 0; i < scan.p_S.size(); ++i) {
       const Pose X_DS = sensor.pose(i);
       input.points_m.push_back((file.points == LidarSpec::Points::AsFired ? X_DS : file.X_DS) *

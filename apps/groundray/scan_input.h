@@ -47,6 +47,7 @@ struct PointInput {
   std::vector<float> sd_m;            ///< of each range
   std::vector<std::uint16_t> labels;  ///< one for each, or none
   std::size_t rows = 0;               ///< of the file
+  std::vector<std::string> notes;     ///< for people
 };
 
 /// Reads a scan: the points that the sensor reported at the poses that it knew, never what a

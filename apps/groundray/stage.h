@@ -15,7 +15,7 @@ namespace groundray {
 /// One of the steps that a reconstruction takes: says how far it is, and stops when asked to.
 class Stage {
  public:
-  explicit Stage(const std::string& label) : progress_(stderr, label + ", per mille", steps) {}
+  explicit Stage(const std::string& label) : progress_(stderr, label + ", percent", steps) {}
 
   /// Returns what the library is to report to; not for longer than this lives.
   Work work(std::size_t most_bytes) {
@@ -28,7 +28,7 @@ class Stage {
   }
 
  private:
-  static constexpr std::uint64_t steps = 1000;
+  static constexpr std::uint64_t steps = 100;
   Progress progress_;
 };
 

@@ -4,6 +4,7 @@
 #include <cmath>
 #include <glm/gtc/quaternion.hpp>
 
+#include "apps/scan/number_checks.h"
 #include "core/error.h"
 
 namespace groundray {
@@ -28,9 +29,9 @@ Pose sensor_pose(const std::vector<double>& numbers, const std::string& option) 
 void ScanFlags::add(CLI::App* group, const std::string& prefix) {
   whose_ = prefix;
   group->add_option("--" + prefix + "unit-m", unit_m_, "Unit of x, y and z, in metres")
-      ->check(CLI::PositiveNumber);
+      ->check(positive());
   group->add_option("--" + prefix + "time-unit-s", time_unit_s_, "Unit of time, in seconds")
-      ->check(CLI::PositiveNumber);
+      ->check(positive());
   group->add_option("--" + prefix + "time-zero-s", time_zero_s_,
                     "What the clock shows at the scan's stamp");
   auto* posed = group
@@ -47,6 +48,11 @@ void ScanFlags::add(CLI::App* group, const std::string& prefix) {
 ScanReading ScanFlags::reading() const {
   ScanReading reading{
       .unit_m = unit_m_, .time_unit_s = time_unit_s_, .X_FS = {}, .columns = columns_};
+  constexpr double latest_s = 9e9;  // nanoseconds hold it
+  if (!(std::abs(time_zero_s_) <= latest_s)) {
+    throw Error("--{}time-zero-s: {} s must be within 9e9 s of 0: is it in another unit?", whose_,
+                time_zero_s_);
+  }
   reading.time_zero = std::chrono::nanoseconds(std::llround(time_zero_s_ * 1e9));
   if (viewpoint_) reading.X_FS = FileViewpoint{};
   if (!pose_.empty()) reading.X_FS = sensor_pose(pose_, "--" + whose_ + "sensor-pose");

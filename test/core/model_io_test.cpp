@@ -226,6 +226,15 @@ TEST_F(ModelIo, EveryFormGivesTheSameWedge) {
   EXPECT_THAT(refusal("a.fbx", ""), HasSubstr("a.fbx: the name of a model must end in .obj, .ply"));
 }
 
+// Assimp looks for the first buffer in the file, whatever its URI says.
+TEST_F(ModelIo, AFileOfJsonAloneThatNamesABufferBesideItIsRefused) {
+  std::string bytes = glb(wedge_gltf(R"({"mesh":0})", bin_file), "");
+  bytes.resize(bytes.size() - 8);  // without the second chunk
+  bytes[8] = static_cast<char>(bytes.size() & 0xff);
+  bytes[9] = static_cast<char>(bytes.size() >> 8);
+  EXPECT_THAT(refusal("a.glb", bytes), HasSubstr(in("a.glb").string()));
+}
+
 TEST_F(ModelIo, MeshesThatGroundrayWroteAreReadToTheLastBit) {
   std::mt19937_64 random(3);
   std::uniform_real_distribution<double> east(435000, 435001), north(5150000, 5150001);

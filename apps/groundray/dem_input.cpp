@@ -1,0 +1,119 @@
+#include "apps/groundray/dem_input.h"
+
+#include <algorithm>
+#include <cstdint>
+#include <glm/common.hpp>
+#include <limits>
+#include <span>
+
+#include "apps/groundray/stage.h"
+#include "core/error.h"
+
+namespace groundray {
+namespace {
+
+namespace fs = std::filesystem;
+
+bool is_dataset(const DemRequest& request) { return fs::is_directory(request.choice.inputs.at(0)); }
+
+Area around(std::span<const glm::dvec3> points_m, Area area) {
+  for (const glm::dvec3& p : points_m) {
+    area.low_m = glm::min(area.low_m, glm::dvec2(p));
+    area.high_m = glm::max(area.high_m, glm::dvec2(p));
+  }
+  return area;
+}
+
+}  // namespace
+
+void check_count(std::size_t points) {
+  if (points == 0)
+    throw Error(
+        "no scan has a return and no stereo pair a match: there is nothing to make a DEM of");
+  if (points < 3)
+    throw Error("there {} only {} point{}: a DEM takes three or more", points == 1 ? "is" : "are",
+                points, points == 1 ? "" : "s");
+}
+
+DemInput::DemInput(const DemRequest& request, const ScanFiles& files)
+    : request_(request), files_(files), scans_(files.scans.size()) {
+  for (std::size_t i = 0; i < scans_.size(); ++i) scans_[i].name = files.scans[i].name;
+  match_pairs();
+}
+
+void DemInput::match_pairs() {
+  const PairChoice& choice = request_.pairs;
+  if (!choice.are_any) return;
+  if (!is_dataset(request_)) {
+    if (!choice.names.empty())
+      throw Error("--stereo: only a dataset has stereo pairs: give its folder");
+    return;
+  }
+  const auto recorded = read_stereo_pairs(request_.choice.inputs[0], choice.names);
+  const auto images = image_pairs(recorded, request_.stereo.frames, notes_);
+  if (images.empty()) {
+    if (!choice.names.empty())
+      throw Error("--stereo: there is no pair of images among those asked for (--stereo-frames)");
+    return;
+  }
+  const bool moves = std::ranges::any_of(
+      recorded, [](const RecordedPair& pair) { return pair.cameras[0].row_s > 0; });
+  if (moves)
+    notes_.emplace_back("rolling shutters: all rows are taken as seen at the middle's time");
+  Stage stage("matching");
+  for (std::size_t i = 0; i < images.size(); ++i) {
+    stage.update(static_cast<double>(i) / static_cast<double>(images.size()));
+    const auto group = static_cast<std::uint32_t>(files_.scans.size() + i);
+    pairs_.push_back(add_stereo_points(images[i], request_.stereo, request_.noise, group, stereo_));
+  }
+  stage.update(1);
+}
+
+PointNoise DemInput::noise_of(const ScanFile& scan) {
+  PointNoise noise = request_.noise;
+  if (noise.divergence_rad || !is_dataset(request_)) return noise;
+  const std::string sensor = scan.name.substr(0, scan.name.rfind('/'));
+  const auto known = divergences_rad_.find(sensor);
+  noise.divergence_rad =
+      known != divergences_rad_.end()
+          ? known->second
+          : divergences_rad_
+                .emplace(sensor, calibrated_divergence_rad(request_.choice.inputs[0], scan))
+                .first->second;
+  return noise;
+}
+
+bool DemInput::next(MeasuredPoints& block) {
+  const std::size_t now = next_;
+  if (now > files_.scans.size()) return false;
+  ++next_;
+  if (now == 0) {
+    block = stereo_;
+    return true;
+  }
+  stop_if_interrupted();
+  const ScanFile& scan = files_.scans[now - 1];
+  block = lidar_points(files_, scan, request_.taking, noise_of(scan),
+                       static_cast<std::uint32_t>(now - 1), scans_[now - 1]);
+  return true;
+}
+
+void DemInput::rewind() noexcept { next_ = 0; }
+
+Area DemInput::extent() {
+  rewind();
+  constexpr double infinity = std::numeric_limits<double>::infinity();
+  Area area{glm::dvec2(infinity), glm::dvec2(-infinity)};
+  std::size_t count = 0;
+  Stage stage("reading");
+  for (MeasuredPoints block; next(block);) {
+    area = around(block.p_m, area);
+    count += block.size();
+    stage.update(static_cast<double>(next_) / static_cast<double>(files_.scans.size() + 1));
+  }
+  rewind();
+  check_count(count);
+  return area;
+}
+
+}  // namespace groundray

@@ -1,0 +1,59 @@
+#pragma once
+
+#include <cstddef>
+#include <cstdint>
+#include <filesystem>
+#include <optional>
+#include <string>
+#include <vector>
+
+#include "apps/groundray/scan_files.h"
+#include "apps/groundray/scan_input.h"
+#include "reconstruction/dem/measured_points.h"
+
+namespace groundray {
+
+/// From where beams came, if files do not tell: from their sensor's place, or straight from above
+/// and far away, as for points of a survey from the air in the coordinates of a map.
+enum class BeamOrigin { Sensor, Above };
+
+/// What is known of the errors of lidar points besides the noise of their ranges.
+struct PointNoise {
+  BeamOrigin beams = BeamOrigin::Sensor;
+  /// Full angle far from the sensor; none: what a dataset's calibration says of lidars with light.
+  std::optional<double> divergence_rad;
+  double position_sd_m = 0;    ///< of a scan's pose, each way
+  double attitude_sd_rad = 0;  ///< of a scan's pose, about each axis
+  double across_sd_m = 0;      ///< of places in plan, besides
+  double longest_pose_gap_s = 1;
+};
+
+/// What became of a scan or a stereo pair.
+struct PointTally {
+  std::string name;
+  std::size_t rows = 0;    ///< of the file, or pixels that were matched
+  std::size_t points = 0;  ///< that measured the DEM
+};
+
+/// Returns the points of a scan with what is known of their errors. Of a point at the slant range r
+/// along the unit vector d, with the range's sd s and the divergence a:
+///     sd^2 = (s d_z)^2 + (r a / 4)^2 (1 - d_z^2)               of the height
+///     across^2 = (s^2 (1 - d_z^2) + (r a / 4)^2 (1 + d_z^2)) / 2   of the place, each way
+///     bias^2 = position^2 + (r attitude)^2 (1 - d_z^2)         that all of the scan have in common
+/// @param group  number of the scan among all that measured.
+/// @param tally  gets the counts.
+/// @throws Error as read_points, or if the path has a gap where the scan was made.
+MeasuredPoints lidar_points(const ScanFiles& files, const ScanFile& scan, const ScanTaking& taking,
+                            const PointNoise& noise, std::uint32_t group, PointTally& tally);
+
+/// Moves D's origin to height 0, so that heights in D are those in W.
+void level_origin(ScanFiles& files);
+
+/// Returns the divergence that the file of a dataset's lidar tells, rad: full angle between the
+/// 1/e^2 points, both ways' mean, as much wider as the jitter of the beams makes it. Without light
+/// there is only jitter: points lie where the axes of beams meet something. Nothing if `scan` is of
+/// no dataset.
+std::optional<double> calibrated_divergence_rad(const std::filesystem::path& dataset,
+                                                const ScanFile& scan);
+
+}  // namespace groundray

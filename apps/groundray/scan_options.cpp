@@ -1,0 +1,61 @@
+#include "apps/groundray/scan_options.h"
+
+#include <map>
+
+namespace groundray {
+void ScanOptions::add(CLI::App* command) {
+  CLI::App* scans = command->add_option_group("Scans");
+  scans->add_option("--sensor", choice.sensors, "Lidars of a dataset; all without it")
+      ->delimiter(',');
+  scans->add_option("--frames", frames, "A:B:STEP, from A on to before B: frames, or files");
+  add_poses(scans);
+  const std::map<std::string, ReturnChoice> choices{{"last", ReturnChoice::Last},
+                                                    {"strongest", ReturnChoice::Strongest},
+                                                    {"first", ReturnChoice::First}};
+  scans->add_option("--returns", taking.returns, "Which return of a pulse is taken")
+      ->transform(CLI::CheckedTransformer(choices))
+      ->option_text("last|strongest|first");
+  const std::map<std::string, GridSource> grids{{"beams", GridSource::Beams},
+                                                {"file", GridSource::File}};
+  scans
+      ->add_option("--grid", taking.grid,
+                   "What makes points neighbours: rings and azimuths, or the file's own image")
+      ->transform(CLI::CheckedTransformer(grids))
+      ->option_text("beams|file");
+  scans
+      ->add_option("--range-sd-m", taking.range_sd_m,
+                   "Standard deviation of ranges, instead of what scans tell")
+      ->check(not_negative());
+  scans->add_flag("--no-labels", leaves_labels, "Leave semantic classes out");
+  columns.add(scans, "");
+}
+
+void ScanOptions::add_poses(CLI::App* scans) {
+  scans->add_option("--poses", choice.poses,
+                    "Poses of the sensor (TUM: t x y z qx qy qz qw) for files, or instead of a "
+                    "dataset's");
+  const std::map<std::string, PoseOrder> orders{{"line", PoseOrder::Line},
+                                                {"name", PoseOrder::Name}};
+  scans
+      ->add_option("--pose-by", choice.order,
+                   "Which pose is a file's: that of its line, or by the stamp that is its name")
+      ->transform(CLI::CheckedTransformer(orders))
+      ->option_text("line|name");
+  const std::map<std::string, LidarSpec::Points> frames_of{
+      {"as_fired", LidarSpec::Points::AsFired}, {"at_stamp", LidarSpec::Points::AtStamp}};
+  scans
+      ->add_option("--points", choice.points,
+                   "In which frame points are: the sensor's as each was measured, or at the "
+                   "scan's stamp")
+      ->transform(CLI::CheckedTransformer(frames_of))
+      ->option_text("as_fired|at_stamp");
+}
+
+void ScanOptions::close() {
+  choice.frames = parse_frames(frames);
+  taking.columns = columns.reading();
+  choice.conf_unit_m = taking.columns.unit_m;
+  if (leaves_labels) taking.labels = LabelUse::Leave;
+}
+
+}  // namespace groundray

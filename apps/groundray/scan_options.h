@@ -1,0 +1,29 @@
+#pragma once
+
+#include <CLI/CLI.hpp>
+#include <string>
+
+#include "apps/groundray/scan_files.h"
+#include "apps/groundray/scan_input.h"
+#include "apps/scan/number_checks.h"
+#include "apps/scan/scan_flags.h"
+
+namespace groundray {
+
+/// The options that say which scans, and how their files are to be read.
+struct ScanOptions {
+  ScanChoice choice;
+  ScanTaking taking;
+  ScanFlags columns;
+  std::string frames = ":";
+  bool leaves_labels = false;
+
+  void add(CLI::App* command);
+  /// Call it once the line is read. @throws Error as parse_frames and ScanFlags.
+  void close();
+
+ private:
+  void add_poses(CLI::App* scans);
+};
+
+}  // namespace groundray

@@ -1,0 +1,34 @@
+#include "apps/scan/number_checks.h"
+
+#include <cmath>
+#include <optional>
+#include <string>
+
+namespace groundray {
+namespace {
+
+std::optional<double> number_in(const std::string& text) {
+  double value = 0;
+  if (!CLI::detail::lexical_cast(text, value) || !std::isfinite(value)) return std::nullopt;
+  return value;
+}
+
+}  // namespace
+
+CLI::Validator positive() {
+  const auto check = [](const std::string& text) {
+    const auto value = number_in(text);
+    return value && *value > 0 ? std::string() : "'" + text + "' must be a number above 0";
+  };
+  return {check, "POSITIVE"};
+}
+
+CLI::Validator not_negative() {
+  const auto check = [](const std::string& text) {
+    const auto value = number_in(text);
+    return value && *value >= 0 ? std::string() : "'" + text + "' must be a number, 0 or more";
+  };
+  return {check, "NONNEGATIVE"};
+}
+
+}  // namespace groundray
