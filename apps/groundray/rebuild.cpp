@@ -193,7 +193,7 @@ void merge_scans(std::vector<ScanMesh> scans, const ScanFiles& files, const Mesh
   if (!has_noise) check_halt_without_noise(finishing);
   note_unknown_noise(scans, making.report);
   if (scans.size() == 1) {
-    making.mesh = std::move(scans[0].mesh);
+    making.mesh = merge(scans, meshing.merging).mesh;
     return;
   }
   const Timing timing(making.report, "merge");

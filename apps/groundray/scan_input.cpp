@@ -162,8 +162,11 @@ ScanReturns returns_of(const ScanFile& file, Scan& scan, const SensorAt& sensor,
     returns.rings = whole<std::int32_t>(file, scan, Quantity::Ring, "ring");
     returns.columns = whole<std::int32_t>(file, scan, Quantity::Column, "column");
   }
-  // Times tell columns of points as they were fired alone: motion within a scan turns the others.
-  if (sensor.is_path()) returns.times_s = sensor.times_s();
+  if (sensor.is_path()) {
+    returns.times_s = sensor.times_s();
+  } else if (const auto* times_s = scan.find(Quantity::Time)) {
+    returns.times_s = *times_s;
+  }
   if (const auto* intensity = scan.find(Quantity::Intensity))
     returns.intensity.assign(intensity->begin(), intensity->end());
   returns.p_S = as_fired(file, scan, sensor);

@@ -152,8 +152,11 @@ FarthestProbe search_suspects(const TriangleMesh& from, const ClosestPoint& to, 
 }
 
 /// Cuts a surface for shares.
-double step_of(const ShareFineness& fineness, const MeshDistance& distance) {
-  return fineness.step_m == 0 ? distance.step_for_m(1e5) : fineness.step_m;
+double step_of(const ShareFineness& fineness, const MeshDistance& distance,
+               const TriangleMesh& from) {
+  constexpr double samples = 1e5;
+  if (fineness.step_m != 0) return fineness.step_m;
+  return SurfaceParts::widened_m(from, distance.step_for_m(samples), samples);
 }
 
 }  // namespace
@@ -251,13 +254,16 @@ MeanDistance MeshDistance::mean(double step_m, const DistanceBins& bins) const {
 
 OneSidedError MeshDistance::error(const ErrorFineness& fineness) const {
   check_area();
-  if (!(fineness.samples > 0 && fineness.largest_share > 0 && fineness.largest_share < 1)) {
+  if (!(fineness.samples > 0 && std::isfinite(fineness.samples) && fineness.largest_share > 0 &&
+        fineness.largest_share < 1)) {
     throw Error(
-        "distance between meshes: samples = {} must be positive, and largest_share = {} between 0 "
+        "distance between meshes: samples = {} must be positive and finite, and largest_share = {} "
+        "between 0 "
         "and 1",
         fineness.samples, fineness.largest_share);
   }
-  const SurfaceParts parts(from_, step_for_m(fineness.samples));
+  const double samples = fineness.samples;
+  const SurfaceParts parts(from_, SurfaceParts::widened_m(from_, step_for_m(samples), samples));
   const auto visit = [&](const Facet& facet, const SurfacePart& part, ErrorLot& lot) {
     const Sample sample = take_sample(to_, facet, part, lot.near, lot);
     lot.near = sample.nearest.triangle;
@@ -287,8 +293,9 @@ std::vector<AreaShare> MeshDistance::within(std::span<const double> tolerances_m
                                             const ShareFineness& fineness,
                                             const SurfaceWeight& weight) const {
   check_tolerances(tolerances_m);
+  check_quarterings(fineness.quarterings);
   check_area();
-  const SurfaceParts parts(from_, step_of(fineness, *this));
+  const SurfaceParts parts(from_, step_of(fineness, *this, from_));
   const auto distance = [&](const Facet& facet, const SurfacePart& part, std::uint32_t& near) {
     const NearestPoint nearest = to_.nearest(part.middle, near);
     near = nearest.triangle;

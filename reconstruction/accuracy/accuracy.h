@@ -61,7 +61,9 @@ struct MeanDistance {
 struct ErrorFineness {
   /// Where surfaces cross within the parts that have a sample, means come out low: by 1 % of
   /// terrain that was thinned eightfold, with a sample for each triangle.
-  double samples = 1e5;         ///< about, at least one for each triangle
+  /// About, at least one for each triangle; up to 16 times as many where there are needles, and
+  /// then fewer by area.
+  double samples = 1e5;
   double largest_share = 0.05;  ///< between the bounds of the largest distance, of the upper one
   /// To look at. Where they do not suffice, as where the error is even and far below the size of
   /// triangles, the bounds hold but are farther apart.
@@ -111,7 +113,8 @@ class MeshDistance {
   /// a mesh from which one asks for a truth, the completeness the other way round.
   /// @param weight  what places count, none for all alike; one value is taken for each part, amid
   ///                it, and bounds hold for weights that are so.
-  /// @throws Error if a tolerance is not positive, nothing has weight, or as mean.
+  /// @throws Error if a tolerance is not positive, there are more than 12 quarterings, a weight is
+  ///         negative or not finite, nothing has weight, or as mean.
   std::vector<AreaShare> within(std::span<const double> tolerances_m,
                                 const ShareFineness& fineness = {},
                                 const SurfaceWeight& weight = {}) const;

@@ -19,6 +19,7 @@ void ShareSums::add(const PartDistance& distance, double area,
 
 void ShareSums::operator+=(const ShareSums& more) {
   all += more.all;
+  has_bad_weight = has_bad_weight || more.has_bad_weight;
   areas.resize(std::max(areas.size(), more.areas.size()));
   for (std::size_t k = 0; k < more.areas.size(); ++k) {
     areas[k].within += more.areas[k].within;
@@ -28,6 +29,11 @@ void ShareSums::operator+=(const ShareSums& more) {
 }
 
 std::vector<AreaShare> ShareSums::shares(double sum_rounding) const {
+  if (has_bad_weight) {
+    throw Error(
+        "share within a distance: a place of the surface has a weight that is negative or not "
+        "finite; it must be 0 or more");
+  }
   if (!(all > 0)) {
     throw Error(
         "share within a distance: no part of the surface has an area that counts; are all weights "
@@ -50,6 +56,15 @@ void check_tolerances(std::span<const double> tolerances_m) {
                   tolerance_m);
     }
   }
+}
+
+void check_quarterings(unsigned quarterings) {
+  constexpr unsigned most = 12;
+  if (quarterings <= most) return;
+  throw Error(
+      "share within a distance: quarterings = {} must be at most {}, for each takes four times as "
+      "long; take a smaller step",
+      quarterings, most);
 }
 
 bool is_open(const PartDistance& distance, std::span<const double> tolerances_m) {

@@ -26,15 +26,19 @@ struct ShareSums {
   std::vector<Areas> areas;
   double all = 0;
   std::uint32_t near = 0;
+  bool has_bad_weight = false;  // negative or not finite
 
   void add(const PartDistance& distance, double area, std::span<const double> tolerances_m);
   void operator+=(const ShareSums& more);
-  /// @throws Error if nothing has weight.
+  /// @throws Error if nothing has weight, or any is negative or not finite.
   std::vector<AreaShare> shares(double sum_rounding) const;
 };
 
 /// @throws Error naming each that is not a positive number, or that there is none.
 void check_tolerances(std::span<const double> tolerances_m);
+
+/// @throws Error if there are more than 12: each takes four times as long.
+void check_quarterings(unsigned quarterings);
 
 /// Returns whether it is open for any tolerance if all of a part is within.
 bool is_open(const PartDistance& distance, std::span<const double> tolerances_m);
@@ -53,7 +57,9 @@ void add_shares(const Facet& facet, const SurfacePart& part, std::span<const dou
     }
     return;
   }
-  sums.add(found, weight(part) * part.area_m2(facet), tolerances_m);
+  const double counts = weight(part);
+  if (!(counts >= 0) || !std::isfinite(counts)) sums.has_bad_weight = true;
+  sums.add(found, counts * part.area_m2(facet), tolerances_m);
 }
 
 }  // namespace groundray

@@ -14,6 +14,13 @@ namespace {
 constexpr double most_parts = 1e9;
 constexpr std::size_t parts_each = 4096;  // lot, where a row has no more
 
+// Into how many parts the edges of a triangle are cut. One that has no area, but for rounding,
+// counts nothing in means.
+double splits_of(const Facet& facet, double step_m) {
+  if (facet.area_m2 <= 1e-15 * facet.longest_m * facet.longest_m) return 1;
+  return std::max(1.0, std::ceil(facet.longest_m / step_m));
+}
+
 }  // namespace
 
 Facet::Facet(const TriangleMesh& mesh, std::size_t triangle) {
@@ -52,7 +59,7 @@ SurfaceParts::SurfaceParts(const TriangleMesh& mesh, double step_m) : mesh_(mesh
   double parts = 0;
   std::vector<double> splits(mesh.triangles.size());
   for (std::size_t i = 0; i < splits.size(); ++i) {
-    splits[i] = std::max(1.0, std::ceil(Facet(mesh, i).longest_m / step_m));
+    splits[i] = splits_of(Facet(mesh, i), step_m);
     parts += splits[i] * splits[i];
   }
   if (!(parts <= most_parts)) {
@@ -77,6 +84,20 @@ SurfaceParts::SurfaceParts(const TriangleMesh& mesh, double step_m) : mesh_(mesh
     }
   }
   lots_.push_back(rows_.size());
+}
+
+double SurfaceParts::widened_m(const TriangleMesh& mesh, double step_m, double samples) {
+  const double most =
+      std::min(most_parts, 16 * samples + static_cast<double>(mesh.triangles.size()));
+  for (;; step_m *= 2) {
+    double parts = 0, largest = 0;
+    for (std::size_t i = 0; i < mesh.triangles.size(); ++i) {
+      const double splits = splits_of(Facet(mesh, i), step_m);
+      parts += splits * splits;
+      largest = std::max(largest, splits);
+    }
+    if (parts <= most || !(largest > 1) || !(step_m > 0)) return step_m;
+  }
 }
 
 double SurfaceParts::sum_rounding() const noexcept {

@@ -39,11 +39,15 @@ struct SurfacePart {
 };
 
 /// A surface cut into parts whose edges are at most one step long, the same for any number of
-/// threads. The mesh must outlive it.
+/// threads. A triangle without area is one part, whatever its length. The mesh must outlive it.
 class SurfaceParts {
  public:
   /// @throws Error if the step is not positive or there were more than 1e9 parts.
   SurfaceParts(const TriangleMesh& mesh, double step_m);
+
+  /// Widens a step that was chosen for so many samples, which by needles may become many more:
+  /// doubles it until a mesh has at most 16 parts for each sample and one for each triangle.
+  static double widened_m(const TriangleMesh& mesh, double step_m, double samples);
 
   /// Calls `visit(facet, part, sums)` for each part. Lots of neighbouring parts are visited in
   /// order, each with a copy of `empty`, and several lots at once; `take(sums)` is called for each

@@ -214,9 +214,12 @@ TrueDistance true_distance(const TriangleMesh& mesh, const TrueSurface& truth,
   check_mesh(mesh, "mesh", EmptyMesh::Refuse);
   check_truth(truth);
   if (!tolerances_m.empty()) check_tolerances(tolerances_m);
+  check_quarterings(fineness.quarterings);
   const double area_m2 = area_of(mesh);
   constexpr double samples = 1e5;
-  const double step_m = fineness.step_m == 0 ? std::sqrt(2 * area_m2 / samples) : fineness.step_m;
+  const double step_m = fineness.step_m == 0 ? SurfaceParts::widened_m(
+                                                   mesh, std::sqrt(2 * area_m2 / samples), samples)
+                                             : fineness.step_m;
   const SurfaceParts parts(mesh, step_m);
   const TrueMeasure measure(mesh, truth, tolerances_m, fineness.quarterings);
   const auto visit = [&](const Facet& facet, const SurfacePart& part, TrueLot& lot) {

@@ -75,7 +75,9 @@ class Consensus {
     if (near == not_covered) near = 0;
     const CoverAnswer answer =
         scans_[s].rated->surface.at({vertex.p, vertex.normal, vertex.sd_m}, 0, near);
-    return answer.cover == Cover::Inside ? answer.nearest.triangle : not_covered;
+    const std::uint32_t triangle = answer.nearest.triangle;
+    const bool is_seen = answer.cover == Cover::Inside && !scans_[s].rated->refutes(triangle);
+    return is_seen ? triangle : not_covered;
   }
 
   void vote(const QuiltVertex& vertex, std::size_t s, std::uint32_t triangle, Votes& votes) const {

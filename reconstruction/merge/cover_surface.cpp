@@ -90,7 +90,8 @@ CoverAnswer CoverSurface::at(const MeasuredPlace& place, double slack_m,
   if (!(answer.nearest.distance_m <= limits_.noise_sds * sd + limits_.apart_m + slack_m))
     return answer;
   const glm::vec3 normal = normals_[t.x] + normals_[t.y] + normals_[t.z];
-  if (!(glm::dot(normal, place.normal) >= limits_.least_cosine * glm::length(normal)))
+  const float length = glm::length(normal);
+  if (!(length > 0 && glm::dot(normal, place.normal) >= limits_.least_cosine * length))
     return answer;
   const glm::dvec3 from = place.p - answer.nearest.point, up = glm::normalize(normal);
   const double beside_m = glm::length(from - glm::dot(from, up) * up);

@@ -14,7 +14,7 @@ namespace groundray {
 
 /// How a point lies to a surface.
 enum class Cover : std::uint8_t {
-  None,    ///< too far from it, or turned too far
+  None,    ///< too far from it, or turned too far, or the surface has no normal there
   Border,  ///< beside it, by a tenth of a triangle's size or more: the nearest point is on its
            ///< border
   Inside,  ///< on it, within the limits

@@ -21,7 +21,8 @@ namespace {
 constexpr double least_cosine = 0.8660254;  // of 30 degrees, between normals
 constexpr double least_height = 1e-3;       // of a triangle, by its longest edge
 constexpr double full_turn = 2 * std::numbers::pi;
-constexpr double edge_rad = 1e-9;  // what rounding makes of no angle
+constexpr double edge_rad = 1e-9;         // what rounding makes of no angle
+constexpr std::size_t steps_each = 4096;  // call of progress
 
 /// For each vertex, the longest edge of its triangles.
 std::vector<double> sizes_at_vertices(const Quilt& quilt) {
@@ -83,16 +84,24 @@ struct Bridge {
 
 class Bridging {
  public:
-  explicit Bridging(const Quilt& quilt)
-      : quilt_(quilt), border_(quilt), sizes_m_(sizes_at_vertices(quilt)), tree_(places()) {}
+  Bridging(const Quilt& quilt, const Work& work)
+      : quilt_(quilt),
+        work_(work),
+        border_(quilt),
+        sizes_m_(sizes_at_vertices(quilt)),
+        tree_(places()) {}
 
   /// Returns the triangles to add.
   std::vector<glm::uvec3> run() {
-    for (const std::uint32_t from : border_.vertices()) {
+    const std::size_t count = border_.vertices().size();
+    for (std::size_t i = 0; i < count; ++i) {
+      if (i % steps_each == 0) report(0.5 * static_cast<double>(i) / static_cast<double>(count));
+      const std::uint32_t from = border_.vertices()[i];
       for (const std::uint32_t to : border_.after(from)) look_beside(from, to);
     }
     std::vector<glm::uvec3> added;
-    while (!queue_.empty()) {
+    for (std::size_t step = 0; !queue_.empty(); ++step) {
+      if (step % steps_each == 0) report(0.5);  // how many are to come is not known
       const glm::uvec3 t = queue_.top().t;
       queue_.pop();
       if (!border_.has(t.y, t.x)) continue;
@@ -109,6 +118,10 @@ class Bridging {
   }
 
  private:
+  void report(double share) const {
+    if (work_.progress) work_.progress(share);
+  }
+
   const glm::dvec3& p(std::uint32_t vertex) const { return quilt_.vertices[vertex].p; }
 
   std::vector<glm::dvec3> places() const {
@@ -238,6 +251,7 @@ class Bridging {
   }
 
   const Quilt& quilt_;
+  const Work& work_;
   OpenBorder border_;
   std::vector<double> sizes_m_;
   PointTree tree_;
@@ -247,13 +261,13 @@ class Bridging {
 }  // namespace
 
 std::size_t bridge_gaps(Quilt& quilt, std::span<const BeamSurface> scans,
-                        const CoverTolerance& tolerance, double interpolation) {
-  const std::vector<glm::uvec3> bridges = Bridging(quilt).run();
+                        const CoverTolerance& tolerance, double interpolation, const Work& work) {
+  const std::vector<glm::uvec3> bridges = Bridging(quilt, work).run();
   if (bridges.empty()) return 0;
   TriangleMesh mesh = mesh_of(quilt);
   mesh.triangles = bridges;
   const std::vector<char> is_passed =
-      find_passed(mesh, sds_of(quilt), scans, tolerance, interpolation);
+      find_passed(mesh, sds_of(quilt), scans, tolerance, interpolation, {});
   std::size_t added = 0;
   for (std::size_t i = 0; i < bridges.size(); ++i) {
     if (is_passed[i] != 0) continue;

@@ -6,6 +6,7 @@
 #include "reconstruction/merge/cover_surface.h"
 #include "reconstruction/merge/quilt.h"
 #include "reconstruction/merge/seen_through.h"
+#include "reconstruction/work.h"
 
 namespace groundray {
 
@@ -21,6 +22,6 @@ namespace groundray {
 /// @see Cohen-Steiner, Da, A greedy Delaunay-based surface reconstruction algorithm, The Visual
 ///      Computer 20(1) (2004), for the order.
 std::size_t bridge_gaps(Quilt& quilt, std::span<const BeamSurface> scans,
-                        const CoverTolerance& tolerance, double interpolation);
+                        const CoverTolerance& tolerance, double interpolation, const Work& work);
 
 }  // namespace groundray

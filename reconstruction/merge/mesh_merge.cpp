@@ -4,14 +4,19 @@
 
 #include <algorithm>
 #include <cmath>
+#include <cstddef>
+#include <cstdint>
 #include <glm/common.hpp>
+#include <iterator>
 #include <numbers>
-#include <numeric>
 #include <string>
+#include <utility>
+#include <vector>
 
 #include "core/error.h"
 #include "core/mesh_check.h"
 #include "core/model.h"
+#include "reconstruction/manifold_mesh.h"
 #include "reconstruction/merge/consensus.h"
 #include "reconstruction/merge/cover_surface.h"
 #include "reconstruction/merge/gap_bridge.h"
@@ -79,6 +84,39 @@ void check_memory(std::span<const ScanMesh> scans, const Work& work) {
       triangles, scans.size(), bytes / 1e6, static_cast<double>(work.most_bytes) / 1e6);
 }
 
+/// The median of the standard deviations that are known; 0 where none is.
+float median_sd_m(const MeasuredMesh& mesh) {
+  std::vector<float> known;
+  std::ranges::copy_if(mesh.sd_m, std::back_inserter(known), [](float sd_m) { return sd_m > 0; });
+  if (known.empty()) return 0;
+  const auto middle = known.begin() + static_cast<std::ptrdiff_t>(known.size() / 2);
+  std::ranges::nth_element(known, middle);
+  return *middle;
+}
+
+/// The standard deviations of each scan's vertices, with what stands for those not known; empty
+/// where no scan knows any.
+std::vector<std::vector<float>> sds_of(std::span<const ScanMesh* const> scans) {
+  std::vector<float> medians_m;
+  for (const ScanMesh* scan : scans) medians_m.push_back(median_sd_m(scan->mesh));
+  const float noisiest_m = std::ranges::max(medians_m);
+  std::vector<std::vector<float>> sds_m(scans.size());
+  for (std::size_t s = 0; s < scans.size() && noisiest_m > 0; ++s) {
+    sds_m[s] = scans[s]->mesh.sd_m;
+    sds_m[s].resize(scans[s]->mesh.shape.vertices_m.size());
+    std::ranges::replace(sds_m[s], 0.f, medians_m[s] > 0 ? medians_m[s] : noisiest_m);
+  }
+  return sds_m;
+}
+
+/// Work whose progress is from one share of another's to the next.
+Work part_of(const Work& work, double begin, double end) {
+  if (!work.progress) return {};
+  return {.progress = [&work, begin, end](double share) {
+    work.progress(begin + share * (end - begin));
+  }};
+}
+
 /// Amid the scans: there, floats tell places well.
 glm::dvec3 middle_of(std::span<const ScanMesh* const> scans) {
   ModelBounds all = bounds_of(scans.front()->mesh.shape);
@@ -96,7 +134,7 @@ TriangleMesh moved(const TriangleMesh& mesh, const glm::dvec3& by_m) {
   return out;
 }
 
-/// Merges scans that are sound and have triangles.
+/// Merges scans, more than one, that are sound and have triangles.
 class Merging {
  public:
   Merging(std::vector<const ScanMesh*> scans, const MergeLimits& limits, const Work& work)
@@ -105,16 +143,16 @@ class Merging {
         interpolation_(limits.interpolation),
         origin_m_(middle_of(scans_)),
         work_(work) {
-    for (const ScanMesh* scan : scans_) {
-      CoverSurface surface(moved(scan->mesh.shape, -origin_m_), scan->mesh.sd_m, limits_);
-      std::vector<float> worth = rate_faces(surface, scan->face_confidence);
+    std::vector<std::vector<float>> sds_m = sds_of(scans_);
+    for (std::size_t s = 0; s < scans_.size(); ++s) {
+      CoverSurface surface(moved(scans_[s]->mesh.shape, -origin_m_), std::move(sds_m[s]), limits_);
+      std::vector<float> worth = rate_faces(surface, scans_[s]->face_confidence);
       rated_.push_back({std::move(surface), std::move(worth), {}});
+      report(0.05 * static_cast<double>(s + 1) / static_cast<double>(scans_.size()));
     }
-    if (scans_.size() > 1) note_seen_through();
-    report(0.1);
-    covers_ = find_covers(rated_);
-    report(0.4);
-    kept_ = keep_best_faces(rated_, covers_, interpolation_);
+    note_seen_through();
+    covers_ = find_covers(rated_, part_of(work_, 0.1, 0.4));
+    kept_ = keep_best_faces(rated_, covers_, interpolation_, part_of(work_, 0.4, 0.6));
     note_shared();
     report(0.6);
   }
@@ -125,12 +163,11 @@ class Merging {
     for (std::size_t s = 0; s < scans_.size(); ++s) {
       asked.push_back({&rated_[s], &scans_[s]->mesh, &covers_[s]});
     }
-    if (scans_.size() > 1) {
-      counts_.bridged = bridge_gaps(quilt, beams_, limits_, interpolation_);
-      counts_.filled = fill_slits(quilt, rated_);
-      report(0.9);
-      counts_.moved = move_to_consensus(quilt, asked);
-    }
+    counts_.bridged =
+        bridge_gaps(quilt, beams_, limits_, interpolation_, part_of(work_, 0.85, 0.88));
+    counts_.filled = fill_slits(quilt, rated_, part_of(work_, 0.88, 0.9));
+    report(0.9);
+    counts_.moved = move_to_consensus(quilt, asked);
     MergedMesh merged{.mesh = finished(quilt), .counts = counts_};
     report(1);
     return merged;
@@ -146,7 +183,8 @@ class Merging {
       beams_.push_back({&rated_[s], scans_[s]->origins_m});
       for (glm::dvec3& origin_m : beams_.back().origins_m) origin_m -= origin_m_;
     }
-    std::vector<std::vector<char>> passed = find_seen_through(beams_, limits_, interpolation_);
+    std::vector<std::vector<char>> passed =
+        find_seen_through(beams_, limits_, interpolation_, part_of(work_, 0.05, 0.1));
     for (std::size_t s = 0; s < scans_.size(); ++s) {
       counts_.seen_through += static_cast<std::size_t>(std::ranges::count(passed[s], char{1}));
       rated_[s].is_refuted = std::move(passed[s]);
@@ -213,7 +251,7 @@ class Merging {
           numbers[v] = static_cast<std::uint32_t>(quilt.vertices.size());
           quilt.vertices.push_back({.p = surface.mesh().vertices_m[v],
                                     .normal = surface.normals()[v],
-                                    .sd_m = mesh.sd_m.empty() ? 0 : mesh.sd_m[v],
+                                    .sd_m = static_cast<float>(surface.sd_m(v)),
                                     .confidence = mesh.confidence.empty() ? 1 : mesh.confidence[v],
                                     .label = mesh.labels.empty() ? no_label : mesh.labels[v],
                                     .scan = static_cast<std::uint32_t>(s),
@@ -278,6 +316,40 @@ class Merging {
   MergeCounts counts_;
 };
 
+template <typename T>
+std::vector<T> taken(const std::vector<T>& values, const std::vector<std::uint32_t>& which) {
+  std::vector<T> out;
+  for (std::size_t i = 0; i < which.size() && !values.empty(); ++i) out.push_back(values[which[i]]);
+  return out;
+}
+
+/// One scan as a surface with borders: nothing moves.
+MergedMesh alone(const MeasuredMesh& mesh) {
+  const std::size_t vertices = mesh.shape.vertices_m.size();
+  MergedMesh out;
+  std::vector<glm::uvec3>& triangles = out.mesh.shape.triangles;
+  triangles = mesh.shape.triangles;
+  out.counts.left_out = drop_conflicts(triangles, vertices);
+  const std::vector<std::uint32_t> copies =
+      part_fans(triangles, vertices, pair_edges(triangles, vertices));
+  std::vector<std::uint32_t> numbers(vertices + copies.size(), no_vertex), sources;
+  for (glm::uvec3& t : triangles) {
+    for (int k = 0; k < 3; ++k) {
+      const std::uint32_t v = t[k];
+      if (numbers[v] == no_vertex) {
+        numbers[v] = static_cast<std::uint32_t>(sources.size());
+        sources.push_back(v < vertices ? v : copies[v - vertices]);
+      }
+      t[k] = numbers[v];
+    }
+  }
+  out.mesh.shape.vertices_m = taken(mesh.shape.vertices_m, sources);
+  out.mesh.sd_m = taken(mesh.sd_m, sources);
+  out.mesh.labels = taken(mesh.labels, sources);
+  out.mesh.confidence = taken(mesh.confidence, sources);
+  return out;
+}
+
 }  // namespace
 
 MergedMesh merge(std::span<const ScanMesh> scans, const MergeLimits& limits, const Work& work) {
@@ -289,7 +361,10 @@ MergedMesh merge(std::span<const ScanMesh> scans, const MergeLimits& limits, con
   }
   check_memory(scans, work);
   if (seen.empty()) return {};
-  return Merging(std::move(seen), limits, work).run();
+  if (seen.size() > 1) return Merging(std::move(seen), limits, work).run();
+  MergedMesh made = alone(seen.front()->mesh);
+  if (work.progress) work.progress(1);
+  return made;
 }
 
 }  // namespace groundray

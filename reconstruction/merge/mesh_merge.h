@@ -41,11 +41,15 @@ struct MergedMesh {
 /// Merges scans that are in one frame. Where several saw the same surface the triangles of the one
 /// that saw it best are kept, the others' are cut at their border and share its vertices, gaps
 /// between borders that are no longer than the triangles beside them are bridged, and each vertex
-/// moves along its normal to where all scans have the surface in the mean. One scan stays as it is.
-/// Does not depend on the number of threads.
+/// moves along its normal to where all scans have the surface in the mean. Of one scan nothing
+/// moves: it is made the surface that MergedMesh is, in little time. Does not depend on the number
+/// of threads.
 /// @param scans  in any order, which matters where two are worth the same. Standard deviations,
-///               labels and confidences are carried along if any scan has them; those of a scan
-///               that has none are 0 m, 0 and 1.
+///               labels and confidences are carried along if any scan has them; labels and
+///               confidences of a scan that has none are 0 and 1. A standard deviation of 0, or
+///               none, is one that is not known: where any is, it is taken to be the median of its
+///               scan's others or, where a scan knows none, that of the noisiest scan, so that what
+///               is not known never counts for more than what is.
 /// @throws Error naming every fault of a scan or of the limits, or if it takes too much memory.
 /// @see Turk, Levoy, Zippered polygon meshes from range images (1994).
 MergedMesh merge(std::span<const ScanMesh> scans, const MergeLimits& limits, const Work& work = {});

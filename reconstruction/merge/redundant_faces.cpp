@@ -207,10 +207,15 @@ class Selection {
     }
   }
 
-  std::vector<std::vector<char>> run() && {
+  std::vector<std::vector<char>> run(const Work& work) && {
     // The best come first, so that what is kept already is worth more.
-    for (const RankedFace& face : ranked(scans_))
-      kept_[face.scan][face.triangle] = is_covered(face.scan, face.triangle) ? 0 : 1;
+    const std::vector<RankedFace> faces = ranked(scans_);
+    for (std::size_t i = 0; i < faces.size(); ++i) {
+      if (i % 16384 == 0 && work.progress)
+        work.progress(static_cast<double>(i) / static_cast<double>(faces.size()));
+      kept_[faces[i].scan][faces[i].triangle] =
+          is_covered(faces[i].scan, faces[i].triangle) ? 0 : 1;
+    }
     for (std::size_t s = 0; s < scans_.size(); ++s) close_holes(s);
     for (std::size_t s = 0; s < scans_.size(); ++s) remove_islands(s);
     return std::move(kept_);
@@ -302,15 +307,18 @@ std::vector<float> worth_of_vertices(const RatedSurface& rated) {
   return sums;
 }
 
-std::vector<VertexCovers> find_covers(std::span<const RatedSurface> scans) {
+std::vector<VertexCovers> find_covers(std::span<const RatedSurface> scans, const Work& work) {
   std::vector<VertexCovers> covers;
   for (const RatedSurface& scan : scans) {
     const std::size_t vertices = scan.surface.mesh().vertices_m.size();
     covers.push_back({scans.size(), std::vector(vertices * scans.size(), not_covered)});
   }
-  for (std::size_t s = 0; s < scans.size(); ++s) {
-    for (std::size_t by = 0; by < scans.size(); ++by) {
+  const std::size_t count = scans.size();
+  for (std::size_t s = 0; s < count; ++s) {
+    for (std::size_t by = 0; by < count; ++by) {
       if (s != by) note_covers(scans[s].surface, scans[by], by, covers[s]);
+      if (work.progress)
+        work.progress(static_cast<double>(s * count + by + 1) / static_cast<double>(count * count));
     }
   }
   return covers;
@@ -318,8 +326,8 @@ std::vector<VertexCovers> find_covers(std::span<const RatedSurface> scans) {
 
 std::vector<std::vector<char>> keep_best_faces(std::span<const RatedSurface> scans,
                                                std::span<const VertexCovers> covers,
-                                               double interpolation) {
-  return Selection(scans, covers, interpolation).run();
+                                               double interpolation, const Work& work) {
+  return Selection(scans, covers, interpolation).run(work);
 }
 
 }  // namespace groundray

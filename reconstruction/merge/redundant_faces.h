@@ -6,6 +6,7 @@
 #include <vector>
 
 #include "reconstruction/merge/cover_surface.h"
+#include "reconstruction/work.h"
 
 namespace groundray {
 
@@ -43,7 +44,7 @@ struct VertexCovers {
 };
 
 /// Returns those of each scan.
-std::vector<VertexCovers> find_covers(std::span<const RatedSurface> scans);
+std::vector<VertexCovers> find_covers(std::span<const RatedSurface> scans, const Work& work);
 
 /// Returns for each scan which of its triangles to keep. A triangle is redundant where each place
 /// of it is covered by one that is kept, is another scan's, and is worth more, or as much in an
@@ -56,6 +57,6 @@ std::vector<VertexCovers> find_covers(std::span<const RatedSurface> scans);
 /// @see Turk, Levoy, Zippered polygon meshes from range images (1994), section 4.1.
 std::vector<std::vector<char>> keep_best_faces(std::span<const RatedSurface> scans,
                                                std::span<const VertexCovers> covers,
-                                               double interpolation);
+                                               double interpolation, const Work& work);
 
 }  // namespace groundray

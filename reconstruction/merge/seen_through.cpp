@@ -125,8 +125,8 @@ std::vector<char> at_marked(const TriangleMesh& mesh, const std::vector<char>& i
 }  // namespace
 
 std::vector<std::vector<char>> find_seen_through(std::span<const BeamSurface> scans,
-                                                 const CoverTolerance& limits,
-                                                 double interpolation) {
+                                                 const CoverTolerance& limits, double interpolation,
+                                                 const Work& work) {
   const std::size_t count = scans.size();
   const RayDevice device;
   std::vector<std::vector<Passage>> passages(count * count);  // of each scan's triangles and beams
@@ -139,6 +139,9 @@ std::vector<std::vector<char>> find_seen_through(std::span<const BeamSurface> sc
       if (other == s) continue;
       passages[s * count + other] = triangles.passed_by(scans[other]);
       for (const Passage& passage : passages[s * count + other]) passed[s][passage.triangle] = 1;
+      if (work.progress)
+        work.progress(static_cast<double>(s * count + other + 1) /
+                      static_cast<double>(count * count));
     }
   }
   std::vector<std::vector<char>> refuted;
@@ -159,12 +162,14 @@ std::vector<std::vector<char>> find_seen_through(std::span<const BeamSurface> sc
 
 std::vector<char> find_passed(const TriangleMesh& mesh, std::span<const float> sd_m,
                               std::span<const BeamSurface> scans, const CoverTolerance& tolerance,
-                              double interpolation) {
+                              double interpolation, const Work& work) {
   const RayDevice device;
   const LongTriangles triangles(device, mesh, sd_m, tolerance, interpolation);
   std::vector<char> is_passed(mesh.triangles.size());
-  for (const BeamSurface& scan : scans) {
-    for (const Passage& passage : triangles.passed_by(scan)) is_passed[passage.triangle] = 1;
+  for (std::size_t s = 0; s < scans.size(); ++s) {
+    for (const Passage& passage : triangles.passed_by(scans[s])) is_passed[passage.triangle] = 1;
+    if (work.progress)
+      work.progress(static_cast<double>(s + 1) / static_cast<double>(scans.size()));
   }
   return is_passed;
 }

@@ -6,6 +6,7 @@
 
 #include "reconstruction/merge/cover_surface.h"
 #include "reconstruction/merge/redundant_faces.h"
+#include "reconstruction/work.h"
 
 namespace groundray {
 
@@ -22,13 +23,13 @@ struct BeamSurface {
 /// between their corners are looked at: one beam is enough to tell that they bridge something.
 /// @param interpolation  how far, for each metre of its longest edge, that may be.
 std::vector<std::vector<char>> find_seen_through(std::span<const BeamSurface> scans,
-                                                 const CoverTolerance& limits,
-                                                 double interpolation);
+                                                 const CoverTolerance& limits, double interpolation,
+                                                 const Work& work);
 
 /// Returns which of some triangles, long ones as above, beams of any scan have passed.
 /// @param sd_m  of each vertex.
 std::vector<char> find_passed(const TriangleMesh& mesh, std::span<const float> sd_m,
                               std::span<const BeamSurface> scans, const CoverTolerance& tolerance,
-                              double interpolation);
+                              double interpolation, const Work& work);
 
 }  // namespace groundray

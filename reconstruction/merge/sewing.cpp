@@ -2,6 +2,7 @@
 
 #include <algorithm>
 #include <array>
+#include <cstdint>
 #include <glm/geometric.hpp>
 #include <span>
 #include <tuple>
@@ -78,6 +79,9 @@ std::vector<std::uint32_t> border_before(const Quilt& quilt) {
   return before;
 }
 
+/// Which corner of a triangle is alone: the others lie the other way.
+enum class LoneCorner : std::uint8_t { Inside, Outside };
+
 /// Takes a patch's triangles over into a quilt.
 class Sewing {
  public:
@@ -117,12 +121,13 @@ class Sewing {
     } else {
       int odd = 0;  // the corner that is alone
       while (is_in[static_cast<std::size_t>(odd)] != (inside == 1)) ++odd;
-      clip({t[odd], t[(odd + 1) % 3], t[(odd + 2) % 3]}, inside == 1);
+      clip({t[odd], t[(odd + 1) % 3], t[(odd + 2) % 3]},
+           inside == 1 ? LoneCorner::Inside : LoneCorner::Outside);
     }
   }
 
-  /// @param t  the first corner is inside and the others outside, or the other way about.
-  void clip(const glm::uvec3& t, bool is_first_inside) {
+  /// @param t  its first corner is the one that is alone.
+  void clip(const glm::uvec3& t, LoneCorner lone) {
     const std::uint32_t leaving = crossings_.at(key_of(t.x, t.y));
     const std::uint32_t coming = crossings_.at(key_of(t.z, t.x));
     if (leaving == no_vertex || coming == no_vertex) {
@@ -131,7 +136,7 @@ class Sewing {
     }
     ++counts_.clipped;
     std::vector<std::uint32_t> loop;
-    if (is_first_inside) {
+    if (lone == LoneCorner::Inside) {
       loop = {taken(t.y), taken(t.z)};
       append_border(coming, leaving, t, loop);
     } else {
@@ -286,12 +291,14 @@ SewingCounts sew(Quilt& quilt, Quilt patch, const CoverTolerance& limits) {
   return Sewing(quilt, patch, found).run();
 }
 
-std::size_t fill_slits(Quilt& quilt, std::span<const RatedSurface> seen) {
+std::size_t fill_slits(Quilt& quilt, std::span<const RatedSurface> seen, const Work& work) {
   const std::vector<std::uint32_t> before = border_before(quilt);
   const std::vector<double> round_m2 = areas_round(quilt);
   std::vector<char> is_done(before.size());
   std::size_t added = 0;
   for (std::uint32_t begin = 0; begin < before.size(); ++begin) {
+    if (begin % 4096 == 0 && work.progress)
+      work.progress(static_cast<double>(begin) / static_cast<double>(before.size()));
     if (before[begin] == no_vertex || is_done[begin] != 0) continue;
     std::vector<std::uint32_t> loop;
     for (std::uint32_t v = begin; v != no_vertex && is_done[v] == 0; v = before[v]) {

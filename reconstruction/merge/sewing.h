@@ -6,6 +6,7 @@
 #include "reconstruction/merge/cover_surface.h"
 #include "reconstruction/merge/quilt.h"
 #include "reconstruction/merge/redundant_faces.h"
+#include "reconstruction/work.h"
 
 namespace groundray {
 
@@ -30,6 +31,6 @@ SewingCounts sew(Quilt& quilt, Quilt patch, const CoverTolerance& limits);
 /// that was seen. The sides of a slit may overlap a little; the outline of a patch is no slit.
 /// @param seen  the surfaces that were, but for what is refuted.
 /// @return the number of triangles added.
-std::size_t fill_slits(Quilt& quilt, std::span<const RatedSurface> seen);
+std::size_t fill_slits(Quilt& quilt, std::span<const RatedSurface> seen, const Work& work);
 
 }  // namespace groundray

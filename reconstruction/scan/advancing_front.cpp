@@ -7,6 +7,9 @@
 
 #include <CGAL/Advancing_front_surface_reconstruction.h>
 #include <CGAL/Exact_predicates_inexact_constructions_kernel.h>
+#include <CGAL/Spatial_sort_traits_adapter_3.h>
+#include <CGAL/property_map.h>
+#include <CGAL/spatial_sort.h>
 
 #include <algorithm>
 #include <array>
@@ -15,6 +18,8 @@
 #include <glm/common.hpp>
 #include <glm/geometric.hpp>
 #include <iterator>
+#include <limits>
+#include <numeric>
 #include <unordered_map>
 #include <utility>
 
@@ -32,7 +37,8 @@ using Tetrahedra = CGAL::Delaunay_triangulation_3<
                 CGAL::Advancing_front_surface_reconstruction_vertex_base_3<Kernel>,
                 CGAL::Advancing_front_surface_reconstruction_cell_base_3<Kernel>>>;
 using QueuedEdge = Tetrahedra::Vertex::Radius_ptr_type;  // how good its candidate is, and where
-constexpr std::size_t bytes_each = 2000;                 // that a point takes, at most
+constexpr std::size_t bytes_each = 2000;  // that a point takes: 550 to 2200 of a lidar
+constexpr std::size_t most_each = 8000;   // that it may take
 using Triple = std::array<std::size_t, 3>;
 
 // Numbers things by the order in which they are first asked for, as long as it is there.
@@ -105,15 +111,19 @@ std::vector<std::uint32_t> distinct(std::span<const glm::dvec3> points_m, FrontM
   return order;
 }
 
-// Whether all points are so near to a line that nothing can be told of a surface.
-bool are_on_a_line(const std::vector<Point>& points, double near_m) {
+// Whether all points are on a line but for what rounding does.
+// @param rounding_m  of their coordinates.
+bool are_on_a_line(const std::vector<Point>& points, double rounding_m) {
+  constexpr double near_share = 1e-12;  // of how far they reach
   if (points.size() < 3) return true;
   const Point& from = points.front();
   const Point& to = *std::ranges::max_element(
       points, {}, [&](const Point& p) { return CGAL::squared_distance(from, p); });
+  const double reach_m = std::sqrt(CGAL::squared_distance(from, to));
+  const double near_m = near_share * reach_m + rounding_m;
   return std::ranges::all_of(points, [&](const Point& p) {
     const double twice_area = std::sqrt(CGAL::cross_product(to - from, p - from).squared_length());
-    return twice_area <= near_m * std::sqrt(CGAL::squared_distance(from, to));
+    return twice_area <= near_m * reach_m;
   });
 }
 
@@ -143,14 +153,33 @@ class Plausibility {
   mutable std::size_t seen_ = 0;
 };
 
+// Inserts points one by one in an order along which neighbours follow each other, as CGAL does.
+void insert(const std::vector<Point>& points, const AscendingMemory& memory,
+            Tetrahedra& tetrahedra) {
+  using Places = CGAL::Pointer_property_map<Point>::const_type;
+  std::vector<std::size_t> order(points.size());
+  std::iota(order.begin(), order.end(), std::size_t{0});
+  CGAL::spatial_sort(order.begin(), order.end(),
+                     CGAL::Spatial_sort_traits_adapter_3<Kernel, Places>(
+                         CGAL::make_property_map(points), Kernel()));
+  Tetrahedra::Vertex_handle last;
+  for (const std::size_t i : order) {
+    last = tetrahedra.insert(points[i], last);
+    last->info() = i;
+    if (memory.is_used_up())
+      throw Error(
+          "surface between points: {} points make more tetrahedra than there are {} MB for, as "
+          "those on few lines do; thin them out along their lines, or link them as scans",
+          points.size(), memory.bytes() / 1'000'000);
+  }
+}
+
 std::vector<Triple> triangles_between(const std::vector<Point>& points, double longest_perimeter_m,
                                       const Work& work) {
   const Arrivals arrivals;
-  AscendingMemory memory(points.size() * bytes_each + 100'000);
+  const AscendingMemory memory(std::min(work.most_bytes, points.size() * most_each + 1'000'000));
   Tetrahedra tetrahedra;
-  std::vector<std::pair<Point, std::size_t>> numbered;
-  for (std::size_t i = 0; i < points.size(); ++i) numbered.emplace_back(points[i], i);
-  tetrahedra.insert(numbered.begin(), numbered.end());
+  insert(points, memory, tetrahedra);
   CGAL::Advancing_front_surface_reconstruction<Tetrahedra, Plausibility> front(
       tetrahedra, Plausibility(longest_perimeter_m, points.size(), work));
   front.run();
@@ -275,11 +304,14 @@ FrontMesh advance_front(std::span<const glm::dvec3> points_m, double longest_per
   FrontMesh out;
   const std::vector<std::uint32_t> taken = distinct(points_m, out);
   std::vector<Point> points;
+  double farthest_m = 0;  // from zero along an axis
   for (const std::uint32_t i : taken) {
+    const glm::dvec3 size_m = glm::abs(points_m[i]);
+    farthest_m = std::max({farthest_m, size_m.x, size_m.y, size_m.z});
     const glm::dvec3 p = points_m[i] - glm::round(points_m[taken.front()]);
     points.emplace_back(p.x, p.y, p.z);
   }
-  if (are_on_a_line(points, 1e-9 * longest_perimeter_m)) return out;
+  if (are_on_a_line(points, farthest_m * std::numeric_limits<double>::epsilon())) return out;
   take_triangles(points_m, taken, triangles_between(points, longest_perimeter_m, work), out);
   wind(out, origins_m);
   if (work.progress) work.progress(1);

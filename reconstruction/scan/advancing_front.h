@@ -32,8 +32,9 @@ struct FrontMesh {
 ///                   counter-clockwise as seen from where most of their area was seen from. Or
 ///                   none: then closed pieces face outwards and others upwards.
 /// @throws Error if longest_perimeter_m is not positive, origins are neither none nor one for each
-///         point, a finite point is farther than 1e15 m from zero along an axis, or more memory is
-///         needed than `work` allows.
+///         point, a finite point is farther than 1e15 m from zero along an axis, more memory is
+///         needed than `work` allows, or the tetrahedra take more than 8000 bytes a point: for
+///         points on two lines that pass each other they grow as the square.
 /// @see Cohen-Steiner, Da, A greedy Delaunay-based surface reconstruction algorithm, The Visual
 ///      Computer 20 (2004).
 FrontMesh advance_front(std::span<const glm::dvec3> points_m, double longest_perimeter_m,

@@ -11,7 +11,7 @@ namespace groundray {
 /// use it are told of no other, since CGAL's allocators are of a type alone.
 class AscendingMemory {
  public:
-  /// @param bytes  that are there; what is asked for beyond comes from elsewhere.
+  /// @param bytes  that are there; what is asked for beyond comes from elsewhere, in any order.
   explicit AscendingMemory(std::size_t bytes)
       : outer_(current()),
         bytes_(bytes),
@@ -32,10 +32,19 @@ class AscendingMemory {
   void* take(std::size_t bytes, std::size_t alignment) noexcept {
     void* place = block_.get() + used_;
     std::size_t left = bytes_ - used_;
-    if (std::align(alignment, bytes, place, left) == nullptr) return nullptr;
+    if (std::align(alignment, bytes, place, left) == nullptr) {
+      is_used_up_ = true;
+      return nullptr;
+    }
     used_ = bytes_ - left + bytes;
     return place;
   }
+
+  std::size_t bytes() const noexcept { return bytes_; }
+
+  /// Whether more was asked for than there is. It is not thrown: what is amid a change of its
+  /// structure could not be taken down.
+  bool is_used_up() const noexcept { return is_used_up_; }
 
   bool owns(const void* place) const noexcept {
     const std::less<const void*> is_before;
@@ -45,6 +54,7 @@ class AscendingMemory {
  private:
   AscendingMemory* outer_;
   std::size_t bytes_, used_ = 0;
+  bool is_used_up_ = false;
   std::unique_ptr<std::byte[]> block_;
 };
 

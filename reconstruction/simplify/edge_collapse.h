@@ -12,8 +12,10 @@ namespace groundray {
 
 /// Collapses edges one by one, each time the cheapest that the rules allow: what one costs is the
 /// sum of squares of distances from the planes of triangles, by their area, times this area: what
-/// stands for much already is spared. A collapse that they do
-/// not allow is tried again only after the surface changed beside the vertex that was to leave.
+/// stands for much already is spared. It is that of when the surface last changed beside the vertex
+/// that is to leave: what this may move onto can have taken in more since, from farther off, which
+/// the order does not know. A collapse that they do not allow is tried again only after the surface
+/// changed beside that vertex.
 class EdgeCollapse {
  public:
   /// @param line_weight  of planes through the edges of lines, upright on the surface, by the

@@ -50,7 +50,7 @@ struct EdgeSurroundings {
     glm::dvec3 begin_m{0}, end_m{0};
   };
   std::span<const BorderEdge> borders;
-  std::optional<glm::dvec3> middle_m;  ///< of the vertices round it; asked for if all else fails
+  std::optional<glm::dvec3> middle_m;  ///< of the vertices round it; for when all else fails
 };
 
 /// Returns the place that changes the border's area, the volume, and squares of both least, and of

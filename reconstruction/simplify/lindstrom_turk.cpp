@@ -39,6 +39,13 @@ glm::dvec3 origin_amid(const TriangleMesh& mesh) {
   return glm::round(0.5 * (bounds.low_m + bounds.high_m));
 }
 
+// The largest coordinate, which rounds most.
+double farthest_m(const TriangleMesh& mesh) {
+  const ModelBounds bounds = bounds_of(mesh);
+  const glm::dvec3 away = glm::max(glm::abs(bounds.low_m), glm::abs(bounds.high_m));
+  return std::max({away.x, away.y, away.z});
+}
+
 // Numbers what is left of `mesh` anew.
 void take_triangles(const CollapsibleMesh& mesh, const std::vector<glm::dvec3>& places_m,
                     std::vector<std::uint32_t>& numbers, TriangleMesh& out) {
@@ -82,17 +89,19 @@ ReducedMesh result_of(const CollapsibleMesh& mesh, const std::vector<glm::dvec3>
   return out;
 }
 
-void collapse_to(std::size_t triangles, bool is_flat, const Work& work, CollapsibleMesh& mesh,
-                 std::vector<glm::dvec3>& places_m, Merges& merges) {
+void collapse_to(std::size_t triangles, bool is_flat, double away_m, const Work& work,
+                 CollapsibleMesh& mesh, std::vector<glm::dvec3>& places_m, Merges& merges) {
   constexpr double looking = 0.1;  // of the time, at all edges first
   const auto tell = [&](double share) {
     if (work.progress) work.progress(share);
   };
+  constexpr std::uint64_t edges_each = 16384;  // that were looked at, a call of progress
   const std::size_t first = mesh.triangles();
-  VolumeCollapse collapse(mesh, places_m, is_flat ? Overhang::Refuse : Overhang::Allow,
+  VolumeCollapse collapse(mesh, places_m, {is_flat ? Overhang::Refuse : Overhang::Allow, away_m},
                           [&](double share) { tell(looking * share); });
-  for (std::size_t steps = 0; mesh.triangles() > triangles; ++steps) {
-    if (steps % 1024 == 0) {
+  for (std::uint64_t next = 0; mesh.triangles() > triangles;) {
+    if (collapse.looked_at() >= next) {
+      next = collapse.looked_at() + edges_each;
       tell(looking + (1 - looking) * static_cast<double>(first - mesh.triangles()) /
                          static_cast<double>(first - triangles));
     }
@@ -102,7 +111,12 @@ void collapse_to(std::size_t triangles, bool is_flat, const Work& work, Collapsi
   }
 }
 
-void check_memory(const TriangleMesh& mesh, const Work& work) {
+void check_size(const TriangleMesh& mesh, const Work& work) {
+  constexpr std::size_t most_triangles = 1'400'000'000;  // whose half-edges 32 bits can number
+  if (mesh.triangles.size() >= most_triangles) {
+    throw Error("reducing a mesh: {} triangles must be fewer than {}; cut the mesh in parts",
+                mesh.triangles.size(), most_triangles);
+  }
   constexpr std::size_t bytes_each = 500;  // triangle, measured
   if (mesh.triangles.size() > work.most_bytes / bytes_each) {
     throw Error(
@@ -118,7 +132,7 @@ void check_memory(const TriangleMesh& mesh, const Work& work) {
 ReducedMesh reduce(const TriangleMesh& mesh, std::size_t triangles, const Work& work) {
   check_mesh(mesh, "mesh to reduce", EmptyMesh::Refuse);
   if (triangles == 0) throw Error("reducing a mesh: triangles = 0 must be at least 1");
-  check_memory(mesh, work);
+  check_size(mesh, work);
   const ManifoldMesh manifold = cut_to_manifold(mesh);
   const bool is_flat = is_height_field(manifold.shape);
   const glm::dvec3 origin_m = origin_amid(mesh);
@@ -128,7 +142,8 @@ ReducedMesh reduce(const TriangleMesh& mesh, std::size_t triangles, const Work& 
   Merges merges;
   merges.into.resize(manifold.sources.size());
   std::iota(merges.into.begin(), merges.into.end(), 0u);
-  if (rest.triangles() > triangles) collapse_to(triangles, is_flat, work, rest, places_m, merges);
+  if (rest.triangles() > triangles)
+    collapse_to(triangles, is_flat, farthest_m(mesh), work, rest, places_m, merges);
   ReducedMesh out = result_of(rest, places_m, manifold, merges, mesh, origin_m);
   out.tangled_edges = manifold.tangled_edges;
   out.dropped = manifold.dropped;

@@ -2,7 +2,9 @@
 
 #include <algorithm>
 #include <functional>
+#include <optional>
 #include <utility>
+#include <vector>
 
 #include "core/error.h"
 #include "reconstruction/simplify/cost_knee.h"
@@ -90,7 +92,10 @@ class Simplifier {
                                     const Stage& stage) const;
   bool tighten(const TriangleMesh& local, double error_m, double share,
                Tolerances& tolerances) const;
-  Simplified result_of(const Remainder& remainder, HaltReason reason) const;
+  bool keep_covered(const std::vector<VerticalDistance>& distances, const Tolerances& tolerances,
+                    std::vector<bool>& stay_covered) const;
+  Simplified result_of(const Remainder& remainder, HaltReason reason,
+                       std::optional<VerticalError> vertical = {}) const;
   Simplified measured(Simplified result, TriangleMesh local) const;
 
   SimplifyOriginal original_;
@@ -104,12 +109,46 @@ void run(EdgeCollapse& collapse, const Stage& stage) {
   }
 }
 
+// Notes what is too far above or below a result. Returns whether nothing is.
+bool Simplifier::keep_covered(const std::vector<VerticalDistance>& distances,
+                              const Tolerances& tolerances, std::vector<bool>& stay_covered) const {
+  const double rounding_m = 1e-12 * original_.size_m();
+  bool is_near = true;
+  for (std::size_t i = 0; i < distances.size(); ++i) {
+    const auto tolerance_m = static_cast<double>(tolerances.each_m[i]);
+    if (distances[i].above_m <= (1 + 1e-9) * tolerance_m + rounding_m) continue;
+    stay_covered[i] = true;
+    is_near = false;
+  }
+  return is_near;
+}
+
+// What a border withdrew from is kept with the border, but another may have come nearer. Each round
+// begins anew and does not withdraw from what was too far in the one before; the last but one from
+// nothing.
 Simplified Simplifier::bounded_above(const Tolerances& tolerances) const {
-  Workpiece piece = original_.workpiece(options_, tolerances);
-  VerticalRules rules(piece, tolerances.border_m);
-  EdgeCollapse collapse(piece, rules, 0);
-  run(collapse, {work_});
-  return result_of(Remainder(piece), HaltReason::Bound);
+  const std::vector<glm::dvec3>& places_m = original_.surface().mesh().vertices_m;
+  std::vector<bool> stay_covered(places_m.size());
+  double begin = 0;
+  for (std::size_t round = 1; round < most_rounds; ++round) {
+    const double end = 0.9 + 0.1 * begin;
+    Workpiece piece = original_.workpiece(options_, tolerances);
+    VerticalRules rules(piece, tolerances.border_m, stay_covered, original_.rounding_m());
+    EdgeCollapse collapse(piece, rules, 0);
+    run(collapse, {work_, begin, end});
+    const Remainder remainder(piece);
+    const auto distances = vertical_distances(places_m, remainder.local);
+    if (keep_covered(distances, tolerances, stay_covered)) {
+      Simplified result = result_of(remainder, HaltReason::Bound, sum_up(distances));
+      result.rounds = round;
+      return result;
+    }
+    if (round + 2 == most_rounds) stay_covered.assign(places_m.size(), true);
+    begin = end;
+  }
+  Simplified result = result_of(Remainder(free_piece()), HaltReason::Bound);
+  result.rounds = most_rounds;
+  return result;
 }
 
 Workpiece Simplifier::bounded_around(const Tolerances& tolerances, const Stage& stage) const {
@@ -220,10 +259,12 @@ Simplified Simplifier::operator()(const FaceBudget& halt) const {
   return measured(std::move(result), std::move(local));
 }
 
-Simplified Simplifier::result_of(const Remainder& remainder, HaltReason reason) const {
+Simplified Simplifier::result_of(const Remainder& remainder, HaltReason reason,
+                                 std::optional<VerticalError> vertical) const {
   Simplified result{.sources = picked(original_.sources(), remainder.sources),
                     .halted_by = reason,
-                    .repairs = original_.repairs()};
+                    .repairs = original_.repairs(),
+                    .vertical = vertical};
   // Positions to the last bit.
   result.mesh.shape = {
       picked(original_.mesh().shape.vertices_m, result.sources), remainder.local.triangles, {}};
@@ -235,7 +276,7 @@ Simplified Simplifier::measured(Simplified result, TriangleMesh local) const {
   result.mesh.sd_m = picked(mesh.sd_m, result.sources);
   result.mesh.labels = picked(mesh.labels, result.sources);
   result.mesh.confidence = picked(mesh.confidence, result.sources);
-  if (!original_.hangs_over() && overhanging_triangle(local) == none)
+  if (!result.vertical && !original_.hangs_over() && overhanging_triangle(local) == none)
     result.vertical = vertical_error(original_.surface().mesh().vertices_m, local);
   result.error =
       two_sided_error(original_.surface(), ClosestPoint(std::move(local)), options_.fineness);

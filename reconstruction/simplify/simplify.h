@@ -17,7 +17,9 @@ namespace groundray {
 /// Stop before any vertex of the original is farther than this above or below the result, and its
 /// border, as seen from above, farther than `border_m` from the result's. For terrain: no triangle
 /// may hang over, and none does in the result. A vertex that is beyond the result's border is
-/// measured at the border's nearest point in the plan, which is at most `border_m` aside.
+/// measured at the border's nearest point in the plan, which is at most `border_m` aside; where
+/// parts of the surface lie above each other or touch, as a VerticalDistance. It is so measured of
+/// each result, at every vertex, and holds but for rounding.
 struct VerticalBound {
   double error_m = 0;
   double border_m = 0;
@@ -72,7 +74,8 @@ struct SimplifyOptions {
 
 /// Why no more edges were collapsed.
 enum class HaltReason {
-  Bound,   ///< every further collapse would break a bound
+  Bound,   ///< every further collapse would break a bound, move a line that is kept by more than
+           ///< it, or do what Shape says; where nothing is left but Shape it is Bound as well
   Budget,  ///< there were as few triangles as asked
   Knee,    ///< the knee was reached
   Shape    ///< every further collapse would turn triangles over or change what is connected
@@ -92,8 +95,10 @@ struct Simplified {
   std::vector<std::uint32_t> sources;  ///< of each vertex: which of the original, or the nearest
   HaltReason halted_by = HaltReason::Bound;
   MeshRepairs repairs;
-  /// Runs that it took, for a DistanceBound until a proof of the whole holds: one but for rounding,
-  /// as each collapse is proved; if it does not for 20 of them nothing is simplified.
+  /// Runs that it took. For a DistanceBound until a proof of the whole holds: one but for rounding,
+  /// as each collapse is proved. For heights until all are measured to be within the bound: one
+  /// where borders do not move over what others withdrew from. If that is not so for 20 of them
+  /// nothing is simplified.
   std::size_t rounds = 1;
   TwoSidedError error;  ///< `forth` from the original to the result, `back` from there
   /// Of terrain, which hangs over neither before nor after: how far the original's vertices are

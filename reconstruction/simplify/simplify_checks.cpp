@@ -58,6 +58,11 @@ void check_simplify(const MeasuredMesh& mesh, const Halt& halt, const SimplifyOp
                 bad - mesh.sd_m.begin(), bad == mesh.sd_m.end() ? 0 : *bad);
   std::visit(HaltCheck{broken, mesh}, halt);
   broken.unless(options.crease_rad > 0, "crease_rad = {} must be positive", options.crease_rad);
+  const ErrorFineness& fineness = options.fineness;
+  broken.unless(fineness.samples > 0 && std::isfinite(fineness.samples),
+                "fineness.samples = {} must be positive", fineness.samples);
+  broken.unless(fineness.largest_share > 0 && fineness.largest_share < 1,
+                "fineness.largest_share = {} must be between 0 and 1", fineness.largest_share);
   constexpr std::size_t most_triangles = 1'400'000'000;
   broken.unless(mesh.shape.triangles.size() < most_triangles,
                 "{} triangles must be fewer than {}: part the mesh", mesh.shape.triangles.size(),

@@ -1,5 +1,6 @@
 #include "reconstruction/simplify/simplify_original.h"
 
+#include <algorithm>
 #include <cmath>
 #include <glm/common.hpp>
 #include <glm/geometric.hpp>
@@ -11,6 +12,15 @@
 
 namespace groundray {
 namespace {
+
+// As what measures the result afterwards needs it.
+bool has_area(const TriangleMesh& mesh) {
+  return std::ranges::any_of(mesh.triangles, [&](const glm::uvec3& t) {
+    const glm::dvec3& a_m = mesh.vertices_m[t.x];
+    const glm::dvec3 normal = glm::cross(mesh.vertices_m[t.y] - a_m, mesh.vertices_m[t.z] - a_m);
+    return glm::length(normal) > 0;
+  });
+}
 
 float float_at_most(double value) {
   const auto nearest = static_cast<float>(value);
@@ -36,6 +46,11 @@ SimplifyOriginal::SimplifyOriginal(const MeasuredMesh& mesh)
   // Whole metres, so that a mesh that is moved by such becomes the same.
   origin_m_ = glm::round(0.5 * (bounds.low_m + bounds.high_m));
   TriangleMesh local = localised(manifold_.shape);
+  if (!has_area(local)) {
+    throw Error(
+        "simplify: all {} triangles of the mesh are needles or points, so that there is no surface",
+        mesh.shape.triangles.size());
+  }
   manifold_.shape.vertices_m = {};
   surface_.emplace(std::move(local));
 }
@@ -46,8 +61,7 @@ TriangleMesh SimplifyOriginal::localised(TriangleMesh mesh) const {
 }
 
 Tolerances SimplifyOriginal::equal(double error_m, double border_m) const {
-  // Rounding takes what is on a line off it by less than this share of the size.
-  return {std::vector<float>(sources().size(), float_at_most(error_m)), border_m + 1e-14 * size_m_};
+  return {std::vector<float>(sources().size(), float_at_most(error_m)), border_m + rounding_m()};
 }
 
 Tolerances SimplifyOriginal::noise(double sds) const {

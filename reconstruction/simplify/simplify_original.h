@@ -23,7 +23,7 @@ struct Tolerances {
 class SimplifyOriginal {
  public:
   /// @param mesh  as check_simplify asks; must outlive this.
-  /// @throws Error if there is no triangle but what names a vertex twice.
+  /// @throws Error if there is no triangle but what names a vertex twice, or none has an area.
   explicit SimplifyOriginal(const MeasuredMesh& mesh);
 
   const MeasuredMesh& mesh() const noexcept { return mesh_; }
@@ -34,6 +34,8 @@ class SimplifyOriginal {
   const MeshRepairs& repairs() const noexcept { return repairs_; }
   bool hangs_over() const noexcept { return hangs_over_; }
   double size_m() const noexcept { return size_m_; }
+  /// Returns what rounding takes off a line that is on it, at most.
+  double rounding_m() const noexcept { return 1e-14 * size_m_; }
   /// Returns a mesh of the caller's frame in that of the surface.
   TriangleMesh localised(TriangleMesh mesh) const;
 

@@ -3,6 +3,7 @@
 #include <algorithm>
 #include <cmath>
 #include <glm/geometric.hpp>
+#include <utility>
 
 #include "reconstruction/simplify/plan_area.h"
 #include "reconstruction/simplify/vector_to_edge.h"
@@ -19,12 +20,16 @@ std::vector<glm::dvec3> places_of(const std::vector<Sample>& samples) {
 
 }  // namespace
 
-VerticalRules::VerticalRules(Workpiece& piece, std::optional<double> border_m)
+VerticalRules::VerticalRules(Workpiece& piece, std::optional<double> border_m,
+                             std::vector<bool> stay_covered, double rounding_m)
     : piece_(piece),
       border_m_(border_m),
+      stay_covered_(std::move(stay_covered)),
+      rounding_m_(rounding_m),
       lists_(piece.mesh.numbers()),
       borders_(piece.mesh, places_of(piece.samples)),
       is_covered_(piece.samples.size()) {
+  stay_covered_.resize(piece.samples.size());
   double sum_m2 = 0;
   for (std::uint32_t i = 0; i < piece.mesh.numbers(); ++i) sum_m2 += twice_plan_area_m2(i);
   // A tenth of a cell, which has two triangles.
@@ -109,8 +114,9 @@ bool VerticalRules::is_near(std::uint32_t vertex, std::size_t& sector) const noe
   return std::abs(sample.p_m.z - tip_m_.z - z) <= static_cast<double>(sample.tolerance_m);
 }
 
-double VerticalRules::most_aside_m(const Sample& sample) const noexcept {
-  return border_m_.value_or(static_cast<double>(sample.tolerance_m));
+double VerticalRules::most_aside_m(std::uint32_t vertex) const noexcept {
+  const double border_m = border_m_.value_or(double{piece_.samples[vertex].tolerance_m});
+  return stay_covered_[vertex] ? std::min(border_m, rounding_m_) : border_m;
 }
 
 // Whether the border's new edge is near enough, aside and above or below.
@@ -120,7 +126,7 @@ bool VerticalRules::is_near_border(std::uint32_t vertex) const noexcept {
   const glm::dvec2 edge = glm::dvec2(other_m - tip_m_), from = glm::dvec2(sample.p_m - tip_m_);
   const double share = std::clamp(glm::dot(edge, from) / glm::dot(edge, edge), 0.0, 1.0);
   const double z_m = share * (other_m.z - tip_m_.z);
-  return glm::length(from - share * edge) <= most_aside_m(sample) &&
+  return glm::length(from - share * edge) <= most_aside_m(vertex) &&
          std::abs(sample.p_m.z - tip_m_.z - z_m) <= static_cast<double>(sample.tolerance_m);
 }
 
@@ -137,7 +143,7 @@ bool VerticalRules::keeps_line() const {
     glm::dvec3 flat_m = sample.p_m, flat_tip_m = tip_m_, flat_other_m = other_m;
     flat_m.z = flat_tip_m.z = flat_other_m.z = 0;
     apart = vector_to_edge(flat_m, flat_tip_m, flat_other_m);
-    if (!(glm::length(apart) <= most_aside_m(sample))) return false;
+    if (!(glm::length(apart) <= most_aside_m(vertex))) return false;
   }
   return true;
 }

@@ -22,7 +22,10 @@ class VerticalRules final : public CollapseRules {
   /// @param piece     whose triangles all have an area as seen from above; must outlive this.
   /// @param border_m  that borders, and those of labels, may be aside; each vertex' tolerance if it
   ///                  is not given.
-  VerticalRules(Workpiece& piece, std::optional<double> border_m);
+  /// @param stay_covered  of each vertex, whether it stays within `rounding_m` of what covers it as
+  ///                      seen from above, whatever borders may do; none if empty.
+  VerticalRules(Workpiece& piece, std::optional<double> border_m,
+                std::vector<bool> stay_covered = {}, double rounding_m = 0);
 
   bool allow(const Star& star, const FeatureLines::Crossing& crossing, std::size_t to) override;
   void collapse(const Star& star, const FeatureLines::Crossing& crossing, std::size_t to) override;
@@ -43,13 +46,15 @@ class VerticalRules final : public CollapseRules {
   std::size_t nearest_sector(double x, double y) const noexcept;
   bool is_near(std::uint32_t vertex, std::size_t& sector) const noexcept;
   bool is_near_border(std::uint32_t vertex) const noexcept;
-  double most_aside_m(const Sample& sample) const noexcept;
+  double most_aside_m(std::uint32_t vertex) const noexcept;
   bool keeps_line() const;
   bool keeps_border(const Star& star, std::size_t to);
   bool keeps_samples(const Star& star);
 
   Workpiece& piece_;
   std::optional<double> border_m_;
+  std::vector<bool> stay_covered_;
+  double rounding_m_ = 0;
   double least_m2_ = 0;  // twice the area of a triangle, but where there are smaller ones
   TriangleLists lists_;
   BorderGrid borders_;

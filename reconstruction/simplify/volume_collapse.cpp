@@ -3,27 +3,30 @@
 #include <algorithm>
 #include <cmath>
 #include <glm/geometric.hpp>
+#include <limits>
 #include <utility>
 
 namespace groundray {
 namespace {
 
 // Whether a triangle is counter-clockwise from above, and by more than what moving it to its place
-// in the world rounds away.
-bool lies_flat(const glm::dvec3& a, const glm::dvec3& b, const glm::dvec3& c) {
+// in the world, `away_m` from the origin, rounds away: half an ulp of each coordinate.
+bool lies_flat(const glm::dvec3& a, const glm::dvec3& b, const glm::dvec3& c, double away_m) {
   const glm::dvec3 ab = b - a, ac = c - a, bc = c - b;
   const double longest2 = std::max({glm::dot(ab, ab), glm::dot(ac, ac), glm::dot(bc, bc)});
-  return ab.x * ac.y - ab.y * ac.x > 1e-6 * longest2;
+  const double rounding_m = 8 * std::numeric_limits<double>::epsilon() * away_m;
+  return ab.x * ac.y - ab.y * ac.x > std::max(1e-6 * longest2, rounding_m * std::sqrt(longest2));
 }
 
 }  // namespace
 
 VolumeCollapse::VolumeCollapse(CollapsibleMesh& mesh, std::vector<glm::dvec3>& places_m,
-                               Overhang overhang, const std::function<void(double share)>& tell)
+                               const Lie& lie, const std::function<void(double share)>& tell)
     : mesh_(mesh),
       places_m_(places_m),
-      overhang_(overhang),
+      lie_(lie),
       terms_(places_m.size()),
+      rings_(places_m.size()),
       is_border_(places_m.size()),
       changed_(places_m.size()),
       queue_(3 * mesh.numbers()) {
@@ -33,6 +36,11 @@ VolumeCollapse::VolumeCollapse(CollapsibleMesh& mesh, std::vector<glm::dvec3>& p
       terms_[mesh.from(h)].add(n);
       if (mesh.twin(h) == none) is_border_[mesh.from(h)] = is_border_[mesh.to(h)] = true;
     }
+  }
+  for (std::uint32_t vertex = 0; vertex < places_m.size(); ++vertex) {
+    if (!mesh.has_vertex(vertex)) continue;
+    mesh.gather(vertex, round_);
+    note_ring(round_);
   }
   for (HalfEdge h = 0; h < 3 * mesh.numbers(); ++h) {
     if (edge_of(h) == h) enter(h);
@@ -60,12 +68,24 @@ void VolumeCollapse::sum_up(std::uint32_t vertex) {
     before = after;
   }
   terms_[vertex] = term;
+  note_ring(round_);
+}
+
+void VolumeCollapse::note_ring(const Star& star) {
+  Ring ring{.count = static_cast<std::uint32_t>(star.ring.size())};
+  for (const std::uint32_t vertex : star.ring)
+    ring.sum_m += places_m_[vertex] - places_m_[star.centre];
+  if (star.is_open()) {
+    ring.first = star.ring.front();
+    ring.last = star.ring.back();
+  }
+  rings_[star.centre] = ring;
 }
 
 // Adds the edges of the border at a vertex, once each.
 void VolumeCollapse::add_borders(std::uint32_t vertex, const glm::dvec3& origin_m) {
   if (!is_border_[vertex]) return;
-  mesh_.gather(vertex, round_);
+  const Ring& ring = rings_[vertex];
   const glm::dvec3 centre_m = places_m_[vertex] - origin_m;
   const auto add = [&](const BorderEdge& edge) {
     for (const BorderEdge& known : borders_) {
@@ -73,23 +93,18 @@ void VolumeCollapse::add_borders(std::uint32_t vertex, const glm::dvec3& origin_
     }
     borders_.push_back(edge);
   };
-  add({centre_m, places_m_[round_.ring.front()] - origin_m});
-  add({places_m_[round_.ring.back()] - origin_m, centre_m});
+  add({centre_m, places_m_[ring.first] - origin_m});
+  add({places_m_[ring.last] - origin_m, centre_m});
 }
 
-// The mean of the vertices round an edge.
-glm::dvec3 VolumeCollapse::middle_round(HalfEdge h, const glm::dvec3& origin_m) {
-  const std::uint32_t a = mesh_.from(h), b = mesh_.to(h);
-  glm::dvec3 sum_m(0);
-  double count = 0;
-  for (const auto& [centre, other] : {std::pair(a, b), std::pair(b, a)}) {
-    mesh_.gather(centre, round_);
-    for (const std::uint32_t vertex : round_.ring) {
-      if (vertex == other) continue;
-      sum_m += places_m_[vertex] - origin_m;
-      ++count;
-    }
-  }
+// The mean of the vertices round an edge, from where it begins.
+glm::dvec3 VolumeCollapse::middle_round(HalfEdge h) const noexcept {
+  const Ring &a = rings_[mesh_.from(h)], &b = rings_[mesh_.to(h)];
+  const glm::dvec3 edge_m = places_m_[mesh_.to(h)] - places_m_[mesh_.from(h)];
+  // Without either end, each of which is in the other's ring.
+  const double more = static_cast<double>(b.count) - 1;
+  const double count = static_cast<double>(a.count) - 1 + more;
+  const glm::dvec3 sum_m = a.sum_m + b.sum_m + more * edge_m;
   return count > 0 ? sum_m / count : sum_m;
 }
 
@@ -108,16 +123,14 @@ std::optional<EdgePlacement> VolumeCollapse::placement(HalfEdge h) {
   add_borders(a, origin_m);
   add_borders(b, origin_m);
   edge.borders = borders_;
+  edge.middle_m = middle_round(h);
   auto found = place_edge(edge);
-  if (!found) {
-    edge.middle_m = middle_round(h, origin_m);
-    found = place_edge(edge);
-  }
   if (found) found->place_m += origin_m;
   return found;
 }
 
 void VolumeCollapse::enter(HalfEdge h) {
+  ++looked_at_;
   if (const auto found = placement(h); found && std::isfinite(found->cost)) {
     queue_.set(h, found->cost);
   } else {
@@ -146,7 +159,7 @@ bool VolumeCollapse::keeps_sides(const Star& star, std::uint32_t other,
     const glm::dvec3 &p = places_m_[a], &q = places_m_[b];
     const glm::dvec3 before = glm::cross(p - centre_m, q - centre_m);
     if (glm::dot(before, glm::cross(p - place_m, q - place_m)) < 0) return false;
-    if (overhang_ == Overhang::Refuse && !lies_flat(place_m, p, q)) return false;
+    if (lie_.overhang == Overhang::Refuse && !lies_flat(place_m, p, q, lie_.away_m)) return false;
   }
   return true;
 }

@@ -263,10 +263,10 @@ def test_other_peoples_files_with_poses_give_the_same_mesh(dataset, tmp_path):
     reconstruct("mesh", *files, *command, "-o", theirs)
     reconstruct("mesh", dataset, "--sensor", "rear", "-o", ours, "--report", tmp_path / "ours.json")
     a, b = (json.loads((tmp_path / name).read_text()) for name in ("ours.json", "theirs.json"))
-    # Their columns are azimuths, which the sensor's motion turns: some returns share a cell.
+    # Their columns come from times, the sensor's motion from the points: some returns share a cell.
     for ours_scan, theirs_scan in zip(a["scans"], b["scans"], strict=True):
         for count in ("used", "accepted_faces"):
-            assert ours_scan[count] == pytest.approx(theirs_scan[count], rel=0.1)
+            assert ours_scan[count] == pytest.approx(theirs_scan[count], rel=0.03)
     # A few vertices are where borders were clipped; the others where a beam met the ground,
     # or a little above or below: merging moves them to the mean of what scans interpolate.
     truth = np.concatenate([world(scan_of(dataset, "rear", frame)) for frame in range(3)])
@@ -283,7 +283,7 @@ def test_kitti_points_without_rings_are_meshed(dataset, tmp_path):
     assert farthest_from(as_table(scan, "x y z").astype("f8"), mesh.p[::7]) < 1e-6
     assert "sensor's frame" in said
     reconstruct("mesh", dataset, "--sensor", "top", "--frames", "0", "-o", tmp_path / "ours.ply")
-    assert len(mesh.faces) == pytest.approx(len(Mesh(tmp_path / "ours.ply").faces), rel=0.02)
+    assert len(mesh.faces) == pytest.approx(len(Mesh(tmp_path / "ours.ply").faces), rel=0.03)
 
 
 def test_poses_by_name_and_far_origin(tmp_path):

@@ -194,6 +194,14 @@ TEST(Agreement, NamesWhatIsWrong) {
     EXPECT_THAT(of({1, bad_m}), HasSubstr("must be positive and finite"));
   EXPECT_THAT(of({1}, [](std::uint32_t, const glm::dvec3&) { return 0.0; }),
               HasSubstr("no part of the surface has an area that counts"));
+  for (const double bad : {-1.0, std::nan(""), std::numeric_limits<double>::infinity()}) {
+    EXPECT_THAT(of({1}, [bad](std::uint32_t, const glm::dvec3&) { return bad; }),
+                HasSubstr("negative or not finite"));
+  }
+  EXPECT_THAT(message_of([&] {
+                static_cast<void>(agreement(mesh, mesh, std::vector{1.0}, {.quarterings = 13}));
+              }),
+              HasSubstr("quarterings = 13 must be at most 12"));
   EXPECT_THAT(
       message_of([&] { static_cast<void>(agreement(mesh, TriangleMesh{}, std::vector{1.0})); }),
       HasSubstr("there is no triangle"));

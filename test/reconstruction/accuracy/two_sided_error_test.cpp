@@ -7,6 +7,7 @@
 
 #include <cmath>
 #include <glm/geometric.hpp>
+#include <numbers>
 #include <random>
 #include <string>
 #include <vector>
@@ -160,6 +161,34 @@ TEST(TwoSidedError, IsTheSameForAnyNumberOfThreads) {
   EXPECT_EQ(one.back.at_most_m, five.back.at_most_m);
   EXPECT_EQ(one.mean_m(), five.mean_m());
   EXPECT_EQ(one.rms_m(), five.rms_m());
+}
+
+// A fan of needles, and a triangle without area that is far longer than the rest.
+TEST(TwoSidedError, OfNeedlesIsMeasuredInReasonableTime) {
+  constexpr unsigned count = 150'000;
+  TriangleMesh disc{{{0, 0, 0}}, {}, {}};
+  for (unsigned i = 0; i < count; ++i) {
+    const double angle = 2 * std::numbers::pi * i / count;
+    disc.vertices_m.emplace_back(std::cos(angle), std::sin(angle), 0);
+    disc.triangles.emplace_back(0, 1 + i, 1 + (i + 1) % count);
+  }
+  const TriangleMesh plate{
+      {{-1, -1, 0.5}, {1, -1, 0.5}, {1, 1, 0.5}, {-1, 1, 0.5}}, {{0, 1, 2}, {0, 2, 3}}, {}};
+  const OneSidedError fan = MeshDistance(disc, plate).error();
+  EXPECT_LE(fan.mean.at_least_m, 0.5);
+  EXPECT_GE(fan.mean.at_most_m, 0.5);
+  EXPECT_NEAR(fan.mean.value_m, 0.5, 1e-9);
+  EXPECT_NEAR(fan.at_most_m, 0.5, 1e-9);
+  TriangleMesh spiked = plate;
+  for (glm::dvec3& p_m : spiked.vertices_m) p_m.z = 0;
+  spiked.vertices_m.insert(spiked.vertices_m.end(), {{5000, -1, 0}, {10000, -1, 0}});
+  spiked.triangles.emplace_back(0, 4, 5);
+  const OneSidedError spike = MeshDistance(spiked, plate).error();
+  const double far_m = std::hypot(9999, 0.5);  // from the plate's corner
+  EXPECT_LE(spike.at_least_m, far_m + 1e-9);
+  EXPECT_GE(spike.at_most_m, far_m - 1e-9);
+  EXPECT_GE(spike.at_least_m, 0.9 * far_m);
+  EXPECT_NEAR(spike.mean.value_m, 0.5, 1e-9);
 }
 
 TEST(TwoSidedError, NamesWhatIsWrong) {

@@ -3,6 +3,7 @@
 #include <gmock/gmock.h>
 #include <gtest/gtest.h>
 
+#include <algorithm>
 #include <cmath>
 #include <glm/vec3.hpp>
 #include <random>
@@ -60,6 +61,30 @@ TEST(VerticalError, IsThatOfTheTriangleAboveOrBelow) {
   EXPECT_NEAR(error.largest_m, check.largest_m, 1e-12);
   EXPECT_NEAR(error.rms_m, check.rms_m, 1e-12);
   EXPECT_EQ(error.aside_m, 0);
+}
+
+// Two decks, whichever is first, and a part of the lower one that the upper one does not cover.
+TEST(VerticalError, OfTwoStoreysIsThatOfTheNearest) {
+  for (const bool is_upper_first : {true, false}) {
+    TriangleMesh decks = slope;  // z = x / 2
+    for (const glm::dvec3& p_m : slope.vertices_m)
+      decks.vertices_m.emplace_back(0.5 * p_m.x, p_m.y, 20 + p_m.z);  // z = 20 + x
+    decks.triangles = {{0, 1, 2}, {0, 2, 3}, {4, 5, 6}, {4, 6, 7}};
+    if (is_upper_first) std::reverse(decks.triangles.begin(), decks.triangles.end());
+    const auto distances =
+        vertical_distances({{2, 3, 1.5}, {2, 7, 21}, {2, 3, 9}, {8, 3, 18}}, decks);
+    const double expected_m[] = {0.5, 1, 8, 14};
+    for (std::size_t i = 0; i < distances.size(); ++i) {
+      EXPECT_NEAR(distances[i].above_m, expected_m[i], 1e-13) << i;
+      EXPECT_EQ(distances[i].aside_m, 0) << i;
+    }
+    // Beyond the borders of both at once, and of the upper one alone.
+    const auto beyond = vertical_distances({{-1, 5, 19}, {-1, 5, 1}, {12, 5, 24}}, decks);
+    EXPECT_NEAR(beyond[0].above_m, 1, 1e-13);
+    EXPECT_NEAR(beyond[1].above_m, 1, 1e-13);
+    EXPECT_NEAR(beyond[2].above_m, 19, 1e-13);
+    EXPECT_NEAR(beyond[2].aside_m, 2, 1e-13);
+  }
 }
 
 TEST(VerticalError, RefusesWhatIsNoSurface) {

@@ -6,6 +6,7 @@
 #include <algorithm>
 #include <cmath>
 #include <glm/geometric.hpp>
+#include <limits>
 #include <memory>
 #include <numbers>
 #include <random>
@@ -147,6 +148,14 @@ TEST(AdvancingFront, BridgesNoGapBeyondTheLimit) {
   }
 }
 
+TEST(AdvancingFront, NeedsNoLimit) {
+  const Points points_m = ball_points(300);
+  const FrontMesh front = advance_front(points_m, 3);
+  EXPECT_EQ(testing::euler_number(front.mesh), 2);
+  for (const double limit_m : {1e9, std::numeric_limits<double>::infinity()})
+    EXPECT_EQ(advance_front(points_m, limit_m).mesh.triangles, front.mesh.triangles);
+}
+
 TEST(AdvancingFront, LeavesOutWhatIsRepeatedOrNotFinite) {
   Points points_m = ball_points(500);
   const std::size_t all = points_m.size();
@@ -169,6 +178,10 @@ TEST(AdvancingFront, OfTooLittleIsNothing) {
     EXPECT_TRUE(front.mesh.triangles.empty());
     EXPECT_TRUE(front.mesh.vertices_m.empty());
   }
+  Points line_m;  // on which coordinates are round to a nanometre
+  for (int i = 0; i < 50; ++i)
+    line_m.push_back(glm::dvec3(5e5, 5312345, 2e2) + (0.1 * i) * glm::dvec3(0.36, 0.48, 0.8));
+  EXPECT_TRUE(advance_front(line_m, 3).mesh.triangles.empty());
   EXPECT_EQ(advance_front(Points{p, p + step, p + glm::dvec3(1, 0, 0)}, 3).mesh.triangles.size(),
             1u);
 }
@@ -222,6 +235,23 @@ TEST(AdvancingFront, RefusesWhatItCannotLink) {
   EXPECT_THAT(message(points_m, 3, Points(9), {}), HasSubstr("9 origins for 10 points"));
   EXPECT_THAT(message(points_m, 3, {}, {.most_bytes = 100}), HasSubstr("10 points take about"));
   EXPECT_THAT(message({{0, 0, 1e16}}, 3, {}, {}), HasSubstr("point 0 must be within 1e+15 m"));
+}
+
+// Each edge along one line makes a tetrahedron with each along the other.
+TEST(AdvancingFront, RefusesLinesWhoseTetrahedraTakeTooMuch) {
+  Points points_m;
+  for (int i = 0; i < 500; ++i) {
+    points_m.emplace_back(0.01 * i, 0, 0);
+    points_m.emplace_back(0, 0.01 * i, 1);
+  }
+  try {
+    advance_front(points_m, 3);
+    FAIL() << "249 001 tetrahedra were linked";
+  } catch (const Error& error) {
+    EXPECT_THAT(error.what(), HasSubstr("1000 points make more tetrahedra than there are 9 MB"));
+  }
+  const Points ball_m = ball_points(100);  // nothing stays behind
+  EXPECT_EQ(testing::euler_number(advance_front(ball_m, 3).mesh), 2);
 }
 
 TEST(AdvancingFront, TellsHowFarItIsAndEndsWhenToldTo) {

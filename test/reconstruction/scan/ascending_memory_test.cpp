@@ -23,9 +23,12 @@ TEST(AscendingMemory, IsHandedOutInOrderHoweverMuchIsGivenBack) {
   }
 }
 
-TEST(AscendingMemory, GoesOnElsewhereWhereItEnds) {
+TEST(AscendingMemory, GoesOnElsewhereWhereItEndsAndTells) {
   const AscendingMemory memory(100);
-  std::vector<int, AscendingAllocator<int>> few(10, 1), many(1000, 2);
+  const std::vector<int, AscendingAllocator<int>> few(10, 1);
+  EXPECT_FALSE(memory.is_used_up());
+  const std::vector<int, AscendingAllocator<int>> many(1000, 2);
+  EXPECT_TRUE(memory.is_used_up());
   EXPECT_TRUE(memory.owns(few.data()));
   EXPECT_FALSE(memory.owns(many.data()));
   EXPECT_EQ(many.back(), 2);

@@ -8,9 +8,11 @@
 #include <array>
 #include <cmath>
 #include <cstdlib>
+#include <ctime>
 #include <filesystem>
 #include <glm/geometric.hpp>
 #include <limits>
+#include <numbers>
 #include <random>
 #include <stdexcept>
 #include <string>
@@ -155,6 +157,15 @@ TEST(LindstromTurk, LetsNoTriangleHangOver) {
   EXPECT_FALSE(reduce(testing::icosphere(3, 2).mesh, 100).is_height_field);
 }
 
+// Cells of 10 nm, at places that are rounded to some 1 nm.
+TEST(LindstromTurk, LetsNoTriangleHangOverWhereItIsRounded) {
+  TriangleMesh mesh = mesh_of(testing::fractal(65, 1, 30, Seed{5}));
+  for (glm::dvec3& p : mesh.vertices_m) p = 1e-8 * p + glm::dvec3(5e5, 5e6, 300);
+  ASSERT_EQ(folds_in(mesh), 0u);
+  for (const std::size_t triangles : {4000u, 2000u, 300u, 40u})
+    EXPECT_EQ(folds_in(reduce(mesh, triangles).mesh), 0u) << triangles;
+}
+
 // Heights and the shift are multiples of 2^-10 m: positions about the origin are the same.
 TEST(LindstromTurk, DoesNotDependOnWhereTheOriginIs) {
   TriangleMesh near = mesh_of(hills(33));
@@ -213,6 +224,25 @@ TEST(LindstromTurk, OfAnyTrianglesIsASurface) {
     EXPECT_THAT(testing::surface_faults(reduced.mesh), IsEmpty()) << "trial " << trial;
     for (const glm::dvec3& p : reduced.mesh.vertices_m) EXPECT_TRUE(std::isfinite(glm::length(p)));
   }
+}
+
+// Each collapse changes what all edges of the middle cost.
+TEST(LindstromTurk, TakesAFanInLittleTime) {
+  constexpr unsigned count = 5000;
+  TriangleMesh disc{{{0, 0, 0}}, {}, {}};
+  for (unsigned i = 0; i < count; ++i) {
+    const double angle = 2 * std::numbers::pi * i / count;
+    disc.vertices_m.emplace_back(std::cos(angle), std::sin(angle), 0);
+    disc.triangles.emplace_back(0, 1 + i, 1 + (i + 1) % count);
+  }
+  std::size_t told = 0;
+  const std::clock_t begin = std::clock();
+  const ReducedMesh result = reduce(disc, count / 2, {.progress = [&](double) { ++told; }});
+  const double took_s = static_cast<double>(std::clock() - begin) / CLOCKS_PER_SEC;
+  EXPECT_LE(result.mesh.triangles.size(), count / 2);
+  EXPECT_LT(took_s, 2);
+  EXPECT_GT(told, 100u);
+  testing::record_margin("fan of 5000 triangles to half: CPU time", took_s, 2, "s");
 }
 
 TEST(LindstromTurk, KeepsOneTriangle) {

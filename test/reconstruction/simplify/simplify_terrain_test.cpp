@@ -165,6 +165,83 @@ TEST(SimplifyTerrain, BordersThatMoveDoNotCross) {
   }
 }
 
+// Two sheets of cells of 1 m, one `step_m` higher, on either side of a crack: teeth of both reach
+// between each other's, or it runs straight.
+TriangleMesh cracked_terrain(double teeth_m, double gap_m, double step_m, Random& random) {
+  constexpr unsigned side = 12;
+  TriangleMesh mesh;
+  for (int sheet = 0; sheet < 2; ++sheet) {
+    const auto first = static_cast<unsigned>(mesh.vertices_m.size());
+    for (unsigned row = 0; row < side; ++row) {
+      for (unsigned column = 0; column < side; ++column) {
+        // Every other row reaches out, the most at the crack.
+        const unsigned from_afar = sheet == 0 ? column : side - 1 - column;
+        const double out_m = row % 2 == 0 ? 0 : teeth_m * from_afar / (side - 1.0);
+        const double jitter_m = from_afar == side - 1 && teeth_m == 0 ? 0 : 0.05;
+        mesh.vertices_m.emplace_back(
+            sheet * (side - 1 + gap_m) + column + out_m + uniform(random, -jitter_m, jitter_m),
+            row + uniform(random, -0.05, 0.05), sheet * step_m + uniform(random, 0, 0.3));
+      }
+    }
+    for (unsigned row = 0; row + 1 < side; ++row) {
+      for (unsigned column = 0; column + 1 < side; ++column) {
+        const unsigned a = first + row * side + column, b = a + 1, c = a + side, d = c + 1;
+        mesh.triangles.insert(mesh.triangles.end(), {{a, b, c}, {b, d, c}});
+      }
+    }
+  }
+  return mesh;
+}
+
+// Terrain with a cliff or steep hills, of which a triangle in eight is left out.
+TriangleMesh torn_terrain(bool has_cliff, Random& random) {
+  TriangleMesh mesh = random_terrain(16, 0.1, 0.1, 0, random);
+  for (glm::dvec3& p : mesh.vertices_m)
+    p.z += has_cliff ? (p.x > 8.4 ? 50 : 0) : 20 * std::sin(0.9 * p.x) + 20 * std::cos(0.7 * p.y);
+  std::erase_if(mesh.triangles, [&](const glm::uvec3&) { return random() % 8 == 0; });
+  return mesh;
+}
+
+// By triangles above and below and by the border, searched one by one.
+double farthest_above_m(const TriangleMesh& original, const TriangleMesh& coarse) {
+  const testing::PlanBins bins(coarse);
+  const Border border = testing::border_of(coarse);
+  double farthest_m = 0;
+  for (const glm::dvec3& p : used_vertices(original)) {
+    const std::vector<double> heights_m = bins.heights_m(glm::dvec2(p));
+    double above_m = std::numeric_limits<double>::infinity();
+    for (const double height_m : heights_m) above_m = std::min(above_m, std::abs(height_m - p.z));
+    if (heights_m.empty()) above_m = from_border(p, coarse, border).above_m;
+    farthest_m = std::max(farthest_m, above_m);
+  }
+  return farthest_m;
+}
+
+// What one border withdrew from may be nearer to another's, which is elsewhere in height.
+TEST(SimplifyTerrain, IsWithinTheBoundWhereBordersMoveOverEachOther) {
+  Random random(8);
+  std::size_t mended = 0, left = 0, all = 0;
+  for (int i = 0; i < 60; ++i) {
+    TriangleMesh mesh;
+    if (i % 3 == 0) mesh = cracked_terrain(0.8, 0.3, 100, random);
+    if (i % 3 == 1) mesh = cracked_terrain(0, i % 2 == 0 ? 0 : 0.2, 100, random);
+    if (i % 3 == 2) mesh = torn_terrain(i % 2 == 0, random);
+    const VerticalBound halt{1, i % 3 == 2 ? 2.5 : 1};
+    const Simplified result = simplify({mesh}, halt, {.crease_rad = 4});
+    const TriangleMesh& coarse = result.mesh.shape;
+    ASSERT_TRUE(result.vertical);
+    EXPECT_LE(result.vertical->largest_m, halt.error_m * (1 + 1e-9));
+    EXPECT_LE(result.vertical->aside_m, halt.border_m * (1 + 1e-9));
+    EXPECT_LE(farthest_above_m(mesh, coarse), halt.error_m * (1 + 1e-9));
+    EXPECT_EQ(testing::check_plan({}, coarse).turned_over, 0u);
+    mended += result.rounds > 1 ? 1 : 0;
+    left += coarse.triangles.size();
+    all += mesh.triangles.size();
+  }
+  EXPECT_GT(mended, 10u);
+  EXPECT_LT(3 * left, 2 * all);
+}
+
 TEST(SimplifyTerrain, NoiseIsTakenAwayAndAStepIsNot) {
   Random random(5);
   std::normal_distribution<double> noise(0, 0.02);

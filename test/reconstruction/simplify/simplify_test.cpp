@@ -256,6 +256,13 @@ TEST(Simplify, RefusesWhatItCannotTake) {
               HasSubstr("sd_m of vertex 0 is nan"));
   EXPECT_THAT(fault({good, {}, {1, 2}}, CostKnee{}), HasSubstr("labels has 2 values"));
   EXPECT_THAT(fault({good}, CostKnee{}, {.crease_rad = 0}), HasSubstr("crease_rad = 0"));
+  EXPECT_THAT(fault({good}, CostKnee{}, {.fineness = {.samples = -1}}),
+              HasSubstr("fineness.samples = -1"));
+  EXPECT_THAT(fault({good}, CostKnee{}, {.fineness = {.largest_share = 1}}),
+              HasSubstr("fineness.largest_share = 1"));
+  TriangleMesh needles = good;
+  for (glm::dvec3& p_m : needles.vertices_m) p_m.y = p_m.z = 0;
+  EXPECT_THAT(fault({needles}, DistanceBound{1, 1}), HasSubstr("needles or points"));
   EXPECT_THAT(fault({good}, CostKnee{}, {}, {.most_bytes = 1000}), HasSubstr("32 triangles take"));
   TriangleMesh over = good;
   std::swap(over.triangles[5].x, over.triangles[5].y);
