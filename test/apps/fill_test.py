@@ -126,7 +126,7 @@ def read_voids(path):
         (["--bound", str(JACKSBORO)], "its samples are not those of the DEM"),
     ],
 )
-def test_faults_are_told_and_nothing_is_written(tmp_path, options, message):
+def test_faults_of_a_filling_are_told_and_nothing_is_written(tmp_path, options, message):
     peers.write_grid(tmp_path / "in.asc", np.ones((8, 8)))
     result = fill(tmp_path / "in.asc", "-o", tmp_path / "out.tif", *options)
     assert result.returncode == 1

@@ -307,7 +307,7 @@ def test_a_dem_is_a_terrain_again(prairie, tmp_path):
     assert np.array_equal(a.bands[:4], b.bands[:4], equal_nan=True)
 
 
-def test_bytes_do_not_depend_on_threads(prairie, tmp_path):
+def test_bytes_of_a_dem_do_not_depend_on_threads(prairie, tmp_path):
     for name, cpus in (("one", {min(os.sched_getaffinity(0))}), ("all", os.sched_getaffinity(0))):
         done(
             *("reconstruct", "dem", prairie / "data", "--cell-m", "0.25"),

@@ -685,6 +685,7 @@ def test_known_scene_is_built_anew_better_than_by_others(scans):
 
     for peer in ("advancing_front", "ball_pivoting"):
         assert total("groundray", "f1") >= total(peer, "f1"), runs
-        # Ball pivoting takes its time where points are dense: so at full resolution alone.
+        # Theirs grows faster with the points than groundray's: a tenth at full resolution.
         if is_full or peer == "advancing_front":
-            assert total("groundray", "cpu_s") <= 0.1 * total(peer, "cpu_s"), runs
+            share = 0.1 if is_full else 0.2
+            assert total("groundray", "cpu_s") <= share * total(peer, "cpu_s"), runs
