@@ -280,10 +280,9 @@ TEST(Disparity, RangesFollowDepths) {
   EXPECT_EQ(disparity_range(pair, 4.1, std::numeric_limits<double>::infinity()),
             (DisparityRange{-1, 26}));
   EXPECT_EQ(disparity_range(pair, 2, 8), (DisparityRange{11, 51}));
-  for (const auto& [nearest_m, farthest_m] :
-       {std::pair(0.0, 5.0), std::pair(3.0, 2.0), std::pair(-1.0, 2.0), std::pair(0.01, 2.0),
-        std::pair(1.0, std::nan(""))})
-    EXPECT_THAT([&] { disparity_range(pair, nearest_m, farthest_m); },
+  for (const auto& depths_m : {std::pair(0.0, 5.0), std::pair(3.0, 2.0), std::pair(-1.0, 2.0),
+                               std::pair(0.01, 2.0), std::pair(1.0, std::nan(""))})
+    EXPECT_THAT([&] { disparity_range(pair, depths_m.first, depths_m.second); },
                 ThrowsMessage<Error>(HasSubstr("the nearest depth must be")));
 }
 
