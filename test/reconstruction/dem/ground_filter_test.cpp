@@ -214,8 +214,7 @@ TEST(GroundFilter, TellsTrunksBushesAndBranchesForARobot) {
     // Threshold and slope take what is lower for ground, and bushes hide some of it.
     const Errors errors = errors_of(maker.scene, found, 0.4 + 0.5 * slope);
     EXPECT_LE(errors.ground_missed, 0.002) << slope;
-    // Compilers draw the coordinates in different orders: 0.048 in one such scene, 0.058 in
-    // another.
+    // Compilers draw the coordinates in different orders; one such scene has 0.058.
     EXPECT_LE(errors.above_taken, 0.08) << slope;
   }
 }
