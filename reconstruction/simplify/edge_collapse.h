@@ -14,8 +14,9 @@ namespace groundray {
 /// sum of squares of distances from the planes of triangles, by their area, times this area: what
 /// stands for much already is spared. It is that of when the surface last changed beside the vertex
 /// that is to leave: what this may move onto can have taken in more since, from farther off, which
-/// the order does not know. A collapse that they do not allow is tried again only after the surface
-/// changed beside that vertex.
+/// the order does not know. If it did, about a percent more or fewer triangles would be left, at
+/// most, and it would take longer. A collapse that they do not allow is tried again only after the
+/// surface changed beside that vertex.
 class EdgeCollapse {
  public:
   /// @param line_weight  of planes through the edges of lines, upright on the surface, by the

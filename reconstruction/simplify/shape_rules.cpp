@@ -38,11 +38,10 @@ bool ShapeRules::is_sound(const Star& star, std::size_t i) const {
 bool ShapeRules::allow(const Star& star, const FeatureLines::Crossing&, std::size_t to) {
   fan_ = Fan(star, to);
   tip_m_ = piece_.samples[star.ring[to]].p_m;
-  rim_m_.resize(fan_.triangles + 1);
-  for (std::size_t i = 0; i < rim_m_.size(); ++i)
-    rim_m_[i] = piece_.samples[star.ring[(fan_.first + i) % star.ring.size()]].p_m;
-  for (std::size_t i = 0; i < fan_.triangles; ++i) {
-    if (!is_sound(star, i)) return false;
+  rim_m_.clear();
+  for (std::size_t i = 0; i <= fan_.triangles; ++i) {
+    rim_m_.push_back(piece_.samples[star.ring[(fan_.first + i) % star.ring.size()]].p_m);
+    if (i > 0 && !is_sound(star, i - 1)) return false;
   }
   return piece_.mesh.may_collapse(star, to);
 }

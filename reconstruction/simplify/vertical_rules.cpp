@@ -48,32 +48,42 @@ bool VerticalRules::set_fan(const Star& star, std::size_t to) {
   is_open_ = star.is_open();
   tip_m_ = piece_.samples[star.ring[to]].p_m;
   spokes_.resize(fan_.triangles + 1);
-  for (std::size_t i = 0; i <= fan_.triangles; ++i) {
+  const auto place = [&](std::size_t i) {
     const glm::dvec3 d =
         piece_.samples[star.ring[(fan_.first + i) % star.ring.size()]].p_m - tip_m_;
     spokes_[i] = {.x = d.x, .y = d.y, .z = d.z};
-  }
+  };
+  place(0);
+  double smallest_m2 = -1;  // of this star's, found if any triangle is small
   for (std::size_t i = 0; i < fan_.triangles; ++i) {
+    place(i + 1);
     Spoke& a = spokes_[i];
     const Spoke& b = spokes_[i + 1];
     const double twice_m2 = a.x * b.y - a.y * b.x;
-    if (!(twice_m2 >= least_m2_) && !is_no_worse(twice_m2, i, star)) return false;
+    if (!(twice_m2 >= least_m2_)) [[unlikely]] {
+      if (is_narrow(twice_m2, i)) return false;
+      if (!(smallest_m2 >= 0)) smallest_m2 = smallest_of(star);
+      if (!(twice_m2 >= smallest_m2)) return false;
+    }
     a.slope_x = (a.z * b.y - b.z * a.y) / twice_m2;
     a.slope_y = (a.x * b.z - b.x * a.z) / twice_m2;
   }
   return true;
 }
 
-// Small triangles are allowed where there are smaller ones, unless doubles could not tell which
-// way round they are.
-bool VerticalRules::is_no_worse(double twice_m2, std::size_t i, const Star& star) const {
+// Whether doubles could not tell which way round a triangle of the fan is.
+bool VerticalRules::is_narrow(double twice_m2, std::size_t i) const noexcept {
   const Spoke &a = spokes_[i], &b = spokes_[i + 1];
   const double square_m2 = std::max({a.x * a.x + a.y * a.y, b.x * b.x + b.y * b.y});
-  if (!(twice_m2 > 1e-6 * square_m2)) return false;
+  return !(twice_m2 > 1e-6 * square_m2);
+}
+
+// Small triangles are allowed where there are smaller ones.
+double VerticalRules::smallest_of(const Star& star) const noexcept {
   double smallest_m2 = least_m2_;
   for (std::size_t k = 0; k < star.spokes.size(); ++k)
     smallest_m2 = std::min(smallest_m2, twice_plan_area_m2(star.triangle(k)));
-  return twice_m2 >= smallest_m2;
+  return smallest_m2;
 }
 
 // Which triangle of the fan is above or below a place, given from the tip.

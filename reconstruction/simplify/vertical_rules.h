@@ -41,7 +41,8 @@ class VerticalRules final : public CollapseRules {
 
   double twice_plan_area_m2(std::uint32_t triangle) const noexcept;
   bool set_fan(const Star& star, std::size_t to);
-  bool is_no_worse(double twice_m2, std::size_t i, const Star& star) const;
+  bool is_narrow(double twice_m2, std::size_t i) const noexcept;
+  double smallest_of(const Star& star) const noexcept;
   std::size_t sector_of(double x, double y) const noexcept;
   std::size_t nearest_sector(double x, double y) const noexcept;
   bool is_near(std::uint32_t vertex, std::size_t& sector) const noexcept;

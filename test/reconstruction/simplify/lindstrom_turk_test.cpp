@@ -226,25 +226,42 @@ TEST(LindstromTurk, OfAnyTrianglesIsASurface) {
   }
 }
 
-// Each collapse changes what all edges of the middle cost.
-TEST(LindstromTurk, TakesAFanInLittleTime) {
-  constexpr unsigned count = 5000;
+// A disc of needles round its middle.
+TriangleMesh fan_of(unsigned count) {
   TriangleMesh disc{{{0, 0, 0}}, {}, {}};
   for (unsigned i = 0; i < count; ++i) {
     const double angle = 2 * std::numbers::pi * i / count;
     disc.vertices_m.emplace_back(std::cos(angle), std::sin(angle), 0);
     disc.triangles.emplace_back(0, 1 + i, 1 + (i + 1) % count);
   }
+  return disc;
+}
+
+// CPU time of reducing a fan to half, the least of some: what else runs makes it longer.
+double fan_time_s(unsigned count) {
+  const TriangleMesh disc = fan_of(count);
+  double least_s = std::numeric_limits<double>::infinity();
+  for (int i = 0; i < 3; ++i) {
+    const std::clock_t begin = std::clock();
+    EXPECT_LE(reduce(disc, count / 2).mesh.triangles.size(), count / 2);
+    least_s = std::min(least_s, static_cast<double>(std::clock() - begin) / CLOCKS_PER_SEC);
+  }
+  return least_s;
+}
+
+// Each collapse changes what all edges of the middle cost: time grows with the square, 16-fold, but
+// not with the cube, 64-fold. The limit is amid them.
+TEST(LindstromTurk, TakesAFanInATimeThatGrowsWithTheSquare) {
+  constexpr double most = 32;
+  const double found = fan_time_s(2000) / fan_time_s(500);
+  EXPECT_LT(found, most);
+  testing::record_margin("fan of 2000 triangles to half: CPU time over that of 500", found, most);
+}
+
+TEST(LindstromTurk, TellsHowFarItIsWithinAFan) {
   std::size_t told = 0;
-  const std::clock_t begin = std::clock();
-  const ReducedMesh result = reduce(disc, count / 2, {.progress = [&](double) { ++told; }});
-  const double took_s = static_cast<double>(std::clock() - begin) / CLOCKS_PER_SEC;
-  EXPECT_LE(result.mesh.triangles.size(), count / 2);
-  constexpr double most_s =
-      30;  // minutes if the cost grows with the cube; a second, or ten checked
-  EXPECT_LT(took_s, most_s);
-  EXPECT_GT(told, 100u);
-  testing::record_margin("fan of 5000 triangles to half: CPU time", took_s, most_s, "s");
+  reduce(fan_of(2000), 1000, {.progress = [&](double) { ++told; }});
+  EXPECT_GT(told, 50u);
 }
 
 TEST(LindstromTurk, KeepsOneTriangle) {
@@ -322,7 +339,6 @@ double vertical_rms_m(const HeightGrid& grid, const TriangleMesh& mesh) {
 
 // What CGAL's own edge_collapse gave with this cost and placement, as other programs measured it.
 TEST(LindstromTurkProof, IsAsAccurateAsMeasuredElsewhereOnADem) {
-  if (testing::proof_size(0, 1) == 0) GTEST_SKIP() << "at full size only: takes five seconds";
   const HeightGrid grid = load_dem(testing::data_folder() / "terrain/jacksboro.tif").grid;
   const TriangleMesh mesh = mesh_of(grid);
   struct Case {
