@@ -4,15 +4,18 @@
 
 BUILD is the folder whose results/ `./dev test` and `./dev prove` wrote, build/release if not given,
 and GOLDEN that of the report of `./dev golden`, out/golden. Every test that a claim names must have
-run and passed; else nothing is written, and the tests are listed.
+run and passed; else nothing is written, and the tests are listed. A figure beyond its limit is no
+failure by itself: times are, where much else runs. It is told beside the claim and above the table.
 """
 
 import json
+import math
 import re
 import sys
 import xml.etree.ElementTree as ET
 from dataclasses import dataclass, field
 from datetime import date
+from fnmatch import fnmatchcase
 from pathlib import Path
 
 import yaml
@@ -21,6 +24,8 @@ ROOT = Path(__file__).resolve().parents[1]
 PAGE = ROOT / "docs/accuracy.md"
 BEGIN = "<!-- What follows is by docs/list_accuracy.py, of docs/claims.yaml and the last run. -->\n"
 END = "<!-- What follows is by hand. -->\n"
+AT_FULL_SIZE = "at full size only"  # so begins why a proof is skipped at a reduced size
+ROUNDING = 1e-9  # of a share: a figure that meets its limit is not over it
 
 
 class AccuracyError(Exception):
@@ -33,6 +38,8 @@ class Result:
 
     verdicts: set[str] = field(default_factory=set)  # passed, failed, skipped, not run
     margins: dict[str, tuple] = field(default_factory=dict)  # share, measured, tolerance, unit
+    sizes: set[str] = field(default_factory=set)  # full, reduced; none if there is but one
+    reasons: set[str] = field(default_factory=set)  # why it was skipped
 
     def add(self, verdict: str, margins: dict[str, tuple]) -> None:
         self.verdicts.add(verdict)
@@ -45,11 +52,12 @@ class Run:
 
     results: dict[str, Result] = field(default_factory=dict)
     days: set[date] = field(default_factory=set)
-    sizes: set[str] = field(default_factory=set)  # of proofs: full, reduced
     made_by: str = ""
 
-    def add(self, name: str, verdict: str, margins: dict[str, tuple] | None = None) -> None:
-        self.results.setdefault(name, Result()).add(verdict, margins or {})
+    def add(self, name: str, verdict: str, margins: dict[str, tuple] | None = None) -> Result:
+        result = self.results.setdefault(name, Result())
+        result.add(verdict, margins or {})
+        return result
 
 
 def keep_nearest(margins: dict[str, tuple], others: dict[str, tuple]) -> None:
@@ -86,11 +94,12 @@ def tests_of_claim(claim: dict, by_file: dict[str, list[str]], cases: list[str])
     """Returns the names of the tests and cases that hold a claim, none of which may be unknown."""
     names = []
     for test in claim.get("tests", []):
-        found = by_file.get(test) or [
+        is_file = test.endswith((".cpp", ".py"))
+        found = [
             name
-            for tests in by_file.values()
+            for file, tests in by_file.items()
             for name in tests
-            if name == test or (test.endswith(".*") and name.startswith(test[:-1]))
+            if fnmatchcase(file if is_file else name, test)
         ]
         if not found:
             raise AccuracyError(f"claims.yaml: '{claim['claim']}': there is no test '{test}'")
@@ -112,9 +121,34 @@ def verdict_of(test: ET.Element) -> str:
 
 
 def margin_of(text: str) -> tuple:
-    """Reads what test/support/margin.h writes."""
-    share, measured, tolerance, unit = text.split(" ", 3)
-    return float(share), float(measured), float(tolerance), unit
+    """Reads what test/support/margin.h writes, and tests in Python as it does."""
+    share, measured, tolerance, *unit = text.split(" ", 3)
+    nearest = math.inf if math.isnan(float(share)) else float(share)
+    return nearest, float(measured), float(tolerance), "".join(unit)
+
+
+def is_over(margin: tuple) -> bool:
+    return margin[0] > 1 + ROUNDING
+
+
+def reason_of(skipped: ET.Element) -> str:
+    """Returns what a test says of why it was skipped, without where in the source it says so."""
+    said = (skipped.get("message") or "").splitlines()
+    reason = " ".join(said[1:] if len(said) > 1 else said).strip()
+    return reason.replace(f"{ROOT}/", "").replace(f"{ROOT.parent}/", "../")
+
+
+def add_test(test: ET.Element, name: str, run: Run) -> None:
+    properties = {each.get("name"): each.get("value") for each in test.iter("property")}
+    margins = {
+        key.removeprefix("margin: "): margin_of(value)
+        for key, value in properties.items()
+        if key.startswith("margin: ")
+    }
+    result = run.add(name, verdict_of(test), margins)
+    if "size" in properties:
+        result.sizes.add(properties["size"])
+    result.reasons |= {reason_of(skipped) for skipped in test.iter("skipped")}
 
 
 def suite_of(name: str) -> str:
@@ -136,20 +170,16 @@ def read_cpp_results(file: Path, results: Path, run: Run) -> None:
         return
     for test in ET.parse(file).getroot().iter("testcase"):
         suite = suite_of(test.get("classname"))
-        properties = {each.get("name"): each.get("value") for each in test.iter("property")}
-        margins = {
-            name.removeprefix("margin: "): margin_of(value)
-            for name, value in properties.items()
-            if name.startswith("margin: ")
-        }
-        run.add(f"{suite}.{test.get('name').split('/')[0]}", verdict_of(test), margins)
-        run.sizes |= {properties["size"]} if "size" in properties else set()
+        add_test(test, f"{suite}.{test.get('name').split('/')[0]}", run)
         run.days.add(date.fromisoformat(test.get("timestamp")[:10]))
 
 
 def read_python_results(file: Path, run: Run) -> None:
+    """Takes these results in place of those that the run has of the same tests."""
+    found = Run()
     for test in ET.parse(file).getroot().iter("testcase"):
-        run.add(test.get("name").split("[")[0], verdict_of(test))
+        add_test(test, test.get("name").split("[")[0], found)
+    run.results |= found.results
     run.days.add(date.fromtimestamp(file.stat().st_mtime))
 
 
@@ -182,38 +212,70 @@ def read_run(build: Path, golden: Path) -> Run:
             raise AccuracyError(f"{file}: there are no results; run ./dev {command} first")
     for file in listed_results(build):
         read_cpp_results(file, build / "results", run)
-    read_python_results(python, run)
+    proofs = build / "results/python_proofs.xml"  # of `./dev prove`, at full size
+    for file in (python, proofs) if proofs.exists() else (python,):
+        read_python_results(file, run)
     read_golden_results(report, run)
     return run
 
 
 def number(value: float) -> str:
+    if 1000 <= abs(value) < 1e5:
+        return f"{value:.0f}"
     return f"{value:.3g}".replace("e-0", "e-").replace("e+0", "e")
 
 
-def text_of_margin(name: str, margin: tuple) -> str:
+def figure_of(name: str, margin: tuple) -> str:
     share, measured, tolerance, unit = margin
     if name == "golden":
         return f"golden: {share:.0%} of the tolerance at most".replace("%", " %")
     if tolerance == 1 and not unit:
         return f"{name}: {number(100 * measured)} % of the tolerance"
-    if tolerance == 0:
+    if tolerance == 0 and measured == 0:
         return f"{name}: none"
     return f"{name}: {number(measured)} of {number(tolerance)} {unit}".rstrip()
 
 
+def text_of_margin(name: str, margin: tuple) -> str:
+    told = " (**over its limit** in this run)" if is_over(margin) else ""
+    return figure_of(name, margin) + told
+
+
+def why_skipped(result: Result) -> str:
+    if result.reasons and all(reason.startswith(AT_FULL_SIZE) for reason in result.reasons):
+        return "runs at full size only"
+    return ": ".join(["needs what is absent", *sorted(result.reasons - {""})])
+
+
+def size_of(names: list[str], run: Run) -> str:
+    """Returns the size at which tests ran, if they are of those that grow."""
+    sizes = {name: run.results[name].sizes for name in names if run.results[name].sizes}
+    reduced = [name for name, of in sizes.items() if "reduced" in of]
+    if not sizes:
+        return ""
+    if len(reduced) == len(sizes):
+        return " at a reduced size"
+    return " at full size" + "".join(f", but for `{name}`" for name in reduced)
+
+
 def last_run(claim: dict, names: list[str], run: Run) -> str:
-    results = [run.results[name] for name in names]
-    skipped = [name for name in names if run.results[name].verdicts == {"skipped"}]
-    if len(skipped) == len(names):
-        return "not run here: what it needs is absent"
+    skipped = [name for name in names if "skipped" in run.results[name].verdicts]
+    ran = [name for name in names if run.results[name].verdicts != {"skipped"}]
+    if not ran:
+        whys = dict.fromkeys(why_skipped(run.results[name]) for name in skipped)
+        return "**not run here**: " + "; ".join(f"it {why}" for why in whys)
     margins = {}
-    for result in results:
-        keep_nearest(margins, result.margins)
-    chosen = [name for name in margins if name in claim.get("margins", margins)]
-    chosen = [name for name in chosen if name != "golden" or margins[name][0] > 0]
-    said = ["holds"] + [text_of_margin(name, margins[name]) for name in chosen]
-    said += [f"without `{name}`, which needs what is absent" for name in skipped]
+    for name in ran:
+        keep_nearest(margins, run.results[name].margins)
+    chosen = {name: margins[name] for name in margins if name in claim.get("margins", margins)}
+    is_all_held = not any(is_over(margin) for margin in chosen.values())
+    said = ["holds" + size_of(ran, run) + ("" if is_all_held else ", **but over a limit**")]
+    for name, margin in chosen.items():
+        if name != "golden" or margin[0] > 0:
+            said.append(text_of_margin(name, margin))
+    for name in skipped:
+        part = "a part of " if name in ran else ""
+        said.append(f"without {part}`{name}`, which {why_skipped(run.results[name])}")
     return "; ".join(said)
 
 
@@ -241,15 +303,43 @@ def check(names: list[list[str]], run: Run) -> None:
         raise AccuracyError("these hold claims but did not pass:\n  " + "\n  ".join(faults))
 
 
+def limits_told(run: Run) -> str:
+    """Returns how many figures of the run are over their limits, and which."""
+    margins = [
+        (test, name, margin)
+        for test, result in run.results.items()
+        for name, margin in result.margins.items()
+    ]
+    over = [f"`{test}`: {figure_of(name, of)}" for test, name, of in margins if is_over(of)]
+    if not over:
+        return f"None of the {len(margins)} figures that tests record is over its limit."
+    return (
+        f"**Over their limits in this run: {len(over)} of the {len(margins)} figures that tests "
+        f"record**: {'; '.join(over)}."
+    )
+
+
+def sizes_told(names: list[list[str]], run: Run) -> str:
+    """Returns how many rows ran at which size."""
+    sizes = [size_of(some, run) for some in names]
+    growing = len(sizes) - sizes.count("")
+    full, reduced = sizes.count(" at full size"), sizes.count(" at a reduced size")
+    mixed = growing - full - reduced
+    told = f"{full} ran at the size given here, {reduced} at a reduced size"
+    told += f", {mixed} at a reduced size in part" if mixed else ""
+    return f"{growing} of {len(sizes)} rows have tests of two sizes: {told}; each row says which."
+
+
 def table(claims: list[dict], run: Run) -> str:
     """Returns what stands between the page's two comments."""
     by_file, cases = tests_by_file(), golden_cases()
     names = [tests_of_claim(claim, by_file, cases) for claim in claims]
     check(names, run)
     days = sorted({min(run.days), max(run.days)})
-    size = "at the size given here" if run.sizes == {"full"} else "at a reduced size"
     lines = [
-        f"The last run: {run.made_by}, {' to '.join(map(str, days))}, proofs {size}.",
+        f"The last run: {run.made_by}, {' to '.join(map(str, days))}. {sizes_told(names, run)}",
+        "",
+        limits_told(run),
         "",
         "| claim | test | tolerance, and why | last run |",
         "|---|---|---|---|",

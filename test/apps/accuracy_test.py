@@ -2,6 +2,7 @@
 
 import importlib.util
 import json
+import re
 import subprocess
 from pathlib import Path
 
@@ -56,6 +57,38 @@ def test_the_names_in_the_sources_are_those_of_the_programs(library):
     assert names <= {name for tests in lister.tests_by_file().values() for name in tests}
 
 
+def test_what_proofs_say_of_their_size_can_be_told():
+    """Why a test is skipped is told apart by its words, and sizes are recorded as tests run."""
+    sources = [file.read_text() for file in ROOT.glob("test/**/*_test.cpp")]
+    skips = [
+        line
+        for text in sources
+        for line in re.findall(r"^.*proof_size\(.*\n?.*GTEST_SKIP.*$", text, re.MULTILINE)
+        if "GTEST_SKIP" in line
+    ]
+    for line in skips:
+        assert f'<< "{lister.AT_FULL_SIZE}' in line, f"must say '{lister.AT_FULL_SIZE}': {line}"
+    for text in sources:
+        assert not re.search(
+            r"^(const|static|constexpr|inline)\b.*proof_size\(", text, re.MULTILINE
+        )
+
+
+def test_claims_may_name_many_files_and_suites():
+    by_file = {"a_test.cpp": ["A.One"], "a_proof_test.cpp": ["AProof.Two"], "b_test.py": ["test_b"]}
+    for pattern, expected in (
+        ("a*_test.cpp", ["A.One", "AProof.Two"]),
+        ("A.*", ["A.One"]),
+        ("*Proof.*", ["AProof.Two"]),
+        ("test_b", ["test_b"]),
+    ):
+        claim = {"claim": "c", "tests": [pattern]}
+        assert lister.tests_of_claim(claim, by_file, []) == expected
+    for pattern in ("c*_test.cpp", "B.*", "A"):
+        with pytest.raises(lister.AccuracyError, match="there is no test"):
+            lister.tests_of_claim({"claim": "c", "tests": [pattern]}, by_file, [])
+
+
 CLAIMS = [
     {"claim": "a | b", "tests": ["Cubes.*"], "golden": ["lens"], "tolerance": "1e-9 px"},
     {"claim": "c", "tests": ["test_c"], "how": "by hand", "see": "sky.md", "tolerance": "none"},
@@ -64,9 +97,11 @@ CUBE = """<testsuites><testsuite name="All/Cubes"><testcase name="AreCubes/{0}" 
   result="completed" timestamp="2026-01-02T03:04:05.678" classname="All/Cubes"><properties>
   <property name="margin: side" value="{1} {1} 1 px"/>
   <property name="margin: range" value="{1} {1} 1 "/>
-  <property name="size" value="full"/></properties>{2}</testcase></testsuite></testsuites>"""
+  <property name="size" value="{3}"/></properties>{2}</testcase></testsuite></testsuites>"""
 PYTHON = """<testsuites><testsuite><testcase classname="x" name="test_c[1]">{}</testcase>
   </testsuite></testsuites>"""
+TIME = """<properties><property name="margin: time" value="{0} {0} 1 s"/>
+  <property name="size" value="{1}"/></properties>"""
 
 
 def measure(value, limit, verdict):
@@ -89,7 +124,7 @@ def folder(tmp_path, monkeypatch):
     results = [tmp_path / f"results/core/All/Cubes.AreCubes/{i}.xml" for i in range(2)]
     results[0].parent.mkdir(parents=True)
     for i, share in enumerate((0.25, 0.0123456)):
-        results[i].write_text(CUBE.format(i, share, ""))
+        write_cube(tmp_path, i, share)
     (tmp_path / "test/core_test[1]_tests.cmake").write_text(
         "".join(f"add_test([=[x]=] y [==[--gtest_output=xml:{file}]==])\n" for file in results)
     )
@@ -99,6 +134,15 @@ def folder(tmp_path, monkeypatch):
     monkeypatch.setattr(lister, "tests_by_file", lambda: by_file)
     monkeypatch.setattr(lister, "golden_cases", lambda: ["lens"])
     return tmp_path
+
+
+def write_cube(folder, i, share, inside="", size="full"):
+    path = folder / f"results/core/All/Cubes.AreCubes/{i}.xml"
+    path.write_text(CUBE.format(i, share, inside, size))
+
+
+def write_python(folder, inside, name="python"):
+    (folder / f"results/{name}.xml").write_text(PYTHON.format(inside))
 
 
 def write_report(folder, verdict):
@@ -111,26 +155,137 @@ def table(folder):
     return lister.table(CLAIMS, lister.read_run(folder, folder))
 
 
+def rows(folder):
+    """Returns what the last column says of the two claims."""
+    return [line.split(" | ")[-1].removesuffix(" |") for line in table(folder).splitlines()[-2:]]
+
+
 def test_the_table_tells_the_margin_that_is_nearest_its_tolerance(folder):
     made = table(folder)
     assert "version 0.1.0 (gcc), 2026-01-02 to 20" in made
-    assert "proofs at the size given here" in made
-    assert made.splitlines()[4:] == [
-        r"| a \| b | `Cubes.*`, golden `lens` | 1e-9 px | holds; side: 0.25 of 1 px; "
+    assert made.splitlines()[2:] == [
+        "None of the 3 figures that tests record is over its limit.",
+        "",
+        "| claim | test | tolerance, and why | last run |",
+        "|---|---|---|---|",
+        r"| a \| b | `Cubes.*`, golden `lens` | 1e-9 px | holds at full size; side: 0.25 of 1 px; "
         "range: 25 % of the tolerance; golden: 30 % of the tolerance at most |",
         "| c | `test_c` ([sky.md](sky.md)): by hand | none | holds |",
     ]
 
 
-def test_what_was_skipped_is_told(folder):
-    (folder / "results/python.xml").write_text(PYTHON.format("<skipped/>"))
-    assert table(folder).endswith("| none | not run here: what it needs is absent |\n")
+def test_what_is_over_its_limit_is_told_beside_it_and_above_the_table(folder):
+    write_cube(folder, 1, 1.25)
+    write_python(folder, TIME.format(2.18, "reduced"))
+    assert (
+        "**Over their limits in this run: 3 of the 4 figures that tests record**: "
+        "`Cubes.AreCubes`: side: 1.25 of 1 px; `Cubes.AreCubes`: range: 125 % of the tolerance; "
+        "`test_c`: time: 2.18 of 1 s."
+    ) in table(folder).splitlines()
+    assert rows(folder) == [
+        "holds at full size, **but over a limit**; side: 1.25 of 1 px (**over its limit** in this "
+        "run); range: 125 % of the tolerance (**over its limit** in this run); golden: 30 % of the "
+        "tolerance at most",
+        "holds at a reduced size, **but over a limit**; time: 2.18 of 1 s (**over its limit** in "
+        "this run)",
+    ]
+
+
+@pytest.mark.parametrize(
+    ("share", "is_over"),
+    [("1", False), ("1.0000000000000058", False), ("1.001", True), ("nan", True), ("inf", True)],
+)
+def test_a_limit_that_is_met_to_rounding_is_not_exceeded(folder, share, is_over):
+    write_cube(folder, 1, share)
+    assert ("over its limit** in" in table(folder)) == is_over
+    assert ("None of the 3 figures" in table(folder)) != is_over
+
+
+def test_a_figure_that_may_not_be_there_at_all_is_told():
+    assert lister.text_of_margin("rays", lister.margin_of("0 0 0 rays")) == "rays: none"
+    assert lister.text_of_margin("rays", lister.margin_of("inf 3 0 rays")) == (
+        "rays: 3 of 0 rays (**over its limit** in this run)"
+    )
+    assert lister.figure_of("bytes", lister.margin_of("0.4 414 1000 B")) == "bytes: 414 of 1000 B"
+    assert lister.figure_of("off", lister.margin_of("0.2 0.03 0.15")) == "off: 0.03 of 0.15"
+
+
+def test_a_figure_over_its_limit_is_told_where_no_row_shows_it(folder, monkeypatch):
+    write_cube(folder, 1, 1.25)
+    monkeypatch.setitem(CLAIMS[0], "margins", ["side"])
+    assert "side: 1.25 of 1 px" in rows(folder)[0]
+    assert "range" not in rows(folder)[0]
+    assert "`Cubes.AreCubes`: range: 125 % of the tolerance" in table(folder)
+
+
+@pytest.mark.parametrize(
+    ("sizes", "said", "above"),
+    [
+        (("full", "full"), "holds at full size", "1 ran at the size given here, 0 at a reduced"),
+        (("reduced", "reduced"), "holds at a reduced size", "0 ran at the size given here, 1 at a"),
+        (
+            ("reduced", "full"),  # of one test's parameters
+            "holds at a reduced size",
+            "0 ran at the size given here, 1 at a",
+        ),
+    ],
+)
+def test_each_row_tells_the_size_that_it_ran_at(folder, sizes, said, above):
+    for i, size in enumerate(sizes):
+        write_cube(folder, i, 0.5, size=size)
+    assert rows(folder)[0].startswith(said + ";")
+    assert rows(folder)[1] == "holds"  # has one size
+    assert "1 of 2 rows have tests of two sizes: " + above in table(folder)
+
+
+def test_a_row_of_both_sizes_names_what_was_reduced(folder, monkeypatch):
+    monkeypatch.setitem(CLAIMS[0], "tests", ["Cubes.*", "test_c"])
+    write_python(folder, TIME.format(0.5, "reduced"))
+    assert rows(folder)[0].startswith("holds at full size, but for `test_c`; side")
+    assert (
+        "2 of 2 rows have tests of two sizes: 0 ran at the size given here, 1 at a reduced size, "
+        "1 at a reduced size in part; each row says which."
+    ) in table(folder)
+
+
+def test_proofs_in_python_at_full_size_take_the_place_of_reduced_ones(folder):
+    write_python(folder, TIME.format(0.5, "reduced"))
+    assert rows(folder)[1] == "holds at a reduced size; time: 0.5 of 1 s"
+    write_python(folder, TIME.format(0.25, "full"), "python_proofs")
+    assert rows(folder)[1] == "holds at full size; time: 0.25 of 1 s"
+
+
+def skipped(why):
+    return f"""<skipped message="{why}"/>"""
+
+
+def test_what_was_skipped_is_told_with_its_reason(folder):
+    write_python(folder, skipped(f"there is no {ROOT.parent}/shared/x.laz"))
+    said = "**not run here**: it needs what is absent"
+    assert rows(folder)[1] == f"{said}: there is no ../shared/x.laz"
+    write_python(folder, "<skipped/>")
+    assert rows(folder)[1] == said
+
+
+@pytest.mark.parametrize(
+    ("why", "said"),
+    [
+        ("/a/cubes_test.cpp:7&#x0A;at full size only: takes long", "runs at full size only"),
+        ("/a/cubes_test.cpp:7&#x0A;no cubes", "needs what is absent: no cubes"),
+    ],
+)
+def test_a_test_that_was_skipped_is_told_apart_by_its_reason(folder, why, said):
+    write_cube(folder, 1, 0.5, skipped(why), "reduced")
+    assert rows(folder)[0].endswith(f"; without a part of `Cubes.AreCubes`, which {said}")
+    write_cube(folder, 0, 0.5, skipped(why), "reduced")
+    made = rows(folder)[0]  # the golden case ran
+    assert made.startswith("holds; golden: 30 %")
+    assert made.endswith(f"; without `Cubes.AreCubes`, which {said}")
 
 
 def test_what_failed_or_did_not_run_is_an_error(folder):
-    results = folder / "results/core/All/Cubes.AreCubes"
-    (results / "0.xml").unlink()  # as one that crashed
-    (results / "1.xml").write_text(CUBE.format(1, 0.5, "<failure message='no'/>"))
+    (folder / "results/core/All/Cubes.AreCubes/0.xml").unlink()  # as one that crashed
+    write_cube(folder, 1, 0.5, "<failure message='no'/>")
     (folder / "results/python.xml").write_text("<testsuites/>")
     write_report(folder, "failed")
     with pytest.raises(lister.AccuracyError) as fault:

@@ -103,13 +103,13 @@ Model plane_model(const glm::dvec3& normal) {
 }
 
 // All in all a million rays, 10^8 when it is a proof.
-const std::size_t rays_each = proof_size(125'000, 12'500'000);
+std::size_t rays_each() { return proof_size(125'000, 12'500'000); }
 
 TEST(WatertightProof, NoRayToAnEdgeOrVertexOfTheGroundGoesThrough) {
   for (const Tracing tracing : {Tracing::Fast, Tracing::Exact}) {
     for (const glm::dvec3& normal : {glm::dvec3(0, 0, 1), glm::dvec3(-0.25, 0.5, 1)}) {
       const Scene scene = scene_of(plane_grid(normal), {}, {}, {}, tracing);
-      EXPECT_EQ(leaks(scene, normal, 0, Aim::EdgesAndVertices, rays_each), 0u);
+      EXPECT_EQ(leaks(scene, normal, 0, Aim::EdgesAndVertices, rays_each()), 0u);
     }
   }
 }
@@ -119,7 +119,7 @@ TEST(WatertightProof, NoRayToAnEdgeOrVertexOfAnObjectGoesThrough) {
     for (const glm::dvec3& normal : {glm::dvec3(0, 0, 1), glm::dvec3(-0.25, 0.5, 1)}) {
       const Scene scene =
           scene_of(plane_ground(0, 0, -50), {plane_model(normal)}, {{}}, {}, tracing);
-      EXPECT_EQ(leaks(scene, normal, 1, Aim::EdgesAndVertices, rays_each), 0u);
+      EXPECT_EQ(leaks(scene, normal, 1, Aim::EdgesAndVertices, rays_each()), 0u);
     }
   }
 }
