@@ -346,6 +346,11 @@ void Map::close() {
     faults_.add(name, name.text, "unknown{}", suggestion(name.text, absent_));
     if (const auto meant = nearest(name.text, absent_)) std::erase(missing_, *meant);
   }
+  close_partly();
+}
+
+void Map::close_partly() {
+  if (node_.kind != Node::Kind::Map) return;
   for (const std::string& key : missing_) faults_.add(node_, key, "missing");
 }
 

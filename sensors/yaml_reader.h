@@ -86,7 +86,7 @@ enum class Need { Required, Optional };
 
 /// One map of a file while it is read. Each read_ function makes its key known; if the key is there
 /// and its value sound, it sets `into` and returns the value's node, else it changes nothing, notes
-/// what is wrong and returns null. Call `close` at the end.
+/// what is wrong and returns null. Call `close` at the end, or `close_partly`.
 class Map {
  public:
   /// @param node  a value of any kind; if it is no map, that is a fault and the map has no keys.
@@ -130,6 +130,8 @@ class Map {
 
   /// Notes the keys that nothing asked for and those that are missing.
   void close();
+  /// Notes those that are missing alone: what nothing asked for is for others.
+  void close_partly();
 
   const Node& node() const { return node_; }
 

@@ -36,6 +36,19 @@ Dem load_dem(const std::filesystem::path& path, const DemOptions& options) {
           header.origin_w_m, header.crs_wkt, header.crs_name};
 }
 
+bool is_same_crs(const std::string& wkt, const std::string& other) {
+  start_gdal();
+  const CPLErrorHandlerPusher quiet(CPLQuietErrorHandler);
+  OGRSpatialReference a, b;
+  if (a.SetFromUserInput(wkt.c_str()) != OGRERR_NONE) return false;
+  if (b.SetFromUserInput(other.c_str()) != OGRERR_NONE) return false;
+  if (a.IsCompound() != b.IsCompound()) {
+    a.StripVertical();
+    b.StripVertical();
+  }
+  return a.IsSame(&b) != 0;
+}
+
 DemInfo inspect_dem(const std::filesystem::path& path) {
   return about(path, [&] {
     const GDALDatasetUniquePtr dataset = open_raster(path);

@@ -45,6 +45,10 @@ struct DemOptions {
 ///         metres, with the gdalwarp line that does the same warp.
 Dem load_dem(const std::filesystem::path& path, const DemOptions& options = {});
 
+/// Returns whether two CRSs, as WKT, are one, however they are worded: in plan, and in height
+/// unless one of them tells no datum of heights. False for what is no WKT.
+bool is_same_crs(const std::string& wkt, const std::string& other);
+
 /// What can be told of a DEM file without loading it.
 struct DemInfo {
   int columns = 0;

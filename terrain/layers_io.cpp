@@ -4,9 +4,15 @@
 
 #include <algorithm>
 #include <array>
+#include <charconv>
+#include <cmath>
 #include <cstdint>
 #include <glm/common.hpp>
 #include <limits>
+#include <string_view>
+#include <system_error>
+#include <utility>
+#include <vector>
 
 #include "core/product_io.h"
 #include "terrain/dem_raster.h"
@@ -31,8 +37,18 @@ void check(const GridFrame& frame, const Georeference& georeference,
   broken.throw_if_any();
 }
 
+// Whether some sample's height would be taken for none, or floats cannot tell the value.
+bool is_misleading(double nodata, std::span<const RasterLayer> layers) {
+  const auto value = static_cast<float>(nodata);
+  if (double{value} != nodata || !std::isfinite(value)) return true;
+  return std::ranges::any_of(layers, [value](const RasterLayer& layer) {
+    return std::ranges::find(layer.values, value) != layer.values.end();
+  });
+}
+
 // Adds a band that GDAL sees without a copy, north and west first.
-void add_band(GDALDataset& dataset, const GridFrame& frame, const RasterLayer& layer) {
+void add_band(GDALDataset& dataset, const GridFrame& frame, const RasterLayer& layer,
+              double nodata) {
   const std::int64_t columns = frame.samples.x, rows = frame.samples.y;
   const bool is_from_west = frame.step_m.x > 0, is_from_north = frame.step_m.y < 0;
   const float* const first = layer.values.data() + (is_from_west ? 0 : columns - 1) +
@@ -46,8 +62,51 @@ void add_band(GDALDataset& dataset, const GridFrame& frame, const RasterLayer& l
   dataset.AddBand(GDT_Float32, options.List());
   GDALRasterBand& band = *dataset.GetRasterBand(dataset.GetRasterCount());
   band.SetDescription(layer.name.c_str());
-  band.SetNoDataValue(std::numeric_limits<double>::quiet_NaN());
+  band.SetNoDataValue(nodata);
   if (!layer.unit.empty()) band.SetUnitType(layer.unit.c_str());
+}
+
+OGRSpatialReference crs_of(const Georeference& georeference) {
+  OGRSpatialReference crs;
+  if (crs.SetFromUserInput(georeference.crs_wkt.c_str()) != OGRERR_NONE) {
+    constexpr std::size_t most = 80;
+    throw Error(
+        "the CRS '{}' is not one that PROJ knows: is its WKT (crs_wkt in a dataset.yaml) whole?",
+        georeference.crs_wkt.substr(0, most));
+  }
+  return crs;
+}
+
+// EPSG's number of something; 0 if it has none.
+int number_of(const char* code) {
+  const std::string_view text = code == nullptr ? "" : code;
+  int number = 0;
+  const auto end = std::from_chars(text.data(), text.data() + text.size(), number);
+  return end.ec == std::errc() && end.ptr == text.data() + text.size() ? number : 0;
+}
+
+// The same datum's heights in metres. Files keep a datum by its code alone.
+OGRSpatialReference heights_in_metres(const OGRSpatialReference& crs) {
+  const char* const datum = crs.GetAttrValue("VERT_DATUM");
+  OGRSpatialReference heights;
+  heights.SetVertCS(fmt::format("{} height", datum == nullptr ? "unknown" : datum).c_str(), datum);
+  OGRSpatialReference told;  // what the code of the whole knows of the datum
+  const int code = number_of(crs.GetAuthorityCode("VERT_CS"));
+  if (code == 0 || told.importFromEPSG(code) != OGRERR_NONE) return heights;
+  const int datum_code = number_of(told.GetAuthorityCode("VERT_DATUM"));
+  if (datum_code != 0) heights.SetAuthority("VERT_CS|VERT_DATUM", "EPSG", datum_code);
+  return heights;
+}
+
+// Has a CRS tell its heights in metres, if it has some.
+void take_metres(OGRSpatialReference& crs) {
+  if (crs.IsCompound() == 0 || crs.GetTargetLinearUnits("VERT_CS") == 1) return;
+  const OGRSpatialReference heights = heights_in_metres(crs);
+  OGRSpatialReference plan = crs, both;
+  plan.StripVertical();
+  const std::string name = fmt::format("{} + {}", plan.GetName(), heights.GetName());
+  both.SetCompoundCS(name.c_str(), &plan, &heights);
+  crs = std::move(both);
 }
 
 void place(GDALDataset& dataset, const GridFrame& frame, const Georeference& georeference) {
@@ -59,49 +118,94 @@ void place(GDALDataset& dataset, const GridFrame& frame, const Georeference& geo
   std::array<double, 6> transform{west, step.x, 0, north, 0, -step.y};
   dataset.SetGeoTransform(transform.data());
   if (georeference.crs_wkt.empty()) return;
-  OGRSpatialReference crs;
-  crs.SetFromUserInput(georeference.crs_wkt.c_str());
+  OGRSpatialReference crs = crs_of(georeference);
+  take_metres(crs);
+  crs.SetAxisMappingStrategy(OAMS_TRADITIONAL_GIS_ORDER);
   dataset.SetSpatialRef(&crs);
 }
 
 GDALDatasetUniquePtr dataset_of(const GridFrame& frame, const Georeference& georeference,
-                                std::span<const RasterLayer> layers) {
+                                std::span<const RasterLayer> layers, double nodata,
+                                const RasterForm& form) {
   GDALDriver& memory = *GetGDALDriverManager()->GetDriverByName("MEM");
   GDALDatasetUniquePtr dataset(
       memory.Create("", frame.samples.x, frame.samples.y, 0, GDT_Float32, nullptr));
-  for (const RasterLayer& layer : layers) add_band(*dataset, frame, layer);
+  if (dataset == nullptr) throw Error("there is no memory for a raster: {}", CPLGetLastErrorMsg());
+  for (const RasterLayer& layer : layers) add_band(*dataset, frame, layer, nodata);
   place(*dataset, frame, georeference);
+  dataset->SetMetadataItem("AREA_OR_POINT", form.is_point ? "Point" : "Area");
   return dataset;
 }
 
-CPLStringList creation_options() {
+CPLStringList creation_options(std::span<const RasterLayer> layers) {
+  const bool are_lengths =
+      std::ranges::none_of(layers, [](const RasterLayer& layer) { return layer.unit.empty(); });
   CPLStringList options;
   options.AddNameValue("COMPRESS", "DEFLATE");
   options.AddNameValue("PREDICTOR", "FLOATING_POINT");
   options.AddNameValue("BIGTIFF", "IF_SAFER");
-  options.AddNameValue("OVERVIEW_RESAMPLING", "NEAREST");  // means of counts and flags say nothing
+  options.AddNameValue("OVERVIEW_RESAMPLING", are_lengths ? "AVERAGE" : "NEAREST");
   return options;
 }
 
-}  // namespace
-
-void write_layers(const std::filesystem::path& path, const GridFrame& frame,
-                  const Georeference& georeference, std::span<const RasterLayer> layers) {
-  about(path, [&] { check(frame, georeference, layers); });
-  start_gdal();
-  const CPLErrorHandlerPusher quiet(CPLQuietErrorHandler);
-  const GDALDatasetUniquePtr source = dataset_of(frame, georeference, layers);
+void copy_whole(const std::filesystem::path& path, GDALDataset& source,
+                const CPLStringList& options) {
   write_whole(path, [&](const std::filesystem::path& part) {
     CPLErrorReset();
     GDALDriver& driver = *GetGDALDriverManager()->GetDriverByName("COG");
-    GDALDatasetUniquePtr written(driver.CreateCopy(part.c_str(), source.get(), 0,
-                                                   creation_options().List(), nullptr, nullptr));
+    GDALDatasetUniquePtr written(
+        driver.CreateCopy(part.c_str(), &source, 0, options.List(), nullptr, nullptr));
     const bool is_there = written != nullptr;
     written.reset();
     if (!is_there || CPLGetLastErrorType() >= CE_Failure)
       throw Error("{}: cannot be written: {}; is the disk full?", path.string(),
                   CPLGetLastErrorMsg());
   });
+}
+
+}  // namespace
+
+void check_crs(const Georeference& georeference) {
+  start_gdal();
+  const CPLErrorHandlerPusher quiet(CPLQuietErrorHandler);
+  if (!georeference.crs_wkt.empty()) crs_of(georeference);
+}
+
+RasterForm read_form(const std::filesystem::path& path) {
+  start_gdal();
+  return about(path, [&] {
+    const GDALDatasetUniquePtr dataset = open_raster(path);
+    RasterForm form;
+    int has_nodata = 0;
+    const double nodata = dataset->GetRasterBand(1)->GetNoDataValue(&has_nodata);
+    if (has_nodata != 0) form.nodata = nodata;
+    const char* kind = dataset->GetMetadataItem("AREA_OR_POINT");
+    form.is_point = kind != nullptr && std::string_view(kind) == "Point";
+    return form;
+  });
+}
+
+void write_layers(const std::filesystem::path& path, const GridFrame& frame,
+                  const Georeference& georeference, std::span<const RasterLayer> layers,
+                  const RasterForm& form) {
+  about(path, [&] { check(frame, georeference, layers); });
+  start_gdal();
+  const CPLErrorHandlerPusher quiet(CPLQuietErrorHandler);
+  constexpr double nan = std::numeric_limits<double>::quiet_NaN();
+  const bool is_nan = !form.nodata || is_misleading(*form.nodata, layers);
+  const double nodata = is_nan ? nan : *form.nodata;
+  std::vector<RasterLayer> stored(layers.begin(), layers.end());
+  std::vector<std::vector<float>> copies;  // of layers, with the value that stands for none
+  if (!is_nan) {
+    for (RasterLayer& layer : stored) {
+      copies.emplace_back(layer.values.begin(), layer.values.end());
+      std::ranges::replace_if(
+          copies.back(), [](float value) { return std::isnan(value); }, static_cast<float>(nodata));
+      layer.values = copies.back();
+    }
+  }
+  const GDALDatasetUniquePtr source = dataset_of(frame, georeference, stored, nodata, form);
+  copy_whole(path, *source, creation_options(layers));
 }
 
 }  // namespace groundray

@@ -1,7 +1,12 @@
 #include "apps/groundray/dem_command.h"
 
+#include <unistd.h>
+
+#include <algorithm>
 #include <array>
+#include <cmath>
 #include <cstdint>
+#include <limits>
 #include <map>
 #include <numbers>
 #include <optional>
@@ -17,6 +22,13 @@ namespace {
 
 enum class FilterPreset { None, Ground, Air };
 
+// What the machine has: who takes more may be ended by the system without a word.
+std::size_t machine_bytes() {
+  const auto pages = sysconf(_SC_PHYS_PAGES), page_bytes = sysconf(_SC_PAGESIZE);
+  if (pages <= 0 || page_bytes <= 0) return std::numeric_limits<std::size_t>::max();
+  return static_cast<std::size_t>(pages) * static_cast<std::size_t>(page_bytes);
+}
+
 }  // namespace
 
 struct DemCommand::Options {
@@ -30,7 +42,8 @@ struct DemCommand::Options {
   double attitude_sd_mrad = 0;
   std::string stereo_frames = ":";
   std::optional<std::uint64_t> memory_mb;
-  bool has_stereo = true, is_airborne = false, is_filled = true, is_smoothed = false;
+  bool has_lidar = true, has_stereo = true, is_airborne = false, is_filled = true,
+       is_smoothed = false;
   FillOptions filling;
 
   void add_files() {
@@ -47,7 +60,9 @@ struct DemCommand::Options {
     auto* truth = command->add_option("--truth", request.truth, "A DEM to compare with");
     command->add_option("--error-map", output.error_map, "GeoTIFF of the errors")->needs(truth);
     command->add_option("--report", output.report, "JSON file for all figures");
-    command->add_option("--memory-mb", memory_mb, "Begin no work that would take more")
+    command
+        ->add_option("--memory-mb", memory_mb,
+                     "Begin no work that would take more (what the machine has)")
         ->check(positive());
   }
 
@@ -91,6 +106,7 @@ struct DemCommand::Options {
     stereo->add_option("--stereo", request.pairs.names,
                        "Pairs of a dataset by name, or cameras LEFT,RIGHT; all pairs without it");
     stereo->add_flag("!--no-stereo", has_stereo, "Take lidars alone");
+    stereo->add_flag("!--no-lidar", has_lidar, "Take a dataset's stereo pairs alone");
     stereo->add_option("--stereo-frames", stereo_frames, "A:B:STEP, as --frames, of images");
     StereoPointOptions& points = request.stereo.points;
     stereo->add_option("--nearest-m", points.nearest_m, "Depth of matches, at least")
@@ -152,14 +168,13 @@ struct DemCommand::Options {
         ->add_option("--largest-share", filling.largest_share,
                      "Leave holes that are a larger share of the raster (0.2)")
         ->check(CLI::Range(0.0, 1.0));
-    const std::map<std::string, SightUse> uses{
-        {"none", SightUse::None}, {"beams", SightUse::Beams}, {"faces", SightUse::Faces}};
+    const std::map<std::string, SightUse> uses{{"none", SightUse::None},
+                                               {"beams", SightUse::Beams}};
     group
         ->add_option("--sight", request.sight,
-                     "What bounds the ground from above: beams that passed (default), or also "
-                     "the faces between them, which are too low behind crests")
+                     "What bounds the ground from above: beams that passed (default)")
         ->transform(CLI::CheckedTransformer(uses))
-        ->option_text("none|beams|faces");
+        ->option_text("none|beams");
     group->add_option("--sight-margin-m", request.sight_margin_m, "Added (a quarter of a cell)")
         ->check(not_negative());
     auto* smooth = group->add_flag("--smooth", is_smoothed, "Smooth measured heights first");
@@ -184,8 +199,21 @@ struct DemCommand::Options {
     return options;
   }
 
+  void close_area() {
+    if (area.empty()) return;
+    const bool is_bounded = std::ranges::all_of(area, [](double x) { return std::isfinite(x); });
+    if (!is_bounded || !(area[0] < area[2] && area[1] < area[3])) {
+      throw Error(
+          "--area: {} {} {} {} must be W S E N in the CRS, metres, with W < E and S < N: are they "
+          "in another order?",
+          area[0], area[1], area[2], area[3]);
+    }
+    request.area_w = Area{{area[0], area[1]}, {area[2], area[3]}};
+  }
+
   void close_memory() {
     constexpr std::size_t bytes_per_mb = 1'000'000;
+    request.most_bytes = machine_bytes();
     if (!memory_mb) return;
     request.most_bytes = *memory_mb * bytes_per_mb;
     request.fusion.memory_bytes = request.most_bytes / 2;
@@ -197,14 +225,17 @@ struct DemCommand::Options {
     scans.close();
     request.choice = scans.choice;
     request.taking = scans.taking;
-    request.stereo.frames = parse_frames(stereo_frames);
+    request.stereo.frames = parse_frames(stereo_frames, "--stereo-frames");
     request.pairs.are_any = has_stereo;
     if (!has_stereo && !request.pairs.names.empty())
       throw Error("--stereo and --no-stereo contradict each other: leave one out");
+    if (!has_stereo && !has_lidar)
+      throw Error("--no-lidar and --no-stereo leave nothing that measures: leave one out");
+    if (has_stereo) request.choice.need = has_lidar ? ScanNeed::IfThere : ScanNeed::None;
     if (divergence_mrad) request.noise.divergence_rad = *divergence_mrad * per_mille;
     request.noise.attitude_sd_rad = attitude_sd_mrad * per_mille;
     if (is_airborne) request.noise.beams = BeamOrigin::Above;
-    if (!area.empty()) request.area_w = Area{{area[0], area[1]}, {area[2], area[3]}};
+    close_area();
     request.filter = ground_filter();
     request.fill = is_filled ? std::optional(filling) : std::nullopt;
     if (is_smoothed) request.smooth = SmoothOptions{.curvature_sd_per_m = curvature_sd_per_m};

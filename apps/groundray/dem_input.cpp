@@ -1,5 +1,8 @@
 #include "apps/groundray/dem_input.h"
 
+#include <fmt/format.h>
+#include <fmt/ranges.h>
+
 #include <algorithm>
 #include <cstdint>
 #include <glm/common.hpp>
@@ -35,27 +38,44 @@ void check_count(std::size_t points) {
                 points, points == 1 ? "" : "s");
 }
 
-DemInput::DemInput(const DemRequest& request, const ScanFiles& files)
-    : request_(request), files_(files), scans_(files.scans.size()) {
-  for (std::size_t i = 0; i < scans_.size(); ++i) scans_[i].name = files.scans[i].name;
-  match_pairs();
-}
-
-void DemInput::match_pairs() {
-  const PairChoice& choice = request_.pairs;
-  if (!choice.are_any) return;
-  if (!is_dataset(request_)) {
+std::vector<RecordedPair> find_pairs(const DemRequest& request, const ScanFiles& files) {
+  const PairChoice& choice = request.pairs;
+  if (!choice.are_any) return {};
+  if (!is_dataset(request)) {
     if (!choice.names.empty())
       throw Error("--stereo: only a dataset has stereo pairs: give its folder");
-    return;
+    return {};
   }
-  const auto recorded = read_stereo_pairs(request_.choice.inputs[0], choice.names);
+  const fs::path& dataset = request.choice.inputs[0];
+  auto pairs = read_stereo_pairs(dataset, choice.names);
+  if (pairs.empty() && files.scans.empty())
+    throw Error(
+        "{}: without lidars it takes a stereo pair to measure, but the dataset lists none: "
+        "--stereo LEFT,RIGHT makes one of two cameras",
+        dataset.string());
+  return pairs;
+}
+
+DemInput::DemInput(const DemRequest& request, const ScanFiles& files,
+                   const std::vector<RecordedPair>& pairs)
+    : request_(request), files_(files), scans_(files.scans.size()) {
+  for (std::size_t i = 0; i < scans_.size(); ++i) scans_[i].name = files.scans[i].name;
+  match(pairs);
+}
+
+void DemInput::match(const std::vector<RecordedPair>& recorded) {
   const auto images = image_pairs(recorded, request_.stereo.frames, notes_);
   if (images.empty()) {
-    if (!choice.names.empty())
-      throw Error("--stereo: there is no pair of images among those asked for (--stereo-frames)");
+    if (!request_.pairs.names.empty() || files_.scans.empty())
+      throw Error(
+          "{}: the stereo pairs have no images of one time among those asked for "
+          "(--stereo-frames){}",
+          request_.choice.inputs.at(0).string(),
+          notes_.empty() ? "" : fmt::format("; {}", fmt::join(notes_, "; ")));
     return;
   }
+  if (request_.choice.poses)
+    notes_.emplace_back("--poses are the lidar's: cameras keep those of the dataset");
   const bool moves = std::ranges::any_of(
       recorded, [](const RecordedPair& pair) { return pair.cameras[0].row_s > 0; });
   if (moves)
@@ -96,6 +116,17 @@ bool DemInput::next(MeasuredPoints& block) {
   block = lidar_points(files_, scan, request_.taking, noise_of(scan),
                        static_cast<std::uint32_t>(now - 1), scans_[now - 1]);
   return true;
+}
+
+std::vector<std::string> DemInput::notes() const {
+  std::vector<std::string> notes = notes_;
+  const auto noiseless = std::ranges::count_if(scans_, &PointTally::is_noiseless);
+  if (noiseless > 0)
+    notes.push_back(
+        fmt::format("{} of {} scans tell no standard deviation of their ranges, so those of "
+                    "heights are too small: give it by --range-sd-m",
+                    noiseless, scans_.size()));
+  return notes;
 }
 
 void DemInput::rewind() noexcept { next_ = 0; }

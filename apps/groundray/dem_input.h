@@ -8,19 +8,27 @@
 
 #include "apps/groundray/dem_points.h"
 #include "apps/groundray/dem_request.h"
+#include "apps/groundray/recorded_stereo.h"
 #include "apps/groundray/scan_files.h"
 #include "reconstruction/dem/measured_points.h"
 #include "terrain/area.h"
 
 namespace groundray {
 
+/// Reads what a dataset tells of the stereo pairs that are asked for; none if the input is none.
+/// @throws Error as read_stereo_pairs; or if there is nothing else to measure with, but no pair; or
+///         a pair is asked for by name of what is no dataset.
+std::vector<RecordedPair> find_pairs(const DemRequest& request, const ScanFiles& files);
+
 /// The points that a DEM is asked to be made of: those of stereo pairs, which are kept, and those
 /// of scans, which are read whenever they are asked for.
 class DemInput {
  public:
-  /// Matches the images of stereo pairs. `request` and `files` must outlive this.
-  /// @throws Error as read_stereo_pairs and add_stereo_points.
-  DemInput(const DemRequest& request, const ScanFiles& files);
+  /// Matches the images of stereo pairs. All three must outlive this.
+  /// @throws Error if pairs are asked for and have no images, or there is nothing else to measure
+  ///         with; and as add_stereo_points.
+  DemInput(const DemRequest& request, const ScanFiles& files,
+           const std::vector<RecordedPair>& pairs);
 
   /// Fills a block with the points of all pairs, then scan by scan; false after the last.
   /// @throws Error as lidar_points.
@@ -33,10 +41,11 @@ class DemInput {
 
   const std::vector<PointTally>& scans() const noexcept { return scans_; }
   const std::vector<PointTally>& pairs() const noexcept { return pairs_; }
-  const std::vector<std::string>& notes() const noexcept { return notes_; }
+  /// For people, once all is read.
+  std::vector<std::string> notes() const;
 
  private:
-  void match_pairs();
+  void match(const std::vector<RecordedPair>& pairs);
   PointNoise noise_of(const ScanFile& scan);
 
   const DemRequest& request_;

@@ -1,7 +1,6 @@
 #include "apps/groundray/dem_output.h"
 
 #include <algorithm>
-#include <cctype>
 #include <cmath>
 #include <limits>
 #include <numbers>
@@ -20,14 +19,6 @@ namespace {
 namespace fs = std::filesystem;
 
 constexpr float nan = std::numeric_limits<float>::quiet_NaN();
-
-void check_ending(const fs::path& path, std::initializer_list<const char*> endings) {
-  std::string ending = path.extension().string();
-  std::ranges::transform(ending, ending.begin(),
-                         [](unsigned char c) { return static_cast<char>(std::tolower(c)); });
-  if (std::ranges::find(endings, ending) == endings.end())
-    throw Error("{}: its name must end in {}", path.string(), *endings.begin());
-}
 
 template <typename T>
 std::vector<float> numbers(const std::vector<T>& values) {
@@ -111,16 +102,21 @@ void write_output(const DemOutput& output, const DemLayers& layers, const TruthC
   if (output.picture) {
     PictureScale scale;
     const std::vector<float> errors_m = truth != nullptr ? truth->error_m : std::vector<float>{};
-    write_png(files.aside(*output.picture), draw_dem(layers, errors_m, scale));
+    files.write(*output.picture,
+                [&](const fs::path& path) { write_png(path, draw_dem(layers, errors_m, scale)); });
     report.colour_m = scale.most_m;
   }
   if (output.error_map && truth != nullptr) {
     const std::vector<RasterLayer> bands{{"error", "m", truth->error_m},
                                          {"normalised_error", "", truth->normalised}};
-    write_layers(files.aside(*output.error_map), layers.frame, report.georeference, bands);
+    files.write(*output.error_map, [&](const fs::path& path) {
+      write_layers(path, layers.frame, report.georeference, bands);
+    });
   }
-  if (output.report) write_json(files.aside(*output.report), report);
-  write_layers(files.aside(output.dem), layers, report.georeference);
+  if (output.report)
+    files.write(*output.report, [&](const fs::path& path) { write_json(path, report); });
+  files.write(output.dem,
+              [&](const fs::path& path) { write_layers(path, layers, report.georeference); });
   files.appear();
 }
 

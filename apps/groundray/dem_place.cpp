@@ -5,6 +5,7 @@
 
 #include "core/error.h"
 #include "reconstruction/dem/dem_frame.h"
+#include "terrain/dem_io.h"
 
 namespace groundray {
 namespace {
@@ -22,8 +23,10 @@ void agree(const NamedDem& other, Georeference& points) {
     points.crs_name = dem.crs_wkt.empty() ? "" : dem.crs_name;
     return;
   }
-  if (dem.crs_wkt.empty() || points.crs_wkt == dem.crs_wkt || points.crs_name == dem.crs_name)
-    return;
+  if (dem.crs_wkt.empty()) return;
+  const bool is_same = points.crs_wkt.empty() ? points.crs_name == dem.crs_name
+                                              : is_same_crs(points.crs_wkt, dem.crs_wkt);
+  if (is_same) return;
   throw Error(
       "{}: its CRS is {}, but that of the points is {}: warp it with `gdalwarp -t_srs`, or take "
       "the DEM that the points were measured over",

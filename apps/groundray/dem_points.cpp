@@ -16,24 +16,6 @@ namespace {
 
 double squared(double x) { return x * x; }
 
-// Between poses that are far apart in time nobody knows where the sensor was.
-void check_gap(const ScanFiles& files, const ScanFile& scan, double longest_s) {
-  if (!scan.path) return;
-  const auto& samples = files.paths[*scan.path].samples();
-  const auto after = std::ranges::upper_bound(samples, scan.stamp, {}, &Trajectory::Sample::time);
-  if (after == samples.begin() || after == samples.end()) return;  // at an end, or no path
-  const auto s = [](std::chrono::nanoseconds time) {
-    return 1e-9 * static_cast<double>(time.count());
-  };
-  const double gap_s = s(after->time - std::prev(after)->time);
-  if (gap_s <= longest_s) return;
-  throw Error(
-      "{}: the poses have a gap of {:.6g} s there, from {:.9g} to {:.9g} s, more than {:g} s: "
-      "leave "
-      "the scan out (--frames), or say by --pose-gap-s what gap may be bridged",
-      scan.name, gap_s, s(std::prev(after)->time), s(after->time), longest_s);
-}
-
 // What is known of the errors of one beam's point.
 struct BeamErrors {
   float sd_m = 0, bias_sd_m = 0, across_sd_m = 0;
@@ -59,9 +41,24 @@ BeamErrors errors_of(const glm::dvec3& beam_m, double range_sd_m, const PointNoi
 
 }  // namespace
 
+void check_gap(const std::string& name, const Trajectory& path, std::chrono::nanoseconds time,
+               double longest_s) {
+  const auto& samples = path.samples();
+  const auto after = std::ranges::upper_bound(samples, time, {}, &Trajectory::Sample::time);
+  if (after == samples.begin() || after == samples.end()) return;  // at an end, or beyond
+  const auto s = [](std::chrono::nanoseconds at) { return 1e-9 * static_cast<double>(at.count()); };
+  const double gap_s = s(after->time - std::prev(after)->time);
+  if (gap_s <= longest_s) return;
+  throw Error(
+      "{}: the poses have a gap of {:.6g} s there, from {:.9g} to {:.9g} s, more than {:g} s: "
+      "leave it out (--frames, --stereo-frames), or say by --pose-gap-s what gap may be bridged",
+      name, gap_s, s(std::prev(after)->time), s(after->time), longest_s);
+}
+
 MeasuredPoints lidar_points(const ScanFiles& files, const ScanFile& scan, const ScanTaking& taking,
                             const PointNoise& noise, std::uint32_t group, PointTally& tally) {
-  check_gap(files, scan, noise.longest_pose_gap_s);
+  if (scan.path)
+    check_gap(scan.name, files.paths[*scan.path], scan.stamp, noise.longest_pose_gap_s);
   PointInput input = read_points(files, scan, taking);
   MeasuredPoints points;
   const std::size_t count = input.points_m.size();
@@ -76,7 +73,9 @@ MeasuredPoints lidar_points(const ScanFiles& files, const ScanFile& scan, const 
     points.across_sd_m.push_back(errors.across_sd_m);
   }
   points.p_m = std::move(input.points_m);
-  tally = {.name = scan.name, .rows = input.rows, .points = count};
+  const bool is_noiseless =
+      count > 0 && std::ranges::all_of(input.sd_m, [](float sd_m) { return sd_m == 0; });
+  tally = {.name = scan.name, .rows = input.rows, .points = count, .is_noiseless = is_noiseless};
   points.groups.assign(count, group);
   points.origins.assign(count, PointOrigin::Lidar);
   return points;
@@ -103,6 +102,7 @@ std::optional<double> calibrated_divergence_rad(const std::filesystem::path& dat
   yaml::Map root(node, "", faults);
   std::string text;
   root.read_text("lidar_file", yaml::Need::Required, text);
+  root.close_partly();
   faults.throw_if_any();
   const LidarSpec lidar = parse_lidar(text, path);
   double width_rad = 0;

@@ -1,5 +1,6 @@
 #pragma once
 
+#include <chrono>
 #include <cstddef>
 #include <cstdint>
 #include <filesystem>
@@ -9,6 +10,7 @@
 
 #include "apps/groundray/scan_files.h"
 #include "apps/groundray/scan_input.h"
+#include "core/trajectory.h"
 #include "reconstruction/dem/measured_points.h"
 
 namespace groundray {
@@ -31,9 +33,16 @@ struct PointNoise {
 /// What became of a scan or a stereo pair.
 struct PointTally {
   std::string name;
-  std::size_t rows = 0;    ///< of the file, or pixels that were matched
-  std::size_t points = 0;  ///< that measured the DEM
+  std::size_t rows = 0;       ///< of the file, or pixels that were matched
+  std::size_t points = 0;     ///< that measured the DEM
+  bool is_noiseless = false;  ///< no standard deviation of ranges is known
 };
+
+/// Between poses that are far apart in time nobody knows where a sensor was.
+/// @param name  of what it measured at `time`.
+/// @throws Error if the path has a gap there that is longer.
+void check_gap(const std::string& name, const Trajectory& path, std::chrono::nanoseconds time,
+               double longest_s);
 
 /// Returns the points of a scan with what is known of their errors. Of a point at the slant range r
 /// along the unit vector d, with the range's sd s and the divergence a:

@@ -12,11 +12,13 @@
 #include "apps/groundray/dem_place.h"
 #include "apps/groundray/dem_report.h"
 #include "apps/groundray/dem_request.h"
+#include "apps/groundray/recorded_stereo.h"
 #include "apps/groundray/stage.h"
 #include "core/error.h"
 #include "reconstruction/dem/mesh_fill.h"
 #include "reconstruction/dem/overhangs.h"
 #include "terrain/dem_io.h"
+#include "terrain/layers_io.h"
 
 namespace groundray {
 namespace {
@@ -94,7 +96,8 @@ Fusion fuse_ground(const DemRequest& request, DemInput& input, const GridFrame& 
   for (MeasuredPoints block; input.next(block);) add(all, block);
   check_count(all.size());
   keep_around(frame, 2 * filter.window_radius_m, all);
-  if (all.size() == 0) throw Error("no point lies in the DEM's frame: is it of another place?");
+  if (all.size() == 0)
+    throw Error("no point lies in the DEM's frame: is it of another place? (--area, --like)");
   GroundPoints ground;
   {
     const Timing timing(report, "ground");
@@ -138,8 +141,9 @@ void check_ground(const Fusion& fusion) {
   if (has_ground) return;
   const FusionCounts& counts = fusion.counts;
   if (counts.outside == counts.points)
-    throw Error("all {} points lie outside of the DEM's frame: is it of another place?",
-                counts.points);
+    throw Error(
+        "all {} points lie outside of the DEM's frame: is it of another place? (--area, --like)",
+        counts.points);
   throw Error(
       "none of the {} points makes ground: {} are outside of the frame, {} unusable, and in {} "
       "cells they are too few or contradict each other: are the poses right? Larger cells "
@@ -152,14 +156,14 @@ void check_ground(const Fusion& fusion) {
 void bound(const DemRequest& request, const ScanFiles& files, DemLayers& layers,
            DemReport& report) {
   if (request.sight == SightUse::None || request.noise.beams == BeamOrigin::Above) return;
+  if (files.scans.empty()) return;
   const Timing timing(report, "sight");
   Stage stage("looking along beams");
   constexpr double share_of_cell = 0.25;  // half a cell, rising by one in two
   const double margin_m =
       request.sight_margin_m.value_or(share_of_cell * std::abs(layers.frame.step_m.x));
   for (std::size_t i = 0; i < files.scans.size(); ++i) {
-    bound_by_sight(files, files.scans[i], request.taking, request.sight, margin_m, layers,
-                   report.notes);
+    bound_by_sight(files, files.scans[i], request.taking, margin_m, layers);
     stage.update(static_cast<double>(i + 1) / static_cast<double>(files.scans.size()));
   }
   constexpr float sds = 3;
@@ -213,21 +217,26 @@ std::optional<NamedDem> load(const std::optional<fs::path>& path) {
   return NamedDem{*path, load_dem(*path)};
 }
 
-void check_outputs(const DemRequest& request, const ScanFiles& files) {
-  std::vector<fs::path> inputs = request.choice.inputs;
-  if (request.choice.poses) inputs.push_back(*request.choice.poses);
+void check_outputs(const DemRequest& request, const ScanFiles& files,
+                   const std::vector<RecordedPair>& pairs) {
+  std::vector<fs::path> inputs = files.read;
   if (request.like) inputs.push_back(*request.like);
   if (request.truth) inputs.push_back(*request.truth);
-  for (const ScanFile& scan : files.scans) inputs.push_back(scan.file);
+  for (const RecordedPair& pair : pairs) {
+    for (const RecordedCamera& camera : pair.cameras) {
+      for (const RecordedFrame& frame : camera.frames) inputs.push_back(frame.file);
+    }
+  }
   check_output(request.output, inputs);
 }
 
-DemLayers measure(const DemRequest& request, const ScanFiles& files, const PlaceChoice& place,
+DemLayers measure(const DemRequest& request, const ScanFiles& files,
+                  const std::vector<RecordedPair>& pairs, const PlaceChoice& place,
                   DemReport& report) {
   std::optional<DemInput> input;
   {
     const Timing timing(report, "match");
-    input.emplace(request, files);
+    input.emplace(request, files, pairs);
   }
   const Area extent = needs_extent(place) ? input->extent() : Area{};
   const GridFrame frame = choose_frame(place, files.georeference, extent);
@@ -238,7 +247,7 @@ DemLayers measure(const DemRequest& request, const ScanFiles& files, const Place
   report.frame = frame;
   report.scans = input->scans();
   report.pairs = input->pairs();
-  report.notes.insert(report.notes.end(), input->notes().begin(), input->notes().end());
+  for (std::string& note : input->notes()) report.notes.push_back(std::move(note));
   return std::move(fusion.layers);
 }
 
@@ -247,15 +256,17 @@ DemLayers measure(const DemRequest& request, const ScanFiles& files, const Place
 void rebuild_dem(const DemRequest& request) {
   ScanFiles files = find_scans(request.choice);
   level_origin(files);
-  check_outputs(request, files);
+  const std::vector<RecordedPair> pairs = find_pairs(request, files);
+  check_outputs(request, files, pairs);
   const PlaceChoice place{.cell_m = request.cell_m,
                           .like = load(request.like),
                           .truth = load(request.truth),
                           .area_w = request.area_w};
   agree_on_crs(place, files.georeference);
+  check_crs(files.georeference);
   DemReport report{.facts = request.output.facts, .georeference = files.georeference};
   if (request.noise.beams == BeamOrigin::Sensor) report.notes = files.notes;
-  DemLayers layers = measure(request, files, place, report);
+  DemLayers layers = measure(request, files, pairs, place, report);
   bound(request, files, layers, report);
   smooth(request, layers, report);
   fill(request, layers, report);

@@ -126,6 +126,7 @@ Json json_of(const FillTally& fill) {
   }
   for (const TrialReport& trial : fill.trials) {
     trials.push_back({{"shape", trial.is_long ? "long" : "compact"},
+                      {"in_shadow", trial.is_shadow},
                       {"from_cells", trial.from_cells},
                       {"to_cells", number(trial.to_cells)},
                       {"tension", trial.form.tension},

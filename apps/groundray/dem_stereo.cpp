@@ -21,7 +21,7 @@ namespace {
 
 namespace fs = std::filesystem;
 
-StereoView view_of(const RecordedCamera& camera, const RecordedCamera::Frame& frame) {
+StereoView view_of(const RecordedCamera& camera, const RecordedFrame& frame) {
   const auto lens = std::make_shared<const Lens>(camera.lens, camera.size_px);
   return {.size_px = camera.size_px,
           .X_DC = camera.X_DC.pose_at(camera.middle(frame)),
@@ -71,15 +71,47 @@ void encode(ImageF& left, ImageF& right) {
   }
 }
 
-std::array<ImageF, 2> read_images(const fs::path& left, const fs::path& right) {
+void check_size(const fs::path& file, const ImageF& image, const RecordedCamera& camera) {
+  if (image.width() == camera.size_px.x && image.height() == camera.size_px.y) return;
+  throw Error(
+      "{}: it has {} x {} px, but calibration/{}.yaml says {} x {}: is it another camera's?",
+      file.string(), image.width(), image.height(), camera.name, camera.size_px.x,
+      camera.size_px.y);
+}
+
+std::array<ImageF, 2> read_images(const ImagePair& pair) {
+  const auto& cameras = pair.pair->cameras;
+  const fs::path &left = cameras[0].frames[pair.left].file,
+                 &right = cameras[1].frames[pair.right].file;
   const auto is_light = [](const fs::path& file) { return file.extension() == ".exr"; };
-  if (is_light(left) != is_light(right))
-    throw Error("{}: the other image of the pair, {}, is of another kind", left.string(),
-                right.string());
-  if (!is_light(left)) return {grey_of(read_image8(left)), grey_of(read_image8(right))};
-  std::array<ImageF, 2> images{light_of(left), light_of(right)};
-  encode(images[0], images[1]);
+  if (is_light(left) != is_light(right)) {
+    throw Error(
+        "{}: of the pair's images one is light (.exr) and {} a picture (.png): was one removed? "
+        "Ask both cameras for the product picture",
+        is_light(left) ? left.string() : right.string(),
+        is_light(left) ? right.string() : left.string());
+  }
+  const auto read =
+      is_light(left) ? light_of : [](const fs::path& file) { return grey_of(read_image8(file)); };
+  std::array<ImageF, 2> images{read(left), read(right)};
+  check_size(left, images[0], cameras[0]);
+  check_size(right, images[1], cameras[1]);
+  if (is_light(left)) encode(images[0], images[1]);
   return images;
+}
+
+void check_poses(const RecordedCamera& camera, const RecordedFrame& frame, double longest_gap_s) {
+  const auto at = camera.middle(frame);
+  const auto s = [](std::chrono::nanoseconds time) {
+    return 1e-9 * static_cast<double>(time.count());
+  };
+  if (at < camera.X_DC.begin_time() || at > camera.X_DC.end_time()) {
+    throw Error(
+        "poses/{}.tum: it covers {:.9g} to {:.9g} s, but the image was exposed at {:.9g} s: was "
+        "the file cut short?",
+        camera.name, s(camera.X_DC.begin_time()), s(camera.X_DC.end_time()), s(at));
+  }
+  check_gap(fmt::format("poses/{}.tum", camera.name), camera.X_DC, at, longest_gap_s);
 }
 
 // Adds what the cameras' poses are off to the bias of points from `first` on.
@@ -96,11 +128,13 @@ void add_pose_bias(const PointNoise& noise, const glm::dvec3& eye_m, std::size_t
 PointTally add_points(const ImagePair& images, const StereoTaking& taking, const PointNoise& noise,
                       std::uint32_t group, MeasuredPoints& to) {
   const auto& [left, right] = images.pair->cameras;
-  const RecordedCamera::Frame& left_frame = left.frames[images.left];
-  const RecordedCamera::Frame& right_frame = right.frames[images.right];
+  const RecordedFrame& left_frame = left.frames[images.left];
+  const RecordedFrame& right_frame = right.frames[images.right];
+  check_poses(left, left_frame, noise.longest_pose_gap_s);
+  check_poses(right, right_frame, noise.longest_pose_gap_s);
   const StereoView left_view = view_of(left, left_frame);
   const StereoView right_view = view_of(right, right_frame);
-  const auto greys = read_images(left_frame.file, right_frame.file);
+  const auto greys = read_images(images);
   const PinholePair pair = pinhole_pair(left_view, right_view);
   const DisparityMap map =
       match(resample(greys[0], pair, StereoSide::Left, left_view),
@@ -125,9 +159,9 @@ std::vector<ImagePair> image_pairs(const std::vector<RecordedPair>& pairs, const
     std::size_t alone = 0;
     const auto& rights = pair.cameras[1].frames;
     for (std::size_t i = 0; i < pair.cameras[0].frames.size(); ++i) {
-      const RecordedCamera::Frame& left = pair.cameras[0].frames[i];
+      const RecordedFrame& left = pair.cameras[0].frames[i];
       if (!frames.contains(static_cast<std::size_t>(left.number))) continue;
-      const auto right = std::ranges::find(rights, left.number, &RecordedCamera::Frame::number);
+      const auto right = std::ranges::find(rights, left.number, &RecordedFrame::number);
       if (right == rights.end() || std::chrono::abs(right->stamp - left.stamp) > together) {
         ++alone;
         continue;

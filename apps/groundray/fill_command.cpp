@@ -13,21 +13,23 @@
 #include <string>
 #include <vector>
 
+#include "apps/groundray/result_files.h"
 #include "apps/interruption.h"
 #include "core/error.h"
 #include "core/progress.h"
 #include "reconstruction/dem/dem_fill.h"
+#include "reconstruction/dem/inpaint_fill.h"
 #include "reconstruction/dem/mesh_fill.h"
 #include "terrain/dem_io.h"
-#include "terrain/dem_writer.h"
 #include "terrain/gdal_fill.h"
+#include "terrain/layers_io.h"
 
 namespace groundray {
 namespace {
 
 namespace fs = std::filesystem;
 
-enum class Method { Tension, Cgal, Gdal };
+enum class Method { Tension, Cgal, Gdal, Telea, NavierStokes };
 
 // Shows how far filling is, and stops it when asked to.
 Work shown_work(std::optional<Progress>& progress) {
@@ -97,17 +99,18 @@ void print_holes(const FilledHeights& filled) {
 
 void print_trials(const FilledHeights& filled) {
   if (filled.trials.empty()) return;
-  fmt::print("{:>20} {:>8} {:>11} {:>8} {:>9} {:>9} {:>9}\n", "kind of hole, cells", "tension",
+  fmt::print("{:>28} {:>8} {:>11} {:>8} {:>9} {:>9} {:>9}\n", "kind of hole, cells", "tension",
              "smoothness", "tried", "in 1 sd", "in 2 sd", "widened");
   for (const TrialReport& trial : filled.trials) {
-    const std::string kind = fmt::format("{}, {:.0f} to {:.0f}", trial.is_long ? "long" : "compact",
-                                         trial.from_cells, trial.to_cells);
+    const std::string kind =
+        fmt::format("{}{}, {:.0f} to {:.0f}", trial.is_shadow ? "shadow, " : "",
+                    trial.is_long ? "long" : "compact", trial.from_cells, trial.to_cells);
     if (trial.samples == 0) {
-      fmt::print("{:>20} {:>8g} {:>11g}  no ground to try it on\n", kind, trial.form.tension,
+      fmt::print("{:>28} {:>8g} {:>11g}  no ground to try it on\n", kind, trial.form.tension,
                  trial.form.smoothness);
       continue;
     }
-    fmt::print("{:>20} {:>8g} {:>11g} {:>8} {:>7.1f} % {:>7.1f} % {:>9.2f}\n", kind,
+    fmt::print("{:>28} {:>8g} {:>11g} {:>8} {:>7.1f} % {:>7.1f} % {:>9.2f}\n", kind,
                trial.form.tension, trial.form.smoothness, trial.samples, 100 * trial.within_1sd,
                100 * trial.within_2sd, trial.widened_by);
   }
@@ -151,14 +154,19 @@ struct FillCommand::Options {
   }
 
   void add_choices() {
-    const std::map<std::string, Method> methods{
-        {"tension", Method::Tension}, {"cgal", Method::Cgal}, {"gdal", Method::Gdal}};
+    const std::map<std::string, Method> methods{{"tension", Method::Tension},
+                                                {"cgal", Method::Cgal},
+                                                {"gdal", Method::Gdal},
+                                                {"telea", Method::Telea},
+                                                {"ns", Method::NavierStokes}};
     command
-        ->add_option("--method", method,
-                     "tension: smoothest surface (default); cgal: by triangulated, refined and "
-                     "faired meshes; gdal: as gdal_fillnodata")
+        ->add_option(
+            "--method", method,
+            "tension: smoothest surface (default); cgal: by triangulated, refined and "
+            "faired meshes; to compare with: gdal, as gdal_fillnodata; telea and ns, OpenCV's "
+            "inpainting")
         ->transform(CLI::CheckedTransformer(methods))
-        ->option_text("tension|cgal|gdal");
+        ->option_text("tension|cgal|gdal|telea|ns");
     const std::map<std::string, FillReach> reaches{{"enclosed", FillReach::Enclosed},
                                                    {"hull", FillReach::Hull},
                                                    {"everywhere", FillReach::Everywhere}};
@@ -196,6 +204,11 @@ struct FillCommand::Options {
       return take_filling(frame, heights_m, fill_by_gdal(frame.samples, heights_m, farthest_cells),
                           filling);
     }
+    if (method != Method::Tension) {
+      const Inpainting by = method == Method::Telea ? Inpainting::Telea : Inpainting::NavierStokes;
+      return take_filling(frame, heights_m, fill_by_inpainting(frame.samples, heights_m, by),
+                          filling);
+    }
     std::vector<float> most_m;
     if (!bound.empty()) most_m = load_bounds(bound, read);
     return fill_dem(frame, heights_m, most_m, filling, shown_work(progress));
@@ -209,21 +222,37 @@ struct FillCommand::Options {
           "them out, or the method");
   }
 
+  void check_files() const {
+    std::vector<fs::path> results{out}, inputs{dem};
+    if (!sd_out.empty()) results.push_back(sd_out);
+    if (!bound.empty()) inputs.push_back(bound);
+    for (const fs::path& result : results) check_ending(result, {".tif", ".tiff"});
+    check_results(results, inputs);
+  }
+
+  void write(const Dem& read, const FilledHeights& filled) const {
+    const RasterForm form = read_form(dem);
+    const Georeference place{.origin_w_m = read.origin_w_m, .crs_wkt = read.crs_wkt};
+    const RasterLayer heights{"elevation", "m", filled.heights_m}, sds{"fill_sd", "m", filled.sd_m};
+    ResultFiles files;
+    files.write(out, [&](const fs::path& path) {
+      write_layers(path, read.grid.frame(), place, {&heights, 1}, form);
+    });
+    if (!sd_out.empty()) {
+      files.write(sd_out, [&](const fs::path& path) {
+        write_layers(path, read.grid.frame(), place, {&sds, 1}, {.is_point = form.is_point});
+      });
+    }
+    files.appear();
+  }
+
   void run() {
     refuse_mixtures();
+    check_files();
     const Dem read = load_dem(dem, reading);
-    DemPlace place = describe_file(dem);
-    place.frame = read.grid.frame();
-    place.origin_w_m = read.origin_w_m;
-    place.crs_wkt = read.crs_wkt;
     const FilledHeights filled = fill(read);
     stop_if_interrupted();
-    write_dem(out, place, filled.heights_m);
-    if (!sd_out.empty()) {
-      place.nodata.reset();
-      place.name = "fill_sd";
-      write_dem(sd_out, place, filled.sd_m);
-    }
+    write(read, filled);
     print_holes(filled);
     if (method == Method::Tension) print_trials(filled);
     if (!bound.empty()) print_bounds(filled);

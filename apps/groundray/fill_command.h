@@ -17,7 +17,7 @@ class FillCommand {
   bool is_asked_for() const;
 
   /// Fills, writes and prints what was done.
-  /// @throws Error as load_dem, fill_dem and write_dem.
+  /// @throws Error as load_dem, fill_dem and write_layers.
   void run() const;
 
  private:

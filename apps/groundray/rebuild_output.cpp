@@ -56,10 +56,15 @@ void check_output(const RebuildOutput& output, std::span<const fs::path> inputs)
 void write_output(const RebuildOutput& output, const MeasuredMesh& mesh,
                   const OcclusionFaces& occlusion, const RebuildReport& report) {
   ResultFiles files;
-  if (output.occlusion)
-    write_occlusion(files.aside(*output.occlusion), occlusion, report.georeference);
-  if (output.report) write_json(files.aside(*output.report), report);
-  write_measured_mesh(files.aside(output.mesh), mesh, report.georeference);
+  if (output.occlusion) {
+    files.write(*output.occlusion, [&](const fs::path& path) {
+      write_occlusion(path, occlusion, report.georeference);
+    });
+  }
+  if (output.report)
+    files.write(*output.report, [&](const fs::path& path) { write_json(path, report); });
+  files.write(output.mesh,
+              [&](const fs::path& path) { write_measured_mesh(path, mesh, report.georeference); });
   files.appear();
 }
 

@@ -2,14 +2,12 @@
 
 #include <array>
 #include <chrono>
-#include <cstddef>
-#include <cstdint>
 #include <filesystem>
 #include <glm/vec2.hpp>
 #include <string>
 #include <vector>
 
-#include "core/mesh_io.h"
+#include "apps/groundray/dataset_listing.h"
 #include "core/trajectory.h"
 #include "sensors/camera/lens_models.h"
 
@@ -17,22 +15,15 @@ namespace groundray {
 
 /// A camera of a stereo pair in a dataset.
 struct RecordedCamera {
-  /// An image that is there.
-  struct Frame {
-    std::int64_t number = 0;
-    std::chrono::nanoseconds stamp{0};
-    std::filesystem::path file;  ///< the picture (.png), else the light (.exr)
-  };
-
   std::string name;
   Trajectory X_DC;
   LensModel lens;
   glm::ivec2 size_px{0};
   double exposure_s = 0, row_s = 0;
-  std::vector<Frame> frames;
+  std::vector<RecordedFrame> frames;  ///< by number; pictures (.png), else light (.exr)
 
   /// Returns the middle of an image's exposure: of its middle row.
-  std::chrono::nanoseconds middle(const Frame& frame) const;
+  std::chrono::nanoseconds middle(const RecordedFrame& frame) const;
 };
 
 /// A stereo pair in a dataset: its left and its right camera.

@@ -5,7 +5,9 @@
 #include <unistd.h>
 
 #include <algorithm>
+#include <cctype>
 #include <cerrno>
+#include <string>
 #include <system_error>
 
 #include "core/error.h"
@@ -30,6 +32,14 @@ void check_place(const fs::path& path) {
 
 }  // namespace
 
+void check_ending(const fs::path& path, std::initializer_list<const char*> endings) {
+  std::string ending = path.extension().string();
+  std::ranges::transform(ending, ending.begin(),
+                         [](unsigned char c) { return static_cast<char>(std::tolower(c)); });
+  if (std::ranges::find(endings, ending) == endings.end())
+    throw Error("{}: its name must end in {}", path.string(), *endings.begin());
+}
+
 void check_results(std::span<const fs::path> results, std::span<const fs::path> inputs) {
   std::vector<fs::path> places;
   for (const fs::path& result : results) {
@@ -51,6 +61,20 @@ void check_results(std::span<const fs::path> results, std::span<const fs::path> 
 ResultFiles::~ResultFiles() {
   std::error_code ignored;
   for (const auto& [aside, path] : files_) fs::remove(aside, ignored);
+}
+
+void ResultFiles::write(const fs::path& path, const std::function<void(const fs::path&)>& write) {
+  const std::string other = aside(path).string();
+  try {
+    write(other);
+  } catch (const Error& error) {
+    std::string what = error.what();
+    for (std::size_t at = 0; (at = what.find(other, at)) != std::string::npos;) {
+      what.replace(at, other.size(), path.string());
+      at += path.string().size();
+    }
+    throw Error("{}", what);
+  }
 }
 
 fs::path ResultFiles::aside(const fs::path& path) {

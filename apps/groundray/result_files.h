@@ -1,11 +1,16 @@
 #pragma once
 
 #include <filesystem>
+#include <functional>
+#include <initializer_list>
 #include <span>
 #include <utility>
 #include <vector>
 
 namespace groundray {
+
+/// @throws Error unless the name ends in one of `endings`, whatever its case.
+void check_ending(const std::filesystem::path& path, std::initializer_list<const char*> endings);
 
 /// Checks, before work that may take long, that results can be written, each to a file of its own.
 /// @param inputs  what will be read: none of these may be written over.
@@ -21,14 +26,17 @@ class ResultFiles {
   ResultFiles(const ResultFiles&) = delete;
   ResultFiles& operator=(const ResultFiles&) = delete;
 
-  /// Returns where the file is to be written meanwhile: beside it, a name with the same ending that
-  /// no file had. @throws Error if it cannot be.
-  std::filesystem::path aside(const std::filesystem::path& path);
+  /// Has `write` fill the file under another name meanwhile: beside it, with the same ending, that
+  /// no file had. @throws Error if it cannot be; and as `write`, with the file's own name.
+  void write(const std::filesystem::path& path,
+             const std::function<void(const std::filesystem::path&)>& write);
 
   /// @throws Error naming the file that cannot get its name.
   void appear();
 
  private:
+  std::filesystem::path aside(const std::filesystem::path& path);
+
   std::vector<std::pair<std::filesystem::path, std::filesystem::path>> files_;
 };
 

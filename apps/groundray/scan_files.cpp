@@ -123,14 +123,15 @@ void check_sensors(const ScanChoice& choice, const RecordedDataset& dataset) {
   for (const std::string& sensor : choice.sensors) {
     if (std::ranges::find(names, sensor) != names.end()) continue;
     throw Error("{}: it has no lidar '{}'; it has: {}{}", choice.inputs[0].string(), sensor,
-                fmt::join(names, ", "), yaml::suggestion(sensor, names));
+                names.empty() ? "none" : fmt::format("{}", fmt::join(names, ", ")),
+                yaml::suggestion(sensor, names));
   }
 }
 
 void add_scans(RecordedLidar lidar, const ScanChoice& choice, ScanFiles& files) {
   if (lidar.pending > 0)
     files.notes.push_back(fmt::format("{}: {} frames are pending", lidar.name, lidar.pending));
-  for (const RecordedLidar::Frame& frame : lidar.frames) {
+  for (const RecordedFrame& frame : lidar.frames) {
     if (!choice.frames.contains(static_cast<std::size_t>(frame.number))) continue;
     ScanFile scan{.name = fmt::format("{}/{:06}", lidar.name, frame.number),
                   .file = frame.file,
@@ -146,7 +147,12 @@ void add_scans(RecordedLidar lidar, const ScanChoice& choice, ScanFiles& files) 
 }
 
 ScanFiles scans_of_dataset(const ScanChoice& choice) {
-  RecordedDataset dataset = read_dataset(choice.inputs[0]);
+  const fs::path& folder = choice.inputs[0];
+  if (choice.need == ScanNeed::None) return {.georeference = read_listing(folder).georeference};
+  RecordedDataset dataset = read_dataset(folder);
+  if (dataset.lidars.empty() && (choice.need == ScanNeed::Some || choice.poses))
+    throw Error("{}: the dataset has no lidar; `reconstruct dem` takes its stereo pairs alone, too",
+                (folder / "dataset.yaml").string());
   check_sensors(choice, dataset);
   std::erase_if(dataset.lidars, [&](const RecordedLidar& lidar) {
     return !choice.sensors.empty() &&
@@ -160,6 +166,14 @@ ScanFiles scans_of_dataset(const ScanChoice& choice) {
   ScanFiles files{.georeference = std::move(dataset.georeference)};
   for (RecordedLidar& lidar : dataset.lidars) add_scans(std::move(lidar), choice, files);
   return files;
+}
+
+// Some of a dataset's lidars' scans are wanted, but none is there.
+[[noreturn]] void refuse_no_scan(const ScanChoice& choice, const ScanFiles& files) {
+  std::string rest;
+  for (const std::string& note : files.notes) rest += "; " + note;  // of what is pending
+  if (choice.need == ScanNeed::IfThere) rest += "; --no-lidar takes stereo pairs alone";
+  throw Error("{}: there is no scan among the frames asked for{}", choice.inputs[0].string(), rest);
 }
 
 // ----- files
@@ -257,6 +271,12 @@ std::vector<fs::path> files_read(const ScanChoice& choice, const ScanFiles& file
 }
 
 void check_options(const ScanChoice& choice, InputKind kind) {
+  if (choice.need == ScanNeed::None) {
+    if (kind != InputKind::Dataset)
+      throw Error("--no-lidar: only a dataset has stereo pairs: give its folder");
+    if (!choice.sensors.empty() || choice.poses)
+      throw Error("--no-lidar: --sensor and --poses are of lidars: leave one out");
+  }
   if (kind != InputKind::Dataset && !choice.sensors.empty())
     throw Error("--sensor: only datasets have sensors by name");
   if (kind == InputKind::Conf && choice.poses)
@@ -275,9 +295,9 @@ void check_options(const ScanChoice& choice, InputKind kind) {
 
 }  // namespace
 
-FrameRange parse_frames(std::string_view text) {
+FrameRange parse_frames(std::string_view text, std::string_view option) {
   const auto fail = [&] {
-    throw Error("--frames: '{}' must be A:B:STEP, such as 0:10, 5: or ::2, or one number", text);
+    throw Error("{}: '{}' must be A:B:STEP, such as 0:10, 5: or ::2, or one number", option, text);
   };
   FrameRange range;
   const std::array<std::size_t*, 3> parts{&range.first, &range.end, &range.step};
@@ -308,8 +328,8 @@ ScanFiles find_scans(const ScanChoice& choice) {
   if (kind == InputKind::Conf) files = scans_of_conf(choice.inputs[0], choice.conf_unit_m);
   if (kind == InputKind::Files) files = scans_of_files(choice);
   if (kind != InputKind::Dataset) keep_frames(choice.frames, files.scans);
-  if (files.scans.empty())
-    throw Error("{}: there is no scan among the frames asked for", choice.inputs[0].string());
+  const bool is_of_pairs = kind == InputKind::Dataset && files.paths.empty();  // of no lidar
+  if (files.scans.empty() && !is_of_pairs) refuse_no_scan(choice, files);
   if (kind != InputKind::Dataset) choose_origin(files);
   files.read = files_read(choice, files, kind);
   return files;

@@ -28,8 +28,8 @@ struct FrameRange {
 };
 
 /// Reads `A:B:STEP`, parts of which may be left out, or the number of one frame.
-/// @throws Error if it is neither, or takes no frame.
-FrameRange parse_frames(std::string_view text);
+/// @throws Error that names the option if it is neither, or takes no frame.
+FrameRange parse_frames(std::string_view text, std::string_view option = "--frames");
 
 /// How poses of a file belong to scans.
 enum class PoseOrder {
@@ -37,10 +37,18 @@ enum class PoseOrder {
   Name,  ///< by time, which each scan's name is
 };
 
+/// Whether a run can do without scans, for a dataset's stereo pairs measure as well.
+enum class ScanNeed {
+  Some,     ///< there must be one
+  IfThere,  ///< but a dataset may have no lidar
+  None,     ///< a dataset's lidars are left alone
+};
+
 /// Which scans there are, and what their files do not say of where they were made.
 struct ScanChoice {
   std::vector<std::filesystem::path> inputs;  ///< a dataset, a .conf, or files of scans
-  std::vector<std::string> sensors;           ///< of a dataset; empty for all its lidars
+  ScanNeed need = ScanNeed::Some;
+  std::vector<std::string> sensors;  ///< of a dataset; empty for all its lidars
   FrameRange frames;
   std::optional<std::filesystem::path> poses;  ///< instead of a dataset's own
   PoseOrder order = PoseOrder::Line;
@@ -71,8 +79,8 @@ struct ScanFiles {
 
 /// Finds the scans and where each was made. Poses farther than 10 km from their zero get an origin
 /// near the first of them, in whole metres.
-/// @throws Error if there is no scan, a scan has no pose, kinds of input are mixed, or an option
-///         does not suit them; and as read_dataset and read_tum.
+/// @throws Error if there is no scan though one is needed, a scan has no pose, kinds of input are
+///         mixed, or an option does not suit them; and as read_dataset and read_tum.
 ScanFiles find_scans(const ScanChoice& choice);
 
 }  // namespace groundray

@@ -15,6 +15,7 @@ find_package(tinyxml2 REQUIRED)
 # OpenCV is linked by the names of a few of its libraries; its CMake files would need all of it.
 find_library(GROUNDRAY_OPENCV_IMGPROC opencv_imgproc REQUIRED)
 find_library(GROUNDRAY_OPENCV_CALIB3D opencv_calib3d REQUIRED)
+find_library(GROUNDRAY_OPENCV_PHOTO opencv_photo REQUIRED)
 # CGAL is headers over these two; its CMake files would set flags for all sources and print.
 find_library(GROUNDRAY_GMP gmp REQUIRED)
 find_library(GROUNDRAY_MPFR mpfr REQUIRED)

@@ -507,6 +507,25 @@ TEST_F(DemIo, TheHeaderTellsSizeFormatTypeAndCrs) {
   EXPECT_EQ(info.crs_name, "WGS 84 / UTM zone 31N (EPSG:32631)");
 }
 
+TEST_F(DemIo, SystemsOfCoordinatesAreOneHoweverWorded) {
+  constexpr const char* esri =
+      "PROJCS[\"NAD_1983_UTM_Zone_15N\",GEOGCS[\"GCS_North_American_1983\","
+      "DATUM[\"D_North_American_1983\",SPHEROID[\"GRS_1980\",6378137.0,298.257222101]],"
+      "PRIMEM[\"Greenwich\",0.0],UNIT[\"Degree\",0.0174532925199433]],"
+      "PROJECTION[\"Transverse_Mercator\"],PARAMETER[\"False_Easting\",500000.0],"
+      "PARAMETER[\"False_Northing\",0.0],PARAMETER[\"Central_Meridian\",-93.0],"
+      "PARAMETER[\"Scale_Factor\",0.9996],PARAMETER[\"Latitude_Of_Origin\",0.0],"
+      "UNIT[\"Meter\",1.0]]";
+  EXPECT_TRUE(is_same_crs("EPSG:26915", "EPSG:26915"));
+  EXPECT_TRUE(is_same_crs("ESRI::" + std::string(esri), "EPSG:26915"));
+  EXPECT_TRUE(is_same_crs("EPSG:26915+5703", "EPSG:26915")) << "no datum of heights is told";
+  EXPECT_FALSE(is_same_crs("EPSG:26915+5703", "EPSG:26915+5773"));
+  EXPECT_FALSE(is_same_crs("EPSG:26915", "EPSG:32615")) << "another datum";
+  EXPECT_FALSE(is_same_crs("EPSG:26915", "EPSG:26916"));
+  EXPECT_FALSE(is_same_crs("EPSG:26915", ""));
+  EXPECT_FALSE(is_same_crs("nonsense", "nonsense"));
+}
+
 TEST(DemIoData, ThePrairieIsWholeAndOneMetreApart) {
   const Dem dem = load_dem(testing::data_folder() / "terrain/prairie_1m.tif");
   EXPECT_EQ(dem.grid.columns(), 400);

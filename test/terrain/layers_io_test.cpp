@@ -7,19 +7,33 @@
 #include <cmath>
 #include <fstream>
 #include <limits>
+#include <memory>
+#include <string>
 #include <vector>
 
 #include "core/error.h"
 #include "terrain/dem_io.h"
+#include "test/support/geotiff.h"
 #include "test/support/temporary_folder.h"
 
 namespace groundray {
 namespace {
 
+using ::testing::AnyOf;
 using ::testing::ElementsAre;
 using ::testing::HasSubstr;
 
 constexpr float hole = std::numeric_limits<float>::quiet_NaN();
+
+void expect_same(std::span<const float> found_m, std::span<const float> written_m) {
+  ASSERT_EQ(found_m.size(), written_m.size());
+  for (std::size_t i = 0; i < found_m.size(); ++i) {
+    EXPECT_EQ(std::isnan(found_m[i]), std::isnan(written_m[i])) << i;
+    if (!std::isnan(written_m[i])) {
+      EXPECT_EQ(found_m[i], written_m[i]) << i;
+    }
+  }
+}
 
 class LayersIo : public ::testing::Test {
  protected:
@@ -50,9 +64,74 @@ TEST_F(LayersIo, ReadsItsElevationsAgain) {
   EXPECT_EQ(dem.grid.step_m(), glm::dvec2(2, -3));
   EXPECT_EQ(dem.grid.origin_m() + glm::dvec2(dem.origin_w_m),
             frame_.origin_m + glm::dvec2(place_.origin_w_m));
-  for (std::size_t i = 0; i < heights_m_.size(); ++i) {
-    const float read = dem.grid.heights_m()[i];
-    EXPECT_TRUE(read == heights_m_[i] || (std::isnan(read) && std::isnan(heights_m_[i])));
+  expect_same(dem.grid.heights_m(), heights_m_);
+}
+
+TEST_F(LayersIo, KeepsTheFormOfAFileAndItsPlaces) {
+  std::vector<double> heights_m(1200);
+  for (std::size_t i = 0; i < heights_m.size(); ++i)
+    heights_m[i] = i % 7 == 0 ? -9999 : std::sin(static_cast<double>(i)) * 100;
+  for (const char* kind : {"Area", "Point"}) {
+    for (const double nodata : {-9999.0, -32768.0}) {
+      testing::GeoTiff{.size = {40, 30}, .values = heights_m, .crs = "EPSG:26915", .nodata = nodata}
+          .save(folder_ / "in.tif");
+      {
+        const std::unique_ptr<void, decltype(&GDALClose)> file(
+            GDALOpen((folder_ / "in.tif").c_str(), GA_Update), &GDALClose);
+        GDALSetMetadataItem(file.get(), "AREA_OR_POINT", kind, nullptr);
+      }
+      const Dem dem = load_dem(folder_ / "in.tif");
+      const RasterForm form = read_form(folder_ / "in.tif");
+      EXPECT_EQ(form.nodata, nodata);
+      EXPECT_EQ(form.is_point, std::string(kind) == "Point");
+      const RasterLayer layer{"elevation", "m", dem.grid.heights_m()};
+      write_layers(file_, dem.grid.frame(), {.origin_w_m = dem.origin_w_m, .crs_wkt = dem.crs_wkt},
+                   {&layer, 1}, form);
+      const Dem again = load_dem(file_);
+      EXPECT_EQ(again.crs_name, dem.crs_name);
+      EXPECT_EQ(again.origin_w_m, dem.origin_w_m);
+      EXPECT_EQ(again.grid.origin_m(), dem.grid.origin_m());
+      EXPECT_EQ(again.grid.step_m(), dem.grid.step_m());
+      expect_same(again.grid.heights_m(), dem.grid.heights_m());
+      // The second file has heights of -9999 beside holes of -32768: both stay what they are.
+      EXPECT_EQ(read_form(file_).nodata, nodata);
+      EXPECT_EQ(read_form(file_).is_point, form.is_point);
+    }
+  }
+}
+
+TEST_F(LayersIo, NoHeightIsTakenForAHole) {
+  heights_m_[0] = 0;
+  for (const double nodata : {0.0, 0.1, 1e300}) {  // a height; no float; too large for one
+    write_layers(file_, frame_, place_,
+                 std::vector<RasterLayer>{{"counts", "", counts_}, {"elevation", "m", heights_m_}},
+                 {.nodata = nodata});
+    EXPECT_TRUE(std::isnan(*read_form(file_).nodata)) << nodata;
+    write_layers(file_, frame_, place_, std::vector<RasterLayer>{{"elevation", "m", heights_m_}},
+                 {.nodata = nodata});
+    expect_same(load_dem(file_).grid.heights_m(), heights_m_);
+  }
+}
+
+// Heights are metres, whatever the datum's own unit; the datum stays.
+TEST_F(LayersIo, KeepsTheDatumOfHeightsInMetres) {
+  const std::vector<RasterLayer> layers{{"elevation", "m", heights_m_}};
+  for (const char* crs : {"EPSG:26915+5703", "EPSG:26915+6360"}) {  // NAVD88 in m and in US feet
+    OGRSpatialReference both;
+    ASSERT_EQ(both.SetFromUserInput(crs), OGRERR_NONE);
+    char* text = nullptr;
+    both.exportToWkt(&text);
+    place_.crs_wkt = text;
+    CPLFree(text);
+    write_layers(file_, frame_, place_, layers);
+    const Dem dem = load_dem(file_);
+    expect_same(dem.grid.heights_m(), heights_m_);
+    EXPECT_THAT(dem.crs_name, AllOf(HasSubstr("UTM zone 15N"),
+                                    AnyOf(HasSubstr("NAVD88 height"),
+                                          HasSubstr("North American Vertical Datum 1988 height"))));
+    OGRSpatialReference read;
+    ASSERT_EQ(read.SetFromUserInput(dem.crs_wkt.c_str()), OGRERR_NONE);
+    EXPECT_EQ(read.GetTargetLinearUnits("VERT_CS"), 1) << crs;
   }
 }
 

@@ -93,9 +93,14 @@ TEST(DatasetReader, FaultsNameFileLineAndRule) {
       {changed("stamp_s: 0.1", "stamp_s: nan"), "stamp_s"},
       {changed("frame: 1", "frame: -1"), "frame"},
       {changed("[400000, 5000000, 100]", "[4, 5]"), "origin_w_m"},
-      {changed("kind: lidar}\n  - {name: rear, kind: lidar",
-               "kind: camera}\n  - {name: rear, kind: camera"),
-       "the dataset has no lidar"},
+      {changed("name: top, ", ""), "dataset.yaml:5:5: key 'name': missing"},
+      {changed("origin_w_m", "origin"), "key 'origin_w_m': missing"},
+      {changed("{sensor: top, frame: 1, ", "{frame: 1, "),
+       "dataset.yaml:9:5: key 'sensor': missing"},
+      {changed(", state: pending", ""), "key 'state': missing"},
+      {changed("kind: camera}", "kind: camera, frames: 3}"),
+       "dataset.yaml:7:39: key 'frames': eye has 3 frames, but 1 are listed: was the file cut "
+       "short?"},
       {changed("sensors:", "sensors: 3 #"), "dataset.yaml"},
       {"", "dataset.yaml"},
       {"[", "dataset.yaml"}};
@@ -108,6 +113,8 @@ TEST(DatasetReader, FaultsNameFileLineAndRule) {
   write_dataset(folder, yaml);
   write(folder / "calibration/rear.yaml", "range_noise_sigma_m: -1\n");
   EXPECT_THAT(refusal(folder.path()), AllOf(HasSubstr("rear.yaml:1"), HasSubstr("must be >= 0")));
+  write(folder / "calibration/rear.yaml", "points: as_fired\n");
+  EXPECT_THAT(refusal(folder.path()), HasSubstr("key 'range_noise_sigma_m': missing"));
   std::filesystem::remove(folder / "poses/top.tum");
   EXPECT_THAT(refusal(folder.path()), HasSubstr("top.tum"));
 }

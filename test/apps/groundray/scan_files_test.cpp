@@ -88,6 +88,45 @@ TEST(ScanFiles, ConfsNameScansBesideThem) {
   EXPECT_THAT(refusal({.inputs = {conf, folder / "a.ply"}}), HasSubstr("must be the only input"));
 }
 
+// A dataset of one lidar, whose second scan is not there yet, or of a camera.
+TEST(ScanFiles, DatasetsNeedNoLidarWherePairsMeasure) {
+  const TemporaryFolder folder;
+  const auto dataset_of = [&](const std::string& kind) {
+    write(folder / "dataset.yaml",
+          fmt::format("groundray_dataset: 1\norigin_w_m: [1, 2, 0]\n"
+                      "sensors: [{{name: top, kind: {}}}]\n"
+                      "frames:\n  - {{sensor: top, frame: 0, stamp_s: 0, state: done}}\n"
+                      "  - {{sensor: top, frame: 1, stamp_s: 0.1, state: pending}}\n",
+                      kind));
+  };
+  const std::vector<std::filesystem::path> inputs{folder.path()};
+  dataset_of("camera");
+  EXPECT_THAT(refusal({.inputs = inputs}), HasSubstr("the dataset has no lidar"));
+  const ScanFiles none = find_scans({.inputs = inputs, .need = ScanNeed::IfThere});
+  EXPECT_TRUE(none.scans.empty());
+  EXPECT_EQ(none.georeference.origin_w_m, glm::dvec3(1, 2, 0));
+  EXPECT_THAT(refusal({.inputs = inputs, .need = ScanNeed::IfThere, .sensors = {"top"}}),
+              HasSubstr("it has no lidar 'top'; it has: none"));
+  EXPECT_THAT(refusal({.inputs = inputs, .need = ScanNeed::IfThere, .poses = "p.tum"}),
+              HasSubstr("the dataset has no lidar"));
+  dataset_of("lidar");  // nothing says where it was or what it is
+  EXPECT_TRUE(find_scans({.inputs = inputs, .need = ScanNeed::None}).scans.empty());
+  EXPECT_THAT(refusal({.inputs = inputs, .need = ScanNeed::IfThere}), HasSubstr("top.tum"));
+  std::filesystem::create_directories(folder / "poses");
+  std::filesystem::create_directories(folder / "calibration");
+  write(folder / "poses/top.tum", "0 1 2 3 0 0 0 1\n0.5 2 2 3 0 0 0 1\n");
+  write(folder / "calibration/top.yaml", "range_noise_sigma_m: 0.02\n");
+  EXPECT_EQ(find_scans({.inputs = inputs, .need = ScanNeed::IfThere}).scans.size(), 1u);
+  EXPECT_THAT(refusal({.inputs = inputs, .need = ScanNeed::IfThere, .frames = parse_frames("1:")}),
+              AllOf(HasSubstr("no scan among the frames asked for; top: 1 frames are pending"),
+                    HasSubstr("--no-lidar")));
+  EXPECT_THAT(refusal({.inputs = inputs, .need = ScanNeed::None, .sensors = {"top"}}),
+              HasSubstr("--no-lidar: --sensor"));
+  const auto scan = write(folder / "a.pcd", "");
+  EXPECT_THAT(refusal({.inputs = {scan}, .need = ScanNeed::None}),
+              HasSubstr("only a dataset has stereo pairs"));
+}
+
 TEST(ScanFiles, PosesBelongToScansByLine) {
   const TemporaryFolder folder;
   const auto a = write(folder / "a.pcd", ""), b = write(folder / "b.pcd", "");

@@ -1,0 +1,295 @@
+"""What `groundray reconstruct dem` takes, and how it says what is wrong with it.
+
+A dataset with a lidar and a stereo pair is broken in one place at a time: each fault is one message
+that names the place, and no file is there that was not before.
+"""
+
+import os
+import re
+import shutil
+import subprocess
+from pathlib import Path
+
+import cv2
+import numpy as np
+import pytest
+
+ROOT = Path(__file__).resolve().parents[2]
+PROGRAM = ROOT / "build/release/bin/groundray"
+PRAIRIE = ROOT / "data/terrain/prairie_1m.tif"
+SCENE = """\
+groundray: 1
+seed: 5
+duration_s: 0.3
+terrain:
+  dem: {prairie}
+  material: dry_soil
+  texture: {{albedo: gravel.png, size_m: 8}}
+sky:
+  analytic: {{}}
+  sun: {{azimuth_deg: 130, elevation_deg: 40}}
+platform:
+  drive:
+    waypoints_m: [[429440, 5150660], [429460, 5150668]]
+    speed_m_s: 5
+    height_m: 0.5
+lidars:
+  - name: top
+    preset: velodyne_vlp16
+    mount: {{translation_m: [0, 0, 1.8]}}
+    range_noise_sigma_m: 0.02
+cameras:
+  - name: left
+    file: camera.yaml
+    mount: {{translation_m: [1.5, 0.25, 1.6], pitch_deg: 15}}
+    sampling: {{samples: 4, most_samples: 4, depth: 2}}
+  - name: right
+    file: camera.yaml
+    mount: {{translation_m: [1.5, -0.25, 1.6], pitch_deg: 15}}
+    sampling: {{samples: 4, most_samples: 4, depth: 2}}
+stereo:
+  - {{name: pair, left: left, right: right, images: rectified}}
+"""
+CAMERA = """\
+groundray_camera: 1
+model: Grey camera of 0.3 MP
+size_px: [640, 480]
+lens: {pinhole: {focal_px: [457, 457], centre_px: [319.5, 239.5]}}
+rate_hz: 5
+first_ms: 100
+shutter: {exposure_ms: 0.5}
+aperture: {f_number: 4}
+imager:
+  pixel_pitch_um: 4.8
+  filter: rggb
+  quantum_efficiency: [0.45, 0.6, 0.5]
+  full_well_e: 10000
+  read_noise_e: 5
+  dark_current_e_s: 10
+  prnu_percent: 0.5
+  dsnu_e: 1
+  gain_dn_e: 0.4
+  black_dn: 64
+  bits: 12
+products: [radiance, picture]
+sources: {all: an example of our own}
+"""
+
+
+def groundray(*arguments, **options):
+    return subprocess.run(
+        [PROGRAM, *map(str, arguments)], capture_output=True, text=True, timeout=300, **options
+    )
+
+
+def made(*arguments):
+    result = groundray("reconstruct", "dem", *arguments)
+    assert result.returncode == 0, result.stderr
+    return result.stdout
+
+
+def refused(folder, *arguments, words, **options):
+    """One message, of all the words, and no file of another time or name than before."""
+    before = {path: path.lstat().st_mtime_ns for path in folder.rglob("*") if path.is_file()}
+    result = groundray("reconstruct", "dem", *arguments, **options)
+    assert result.returncode == 1, result
+    said = [line for line in result.stderr.splitlines() if not line.startswith(("match", "read"))]
+    for word in words:
+        assert word in "\n".join(said), result.stderr
+    assert sum(line.startswith("groundray: ") for line in said) == 1
+    after = {path: path.lstat().st_mtime_ns for path in folder.rglob("*") if path.is_file()}
+    assert before == after
+
+
+@pytest.fixture(scope="module")
+def recorded(tmp_path_factory):
+    folder = tmp_path_factory.mktemp("recorded")
+    grains = cv2.GaussianBlur(np.random.default_rng(1).normal(0, 1, (1024, 1024)), (0, 0), 2)
+    gravel = np.clip(128 + 45 * grains / grains.std(), 0, 255)
+    cv2.imwrite(str(folder / "gravel.png"), gravel.astype(np.uint8))
+    (folder / "camera.yaml").write_text(CAMERA)
+    (folder / "scene.yaml").write_text(SCENE.format(prairie=PRAIRIE))
+    result = groundray("generate", folder / "scene.yaml", "-o", folder / "data")
+    assert result.returncode == 0, result.stderr
+    return folder / "data"
+
+
+@pytest.fixture
+def data(recorded, tmp_path):
+    """A copy to break."""
+    return Path(shutil.copytree(recorded, tmp_path / "data"))
+
+
+def changed(path, pattern, by):
+    text, count = re.subn(pattern, by, path.read_text(), flags=re.MULTILINE)
+    assert count > 0
+    path.write_text(text)
+
+
+def without_lidar(data):
+    changed(data / "dataset.yaml", r"^.*(kind: lidar|sensor: top).*\n", "")
+    shutil.rmtree(data / "lidar")
+    (data / "poses/top.tum").unlink()
+    (data / "calibration/top.yaml").unlink()
+
+
+def bands(path, folder):
+    raw = folder / "bands.raw"
+    command = ["gdal_translate", "-q", "-of", "ENVI", "-ot", "Float32", "-co", "INTERLEAVE=BSQ"]
+    subprocess.run([*command, path, raw], check=True)
+    return np.fromfile(raw, "<f4").reshape(12, -1)
+
+
+def test_pairs_measure_alone(recorded, data, tmp_path):
+    """Of a dataset with a lidar, and, to the byte the same, of one without."""
+    alone = ["--cell-m", "0.5", "-o", tmp_path / "alone.tif", "--no-lidar"]
+    assert "pair/000000" in made(recorded, *alone)
+    named = ["--cell-m", "0.5", "-o", tmp_path / "named.tif", "--no-lidar", "--stereo", "pair"]
+    made(recorded, *named)
+    layers = bands(tmp_path / "alone.tif", tmp_path)
+    assert layers[2].max() == 0  # n_lidar
+    assert set(np.unique(layers[6])) <= {0, 2, 4}  # source
+    assert np.count_nonzero(layers[6] == 2) > 20
+    assert np.all(np.isnan(layers[9]))  # upper_bound: no beam is known
+    without_lidar(data)
+    made(data, "--cell-m", "0.5", "-o", tmp_path / "none.tif")
+    whole = (tmp_path / "alone.tif").read_bytes()
+    assert whole == (tmp_path / "none.tif").read_bytes()
+    assert whole == (tmp_path / "named.tif").read_bytes()
+
+
+def test_what_does_not_measure_is_told(data, tmp_path):
+    out = ["--cell-m", "1", "-o", tmp_path / "dem.tif"]
+    refused(tmp_path, data, *out, "--no-lidar", "--no-stereo", words=["leave nothing"])
+    refused(tmp_path, data, *out, "--no-lidar", "--sensor", "top", words=["--sensor"])
+    late = ["--no-lidar", "--stereo-frames", "9:"]
+    refused(tmp_path, data, *out, *late, words=["no images", "(--stereo-frames)"])
+    words = ["--stereo-frames: 'x' must be"]
+    refused(tmp_path, data, *out, "--stereo-frames", "x", words=words)
+    refused(tmp_path, data, *out, "--frames", "9:", words=["no scan among", "--no-lidar"])
+    without_lidar(data)
+    refused(tmp_path, data, *out, "--no-stereo", words=["dataset.yaml", "has no lidar"])
+    changed(data / "dataset.yaml", r"^.*kind: stereo.*\n", "")
+    refused(tmp_path, data, *out, words=["takes a stereo pair", "--stereo LEFT,RIGHT"])
+    assert "left,right/000000" in made(data, *out, "--stereo", "left,right")
+
+
+def cut(path):
+    os.truncate(path, path.stat().st_size // 2)
+
+
+def other_size(path):
+    cv2.imwrite(str(path), np.zeros((48, 64), np.uint8))
+
+
+def last_pose_late(path):
+    lines = path.read_text().splitlines(keepends=True)
+    path.write_text("".join([*lines[:4], "40" + lines[-1][lines[-1].index(" ") :]]))
+
+
+def first_poses(path):
+    path.write_text("".join(path.read_text().splitlines(keepends=True)[:4]))
+
+
+def frames_lost(path):
+    path.write_text("".join(path.read_text().splitlines(keepends=True)[:-2]))
+
+
+@pytest.mark.parametrize(
+    ("file", "fault", "words"),
+    [
+        (
+            "camera/left/000000.png",
+            Path.unlink,
+            ["left/000000.exr", "one is light", "was one removed"],
+        ),
+        ("camera/left/000000.png", cut, ["left/000000.png", "cut short"]),
+        ("camera/right/000000.png", other_size, ["right/000000.png", "64 x 48", "640 x 480"]),
+        ("poses/left.tum", last_pose_late, ["poses/left.tum", "have a gap", "--pose-gap-s"]),
+        ("poses/top.tum", last_pose_late, ["top/00000", "have a gap", "--pose-gap-s"]),
+        ("poses/right.tum", first_poses, ["poses/right.tum", "covers 0 to", "cut short?"]),
+        ("lidar/top/000000.ply", cut, ["top/000000.ply", "cut short?"]),
+        ("dataset.yaml", frames_lost, ["dataset.yaml:", "'frames'", "are listed", "cut short?"]),
+        ("calibration/left.yaml", Path.unlink, ["left.yaml", "no such file"]),
+    ],
+)
+def test_faults_of_a_dataset_name_their_file(data, tmp_path, file, fault, words):
+    fault(data / file)
+    refused(tmp_path, data, "--cell-m", "1", "-o", tmp_path / "dem.tif", words=words)
+
+
+def test_missing_images_and_keys_are_told(data, tmp_path):
+    out = ["--cell-m", "1", "-o", tmp_path / "dem.tif"]
+    for name in ("left", "right"):
+        (data / f"camera/{name}/000000.png").unlink()
+    assert "pair/000000" in made(data, *out)  # of light
+    (tmp_path / "dem.tif").unlink()
+    shutil.rmtree(data / "camera/left")
+    refused(tmp_path, data, *out, words=["left/000000.png", "was it removed"])
+    changed(data / "dataset.yaml", r"^crs_wkt: .*$", "crs_wkt: nonsense")
+    only = [*out, "--no-stereo"]
+    refused(tmp_path, data, *only, words=["the CRS 'nonsense'", "crs_wkt"])
+    changed(data / "dataset.yaml", r"^origin_w_m: .*$", "")
+    refused(tmp_path, data, *only, words=["dataset.yaml:", "key 'origin_w_m': missing"])
+
+
+def test_places_and_sizes_that_cannot_be_are_told(recorded, tmp_path):
+    out = ["--no-stereo", "-o", tmp_path / "dem.tif"]
+    box = ["--area", "429450", "5150650", "429400", "5150700"]
+    refused(tmp_path, recorded, *out, "--cell-m", "1", *box, words=["--area: 429450", "W < E"])
+    far = ["--area", "0", "0", "9", "9"]
+    refused(tmp_path, recorded, *out, "--cell-m", "1", *far, words=["outside", "--area"])
+    refused(tmp_path, recorded, *out, "--cell-m", "1e-4", words=["samples", "larger cells"])
+
+
+def test_a_dataset_is_not_written_over(data, tmp_path):
+    out = ["--cell-m", "1", "-o", tmp_path / "dem.tif"]
+    for option, file in (("--report", "dataset.yaml"), ("--picture", "camera/left/000000.png")):
+        refused(tmp_path, data, *out, option, data / file, words=[file, "another name"])
+
+
+def test_a_disk_without_space_leaves_nothing_and_names_the_file(recorded, tmp_path):
+    """A limit on sizes of files stands for it, as `ulimit -f` sets it."""
+    limit = ["bash", "-c", 'ulimit -f 8; exec "$@"', "bash", PROGRAM, "reconstruct", "dem"]
+    command = [*limit, recorded, "--no-stereo", "--cell-m", "0.25", "-o", tmp_path / "dem.tif"]
+    result = subprocess.run([*map(str, command)], capture_output=True, text=True, timeout=300)
+    assert result.returncode == 1, result
+    assert f"{tmp_path}/dem.tif: cannot be written" in result.stderr
+    assert list(tmp_path.iterdir()) == []
+
+
+def test_scans_without_noise_are_told(data, tmp_path):
+    changed(data / "calibration/top.yaml", r"^range_noise_sigma_m: .*$", "range_noise_sigma_m: 0")
+    for path in sorted((data / "lidar/top").glob("*[0-9].ply")):
+        path.write_bytes(path.read_bytes().replace(b"float range_sd\n", b"float other_no\n", 1))
+    out = ["--no-stereo", "--cell-m", "1", "-o", tmp_path / "dem.tif"]
+    assert "tell no standard deviation of their ranges" in made(data, *out)
+    assert "tell no standard deviation" not in made(data, *out, "--range-sd-m", "0.02")
+
+
+@pytest.mark.parametrize("vertical", [5703, 6360])  # NAVD88, in metres and in US feet
+def test_a_datum_of_heights_stays(tmp_path, vertical):
+    dem, made_of = tmp_path / "dem.tif", tmp_path / "filled.tif"
+    system = f"EPSG:26915+{vertical}"
+    subprocess.run(["gdal_translate", "-q", "-a_srs", system, PRAIRIE, dem], check=True)
+    result = groundray("terrain", "fill", dem, "-o", made_of)
+    assert result.returncode == 0, result.stderr
+    info = subprocess.run(["gdalinfo", made_of], check=True, capture_output=True, text=True).stdout
+    assert 'COMPOUNDCRS["NAD83 / UTM zone 15N' in info
+    assert 'VDATUM["North American Vertical Datum 1988"' in info
+    vertical_part = info[info.index("VERTCRS") : info.index("Data axis")]
+    assert "foot" not in vertical_part
+    assert "Unit Type: met" in info or "Unit Type: m\n" in info
+
+
+def test_files_are_cloud_optimised(recorded, tmp_path):
+    """By GDAL's own check."""
+    check = ["/usr/bin/python3", "-m", "osgeo_utils.samples.validate_cloud_optimized_geotiff"]
+    probe = subprocess.run([*check, PRAIRIE], capture_output=True, text=True)
+    if "No module" in probe.stderr or not Path(check[0]).exists():
+        pytest.skip("GDAL's Python samples are not there: apt-get install python3-gdal")
+    error = ["--truth", PRAIRIE, "--error-map", tmp_path / "error.tif"]
+    made(recorded, "--no-stereo", "--cell-m", "0.2", "-o", tmp_path / "dem.tif", *error)
+    for name in ("dem.tif", "error.tif"):
+        said = subprocess.run([*check, tmp_path / name], capture_output=True, text=True)
+        assert "is a valid cloud optimized GeoTIFF" in said.stdout, said
