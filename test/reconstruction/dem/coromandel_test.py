@@ -10,6 +10,7 @@ import subprocess
 from collections.abc import Callable
 from pathlib import Path
 
+import laspy
 import numpy as np
 import pytest
 
@@ -17,6 +18,18 @@ ROOT = Path(__file__).resolve().parents[3]
 SHARED = Path(os.environ.get("GROUNDRAY_SHARED_DATA", ROOT.parent / "shared/data"))
 SCAN = SHARED / "lidar/als_coromandel/points.laz"
 GROUND, NOISE = 2, (7, 18)  # classes of the American Society for Photogrammetry
+
+OPTIONS = {
+    "one set": ("airborne",),
+    # For land as steep as here and 32 points a square metre.
+    "for this land": ("airborne", "slope=0.6", "threshold_m=0.3", "scaling_m=0.3"),
+}
+# What the cloth simulation has of samp11, the bush on steep land of the ISPRS filter test, with the
+# options that its authors chose for it: Zhang et al. (2016), table 3.
+MOST_MISSED, MOST_TAKEN = 0.0723, 0.1844
+# The surface has one height for each cell of this side, and the land rises by 0.8 in the median:
+# heights may be off as between cells, and in the middle by no more than half of that.
+CELL_M, RISE = 1, 0.8
 
 
 def found_in(points: np.ndarray, folder: Path, *words: str) -> np.ndarray:
@@ -26,43 +39,36 @@ def found_in(points: np.ndarray, folder: Path, *words: str) -> np.ndarray:
     return np.load(folder / "out.npy")
 
 
-@pytest.mark.parametrize(
-    ("words", "most_missed", "most_taken"),
-    [
-        (("airborne",), 0.07, 0.20),
-        # For land as steep as here (39 degrees in the median) and 32 points a square metre.
-        (("airborne", "slope=0.6", "threshold_m=0.3", "scaling_m=0.3"), 0.04, 0.15),
-    ],
-)
-def test_labelled_ground_is_found(
-    tmp_path: Path,
-    record_property: Callable[[str, object], None],
-    words: tuple[str, ...],
-    most_missed: float,
-    most_taken: float,
-) -> None:
+def read_scan() -> tuple[np.ndarray, np.ndarray]:
+    """Points near 0, and their classes."""
     if not SCAN.exists():
         pytest.skip(f"there is no {SCAN}; set GROUNDRAY_SHARED_DATA")
-    laspy = pytest.importorskip("laspy", reason="laspy is not installed: pip install laspy")
-    pytest.importorskip("lazrs", reason="lazrs is not installed: pip install lazrs")
     scan = laspy.read(SCAN)
     points = np.column_stack([scan.x, scan.y, scan.z])
     points[:, :2] -= np.floor(points[:, :2].min(axis=0))
-    labels = np.asarray(scan.classification)
+    return points, np.asarray(scan.classification)
+
+
+def test_labelled_ground_is_found(
+    tmp_path: Path, record_property: Callable[[str, object], None]
+) -> None:
+    points, labels = read_scan()
     is_ground, is_noise = labels == GROUND, np.isin(labels, NOISE)
-    found = found_in(points, tmp_path, *words)
-    is_found = found["class"] == 0
-    missed = np.mean(~is_found[is_ground])
-    taken = np.mean(is_found[~is_ground & ~is_noise])
-    total = np.mean((is_found != is_ground)[~is_noise])
-    off_m = found["height_m"][is_ground]
-    middle_m = np.median(off_m)
-    spread_m = 1.4826 * np.median(np.abs(off_m - middle_m))
-    record_property("type I", f"{100 * missed:.2f} %")
-    record_property("type II", f"{100 * taken:.2f} %")
-    record_property("total", f"{100 * total:.2f} %")
-    record_property("labelled ground above the surface", f"{middle_m:.3f} m, NMAD {spread_m:.3f} m")
-    assert missed <= most_missed
-    assert taken <= most_taken
-    assert abs(middle_m) <= 0.2
-    assert spread_m <= 0.4
+    errors = {}
+    for name, words in OPTIONS.items():
+        found = found_in(points, tmp_path, *words)
+        is_found = found["class"] == 0
+        missed = np.mean(~is_found[is_ground])
+        taken = np.mean(is_found[~is_ground & ~is_noise])
+        total = np.mean((is_found != is_ground)[~is_noise])
+        off_m = found["height_m"][is_ground]
+        middle_m = np.median(off_m)
+        spread_m = 1.4826 * np.median(np.abs(off_m - middle_m))
+        record_property(f"{name}: type I, II, total", f"{missed:.4f} {taken:.4f} {total:.4f}")
+        record_property(f"{name}: ground less surface", f"{middle_m:.3f} m, NMAD {spread_m:.3f} m")
+        assert missed <= MOST_MISSED
+        assert taken <= MOST_TAKEN
+        assert abs(middle_m) <= RISE * CELL_M / 4
+        assert spread_m <= RISE * CELL_M / 2
+        errors[name] = missed, taken
+    assert all(np.less(errors["for this land"], errors["one set"]))
