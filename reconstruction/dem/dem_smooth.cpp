@@ -15,17 +15,20 @@ namespace {
 
 using Matrix = Eigen::SparseMatrix<double, Eigen::ColMajor, int>;
 
-constexpr std::size_t bytes_per_sample = 800;
-constexpr double still_sds = 1e-3;  // of a height: a move that ends the rounds
+constexpr std::size_t bytes_per_sample = 640;
+constexpr std::int64_t most_samples = 300'000'000;  // 7 entries each are counted in 31 bits
+constexpr double still_sds = 1e-3;                  // a pull that ends the rounds
+// What a round leaves of the pull: the next one, of other weights, takes of that as well.
+constexpr double solved_share = 0.03;
+constexpr int most_steps = 10000;  // of one round
 
 void check(const GridFrame& frame, std::span<const float> heights_m,
            std::span<const float> variance_m2, const SmoothOptions& options, const Work& work) {
   Violations broken("smoothing a DEM");
   const auto samples = std::int64_t{frame.samples.x} * frame.samples.y;
-  broken.unless(frame.samples.x >= 2 && frame.samples.y >= 2 &&
-                    samples < std::numeric_limits<std::int32_t>::max(),
-                "samples = [{}, {}] must be 2 or more each way, and 2^31 at most in all",
-                frame.samples.x, frame.samples.y);
+  broken.unless(frame.samples.x >= 2 && frame.samples.y >= 2 && samples <= most_samples,
+                "samples = [{}, {}] must be 2 or more each way, and {} at most in all",
+                frame.samples.x, frame.samples.y, most_samples);
   const double area_m2 = frame.step_m.x * frame.step_m.y;
   broken.unless(std::isfinite(area_m2) && area_m2 != 0,
                 "step_m = [{}, {}] must be finite and not zero", frame.step_m.x, frame.step_m.y);
@@ -52,7 +55,16 @@ void check(const GridFrame& frame, std::span<const float> heights_m,
         frame.samples.x, frame.samples.y, bytes / 1'000'000, work.most_bytes / 1'000'000);
 }
 
-// The equations of one raster.
+// The second derivatives of one kind.
+struct Derivatives {
+  std::array<std::array<int, 2>, 4> offsets{};  // of the samples, in the order of their numbers
+  std::array<double, 4> factors{};
+  std::vector<std::array<std::int32_t, 4>> rows;  // the unknowns of each
+};
+
+// The equations of one raster, in units of each height's sd: so the least eigenvalue of their
+// matrix is 1 or more, and what is left of the right side is farther from 0 than heights are from
+// the solution.
 class Smoothing {
  public:
   Smoothing(const GridFrame& frame, std::span<const float> heights_m,
@@ -62,19 +74,23 @@ class Smoothing {
   SmoothHeights run(double curvature_sd_per_m, std::size_t most_rounds, const Work& work);
 
  private:
+  // The number of the unknown that far from a sample; -1 for none.
+  std::int32_t unknown_at(std::uint32_t sample, const std::array<int, 2>& offset) const;
   void find_rows();
-  void add_row(std::span<const std::array<int, 2>> offsets, std::span<const double> factors,
-               int column, int row);
-  Eigen::VectorXd solve(const Eigen::VectorXd& row_weights, const Eigen::VectorXd& guess) const;
+  void find_pattern();
+  double derivative(const Derivatives& kind, const std::array<std::int32_t, 4>& row) const;
+  void add(std::int32_t row, std::int32_t column, double value);
+  void set_up(double curvature_sd_per_m);
+  Eigen::VectorXd solve(double curvature_sd_per_m) const;
 
   const GridFrame& frame_;
   std::vector<std::int32_t> numbers_;   // of each sample; -1 for none
   std::vector<std::uint32_t> samples_;  // of each unknown
   double base_m_ = 0;
-  Eigen::VectorXd measured_m_, weights_;  // above the base; 1 / variance
-  std::vector<Eigen::Triplet<double>> entries_;
-  std::vector<double> noise_;  // variance of each second derivative, of errors of heights
-  Matrix derivatives_;         // by second derivative and unknown; mixed ones times sqrt(2)
+  Eigen::VectorXd measured_m_, heights_m_, sds_m_;  // heights above the base
+  std::array<Derivatives, 3> kinds_;                // mixed ones times sqrt(2)
+  Matrix matrix_;                                   // its lower half
+  Eigen::VectorXd pull_;  // half of the cost's derivative, downwards: of a height by its sd
 };
 
 Smoothing::Smoothing(const GridFrame& frame, std::span<const float> heights_m,
@@ -87,52 +103,64 @@ Smoothing::Smoothing(const GridFrame& frame, std::span<const float> heights_m,
   }
   const auto count = static_cast<Eigen::Index>(samples_.size());
   measured_m_.resize(count);
-  weights_.resize(count);
+  sds_m_.resize(count);
   if (count > 0) base_m_ = heights_m[samples_.front()];
   for (Eigen::Index i = 0; i < count; ++i) {
     const std::uint32_t sample = samples_[static_cast<std::size_t>(i)];
     measured_m_[i] = heights_m[sample] - base_m_;
-    weights_[i] = 1 / double{variance_m2[sample]};
+    sds_m_[i] = std::sqrt(double{variance_m2[sample]});
   }
+  heights_m_ = measured_m_;
   find_rows();
 }
 
-void Smoothing::add_row(std::span<const std::array<int, 2>> offsets,
-                        std::span<const double> factors, int column, int row) {
-  std::array<std::int32_t, 4> unknowns{};
-  for (std::size_t k = 0; k < offsets.size(); ++k) {
-    const int c = column + offsets[k][0], r = row + offsets[k][1];
-    if (c >= frame_.samples.x || r >= frame_.samples.y) return;
-    unknowns[k] =
-        numbers_[static_cast<std::size_t>(r) * static_cast<std::size_t>(frame_.samples.x) +
-                 static_cast<std::size_t>(c)];
-    if (unknowns[k] < 0) return;
-  }
-  const auto number = static_cast<int>(noise_.size());
-  double noise = 0;
-  for (std::size_t k = 0; k < offsets.size(); ++k) {
-    entries_.emplace_back(number, unknowns[k], factors[k]);
-    noise += factors[k] * factors[k] / weights_[unknowns[k]];
-  }
-  noise_.push_back(noise);
+std::int32_t Smoothing::unknown_at(std::uint32_t sample, const std::array<int, 2>& offset) const {
+  const auto columns = static_cast<std::uint32_t>(frame_.samples.x);
+  const auto column = static_cast<int>(sample % columns) + offset[0];
+  const auto row = static_cast<int>(sample / columns) + offset[1];
+  if (column < 0 || column >= frame_.samples.x || row >= frame_.samples.y) return -1;
+  return numbers_[static_cast<std::size_t>(row) * columns + static_cast<std::size_t>(column)];
 }
 
 void Smoothing::find_rows() {
   const double dx = std::abs(frame_.step_m.x), dy = std::abs(frame_.step_m.y);
   const double xx = 1 / (dx * dx), yy = 1 / (dy * dy), xy = std::sqrt(2.0) / (dx * dy);
-  constexpr std::array<std::array<int, 2>, 3> across{{{0, 0}, {1, 0}, {2, 0}}};
-  constexpr std::array<std::array<int, 2>, 3> down{{{0, 0}, {0, 1}, {0, 2}}};
-  constexpr std::array<std::array<int, 2>, 4> block{{{0, 0}, {1, 0}, {0, 1}, {1, 1}}};
-  for (int row = 0; row < frame_.samples.y; ++row) {
-    for (int column = 0; column < frame_.samples.x; ++column) {
-      add_row(across, std::array{xx, -2 * xx, xx}, column, row);
-      add_row(down, std::array{yy, -2 * yy, yy}, column, row);
-      add_row(block, std::array{xy, -xy, -xy, xy}, column, row);
+  kinds_[0] = {{{{0, 0}, {1, 0}, {2, 0}, {2, 0}}}, {xx, -2 * xx, xx, 0}, {}};
+  kinds_[1] = {{{{0, 0}, {0, 1}, {0, 2}, {0, 2}}}, {yy, -2 * yy, yy, 0}, {}};
+  kinds_[2] = {{{{0, 0}, {1, 0}, {0, 1}, {1, 1}}}, {xy, -xy, -xy, xy}, {}};
+  for (Derivatives& kind : kinds_) {
+    for (const std::uint32_t sample : samples_) {
+      std::array<std::int32_t, 4> row{};
+      std::ranges::transform(kind.offsets, row.begin(), [&](const std::array<int, 2>& offset) {
+        return unknown_at(sample, offset);
+      });
+      if (std::ranges::min(row) >= 0) kind.rows.push_back(row);
     }
   }
-  derivatives_.resize(static_cast<Eigen::Index>(noise_.size()), measured_m_.size());
-  derivatives_.setFromTriplets(entries_.begin(), entries_.end());
-  entries_ = {};
+}
+
+// Whatever two samples may have a derivative in common: entries that none fills stay 0.
+void Smoothing::find_pattern() {
+  constexpr std::array<std::array<int, 2>, 7> neighbours{
+      {{0, 0}, {1, 0}, {2, 0}, {-1, 1}, {0, 1}, {1, 1}, {0, 2}}};
+  const auto count = static_cast<int>(samples_.size());
+  matrix_.resize(count, count);
+  matrix_.reserve(count * std::ssize(neighbours));
+  for (int column = 0; column < count; ++column) {
+    matrix_.startVec(column);
+    for (const auto& offset : neighbours) {
+      const std::int32_t row = unknown_at(samples_[static_cast<std::size_t>(column)], offset);
+      if (row >= 0) matrix_.insertBackByOuterInner(column, row) = 0;
+    }
+  }
+  matrix_.finalize();
+}
+
+double Smoothing::derivative(const Derivatives& kind,
+                             const std::array<std::int32_t, 4>& row) const {
+  double sum = 0;
+  for (std::size_t i = 0; i < row.size(); ++i) sum += kind.factors[i] * heights_m_[row[i]];
+  return sum;
 }
 
 double median_of(std::vector<double> values) {
@@ -143,45 +171,89 @@ double median_of(std::vector<double> values) {
 
 // The sd of second derivatives beyond what noise makes of it; at least a tenth of that.
 double Smoothing::usual_curvature() const {
-  if (noise_.empty()) return 1;
-  const Eigen::VectorXd rows = derivatives_ * measured_m_;
-  std::vector<double> squares;
-  for (Eigen::Index i = 0; i < rows.size(); ++i) squares.push_back(rows[i] * rows[i]);
+  std::vector<double> squares, noise;
+  for (const Derivatives& kind : kinds_) {
+    for (const auto& row : kind.rows) {
+      const double size = derivative(kind, row);
+      squares.push_back(size * size);
+      noise.push_back(0);
+      for (std::size_t i = 0; i < row.size(); ++i)
+        noise.back() += std::pow(kind.factors[i] * sds_m_[row[i]], 2);
+    }
+  }
+  if (squares.empty()) return 1;
   constexpr double median_of_chi2 = 0.4549;  // with one degree of freedom
-  const double noise = median_of(noise_);
-  return std::sqrt(std::max(median_of(squares) / median_of_chi2 - noise, noise / 100));
+  const double usual_noise = median_of(std::move(noise));
+  return std::sqrt(
+      std::max(median_of(std::move(squares)) / median_of_chi2 - usual_noise, usual_noise / 100));
 }
 
-Eigen::VectorXd Smoothing::solve(const Eigen::VectorXd& row_weights,
-                                 const Eigen::VectorXd& guess) const {
-  Matrix matrix = derivatives_.transpose() * (row_weights.asDiagonal() * derivatives_);
-  for (Eigen::Index i = 0; i < weights_.size(); ++i) matrix.coeffRef(i, i) += weights_[i];
-  Eigen::ConjugateGradient<Matrix, Eigen::Lower, Eigen::IncompleteCholesky<double>> solver;
-  constexpr double tolerance = 1e-9;
-  solver.setTolerance(tolerance);
-  solver.compute(matrix);
-  return solver.solveWithGuess(weights_.cwiseProduct(measured_m_), guess);
+void Smoothing::add(std::int32_t row, std::int32_t column, double value) {
+  int at = matrix_.outerIndexPtr()[column];
+  while (matrix_.innerIndexPtr()[at] != row) ++at;
+  matrix_.valuePtr()[at] += value;
+}
+
+// The equations of the moves of heights, with weights by what these are now.
+void Smoothing::set_up(double curvature_sd_per_m) {
+  const double bending = 1 / (curvature_sd_per_m * curvature_sd_per_m);
+  pull_ = (measured_m_ - heights_m_).cwiseQuotient(sds_m_);
+  matrix_.coeffs().setZero();
+  for (std::int32_t i = 0; i < pull_.size(); ++i) add(i, i, 1);
+  for (const Derivatives& kind : kinds_) {
+    for (const auto& row : kind.rows) {
+      const double size = derivative(kind, row);
+      const double weight = bending / std::sqrt(1 + bending * size * size);
+      for (std::size_t i = 0; i < row.size() && kind.factors[i] != 0; ++i) {
+        const double by_i = kind.factors[i] * sds_m_[row[i]] * weight;
+        pull_[row[i]] -= by_i * size;
+        for (std::size_t j = 0; j <= i; ++j)
+          add(row[i], row[j], by_i * kind.factors[j] * sds_m_[row[j]]);
+      }
+    }
+  }
+}
+
+// Moves, in sds.
+Eigen::VectorXd Smoothing::solve(double curvature_sd_per_m) const {
+  using Natural = Eigen::NaturalOrdering<int>;
+  Eigen::ConjugateGradient<Matrix, Eigen::Lower,
+                           Eigen::IncompleteCholesky<double, Eigen::Lower, Natural>>
+      solver;
+  solver.setTolerance(solved_share);
+  solver.setMaxIterations(most_steps);
+  const bool is_finite = pull_.allFinite() && matrix_.coeffs().isFinite().all();
+  Eigen::VectorXd moves;
+  if (is_finite) {
+    solver.compute(matrix_);
+    if (solver.info() == Eigen::Success) moves = solver.solve(pull_);
+  }
+  if (!is_finite || solver.info() != Eigen::Success || !moves.allFinite())
+    throw Error(
+        "smoothing a DEM: the equations of {} heights, of sds from {:.3g} to {:.3g} m, with "
+        "curvature_sd_per_m = {:.3g} could not be solved: it is too small for these sds, or a "
+        "variance or height is of no DEM",
+        pull_.size(), sds_m_.minCoeff(), sds_m_.maxCoeff(), curvature_sd_per_m);
+  return moves;
 }
 
 SmoothHeights Smoothing::run(double curvature_sd_per_m, std::size_t most_rounds, const Work& work) {
   SmoothHeights result;
   result.curvature_sd_per_m = curvature_sd_per_m;
-  const double bending = 1 / (curvature_sd_per_m * curvature_sd_per_m);
-  Eigen::VectorXd z = measured_m_;
-  for (; result.rounds < most_rounds && z.size() > 0; ++result.rounds) {
-    const Eigen::VectorXd rows = derivatives_ * z;
-    const Eigen::VectorXd weights = bending * (1 + bending * rows.array().square()).rsqrt();
-    const Eigen::VectorXd next = solve(weights, z);
-    const Eigen::ArrayXd moves = (next - z).array().abs();
-    z = next;
-    result.last_move_m = moves.maxCoeff();
+  find_pattern();
+  for (; result.rounds < most_rounds && !samples_.empty(); ++result.rounds) {
+    set_up(curvature_sd_per_m);
+    if (pull_.cwiseAbs().maxCoeff() < still_sds) break;
+    const Eigen::VectorXd moves_m = solve(curvature_sd_per_m).cwiseProduct(sds_m_);
+    heights_m_ += moves_m;
+    result.last_move_m = moves_m.cwiseAbs().maxCoeff();
     if (work.progress)
       work.progress(static_cast<double>(result.rounds + 1) / static_cast<double>(most_rounds));
-    if ((moves.square() * weights_.array()).maxCoeff() < still_sds * still_sds) break;
   }
   result.heights_m.assign(numbers_.size(), std::numeric_limits<float>::quiet_NaN());
   for (std::size_t i = 0; i < samples_.size(); ++i)
-    result.heights_m[samples_[i]] = static_cast<float>(z[static_cast<Eigen::Index>(i)] + base_m_);
+    result.heights_m[samples_[i]] =
+        static_cast<float>(heights_m_[static_cast<Eigen::Index>(i)] + base_m_);
   return result;
 }
 

@@ -67,7 +67,7 @@ Box bounds_of(std::span<const glm::dvec3> points_m) {
 
 // Whole cells from D's origin, so that tiles have cells in common; two at least each way.
 CellFrame frame_around(const Box& box, std::size_t points, double cell_m, std::size_t most_bytes) {
-  constexpr double bytes_per_cell = 40, bytes_per_point = 5, always_cells = 1 << 26;
+  constexpr double bytes_per_cell = 40, bytes_per_point = 5, always_cells = 2.5e6;
   const glm::dvec2 first = glm::floor(glm::dvec2(box.low_m) / cell_m);
   const glm::dvec2 cells =
       glm::max(glm::floor(glm::dvec2(box.high_m) / cell_m) - first + 1., glm::dvec2(2));

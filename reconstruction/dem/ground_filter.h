@@ -79,7 +79,8 @@ struct GroundPoints {
 /// other in one cell, the first in x, then in y counts).
 /// @param points_m  in D, at least one.
 /// @throws Error if there are no points, one is not finite or far from D, an option is out of
-/// bounds, or the points spread over more than 64 cells each or more than `work.most_bytes` allows.
+/// bounds, or the points spread over more than 64 cells each (and over more than 2.5 million in
+/// all, which take 100 MB), or over more than `work.most_bytes` allows.
 /// @see Pingel, Clarke, McBride, An improved simple morphological filter for the terrain
 /// classification of airborne LIDAR data (2013). Differs from it in how blank cells are filled
 /// (see membrane_through), and in that the ground's heights are carried from their points to the

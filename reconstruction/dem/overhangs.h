@@ -17,7 +17,10 @@ struct Overhangs {
       surfaces;  ///< points lie on so many, one above the other; 0: no points
   std::vector<float>
       overhang_m;  ///< height in D of the lowest one that is clear of the ground; NaN
-  std::vector<float> clearance_m;  ///< free height between it and the ground below it; NaN
+  /// Free height between it and the highest point of the ground's surface below it; NaN. A column
+  /// of its own: overhang_m less a DEM's height is another one, since that is fitted, at the
+  /// sample, and filled where an overhang hides the ground.
+  std::vector<float> clearance_m;
 };
 
 /// Tells the surfaces of each cell apart: points of one surface leave no gap of more than `gap_m`

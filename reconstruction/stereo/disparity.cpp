@@ -12,7 +12,6 @@ namespace groundray {
 namespace {
 
 constexpr float nothing = std::numeric_limits<float>::quiet_NaN();
-constexpr int farthest_px = 2000;  // disparities are kept in 16 bits, times 16
 
 bool is_within(double value, double least, double most) { return least <= value && value <= most; }
 
@@ -58,18 +57,6 @@ void check(const MatchOptions& options, Violations& broken) {
                     range.most_px <= farthest_px,
                 "range = {} to {} px must not be empty, nor beyond {} px on either side",
                 range.least_px, range.most_px, farthest_px);
-}
-
-void check_bytes(const Image8& image, const DisparityRange& range, const MatchOptions& options) {
-  if (options.paths != MatchOptions::Paths::Eight) return;
-  const double columns = image.width() + std::max(0, range.most_px) + std::max(0, -range.least_px);
-  const double bytes = 8 * columns * image.height() * (range.most_px - range.least_px + 16);
-  if (bytes <= static_cast<double>(options.most_bytes)) return;
-  throw Error(
-      "matching {} x {} px over disparities of {} to {} px would take {:.3g} GB, more than "
-      "{:.3g}: raise most_bytes, narrow the range, or ask for paths Five",
-      image.width(), image.height(), range.least_px, range.most_px, bytes / 1e9,
-      static_cast<double>(options.most_bytes) / 1e9);
 }
 
 // What is no number is not seen.
@@ -169,7 +156,7 @@ DisparityRange disparity_range(const PinholePair& pair, double nearest_m, double
         nearest_m, farthest_m, most_px, pair.focal_px * pair.baseline_m / farthest_m, farthest_px);
   }
   return {static_cast<int>(std::floor(pair.focal_px * pair.baseline_m / farthest_m)) - 1,
-          static_cast<int>(std::ceil(most_px)) + 1};
+          std::min(static_cast<int>(std::ceil(most_px)) + 1, farthest_px)};
 }
 
 DisparityMap match(const RectifiedImage& left, const RectifiedImage& right,
@@ -188,15 +175,17 @@ DisparityMap match(const RectifiedImage& left, const RectifiedImage& right,
   auto range = options.range ? options.range : common_range(left_search, right_search, options);
   if (range) {
     // No pixel is matched with one that is farther away than the image is wide.
-    range->least_px = std::max(range->least_px, 1 - left.grey.width());
-    range->most_px = std::min(range->most_px, left.grey.width() - 1);
+    const int most_px = std::min(farthest_px, left.grey.width() - 1);
+    range->least_px = std::max(range->least_px, -most_px);
+    range->most_px = std::min(range->most_px, most_px);
   }
   if (!range || range->least_px >= range->most_px) {
-    map.unmatched.ambiguous = static_cast<std::uint64_t>(empty.values().size());
+    const auto& seen = left_search.seen.values();
+    map.unmatched.unseen = static_cast<std::uint64_t>(std::ranges::count(seen, std::uint8_t{0}));
+    map.unmatched.ambiguous = seen.size() - map.unmatched.unseen;
     return map;
   }
   map.range = *range;
-  check_bytes(left_search.grey, map.range, options);
   const ImageF start_px = starts(left_search, right_search, options, map);
   const RefinedDisparity refined =
       refine(clean_left.grey, clean_right.grey, start_px, options.window_px);

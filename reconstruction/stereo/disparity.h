@@ -18,14 +18,15 @@ struct DisparityRange {
   friend bool operator==(const DisparityRange&, const DisparityRange&) = default;
 };
 
-/// Returns the disparities of depths between two, with one more on each side.
+/// Returns the disparities of depths between two, with one more on each side up to 2000 px.
 /// @param farthest_m  may be infinite.
 /// @throws Error unless 0 < nearest_m < farthest_m, and both are of less than 2000 px.
 DisparityRange disparity_range(const PinholePair& pair, double nearest_m, double farthest_m);
 
 /// How two images are matched.
 struct MatchOptions {
-  /// Without it, what is found at a width of at most 320 px where all disparities are looked for.
+  /// Without it, what is found at a width of at most 320 px, where disparities up to half the width
+  /// (and of points beyond infinity, for small errors of pose) are looked for; 2000 px at most.
   std::optional<DisparityRange> range = {};
   int block_px = 3;            ///< side of the squares whose difference is a cost; odd, 1 to 11
   int step_cost = 8;           ///< of a disparity that changes by 1, for each pixel of a block
@@ -34,7 +35,7 @@ struct MatchOptions {
   /// Along how many directions costs are summed: eight take 8 bytes for each pixel and disparity.
   enum class Paths { Five, Eight };
   Paths paths = Paths::Eight;
-  std::size_t most_bytes = std::size_t{4} << 30;  ///< of these; more is an Error
+  std::size_t most_bytes = std::size_t{4} << 30;  ///< of these, to find a range too; more: Error
   double left_right_px = 1;  ///< by how much a disparity may differ from the one found back
   int speckle_px = 100;      ///< pixels that a patch without jumps must have
   /// Where least squares start: at what was found, or at that smoothed along the image's edges,

@@ -65,19 +65,31 @@ class RowSplines {
   double coefficient(int x, int row) const {
     return static_cast<double>(coefficients_[index(std::clamp(x, 0, width_ - 1), row)]);
   }
-  // The rim's values go on beyond it.
+  // Beyond the rims an image is mirrored, rim pixels twice; so are the coefficients.
   void prefilter(int row) {
     const double pole = std::sqrt(3.0) - 2;
     const std::size_t first = index(0, row), last = index(width_ - 1, row);
     std::vector<double> c(coefficients_.begin() + static_cast<std::ptrdiff_t>(first),
                           coefficients_.begin() + static_cast<std::ptrdiff_t>(last) + 1);
     for (double& value : c) value *= 6;
-    c[0] /= 1 - pole;
+    c[0] = mirrored_sum(c, pole);
     for (std::size_t i = 1; i < c.size(); ++i) c[i] += pole * c[i - 1];
     c.back() *= -pole / (1 - pole);
     for (std::size_t i = c.size() - 1; i-- > 0;) c[i] = pole * (c[i + 1] - c[i]);
     std::ranges::transform(c, coefficients_.begin() + static_cast<std::ptrdiff_t>(first),
                            [](double value) { return static_cast<float>(value); });
+  }
+
+  // The first value, and those that are mirrored before it, each by a power of the pole.
+  static double mirrored_sum(const std::vector<double>& values, double pole) {
+    const std::size_t period = 2 * values.size();
+    double sum = values[0], power = 1;
+    for (std::size_t i = 0; std::abs(power) > 1e-17; ++i) {
+      power *= pole;
+      const std::size_t at = i % period;
+      sum += power * values[std::min(at, period - 1 - at)];
+    }
+    return sum;
   }
 
   int width_;

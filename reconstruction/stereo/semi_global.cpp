@@ -13,6 +13,8 @@
 #endif
 #include <vector>
 
+#include "core/error.h"
+
 namespace groundray {
 namespace {
 
@@ -30,6 +32,18 @@ cv::Mat mat_of(const Image8& image) {
 // SGBM wants a multiple of 16.
 int count_of(const DisparityRange& range) {
   return (range.most_px - range.least_px + 16) / 16 * 16;
+}
+
+void check_bytes(const Image8& image, const DisparityRange& range, const MatchOptions& options) {
+  if (options.paths != MatchOptions::Paths::Eight) return;
+  const double columns = image.width() + std::max(0, range.most_px) + std::max(0, -range.least_px);
+  const double bytes = 8 * columns * image.height() * (range.most_px - range.least_px + 16);
+  if (bytes <= static_cast<double>(options.most_bytes)) return;
+  throw Error(
+      "matching {} x {} px over disparities of {} to {} px would take {:.3g} GB, more than "
+      "{:.3g}: raise most_bytes, give a narrower range, or ask for paths Five",
+      image.width(), image.height(), range.least_px, range.most_px, bytes / 1e9,
+      static_cast<double>(options.most_bytes) / 1e9);
 }
 
 // The disparities, times 16, of the first image. Both are made wider, so that all of the first
@@ -107,6 +121,7 @@ cv::Mat fixed(const ImageF& image, float sign, int none) {
 
 SemiGlobalDisparity semi_global(const Image8& left, const Image8& right,
                                 const DisparityRange& range, const MatchOptions& options) {
+  check_bytes(left, range, options);
   const cv::Mat left_mat = mat_of(left), right_mat = mat_of(right);
   SemiGlobalDisparity result;
   tbb::parallel_invoke(
@@ -132,7 +147,7 @@ std::uint64_t remove_speckles(ImageF& disparity_px, int pixels) {
           std::isnan(value) ? none : static_cast<short>(std::lround(value * 16.0F));
     }
   }
-  cv::filterSpeckles(fixed, none, pixels, 16);
+  cv::filterSpeckles(fixed, none, pixels - 1, 16);  // up to so many
   std::uint64_t removed = 0;
   for (int y = 0; y < fixed.rows; ++y) {
     for (int x = 0; x < fixed.cols; ++x) {

@@ -8,6 +8,9 @@
 
 namespace groundray {
 
+/// Disparities are kept in 16 bits, times 16, so they are no farther from 0 than this.
+inline constexpr int farthest_px = 2000;
+
 /// An image to search, 1 channel each.
 struct SearchedImage {
   Image8 grey;
@@ -21,14 +24,16 @@ struct SemiGlobalDisparity {
 };
 
 /// Matches two images of one size, from each side.
-/// @param range  of less than 2000 px on either side.
+/// @param range  up to farthest_px on either side.
+/// @throws Error if that takes more bytes than options.most_bytes.
 /// @see Birchfield, Tomasi, A pixel dissimilarity measure that is insensitive to image sampling,
 ///      PAMI 20 (1998): the costs of OpenCV's StereoSGBM
 SemiGlobalDisparity semi_global(const Image8& left, const Image8& right,
                                 const DisparityRange& range, const MatchOptions& options);
 
-/// Returns the disparities that two images have in common, found at a width of at most 320 px;
-/// nothing if there are none.
+/// Returns the disparities that two images have in common, found at a width of at most 320 px,
+/// where those from -2 px to half the width are looked for; nothing if there are none.
+/// @throws Error if that takes more bytes than options.most_bytes.
 std::optional<DisparityRange> common_range(const SearchedImage& left, const SearchedImage& right,
                                            const MatchOptions& options);
 

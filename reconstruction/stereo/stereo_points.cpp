@@ -82,7 +82,8 @@ StereoPoints stereo_points(const PinholePair& pair, const StereoView& left, cons
       const double disparity_px = map.disparity_px.at(x, y)[0];
       if (!std::isfinite(disparity_px)) continue;
       const double sd_px = match_px(map, noise, x, y);
-      if (!(std::hypot(sd_px, noise.bias_px) <= options.most_relative_sd * disparity_px)) {
+      if (!(disparity_px > 0) ||
+          !(std::hypot(sd_px, noise.bias_px) <= options.most_relative_sd * disparity_px)) {
         ++points.too_uncertain;
         continue;
       }

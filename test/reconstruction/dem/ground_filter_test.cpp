@@ -104,6 +104,11 @@ struct Errors {
   double above_taken = 0;    // type II
 };
 
+// Made scenes have no wrong labels and no low plants, so they are to be told six times as well as
+// real sites: published filters get 2.97 % of all points wrong in the ISPRS's test, the best of
+// them (docs/ground_filter.md). Where a scene asks for more or less its test says why.
+constexpr double most_wrong = 0.005;
+
 // What is lower above the ground than `least_m` is not judged: threshold and slope do not tell it.
 Errors errors_of(const Scene& scene, const GroundPoints& found, double least_m = 0) {
   double ground = 0, missed = 0, above = 0, taken = 0;
@@ -148,6 +153,7 @@ TEST(GroundFilter, KeepsBothSidesOfACliff) {
   SceneMaker maker(2, [](double x, double y) { return x + 0.2 * y < 70 ? 0 : 20 + 0.05 * x; });
   maker.add_ground(80000, 140, 0.05);
   const GroundPoints found = filter_ground(maker.scene.points_m);
+  // Less than the cells that the cliff goes through and one on each side: 3 of 140 columns.
   EXPECT_LE(errors_of(maker.scene, found).ground_missed, 0.02);
 }
 
@@ -166,15 +172,17 @@ TEST(GroundFilter, TellsBuildingsAndTreesFromTheAir) {
     scene.truth[i] = GroundClass::Above;
   }
   for (int tree = 0; tree < 60; ++tree) {
-    const glm::dvec2 at(maker.uniform(0, 200), maker.uniform(0, 200));
+    const double y = maker.uniform(0, 200), x = maker.uniform(0, 200);
     maker.add_above(150, [&] {
-      return glm::dvec3(at.x + maker.noise_m(1.5), at.y + maker.noise_m(1.5), maker.uniform(2, 9));
+      const double z = maker.uniform(2, 9);
+      const double off_y = maker.noise_m(1.5), off_x = maker.noise_m(1.5);
+      return glm::dvec3(x + off_x, y + off_y, z);
     });
   }
   const GroundPoints found = filter_ground(scene.points_m);
   const Errors errors = errors_of(scene, found);
-  EXPECT_LE(errors.ground_missed, 0.005);
-  EXPECT_LE(errors.above_taken, 0.005);
+  EXPECT_LE(errors.ground_missed, most_wrong);
+  EXPECT_LE(errors.above_taken, most_wrong);
   EXPECT_EQ(found.counts.ground + found.counts.above + found.counts.below, scene.truth.size());
 }
 
@@ -190,8 +198,8 @@ TEST(GroundFilter, CutsWhatIsWiderThanTheWidestDiscByANet) {
   }
   EXPECT_GT(errors_of(scene, filter_ground(scene.points_m)).above_taken, 0.9);
   const Errors cut = errors_of(scene, filter_ground(scene.points_m, {.net_m = 25}));
-  EXPECT_LE(cut.above_taken, 0.01);
-  EXPECT_LE(cut.ground_missed, 0.01);
+  EXPECT_LE(cut.above_taken, 2 * most_wrong);  // nets cut the ground, too
+  EXPECT_LE(cut.ground_missed, 2 * most_wrong);
 }
 
 TEST(GroundFilter, TellsTrunksBushesAndBranchesForARobot) {
@@ -200,22 +208,27 @@ TEST(GroundFilter, TellsTrunksBushesAndBranchesForARobot) {
       return slope * x + 0.4 * std::sin(x / 5) * std::cos(y / 4) + 0.03 * std::sin(9 * x);
     });
     maker.add_ground_around(120000, {0, 0}, 30, 0.02);
-    for (int i = 0; i < 40; ++i)
-      maker.add_trunk({maker.uniform(-20, 20), maker.uniform(-20, 20)}, 0.2, 4, 200);
     for (int i = 0; i < 40; ++i) {
-      const glm::dvec2 at(maker.uniform(-20, 20), maker.uniform(-20, 20));
-      maker.add_bush(at, maker.uniform(0.4, 1.5), 300);
+      const double x = maker.uniform(-20, 20), y = maker.uniform(-20, 20);
+      maker.add_trunk({x, y}, 0.2, 4, 200);
+    }
+    for (int i = 0; i < 40; ++i) {
+      const double y = maker.uniform(-20, 20), x = maker.uniform(-20, 20);
+      maker.add_bush({x, y}, maker.uniform(0.4, 1.5), 300);
     }
     maker.add_above(4000, [&] {  // branches
-      return glm::dvec3(maker.uniform(-15, 15), maker.uniform(-15, 15), maker.uniform(1.5, 4));
+      const double z = maker.uniform(1.5, 4);
+      const double y = maker.uniform(-15, 15), x = maker.uniform(-15, 15);
+      return glm::dvec3(x, y, z);
     });
     const GroundPoints found =
         filter_ground(maker.scene.points_m, GroundFilterOptions::ground_scan());
     // Threshold and slope take what is lower for ground, and bushes hide some of it.
     const Errors errors = errors_of(maker.scene, found, 0.4 + 0.5 * slope);
+    // Ground is dense and its noise a seventh of the threshold: 240 of 120,000 points at most.
     EXPECT_LE(errors.ground_missed, 0.002) << slope;
-    // Compilers draw the coordinates in different orders; one such scene has 0.058.
-    EXPECT_LE(errors.above_taken, 0.08) << slope;
+    // The steepest slope has most: 0.038 in the mean of 16 scenes, with an sd of 0.009.
+    EXPECT_LE(errors.above_taken, 0.05) << slope;
   }
 }
 
@@ -249,8 +262,8 @@ TEST(GroundFilter, KeepsTheGroundUnderABridge) {
   };
   maker.add_above(2400, on_deck);
   const GroundPoints found = filter_ground(maker.scene.points_m);
-  EXPECT_LE(errors_of(maker.scene, found).ground_missed, 0.005);
-  EXPECT_LE(errors_of(maker.scene, found).above_taken, 0.005);
+  EXPECT_LE(errors_of(maker.scene, found).ground_missed, most_wrong);
+  EXPECT_LE(errors_of(maker.scene, found).above_taken, most_wrong);
 }
 
 TEST(GroundFilter, TellsHeightsAboveItsSurface) {
@@ -260,7 +273,7 @@ TEST(GroundFilter, TellsHeightsAboveItsSurface) {
   for (std::size_t i = 0; i < found.height_m.size(); ++i) {
     const glm::dvec3& p = maker.scene.points_m[i];
     if (std::min({p.x, p.y, 50 - p.x, 50 - p.y}) < 3) continue;
-    EXPECT_NEAR(found.height_m[i], 0, 0.02);
+    EXPECT_NEAR(found.height_m[i], 0, 0.02);  // of a plane that rises by 0.22 m from cell to cell
   }
   EXPECT_NEAR(found.surface.height_m_at({25, 25}).value(), 2.5, 0.02);
 }
@@ -341,6 +354,9 @@ TEST(GroundFilter, RefusesWhatItCannotTell) {
   EXPECT_THAT(fault_of({{0, 0, 0}, {1e300, 0, 0}}), HasSubstr("million km"));
   EXPECT_EQ(fault_of({{1e9, -1e9, 5}, {1e9, -1e9, 5}}, {.cell_m = 1e-9, .window_radius_m = 0}),
             "none");
+  // 4 million cells of 40 bytes for two points.
+  EXPECT_THAT(fault_of({{0, 0, 0}, {2000, 2000, 0}}), HasSubstr("more than 64 for each point"));
+  EXPECT_EQ(fault_of({{0, 0, 0}, {1500, 1500, 0}}, {.window_radius_m = 1}), "none");
   EXPECT_THAT(fault_of({{0, 0, 0}, {1000, 1000, 0}}, {}, {.most_bytes = 1'000'000}),
               AllOf(HasSubstr("40.1 MB"), HasSubstr("1.0 MB allowed")));
   EXPECT_THAT(fault_of(fine, {.cell_m = 0, .slope = -1, .threshold_m = nan}),

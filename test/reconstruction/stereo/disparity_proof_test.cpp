@@ -131,7 +131,8 @@ TEST_F(MotorcycleProof, HasFewerBadPixelsThanOpenCvs) {
 }
 
 // The truth is given to 0.1 px or so, and mismatches beside edges are not what the standard
-// deviation speaks of: so the median of errors is compared, of pixels alike in what is stated.
+// deviation speaks of: so the median of errors is compared, of pixels alike in what is stated. It
+// is held to what is asked of a DEM's errors, 0.85 to 1.15.
 TEST_F(MotorcycleProof, ErrsAsStated) {
   const DisparityMap map = match(left_, right_, {.range = range});
   constexpr std::array<double, 5> steps_px{0.1, 0.12, 0.17, 0.24, 0.4};
@@ -148,8 +149,8 @@ TEST_F(MotorcycleProof, ErrsAsStated) {
     const auto middle = normalised.begin() + static_cast<std::ptrdiff_t>(normalised.size() / 2);
     std::ranges::nth_element(normalised, middle);
     const double robust_rms = 1.4826 * *middle;
-    EXPECT_NEAR(robust_rms, 1, 0.35) << steps_px[step];
-    testing::record_margin("normalised error", robust_rms - 1, 0.35);
+    EXPECT_NEAR(robust_rms, 1, 0.15) << steps_px[step];
+    testing::record_margin("normalised error", robust_rms - 1, 0.15);
   }
 }
 

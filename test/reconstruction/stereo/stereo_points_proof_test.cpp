@@ -67,14 +67,17 @@ ImageF picture(const LensModel& lens, glm::ivec2 size_px, const Pose& X_DC, cons
   return grey;
 }
 
-// What a ray along each point's line of sight says of its depth.
+// Errors over their stated standard deviations.
 struct Residuals {
-  std::vector<double> depth_m, normalised, by_bias;
+  std::vector<double> normalised;
+  std::vector<double> by_bias;  // what one standard deviation of bias does to each
   double outlier_share = 0;
 };
 
+constexpr double gross = 5;  // standard deviations: mismatches, which are counted by themselves
+
+// What a ray along each point's line of sight says of its depth.
 Residuals residuals_of(const StereoPoints& points, const PinholePair& pair, const Scene& scene) {
-  constexpr double gross = 5;  // standard deviations: mismatches, which are counted by themselves
   std::vector<Ray> rays;
   for (const glm::dvec3& p_m : points.p_m)
     rays.push_back({pair.X_DL.translation_m, glm::normalize(p_m - pair.X_DL.translation_m)});
@@ -91,13 +94,58 @@ Residuals residuals_of(const StereoPoints& points, const PinholePair& pair, cons
       ++gross_count;
       continue;
     }
-    residuals.depth_m.push_back(off_m);
     residuals.normalised.push_back(off_m / sd_m);
     residuals.by_bias.push_back(glm::dot(glm::dvec3(points.bias_m[i]), ahead) / sd_m);
   }
   residuals.outlier_share =
       static_cast<double>(gross_count) / std::max<double>(1, static_cast<double>(points.size()));
   return residuals;
+}
+
+struct SurfaceResiduals {
+  Residuals facing, averted;  // of ground that rises away from the camera, and that falls
+};
+
+// What the plane that touches the ground says, where a point's line of sight meets it: along its
+// normal n an error of the covariance C has the variance n' C n. The square is the least
+// Mahalanobis distance of the point to the plane, chi^2 of one degree of freedom, and takes all of
+// C. The plane is that of rays as far to each side as a match's place may be off.
+SurfaceResiduals surface_residuals_of(const StereoPoints& points, const PinholePair& pair,
+                                      const Scene& scene) {
+  const double aside = StereoNoise{}.place_px / pair.focal_px;
+  std::vector<Ray> rays;
+  for (const glm::dvec3& p_m : points.p_m) {
+    const glm::dvec3 p_LQ = inverse(pair.X_DL) * p_m;
+    for (const glm::dvec2 off : {glm::dvec2(0), {aside, 0}, {-aside, 0}, {0, aside}, {0, -aside}}) {
+      const glm::dvec3 ahead(glm::dvec2(p_LQ) / p_LQ.z + off, 1);
+      rays.push_back({pair.X_DL.translation_m, glm::normalize(pair.X_DL.rotation * ahead)});
+    }
+  }
+  std::vector<Hit> hits(rays.size());
+  scene.trace(rays, hits, Batch::Alike);
+  SurfaceResiduals result;
+  for (std::size_t i = 0; i < points.size(); ++i) {
+    const auto met = [&](std::size_t k) {
+      return rays[5 * i + k].direction * hits[5 * i + k].range_m;
+    };
+    const glm::dvec3 right = met(1) - met(2), down = met(3) - met(4);
+    const glm::dvec3 up = glm::cross(right, -down),
+                     off_m = points.p_m[i] - pair.X_DL.translation_m - met(0);
+    const double sd = std::sqrt(glm::dot(up, glm::dmat3(points.covariance_m2[i]) * up));
+    const glm::dvec2 sight(rays[5 * i].direction);
+    Residuals& of = glm::dot(glm::dvec2(up), sight) < 0 ? result.facing : result.averted;
+    const double off = glm::dot(up, off_m) / sd;
+    if (!(std::abs(off) <= gross)) {
+      of.outlier_share += 1;
+      continue;
+    }
+    of.normalised.push_back(off);
+    of.by_bias.push_back(glm::dot(glm::dvec3(points.bias_m[i]), up) / sd);
+  }
+  for (Residuals* of : {&result.facing, &result.averted})
+    of->outlier_share /=
+        std::max(1.0, of->outlier_share + static_cast<double>(of->normalised.size()));
+  return result;
 }
 
 // How many standard deviations of bias explain the residuals best.
@@ -157,13 +205,42 @@ Measured measure(const View& left, const View& right, float bias_px) {
 // What the limits below hold of the residuals, but for a bias.
 void expect_stated(const std::string& name, const Residuals& residuals, double bias) {
   // One factor stands for cameras that spread their noise over neighbours, by demosaicing or
-  // resampling, and for those that do not.
+  // resampling, and for those that do not: a mean of two pixels has half of their variance, hence
+  // the root of that.
   EXPECT_GT(rms(residuals, bias), 0.7) << name;
   EXPECT_LT(rms(residuals, bias), 1.15) << name;
   EXPECT_GT(share_within(residuals, bias, 1), 0.65) << name;
   EXPECT_GT(share_within(residuals, bias, 2), 0.92) << name;
   testing::record_margin("normalised error", rms(residuals, bias), 1.15);
   testing::record_margin("beyond two sd", 1 - share_within(residuals, bias, 2), 0.08);
+}
+
+// By what factor the stated standard deviations are too small, told by squares at two quantiles of
+// chi^2: 1 if they are right, and from 0.7 to 1.15 as expect_stated allows. To these limits 3.1
+// standard errors of a sample's quantile are added, which is 5 % for all 24 comparisons; of two
+// neighbours, whose windows overlap, one counts.
+void expect_chi2(const std::string& name, const Residuals& residuals, double bias) {
+  struct Quantile {
+    double share, chi, density;  // of the root of chi^2 there
+  };
+  const auto count = static_cast<double>(residuals.normalised.size());
+  ASSERT_GT(count, 200) << name;
+  EXPECT_LT(residuals.outlier_share, 0.02) << name;
+  std::vector<double> sizes;
+  for (std::size_t i = 0; i < residuals.normalised.size(); ++i)
+    sizes.push_back(std::abs(residuals.normalised[i] - bias * residuals.by_bias[i]));
+  std::ranges::sort(sizes);
+  for (const Quantile& at : {Quantile{0.05, 0.0627, 0.796}, Quantile{0.95, 1.960, 0.1169}}) {
+    const double factor = sizes[static_cast<std::size_t>(at.share * count)] / at.chi;
+    const double allowed =
+        3.1 * std::sqrt(2 * at.share * (1 - at.share) / count) / (at.density * at.chi);
+    EXPECT_LT(factor, 1.15 * (1 + allowed)) << name << " at " << at.share;
+    EXPECT_GT(factor, 0.7 * (1 - allowed)) << name << " at " << at.share;
+    testing::record_margin("chi at the quantile " + std::to_string(at.share).substr(0, 4), factor,
+                           1.15 * (1 + allowed));
+    ::testing::Test::RecordProperty(name + " at " + std::to_string(at.share).substr(0, 4),
+                                    std::to_string(factor));
+  }
 }
 
 // One picture of the ground by each camera of a shot.
@@ -199,6 +276,9 @@ TEST(StereoPointsProof, OfRenderedPairsErrAsStated) {
     const double own_bias = bias_of(residuals);
     EXPECT_LT(std::abs(own_bias), 1) << shot.name;
     testing::record_margin("bias", own_bias, 1, "sd");
+    const SurfaceResiduals surface = surface_residuals_of(fair.points, fair.pair, scene);
+    expect_chi2(shot.name + ", facing", surface.facing, own_bias);
+    expect_chi2(shot.name + ", averted", surface.averted, own_bias);
 
     // Three standard deviations of bias are told apart from the noise by their pattern alone.
     const Measured biased = measure(left, right, 0.3F);

@@ -175,6 +175,10 @@ TEST(StereoPoints, LeavesOutWhatIsTooUncertainOrBeyondLimits) {
   EXPECT_EQ(stereo_points(pair, left, map).size(), 0U);
   for (const float none : {0.0F, -3.0F, nothing, std::numeric_limits<float>::infinity()})
     EXPECT_EQ(stereo_points(pair, left, map_of(pair, none)).size(), 0U) << none;
+  // Without any noise what is infinitely far is not to be had either.
+  EXPECT_EQ(
+      stereo_points(pair, left, map_of(pair, 0), {.noise = {.match_px = 0, .bias_px = 0}}).size(),
+      0U);
 }
 
 TEST(StereoPoints, TakeTheMapsOwnUncertaintyUnlessTold) {
