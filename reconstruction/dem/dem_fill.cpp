@@ -5,6 +5,7 @@
 
 #include <algorithm>
 #include <cmath>
+#include <compare>
 #include <limits>
 #include <map>
 #include <mutex>
@@ -13,6 +14,7 @@
 #include "core/error.h"
 #include "reconstruction/dem/data_distance.h"
 #include "reconstruction/dem/fill_calibration.h"
+#include "reconstruction/dem/fill_shadow.h"
 #include "reconstruction/dem/ground_roughness.h"
 #include "reconstruction/dem/plate_system.h"
 #include "reconstruction/dem/sorted_holes.h"
@@ -83,13 +85,18 @@ class Filling {
   FilledHeights run();
 
  private:
+  struct Shape {
+    bool is_shadow = false, is_long = false;
+    friend auto operator<=>(const Shape&, const Shape&) = default;
+  };
   struct Kind {
-    bool is_long;
+    Shape shape;
     int first, end;  // octaves of distances to data
     std::vector<TriedHole> holes;
   };
   int octave_of(const RasterHole& hole) const;
-  bool is_long(const RasterHole& hole) const;
+  Shape shape_of(std::size_t hole) const;
+  void find_sights();
   std::vector<Kind> kinds() const;
   void check_memory(std::span<const std::vector<std::uint32_t>> sets) const;
   void try_kinds();
@@ -108,7 +115,8 @@ class Filling {
   const Work& work_;
   FilledHeights result_;
   SortedHoles sorted_;
-  std::vector<std::optional<FillLaw>> laws_;  // of each trial
+  std::vector<std::optional<GrazingSight>> sights_;  // over each hole
+  std::vector<std::optional<FillLaw>> laws_;         // of each trial
   std::optional<GroundRoughness> roughness_;
 };
 
@@ -131,26 +139,37 @@ int Filling::octave_of(const RasterHole& hole) const {
   return static_cast<int>(std::log2(std::clamp(hole.farthest_m / cell_m_, 1.0, 1e9)));
 }
 
-bool Filling::is_long(const RasterHole& hole) const {
-  const double cells = hole.farthest_m / cell_m_;
-  return static_cast<double>(hole.samples) > long_shape * cells * cells;
+Filling::Shape Filling::shape_of(std::size_t hole) const {
+  const RasterHole& of = sorted_.holes[hole];
+  const double cells = of.farthest_m / cell_m_;
+  return {sights_[hole].has_value(), static_cast<double>(of.samples) > long_shape * cells * cells};
+}
+
+void Filling::find_sights() {
+  sights_.resize(sorted_.holes.size());
+  if (most_m_.empty()) return;
+  const PlateRaster raster{frame_.samples, frame_.step_m, heights_m_, sorted_.numbers};
+  tbb::parallel_for(std::size_t{0}, sights_.size(), [&](std::size_t i) {
+    if (sorted_.holes[i].fate == HoleFate::Filled)
+      sights_[i] = sight_over(raster, most_m_, sorted_.samples[i]);
+  });
 }
 
 // Octaves joined until each kind has a share of all samples that is worth a trial.
 std::vector<Filling::Kind> Filling::kinds() const {
-  std::map<std::pair<bool, int>, std::vector<TriedHole>> octaves;
+  std::map<std::pair<Shape, int>, std::vector<TriedHole>> octaves;
   std::size_t all = 0;
   for (std::size_t i = 0; i < sorted_.holes.size(); ++i) {
     const RasterHole& hole = sorted_.holes[i];
     if (hole.fate != HoleFate::Filled) continue;
-    octaves[{is_long(hole), octave_of(hole)}].push_back(
-        {sorted_.samples[i], hole.farthest_m / cell_m_});
+    octaves[{shape_of(i), octave_of(hole)}].push_back(
+        {sorted_.samples[i], hole.farthest_m / cell_m_, sights_[i]});
     all += hole.samples;
   }
   std::vector<Kind> kinds;
   std::size_t in_last = all;
   for (const auto& [octave, holes] : octaves) {
-    const bool goes_on = !kinds.empty() && kinds.back().is_long == octave.first &&
+    const bool goes_on = !kinds.empty() && kinds.back().shape == octave.first &&
                          static_cast<double>(in_last) < least_share * static_cast<double>(all);
     if (!goes_on) {
       kinds.push_back({octave.first, octave.second, octave.second + 1, {}});
@@ -187,18 +206,20 @@ void Filling::try_kinds() {
   const PlateRaster raster{frame_.samples, frame_.step_m, heights_m_, sorted_.numbers};
   for (const Kind& kind : all) {
     const FillTrial trial = try_filling(raster, kind.holes, options_.form, roughness_->usual_m());
-    const PlateForm untried{kind.is_long ? 0 : usual_tension, 0};
-    result_.trials.push_back({kind.is_long, std::exp2(kind.first), std::exp2(kind.end),
+    const PlateForm untried{kind.shape.is_shadow || kind.shape.is_long ? 0 : usual_tension, 0};
+    result_.trials.push_back({kind.shape.is_shadow, kind.shape.is_long, std::exp2(kind.first),
+                              std::exp2(kind.end),
                               options_.form.value_or(trial.form.value_or(untried)), trial.samples,
                               trial.cover.within_1sd, trial.cover.within_2sd, trial.widened_by});
     laws_.push_back(trial.law);
     report(trials_share * static_cast<double>(laws_.size()) / static_cast<double>(all.size()));
   }
   borrow_laws();
-  for (RasterHole& hole : sorted_.holes) {
+  for (std::size_t i = 0; i < sorted_.holes.size(); ++i) {
+    RasterHole& hole = sorted_.holes[i];
     if (hole.fate != HoleFate::Filled) continue;
     const auto is_its = [&](const Kind& kind) {
-      return kind.is_long == is_long(hole) && kind.first <= octave_of(hole) &&
+      return kind.shape == shape_of(i) && kind.first <= octave_of(hole) &&
              octave_of(hole) < kind.end;
     };
     hole.trial = static_cast<std::size_t>(std::ranges::find_if(all, is_its) - all.begin());
@@ -271,6 +292,7 @@ FilledHeights Filling::run() {
   check_memory(sets);
   const auto all = static_cast<double>(std::ranges::count(is_wanted, std::uint8_t{1}));
   roughness_.emplace(frame_.samples, heights_m_);
+  find_sights();
   try_kinds();
   std::mutex one_at_a_time;
   tbb::parallel_for(std::size_t{0}, sets.size(), [&](std::size_t i) {

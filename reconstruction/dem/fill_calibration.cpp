@@ -5,6 +5,7 @@
 #include <algorithm>
 #include <cmath>
 #include <cstdint>
+#include <limits>
 #include <vector>
 
 #include "reconstruction/dem/data_distance.h"
@@ -14,15 +15,20 @@
 namespace groundray {
 namespace {
 
-constexpr std::size_t enough_samples = 2500, enough_pieces = 120, fewest_pieces = 4,
-                      fewest_for_forms = 12;
-constexpr std::uint32_t most_attempts = 240, batch = 4;
-constexpr std::size_t telling_samples = 400;  // that leave promising forms alone
+constexpr std::size_t enough_samples = 7000, enough_pieces = 300, fewest_pieces = 4,
+                      fewest_for_forms = 12, fewest_shadows = 30;
+constexpr std::uint32_t most_attempts = 600, batch = 4;
+constexpr std::size_t telling_samples = 1200;  // that leave promising forms alone
 constexpr double doubt = 2;          // standard deviations by which a form must beat a thin plate,
 constexpr double least_gain = 0.02;  // and by which share of its squares
 
+constexpr double doubt_in_shadow = 1;
+// Ground that hides itself falls off behind its crests: more than a thin plate has it.
+constexpr PlateForm usual_in_shadow{0, 5};
+
 // From the one for the roughest ground to that for the smoothest. The thin plate is among them.
-const std::vector<PlateForm> all_forms{{0.2, 0}, {0.05, 0}, {0, 0}, {0, 1}, {0, 5}, {0, 50}};
+const std::vector<PlateForm> all_forms{{0.2, 0}, {0.05, 0}, {0, 0}, {0, 0.25},
+                                       {0, 1},   {0, 5},    {0, 50}};
 
 // What came of one piece.
 struct PieceErrors {
@@ -43,6 +49,19 @@ bool drop_loose(HiddenPiece& piece) {
                              [&](std::uint32_t sample) { return piece.numbers[sample] >= 0; });
 }
 
+// Of each sample of a set, NaN for none; nothing if the piece has no bounds.
+std::vector<double> bounds_of(const HiddenPiece& piece, const std::vector<std::uint32_t>& set,
+                              const std::vector<std::int32_t>& order) {
+  std::vector<double> most_m;
+  if (piece.most_m.empty()) return most_m;
+  for (const std::uint32_t sample : set) {
+    const std::int32_t at = order[sample];
+    most_m.push_back(at < 0 ? std::numeric_limits<double>::quiet_NaN()
+                            : double{piece.most_m[static_cast<std::size_t>(at)]});
+  }
+  return most_m;
+}
+
 void fill(HiddenPiece& piece, std::span<const PlateForm> forms, PieceErrors& found) {
   std::vector<std::uint8_t> is_open(piece.numbers.size());
   std::ranges::transform(piece.numbers, is_open.begin(),
@@ -56,8 +75,10 @@ void fill(HiddenPiece& piece, std::span<const PlateForm> forms, PieceErrors& fou
     std::int32_t number = 0;
     for (const std::uint32_t sample : set) piece.numbers[sample] = number++;
     PlateSystem system({piece.size, piece.step_m, piece.heights_m, piece.numbers}, set);
+    const std::vector<double> most_m = bounds_of(piece, set, order);
     for (std::size_t form = 0; form < forms.size(); ++form) {
-      const std::vector<double> heights_m = system.solve(forms[form]);
+      std::vector<double> heights_m = system.solve(forms[form]);
+      if (!most_m.empty()) heights_m = system.solve_below(forms[form], heights_m, most_m).heights_m;
       for (std::size_t i = 0; i < set.size(); ++i) {
         const std::int32_t at = order[set[i]];
         if (at < 0) continue;
@@ -116,32 +137,38 @@ Gain gain_of(std::span<const PieceErrors> pieces, std::size_t form, std::size_t 
   return {sum / weights, std::sqrt(squares) / weights, less > std::sqrt(less_squares) / 2};
 }
 
-// The number of the form that gains most; of a thin plate unless the gain on it is above `sds`
-// times what chance may give, and above `least`.
+// What a form must gain on the usual one to be taken instead.
+struct Demand {
+  PlateForm usual;
+  double sds = 0;    // times what chance may give
+  double share = 0;  // of its squares
+};
+
+// The number of the form that gains most; of the usual one unless the gain on it is large enough.
 std::size_t best_form(std::span<const PieceErrors> pieces, std::span<const PlateForm> forms,
-                      double sds, double least) {
-  const auto plate_at = std::ranges::find(forms, PlateForm{});
-  if (plate_at == forms.end()) return 0;
-  const auto plate = static_cast<std::size_t>(plate_at - forms.begin());
-  std::size_t best = plate;
-  double most = least;
+                      const Demand& demand) {
+  const auto usual_at = std::ranges::find(forms, demand.usual);
+  if (usual_at == forms.end()) return 0;
+  const auto usual = static_cast<std::size_t>(usual_at - forms.begin());
+  std::size_t best = usual;
+  double most = demand.share;
   for (std::size_t form = 0; form < forms.size(); ++form) {
-    const Gain gain = gain_of(pieces, form, plate);
-    if (!gain.is_less || gain.mean_log <= std::max(most, sds * gain.chance)) continue;
+    const Gain gain = gain_of(pieces, form, usual);
+    if (!gain.is_less || gain.mean_log <= std::max(most, demand.sds * gain.chance)) continue;
     most = gain.mean_log;
     best = form;
   }
   return best;
 }
 
-// Those worth more trials: the best so far, its neighbours and the thin plate.
+// Those worth more trials: the best so far, its neighbours and the usual one.
 std::vector<PlateForm> promising(std::span<const PieceErrors> pieces,
-                                 std::span<const PlateForm> forms) {
-  const std::size_t best = best_form(pieces, forms, 0, 0);
+                                 std::span<const PlateForm> forms, const PlateForm& usual) {
+  const std::size_t best = best_form(pieces, forms, {usual});
   std::vector<PlateForm> kept;
   for (std::size_t form = 0; form < forms.size(); ++form) {
     const bool is_near = form + 1 >= best && form <= best + 1;
-    if (is_near || forms[form] == PlateForm{}) kept.push_back(forms[form]);
+    if (is_near || forms[form] == usual) kept.push_back(forms[form]);
   }
   return kept;
 }
@@ -161,6 +188,7 @@ void keep(std::vector<PieceErrors>& pieces, std::span<const PlateForm> forms,
 
 // Pieces, until there are enough of them; `forms` become fewer.
 std::vector<PieceErrors> try_pieces(const PieceMaker& maker, std::vector<PlateForm>& forms,
+                                    const PlateForm& usual, std::size_t fewest,
                                     double usual_roughness_m) {
   std::vector<PieceErrors> all;
   std::size_t samples = 0;
@@ -177,12 +205,10 @@ std::vector<PieceErrors> try_pieces(const PieceMaker& maker, std::vector<PlateFo
       samples += found.distances_cells.size();
       all.push_back(std::move(found));
     }
-    if (all.size() >= enough_pieces ||
-        (all.size() >= fewest_for_forms && samples >= enough_samples))
-      break;
+    if (all.size() >= enough_pieces || (all.size() >= fewest && samples >= enough_samples)) break;
     if (forms.size() == all_forms.size() && all.size() >= fewest_pieces &&
         samples >= telling_samples) {
-      const std::vector<PlateForm> kept = promising(all, forms);
+      const std::vector<PlateForm> kept = promising(all, forms, usual);
       keep(all, forms, kept);
       forms = kept;
     }
@@ -218,11 +244,15 @@ FillTrial try_filling(const PlateRaster& raster, std::span<const TriedHole> hole
                       const std::optional<PlateForm>& form, double usual_roughness_m) {
   std::vector<PlateForm> forms = all_forms;
   if (form) forms = {*form};
+  const bool is_shadow = holes.front().sight.has_value();
+  const Demand demand = is_shadow ? Demand{usual_in_shadow, doubt_in_shadow, 0}
+                                  : Demand{PlateForm{}, doubt, least_gain};
   const std::vector<PieceErrors> pieces =
-      try_pieces(PieceMaker(raster, holes), forms, usual_roughness_m);
+      try_pieces(PieceMaker(raster, holes), forms, demand.usual,
+                 is_shadow ? fewest_shadows : fewest_for_forms, usual_roughness_m);
   FillTrial trial;
   if (pieces.size() < fewest_pieces) return trial;
-  const std::size_t best = best_form(pieces, forms, doubt, least_gain);
+  const std::size_t best = best_form(pieces, forms, demand);
   trial.form = forms[best];
   std::vector<FillError> errors;
   for (std::uint32_t i = 0; i < pieces.size(); ++i) {

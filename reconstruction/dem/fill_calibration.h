@@ -22,12 +22,13 @@ struct FillTrial {
 };
 
 /// Tries how well holes like some are filled: hides pieces of their shape elsewhere, where the
-/// ground is known, fills them by each of several forms and compares. The best form is the one
-/// whose squared errors are least, by the mean logarithm over pieces, unless a thin plate's are as
-/// small but for chance. Laws of sd follow
-/// from the errors by maximum likelihood; where errors of one half of the trials are larger than
-/// the law of the other says, sd is widened.
-/// @param holes  that are alike; not empty.
+/// ground is known, or for shadows what lines of sight alike would not see there, fills them by
+/// each of several forms and compares. The best form is the one whose squared errors are least, by
+/// the mean logarithm over pieces, unless those of the usual form are as small but for chance: a
+/// thin plate, and one with the smoothness 5 for shadows. Laws of sd follow from the errors by
+/// maximum likelihood; where errors of one half of the trials are larger than the law of the other
+/// says, sd is widened.
+/// @param holes  that are alike, all shadows or none; not empty.
 /// @param form   to be tried alone, if given.
 /// @param usual_roughness_m  of the whole raster.
 FillTrial try_filling(const PlateRaster& raster, std::span<const TriedHole> holes,

@@ -4,6 +4,7 @@
 #include <cmath>
 #include <glm/common.hpp>
 #include <limits>
+#include <utility>
 
 namespace groundray {
 namespace {
@@ -11,6 +12,7 @@ namespace {
 constexpr int shifts_tried = 12;
 constexpr int near_cells = 6;        // about what is hidden, where other holes are filled as well
 constexpr double least_share = 0.3;  // of a piece, that must come upon known ground
+constexpr double alike = 0.8;        // a shadow as large as the one wanted, near enough
 constexpr int least_half_cells = 6, most_half_cells = 24;
 
 // Number n of a sequence that fills [0, 1) evenly, and cubes by three sequences.
@@ -55,7 +57,8 @@ PieceMaker::Cut PieceMaker::cut(std::uint32_t number) const {
     return glm::ivec2(static_cast<int>(i % wide), static_cast<int>(i / wide));
   };
   Cut cut;
-  cut.farthest_cells = hole.farthest_cells;
+  cut.hole = &hole;
+  cut.middle = place(middle);
   cut.half_cells = std::clamp(static_cast<int>(1.5 * std::min(hole.farthest_cells, 1e6)),
                               least_half_cells, most_half_cells);
   const auto half = static_cast<std::uint32_t>(cut.half_cells);
@@ -76,36 +79,64 @@ double PieceMaker::known_share(const Cut& cut, glm::ivec2 shift) const {
   return known / all;
 }
 
-std::optional<HiddenPiece> PieceMaker::make(std::uint32_t number) const {
-  const Cut piece = cut(number);
-  const int range = std::max(4 * most_half_cells, 6 * piece.half_cells);
+glm::ivec2 PieceMaker::shift(const Cut& cut, std::uint32_t number) const {
+  const int range = std::max(4 * most_half_cells, 6 * cut.half_cells);
+  return {std::lround((2 * spread(number, 1) - 1) * range),
+          std::lround((2 * spread(number, 2) - 1) * range)};
+}
+
+// What casts as much shadow as the piece of the hole has, as nearly as can be.
+std::optional<HiddenPiece> PieceMaker::make_shadow(const Cut& cut, std::uint32_t number) const {
+  const auto wanted = static_cast<double>(cut.samples.size());
   double best = least_share;
-  std::optional<glm::ivec2> shift;
+  CastShadow found;
   for (std::uint32_t i = 0; i < shifts_tried; ++i) {
     const std::uint32_t of = number * shifts_tried + i;
-    const glm::ivec2 tried(std::lround((2 * spread(of, 1) - 1) * range),
-                           std::lround((2 * spread(of, 2) - 1) * range));
+    const glm::ivec2 middle = cut.middle + shift(cut, of);
+    const glm::ivec2 low = glm::max(middle - cut.half_cells, glm::ivec2(0));
+    const glm::ivec2 high = glm::min(middle + cut.half_cells, raster_.size - 1);
+    if (low.x > high.x || low.y > high.y) continue;
+    CastShadow shadow = cast_shadow(raster_, *cut.hole->sight, of, low, high);
+    const auto count = static_cast<double>(shadow.samples.size());
+    const double share = std::min(count, wanted) / std::max(count, wanted);
+    if (share <= best) continue;
+    best = share;
+    found = std::move(shadow);
+    if (share >= alike) break;
+  }
+  if (found.samples.empty()) return std::nullopt;
+  HiddenPiece piece = hide(found.samples, cut.hole->farthest_cells);
+  piece.most_m = std::move(found.most_m);
+  return piece;
+}
+
+std::optional<HiddenPiece> PieceMaker::make(std::uint32_t number) const {
+  const Cut piece = cut(number);
+  if (piece.hole->sight) return make_shadow(piece, number);
+  double best = least_share;
+  std::optional<glm::ivec2> where;
+  for (std::uint32_t i = 0; i < shifts_tried; ++i) {
+    const glm::ivec2 tried = shift(piece, number * shifts_tried + i);
     const double share = known_share(piece, tried);
     if (share <= best) continue;
     best = share;
-    shift = tried;
+    where = tried;
     if (share == 1) break;
   }
-  if (!shift) return std::nullopt;
-  return hide(piece, *shift);
+  if (!where) return std::nullopt;
+  std::vector<glm::ivec2> hidden;
+  for (const glm::ivec2 sample : piece.samples)
+    if (is_known(sample + *where)) hidden.push_back(sample + *where);
+  return hide(hidden, piece.hole->farthest_cells);
 }
 
-HiddenPiece PieceMaker::hide(const Cut& cut, glm::ivec2 shift) const {
+HiddenPiece PieceMaker::hide(const std::vector<glm::ivec2>& samples, double farthest_cells) const {
   glm::ivec2 low(raster_.size), high(-1);
-  std::vector<glm::ivec2> hidden;
-  for (const glm::ivec2 sample : cut.samples) {
-    const glm::ivec2 at = sample + shift;
-    if (!is_known(at)) continue;
-    hidden.push_back(at);
+  for (const glm::ivec2 at : samples) {
     low = glm::min(low, at);
     high = glm::max(high, at);
   }
-  const int margin = roughness_reach(cut.farthest_cells) + 3;
+  const int margin = roughness_reach(farthest_cells) + 3;
   const glm::ivec2 near_low = low - near_cells, near_high = high + near_cells;
   low = glm::max(low - margin, glm::ivec2(0));
   high = glm::min(high + margin, raster_.size - 1);
@@ -123,7 +154,7 @@ HiddenPiece PieceMaker::hide(const Cut& cut, glm::ivec2 shift) const {
       piece.numbers.push_back(number < 0 ? number : is_near ? 0 : plate_absent);
     }
   }
-  for (const glm::ivec2 sample : hidden) {
+  for (const glm::ivec2 sample : samples) {
     const glm::ivec2 at = sample - low;
     const auto i = static_cast<std::uint32_t>(at.y * piece.size.x + at.x);
     piece.hidden.push_back(i);

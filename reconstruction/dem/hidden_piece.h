@@ -7,6 +7,7 @@
 #include <span>
 #include <vector>
 
+#include "reconstruction/dem/fill_shadow.h"
 #include "reconstruction/dem/plate_system.h"
 
 // Known ground that is hidden to try how well it is filled, private to this library.
@@ -16,6 +17,7 @@ namespace groundray {
 struct TriedHole {
   std::span<const std::uint32_t> samples;  ///< ascending
   double farthest_cells = 0;               ///< from data
+  std::optional<GrazingSight> sight;       ///< over it, if it is a shadow
 };
 
 /// Returns in how many columns and rows about a sample its roughness counts.
@@ -29,9 +31,11 @@ struct HiddenPiece {
   std::vector<std::int32_t> numbers;  ///< as PlateRaster's; all that are to be filled are 0
   std::vector<std::uint32_t> hidden;  ///< samples of this part, ascending
   std::vector<float> truth_m;         ///< of the hidden ones
+  std::vector<float> most_m;          ///< bounds of the hidden ones; or empty
 };
 
-/// Cuts pieces out of holes, and hides known ground of their shapes elsewhere.
+/// Hides known ground elsewhere: of the shapes of pieces that are cut out of holes, or, for holes
+/// that are shadows, what would be in the shadow of sights alike.
 class PieceMaker {
  public:
   /// @param raster  numbers: those to be filled are not negative. Must outlive this.
@@ -46,12 +50,15 @@ class PieceMaker {
   struct Cut {
     std::vector<glm::ivec2> samples;
     int half_cells = 0;
-    double farthest_cells = 0;
+    const TriedHole* hole = nullptr;
+    glm::ivec2 middle{0};
   };
   Cut cut(std::uint32_t number) const;
+  glm::ivec2 shift(const Cut& cut, std::uint32_t number) const;
+  std::optional<HiddenPiece> make_shadow(const Cut& cut, std::uint32_t number) const;
   bool is_known(glm::ivec2 sample) const noexcept;
   double known_share(const Cut& cut, glm::ivec2 shift) const;
-  HiddenPiece hide(const Cut& cut, glm::ivec2 shift) const;
+  HiddenPiece hide(const std::vector<glm::ivec2>& samples, double farthest_cells) const;
 
   const PlateRaster& raster_;
   std::span<const TriedHole> holes_;

@@ -4,6 +4,7 @@
 #include <array>
 #include <cmath>
 #include <cstdint>
+#include <glm/geometric.hpp>
 #include <limits>
 #include <utility>
 #include <vector>
@@ -15,6 +16,8 @@ namespace groundray {
 namespace {
 
 constexpr int ring_cells = 4;  // of ground about holes that triangles are made of
+// On the mean, at most: rims of holes on steeper ground look like outlines of what stands upright.
+constexpr double most_slope = 0.5;
 
 // The ground about holes as triangles that face upwards.
 class RingMesh {
@@ -85,6 +88,18 @@ class RingMesh {
   TriangleMesh mesh_;
 };
 
+// What heights are to be multiplied by lest the mesh is too steep.
+double flattening_of(const TriangleMesh& mesh) {
+  double sum = 0;
+  for (const glm::uvec3& t : mesh.triangles) {
+    const glm::dvec3 normal = glm::cross(mesh.vertices_m[t.y] - mesh.vertices_m[t.x],
+                                         mesh.vertices_m[t.z] - mesh.vertices_m[t.x]);
+    sum += (normal.x * normal.x + normal.y * normal.y) / (normal.z * normal.z);
+  }
+  if (!(sum > 0)) return 1;
+  return std::min(1.0, most_slope / std::sqrt(sum / static_cast<double>(mesh.triangles.size())));
+}
+
 }  // namespace
 
 FilledHeights fill_dem_by_mesh(const GridFrame& frame, std::span<const float> heights_m,
@@ -98,6 +113,8 @@ FilledHeights fill_dem_by_mesh(const GridFrame& frame, std::span<const float> he
   if (!is_any) return left;
   MeasuredMesh ring{
       .shape = RingMesh(frame, heights_m).take(), .sd_m = {}, .labels = {}, .confidence = {}};
+  const double flattening = flattening_of(ring.shape);
+  for (glm::dvec3& vertex_m : ring.shape.vertices_m) vertex_m.z *= flattening;
   const FilledMesh mesh =
       fill_holes(std::move(ring), {std::numeric_limits<double>::max(), most_edges}, work);
   const TriangleMesh& shape = mesh.mesh.shape;
@@ -107,7 +124,8 @@ FilledHeights fill_dem_by_mesh(const GridFrame& frame, std::span<const float> he
       float& least_m =
           filled_m[static_cast<std::size_t>(row) * static_cast<std::size_t>(frame.samples.x) +
                    static_cast<std::size_t>(column)];
-      if (!(height_m >= double{least_m})) least_m = static_cast<float>(height_m);
+      const double true_m = height_m / flattening;
+      if (!(true_m >= double{least_m})) least_m = static_cast<float>(true_m);
     };
     visit_samples(frame, {shape.vertices_m[t.x], shape.vertices_m[t.y], shape.vertices_m[t.z]},
                   lower);

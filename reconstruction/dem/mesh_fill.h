@@ -12,8 +12,8 @@ namespace groundray {
 /// Fills blank areas of a DEM by meshes: the ground round about as triangles (split as HeightGrid's
 /// cells are), its holes filled as fill_holes does (triangulated, refined, faired), resampled. It
 /// is an alternative to fill_dem to compare with, and for rims that stand so steep or overhang that
-/// a surface of heights is none of theirs: of what lies above a sample the lowest is taken. Tells
-/// no sd.
+/// a surface of heights is none of theirs: of what lies above a sample the lowest is taken. Ground
+/// steeper than one in two on the mean is flattened to that meanwhile. Tells no sd.
 ///
 /// Times grow with the square of a rim's edges and more: see HoleLimits. Options' form is not used.
 /// @param most_edges  of a rim, at most; holes with a longer one stay, with the fate Partly.
