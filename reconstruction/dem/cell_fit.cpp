@@ -5,6 +5,8 @@
 #include <cmath>
 #include <limits>
 
+#include "reconstruction/dem/cell_bend.h"
+#include "reconstruction/dem/few_points.h"
 #include "reconstruction/dem/float_lanes.h"
 #include "reconstruction/dem/order_statistic.h"
 
@@ -15,10 +17,13 @@ constexpr float least_sd_m = 1e-4F;  // what is said to be nearer counts as this
 constexpr int huber_rounds = 3, tukey_rounds = 5;
 constexpr float huber_limit = 1.345F, tukey_limit = 4.685F;  // 95 % efficient on normal errors
 
-// By how much of the sd of neighbours about their plane the ground at a sample may differ from the
-// plane through its own cell, and more for each cell that the middle of its points is off. By trial
-// on rolling ground.
-constexpr double roughness_share = 0.1, roughness_off = 0.3;
+// Of a guess from so many points half is the crest of the cell, and half where they happen to lie.
+constexpr double crest_points = 4;
+
+// Heights of outliers are spread over so much, more or less.
+constexpr double outliers_reach_m = 2;
+constexpr std::size_t few_points = 2;
+constexpr int enough_neighbours = 5;
 
 constexpr std::uint32_t no_group = std::numeric_limits<std::uint32_t>::max();
 
@@ -36,7 +41,7 @@ struct CellFit::Sums {
   double w = 0, x = 0, y = 0, z = 0, xx = 0, xy = 0, yy = 0, xz = 0, yz = 0;
 
   // Inverse of the normal equations' matrix, with what is known of the slopes added.
-  Inverse inverse(const NeighbourPlane& known) const noexcept {
+  Inverse inverse(const NeighbourSurface& known) const noexcept {
     // The height is eliminated first: what is left is positive by what is known.
     const double mean_x = x / w, mean_y = y / w;
     const double a = std::max(0.0, xx - x * mean_x) + known.information_xx;
@@ -50,7 +55,7 @@ struct CellFit::Sums {
     return m;
   }
 
-  SurfacePlane solve(const NeighbourPlane& known) const noexcept {
+  SurfacePlane solve(const NeighbourSurface& known) const noexcept {
     const Inverse m = inverse(known);
     const SurfacePlane& p = known.plane;
     const double right_x = xz + known.information_xx * p.slope_x + known.information_xy * p.slope_y;
@@ -82,6 +87,23 @@ void CellFit::unpack(std::span<const PackedPoint> points, glm::dvec2 step_m,
     noise_m2_[i] = sd * sd;
     across_m2_[i] = across * across;
     bias_m_[i] = unpacked_sd(p.bias);
+  }
+}
+
+// Leaves of heights what is above the bend of the neighbours' surface and the cell's crest.
+void CellFit::unbend(const NeighbourSurface& neighbours, glm::dvec2 step_m) {
+  const auto n = static_cast<double>(count_);
+  const bool is_weighed = outliers_per_m_ > 0 && count_ <= few_points;  // the crest with the rest
+  own_crest_ = is_weighed ? 0 : n / (n + crest_points);
+  const double crest_m = own_crest_ * neighbours.crest_m;
+  const auto xx = static_cast<float>(neighbours.bend.xx - 2 * crest_m),
+             yy = static_cast<float>(neighbours.bend.yy - 2 * crest_m),
+             xy = static_cast<float>(neighbours.bend.xy);
+  const auto per_x = static_cast<float>(1 / step_m.x), per_y = static_cast<float>(1 / step_m.y);
+  for (std::size_t i = 0; i < padded_; i += lanes) {
+    const FloatLanes u = load(&x_m_[i]) * per_x, v = load(&y_m_[i]) * per_y;
+    const FloatLanes bend = xx * cell_bend(u) + yy * cell_bend(v) + xy * u * v;
+    store(load(&z_m_[i]) - bend, &z_m_[i]);
   }
 }
 
@@ -189,7 +211,7 @@ CellFit::Sums CellFit::sum(const SurfacePlane& plane, double scale, const Robust
 
 // Improves `plane` until it does not change, but no more than `rounds` times.
 template <typename Robust>
-void CellFit::iterate(SurfacePlane& plane, const NeighbourPlane& neighbours, double scale,
+void CellFit::iterate(SurfacePlane& plane, const NeighbourSurface& neighbours, double scale,
                       int rounds, const Robust& robust) {
   constexpr double little = 5e-3;  // of its sd
   for (int round = 0; round < rounds; ++round) {
@@ -203,13 +225,19 @@ void CellFit::iterate(SurfacePlane& plane, const NeighbourPlane& neighbours, dou
   }
 }
 
-CellHeight CellFit::operator()(std::span<const PackedPoint> points,
-                               const NeighbourPlane& neighbours, glm::dvec2 step_m,
-                               std::int32_t reference) {
+CellFit::CellFit(double outlier_share) noexcept
+    : outliers_per_m_(outlier_share / outliers_reach_m) {}
+
+std::optional<CellHeight> CellFit::operator()(std::span<const PackedPoint> points,
+                                              const NeighbourSurface& neighbours, glm::dvec2 step_m,
+                                              std::int32_t reference) {
   unpack(points, step_m, reference);
   number_groups(points);
+  unbend(neighbours, step_m);
   SurfacePlane plane = neighbours.plane;
   weigh(plane);
+  if (outliers_per_m_ > 0 && count_ <= few_points && neighbours.cells >= enough_neighbours)
+    return fit_few_points(neighbours, step_m, reference * PackedPoint::height_step_m);
   plane.height_m = median_height(plane);
   iterate(plane, neighbours, scale(plane), huber_rounds,
           [](const FloatLanes& size) { return huber_limit / larger(size, all_of(huber_limit)); });
@@ -224,45 +252,101 @@ CellHeight CellFit::operator()(std::span<const PackedPoint> points,
   return finish(plane, sum(plane, times, tukey), neighbours, step_m);
 }
 
-// Counts the points that weigh something, and sets chi2 to the sum of their squared residuals, each
-// over what is to be expected of it.
-void CellFit::compare(const SurfacePlane& plane, double bias_m2, CellHeight& found) const {
-  found.chi2 = 0;
+std::optional<CellHeight> CellFit::fit_few_points(const NeighbourSurface& neighbours,
+                                                  glm::dvec2 step_m, double reference_m) const {
+  const SurfacePlane& plane = neighbours.plane;
+  const double base_m = plane.height_m - reference_m;
+  std::array<FewPoint, few_points> few;
   for (std::size_t i = 0; i < count_; ++i) {
-    if (!(weight_[i] > 0)) continue;
-    const double residual_m = double{z_m_[i]} - plane.height_m - plane.slope_x * double{x_m_[i]} -
-                              plane.slope_y * double{y_m_[i]};
-    // What is common to a group is in the estimate too, as far as the group is.
-    const double bias = bias_m_[i];
-    const double expected_m2 =
-        double{variance_m2_[i]} +
-        std::max(0.0, bias * bias - 2 * bias * bias_sum_m_[group_[i]] + bias_m2);
-    found.chi2 += residual_m * residual_m / expected_m2;
+    const glm::dvec2 place_m(x_m_[i], y_m_[i]);
+    // Where slopes are known but roughly, so is what places that are off do to heights.
+    const double slope_m2 = double{across_m2_[i]} * (neighbours.xx + neighbours.yy);
+    few[i] = {place_m,
+              double{z_m_[i]} - base_m - plane.slope_x * place_m.x - plane.slope_y * place_m.y,
+              double{variance_m2_[i]} + slope_m2, bias_m_[i], names_[group_[i]]};
+  }
+  const FewHeight got = fit_few(few, static_cast<int>(count_), neighbours, step_m, outliers_per_m_);
+  if (got.is_none > 0.5) return std::nullopt;
+  CellHeight found{.plane = plane,
+                   .variance_m2 = got.variance_m2,
+                   .chi2 = std::numeric_limits<double>::quiet_NaN()};
+  found.plane.height_m = base_m + got.above_m;
+  const bool is_first = got.is_ground[0] >= got.is_ground[1];
+  for (std::size_t i = 0; i < count_; ++i) {
+    if (got.is_ground[i] < 0.5 && is_first != (i == 0)) continue;  // the likelier one counts
     ++((names_[group_[i]] & 1U) == 0 ? found.lidar : found.stereo);
   }
+  return found;
+}
+
+// Counts the points that weigh something, and sets chi2 to the sum of their squared residuals, each
+// over what is to be expected of it.
+void CellFit::compare(const SurfacePlane& plane, double bias_m2, CellHeight& found) {
+  const auto shared_m2 = static_cast<float>(bias_m2);
+  std::uint32_t stereo = 0, all = 0;
+  for (std::size_t i = 0; i < count_; ++i) {
+    // What is common to a group is in the estimate too, as far as the group is.
+    const std::uint32_t group = group_[i];
+    const float bias = bias_m_[i];
+    size_[i] =
+        std::max(0.F, bias * bias - 2 * bias * static_cast<float>(bias_sum_m_[group]) + shared_m2);
+    const std::uint32_t counts = weight_[i] > 0 ? 1 : 0;
+    all += counts;
+    stereo += counts & names_[group];
+  }
+  found.stereo = stereo;
+  found.lidar = all - stereo;
+  const auto h = static_cast<float>(plane.height_m), a = static_cast<float>(plane.slope_x),
+             b = static_cast<float>(plane.slope_y);
+  FloatLanes chi2{};
+  for (std::size_t i = 0; i < padded_; i += lanes) {
+    const FloatLanes off = load(&z_m_[i]) - h - a * load(&x_m_[i]) - b * load(&y_m_[i]);
+    const FloatLanes term = off * off / (load(&variance_m2_[i]) + load(&size_[i]));
+    chi2 += load(&weight_[i]) > 0 ? term : FloatLanes{};
+  }
+  found.chi2 = double{total(chi2)};
+}
+
+// How the height at the sample depends on points: it rises by size_ with each one's.
+struct CellFit::Levers {
+  Inverse inverse;
+  double noise_m2 = 0, bias_m2 = 0;
+  double bend_x = 0, bend_y = 0, bend_xy = 0;  // with second differences of the ground
+};
+
+CellFit::Levers CellFit::levers(const Sums& sums, const NeighbourSurface& neighbours,
+                                glm::dvec2 step_m) {
+  Levers found{.inverse = sums.inverse(neighbours)};
+  const Inverse& m = found.inverse;
+  const auto lever_h = static_cast<float>(m.hh), lever_x = static_cast<float>(m.hx),
+             lever_y = static_cast<float>(m.hy);
+  const auto per_x = static_cast<float>(1 / step_m.x), per_y = static_cast<float>(1 / step_m.y);
+  FloatLanes noise{}, bend_x{}, bend_y{}, bend_xy{};
+  for (std::size_t i = 0; i < padded_; i += lanes) {
+    const FloatLanes x = load(&x_m_[i]), y = load(&y_m_[i]), u = x * per_x, v = y * per_y;
+    const FloatLanes lever = load(&weight_[i]) * (lever_h + lever_x * x + lever_y * y);
+    noise += lever * lever * load(&variance_m2_[i]);
+    bend_x += lever * cell_bend(u);
+    bend_y += lever * cell_bend(v);
+    bend_xy += lever * u * v;
+    store(lever, &size_[i]);
+  }
+  found.noise_m2 = double{total(noise)};
+  found.bend_x = double{total(bend_x)};
+  found.bend_y = double{total(bend_y)};
+  found.bend_xy = double{total(bend_xy)};
+  bias_sum_m_.assign(names_.size(), 0);
+  for (std::size_t i = 0; i < count_; ++i) bias_sum_m_[group_[i]] += double{size_[i] * bias_m_[i]};
+  for (const double sum_m : bias_sum_m_) found.bias_m2 += sum_m * sum_m;
+  return found;
 }
 
 CellHeight CellFit::finish(const SurfacePlane& plane, const Sums& sums,
-                           const NeighbourPlane& neighbours, glm::dvec2 step_m) {
+                           const NeighbourSurface& neighbours, glm::dvec2 step_m) {
   CellHeight found{.plane = plane};
-  const Inverse m = sums.inverse(neighbours);
-  // By how much the height at the sample rises with each point's.
-  const auto lever_h = static_cast<float>(m.hh), lever_x = static_cast<float>(m.hx),
-             lever_y = static_cast<float>(m.hy);
-  FloatLanes noise_lanes{};
-  for (std::size_t i = 0; i < padded_; i += lanes) {
-    const FloatLanes lever =
-        load(&weight_[i]) * (lever_h + lever_x * load(&x_m_[i]) + lever_y * load(&y_m_[i]));
-    noise_lanes += lever * lever * load(&variance_m2_[i]);
-    store(lever, &size_[i]);
-  }
-  const double noise_m2 = total(noise_lanes);
-  bias_sum_m_.assign(names_.size(), 0);
-  for (std::size_t i = 0; i < count_; ++i) bias_sum_m_[group_[i]] += double{size_[i] * bias_m_[i]};
-  double bias_m2 = 0;
-  for (const double sum_m : bias_sum_m_) bias_m2 += sum_m * sum_m;
-
-  compare(plane, bias_m2, found);
+  const Levers by = levers(sums, neighbours, step_m);
+  const Inverse& m = by.inverse;
+  compare(plane, by.bias_m2, found);
   const double inside = found.lidar + found.stereo;
   const double known = m.xx * neighbours.information_xx + 2 * m.xy * neighbours.information_xy +
                        m.yy * neighbours.information_yy;
@@ -272,10 +356,14 @@ CellHeight CellFit::finish(const SurfacePlane& plane, const Sums& sums,
   const double lent_m2 = m.hx * m.hx * neighbours.information_xx +
                          2 * m.hx * m.hy * neighbours.information_xy +
                          m.hy * m.hy * neighbours.information_yy;
-  const double off = std::hypot(sums.x / step_m.x, sums.y / step_m.y) / sums.w;
-  const double rough_m = neighbours.scatter_m * std::hypot(roughness_share, roughness_off * off);
-  found.variance_m2 =
-      noise_m2 * (found.chi2 > 1 ? found.chi2 : 1.0) + bias_m2 + lent_m2 + rough_m * rough_m;
+  const SurfaceBend& bend = neighbours.bend_variance;
+  const double bend_m2 = by.bend_x * by.bend_x * bend.xx + by.bend_y * by.bend_y * bend.yy +
+                         by.bend_xy * by.bend_xy * bend.xy;
+  // The crest was added to the height: the same noise once more, but not what groups have in
+  // common, which neighbours have too.
+  const double again = 1 + 2 * own_crest_ * neighbours.crest_share * (by.bend_x + by.bend_y);
+  const double misfit = found.chi2 > 1 ? found.chi2 : 1.0;
+  found.variance_m2 = again * again * by.noise_m2 * misfit + by.bias_m2 + lent_m2 + bend_m2;
   return found;
 }
 

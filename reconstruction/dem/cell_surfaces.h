@@ -27,6 +27,7 @@ class OutlierRule {
   /// more, but 1 for the only point, or if there are no outliers.
   std::uint32_t credible(std::uint32_t points) const noexcept;
   bool none() const noexcept { return share_ == 0; }
+  double share() const noexcept { return share_; }
 
  private:
   double share_;

@@ -12,7 +12,7 @@ namespace groundray {
 /// so what it is told of them it knows without its neighbours.
 class CellTiling {
  public:
-  static constexpr int rim = 2;
+  static constexpr int rim = 3;
   static constexpr int width = 256;  ///< of a tile with its rim, at most
   static constexpr int largest_edge = width - 2 * rim;
   static constexpr int smallest_edge = 2 * rim;  ///< so no cell is in the rims of two on one side

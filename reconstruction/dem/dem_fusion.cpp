@@ -34,6 +34,7 @@ void refuse_faults(const FusionOptions& options) {
                 options.steepest_slope);
   broken.unless(options.slope_sd > 0 && options.slope_sd <= 1e6,
                 "slope_sd = {} must be above 0 and at most 1e6", options.slope_sd);
+  broken.unless(options.most_sd_m > 0, "most_sd_m = {} must be above 0", options.most_sd_m);
   broken.throw_if_any();
 }
 
@@ -162,8 +163,8 @@ class TileFusion {
       : frame_(frame),
         memory_bytes_(options.memory_bytes),
         folder_(std::move(folder)),
-        rules_{frame.step_m, options.surface_gap_m, options.steepest_slope, options.slope_sd,
-               OutlierRule(options.outlier_share)} {}
+        rules_{frame.step_m,     options.surface_gap_m, options.steepest_slope,
+               options.slope_sd, options.most_sd_m,     OutlierRule(options.outlier_share)} {}
 
   std::size_t most_in_tile() const noexcept { return memory_bytes_ / 4 / bytes_in_work; }
   std::size_t most_in_batch() const noexcept { return memory_bytes_ / 2 / bytes_in_work; }
@@ -173,6 +174,7 @@ class TileFusion {
   DemTile fuse(const CellTiling& tiling, const PointSpool& spool, std::size_t tile);
 
   std::uint64_t without_ground() const noexcept { return without_ground_; }
+  std::uint64_t uncertain() const noexcept { return uncertain_; }
   std::uint64_t bytes_on_disk() const noexcept { return bytes_on_disk_; }
 
  private:
@@ -183,7 +185,7 @@ class TileFusion {
   std::size_t memory_bytes_;
   std::filesystem::path folder_;
   TileRules rules_;
-  std::atomic<std::uint64_t> without_ground_ = 0;
+  std::atomic<std::uint64_t> without_ground_ = 0, uncertain_ = 0;
   std::uint64_t bytes_on_disk_ = 0;
 };
 
@@ -206,8 +208,10 @@ void TileFusion::fit(const CellTiling& tiling, const PointSpool& spool, std::siz
   spool.read(tile, [&points](std::span<const PackedPoint> some) {
     points.insert(points.end(), some.begin(), some.end());
   });
-  without_ground_ += fit_tile(std::move(points), tiling.cells(tile),
-                              tiling.first_cell(tile) - into.first, rules_, into.layers);
+  const TileCounts counts = fit_tile(std::move(points), tiling.cells(tile),
+                                     tiling.first_cell(tile) - into.first, rules_, into.layers);
+  without_ground_ += counts.without_ground;
+  uncertain_ += counts.uncertain;
 }
 
 // A tile of too many points is cut into tiles of an eighth of its edge.
@@ -245,7 +249,7 @@ void TileFusion::split(const CellTiling& tiling, const PointSpool& spool, std::s
 // many points, which will be split, is by itself.
 std::size_t batch_end(const PointSpool& spool, std::size_t begin, std::size_t most_points,
                       std::size_t most_in_tile) {
-  constexpr std::size_t cells_weigh = 100'000;  // what a tile takes whatever its points
+  constexpr std::size_t cells_weigh = 200'000;  // what a tile takes whatever its points
   constexpr std::size_t most_tiles = 64;
   std::size_t end = begin, points = 0;
   while (end < spool.bins() && end - begin < most_tiles) {
@@ -289,6 +293,7 @@ FusionCounts fuse(const PointSource& source, const GridFrame& frame, const Fusio
   }
   FusionCounts counts = intake.counts();
   counts.without_ground = fusion.without_ground();
+  counts.uncertain = fusion.uncertain();
   counts.bytes_on_disk = spool.bytes_on_disk() + fusion.bytes_on_disk();
   return counts;
 }

@@ -8,11 +8,12 @@
 #include <cmath>
 #include <limits>
 #include <memory>
+#include <optional>
 #include <span>
 
 #include "reconstruction/dem/cell_fit.h"
 #include "reconstruction/dem/cell_tiling.h"
-#include "reconstruction/dem/neighbour_plane.h"
+#include "reconstruction/dem/neighbour_surface.h"
 #include "reconstruction/dem/order_statistic.h"
 
 namespace groundray {
@@ -21,6 +22,10 @@ namespace {
 constexpr int rim = CellTiling::rim;
 constexpr int width = CellTiling::width;
 constexpr int enough_neighbours = 5;  // to contradict a cell's own points
+
+// Cells this far off tell how rough the ground is: their neighbours are in the rim, too.
+constexpr int rough_reach = 1;
+static_assert(rough_reach + 2 <= rim);
 
 // Sorts the points of cells by height; those of one height by the rest.
 class CellSort {
@@ -76,11 +81,16 @@ class TilePoints {
   const GroundGuess* guess(int column, int row) const noexcept {
     return &guesses_[index(column, row)];
   }
+  NeighbourSurface neighbours(int column, int row) const noexcept {
+    return neighbour_surface(guess(column, row), width, rules_.step_m, rules_.slope_sd,
+                             sketches_[index(column, row)], scatter(column, row));
+  }
 
  private:
   static std::size_t index(int column, int row) noexcept {
     return static_cast<std::size_t>(row + rim) * width + static_cast<std::size_t>(column + rim);
   }
+  GroundScatter scatter(int column, int row) const noexcept;
   void look_at(std::size_t cell, CellSort& sort, std::vector<CellSurface>& surfaces);
 
   const TileRules& rules_;
@@ -88,6 +98,7 @@ class TilePoints {
   std::unique_ptr<PackedPoint[]> points_;
   std::vector<std::uint32_t> begins_;
   std::vector<GroundGuess> guesses_;
+  std::vector<NeighbourSketch> sketches_;
 };
 
 double tallest_ground_m(const TileRules& rules) {
@@ -111,6 +122,35 @@ TilePoints::TilePoints(const std::vector<PackedPoint>& points, glm::ivec2 size,
     for (int column = 0; column < size.x + 2 * rim; ++column)
       look_at(index(column - rim, row - rim), sort, surfaces);
   });
+  sketches_.resize(cells);
+  tbb::parallel_for(-rough_reach, size.y + rough_reach, [&](int row) {
+    for (int column = -rough_reach; column < size.x + rough_reach; ++column) {
+      sketches_[index(column, row)] =
+          sketch_neighbours(guess(column, row), width, rules_.step_m, rules_.slope_sd);
+    }
+  });
+}
+
+// How rough the ground is, from the scatter of 7 x 7 cells: that about 9 surfaces. Where these are
+// hardly more than fitted, that about planes counts, and an expectation.
+GroundScatter TilePoints::scatter(int column, int row) const noexcept {
+  constexpr double plane_counts = 3, expected_counts = 1, expected_bend = 0.05;
+  double rough = 0, freedom = 0, plane = 0, cells = 0;
+  for (int r = row - rough_reach; r <= row + rough_reach; ++r) {
+    for (int c = column - rough_reach; c <= column + rough_reach; ++c) {
+      const NeighbourSketch& one = sketches_[index(c, r)];
+      const double more = std::max(0, one.cells - 3);
+      rough += double{one.freedom} * double{one.rough_m2};
+      freedom += double{one.freedom};
+      plane += more * double{one.plane_m2};
+      cells += more;
+    }
+  }
+  if (cells > 0) plane /= cells;
+  const double expected_m2 =
+      std::abs(rules_.step_m.x * rules_.step_m.y) * std::pow(expected_bend * rules_.slope_sd, 2);
+  const double all = freedom + plane_counts + expected_counts;
+  return {plane, std::max(0.0, rough + plane_counts * plane + expected_counts * expected_m2) / all};
 }
 
 // What the lowest surface that outliers do not explain is like: the mean of the middle half of its
@@ -118,9 +158,11 @@ TilePoints::TilePoints(const std::vector<PackedPoint>& points, glm::ivec2 size,
 GroundGuess first_guess(std::span<const PackedPoint> cell, const CellSurface& ground,
                         glm::dvec2 step_m) {
   const std::uint32_t quarter = ground.size() / 4, half = ground.size() - 2 * quarter;
-  double noise_m2 = 0, bias_m2 = 0, x = 0, y = 0, height = 0;
+  double noise_m2 = 0, bias_m2 = 0, across_m2 = 0, x = 0, y = 0, height = 0;
   for (const PackedPoint& p : cell.subspan(ground.begin + quarter, half)) {
     const double sd = unpacked_sd(p.sd), bias = unpacked_sd(p.bias);
+    const double across = unpacked_sd(p.across);
+    across_m2 += across * across;
     noise_m2 += sd * sd;
     bias_m2 += bias * bias;
     x += double{PackedPoint::from_sample(p.x)};
@@ -130,6 +172,7 @@ GroundGuess first_guess(std::span<const PackedPoint> cell, const CellSurface& gr
   // Of normal errors the mean of the middle half has 1.2 times the variance of that of all.
   const double n = half, shared_m2 = (1.2 * noise_m2 / n + bias_m2 / n) / ground.size();
   return {height / n * PackedPoint::height_step_m, static_cast<float>(shared_m2 + 1e-8),
+          static_cast<float>(1.2 * across_m2 / n / ground.size()),
           static_cast<float>(x / n * step_m.x), static_cast<float>(y / n * step_m.y)};
 }
 
@@ -153,12 +196,16 @@ void TilePoints::look_at(std::size_t cell, CellSort& sort, std::vector<CellSurfa
 class RowFit {
  public:
   RowFit(const TilePoints& points, const TileRules& rules)
-      : points_(points), rules_(rules), tallest_m_(tallest_ground_m(rules)) {}
+      : points_(points),
+        rules_(rules),
+        tallest_m_(tallest_ground_m(rules)),
+        cell_fit_(rules.outliers.share()) {}
 
-  /// Returns whether the cell has ground, if it has points.
-  bool fit(int column, int row, std::size_t at, DemLayers& layers);
+  void fit(int column, int row, std::size_t at, DemLayers& layers);
+  const TileCounts& counts() const noexcept { return counts_; }
 
  private:
+  std::optional<CellSurface> ground(std::size_t at, DemLayers& layers);
   bool is_credible(const CellSurface& surface) const;
   bool agrees(double low_m, double high_m, double variance_m2, double give_m) const;
   bool stands_clear(const CellSurface& wall) const;
@@ -171,7 +218,8 @@ class RowFit {
   CellFit cell_fit_;
   std::vector<CellSurface> surfaces_;
   std::span<const PackedPoint> cell_;
-  NeighbourPlane around_;
+  NeighbourSurface around_;
+  TileCounts counts_;
 };
 
 double height_m(const PackedPoint& point) { return point.height * PackedPoint::height_step_m; }
@@ -201,29 +249,30 @@ CellSurface RowFit::foot(const CellSurface& wall) const {
   return height_m(cell_[foot.end - 1]) > highest_m ? wall : foot;
 }
 
-// Few points are believed if neighbours, which must agree with each other, agree with them. Three
-// or more that outliers do not explain are, unless neighbours contradict; more yet in any case.
+// Few points are believed if neighbours know where the ground is, and that it is there. Three or
+// more that outliers do not explain are, unless neighbours, which must agree with each other,
+// contradict; more yet in any case.
 bool RowFit::is_credible(const CellSurface& surface) const {
   const std::uint32_t size = surface.size();
   const std::uint32_t credible = rules_.outliers.credible(static_cast<std::uint32_t>(cell_.size()));
   if (rules_.outliers.none() || (size >= 3 && size > credible)) return true;
   const bool is_enough = size >= 3 && size >= credible;
-  const double most_m = is_enough ? 0.5 * tallest_m_ : rules_.gap_m / 3;
-  if (around_.cells < enough_neighbours || around_.scatter_m > most_m) return is_enough;
+  if (around_.cells < enough_neighbours) return is_enough;
+  const bool is_known = is_enough ? around_.scatter_m <= 0.5 * tallest_m_
+                                  : std::sqrt(around_.height_variance_m2) <= rules_.gap_m / 3;
+  if (!is_known) return is_enough;
   const double sd_m = total_sd_m(cell_[surface.begin]);
   return agrees(height_m(cell_[surface.begin]), height_m(cell_[surface.end - 1]), sd_m * sd_m,
                 is_enough ? rules_.gap_m : 0);
 }
 
-bool RowFit::fit(int column, int row, std::size_t at, DemLayers& layers) {
-  cell_ = points_.cell(column, row);
-  if (cell_.empty()) return true;
+// The points of the ground, if there are any.
+std::optional<CellSurface> RowFit::ground(std::size_t at, DemLayers& layers) {
   find_surfaces(cell_, rules_.gap_m, surfaces_);
-  around_ = neighbour_plane(points_.guess(column, row), width, rules_.step_m, rules_.slope_sd);
   std::erase_if(surfaces_, [this](const CellSurface& s) { return !is_credible(s); });
   constexpr std::size_t most = std::numeric_limits<std::uint16_t>::max();
   layers.surfaces[at] = static_cast<std::uint16_t>(std::min(surfaces_.size(), most));
-  if (surfaces_.empty()) return false;
+  if (surfaces_.empty()) return std::nullopt;
 
   const CellSurface& lowest = surfaces_.front();
   CellSurface ground =
@@ -232,17 +281,35 @@ bool RowFit::fit(int column, int row, std::size_t at, DemLayers& layers) {
   if (ground.end < lowest.end) {
     if (stands_clear(lowest)) {
       layers.overhang_m[at] = static_cast<float>(height_m(cell_[lowest.begin]));
-      return false;
+      return std::nullopt;
     }
     ground = foot(ground);
   }
   if (surfaces_.size() > 1)
     layers.overhang_m[at] = static_cast<float>(height_m(cell_[surfaces_[1].begin]));
-  const std::int32_t reference = cell_[ground.begin + ground.size() / 2].height;
-  const CellHeight found =
-      cell_fit_(cell_.subspan(ground.begin, ground.size()), around_, rules_.step_m, reference);
-  fill(at, found, reference * PackedPoint::height_step_m, layers);
-  return true;
+  return ground;
+}
+
+void RowFit::fit(int column, int row, std::size_t at, DemLayers& layers) {
+  cell_ = points_.cell(column, row);
+  if (cell_.empty()) return;
+  around_ = points_.neighbours(column, row);
+  const std::optional<CellSurface> points = ground(at, layers);
+  if (!points) {
+    ++counts_.without_ground;
+    return;
+  }
+  const std::int32_t reference = cell_[points->begin + points->size() / 2].height;
+  const std::optional<CellHeight> found =
+      cell_fit_(cell_.subspan(points->begin, points->size()), around_, rules_.step_m, reference);
+  if (!found) {
+    layers.surfaces[at] = static_cast<std::uint16_t>(layers.surfaces[at] - 1);
+    ++counts_.without_ground;
+  } else if (found->variance_m2 > rules_.most_sd_m * rules_.most_sd_m) {
+    ++counts_.uncertain;
+  } else {
+    fill(at, *found, reference * PackedPoint::height_step_m, layers);
+  }
 }
 
 void RowFit::fill(std::size_t at, const CellHeight& ground, double reference_m,
@@ -262,22 +329,22 @@ void RowFit::fill(std::size_t at, const CellHeight& ground, double reference_m,
 
 }  // namespace
 
-std::uint64_t fit_tile(std::vector<PackedPoint> points, glm::ivec2 size, glm::ivec2 first,
-                       const TileRules& rules, DemLayers& layers) {
+TileCounts fit_tile(std::vector<PackedPoint> points, glm::ivec2 size, glm::ivec2 first,
+                    const TileRules& rules, DemLayers& layers) {
   const TilePoints sorted(points, size, rules);
   std::vector<PackedPoint>().swap(points);
-  std::atomic<std::uint64_t> without_ground = 0;
+  std::atomic<std::uint64_t> without_ground = 0, uncertain = 0;
   tbb::parallel_for(0, size.y, [&](int row) {
     RowFit fit(sorted, rules);
-    std::uint64_t missed = 0;
     const auto begin =
         static_cast<std::size_t>(first.y + row) * static_cast<std::size_t>(layers.frame.samples.x) +
         static_cast<std::size_t>(first.x);
     for (int column = 0; column < size.x; ++column)
-      missed += fit.fit(column, row, begin + static_cast<std::size_t>(column), layers) ? 0 : 1;
-    without_ground += missed;
+      fit.fit(column, row, begin + static_cast<std::size_t>(column), layers);
+    without_ground += fit.counts().without_ground;
+    uncertain += fit.counts().uncertain;
   });
-  return without_ground;
+  return {without_ground, uncertain};
 }
 
 }  // namespace groundray

@@ -3,6 +3,7 @@
 // Private to the library: the ground of all cells of a tile.
 #include <cstdint>
 #include <glm/vec2.hpp>
+#include <limits>
 #include <vector>
 
 #include "reconstruction/dem/cell_surfaces.h"
@@ -17,15 +18,21 @@ struct TileRules {
   double gap_m = 0;
   double steepest_slope = 0;
   double slope_sd = 0;
+  double most_sd_m = std::numeric_limits<double>::infinity();
   OutlierRule outliers;
+};
+
+/// Cells that have points, but stay unmeasured.
+struct TileCounts {
+  std::uint64_t without_ground = 0;
+  std::uint64_t uncertain = 0;  ///< their ground's sd is above the most
 };
 
 /// Fits each cell of a tile to its points and writes it to its place in `layers`.
 /// @param points  of the tile and its rim, in any order, which changes nothing.
 /// @param size    of the tile without its rim, in cells.
 /// @param first   the tile's first cell, in `layers`.
-/// @return how many cells have points, but no ground.
-std::uint64_t fit_tile(std::vector<PackedPoint> points, glm::ivec2 size, glm::ivec2 first,
-                       const TileRules& rules, DemLayers& layers);
+TileCounts fit_tile(std::vector<PackedPoint> points, glm::ivec2 size, glm::ivec2 first,
+                    const TileRules& rules, DemLayers& layers);
 
 }  // namespace groundray

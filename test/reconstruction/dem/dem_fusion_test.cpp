@@ -217,7 +217,7 @@ TEST(DemFusion, OrderBlocksThreadsAndMemoryDoNotMatter) {
   for (const std::size_t threads : {1U, 3U}) {
     const tbb::global_control limit(tbb::global_control::max_allowed_parallelism, threads);
     for (const std::size_t bytes :
-         {std::size_t{1} << 30U, std::size_t{400'000}, std::size_t{120'000}}) {
+         {std::size_t{1} << 30U, std::size_t{400'000}, std::size_t{250'000}}) {
       FusionOptions options;
       options.memory_bytes = bytes;
       const Fusion again = fuse(in_blocks(other, 977), frame, options);
@@ -276,6 +276,24 @@ TEST(DemFusion, OnePointIsGroundIfThereAreNoOutliers) {
   EXPECT_NEAR(fusion.layers.to_data_m[16], 0.75, 1e-6);
 }
 
+// Half of the cells have points of 5 cm, the others of 1 cm: a limit of 2 cm leaves the others.
+TEST(DemFusion, SamplesKnownWorseThanAskedForStayUnmeasured) {
+  const GridFrame frame = frame_over({{0, 0}, {2, 2}}, 0.25);
+  MeasuredPoints points = flat_ground(frame, 2);
+  for (std::size_t i = 0; i < points.size(); ++i) points.sd_m[i] = i % 8 < 4 ? 0.01F : 0.05F;
+  const Fusion all = fuse_all(points, frame, {.outlier_share = 0});
+  const Fusion some = fuse_all(points, frame, {.outlier_share = 0, .most_sd_m = 0.02});
+  EXPECT_EQ(all.counts.uncertain, 0U);
+  EXPECT_EQ(some.counts.uncertain, 32U);
+  EXPECT_EQ(some.counts.without_ground, 0U);
+  for (std::size_t i = 0; i < 64; ++i) {
+    EXPECT_EQ(some.layers.source[i], i % 8 < 4 ? HeightSource::Lidar : HeightSource::None);
+    if (i % 8 < 4) {
+      EXPECT_EQ(some.layers.elevation_m[i], all.layers.elevation_m[i]);
+    }
+  }
+}
+
 TEST(DemFusion, NothingButOutliersMakeHardlyAnyGround) {
   const GridFrame frame = frame_over({{0, 0}, {10, 10}}, 0.25);
   MeasuredPoints points;
@@ -329,6 +347,7 @@ TEST(DemFusion, RefusesBadColumnsAndOptions) {
                  "outlier_share = 0.7 must be 0 to 0.5");
   expect_refusal([&] { fuse_all({}, frame, {.surface_gap_m = nan}); }, "surface_gap_m = nan");
   expect_refusal([&] { fuse_all({}, frame, {.slope_sd = 0}); }, "slope_sd = 0 must be above 0");
+  expect_refusal([&] { fuse_all({}, frame, {.most_sd_m = nan}); }, "most_sd_m = nan must be above");
   expect_refusal([&] { fuse_all({}, GridFrame{{1, 1}}); }, "must be at least 2 x 2");
   expect_refusal(
       [&] { fuse(in_blocks(points, 1), frame, {}, Work{.progress = {}, .most_bytes = 1000}); },

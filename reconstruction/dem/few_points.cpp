@@ -1,0 +1,98 @@
+#include "reconstruction/dem/few_points.h"
+
+#include <cmath>
+#include <glm/ext/scalar_constants.hpp>
+
+#include "reconstruction/dem/cell_bend.h"
+
+namespace groundray {
+namespace {
+
+// Covariances about the neighbours' surface.
+struct Joint {
+  double sample = 0;              // of the ground at the sample
+  std::array<double, 2> with{};   // and of the points' heights with it
+  double aa = 0, ab = 0, bb = 0;  // of the points' heights
+};
+
+// Points of a cell deviate from each other as ground a third of a cell away does: 0.118².
+constexpr double nearby = 0.0139;
+
+Joint joint(const std::array<FewPoint, 2>& points, const NeighbourSurface& known,
+            glm::dvec2 step_m) {
+  const auto tilt = [&](const FewPoint& a) {
+    return a.place_m.x * known.height_x_m2 + a.place_m.y * known.height_y_m2;
+  };
+  const auto between = [&](const FewPoint& a, const FewPoint& b) {
+    const glm::dvec2 p = a.place_m, q = b.place_m, u = p / step_m, v = q / step_m;
+    const SurfaceBend& bend = known.bend_variance;
+    return known.height_variance_m2 + tilt(a) + tilt(b) + p.x * q.x * known.xx +
+           (p.x * q.y + p.y * q.x) * known.xy + p.y * q.y * known.yy +
+           bend.xx * cell_bend(u.x) * cell_bend(v.x) + bend.yy * cell_bend(u.y) * cell_bend(v.y) +
+           bend.xy * u.x * u.y * v.x * v.y + (a.group == b.group ? a.bias_m * b.bias_m : 0);
+  };
+  const FewPoint &a = points[0], &b = points[1];
+  Joint c;
+  c.sample = known.height_variance_m2;
+  c.with = {c.sample + tilt(a), c.sample + tilt(b)};
+  const double apart_m2 = nearby * (known.bend_variance.xx + known.bend_variance.yy);
+  c.aa = between(a, a) + a.variance_m2 + apart_m2;
+  c.ab = between(a, b);
+  c.bb = between(b, b) + b.variance_m2 + apart_m2;
+  return c;
+}
+
+// The ground at the sample if certain points are ground, and how likely their heights are then.
+struct Choice {
+  double weight = 0, above_m = 0, variance_m2 = 0;
+};
+
+Choice given_one(double variance_m2, double with_m2, double sample_m2, double above_m) {
+  const double gain = with_m2 / variance_m2;
+  return {std::exp(-0.5 * above_m * above_m / variance_m2) /
+              std::sqrt(2 * glm::pi<double>() * variance_m2),
+          gain * above_m, sample_m2 - gain * with_m2};
+}
+
+Choice given_both(const Joint& c, double a_m, double b_m) {
+  const double det = c.aa * c.bb - c.ab * c.ab;
+  const double gain_a = (c.bb * c.with[0] - c.ab * c.with[1]) / det,
+               gain_b = (c.aa * c.with[1] - c.ab * c.with[0]) / det;
+  const double square = (c.bb * a_m * a_m - 2 * c.ab * a_m * b_m + c.aa * b_m * b_m) / det;
+  return {std::exp(-0.5 * square) / (2 * glm::pi<double>() * std::sqrt(det)),
+          gain_a * a_m + gain_b * b_m, c.sample - gain_a * c.with[0] - gain_b * c.with[1]};
+}
+
+}  // namespace
+
+FewHeight fit_few(const std::array<FewPoint, 2>& points, int count,
+                  const NeighbourSurface& neighbours, glm::dvec2 step_m,
+                  double outliers_per_m) noexcept {
+  const Joint c = joint(points, neighbours, step_m);
+  const double a_m = points[0].above_m, b_m = points[1].above_m, out = outliers_per_m;
+  std::array<Choice, 4> choices;  // bit 0: the first point is ground; bit 1: the second
+  choices[0] = {count == 1 ? out : out * out, 0, c.sample};
+  choices[1] = given_one(c.aa, c.with[0], c.sample, a_m);
+  if (count == 2) {
+    choices[1].weight *= out;
+    choices[2] = given_one(c.bb, c.with[1], c.sample, b_m);
+    choices[2].weight *= out;
+    choices[3] = given_both(c, a_m, b_m);
+  }
+  double all = 0;
+  for (const Choice& one : choices) all += one.weight;
+  FewHeight found;
+  for (Choice& one : choices) {
+    one.weight /= all;
+    found.above_m += one.weight * one.above_m;
+  }
+  for (const Choice& one : choices) {
+    const double off_m = one.above_m - found.above_m;
+    found.variance_m2 += one.weight * (one.variance_m2 + off_m * off_m);
+  }
+  found.is_ground = {choices[1].weight + choices[3].weight, choices[2].weight + choices[3].weight};
+  found.is_none = choices[0].weight;
+  return found;
+}
+
+}  // namespace groundray

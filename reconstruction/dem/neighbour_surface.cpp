@@ -1,0 +1,263 @@
+#include "reconstruction/dem/neighbour_surface.h"
+
+#include <algorithm>
+#include <array>
+#include <cmath>
+#include <cstdlib>
+
+#include "reconstruction/dem/float_lanes.h"
+#include "reconstruction/dem/order_statistic.h"
+
+namespace groundray {
+namespace {
+
+constexpr int reach = 2;
+constexpr std::size_t across = 5;
+constexpr std::size_t window = across * across;
+
+// Second differences may be larger than the scatter about a plane, but not by much more: a surface
+// that bends by d scatters by 0.84 d about its plane.
+constexpr double bend_share = 1.5;
+// By which share the scatter falls from planes to surfaces of the second degree, by that it falls
+// again to what a cell's own slope differs from the surface's, and twice to its second differences;
+// times these, by trial on fractals, a real valley and triangles, one of each.
+constexpr double slope_rest = 2.5, bend_rest = 8;
+
+// Cells of the window, row by row; those without ground, and beyond the window, weigh nothing.
+struct Neighbours {
+  int count = 0;
+  double base_m = 0;  // heights are above
+  QuadricPlaces places;
+  QuadricColumn is_there{}, variance{}, place_m2{}, residual{};
+};
+
+Neighbours gather(const GroundGuess* guess, std::ptrdiff_t stride, glm::dvec2 step_m) noexcept {
+  Neighbours near;
+  const auto per_x = static_cast<float>(1 / step_m.x), per_y = static_cast<float>(1 / step_m.y);
+  std::size_t i = 0;
+  for (int row = -reach; row <= reach; ++row) {
+    for (int column = -reach; column <= reach; ++column, ++i) {
+      const GroundGuess& one = guess[row * stride + column];
+      near.variance[i] = 1;
+      if ((row == 0 && column == 0) || std::isnan(one.height_m)) continue;
+      if (near.count++ == 0) near.base_m = one.height_m;
+      near.is_there[i] = 1;
+      near.places.u[i] = static_cast<float>(column) + one.x_m * per_x;
+      near.places.v[i] = static_cast<float>(row) + one.y_m * per_y;
+      near.places.z[i] = static_cast<float>(one.height_m - near.base_m);
+      near.variance[i] = one.variance_m2;
+      near.place_m2[i] = one.across_m2;
+    }
+  }
+  std::fill(near.variance.begin() + window, near.variance.end(), 1.F);
+  return near;
+}
+
+// Adds to the variances of heights what places that are off do to them on a slope.
+void add_places(Neighbours& near, const QuadricTerms& t, glm::dvec2 step_m) noexcept {
+  const double a = t[1] / step_m.x, b = t[2] / step_m.y;
+  const auto rise2 = static_cast<float>(a * a + b * b);
+  for (std::size_t i = 0; i < quadric_places; i += lanes)
+    store(load(&near.variance[i]) + rise2 * load(&near.place_m2[i]), &near.variance[i]);
+}
+
+double middle(QuadricColumn& values, std::size_t count) noexcept {
+  return double{kth_of_few(values.data(), count, count / 2)};
+}
+
+// The median slope between cells two or four apart along columns or rows; 0 if there are but few.
+double median_slope(const Neighbours& near, const QuadricColumn& place, std::size_t along,
+                    std::size_t beside) noexcept {
+  constexpr std::array<std::array<std::size_t, 2>, 4> pairs{{{0, 2}, {1, 3}, {2, 4}, {0, 4}}};
+  QuadricColumn slopes;
+  std::size_t count = 0;
+  for (std::size_t line = 0; line < across; ++line) {
+    for (const auto& pair : pairs) {
+      const std::size_t i = line * beside + pair[0] * along, j = line * beside + pair[1] * along;
+      slopes[count] = (near.places.z[j] - near.places.z[i]) / (place[j] - place[i]);
+      count += near.is_there[i] * near.is_there[j] > 0 ? 1 : 0;
+    }
+  }
+  return count < 2 ? 0 : middle(slopes, count);
+}
+
+void set_weights(Neighbours& near, double excess_m2) noexcept {
+  constexpr float cauchy = 1 / (2.385F * 2.385F);
+  const auto excess = static_cast<float>(excess_m2);
+  for (std::size_t i = 0; i < quadric_places; i += lanes) {
+    const FloatLanes off = load(&near.residual[i]);
+    const FloatLanes variance = load(&near.variance[i]) + excess;
+    store(load(&near.is_there[i]) / (variance + cauchy * off * off), &near.places.weight[i]);
+  }
+}
+
+double mean_variance(const Neighbours& near) noexcept {
+  FloatLanes sum{};
+  for (std::size_t i = 0; i < quadric_places; i += lanes)
+    sum += load(&near.is_there[i]) * load(&near.variance[i]);
+  return double{total(sum)} / near.count;
+}
+
+// The residuals of the cells that there are.
+std::size_t residuals(const Neighbours& near, QuadricColumn& found) noexcept {
+  std::size_t count = 0;
+  for (std::size_t i = 0; i < window; ++i) {
+    found[count] = near.residual[i];
+    count += near.is_there[i] > 0 ? 1 : 0;
+  }
+  return count;
+}
+
+// The variance of residuals: by the median, which a few wrong cells do not move.
+double residual_variance(const Neighbours& near) noexcept {
+  QuadricColumn sizes;
+  const std::size_t count = residuals(near, sizes);
+  for (float& size : sizes) size = std::abs(size);
+  const double sd = 1.4826 * middle(sizes, count);
+  return sd * sd;
+}
+
+QuadricTerms start(Neighbours& near) noexcept {
+  QuadricTerms plane{0, median_slope(near, near.places.u, 1, across),
+                     median_slope(near, near.places.v, across, 1)};
+  set_residuals(near.places, plane, near.residual);
+  QuadricColumn found;
+  const std::size_t count = residuals(near, found);
+  plane[0] = middle(found, count);
+  set_residuals(near.places, plane, near.residual);
+  return plane;
+}
+
+// Takes a plane off heights, so that what is known beforehand is of the rest.
+void level(Neighbours& near, const QuadricTerms& plane) noexcept {
+  set_residuals(near.places, {plane[0], plane[1], plane[2]}, near.places.z);
+}
+
+void add_plane(QuadricTerms& to, const QuadricTerms& plane) noexcept {
+  for (std::size_t i = 0; i < 3; ++i) to[i] += plane[i];
+}
+
+// What is known of the terms beforehand.
+QuadricTerms hold_of(glm::dvec2 step_m, double slope_sd, double plane_m2) noexcept {
+  constexpr double least_m2 = 1e-12;
+  const glm::dvec2 slope = slope_sd * step_m;
+  const double bend = 1 / (bend_share * plane_m2 + least_m2);
+  return {0, 1 / (slope.x * slope.x), 1 / (slope.y * slope.y), bend, 2 * bend, bend};
+}
+
+void set_slopes(NeighbourSurface& found, double xx, double xy, double yy) noexcept {
+  found.xx = xx;
+  found.xy = xy;
+  found.yy = yy;
+  const double back = 1 / (xx * yy - xy * xy);
+  found.information_xx = yy * back;
+  found.information_xy = -xy * back;
+  found.information_yy = xx * back;
+}
+
+// Places that are off flatten the fit where cells lie along a line: slopes are then known less.
+void set_slopes(NeighbourSurface& found, const Neighbours& near, const QuadricMatrix& covariance,
+                glm::dvec2 step_m, double slope_sd, double spread_m2) noexcept {
+  FloatLanes off{};
+  for (std::size_t i = 0; i < quadric_places; i += lanes)
+    off += load(&near.places.weight[i]) * load(&near.place_m2[i]);
+  const double places = double{total(off)};
+  const double x2 = step_m.x * step_m.x, y2 = step_m.y * step_m.y;
+  const double cxx = covariance[1][1] / x2, cxy = covariance[1][2] / (step_m.x * step_m.y),
+               cyy = covariance[2][2] / y2;
+  // By which share slopes are lost.
+  const double most = std::max(1.0, places * (cxx + cyy)), share = places / most * slope_sd;
+  set_slopes(found, cxx + spread_m2 / x2 + share * share * (cxx * cxx + cxy * cxy),
+             cxy + share * share * cxy * (cxx + cyy),
+             cyy + spread_m2 / y2 + share * share * (cyy * cyy + cxy * cxy));
+}
+
+void set_crest(NeighbourSurface& found, const GroundGuess& own, const Neighbours& near,
+               const QuadricTerms& t, double variance_m2, double rough_m2,
+               glm::dvec2 step_m) noexcept {
+  constexpr double farthest = 3;  // in sd: more is another surface, or an outlier
+  constexpr double believed = 0.8;
+  if (std::isnan(own.height_m)) return;
+  const double above_m =
+      own.height_m - near.base_m - height_at(t, own.x_m / step_m.x, own.y_m / step_m.y);
+  const double expected_m2 = rough_m2 + double{own.variance_m2} + variance_m2;
+  if (above_m * above_m > farthest * farthest * expected_m2) return;
+  found.crest_share = believed * rough_m2 / expected_m2;
+  found.crest_m = found.crest_share * above_m;
+}
+
+}  // namespace
+
+NeighbourSketch sketch_neighbours(const GroundGuess* guess, std::ptrdiff_t stride,
+                                  glm::dvec2 step_m, double slope_sd) noexcept {
+  NeighbourSketch found;
+  Neighbours near = gather(guess, stride, step_m);
+  found.cells = near.count;
+  if (near.count == 0) return found;
+  const QuadricTerms plane = start(near);
+  add_places(near, plane, step_m);
+  const double noise_m2 = mean_variance(near);
+  const double plane_m2 = std::max(0.0, residual_variance(near) - noise_m2);
+  const QuadricTerms hold = hold_of(step_m, slope_sd, plane_m2);
+  QuadricFit fit;
+  QuadricTerms base = plane;
+  const QuadricPlaces heights = near.places;
+  level(near, plane);
+  for (int round = 0; round < 2; ++round) {
+    set_weights(near, plane_m2);
+    fit = fit_quadric(near.places, hold);
+    set_residuals(near.places, fit.terms, near.residual);
+    add_plane(fit.terms, base);
+    base = fit.terms;
+    set_residuals(heights, {base[0], base[1], base[2]}, near.places.z);
+  }
+  const QuadricMatrix covariance = fit.covariance();
+  double freedom = near.count - static_cast<double>(hold.size());
+  for (std::size_t i = 0; i < hold.size(); ++i) {
+    freedom += hold[i] * covariance[i][i];
+    found.terms[i] = static_cast<float>(fit.terms[i]);
+  }
+  found.plane_m2 = static_cast<float>(plane_m2);
+  if (freedom < 1) return found;
+  found.freedom = static_cast<float>(freedom);
+  found.rough_m2 = static_cast<float>(residual_variance(near) * near.count / freedom - noise_m2);
+  return found;
+}
+
+NeighbourSurface neighbour_surface(const GroundGuess* guess, std::ptrdiff_t stride,
+                                   glm::dvec2 step_m, double slope_sd,
+                                   const NeighbourSketch& sketch,
+                                   const GroundScatter& scatter) noexcept {
+  NeighbourSurface found;
+  found.cells = sketch.cells;
+  if (sketch.cells == 0) {
+    set_slopes(found, slope_sd * slope_sd, 0, slope_sd * slope_sd);
+    return found;
+  }
+  Neighbours near = gather(guess, stride, step_m);
+  QuadricTerms sketched;
+  std::copy(sketch.terms.begin(), sketch.terms.end(), sketched.begin());
+  add_places(near, sketched, step_m);
+  set_residuals(near.places, sketched, near.residual);
+  const double rough_m2 = scatter.quadric_m2;
+  set_weights(near, rough_m2);
+  level(near, sketched);
+  QuadricFit fit = fit_quadric(near.places, hold_of(step_m, slope_sd, scatter.plane_m2));
+  add_plane(fit.terms, sketched);
+  const QuadricTerms& t = fit.terms;
+  const QuadricMatrix c = fit.covariance();
+  found.plane = {t[0] + near.base_m, t[1] / step_m.x, t[2] / step_m.y};
+  found.bend = {t[3], t[4], t[5]};
+  found.height_variance_m2 = c[0][0] + rough_m2;
+  found.height_x_m2 = c[0][1] / step_m.x;
+  found.height_y_m2 = c[0][2] / step_m.y;
+  const double falls = scatter.plane_m2 > rough_m2 ? rough_m2 / scatter.plane_m2 : 1;
+  set_slopes(found, near, c, step_m, slope_sd, slope_rest * falls * rough_m2);
+  const double rest_m2 = bend_rest * falls * falls * rough_m2;
+  found.bend_variance = {c[3][3] + rest_m2, c[4][4] + 0.5 * rest_m2, c[5][5] + rest_m2};
+  found.scatter_m = double{std::sqrt(std::max(0.F, sketch.rough_m2))};
+  set_crest(found, *guess, near, t, c[0][0], rough_m2, step_m);
+  return found;
+}
+
+}  // namespace groundray
