@@ -6,6 +6,7 @@
 #include <array>
 #include <cmath>
 #include <cstdint>
+#include <initializer_list>
 #include <limits>
 #include <map>
 #include <numbers>
@@ -19,6 +20,9 @@
 
 namespace groundray {
 namespace {
+
+// Less is a sag of a thousandth of a millimetre in a metre: no ground has it, and it takes long.
+constexpr double least_curvature_per_m = 1e-5, most_curvature_per_m = 1e3;
 
 enum class FilterPreset { None, Ground, Air };
 
@@ -97,6 +101,10 @@ struct DemCommand::Options {
         ->check(positive());
     noise->add_flag("--airborne", is_airborne,
                     "Points were measured from far above, in the coordinates of a map");
+    noise
+        ->add_option("--most-sd-m", request.fusion.most_sd_m,
+                     "Leave samples unmeasured whose height is known worse than this")
+        ->check(positive());
     noise->add_option("--outlier-share", request.fusion.outlier_share, "Of all points (0.02)")
         ->check(CLI::Range(0.0, 0.5));
   }
@@ -168,6 +176,10 @@ struct DemCommand::Options {
         ->add_option("--largest-share", filling.largest_share,
                      "Leave holes that are a larger share of the raster (0.2)")
         ->check(CLI::Range(0.0, 1.0));
+  }
+
+  void add_sight() {
+    CLI::App* group = command->add_option_group("Sight and smoothness");
     const std::map<std::string, SightUse> uses{{"none", SightUse::None},
                                                {"beams", SightUse::Beams}};
     group
@@ -180,7 +192,32 @@ struct DemCommand::Options {
     auto* smooth = group->add_flag("--smooth", is_smoothed, "Smooth measured heights first");
     group->add_option("--curvature-sd-per-m", curvature_sd_per_m, "Of true ground, for --smooth")
         ->check(positive())
+        ->check(CLI::Range(least_curvature_per_m, most_curvature_per_m))
         ->needs(smooth);
+  }
+
+  // What would be read and then left unused is rather refused.
+  void refuse(std::initializer_list<const char*> options, const char* why) const {
+    for (const char* option : options) {
+      if (command->get_option(option)->count() > 0)
+        throw Error("{}: {}: leave one of them out", option, why);
+    }
+  }
+
+  void check_use() const {
+    if (!has_stereo)
+      refuse({"--stereo", "--stereo-frames", "--nearest-m", "--farthest-depth-m", "--match-sd-px",
+              "--bias-sd-px"},
+             "--no-stereo leaves pairs out");
+    if (is_airborne)
+      refuse({"--divergence-mrad", "--attitude-sd-mrad", "--sight", "--sight-margin-m"},
+             "with --airborne nothing is known of beams");
+    if (!is_filled)
+      refuse({"--method", "--reach", "--farthest-m", "--largest-share"}, "--no-fill fills nothing");
+    if (request.fill_method == FillMethod::Mesh)
+      refuse({"--sight", "--sight-margin-m"}, "--method cgal takes no bounds");
+    if (!has_stereo && !has_lidar)
+      throw Error("--no-lidar and --no-stereo leave nothing that measures: leave one out");
   }
 
   std::optional<GroundFilterOptions> ground_filter() const {
@@ -213,24 +250,23 @@ struct DemCommand::Options {
 
   void close_memory() {
     constexpr std::size_t bytes_per_mb = 1'000'000;
-    request.most_bytes = machine_bytes();
+    request.most_bytes = request.taking.most_bytes = machine_bytes();
     if (!memory_mb) return;
-    request.most_bytes = *memory_mb * bytes_per_mb;
+    constexpr std::size_t most_mb = std::numeric_limits<std::size_t>::max() / bytes_per_mb;
+    const std::size_t asked_mb = std::min<std::size_t>(*memory_mb, most_mb);
+    request.most_bytes = request.taking.most_bytes = asked_mb * bytes_per_mb;
     request.fusion.memory_bytes = request.most_bytes / 2;
     request.stereo.matching.most_bytes = request.most_bytes;
   }
 
   void close() {
     constexpr double per_mille = 1e-3;
+    check_use();
     scans.close();
     request.choice = scans.choice;
     request.taking = scans.taking;
     request.stereo.frames = parse_frames(stereo_frames, "--stereo-frames");
     request.pairs.are_any = has_stereo;
-    if (!has_stereo && !request.pairs.names.empty())
-      throw Error("--stereo and --no-stereo contradict each other: leave one out");
-    if (!has_stereo && !has_lidar)
-      throw Error("--no-lidar and --no-stereo leave nothing that measures: leave one out");
     if (has_stereo) request.choice.need = has_lidar ? ScanNeed::IfThere : ScanNeed::None;
     if (divergence_mrad) request.noise.divergence_rad = *divergence_mrad * per_mille;
     request.noise.attitude_sd_rad = attitude_sd_mrad * per_mille;
@@ -259,6 +295,7 @@ DemCommand::DemCommand(CLI::App& reconstruct) : options_(std::make_unique<Option
   options_->add_stereo();
   options_->add_filter();
   options_->add_filling();
+  options_->add_sight();
 }
 
 DemCommand::~DemCommand() = default;

@@ -8,6 +8,7 @@
 #include <glm/common.hpp>
 #include <limits>
 #include <span>
+#include <utility>
 
 #include "apps/groundray/stage.h"
 #include "core/error.h"
@@ -25,6 +26,32 @@ Area around(std::span<const glm::dvec3> points_m, Area area) {
     area.high_m = glm::max(area.high_m, glm::dvec2(p));
   }
   return area;
+}
+
+// What is said of several scans but for their names is said of the first of them.
+std::vector<std::string> notes_of_scans(const ScanFiles& files,
+                                        const std::vector<PointTally>& scans) {
+  std::vector<std::string> notes, nameless;
+  std::vector<std::size_t> more;
+  for (std::size_t i = 0; i < scans.size(); ++i) {
+    const std::string name = files.scans[i].file.string();
+    for (const std::string& note : scans[i].notes) {
+      const std::size_t at = note.find(name);
+      const std::string rest =
+          at == std::string::npos ? note : note.substr(0, at) + note.substr(at + name.size());
+      const auto known = std::ranges::find(nameless, rest);
+      if (known != nameless.end()) {
+        ++more[static_cast<std::size_t>(known - nameless.begin())];
+        continue;
+      }
+      notes.push_back(note);
+      nameless.push_back(rest);
+      more.push_back(0);
+    }
+  }
+  for (std::size_t i = 0; i < notes.size(); ++i)
+    if (more[i] > 0) notes[i] += fmt::format(" (so of {} more scans)", more[i]);
+  return notes;
 }
 
 }  // namespace
@@ -103,24 +130,37 @@ PointNoise DemInput::noise_of(const ScanFile& scan) {
   return noise;
 }
 
+LidarPoints DemInput::points_of(std::size_t scan) {
+  const ScanFile& file = files_.scans.at(scan);
+  return {files_, file, request_.taking, noise_of(file), static_cast<std::uint32_t>(scan)};
+}
+
 bool DemInput::next(MeasuredPoints& block) {
-  const std::size_t now = next_;
-  if (now > files_.scans.size()) return false;
-  ++next_;
-  if (now == 0) {
+  if (next_ == 0) {
+    ++next_;
     block = stereo_;
     return true;
   }
-  stop_if_interrupted();
-  const ScanFile& scan = files_.scans[now - 1];
-  block = lidar_points(files_, scan, request_.taking, noise_of(scan),
-                       static_cast<std::uint32_t>(now - 1), scans_[now - 1]);
-  return true;
+  for (; next_ <= files_.scans.size(); ++next_) {
+    stop_if_interrupted();
+    if (!reading_) reading_.emplace(points_of(next_ - 1));
+    LidarBlock points;
+    const bool is_more = reading_->next(points);
+    if (is_more) {
+      block = std::move(points.points);
+      return true;
+    }
+    scans_[next_ - 1] = reading_->tally();
+    reading_.reset();
+  }
+  return false;
 }
 
 std::vector<std::string> DemInput::notes() const {
   std::vector<std::string> notes = notes_;
-  const auto noiseless = std::ranges::count_if(scans_, &PointTally::is_noiseless);
+  for (std::string& note : notes_of_scans(files_, scans_)) notes.push_back(std::move(note));
+  const auto noiseless = std::ranges::count_if(
+      scans_, [](const PointTally& scan) { return scan.is_noiseless && scan.points > 0; });
   if (noiseless > 0)
     notes.push_back(
         fmt::format("{} of {} scans tell no standard deviation of their ranges, so those of "
@@ -129,7 +169,10 @@ std::vector<std::string> DemInput::notes() const {
   return notes;
 }
 
-void DemInput::rewind() noexcept { next_ = 0; }
+void DemInput::rewind() noexcept {
+  next_ = 0;
+  reading_.reset();
+}
 
 Area DemInput::extent() {
   rewind();
@@ -140,7 +183,8 @@ Area DemInput::extent() {
   for (MeasuredPoints block; next(block);) {
     area = around(block.p_m, area);
     count += block.size();
-    stage.update(static_cast<double>(next_) / static_cast<double>(files_.scans.size() + 1));
+    stage.update(static_cast<double>(std::min(next_, files_.scans.size())) /
+                 static_cast<double>(files_.scans.size() + 1));
   }
   rewind();
   check_count(count);

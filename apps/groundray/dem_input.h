@@ -30,14 +30,18 @@ class DemInput {
   DemInput(const DemRequest& request, const ScanFiles& files,
            const std::vector<RecordedPair>& pairs);
 
-  /// Fills a block with the points of all pairs, then scan by scan; false after the last.
-  /// @throws Error as lidar_points.
+  /// Fills a block with the points of all pairs, then scan by scan, large ones in several blocks;
+  /// false after the last.
+  /// @throws Error as LidarPoints.
   bool next(MeasuredPoints& block);
   /// Begins anew.
   void rewind() noexcept;
 
   /// Reads all to find where points lie in plan. @throws Error if there are fewer than three.
   Area extent();
+
+  /// The points of one scan, by its number.
+  LidarPoints points_of(std::size_t scan);
 
   const std::vector<PointTally>& scans() const noexcept { return scans_; }
   const std::vector<PointTally>& pairs() const noexcept { return pairs_; }
@@ -52,6 +56,7 @@ class DemInput {
   const ScanFiles& files_;
   MeasuredPoints stereo_;
   std::size_t next_ = 0;  // 0: stereo's; then scans
+  std::optional<LidarPoints> reading_;
   std::vector<PointTally> scans_, pairs_;
   std::map<std::string, std::optional<double>> divergences_rad_;  // by sensor
   std::vector<std::string> notes_;

@@ -3,8 +3,8 @@
 #include <algorithm>
 #include <cmath>
 #include <glm/geometric.hpp>
+#include <glm/matrix.hpp>
 #include <numbers>
-#include <string_view>
 #include <utility>
 
 #include "core/error.h"
@@ -18,67 +18,108 @@ double squared(double x) { return x * x; }
 
 // What is known of the errors of one beam's point.
 struct BeamErrors {
-  float sd_m = 0, bias_sd_m = 0, across_sd_m = 0;
+  PointErrors noise;
+  float bias_sd_m = 0;
 };
 
 BeamErrors errors_of(const glm::dvec3& beam_m, double range_sd_m, const PointNoise& noise) {
   if (noise.beams == BeamOrigin::Above) {
-    return {static_cast<float>(range_sd_m), static_cast<float>(noise.position_sd_m),
-            static_cast<float>(noise.across_sd_m)};
+    return {{.sd_m = static_cast<float>(range_sd_m),
+             .across_sd_m = static_cast<float>(noise.across_sd_m)},
+            static_cast<float>(noise.position_sd_m)};
   }
   const double range_m = glm::length(beam_m);
-  const double down2 = range_m > 0 ? squared(beam_m.z / range_m) : 1;
-  const double flat2 = std::max(0.0, 1 - down2);
+  const glm::dvec3 along = range_m > 0 ? beam_m / range_m : glm::dvec3(0, 0, -1);
   const double foot2_m2 = squared(range_m * noise.divergence_rad.value_or(0) / 4);
-  const double sd2_m2 = squared(range_sd_m) * down2 + foot2_m2 * flat2;
-  const double bias2_m2 =
-      squared(noise.position_sd_m) + squared(range_m * noise.attitude_sd_rad) * flat2;
-  const double across2_m2 =
-      (squared(range_sd_m) * flat2 + foot2_m2 * (1 + down2)) / 2 + squared(noise.across_sd_m);
-  return {static_cast<float>(std::sqrt(sd2_m2)), static_cast<float>(std::sqrt(bias2_m2)),
-          static_cast<float>(std::sqrt(across2_m2))};
+  const glm::dmat3 covariance_m2 =
+      glm::dmat3(foot2_m2) + (squared(range_sd_m) - foot2_m2) * glm::outerProduct(along, along);
+  BeamErrors errors{.noise = point_errors(covariance_m2)};
+  errors.noise.across_sd_m =
+      static_cast<float>(std::hypot(errors.noise.across_sd_m, noise.across_sd_m));
+  const double flat2 = std::max(0.0, 1 - squared(along.z));
+  errors.bias_sd_m = static_cast<float>(
+      std::hypot(noise.position_sd_m, range_m * noise.attitude_sd_rad * std::sqrt(flat2)));
+  return errors;
 }
 
 }  // namespace
 
-void check_gap(const std::string& name, const Trajectory& path, std::chrono::nanoseconds time,
-               double longest_s) {
+void check_gap(const std::string& name, const Trajectory& path, std::chrono::nanoseconds begin,
+               std::chrono::nanoseconds end, double longest_s) {
   const auto& samples = path.samples();
-  const auto after = std::ranges::upper_bound(samples, time, {}, &Trajectory::Sample::time);
-  if (after == samples.begin() || after == samples.end()) return;  // at an end, or beyond
   const auto s = [](std::chrono::nanoseconds at) { return 1e-9 * static_cast<double>(at.count()); };
-  const double gap_s = s(after->time - std::prev(after)->time);
-  if (gap_s <= longest_s) return;
-  throw Error(
-      "{}: the poses have a gap of {:.6g} s there, from {:.9g} to {:.9g} s, more than {:g} s: "
-      "leave it out (--frames, --stereo-frames), or say by --pose-gap-s what gap may be bridged",
-      name, gap_s, s(std::prev(after)->time), s(after->time), longest_s);
+  auto after = std::ranges::upper_bound(samples, begin, {}, &Trajectory::Sample::time);
+  if (after == samples.begin() && after != samples.end()) ++after;
+  for (; after != samples.end(); ++after) {
+    const auto from = std::prev(after)->time, to = after->time;
+    if (from > begin && from >= end) return;
+    if (s(to - from) <= longest_s) continue;
+    throw Error(
+        "{}: the poses have a gap of {:.6g} s there, from {:.9g} to {:.9g} s, more than {:g} s: "
+        "leave it out (--frames, --stereo-frames), or say by --pose-gap-s what gap may be bridged",
+        name, s(to - from), s(from), s(to), longest_s);
+  }
 }
 
-MeasuredPoints lidar_points(const ScanFiles& files, const ScanFile& scan, const ScanTaking& taking,
-                            const PointNoise& noise, std::uint32_t group, PointTally& tally) {
-  if (scan.path)
-    check_gap(scan.name, files.paths[*scan.path], scan.stamp, noise.longest_pose_gap_s);
-  PointInput input = read_points(files, scan, taking);
+LidarPoints::LidarPoints(const ScanFiles& files, const ScanFile& scan, ScanTaking taking,
+                         const PointNoise& noise, std::uint32_t group)
+    : files_(files),
+      scan_(scan),
+      noise_(noise),
+      group_(group),
+      reader_(files, scan, std::move(taking)),
+      tally_{.name = scan.name, .is_noiseless = true} {}
+
+void LidarPoints::check(const PointInput& input) const {
+  if (scan_.path)
+    check_gap(scan_.name, files_.paths[*scan_.path], input.begin, input.end,
+              noise_.longest_pose_gap_s);
+  if (files_.are_posed || noise_.beams == BeamOrigin::Above) return;
+  constexpr double far_m = 10'000;
+  for (std::size_t i = 0; i < input.points_m.size(); ++i) {
+    const double range_m = glm::distance(input.points_m[i], input.origins_m[i]);
+    if (range_m <= far_m) continue;
+    throw Error(
+        "{}: a point lies {:.4g} km from the sensor, which without poses is where points have "
+        "their zero: are these the coordinates of a map? Say --airborne, or give --poses",
+        scan_.file.string(), range_m / 1000);
+  }
+}
+
+void LidarPoints::count(const PointInput& input) {
+  tally_.rows += input.rows;
+  tally_.points += input.points_m.size();
+  tally_.is_noiseless =
+      tally_.is_noiseless && std::ranges::all_of(input.sd_m, [](float sd_m) { return sd_m == 0; });
+  for (const std::string& note : input.notes) {
+    if (std::ranges::find(tally_.notes, note) == tally_.notes.end()) tally_.notes.push_back(note);
+  }
+}
+
+bool LidarPoints::next(LidarBlock& block) {
+  PointInput input;
+  if (!reader_.next(input)) return false;
+  check(input);
+  count(input);
   MeasuredPoints points;
-  const std::size_t count = input.points_m.size();
-  points.sd_m.reserve(count);
-  points.bias_sd_m.reserve(count);
-  points.across_sd_m.reserve(count);
-  for (std::size_t i = 0; i < count; ++i) {
+  const std::size_t size = input.points_m.size();
+  points.sd_m.reserve(size);
+  points.bias_sd_m.reserve(size);
+  points.lean.reserve(size);
+  points.across_sd_m.reserve(size);
+  for (std::size_t i = 0; i < size; ++i) {
     const BeamErrors errors =
-        errors_of(input.points_m[i] - input.origins_m[i], input.sd_m[i], noise);
-    points.sd_m.push_back(errors.sd_m);
+        errors_of(input.points_m[i] - input.origins_m[i], input.sd_m[i], noise_);
+    points.sd_m.push_back(errors.noise.sd_m);
+    points.lean.push_back(errors.noise.lean);
     points.bias_sd_m.push_back(errors.bias_sd_m);
-    points.across_sd_m.push_back(errors.across_sd_m);
+    points.across_sd_m.push_back(errors.noise.across_sd_m);
   }
   points.p_m = std::move(input.points_m);
-  const bool is_noiseless =
-      count > 0 && std::ranges::all_of(input.sd_m, [](float sd_m) { return sd_m == 0; });
-  tally = {.name = scan.name, .rows = input.rows, .points = count, .is_noiseless = is_noiseless};
-  points.groups.assign(count, group);
-  points.origins.assign(count, PointOrigin::Lidar);
-  return points;
+  points.groups.assign(size, group_);
+  points.origins.assign(size, PointOrigin::Lidar);
+  block = {.points = std::move(points), .origins_m = std::move(input.origins_m)};
+  return true;
 }
 
 void level_origin(ScanFiles& files) {

@@ -4,6 +4,7 @@
 #include <cstddef>
 #include <cstdint>
 #include <filesystem>
+#include <glm/vec3.hpp>
 #include <optional>
 #include <string>
 #include <vector>
@@ -33,27 +34,57 @@ struct PointNoise {
 /// What became of a scan or a stereo pair.
 struct PointTally {
   std::string name;
-  std::size_t rows = 0;       ///< of the file, or pixels that were matched
-  std::size_t points = 0;     ///< that measured the DEM
-  bool is_noiseless = false;  ///< no standard deviation of ranges is known
+  std::size_t rows = 0;            ///< of the file, or pixels that were matched
+  std::size_t points = 0;          ///< that measured the DEM
+  bool is_noiseless = false;       ///< no standard deviation of ranges is known
+  std::vector<std::string> notes;  ///< for people
 };
 
 /// Between poses that are far apart in time nobody knows where a sensor was.
-/// @param name  of what it measured at `time`.
-/// @throws Error if the path has a gap there that is longer.
-void check_gap(const std::string& name, const Trajectory& path, std::chrono::nanoseconds time,
-               double longest_s);
+/// @param name  of what it measured from `begin` to `end`.
+/// @throws Error if the path has a gap within this time, or about it, that is longer.
+void check_gap(const std::string& name, const Trajectory& path, std::chrono::nanoseconds begin,
+               std::chrono::nanoseconds end, double longest_s);
 
-/// Returns the points of a scan with what is known of their errors. Of a point at the slant range r
-/// along the unit vector d, with the range's sd s and the divergence a:
-///     sd^2 = (s d_z)^2 + (r a / 4)^2 (1 - d_z^2)               of the height
-///     across^2 = (s^2 (1 - d_z^2) + (r a / 4)^2 (1 + d_z^2)) / 2   of the place, each way
+/// Points with what is known of their errors, and where their beams began.
+struct LidarBlock {
+  MeasuredPoints points;
+  std::vector<glm::dvec3> origins_m;
+};
+
+/// Reads the points of a scan with what is known of their errors, in blocks as PointReader. Of a
+/// point at the slant range r along the unit vector d, with the range's sd s and the divergence a:
+///     C = s^2 d d' + (r a / 4)^2 (1 - d d')                    of the point
+///     sd^2 = C_zz = (s d_z)^2 + (r a / 4)^2 (1 - d_z^2)        of the height
+///     lean = (C_xz, C_yz) / C_zz                               of the place with the height
+///     across^2 = (C_xx + C_yy - lean^2 sd^2) / 2               of the rest of the place, each way
 ///     bias^2 = position^2 + (r attitude)^2 (1 - d_z^2)         that all of the scan have in common
-/// @param group  number of the scan among all that measured.
-/// @param tally  gets the counts.
-/// @throws Error as read_points, or if the path has a gap where the scan was made.
-MeasuredPoints lidar_points(const ScanFiles& files, const ScanFile& scan, const ScanTaking& taking,
-                            const PointNoise& noise, std::uint32_t group, PointTally& tally);
+class LidarPoints {
+ public:
+  /// @param files, scan  must outlive this.
+  /// @param group        number of the scan among all that measured.
+  LidarPoints(const ScanFiles& files, const ScanFile& scan, ScanTaking taking,
+              const PointNoise& noise, std::uint32_t group);
+
+  /// Returns false after the last.
+  /// @throws Error as PointReader; if the path has a gap while the scan was made; or a point is too
+  ///         far from a sensor that has no pose, as one in the coordinates of a map is.
+  bool next(LidarBlock& block);
+
+  /// What has been read so far.
+  const PointTally& tally() const noexcept { return tally_; }
+
+ private:
+  void check(const PointInput& input) const;
+  void count(const PointInput& input);
+
+  const ScanFiles& files_;
+  const ScanFile& scan_;
+  PointNoise noise_;
+  std::uint32_t group_;
+  PointReader reader_;
+  PointTally tally_;
+};
 
 /// Moves D's origin to height 0, so that heights in D are those in W.
 void level_origin(ScanFiles& files);

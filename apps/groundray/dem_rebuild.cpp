@@ -3,6 +3,7 @@
 #include <algorithm>
 #include <chrono>
 #include <cmath>
+#include <glm/common.hpp>
 #include <optional>
 #include <string>
 #include <utility>
@@ -17,6 +18,7 @@
 #include "core/error.h"
 #include "reconstruction/dem/mesh_fill.h"
 #include "reconstruction/dem/overhangs.h"
+#include "reconstruction/dem/rim_variance.h"
 #include "terrain/dem_io.h"
 #include "terrain/layers_io.h"
 
@@ -51,6 +53,7 @@ void add(MeasuredPoints& all, const MeasuredPoints& more) {
   append(all.p_m, more.p_m);
   append(all.sd_m, more.sd_m);
   append(all.bias_sd_m, more.bias_sd_m);
+  append(all.lean, more.lean);
   append(all.across_sd_m, more.across_sd_m);
   append(all.groups, more.groups);
   append(all.origins, more.origins);
@@ -68,6 +71,7 @@ void keep(MeasuredPoints& points, const IsKept& is_kept) {
   };
   keep_column(points.sd_m);
   keep_column(points.bias_sd_m);
+  keep_column(points.lean);
   keep_column(points.across_sd_m);
   keep_column(points.groups);
   keep_column(points.origins);
@@ -88,12 +92,25 @@ void keep_around(const GridFrame& frame, double margin_m, MeasuredPoints& points
   });
 }
 
+// A ground filter looks at all points at once.
+void check_memory(std::size_t points, std::size_t most_bytes) {
+  constexpr std::size_t point_bytes = 100;
+  if (points <= most_bytes / point_bytes) return;
+  throw Error(
+      "--ground-filter: with {} points and more it takes over {} MB: take fewer (--frames, "
+      "--area), none of it, or give more by --memory-mb",
+      points, most_bytes / 1'000'000);
+}
+
 // ----- ground
 
 Fusion fuse_ground(const DemRequest& request, DemInput& input, const GridFrame& frame,
                    const GroundFilterOptions& filter, DemReport& report) {
   MeasuredPoints all;
-  for (MeasuredPoints block; input.next(block);) add(all, block);
+  for (MeasuredPoints block; input.next(block);) {
+    add(all, block);
+    check_memory(all.size(), request.most_bytes);
+  }
   check_count(all.size());
   keep_around(frame, 2 * filter.window_radius_m, all);
   if (all.size() == 0)
@@ -144,6 +161,10 @@ void check_ground(const Fusion& fusion) {
     throw Error(
         "all {} points lie outside of the DEM's frame: is it of another place? (--area, --like)",
         counts.points);
+  if (counts.uncertain > 0) {
+    throw Error("all {} cells with ground are known worse than --most-sd-m: ask for less",
+                counts.uncertain);
+  }
   throw Error(
       "none of the {} points makes ground: {} are outside of the frame, {} unusable, and in {} "
       "cells they are too few or contradict each other: are the poses right? Larger cells "
@@ -153,18 +174,21 @@ void check_ground(const Fusion& fusion) {
 
 // ----- after fusion
 
-void bound(const DemRequest& request, const ScanFiles& files, DemLayers& layers,
-           DemReport& report) {
+void bound(const DemRequest& request, DemInput& input, DemLayers& layers, DemReport& report) {
   if (request.sight == SightUse::None || request.noise.beams == BeamOrigin::Above) return;
-  if (files.scans.empty()) return;
+  const std::size_t scans = input.scans().size();
+  if (scans == 0) return;
   const Timing timing(report, "sight");
   Stage stage("looking along beams");
   constexpr double share_of_cell = 0.25;  // half a cell, rising by one in two
+  const glm::dvec2 cell_m = glm::abs(layers.frame.step_m);
   const double margin_m =
-      request.sight_margin_m.value_or(share_of_cell * std::abs(layers.frame.step_m.x));
-  for (std::size_t i = 0; i < files.scans.size(); ++i) {
-    bound_by_sight(files, files.scans[i], request.taking, margin_m, layers);
-    stage.update(static_cast<double>(i + 1) / static_cast<double>(files.scans.size()));
+      request.sight_margin_m.value_or(share_of_cell * std::max(cell_m.x, cell_m.y));
+  for (std::size_t i = 0; i < scans; ++i) {
+    stop_if_interrupted();
+    LidarPoints points = input.points_of(i);
+    bound_by_sight(points, margin_m, layers);
+    stage.update(static_cast<double>(i + 1) / static_cast<double>(scans));
   }
   constexpr float sds = 3;
   BoundTally tally;
@@ -208,6 +232,7 @@ void fill(const DemRequest& request, DemLayers& layers, DemReport& report) {
     layers.source[i] = HeightSource::Filled;
     if (!filled.sd_m.empty()) layers.fill_sd_m[i] = filled.sd_m[i];
   }
+  add_rim_variance(layers);
 }
 
 // ----- all of it
@@ -230,25 +255,32 @@ void check_outputs(const DemRequest& request, const ScanFiles& files,
   check_output(request.output, inputs);
 }
 
-DemLayers measure(const DemRequest& request, const ScanFiles& files,
-                  const std::vector<RecordedPair>& pairs, const PlaceChoice& place,
-                  DemReport& report) {
-  std::optional<DemInput> input;
-  {
-    const Timing timing(report, "match");
-    input.emplace(request, files, pairs);
-  }
-  const Area extent = needs_extent(place) ? input->extent() : Area{};
-  const GridFrame frame = choose_frame(place, files.georeference, extent);
-  Fusion fusion = request.filter ? fuse_ground(request, *input, frame, *request.filter, report)
-                                 : fuse_all(request, *input, frame, report);
+DemLayers measure(const DemRequest& request, const Georeference& georeference,
+                  const PlaceChoice& place, DemInput& input, DemReport& report) {
+  const Area extent = needs_extent(place) ? input.extent() : Area{};
+  const GridFrame frame = choose_frame(place, georeference, extent);
+  Fusion fusion = request.filter ? fuse_ground(request, input, frame, *request.filter, report)
+                                 : fuse_all(request, input, frame, report);
   check_ground(fusion);
   report.fusion = fusion.counts;
   report.frame = frame;
-  report.scans = input->scans();
-  report.pairs = input->pairs();
-  for (std::string& note : input->notes()) report.notes.push_back(std::move(note));
+  report.scans = input.scans();
+  report.pairs = input.pairs();
+  for (std::string& note : input.notes()) report.notes.push_back(std::move(note));
   return std::move(fusion.layers);
+}
+
+std::vector<std::string> notes_of(const DemRequest& request, const ScanFiles& files) {
+  std::vector<std::string> notes = files.notes;
+  if (!files.are_posed && request.noise.beams == BeamOrigin::Sensor)
+    notes.emplace_back("without poses the DEM is in the sensor's frame");
+  return notes;
+}
+
+DemInput read_input(const DemRequest& request, const ScanFiles& files,
+                    const std::vector<RecordedPair>& pairs, DemReport& report) {
+  const Timing timing(report, "match");
+  return {request, files, pairs};
 }
 
 }  // namespace
@@ -265,9 +297,10 @@ void rebuild_dem(const DemRequest& request) {
   agree_on_crs(place, files.georeference);
   check_crs(files.georeference);
   DemReport report{.facts = request.output.facts, .georeference = files.georeference};
-  if (request.noise.beams == BeamOrigin::Sensor) report.notes = files.notes;
-  DemLayers layers = measure(request, files, pairs, place, report);
-  bound(request, files, layers, report);
+  report.notes = notes_of(request, files);
+  DemInput input = read_input(request, files, pairs, report);
+  DemLayers layers = measure(request, files.georeference, place, input, report);
+  bound(request, input, layers, report);
   smooth(request, layers, report);
   fill(request, layers, report);
   set_slopes(layers);

@@ -144,6 +144,7 @@ Json json_of(const FusionCounts& counts) {
           {"outside", counts.outside},
           {"unusable", counts.unusable},
           {"cells_without_ground", counts.without_ground},
+          {"cells_uncertain", counts.uncertain},
           {"bytes_on_disk", counts.bytes_on_disk}};
 }
 
@@ -197,6 +198,8 @@ void print(const DemReport& report) {
   const FusionCounts& fusion = report.fusion;
   fmt::print("fused: {} points, {} outside, {} unusable; {} cells without credible ground\n",
              fusion.points, fusion.outside, fusion.unusable, fusion.without_ground);
+  if (fusion.uncertain > 0)
+    fmt::print("{} cells are known worse than asked for, and stay unmeasured\n", fusion.uncertain);
   if (const auto& bound = report.bound)
     fmt::print("lines of sight bound {} samples; {} measured ones are above\n", bound->samples,
                bound->broken);

@@ -1,7 +1,6 @@
 #pragma once
 
-#include "apps/groundray/scan_files.h"
-#include "apps/groundray/scan_input.h"
+#include "apps/groundray/dem_points.h"
 #include "reconstruction/dem/dem_layers.h"
 
 namespace groundray {
@@ -9,11 +8,12 @@ namespace groundray {
 /// What tells how high the ground can be where nothing measured it: nothing, or beams that passed.
 enum class SightUse { None, Beams };
 
-/// Lowers `layers.upper_bound_m` to the heights that beams of a scan pass at. A beam that ends
-/// where nothing was measured, or below what was, is left out: its point may be an outlier.
+/// Lowers `layers.upper_bound_m` to the heights that beams of a scan pass at, each raised by two
+/// standard deviations of its point's height, those of its pose counted. A beam that ends where
+/// nothing was measured, or below what was, is left out: its point may be an outlier.
+/// @param points    of the scan, from the first on.
 /// @param margin_m  added, see sight_bound.
-/// @throws Error as read_points.
-void bound_by_sight(const ScanFiles& files, const ScanFile& scan, const ScanTaking& taking,
-                    double margin_m, DemLayers& layers);
+/// @throws Error as LidarPoints.
+void bound_by_sight(LidarPoints& points, double margin_m, DemLayers& layers);
 
 }  // namespace groundray

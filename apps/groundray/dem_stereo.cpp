@@ -111,7 +111,7 @@ void check_poses(const RecordedCamera& camera, const RecordedFrame& frame, doubl
         "the file cut short?",
         camera.name, s(camera.X_DC.begin_time()), s(camera.X_DC.end_time()), s(at));
   }
-  check_gap(fmt::format("poses/{}.tum", camera.name), camera.X_DC, at, longest_gap_s);
+  check_gap(fmt::format("poses/{}.tum", camera.name), camera.X_DC, at, at, longest_gap_s);
 }
 
 // Adds what the cameras' poses are off to the bias of points from `first` on.

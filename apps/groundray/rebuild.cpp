@@ -336,6 +336,8 @@ void rebuild_mesh(const ScanChoice& choice, const ScanTaking& taking, const Mesh
   Making making;
   making.report.georeference = files.georeference;
   making.report.notes = files.notes;
+  if (!files.are_posed)
+    making.report.notes.emplace_back("without poses the mesh is in the sensor's frame");
   if (meshing.perimeter_m) {
     join_points(files, taking, meshing, finishing, making);
   } else {

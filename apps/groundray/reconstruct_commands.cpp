@@ -196,13 +196,14 @@ struct ReconstructCommands::Options {
     mesh->add_option("--occlusion", out[0].output.occlusion,
                      "Mesh for what beams passed by: links that were not taken for surface");
     scans.add(mesh);
+    scans.add_grid(mesh);
     surface.add(mesh);
     add_fill(mesh)->required(false);
     halt[0].add(mesh, HaltOptions::Need::None);
     CLI::Option* unorganised = mesh->get_option("--unorganised");
     for (const char* of_grids :
-         {"--occlusion", "--returns", "--grid", "--preset", "--incidence-deg", "--longest-m",
-          "--noise-sds", "--merge-sds", "--apart-m", "--turned-deg"})
+         {"--occlusion", "--grid", "--preset", "--incidence-deg", "--longest-m", "--noise-sds",
+          "--merge-sds", "--apart-m", "--turned-deg"})
       mesh->get_option(of_grids)->excludes(unorganised);
   }
 

@@ -22,6 +22,8 @@ using yaml::Need;
 constexpr yaml::Rule pixels_rule{
     [](double value) { return value >= 1 && value <= 65536 && value == std::floor(value); },
     "must be a whole number from 1 to 65536"};
+constexpr yaml::Rule time_rule{[](double value) { return value >= 0 && value <= 3600; },
+                               "must be a number of seconds from 0 to 3600"};
 
 void read_calibration(const fs::path& path, RecordedCamera& camera) {
   yaml::Faults faults(path);
@@ -29,13 +31,13 @@ void read_calibration(const fs::path& path, RecordedCamera& camera) {
   yaml::Map root(node, "", faults);
   std::array<double, 2> size_px{};
   root.read_numbers("size_px", Need::Required, size_px, pixels_rule);
-  camera.size_px = {static_cast<int>(size_px[0]), static_cast<int>(size_px[1])};
-  root.read_number("exposure_s", Need::Required, camera.exposure_s, yaml::not_negative);
-  root.read_number("row_s", Need::Required, camera.row_s, yaml::not_negative);
+  root.read_number("exposure_s", Need::Required, camera.exposure_s, time_rule);
+  root.read_number("row_s", Need::Required, camera.row_s, time_rule);
   if (const yaml::Node* lens = root.find("lens", Need::Required))
     camera.lens = read_lens(*lens, path, faults).model;
   root.close_partly();
   faults.throw_if_any();
+  camera.size_px = {static_cast<int>(size_px[0]), static_cast<int>(size_px[1])};
 }
 
 // The picture that the camera gives, else the light that it was made of.

@@ -195,7 +195,7 @@ ScanFiles scans_of_files(const ScanChoice& choice) {
   if (choice.poses) {
     pose_scans(choice, choice.points.value_or(LidarSpec::Points::AtStamp), files);
   } else {
-    files.notes.emplace_back("without poses the mesh is in the sensor's frame");
+    files.are_posed = false;
   }
   return files;
 }

@@ -75,6 +75,7 @@ struct ScanFiles {
   Georeference georeference;                ///< of D
   std::vector<std::filesystem::path> read;  ///< all files that say something of them
   std::vector<std::string> notes;           ///< for people: what was left out
+  bool are_posed = true;                    ///< false: D is the frame of the one scan's sensor
 };
 
 /// Finds the scans and where each was made. Poses farther than 10 km from their zero get an origin

@@ -8,9 +8,11 @@
 #include <limits>
 #include <string>
 #include <string_view>
+#include <tuple>
 #include <utility>
 
 #include "apps/groundray/packed_file.h"
+#include "apps/groundray/pulse_returns.h"
 #include "core/error.h"
 #include "reconstruction/scan/range_grid.h"
 
@@ -43,6 +45,14 @@ class SensorAt {
   void add_note(std::vector<std::string>& notes) const {
     if (unused_.empty()) return;
     notes.push_back("the sensor's motion within scans was not used: " + unused_);
+  }
+
+  // From the first beam to the last, and the stamp.
+  std::pair<nanoseconds, nanoseconds> span() const {
+    if (!is_path() || times_s_.empty()) return {file_.stamp, file_.stamp};
+    const auto [first, last] = std::ranges::minmax(times_s_);
+    return {std::min(file_.stamp, after(file_.stamp, first)),
+            std::max(file_.stamp, after(file_.stamp, last))};
   }
 
   bool is_path() const { return X_DS_ != nullptr; }
@@ -235,6 +245,25 @@ PointInput points_of(const OrganisedInput& grid) {
   return input;
 }
 
+PointInput points_of(const ScanFiles& files, const ScanFile& file, const ScanTaking& taking,
+                     const Scan& scan) {
+  const SensorAt sensor(files, file, scan);
+  PointInput input{.sd_m = sds_of(file, scan, taking),
+                   .labels = labels_of(file, scan, taking),
+                   .notes = scan.notes};
+  std::tie(input.begin, input.end) = sensor.span();
+  sensor.add_note(input.notes);
+  input.points_m.reserve(scan.p_S.size());
+  input.origins_m.reserve(scan.p_S.size());
+  for (std::size_t i = 0; i < scan.p_S.size(); ++i) {
+    const Pose X_DS = sensor.pose(i);
+    input.points_m.push_back((file.points == LidarSpec::Points::AsFired ? X_DS : file.X_DS) *
+                             scan.p_S[i]);
+    input.origins_m.push_back(X_DS.translation_m);
+  }
+  return input;
+}
+
 // With the file's name before what is wrong, unless it is there.
 template <typename Read>
 auto naming(const ScanFile& file, Read&& read) {
@@ -254,24 +283,73 @@ OrganisedInput read_organised(const ScanFiles& files, const ScanFile& file,
   return naming(file, [&] { return organise_scan(files, file, taking); });
 }
 
-PointInput read_points(const ScanFiles& files, const ScanFile& file, const ScanTaking& taking) {
-  return naming(file, [&] {
-    if (file.is_range_grid) return points_of(read_grid(file, taking));
-    const Scan scan = read_scan(file.file, taking.columns);
-    const SensorAt sensor(files, file, scan);
-    PointInput input{.sd_m = sds_of(file, scan, taking),
-                     .labels = labels_of(file, scan, taking),
-                     .rows = scan.rows,
-                     .notes = scan.notes};
-    sensor.add_note(input.notes);
-    for (std::size_t i = 0; i < scan.p_S.size(); ++i) {
-      const Pose X_DS = sensor.pose(i);
-      input.points_m.push_back((file.points == LidarSpec::Points::AsFired ? X_DS : file.X_DS) *
-                               scan.p_S[i]);
-      input.origins_m.push_back(X_DS.translation_m);
+PointReader::PointReader(const ScanFiles& files, const ScanFile& scan, ScanTaking taking,
+                         std::size_t block_bytes)
+    : files_(files), scan_(scan), taking_(std::move(taking)), block_bytes_(block_bytes) {}
+
+void PointReader::open() {
+  is_open_ = true;
+  std::error_code ignored;
+  const bool is_large = std::filesystem::file_size(scan_.file, ignored) > block_bytes_ && !ignored;
+  if (scan_.path || !is_large) return;
+  blocks_ = CloudBlocks::open(scan_.file, taking_.columns.columns, block_bytes_);
+  if (!blocks_) return;
+  ahead_ = blocks_->next();
+  const Scan first = scan_of(*ahead_, scan_.file.string(), taking_.columns);
+  if (!tells_returns(first)) return;
+  blocks_.reset();
+  ahead_.reset();
+}
+
+// Of a file in memory there are its bytes, its columns, and what is made of them.
+void PointReader::check_memory() const {
+  constexpr std::uintmax_t times = 8;
+  std::error_code fault;
+  const std::uintmax_t bytes = std::filesystem::file_size(scan_.file, fault);
+  if (fault || bytes <= taking_.most_bytes / times) return;
+  throw Error(
+      "it has {} MB, takes up to {} times that in memory, more than there is or --memory-mb "
+      "allows, and cannot be read in blocks: these are .npy, .bin, binary .ply and .pcd without "
+      "poses by time and without several returns of a pulse; or split it",
+      bytes / 1'000'000, times);
+}
+
+Scan PointReader::next_scan() {
+  if (!blocks_) {
+    check_memory();
+    is_done_ = true;
+    return read_scan(scan_.file, taking_.columns);
+  }
+  const CloudFile file = ahead_ ? std::move(*ahead_) : CloudFile{};
+  ahead_ = blocks_->next();
+  is_done_ = !ahead_;
+  return scan_of(file, scan_.file.string(), taking_.columns);
+}
+
+bool PointReader::next(PointInput& block) {
+  if (is_done_) return false;
+  naming(scan_, [&] {
+    if (!is_open_) open();
+    if (scan_.is_range_grid) {
+      is_done_ = true;
+      block = points_of(read_grid(scan_, taking_));
+      block.begin = block.end = scan_.stamp;
+      return;
     }
-    return input;
+    Scan scan = next_scan();
+    const std::size_t rows = scan.rows;
+    take_returns(taking_.returns, scan);
+    block = points_of(files_, scan_, taking_, scan);
+    block.rows = rows;
   });
+  return true;
+}
+
+PointInput read_points(const ScanFiles& files, const ScanFile& file, const ScanTaking& taking) {
+  constexpr std::size_t all = std::numeric_limits<std::size_t>::max();
+  PointInput input;
+  PointReader(files, file, taking, all).next(input);
+  return input;
 }
 
 }  // namespace groundray

@@ -1,13 +1,16 @@
 #pragma once
 
+#include <chrono>
 #include <cstddef>
 #include <cstdint>
 #include <glm/vec3.hpp>
+#include <limits>
 #include <optional>
 #include <string>
 #include <vector>
 
 #include "apps/groundray/scan_files.h"
+#include "apps/scan/cloud_blocks.h"
 #include "apps/scan/scan.h"
 #include "reconstruction/scan/organised_scan.h"
 
@@ -29,6 +32,8 @@ struct ScanTaking {
   GridSource grid = GridSource::Beams;
   LabelUse labels = LabelUse::Carry;
   std::optional<double> range_sd_m;  ///< instead of what scan and sensor say
+  /// Files of points that take more in memory, and cannot be read in blocks, are refused.
+  std::size_t most_bytes = std::numeric_limits<std::size_t>::max();
 };
 
 /// A scan on the grid of its beams, in D.
@@ -47,6 +52,8 @@ struct PointInput {
   std::vector<float> sd_m;            ///< of each range
   std::vector<std::uint16_t> labels;  ///< one for each, or none
   std::size_t rows = 0;               ///< of the file
+  std::chrono::nanoseconds begin{0};  ///< on the path's clock: when the first beam went
+  std::chrono::nanoseconds end{0};    ///< and the last
   std::vector<std::string> notes;     ///< for people
 };
 
@@ -58,7 +65,39 @@ struct PointInput {
 OrganisedInput read_organised(const ScanFiles& files, const ScanFile& scan,
                               const ScanTaking& taking);
 
-/// As read_organised, of clouds whose beams need not lie on a grid.
+/// Reads a scan as read_organised does, of clouds whose beams need not lie on a grid. Where columns
+/// tell the returns of a pulse (pulse, or else ring and time, beside return_index), one of each is
+/// taken.
+///
+/// Files whose rows are of one size (CloudBlocks) are read in blocks, unless points need poses at
+/// times or there are several returns of a pulse: all rows are then in memory.
+class PointReader {
+ public:
+  static constexpr std::size_t usual_block_bytes = std::size_t{8} << 20U;
+
+  /// @param files, scan  must outlive this.
+  PointReader(const ScanFiles& files, const ScanFile& scan, ScanTaking taking,
+              std::size_t block_bytes = usual_block_bytes);
+
+  /// Returns false after the last; there is one block at least.
+  /// @throws Error as read_organised; or if the file would take more than taking.most_bytes.
+  bool next(PointInput& block);
+
+ private:
+  void open();
+  Scan next_scan();
+  void check_memory() const;
+
+  const ScanFiles& files_;
+  const ScanFile& scan_;
+  ScanTaking taking_;
+  std::size_t block_bytes_;
+  bool is_open_ = false, is_done_ = false;
+  std::optional<CloudBlocks> blocks_;
+  std::optional<CloudFile> ahead_;
+};
+
+/// Reads all points of a scan, as PointReader.
 PointInput read_points(const ScanFiles& files, const ScanFile& scan, const ScanTaking& taking);
 
 }  // namespace groundray

@@ -15,19 +15,22 @@ void ScanOptions::add(CLI::App* command) {
   scans->add_option("--returns", taking.returns, "Which return of a pulse is taken")
       ->transform(CLI::CheckedTransformer(choices))
       ->option_text("last|strongest|first");
-  const std::map<std::string, GridSource> grids{{"beams", GridSource::Beams},
-                                                {"file", GridSource::File}};
-  scans
-      ->add_option("--grid", taking.grid,
-                   "What makes points neighbours: rings and azimuths, or the file's own image")
-      ->transform(CLI::CheckedTransformer(grids))
-      ->option_text("beams|file");
   scans
       ->add_option("--range-sd-m", taking.range_sd_m,
                    "Standard deviation of ranges, instead of what scans tell")
       ->check(not_negative());
   scans->add_flag("--no-labels", leaves_labels, "Leave semantic classes out");
   columns.add(scans, "");
+}
+
+void ScanOptions::add_grid(CLI::App* command) {
+  const std::map<std::string, GridSource> grids{{"beams", GridSource::Beams},
+                                                {"file", GridSource::File}};
+  command
+      ->add_option("--grid", taking.grid,
+                   "What makes points neighbours: rings and azimuths, or the file's own image")
+      ->transform(CLI::CheckedTransformer(grids))
+      ->option_text("beams|file");
 }
 
 void ScanOptions::add_poses(CLI::App* scans) {

@@ -19,6 +19,8 @@ struct ScanOptions {
   bool leaves_labels = false;
 
   void add(CLI::App* command);
+  /// Which of the points are neighbours, for who links them.
+  void add_grid(CLI::App* command);
   /// Call it once the line is read. @throws Error as parse_frames and ScanFlags.
   void close();
 

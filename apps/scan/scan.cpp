@@ -266,9 +266,9 @@ class Reader {
                         scan_.name));
       }
     }
-    scan_.notes.push_back(fmt::format(
+    scan_.frame = fmt::format(
         "Points of {} are taken {}, x forward, y left, z up.", scan_.name,
-        X_FS == none ? "as in the sensor's frame" : "into the sensor's frame by its pose"));
+        X_FS == none ? "as in the sensor's frame" : "into the sensor's frame by its pose");
     return X_FS == none ? none : inverse(X_FS);
   }
 

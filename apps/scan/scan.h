@@ -69,7 +69,8 @@ struct Scan {
   NoReturns no_returns;
   std::vector<ReadColumn> read;
   std::vector<std::string> unused;  ///< columns that were not understood or not needed
-  std::vector<std::string> notes;   ///< sentences on units and frames
+  std::vector<std::string> notes;   ///< sentences on what the reader should know
+  std::string frame;                ///< sentence on how points came into the sensor's frame
 
   /// Returns the values of the returns, or null if the file has none.
   const std::vector<double>* find(Quantity quantity) const {

@@ -24,9 +24,6 @@ constexpr double crest_points = 4;
 constexpr double outliers_reach_m = 2;
 constexpr std::size_t few_points = 2;
 constexpr int enough_neighbours = 5;
-
-constexpr std::uint32_t no_group = std::numeric_limits<std::uint32_t>::max();
-
 double rise2(const SurfacePlane& plane) {
   return plane.slope_x * plane.slope_x + plane.slope_y * plane.slope_y;
 }
@@ -69,14 +66,16 @@ void CellFit::unpack(std::span<const PackedPoint> points, glm::dvec2 step_m,
                      std::int32_t reference) {
   count_ = points.size();
   padded_ = whole_lanes(count_);
-  for (auto* const column : {&x_m_, &y_m_, &z_m_, &noise_m2_, &across_m2_, &bias_m_, &variance_m2_,
-                             &gain_, &per_sd_, &weight_, &size_}) {
+  for (auto* const column :
+       {&x_m_, &y_m_, &z_m_, &noise_m2_, &across_m2_, &lean_x_, &lean_y_, &level_bias_m_,
+        &leaning_bias_m_, &bias_m_, &variance_m2_, &gain_, &per_sd_, &weight_, &size_}) {
     if (column->size() < padded_) column->resize(std::max(few_numbers, 2 * padded_));
     std::fill(column->begin() + static_cast<std::ptrdiff_t>(padded_ - lanes),
               column->begin() + static_cast<std::ptrdiff_t>(padded_), 0.F);
   }
   for (std::size_t i = count_; i < padded_; ++i) noise_m2_[i] = 1;
   const auto step_x = static_cast<float>(step_m.x), step_y = static_cast<float>(step_m.y);
+  std::uint32_t leans = 0;
   for (std::size_t i = 0; i < count_; ++i) {
     const PackedPoint& p = points[i];
     x_m_[i] = PackedPoint::from_sample(p.x) * step_x;
@@ -86,8 +85,13 @@ void CellFit::unpack(std::span<const PackedPoint> points, glm::dvec2 step_m,
     const float sd = std::max(least_sd_m, unpacked_sd(p.sd)), across = unpacked_sd(p.across);
     noise_m2_[i] = sd * sd;
     across_m2_[i] = across * across;
-    bias_m_[i] = unpacked_sd(p.bias);
+    level_bias_m_[i] = unpacked_sd(p.bias);
+    leaning_bias_m_[i] = p.origin() == PointOrigin::Stereo ? level_bias_m_[i] : 0;
+    lean_x_[i] = unpacked_lean(p.lean_x);
+    lean_y_[i] = unpacked_lean(p.lean_y);
+    leans |= std::uint32_t{p.lean_x} | p.lean_y;
   }
+  is_leaning_ = leans != 0;
 }
 
 // Leaves of heights what is above the bend of the neighbours' surface and the cell's crest.
@@ -126,13 +130,38 @@ void CellFit::number_groups(std::span<const PackedPoint> points) {
   }
 }
 
-// Sets variances and weights for the slope of `plane`.
-void CellFit::weigh(const SurfacePlane& plane) {
-  const auto rise_squared = static_cast<float>(rise2(plane));
+// Sets variances and biases of distances from ground with the slope of `plane`.
+void CellFit::tilt(const SurfacePlane& plane, const SlopeSpread& spread) {
+  const auto a = static_cast<float>(plane.slope_x), b = static_cast<float>(plane.slope_y),
+             rise_squared = static_cast<float>(rise2(plane));
+  if (!is_leaning_) {
+    for (std::size_t i = 0; i < padded_; i += lanes)
+      store(load(&noise_m2_[i]) + rise_squared * load(&across_m2_[i]), &variance_m2_[i]);
+    std::copy_n(level_bias_m_.begin(), padded_, bias_m_.begin());
+    return;
+  }
+  const auto xx = static_cast<float>(spread.xx), xy = static_cast<float>(spread.xy),
+             yy = static_cast<float>(spread.yy);
   for (std::size_t i = 0; i < padded_; i += lanes) {
-    const FloatLanes variance = load(&noise_m2_[i]) + rise_squared * load(&across_m2_[i]);
-    const FloatLanes bias = load(&bias_m_[i]);
-    store(variance, &variance_m2_[i]);
+    const FloatLanes x = load(&lean_x_[i]), y = load(&lean_y_[i]);
+    const FloatLanes along = a * x + b * y, unknown = xx * x * x + 2 * xy * x * y + yy * y * y;
+    const FloatLanes bias = load(&leaning_bias_m_[i]);
+    const FloatLanes tilt = larger(1 - along, least_tilt(x, y));
+    const FloatLanes off = load(&level_bias_m_[i]) - bias * (1 - tilt);
+    store(load(&noise_m2_[i]) * (tilt * tilt + unknown) + rise_squared * load(&across_m2_[i]),
+          &variance_m2_[i]);
+    store(off, &bias_m_[i]);
+    store(off * off + bias * bias * unknown, &size_[i]);
+  }
+  for (std::size_t i = 0; i < padded_; ++i)
+    bias_m_[i] = std::copysign(std::sqrt(size_[i]), bias_m_[i]);
+}
+
+// Sets variances and weights for ground with the slope of `plane`.
+void CellFit::weigh(const SurfacePlane& plane, const SlopeSpread& spread) {
+  tilt(plane, spread);
+  for (std::size_t i = 0; i < padded_; i += lanes) {
+    const FloatLanes variance = load(&variance_m2_[i]), bias = load(&bias_m_[i]);
     store(1 / variance, &gain_[i]);
     store(1 / (variance + bias * bias), &per_sd_[i]);
   }
@@ -209,20 +238,23 @@ CellFit::Sums CellFit::sum(const SurfacePlane& plane, double scale, const Robust
           total(xy), total(yy), total(xz), total(yz)};
 }
 
-// Improves `plane` until it does not change, but no more than `rounds` times.
+// Improves `plane` until it does not change, but no more than `rounds` times; returns the last
+// sums.
 template <typename Robust>
-void CellFit::iterate(SurfacePlane& plane, const NeighbourSurface& neighbours, double scale,
-                      int rounds, const Robust& robust) {
+CellFit::Sums CellFit::iterate(SurfacePlane& plane, const NeighbourSurface& neighbours,
+                               double scale, int rounds, const Robust& robust) {
   constexpr double little = 5e-3;  // of its sd
+  Sums sums;
   for (int round = 0; round < rounds; ++round) {
-    const Sums sums = sum(plane, scale, robust);
-    if (!(sums.w > 0)) return;  // not so: at least half of the points are near
+    sums = sum(plane, scale, robust);
+    if (!(sums.w > 0)) break;  // not so: at least half of the points are near
     const SurfacePlane next = sums.solve(neighbours);
     const double h = next.height_m - plane.height_m, a = next.slope_x - plane.slope_x,
                  b = next.slope_y - plane.slope_y;
     plane = next;
-    if (sums.w * h * h + sums.xx * a * a + sums.yy * b * b < little * little) return;
+    if (sums.w * h * h + sums.xx * a * a + sums.yy * b * b < little * little) break;
   }
+  return sums;
 }
 
 CellFit::CellFit(double outlier_share) noexcept
@@ -235,13 +267,16 @@ std::optional<CellHeight> CellFit::operator()(std::span<const PackedPoint> point
   number_groups(points);
   unbend(neighbours, step_m);
   SurfacePlane plane = neighbours.plane;
-  weigh(plane);
+  weigh(plane, {neighbours.xx, neighbours.xy, neighbours.yy});
   if (outliers_per_m_ > 0 && count_ <= few_points && neighbours.cells >= enough_neighbours)
     return fit_few_points(neighbours, step_m, reference * PackedPoint::height_step_m);
   plane.height_m = median_height(plane);
-  iterate(plane, neighbours, scale(plane), huber_rounds,
-          [](const FloatLanes& size) { return huber_limit / larger(size, all_of(huber_limit)); });
-  if (std::abs(rise2(plane) - rise2(neighbours.plane)) > 0.01) weigh(plane);
+  const Inverse found =
+      iterate(plane, neighbours, scale(plane), huber_rounds, [](const FloatLanes& size) {
+        return huber_limit / larger(size, all_of(huber_limit));
+      }).inverse(neighbours);
+  if (is_leaning_ || std::abs(rise2(plane) - rise2(neighbours.plane)) > 0.01)
+    weigh(plane, {found.xx, found.xy, found.yy});
   const double times = scale(plane);
   const auto tukey = [](const FloatLanes& size) {
     constexpr float per_limit2 = 1 / (tukey_limit * tukey_limit);

@@ -26,12 +26,15 @@ struct CellHeight {
 /// Points are freed of the bend of the neighbours' surface first, and of the cell's own crest: what
 /// its first guess is above that surface, of which the ground bends by -2 along columns and rows;
 /// the fewer points (4 / n), the less of it. A point's weight is 1 / variance, where the variance
-/// is that of its height and of its place times the slope, and the points of a group together weigh
-/// no more than what they have in common lets them: in all 1 / (1 / sum(1 / variance) + bias²), as
-/// generalised least squares would have it. Slopes are held to the neighbours' by what those know.
-/// The start has the median height and the neighbours' slope; residuals are in units of their sd,
-/// times 1.4826 of their median where that is above 1; Huber's weights (k = 1.345) come up to three
-/// times, then, with slope and scale of that, Tukey's (c = 4.685) up to five.
+/// is that of its distance from the ground: sd² ((1 - g lean)² + lean' G lean) + g² across², with
+/// the neighbours' slope g and its covariance G at first, then the fit's, and 1 - g lean no less
+/// than least_tilt(); a stereo pair's bias has the same factor. And the points of a
+/// group together weigh no more than what they have in common lets them: in all 1 / (1 / sum(1 /
+/// variance) + bias²), as generalised least squares would have it. Slopes are held to the
+/// neighbours' by what those know. The start has the median height and the neighbours' slope;
+/// residuals are in units of their sd, times 1.4826 of their median where that is above 1; Huber's
+/// weights (k = 1.345) come up to three times, then, with slope and scale of that, Tukey's (c
+/// = 4.685) up to five.
 ///
 /// The variance is that of the linear estimate with the last weights: of the points' noise, times
 /// the fit's chi² per degree of freedom where that is above 1; of what groups have in common, each
@@ -56,17 +59,21 @@ class CellFit {
  private:
   struct Sums;
   struct Levers;
+  struct SlopeSpread {
+    double xx = 0, xy = 0, yy = 0;  // covariance
+  };
   void unpack(std::span<const PackedPoint> points, glm::dvec2 step_m, std::int32_t reference);
   void unbend(const NeighbourSurface& neighbours, glm::dvec2 step_m);
   void number_groups(std::span<const PackedPoint> points);
-  void weigh(const SurfacePlane& plane);
+  void tilt(const SurfacePlane& plane, const SlopeSpread& spread);
+  void weigh(const SurfacePlane& plane, const SlopeSpread& spread);
   float kth_size(std::size_t k);
   double median_height(const SurfacePlane& slopes);
   double scale(const SurfacePlane& plane);
   template <typename Robust>
   Sums sum(const SurfacePlane& plane, double scale, const Robust& robust);
   template <typename Robust>
-  void iterate(SurfacePlane& plane, const NeighbourSurface& neighbours, double scale, int rounds,
+  Sums iterate(SurfacePlane& plane, const NeighbourSurface& neighbours, double scale, int rounds,
                const Robust& robust);
   void compare(const SurfacePlane& plane, double bias_m2, CellHeight& found);
   std::optional<CellHeight> fit_few_points(const NeighbourSurface& neighbours, glm::dvec2 step_m,
@@ -76,10 +83,13 @@ class CellFit {
                     glm::dvec2 step_m);
 
   double outliers_per_m_ = 0;
-  double own_crest_ = 0;    // which share of it points were freed of
-  std::size_t count_ = 0;   // points
-  std::size_t padded_ = 0;  // entries below, a whole number of vectors; those beyond weigh nothing
-  std::vector<float> x_m_, y_m_, z_m_, noise_m2_, across_m2_, bias_m_;
+  double own_crest_ = 0;     // which share of it points were freed of
+  std::size_t count_ = 0;    // points
+  std::size_t padded_ = 0;   // entries below, a whole number of vectors; those beyond weigh nothing
+  bool is_leaning_ = false;  // some point
+  std::vector<float> x_m_, y_m_, z_m_, noise_m2_, across_m2_, lean_x_, lean_y_;
+  std::vector<float> level_bias_m_, leaning_bias_m_;  // of heights; the part that leans
+  std::vector<float> bias_m_;                         // of distances from the ground
   std::vector<float> variance_m2_, gain_, per_sd_, weight_, size_;
   std::vector<std::uint32_t> group_;        // number of each point's group in the cell
   std::vector<std::uint32_t> names_;        // of the groups

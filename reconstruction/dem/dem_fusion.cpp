@@ -5,6 +5,7 @@
 #include <algorithm>
 #include <atomic>
 #include <cmath>
+#include <glm/geometric.hpp>
 #include <limits>
 #include <system_error>
 #include <utility>
@@ -90,19 +91,24 @@ class Intake {
 
 void Intake::refuse_columns(const MeasuredPoints& block) const {
   const std::size_t n = block.size();
-  if (block.sd_m.size() == n && block.bias_sd_m.size() == n && block.across_sd_m.size() == n &&
-      block.groups.size() == n && block.origins.size() == n) {
+  if (block.sd_m.size() == n && block.bias_sd_m.size() == n && block.lean.size() == n &&
+      block.across_sd_m.size() == n && block.groups.size() == n && block.origins.size() == n) {
     return;
   }
   throw Error(
       "measured points after the first {}: columns must be of one length, but p_m has {} entries, "
-      "sd_m {}, bias_sd_m {}, across_sd_m {}, groups {} and origins {}",
-      counts_.points, n, block.sd_m.size(), block.bias_sd_m.size(), block.across_sd_m.size(),
-      block.groups.size(), block.origins.size());
+      "sd_m {}, bias_sd_m {}, lean {}, across_sd_m {}, groups {} and origins {}",
+      counts_.points, n, block.sd_m.size(), block.bias_sd_m.size(), block.lean.size(),
+      block.across_sd_m.size(), block.groups.size(), block.origins.size());
 }
 
 bool is_sd(float value_m) {
   return value_m >= 0 && value_m < std::numeric_limits<float>::infinity();
+}
+
+bool is_lean(glm::vec2 lean) {
+  constexpr float most = 1.001F * MeasuredPoints::most_lean;
+  return glm::dot(lean, lean) <= most * most;
 }
 
 // Counts a point that is not to be used, or refuses it.
@@ -120,6 +126,9 @@ void Intake::set_aside(const MeasuredPoints& block, std::size_t i) {
   check("sd_m", block.sd_m[i]);
   check("bias_sd_m", block.bias_sd_m[i]);
   check("across_sd_m", block.across_sd_m[i]);
+  broken.unless(is_lean(block.lean[i]),
+                "lean = ({}, {}) must be numbers, of a length of {} at most", block.lean[i].x,
+                block.lean[i].y, MeasuredPoints::most_lean);
   broken.unless(block.groups[i] < PackedPoint::groups, "group {} must be below 2^31",
                 block.groups[i]);
   broken.throw_if_any();
@@ -134,10 +143,12 @@ void Intake::take(const MeasuredPoints& block) {
     const glm::dvec3 p_m = block.p_m[i];
     const float sd_m = block.sd_m[i], bias_m = block.bias_sd_m[i], across_m = block.across_sd_m[i];
     const std::uint32_t group = block.groups[i];
+    const glm::vec2 lean = block.lean[i];
     const glm::dvec2 at = frame.to_grid(glm::dvec2(p_m)) + 0.5;  // from the first cell's corner
     const bool is_inside = at.x >= 0 && at.x < samples.x && at.y >= 0 && at.y < samples.y;
     if (!is_inside || !(std::abs(p_m.z) <= PackedPoint::highest_m) ||
-        !(is_sd(sd_m) && is_sd(bias_m) && is_sd(across_m)) || group >= PackedPoint::groups) {
+        !(is_sd(sd_m) && is_sd(bias_m) && is_sd(across_m) && is_lean(lean)) ||
+        group >= PackedPoint::groups) {
       set_aside(block, i);
       continue;
     }
@@ -148,9 +159,10 @@ void Intake::take(const MeasuredPoints& block) {
     const auto y = static_cast<std::uint16_t>(static_cast<std::int32_t>((at.y - cell.y) * places));
     const std::uint32_t name = 2 * group + (block.origins[i] == PointOrigin::Stereo ? 1U : 0U);
     const std::uint16_t sd = packed_sd(sd_m), bias = packed_sd(bias_m),
-                        across = packed_sd(across_m);
+                        across = packed_sd(across_m), lean_x = packed_lean(lean.x),
+                        lean_y = packed_lean(lean.y);
     tiling_.for_each_view(cell, [&](std::size_t tile, std::uint16_t number) {
-      spool_.add(tile, {height, name, number, x, y, sd, bias, across});
+      spool_.add(tile, {height, name, number, x, y, sd, bias, across, lean_x, lean_y});
     });
   }
   counts_.points += block.size();

@@ -86,7 +86,8 @@ struct DemTile {
 /// A lone point, or two, are no ground unless five of the cells around know its height to a third
 /// of surface_gap_m, and they agree. Each is then ground or an outlier (outlier_share, spread over
 /// 2 m): height and variance are those of all such choices, weighed by Bayes with the surface
-/// around; where all being outliers is the likeliest by half there is no ground. With an
+/// around; where all being outliers is the likeliest by half there is no ground. Fewer than
+/// three points of stereo pairs alone are no ground: pixels are matched wrong in patches. With an
 /// outlier_share of 0 all points are ground.
 ///
 /// The result is the same for any number of threads, any blocks, order of the points and memory.

@@ -23,18 +23,28 @@ Joint joint(const std::array<FewPoint, 2>& points, const NeighbourSurface& known
   const auto tilt = [&](const FewPoint& a) {
     return a.place_m.x * known.height_x_m2 + a.place_m.y * known.height_y_m2;
   };
+  // What groups have in common, less what the neighbours' surface has in common with one of them.
+  const auto lever = [&](const FewPoint& a) {
+    return (a.group == known.group ? a.bias_m : 0) - known.bias_m;
+  };
+  const auto shared = [&](const FewPoint& a, const FewPoint& b) {
+    const bool is_own = a.group == b.group && a.group != known.group;
+    return lever(a) * lever(b) + (is_own ? a.bias_m * b.bias_m : 0);
+  };
   const auto between = [&](const FewPoint& a, const FewPoint& b) {
     const glm::dvec2 p = a.place_m, q = b.place_m, u = p / step_m, v = q / step_m;
     const SurfaceBend& bend = known.bend_variance;
     return known.height_variance_m2 + tilt(a) + tilt(b) + p.x * q.x * known.xx +
            (p.x * q.y + p.y * q.x) * known.xy + p.y * q.y * known.yy +
            bend.xx * cell_bend(u.x) * cell_bend(v.x) + bend.yy * cell_bend(u.y) * cell_bend(v.y) +
-           bend.xy * u.x * u.y * v.x * v.y + (a.group == b.group ? a.bias_m * b.bias_m : 0);
+           bend.xy * u.x * u.y * v.x * v.y + shared(a, b);
   };
   const FewPoint &a = points[0], &b = points[1];
   Joint c;
-  c.sample = known.height_variance_m2;
-  c.with = {c.sample + tilt(a), c.sample + tilt(b)};
+  const double height_m2 = known.height_variance_m2;
+  c.sample = height_m2 + known.bias_m * known.bias_m;
+  c.with = {height_m2 + tilt(a) - known.bias_m * lever(a),
+            height_m2 + tilt(b) - known.bias_m * lever(b)};
   const double apart_m2 = nearby * (known.bend_variance.xx + known.bend_variance.yy);
   c.aa = between(a, a) + a.variance_m2 + apart_m2;
   c.ab = between(a, b);

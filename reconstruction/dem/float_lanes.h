@@ -39,6 +39,13 @@ inline FloatLanes larger(const FloatLanes& a, const FloatLanes& b) noexcept {
 }
 inline FloatLanes size_of(const FloatLanes& a) noexcept { return larger(a, -a); }
 
+/// Returns what 1 - slope * lean (MeasuredPoints) counts as at least: a half, and what an incidence
+/// of 84 degrees makes of it. Along a line of sight, where it is 0, errors do not show at all:
+/// slopes that are fitted to few points would be drawn there.
+inline FloatLanes least_tilt(const FloatLanes& lean_x, const FloatLanes& lean_y) noexcept {
+  return larger(all_of(0.5F), 0.1F * larger(size_of(lean_x), size_of(lean_y)));
+}
+
 inline float total(const FloatLanes& a) noexcept {
   return ((a[0] + a[4]) + (a[2] + a[6])) + ((a[1] + a[5]) + (a[3] + a[7]));
 }

@@ -28,7 +28,7 @@ struct Neighbours {
   int count = 0;
   double base_m = 0;  // heights are above
   QuadricPlaces places;
-  QuadricColumn is_there{}, variance{}, place_m2{}, residual{};
+  QuadricColumn is_there{}, variance{}, place_m2{}, lean_x{}, lean_y{}, residual{};
 };
 
 Neighbours gather(const GroundGuess* guess, std::ptrdiff_t stride, glm::dvec2 step_m) noexcept {
@@ -47,18 +47,25 @@ Neighbours gather(const GroundGuess* guess, std::ptrdiff_t stride, glm::dvec2 st
       near.places.z[i] = static_cast<float>(one.height_m - near.base_m);
       near.variance[i] = one.variance_m2;
       near.place_m2[i] = one.across_m2;
+      near.lean_x[i] = one.lean_x;
+      near.lean_y[i] = one.lean_y;
     }
   }
   std::fill(near.variance.begin() + window, near.variance.end(), 1.F);
   return near;
 }
 
-// Adds to the variances of heights what places that are off do to them on a slope.
+// Makes variances of heights those of distances from a slope, which places that are off add to.
 void add_places(Neighbours& near, const QuadricTerms& t, glm::dvec2 step_m) noexcept {
   const double a = t[1] / step_m.x, b = t[2] / step_m.y;
   const auto rise2 = static_cast<float>(a * a + b * b);
-  for (std::size_t i = 0; i < quadric_places; i += lanes)
-    store(load(&near.variance[i]) + rise2 * load(&near.place_m2[i]), &near.variance[i]);
+  const auto slope_x = static_cast<float>(a), slope_y = static_cast<float>(b);
+  for (std::size_t i = 0; i < quadric_places; i += lanes) {
+    const FloatLanes x = load(&near.lean_x[i]), y = load(&near.lean_y[i]);
+    const FloatLanes tilt = larger(1 - slope_x * x - slope_y * y, least_tilt(x, y));
+    store(load(&near.variance[i]) * tilt * tilt + rise2 * load(&near.place_m2[i]),
+          &near.variance[i]);
+  }
 }
 
 double middle(QuadricColumn& values, std::size_t count) noexcept {
@@ -172,6 +179,45 @@ void set_slopes(NeighbourSurface& found, const Neighbours& near, const QuadricMa
              cyy + spread_m2 / y2 + share * share * (cyy * cyy + cxy * cxy));
 }
 
+// The group that more than half of the cells are of: if there is one, it is the last that votes for
+// others have not struck out.
+// @see Boyer, Moore, MJRTY: a fast majority vote algorithm (1991)
+std::uint32_t most_common_group(const GroundGuess* guess, std::ptrdiff_t stride) noexcept {
+  std::uint32_t group = no_group;
+  int votes = 0;
+  for (int row = -reach; row <= reach; ++row) {
+    for (int column = -reach; column <= reach; ++column) {
+      const GroundGuess& one = guess[row * stride + column];
+      if ((row == 0 && column == 0) || std::isnan(one.height_m)) continue;
+      if (votes == 0) group = one.group;
+      votes += one.group == group ? 1 : -1;
+    }
+  }
+  return votes > 0 ? group : no_group;
+}
+
+// With the share of the weight that the group has. A stereo pair's bias is along its lines of
+// sight.
+void set_bias(NeighbourSurface& found, const GroundGuess* guess, std::ptrdiff_t stride,
+              const Neighbours& near) noexcept {
+  found.group = most_common_group(guess, stride);
+  if (found.group == no_group) return;
+  const bool is_stereo = (found.group & 1U) != 0;
+  double sum_m = 0, all = 0;
+  std::size_t i = 0;
+  for (int row = -reach; row <= reach; ++row) {
+    for (int column = -reach; column <= reach; ++column, ++i) {
+      const GroundGuess& one = guess[row * stride + column];
+      const double weight = near.places.weight[i];
+      all += weight;
+      if (one.group != found.group) continue;
+      const double along = found.plane.slope_x * one.lean_x + found.plane.slope_y * one.lean_y;
+      sum_m += weight * one.bias_m * (is_stereo ? 1 - along : 1);
+    }
+  }
+  found.bias_m = sum_m / all;
+}
+
 void set_crest(NeighbourSurface& found, const GroundGuess& own, const Neighbours& near,
                const QuadricTerms& t, double variance_m2, double rough_m2,
                glm::dvec2 step_m) noexcept {
@@ -256,6 +302,7 @@ NeighbourSurface neighbour_surface(const GroundGuess* guess, std::ptrdiff_t stri
   const double rest_m2 = bend_rest * falls * falls * rough_m2;
   found.bend_variance = {c[3][3] + rest_m2, c[4][4] + 0.5 * rest_m2, c[5][5] + rest_m2};
   found.scatter_m = double{std::sqrt(std::max(0.F, sketch.rough_m2))};
+  set_bias(found, guess, stride, near);
   set_crest(found, *guess, near, t, c[0][0], rough_m2, step_m);
   return found;
 }

@@ -3,6 +3,7 @@
 // Private to the library: the ground through the cells around one.
 #include <array>
 #include <cstddef>
+#include <cstdint>
 #include <glm/vec2.hpp>
 #include <limits>
 
@@ -10,12 +11,19 @@
 
 namespace groundray {
 
+/// The name of no group of points.
+inline constexpr std::uint32_t no_group = std::numeric_limits<std::uint32_t>::max();
+
 /// What is known of a cell's ground at first sight.
 struct GroundGuess {
   double height_m = std::numeric_limits<double>::quiet_NaN();  ///< NaN for none
   float variance_m2 = 0;
-  float across_m2 = 0;  ///< variance of its place, each way
-  float x_m = 0;        ///< mean place of its points, from its sample
+  float across_m2 = 0;  ///< variance of its place, each way, but for what goes with its height:
+  float lean_x = 0;     ///< see MeasuredPoints
+  float lean_y = 0;
+  float bias_m = 0;                ///< what its points have in common, if they are
+  std::uint32_t group = no_group;  ///< of one group: its name
+  float x_m = 0;                   ///< mean place of its points, from its sample
   float y_m = 0;
 };
 
@@ -61,6 +69,10 @@ struct NeighbourSurface {
   /// By how much the cell's own guess is above the surface, as far as its noise allows, and which
   /// share of the whole that is.
   double crest_m = 0, crest_share = 0;
+  /// What the surface has in common with the group that most of these cells are of, if any: one
+  /// standard deviation, of its bias' sign. Not in the variances above.
+  double bias_m = 0;
+  std::uint32_t group = no_group;
 };
 
 /// Fits a surface of the second degree to the 24 cells around one. Robust: begins with the medians

@@ -7,7 +7,7 @@ namespace groundray {
 
 PointSpool::PointSpool(std::size_t bins, std::size_t most_bytes, std::filesystem::path folder)
     : folder_(std::move(folder)), bins_(bins) {
-  constexpr std::size_t least = 51, most = 3276;  // points in 1 KB and in 64 KB
+  constexpr std::size_t least = 42, most = 2730;  // points in 1 KB and in 64 KB
   chunk_points_ =
       std::clamp(most_bytes / (std::max<std::size_t>(bins, 1) * sizeof(PackedPoint)), least, most);
   most_in_memory_ = most_bytes / (chunk_points_ * sizeof(PackedPoint));

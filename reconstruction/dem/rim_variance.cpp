@@ -39,8 +39,8 @@ class NearestMeasured {
   double distance2_m2(glm::ivec2 at, std::uint32_t to) const {
     if (to == none) return std::numeric_limits<double>::infinity();
     const auto columns = static_cast<std::uint32_t>(size_.x);
-    const glm::dvec2 apart(static_cast<double>(to % columns) - at.x,
-                           static_cast<double>(to / columns) - at.y);
+    const glm::ivec2 there(to % columns, to / columns);
+    const glm::dvec2 apart(there - at);
     const glm::dvec2 apart_m = apart * step_m_;
     return apart_m.x * apart_m.x + apart_m.y * apart_m.y;
   }
@@ -74,18 +74,18 @@ double variance_about_m2(const DemLayers& layers, std::uint32_t nearest) {
   const glm::ivec2 size = layers.frame.samples;
   const int row = static_cast<int>(nearest / static_cast<std::uint32_t>(size.x));
   const int column = static_cast<int>(nearest % static_cast<std::uint32_t>(size.x));
-  double sum_m2 = 0;
-  std::size_t count = 0;
+  double sum_m2 = 0, weight = 0;
   for (int y = std::max(0, row - reach); y <= std::min(size.y - 1, row + reach); ++y) {
     for (int x = std::max(0, column - reach); x <= std::min(size.x - 1, column + reach); ++x) {
       const std::size_t i = static_cast<std::size_t>(y) * static_cast<std::size_t>(size.x) +
                             static_cast<std::size_t>(x);
       if (!is_measured(layers, i)) continue;
-      sum_m2 += static_cast<double>(layers.variance_m2[i]);
-      ++count;
+      const double points = std::max(1.0, static_cast<double>(layers.lidar[i] + layers.stereo[i]));
+      sum_m2 += points * static_cast<double>(layers.variance_m2[i]);
+      weight += points;
     }
   }
-  return sum_m2 / static_cast<double>(count);  // the nearest itself is one
+  return sum_m2 / weight;  // the nearest itself is one
 }
 
 }  // namespace

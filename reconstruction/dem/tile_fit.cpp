@@ -159,21 +159,34 @@ GroundGuess first_guess(std::span<const PackedPoint> cell, const CellSurface& gr
                         glm::dvec2 step_m) {
   const std::uint32_t quarter = ground.size() / 4, half = ground.size() - 2 * quarter;
   double noise_m2 = 0, bias_m2 = 0, across_m2 = 0, x = 0, y = 0, height = 0;
+  double lean_x = 0, lean_y = 0;
   for (const PackedPoint& p : cell.subspan(ground.begin + quarter, half)) {
     const double sd = unpacked_sd(p.sd), bias = unpacked_sd(p.bias);
     const double across = unpacked_sd(p.across);
     across_m2 += across * across;
     noise_m2 += sd * sd;
     bias_m2 += bias * bias;
+    lean_x += double{unpacked_lean(p.lean_x)};
+    lean_y += double{unpacked_lean(p.lean_y)};
     x += double{PackedPoint::from_sample(p.x)};
     y += double{PackedPoint::from_sample(p.y)};
     height += p.height;
   }
+  const std::uint32_t group = cell[ground.begin + quarter].group;
+  const bool is_one = std::all_of(cell.begin() + ground.begin + quarter,
+                                  cell.begin() + ground.begin + quarter + half,
+                                  [group](const PackedPoint& p) { return p.group == group; });
   // Of normal errors the mean of the middle half has 1.2 times the variance of that of all.
   const double n = half, shared_m2 = (1.2 * noise_m2 / n + bias_m2 / n) / ground.size();
-  return {height / n * PackedPoint::height_step_m, static_cast<float>(shared_m2 + 1e-8),
+  return {height / n * PackedPoint::height_step_m,
+          static_cast<float>(shared_m2 + 1e-8),
           static_cast<float>(1.2 * across_m2 / n / ground.size()),
-          static_cast<float>(x / n * step_m.x), static_cast<float>(y / n * step_m.y)};
+          static_cast<float>(lean_x / n),
+          static_cast<float>(lean_y / n),
+          static_cast<float>(std::sqrt(bias_m2 / n)),
+          is_one ? group : no_group,
+          static_cast<float>(x / n * step_m.x),
+          static_cast<float>(y / n * step_m.y)};
 }
 
 void TilePoints::look_at(std::size_t cell, CellSort& sort, std::vector<CellSurface>& surfaces) {
@@ -210,6 +223,7 @@ class RowFit {
   bool agrees(double low_m, double high_m, double variance_m2, double give_m) const;
   bool stands_clear(const CellSurface& wall) const;
   CellSurface foot(const CellSurface& wall) const;
+  bool is_mismatch(const CellHeight& ground) const;
   void fill(std::size_t at, const CellHeight& ground, double reference_m, DemLayers& layers) const;
 
   const TilePoints& points_;
@@ -302,7 +316,7 @@ void RowFit::fit(int column, int row, std::size_t at, DemLayers& layers) {
   const std::int32_t reference = cell_[points->begin + points->size() / 2].height;
   const std::optional<CellHeight> found =
       cell_fit_(cell_.subspan(points->begin, points->size()), around_, rules_.step_m, reference);
-  if (!found) {
+  if (!found || is_mismatch(*found)) {
     layers.surfaces[at] = static_cast<std::uint16_t>(layers.surfaces[at] - 1);
     ++counts_.without_ground;
   } else if (found->variance_m2 > rules_.most_sd_m * rules_.most_sd_m) {
@@ -310,6 +324,12 @@ void RowFit::fit(int column, int row, std::size_t at, DemLayers& layers) {
   } else {
     fill(at, *found, reference * PackedPoint::height_step_m, layers);
   }
+}
+
+// Pixels are matched wrong in patches, so that a few of them agree all the same.
+bool RowFit::is_mismatch(const CellHeight& ground) const {
+  constexpr std::uint32_t enough = 3;
+  return !rules_.outliers.none() && ground.lidar == 0 && ground.stereo < enough;
 }
 
 void RowFit::fill(std::size_t at, const CellHeight& ground, double reference_m,

@@ -105,12 +105,13 @@ void append(const StereoPoints& points, std::uint32_t group, MeasuredPoints& to)
   for (std::size_t i = 0; i < points.size(); ++i) {
     const glm::dmat3 covariance_m2(points.covariance_m2[i]);
     const double footprint_m = points.footprint_m[i];
-    const double across_m2 = (covariance_m2[0][0] + covariance_m2[1][1]) / 2 +
-                             footprint_m * footprint_m / 12;  // of a pixel's square
+    const PointErrors errors = point_errors(covariance_m2);
     to.p_m.push_back(points.p_m[i]);
-    to.sd_m.push_back(static_cast<float>(std::sqrt(covariance_m2[2][2])));
+    to.sd_m.push_back(errors.sd_m);
     to.bias_sd_m.push_back(std::abs(points.bias_m[i].z));
-    to.across_sd_m.push_back(static_cast<float>(std::sqrt(across_m2)));
+    to.lean.push_back(errors.lean);
+    to.across_sd_m.push_back(  // with a pixel's square
+        static_cast<float>(std::hypot(errors.across_sd_m, footprint_m / std::sqrt(12.0))));
     to.groups.push_back(group);
     to.origins.push_back(PointOrigin::Stereo);
   }

@@ -77,8 +77,8 @@ StereoPoint stereo_point(const PinholePair& pair, glm::dvec2 pixel, double dispa
 StereoPoints stereo_points(const PinholePair& pair, const StereoView& left, const DisparityMap& map,
                            const StereoPointOptions& options = {});
 
-/// Adds points to those of a DEM: the noise's share of height, the bias', and in plan the mean of
-/// both ways with the pixel's footprint.
+/// Adds points to those of a DEM: of the noise the share of height, how it leans, and the rest in
+/// plan, the mean of both ways with the pixel's footprint; of the bias the share of height.
 /// @param group  number of the pair: its points have one bias.
 void append(const StereoPoints& points, std::uint32_t group, MeasuredPoints& to);
 

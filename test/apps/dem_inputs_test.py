@@ -191,6 +191,13 @@ def first_poses(path):
     path.write_text("".join(path.read_text().splitlines(keepends=True)[:4]))
 
 
+def gap_in_a_scan(path):
+    """Poses to 0.03 s, then 3 s: at the stamps of scans there is one."""
+    lines = path.read_text().splitlines(keepends=True)
+    kept = [line for line in lines if line.startswith("#") or float(line.split()[0]) <= 0.03]
+    path.write_text("".join([*kept, "3" + lines[-1][lines[-1].index(" ") :]]))
+
+
 def frames_lost(path):
     path.write_text("".join(path.read_text().splitlines(keepends=True)[:-2]))
 
@@ -207,6 +214,7 @@ def frames_lost(path):
         ("camera/right/000000.png", other_size, ["right/000000.png", "64 x 48", "640 x 480"]),
         ("poses/left.tum", last_pose_late, ["poses/left.tum", "have a gap", "--pose-gap-s"]),
         ("poses/top.tum", last_pose_late, ["top/00000", "have a gap", "--pose-gap-s"]),
+        ("poses/top.tum", gap_in_a_scan, ["top/000000", "have a gap", "--pose-gap-s"]),
         ("poses/right.tum", first_poses, ["poses/right.tum", "covers 0 to", "cut short?"]),
         ("lidar/top/000000.ply", cut, ["top/000000.ply", "cut short?"]),
         ("dataset.yaml", frames_lost, ["dataset.yaml:", "'frames'", "are listed", "cut short?"]),
@@ -293,3 +301,118 @@ def test_files_are_cloud_optimised(recorded, tmp_path):
     for name in ("dem.tif", "error.tif"):
         said = subprocess.run([*check, tmp_path / name], capture_output=True, text=True)
         assert "is a valid cloud optimized GeoTIFF" in said.stdout, said
+
+
+def survey(path, rows=3000, **more):
+    """Level ground of a map, without poses, 0.2 m too high, with a blank in the middle."""
+    random = np.random.default_rng(8)
+    columns = {name: random.uniform(0, 30, rows) for name in "xy"}
+    columns["z"] = 240.2 + random.normal(0, 0.01, rows)
+    columns |= more
+    table = np.rec.fromarrays(list(columns.values()), names=list(columns))
+    table = table[np.hypot(table.x - 15, table.y - 15) > 4]
+    table.x += 600_000
+    table.y += 5_000_000
+    np.save(path, np.array(table.tolist(), dtype=table.dtype.descr))
+    return path
+
+
+def test_filled_heights_carry_what_all_data_are_off(tmp_path):
+    """Measured ones are known to 0.2 m, their common error; so filled ones are known no better."""
+    points = survey(tmp_path / "points.npy", 12000)
+    noise = ["--airborne", "--range-sd-m", "0.01", "--position-sd-m", "0.2"]
+    made(points, *noise, "--cell-m", "1", "-o", tmp_path / "dem.tif")
+    layers = bands(tmp_path / "dem.tif", tmp_path)
+    filled = layers[6] == 4
+    assert np.count_nonzero(filled) > 30
+    assert np.median(layers[8][filled]) == pytest.approx(0.2, rel=0.1)
+    # All of them are off by one standard deviation, to what the ground's noise adds.
+    z = (layers[0][filled] - 240) / layers[8][filled]
+    assert 0.8 < np.sqrt(np.mean(z**2)) < 1.1
+
+
+def test_coordinates_of_a_map_take_poses_or_a_word(tmp_path):
+    points = survey(tmp_path / "points.npy")
+    out = ["--cell-m", "1", "-o", tmp_path / "dem.tif"]
+    words = ["points.npy", "km from the sensor", "--airborne", "--poses"]
+    refused(tmp_path, points, *out, words=words)
+    assert "sensor's frame" not in made(points, *out, "--airborne")
+
+
+def test_returns_of_pulses_are_chosen(tmp_path):
+    """First ones are leaves 3 m above the ground, of last ones."""
+    rows = 3000
+    pulse = np.arange(rows) // 2
+    index = 1 + np.arange(rows) % 2
+    points = survey(tmp_path / "points.npy", rows, pulse=pulse, return_index=index)
+    table = np.load(points)
+    table["z"] += np.where(table["return_index"] == 1, 3, 0)
+    np.save(points, table)
+    for choice, height in (("first", 243.2), ("last", 240.2)):
+        out = tmp_path / f"{choice}.tif"
+        made(points, "--airborne", "--cell-m", "2", "--returns", choice, "-o", out, "--no-fill")
+        layers = bands(out, tmp_path)
+        assert np.nanmedian(layers[0]) == pytest.approx(height, abs=0.02), choice
+
+
+@pytest.mark.parametrize(
+    ("options", "words"),
+    [
+        (["--no-stereo", "--match-sd-px", "1"], ["--match-sd-px", "--no-stereo"]),
+        (["--no-stereo", "--stereo-frames", "0"], ["--stereo-frames", "--no-stereo"]),
+        (["--airborne", "--sight", "beams"], ["--sight", "--airborne"]),
+        (["--airborne", "--divergence-mrad", "3"], ["--divergence-mrad", "--airborne"]),
+        (["--no-fill", "--reach", "hull"], ["--reach", "--no-fill"]),
+        (["--method", "cgal", "--sight-margin-m", "1"], ["--sight-margin-m", "--method cgal"]),
+    ],
+)
+def test_options_that_would_do_nothing_are_refused(recorded, tmp_path, options, words):
+    refused(tmp_path, recorded, "--cell-m", "1", "-o", tmp_path / "dem.tif", *options, words=words)
+
+
+def test_options_of_noise_and_form_do_what_they_say(recorded, tmp_path):
+    def layers(name, *options):
+        out = tmp_path / f"{name}.tif"
+        made(
+            recorded, "--no-stereo", "--cell-m", "0.5", "--range-sd-m", "0.02", "-o", out, *options
+        )
+        return bands(out, tmp_path)
+
+    plain = layers("plain")
+    measured = plain[6] == 1
+    turned = layers("turned", "--attitude-sd-mrad", "10")
+    more = (turned[1] - plain[1])[measured & (turned[6] == 1)]
+    assert np.mean(more > 0) > 0.9  # of the variances
+    assert np.median(turned[8][turned[6] == 4]) > np.median(plain[8][plain[6] == 4])
+    smooth = layers("smooth", "--smooth")
+    both = measured & (smooth[6] == 1)
+    assert np.count_nonzero(both) > 100
+    assert 0 < np.max(np.abs(smooth[0] - plain[0])[both]) < 0.2
+    faired = layers("faired", "--method", "cgal")
+    assert np.array_equal(faired[0][measured], plain[0][measured])
+    assert np.all(np.isnan(faired[8]))
+    few = layers("few", "--area", "429445", "5150655", "429455", "5150665")
+    assert few.shape[1] == 20 * 20
+
+
+def test_the_picture_shows_what_is_what(recorded, tmp_path):
+    """Three panels of the DEM's samples: filled ones are orange in the second alone."""
+    out, picture = tmp_path / "dem.tif", tmp_path / "dem.png"
+    made(recorded, "--no-stereo", "--cell-m", "0.5", "-o", out, "--picture", picture)
+    image = cv2.imread(str(picture)).astype(int)
+    info = subprocess.run(["gdalinfo", out], check=True, capture_output=True, text=True).stdout
+    columns, rows = map(int, re.search(r"Size is (\d+), (\d+)", info).groups())
+    source = bands(out, tmp_path)[6].reshape(rows, columns)
+    scale = max(columns, rows) / 600
+    width, height = int(columns / scale), int(rows / scale)
+    assert image.shape == (height, 3 * width + 2 * 8, 3)
+    at = np.floor((np.arange(max(width, height)) + 0.5) * scale).astype(int)
+    shown = source[np.ix_(at[:height], at[:width])]
+    measured, both, sd = (image[:, k * (width + 8) :][:, :width] for k in range(3))
+    blue, red = both[..., 0], both[..., 2]
+    assert np.array_equal(red > 1.3 * blue, shown == 4)
+    dark = np.array([51, 36, 31])  # blue, green, red
+    assert np.array_equal(np.all(np.abs(measured - dark) <= 1, axis=2), shown != 1)
+    assert np.all(measured[shown == 1].std(axis=1) < 1)  # grey
+    assert np.array_equal(np.all(np.abs(both - dark) <= 1, axis=2), shown == 0)
+    assert np.array_equal(np.all(np.abs(sd - dark) <= 1, axis=2), shown == 0)

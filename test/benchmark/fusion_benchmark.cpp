@@ -41,6 +41,7 @@ class Survey {
     block.p_m.resize(count);
     block.sd_m.resize(count);
     block.bias_sd_m.resize(count);
+    block.lean.resize(count);
     block.across_sd_m.resize(count);
     block.groups.resize(count);
     block.origins.resize(count);
@@ -64,6 +65,7 @@ class Survey {
     block.p_m[i] = {x, y, z};
     block.sd_m[i] = static_cast<float>(sd_m);
     block.bias_sd_m[i] = is_lidar ? 0.004F : 0.02F;
+    block.lean[i] = {static_cast<float>(group % 3) - 1, 0.1F * static_cast<float>(group)};
     block.across_sd_m[i] = 0.02F;
     block.groups[i] = group;
     block.origins[i] = is_lidar ? PointOrigin::Lidar : PointOrigin::Stereo;

@@ -238,7 +238,8 @@ Section compare_scans(const Scan& reference, const Scan& other, const ScanOption
   add_sentences(section.text, doubts);
   add_sentences(section.text, doubts_about(pairs, errors, turn_rad));
   add_sentences(section.text, {pairing_text(reference, other, pairs)});
-  for (const auto& notes : {pairs.notes, reference.notes, other.notes,
+  const std::vector<std::string> frames{reference.frame, other.frame};
+  for (const auto& notes : {pairs.notes, frames, reference.notes, other.notes,
                             doubts_about_ranges(reference), doubts_about_ranges(other)}) {
     add_sentences(section.text, notes);
   }

@@ -6,6 +6,7 @@
 #include <array>
 #include <cmath>
 #include <glm/ext/scalar_constants.hpp>
+#include <glm/geometric.hpp>
 #include <vector>
 
 #include "core/random.h"
@@ -263,6 +264,68 @@ TEST(CellFit, ErrorsAreAsToldWithNoiseBiasAndOutliers) {
   EXPECT_NEAR(two / count, 0.954, 0.02);
   record_margin("normalised error of fused heights", rms - 1, 0.15);
   RecordProperty("coverage", fmt::format("{:.3f} {:.3f}", one / count, two / count));
+}
+
+// Cells of a plane, each seen by two pairs and a scan along a line that dips by 10 degrees.
+struct ObliqueView {
+  glm::dvec2 slope{0};
+  int most_points = 0;  // of a cell
+};
+
+MeasuredPoints seen_obliquely(const ObliqueView& view, const GridFrame& frame, std::size_t cells) {
+  const glm::dvec3 sight(std::cos(0.2) * std::cos(0.17), std::sin(0.2) * std::cos(0.17),
+                         -std::sin(0.17));
+  const glm::dvec2 lean = glm::dvec2(sight) / sight.z;
+  constexpr double across_m = 0.03;
+  MeasuredPoints points;
+  for (std::size_t cell = 0; cell < cells; ++cell) {
+    const glm::dvec2 sample = frame.to_D(
+        {static_cast<int>(cell) % frame.samples.x, static_cast<int>(cell) / frame.samples.x});
+    const std::size_t count = 4 + cell % static_cast<std::size_t>(view.most_points - 3);
+    for (std::size_t k = 0; k < count; ++k) {
+      const std::size_t i = 32 * cell + k;
+      const glm::dvec2 p = sample + (uniform(i, 20) - 0.5) * 0.4;
+      const auto group = static_cast<std::uint32_t>(3 * cell + k % 3);
+      const bool is_lidar = k % 3 == 0;
+      const double sd_m = is_lidar ? 0.01 : 0.02 + 0.03 * uniform(i, 21).x;
+      const double bias_m = is_lidar ? 0.003 : 0.02;
+      const double shift_m = bias_m * normal(group, 24).x;
+      const double along_m = sd_m * normal(i, 23).x + (is_lidar ? 0 : shift_m);  // its height
+      // Nothing but where the error takes a point of the ground that was met.
+      const glm::dvec2 met = p - along_m * lean - across_m * normal(i, 22);
+      add_point(points, {p, glm::dot(view.slope, met) + along_m + (is_lidar ? shift_m : 0)}, sd_m,
+                bias_m, across_m, group, is_lidar ? Lidar : Stereo, lean);
+    }
+  }
+  return points;
+}
+
+// Errors along lines of sight that dip by 10 degrees, 6 m in plan for each of height, on ground
+// that faces the sensor, lies level, falls away from it, or is seen from the side. 10^4 cells give
+// a root mean square of 1 within 1 % for exact normal errors; chi² is one-sided, so less is to be
+// expected.
+TEST(CellFit, ErrorsAlongLinesOfSightAreAsTold) {
+  const GridFrame frame = frame_over({{-20, -20}, {20, 20}}, 0.4);
+  const auto cells = testing::number_of(frame, {0, frame.samples.y});
+  for (const glm::dvec2 slope : {glm::dvec2(0.3, 0.06), {0, 0}, {-0.1, -0.02}, {-0.06, 0.3}}) {
+    const Fusion fusion = fuse_all(seen_obliquely({slope, 23}, frame, cells), frame);
+    double sum = 0, within = 0, count = 0;
+    for (std::size_t i = 0; i < cells; ++i) {
+      if (std::isnan(fusion.layers.elevation_m[i])) continue;
+      const glm::dvec2 p = frame.to_D(
+          {static_cast<int>(i) % frame.samples.x, static_cast<int>(i) / frame.samples.x});
+      const double z = (double{fusion.layers.elevation_m[i]} - glm::dot(slope, p)) /
+                       std::sqrt(double{fusion.layers.variance_m2[i]});
+      sum += z * z;
+      within += std::abs(z) <= 1 ? 1 : 0;
+      count += 1;
+    }
+    const double rms = std::sqrt(sum / count);
+    EXPECT_GT(count, 0.99 * static_cast<double>(cells));
+    EXPECT_NEAR(rms, 1, 0.15) << slope.x << ", " << slope.y;
+    EXPECT_NEAR(within / count, 0.683, 0.05);
+    record_margin(fmt::format("oblique errors, slope {} {}", slope.x, slope.y), rms - 1, 0.15);
+  }
 }
 
 }  // namespace

@@ -37,7 +37,8 @@ PointSource in_blocks(const MeasuredPoints& points, std::size_t most) {
     const std::size_t end = std::min(points.size(), next + most);
     for (; next < end; ++next) {
       add_point(block, points.p_m[next], points.sd_m[next], points.bias_sd_m[next],
-                points.across_sd_m[next], points.groups[next], points.origins[next]);
+                points.across_sd_m[next], points.groups[next], points.origins[next],
+                points.lean[next]);
     }
     return true;
   };
@@ -212,12 +213,12 @@ TEST(DemFusion, OrderBlocksThreadsAndMemoryDoNotMatter) {
   MeasuredPoints other;
   for (const std::size_t i : order) {
     add_point(other, points.p_m[i], points.sd_m[i], points.bias_sd_m[i], points.across_sd_m[i],
-              points.groups[i], points.origins[i]);
+              points.groups[i], points.origins[i], points.lean[i]);
   }
   for (const std::size_t threads : {1U, 3U}) {
     const tbb::global_control limit(tbb::global_control::max_allowed_parallelism, threads);
     for (const std::size_t bytes :
-         {std::size_t{1} << 30U, std::size_t{400'000}, std::size_t{250'000}}) {
+         {std::size_t{1} << 30U, std::size_t{480'000}, std::size_t{300'000}}) {
       FusionOptions options;
       options.memory_bytes = bytes;
       const Fusion again = fuse(in_blocks(other, 977), frame, options);

@@ -5,6 +5,7 @@
 #include <cstdint>
 #include <glm/ext/scalar_constants.hpp>
 #include <glm/geometric.hpp>
+#include <glm/matrix.hpp>
 #include <glm/trigonometric.hpp>
 #include <glm/vec2.hpp>
 #include <glm/vec3.hpp>
@@ -122,10 +123,12 @@ inline std::size_t number_of(const GridFrame& frame, glm::ivec2 sample) {
 
 /// Adds a point to all columns.
 inline void add_point(MeasuredPoints& points, const glm::dvec3& p_m, double sd_m, double bias_sd_m,
-                      double across_sd_m, std::uint32_t group, PointOrigin origin) {
+                      double across_sd_m, std::uint32_t group, PointOrigin origin,
+                      glm::vec2 lean = glm::vec2(0)) {
   points.p_m.push_back(p_m);
   points.sd_m.push_back(static_cast<float>(sd_m));
   points.bias_sd_m.push_back(static_cast<float>(bias_sd_m));
+  points.lean.push_back(lean);
   points.across_sd_m.push_back(static_cast<float>(across_sd_m));
   points.groups.push_back(group);
   points.origins.push_back(origin);
@@ -165,12 +168,13 @@ inline MeasuredPoints scan_by_lidar(const RollingGround& ground, const glm::dvec
       const bool is_outlier = dice.x < 0.01;
       const double range_m =
           is_outlier ? 0.5 + 30 * dice.y : *met_m + bias_m + range_sd_m * noise.x;
-      const double level2 = 1 - nominal.z * nominal.z, side_m = range_m * angle_sd;
-      add_point(points, from + range_m * nominal,
-                std::sqrt(std::pow(range_sd_m * nominal.z, 2) + side_m * side_m * level2),
-                bias_sd_m * std::abs(nominal.z),
-                std::sqrt(range_sd_m * range_sd_m * level2 + side_m * side_m), group,
-                PointOrigin::Lidar);
+      const double side_m = range_m * angle_sd;
+      const PointErrors errors =
+          point_errors(glm::dmat3(side_m * side_m) + (range_sd_m * range_sd_m - side_m * side_m) *
+                                                         glm::outerProduct(nominal, nominal));
+      add_point(points, from + range_m * nominal, double{errors.sd_m},
+                bias_sd_m * std::abs(nominal.z), double{errors.across_sd_m}, group,
+                PointOrigin::Lidar, errors.lean);
     }
   }
   return points;
@@ -213,13 +217,12 @@ inline MeasuredPoints match_by_stereo(const RollingGround& ground, const glm::dv
       const double side_m = seen_m / focal_px * noise_px;
       const glm::dvec3 seen =
           seen_m * (ray + noise_px / focal_px * (spread.x * right + spread.y * down));
-      const double level = glm::length(glm::dvec2(seen));
-      add_point(
-          points, from + seen,
-          std::sqrt(std::pow(per_px * noise_px * seen.z, 2) + side_m * side_m * (down.z * down.z)),
-          std::abs(per_px * bias_px * seen.z),
-          std::sqrt(0.5 * std::pow(per_px * noise_px * level, 2) + side_m * side_m), group,
-          PointOrigin::Stereo);
+      const glm::dvec3 deep_m = per_px * noise_px * seen;
+      const PointErrors errors = point_errors(
+          glm::outerProduct(deep_m, deep_m) +
+          side_m * side_m * (glm::outerProduct(right, right) + glm::outerProduct(down, down)));
+      add_point(points, from + seen, double{errors.sd_m}, std::abs(per_px * bias_px * seen.z),
+                double{errors.across_sd_m}, group, PointOrigin::Stereo, errors.lean);
     }
   }
   return points;

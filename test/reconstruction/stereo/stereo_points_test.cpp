@@ -144,12 +144,20 @@ TEST(StereoPoints, AreTurnedToD) {
   ASSERT_EQ(measured.size(), 2 * points.size());
   EXPECT_NEAR(measured.sd_m[i], std::sqrt(variance_m2), 1e-5 * std::sqrt(variance_m2));
   EXPECT_NEAR(measured.bias_sd_m[i], std::abs(glm::dot(up, point.by_disparity_m) * 0.1), 1e-6);
-  // The trace is the same in all frames.
-  const double trace_m2 =
-      point.covariance_m2[0][0] + point.covariance_m2[1][1] + point.covariance_m2[2][2];
+  // Distances from planes of slope g vary by n' C n with n = (-g, 1), whatever the slope; the rest
+  // of the place counts as the mean of both ways, so slopes of two ways at right angles are added.
   const double footprint_m = p_LQ.z / pair.focal_px;
-  EXPECT_NEAR(std::pow(measured.across_sd_m[i], 2),
-              (trace_m2 - variance_m2) / 2 + footprint_m * footprint_m / 12, 1e-5 * trace_m2);
+  for (const glm::dvec2 slope : {glm::dvec2(0.5, -0.2), {0.1, 0.9}, {-0.3, -0.3}}) {
+    double told_m2 = 0, true_m2 = 0;
+    for (const glm::dvec2 g : {slope, glm::dvec2(-slope.y, slope.x)}) {
+      const glm::dvec3 n = glm::conjugate(pair.X_DL.rotation) * glm::dvec3(-g, 1);
+      true_m2 +=
+          glm::dot(n, point.covariance_m2 * n) + glm::dot(g, g) * footprint_m * footprint_m / 12;
+      told_m2 += std::pow(measured.sd_m[i] * (1 - glm::dot(g, glm::dvec2(measured.lean[i]))), 2) +
+                 glm::dot(g, g) * std::pow(measured.across_sd_m[i], 2);
+    }
+    EXPECT_NEAR(told_m2, true_m2, 1e-5 * true_m2);
+  }
   EXPECT_EQ(measured.groups[i], 7U);
   EXPECT_EQ(measured.groups.back(), 8U);
   EXPECT_EQ(measured.origins[i], PointOrigin::Stereo);
