@@ -20,7 +20,7 @@ using namespace groundray::testing;  // NOLINT(google-build-using-namespace)
 constexpr int points = 1003;
 
 std::string rows() {
-  std::string bytes(points * 4 * sizeof(float), '\0');
+  std::string bytes(std::size_t{points} * 4 * sizeof(float), '\0');
   for (int i = 0; i < points * 4; ++i) {
     const float value = 0.25f * static_cast<float>(i) + 1;
     std::memcpy(bytes.data() + static_cast<std::size_t>(i) * sizeof value, &value, sizeof value);

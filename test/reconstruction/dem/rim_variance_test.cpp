@@ -64,7 +64,8 @@ TEST(RimVariance, IsThatOfANearSampleWhateverTheirPlaces) {
   }
   const auto distance_m = [&](std::size_t a, std::size_t b) {
     const auto x = static_cast<double>(a % 61) - static_cast<double>(b % 61);
-    const auto y = static_cast<double>(a / 61) - static_cast<double>(b / 61);
+    const std::size_t row_a = a / 61, row_b = b / 61;
+    const double y = static_cast<double>(row_a) - static_cast<double>(row_b);
     return std::hypot(0.5 * x, 2 * y);
   };
   add_rim_variance(layers);
