@@ -696,8 +696,12 @@ def test_known_scene_is_built_anew_better_than_by_others(scans):
     for peer in ("advancing_front", "ball_pivoting"):
         assert total("groundray", "f1") >= total(peer, "f1"), runs
 
+    # A tenth in the mean of ten scenes; one small scene has an eighth at worst, and processors
+    # that do other work give up to half as much again.
+    most = 0.1 if is_full else 0.2
+
     def is_fast() -> bool:
-        return all(total("groundray", "cpu_s") <= 0.1 * total(peer, "cpu_s") for peer in timed)
+        return all(total("groundray", "cpu_s") <= most * total(peer, "cpu_s") for peer in timed)
 
     tries = [runs[0]]
     while not is_full and not is_fast() and len(tries) < 3:  # ten seeds need no more
