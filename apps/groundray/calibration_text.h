@@ -4,7 +4,7 @@
 #include <string>
 #include <string_view>
 
-#include "apps/groundray/world.h"
+#include "apps/scene/world.h"
 
 namespace groundray {
 

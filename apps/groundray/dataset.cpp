@@ -15,9 +15,10 @@
 #include <string>
 #include <string_view>
 
+#include "apps/dataset/dataset_listing.h"
 #include "apps/groundray/calibration_text.h"
-#include "apps/groundray/fingerprint.h"
 #include "apps/groundray/images.h"
+#include "apps/scene/fingerprint.h"
 #include "core/error.h"
 #include "core/product_io.h"
 

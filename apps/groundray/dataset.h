@@ -6,14 +6,12 @@
 #include <string_view>
 #include <vector>
 
-#include "apps/groundray/world.h"
+#include "apps/scene/world.h"
 
 namespace groundray {
 
 /// What the comment of a scan with its convergence begins with; a YAML mapping follows.
 inline constexpr std::string_view convergence_comment = "convergence ";
-/// What the names of scans end with.
-inline constexpr std::string_view scan_suffix = ".ply";
 
 /// The folder that a run fills (docs/formats.md). Made anew, or taken up again where an earlier run
 /// of the same scene, seed and version stopped.

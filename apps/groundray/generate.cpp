@@ -12,16 +12,17 @@
 #include <utility>
 #include <vector>
 
+#include "apps/dataset/dataset_listing.h"
 #include "apps/groundray/dataset.h"
 #include "apps/groundray/images.h"
 #include "apps/groundray/preview.h"
-#include "apps/groundray/world.h"
 #include "apps/interruption.h"
+#include "apps/scene/frame_scene.h"
+#include "apps/scene/world.h"
 #include "core/npy_io.h"
 #include "core/ply_io.h"
 #include "core/product_io.h"
 #include "core/progress.h"
-#include "terrain/terrain_scene.h"
 
 namespace groundray {
 namespace {
@@ -37,43 +38,6 @@ struct Tally {
   std::uint64_t points = 0;
   std::uint64_t pulses = 0;
   std::chrono::duration<double> scanning{0};
-};
-
-// Makes scenes as frames ask for them: the float frame L follows the sensor over its lattice, the
-// levels of the terrain follow its positions during the frame, so that a frame's bytes depend on
-// the frame alone.
-class SceneFor {
- public:
-  explicit SceneFor(const World& world) : world_(world) {}
-
-  const Scene& operator()(const Exposed& frame) {
-    const glm::dvec3 p_DL = float_frame_origin(frame.X_DS->pose_at(frame.begin).translation_m);
-    const HeightGrid* whole = world_.terrain.whole();
-    if (whole == nullptr) {
-      const SensorBox sensors = sensor_box(frame);
-      clipmap_ =
-          clipmap_ ? clipmap_->moved_to(sensors) : world_.terrain.clipmap(sensors, world_.reach_m);
-      take(build_tracer(*clipmap_, p_DL, world_.spec.tracing, scene_ ? &scene_->rays : nullptr));
-    } else if (!scene_ || p_DL != p_DL_) {
-      scene_.reset();  // before the next one is built: two would need twice the memory
-      take({{full_resolution_level(*whole)}, p_DL, world_.spec.tracing});
-    }
-    p_DL_ = p_DL;
-    return *scene_;
-  }
-
- private:
-  void take(RayTracer rays) {
-    const Content& content = world_.content;
-    scene_ = Scene{std::move(rays),   {.label = world_.spec.terrain.label},
-                   content.materials, content.objects,
-                   content.models,    content.cover};
-  }
-
-  const World& world_;
-  glm::dvec3 p_DL_{0};
-  std::optional<Clipmap> clipmap_;
-  std::optional<Scene> scene_;
 };
 
 struct Frame {
@@ -132,8 +96,8 @@ std::vector<std::string> comments_of(const World& world, const LidarScan& scan) 
   return comments;
 }
 
-void make_scan(const World& world, const Dataset& dataset, const Frame& which, SceneFor& scene_for,
-               Tally& tally) {
+void make_scan(const World& world, const Dataset& dataset, const Frame& which,
+               FrameScene& scene_for, Tally& tally) {
   const auto [sensor, frame] = which;
   const PlacedLidar& lidar = world.lidars[sensor];
   const ScanPattern& pattern = lidar.lidar.pattern();
@@ -151,8 +115,8 @@ void make_scan(const World& world, const Dataset& dataset, const Frame& which, S
   write_ply(dataset.product_path(lidar, frame, scan_suffix), scan.echoes, comments_of(world, scan));
 }
 
-void make_frame(const World& world, const Dataset& dataset, const Frame& which, SceneFor& scene_for,
-                Tally& tally) {
+void make_frame(const World& world, const Dataset& dataset, const Frame& which,
+                FrameScene& scene_for, Tally& tally) {
   if (which.sensor < world.lidars.size()) return make_scan(world, dataset, which, scene_for, tally);
   const std::size_t camera = which.sensor - world.lidars.size();
   const auto begin = Clock::now();
@@ -209,7 +173,7 @@ void generate(const std::filesystem::path& scene, const std::filesystem::path& o
   }
   const Dataset dataset(out, world);
   const std::vector<Frame> frames = missing_frames(world, dataset);
-  SceneFor scene_for(world);
+  FrameScene scene_for(world);
   Tally tally;
   try {
     Progress progress(stderr, "frames", frames.size());

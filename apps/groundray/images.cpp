@@ -13,6 +13,7 @@
 #include <utility>
 #include <variant>
 
+#include "apps/dataset/dataset_listing.h"
 #include "apps/groundray/camera_preview.h"
 #include "apps/interruption.h"
 #include "core/exr_io.h"

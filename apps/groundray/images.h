@@ -7,7 +7,7 @@
 #include <vector>
 
 #include "apps/groundray/dataset.h"
-#include "apps/groundray/world.h"
+#include "apps/scene/world.h"
 
 namespace groundray {
 

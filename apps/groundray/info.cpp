@@ -14,7 +14,7 @@
 #include <variant>
 #include <vector>
 
-#include "apps/groundray/world.h"
+#include "apps/scene/world.h"
 #include "terrain/certificate.h"
 #include "terrain/dem_file.h"
 #include "terrain/dem_io.h"

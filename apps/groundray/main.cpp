@@ -8,7 +8,7 @@
 #include <new>
 #include <optional>
 
-#include "apps/groundray/fill_command.h"
+#include "apps/groundray/dem/fill_command.h"
 #include "apps/groundray/generate.h"
 #include "apps/groundray/info.h"
 #include "apps/groundray/reconstruct_commands.h"

@@ -1,6 +1,6 @@
 #pragma once
 
-#include "apps/groundray/world.h"
+#include "apps/scene/world.h"
 #include "core/image.h"
 #include "core/point_cloud.h"
 

@@ -10,8 +10,8 @@
 #include <string>
 #include <vector>
 
-#include "apps/groundray/dem_command.h"
-#include "apps/groundray/rebuild.h"
+#include "apps/groundray/dem/dem_command.h"
+#include "apps/groundray/mesh/rebuild.h"
 #include "apps/groundray/scan_options.h"
 #include "core/error.h"
 

@@ -3,8 +3,8 @@
 #include <CLI/CLI.hpp>
 #include <string>
 
-#include "apps/groundray/scan_files.h"
-#include "apps/groundray/scan_input.h"
+#include "apps/dataset/scan_files.h"
+#include "apps/dataset/scan_input.h"
 #include "apps/scan/number_checks.h"
 #include "apps/scan/scan_flags.h"
 

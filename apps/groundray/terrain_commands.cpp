@@ -9,8 +9,8 @@
 #include <map>
 #include <utility>
 
-#include "apps/groundray/certifying.h"
 #include "apps/interruption.h"
+#include "apps/scene/certifying.h"
 #include "core/mesh_io.h"
 #include "terrain/certificate.h"
 #include "terrain/dem_file.h"

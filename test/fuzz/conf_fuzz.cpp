@@ -2,7 +2,7 @@
 #include <cstdint>
 #include <string_view>
 
-#include "apps/groundray/range_conf.h"
+#include "apps/dataset/range_conf.h"
 #include "core/error.h"
 
 /// Whatever the text, parse_conf returns poses or throws Error.

@@ -2,7 +2,7 @@
 #include <cstdint>
 #include <string_view>
 
-#include "apps/groundray/packed_file.h"
+#include "apps/dataset/packed_file.h"
 #include "core/error.h"
 
 /// Whatever the bytes, unpack returns what is in them or throws Error.

@@ -1,0 +1,112 @@
+#include "apps/dataset/dataset_listing.h"
+
+#include <algorithm>
+#include <array>
+#include <cmath>
+#include <utility>
+
+#include "core/error.h"
+#include "sensors/yaml_reader.h"
+
+namespace groundray {
+namespace {
+
+namespace fs = std::filesystem;
+using yaml::Need;
+
+constexpr yaml::Rule stamp_rule{[](double value) { return std::abs(value) < 9e9; },
+                                "must be within 9e9 s"};  // what nanoseconds hold
+
+Georeference read_georeference(yaml::Map& root) {
+  Georeference georeference;
+  std::array<double, 3> origin_m{};
+  root.read_numbers("origin_w_m", Need::Required, origin_m);
+  georeference.origin_w_m = {origin_m[0], origin_m[1], origin_m[2]};
+  const auto read_text = [&](const char* key, std::string& into) {
+    if (const yaml::Node* node = root.find(key, Need::Optional)) into = node->text;  // or empty
+  };
+  read_text("crs", georeference.crs_name);
+  read_text("crs_wkt", georeference.crs_wkt);
+  return georeference;
+}
+
+// What is listed of frames must be as many as the sensor says that it has.
+void check_count(const std::string& name, yaml::Map& sensor, yaml::Faults& faults,
+                 const DatasetListing& listing) {
+  std::uint64_t count = 0;
+  const yaml::Node* node = sensor.read_whole("frames", Need::Optional, count);
+  const DatasetListing::Frames frames = listing.frames_of(name);
+  const std::size_t listed = frames.done.size() + frames.pending;
+  if (node != nullptr && listed != count)
+    faults.add(*node, "frames", "{} has {} frames, but {} are listed: was the file cut short?",
+               name, count, listed);
+}
+
+// After the frames are known.
+void read_sensor(const yaml::Node& node, yaml::Faults& faults, DatasetListing& listing) {
+  yaml::Map sensor(node, "sensors", faults);
+  DatasetListing::Pair pair;
+  std::string kind;
+  sensor.read_text("name", Need::Required, pair.name);
+  sensor.read_text("kind", Need::Required, kind);
+  if (kind == "lidar") listing.lidars.push_back(pair.name);
+  if (kind == "camera") listing.cameras.push_back(pair.name);
+  if (kind == "stereo") {
+    sensor.read_text("left", Need::Required, pair.left);
+    sensor.read_text("right", Need::Required, pair.right);
+    listing.pairs.push_back(std::move(pair));
+  } else {
+    check_count(pair.name, sensor, faults, listing);
+  }
+  sensor.close_partly();
+}
+
+void read_frame(const yaml::Node& node, yaml::Faults& faults, DatasetListing& listing) {
+  yaml::Map frame(node, "frames", faults);
+  std::string sensor;
+  std::uint64_t number = 0;
+  double stamp_s = 0;
+  bool is_done = false;
+  frame.read_text("sensor", Need::Required, sensor);
+  frame.read_whole("frame", Need::Required, number);
+  frame.read_number("stamp_s", Need::Required, stamp_s, stamp_rule);
+  frame.read_choice("state", Need::Required, is_done, {{"done", true}, {"pending", false}});
+  DatasetListing::Frames& frames = listing.frames[sensor];
+  if (is_done)
+    frames.done.push_back(
+        {.number = static_cast<std::int64_t>(number), .stamp = time_of(stamp_s), .file = {}});
+  else
+    ++frames.pending;
+  frame.close_partly();
+}
+
+}  // namespace
+
+DatasetListing::Frames DatasetListing::frames_of(const std::string& sensor) const {
+  const auto found = frames.find(sensor);
+  return found == frames.end() ? Frames{} : found->second;
+}
+
+DatasetListing read_listing(const fs::path& folder) {
+  const fs::path path = folder / "dataset.yaml";
+  yaml::Faults faults(path);
+  const yaml::Node node = yaml::parse(yaml::read_file(path), path);
+  yaml::Map root(node, "", faults);
+  yaml::check_version(root, "groundray_dataset", faults);
+  DatasetListing listing{.georeference = read_georeference(root)};
+  for (const yaml::Node& frame : root.list("frames", Need::Required))
+    read_frame(frame, faults, listing);
+  for (const yaml::Node& sensor : root.list("sensors", Need::Required))
+    read_sensor(sensor, faults, listing);
+  root.close_partly();
+  faults.throw_if_any();
+  for (auto& [sensor, frames] : listing.frames)
+    std::ranges::sort(frames.done, {}, &RecordedFrame::number);
+  return listing;
+}
+
+std::chrono::nanoseconds time_of(double time_s) {
+  return std::chrono::nanoseconds(std::llround(time_s * 1e9));
+}
+
+}  // namespace groundray

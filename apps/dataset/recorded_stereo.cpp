@@ -1,0 +1,115 @@
+#include "apps/dataset/recorded_stereo.h"
+
+#include <fmt/format.h>
+#include <fmt/ranges.h>
+
+#include <algorithm>
+#include <cmath>
+#include <system_error>
+
+#include "core/error.h"
+#include "core/product_io.h"
+#include "sensors/lens_reader.h"
+#include "sensors/yaml_reader.h"
+
+namespace groundray {
+namespace {
+
+namespace fs = std::filesystem;
+using std::chrono::nanoseconds;
+using yaml::Need;
+
+constexpr yaml::Rule pixels_rule{
+    [](double value) { return value >= 1 && value <= 65536 && value == std::floor(value); },
+    "must be a whole number from 1 to 65536"};
+constexpr yaml::Rule time_rule{[](double value) { return value >= 0 && value <= 3600; },
+                               "must be a number of seconds from 0 to 3600"};
+
+void read_calibration(const fs::path& path, RecordedCamera& camera) {
+  yaml::Faults faults(path);
+  const yaml::Node node = yaml::parse(yaml::read_file(path), path);
+  yaml::Map root(node, "", faults);
+  std::array<double, 2> size_px{};
+  root.read_numbers("size_px", Need::Required, size_px, pixels_rule);
+  root.read_number("exposure_s", Need::Required, camera.exposure_s, time_rule);
+  root.read_number("row_s", Need::Required, camera.row_s, time_rule);
+  if (const yaml::Node* lens = root.find("lens", Need::Required))
+    camera.lens = read_lens(*lens, path, faults).model;
+  root.close_partly();
+  faults.throw_if_any();
+  camera.size_px = {static_cast<int>(size_px[0]), static_cast<int>(size_px[1])};
+}
+
+// The picture that the camera gives, else the light that it was made of.
+fs::path image_file(const fs::path& dataset, const std::string& camera, std::int64_t number) {
+  const fs::path stem = dataset / "camera" / camera / fmt::format("{:06}", number);
+  for (const char* ending : {".png", ".exr"}) {
+    fs::path file = stem.string() + ending;
+    std::error_code ignored;
+    if (fs::is_regular_file(file, ignored)) return file;
+  }
+  throw Error(
+      "{}: there is neither {}.png nor {}.exr, though dataset.yaml says that the image is done: "
+      "was it removed, or may you not read it? If the scene does not ask for it, give the camera "
+      "the product picture or "
+      "radiance",
+      dataset.string(), stem.string(), stem.string());
+}
+
+RecordedCamera read_camera(const fs::path& dataset, const std::string& name,
+                           const DatasetListing& listing) {
+  RecordedCamera camera{.name = name,
+                        .X_DC = read_tum(dataset / "poses" / (name + ".tum")),
+                        .lens = Pinhole{},
+                        .frames = {}};
+  read_calibration(dataset / "calibration" / (name + ".yaml"), camera);
+  camera.frames = listing.frames_of(name).done;
+  for (RecordedFrame& frame : camera.frames) frame.file = image_file(dataset, name, frame.number);
+  return camera;
+}
+
+// The pair that a name or two names of cameras mean.
+DatasetListing::Pair pair_named(const std::string& word, const DatasetListing& listing,
+                                const fs::path& dataset) {
+  const auto pair = std::ranges::find(listing.pairs, word, &DatasetListing::Pair::name);
+  if (pair != listing.pairs.end()) return *pair;
+  const std::size_t comma = word.find(',');
+  std::vector<std::string> names;
+  for (const DatasetListing::Pair& each : listing.pairs) names.push_back(each.name);
+  if (comma == std::string::npos) {
+    throw Error("{}: it has no stereo pair '{}'; it has: {}{}", dataset.string(), word,
+                names.empty() ? "none" : fmt::format("{}", fmt::join(names, ", ")),
+                yaml::suggestion(word, names));
+  }
+  DatasetListing::Pair made{word, word.substr(0, comma), word.substr(comma + 1)};
+  for (const std::string* camera : {&made.left, &made.right}) {
+    if (std::ranges::find(listing.cameras, *camera) != listing.cameras.end()) continue;
+    throw Error("{}: it has no camera '{}' for the stereo pair {}; it has: {}{}", dataset.string(),
+                *camera, word, fmt::join(listing.cameras, ", "),
+                yaml::suggestion(*camera, listing.cameras));
+  }
+  return made;
+}
+
+}  // namespace
+
+nanoseconds RecordedCamera::middle(const RecordedFrame& frame) const {
+  return frame.stamp + time_of((exposure_s + row_s * (size_px.y - 1)) / 2);
+}
+
+std::vector<RecordedPair> read_stereo_pairs(const fs::path& dataset,
+                                            const std::vector<std::string>& names) {
+  const DatasetListing listing = read_listing(dataset);
+  std::vector<DatasetListing::Pair> wanted =
+      names.empty() ? listing.pairs : std::vector<DatasetListing::Pair>{};
+  for (const std::string& name : names) wanted.push_back(pair_named(name, listing, dataset));
+  std::vector<RecordedPair> pairs;
+  for (const DatasetListing::Pair& pair : wanted) {
+    pairs.push_back({.name = pair.name,
+                     .cameras = {read_camera(dataset, pair.left, listing),
+                                 read_camera(dataset, pair.right, listing)}});
+  }
+  return pairs;
+}
+
+}  // namespace groundray

@@ -1,0 +1,277 @@
+#include "apps/groundray/dem/fill_command.h"
+
+#include <fmt/format.h>
+
+#include <algorithm>
+#include <cmath>
+#include <cstddef>
+#include <cstdint>
+#include <cstdio>
+#include <filesystem>
+#include <map>
+#include <optional>
+#include <string>
+#include <vector>
+
+#include "apps/groundray/result_files.h"
+#include "apps/interruption.h"
+#include "core/error.h"
+#include "core/progress.h"
+#include "reconstruction/dem/dem_fill.h"
+#include "reconstruction/dem/inpaint_fill.h"
+#include "reconstruction/dem/mesh_fill.h"
+#include "terrain/dem_io.h"
+#include "terrain/gdal_fill.h"
+#include "terrain/layers_io.h"
+
+namespace groundray {
+namespace {
+
+namespace fs = std::filesystem;
+
+enum class Method { Tension, Cgal, Gdal, Telea, NavierStokes };
+
+// Shows how far filling is, and stops it when asked to.
+Work shown_work(std::optional<Progress>& progress) {
+  return {.progress = [&progress](double share) {
+    stop_if_interrupted();
+    constexpr std::uint64_t steps = 1000;
+    if (!progress) progress.emplace(stderr, "filling, per mille", steps);
+    progress->update(static_cast<std::uint64_t>(share * steps));
+  }};
+}
+
+// Heights of another raster of the same samples.
+std::vector<float> load_bounds(const fs::path& path, const Dem& dem) {
+  const Dem bounds = load_dem(path);
+  const GridFrame &a = dem.grid.frame(), &b = bounds.grid.frame();
+  const glm::dvec2 apart = (b.to_D({0, 0}) + glm::dvec2(bounds.origin_w_m)) -
+                           (a.to_D({0, 0}) + glm::dvec2(dem.origin_w_m));
+  constexpr double tolerance = 1e-6;  // of a cell
+  const auto differs = [&](double by_m, double step_m) {
+    return !(std::abs(by_m) <= tolerance * std::abs(step_m));
+  };
+  if (a.samples != b.samples || differs(apart.x, a.step_m.x) || differs(apart.y, a.step_m.y) ||
+      differs(b.step_m.x - a.step_m.x, a.step_m.x) || differs(b.step_m.y - a.step_m.y, a.step_m.y))
+    throw Error(
+        "{}: its samples are not those of the DEM: {} x {} instead of {} x {}, or elsewhere; warp "
+        "it with gdalwarp -te ... -ts {} {}",
+        path.string(), b.samples.x, b.samples.y, a.samples.x, a.samples.y, a.samples.x,
+        a.samples.y);
+  const auto heights_m = bounds.grid.heights_m();
+  return {heights_m.begin(), heights_m.end()};
+}
+
+const char* word_for(HoleFate fate) {
+  switch (fate) {
+    case HoleFate::Filled:
+      return "filled";
+    case HoleFate::Open:
+      return "not enclosed by data (--reach)";
+    case HoleFate::TooFar:
+      return "too far from data (--farthest-m)";
+    case HoleFate::TooLarge:
+      return "too large (--largest-share)";
+    case HoleFate::NoGround:
+      return "without data beside them";
+    case HoleFate::Partly:
+      return "filled in part or not, the method leaves them";
+  }
+  return "";
+}
+
+void print_holes(const FilledHeights& filled) {
+  fmt::print("{:>8} {:>12} {:>12}  what became of them\n", "holes", "samples", "farthest m");
+  for (const HoleFate fate : {HoleFate::Filled, HoleFate::Open, HoleFate::TooFar,
+                              HoleFate::TooLarge, HoleFate::NoGround, HoleFate::Partly}) {
+    std::size_t holes = 0, samples = 0;
+    double farthest_m = 0;
+    for (const RasterHole& hole : filled.holes) {
+      if (hole.fate != fate) continue;
+      ++holes;
+      samples += hole.samples;
+      farthest_m = std::max(farthest_m, hole.farthest_m);
+    }
+    if (holes > 0)
+      fmt::print("{:>8} {:>12} {:>12.4g}  {}\n", holes, samples, farthest_m, word_for(fate));
+  }
+}
+
+void print_trials(const FilledHeights& filled) {
+  if (filled.trials.empty()) return;
+  fmt::print("{:>28} {:>8} {:>11} {:>8} {:>9} {:>9} {:>9}\n", "kind of hole, cells", "tension",
+             "smoothness", "tried", "in 1 sd", "in 2 sd", "widened");
+  for (const TrialReport& trial : filled.trials) {
+    const std::string kind =
+        fmt::format("{}{}, {:.0f} to {:.0f}", trial.is_shadow ? "shadow, " : "",
+                    trial.is_long ? "long" : "compact", trial.from_cells, trial.to_cells);
+    if (trial.samples == 0) {
+      fmt::print("{:>28} {:>8g} {:>11g}  no ground to try it on\n", kind, trial.form.tension,
+                 trial.form.smoothness);
+      continue;
+    }
+    fmt::print("{:>28} {:>8g} {:>11g} {:>8} {:>7.1f} % {:>7.1f} % {:>9.2f}\n", kind,
+               trial.form.tension, trial.form.smoothness, trial.samples, 100 * trial.within_1sd,
+               100 * trial.within_2sd, trial.widened_by);
+  }
+}
+
+void print_bounds(const FilledHeights& filled) {
+  std::size_t held = 0, holes = 0;
+  for (const RasterHole& hole : filled.holes) {
+    held += hole.at_bound;
+    holes += hole.is_least ? 0 : 1;
+  }
+  fmt::print("{} filled samples are held down by a bound\n", held);
+  if (holes > 0) fmt::print("{} holes are held down by more than they should be\n", holes);
+}
+
+}  // namespace
+
+struct FillCommand::Options {
+  CLI::App* command = nullptr;
+  fs::path dem, out, sd_out, bound;
+  DemOptions reading;
+  Method method = Method::Tension;
+  FillOptions filling;
+  std::optional<double> tension, smoothness;
+  std::size_t most_edges = 1000;
+
+  void add_files() {
+    command
+        ->add_option("DEM", dem, "Any raster of heights that GDAL reads (GeoTIFF, VRT, HGT, ...)")
+        ->required();
+    command->add_option("-o,--output", out, "GeoTIFF to write: heights in metres, CRS as the DEM's")
+        ->required();
+    command->add_option("--sd-out", sd_out,
+                        "GeoTIFF for the standard deviation of filled heights (tension only)");
+    command->add_option("--bound", bound,
+                        "Raster of the same samples: heights that filled ones stay below");
+    command->add_option("--nodata", reading.nodata,
+                        "A height that means 'none', besides the one that the file declares");
+    command->add_option("--reproject-to", reading.reproject_to,
+                        "A CRS to warp to, such as EPSG:32631, or utm for the zone that fits");
+  }
+
+  void add_choices() {
+    const std::map<std::string, Method> methods{{"tension", Method::Tension},
+                                                {"cgal", Method::Cgal},
+                                                {"gdal", Method::Gdal},
+                                                {"telea", Method::Telea},
+                                                {"ns", Method::NavierStokes}};
+    command
+        ->add_option(
+            "--method", method,
+            "tension: smoothest surface (default); cgal: by triangulated, refined and "
+            "faired meshes; to compare with: gdal, as gdal_fillnodata; telea and ns, OpenCV's "
+            "inpainting")
+        ->transform(CLI::CheckedTransformer(methods))
+        ->option_text("tension|cgal|gdal|telea|ns");
+    const std::map<std::string, FillReach> reaches{{"enclosed", FillReach::Enclosed},
+                                                   {"hull", FillReach::Hull},
+                                                   {"everywhere", FillReach::Everywhere}};
+    command
+        ->add_option(
+            "--reach", filling.reach,
+            "enclosed: holes that do not touch the edge (default); hull: within the convex "
+            "hull of data; everywhere")
+        ->transform(CLI::CheckedTransformer(reaches))
+        ->option_text("enclosed|hull|everywhere");
+    command
+        ->add_option("--farthest-m", filling.farthest_m,
+                     "Leave holes some of which is farther from data (50 cells)")
+        ->check(CLI::PositiveNumber);
+    command
+        ->add_option("--largest-share", filling.largest_share,
+                     "Leave holes that are a larger share of the raster (0.2)")
+        ->check(CLI::Range(0.0, 1.0));
+    command->add_option("--tension", tension, "0 to below 1, instead of what trials show is best");
+    command->add_option("--smoothness", smoothness, "0 or more, likewise");
+    command->add_option("--most-edges", most_edges,
+                        "Of a rim, for cgal: leave holes with more (1000)");
+  }
+
+  FilledHeights fill(const Dem& read) {
+    const GridFrame& frame = read.grid.frame();
+    const auto heights_m = read.grid.heights_m();
+    if (tension || smoothness)
+      filling.form = PlateForm{tension.value_or(0), smoothness.value_or(0)};
+    std::optional<Progress> progress;
+    if (method == Method::Cgal)
+      return fill_dem_by_mesh(frame, heights_m, filling, most_edges, shown_work(progress));
+    if (method == Method::Gdal) {
+      const double farthest_cells = std::hypot(frame.samples.x, frame.samples.y);
+      return take_filling(frame, heights_m, fill_by_gdal(frame.samples, heights_m, farthest_cells),
+                          filling);
+    }
+    if (method != Method::Tension) {
+      const Inpainting by = method == Method::Telea ? Inpainting::Telea : Inpainting::NavierStokes;
+      return take_filling(frame, heights_m, fill_by_inpainting(frame.samples, heights_m, by),
+                          filling);
+    }
+    std::vector<float> most_m;
+    if (!bound.empty()) most_m = load_bounds(bound, read);
+    return fill_dem(frame, heights_m, most_m, filling, shown_work(progress));
+  }
+
+  void refuse_mixtures() const {
+    if (method == Method::Tension) return;
+    if (!sd_out.empty() || !bound.empty() || tension || smoothness)
+      throw Error(
+          "--sd-out, --bound, --tension and --smoothness go with --method tension alone; leave "
+          "them out, or the method");
+  }
+
+  void check_files() const {
+    std::vector<fs::path> results{out}, inputs{dem};
+    if (!sd_out.empty()) results.push_back(sd_out);
+    if (!bound.empty()) inputs.push_back(bound);
+    for (const fs::path& result : results) check_ending(result, {".tif", ".tiff"});
+    check_results(results, inputs);
+  }
+
+  void write(const Dem& read, const FilledHeights& filled) const {
+    const RasterForm form = read_form(dem);
+    const Georeference place{.origin_w_m = read.origin_w_m, .crs_wkt = read.crs_wkt};
+    const RasterLayer heights{"elevation", "m", filled.heights_m}, sds{"fill_sd", "m", filled.sd_m};
+    ResultFiles files;
+    files.write(out, [&](const fs::path& path) {
+      write_layers(path, read.grid.frame(), place, {&heights, 1}, form);
+    });
+    if (!sd_out.empty()) {
+      files.write(sd_out, [&](const fs::path& path) {
+        write_layers(path, read.grid.frame(), place, {&sds, 1}, {.is_point = form.is_point});
+      });
+    }
+    files.appear();
+  }
+
+  void run() {
+    refuse_mixtures();
+    check_files();
+    const Dem read = load_dem(dem, reading);
+    const FilledHeights filled = fill(read);
+    stop_if_interrupted();
+    write(read, filled);
+    print_holes(filled);
+    if (method == Method::Tension) print_trials(filled);
+    if (!bound.empty()) print_bounds(filled);
+    fmt::print("{} of {} missing samples filled; written to {}\n", filled.filled,
+               read.grid.hole_count(), out.string());
+  }
+};
+
+FillCommand::FillCommand(CLI::App& terrain) : options_(std::make_unique<Options>()) {
+  options_->command = terrain.add_subcommand(
+      "fill", "Fill blank areas of a DEM, and tell how far off the filled heights may be");
+  options_->add_files();
+  options_->add_choices();
+}
+
+FillCommand::~FillCommand() = default;
+
+bool FillCommand::is_asked_for() const { return options_->command->parsed(); }
+
+void FillCommand::run() const { options_->run(); }
+
+}  // namespace groundray

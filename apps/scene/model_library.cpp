@@ -1,0 +1,138 @@
+#include "apps/scene/model_library.h"
+
+#include <fmt/ranges.h>
+
+#include <algorithm>
+#include <span>
+#include <string_view>
+#include <tuple>
+#include <utility>
+
+#include "core/displacement.h"
+#include "core/error.h"
+#include "core/image_io.h"
+#include "core/model_io.h"
+#include "core/product_io.h"
+#include "terrain/asset.h"
+
+namespace groundray {
+namespace {
+
+// All that says what a source makes; another member does not go unnoticed, for then this does not
+// compile.
+auto parts(const AssetSpec& spec) {
+  const auto& [kind, size_m, width_m, sag_m, square_m, leaf_area_index, seed, detail] = spec;
+  return std::tuple(kind, size_m, width_m, sag_m, square_m, leaf_area_index, seed.value, detail);
+}
+auto parts(const ModelSource& source) {
+  const auto& [file, options, displacement] = source;
+  const auto& [metres_per_unit, up, broken] = options;
+  const auto& [image, amplitude_m, middle, cell_m] = displacement.value_or(DisplacementSource{});
+  return std::tuple(file, metres_per_unit, up, broken, image, amplitude_m, middle, cell_m);
+}
+
+bool are_equal(const std::variant<AssetSpec, ModelSource>& a,
+               const std::variant<AssetSpec, ModelSource>& b) {
+  if (a.index() != b.index()) return false;
+  if (const auto* asset = std::get_if<AssetSpec>(&a))
+    return parts(*asset) == parts(std::get<AssetSpec>(b));
+  return parts(std::get<ModelSource>(a)) == parts(std::get<ModelSource>(b));
+}
+
+Model make(const std::variant<AssetSpec, ModelSource>& source) {
+  if (const auto* asset = std::get_if<AssetSpec>(&source)) return make_asset(*asset);
+  const auto& [file, options, displacement] = std::get<ModelSource>(source);
+  Model model = read_model(file, options).model;
+  if (!displacement) return model;
+  const auto& [image, amplitude_m, middle, cell_m] = *displacement;
+  try {
+    return displaced(model, {read_heights(image), amplitude_m, middle, cell_m});
+  } catch (const Error& fault) {
+    throw Error("{}: {}", file.string(), fault.what());
+  }
+}
+
+// Materials are given to surfaces that are there.
+void check_names(const ModelSpec& spec, const Model& model) {
+  for (const auto& [name, material] : spec.materials) {
+    if (std::ranges::count(model.surfaces, name, &ModelSurface::name) > 0) continue;
+    std::vector<std::string_view> names;
+    for (const ModelSurface& surface : model.surfaces) names.push_back(surface.name);
+    throw Error("materials names the surface '{}', but the model has {}", name,
+                fmt::join(names, ", "));
+  }
+}
+
+void add(const Model& model, Fingerprint& print) {
+  print.add(std::span(model.mesh.vertices_m));
+  print.add(std::span(model.mesh.triangles));
+  print.add(std::span(model.uv));
+  print.add(std::span(model.surface_of));
+  for (const ModelSurface& surface : model.surfaces) {
+    print.add_all(surface.least_alpha);
+    for (const ModelImage* image : {&surface.albedo, &surface.opacity}) {
+      print.add(image->pixels.values());
+      if (!image->file.empty()) print.add(std::span<const char>(read_text(image->file)));
+    }
+  }
+}
+
+std::size_t bytes_of(const Model& model) {
+  const auto bytes = [](const auto& values) { return std::span(values).size_bytes(); };
+  std::size_t sum = bytes(model.mesh.vertices_m) + bytes(model.mesh.triangles) + bytes(model.uv) +
+                    bytes(model.normals) + bytes(model.surface_of);
+  for (const ModelSurface& surface : model.surfaces) {
+    for (const ModelImage* image : {&surface.albedo, &surface.normal, &surface.opacity})
+      sum += bytes(image->pixels.values());
+  }
+  return sum;
+}
+
+}  // namespace
+
+ModelLibrary::ModelLibrary(RayDevice device, Tracing tracing)
+    : device_(std::move(device)), tracing_(tracing) {}
+
+std::uint32_t ModelLibrary::load(const Source& source) {
+  const auto found = std::ranges::find_if(
+      sources_, [&](const Source& loaded) { return are_equal(loaded, source); });
+  if (found == sources_.end()) {
+    shapes_.emplace_back(device_, make(source), tracing_);
+    sources_.push_back(source);
+    return static_cast<std::uint32_t>(shapes_.size() - 1);
+  }
+  return static_cast<std::uint32_t>(found - sources_.begin());
+}
+
+std::uint32_t ModelLibrary::add(const ModelSpec& spec, std::uint16_t label, Palette& palette) {
+  const std::uint32_t shape = load(spec.source);
+  const Model& model = shapes_[shape].model();
+  check_names(spec, model);
+  ModelTruth truth{label, {}};
+  for (const ModelSurface& surface : model.surfaces)
+    truth.materials.push_back(palette.index_of(spec, surface.name));
+  shape_of_.push_back(shape);
+  truths_.push_back(std::move(truth));
+  return size() - 1;
+}
+
+std::vector<ModelScene> ModelLibrary::models() const {
+  std::vector<ModelScene> models;
+  models.reserve(shape_of_.size());
+  for (const std::uint32_t shape : shape_of_) models.push_back(shapes_[shape]);
+  return models;
+}
+
+void ModelLibrary::add_to(Fingerprint& print) const {
+  for (const ModelScene& shape : shapes_) groundray::add(shape.model(), print);
+  print.add(std::span(shape_of_));
+  for (const ModelTruth& truth : truths_) print.add(std::span(truth.materials));
+}
+
+std::size_t ModelLibrary::memory_bytes() const {
+  std::size_t sum = 0;
+  for (const ModelScene& shape : shapes_) sum += bytes_of(shape.model()) + shape.texture_bytes();
+  return sum;
+}
+
+}  // namespace groundray

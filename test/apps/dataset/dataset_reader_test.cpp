@@ -1,0 +1,123 @@
+#include "apps/dataset/dataset_reader.h"
+
+#include <gmock/gmock.h>
+#include <gtest/gtest.h>
+
+#include <filesystem>
+#include <fstream>
+#include <string>
+#include <utility>
+#include <vector>
+
+#include "core/error.h"
+#include "test/support/temporary_folder.h"
+
+namespace groundray {
+namespace {
+
+using ::testing::AllOf;
+using ::testing::HasSubstr;
+using namespace groundray::testing;  // NOLINT(google-build-using-namespace)
+
+constexpr const char* yaml =
+    "groundray_dataset: 1\n"
+    "origin_w_m: [400000, 5000000, 100]\n"
+    "crs: EPSG:32632\n"
+    "sensors:\n"
+    "  - {name: top, kind: lidar}\n"
+    "  - {name: rear, kind: lidar}\n"
+    "  - {name: eye, kind: camera}\n"
+    "frames:\n"
+    "  - {sensor: top, frame: 1, stamp_s: 0.1, state: done}\n"
+    "  - {sensor: top, frame: 0, stamp_s: 0, state: done}\n"
+    "  - {sensor: eye, frame: 0, stamp_s: 0, state: done}\n"
+    "  - {sensor: top, frame: 2, stamp_s: 0.2, state: pending}\n"
+    "  - {sensor: rear, frame: 7, stamp_s: 0.000000001, state: done}\n";
+
+void write(const std::filesystem::path& path, const std::string& text) {
+  std::filesystem::create_directories(path.parent_path());
+  std::ofstream(path) << text;
+}
+
+// A dataset of two lidars and a camera.
+void write_dataset(const TemporaryFolder& folder, const std::string& text) {
+  write(folder / "dataset.yaml", text);
+  for (const std::string name : {"top", "rear"})
+    write(folder / "poses" / (name + ".tum"), "0 1 2 3 0 0 0 1\n0.5 2 2 3 0 0 0 1\n");
+  write(folder / "calibration/top.yaml", "range_noise_sigma_m: 0.02\npoints: at_stamp\nmore: 7\n");
+  write(folder / "calibration/rear.yaml", "range_noise_sigma_m: 0\n");
+}
+
+std::string refusal(const std::filesystem::path& folder) {
+  try {
+    read_dataset(folder);
+  } catch (const Error& fault) {
+    return fault.what();
+  }
+  return "";
+}
+
+TEST(DatasetReader, TellsWhatIsThere) {
+  const TemporaryFolder folder;
+  write_dataset(folder, yaml);
+  const RecordedDataset dataset = read_dataset(folder.path());
+  EXPECT_EQ(dataset.georeference.origin_w_m, glm::dvec3(400000, 5000000, 100));
+  EXPECT_EQ(dataset.georeference.crs_name, "EPSG:32632");
+  ASSERT_EQ(dataset.lidars.size(), 2u);
+  const RecordedLidar &top = dataset.lidars[0], &rear = dataset.lidars[1];
+  EXPECT_EQ(top.name, "top");
+  EXPECT_EQ(top.points, LidarSpec::Points::AtStamp);
+  EXPECT_EQ(top.range_noise_sigma_m, 0.02);
+  EXPECT_EQ(top.pending, 1u);
+  ASSERT_EQ(top.frames.size(), 2u) << "in order, and none that is not there yet";
+  EXPECT_EQ(top.frames[0].number, 0);
+  EXPECT_EQ(top.frames[1].stamp, std::chrono::milliseconds(100));
+  EXPECT_EQ(top.frames[1].file, folder / "lidar/top/000001.ply");
+  EXPECT_EQ(rear.points, LidarSpec::Points::AsFired);
+  ASSERT_EQ(rear.frames.size(), 1u);
+  EXPECT_EQ(rear.frames[0].stamp, std::chrono::nanoseconds(1));
+  EXPECT_EQ(rear.X_DS.samples().size(), 2u);
+}
+
+std::string changed(const std::string& from, const std::string& to) {
+  std::string text = yaml;
+  text.replace(text.find(from), from.size(), to);
+  return text;
+}
+
+TEST(DatasetReader, FaultsNameFileLineAndRule) {
+  const std::vector<std::pair<std::string, std::string>> bad{
+      {changed("dataset: 1", "dataset: 2"), "reads format 1 alone"},
+      {changed("state: done", "state: gone"), "dataset.yaml:9:"},
+      {changed("stamp_s: 0.1", "stamp_s: 1e300"), "must be within 9e9 s"},
+      {changed("stamp_s: 0.1", "stamp_s: nan"), "stamp_s"},
+      {changed("frame: 1", "frame: -1"), "frame"},
+      {changed("[400000, 5000000, 100]", "[4, 5]"), "origin_w_m"},
+      {changed("name: top, ", ""), "dataset.yaml:5:5: key 'name': missing"},
+      {changed("origin_w_m", "origin"), "key 'origin_w_m': missing"},
+      {changed("{sensor: top, frame: 1, ", "{frame: 1, "),
+       "dataset.yaml:9:5: key 'sensor': missing"},
+      {changed(", state: pending", ""), "key 'state': missing"},
+      {changed("kind: camera}", "kind: camera, frames: 3}"),
+       "dataset.yaml:7:39: key 'frames': eye has 3 frames, but 1 are listed: was the file cut "
+       "short?"},
+      {changed("sensors:", "sensors: 3 #"), "dataset.yaml"},
+      {"", "dataset.yaml"},
+      {"[", "dataset.yaml"}};
+  for (const auto& [text, rule] : bad) {
+    const TemporaryFolder folder;
+    write_dataset(folder, text);
+    EXPECT_THAT(refusal(folder.path()), AllOf(HasSubstr("dataset.yaml"), HasSubstr(rule))) << text;
+  }
+  const TemporaryFolder folder;
+  write_dataset(folder, yaml);
+  write(folder / "calibration/rear.yaml", "range_noise_sigma_m: -1\n");
+  EXPECT_THAT(refusal(folder.path()), AllOf(HasSubstr("rear.yaml:1"), HasSubstr("must be >= 0")));
+  write(folder / "calibration/rear.yaml", "points: as_fired\n");
+  EXPECT_THAT(refusal(folder.path()), HasSubstr("key 'range_noise_sigma_m': missing"));
+  std::filesystem::remove(folder / "poses/top.tum");
+  EXPECT_THAT(refusal(folder.path()), HasSubstr("top.tum"));
+}
+
+}  // namespace
+}  // namespace groundray
