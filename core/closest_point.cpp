@@ -152,7 +152,7 @@ ClosestPoint::Impl::Impl(TriangleMesh content, const RayDevice& with)
   rtcSetGeometryBoundsFunction(geometry.get(), bound_triangle, nullptr);
   rtcCommitGeometry(geometry.get());
   rtcAttachGeometryByID(scene.get(), geometry.get(), 0);
-  rtcCommitScene(scene.get());
+  commit(scene.get());
   check(device, "building a mesh to find nearest points of");
 }
 

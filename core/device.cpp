@@ -1,6 +1,8 @@
 #include "core/device.h"
 
 #include <fmt/format.h>
+#include <tbb/parallel_for.h>
+#include <tbb/task_group.h>
 
 #include "core/error.h"
 
@@ -49,6 +51,14 @@ RTCScene new_scene(const RayDevice& device) {
   return scene;
 }
 
+// Embree keeps a task group in each scene, and that a pointer to the context that it was first used
+// in: TBB follows it when it cancels anything later, so that context has to live as long.
+void commit(RTCScene scene) {
+  static auto* const context = new tbb::task_group_context(tbb::task_group_context::isolated);
+  tbb::parallel_for(
+      0, 1, [scene](int) { rtcCommitScene(scene); }, *context);
+}
+
 RTCScene instance_all(const RayDevice& device, std::span<const RTCScene> scenes) {
   RTCScene all = new_scene(device);
   for (unsigned i = 0; i < scenes.size(); ++i) {
@@ -58,7 +68,7 @@ RTCScene instance_all(const RayDevice& device, std::span<const RTCScene> scenes)
     rtcAttachGeometryByID(all, instance, i);
     rtcReleaseGeometry(instance);
   }
-  rtcCommitScene(all);
+  commit(all);
   return all;
 }
 

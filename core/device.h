@@ -23,6 +23,9 @@ inline RTCDevice handle(const RayDevice& device) noexcept { return device.impl()
 /// Returns an empty scene as all of ours are: robust.
 RTCScene new_scene(const RayDevice& device);
 
+/// Builds what was attached to a scene, in any thread's parallel work too.
+void commit(RTCScene scene);
+
 /// Returns a scene of scenes, numbered as they come. Their transforms are the identity: any other
 /// would round the rays in each of them in its own way.
 RTCScene instance_all(const RayDevice& device, std::span<const RTCScene> scenes);

@@ -242,7 +242,7 @@ std::shared_ptr<const LevelPart> build_part(const LevelScene::Impl& level, glm::
   } else {
     build_fast(handle(level.device), level, *part);
   }
-  rtcCommitScene(part->scene);
+  commit(part->scene);
   part->built_for = nullptr;
   return part;
 }

@@ -168,7 +168,7 @@ ModelScene::Impl::Impl(const RayDevice& with, Model content, Tracing how)
     add_triangles(*this, vertices, 0, solid);
     add_triangles(*this, vertices, 1, cut);
   }
-  rtcCommitScene(scene.get());
+  commit(scene.get());
   check(device, "building a model");
 }
 

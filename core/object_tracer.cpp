@@ -266,7 +266,7 @@ void ObjectTracer::Impl::build() {
       width == 16  ? meet_moving<16>
       : width == 8 ? meet_moving<8>
                    : meet_moving<4>);
-  rtcCommitScene(scene.get());
+  commit(scene.get());
   check(device, "building the objects");
 }
 

@@ -66,10 +66,11 @@ Lidar::Lidar(const LidarSpec& spec, const AtmosphereSpec& air)
       quiet_light_(light_of(without_noise(light_), air, spec.gate)) {}
 
 LidarScan Lidar::scan(const Scene& scene, const Trajectory& X_DS, std::int64_t number, Seed seed,
-                      std::uint32_t sensor_number) const {
+                      std::uint32_t sensor_number, const SweepWatch& watch) const {
   const auto pointer = [](const std::optional<Light>& light) { return light ? &*light : nullptr; };
   return scan_sweep({spec_, pattern_, beam_, last_level_, pointer(light_), pointer(quiet_light_)},
-                    scene, X_DS, number, {seed, sensor_number, static_cast<std::uint32_t>(number)});
+                    scene, X_DS, number, {seed, sensor_number, static_cast<std::uint32_t>(number)},
+                    watch);
 }
 
 }  // namespace groundray

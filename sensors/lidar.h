@@ -1,6 +1,7 @@
 #pragma once
 
 #include <cstdint>
+#include <functional>
 #include <optional>
 #include <vector>
 
@@ -47,6 +48,13 @@ struct LidarScan {
   Convergence convergence;
 };
 
+/// Is told now and then which share of a sweep is done, 0 to 1, and returns whether to go on. It is
+/// called by one thread at a time, but not always by the same.
+using SweepWatch = std::function<bool(double share)>;
+
+/// Thrown where a sweep ends before its last pulse, because its watch said so.
+struct SweepStopped {};
+
 /// A scanning time-of-flight lidar. Immutable, so any number of threads may scan with one.
 class Lidar {
  public:
@@ -68,9 +76,11 @@ class Lidar {
   /// @param X_DS   path of sensor S through D; must cover the sweep.
   /// @param sweep  which one since time 0.
   /// @param sensor_number  tells sensors of one dataset apart in the random numbers.
+  /// @param watch  may be none.
   /// @throws Error if X_DS does not cover the sweep, or a spectrum not the laser's wavelength.
+  /// @throws SweepStopped if `watch` says so.
   LidarScan scan(const Scene& scene, const Trajectory& X_DS, std::int64_t sweep, Seed seed,
-                 std::uint32_t sensor_number) const;
+                 std::uint32_t sensor_number, const SweepWatch& watch = {}) const;
 
  private:
   LidarSpec spec_;

@@ -92,8 +92,9 @@ struct Chunk {
 class Sweep {
  public:
   Sweep(const LidarParts& lidar, const Scene& scene, const Trajectory& X_DS, std::int64_t number,
-        const RandomKey& key)
+        const RandomKey& key, const SweepWatch& watch)
       : lidar_(lidar),
+        watch_(watch),
         spec_(lidar.spec),
         scene_(scene),
         path_(path_of(lidar.pattern, X_DS, number)),
@@ -142,6 +143,7 @@ class Sweep {
   PointCloud no_returns() const;
 
   const LidarParts& lidar_;
+  const SweepWatch& watch_;
   const LidarSpec& spec_;
   const Scene& scene_;
   SweepPath path_;
@@ -153,6 +155,7 @@ class Sweep {
 
   // Filled in firing order:
   std::size_t next_row_ = 0;
+  bool is_stopped_ = false;
   struct PlacedRows {
     std::size_t first_row;
     std::vector<LightRow> rows;
@@ -424,6 +427,7 @@ LidarScan Sweep::run() {
   stream([&](const Chunk& chunk) {
     if (columns) write(chunk, *columns);
   });
+  if (is_stopped_) throw SweepStopped{};
   if (has_light) {
     write_light();
     scan_.waveforms.interval_s = lidar_.light->interval_s();
@@ -443,7 +447,9 @@ void Sweep::stream(const Finish& finish) {
   for (Chunk& chunk : chunks) idle.push(&chunk);
   std::int64_t next = 0;
   const auto take = [&](tbb::flow_control& flow) -> Chunk* {
-    if (next == pulses_) {
+    const double share = static_cast<double>(next) / static_cast<double>(pulses_);
+    is_stopped_ = watch_ && !watch_(share);
+    if (is_stopped_ || next == pulses_) {
       flow.stop();
       return nullptr;
     }
@@ -476,8 +482,8 @@ void Sweep::stream(const Finish& finish) {
 }  // namespace
 
 LidarScan scan_sweep(const LidarParts& lidar, const Scene& scene, const Trajectory& X_DS,
-                     std::int64_t number, const RandomKey& key) {
-  return Sweep(lidar, scene, X_DS, number, key).run();
+                     std::int64_t number, const RandomKey& key, const SweepWatch& watch) {
+  return Sweep(lidar, scene, X_DS, number, key, watch).run();
 }
 
 }  // namespace groundray

@@ -18,6 +18,6 @@ struct LidarParts {
 
 /// Makes one sweep of a lidar. @param key  names the sweep. @throws Error as Lidar::scan.
 LidarScan scan_sweep(const LidarParts& lidar, const Scene& scene, const Trajectory& X_DS,
-                     std::int64_t number, const RandomKey& key);
+                     std::int64_t number, const RandomKey& key, const SweepWatch& watch);
 
 }  // namespace groundray

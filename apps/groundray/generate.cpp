@@ -13,9 +13,9 @@
 #include <vector>
 
 #include "apps/dataset/dataset_listing.h"
-#include "apps/groundray/dataset.h"
-#include "apps/groundray/images.h"
-#include "apps/groundray/preview.h"
+#include "apps/groundray/record/dataset.h"
+#include "apps/groundray/record/images.h"
+#include "apps/groundray/record/preview.h"
 #include "apps/interruption.h"
 #include "apps/scene/frame_scene.h"
 #include "apps/scene/world.h"

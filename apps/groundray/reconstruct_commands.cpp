@@ -4,7 +4,6 @@
 #include <cmath>
 #include <filesystem>
 #include <limits>
-#include <map>
 #include <numbers>
 #include <optional>
 #include <string>
@@ -13,6 +12,7 @@
 #include "apps/groundray/dem/dem_command.h"
 #include "apps/groundray/mesh/rebuild.h"
 #include "apps/groundray/scan_options.h"
+#include "apps/scan/word_option.h"
 #include "core/error.h"
 
 namespace groundray {
@@ -39,14 +39,12 @@ struct SurfaceOptions {
 
   void add(CLI::App* command) {
     CLI::App* surface = command->add_option_group("Surface");
-    const std::map<std::string, Preset> presets{
+    const Words<Preset> presets{
         {"ground", Preset::Ground}, {"strict", Preset::Strict}, {"object", Preset::Object}};
-    surface
-        ->add_option("--preset", preset,
-                     "Between which returns there is surface: ground (88 deg, 3 m), strict (85 "
-                     "deg, 2 m), object (75.5 deg)")
-        ->transform(CLI::CheckedTransformer(presets))
-        ->option_text("ground|strict|object");
+    add_words(surface, "--preset", preset,
+              "Between which returns there is surface: ground (88 deg, 3 m), strict (85 "
+              "deg, 2 m), object (75.5 deg)",
+              presets);
     surface
         ->add_option("--incidence-deg", incidence_deg, "Angle of incidence at most, instead of its")
         ->check(CLI::Range(0.0, 90.0));

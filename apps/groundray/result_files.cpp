@@ -30,6 +30,29 @@ void check_place(const fs::path& path) {
     throw Error("{}: you may not write in the folder {}", path.string(), folder.string());
 }
 
+// A name beside a file's, with the same ending.
+fs::path beside(const fs::path& path, int number) {
+  fs::path name = path.stem();
+  name += fmt::format(".part-{}-{}", getpid(), number);
+  name += path.extension();
+  return path.parent_path() / name;
+}
+
+// An empty file beside another, of a name that no file had.
+fs::path new_file_beside(const fs::path& path) {
+  for (int number = 0;; ++number) {
+    fs::path aside = beside(path, number);
+    const int file = open(aside.c_str(), O_CREAT | O_EXCL | O_WRONLY | O_CLOEXEC, 0666);
+    if (file < 0 && errno == EEXIST) continue;  // it is somebody else's
+    if (file < 0) {
+      throw Error("{}: cannot be written: {}", path.string(),
+                  std::generic_category().message(errno));
+    }
+    close(file);
+    return aside;
+  }
+}
+
 }  // namespace
 
 void check_ending(const fs::path& path, std::initializer_list<const char*> endings) {
@@ -60,11 +83,15 @@ void check_results(std::span<const fs::path> results, std::span<const fs::path> 
 
 ResultFiles::~ResultFiles() {
   std::error_code ignored;
-  for (const auto& [aside, path] : files_) fs::remove(aside, ignored);
+  for (const File& file : files_) {
+    fs::remove(file.aside, ignored);
+    if (!file.spare.empty()) fs::remove(file.spare, ignored);
+  }
 }
 
 void ResultFiles::write(const fs::path& path, const std::function<void(const fs::path&)>& write) {
-  const std::string other = aside(path).string();
+  files_.push_back({.path = path, .aside = new_file_beside(path), .spare = {}});
+  const std::string other = files_.back().aside.string();
   try {
     write(other);
   } catch (const Error& error) {
@@ -77,31 +104,51 @@ void ResultFiles::write(const fs::path& path, const std::function<void(const fs:
   }
 }
 
-fs::path ResultFiles::aside(const fs::path& path) {
-  for (int number = 0;; ++number) {
-    fs::path name = path.stem();
-    name += fmt::format(".part-{}-{}", getpid(), number);
-    name += path.extension();
-    const fs::path aside = path.parent_path() / name;
-    const int file = open(aside.c_str(), O_CREAT | O_EXCL | O_WRONLY | O_CLOEXEC, 0666);
-    if (file < 0 && errno == EEXIST) continue;  // it is somebody else's
-    if (file < 0) {
-      throw Error("{}: cannot be written: {}", path.string(),
-                  std::generic_category().message(errno));
+void ResultFiles::appear() {
+  for (File& file : files_) spare(file);
+  for (std::size_t i = 0; i < files_.size(); ++i) {
+    const File& file = files_[i];
+    std::error_code fault;
+    fs::rename(file.aside, file.path, fault);
+    if (fault) {
+      throw Error("{}: cannot be written: {}{}", file.path.string(), fault.message(), take_back(i));
     }
-    close(file);
-    files_.emplace_back(aside, path);
-    return aside;
+  }
+  std::error_code ignored;
+  for (const File& file : files_)
+    if (!file.spare.empty()) fs::remove(file.spare, ignored);
+  files_.clear();
+}
+
+// Gives what has a file's name another one besides.
+void ResultFiles::spare(File& file) const {
+  std::error_code fault;
+  file.is_new = !fs::exists(fs::symlink_status(file.path, fault));
+  if (file.is_new) return;
+  for (int number = 0;; ++number) {
+    const fs::path name = beside(file.path, number);
+    fs::create_hard_link(file.path, name, fault);
+    if (fault == std::errc::file_exists) continue;
+    if (!fault) file.spare = name;
+    return;
   }
 }
 
-void ResultFiles::appear() {
-  for (const auto& [aside, path] : files_) {
+// Undoes the first of what appeared; says what could not be.
+std::string ResultFiles::take_back(std::size_t count) {
+  std::string left;
+  for (std::size_t i = 0; i < count; ++i) {
+    File& file = files_[i];
     std::error_code fault;
-    fs::rename(aside, path, fault);
-    if (fault) throw Error("{}: cannot be written: {}", path.string(), fault.message());
+    if (!file.spare.empty()) {
+      fs::rename(file.spare, file.path, fault);
+    } else if (file.is_new) {
+      fs::remove(file.path, fault);
+    }
+    const bool is_left = fault || (file.spare.empty() && !file.is_new);
+    if (is_left) left += fmt::format("; {} is written all the same", file.path.string());
   }
-  files_.clear();
+  return left;
 }
 
 }  // namespace groundray

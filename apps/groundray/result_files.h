@@ -1,10 +1,11 @@
 #pragma once
 
+#include <cstddef>
 #include <filesystem>
 #include <functional>
 #include <initializer_list>
 #include <span>
-#include <utility>
+#include <string>
 #include <vector>
 
 namespace groundray {
@@ -18,7 +19,8 @@ void check_ending(const std::filesystem::path& path, std::initializer_list<const
 void check_results(std::span<const std::filesystem::path> results,
                    std::span<const std::filesystem::path> inputs);
 
-/// Files none of which appears before each is whole. What has not appeared is removed in the end.
+/// Files none of which appears before each is whole, and none unless all do. What has not appeared
+/// is removed in the end.
 class ResultFiles {
  public:
   ResultFiles() = default;
@@ -31,13 +33,22 @@ class ResultFiles {
   void write(const std::filesystem::path& path,
              const std::function<void(const std::filesystem::path&)>& write);
 
-  /// @throws Error naming the file that cannot get its name.
+  /// Gives each file its name. If one cannot have it, the others are taken back: names have what
+  /// they had before; but a file that was written over is lost where the disk knows no hard links.
+  /// @throws Error naming the file that cannot get its name, and any that could not be taken back.
   void appear();
 
  private:
-  std::filesystem::path aside(const std::filesystem::path& path);
+  struct File {
+    std::filesystem::path path;
+    std::filesystem::path aside;  // where it is meanwhile
+    std::filesystem::path spare;  // another name of what had the path before; or none
+    bool is_new = true;           // nothing had it
+  };
+  void spare(File& file) const;
+  std::string take_back(std::size_t count);
 
-  std::vector<std::pair<std::filesystem::path, std::filesystem::path>> files_;
+  std::vector<File> files_;
 };
 
 }  // namespace groundray

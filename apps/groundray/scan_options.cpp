@@ -1,6 +1,6 @@
 #include "apps/groundray/scan_options.h"
 
-#include <map>
+#include "apps/scan/word_option.h"
 
 namespace groundray {
 void ScanOptions::add(CLI::App* command) {
@@ -9,12 +9,10 @@ void ScanOptions::add(CLI::App* command) {
       ->delimiter(',');
   scans->add_option("--frames", frames, "A:B:STEP, from A on to before B: frames, or files");
   add_poses(scans);
-  const std::map<std::string, ReturnChoice> choices{{"last", ReturnChoice::Last},
-                                                    {"strongest", ReturnChoice::Strongest},
-                                                    {"first", ReturnChoice::First}};
-  scans->add_option("--returns", taking.returns, "Which return of a pulse is taken")
-      ->transform(CLI::CheckedTransformer(choices))
-      ->option_text("last|strongest|first");
+  const Words<ReturnChoice> choices{{"last", ReturnChoice::Last},
+                                    {"strongest", ReturnChoice::Strongest},
+                                    {"first", ReturnChoice::First}};
+  add_words(scans, "--returns", taking.returns, "Which return of a pulse is taken", choices);
   scans
       ->add_option("--range-sd-m", taking.range_sd_m,
                    "Standard deviation of ranges, instead of what scans tell")
@@ -24,34 +22,24 @@ void ScanOptions::add(CLI::App* command) {
 }
 
 void ScanOptions::add_grid(CLI::App* command) {
-  const std::map<std::string, GridSource> grids{{"beams", GridSource::Beams},
-                                                {"file", GridSource::File}};
-  command
-      ->add_option("--grid", taking.grid,
-                   "What makes points neighbours: rings and azimuths, or the file's own image")
-      ->transform(CLI::CheckedTransformer(grids))
-      ->option_text("beams|file");
+  const Words<GridSource> grids{{"beams", GridSource::Beams}, {"file", GridSource::File}};
+  add_words(command, "--grid", taking.grid,
+            "What makes points neighbours: rings and azimuths, or the file's own image", grids);
 }
 
 void ScanOptions::add_poses(CLI::App* scans) {
   scans->add_option("--poses", choice.poses,
                     "Poses of the sensor (TUM: t x y z qx qy qz qw) for files, or instead of a "
                     "dataset's");
-  const std::map<std::string, PoseOrder> orders{{"line", PoseOrder::Line},
-                                                {"name", PoseOrder::Name}};
-  scans
-      ->add_option("--pose-by", choice.order,
-                   "Which pose is a file's: that of its line, or by the stamp that is its name")
-      ->transform(CLI::CheckedTransformer(orders))
-      ->option_text("line|name");
-  const std::map<std::string, LidarSpec::Points> frames_of{
-      {"as_fired", LidarSpec::Points::AsFired}, {"at_stamp", LidarSpec::Points::AtStamp}};
-  scans
-      ->add_option("--points", choice.points,
-                   "In which frame points are: the sensor's as each was measured, or at the "
-                   "scan's stamp")
-      ->transform(CLI::CheckedTransformer(frames_of))
-      ->option_text("as_fired|at_stamp");
+  const Words<PoseOrder> orders{{"line", PoseOrder::Line}, {"name", PoseOrder::Name}};
+  add_words(scans, "--pose-by", choice.order,
+            "Which pose is a file's: that of its line, or by the stamp that is its name", orders);
+  const Words<LidarSpec::Points> frames_of{{"as_fired", LidarSpec::Points::AsFired},
+                                           {"at_stamp", LidarSpec::Points::AtStamp}};
+  add_words(scans, "--points", choice.points,
+            "In which frame points are: the sensor's as each was measured, or at the "
+            "scan's stamp",
+            frames_of);
 }
 
 void ScanOptions::close() {

@@ -1,7 +1,6 @@
 #include "reconstruction/dem/cell_fit.h"
 
 #include <algorithm>
-#include <bit>
 #include <cmath>
 #include <limits>
 
@@ -13,7 +12,6 @@
 namespace groundray {
 namespace {
 
-constexpr float least_sd_m = 1e-4F;  // what is said to be nearer counts as this
 constexpr int huber_rounds = 3, tukey_rounds = 5;
 constexpr float huber_limit = 1.345F, tukey_limit = 4.685F;  // 95 % efficient on normal errors
 
@@ -24,9 +22,6 @@ constexpr double crest_points = 4;
 constexpr double outliers_reach_m = 2;
 constexpr std::size_t few_points = 2;
 constexpr int enough_neighbours = 5;
-double rise2(const SurfacePlane& plane) {
-  return plane.slope_x * plane.slope_x + plane.slope_y * plane.slope_y;
-}
 
 struct Inverse {
   double hh = 0, hx = 0, hy = 0, xx = 0, xy = 0, yy = 0;
@@ -62,136 +57,25 @@ struct CellFit::Sums {
   }
 };
 
-void CellFit::unpack(std::span<const PackedPoint> points, glm::dvec2 step_m,
-                     std::int32_t reference) {
-  count_ = points.size();
-  padded_ = whole_lanes(count_);
-  for (auto* const column :
-       {&x_m_, &y_m_, &z_m_, &noise_m2_, &across_m2_, &lean_x_, &lean_y_, &level_bias_m_,
-        &leaning_bias_m_, &bias_m_, &variance_m2_, &gain_, &per_sd_, &weight_, &size_}) {
-    if (column->size() < padded_) column->resize(std::max(few_numbers, 2 * padded_));
-    std::fill(column->begin() + static_cast<std::ptrdiff_t>(padded_ - lanes),
-              column->begin() + static_cast<std::ptrdiff_t>(padded_), 0.F);
-  }
-  for (std::size_t i = count_; i < padded_; ++i) noise_m2_[i] = 1;
-  const auto step_x = static_cast<float>(step_m.x), step_y = static_cast<float>(step_m.y);
-  std::uint32_t leans = 0;
-  for (std::size_t i = 0; i < count_; ++i) {
-    const PackedPoint& p = points[i];
-    x_m_[i] = PackedPoint::from_sample(p.x) * step_x;
-    y_m_[i] = PackedPoint::from_sample(p.y) * step_y;
-    z_m_[i] = static_cast<float>(static_cast<double>(std::int64_t{p.height} - reference) *
-                                 PackedPoint::height_step_m);
-    const float sd = std::max(least_sd_m, unpacked_sd(p.sd)), across = unpacked_sd(p.across);
-    noise_m2_[i] = sd * sd;
-    across_m2_[i] = across * across;
-    level_bias_m_[i] = unpacked_sd(p.bias);
-    leaning_bias_m_[i] = p.origin() == PointOrigin::Stereo ? level_bias_m_[i] : 0;
-    lean_x_[i] = unpacked_lean(p.lean_x);
-    lean_y_[i] = unpacked_lean(p.lean_y);
-    leans |= std::uint32_t{p.lean_x} | p.lean_y;
-  }
-  is_leaning_ = leans != 0;
-}
-
-// Leaves of heights what is above the bend of the neighbours' surface and the cell's crest.
-void CellFit::unbend(const NeighbourSurface& neighbours, glm::dvec2 step_m) {
-  const auto n = static_cast<double>(count_);
-  const bool is_weighed = outliers_per_m_ > 0 && count_ <= few_points;  // the crest with the rest
-  own_crest_ = is_weighed ? 0 : n / (n + crest_points);
-  const double crest_m = own_crest_ * neighbours.crest_m;
-  const auto xx = static_cast<float>(neighbours.bend.xx - 2 * crest_m),
-             yy = static_cast<float>(neighbours.bend.yy - 2 * crest_m),
-             xy = static_cast<float>(neighbours.bend.xy);
-  const auto per_x = static_cast<float>(1 / step_m.x), per_y = static_cast<float>(1 / step_m.y);
-  for (std::size_t i = 0; i < padded_; i += lanes) {
-    const FloatLanes u = load(&x_m_[i]) * per_x, v = load(&y_m_[i]) * per_y;
-    const FloatLanes bend = xx * cell_bend(u) + yy * cell_bend(v) + xy * u * v;
-    store(load(&z_m_[i]) - bend, &z_m_[i]);
-  }
-}
-
-// In the order in which groups come up: a table that is never more than half full.
-void CellFit::number_groups(std::span<const PackedPoint> points) {
-  const std::size_t mask = std::bit_ceil(2 * count_) - 1;
-  if (table_.size() <= mask) table_.resize(mask + 1);
-  std::fill_n(table_.begin(), mask + 1, no_group);
-  if (group_.size() < count_) group_.resize(2 * padded_);
-  names_.clear();
-  for (std::size_t i = 0; i < count_; ++i) {
-    const std::uint32_t name = points[i].group;
-    std::size_t at = (name * 2654435769U >> 12U) & mask;
-    while (table_[at] != no_group && names_[table_[at]] != name) at = (at + 1) & mask;
-    if (table_[at] == no_group) {
-      table_[at] = static_cast<std::uint32_t>(names_.size());
-      names_.push_back(name);
-    }
-    group_[i] = table_[at];
-  }
-}
-
-// Sets variances and biases of distances from ground with the slope of `plane`.
-void CellFit::tilt(const SurfacePlane& plane, const SlopeSpread& spread) {
-  const auto a = static_cast<float>(plane.slope_x), b = static_cast<float>(plane.slope_y),
-             rise_squared = static_cast<float>(rise2(plane));
-  if (!is_leaning_) {
-    for (std::size_t i = 0; i < padded_; i += lanes)
-      store(load(&noise_m2_[i]) + rise_squared * load(&across_m2_[i]), &variance_m2_[i]);
-    std::copy_n(level_bias_m_.begin(), padded_, bias_m_.begin());
-    return;
-  }
-  const auto xx = static_cast<float>(spread.xx), xy = static_cast<float>(spread.xy),
-             yy = static_cast<float>(spread.yy);
-  for (std::size_t i = 0; i < padded_; i += lanes) {
-    const FloatLanes x = load(&lean_x_[i]), y = load(&lean_y_[i]);
-    const FloatLanes along = a * x + b * y, unknown = xx * x * x + 2 * xy * x * y + yy * y * y;
-    const FloatLanes bias = load(&leaning_bias_m_[i]);
-    const FloatLanes tilt = larger(1 - along, least_tilt(x, y));
-    const FloatLanes off = load(&level_bias_m_[i]) - bias * (1 - tilt);
-    store(load(&noise_m2_[i]) * (tilt * tilt + unknown) + rise_squared * load(&across_m2_[i]),
-          &variance_m2_[i]);
-    store(off, &bias_m_[i]);
-    store(off * off + bias * bias * unknown, &size_[i]);
-  }
-  for (std::size_t i = 0; i < padded_; ++i)
-    bias_m_[i] = std::copysign(std::sqrt(size_[i]), bias_m_[i]);
-}
-
-// Sets variances and weights for ground with the slope of `plane`.
-void CellFit::weigh(const SurfacePlane& plane, const SlopeSpread& spread) {
-  tilt(plane, spread);
-  for (std::size_t i = 0; i < padded_; i += lanes) {
-    const FloatLanes variance = load(&variance_m2_[i]), bias = load(&bias_m_[i]);
-    store(1 / variance, &gain_[i]);
-    store(1 / (variance + bias * bias), &per_sd_[i]);
-  }
-  for (float& per_sd : std::span(per_sd_).first(padded_)) per_sd = std::sqrt(per_sd);
-  for (std::size_t i = count_; i < padded_; ++i) gain_[i] = 0;
-  share_.assign(names_.size(), 0);
-  for (std::size_t i = 0; i < count_; ++i)
-    share_[group_[i]] += double{bias_m_[i] * bias_m_[i] * gain_[i]};
-  for (double& share : share_) share = 1 / (1 + share);
-  for (std::size_t i = 0; i < count_; ++i) gain_[i] *= static_cast<float>(share_[group_[i]]);
-}
-
-// The k-th least of size_.
+// The k-th least of points_.size.
 float CellFit::kth_size(std::size_t k) {
-  if (count_ <= few_numbers) return kth_of_few(size_.data(), count_, k);
-  const auto begin = size_.begin(), at = begin + static_cast<std::ptrdiff_t>(k);
-  std::nth_element(begin, at, begin + static_cast<std::ptrdiff_t>(count_));
+  if (points_.count <= few_numbers) return kth_of_few(points_.size.data(), points_.count, k);
+  const auto begin = points_.size.begin(), at = begin + static_cast<std::ptrdiff_t>(k);
+  std::nth_element(begin, at, begin + static_cast<std::ptrdiff_t>(points_.count));
   return *at;
 }
 
 // The height at the sample of a plane through the points' middle: points ascend.
 double CellFit::median_height(const SurfacePlane& slopes) {
   FloatLanes x{}, y{};
-  for (std::size_t i = 0; i < padded_; i += lanes) {
-    x += load(&x_m_[i]);
-    y += load(&y_m_[i]);
+  for (std::size_t i = 0; i < points_.padded; i += lanes) {
+    x += load(&points_.x_m[i]);
+    y += load(&points_.y_m[i]);
   }
-  const double middle = 0.5 * (double{z_m_[(count_ - 1) / 2]} + double{z_m_[count_ / 2]});
+  const double middle =
+      0.5 * (double{points_.z_m[(points_.count - 1) / 2]} + double{points_.z_m[points_.count / 2]});
   return middle - (slopes.slope_x * double{total(x)} + slopes.slope_y * double{total(y)}) /
-                      static_cast<double>(count_);
+                      static_cast<double>(points_.count);
 }
 
 // By how much residuals exceed their sd; 1 if they do not.
@@ -199,16 +83,18 @@ double CellFit::scale(const SurfacePlane& plane) {
   const auto h = static_cast<float>(plane.height_m), a = static_cast<float>(plane.slope_x),
              b = static_cast<float>(plane.slope_y);
   constexpr float to_sd = 1.4826F;  // from the median size of normal errors
-  for (std::size_t i = 0; i < padded_; i += lanes) {
-    const FloatLanes off = load(&z_m_[i]) - h - a * load(&x_m_[i]) - b * load(&y_m_[i]);
-    store(size_of(off) * load(&per_sd_[i]) * to_sd, &size_[i]);
+  for (std::size_t i = 0; i < points_.padded; i += lanes) {
+    const FloatLanes off =
+        load(&points_.z_m[i]) - h - a * load(&points_.x_m[i]) - b * load(&points_.y_m[i]);
+    store(size_of(off) * load(&points_.per_sd[i]) * to_sd, &points_.size[i]);
   }
-  std::fill(size_.data() + count_, size_.data() + padded_, std::numeric_limits<float>::infinity());
+  std::fill(points_.size.data() + points_.count, points_.size.data() + points_.padded,
+            std::numeric_limits<float>::infinity());
   IntLanes small{};
-  for (std::size_t i = 0; i < padded_; i += lanes) small -= load(&size_[i]) <= 1.F;
+  for (std::size_t i = 0; i < points_.padded; i += lanes) small -= load(&points_.size[i]) <= 1.F;
   std::size_t within = 0;
   for (std::size_t i = 0; i < lanes; ++i) within += static_cast<std::size_t>(small[i]);
-  return within > count_ / 2 ? 1 : std::max(1.0, double{kth_size(count_ / 2)});
+  return within > points_.count / 2 ? 1 : std::max(1.0, double{kth_size(points_.count / 2)});
 }
 
 template <typename Robust>
@@ -217,12 +103,13 @@ CellFit::Sums CellFit::sum(const SurfacePlane& plane, double scale, const Robust
              b = static_cast<float>(plane.slope_y), per_scale = static_cast<float>(1 / scale);
   const float per_variance = per_scale * per_scale;
   FloatLanes w{}, x{}, y{}, z{}, xx{}, xy{}, yy{}, xz{}, yz{};
-  for (std::size_t i = 0; i < padded_; i += lanes) {
-    const FloatLanes at_x = load(&x_m_[i]), at_y = load(&y_m_[i]), at_z = load(&z_m_[i]);
+  for (std::size_t i = 0; i < points_.padded; i += lanes) {
+    const FloatLanes at_x = load(&points_.x_m[i]), at_y = load(&points_.y_m[i]),
+                     at_z = load(&points_.z_m[i]);
     const FloatLanes off = at_z - h - a * at_x - b * at_y;
-    const FloatLanes weight =
-        load(&gain_[i]) * per_variance * robust(size_of(off) * load(&per_sd_[i]) * per_scale);
-    store(weight, &weight_[i]);
+    const FloatLanes weight = load(&points_.gain[i]) * per_variance *
+                              robust(size_of(off) * load(&points_.per_sd[i]) * per_scale);
+    store(weight, &points_.weight[i]);
     const FloatLanes wx = weight * at_x, wy = weight * at_y;
     w += weight;
     x += wx;
@@ -263,20 +150,24 @@ CellFit::CellFit(double outlier_share) noexcept
 std::optional<CellHeight> CellFit::operator()(std::span<const PackedPoint> points,
                                               const NeighbourSurface& neighbours, glm::dvec2 step_m,
                                               std::int32_t reference) {
-  unpack(points, step_m, reference);
-  number_groups(points);
-  unbend(neighbours, step_m);
+  points_.unpack(points, step_m, reference);
+  const auto n = static_cast<double>(points_.count);
+  const bool is_weighed = outliers_per_m_ > 0 && points_.count <= few_points;
+  own_crest_ = is_weighed ? 0 : n / (n + crest_points);  // else it is weighed with the rest
+  const double crest_m = own_crest_ * neighbours.crest_m;
+  const SurfaceBend& bend = neighbours.bend;
+  points_.unbend({bend.xx - 2 * crest_m, bend.xy, bend.yy - 2 * crest_m}, step_m);
   SurfacePlane plane = neighbours.plane;
-  weigh(plane, {neighbours.xx, neighbours.xy, neighbours.yy});
-  if (outliers_per_m_ > 0 && count_ <= few_points && neighbours.cells >= enough_neighbours)
+  points_.weigh(plane, {neighbours.xx, neighbours.xy, neighbours.yy});
+  if (is_weighed && neighbours.cells >= enough_neighbours)
     return fit_few_points(neighbours, step_m, reference * PackedPoint::height_step_m);
   plane.height_m = median_height(plane);
   const Inverse found =
       iterate(plane, neighbours, scale(plane), huber_rounds, [](const FloatLanes& size) {
         return huber_limit / larger(size, all_of(huber_limit));
       }).inverse(neighbours);
-  if (is_leaning_ || std::abs(rise2(plane) - rise2(neighbours.plane)) > 0.01)
-    weigh(plane, {found.xx, found.xy, found.yy});
+  if (points_.is_leaning || std::abs(rise2(plane) - rise2(neighbours.plane)) > 0.01)
+    points_.weigh(plane, {found.xx, found.xy, found.yy});
   const double times = scale(plane);
   const auto tukey = [](const FloatLanes& size) {
     constexpr float per_limit2 = 1 / (tukey_limit * tukey_limit);
@@ -292,24 +183,27 @@ std::optional<CellHeight> CellFit::fit_few_points(const NeighbourSurface& neighb
   const SurfacePlane& plane = neighbours.plane;
   const double base_m = plane.height_m - reference_m;
   std::array<FewPoint, few_points> few;
-  for (std::size_t i = 0; i < count_; ++i) {
-    const glm::dvec2 place_m(x_m_[i], y_m_[i]);
+  for (std::size_t i = 0; i < points_.count; ++i) {
+    const glm::dvec2 place_m(points_.x_m[i], points_.y_m[i]);
     // Where slopes are known but roughly, so is what places that are off do to heights.
-    const double slope_m2 = double{across_m2_[i]} * (neighbours.xx + neighbours.yy);
-    few[i] = {place_m,
-              double{z_m_[i]} - base_m - plane.slope_x * place_m.x - plane.slope_y * place_m.y,
-              double{variance_m2_[i]} + slope_m2, bias_m_[i], names_[group_[i]]};
+    const double slope_m2 = double{points_.across_m2[i]} * (neighbours.xx + neighbours.yy);
+    few[i] = {
+        place_m,
+        double{points_.z_m[i]} - base_m - plane.slope_x * place_m.x - plane.slope_y * place_m.y,
+        double{points_.variance_m2[i]} + slope_m2, points_.bias_m[i],
+        points_.names[points_.group_of[i]]};
   }
-  const FewHeight got = fit_few(few, static_cast<int>(count_), neighbours, step_m, outliers_per_m_);
+  const FewHeight got =
+      fit_few(few, static_cast<int>(points_.count), neighbours, step_m, outliers_per_m_);
   if (got.is_none > 0.5) return std::nullopt;
   CellHeight found{.plane = plane,
                    .variance_m2 = got.variance_m2,
                    .chi2 = std::numeric_limits<double>::quiet_NaN()};
   found.plane.height_m = base_m + got.above_m;
   const bool is_first = got.is_ground[0] >= got.is_ground[1];
-  for (std::size_t i = 0; i < count_; ++i) {
+  for (std::size_t i = 0; i < points_.count; ++i) {
     if (got.is_ground[i] < 0.5 && is_first != (i == 0)) continue;  // the likelier one counts
-    ++((names_[group_[i]] & 1U) == 0 ? found.lidar : found.stereo);
+    ++((points_.names[points_.group_of[i]] & 1U) == 0 ? found.lidar : found.stereo);
   }
   return found;
 }
@@ -319,30 +213,31 @@ std::optional<CellHeight> CellFit::fit_few_points(const NeighbourSurface& neighb
 void CellFit::compare(const SurfacePlane& plane, double bias_m2, CellHeight& found) {
   const auto shared_m2 = static_cast<float>(bias_m2);
   std::uint32_t stereo = 0, all = 0;
-  for (std::size_t i = 0; i < count_; ++i) {
+  for (std::size_t i = 0; i < points_.count; ++i) {
     // What is common to a group is in the estimate too, as far as the group is.
-    const std::uint32_t group = group_[i];
-    const float bias = bias_m_[i];
-    size_[i] =
+    const std::uint32_t group = points_.group_of[i];
+    const float bias = points_.bias_m[i];
+    points_.size[i] =
         std::max(0.F, bias * bias - 2 * bias * static_cast<float>(bias_sum_m_[group]) + shared_m2);
-    const std::uint32_t counts = weight_[i] > 0 ? 1 : 0;
+    const std::uint32_t counts = points_.weight[i] > 0 ? 1 : 0;
     all += counts;
-    stereo += counts & names_[group];
+    stereo += counts & points_.names[group];
   }
   found.stereo = stereo;
   found.lidar = all - stereo;
   const auto h = static_cast<float>(plane.height_m), a = static_cast<float>(plane.slope_x),
              b = static_cast<float>(plane.slope_y);
   FloatLanes chi2{};
-  for (std::size_t i = 0; i < padded_; i += lanes) {
-    const FloatLanes off = load(&z_m_[i]) - h - a * load(&x_m_[i]) - b * load(&y_m_[i]);
-    const FloatLanes term = off * off / (load(&variance_m2_[i]) + load(&size_[i]));
-    chi2 += load(&weight_[i]) > 0 ? term : FloatLanes{};
+  for (std::size_t i = 0; i < points_.padded; i += lanes) {
+    const FloatLanes off =
+        load(&points_.z_m[i]) - h - a * load(&points_.x_m[i]) - b * load(&points_.y_m[i]);
+    const FloatLanes term = off * off / (load(&points_.variance_m2[i]) + load(&points_.size[i]));
+    chi2 += load(&points_.weight[i]) > 0 ? term : FloatLanes{};
   }
   found.chi2 = double{total(chi2)};
 }
 
-// How the height at the sample depends on points: it rises by size_ with each one's.
+// How the height at the sample depends on points: it rises by points_.size with each one's.
 struct CellFit::Levers {
   Inverse inverse;
   double noise_m2 = 0, bias_m2 = 0;
@@ -357,21 +252,23 @@ CellFit::Levers CellFit::levers(const Sums& sums, const NeighbourSurface& neighb
              lever_y = static_cast<float>(m.hy);
   const auto per_x = static_cast<float>(1 / step_m.x), per_y = static_cast<float>(1 / step_m.y);
   FloatLanes noise{}, bend_x{}, bend_y{}, bend_xy{};
-  for (std::size_t i = 0; i < padded_; i += lanes) {
-    const FloatLanes x = load(&x_m_[i]), y = load(&y_m_[i]), u = x * per_x, v = y * per_y;
-    const FloatLanes lever = load(&weight_[i]) * (lever_h + lever_x * x + lever_y * y);
-    noise += lever * lever * load(&variance_m2_[i]);
+  for (std::size_t i = 0; i < points_.padded; i += lanes) {
+    const FloatLanes x = load(&points_.x_m[i]), y = load(&points_.y_m[i]), u = x * per_x,
+                     v = y * per_y;
+    const FloatLanes lever = load(&points_.weight[i]) * (lever_h + lever_x * x + lever_y * y);
+    noise += lever * lever * load(&points_.variance_m2[i]);
     bend_x += lever * cell_bend(u);
     bend_y += lever * cell_bend(v);
     bend_xy += lever * u * v;
-    store(lever, &size_[i]);
+    store(lever, &points_.size[i]);
   }
   found.noise_m2 = double{total(noise)};
   found.bend_x = double{total(bend_x)};
   found.bend_y = double{total(bend_y)};
   found.bend_xy = double{total(bend_xy)};
-  bias_sum_m_.assign(names_.size(), 0);
-  for (std::size_t i = 0; i < count_; ++i) bias_sum_m_[group_[i]] += double{size_[i] * bias_m_[i]};
+  bias_sum_m_.assign(points_.names.size(), 0);
+  for (std::size_t i = 0; i < points_.count; ++i)
+    bias_sum_m_[points_.group_of[i]] += double{points_.size[i] * points_.bias_m[i]};
   for (const double sum_m : bias_sum_m_) found.bias_m2 += sum_m * sum_m;
   return found;
 }

@@ -8,6 +8,7 @@
 #include <span>
 #include <vector>
 
+#include "reconstruction/dem/cell_columns.h"
 #include "reconstruction/dem/neighbour_surface.h"
 #include "reconstruction/dem/packed_point.h"
 
@@ -25,12 +26,8 @@ struct CellHeight {
 ///
 /// Points are freed of the bend of the neighbours' surface first, and of the cell's own crest: what
 /// its first guess is above that surface, of which the ground bends by -2 along columns and rows;
-/// the fewer points (4 / n), the less of it. A point's weight is 1 / variance, where the variance
-/// is that of its distance from the ground: sd² ((1 - g lean)² + lean' G lean) + g² across², with
-/// the neighbours' slope g and its covariance G at first, then the fit's, and 1 - g lean no less
-/// than least_tilt(); a stereo pair's bias has the same factor. And the points of a
-/// group together weigh no more than what they have in common lets them: in all 1 / (1 / sum(1 /
-/// variance) + bias²), as generalised least squares would have it. Slopes are held to the
+/// the fewer points (4 / n), the less of it. A point's weight is that of CellColumns, with the
+/// neighbours' slope and its covariance at first, then the fit's. Slopes are held to the
 /// neighbours' by what those know. The start has the median height and the neighbours' slope;
 /// residuals are in units of their sd, times 1.4826 of their median where that is above 1; Huber's
 /// weights (k = 1.345) come up to three times, then, with slope and scale of that, Tukey's (c
@@ -59,14 +56,6 @@ class CellFit {
  private:
   struct Sums;
   struct Levers;
-  struct SlopeSpread {
-    double xx = 0, xy = 0, yy = 0;  // covariance
-  };
-  void unpack(std::span<const PackedPoint> points, glm::dvec2 step_m, std::int32_t reference);
-  void unbend(const NeighbourSurface& neighbours, glm::dvec2 step_m);
-  void number_groups(std::span<const PackedPoint> points);
-  void tilt(const SurfacePlane& plane, const SlopeSpread& spread);
-  void weigh(const SurfacePlane& plane, const SlopeSpread& spread);
   float kth_size(std::size_t k);
   double median_height(const SurfacePlane& slopes);
   double scale(const SurfacePlane& plane);
@@ -83,18 +72,9 @@ class CellFit {
                     glm::dvec2 step_m);
 
   double outliers_per_m_ = 0;
-  double own_crest_ = 0;     // which share of it points were freed of
-  std::size_t count_ = 0;    // points
-  std::size_t padded_ = 0;   // entries below, a whole number of vectors; those beyond weigh nothing
-  bool is_leaning_ = false;  // some point
-  std::vector<float> x_m_, y_m_, z_m_, noise_m2_, across_m2_, lean_x_, lean_y_;
-  std::vector<float> level_bias_m_, leaning_bias_m_;  // of heights; the part that leans
-  std::vector<float> bias_m_;                         // of distances from the ground
-  std::vector<float> variance_m2_, gain_, per_sd_, weight_, size_;
-  std::vector<std::uint32_t> group_;        // number of each point's group in the cell
-  std::vector<std::uint32_t> names_;        // of the groups
-  std::vector<std::uint32_t> table_;        // where to look for a name
-  std::vector<double> share_, bias_sum_m_;  // of each group
+  double own_crest_ = 0;  // which share of it points were freed of
+  CellColumns points_;
+  std::vector<double> bias_sum_m_;  // of each group
 };
 
 }  // namespace groundray

@@ -25,7 +25,7 @@ namespace {
 constexpr double long_shape = 15;       // area / largest distance^2; a disc has 3
 constexpr double usual_tension = 0.05;  // for compact holes
 constexpr double least_share = 0.1;     // of filled samples, for a kind of holes to be tried
-constexpr std::size_t bytes_per_sample = 40, bytes_per_filled = 2000;
+constexpr std::size_t bytes_per_sample = 40, bytes_per_filled = 3500, bytes_per_bounded = 9000;
 constexpr double trials_share = 0.3;  // of the work, for the sake of progress
 
 void check_numbers(std::span<const float> values, const char* name, int columns,
@@ -102,7 +102,8 @@ class Filling {
   void try_kinds();
   void borrow_laws();
   void fill(const std::vector<std::uint32_t>& set);
-  PlateForm form_of(const std::vector<std::uint32_t>& set);
+  std::size_t trial_of(const std::vector<std::uint32_t>& set) const;
+  const std::optional<FillLaw>& law_of(const RasterHole& hole, std::size_t filled_by) const;
   double sd_at(std::uint32_t sample, const std::optional<FillLaw>& law) const;
   void report(double share) const {
     if (work_.progress) work_.progress(share);
@@ -191,8 +192,9 @@ void Filling::check_memory(std::span<const std::vector<std::uint32_t>> sets) con
     largest = std::max(largest, set.size());
   }
   const auto threads = static_cast<std::size_t>(tbb::this_task_arena::max_concurrency());
+  const std::size_t each = most_m_.empty() ? bytes_per_filled : bytes_per_bounded;
   const std::size_t bytes =
-      bytes_per_sample * heights_m_.size() + bytes_per_filled * std::min(all, threads * largest);
+      bytes_per_sample * heights_m_.size() + each * std::min(all, threads * largest);
   if (bytes <= work_.most_bytes) return;
   throw Error(
       "filling a DEM of {} x {} samples may take {:.0f} MB, more than the {:.0f} MB allowed: its "
@@ -237,14 +239,14 @@ void Filling::borrow_laws() {
   }
 }
 
-// The form for the largest of the holes that make up a set.
-PlateForm Filling::form_of(const std::vector<std::uint32_t>& set) {
+// The trial of the largest of the holes that make up a set: its form is that of all.
+std::size_t Filling::trial_of(const std::vector<std::uint32_t>& set) const {
   const RasterHole* largest = nullptr;
   for (const std::uint32_t sample : set) {
     const RasterHole& hole = sorted_.holes[static_cast<std::size_t>(sorted_.numbers[sample])];
     if (largest == nullptr || hole.samples > largest->samples) largest = &hole;
   }
-  return result_.trials[largest->trial].form;
+  return largest->trial;
 }
 
 double Filling::sd_at(std::uint32_t sample, const std::optional<FillLaw>& law) const {
@@ -255,25 +257,35 @@ double Filling::sd_at(std::uint32_t sample, const std::optional<FillLaw>& law) c
   return law->sd_m(cells, roughness_->at_m(at, roughness_reach(cells), roughness_->usual_m()));
 }
 
+// The law of a hole's own kind if it is one of the form that it was filled by, else of the kind
+// that this form was chosen for.
+const std::optional<FillLaw>& Filling::law_of(const RasterHole& hole, std::size_t filled_by) const {
+  const auto& trials = result_.trials;
+  return laws_[trials[hole.trial].form == trials[filled_by].form ? hole.trial : filled_by];
+}
+
 void Filling::fill(const std::vector<std::uint32_t>& set) {
-  const PlateForm form = form_of(set);
+  const std::size_t filled_by = trial_of(set);
+  const PlateForm form = result_.trials[filled_by].form;
   std::vector<std::size_t> holes;  // of each sample
   std::int32_t number = 0;
   for (const std::uint32_t sample : set)
     holes.push_back(static_cast<std::size_t>(std::exchange(sorted_.numbers[sample], number++)));
   PlateSystem system({frame_.samples, frame_.step_m, heights_m_, sorted_.numbers}, set);
-  BoundedPlate plate{.heights_m = system.solve(form)};
-  if (!most_m_.empty()) {
+  BoundedPlate plate;
+  if (most_m_.empty()) {
+    plate.heights_m = system.solve(form);
+  } else {
     std::vector<double> most_m;
     for (const std::uint32_t sample : set) most_m.push_back(most_m_[sample]);
-    plate = system.solve_below(form, plate.heights_m, most_m);
+    plate = system.solve_below(form, most_m);
   }
   for (std::size_t i = 0; i < set.size(); ++i) {
     const std::uint32_t sample = set[i];
     RasterHole& hole = sorted_.holes[holes[i]];
     hole.form = form;
     hole.is_least = plate.is_best;
-    result_.sd_m[sample] = static_cast<float>(sd_at(sample, laws_[hole.trial]));
+    result_.sd_m[sample] = static_cast<float>(sd_at(sample, law_of(hole, filled_by)));
     float height_m = static_cast<float>(plate.heights_m[i]);
     if (!most_m_.empty() && plate.heights_m[i] >= most_m_[sample]) {
       height_m = most_m_[sample];

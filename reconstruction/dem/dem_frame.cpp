@@ -39,7 +39,7 @@ GridFrame frame_of(const Area& area, glm::dvec2 zero_m, glm::dvec2 step_m) {
   const Samples y = samples_over(area.low_m.y, area.high_m.y, zero_m.y, step_m.y);
   if (std::max(x.count, y.count) > most_samples) {
     throw Error(
-        "cells of {} x {} m over {} x {} m are {:.3g} x {:.3g}: more than 2^30 along a "
+        "cells of {} x {} m over {:.6g} x {:.6g} m are {:.3g} x {:.3g}: more than 2^30 along a "
         "side; choose larger cells or a smaller area",
         std::abs(step_m.x), std::abs(step_m.y), area.high_m.x - area.low_m.x,
         area.high_m.y - area.low_m.y, x.count, y.count);

@@ -215,12 +215,8 @@ void TileFusion::fit(const CellTiling& tiling, const PointSpool& spool, std::siz
                      DemTile& into) {
   if (spool.count(tile) == 0) return;
   if (spool.count(tile) > most_in_tile()) return split(tiling, spool, tile, into);
-  std::vector<PackedPoint> points;
-  points.reserve(spool.count(tile));
-  spool.read(tile, [&points](std::span<const PackedPoint> some) {
-    points.insert(points.end(), some.begin(), some.end());
-  });
-  const TileCounts counts = fit_tile(std::move(points), tiling.cells(tile),
+  std::vector<PackedPoint> read_back;
+  const TileCounts counts = fit_tile(spool.parts(tile, read_back), tiling.cells(tile),
                                      tiling.first_cell(tile) - into.first, rules_, into.layers);
   without_ground_ += counts.without_ground;
   uncertain_ += counts.uncertain;
@@ -333,6 +329,7 @@ void place(const DemTile& tile, DemLayers& whole) {
   copy(&DemLayers::chi2);
   copy(&DemLayers::surfaces);
   copy(&DemLayers::overhang_m);
+  copy(&DemLayers::clearance_m);
   copy(&DemLayers::source);
   copy(&DemLayers::slope_rad);
 }

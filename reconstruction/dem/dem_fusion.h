@@ -68,8 +68,8 @@ struct DemTile {
 /// is not known. With the variance e² of these cells about planes and s² about such surfaces (their
 /// noise taken off, the mean of 7 x 7 cells), what that surface does not tell of the cell itself
 /// has the variances
-///     s² of the height, 2.5 (s²/e²) s² of the slope across a cell, 8 (s²/e²)² s² of p and r
-/// besides those of the fit: as scatter falls from planes to surfaces, so it falls from these on.
+///     s² of the height, 1.8 (s/e) s² of the slope across a cell, 1.15 s² of p and r
+/// besides those of the fit. Where noise hides s², it is as large as it may well be.
 ///
 /// Points are freed of the bend, p f(u) + q u v + r f(v) with f(u) = (|u| + u²) / 4, halfway
 /// between smooth ground and a crease at the sample; p and r are those around less twice the cell's
@@ -86,8 +86,7 @@ struct DemTile {
 /// A lone point, or two, are no ground unless five of the cells around know its height to a third
 /// of surface_gap_m, and they agree. Each is then ground or an outlier (outlier_share, spread over
 /// 2 m): height and variance are those of all such choices, weighed by Bayes with the surface
-/// around; where all being outliers is the likeliest by half there is no ground. Fewer than
-/// three points of stereo pairs alone are no ground: pixels are matched wrong in patches. With an
+/// around; where all being outliers is the likeliest by half there is no ground. With an
 /// outlier_share of 0 all points are ground.
 ///
 /// The result is the same for any number of threads, any blocks, order of the points and memory.

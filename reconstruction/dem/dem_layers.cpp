@@ -17,6 +17,7 @@ DemLayers unknown_layers(const GridFrame& frame) {
           .chi2 = none,
           .surfaces = std::vector<std::uint16_t>(count),
           .overhang_m = none,
+          .clearance_m = none,
           .source = std::vector<HeightSource>(count),
           .to_data_m = none,
           .fill_sd_m = none,

@@ -20,7 +20,10 @@ struct DemLayers {
   std::vector<std::uint32_t> stereo;
   std::vector<float> chi2;              ///< of the fit, per degree of freedom; NaN for a lone point
   std::vector<std::uint16_t> surfaces;  ///< how many, one above the other
-  std::vector<float> overhang_m;        ///< the lowest height of what is above the ground
+  std::vector<float> overhang_m;        ///< the lowest height of what is clear of the ground
+  /// Free height from the highest of what was measured below the overhang, or from the ground
+  /// around where nothing was, to it: in the whole cell there is no less.
+  std::vector<float> clearance_m;
   std::vector<HeightSource> source;
   std::vector<float> to_data_m;      ///< to the nearest measured sample, in plan
   std::vector<float> fill_sd_m;      ///< of filled heights

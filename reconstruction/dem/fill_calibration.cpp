@@ -77,8 +77,9 @@ void fill(HiddenPiece& piece, std::span<const PlateForm> forms, PieceErrors& fou
     PlateSystem system({piece.size, piece.step_m, piece.heights_m, piece.numbers}, set);
     const std::vector<double> most_m = bounds_of(piece, set, order);
     for (std::size_t form = 0; form < forms.size(); ++form) {
-      std::vector<double> heights_m = system.solve(forms[form]);
-      if (!most_m.empty()) heights_m = system.solve_below(forms[form], heights_m, most_m).heights_m;
+      const std::vector<double> heights_m = most_m.empty()
+                                                ? system.solve(forms[form])
+                                                : system.solve_below(forms[form], most_m).heights_m;
       for (std::size_t i = 0; i < set.size(); ++i) {
         const std::int32_t at = order[set[i]];
         if (at < 0) continue;
@@ -224,6 +225,7 @@ void judge(std::span<const FillError> errors, FillTrial& trial) {
   const std::array laws{fit_law(halves[0]), fit_law(halves[1])};
   if (!trial.law || !laws[0] || !laws[1]) return;
   double all = 0;
+  trial.cover = {0, 0, 0};
   for (const std::size_t half : {0u, 1u}) {
     const FillCover cover = cover_of(halves[half], *laws[1 - half]);
     const auto count = static_cast<double>(halves[half].size());

@@ -17,7 +17,8 @@ struct FillTrial {
   std::optional<PlateForm> form;  ///< nothing if there was too little ground to try it
   std::optional<FillLaw> law;     ///< likewise; widened
   std::size_t samples = 0;        ///< that were hidden, filled and compared
-  FillCover cover;                ///< of errors by laws from the other half of the trials
+  FillCover cover;                ///< of errors by laws from the other half of the trials; NaN if
+                                  ///< either half is too small for a law
   double widened_by = 1;          ///< what sd was multiplied by for it
 };
 

@@ -27,10 +27,11 @@ struct Sample {
   double square_m2;
 };
 
-// Twice the negative logarithm of the likelihood.
+// Twice the negative logarithm of the likelihood, and of what the usual powers have for them: the
+// curvature of as many errors.
 double misfit_of(const std::vector<Sample>& samples, const Eigen::Vector3d& factors,
                  const Eigen::Vector3d& usual) {
-  double sum = usual_weight * (factors - usual).tail<2>().squaredNorm();
+  double sum = usual_weight / 2 * (factors - usual).tail<2>().squaredNorm();
   for (const Sample& sample : samples) {
     const double log_variance = sample.terms.dot(factors);
     sum += log_variance + sample.square_m2 * std::exp(-log_variance);
@@ -96,8 +97,8 @@ std::optional<FillLaw> fit_law(std::span<const FillError> errors) {
 }
 
 FillCover cover_of(std::span<const FillError> errors, const FillLaw& law) {
-  FillCover cover;
-  if (errors.empty()) return cover;
+  if (errors.empty()) return {};
+  FillCover cover{0, 0, 0};
   for (const FillError& error : errors) {
     const double sds = std::abs(error.error_m) / law.sd_m(error.distance_cells, error.roughness_m);
     cover.within_1sd += sds <= 1 ? 1 : 0;

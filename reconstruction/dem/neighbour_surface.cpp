@@ -18,10 +18,14 @@ constexpr std::size_t window = across * across;
 // Second differences may be larger than the scatter about a plane, but not by much more: a surface
 // that bends by d scatters by 0.84 d about its plane.
 constexpr double bend_share = 1.5;
-// By which share the scatter falls from planes to surfaces of the second degree, by that it falls
-// again to what a cell's own slope differs from the surface's, and twice to its second differences;
-// times these, by trial on fractals, a real valley and triangles, one of each.
-constexpr double slope_rest = 2.5, bend_rest = 8;
+// By how much a cell's second differences are off those of the surface, over how far its height is:
+// variances. Its slope across the cell is off by this times the share to which sd fall from planes
+// to surfaces of the second degree: ground that these fit well is smooth between samples, too. By
+// trial on rolling ground, fractals, a real valley and triangles, from 1 point a cell to 100.
+constexpr double bend_rest = 1.15, slope_rest = 1.8;
+
+// Fewer cells do not tell a plane: how far they are off the first guess counts.
+constexpr int cells_for_plane = 8;
 
 // Cells of the window, row by row; those without ground, and beyond the window, weigh nothing.
 struct Neighbours {
@@ -115,13 +119,36 @@ std::size_t residuals(const Neighbours& near, QuadricColumn& found) noexcept {
   return count;
 }
 
-// The variance of residuals: by the median, which a few wrong cells do not move.
-double residual_variance(const Neighbours& near) noexcept {
+// By how much more residuals vary than noise tells, and the variance of that estimate.
+struct Excess {
+  double m2 = 0, m4 = 0;
+};
+
+// Each square tells of it, less the cell's noise: those of much noise tell little, so they weigh
+// less, or they would drown the others. A square counts as no more than 4 variances, as the median
+// size has them: a few wrong cells do not move that, nor does the shape of the ground.
+// @see Huber, Ronchetti, Robust statistics (2009), section 6.4: proposal 2
+// @param freedom  of the residuals: cells less what was fitted.
+Excess excess(const Neighbours& near, double noise_m2, double freedom) noexcept {
+  constexpr float most = 4;
+  constexpr float whole = 1 / 0.9205F;  // of normal residuals 0.92 of the variance are left then
   QuadricColumn sizes;
   const std::size_t count = residuals(near, sizes);
   for (float& size : sizes) size = std::abs(size);
-  const double sd = 1.4826 * middle(sizes, count);
-  return sd * sd;
+  const double sd = 1.4826 * middle(sizes, count), lost = near.count / freedom;
+  const auto start = static_cast<float>(std::max(0.0, lost * sd * sd - noise_m2));
+  const auto noise = static_cast<float>(noise_m2), times = static_cast<float>(lost);
+  FloatLanes sum{}, all{}, spread{};
+  for (std::size_t i = 0; i < quadric_places; i += lanes) {
+    const FloatLanes off = load(&near.residual[i]), own = load(&near.variance[i]);
+    const FloatLanes expected = own + start, square = smaller(times * off * off, most * expected);
+    const FloatLanes root = load(&near.is_there[i]) / (own + noise), weight = root * root;
+    sum += weight * (whole * square - own);
+    all += weight;
+    spread += weight * weight * expected * expected;
+  }
+  const double per = 1 / double{total(all)};
+  return {per * double{total(sum)}, 2 * lost * per * per * double{total(spread)}};
 }
 
 QuadricTerms start(Neighbours& near) noexcept {
@@ -243,20 +270,20 @@ NeighbourSketch sketch_neighbours(const GroundGuess* guess, std::ptrdiff_t strid
   const QuadricTerms plane = start(near);
   add_places(near, plane, step_m);
   const double noise_m2 = mean_variance(near);
-  const double plane_m2 = std::max(0.0, residual_variance(near) - noise_m2);
-  const QuadricTerms hold = hold_of(step_m, slope_sd, plane_m2);
-  QuadricFit fit;
-  QuadricTerms base = plane;
-  const QuadricPlaces heights = near.places;
+  double plane_m2 = std::max(0.0, excess(near, noise_m2, near.count).m2);
+  set_weights(near, plane_m2);
   level(near, plane);
-  for (int round = 0; round < 2; ++round) {
-    set_weights(near, plane_m2);
-    fit = fit_quadric(near.places, hold);
+  QuadricFit fit;
+  if (near.count >= cells_for_plane) {
+    fit = fit_quadric(near.places, hold_of(step_m, slope_sd, 0));
     set_residuals(near.places, fit.terms, near.residual);
-    add_plane(fit.terms, base);
-    base = fit.terms;
-    set_residuals(heights, {base[0], base[1], base[2]}, near.places.z);
+    plane_m2 = std::max(0.0, excess(near, noise_m2, near.count - 3).m2);
+    set_weights(near, plane_m2);
   }
+  const QuadricTerms hold = hold_of(step_m, slope_sd, plane_m2);
+  fit = fit_quadric(near.places, hold);
+  set_residuals(near.places, fit.terms, near.residual);
+  add_plane(fit.terms, plane);
   const QuadricMatrix covariance = fit.covariance();
   double freedom = near.count - static_cast<double>(hold.size());
   for (std::size_t i = 0; i < hold.size(); ++i) {
@@ -266,7 +293,9 @@ NeighbourSketch sketch_neighbours(const GroundGuess* guess, std::ptrdiff_t strid
   found.plane_m2 = static_cast<float>(plane_m2);
   if (freedom < 1) return found;
   found.freedom = static_cast<float>(freedom);
-  found.rough_m2 = static_cast<float>(residual_variance(near) * near.count / freedom - noise_m2);
+  const Excess rough = excess(near, noise_m2, freedom);
+  found.rough_m2 = static_cast<float>(rough.m2);
+  found.rough_m4 = static_cast<float>(rough.m4);
   return found;
 }
 
@@ -297,9 +326,9 @@ NeighbourSurface neighbour_surface(const GroundGuess* guess, std::ptrdiff_t stri
   found.height_variance_m2 = c[0][0] + rough_m2;
   found.height_x_m2 = c[0][1] / step_m.x;
   found.height_y_m2 = c[0][2] / step_m.y;
-  const double falls = scatter.plane_m2 > rough_m2 ? rough_m2 / scatter.plane_m2 : 1;
+  const double falls = scatter.plane_m2 > rough_m2 ? std::sqrt(rough_m2 / scatter.plane_m2) : 1;
   set_slopes(found, near, c, step_m, slope_sd, slope_rest * falls * rough_m2);
-  const double rest_m2 = bend_rest * falls * falls * rough_m2;
+  const double rest_m2 = bend_rest * rough_m2;
   found.bend_variance = {c[3][3] + rest_m2, c[4][4] + 0.5 * rest_m2, c[5][5] + rest_m2};
   found.scatter_m = double{std::sqrt(std::max(0.F, sketch.rough_m2))};
   set_bias(found, guess, stride, near);

@@ -45,6 +45,7 @@ struct NeighbourSketch {
   std::array<float, 6> terms{};  ///< in cells; heights are above the first of them
   float plane_m2 = 0;            ///< variance of heights about a plane, their noise taken off
   float rough_m2 = 0;  ///< the same about the surface of the second degree; may be negative
+  float rough_m4 = 0;  ///< variance of that
   float freedom = 0;   ///< cells more than that surface's terms
 };
 
@@ -77,7 +78,7 @@ struct NeighbourSurface {
 
 /// Fits a surface of the second degree to the 24 cells around one. Robust: begins with the medians
 /// of slopes between cells that are two or four apart, then weights by Cauchy's function
-/// (c = 2.385) twice.
+/// (c = 2.385).
 /// @param guess    of the cell; its neighbours two columns and two rows off must exist.
 /// @param stride   of rows of guesses.
 /// @param slope_sd  what slopes are like where neighbours do not tell.

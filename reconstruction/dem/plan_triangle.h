@@ -3,15 +3,46 @@
 #include <algorithm>
 #include <array>
 #include <cmath>
+#include <glm/vec2.hpp>
 #include <glm/vec3.hpp>
+#include <limits>
 
 #include "core/grid_frame.h"
 
 // Samples below a triangle, private to this library.
 namespace groundray {
 
+/// Columns of a triangle's plan in a row; low above high if it does not reach the row.
+struct PlanSpan {
+  double low = std::numeric_limits<double>::infinity();
+  double high = -std::numeric_limits<double>::infinity();
+};
+
+/// Returns the span of a triangle of columns and rows in a row, a little too wide.
+inline PlanSpan span_in_row(const std::array<glm::dvec2, 3>& p, double row) {
+  constexpr double rounding = 1e-9;
+  PlanSpan span;
+  const auto add = [&span](double at) {
+    span.low = std::min(span.low, at - rounding * (1 + std::abs(at)));
+    span.high = std::max(span.high, at + rounding * (1 + std::abs(at)));
+  };
+  for (std::size_t k = 0; k < 3; ++k) {
+    const glm::dvec2 a = p[k], b = p[(k + 1) % 3];
+    const auto [top, bottom] = std::minmax(a.y, b.y);
+    const double slack = rounding * (1 + std::abs(top) + std::abs(bottom));
+    if (row < top - slack || row > bottom + slack) continue;
+    if (bottom - top <= 2 * slack) {
+      add(a.x);
+      add(b.x);
+    } else {
+      add(a.x + std::clamp((row - a.y) / (b.y - a.y), 0.0, 1.0) * (b.x - a.x));
+    }
+  }
+  return span;
+}
+
 /// Calls `visit(column, row, height_m)` for each sample of the frame in the triangle's plan, its
-/// border included; never for an upright one.
+/// border included; never for an upright one. Takes time in proportion to these and the rows.
 template <typename Visit>
 void visit_samples(const GridFrame& frame, const std::array<glm::dvec3, 3>& corners_m,
                    const Visit& visit) {
@@ -21,7 +52,6 @@ void visit_samples(const GridFrame& frame, const std::array<glm::dvec3, 3>& corn
   const double area = cross(p[1] - p[0], p[2] - p[0]);
   if (area == 0) return;
   const auto [top, bottom] = std::minmax({p[0].y, p[1].y, p[2].y});
-  const auto [left, right] = std::minmax({p[0].x, p[1].x, p[2].x});
   static constexpr double most = 1 << 30;  // what is beyond is outside of any frame
   const auto first = [](double at) {
     return static_cast<int>(std::ceil(std::clamp(at, 0.0, most)));
@@ -30,7 +60,9 @@ void visit_samples(const GridFrame& frame, const std::array<glm::dvec3, 3>& corn
     return static_cast<int>(std::floor(std::clamp(at, -1.0, count - 1.0)));
   };
   for (int row = first(top); row <= last(bottom, frame.samples.y); ++row) {
-    for (int column = first(left); column <= last(right, frame.samples.x); ++column) {
+    const PlanSpan span = span_in_row(p, row);
+    const int end = last(span.high, frame.samples.x);
+    for (int column = first(span.low); column <= end; ++column) {
       const glm::dvec2 q(column, row);
       const double b = cross(q - p[0], p[2] - p[0]) / area;
       const double c = cross(p[1] - p[0], q - p[0]) / area;

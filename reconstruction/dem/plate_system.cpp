@@ -1,21 +1,19 @@
 #include "reconstruction/dem/plate_system.h"
 
-#include <Eigen/SparseCholesky>
-#include <Eigen/SparseCore>
 #include <algorithm>
 #include <array>
 #include <cmath>
 #include <cstdlib>
+#include <limits>
 #include <optional>
 #include <utility>
 
-#include "core/error.h"
+#include "reconstruction/dem/plate_descent.h"
+#include "reconstruction/dem/plate_dissection.h"
+#include "reconstruction/dem/plate_factor.h"
 
 namespace groundray {
 namespace {
-
-using Matrix = Eigen::SparseMatrix<double, Eigen::ColMajor, int>;
-using Solver = Eigen::SimplicialLDLT<Matrix, Eigen::Lower>;
 
 constexpr int reach = 3;  // of the equations, in columns and rows
 constexpr std::size_t side = 2 * reach + 1;
@@ -54,6 +52,8 @@ std::vector<Term> terms_of(glm::dvec2 step_m, const PlateForm& form) {
   return terms;
 }
 
+int reach_of(const PlateForm& form) { return form.smoothness > 0 ? reach : reach - 1; }
+
 // The equation of one sample: factors of the samples about it.
 using Stencil = std::array<double, side * side>;
 
@@ -61,39 +61,83 @@ std::size_t stencil_place(int columns, int rows) {
   return static_cast<std::size_t>(rows + reach) * side + static_cast<std::size_t>(columns + reach);
 }
 
-class StencilMaker {
- public:
-  StencilMaker(const PlateRaster& raster, const PlateForm& form)
-      : raster_(raster), terms_(terms_of(raster.step_m, form)) {}
+struct EquationEntry {
+  std::size_t sample = 0;  // of the raster
+  double factor = 0;
+};
 
-  Stencil at(int column, int row) const {
-    Stencil stencil{};
-    for (const Term& term : terms_) {
-      for (const TermSample& self : term.samples)
-        add(term, self, column - self.column, row - self.row, stencil);
+class EquationMaker {
+ public:
+  EquationMaker(const PlateRaster& raster, const PlateForm& form, int wide)
+      : raster_(raster), terms_(terms_of(raster.step_m, form)), wide_(wide) {
+    entries_.reserve(side * side);
+    for (const Term& term : terms_)
+      for (const TermSample& self : term.samples) add(term, self, whole_);
+  }
+
+  // Valid until it is called again.
+  const std::vector<EquationEntry>& at(glm::ivec2 place) {
+    if (!take(whole_, place)) {
+      Stencil stencil{};
+      for (const Term& term : terms_) {
+        for (const TermSample& self : term.samples)
+          if (is_whole(term, place - glm::ivec2(self.column, self.row))) add(term, self, stencil);
+      }
+      take(stencil, place);
     }
-    return stencil;
+    return entries_;
   }
 
  private:
-  bool is_there(int column, int row) const {
-    if (column < 0 || row < 0 || column >= raster_.size.x || row >= raster_.size.y) return false;
-    return raster_
-               .numbers[static_cast<std::size_t>(row) * static_cast<std::size_t>(raster_.size.x) +
-                        static_cast<std::size_t>(column)] != plate_absent;
+  // The number of a sample; plate_absent beyond the edge.
+  std::int32_t number_at(glm::ivec2 place) const {
+    if (place.x < 0 || place.y < 0 || place.x >= raster_.size.x || place.y >= raster_.size.y)
+      return plate_absent;
+    return raster_.numbers[index_of(place)];
   }
 
-  // Adds the term whose first sample is (column, row).
-  void add(const Term& term, const TermSample& self, int column, int row, Stencil& stencil) const {
-    for (const TermSample& other : term.samples)
-      if (!is_there(column + other.column, row + other.row)) return;
+  std::size_t index_of(glm::ivec2 place) const {
+    return static_cast<std::size_t>(place.y) * static_cast<std::size_t>(raster_.size.x) +
+           static_cast<std::size_t>(place.x);
+  }
+
+  bool is_whole(const Term& term, glm::ivec2 first) const {
+    return std::ranges::all_of(term.samples, [&](const TermSample& sample) {
+      return number_at(first + glm::ivec2(sample.column, sample.row)) != plate_absent;
+    });
+  }
+
+  static void add(const Term& term, const TermSample& self, Stencil& stencil) {
     for (const TermSample& other : term.samples)
       stencil[stencil_place(other.column - self.column, other.row - self.row)] +=
           term.weight * self.factor * other.factor;
   }
 
+  // Makes a stencil the equation of a sample. Whether all samples that a whole one reaches are
+  // there.
+  bool take(const Stencil& stencil, glm::ivec2 place) {
+    entries_.clear();
+    bool is_whole = true;
+    for (int down = -wide_; down <= wide_; ++down) {
+      const int most = wide_ - std::abs(down);
+      for (int across = -most; across <= most; ++across) {
+        const glm::ivec2 other = place + glm::ivec2(across, down);
+        const double factor = stencil[stencil_place(across, down)];
+        if (number_at(other) == plate_absent) {
+          is_whole = false;
+        } else if (factor != 0) {
+          entries_.push_back({index_of(other), factor});
+        }
+      }
+    }
+    return is_whole;
+  }
+
   const PlateRaster& raster_;
   std::vector<Term> terms_;
+  int wide_;
+  Stencil whole_{};
+  std::vector<EquationEntry> entries_;
 };
 
 }  // namespace
@@ -142,22 +186,23 @@ bool has_known_neighbour(glm::ivec2 size, std::span<const std::int32_t> numbers,
 // A z = b for one form, with the heights above a base.
 struct PlateSystem::Equations {
   std::optional<PlateForm> form;
-  double base_m = 0;
-  Matrix matrix;  // lower triangle
-  Eigen::VectorXd right;
-  Solver solver;
-  Eigen::Index analysed = -1;  // nonzeros of the matrix that the order of elimination is for
+  double base_m = std::numeric_limits<double>::quiet_NaN();  // the first known height met
+  PlateMatrix matrix;
+  std::vector<double> right;
+  std::vector<glm::ivec2> places;                           // of the samples: columns and rows
+  std::array<std::optional<Dissection>, reach + 1> orders;  // by the reach of the equations
+  std::vector<double> below;  // the latest heights under bounds, above the base
 
   void assemble(const PlateRaster& raster, std::span<const std::uint32_t> samples,
                 const PlateForm& for_form);
-  void factorise(const Matrix& of);
+  const Dissection& order();
 };
 
-void PlateSystem::Equations::factorise(const Matrix& of) {
-  if (std::exchange(analysed, of.nonZeros()) != of.nonZeros()) solver.analyzePattern(of);
-  solver.factorize(of);
-  if (solver.info() != Eigen::Success)
-    throw Error("a hole of {} samples has no surface: its equations have no solution", of.cols());
+const Dissection& PlateSystem::Equations::order() {
+  const int wide = reach_of(*form);
+  auto& order = orders[static_cast<std::size_t>(wide)];
+  if (!order) order = dissect(places, wide);
+  return *order;
 }
 
 void PlateSystem::Equations::assemble(const PlateRaster& raster,
@@ -165,140 +210,61 @@ void PlateSystem::Equations::assemble(const PlateRaster& raster,
                                       const PlateForm& for_form) {
   if (form == for_form) return;
   form = for_form;
-  const auto count = static_cast<Eigen::Index>(samples.size());
-  matrix.resize(count, count);
-  matrix.reserve(count * (side * side / 4 + 1));
-  right.setZero(count);
-  const StencilMaker maker(raster, for_form);
-  std::vector<std::pair<double, double>> known;  // factors and heights, of one equation
-  base_m = std::nan("");
-  for (Eigen::Index i = 0; i < count; ++i) {
-    const auto at = static_cast<int>(samples[static_cast<std::size_t>(i)]);
-    const int column = at % raster.size.x, row = at / raster.size.x;
-    const Stencil stencil = maker.at(column, row);
-    matrix.startVec(i);
-    for (int down = -reach; down <= reach; ++down) {
-      for (int across = -reach; across <= reach; ++across) {
-        const double factor = stencil[stencil_place(across, down)];
-        if (factor == 0) continue;
-        const auto other =
-            static_cast<std::size_t>(at + std::ptrdiff_t{down} * raster.size.x + across);
-        const std::int32_t number = raster.numbers[other];
-        if (number == plate_known) {
-          const double height_m = raster.heights_m[other];
-          if (std::isnan(base_m)) base_m = height_m;
-          right[i] -= factor * (height_m - base_m);
-        } else if (number >= i) {
-          matrix.insertBack(number, i) = factor;
-        }
+  matrix.ends.clear();
+  matrix.samples.clear();
+  matrix.factors.clear();
+  right.assign(samples.size(), 0);
+  EquationMaker maker(raster, for_form, reach_of(for_form));
+  for (std::size_t i = 0; i < samples.size(); ++i) {
+    for (const EquationEntry& entry : maker.at(places[i])) {
+      const std::int32_t number = raster.numbers[entry.sample];
+      if (number == plate_known) {
+        const double height_m = raster.heights_m[entry.sample];
+        if (std::isnan(base_m)) base_m = height_m;
+        right[i] -= entry.factor * (height_m - base_m);
+      } else {
+        matrix.samples.push_back(number);
+        matrix.factors.push_back(entry.factor);
       }
     }
+    matrix.ends.push_back(matrix.samples.size());
   }
-  matrix.finalize();
 }
 
 PlateSystem::PlateSystem(const PlateRaster& raster, std::vector<std::uint32_t> samples)
-    : raster_(raster), samples_(std::move(samples)), equations_(std::make_unique<Equations>()) {}
+    : raster_(raster), samples_(std::move(samples)), equations_(std::make_unique<Equations>()) {
+  for (const std::uint32_t sample : samples_) {
+    const auto at = static_cast<int>(sample);
+    equations_->places.emplace_back(at % raster_.size.x, at / raster_.size.x);
+  }
+}
 
 PlateSystem::~PlateSystem() = default;
 
 std::vector<double> PlateSystem::solve(const PlateForm& form) {
   equations_->assemble(raster_, samples_, form);
-  equations_->factorise(equations_->matrix);
-  const Eigen::VectorXd above_m = equations_->solver.solve(equations_->right);
-  std::vector<double> heights_m(samples_.size());
-  for (std::size_t i = 0; i < heights_m.size(); ++i)
-    heights_m[i] = above_m[static_cast<Eigen::Index>(i)] + equations_->base_m;
+  PlateFactor factor(equations_->matrix, equations_->order(), FactorUse::Once);
+  factor.factorise(std::vector<std::uint8_t>(samples_.size()));
+  std::vector<double> heights_m = factor.solve(equations_->right);
+  for (double& height_m : heights_m) height_m += equations_->base_m;
   return heights_m;
 }
 
-namespace {
-
-constexpr int most_rounds = 60;     // of the active set
-constexpr int rounds_of_both = 25;  // after which samples only join it, so that it ends
-
-// The matrix with the samples at their bounds taken out, each left to an equation of its own.
-Matrix without(const Matrix& matrix, const std::vector<std::uint8_t>& is_held) {
-  Matrix rest(matrix);
-  double* const factors = rest.valuePtr();
-  for (int column = 0; column < rest.outerSize(); ++column) {
-    for (int k = rest.outerIndexPtr()[column]; k < rest.outerIndexPtr()[column + 1]; ++k) {
-      const int row = rest.innerIndexPtr()[k];
-      if (is_held[static_cast<std::size_t>(row)] != 0 ||
-          is_held[static_cast<std::size_t>(column)] != 0)
-        factors[k] = row == column ? 1 : 0;
-    }
-  }
-  return rest;
-}
-
-// Which samples are at their bounds.
-class Held {
- public:
-  Held(std::span<const double> most_m, double base_m)
-      : most_m_(Eigen::Map<const Eigen::VectorXd>(most_m.data(), std::ssize(most_m)).array() -
-                base_m),
-        is_held_(most_m.size()) {}
-
-  const std::vector<std::uint8_t>& flags() const { return is_held_; }
-
-  // Takes in those above their bounds and lets go, if it may, those that would fall. How many
-  // changed.
-  std::size_t update(const Eigen::VectorXd& z, const Eigen::VectorXd& push, bool may_let_go) {
-    std::size_t changed = 0;
-    for (Eigen::Index i = 0; i < z.size(); ++i) {
-      std::uint8_t& is_held = is_held_[static_cast<std::size_t>(i)];
-      const bool stays = is_held != 0 && (push[i] > 0 || !may_let_go);
-      const std::uint8_t shall = stays || z[i] > most_m_[i] ? 1 : 0;
-      if (std::exchange(is_held, shall) != shall) ++changed;
-    }
-    return changed;
-  }
-
-  // The vector with the bounds in the places of those held.
-  Eigen::VectorXd put_bounds(Eigen::VectorXd values) const {
-    for (Eigen::Index i = 0; i < values.size(); ++i)
-      if (is_held_[static_cast<std::size_t>(i)] != 0) values[i] = most_m_[i];
-    return values;
-  }
-
- private:
-  Eigen::VectorXd most_m_;  // above the base; NaN for none
-  std::vector<std::uint8_t> is_held_;
-};
-
-// A z for a symmetric matrix of which the lower triangle is stored.
-Eigen::VectorXd times(const Matrix& lower, const Eigen::VectorXd& z) {
-  return lower.selfadjointView<Eigen::Lower>() * z;
-}
-
-}  // namespace
-
-BoundedPlate PlateSystem::solve_below(const PlateForm& form, std::span<const double> start,
-                                      std::span<const double> most_m) {
-  equations_->assemble(raster_, samples_, form);
-  const Matrix& matrix = equations_->matrix;
-  const auto count = static_cast<Eigen::Index>(samples_.size());
-  Held held(most_m, equations_->base_m);
-  Eigen::VectorXd z =
-      Eigen::Map<const Eigen::VectorXd>(start.data(), count).array() - equations_->base_m;
-  Eigen::VectorXd push = Eigen::VectorXd::Zero(count);  // of the bounds, downwards
+BoundedPlate PlateSystem::solve_below(const PlateForm& form, std::span<const double> most_m) {
+  Equations& equations = *equations_;
+  equations.assemble(raster_, samples_, form);
+  std::vector<double> most(most_m.begin(), most_m.end());  // above the base
+  for (double& bound : most)
+    bound = std::isnan(bound) ? std::numeric_limits<double>::infinity() : bound - equations.base_m;
+  PlateDescent descent(equations.matrix, equations.order(), equations.right, most);
   BoundedPlate result;
-  for (int round = 0; round < most_rounds; ++round) {
-    const std::size_t changed = held.update(z, push, round < rounds_of_both);
-    result.is_best = changed == 0 && round <= rounds_of_both;
-    if (changed == 0) break;
-    Eigen::VectorXd rest =
-        equations_->right - times(matrix, held.put_bounds(Eigen::VectorXd::Zero(count)));
-    equations_->factorise(without(matrix, held.flags()));
-    z = equations_->solver.solve(held.put_bounds(std::move(rest)));
-    push = equations_->right - times(matrix, z);
-  }
-  result.at_bound = static_cast<std::size_t>(std::ranges::count(held.flags(), 1));
-  for (Eigen::Index i = 0; i < count; ++i) {
-    const double bound_m = most_m[static_cast<std::size_t>(i)];
-    const double height_m = z[i] + equations_->base_m;
-    result.heights_m.push_back(height_m > bound_m ? bound_m : height_m);
+  result.is_best = descent.run(equations.below);
+  equations.below = descent.heights();
+  result.heights_m = descent.heights();
+  for (std::size_t i = 0; i < most.size(); ++i) {
+    double& height_m = result.heights_m[i];
+    if (height_m >= most[i]) ++result.at_bound;
+    height_m = height_m >= most[i] ? most_m[i] : height_m + equations.base_m;
   }
   return result;
 }

@@ -38,7 +38,7 @@ bool has_known_neighbour(glm::ivec2 size, std::span<const std::int32_t> numbers,
 struct BoundedPlate {
   std::vector<double> heights_m;
   std::size_t at_bound = 0;  ///< how many are held down
-  bool is_best = true;       ///< else within all bounds, but held down by more than it should be
+  bool is_best = true;       ///< else within all bounds, but not yet the least
 };
 
 /// The heights of some samples that have the least of what PlateForm tells where all other samples
@@ -61,13 +61,9 @@ class PlateSystem {
   std::vector<double> solve(const PlateForm& form);
 
   /// Returns the height of each sample, none above its bound: the least of the same under these
-  /// bounds, by an active set of primal and dual signs.
-  /// @param start   what solve returned for the same form.
+  /// bounds. What the call before returned serves as a start.
   /// @param most_m  of each sample; NaN for none.
-  /// @see Hintermueller, Ito, Kunisch, The primal-dual active set strategy as a semismooth Newton
-  ///      method, SIAM J. Optim. 13 (2002).
-  BoundedPlate solve_below(const PlateForm& form, std::span<const double> start,
-                           std::span<const double> most_m);
+  BoundedPlate solve_below(const PlateForm& form, std::span<const double> most_m);
 
  private:
   struct Equations;

@@ -39,6 +39,30 @@ void PointSpool::make_room(Bin& bin) {
   ++on_disk_;
 }
 
+std::vector<std::span<const PackedPoint>> PointSpool::parts(
+    std::size_t bin, std::vector<PackedPoint>& read_back) const {
+  const Bin& from = bins_[bin];
+  std::size_t on_disk = 0;
+  for (const std::uint64_t chunk : from.chunks) on_disk += chunk < in_memory_.size() ? 0 : 1;
+  read_back.resize(on_disk * chunk_points_);
+  std::vector<std::span<const PackedPoint>> found;
+  found.reserve(from.chunks.size() + 1);
+  std::span<PackedPoint> room(read_back);
+  for (const std::uint64_t chunk : from.chunks) {
+    if (chunk < in_memory_.size()) {
+      found.emplace_back(in_memory_[chunk].get(), chunk_points_);
+      continue;
+    }
+    const std::span<PackedPoint> part = room.first(chunk_points_);
+    room = room.subspan(chunk_points_);
+    file_->read((chunk - in_memory_.size()) * chunk_points_ * sizeof(PackedPoint),
+                std::as_writable_bytes(part));
+    found.emplace_back(part);
+  }
+  if (from.fill > 0) found.emplace_back(from.open.get(), from.fill);
+  return found;
+}
+
 void PointSpool::read(std::size_t bin,
                       const std::function<void(std::span<const PackedPoint>)>& visit) const {
   const Bin& from = bins_[bin];

@@ -35,6 +35,10 @@ class PointSpool {
   std::size_t bins() const noexcept { return bins_.size(); }
   std::uint64_t bytes_on_disk() const noexcept;
 
+  /// Returns all points of a bin, as they lie in memory; those on disk are read to `read_back`.
+  std::vector<std::span<const PackedPoint>> parts(std::size_t bin,
+                                                  std::vector<PackedPoint>& read_back) const;
+
   /// Shows a bin's points, a part of them at a time. Any number of threads may read.
   void read(std::size_t bin, const std::function<void(std::span<const PackedPoint>)>& visit) const;
 

@@ -19,8 +19,9 @@ struct SightLine {
 /// above it, so that the ground is no higher: NaN where none does. Sums of `margin_m` and
 ///
 /// - the height of a line at its foot point, the nearest to the sample in plan, if that lies on the
-///   line and no more than half a cell away. What the ground rises from the line to the sample the
-///   margin has to cover: half a cell times the slope.
+///   line and no more than half a cell away, both counted in columns and rows: where cells are
+///   oblong, half of their longer side along it. What the ground rises from the line to the sample
+///   the margin has to cover: half a cell times the slope.
 /// - the height, exactly above the sample, of the planes of occlusion faces and of those between
 ///   their sides and where the beams began. That holds as far as nothing stands between
 ///   neighbouring beams: behind a crest which rises above the beam that met it and below the next

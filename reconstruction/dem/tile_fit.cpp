@@ -72,7 +72,7 @@ class CellSort {
 // first sight.
 class TilePoints {
  public:
-  TilePoints(const std::vector<PackedPoint>& points, glm::ivec2 size, const TileRules& rules);
+  TilePoints(const PointParts& parts, glm::ivec2 size, const TileRules& rules);
 
   std::span<const PackedPoint> cell(int column, int row) const noexcept {
     const std::size_t at = index(column, row);
@@ -101,20 +101,27 @@ class TilePoints {
   std::vector<NeighbourSketch> sketches_;
 };
 
+std::size_t count_of(const PointParts& parts) {
+  std::size_t count = 0;
+  for (const std::span<const PackedPoint> part : parts) count += part.size();
+  return count;
+}
+
 double tallest_ground_m(const TileRules& rules) {
   return rules.steepest_slope * std::hypot(rules.step_m.x, rules.step_m.y);
 }
 
-TilePoints::TilePoints(const std::vector<PackedPoint>& points, glm::ivec2 size,
-                       const TileRules& rules)
+TilePoints::TilePoints(const PointParts& parts, glm::ivec2 size, const TileRules& rules)
     : rules_(rules),
       tallest_m_(tallest_ground_m(rules)),
-      points_(std::make_unique_for_overwrite<PackedPoint[]>(points.size())) {
+      points_(std::make_unique_for_overwrite<PackedPoint[]>(count_of(parts))) {
   const std::size_t cells = static_cast<std::size_t>(size.y + 2 * rim) * width;
   begins_.assign(cells + 2, 0);
-  for (const PackedPoint& point : points) ++begins_[point.cell + std::size_t{2}];
+  for (const std::span<const PackedPoint> part : parts)
+    for (const PackedPoint& point : part) ++begins_[point.cell + std::size_t{2}];
   for (std::size_t i = 2; i < begins_.size(); ++i) begins_[i] += begins_[i - 1];
-  for (const PackedPoint& point : points) points_[begins_[point.cell + std::size_t{1}]++] = point;
+  for (const std::span<const PackedPoint> part : parts)
+    for (const PackedPoint& point : part) points_[begins_[point.cell + std::size_t{1}]++] = point;
   guesses_.resize(cells);
   tbb::parallel_for(0, size.y + 2 * rim, [&](int row) {
     CellSort sort;
@@ -132,25 +139,32 @@ TilePoints::TilePoints(const std::vector<PackedPoint>& points, glm::ivec2 size,
 }
 
 // How rough the ground is, from the scatter of 7 x 7 cells: that about 9 surfaces. Where these are
-// hardly more than fitted, that about planes counts, and an expectation.
+// hardly more than fitted, that about planes counts, and an expectation. As far as noise hides it
+// roughness is expected too: a variance is not below 0, so the mean of what it may be is that of a
+// normal distribution cut there, which this root is at 0 and far above.
 GroundScatter TilePoints::scatter(int column, int row) const noexcept {
-  constexpr double plane_counts = 3, expected_counts = 1, expected_bend = 0.05;
-  double rough = 0, freedom = 0, plane = 0, cells = 0;
+  constexpr double plane_counts = 3, expected_counts = 1, expected_bend = 0.02;
+  constexpr double overlap = 4;   // the 7 x 7 cells have as much freedom as a fourth of the 9 sums
+  constexpr double at_0 = 0.798;  // that mean, in sd: sqrt(2 / pi)
+  double rough = 0, spread = 0, freedom = 0, plane = 0, cells = 0;
   for (int r = row - rough_reach; r <= row + rough_reach; ++r) {
     for (int c = column - rough_reach; c <= column + rough_reach; ++c) {
       const NeighbourSketch& one = sketches_[index(c, r)];
       const double more = std::max(0, one.cells - 3);
       rough += double{one.freedom} * double{one.rough_m2};
+      spread += std::pow(double{one.freedom}, 2) * double{one.rough_m4};
       freedom += double{one.freedom};
       plane += more * double{one.plane_m2};
       cells += more;
     }
   }
-  if (cells > 0) plane /= cells;
   const double expected_m2 =
       std::abs(rules_.step_m.x * rules_.step_m.y) * std::pow(expected_bend * rules_.slope_sd, 2);
   const double all = freedom + plane_counts + expected_counts;
-  return {plane, std::max(0.0, rough + plane_counts * plane + expected_counts * expected_m2) / all};
+  plane = (plane + expected_counts * expected_m2) / (cells + expected_counts);
+  const double half_m2 = 0.5 * (rough + plane_counts * plane + expected_counts * expected_m2) / all;
+  const double hidden_m4 = at_0 * at_0 * overlap * spread / (all * all);
+  return {plane, half_m2 + std::sqrt(half_m2 * half_m2 + hidden_m4)};
 }
 
 // What the lowest surface that outliers do not explain is like: the mean of the middle half of its
@@ -177,10 +191,11 @@ GroundGuess first_guess(std::span<const PackedPoint> cell, const CellSurface& gr
                                   cell.begin() + ground.begin + quarter + half,
                                   [group](const PackedPoint& p) { return p.group == group; });
   // Of normal errors the mean of the middle half has 1.2 times the variance of that of all.
-  const double n = half, shared_m2 = (1.2 * noise_m2 / n + bias_m2 / n) / ground.size();
+  const double more = quarter == 0 ? 1 : 1.2;
+  const double n = half, shared_m2 = (more * noise_m2 / n + bias_m2 / n) / ground.size();
   return {height / n * PackedPoint::height_step_m,
           static_cast<float>(shared_m2 + 1e-8),
-          static_cast<float>(1.2 * across_m2 / n / ground.size()),
+          static_cast<float>(more * across_m2 / n / ground.size()),
           static_cast<float>(lean_x / n),
           static_cast<float>(lean_y / n),
           static_cast<float>(std::sqrt(bias_m2 / n)),
@@ -223,7 +238,7 @@ class RowFit {
   bool agrees(double low_m, double high_m, double variance_m2, double give_m) const;
   bool stands_clear(const CellSurface& wall) const;
   CellSurface foot(const CellSurface& wall) const;
-  bool is_mismatch(const CellHeight& ground) const;
+  static void set_overhang(std::size_t at, double overhang_m, double top_m, DemLayers& layers);
   void fill(std::size_t at, const CellHeight& ground, double reference_m, DemLayers& layers) const;
 
   const TilePoints& points_;
@@ -280,6 +295,11 @@ bool RowFit::is_credible(const CellSurface& surface) const {
                 is_enough ? rules_.gap_m : 0);
 }
 
+void RowFit::set_overhang(std::size_t at, double overhang_m, double top_m, DemLayers& layers) {
+  layers.overhang_m[at] = static_cast<float>(overhang_m);
+  layers.clearance_m[at] = static_cast<float>(overhang_m - top_m);
+}
+
 // The points of the ground, if there are any.
 std::optional<CellSurface> RowFit::ground(std::size_t at, DemLayers& layers) {
   find_surfaces(cell_, rules_.gap_m, surfaces_);
@@ -294,13 +314,14 @@ std::optional<CellSurface> RowFit::ground(std::size_t at, DemLayers& layers) {
                  tallest_m_);
   if (ground.end < lowest.end) {
     if (stands_clear(lowest)) {
-      layers.overhang_m[at] = static_cast<float>(height_m(cell_[lowest.begin]));
+      set_overhang(at, height_m(cell_[lowest.begin]), around_.plane.height_m, layers);
       return std::nullopt;
     }
     ground = foot(ground);
   }
-  if (surfaces_.size() > 1)
-    layers.overhang_m[at] = static_cast<float>(height_m(cell_[surfaces_[1].begin]));
+  if (surfaces_.size() > 1) {
+    set_overhang(at, height_m(cell_[surfaces_[1].begin]), height_m(cell_[lowest.end - 1]), layers);
+  }
   return ground;
 }
 
@@ -316,20 +337,15 @@ void RowFit::fit(int column, int row, std::size_t at, DemLayers& layers) {
   const std::int32_t reference = cell_[points->begin + points->size() / 2].height;
   const std::optional<CellHeight> found =
       cell_fit_(cell_.subspan(points->begin, points->size()), around_, rules_.step_m, reference);
-  if (!found || is_mismatch(*found)) {
+  if (!found) {
     layers.surfaces[at] = static_cast<std::uint16_t>(layers.surfaces[at] - 1);
+    layers.clearance_m[at] = std::numeric_limits<float>::quiet_NaN();  // what is below was nothing
     ++counts_.without_ground;
   } else if (found->variance_m2 > rules_.most_sd_m * rules_.most_sd_m) {
     ++counts_.uncertain;
   } else {
     fill(at, *found, reference * PackedPoint::height_step_m, layers);
   }
-}
-
-// Pixels are matched wrong in patches, so that a few of them agree all the same.
-bool RowFit::is_mismatch(const CellHeight& ground) const {
-  constexpr std::uint32_t enough = 3;
-  return !rules_.outliers.none() && ground.lidar == 0 && ground.stereo < enough;
 }
 
 void RowFit::fill(std::size_t at, const CellHeight& ground, double reference_m,
@@ -349,10 +365,9 @@ void RowFit::fill(std::size_t at, const CellHeight& ground, double reference_m,
 
 }  // namespace
 
-TileCounts fit_tile(std::vector<PackedPoint> points, glm::ivec2 size, glm::ivec2 first,
+TileCounts fit_tile(const PointParts& parts, glm::ivec2 size, glm::ivec2 first,
                     const TileRules& rules, DemLayers& layers) {
-  const TilePoints sorted(points, size, rules);
-  std::vector<PackedPoint>().swap(points);
+  const TilePoints sorted(parts, size, rules);
   std::atomic<std::uint64_t> without_ground = 0, uncertain = 0;
   tbb::parallel_for(0, size.y, [&](int row) {
     RowFit fit(sorted, rules);

@@ -4,6 +4,7 @@
 #include <cstdint>
 #include <glm/vec2.hpp>
 #include <limits>
+#include <span>
 #include <vector>
 
 #include "reconstruction/dem/cell_surfaces.h"
@@ -28,11 +29,14 @@ struct TileCounts {
   std::uint64_t uncertain = 0;  ///< their ground's sd is above the most
 };
 
+/// Points that do not lie in one piece.
+using PointParts = std::vector<std::span<const PackedPoint>>;
+
 /// Fits each cell of a tile to its points and writes it to its place in `layers`.
-/// @param points  of the tile and its rim, in any order, which changes nothing.
+/// @param parts   of the tile's points and its rim's, in any order, which changes nothing.
 /// @param size    of the tile without its rim, in cells.
 /// @param first   the tile's first cell, in `layers`.
-TileCounts fit_tile(std::vector<PackedPoint> points, glm::ivec2 size, glm::ivec2 first,
+TileCounts fit_tile(const PointParts& parts, glm::ivec2 size, glm::ivec2 first,
                     const TileRules& rules, DemLayers& layers);
 
 }  // namespace groundray

@@ -41,7 +41,8 @@ void check_bytes(const Image8& image, const DisparityRange& range, const MatchOp
   if (bytes <= static_cast<double>(options.most_bytes)) return;
   throw Error(
       "matching {} x {} px over disparities of {} to {} px would take {:.3g} GB, more than "
-      "{:.3g}: raise most_bytes, give a narrower range, or ask for paths Five",
+      "the {:.3g} GB allowed (most_bytes): allow more, give a narrower range, or ask for paths "
+      "Five",
       image.width(), image.height(), range.least_px, range.most_px, bytes / 1e9,
       static_cast<double>(options.most_bytes) / 1e9);
 }

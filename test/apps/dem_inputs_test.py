@@ -13,10 +13,19 @@ from pathlib import Path
 import cv2
 import numpy as np
 import pytest
+from dem_runs import (
+    CAMERA,
+    LAYERS,
+    PAIR,
+    PRAIRIE,
+    PROGRAM,
+    groundray,
+    made,
+    points_file,
+    refused,
+    same_bytes_on_any_threads,
+)
 
-ROOT = Path(__file__).resolve().parents[2]
-PROGRAM = ROOT / "build/release/bin/groundray"
-PRAIRIE = ROOT / "data/terrain/prairie_1m.tif"
 SCENE = """\
 groundray: 1
 seed: 5
@@ -38,67 +47,7 @@ lidars:
     preset: velodyne_vlp16
     mount: {{translation_m: [0, 0, 1.8]}}
     range_noise_sigma_m: 0.02
-cameras:
-  - name: left
-    file: camera.yaml
-    mount: {{translation_m: [1.5, 0.25, 1.6], pitch_deg: 15}}
-    sampling: {{samples: 4, most_samples: 4, depth: 2}}
-  - name: right
-    file: camera.yaml
-    mount: {{translation_m: [1.5, -0.25, 1.6], pitch_deg: 15}}
-    sampling: {{samples: 4, most_samples: 4, depth: 2}}
-stereo:
-  - {{name: pair, left: left, right: right, images: rectified}}
 """
-CAMERA = """\
-groundray_camera: 1
-model: Grey camera of 0.3 MP
-size_px: [640, 480]
-lens: {pinhole: {focal_px: [457, 457], centre_px: [319.5, 239.5]}}
-rate_hz: 5
-first_ms: 100
-shutter: {exposure_ms: 0.5}
-aperture: {f_number: 4}
-imager:
-  pixel_pitch_um: 4.8
-  filter: rggb
-  quantum_efficiency: [0.45, 0.6, 0.5]
-  full_well_e: 10000
-  read_noise_e: 5
-  dark_current_e_s: 10
-  prnu_percent: 0.5
-  dsnu_e: 1
-  gain_dn_e: 0.4
-  black_dn: 64
-  bits: 12
-products: [radiance, picture]
-sources: {all: an example of our own}
-"""
-
-
-def groundray(*arguments, **options):
-    return subprocess.run(
-        [PROGRAM, *map(str, arguments)], capture_output=True, text=True, timeout=300, **options
-    )
-
-
-def made(*arguments):
-    result = groundray("reconstruct", "dem", *arguments)
-    assert result.returncode == 0, result.stderr
-    return result.stdout
-
-
-def refused(folder, *arguments, words, **options):
-    """One message, of all the words, and no file of another time or name than before."""
-    before = {path: path.lstat().st_mtime_ns for path in folder.rglob("*") if path.is_file()}
-    result = groundray("reconstruct", "dem", *arguments, **options)
-    assert result.returncode == 1, result
-    said = [line for line in result.stderr.splitlines() if not line.startswith(("match", "read"))]
-    for word in words:
-        assert word in "\n".join(said), result.stderr
-    assert sum(line.startswith("groundray: ") for line in said) == 1
-    after = {path: path.lstat().st_mtime_ns for path in folder.rglob("*") if path.is_file()}
-    assert before == after
 
 
 @pytest.fixture(scope="module")
@@ -107,8 +56,9 @@ def recorded(tmp_path_factory):
     grains = cv2.GaussianBlur(np.random.default_rng(1).normal(0, 1, (1024, 1024)), (0, 0), 2)
     gravel = np.clip(128 + 45 * grains / grains.std(), 0, 255)
     cv2.imwrite(str(folder / "gravel.png"), gravel.astype(np.uint8))
-    (folder / "camera.yaml").write_text(CAMERA)
-    (folder / "scene.yaml").write_text(SCENE.format(prairie=PRAIRIE))
+    camera = CAMERA.format(rate_hz=5, first_ms=100, products="radiance, picture")
+    (folder / "camera.yaml").write_text(camera)
+    (folder / "scene.yaml").write_text(SCENE.format(prairie=PRAIRIE) + PAIR)
     result = groundray("generate", folder / "scene.yaml", "-o", folder / "data")
     assert result.returncode == 0, result.stderr
     return folder / "data"
@@ -137,7 +87,7 @@ def bands(path, folder):
     raw = folder / "bands.raw"
     command = ["gdal_translate", "-q", "-of", "ENVI", "-ot", "Float32", "-co", "INTERLEAVE=BSQ"]
     subprocess.run([*command, path, raw], check=True)
-    return np.fromfile(raw, "<f4").reshape(12, -1)
+    return np.fromfile(raw, "<f4").reshape(len(LAYERS), -1)
 
 
 def test_pairs_measure_alone(recorded, data, tmp_path):
@@ -156,6 +106,13 @@ def test_pairs_measure_alone(recorded, data, tmp_path):
     whole = (tmp_path / "alone.tif").read_bytes()
     assert whole == (tmp_path / "none.tif").read_bytes()
     assert whole == (tmp_path / "named.tif").read_bytes()
+
+
+def test_bytes_of_pairs_and_smooth_ground_do_not_depend_on_threads(recorded, tmp_path):
+    options = ["--cell-m", "0.25", "--smooth", "--reach", "hull"]
+    assert same_bytes_on_any_threads(tmp_path, recorded, *options)
+    layers = bands(tmp_path / "one.tif", tmp_path)
+    assert {1, 2, 3, 4} <= set(np.unique(layers[6]))  # source: all kinds are in it
 
 
 def test_what_does_not_measure_is_told(data, tmp_path):
@@ -233,7 +190,7 @@ def test_missing_images_and_keys_are_told(data, tmp_path):
     assert "pair/000000" in made(data, *out)  # of light
     (tmp_path / "dem.tif").unlink()
     shutil.rmtree(data / "camera/left")
-    refused(tmp_path, data, *out, words=["left/000000.png", "was it removed"])
+    refused(tmp_path, data, *out, words=["left/000000.png", "was it removed", "--no-stereo"])
     changed(data / "dataset.yaml", r"^crs_wkt: .*$", "crs_wkt: nonsense")
     only = [*out, "--no-stereo"]
     refused(tmp_path, data, *only, words=["the CRS 'nonsense'", "crs_wkt"])
@@ -331,6 +288,22 @@ def test_filled_heights_carry_what_all_data_are_off(tmp_path):
     assert 0.8 < np.sqrt(np.mean(z**2)) < 1.1
 
 
+def test_sparse_points_are_told(tmp_path):
+    """One point in nine cells, no more than an outlier in fifty: none is known to be of the ground,
+    unless there are no outliers."""
+    cells = np.stack(np.meshgrid(np.arange(0, 90, 3), np.arange(0, 90, 3)), axis=-1).reshape(-1, 2)
+    crowd = np.random.default_rng(2).uniform(0, 3, (300, 2))
+    points = points_file(
+        tmp_path / "sparse.npy",
+        np.column_stack([np.concatenate([cells + 0.5, crowd]), np.full(1200, 7.0)]),
+    )
+    out = ["--airborne", "--cell-m", "1", "--range-sd-m", "0.01", "-o", tmp_path / "dem.tif"]
+    said = made(points, *out)
+    assert "cells with points have too few" in said
+    assert "--outlier-share" in said
+    assert "have too few" not in made(points, *out, "--outlier-share", "0")
+
+
 def test_coordinates_of_a_map_take_poses_or_a_word(tmp_path):
     points = survey(tmp_path / "points.npy")
     out = ["--cell-m", "1", "-o", tmp_path / "dem.tif"]
@@ -364,6 +337,8 @@ def test_returns_of_pulses_are_chosen(tmp_path):
         (["--airborne", "--divergence-mrad", "3"], ["--divergence-mrad", "--airborne"]),
         (["--no-fill", "--reach", "hull"], ["--reach", "--no-fill"]),
         (["--method", "cgal", "--sight-margin-m", "1"], ["--sight-margin-m", "--method cgal"]),
+        (["--most-edges", "9"], ["--most-edges", "--method cgal"]),
+        (["--no-fill", "--method", "cgal", "--most-edges", "9"], ["--method", "--no-fill"]),
     ],
 )
 def test_options_that_would_do_nothing_are_refused(recorded, tmp_path, options, words):
@@ -391,6 +366,9 @@ def test_options_of_noise_and_form_do_what_they_say(recorded, tmp_path):
     faired = layers("faired", "--method", "cgal")
     assert np.array_equal(faired[0][measured], plain[0][measured])
     assert np.all(np.isnan(faired[8]))
+    assert np.count_nonzero(faired[6] == 4) > 0
+    few_edges = layers("few_edges", "--method", "cgal", "--most-edges", "3")
+    assert np.count_nonzero(few_edges[6] == 4) == 0  # a rim about a sample has more
     few = layers("few", "--area", "429445", "5150655", "429455", "5150665")
     assert few.shape[1] == 20 * 20
 

@@ -8,14 +8,16 @@
 #include <cstdint>
 #include <initializer_list>
 #include <limits>
-#include <map>
 #include <numbers>
 #include <optional>
 #include <string>
 #include <string_view>
 
 #include "apps/groundray/dem/dem_request.h"
+#include "apps/groundray/dem/fill_options.h"
 #include "apps/groundray/scan_options.h"
+#include "apps/scan/number_checks.h"
+#include "apps/scan/word_option.h"
 #include "core/error.h"
 
 namespace groundray {
@@ -46,9 +48,9 @@ struct DemCommand::Options {
   double attitude_sd_mrad = 0;
   std::string stereo_frames = ":";
   std::optional<std::uint64_t> memory_mb;
-  bool has_lidar = true, has_stereo = true, is_airborne = false, is_filled = true,
-       is_smoothed = false;
-  FillOptions filling;
+  bool without_lidar = false, without_stereo = false, without_filling = false;
+  bool is_airborne = false, is_smoothed = false;
+  FillLimits limits;
 
   void add_files() {
     command
@@ -113,8 +115,8 @@ struct DemCommand::Options {
     CLI::App* stereo = command->add_option_group("Stereo");
     stereo->add_option("--stereo", request.pairs.names,
                        "Pairs of a dataset by name, or cameras LEFT,RIGHT; all pairs without it");
-    stereo->add_flag("!--no-stereo", has_stereo, "Take lidars alone");
-    stereo->add_flag("!--no-lidar", has_lidar, "Take a dataset's stereo pairs alone");
+    stereo->add_flag("--no-stereo", without_stereo, "Take lidars alone");
+    stereo->add_flag("--no-lidar", without_lidar, "Take a dataset's stereo pairs alone");
     stereo->add_option("--stereo-frames", stereo_frames, "A:B:STEP, as --frames, of images");
     StereoPointOptions& points = request.stereo.points;
     stereo->add_option("--nearest-m", points.nearest_m, "Depth of matches, at least")
@@ -133,14 +135,12 @@ struct DemCommand::Options {
 
   void add_filter() {
     CLI::App* group = command->add_option_group("Ground");
-    const std::map<std::string, FilterPreset> presets{
+    const Words<FilterPreset> presets{
         {"none", FilterPreset::None}, {"ground", FilterPreset::Ground}, {"air", FilterPreset::Air}};
-    group
-        ->add_option("--ground-filter", filter,
-                     "Leave out what stands on the ground, as scans from the ground or from the "
-                     "air show it; none (default): the lowest surface of each cell is the ground")
-        ->transform(CLI::CheckedTransformer(presets))
-        ->option_text("none|ground|air");
+    add_words(group, "--ground-filter", filter,
+              "Leave out what stands on the ground, as scans from the ground or from the air show "
+              "it; none (default): the lowest surface of each cell is the ground",
+              presets);
     group->add_option("--filter-cell-m", filter_cell_m, "Of its raster")->check(positive());
     group->add_option("--filter-slope", filter_slope, "Steeper is no ground")->check(positive());
     group->add_option("--filter-radius-m", filter_radius_m, "Half the width of what is no ground")
@@ -151,42 +151,18 @@ struct DemCommand::Options {
 
   void add_filling() {
     CLI::App* group = command->add_option_group("Blank areas");
-    group->add_flag("--fill,!--no-fill", is_filled, "Fill them (default)");
-    const std::map<std::string, FillMethod> methods{{"tension", FillMethod::Tension},
-                                                    {"cgal", FillMethod::Mesh}};
-    group
-        ->add_option("--method", request.fill_method,
-                     "tension: the smoothest surface (default); cgal: faired meshes")
-        ->transform(CLI::CheckedTransformer(methods))
-        ->option_text("tension|cgal");
-    const std::map<std::string, FillReach> reaches{{"enclosed", FillReach::Enclosed},
-                                                   {"hull", FillReach::Hull},
-                                                   {"everywhere", FillReach::Everywhere}};
-    group
-        ->add_option("--reach", filling.reach,
-                     "enclosed: holes that do not touch the edge (default); hull: within the "
-                     "convex hull of data; everywhere")
-        ->transform(CLI::CheckedTransformer(reaches))
-        ->option_text("enclosed|hull|everywhere");
-    group
-        ->add_option("--farthest-m", filling.farthest_m,
-                     "Leave holes some of which is farther from data (50 cells)")
-        ->check(positive());
-    group
-        ->add_option("--largest-share", filling.largest_share,
-                     "Leave holes that are a larger share of the raster (0.2)")
-        ->check(CLI::Range(0.0, 1.0));
+    group->add_flag("--no-fill", without_filling, "Leave them blank");
+    const Words<FillMethod> methods{{"tension", FillMethod::Tension}, {"cgal", FillMethod::Mesh}};
+    add_words(group, "--method", request.fill_method,
+              "tension: the smoothest surface (default); cgal: faired meshes", methods);
+    limits.add(group);
   }
 
   void add_sight() {
     CLI::App* group = command->add_option_group("Sight and smoothness");
-    const std::map<std::string, SightUse> uses{{"none", SightUse::None},
-                                               {"beams", SightUse::Beams}};
-    group
-        ->add_option("--sight", request.sight,
-                     "What bounds the ground from above: beams that passed (default)")
-        ->transform(CLI::CheckedTransformer(uses))
-        ->option_text("none|beams");
+    const Words<SightUse> uses{{"none", SightUse::None}, {"beams", SightUse::Beams}};
+    add_words(group, "--sight", request.sight,
+              "What bounds the ground from above: beams that passed (default)", uses);
     group->add_option("--sight-margin-m", request.sight_margin_m, "Added (a quarter of a cell)")
         ->check(not_negative());
     auto* smooth = group->add_flag("--smooth", is_smoothed, "Smooth measured heights first");
@@ -205,18 +181,21 @@ struct DemCommand::Options {
   }
 
   void check_use() const {
-    if (!has_stereo)
+    if (without_stereo)
       refuse({"--stereo", "--stereo-frames", "--nearest-m", "--farthest-depth-m", "--match-sd-px",
               "--bias-sd-px"},
              "--no-stereo leaves pairs out");
     if (is_airborne)
       refuse({"--divergence-mrad", "--attitude-sd-mrad", "--sight", "--sight-margin-m"},
              "with --airborne nothing is known of beams");
-    if (!is_filled)
-      refuse({"--method", "--reach", "--farthest-m", "--largest-share"}, "--no-fill fills nothing");
+    if (without_filling)
+      refuse({"--method", "--reach", "--farthest-m", "--largest-share", "--most-edges"},
+             "--no-fill fills nothing");
     if (request.fill_method == FillMethod::Mesh)
       refuse({"--sight", "--sight-margin-m"}, "--method cgal takes no bounds");
-    if (!has_stereo && !has_lidar)
+    else
+      refuse({"--most-edges"}, "only --method cgal goes by rims");
+    if (without_stereo && without_lidar)
       throw Error("--no-lidar and --no-stereo leave nothing that measures: leave one out");
   }
 
@@ -266,14 +245,18 @@ struct DemCommand::Options {
     request.choice = scans.choice;
     request.taking = scans.taking;
     request.stereo.frames = parse_frames(stereo_frames, "--stereo-frames");
-    request.pairs.are_any = has_stereo;
-    if (has_stereo) request.choice.need = has_lidar ? ScanNeed::IfThere : ScanNeed::None;
+    request.pairs.are_any = !without_stereo;
+    if (!without_stereo) request.choice.need = without_lidar ? ScanNeed::None : ScanNeed::IfThere;
     if (divergence_mrad) request.noise.divergence_rad = *divergence_mrad * per_mille;
     request.noise.attitude_sd_rad = attitude_sd_mrad * per_mille;
     if (is_airborne) request.noise.beams = BeamOrigin::Above;
     close_area();
     request.filter = ground_filter();
-    request.fill = is_filled ? std::optional(filling) : std::nullopt;
+    if (without_filling)
+      request.fill = std::nullopt;
+    else
+      request.fill = limits.filling;
+    request.most_rim_edges = limits.edges();
     if (is_smoothed) request.smooth = SmoothOptions{.curvature_sd_per_m = curvature_sd_per_m};
     close_memory();
     const auto folder = request.output.dem.parent_path();

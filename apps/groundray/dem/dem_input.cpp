@@ -28,6 +28,17 @@ Area around(std::span<const glm::dvec3> points_m, Area area) {
   return area;
 }
 
+// What is wrong with stereo pairs that nobody named need not stop who has lidars.
+template <typename Step>
+auto or_lidars_alone(const PairChoice& choice, const ScanFiles& files, const Step& step) {
+  try {
+    return step();
+  } catch (const Error& fault) {
+    if (files.scans.empty() || !choice.names.empty()) throw;
+    throw Error("{}; --no-stereo takes lidars alone", fault.what());
+  }
+}
+
 // What is said of several scans but for their names is said of the first of them.
 std::vector<std::string> notes_of_scans(const ScanFiles& files,
                                         const std::vector<PointTally>& scans) {
@@ -74,7 +85,8 @@ std::vector<RecordedPair> find_pairs(const DemRequest& request, const ScanFiles&
     return {};
   }
   const fs::path& dataset = request.choice.inputs[0];
-  auto pairs = read_stereo_pairs(dataset, choice.names);
+  auto pairs =
+      or_lidars_alone(choice, files, [&] { return read_stereo_pairs(dataset, choice.names); });
   if (pairs.empty() && files.scans.empty())
     throw Error(
         "{}: without lidars it takes a stereo pair to measure, but the dataset lists none: "
@@ -111,7 +123,9 @@ void DemInput::match(const std::vector<RecordedPair>& recorded) {
   for (std::size_t i = 0; i < images.size(); ++i) {
     stage.update(static_cast<double>(i) / static_cast<double>(images.size()));
     const auto group = static_cast<std::uint32_t>(files_.scans.size() + i);
-    pairs_.push_back(add_stereo_points(images[i], request_.stereo, request_.noise, group, stereo_));
+    pairs_.push_back(or_lidars_alone(request_.pairs, files_, [&] {
+      return add_stereo_points(images[i], request_.stereo, request_.noise, group, stereo_);
+    }));
   }
   stage.update(1);
 }

@@ -48,7 +48,8 @@ void write_layers(const fs::path& path, const DemLayers& layers, const Georefere
                                        {"fill_sd", "m", layers.fill_sd_m},
                                        {"upper_bound", "m", layers.upper_bound_m},
                                        {"slope", "deg", slope_deg},
-                                       {"overhang", "m", layers.overhang_m}};
+                                       {"overhang", "m", layers.overhang_m},
+                                       {"clearance", "m", layers.clearance_m}};
   write_layers(path, layers.frame, georeference, bands);
 }
 

@@ -7,8 +7,10 @@
 #include <glm/geometric.hpp>
 #include <limits>
 #include <optional>
+#include <utility>
 
 #include "apps/groundray/colour_map.h"
+#include "apps/groundray/dem/quantile.h"
 
 namespace groundray {
 namespace {
@@ -87,16 +89,13 @@ class Shading {
   bool with_filled_;
 };
 
-// The size below which 95 % lie.
+// The size that 95 % do not exceed.
 double usual_size(const std::vector<float>& values) {
-  std::vector<float> sizes;
+  std::vector<double> sizes;
   for (const float value : values)
     if (std::isfinite(value)) sizes.push_back(std::abs(value));
-  if (sizes.empty()) return 1;
-  const auto at =
-      sizes.begin() + static_cast<std::ptrdiff_t>(0.95 * static_cast<double>(sizes.size() - 1));
-  std::ranges::nth_element(sizes, at);
-  return *at > 0 ? *at : 1;
+  const double size_m = quantile(std::move(sizes), 0.95);
+  return size_m > 0 ? size_m : 1;
 }
 
 // White of no error; red of too high, blue of too low.

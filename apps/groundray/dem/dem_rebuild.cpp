@@ -138,6 +138,7 @@ Fusion fuse_ground(const DemRequest& request, DemInput& input, const GridFrame& 
   stage.update(1);
   fusion.layers.surfaces = std::move(overhangs.surfaces);
   fusion.layers.overhang_m = std::move(overhangs.overhang_m);
+  fusion.layers.clearance_m = std::move(overhangs.clearance_m);
   return fusion;
 }
 
@@ -153,8 +154,8 @@ Fusion fuse_all(const DemRequest& request, DemInput& input, const GridFrame& fra
 }
 
 void check_ground(const Fusion& fusion) {
-  const bool has_ground = std::ranges::any_of(
-      fusion.layers.source, [](HeightSource source) { return source != HeightSource::None; });
+  const bool has_ground = std::ranges::any_of(fusion.layers.elevation_m,
+                                              [](float height_m) { return !std::isnan(height_m); });
   if (has_ground) return;
   const FusionCounts& counts = fusion.counts;
   if (counts.outside == counts.points)
@@ -170,6 +171,19 @@ void check_ground(const Fusion& fusion) {
       "cells they are too few or contradict each other: are the poses right? Larger cells "
       "(--cell-m) hold more points, --outlier-share says how many are outliers",
       counts.points, counts.outside, counts.unusable, counts.without_ground);
+}
+
+// Sparse points make ground of few cells, and people wonder why.
+void note_sparse_cells(const Fusion& fusion, DemReport& report) {
+  const auto measured = std::ranges::count_if(
+      fusion.layers.source, [](HeightSource source) { return source != HeightSource::None; });
+  if (fusion.counts.without_ground <= static_cast<std::size_t>(measured)) return;
+  report.notes.push_back(fmt::format(
+      "{} of {} cells with points have too few to tell ground from outliers: larger cells "
+      "(--cell-m) "
+      "hold more, --outlier-share says how many are outliers (0 where a filter left them out)",
+      fusion.counts.without_ground,
+      fusion.counts.without_ground + static_cast<std::size_t>(measured)));
 }
 
 // ----- after fusion
@@ -218,12 +232,12 @@ void fill(const DemRequest& request, DemLayers& layers, DemReport& report) {
   if (!request.fill) return;
   const Timing timing(report, "fill");
   Stage stage("filling");
-  constexpr std::size_t most_edges = 1000;
-  FilledHeights filled = request.fill_method == FillMethod::Mesh
-                             ? fill_dem_by_mesh(layers.frame, layers.elevation_m, *request.fill,
-                                                most_edges, stage.work(request.most_bytes))
-                             : fill_dem(layers.frame, layers.elevation_m, layers.upper_bound_m,
-                                        *request.fill, stage.work(request.most_bytes));
+  FilledHeights filled =
+      request.fill_method == FillMethod::Mesh
+          ? fill_dem_by_mesh(layers.frame, layers.elevation_m, *request.fill,
+                             request.most_rim_edges, stage.work(request.most_bytes))
+          : fill_dem(layers.frame, layers.elevation_m, layers.upper_bound_m, *request.fill,
+                     stage.work(request.most_bytes));
   stage.update(1);
   report.filled = tally_of(filled);
   for (std::size_t i = 0; i < layers.elevation_m.size(); ++i) {
@@ -262,6 +276,7 @@ DemLayers measure(const DemRequest& request, const Georeference& georeference,
   Fusion fusion = request.filter ? fuse_ground(request, input, frame, *request.filter, report)
                                  : fuse_all(request, input, frame, report);
   check_ground(fusion);
+  note_sparse_cells(fusion, report);
   report.fusion = fusion.counts;
   report.frame = frame;
   report.scans = input.scans();

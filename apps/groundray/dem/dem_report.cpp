@@ -13,45 +13,7 @@ namespace {
 
 using Json = nlohmann::ordered_json;
 
-constexpr std::array fates{HoleFate::Filled,   HoleFate::Open,     HoleFate::TooFar,
-                           HoleFate::TooLarge, HoleFate::NoGround, HoleFate::Partly};
 constexpr std::array<const char*, 5> source_words{"none", "lidar", "stereo", "fused", "filled"};
-
-const char* word_of(HoleFate fate) {
-  switch (fate) {
-    case HoleFate::Filled:
-      return "filled";
-    case HoleFate::Open:
-      return "open";
-    case HoleFate::TooFar:
-      return "too_far";
-    case HoleFate::TooLarge:
-      return "too_large";
-    case HoleFate::NoGround:
-      return "no_ground";
-    case HoleFate::Partly:
-      break;
-  }
-  return "partly";
-}
-
-const char* sentence_of(HoleFate fate) {
-  switch (fate) {
-    case HoleFate::Filled:
-      return "filled";
-    case HoleFate::Open:
-      return "left: not enclosed by data (--reach)";
-    case HoleFate::TooFar:
-      return "left: too far from data (--farthest-m)";
-    case HoleFate::TooLarge:
-      return "left: too large (--largest-share)";
-    case HoleFate::NoGround:
-      return "left: nothing measured beside them";
-    case HoleFate::Partly:
-      break;
-  }
-  return "left in part: the method does not reach all of them";
-}
 
 void print_points(const char* what, const char* rows, const std::vector<PointTally>& tallies) {
   constexpr std::size_t most = 8;
@@ -69,11 +31,7 @@ void print_points(const char* what, const char* rows, const std::vector<PointTal
 }
 
 void print_fill(const FillTally& fill) {
-  fmt::print("{:>8} {:>12} {:>12}  what became of blank areas\n", "holes", "samples", "farthest m");
-  for (const FateTally& tally : fill.fates) {
-    fmt::print("{:>8} {:>12} {:>12.4g}  {}\n", tally.holes, tally.samples, tally.farthest_m,
-               sentence_of(tally.fate));
-  }
+  print_fates(fill);
   if (fill.at_bound > 0) fmt::print("lines of sight hold {} filled samples down\n", fill.at_bound);
 }
 
@@ -172,22 +130,6 @@ void add_options(const DemReport& report, Json& json) {
 }
 
 }  // namespace
-
-FillTally tally_of(const FilledHeights& filled) {
-  FillTally tally{.fates = {}, .trials = filled.trials};
-  for (const HoleFate fate : fates) {
-    FateTally of{.fate = fate};
-    for (const RasterHole& hole : filled.holes) {
-      if (hole.fate != fate) continue;
-      ++of.holes;
-      of.samples += hole.samples;
-      of.farthest_m = std::max(of.farthest_m, hole.farthest_m);
-      tally.at_bound += hole.at_bound;
-    }
-    if (of.holes > 0) tally.fates.push_back(of);
-  }
-  return tally;
-}
 
 void print(const DemReport& report) {
   print_points("scan", "rows", report.scans);

@@ -10,27 +10,13 @@
 
 #include "apps/groundray/dem/dem_points.h"
 #include "apps/groundray/dem/dem_truth.h"
+#include "apps/groundray/dem/fill_report.h"
 #include "core/grid_frame.h"
 #include "core/mesh_io.h"
-#include "reconstruction/dem/dem_fill.h"
 #include "reconstruction/dem/dem_fusion.h"
 #include "reconstruction/dem/ground_filter.h"
 
 namespace groundray {
-
-/// What became of the blank areas of one fate.
-struct FateTally {
-  HoleFate fate = HoleFate::Filled;
-  std::size_t holes = 0, samples = 0;
-  double farthest_m = 0;
-};
-
-/// What became of a DEM's blank areas.
-struct FillTally {
-  std::vector<FateTally> fates;  ///< those that there are
-  std::vector<TrialReport> trials;
-  std::size_t at_bound = 0;  ///< filled samples that lines of sight hold down
-};
 
 /// What smoothing did.
 struct SmoothTally {
@@ -61,9 +47,6 @@ struct DemReport {
   std::vector<std::pair<std::string, double>> seconds;  ///< of each stage
   std::vector<std::string> notes;
 };
-
-/// Returns what became of blank areas, fate by fate.
-FillTally tally_of(const FilledHeights& filled);
 
 /// Prints a report for people.
 void print(const DemReport& report);

@@ -56,6 +56,7 @@ struct DemRequest {
   std::optional<SmoothOptions> smooth;
   std::optional<FillOptions> fill = FillOptions{};
   FillMethod fill_method = FillMethod::Tension;
+  std::size_t most_rim_edges = 1000;  ///< of holes that meshes fill
   SightUse sight = SightUse::Beams;
   std::optional<double> sight_margin_m;  ///< else a quarter of a cell
 

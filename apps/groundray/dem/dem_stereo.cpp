@@ -125,6 +125,16 @@ void add_pose_bias(const PointNoise& noise, const glm::dvec3& eye_m, std::size_t
   }
 }
 
+// Images are of one size and options are sound: what is wrong is the memory that it takes.
+DisparityMap match_within(const RectifiedImage& left, const RectifiedImage& right,
+                          const MatchOptions& options) {
+  try {
+    return match(left, right, options);
+  } catch (const Error& fault) {
+    throw Error("{} (--memory-mb allows more)", fault.what());
+  }
+}
+
 PointTally add_points(const ImagePair& images, const StereoTaking& taking, const PointNoise& noise,
                       std::uint32_t group, MeasuredPoints& to) {
   const auto& [left, right] = images.pair->cameras;
@@ -137,8 +147,8 @@ PointTally add_points(const ImagePair& images, const StereoTaking& taking, const
   const auto greys = read_images(images);
   const PinholePair pair = pinhole_pair(left_view, right_view);
   const DisparityMap map =
-      match(resample(greys[0], pair, StereoSide::Left, left_view),
-            resample(greys[1], pair, StereoSide::Right, right_view), taking.matching);
+      match_within(resample(greys[0], pair, StereoSide::Left, left_view),
+                   resample(greys[1], pair, StereoSide::Right, right_view), taking.matching);
   const StereoPoints points = stereo_points(pair, left_view, map, taking.points);
   const std::size_t first = to.size();
   append(points, group, to);
@@ -172,8 +182,8 @@ std::vector<ImagePair> image_pairs(const std::vector<RecordedPair>& pairs, const
                         .right = static_cast<std::size_t>(right - rights.begin())});
     }
     if (alone > 0)
-      notes.push_back(
-          fmt::format("{}: {} images have no other one at their time", pair.name, alone));
+      notes.push_back(fmt::format("{}: {} image{} no other one at {} time", pair.name, alone,
+                                  alone == 1 ? " has" : "s have", alone == 1 ? "its" : "their"));
   }
   return images;
 }

@@ -5,20 +5,14 @@
 #include <functional>
 #include <limits>
 #include <optional>
+#include <utility>
+
+#include "apps/groundray/dem/quantile.h"
 
 namespace groundray {
 namespace {
 
 constexpr float nan = std::numeric_limits<float>::quiet_NaN();
-
-// The value below which a share of all lies.
-double quantile(std::vector<double> values, double share) {
-  if (values.empty()) return nan;
-  const auto at =
-      values.begin() + static_cast<std::ptrdiff_t>(share * static_cast<double>(values.size() - 1));
-  std::ranges::nth_element(values, at);
-  return *at;
-}
 
 double share_within(const std::vector<double>& squares, double sds) {
   const auto within =
@@ -32,7 +26,7 @@ void set_normalised(HeightErrors& errors, const std::vector<double>& squares) {
   for (const double square : squares) sum += square;
   errors.stated = squares.size();
   errors.normalised_rms = std::sqrt(sum / static_cast<double>(squares.size()));
-  errors.normalised_robust = std::sqrt(quantile(squares, 0.5) / median_of_chi2);
+  errors.normalised_robust = std::sqrt(median(squares) / median_of_chi2);
   errors.within_1sd = share_within(squares, 1);
   errors.within_2sd = share_within(squares, 2);
 }
@@ -56,13 +50,13 @@ HeightErrors errors_of(std::string name, const TruthComparison& all,
   const auto count = static_cast<double>(errors_m.size());
   figures.bias_m = sum_m / count;
   figures.rmse_m = std::sqrt(sum2_m2 / count);
-  const double middle_m = quantile(errors_m, 0.5);
+  const double middle_m = median(errors_m);
   std::vector<double> sizes_m, apart_m;
   for (const double error_m : errors_m) {
     sizes_m.push_back(std::abs(error_m));
     apart_m.push_back(std::abs(error_m - middle_m));
   }
-  figures.nmad_m = normal_mad * quantile(std::move(apart_m), 0.5);
+  figures.nmad_m = normal_mad * median(std::move(apart_m));
   figures.largest_m = quantile(sizes_m, 1);
   figures.p95_m = quantile(std::move(sizes_m), 0.95);
   set_normalised(figures, squares);
@@ -106,7 +100,7 @@ TruthComparison compare_with_truth(const DemLayers& layers, const Georeference& 
   comparison.errors = {errors_of("measured", comparison, is_measured),
                        errors_of("lidar", comparison, of(HeightSource::Lidar)),
                        errors_of("stereo", comparison, of(HeightSource::Stereo)),
-                       errors_of("both", comparison, of(HeightSource::Fused)),
+                       errors_of("fused", comparison, of(HeightSource::Fused)),
                        errors_of("filled", comparison, of(HeightSource::Filled))};
   return comparison;
 }

@@ -2,19 +2,20 @@
 
 #include <fmt/format.h>
 
-#include <algorithm>
 #include <cmath>
 #include <cstddef>
 #include <cstdint>
 #include <cstdio>
 #include <filesystem>
-#include <map>
 #include <optional>
 #include <string>
 #include <vector>
 
+#include "apps/groundray/dem/fill_options.h"
+#include "apps/groundray/dem/fill_report.h"
 #include "apps/groundray/result_files.h"
 #include "apps/interruption.h"
+#include "apps/scan/word_option.h"
 #include "core/error.h"
 #include "core/progress.h"
 #include "reconstruction/dem/dem_fill.h"
@@ -62,41 +63,6 @@ std::vector<float> load_bounds(const fs::path& path, const Dem& dem) {
   return {heights_m.begin(), heights_m.end()};
 }
 
-const char* word_for(HoleFate fate) {
-  switch (fate) {
-    case HoleFate::Filled:
-      return "filled";
-    case HoleFate::Open:
-      return "not enclosed by data (--reach)";
-    case HoleFate::TooFar:
-      return "too far from data (--farthest-m)";
-    case HoleFate::TooLarge:
-      return "too large (--largest-share)";
-    case HoleFate::NoGround:
-      return "without data beside them";
-    case HoleFate::Partly:
-      return "filled in part or not, the method leaves them";
-  }
-  return "";
-}
-
-void print_holes(const FilledHeights& filled) {
-  fmt::print("{:>8} {:>12} {:>12}  what became of them\n", "holes", "samples", "farthest m");
-  for (const HoleFate fate : {HoleFate::Filled, HoleFate::Open, HoleFate::TooFar,
-                              HoleFate::TooLarge, HoleFate::NoGround, HoleFate::Partly}) {
-    std::size_t holes = 0, samples = 0;
-    double farthest_m = 0;
-    for (const RasterHole& hole : filled.holes) {
-      if (hole.fate != fate) continue;
-      ++holes;
-      samples += hole.samples;
-      farthest_m = std::max(farthest_m, hole.farthest_m);
-    }
-    if (holes > 0)
-      fmt::print("{:>8} {:>12} {:>12.4g}  {}\n", holes, samples, farthest_m, word_for(fate));
-  }
-}
-
 void print_trials(const FilledHeights& filled) {
   if (filled.trials.empty()) return;
   fmt::print("{:>28} {:>8} {:>11} {:>8} {:>9} {:>9} {:>9}\n", "kind of hole, cells", "tension",
@@ -133,9 +99,8 @@ struct FillCommand::Options {
   fs::path dem, out, sd_out, bound;
   DemOptions reading;
   Method method = Method::Tension;
-  FillOptions filling;
+  FillLimits limits;
   std::optional<double> tension, smoothness;
-  std::size_t most_edges = 1000;
 
   void add_files() {
     command
@@ -154,51 +119,30 @@ struct FillCommand::Options {
   }
 
   void add_choices() {
-    const std::map<std::string, Method> methods{{"tension", Method::Tension},
-                                                {"cgal", Method::Cgal},
-                                                {"gdal", Method::Gdal},
-                                                {"telea", Method::Telea},
-                                                {"ns", Method::NavierStokes}};
-    command
-        ->add_option(
-            "--method", method,
-            "tension: smoothest surface (default); cgal: by triangulated, refined and "
-            "faired meshes; to compare with: gdal, as gdal_fillnodata; telea and ns, OpenCV's "
-            "inpainting")
-        ->transform(CLI::CheckedTransformer(methods))
-        ->option_text("tension|cgal|gdal|telea|ns");
-    const std::map<std::string, FillReach> reaches{{"enclosed", FillReach::Enclosed},
-                                                   {"hull", FillReach::Hull},
-                                                   {"everywhere", FillReach::Everywhere}};
-    command
-        ->add_option(
-            "--reach", filling.reach,
-            "enclosed: holes that do not touch the edge (default); hull: within the convex "
-            "hull of data; everywhere")
-        ->transform(CLI::CheckedTransformer(reaches))
-        ->option_text("enclosed|hull|everywhere");
-    command
-        ->add_option("--farthest-m", filling.farthest_m,
-                     "Leave holes some of which is farther from data (50 cells)")
-        ->check(CLI::PositiveNumber);
-    command
-        ->add_option("--largest-share", filling.largest_share,
-                     "Leave holes that are a larger share of the raster (0.2)")
-        ->check(CLI::Range(0.0, 1.0));
+    const Words<Method> methods{{"tension", Method::Tension},
+                                {"cgal", Method::Cgal},
+                                {"gdal", Method::Gdal},
+                                {"telea", Method::Telea},
+                                {"ns", Method::NavierStokes}};
+    add_words(
+        command, "--method", method,
+        "tension: smoothest surface (default); cgal: by triangulated, refined and faired "
+        "meshes; to compare with: gdal, as gdal_fillnodata; telea and ns, OpenCV's inpainting",
+        methods);
+    limits.add(command);
     command->add_option("--tension", tension, "0 to below 1, instead of what trials show is best");
     command->add_option("--smoothness", smoothness, "0 or more, likewise");
-    command->add_option("--most-edges", most_edges,
-                        "Of a rim, for cgal: leave holes with more (1000)");
   }
 
-  FilledHeights fill(const Dem& read) {
+  FilledHeights fill(const Dem& read) const {
     const GridFrame& frame = read.grid.frame();
     const auto heights_m = read.grid.heights_m();
+    FillOptions filling = limits.filling;
     if (tension || smoothness)
       filling.form = PlateForm{tension.value_or(0), smoothness.value_or(0)};
     std::optional<Progress> progress;
     if (method == Method::Cgal)
-      return fill_dem_by_mesh(frame, heights_m, filling, most_edges, shown_work(progress));
+      return fill_dem_by_mesh(frame, heights_m, filling, limits.edges(), shown_work(progress));
     if (method == Method::Gdal) {
       const double farthest_cells = std::hypot(frame.samples.x, frame.samples.y);
       return take_filling(frame, heights_m, fill_by_gdal(frame.samples, heights_m, farthest_cells),
@@ -215,6 +159,8 @@ struct FillCommand::Options {
   }
 
   void refuse_mixtures() const {
+    if (limits.most_edges && method != Method::Cgal)
+      throw Error("--most-edges goes with --method cgal alone; leave it out, or say so");
     if (method == Method::Tension) return;
     if (!sd_out.empty() || !bound.empty() || tension || smoothness)
       throw Error(
@@ -253,7 +199,7 @@ struct FillCommand::Options {
     const FilledHeights filled = fill(read);
     stop_if_interrupted();
     write(read, filled);
-    print_holes(filled);
+    print_fates(tally_of(filled));
     if (method == Method::Tension) print_trials(filled);
     if (!bound.empty()) print_bounds(filled);
     fmt::print("{} of {} missing samples filled; written to {}\n", filled.filled,

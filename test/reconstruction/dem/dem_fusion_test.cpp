@@ -79,6 +79,7 @@ void expect_same(const DemLayers& a, const DemLayers& b) {
   EXPECT_TRUE(same(a.chi2, b.chi2));
   EXPECT_TRUE(same(a.surfaces, b.surfaces));
   EXPECT_TRUE(same(a.overhang_m, b.overhang_m));
+  EXPECT_TRUE(same(a.clearance_m, b.clearance_m));
   EXPECT_TRUE(same(a.source, b.source));
   EXPECT_TRUE(same(a.slope_rad, b.slope_rad));
 }
@@ -160,8 +161,11 @@ TEST(DemFusion, WhatStandsAboveGroundIsOverhang) {
   EXPECT_NEAR(layers.elevation_m[under], 1, 0.02);
   EXPECT_EQ(layers.surfaces[under], 2);
   EXPECT_EQ(layers.overhang_m[under], 3.5F);
+  EXPECT_NEAR(layers.clearance_m[under], 2.5, 0.05);  // above the highest point of the ground
+  EXPECT_LT(layers.clearance_m[under], 3.5F - layers.elevation_m[under]);
   EXPECT_EQ(layers.lidar[under], 10U);
   EXPECT_TRUE(std::isnan(layers.overhang_m[0]));
+  EXPECT_TRUE(std::isnan(layers.clearance_m[0]));
   EXPECT_EQ(layers.surfaces[0], 1);
 }
 
@@ -185,6 +189,7 @@ TEST(DemFusion, TrunksAreNotGround) {
   EXPECT_NEAR(fusion.layers.elevation_m[3 * 8 + 3], 1, 0.05);
   EXPECT_EQ(fusion.layers.source[2 * 8 + 6], HeightSource::None);
   EXPECT_NEAR(fusion.layers.overhang_m[2 * 8 + 6], 2.2, 1e-5);
+  EXPECT_NEAR(fusion.layers.clearance_m[2 * 8 + 6], 1.2, 0.05);  // above the ground around
   EXPECT_EQ(fusion.counts.without_ground, 1U);
 }
 

@@ -1,0 +1,33 @@
+#include "apps/groundray/dem/quantile.h"
+
+#include <algorithm>
+#include <cmath>
+#include <cstddef>
+#include <limits>
+
+namespace groundray {
+namespace {
+
+constexpr double nan = std::numeric_limits<double>::quiet_NaN();
+
+}  // namespace
+
+double quantile(std::vector<double> values, double share) {
+  if (values.empty()) return nan;
+  constexpr double rounding = 1e-12;  // 0.95 of 20 is 19, and no more
+  const double count = std::ceil(share * static_cast<double>(values.size()) * (1 - rounding));
+  const auto at = values.begin() + static_cast<std::ptrdiff_t>(std::max(count, 1.0)) - 1;
+  std::ranges::nth_element(values, at);
+  return *at;
+}
+
+double median(std::vector<double> values) {
+  if (values.empty()) return nan;
+  const auto half = values.begin() + static_cast<std::ptrdiff_t>(values.size() / 2);
+  std::ranges::nth_element(values, half);
+  const double upper = *half;
+  if (values.size() % 2 == 1) return upper;
+  return (upper + *std::max_element(values.begin(), half)) / 2;
+}
+
+}  // namespace groundray

@@ -1,0 +1,281 @@
+#include "apps/groundray/record/images.h"
+
+#include <fmt/format.h>
+
+#include <algorithm>
+#include <chrono>
+#include <filesystem>
+#include <functional>
+#include <glm/gtc/quaternion.hpp>
+#include <limits>
+#include <optional>
+#include <span>
+#include <utility>
+#include <variant>
+
+#include "apps/dataset/dataset_listing.h"
+#include "apps/groundray/record/camera_preview.h"
+#include "apps/interruption.h"
+#include "core/exr_io.h"
+#include "core/flow_io.h"
+#include "core/luminance.h"
+#include "core/ply_io.h"
+#include "core/product_io.h"
+#include "sensors/camera/image_truth.h"
+#include "sensors/camera/imager.h"
+#include "sensors/camera/irradiance.h"
+#include "sensors/camera/lidar_image.h"
+#include "sensors/camera/path_tracer.h"
+#include "sensors/camera/picture.h"
+
+namespace groundray {
+namespace {
+
+using std::chrono::nanoseconds;
+using Product = CameraProduct;
+
+bool needs_truth(const CameraSpec& camera) {
+  return gives(camera, Product::Truth) || gives(camera, Product::Bound) ||
+         gives(camera, Product::Flow) || gives(camera, Product::FlowFlo) ||
+         gives(camera, Product::FlowKitti);
+}
+
+bool needs_imager(const CameraSpec& camera) {
+  return std::ranges::any_of(camera.products,
+                             [](Product product) { return product >= Product::Irradiance; });
+}
+
+// What goes into the image's EXR file.
+bool is_layer(Product product) { return product <= Product::Flow || product == Product::Coverage; }
+
+std::string echoes_suffix(const std::string& lidar) { return "_" + lidar + ".npy"; }
+
+// What is gathered for one EXR file.
+struct Layers {
+  std::vector<ExrLayer> all;
+
+  void add(std::vector<std::string> names, const ImageF& image) {
+    all.push_back({std::move(names), &image});
+  }
+  void add(const char* name, const Image32& image) { all.push_back({{name}, &image}); }
+};
+
+void add_light(const Exposure& light, const CameraSpec& camera,
+               std::span<const std::uint16_t> labels, Layers& layers) {
+  if (gives(camera, Product::Radiance)) {
+    layers.add({"R", "G", "B"}, light.radiance);
+    layers.add({"StdError.R", "StdError.G", "StdError.B"}, light.standard_error);
+    layers.add({"Samples"}, light.samples);
+  }
+  if (!gives(camera, Product::Coverage)) return;
+  std::vector<std::string> names;
+  for (const std::uint16_t label : labels) names.push_back(fmt::format("Coverage.{}", label));
+  layers.add(std::move(names), light.coverage);
+}
+
+// The channels of a truth that are of another type in files.
+struct TruthInFile {
+  ImageF p_DQ;
+  Image32 is_valid, forward_is_seen, backward_is_seen;
+
+  explicit TruthInFile(const ImageTruth& truth)
+      : p_DQ(converted<float>(truth.p_DQ)),
+        is_valid(converted<std::uint32_t>(truth.is_valid)),
+        forward_is_seen(converted<std::uint32_t>(truth.forward.is_seen)),
+        backward_is_seen(converted<std::uint32_t>(truth.backward.is_seen)) {}
+
+ private:
+  template <typename T, typename From>
+  static Image<T> converted(const Image<From>& from) {
+    if (from.width() == 0) return {};
+    Image<T> to(from.width(), from.height(), from.channels());
+    std::ranges::transform(from.values(), to.values().begin(),
+                           [](From value) { return static_cast<T>(value); });
+    return to;
+  }
+};
+
+void add_flow(const std::string& name, const Flow& flow, const Image32& is_seen, Layers& layers) {
+  if (flow.offset_px.width() == 0) return;
+  layers.add({name + ".u", name + ".v"}, flow.offset_px);
+  layers.all.push_back({{name + ".seen"}, &is_seen});
+}
+
+void add_truth(const ImageTruth& truth, const TruthInFile& in_file, const CameraSpec& camera,
+               Layers& layers) {
+  if (gives(camera, Product::Truth)) {
+    layers.add("Valid", in_file.is_valid);
+    layers.add({"Distance"}, truth.range_m);
+    layers.add({"Z"}, truth.depth_m);
+    layers.add({"P.X", "P.Y", "P.Z"}, in_file.p_DQ);
+    layers.add({"N.X", "N.Y", "N.Z"}, truth.normal);
+    layers.add({"Ns.X", "Ns.Y", "Ns.Z"}, truth.shading_normal);
+    layers.add({"Albedo.R", "Albedo.G", "Albedo.B"}, truth.albedo);
+    layers.add({"Incidence"}, truth.incidence_rad);
+    layers.add({"Velocity.X", "Velocity.Y", "Velocity.Z"}, truth.velocity_m_s);
+    layers.add("Label", truth.label);
+    layers.add("Instance", truth.instance);
+    layers.add("Material", truth.material);
+  }
+  if (gives(camera, Product::Bound)) layers.add({"Bound"}, truth.bound_m);
+  if (!gives(camera, Product::Flow)) return;
+  add_flow("FlowForward", truth.forward, in_file.forward_is_seen, layers);
+  add_flow("FlowBackward", truth.backward, in_file.backward_is_seen, layers);
+}
+
+// Of D, in the middle of the image's time: rows of a rolling shutter have poses of their own.
+glm::mat4 world_to_camera(const PlacedCamera& placed, nanoseconds begin) {
+  const Pose X_CD = inverse(placed.X_DC.pose_at(begin + placed.camera.duration() / 2));
+  glm::mat4 matrix(glm::mat3_cast(glm::quat(X_CD.rotation)));
+  matrix[3] = glm::vec4(glm::vec3(X_CD.translation_m), 1);
+  return matrix;
+}
+
+std::vector<ExrAttribute> attributes_of(const PlacedCamera& placed, nanoseconds begin) {
+  const CameraSpec& camera = placed.spec.camera;
+  std::vector<ExrAttribute> attributes{
+      {"cameraModel", camera.model},
+      {"radianceUnit", "W/(m^2 sr), 683 lm/W"},
+      {"pixelCentres", "whole"},
+      {"whiteLuminance", static_cast<float>(luminous_efficacy_lm_w)},
+      {"expTime", static_cast<float>(camera.shutter.exposure_s)},
+      {"worldToCamera", world_to_camera(placed, begin)}};
+  if (camera.aperture)
+    attributes.push_back({"aperture", static_cast<float>(camera.aperture->f_number)});
+  return attributes;
+}
+
+// Light on its way to a picture, each stage in a file of its own if it is asked for.
+void write_stages(const PlacedCamera& placed, const ImageF& radiance, const RandomKey& key,
+                  const std::function<std::filesystem::path(const char*)>& path_of) {
+  const CameraSpec& camera = placed.spec.camera;
+  const Imager imager(*camera.imager, camera.shutter.exposure_s);
+  const ImageF light = irradiance(radiance, placed.pupil_sr);
+  if (gives(camera, Product::Irradiance))
+    write_exr(path_of("_irradiance.exr"), {{{"R", "G", "B"}, &light}});
+  const ImageF photons = imager.photons(light);
+  if (gives(camera, Product::Photons)) write_exr(path_of("_photons.exr"), {{{"Y"}, &photons}});
+  const ImageF electrons = imager.electrons(photons, key);
+  if (gives(camera, Product::Electrons))
+    write_exr(path_of("_electrons.exr"), {{{"Y"}, &electrons}});
+  const Image16 raw = imager.digital(electrons, key);
+  if (gives(camera, Product::Raw)) write_png(path_of("_raw.png"), raw);
+  if (!gives(camera, Product::Picture)) return;
+  const Picture picture = RawDeveloper(camera.picture, *camera.imager).develop(raw);
+  std::visit([&](const auto& image) { write_png(path_of(".png"), image); }, picture);
+}
+
+// The last scan that has begun when the image is half exposed, or the first one.
+std::int64_t scan_at(const PlacedLidar& lidar, nanoseconds time) {
+  std::int64_t scan = 0;
+  while (scan + 1 < lidar.sweeps && lidar.lidar.pattern().stamp(scan + 1) <= time) ++scan;
+  return scan;
+}
+
+// The last image has none after it: all of its flow is unknown.
+ImageF unknown_flow(glm::ivec2 size_px) {
+  ImageF flow_px(size_px.x, size_px.y, 2);
+  std::ranges::fill(flow_px.values(), std::numeric_limits<float>::quiet_NaN());
+  return flow_px;
+}
+
+// Returns how many flows KITTI's file has no room for.
+std::size_t write_flows(const CameraSpec& camera, const ImageF& forward_px,
+                        const std::function<std::filesystem::path(const char*)>& path_of) {
+  if (gives(camera, Product::FlowFlo)) write_flo(path_of(".flo"), forward_px);
+  return gives(camera, Product::FlowKitti) ? write_kitti_flow(path_of("_flow.png"), forward_px) : 0;
+}
+
+TruthRequest request_of(const PlacedCamera& placed, std::size_t image) {
+  const CameraSpec& camera = placed.spec.camera;
+  TruthRequest request{.begin = placed.begins[image],
+                       .before = {},
+                       .after = {},
+                       .bounds = gives(camera, Product::Bound)};
+  const bool flows = gives(camera, Product::Flow);
+  const bool to_file = gives(camera, Product::FlowFlo) || gives(camera, Product::FlowKitti);
+  if (flows && image > 0) request.before = placed.begins[image - 1];
+  if ((flows || to_file) && image + 1 < placed.begins.size())
+    request.after = placed.begins[image + 1];
+  return request;
+}
+
+}  // namespace
+
+void show_echoes(const World& world, const Dataset& dataset, std::size_t camera, std::int64_t image,
+                 const std::function<const Scene&(const Exposed&)>& scene_for) {
+  const PlacedCamera& placed = world.cameras[camera];
+  const nanoseconds begin = placed.begins[static_cast<std::size_t>(image)];
+  for (const std::string& name : placed.spec.lidars) {
+    const PlacedLidar& lidar = *std::ranges::find(
+        world.lidars, name, [](const PlacedLidar& each) { return each.spec.name; });
+    const std::int64_t scan = scan_at(lidar, begin + placed.camera.duration() / 2);
+    const PlyFile file = read_ply(dataset.product_path(lidar, scan, scan_suffix));
+    const auto echoes = image_echoes(placed.camera, scene_for(exposed(lidar, scan)), placed.X_DC,
+                                     begin, file.cloud, lidar.lidar.pattern().stamp(scan));
+    write_imaged_echoes(dataset.product_path(placed, image, echoes_suffix(name)), echoes);
+  }
+}
+
+std::vector<std::string> image_suffixes(const MountedCamera& mounted) {
+  const CameraSpec& camera = mounted.camera;
+  std::vector<std::string> suffixes{"_preview.png"};
+  const auto add = [&](Product product, const char* suffix) {
+    if (gives(camera, product)) suffixes.emplace_back(suffix);
+  };
+  add(Product::FlowFlo, ".flo");
+  add(Product::FlowKitti, "_flow.png");
+  add(Product::Irradiance, "_irradiance.exr");
+  add(Product::Photons, "_photons.exr");
+  add(Product::Electrons, "_electrons.exr");
+  add(Product::Raw, "_raw.png");
+  add(Product::Picture, ".png");
+  for (const std::string& lidar : mounted.lidars) suffixes.push_back(echoes_suffix(lidar));
+  if (std::ranges::any_of(camera.products, is_layer)) suffixes.emplace_back(".exr");
+  return suffixes;
+}
+
+ImageTally make_image(const World& world, const Dataset& dataset, std::size_t which,
+                      std::int64_t image, const Scene& scene) {
+  const PlacedCamera& placed = world.cameras[which];
+  const CameraSpec& camera = placed.spec.camera;
+  const auto number = static_cast<std::size_t>(image);
+  const nanoseconds begin = placed.begins[number];
+  const RandomKey key{.seed = world.spec.seed,
+                      .sensor = static_cast<std::uint32_t>(world.lidars.size() + which),
+                      .frame = static_cast<std::uint32_t>(image)};
+  const auto path_of = [&](const char* suffix) {
+    return dataset.product_path(placed, image, suffix);
+  };
+  ImageTally tally;
+  Layers layers;
+  std::optional<Exposure> light;
+  std::vector<std::uint16_t> labels;
+  if (needs_light(camera)) {
+    if (gives(camera, Product::Coverage)) labels = labels_of(scene);
+    const PathTracer tracer(scene, *world.sky, camera.sampling.depth, world.air);
+    light = placed.camera.expose(tracer, placed.X_DC, begin, key, labels, stop_if_interrupted);
+    add_light(*light, camera, labels, layers);
+  }
+  std::optional<ImageTruth> truth;
+  std::optional<TruthInFile> in_file;
+  if (needs_truth(camera)) {
+    truth = image_truth(placed.camera, scene, world.content.materials.in_colour(), placed.X_DC,
+                        request_of(placed, number));
+    in_file.emplace(*truth);
+    add_truth(*truth, *in_file, camera, layers);
+    const ImageF& flow_px = truth->forward.offset_px;
+    tally.flows_left_out =
+        write_flows(camera, flow_px.width() > 0 ? flow_px : unknown_flow(camera.size_px), path_of);
+  }
+  if (needs_imager(camera)) write_stages(placed, light->radiance, key, path_of);
+  write_png(path_of("_preview.png"),
+            draw_image_preview(light ? &*light : nullptr, truth ? &*truth : nullptr));
+  if (!layers.all.empty()) write_exr(path_of(".exr"), layers.all, attributes_of(placed, begin));
+  if (!light) return tally;
+  for (const float samples : light->samples.values())
+    tally.paths += static_cast<std::uint64_t>(samples);
+  return tally;
+}
+
+}  // namespace groundray

@@ -1,0 +1,194 @@
+#include "apps/groundray/record/preview.h"
+
+#include <algorithm>
+#include <array>
+#include <cmath>
+#include <glm/common.hpp>
+#include <glm/geometric.hpp>
+#include <limits>
+#include <numbers>
+#include <span>
+#include <vector>
+
+#include "apps/groundray/colour_map.h"
+
+namespace groundray {
+namespace {
+
+constexpr int width = 900;
+constexpr int gap = 8;
+
+// The range below which a share of the echoes lies.
+double quantile_m(std::span<const double> ranges_m, double share) {
+  std::vector<double> sorted;
+  std::ranges::copy_if(ranges_m, std::back_inserter(sorted),
+                       [](double range_m) { return !std::isnan(range_m); });
+  if (sorted.empty()) return 1;
+  const auto at =
+      sorted.begin() + static_cast<std::ptrdiff_t>(share * static_cast<double>(sorted.size() - 1));
+  std::nth_element(sorted.begin(), at, sorted.end());
+  return *at;
+}
+
+// Rows of the range image: a band for each ring of a spinning head, from the top; else elevations,
+// from the highest point down to the lowest.
+struct RangeRows {
+  static constexpr int rows_of_elevations = 160;
+  std::vector<int> places;  // by ring
+  int height = rows_of_elevations;
+  int band = 1;
+  float low_rad = 0, high_rad = 0;
+
+  RangeRows(const PointCloud& scan, const PatternSpec& pattern) {
+    if (const auto* spinning = std::get_if<SpinningPattern>(&pattern)) {
+      std::vector<Beam> beams = spinning->beams;
+      std::ranges::stable_sort(beams, std::ranges::greater{}, &Beam::elevation_rad);
+      places.resize(std::ranges::max(beams, {}, &Beam::ring).ring + std::size_t{1});
+      for (std::size_t i = 0; i < beams.size(); ++i) places[beams[i].ring] = static_cast<int>(i);
+      band = std::max(2, rows_of_elevations / static_cast<int>(beams.size()));
+      height = band * static_cast<int>(beams.size());
+      return;
+    }
+    for (std::size_t i = 0; i < scan.rows(); ++i) {
+      const float now_rad = elevation_rad(scan, i);
+      low_rad = i == 0 ? now_rad : std::min(low_rad, now_rad);
+      high_rad = i == 0 ? now_rad : std::max(high_rad, now_rad);
+    }
+  }
+
+  static float elevation_rad(const PointCloud& scan, std::size_t i) {
+    return std::atan2(scan.column<float>("z")[i],
+                      std::hypot(scan.column<float>("x")[i], scan.column<float>("y")[i]));
+  }
+  int row(const PointCloud& scan, std::size_t i) const {
+    if (!places.empty()) return places[scan.column<std::uint16_t>("ring")[i]] * band;
+    const float span_rad = std::max(high_rad - low_rad, 1e-6f);
+    const float share = (high_rad - elevation_rad(scan, i)) / span_rad;
+    return std::min(static_cast<int>(share * static_cast<float>(height)), height - 1);
+  }
+};
+
+void draw_ranges(Image8& image, const PointCloud& scan, const RangeRows& rows, double far_m) {
+  const auto x = scan.column<float>("x");
+  const auto y = scan.column<float>("y");
+  const auto range_m = scan.column<double>("range_true");
+  for (std::size_t i = 0; i < scan.rows(); ++i) {
+    if (std::isnan(range_m[i])) continue;
+    const double turn = 0.5 - std::atan2(y[i], x[i]) / (2 * std::numbers::pi);
+    const int column = std::min(static_cast<int>(turn * width), width - 1);
+    for (int k = 0; k < rows.band; ++k)
+      paint(image, column, rows.row(scan, i) + k, range_colour(range_m[i] / far_m));
+  }
+}
+
+// A square of the map, north up.
+struct MapWindow {
+  glm::dvec2 centre_m;
+  double half_m;
+  int top;
+
+  glm::dvec2 point(int x, int y) const {
+    const glm::dvec2 share((x + 0.5) / width * 2 - 1, 1 - (y + 0.5) / width * 2);
+    return centre_m + share * half_m;
+  }
+  glm::ivec2 pixel(glm::dvec2 p) const {
+    const glm::dvec2 share = (p - centre_m) / half_m;
+    return {static_cast<int>(std::floor((share.x + 1) / 2 * width)),
+            top + static_cast<int>(std::floor((1 - share.y) / 2 * width))};
+  }
+};
+
+// Heights at the points of a lattice with a pixel's pitch, which reaches beyond
+// the window by `reach` pixels; NaN where there is no ground.
+class HeightLattice {
+ public:
+  HeightLattice(const MapWindow& window, const Ground& ground, int reach)
+      : reach_(reach), side_(width + 2 * reach) {
+    heights_m_.reserve(static_cast<std::size_t>(side_) * static_cast<std::size_t>(side_));
+    for (int y = -reach; y < width + reach; ++y) {
+      for (int x = -reach; x < width + reach; ++x) {
+        heights_m_.push_back(ground.height_m_at(window.point(x, y))
+                                 .value_or(std::numeric_limits<double>::quiet_NaN()));
+      }
+    }
+  }
+  double at(int x, int y) const {
+    return heights_m_[static_cast<std::size_t>(y + reach_) * static_cast<std::size_t>(side_) +
+                      static_cast<std::size_t>(x + reach_)];
+  }
+
+ private:
+  int reach_, side_;
+  std::vector<double> heights_m_;
+};
+
+void draw_hillshade(Image8& image, const MapWindow& window, const Ground& ground) {
+  const glm::dvec3 sun =
+      glm::normalize(glm::dvec3(-1, 1, 1.4));  // from the north-west, as maps have it
+  constexpr int farthest = 32;                 // pixels; cells of more show as facets
+  const double pixel_m = 2 * window.half_m / width;
+  const int reach = static_cast<int>(std::clamp(
+      std::ceil(0.5 * std::abs(ground.frame().step_m.x) / pixel_m), 1.0, double{farthest}));
+  const HeightLattice heights_m(window, ground, reach);
+  for (int y = 0; y < width; ++y) {
+    for (int x = 0; x < width; ++x) {
+      const glm::dvec3 up(heights_m.at(x - reach, y) - heights_m.at(x + reach, y),
+                          heights_m.at(x, y + reach) - heights_m.at(x, y - reach),
+                          2 * reach * pixel_m);
+      Colour colour(0.12, 0.14, 0.2);  // no ground here
+      if (std::isfinite(up.x + up.y))
+        colour = Colour(0.25 + 0.6 * std::max(0.0, glm::dot(glm::normalize(up), sun)));
+      paint(image, x, window.top + y, colour);
+    }
+  }
+}
+
+void draw_points(Image8& image, const MapWindow& window, const PointCloud& scan, double far_m) {
+  const auto x = scan.column<double>("world_x");
+  const auto y = scan.column<double>("world_y");
+  const auto range_m = scan.column<double>("range_true");
+  for (std::size_t i = 0; i < scan.rows(); ++i) {
+    const glm::ivec2 at = window.pixel({x[i], y[i]});
+    for (const glm::ivec2 step :
+         {glm::ivec2(0, 0), glm::ivec2(1, 0), glm::ivec2(0, 1), glm::ivec2(1, 1)}) {
+      if (at.y < window.top) continue;
+      paint(image, at.x + step.x, at.y + step.y, range_colour(range_m[i] / far_m));
+    }
+  }
+}
+
+// A red dot where the sensor is, and a line to where it looks.
+void draw_sensor(Image8& image, const MapWindow& window, const Pose& X_DS) {
+  const glm::dvec3 forward = X_DS.rotation * glm::dvec3(1, 0, 0);
+  for (int step = 0; step <= 200; ++step) {
+    const double ahead_m = window.half_m * 0.1 * step / 200;
+    const glm::ivec2 at = window.pixel(glm::dvec2(X_DS.translation_m + forward * ahead_m));
+    const int radius = step == 0 ? 4 : 1;
+    for (int dy = -radius; dy <= radius; ++dy) {
+      for (int dx = -radius; dx <= radius; ++dx) {
+        if (dx * dx + dy * dy <= radius * radius)
+          paint(image, at.x + dx, at.y + dy, {0.9, 0.1, 0.1});
+      }
+    }
+  }
+}
+
+}  // namespace
+
+Image8 draw_preview(const PointCloud& scan, const PlacedLidar& lidar, const Ground& ground,
+                    std::int64_t frame) {
+  const RangeRows rows(scan, lidar.spec.lidar.pattern);
+  Image8 image(width, rows.height + gap + width, 3);
+  const auto range_m = scan.column<double>("range_true");
+  const double far_m = std::max(quantile_m(range_m, 0.95), 1.0);
+  const Pose X_DS = lidar.X_DS.pose_at(lidar.lidar.pattern().stamp(frame));
+  const MapWindow window{glm::dvec2(X_DS.translation_m), std::max(far_m * 1.1, 10.0),
+                         rows.height + gap};
+  draw_ranges(image, scan, rows, far_m);
+  draw_hillshade(image, window, ground);
+  draw_points(image, window, scan, far_m);
+  draw_sensor(image, window, X_DS);
+  return image;
+}
+
+}  // namespace groundray

@@ -1,0 +1,154 @@
+#include "apps/view/dem_layer.h"
+
+#include <fmt/format.h>
+
+#include <cmath>
+#include <cstdint>
+#include <glm/geometric.hpp>
+#include <glm/trigonometric.hpp>
+#include <limits>
+#include <vector>
+
+#include "apps/view/cloud_layer.h"
+#include "apps/view/mesh_layer.h"
+#include "core/error.h"
+#include "core/point_cloud.h"
+#include "terrain/band_file.h"
+#include "terrain/dem_file.h"
+
+namespace groundray {
+namespace {
+
+// Heights of every step-th sample.
+std::vector<float> thinned_heights(const DemFile& file, int step) {
+  const glm::ivec2 samples = file.header().samples;
+  std::vector<float> heights;
+  for (int row = 0; row < samples.y; row += step) {
+    const std::vector<float> line = file.read({0, row}, {samples.x, 1});
+    for (std::size_t i = 0; i < line.size(); i += static_cast<std::size_t>(step))
+      heights.push_back(line[i]);
+  }
+  return heights;
+}
+
+// The triangles of a grid whose samples are all there, by sample; a cell is split as the reference
+// surface is: from its north-eastern corner.
+std::vector<glm::uvec3> grid_triangles(glm::ivec2 size, const std::vector<float>& heights,
+                                       bool is_mirrored) {
+  std::vector<glm::uvec3> triangles;
+  const auto columns = static_cast<std::uint32_t>(size.x);
+  const auto add = [&](std::uint32_t a, std::uint32_t b, std::uint32_t c) {
+    if (std::isnan(heights[a]) || std::isnan(heights[b]) || std::isnan(heights[c])) return;
+    triangles.push_back(is_mirrored ? glm::uvec3(a, c, b) : glm::uvec3(a, b, c));
+  };
+  for (std::uint32_t row = 0; row + 1 < static_cast<std::uint32_t>(size.y); ++row) {
+    for (std::uint32_t column = 0; column + 1 < columns; ++column) {
+      const std::uint32_t nw = row * columns + column, sw = nw + columns;
+      add(nw, sw, nw + 1);
+      add(sw + 1, nw + 1, sw);
+    }
+  }
+  return triangles;
+}
+
+// Drops samples that no triangle has; `number` tells the new number of each.
+struct Kept {
+  std::vector<std::size_t> rows;
+  std::vector<glm::uvec3> triangles;
+};
+
+Kept keep_used(std::vector<glm::uvec3> triangles, std::size_t samples) {
+  constexpr auto none = std::numeric_limits<std::uint32_t>::max();
+  std::vector<std::uint32_t> number(samples, none);
+  for (const glm::uvec3& triangle : triangles) {
+    for (glm::length_t k = 0; k < 3; ++k) number[triangle[k]] = 0;
+  }
+  Kept kept;
+  for (std::size_t i = 0; i < samples; ++i) {
+    if (number[i] == none) continue;
+    number[i] = static_cast<std::uint32_t>(kept.rows.size());
+    kept.rows.push_back(i);
+  }
+  for (glm::uvec3& triangle : triangles) {
+    for (glm::length_t k = 0; k < 3; ++k) triangle[k] = number[triangle[k]];
+  }
+  kept.triangles = std::move(triangles);
+  return kept;
+}
+
+PointCloud table_of(const RasterBands& bands) {
+  PointCloud table(static_cast<std::size_t>(bands.samples.x) *
+                   static_cast<std::size_t>(bands.samples.y));
+  for (std::size_t i = 1; i < bands.bands.size(); ++i) {
+    std::string name = bands.bands[i].name;
+    while (table.has(name) || name == "height" || name == "slope") name += '\'';
+    std::ranges::copy(bands.bands[i].values, table.add<float>(name).begin());
+  }
+  return table;
+}
+
+std::vector<float> slopes_deg(const Layer& layer) {
+  const auto places = coordinates(*layer.data);
+  const auto corner = corners(*layer.data);
+  const auto at = [&](std::int32_t i) {
+    const auto first = std::size_t{3} * static_cast<std::size_t>(i);
+    return glm::dvec3(places[first], places[first + 1], places[first + 2]);
+  };
+  std::vector<float> slopes;
+  for (std::size_t i = 0; i + 2 < corner.size(); i += 3) {
+    const glm::dvec3 a = at(corner[i]);
+    const glm::dvec3 normal = glm::cross(at(corner[i + 1]) - a, at(corner[i + 2]) - a);
+    slopes.push_back(static_cast<float>(
+        glm::degrees(std::atan2(std::hypot(normal.x, normal.y), std::abs(normal.z)))));
+  }
+  return slopes;
+}
+
+}  // namespace
+
+Layer dem_layer(const std::string& name, const std::filesystem::path& path,
+                std::size_t most_samples) {
+  const DemFile file(path);
+  const DemHeader& header = file.header();
+  const RasterBands bands = read_bands(path, most_samples);
+  const std::vector<float> heights = thinned_heights(file, bands.step);
+  const Kept kept =
+      keep_used(grid_triangles(bands.samples, heights, header.step_m.x * header.step_m.y > 0),
+                heights.size());
+  if (kept.triangles.empty())
+    throw Error("{}: no three samples beside each other have heights: there is nothing to show",
+                path.string());
+  Layer layer{.name = name, .kind = LayerKind::Terrain, .data = make_points(kept.rows.size())};
+  layer.origin_w_m = header.origin_w_m;
+  const auto places = coordinates(*layer.data);
+  std::vector<float> height(kept.rows.size());
+  for (std::size_t i = 0; i < kept.rows.size(); ++i) {
+    const auto row = static_cast<int>(kept.rows[i]);
+    const glm::ivec2 sample(row % bands.samples.x, row / bands.samples.x);
+    const glm::dvec2 p = header.origin_m + glm::dvec2(sample * bands.step) * header.step_m;
+    places[3 * i] = static_cast<float>(p.x);
+    places[3 * i + 1] = static_cast<float>(p.y);
+    places[3 * i + 2] = height[i] = heights[kept.rows[i]];
+  }
+  set_triangles(*layer.data, kept.triangles);
+  add_normals(layer);
+  add_table(layer, LayerColumn::Of::Points, table_of(bands), kept.rows);
+  for (LayerColumn& column : layer.columns) {
+    for (const RasterBands::Band& band : bands.bands) {
+      if (band.name == column.name) column.unit = band.unit;
+    }
+  }
+  add_column(layer, {.name = "height", .unit = "m", .scale = ColourScale::Earth}, height);
+  add_column(layer, {.name = "slope", .unit = "deg", .of = LayerColumn::Of::Cells},
+             slopes_deg(layer));
+  layer.coloured_by = "height";
+  layer.facts.push_back(fmt::format("{} x {} samples, {} bands", header.samples.x, header.samples.y,
+                                    bands.bands.size()));
+  if (bands.step > 1)
+    layer.facts.push_back(
+        fmt::format("shown with every {}. sample of each row and column", bands.step));
+  layer.facts.push_back(header.crs_name);
+  return layer;
+}
+
+}  // namespace groundray

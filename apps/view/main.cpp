@@ -1,0 +1,122 @@
+#include <fmt/format.h>
+#include <vtkObject.h>
+
+#include <CLI/CLI.hpp>
+#include <exception>
+#include <filesystem>
+#include <new>
+#include <optional>
+#include <string>
+#include <vector>
+
+#include "apps/view/off_screen_window.h"
+#include "apps/view/open.h"
+#include "apps/view/still.h"
+#include "apps/view/window/run_window.h"
+#include "core/error.h"
+
+namespace groundray {
+namespace {
+
+constexpr int done = 0;
+constexpr int failed = 1;
+constexpr int wrong_usage = 2;
+
+struct Arguments {
+  std::vector<std::filesystem::path> inputs;
+  std::filesystem::path screenshot;
+  std::string size = "1280x720", look_from, look_at;
+  int turntable = 0;
+  StillSpec still;
+  std::optional<double> point_size;
+  bool no_legend = false;
+};
+
+void add_options(CLI::App& app, Arguments& arguments) {
+  app.add_option("INPUT", arguments.inputs,
+                 "Scene (.yaml), dataset (folder), mesh, cloud, DEM or picture; any number");
+  app.add_option("--screenshot", arguments.screenshot,
+                 "Write a picture (.png) of them and end: without a window, display or X server");
+  app.add_option("--size", arguments.size, "Of the picture, px")->capture_default_str();
+  app.add_option("--look-from", arguments.look_from, "X,Y,Z of the eye, m, as the map has them");
+  app.add_option("--look-at", arguments.look_at, "X,Y,Z of what is in the picture's middle");
+  app.add_option("--colour-by", arguments.still.colour_by,
+                 "COLUMN of all layers that have it, or LAYER=COLUMN; any number");
+  app.add_option("--hide", arguments.still.hide, "LAYER, or what its name begins with: objects");
+  app.add_option("--point-size", arguments.point_size, "Of clouds, px")
+      ->check(CLI::Range(1.0, 32.0));
+  app.add_flag("--wireframe", arguments.still.is_wireframe, "Surfaces by their edges");
+  app.add_flag("--no-legend", arguments.no_legend, "Leave out what the colours mean");
+  app.add_option("--turntable", arguments.turntable,
+                 "Write so many pictures of a whole turn into the folder that --screenshot names");
+}
+
+int take_stills(Arguments& arguments) {
+  if (arguments.inputs.empty())
+    throw Error("--screenshot: there is nothing to be shown; name a file or a folder");
+  StillSpec& spec = arguments.still;
+  spec.size_px = parse_size(arguments.size);
+  if (!arguments.look_from.empty()) spec.from_w_m = parse_place(arguments.look_from, "--look-from");
+  if (!arguments.look_at.empty()) spec.at_w_m = parse_place(arguments.look_at, "--look-at");
+  spec.point_size_px = arguments.point_size;
+  spec.has_legend = !arguments.no_legend;
+  std::vector<Opened> inputs;
+  for (const std::filesystem::path& input : arguments.inputs) {
+    inputs.push_back(open_any(input));
+    for (const std::string& note : inputs.back().notes) fmt::print(stderr, "note: {}\n", note);
+  }
+  View view(make_off_screen_window(spec.size_px));
+  arrange(view, inputs, spec);
+  if (arguments.turntable != 0) {
+    write_turntable(view, arguments.screenshot, arguments.turntable, spec.size_px);
+  } else {
+    write_still(view, arguments.screenshot, spec.size_px);
+  }
+  return done;
+}
+
+int show_window(int& argc, char** argv, const Arguments& arguments) {
+  WindowStart start{.inputs = arguments.inputs, .wireframe = arguments.still.is_wireframe};
+  if (!arguments.still.colour_by.empty()) start.coloured_by = arguments.still.colour_by.front();
+  if (!arguments.look_from.empty() && !arguments.look_at.empty())
+    start.look = Look{.from_w_m = parse_place(arguments.look_from, "--look-from"),
+                      .at_w_m = parse_place(arguments.look_at, "--look-at")};
+  return run_window(argc, argv, start);
+}
+
+int run(int argc, char** argv) {
+  CLI::App app("groundray-view shows scenes, scans, meshes, DEMs and pictures.");
+  app.footer(
+      "Look at the demo:  groundray-view data/scenes/offroad_trail.yaml\n"
+      "A picture of it:   groundray-view data/scenes/offroad_trail.yaml --screenshot trail.png\n"
+      "Exit codes:        0 done, 1 failed, 2 wrong usage");
+  app.set_version_flag("--version", "groundray-view " GROUNDRAY_VERSION);
+  Arguments arguments;
+  add_options(app, arguments);
+  try {
+    app.parse(argc, argv);
+  } catch (const CLI::ParseError& fault) {
+    return app.exit(fault) == 0 ? done : wrong_usage;
+  }
+  if (arguments.screenshot.empty() && arguments.turntable != 0) {
+    fmt::print(stderr, "groundray-view: --turntable needs --screenshot FOLDER\n");
+    return wrong_usage;
+  }
+  if (arguments.screenshot.empty()) return show_window(argc, argv, arguments);
+  vtkObject::GlobalWarningDisplayOff();  // faults are thrown
+  return take_stills(arguments);
+}
+
+}  // namespace
+}  // namespace groundray
+
+int main(int argc, char** argv) {
+  try {
+    return groundray::run(argc, argv);
+  } catch (const std::bad_alloc&) {
+    fmt::print(stderr, "groundray-view: there is not enough memory\n");
+  } catch (const std::exception& fault) {
+    fmt::print(stderr, "groundray-view: {}\n", fault.what());
+  }
+  return groundray::failed;
+}

@@ -1,0 +1,264 @@
+#include "apps/view/open.h"
+
+#include <fmt/format.h>
+
+#include <algorithm>
+#include <cctype>
+#include <fstream>
+#include <string_view>
+#include <system_error>
+
+#include "apps/view/cloud_layer.h"
+#include "apps/view/dem_layer.h"
+#include "apps/view/mesh_layer.h"
+#include "apps/view/object_layer.h"
+#include "apps/view/picture_file.h"
+#include "apps/view/picture_layer.h"
+#include "apps/view/scene_layers.h"
+#include "core/error.h"
+#include "terrain/band_file.h"
+
+namespace groundray {
+namespace {
+
+namespace fs = std::filesystem;
+
+std::string ending(const fs::path& path) {
+  std::string text = path.extension().string();
+  std::ranges::transform(text, text.begin(),
+                         [](unsigned char c) { return static_cast<char>(std::tolower(c)); });
+  return text;
+}
+
+bool is_one_of(const std::string& text, std::initializer_list<std::string_view> words) {
+  return std::ranges::find(words, text) != words.end();
+}
+
+// Whether the header of a PLY announces faces.
+bool has_faces(const fs::path& path) {
+  std::ifstream file(path, std::ios::binary);
+  std::string line;
+  for (int i = 0; i < 1000 && std::getline(file, line); ++i) {
+    if (line.starts_with("end_header")) break;
+    if (line.starts_with("element face") || line.starts_with("element tristrips"))
+      return line.find_first_of("123456789", 12) != std::string::npos;
+  }
+  return false;
+}
+
+InputKind kind_of_raster(const fs::path& path) {
+  try {
+    return inspect_raster(path).is_picture ? InputKind::Picture : InputKind::Dem;
+  } catch (const Error& fault) {
+    throw Error(
+        "{}: nothing that can be shown: neither a scene (.yaml), a dataset's folder, a mesh (.ply, "
+        ".obj, .stl, .gltf, .glb), a cloud (.ply, .pcd, .npy, .npz, .bin), a picture (.png, .jpg, "
+        ".exr, .hdr), nor a DEM that GDAL reads ({})",
+        path.string(), fault.what());
+  }
+}
+
+void check_size(const fs::path& path, const OpenLimits& limits) {
+  std::error_code fault;
+  const auto bytes = fs::file_size(path, fault);
+  if (fault || bytes <= limits.file_bytes) return;
+  throw Error(
+      "{}: {:.1f} GB, more than the {:.1f} GB that are read at once: thin it out or cut it into "
+      "parts first",
+      path.string(), static_cast<double>(bytes) / 1e9,
+      static_cast<double>(limits.file_bytes) / 1e9);
+}
+
+void open_scene(Opened& opened, const OpenLimits& limits) {
+  auto world = std::make_shared<const World>(load_world(opened.path));
+  opened.world = world;
+  opened.look = look_at_platform(*world);
+  opened.follower = std::make_shared<TerrainFollower>(world);
+  FollowedTerrain terrain = opened.follower->follow(opened.look->from_w_m);
+  opened.layers.push_back(std::move(terrain.layer));
+  const glm::dvec3 middle_m = middle_of_run(*world);
+  for (Layer& layer :
+       object_layers(*world, first_frame(*world).begin, middle_m, limits.objects_triangles))
+    opened.layers.push_back(std::move(layer));
+  for (Layer& layer : sensor_layers(*world)) opened.layers.push_back(std::move(layer));
+}
+
+void name_labels(Layer& layer, const RecordedNames& names) {
+  for (LayerColumn& column : layer.columns) {
+    if (column.name != "label" && column.name != "second_label") continue;
+    for (auto& [kind, name] : column.categories) {
+      const auto found = names.labels.find(static_cast<std::uint32_t>(kind));
+      if (found != names.labels.end()) name = found->second;
+    }
+  }
+}
+
+void open_dataset(Opened& opened) {
+  if (!fs::is_directory(opened.path)) opened.path = opened.path.parent_path();
+  opened.dataset = std::make_shared<const RecordedDataset>(read_dataset(opened.path));
+  opened.run = std::make_shared<const RecordedRun>(read_recorded_run(opened.path));
+  for (const RecordedLidar& lidar : opened.dataset->lidars) {
+    if (lidar.frames.empty()) continue;
+    Layer layer = scan_layer(*opened.dataset, lidar, lidar.frames.front(), "lidar/" + lidar.name);
+    name_labels(layer, opened.run->names);
+    if (!opened.look) {
+      const Pose X_DS = lidar.X_DS.pose_at(lidar.X_DS.begin_time());
+      opened.look = look_at(X_DS.translation_m + opened.dataset->georeference.origin_w_m,
+                            X_DS.rotation * glm::dvec3(1, 0, 0), 30);
+    }
+    opened.layers.push_back(std::move(layer));
+  }
+  for (Layer& layer : sensor_layers(*opened.run)) opened.layers.push_back(std::move(layer));
+}
+
+void open_mesh(Opened& opened, const OpenLimits& limits) {
+  check_size(opened.path, limits);
+  StoredMesh file;
+  if (ending(opened.path) == ".ply") {
+    file = read_stored_mesh(opened.path);
+  } else {
+    static_cast<MeshFile&>(file) = read_mesh(opened.path);
+  }
+  Layer layer = mesh_layer(opened.path.filename().string(), file.mesh, file.georeference.origin_w_m,
+                           file.vertices);
+  if (file.dropped > 0)
+    opened.notes.push_back(fmt::format("{} broken triangles left out", file.dropped));
+  if (file.skipped > 0)
+    opened.notes.push_back(fmt::format("{} points, lines or patches left out", file.skipped));
+  limit_triangles(layer, limits.triangles);
+  if (!file.georeference.crs_name.empty()) layer.facts.push_back(file.georeference.crs_name);
+  opened.layers.push_back(std::move(layer));
+}
+
+void open_cloud(Opened& opened, const OpenLimits& limits) {
+  check_size(opened.path, limits);
+  const CloudFile file = read_cloud(opened.path, {});
+  CloudContent content{.name = opened.path.filename().string(),
+                       .p_m = positions_of(file.cloud),
+                       .most_points = limits.points};
+  if (content.p_m.empty())
+    throw Error("{}: {}: a cloud has points with columns x, y and z", opened.path.string(),
+                file.cloud.rows() == 0 ? "it has no point" : "no columns x, y, z");
+  Layer layer = cloud_layer(content, file.cloud);
+  if (layer.points() == 0)
+    throw Error("{}: none of its {} points has a finite position", opened.path.string(),
+                content.p_m.size());
+  layer.facts.push_back(file.form);
+  for (const std::string& unread : file.unread) opened.notes.push_back(unread);
+  opened.layers.push_back(std::move(layer));
+}
+
+void open_dem(Opened& opened, const OpenLimits& limits) {
+  const std::string name = opened.path.filename().string();
+  const RasterKind kind = inspect_raster(opened.path);
+  if (kind.is_geographic)
+    opened.notes.emplace_back("placed by angles: warped to the UTM zone of its centre");
+  if (kind.bands > 1) {
+    opened.layers.push_back(dem_layer(name, opened.path, limits.triangles / 2));
+    return;
+  }
+  opened.follower = std::make_shared<TerrainFollower>(opened.path);
+  FollowedTerrain terrain = opened.follower->follow(opened.follower->overview_w_m());
+  if (terrain.triangles == 0)
+    throw Error("{}: no three samples beside each other have heights", opened.path.string());
+  opened.layers.push_back(std::move(terrain.layer));
+}
+
+void open_picture(Opened& opened) {
+  PictureFile file = read_picture(opened.path);
+  opened.notes = std::move(file.notes);
+  opened.picture = std::make_shared<const Image8>(std::move(file.picture));
+  const Image8& picture = *opened.picture;
+  opened.layers.push_back(picture_layer(opened.path.filename().string(), picture));
+  const glm::dvec3 centre(picture.width() / 2.0, picture.height() / 2.0, 0);
+  const double back = 2.1 * std::max<double>(picture.height(), 0.75 * picture.width());
+  opened.look = Look{centre + glm::dvec3(0, 0, back), centre, {0, 1, 0}};
+}
+
+}  // namespace
+
+InputKind kind_of(const fs::path& path) {
+  std::error_code fault;
+  const fs::file_status status = fs::status(path, fault);
+  // GDAL has paths of its own, into archives.
+  if (!fs::exists(status) && !path.string().starts_with("/vsi"))
+    throw Error("{}: there is no such file or folder", path.string());
+  if (fs::is_directory(status)) {
+    if (fs::exists(path / "dataset.yaml")) return InputKind::Dataset;
+    throw Error("{}: the folder is no dataset, it has no dataset.yaml", path.string());
+  }
+  if (path.filename() == "dataset.yaml") return InputKind::Dataset;
+  const std::string end = ending(path);
+  if (is_one_of(end, {".yaml", ".yml"})) return InputKind::Scene;
+  if (end == ".ply") return has_faces(path) ? InputKind::Mesh : InputKind::Cloud;
+  if (is_one_of(end, {".obj", ".stl", ".gltf", ".glb"})) return InputKind::Mesh;
+  if (is_one_of(end, {".pcd", ".npy", ".npz", ".bin", ".las", ".laz", ".e57"}))
+    return InputKind::Cloud;
+  if (is_one_of(end, {".png", ".jpg", ".jpeg", ".exr", ".hdr"})) return InputKind::Picture;
+  return kind_of_raster(path);
+}
+
+Opened open_any(const fs::path& path, const OpenLimits& limits) {
+  Opened opened{.kind = kind_of(path), .path = path};
+  try {
+    switch (opened.kind) {
+      case InputKind::Scene:
+        open_scene(opened, limits);
+        break;
+      case InputKind::Dataset:
+        open_dataset(opened);
+        break;
+      case InputKind::Mesh:
+        open_mesh(opened, limits);
+        break;
+      case InputKind::Cloud:
+        open_cloud(opened, limits);
+        break;
+      case InputKind::Dem:
+        open_dem(opened, limits);
+        break;
+      case InputKind::Picture:
+        open_picture(opened);
+        break;
+    }
+  } catch (const std::bad_alloc&) {
+    throw Error("{}: it takes more memory than there is: thin it out or cut it into parts first",
+                path.string());
+  }
+  for (const Layer& layer : opened.layers) {
+    for (const std::string& fact : layer.facts) {
+      if (fact.starts_with("thinned") || fact.starts_with("shown with"))
+        opened.notes.push_back(fmt::format("{}: {}", layer.name, fact));
+    }
+  }
+  return opened;
+}
+
+Layer scan_layer(const RecordedDataset& dataset, const RecordedLidar& lidar,
+                 const RecordedFrame& frame, const std::string& name) {
+  const CloudFile file = read_cloud(frame.file, {});
+  CloudContent content{
+      .name = name, .p_m = positions_of(file.cloud), .origin_w_m = dataset.georeference.origin_w_m};
+  if (content.p_m.empty() && file.cloud.rows() > 0)
+    throw Error("{}: it has no columns x, y, z", frame.file.string());
+  PointCloud table = file.cloud;
+  std::span<float> range_m;
+  if (!table.has("range")) range_m = table.add<float>("range");
+  const bool moves = lidar.points == LidarSpec::Points::AsFired && table.has("time");
+  const std::span<const float> time_s =
+      moves ? table.column<float>("time") : std::span<const float>();
+  for (std::size_t i = 0; i < content.p_m.size(); ++i) {
+    if (!range_m.empty()) range_m[i] = static_cast<float>(glm::length(content.p_m[i]));
+    const auto after =
+        moves ? time_of(static_cast<double>(time_s[i])) : std::chrono::nanoseconds(0);
+    const auto time =
+        std::clamp(frame.stamp + after, lidar.X_DS.begin_time(), lidar.X_DS.end_time());
+    content.p_m[i] = lidar.X_DS.pose_at(time) * content.p_m[i];
+  }
+  Layer layer = cloud_layer(content, table);
+  layer.coloured_by = "range";
+  layer.point_size_px = 3;
+  return layer;
+}
+
+}  // namespace groundray

@@ -1,0 +1,65 @@
+#include "apps/view/window/help.h"
+
+#include <QDialog>
+#include <QDialogButtonBox>
+#include <QTextBrowser>
+#include <QVBoxLayout>
+
+namespace groundray {
+namespace {
+
+constexpr const char* text = R"(
+<style>td { padding: 1px 14px 1px 0; } h3 { margin: 10px 0 2px 0; }</style>
+<h3>Opening</h3>
+<p>Drop scenes (.yaml), datasets (their folders), meshes, clouds, DEMs and pictures into the window,
+or use <b>Ctrl+O</b> and, for a dataset's folder, <b>Ctrl+Shift+O</b>.</p>
+<h3>Mouse</h3>
+<table>
+<tr><td>drag left</td><td>turn round the point that is looked at; up stays up</td></tr>
+<tr><td>drag in the middle, Shift + left</td><td>move</td></tr>
+<tr><td>wheel, drag right</td><td>come nearer: the wheel to what is pointed at</td></tr>
+<tr><td>double click</td><td>what the view turns round from now on</td></tr>
+<tr><td>click</td><td>pick an echo, a point or a triangle: all its numbers, beam and footprint</td></tr>
+<tr><td>Ctrl + click</td><td>put the terrain's viewpoint there</td></tr>
+</table>
+<h3>Keys</h3>
+<table>
+<tr><td>F, Home</td><td>see all</td><td>Z</td><td>see the selected layer</td></tr>
+<tr><td>W A S D, Q E</td><td>fly ahead, aside, down and up</td><td>arrows</td><td>turn</td></tr>
+<tr><td>1 2 3 4</td><td>from above, south, east, aslant</td><td>+ -</td><td>nearer, farther</td></tr>
+<tr><td>T</td><td>surfaces as wireframe</td><td>L</td><td>legend</td></tr>
+<tr><td>Space</td><td>play, pause</td><td>, .</td><td>the frame before, the next</td></tr>
+<tr><td>N</td><td>scan here</td><td>C</td><td>compare with the truth</td></tr>
+<tr><td>Ctrl+S</td><td>save a picture</td><td>Delete</td><td>close the selected layer</td></tr>
+<tr><td>Escape</td><td>cancel; take back what was picked</td><td>F11</td><td>full screen</td></tr>
+</table>
+<h3>Images</h3>
+<p>Point at a pixel for its value; click for its ray and the surface that it meets. The wheel comes
+nearer, a double click shows all.</p>
+<h3>Scan here</h3>
+<p>Of a scene: choose a sensor, press <i>Place it in the view</i>, press on the ground where it
+stands and drag to where it looks; then <i>Scan</i>.</p>
+<h3>Compare</h3>
+<p>Choose what is measured and the truth: a scene's ground, a DEM, or a surface that is shown. Both
+are to be in one frame. Above, or on the side that triangles face, is positive.</p>
+)";
+
+}  // namespace
+
+void show_help(QWidget* parent) {
+  auto* dialog = new QDialog(parent);
+  dialog->setObjectName("help");
+  dialog->setAttribute(Qt::WA_DeleteOnClose);
+  dialog->setWindowTitle("Mouse and keys");
+  auto* browser = new QTextBrowser;
+  browser->setHtml(text);
+  auto* buttons = new QDialogButtonBox(QDialogButtonBox::Close);
+  QObject::connect(buttons, &QDialogButtonBox::rejected, dialog, &QDialog::close);
+  auto* layout = new QVBoxLayout(dialog);
+  layout->addWidget(browser);
+  layout->addWidget(buttons);
+  dialog->resize(720, 640);
+  dialog->show();
+}
+
+}  // namespace groundray

@@ -1,0 +1,57 @@
+#pragma once
+
+#include <QImage>
+#include <QPointF>
+#include <QWidget>
+#include <functional>
+#include <glm/vec2.hpp>
+#include <optional>
+
+#include "core/image.h"
+
+namespace groundray {
+
+/// A picture, as large as there is room; the wheel brings it nearer, dragging moves it.
+class PictureArea : public QWidget {
+ public:
+  struct Hooks {
+    std::function<void(glm::ivec2)> clicked{};                 ///< a pixel
+    std::function<void(std::optional<glm::ivec2>)> pointed{};  ///< at a pixel, or beside
+  };
+
+  explicit PictureArea(Hooks hooks, QWidget* parent = nullptr);
+
+  /// @param picture  of 1, 3 or 4 channels.
+  void show_picture(const Image8& picture);
+  void clear();
+  /// Marks a place in the picture; none takes the mark away.
+  void mark(std::optional<glm::dvec2> pixel);
+
+  /// Returns the middle of a pixel in this widget.
+  QPointF place_of(glm::dvec2 pixel) const;
+  QSize sizeHint() const override { return {420, 300}; }
+
+ protected:
+  void paintEvent(QPaintEvent* event) override;
+  void mousePressEvent(QMouseEvent* event) override;
+  void mouseMoveEvent(QMouseEvent* event) override;
+  void mouseReleaseEvent(QMouseEvent* event) override;
+  void mouseDoubleClickEvent(QMouseEvent* event) override;
+  void leaveEvent(QEvent* event) override;
+  void wheelEvent(QWheelEvent* event) override;
+
+ private:
+  double scale() const;
+  QPointF corner() const;
+  std::optional<glm::ivec2> pixel_at(QPointF place) const;
+
+  Hooks hooks_;
+  QImage picture_;
+  double zoom_ = 1;  // 1: all of it is seen
+  QPointF shift_;    // of its middle from this widget's
+  QPoint pressed_, dragged_;
+  bool is_drag_ = false;
+  std::optional<glm::dvec2> mark_;
+};
+
+}  // namespace groundray

@@ -1,0 +1,196 @@
+#include "apps/view/window/playback.h"
+
+#include <fmt/format.h>
+
+#include <algorithm>
+
+#include "apps/view/object_layer.h"
+#include "apps/view/open.h"
+#include "apps/view/scene_layers.h"
+#include "apps/view/window/line_layer.h"
+
+namespace groundray {
+namespace {
+
+using std::chrono::nanoseconds;
+constexpr Pen trail_pen{{255, 158, 41}, 2.5};
+constexpr std::size_t most_triangles = 200'000;  // of an object that moves
+
+const RecordedLidar* lidar_named(const RecordedDataset& dataset, const std::string& name) {
+  const auto found = std::ranges::find(dataset.lidars, name, &RecordedLidar::name);
+  return found == dataset.lidars.end() ? nullptr : &*found;
+}
+
+// The sensors where they are at a time, as they are drawn where they begin.
+void add_sensors(std::vector<Layer>& layers, const Timeline& timeline, nanoseconds time,
+                 const std::string& prefix) {
+  RecordedRun now{.georeference = timeline.georeference(), .sensors = {}, .names = {}};
+  for (std::size_t i = 0; i < timeline.sensors().size(); ++i) {
+    RecordedSensor sensor = timeline.sensors()[i];
+    sensor.X_DS = Trajectory({{time, timeline.pose_at(i, time)}});
+    now.sensors.push_back(std::move(sensor));
+  }
+  for (Layer& layer : sensor_layers(now)) {
+    if (layer.kind != LayerKind::Sensors) continue;
+    layer.name = prefix + layer.name;
+    layers.push_back(std::move(layer));
+  }
+}
+
+// The objects of a scene that move, where they are at a time.
+void add_moving(std::vector<Layer>& layers, const World& world, nanoseconds time,
+                const std::string& prefix) {
+  for (const MovingThing& thing : moving_things(world)) {
+    const auto& groups = world.content.groups;
+    const auto group = std::ranges::find(groups, thing.name, &Content::Group::name);
+    layers.push_back(object_layer(world, static_cast<std::size_t>(group - groups.begin()), time,
+                                  place_of(world, thing, time).p_DO, most_triangles));
+    layers.back().name = prefix + layers.back().name;
+  }
+}
+
+}  // namespace
+
+Playback::Playback(View& view, Hooks hooks) : view_(view), hooks_(std::move(hooks)) {}
+
+void Playback::open(Recording recording) {
+  recording_ = std::move(recording);
+  time_ = recording_.timeline->begin();
+  scans_.clear();
+  frames_.clear();
+  camera_.clear();
+}
+
+void Playback::close() {
+  job_.abandon();
+  recording_ = {};
+  scans_.clear();
+  frames_.clear();
+}
+
+void Playback::set_world(std::shared_ptr<const World> world, const std::string& prefix) {
+  world_ = std::move(world);
+  world_prefix_ = prefix;
+}
+
+void Playback::go_to(nanoseconds time) {
+  if (!is_open()) return;
+  time_ = time;
+  show_image();
+  if (job_.is_running()) {
+    is_stale_ = true;
+  } else {
+    begin_step();
+  }
+}
+
+void Playback::set_trail(bool on) {
+  has_trail_ = on;
+  if (is_open()) go_to(time_);
+}
+
+void Playback::set_camera(const std::string& name) {
+  camera_ = name;
+  if (is_open()) show_image();
+}
+
+std::optional<std::pair<std::size_t, std::size_t>> Playback::camera_frame() const {
+  if (!is_open() || recording_.dataset == nullptr || camera_.empty()) return std::nullopt;
+  const std::size_t sensor = recording_.timeline->sensor_named(camera_);
+  const auto frame = recording_.timeline->current(sensor, time_);
+  if (!frame) return std::nullopt;
+  return std::pair(sensor, *frame);
+}
+
+void Playback::show_image() {
+  if (camera_.empty()) return;
+  const auto shown = camera_frame();
+  if (!shown) {
+    if (hooks_.no_image) hooks_.no_image();
+    return;
+  }
+  const Timeline& timeline = *recording_.timeline;
+  const RecordedFrame& frame = timeline.sensors()[shown->first].frames[shown->second];
+  if (hooks_.image) {
+    hooks_.image({.title = fmt::format("{} {:06}", camera_, frame.number),
+                  .file = frame.file,
+                  .is_frame = true,
+                  .names = timeline.names()});
+  }
+}
+
+std::optional<glm::dvec3> Playback::platform_w_m() const {
+  if (!is_open() || recording_.timeline->sensors().empty()) return std::nullopt;
+  const Timeline& timeline = *recording_.timeline;
+  return timeline.georeference().origin_w_m + timeline.pose_at(0, time_).translation_m;
+}
+
+// All that belongs to a time, but for scans that are shown already. Any thread may call it.
+Playback::Step Playback::step_to(const Request& asked) {
+  const Timeline& timeline = *asked.recording.timeline;
+  const std::string& prefix = asked.recording.prefix;
+  const glm::dvec3 origin_w_m = timeline.georeference().origin_w_m;
+  Step step;
+  add_sensors(step.layers, timeline, asked.time, prefix);
+  for (std::size_t i = 0; i < timeline.sensors().size(); ++i) {
+    const RecordedSensor& sensor = timeline.sensors()[i];
+    const auto current = timeline.current(i, asked.time);
+    const RecordedLidar* lidar = asked.recording.dataset == nullptr
+                                     ? nullptr
+                                     : lidar_named(*asked.recording.dataset, sensor.name);
+    if (!current || lidar == nullptr) continue;
+    const auto shown = asked.frames.find(i);
+    if (shown != asked.frames.end() && shown->second == *current) continue;
+    const RecordedFrame& frame = sensor.frames[*current];
+    const std::string name = prefix + "lidar/" + sensor.name;
+    step.layers.push_back(scan_layer(*asked.recording.dataset, *lidar, frame, name));
+    step.scans[name] = {std::make_shared<const RecordedSensor>(sensor), frame, nullptr,
+                        timeline.names(), origin_w_m};
+    step.frames[i] = *current;
+  }
+  if (asked.has_trail && !timeline.sensors().empty()) {
+    step.layers.push_back(line_layer(prefix + "trail", LayerKind::Trail, origin_w_m,
+                                     {timeline.trail_m(0, asked.time)}, trail_pen));
+  }
+  if (asked.world != nullptr) {
+    add_moving(step.layers, *asked.world, asked.time, asked.world_prefix);
+  }
+  return step;
+}
+
+void Playback::begin_step() {
+  is_stale_ = false;
+  const Request asked{recording_, world_, world_prefix_, frames_, time_, has_trail_};
+  const auto ended = [this] {
+    if (is_stale_ && is_open()) begin_step();
+  };
+  job_.start([asked](const auto&, const auto&) { return step_to(asked); },
+             [this](Step step) { take(std::move(step)); },
+             {.failed = hooks_.failed, .ended = ended});
+}
+
+void Playback::take(Step step) {
+  if (!is_open()) return;
+  for (Layer& layer : step.layers) {
+    // Colours keep their meaning from scan to scan.
+    const Layer* before = view_.find(layer.name);
+    const LayerColumn* column = before == nullptr ? nullptr : before->find(before->coloured_by);
+    if (column != nullptr && !column->is_rgb) {
+      for (LayerColumn& each : layer.columns) {
+        if (each.name == column->name) each.range = column->range;
+      }
+    }
+    view_.add(std::move(layer));
+  }
+  if (!has_trail_) view_.remove(recording_.prefix + "trail");
+  for (auto& [name, scan] : step.scans) scans_[name] = std::move(scan);
+  for (const auto& [sensor, frame] : step.frames) frames_[sensor] = frame;
+  if (hooks_.changed) hooks_.changed();
+}
+
+const ShownScan* Playback::scan(const std::string& layer) const {
+  const auto found = scans_.find(layer);
+  return found == scans_.end() ? nullptr : &found->second;
+}
+
+}  // namespace groundray

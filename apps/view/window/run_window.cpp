@@ -1,0 +1,43 @@
+#include "apps/view/window/run_window.h"
+
+#include <QVTKOpenGLNativeWidget.h>
+
+#include <QApplication>
+#include <QSurfaceFormat>
+#include <cstdlib>
+
+#include "apps/view/window/style.h"
+#include "apps/view/window/window.h"
+#include "core/error.h"
+
+namespace groundray {
+namespace {
+
+bool has_display() {
+  for (const char* name : {"DISPLAY", "WAYLAND_DISPLAY", "QT_QPA_PLATFORM"}) {
+    const char* value = std::getenv(name);
+    if (value != nullptr && *value != '\0') return true;
+  }
+  return false;
+}
+
+}  // namespace
+
+int run_window(int& argc, char** argv, const WindowStart& start) {
+#ifdef __linux__
+  if (!has_display()) {
+    throw Error(
+        "there is no display to show a window on: $DISPLAY is empty. --screenshot FILE writes a "
+        "picture without one");
+  }
+#endif
+  QSurfaceFormat::setDefaultFormat(QVTKOpenGLNativeWidget::defaultFormat());
+  QApplication::setAttribute(Qt::AA_EnableHighDpiScaling);
+  const QApplication application(argc, argv);
+  set_style(*qApp);
+  Window window(start);
+  window.show();
+  return QApplication::exec();
+}
+
+}  // namespace groundray

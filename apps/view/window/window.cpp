@@ -1,0 +1,246 @@
+#include "apps/view/window/window.h"
+
+#include <fmt/format.h>
+
+#include <QComboBox>
+#include <QDockWidget>
+#include <QFormLayout>
+#include <QLabel>
+#include <QMessageBox>
+#include <QProgressBar>
+#include <QStatusBar>
+#include <QVBoxLayout>
+
+#include "core/product_io.h"
+
+namespace groundray {
+namespace {
+
+constexpr int status_ms = 500;
+constexpr double mib = 1024.0 * 1024.0;
+
+}  // namespace
+
+Window::Window(WindowStart start) : start_(std::move(start)) {
+  setWindowTitle("groundray view");
+  setAcceptDrops(true);
+  setDockOptions(AllowNestedDocks | AllowTabbedDocks | AnimatedDocks);
+  resize(1440, 900);
+  canvas_ = new Canvas;
+  setCentralWidget(canvas_);
+  hint_ = new QLabel("Drop a scene, a dataset's folder, a mesh, a cloud, a DEM or a picture here",
+                     this);
+  hint_->setStyleSheet("color: #aeb6c2; font-size: 15px;");
+  hint_->setAlignment(Qt::AlignCenter);
+  auto* over_canvas = new QVBoxLayout(canvas_);
+  over_canvas->addWidget(hint_);
+  hint_->setAttribute(Qt::WA_TransparentForMouseEvents);
+  build_docks();
+  build_workers();
+  connect_canvas();
+  build_actions();
+  message_ = new QLabel;
+  busy_ = new QProgressBar;
+  busy_->setRange(0, 0);
+  busy_->setMaximumWidth(140);
+  busy_->hide();
+  statusBar()->addWidget(message_, 1);
+  statusBar()->addPermanentWidget(busy_);
+  status_clock_.setInterval(status_ms);
+  connect(&status_clock_, &QTimer::timeout, this, [this] { show_status(); });
+  status_clock_.start();
+  for (const std::filesystem::path& input : start_.inputs) open(input);
+}
+
+Window::~Window() {
+  status_clock_.stop();
+  opening_.abandon();
+}
+
+QDockWidget* Window::dock(const QString& title, QWidget* content, Side side) {
+  auto* made = new QDockWidget(title, this);
+  made->setObjectName(title);
+  made->setWidget(content);
+  const Qt::DockWidgetArea area = side == Side::Left     ? Qt::LeftDockWidgetArea
+                                  : side == Side::Bottom ? Qt::BottomDockWidgetArea
+                                                         : Qt::RightDockWidgetArea;
+  addDockWidget(area, made);
+  docks_[content] = made;
+  return made;
+}
+
+void Window::build_docks() {
+  const auto failed = [this](const std::string& message) { fault(message); };
+  layers_ = new LayerPanel(view(), {.changed = [this] { canvas_->draw(); },
+                                    .selected = [this](auto& name) { explain(name); },
+                                    .failed = failed});
+  timeline_ =
+      new TimelinePanel({.went = [this](auto time) { go_to(time); },
+                         .asked = [this] { playback_->set_trail(timeline_->shows_trail()); }});
+  images_ = new ImagePanel({.camera_chosen = [this](auto& name) { playback_->set_camera(name); },
+                            .clicked = [this](glm::ivec2 pixel) { click_pixel(pixel); },
+                            .failed = failed});
+  scan_ = new ScanPanel({.take_place = [this] { canvas_->take_place(true); },
+                         .show =
+                             [this](Layer layer) {
+                               view().add(std::move(layer));
+                               changed();
+                             },
+                         .scanned = [this](ScanMade made) { take_scan(std::move(made)); },
+                         .failed = failed});
+  compare_ = new ComparePanel({.layer = [this](auto& name) { return view().find(name); },
+                               .compared = [this](const auto& all) { take_comparison(all); },
+                               .failed = failed});
+  setCorner(Qt::BottomLeftCorner, Qt::LeftDockWidgetArea);
+  setCorner(Qt::BottomRightCorner, Qt::RightDockWidgetArea);
+  dock("Layers", layers_, Side::Left);
+  QDockWidget* status = dock("Status", build_status(), Side::Left);
+  dock("Image", images_, Side::RightAbove)->hide();
+  QDockWidget* picked = dock("Picked", build_picked(), Side::Right);
+  QDockWidget* scan = dock("Scan here", scan_, Side::Right);
+  QDockWidget* compare = dock("Compare", compare_, Side::Right);
+  dock("Time", timeline_, Side::Bottom)->hide();
+  tabifyDockWidget(picked, scan);
+  tabifyDockWidget(scan, compare);
+  picked->raise();
+  resizeDocks({docks_[layers_], picked}, {290, 330}, Qt::Horizontal);
+  resizeDocks({docks_[layers_], status}, {520, 300}, Qt::Vertical);
+}
+
+QWidget* Window::build_status() {
+  auto* content = new QWidget;
+  follows_ = new QComboBox;
+  follows_->setObjectName("follows");
+  follows_->addItems({"the eye", "the platform", "a place (Ctrl + click)"});
+  follows_->setSizeAdjustPolicy(QComboBox::AdjustToMinimumContentsLengthWithIcon);
+  follows_->setMinimumContentsLength(10);
+  follows_->setToolTip("Whose place the terrain's quadtree and clipmap follow");
+  connect(follows_, qOverload<int>(&QComboBox::activated), this, [this](int index) {
+    tracker_->set_follows(static_cast<TerrainTracker::Follows>(index));
+  });
+  status_ = new FactTable;
+  auto* form = new QFormLayout;
+  form->addRow("Levels follow", follows_);
+  auto* layout = new QVBoxLayout(content);
+  layout->setContentsMargins(4, 4, 4, 4);
+  layout->addLayout(form);
+  layout->addWidget(status_);
+  return content;
+}
+
+QWidget* Window::build_picked() {
+  auto* content = new QWidget;
+  picked_title_ = new QLabel("Click an echo, a point or a triangle.");
+  picked_title_->setWordWrap(true);
+  picked_ = new FactTable;
+  auto* layout = new QVBoxLayout(content);
+  layout->setContentsMargins(4, 4, 4, 4);
+  layout->addWidget(picked_title_);
+  layout->addWidget(picked_);
+  return content;
+}
+
+void Window::connect_canvas() {
+  canvas_->set_hooks({.clicked = [this](auto at_px, auto keys) { click(at_px, keys); },
+                      .placed = [this](auto at_px, auto to_px) { take_place(at_px, to_px); },
+                      .moving = {},
+                      .rested =
+                          [this] {
+                            follow_eye();
+                            show_status();
+                          }});
+}
+
+void Window::build_workers() {
+  const auto failed = [this](const std::string& message) { fault(message); };
+  const auto redraw = [this] { changed(); };
+  tracker_ = std::make_unique<TerrainTracker>(view(), TerrainTracker::Hooks{.changed =
+                                                                                [this] {
+                                                                                  show_status();
+                                                                                  changed();
+                                                                                },
+                                                                            .failed = failed});
+  playback_ = std::make_unique<Playback>(
+      view(), Playback::Hooks{.changed = redraw,
+                              .image = [this](auto& source) { images_->show_image(source); },
+                              .no_image = [this] { images_->clear(); },
+                              .failed = failed});
+  picker_ = std::make_unique<Picker>(
+      view(),
+      Picker::Hooks{.changed = redraw,
+                    .told =
+                        [this](const std::string& title, const FactTable::Facts& facts) {
+                          picked_title_->setText(QString::fromStdString(title));
+                          picked_->show_facts(facts);
+                        },
+                    .beam = [this](auto& beam, auto& origin) { mark_in_image(beam, origin); },
+                    .failed = failed});
+}
+
+// The view holds something else: the tree shows it, and a picture is drawn.
+void Window::changed() {
+  std::vector<std::string> names;
+  for (const Layer* layer : view().layers()) names.push_back(layer->name);
+  if (layers_->names() != names) {
+    layers_->refresh();
+    offer_comparisons();
+  }
+  canvas_->draw();
+}
+
+void Window::show_status() {
+  FactTable::Facts facts;
+  if (const auto& built = tracker_->built()) {
+    facts.emplace_back("terrain's triangles", fmt::format("{}", built->triangles));
+    facts.emplace_back("quadtree's leaves", fmt::format("{}", built->leaves));
+    facts.emplace_back("clipmap's levels", fmt::format("{}", built->levels));
+    facts.emplace_back("terrain's memory",
+                       fmt::format("{:.1f} MiB", static_cast<double>(built->memory_bytes) / mib));
+    facts.emplace_back("rebuilt in", fmt::format("{:.0f} ms", built->rebuild_s * 1000));
+    facts.emplace_back("deviation kept", fmt::format("{:.3g} mrad", built->angle_rad * 1000));
+  }
+  std::size_t points = 0, triangles = 0;
+  for (const Layer* layer : view().layers()) {
+    if (!layer->visible) continue;
+    if (layer->kind == LayerKind::Cloud) points += layer->points();
+    triangles += layer->triangles();
+  }
+  facts.emplace_back("points shown", fmt::format("{}", points));
+  facts.emplace_back("triangles shown", fmt::format("{}", triangles));
+  if (const double rate = canvas_->frames_per_s(); rate > 0) {
+    facts.emplace_back("while moving", fmt::format("{:.0f} frames/s", rate));
+  }
+  const Look look = view().current_look();
+  facts.emplace_back("eye", fmt::format("{:.1f}, {:.1f}, {:.1f} m", look.from_w_m.x,
+                                        look.from_w_m.y, look.from_w_m.z));
+  facts.emplace_back("looks at", fmt::format("{:.1f}, {:.1f}, {:.1f} m", look.at_w_m.x,
+                                             look.at_w_m.y, look.at_w_m.z));
+  status_->show_facts(facts);
+}
+
+void Window::fault(const std::string& message) {
+  const QString text = QString::fromStdString(message);
+  for (const QMessageBox* shown : findChildren<QMessageBox*>("fault")) {
+    if (shown->text() == text && shown->isVisible()) return;
+  }
+  auto* box = new QMessageBox(QMessageBox::Warning, "groundray view", text, QMessageBox::Ok, this);
+  box->setObjectName("fault");
+  box->setAttribute(Qt::WA_DeleteOnClose);
+  box->setTextFormat(Qt::PlainText);
+  box->setTextInteractionFlags(Qt::TextSelectableByMouse);
+  box->open();
+}
+
+bool Window::is_busy() const {
+  return opening_.is_running() || !queue_.empty() || tracker_->is_busy() || playback_->is_busy() ||
+         picker_->is_busy() || images_->is_busy() || scan_->is_scanning() ||
+         compare_->is_comparing();
+}
+
+void Window::save_picture(const std::filesystem::path& path, glm::ivec2 size_px) {
+  canvas_->makeCurrent();
+  write_png(path, view().picture(size_px));
+  canvas_->draw();
+}
+
+}  // namespace groundray

@@ -1,0 +1,164 @@
+#pragma once
+
+#include <QMainWindow>
+#include <QTimer>
+#include <chrono>
+#include <deque>
+#include <filesystem>
+#include <map>
+#include <memory>
+#include <optional>
+#include <string>
+#include <vector>
+
+#include "apps/view/open.h"
+#include "apps/view/timeline.h"
+#include "apps/view/window/canvas.h"
+#include "apps/view/window/compare_panel.h"
+#include "apps/view/window/fact_table.h"
+#include "apps/view/window/image_panel.h"
+#include "apps/view/window/job.h"
+#include "apps/view/window/layer_panel.h"
+#include "apps/view/window/picker.h"
+#include "apps/view/window/playback.h"
+#include "apps/view/window/run_window.h"
+#include "apps/view/window/scan_panel.h"
+#include "apps/view/window/style.h"
+#include "apps/view/window/terrain_tracker.h"
+#include "apps/view/window/timeline_panel.h"
+
+class QComboBox;
+class QLabel;
+class QMenu;
+class QProgressBar;
+class QToolBar;
+
+namespace groundray {
+
+/// The viewer's window: what is open, as it looks, and what can be asked of it. Work that takes
+/// long is done off its thread.
+class Window : public QMainWindow {
+ public:
+  explicit Window(WindowStart start = {});
+  ~Window() override;
+
+  /// Opens one thing after the other; a fault is shown in a message box.
+  void open(const std::filesystem::path& path);
+  /// Closes everything.
+  void close_all();
+  /// Writes a picture of the view. @throws Error if it cannot be written.
+  void save_picture(const std::filesystem::path& path, glm::ivec2 size_px);
+  /// Shows a fault; one that is shown already is not shown twice.
+  void fault(const std::string& message);
+  /// Whether anything is being read or worked out.
+  bool is_busy() const;
+
+  Canvas& canvas() noexcept { return *canvas_; }
+  View& view() noexcept { return canvas_->view(); }
+  LayerPanel& layer_panel() noexcept { return *layers_; }
+  TimelinePanel& timeline_panel() noexcept { return *timeline_; }
+  ImagePanel& image_panel() noexcept { return *images_; }
+  ScanPanel& scan_panel() noexcept { return *scan_; }
+  ComparePanel& compare_panel() noexcept { return *compare_; }
+  const FactTable& status() const noexcept { return *status_; }
+  const FactTable& picked() const noexcept { return *picked_; }
+  TerrainTracker& tracker() noexcept { return *tracker_; }
+
+ protected:
+  void dragEnterEvent(QDragEnterEvent* event) override;
+  void dropEvent(QDropEvent* event) override;
+
+ private:
+  // What came of one input.
+  struct Document {
+    std::filesystem::path path;
+    InputKind kind = InputKind::Mesh;
+    std::string name;  // heads its layers' names
+    std::shared_ptr<TerrainFollower> follower;
+    std::string terrain;  // the layer that follows
+    std::shared_ptr<const World> world;
+    std::shared_ptr<const RecordedDataset> dataset;  // null of a scene
+    std::shared_ptr<const Timeline> timeline;
+  };
+  struct Loaded {
+    Opened opened;
+    std::shared_ptr<const Timeline> timeline;
+  };
+  enum class Side { Left, RightAbove, Right, Bottom };
+
+  // window.cpp
+  void build_docks();
+  QWidget* build_status();
+  QWidget* build_picked();
+  QDockWidget* dock(const QString& title, QWidget* content, Side side);
+  void connect_canvas();
+  void build_workers();
+  void changed();
+  void show_status();
+
+  // window_actions.cpp
+  void build_actions();
+  void build_file_actions(QMenu& menu, QToolBar& bar);
+  void build_view_actions(QMenu& menu, QToolBar& bar);
+  void build_tool_actions(QMenu& menu, QToolBar& bar);
+  QAction* action(QMenu& menu, QToolBar* bar, const QString& text, const QKeySequence& keys,
+                  std::optional<Sign> sign, std::function<void()> done);
+  void ask_to_open();
+  void ask_to_open_folder();
+  void ask_for_picture();
+  void look_along(const glm::dvec3& direction, const glm::dvec3& up);
+  void toggle_wireframe();
+  void close_selected();
+  void escape();
+
+  // window_open.cpp
+  void open_next();
+  void take(Loaded loaded);
+  std::string name_for(const std::filesystem::path& path) const;
+  void name_layers(std::vector<Layer>& layers, const std::string& document) const;
+  void first_look(const Opened& opened, const std::vector<std::string>& layers);
+  void use(const Document& document);
+  void show_images();
+  void forget(const std::string& document);
+  void offer_comparisons();
+  void show_documents();
+
+  // window_seen.cpp
+  void explain(const std::string& layer);
+  void click(glm::ivec2 at_px, Qt::KeyboardModifiers keys);
+  void follow_eye();
+  void put_viewpoint(const glm::dvec3& p_w_m);
+  void take_place(glm::ivec2 at_px, glm::ivec2 towards_px);
+  const ShownScan* scan_of(const std::string& layer) const;
+  void go_to(std::chrono::nanoseconds time);
+  void click_pixel(glm::ivec2 pixel);
+  void mark_in_image(const EchoBeam& beam, const glm::dvec3& origin_w_m);
+  void take_scan(ScanMade made);
+  void take_comparison(const Comparison& comparison);
+
+  WindowStart start_;
+  std::vector<Document> documents_;
+  std::map<std::string, ShownScan> scans_here_;  // by layer
+  std::deque<std::filesystem::path> queue_;
+  bool has_looked_ = false;
+  std::optional<glm::dvec3> rode_from_w_m_;
+
+  Canvas* canvas_ = nullptr;
+  LayerPanel* layers_ = nullptr;
+  FactTable *status_ = nullptr, *picked_ = nullptr;
+  QLabel *picked_title_ = nullptr, *hint_ = nullptr, *message_ = nullptr;
+  QComboBox* follows_ = nullptr;
+  QProgressBar* busy_ = nullptr;
+  TimelinePanel* timeline_ = nullptr;
+  ImagePanel* images_ = nullptr;
+  ScanPanel* scan_ = nullptr;
+  ComparePanel* compare_ = nullptr;
+  std::map<QWidget*, QDockWidget*> docks_;  // by content
+  QTimer status_clock_;
+  std::unique_ptr<TerrainTracker> tracker_;
+  std::unique_ptr<Playback> playback_;
+  std::unique_ptr<Picker> picker_;
+  Job opening_;
+};
+
+}  // namespace groundray

@@ -1,0 +1,234 @@
+#include <QAction>
+#include <QApplication>
+#include <QDialog>
+#include <QDialogButtonBox>
+#include <QDockWidget>
+#include <QFileDialog>
+#include <QFormLayout>
+#include <QMenuBar>
+#include <QSpinBox>
+#include <QToolBar>
+#include <glm/geometric.hpp>
+
+#include "apps/view/window/help.h"
+#include "apps/view/window/window.h"
+#include "core/error.h"
+
+namespace groundray {
+namespace {
+
+constexpr int largest_picture_px = 32768;
+
+const char* const open_filter =
+    "All that can be opened (*.yaml *.ply *.pcd *.las *.laz *.bin *.xyz *.csv *.npy *.npz *.obj "
+    "*.stl *.glb *.gltf *.tif *.tiff *.hgt *.asc *.vrt *.png *.jpg *.jpeg *.exr *.hdr);;"
+    "Any file (*)";
+
+// Asks for a picture's size; none if the user thinks better of it.
+std::optional<glm::ivec2> ask_for_size(QWidget* parent, QSize at_first) {
+  QDialog dialog(parent);
+  dialog.setWindowTitle("Size of the picture");
+  auto* width = new QSpinBox;
+  auto* height = new QSpinBox;
+  for (QSpinBox* box : {width, height}) {
+    box->setRange(16, largest_picture_px);
+    box->setSuffix(" px");
+  }
+  width->setValue(at_first.width());
+  height->setValue(at_first.height());
+  auto* buttons = new QDialogButtonBox(QDialogButtonBox::Ok | QDialogButtonBox::Cancel);
+  QObject::connect(buttons, &QDialogButtonBox::accepted, &dialog, &QDialog::accept);
+  QObject::connect(buttons, &QDialogButtonBox::rejected, &dialog, &QDialog::reject);
+  auto* form = new QFormLayout(&dialog);
+  form->addRow("Width", width);
+  form->addRow("Height", height);
+  form->addRow(buttons);
+  if (dialog.exec() != QDialog::Accepted) return std::nullopt;
+  return glm::ivec2(width->value(), height->value());
+}
+
+}  // namespace
+
+QAction* Window::action(QMenu& menu, QToolBar* bar, const QString& text, const QKeySequence& keys,
+                        std::optional<Sign> sign, std::function<void()> done) {
+  auto* made = new QAction(text, this);
+  made->setShortcut(keys);
+  made->setObjectName(text);
+  if (sign) made->setIcon(icon_of(*sign));
+  const QString named = QString(text).remove('&').remove("...");
+  made->setToolTip(keys.isEmpty() ? named : named + "  (" + keys.toString() + ")");
+  connect(made, &QAction::triggered, this, [this, done = std::move(done)] {
+    try {
+      if (done) done();
+    } catch (const std::exception& error) {
+      fault(error.what());
+    }
+  });
+  menu.addAction(made);
+  if (bar != nullptr) bar->addAction(made);
+  return made;
+}
+
+void Window::build_actions() {
+  QToolBar& bar = *addToolBar("Tools");
+  bar.setObjectName("tools");
+  bar.setIconSize({22, 22});
+  bar.setMovable(false);
+  build_file_actions(*menuBar()->addMenu("&File"), bar);
+  bar.addSeparator();
+  build_view_actions(*menuBar()->addMenu("&View"), bar);
+  bar.addSeparator();
+  build_tool_actions(*menuBar()->addMenu("&Tools"), bar);
+  QMenu& panels = *menuBar()->addMenu("&Panels");
+  for (QWidget* content :
+       std::initializer_list<QWidget*>{layers_, status_->parentWidget(), picked_->parentWidget(),
+                                       timeline_, images_, scan_, compare_}) {
+    panels.addAction(docks_.at(content)->toggleViewAction());
+  }
+  QMenu& help = *menuBar()->addMenu("&Help");
+  action(help, &bar, "Mouse and &keys", Qt::Key_F1, Sign::Help, [this] { show_help(this); });
+}
+
+void Window::build_file_actions(QMenu& menu, QToolBar& bar) {
+  action(menu, &bar, "&Open...", QKeySequence::Open, Sign::Open, [this] { ask_to_open(); });
+  action(menu, &bar, "Open a dataset's &folder...", QKeySequence("Ctrl+Shift+O"), Sign::OpenFolder,
+         [this] { ask_to_open_folder(); });
+  action(menu, &bar, "&Save a picture...", QKeySequence::Save, Sign::Save,
+         [this] { ask_for_picture(); });
+  menu.addSeparator();
+  action(menu, nullptr, "&Close the selected layer", Qt::Key_Delete, {},
+         [this] { close_selected(); });
+  action(menu, nullptr, "Close &all", QKeySequence("Ctrl+W"), {}, [this] { close_all(); });
+  menu.addSeparator();
+  action(menu, nullptr, "&Quit", QKeySequence("Ctrl+Q"), {}, [this] { close(); });
+}
+
+void Window::build_view_actions(QMenu& menu, QToolBar& bar) {
+  const auto fit = [this] {
+    view().fit();
+    canvas_->look(view().current_look());
+  };
+  action(menu, &bar, "See &all", Qt::Key_F, Sign::Fit, fit)
+      ->setShortcuts({Qt::Key_F, Qt::Key_Home});
+  action(menu, nullptr, "See the selected &layer", Qt::Key_Z, {}, [this] {
+    if (view().find(layers_->selected()) == nullptr) return;
+    view().fit(layers_->selected());
+    canvas_->look(view().current_look());
+  });
+  action(menu, &bar, "From a&bove", Qt::Key_1, Sign::Top, [this] {
+    look_along({0, 0, -1}, {0, 1, 0});
+  });
+  action(menu, &bar, "From the &south", Qt::Key_2, Sign::South, [this] {
+    look_along({0, 1, -0.05}, {0, 0, 1});
+  });
+  action(menu, &bar, "From the &east", Qt::Key_3, Sign::East, [this] {
+    look_along({-1, 0, -0.05}, {0, 0, 1});
+  });
+  action(menu, &bar, "Aslan&t", Qt::Key_4, Sign::Oblique, [this] {
+    look_along({0.6, 1, -0.8}, {0, 0, 1});
+  });
+  menu.addSeparator();
+  action(menu, &bar, "&Wireframe", Qt::Key_T, Sign::Wireframe, [this] { toggle_wireframe(); });
+  QAction* legend = action(menu, &bar, "&Legend", Qt::Key_L, Sign::Legend, {});
+  legend->setCheckable(true);
+  legend->setChecked(true);
+  connect(legend, &QAction::toggled, this, [this](bool on) {
+    view().set_legend_visible(on);
+    canvas_->draw();
+  });
+  action(menu, nullptr, "&Full screen", Qt::Key_F11, {},
+         [this] { setWindowState(windowState() ^ Qt::WindowFullScreen); });
+}
+
+void Window::build_tool_actions(QMenu& menu, QToolBar& bar) {
+  const auto show = [this](QWidget* panel) {
+    docks_.at(panel)->show();
+    docks_.at(panel)->raise();
+  };
+  action(menu, &bar, "Sca&n here", Qt::Key_N, Sign::Scan, [this, show] { show(scan_); });
+  action(menu, &bar, "&Compare with the truth", Qt::Key_C, Sign::Compare,
+         [this, show] { show(compare_); });
+  menu.addSeparator();
+  QAction* play = action(menu, nullptr, "&Play", Qt::Key_Space, {},
+                         [this] { timeline_->play(!timeline_->is_playing()); });
+  // Elsewhere the space bar presses what has the focus.
+  play->setShortcutContext(Qt::WidgetWithChildrenShortcut);
+  canvas_->addAction(play);
+  docks_.at(timeline_)->addAction(play);
+  action(menu, nullptr, "The &next frame", Qt::Key_Period, {},
+         [this] { timeline_->step_forward(); });
+  action(menu, nullptr, "The frame &before", Qt::Key_Comma, {}, [this] { timeline_->step_back(); });
+  menu.addSeparator();
+  action(menu, nullptr, "&Stop and take back", Qt::Key_Escape, {}, [this] { escape(); });
+}
+
+void Window::ask_to_open() {
+  for (const QString& name : QFileDialog::getOpenFileNames(this, "Open", {}, open_filter)) {
+    open(name.toStdString());
+  }
+}
+
+void Window::ask_to_open_folder() {
+  const QString name = QFileDialog::getExistingDirectory(this, "Open a dataset's folder");
+  if (!name.isEmpty()) open(name.toStdString());
+}
+
+void Window::ask_for_picture() {
+  const auto size_px = ask_for_size(this, canvas_->size());
+  if (!size_px) return;
+  const QString name =
+      QFileDialog::getSaveFileName(this, "Save a picture", "groundray.png", "PNG (*.png)");
+  if (!name.isEmpty()) save_picture(name.toStdString(), *size_px);
+}
+
+// All is seen from a side.
+void Window::look_along(const glm::dvec3& direction, const glm::dvec3& up) {
+  view().fit();
+  const Look fitted = view().current_look();
+  const double distance_m = glm::distance(fitted.from_w_m, fitted.at_w_m);
+  canvas_->look({fitted.at_w_m - distance_m * glm::normalize(direction), fitted.at_w_m, up});
+}
+
+void Window::toggle_wireframe() {
+  bool all = true;
+  std::vector<std::string> surfaces;
+  for (const Layer* layer : view().layers()) {
+    if (layer->triangles() == 0 || layer->kind == LayerKind::Picture) continue;
+    surfaces.push_back(layer->name);
+    all = all && layer->wireframe;
+  }
+  for (const std::string& name : surfaces) view().set_wireframe(name, !all);
+  layers_->refresh();
+  canvas_->draw();
+}
+
+void Window::close_selected() {
+  const std::string layer = layers_->selected();
+  if (view().find(layer) == nullptr) return;
+  view().remove(layer);
+  const std::string document = layer.substr(0, layer.find('/'));
+  bool has_more = false;
+  for (const Layer* each : view().layers()) {
+    has_more = has_more || each->name.substr(0, each->name.find('/')) == document;
+  }
+  if (!has_more) forget(document);
+  changed();
+}
+
+void Window::escape() {
+  if (canvas_->is_taking_place()) return canvas_->take_place(false);
+  if (scan_->is_scanning()) return scan_->cancel();
+  if (compare_->is_comparing()) return compare_->cancel();
+  if (opening_.is_running()) {
+    queue_.clear();
+    opening_.abandon();
+    show_documents();
+    return;
+  }
+  timeline_->play(false);
+  view().remove("picked/ray");
+  images_->mark(std::nullopt);
+  picker_->clear();
+}
+
+}  // namespace groundray

@@ -1,0 +1,251 @@
+#include <fmt/format.h>
+#include <fmt/ranges.h>
+
+#include <QDockWidget>
+#include <QDragEnterEvent>
+#include <QLabel>
+#include <QMimeData>
+#include <QProgressBar>
+#include <QStatusBar>
+#include <QUrl>
+#include <algorithm>
+#include <set>
+
+#include "apps/view/window/scene_run.h"
+#include "apps/view/window/window.h"
+
+namespace groundray {
+namespace {
+
+std::vector<std::string> camera_names(const Timeline& timeline) {
+  std::vector<std::string> names;
+  for (const RecordedSensor& sensor : timeline.sensors()) {
+    if (sensor.camera) names.push_back(sensor.name);
+  }
+  return names;
+}
+
+std::string document_of(const std::string& layer) { return layer.substr(0, layer.find('/')); }
+
+}  // namespace
+
+void Window::dragEnterEvent(QDragEnterEvent* event) {
+  if (event->mimeData()->hasUrls()) event->acceptProposedAction();
+}
+
+void Window::dropEvent(QDropEvent* event) {
+  for (const QUrl& url : event->mimeData()->urls()) {
+    if (url.isLocalFile()) open(url.toLocalFile().toStdString());
+  }
+  event->acceptProposedAction();
+}
+
+void Window::open(const std::filesystem::path& path) {
+  queue_.push_back(path);
+  if (!opening_.is_running()) open_next();
+}
+
+void Window::open_next() {
+  show_documents();
+  if (queue_.empty()) return;
+  const std::filesystem::path path = queue_.front();
+  queue_.pop_front();
+  const auto work = [path, limits = start_.limits](const auto&, const auto&) {
+    Loaded loaded{open_any(path, limits), nullptr};
+    if (loaded.opened.run != nullptr) {
+      loaded.timeline = std::make_shared<const Timeline>(*loaded.opened.run);
+    } else if (loaded.opened.world != nullptr) {
+      loaded.timeline = std::make_shared<const Timeline>(run_of(*loaded.opened.world));
+    }
+    return loaded;
+  };
+  opening_.start(work, [this](Loaded loaded) { take(std::move(loaded)); },
+                 {.failed = [this](const std::string& message) { fault(message); },
+                  .ended = [this] { open_next(); }});
+  busy_->show();
+  message_->setText(QString::fromStdString(fmt::format("opening {} ...", path.string())));
+}
+
+std::string Window::name_for(const std::filesystem::path& path) const {
+  const std::filesystem::path file =
+      path.filename().empty() ? path.parent_path().filename() : path.filename();
+  const auto is_taken = [&](const std::string& name) {
+    return std::ranges::find(documents_, name, &Document::name) != documents_.end();
+  };
+  std::string name = file.string();
+  std::ranges::replace(name, '/', '_');
+  for (int i = 2; is_taken(name); ++i) name = fmt::format("{} ({})", file.string(), i);
+  return name;
+}
+
+// A document's only layer has the document's name, others are under it.
+void Window::name_layers(std::vector<Layer>& layers, const std::string& document) const {
+  for (Layer& layer : layers) {
+    if (layer.kind == LayerKind::Terrain) layer.name = "terrain";
+    layer.name = layers.size() == 1 ? document : fmt::format("{}/{}", document, layer.name);
+    if (layer.find(start_.coloured_by) != nullptr) layer.coloured_by = start_.coloured_by;
+    layer.wireframe = layer.wireframe || (start_.wireframe && layer.triangles() > 0);
+  }
+}
+
+void Window::take(Loaded loaded) {
+  Opened& opened = loaded.opened;
+  const auto again = std::ranges::find(documents_, opened.path, &Document::path);
+  if (again != documents_.end()) forget(again->name);  // what is opened again is read anew
+  Document document{.path = opened.path,
+                    .kind = opened.kind,
+                    .name = name_for(opened.path),
+                    .follower = opened.follower,
+                    .terrain = "",
+                    .world = opened.world,
+                    .dataset = opened.dataset,
+                    .timeline = loaded.timeline};
+  name_layers(opened.layers, document.name);
+  std::vector<std::string> names;
+  for (Layer& layer : opened.layers) {
+    names.push_back(layer.name);
+    if (layer.kind == LayerKind::Terrain) document.terrain = layer.name;
+    view().add(std::move(layer));
+  }
+  documents_.push_back(document);
+  hint_->hide();
+  if (!opened.notes.empty()) {
+    statusBar()->showMessage(
+        QString::fromStdString(fmt::format("{}", fmt::join(opened.notes, "; "))), 15000);
+  }
+  changed();
+  first_look(opened, names);
+  use(document);
+  offer_comparisons();
+}
+
+void Window::first_look(const Opened& opened, const std::vector<std::string>& layers) {
+  if (has_looked_ && documents_.size() > 1) return;
+  has_looked_ = true;
+  if (start_.look) {
+    view().look(*start_.look);
+  } else if (opened.look) {
+    view().look(*opened.look);
+  } else {
+    view().fit();
+  }
+  if (!layers.empty()) layers_->select(layers.front());
+  canvas_->look(view().current_look());
+}
+
+// What came last is what is scanned, followed and played.
+void Window::use(const Document& document) {
+  if (document.world != nullptr) {
+    scan_->set_world(document.world);
+    playback_->set_world(document.world, document.name + "/");
+  }
+  if (document.follower != nullptr) {
+    tracker_->open(document.follower, document.terrain);
+    follow_eye();
+  }
+  // What was recorded is played rather than what a scene would do.
+  const bool is_recorded_elsewhere = document.dataset == nullptr && playback_->is_open() &&
+                                     playback_->recording().dataset != nullptr;
+  if (document.timeline != nullptr && !is_recorded_elsewhere) {
+    playback_->open({document.dataset, document.timeline, document.name + "/"});
+    const std::vector<std::string> cameras = camera_names(*document.timeline);
+    docks_.at(timeline_)->show();
+    const bool has_images = document.dataset != nullptr && !cameras.empty();
+    if (has_images) show_images();
+    images_->set_cameras(has_images ? cameras : std::vector<std::string>());
+    timeline_->show_timeline(document.timeline);
+  }
+  if (document.kind == InputKind::Picture) {
+    show_images();
+    images_->show_image({.title = document.name, .file = document.path, .is_frame = false});
+  }
+}
+
+void Window::show_images() {
+  QDockWidget* const images = docks_.at(images_);
+  images->show();
+  QList<QDockWidget*> docks{images};
+  QList<int> heights_px{height() * 45 / 100};
+  for (QDockWidget* tab :
+       {docks_.at(picked_->parentWidget()), docks_.at(scan_), docks_.at(compare_)}) {
+    docks << tab;
+    heights_px << height() * 45 / 100;
+  }
+  resizeDocks(docks, heights_px, Qt::Vertical);
+}
+
+// A document and all of its layers are gone.
+void Window::forget(const std::string& document) {
+  std::vector<std::string> layers;
+  for (const Layer* layer : view().layers()) {
+    if (document_of(layer->name) == document) layers.push_back(layer->name);
+  }
+  for (const std::string& layer : layers) view().remove(layer);
+  const auto found = std::ranges::find(documents_, document, &Document::name);
+  if (found == documents_.end()) return;
+  const Document gone = std::move(*found);
+  documents_.erase(found);
+  if (gone.follower != nullptr) tracker_->close();
+  if (gone.world != nullptr) {
+    scan_->set_world(nullptr);
+    playback_->set_world(nullptr, "");
+  }
+  if (gone.timeline != nullptr) {
+    timeline_->show_timeline(nullptr);
+    playback_->close();
+    images_->set_cameras({});
+    images_->clear();
+    docks_.at(timeline_)->hide();
+  }
+  for (const Document& each : documents_) {
+    if ((gone.follower != nullptr && each.follower != nullptr) ||
+        (gone.world != nullptr && each.world != nullptr) ||
+        (gone.timeline != nullptr && each.timeline != nullptr)) {
+      use(each);
+    }
+  }
+  show_documents();
+}
+
+void Window::close_all() {
+  queue_.clear();
+  opening_.abandon();
+  picker_->clear();
+  while (!documents_.empty()) forget(Document(documents_.back()).name);
+  std::vector<std::string> rest;
+  for (const Layer* layer : view().layers()) rest.push_back(layer->name);
+  for (const std::string& layer : rest) view().remove(layer);
+  scans_here_.clear();
+  has_looked_ = false;
+  hint_->show();
+  changed();
+  offer_comparisons();
+  show_documents();
+}
+
+void Window::offer_comparisons() {
+  std::vector<std::string> measured;
+  std::vector<Truth> truths;
+  for (const Document& document : documents_) {
+    if (document.world != nullptr) truths.push_back({"ground of " + document.name, document.world});
+    if (document.kind == InputKind::Dem) {
+      truths.push_back({"heights of " + document.name, Truth::DemFile{document.path}});
+    }
+  }
+  for (const Layer* layer : view().layers()) {
+    const bool is_surface = layer->kind == LayerKind::Mesh || layer->kind == LayerKind::Terrain;
+    if (is_surface || layer->kind == LayerKind::Cloud) measured.push_back(layer->name);
+    if (is_surface) truths.push_back({"surface of " + layer->name, *layer});
+  }
+  compare_->offer(measured, std::move(truths));
+}
+
+void Window::show_documents() {
+  QStringList names;
+  for (const Document& document : documents_) names << QString::fromStdString(document.name);
+  setWindowTitle(names.empty() ? "groundray view" : names.join(", ") + " - groundray view");
+  message_->setText(names.empty() ? "F1: mouse and keys" : names.join(", "));
+  busy_->hide();
+}
+
+}  // namespace groundray

@@ -1,0 +1,81 @@
+#include "terrain/band_file.h"
+
+#include <cmath>
+#include <cstdint>
+#include <limits>
+
+#include "terrain/dem_raster.h"
+
+namespace groundray {
+namespace {
+
+int step_for(glm::ivec2 samples, std::size_t most) {
+  int step = 1;
+  const auto count = [&] {
+    const glm::ivec2 kept = (samples - 1) / step + 1;
+    return static_cast<std::size_t>(kept.x) * static_cast<std::size_t>(kept.y);
+  };
+  while (count() > most) ++step;
+  return step;
+}
+
+// Reads one row of a band, and says which of its samples are hidden.
+void read_row(GDALRasterBand& band, int row, int columns, std::vector<double>& values,
+              std::vector<std::uint8_t>& mask) {
+  if (band.RasterIO(GF_Read, 0, row, columns, 1, values.data(), columns, 1, GDT_Float64, 0, 0,
+                    nullptr) != CE_None ||
+      band.GetMaskBand()->RasterIO(GF_Read, 0, row, columns, 1, mask.data(), columns, 1, GDT_Byte,
+                                   0, 0, nullptr) != CE_None)
+    throw Error("row {} of band {} cannot be read: {}", row, band.GetBand(), CPLGetLastErrorMsg());
+}
+
+RasterBands::Band read_band(GDALRasterBand& band, glm::ivec2 samples, int step) {
+  if (GDALDataTypeIsComplex(band.GetRasterDataType()) != 0)
+    throw Error("band {} holds complex numbers: take their real parts or magnitudes",
+                band.GetBand());
+  RasterBands::Band taken;
+  const std::string description = band.GetDescription();
+  taken.name = description.empty() ? fmt::format("band {}", band.GetBand()) : description;
+  taken.unit = band.GetUnitType();
+  const double scale = band.GetScale(), offset = band.GetOffset();
+  std::vector<double> values(static_cast<std::size_t>(samples.x));
+  std::vector<std::uint8_t> mask(values.size());
+  for (int row = 0; row < samples.y; row += step) {
+    read_row(band, row, samples.x, values, mask);
+    for (std::size_t i = 0; i < values.size(); i += static_cast<std::size_t>(step))
+      taken.values.push_back(mask[i] == 0 ? std::numeric_limits<float>::quiet_NaN()
+                                          : static_cast<float>(values[i] * scale + offset));
+  }
+  return taken;
+}
+
+}  // namespace
+
+RasterBands read_bands(const std::filesystem::path& path, std::size_t most_samples) {
+  return about(path, [&] {
+    const GDALDatasetUniquePtr dataset = open_raster(path);
+    const glm::ivec2 samples(dataset->GetRasterXSize(), dataset->GetRasterYSize());
+    RasterBands bands;
+    bands.step = step_for(samples, most_samples);
+    bands.samples = (samples - 1) / bands.step + 1;
+    for (int i = 1; i <= dataset->GetRasterCount(); ++i)
+      bands.bands.push_back(read_band(*dataset->GetRasterBand(i), samples, bands.step));
+    return bands;
+  });
+}
+
+RasterKind inspect_raster(const std::filesystem::path& path) {
+  return about(path, [&] {
+    const GDALDatasetUniquePtr dataset = open_raster(path);
+    RasterKind kind{.samples = {dataset->GetRasterXSize(), dataset->GetRasterYSize()},
+                    .bands = dataset->GetRasterCount()};
+    const OGRSpatialReference* const crs = dataset->GetSpatialRef();
+    kind.is_geographic = crs != nullptr && crs->IsGeographic() != 0;
+    kind.is_picture = kind.bands >= 3;
+    for (int i = 1; i <= std::min(kind.bands, 3); ++i)
+      kind.is_picture &= dataset->GetRasterBand(i)->GetRasterDataType() == GDT_Byte;
+    return kind;
+  });
+}
+
+}  // namespace groundray

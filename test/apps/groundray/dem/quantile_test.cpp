@@ -1,0 +1,38 @@
+#include "apps/groundray/dem/quantile.h"
+
+#include <gtest/gtest.h>
+
+#include <algorithm>
+#include <cmath>
+#include <numeric>
+#include <random>
+
+namespace groundray {
+namespace {
+
+// By counting: so many do not exceed it, and of the next smaller one too few are there.
+TEST(Quantile, IsTheSmallestThatAShareDoesNotExceed) {
+  std::mt19937 random(3);
+  for (int count = 1; count <= 400; ++count) {
+    std::vector<double> values(static_cast<std::size_t>(count));
+    std::iota(values.begin(), values.end(), 1);
+    std::ranges::shuffle(values, random);
+    for (const int percent : {5, 50, 95, 100}) {
+      const double found = quantile(values, 0.01 * percent);
+      EXPECT_GE(100 * std::lround(found), percent * count) << percent << " % of " << count;
+      EXPECT_LT(100 * (std::lround(found) - 1), percent * count) << percent << " % of " << count;
+    }
+  }
+  EXPECT_TRUE(std::isnan(quantile({}, 0.5)));
+}
+
+TEST(Quantile, OfAHalfMayLieBetweenTwo) {
+  EXPECT_EQ(median({3}), 3);
+  EXPECT_EQ(median({4, 1}), 2.5);
+  EXPECT_EQ(median({9, 1, 4}), 4);
+  EXPECT_EQ(median({9, 1, 4, 6}), 5);
+  EXPECT_TRUE(std::isnan(median({})));
+}
+
+}  // namespace
+}  // namespace groundray

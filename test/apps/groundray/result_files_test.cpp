@@ -1,0 +1,116 @@
+#include "apps/groundray/result_files.h"
+
+#include <gmock/gmock.h>
+#include <gtest/gtest.h>
+
+#include <algorithm>
+#include <fstream>
+#include <iterator>
+
+#include "core/error.h"
+#include "test/support/temporary_folder.h"
+
+namespace groundray {
+namespace {
+
+using groundray::testing::TemporaryFolder;
+using ::testing::AllOf;
+using ::testing::ElementsAre;
+using ::testing::HasSubstr;
+using ::testing::Not;
+namespace fs = std::filesystem;
+
+void put(const fs::path& path, const std::string& text) { std::ofstream(path) << text; }
+
+std::string text_of(const fs::path& path) {
+  std::ifstream file(path);
+  return {std::istreambuf_iterator<char>(file), {}};
+}
+
+std::vector<std::string> names_in(const fs::path& folder) {
+  std::vector<std::string> names;
+  for (const auto& entry : fs::directory_iterator(folder)) names.push_back(entry.path().filename());
+  std::ranges::sort(names);
+  return names;
+}
+
+TEST(ResultFiles, AppearTogether) {
+  const TemporaryFolder folder;
+  const fs::path a = folder.path() / "a.tif", b = folder.path() / "b.json";
+  put(b, "old");
+  {
+    ResultFiles files;
+    files.write(a, [](const fs::path& path) { put(path, "A"); });
+    files.write(b, [](const fs::path& path) { put(path, "B"); });
+    EXPECT_FALSE(fs::exists(a));
+    EXPECT_EQ(text_of(b), "old");
+    files.appear();
+  }
+  EXPECT_THAT(names_in(folder.path()), ElementsAre("a.tif", "b.json"));
+  EXPECT_EQ(text_of(a), "A");
+  EXPECT_EQ(text_of(b), "B");
+}
+
+TEST(ResultFiles, LeaveNothingUnlessTheyAppear) {
+  const TemporaryFolder folder;
+  const fs::path a = folder.path() / "a.tif";
+  const auto fail = [](const fs::path& path) { throw Error("{}: no space", path.string()); };
+  try {
+    ResultFiles files;
+    files.write(a, fail);
+    FAIL();
+  } catch (const Error& error) {
+    EXPECT_EQ(std::string(error.what()),
+              a.string() + ": no space");  // by the name that people know
+  }
+  EXPECT_THAT(names_in(folder.path()), ElementsAre());
+}
+
+// A folder stands where the third is to be: the first was new, the second wrote over another.
+TEST(ResultFiles, AreTakenBackIfOneCannotAppear) {
+  const TemporaryFolder folder;
+  const fs::path a = folder.path() / "a.tif", b = folder.path() / "b.json",
+                 c = folder.path() / "c.png";
+  put(b, "old");
+  {
+    ResultFiles files;
+    for (const fs::path& path : {a, b, c})
+      files.write(path, [](const fs::path& aside) { put(aside, "new"); });
+    fs::create_directory(c);
+    put(c / "full", "x");
+    try {
+      files.appear();
+      FAIL();
+    } catch (const Error& error) {
+      EXPECT_THAT(error.what(), AllOf(HasSubstr("c.png: cannot be written"),
+                                      Not(HasSubstr("written all the same"))));
+    }
+  }
+  EXPECT_THAT(names_in(folder.path()), ElementsAre("b.json", "c.png"));
+  EXPECT_EQ(text_of(b), "old");
+}
+
+TEST(ResultFiles, AreCheckedBeforeWork) {
+  const TemporaryFolder folder;
+  const fs::path a = folder.path() / "a.tif", b = folder.path() / "b.tif";
+  put(b, "old");
+  const auto fault_of = [](const std::vector<fs::path>& results,
+                           const std::vector<fs::path>& inputs) -> std::string {
+    try {
+      check_results(results, inputs);
+    } catch (const Error& error) {
+      return error.what();
+    }
+    return "none";
+  };
+  EXPECT_EQ(fault_of({a, b}, {}), "none");
+  EXPECT_THAT(fault_of({a, folder.path() / "." / "a.tif"}, {}), HasSubstr("one name"));
+  EXPECT_THAT(fault_of({a, b}, {b}), HasSubstr("it is read"));
+  EXPECT_THAT(fault_of({folder.path() / "no" / "a.tif"}, {}), HasSubstr("there is no folder"));
+  EXPECT_THAT(fault_of({folder.path()}, {}), HasSubstr("a folder"));
+  EXPECT_NO_THROW(check_ending("x.TIF", {".tif", ".tiff"}));
+  EXPECT_THROW(check_ending("x.png", {".tif", ".tiff"}), Error);
+}
+
+}  // namespace
+}  // namespace groundray

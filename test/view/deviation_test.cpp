@@ -1,0 +1,320 @@
+#include "apps/view/deviation.h"
+
+#include <gmock/gmock.h>
+#include <gtest/gtest.h>
+#include <tbb/global_control.h>
+
+#include <cmath>
+#include <glm/geometric.hpp>
+#include <numbers>
+#include <random>
+#include <stop_token>
+
+#include "apps/interruption.h"
+#include "core/error.h"
+#include "test/support/margin.h"
+#include "test/support/sample_terrain.h"
+
+namespace groundray {
+namespace {
+
+using ::testing::ElementsAre;
+using ::testing::HasSubstr;
+
+constexpr double nan = std::numeric_limits<double>::quiet_NaN();
+
+// A sphere of unit radius about the origin, in quarters of degrees of latitude and longitude.
+TriangleMesh sphere(std::uint32_t bands) {
+  TriangleMesh mesh;
+  const std::uint32_t columns = 2 * bands;
+  for (std::uint32_t i = 0; i <= bands; ++i) {
+    for (std::uint32_t k = 0; k < columns; ++k) {
+      const double polar = std::numbers::pi * i / bands, azimuth = std::numbers::pi * k / bands;
+      mesh.vertices_m.emplace_back(std::sin(polar) * std::cos(azimuth),
+                                   std::sin(polar) * std::sin(azimuth), std::cos(polar));
+    }
+  }
+  for (std::uint32_t i = 0; i < bands; ++i) {
+    for (std::uint32_t k = 0; k < columns; ++k) {
+      const std::uint32_t a = i * columns + k, b = i * columns + (k + 1) % columns;
+      if (i + 1 < bands) mesh.triangles.emplace_back(a, a + columns, b + columns);
+      if (i > 0) mesh.triangles.emplace_back(a, b + columns, b);
+    }
+  }
+  // The poles are one vertex each, as the others.
+  for (glm::uvec3& triangle : mesh.triangles) {
+    for (glm::length_t k = 0; k < 3; ++k) {
+      if (triangle[k] < columns) triangle[k] = 0;
+      if (triangle[k] >= bands * columns) triangle[k] = bands * columns;
+    }
+  }
+  return mesh;
+}
+
+// Each triangle with corners of its own, as in an STL.
+TriangleMesh soup_of(const TriangleMesh& mesh) {
+  TriangleMesh soup;
+  for (const glm::uvec3& triangle : mesh.triangles) {
+    const auto first = static_cast<std::uint32_t>(soup.vertices_m.size());
+    for (glm::length_t k = 0; k < 3; ++k) soup.vertices_m.push_back(mesh.vertices_m[triangle[k]]);
+    soup.triangles.emplace_back(first, first + 1, first + 2);
+  }
+  return soup;
+}
+
+// How often a closed mesh winds round a point: 1 inside, 0 outside. Van Oosterom and Strackee, The
+// solid angle of a plane triangle (1983).
+double winding(const TriangleMesh& mesh, const glm::dvec3& p) {
+  double sum = 0;
+  for (const glm::uvec3& triangle : mesh.triangles) {
+    const glm::dvec3 a = mesh.vertices_m[triangle.x] - p, b = mesh.vertices_m[triangle.y] - p,
+                     c = mesh.vertices_m[triangle.z] - p;
+    const double la = glm::length(a), lb = glm::length(b), lc = glm::length(c);
+    sum += 2 * std::atan2(
+                   glm::dot(a, glm::cross(b, c)),
+                   la * lb * lc + glm::dot(a, b) * lc + glm::dot(b, c) * la + glm::dot(c, a) * lb);
+  }
+  return sum / (4 * std::numbers::pi);
+}
+
+std::vector<glm::dvec3> random_places(std::size_t count, double size_m) {
+  std::mt19937_64 random(5);
+  std::uniform_real_distribution<double> uniform(-size_m, size_m);
+  std::vector<glm::dvec3> places_m(count);
+  for (glm::dvec3& p : places_m) p = {uniform(random), uniform(random), uniform(random)};
+  return places_m;
+}
+
+// The mesh lies within its sagitta inside of the sphere.
+TEST(Deviation, FromASphereIsTheDifferenceOfRadii) {
+  constexpr std::uint32_t bands = 60;
+  const TrueMesh truth(sphere(bands));
+  const double side_rad = std::numbers::pi / bands;
+  const double sagitta_m = 1 - std::cos(side_rad / 2) * std::cos(side_rad / 2);
+  double farthest_m = 0;
+  const auto places_m = random_places(20'000, 1.5);
+  const Deviation deviation = deviation_from_mesh(places_m, truth);
+  for (std::size_t i = 0; i < places_m.size(); ++i) {
+    const double off_m = deviation.signed_m[i] - (glm::length(places_m[i]) - 1);
+    EXPECT_GT(off_m, -1e-6);  // floats
+    EXPECT_LT(off_m, sagitta_m + 1e-6);
+    farthest_m = std::max(farthest_m, off_m);
+  }
+  groundray::testing::record_margin("deviation from a sphere of triangles, in sagittas",
+                                    farthest_m / sagitta_m, 1);
+  EXPECT_EQ(deviation.figures.count, places_m.size());
+  EXPECT_EQ(deviation.figures.beyond, 0U);
+}
+
+TEST(Deviation, FromASoupIsThatFromTheMesh) {
+  const TriangleMesh mesh = sphere(12);
+  const auto places_m = random_places(2'000, 1.5);
+  const Deviation whole = deviation_from_mesh(places_m, TrueMesh(mesh));
+  const Deviation soup = deviation_from_mesh(places_m, TrueMesh(soup_of(mesh)));
+  EXPECT_EQ(whole.signed_m, soup.signed_m);
+  EXPECT_EQ(whole.figures.beyond, 0U);
+}
+
+// What was found of the sides of a star's places.
+struct StarSides {
+  int inside = 0, wrong = 0;
+  int wrong_by_face = 0;  // if the normal of the nearest triangle alone told
+};
+
+// Asks about places in and round a star with sharp spikes and deep folds.
+StarSides look_at_star(std::uint64_t seed, std::size_t places) {
+  TriangleMesh star = sphere(8);
+  std::mt19937_64 random(seed);
+  std::uniform_real_distribution<double> uniform(0.2, 2);
+  for (glm::dvec3& p : star.vertices_m) p *= uniform(random);
+  const TrueMesh truth(star);
+  StarSides sides;
+  std::uint32_t near = 0;
+  for (const glm::dvec3& p : random_places(places, 2)) {
+    const double signed_m = truth.signed_distance_m(p, near);
+    if (std::abs(signed_m) < 1e-9) continue;
+    const bool is_inside = winding(star, p) > 0.5;
+    sides.inside += is_inside ? 1 : 0;
+    sides.wrong += (signed_m < 0) == is_inside ? 0 : 1;
+    const glm::uvec3& t = star.triangles[near];
+    const glm::dvec3& a = star.vertices_m[t.x];
+    const glm::dvec3 normal = glm::cross(star.vertices_m[t.y] - a, star.vertices_m[t.z] - a);
+    sides.wrong_by_face += (glm::dot(p - a, normal) < 0) == is_inside ? 0 : 1;
+  }
+  return sides;
+}
+
+TEST(Deviation, TellsInsideFromOutsideOfAStar) {
+  const StarSides sides = look_at_star(3, 5'000);
+  EXPECT_EQ(sides.wrong, 0);
+  EXPECT_GT(sides.inside, 200);
+  EXPECT_GT(sides.wrong_by_face, 10);  // the star is a trial
+}
+
+TEST(DeviationProof, TellsInsideFromOutsideOfManyStars) {
+  const std::size_t stars = groundray::testing::proof_size(4, 200);
+  for (std::uint64_t seed = 10; seed < 10 + stars; ++seed)
+    EXPECT_EQ(look_at_star(seed, 4'000).wrong, 0) << "star " << seed;
+}
+
+TEST(Deviation, IsNoneBesideTheBorder) {
+  const TrueMesh plate({.vertices_m = {{0, 0, 1}, {2, 0, 1}, {2, 2, 1}, {0, 2, 1}},
+                        .triangles = {{0, 1, 2}, {0, 2, 3}},
+                        .levels = {}});
+  std::uint32_t near = 0;
+  EXPECT_DOUBLE_EQ(plate.signed_distance_m({1, 1, 3}, near), 2);
+  EXPECT_DOUBLE_EQ(plate.signed_distance_m({1, 1, 0.5}, near), -0.5);
+  EXPECT_DOUBLE_EQ(plate.signed_distance_m({0, 0, 1.25}, near), 0.25);
+  EXPECT_NEAR(plate.signed_distance_m({-0.1, 1, 1.5}, near), std::hypot(0.1, 0.5), 1e-15);
+  EXPECT_NEAR(plate.signed_distance_m({2.1, 2.1, 0.5}, near), -std::sqrt(0.27), 1e-15);
+  EXPECT_TRUE(std::isnan(plate.signed_distance_m({-0.5, 1, 1.4}, near)));
+  EXPECT_TRUE(std::isnan(plate.signed_distance_m({3, 3, 1}, near)));
+  EXPECT_TRUE(std::isnan(plate.signed_distance_m({nan, 0, 0}, near)));
+}
+
+// The plane z = x / 2 - y / 4 + 3; distances across it are those up times the normal's z.
+TEST(Deviation, FromATiltedPlaneHasAClosedForm) {
+  const auto height_m = [](double x, double y) { return x / 2 - y / 4 + 3; };
+  std::vector<float> heights_m;
+  for (int row = 0; row < 9; ++row) {
+    for (int column = 0; column < 9; ++column)
+      heights_m.push_back(static_cast<float>(height_m(column, 8 - row)));
+  }
+  const HeightGrid grid({9, 9}, {0, 8}, {1, -1}, heights_m);
+  const TrueMesh mesh({.vertices_m = {{0, 0, height_m(0, 0)},
+                                      {8, 0, height_m(8, 0)},
+                                      {8, 8, height_m(8, 8)},
+                                      {0, 8, height_m(0, 8)}},
+                       .triangles = {{0, 1, 2}, {0, 2, 3}},
+                       .levels = {}});
+  const double normal_z = 1 / std::sqrt(1 + 0.25 + 0.0625);
+  const glm::dvec3 shift_m(100, 200, 7);  // from the places' D to the truth's
+  std::vector<glm::dvec3> places_m;
+  std::vector<double> above_m;
+  for (const glm::dvec3& random : random_places(1'000, 1)) {
+    const glm::dvec2 at = 4.0 + 2.0 * glm::dvec2(random);
+    above_m.push_back(random.z / 2);
+    places_m.push_back(glm::dvec3(at, height_m(at.x, at.y) + above_m.back()) - shift_m);
+  }
+  const Deviation up = deviation_from_ground(places_m, grid, shift_m);
+  const Deviation across = deviation_from_mesh(places_m, mesh, shift_m);
+  double sum_m = 0, sum2_m2 = 0, worst_m = 0;
+  for (std::size_t i = 0; i < places_m.size(); ++i) {
+    EXPECT_NEAR(up.signed_m[i], above_m[i], 1e-7);
+    EXPECT_NEAR(across.signed_m[i], above_m[i] * normal_z, 1e-7);
+    worst_m = std::max(worst_m, std::abs(across.signed_m[i] - above_m[i] * normal_z));
+    sum_m += above_m[i];
+    sum2_m2 += above_m[i] * above_m[i];
+  }
+  groundray::testing::record_margin("deviation from a plane", worst_m, 1e-7, "m");
+  EXPECT_NEAR(up.figures.mean_m, sum_m / 1000, 1e-8);
+  EXPECT_NEAR(up.figures.rms_m, std::sqrt(sum2_m2 / 1000), 1e-8);
+  EXPECT_NEAR(across.figures.rms_m, normal_z * up.figures.rms_m, 1e-7);
+}
+
+TEST(Deviation, OfADemFromItselfIsZeroButForHoles) {
+  std::vector<float> heights_m(30, 2);
+  heights_m[7] = static_cast<float>(nan);
+  const HeightGrid grid({6, 5}, {10, 20}, {2, -2}, heights_m);
+  const auto places_m = sample_places_m(grid);
+  ASSERT_EQ(places_m.size(), 30U);
+  EXPECT_EQ(places_m[8], glm::dvec3(14, 18, 2));
+  const Deviation deviation = deviation_from_ground(places_m, grid);
+  EXPECT_TRUE(std::isnan(deviation.signed_m[7]));
+  EXPECT_EQ(deviation.signed_m[29], 0);
+  EXPECT_EQ(deviation.figures.largest_m, 0);
+  EXPECT_GE(deviation.figures.beyond, 1U);
+}
+
+// By hand: of -1, 0, 1, 2, 10 the median is 1, and the distances to it are 2, 1, 0, 1, 9.
+TEST(Deviation, HasTheUsualFigures) {
+  const auto nothing = static_cast<float>(nan);
+  const DeviationFigures figures = figures_of({10, nothing, -1, 1, 0, 2, nothing});
+  EXPECT_EQ(figures.count, 5U);
+  EXPECT_EQ(figures.beyond, 2U);
+  EXPECT_DOUBLE_EQ(figures.mean_m, 12 / 5.0);
+  EXPECT_DOUBLE_EQ(figures.rms_m, std::sqrt(106 / 5.0));
+  EXPECT_DOUBLE_EQ(figures.median_m, 1);
+  EXPECT_DOUBLE_EQ(figures.nmad_m, 1.4826);
+  EXPECT_DOUBLE_EQ(figures.p95_m, 2);  // rank 0.95 * 4, rounded down
+  EXPECT_DOUBLE_EQ(figures.largest_m, 10);
+  EXPECT_DOUBLE_EQ(figures.low_m, -1);
+  EXPECT_DOUBLE_EQ(figures.high_m, 10);
+  EXPECT_THAT(figure_lines(figures), ::testing::Contains("2 places beyond the truth"));
+  const DeviationFigures none = figures_of({nothing});
+  EXPECT_EQ(none.count, 0U);
+  EXPECT_TRUE(std::isnan(none.mean_m));
+  EXPECT_TRUE(std::isnan(none.p95_m));
+  EXPECT_THAT(figure_lines(none)[1], HasSubstr("none"));
+}
+
+TEST(Deviation, IsCountedInBins) {
+  const std::vector<float> values{-2, -1, -0.5F, 0, 0.5F, 1, 3, static_cast<float>(nan)};
+  const DeviationHistogram histogram = histogram_of(values, 4, std::pair(-1.0, 1.0));
+  EXPECT_THAT(histogram.counts, ElementsAre(1, 1, 1, 2));
+  EXPECT_EQ(histogram.below, 1U);
+  EXPECT_EQ(histogram.above, 1U);
+  const DeviationHistogram all = histogram_of(values, 10);
+  EXPECT_LE(all.low_m, 0);
+  EXPECT_GE(all.high_m, 0);
+  std::size_t counted = all.below + all.above;
+  for (const std::size_t count : all.counts) counted += count;
+  EXPECT_EQ(counted, 7U);
+  EXPECT_EQ(histogram_of({}, 3).counts.size(), 3U);
+  EXPECT_THROW(histogram_of(values, 0), Error);
+  EXPECT_THROW(histogram_of(values, 3, std::pair(1.0, -1.0)), Error);
+}
+
+TEST(Deviation, IsTheSameForAnyNumberOfThreads) {
+  const TrueMesh truth(sphere(20));
+  const auto places_m = random_places(100'000, 2);
+  const Deviation many = deviation_from_mesh(places_m, truth);
+  const tbb::global_control one(tbb::global_control::max_allowed_parallelism, 1);
+  EXPECT_EQ(deviation_from_mesh(places_m, truth).signed_m, many.signed_m);
+}
+
+TEST(Deviation, TellsHowFarItIsAndStops) {
+  const TrueMesh truth(sphere(6));
+  const auto places_m = random_places(150'000, 2);
+  std::vector<double> shares;
+  deviation_from_mesh(places_m, truth, glm::dvec3(0), {},
+                      [&](double share) { shares.push_back(share); });
+  EXPECT_TRUE(std::ranges::is_sorted(shares));
+  EXPECT_EQ(shares.size(), 4U);
+  EXPECT_EQ(shares.back(), 1);
+  std::stop_source stop;
+  std::size_t told = 0;
+  EXPECT_THROW(deviation_from_mesh(places_m, truth, glm::dvec3(0), stop.get_token(),
+                                   [&](double) {
+                                     if (++told == 2) stop.request_stop();
+                                   }),
+               Interrupted);
+  EXPECT_EQ(told, 2U);
+}
+
+TEST(Deviation, RefusesOrBearsBadMeshes) {
+  EXPECT_THROW(TrueMesh(TriangleMesh{}), Error);
+  EXPECT_THROW(
+      TrueMesh({.vertices_m = {{0, 0, nan}, {1, 0, 0}, {0, 1, 0}}, .triangles = {{0, 1, 2}}}),
+      Error);
+  // Three triangles on one side, one of them without area, and one face twice, back to back.
+  const TrueMesh wild({.vertices_m = {{0, 0, 0}, {1, 0, 0}, {0, 1, 0}, {0, 0, 1}, {0.5, 0, 0}},
+                       .triangles = {{0, 1, 2}, {0, 2, 1}, {1, 0, 3}, {0, 1, 4}},
+                       .levels = {}});
+  const auto places_m = random_places(1'000, 2);
+  const Deviation deviation = deviation_from_mesh(places_m, wild);
+  EXPECT_EQ(deviation.figures.count + deviation.figures.beyond, places_m.size());
+  EXPECT_EQ(deviation_from_mesh({}, wild).figures.count, 0U);
+}
+
+TEST(Deviation, SaysHowMuchAgrees) {
+  const TriangleMesh plate{.vertices_m = {{0, 0, 0}, {1, 0, 0}, {1, 1, 0}, {0, 1, 0}},
+                           .triangles = {{0, 1, 2}, {0, 2, 3}},
+                           .levels = {}};
+  const std::vector<double> tolerances_m{0.01};
+  EXPECT_THAT(agreement_lines(agreement(plate, plate, tolerances_m)),
+              ElementsAre("within 0.01 m: precision 100.00 %, completeness 100.00 %, F1 100.00 %"));
+}
+
+}  // namespace
+}  // namespace groundray

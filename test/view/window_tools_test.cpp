@@ -1,0 +1,366 @@
+#include <QCheckBox>
+#include <QComboBox>
+#include <QLabel>
+#include <QPushButton>
+#include <QSlider>
+#include <cmath>
+#include <glm/geometric.hpp>
+
+#include "apps/view/window/picture_area.h"
+#include "apps/view/window/window.h"
+#include "core/mesh_io.h"
+#include "core/ply_io.h"
+#include "test/view/sample_dataset.h"
+#include "test/view/window_fixture.h"
+
+namespace groundray {
+namespace {
+
+using testing::SampleDataset;
+using testing::TemporaryFolder;
+using testing::wait_until;
+
+// The sample scene's ground, as write_hills has it; between samples 1 m apart, heights are off by
+// what triangles make of a wave: its second derivative over 8, 0.004 m.
+double hill_m(double x, double y) {
+  constexpr double last_row_m = 160.5;  // from the corner: samples stand in the middle of cells
+  return 50 + 2 * std::sin((x - 0.5) * 0.08) + 1.5 * std::cos((last_row_m - y) * 0.11);
+}
+
+double metres(const std::string& text) { return std::stod(text); }
+
+struct Rows {
+  std::string text;
+  std::size_t number() const { return std::stoul(text.substr(text.find_last_of(' '))); }
+};
+
+class WindowToolsTest : public testing::WindowTest {
+ protected:
+  QLabel* picked_title() {
+    return const_cast<FactTable&>(window_->picked()).parentWidget()->findChild<QLabel*>();
+  }
+
+  // Clicks into the view until something of a layer is picked.
+  bool pick_in(const std::string& layer) {
+    Canvas& canvas = window_->canvas();
+    for (int y = 20; y < canvas.height() - 20; y += 9) {
+      for (int x = 20; x < canvas.width() - 20; x += 9) {
+        const auto picked = window_->view().pick(x, y);
+        if (!picked || picked->layer != layer) continue;
+        QTest::mouseClick(&canvas, Qt::LeftButton, Qt::NoModifier, {x, y});
+        settle();
+        return true;
+      }
+    }
+    return false;
+  }
+};
+
+TEST_F(WindowToolsTest, PickingAnEchoShowsItsColumnsBeamAndFootprint) {
+  Window& window = shown();
+  open(SampleDataset::get().path());
+  ASSERT_TRUE(pick_in("dataset/lidar/top"));
+  EXPECT_EQ(dismiss_fault(), "");
+  const std::size_t row = Rows{picked_title()->text().toStdString()}.number();
+  // What the file has in that row, read without the window.
+  const PointCloud scan = read_ply(SampleDataset::get().path() / "lidar/top/000000.ply").cloud;
+  ASSERT_LT(row, scan.rows());
+  for (const PointCloud::Column& column : scan.columns()) {
+    EXPECT_NE(window.picked().value(column.name), "") << column.name;
+  }
+  EXPECT_EQ(std::stoi(window.picked().value("ring")), scan.column<std::uint16_t>("ring")[row]);
+  const glm::dvec3 shown_m(metres(window.picked().value("east")),
+                           metres(window.picked().value("north")),
+                           metres(window.picked().value("up")));
+  const glm::dvec3 true_m =
+      window.timeline_panel().timeline()->georeference().origin_w_m +
+      glm::dvec3(scan.column<double>("world_x")[row], scan.column<double>("world_y")[row],
+                 scan.column<double>("world_z")[row]);
+  constexpr double noise_m = 0.02;  // of the ranges, as the scene says
+  EXPECT_LT(glm::distance(shown_m, true_m), 6 * noise_m);
+  for (const char* layer : {"picked/beam", "picked/footprint", "picked/place"}) {
+    EXPECT_NE(window.view().find(layer), nullptr) << layer;
+  }
+  // The beam ends at the echo.
+  const Layer& beam = *window.view().find("picked/beam");
+  EXPECT_LT(glm::distance(beam.p_w_m(1), shown_m), 0.002);
+  QTest::keyClick(&window, Qt::Key_Escape);
+  EXPECT_EQ(window.view().find("picked/beam"), nullptr);
+}
+
+TEST_F(WindowToolsTest, PickingASurfaceTellsItsNumbers) {
+  Window& window = shown();
+  open(SampleDataset::get().scene());
+  ASSERT_TRUE(pick_in("scene.yaml/terrain"));
+  const double x = metres(window.picked().value("east")),
+               y = metres(window.picked().value("north"));
+  EXPECT_NEAR(metres(window.picked().value("up")), hill_m(x, y), 0.05);
+  EXPECT_NE(window.picked().value("slope"), "");
+}
+
+TEST_F(WindowToolsTest, TimelineShowsTheScansOfItsTime) {
+  Window& window = shown();
+  open(SampleDataset::get().path());
+  TimelinePanel& panel = window.timeline_panel();
+  const Timeline& timeline = *panel.timeline();
+  auto* slider = panel.findChild<QSlider*>("time");
+  const auto rows_shown = [&] { return window.view().find("dataset/lidar/top")->points(); };
+  const auto rows_of = [&](std::chrono::nanoseconds time) {
+    const std::size_t top = timeline.sensor_named("top");
+    const RecordedFrame& frame = timeline.sensors()[top].frames[*timeline.current(top, time)];
+    return read_ply(frame.file).cloud.rows();
+  };
+  for (const int place : {slider->maximum(), slider->maximum() / 2, 0}) {
+    slider->setValue(place);
+    settle();
+    EXPECT_EQ(dismiss_fault(), "");
+    EXPECT_EQ(rows_shown(), rows_of(panel.time())) << place;
+  }
+  // Steps go through the stamps.
+  QTest::keyClick(&window, Qt::Key_Period);
+  settle();
+  const auto second = panel.time();
+  EXPECT_EQ(second, *timeline.next(timeline.begin()));
+  QTest::keyClick(&window, Qt::Key_Comma);
+  settle();
+  EXPECT_EQ(panel.time(), timeline.begin());
+  // Playing ends at the end.
+  QTest::mouseClick(panel.findChild<QWidget*>("play"), Qt::LeftButton);
+  EXPECT_TRUE(panel.is_playing());
+  EXPECT_TRUE(wait_until([&] { return !panel.is_playing(); }, 10'000));
+  settle();
+  EXPECT_EQ(panel.time(), timeline.end());
+  EXPECT_EQ(rows_shown(), rows_of(timeline.end()));
+  EXPECT_GT(window.view().find("dataset/trail")->points(), 2U);
+}
+
+TEST_F(WindowToolsTest, WhatMovesIsWhereItIsAtTheTime) {
+  Window& window = shown();
+  open(SampleDataset::get().path());
+  open(SampleDataset::get().scene());
+  const auto middle_y_m = [&] {
+    const Layer& cart = *window.view().find("scene.yaml/objects/cart");
+    double least = 1e9, most = -1e9;
+    for (vtkIdType i = 0; i < static_cast<vtkIdType>(cart.points()); ++i) {
+      least = std::min(least, cart.p_w_m(i).y);
+      most = std::max(most, cart.p_w_m(i).y);
+    }
+    return (least + most) / 2;
+  };
+  TimelinePanel& panel = window.timeline_panel();
+  panel.go_to(std::chrono::milliseconds(50));
+  settle();
+  const double before_m = middle_y_m();
+  panel.findChild<QCheckBox*>("rides")->setChecked(true);
+  settle();
+  const Look look = window.view().current_look();
+  const Timeline& timeline = *panel.timeline();
+  const glm::dvec3 platform_m = timeline.pose_at(0, panel.time()).translation_m;
+  panel.go_to(std::chrono::milliseconds(450));
+  settle();
+  // It drives north at 8 m/s along the slope, and leans as the ground does: 0.2 rad at most.
+  EXPECT_NEAR(middle_y_m() - before_m, 8 * 0.4, 0.25);
+  const glm::dvec3 ridden_m = window.view().current_look().from_w_m - look.from_w_m;
+  const glm::dvec3 driven_m = timeline.pose_at(0, panel.time()).translation_m - platform_m;
+  EXPECT_LT(glm::distance(ridden_m, driven_m), 1e-6);
+  EXPECT_GT(glm::length(driven_m), 1);
+}
+
+TEST_F(WindowToolsTest, AClickedPixelShowsItsRayAndTheSurface) {
+  Window& window = shown();
+  open(SampleDataset::get().path());
+  window.timeline_panel().go_to(window.timeline_panel().timeline()->end());
+  settle();
+  ImagePanel& panel = window.image_panel();
+  ASSERT_NE(panel.image(), nullptr);
+  auto* channel = panel.findChild<QComboBox*>("channel");
+  EXPECT_GT(channel->count(), 5);
+  for (int i = 0; i < channel->count(); ++i) {
+    channel->setCurrentIndex(i);
+    EXPECT_TRUE(wait_until([&] { return !panel.is_busy(); }));
+  }
+  const auto label = panel.image()->find("label");
+  ASSERT_TRUE(label);
+  int of_ground = 0;
+  for (const glm::ivec2 pixel : {glm::ivec2(31, 40), glm::ivec2(10, 44), glm::ivec2(55, 36)}) {
+    constexpr double ground = 3;  // as the scene's terrain says
+    if (panel.image()->numbers_at(*label, pixel).front() != ground) continue;
+    ++of_ground;
+    const QPoint place = panel.area().place_of(pixel).toPoint();
+    QTest::mouseClick(&panel.area(), Qt::LeftButton, Qt::NoModifier, place);
+    ASSERT_NE(window.view().find("picked/ray"), nullptr);
+    const glm::dvec3 p = window.view().find("picked/ray")->p_w_m(1);
+    EXPECT_NEAR(p.z, hill_m(p.x, p.y), 0.05) << pixel.x << ' ' << pixel.y;
+    EXPECT_NE(window.picked().value("surface"), "");
+  }
+  EXPECT_GT(of_ground, 0);
+}
+
+TEST_F(WindowToolsTest, ScansFromWhereTheMousePutsTheSensor) {
+  Window& window = shown();
+  open(SampleDataset::get().scene());
+  ScanPanel& panel = window.scan_panel();
+  panel.choose("velodyne_vlp16");
+  QTest::mouseClick(panel.findChild<QPushButton*>("place"), Qt::LeftButton);
+  ASSERT_TRUE(window.canvas().is_taking_place());
+  const QPoint middle(window.canvas().width() / 2, window.canvas().height() / 2);
+  const auto ground = window.view().pick(middle.x(), middle.y() + 60);
+  ASSERT_TRUE(ground);
+  QTest::mousePress(&window.canvas(), Qt::LeftButton, {}, middle + QPoint(0, 60));
+  QTest::mouseRelease(&window.canvas(), Qt::LeftButton, {}, middle + QPoint(0, 20));
+  ASSERT_TRUE(panel.has_place());
+  const Layer& place = *window.view().find("scan here/place");
+  EXPECT_NEAR(place.p_w_m(0).x, ground->p_w_m.x, 1e-3);
+  EXPECT_NEAR(place.p_w_m(0).z, hill_m(ground->p_w_m.x, ground->p_w_m.y) + 1.8, 0.05);
+  QTest::mouseClick(panel.findChild<QPushButton*>("scan"), Qt::LeftButton);
+  EXPECT_TRUE(panel.is_scanning());
+  settle();
+  EXPECT_EQ(dismiss_fault(), "");
+  const Layer* scan = window.view().find("scan here/1 velodyne_vlp16");
+  ASSERT_NE(scan, nullptr);
+  ASSERT_GT(scan->points(), 1000U);
+  // Most of it is ground; the sensor's range noise is 0.03 m at most.
+  std::size_t on_ground = 0;
+  for (vtkIdType i = 0; i < static_cast<vtkIdType>(scan->points()); ++i) {
+    const glm::dvec3 p = scan->p_w_m(i);
+    on_ground += std::abs(p.z - hill_m(p.x, p.y)) < 0.15 ? 1U : 0U;
+  }
+  EXPECT_GT(static_cast<double>(on_ground), 0.9 * static_cast<double>(scan->points()));
+  // Its echoes have beams, too.
+  window.view().fit("scan here/1 velodyne_vlp16");
+  ASSERT_TRUE(pick_in("scan here/1 velodyne_vlp16"));
+  EXPECT_NE(window.view().find("picked/beam"), nullptr);
+}
+
+TEST_F(WindowToolsTest, AScanCanBeCancelled) {
+  Window& window = shown();
+  open(SampleDataset::get().scene());
+  ScanPanel& panel = window.scan_panel();
+  panel.choose("ouster_os1_128");
+  panel.put_down({80, 80, 50}, {90, 80, 50});
+  const std::size_t layers = window.view().layers().size();
+  QTest::mouseClick(panel.findChild<QPushButton*>("scan"), Qt::LeftButton);
+  ASSERT_TRUE(panel.is_scanning());
+  auto* cancel = panel.findChild<QPushButton*>("cancel");
+  EXPECT_TRUE(cancel->isEnabled());
+  QTest::mouseClick(cancel, Qt::LeftButton);
+  EXPECT_TRUE(wait_until([&] { return !panel.is_scanning(); }));
+  EXPECT_EQ(panel.findChild<QLabel*>("scan_status")->text(), "cancelled");
+  EXPECT_EQ(window.view().layers().size(), layers);
+  EXPECT_TRUE(panel.findChild<QPushButton*>("scan")->isEnabled());
+}
+
+TEST_F(WindowToolsTest, TheWindowGoesOnWhileItWorks) {
+  Window& window = shown();
+  window.open(SampleDataset::get().scene());
+  // The thread of the window is never held up for long: its clock goes on ticking.
+  QElapsedTimer clock;
+  clock.start();
+  qint64 longest_ms = 0, last_ms = 0;
+  while (window.is_busy() && clock.elapsed() < 60'000) {
+    QCoreApplication::processEvents(QEventLoop::AllEvents, 5);
+    longest_ms = std::max(longest_ms, clock.elapsed() - last_ms);
+    last_ms = clock.elapsed();
+  }
+  // A picture of the scene by a software renderer takes less than this, on a busy machine, too.
+  EXPECT_LT(longest_ms, 1500);
+  settle();
+}
+
+TEST_F(WindowToolsTest, ComparesWithTheTruth) {
+  Window& window = shown();
+  const TemporaryFolder folder;
+  constexpr double offset_m = 0.25;
+  TriangleMesh truth, raised;
+  constexpr unsigned side = 11;
+  for (unsigned i = 0; i < side * side; ++i) {
+    truth.vertices_m.emplace_back(i % side, i / side, 0);
+    // Half of it above, the rest below, so that the mean is not the whole story.
+    raised.vertices_m.emplace_back(i % side, i / side, i % 2 == 0 ? offset_m : -offset_m);
+  }
+  for (unsigned row = 0; row + 1 < side; ++row) {
+    for (unsigned column = 0; column + 1 < side; ++column) {
+      const unsigned a = row * side + column, b = a + 1, c = a + side, d = c + 1;
+      for (TriangleMesh* mesh : {&truth, &raised}) {
+        mesh->triangles.emplace_back(a, b, d);
+        mesh->triangles.emplace_back(a, d, c);
+      }
+    }
+  }
+  write_ply(folder / "truth.ply", truth, {});
+  write_ply(folder / "raised.ply", raised, {});
+  open(folder / "truth.ply");
+  open(folder / "raised.ply");
+  ComparePanel& panel = window.compare_panel();
+  panel.choose("raised.ply", "surface of truth.ply");
+  QTest::keyClick(&window, Qt::Key_C);
+  QTest::mouseClick(panel.findChild<QPushButton*>("compare"), Qt::LeftButton);
+  settle();
+  EXPECT_EQ(dismiss_fault(), "");
+  // 61 of the 121 vertices are above, 60 below; no metre is rounded in floats of 1/4.
+  EXPECT_EQ(panel.figures().value("points"), "121");
+  EXPECT_NEAR(metres(panel.figures().value("mean")), offset_m / 121, 1e-5);
+  EXPECT_NEAR(metres(panel.figures().value("RMS")), offset_m, 1e-5);
+  EXPECT_NEAR(metres(panel.figures().value("largest")), offset_m, 1e-5);
+  const Layer& layer = *window.view().find("raised.ply");
+  EXPECT_EQ(layer.coloured_by, "deviation");
+  const LayerColumn* column = layer.find("deviation");
+  ASSERT_NE(column, nullptr);
+  for (vtkIdType i = 0; i < 121; ++i) {
+    const double height_m = layer.p_w_m(i).z;
+    EXPECT_NEAR(layer.value(*column, i), height_m, 1e-6);
+  }
+}
+
+TEST_F(WindowToolsTest, ComparesWithASceneAndADem) {
+  Window& window = shown();
+  const TemporaryFolder folder;
+  testing::write_hills(folder / "hills.asc");
+  constexpr double above_m = 0.5;
+  PointCloud points(500);
+  const auto x = points.add<double>("x"), y = points.add<double>("y"), z = points.add<double>("z");
+  for (std::size_t i = 0; i < points.rows(); ++i) {
+    const std::size_t line = i / 100;
+    // On samples of the DEM, whose centres are half a metre inside.
+    x[i] = static_cast<double>(20 + i % 100) + 0.5;
+    y[i] = static_cast<double>(20 + 10 * line) + 0.5;
+    z[i] = hill_m(x[i], y[i]) + above_m;
+  }
+  write_ply(folder / "above.ply", points, {});
+  open(folder / "above.ply");
+  open(folder / "hills.asc");
+  open(SampleDataset::get().scene());
+  ComparePanel& panel = window.compare_panel();
+  for (const char* truth : {"heights of hills.asc", "ground of scene.yaml"}) {
+    panel.choose("above.ply", truth);
+    panel.compare_chosen();
+    settle();
+    EXPECT_EQ(dismiss_fault(), "") << truth;
+    EXPECT_EQ(panel.figures().value("points"), "500") << truth;
+    // Heights are stored with four digits, points in floats of metres.
+    EXPECT_NEAR(metres(panel.figures().value("mean")), above_m, 2e-4) << truth;
+    EXPECT_LT(std::abs(metres(panel.figures().value("NMAD"))), 2e-4) << truth;
+  }
+}
+
+TEST_F(WindowToolsTest, LevelsFollowAPlaceThatIsClicked) {
+  Window& window = shown();
+  open(SampleDataset::get().scene());
+  const QPoint middle(window.canvas().width() / 2, window.canvas().height() / 2 + 40);
+  const auto ground = window.view().pick(middle.x(), middle.y());
+  ASSERT_TRUE(ground);
+  const std::size_t before = window.tracker().built()->triangles;
+  QTest::mouseClick(&window.canvas(), Qt::LeftButton, Qt::ControlModifier, middle);
+  settle();
+  EXPECT_EQ(window.tracker().follows(), TerrainTracker::Follows::Place);
+  EXPECT_NE(window.view().find("viewpoint"), nullptr);
+  EXPECT_NE(window.tracker().built()->triangles, before);
+  // From now on the eye may go anywhere: the levels stay.
+  const std::size_t of_place = window.tracker().built()->triangles;
+  QTest::keyClick(&window, Qt::Key_1);
+  settle();
+  EXPECT_EQ(window.tracker().built()->triangles, of_place);
+}
+
+}  // namespace
+}  // namespace groundray
