@@ -11,8 +11,9 @@
 
 namespace groundray {
 
-/// Returns the layer of a mesh, smooth if it has many triangles, in a frame whose origin is at `origin_w_m`, with the column "height"
-/// and one for each of `vertices`, which has a row for each vertex or no column.
+/// Returns the layer of a mesh, smooth if it has many triangles, in a frame whose origin is at
+/// `origin_w_m`, with the column "height" and one for each of `vertices`, which has a row for each
+/// vertex or no column.
 Layer mesh_layer(const std::string& name, const TriangleMesh& mesh, const glm::dvec3& origin_w_m,
                  const PointCloud& vertices = PointCloud());
 

@@ -104,7 +104,7 @@ void ShownLayer::restyle() {
   property.SetPointSize(static_cast<float>(layer_.point_size_px));
   property.SetLineWidth(static_cast<float>(layer_.line_width_px));
   property.SetLighting(is_lit(layer_.kind) && !layer_.wireframe);
-  property.SetAmbient(property.GetLighting() ? 0.12 : 0.0);
+  property.SetAmbient(property.GetLighting() ? 0.17 : 0.0);
   property.SetDiffuse(1.0);
   property.SetSpecular(0);
   property.SetInterpolationToPhong();

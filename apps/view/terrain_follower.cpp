@@ -22,7 +22,7 @@ namespace {
 constexpr std::size_t tile_cache_bytes = std::size_t{64} << 20U;
 constexpr double most_whole_samples = 1.2e8;      // of a DEM that is kept in memory
 constexpr double most_uncertified_samples = 1e9;  // that are certified while somebody waits
-constexpr std::size_t coarse_triangles = 100'000;
+constexpr std::size_t coarse_triangles = 25'000;
 constexpr int most_doublings = 24;
 
 using Tiles = std::shared_ptr<const TileSource>;

@@ -46,11 +46,11 @@ void add_lights(vtkRenderer& renderer) {
     light->SetColor(colour.x, colour.y, colour.z);
     renderer.AddLight(light);
   };
-  add({-0.60, 0.45, 0.70}, 0.80, {1.0, 0.97, 0.91});
+  add({-0.60, 0.45, 0.70}, 0.74, {1.0, 0.97, 0.91});
   add({0.1, -0.2, 1}, 0.22, {0.85, 0.92, 1.0});
   vtkNew<vtkLight> eye;
   eye->SetLightTypeToHeadlight();
-  eye->SetIntensity(0.30);
+  eye->SetIntensity(0.40);
   renderer.AddLight(eye);
 }
 

@@ -4,9 +4,9 @@ import os
 import subprocess
 from pathlib import Path
 
+import cv2
 import numpy as np
 import pytest
-from PIL import Image
 
 ROOT = Path(__file__).parents[2]
 PROGRAM = ROOT / "build/release/bin/groundray-view"
@@ -34,7 +34,7 @@ def test_pictures_need_no_display(tmp_path: Path) -> None:
     result = view(DEM, "--screenshot", tmp_path / "dem.png", "--size", "320x200")
     assert result.returncode == 0, result.stderr
     assert result.stderr == ""
-    picture = np.asarray(Image.open(tmp_path / "dem.png"))
+    picture = cv2.imread(str(tmp_path / "dem.png"))
     assert picture.shape == (200, 320, 3)
     assert len(np.unique(picture.reshape(-1, 3), axis=0)) > 1000
 

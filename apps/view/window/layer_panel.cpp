@@ -132,7 +132,11 @@ QWidget* LayerPanel::build_looks() {
   facts_->setWordWrap(true);
   facts_->setTextInteractionFlags(Qt::TextSelectableByMouse);
   form->addRow(facts_);
+  connect_looks();
+  return looks;
+}
 
+void LayerPanel::connect_looks() {
   connect(column_, qOverload<int>(&QComboBox::currentIndexChanged), this, [this](int index) {
     const std::string name = column_->itemData(index).toString().toStdString();
     change([&] { view_.colour_by(selected(), name); });
@@ -147,7 +151,6 @@ QWidget* LayerPanel::build_looks() {
   for (QDoubleSpinBox* box : {low_, high_}) {
     connect(box, qOverload<double>(&QDoubleSpinBox::valueChanged), this, [this] { set_range(); });
   }
-  return looks;
 }
 
 void LayerPanel::change(const std::function<void()>& what) {

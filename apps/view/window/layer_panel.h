@@ -41,6 +41,7 @@ class LayerPanel : public QWidget {
  private:
   void build_tree();
   QWidget* build_looks();
+  void connect_looks();
   QTreeWidgetItem* branch(const QStringList& path);
   void add_leaf(const Layer& layer);
   void checked(QTreeWidgetItem* item);

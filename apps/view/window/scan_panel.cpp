@@ -104,6 +104,10 @@ void ScanPanel::build() {
   status_ = new QLabel;
   status_->setObjectName("scan_status");
   status_->setWordWrap(true);
+  lay_out();
+}
+
+void ScanPanel::lay_out() {
   auto* form = new QFormLayout;
   form->addRow("Sensor", preset_);
   form->addRow("Above ground", height_);

@@ -52,6 +52,7 @@ class ScanPanel : public QWidget {
 
  private:
   void build();
+  void lay_out();
   void connect_widgets();
   SensorPlace place() const;
   void show_place();

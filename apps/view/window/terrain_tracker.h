@@ -39,6 +39,8 @@ class TerrainTracker {
 
   /// Returns what was built last, without its layer; nothing before.
   const std::optional<FollowedTerrain>& built() const noexcept { return built_; }
+  /// Returns the viewpoint that is followed; nothing before there is one.
+  const std::optional<glm::dvec3>& viewpoint_w_m() const noexcept { return built_for_w_m_; }
   bool is_busy() const noexcept { return job_.is_running(); }
 
  private:

@@ -44,6 +44,11 @@ TimelinePanel::TimelinePanel(Hooks hooks, QWidget* parent)
   layout->addWidget(slider_);
   layout->addWidget(strip_);
   layout->addStretch(1);
+  for (QCheckBox* box : {rides_, trail_}) {
+    connect(box, &QCheckBox::toggled, this, [this] {
+      if (hooks_.asked) hooks_.asked();
+    });
+  }
   clock_.setInterval(tick_ms);
   connect(&clock_, &QTimer::timeout, this, [this] { tick(); });
   setEnabled(false);
@@ -84,11 +89,6 @@ QWidget* TimelinePanel::build_buttons() {
   rides_->setToolTip("The view moves with the platform");
   trail_ = new QCheckBox("Trail");
   trail_->setChecked(true);
-  for (QCheckBox* box : {rides_, trail_}) {
-    connect(box, &QCheckBox::toggled, this, [this] {
-      if (hooks_.asked) hooks_.asked();
-    });
-  }
   for (QWidget* each : std::initializer_list<QWidget*>{back, play_, forward}) {
     layout->addWidget(each);
   }
