@@ -42,6 +42,13 @@ void check(const PinholePair& pair, const StereoView& left, const DisparityMap& 
   broken.throw_if_any();
 }
 
+// Of four points of a square, whose errors are alike the more the nearer they are: on rendered
+// pairs half at 4 px, 0.3 at 8.
+double variance_together(double stride_px) {
+  constexpr double alike_px = 6;
+  return 1 + 2 * std::exp(-stride_px / alike_px) + std::exp(-std::sqrt(2.0) * stride_px / alike_px);
+}
+
 double match_px(const DisparityMap& map, const StereoNoise& noise, int x, int y) {
   if (noise.match_px) return *noise.match_px;
   return map.sd_px.width() > 0 ? static_cast<double>(map.sd_px.at(x, y)[0]) : usual_match_px;
@@ -77,6 +84,7 @@ StereoPoints stereo_points(const PinholePair& pair, const StereoView& left, cons
   check(pair, left, map, options);
   const StereoNoise& noise = options.noise;
   StereoPoints points;
+  points.together = variance_together(options.stride_px);
   for (int y = options.stride_px / 2; y < pair.size_px.y; y += options.stride_px) {
     for (int x = options.stride_px / 2; x < pair.size_px.x; x += options.stride_px) {
       const double disparity_px = map.disparity_px.at(x, y)[0];
@@ -103,7 +111,7 @@ StereoPoints stereo_points(const PinholePair& pair, const StereoView& left, cons
 
 void append(const StereoPoints& points, std::uint32_t group, MeasuredPoints& to) {
   for (std::size_t i = 0; i < points.size(); ++i) {
-    const glm::dmat3 covariance_m2(points.covariance_m2[i]);
+    const glm::dmat3 covariance_m2 = points.together * glm::dmat3(points.covariance_m2[i]);
     const double footprint_m = points.footprint_m[i];
     const PointErrors errors = point_errors(covariance_m2);
     to.p_m.push_back(points.p_m[i]);

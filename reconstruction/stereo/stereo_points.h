@@ -45,11 +45,13 @@ struct StereoPoints {
   /// One standard deviation of the pair's common bias: it moves all points together, each by its
   /// own vector here times the same number. Not in the covariance.
   std::vector<glm::vec3> bias_m;
-  std::vector<glm::vec2> pixels;    ///< where in the left camera's own image
-  std::vector<float> depth_m;       ///< along the axis of the rectified pair
-  std::vector<float> depth_sd_m;    ///< of its noise
-  std::vector<float> confidence;    ///< see DisparityMap
-  std::vector<float> footprint_m;   ///< how wide a pixel is there, across the line of sight
+  std::vector<glm::vec2> pixels;   ///< where in the left camera's own image
+  std::vector<float> depth_m;      ///< along the axis of the rectified pair
+  std::vector<float> depth_sd_m;   ///< of its noise
+  std::vector<float> confidence;   ///< see DisparityMap
+  std::vector<float> footprint_m;  ///< how wide a pixel is there, across the line of sight
+  /// By which factor the mean of a few neighbouring points varies more than if each erred apart.
+  double together = 1;
   std::uint64_t too_uncertain = 0;  ///< matches that most_relative_sd left out
   std::uint64_t out_of_limits = 0;  ///< that depth or confidence left out
 
@@ -79,6 +81,7 @@ StereoPoints stereo_points(const PinholePair& pair, const StereoView& left, cons
 
 /// Adds points to those of a DEM: of the noise the share of height, how it leans, and the rest in
 /// plan, the mean of both ways with the pixel's footprint; of the bias the share of height.
+/// Variances of noise are times `together`, for means are taken as if each point erred apart.
 /// @param group  number of the pair: its points have one bias.
 void append(const StereoPoints& points, std::uint32_t group, MeasuredPoints& to);
 

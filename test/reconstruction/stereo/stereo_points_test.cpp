@@ -136,8 +136,11 @@ TEST(StereoPoints, AreTurnedToD) {
   const glm::dvec3 p_LQ = inverse(pair.X_DL) * points.p_m[i];
   const StereoPoint point = stereo_point(
       pair, glm::dvec2(p_LQ) / p_LQ.z * pair.focal_px + pair.centre_px, 5, usual_match_px, 0.3);
-  const double variance_m2 = glm::dot(up, point.covariance_m2 * up);
-  EXPECT_NEAR(points.covariance_m2[i][2][2], variance_m2, 1e-5 * variance_m2);
+  const double alone_m2 = glm::dot(up, point.covariance_m2 * up);
+  EXPECT_NEAR(points.covariance_m2[i][2][2], alone_m2, 1e-5 * alone_m2);
+  // Four neighbours 6 px apart, with errors that are alike by exp(-distance / 6 px).
+  EXPECT_NEAR(points.together, 1 + 2 * std::exp(-1.0) + std::exp(-std::sqrt(2.0)), 1e-12);
+  const double variance_m2 = points.together * alone_m2;
   MeasuredPoints measured;
   append(points, 7, measured);
   append(points, 8, measured);
@@ -151,8 +154,8 @@ TEST(StereoPoints, AreTurnedToD) {
     double told_m2 = 0, true_m2 = 0;
     for (const glm::dvec2 g : {slope, glm::dvec2(-slope.y, slope.x)}) {
       const glm::dvec3 n = glm::conjugate(pair.X_DL.rotation) * glm::dvec3(-g, 1);
-      true_m2 +=
-          glm::dot(n, point.covariance_m2 * n) + glm::dot(g, g) * footprint_m * footprint_m / 12;
+      true_m2 += points.together * glm::dot(n, point.covariance_m2 * n) +
+                 glm::dot(g, g) * footprint_m * footprint_m / 12;
       told_m2 += std::pow(measured.sd_m[i] * (1 - glm::dot(g, glm::dvec2(measured.lean[i]))), 2) +
                  glm::dot(g, g) * std::pow(measured.across_sd_m[i], 2);
     }
