@@ -23,7 +23,8 @@ inline RTCDevice handle(const RayDevice& device) noexcept { return device.impl()
 /// Returns an empty scene as all of ours are: robust.
 RTCScene new_scene(const RayDevice& device);
 
-/// Builds what was attached to a scene, in any thread's parallel work too.
+/// Builds what was attached to a scene; within a thread's parallel work too, which may end before
+/// the scene does.
 void commit(RTCScene scene);
 
 /// Returns a scene of scenes, numbered as they come. Their transforms are the identity: any other

@@ -48,8 +48,8 @@ struct LidarScan {
   Convergence convergence;
 };
 
-/// Is told now and then which share of a sweep is done, 0 to 1, and returns whether to go on. It is
-/// called by one thread at a time, but not always by the same.
+/// Is told now and then which share of a sweep is begun, from 0, and returns whether to go on. It
+/// is called by one thread at a time, but not always by the same.
 using SweepWatch = std::function<bool(double share)>;
 
 /// Thrown where a sweep ends before its last pulse, because its watch said so.

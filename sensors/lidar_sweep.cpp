@@ -448,7 +448,7 @@ void Sweep::stream(const Finish& finish) {
   std::int64_t next = 0;
   const auto take = [&](tbb::flow_control& flow) -> Chunk* {
     const double share = static_cast<double>(next) / static_cast<double>(pulses_);
-    is_stopped_ = watch_ && !watch_(share);
+    is_stopped_ = next < pulses_ && watch_ && !watch_(share);
     if (is_stopped_ || next == pulses_) {
       flow.stop();
       return nullptr;

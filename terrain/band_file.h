@@ -26,6 +26,7 @@ struct RasterBands {
 /// every step-th row. Values are scaled as the file says; holes are what GDAL's masks hide.
 /// @throws Error that names the file, if it is no raster, one of complex numbers, or cannot be
 ///         read.
+/// @param most_samples  1 or more.
 RasterBands read_bands(const std::filesystem::path& path, std::size_t most_samples);
 
 /// What kind of picture or model a raster's file seems to hold.

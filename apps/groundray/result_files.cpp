@@ -134,7 +134,8 @@ void ResultFiles::spare(File& file) const {
   }
 }
 
-// Undoes the first of what appeared; says what could not be.
+// Undoes the first of what appeared; says what could not be. A spare that cannot have its name back
+// is all that is left of the user's file: it stays.
 std::string ResultFiles::take_back(std::size_t count) {
   std::string left;
   for (std::size_t i = 0; i < count; ++i) {
@@ -146,7 +147,11 @@ std::string ResultFiles::take_back(std::size_t count) {
       fs::remove(file.path, fault);
     }
     const bool is_left = fault || (file.spare.empty() && !file.is_new);
-    if (is_left) left += fmt::format("; {} is written all the same", file.path.string());
+    if (!is_left) continue;
+    left += fmt::format("; {} is written all the same", file.path.string());
+    if (file.spare.empty()) continue;
+    left += fmt::format(", and what it was is kept as {}", file.spare.string());
+    file.spare.clear();
   }
   return left;
 }

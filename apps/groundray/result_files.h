@@ -35,7 +35,8 @@ class ResultFiles {
 
   /// Gives each file its name. If one cannot have it, the others are taken back: names have what
   /// they had before; but a file that was written over is lost where the disk knows no hard links.
-  /// @throws Error naming the file that cannot get its name, and any that could not be taken back.
+  /// @throws Error naming the file that cannot get its name, and any that could not be taken back;
+  ///         and under which name what they were is kept.
   void appear();
 
  private:

@@ -21,8 +21,8 @@ struct DemLayers {
   std::vector<float> chi2;              ///< of the fit, per degree of freedom; NaN for a lone point
   std::vector<std::uint16_t> surfaces;  ///< how many, one above the other
   std::vector<float> overhang_m;        ///< the lowest height of what is clear of the ground
-  /// Free height from the highest of what was measured below the overhang, or from the ground
-  /// around where nothing was, to it: in the whole cell there is no less.
+  /// Free height up to the overhang, from the highest of what was measured below it, or where
+  /// nothing was from the highest that the ground around comes to within the cell.
   std::vector<float> clearance_m;
   std::vector<HeightSource> source;
   std::vector<float> to_data_m;      ///< to the nearest measured sample, in plan

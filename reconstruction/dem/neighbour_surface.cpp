@@ -142,7 +142,8 @@ Excess excess(const Neighbours& near, double noise_m2, double freedom) noexcept 
   for (std::size_t i = 0; i < quadric_places; i += lanes) {
     const FloatLanes off = load(&near.residual[i]), own = load(&near.variance[i]);
     const FloatLanes expected = own + start, square = smaller(times * off * off, most * expected);
-    const FloatLanes root = load(&near.is_there[i]) / (own + noise), weight = root * root;
+    const FloatLanes root = noise * load(&near.is_there[i]) / (own + noise);
+    const FloatLanes weight = root * root;  // up to 1, lest their squares leave what a float holds
     sum += weight * (whole * square - own);
     all += weight;
     spread += weight * weight * expected * expected;

@@ -8,8 +8,14 @@
 namespace groundray {
 namespace {
 
-constexpr int most_rounds = 100;
-constexpr int sweeps = 2;  // there and back, of samples moved one by one
+constexpr int first_rounds = 30;     // of descent; most plates take ten
+constexpr int most_exchanges = 500;  // where these did not do
+// Then descent goes on as long as so many rounds take away more than a share of what all did.
+constexpr int some_rounds = 100;
+constexpr double least_fall = 1e-9;
+constexpr int most_rounds = 10000;
+constexpr double most_work = 4e7;  // samples times rounds, beyond a hundred of each sort
+constexpr int sweeps = 2;          // there and back, of samples moved one by one
 // Shares of the largest height that are no more than rounding: of a height that follows from all
 // equations, and of the move that one equation asks for, which stiff forms make much of.
 constexpr double least_move = 1e-10, least_push = 1e-14;
@@ -50,20 +56,31 @@ void PlateDescent::move_each() {
   }
 }
 
-// Moves those that are not held to where their equations lead them, cut off at the bounds and as
-// far as the sum gets less. Whether nothing had to be cut off.
+// Moves those that are not held to where their equations lead them, as far as the sum gets less:
+// each cut off at its bound, or all until the first one meets its own, whichever leaves less.
+// Whether nothing was in the way.
 bool PlateDescent::step() {
   const std::vector<double> lacks = rest();
   factor_.factorise(is_held_);
-  std::vector<double> way = factor_.solve(lacks);
+  const std::vector<double> whole = factor_.solve(lacks);
+  std::vector<double> way = whole;
   bool is_whole = true;
+  double straight = 1;
   for (std::size_t i = 0; i < way.size(); ++i) {
     const double most = most_[i] - z_[i];
     if (is_held_[i] != 0 || way[i] <= most) continue;
     is_whole &= way[i] <= most + least_move * largest_;
+    straight = std::min(straight, most / way[i]);
     way[i] = most;
   }
-  const double length = is_whole ? 1 : best_length(way, lacks);
+  double length = 1;
+  if (!is_whole) {
+    const Stretch cut = best_stretch(way, lacks);
+    const double falls = std::inner_product(whole.begin(), whole.end(), lacks.begin(), 0.0);
+    const bool is_cut = cut.falls >= falls * straight * (1 - straight / 2);
+    length = is_cut ? cut.length : straight;
+    if (!is_cut) way = whole;
+  }
   moved_ = 0;
   for (std::size_t i = 0; i < way.size(); ++i) {
     moved_ = std::max(moved_, length * std::abs(way[i]));
@@ -73,11 +90,18 @@ bool PlateDescent::step() {
 }
 
 // How far to go a way, as a share of it, for the least sum.
-double PlateDescent::best_length(std::span<const double> way, std::span<const double> lacks) const {
+PlateDescent::Stretch PlateDescent::best_stretch(std::span<const double> way,
+                                                 std::span<const double> lacks) const {
   const std::vector<double> bent = matrix_.times(way);
   const double falls = std::inner_product(way.begin(), way.end(), lacks.begin(), 0.0);
   const double bends = std::inner_product(way.begin(), way.end(), bent.begin(), 0.0);
-  return bends > 0 ? std::clamp(falls / bends, 0.0, 1.0) : 0;
+  const double length = bends > 0 ? std::clamp(falls / bends, 0.0, 1.0) : 0;
+  return {length, length * (falls - length * bends / 2)};
+}
+
+// Whether a sample would fall if it were not held.
+bool PlateDescent::would_fall(std::size_t i, double lacks) const {
+  return lacks < -least_push * largest_ * own_[i];
 }
 
 // Lets samples go that would fall. Whether there are none.
@@ -85,10 +109,71 @@ bool PlateDescent::let_go() {
   const std::vector<double> lacks = rest();
   bool is_none = true;
   for (std::size_t i = 0; i < z_.size(); ++i) {
-    is_let_go_[i] = is_held_[i] != 0 && lacks[i] < -least_push * largest_ * own_[i] ? 1 : 0;
+    is_let_go_[i] = is_held_[i] != 0 && would_fall(i, lacks[i]) ? 1 : 0;
     is_none &= is_let_go_[i] == 0;
   }
   return is_none;
+}
+
+// Rounds of descent. Whether the least was found.
+bool PlateDescent::descend(int rounds) {
+  for (int round = 0; round < rounds; ++round) {
+    move_each();
+    for (std::size_t i = 0; i < z_.size(); ++i)
+      is_held_[i] = z_[i] >= most_[i] && is_let_go_[i] == 0 ? 1 : 0;
+    const bool is_whole = step();
+    // Those let go before did not fall either, but for rounding, if nothing moved.
+    const bool is_still = round > 0 && moved_ <= least_move * largest_;
+    if ((let_go() || is_still) && is_whole) return true;
+  }
+  return false;
+}
+
+// Samples on the wrong side where those that are held are at their bounds and the rest has its
+// equations met: above their bounds, or held though they would fall.
+std::vector<std::size_t> PlateDescent::misplaced() {
+  for (std::size_t i = 0; i < z_.size(); ++i)
+    if (is_held_[i] != 0) z_[i] = most_[i];
+  factor_.factorise(is_held_);
+  const std::vector<double> way = factor_.solve(rest());
+  std::ranges::transform(z_, way, z_.begin(), std::plus<>());
+  const std::vector<double> lacks = rest();
+  std::vector<std::size_t> found;
+  for (std::size_t i = 0; i < z_.size(); ++i) {
+    const bool is =
+        is_held_[i] != 0 ? would_fall(i, lacks[i]) : z_[i] > most_[i] + least_move * largest_;
+    if (is) found.push_back(i);
+  }
+  return found;
+}
+
+// Has all samples that are on the wrong side change it, or, if that leaves no fewer of them for
+// some rounds, one alone. Whether the least was found; else heights stay as they were.
+bool PlateDescent::exchange(int rounds) {
+  constexpr int most_vain = 3;
+  const std::vector<double> before = z_;
+  std::size_t fewest = z_.size() + 1;
+  for (int round = 0, vain = 0; round < rounds; ++round) {
+    std::vector<std::size_t> wrong = misplaced();
+    if (wrong.empty()) {
+      std::ranges::transform(z_, most_, z_.begin(),
+                             [](double z, double most) { return std::min(z, most); });
+      return true;
+    }
+    vain = wrong.size() < fewest ? 0 : vain + 1;
+    fewest = std::min(fewest, wrong.size());
+    if (vain > most_vain) wrong.assign(1, wrong.back());
+    for (const std::size_t i : wrong) is_held_[i] ^= 1;
+  }
+  z_ = before;
+  return false;
+}
+
+double PlateDescent::sum() const {
+  const std::vector<double> lacks = rest();
+  double sum = 0;
+  for (std::size_t i = 0; i < z_.size(); ++i) sum -= z_[i] * (right_[i] + lacks[i]) / 2;
+  return sum;
 }
 
 bool PlateDescent::run(std::span<const double> start) {
@@ -106,14 +191,18 @@ bool PlateDescent::run(std::span<const double> start) {
     z_[i] = lower;
   }
   if (is_free && start.empty()) return true;
-  for (int round = 0; round < most_rounds; ++round) {
-    move_each();
-    for (std::size_t i = 0; i < z_.size(); ++i)
-      is_held_[i] = z_[i] >= most_[i] && is_let_go_[i] == 0 ? 1 : 0;
-    const bool is_whole = step();
-    // Those let go before did not fall either, but for rounding, if nothing moved.
-    const bool is_still = round > 0 && moved_ <= least_move * largest_;
-    if ((let_go() || is_still) && is_whole) return true;
+  const double first = sum();
+  const auto no_more_than = [this](int rounds) {
+    return std::clamp(static_cast<int>(most_work / static_cast<double>(z_.size())), some_rounds,
+                      rounds);
+  };
+  if (descend(first_rounds) || exchange(no_more_than(most_exchanges))) return true;
+  double before = sum();
+  for (int done = 0; done < no_more_than(most_rounds); done += some_rounds) {
+    if (descend(some_rounds)) return true;
+    const double now = sum();
+    if (before - now <= least_fall * (first - now)) return false;
+    before = now;
   }
   return false;
 }

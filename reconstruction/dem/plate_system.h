@@ -38,7 +38,7 @@ bool has_known_neighbour(glm::ivec2 size, std::span<const std::int32_t> numbers,
 struct BoundedPlate {
   std::vector<double> heights_m;
   std::size_t at_bound = 0;  ///< how many are held down
-  bool is_best = true;       ///< else within all bounds, but not yet the least
+  bool is_best = true;       ///< else within all bounds, but maybe far from the least
 };
 
 /// The heights of some samples that have the least of what PlateForm tells where all other samples

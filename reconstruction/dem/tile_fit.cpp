@@ -237,6 +237,7 @@ class RowFit {
   bool is_credible(const CellSurface& surface) const;
   bool agrees(double low_m, double high_m, double variance_m2, double give_m) const;
   bool stands_clear(const CellSurface& wall) const;
+  double top_of_ground() const;
   CellSurface foot(const CellSurface& wall) const;
   static void set_overhang(std::size_t at, double overhang_m, double top_m, DemLayers& layers);
   void fill(std::size_t at, const CellHeight& ground, double reference_m, DemLayers& layers) const;
@@ -295,6 +296,13 @@ bool RowFit::is_credible(const CellSurface& surface) const {
                 is_enough ? rules_.gap_m : 0);
 }
 
+// The highest that the ground of the cells around has in this one.
+double RowFit::top_of_ground() const {
+  const SurfacePlane& plane = around_.plane;
+  return plane.height_m + 0.5 * (std::abs(plane.slope_x) * rules_.step_m.x +
+                                 std::abs(plane.slope_y) * rules_.step_m.y);
+}
+
 void RowFit::set_overhang(std::size_t at, double overhang_m, double top_m, DemLayers& layers) {
   layers.overhang_m[at] = static_cast<float>(overhang_m);
   layers.clearance_m[at] = static_cast<float>(overhang_m - top_m);
@@ -314,7 +322,7 @@ std::optional<CellSurface> RowFit::ground(std::size_t at, DemLayers& layers) {
                  tallest_m_);
   if (ground.end < lowest.end) {
     if (stands_clear(lowest)) {
-      set_overhang(at, height_m(cell_[lowest.begin]), around_.plane.height_m, layers);
+      set_overhang(at, height_m(cell_[lowest.begin]), top_of_ground(), layers);
       return std::nullopt;
     }
     ground = foot(ground);
@@ -339,9 +347,12 @@ void RowFit::fit(int column, int row, std::size_t at, DemLayers& layers) {
       cell_fit_(cell_.subspan(points->begin, points->size()), around_, rules_.step_m, reference);
   if (!found) {
     layers.surfaces[at] = static_cast<std::uint16_t>(layers.surfaces[at] - 1);
-    layers.clearance_m[at] = std::numeric_limits<float>::quiet_NaN();  // what is below was nothing
+    // What was below was nothing.
+    const double base_m = around_.cells > 0 ? double{layers.overhang_m[at]}
+                                            : std::numeric_limits<double>::quiet_NaN();
+    set_overhang(at, base_m, top_of_ground(), layers);
     ++counts_.without_ground;
-  } else if (found->variance_m2 > rules_.most_sd_m * rules_.most_sd_m) {
+  } else if (!(found->variance_m2 <= rules_.most_sd_m * rules_.most_sd_m)) {
     ++counts_.uncertain;
   } else {
     fill(at, *found, reference * PackedPoint::height_step_m, layers);

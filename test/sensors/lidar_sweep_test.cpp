@@ -5,6 +5,7 @@
 
 #include <algorithm>
 #include <cmath>
+#include <functional>
 #include <glm/geometric.hpp>
 #include <string_view>
 
@@ -99,6 +100,72 @@ TEST(LidarSweep, SameBytesForAnyNumberOfThreadsWithAllNoiseOn) {
     EXPECT_EQ(scans[0].waveforms.power_w, other->waveforms.power_w);
     EXPECT_EQ(scans[0].convergence.sum_squares_m2, other->convergence.sum_squares_m2);
   }
+}
+
+TEST(LidarSweep, IsTheSameWhoeverWatches) {
+  const HeightGrid ground = testing::fractal(513, 1, 60, Seed{1});
+  const Scene scene = scene_of(ground);
+  const Trajectory X_DS = ride_over(ground);
+  LidarSpec spec = noisy();
+  for (const bool has_light : {true, false}) {
+    SCOPED_TRACE(has_light ? "with light" : "without");
+    if (!has_light) {
+      spec.light.reset();
+      spec.beam = {};
+      spec.waveforms = LidarSpec::WaveformOutput::Omit;
+    }
+    const Lidar lidar(spec);
+    std::vector<double> shares;
+    const LidarScan watched = lidar.scan(scene, X_DS, 3, Seed{7}, 0, [&](double share) {
+      shares.push_back(share);
+      return true;
+    });
+    ASSERT_GT(shares.size(), 10u);
+    EXPECT_EQ(shares.front(), 0);
+    EXPECT_LE(shares.back(), 1);
+    EXPECT_EQ(std::ranges::adjacent_find(shares, std::greater_equal<>()), shares.end());
+    const LidarScan alone = lidar.scan(scene, X_DS, 3, Seed{7}, 0);
+    ASSERT_GT(alone.echoes.rows(), 5000u);
+    ASSERT_GT(alone.no_returns.rows(), 1000u);
+    expect_same_bytes(alone.echoes, watched.echoes);
+    expect_same_bytes(alone.no_returns, watched.no_returns);
+    EXPECT_EQ(alone.waveforms.power_w, watched.waveforms.power_w);
+  }
+}
+
+// No more pulses begin, and the watch hears of nothing more.
+TEST(LidarSweep, StopsWhenItsWatchSaysSo) {
+  const HeightGrid ground = testing::fractal(513, 1, 60, Seed{1});
+  const Scene scene = scene_of(ground);
+  const Trajectory X_DS = ride_over(ground);
+  const Lidar lidar(noisy());
+  for (const double until : {0.0, 0.5}) {
+    std::vector<double> shares;
+    const auto scan = [&] {
+      return lidar.scan(scene, X_DS, 3, Seed{7}, 0, [&](double share) {
+        shares.push_back(share);
+        return share < until;
+      });
+    };
+    EXPECT_THROW(scan(), SweepStopped);
+    ASSERT_FALSE(shares.empty());
+    EXPECT_GE(shares.back(), until);
+    EXPECT_LT(shares.back(), until + 0.1);
+    EXPECT_EQ(std::ranges::count_if(shares, [&](double share) { return share >= until; }), 1);
+  }
+}
+
+// What is said after the last pulse has begun comes too late, and the whole sweep is returned.
+TEST(LidarSweep, IsWholeIfItsWatchStopsItTooLate) {
+  const HeightGrid ground = testing::fractal(513, 1, 60, Seed{1});
+  const Scene scene = scene_of(ground);
+  const Trajectory X_DS = ride_over(ground);
+  const Lidar lidar(noisy());
+  const LidarScan alone = lidar.scan(scene, X_DS, 3, Seed{7}, 0);
+  const LidarScan watched =
+      lidar.scan(scene, X_DS, 3, Seed{7}, 0, [](double share) { return share < 1; });
+  expect_same_bytes(alone.echoes, watched.echoes);
+  expect_same_bytes(alone.no_returns, watched.no_returns);
 }
 
 TEST(LidarSweep, EchoesDoNotDependOnWhatElseIsAskedFor) {

@@ -33,6 +33,7 @@ void print_points(const char* what, const char* rows, const std::vector<PointTal
 void print_fill(const FillTally& fill) {
   print_fates(fill);
   if (fill.at_bound > 0) fmt::print("lines of sight hold {} filled samples down\n", fill.at_bound);
+  print_not_least(fill);
 }
 
 void print_errors(const std::vector<HeightErrors>& errors) {
@@ -94,7 +95,10 @@ Json json_of(const FillTally& fill) {
                       {"within_2sd", number(trial.within_2sd)},
                       {"widened_by", number(trial.widened_by)}});
   }
-  return {{"holes", holes}, {"trials", trials}, {"at_bound", fill.at_bound}};
+  return {{"holes", holes},
+          {"trials", trials},
+          {"at_bound", fill.at_bound},
+          {"not_least", fill.not_least}};
 }
 
 Json json_of(const FusionCounts& counts) {

@@ -63,6 +63,11 @@ std::vector<float> load_bounds(const fs::path& path, const Dem& dem) {
   return {heights_m.begin(), heights_m.end()};
 }
 
+// A dash for what nothing tells.
+std::string percent(double share) {
+  return std::isnan(share) ? "-" : fmt::format("{:.1f} %", 100 * share);
+}
+
 void print_trials(const FilledHeights& filled) {
   if (filled.trials.empty()) return;
   fmt::print("{:>28} {:>8} {:>11} {:>8} {:>9} {:>9} {:>9}\n", "kind of hole, cells", "tension",
@@ -76,20 +81,15 @@ void print_trials(const FilledHeights& filled) {
                  trial.form.smoothness);
       continue;
     }
-    fmt::print("{:>28} {:>8g} {:>11g} {:>8} {:>7.1f} % {:>7.1f} % {:>9.2f}\n", kind,
-               trial.form.tension, trial.form.smoothness, trial.samples, 100 * trial.within_1sd,
-               100 * trial.within_2sd, trial.widened_by);
+    fmt::print("{:>28} {:>8g} {:>11g} {:>8} {:>9} {:>9} {:>9.2f}\n", kind, trial.form.tension,
+               trial.form.smoothness, trial.samples, percent(trial.within_1sd),
+               percent(trial.within_2sd), trial.widened_by);
   }
 }
 
-void print_bounds(const FilledHeights& filled) {
-  std::size_t held = 0, holes = 0;
-  for (const RasterHole& hole : filled.holes) {
-    held += hole.at_bound;
-    holes += hole.is_least ? 0 : 1;
-  }
-  fmt::print("{} filled samples are held down by a bound\n", held);
-  if (holes > 0) fmt::print("{} holes are held down by more than they should be\n", holes);
+void print_bounds(const FillTally& tally) {
+  fmt::print("{} filled samples are held down by a bound\n", tally.at_bound);
+  print_not_least(tally);
 }
 
 }  // namespace
@@ -199,9 +199,10 @@ struct FillCommand::Options {
     const FilledHeights filled = fill(read);
     stop_if_interrupted();
     write(read, filled);
-    print_fates(tally_of(filled));
+    const FillTally tally = tally_of(filled);
+    print_fates(tally);
     if (method == Method::Tension) print_trials(filled);
-    if (!bound.empty()) print_bounds(filled);
+    if (!bound.empty()) print_bounds(tally);
     fmt::print("{} of {} missing samples filled; written to {}\n", filled.filled,
                read.grid.hole_count(), out.string());
   }

@@ -41,6 +41,7 @@ FillTally tally_of(const FilledHeights& filled) {
       of.samples += hole.samples;
       of.farthest_m = std::max(of.farthest_m, hole.farthest_m);
       tally.at_bound += hole.at_bound;
+      tally.not_least += hole.is_least ? 0 : 1;
     }
     if (of.holes > 0) tally.fates.push_back(of);
   }
@@ -54,6 +55,14 @@ void print_fates(const FillTally& tally) {
     fmt::print("{:>8} {:>12} {:>12.4g}  {}\n", fate.holes, fate.samples, fate.farthest_m,
                sentence_of(fate.fate));
   }
+}
+
+void print_not_least(const FillTally& tally) {
+  if (tally.not_least == 0) return;
+  fmt::print(
+      "{} holes are filled below their bounds, but maybe far from the best surface that is: the "
+      "search for it was given up\n",
+      tally.not_least);
 }
 
 const char* word_of(HoleFate fate) {

@@ -90,6 +90,39 @@ TEST(ResultFiles, AreTakenBackIfOneCannotAppear) {
   EXPECT_EQ(text_of(b), "old");
 }
 
+// The second takes the place of the link by which the first is reached, so that this cannot be
+// taken back until that is.
+TEST(ResultFiles, KeepWhatCannotBeTakenBack) {
+  const TemporaryFolder folder;
+  const fs::path real = folder.path() / "real", link = folder.path() / "link.tif",
+                 full = folder.path() / "full.tif", old = link / "b.tif";
+  fs::create_directory(real);
+  fs::create_directory_symlink(real, link);
+  put(old, "old");
+  std::string told;
+  {
+    ResultFiles files;
+    for (const fs::path& path : {old, link, full})
+      files.write(path, [](const fs::path& aside) { put(aside, "new"); });
+    fs::create_directory(full);
+    put(full / "x", "x");
+    try {
+      files.appear();
+      FAIL();
+    } catch (const Error& error) {
+      told = error.what();
+    }
+  }
+  EXPECT_THAT(names_in(folder.path()), ElementsAre("full.tif", "link.tif", "real"));
+  EXPECT_EQ(text_of(real / "b.tif"), "new");
+  EXPECT_THAT(told, AllOf(HasSubstr("full.tif: cannot be written"),
+                          HasSubstr("b.tif is written all the same")));
+  const std::string words = "what it was is kept as ";
+  ASSERT_THAT(told, HasSubstr(words));
+  EXPECT_EQ(text_of(told.substr(told.find(words) + words.size())), "old");
+  EXPECT_EQ(names_in(real).size(), 2u);
+}
+
 TEST(ResultFiles, AreCheckedBeforeWork) {
   const TemporaryFolder folder;
   const fs::path a = folder.path() / "a.tif", b = folder.path() / "b.tif";

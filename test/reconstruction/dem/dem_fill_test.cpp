@@ -213,6 +213,9 @@ TEST(DemFill, HolesThatStayHaveNoInfluence) {
       for (int c = 0; c < 40; ++c) {
         const float z = all.heights_m[index_of(c, r, 40)];
         EXPECT_EQ(std::isnan(z), c < 4);
+        if (c < 4 || !std::isnan(holed_m[index_of(c, r, 64)])) {
+          EXPECT_TRUE(std::isnan(all.sd_m[index_of(c, r, 40)]));
+        }
         if (c >= 4) {
           EXPECT_NEAR(z, cut.heights_m[index_of(c - 4, r, 36)], 1e-4);  // rounding, of stiff forms
         }

@@ -193,6 +193,51 @@ TEST(DemFusion, TrunksAreNotGround) {
   EXPECT_EQ(fusion.counts.without_ground, 1U);
 }
 
+// Under a wall that begins above the ground and hides it: on a slope what passes below is what
+// passes at the cell's upper edge.
+TEST(DemFusion, ClearanceOnASlopeIsThatOfTheHighestGround) {
+  const GridFrame frame = frame_over({{0, 0}, {9, 9}}, 1);
+  const glm::dvec2 hidden = frame.to_D({4, 4});
+  const double base_m = 0.8 * hidden.x + 2;
+  MeasuredPoints points;
+  for (std::size_t i = 0; i < 800; ++i) {
+    const glm::dvec2 p = uniform(i, 40) * 9.0;
+    const glm::dvec2 off = glm::abs(p - hidden);
+    if (std::max(off.x, off.y) < 0.5) continue;
+    add_point(points, {p, 0.8 * p.x}, 0.005, 0, 0, 7, Lidar);
+  }
+  for (std::size_t i = 0; i < 80; ++i) {
+    add_point(points, {hidden + uniform(i, 43) - 0.5, base_m + 0.05 * static_cast<double>(i)},
+              0.005, 0, 0, 7, Lidar);
+  }
+  const Fusion fusion = fuse_all(points, frame);
+  const std::size_t cell = 4 * static_cast<std::size_t>(frame.samples.x) + 4;
+  EXPECT_NEAR(fusion.layers.overhang_m[cell], base_m, 1e-4);
+  EXPECT_NEAR(fusion.layers.clearance_m[cell], 2 - 0.8 * 0.5, 0.02);
+}
+
+// Of points that are taken for exact, as those of files without deviations are.
+TEST(DemFusion, MountainsOfExactPointsHaveHeights) {
+  const GridFrame frame = frame_over({{0, 0}, {3000, 3000}}, 100);
+  MeasuredPoints points;
+  for (std::size_t i = 0; i < 8000; ++i) {
+    const glm::dvec2 p = uniform(i, 42) * 3000.0, cell = glm::floor(p / 100.0);
+    const double peak_m = 60 * normal(static_cast<std::size_t>(cell.x + 30 * cell.y), 44).x;
+    add_point(points, {p, 1000 + peak_m + 0.2 * p.x}, 0, 0, 0, 7, Lidar);
+  }
+  FusionOptions options;
+  options.outlier_share = 0;
+  options.steepest_slope = 10;
+  options.surface_gap_m = 1000;
+  const DemLayers layers = fuse_all(points, frame, options).layers;
+  for (std::size_t i = 0; i < layers.source.size(); ++i) {
+    const bool is_told = layers.source[i] != HeightSource::None;
+    EXPECT_EQ(is_told, std::isfinite(layers.elevation_m[i]));
+    EXPECT_EQ(is_told, std::isfinite(layers.variance_m2[i]));
+  }
+  EXPECT_GT(std::count(layers.source.begin(), layers.source.end(), HeightSource::Lidar), 880);
+}
+
 MeasuredPoints rolling_points(std::size_t count) {
   const testing::RollingGround ground(10, 10, 0, Seed{2});
   MeasuredPoints points;

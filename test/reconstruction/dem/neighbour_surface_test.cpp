@@ -72,6 +72,19 @@ TEST(NeighbourSurface, WithoutCellsOnlySlopesAreTold) {
   EXPECT_EQ(got.group, no_group);
 }
 
+// Points that are taken for exact, on ground of hundreds of metres.
+TEST(NeighbourSurface, RoughnessOfHighMountainsIsANumber) {
+  Window window;
+  for (std::size_t i = 0; i < window.size(); ++i) {
+    window[i].height_m = 1000 * normal(9, i);
+    window[i].variance_m2 = 1e-8F;
+  }
+  const NeighbourSketch sketch = sketch_neighbours(&window[middle], stride, {300, 300}, 1);
+  EXPECT_GT(sketch.rough_m2, 1e4F);
+  EXPECT_TRUE(std::isfinite(sketch.rough_m2));
+  EXPECT_TRUE(std::isfinite(sketch.rough_m4));
+}
+
 // Rough ground of a known variance under noise, which is alike or differs by 6 times as that of one
 // point and of 36: what a sketch tells of roughness is right in the mean, and as uncertain as it
 // says. The mean of 4000 windows scatters by 2 %, and Cauchy's weights take up to 20 %. A surface

@@ -5,11 +5,13 @@
 
 #include <algorithm>
 #include <cmath>
+#include <cstdint>
 #include <limits>
 #include <random>
 #include <vector>
 
 #include "reconstruction/dem/plate_dissection.h"
+#include "reconstruction/dem/plate_system.h"
 #include "test/reconstruction/dem/difference_plate.h"
 
 namespace groundray {
@@ -63,6 +65,41 @@ TEST(PlateDescent, FindsTheLeastBelowBoundsAlsoOfStiffPlates) {
       start = descent.heights();
     }
   }
+}
+
+// A few samples far below a stiff plate bend all of it, so that which ones are held down takes long
+// to find.
+TEST(PlateSystem, FindsTheLeastOfStiffPlatesUnderFewLowBounds) {
+  constexpr int side = 36, wide = side + 6, every = 5;
+  std::mt19937 random(7);
+  std::uniform_real_distribution<float> uniform(-1, 1);
+  std::vector<float> heights_m;
+  std::vector<std::int32_t> numbers(std::size_t{wide} * wide, plate_known);
+  std::vector<std::uint32_t> samples;
+  std::vector<double> most_m;
+  for (int row = 0; row < wide; ++row) {
+    for (int column = 0; column < wide; ++column) {
+      const auto at = static_cast<std::uint32_t>(row * wide + column);
+      const double hills_m = 5 * std::sin(row * 0.05) + 3 * std::cos(column * 0.07);
+      heights_m.push_back(static_cast<float>(hills_m) + uniform(random));
+      if (std::min(row, column) < 3 || std::max(row, column) >= wide - 3) continue;
+      numbers[at] = static_cast<std::int32_t>(samples.size());
+      most_m.push_back((7 * row + column) % every == 0 ? 0 : std::nan(""));
+      samples.push_back(at);
+    }
+  }
+  const PlateRaster raster{{wide, wide}, {1, 1}, heights_m, numbers};
+  PlateSystem system(raster, samples), other(raster, samples);
+  const BoundedPlate found = system.solve_below({0, 5}, most_m);
+  EXPECT_TRUE(found.is_best);
+  EXPECT_GT(found.at_bound, 10u);
+  // There is one least alone, from wherever it is looked for.
+  (void)other.solve_below({0, 5}, std::vector<double>(samples.size(), -3));
+  const BoundedPlate again = other.solve_below({0, 5}, most_m);
+  EXPECT_TRUE(again.is_best);
+  EXPECT_EQ(again.at_bound, found.at_bound);
+  for (std::size_t i = 0; i < samples.size(); ++i)
+    EXPECT_NEAR(again.heights_m[i], found.heights_m[i], 1e-6);
 }
 
 TEST(PlateDescent, TakesWhatNeedsNoBoundsAndWhatIsAllHeldDown) {
