@@ -83,7 +83,10 @@ def tests_of_file(file: Path) -> list[str]:
 def tests_by_file() -> dict[str, list[str]]:
     """Returns the names of all tests, by the names of their files."""
     files = [file for suffix in ("cpp", "py") for file in ROOT.glob(f"test/**/*_test.{suffix}")]
-    return {file.name: tests_of_file(file) for file in sorted(files)}
+    by_file: dict[str, list[str]] = {}
+    for file in sorted(files):
+        by_file.setdefault(file.name, []).extend(tests_of_file(file))
+    return by_file
 
 
 def golden_cases() -> list[str]:

@@ -1,5 +1,6 @@
 #include "terrain/band_file.h"
 
+#include <algorithm>
 #include <cmath>
 #include <cstdint>
 #include <limits>
@@ -49,16 +50,31 @@ RasterBands::Band read_band(GDALRasterBand& band, glm::ivec2 samples, int step) 
   return taken;
 }
 
+void check_size(glm::ivec2 samples, int bands) {
+  constexpr double most_bytes = 4.0 * (1 << 30);
+  const double bytes = 4.0 * samples.x * samples.y * bands;
+  if (bytes <= most_bytes) return;
+  throw Error(
+      "{} bands of {} x {} samples take {:.1f} GB, more than the {:.1f} GB that are read at once: "
+      "ask for fewer bands or samples",
+      bands, samples.x, samples.y, bytes / 1e9, most_bytes / 1e9);
+}
+
 }  // namespace
 
-RasterBands read_bands(const std::filesystem::path& path, std::size_t most_samples) {
+RasterBands read_bands(const std::filesystem::path& path, std::size_t most_samples,
+                       int most_bands) {
   return about(path, [&] {
+    if (most_samples == 0) throw Error("at most 0 samples of it are asked for: ask for 1 or more");
     const GDALDatasetUniquePtr dataset = open_raster(path);
     const glm::ivec2 samples(dataset->GetRasterXSize(), dataset->GetRasterYSize());
     RasterBands bands;
     bands.step = step_for(samples, most_samples);
     bands.samples = (samples - 1) / bands.step + 1;
-    for (int i = 1; i <= dataset->GetRasterCount(); ++i)
+    const int all = dataset->GetRasterCount();
+    const int count = most_bands > 0 ? std::min(all, most_bands) : all;
+    check_size(bands.samples, count);
+    for (int i = 1; i <= count; ++i)
       bands.bands.push_back(read_band(*dataset->GetRasterBand(i), samples, bands.step));
     return bands;
   });

@@ -22,12 +22,15 @@ struct RasterBands {
   std::vector<Band> bands;
 };
 
-/// Reads all bands of a raster, thinned to at most so many samples each: every step-th column of
+/// Reads the bands of a raster, thinned to at most so many samples each: every step-th column of
 /// every step-th row. Values are scaled as the file says; holes are what GDAL's masks hide.
 /// @throws Error that names the file, if it is no raster, one of complex numbers, or cannot be
 ///         read.
 /// @param most_samples  1 or more.
-RasterBands read_bands(const std::filesystem::path& path, std::size_t most_samples);
+/// @param most_bands    so many are read, from the first on, if there are more; 0 for all.
+/// @throws Error that names the file as well, if the numbers would take more than 4 GiB.
+RasterBands read_bands(const std::filesystem::path& path, std::size_t most_samples,
+                       int most_bands = 0);
 
 /// What kind of picture or model a raster's file seems to hold.
 struct RasterKind {

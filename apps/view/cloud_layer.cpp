@@ -1,6 +1,8 @@
 #include "apps/view/cloud_layer.h"
 
 #include <fmt/format.h>
+#include <vtkPointData.h>
+#include <vtkTypeInt64Array.h>
 
 #include <algorithm>
 #include <array>
@@ -129,6 +131,27 @@ void add_colour(Layer& layer, LayerColumn::Of of, const PointCloud& table,
   add_colours(layer, {.name = "colour", .unit = "", .of = of}, rgb);
 }
 
+// No column, so nobody's: the table's rows of the points.
+constexpr const char* rows_name = "groundray: rows of the table";
+
+void keep_rows(Layer& layer, std::span<const std::size_t> rows) {
+  auto array = vtkSmartPointer<vtkTypeInt64Array>::New();
+  array->SetName(rows_name);
+  array->SetNumberOfValues(static_cast<vtkIdType>(rows.size()));
+  for (std::size_t i = 0; i < rows.size(); ++i)
+    array->SetValue(static_cast<vtkIdType>(i), static_cast<vtkTypeInt64>(rows[i]));
+  layer.data->GetPointData()->AddArray(array);
+}
+
+// How many finite numbers floats cannot hold.
+std::size_t beyond_floats(const PointCloud::Column& column) {
+  const auto* const values = std::get_if<PointCloud::Values<double>>(&column.values);
+  if (values == nullptr) return 0;
+  return static_cast<std::size_t>(std::ranges::count_if(*values, [](double value) {
+    return std::isfinite(value) && std::abs(value) > std::numeric_limits<float>::max();
+  }));
+}
+
 bool is_finite(const glm::dvec3& p) {
   return std::isfinite(p.x) && std::isfinite(p.y) && std::isfinite(p.z);
 }
@@ -193,9 +216,18 @@ void add_table(Layer& layer, LayerColumn::Of of, const PointCloud& table,
                           .of = of,
                           .scale = scale_of(column.name)};
     if (counts_kinds(column.name)) described.categories = kinds_in(values);
+    if (const std::size_t count = beyond_floats(column); count > 0)
+      layer.facts.push_back(fmt::format("{} numbers of '{}' are beyond {:.2g}: taken as infinite",
+                                        count, column.name, std::numeric_limits<float>::max()));
     add_column(layer, std::move(described), values);
   }
   add_colour(layer, of, table, rows);
+}
+
+std::size_t table_row(const Layer& cloud, vtkIdType point) {
+  auto* const rows =
+      vtkTypeInt64Array::SafeDownCast(cloud.data->GetPointData()->GetAbstractArray(rows_name));
+  return static_cast<std::size_t>(rows == nullptr ? point : rows->GetValue(point));
 }
 
 Layer cloud_layer(const CloudContent& content, const PointCloud& table) {
@@ -215,7 +247,10 @@ Layer cloud_layer(const CloudContent& content, const PointCloud& table) {
   }
   add_table(layer, LayerColumn::Of::Points, table, rows);
   add_column(layer, {.name = "height", .unit = "m", .scale = ColourScale::Earth}, height);
-  if (rows.size() < content.p_m.size()) add_column(layer, {.name = "row", .unit = ""}, number);
+  if (rows.size() < content.p_m.size()) {
+    keep_rows(layer, rows);
+    if (layer.find("row") == nullptr) add_column(layer, {.name = "row", .unit = ""}, number);
+  }
   layer.coloured_by = layer.find("colour") != nullptr ? "colour" : "height";
   layer.facts.push_back(fmt::format("{} points, {} columns", rows.size(), layer.columns.size()));
   if (broken > 0) layer.facts.push_back(fmt::format("{} rows without a position", broken));

@@ -20,9 +20,13 @@ struct CloudContent {
 };
 
 /// Returns the layer of a cloud: a column for each of `table`, those of kinds with their numbers as
-/// categories; x, y and z of `p_m` as "height". Where rows are left out, the column "row" tells
-/// whose a point is.
+/// categories; x, y and z of `p_m` as "height". Where rows are left out, and the table has no such
+/// column, the column "row" tells whose a point is. Numbers beyond floats are infinite, with a fact
+/// that tells so.
 Layer cloud_layer(const CloudContent& content, const PointCloud& table);
+
+/// Returns which row of its table a point of a cloud's layer is of: exact, whatever columns it has.
+std::size_t table_row(const Layer& cloud, vtkIdType point);
 
 /// Returns the positions in a table by its columns x, y, z, however they are spelt; nothing if it
 /// has none.

@@ -11,8 +11,10 @@
 #include <glm/common.hpp>
 #include <glm/geometric.hpp>
 #include <limits>
+#include <numeric>
 #include <span>
 #include <unordered_map>
+#include <unordered_set>
 #include <vector>
 
 namespace groundray {
@@ -53,13 +55,41 @@ glm::dvec3 point(std::span<const float> at, std::int32_t i) {
   return {at[first], at[first + 1], at[first + 2]};
 }
 
-double area_m2(std::span<const float> at, std::span<const std::int32_t> corner) {
-  double twice = 0;
-  for (std::size_t i = 0; i + 2 < corner.size(); i += 3) {
-    const glm::dvec3 a = point(at, corner[i]);
-    twice += glm::length(glm::cross(point(at, corner[i + 1]) - a, point(at, corner[i + 2]) - a));
+// The area of each triangle.
+std::vector<double> areas_m2(std::span<const float> at, std::span<const std::int32_t> corner) {
+  std::vector<double> areas(corner.size() / 3);
+  for (std::size_t i = 0; i < areas.size(); ++i) {
+    const glm::dvec3 a = point(at, corner[3 * i]);
+    areas[i] = glm::length(
+                   glm::cross(point(at, corner[3 * i + 1]) - a, point(at, corner[3 * i + 2]) - a)) /
+               2;
+    if (!std::isfinite(areas[i])) areas[i] = 0;
   }
-  return twice / 2;
+  return areas;
+}
+
+struct Box {
+  glm::dvec3 low{0}, size{0};
+  double extent_m() const { return std::max({size.x, size.y, size.z}); }
+};
+
+Box box_of(std::span<const float> at) {
+  constexpr double none = std::numeric_limits<double>::infinity();
+  glm::dvec3 low(none), high(-none);
+  for (std::size_t i = 0; i < at.size(); ++i) {
+    if (!std::isfinite(at[i])) continue;
+    const auto k = static_cast<glm::length_t>(i % 3);
+    low[k] = std::min(low[k], static_cast<double>(at[i]));
+    high[k] = std::max(high[k], static_cast<double>(at[i]));
+  }
+  Box box;
+  for (glm::length_t k = 0; k < 3; ++k) {
+    if (low[k] <= high[k]) {
+      box.low[k] = low[k];
+      box.size[k] = high[k] - low[k];
+    }
+  }
+  return box;
 }
 
 struct Clustered {
@@ -67,49 +97,135 @@ struct Clustered {
   Triangles triangles;                         // of these vertices
 };
 
+// Cells of a grid from the lower corner of a box: so many on a side at most.
+constexpr double most_cells = 1 << 20;
+
 // For each vertex the first one of its grid cell.
-std::vector<std::uint32_t> first_of_cells(std::span<const float> at, double cell_m) {
+std::vector<std::uint32_t> first_of_cells(std::span<const float> at, const glm::dvec3& low,
+                                          double cell_m) {
   std::unordered_map<std::uint64_t, std::uint32_t> first;
   std::vector<std::uint32_t> of(at.size() / 3);
   first.reserve(of.size() / 4);
   for (std::size_t i = 0; i < of.size(); ++i) {
     std::uint64_t key = 0;
     for (std::size_t k = 0; k < 3; ++k) {
-      const double place = std::floor(static_cast<double>(at[3 * i + k]) / cell_m);
-      const auto number = static_cast<std::int64_t>(std::clamp(place, -1e6, 1e6)) + (1 << 20);
-      key = (key << 21U) | static_cast<std::uint64_t>(number);
+      const double place =
+          (static_cast<double>(at[3 * i + k]) - low[static_cast<glm::length_t>(k)]) / cell_m;
+      key <<= 21U;
+      if (place >= 0) key |= static_cast<std::uint64_t>(std::min(place, most_cells));
     }
     of[i] = first.try_emplace(key, static_cast<std::uint32_t>(i)).first->second;
   }
   return of;
 }
 
-Clustered cluster(std::span<const float> at, std::span<const std::int32_t> corner, double cell_m) {
-  const std::vector<std::uint32_t> first = first_of_cells(at, cell_m);
-  std::vector<std::uint32_t> number(first.size(), std::numeric_limits<std::uint32_t>::max());
-  Clustered kept;
-  for (std::size_t i = 0; i + 2 < corner.size(); i += 3) {
-    std::array<std::uint32_t, 3> place{};
-    for (std::size_t k = 0; k < 3; ++k) place[k] = first[static_cast<std::size_t>(corner[i + k])];
-    if (place[0] == place[1] || place[1] == place[2] || place[2] == place[0]) continue;
-    for (std::uint32_t& one : place) {
-      if (number[one] == std::numeric_limits<std::uint32_t>::max()) {
-        number[one] = static_cast<std::uint32_t>(kept.vertices.size());
-        kept.vertices.push_back(one);
+// Gathers triangles that stay, and numbers their vertices anew.
+class Gathered {
+ public:
+  explicit Gathered(std::size_t vertices)
+      : number_(vertices, std::numeric_limits<std::uint32_t>::max()) {}
+
+  void add(glm::uvec3 corner, std::size_t cell) {
+    for (glm::length_t k = 0; k < 3; ++k) {
+      std::uint32_t& number = number_[corner[k]];
+      if (number == std::numeric_limits<std::uint32_t>::max()) {
+        number = static_cast<std::uint32_t>(kept.vertices.size());
+        kept.vertices.push_back(corner[k]);
       }
-      one = number[one];
+      corner[k] = number;
     }
-    kept.triangles.emplace_back(place[0], place[1], place[2]);
-    kept.cells.push_back(static_cast<std::uint32_t>(i / 3));
+    kept.triangles.push_back(corner);
+    kept.cells.push_back(static_cast<std::uint32_t>(cell));
+  }
+
+  Clustered kept;
+
+ private:
+  std::vector<std::uint32_t> number_;
+};
+
+struct Scattered {
+  std::size_t operator()(const glm::uvec3& corner) const {
+    return scatter(corner.x ^ scatter(corner.y ^ scatter(corner.z)));
+  }
+};
+
+// The same triangle, seen from the same side, whichever corner it begins with.
+glm::uvec3 least_first(const glm::uvec3& corner) {
+  if (corner.y < corner.x && corner.y < corner.z) return {corner.y, corner.z, corner.x};
+  if (corner.z < corner.x && corner.z < corner.y) return {corner.z, corner.x, corner.y};
+  return corner;
+}
+
+Clustered cluster(std::span<const float> at, std::span<const std::int32_t> corner,
+                  const glm::dvec3& low, double cell_m) {
+  const std::vector<std::uint32_t> first = first_of_cells(at, low, cell_m);
+  Gathered gathered(first.size());
+  std::unordered_set<glm::uvec3, Scattered> seen;
+  for (std::size_t i = 0; i + 2 < corner.size(); i += 3) {
+    glm::uvec3 place;
+    for (std::size_t k = 0; k < 3; ++k)
+      place[static_cast<glm::length_t>(k)] = first[static_cast<std::size_t>(corner[i + k])];
+    if (place.x == place.y || place.y == place.z || place.z == place.x) continue;
+    if (seen.insert(least_first(place)).second) gathered.add(place, i / 3);
+  }
+  return std::move(gathered.kept);
+}
+
+// Clusters by the finest grid, about, that leaves so many triangles at most.
+Clustered cluster_to(std::span<const float> at, std::span<const std::int32_t> corner,
+                     double area_m2, std::size_t triangles) {
+  const Box box = box_of(at);
+  // Halves of the box: of its eight cells there are 112 triangles, each side counted.
+  const double coarsest_m = 0.51 * box.extent_m();
+  if (!(coarsest_m > 0)) return {};
+  // A plane of area A in squares of width s has 2 A / s^2 triangles.
+  double cell_m = std::clamp(std::sqrt(2 * area_m2 / static_cast<double>(triangles)),
+                             box.extent_m() / most_cells, coarsest_m);
+  Clustered kept = cluster(at, corner, box.low, cell_m);
+  while (kept.triangles.size() > triangles && cell_m < coarsest_m) {
+    const double excess =
+        static_cast<double>(kept.triangles.size()) / static_cast<double>(triangles);
+    cell_m = std::min(cell_m * std::max(1.15, std::sqrt(excess)), coarsest_m);
+    kept = cluster(at, corner, box.low, cell_m);
+  }
+  // Rough surfaces have much area in few cells.
+  for (int round = 0; round < 6 && 4 * kept.triangles.size() < triangles; ++round) {
+    cell_m /= 1.6;
+    Clustered finer = cluster(at, corner, box.low, cell_m);
+    if (finer.triangles.size() > triangles) break;
+    kept = std::move(finer);
   }
   return kept;
+}
+
+// The largest triangles; of equal ones, some from everywhere.
+Clustered largest(std::span<const std::int32_t> corner, std::span<const double> areas_m2,
+                  std::size_t vertices, std::size_t triangles) {
+  std::vector<std::uint32_t> cells(areas_m2.size());
+  std::iota(cells.begin(), cells.end(), 0U);
+  const auto end = cells.begin() + static_cast<std::ptrdiff_t>(triangles);
+  std::nth_element(cells.begin(), end, cells.end(), [&](std::uint32_t a, std::uint32_t b) {
+    // Areas that differ by rounding alone count as equal.
+    const auto first = static_cast<float>(areas_m2[a]), second = static_cast<float>(areas_m2[b]);
+    return first != second ? first > second : scatter(a) < scatter(b);
+  });
+  std::sort(cells.begin(), end);
+  Gathered gathered(vertices);
+  for (auto cell = cells.begin(); cell != end; ++cell) {
+    const std::int32_t* const c = &corner[std::size_t{3} * *cell];
+    gathered.add(glm::uvec3(c[0], c[1], c[2]), *cell);
+  }
+  return std::move(gathered.kept);
 }
 
 }  // namespace
 
 vtkSmartPointer<vtkPolyData> thin_points(const Layer& cloud, std::size_t points) {
   const std::size_t all = cloud.points();
-  const double share = all == 0 ? 1 : static_cast<double>(points) / static_cast<double>(all);
+  points = std::max(points, fewest_elements);
+  if (all <= points) return cloud.data;
+  const double share = static_cast<double>(points) / static_cast<double>(all);
   const double limit = share * 4294967296.0;
   std::vector<std::uint32_t> rows;
   for (std::uint32_t i = 0; i < all; ++i) {
@@ -120,16 +236,14 @@ vtkSmartPointer<vtkPolyData> thin_points(const Layer& cloud, std::size_t points)
 
 vtkSmartPointer<vtkPolyData> thin_triangles(const Layer& surface, std::size_t triangles) {
   const auto corner = corners(*surface.data);
+  triangles = std::max(triangles, fewest_elements);
   if (corner.size() / 3 <= triangles) return surface.data;
   const auto at = coordinates(*surface.data);
-  // A plane of area A in squares of width s has 2 A / s^2 triangles.
-  const double area = std::max(area_m2(at, corner), 1e-30);
-  double cell_m = std::sqrt(2 * area / static_cast<double>(std::max<std::size_t>(triangles, 1)));
-  Clustered kept = cluster(at, corner, cell_m);
-  while (kept.triangles.size() > triangles) {
-    cell_m *= 1.3;
-    kept = cluster(at, corner, cell_m);
-  }
+  const std::vector<double> areas = areas_m2(at, corner);
+  const double area_m2 = std::accumulate(areas.begin(), areas.end(), 0.0);
+  Clustered kept = cluster_to(at, corner, area_m2, triangles);
+  if (8 * kept.triangles.size() < triangles)
+    kept = largest(corner, areas, at.size() / 3, triangles);
   auto thinned = take_points(*surface.data, kept.vertices);
   set_triangles(*thinned, kept.triangles);
   copy_rows(*thinned->GetCellData(), *surface.data->GetCellData(), kept.cells);

@@ -19,6 +19,8 @@
 namespace groundray {
 namespace {
 
+constexpr int most_bands = 32;
+
 // Heights of every step-th sample.
 std::vector<float> thinned_heights(const DemFile& file, int step) {
   const glm::ivec2 samples = file.header().samples;
@@ -106,11 +108,15 @@ std::vector<float> slopes_deg(const Layer& layer) {
 
 }  // namespace
 
+DemOptions options_for(const std::filesystem::path& dem) {
+  return {.reproject_to = inspect_raster(dem).is_geographic ? "utm" : ""};
+}
+
 Layer dem_layer(const std::string& name, const std::filesystem::path& path,
                 std::size_t most_samples) {
   const DemFile file(path);
   const DemHeader& header = file.header();
-  const RasterBands bands = read_bands(path, most_samples);
+  const RasterBands bands = read_bands(path, most_samples, most_bands);
   const std::vector<float> heights = thinned_heights(file, bands.step);
   const Kept kept =
       keep_used(grid_triangles(bands.samples, heights, header.step_m.x * header.step_m.y > 0),
@@ -142,8 +148,12 @@ Layer dem_layer(const std::string& name, const std::filesystem::path& path,
   add_column(layer, {.name = "slope", .unit = "deg", .of = LayerColumn::Of::Cells},
              slopes_deg(layer));
   layer.coloured_by = "height";
-  layer.facts.push_back(fmt::format("{} x {} samples, {} bands", header.samples.x, header.samples.y,
-                                    bands.bands.size()));
+  const int all_bands = inspect_raster(path).bands;
+  layer.facts.push_back(
+      fmt::format("{} x {} samples, {} bands", header.samples.x, header.samples.y, all_bands));
+  if (all_bands > most_bands)
+    layer.facts.push_back(
+        fmt::format("shown with the first {} of {} bands", most_bands, all_bands));
   if (bands.step > 1)
     layer.facts.push_back(
         fmt::format("shown with every {}. sample of each row and column", bands.step));

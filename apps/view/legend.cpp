@@ -17,6 +17,7 @@
 #include <array>
 #include <cmath>
 #include <cstddef>
+#include <limits>
 #include <optional>
 #include <string>
 #include <vector>
@@ -79,9 +80,9 @@ struct Mark {
 // Round numbers in a range: 1, 2 or 5 times a power of ten apart.
 std::vector<Mark> marks_in(glm::dvec2 range) {
   const double span = range.y - range.x;
-  if (!(span > 0)) return {{0.5, fmt::format("{:.6g}", range.x)}};
   constexpr double wanted = 5;
   const double power = std::pow(10, std::floor(std::log10(span / wanted)));
+  if (!std::isnormal(power) || !std::isfinite(span)) return {{0.5, fmt::format("{:.6g}", range.x)}};
   double step = 10 * power;
   for (const double factor : {5.0, 2.0, 1.0}) {
     if (span / (factor * power) >= wanted - 1.5 && span / (factor * power) <= 2 * wanted) {
@@ -92,8 +93,14 @@ std::vector<Mark> marks_in(glm::dvec2 range) {
   const int decimals = std::max(0, -static_cast<int>(std::floor(std::log10(step) + 1e-9)));
   const bool is_plain = decimals <= 5 && std::max(std::abs(range.x), std::abs(range.y)) < 1e7;
   std::vector<Mark> marks;
-  for (double i = std::ceil(range.x / step - 1e-9); i * step <= range.y + 1e-9 * span; ++i) {
-    const double value = i == 0 ? 0 : i * step;
+  const double first = std::ceil(range.x / step - 1e-9);
+  constexpr int most = 50;
+  double last = -std::numeric_limits<double>::infinity();
+  for (int i = 0; i < most; ++i) {
+    const double value = first + i == 0 ? 0 : (first + i) * step;
+    if (value > range.y + 1e-9 * span) break;
+    if (value <= last) continue;  // no double tells them apart
+    last = value;
     marks.push_back({(value - range.x) / span, is_plain ? fmt::format("{:.{}f}", value, decimals)
                                                         : fmt::format("{:.3g}", value)});
   }

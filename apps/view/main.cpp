@@ -25,7 +25,7 @@ constexpr int wrong_usage = 2;
 struct Arguments {
   std::vector<std::filesystem::path> inputs;
   std::filesystem::path screenshot;
-  std::string size = "1280x720", look_from, look_at;
+  std::string size, look_from, look_at;
   int turntable = 0;
   StillSpec still;
   std::optional<double> point_size;
@@ -37,7 +37,7 @@ void add_options(CLI::App& app, Arguments& arguments) {
                  "Scene (.yaml), dataset (folder), mesh, cloud, DEM or picture; any number");
   app.add_option("--screenshot", arguments.screenshot,
                  "Write a picture (.png) of them and end: without a window, display or X server");
-  app.add_option("--size", arguments.size, "Of the picture, px")->capture_default_str();
+  app.add_option("--size", arguments.size, "Of the picture that --screenshot writes, px: 1280x720");
   app.add_option("--look-from", arguments.look_from, "X,Y,Z of the eye, m, as the map has them");
   app.add_option("--look-at", arguments.look_at, "X,Y,Z of what is in the picture's middle");
   app.add_option("--colour-by", arguments.still.colour_by,
@@ -51,15 +51,21 @@ void add_options(CLI::App& app, Arguments& arguments) {
                  "Write so many pictures of a whole turn into the folder that --screenshot names");
 }
 
-int take_stills(Arguments& arguments) {
-  if (arguments.inputs.empty())
-    throw Error("--screenshot: there is nothing to be shown; name a file or a folder");
+void read_spec(Arguments& arguments) {
   StillSpec& spec = arguments.still;
-  spec.size_px = parse_size(arguments.size);
+  if (!arguments.size.empty()) spec.size_px = parse_size(arguments.size);
   if (!arguments.look_from.empty()) spec.from_w_m = parse_place(arguments.look_from, "--look-from");
   if (!arguments.look_at.empty()) spec.at_w_m = parse_place(arguments.look_at, "--look-at");
+  if (spec.from_w_m && spec.from_w_m == spec.at_w_m)
+    throw Error("--look-from and --look-at are one place: an eye looks somewhere else");
   spec.point_size_px = arguments.point_size;
   spec.has_legend = !arguments.no_legend;
+}
+
+int take_stills(const Arguments& arguments) {
+  if (arguments.inputs.empty())
+    throw Error("--screenshot: there is nothing to be shown; name a file or a folder");
+  const StillSpec& spec = arguments.still;
   std::vector<Opened> inputs;
   for (const std::filesystem::path& input : arguments.inputs) {
     inputs.push_back(open_any(input));
@@ -76,11 +82,15 @@ int take_stills(Arguments& arguments) {
 }
 
 int show_window(int& argc, char** argv, const Arguments& arguments) {
-  WindowStart start{.inputs = arguments.inputs, .wireframe = arguments.still.is_wireframe};
-  if (!arguments.still.colour_by.empty()) start.coloured_by = arguments.still.colour_by.front();
-  if (!arguments.look_from.empty() && !arguments.look_at.empty())
-    start.look = Look{.from_w_m = parse_place(arguments.look_from, "--look-from"),
-                      .at_w_m = parse_place(arguments.look_at, "--look-at")};
+  const StillSpec& spec = arguments.still;
+  const WindowStart start{.inputs = arguments.inputs,
+                          .from_w_m = spec.from_w_m,
+                          .at_w_m = spec.at_w_m,
+                          .coloured_by = spec.colour_by,
+                          .hidden = spec.hide,
+                          .point_size_px = spec.point_size_px,
+                          .wireframe = spec.is_wireframe,
+                          .has_legend = spec.has_legend};
   return run_window(argc, argv, start);
 }
 
@@ -102,6 +112,11 @@ int run(int argc, char** argv) {
     fmt::print(stderr, "groundray-view: --turntable needs --screenshot FOLDER\n");
     return wrong_usage;
   }
+  if (arguments.screenshot.empty() && !arguments.size.empty()) {
+    fmt::print(stderr, "groundray-view: --size needs --screenshot FILE\n");
+    return wrong_usage;
+  }
+  read_spec(arguments);
   if (arguments.screenshot.empty()) return show_window(argc, argv, arguments);
   vtkObject::GlobalWarningDisplayOff();  // faults are thrown
   return take_stills(arguments);

@@ -3,8 +3,11 @@
 #include <fmt/format.h>
 
 #include <algorithm>
+#include <array>
 #include <cctype>
+#include <cmath>
 #include <fstream>
+#include <span>
 #include <string_view>
 #include <system_error>
 
@@ -69,6 +72,22 @@ void check_size(const fs::path& path, const OpenLimits& limits) {
       static_cast<double>(limits.file_bytes) / 1e9);
 }
 
+// Floats hold larger places, but pictures of them would be empty: the rule is that of meshes.
+void check_places(const Layer& layer, const fs::path& path) {
+  constexpr double most_m = 1e15;
+  const std::span<const float> at = coordinates(*layer.data);
+  std::array<bool, 3> is_near{true, true, true};
+  for (std::size_t i = 0; i < at.size(); ++i) {
+    const double origin = layer.origin_w_m[static_cast<glm::length_t>(i % 3)];
+    is_near[i % 3] &= std::abs(origin + static_cast<double>(at[i])) <= most_m;
+  }
+  if (is_near[0] && is_near[1] && is_near[2]) return;
+  throw Error(
+      "{}: something in '{}' is more than {:g} m from the origin: is it a mark for what is not "
+      "known?",
+      path.string(), layer.name, most_m);
+}
+
 void open_scene(Opened& opened, const OpenLimits& limits) {
   auto world = std::make_shared<const World>(load_world(opened.path));
   opened.world = world;
@@ -94,7 +113,10 @@ void name_labels(Layer& layer, const RecordedNames& names) {
 }
 
 void open_dataset(Opened& opened) {
+  // Whole, for its last part is its name: that of "." would be none.
+  opened.path = fs::absolute(opened.path);
   if (!fs::is_directory(opened.path)) opened.path = opened.path.parent_path();
+  opened.path = (opened.path / "").lexically_normal().parent_path();
   opened.dataset = std::make_shared<const RecordedDataset>(read_dataset(opened.path));
   opened.run = std::make_shared<const RecordedRun>(read_recorded_run(opened.path));
   for (const RecordedLidar& lidar : opened.dataset->lidars) {
@@ -153,7 +175,10 @@ void open_dem(Opened& opened, const OpenLimits& limits) {
   const RasterKind kind = inspect_raster(opened.path);
   if (kind.is_geographic)
     opened.notes.emplace_back("placed by angles: warped to the UTM zone of its centre");
-  if (kind.bands > 1) {
+  if (kind.bands > 1 && kind.is_geographic)
+    opened.notes.push_back(fmt::format(
+        "of its {} bands the first alone is shown: warp it to metres to see all", kind.bands));
+  if (kind.bands > 1 && !kind.is_geographic) {
     opened.layers.push_back(dem_layer(name, opened.path, limits.triangles / 2));
     return;
   }
@@ -226,6 +251,7 @@ Opened open_any(const fs::path& path, const OpenLimits& limits) {
                 path.string());
   }
   for (const Layer& layer : opened.layers) {
+    check_places(layer, path);
     for (const std::string& fact : layer.facts) {
       if (fact.starts_with("thinned") || fact.starts_with("shown with"))
         opened.notes.push_back(fmt::format("{}: {}", layer.name, fact));
@@ -256,6 +282,7 @@ Layer scan_layer(const RecordedDataset& dataset, const RecordedLidar& lidar,
     content.p_m[i] = lidar.X_DS.pose_at(time) * content.p_m[i];
   }
   Layer layer = cloud_layer(content, table);
+  check_places(layer, frame.file);
   layer.coloured_by = "range";
   layer.point_size_px = 3;
   return layer;

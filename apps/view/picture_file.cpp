@@ -42,9 +42,11 @@ PictureFile exr_numbers(const ExrFile& file, const ExrChannel& channel) {
   const glm::dvec2 range = colour_range(values, ColourScale::Even);
   PictureFile shown{Image8(file.width, file.height, 3), {}};
   for (std::size_t i = 0; i < values.size(); ++i) {
-    const double share = (static_cast<double>(values[i]) - range.x) / (range.y - range.x);
+    // Of equal numbers each is in the middle.
+    const double share =
+        range.y > range.x ? (static_cast<double>(values[i]) - range.x) / (range.y - range.x) : 0.5;
     const glm::dvec3 colour =
-        std::isfinite(share) ? colour_on(ColourScale::Even, share) : glm::dvec3(0.45);
+        std::isfinite(values[i]) ? colour_on(ColourScale::Even, share) : glm::dvec3(0.45);
     for (std::size_t k = 0; k < 3; ++k)
       shown.picture.values()[3 * i + k] =
           static_cast<std::uint8_t>(std::lround(255 * colour[static_cast<glm::length_t>(k)]));
@@ -71,7 +73,7 @@ PictureFile read_raster_picture(const std::filesystem::path& path) {
     throw Error("{}: {} x {} px, more than the {} that can be shown", path.string(), kind.samples.x,
                 kind.samples.y, most_image_pixels);
   constexpr std::size_t most_pixels = std::size_t{1} << 24U;
-  const RasterBands bands = read_bands(path, most_pixels);
+  const RasterBands bands = read_bands(path, most_pixels, 3);
   PictureFile shown{Image8(bands.samples.x, bands.samples.y, 3), {}};
   for (std::size_t k = 0; k < 3; ++k) {
     const std::vector<float>& values = bands.bands[k].values;

@@ -56,8 +56,11 @@ std::string with_unit(std::string text, const std::string& unit) {
 std::string value_text(const ImageChannel& channel, const std::vector<double>& values,
                        const RecordedNames& names) {
   if (channel.kind == Kind::Categories) {
-    const std::string name = name_of(channel, static_cast<std::uint32_t>(values[0]), names);
-    return name.empty() ? fmt::format("{}", values[0]) : fmt::format("{} ({})", values[0], name);
+    const double value = values[0];
+    const bool counts = value >= 0 && value <= 4294967295.0 && value == std::floor(value);
+    if (!counts) return text_of(channel, value);
+    const std::string name = name_of(channel, static_cast<std::uint32_t>(value), names);
+    return name.empty() ? fmt::format("{}", value) : fmt::format("{} ({})", value, name);
   }
   if (values.size() == 1) return with_unit(text_of(channel, values[0]), channel.unit);
   if (std::ranges::all_of(values, [](double value) { return std::isnan(value); })) return "none";

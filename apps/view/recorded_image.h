@@ -77,7 +77,8 @@ class RecordedImage {
   /// @throws Error naming the file, if one is damaged, there is none, or their sizes differ.
   RecordedImage(const std::filesystem::path& stem, const RecordedNames& names);
 
-  /// Reads one file: PNG, JPEG, Radiance or OpenEXR, whoever made it. @throws Error likewise.
+  /// Reads one file, whoever made it: PNG, JPEG, Radiance, OpenEXR or a raster as read_picture
+  /// shows it. @throws Error likewise.
   explicit RecordedImage(const std::filesystem::path& file);
 
   glm::ivec2 size_px() const noexcept { return size_px_; }

@@ -13,6 +13,7 @@
 #include <system_error>
 #include <utility>
 
+#include "apps/view/picture_file.h"
 #include "apps/view/recorded_image.h"
 #include "core/error.h"
 #include "core/exr_reader.h"
@@ -318,8 +319,11 @@ std::vector<ImageChannel> read_file_channels(const fs::path& file) {
     channels.push_back(stage_channel(file, "light", "", Kind::Light));
   else if (ending == ".flo")
     channels.push_back(flo_channel(file));
-  else
+  else if (ending == ".png" || ending == ".jpg" || ending == ".jpeg")
     channels.push_back(picture_channel(file));
+  else  // a raster of bands: GeoTIFF and its like
+    channels.push_back(
+        {.name = "picture", .kind = Kind::Picture, .values = read_picture(file).picture});
   for (ImageChannel& channel : channels) channel.file = file.filename().string();
   return channels;
 }

@@ -9,10 +9,10 @@
 #include <optional>
 #include <utility>
 
+#include "apps/view/dem_layer.h"
 #include "apps/view/ground_colour.h"
 #include "apps/view/terrain_surface.h"
 #include "core/error.h"
-#include "terrain/band_file.h"
 #include "terrain/deviation.h"
 #include "terrain/refined_tiles.h"
 
@@ -120,8 +120,7 @@ TerrainFollower::TerrainFollower(std::shared_ptr<const World> world, const Terra
 
 TerrainFollower::TerrainFollower(const std::filesystem::path& dem, const TerrainDrawing& drawing)
     : impl_(std::make_unique<Impl>()) {
-  const DemOptions options{.reproject_to = inspect_raster(dem).is_geographic ? "utm" : ""};
-  impl_->source = open_source(dem, options, std::nullopt, drawing.memory_bytes);
+  impl_->source = open_source(dem, options_for(dem), std::nullopt, drawing.memory_bytes);
   impl_->drawing = drawing;
 }
 

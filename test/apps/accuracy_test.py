@@ -38,7 +38,10 @@ def test_every_golden_case_holds_a_claim():
     assert held == set(lister.golden_cases()), "docs/claims.yaml must name each case of test/golden"
 
 
-@pytest.mark.parametrize("library", ["core", "terrain", "sensors", "reconstruction", "golden"])
+@pytest.mark.parametrize(
+    "library",
+    ["core", "terrain", "sensors", "reconstruction", "golden", "apps", "view"],
+)
 def test_the_names_in_the_sources_are_those_of_the_programs(library):
     listed = subprocess.run(
         [PROGRAMS / f"{library}_test", "--gtest_list_tests"],

@@ -13,6 +13,7 @@
 namespace groundray {
 namespace {
 
+using ::testing::AllOf;
 using testing::GeoTiff;
 using ::testing::HasSubstr;
 using testing::TemporaryFolder;
@@ -51,6 +52,29 @@ TEST(BandFile, ThinsByWholeSteps) {
   EXPECT_EQ(bands.samples, glm::ivec2(4, 3));
   EXPECT_THAT(bands.bands[0].values,
               ::testing::ElementsAre(0, 2, 4, 6, 20, 22, 24, 26, 40, 42, 44, 46));
+}
+
+TEST(BandFile, ReadsNoMoreBandsThanAskedFor) {
+  const TemporaryFolder folder;
+  two_bands().save(folder / "two.tif");
+  EXPECT_EQ(read_bands(folder / "two.tif", 1000, 1).bands.size(), 1u);
+  EXPECT_EQ(read_bands(folder / "two.tif", 1000, 9).bands.size(), 2u);
+}
+
+// 300 bands of 4 million samples take 4.8 GB; nothing of them is read.
+TEST(BandFile, RefusesMoreThanMemoryHolds) {
+  const TemporaryFolder folder;
+  std::ofstream vrt(folder / "many.vrt");
+  vrt << "<VRTDataset rasterXSize=\"2000\" rasterYSize=\"2000\">";
+  for (int band = 1; band <= 300; ++band)
+    vrt << "<VRTRasterBand dataType=\"Float32\" band=\"" << band << "\"/>";
+  vrt << "</VRTDataset>";
+  vrt.close();
+  EXPECT_THAT([&] { read_bands(folder / "many.vrt", 4'000'000); },
+              ThrowsMessage<Error>(AllOf(HasSubstr("many.vrt"), HasSubstr("300 bands"))));
+  EXPECT_EQ(read_bands(folder / "many.vrt", 10'000, 5).bands.size(), 5u);
+  EXPECT_THAT([&] { read_bands(folder / "many.vrt", 0); },
+              ThrowsMessage<Error>(HasSubstr("1 or more")));
 }
 
 TEST(BandFile, HonoursScaleAndOffset) {

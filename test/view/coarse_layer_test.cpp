@@ -7,6 +7,8 @@
 
 #include <algorithm>
 #include <cmath>
+#include <cstdint>
+#include <glm/geometric.hpp>
 #include <set>
 
 #include "apps/view/mesh_layer.h"
@@ -52,6 +54,122 @@ TEST(CoarseLayer, MorePointsHoldTheFewer) {
   const std::set<float> more = numbers_in(*thin_points(cloud, 5'000));
   EXPECT_TRUE(std::ranges::includes(more, few));
   EXPECT_EQ(numbers_in(*thin_points(cloud, 20'000)).size(), 20'000u);
+}
+
+TEST(CoarseLayer, SmallCloudsStayWhole) {
+  const Layer cloud = numbered_points(400);
+  EXPECT_EQ(thin_points(cloud, 0), cloud.data);
+  EXPECT_EQ(thin_points(Layer{.name = "none", .data = make_points(0)}, 0)->GetNumberOfPoints(), 0);
+}
+
+// Triangles on a grid of columns x rows points, each of height(column, row).
+template <typename Height>
+Layer relief(int columns, int rows, double step_m, const glm::dvec3& low, const Height& height) {
+  TriangleMesh mesh;
+  for (int row = 0; row < rows; ++row) {
+    for (int column = 0; column < columns; ++column)
+      mesh.vertices_m.push_back(low +
+                                glm::dvec3(column * step_m, row * step_m, height(column, row)));
+  }
+  for (int row = 0; row + 1 < rows; ++row) {
+    for (int column = 0; column + 1 < columns; ++column) {
+      const auto a = static_cast<std::uint32_t>(row * columns + column);
+      const auto up = static_cast<std::uint32_t>(columns);
+      mesh.triangles.emplace_back(a, a + 1, a + up);
+      mesh.triangles.emplace_back(a + 1, a + up + 1, a + up);
+    }
+  }
+  return mesh_layer("relief", mesh, glm::dvec3(0));
+}
+
+double area_m2(vtkPolyData& data) {
+  const auto at = coordinates(data);
+  const auto corner = corners(data);
+  double area = 0;
+  for (std::size_t i = 0; i + 2 < corner.size(); i += 3) {
+    std::array<glm::dvec3, 3> p;
+    for (std::size_t k = 0; k < 3; ++k) {
+      const auto first = std::size_t{3} * static_cast<std::size_t>(corner[i + k]);
+      p[k] = {at[first], at[first + 1], at[first + 2]};
+    }
+    area += glm::length(glm::cross(p[1] - p[0], p[2] - p[0])) / 2;
+  }
+  return area;
+}
+
+// A plane about the origin, whose quadrants it crosses, and the same one far off: so many triangles
+// as are asked for, a quarter of them at least, that cover it but for a cell at its rim.
+TEST(CoarseLayer, PlanesStayWhole) {
+  for (const double low_m : {-40.0, 0.0, 1e5}) {
+    const Layer plane = relief(201, 201, 0.4, glm::dvec3(low_m), [](int, int) { return 0.0; });
+    for (const std::size_t most : {0U, 700U, 5'000U, 30'000U}) {
+      const auto thinned = thin_triangles(plane, most);
+      const std::size_t limit = std::max(most, fewest_elements);
+      const auto kept = static_cast<std::size_t>(thinned->GetNumberOfPolys());
+      EXPECT_LE(kept, limit);
+      EXPECT_GE(kept, limit / 4);
+      const double cell_m = 80 / std::sqrt(static_cast<double>(limit) / 8);
+      EXPECT_NEAR(area_m2(*thinned), 6400, 4 * 80 * cell_m);
+      EXPECT_LE(area_m2(*thinned), 6400 * 1.001);
+    }
+  }
+}
+
+// Spikes have much more area than their grid has cells; and no limit takes all of them away.
+TEST(CoarseLayer, RoughSurfacesStay) {
+  const Layer rough = relief(150, 150, 0.1, {-7, -7, 0}, [](int column, int row) {
+    return (column * 7 + row * 13) % 11 * 0.3;
+  });
+  for (const std::size_t most : {1U, 2'000U, 20'000U}) {
+    const std::size_t limit = std::max(most, fewest_elements);
+    const auto kept = static_cast<std::size_t>(thin_triangles(rough, most)->GetNumberOfPolys());
+    EXPECT_LE(kept, limit);
+    EXPECT_GE(kept, limit / 8);
+  }
+}
+
+// A thousand tetrahedra of 10 cm on a square kilometre, each smaller than any cell that would do.
+TEST(CoarseLayer, ThingsSmallerThanACellDoNotVanish) {
+  TriangleMesh posts;
+  for (std::uint32_t i = 0; i < 1000; ++i) {
+    const glm::dvec3 foot(i % 32 * 31, i / 32 * 31, 0);
+    for (const glm::dvec3& p :
+         {glm::dvec3(0), glm::dvec3(0.1, 0, 0), glm::dvec3(0, 0.1, 0), glm::dvec3(0, 0, 0.1)})
+      posts.vertices_m.push_back(foot + p);
+    for (const glm::uvec3& t :
+         {glm::uvec3(0, 2, 1), glm::uvec3(0, 1, 3), glm::uvec3(1, 2, 3), glm::uvec3(0, 3, 2)})
+      posts.triangles.push_back(t + 4 * i);
+  }
+  const Layer layer = mesh_layer("posts", posts, glm::dvec3(0));
+  const auto thinned = thin_triangles(layer, 600);
+  EXPECT_LE(thinned->GetNumberOfPolys(), 600);
+  EXPECT_GT(thinned->GetNumberOfPolys(), 600 / 8);
+  std::array<double, 6> bounds{};
+  thinned->GetBounds(bounds.data());
+  EXPECT_GT(bounds[1] - bounds[0], 760);  // of 961 m
+  EXPECT_GT(bounds[3] - bounds[2], 760);
+  // One that has few triangles is drawn as it is.
+  posts.triangles.resize(60);
+  const Layer few = mesh_layer("few", posts, glm::dvec3(0));
+  EXPECT_EQ(thin_triangles(few, 0), few.data);
+}
+
+// Triangles without extent or area have no cell at all.
+TEST(CoarseLayer, BearsWhatHasNoExtent) {
+  for (const double length_m : {0.0, 1e-30, 3.0}) {
+    TriangleMesh line;
+    for (std::uint32_t i = 0; i < 3000; ++i) {
+      line.vertices_m.emplace_back(i % 3 * length_m, 0, 0);
+      if (i % 3 == 0) line.triangles.emplace_back(i, i + 1, i + 2);
+    }
+    Layer layer{.name = "line", .kind = LayerKind::Mesh, .data = make_points(3000)};
+    const auto at = coordinates(*layer.data);
+    for (std::size_t i = 0; i < 3000; ++i) at[3 * i] = static_cast<float>(line.vertices_m[i].x);
+    set_triangles(*layer.data, line.triangles);
+    const auto thinned = thin_triangles(layer, 700);
+    EXPECT_LE(thinned->GetNumberOfPolys(), 700);
+    EXPECT_GT(thinned->GetNumberOfPolys(), 0);
+  }
 }
 
 // A sphere of radius 1: its thinned surface is made of its own vertices, all round.

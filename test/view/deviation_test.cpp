@@ -86,7 +86,7 @@ std::vector<glm::dvec3> random_places(std::size_t count, double size_m) {
 }
 
 // The mesh lies within its sagitta inside of the sphere.
-TEST(Deviation, FromASphereIsTheDifferenceOfRadii) {
+TEST(DeviationFromTruth, FromASphereIsTheDifferenceOfRadii) {
   constexpr std::uint32_t bands = 60;
   const TrueMesh truth(sphere(bands));
   const double side_rad = std::numbers::pi / bands;
@@ -106,7 +106,7 @@ TEST(Deviation, FromASphereIsTheDifferenceOfRadii) {
   EXPECT_EQ(deviation.figures.beyond, 0U);
 }
 
-TEST(Deviation, FromASoupIsThatFromTheMesh) {
+TEST(DeviationFromTruth, FromASoupIsThatFromTheMesh) {
   const TriangleMesh mesh = sphere(12);
   const auto places_m = random_places(2'000, 1.5);
   const Deviation whole = deviation_from_mesh(places_m, TrueMesh(mesh));
@@ -144,20 +144,20 @@ StarSides look_at_star(std::uint64_t seed, std::size_t places) {
   return sides;
 }
 
-TEST(Deviation, TellsInsideFromOutsideOfAStar) {
+TEST(DeviationFromTruth, TellsInsideFromOutsideOfAStar) {
   const StarSides sides = look_at_star(3, 5'000);
   EXPECT_EQ(sides.wrong, 0);
   EXPECT_GT(sides.inside, 200);
   EXPECT_GT(sides.wrong_by_face, 10);  // the star is a trial
 }
 
-TEST(DeviationProof, TellsInsideFromOutsideOfManyStars) {
+TEST(DeviationFromTruthProof, TellsInsideFromOutsideOfManyStars) {
   const std::size_t stars = groundray::testing::proof_size(4, 200);
   for (std::uint64_t seed = 10; seed < 10 + stars; ++seed)
     EXPECT_EQ(look_at_star(seed, 4'000).wrong, 0) << "star " << seed;
 }
 
-TEST(Deviation, IsNoneBesideTheBorder) {
+TEST(DeviationFromTruth, IsNoneBesideTheBorder) {
   const TrueMesh plate({.vertices_m = {{0, 0, 1}, {2, 0, 1}, {2, 2, 1}, {0, 2, 1}},
                         .triangles = {{0, 1, 2}, {0, 2, 3}},
                         .levels = {}});
@@ -173,7 +173,7 @@ TEST(Deviation, IsNoneBesideTheBorder) {
 }
 
 // The plane z = x / 2 - y / 4 + 3; distances across it are those up times the normal's z.
-TEST(Deviation, FromATiltedPlaneHasAClosedForm) {
+TEST(DeviationFromTruth, FromATiltedPlaneHasAClosedForm) {
   const auto height_m = [](double x, double y) { return x / 2 - y / 4 + 3; };
   std::vector<float> heights_m;
   for (int row = 0; row < 9; ++row) {
@@ -212,7 +212,7 @@ TEST(Deviation, FromATiltedPlaneHasAClosedForm) {
   EXPECT_NEAR(across.figures.rms_m, normal_z * up.figures.rms_m, 1e-7);
 }
 
-TEST(Deviation, OfADemFromItselfIsZeroButForHoles) {
+TEST(DeviationFromTruth, OfADemFromItselfIsZeroButForHoles) {
   std::vector<float> heights_m(30, 2);
   heights_m[7] = static_cast<float>(nan);
   const HeightGrid grid({6, 5}, {10, 20}, {2, -2}, heights_m);
@@ -227,7 +227,7 @@ TEST(Deviation, OfADemFromItselfIsZeroButForHoles) {
 }
 
 // By hand: of -1, 0, 1, 2, 10 the median is 1, and the distances to it are 2, 1, 0, 1, 9.
-TEST(Deviation, HasTheUsualFigures) {
+TEST(DeviationFromTruth, HasTheUsualFigures) {
   const auto nothing = static_cast<float>(nan);
   const DeviationFigures figures = figures_of({10, nothing, -1, 1, 0, 2, nothing});
   EXPECT_EQ(figures.count, 5U);
@@ -248,7 +248,7 @@ TEST(Deviation, HasTheUsualFigures) {
   EXPECT_THAT(figure_lines(none)[1], HasSubstr("none"));
 }
 
-TEST(Deviation, IsCountedInBins) {
+TEST(DeviationFromTruth, IsCountedInBins) {
   const std::vector<float> values{-2, -1, -0.5F, 0, 0.5F, 1, 3, static_cast<float>(nan)};
   const DeviationHistogram histogram = histogram_of(values, 4, std::pair(-1.0, 1.0));
   EXPECT_THAT(histogram.counts, ElementsAre(1, 1, 1, 2));
@@ -265,7 +265,7 @@ TEST(Deviation, IsCountedInBins) {
   EXPECT_THROW(histogram_of(values, 3, std::pair(1.0, -1.0)), Error);
 }
 
-TEST(Deviation, IsTheSameForAnyNumberOfThreads) {
+TEST(DeviationFromTruth, IsTheSameForAnyNumberOfThreads) {
   const TrueMesh truth(sphere(20));
   const auto places_m = random_places(100'000, 2);
   const Deviation many = deviation_from_mesh(places_m, truth);
@@ -273,7 +273,7 @@ TEST(Deviation, IsTheSameForAnyNumberOfThreads) {
   EXPECT_EQ(deviation_from_mesh(places_m, truth).signed_m, many.signed_m);
 }
 
-TEST(Deviation, TellsHowFarItIsAndStops) {
+TEST(DeviationFromTruth, TellsHowFarItIsAndStops) {
   const TrueMesh truth(sphere(6));
   const auto places_m = random_places(150'000, 2);
   std::vector<double> shares;
@@ -292,7 +292,7 @@ TEST(Deviation, TellsHowFarItIsAndStops) {
   EXPECT_EQ(told, 2U);
 }
 
-TEST(Deviation, RefusesOrBearsBadMeshes) {
+TEST(DeviationFromTruth, RefusesOrBearsBadMeshes) {
   EXPECT_THROW(TrueMesh(TriangleMesh{}), Error);
   EXPECT_THROW(
       TrueMesh({.vertices_m = {{0, 0, nan}, {1, 0, 0}, {0, 1, 0}}, .triangles = {{0, 1, 2}}}),
@@ -307,7 +307,7 @@ TEST(Deviation, RefusesOrBearsBadMeshes) {
   EXPECT_EQ(deviation_from_mesh({}, wild).figures.count, 0U);
 }
 
-TEST(Deviation, SaysHowMuchAgrees) {
+TEST(DeviationFromTruth, SaysHowMuchAgrees) {
   const TriangleMesh plate{.vertices_m = {{0, 0, 0}, {1, 0, 0}, {1, 1, 0}, {0, 1, 0}},
                            .triangles = {{0, 1, 2}, {0, 2, 3}},
                            .levels = {}};

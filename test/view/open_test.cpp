@@ -14,6 +14,8 @@
 #include <sstream>
 #include <string>
 
+#include "apps/view/cloud_layer.h"
+#include "apps/view/dem_layer.h"
 #include "core/error.h"
 #include "core/exr_io.h"
 #include "core/mesh_io.h"
@@ -151,6 +153,114 @@ TEST(Open, RowsWithoutAPlaceAreLeftOut) {
   EXPECT_THAT(layer.facts, ::testing::Contains("1 rows without a position"));
   EXPECT_EQ(layer.value(*layer.find("intensity"), 1), 0.25);
   EXPECT_EQ(layer.value(*layer.find("row"), 1), 1);
+}
+
+// A column of that name of the file's own stays what it is.
+TEST(Open, PointsKnowTheirRows) {
+  TemporaryFolder folder;
+  write_text(folder / "rows.pcd",
+             "VERSION .7\nFIELDS x y z row\nSIZE 4 4 4 4\nTYPE F F F F\nCOUNT 1 1 1 1\n"
+             "WIDTH 3\nHEIGHT 1\nPOINTS 3\nDATA ascii\n1 2 3 70\nnan nan nan 80\n4 5 6 90\n");
+  const Layer layer = open_any(folder / "rows.pcd").layers.at(0);
+  EXPECT_EQ(layer.value(*layer.find("row"), 1), 90);
+  EXPECT_EQ(table_row(layer, 0), 0u);
+  EXPECT_EQ(table_row(layer, 1), 2u);
+  EXPECT_EQ(table_row(open_any(Samples::get()["cloud.ply"]).layers.at(0), 1), 1u);
+}
+
+TEST(Open, RefusesPlacesBeyondAnyPicture) {
+  TemporaryFolder folder;
+  const auto cloud = [&](const std::string& x, const std::string& amplitude) {
+    write_text(folder / "far.pcd",
+               "VERSION .7\nFIELDS x y z amplitude\nSIZE 8 8 8 8\nTYPE F F F F\nCOUNT 1 1 1 1\n"
+               "WIDTH 2\nHEIGHT 1\nPOINTS 2\nDATA ascii\n1 2 3 4\n" +
+                   x + " 2 3 " + amplitude + "\n");
+    return folder / "far.pcd";
+  };
+  for (const char* const x : {"1e300", "-2e15", "1e38"}) {
+    EXPECT_THAT([&] { open_any(cloud(x, "5")); },
+                ThrowsMessage<Error>(AllOf(HasSubstr("far.pcd"), HasSubstr("1e+15 m"))));
+  }
+  const Layer layer = open_any(cloud("1e14", "1e300")).layers.at(0);
+  EXPECT_THAT(layer.facts, ::testing::Contains(HasSubstr("1 numbers of 'amplitude' are beyond")));
+  testing::GeoTiff dem{.size = {8, 8}};
+  dem.values.assign(64, 1e38);
+  dem.save(folder / "far.tif");
+  EXPECT_THAT([&] { open_any(folder / "far.tif"); }, ThrowsMessage<Error>(HasSubstr("far.tif")));
+}
+
+// A cone of heights in degrees, with a second band: its first is shown in the UTM zone, and can be
+// measured against.
+TEST(Open, DemsInDegreesAreWarped) {
+  TemporaryFolder folder;
+  testing::GeoTiff dem{
+      .size = {30, 20}, .geotransform = {9, 1e-3, 0, 47, 0, -1e-3}, .crs = "EPSG:4326"};
+  dem.values.assign(1200, 250);
+  dem.save(folder / "degrees.tif");
+  write_text(folder / "degrees.vrt",
+             "<VRTDataset rasterXSize=\"30\" rasterYSize=\"20\"><SRS>EPSG:4326</SRS><GeoTransform>"
+             "9,0.001,0,47,0,-0.001</GeoTransform>"
+             "<VRTRasterBand dataType=\"Float32\" band=\"1\"><Description>elevation</Description>"
+             "<SimpleSource><SourceFilename relativeToVRT=\"1\">degrees.tif</SourceFilename>"
+             "<SourceBand>1</SourceBand></SimpleSource></VRTRasterBand>"
+             "<VRTRasterBand dataType=\"Float32\" band=\"2\"><SimpleSource><SourceFilename "
+             "relativeToVRT=\"1\">degrees.tif</SourceFilename><SourceBand>2</SourceBand>"
+             "</SimpleSource></VRTRasterBand></VRTDataset>");
+  const Opened opened = open_any(folder / "degrees.vrt");
+  const Layer& layer = opened.layers.at(0);
+  EXPECT_THAT(opened.notes, ::testing::Contains(HasSubstr("UTM zone")));
+  EXPECT_THAT(opened.notes, ::testing::Contains(HasSubstr("of its 2 bands the first")));
+  // 9 degrees east is the central meridian of zone 32, 47 degrees north 5205 km from the equator.
+  for (vtkIdType i = 0; i < layer.data->GetNumberOfPoints(); ++i) {
+    const glm::dvec3 p = layer.p_w_m(i);
+    EXPECT_NEAR(p.x, 501'000, 2'000);
+    EXPECT_NEAR(p.y, 5'204'000, 3'000);
+    EXPECT_NEAR(p.z, 250, 1e-3);
+  }
+  EXPECT_EQ(options_for(folder / "degrees.vrt").reproject_to, "utm");
+  EXPECT_EQ(options_for(Samples::get()["fused.tif"]).reproject_to, "");
+}
+
+TEST(Open, RastersOfManyBandsShowTheFirst) {
+  TemporaryFolder folder;
+  testing::GeoTiff many{.size = {6, 5}};
+  for (int i = 0; i < 30 * 40; ++i) many.values.push_back(i);
+  many.save(folder / "bands.tif");
+  std::string vrt =
+      "<VRTDataset rasterXSize=\"6\" rasterYSize=\"5\"><SRS>EPSG:32631</SRS><GeoTransform>"
+      "500000,2,0,5150000,0,-2</GeoTransform>";
+  for (int band = 1; band <= 40; ++band)
+    vrt += fmt::format(
+        "<VRTRasterBand dataType=\"Float32\" band=\"{0}\"><Description>{1}</Description>"
+        "<SimpleSource><SourceFilename relativeToVRT=\"1\">bands.tif</SourceFilename><SourceBand>"
+        "{0}</SourceBand></SimpleSource></VRTRasterBand>",
+        band, band == 1 ? "elevation" : fmt::format("of {}", band));
+  write_text(folder / "bands.vrt", vrt + "</VRTDataset>");
+  const Opened opened = open_any(folder / "bands.vrt");
+  EXPECT_THAT(opened.notes, ::testing::Contains(HasSubstr("the first 32 of 40 bands")));
+  EXPECT_NE(opened.layers.at(0).find("of 32"), nullptr);
+  EXPECT_EQ(opened.layers.at(0).find("of 33"), nullptr);
+}
+
+// A dataset has a name wherever it is opened from.
+TEST(Open, DatasetsAreNamedFromWithin) {
+  const std::filesystem::path before = std::filesystem::current_path();
+  const std::filesystem::path folder = std::filesystem::absolute(SampleDataset::get().path());
+  std::filesystem::current_path(folder);
+  for (const char* const path : {".", "dataset.yaml", "./dataset.yaml", "./"})
+    EXPECT_EQ(open_any(path).path.filename(), (folder / "").parent_path().filename()) << path;
+  std::filesystem::current_path(before);
+}
+
+// Equal numbers are no missing ones: viridis has no grey.
+TEST(Open, ConstantPicturesHaveAColour) {
+  TemporaryFolder folder;
+  ImageF depth(4, 3, 1);
+  std::ranges::fill(depth.values(), 7.0f);
+  write_exr(folder / "flat.exr", {{{"Z"}, &depth}});
+  const Opened opened = open_any(folder / "flat.exr");
+  const auto pixel = opened.picture->at(1, 1);
+  EXPECT_NE(pixel[0], pixel[1]);
 }
 
 TEST(Open, DemsHaveTheirBandsAndNoVoids) {

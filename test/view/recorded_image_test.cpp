@@ -192,6 +192,22 @@ TEST(RecordedImage, BearsImagesWithoutAnyNumber) {
   EXPECT_EQ(value_at(image, "normal", {0, 0}), "none");
 }
 
+// Files of others may hold what no kind's number is.
+TEST(RecordedImage, TellsNumbersThatAreNoKind) {
+  const TemporaryFolder folder;
+  const double infinite = std::numeric_limits<double>::infinity();
+  ImageF values(5, 1, 1);
+  const std::array<double, 5> numbers = {std::numeric_limits<double>::quiet_NaN(), -3, 1e20,
+                                         infinite, 2.5};
+  for (std::size_t i = 0; i < 5; ++i) values.values()[i] = static_cast<float>(numbers[i]);
+  write_exr(folder / "a.exr", {{{"Label"}, &values}});
+  const RecordedImage image(folder / "a.exr");
+  const std::array<const char*, 5> texts = {"none", "-3", "1e+20", "infinite", "2.5"};
+  for (int i = 0; i < 5; ++i)
+    EXPECT_EQ(value_at(image, "label", {i, 0}), texts[static_cast<std::size_t>(i)]);
+  EXPECT_EQ(image.draw(0).picture.width(), 5);
+}
+
 // Of light 1 % is cut off; sRGB makes the middle of the rest brighter.
 TEST(RecordedImage, DrawsLight) {
   const TemporaryFolder folder;

@@ -1,6 +1,9 @@
 #include <fmt/format.h>
 #include <gmock/gmock.h>
 #include <gtest/gtest.h>
+#include <vtkActor.h>
+#include <vtkPolyData.h>
+#include <vtkPolyDataMapper.h>
 
 #include <chrono>
 #include <cmath>
@@ -51,6 +54,11 @@ Layer points(std::size_t count, double size_m) {
   return layer;
 }
 
+// What a layer is drawn with now.
+vtkPolyData& drawn(const View& view, const std::string& layer) {
+  return *vtkPolyDataMapper::SafeDownCast(view.find(layer)->actor->GetMapper())->GetInput();
+}
+
 double frames_per_s(View& view, double size_m, int frames) {
   const auto begin = std::chrono::steady_clock::now();
   const glm::dvec3 middle(size_m / 2, size_m / 2, 0);
@@ -74,6 +82,8 @@ TEST(ViewProof, KeepsUpWhileMoving) {
   const double still = frames_per_s(view, cells, 3);
   view.set_moving(true);
   frames_per_s(view, cells, 2);
+  EXPECT_GT(drawn(view, "surface").GetNumberOfPolys(), 5'000);
+  EXPECT_GT(drawn(view, "points").GetNumberOfPoints(), 5'000);
   const double moving = frames_per_s(view, cells, 30);
   fmt::print("{} triangles, {} points: {:.1f} frames/s while moving, {:.1f} in full\n",
              view.find("surface")->triangles(), view.find("points")->points(), moving, still);
@@ -82,6 +92,9 @@ TEST(ViewProof, KeepsUpWhileMoving) {
     EXPECT_GE(moving, 15);
   }
   EXPECT_GT(moving, 1);
+  // However slow it was: both are still there.
+  EXPECT_GT(drawn(view, "surface").GetNumberOfPolys(), 1'000);
+  EXPECT_GT(drawn(view, "points").GetNumberOfPoints(), 1'000);
 }
 
 }  // namespace

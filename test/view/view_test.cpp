@@ -268,6 +268,44 @@ TEST(View, ExplainsItsColours) {
   EXPECT_GT(violet, 5);
 }
 
+// Ranges that no round numbers divide, or doubles do not resolve.
+TEST(View, ExplainsAnyRange) {
+  constexpr glm::ivec2 size(200, 150);
+  View view(make_off_screen_window(size));
+  view.add(points_at("cloud", places, colours));
+  view.colour_by("cloud", "number");
+  constexpr double most = std::numeric_limits<double>::max();
+  for (const glm::dvec2 range :
+       {glm::dvec2(1e17, 1e17 + 64), glm::dvec2(-1e300, -1e300 * (1 - 1e-15)),
+        glm::dvec2(-most, most), glm::dvec2(0, 5e-324), glm::dvec2(0, 1e-307),
+        glm::dvec2(1, 1 + 1e-15), glm::dvec2(0, most)}) {
+    view.set_range("cloud", "number", range);
+    EXPECT_EQ(view.picture(size).width(), size.x);
+  }
+}
+
+// Small things are not thinned away beside large ones.
+TEST(View, KeepsSmallThingsWhileMoving) {
+  std::vector<glm::dvec3> many(600'000, glm::dvec3(0));
+  View view(make_off_screen_window({300, 200}));
+  view.add(points_at("cloud", many, std::vector<glm::u8vec3>(many.size())));
+  view.add(points_at("few", places, colours));
+  TriangleMesh field;
+  for (std::uint32_t i = 0; i < 90'000; ++i) {
+    for (const glm::dvec3& p : {glm::dvec3(0), glm::dvec3(0.01, 0, 0), glm::dvec3(0, 0.01, 0)})
+      field.vertices_m.push_back(p + glm::dvec3(i % 300 * 0.01, i / 300 * 0.01, 0));
+    field.triangles.push_back(glm::uvec3(0, 1, 2) + 3 * i);
+  }
+  view.add(mesh_layer("field", field, far_away));
+  view.add(square_at("floor", 0));
+  view.set_moving(true);
+  view.render();
+  EXPECT_EQ(drawn_points(view, "few"), 4);
+  EXPECT_EQ(drawn_points(view, "floor"), 4);
+  EXPECT_GT(drawn_points(view, "field"), 5'000);
+  EXPECT_LT(drawn_points(view, "field"), 270'000);
+}
+
 TEST(View, FitsWhatIsVisible) {
   View view(make_off_screen_window({200, 200}));
   view.add(square_at("floor", 0));

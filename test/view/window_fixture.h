@@ -11,7 +11,6 @@
 #include <QTest>
 #include <filesystem>
 #include <functional>
-#include <set>
 #include <string>
 
 #include "apps/view/window/style.h"
@@ -94,19 +93,34 @@ class WindowTest : public ::testing::Test {
     return text;
   }
 
-  /// Returns how many colours the view has on the screen, to 5 bits each.
-  std::size_t colours_in_view() const {
-    QTest::qWait(50);
-    const QPoint corner = window_->canvas().mapToGlobal({0, 0});
-    const QImage image = QGuiApplication::primaryScreen()
-                             ->grabWindow(0, corner.x(), corner.y(), window_->canvas().width(),
-                                          window_->canvas().height())
-                             .toImage();
-    std::set<QRgb> colours;
-    for (int y = 0; y < image.height(); y += 2) {
-      for (int x = 0; x < image.width(); x += 2) colours.insert(image.pixel(x, y) & 0xf8f8f8U);
+  /// Returns on how many of the screen's pixels a layer is seen: those that change when it is
+  /// hidden.
+  std::size_t pixels_of(const std::string& layer) const {
+    View& view = window_->view();
+    view.set_legend_visible(false);
+    const QImage with = view_on_screen();
+    view.set_visible(layer, false);
+    const QImage without = view_on_screen();
+    view.set_visible(layer, true);
+    view.set_legend_visible(true);
+    view_on_screen();
+    std::size_t changed = 0;
+    for (int y = 0; y < with.height(); ++y) {
+      for (int x = 0; x < with.width(); ++x) {
+        changed += with.pixel(x, y) != without.pixel(x, y) ? 1U : 0U;
+      }
     }
-    return colours.size();
+    return changed;
+  }
+
+  QImage view_on_screen() const {
+    window_->canvas().draw();
+    QTest::qWait(100);
+    const QPoint corner = window_->canvas().mapToGlobal({0, 0});
+    return QGuiApplication::primaryScreen()
+        ->grabWindow(0, corner.x(), corner.y(), window_->canvas().width(),
+                     window_->canvas().height())
+        .toImage();
   }
 
   std::unique_ptr<Window> window_;

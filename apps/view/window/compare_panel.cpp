@@ -13,6 +13,7 @@
 #include <algorithm>
 
 #include "apps/view/window/histogram_plot.h"
+#include "core/error.h"
 
 namespace groundray {
 namespace {
@@ -121,21 +122,38 @@ void ComparePanel::update_buttons() {
   progress_->setVisible(is_comparing());
 }
 
+// A surface that is shown may have changed since it was offered: terrain follows the eye.
+Truth ComparePanel::chosen_truth(std::size_t index) const {
+  Truth truth = truths_[index];
+  if (const auto* offered = std::get_if<Layer>(&truth.what)) {
+    const Layer* shown = hooks_.layer(offered->name);
+    if (shown == nullptr) throw Error("{}: it is not shown any more", truth.name);
+    truth.what = Layer(*shown);
+  }
+  return truth;
+}
+
 void ComparePanel::compare_chosen() {
   const Layer* layer = hooks_.layer(layer_->currentText().toStdString());
   const int index = truth_->currentIndex();
   if (layer == nullptr || index < 0 || is_comparing()) return;
-  const auto work = [layer = *layer, truth = truths_[static_cast<std::size_t>(index)],
-                     tolerance_m = tolerance_->value()](const std::stop_token& stop,
-                                                        const Told& told) {
-    return compare(layer, truth, tolerance_m, stop, [&](double share) { told(share, ""); });
+  Truth truth;
+  try {
+    truth = chosen_truth(static_cast<std::size_t>(index));
+  } catch (const Error& error) {
+    if (hooks_.failed) hooks_.failed(error.what());
+    return;
+  }
+  const auto work = [measured = *layer, truth, tolerance_m = tolerance_->value()](
+                        const std::stop_token& stop, const Told& told) {
+    return compare(measured, truth, tolerance_m, stop, [&](double share) { told(share, ""); });
   };
   progress_->setValue(0);
   title_->clear();
   job_.start(work,
-             [this](const Comparison& comparison) {
+             [this, measured = *layer](const Comparison& comparison) {
                show_comparison(comparison);
-               if (hooks_.compared) hooks_.compared(comparison);
+               if (hooks_.compared) hooks_.compared(comparison, measured);
              },
              {.told =
                   [this](double share, const std::string&) {

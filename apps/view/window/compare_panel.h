@@ -26,13 +26,15 @@ class ComparePanel : public QWidget {
  public:
   struct Hooks {
     std::function<const Layer*(const std::string&)> layer{};  ///< of a name, null if it is gone
-    std::function<void(const Comparison&)> compared{};
+    /// Of the layer as it was when the comparison began.
+    std::function<void(const Comparison&, const Layer& measured)> compared{};
     std::function<void(const std::string&)> failed{};
   };
 
   explicit ComparePanel(Hooks hooks, QWidget* parent = nullptr);
 
-  /// Offers what there is; what was chosen stays chosen.
+  /// Offers what there is; what was chosen stays chosen. Of a truth that is shown the layer's name
+  /// is enough: it is taken as it is when it is compared with.
   void offer(const std::vector<std::string>& layers, std::vector<Truth> truths);
   /// Chooses by name; nothing happens to what has none such.
   void choose(const std::string& layer, const std::string& truth);
@@ -44,6 +46,7 @@ class ComparePanel : public QWidget {
  private:
   void build();
   void update_buttons();
+  Truth chosen_truth(std::size_t index) const;
   void show_comparison(const Comparison& comparison);
 
   Hooks hooks_;

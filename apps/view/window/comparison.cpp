@@ -5,6 +5,7 @@
 #include <cmath>
 #include <utility>
 
+#include "apps/view/dem_layer.h"
 #include "core/error.h"
 #include "terrain/dem_io.h"
 
@@ -54,7 +55,7 @@ Comparison compare(const Layer& layer, const Truth& truth, double tolerance_m,
     comparison.deviation = deviation_from_ground(places_m(layer, terrain.header().origin_w_m),
                                                  terrain.ground(), glm::dvec3(0), stop, progress);
   } else if (const auto* file = std::get_if<Truth::DemFile>(&truth.what)) {
-    const Dem dem = load_dem(file->path);
+    const Dem dem = load_dem(file->path, options_for(file->path));
     comparison.deviation = deviation_from_ground(places_m(layer, dem.origin_w_m), dem.grid,
                                                  glm::dvec3(0), stop, progress);
   } else {

@@ -85,7 +85,7 @@ void ImagePanel::read(const ImageSource& source) {
                            ? std::make_shared<const RecordedImage>(source.file, source.names)
                            : std::make_shared<const RecordedImage>(source.file);
     const std::size_t channel = image->find(wanted).value_or(0);
-    return Shown{image, channel, image->draw(channel)};
+    return Shown{source, image, channel, image->draw(channel)};
   });
 }
 
@@ -96,7 +96,9 @@ void ImagePanel::redraw() {
     return;
   }
   const std::size_t channel = image_->find(channel_name_).value_or(0);
-  start([image = image_, channel] { return Shown{image, channel, image->draw(channel)}; });
+  start([source = *shown_, image = image_, channel] {
+    return Shown{source, image, channel, image->draw(channel)};
+  });
 }
 
 void ImagePanel::start(std::function<Shown()> work) {
@@ -114,13 +116,17 @@ void ImagePanel::start(std::function<Shown()> work) {
              [this](Shown shown) { take(std::move(shown)); },
              {.failed =
                   [this](const std::string& fault) {
-                    clear();
+                    source_.reset();
+                    show_nothing();
                     if (hooks_.failed) hooks_.failed(fault);
                   },
               .ended = ended});
 }
 
 void ImagePanel::take(Shown shown) {
+  const bool is_another = !shown_ || shown_->file != shown.source.file;
+  if (is_another) area_->mark(std::nullopt);  // it was a place in what was shown before
+  shown_ = std::move(shown.source);
   image_ = std::move(shown.image);
   is_filling_ = true;
   channel_->clear();
@@ -133,14 +139,21 @@ void ImagePanel::take(Shown shown) {
   const bool is_picture = image_->channels()[shown.channel].kind == ImageChannel::Kind::Picture;
   legend_->show_legend(is_picture ? std::nullopt : std::optional(shown.drawn.legend));
   const glm::ivec2 size = image_->size_px();
-  title_->setText(QString::fromStdString(
-      fmt::format("{}   {} x {} px", source_ ? source_->title : "", size.x, size.y)));
+  title_->setText(
+      QString::fromStdString(fmt::format("{}   {} x {} px", shown_->title, size.x, size.y)));
 }
 
 void ImagePanel::clear() {
+  job_.abandon();
+  is_stale_ = false;
   source_.reset();
   next_.reset();
+  show_nothing();
+}
+
+void ImagePanel::show_nothing() {
   image_ = nullptr;
+  shown_.reset();
   area_->clear();
   legend_->show_legend(std::nullopt);
   title_->clear();

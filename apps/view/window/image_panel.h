@@ -19,6 +19,7 @@ namespace groundray {
 
 class LegendStrip;
 class PictureArea;
+class Timeline;
 
 /// Where an image is: a frame of a dataset's camera, or a picture file.
 struct ImageSource {
@@ -26,6 +27,8 @@ struct ImageSource {
   std::filesystem::path file;  ///< of a frame, without an ending
   bool is_frame = false;
   RecordedNames names{};
+  std::shared_ptr<const Timeline> timeline{};  ///< of a frame: whose it is; else null
+  std::size_t sensor = 0, frame = 0;           ///< of a frame: which of the timeline's
 };
 
 /// What a camera saw, with all that is known of each pixel.
@@ -47,16 +50,20 @@ class ImagePanel : public QWidget {
   /// Reads an image, off the window's thread, and shows it when it is there, in the channel that is
   /// chosen. While one is read, of those asked for only the last is read after it.
   void show_image(const ImageSource& source);
+  /// Shows nothing; what is being read is not heard of again.
   void clear();
   void mark(std::optional<glm::dvec2> pixel);
 
   /// Returns what is shown, null for nothing.
   std::shared_ptr<const RecordedImage> image() const { return image_; }
+  /// Returns where that is from, none if nothing is shown.
+  const std::optional<ImageSource>& shown() const noexcept { return shown_; }
   PictureArea& area() noexcept { return *area_; }
   bool is_busy() const noexcept { return job_.is_running(); }
 
  private:
   struct Shown {
+    ImageSource source;
     std::shared_ptr<const RecordedImage> image;
     std::size_t channel = 0;
     DrawnChannel drawn;
@@ -67,10 +74,12 @@ class ImagePanel : public QWidget {
   void redraw();
   void start(std::function<Shown()> work);
   void take(Shown shown);
+  void show_nothing();
   void point_at(std::optional<glm::ivec2> pixel);
 
   Hooks hooks_;
-  std::optional<ImageSource> source_, next_;
+  std::optional<ImageSource> source_, next_;  // asked for last, and after that
+  std::optional<ImageSource> shown_;          // image_ is from there
   std::shared_ptr<const RecordedImage> image_;
   std::string channel_name_;  // that is wanted, whichever the image has
   bool is_filling_ = false;

@@ -29,11 +29,13 @@ void Job::run(Work work, Hooks hooks) {
 Job::Finish Job::worked(const Work& work, const std::stop_token& stop, std::uint64_t turn) {
   const auto failure = [this](std::string message) -> Finish {
     return [this, message = std::move(message)] {
-      if (hooks_.failed) hooks_.failed(message);
+      const auto failed = hooks_.failed;  // it may start what has other hooks
+      if (failed) failed(message);
     };
   };
   Finish cancelled = [this] {
-    if (hooks_.cancelled) hooks_.cancelled();
+    const auto hook = hooks_.cancelled;
+    if (hook) hook();
   };
   try {
     Finish finish = work(stop, [this, turn](double share, const std::string& step) {
@@ -65,9 +67,11 @@ void Job::end(std::uint64_t turn, const Finish& finish) {
   try {
     finish();
   } catch (const std::exception& error) {
-    if (turn == turn_ && hooks_.failed) hooks_.failed(error.what());
+    const auto failed = hooks_.failed;
+    if (turn == turn_ && failed) failed(error.what());
   }
-  if (turn == turn_ && hooks_.ended) hooks_.ended();
+  const auto ended = hooks_.ended;
+  if (turn == turn_ && ended) ended();
 }
 
 void Job::cancel() {

@@ -40,10 +40,24 @@ QString kind_text(LayerKind kind) {
   return {};
 }
 
-QDoubleSpinBox* number_box(double least, double most, int decimals) {
-  auto* box = new QDoubleSpinBox;
+// Any number, however small or large, with its significant digits.
+class EndBox : public QDoubleSpinBox {
+ public:
+  QString textFromValue(double value) const override { return QString::number(value, 'g', digits); }
+  double valueFromText(const QString& text) const override { return text.toDouble(); }
+  QValidator::State validate(QString& text, int&) const override {
+    bool is_number = false;
+    text.toDouble(&is_number);
+    return is_number ? QValidator::Acceptable : QValidator::Intermediate;
+  }
+
+ private:
+  static constexpr int digits = 9;
+};
+
+QDoubleSpinBox* number_box(QDoubleSpinBox* box, double least, double most, int decimals) {
+  box->setDecimals(decimals);  // first: it rounds the ends
   box->setRange(least, most);
-  box->setDecimals(decimals);
   box->setKeyboardTracking(false);
   box->setMinimumWidth(70);  // the widest number would take half of the window
   box->setSizePolicy(QSizePolicy::Ignored, QSizePolicy::Fixed);
@@ -109,8 +123,12 @@ QWidget* LayerPanel::build_looks() {
   column_ = new QComboBox;
   column_->setObjectName("colour_by");
   form->addRow("Colour by", column_);
-  low_ = number_box(-1e12, 1e12, 4);
-  high_ = number_box(-1e12, 1e12, 4);
+  constexpr double any = 1e38;
+  constexpr int any_decimals = 60;
+  low_ = number_box(new EndBox, -any, any, any_decimals);
+  low_->setObjectName("range_low");
+  high_ = number_box(new EndBox, -any, any, any_decimals);
+  high_->setObjectName("range_high");
   range_ = new QWidget;
   auto* ends = new QHBoxLayout(range_);
   ends->setContentsMargins(0, 0, 0, 0);
@@ -122,7 +140,7 @@ QWidget* LayerPanel::build_looks() {
   opacity_->setObjectName("opacity");
   opacity_->setRange(0, 100);
   form->addRow("Opacity", opacity_);
-  point_size_ = number_box(1, 20, 1);
+  point_size_ = number_box(new QDoubleSpinBox, 1, 32, 1);
   point_size_->setSuffix(" px");
   form->addRow("Point size", point_size_);
   wireframe_ = new QCheckBox("Wireframe");
@@ -149,7 +167,8 @@ void LayerPanel::connect_looks() {
   connect(point_size_, qOverload<double>(&QDoubleSpinBox::valueChanged), this,
           [this](double size) { change([&] { view_.set_point_size(selected(), size); }); });
   for (QDoubleSpinBox* box : {low_, high_}) {
-    connect(box, qOverload<double>(&QDoubleSpinBox::valueChanged), this, [this] { set_range(); });
+    connect(box, qOverload<double>(&QDoubleSpinBox::valueChanged), this,
+            [this, is_low = box == low_] { set_range(is_low); });
   }
 }
 
@@ -163,11 +182,16 @@ void LayerPanel::change(const std::function<void()>& what) {
   if (hooks_.changed) hooks_.changed();
 }
 
-void LayerPanel::set_range() {
+// The end that is edited; the other stays, to its last digit.
+void LayerPanel::set_range(bool is_low) {
   const Layer* layer = view_.find(selected());
-  if (layer == nullptr || !(low_->value() < high_->value())) return;
-  const std::string column = layer->coloured_by;
-  change([&] { view_.set_range(selected(), column, {low_->value(), high_->value()}); });
+  const LayerColumn* column = layer == nullptr ? nullptr : layer->find(layer->coloured_by);
+  if (column == nullptr) return;
+  glm::dvec2 range = column->range;
+  (is_low ? range.x : range.y) = (is_low ? low_ : high_)->value();
+  if (!(range.x < range.y)) return;
+  const std::string name = column->name;
+  change([&] { view_.set_range(selected(), name, range); });
 }
 
 QTreeWidgetItem* LayerPanel::branch(const QStringList& path) {

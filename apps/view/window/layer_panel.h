@@ -48,7 +48,7 @@ class LayerPanel : public QWidget {
   void show_looks();
   void show_columns(const Layer& layer);
   void show_range(const Layer& layer);
-  void set_range();
+  void set_range(bool is_low);
   void change(const std::function<void()>& what);
 
   View& view_;

@@ -5,6 +5,7 @@
 #include <algorithm>
 #include <cmath>
 
+#include "apps/view/cloud_layer.h"
 #include "apps/view/window/line_layer.h"
 #include "core/ply_io.h"
 
@@ -32,13 +33,6 @@ std::string value_text(const Layer& layer, const LayerColumn& column, vtkIdType 
   if (kind != column.categories.end()) return fmt::format("{} ({})", value, kind->second);
   return column.unit.empty() ? fmt::format("{:.7g}", value)
                              : fmt::format("{:.7g} {}", value, column.unit);
-}
-
-// Which row of its table a point is of: rows without a place have no point.
-std::size_t table_row(const Layer& layer, vtkIdType point) {
-  const LayerColumn* column = layer.find("row");
-  return static_cast<std::size_t>(column == nullptr ? static_cast<double>(point)
-                                                    : layer.value(*column, point));
 }
 
 void add_beam(FactTable::Facts& facts, const EchoBeam& beam) {
@@ -86,6 +80,7 @@ void Picker::clear() {
 void Picker::pick(const Picked& picked, const ShownScan* scan) {
   const Layer* layer = view_.find(picked.layer);
   if (layer == nullptr) return;
+  job_.abandon();  // an echo that was clicked before is not to be told of any more
   for (const std::string& name : {beam_name, footprint_name}) view_.remove(name);
   if (scan != nullptr && picked.of == LayerColumn::Of::Points) {
     show_echo(*layer, picked, *scan);

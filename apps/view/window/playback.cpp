@@ -54,6 +54,8 @@ void add_moving(std::vector<Layer>& layers, const World& world, nanoseconds time
 Playback::Playback(View& view, Hooks hooks) : view_(view), hooks_(std::move(hooks)) {}
 
 void Playback::open(Recording recording) {
+  job_.abandon();
+  is_stale_ = false;
   recording_ = std::move(recording);
   time_ = recording_.timeline->begin();
   scans_.clear();
@@ -63,6 +65,7 @@ void Playback::open(Recording recording) {
 
 void Playback::close() {
   job_.abandon();
+  is_stale_ = false;
   recording_ = {};
   scans_.clear();
   frames_.clear();
@@ -115,7 +118,10 @@ void Playback::show_image() {
     hooks_.image({.title = fmt::format("{} {:06}", camera_, frame.number),
                   .file = frame.file,
                   .is_frame = true,
-                  .names = timeline.names()});
+                  .names = timeline.names(),
+                  .timeline = recording_.timeline,
+                  .sensor = shown->first,
+                  .frame = shown->second});
   }
 }
 

@@ -64,7 +64,8 @@ class Playback {
 
   /// Returns what is known of a scan layer, null if it is none of the dataset's.
   const ShownScan* scan(const std::string& layer) const;
-  /// Returns which frame the chosen camera shows, as its sensor's and its number among the frames.
+  /// Returns the chosen camera's frame at the time, as its sensor's and its number among the
+  /// frames; what is shown may be another for a while.
   std::optional<std::pair<std::size_t, std::size_t>> camera_frame() const;
   /// Returns where the platform is at the time, in W: its first sensor.
   std::optional<glm::dvec3> platform_w_m() const;

@@ -1,6 +1,7 @@
 #pragma once
 
 #include <filesystem>
+#include <glm/vec3.hpp>
 #include <optional>
 #include <string>
 #include <vector>
@@ -14,9 +15,13 @@ namespace groundray {
 struct WindowStart {
   std::vector<std::filesystem::path> inputs;
   OpenLimits limits{};
-  std::optional<Look> look{};  ///< else where the inputs are best seen from
-  std::string coloured_by{};   ///< a column, of all layers that have it; else what suits each
-  bool wireframe = false;      ///< of what has triangles
+  std::optional<glm::dvec3> from_w_m{}, at_w_m{};  ///< else as the inputs are best seen
+  /// COLUMN of all layers that have it, or LAYER=COLUMN; else what suits each.
+  std::vector<std::string> coloured_by{};
+  std::vector<std::string> hidden{};  ///< layers by name, or what their names begin with
+  std::optional<double> point_size_px{};
+  bool wireframe = false;  ///< of what has triangles
+  bool has_legend = true;
 };
 
 /// Shows the window until it is closed.

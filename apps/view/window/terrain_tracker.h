@@ -37,6 +37,8 @@ class TerrainTracker {
   /// @param step_m  moves that are smaller show nothing else.
   void set_place(Follows of, const glm::dvec3& p_w_m, double step_m);
 
+  /// Returns the name of the layer that follows.
+  const std::string& layer() const noexcept { return layer_; }
   /// Returns what was built last, without its layer; nothing before.
   const std::optional<FollowedTerrain>& built() const noexcept { return built_; }
   /// Returns the viewpoint that is followed; nothing before there is one.

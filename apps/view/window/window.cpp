@@ -38,6 +38,7 @@ Window::Window(WindowStart start) : start_(std::move(start)) {
   build_docks();
   build_workers();
   connect_canvas();
+  view().set_legend_visible(start_.has_legend);
   build_actions();
   message_ = new QLabel;
   busy_ = new QProgressBar;
@@ -49,6 +50,8 @@ Window::Window(WindowStart start) : start_(std::move(start)) {
   status_clock_.setInterval(status_ms);
   connect(&status_clock_, &QTimer::timeout, this, [this] { show_status(); });
   status_clock_.start();
+  for (const std::string& wish : start_.coloured_by) unmet_.insert("--colour-by " + wish);
+  for (const std::string& wish : start_.hidden) unmet_.insert("--hide " + wish);
   for (const std::filesystem::path& input : start_.inputs) open(input);
 }
 
@@ -88,9 +91,11 @@ void Window::build_docks() {
                              },
                          .scanned = [this](ScanMade made) { take_scan(std::move(made)); },
                          .failed = failed});
-  compare_ = new ComparePanel({.layer = [this](auto& name) { return view().find(name); },
-                               .compared = [this](const auto& all) { take_comparison(all); },
-                               .failed = failed});
+  compare_ = new ComparePanel(
+      {.layer = [this](auto& name) { return view().find(name); },
+       .compared = [this](const auto& all,
+                          const auto& measured) { take_comparison(all, measured); },
+       .failed = failed});
   setCorner(Qt::BottomLeftCorner, Qt::LeftDockWidgetArea);
   setCorner(Qt::BottomRightCorner, Qt::RightDockWidgetArea);
   dock("Layers", layers_, Side::Left);

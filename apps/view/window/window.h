@@ -8,6 +8,7 @@
 #include <map>
 #include <memory>
 #include <optional>
+#include <set>
 #include <string>
 #include <vector>
 
@@ -115,11 +116,14 @@ class Window : public QMainWindow {
   void open_next();
   void take(Loaded loaded);
   std::string name_for(const std::filesystem::path& path) const;
-  void name_layers(std::vector<Layer>& layers, const std::string& document) const;
+  void name_layers(std::vector<Layer>& layers, const std::string& document);
+  void dress(Layer& layer, const std::string& own_name);
+  void tell_unmet();
   void first_look(const Opened& opened, const std::vector<std::string>& layers);
   void use(const Document& document);
   void show_images();
   void forget(const std::string& document);
+  void remove_layer(const std::string& name);
   void offer_comparisons();
   void show_documents();
 
@@ -134,9 +138,10 @@ class Window : public QMainWindow {
   void click_pixel(glm::ivec2 pixel);
   void mark_in_image(const EchoBeam& beam, const glm::dvec3& origin_w_m);
   void take_scan(ScanMade made);
-  void take_comparison(const Comparison& comparison);
+  void take_comparison(const Comparison& comparison, const Layer& measured);
 
   WindowStart start_;
+  std::set<std::string> unmet_;  // of what the program was asked to show, what no layer has met
   std::vector<Document> documents_;
   std::map<std::string, ShownScan> scans_here_;  // by layer
   std::deque<std::filesystem::path> queue_;

@@ -20,8 +20,8 @@ namespace {
 constexpr int largest_picture_px = 32768;
 
 const char* const open_filter =
-    "All that can be opened (*.yaml *.ply *.pcd *.las *.laz *.bin *.xyz *.csv *.npy *.npz *.obj "
-    "*.stl *.glb *.gltf *.tif *.tiff *.hgt *.asc *.vrt *.png *.jpg *.jpeg *.exr *.hdr);;"
+    "All that can be opened (*.yaml *.ply *.pcd *.bin *.npy *.npz *.obj *.stl *.glb *.gltf *.tif "
+    "*.tiff *.hgt *.asc *.vrt *.nc *.dem *.zip *.png *.jpg *.jpeg *.exr *.hdr);;"
     "Any file (*)";
 
 // Asks for a picture's size; none if the user thinks better of it.
@@ -205,7 +205,7 @@ void Window::toggle_wireframe() {
 void Window::close_selected() {
   const std::string layer = layers_->selected();
   if (view().find(layer) == nullptr) return;
-  view().remove(layer);
+  remove_layer(layer);
   const std::string document = layer.substr(0, layer.find('/'));
   bool has_more = false;
   for (const Layer* each : view().layers()) {

@@ -9,8 +9,9 @@
 #include <QStatusBar>
 #include <QUrl>
 #include <algorithm>
-#include <set>
+#include <cmath>
 
+#include "apps/interruption.h"
 #include "apps/view/window/scene_run.h"
 #include "apps/view/window/window.h"
 
@@ -47,11 +48,12 @@ void Window::open(const std::filesystem::path& path) {
 
 void Window::open_next() {
   show_documents();
-  if (queue_.empty()) return;
+  if (queue_.empty()) return tell_unmet();
   const std::filesystem::path path = queue_.front();
   queue_.pop_front();
-  const auto work = [path, limits = start_.limits](const auto&, const auto&) {
+  const auto work = [path, limits = start_.limits](const std::stop_token& stop, const auto&) {
     Loaded loaded{open_any(path, limits), nullptr};
+    if (stop.stop_requested()) throw Interrupted();
     if (loaded.opened.run != nullptr) {
       loaded.timeline = std::make_shared<const Timeline>(*loaded.opened.run);
     } else if (loaded.opened.world != nullptr) {
@@ -64,6 +66,16 @@ void Window::open_next() {
                   .ended = [this] { open_next(); }});
   busy_->show();
   message_->setText(QString::fromStdString(fmt::format("opening {} ...", path.string())));
+}
+
+// What the program was asked to show, and is not there.
+void Window::tell_unmet() {
+  if (unmet_.empty()) return;
+  const std::string message = fmt::format(
+      "{}: no layer has that name or column; the tree and \"Colour by\" tell what there is",
+      fmt::join(unmet_, ", "));
+  unmet_.clear();
+  fault(message);
 }
 
 std::string Window::name_for(const std::filesystem::path& path) const {
@@ -79,13 +91,37 @@ std::string Window::name_for(const std::filesystem::path& path) const {
 }
 
 // A document's only layer has the document's name, others are under it.
-void Window::name_layers(std::vector<Layer>& layers, const std::string& document) const {
+void Window::name_layers(std::vector<Layer>& layers, const std::string& document) {
   for (Layer& layer : layers) {
     if (layer.kind == LayerKind::Terrain) layer.name = "terrain";
-    layer.name = layers.size() == 1 ? document : fmt::format("{}/{}", document, layer.name);
-    if (layer.find(start_.coloured_by) != nullptr) layer.coloured_by = start_.coloured_by;
-    layer.wireframe = layer.wireframe || (start_.wireframe && layer.triangles() > 0);
+    const std::string own_name = layer.name;
+    layer.name = layers.size() == 1 ? document : fmt::format("{}/{}", document, own_name);
+    dress(layer, own_name);
   }
+}
+
+// As the program was asked to show it.
+// @param own_name  by which it goes in its document.
+void Window::dress(Layer& layer, const std::string& own_name) {
+  for (const std::string& wish : start_.coloured_by) {
+    const std::size_t equals = wish.rfind('=');
+    const bool is_of_all = equals == std::string::npos;
+    const std::string of = is_of_all ? "" : wish.substr(0, equals);
+    const std::string column = is_of_all ? wish : wish.substr(equals + 1);
+    if (!is_of_all && of != layer.name && of != own_name) continue;
+    if (layer.find(column) == nullptr) continue;
+    layer.coloured_by = column;
+    unmet_.erase("--colour-by " + wish);
+  }
+  for (const std::string& wish : start_.hidden) {
+    for (const std::string& name : {layer.name, own_name}) {
+      if (name != wish && !name.starts_with(wish + "/")) continue;
+      layer.visible = false;
+      unmet_.erase("--hide " + wish);
+    }
+  }
+  if (start_.point_size_px) layer.point_size_px = *start_.point_size_px;
+  layer.wireframe = layer.wireframe || (start_.wireframe && layer.triangles() > 0);
 }
 
 void Window::take(Loaded loaded) {
@@ -122,12 +158,19 @@ void Window::take(Loaded loaded) {
 void Window::first_look(const Opened& opened, const std::vector<std::string>& layers) {
   if (has_looked_ && documents_.size() > 1) return;
   has_looked_ = true;
-  if (start_.look) {
-    view().look(*start_.look);
-  } else if (opened.look) {
+  if (opened.look) {
     view().look(*opened.look);
   } else {
     view().fit();
+  }
+  if (start_.from_w_m || start_.at_w_m) {
+    Look look = view().current_look();
+    look.from_w_m = start_.from_w_m.value_or(look.from_w_m);
+    look.at_w_m = start_.at_w_m.value_or(look.at_w_m);
+    const glm::dvec3 ahead = look.at_w_m - look.from_w_m;
+    const bool is_plumb = std::hypot(ahead.x, ahead.y) < 1e-6 * std::abs(ahead.z);
+    look.up = is_plumb ? glm::dvec3(0, 1, 0) : glm::dvec3(0, 0, 1);
+    if (look.from_w_m != look.at_w_m) view().look(look);
   }
   if (!layers.empty()) layers_->select(layers.front());
   canvas_->look(view().current_look());
@@ -174,13 +217,22 @@ void Window::show_images() {
   resizeDocks(docks, heights_px, Qt::Vertical);
 }
 
-// A document and all of its layers are gone.
+void Window::remove_layer(const std::string& name) {
+  view().remove(name);
+  scans_here_.erase(name);
+  // It would come back as soon as the eye moves.
+  if (tracker_->is_open() && tracker_->layer() == name) tracker_->close();
+}
+
+// A document and all of its layers are gone, and what was picked of them.
 void Window::forget(const std::string& document) {
+  picker_->clear();
+  view().remove("picked/ray");
   std::vector<std::string> layers;
   for (const Layer* layer : view().layers()) {
     if (document_of(layer->name) == document) layers.push_back(layer->name);
   }
-  for (const std::string& layer : layers) view().remove(layer);
+  for (const std::string& layer : layers) remove_layer(layer);
   const auto found = std::ranges::find(documents_, document, &Document::name);
   if (found == documents_.end()) return;
   const Document gone = std::move(*found);
@@ -190,6 +242,8 @@ void Window::forget(const std::string& document) {
     scan_->set_world(nullptr);
     playback_->set_world(nullptr, "");
   }
+  const std::optional<ImageSource>& shown = images_->shown();
+  if (gone.kind == InputKind::Picture && shown && shown->file == gone.path) images_->clear();
   if (gone.timeline != nullptr) {
     timeline_->show_timeline(nullptr);
     playback_->close();
@@ -214,8 +268,7 @@ void Window::close_all() {
   while (!documents_.empty()) forget(Document(documents_.back()).name);
   std::vector<std::string> rest;
   for (const Layer* layer : view().layers()) rest.push_back(layer->name);
-  for (const std::string& layer : rest) view().remove(layer);
-  scans_here_.clear();
+  for (const std::string& layer : rest) remove_layer(layer);
   has_looked_ = false;
   hint_->show();
   changed();
@@ -235,7 +288,7 @@ void Window::offer_comparisons() {
   for (const Layer* layer : view().layers()) {
     const bool is_surface = layer->kind == LayerKind::Mesh || layer->kind == LayerKind::Terrain;
     if (is_surface || layer->kind == LayerKind::Cloud) measured.push_back(layer->name);
-    if (is_surface) truths.push_back({"surface of " + layer->name, *layer});
+    if (is_surface) truths.push_back({"surface of " + layer->name, Layer{.name = layer->name}});
   }
   compare_->offer(measured, std::move(truths));
 }

@@ -94,22 +94,22 @@ void Window::go_to(std::chrono::nanoseconds time) {
   canvas_->look({look.from_w_m + moved_m, look.at_w_m + moved_m, look.up});
 }
 
-// A pixel's ray, and the surface that it meets.
+// A pixel's ray, and the surface that it meets; of a picture that no sensor took, its values alone.
 void Window::click_pixel(glm::ivec2 pixel) {
   FactTable::Facts facts;
   const auto image = images_->image();
+  const ImageSource& source = *images_->shown();
   for (const PixelValue& value : image->values_at(pixel)) {
     facts.emplace_back(value.channel, value.text);
   }
-  picked_title_->setText(QString::fromStdString(
-      fmt::format("pixel ({}, {}) of {}", pixel.x, pixel.y, images_->camera())));
-  const auto frame = playback_->camera_frame();
+  picked_title_->setText(
+      QString::fromStdString(fmt::format("pixel ({}, {}) of {}", pixel.x, pixel.y, source.title)));
   view().remove("picked/ray");
-  if (frame) {
-    const Timeline& timeline = *playback_->recording().timeline;
-    const RecordedSensor& camera = timeline.sensors()[frame->first];
+  if (source.timeline != nullptr) {
+    const Timeline& timeline = *source.timeline;
+    const RecordedSensor& camera = timeline.sensors()[source.sensor];
     const auto seen =
-        seen_pixel(camera, camera.frames[frame->second], glm::dvec2(pixel), image.get());
+        seen_pixel(camera, camera.frames[source.frame], glm::dvec2(pixel), image.get());
     if (seen) {
       const glm::dvec3 end_m =
           seen->p_D_m.value_or(seen->origin_m + ray_of_sky_m * seen->direction);
@@ -131,12 +131,12 @@ void Window::click_pixel(glm::ivec2 pixel) {
 
 // Where the echo is seen in the image that is shown, if it is.
 void Window::mark_in_image(const EchoBeam& beam, const glm::dvec3& origin_w_m) {
-  const auto frame = playback_->camera_frame();
-  if (!frame) return;
-  const Timeline& timeline = *playback_->recording().timeline;
-  const RecordedSensor& camera = timeline.sensors()[frame->first];
+  const std::optional<ImageSource>& source = images_->shown();
+  if (!source || source->timeline == nullptr) return;
+  const Timeline& timeline = *source->timeline;
+  const RecordedSensor& camera = timeline.sensors()[source->sensor];
   const glm::dvec3 p_D_m = beam.reported_m + (origin_w_m - timeline.georeference().origin_w_m);
-  images_->mark(pixel_of(camera, camera.frames[frame->second], p_D_m));
+  images_->mark(pixel_of(camera, camera.frames[source->frame], p_D_m));
 }
 
 void Window::take_scan(ScanMade made) {
@@ -150,11 +150,9 @@ void Window::take_scan(ScanMade made) {
   explain(name);
 }
 
-void Window::take_comparison(const Comparison& comparison) {
+void Window::take_comparison(const Comparison& comparison, const Layer& measured) {
   const Layer* layer = view().find(comparison.layer);
-  if (layer == nullptr || layer->points() != comparison.deviation.signed_m.size()) {
-    return;  // it is gone, or another by now
-  }
+  if (layer == nullptr || layer->data != measured.data) return;  // it is gone, or another by now
   const std::string name = comparison.layer;
   view().add(coloured_by_deviation(*layer, comparison));
   view().colour_by(name, "deviation");

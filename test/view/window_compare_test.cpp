@@ -1,0 +1,85 @@
+#include <QPushButton>
+#include <QTest>
+#include <string>
+
+#include "apps/view/window/window.h"
+#include "core/mesh_io.h"
+#include "core/ply_io.h"
+#include "test/view/sample_dataset.h"
+#include "test/view/window_fixture.h"
+
+namespace groundray {
+namespace {
+
+using testing::SampleDataset;
+using testing::TemporaryFolder;
+using WindowCompareTest = testing::WindowTest;
+
+double metres(const std::string& text) { return std::stod(text); }
+
+TEST_F(WindowCompareTest, ComparesWithTheTruth) {
+  Window& window = shown();
+  const TemporaryFolder folder;
+  constexpr double offset_m = 0.25;
+  TriangleMesh truth, raised;
+  constexpr unsigned side = 11;
+  for (unsigned i = 0; i < side * side; ++i) {
+    truth.vertices_m.emplace_back(i % side, i / side, 0);
+    // Half of it above, the rest below, so that the mean is not the whole story.
+    raised.vertices_m.emplace_back(i % side, i / side, i % 2 == 0 ? offset_m : -offset_m);
+  }
+  for (unsigned row = 0; row + 1 < side; ++row) {
+    for (unsigned column = 0; column + 1 < side; ++column) {
+      const unsigned a = row * side + column, b = a + 1, c = a + side, d = c + 1;
+      for (TriangleMesh* mesh : {&truth, &raised}) {
+        mesh->triangles.emplace_back(a, b, d);
+        mesh->triangles.emplace_back(a, d, c);
+      }
+    }
+  }
+  write_ply(folder / "truth.ply", truth, {});
+  write_ply(folder / "raised.ply", raised, {});
+  open(folder / "truth.ply");
+  open(folder / "raised.ply");
+  ComparePanel& panel = window.compare_panel();
+  panel.choose("raised.ply", "surface of truth.ply");
+  QTest::keyClick(&window, Qt::Key_C);
+  QTest::mouseClick(panel.findChild<QPushButton*>("compare"), Qt::LeftButton);
+  settle();
+  EXPECT_EQ(dismiss_fault(), "");
+  // 61 of the 121 vertices are above, 60 below; no metre is rounded in floats of 1/4.
+  EXPECT_EQ(panel.figures().value("points"), "121");
+  EXPECT_NEAR(metres(panel.figures().value("mean")), offset_m / 121, 1e-5);
+  EXPECT_NEAR(metres(panel.figures().value("RMS")), offset_m, 1e-5);
+  EXPECT_NEAR(metres(panel.figures().value("largest")), offset_m, 1e-5);
+  const Layer& layer = *window.view().find("raised.ply");
+  EXPECT_EQ(layer.coloured_by, "deviation");
+  const LayerColumn* column = layer.find("deviation");
+  ASSERT_NE(column, nullptr);
+  for (vtkIdType i = 0; i < 121; ++i) {
+    const double height_m = layer.p_w_m(i).z;
+    EXPECT_NEAR(layer.value(*column, i), height_m, 1e-6);
+  }
+}
+
+// Its levels have changed since it was offered, and so has its surface.
+TEST_F(WindowCompareTest, TerrainIsItsOwnTruthAfterItFollowedTheEye) {
+  Window& window = shown();
+  open(SampleDataset::get().scene());
+  const auto before = window.view().find("scene.yaml/terrain")->data;
+  window.canvas().look({{300, 300, 400}, {80, 80, 50}});
+  QTest::keyClick(&window, Qt::Key_1);
+  settle();
+  ASSERT_NE(window.view().find("scene.yaml/terrain")->data, before);
+  ComparePanel& panel = window.compare_panel();
+  panel.choose("scene.yaml/terrain", "surface of scene.yaml/terrain");
+  panel.compare_chosen();
+  settle();
+  EXPECT_EQ(dismiss_fault(), "");
+  ASSERT_NE(panel.figures().value("largest"), "");
+  EXPECT_LT(std::stod(panel.figures().value("largest")), 1e-6);
+  EXPECT_EQ(window.view().find("scene.yaml/terrain")->coloured_by, "deviation");
+}
+
+}  // namespace
+}  // namespace groundray
