@@ -293,7 +293,8 @@ TEST(View, KeepsSmallThingsWhileMoving) {
   TriangleMesh field;
   for (std::uint32_t i = 0; i < 90'000; ++i) {
     for (const glm::dvec3& p : {glm::dvec3(0), glm::dvec3(0.01, 0, 0), glm::dvec3(0, 0.01, 0)})
-      field.vertices_m.push_back(p + glm::dvec3(i % 300 * 0.01, i / 300 * 0.01, 0));
+      field.vertices_m.push_back(
+          p + 0.01 * glm::dvec3(i % 300, static_cast<std::uint32_t>(i / 300), 0));
     field.triangles.push_back(glm::uvec3(0, 1, 2) + 3 * i);
   }
   view.add(mesh_layer("field", field, far_away));
