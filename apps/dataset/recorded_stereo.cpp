@@ -4,12 +4,12 @@
 #include <fmt/ranges.h>
 
 #include <algorithm>
-#include <cmath>
 #include <system_error>
+#include <utility>
 
+#include "apps/dataset/recorded_calibration.h"
 #include "core/error.h"
 #include "core/product_io.h"
-#include "sensors/lens_reader.h"
 #include "sensors/yaml_reader.h"
 
 namespace groundray {
@@ -17,28 +17,6 @@ namespace {
 
 namespace fs = std::filesystem;
 using std::chrono::nanoseconds;
-using yaml::Need;
-
-constexpr yaml::Rule pixels_rule{
-    [](double value) { return value >= 1 && value <= 65536 && value == std::floor(value); },
-    "must be a whole number from 1 to 65536"};
-constexpr yaml::Rule time_rule{[](double value) { return value >= 0 && value <= 3600; },
-                               "must be a number of seconds from 0 to 3600"};
-
-void read_calibration(const fs::path& path, RecordedCamera& camera) {
-  yaml::Faults faults(path);
-  const yaml::Node node = yaml::parse(yaml::read_file(path), path);
-  yaml::Map root(node, "", faults);
-  std::array<double, 2> size_px{};
-  root.read_numbers("size_px", Need::Required, size_px, pixels_rule);
-  root.read_number("exposure_s", Need::Required, camera.exposure_s, time_rule);
-  root.read_number("row_s", Need::Required, camera.row_s, time_rule);
-  if (const yaml::Node* lens = root.find("lens", Need::Required))
-    camera.lens = read_lens(*lens, path, faults).model;
-  root.close_partly();
-  faults.throw_if_any();
-  camera.size_px = {static_cast<int>(size_px[0]), static_cast<int>(size_px[1])};
-}
 
 // The picture that the camera gives, else the light that it was made of.
 fs::path image_file(const fs::path& dataset, const std::string& camera, std::int64_t number) {
@@ -58,12 +36,14 @@ fs::path image_file(const fs::path& dataset, const std::string& camera, std::int
 
 RecordedCamera read_camera(const fs::path& dataset, const std::string& name,
                            const DatasetListing& listing) {
+  RecordedCalibration told = read_camera_calibration(dataset / "calibration" / (name + ".yaml"));
   RecordedCamera camera{.name = name,
                         .X_DC = read_tum(dataset / "poses" / (name + ".tum")),
-                        .lens = Pinhole{},
-                        .frames = {}};
-  read_calibration(dataset / "calibration" / (name + ".yaml"), camera);
-  camera.frames = listing.frames_of(name).done;
+                        .lens = std::move(told.lens),
+                        .size_px = told.size_px,
+                        .exposure_s = told.exposure_s,
+                        .row_s = told.row_s,
+                        .frames = listing.frames_of(name).done};
   for (RecordedFrame& frame : camera.frames) frame.file = image_file(dataset, name, frame.number);
   return camera;
 }

@@ -214,7 +214,7 @@ OrganisedReturns organised_returns(const ScanReturns& returns, const ScanTaking&
   } catch (const Error& error) {
     const std::string_view what = error.what();
     if (!what.ends_with("as points without order")) throw;
-    throw Error("{} (--unorganised)", what);
+    throw Error("{} (--unorganised); of a dataset other lidars may do (--sensor)", what);
   }
 }
 

@@ -13,6 +13,7 @@
 
 #include "apps/interruption.h"
 #include "core/error.h"
+#include "core/quantile.h"
 
 namespace groundray {
 namespace {
@@ -38,14 +39,6 @@ Deviation measured(std::size_t count, const std::stop_token& stop, const ShareDo
   if (progress) progress(1);
   deviation.figures = figures_of(deviation.signed_m);
   return deviation;
-}
-
-// The value below which a share of all lies: of some that may be put in another order.
-double quantile(std::vector<double>& values, double share) {
-  const auto at =
-      values.begin() + static_cast<std::ptrdiff_t>(share * static_cast<double>(values.size() - 1));
-  std::ranges::nth_element(values, at);
-  return *at;
 }
 
 std::vector<double> known(const std::vector<float>& signed_m) {
@@ -91,7 +84,6 @@ Deviation deviation_from_mesh(const std::vector<glm::dvec3>& places_m, const Tru
 }
 
 DeviationFigures figures_of(const std::vector<float>& signed_m) {
-  constexpr double normal_mad = 1.4826;
   std::vector<double> values = known(signed_m);
   DeviationFigures figures{.count = values.size(), .beyond = signed_m.size() - values.size()};
   double sum_m = 0, sum2_m2 = 0;
@@ -111,12 +103,10 @@ DeviationFigures figures_of(const std::vector<float>& signed_m) {
   figures.low_m = low;
   figures.high_m = high;
   figures.largest_m = std::max(std::abs(low), std::abs(high));
-  figures.median_m = quantile(values, 0.5);
-  std::vector<double> sizes_m = values;
-  for (double& value : values) value = std::abs(value - figures.median_m);
-  for (double& size_m : sizes_m) size_m = std::abs(size_m);
-  figures.nmad_m = normal_mad * quantile(values, 0.5);
-  figures.p95_m = quantile(sizes_m, 0.95);
+  figures.median_m = median(values);
+  figures.nmad_m = nmad(values);
+  for (double& value : values) value = std::abs(value);
+  figures.p95_m = quantile(std::move(values), 0.95);
   return figures;
 }
 

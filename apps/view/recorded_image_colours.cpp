@@ -10,9 +10,10 @@
 #include <numbers>
 #include <unordered_map>
 
-#include "apps/groundray/colour_map.h"
+#include "apps/colour_map.h"
 #include "apps/view/colour_table.h"
 #include "apps/view/recorded_image.h"
+#include "core/quantile.h"
 #include "core/srgb.h"
 
 namespace groundray {
@@ -42,16 +43,10 @@ std::vector<double> some_values(const PixelValues& values, int component,
   return found;
 }
 
-// The value below which a share of some lies.
-double quantile(std::vector<double>& values, double share) {
-  const auto at =
-      values.begin() + static_cast<std::ptrdiff_t>(share * static_cast<double>(values.size() - 1));
-  std::ranges::nth_element(values, at);
-  return *at;
-}
-
-// 1 % of the values are beyond either end.
+// From nothing to what has full colour; if that is not known, 1 % of the values are beyond either
+// end.
 std::pair<double, double> usual_range(const ImageChannel& channel) {
+  if (channel.full) return {0, *channel.full};
   const bool is_distance = channel.kind == Kind::Distance;
   std::vector<double> values = some_values(channel.values, components_of(channel.values) - 1,
                                            [&](double value) { return !is_distance || value > 0; });

@@ -3,15 +3,12 @@
 #include <fmt/format.h>
 
 #include <algorithm>
-#include <array>
-#include <cmath>
-#include <glm/gtc/quaternion.hpp>
 #include <span>
 #include <utility>
 
+#include "apps/dataset/recorded_calibration.h"
 #include "core/error.h"
 #include "core/product_io.h"
-#include "sensors/lens_reader.h"
 #include "sensors/lidar_reader.h"
 #include "sensors/yaml_reader.h"
 
@@ -22,31 +19,8 @@ namespace fs = std::filesystem;
 using std::chrono::nanoseconds;
 using yaml::Need;
 
-constexpr yaml::Rule pixels_rule{
-    [](double value) { return value >= 1 && value <= 65536 && value == std::floor(value); },
-    "must be a whole number from 1 to 65536"};
-constexpr yaml::Rule time_rule{[](double value) { return value >= 0 && value <= 3600; },
-                               "must be a number of seconds from 0 to 3600"};
-
 fs::path calibration_path(const fs::path& dataset, const std::string& sensor) {
   return dataset / "calibration" / (sensor + ".yaml");
-}
-
-Pose read_mount(yaml::Map& root, std::string_view key, yaml::Faults& faults) {
-  Pose pose;
-  auto mount = root.map(key, Need::Optional);
-  if (!mount) return pose;
-  std::array<double, 3> p_m{};
-  std::array<double, 4> q{0, 0, 0, 1};
-  mount->read_numbers("translation_m", Need::Required, p_m);
-  mount->read_numbers("rotation_xyzw", Need::Required, q);
-  mount->close_partly();
-  const glm::dquat rotation(q[3], q[0], q[1], q[2]);
-  if (std::abs(glm::length(rotation) - 1) > 1e-6) {
-    faults.add(mount->node(), "rotation_xyzw", "must be of length 1, but is of {}",
-               glm::length(rotation));
-  }
-  return {rotation, {p_m[0], p_m[1], p_m[2]}};
 }
 
 // What the scene file says, as far as it concerns a dataset. It may name files that are no longer
@@ -135,24 +109,12 @@ void read_lidar(const fs::path& path, SceneText& scene, RecordedSensor& sensor) 
 }
 
 void read_camera(const fs::path& path, RecordedSensor& sensor) {
-  yaml::Faults faults(path);
-  const yaml::Node node = yaml::parse(yaml::read_file(path), path);
-  yaml::Map root(node, "", faults);
-  std::array<double, 2> size_px{};
-  double exposure_s = 0, row_s = 0;
-  LensModel lens = Pinhole{};
-  root.read_text("model", Need::Optional, sensor.model);
-  sensor.X_BS = read_mount(root, "X_BC", faults);
-  root.read_numbers("size_px", Need::Required, size_px, pixels_rule);
-  root.read_number("exposure_s", Need::Required, exposure_s, time_rule);
-  root.read_number("row_s", Need::Required, row_s, time_rule);
-  if (const yaml::Node* found = root.find("lens", Need::Required))
-    lens = read_lens(*found, path, faults).model;
-  root.close_partly();
-  faults.throw_if_any();
-  const glm::ivec2 size(static_cast<int>(size_px[0]), static_cast<int>(size_px[1]));
-  sensor.camera = CameraFacts{Lens(std::move(lens), size), exposure_s, row_s};
-  sensor.lasts = time_of(exposure_s + row_s * (size.y - 1));
+  RecordedCalibration told = read_camera_calibration(path);
+  sensor.model = std::move(told.model);
+  sensor.X_BS = told.X_BC;
+  sensor.lasts = time_of(told.exposure_s + told.row_s * (told.size_px.y - 1));
+  sensor.camera =
+      CameraFacts{Lens(std::move(told.lens), told.size_px), told.exposure_s, told.row_s};
 }
 
 RecordedSensor read_sensor(const fs::path& dataset, const std::string& name, SensorKind kind,

@@ -12,7 +12,7 @@
 #include <span>
 #include <string>
 
-#include "apps/groundray/colour_map.h"
+#include "apps/colour_map.h"
 #include "apps/view/pixel_ray.h"
 #include "core/error.h"
 #include "core/exr_io.h"

@@ -9,9 +9,9 @@
 #include <span>
 #include <vector>
 
+#include "apps/colour_map.h"
 #include "apps/golden/compare/error_figures.h"
 #include "apps/golden/suite/false_colour.h"
-#include "apps/groundray/colour_map.h"
 #include "core/srgb.h"
 
 namespace groundray::golden {

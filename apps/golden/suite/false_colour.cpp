@@ -4,7 +4,7 @@
 #include <cmath>
 #include <limits>
 
-#include "apps/groundray/colour_map.h"
+#include "apps/colour_map.h"
 
 namespace groundray::golden {
 namespace {

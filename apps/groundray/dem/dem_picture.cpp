@@ -9,8 +9,8 @@
 #include <optional>
 #include <utility>
 
-#include "apps/groundray/colour_map.h"
-#include "apps/groundray/dem/quantile.h"
+#include "apps/colour_map.h"
+#include "core/quantile.h"
 
 namespace groundray {
 namespace {

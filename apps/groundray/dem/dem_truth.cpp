@@ -7,7 +7,7 @@
 #include <optional>
 #include <utility>
 
-#include "apps/groundray/dem/quantile.h"
+#include "core/quantile.h"
 
 namespace groundray {
 namespace {
@@ -33,7 +33,6 @@ void set_normalised(HeightErrors& errors, const std::vector<double>& squares) {
 
 HeightErrors errors_of(std::string name, const TruthComparison& all,
                        const std::function<bool(std::size_t)>& is_asked) {
-  constexpr double normal_mad = 1.4826;
   std::vector<double> errors_m, squares;
   for (std::size_t i = 0; i < all.error_m.size(); ++i) {
     if (std::isnan(all.error_m[i]) || !is_asked(i)) continue;
@@ -50,13 +49,9 @@ HeightErrors errors_of(std::string name, const TruthComparison& all,
   const auto count = static_cast<double>(errors_m.size());
   figures.bias_m = sum_m / count;
   figures.rmse_m = std::sqrt(sum2_m2 / count);
-  const double middle_m = median(errors_m);
-  std::vector<double> sizes_m, apart_m;
-  for (const double error_m : errors_m) {
-    sizes_m.push_back(std::abs(error_m));
-    apart_m.push_back(std::abs(error_m - middle_m));
-  }
-  figures.nmad_m = normal_mad * median(std::move(apart_m));
+  std::vector<double> sizes_m;
+  for (const double error_m : errors_m) sizes_m.push_back(std::abs(error_m));
+  figures.nmad_m = nmad(std::move(errors_m));
   figures.largest_m = quantile(sizes_m, 1);
   figures.p95_m = quantile(std::move(sizes_m), 0.95);
   set_normalised(figures, squares);

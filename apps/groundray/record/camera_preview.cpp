@@ -9,7 +9,7 @@
 #include <numbers>
 #include <vector>
 
-#include "apps/groundray/colour_map.h"
+#include "apps/colour_map.h"
 #include "core/luminance.h"
 #include "core/srgb.h"
 

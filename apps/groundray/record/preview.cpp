@@ -10,7 +10,7 @@
 #include <span>
 #include <vector>
 
-#include "apps/groundray/colour_map.h"
+#include "apps/colour_map.h"
 
 namespace groundray {
 namespace {

@@ -1,9 +1,10 @@
-#include "apps/groundray/dem/quantile.h"
+#include "core/quantile.h"
 
 #include <algorithm>
 #include <cmath>
 #include <cstddef>
 #include <limits>
+#include <utility>
 
 namespace groundray {
 namespace {
@@ -28,6 +29,13 @@ double median(std::vector<double> values) {
   const double upper = *half;
   if (values.size() % 2 == 1) return upper;
   return (upper + *std::max_element(values.begin(), half)) / 2;
+}
+
+double nmad(std::vector<double> values) {
+  constexpr double of_normal = 1.4826;
+  const double middle = median(values);
+  for (double& value : values) value = std::abs(value - middle);
+  return of_normal * median(std::move(values));
 }
 
 }  // namespace groundray

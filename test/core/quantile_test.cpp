@@ -1,4 +1,4 @@
-#include "apps/groundray/dem/quantile.h"
+#include "core/quantile.h"
 
 #include <gtest/gtest.h>
 
@@ -32,6 +32,11 @@ TEST(Quantile, OfAHalfMayLieBetweenTwo) {
   EXPECT_EQ(median({9, 1, 4}), 4);
   EXPECT_EQ(median({9, 1, 4, 6}), 5);
   EXPECT_TRUE(std::isnan(median({})));
+}
+
+TEST(Quantile, OfDistancesToTheMedianIsTheNmad) {
+  EXPECT_DOUBLE_EQ(nmad({1, 2, 4, 8, 100}), 1.4826 * 3);  // of 3, 2, 0, 4 and 96
+  EXPECT_TRUE(std::isnan(nmad({})));
 }
 
 }  // namespace
