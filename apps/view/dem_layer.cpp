@@ -106,6 +106,48 @@ std::vector<float> slopes_deg(const Layer& layer) {
   return slopes;
 }
 
+// The triangles over the samples that are kept, with the column "height".
+Layer surface_of(const std::string& name, const DemHeader& header, const RasterBands& bands,
+                 const std::vector<float>& heights, const Kept& kept) {
+  Layer layer{.name = name, .kind = LayerKind::Terrain, .data = make_points(kept.rows.size())};
+  layer.origin_w_m = header.origin_w_m;
+  const auto places = coordinates(*layer.data);
+  std::vector<float> height(kept.rows.size());
+  for (std::size_t i = 0; i < kept.rows.size(); ++i) {
+    const auto row = static_cast<int>(kept.rows[i]);
+    const glm::ivec2 sample(row % bands.samples.x, row / bands.samples.x);
+    const glm::dvec2 p = header.origin_m + glm::dvec2(sample * bands.step) * header.step_m;
+    places[3 * i] = static_cast<float>(p.x);
+    places[3 * i + 1] = static_cast<float>(p.y);
+    places[3 * i + 2] = height[i] = heights[kept.rows[i]];
+  }
+  set_triangles(*layer.data, kept.triangles);
+  add_normals(layer);
+  add_column(layer, {.name = "height", .unit = "m", .scale = ColourScale::Earth}, height);
+  return layer;
+}
+
+// Adds the other bands, with the units that the file tells.
+void add_bands(Layer& layer, const RasterBands& bands, const std::vector<std::size_t>& rows) {
+  add_table(layer, LayerColumn::Of::Points, table_of(bands), rows);
+  for (LayerColumn& column : layer.columns) {
+    for (const RasterBands::Band& band : bands.bands) {
+      if (band.name == column.name && band.name != "height") column.unit = band.unit;
+    }
+  }
+}
+
+std::vector<std::string> facts_of(const DemHeader& header, int all_bands, int step) {
+  std::vector<std::string> facts = {
+      fmt::format("{} x {} samples, {} bands", header.samples.x, header.samples.y, all_bands)};
+  if (all_bands > most_bands)
+    facts.push_back(fmt::format("shown with the first {} of {} bands", most_bands, all_bands));
+  if (step > 1)
+    facts.push_back(fmt::format("shown with every {}. sample of each row and column", step));
+  facts.push_back(header.crs_name);
+  return facts;
+}
+
 }  // namespace
 
 DemOptions options_for(const std::filesystem::path& dem) {
@@ -124,40 +166,12 @@ Layer dem_layer(const std::string& name, const std::filesystem::path& path,
   if (kept.triangles.empty())
     throw Error("{}: no three samples beside each other have heights: there is nothing to show",
                 path.string());
-  Layer layer{.name = name, .kind = LayerKind::Terrain, .data = make_points(kept.rows.size())};
-  layer.origin_w_m = header.origin_w_m;
-  const auto places = coordinates(*layer.data);
-  std::vector<float> height(kept.rows.size());
-  for (std::size_t i = 0; i < kept.rows.size(); ++i) {
-    const auto row = static_cast<int>(kept.rows[i]);
-    const glm::ivec2 sample(row % bands.samples.x, row / bands.samples.x);
-    const glm::dvec2 p = header.origin_m + glm::dvec2(sample * bands.step) * header.step_m;
-    places[3 * i] = static_cast<float>(p.x);
-    places[3 * i + 1] = static_cast<float>(p.y);
-    places[3 * i + 2] = height[i] = heights[kept.rows[i]];
-  }
-  set_triangles(*layer.data, kept.triangles);
-  add_normals(layer);
-  add_table(layer, LayerColumn::Of::Points, table_of(bands), kept.rows);
-  for (LayerColumn& column : layer.columns) {
-    for (const RasterBands::Band& band : bands.bands) {
-      if (band.name == column.name) column.unit = band.unit;
-    }
-  }
-  add_column(layer, {.name = "height", .unit = "m", .scale = ColourScale::Earth}, height);
+  Layer layer = surface_of(name, header, bands, heights, kept);
+  add_bands(layer, bands, kept.rows);
   add_column(layer, {.name = "slope", .unit = "deg", .of = LayerColumn::Of::Cells},
              slopes_deg(layer));
   layer.coloured_by = "height";
-  const int all_bands = inspect_raster(path).bands;
-  layer.facts.push_back(
-      fmt::format("{} x {} samples, {} bands", header.samples.x, header.samples.y, all_bands));
-  if (all_bands > most_bands)
-    layer.facts.push_back(
-        fmt::format("shown with the first {} of {} bands", most_bands, all_bands));
-  if (bands.step > 1)
-    layer.facts.push_back(
-        fmt::format("shown with every {}. sample of each row and column", bands.step));
-  layer.facts.push_back(header.crs_name);
+  layer.facts = facts_of(header, inspect_raster(path).bands, bands.step);
   return layer;
 }
 

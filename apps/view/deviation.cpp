@@ -14,6 +14,7 @@
 #include "apps/interruption.h"
 #include "core/error.h"
 #include "core/quantile.h"
+#include "reconstruction/accuracy/accuracy.h"
 
 namespace groundray {
 namespace {
@@ -81,6 +82,22 @@ Deviation deviation_from_mesh(const std::vector<glm::dvec3>& places_m, const Tru
                           static_cast<float>(truth.signed_distance_m(places_m[i] + shift_m, near));
                     }
                   });
+}
+
+// What a place counts is asked of each, so that is where an end is heard of.
+std::vector<Agreement> agreement_until(const TriangleMesh& mesh, const TriangleMesh& truth,
+                                       std::span<const double> tolerances_m,
+                                       const std::stop_token& stop) {
+  const SurfaceWeight all_alike = [&](std::uint32_t, const glm::dvec3&) {
+    if (stop.stop_requested()) throw Interrupted{};
+    return 1.0;
+  };
+  const auto precision = MeshDistance(mesh, truth).within(tolerances_m, {}, all_alike);
+  const auto completeness = MeshDistance(truth, mesh).within(tolerances_m, {}, all_alike);
+  std::vector<Agreement> all;
+  for (std::size_t k = 0; k < tolerances_m.size(); ++k)
+    all.push_back({tolerances_m[k], precision[k], completeness[k]});
+  return all;
 }
 
 DeviationFigures figures_of(const std::vector<float>& signed_m) {

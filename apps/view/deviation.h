@@ -5,6 +5,7 @@
 #include <functional>
 #include <glm/vec3.hpp>
 #include <optional>
+#include <span>
 #include <stop_token>
 #include <string>
 #include <utility>
@@ -95,6 +96,11 @@ class TrueMesh {
 Deviation deviation_from_mesh(const std::vector<glm::dvec3>& places_m, const TrueMesh& truth,
                               const glm::dvec3& shift_m = glm::dvec3(0),
                               const std::stop_token& stop = {}, const ShareDone& progress = {});
+
+/// As agreement() at its usual fineness, but ends when asked to. @throws Interrupted then.
+std::vector<Agreement> agreement_until(const TriangleMesh& mesh, const TriangleMesh& truth,
+                                       std::span<const double> tolerances_m,
+                                       const std::stop_token& stop);
 
 /// Returns the numbers over deviations, those that are NaN being beyond.
 DeviationFigures figures_of(const std::vector<float>& signed_m);

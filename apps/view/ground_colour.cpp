@@ -8,7 +8,6 @@
 #include <cmath>
 #include <cstdint>
 #include <glm/common.hpp>
-#include <optional>
 #include <vector>
 
 #include "core/error.h"
@@ -21,30 +20,6 @@ namespace {
 constexpr double exposure = 1.6;
 constexpr double patch_m = 0.5;  // points stand for so wide a part of the ground
 
-std::optional<Materials::InColour> colours_of(const World& world) {
-  if (!world.spec.terrain.material || world.content.materials.all().empty()) return std::nullopt;
-  try {
-    return world.content.materials.in_colour();
-  } catch (const Error&) {
-    return std::nullopt;  // its spectra lack what is visible: nobody asked for it
-  }
-}
-
-glm::dvec3 reflected_at(const GroundCover& cover, const Materials::InColour& colours,
-                        const GroundCover::Point& point) {
-  if (cover.empty()) return colours.albedos.front();
-  const SurfacePatch patch{{patch_m, 0, 0}, {0, patch_m, 0}};
-  const GroundCover::Shares shares = cover.shares_at(point);
-  glm::dvec3 sum(0);
-  for (std::size_t i = 0; i < cover.layers().size(); ++i) {
-    if (!(shares[i] > 0)) continue;
-    const Tint tint = cover.tint_at(i, point, patch, Filtering::Fast);
-    sum += static_cast<double>(shares[i]) *
-           glm::dvec3(colours.albedo(cover.layers()[i].material, tint.color));
-  }
-  return sum;
-}
-
 }  // namespace
 
 glm::u8vec3 shown_colour(const glm::dvec3& reflected) {
@@ -56,8 +31,35 @@ glm::u8vec3 shown_colour(const glm::dvec3& reflected) {
   return bytes;
 }
 
+std::optional<GroundColour> GroundColour::of(const World& world) {
+  if (!world.spec.terrain.material || world.content.materials.all().empty()) return std::nullopt;
+  try {
+    return GroundColour(world.content.cover, world.content.materials.in_colour());
+  } catch (const Error&) {
+    return std::nullopt;  // its spectra lack what is visible: nobody asked for it
+  }
+}
+
+glm::u8vec3 GroundColour::shown_at(const GroundCover::Point& point, double patch_m) const {
+  return shown_colour(reflected_at(point, patch_m));
+}
+
+glm::dvec3 GroundColour::reflected_at(const GroundCover::Point& point, double patch_m) const {
+  if (cover_->empty()) return colours_.albedos.front();
+  const SurfacePatch patch{{patch_m, 0, 0}, {0, patch_m, 0}};
+  const GroundCover::Shares shares = cover_->shares_at(point);
+  glm::dvec3 sum(0);
+  for (std::size_t i = 0; i < cover_->layers().size(); ++i) {
+    if (!(shares[i] > 0)) continue;
+    const Tint tint = cover_->tint_at(i, point, patch, Filtering::Fast);
+    sum += static_cast<double>(shares[i]) *
+           glm::dvec3(colours_.albedo(cover_->layers()[i].material, tint.color));
+  }
+  return sum;
+}
+
 void add_ground_colour(Layer& terrain, const World& world) {
-  const auto colours = colours_of(world);
+  const auto colours = GroundColour::of(world);
   if (!colours || terrain.points() == 0) return;
   const auto places = coordinates(*terrain.data);
   vtkDataArray& normals = *terrain.data->GetPointData()->GetNormals();
@@ -68,7 +70,7 @@ void add_ground_colour(Layer& terrain, const World& world) {
     point.p_D = offset + glm::dvec3(places[3 * i], places[3 * i + 1], places[3 * i + 2]);
     for (int k = 0; k < 3; ++k)
       point.normal[k] = normals.GetComponent(static_cast<vtkIdType>(i), k);
-    const glm::u8vec3 colour = shown_colour(reflected_at(world.content.cover, *colours, point));
+    const glm::u8vec3 colour = colours->shown_at(point, patch_m);
     for (std::size_t k = 0; k < 3; ++k) rgb[3 * i + k] = colour[static_cast<glm::length_t>(k)];
   });
   add_colours(terrain, {.name = "colour", .unit = ""}, rgb);

@@ -54,7 +54,8 @@ struct Layer {
   std::vector<LayerColumn> columns{};
   /// The same with less detail, for the time while a view moves; null: View makes it.
   vtkSmartPointer<vtkPolyData> coarse{};
-  /// Lies on the surface by the data's texture coordinates, where no column colours it; or null.
+  /// Lies on the surface by the data's texture coordinates, where no column colours it, or one that
+  /// is a colour: that is then what the texture shows more finely. Or null.
   vtkSmartPointer<vtkTexture> texture{};
 
   std::string coloured_by{};           ///< a column; empty for one colour

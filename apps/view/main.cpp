@@ -9,9 +9,11 @@
 #include <string>
 #include <vector>
 
+#include "apps/view/deviation.h"
 #include "apps/view/off_screen_window.h"
 #include "apps/view/open.h"
 #include "apps/view/still.h"
+#include "apps/view/window/comparison.h"
 #include "apps/view/window/run_window.h"
 #include "core/error.h"
 
@@ -25,7 +27,9 @@ constexpr int wrong_usage = 2;
 struct Arguments {
   std::vector<std::filesystem::path> inputs;
   std::filesystem::path screenshot;
-  std::string size, look_from, look_at;
+  std::string size, look_from, look_at, follow, range;
+  std::filesystem::path compare_with;
+  double tolerance_m = 0;
   int turntable = 0;
   StillSpec still;
   std::optional<double> point_size;
@@ -40,11 +44,21 @@ void add_options(CLI::App& app, Arguments& arguments) {
   app.add_option("--size", arguments.size, "Of the picture that --screenshot writes, px: 1280x720");
   app.add_option("--look-from", arguments.look_from, "X,Y,Z of the eye, m, as the map has them");
   app.add_option("--look-at", arguments.look_at, "X,Y,Z of what is in the picture's middle");
+  app.add_option("--follow", arguments.follow,
+                 "X,Y,Z whose terrain is drawn by --screenshot, if not the eye's");
   app.add_option("--colour-by", arguments.still.colour_by,
                  "COLUMN of all layers that have it, or LAYER=COLUMN; any number");
+  app.add_option("--range", arguments.range,
+                 "LOW,HIGH that the colours of --colour-by and --compare-with span");
   app.add_option("--hide", arguments.still.hide, "LAYER, or what its name begins with: objects");
   app.add_option("--point-size", arguments.point_size, "Of clouds, px")
       ->check(CLI::Range(1.0, 32.0));
+  app.add_option("--compare-with", arguments.compare_with,
+                 "Scene, DEM or mesh: colour clouds and meshes by how far they are from it, and "
+                 "say so; with --screenshot");
+  app.add_option("--tolerance-m", arguments.tolerance_m,
+                 "Of --compare-with a mesh: say how much lies within it")
+      ->check(CLI::PositiveNumber);
   app.add_flag("--wireframe", arguments.still.is_wireframe, "Surfaces by their edges");
   app.add_flag("--no-legend", arguments.no_legend, "Leave out what the colours mean");
   app.add_option("--turntable", arguments.turntable,
@@ -56,10 +70,42 @@ void read_spec(Arguments& arguments) {
   if (!arguments.size.empty()) spec.size_px = parse_size(arguments.size);
   if (!arguments.look_from.empty()) spec.from_w_m = parse_place(arguments.look_from, "--look-from");
   if (!arguments.look_at.empty()) spec.at_w_m = parse_place(arguments.look_at, "--look-at");
+  if (!arguments.follow.empty()) spec.follow_w_m = parse_place(arguments.follow, "--follow");
+  if (!arguments.range.empty()) spec.range = parse_range(arguments.range);
   if (spec.from_w_m && spec.from_w_m == spec.at_w_m)
     throw Error("--look-from and --look-at are one place: an eye looks somewhere else");
   spec.point_size_px = arguments.point_size;
   spec.has_legend = !arguments.no_legend;
+}
+
+Truth open_truth(const std::filesystem::path& path) {
+  Opened opened = open_any(path);
+  const std::string name = path.filename().string();
+  if (opened.world) return {name, opened.world};
+  if (opened.kind == InputKind::Dem) return {name, Truth::DemFile{path}};
+  if (opened.kind == InputKind::Mesh) return {name, opened.layers.front()};
+  throw Error("--compare-with {}: a scene, a DEM or a mesh is the truth", path.string());
+}
+
+// Colours clouds and meshes by how far they are from the truth, and prints the numbers.
+void compare_inputs(std::vector<Opened>& inputs, const Arguments& arguments) {
+  const Truth truth = open_truth(arguments.compare_with);
+  int compared = 0;
+  for (Opened& input : inputs) {
+    for (Layer& layer : input.layers) {
+      if (layer.kind != LayerKind::Cloud && layer.kind != LayerKind::Mesh) continue;
+      if (input.world) continue;  // what stands in a scene is no measurement
+      const Comparison found = compare(layer, truth, arguments.tolerance_m, {}, {});
+      layer = coloured_by_deviation(layer, found);
+      fmt::print("{} from {}:\n", layer.name, truth.name);
+      for (const std::string& line : figure_lines(found.deviation.figures))
+        fmt::print("  {}\n", line);
+      for (const std::string& line : agreement_lines(found.agreements)) fmt::print("  {}\n", line);
+      ++compared;
+    }
+  }
+  if (compared == 0)
+    throw Error("--compare-with: of the inputs none is a cloud, a dataset with scans or a mesh");
 }
 
 int take_stills(const Arguments& arguments) {
@@ -71,6 +117,7 @@ int take_stills(const Arguments& arguments) {
     inputs.push_back(open_any(input));
     for (const std::string& note : inputs.back().notes) fmt::print(stderr, "note: {}\n", note);
   }
+  if (!arguments.compare_with.empty()) compare_inputs(inputs, arguments);
   View view(make_off_screen_window(spec.size_px));
   arrange(view, inputs, spec);
   if (arguments.turntable != 0) {
@@ -94,6 +141,16 @@ int show_window(int& argc, char** argv, const Arguments& arguments) {
   return run_window(argc, argv, start);
 }
 
+// Returns an option that serves pictures alone, if there is one but no picture is asked for.
+std::string without_screenshot(const Arguments& arguments) {
+  if (!arguments.screenshot.empty()) return "";
+  if (arguments.turntable != 0) return "--turntable";
+  if (!arguments.size.empty()) return "--size";
+  if (!arguments.follow.empty()) return "--follow";
+  if (!arguments.range.empty()) return "--range";
+  return arguments.compare_with.empty() ? "" : "--compare-with";
+}
+
 int run(int argc, char** argv) {
   CLI::App app("groundray-view shows scenes, scans, meshes, DEMs and pictures.");
   app.footer(
@@ -108,12 +165,9 @@ int run(int argc, char** argv) {
   } catch (const CLI::ParseError& fault) {
     return app.exit(fault) == 0 ? done : wrong_usage;
   }
-  if (arguments.screenshot.empty() && arguments.turntable != 0) {
-    fmt::print(stderr, "groundray-view: --turntable needs --screenshot FOLDER\n");
-    return wrong_usage;
-  }
-  if (arguments.screenshot.empty() && !arguments.size.empty()) {
-    fmt::print(stderr, "groundray-view: --size needs --screenshot FILE\n");
+  const std::string lonely = without_screenshot(arguments);
+  if (!lonely.empty()) {
+    fmt::print(stderr, "groundray-view: {} needs --screenshot\n", lonely);
     return wrong_usage;
   }
   read_spec(arguments);

@@ -4,13 +4,14 @@
 
 #include <algorithm>
 #include <array>
-#include <cctype>
 #include <cmath>
 #include <fstream>
 #include <span>
 #include <string_view>
 #include <system_error>
 
+#include "apps/interruption.h"
+#include "apps/scene/certifying.h"
 #include "apps/view/cloud_layer.h"
 #include "apps/view/dem_layer.h"
 #include "apps/view/mesh_layer.h"
@@ -19,19 +20,14 @@
 #include "apps/view/picture_layer.h"
 #include "apps/view/scene_layers.h"
 #include "core/error.h"
+#include "core/file_ending.h"
+#include "sensors/spec_io.h"
 #include "terrain/band_file.h"
 
 namespace groundray {
 namespace {
 
 namespace fs = std::filesystem;
-
-std::string ending(const fs::path& path) {
-  std::string text = path.extension().string();
-  std::ranges::transform(text, text.begin(),
-                         [](unsigned char c) { return static_cast<char>(std::tolower(c)); });
-  return text;
-}
 
 bool is_one_of(const std::string& text, std::initializer_list<std::string_view> words) {
   return std::ranges::find(words, text) != words.end();
@@ -61,6 +57,10 @@ InputKind kind_of_raster(const fs::path& path) {
   }
 }
 
+void stop_if_asked(const std::stop_token& stop) {
+  if (stop.stop_requested()) throw Interrupted{};
+}
+
 void check_size(const fs::path& path, const OpenLimits& limits) {
   std::error_code fault;
   const auto bytes = fs::file_size(path, fault);
@@ -88,12 +88,26 @@ void check_places(const Layer& layer, const fs::path& path) {
       path.string(), layer.name, most_m);
 }
 
-void open_scene(Opened& opened, const OpenLimits& limits) {
-  auto world = std::make_shared<const World>(load_world(opened.path));
+// As load_world, but ends when asked to.
+World load_until(const fs::path& scene, const std::stop_token& stop) {
+  SceneSpec spec = load_scene(scene, data_folder() / "sensors");
+  stop_if_asked(stop);
+  Certifying progress;
+  return build_world(std::move(spec), [&](double share) {
+    stop_if_asked(stop);
+    progress.update(share);
+  });
+}
+
+void open_scene(Opened& opened, const OpenLimits& limits, const std::stop_token& stop) {
+  auto world = std::make_shared<const World>(load_until(opened.path, stop));
+  stop_if_asked(stop);
   opened.world = world;
   opened.look = look_at_platform(*world);
-  opened.follower = std::make_shared<TerrainFollower>(world);
+  opened.follower = std::make_shared<TerrainFollower>(world, TerrainDrawing{}, stop);
+  stop_if_asked(stop);
   FollowedTerrain terrain = opened.follower->follow(opened.look->from_w_m);
+  stop_if_asked(stop);
   opened.layers.push_back(std::move(terrain.layer));
   const glm::dvec3 middle_m = middle_of_run(*world);
   for (Layer& layer :
@@ -112,7 +126,7 @@ void name_labels(Layer& layer, const RecordedNames& names) {
   }
 }
 
-void open_dataset(Opened& opened) {
+void open_dataset(Opened& opened, const std::stop_token& stop) {
   // Whole, for its last part is its name: that of "." would be none.
   opened.path = fs::absolute(opened.path);
   if (!fs::is_directory(opened.path)) opened.path = opened.path.parent_path();
@@ -121,6 +135,7 @@ void open_dataset(Opened& opened) {
   opened.run = std::make_shared<const RecordedRun>(read_recorded_run(opened.path));
   for (const RecordedLidar& lidar : opened.dataset->lidars) {
     if (lidar.frames.empty()) continue;
+    stop_if_asked(stop);
     Layer layer = scan_layer(*opened.dataset, lidar, lidar.frames.front(), "lidar/" + lidar.name);
     name_labels(layer, opened.run->names);
     if (!opened.look) {
@@ -136,7 +151,7 @@ void open_dataset(Opened& opened) {
 void open_mesh(Opened& opened, const OpenLimits& limits) {
   check_size(opened.path, limits);
   StoredMesh file;
-  if (ending(opened.path) == ".ply") {
+  if (file_ending(opened.path) == ".ply") {
     file = read_stored_mesh(opened.path);
   } else {
     static_cast<MeshFile&>(file) = read_mesh(opened.path);
@@ -170,7 +185,7 @@ void open_cloud(Opened& opened, const OpenLimits& limits) {
   opened.layers.push_back(std::move(layer));
 }
 
-void open_dem(Opened& opened, const OpenLimits& limits) {
+void open_dem(Opened& opened, const OpenLimits& limits, const std::stop_token& stop) {
   const std::string name = opened.path.filename().string();
   const RasterKind kind = inspect_raster(opened.path);
   if (kind.is_geographic)
@@ -182,7 +197,8 @@ void open_dem(Opened& opened, const OpenLimits& limits) {
     opened.layers.push_back(dem_layer(name, opened.path, limits.triangles / 2));
     return;
   }
-  opened.follower = std::make_shared<TerrainFollower>(opened.path);
+  opened.follower = std::make_shared<TerrainFollower>(opened.path, TerrainDrawing{}, stop);
+  stop_if_asked(stop);
   FollowedTerrain terrain = opened.follower->follow(opened.follower->overview_w_m());
   if (terrain.triangles == 0)
     throw Error("{}: no three samples beside each other have heights", opened.path.string());
@@ -213,7 +229,7 @@ InputKind kind_of(const fs::path& path) {
     throw Error("{}: the folder is no dataset, it has no dataset.yaml", path.string());
   }
   if (path.filename() == "dataset.yaml") return InputKind::Dataset;
-  const std::string end = ending(path);
+  const std::string end = file_ending(path);
   if (is_one_of(end, {".yaml", ".yml"})) return InputKind::Scene;
   if (end == ".ply") return has_faces(path) ? InputKind::Mesh : InputKind::Cloud;
   if (is_one_of(end, {".obj", ".stl", ".gltf", ".glb"})) return InputKind::Mesh;
@@ -223,15 +239,15 @@ InputKind kind_of(const fs::path& path) {
   return kind_of_raster(path);
 }
 
-Opened open_any(const fs::path& path, const OpenLimits& limits) {
+Opened open_any(const fs::path& path, const OpenLimits& limits, const std::stop_token& stop) {
   Opened opened{.kind = kind_of(path), .path = path};
   try {
     switch (opened.kind) {
       case InputKind::Scene:
-        open_scene(opened, limits);
+        open_scene(opened, limits, stop);
         break;
       case InputKind::Dataset:
-        open_dataset(opened);
+        open_dataset(opened, stop);
         break;
       case InputKind::Mesh:
         open_mesh(opened, limits);
@@ -240,7 +256,7 @@ Opened open_any(const fs::path& path, const OpenLimits& limits) {
         open_cloud(opened, limits);
         break;
       case InputKind::Dem:
-        open_dem(opened, limits);
+        open_dem(opened, limits, stop);
         break;
       case InputKind::Picture:
         open_picture(opened);
@@ -250,6 +266,7 @@ Opened open_any(const fs::path& path, const OpenLimits& limits) {
     throw Error("{}: it takes more memory than there is: thin it out or cut it into parts first",
                 path.string());
   }
+  stop_if_asked(stop);
   for (const Layer& layer : opened.layers) {
     check_places(layer, path);
     for (const std::string& fact : layer.facts) {

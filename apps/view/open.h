@@ -4,6 +4,7 @@
 #include <filesystem>
 #include <memory>
 #include <optional>
+#include <stop_token>
 #include <string>
 #include <vector>
 
@@ -45,9 +46,12 @@ struct Opened {
 
 /// Opens a scene (.yaml), a dataset (a folder with dataset.yaml), a mesh, a cloud, a DEM or a
 /// picture, told apart by ending and content. Any thread may; nothing is drawn.
+/// @param stop  asks for an end, from any thread: the certification of a terrain ends then, a file
+///              that is being read is waited for.
 /// @throws Error that names the path, if it is none of these or at fault, or larger than the
-///         limits allow.
-Opened open_any(const std::filesystem::path& path, const OpenLimits& limits = {});
+///         limits allow. @throws Interrupted if it was asked to stop.
+Opened open_any(const std::filesystem::path& path, const OpenLimits& limits = {},
+                const std::stop_token& stop = {});
 
 /// Returns what a path seems to be, without reading all of it. @throws Error as open_any.
 InputKind kind_of(const std::filesystem::path& path);

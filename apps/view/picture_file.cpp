@@ -4,7 +4,6 @@
 
 #include <algorithm>
 #include <array>
-#include <cctype>
 #include <cmath>
 #include <cstdint>
 
@@ -12,6 +11,7 @@
 #include "apps/view/picture_layer.h"
 #include "core/error.h"
 #include "core/exr_reader.h"
+#include "core/file_ending.h"
 #include "core/image_io.h"
 #include "terrain/band_file.h"
 
@@ -88,9 +88,7 @@ PictureFile read_raster_picture(const std::filesystem::path& path) {
 }  // namespace
 
 PictureFile read_picture(const std::filesystem::path& path) {
-  std::string end = path.extension().string();
-  std::ranges::transform(end, end.begin(),
-                         [](unsigned char c) { return static_cast<char>(std::tolower(c)); });
+  const std::string end = file_ending(path);
   if (end == ".exr") return read_exr_picture(path);
   if (end == ".hdr")
     return {expose(read_image_f(path)), {"light, exposed so that its brightest parts are white"}};

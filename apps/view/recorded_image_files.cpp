@@ -3,7 +3,6 @@
 #include <algorithm>
 #include <array>
 #include <bit>
-#include <cctype>
 #include <cmath>
 #include <cstdint>
 #include <cstring>
@@ -17,6 +16,7 @@
 #include "apps/view/recorded_image.h"
 #include "core/error.h"
 #include "core/exr_reader.h"
+#include "core/file_ending.h"
 #include "core/image_io.h"
 #include "core/npy_reader.h"
 #include "core/product_io.h"
@@ -309,9 +309,7 @@ std::vector<ImageChannel> read_frame_channels(const fs::path& stem) {
 }
 
 std::vector<ImageChannel> read_file_channels(const fs::path& file) {
-  std::string ending = file.extension().string();
-  std::ranges::transform(ending, ending.begin(),
-                         [](unsigned char c) { return static_cast<char>(std::tolower(c)); });
+  const std::string ending = file_ending(file);
   std::vector<ImageChannel> channels;
   if (ending == ".exr")
     channels = exr_channels(file);

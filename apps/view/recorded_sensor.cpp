@@ -173,7 +173,7 @@ RecordedRun read_recorded_run(const fs::path& dataset) {
   RecordedRun run{.georeference = listing.georeference, .sensors = {}, .names = {}};
   const fs::path path = dataset / "dataset.yaml";
   yaml::Faults faults(path);
-  const yaml::Node node = yaml::parse(yaml::read_file(path), path);
+  const yaml::Node node = yaml::parse(read_run_text(dataset), path);
   yaml::Map root(node, "", faults);
   std::string text;
   root.read_text("scene", Need::Optional, text);

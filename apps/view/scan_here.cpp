@@ -8,7 +8,9 @@
 #include <utility>
 
 #include "apps/interruption.h"
+#include "apps/view/dem_layer.h"
 #include "core/error.h"
+#include "core/material.h"
 #include "sensors/spec_io.h"
 #include "sensors/sun.h"
 
@@ -32,6 +34,14 @@ std::int64_t sweep_at(const ScanPattern& pattern, nanoseconds time) {
   return sweep;
 }
 
+constexpr const char* bare_name = "bare ground";
+
+// Grey, as far as lasers and eyes go.
+Material bare_ground() {
+  return {.name = bare_name,
+          .reflection = Lambertian{{{200, bare_reflectance}, {20'000, bare_reflectance}}}};
+}
+
 // Rays alone, of a sensor whose light meets no material.
 void put_out(LidarSpec& lidar) {
   lidar.light.reset();
@@ -49,6 +59,12 @@ void suit_to_scene(const SceneSpec& scene, const Materials& materials, LidarSpec
         "the scene's surfaces have no materials, so rays alone were traced: ranges are exact, and "
         "there is no noise of light. Give the terrain a material to see what the laser would");
     return;
+  }
+  if (scene.terrain.material && scene.terrain.material->name == bare_name) {
+    notes.push_back(fmt::format(
+        "a DEM has no materials, so its ground was taken as grey: it reflects {:.0f} % of light of "
+        "any wavelength, evenly to all sides",
+        100 * bare_reflectance));
   }
   const AtmosphereSpec& air = scene.air;
   if ((air.backscatter_per_m_sr > 0 || std::isfinite(air.fog_range_m)) &&
@@ -76,6 +92,17 @@ std::vector<SensorPreset> lidar_presets() {
     presets.push_back({name, std::move(model), std::move(lidar)});
   }
   return presets;
+}
+
+World world_of_dem(const std::filesystem::path& dem, const std::stop_token& stop) {
+  SceneSpec spec;
+  spec.terrain = {.dem = dem, .options = options_for(dem), .material = bare_ground()};
+  Terrain terrain(dem, spec.terrain.options, spec.terrain.detail, [&](double) {
+    if (stop.stop_requested()) throw Interrupted{};
+  });
+  Content content;
+  content.materials = Materials({bare_ground()});
+  return {.spec = std::move(spec), .terrain = std::move(terrain), .content = std::move(content)};
 }
 
 Pose pose_at(const SensorPlace& place, const Ground& ground) {

@@ -28,6 +28,14 @@ struct SensorPreset {
 /// Returns the lidars that groundray comes with, by name. @throws Error as load_lidar.
 std::vector<SensorPreset> lidar_presets();
 
+/// Returns a DEM as a scene in which nothing else is: bare ground, the same to all sides, that
+/// reflects `bare_reflectance` of the light of any wavelength; there is no sun. Only for scanning:
+/// it has no sensors of its own. A DEM that is placed by angles is warped to its UTM zone.
+/// @param stop  asks for an end of the certification that a large DEM needs.
+/// @throws Error as Terrain. @throws Interrupted if it was asked to stop.
+World world_of_dem(const std::filesystem::path& dem, const std::stop_token& stop = {});
+inline constexpr double bare_reflectance = 0.3;
+
 /// Where a sensor is put down.
 struct SensorPlace {
   glm::dvec2 at_m{0};               ///< in D
@@ -51,7 +59,7 @@ struct ScanRequest {
 struct PlacedScan {
   LidarScan scan;                     ///< columns as docs/formats.md has them
   std::chrono::nanoseconds stamp{0};  ///< of its sweep
-  std::vector<std::string> notes;     ///< for people: what was left out
+  std::vector<std::string> notes;     ///< for people: what was left out or assumed
 };
 
 /// What the one that waits is told: the share that is done, 0 to 1, and of what.

@@ -73,10 +73,18 @@ ShownLayer::ShownLayer(Layer layer, const glm::dvec3& origin_w_m) : layer_(std::
   restyle();
 }
 
+// A texture shows what a column of colours does, but more finely.
+bool ShownLayer::is_textured(vtkPolyDataMapper& mapper) const {
+  const LayerColumn* const column = layer_.find(layer_.coloured_by);
+  return layer_.texture != nullptr && (column == nullptr || column->is_rgb) &&
+         mapper.GetInput()->GetPointData()->GetTCoords() != nullptr;
+}
+
 void ShownLayer::paint(vtkPolyDataMapper& mapper) const {
   const LayerColumn* const column = layer_.find(layer_.coloured_by);
-  mapper.SetScalarVisibility(column != nullptr ? 1 : 0);
-  if (column == nullptr) return;
+  const bool is_coloured = column != nullptr && !is_textured(mapper);
+  mapper.SetScalarVisibility(is_coloured ? 1 : 0);
+  if (!is_coloured) return;
   if (column->of == LayerColumn::Of::Points) {
     mapper.SetScalarModeToUsePointFieldData();
   } else {
@@ -99,13 +107,15 @@ void ShownLayer::restyle() {
   if (thin_ != nullptr) paint(*thin_);
   vtkActor& actor = *layer_.actor;
   vtkProperty& property = *actor.GetProperty();
-  property.SetColor(layer_.colour.r, layer_.colour.g, layer_.colour.b);
   property.SetOpacity(layer_.opacity);
   property.SetPointSize(static_cast<float>(layer_.point_size_px));
   property.SetLineWidth(static_cast<float>(layer_.line_width_px));
   property.SetLighting(is_lit(layer_.kind) && !layer_.wireframe);
-  property.SetAmbient(property.GetLighting() ? 0.17 : 0.0);
-  property.SetDiffuse(1.0);
+  // Colours that stand for numbers are as bright as in the legend where light is brightest.
+  const LayerColumn* const column = layer_.find(layer_.coloured_by);
+  const bool is_legend = column != nullptr && !column->is_rgb;
+  property.SetAmbient(!property.GetLighting() ? 0.0 : is_legend ? 0.25 : 0.17);
+  property.SetDiffuse(is_legend && property.GetLighting() ? 0.62 : 1.0);
   property.SetSpecular(0);
   property.SetInterpolationToPhong();
   if (layer_.wireframe) {
@@ -113,10 +123,8 @@ void ShownLayer::restyle() {
   } else {
     property.SetRepresentationToSurface();
   }
-  const bool is_textured = layer_.texture != nullptr && layer_.find(layer_.coloured_by) == nullptr;
-  actor.SetTexture(is_textured ? layer_.texture.Get() : nullptr);
-  if (is_textured) property.SetColor(1, 1, 1);
   actor.SetVisibility(layer_.visible ? 1 : 0);
+  draw(vtkPolyDataMapper::SafeDownCast(actor.GetMapper()));
 }
 
 std::size_t ShownLayer::elements() const {
@@ -132,15 +140,27 @@ void ShownLayer::thin_to(std::size_t elements) {
     const bool is_cloud = layer_.kind == LayerKind::Cloud;
     const bool serves = layer_.coarse != nullptr &&
                         static_cast<std::size_t>(layer_.coarse->GetNumberOfPolys()) <= elements;
-    thin_ = make_mapper(layer_, *(is_cloud ? thin_points(layer_, elements)
-                                  : serves ? layer_.coarse
-                                           : thin_triangles(layer_, elements)));
+    const auto thin = is_cloud ? thin_points(layer_, elements)
+                      : serves ? layer_.coarse
+                               : thin_triangles(layer_, elements);
+    // Points that stand for others are not where their texture has theirs.
+    if (!is_cloud && !serves && thin != layer_.data) thin->GetPointData()->SetTCoords(nullptr);
+    thin_ = make_mapper(layer_, *thin);
     thinned_to_ = elements;
     paint(*thin_);
   }
-  layer_.actor->SetMapper(thin_);
+  draw(thin_);
 }
 
-void ShownLayer::draw_full() { layer_.actor->SetMapper(full_); }
+void ShownLayer::draw_full() { draw(full_); }
+
+void ShownLayer::draw(vtkPolyDataMapper* mapper) {
+  vtkActor& actor = *layer_.actor;
+  actor.SetMapper(mapper);
+  const bool textured = is_textured(*mapper);
+  actor.SetTexture(textured ? layer_.texture.Get() : nullptr);
+  const glm::vec3 colour = textured ? glm::vec3(1) : layer_.colour;
+  actor.GetProperty()->SetColor(colour.r, colour.g, colour.b);
+}
 
 }  // namespace groundray

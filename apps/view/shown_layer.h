@@ -30,6 +30,8 @@ class ShownLayer {
 
  private:
   void paint(vtkPolyDataMapper& mapper) const;
+  void draw(vtkPolyDataMapper* mapper);
+  bool is_textured(vtkPolyDataMapper& mapper) const;
 
   Layer layer_;
   vtkSmartPointer<vtkPolyDataMapper> full_, thin_;

@@ -61,6 +61,17 @@ void colour(View& view, const std::string& wish) {
     throw Error("--colour-by {}: no layer has that column; there are {}", wish, columns);
 }
 
+// Sets what the colours of a column mean, wherever it is shown.
+void span_colours(View& view, const std::string& wish, const glm::dvec2& range) {
+  const auto equals = wish.rfind('=');
+  const std::string name = equals == std::string::npos ? wish : wish.substr(equals + 1);
+  for (const Layer* const layer : view.layers()) {
+    const LayerColumn* const column = layer->find(name);
+    if (layer->coloured_by == name && column != nullptr && !column->is_rgb)
+      view.set_range(layer->name, name, range);
+  }
+}
+
 void hide(View& view, const std::string& wish) {
   bool is_done = false;
   for (const std::string& name : names_of(view)) {
@@ -114,10 +125,15 @@ void arrange(View& view, std::vector<Opened>& inputs, const StillSpec& spec) {
     // Of several terrains only the first has the name that its follower gives it.
     const bool is_first = &opened == &inputs.front();
     if (opened.follower && is_first)
-      view.add(opened.follower->follow(view.current_look().from_w_m).layer);
+      view.add(
+          opened.follower->follow(spec.follow_w_m.value_or(view.current_look().from_w_m)).layer);
   }
   for (const std::string& wish : spec.hide) hide(view, wish);
   for (const std::string& wish : spec.colour_by) colour(view, wish);
+  if (spec.range) {
+    span_colours(view, "deviation", *spec.range);
+    for (const std::string& wish : spec.colour_by) span_colours(view, wish, *spec.range);
+  }
   if (spec.is_wireframe) {
     for (const Layer* const layer : view.layers()) {
       if (layer->kind == LayerKind::Terrain || layer->kind == LayerKind::Mesh)
@@ -156,6 +172,14 @@ glm::ivec2 parse_size(const std::string& text) {
   const auto numbers = parse_numbers<int, 2>(text, 'x');
   if (!numbers || (*numbers)[0] < 1 || (*numbers)[1] < 1)
     throw Error("--size {}: it must be WIDTHxHEIGHT in pixels, such as 1280x720", text);
+  return {(*numbers)[0], (*numbers)[1]};
+}
+
+glm::dvec2 parse_range(const std::string& text) {
+  const auto numbers = parse_numbers<double, 2>(text, ',');
+  if (!numbers || !std::isfinite((*numbers)[0]) || !std::isfinite((*numbers)[1]) ||
+      !((*numbers)[0] < (*numbers)[1]))
+    throw Error("--range {}: it must be LOW,HIGH, the first number the lower one", text);
   return {(*numbers)[0], (*numbers)[1]};
 }
 

@@ -16,9 +16,12 @@ namespace groundray {
 struct StillSpec {
   glm::ivec2 size_px{1280, 720};
   std::optional<glm::dvec3> from_w_m, at_w_m;  ///< else as what is opened is best seen
+  std::optional<glm::dvec3> follow_w_m;        ///< whose terrain's levels; else the eye's
   std::vector<std::string> colour_by;  ///< COLUMN of all layers that have it, or LAYER=COLUMN
-  std::vector<std::string> hide;       ///< layers by name, or what their names begin with
-  bool is_wireframe = false;           ///< surfaces
+  /// What the colours of numbers span, where one of `colour_by` or "deviation" is shown.
+  std::optional<glm::dvec2> range;
+  std::vector<std::string> hide;  ///< layers by name, or what their names begin with
+  bool is_wireframe = false;      ///< surfaces
   bool has_legend = true;
   std::optional<double> point_size_px;
 };
@@ -38,6 +41,8 @@ void write_turntable(View& view, const std::filesystem::path& folder, int pictur
 
 /// Reads `WIDTHxHEIGHT`. @throws Error that names the option if it is none.
 glm::ivec2 parse_size(const std::string& text);
+/// Reads `LOW,HIGH`. @throws Error that names the option if it is none, or empty.
+glm::dvec2 parse_range(const std::string& text);
 /// Reads `X,Y,Z`. @param option  for the message. @throws Error likewise.
 glm::dvec3 parse_place(const std::string& text, const std::string& option);
 

@@ -2,15 +2,25 @@
 
 #include <fmt/format.h>
 
+#include <algorithm>
 #include <chrono>
 #include <cmath>
+#include <compare>
+#include <glm/common.hpp>
+#include <glm/geometric.hpp>
 #include <map>
 #include <mutex>
 #include <optional>
+#include <set>
+#include <span>
+#include <string>
 #include <utility>
+#include <vector>
 
+#include "apps/interruption.h"
 #include "apps/view/dem_layer.h"
 #include "apps/view/ground_colour.h"
+#include "apps/view/ground_texture.h"
 #include "apps/view/terrain_surface.h"
 #include "core/error.h"
 #include "terrain/deviation.h"
@@ -23,6 +33,10 @@ constexpr std::size_t tile_cache_bytes = std::size_t{64} << 20U;
 constexpr double most_whole_samples = 1.2e8;      // of a DEM that is kept in memory
 constexpr double most_uncertified_samples = 1e9;  // that are certified while somebody waits
 constexpr std::size_t coarse_triangles = 25'000;
+constexpr double coarse_eye_height_m = 4;
+// Windows of so much often hold what is asked for, and are quickly made; the smallest ones of any
+// DEM take less.
+constexpr std::size_t first_memory_bytes = std::size_t{16} << 20U;
 constexpr int most_doublings = 24;
 
 using Tiles = std::shared_ptr<const TileSource>;
@@ -36,7 +50,8 @@ struct Source {
 
 // The terrain of a scene serves the levels of its own tolerances alone, so its DEM is opened anew.
 Source open_source(const std::filesystem::path& path, const DemOptions& options,
-                   const std::optional<ReliefSpec>& relief, std::size_t memory_bytes) {
+                   const std::optional<ReliefSpec>& relief, std::size_t memory_bytes,
+                   const std::stop_token& stop) {
   DemFile file(path, options);
   const DemHeader header = file.header();
   Source source{.frame = {header.samples, header.origin_m, header.step_m, 1.0 / header.step_m},
@@ -53,7 +68,10 @@ Source open_source(const std::filesystem::path& path, const DemOptions& options,
           "it "
           "first, or cut out a part",
           path.string(), header.samples.x, header.samples.y);
-    Certificate certificate = Certificate::open_or_make(file);
+    const auto stop_if_asked = [&](double) {
+      if (stop.stop_requested()) throw Interrupted{};
+    };
+    Certificate certificate = Certificate::open_or_make(file, {.progress = stop_if_asked});
     source.tiles =
         std::make_shared<FileTiles>(std::move(file), std::move(certificate), tile_cache_bytes);
   }
@@ -72,55 +90,163 @@ std::size_t sample_bytes(std::span<const Level> levels) {
   return bytes;
 }
 
+// At least how far a leaf is from an eye.
+double least_distance_m(const Level& level, const Leaf& leaf, const glm::dvec3& eye_m) {
+  const glm::ivec2 first(leaf.column, leaf.row);
+  const glm::dvec2 a = level.frame.to_D(first);
+  const glm::dvec2 b =
+      level.frame.to_D(glm::min(first + level.leaf_cells * leaf.step, level.frame.samples - 1));
+  const glm::dvec2 eye(eye_m);
+  const glm::dvec2 aside = glm::max(glm::max(glm::min(a, b) - eye, eye - glm::max(a, b)), 0.0);
+  return glm::length(glm::dvec3(aside, std::max(0.0, eye_m.z - static_cast<double>(leaf.high_m))));
+}
+
+// Whether all leaves are as fine as the settings ask for: else their windows are too small.
+bool are_fine(std::span<const Level> levels, const ClipmapSettings& settings,
+              const glm::dvec3& eye_m) {
+  for (const Level& level : levels.subspan(1)) {
+    for (const Leaf& leaf : level.leaves) {
+      if (leaf.step > level.step || leaf.has_holes) continue;
+      const double asked_m =
+          std::max(settings.tolerance_m, settings.angle_rad * least_distance_m(level, leaf, eye_m));
+      if (static_cast<double>(leaf.deviation_m) > asked_m) return false;
+    }
+  }
+  return true;
+}
+
+// What one clipmap is made by.
+struct Windows {
+  int doublings = 0;        // of the drawing's angle
+  double eye_height_m = 0;  // nothing is finer than seen from there
+  std::size_t memory_bytes = 0;
+  auto operator<=>(const Windows&) const = default;
+};
+
+// Whether windows hold what their angle asks for; where not, the leaves say what is left.
+struct Chosen {
+  Windows windows;
+  bool is_kept = true;
+};
+
+// The terrain for an eye, as it is drawn.
+FollowedTerrain followed_terrain(std::span<const Level> levels, std::span<const Level> coarse,
+                                 const Source& source, const World* world,
+                                 const glm::dvec3& eye_m) {
+  FollowedTerrain followed{.layer = terrain_layer(levels, source.origin_w_m, eye_m)};
+  Layer coarse_layer = terrain_layer(coarse, source.origin_w_m, eye_m);
+  if (world != nullptr) {
+    add_ground_colour(followed.layer, *world);
+    add_ground_colour(coarse_layer, *world);
+  }
+  followed.layer.coarse = coarse_layer.data;
+  if (world != nullptr) drape_ground(followed.layer, *world, eye_m);
+  followed.triangles = followed.layer.triangles();
+  for (const Level& level : levels) followed.leaves += level.leaves.size();
+  followed.levels = static_cast<int>(levels.size());
+  followed.memory_bytes =
+      sample_bytes(levels) + std::size_t{1024} * (followed.layer.data->GetActualMemorySize() +
+                                                  followed.layer.coarse->GetActualMemorySize());
+  return followed;
+}
+
+std::vector<std::string> facts_of(const FollowedTerrain& terrain) {
+  return {fmt::format("{} triangles of {} leaves in {} levels", terrain.triangles, terrain.leaves,
+                      terrain.levels),
+          fmt::format("within {:.3g} mrad of distance{}", terrain.angle_rad * 1e3,
+                      terrain.is_angle_kept ? "" : ", as far as its windows reach"),
+          fmt::format("{:.1f} MB, rebuilt in {:.0f} ms",
+                      static_cast<double>(terrain.memory_bytes) / 1e6, terrain.rebuild_s * 1e3)};
+}
+
 }  // namespace
 
 struct TerrainFollower::Impl {
   Source source;
   TerrainDrawing drawing;
-  std::shared_ptr<const World> world;  // or null
-  std::map<int, Clipmap> clipmaps;     // the last one of each angle, by doublings
+  std::shared_ptr<const World> world;    // or null
+  std::map<Windows, Clipmap> clipmaps;   // the last one of each
+  std::set<Windows> used;                // for the viewpoint that is followed
+  std::optional<FollowedTerrain> shown;  // last
+  glm::dvec3 shown_from_m{0};
   std::mutex mutex;
+  int last = 3, last_coarse = 8;  // doublings
 
-  const Clipmap& clipmap(int doublings, const SensorBox& viewer);
-  std::size_t triangles(int doublings, const SensorBox& viewer) {
-    return count_triangles(clipmap(doublings, viewer).levels());
-  }
+  ClipmapSettings settings(const Windows& windows) const;
+  const std::vector<Level>& levels(const Windows& windows, const glm::dvec3& eye_m);
+  // The smallest windows that hold what is asked for, of as much memory at most; nothing if that is
+  // more triangles.
+  std::optional<Chosen> fit(Windows windows, std::size_t triangles, const glm::dvec3& eye_m);
   // The fewest doublings of the angle that keep to so many triangles, looked for from a guess.
-  int doublings_for(std::size_t triangles, int guess, const SensorBox& viewer);
-  int last = 0, last_coarse = 2;
+  Chosen choose(Windows guess, std::size_t triangles, const glm::dvec3& eye_m);
 };
 
-const Clipmap& TerrainFollower::Impl::clipmap(int doublings, const SensorBox& viewer) {
-  const auto found = clipmaps.find(doublings);
+ClipmapSettings TerrainFollower::Impl::settings(const Windows& windows) const {
+  const double angle_rad = std::ldexp(drawing.angle_rad, windows.doublings);
+  return {.tolerance_m = angle_rad * windows.eye_height_m,
+          .angle_rad = angle_rad,
+          .memory_bytes = windows.memory_bytes};
+}
+
+const std::vector<Level>& TerrainFollower::Impl::levels(const Windows& windows,
+                                                        const glm::dvec3& eye_m) {
+  const SensorBox viewer{eye_m, eye_m};
+  const bool is_done = !used.insert(windows).second;
+  const auto found = clipmaps.find(windows);
   if (found == clipmaps.end()) {
-    const ClipmapSettings settings{.angle_rad = std::ldexp(drawing.angle_rad, doublings),
-                                   .memory_bytes = drawing.memory_bytes};
-    return clipmaps.emplace(doublings, Clipmap(source.tiles, source.frame, settings, viewer))
-        .first->second;
+    Clipmap made(source.tiles, source.frame, settings(windows), viewer);
+    return clipmaps.emplace(windows, std::move(made)).first->second.levels();
   }
-  found->second = found->second.moved_to(viewer);
-  return found->second;
+  if (!is_done) found->second = found->second.moved_to(viewer);
+  return found->second.levels();
 }
 
-int TerrainFollower::Impl::doublings_for(std::size_t most, int guess, const SensorBox& viewer) {
-  int doublings = guess;
-  while (doublings < most_doublings && triangles(doublings, viewer) > most) ++doublings;
-  if (doublings > guess) return doublings;
-  while (doublings > 0 && triangles(doublings - 1, viewer) <= most) --doublings;
-  return doublings;
+std::optional<Chosen> TerrainFollower::Impl::fit(Windows windows, std::size_t triangles,
+                                                 const glm::dvec3& eye_m) {
+  const bool is_last = windows.doublings >= most_doublings;
+  const std::size_t most_bytes =
+      std::exchange(windows.memory_bytes, std::min(first_memory_bytes, windows.memory_bytes));
+  while (true) {
+    const std::vector<Level>& made = levels(windows, eye_m);
+    if (!is_last && count_triangles(made) > triangles) return std::nullopt;
+    if (are_fine(made, settings(windows), eye_m)) return Chosen{windows, true};
+    if (windows.memory_bytes >= most_bytes) return Chosen{windows, false};
+    windows.memory_bytes = std::min(2 * windows.memory_bytes, most_bytes);
+  }
 }
 
-TerrainFollower::TerrainFollower(std::shared_ptr<const World> world, const TerrainDrawing& drawing)
+Chosen TerrainFollower::Impl::choose(Windows guess, std::size_t triangles,
+                                     const glm::dvec3& eye_m) {
+  auto chosen = fit(guess, triangles, eye_m);
+  if (!chosen) {
+    while (!chosen) {
+      ++guess.doublings;
+      chosen = fit(guess, triangles, eye_m);
+    }
+    return *chosen;
+  }
+  while (guess.doublings > 0) {
+    --guess.doublings;
+    const auto finer = fit(guess, triangles, eye_m);
+    if (!finer) break;
+    chosen = finer;
+  }
+  return *chosen;
+}
+
+TerrainFollower::TerrainFollower(std::shared_ptr<const World> world, const TerrainDrawing& drawing,
+                                 const std::stop_token& stop)
     : impl_(std::make_unique<Impl>()) {
   const TerrainSpec& spec = world->spec.terrain;
-  impl_->source = open_source(spec.dem, spec.options, spec.relief, drawing.memory_bytes);
+  impl_->source = open_source(spec.dem, spec.options, spec.relief, drawing.memory_bytes, stop);
   impl_->drawing = drawing;
   impl_->world = std::move(world);
 }
 
-TerrainFollower::TerrainFollower(const std::filesystem::path& dem, const TerrainDrawing& drawing)
+TerrainFollower::TerrainFollower(const std::filesystem::path& dem, const TerrainDrawing& drawing,
+                                 const std::stop_token& stop)
     : impl_(std::make_unique<Impl>()) {
-  impl_->source = open_source(dem, options_for(dem), std::nullopt, drawing.memory_bytes);
+  impl_->source = open_source(dem, options_for(dem), std::nullopt, drawing.memory_bytes, stop);
   impl_->drawing = drawing;
 }
 
@@ -130,38 +256,30 @@ FollowedTerrain TerrainFollower::follow(const glm::dvec3& viewpoint_w_m) {
   const std::scoped_lock lock(impl_->mutex);
   const auto begin = std::chrono::steady_clock::now();
   Impl& own = *impl_;
-  const glm::dvec3 viewpoint_m = viewpoint_w_m - own.source.origin_w_m;
-  const SensorBox viewer{viewpoint_m, viewpoint_m};
-  own.last = own.doublings_for(own.drawing.triangles, own.last, viewer);
-  own.last_coarse =
-      own.doublings_for(std::min(coarse_triangles, own.drawing.triangles), own.last_coarse, viewer);
-  std::erase_if(own.clipmaps, [&](const auto& kept) {
-    return std::abs(kept.first - own.last) > 1 && std::abs(kept.first - own.last_coarse) > 1;
-  });
-  const std::vector<Level>& levels = own.clipmap(own.last, viewer).levels();
-  FollowedTerrain followed{.layer = terrain_layer(levels, own.source.origin_w_m, viewpoint_m)};
-  Layer coarse = terrain_layer(own.clipmap(own.last_coarse, viewer).levels(), own.source.origin_w_m,
-                               viewpoint_m);
-  if (own.world != nullptr) {
-    add_ground_colour(followed.layer, *own.world);
-    add_ground_colour(coarse, *own.world);
-  }
-  followed.layer.coarse = coarse.data;
-  followed.triangles = followed.layer.triangles();
-  for (const Level& level : levels) followed.leaves += level.leaves.size();
-  followed.levels = static_cast<int>(levels.size());
-  followed.memory_bytes =
-      sample_bytes(levels) + std::size_t{1024} * (followed.layer.data->GetActualMemorySize() +
-                                                  followed.layer.coarse->GetActualMemorySize());
-  followed.angle_rad = std::ldexp(own.drawing.angle_rad, own.last);
+  // Millimetres, so that what others' frames round away counts as no other place.
+  const glm::dvec3 eye_m = glm::round((viewpoint_w_m - own.source.origin_w_m) * 1e3) / 1e3;
+  if (own.shown && own.shown_from_m == eye_m) return *own.shown;
+  own.used.clear();
+  const Chosen full = own.choose({.doublings = own.last, .memory_bytes = own.drawing.memory_bytes},
+                                 own.drawing.triangles, eye_m);
+  const Chosen coarse =
+      own.choose({.doublings = own.last_coarse,
+                  .eye_height_m = coarse_eye_height_m,
+                  .memory_bytes = std::min(first_memory_bytes, own.drawing.memory_bytes)},
+                 std::min(coarse_triangles, own.drawing.triangles), eye_m);
+  own.last = full.windows.doublings;
+  own.last_coarse = coarse.windows.doublings;
+  std::erase_if(own.clipmaps, [&](const auto& kept) { return !own.used.contains(kept.first); });
+  FollowedTerrain followed =
+      followed_terrain(own.levels(full.windows, eye_m), own.levels(coarse.windows, eye_m),
+                       own.source, own.world.get(), eye_m);
+  followed.angle_rad = own.settings(full.windows).angle_rad;
+  followed.is_angle_kept = full.is_kept;
   followed.rebuild_s =
       std::chrono::duration<double>(std::chrono::steady_clock::now() - begin).count();
-  followed.layer.facts = {
-      fmt::format("{} triangles of {} leaves in {} levels", followed.triangles, followed.leaves,
-                  followed.levels),
-      fmt::format("within {:.3g} mrad of distance", followed.angle_rad * 1e3),
-      fmt::format("{:.1f} MB, rebuilt in {:.0f} ms",
-                  static_cast<double>(followed.memory_bytes) / 1e6, followed.rebuild_s * 1e3)};
+  followed.layer.facts = facts_of(followed);
+  own.shown = followed;
+  own.shown_from_m = eye_m;
   return followed;
 }
 

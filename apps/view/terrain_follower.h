@@ -4,6 +4,7 @@
 #include <filesystem>
 #include <glm/vec3.hpp>
 #include <memory>
+#include <stop_token>
 
 #include "apps/scene/world.h"
 #include "apps/view/layer.h"
@@ -14,7 +15,7 @@ namespace groundray {
 struct TerrainDrawing {
   double angle_rad = 2.5e-4;        ///< deviation allowed for each metre of distance
   std::size_t triangles = 600'000;  ///< the angle is doubled until there are no more, about
-  std::size_t memory_bytes = std::size_t{512} << 20U;
+  std::size_t memory_bytes = std::size_t{512} << 20U;  ///< at most, for its windows
 };
 
 /// Terrain as it is drawn from one viewpoint.
@@ -27,16 +28,21 @@ struct FollowedTerrain {
   std::size_t memory_bytes = 0;  ///< of the clipmap's samples and of what is drawn
   double rebuild_s = 0;          ///< what this took
   double angle_rad = 0;          ///< that was kept
+  bool is_angle_kept = true;     ///< false: far out only as far as the memory went
 };
 
 /// The quadtree and clipmap of a terrain for viewpoints that move.
 class TerrainFollower {
  public:
-  /// Of an opened scene, with its relief. @throws Error as Terrain.
-  explicit TerrainFollower(std::shared_ptr<const World> world, const TerrainDrawing& drawing = {});
+  /// Of an opened scene, with its relief.
+  /// @param stop  asks for an end of the certification that a large DEM needs.
+  /// @throws Error as Terrain. @throws Interrupted if it was asked to stop.
+  explicit TerrainFollower(std::shared_ptr<const World> world, const TerrainDrawing& drawing = {},
+                           const std::stop_token& stop = {});
   /// Of a DEM file alone; one that is placed by angles is warped to its UTM zone.
-  /// @throws Error likewise.
-  explicit TerrainFollower(const std::filesystem::path& dem, const TerrainDrawing& drawing = {});
+  /// @throws Error, Interrupted likewise.
+  explicit TerrainFollower(const std::filesystem::path& dem, const TerrainDrawing& drawing = {},
+                           const std::stop_token& stop = {});
   ~TerrainFollower();
   TerrainFollower(const TerrainFollower&) = delete;
   TerrainFollower& operator=(const TerrainFollower&) = delete;

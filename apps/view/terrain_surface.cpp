@@ -182,9 +182,10 @@ std::map<int, std::string> cell_sizes(const Level& level, std::span<const float>
   return names;
 }
 
-std::map<int, std::string> numbers(std::span<const float> values) {
-  std::map<int, std::string> names;
-  for (const float value : values) names[static_cast<int>(value)] = std::to_string(int(value));
+// Numbers of clipmap levels, with the finest cells that they may have.
+std::map<int, std::string> level_names(const Level& level, std::span<const float> numbers) {
+  std::map<int, std::string> names = cell_sizes(level, numbers);
+  for (auto& [number, name] : names) name = fmt::format("{}: {}", number, name);
   return names;
 }
 
@@ -200,7 +201,7 @@ void add_columns(Layer& layer, const Gathered& all, std::span<const glm::uvec3> 
              {.name = "clipmap level",
               .unit = "",
               .of = of_cells,
-              .categories = numbers(all.clipmap_level),
+              .categories = level_names(level, all.clipmap_level),
               .is_ordered = true},
              all.clipmap_level);
   add_column(layer,

@@ -55,6 +55,43 @@ def test_turntable_is_a_sequence(tmp_path: Path) -> None:
     ]
 
 
+# Written by others: NumPy and OpenCV.
+def write_inputs(folder: Path) -> list[Path]:
+    points = np.random.default_rng(3).uniform(-5, 5, (500, 4)).astype(np.float32)
+    np.save(folder / "cloud.npy", points)
+    np.savez(folder / "cloud.npz", xyz=points[:, :3], intensity=points[:, 3])
+    points.tofile(folder / "cloud.bin")
+    colours = np.random.default_rng(4).uniform(0, 255, (9, 16, 3))
+    colours = cv2.resize(colours, (160, 90))
+    for name in ("picture.png", "picture.jpg"):
+        assert cv2.imwrite(str(folder / name), colours.astype(np.uint8))
+    assert cv2.imwrite(str(folder / "light.hdr"), (colours / 50).astype(np.float32))
+    return sorted(folder.iterdir())
+
+
+def test_clouds_and_pictures_of_others_are_shown(tmp_path: Path) -> None:
+    (tmp_path / "in").mkdir()
+    for path in write_inputs(tmp_path / "in"):
+        result = view(path, "--screenshot", tmp_path / "out.png", "--size", "320x180")
+        assert result.returncode == 0, result.stderr
+        picture = cv2.imread(str(tmp_path / "out.png"))
+        # More than the background, whose colour changes from row to row alone.
+        assert np.any(np.ptp(picture.astype(int), axis=1) > 20), path.name
+
+
+def test_pictures_stay_what_they_are(tmp_path: Path) -> None:
+    """The middle of a picture has its colours."""
+    bands = np.zeros((40, 60, 3), np.uint8)
+    bands[:, :30] = (200, 60, 20)
+    bands[:, 30:] = (10, 90, 220)
+    cv2.imwrite(str(tmp_path / "bands.jpg"), bands)
+    result = view(tmp_path / "bands.jpg", "--screenshot", tmp_path / "out.png", "--size", "300x200")
+    assert result.returncode == 0, result.stderr
+    picture = cv2.imread(str(tmp_path / "out.png")).astype(int)
+    assert np.abs(picture[100, 110] - bands[20, 10]).max() <= 6  # JPEG's and drawing's rounding
+    assert np.abs(picture[100, 190] - bands[20, 50]).max() <= 6
+
+
 @pytest.mark.parametrize(
     ("name", "content", "said"),
     [
@@ -62,6 +99,17 @@ def test_turntable_is_a_sequence(tmp_path: Path) -> None:
         ("scan.pcd", b"VERSION .7\n", "scan.pcd"),
         ("dem.tif", b"II*\0", "dem.tif"),
         ("picture.png", b"\x89PNG\r\n\x1a\n", "picture.png"),
+        ("picture.jpg", b"\xff\xd8\xff\xe0", "picture.jpg"),
+        ("light.exr", b"\x76\x2f\x31\x01\x02", "light.exr"),
+        ("light.hdr", b"#?RADIANCE\n\n-Y 60000 +X 60000\n", "light.hdr"),
+        ("mesh.stl", b"\0" * 80 + b"\xff" * 4, "mesh.stl"),
+        ("mesh.obj", b"v 1 2\nf 1 2 3\n", "mesh.obj"),
+        ("mesh.glb", b"glTF\x02\0\0\0\xff\xff\xff\xff", "mesh.glb"),
+        ("scan.npy", b"\x93NUMPY\x01\0", "scan.npy"),
+        ("scan.npz", b"PK\x03\x04", "scan.npz"),
+        ("scan.bin", b"12345", "scan.bin"),
+        ("scan.las", b"LASF", "laspy"),
+        ("dataset.yaml", b"groundray_dataset: 99\n", "dataset.yaml"),
         ("scene.yaml", b"groundray: [", "scene.yaml"),
         ("notes.txt", b"hello", "nothing that can be shown"),
     ],
@@ -75,12 +123,50 @@ def test_broken_inputs_are_named(tmp_path: Path, name: str, content: bytes, said
     assert not (tmp_path / "out.png").exists()
 
 
+def write_plate(path: Path, height_m: float) -> None:
+    corners = [(0, 0), (4, 0), (4, 4), (0, 4)]
+    path.write_text(
+        "ply\nformat ascii 1.0\nelement vertex 4\nproperty double x\nproperty double y\n"
+        "property double z\nelement face 2\nproperty list uchar int vertex_indices\nend_header\n"
+        + "".join(f"{x} {y} {height_m}\n" for x, y in corners)
+        + "3 0 1 2\n3 0 2 3\n"
+    )
+
+
+def test_distances_from_the_truth_are_printed_and_shown(tmp_path: Path) -> None:
+    write_plate(tmp_path / "truth.ply", 1)
+    write_plate(tmp_path / "raised.ply", 1.05)
+    truth = ["--compare-with", tmp_path / "truth.ply", "--tolerance-m", 0.1]
+    for span, is_red in (("-0.05,0.05", True), ("0.05,0.1", False)):
+        picture = ["--screenshot", tmp_path / "out.png", "--size", "200x120", "--no-legend"]
+        result = view(tmp_path / "raised.ply", *truth, *picture, f"--range={span}")
+        assert result.returncode == 0, result.stderr
+        assert "raised.ply from truth.ply:" in result.stdout
+        assert "mean 0.05 m" in result.stdout
+        blue, _, red = cv2.imread(str(tmp_path / "out.png"))[60, 100].astype(int)
+        assert abs(red - blue) > 60
+        assert (red > blue) == is_red
+
+
 def test_usage(tmp_path: Path) -> None:
     assert view("--help").returncode == 0
     assert view("--version").stdout.startswith("groundray-view ")
     assert view("--no-such-option").returncode == 2
-    assert view("--turntable", 4).returncode == 2
-    for wrong in (("--size", "12"), ("--look-at", "1,2"), ("--colour-by", "nothing")):
+    for lonely in (
+        ("--turntable", 4),
+        ("--follow", "1,2,3"),
+        ("--range", "0,1"),
+        ("--compare-with", DEM),
+    ):
+        result = view(DEM, *lonely)
+        assert result.returncode == 2
+        assert f"{lonely[0]} needs --screenshot" in result.stderr
+    for wrong in (
+        ("--size", "12"),
+        ("--look-at", "1,2"),
+        ("--colour-by", "nothing"),
+        ("--range", "2,1"),
+    ):
         result = view(DEM, "--screenshot", tmp_path / "out.png", *wrong)
         assert result.returncode == 1
         assert wrong[0] in result.stderr

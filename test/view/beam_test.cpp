@@ -110,7 +110,7 @@ TEST(Beam, IsFoundByItsPulseAndAtTheStamp) {
               "    receiver: {aperture_mm: 20, threshold_w: 1.0e-7, timing: peak, returns: all}\n");
   text.replace(text.find("duration_s: 0.5"), 15, "duration_s: 0.2");
   groundray::generate(groundray::testing::write_sample_scene(folder.path(), text), folder / "out",
-                      std::nullopt);
+                      {});
   const SampleScan sample = scan_of(folder / "out", 1);
   EXPECT_EQ(sample.lidar().points, LidarSpec::Points::AtStamp);
   ASSERT_TRUE(sample.scan.has("pulse"));

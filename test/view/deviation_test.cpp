@@ -316,5 +316,24 @@ TEST(DeviationFromTruth, SaysHowMuchAgrees) {
               ElementsAre("within 0.01 m: precision 100.00 %, completeness 100.00 %, F1 100.00 %"));
 }
 
+// Two squares that lie 5 cm apart and overlap in half of each.
+TEST(AgreementUntil, IsTheAgreementUnlessStopped) {
+  const TriangleMesh truth{
+      {{0, 0, 0}, {2, 0, 0}, {2, 1, 0}, {0, 1, 0}}, {{0, 1, 2}, {0, 2, 3}}, {}};
+  TriangleMesh mesh = truth;
+  for (glm::dvec3& p : mesh.vertices_m) p += glm::dvec3(1, 0, 0.05);
+  const std::vector<double> tolerances_m = {0.06};
+  std::stop_source stop;
+  const auto all = agreement_until(mesh, truth, tolerances_m, stop.get_token());
+  const auto expected = agreement(mesh, truth, tolerances_m);
+  ASSERT_EQ(all.size(), 1u);
+  EXPECT_EQ(all[0].precision.value, expected[0].precision.value);
+  EXPECT_EQ(all[0].completeness.value, expected[0].completeness.value);
+  // The tolerance reaches sqrt(0.06^2 - 0.05^2) m beyond the edge.
+  EXPECT_NEAR(all[0].precision.value, (1 + std::sqrt(0.0011)) / 2, 0.02);
+  stop.request_stop();
+  EXPECT_THROW(agreement_until(mesh, truth, tolerances_m, stop.get_token()), Interrupted);
+}
+
 }  // namespace
 }  // namespace groundray

@@ -84,7 +84,7 @@ class SampleDataset {
 
  private:
   SampleDataset() {
-    groundray::generate(write_sample_scene(folder_.path(), sample_scene()), path(), std::nullopt);
+    groundray::generate(write_sample_scene(folder_.path(), sample_scene()), path(), {});
   }
 
   TemporaryFolder folder_;

@@ -143,7 +143,7 @@ TEST(ScanHere, GivesTheBytesOfAGeneratedScan) {
                             "file: lamp.yaml, range_noise_sigma_m: 0.01, error_bound: report"}) {
     const groundray::testing::TemporaryFolder folder;
     const auto scene = write_scene_at_rest(folder.path(), sample_world(), lidar);
-    groundray::generate(scene, folder / "out", std::nullopt);
+    groundray::generate(scene, folder / "out", {});
     const World world = load_world(scene);
     LidarSpec spec = world.lidars[0].spec.lidar;
     if (spec.light) spec.light->sun = load_lidar(folder / "lamp.yaml").light->sun;
@@ -159,6 +159,33 @@ TEST(ScanHere, GivesTheBytesOfAGeneratedScan) {
       EXPECT_GT(generated.rows(), 500U);
       EXPECT_EQ(difference(placed.scan.echoes, generated), "") << lidar << ", sweep " << sweep;
     }
+  }
+}
+
+// The oracle is what generate writes of a scene of that DEM with a material that says the same.
+TEST(ScanHere, OfADemAloneHasTheBytesOfGreyGround) {
+  for (const char* lidar : {"preset: velodyne_vlp16, range_noise_sigma_m: 0.03",
+                            "file: lamp.yaml, range_noise_sigma_m: 0.01"}) {
+    const groundray::testing::TemporaryFolder folder;
+    const auto scene = write_scene_at_rest(folder.path(), sample_world(), lidar);
+    std::ofstream(folder / "grey.yaml")
+        << "groundray_material: 1\nname: grey\nspectrum:\n"
+           "  wavelengths_nm: [300, 2500]\n  reflectances: [0.3, 0.3]\n"
+           "sources: {all: made up}\n";
+    std::ofstream(folder / "scene.yaml")
+        << "groundray: 1\nseed: 0\nduration_s: 0.2\n"
+           "terrain: {dem: hills.asc, material: grey.yaml}\nplatform: {trajectory: body.tum}\n"
+           "lidars:\n  - {name: top, mount: {}, "
+        << lidar << "}\n";
+    groundray::generate(scene, folder / "out", {});
+    const LidarSpec spec = load_world(scene).lidars[0].spec.lidar;
+    const World world = world_of_dem(folder / "hills.asc");
+    const PlacedScan placed =
+        scan_here(world, {spec, pose_at(rest(), world.terrain.ground()), 150ms});
+    EXPECT_EQ(placed.notes.size(), spec.light ? 1U : 0U);
+    const PointCloud generated = read_ply(folder / "out/lidar/top/000001.ply").cloud;
+    EXPECT_GT(generated.rows(), 500U);
+    EXPECT_EQ(difference(placed.scan.echoes, generated), "") << lidar;
   }
 }
 

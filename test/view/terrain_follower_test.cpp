@@ -4,6 +4,7 @@
 #include <gtest/gtest.h>
 
 #include <algorithm>
+#include <string>
 #include <vector>
 
 #include "test/support/geotiff.h"
@@ -69,6 +70,25 @@ TEST_F(Followed, DeviatesByTheAngleAtMost) {
     ASSERT_LE(terrain.layer.value(*deviation, static_cast<vtkIdType>(i)),
               terrain.angle_rad * distance_m * (1 + 1e-6));
   }
+}
+
+// What is asked for twice is made once, also where a view's own frame has rounded the eye's place.
+TEST_F(Followed, IsNotMadeTwiceForOnePlace) {
+  TerrainFollower follower(dem());
+  const FollowedTerrain terrain = follower.follow(eye(0));
+  EXPECT_EQ(follower.follow(eye(1e-9)).layer.data, terrain.layer.data);
+  EXPECT_NE(follower.follow(eye(1)).layer.data, terrain.layer.data);
+}
+
+// With less memory than it takes the angle is not kept everywhere, and that is told.
+TEST_F(Followed, TellsWhereItsMemoryEnds) {
+  const FollowedTerrain whole = TerrainFollower(dem()).follow(eye(0));
+  EXPECT_TRUE(whole.is_angle_kept);
+  const FollowedTerrain part = TerrainFollower(dem(), {.memory_bytes = 1'600'000}).follow(eye(0));
+  EXPECT_FALSE(part.is_angle_kept);
+  EXPECT_GT(part.levels, 2);
+  EXPECT_LT(part.triangles, whole.triangles);
+  EXPECT_NE(part.layer.facts[1].find("as far as its windows reach"), std::string::npos);
 }
 
 TEST_F(Followed, IsCoarserForMoving) {

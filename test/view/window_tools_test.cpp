@@ -256,6 +256,35 @@ TEST_F(WindowToolsTest, ScansFromWhereTheMousePutsTheSensor) {
   EXPECT_NE(window.view().find("picked/beam"), nullptr);
 }
 
+TEST_F(WindowToolsTest, ScansADemAlone) {
+  Window& window = shown();
+  open(SampleDataset::get().scene().parent_path() / "hills.asc");
+  ScanPanel& panel = window.scan_panel();
+  panel.choose("velodyne_vlp16");
+  QTest::mouseClick(panel.findChild<QPushButton*>("place"), Qt::LeftButton);
+  EXPECT_TRUE(wait_until([&] { return window.canvas().is_taking_place(); }));
+  window.canvas().take_place(false);
+  panel.put_down({80, 80, 50}, {90, 80, 50});
+  ASSERT_TRUE(panel.has_place());
+  panel.scan();
+  settle();
+  EXPECT_EQ(dismiss_fault(), "");
+  const Layer* scan = window.view().find("scan here/1 velodyne_vlp16");
+  ASSERT_NE(scan, nullptr);
+  ASSERT_GT(scan->points(), 1000U);
+  // There is ground alone; 6 sigma of the range noise are 0.18 m along the beam.
+  for (vtkIdType i = 0; i < static_cast<vtkIdType>(scan->points()); ++i) {
+    const glm::dvec3 p = scan->p_w_m(i);
+    ASSERT_NEAR(p.z, hill_m(p.x, p.y), 0.2) << i;
+  }
+  open(SampleDataset::get().scene());  // which has more to be scanned
+  EXPECT_FALSE(panel.has_place());
+  window.layer_panel().select("hills.asc");
+  QTest::keyClick(&window, Qt::Key_Delete);
+  panel.put_down({80, 80, 50}, {90, 80, 50});
+  EXPECT_TRUE(panel.has_place());
+}
+
 TEST_F(WindowToolsTest, AScanCanBeCancelled) {
   Window& window = shown();
   open(SampleDataset::get().scene());

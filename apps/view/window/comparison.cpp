@@ -37,10 +37,11 @@ TriangleMesh mesh_of(const Layer& layer, const glm::dvec3& origin_w_m) {
 }
 
 std::vector<Agreement> agreements_of(const Layer& layer, const TriangleMesh& truth,
-                                     const glm::dvec3& origin_w_m, double tolerance_m) {
+                                     const glm::dvec3& origin_w_m, double tolerance_m,
+                                     const std::stop_token& stop) {
   if (tolerance_m <= 0 || layer.triangles() == 0) return {};
   const std::array<double, 1> tolerances_m{tolerance_m};
-  return agreement(mesh_of(layer, origin_w_m), truth, tolerances_m);
+  return agreement_until(mesh_of(layer, origin_w_m), truth, tolerances_m, stop);
 }
 
 }  // namespace
@@ -63,7 +64,7 @@ Comparison compare(const Layer& layer, const Truth& truth, double tolerance_m,
     const TriangleMesh mesh = mesh_of(surface, surface.origin_w_m);
     comparison.deviation = deviation_from_mesh(places_m(layer, surface.origin_w_m), TrueMesh(mesh),
                                                glm::dvec3(0), stop, progress);
-    comparison.agreements = agreements_of(layer, mesh, surface.origin_w_m, tolerance_m);
+    comparison.agreements = agreements_of(layer, mesh, surface.origin_w_m, tolerance_m, stop);
   }
   if (comparison.deviation.figures.count == 0) {
     throw Error("{} has no point near {}: are both in one frame?", layer.name, truth.name);

@@ -19,6 +19,7 @@ FactTable::FactTable(QWidget* parent) : QTableWidget(0, 2, parent) {
   setAlternatingRowColors(true);
   setShowGrid(false);
   setWordWrap(false);
+  setMinimumHeight(3 * verticalHeader()->defaultSectionSize());
 }
 
 void FactTable::show_facts(const Facts& facts) {

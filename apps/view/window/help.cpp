@@ -8,11 +8,12 @@
 namespace groundray {
 namespace {
 
-constexpr const char* text = R"(
+constexpr const char* help_html = R"(
 <style>td { padding: 1px 14px 1px 0; } h3 { margin: 10px 0 2px 0; }</style>
 <h3>Opening</h3>
 <p>Drop scenes (.yaml), datasets (their folders), meshes, clouds, DEMs and pictures into the window,
-or use <b>Ctrl+O</b> and, for a dataset's folder, <b>Ctrl+Shift+O</b>.</p>
+or use <b>Ctrl+O</b> and, for a dataset's folder, <b>Ctrl+Shift+O</b>. What was opened last is in the
+menu <i>File</i>.</p>
 <h3>Mouse</h3>
 <table>
 <tr><td>drag left</td><td>turn round the point that is looked at; up stays up</td></tr>
@@ -30,14 +31,17 @@ or use <b>Ctrl+O</b> and, for a dataset's folder, <b>Ctrl+Shift+O</b>.</p>
 <tr><td>T</td><td>surfaces as wireframe</td><td>L</td><td>legend</td></tr>
 <tr><td>Space</td><td>play, pause</td><td>, .</td><td>the frame before, the next</td></tr>
 <tr><td>N</td><td>scan here</td><td>C</td><td>compare with the truth</td></tr>
-<tr><td>Ctrl+S</td><td>save a picture</td><td>Delete</td><td>close the selected layer</td></tr>
+<tr><td>Ctrl+O</td><td>open files</td><td>Ctrl+Shift+O</td><td>open a dataset's folder</td></tr>
+<tr><td>Ctrl+S</td><td>save a picture</td><td>Ctrl+T</td><td>pictures of a whole turn</td></tr>
+<tr><td>Delete</td><td>close the selected layer</td><td>Ctrl+W</td><td>close all</td></tr>
 <tr><td>Escape</td><td>cancel; take back what was picked</td><td>F11</td><td>full screen</td></tr>
+<tr><td>F1</td><td>this page</td><td>Ctrl+Q</td><td>quit</td></tr>
 </table>
 <h3>Images</h3>
 <p>Point at a pixel for its value; click for its ray and the surface that it meets. The wheel comes
 nearer, a double click shows all.</p>
 <h3>Scan here</h3>
-<p>Of a scene: choose a sensor, press <i>Place it in the view</i>, press on the ground where it
+<p>Of a scene, or of a DEM as bare ground: choose a sensor, press <i>Place it in the view</i>, press on the ground where it
 stands and drag to where it looks; then <i>Scan</i>.</p>
 <h3>Compare</h3>
 <p>Choose what is measured and the truth: a scene's ground, a DEM, or a surface that is shown. Both
@@ -46,13 +50,15 @@ are to be in one frame. Above, or on the side that triangles face, is positive.<
 
 }  // namespace
 
+QString help_text() { return QString::fromUtf8(help_html); }
+
 void show_help(QWidget* parent) {
   auto* dialog = new QDialog(parent);
   dialog->setObjectName("help");
   dialog->setAttribute(Qt::WA_DeleteOnClose);
   dialog->setWindowTitle("Mouse and keys");
   auto* browser = new QTextBrowser;
-  browser->setHtml(text);
+  browser->setHtml(help_text());
   auto* buttons = new QDialogButtonBox(QDialogButtonBox::Close);
   QObject::connect(buttons, &QDialogButtonBox::rejected, dialog, &QDialog::close);
   auto* layout = new QVBoxLayout(dialog);

@@ -1,10 +1,15 @@
 #pragma once
 
+#include <QString>
+
 class QWidget;
 
 namespace groundray {
 
-/// Shows what the mouse and the keys do.
+/// Returns what the mouse and the keys do, as HTML.
+QString help_text();
+
+/// Shows it.
 void show_help(QWidget* parent);
 
 }  // namespace groundray

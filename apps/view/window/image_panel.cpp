@@ -27,12 +27,15 @@ ImagePanel::ImagePanel(Hooks hooks, QWidget* parent) : QWidget(parent), hooks_(s
 void ImagePanel::build() {
   camera_ = new QComboBox;
   camera_->setObjectName("camera");
-  camera_->setVisible(false);
+  camera_->setSizeAdjustPolicy(QComboBox::AdjustToContents);
+  camera_->hide();
   channel_ = new QComboBox;
   channel_->setObjectName("channel");
   channel_->setToolTip("What is shown of each pixel");
-  channel_->setMinimumWidth(110);
+  channel_->setSizeAdjustPolicy(QComboBox::AdjustToContents);
+  channel_->hide();
   title_ = new QLabel;
+  title_->setSizePolicy(QSizePolicy::Ignored, QSizePolicy::Preferred);
   area_ = new PictureArea({.clicked =
                                [this](glm::ivec2 pixel) {
                                  if (image_ != nullptr && hooks_.clicked) hooks_.clicked(pixel);
@@ -40,16 +43,18 @@ void ImagePanel::build() {
                            .pointed = [this](auto pixel) { point_at(pixel); }});
   area_->setObjectName("picture");
   legend_ = new LegendStrip;
-  values_ = new QLabel("point at a pixel; a click shows its ray");
+  values_ = new QLabel;
+  values_->setWordWrap(true);
   values_->setObjectName("pixel_values");
   auto* row = new QHBoxLayout;
   row->addWidget(camera_);
   row->addWidget(channel_);
-  row->addWidget(title_, 1);
+  row->addStretch(1);
   auto* layout = new QVBoxLayout(this);
   layout->setContentsMargins(4, 4, 4, 4);
   layout->setSpacing(3);
   layout->addLayout(row);
+  layout->addWidget(title_);
   layout->addWidget(area_, 1);
   layout->addWidget(legend_);
   layout->addWidget(values_);
@@ -117,7 +122,7 @@ void ImagePanel::start(std::function<Shown()> work) {
              {.failed =
                   [this](const std::string& fault) {
                     source_.reset();
-                    show_nothing();
+                    show_nothing("this image cannot be read");
                     if (hooks_.failed) hooks_.failed(fault);
                   },
               .ended = ended});
@@ -134,6 +139,8 @@ void ImagePanel::take(Shown shown) {
     channel_->addItem(QString::fromStdString(each.name));
   }
   channel_->setCurrentIndex(static_cast<int>(shown.channel));
+  channel_->show();
+  if (values_->text().isEmpty()) values_->setText("point at a pixel; a click shows its ray");
   is_filling_ = false;
   area_->show_picture(shown.drawn.picture);
   const bool is_picture = image_->channels()[shown.channel].kind == ImageChannel::Kind::Picture;
@@ -143,20 +150,22 @@ void ImagePanel::take(Shown shown) {
       QString::fromStdString(fmt::format("{}   {} x {} px", shown_->title, size.x, size.y)));
 }
 
-void ImagePanel::clear() {
+void ImagePanel::clear(const QString& why) {
   job_.abandon();
   is_stale_ = false;
   source_.reset();
   next_.reset();
-  show_nothing();
+  show_nothing(why);
 }
 
-void ImagePanel::show_nothing() {
+void ImagePanel::show_nothing(const QString& why) {
   image_ = nullptr;
   shown_.reset();
-  area_->clear();
+  area_->clear(why);
   legend_->show_legend(std::nullopt);
   title_->clear();
+  values_->clear();
+  channel_->hide();
   is_filling_ = true;
   channel_->clear();
   is_filling_ = false;

@@ -50,8 +50,8 @@ class ImagePanel : public QWidget {
   /// Reads an image, off the window's thread, and shows it when it is there, in the channel that is
   /// chosen. While one is read, of those asked for only the last is read after it.
   void show_image(const ImageSource& source);
-  /// Shows nothing; what is being read is not heard of again.
-  void clear();
+  /// Shows nothing, and why; what is being read is not heard of again.
+  void clear(const QString& why = {});
   void mark(std::optional<glm::dvec2> pixel);
 
   /// Returns what is shown, null for nothing.
@@ -74,7 +74,7 @@ class ImagePanel : public QWidget {
   void redraw();
   void start(std::function<Shown()> work);
   void take(Shown shown);
-  void show_nothing();
+  void show_nothing(const QString& why);
   void point_at(std::optional<glm::ivec2> pixel);
 
   Hooks hooks_;

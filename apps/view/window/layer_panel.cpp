@@ -43,6 +43,7 @@ QString kind_text(LayerKind kind) {
 // Any number, however small or large, with its significant digits.
 class EndBox : public QDoubleSpinBox {
  public:
+  EndBox() { setButtonSymbols(NoButtons); }  // their room is needed for digits
   QString textFromValue(double value) const override { return QString::number(value, 'g', digits); }
   double valueFromText(const QString& text) const override { return text.toDouble(); }
   QValidator::State validate(QString& text, int&) const override {
@@ -53,6 +54,15 @@ class EndBox : public QDoubleSpinBox {
 
  private:
   static constexpr int digits = 9;
+};
+
+// What is selected stays in sight when what is told of it takes room from the tree.
+class LayerTree : public QTreeWidget {
+ protected:
+  void resizeEvent(QResizeEvent* event) override {
+    QTreeWidget::resizeEvent(event);
+    scrollToItem(currentItem());
+  }
 };
 
 QDoubleSpinBox* number_box(QDoubleSpinBox* box, double least, double most, int decimals) {
@@ -98,7 +108,7 @@ LayerPanel::LayerPanel(View& view, Hooks hooks, QWidget* parent)
 }
 
 void LayerPanel::build_tree() {
-  tree_ = new QTreeWidget;
+  tree_ = new LayerTree;
   tree_->setObjectName("layers");
   tree_->setColumnCount(2);
   tree_->setHeaderLabels({"layer", "kind"});
@@ -107,6 +117,7 @@ void LayerPanel::build_tree() {
   tree_->header()->setSectionResizeMode(1, QHeaderView::ResizeToContents);
   tree_->setAlternatingRowColors(true);
   tree_->setUniformRowHeights(true);
+  tree_->setMinimumHeight(60);
   connect(tree_, &QTreeWidget::itemChanged, this,
           [this](QTreeWidgetItem* item, int) { checked(item); });
   connect(tree_, &QTreeWidget::currentItemChanged, this, [this] {
@@ -257,6 +268,7 @@ void LayerPanel::select(const std::string& layer) {
   }
   is_filling_ = false;
   show_looks();
+  tree_->scrollToItem(tree_->currentItem());
 }
 
 void LayerPanel::checked(QTreeWidgetItem* item) {

@@ -11,6 +11,7 @@ namespace {
 constexpr int margin_px = 6;
 constexpr int band_px = 12;
 constexpr int band_ticks = 5;
+constexpr int few_ticks = 3;  // where there is no room for more
 
 QColor colour_of(const glm::dvec3& colour) {
   return QColor::fromRgbF(std::clamp(colour.r, 0.0, 1.0), std::clamp(colour.g, 0.0, 1.0),
@@ -69,11 +70,12 @@ void LegendStrip::paint_band(QPainter& painter) const {
   }
   painter.fillRect(band, colours);
   painter.setPen(palette().text().color());
-  for (int i = 0; i < band_ticks; ++i) {
-    const double share = static_cast<double>(i) / (band_ticks - 1);
+  const int text_room_px = painter.fontMetrics().horizontalAdvance("000.0 mm  ");
+  const int ticks = band_ticks * text_room_px <= width() ? band_ticks : few_ticks;
+  for (int i = 0; i < ticks; ++i) {
+    const double share = static_cast<double>(i) / (ticks - 1);
     const double x = band.left() + share * band.width();
-    const std::string unit =
-        i + 1 == band_ticks && !legend_->unit.empty() ? " " + legend_->unit : "";
+    const std::string unit = i + 1 == ticks && !legend_->unit.empty() ? " " + legend_->unit : "";
     const QString text =
         QString::fromStdString(fmt::format("{:.4g}{}", value_at(*legend_, share), unit));
     const double text_px = painter.fontMetrics().horizontalAdvance(text);

@@ -44,7 +44,8 @@ void PictureArea::show_picture(const Image8& picture) {
   update();
 }
 
-void PictureArea::clear() {
+void PictureArea::clear(const QString& why) {
+  why_ = why;
   picture_ = {};
   mark_.reset();
   update();
@@ -84,7 +85,8 @@ void PictureArea::paintEvent(QPaintEvent*) {
   painter.fillRect(rect(), palette().base());
   if (picture_.isNull()) {
     painter.setPen(palette().placeholderText().color());
-    painter.drawText(rect(), Qt::AlignCenter, "no image at this time");
+    painter.drawText(rect().adjusted(8, 8, -8, -8), Qt::AlignCenter | Qt::TextWordWrap,
+                     why_.isEmpty() ? "Open a dataset with a camera, or a picture." : why_);
     return;
   }
   painter.setRenderHint(QPainter::SmoothPixmapTransform, scale() < 2);

@@ -23,7 +23,8 @@ class PictureArea : public QWidget {
 
   /// @param picture  of 1, 3 or 4 channels.
   void show_picture(const Image8& picture);
-  void clear();
+  /// Shows nothing, and why.
+  void clear(const QString& why = {});
   /// Marks a place in the picture; none takes the mark away.
   void mark(std::optional<glm::dvec2> pixel);
 
@@ -47,6 +48,7 @@ class PictureArea : public QWidget {
 
   Hooks hooks_;
   QImage picture_;
+  QString why_;      // there is none
   double zoom_ = 1;  // 1: all of it is seen
   QPointF shift_;    // of its middle from this widget's
   QPoint pressed_, dragged_;

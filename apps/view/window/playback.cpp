@@ -89,12 +89,19 @@ void Playback::go_to(nanoseconds time) {
 
 void Playback::set_trail(bool on) {
   has_trail_ = on;
+  if (on) kept_away_.erase(recording_.prefix + "trail");
   if (is_open()) go_to(time_);
 }
 
 void Playback::set_camera(const std::string& name) {
   camera_ = name;
   if (is_open()) show_image();
+}
+
+void Playback::keep_away(const std::string& layer) { kept_away_.insert(layer); }
+
+void Playback::show_again(const std::string& prefix) {
+  std::erase_if(kept_away_, [&](const std::string& name) { return name.starts_with(prefix); });
 }
 
 std::optional<std::pair<std::size_t, std::size_t>> Playback::camera_frame() const {
@@ -105,11 +112,18 @@ std::optional<std::pair<std::size_t, std::size_t>> Playback::camera_frame() cons
   return std::pair(sensor, *frame);
 }
 
+std::optional<nanoseconds> Playback::first_image() const {
+  if (!is_open() || recording_.dataset == nullptr || camera_.empty()) return std::nullopt;
+  const Timeline& timeline = *recording_.timeline;
+  const RecordedSensor& camera = timeline.sensors()[timeline.sensor_named(camera_)];
+  return camera.frames.empty() ? std::nullopt : std::optional(camera.frames.front().stamp);
+}
+
 void Playback::show_image() {
   if (camera_.empty()) return;
   const auto shown = camera_frame();
   if (!shown) {
-    if (hooks_.no_image) hooks_.no_image();
+    if (hooks_.no_image) hooks_.no_image(first_image());
     return;
   }
   const Timeline& timeline = *recording_.timeline;
@@ -178,6 +192,7 @@ void Playback::begin_step() {
 void Playback::take(Step step) {
   if (!is_open()) return;
   for (Layer& layer : step.layers) {
+    if (kept_away_.contains(layer.name)) continue;
     // Colours keep their meaning from scan to scan.
     const Layer* before = view_.find(layer.name);
     const LayerColumn* column = before == nullptr ? nullptr : before->find(before->coloured_by);
@@ -189,7 +204,9 @@ void Playback::take(Step step) {
     view_.add(std::move(layer));
   }
   if (!has_trail_) view_.remove(recording_.prefix + "trail");
-  for (auto& [name, scan] : step.scans) scans_[name] = std::move(scan);
+  for (auto& [name, scan] : step.scans) {
+    if (!kept_away_.contains(name)) scans_[name] = std::move(scan);
+  }
   for (const auto& [sensor, frame] : step.frames) frames_[sensor] = frame;
   if (hooks_.changed) hooks_.changed();
 }

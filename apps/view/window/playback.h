@@ -6,6 +6,7 @@
 #include <map>
 #include <memory>
 #include <optional>
+#include <set>
 #include <string>
 #include <vector>
 
@@ -43,7 +44,8 @@ class Playback {
   struct Hooks {
     std::function<void()> changed{};                  ///< the view holds something else
     std::function<void(const ImageSource&)> image{};  ///< the chosen camera's, at the time
-    std::function<void()> no_image{};                 ///< it has none yet
+    /// It has none yet, but will from a time on, if it has any.
+    std::function<void(std::optional<std::chrono::nanoseconds>)> no_image{};
     std::function<void(const std::string&)> failed{};
   };
 
@@ -61,6 +63,11 @@ class Playback {
   void go_to(std::chrono::nanoseconds time);
   void set_trail(bool on);
   void set_camera(const std::string& name);
+
+  /// Shows a layer no more, whatever the time.
+  void keep_away(const std::string& layer);
+  /// Shows those again whose names begin with something.
+  void show_again(const std::string& prefix);
 
   /// Returns what is known of a scan layer, null if it is none of the dataset's.
   const ShownScan* scan(const std::string& layer) const;
@@ -90,6 +97,7 @@ class Playback {
   void begin_step();
   void take(Step step);
   void show_image();
+  std::optional<std::chrono::nanoseconds> first_image() const;
 
   View& view_;
   Hooks hooks_;
@@ -100,6 +108,7 @@ class Playback {
   bool has_trail_ = true;
   bool is_stale_ = false;  // what is under way is not the time that is wanted
   std::string camera_;
+  std::set<std::string> kept_away_;
   std::map<std::string, ShownScan> scans_;
   std::map<std::size_t, std::size_t> frames_;
   Job job_;

@@ -3,6 +3,7 @@
 #include <QVTKOpenGLNativeWidget.h>
 
 #include <QApplication>
+#include <QStandardPaths>
 #include <QSurfaceFormat>
 #include <cstdlib>
 
@@ -21,6 +22,12 @@ bool has_display() {
   return false;
 }
 
+std::filesystem::path settings_file() {
+  const QString folder = QStandardPaths::writableLocation(QStandardPaths::GenericConfigLocation);
+  if (folder.isEmpty()) return {};
+  return std::filesystem::path(folder.toStdString()) / "groundray" / "view.ini";
+}
+
 }  // namespace
 
 int run_window(int& argc, char** argv, const WindowStart& start) {
@@ -35,7 +42,9 @@ int run_window(int& argc, char** argv, const WindowStart& start) {
   QApplication::setAttribute(Qt::AA_EnableHighDpiScaling);
   const QApplication application(argc, argv);
   set_style(*qApp);
-  Window window(start);
+  WindowStart begun = start;
+  if (begun.settings.empty()) begun.settings = settings_file();
+  Window window(std::move(begun));
   window.show();
   return QApplication::exec();
 }

@@ -22,6 +22,7 @@ struct WindowStart {
   std::optional<double> point_size_px{};
   bool wireframe = false;  ///< of what has triangles
   bool has_legend = true;
+  std::filesystem::path settings{};  ///< where it keeps what was opened last; empty: nowhere
 };
 
 /// Shows the window until it is closed.

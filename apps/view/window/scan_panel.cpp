@@ -24,6 +24,9 @@ namespace {
 
 constexpr int progress_steps = 1000;
 constexpr double marker_m = 1.5;
+const QString no_ground = QStringLiteral("Open a scene or a DEM: its ground can be scanned.");
+const QString bare_ground = QStringLiteral(
+    "A DEM alone has no materials: its ground is taken as bare and grey, and there is no sun.");
 
 // The sensor as a dataset would have it, for the beams of its echoes.
 RecordedSensor recorded(const SensorPreset& preset, const Pose& X_DS,
@@ -74,7 +77,7 @@ ScanMade made_of(const World& world, const SensorPreset& preset, const Pose& X_D
 ScanPanel::ScanPanel(Hooks hooks, QWidget* parent) : QWidget(parent), hooks_(std::move(hooks)) {
   build();
   connect_widgets();
-  set_world(nullptr);
+  take_ground(nullptr, {});
 }
 
 void ScanPanel::build() {
@@ -118,6 +121,9 @@ void ScanPanel::lay_out() {
   buttons->addWidget(scan_);
   buttons->addWidget(cancel_);
   auto* layout = new QVBoxLayout(this);
+  layout->setContentsMargins(8, 6, 8, 6);
+  layout->setSpacing(5);
+  form->setSpacing(5);
   layout->addLayout(form);
   layout->addWidget(place_);
   layout->addLayout(buttons);
@@ -127,10 +133,7 @@ void ScanPanel::lay_out() {
 }
 
 void ScanPanel::connect_widgets() {
-  connect(place_, &QPushButton::clicked, this, [this] {
-    status_->setText("Press where it stands, and drag to where it looks.");
-    if (hooks_.take_place) hooks_.take_place();
-  });
+  connect(place_, &QPushButton::clicked, this, [this] { ask_for_place(); });
   connect(scan_, &QPushButton::clicked, this, [this] { scan(); });
   connect(cancel_, &QPushButton::clicked, this, [this] { cancel(); });
   for (QDoubleSpinBox* box : {height_, heading_}) {
@@ -140,13 +143,24 @@ void ScanPanel::connect_widgets() {
 }
 
 void ScanPanel::set_world(std::shared_ptr<const World> world) {
+  if (dem_.empty() && world == world_) return;
+  take_ground(std::move(world), {});
+}
+
+void ScanPanel::set_dem(const std::filesystem::path& dem) {
+  if (dem != dem_) take_ground(nullptr, dem);
+}
+
+void ScanPanel::take_ground(std::shared_ptr<const World> world, const std::filesystem::path& dem) {
   job_.abandon();
   world_ = std::move(world);
+  dem_ = dem;
   scanner_ = nullptr;
   at_m_.reset();
   where_->setText("none yet");
-  status_->setText(world_ == nullptr ? "Open a scene: scans are made of what it describes." : "");
-  if (world_ != nullptr && presets_.empty()) {
+  const bool has_ground = world_ != nullptr || !dem_.empty();
+  status_->setText(!has_ground ? no_ground : dem_.empty() ? QString() : bare_ground);
+  if (has_ground && presets_.empty()) {
     try {
       presets_ = lidar_presets();
     } catch (const std::exception& error) {
@@ -165,11 +179,11 @@ void ScanPanel::choose(const std::string& preset) {
 }
 
 void ScanPanel::update_buttons() {
-  const bool has_world = world_ != nullptr && !presets_.empty();
+  const bool has_ground = (world_ != nullptr || !dem_.empty()) && !presets_.empty();
   for (QWidget* each : std::initializer_list<QWidget*>{preset_, height_, heading_, tilt_, place_}) {
-    each->setEnabled(has_world && !is_scanning());
+    each->setEnabled(has_ground && !is_scanning());
   }
-  scan_->setEnabled(has_world && at_m_ && !is_scanning());
+  scan_->setEnabled(has_ground && at_m_ && !is_scanning());
   cancel_->setEnabled(is_scanning());
   progress_->setVisible(is_scanning());
 }
@@ -181,8 +195,35 @@ SensorPlace ScanPanel::place() const {
           .stance = tilt_->isChecked() ? Stance::OnSlope : Stance::Upright};
 }
 
+// Calls something now if there is ground, else as soon as the DEM is read.
+void ScanPanel::with_ground(std::function<void()> then) {
+  if (world_ != nullptr) return then();
+  if (dem_.empty() || is_scanning()) return;
+  const auto work = [dem = dem_](const std::stop_token& stop, const Told&) {
+    return std::make_shared<const World>(world_of_dem(dem, stop));
+  };
+  const auto done = [this, then = std::move(then)](std::shared_ptr<const World> world) {
+    world_ = std::move(world);
+    then();
+  };
+  status_->setText("reading the DEM");
+  progress_->setRange(0, 0);
+  job_.start(work, done, hooks_of_job());
+  update_buttons();
+}
+
+void ScanPanel::ask_for_place() {
+  with_ground([this] {
+    status_->setText("Press where it stands, and drag to where it looks.");
+    if (hooks_.take_place) hooks_.take_place();
+  });
+}
+
 void ScanPanel::put_down(const glm::dvec3& at_w_m, const glm::dvec3& towards_w_m) {
-  if (world_ == nullptr) return;
+  with_ground([this, at_w_m, towards_w_m] { put(at_w_m, towards_w_m); });
+}
+
+void ScanPanel::put(const glm::dvec3& at_w_m, const glm::dvec3& towards_w_m) {
   const glm::dvec3 ahead = towards_w_m - at_w_m;
   if (std::hypot(ahead.x, ahead.y) > 0) {
     heading_->setValue(glm::degrees(std::atan2(ahead.y, ahead.x)));
@@ -199,7 +240,7 @@ void ScanPanel::show_place() {
     const glm::dvec3 origin_w_m = world_->terrain.header().origin_w_m;
     const glm::dvec3 p_w_m = origin_w_m + X_DS.translation_m;
     where_->setText(QString::fromStdString(
-        fmt::format("east {:.2f} m\nnorth {:.2f} m\nup {:.2f} m", p_w_m.x, p_w_m.y, p_w_m.z)));
+        fmt::format("{:.2f} E, {:.2f} N,\n{:.2f} m up", p_w_m.x, p_w_m.y, p_w_m.z)));
     if (hooks_.show) hooks_.show(axes_layer("scan here/place", origin_w_m, X_DS, marker_m));
   } catch (const std::exception& error) {
     at_m_.reset();
@@ -227,6 +268,7 @@ void ScanPanel::scan() {
         fmt::format("{} echoes. {}", made.scan.cloud->rows(), fmt::join(made.notes, " "))));
     if (hooks_.scanned) hooks_.scanned(std::move(made));
   };
+  progress_->setRange(0, progress_steps);
   progress_->setValue(0);
   status_->setText("begins");
   job_.start(work, done, hooks_of_job());

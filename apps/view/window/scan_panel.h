@@ -1,6 +1,7 @@
 #pragma once
 
 #include <QWidget>
+#include <filesystem>
 #include <functional>
 #include <memory>
 #include <optional>
@@ -27,7 +28,7 @@ struct ScanMade {
   std::vector<std::string> notes;
 };
 
-/// Puts a sensor down anywhere on a scene's ground, and scans from there.
+/// Puts a sensor down anywhere on the ground of a scene or a DEM, and scans from there.
 class ScanPanel : public QWidget {
  public:
   struct Hooks {
@@ -41,6 +42,10 @@ class ScanPanel : public QWidget {
 
   /// The scene that is scanned; null for none.
   void set_world(std::shared_ptr<const World> world);
+  /// A DEM that is scanned as bare ground; it is read when that is needed.
+  void set_dem(const std::filesystem::path& dem);
+  /// Asks for a place in the view, as soon as there is ground to be put on.
+  void ask_for_place();
   /// Puts the sensor down at a place of W, looking towards another unless both are one.
   void put_down(const glm::dvec3& at_w_m, const glm::dvec3& towards_w_m);
   void scan();
@@ -54,13 +59,17 @@ class ScanPanel : public QWidget {
   void build();
   void lay_out();
   void connect_widgets();
+  void take_ground(std::shared_ptr<const World> world, const std::filesystem::path& dem);
+  void with_ground(std::function<void()> then);
+  void put(const glm::dvec3& at_w_m, const glm::dvec3& towards_w_m);
   SensorPlace place() const;
   void show_place();
   void update_buttons();
   Job::Hooks hooks_of_job();
 
   Hooks hooks_;
-  std::shared_ptr<const World> world_;
+  std::shared_ptr<const World> world_;     // null of a DEM that is not read yet
+  std::filesystem::path dem_;              // empty of a scene
   std::shared_ptr<SceneScanner> scanner_;  // used by the job alone
   std::vector<SensorPreset> presets_;
   std::optional<glm::dvec2> at_m_;  // in D

@@ -5,7 +5,10 @@
 #include <QPainterPath>
 #include <QPalette>
 #include <QPixmap>
+#include <QProxyStyle>
 #include <QStyleFactory>
+#include <QStyleOption>
+#include <algorithm>
 #include <functional>
 #include <map>
 
@@ -132,6 +135,17 @@ void draw_forward(QPainter& painter) {
   painter.drawLine(QPointF(18, 5), QPointF(18, 19));
 }
 
+void draw_close(QPainter& painter) {
+  painter.drawLine(QPointF(6, 6), QPointF(18, 18));
+  painter.drawLine(QPointF(6, 18), QPointF(18, 6));
+}
+
+// A window that is taken out of another.
+void draw_float(QPainter& painter) {
+  painter.drawRect(QRectF(5, 9, 10, 10));
+  painter.drawPolyline(QPolygonF(QVector<QPointF>{{9, 9}, {9, 5}, {19, 5}, {19, 15}, {15, 15}}));
+}
+
 const std::map<Sign, std::function<void(QPainter&)>>& drawings() {
   const QPolygonF top(QVector<QPointF>{{12, 3}, {20, 7}, {12, 11}, {4, 7}});
   const QPolygonF left(QVector<QPointF>{{4, 7}, {12, 11}, {12, 21}, {4, 16}});
@@ -153,7 +167,9 @@ const std::map<Sign, std::function<void(QPainter&)>>& drawings() {
       {Sign::Play, draw_play},
       {Sign::Pause, draw_pause},
       {Sign::Back, draw_back},
-      {Sign::Forward, draw_forward}};
+      {Sign::Forward, draw_forward},
+      {Sign::Close, draw_close},
+      {Sign::Float, draw_float}};
   return all;
 }
 
@@ -181,10 +197,54 @@ QPalette dark_palette() {
   return palette;
 }
 
+// Seen on dark ground, whether checked or not.
+void draw_check_box(QPainter& painter, const QRect& place, QStyle::State state) {
+  const bool is_enabled = (state & QStyle::State_Enabled) != 0;
+  const double side = std::min({place.width(), place.height(), 14}) - 1;
+  const QRectF box(place.center().x() - side / 2 + 0.5, place.center().y() - side / 2 + 0.5, side,
+                   side);
+  painter.save();
+  painter.setRenderHint(QPainter::Antialiasing);
+  painter.setPen(QPen(is_enabled ? QColor(132, 140, 152) : QColor(84, 89, 97), 1));
+  painter.setBrush(QColor(31, 34, 40));
+  painter.drawRoundedRect(box, 2, 2);
+  const QColor mark = is_enabled ? line_colour : QColor(118, 123, 131);
+  if ((state & QStyle::State_On) != 0) {
+    painter.setPen(QPen(mark, 1.8, Qt::SolidLine, Qt::RoundCap, Qt::RoundJoin));
+    const auto at = [&](double x, double y) {
+      return QPointF(box.x() + x * side, box.y() + y * side);
+    };
+    painter.drawPolyline(
+        QPolygonF(QVector<QPointF>{at(0.22, 0.52), at(0.42, 0.74), at(0.78, 0.28)}));
+  } else if ((state & QStyle::State_NoChange) != 0) {
+    painter.fillRect(box.adjusted(0.28 * side, 0.28 * side, -0.28 * side, -0.28 * side), mark);
+  }
+  painter.restore();
+}
+
+// Fusion, whose panels' buttons and check boxes are made for light windows.
+class CalmStyle : public QProxyStyle {
+ public:
+  CalmStyle() : QProxyStyle(QStyleFactory::create("Fusion")) {}
+  QIcon standardIcon(StandardPixmap which, const QStyleOption* option,
+                     const QWidget* widget) const override {
+    if (which == SP_TitleBarCloseButton) return icon_of(Sign::Close);
+    if (which == SP_TitleBarNormalButton) return icon_of(Sign::Float);
+    return QProxyStyle::standardIcon(which, option, widget);
+  }
+  void drawPrimitive(PrimitiveElement which, const QStyleOption* option, QPainter* painter,
+                     const QWidget* widget) const override {
+    if (which == PE_IndicatorCheckBox || which == PE_IndicatorItemViewItemCheck) {
+      return draw_check_box(*painter, option->rect, option->state);
+    }
+    QProxyStyle::drawPrimitive(which, option, painter, widget);
+  }
+};
+
 }  // namespace
 
 void set_style(QApplication& application) {
-  application.setStyle(QStyleFactory::create("Fusion"));
+  application.setStyle(new CalmStyle);
   application.setPalette(dark_palette());
   application.setStyleSheet(
       "QToolTip { color: #dee2e8; background: #3a3f48; border: 1px solid #5a616d; padding: 3px; }"

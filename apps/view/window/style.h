@@ -27,7 +27,9 @@ enum class Sign {
   Play,
   Pause,
   Back,
-  Forward
+  Forward,
+  Close,
+  Float
 };
 
 /// Returns a sign, drawn in lines.

@@ -79,9 +79,10 @@ QWidget* TimelinePanel::build_buttons() {
     speed_->addItem(QString::fromStdString(fmt::format("{} x", speed)), speed);
   }
   speed_->setCurrentIndex(speed_at_first);
-  speed_->setToolTip("Seconds of the run in each second");
+  speed_->setToolTip("Speed: seconds of the run in each second");
   sensor_ = new QComboBox;
-  sensor_->setToolTip("Whose frames the steps go through");
+  sensor_->setSizeAdjustPolicy(QComboBox::AdjustToContents);
+  sensor_->setToolTip("Steps: whose frames they go through");
   label_ = new QLabel;
   label_->setObjectName("time_label");
   rides_ = new QCheckBox("Ride along");
@@ -92,9 +93,7 @@ QWidget* TimelinePanel::build_buttons() {
   for (QWidget* each : std::initializer_list<QWidget*>{back, play_, forward}) {
     layout->addWidget(each);
   }
-  layout->addWidget(new QLabel("Speed"));
   layout->addWidget(speed_);
-  layout->addWidget(new QLabel("Steps of"));
   layout->addWidget(sensor_);
   layout->addWidget(rides_);
   layout->addWidget(trail_);
@@ -140,7 +139,7 @@ void TimelinePanel::show_time() {
   slider_->setValue(static_cast<int>((time_ - timeline_->begin()).count() / slider_step_ns));
   strip_->set_time(time_);
   label_->setText(QString::fromStdString(
-      fmt::format("{:.3f} s  of  {:.3f} s", seconds(time_), seconds(timeline_->end()))));
+      fmt::format("{:.3f} of {:.3f} s", seconds(time_), seconds(timeline_->end()))));
 }
 
 void TimelinePanel::step_forward() {

@@ -8,6 +8,9 @@
 #include <QLabel>
 #include <QMessageBox>
 #include <QProgressBar>
+#include <QPushButton>
+#include <QScreen>
+#include <QScrollArea>
 #include <QStatusBar>
 #include <QVBoxLayout>
 
@@ -18,35 +21,38 @@ namespace {
 
 constexpr int status_ms = 500;
 constexpr double mib = 1024.0 * 1024.0;
+constexpr QSize size_at_first(1440, 900);
+constexpr const char* hint =
+    "<p style='font-size: 16px'><b>Drop something here</b></p>"
+    "<p>a scene, a dataset's folder, a mesh,<br>a cloud, a DEM or a picture</p>"
+    "<p>or press <b>Ctrl+O</b>; <b>F1</b> tells what mouse and keys do</p>";
+
+// What does not fit is reached by scrolling, so that the window may be small.
+QScrollArea* scrolled(QWidget* content) {
+  auto* area = new QScrollArea;
+  area->setWidgetResizable(true);
+  area->setFrameShape(QFrame::NoFrame);
+  area->setHorizontalScrollBarPolicy(Qt::ScrollBarAlwaysOff);
+  area->setWidget(content);
+  return area;
+}
 
 }  // namespace
 
-Window::Window(WindowStart start) : start_(std::move(start)) {
+Window::Window(WindowStart start) : start_(std::move(start)), recent_(start_.settings) {
   setWindowTitle("groundray view");
   setAcceptDrops(true);
   setDockOptions(AllowNestedDocks | AllowTabbedDocks | AnimatedDocks);
-  resize(1440, 900);
+  resize(size_at_first.boundedTo(0.95 * screen()->availableSize()));
   canvas_ = new Canvas;
   setCentralWidget(canvas_);
-  hint_ = new QLabel("Drop a scene, a dataset's folder, a mesh, a cloud, a DEM or a picture here",
-                     this);
-  hint_->setStyleSheet("color: #aeb6c2; font-size: 15px;");
-  hint_->setAlignment(Qt::AlignCenter);
-  auto* over_canvas = new QVBoxLayout(canvas_);
-  over_canvas->addWidget(hint_);
-  hint_->setAttribute(Qt::WA_TransparentForMouseEvents);
+  build_hint();
   build_docks();
   build_workers();
   connect_canvas();
   view().set_legend_visible(start_.has_legend);
   build_actions();
-  message_ = new QLabel;
-  busy_ = new QProgressBar;
-  busy_->setRange(0, 0);
-  busy_->setMaximumWidth(140);
-  busy_->hide();
-  statusBar()->addWidget(message_, 1);
-  statusBar()->addPermanentWidget(busy_);
+  build_status_bar();
   status_clock_.setInterval(status_ms);
   connect(&status_clock_, &QTimer::timeout, this, [this] { show_status(); });
   status_clock_.start();
@@ -60,10 +66,40 @@ Window::~Window() {
   opening_.abandon();
 }
 
+void Window::build_hint() {
+  hint_ = new QLabel(hint, this);
+  hint_->setStyleSheet(
+      "color: #e6eaf0; background: rgba(24, 28, 36, 170); border-radius: 10px; padding: 14px "
+      "26px;");
+  hint_->setAlignment(Qt::AlignCenter);
+  hint_->setAttribute(Qt::WA_TransparentForMouseEvents);
+  auto* over_canvas = new QVBoxLayout(canvas_);
+  over_canvas->addWidget(hint_, 0, Qt::AlignCenter);
+}
+
+void Window::build_status_bar() {
+  message_ = new QLabel("F1: mouse and keys");
+  message_->setContentsMargins(6, 0, 0, 0);
+  message_->setSizePolicy(QSizePolicy::Ignored, QSizePolicy::Preferred);  // paths may be long
+  busy_ = new QProgressBar;
+  busy_->setRange(0, 0);
+  busy_->setMaximumWidth(140);
+  cancel_ = new QPushButton("Cancel");
+  cancel_->setObjectName("cancel_opening");
+  cancel_->setToolTip("Opens no more (Escape)");
+  cancel_->setFocusPolicy(Qt::NoFocus);
+  connect(cancel_, &QPushButton::clicked, this, [this] { cancel_opening(); });
+  statusBar()->addWidget(message_, 1);
+  for (QWidget* each : {static_cast<QWidget*>(busy_), static_cast<QWidget*>(cancel_)}) {
+    statusBar()->addPermanentWidget(each);
+    each->hide();
+  }
+}
+
 QDockWidget* Window::dock(const QString& title, QWidget* content, Side side) {
   auto* made = new QDockWidget(title, this);
   made->setObjectName(title);
-  made->setWidget(content);
+  made->setWidget(content == scan_ || content == compare_ ? scrolled(content) : content);
   const Qt::DockWidgetArea area = side == Side::Left     ? Qt::LeftDockWidgetArea
                                   : side == Side::Bottom ? Qt::BottomDockWidgetArea
                                                          : Qt::RightDockWidgetArea;
@@ -109,7 +145,7 @@ void Window::build_docks() {
   tabifyDockWidget(scan, compare);
   picked->raise();
   resizeDocks({docks_[layers_], picked}, {290, 330}, Qt::Horizontal);
-  resizeDocks({docks_[layers_], status}, {520, 300}, Qt::Vertical);
+  resizeDocks({docks_[layers_], status}, {height() - 270, 230}, Qt::Vertical);
 }
 
 QWidget* Window::build_status() {
@@ -168,7 +204,7 @@ void Window::build_workers() {
   playback_ = std::make_unique<Playback>(
       view(), Playback::Hooks{.changed = redraw,
                               .image = [this](auto& source) { images_->show_image(source); },
-                              .no_image = [this] { images_->clear(); },
+                              .no_image = [this](auto first) { tell_no_image(first); },
                               .failed = failed});
   picker_ = std::make_unique<Picker>(
       view(),
@@ -243,7 +279,7 @@ bool Window::is_busy() const {
 }
 
 void Window::save_picture(const std::filesystem::path& path, glm::ivec2 size_px) {
-  canvas_->makeCurrent();
+  canvas_->doneCurrent();  // it is drawn elsewhere, and a thread draws in one place at a time
   write_png(path, view().picture(size_px));
   canvas_->draw();
 }

@@ -22,6 +22,7 @@
 #include "apps/view/window/layer_panel.h"
 #include "apps/view/window/picker.h"
 #include "apps/view/window/playback.h"
+#include "apps/view/window/recent_files.h"
 #include "apps/view/window/run_window.h"
 #include "apps/view/window/scan_panel.h"
 #include "apps/view/window/style.h"
@@ -32,6 +33,7 @@ class QComboBox;
 class QLabel;
 class QMenu;
 class QProgressBar;
+class QPushButton;
 class QToolBar;
 
 namespace groundray {
@@ -45,6 +47,8 @@ class Window : public QMainWindow {
 
   /// Opens one thing after the other; a fault is shown in a message box.
   void open(const std::filesystem::path& path);
+  /// Stops what is being opened, and forgets what was to follow.
+  void cancel_opening();
   /// Closes everything.
   void close_all();
   /// Writes a picture of the view. @throws Error if it cannot be written.
@@ -76,7 +80,8 @@ class Window : public QMainWindow {
     InputKind kind = InputKind::Mesh;
     std::string name;  // heads its layers' names
     std::shared_ptr<TerrainFollower> follower;
-    std::string terrain;  // the layer that follows
+    std::string terrain;        // the layer that follows
+    bool has_one_band = false;  // of a DEM: its heights
     std::shared_ptr<const World> world;
     std::shared_ptr<const RecordedDataset> dataset;  // null of a scene
     std::shared_ptr<const Timeline> timeline;
@@ -88,7 +93,9 @@ class Window : public QMainWindow {
   enum class Side { Left, RightAbove, Right, Bottom };
 
   // window.cpp
+  void build_hint();
   void build_docks();
+  void build_status_bar();
   QWidget* build_status();
   QWidget* build_picked();
   QDockWidget* dock(const QString& title, QWidget* content, Side side);
@@ -107,6 +114,8 @@ class Window : public QMainWindow {
   void ask_to_open();
   void ask_to_open_folder();
   void ask_for_picture();
+  void ask_for_turntable();
+  void fill_recent();
   void look_along(const glm::dvec3& direction, const glm::dvec3& up);
   void toggle_wireframe();
   void close_selected();
@@ -121,6 +130,10 @@ class Window : public QMainWindow {
   void tell_unmet();
   void first_look(const Opened& opened, const std::vector<std::string>& layers);
   void use(const Document& document);
+  void play(const Document& document);
+  void offer_ground();
+  void set_sensors_of_scenes_visible(bool visible);
+  void tell_no_image(std::optional<std::chrono::nanoseconds> first);
   void show_images();
   void forget(const std::string& document);
   void remove_layer(const std::string& name);
@@ -145,6 +158,7 @@ class Window : public QMainWindow {
   std::vector<Document> documents_;
   std::map<std::string, ShownScan> scans_here_;  // by layer
   std::deque<std::filesystem::path> queue_;
+  RecentFiles recent_;
   bool has_looked_ = false;
   std::optional<glm::dvec3> rode_from_w_m_;
 
@@ -154,6 +168,8 @@ class Window : public QMainWindow {
   QLabel *picked_title_ = nullptr, *hint_ = nullptr, *message_ = nullptr;
   QComboBox* follows_ = nullptr;
   QProgressBar* busy_ = nullptr;
+  QPushButton* cancel_ = nullptr;  // of opening
+  QMenu* recent_menu_ = nullptr;
   TimelinePanel* timeline_ = nullptr;
   ImagePanel* images_ = nullptr;
   ScanPanel* scan_ = nullptr;

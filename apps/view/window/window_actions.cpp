@@ -2,6 +2,7 @@
 #include <QApplication>
 #include <QDialog>
 #include <QDialogButtonBox>
+#include <QDir>
 #include <QDockWidget>
 #include <QFileDialog>
 #include <QFormLayout>
@@ -11,6 +12,7 @@
 #include <glm/geometric.hpp>
 
 #include "apps/view/window/help.h"
+#include "apps/view/window/turntable_dialog.h"
 #include "apps/view/window/window.h"
 #include "core/error.h"
 
@@ -93,8 +95,14 @@ void Window::build_file_actions(QMenu& menu, QToolBar& bar) {
   action(menu, &bar, "&Open...", QKeySequence::Open, Sign::Open, [this] { ask_to_open(); });
   action(menu, &bar, "Open a dataset's &folder...", QKeySequence("Ctrl+Shift+O"), Sign::OpenFolder,
          [this] { ask_to_open_folder(); });
+  recent_menu_ = menu.addMenu("Open &recent");
+  recent_menu_->setObjectName("recent");
+  connect(recent_menu_, &QMenu::aboutToShow, this, [this] { fill_recent(); });
+  menu.addSeparator();
   action(menu, &bar, "&Save a picture...", QKeySequence::Save, Sign::Save,
          [this] { ask_for_picture(); });
+  action(menu, nullptr, "Save a &turntable...", QKeySequence("Ctrl+T"), {},
+         [this] { ask_for_turntable(); });
   menu.addSeparator();
   action(menu, nullptr, "&Close the selected layer", Qt::Key_Delete, {},
          [this] { close_selected(); });
@@ -181,6 +189,39 @@ void Window::ask_for_picture() {
   if (!name.isEmpty()) save_picture(name.toStdString(), *size_px);
 }
 
+void Window::ask_for_turntable() {
+  const auto write = [this](const Look& look, const std::filesystem::path& path,
+                            glm::ivec2 size_px) {
+    const Look before = view().current_look();
+    view().look(look);
+    save_picture(path, size_px);
+    view().look(before);
+  };
+  auto* dialog = new TurntableDialog(
+      view().current_look(), {canvas_->width(), canvas_->height()},
+      {.write = write, .failed = [this](const std::string& message) { fault(message); }}, this);
+  dialog->open();
+}
+
+// They are told by their folders, too, as far as that is not the home folder.
+void Window::fill_recent() {
+  recent_menu_->clear();
+  for (const std::filesystem::path& path : recent_.paths()) {
+    QString text = QString::fromStdString(path.string());
+    const QString home = QDir::homePath() + '/';
+    if (text.startsWith(home)) text.replace(0, home.size(), "~/");
+    connect(recent_menu_->addAction(text.replace('&', "&&")), &QAction::triggered, this,
+            [this, path] { open(path); });
+  }
+  if (recent_.paths().empty()) {
+    recent_menu_->addAction("nothing yet")->setEnabled(false);
+    return;
+  }
+  recent_menu_->addSeparator();
+  connect(recent_menu_->addAction("&Forget these"), &QAction::triggered, this,
+          [this] { recent_.clear(); });
+}
+
 // All is seen from a side.
 void Window::look_along(const glm::dvec3& direction, const glm::dvec3& up) {
   view().fit();
@@ -206,7 +247,11 @@ void Window::close_selected() {
   const std::string layer = layers_->selected();
   if (view().find(layer) == nullptr) return;
   remove_layer(layer);
+  playback_->keep_away(layer);
   const std::string document = layer.substr(0, layer.find('/'));
+  for (Document& each : documents_) {
+    if (each.name == document && each.terrain == layer) each.follower = nullptr;
+  }
   bool has_more = false;
   for (const Layer* each : view().layers()) {
     has_more = has_more || each->name.substr(0, each->name.find('/')) == document;
@@ -219,12 +264,7 @@ void Window::escape() {
   if (canvas_->is_taking_place()) return canvas_->take_place(false);
   if (scan_->is_scanning()) return scan_->cancel();
   if (compare_->is_comparing()) return compare_->cancel();
-  if (opening_.is_running()) {
-    queue_.clear();
-    opening_.abandon();
-    show_documents();
-    return;
-  }
+  if (opening_.is_running()) return cancel_opening();
   timeline_->play(false);
   view().remove("picked/ray");
   images_->mark(std::nullopt);

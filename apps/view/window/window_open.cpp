@@ -6,6 +6,7 @@
 #include <QLabel>
 #include <QMimeData>
 #include <QProgressBar>
+#include <QPushButton>
 #include <QStatusBar>
 #include <QUrl>
 #include <algorithm>
@@ -52,7 +53,7 @@ void Window::open_next() {
   const std::filesystem::path path = queue_.front();
   queue_.pop_front();
   const auto work = [path, limits = start_.limits](const std::stop_token& stop, const auto&) {
-    Loaded loaded{open_any(path, limits), nullptr};
+    Loaded loaded{open_any(path, limits, stop), nullptr};
     if (stop.stop_requested()) throw Interrupted();
     if (loaded.opened.run != nullptr) {
       loaded.timeline = std::make_shared<const Timeline>(*loaded.opened.run);
@@ -65,7 +66,14 @@ void Window::open_next() {
                  {.failed = [this](const std::string& message) { fault(message); },
                   .ended = [this] { open_next(); }});
   busy_->show();
+  cancel_->show();
   message_->setText(QString::fromStdString(fmt::format("opening {} ...", path.string())));
+}
+
+void Window::cancel_opening() {
+  queue_.clear();
+  opening_.abandon();
+  show_documents();
 }
 
 // What the program was asked to show, and is not there.
@@ -133,6 +141,7 @@ void Window::take(Loaded loaded) {
                     .name = name_for(opened.path),
                     .follower = opened.follower,
                     .terrain = "",
+                    .has_one_band = opened.follower != nullptr,
                     .world = opened.world,
                     .dataset = opened.dataset,
                     .timeline = loaded.timeline};
@@ -144,6 +153,8 @@ void Window::take(Loaded loaded) {
     view().add(std::move(layer));
   }
   documents_.push_back(document);
+  recent_.add(opened.path);
+  playback_->show_again(document.name + "/");
   hint_->hide();
   if (!opened.notes.empty()) {
     statusBar()->showMessage(
@@ -152,6 +163,10 @@ void Window::take(Loaded loaded) {
   changed();
   first_look(opened, names);
   use(document);
+  offer_ground();
+  // While a dataset is played, the sensors of a scene would stand where they began.
+  const bool is_played = playback_->is_open() && playback_->recording().dataset != nullptr;
+  if (document.timeline != nullptr && is_played) set_sensors_of_scenes_visible(false);
   offer_comparisons();
 }
 
@@ -178,10 +193,7 @@ void Window::first_look(const Opened& opened, const std::vector<std::string>& la
 
 // What came last is what is scanned, followed and played.
 void Window::use(const Document& document) {
-  if (document.world != nullptr) {
-    scan_->set_world(document.world);
-    playback_->set_world(document.world, document.name + "/");
-  }
+  if (document.world != nullptr) playback_->set_world(document.world, document.name + "/");
   if (document.follower != nullptr) {
     tracker_->open(document.follower, document.terrain);
     follow_eye();
@@ -189,19 +201,51 @@ void Window::use(const Document& document) {
   // What was recorded is played rather than what a scene would do.
   const bool is_recorded_elsewhere = document.dataset == nullptr && playback_->is_open() &&
                                      playback_->recording().dataset != nullptr;
-  if (document.timeline != nullptr && !is_recorded_elsewhere) {
-    playback_->open({document.dataset, document.timeline, document.name + "/"});
-    const std::vector<std::string> cameras = camera_names(*document.timeline);
-    docks_.at(timeline_)->show();
-    const bool has_images = document.dataset != nullptr && !cameras.empty();
-    if (has_images) show_images();
-    images_->set_cameras(has_images ? cameras : std::vector<std::string>());
-    timeline_->show_timeline(document.timeline);
-  }
+  if (document.timeline != nullptr && !is_recorded_elsewhere) play(document);
   if (document.kind == InputKind::Picture) {
     show_images();
     images_->show_image({.title = document.name, .file = document.path, .is_frame = false});
   }
+}
+
+void Window::play(const Document& document) {
+  playback_->open({document.dataset, document.timeline, document.name + "/"});
+  const std::vector<std::string> cameras = camera_names(*document.timeline);
+  docks_.at(timeline_)->show();
+  const bool has_images = document.dataset != nullptr && !cameras.empty();
+  if (has_images) show_images();
+  images_->set_cameras(has_images ? cameras : std::vector<std::string>());
+  timeline_->show_timeline(document.timeline);
+}
+
+// The scene that came last is scanned; if there is none, the DEM.
+void Window::offer_ground() {
+  const Document* scene = nullptr;
+  const Document* dem = nullptr;
+  for (const Document& each : documents_) {
+    if (each.world != nullptr) scene = &each;
+    if (each.kind == InputKind::Dem && each.has_one_band) dem = &each;
+  }
+  if (scene == nullptr && dem != nullptr) return scan_->set_dem(dem->path);
+  scan_->set_world(scene == nullptr ? nullptr : scene->world);
+}
+
+void Window::set_sensors_of_scenes_visible(bool visible) {
+  std::vector<std::string> sensors;
+  for (const Layer* layer : view().layers()) {
+    const bool may_be = layer->kind == LayerKind::Sensors || layer->kind == LayerKind::Trail;
+    const auto of = std::ranges::find(documents_, document_of(layer->name), &Document::name);
+    if (may_be && of != documents_.end() && of->world != nullptr) sensors.push_back(layer->name);
+  }
+  for (const std::string& name : sensors) view().set_visible(name, visible);
+  layers_->refresh();
+  canvas_->draw();
+}
+
+void Window::tell_no_image(std::optional<std::chrono::nanoseconds> first) {
+  if (!first) return images_->clear("this camera has no image");
+  images_->clear(QString::fromStdString(fmt::format(
+      "no image yet: the first is at {:.3f} s", std::chrono::duration<double>(*first).count())));
 }
 
 void Window::show_images() {
@@ -238,10 +282,7 @@ void Window::forget(const std::string& document) {
   const Document gone = std::move(*found);
   documents_.erase(found);
   if (gone.follower != nullptr) tracker_->close();
-  if (gone.world != nullptr) {
-    scan_->set_world(nullptr);
-    playback_->set_world(nullptr, "");
-  }
+  if (gone.world != nullptr) playback_->set_world(nullptr, "");
   const std::optional<ImageSource>& shown = images_->shown();
   if (gone.kind == InputKind::Picture && shown && shown->file == gone.path) images_->clear();
   if (gone.timeline != nullptr) {
@@ -258,6 +299,8 @@ void Window::forget(const std::string& document) {
       use(each);
     }
   }
+  if (gone.dataset != nullptr) set_sensors_of_scenes_visible(true);
+  offer_ground();
   show_documents();
 }
 
@@ -299,6 +342,7 @@ void Window::show_documents() {
   setWindowTitle(names.empty() ? "groundray view" : names.join(", ") + " - groundray view");
   message_->setText(names.empty() ? "F1: mouse and keys" : names.join(", "));
   busy_->hide();
+  cancel_->hide();
 }
 
 }  // namespace groundray

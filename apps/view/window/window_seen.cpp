@@ -48,6 +48,7 @@ void Window::click(glm::ivec2 at_px, Qt::KeyboardModifiers keys) {
   docks_.at(picked_->parentWidget())->show();
   docks_.at(picked_->parentWidget())->raise();
   layers_->select(picked->layer);
+  explain(picked->layer);
   picker_->pick(*picked, scan_of(picked->layer));
 }
 
