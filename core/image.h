@@ -56,9 +56,9 @@ class Image {
   std::vector<T> values_;
 };
 
-using Image8 = Image<std::uint8_t>;
-using Image16 = Image<std::uint16_t>;
-using Image32 = Image<std::uint32_t>;
-using ImageF = Image<float>;
+using Image8 = Image<std::uint8_t>;    ///< pictures
+using Image16 = Image<std::uint16_t>;  ///< numbers of 9 to 16 bits
+using Image32 = Image<std::uint32_t>;  ///< labels and other numbers of things
+using ImageF = Image<float>;           ///< light and lengths
 
 }  // namespace groundray

@@ -1,5 +1,4 @@
 #include <algorithm>
-#include <cctype>
 #include <cmath>
 #include <cstdint>
 #include <fstream>
@@ -9,6 +8,7 @@
 #include <utility>
 
 #include "core/error.h"
+#include "core/file_ending.h"
 #include "core/mesh_check.h"
 #include "core/mesh_io.h"
 #include "core/obj_reader.h"
@@ -133,9 +133,7 @@ Reading read_gltf(const fs::path& path) {
 }
 
 Reading read_file(const fs::path& path) {
-  std::string form = path.extension().string();
-  std::ranges::transform(form, form.begin(),
-                         [](unsigned char c) { return static_cast<char>(std::tolower(c)); });
+  const std::string form = file_ending(path);
   if (form == ".gltf" || form == ".glb") return read_gltf(path);
   if (form == ".stl")
     return {.soup = read_scene_file(path, SceneForm::Stl), .georeference = stl_georeference(path)};

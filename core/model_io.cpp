@@ -1,7 +1,6 @@
 #include "core/model_io.h"
 
 #include <algorithm>
-#include <cctype>
 #include <charconv>
 #include <cmath>
 #include <cstdint>
@@ -14,6 +13,7 @@
 #include <vector>
 
 #include "core/error.h"
+#include "core/file_ending.h"
 #include "core/obj_reader.h"
 #include "core/ply_reader.h"
 #include "core/polygon_soup.h"
@@ -30,9 +30,7 @@ using Surface = PolygonSoup::Surface;
 enum class Form { Obj, Ply, Stl, Gltf, Collada };
 
 Form form_of(const fs::path& path) {
-  std::string ending = path.extension().string();
-  std::ranges::transform(ending, ending.begin(),
-                         [](unsigned char c) { return static_cast<char>(std::tolower(c)); });
+  const std::string ending = file_ending(path);
   if (ending == ".obj") return Form::Obj;
   if (ending == ".ply") return Form::Ply;
   if (ending == ".stl") return Form::Stl;

@@ -15,6 +15,7 @@ enum class UpAxis { X, Y, Z };
 /// What to do with parts of a model that are no surface.
 enum class BrokenParts { Refuse, Drop };
 
+/// What to do with a model beyond what its file says.
 struct ModelOptions {
   std::optional<double> metres_per_unit;  ///< else what the file says: 1 where it says nothing
   std::optional<UpAxis> up;  ///< else what the file says: Y for glTF, Z where it says nothing

@@ -11,6 +11,7 @@
 /// Numbers as other people's point files hold them, and the columns that they become.
 namespace groundray {
 
+/// What the numbers of a column are.
 enum class NumberType {
   Float16,
   Float32,
@@ -26,6 +27,7 @@ enum class NumberType {
   Bool  ///< a byte
 };
 
+/// Which byte of a number comes first: the lowest, or the highest.
 enum class ByteOrder { Little, Big };
 
 /// Returns how many bytes one number takes.

@@ -16,6 +16,7 @@ namespace groundray {
 /// An allocator that leaves new numbers unset: a column is written once, by whoever resized it.
 template <typename T>
 struct UnsetAllocator : std::allocator<T> {
+  /// The same for another type, as containers ask for it.
   template <typename U>
   struct rebind {
     using other = UnsetAllocator<U>;
@@ -38,6 +39,7 @@ class PointCloud {
   using AnyValues = std::variant<Values<float>, Values<double>, Values<std::uint8_t>,
                                  Values<std::uint16_t>, Values<std::uint32_t>, Values<std::int8_t>,
                                  Values<std::int16_t>, Values<std::int32_t>>;
+  /// A name and as many numbers as there are rows.
   struct Column {
     std::string name;
     AnyValues values;

@@ -218,16 +218,24 @@ Trajectory parse_tum(std::string_view text, const std::string& name) {
 
 void write_tum(const std::filesystem::path& path, const Trajectory& trajectory,
                std::string_view comment) {
-  std::string text;
+  constexpr std::size_t block_bytes = 1 << 16;  // a path of days need not be in memory as text
+  const auto& samples = trajectory.samples();
+  std::size_t next = 0;
+  std::string block;
   TextLines lines(comment);
-  while (const auto line = lines.next()) fmt::format_to(std::back_inserter(text), "# {}\n", *line);
-  for (const auto& [time, pose] : trajectory.samples()) {
-    const auto& [q, p] = pose;
-    fmt::format_to(std::back_inserter(text),
-                   "{} {:.17g} {:.17g} {:.17g} {:.17g} {:.17g} {:.17g} {:.17g}\n",
-                   seconds_text(time), p.x, p.y, p.z, q.x, q.y, q.z, q.w);
-  }
-  write_text(path, text);
+  write_blocks(path, [&]() -> std::string_view {
+    block.clear();
+    while (const auto line = lines.next())
+      fmt::format_to(std::back_inserter(block), "# {}\n", *line);
+    for (; next < samples.size() && block.size() < block_bytes; ++next) {
+      const auto& [time, pose] = samples[next];
+      const auto& [q, p] = pose;
+      fmt::format_to(std::back_inserter(block),
+                     "{} {:.17g} {:.17g} {:.17g} {:.17g} {:.17g} {:.17g} {:.17g}\n",
+                     seconds_text(time), p.x, p.y, p.z, q.x, q.y, q.z, q.w);
+    }
+    return block;
+  });
 }
 
 }  // namespace groundray

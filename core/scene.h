@@ -30,6 +30,7 @@ struct ModelTruth {
 
 /// What a surface shows where a ray meets it: one material or, of ground, several.
 struct Appearance {
+  /// A material and how much of the surface it is.
   struct Part {
     std::uint16_t material = 0;  ///< index among the scene's
     float share = 1;             ///< of the surface; all parts' are 1

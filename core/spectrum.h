@@ -23,7 +23,7 @@ std::optional<double> value_at(std::span<const SpectrumSample> spectrum,
 /// The wavelengths that a colour needs. A reflectance that differs by 1 beyond them changes a
 /// colour by less than 0.003.
 inline constexpr double colour_from_nm = 400;
-inline constexpr double colour_to_nm = 700;
+inline constexpr double colour_to_nm = 700;  ///< as colour_from_nm
 
 /// Returns the linear sRGB colour (Rec. 709 primaries) that a reflectance or transmittance has in
 /// daylight, CIE D65, for the CIE 1931 2-degree observer: sums over 380 to 780 nm in steps of 5 nm,

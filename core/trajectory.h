@@ -12,6 +12,7 @@ namespace groundray {
 /// constant body velocity (constant twist). Immutable; any number of threads may read it.
 class Trajectory {
  public:
+  /// X_AB at one time.
   struct Sample {
     std::chrono::nanoseconds time{0};
     Pose pose;

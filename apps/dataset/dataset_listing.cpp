@@ -3,8 +3,12 @@
 #include <algorithm>
 #include <array>
 #include <cmath>
+#include <optional>
+#include <string>
 #include <utility>
 
+#include "apps/dataset/dataset_text.h"
+#include "apps/dataset/frame_entry.h"
 #include "core/error.h"
 #include "sensors/yaml_reader.h"
 
@@ -80,6 +84,27 @@ void read_frame(const yaml::Node& node, yaml::Faults& faults, DatasetListing& li
   frame.close_partly();
 }
 
+// All that precedes the frames of a file that is as the generator writes it, which may list any
+// number of them; nothing if it is any other.
+std::optional<yaml::Node> read_generated(const fs::path& folder, DatasetListing& listing) {
+  try {
+    DatasetText text(folder);
+    while (const auto line = text.next_entry()) {
+      const auto entry = parse_entry(*line);
+      if (!entry) return std::nullopt;
+      DatasetListing::Frames& frames = listing.frames[entry->sensor];
+      if (entry->is_done)
+        frames.done.push_back({.number = entry->frame, .stamp = entry->stamp, .file = {}});
+      else
+        ++frames.pending;
+    }
+    return text.is_intact() ? std::optional(yaml::parse(text.header(), folder / dataset_file))
+                            : std::nullopt;
+  } catch (const Error&) {
+    return std::nullopt;  // what is wrong with it is told where it is read as any other
+  }
+}
+
 }  // namespace
 
 DatasetListing::Frames DatasetListing::frames_of(const std::string& sensor) const {
@@ -88,14 +113,19 @@ DatasetListing::Frames DatasetListing::frames_of(const std::string& sensor) cons
 }
 
 DatasetListing read_listing(const fs::path& folder) {
-  const fs::path path = folder / "dataset.yaml";
+  const fs::path path = folder / dataset_file;
   yaml::Faults faults(path);
-  const yaml::Node node = yaml::parse(yaml::read_file(path), path);
+  DatasetListing listing;
+  const auto generated = read_generated(folder, listing);
+  if (!generated) listing.frames.clear();
+  const yaml::Node node = generated ? *generated : yaml::parse(yaml::read_file(path), path);
   yaml::Map root(node, "", faults);
   yaml::check_version(root, "groundray_dataset", faults);
-  DatasetListing listing{.georeference = read_georeference(root)};
-  for (const yaml::Node& frame : root.list("frames", Need::Required))
-    read_frame(frame, faults, listing);
+  listing.georeference = read_georeference(root);
+  if (!generated) {
+    for (const yaml::Node& frame : root.list("frames", Need::Required))
+      read_frame(frame, faults, listing);
+  }
   for (const yaml::Node& sensor : root.list("sensors", Need::Required))
     read_sensor(sensor, faults, listing);
   root.close_partly();
@@ -103,6 +133,18 @@ DatasetListing read_listing(const fs::path& folder) {
   for (auto& [sensor, frames] : listing.frames)
     std::ranges::sort(frames.done, {}, &RecordedFrame::number);
   return listing;
+}
+
+std::string read_run_text(const fs::path& folder) {
+  try {
+    DatasetText text(folder);
+    while (text.next_entry()) {
+    }
+    if (text.is_intact()) return text.header();
+  } catch (const Error&) {
+    // Then it is any other file.
+  }
+  return yaml::read_file(folder / dataset_file);
 }
 
 std::chrono::nanoseconds time_of(double time_s) {

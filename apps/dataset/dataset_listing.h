@@ -46,6 +46,10 @@ struct DatasetListing {
 /// @throws Error naming file, line and rule of each fault.
 DatasetListing read_listing(const std::filesystem::path& folder);
 
+/// Returns the text of dataset.yaml; where it is as the generator writes it, without the frames, of
+/// which there may be any number. @throws Error if it cannot be read.
+std::string read_run_text(const std::filesystem::path& folder);
+
 /// Returns a time in nanoseconds.
 std::chrono::nanoseconds time_of(double time_s);
 

@@ -12,6 +12,7 @@
 #include "apps/dataset/dataset_reader.h"
 #include "apps/dataset/range_conf.h"
 #include "core/error.h"
+#include "core/file_ending.h"
 #include "core/product_io.h"
 #include "core/text_lines.h"
 #include "sensors/yaml_reader.h"
@@ -23,9 +24,7 @@ namespace fs = std::filesystem;
 using std::chrono::nanoseconds;
 
 bool is_range_grid(const fs::path& path) {
-  std::string ending = path.extension().string();
-  std::ranges::transform(ending, ending.begin(),
-                         [](unsigned char c) { return static_cast<char>(std::tolower(c)); });
+  const std::string ending = file_ending(path);
   if (ending == ".gz") return true;  // as Stanford's come
   if (ending != ".ply") return false;
   std::ifstream file(path, std::ios::binary);

@@ -14,6 +14,7 @@
 #include <variant>
 #include <vector>
 
+#include "apps/dataset/dataset_summary.h"
 #include "apps/scene/world.h"
 #include "terrain/certificate.h"
 #include "terrain/dem_file.h"
@@ -206,9 +207,24 @@ void print_scene(const World& world) {
   for (const PlacedCamera& camera : world.cameras) print_camera(camera);
 }
 
+void print_dataset(const std::filesystem::path& folder) {
+  const DatasetSummary dataset = read_summary(folder);
+  fmt::print(
+      "dataset   {} of {} frames are there{}\n", dataset.done, dataset.asked_for,
+      dataset.done < dataset.asked_for ? "; `groundray generate --resume` makes the rest" : "");
+  if (dataset.shard) fmt::print("shard     {}\n", text_of(*dataset.shard));
+  fmt::print("version   {}\nseed      {}\n", dataset.version, dataset.seed);
+  for (const DatasetSummary::Sensor& sensor : dataset.sensors) {
+    fmt::print("{:<9} {}: {}, {} of {} frames, {:.1f} MiB\n", sensor.kind, sensor.name,
+               sensor.model, sensor.done, sensor.asked_for,
+               static_cast<double>(sensor.bytes) / mib);
+  }
+}
+
 }  // namespace
 
 void print_info(const std::filesystem::path& file) {
+  if (std::filesystem::is_directory(file)) return print_dataset(file);
   if (file.extension() == ".yaml" || file.extension() == ".yml")
     return print_scene(load_world(file));
   print_dem(file);

@@ -1,17 +1,15 @@
 #include <fmt/format.h>
-#include <malloc.h>
 
 #include <CLI/CLI.hpp>
 #include <csignal>
 #include <exception>
 #include <filesystem>
 #include <new>
-#include <optional>
 
 #include "apps/groundray/dem/fill_command.h"
-#include "apps/groundray/generate.h"
 #include "apps/groundray/info.h"
 #include "apps/groundray/reconstruct_commands.h"
+#include "apps/groundray/run/run_commands.h"
 #include "apps/groundray/terrain_commands.h"
 #include "apps/interruption.h"
 #include "core/error.h"
@@ -29,31 +27,20 @@ int run(int argc, char** argv) {
       "with its true place, range and normal.");
   app.footer(
       "A first run:  groundray generate data/scenes/first_light.yaml -o out/first_light\n"
-      "Exit codes:   0 done, 1 failed, 2 wrong usage, 130 interrupted (the same command goes on)\n"
+      "Exit codes:   0 done, 1 failed, 2 wrong usage, 130 interrupted (--resume goes on)\n"
       "Data:         presets are looked up in $GROUNDRAY_DATA/sensors, else beside the program");
   app.set_version_flag("--version", "groundray " GROUNDRAY_VERSION);
   app.require_subcommand(1);
 
-  std::filesystem::path scene;
-  std::filesystem::path out;
-  auto* generate = app.add_subcommand(
-      "generate", "Run a scene and write its dataset: scans, images, poses, calibration, pictures");
-  generate->add_option("SCENE", scene, "Scene file (YAML, see docs/scene.md)")->required();
-  generate
-      ->add_option(
-          "-o,--output", out,
-          "Folder for the dataset; made if missing; a run that was interrupted goes on in it")
-      ->required();
-  std::optional<std::uint64_t> seed;
-  generate->add_option("--seed", seed,
-                       "Instead of the scene's own: another draw of noise and scattered things");
+  const groundray::RunCommands runs(app);
 
+  std::filesystem::path out;
   std::filesystem::path file;
   auto* info = app.add_subcommand("info", "Say what a file is and what it would take");
   info->add_option(
           "FILE", file,
           "A DEM (GeoTIFF, HGT, ASCII grid, ...): size, CRS, cell, heights, holes, memory; "
-          "or a scene (.yaml): what it would make")
+          "a scene (.yaml): what it would make; or a dataset: what is there")
       ->required();
 
   auto* terrain = app.add_subcommand("terrain", "Work on a DEM");
@@ -125,7 +112,7 @@ int run(int argc, char** argv) {
     groundray::mesh_terrain(file, dem_options, request, out);
     return done;
   }
-  groundray::generate(scene, out, seed ? std::optional(groundray::Seed{*seed}) : std::nullopt);
+  runs.run();
   return done;
 }
 
@@ -138,7 +125,9 @@ int main(int argc, char** argv) {
   try {
     return run(argc, argv);
   } catch (const groundray::Interrupted&) {
-    fmt::print(stderr, "\ngroundray: interrupted; the same command goes on, or begins anew\n");
+    fmt::print(stderr,
+               "\ngroundray: interrupted; a run or a merge goes on with --resume, other commands "
+               "begin anew\n");
     return interrupted;
   } catch (const std::bad_alloc&) {
     fmt::print(stderr,

@@ -5,12 +5,12 @@
 #include <unistd.h>
 
 #include <algorithm>
-#include <cctype>
 #include <cerrno>
 #include <string>
 #include <system_error>
 
 #include "core/error.h"
+#include "core/file_ending.h"
 
 namespace groundray {
 namespace {
@@ -56,9 +56,7 @@ fs::path new_file_beside(const fs::path& path) {
 }  // namespace
 
 void check_ending(const fs::path& path, std::initializer_list<const char*> endings) {
-  std::string ending = path.extension().string();
-  std::ranges::transform(ending, ending.begin(),
-                         [](unsigned char c) { return static_cast<char>(std::tolower(c)); });
+  const std::string ending = file_ending(path);
   if (std::ranges::find(endings, ending) == endings.end())
     throw Error("{}: its name must end in {}", path.string(), *endings.begin());
 }

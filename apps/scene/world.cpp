@@ -1,5 +1,6 @@
 #include "apps/scene/world.h"
 
+#include <dlfcn.h>
 #include <fmt/format.h>
 
 #include <algorithm>
@@ -84,13 +85,6 @@ double diagonal_m(const GridFrame& frame) {
   return glm::distance(frame.to_D({0, 0}), frame.to_D(frame.samples - 1));
 }
 
-// Says how far a long preparation is; most take no time that is worth a word.
-Terrain load_terrain(const TerrainSpec& spec) {
-  Certifying progress;
-  return {spec.dem, spec.options, spec.detail, [&](double share) { progress.update(share); },
-          spec.relief};
-}
-
 double largest_reach_m(const std::vector<PlacedLidar>& lidars,
                        const std::vector<PlacedCamera>& cameras) {
   double reach_m = 0;
@@ -127,6 +121,13 @@ std::optional<Sky> load_sky(const SceneSpec& spec) {
   if (!spec.sky) return std::nullopt;
   const auto* environment = std::get_if<EnvironmentImage>(&spec.sky->dome);
   return Sky(*spec.sky, environment != nullptr ? read_image_f(environment->image) : ImageF());
+}
+
+// The program or shared library that this is part of: the Python module has its data beside it.
+std::filesystem::path own_file() {
+  Dl_info info{};
+  static const char here = 0;
+  return dladdr(&here, &info) != 0 && info.dli_fname != nullptr ? info.dli_fname : "";
 }
 
 std::optional<AerialPerspective> air_of(const SceneSpec& spec) {
@@ -167,15 +168,22 @@ std::filesystem::path data_folder() {
   if (const char* chosen = std::getenv("GROUNDRAY_DATA")) return chosen;
   std::error_code ignored;
   const auto program = std::filesystem::read_symlink("/proc/self/exe", ignored);
-  auto installed = program.parent_path().parent_path() / "share/groundray";
-  if (std::filesystem::exists(installed / "sensors", ignored)) return installed;
+  for (const auto& folder :
+       {program.parent_path().parent_path() / "share/groundray", own_file().parent_path() / "data"})
+    if (std::filesystem::exists(folder / "sensors", ignored)) return folder;
   return GROUNDRAY_SOURCE_DATA;
 }
 
 World load_world(const std::filesystem::path& scene, std::optional<Seed> seed) {
   SceneSpec spec = load_scene(scene, data_folder() / "sensors");
   if (seed) spec.seed = *seed;
-  Terrain terrain = load_terrain(spec.terrain);
+  Certifying progress;  // most take no time that is worth a word
+  return build_world(std::move(spec), [&](double share) { progress.update(share); });
+}
+
+World build_world(SceneSpec spec, const Terrain::Progress& progress) {
+  Terrain terrain(spec.terrain.dem, spec.terrain.options, spec.terrain.detail, progress,
+                  spec.terrain.relief);
   std::chrono::nanoseconds begin{0};
   const Trajectory X_DB =
       extended(std::visit([&](const auto& path) { return lay_path(path, spec, terrain, begin); },

@@ -52,8 +52,8 @@ SensorBox sensor_box(const Exposed& frame);
 /// Returns the first frame of a run: the first lidar's, or else the first camera's.
 Exposed first_frame(const World& world);
 
-/// The folder with groundray's own data: $GROUNDRAY_DATA, or beside the installed program, or of
-/// the source tree.
+/// The folder with groundray's own data: $GROUNDRAY_DATA, or beside the installed program or Python
+/// module, or of the source tree.
 std::filesystem::path data_folder();
 
 /// Loads a scene and everything it names.
@@ -62,5 +62,10 @@ std::filesystem::path data_folder();
 ///         one image, or a stereo pair cannot be rectified.
 /// @param seed  instead of the scene's own.
 World load_world(const std::filesystem::path& scene, std::optional<Seed> seed = std::nullopt);
+
+/// As load_world, of a scene that is understood already.
+/// @param progress  is told now and then which share of a long preparation of the terrain is done;
+///                  what it throws ends that and reaches the caller. May be none.
+World build_world(SceneSpec spec, const Terrain::Progress& progress = {});
 
 }  // namespace groundray

@@ -16,7 +16,7 @@ import yaml
 from plyfile import PlyData
 
 ROOT = Path(__file__).resolve().parents[2]
-PROGRAM = ROOT / "build/release/bin/groundray"
+PROGRAM = Path(os.environ.get("GROUNDRAY", ROOT / "build/release/bin/groundray"))
 PRAIRIE = ROOT / "data/terrain/prairie_1m.tif"
 
 COLUMNS = {
@@ -48,9 +48,10 @@ def groundray(*arguments, **options):
     )
 
 
-def generate(folder, scene=SCENE, out="out", **options):
+def generate(folder, scene=SCENE, out="out", resume=False, **options):
     (folder / "scene.yaml").write_text(scene)
-    return groundray("generate", folder / "scene.yaml", "-o", folder / out, **options)
+    more = ["--resume"] if resume else []
+    return groundray("generate", folder / "scene.yaml", "-o", folder / out, *more, **options)
 
 
 def refused(result, *words):
@@ -186,7 +187,7 @@ def test_run_goes_on_where_it_stopped_and_ends_with_the_same_bytes(dataset, tmp_
     shutil.copytree(dataset, tmp_path / "out")
     for name in ("000001.ply", "000002.ply", "000002_preview.png"):
         (tmp_path / "out/lidar/top" / name).unlink()
-    result = generate(tmp_path)
+    result = generate(tmp_path, resume=True)
     assert result.returncode == 0, result.stderr
     assert "1 scans were there already" in result.stdout
     assert files(tmp_path / "out") == files(dataset)
@@ -206,7 +207,7 @@ def test_interrupt_leaves_whole_frames_and_exit_code_130(dataset, tmp_path):
     run.send_signal(signal.SIGINT)
     _, said = run.communicate(timeout=60)
     assert run.returncode == 130, said
-    assert "goes on" in said
+    assert "goes on with --resume" in said
     names = sorted(p.name for p in (out / "lidar/top").iterdir())
     assert all(re.fullmatch(r"\d{6}(\.ply|_preview\.png)", name) for name in names), names
     for scan in (out / "lidar/top").glob("*.ply"):
@@ -218,6 +219,7 @@ def test_interrupt_leaves_whole_frames_and_exit_code_130(dataset, tmp_path):
 
 def test_folder_of_another_run_is_left_alone(dataset, tmp_path):
     shutil.copytree(dataset, tmp_path / "out")
+    assert refused(generate(tmp_path), "holds a dataset of this run already", "add --resume")
     assert refused(generate(tmp_path, SCENE.replace("seed: 7", "seed: 8")), "another scene, DEM")
     assert files(tmp_path / "out") == files(dataset)
     (tmp_path / "mine").mkdir()

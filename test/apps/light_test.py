@@ -16,10 +16,10 @@ SCENE = (ROOT / "data/scenes/lidar_physics.yaml").read_text()
 SPEED_OF_LIGHT = 299_792_458
 
 
-def generate(scene, folder):
+def generate(scene, folder, *more):
     text = scene.replace("../terrain/", f"{ROOT / 'data/terrain'}/")
     (folder / "scene.yaml").write_text(text.replace("duration_s: 0.5", "duration_s: 0.1"))
-    command = [PROGRAM, "generate", folder / "scene.yaml", "-o", folder / "out"]
+    command = [PROGRAM, "generate", folder / "scene.yaml", "-o", folder / "out", *more]
     return subprocess.run(command, capture_output=True, text=True, timeout=300)
 
 
@@ -118,7 +118,7 @@ def test_another_laser_or_material_is_another_dataset(noisy, tmp_path):
     scene = SCENE.replace("material: dry_grass", f"material: {material}")
     material.write_text(text)
     assert generate(scene, tmp_path).returncode == 0
-    assert generate(scene, tmp_path).returncode == 0
+    assert generate(scene, tmp_path, "--resume").returncode == 0
     material.write_text(re.sub(r"reflectances: \[([\d.]+)", "reflectances: [0.5", text))
     result = generate(scene, tmp_path)
     assert result.returncode == 1

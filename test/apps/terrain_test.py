@@ -41,10 +41,10 @@ def groundray(*arguments, **options):
     )
 
 
-def generate(folder, dem, detail, out, **options):
+def generate(folder, dem, detail, out, *more, **options):
     text = SCENE.replace("DEM", str(dem)).replace("DETAIL", detail)
     (folder / f"{out}.yaml").write_text(text)
-    result = groundray("generate", folder / f"{out}.yaml", "-o", folder / out, **options)
+    result = groundray("generate", folder / f"{out}.yaml", "-o", folder / out, *more, **options)
     assert result.returncode == 0, result.stderr
     return [PlyData.read(p)["vertex"] for p in sorted((folder / out).glob("lidar/top/*.ply"))]
 
@@ -109,7 +109,7 @@ def test_frames_do_not_depend_on_those_before(tmp_path, dem):
     last = tmp_path / "run/lidar/top/000001.ply"
     before = last.read_bytes()
     last.unlink()
-    generate(tmp_path, dem, "memory_mib: 3, tolerance_mrad: 0.5", "run")
+    generate(tmp_path, dem, "memory_mib: 3, tolerance_mrad: 0.5", "run", "--resume")
     assert last.read_bytes() == before
 
 

@@ -4,11 +4,11 @@
 
 #include <algorithm>
 #include <array>
-#include <cctype>
 #include <string_view>
 
 #include "apps/groundray/result_files.h"
 #include "core/error.h"
+#include "core/file_ending.h"
 #include "reconstruction/measured_mesh_io.h"
 
 namespace groundray {
@@ -16,23 +16,16 @@ namespace {
 
 namespace fs = std::filesystem;
 
-std::string ending_of(const fs::path& path) {
-  std::string ending = path.extension().string();
-  std::ranges::transform(ending, ending.begin(),
-                         [](unsigned char c) { return static_cast<char>(std::tolower(c)); });
-  return ending;
-}
-
 void check_mesh_name(const fs::path& path) {
   static constexpr std::array<std::string_view, 4> endings{".ply", ".obj", ".stl", ".glb"};
-  if (std::ranges::find(endings, ending_of(path)) == endings.end())
+  if (std::ranges::find(endings, file_ending(path)) == endings.end())
     throw Error("{}: the name of a mesh must end in .ply, .obj, .stl or .glb", path.string());
 }
 
 // In a .ply each vertex tells where its beam began.
 void write_occlusion(const fs::path& path, const OcclusionFaces& faces,
                      const Georeference& georeference) {
-  if (ending_of(path) != ".ply")
+  if (file_ending(path) != ".ply")
     return write_measured_mesh(path, {.shape = faces.shape}, georeference);
   MeshColumns columns{.vertices = PointCloud(faces.origins_m.size())};
   for (int axis = 0; axis < 3; ++axis) {

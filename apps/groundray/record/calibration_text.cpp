@@ -101,7 +101,8 @@ std::string calibration_text(const PlacedCamera& placed) {
   return text + fmt::format("camera_file: {}\n", yaml_text(placed.spec.text));
 }
 
-void write_exchange_calibrations(const std::filesystem::path& stem, const PlacedCamera& placed) {
+std::vector<std::string> write_exchange_calibrations(const std::filesystem::path& stem,
+                                                     const PlacedCamera& placed) {
   const CameraSpec& camera = placed.spec.camera;
   CameraCalibration calibration{.name = placed.spec.name,
                                 .model = camera.lens,
@@ -110,6 +111,7 @@ void write_exchange_calibrations(const std::filesystem::path& stem, const Placed
                                 .X_FC = {},
                                 .time_shift_s = 0,
                                 .rectification = placed.rectification};
+  std::vector<std::string> written;
   const auto write = [&](const char* suffix, CalibrationFormat format) {
     std::string text;
     try {
@@ -118,10 +120,12 @@ void write_exchange_calibrations(const std::filesystem::path& stem, const Placed
       return;  // it has no words for this lens
     }
     write_text(stem.string() + suffix, text);
+    written.emplace_back(suffix);
   };
   write(".ros.yaml", CalibrationFormat::RosYaml);
   calibration.rectification.reset();  // Kalibr's files are of cameras as they are mounted
   write(".kalibr.yaml", CalibrationFormat::KalibrYaml);
+  return written;
 }
 
 }  // namespace groundray

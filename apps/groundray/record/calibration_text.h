@@ -3,6 +3,7 @@
 #include <filesystem>
 #include <string>
 #include <string_view>
+#include <vector>
 
 #include "apps/scene/world.h"
 
@@ -16,7 +17,9 @@ std::string calibration_text(const PlacedLidar& lidar);
 std::string calibration_text(const PlacedCamera& camera);
 
 /// Writes a camera's calibration in the formats of others that can say it, as <stem>.ros.yaml and
-/// <stem>.kalibr.yaml. @throws Error as write_text.
-void write_exchange_calibrations(const std::filesystem::path& stem, const PlacedCamera& camera);
+/// <stem>.kalibr.yaml. @return what the names of those that were written end with.
+/// @throws Error as write_text.
+std::vector<std::string> write_exchange_calibrations(const std::filesystem::path& stem,
+                                                     const PlacedCamera& camera);
 
 }  // namespace groundray

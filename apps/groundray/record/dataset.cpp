@@ -1,134 +1,39 @@
 #include "apps/groundray/record/dataset.h"
 
 #include <fmt/format.h>
+#include <tbb/parallel_for.h>
 
 #include <algorithm>
-#include <array>
-#include <chrono>
-#include <cmath>
-#include <cstddef>
-#include <cstdint>
-#include <cstdlib>
+#include <cstdio>
 #include <fstream>
-#include <numbers>
-#include <span>
-#include <string>
-#include <string_view>
+#include <system_error>
+#include <utility>
 
 #include "apps/dataset/dataset_listing.h"
+#include "apps/dataset/dataset_text.h"
 #include "apps/groundray/record/calibration_text.h"
 #include "apps/groundray/record/images.h"
-#include "apps/scene/fingerprint.h"
+#include "apps/groundray/record/run_header.h"
+#include "apps/groundray/record/scans.h"
+#include "apps/groundray/run/file_check.h"
+#include "apps/interruption.h"
 #include "core/error.h"
 #include "core/product_io.h"
+#include "core/progress.h"
 
 namespace groundray {
 namespace {
 
 namespace fs = std::filesystem;
 
-constexpr std::string_view frames = "\nframes:\n";  // what precedes it says what run this is
+constexpr std::string_view aside = ".part";  // what names of files being written end with
 
-// Seconds to the nanosecond, whatever the clock's epoch.
-std::string decimal_seconds(std::chrono::nanoseconds time) {
-  const std::int64_t count = time.count();
-  return fmt::format("{}{}.{:09}", count < 0 ? "-" : "", std::abs(count / 1'000'000'000),
-                     std::abs(count % 1'000'000'000));
-}
-
-// A lens by where some pixels look: it may come from a file that the camera's only names.
-void add_lens(const Lens& lens, Fingerprint& print) {
-  constexpr int steps = 8;
-  for (int i = 0; i <= steps * steps; ++i) {
-    const glm::dvec2 share(i % steps, i / steps);
-    const auto ray = lens.ray(share * glm::dvec2(lens.size_px() - 1) / double{steps});
-    const glm::dvec3 direction = ray ? ray->direction : glm::dvec3(0);
-    print.add_all(direction.x, direction.y, direction.z);
-  }
-}
-
-std::uint64_t fingerprint(const World& world) {
-  static_assert(sizeof(Trajectory::Sample) == 8 * sizeof(double),
-                "no padding, whose bytes are anything");
-  Fingerprint print;
-  print.add(std::span<const char>(world.terrain.fingerprint()));
-  for (const PlacedLidar& lidar : world.lidars) {
-    print.add(std::span(lidar.X_DS.samples()));
-    print.add(std::span<const char>(calibration_text(lidar)));
-    if (const auto* table = std::get_if<TablePattern>(&lidar.spec.lidar.pattern)) {
-      for (const auto& [time_s, azimuth_rad, elevation_rad, ring, origin_m] : table->shots) {
-        const std::array numbers{time_s, azimuth_rad, elevation_rad};
-        print.add(std::span<const double>(numbers));
-        print.add(std::span<const std::uint16_t>(&ring, 1));
-      }
-    }
-  }
-  for (const PlacedCamera& camera : world.cameras) {
-    print.add(std::span(camera.X_DC.samples()));
-    print.add(std::span<const char>(calibration_text(camera)));
-    add_lens(camera.camera.lens(), print);
-  }
-  if (const auto& sky = world.spec.sky) {
-    if (const auto* environment = std::get_if<EnvironmentImage>(&sky->dome))
-      print.add(std::span<const char>(read_text(environment->image)));
-  }
-  for (const Material& material : world.content.materials.all())
-    print.add_all(fingerprint_of(material));
-  print.add(std::span<const char>(world.content.fingerprint));
-  return print.value();
-}
-
-std::string header(const World& world) {
-  const glm::dvec3 origin_m = world.terrain.header().origin_w_m;
-  std::string text = fmt::format(
-      "groundray_dataset: 1\nversion: {}\nseed: {}\ntracing: {}\ninputs: "
-      "\"{:016x}\"\ntime_origin_s: {}\n"
-      "origin_w_m: [{}, {}, {}]\ncrs: "
-      "{}\ncrs_wkt: {}\nscene: "
-      "{}\nsensors:\n",
-      yaml_text(GROUNDRAY_VERSION), world.spec.seed.value,
-      world.spec.tracing == Tracing::Fast ? "fast" : "exact", fingerprint(world),
-      decimal_seconds(world.begin), origin_m.x, origin_m.y, origin_m.z,
-      yaml_text(world.terrain.header().crs_name), yaml_text(world.terrain.header().crs_wkt),
-      yaml_text(world.spec.text));
-  for (std::size_t i = 0; i < world.lidars.size(); ++i) {
-    const MountedLidar& spec = world.lidars[i].spec;
-    text += fmt::format(
-        "  - {{name: {}, kind: lidar, number: {}, model: {}, source: {}, frames: {}}}\n",
-        yaml_text(spec.name), i, yaml_text(spec.lidar.model), yaml_text(spec.source),
-        world.lidars[i].sweeps);
-  }
-  for (std::size_t i = 0; i < world.cameras.size(); ++i) {
-    const MountedCamera& spec = world.cameras[i].spec;
-    text += fmt::format(
-        "  - {{name: {}, kind: camera, number: {}, model: {}, source: {}, frames: {}}}\n",
-        yaml_text(spec.name), world.lidars.size() + i, yaml_text(spec.camera.model),
-        yaml_text(spec.source), world.cameras[i].begins.size());
-  }
-  for (const StereoSpec& pair : world.spec.stereo) {
-    text += fmt::format("  - {{name: {}, kind: stereo, left: {}, right: {}, images: {}}}\n",
-                        yaml_text(pair.name), yaml_text(pair.left), yaml_text(pair.right),
-                        pair.images == StereoSpec::Images::Rectified ? "rectified" : "as_mounted");
-  }
-  if (!world.cameras.empty()) {
-    text += "materials:  # by number in images, from 1\n";
-    for (const Material& material : world.content.materials.all())
-      text += fmt::format("  - {}\n", yaml_text(material.name));
-  }
-  if (!world.content.groups.empty()) text += "objects:\n";
-  for (const Content::Group& group : world.content.groups) {
-    text += fmt::format("  - {{name: {}, label: {}, first_instance: {}, count: {}}}\n",
-                        yaml_text(group.name), group.label, group.first, group.count);
-  }
-  return text;
-}
-
-// What the scan's header says of its convergence, as an entry of its frame; empty if nothing.
+// What the scan's header says of its convergence; empty if nothing.
 std::string convergence_of(const fs::path& scan) {
   std::ifstream file(scan);
   const std::string begin = fmt::format("comment {}", convergence_comment);
   for (std::string line; std::getline(file, line) && line != "end_header";) {
-    if (line.starts_with(begin)) return ", convergence: " + line.substr(begin.size());
+    if (line.starts_with(begin)) return line.substr(begin.size());
   }
   return {};
 }
@@ -142,96 +47,290 @@ void make_folder(const fs::path& folder) {
   }
 }
 
-void check_same_run(const fs::path& folder, const std::string& header) {
+// A run that was cut off before it had written anything leaves no more than that.
+bool is_as_new(const fs::path& folder) {
+  return std::ranges::all_of(fs::directory_iterator(folder), [](const fs::directory_entry& entry) {
+    return entry.path().filename() == fmt::format("{}{}", dataset_file, aside);
+  });
+}
+
+// Whether a name is that of a frame's file with one of the suffixes while that is being written.
+bool is_aside(const std::string& name, const std::vector<std::string>& suffixes) {
+  const std::size_t digits = std::min(name.find_first_not_of("0123456789"), name.size());
+  return digits >= 6 && std::ranges::any_of(suffixes, [&](const std::string& suffix) {
+           return name.substr(digits) == fmt::format("{}{}", suffix, aside);
+         });
+}
+
+void remove_asides(const fs::path& folder, const std::vector<std::string>& suffixes) {
   std::error_code ignored;
-  if (!fs::exists(folder, ignored) || fs::is_empty(folder, ignored)) return;
-  const fs::path record = folder / "dataset.yaml";
-  if (!fs::exists(record, ignored)) {
-    throw Error(
-        "{}: the folder is not empty and holds no dataset.yaml; choose a new folder with -o",
-        folder.string());
-  }
-  const std::string before = read_text(record);
-  if (before.substr(0, before.find(frames)) + "\n" != header) {
-    throw Error(
-        "{}: the folder holds a dataset of another scene, DEM, trajectory, sensor, seed or "
-        "version; choose a new folder "
-        "with -o or "
-        "remove this one",
-        folder.string());
-  }
+  for (const fs::directory_entry& entry : fs::directory_iterator(folder, ignored))
+    if (is_aside(entry.path().filename().string(), suffixes)) fs::remove(entry.path(), ignored);
+}
+
+std::string shard_words(const std::optional<Shard>& shard) {
+  return shard ? fmt::format("shard {}", text_of(*shard)) : "the whole";
 }
 
 }  // namespace
 
-Dataset::Dataset(const fs::path& folder, const World& world)
-    : folder_(folder), world_(world), header_(header(world)) {
-  check_same_run(folder, header_);
-  make_folder(folder);
-  record();  // first: a folder with it can be taken up again
-  for (const char* name : {"poses", "calibration"}) make_folder(folder / name);
+// A frame that is looked at.
+struct Dataset::Check {
+  std::uint32_t sensor = 0;
+  std::int64_t frame = 0;
+  std::string text;                 // of its entry; of the right one, once it is checked
+  std::vector<std::string> faults;  // none: all of it is there
+};
+
+Dataset::Dataset(fs::path folder, const World& world, FolderUse use, std::optional<Shard> shard)
+    : folder_(std::move(folder)), world_(world), shard_(shard), header_(run_header(world)) {
+  for (const PlacedLidar& lidar : world.lidars) {
+    sensors_.push_back({lidar.spec.name,
+                        folder_ / "lidar" / lidar.spec.name,
+                        scan_suffixes(lidar.spec),
+                        lidar.sweeps,
+                        {}});
+  }
+  for (const PlacedCamera& camera : world.cameras) {
+    sensors_.push_back({camera.spec.name,
+                        folder_ / "camera" / camera.spec.name,
+                        image_suffixes(camera.spec),
+                        std::ssize(camera.begins),
+                        {}});
+  }
+  for (Sensor& sensor : sensors_)
+    sensor.entry_after.resize(static_cast<std::size_t>(sensor.frames));
+  make_folder(folder_);
+  lock_.emplace(folder_, FolderLock::Use::Write);
+  if (is_taken_up(use)) {
+    take_up();
+  } else {
+    write_record();  // first: a folder with it can be taken up again
+    journal_.emplace(folder_ / journal_file);
+  }
+  write_sensors();
+}
+
+fs::path Dataset::product_path(std::uint32_t sensor, std::int64_t frame,
+                               std::string_view suffix) const {
+  return sensors_[sensor].folder / fmt::format("{:06}{}", frame, suffix);
+}
+
+bool Dataset::has(std::uint32_t sensor, std::int64_t frame) const {
+  return sensors_[sensor].entry_after[static_cast<std::size_t>(frame)] != 0;
+}
+
+// Whether there is a dataset of this run to go on with.
+bool Dataset::is_taken_up(FolderUse use) const {
+  if (is_as_new(folder_)) return false;
+  if (!fs::exists(folder_ / dataset_file)) {
+    throw Error(
+        "{}: the folder is not empty and holds no dataset.yaml; choose a new folder with -o",
+        folder_.string());
+  }
+  const DatasetText before(folder_);
+  if (before.header() != header_) {
+    throw Error(
+        "{}: the folder holds a dataset of another scene, DEM, trajectory, sensor, seed or "
+        "version: {}; choose a new folder with -o or remove this one",
+        (folder_ / dataset_file).string(), first_difference(before.header(), header_));
+  }
+  if (before.shard() != shard_) {
+    throw Error(
+        "{}: the folder holds {} of this run, and this is {}; give each a folder of its own with "
+        "-o",
+        folder_.string(), shard_words(before.shard()), shard_words(shard_));
+  }
+  if (use == FolderUse::New) {
+    throw Error(
+        "{}: the folder holds a dataset of this run already; add --resume to check it and go on "
+        "with it, or choose a new folder with -o",
+        folder_.string());
+  }
+  return true;
+}
+
+void Dataset::take_up() {
+  std::error_code ignored;
+  fs::remove(folder_ / fmt::format("{}{}", dataset_file, aside), ignored);
+  for (const Sensor& sensor : sensors_) remove_asides(sensor.folder, sensor.suffixes);
+  journal_.emplace(folder_ / fmt::format("{}{}", journal_file, aside));
+  try {
+    take_entries(*journal_);
+    check_entries(*journal_);
+    journal_->rename_to(folder_ / journal_file);
+  } catch (...) {
+    journal_->remove();  // the one before is still there
+    throw;
+  }
+}
+
+// All that a run before has noted, of each frame what it has noted last.
+void Dataset::take_entries(Journal& journal) {
+  const auto take = [&](const std::string& text) {
+    const auto entry = parse_entry(text);
+    if (!entry) return false;
+    const auto sensor = std::ranges::find(sensors_, entry->sensor, &Sensor::name);
+    if (sensor == sensors_.end() || entry->frame >= sensor->frames) return false;
+    if (entry->is_done)
+      sensor->entry_after[static_cast<std::size_t>(entry->frame)] = 1 + journal.add(text);
+    return true;
+  };
+  DatasetText text(folder_);
+  while (const auto entry = text.next_entry()) {
+    if (!take(*entry)) {
+      faults_.push_back(fmt::format("{}:{}: not as it was written; its frame is made again",
+                                    dataset_file, text.line()));
+    }
+  }
+  if (fs::exists(folder_ / journal_file)) {
+    const std::size_t torn =
+        read_journal(folder_ / journal_file, [&](const std::string& entry) { take(entry); });
+    if (torn > 0)
+      faults_.push_back(fmt::format("{}: {} torn {}; frames are made again", journal_file, torn,
+                                    torn == 1 ? "line" : "lines"));
+  }
+  for (const NamedSum& file : text.files()) {
+    if (const auto fault = fault_of(folder_ / file.path, file.sum))
+      faults_.push_back(fmt::format("{}: {}; it is written again", file.path, *fault));
+  }
+}
+
+// Keeps the frames that are sound, and their entries as this run would write them.
+void Dataset::check_entries(Journal& journal) {
+  constexpr std::size_t block = 64;  // how many are in memory at a time
+  std::size_t total = 0, done = 0;
+  for (const Sensor& sensor : sensors_)
+    total += sensor.entry_after.size() -
+             static_cast<std::size_t>(std::ranges::count(sensor.entry_after, 0u));
+  if (total == 0) return;
+  Progress progress(stderr, "frames checked", total);
+  std::vector<Check> checks;
+  const auto flush = [&] {
+    stop_if_interrupted();
+    tbb::parallel_for(std::size_t{0}, checks.size(), [&](std::size_t i) { check(checks[i]); });
+    for (Check& each : checks) {
+      auto& after = sensors_[each.sensor].entry_after[static_cast<std::size_t>(each.frame)];
+      if (!each.faults.empty())
+        after = 0;
+      else if (journal.at(after - 1) != each.text)
+        after = 1 + journal.add(each.text);
+      std::ranges::move(each.faults, std::back_inserter(faults_));
+    }
+    progress.update(done += checks.size());
+    checks.clear();
+  };
+  for (std::uint32_t sensor = 0; sensor < sensor_count(); ++sensor) {
+    for (std::int64_t frame = 0; frame < frames(sensor); ++frame) {
+      if (!has(sensor, frame)) continue;
+      const auto after = sensors_[sensor].entry_after[static_cast<std::size_t>(frame)];
+      checks.push_back({sensor, frame, journal.at(after - 1), {}});
+      if (checks.size() == block) flush();
+    }
+  }
+  flush();
+}
+
+void Dataset::check(Check& check) const {
+  const Sensor& sensor = sensors_[check.sensor];
+  auto entry = parse_entry(check.text);
+  std::vector<std::string> listed;
+  for (const ProductSum& file : entry->files) listed.push_back(file.suffix);
+  if (listed != sensor.suffixes) {
+    check.faults.push_back(fmt::format("{}, frame {}: not all files are listed; made again",
+                                       sensor.name, check.frame));
+    return;
+  }
+  for (const ProductSum& file : entry->files) {
+    const fs::path path = product_path(check.sensor, check.frame, file.suffix);
+    if (const auto fault = fault_of(path, file.sum)) {
+      check.faults.push_back(fmt::format(
+          "{}: {}; made again", path.lexically_relative(folder_).generic_string(), *fault));
+    }
+  }
+  if (check.faults.empty())
+    check.text = done_text(check.sensor, check.frame, std::move(entry->files));
+}
+
+void Dataset::write_sensors() {
+  for (const char* name : {"poses", "calibration"}) make_folder(folder_ / name);
+  for (const Sensor& sensor : sensors_) make_folder(sensor.folder);
+  const auto note = [&](const std::string& path) {
+    files_.push_back({path, sum_file(folder_ / path)});
+  };
   const auto write_calibration = [&](const std::string& name, const Trajectory& X_DS,
                                      const char* comment, const std::string& text) {
-    write_tum(folder / "poses" / (name + ".tum"), X_DS, comment);
-    write_text(folder / "calibration" / (name + ".yaml"), text);
+    const std::string poses = fmt::format("poses/{}.tum", name);
+    write_tum(folder_ / poses, X_DS, comment);
+    note(poses);
+    const std::string calibration = fmt::format("calibration/{}.yaml", name);
+    write_text(folder_ / calibration, text);
+    note(calibration);
   };
-  for (const PlacedLidar& lidar : world.lidars) {
-    make_folder(folder / "lidar" / lidar.spec.name);
+  for (const PlacedLidar& lidar : world_.lidars) {
     write_calibration(lidar.spec.name, lidar.X_DS, "sensor S in D: t [s] x y z [m] qx qy qz qw",
                       calibration_text(lidar));
   }
-  for (const PlacedCamera& camera : world.cameras) {
-    make_folder(folder / "camera" / camera.spec.name);
-    write_calibration(camera.spec.name, camera.X_DC, "camera C in D: t [s] x y z [m] qx qy qz qw",
-                      calibration_text(camera));
-    write_exchange_calibrations(folder / "calibration" / camera.spec.name, camera);
-  }
-}
-
-fs::path Dataset::product_path(const PlacedLidar& lidar, std::int64_t frame,
-                               std::string_view suffix) const {
-  return folder_ / "lidar" / lidar.spec.name / fmt::format("{:06}{}", frame, suffix);
-}
-
-fs::path Dataset::product_path(const PlacedCamera& camera, std::int64_t frame,
-                               std::string_view suffix) const {
-  return folder_ / "camera" / camera.spec.name / fmt::format("{:06}{}", frame, suffix);
-}
-
-bool Dataset::has(const PlacedLidar& lidar, std::int64_t frame) const {
-  return fs::exists(product_path(lidar, frame, scan_suffix));
-}
-
-bool Dataset::has(const PlacedCamera& camera, std::int64_t frame) const {
-  return std::ranges::all_of(image_suffixes(camera.spec), [&](const std::string& suffix) {
-    return fs::exists(product_path(camera, frame, suffix));
-  });
-}
-
-void Dataset::record() const {
-  std::string text = header_;
-  text.pop_back();
-  text += frames;
-  const auto add = [&](const std::string& sensor, std::int64_t frame,
-                       std::chrono::nanoseconds stamp, bool is_done, const std::string& more) {
-    text += fmt::format("  - {{sensor: {}, frame: {}, stamp_s: {:.9f}, state: {}{}}}\n",
-                        yaml_text(sensor), frame, 1e-9 * static_cast<double>(stamp.count()),
-                        is_done ? "done" : "pending", more);
-  };
-  for (const PlacedLidar& lidar : world_.lidars) {
-    for (std::int64_t frame = 0; frame < lidar.sweeps; ++frame) {
-      const bool is_done = has(lidar, frame);
-      add(lidar.spec.name, frame, lidar.lidar.pattern().stamp(frame), is_done,
-          is_done ? convergence_of(product_path(lidar, frame, scan_suffix)) : "");
-    }
-  }
   for (const PlacedCamera& camera : world_.cameras) {
-    for (std::size_t i = 0; i < camera.begins.size(); ++i) {
-      const auto frame = static_cast<std::int64_t>(i);
-      add(camera.spec.name, frame, camera.begins[i], has(camera, frame), "");
-    }
+    const std::string& name = camera.spec.name;
+    write_calibration(name, camera.X_DC, "camera C in D: t [s] x y z [m] qx qy qz qw",
+                      calibration_text(camera));
+    for (const std::string& suffix :
+         write_exchange_calibrations(folder_ / "calibration" / name, camera))
+      note(fmt::format("calibration/{}{}", name, suffix));
   }
-  write_text(folder_ / "dataset.yaml", text);
+}
+
+// As long as it is not there.
+FrameEntry Dataset::entry_of(std::uint32_t sensor, std::int64_t frame) const {
+  const std::size_t lidars = world_.lidars.size();
+  const std::chrono::nanoseconds stamp =
+      sensor < lidars ? world_.lidars[sensor].lidar.pattern().stamp(frame)
+                      : world_.cameras[sensor - lidars].begins[static_cast<std::size_t>(frame)];
+  return {sensors_[sensor].name, frame, stamp, false, {}, {}};
+}
+
+std::string Dataset::done_text(std::uint32_t sensor, std::int64_t frame,
+                               std::vector<ProductSum> files) const {
+  FrameEntry entry = entry_of(sensor, frame);
+  entry.is_done = true;
+  if (sensor < world_.lidars.size())
+    entry.convergence = convergence_of(product_path(sensor, frame, scan_suffix));
+  entry.files = std::move(files);
+  return text_of(entry);
+}
+
+std::uint64_t Dataset::note(std::uint32_t sensor, std::int64_t frame) {
+  std::vector<ProductSum> files;
+  std::uint64_t bytes = 0;
+  for (const std::string& suffix : sensors_[sensor].suffixes) {
+    files.push_back({suffix, sum_file(product_path(sensor, frame, suffix))});
+    bytes += files.back().sum.bytes;
+  }
+  sensors_[sensor].entry_after[static_cast<std::size_t>(frame)] =
+      1 + journal_->add(done_text(sensor, frame, std::move(files)));
+  return bytes;
+}
+
+void Dataset::write_record() const {
+  std::uint32_t sensor = 0;
+  std::int64_t frame = 0;
+  const auto next = [&]() -> std::optional<std::string> {
+    while (sensor < sensor_count() && frame == frames(sensor)) {
+      ++sensor;
+      frame = 0;
+    }
+    if (sensor == sensor_count()) return std::nullopt;
+    const auto after = sensors_[sensor].entry_after[static_cast<std::size_t>(frame)];
+    const std::int64_t number = frame++;
+    return after > 0 ? journal_->at(after - 1) : text_of(entry_of(sensor, number));
+  };
+  write_dataset_text(folder_, header_, shard_, next, files_);
+}
+
+void Dataset::close() {
+  write_record();
+  journal_->remove();
 }
 
 }  // namespace groundray

@@ -13,13 +13,11 @@
 #include <utility>
 #include <variant>
 
-#include "apps/dataset/dataset_listing.h"
 #include "apps/groundray/record/camera_preview.h"
 #include "apps/interruption.h"
 #include "core/exr_io.h"
 #include "core/flow_io.h"
 #include "core/luminance.h"
-#include "core/ply_io.h"
 #include "core/product_io.h"
 #include "sensors/camera/image_truth.h"
 #include "sensors/camera/imager.h"
@@ -200,21 +198,34 @@ TruthRequest request_of(const PlacedCamera& placed, std::size_t image) {
   return request;
 }
 
+RandomKey key_of(const World& world, std::size_t camera, std::int64_t image) {
+  return {.seed = world.spec.seed,
+          .sensor = static_cast<std::uint32_t>(world.lidars.size() + camera),
+          .frame = static_cast<std::uint32_t>(image)};
+}
+
 }  // namespace
 
-void show_echoes(const World& world, const Dataset& dataset, std::size_t camera, std::int64_t image,
-                 const std::function<const Scene&(const Exposed&)>& scene_for) {
+std::vector<ShownScan> shown_scans(const World& world, std::size_t camera, std::int64_t image) {
   const PlacedCamera& placed = world.cameras[camera];
   const nanoseconds begin = placed.begins[static_cast<std::size_t>(image)];
+  std::vector<ShownScan> scans;
   for (const std::string& name : placed.spec.lidars) {
-    const PlacedLidar& lidar = *std::ranges::find(
-        world.lidars, name, [](const PlacedLidar& each) { return each.spec.name; });
-    const std::int64_t scan = scan_at(lidar, begin + placed.camera.duration() / 2);
-    const PlyFile file = read_ply(dataset.product_path(lidar, scan, scan_suffix));
-    const auto echoes = image_echoes(placed.camera, scene_for(exposed(lidar, scan)), placed.X_DC,
-                                     begin, file.cloud, lidar.lidar.pattern().stamp(scan));
-    write_imaged_echoes(dataset.product_path(placed, image, echoes_suffix(name)), echoes);
+    const auto lidar = std::ranges::find(world.lidars, name,
+                                         [](const PlacedLidar& each) { return each.spec.name; });
+    scans.push_back({static_cast<std::uint32_t>(lidar - world.lidars.begin()),
+                     scan_at(*lidar, begin + placed.camera.duration() / 2)});
   }
+  return scans;
+}
+
+std::vector<ImagedEcho> show_echoes(const World& world, std::size_t camera, std::int64_t image,
+                                    const ShownScan& shown, const PointCloud& echoes,
+                                    const Scene& scene) {
+  const PlacedCamera& placed = world.cameras[camera];
+  return image_echoes(placed.camera, scene, placed.X_DC,
+                      placed.begins[static_cast<std::size_t>(image)], echoes,
+                      world.lidars[shown.lidar].lidar.pattern().stamp(shown.scan));
 }
 
 std::vector<std::string> image_suffixes(const MountedCamera& mounted) {
@@ -235,47 +246,58 @@ std::vector<std::string> image_suffixes(const MountedCamera& mounted) {
   return suffixes;
 }
 
-ImageTally make_image(const World& world, const Dataset& dataset, std::size_t which,
-                      std::int64_t image, const Scene& scene) {
+MadeImage make_image(const World& world, std::size_t which, std::int64_t image,
+                     const Scene& scene) {
   const PlacedCamera& placed = world.cameras[which];
   const CameraSpec& camera = placed.spec.camera;
   const auto number = static_cast<std::size_t>(image);
-  const nanoseconds begin = placed.begins[number];
-  const RandomKey key{.seed = world.spec.seed,
-                      .sensor = static_cast<std::uint32_t>(world.lidars.size() + which),
-                      .frame = static_cast<std::uint32_t>(image)};
-  const auto path_of = [&](const char* suffix) {
-    return dataset.product_path(placed, image, suffix);
-  };
-  ImageTally tally;
-  Layers layers;
-  std::optional<Exposure> light;
-  std::vector<std::uint16_t> labels;
+  MadeImage made;
   if (needs_light(camera)) {
-    if (gives(camera, Product::Coverage)) labels = labels_of(scene);
+    if (gives(camera, Product::Coverage)) made.labels = labels_of(scene);
     const PathTracer tracer(scene, *world.sky, camera.sampling.depth, world.air);
-    light = placed.camera.expose(tracer, placed.X_DC, begin, key, labels, stop_if_interrupted);
-    add_light(*light, camera, labels, layers);
+    made.light =
+        placed.camera.expose(tracer, placed.X_DC, placed.begins[number],
+                             key_of(world, which, image), made.labels, stop_if_interrupted);
+    for (const float samples : made.light->samples.values())
+      made.paths += static_cast<std::uint64_t>(samples);
   }
-  std::optional<ImageTruth> truth;
-  std::optional<TruthInFile> in_file;
   if (needs_truth(camera)) {
-    truth = image_truth(placed.camera, scene, world.content.materials.in_colour(), placed.X_DC,
-                        request_of(placed, number));
-    in_file.emplace(*truth);
-    add_truth(*truth, *in_file, camera, layers);
-    const ImageF& flow_px = truth->forward.offset_px;
-    tally.flows_left_out =
+    made.truth = image_truth(placed.camera, scene, world.content.materials.in_colour(), placed.X_DC,
+                             request_of(placed, number));
+  }
+  return made;
+}
+
+std::uint64_t write_image(const World& world, const Dataset& dataset, std::size_t which,
+                          std::int64_t image, const MadeImage& made) {
+  const PlacedCamera& placed = world.cameras[which];
+  const CameraSpec& camera = placed.spec.camera;
+  const auto path_of = [&](std::string_view suffix) {
+    return dataset.product_path(static_cast<std::uint32_t>(world.lidars.size() + which), image,
+                                suffix);
+  };
+  for (std::size_t i = 0; i < made.echoes.size(); ++i)
+    write_imaged_echoes(path_of(echoes_suffix(placed.spec.lidars[i])), made.echoes[i]);
+  std::uint64_t flows_left_out = 0;
+  Layers layers;
+  if (made.light) add_light(*made.light, camera, made.labels, layers);
+  std::optional<TruthInFile> in_file;
+  if (made.truth) {
+    in_file.emplace(*made.truth);
+    add_truth(*made.truth, *in_file, camera, layers);
+    const ImageF& flow_px = made.truth->forward.offset_px;
+    flows_left_out =
         write_flows(camera, flow_px.width() > 0 ? flow_px : unknown_flow(camera.size_px), path_of);
   }
-  if (needs_imager(camera)) write_stages(placed, light->radiance, key, path_of);
-  write_png(path_of("_preview.png"),
-            draw_image_preview(light ? &*light : nullptr, truth ? &*truth : nullptr));
-  if (!layers.all.empty()) write_exr(path_of(".exr"), layers.all, attributes_of(placed, begin));
-  if (!light) return tally;
-  for (const float samples : light->samples.values())
-    tally.paths += static_cast<std::uint64_t>(samples);
-  return tally;
+  if (needs_imager(camera))
+    write_stages(placed, made.light->radiance, key_of(world, which, image), path_of);
+  write_png(path_of("_preview.png"), draw_image_preview(made.light ? &*made.light : nullptr,
+                                                        made.truth ? &*made.truth : nullptr));
+  if (!layers.all.empty()) {
+    write_exr(path_of(".exr"), layers.all,
+              attributes_of(placed, placed.begins[static_cast<std::size_t>(image)]));
+  }
+  return flows_left_out;
 }
 
 }  // namespace groundray

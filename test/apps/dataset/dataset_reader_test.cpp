@@ -3,12 +3,16 @@
 #include <gmock/gmock.h>
 #include <gtest/gtest.h>
 
+#include <chrono>
+#include <cstdint>
 #include <filesystem>
 #include <fstream>
+#include <optional>
 #include <string>
 #include <utility>
 #include <vector>
 
+#include "apps/dataset/dataset_text.h"
 #include "core/error.h"
 #include "test/support/temporary_folder.h"
 
@@ -83,6 +87,38 @@ std::string changed(const std::string& from, const std::string& to) {
   std::string text = yaml;
   text.replace(text.find(from), from.size(), to);
   return text;
+}
+
+// As the generator writes it: read line by line, for it may be larger than any other file.
+TEST(DatasetReader, ReadsAnyNumberOfFrames) {
+  constexpr std::int64_t frames = 100'000;
+  const TemporaryFolder folder;
+  write_dataset(folder, "");
+  const FileSum sum{1 << 20, sha256_of("")};
+  std::int64_t next = 0;
+  write_dataset_text(folder.path(),
+                     "groundray_dataset: 1\norigin_w_m: [4, 5, 6]\nsensors:\n"
+                     "  - {name: top, kind: lidar, frames: 100000}\n",
+                     Shard{1, 2},
+                     [&]() -> std::optional<std::string> {
+                       if (next == frames) return std::nullopt;
+                       FrameEntry entry{"top",         next, std::chrono::milliseconds(100 * next),
+                                        next % 10 > 0, {},   {}};
+                       if (entry.is_done) entry.files = {{"_preview.png", sum}, {".ply", sum}};
+                       ++next;
+                       return text_of(entry);
+                     },
+                     {});
+  EXPECT_GT(std::filesystem::file_size(folder / "dataset.yaml"), std::uintmax_t{16} << 20);
+  const RecordedDataset dataset = read_dataset(folder.path());
+  ASSERT_EQ(dataset.lidars.size(), 1u);
+  const RecordedLidar& top = dataset.lidars[0];
+  EXPECT_EQ(top.pending, 10'000u);
+  ASSERT_EQ(top.frames.size(), 90'000u);
+  EXPECT_EQ(top.frames.back().number, frames - 1);
+  EXPECT_EQ(top.frames.back().stamp, std::chrono::milliseconds(100 * (frames - 1)));
+  EXPECT_EQ(top.frames[0].file, folder / "lidar/top/000001.ply");
+  EXPECT_EQ(dataset.georeference.origin_w_m, glm::dvec3(4, 5, 6));
 }
 
 TEST(DatasetReader, FaultsNameFileLineAndRule) {

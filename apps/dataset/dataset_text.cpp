@@ -1,0 +1,147 @@
+#include "apps/dataset/dataset_text.h"
+
+#include <fmt/format.h>
+#include <unistd.h>
+
+#include <algorithm>
+#include <cerrno>
+#include <cstddef>
+#include <cstdio>
+#include <memory>
+#include <system_error>
+#include <utility>
+
+#include "core/error.h"
+#include "core/product_io.h"
+
+namespace groundray {
+namespace {
+
+namespace fs = std::filesystem;
+
+constexpr std::string_view frames_line = "frames:", files_line = "files:";
+constexpr std::string_view item = "  - ";
+constexpr std::string_view shard_begin = "shard: \"", sum_begin = "sha256_above: \"", quote = "\"";
+
+struct CloseFile {
+  void operator()(std::FILE* file) const noexcept { std::fclose(file); }
+};
+
+// Lines on their way to a file, and what they sum up to.
+class LineSink {
+ public:
+  explicit LineSink(const fs::path& path) : file_(std::fopen(path.c_str(), "wb")) {
+    if (!file_) fail();
+  }
+
+  void write(std::string_view text) {
+    sum_.add(text);
+    if (std::fwrite(text.data(), 1, text.size(), file_.get()) != text.size()) fail();
+  }
+  std::string digits() const { return sum_.digits(); }
+
+  void close() {
+    if (std::fflush(file_.get()) != 0 || fdatasync(fileno(file_.get())) != 0) fail();
+    if (std::fclose(file_.release()) != 0) fail();
+  }
+
+ private:
+  [[noreturn]] static void fail() { throw std::system_error(errno, std::generic_category()); }
+
+  std::unique_ptr<std::FILE, CloseFile> file_;
+  Sha256 sum_;
+};
+
+// What stands between the two; nothing if the text is something else.
+std::optional<std::string_view> between(std::string_view text, std::string_view begin,
+                                        std::string_view end) {
+  if (text.size() < begin.size() + end.size() || !text.starts_with(begin) || !text.ends_with(end))
+    return std::nullopt;
+  return text.substr(begin.size(), text.size() - begin.size() - end.size());
+}
+
+}  // namespace
+
+DatasetText::DatasetText(const fs::path& folder)
+    : path_(folder / dataset_file), file_(path_, std::ios::binary) {
+  if (!file_) {
+    throw Error(
+        "{}: the folder holds no {} that can be read: is it what `groundray generate` made?",
+        folder.string(), dataset_file);
+  }
+  while (const auto line = next_line()) {
+    sum_.add(*line + "\n");
+    if (*line == frames_line) return;
+    const auto shard = between(*line, shard_begin, quote);
+    if (shard) shard_ = parse_shard(*shard);
+    if (!shard || !shard_) header_ += *line + "\n";
+  }
+  throw Error("{}: it lists no frames: it was cut short, or groundray did not write it",
+              path_.string());
+}
+
+std::optional<std::string> DatasetText::next_line() {
+  std::string line;
+  if (!std::getline(file_, line)) {
+    if (file_.bad()) throw Error("{}: cannot be read: check the disk", path_.string());
+    return std::nullopt;
+  }
+  ++line_;
+  return line;
+}
+
+std::optional<std::string> DatasetText::next_entry() {
+  if (!is_in_frames_) return std::nullopt;
+  auto line = next_line();
+  if (line && line->starts_with(item)) {
+    sum_.add(*line + "\n");
+    return line->substr(item.size());
+  }
+  is_in_frames_ = false;
+  if (line) read_end(std::move(*line));
+  return std::nullopt;
+}
+
+void DatasetText::read_end(std::string line) {
+  do {
+    if (const auto digits = between(line, sum_begin, quote)) {
+      // The last line, and a whole one.
+      is_intact_ = *digits == sum_.digits() && !file_.eof() && !next_line();
+      return;
+    }
+    sum_.add(line + "\n");
+    if (!line.starts_with(item)) continue;
+    if (auto file = parse_named_sum(std::string_view(line).substr(item.size())))
+      files_.push_back(std::move(*file));
+  } while (std::getline(file_, line));
+}
+
+std::string first_difference(std::string_view text, std::string_view other) {
+  constexpr std::size_t before = 40, most = 80;  // characters that are shown
+  const auto at = static_cast<std::size_t>(std::ranges::mismatch(text, other).in1 - text.begin());
+  const auto part = [at](std::string_view whole) {
+    const std::size_t line = at == 0 ? 0 : whole.rfind('\n', at - 1) + 1;  // npos + 1 is 0
+    const std::string_view rest = whole.substr(std::max(line, at < before ? 0 : at - before));
+    return rest.substr(0, rest.find('\n')).substr(0, most);
+  };
+  return fmt::format("'{}' instead of '{}'", part(text), part(other));
+}
+
+void write_dataset_text(const fs::path& folder, std::string_view header,
+                        const std::optional<Shard>& shard,
+                        const std::function<std::optional<std::string>()>& next_entry,
+                        const std::vector<NamedSum>& files) {
+  write_whole(folder / dataset_file, [&](const fs::path& aside) {
+    LineSink sink(aside);
+    sink.write(header);
+    if (shard) sink.write(fmt::format("{}{}{}\n", shard_begin, text_of(*shard), quote));
+    sink.write(fmt::format("{}\n", frames_line));
+    while (const auto entry = next_entry()) sink.write(fmt::format("{}{}\n", item, *entry));
+    if (!files.empty()) sink.write(fmt::format("{}\n", files_line));
+    for (const NamedSum& file : files) sink.write(fmt::format("{}{}\n", item, text_of(file)));
+    sink.write(fmt::format("{}{}{}\n", sum_begin, sink.digits(), quote));
+    sink.close();
+  });
+}
+
+}  // namespace groundray

@@ -1,0 +1,42 @@
+#pragma once
+
+#include <cstdint>
+#include <filesystem>
+#include <memory>
+#include <string>
+#include <string_view>
+
+namespace groundray {
+
+/// What tells a file's bytes from all others.
+struct FileSum {
+  std::uint64_t bytes = 0;
+  std::string sha256;  ///< 64 hexadecimal digits, as sha256sum prints them
+  friend bool operator==(const FileSum&, const FileSum&) = default;
+};
+
+/// SHA-256 of bytes that come piece by piece.
+/// @see FIPS 180-4, Secure Hash Standard (2015).
+class Sha256 {
+ public:
+  Sha256();
+  ~Sha256();
+  Sha256(const Sha256&) = delete;
+  Sha256& operator=(const Sha256&) = delete;
+
+  void add(std::string_view bytes);
+  /// Returns the 64 digits of all that was added so far.
+  std::string digits() const;
+
+ private:
+  struct State;
+  std::unique_ptr<State> state_;
+};
+
+/// Returns that of bytes in memory.
+std::string sha256_of(std::string_view bytes);
+
+/// Reads a file through. @throws Error if it cannot be read.
+FileSum sum_file(const std::filesystem::path& path);
+
+}  // namespace groundray

@@ -1,0 +1,28 @@
+#include "apps/groundray/run/file_check.h"
+
+#include <fmt/format.h>
+
+#include <system_error>
+
+#include "core/error.h"
+
+namespace groundray {
+
+std::optional<std::string> fault_of(const std::filesystem::path& file, const FileSum& as_written) {
+  std::error_code fault;
+  if (!std::filesystem::exists(file, fault)) return "missing";
+  if (!std::filesystem::is_regular_file(file, fault)) return "no file any more";
+  if (const auto bytes = std::filesystem::file_size(file, fault);
+      !fault && bytes != as_written.bytes) {
+    return fmt::format("of {} bytes instead of {}: {}", bytes, as_written.bytes,
+                       bytes < as_written.bytes ? "cut short" : "something was added");
+  }
+  try {
+    if (sum_file(file) == as_written) return std::nullopt;
+  } catch (const Error&) {
+    return "not to be read";
+  }
+  return "changed: its SHA-256 is another";
+}
+
+}  // namespace groundray

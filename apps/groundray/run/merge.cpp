@@ -1,0 +1,289 @@
+#include "apps/groundray/run/merge.h"
+
+#include <fmt/format.h>
+#include <tbb/parallel_for.h>
+
+#include <algorithm>
+#include <array>
+#include <cstddef>
+#include <cstdint>
+#include <cstdio>
+#include <fstream>
+#include <memory>
+#include <optional>
+#include <span>
+#include <string>
+#include <string_view>
+#include <system_error>
+#include <utility>
+
+#include "apps/dataset/dataset_summary.h"
+#include "apps/dataset/dataset_text.h"
+#include "apps/groundray/run/file_check.h"
+#include "apps/groundray/run/folder_lock.h"
+#include "apps/groundray/run/journal.h"
+#include "apps/interruption.h"
+#include "core/error.h"
+#include "core/product_io.h"
+#include "core/progress.h"
+
+namespace groundray {
+namespace {
+
+namespace fs = std::filesystem;
+
+// A frame of a run, and the shard that has it.
+struct SharedFrame {
+  std::size_t shard = 0;  // index among the folders
+  std::string text;       // of its entry
+  FrameEntry entry;
+};
+
+// The files dataset.yaml of all shards, read side by side.
+class ShardTexts {
+ public:
+  explicit ShardTexts(const std::vector<fs::path>& folders)
+      : folders_(folders), summary_(read_summary(folders[0])) {
+    for (const fs::path& folder : folders) texts_.push_back(std::make_unique<DatasetText>(folder));
+  }
+
+  const std::string& header() const { return texts_[0]->header(); }
+  const std::vector<NamedSum>& files() const { return texts_[0]->files(); }
+  const DatasetSummary& summary() const { return summary_; }
+
+  // @throws Error unless they are all shards of one run.
+  void check_shards() const {
+    std::vector<std::optional<fs::path>> found;
+    for (std::size_t i = 0; i < texts_.size(); ++i) {
+      const DatasetText& text = *texts_[i];
+      const std::string name = folders_[i].string();
+      if (!text.shard()) throw Error("{}: the dataset is whole already, no shard", name);
+      if (text.header() != header()) {
+        throw Error("{}: it is of another run than {}: {}", name, folders_[0].string(),
+                    first_difference(text.header(), header()));
+      }
+      if (fs::exists(folders_[i] / journal_file)) throw_incomplete(i);
+      found.resize(texts_[0]->shard()->count);
+      if (text.shard()->count != found.size()) {
+        throw Error("{}: it is shard {}, but {} is {}: shards of one cut alone can be joined", name,
+                    text_of(*text.shard()), folders_[0].string(), text_of(*texts_[0]->shard()));
+      }
+      auto& place = found[text.shard()->index - 1];
+      if (place)
+        throw Error("{}: shard {} is there twice: in {} too", name, text_of(*text.shard()),
+                    place->string());
+      place = folders_[i];
+    }
+    const auto missing = std::ranges::find_if(found, [](const auto& place) { return !place; });
+    if (missing == found.end()) return;
+    throw Error("shard {}/{} is missing; make it by `groundray generate --shard`, or name it",
+                missing - found.begin() + 1, found.size());
+  }
+
+  // Returns the next frame; nothing after the last one. @throws Error if none or two shards have
+  // it.
+  std::optional<SharedFrame> next() {
+    std::optional<SharedFrame> frame;
+    std::size_t ended = 0;
+    for (std::size_t i = 0; i < texts_.size(); ++i) {
+      const auto text = texts_[i]->next_entry();
+      if (!text) {
+        ++ended;
+        continue;
+      }
+      auto entry = parse_entry(*text);
+      const bool is_same = entry && entry->sensor == sensor_name() && entry->frame == frame_;
+      if (!is_same) throw_broken(i);
+      if (!entry->is_done) continue;
+      if (frame || entry->files.empty()) throw_broken(i);
+      frame = SharedFrame{i, *text, std::move(*entry)};
+    }
+    if (ended == texts_.size()) {
+      check_ends();
+      return std::nullopt;
+    }
+    if (ended > 0) throw_broken(0);
+    if (!frame) throw_incomplete(owner());
+    to_next_frame();
+    return frame;
+  }
+
+ private:
+  std::string_view sensor_name() const {
+    return sensor_ < summary_.sensors.size() ? summary_.sensors[sensor_].name : std::string_view();
+  }
+  void to_next_frame() {
+    if (++frame_ < summary_.sensors[sensor_].frames) return;
+    ++sensor_;
+    frame_ = 0;
+  }
+
+  // The folder that should have the frame.
+  std::size_t owner() const {
+    const auto it = std::ranges::find_if(texts_, [&](const auto& text) {
+      return text->shard()->has(static_cast<std::uint32_t>(sensor_), frame_,
+                                summary_.sensors[sensor_].frames);
+    });
+    return static_cast<std::size_t>(it - texts_.begin());
+  }
+
+  void check_ends() const {
+    if (sensor_ < summary_.sensors.size()) throw_broken(0);
+    for (std::size_t i = 0; i < texts_.size(); ++i) {
+      const auto same = [](const NamedSum& a, const NamedSum& b) {
+        return a.path == b.path && a.sum == b.sum;
+      };
+      if (!texts_[i]->is_intact() || !std::ranges::equal(texts_[i]->files(), files(), same))
+        throw_broken(i);
+    }
+  }
+
+  [[noreturn]] void throw_incomplete(std::size_t i) const {
+    throw Error("{}: shard {} is not complete; go on with it by `groundray generate --resume`",
+                folders_[i].string(), text_of(*texts_[i]->shard()));
+  }
+  [[noreturn]] void throw_broken(std::size_t i) const {
+    throw Error("{}: changed since it was written; `groundray verify` says more",
+                (folders_[i] / dataset_file).string());
+  }
+
+  const std::vector<fs::path>& folders_;
+  DatasetSummary summary_;
+  std::vector<std::unique_ptr<DatasetText>> texts_;
+  std::size_t sensor_ = 0;  // of the frame that comes next
+  std::int64_t frame_ = 0;
+};
+
+// A file on its way from a shard to the whole.
+struct Copy {
+  fs::path from, to;
+  FileSum sum;
+};
+
+// @throws Error if it is not as its shard says.
+void copy_file(const Copy& copy) {
+  std::ifstream file(copy.from, std::ios::binary);
+  std::vector<char> block(256 << 10);
+  Sha256 sum;
+  write_blocks(copy.to, [&]() -> std::string_view {
+    file.read(block.data(), static_cast<std::streamsize>(block.size()));
+    const std::string_view read(block.data(), static_cast<std::size_t>(file.gcount()));
+    sum.add(read);
+    if (read.empty() && sum.digits() != copy.sum.sha256) {
+      throw Error("{}: missing or changed since it was written; `groundray verify` finds all such",
+                  copy.from.string());
+    }
+    return read;
+  });
+}
+
+void copy_all(std::span<const Copy> copies, FolderUse use) {
+  stop_if_interrupted();
+  tbb::parallel_for(std::size_t{0}, copies.size(), [&](std::size_t i) {
+    const Copy& copy = copies[i];
+    if (use == FolderUse::Resume && !fault_of(copy.to, copy.sum)) return;
+    copy_file(copy);
+  });
+}
+
+void check_out(const fs::path& out, FolderUse use, const std::string& header) {
+  std::error_code fault;
+  fs::create_directories(out, fault);
+  if (fault) {
+    throw Error("{}: cannot make this folder: {}; choose another one with -o", out.string(),
+                fault.message());
+  }
+  if (fs::is_empty(out)) return;
+  if (use == FolderUse::New)
+    throw Error(
+        "{}: the folder is not empty; choose a new one with -o{}", out.string(),
+        fs::exists(out / dataset_file) ? ", or go on with a merge into it by --resume" : "");
+  const DatasetText before(out);
+  if (before.header() != header || before.shard())
+    throw Error("{}: the folder holds another dataset; choose a new one with -o", out.string());
+}
+
+// All of it once, before anything is written: that every frame is there. What is written then says
+// of none that it is done.
+void write_pending(const std::vector<fs::path>& shards, const fs::path& out) {
+  ShardTexts texts(shards);
+  const auto next = [&]() -> std::optional<std::string> {
+    auto frame = texts.next();
+    if (!frame) return std::nullopt;
+    frame->entry.is_done = false;
+    frame->entry.convergence.clear();
+    frame->entry.files.clear();
+    return text_of(frame->entry);
+  };
+  write_dataset_text(out, texts.header(), std::nullopt, next, {});
+}
+
+void write_done(const std::vector<fs::path>& shards, const fs::path& out) {
+  ShardTexts texts(shards);
+  std::vector<NamedSum> files;
+  {
+    ShardTexts ahead(shards);  // what comes after the frames
+    while (ahead.next()) {
+    }
+    files = ahead.files();
+  }
+  const auto next = [&]() -> std::optional<std::string> {
+    auto frame = texts.next();
+    return frame ? std::optional(std::move(frame->text)) : std::nullopt;
+  };
+  write_dataset_text(out, texts.header(), std::nullopt, next, files);
+}
+
+// Returns how many bytes were copied, or found there.
+std::uint64_t copy_shards(const std::vector<fs::path>& shards, const fs::path& out, FolderUse use) {
+  constexpr std::size_t block = 256;  // files at a time
+  ShardTexts texts(shards);
+  std::vector<Copy> copies;
+  std::uint64_t bytes = 0, frames = 0, total = 0;
+  for (const DatasetSummary::Sensor& sensor : texts.summary().sensors)
+    total += static_cast<std::uint64_t>(sensor.frames);
+  Progress progress(stderr, "frames joined", total);
+  const auto add = [&](std::size_t shard, const std::string& path, const FileSum& sum) {
+    copies.push_back({shards[shard] / path, out / path, sum});
+    bytes += sum.bytes;
+    if (copies.size() < block) return;
+    copy_all(copies, use);
+    copies.clear();
+    progress.update(frames);
+  };
+  for (const DatasetSummary::Sensor& sensor : texts.summary().sensors)
+    fs::create_directories(out / sensor.kind / sensor.name);
+  for (const char* name : {"poses", "calibration"}) fs::create_directories(out / name);
+  while (const auto frame = texts.next()) {
+    ++frames;
+    const auto stem = texts.summary().stem_of(frame->entry);
+    for (const ProductSum& file : frame->entry.files)
+      add(frame->shard, *stem + file.suffix, file.sum);
+  }
+  for (const NamedSum& file : texts.files()) add(0, file.path, file.sum);
+  copy_all(copies, use);
+  return bytes;
+}
+
+}  // namespace
+
+void merge(const std::vector<fs::path>& shards, const fs::path& out, FolderUse use) {
+  std::vector<std::unique_ptr<FolderLock>> locks;
+  for (const fs::path& shard : shards)
+    locks.push_back(std::make_unique<FolderLock>(shard, FolderLock::Use::Read));
+  ShardTexts texts(shards);
+  texts.check_shards();
+  std::uint64_t frames = 0;
+  while (texts.next()) ++frames;
+  check_out(out, use, texts.header());
+  const FolderLock lock(out, FolderLock::Use::Write);
+  write_pending(shards, out);
+  const std::uint64_t bytes = copy_shards(shards, out, use);
+  write_done(shards, out);
+  std::error_code ignored;
+  fs::remove(out / journal_file, ignored);
+  fmt::print("{} frames of {} shards, {:.1f} MiB\ndataset: {}\n", frames, shards.size(),
+             static_cast<double>(bytes) / (1 << 20), out.string());
+}
+
+}  // namespace groundray

@@ -1,0 +1,94 @@
+#include "apps/groundray/run/run_commands.h"
+
+#include <cstdint>
+#include <filesystem>
+#include <optional>
+#include <string>
+#include <vector>
+
+#include "apps/groundray/generate.h"
+#include "apps/groundray/run/merge.h"
+#include "apps/groundray/run/verify.h"
+
+namespace groundray {
+namespace {
+
+namespace fs = std::filesystem;
+
+// What CLI11 says of a text that is no shard.
+std::string check_shard(const std::string& text) {
+  return parse_shard(text) ? "" : "'" + text + "' must be one of 1/N to N/N, such as 2/8";
+}
+
+}  // namespace
+
+struct RunCommands::Options {
+  CLI::App *generate = nullptr, *verify = nullptr, *merge = nullptr;
+  fs::path scene, out;
+  bool resume = false;
+  std::optional<std::uint64_t> seed;
+  std::string shard, log;
+  std::vector<fs::path> datasets;
+
+  void add_generate(CLI::App& app) {
+    generate = app.add_subcommand(
+        "generate",
+        "Run a scene and write its dataset: scans, images, poses, calibration, pictures");
+    generate->add_option("SCENE", scene, "Scene file (YAML, see docs/scene.md)")->required();
+    generate->add_option("-o,--output", out, "Folder for the dataset; made if missing")->required();
+    generate->add_option("--seed", seed,
+                         "Instead of the scene's own: another draw of noise and scattered things");
+    generate->add_flag(
+        "--resume", resume,
+        "Go on in a folder where the same run was cut off: check all that is there, make what is "
+        "missing or was changed; begins anew where nothing is there");
+    generate
+        ->add_option("--shard", shard,
+                     "I/N, I from 1 to N: make the I-th of N shares of the frames, in a folder of "
+                     "its own; `groundray merge` joins them")
+        ->check(check_shard);
+    generate->add_option("--log-json", log,
+                         "File to add a line of JSON to for each frame, or - for standard output "
+                         "(docs/runs.md)");
+  }
+
+  void add_verify(CLI::App& app) {
+    verify = app.add_subcommand(
+        "verify", "Check every file of datasets against the checksums in their dataset.yaml");
+    verify->add_option("DATASET", datasets, "Folders that `generate` or `merge` wrote")->required();
+  }
+
+  void add_merge(CLI::App& app) {
+    merge = app.add_subcommand(
+        "merge", "Join the shards of a run to the dataset that one run would have made");
+    merge->add_option("SHARD", datasets, "Folders of all shards")->required();
+    merge->add_option("-o,--output", out, "Folder for the dataset; made if missing")->required();
+    merge->add_flag("--resume", resume, "Go on in a folder where a merge was cut off");
+  }
+};
+
+RunCommands::RunCommands(CLI::App& app) : options_(std::make_unique<Options>()) {
+  options_->add_generate(app);
+  options_->add_verify(app);
+  options_->add_merge(app);
+}
+
+RunCommands::~RunCommands() = default;
+
+bool RunCommands::is_asked_for() const {
+  return options_->generate->parsed() || options_->verify->parsed() || options_->merge->parsed();
+}
+
+void RunCommands::run() const {
+  const Options& asked = *options_;
+  const FolderUse use = asked.resume ? FolderUse::Resume : FolderUse::New;
+  if (asked.verify->parsed()) return verify(asked.datasets);
+  if (asked.merge->parsed()) return merge(asked.datasets, asked.out, use);
+  generate(asked.scene, asked.out,
+           {.seed = asked.seed ? std::optional(Seed{*asked.seed}) : std::nullopt,
+            .use = use,
+            .shard = parse_shard(asked.shard),
+            .log = asked.log});
+}
+
+}  // namespace groundray

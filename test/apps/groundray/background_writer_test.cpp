@@ -1,0 +1,73 @@
+#include "apps/groundray/run/background_writer.h"
+
+#include <gtest/gtest.h>
+
+#include <algorithm>
+#include <atomic>
+#include <chrono>
+#include <memory>
+#include <stdexcept>
+#include <thread>
+#include <utility>
+#include <vector>
+
+namespace groundray {
+namespace {
+
+using namespace std::chrono_literals;
+
+TEST(BackgroundWriter, DoesOneJobAfterTheOther) {
+  std::vector<int> done;
+  std::atomic<int> at_once = 0, most_at_once = 0;
+  BackgroundWriter writer;
+  for (int i = 0; i < 50; ++i) {
+    writer.begin([&, i] {
+      most_at_once = std::max(most_at_once.load(), ++at_once);
+      done.push_back(i);
+      --at_once;
+    });
+  }
+  writer.wait();
+  ASSERT_EQ(done.size(), 50u);
+  for (int i = 0; i < 50; ++i) EXPECT_EQ(done[static_cast<std::size_t>(i)], i);
+  EXPECT_EQ(most_at_once, 1);
+}
+
+// The caller goes on while a job is under way: else neither would ever end.
+TEST(BackgroundWriter, LetsItsCallerGoOn) {
+  std::atomic<bool> has_gone_on = false;
+  BackgroundWriter writer;
+  writer.begin([&] {
+    while (!has_gone_on) std::this_thread::yield();
+  });
+  has_gone_on = true;
+  writer.wait();
+}
+
+TEST(BackgroundWriter, TellsOnceWhatAJobThrew) {
+  BackgroundWriter writer;
+  bool is_begun = false;
+  writer.begin([] { throw std::runtime_error("full"); });
+  EXPECT_THROW(writer.begin([&] { is_begun = true; }), std::runtime_error);
+  writer.wait();
+  EXPECT_FALSE(is_begun);
+  writer.begin([] { throw std::runtime_error("full"); });
+  writer.settle();
+  writer.wait();
+}
+
+TEST(BackgroundWriter, EndsItsJobBeforeItGoes) {
+  bool is_done = false;
+  {
+    BackgroundWriter writer;
+    auto owned = std::make_unique<int>(3);  // jobs need not be copied
+    writer.begin([&is_done, owned = std::move(owned)] {
+      std::this_thread::sleep_for(20ms);
+      is_done = *owned == 3;
+    });
+  }
+  EXPECT_TRUE(is_done);
+}
+
+}  // namespace
+}  // namespace groundray

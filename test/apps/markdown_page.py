@@ -1,0 +1,119 @@
+"""Pages of Markdown as the tests of docs see them: fenced blocks, headings, links."""
+
+import re
+import subprocess
+from dataclasses import dataclass
+from pathlib import Path
+
+ROOT = Path(__file__).resolve().parents[2]
+FENCE = re.compile(r"^(`{3,})(.*)$")
+HEADING = re.compile(r"^(#{1,6})\s+(.+?)\s*#*$")
+CODE_SPAN = re.compile(r"(`+)(?!`).*?(?<!`)\1(?!`)")
+# [text](target) and ![text](target "title"); the text may hold an image or code in brackets.
+LINK = re.compile(
+    r"\[(?:[^\[\]]|\[[^\[\]]*\])*\]\(\s*<?([^\s()<>]*(?:\([^\s()]*\)[^\s()<>]*)*)>?[^()]*\)"
+)
+
+
+@dataclass(frozen=True)
+class Block:
+    """What stands between two fences."""
+
+    language: str
+    words: str  # what follows the language on the opening fence
+    text: str
+    line: int  # of the opening fence, from 1
+    section: str  # the heading of level 2 above it, or ""
+
+
+@dataclass(frozen=True)
+class Link:
+    target: str
+    line: int
+
+
+class PageError(Exception):
+    """Says what is wrong in which line."""
+
+
+class Page:
+    """One file of Markdown."""
+
+    def __init__(self, path: Path):
+        self.path = path
+        self.blocks: list[Block] = []
+        self.links: list[Link] = []
+        self.headings: list[str] = []
+        self.prose: list[str] = []  # all lines, blank where there is code
+        self._read(path.read_text(encoding="utf-8").splitlines())
+
+    @property
+    def anchors(self) -> set[str]:
+        """The names by which headings are linked to, as GitHub makes them."""
+        found: set[str] = set()
+        for heading in self.headings:
+            name = base = anchor_of(heading)
+            count = 0
+            while name in found:
+                count += 1
+                name = f"{base}-{count}"
+            found.add(name)
+        return found
+
+    def _read(self, lines: list[str]) -> None:
+        section = ""
+        number = 0
+        while number < len(lines):
+            line = lines[number]
+            if fence := FENCE.match(line):
+                end = self._end_of(fence[1], lines, number)
+                language, _, words = fence[2].strip().partition(" ")
+                text = "\n".join(lines[number + 1 : end]) + "\n"
+                self.blocks.append(Block(language, words.strip(), text, number + 1, section))
+                self.prose += [""] * (end + 1 - number)
+                number = end + 1
+                continue
+            if heading := HEADING.match(line):
+                self.headings.append(heading[2])
+                section = heading[2] if len(heading[1]) == 2 else section
+            self.prose.append("" if line.startswith("    ") else line)
+            number += 1
+        self._find_links("\n".join(self.prose))
+
+    def _end_of(self, fence: str, lines: list[str], begin: int) -> int:
+        for number in range(begin + 1, len(lines)):
+            if lines[number].rstrip() == fence:
+                return number
+        raise PageError(f"{self.path}:{begin + 1}: this block has no end")
+
+    def _find_links(self, prose: str) -> None:
+        plain = CODE_SPAN.sub(lambda code: "x" * len(code[0]), prose)
+        for link in LINK.finditer(plain):
+            line = plain.count("\n", 0, link.start()) + 1
+            self.links.append(Link(link[1], line))
+
+
+def anchor_of(heading: str) -> str:
+    """Returns how GitHub names a heading: lower case, without punctuation, dashes for blanks."""
+    text = re.sub(r"!?\[([^\]]*)\]\([^)]*\)", r"\1", heading).replace("`", "")
+    return re.sub(r"[^\w\- ]", "", text.lower()).replace(" ", "-")
+
+
+def known_files() -> list[Path]:
+    """All files of the checkout that git has or would take."""
+    listed = subprocess.run(
+        ["git", "ls-files", "--cached", "--others", "--exclude-standard"],
+        cwd=ROOT,
+        capture_output=True,
+        text=True,
+        check=True,
+    )
+    return sorted({ROOT / name for name in listed.stdout.splitlines() if (ROOT / name).is_file()})
+
+
+FILES = known_files()
+PAGES = [path for path in FILES if path.suffix == ".md"]
+
+
+def name_of(path: Path) -> str:
+    return str(path.relative_to(ROOT))

@@ -1,0 +1,298 @@
+"""Runs that a signal, a full disk or a changed file cuts off go on to the bytes of one run."""
+
+import hashlib
+import os
+import pty
+import random
+import re
+import resource
+import shutil
+import signal
+import subprocess
+import time
+
+import pytest
+from dataset_runs import SCENE, command, files, generate, groundray, make_whole
+
+IS_FULL = os.environ.get("GROUNDRAY_PROOF") == "full"
+
+
+@pytest.fixture(scope="module")
+def whole(tmp_path_factory):
+    return make_whole(tmp_path_factory.mktemp("whole"))
+
+
+def resumed(folder, *more):
+    result = generate(folder, "--resume", *more)
+    assert result.returncode == 0, result.stderr
+    return result
+
+
+def refused(result, *words):
+    assert result.returncode == 1, result
+    assert result.stderr.splitlines()[-1].startswith("groundray: "), result.stderr
+    for word in words:
+        assert word in result.stderr, result.stderr
+
+
+def seconds_to_make(folder):
+    begin = time.monotonic()
+    make_whole(folder)
+    return time.monotonic() - begin
+
+
+def kill_after(arguments, delay_s):
+    run = subprocess.Popen(arguments, stdout=subprocess.DEVNULL, stderr=subprocess.DEVNULL)
+    time.sleep(delay_s)
+    run.send_signal(signal.SIGKILL)
+    run.wait()
+
+
+def test_a_run_killed_at_any_moment_goes_on_to_the_same_bytes(whole, tmp_path):
+    """A third of the runs are killed once more while they go on."""
+    (tmp_path / "timed").mkdir()
+    lasts_s = seconds_to_make(tmp_path / "timed")
+    moments = random.Random(11)
+    for k in range(50 if IS_FULL else 8):
+        folder = tmp_path / f"killed_{k}"
+        folder.mkdir()
+        kill_after(command(folder), moments.uniform(0, lasts_s))
+        if k % 3 == 0:
+            kill_after(command(folder, "--resume"), moments.uniform(0, lasts_s))
+        resumed(folder)
+        assert files(folder / "out") == files(whole), k
+        shutil.rmtree(folder)
+
+
+def as_cut_off(whole, out, frames):
+    """The folder as a run leaves it that is killed after so many frames."""
+    shutil.copytree(whole, out)
+    record = (out / "dataset.yaml").read_text()
+    head, rest = record.split("frames:\n")
+    entries = [line[4:] for line in rest.split("files:\n")[0].splitlines()]
+    pending = [re.sub(r"state: done.*", "state: pending}", entry) for entry in entries]
+    text = head + "frames:\n" + "".join(f"  - {entry}\n" for entry in pending)
+    digits = hashlib.sha256(text.encode()).hexdigest()
+    (out / "dataset.yaml").write_text(f'{text}sha256_above: "{digits}"\n')
+    lines = [f"{hashlib.sha256(e.encode()).hexdigest()[:16]} {e}\n" for e in entries[:frames]]
+    (out / "dataset.journal").write_text("".join(lines))
+    for entry in entries[frames:]:
+        sensor, number = re.match(r'\{sensor: "(\w+)", frame: (\d+)', entry).groups()
+        for file in out.glob(f"*/{sensor}/{int(number):06}*"):
+            file.unlink()
+    return lines
+
+
+def test_leftovers_of_a_killed_run_go(whole, tmp_path):
+    out = tmp_path / "out"
+    as_cut_off(whole, out, 4)
+    for name in (
+        "dataset.yaml",
+        "dataset.journal",
+        "lidar/top/000002.ply",
+        "lidar/front/000001_no_returns.ply",
+        "camera/eye/000000_top.npy",
+        "poses/eye.tum",
+    ):
+        (out / f"{name}.part").write_text("half")
+    assert "4 scans were there already" in resumed(tmp_path).stdout
+    assert files(out) == files(whole)
+
+
+@pytest.mark.parametrize("fault", ["cut", "flipped", "garbage", "empty", "no newline", "twice"])
+def test_a_torn_journal_costs_its_torn_lines_alone(whole, tmp_path, fault):
+    out = tmp_path / "out"
+    lines = as_cut_off(whole, out, 5)
+    text = "".join(lines).encode()
+    torn, kept = {
+        "cut": (text[:-30], 4),
+        "flipped": (text.replace(b"frame: 1,", b"frame: 3,", 1), 4),
+        "garbage": (text + b"\0" * 4096 + b"\xff", 5),
+        "empty": (b"", 0),
+        "no newline": (text[:-1], 5),
+        "twice": (text + text, 5),
+    }[fault]
+    (out / "dataset.journal").write_bytes(torn)
+    result = resumed(tmp_path)
+    assert (f"{kept} scans were there already" in result.stdout) == (kept > 0), result.stdout
+    assert ("torn" in result.stderr) == (fault in ("cut", "flipped", "garbage")), result.stderr
+    assert files(out) == files(whole)
+
+
+def test_what_was_changed_is_told_and_made_again(whole, tmp_path):
+    out = tmp_path / "out"
+    shutil.copytree(whole, out)
+    scan = out / "lidar/top/000001.ply"
+    data = bytearray(scan.read_bytes())
+    data[-5] ^= 4
+    scan.write_bytes(data)
+    (out / "lidar/front/000000_no_returns.ply").unlink()
+    image = out / "camera/eye/000002.exr"
+    image_bytes = image.stat().st_size
+    image.write_bytes(image.read_bytes()[:-1])
+    with (out / "lidar/top/000000_preview.png").open("ab") as file:
+        file.write(b"more")
+    (out / "poses/top.tum").unlink()
+    (out / "calibration/eye.yaml").write_text("mine")
+    result = resumed(tmp_path)
+    for words in (
+        "lidar/top/000001.ply: changed: its SHA-256 is another; made again",
+        "lidar/front/000000_no_returns.ply: missing; made again",
+        f"of {image_bytes - 1} bytes instead of {image_bytes}: cut short; made again",
+        "lidar/top/000000_preview.png: of",
+        "poses/top.tum: missing; it is written again",
+        "calibration/eye.yaml: of 4 bytes instead of",
+    ):
+        assert words in result.stderr, result.stderr
+    assert "3 scans were there already" in result.stdout
+    assert "2 images were there already" in result.stdout
+    assert files(out) == files(whole)
+
+
+def test_a_changed_record_is_mended(whole, tmp_path):
+    """What a line says is held against the frame, and what is no line of one is left out."""
+    out = tmp_path / "out"
+    shutil.copytree(whole, out)
+    record = (out / "dataset.yaml").read_text()
+    for old, new in (
+        ('"top", frame: 1, stamp_s: 0.1', '"top", frame: 1, stamp_s: 0.2'),
+        ('"front", frame: 2, stamp_s', '"front", frame:  2, stamp_s'),
+        ('{sensor: "eye", frame: 0', '{sensor: "../eye", frame: 0'),
+    ):
+        assert old in record
+        record = record.replace(old, new)
+    (out / "dataset.yaml").write_text(record)
+    result = resumed(tmp_path)
+    assert result.stderr.count("not as it was written; its frame is made again") == 2
+    assert files(out) == files(whole)
+
+
+def test_a_damaged_head_of_the_record_is_shown_and_may_be_put_right(whole, tmp_path):
+    out = tmp_path / "out"
+    shutil.copytree(whole, out)
+    record = (out / "dataset.yaml").read_bytes()
+    (out / "dataset.yaml").write_bytes(record.replace(b"seed: 7", b"seed: 5", 1))
+    refused(generate(tmp_path, "--resume"), "another scene", "'seed: 5' instead of 'seed: 7'")
+    (out / "dataset.yaml").write_bytes(record)
+    assert "6 scans were there already" in resumed(tmp_path).stdout
+    assert files(out) == files(whole)
+
+
+def test_resuming_begins_where_nothing_is(whole, tmp_path):
+    resumed(tmp_path)
+    assert files(tmp_path / "out") == files(whole)
+    again = resumed(tmp_path)
+    assert "6 scans were there already" in again.stdout
+    assert files(tmp_path / "out") == files(whole)
+
+
+def test_only_the_same_run_goes_on(whole, tmp_path):
+    shutil.copytree(whole, tmp_path / "out")
+    refused(generate(tmp_path), "holds a dataset of this run already", "add --resume")
+    refused(generate(tmp_path, "--resume", "--seed", "8"), "another scene")
+    refused(generate(tmp_path, "--resume", "--shard", "1/2"), "the whole", "shard 1/2")
+    (tmp_path / "mine").mkdir()
+    (tmp_path / "mine/notes.txt").write_text("keep")
+    refused(generate(tmp_path, "--resume", out="mine"), "not empty")
+    assert files(tmp_path / "out") == files(whole)
+
+
+def test_one_run_at_a_time_has_a_folder(tmp_path):
+    long = SCENE.replace("duration_s: 0.3", "duration_s: 1.2")
+    first = subprocess.Popen(
+        command(tmp_path, scene=long), stdout=subprocess.DEVNULL, stderr=subprocess.DEVNULL
+    )
+    while not (tmp_path / "out/lidar/top/000000.ply").exists() and first.poll() is None:
+        time.sleep(0.01)
+    refused(generate(tmp_path, "--resume", scene=long), "another run is at work in this folder")
+    first.send_signal(signal.SIGKILL)
+    first.wait()
+    assert generate(tmp_path, "--resume", scene=long).returncode == 0
+
+
+def test_an_interrupted_run_goes_on_to_the_same_bytes(whole, tmp_path):
+    run = subprocess.Popen(command(tmp_path), stdout=subprocess.DEVNULL, stderr=subprocess.PIPE)
+    while not (tmp_path / "out/lidar/top/000001.ply").exists() and run.poll() is None:
+        time.sleep(0.002)
+    run.send_signal(signal.SIGINT)
+    said = run.communicate(timeout=60)[1].decode()
+    assert run.returncode == 130, said
+    assert "goes on with --resume" in said
+    assert not list((tmp_path / "out").rglob("*.part"))
+    assert not (tmp_path / "out/dataset.journal").exists()
+    incomplete = groundray("verify", tmp_path / "out")
+    assert incomplete.returncode == 1
+    assert re.search(r"incomplete: \d of 9 frames are there", incomplete.stdout)
+    resumed(tmp_path)
+    assert files(tmp_path / "out") == files(whole)
+
+
+@pytest.mark.parametrize("limit_bytes", [3_000, 100_000, 500_000])
+def test_a_run_that_may_write_no_more_goes_on_to_the_same_bytes(whole, tmp_path, limit_bytes):
+    """A limit on file size makes writes fail, as a full disk does."""
+    limits = (limit_bytes, limit_bytes)
+    result = generate(
+        tmp_path, preexec_fn=lambda: resource.setrlimit(resource.RLIMIT_FSIZE, limits)
+    )
+    refused(result, "cannot be written", "File too large")
+    assert not list((tmp_path / "out").rglob("*.part"))
+    resumed(tmp_path)
+    assert files(tmp_path / "out") == files(whole)
+
+
+@pytest.mark.skipif(os.geteuid() != 0, reason="mounting a small disk needs root")
+def test_a_run_on_a_full_disk_goes_on_to_the_same_bytes_once_there_is_room(whole, tmp_path):
+    disk = tmp_path / "disk"
+    disk.mkdir()
+    mount = ["mount", "-t", "tmpfs", "-o", "size=4k", "tmpfs", disk]
+    if subprocess.run(mount, capture_output=True, check=False).returncode != 0:
+        pytest.skip("mounting a small disk is not permitted here")
+    try:
+        total = sum(len(data) for data in files(whole).values())
+        sizes = random.Random(3)
+        rooms = [8192, *sorted(sizes.randrange(16384, total) for _ in range(12 if IS_FULL else 4))]
+        for room in rooms:
+            subprocess.run(["mount", "-o", f"remount,size={room}", disk], check=True)
+            refused(generate(tmp_path, "--resume", out="disk/out"), "No space left on device")
+            assert not list(disk.rglob("*.part"))
+        subprocess.run(["mount", "-o", "remount,size=64m", disk], check=True)
+        assert generate(tmp_path, "--resume", out="disk/out").returncode == 0
+        assert files(disk / "out") == files(whole)
+    finally:
+        subprocess.run(["umount", disk], check=True)
+
+
+def peak_kib(arguments):
+    run = subprocess.Popen(arguments, stdout=subprocess.DEVNULL, stderr=subprocess.DEVNULL)
+    _, status, usage = os.wait4(run.pid, 0)
+    run.returncode = os.waitstatus_to_exitcode(status)
+    assert run.returncode == 0
+    return usage.ru_maxrss
+
+
+def test_memory_does_not_grow_with_the_number_of_frames(tmp_path):
+    """Ten times the frames; a scan in memory, before and while it is written, takes 10 MiB."""
+    peaks = []
+    frames = (10, 100) if IS_FULL else (5, 20)
+    for count in frames:
+        (tmp_path / str(count)).mkdir()
+        scene = SCENE.split("  - {name: front")[0].replace("0.3", f"{count / 10 + 0.05}")
+        scene = scene.replace("speed_m_s: 8", "speed_m_s: 1")
+        peaks.append(peak_kib(command(tmp_path / str(count), scene=scene)))
+    assert peaks[1] - peaks[0] < 10 * 1024, peaks
+
+
+def test_progress_tells_rate_and_time_left_on_a_terminal(tmp_path):
+    master, slave = pty.openpty()
+    run = subprocess.Popen(command(tmp_path), stdout=subprocess.DEVNULL, stderr=slave)
+    os.close(slave)
+    said = b""
+    try:
+        while part := os.read(master, 4096):
+            said += part
+    except OSError:
+        pass  # the terminal goes with the run
+    os.close(master)
+    assert run.wait() == 0
+    assert re.search(rb"\rframes \d/9, [\d.e-]+/s, [\d.]+ s left", said), said
+    assert re.search(rb"\rframes 9/9 in [\d.]+ s *\r?\n$", said), said

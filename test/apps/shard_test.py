@@ -1,0 +1,149 @@
+"""Shares of a run, made one by one, and what is joined from them."""
+
+import shutil
+import signal
+import subprocess
+import time
+
+import pytest
+import yaml
+from dataset_runs import PROGRAM, files, generate, groundray, make_whole
+
+
+@pytest.fixture(scope="module")
+def whole(tmp_path_factory):
+    return make_whole(tmp_path_factory.mktemp("whole"))
+
+
+def make_shards(folder, count, *more):
+    shards = []
+    for k in range(1, count + 1):
+        result = generate(folder, "--shard", f"{k}/{count}", *more, out=f"{k}_of_{count}")
+        assert result.returncode == 0, result.stderr
+        shards.append(folder / f"{k}_of_{count}")
+    return shards
+
+
+@pytest.fixture(scope="module")
+def shards(tmp_path_factory):
+    return make_shards(tmp_path_factory.mktemp("shards"), 3)
+
+
+def merge(out, *shards):
+    return groundray("merge", *shards, "-o", out)
+
+
+def refused(result, *words):
+    assert result.returncode == 1, result
+    for word in words:
+        assert word in result.stderr, result.stderr
+
+
+def done_in(dataset):
+    record = yaml.safe_load((dataset / "dataset.yaml").read_text())
+    return {(f["sensor"], f["frame"]) for f in record["frames"] if f["state"] == "done"}
+
+
+def test_shards_have_each_frame_once_and_join_to_the_whole(whole, shards, tmp_path):
+    done = [done_in(shard) for shard in shards]
+    assert [len(part) for part in done] == [3, 3, 3]
+    assert set.union(*done) == done_in(whole)
+    result = merge(tmp_path / "joined", shards[2], shards[0], shards[1])
+    assert result.returncode == 0, result.stderr
+    assert "9 frames of 3 shards" in result.stdout
+    assert files(tmp_path / "joined") == files(whole)
+    assert groundray("verify", *shards, tmp_path / "joined").returncode == 0
+    assert "shard     2/3" in groundray("info", shards[1]).stdout
+
+
+def test_a_sensor_with_fewer_frames_than_shards_joins_too(whole, tmp_path):
+    """Images show echoes of scans that other shards have."""
+    parts = make_shards(tmp_path, 5)
+    sizes = sorted(len(done_in(part)) for part in parts)
+    assert sum(sizes) == 9
+    assert sizes[-1] - sizes[0] <= 1
+    assert merge(tmp_path / "joined", *parts).returncode == 0
+    assert files(tmp_path / "joined") == files(whole)
+
+
+def test_a_shard_is_resumed_and_no_other(shards, tmp_path):
+    part = tmp_path / "1_of_3"
+    shutil.copytree(shards[0], part)
+    (part / "camera/eye/000000.exr").unlink()
+    again = generate(tmp_path, "--shard", "1/3", "--resume", out="1_of_3")
+    assert again.returncode == 0, again.stderr
+    assert "000000.exr: missing; made again" in again.stderr
+    assert files(part) == files(shards[0])
+    other = generate(tmp_path, "--shard", "2/3", "--resume", out="1_of_3")
+    refused(other, "shard 1/3", "shard 2/3", "a folder of its own")
+    refused(generate(tmp_path, "--resume", out="1_of_3"), "shard 1/3", "the whole")
+
+
+@pytest.mark.parametrize("text", ["0/3", "4/3", "3", "1/0", "a/b", "1/3/2", "-1/3", "1/ 3", ""])
+def test_a_share_that_is_none_is_wrong_usage(tmp_path, text):
+    result = generate(tmp_path, "--shard", text)
+    assert result.returncode == 2
+    assert not (tmp_path / "out").exists()
+
+
+def test_shards_that_do_not_belong_together_are_not_joined(whole, shards, tmp_path):
+    out = tmp_path / "joined"
+    assert generate(tmp_path, "--shard", "3/3", "--seed", "8", out="seed").returncode == 0
+    assert generate(tmp_path, "--shard", "1/2", out="half").returncode == 0
+    refused(merge(out, *shards[:2], tmp_path / "seed"), "another run", "'seed: 8'", "'seed: 7'")
+    refused(merge(out, *shards[:2], tmp_path / "half"), "shard 1/2", "1/3")
+    refused(merge(out, *shards[:2]), "shard 3/3 is missing")
+    refused(merge(out, *shards, shards[1]), "shard 2/3 is there twice")
+    refused(merge(out, *shards, whole), "whole already")
+    refused(merge(out, *shards[:2], tmp_path / "none"), "dataset.yaml")
+    assert not out.exists()
+    shutil.copytree(whole, out)
+    refused(merge(out, *shards), "not empty")
+    assert files(out) == files(whole)
+
+
+def test_a_shard_that_is_not_complete_is_not_joined(shards, tmp_path):
+    part = tmp_path / "part"
+    shutil.copytree(shards[1], part)
+    (part / "dataset.journal").write_text("")
+    refused(merge(tmp_path / "joined", shards[0], part, shards[2]), "shard 2/3 is not complete")
+    (part / "dataset.journal").unlink()
+    text = (part / "dataset.yaml").read_text()
+    (part / "dataset.yaml").write_text(text.replace("state: done", "state: pending", 1))
+    refused(merge(tmp_path / "joined", shards[0], part, shards[2]), "changed since it was written")
+    assert not (tmp_path / "joined").exists()
+
+
+@pytest.mark.parametrize("fault", ["flipped", "missing", "short"])
+def test_a_file_that_has_changed_is_not_joined(whole, shards, tmp_path, fault):
+    part = tmp_path / "part"
+    shutil.copytree(shards[1], part)
+    file = part / "lidar/front/000001.ply"
+    data = bytearray(file.read_bytes())
+    data[len(data) // 2] ^= 1
+    file.write_bytes(data if fault == "flipped" else data[:-7])
+    if fault == "missing":
+        file.unlink()
+    joined = tmp_path / "joined"
+    result = merge(joined, shards[0], part, shards[2])
+    refused(result, "lidar/front/000001.ply: missing or changed", "groundray verify")
+    assert not list(joined.rglob("*.part"))
+    assert not done_in(joined)
+    again = groundray("merge", *shards, "-o", joined, "--resume")
+    assert again.returncode == 0, again.stderr
+    assert files(joined) == files(whole)
+
+
+def test_a_merge_that_was_killed_goes_on(whole, shards, tmp_path):
+    joined = tmp_path / "joined"
+    run = subprocess.Popen(
+        [PROGRAM, "merge", *shards, "-o", joined],
+        stdout=subprocess.DEVNULL, stderr=subprocess.DEVNULL,
+    )  # fmt: skip
+    while not list(joined.glob("lidar/top/*.ply")) and run.poll() is None:
+        time.sleep(0.0005)
+    run.send_signal(signal.SIGKILL)
+    run.wait()
+    again = groundray("merge", *shards, "-o", joined, "--resume")
+    assert again.returncode == 0, again.stderr
+    assert files(joined) == files(whole)
