@@ -2,10 +2,7 @@
 
 #include <fmt/format.h>
 
-#include <algorithm>
 #include <array>
-#include <fstream>
-#include <map>
 #include <string>
 #include <utility>
 #include <vector>
@@ -14,7 +11,9 @@
 #include "apps/golden/compare/image_comparison.h"
 #include "apps/golden/compare/mesh_comparison.h"
 #include "apps/golden/compare/scan_comparison.h"
+#include "apps/golden/compare/subject.h"
 #include "apps/scan/scan_flags.h"
+#include "apps/scan/word_option.h"
 #include "core/error.h"
 
 namespace groundray::golden {
@@ -22,29 +21,18 @@ namespace {
 
 namespace fs = std::filesystem;
 
-bool has_faces(const fs::path& ply) {
-  std::ifstream file(ply, std::ios::binary);
-  for (std::string line; std::getline(file, line) && !line.starts_with("end_header");) {
-    if (line.starts_with("element face") && !line.starts_with("element face 0")) return true;
-  }
-  return false;
-}
-
 struct ImageFlags {
   PngMeaning png = PngMeaning::Picture;
   double depth_unit_m = 1;
   std::vector<std::string> channels;
 
   void add(CLI::App* group, const std::string& prefix) {
-    const std::map<std::string, PngMeaning> meanings{
-        {"picture", PngMeaning::Picture},
-        {"kitti_depth", PngMeaning::KittiDepth},
-        {"millimetre_depth", PngMeaning::MillimetreDepth},
-        {"kitti_flow", PngMeaning::KittiFlow},
-        {"label", PngMeaning::Label}};
-    group->add_option("--" + prefix + "png", png, "What the numbers of a PNG are")
-        ->transform(CLI::CheckedTransformer(meanings))
-        ->option_text("picture|kitti_depth|millimetre_depth|kitti_flow|label");
+    add_words(group, "--" + prefix + "png", png, "What the numbers of a PNG are",
+              Words<PngMeaning>{{"picture", PngMeaning::Picture},
+                                {"kitti_depth", PngMeaning::KittiDepth},
+                                {"millimetre_depth", PngMeaning::MillimetreDepth},
+                                {"kitti_flow", PngMeaning::KittiFlow},
+                                {"label", PngMeaning::Label}});
     group->add_option("--" + prefix + "depth-unit-m", depth_unit_m, "Unit of depths, in metres")
         ->check(CLI::PositiveNumber);
     group
@@ -72,46 +60,6 @@ void add_dem_flags(CLI::App* group, const std::string& prefix, DemOptions& optio
 
 }  // namespace
 
-namespace {
-
-/// Nothing if the name does not tell.
-std::optional<Subject> told_subject_of(const fs::path& file) {
-  std::string ending = file.extension().string();
-  std::ranges::transform(ending, ending.begin(),
-                         [](unsigned char c) { return static_cast<char>(std::tolower(c)); });
-  const auto is_one_of = [&](std::initializer_list<std::string_view> endings) {
-    return std::ranges::find(endings, ending) != endings.end();
-  };
-  if (ending == ".ply") return has_faces(file) ? Subject::Mesh : Subject::Scan;
-  if (is_one_of({".pcd", ".npy", ".npz", ".bin", ".las", ".laz", ".e57"})) return Subject::Scan;
-  if (is_one_of({".exr", ".png", ".hdr", ".jpg", ".jpeg", ".flo", ".pfm"})) return Subject::Image;
-  if (is_one_of({".obj", ".glb", ".gltf", ".stl"})) return Subject::Mesh;
-  if (is_one_of({".tif", ".tiff", ".asc", ".hgt", ".vrt", ".img", ".nc", ".dem"}))
-    return Subject::Dem;
-  return std::nullopt;
-}
-
-std::string_view name_of(Subject subject) {
-  static constexpr std::array<std::string_view, 4> names{"a scan", "an image", "a DEM", "a mesh"};
-  return names[static_cast<std::size_t>(subject)];
-}
-
-}  // namespace
-
-Subject subject_of(const fs::path& file) {
-  if (const auto told = told_subject_of(file)) return *told;
-  throw Error("{}: the name does not tell what it holds; say so by --as", file.string());
-}
-
-Subject subject_of(const fs::path& reference, const fs::path& other) {
-  const Subject subject = subject_of(reference);
-  const Subject of_other = told_subject_of(other).value_or(subject);
-  if (of_other == subject) return subject;
-  throw Error(
-      "{} seems to be {} and {} {}: they must be of one kind; if both are, say which by --as",
-      reference.string(), name_of(subject), other.string(), name_of(of_other));
-}
-
 struct CompareCommand::Options {
   fs::path reference, other;
   fs::path out = "out/compare";
@@ -126,14 +74,12 @@ struct CompareCommand::Options {
   Significance significance;
 
   void add_scan(CLI::App* group) {
-    const std::map<std::string, PairingRule> rules{{"best", PairingRule::Best},
-                                                   {"pulse", PairingRule::Pulse},
-                                                   {"ring_time", PairingRule::RingTime},
-                                                   {"ring_azimuth", PairingRule::RingAzimuth},
-                                                   {"direction", PairingRule::Direction}};
-    group->add_option("--pair-by", pairing.rule, "How pulses are paired")
-        ->transform(CLI::CheckedTransformer(rules))
-        ->option_text("best|pulse|ring_time|ring_azimuth|direction");
+    add_words(group, "--pair-by", pairing.rule, "How pulses are paired",
+              Words<PairingRule>{{"best", PairingRule::Best},
+                                 {"pulse", PairingRule::Pulse},
+                                 {"ring_time", PairingRule::RingTime},
+                                 {"ring_azimuth", PairingRule::RingAzimuth},
+                                 {"direction", PairingRule::Direction}});
     group->add_option("--pair-mrad", tolerance_mrad, "How far apart directions of a pair may be")
         ->check(CLI::PositiveNumber);
     group->add_option("--pair-s", pairing.tolerance_s, "How far apart times of a pair may be")
@@ -176,13 +122,11 @@ CompareCommand::CompareCommand(CLI::App& app)
   Options& into = *options_;
   command_->add_option("REFERENCE", into.reference, "What is taken for true")->required();
   command_->add_option("OTHER", into.other, "What is judged")->required();
-  const std::map<std::string, Subject> subjects{{"scan", Subject::Scan},
-                                                {"image", Subject::Image},
-                                                {"dem", Subject::Dem},
-                                                {"mesh", Subject::Mesh}};
-  command_->add_option("--as", into.subject, "What both are, if their names do not tell")
-      ->transform(CLI::CheckedTransformer(subjects))
-      ->option_text("scan|image|dem|mesh");
+  add_words(command_, "--as", into.subject, "What both are, if their names do not tell",
+            Words<Subject>{{"scan", Subject::Scan},
+                           {"image", Subject::Image},
+                           {"dem", Subject::Dem},
+                           {"mesh", Subject::Mesh}});
   command_->add_option("-o,--output", into.out, "Folder for report.html and report.json")
       ->capture_default_str();
   CLI::App* scans = command_->add_option_group("Scans");

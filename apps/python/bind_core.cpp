@@ -1,0 +1,82 @@
+#include <fmt/format.h>
+#include <fmt/ranges.h>
+#include <nanobind/stl/filesystem.h>
+#include <nanobind/stl/string.h>
+#include <nanobind/stl/vector.h>
+
+#include <algorithm>
+#include <filesystem>
+
+#include "apps/python/bind.h"
+#include "apps/python/long_call.h"
+#include "apps/python/points.h"
+#include "core/error.h"
+#include "core/ply_io.h"
+
+namespace groundray::python {
+namespace {
+
+using nb::literals::operator""_a;
+
+bool has(const Points& points, const std::string& name) {
+  const std::vector<std::string> names = names_of(points);
+  return std::ranges::find(names, name) != names.end();
+}
+
+void bind_points(nb::module_& module) {
+  nb::class_<Points>(module, "Points", R"(A table of points: columns of one length.
+
+points["range_true_m"] is a column as a NumPy array, a view that may not be written to and that
+keeps the table alive. Names are those of the files (docs/formats.md) with their units:
+docs/python.md lists them. dict(points) is a dict of all columns; len(points) counts rows.)")
+      .def("__len__", [](const Points& points) { return points.cloud.rows(); })
+      .def(
+          "__getitem__",
+          [](nb::handle_t<Points> self, const std::string& name) {
+            return column_of(nb::cast<const Points&>(self), name, self);
+          },
+          "name"_a, "The column of this name, n values: a view.")
+      .def("__contains__", &has, "name"_a)
+      .def(
+          "__iter__", [](const Points& points) { return nb::iter(nb::cast(names_of(points))); },
+          "Goes over the names of the columns.")
+      .def("keys", &names_of, "The names of the columns, as `columns`.")
+      .def_prop_ro("columns", &names_of, "The names of the columns, in the order of the files.")
+      .def(
+          "save",
+          [](const Points& points, const std::filesystem::path& path,
+             const std::vector<std::string>& comments) {
+            without_gil([&](const StopRequest&) {
+              write_ply(path, points.cloud, comments);
+              return true;
+            });
+          },
+          "path"_a, "comments"_a = std::vector<std::string>{},
+          R"(Writes the table as a binary PLY file, columns by the names of docs/formats.md.
+
+The file appears only when it is whole. `comments` become lines of its header.)")
+      .def("__repr__", [](const Points& points) {
+        return fmt::format("<Points: {} rows of {}>", points.cloud.rows(),
+                           fmt::join(names_of(points), ", "));
+      });
+  module.def(
+      "load_points",
+      [](const std::filesystem::path& path) {
+        return Points{without_gil([&](const StopRequest&) { return read_ply(path).cloud; })};
+      },
+      "path"_a,
+      R"(Reads the points of a PLY file, such as a scan that `groundray generate` wrote.
+
+Columns that docs/formats.md knows get names with units; others keep theirs.
+Raises groundray.Error if the file cannot be read.)");
+}
+
+}  // namespace
+
+void bind_core(nb::module_& module) {
+  nb::exception<Error>(module, "Error", PyExc_RuntimeError).doc() =
+      "What was wrong, where, by which rule, and what may mend it: a line for each fault.";
+  bind_points(module);
+}
+
+}  // namespace groundray::python

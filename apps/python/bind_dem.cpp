@@ -1,0 +1,342 @@
+#include <fmt/format.h>
+#include <nanobind/stl/array.h>
+#include <nanobind/stl/optional.h>
+#include <nanobind/stl/string.h>
+#include <nanobind/stl/vector.h>
+
+#include <array>
+#include <cmath>
+#include <glm/common.hpp>
+#include <glm/geometric.hpp>
+#include <glm/matrix.hpp>
+#include <limits>
+#include <optional>
+#include <string>
+#include <utility>
+#include <vector>
+
+#include "apps/python/arrays.h"
+#include "apps/python/bind.h"
+#include "apps/python/given.h"
+#include "apps/python/long_call.h"
+#include "apps/python/placed_returns.h"
+#include "apps/python/word_choice.h"
+#include "core/error.h"
+#include "reconstruction/dem/dem_fill.h"
+#include "reconstruction/dem/dem_frame.h"
+#include "reconstruction/dem/dem_fusion.h"
+#include "reconstruction/dem/dem_smooth.h"
+
+namespace groundray::python {
+namespace {
+
+using nb::literals::operator""_a;
+
+double squared(double x) { return x * x; }
+
+// ----- points
+
+/// What is known of the errors of points besides the noise of their ranges.
+struct PoseNoise {
+  double divergence_rad = 0, position_sd_m = 0, attitude_sd_rad = 0;
+};
+
+// As `groundray reconstruct dem` has it: docs/dem.md.
+void add_point(const glm::dvec3& p_m, const glm::dvec3& origin_m, double range_sd_m,
+               std::uint32_t group, const PoseNoise& noise, MeasuredPoints& into) {
+  if (!(range_sd_m >= 0) || !std::isfinite(range_sd_m))
+    throw Error("the standard deviation of the range of point {}, {} m, must be 0 or more",
+                into.size(), range_sd_m);
+  const glm::dvec3 beam_m = p_m - origin_m;
+  const double range_m = glm::length(beam_m);
+  const glm::dvec3 along = range_m > 0 ? beam_m / range_m : glm::dvec3(0, 0, -1);
+  const double foot2_m2 = squared(range_m * noise.divergence_rad / 4);
+  const PointErrors errors = point_errors(
+      glm::dmat3(foot2_m2) + (squared(range_sd_m) - foot2_m2) * glm::outerProduct(along, along));
+  const double flat = std::sqrt(std::max(0.0, 1 - squared(along.z)));
+  into.p_m.push_back(p_m);
+  into.sd_m.push_back(errors.sd_m);
+  into.bias_sd_m.push_back(
+      static_cast<float>(std::hypot(noise.position_sd_m, range_m * noise.attitude_sd_rad * flat)));
+  into.lean.push_back(errors.lean);
+  into.across_sd_m.push_back(errors.across_sd_m);
+  into.groups.push_back(group);
+  into.origins.push_back(PointOrigin::Lidar);
+}
+
+MeasuredPoints points_of(const GivenPoints& points_m, const GivenPoints& origins_m,
+                         const GivenNumbers& range_sd_m, const std::optional<GivenNumbers>& groups,
+                         const PoseNoise& noise) {
+  const std::size_t count = points_m.rows();
+  if (origins_m.rows() != count || range_sd_m.rows() != count ||
+      (groups && groups->rows() != count))
+    throw Error(
+        "fuse_points: there are {} points, {} origins, {} values of range_sd_m{}; there must be as "
+        "many of each",
+        count, origins_m.rows(), range_sd_m.rows(),
+        groups ? fmt::format(" and {} groups", groups->rows()) : "");
+  MeasuredPoints points;
+  for (std::size_t i = 0; i < count; ++i) {
+    const double group = groups ? (*groups)(i) : 0;
+    if (!(0 <= group && group < std::ldexp(1, 31)) || group != std::floor(group))
+      throw Error("fuse_points: the group of point {}, {}, must be a whole number from 0", i,
+                  group);
+    add_point({points_m(i, 0), points_m(i, 1), points_m(i, 2)},
+              {origins_m(i, 0), origins_m(i, 1), origins_m(i, 2)}, range_sd_m(i),
+              static_cast<std::uint32_t>(group), noise, points);
+  }
+  return points;
+}
+
+MeasuredPoints points_of(const std::vector<const Sweep*>& scans, std::optional<double> range_sd_m,
+                         const PoseNoise& noise) {
+  MeasuredPoints points;
+  for (std::size_t k = 0; k < scans.size(); ++k) {
+    const PlacedReturns returns = placed_returns(*scans[k], range_sd_m);
+    for (std::size_t i = 0; i < returns.points_m.size(); ++i)
+      add_point(returns.points_m[i], returns.origins_m[i], returns.sd_m[i],
+                static_cast<std::uint32_t>(k), noise, points);
+  }
+  return points;
+}
+
+// ----- fusion
+
+/// A DEM that was fused.
+struct FusedDem {
+  DemLayers layers;
+  FusionCounts counts;
+};
+
+using GivenArea = std::optional<std::array<double, 4>>;
+
+// Of the cells around all points, or in the area.
+GridFrame frame_of(const MeasuredPoints& points, double cell_m, const GivenArea& area_m) {
+  if (area_m)
+    return frame_over({{(*area_m)[0], (*area_m)[1]}, {(*area_m)[2], (*area_m)[3]}}, cell_m);
+  Area area{glm::dvec2(std::numeric_limits<double>::infinity()),
+            glm::dvec2(-std::numeric_limits<double>::infinity())};
+  for (const glm::dvec3& p_m : points.p_m) {
+    if (!std::isfinite(p_m.x) || !std::isfinite(p_m.y)) continue;
+    area = {glm::min(area.low_m, glm::dvec2(p_m)), glm::max(area.high_m, glm::dvec2(p_m))};
+  }
+  if (!(area.low_m.x <= area.high_m.x)) throw Error("fuse: there is no point with a place");
+  constexpr double share_of_cell = 1e-6;  // the area is without its high sides
+  area.low_m -= cell_m * share_of_cell;
+  area.high_m += cell_m * share_of_cell;
+  return frame_over(area, cell_m);
+}
+
+FusedDem fused(MeasuredPoints points, double cell_m, const GivenArea& area_m, double most_sd_m,
+               double outlier_share, const StopRequest& stop) {
+  const GridFrame frame = frame_of(points, cell_m, area_m);
+  bool is_left = true;
+  const auto source = [&](MeasuredPoints& block) {
+    if (!std::exchange(is_left, false)) return false;
+    block = std::move(points);
+    return true;
+  };
+  Fusion fusion = fuse(source, frame, {.outlier_share = outlier_share, .most_sd_m = most_sd_m},
+                       {.progress = [&](double /*share*/) { stop.obey(); }});
+  return {std::move(fusion.layers), fusion.counts};
+}
+
+template <typename T>
+AnyArray layer(nb::handle_t<FusedDem> self, const std::vector<T> DemLayers::*column) {
+  const DemLayers& layers = nb::cast<const FusedDem&>(self).layers;
+  const glm::uvec2 samples(layers.frame.samples);
+  if constexpr (std::is_enum_v<T>) {
+    static_assert(sizeof(T) == 1);
+    return view(reinterpret_cast<const std::uint8_t*>((layers.*column).data()),
+                {samples.y, samples.x}, self);
+  } else {
+    return view((layers.*column).data(), {samples.y, samples.x}, self);
+  }
+}
+
+template <typename T>
+void add_layer(nb::class_<FusedDem>& type, const char* name, std::vector<T> DemLayers::*column,
+               const char* doc) {
+  type.def_prop_ro(
+      name, [column](nb::handle_t<FusedDem> self) { return layer<T>(self, column); }, doc);
+}
+
+void bind_fused(nb::module_& module) {
+  nb::class_<FusedDem> type(module, "FusedDem", R"(A DEM with what is known of each height.
+
+Layers are rasters, rows x columns, the northernmost row first: views that may not be written to.
+Sample (row, column) stands at first_sample_m + (column, row) * step_m in the frame D.)");
+  add_layer(type, "elevation_m", &DemLayers::elevation_m, "Heights of the ground; NaN for none.");
+  add_layer(type, "variance_m2", &DemLayers::variance_m2, "Of measured heights; NaN elsewhere.");
+  add_layer(type, "lidar_points", &DemLayers::lidar, "How many points tell the height.");
+  add_layer(type, "chi2", &DemLayers::chi2, "Of the fit, per degree of freedom.");
+  add_layer(type, "surfaces", &DemLayers::surfaces, "How many, one above the other.");
+  add_layer(type, "overhang_m", &DemLayers::overhang_m, "The lowest height clear of the ground.");
+  add_layer(type, "clearance_m", &DemLayers::clearance_m, "Free height below it.");
+  add_layer(type, "distance_to_data_m", &DemLayers::to_data_m, "To the nearest measured sample.");
+  add_layer(type, "source", &DemLayers::source, "0 none, 1 lidar.");
+  type.def_prop_ro(
+          "first_sample_m",
+          [](const FusedDem& dem) {
+            return std::array<double, 2>{dem.layers.frame.origin_m.x, dem.layers.frame.origin_m.y};
+          },
+          "Where sample (0, 0) stands, in D.")
+      .def_prop_ro(
+          "step_m",
+          [](const FusedDem& dem) {
+            return std::array<double, 2>{dem.layers.frame.step_m.x, dem.layers.frame.step_m.y};
+          },
+          "From column to column and row to row; below 0 southwards.")
+      .def_prop_ro(
+          "counts",
+          [](const FusedDem& dem) {
+            nb::dict all;
+            all["points"] = dem.counts.points;
+            all["outside"] = dem.counts.outside;
+            all["unusable"] = dem.counts.unusable;
+            all["without_ground"] = dem.counts.without_ground;
+            all["uncertain"] = dem.counts.uncertain;
+            return all;
+          },
+          nb::sig("def counts(self) -> dict[str, int]"),
+          "Points given, outside and unusable; cells without_ground and uncertain.")
+      .def("__repr__", [](const FusedDem& dem) {
+        return fmt::format("<FusedDem: {} x {} samples of {} m>", dem.layers.frame.samples.x,
+                           dem.layers.frame.samples.y, std::abs(dem.layers.frame.step_m.x));
+      });
+}
+
+constexpr double unlimited = std::numeric_limits<double>::infinity();
+
+constexpr const char* fuse_doc = R"(Fuses scans to a DEM that tells how far off it may be.
+
+  scans            of Lidar.scan, as reported at the poses that the sensor knew
+  cell_m           side of the DEM's cells, whose borders are at whole multiples of it in D
+  area_m           west, south, east, north in D: no cell beyond; else around all points
+  range_sd_m       standard deviation of ranges, instead of what scan and sensor say
+  divergence_rad   of beams, full angle between the 1/e^2 points
+  position_sd_m, attitude_sd_rad  of each scan's pose, along and about each axis
+  most_sd_m        samples whose height is known worse than this stay unmeasured
+  outlier_share    of all points, 0 to 0.5
+
+The same bytes for any number of threads. Raises groundray.Error naming every fault.)";
+
+void bind_fusion(nb::module_& module) {
+  module.def(
+      "fuse_dem",
+      [](const std::vector<const Sweep*>& scans, double cell_m, const GivenArea& area_m,
+         std::optional<double> range_sd_m, double divergence_rad, double position_sd_m,
+         double attitude_sd_rad, double most_sd_m, double outlier_share) {
+        check_scans("fuse_dem", scans);
+        return without_gil([&](const StopRequest& stop) {
+          const PoseNoise noise{divergence_rad, position_sd_m, attitude_sd_rad};
+          return fused(points_of(scans, range_sd_m, noise), cell_m, area_m, most_sd_m,
+                       outlier_share, stop);
+        });
+      },
+      "scans"_a, nb::kw_only(), "cell_m"_a, "area_m"_a = nb::none(), "range_sd_m"_a = nb::none(),
+      "divergence_rad"_a = 0.0, "position_sd_m"_a = 0.0, "attitude_sd_rad"_a = 0.0,
+      "most_sd_m"_a = unlimited, "outlier_share"_a = 0.02, fuse_doc);
+  module.def(
+      "fuse_points",
+      [](const GivenPoints& points_m, const GivenPoints& origins_m, const GivenNumbers& range_sd_m,
+         double cell_m, const std::optional<GivenNumbers>& groups, const GivenArea& area_m,
+         double divergence_rad, double position_sd_m, double attitude_sd_rad, double most_sd_m,
+         double outlier_share) {
+        return without_gil([&](const StopRequest& stop) {
+          const PoseNoise noise{divergence_rad, position_sd_m, attitude_sd_rad};
+          return fused(points_of(points_m, origins_m, range_sd_m, groups, noise), cell_m, area_m,
+                       most_sd_m, outlier_share, stop);
+        });
+      },
+      "points_m"_a, "origins_m"_a, "range_sd_m"_a, nb::kw_only(), "cell_m"_a,
+      "groups"_a = nb::none(), "area_m"_a = nb::none(), "divergence_rad"_a = 0.0,
+      "position_sd_m"_a = 0.0, "attitude_sd_rad"_a = 0.0, "most_sd_m"_a = unlimited,
+      "outlier_share"_a = 0.02,
+      R"(As fuse_dem, of points of anybody's.
+
+  points_m    n x 3, in the frame D    origins_m  n x 3, where each beam began
+  range_sd_m  n                        groups     n numbers of scans, else all are of one)");
+}
+
+// ----- smoothing and filling
+
+GridFrame frame_of(const GivenRaster& heights_m, double cell_m) {
+  if (!(cell_m > 0) || !std::isfinite(cell_m)) throw Error("cell_m = {} must be positive", cell_m);
+  return {{static_cast<int>(heights_m.columns()), static_cast<int>(heights_m.rows())},
+          {0, 0},
+          {cell_m, -cell_m},
+          {1 / cell_m, -1 / cell_m}};
+}
+
+std::span<const float> values_of(const GivenRaster& raster) {
+  return {raster.data(), raster.size()};
+}
+
+AnyArray smoothed(const GivenRaster& heights_m, const GivenRaster& variance_m2, double cell_m,
+                  std::optional<double> curvature_sd_per_m) {
+  SmoothHeights result = without_gil([&](const StopRequest& stop) {
+    return smooth_dem(frame_of(heights_m, cell_m), values_of(heights_m), values_of(variance_m2),
+                      {.curvature_sd_per_m = curvature_sd_per_m},
+                      {.progress = [&](double /*share*/) { stop.obey(); }});
+  });
+  return array_of(std::move(result.heights_m), {heights_m.rows(), heights_m.columns()});
+}
+
+nb::dict filled(const GivenRaster& heights_m, double cell_m, const std::string& reach,
+                std::optional<double> farthest_m, double largest_share,
+                const std::optional<GivenRaster>& most_m) {
+  const FillOptions options{.reach = chosen<FillReach>("reach", reach,
+                                                       {{"enclosed", FillReach::Enclosed},
+                                                        {"hull", FillReach::Hull},
+                                                        {"everywhere", FillReach::Everywhere}}),
+                            .farthest_m = farthest_m,
+                            .largest_share = largest_share};
+  FilledHeights result = without_gil([&](const StopRequest& stop) {
+    return fill_dem(frame_of(heights_m, cell_m), values_of(heights_m),
+                    most_m ? values_of(*most_m) : std::span<const float>(), options,
+                    {.progress = [&](double /*share*/) { stop.obey(); }});
+  });
+  const Shape shape{heights_m.rows(), heights_m.columns()};
+  nb::dict all;
+  all["heights_m"] = array_of(std::move(result.heights_m), shape);
+  all["sd_m"] = array_of(std::move(result.sd_m), shape);
+  all["distance_to_data_m"] = array_of(std::move(result.to_data_m), shape);
+  all["filled"] = result.filled;
+  all["holes"] = result.holes.size();
+  return all;
+}
+
+}  // namespace
+
+void bind_dem(nb::module_& module) {
+  bind_fused(module);
+  bind_fusion(module);
+  module.def("smooth_dem", &smoothed, "heights_m"_a, "variance_m2"_a, nb::kw_only(), "cell_m"_a,
+             "curvature_sd_per_m"_a = nb::none(),
+             R"(Smooths measured heights as far as their noise calls for it; edges stay.
+
+  heights_m           rows x columns, metres; NaN where there is none
+  variance_m2         of each height; NaN where it was not measured
+  curvature_sd_per_m  what second derivatives of the true ground are like; else what heights show
+
+Returns heights of the same shape, NaN where nothing was measured.)");
+  module.def("fill_dem", &filled, "heights_m"_a, nb::kw_only(), "cell_m"_a, "reach"_a = "enclosed",
+             "farthest_m"_a = nb::none(), "largest_share"_a = 0.2, "most_m"_a = nb::none(),
+             nb::sig("def fill_dem(heights_m: numpy.typing.ArrayLike, *, cell_m: float, "
+                     "reach: str = 'enclosed', farthest_m: float | None = None, "
+                     "largest_share: float = 0.2, most_m: numpy.typing.ArrayLike | None = None)"
+                     " -> dict[str, typing.Any]"),
+             R"(Fills blank areas of a DEM, and tells how far off what is filled may be.
+
+  heights_m      rows x columns, metres; NaN where there is none
+  reach          "enclosed" holes, the "hull" of what is measured, or "everywhere"
+  farthest_m     a hole stays if some of it is farther from data; else 50 cells
+  largest_share  of the raster's samples; a larger hole stays
+  most_m         heights that lines of sight passed at, rows x columns; NaN for none
+
+Returns heights_m (measured ones as they were), sd_m of filled heights, distance_to_data_m, and
+how many samples were filled of how many holes.)");
+}
+
+}  // namespace groundray::python

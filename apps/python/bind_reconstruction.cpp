@@ -1,0 +1,233 @@
+#include <fmt/format.h>
+#include <nanobind/stl/optional.h>
+#include <nanobind/stl/string.h>
+#include <nanobind/stl/tuple.h>
+#include <nanobind/stl/vector.h>
+
+#include <algorithm>
+#include <optional>
+#include <string>
+#include <tuple>
+#include <utility>
+#include <vector>
+
+#include "apps/python/arrays.h"
+#include "apps/python/bind.h"
+#include "apps/python/long_call.h"
+#include "apps/python/mesh.h"
+#include "apps/python/placed_returns.h"
+#include "apps/python/word_choice.h"
+#include "core/error.h"
+#include "reconstruction/holes/hole_fill.h"
+#include "reconstruction/merge/mesh_merge.h"
+#include "reconstruction/scan/scan_mesh.h"
+#include "reconstruction/simplify/simplify.h"
+
+namespace groundray::python {
+namespace {
+
+using nb::literals::operator""_a;
+using MeshAndFigures = std::tuple<Mesh, nb::dict>;
+
+// ----- from scans
+
+struct Linking {
+  ScreeningLimits screening;
+  ReturnChoice returns = ReturnChoice::Last;
+  std::optional<double> range_sd_m;
+};
+
+ScreeningLimits screening_of(const std::string& preset) {
+  return chosen<ScreeningLimits>("preset", preset,
+                                 {{"ground", ScreeningLimits::ground()},
+                                  {"strict", ScreeningLimits::strict()},
+                                  {"object", ScreeningLimits::object()}});
+}
+
+bool knows_noise(const ScanMesh& scan) {
+  return std::ranges::any_of(scan.mesh.sd_m, [](float sd_m) { return sd_m > 0; });
+}
+
+MergedMesh mesh_of(const std::vector<const Sweep*>& sweeps, const Linking& linking,
+                   std::optional<double> apart_m, const StopRequest& stop) {
+  std::vector<ScanMesh> meshes;
+  for (const Sweep* sweep : sweeps) {
+    stop.obey();
+    ScanMesh mesh = link(organised(*sweep, linking.range_sd_m, linking.returns), linking.screening);
+    mesh.occlusion = {};
+    if (!mesh.mesh.shape.triangles.empty()) meshes.push_back(std::move(mesh));
+  }
+  if (meshes.empty())
+    throw Error(
+        "reconstruct_mesh: no two returns of any of the {} scans were taken for one surface; "
+        "preset, longest_m and range_sd_m say what is surface",
+        sweeps.size());
+  if (meshes.size() > 1 && !apart_m && std::ranges::none_of(meshes, knows_noise))
+    throw Error(
+        "reconstruct_mesh: no noise is known of these scans, so nothing tells how far apart one "
+        "surface may be in two of them: give the standard deviation of ranges as range_sd_m, or "
+        "that distance as apart_m");
+  return merge(meshes, {.apart_m = apart_m.value_or(0)},
+               {.progress = [&](double /*share*/) { stop.obey(); }});
+}
+
+MeshAndFigures reconstruct_mesh(const std::vector<const Sweep*>& scans, const std::string& preset,
+                                std::optional<double> incidence_rad,
+                                std::optional<double> longest_m, std::optional<double> noise_sds,
+                                const std::string& returns, std::optional<double> range_sd_m,
+                                std::optional<double> apart_m) {
+  check_scans("reconstruct_mesh", scans);
+  Linking linking{.screening = screening_of(preset),
+                  .returns = chosen<ReturnChoice>("returns", returns,
+                                                  {{"last", ReturnChoice::Last},
+                                                   {"strongest", ReturnChoice::Strongest},
+                                                   {"first", ReturnChoice::First}}),
+                  .range_sd_m = range_sd_m};
+  linking.screening.incidence_rad = incidence_rad.value_or(linking.screening.incidence_rad);
+  linking.screening.longest_m = longest_m.value_or(linking.screening.longest_m);
+  linking.screening.noise_sds = noise_sds.value_or(linking.screening.noise_sds);
+  MergedMesh merged =
+      without_gil([&](const StopRequest& stop) { return mesh_of(scans, linking, apart_m, stop); });
+  const DemHeader& header = scans.front()->state->world.terrain.header();
+  nb::dict figures;
+  figures["redundant"] = merged.counts.redundant;
+  figures["seen_through"] = merged.counts.seen_through;
+  figures["clipped"] = merged.counts.clipped;
+  figures["filled"] = merged.counts.filled;
+  figures["bridged"] = merged.counts.bridged;
+  figures["moved"] = merged.counts.moved;
+  figures["left_out"] = merged.counts.left_out;
+  return {Mesh{std::move(merged.mesh), {header.origin_w_m, header.crs_name, header.crs_wkt}},
+          std::move(figures)};
+}
+
+// ----- what can be done to a mesh
+
+// The one criterion that was given.
+Halt halt_of(std::optional<double> max_vertical_error_m, std::optional<double> max_error_m,
+             std::optional<std::size_t> triangles, std::optional<double> noise_sds, bool knee,
+             std::optional<double> border_m) {
+  std::vector<Halt> halts;
+  if (max_vertical_error_m)
+    halts.emplace_back(
+        VerticalBound{*max_vertical_error_m, border_m.value_or(*max_vertical_error_m)});
+  if (max_error_m) halts.emplace_back(DistanceBound{*max_error_m, border_m.value_or(*max_error_m)});
+  if (triangles) halts.emplace_back(FaceBudget{*triangles});
+  if (noise_sds) halts.emplace_back(NoiseBound{*noise_sds});
+  if (knee) halts.emplace_back(CostKnee{});
+  if (halts.size() != 1)
+    throw Error(
+        "simplify: give one of max_vertical_error_m, max_error_m, triangles, noise_sds and knee, "
+        "which says until when; there are {}",
+        halts.size());
+  if (border_m && !max_vertical_error_m && !max_error_m)
+    throw Error(
+        "simplify: border_m: only max_error_m and max_vertical_error_m leave borders a bound");
+  return halts.front();
+}
+
+const char* word_of(HaltReason reason) {
+  switch (reason) {
+    case HaltReason::Bound:
+      return "bound";
+    case HaltReason::Budget:
+      return "budget";
+    case HaltReason::Knee:
+      return "knee";
+    case HaltReason::Shape:
+      break;
+  }
+  return "shape";
+}
+
+nb::dict figures_of(const OneSidedError& error) {
+  nb::dict all;
+  all["at_least_m"] = error.at_least_m;
+  all["at_most_m"] = error.at_most_m;
+  all["mean_m"] = error.mean.value_m;
+  all["rms_m"] = error.rms.value_m;
+  return all;
+}
+
+MeshAndFigures simplified(const Mesh& mesh, std::optional<double> max_vertical_error_m,
+                          std::optional<double> max_error_m, std::optional<std::size_t> triangles,
+                          std::optional<double> noise_sds, bool knee,
+                          std::optional<double> border_m, std::optional<double> crease_rad) {
+  const Halt halt =
+      halt_of(max_vertical_error_m, max_error_m, triangles, noise_sds, knee, border_m);
+  SimplifyOptions options;
+  options.crease_rad = crease_rad.value_or(options.crease_rad);
+  Simplified result = without_gil([&](const StopRequest& stop) {
+    return simplify(mesh.measured, halt, options,
+                    {.progress = [&](double /*share*/) { stop.obey(); }});
+  });
+  nb::dict figures;
+  figures["halted_by"] = word_of(result.halted_by);
+  figures["from_original"] = figures_of(result.error.forth);
+  figures["to_original"] = figures_of(result.error.back);
+  if (result.vertical) {
+    figures["vertical_largest_m"] = result.vertical->largest_m;
+    figures["vertical_rms_m"] = result.vertical->rms_m;
+  }
+  return {Mesh{std::move(result.mesh), mesh.georeference}, std::move(figures)};
+}
+
+MeshAndFigures filled(const Mesh& mesh, double longest_m) {
+  FilledMesh result = without_gil([&](const StopRequest& stop) {
+    return fill_holes(mesh.measured, {.longest_m = longest_m},
+                      {.progress = [&](double /*share*/) { stop.obey(); }});
+  });
+  nb::dict figures;
+  figures["filled"] = result.filled.size();
+  figures["left"] = result.left.size();
+  figures["measured_vertices"] = result.measured_vertices;
+  figures["measured_triangles"] = result.measured_triangles;
+  return {Mesh{std::move(result.mesh), mesh.georeference}, std::move(figures)};
+}
+
+constexpr const char* reconstruct_doc =
+    R"(Links each scan to a mesh and merges these, in the frame D.
+
+  scans          of Lidar.scan, as reported at the poses that the sensor knew: nothing of the truth
+  preset         which links are surface: "ground", "strict" or "object"
+  incidence_rad, longest_m, noise_sds  instead of the preset's (docs/reconstruction.md)
+  returns        which return of a pulse stands for it: "last", "strongest" or "first"
+  range_sd_m     standard deviation of ranges, instead of what scan and sensor say
+  apart_m        how far apart one surface may be in two scans besides noise: what poses are off
+
+Returns the mesh, and what merging did: triangles that were redundant, seen_through, clipped,
+filled, bridged and left_out, and vertices moved. The same bytes for any number of threads.
+Raises groundray.Error, if nothing is surface or no noise is known of several scans.)";
+
+constexpr const char* simplify_doc = R"(Simplifies a mesh by collapsing edges, cheapest first, until
+
+  max_vertical_error_m  a vertex would be farther above or below the result (terrain)
+  max_error_m           a point of either surface would be farther from the other: proved
+  triangles             so many are left
+  noise_sds             an error would reach so many standard deviations of the vertices
+  knee                  errors begin to rise faster than triangles go
+
+Give one of these; border_m bounds borders apart from the rest, and crease_rad says from which
+angle on edges stay edges. Returns the mesh, and figures: halted_by ("bound", "budget", "knee",
+"shape"), and the error from_original and to_original as at_least_m and at_most_m, between which
+the largest distance lies, mean_m and rms_m.)";
+
+}  // namespace
+
+void bind_reconstruction(nb::module_& module) {
+  module.def("reconstruct_mesh", &reconstruct_mesh, "scans"_a, nb::kw_only(), "preset"_a = "ground",
+             "incidence_rad"_a = nb::none(), "longest_m"_a = nb::none(), "noise_sds"_a = nb::none(),
+             "returns"_a = "last", "range_sd_m"_a = nb::none(), "apart_m"_a = nb::none(),
+             reconstruct_doc);
+  module.def("simplify", &simplified, "mesh"_a, nb::kw_only(),
+             "max_vertical_error_m"_a = nb::none(), "max_error_m"_a = nb::none(),
+             "triangles"_a = nb::none(), "noise_sds"_a = nb::none(), "knee"_a = false,
+             "border_m"_a = nb::none(), "crease_rad"_a = nb::none(), simplify_doc);
+  module.def("fill_holes", &filled, "mesh"_a, "longest_m"_a,
+             R"(Fills the holes of a mesh whose rim is no longer than this, metres, smoothly.
+
+Returns the mesh, in which what was measured comes first, and figures: how many holes were filled
+and left, measured_vertices and measured_triangles.)");
+}
+
+}  // namespace groundray::python

@@ -1,0 +1,214 @@
+#include <fmt/format.h>
+#include <fmt/ranges.h>
+#include <nanobind/stl/array.h>
+#include <nanobind/stl/filesystem.h>
+#include <nanobind/stl/optional.h>
+#include <nanobind/stl/shared_ptr.h>
+#include <nanobind/stl/string.h>
+#include <nanobind/stl/vector.h>
+
+#include <algorithm>
+#include <array>
+#include <chrono>
+#include <cstdint>
+#include <filesystem>
+#include <glm/geometric.hpp>
+#include <limits>
+#include <memory>
+#include <optional>
+#include <string>
+#include <vector>
+
+#include "apps/python/bind.h"
+#include "apps/python/cast.h"
+#include "apps/python/frame_choice.h"
+#include "apps/python/given.h"
+#include "apps/python/long_call.h"
+#include "apps/python/points.h"
+#include "apps/python/scene_state.h"
+#include "apps/scene/paths.h"
+#include "core/error.h"
+#include "sensors/spec_io.h"
+#include "terrain/terrain_scene.h"
+
+namespace groundray::python {
+namespace {
+
+using nb::literals::operator""_a;
+using SharedScene = std::shared_ptr<SceneState>;
+
+SharedScene build(SceneSpec spec, std::optional<std::uint64_t> seed) {
+  return without_gil([&](const StopRequest& stop) {
+    if (seed) spec.seed = {*seed};
+    return std::make_shared<SceneState>(
+        build_world(std::move(spec), [&](double /*share*/) { stop.obey(); }));
+  });
+}
+
+SharedScene load(const std::filesystem::path& path, std::optional<std::uint64_t> seed) {
+  return build(load_scene(path, data_folder() / "sensors"), seed);
+}
+
+SharedScene parse(const std::string& text, const std::filesystem::path& path,
+                  std::optional<std::uint64_t> seed) {
+  return build(parse_scene(text, path, data_folder() / "sensors"), seed);
+}
+
+template <typename Placed>
+std::vector<std::string> sensor_names(const std::vector<Placed>& sensors) {
+  std::vector<std::string> names;
+  for (const Placed& sensor : sensors) names.push_back(sensor.spec.name);
+  return names;
+}
+
+template <typename Placed>
+std::size_t find_sensor(const std::vector<Placed>& sensors, const std::string& name,
+                        const char* kind) {
+  const std::vector<std::string> names = sensor_names(sensors);
+  const auto found = std::ranges::find(names, name);
+  if (found != names.end()) return static_cast<std::size_t>(found - names.begin());
+  if (names.empty()) throw Error("the scene has no {} '{}', nor any other", kind, name);
+  throw Error("the scene has no {} '{}'; it has {}", kind, name, fmt::join(names, ", "));
+}
+
+// ----- rays
+
+// What rays from a box see: as sensors there would.
+std::shared_ptr<const Scene> scene_for(SceneState& state, const SensorBox& box) {
+  const World& world = state.world;
+  const glm::dvec3 middle = (box.low_m + box.high_m) / 2.0;
+  if (world.terrain.whole() != nullptr) {
+    const Trajectory here({{.pose = {.translation_m = middle}}});
+    return state.frames.of({&here, here.begin_time(), here.end_time()});
+  }
+  const double reach_m = glm::distance(glm::dvec2(box.low_m), glm::dvec2(box.high_m)) / 2;
+  RayTracer rays = build_tracer(world.terrain.clipmap(box, std::max(reach_m, world.reach_m)),
+                                float_frame_origin(middle), world.spec.tracing);
+  return std::make_shared<const Scene>(Scene{std::move(rays),
+                                             {.label = world.spec.terrain.label},
+                                             world.content.materials,
+                                             world.content.objects,
+                                             world.content.models,
+                                             world.content.cover});
+}
+
+Points cast(SceneState& state, const GivenPoints& origins_m, const GivenPoints& directions,
+            double t_s, bool error_bound) {
+  const auto time = nanoseconds_of(t_s);
+  if (time < std::chrono::nanoseconds(0) || time > run_time(state.world.spec))
+    throw Error("cast_rays: t_s = {} must be within the scene's time, 0 to {} s", t_s,
+                state.world.spec.duration_s);
+  const GivenRays rays(origins_m, directions, time);
+  return without_gil([&](const StopRequest& stop) {
+    rays.check();
+    const auto scene = scene_for(state, rays.box());
+    return Points{cast_rays(*scene, rays, error_bound ? ErrorBounds::Report : ErrorBounds::Omit,
+                            [&] { stop.obey(); })};
+  });
+}
+
+AnyArray heights_at(const SceneState& state, const GivenPlaces& places_m) {
+  return array_of(without_gil([&](const StopRequest&) {
+    const Ground& ground = state.world.terrain.ground();
+    std::vector<double> heights_m(places_m.rows());
+    for (std::size_t i = 0; i < heights_m.size(); ++i) {
+      heights_m[i] = ground.height_m_at({places_m(i, 0), places_m(i, 1)})
+                         .value_or(std::numeric_limits<double>::quiet_NaN());
+    }
+    return heights_m;
+  }));
+}
+
+nb::list groups_of(const SceneState& state) {
+  nb::list all;
+  for (const Content::Group& group : state.world.content.groups) {
+    nb::dict one;
+    one["name"] = group.name;
+    one["label"] = group.label;
+    one["first"] = group.first;
+    one["count"] = group.count;
+    all.append(one);
+  }
+  return all;
+}
+
+constexpr const char* cast_doc =
+    R"(Casts rays through the scene, on all cores, and tells what each meets first.
+
+  origins_m    n x 3, metres in the frame D
+  directions   n x 3, axes of D, of any length but zero
+  t_s          when, in seconds of the scene's time: where objects are that move
+  error_bound  also tells how far each range may be from the reference surface's
+
+The result has a row for each ray: range_true_m along it (infinite if it meets nothing), world_x_m,
+world_y_m, world_z_m (in D), nx, ny, nz, incidence_rad (NaN for nothing), label, instance (0 for
+the ground) and error_bound_m if asked for. The ground is met from above only.
+Raises groundray.Error for rays that are none.)";
+
+}  // namespace
+
+void bind_scene(nb::module_& module) {
+  nb::class_<SceneState>(module, "Scene", nb::is_weak_referenceable(),
+                         R"(A scene with all that its file names, ready to run.
+
+See load_scene and scene. Immutable: any number of threads may use one.)")
+      .def_prop_ro(
+          "lidars", [](const SceneState& scene) { return sensor_names(scene.world.lidars); },
+          "Names, in the order of the file.")
+      .def_prop_ro(
+          "cameras", [](const SceneState& scene) { return sensor_names(scene.world.cameras); },
+          "Names, in the order of the file.")
+      .def(
+          "lidar",
+          [](const SharedScene& scene, const std::string& name) {
+            return SceneLidar{scene, find_sensor(scene->world.lidars, name, "lidar")};
+          },
+          "name"_a, "The lidar of this name. Raises groundray.Error if there is none.")
+      .def(
+          "camera",
+          [](const SharedScene& scene, const std::string& name) {
+            return SceneCamera{scene, find_sensor(scene->world.cameras, name, "camera")};
+          },
+          "name"_a, "The camera of this name. Raises groundray.Error if there is none.")
+      .def_prop_ro("duration_s",
+                   [](const SceneState& scene) { return scene.world.spec.duration_s; })
+      .def_prop_ro("seed", [](const SceneState& scene) { return scene.world.spec.seed.value; })
+      .def_prop_ro(
+          "origin_w_m",
+          [](const SceneState& scene) {
+            const glm::dvec3 p = scene.world.terrain.header().origin_w_m;
+            return std::array<double, 3>{p.x, p.y, p.z};
+          },
+          "Where the frame D begins in W, the coordinates of the DEM: add it to places in D.")
+      .def_prop_ro(
+          "crs", [](const SceneState& scene) { return scene.world.terrain.header().crs_name; },
+          "W's coordinate reference system, for people.")
+      .def_prop_ro("objects", &groups_of,
+                   nb::sig("def objects(self) -> list[dict[str, typing.Any]]"),
+                   "Entries with objects: name, label, and their instances: count from first on.")
+      .def("heights_at", &heights_at, "places_m"_a,
+           R"(Heights of the ground's reference surface, n metres, in doubles.
+
+  places_m  n x 2, x and y in the frame D
+
+NaN outside of the DEM and in its holes. Objects are left out.)")
+      .def("cast_rays", &cast, "origins_m"_a, "directions"_a, "t_s"_a = 0.0, nb::kw_only(),
+           "error_bound"_a = false, cast_doc)
+      .def("__repr__", [](const SceneState& scene) {
+        return fmt::format("<Scene of {} s: lidars [{}], cameras [{}]>",
+                           scene.world.spec.duration_s,
+                           fmt::join(sensor_names(scene.world.lidars), ", "),
+                           fmt::join(sensor_names(scene.world.cameras), ", "));
+      });
+  module.def("load_scene", &load, "path"_a, "seed"_a = nb::none(),
+             R"(Loads a scene file (docs/scene.md) and everything it names.
+
+`seed` takes the place of the scene's own. Ctrl-C ends the certification of a large DEM.
+Raises groundray.Error, with a line for each fault: file, line, key, rule and likely fix.)");
+  module.def("parse_scene", &parse, "text"_a, "path"_a, "seed"_a = nb::none(),
+             R"(As load_scene, of the text of a scene file.
+
+`path` stands for the file in messages; what the text names is looked for in its folder.)");
+}
+
+}  // namespace groundray::python

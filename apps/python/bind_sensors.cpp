@@ -1,0 +1,350 @@
+#include <fmt/format.h>
+#include <fmt/ranges.h>
+#include <nanobind/stl/optional.h>
+#include <nanobind/stl/pair.h>
+#include <nanobind/stl/shared_ptr.h>
+#include <nanobind/stl/string.h>
+#include <nanobind/stl/vector.h>
+
+#include <algorithm>
+#include <chrono>
+#include <cmath>
+#include <limits>
+#include <memory>
+#include <optional>
+#include <span>
+#include <string>
+#include <utility>
+#include <vector>
+
+#include "apps/python/bind.h"
+#include "apps/python/camera_image.h"
+#include "apps/python/frame_choice.h"
+#include "apps/python/given.h"
+#include "apps/python/long_call.h"
+#include "apps/python/pose_matrix.h"
+#include "apps/python/sweep.h"
+#include "core/error.h"
+
+namespace groundray::python {
+namespace {
+
+using nb::literals::operator""_a;
+
+// ----- lidars
+
+FrameTimes times_of(const SceneLidar& lidar) {
+  const PlacedLidar& placed = lidar.placed();
+  const ScanPattern& pattern = placed.lidar.pattern();
+  return {fmt::format("lidar '{}'", placed.spec.name), placed.sweeps,
+          [&pattern](std::int64_t sweep) { return pattern.stamp(sweep); }};
+}
+
+Sweep scan(const SceneLidar& lidar, std::optional<double> t_s, std::optional<std::int64_t> frame) {
+  const std::int64_t sweep = chosen_frame(times_of(lidar), t_s, frame);
+  return without_gil([&](const StopRequest& stop) {
+    const PlacedLidar& placed = lidar.placed();
+    const auto scene = lidar.state->frames.of(exposed(placed, sweep));
+    LidarScan scan = placed.lidar.scan(*scene, placed.X_DS, sweep, lidar.state->world.spec.seed,
+                                       static_cast<std::uint32_t>(lidar.index),
+                                       [&](double) { return !stop.is_made(); });
+    return Sweep{{std::move(scan.echoes)},
+                 {std::move(scan.no_returns)},
+                 std::move(scan.waveforms),
+                 scan.convergence,
+                 sweep,
+                 lidar.state,
+                 lidar.index};
+  });
+}
+
+constexpr const char* scan_doc = R"(Makes one sweep, on all cores.
+
+Give either of
+  t_s    when the sweep begins, in seconds of the scene's time: one of `times_s`
+  frame  its number, from 0, as in the names of the files of `groundray generate`
+
+The result has a row for each echo, in firing order and by range, and the columns of
+docs/python.md: x_m, y_m, z_m in the frame S of the sensor as its pulse fired (x forward, y left,
+z up), range_true_m, world_x_m, world_y_m, world_z_m and normals nx, ny, nz in the dataset's frame
+D (x east, y north, z up, from `Scene.origin_w_m`), incidence_rad, time_s since the sweep began,
+label, instance and more. The same seed gives the same bytes, those of `groundray generate`.
+
+Other Python threads go on meanwhile, and may scan themselves. Ctrl-C ends the sweep.
+Raises groundray.Error if no sweep begins then.)";
+
+void bind_lidar(nb::module_& module) {
+  nb::class_<SceneLidar>(module, "Lidar", "A lidar on a scene's platform. See Scene.lidar.")
+      .def_prop_ro("name", [](const SceneLidar& lidar) { return lidar.placed().spec.name; })
+      .def_prop_ro(
+          "model", [](const SceneLidar& lidar) { return lidar.placed().spec.lidar.model; },
+          "Make and model, for people.")
+      .def_prop_ro(
+          "sweep_rate_hz",
+          [](const SceneLidar& lidar) { return lidar.placed().lidar.pattern().sweep_rate_hz(); })
+      .def_prop_ro(
+          "times_s", [](const SceneLidar& lidar) { return all_times_s(times_of(lidar)); },
+          nb::rv_policy::automatic, "When the whole sweeps of the scene begin: n seconds.")
+      .def("scan", &scan, nb::kw_only(), "t_s"_a = nb::none(), "frame"_a = nb::none(), scan_doc)
+      .def(
+          "pose",
+          [](const SceneLidar& lidar, double t_s) {
+            return matrix_of(lidar.placed().X_DS.pose_at(nanoseconds_of(t_s)));
+          },
+          "t_s"_a,
+          R"(The pose X_DS of the sensor at a time of the scene: a 4 x 4 matrix.
+
+It takes points of the sensor's frame S, as columns (x, y, z, 1) in metres, to the frame D.
+Raises groundray.Error outside the scene's time.)")
+      .def("__repr__", [](const SceneLidar& lidar) {
+        return fmt::format("<Lidar '{}': {}, {} sweeps>", lidar.placed().spec.name,
+                           lidar.placed().spec.lidar.model, lidar.placed().sweeps);
+      });
+}
+
+// ----- what a scan has besides echoes
+
+AnyArray field_of(nb::handle_t<Sweep> self, const auto WaveformRun::*field) {
+  const Waveforms& all = nb::cast<const Sweep&>(self).waveforms;
+  using Value = std::remove_cvref_t<decltype(WaveformRun{}.*field)>;
+  constexpr auto step = static_cast<std::int64_t>(sizeof(WaveformRun) / sizeof(Value));
+  return view(all.runs.empty() ? nullptr : &(all.runs.front().*field), {all.runs.size()}, self,
+              step);
+}
+
+nb::object waveforms_of(nb::handle_t<Sweep> self) {
+  const auto& sweep = nb::cast<const Sweep&>(self);
+  if (sweep.waveforms.interval_s == 0) return nb::none();
+  nb::dict all;
+  all["interval_s"] = sweep.waveforms.interval_s;
+  all["power_w"] = view(sweep.waveforms.power_w.data(), {sweep.waveforms.power_w.size()}, self);
+  all["pulse"] = field_of(self, &WaveformRun::pulse);
+  all["count"] = field_of(self, &WaveformRun::count);
+  all["first_sample"] = field_of(self, &WaveformRun::first_sample);
+  all["start_s"] = field_of(self, &WaveformRun::start_s);
+  return all;
+}
+
+nb::object convergence_of(const Sweep& sweep) {
+  const Convergence& seen = sweep.convergence;
+  if (seen.pulses == 0) return nb::none();
+  nb::dict all;
+  all["pulses"] = seen.pulses;
+  all["other_echoes"] = seen.changed;
+  all["range_rms_m"] = std::sqrt(seen.sum_squares_m2 /
+                                 static_cast<double>(std::max<std::uint64_t>(1, seen.compared)));
+  all["range_max_m"] = seen.largest_m;
+  return all;
+}
+
+void bind_scan(nb::module_& module) {
+  nb::class_<Sweep, Points>(module, "Scan", R"(One sweep of a lidar: a row for each echo.
+
+scan["range_true_m"] is a column; see Points for how columns are asked for, Lidar.scan for what
+they are.)")
+      .def_ro("frame", &Sweep::frame, "The sweep's number, from 0.")
+      .def_prop_ro(
+          "t_s", [](const Sweep& sweep) { return seconds_of(sweep.stamp()); },
+          "When the sweep began, in seconds of the scene's time; `time_s` counts from here.")
+      .def_prop_ro("sensor", [](const Sweep& sweep) { return sweep.placed().spec.name; })
+      .def_prop_ro(
+          "no_returns",
+          [](nb::handle_t<Sweep> self) {
+            return nb::cast(&nb::cast<Sweep&>(self).no_returns, nb::rv_policy::reference_internal,
+                            self);
+          },
+          nb::sig("def no_returns(self) -> Points"),
+          R"(Pulses without an echo, where the sensor's file asks for them (else no rows).
+
+Columns: pulse, time_s, ring, dx, dy, dz (where the pulse went, axes of D) and reason.)")
+      .def_prop_ro("waveforms", &waveforms_of,
+                   nb::sig("def waveforms(self) -> dict[str, typing.Any] | None"),
+                   R"(The power received over time, where the sensor's file asks for it, or None.
+
+interval_s from sample to sample; power_w, all samples; and of each run of samples pulse (of the
+sweep), count, first_sample (index in power_w) and start_s, its time after the pulse left.)")
+      .def_prop_ro("convergence", &convergence_of,
+                   nb::sig("def convergence(self) -> dict[str, float] | None"),
+                   R"(How much twice the sub-rays would change, or None of single rays.
+
+Of every 64th pulse: pulses looked at, other_echoes (how many of them would have another number of
+echoes), range_rms_m and range_max_m, of the differences in range of the others' first echoes.)")
+      .def("__repr__", [](const Sweep& sweep) {
+        return fmt::format("<Scan {} of lidar '{}', {} s: {} echoes of {}>", sweep.frame,
+                           sweep.placed().spec.name, seconds_of(sweep.stamp()), sweep.cloud.rows(),
+                           fmt::join(names_of(sweep), ", "));
+      });
+}
+
+// ----- cameras
+
+FrameTimes times_of(const SceneCamera& camera) {
+  const PlacedCamera& placed = camera.placed();
+  return {fmt::format("camera '{}'", placed.spec.name),
+          static_cast<std::int64_t>(placed.begins.size()),
+          [&placed](std::int64_t image) { return placed.begins[static_cast<std::size_t>(image)]; }};
+}
+
+CameraImage expose(const SceneCamera& camera, std::optional<double> t_s,
+                   std::optional<std::int64_t> frame) {
+  const std::int64_t image = chosen_frame(times_of(camera), t_s, frame);
+  return without_gil([&](const StopRequest& stop) {
+    return make_image(camera.state, camera.index, image, [&] { stop.obey(); });
+  });
+}
+
+constexpr const char* expose_doc = R"(Makes one image, on all cores.
+
+Give either of
+  t_s    when the image's first row begins to see, in seconds of the scene's time: of `times_s`
+  frame  its number, from 0, as in the names of the files of `groundray generate`
+
+What the result holds is up to `products` in the camera's file: docs/python.md lists the channels,
+such as radiance_w_m2_sr (height x width x 3, linear sRGB), depth_m, range_m (height x width,
+infinite for sky), position_m (in the frame D), normal, label, instance and picture. Integer
+coordinates are centres of pixels; row 0 is uppermost. The same seed gives the same bytes, those of
+`groundray generate`.
+
+Other Python threads go on meanwhile. Ctrl-C ends light, which takes longest.
+Raises groundray.Error if no image begins then.)";
+
+AnyArray directions_of(nb::handle_t<SceneCamera> self) {
+  const auto& camera = nb::cast<const SceneCamera&>(self);
+  const std::span<const glm::dvec3> all =
+      without_gil([&](const StopRequest&) { return camera.placed().camera.directions(); });
+  const glm::uvec2 size_px(camera.placed().spec.camera.size_px);
+  return view(&all.front().x, {size_px.y, size_px.x, 3}, self);
+}
+
+AnyArray project(const SceneCamera& camera, const GivenPoints& points_m) {
+  constexpr double none = std::numeric_limits<double>::quiet_NaN();
+  const Lens& lens = camera.placed().camera.lens();
+  std::vector<double> pixels;
+  for (std::size_t i = 0; i < points_m.rows(); ++i) {
+    const auto pixel = lens.project({points_m(i, 0), points_m(i, 1), points_m(i, 2)});
+    pixels.push_back(pixel ? pixel->x : none);
+    pixels.push_back(pixel ? pixel->y : none);
+  }
+  return array_of(std::move(pixels), {points_m.rows(), 2});
+}
+
+void bind_camera(nb::module_& module) {
+  nb::class_<SceneCamera>(module, "Camera", "A camera on a scene's platform. See Scene.camera.")
+      .def_prop_ro("name", [](const SceneCamera& camera) { return camera.placed().spec.name; })
+      .def_prop_ro(
+          "model", [](const SceneCamera& camera) { return camera.placed().spec.camera.model; },
+          "Make and model, for people.")
+      .def_prop_ro(
+          "size_px",
+          [](const SceneCamera& camera) {
+            const glm::ivec2 size_px = camera.placed().spec.camera.size_px;
+            return std::pair(size_px.x, size_px.y);
+          },
+          "Width and height.")
+      .def_prop_ro(
+          "times_s", [](const SceneCamera& camera) { return all_times_s(times_of(camera)); },
+          nb::rv_policy::automatic, "When the images of the scene begin: n seconds.")
+      .def("expose", &expose, nb::kw_only(), "t_s"_a = nb::none(), "frame"_a = nb::none(),
+           expose_doc)
+      .def_prop_ro("directions", &directions_of,
+                   R"(Where the centres of all pixels look: height x width x 3, a view.
+
+Unit vectors in the camera's frame C (x right, y down, z ahead); zero where a pixel looks nowhere.)")
+      .def("project", &project, "points_m"_a,
+           R"(Where points of the camera's frame C (n x 3, metres) fall: n x 2, column and row, px.
+
+Inside of the image or not; NaN where the lens images nothing.)")
+      .def(
+          "pose",
+          [](const SceneCamera& camera, double t_s) {
+            return matrix_of(camera.placed().X_DC.pose_at(nanoseconds_of(t_s)));
+          },
+          "t_s"_a,
+          R"(The pose X_DC of the camera at a time of the scene: a 4 x 4 matrix.
+
+It takes points of the camera's frame C, as columns (x, y, z, 1) in metres, to the frame D.
+Raises groundray.Error outside the scene's time.)")
+      .def("__repr__", [](const SceneCamera& camera) {
+        const PlacedCamera& placed = camera.placed();
+        return fmt::format("<Camera '{}': {}, {} x {} px, {} images>", placed.spec.name,
+                           placed.spec.camera.model, placed.spec.camera.size_px.x,
+                           placed.spec.camera.size_px.y, placed.begins.size());
+      });
+}
+
+// ----- images
+
+std::vector<std::string> names_of(const CameraImage& image) {
+  std::vector<std::string> names;
+  for (const CameraImage::Channel& channel : image.channels) names.push_back(channel.name);
+  return names;
+}
+
+AnyArray channel_of(nb::handle_t<CameraImage> self, const std::string& name) {
+  const auto& image = nb::cast<const CameraImage&>(self);
+  const auto found = std::ranges::find(image.channels, name, &CameraImage::Channel::name);
+  if (found == image.channels.end()) {
+    const std::string text = fmt::format("there is no channel '{}'; the camera's products give {}",
+                                         name, fmt::join(names_of(image), ", "));
+    throw nb::key_error(text.c_str());
+  }
+  return std::visit(
+      [&](const auto& pixels) {
+        const auto height = static_cast<std::size_t>(pixels.height());
+        const auto width = static_cast<std::size_t>(pixels.width());
+        const auto depth = static_cast<std::size_t>(pixels.channels());
+        if (depth == 1 && name != "coverage")
+          return view(pixels.values().data(), {height, width}, self);
+        return view(pixels.values().data(), {height, width, depth}, self);
+      },
+      found->pixels);
+}
+
+void bind_image(nb::module_& module) {
+  nb::class_<CameraImage>(module, "Image", R"(One image of a camera: channels of one size.
+
+image["depth_m"] is a channel as a NumPy array, height x width or height x width x n, a view that
+may not be written to and that keeps the image alive. dict(image) is a dict of all channels.)")
+      .def("__getitem__", &channel_of, "name"_a, "The channel of this name: a view.")
+      .def("__len__", [](const CameraImage& image) { return image.channels.size(); })
+      .def(
+          "__contains__",
+          [](const CameraImage& image, const std::string& name) {
+            const std::vector<std::string> names = names_of(image);
+            return std::ranges::find(names, name) != names.end();
+          },
+          "name"_a)
+      .def(
+          "__iter__", [](const CameraImage& image) { return nb::iter(nb::cast(names_of(image))); },
+          nb::sig("def __iter__(self) -> collections.abc.Iterator[str]"),
+          "Goes over the names of the channels.")
+      .def(
+          "keys", [](const CameraImage& image) { return names_of(image); },
+          "The names of the channels.")
+      .def_prop_ro(
+          "labels", [](const CameraImage& image) { return image.labels; },
+          "Which classes the layers of `coverage` are of; 0 is the sky.")
+      .def_ro("frame", &CameraImage::frame, "The image's number, from 0.")
+      .def_prop_ro(
+          "t_s",
+          [](const CameraImage& image) {
+            return seconds_of(image.placed().begins[static_cast<std::size_t>(image.frame)]);
+          },
+          "When its first row began to see, in seconds of the scene's time.")
+      .def_prop_ro("sensor", [](const CameraImage& image) { return image.placed().spec.name; })
+      .def("__repr__", [](const CameraImage& image) {
+        return fmt::format("<Image {} of camera '{}': {}>", image.frame, image.placed().spec.name,
+                           fmt::join(names_of(image), ", "));
+      });
+}
+
+}  // namespace
+
+void bind_sensors(nb::module_& module) {
+  bind_scan(module);
+  bind_lidar(module);
+  bind_image(module);
+  bind_camera(module);
+}
+
+}  // namespace groundray::python

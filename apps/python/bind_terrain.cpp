@@ -1,0 +1,203 @@
+#include <fmt/format.h>
+#include <nanobind/stl/array.h>
+#include <nanobind/stl/filesystem.h>
+#include <nanobind/stl/optional.h>
+#include <nanobind/stl/shared_ptr.h>
+#include <nanobind/stl/string.h>
+
+#include <array>
+#include <cmath>
+#include <filesystem>
+#include <limits>
+#include <memory>
+#include <optional>
+#include <vector>
+
+#include "apps/python/arrays.h"
+#include "apps/python/bind.h"
+#include "apps/python/cast.h"
+#include "apps/python/given.h"
+#include "apps/python/long_call.h"
+#include "apps/python/mesh.h"
+#include "apps/python/points.h"
+#include "apps/python/terrain_model.h"
+#include "core/error.h"
+#include "terrain/dem_io.h"
+#include "terrain/layers_io.h"
+#include "terrain/terrain_mesh.h"
+
+namespace groundray::python {
+namespace {
+
+using nb::literals::operator""_a;
+using Pair = std::array<double, 2>;
+
+// In W, of whole metres, near the raster: D begins there.
+glm::dvec3 origin_for(const Pair& south_west_w_m) {
+  return {std::floor(south_west_w_m[0]), std::floor(south_west_w_m[1]), 0};
+}
+
+Dem dem_of(const GivenRaster& heights_m, double cell_m, const Pair& south_west_w_m,
+           const std::string& crs_wkt) {
+  constexpr std::size_t most = std::numeric_limits<int>::max();
+  Violations broken("Terrain");
+  broken.unless(heights_m.rows() <= most && heights_m.columns() <= most,
+                "heights_m is of {} x {} samples; there may be 2^31 - 1 each way", heights_m.rows(),
+                heights_m.columns());
+  broken.unless(cell_m > 0 && std::isfinite(cell_m), "cell_m = {} must be positive", cell_m);
+  broken.unless(std::isfinite(south_west_w_m[0]) && std::isfinite(south_west_w_m[1]),
+                "south_west_w_m = ({}, {}) must be finite", south_west_w_m[0], south_west_w_m[1]);
+  broken.throw_if_any();
+  const glm::ivec2 size(static_cast<int>(heights_m.columns()), static_cast<int>(heights_m.rows()));
+  const glm::dvec3 origin_w_m = origin_for(south_west_w_m);
+  const glm::dvec2 north_west(south_west_w_m[0] - origin_w_m.x,
+                              south_west_w_m[1] - origin_w_m.y + cell_m * (size.y - 1));
+  HeightGrid grid(size, north_west, {cell_m, -cell_m},
+                  std::vector<float>(heights_m.data(), heights_m.data() + heights_m.size()));
+  const Georeference place{origin_w_m, "", crs_wkt};
+  check_crs(place);
+  return {std::move(grid), origin_w_m, crs_wkt, crs_wkt.empty() ? "local (no CRS)" : "as given"};
+}
+
+using SharedTerrain = std::shared_ptr<TerrainModel>;
+
+SharedTerrain load(const std::filesystem::path& path, std::optional<double> nodata,
+                   const std::string& reproject_to) {
+  return without_gil([&](const StopRequest&) {
+    return std::make_shared<TerrainModel>(load_dem(path, {nodata, reproject_to}));
+  });
+}
+
+void save(const TerrainModel& terrain, const std::filesystem::path& path) {
+  without_gil([&](const StopRequest&) {
+    const Dem& dem = terrain.dem();
+    const RasterLayer layer{"elevation", "m", dem.grid.heights_m()};
+    write_layers(path, dem.grid.frame(), {dem.origin_w_m, dem.crs_name, dem.crs_wkt}, {&layer, 1});
+    return true;
+  });
+}
+
+Points cast(const TerrainModel& terrain, const GivenPoints& origins_m,
+            const GivenPoints& directions) {
+  const GivenRays rays(origins_m, directions, {});
+  return without_gil([&](const StopRequest& stop) {
+    rays.check();
+    return Points{cast_rays(terrain.scene(), rays, ErrorBounds::Omit, [&] { stop.obey(); })};
+  });
+}
+
+AnyArray heights_at(const TerrainModel& terrain, const GivenPlaces& places_m) {
+  std::vector<double> heights_m(places_m.rows());
+  for (std::size_t i = 0; i < heights_m.size(); ++i) {
+    heights_m[i] = terrain.dem()
+                       .grid.height_m_at({places_m(i, 0), places_m(i, 1)})
+                       .value_or(std::numeric_limits<double>::quiet_NaN());
+  }
+  return array_of(std::move(heights_m));
+}
+
+Mesh mesh_of(const TerrainModel& terrain, double max_error_m) {
+  return without_gil([&](const StopRequest&) {
+    const Dem& dem = terrain.dem();
+    TerrainMesh built = build_terrain_mesh(dem.grid, {.tolerance_m = max_error_m});
+    Mesh mesh{.georeference = {dem.origin_w_m, dem.crs_name, dem.crs_wkt}};
+    for (const glm::ivec2& sample : built.vertices)
+      mesh.measured.shape.vertices_m.emplace_back(dem.grid.frame().to_D(sample),
+                                                  dem.grid.height_m(sample.x, sample.y));
+    mesh.measured.shape.triangles = std::move(built.triangles);
+    mesh.measured.shape.levels = std::move(built.levels);
+    return mesh;
+  });
+}
+
+constexpr const char* terrain_doc = R"(A DEM in memory: the reference surface that rays meet.
+
+  heights_m       rows x columns, metres, the northernmost row first; NaN where there is none.
+                  Heights are kept as float32.
+  cell_m          from sample to sample, both ways
+  south_west_w_m  where the first sample of the last row stands in W
+  crs_wkt         W's coordinate reference system as WKT, or nothing: local metres
+
+Each cell is two triangles, split from sample (column + 1, row) to (column, row + 1). Places are
+in the frame D: W less `origin_w_m`, the whole metres of south_west_w_m. Immutable: any number of
+threads may use one. Raises groundray.Error naming every fault.)";
+
+}  // namespace
+
+void bind_terrain(nb::module_& module) {
+  nb::class_<TerrainModel>(module, "Terrain", terrain_doc)
+      .def(
+          "__init__",
+          [](TerrainModel* place, const GivenRaster& heights_m, double cell_m,
+             const Pair& south_west_w_m, const std::string& crs_wkt) {
+            new (place) TerrainModel(dem_of(heights_m, cell_m, south_west_w_m, crs_wkt));
+          },
+          "heights_m"_a, "cell_m"_a = 1.0, "south_west_w_m"_a = Pair{0, 0}, "crs_wkt"_a = "")
+      .def_prop_ro(
+          "heights_m",
+          [](nb::handle_t<TerrainModel> self) {
+            const HeightGrid& grid = nb::cast<const TerrainModel&>(self).dem().grid;
+            return view(
+                grid.heights_m().data(),
+                {static_cast<std::size_t>(grid.rows()), static_cast<std::size_t>(grid.columns())},
+                self);
+          },
+          "Heights of the samples, rows x columns, metres, as the file has them: a view.")
+      .def_prop_ro(
+          "first_sample_m",
+          [](const TerrainModel& terrain) {
+            const glm::dvec2 p = terrain.dem().grid.origin_m();
+            return Pair{p.x, p.y};
+          },
+          "Where sample (0, 0) stands, in D.")
+      .def_prop_ro(
+          "step_m",
+          [](const TerrainModel& terrain) {
+            const glm::dvec2 step_m = terrain.dem().grid.step_m();
+            return Pair{step_m.x, step_m.y};
+          },
+          "From column to column and row to row; below 0 southwards.")
+      .def_prop_ro(
+          "origin_w_m",
+          [](const TerrainModel& terrain) {
+            const glm::dvec3 p = terrain.dem().origin_w_m;
+            return std::array<double, 3>{p.x, p.y, p.z};
+          },
+          "Where the frame D begins in W: add it to places in D.")
+      .def_prop_ro(
+          "crs", [](const TerrainModel& terrain) { return terrain.dem().crs_name; },
+          "W's coordinate reference system, for people.")
+      .def("heights_at", &heights_at, "places_m"_a,
+           R"(Heights of the surface, n metres, in doubles.
+
+  places_m  n x 2, x and y in the frame D
+
+NaN outside of the DEM and in its holes.)")
+      .def("cast_rays", &cast, "origins_m"_a, "directions"_a,
+           R"(Casts rays at the surface, every facet decided in double, on all cores.
+
+  origins_m   n x 3, metres in the frame D
+  directions  n x 3, axes of D, of any length but zero
+
+As Scene.cast_rays; what stands on the ground is not there, and its label is 1.)")
+      .def("mesh", &mesh_of, "max_error_m"_a,
+           R"(The triangle mesh that is nowhere farther than this from the surface, vertically.
+
+Certified, at samples and between them; without T-junctions. 0 keeps all but what is flat.)")
+      .def("save", &save, "path"_a,
+           "Writes a GeoTIFF of float32 heights. It appears only when whole.")
+      .def("__repr__", [](const TerrainModel& terrain) {
+        const HeightGrid& grid = terrain.dem().grid;
+        return fmt::format("<Terrain: {} x {} samples of {} m, {}>", grid.columns(), grid.rows(),
+                           std::abs(grid.step_m().x), terrain.dem().crs_name);
+      });
+  module.def("load_terrain", &load, "path"_a, "nodata"_a = nb::none(), "reproject_to"_a = "",
+             R"(Loads a DEM as a whole: GeoTIFF, HGT, ESRI ASCII and whatever else GDAL reads.
+
+  nodata        a stored value that means "no height", besides the file's own
+  reproject_to  a projected CRS in metres to warp to, such as "EPSG:32631", or "utm"
+
+Raises groundray.Error, with the command that mends the file where one can.)");
+}
+
+}  // namespace groundray::python

@@ -1,0 +1,362 @@
+"""Datasets as `groundray generate` writes them: what they hold, and their scans, paths and cameras.
+
+Files are read when they are asked for, one at a time. Lengths are metres, angles radians; times are
+whole nanoseconds on the dataset's own clock, which begins at `Dataset.time_origin_ns`. Frames: D is
+the dataset's (east, north, up; W less `origin_w_m`), B the body, S a lidar, C a camera.
+"""
+
+from __future__ import annotations
+
+import re
+from collections.abc import Sequence
+from dataclasses import dataclass
+from decimal import Decimal, InvalidOperation
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+import yaml
+from numpy.typing import NDArray
+
+try:
+    from groundray import Error
+except ImportError:  # without the compiled module, or while the package is being imported
+
+    class Error(RuntimeError):  # type: ignore[no-redef]
+        """What is wrong, where, and what would mend it."""
+
+
+__all__ = ["Camera", "Dataset", "Error", "Frame", "Lidar", "ObjectGroup", "StereoPair", "matrix_of"]
+
+Floats = NDArray[np.float64]
+
+_LOADER: Any = getattr(yaml, "CBaseLoader", yaml.BaseLoader)  # all scalars stay text
+
+
+@dataclass(frozen=True)
+class Frame:
+    """A scan or an image that is done: its number, and when it begins."""
+
+    number: int
+    stamp_ns: int
+
+
+@dataclass(frozen=True)
+class Lidar:
+    """A lidar. `is_deskewed`: x, y, z are of S at the stamp, else of S as each pulse fired.
+
+    `intensity_scale` is what its column means: `cosine` (without light), `power`, `reflectance` or
+    `eight_bit`. `returns` is which echoes of a pulse it reports.
+    """
+
+    name: str
+    number: int
+    model: str
+    frames: tuple[Frame, ...]
+    X_BS: Floats
+    is_deskewed: bool
+    intensity_scale: str
+    returns: str
+
+
+@dataclass(frozen=True)
+class Camera:
+    """A camera: its lens is `lens_model` with what the calibration says of it.
+
+    X_BC is the mount of C as it is rendered. Row v sees from stamp + v `row_s` for `exposure_s`.
+    """
+
+    name: str
+    number: int
+    model: str
+    frames: tuple[Frame, ...]
+    X_BC: Floats
+    size_px: tuple[int, int]
+    lens_model: str
+    lens: dict[str, Any]
+    exposure_s: float
+    row_s: float
+
+    @property
+    def middle_ns(self) -> int:
+        """From an image's stamp to the middle of its middle row's exposure."""
+        return round((self.exposure_s + self.row_s * (self.size_px[1] - 1)) / 2 * 1e9)
+
+    def pinhole_matrix(self) -> Floats | None:
+        """Returns K, 3 x 3, px; none of a lens that is not a pinhole."""
+        has_distortion = any(float(k) for k in self.lens.get("coefficients", []))
+        if self.lens_model not in ("pinhole", "brown_conrady") or has_distortion:
+            return None
+        f_u, f_v = (float(f) for f in self.lens["focal_px"])
+        c_u, c_v = (float(c) for c in self.lens["centre_px"])
+        return np.array(
+            [[f_u, f_u * float(self.lens.get("skew", 0)), c_u], [0, f_v, c_v], [0, 0, 1]]
+        )
+
+
+@dataclass(frozen=True)
+class StereoPair:
+    """Two cameras by their names."""
+
+    name: str
+    left: str
+    right: str
+    is_rectified: bool
+
+
+@dataclass(frozen=True)
+class ObjectGroup:
+    """Objects of one entry of the scene: `count` instances from `first_instance` on."""
+
+    name: str
+    label: int
+    first_instance: int
+    count: int
+
+
+def matrix_of(
+    rotation_xyzw: Sequence[float] | Floats, translation_m: Sequence[float] | Floats
+) -> Floats:
+    """Returns the pose as a 4 x 4 matrix."""
+    x, y, z, w = np.asarray(rotation_xyzw, dtype=float) / np.linalg.norm(rotation_xyzw)
+    X = np.eye(4)
+    X[:3, :3] = [
+        [1 - 2 * (y * y + z * z), 2 * (x * y - z * w), 2 * (x * z + y * w)],
+        [2 * (x * y + z * w), 1 - 2 * (x * x + z * z), 2 * (y * z - x * w)],
+        [2 * (x * z - y * w), 2 * (y * z + x * w), 1 - 2 * (x * x + y * y)],
+    ]
+    X[:3, 3] = translation_m
+    return X
+
+
+class _Map:
+    """A map of a YAML file whose every wrong value is one error that says where."""
+
+    def __init__(self, path: Path, value: Any, where: str = "") -> None:
+        self.path = path
+        self.where = where
+        if not isinstance(value, dict):
+            raise Error(
+                f"{path}: {where or 'the file'} must be a map of keys and values; was it cut short?"
+            )
+        self.values: dict[str, Any] = value
+
+    def fault(self, key: str, rule: str) -> Error:
+        place = f"{self.where}.{key}" if self.where else key
+        return Error(f"{self.path}: {place} {rule}")
+
+    def get(self, key: str) -> Any:
+        if key not in self.values:
+            raise self.fault(key, "is missing: is this a file of groundray, and whole?")
+        return self.values[key]
+
+    def text(self, key: str, default: str | None = None) -> str:
+        value = self.values.get(key, default) if default is not None else self.get(key)
+        if not isinstance(value, str):
+            raise self.fault(key, "must be a text")
+        return value
+
+    def numbers(self, key: str, count: int | None = None) -> list[float]:
+        value = self.get(key)
+        try:
+            numbers = [float(each) for each in value] if isinstance(value, list) else [float(value)]
+        except (TypeError, ValueError):
+            raise self.fault(key, f"= {value} must be of numbers") from None
+        if (count is not None and len(numbers) != count) or not np.all(np.isfinite(numbers)):
+            raise self.fault(key, f"= {value} must be {count or 'finite'} finite numbers")
+        return numbers
+
+    def whole(self, key: str) -> int:
+        number = self.numbers(key, 1)[0]
+        if number != int(number):
+            raise self.fault(key, f"= {number} must be a whole number")
+        return int(number)
+
+    def time_ns(self, key: str) -> int:
+        """Seconds as they are written, to the nanosecond: a double has too few digits."""
+        try:
+            return int((Decimal(self.text(key)) * 10**9).to_integral_value())
+        except (InvalidOperation, ValueError):
+            raise self.fault(key, f"= {self.values[key]} must be a number of seconds") from None
+
+    def maps(self, key: str, *, is_optional: bool = False) -> list[_Map]:
+        value = self.values.get(key, []) if is_optional else self.get(key)
+        if not isinstance(value, list):
+            raise self.fault(key, "must be a list; was the file cut short?")
+        return [_Map(self.path, each, f"{key}[{i}]") for i, each in enumerate(value)]
+
+
+def _load_yaml(text: str, path: Path) -> Any:
+    try:
+        return yaml.load(text, Loader=_LOADER)
+    except yaml.YAMLError as fault:
+        mark = getattr(fault, "problem_mark", None)
+        place = f":{mark.line + 1}:{mark.column + 1}" if mark is not None else ""
+        problem = getattr(fault, "problem", None) or "it is not YAML"
+        raise Error(f"{path}{place}: {problem}; was the file cut short or edited?") from None
+
+
+def _read_map(path: Path) -> _Map:
+    try:
+        text = path.read_text(encoding="utf-8")
+    except OSError as fault:
+        raise Error(f"{path}: cannot read it: {fault.strerror}; is this a whole dataset?") from None
+    except UnicodeDecodeError:
+        raise Error(f"{path}: it is not text in UTF-8; was it damaged?") from None
+    return _Map(path, _load_yaml(text, path))
+
+
+def _read_mount(calibration: _Map, key: str) -> Floats:
+    mount = _Map(calibration.path, calibration.values.get(key, {}), key)
+    if not mount.values:
+        return np.eye(4)
+    rotation_xyzw = mount.numbers("rotation_xyzw", 4)
+    if abs(np.linalg.norm(rotation_xyzw) - 1) > 1e-6:
+        raise mount.fault("rotation_xyzw", "must be of length 1")
+    return matrix_of(rotation_xyzw, mount.numbers("translation_m", 3))
+
+
+class Dataset:
+    """What `dataset.yaml` and the calibrations of a folder say."""
+
+    def __init__(self, folder: str | Path) -> None:
+        """Reads all but scans, images and paths.
+
+        Raises Error if the folder holds no dataset, or a file of it says what cannot be.
+        """
+        self.folder = Path(folder)
+        record = self.folder / "dataset.yaml"
+        if not record.is_file():
+            raise Error(
+                f"{self.folder}: it holds no dataset.yaml; give a folder of groundray generate"
+            )
+        root = _read_map(record)
+        if root.text("groundray_dataset") != "1":
+            raise root.fault(
+                "groundray_dataset",
+                f"= {root.get('groundray_dataset')} must be 1: use a newer groundray",
+            )
+        self.version = root.text("version", "")
+        self.seed = root.text("seed", "")
+        self.time_origin_ns = root.time_ns("time_origin_s") if "time_origin_s" in root.values else 0
+        self.origin_w_m: Floats = np.array(root.numbers("origin_w_m", 3))
+        self.crs = root.text("crs", "")
+        self.crs_wkt = root.text("crs_wkt", "")
+        self.scene = root.text("scene", "")
+        self.pairs: list[StereoPair] = []
+        self.lidars: list[Lidar] = []
+        self.cameras: list[Camera] = []
+        self.pending = 0
+        frames = self._read_frames(root)
+        for sensor in root.maps("sensors"):
+            self._read_sensor(sensor, frames)
+        self.object_groups = [
+            ObjectGroup(
+                each.text("name"),
+                each.whole("label"),
+                each.whole("first_instance"),
+                each.whole("count"),
+            )
+            for each in root.maps("objects", is_optional=True)
+        ]
+
+    def _read_frames(self, root: _Map) -> dict[str, list[Frame | None]]:
+        """Returns the frames of each sensor; none for one that is pending."""
+        frames: dict[str, list[Frame | None]] = {}
+        for each in root.maps("frames"):
+            state = each.text("state")
+            if state not in ("done", "pending"):
+                raise each.fault("state", f"= {state} must be done or pending")
+            frame = Frame(each.whole("frame"), each.time_ns("stamp_s")) if state == "done" else None
+            frames.setdefault(each.text("sensor"), []).append(frame)
+        return frames
+
+    def _read_sensor(self, sensor: _Map, frames: dict[str, list[Frame | None]]) -> None:
+        name, kind = sensor.text("name"), sensor.text("kind")
+        if not re.fullmatch(r"[A-Za-z0-9_-]+", name):
+            raise sensor.fault("name", f"= {name!r} must be of letters, digits, _ and -")
+        if kind == "stereo":
+            is_rectified = sensor.text("images", "") == "rectified"
+            self.pairs.append(
+                StereoPair(name, sensor.text("left"), sensor.text("right"), is_rectified)
+            )
+            return
+        listed = frames.get(name, [])
+        if "frames" in sensor.values and sensor.whole("frames") != len(listed):
+            rule = f"= {sensor.whole('frames')}, but {len(listed)} of {name} are listed"
+            raise sensor.fault("frames", f"{rule}: was the file cut short?")
+        done = tuple(sorted((f for f in listed if f is not None), key=lambda frame: frame.number))
+        self.pending += len(listed) - len(done)
+        calibration = _read_map(self.folder / "calibration" / f"{name}.yaml")
+        number = sensor.whole("number")
+        if kind == "lidar":
+            self.lidars.append(_lidar(name, number, done, calibration, self.scene))
+        elif kind == "camera":
+            self.cameras.append(_camera(name, number, done, calibration))
+        else:
+            raise sensor.fault("kind", f"= {kind} must be lidar, camera or stereo")
+
+    def scan_file(self, lidar: Lidar, frame: Frame, suffix: str = ".ply") -> Path:
+        """Returns where that scan is."""
+        return self.folder / "lidar" / lidar.name / f"{frame.number:06}{suffix}"
+
+    def image_file(self, camera: Camera, frame: Frame, suffix: str) -> Path:
+        """Returns where that product of an image is, or would be."""
+        return self.folder / "camera" / camera.name / f"{frame.number:06}{suffix}"
+
+    def path_file(self, sensor: Lidar | Camera) -> Path:
+        """Returns where the sensor's path through D is."""
+        return self.folder / "poses" / f"{sensor.name}.tum"
+
+    def camera_info_file(self, camera: Camera) -> Path:
+        """Returns where the lens is as ROS has it, if ROS has words for it."""
+        return self.folder / "calibration" / f"{camera.name}.ros.yaml"
+
+
+def _camera(name: str, number: int, frames: tuple[Frame, ...], calibration: _Map) -> Camera:
+    lens = _Map(calibration.path, calibration.get("lens"), "lens").values
+    if len(lens) != 1:
+        raise calibration.fault("lens", "must have one key, the lens model")
+    ((lens_model, values),) = lens.items()
+    width, height = calibration.numbers("size_px", 2)
+    return Camera(
+        name=name,
+        number=number,
+        model=calibration.text("model", ""),
+        frames=frames,
+        X_BC=_read_mount(calibration, "X_BC"),
+        size_px=(int(width), int(height)),
+        lens_model=lens_model,
+        lens=values if isinstance(values, dict) else {},
+        exposure_s=calibration.numbers("exposure_s", 1)[0],
+        row_s=calibration.numbers("row_s", 1)[0],
+    )
+
+
+def _receiver(name: str, calibration: _Map, scene: str) -> dict[str, Any]:
+    """The receiver of the lidar's file, or of the scene in its place; nothing without a laser."""
+    own = _load_yaml(calibration.text("lidar_file", "{}"), calibration.path)
+    settings: dict[str, Any] = dict(own) if isinstance(own, dict) else {}
+    of_scene = _load_yaml(scene, calibration.path) if scene else {}
+    lidars = of_scene.get("lidars", []) if isinstance(of_scene, dict) else []
+    for lidar in lidars if isinstance(lidars, list) else []:
+        if isinstance(lidar, dict) and lidar.get("name") == name:
+            settings |= {key: lidar[key] for key in ("laser", "receiver") if key in lidar}
+    receiver = settings.get("receiver")
+    return receiver if "laser" in settings and isinstance(receiver, dict) else {}
+
+
+def _lidar(
+    name: str, number: int, frames: tuple[Frame, ...], calibration: _Map, scene: str
+) -> Lidar:
+    receiver = _receiver(name, calibration, scene)
+    return Lidar(
+        name=name,
+        number=number,
+        model=calibration.text("model", ""),
+        frames=frames,
+        X_BS=_read_mount(calibration, "X_BS"),
+        is_deskewed=calibration.text("points", "as_fired") == "at_stamp",
+        intensity_scale=str(receiver.get("intensity", "power")) if receiver else "cosine",
+        returns=str(receiver.get("returns", "strongest")),
+    )

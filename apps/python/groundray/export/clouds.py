@@ -1,0 +1,122 @@
+"""PCD and NPZ: a file for each scan."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+from numpy.typing import NDArray
+
+from groundray.dataset import Dataset, Error, Lidar
+from groundray.export.notes import Notes
+from groundray.export.scan import UNITS, Scan, read_scan
+from groundray.export.sensor_path import Floats, SensorPath, quaternion_wxyz
+
+_PCD_KINDS = {"f": "F", "i": "I", "u": "U"}
+
+
+def write_pcd(
+    dataset: Dataset, lidars: Sequence[Lidar], columns: Sequence[str], frame: str, out: Path
+) -> str:
+    """Writes `<lidar>/000000.pcd`, binary, with these columns (all, if none are named).
+
+    `frame` is that of x, y, z: `fired`, as the scan has them; `stamp`, S at the stamp; `world`, D.
+    """
+    count = 0
+    for lidar in lidars:
+        path = SensorPath(dataset.path_file(lidar))
+        (out / lidar.name).mkdir()
+        for each in lidar.frames:
+            scan = read_scan(dataset, lidar, each)
+            X_DS = path.pose_at(each.stamp_ns)
+            rows = scan.rows
+            if frame != "fired":
+                is_world = frame == "world"
+                points_m = (
+                    scan.points_in_world_m(path)
+                    if is_world
+                    else scan.points_at_m(path, each.stamp_ns)
+                )
+                rows = rows.copy()
+                for i, axis in enumerate("xyz"):
+                    rows[axis] = points_m[:, i]
+                X_DS = np.eye(4) if is_world else X_DS
+            rows = chosen_columns(rows, columns, str(dataset.scan_file(lidar, each)))
+            normals = {f"n{axis}": f"normal_{axis}" for axis in "xyz"} if frame == "world" else {}
+            file = out / lidar.name / f"{each.number:06}.pcd"
+            file.write_bytes(_pcd_header(rows, X_DS, normals) + rows.tobytes())
+            count += 1
+    return f"{count} scans"
+
+
+def chosen_columns(rows: NDArray[Any], columns: Sequence[str], file: str) -> NDArray[Any]:
+    """Returns these columns, packed, in this order. Raises Error for one that is not there."""
+    names = tuple(rows.dtype.names or ())
+    missing = [name for name in columns if name not in names]
+    if missing:
+        rule = f"it has no column {', '.join(missing)}; it has {', '.join(names)}"
+        raise Error(f"{file}: {rule}")
+    kept = list(columns) or list(names)
+    packed = np.zeros(len(rows), [(name, rows.dtype[name]) for name in kept])
+    for name in kept:
+        packed[name] = rows[name]
+    return packed
+
+
+def _pcd_header(rows: NDArray[Any], X_DS: Floats, other_names: dict[str, str]) -> bytes:
+    names = rows.dtype.names or ()
+    types = [rows.dtype[name] for name in names]
+    position_m, (w, x, y, z) = X_DS[:3, 3], quaternion_wxyz(X_DS[:3, :3])
+    view = " ".join(f"{value:.9g}" for value in (*position_m, w, x, y, z))
+    lines = [
+        "# .PCD v0.7 - Point Cloud Data file format",
+        "VERSION 0.7",
+        "FIELDS " + " ".join(other_names.get(name, name) for name in names),
+        "SIZE " + " ".join(str(each.itemsize) for each in types),
+        "TYPE " + " ".join(_PCD_KINDS[each.kind] for each in types),
+        "COUNT " + " ".join("1" for _ in types),
+        f"WIDTH {len(rows)}",
+        "HEIGHT 1",
+        f"VIEWPOINT {view}",
+        f"POINTS {len(rows)}",
+        "DATA binary",
+    ]
+    return ("\n".join(lines) + "\n").encode("ascii")
+
+
+def write_npz(dataset: Dataset, lidars: Sequence[Lidar], out: Path) -> str:
+    """Writes `<lidar>/000000.npz`: an array for each column, its unit in its name, and the pose."""
+    count = 0
+    for lidar in lidars:
+        path = SensorPath(dataset.path_file(lidar))
+        (out / lidar.name).mkdir()
+        for frame in lidar.frames:
+            scan = read_scan(dataset, lidar, frame)
+            arrays: dict[str, Any] = {
+                "stamp_ns": np.int64(dataset.time_origin_ns + frame.stamp_ns),
+                "X_DS": path.pose_at(frame.stamp_ns),
+                "origin_w_m": dataset.origin_w_m,
+                "crs_wkt": np.str_(dataset.crs_wkt),
+            }
+            for name in scan.names:
+                arrays[name_with_unit(name)] = np.ascontiguousarray(scan.rows[name])
+            np.savez(out / lidar.name / f"{frame.number:06}.npz", **arrays)
+            count += 1
+    return f"{count} scans"
+
+
+def name_with_unit(column: str) -> str:
+    """Returns the name of a column with its unit: range_true_m of range_true."""
+    unit = UNITS.get(column, "").replace("/", "_").lower()
+    return f"{column}_{unit}" if unit else column
+
+
+def tell_of_scan(scan: Scan, notes: Notes) -> None:
+    """Tells of the rows that are echoes of nothing, which forms without `kind` cannot mark."""
+    if "kind" in scan.names:
+        sentence = (
+            "{} points are echoes of air or false alarms, which nothing marks; their label is 0"
+        )
+        notes.count(sentence, int(np.count_nonzero(scan.rows["kind"])))

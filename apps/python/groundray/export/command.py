@@ -1,0 +1,269 @@
+"""The command groundray-export."""
+
+from __future__ import annotations
+
+import argparse
+import importlib.util
+import signal
+import sys
+from collections.abc import Callable, Sequence
+from pathlib import Path
+from types import FrameType
+
+from groundray.dataset import Camera, Dataset, Error, Lidar
+from groundray.export import clouds, kitti, las, ros_bag, tum
+from groundray.export.folder import written_aside
+from groundray.export.intensity import FullScale
+from groundray.export.labels import LabelMap
+from groundray.export.left_out import tell_of_columns, tell_of_products
+from groundray.export.notes import Notes
+
+DONE, FAILED, INTERRUPTED = 0, 1, 130  # argparse exits with 2 of wrong usage
+
+_FORMS = ("kitti", "semantic-kitti", "tum", "pcd", "las", "laz", "npz", "mcap")
+_KITTI, _LAS = {"kitti", "semantic-kitti"}, {"las", "laz"}
+# Which forms an option is for; all others take it.
+_ONLY_OF = {
+    "lidar": set(_FORMS) - {"tum"},
+    "camera": _KITTI | {"tum", "mcap"},
+    "no_images": _KITTI | {"mcap"},
+    "intensity_full_scale": _KITTI | _LAS | {"mcap"},
+    "sequence": _KITTI,
+    "labels": {"semantic-kitti"} | _LAS,
+    "depth_per_m": {"tum"},
+    "columns": {"pcd"},
+    "frame": {"pcd"},
+    "merge": _LAS,
+    "place": _LAS,
+    "clock": _LAS,
+    "points": {"mcap"},
+    "depth": {"mcap"},
+    "compression": {"mcap"},
+    "shift_s": {"mcap"},
+}
+# Which packages a form is written with, by the names that pip knows.
+_PACKAGES = {
+    "tum": {"cv2": "opencv-python-headless", "OpenEXR": "openexr"},
+    "las": {"laspy": "laspy", "pyproj": "pyproj"},
+    "laz": {"laspy": "laspy", "lazrs": "lazrs", "pyproj": "pyproj"},
+    "mcap": {
+        "mcap": "mcap",
+        "mcap_ros2": "mcap-ros2-support",
+        "cv2": "opencv-python-headless",
+        "OpenEXR": "openexr",
+    },
+}
+
+
+def _parser() -> argparse.ArgumentParser:
+    parser = argparse.ArgumentParser(
+        prog="groundray-export",
+        description="Write a dataset of groundray generate in the form that other programs read.",
+        epilog="What each form holds, and what it cannot say: docs/export.md. Exit codes: "
+        "0 done, 1 failed, 2 wrong usage, 130 interrupted. OUT appears only when whole.",
+        allow_abbrev=False,
+    )
+    parser.add_argument("dataset", metavar="DATASET", type=Path, help="folder with a dataset.yaml")
+    parser.add_argument("--to", required=True, choices=_FORMS, help="form of the files")
+    parser.add_argument(
+        "-o",
+        "--output",
+        required=True,
+        type=Path,
+        metavar="OUT",
+        help="a new folder, or an empty one",
+    )
+    parser.add_argument(
+        "--skip-pending", action="store_true", help="export what is done of an unfinished dataset"
+    )
+    _add_choices(parser.add_argument_group("what of it"))
+    _add_points(parser.add_argument_group("points"))
+    _add_others(parser.add_argument_group("others"))
+    return parser
+
+
+def _add_choices(group: argparse._ArgumentGroup) -> None:
+    add = group.add_argument
+    add("--lidar", action="append", metavar="NAME", help="only this lidar; may be repeated")
+    add("--camera", action="append", metavar="NAME", help="only this camera; may be repeated")
+    text = "no cameras (kitti, semantic-kitti, mcap)"
+    add("--no-images", action="store_true", default=None, help=text)
+
+
+def _add_points(group: argparse._ArgumentGroup) -> None:
+    add = group.add_argument
+    text = "intensity that is 1, 255 or 65535 in forms with such a scale"
+    add("--intensity-full-scale", type=_positive, metavar="I", help=text)
+    text = "other numbers for labels (semantic-kitti, las, laz)"
+    add("--labels", type=Path, metavar="MAP.yaml", help=text)
+    add("--columns", metavar="A,B,...", help="columns of a PCD file; all if not given")
+    text = "frame of x, y, z in a PCD file (fired)"
+    add("--frame", choices=("fired", "stamp", "world"), help=text)
+    text = "which points a LAS file has (measured)"
+    add("--place", choices=("measured", "truth"), help=text)
+    text = "what the dataset's seconds are, for LAS (run)"
+    add("--clock", choices=("run", "gps", "unix"), help=text)
+    text = "one LAS file for each lidar"
+    add("--merge", action="store_true", default=None, help=text)
+
+
+def _add_others(group: argparse._ArgumentGroup) -> None:
+    add = group.add_argument
+    add("--sequence", type=_whole, metavar="N", help="number of KITTI's first sequence (0)")
+    text = "what a metre is in TUM's depths (5000)"
+    add("--depth-per-m", type=_positive, metavar="N", help=text)
+    text = "layout of ROS 2 points (full)"
+    add("--points", choices=("velodyne", "ouster", "autoware", "full"), help=text)
+    add("--depth", action="store_true", default=None, help="depth images too, in a bag")
+    add("--compression", choices=("zstd", "lz4", "none"), help="of a bag (zstd)")
+    add("--shift-s", type=_seconds_ns, metavar="T", help="added to all stamps of a bag")
+
+
+def _positive(text: str) -> float:
+    value = float(text)
+    if not 0 < value < float("inf"):
+        raise argparse.ArgumentTypeError(f"{text} must be above 0")
+    return value
+
+
+def _whole(text: str) -> int:
+    value = int(text)
+    if not 0 <= value <= 99:
+        raise argparse.ArgumentTypeError(f"{text} must be from 0 to 99")
+    return value
+
+
+def _seconds_ns(text: str) -> int:
+    value = float(text)
+    if not abs(value) < 2**31:
+        raise argparse.ArgumentTypeError(f"{text} must be within 2^31 s")
+    return round(value * 1e9)
+
+
+def _check_options(parser: argparse.ArgumentParser, options: argparse.Namespace) -> None:
+    for name, forms in _ONLY_OF.items():
+        if getattr(options, name) is not None and options.to not in forms:
+            parser.error(
+                f"--{name.replace('_', '-')} is of {', '.join(sorted(forms))}, not of {options.to}"
+            )
+    if options.camera and options.no_images:
+        parser.error("--camera and --no-images exclude each other")
+
+
+def _chosen(dataset: Dataset, kind: str, names: Sequence[str] | None) -> list[Lidar] | list[Camera]:
+    sensors: list[Lidar] | list[Camera] = dataset.lidars if kind == "lidar" else dataset.cameras
+    if names is None:
+        return sensors
+    known = [sensor.name for sensor in sensors]
+    for name in names:
+        if name not in known:
+            raise Error(
+                f"{dataset.folder}: it has no {kind} {name}; it has: {', '.join(known) or 'none'}"
+            )
+    return [sensor for sensor in sensors if sensor.name in names]  # type: ignore[return-value]
+
+
+def _export(options: argparse.Namespace, out: Path, dataset: Dataset, notes: Notes) -> str:
+    lidars: list[Lidar] = _chosen(dataset, "lidar", options.lidar)  # type: ignore[assignment]
+    cameras: list[Camera] = _chosen(dataset, "camera", options.camera)  # type: ignore[assignment]
+    if options.no_images:
+        cameras = []
+    if not lidars and options.to not in ("tum", "mcap"):
+        raise Error(f"{dataset.folder}: it has no lidar, and {options.to} is of scans")
+    full_scale = FullScale(options.intensity_full_scale)
+    if lidars:
+        tell_of_columns(options.to, options.points or "full", notes)
+    tell_of_products(dataset, options.to, lidars, cameras, notes)
+    if options.to in _KITTI:
+        labels = LabelMap(options.labels, 65535) if options.to == "semantic-kitti" else None
+        settings = kitti.KittiOptions(options.sequence or 0, full_scale, labels)
+        return kitti.write_kitti(dataset, lidars, cameras, settings, out, notes)
+    if options.to == "tum":
+        return tum.write_tum(dataset, cameras, options.depth_per_m or 5000, out, notes)
+    if options.to == "pcd":
+        columns = options.columns.split(",") if options.columns else []
+        return clouds.write_pcd(dataset, lidars, columns, options.frame or "fired", out)
+    if options.to == "npz":
+        return clouds.write_npz(dataset, lidars, out)
+    if options.to in _LAS:
+        labels = LabelMap(options.labels, 255) if options.labels else None
+        place, clock = options.place or "measured", options.clock or "run"
+        form = las.LasOptions(options.to, bool(options.merge), place, clock, full_scale, labels)
+        return las.write_las(dataset, lidars, form, out, notes)
+    if not lidars and not cameras:
+        raise Error(f"{dataset.folder}: it has no sensor to export")
+    bag = ros_bag.BagOptions(
+        options.points or "full",
+        options.compression or "zstd",
+        options.shift_s,
+        bool(options.depth),
+        full_scale,
+    )
+    return ros_bag.write_bag(dataset, lidars, cameras, bag, out, notes)
+
+
+def _check_packages(form: str) -> None:
+    missing = [
+        name
+        for module, name in _PACKAGES.get(form, {}).items()
+        if importlib.util.find_spec(module) is None
+    ]
+    if missing:
+        rule = f"{form} is written with {', '.join(missing)}, which is not installed"
+        raise Error(f"{rule}: pip install {' '.join(missing)}, or groundray[export]")
+
+
+def _open(options: argparse.Namespace) -> Dataset:
+    dataset = Dataset(options.dataset)
+    if dataset.pending and not options.skip_pending:
+        rule = f"{dataset.pending} of its frames are pending"
+        fix = "finish it with groundray generate, or export the others with --skip-pending"
+        raise Error(f"{dataset.folder}: {rule}; {fix}")
+    return dataset
+
+
+def _interrupt(_signal: int, _frame: FrameType | None) -> None:
+    raise KeyboardInterrupt
+
+
+def _guarded(work: Callable[[], str]) -> tuple[int, str]:
+    """Runs work; returns the exit code and what to say."""
+    try:
+        return DONE, work()
+    except KeyboardInterrupt:
+        return INTERRUPTED, "interrupted; nothing was written"
+    except Error as fault:
+        return FAILED, str(fault)
+    except OSError as fault:
+        place = f"{fault.filename}: " if fault.filename else ""
+        return FAILED, f"{place}{fault.strerror or fault}; nothing was written"
+
+
+def main(arguments: Sequence[str] | None = None) -> int:
+    """Runs the command; returns its exit code."""
+    parser = _parser()
+    options = parser.parse_args(arguments)
+    _check_options(parser, options)
+    signal.signal(signal.SIGTERM, _interrupt)
+    notes = Notes()
+
+    def work() -> str:
+        _check_packages(options.to)
+        dataset = _open(options)
+        if dataset.pending:
+            notes.tell(f"{dataset.pending} frames are pending and left out")
+        with written_aside(options.output, options.dataset) as folder:
+            return _export(options, folder, dataset, notes)
+
+    code, told = _guarded(work)
+    if code != DONE:
+        print(f"groundray-export: {told}", file=sys.stderr)
+        return code
+    for line in notes.lines():
+        print(f"note: {line}")
+    print(f"{options.output}: {told}")
+    return DONE
+
+
+if __name__ == "__main__":
+    sys.exit(main())

@@ -1,0 +1,130 @@
+"""Images of cameras: pictures as files, and depths from the truth."""
+
+from __future__ import annotations
+
+import io
+import os
+import struct
+import sys
+from collections.abc import Iterator
+from contextlib import contextmanager, redirect_stdout
+from pathlib import Path
+from typing import Any, NamedTuple
+
+import numpy as np
+from numpy.typing import NDArray
+
+from groundray.dataset import Camera, Dataset, Error, Frame
+
+_GREY, _COLOUR = 0, 2  # colour types of PNG
+
+
+class Picture(NamedTuple):
+    """A picture as its PNG file has it."""
+
+    file: Path
+    data: bytes
+    bits: int
+    is_colour: bool
+
+
+def has_pictures(dataset: Dataset, camera: Camera) -> bool:
+    """Whether any image of the camera has a picture: then all must."""
+    return any(dataset.image_file(camera, frame, ".png").is_file() for frame in camera.frames)
+
+
+def has_depths(dataset: Dataset, camera: Camera) -> bool:
+    """Whether any image of the camera has the truth: then all must."""
+    files = (dataset.image_file(camera, frame, ".exr") for frame in camera.frames)
+    first = next((file for file in files if file.is_file()), None)
+    return first is not None and "Z" in _channels(first, only_names=True)
+
+
+def read_picture(dataset: Dataset, camera: Camera, frame: Frame) -> Picture:
+    """Reads a picture. Raises Error if it is missing, cut short or of another size."""
+    file = dataset.image_file(camera, frame, ".png")
+    data = _read(file)
+    # Signature, then the chunk IHDR; the last one is IEND, which is empty.
+    if data[:8] != b"\x89PNG\r\n\x1a\n" or data[12:16] != b"IHDR" or data[-8:-4] != b"IEND":
+        raise Error(f"{file}: it is no whole PNG file: it is damaged; generate it again")
+    width, height, bits, colours = struct.unpack(">IIBB", data[16:26])
+    if (width, height) != camera.size_px or bits not in (8, 16) or colours not in (_GREY, _COLOUR):
+        rule = f"must have {camera.size_px[0]} x {camera.size_px[1]} pixels, grey or RGB"
+        raise Error(f"{file}: it {rule}, as the camera's calibration says; is it another's?")
+    return Picture(file, data, bits, colours == _COLOUR)
+
+
+def pixels_of(picture: Picture) -> NDArray[Any]:
+    """Returns height x width (x 3: red, green, blue), of 8 or 16 bits."""
+    import cv2
+
+    with _quiet_library():
+        pixels = cv2.imdecode(np.frombuffer(picture.data, np.uint8), cv2.IMREAD_UNCHANGED)
+    if pixels is None:
+        raise Error(f"{picture.file}: its pixels cannot be read: it is damaged; generate it again")
+    return np.ascontiguousarray(pixels[..., ::-1]) if picture.is_colour else pixels
+
+
+def png_of(pixels: NDArray[np.uint16]) -> bytes:
+    """Returns a grey image of 16 bits as a PNG file."""
+    import cv2
+
+    return bytes(cv2.imencode(".png", pixels)[1])
+
+
+def read_depths_m(dataset: Dataset, camera: Camera, frame: Frame) -> NDArray[np.float32]:
+    """Reads the depths Z along the optical axis: height x width; infinite for sky."""
+    file = dataset.image_file(camera, frame, ".exr")
+    channels = _channels(file)
+    if "Z" not in channels:
+        raise Error(f"{file}: it has no depths; give the camera the product truth")
+    depths_m = np.asarray(channels["Z"], dtype=np.float32)
+    if depths_m.shape != camera.size_px[::-1]:
+        rule = f"must have {camera.size_px[0]} x {camera.size_px[1]} pixels"
+        raise Error(f"{file}: it {rule}, as the camera's calibration says; is it another's?")
+    return depths_m
+
+
+def _read(file: Path) -> bytes:
+    try:
+        return file.read_bytes()
+    except OSError as fault:
+        rule = f"cannot read it: {fault.strerror}, though dataset.yaml says that the image is done"
+        raise Error(f"{file}: {rule}; was it removed?") from None
+
+
+@contextmanager
+def _quiet_library() -> Iterator[io.StringIO]:
+    """Gives what is printed meanwhile; what the library's C code says on stderr goes nowhere."""
+    sys.stderr.flush()
+    saved, nowhere = os.dup(2), os.open(os.devnull, os.O_WRONLY)
+    try:
+        os.dup2(nowhere, 2)
+        with redirect_stdout(io.StringIO()) as printed:
+            yield printed
+    finally:
+        os.dup2(saved, 2)
+        os.close(saved)
+        os.close(nowhere)
+
+
+def _channels(file: Path, *, only_names: bool = False) -> dict[str, Any]:
+    import OpenEXR
+
+    if not file.is_file():
+        rule = "it is not there, though dataset.yaml says that the image is done"
+        raise Error(f"{file}: {rule}; was it removed?")
+    try:
+        # Of damaged pixels the library tells by printing alone.
+        with (
+            _quiet_library() as printed,
+            OpenEXR.File(str(file), separate_channels=True, header_only=only_names) as image,
+        ):
+            if only_names:
+                return {each.name: None for each in image.header()["channels"]}
+            channels = {name: each.pixels for name, each in image.channels().items()}
+            if printed.getvalue():
+                raise ValueError(printed.getvalue().strip())
+            return channels
+    except Exception as fault:  # whatever the library makes of a damaged file
+        raise Error(f"{file}: cannot read it: {fault}: it is damaged; generate it again") from None

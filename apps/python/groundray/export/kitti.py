@@ -1,0 +1,277 @@
+"""KITTI odometry, and SemanticKITTI, which adds labels: a sequence for each lidar."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from dataclasses import dataclass
+from pathlib import Path
+
+import numpy as np
+
+from groundray.dataset import Camera, Dataset, Error, Frame, Lidar
+from groundray.export.clouds import tell_of_scan
+from groundray.export.images import Picture, has_pictures, read_picture
+from groundray.export.intensity import FullScale
+from groundray.export.labels import Instances, LabelMap
+from groundray.export.notes import Notes
+from groundray.export.scan import Scan, read_scan
+from groundray.export.sensor_path import Floats, SensorPath
+
+
+@dataclass(frozen=True)
+class KittiOptions:
+    """`labels` is none of KITTI odometry."""
+
+    first_sequence: int
+    full_scale: FullScale
+    labels: LabelMap | None
+
+
+@dataclass(frozen=True)
+class _View:
+    """What stands for KITTI's four cameras: a left one, and a right one if there is a pair."""
+
+    left: Camera | None
+    right: Camera | None
+    matrices: tuple[Floats, Floats]  # P of the left and of the right one, 3 x 4
+
+    def X_BC(self, lidar: Lidar) -> Floats:
+        return self.left.X_BC if self.left else lidar.X_BS @ _X_SC
+
+
+# Where there is no camera: one at the lidar, which looks along its x.
+_X_SC = np.array([[0, 0, 1, 0], [-1, 0, 0, 0], [0, -1, 0, 0], [0, 0, 0, 1]], dtype=float)
+
+
+@dataclass(frozen=True)
+class _KittiFrame:
+    time_ns: int  # of the pose, and of the frame of the points
+    scan: Frame
+    image: Frame | None
+
+
+def write_kitti(
+    dataset: Dataset,
+    lidars: Sequence[Lidar],
+    cameras: Sequence[Camera],
+    options: KittiOptions,
+    out: Path,
+    notes: Notes,
+) -> str:
+    """Writes the sequences of these lidars, with the pictures of a camera or a rectified pair."""
+    view = _view_of(dataset, cameras, notes)
+    notes.tell(
+        "points are moved to the pose of their frame's time; what moves is where its pulses met it"
+    )
+    counts = []
+    for i, lidar in enumerate(lidars):
+        number = options.first_sequence + i
+        frames = _frames_of(lidar, view, notes)
+        _write_sequence(dataset, lidar, view, frames, options, out, number, notes)
+        counts.append(f"sequence {number:02} of {lidar.name}: {len(frames)} frames")
+    return "; ".join(counts)
+
+
+def _view_of(dataset: Dataset, cameras: Sequence[Camera], notes: Notes) -> _View:
+    """The camera that was named or the only one, else the first rectified pair."""
+    names = {camera.name: camera for camera in cameras}
+    chosen = (each for each in dataset.pairs if {each.left, each.right} <= set(names))
+    pair = next((each for each in chosen if each.is_rectified), None)
+    if not cameras:
+        notes.tell(
+            "without a camera, camera 0 stands at the lidar, looks along its x and has P = [I | 0]"
+        )
+        ahead = np.hstack([np.eye(3), np.zeros((3, 1))])
+        return _View(None, None, (ahead, ahead))
+    if pair is None and len(cameras) > 1:
+        rule = f"it has the cameras {', '.join(names)} and no rectified pair among them"
+        raise Error(
+            f"{dataset.folder}: {rule}; choose one with --camera, or --no-images for scans alone"
+        )
+    left = names[pair.left] if pair else cameras[0]
+    right = names[pair.right] if pair else None
+    P_left = np.hstack([_pinhole(dataset, left), np.zeros((3, 1))])
+    if right is None:
+        notes.tell(f"camera {left.name} stands for all four of KITTI's: P0 to P3 are the same")
+        return _View(left, None, (P_left, P_left))
+    left_out = [name for name in names if name not in (left.name, right.name)]
+    if left_out:
+        notes.tell(f"KITTI has one pair of cameras: {', '.join(left_out)} is left out")
+    X_RL = np.linalg.inv(right.X_BC) @ left.X_BC
+    if np.abs(X_RL[:3, :3] - np.eye(3)).max() > 1e-9:
+        rule = f"cameras {left.name} and {right.name} are turned from each other"
+        raise Error(f"{dataset.folder}: {rule}; give their pair images: rectified")
+    K_right = _pinhole(dataset, right)
+    return _View(left, right, (P_left, K_right @ X_RL[:3]))
+
+
+def _pinhole(dataset: Dataset, camera: Camera) -> Floats:
+    if camera.frames and not has_pictures(dataset, camera):
+        rule = f"camera {camera.name} has no pictures"
+        fix = "give it the product picture, or export with --no-images"
+        raise Error(f"{dataset.folder}: {rule}; {fix}")
+    K = camera.pinhole_matrix()
+    if K is None:
+        rule = f"camera {camera.name} is a {camera.lens_model}, but KITTI's images are of pinholes"
+        fix = "give it a pinhole, or images: rectified to its pair, or export with --no-images"
+        raise Error(f"{dataset.folder}: {rule}; {fix}")
+    return K
+
+
+def _frames_of(lidar: Lidar, view: _View, notes: Notes) -> list[_KittiFrame]:
+    """A frame for each scan; with images, for each image that has a scan of its own.
+
+    An image's scan is the last that has begun in the middle of its exposure, or else the first.
+    """
+    if not lidar.frames:
+        raise Error(f"lidar {lidar.name}: it has no scan that is done; generate them first")
+    if view.left is None:
+        return [_KittiFrame(each.stamp_ns, each, None) for each in lidar.frames]
+    if not view.left.frames:
+        rule = f"camera {view.left.name}: it has no image that is done"
+        raise Error(f"{rule}; generate them, or give --no-images")
+    stamps = np.array([each.stamp_ns for each in lidar.frames])
+    frames: list[_KittiFrame] = []
+    for image in view.left.frames:
+        time_ns = image.stamp_ns + view.left.middle_ns
+        i = max(int(np.searchsorted(stamps, time_ns, side="right")) - 1, 0)
+        if frames and frames[-1].scan == lidar.frames[i]:
+            notes.count("{} images are left out: another image has their scan", 1)
+        else:
+            frames.append(_KittiFrame(time_ns, lidar.frames[i], image))
+    sentence = (
+        "{} scans of " + lidar.name + " are left out: no image has them; --no-images exports all"
+    )
+    notes.count(sentence, len(lidar.frames) - len(frames))
+    return frames
+
+
+def _write_sequence(
+    dataset: Dataset,
+    lidar: Lidar,
+    view: _View,
+    frames: Sequence[_KittiFrame],
+    options: KittiOptions,
+    out: Path,
+    number: int,
+    notes: Notes,
+) -> None:
+    folder = out / "sequences" / f"{number:02}"
+    (folder / "velodyne").mkdir(parents=True)
+    path = SensorPath(dataset.path_file(lidar))
+    _write_calibration(folder / "calib.txt", lidar, view)
+    times = [f"{(each.time_ns - frames[0].time_ns) * 1e-9:.9f}\n" for each in frames]
+    (folder / "times.txt").write_text("".join(times))
+    _write_poses(lidar, view, path, frames, options, out, number)
+    labels = _LabelWriter(dataset, options.labels, folder) if options.labels else None
+    for i, each in enumerate(frames):
+        scan = read_scan(dataset, lidar, each.scan)
+        _write_points(scan, path, each.time_ns, options.full_scale, folder / f"velodyne/{i:06}.bin")
+        if labels:
+            labels.write(scan, i)
+        else:
+            tell_of_scan(scan, notes)
+        if each.image is not None:
+            _write_pictures(dataset, view, each.image, folder, i, notes)
+    if labels:
+        labels.finish(notes)
+
+
+def _write_poses(
+    lidar: Lidar,
+    view: _View,
+    path: SensorPath,
+    frames: Sequence[_KittiFrame],
+    options: KittiOptions,
+    out: Path,
+    number: int,
+) -> None:
+    """Of camera 0, in its frame at the begin: poses/NN.txt, of SemanticKITTI poses.txt."""
+    X_SC = np.linalg.inv(lidar.X_BS) @ view.X_BC(lidar)
+    X_DC = [path.pose_at(each.time_ns) @ X_SC for each in frames]
+    poses = [np.linalg.inv(X_DC[0]) @ each for each in X_DC]
+    text = "".join(_numbers(pose[:3]) + "\n" for pose in poses)
+    if options.labels:
+        (out / "sequences" / f"{number:02}" / "poses.txt").write_text(text)
+    else:
+        (out / "poses").mkdir(exist_ok=True)
+        (out / "poses" / f"{number:02}.txt").write_text(text)
+
+
+def _write_calibration(file: Path, lidar: Lidar, view: _View) -> None:
+    P_left, P_right = view.matrices
+    lines = {"P0": P_left, "P1": P_right, "P2": P_left, "P3": P_right}
+    lines["Tr"] = (np.linalg.inv(view.X_BC(lidar)) @ lidar.X_BS)[:3]
+    file.write_text("".join(f"{name}: {_numbers(matrix)}\n" for name, matrix in lines.items()))
+
+
+def _numbers(matrix: Floats) -> str:
+    return " ".join(f"{value:.16e}" for value in matrix.ravel())
+
+
+def _write_points(
+    scan: Scan, path: SensorPath, time_ns: int, full_scale: FullScale, file: Path
+) -> None:
+    rows = np.empty((len(scan), 4), "<f4")
+    rows[:, :3] = scan.points_at_m(path, time_ns)
+    rows[:, 3] = full_scale.shares(scan.lidar, scan.rows)
+    file.write_bytes(rows.tobytes())
+
+
+def _write_pictures(
+    dataset: Dataset, view: _View, image: Frame, folder: Path, i: int, notes: Notes
+) -> None:
+    for side, camera in enumerate((view.left, view.right)):
+        if camera is None:
+            continue
+        frame = next((each for each in camera.frames if each.number == image.number), None)
+        if frame is None:
+            rule = f"it has no image {image.number}, which the other of its pair has"
+            raise Error(f"camera {camera.name}: {rule}; generate it")
+        picture = read_picture(dataset, camera, frame)
+        _tell_of_bits(picture, notes)
+        # KITTI's cameras 0 and 1 are grey, 2 and 3 have colours.
+        images = folder / f"image_{side + (2 if picture.is_colour else 0)}"
+        images.mkdir(exist_ok=True)
+        (images / f"{i:06}.png").write_bytes(picture.data)
+
+
+def _tell_of_bits(picture: Picture, notes: Notes) -> None:
+    if picture.bits == 16:
+        notes.tell(
+            "pictures have 16 bits, where KITTI's have 8: some programs read their upper 8 alone"
+        )
+
+
+class _LabelWriter:
+    """labels/*.label: the class in the lower 16 bits, the instance in the upper 16."""
+
+    def __init__(self, dataset: Dataset, labels: LabelMap, folder: Path) -> None:
+        self._folder = folder
+        self._labels = labels
+        self._instances = Instances(dataset, labels)
+        (folder / "labels").mkdir()
+
+    def write(self, scan: Scan, i: int) -> None:
+        theirs = self._labels.of(scan.rows["label"])
+        instances = self._instances.of(scan.rows, theirs)
+        values = (instances << np.uint32(16) | theirs).astype("<u4")
+        (self._folder / f"labels/{i:06}.label").write_bytes(values.tobytes())
+
+    def finish(self, notes: Notes) -> None:
+        """Writes which object each number is, where they are not the dataset's own."""
+        if self._labels.file is None:
+            notes.tell(
+                "labels are the dataset's own numbers, not SemanticKITTI's; --labels gives others"
+            )
+        if not self._instances.is_renumbered:
+            return
+        notes.tell(
+            "instances are numbered anew for each label, to fit 16 bits: instances.txt tells them"
+        )
+        lines = [
+            f"{label} {number} {instance}\n"
+            for (label, instance), number in self._instances.numbers.items()
+        ]
+        header = "# label, its instance here, the dataset's instance\n"
+        (self._folder / "instances.txt").write_text(header + "".join(lines))

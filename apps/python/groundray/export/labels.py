@@ -1,0 +1,126 @@
+"""Semantic classes and instances in the numbers of other people's data sets."""
+
+from __future__ import annotations
+
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+import yaml
+from numpy.typing import NDArray
+
+from groundray.dataset import Dataset, Error
+
+Numbers = NDArray[np.uint32]
+
+
+class LabelMap:
+    """The dataset's labels to others, from a file of `labels`, `others` and `instances`."""
+
+    def __init__(self, file: Path | None, most: int) -> None:
+        """Without a file labels stay. Raises Error if the file says what cannot be."""
+        self.file = file
+        self.most = most
+        self.labels: dict[int, int] = {}
+        self.others: int | None = None
+        self.with_instances: set[int] | None = None
+        if file is not None:
+            self._read(file)
+
+    def _read(self, file: Path) -> None:
+        try:
+            values = yaml.safe_load(file.read_text(encoding="utf-8"))
+        except OSError as fault:
+            raise Error(f"{file}: cannot read it: {fault.strerror}") from None
+        except (yaml.YAMLError, UnicodeDecodeError) as fault:
+            raise Error(f"{file}: it is not YAML: {fault}") from None
+        known = {"labels", "others", "instances"}
+        if not isinstance(values, dict) or "labels" not in values or set(values) - known:
+            raise Error(f"{file}: it must be a map of labels and, perhaps, others and instances")
+        pairs = values["labels"]
+        if not isinstance(pairs, dict):
+            raise Error(f"{file}: labels must be a map of the dataset's labels to others")
+        self.labels = {
+            self._checked(ours, 65535): self._checked(theirs, self.most)
+            for ours, theirs in pairs.items()
+        }
+        if "others" in values:
+            self.others = self._checked(values["others"], self.most)
+        if "instances" in values:
+            if not isinstance(values["instances"], list):
+                raise Error(f"{file}: instances must be a list of the dataset's labels")
+            self.with_instances = {self._checked(each, 65535) for each in values["instances"]}
+
+    def _checked(self, number: Any, most: int) -> int:
+        if not isinstance(number, int) or isinstance(number, bool) or not 0 <= number <= most:
+            raise Error(f"{self.file}: {number!r} must be a whole number from 0 to {most}")
+        return number
+
+    def of(self, labels: NDArray[Any]) -> Numbers:
+        """Returns the labels in the other numbers. Raises Error for one that has none."""
+        ours, which = np.unique(labels, return_inverse=True)
+        theirs = np.array([self._one(int(label)) for label in ours], dtype=np.uint32)
+        return theirs[which] if theirs.size else np.zeros(0, np.uint32)
+
+    def _one(self, label: int) -> int:
+        if self.file is not None:
+            if label in self.labels:
+                return self.labels[label]
+            if self.others is not None:
+                return self.others
+            if label == 0:
+                return 0  # nothing here, nothing there
+            rule = f"it has no number for the label {label}"
+            raise Error(f"{self.file}: {rule}; add it to labels, or say what others become")
+        if label > self.most:
+            rule = f"label {label} is above {self.most}, the most of this form"
+            raise Error(f"{rule}; give other numbers with --labels")
+        return label
+
+
+class Instances:
+    """Numbers of objects in 16 bits: their own if all fit, else in the order of being seen."""
+
+    most = 65535
+
+    def __init__(self, dataset: Dataset, labels: LabelMap) -> None:
+        self._labels = labels
+        kept = labels.with_instances
+        groups = [each for each in dataset.object_groups if kept is None or each.label in kept]
+        last = max((group.first_instance + group.count - 1 for group in groups), default=0)
+        self.is_renumbered = last > self.most
+        self.numbers: dict[tuple[int, int], int] = {}  # of (their label, our instance)
+        self._used: dict[int, int] = {}
+
+    def of(self, rows: NDArray[Any], theirs: Numbers) -> Numbers:
+        """Returns the numbers of instances; 0 for what has none."""
+        ours = rows["instance"].astype(np.uint32)
+        if self._labels.with_instances is not None:
+            kept = np.isin(rows["label"], sorted(self._labels.with_instances))
+            ours = np.where(kept, ours, np.uint32(0))
+        if not self.is_renumbered:
+            if ours.size and ours.max() > self.most:
+                rule = (
+                    f"a scan has the instance {ours.max()}, which dataset.yaml lists no object for"
+                )
+                raise Error(f"{rule}: is it of this dataset?")
+            return ours
+        keys, first, which = np.unique(
+            theirs.astype(np.uint64) << np.uint64(32) | ours, return_index=True, return_inverse=True
+        )
+        numbers = np.zeros(len(keys), np.uint32)
+        for i in np.argsort(first, kind="stable"):
+            numbers[i] = self._number(int(keys[i]) >> 32, int(keys[i]) & 0xFFFFFFFF)
+        return numbers[which]
+
+    def _number(self, label: int, instance: int) -> int:
+        if instance == 0:
+            return 0
+        if (label, instance) not in self.numbers:
+            self._used[label] = self._used.get(label, 0) + 1
+            if self._used[label] > self.most:
+                rule = f"more than {self.most} objects of the label {label} are seen"
+                fix = "list the labels whose instances matter as instances in the file of --labels"
+                raise Error(f"{rule}, more than this form can number; {fix}")
+            self.numbers[label, instance] = self._used[label]
+        return self.numbers[label, instance]

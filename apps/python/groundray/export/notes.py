@@ -1,0 +1,23 @@
+"""What a form cannot say, told once each, with how often it happened."""
+
+from __future__ import annotations
+
+
+class Notes:
+    """Sentences in the order in which they first came up."""
+
+    def __init__(self) -> None:
+        self._counts: dict[str, int] = {}
+
+    def tell(self, sentence: str) -> None:
+        """Keeps a sentence, once."""
+        self._counts.setdefault(sentence, 0)
+
+    def count(self, sentence: str, number: int) -> None:
+        """Adds to the number of a sentence that has `{}` for it; nothing for 0."""
+        if number:
+            self._counts[sentence] = self._counts.get(sentence, 0) + int(number)
+
+    def lines(self) -> list[str]:
+        """Returns the sentences with their numbers."""
+        return [sentence.replace("{}", str(n)) for sentence, n in self._counts.items()]

@@ -1,0 +1,152 @@
+"""Scans: their rows, and where the points are in other frames."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+from numpy.typing import NDArray
+
+from groundray.dataset import Dataset, Error, Frame, Lidar
+from groundray.export.sensor_path import Floats, SensorPath
+
+# Units and meanings of the columns that docs/formats.md defines.
+UNITS = {
+    **dict.fromkeys(["x", "y", "z", "world_x", "world_y", "world_z", "range_true"], "m"),
+    **dict.fromkeys(["error_estimate", "range_sd", "error_bound"], "m"),
+    **dict.fromkeys(["vx", "vy", "vz"], "m/s"),
+    **dict.fromkeys(["time", "width"], "s"),
+    "incidence": "rad",
+    "amplitude": "W",
+}
+MEANINGS = {
+    "intensity": "as the sensor reports it",
+    "time": "since the stamp of the scan",
+    "ring": "number of the beam",
+    "return_index": "which echo of its pulse, from 1",
+    "return_count": "how many echoes of its pulse",
+    **{f"world_{axis}": "truth: the surface, in D" for axis in "xyz"},
+    "range_true": "truth: from beam to surface",
+    **{f"n{axis}": "truth: normal, axes of D" for axis in "xyz"},
+    "incidence": "truth: beam to normal",
+    "label": "truth: semantic class",
+    "instance": "truth: number of the object",
+    "error_estimate": "truth: error of range_true",
+    "pulse": "number in the sweep",
+    "amplitude": "peak power at the detector",
+    "width": "full width at half of the peak",
+    "snr": "peak over noise",
+    "kind": "0 surface, 1 air, 2 false alarm",
+    "share": "truth: energy of first surface",
+    "second_share": "truth: energy of the next one",
+    "second_label": "truth: class of the next one",
+    "range_sd": "standard deviation of range",
+    **{f"v{axis}": "truth: velocity, axes of D" for axis in "xyz"},
+    "error_bound": "truth: bound of error",
+}
+
+_TYPES = {
+    **dict.fromkeys(["char", "int8"], "<i1"),
+    **dict.fromkeys(["uchar", "uint8"], "<u1"),
+    **dict.fromkeys(["short", "int16"], "<i2"),
+    **dict.fromkeys(["ushort", "uint16"], "<u2"),
+    **dict.fromkeys(["int", "int32"], "<i4"),
+    **dict.fromkeys(["uint", "uint32"], "<u4"),
+    **dict.fromkeys(["float", "float32"], "<f4"),
+    **dict.fromkeys(["double", "float64"], "<f8"),
+}
+_REQUIRED = (
+    *("x", "y", "z", "intensity", "time", "ring", "return_index", "return_count"),
+    *("world_x", "world_y", "world_z", "range_true", "nx", "ny", "nz", "label", "instance"),
+)
+
+
+@dataclass(frozen=True)
+class Scan:
+    """The rows of one scan, as its file has them; columns have the names of docs/formats.md."""
+
+    lidar: Lidar
+    frame: Frame
+    rows: NDArray[Any]
+
+    def __len__(self) -> int:
+        return len(self.rows)
+
+    @property
+    def names(self) -> tuple[str, ...]:
+        """The columns, in the order of the file."""
+        return tuple(self.rows.dtype.names or ())
+
+    @property
+    def points_m(self) -> Floats:
+        """n x 3: x, y, z, in the frame that `Lidar.is_deskewed` tells."""
+        return np.stack([self.rows[axis].astype(float) for axis in "xyz"], axis=-1)
+
+    @property
+    def times_ns(self) -> NDArray[np.int64]:
+        """When each pulse fired, on the dataset's clock."""
+        offsets_ns = np.rint(self.rows["time"].astype(float) * 1e9).astype(np.int64)
+        return np.add(offsets_ns, self.frame.stamp_ns, dtype=np.int64)
+
+    def points_in_world_m(self, path: SensorPath) -> Floats:
+        """Returns the points as reported, in D, by the true path: n x 3."""
+        times_ns = self.times_ns
+        if self.lidar.is_deskewed:
+            times_ns = np.full_like(times_ns, self.frame.stamp_ns)
+        when, which = np.unique(times_ns, return_inverse=True)
+        rotations, positions_m = path.at(when)
+        return (rotations[which] @ self.points_m[..., None])[..., 0] + positions_m[which]
+
+    def points_at_m(self, path: SensorPath, time_ns: int) -> Floats:
+        """Returns the points as reported, in S as it was at one time: n x 3."""
+        if self.lidar.is_deskewed and time_ns == self.frame.stamp_ns:
+            return self.points_m
+        X_DS = path.pose_at(time_ns)
+        return (self.points_in_world_m(path) - X_DS[:3, 3]) @ X_DS[:3, :3]
+
+
+def read_scan(dataset: Dataset, lidar: Lidar, frame: Frame) -> Scan:
+    """Reads one scan. Raises Error if it is missing, cut short, or no scan of groundray."""
+    file = dataset.scan_file(lidar, frame)
+    try:
+        data = file.read_bytes()
+    except OSError as fault:
+        rule = f"cannot read it: {fault.strerror}, though dataset.yaml says that it is done"
+        raise Error(f"{file}: {rule}; was it removed?") from None
+    dtype, count, offset = _read_header(data, file)
+    expected = offset + count * dtype.itemsize
+    if len(data) != expected:
+        rule = f"it has {len(data)} bytes but its header asks for {expected}"
+        raise Error(f"{file}: {rule}: it is damaged; generate it again")
+    rows = np.frombuffer(data, dtype, count, offset)
+    finite = np.isfinite([rows[axis] for axis in "xyz"]).all()
+    if not finite or not np.all((rows["time"] >= 0) & (rows["time"] < 3600)):
+        rule = "it has points that lie nowhere, or at no time of a scan"
+        raise Error(f"{file}: {rule}: it is damaged; generate it again")
+    return Scan(lidar, frame, rows)
+
+
+def _read_header(data: bytes, file: Path) -> tuple[np.dtype[Any], int, int]:
+    """Returns the type of a row, how many rows there are, and where they begin."""
+    end = data.find(b"end_header\n", 0, 1 << 20)
+    lines = data[: max(end, 0)].decode("ascii", "replace").split("\n")
+    if end < 0 or lines[:2] != ["ply", "format binary_little_endian 1.0"]:
+        raise Error(f"{file}: it is not a PLY file as groundray writes scans: is it damaged?")
+    count = -1
+    columns: list[tuple[str, str]] = []
+    for line in lines[2:]:
+        words = line.split()
+        if words[:2] == ["element", "vertex"] and len(words) == 3 and words[2].isdigit():
+            count = int(words[2])
+        elif words[:1] == ["property"] and len(words) == 3 and words[1] in _TYPES:
+            columns.append((words[2], _TYPES[words[1]]))
+        elif words and words[0] != "comment":
+            raise Error(f"{file}: its header has '{line}', which no scan of groundray has")
+    names = [name for name, _ in columns]
+    missing = [name for name in _REQUIRED if name not in names]
+    if count < 0 or missing or len(set(names)) != len(names):
+        what = f"it lacks {', '.join(missing)}" if missing else "its rows are not told once"
+        raise Error(f"{file}: {what}: is it a scan of groundray?")
+    return np.dtype(columns), count, end + len(b"end_header\n")

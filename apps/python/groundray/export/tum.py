@@ -1,0 +1,141 @@
+"""TUM RGB-D: pictures, depths and the path of a camera."""
+
+from __future__ import annotations
+
+import shutil
+from collections.abc import Sequence
+from pathlib import Path
+
+import numpy as np
+
+from groundray.dataset import Camera, Dataset, Error, Frame
+from groundray.export.images import (
+    has_depths,
+    has_pictures,
+    png_of,
+    read_depths_m,
+    read_picture,
+)
+from groundray.export.notes import Notes
+from groundray.export.sensor_path import Floats, SensorPath, quaternion_wxyz
+
+
+def write_tum(
+    dataset: Dataset, cameras: Sequence[Camera], depth_per_m: float, out: Path, notes: Notes
+) -> str:
+    """Writes a camera into `out`, several into folders of their names."""
+    if not cameras:
+        raise Error(f"{dataset.folder}: it has no camera, and TUM RGB-D is of cameras alone")
+    if depth_per_m != 5000:
+        notes.tell(f"a metre of depth is {depth_per_m:g}, where TUM's is 5000: tell your reader so")
+    count = 0
+    for camera in cameras:
+        folder = out if len(cameras) == 1 else out / camera.name
+        folder.mkdir(exist_ok=True)
+        count += _write_camera(dataset, camera, depth_per_m, folder, notes)
+    return f"{count} images of {len(cameras)} cameras"
+
+
+def _write_camera(
+    dataset: Dataset, camera: Camera, depth_per_m: float, folder: Path, notes: Notes
+) -> int:
+    if not camera.frames:
+        raise Error(f"camera {camera.name}: it has no image that is done; generate them first")
+    with_pictures, with_depths = has_pictures(dataset, camera), has_depths(dataset, camera)
+    if not with_pictures and not with_depths:
+        rule = f"camera {camera.name} has neither pictures nor depths"
+        raise Error(f"{dataset.folder}: {rule}; give it the products picture and truth")
+    times_ns = [frame.stamp_ns + camera.middle_ns for frame in camera.frames]
+    if with_pictures:
+        _write_pictures(dataset, camera, times_ns, folder)
+    else:
+        notes.tell(f"camera {camera.name} has no pictures (product picture): there is no rgb.txt")
+    if with_depths:
+        _write_depths(dataset, camera, times_ns, depth_per_m, folder, notes)
+    else:
+        notes.tell(f"camera {camera.name} has no depths (product truth): there is no depth.txt")
+    _write_path(dataset, camera, times_ns, folder / "groundtruth.txt")
+    shutil.copyfile(
+        dataset.folder / "calibration" / f"{camera.name}.yaml", folder / "calibration.yaml"
+    )
+    if camera.pinhole_matrix() is None:
+        notes.tell(
+            f"TUM RGB-D has no words for the lens of {camera.name}: calibration.yaml tells it"
+        )
+    if camera.row_s:
+        notes.tell(
+            f"rows of {camera.name} are exposed one after another; stamps are of the middle row"
+        )
+    return len(camera.frames)
+
+
+def _stamp(dataset: Dataset, time_ns: int) -> str:
+    total = dataset.time_origin_ns + time_ns
+    sign, total = ("-", -total) if total < 0 else ("", total)
+    return f"{sign}{total // 10**9}.{total % 10**9:09}"
+
+
+def _write_pictures(
+    dataset: Dataset, camera: Camera, times_ns: Sequence[int], folder: Path
+) -> None:
+    (folder / "rgb").mkdir()
+    lines = ["# color images\n", f"# camera: {camera.name}\n", "# timestamp filename\n"]
+    for frame, time_ns in zip(camera.frames, times_ns, strict=True):
+        stamp = _stamp(dataset, time_ns)
+        (folder / f"rgb/{stamp}.png").write_bytes(read_picture(dataset, camera, frame).data)
+        lines.append(f"{stamp} rgb/{stamp}.png\n")
+    (folder / "rgb.txt").write_text("".join(lines))
+
+
+def _write_depths(
+    dataset: Dataset,
+    camera: Camera,
+    times_ns: Sequence[int],
+    depth_per_m: float,
+    folder: Path,
+    notes: Notes,
+) -> None:
+    (folder / "depth").mkdir()
+    lines = ["# depth maps\n", f"# camera: {camera.name}\n", "# timestamp filename\n"]
+    for frame, time_ns in zip(camera.frames, times_ns, strict=True):
+        stamp = _stamp(dataset, time_ns)
+        depths = _depths_of(dataset, camera, frame, depth_per_m, notes)
+        (folder / f"depth/{stamp}.png").write_bytes(png_of(depths))
+        lines.append(f"{stamp} depth/{stamp}.png\n")
+    (folder / "depth.txt").write_text("".join(lines))
+
+
+def _depths_of(
+    dataset: Dataset, camera: Camera, frame: Frame, depth_per_m: float, notes: Notes
+) -> np.ndarray[tuple[int, ...], np.dtype[np.uint16]]:
+    depths_m = read_depths_m(dataset, camera, frame)
+    ahead = np.isfinite(depths_m) & (depths_m > 0)
+    scaled = np.rint(np.where(ahead, depths_m, 0).astype(float) * depth_per_m)
+    far = scaled > 65535
+    sentence = "{} pixels are 0, which means unknown: they are farther than the "
+    sentence += f"{65535 / depth_per_m:.6g} m that 16 bits hold; --depth-per-m says another scale"
+    notes.count(sentence, int(np.count_nonzero(far)))
+    behind = np.isfinite(depths_m) & (scaled == 0)
+    sentence = "{} pixels are 0, since they show something on or behind the camera's plane"
+    notes.count(sentence, int(np.count_nonzero(behind)))
+    return np.where(far, 0, scaled).astype(np.uint16)
+
+
+def _write_path(dataset: Dataset, camera: Camera, times_ns: Sequence[int], file: Path) -> None:
+    """The recorded poses, and those of the images, so that each has one of exactly its time."""
+    path = SensorPath(dataset.path_file(camera))
+    all_ns = np.union1d(path.times_ns, np.array(times_ns, dtype=np.int64))
+    rotations, positions_m = path.at(all_ns)
+    lines = [
+        "# ground truth trajectory\n",
+        f"# camera: {camera.name}\n",
+        "# timestamp tx ty tz qx qy qz qw\n",
+    ]
+    for time_ns, R, p_m in zip(all_ns.tolist(), rotations, positions_m, strict=True):
+        lines.append(f"{_stamp(dataset, time_ns)} {_pose_text(R, p_m)}\n")
+    file.write_text("".join(lines))
+
+
+def _pose_text(R: Floats, p_m: Floats) -> str:
+    w, x, y, z = quaternion_wxyz(R)
+    return " ".join(f"{value:.17g}" for value in (*p_m, x, y, z, w))

@@ -1,0 +1,23 @@
+#include "apps/python/terrain_model.h"
+
+#include <cmath>
+
+#include "terrain/terrain_scene.h"
+
+namespace groundray::python {
+
+const Scene& TerrainModel::scene() const {
+  std::call_once(once_, [&] {
+    const GridFrame& frame = dem_.grid.frame();
+    const glm::dvec2 middle = (frame.to_D({0, 0}) + frame.to_D(frame.samples - 1)) / 2.0;
+    const double low_m = dem_.grid.min_height_m();  // NaN if there is none
+    scene_ = std::make_unique<const Scene>(Scene{
+        .rays =
+            RayTracer({full_resolution_level(dem_.grid)},
+                      float_frame_origin({middle, std::isnan(low_m) ? 0 : low_m}), Tracing::Exact),
+        .terrain = {.label = 1}});
+  });
+  return *scene_;
+}
+
+}  // namespace groundray::python

@@ -1,0 +1,141 @@
+"""Datasets that are broken: one error that says where, and nothing written."""
+
+import re
+import shutil
+
+import numpy as np
+import pytest
+from export_runs import export, fails, names_in, run_folder
+
+
+@pytest.fixture
+def run(tmp_path):
+    """A copy of the dataset that may be spoiled."""
+    return shutil.copytree(run_folder(), tmp_path / "run")
+
+
+def test_datasets_that_are_none_or_broken_are_told(run, capsys):
+    record = run / "dataset.yaml"
+    text = record.read_text()
+    for spoiled, rule in (
+        (text[: len(text) // 2], "dataset.yaml"),
+        (text.replace("groundray_dataset: 1", "groundray_dataset: 2"), "must be 1"),
+        (text.replace("origin_w_m: [", "origin_w_m: [east, "), "must be of numbers"),
+        (text[: text.rindex("  - {sensor")], "was the file cut short?"),
+        (text.replace("kind: lidar", "kind: sonar", 1), "must be lidar, camera or stereo"),
+        ("", "must be a map"),
+        ("frames: [", "dataset.yaml:2:1: "),
+    ):
+        record.write_text(spoiled)
+        assert rule in fails(capsys, run, "npz")
+    record.unlink()
+    assert "it holds no dataset.yaml" in fails(capsys, run, "npz")
+
+
+@pytest.mark.parametrize("form", ["kitti", "npz", "mcap", "laz"])
+def test_scans_that_are_missing_or_damaged_are_told(run, capsys, form):
+    file = run / "lidar/front/000001.ply"
+    data = file.read_bytes()
+    for spoiled, rule in (
+        (data[:-1], "its header asks for"),
+        (data + b"\0", "its header asks for"),
+        (data[:100], "is it damaged?"),
+        (data.replace(b"property float x\n", b"property float q\n", 1), "it lacks x"),
+        (data.replace(b"binary_little_endian", b"ascii", 1), "is it damaged?"),
+        (b"", "is it damaged?"),
+    ):
+        file.write_bytes(spoiled)
+        line = fails(capsys, run, form)
+        assert "lidar/front/000001.ply: " in line
+        assert rule in line
+    file.unlink()
+    assert "though dataset.yaml says that it is done; was it removed?" in fails(capsys, run, form)
+
+
+@pytest.mark.parametrize("form", ["kitti", "tum", "mcap"])
+def test_images_that_are_missing_or_damaged_are_told(run, capsys, form):
+    file = run / "camera/right/000001.png"
+    data = file.read_bytes()
+    for spoiled in (data[:-10], b"", data[:12] + b"JUNK" + data[16:], None):
+        file.unlink(missing_ok=True)
+        if spoiled is not None:
+            file.write_bytes(spoiled)
+        line = fails(capsys, run, form)
+        assert "camera/right/000001.png: " in line
+        assert ("was it removed?" if spoiled is None else "it is damaged") in line
+    file.write_bytes((run / "camera/right/000000_preview.png").read_bytes())
+    assert "must have 96 x 72 pixels" in fails(capsys, run, form)
+
+
+@pytest.mark.parametrize("form", ["kitti", "tum", "mcap"])
+def test_a_first_picture_that_is_missing_does_not_hide_the_others(run, capsys, form):
+    (run / "camera/left/000000.png").unlink()
+    line = fails(capsys, run, form, "--camera", "left", "--camera", "right")
+    assert "camera/left/000000.png: " in line
+    assert "was it removed?" in line
+
+
+def test_points_that_lie_nowhere_are_told(run, capsys):
+    file = run / "lidar/front/000001.ply"
+    data = file.read_bytes()
+    begin = data.index(b"end_header\n") + len(b"end_header\n")
+    for place, value in ((0, np.nan), (8, np.inf), (16, np.nan), (16, -1)):  # x, z, time
+        spoiled = bytearray(data)
+        spoiled[begin + place : begin + place + 4] = np.float32(value).tobytes()
+        file.write_bytes(spoiled)
+        assert "points that lie nowhere, or at no time" in fails(capsys, run, "npz")
+
+
+def test_depths_that_are_missing_or_damaged_are_told(run, capsys):
+    file = run / "camera/eye/000001.exr"
+    data = file.read_bytes()
+    for spoiled in (data[: len(data) // 2], data[:40], b"", None):
+        file.unlink(missing_ok=True)
+        if spoiled is not None:
+            file.write_bytes(spoiled)
+        assert "camera/eye/000001.exr: " in fails(capsys, run, "tum", "--camera", "eye")
+
+
+@pytest.mark.parametrize("form", ["kitti", "pcd", "npz", "las", "mcap"])
+def test_paths_that_are_broken_are_told(run, capsys, form):
+    file = run / "poses/top.tum"
+    lines = file.read_text().splitlines()
+    for spoiled, rule in (
+        ([*lines[:-1], lines[-1][:40]], "eight finite numbers"),
+        ([*lines, lines[-1]], "its times do not increase"),
+        ([*lines[:-1], re.sub(r"\S+$", "7", lines[-1])], "the quaternion must be of length 1"),
+        ([*lines[:-1], re.sub(r"\S+$", "nan", lines[-1])], "eight finite numbers"),
+        (["# nothing"], "it has no pose"),
+        (lines[20:], "the path begins at"),
+    ):
+        file.write_text("\n".join(spoiled))
+        if form == "mcap" and "begins" in rule:
+            continue  # a bag's transforms may begin when they like
+        line = fails(capsys, run, form)
+        assert "poses/top.tum" in line
+        assert rule in line
+
+
+def test_damage_anywhere_gives_one_error_or_none(run, capsys):
+    """Bits flipped and ends cut at random, in all that is read but pixels and points."""
+    random = np.random.default_rng(3)
+    files = ["dataset.yaml", "poses/front.tum", "calibration/front.yaml", "calibration/left.yaml"]
+    files += ["calibration/left.ros.yaml", "lidar/front/000000.ply"]
+    for name in files:
+        data = (run / name).read_bytes()
+        for trial in range(8):
+            spoiled = bytearray(data)
+            if trial % 2:
+                spoiled = spoiled[: random.integers(len(spoiled))]
+            else:
+                for place in random.integers(min(len(spoiled), 2000), size=3):
+                    spoiled[place] ^= 1 << random.integers(8)
+            (run / name).write_bytes(spoiled)
+            for form in ("mcap", "kitti"):
+                code = export(form, run.parent / "out", "--lidar", "front", source=run)
+                told = capsys.readouterr().err
+                assert (code == 0 and not told) or (code == 1 and told.count("\n") >= 1), name
+                assert "Traceback" not in told
+                shutil.rmtree(run.parent / "out", ignore_errors=True)
+                assert names_in(run.parent) == ["run"]
+        (run / name).write_bytes(data)

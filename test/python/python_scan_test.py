@@ -1,0 +1,293 @@
+"""Scans from Python: the bytes of `groundray generate`, without copies, by any threads."""
+
+import gc
+import signal
+import subprocess
+import sys
+import threading
+import time
+from pathlib import Path
+
+import groundray
+import numpy as np
+import pytest
+import small_scene
+from groundray._scene import to_yaml
+
+
+@pytest.fixture(scope="module")
+def made(tmp_path_factory):
+    """A dataset by the program, and the same scene in Python."""
+    folder = tmp_path_factory.mktemp("python_scan")
+    terrain = groundray.Terrain(small_scene.heights_m(), small_scene.CELL_M)
+    terrain.save(folder / "ground.tif")
+    spec = small_scene.spec(folder)
+    spec["terrain"]["dem"] = "ground.tif"
+    (folder / "scene.yaml").write_text(to_yaml(spec))
+    small_scene.run("groundray", "generate", folder / "scene.yaml", "-o", folder / "out")
+    return folder, groundray.load_scene(folder / "scene.yaml")
+
+
+@pytest.fixture
+def lidar(made):
+    return made[1].lidar("roof")
+
+
+@pytest.mark.parametrize("sensor", ["roof", "light"])
+def test_scan_from_python_has_the_bytes_of_the_generator(made, sensor):
+    folder, scene = made
+    for frame in range(2):
+        scan = scene.lidar(sensor).scan(frame=frame)
+        file = groundray.load_points(folder / f"out/lidar/{sensor}/{frame:06}.ply")
+        assert scan.columns == file.columns
+        assert len(scan) == len(file) > 1000
+        for name in scan:
+            assert scan[name].dtype == file[name].dtype
+            assert scan[name].tobytes() == file[name].tobytes(), name
+
+
+def test_what_comes_with_a_scan_has_the_bytes_of_the_generator(made):
+    folder, scene = made
+    scan = scene.lidar("light").scan(frame=1)
+    begin = folder / "out/lidar/light/000001"
+    none = groundray.load_points(f"{begin}_no_returns.ply")
+    assert {n: scan.no_returns[n].tobytes() for n in none} == {n: none[n].tobytes() for n in none}
+    power, index = np.load(f"{begin}_wave.npy"), np.load(f"{begin}_wave_index.npy")
+    assert scan.waveforms["power_w"].tobytes() == power.tobytes()
+    for field in index.dtype.names:
+        assert (scan.waveforms[field] == index[field]).all()
+    assert scan.convergence["pulses"] > 0
+    assert scene.lidar("roof").scan(frame=0).waveforms is None
+
+
+def test_a_scene_of_dicts_is_the_scene_of_its_file(made):
+    folder, scene = made
+    spec = small_scene.spec(folder)
+    terrain = groundray.Terrain(small_scene.heights_m(), small_scene.CELL_M)
+    own = groundray.scene(spec, folder=folder, terrain=terrain)
+    assert own.origin_w_m == scene.origin_w_m
+    assert own.objects == scene.objects
+    ours, theirs = own.lidar("roof").scan(t_s=0.0), scene.lidar("roof").scan(t_s=0.0)
+    assert all(ours[name].tobytes() == theirs[name].tobytes() for name in theirs)
+    other = groundray.scene(spec, folder=folder, terrain=terrain, seed=8).lidar("roof").scan(t_s=0)
+    assert (other["x_m"][:100] != theirs["x_m"][:100]).any()
+    assert (other["range_true_m"][:100] == theirs["range_true_m"][:100]).all()
+
+
+def test_a_scan_is_asked_for_by_time_or_by_number(lidar):
+    times_s = lidar.times_s
+    assert len(times_s) == 2
+    scan = lidar.scan(t_s=times_s[1])
+    assert (scan.frame, scan.t_s, scan.sensor) == (1, times_s[1], "roof")
+    with pytest.raises(
+        groundray.Error, match=r"no frame begins at 0\.05 s; the nearest is frame 0"
+    ):
+        lidar.scan(t_s=0.05)
+    with pytest.raises(groundray.Error, match="there is no frame 2; the scene has 2"):
+        lidar.scan(frame=2)
+    with pytest.raises(groundray.Error, match="give t_s, when the frame begins, or frame"):
+        lidar.scan()
+    with pytest.raises(groundray.Error, match="t_s = nan"):
+        lidar.scan(t_s=float("nan"))
+    with pytest.raises(TypeError, match="t_s: float"):
+        lidar.scan(t_s="now")
+
+
+def test_columns_are_views_that_may_not_be_written_to(lidar):
+    scan = lidar.scan(frame=0)
+    for name in scan.columns:
+        column = scan[name]
+        assert column.shape == (len(scan),)
+        assert not column.flags.writeable
+        assert np.shares_memory(column, scan[name])
+        assert column.__array_interface__["data"] == scan[name].__array_interface__["data"]
+    with pytest.raises(ValueError, match="read-only"):
+        scan["x_m"][0] = 1
+    with pytest.raises(ValueError, match="cannot set WRITEABLE"):
+        scan["x_m"].flags.writeable = True
+    with pytest.raises(KeyError, match="there is no column 'range_true'; there are x_m"):
+        scan["range_true"]
+    assert list(dict(scan)) == scan.keys() == list(scan)
+    assert "ring" in scan
+    assert "x" not in scan
+
+
+def test_arrays_outlive_all_that_made_them(made):
+    folder, _ = made
+    scan = groundray.load_scene(folder / "scene.yaml").lidar("light").scan(frame=0)
+    column, power, none = scan["range_true_m"], scan.waveforms["power_w"], scan.no_returns
+    expected = column.copy(), power.copy()
+    del scan
+    for _ in range(3):
+        gc.collect()
+        np.full(1 << 20, 7.0)
+    assert (column == expected[0]).all()
+    assert (power == expected[1]).all()
+    assert len(none["pulse"]) == len(none)
+
+
+def test_memory_of_scans_is_given_back(lidar):
+    def resident_kb():
+        with open("/proc/self/statm") as file:
+            return int(file.read().split()[1]) * 4
+
+    for _ in range(20):
+        lidar.scan(frame=0)
+    before_kb = resident_kb()
+    for _ in range(100):  # each of 2 MB and more
+        assert lidar.scan(frame=0)["x_m"][0] != 0
+    assert resident_kb() - before_kb < 50_000
+
+
+def test_scans_of_several_threads_at_once_have_the_same_bytes(made):
+    folder, scene = made
+    wanted = [(sensor, frame) for sensor in ("roof", "light") for frame in (0, 1)] * 3
+    alone = {key: scene.lidar(key[0]).scan(frame=key[1])["x_m"].tobytes() for key in set(wanted)}
+    shared = groundray.load_scene(folder / "scene.yaml")
+    got = [None] * len(wanted)
+
+    def work(number):
+        sensor, frame = wanted[number]
+        got[number] = shared.lidar(sensor).scan(frame=frame)["x_m"].tobytes()
+
+    threads = [threading.Thread(target=work, args=(number,)) for number in range(len(wanted))]
+    for thread in threads:
+        thread.start()
+    for thread in threads:
+        thread.join()
+    assert got == [alone[key] for key in wanted]
+
+
+def test_other_threads_go_on_during_a_long_call(made):
+    terrain = groundray.Terrain(small_scene.heights_m(600, 600))
+    origins = np.full((1_000_000, 3), [300.0, 300.0, 20.0])
+    directions = np.random.default_rng(3).normal(size=origins.shape)
+    terrain.cast_rays(origins[:10], directions[:10])
+    seen, is_done = [], threading.Event()
+
+    def tick():
+        while not is_done.is_set():
+            seen.append(time.monotonic())
+            time.sleep(0.002)
+
+    thread = threading.Thread(target=tick)
+    thread.start()
+    begin = time.monotonic()
+    terrain.cast_rays(origins, directions)
+    end = time.monotonic()
+    is_done.set()
+    thread.join()
+    during = [at for at in seen if begin < at < end]
+    assert end - begin > 0.05
+    assert len(during) > 5
+
+
+def test_ctrl_c_ends_a_long_call(tmp_path):
+    script = tmp_path / "long.py"
+    script.write_text(
+        "import pathlib, groundray, small_scene\n"
+        f"folder = pathlib.Path({str(tmp_path)!r})\n"
+        "spec = small_scene.spec(folder, camera=True)\n"
+        "eye = (folder / 'eye.yaml').read_text()\n"
+        "eye = eye.replace('samples: 4', 'samples: 512').replace('36]', '960]')\n"
+        "(folder / 'eye.yaml').write_text(eye)\n"
+        "terrain = groundray.Terrain(small_scene.heights_m(), small_scene.CELL_M)\n"
+        "camera = groundray.scene(spec, folder=folder, terrain=terrain).camera('eye')\n"
+        "print('exposing', flush=True)\n"
+        "try:\n"
+        "    camera.expose(frame=0)\n"
+        "except KeyboardInterrupt:\n"
+        "    print('interrupted')\n"
+    )
+    path = f"{small_scene.PACKAGE}:{Path(small_scene.__file__).parent}"
+    with subprocess.Popen(
+        [sys.executable, script], stdout=subprocess.PIPE, text=True, env={"PYTHONPATH": path}
+    ) as process:
+        assert process.stdout.readline() == "exposing\n"
+        time.sleep(0.5)
+        process.send_signal(signal.SIGINT)
+        begin = time.monotonic()
+        assert process.stdout.read() == "interrupted\n"
+        assert process.wait(60) == 0
+        assert time.monotonic() - begin < 15  # to its end it takes longer
+
+
+def test_a_scan_from_python_costs_less_than_a_millisecond_more(made, tmp_path):
+    (tmp_path / "few.csv").write_text("time_s,azimuth_deg,elevation_deg\n0.01,0,-20\n0.02,10,-20\n")
+    (tmp_path / "few.yaml").write_text(
+        "groundray_lidar: 1\nmodel: Two pulses\n"
+        "table: {csv: few.csv, period_s: 0.1}\nrange_gate_m: {near: 0.1, far: 100}\n"
+    )
+    spec = small_scene.spec(tmp_path)
+    spec["lidars"] = [{"name": "few", "file": "few.yaml", "mount": {"translation_m": [0, 0, 1.5]}}]
+    terrain = groundray.Terrain(small_scene.heights_m(), small_scene.CELL_M)
+    few = groundray.scene(spec, folder=tmp_path, terrain=terrain).lidar("few")
+    assert len(few.scan(frame=0)) == 2
+    spent_s = []
+    for _ in range(300):
+        begin = time.perf_counter()
+        few.scan(frame=0)["range_true_m"]
+        spent_s.append(time.perf_counter() - begin)
+    # The least is what a call costs: all else is what other programs take.
+    assert min(spent_s) < 1e-3
+
+
+def test_faults_of_a_scene_are_told_as_the_program_tells_them(made, tmp_path):
+    folder, _ = made
+    text = (folder / "scene.yaml").read_text().replace("speed_m_s: 5", "speed_km_h: 5")
+    (folder / "wrong.yaml").write_text(text)
+    with pytest.raises(groundray.Error) as raised:
+        groundray.load_scene(folder / "wrong.yaml")
+    told = subprocess.run(
+        [small_scene.BIN / "groundray", "generate", folder / "wrong.yaml", "-o", tmp_path / "out"],
+        capture_output=True,
+        text=True,
+        check=False,
+    )
+    assert str(raised.value) in told.stderr
+    assert "key 'speed_km_h': unknown" in str(raised.value)
+    assert isinstance(raised.value, RuntimeError)
+    with pytest.raises(
+        groundray.Error, match=r"the scene has no lidar 'front'; it has roof, light"
+    ):
+        made[1].lidar("front")
+    with pytest.raises(groundray.Error, match="there is no such file"):
+        groundray.load_scene(tmp_path / "absent.yaml")
+
+
+def test_dicts_become_the_yaml_that_they_are():
+    yaml = pytest.importorskip("yaml")
+    spec = {
+        "a": [1, 2.5, -1e-7, True, None, "x: y", "yes", '"', "a\\b", "ä", ""],
+        "b": {"c": [{"d": 1, "e": {"f": []}}, {"g": [[1, 2], [3, 4]]}], "h": {}},
+        "i": np.array([[1.5, 2], [3, 4]]),
+        "j": np.float32(0.5),
+        "k": np.int64(3),
+        "l": [{"m": {"n": [1]}}, [1, 2]],
+        "0x10": "1e3",
+    }
+    read = yaml.safe_load(to_yaml(spec))
+    wanted = {**spec, "i": spec["i"].tolist(), "j": 0.5, "k": 3}
+    assert read == wanted
+    with pytest.raises(TypeError, match="is a set"):
+        to_yaml({"a": {1, 2}})
+
+
+def test_nothing_leaks_at_exit(made, tmp_path):
+    folder, _ = made
+    script = tmp_path / "exit.py"
+    script.write_text(
+        "import groundray\n"
+        f"scene = groundray.load_scene({str(folder / 'scene.yaml')!r})\n"
+        "scan = scene.lidar('light').scan(frame=0)\n"
+        "x, waves, none = scan['x_m'], scan.waveforms, scan.no_returns['pulse']\n"
+        "try:\n    scene.lidar('none')\nexcept groundray.Error as error:\n    kept = error\n"
+    )
+    done = subprocess.run(
+        [sys.executable, script],
+        capture_output=True,
+        text=True,
+        env={"PYTHONPATH": str(small_scene.PACKAGE)},
+        check=False,
+    )
+    assert (done.returncode, done.stdout, done.stderr) == (0, "", "")
