@@ -1,7 +1,6 @@
 #include "reconstruction/measured_mesh_io.h"
 
 #include <algorithm>
-#include <cctype>
 #include <cmath>
 #include <cstdint>
 #include <glm/common.hpp>
@@ -13,6 +12,7 @@
 #include <vector>
 
 #include "core/error.h"
+#include "core/file_ending.h"
 #include "core/mesh_check.h"
 #include "core/point_cloud.h"
 
@@ -20,13 +20,6 @@ namespace groundray {
 namespace {
 
 namespace fs = std::filesystem;
-
-std::string form_of(const fs::path& path) {
-  std::string form = path.extension().string();
-  std::ranges::transform(form, form.begin(),
-                         [](unsigned char c) { return static_cast<char>(std::tolower(c)); });
-  return form;
-}
 
 /// What a column may hold.
 struct ColumnRule {
@@ -101,7 +94,7 @@ void come_near(TriangleMesh& mesh, Georeference& georeference) {
 
 void write_measured_mesh(const fs::path& path, const MeasuredMesh& mesh,
                          const Georeference& georeference) {
-  const std::string form = form_of(path), name = path.string();
+  const std::string form = file_ending(path), name = path.string();
   MeshColumns columns{.vertices = PointCloud(mesh.shape.vertices_m.size())};
   add_column(name, sd_rule, mesh.sd_m, columns.vertices);
   add_column(name, label_rule, mesh.labels, columns.vertices);
@@ -126,7 +119,7 @@ MeasuredMeshFile read_measured_mesh(const fs::path& path) {
     file.skipped = read.skipped;
     file.rounding_m = read.rounding_m;
   };
-  if (form_of(path) != ".ply") {
+  if (file_ending(path) != ".ply") {
     take(read_mesh(path));
     return file;
   }

@@ -36,10 +36,13 @@ std::vector<Beam> load_velodyne_xml(const std::filesystem::path& path);
 /// @throws Error with path:line and rule for every fault of the file.
 std::vector<Beam> load_hesai_csv(const std::filesystem::path& path);
 
-/// As the functions above, of a text already in memory; `path` stands for the file in messages.
+/// As load_ouster_metadata, of a text already in memory; `path` stands for the file in messages.
 SpinningPattern parse_ouster_metadata(std::string_view text, const std::filesystem::path& path);
+/// Likewise load_velodyne_yaml.
 std::vector<Beam> parse_velodyne_yaml(std::string_view text, const std::filesystem::path& path);
+/// Likewise load_velodyne_xml.
 std::vector<Beam> parse_velodyne_xml(std::string_view text, const std::filesystem::path& path);
+/// Likewise load_hesai_csv.
 std::vector<Beam> parse_hesai_csv(std::string_view text, const std::filesystem::path& path);
 
 /// Returns `pattern` with the angles, origins and rings of `unit`, and its own firing times and

@@ -18,6 +18,7 @@ struct RadianceScale {
 struct IlluminanceScale {
   double lux = 0;
 };
+/// What the values of an image mean.
 using EnvironmentScale = std::variant<RadianceScale, IlluminanceScale>;
 
 /// What shines from every direction, by an equirectangular image. Linear sRGB radiance in

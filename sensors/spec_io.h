@@ -41,6 +41,7 @@ std::string lens_text(const LensModel& lens);
 /// Returns the names of the presets in a folder, sorted. @throws Error if it cannot be read.
 std::vector<std::string> preset_names(const std::filesystem::path& preset_folder);
 
+/// What a file of a sensor describes.
 enum class SensorKind { Lidar, Camera };
 
 /// As preset_names, of one kind of sensors in a folder of both.

@@ -13,6 +13,7 @@ namespace groundray {
 
 /// Any pattern at all: a table of pulses that is repeated for ever.
 struct TablePattern {
+  /// One pulse of the table.
   struct Shot {
     double time_s = 0;         ///< after the start of the table; less than the period
     double azimuth_rad = 0;    ///< from S's x axis, counter-clockwise seen from above

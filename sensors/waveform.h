@@ -26,6 +26,7 @@ struct Bins {
 /// the 2^-24 of a float, which moves an echo by less than 1e-6 of the pulse's sigma.
 class Waveform {
  public:
+  /// A run of bins, and where their power begins.
   struct Segment {
     Bins bins;
     std::size_t first_sample = 0;

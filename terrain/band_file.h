@@ -10,6 +10,7 @@ namespace groundray {
 
 /// Some samples of the bands of a raster.
 struct RasterBands {
+  /// The samples of one band.
   struct Band {
     std::string name;  ///< as its file describes it; of a band without, "band 2"
     std::string unit;  ///< likewise; may be empty

@@ -3,10 +3,12 @@
 #include <cpl_conv.h>
 #include <cpl_string.h>
 #include <fmt/ranges.h>
+#include <tiffio.h>
 
 #include <algorithm>
 #include <cctype>
 #include <cmath>
+#include <cstdarg>
 #include <cstdint>
 #include <limits>
 #include <memory>
@@ -73,6 +75,12 @@ double height_unit_m(GDALRasterBand& band, const OGRSpatialReference& crs) {
       band.GetUnitType());
 }
 
+// Hands on what libtiff says.
+template <CPLErr severity>
+void tell_gdal(const char* /*module*/, const char* format, va_list values) {
+  CPLErrorV(severity, CPLE_FileIO, format, values);
+}
+
 // A window of whole rows of the caller's.
 struct Strip {
   glm::ivec2 first;
@@ -118,6 +126,10 @@ void start_gdal() {
   static std::once_flag once;
   std::call_once(once, [] {
     GDALAllRegister();
+    // As GDAL up to 3.6 sets them. Later ones leave libtiff's own, which print: of a disk that is
+    // full when a file is closed nobody would learn.
+    TIFFSetErrorHandler(tell_gdal<CE_Failure>);
+    TIFFSetWarningHandler(tell_gdal<CE_Warning>);
     const bool is_chosen = CPLGetConfigOption("GDAL_CACHEMAX", nullptr) != nullptr;
     if (!is_chosen && GDALGetCacheMax64() > cache_bytes) GDALSetCacheMax64(cache_bytes);
   });

@@ -52,6 +52,7 @@ struct Selection {
     IsLeaf = 64,  ///< is part of the mesh
     Holed = 128,  ///< some or all samples of the DEM in it are missing
   };
+  /// The window of one level.
   struct Level {
     glm::ivec2 first{0};
     glm::ivec2 size{0};

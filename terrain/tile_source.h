@@ -94,6 +94,7 @@ class MemoryTiles final : public TileSource {
 /// out, so that the fault shows when the tile is asked for.
 class FileTiles final : public TileSource {
  public:
+  /// What was read so far, and what is kept.
   struct Statistics {
     std::size_t reads = 0;         ///< tiles read from files, or tried to be
     std::size_t cached_bytes = 0;  ///< of the tiles in the cache

@@ -43,6 +43,7 @@ struct FusionCounts {
 /// Fills a block with the next points and returns true; returns false if there are none left.
 using PointSource = std::function<bool(MeasuredPoints& block)>;
 
+/// What fusion gives.
 struct Fusion {
   DemLayers layers;
   FusionCounts counts;

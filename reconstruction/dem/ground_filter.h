@@ -45,6 +45,7 @@ struct GroundFilterOptions {
   }
 };
 
+/// How many points and cells became what.
 struct GroundCounts {
   std::size_t ground = 0;
   std::size_t above = 0;
@@ -55,6 +56,7 @@ struct GroundCounts {
   std::size_t pit_cells = 0;     ///< whose lowest point is below it
 };
 
+/// What the filter tells of the points.
 struct GroundPoints {
   std::vector<GroundClass> classes;  ///< of each point
   std::vector<float> height_m;       ///< of each point above `surface`; negative below it

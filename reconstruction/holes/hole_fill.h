@@ -43,6 +43,7 @@ struct FilledHole {
   bool is_smooth = true;      ///< whether it goes on smoothly from the rim; else it is flat
 };
 
+/// A hole that was left, and why.
 struct OpenHole {
   Rim rim;
   HoleLeft why = HoleLeft::TooLong;

@@ -56,8 +56,10 @@ struct NoiseBound {
 /// @see Satopaa, Albrecht, Irwin, Raghavan, Finding a "kneedle" in a haystack, ICDCS (2011).
 struct CostKnee {};
 
+/// Where simplification halts.
 using Halt = std::variant<VerticalBound, DistanceBound, FaceBudget, NoiseBound, CostKnee>;
 
+/// Whether edges between labels stay where they are.
 enum class LabelBorders { Keep, Ignore };
 
 /// What is kept besides.

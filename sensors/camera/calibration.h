@@ -35,6 +35,7 @@ struct CameraCalibration {
   std::optional<Rectification> rectification;
 };
 
+/// The formats of calibration files.
 enum class CalibrationFormat { RosYaml, OpenCvYaml, OpenCvXml, KalibrYaml, ColmapText, BasaltJson };
 
 /// Reads the cameras of a file in any of the formats, which its content tells.

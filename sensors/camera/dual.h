@@ -49,6 +49,10 @@ struct Dual {
   constexpr Dual chain(double f, double slope) const { return {f, slope * dx, slope * dy}; }
 };
 
+/// @name Functions of dual numbers
+/// @{
+
+/// As of a number, with the derivatives.
 inline Dual sqrt(const Dual& a) {
   const double root = std::sqrt(a.value);
   return a.chain(root, 0.5 / root);
@@ -63,8 +67,11 @@ inline Dual cos(const Dual& a) { return a.chain(std::cos(a.value), -std::sin(a.v
 inline Dual asin(const Dual& a) {
   return a.chain(std::asin(a.value), 1 / std::sqrt(1 - a.value * a.value));
 }
+/// @}
 
+/// Returns a number, or a dual number's value.
 inline double value_of(double a) { return a; }
+/// As above.
 inline double value_of(const Dual& a) { return a.value; }
 
 }  // namespace groundray

@@ -18,11 +18,12 @@
 // that derivatives come by themselves. Integer coordinates are pixel centres.
 namespace groundray {
 
-/// A direction in C, unit; and a place in the image, px.
+/// A direction in C, unit.
 template <typename T>
 struct Direction {
   T x, y, z;
 };
+/// A place in the image, px.
 template <typename T>
 struct Pixel {
   T u, v;

@@ -42,17 +42,19 @@ class PathTracer {
 
   /// Buffers of one thread; what is in them is the tracer's.
   struct Workspace {
+    /// A path under way.
     struct Path {
       std::uint32_t sample;
       float pdf_per_sr;  // of its direction; 0 for a camera's, which nothing else could draw
       glm::vec3 throughput;
       SobolPairs numbers;
     };
+    /// Light that arrives unless something is in its way.
     struct Light {
       std::uint32_t sample;
-      glm::vec3 radiance;  // that reaches the eye if nothing is in the way
+      glm::vec3 radiance;
     };
-    // Rays to one kind of light, and what they bring.
+    /// Rays to one kind of light, and what they bring.
     struct Asked {
       std::vector<Ray> rays;
       std::vector<Light> lights;

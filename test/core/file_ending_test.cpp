@@ -1,0 +1,16 @@
+#include "core/file_ending.h"
+
+#include <gtest/gtest.h>
+
+namespace groundray {
+namespace {
+
+TEST(FileEnding, IsWhatFollowsTheLastDotInSmallLetters) {
+  EXPECT_EQ(file_ending("a/b.c/Scan.000.PLY"), ".ply");
+  EXPECT_EQ(file_ending("dem.tiF"), ".tif");
+  EXPECT_EQ(file_ending("a.b/dem"), "");
+  EXPECT_EQ(file_ending(".ply"), "");  // a name that begins with a dot has no ending
+}
+
+}  // namespace
+}  // namespace groundray
