@@ -4,7 +4,7 @@ import re
 from pathlib import Path
 
 import pytest
-from markdown_page import FILES, PAGES, ROOT, Page, PageError, anchor_of, name_of
+from markdown_page import FILES, PAGES, ROOT, Page, PageError, anchor_of, files_below, name_of
 
 FOLDERS = "core|terrain|sensors|reconstruction|apps|test|docs|data"
 # A file of ours as text names it; names with * or <...> stand for several.
@@ -26,6 +26,25 @@ SPELT = {
     "OpenCV": r"\b[Oo]pen-?[Cc][Vv]\b",
     "OpenEXR": r"\b[Oo]pen-?[Ee][Xx][Rr]\b",
 }
+
+
+def test_without_git_the_same_files_are_found(tmp_path: Path) -> None:
+    """What is built, made or hidden is none of ours; in the checkout git says the same."""
+    ours = ["README.md", ".gitignore", ".ci/run", "docs/guide.md", "apps/build/a", "test/out/b"]
+    others = [
+        "build/docs/a",
+        "out/run/a.md",
+        ".venv/a.md",
+        ".git/config",
+        "test/.cache/a",
+    ]
+    others += ["apps/__pycache__/a", "data/a.groundray/b"]
+    for name in (*ours, *others):
+        (tmp_path / name).parent.mkdir(parents=True, exist_ok=True)
+        (tmp_path / name).write_text("text")
+    assert files_below(tmp_path) == sorted(tmp_path / name for name in ours)
+    missing = set(PAGES) - set(files_below(ROOT))
+    assert missing == set()
 
 
 @pytest.mark.parametrize("path", PAGES, ids=name_of)

@@ -1,6 +1,8 @@
 """Pages of Markdown as the tests of docs see them: fenced blocks, headings, links."""
 
+import os
 import re
+import shutil
 import subprocess
 from dataclasses import dataclass
 from pathlib import Path
@@ -100,15 +102,38 @@ def anchor_of(heading: str) -> str:
 
 
 def known_files() -> list[Path]:
-    """All files of the checkout that git has or would take."""
+    """All files of the checkout that git has or would take; without git what looks like them."""
+    if shutil.which("git") is None or not (ROOT / ".git").exists():
+        return files_below(ROOT)
     listed = subprocess.run(
-        ["git", "ls-files", "--cached", "--others", "--exclude-standard"],
+        ["git", "ls-files", "-z", "--cached", "--others", "--exclude-standard"],
         cwd=ROOT,
         capture_output=True,
         text=True,
-        check=True,
+        check=False,
     )
-    return sorted({ROOT / name for name in listed.stdout.splitlines() if (ROOT / name).is_file()})
+    if listed.returncode != 0:  # another user's checkout, say
+        return files_below(ROOT)
+    return sorted({ROOT / name for name in listed.stdout.split("\0") if (ROOT / name).is_file()})
+
+
+def files_below(root: Path) -> list[Path]:
+    """All files but what is built, made or hidden; of what is hidden, those of CI and settings."""
+    found = [path for path in root.iterdir() if path.is_file()]
+    for folder, folders, names in os.walk(root):
+        path = Path(folder)
+        if path == root:
+            folders[:] = [each for each in folders if each not in ("build", "out")]
+        else:
+            found += [path / name for name in names]
+        folders[:] = [
+            each
+            for each in folders
+            if (each == ".ci" or not each.startswith("."))
+            and each != "__pycache__"
+            and not each.endswith(".groundray")
+        ]
+    return sorted(found)
 
 
 FILES = known_files()

@@ -116,6 +116,44 @@ def test_paths_that_are_broken_are_told(run, capsys, form):
         assert rule in line
 
 
+ABSURD = ["inf", "-inf", "nan", "1e30", "-1e30", "1e999999999", "5000000000", "soon"]
+
+
+@pytest.mark.parametrize("form", ["kitti", "tum", "npz", "laz", "mcap"])
+@pytest.mark.parametrize("time", ABSURD)
+def test_times_that_cannot_be_are_told(run, capsys, form, time):
+    """Stamps, the origin, lines of paths, and exposures."""
+    sensor = "left" if form == "tum" else "top"
+    for name, place, told in (
+        ("dataset.yaml", rf'(sensor: "{sensor}", frame: 1, stamp_s: )[^,]+', "stamp_s = "),
+        ("dataset.yaml", r"(time_origin_s: ).*", "time_origin_s = "),
+        (f"poses/{sensor}.tum", r"(?m)^()[^ #]+", f"poses/{sensor}.tum:"),
+        ("calibration/left.yaml", r"(exposure_s: ).*", "exposure_s = "),
+    ):
+        whole = (run / name).read_text()
+        spoiled, count = re.subn(place, rf"\g<1>{time}", whole, count=1)
+        assert count == 1, place
+        (run / name).write_text(spoiled)
+        line = fails(capsys, run, form)
+        assert told in line
+        assert "must be" in line
+        (run / name).write_text(whole)
+
+
+@pytest.mark.parametrize("form", ["kitti", "npz", "laz", "mcap"])
+def test_a_scan_long_after_its_path_is_told(run, capsys, form):
+    record = run / "dataset.yaml"
+    text = re.sub(
+        r"(sensor: \"bare-16\", frame: 2,.*? stamp_s: )[^,}]+", r"\g<1>4e9", record.read_text()
+    )
+    assert "4e9" in text
+    record.write_text(text)
+    options = ["--no-images"] if form == "kitti" else []  # else scans without an image are left out
+    line = fails(capsys, run, form, "--lidar", "bare-16", *options)
+    assert "is asked for 4000000000.0" in line
+    assert "the path ends at 0." in line
+
+
 def test_damage_anywhere_gives_one_error_or_none(run, capsys):
     """Bits flipped and ends cut at random, in all that is read but pixels and points."""
     random = np.random.default_rng(3)

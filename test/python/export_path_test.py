@@ -49,6 +49,11 @@ def test_a_path_of_one_line_stands_and_none_goes_back(tmp_path):
         Exception, match=r"a\.tum: the path begins at 5\.0 s but is asked for 4\.0 s"
     ):
         path.pose_at(4 * 10**9)
+    path.pose_at(3605 * 10**9)
+    with pytest.raises(
+        Exception, match=r"a\.tum: the path ends at 5\.0 s but is asked for 3606\.0 s"
+    ):
+        path.pose_at(3606 * 10**9)
     rotations, positions_m = path.at(np.zeros(0, np.int64))
     assert rotations.shape == (0, 3, 3)
     assert positions_m.shape == (0, 3)

@@ -1,12 +1,10 @@
 """Scans from Python: the bytes of `groundray generate`, without copies, by any threads."""
 
 import gc
-import signal
 import subprocess
 import sys
 import threading
 import time
-from pathlib import Path
 
 import groundray
 import numpy as np
@@ -156,60 +154,6 @@ def test_scans_of_several_threads_at_once_have_the_same_bytes(made):
     for thread in threads:
         thread.join()
     assert got == [alone[key] for key in wanted]
-
-
-def test_other_threads_go_on_during_a_long_call(made):
-    terrain = groundray.Terrain(small_scene.heights_m(600, 600))
-    origins = np.full((1_000_000, 3), [300.0, 300.0, 20.0])
-    directions = np.random.default_rng(3).normal(size=origins.shape)
-    terrain.cast_rays(origins[:10], directions[:10])
-    seen, is_done = [], threading.Event()
-
-    def tick():
-        while not is_done.is_set():
-            seen.append(time.monotonic())
-            time.sleep(0.002)
-
-    thread = threading.Thread(target=tick)
-    thread.start()
-    begin = time.monotonic()
-    terrain.cast_rays(origins, directions)
-    end = time.monotonic()
-    is_done.set()
-    thread.join()
-    during = [at for at in seen if begin < at < end]
-    assert end - begin > 0.05
-    assert len(during) > 5
-
-
-def test_ctrl_c_ends_a_long_call(tmp_path):
-    script = tmp_path / "long.py"
-    script.write_text(
-        "import pathlib, groundray, small_scene\n"
-        f"folder = pathlib.Path({str(tmp_path)!r})\n"
-        "spec = small_scene.spec(folder, camera=True)\n"
-        "eye = (folder / 'eye.yaml').read_text()\n"
-        "eye = eye.replace('samples: 4', 'samples: 512').replace('36]', '960]')\n"
-        "(folder / 'eye.yaml').write_text(eye)\n"
-        "terrain = groundray.Terrain(small_scene.heights_m(), small_scene.CELL_M)\n"
-        "camera = groundray.scene(spec, folder=folder, terrain=terrain).camera('eye')\n"
-        "print('exposing', flush=True)\n"
-        "try:\n"
-        "    camera.expose(frame=0)\n"
-        "except KeyboardInterrupt:\n"
-        "    print('interrupted')\n"
-    )
-    path = f"{small_scene.PACKAGE}:{Path(small_scene.__file__).parent}"
-    with subprocess.Popen(
-        [sys.executable, script], stdout=subprocess.PIPE, text=True, env={"PYTHONPATH": path}
-    ) as process:
-        assert process.stdout.readline() == "exposing\n"
-        time.sleep(0.5)
-        process.send_signal(signal.SIGINT)
-        begin = time.monotonic()
-        assert process.stdout.read() == "interrupted\n"
-        assert process.wait(60) == 0
-        assert time.monotonic() - begin < 15  # to its end it takes longer
 
 
 def test_a_scan_from_python_costs_less_than_a_millisecond_more(made, tmp_path):

@@ -12,15 +12,20 @@ import small_scene
 PUBLIC = [name for name in groundray.__all__ if name != "__version__"]
 
 
+# NDArray and PathLike in stubs are of any kind.
+STRICT = "[mypy]\nstrict = True\n[mypy-groundray._core]\ndisallow_any_generics = False\n"
+
+
 def check(folder, text):
     """Returns what mypy says of a program that uses the package."""
     (folder / "sample.py").write_text(text)
-    # NDArray and PathLike in stubs are of any kind.
-    (folder / "mypy.ini").write_text(
-        "[mypy]\nstrict = True\n[mypy-groundray.*]\ndisallow_any_generics = False\n"
-    )
+    return mypy(folder, STRICT, "sample.py")
+
+
+def mypy(folder, settings, *what):
+    (folder / "mypy.ini").write_text(settings)
     return subprocess.run(
-        [sys.executable, "-m", "mypy", "--cache-dir", folder / "cache", "sample.py"],
+        [sys.executable, "-m", "mypy", "--cache-dir", folder / "cache", *what],
         cwd=folder,
         capture_output=True,
         text=True,
@@ -66,6 +71,18 @@ groundray.simplify("mesh.ply")
     errors = [line for line in wrong.stdout.splitlines() if ": error:" in line]
     kinds = [line.split(":")[1] + line.split("[")[-1] for line in errors]
     assert kinds == ["3arg-type]", "4call-arg]", "5attr-defined]", "6arg-type]"], wrong.stdout
+
+
+def test_types_within_the_package_are_right(tmp_path):
+    """Those of its Python files, groundray-export among them."""
+    foreign = ("OpenEXR", "cv2", "laspy", "lazrs", "mcap", "mcap_ros2", "pyproj")  # some have types
+    settings = STRICT + "".join(
+        f"[mypy-{name}.*]\nignore_missing_imports = True\n" for name in foreign
+    )
+    result = mypy(tmp_path, settings, "-p", "groundray")
+    assert result.returncode == 0, result.stdout
+    files = int(result.stdout.split(" source files")[0].split()[-1])
+    assert files >= len(list((small_scene.ROOT / "apps/python/groundray").rglob("*.py")))
 
 
 def test_everything_public_tells_what_it_is():

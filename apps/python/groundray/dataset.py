@@ -18,17 +18,15 @@ import numpy as np
 import yaml
 from numpy.typing import NDArray
 
-try:
-    from groundray import Error
-except ImportError:  # without the compiled module, or while the package is being imported
-
-    class Error(RuntimeError):  # type: ignore[no-redef]
-        """What is wrong, where, and what would mend it."""
-
+from groundray._core import Error
 
 __all__ = ["Camera", "Dataset", "Error", "Frame", "Lidar", "ObjectGroup", "StereoPair", "matrix_of"]
 
 Floats = NDArray[np.float64]
+
+MOST_S = 2**32
+"""Times are below: until the year 2106, and the sum of two is whole nanoseconds in 64 bits."""
+_OF_TIMES = "must be within 2^32 s; was the file damaged?"
 
 _LOADER: Any = getattr(yaml, "CBaseLoader", yaml.BaseLoader)  # all scalars stay text
 
@@ -114,6 +112,20 @@ class ObjectGroup:
     count: int
 
 
+def nanoseconds_of(text: str) -> int:
+    """Returns seconds as whole nanoseconds: a double has too few digits.
+
+    Raises ValueError with the rule if the text is no number, or farther from 0 than `MOST_S`.
+    """
+    try:
+        seconds = Decimal(text)
+    except InvalidOperation:
+        raise ValueError("must be a number of seconds") from None
+    if seconds.is_nan() or not seconds.copy_abs() < MOST_S:
+        raise ValueError(_OF_TIMES)
+    return int((seconds * 10**9).to_integral_value())
+
+
 def matrix_of(
     rotation_xyzw: Sequence[float] | Floats, translation_m: Sequence[float] | Floats
 ) -> Floats:
@@ -173,11 +185,17 @@ class _Map:
         return int(number)
 
     def time_ns(self, key: str) -> int:
-        """Seconds as they are written, to the nanosecond: a double has too few digits."""
+        """Seconds as they are written, to the nanosecond."""
         try:
-            return int((Decimal(self.text(key)) * 10**9).to_integral_value())
-        except (InvalidOperation, ValueError):
-            raise self.fault(key, f"= {self.values[key]} must be a number of seconds") from None
+            return nanoseconds_of(self.text(key))
+        except ValueError as fault:
+            raise self.fault(key, f"= {self.values[key]} {fault}") from None
+
+    def seconds(self, key: str) -> float:
+        seconds = self.numbers(key, 1)[0]
+        if not abs(seconds) < MOST_S:
+            raise self.fault(key, f"= {seconds} {_OF_TIMES}")
+        return seconds
 
     def maps(self, key: str, *, is_optional: bool = False) -> list[_Map]:
         value = self.values.get(key, []) if is_optional else self.get(key)
@@ -319,6 +337,11 @@ def _camera(name: str, number: int, frames: tuple[Frame, ...], calibration: _Map
         raise calibration.fault("lens", "must have one key, the lens model")
     ((lens_model, values),) = lens.items()
     width, height = calibration.numbers("size_px", 2)
+    exposure_s, row_s = calibration.seconds("exposure_s"), calibration.seconds("row_s")
+    if not (1 <= width < 2**31 and 1 <= height < 2**31):
+        raise calibration.fault("size_px", f"= [{width}, {height}] must be from 1 to 2^31 px")
+    if not abs(exposure_s) + abs(row_s * height) < MOST_S:
+        raise calibration.fault("row_s", f"= {row_s} must end within 2^32 s")
     return Camera(
         name=name,
         number=number,
@@ -328,8 +351,8 @@ def _camera(name: str, number: int, frames: tuple[Frame, ...], calibration: _Map
         size_px=(int(width), int(height)),
         lens_model=lens_model,
         lens=values if isinstance(values, dict) else {},
-        exposure_s=calibration.numbers("exposure_s", 1)[0],
-        row_s=calibration.numbers("row_s", 1)[0],
+        exposure_s=exposure_s,
+        row_s=row_s,
     )
 
 

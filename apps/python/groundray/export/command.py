@@ -6,7 +6,9 @@ import argparse
 import importlib.util
 import signal
 import sys
-from collections.abc import Callable, Sequence
+import threading
+from collections.abc import Callable, Iterator, Sequence
+from contextlib import contextmanager
 from pathlib import Path
 from types import FrameType
 
@@ -226,6 +228,19 @@ def _interrupt(_signal: int, _frame: FrameType | None) -> None:
     raise KeyboardInterrupt
 
 
+@contextmanager
+def _sigterm_interrupts() -> Iterator[None]:
+    """SIGTERM is as Ctrl-C meanwhile; in other threads than the main one it stays what it was."""
+    if threading.current_thread() is not threading.main_thread():
+        yield
+        return
+    before = signal.signal(signal.SIGTERM, _interrupt)
+    try:
+        yield
+    finally:
+        signal.signal(signal.SIGTERM, before)
+
+
 def _guarded(work: Callable[[], str]) -> tuple[int, str]:
     """Runs work; returns the exit code and what to say."""
     try:
@@ -244,7 +259,6 @@ def main(arguments: Sequence[str] | None = None) -> int:
     parser = _parser()
     options = parser.parse_args(arguments)
     _check_options(parser, options)
-    signal.signal(signal.SIGTERM, _interrupt)
     notes = Notes()
 
     def work() -> str:
@@ -255,7 +269,8 @@ def main(arguments: Sequence[str] | None = None) -> int:
         with written_aside(options.output, options.dataset) as folder:
             return _export(options, folder, dataset, notes)
 
-    code, told = _guarded(work)
+    with _sigterm_interrupts():
+        code, told = _guarded(work)
     if code != DONE:
         print(f"groundray-export: {told}", file=sys.stderr)
         return code

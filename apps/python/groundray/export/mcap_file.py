@@ -51,7 +51,7 @@ class Bag:
         self._times_ns = (first_ns, time_ns)
 
     def end(self) -> None:
-        self._writer.finish()
+        self._writer.finish()  # type: ignore[no-untyped-call]
 
     def record(self) -> str:
         """Returns metadata.yaml; it says that /tf_static is latched."""

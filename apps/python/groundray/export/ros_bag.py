@@ -168,6 +168,8 @@ class _Source:
         """X_DB where the path is recorded, and on to the end of the last sweep."""
         times_ns = path.times_ns
         last_ns = max((self._last_time_ns(lidar) for lidar in self.lidars), default=0)
+        if last_ns > times_ns[-1]:
+            path.pose_at(last_ns)  # an error if it is far beyond
         step_ns = 10**7
         more = np.arange(times_ns[-1] + step_ns, last_ns + 2 * step_ns, step_ns, dtype=np.int64)
         times_ns = np.concatenate([times_ns, more]) if last_ns > times_ns[-1] else times_ns

@@ -2,16 +2,17 @@
 
 from __future__ import annotations
 
-from decimal import Decimal
 from pathlib import Path
 
 import numpy as np
 from numpy.typing import NDArray
 
-from groundray.dataset import Error
+from groundray.dataset import Error, nanoseconds_of
 
 Floats = NDArray[np.float64]
 Times = NDArray[np.int64]
+
+_LONGEST_NS = 3600 * 10**9  # beyond the path's end, which no sweep is
 
 
 def _cross_matrices(v: Floats) -> Floats:
@@ -71,11 +72,15 @@ class SensorPath:
     def at(self, times_ns: Times) -> tuple[Floats, Floats]:
         """Returns rotations (n, 3, 3) and positions (n, 3) in D.
 
-        Beyond its end the path goes on as it last moved. Raises Error before its begin.
+        Beyond its end the path goes on as it last moved, for an hour at most. Raises Error before
+        its begin and later.
         """
         if times_ns.size and times_ns.min() < self.times_ns[0]:
             first_s, asked_s = self.times_ns[0] * 1e-9, times_ns.min() * 1e-9
             raise Error(f"{self.file}: the path begins at {first_s} s but is asked for {asked_s} s")
+        if times_ns.size and times_ns.max() - self.times_ns[-1] > _LONGEST_NS:
+            last_s, asked_s = self.times_ns[-1] * 1e-9, times_ns.max() * 1e-9
+            raise Error(f"{self.file}: the path ends at {last_s} s but is asked for {asked_s} s")
         if self.times_ns.size == 1:
             return self.rotations[[0] * times_ns.size], self.positions_m[[0] * times_ns.size]
         i = np.searchsorted(self.times_ns, times_ns, side="right") - 1
@@ -155,4 +160,7 @@ def _read_pose(words: list[str], place: str) -> tuple[int, list[float]]:
     if abs(np.linalg.norm(numbers[4:]) - 1) > 1e-6:
         rule = "the quaternion must be of length 1"
         raise Error(f"{place}: {rule}; are its values in the order qx qy qz qw?")
-    return int((Decimal(words[0]) * 10**9).to_integral_value()), numbers[1:]
+    try:
+        return nanoseconds_of(words[0]), numbers[1:]
+    except ValueError as fault:
+        raise Error(f"{place}: the time {words[0]} {fault}") from None
