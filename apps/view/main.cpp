@@ -170,6 +170,10 @@ int run(int argc, char** argv) {
     fmt::print(stderr, "groundray-view: {} needs --screenshot\n", lonely);
     return wrong_usage;
   }
+  if (arguments.tolerance_m > 0 && arguments.compare_with.empty()) {
+    fmt::print(stderr, "groundray-view: --tolerance-m needs --compare-with\n");
+    return wrong_usage;
+  }
   read_spec(arguments);
   if (arguments.screenshot.empty()) return show_window(argc, argv, arguments);
   vtkObject::GlobalWarningDisplayOff();  // faults are thrown

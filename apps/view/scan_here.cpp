@@ -34,11 +34,9 @@ std::int64_t sweep_at(const ScanPattern& pattern, nanoseconds time) {
   return sweep;
 }
 
-constexpr const char* bare_name = "bare ground";
-
 // Grey, as far as lasers and eyes go.
 Material bare_ground() {
-  return {.name = bare_name,
+  return {.name = "bare ground",
           .reflection = Lambertian{{{200, bare_reflectance}, {20'000, bare_reflectance}}}};
 }
 
@@ -60,7 +58,7 @@ void suit_to_scene(const SceneSpec& scene, const Materials& materials, LidarSpec
         "there is no noise of light. Give the terrain a material to see what the laser would");
     return;
   }
-  if (scene.terrain.material && scene.terrain.material->name == bare_name) {
+  if (scene.text.empty()) {  // world_of_dem made it
     notes.push_back(fmt::format(
         "a DEM has no materials, so its ground was taken as grey: it reflects {:.0f} % of light of "
         "any wavelength, evenly to all sides",

@@ -61,15 +61,18 @@ void colour(View& view, const std::string& wish) {
     throw Error("--colour-by {}: no layer has that column; there are {}", wish, columns);
 }
 
-// Sets what the colours of a column mean, wherever it is shown.
-void span_colours(View& view, const std::string& wish, const glm::dvec2& range) {
+// Sets what the colours of a column mean, wherever it is shown. @return whether it is anywhere.
+bool span_colours(View& view, const std::string& wish, const glm::dvec2& range) {
   const auto equals = wish.rfind('=');
   const std::string name = equals == std::string::npos ? wish : wish.substr(equals + 1);
+  bool is_shown = false;
   for (const Layer* const layer : view.layers()) {
     const LayerColumn* const column = layer->find(name);
-    if (layer->coloured_by == name && column != nullptr && !column->is_rgb)
-      view.set_range(layer->name, name, range);
+    if (layer->coloured_by != name || column == nullptr || column->is_rgb) continue;
+    view.set_range(layer->name, name, range);
+    is_shown = true;
   }
+  return is_shown;
 }
 
 void hide(View& view, const std::string& wish) {
@@ -121,6 +124,8 @@ void arrange(View& view, std::vector<Opened>& inputs, const StillSpec& spec) {
     }
   }
   look(view, inputs, spec);
+  if (spec.follow_w_m && (inputs.empty() || !inputs.front().follower))
+    throw Error("--follow: the first input has no terrain that follows a place; a scene has");
   for (Opened& opened : inputs) {
     // Of several terrains only the first has the name that its follower gives it.
     const bool is_first = &opened == &inputs.front();
@@ -131,8 +136,14 @@ void arrange(View& view, std::vector<Opened>& inputs, const StillSpec& spec) {
   for (const std::string& wish : spec.hide) hide(view, wish);
   for (const std::string& wish : spec.colour_by) colour(view, wish);
   if (spec.range) {
-    span_colours(view, "deviation", *spec.range);
-    for (const std::string& wish : spec.colour_by) span_colours(view, wish, *spec.range);
+    bool is_shown = span_colours(view, "deviation", *spec.range);
+    for (const std::string& wish : spec.colour_by)
+      is_shown = span_colours(view, wish, *spec.range) || is_shown;
+    if (!is_shown) {
+      throw Error(
+          "--range: nothing is coloured by a column of numbers; name one with --colour-by, or a "
+          "truth with --compare-with");
+    }
   }
   if (spec.is_wireframe) {
     for (const Layer* const layer : view.layers()) {

@@ -154,7 +154,6 @@ def test_usage(tmp_path: Path) -> None:
     assert view("--no-such-option").returncode == 2
     for lonely in (
         ("--turntable", 4),
-        ("--follow", "1,2,3"),
         ("--range", "0,1"),
         ("--compare-with", DEM),
     ):
@@ -166,6 +165,7 @@ def test_usage(tmp_path: Path) -> None:
         ("--look-at", "1,2"),
         ("--colour-by", "nothing"),
         ("--range", "2,1"),
+        ("--range", "1,2"),
     ):
         result = view(DEM, "--screenshot", tmp_path / "out.png", *wrong)
         assert result.returncode == 1

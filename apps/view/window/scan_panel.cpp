@@ -152,6 +152,7 @@ void ScanPanel::set_dem(const std::filesystem::path& dem) {
 }
 
 void ScanPanel::take_ground(std::shared_ptr<const World> world, const std::filesystem::path& dem) {
+  const bool was_running = job_.is_running();
   job_.abandon();
   world_ = std::move(world);
   dem_ = dem;
@@ -159,7 +160,10 @@ void ScanPanel::take_ground(std::shared_ptr<const World> world, const std::files
   at_m_.reset();
   where_->setText("none yet");
   const bool has_ground = world_ != nullptr || !dem_.empty();
-  status_->setText(!has_ground ? no_ground : dem_.empty() ? QString() : bare_ground);
+  status_->setText(!has_ground    ? no_ground
+                   : was_running  ? "Cancelled: there is another ground now."
+                   : dem_.empty() ? QString()
+                                  : bare_ground);
   if (has_ground && presets_.empty()) {
     try {
       presets_ = lidar_presets();

@@ -132,7 +132,8 @@ class Window : public QMainWindow {
   void use(const Document& document);
   void play(const Document& document);
   void offer_ground();
-  void set_sensors_of_scenes_visible(bool visible);
+  void hide_sensors_of_scenes();
+  void show_hidden_sensors();
   void tell_no_image(std::optional<std::chrono::nanoseconds> first);
   void show_images();
   void forget(const std::string& document);
@@ -156,6 +157,7 @@ class Window : public QMainWindow {
   WindowStart start_;
   std::set<std::string> unmet_;  // of what the program was asked to show, what no layer has met
   std::vector<Document> documents_;
+  std::vector<std::string> hidden_sensors_;      // of scenes, while a dataset is played
   std::map<std::string, ShownScan> scans_here_;  // by layer
   std::deque<std::filesystem::path> queue_;
   RecentFiles recent_;

@@ -194,7 +194,12 @@ void Window::ask_for_turntable() {
                             glm::ivec2 size_px) {
     const Look before = view().current_look();
     view().look(look);
-    save_picture(path, size_px);
+    try {
+      save_picture(path, size_px);
+    } catch (...) {
+      canvas_->look(before);
+      throw;
+    }
     view().look(before);
   };
   auto* dialog = new TurntableDialog(

@@ -11,6 +11,7 @@
 #include <QUrl>
 #include <algorithm>
 #include <cmath>
+#include <utility>
 
 #include "apps/interruption.h"
 #include "apps/view/window/scene_run.h"
@@ -166,7 +167,7 @@ void Window::take(Loaded loaded) {
   offer_ground();
   // While a dataset is played, the sensors of a scene would stand where they began.
   const bool is_played = playback_->is_open() && playback_->recording().dataset != nullptr;
-  if (document.timeline != nullptr && is_played) set_sensors_of_scenes_visible(false);
+  if (document.timeline != nullptr && is_played) hide_sensors_of_scenes();
   offer_comparisons();
 }
 
@@ -230,14 +231,24 @@ void Window::offer_ground() {
   scan_->set_world(scene == nullptr ? nullptr : scene->world);
 }
 
-void Window::set_sensors_of_scenes_visible(bool visible) {
+void Window::hide_sensors_of_scenes() {
   std::vector<std::string> sensors;
   for (const Layer* layer : view().layers()) {
     const bool may_be = layer->kind == LayerKind::Sensors || layer->kind == LayerKind::Trail;
     const auto of = std::ranges::find(documents_, document_of(layer->name), &Document::name);
-    if (may_be && of != documents_.end() && of->world != nullptr) sensors.push_back(layer->name);
+    if (may_be && layer->visible && of != documents_.end() && of->world != nullptr)
+      sensors.push_back(layer->name);
   }
-  for (const std::string& name : sensors) view().set_visible(name, visible);
+  for (const std::string& name : sensors) view().set_visible(name, false);
+  hidden_sensors_.insert(hidden_sensors_.end(), sensors.begin(), sensors.end());
+  layers_->refresh();
+  canvas_->draw();
+}
+
+void Window::show_hidden_sensors() {
+  for (const std::string& name : std::exchange(hidden_sensors_, {})) {
+    if (view().find(name) != nullptr) view().set_visible(name, true);
+  }
   layers_->refresh();
   canvas_->draw();
 }
@@ -299,7 +310,8 @@ void Window::forget(const std::string& document) {
       use(each);
     }
   }
-  if (gone.dataset != nullptr) set_sensors_of_scenes_visible(true);
+  const bool is_played = playback_->is_open() && playback_->recording().dataset != nullptr;
+  if (gone.dataset != nullptr && !is_played) show_hidden_sensors();
   offer_ground();
   show_documents();
 }
