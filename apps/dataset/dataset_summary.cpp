@@ -3,6 +3,8 @@
 #include <fmt/format.h>
 
 #include <algorithm>
+#include <set>
+#include <string_view>
 #include <utility>
 
 #include "apps/dataset/dataset_text.h"
@@ -13,19 +15,42 @@ namespace {
 
 using yaml::Need;
 
-void read_sensor(const yaml::Node& node, yaml::Faults& faults, DatasetSummary& summary) {
+enum class Kind { Lidar, Camera, Stereo };
+
+// Reads the name of a sensor or a pair: a file's, which no other has.
+std::string read_name(yaml::Map& map, std::set<std::string>& names, yaml::Faults& faults) {
+  constexpr std::string_view letters =
+      "abcdefghijklmnopqrstuvwxyzABCDEFGHIJKLMNOPQRSTUVWXYZ0123456789_-";
+  std::string name;
+  const yaml::Node* const at = map.read_text("name", Need::Required, name);
+  if (at == nullptr) return name;
+  if (name.find_first_not_of(letters) != std::string::npos) {
+    faults.add(*at, "name",
+               "is {}, but names files: only letters, digits, '_' and '-' can be in it",
+               yaml::shown(*at));
+  }
+  if (!names.insert(name).second)
+    faults.add(*at, "name", "'{}' is taken by an earlier sensor: names must differ", name);
+  return name;
+}
+
+void read_sensor(const yaml::Node& node, yaml::Faults& faults, std::set<std::string>& names,
+                 DatasetSummary& summary) {
   yaml::Map map(node, "sensors", faults);
   DatasetSummary::Sensor sensor;
-  map.read_text("name", Need::Required, sensor.name);
-  map.read_text("kind", Need::Required, sensor.kind);
-  if (sensor.kind != "stereo") {
+  sensor.name = read_name(map, names, faults);
+  Kind kind = Kind::Stereo;
+  map.read_choice("kind", Need::Required, kind,
+                  {{"lidar", Kind::Lidar}, {"camera", Kind::Camera}, {"stereo", Kind::Stereo}});
+  if (kind != Kind::Stereo) {
+    sensor.kind = kind == Kind::Lidar ? "lidar" : "camera";
     std::uint32_t frames = 0;
     map.read_whole("frames", Need::Required, frames);
     map.read_text("model", Need::Optional, sensor.model);
     sensor.frames = frames;
     const auto number = static_cast<std::uint32_t>(summary.sensors.size());
-    for (std::int64_t frame = 0; frame < sensor.frames; ++frame)
-      if (!summary.shard || summary.shard->has(number, frame, sensor.frames)) ++sensor.asked_for;
+    sensor.asked_for = static_cast<std::size_t>(
+        summary.shard ? summary.shard->share(number, sensor.frames) : sensor.frames);
     summary.asked_for += sensor.asked_for;
     summary.sensors.push_back(std::move(sensor));
   }
@@ -50,8 +75,9 @@ DatasetSummary read_summary(const std::filesystem::path& folder) {
   DatasetSummary summary{.version = {}, .shard = text.shard(), .sensors = {}};
   root.read_text("version", Need::Required, summary.version);
   root.read_whole("seed", Need::Required, summary.seed);
+  std::set<std::string> names;
   for (const yaml::Node& sensor : root.list("sensors", Need::Required))
-    read_sensor(sensor, faults, summary);
+    read_sensor(sensor, faults, names, summary);
   root.close_partly();
   faults.throw_if_any();
   while (const auto line = text.next_entry()) {

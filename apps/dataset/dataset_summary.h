@@ -15,7 +15,7 @@ namespace groundray {
 /// What a dataset is, and how much of it is there.
 struct DatasetSummary {
   struct Sensor {
-    std::string name, kind, model;  ///< kind: "lidar" or "camera"
+    std::string name, kind, model;  ///< name: as of a file. kind: "lidar" or "camera"
     std::int64_t frames = 0;        ///< of the whole run
     std::size_t asked_for = 0;      ///< of this shard; all of them, if it is none
     std::size_t done = 0;
@@ -32,7 +32,8 @@ struct DatasetSummary {
   std::optional<std::string> stem_of(const FrameEntry& entry) const;
 };
 
-/// Reads dataset.yaml in a folder. @throws Error if that is at fault.
+/// Reads dataset.yaml in a folder. Names of sensors are made sure of, for they name files.
+/// @throws Error if that is at fault, or cannot be read.
 DatasetSummary read_summary(const std::filesystem::path& folder);
 
 }  // namespace groundray

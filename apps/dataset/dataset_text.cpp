@@ -1,5 +1,6 @@
 #include "apps/dataset/dataset_text.h"
 
+#include <fcntl.h>
 #include <fmt/format.h>
 #include <unistd.h>
 
@@ -21,7 +22,8 @@ namespace fs = std::filesystem;
 
 constexpr std::string_view frames_line = "frames:", files_line = "files:";
 constexpr std::string_view item = "  - ";
-constexpr std::string_view shard_begin = "shard: \"", sum_begin = "sha256_above: \"", quote = "\"";
+constexpr std::string_view shard_begin = "shard: \"",
+                           sum_key = "sha256_above:", sum_begin = "sha256_above: \"", quote = "\"";
 
 struct CloseFile {
   void operator()(std::FILE* file) const noexcept { std::fclose(file); }
@@ -52,6 +54,18 @@ class LineSink {
   Sha256 sum_;
 };
 
+// Waits until the names in a folder are on the disk, for a file's own bytes do not take its name
+// there. Some file systems cannot; then there is nothing to wait for.
+void sync_folder(const fs::path& folder) {
+  const int descriptor = open(folder.c_str(), O_RDONLY | O_DIRECTORY | O_CLOEXEC);
+  const bool is_done = descriptor >= 0 && fsync(descriptor) == 0;
+  const int fault = errno;
+  if (descriptor >= 0) close(descriptor);
+  if (is_done || fault == EINVAL || fault == ENOTSUP || fault == EACCES) return;
+  throw Error("{}: cannot be written: {}; check the disk", folder.string(),
+              std::generic_category().message(fault));
+}
+
 // What stands between the two; nothing if the text is something else.
 std::optional<std::string_view> between(std::string_view text, std::string_view begin,
                                         std::string_view end) {
@@ -66,8 +80,8 @@ DatasetText::DatasetText(const fs::path& folder)
     : path_(folder / dataset_file), file_(path_, std::ios::binary) {
   if (!file_) {
     throw Error(
-        "{}: the folder holds no {} that can be read: is it what `groundray generate` made?",
-        folder.string(), dataset_file);
+        "{}: the folder holds no {} that can be read ({}): is it what `groundray generate` made?",
+        folder.string(), dataset_file, std::generic_category().message(errno));
   }
   while (const auto line = next_line()) {
     sum_.add(*line + "\n");
@@ -93,9 +107,9 @@ std::optional<std::string> DatasetText::next_line() {
 std::optional<std::string> DatasetText::next_entry() {
   if (!is_in_frames_) return std::nullopt;
   auto line = next_line();
-  if (line && line->starts_with(item)) {
+  if (line && *line != files_line && !line->starts_with(sum_key)) {
     sum_.add(*line + "\n");
-    return line->substr(item.size());
+    return line->starts_with(item) ? line->substr(item.size()) : std::move(*line);
   }
   is_in_frames_ = false;
   if (line) read_end(std::move(*line));
@@ -142,6 +156,7 @@ void write_dataset_text(const fs::path& folder, std::string_view header,
     sink.write(fmt::format("{}{}{}\n", sum_begin, sink.digits(), quote));
     sink.close();
   });
+  sync_folder(folder);
 }
 
 }  // namespace groundray

@@ -31,7 +31,8 @@ class DatasetText {
   /// Nothing if it is of the whole run.
   const std::optional<Shard>& shard() const noexcept { return shard_; }
 
-  /// Returns the text of the entry of the next frame; nothing after the last one.
+  /// Returns the text of the entry of the next frame; nothing after the last one. A line that is
+  /// none is returned too, for parse_entry to refuse: what was changed hides no frame after it.
   std::optional<std::string> next_entry();
   /// The line that was read last, from 1.
   std::size_t line() const noexcept { return line_; }

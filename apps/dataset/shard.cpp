@@ -14,9 +14,19 @@ constexpr std::uint32_t most_shards = 1'000'000;
 }  // namespace
 
 bool Shard::has(std::uint32_t sensor, std::int64_t frame, std::int64_t frames) const noexcept {
+  if (frame < 0 || frame >= frames) return false;
   std::int64_t owner = frame * count / frames;
   if (frames < count) owner = (owner + sensor) % count;
   return owner + 1 == index;
+}
+
+// The frames that go to a shard by `frame * count / frames` are those from one ratio, rounded up,
+// to the next.
+std::int64_t Shard::share(std::uint32_t sensor, std::int64_t frames) const noexcept {
+  std::int64_t part = index - 1;
+  if (frames < count) part = (part + count - sensor % count) % count;
+  const auto first = [&](std::int64_t k) { return (k * frames + count - 1) / count; };
+  return first(part + 1) - first(part);
 }
 
 std::optional<Shard> parse_shard(std::string_view text) {

@@ -19,6 +19,9 @@ struct Shard {
   ///                another shard.
   bool has(std::uint32_t sensor, std::int64_t frame, std::int64_t frames) const noexcept;
 
+  /// Returns how many of them it has. @param frames  may be none.
+  std::int64_t share(std::uint32_t sensor, std::int64_t frames) const noexcept;
+
   friend auto operator<=>(const Shard&, const Shard&) = default;
 };
 

@@ -119,8 +119,7 @@ void make_frames(const World& world, Dataset& dataset, const std::vector<FrameNa
     writer.wait();
     progress.update(written);
   } catch (...) {
-    writer.settle();
-    throw;
+    writer.fail(std::current_exception());
   }
 }
 

@@ -15,6 +15,8 @@
 #include <vector>
 
 #include "apps/dataset/dataset_summary.h"
+#include "apps/dataset/dataset_text.h"
+#include "apps/groundray/run/journal.h"
 #include "apps/scene/world.h"
 #include "terrain/certificate.h"
 #include "terrain/dem_file.h"
@@ -207,11 +209,39 @@ void print_scene(const World& world) {
   for (const PlacedCamera& camera : world.cameras) print_camera(camera);
 }
 
+// A run's journal has all of its frames that are there; dataset.yaml comes up to date when it ends.
+void count_journal(const std::filesystem::path& journal, DatasetSummary& dataset) {
+  std::vector<std::vector<bool>> noted(dataset.sensors.size());  // by sensor and frame
+  dataset.done = 0;
+  for (DatasetSummary::Sensor& sensor : dataset.sensors) sensor.done = sensor.bytes = 0;
+  read_journal(journal, [&](const std::string& text) {
+    const auto entry = parse_entry(text);
+    if (!entry) return;
+    const auto sensor =
+        std::ranges::find(dataset.sensors, entry->sensor, &DatasetSummary::Sensor::name);
+    if (sensor == dataset.sensors.end() || entry->frame >= sensor->frames) return;
+    auto& frames = noted[static_cast<std::size_t>(sensor - dataset.sensors.begin())];
+    const auto frame = static_cast<std::size_t>(entry->frame);
+    if (frame >= frames.size()) frames.resize(frame + 1);
+    if (frames[frame]) return;
+    frames[frame] = true;
+    ++sensor->done;
+    ++dataset.done;
+    for (const ProductSum& file : entry->files) sensor->bytes += file.sum.bytes;
+  });
+}
+
 void print_dataset(const std::filesystem::path& folder) {
-  const DatasetSummary dataset = read_summary(folder);
-  fmt::print(
-      "dataset   {} of {} frames are there{}\n", dataset.done, dataset.asked_for,
-      dataset.done < dataset.asked_for ? "; `groundray generate --resume` makes the rest" : "");
+  DatasetSummary dataset = read_summary(folder);
+  const std::filesystem::path journal = folder / journal_file;
+  const bool is_open = std::filesystem::exists(journal);
+  if (is_open) count_journal(journal, dataset);
+  fmt::print("dataset   {} of {} frames are there{}\n", dataset.done, dataset.asked_for,
+             is_open ? "; a run is at work, or was cut off and goes on by --resume"
+             : dataset.done < dataset.asked_for
+                 ? "; --resume of `groundray generate`, or of `groundray merge` if that was cut "
+                   "off, brings the rest"
+                 : "");
   if (dataset.shard) fmt::print("shard     {}\n", text_of(*dataset.shard));
   fmt::print("version   {}\nseed      {}\n", dataset.version, dataset.seed);
   for (const DatasetSummary::Sensor& sensor : dataset.sensors) {
@@ -224,7 +254,7 @@ void print_dataset(const std::filesystem::path& folder) {
 }  // namespace
 
 void print_info(const std::filesystem::path& file) {
-  if (std::filesystem::is_directory(file)) return print_dataset(file);
+  if (std::filesystem::exists(file / dataset_file)) return print_dataset(file);
   if (file.extension() == ".yaml" || file.extension() == ".yml")
     return print_scene(load_world(file));
   print_dem(file);

@@ -41,6 +41,18 @@ struct PoseNoise {
   double divergence_rad = 0, position_sd_m = 0, attitude_sd_rad = 0;
 };
 
+void check(const char* call, const PoseNoise& noise) {
+  Violations broken(call);
+  const auto demand = [&](const char* name, double value) {
+    broken.unless(value >= 0 && std::isfinite(value), "{} = {} must be 0 or more, and finite", name,
+                  value);
+  };
+  demand("divergence_rad", noise.divergence_rad);
+  demand("position_sd_m", noise.position_sd_m);
+  demand("attitude_sd_rad", noise.attitude_sd_rad);
+  broken.throw_if_any();
+}
+
 // As `groundray reconstruct dem` has it: docs/dem.md.
 void add_point(const glm::dvec3& p_m, const glm::dvec3& origin_m, double range_sd_m,
                std::uint32_t group, const PoseNoise& noise, MeasuredPoints& into) {
@@ -228,8 +240,9 @@ void bind_fusion(nb::module_& module) {
          std::optional<double> range_sd_m, double divergence_rad, double position_sd_m,
          double attitude_sd_rad, double most_sd_m, double outlier_share) {
         check_scans("fuse_dem", scans);
+        const PoseNoise noise{divergence_rad, position_sd_m, attitude_sd_rad};
+        check("fuse_dem", noise);
         return without_gil([&](const StopRequest& stop) {
-          const PoseNoise noise{divergence_rad, position_sd_m, attitude_sd_rad};
           return fused(points_of(scans, range_sd_m, noise), cell_m, area_m, most_sd_m,
                        outlier_share, stop);
         });
@@ -243,8 +256,9 @@ void bind_fusion(nb::module_& module) {
          double cell_m, const std::optional<GivenNumbers>& groups, const GivenArea& area_m,
          double divergence_rad, double position_sd_m, double attitude_sd_rad, double most_sd_m,
          double outlier_share) {
+        const PoseNoise noise{divergence_rad, position_sd_m, attitude_sd_rad};
+        check("fuse_points", noise);
         return without_gil([&](const StopRequest& stop) {
-          const PoseNoise noise{divergence_rad, position_sd_m, attitude_sd_rad};
           return fused(points_of(points_m, origins_m, range_sd_m, groups, noise), cell_m, area_m,
                        most_sd_m, outlier_share, stop);
         });
@@ -262,7 +276,11 @@ void bind_fusion(nb::module_& module) {
 // ----- smoothing and filling
 
 GridFrame frame_of(const GivenRaster& heights_m, double cell_m) {
+  constexpr std::size_t most = std::numeric_limits<int>::max();
   if (!(cell_m > 0) || !std::isfinite(cell_m)) throw Error("cell_m = {} must be positive", cell_m);
+  if (heights_m.rows() > most || heights_m.columns() > most)
+    throw Error("heights_m is of {} x {} samples; there may be 2^31 - 1 each way", heights_m.rows(),
+                heights_m.columns());
   return {{static_cast<int>(heights_m.columns()), static_cast<int>(heights_m.rows())},
           {0, 0},
           {cell_m, -cell_m},
@@ -273,8 +291,16 @@ std::span<const float> values_of(const GivenRaster& raster) {
   return {raster.data(), raster.size()};
 }
 
+void check_alike(const char* call, const GivenRaster& heights_m, const char* name,
+                 const GivenRaster& other) {
+  if (other.rows() != heights_m.rows() || other.columns() != heights_m.columns())
+    throw Error("{}: {} is of {} x {} samples, but heights_m of {} x {}; they must be alike", call,
+                name, other.rows(), other.columns(), heights_m.rows(), heights_m.columns());
+}
+
 AnyArray smoothed(const GivenRaster& heights_m, const GivenRaster& variance_m2, double cell_m,
                   std::optional<double> curvature_sd_per_m) {
+  check_alike("smooth_dem", heights_m, "variance_m2", variance_m2);
   SmoothHeights result = without_gil([&](const StopRequest& stop) {
     return smooth_dem(frame_of(heights_m, cell_m), values_of(heights_m), values_of(variance_m2),
                       {.curvature_sd_per_m = curvature_sd_per_m},
@@ -286,6 +312,7 @@ AnyArray smoothed(const GivenRaster& heights_m, const GivenRaster& variance_m2, 
 nb::dict filled(const GivenRaster& heights_m, double cell_m, const std::string& reach,
                 std::optional<double> farthest_m, double largest_share,
                 const std::optional<GivenRaster>& most_m) {
+  if (most_m) check_alike("fill_dem", heights_m, "most_m", *most_m);
   const FillOptions options{.reach = chosen<FillReach>("reach", reach,
                                                        {{"enclosed", FillReach::Enclosed},
                                                         {"hull", FillReach::Hull},

@@ -21,6 +21,7 @@
 #include "apps/python/points.h"
 #include "apps/python/terrain_model.h"
 #include "apps/python/word_choice.h"
+#include "core/error.h"
 
 namespace groundray::python {
 namespace {
@@ -91,6 +92,11 @@ nb::dict compare_files(const std::filesystem::path& reference, const std::filesy
                                                   {"dem", Subject::Dem},
                                                   {"mesh", Subject::Mesh}})
                                : golden::subject_of(reference, other);
+  if (what != Subject::Mesh && !within_m.empty())
+    throw Error(
+        "compare: within_m is for meshes, but {} and {} are none: leave it out, or say subject = "
+        "'mesh' if they are",
+        reference.string(), other.string());
   return compared([&]() -> Section {
     switch (what) {
       case Subject::Scan:

@@ -5,11 +5,15 @@
 #include <nanobind/stl/string.h>
 #include <nanobind/stl/vector.h>
 
+#include <algorithm>
 #include <array>
+#include <cmath>
 #include <cstdint>
 #include <filesystem>
 #include <limits>
 #include <optional>
+#include <type_traits>
+#include <utility>
 #include <vector>
 
 #include "apps/python/arrays.h"
@@ -26,35 +30,48 @@ namespace {
 
 using nb::literals::operator""_a;
 
+/// What the values of a column may be, from 0 on.
+struct ColumnRule {
+  const char* name;
+  double most;
+  const char* says;
+};
+
+constexpr ColumnRule sd_rule{"sd_m", std::numeric_limits<float>::max(), "0 or more, and finite"};
+constexpr ColumnRule label_rule{"labels", std::numeric_limits<std::uint16_t>::max(),
+                                "a whole number from 0 to 65535"};
+constexpr ColumnRule confidence_rule{"confidence", 1, "from 0 to 1"};
+
 template <typename T>
-std::vector<T> values_of(const char* name, const std::optional<GivenNumbers>& given,
-                         std::size_t vertices) {
+std::vector<T> values_of(const ColumnRule& rule, const std::optional<GivenNumbers>& given,
+                         std::size_t vertices, Violations& broken) {
   std::vector<T> values;
   if (!given) return values;
-  if (given->rows() != vertices)
-    throw Error("mesh: there are {} vertices, but {} values of {}; there must be one for each",
-                vertices, given->rows(), name);
-  for (std::size_t i = 0; i < vertices; ++i) {
+  broken.unless(given->rows() == vertices,
+                "there are {} vertices, but {} values of {}; there must be one for each", vertices,
+                given->rows(), rule.name);
+  for (std::size_t i = 0; i < given->rows(); ++i) {
     const double value = (*given)(i);
-    if constexpr (std::is_integral_v<T>) {
-      if (!(0 <= value && value <= std::numeric_limits<T>::max()) ||
-          static_cast<double>(static_cast<T>(value)) != value)
-        throw Error("mesh: {} of vertex {}, {}, must be a whole number from 0 to {}", name, i,
-                    value, std::numeric_limits<T>::max());
-    }
+    const bool is_sound =
+        value >= 0 && value <= rule.most && (!std::is_integral_v<T> || value == std::floor(value));
+    broken.unless(is_sound, "{} of vertex {}, {}, must be {}", rule.name, i, value, rule.says);
+    if (!is_sound) break;  // the column's first says what is wrong with it
     values.push_back(static_cast<T>(value));
   }
   return values;
 }
 
-std::vector<glm::uvec3> triangles_of(const GivenIndices& given, std::size_t vertices) {
+std::vector<glm::uvec3> triangles_of(const GivenIndices& given, std::size_t vertices,
+                                     Violations& broken) {
   std::vector<glm::uvec3> triangles(given.rows());
   for (std::size_t i = 0; i < triangles.size(); ++i) {
     for (int k = 0; k < 3; ++k) {
       const std::int64_t vertex = given(i, static_cast<std::size_t>(k));
-      if (vertex < 0 || vertex >= static_cast<std::int64_t>(vertices))
-        throw Error("mesh: triangle {} names vertex {}, but vertices are numbered from 0 to {}", i,
-                    vertex, static_cast<std::int64_t>(vertices) - 1);
+      if (vertex < 0 || vertex >= static_cast<std::int64_t>(vertices)) {
+        broken.unless(false, "triangle {} names vertex {}, but vertices are numbered from 0 to {}",
+                      i, vertex, static_cast<std::int64_t>(vertices) - 1);
+        return triangles;
+      }
       triangles[i][k] = static_cast<std::uint32_t>(vertex);
     }
   }
@@ -66,15 +83,20 @@ Mesh mesh_of(const GivenPoints& vertices_m, const GivenIndices& triangles,
              const std::optional<GivenNumbers>& confidence,
              const std::array<double, 3>& origin_w_m) {
   const std::size_t count = vertices_m.rows();
+  Violations broken("mesh");
   Mesh mesh;
   for (std::size_t i = 0; i < count; ++i)
     mesh.measured.shape.vertices_m.emplace_back(vertices_m(i, 0), vertices_m(i, 1),
                                                 vertices_m(i, 2));
-  mesh.measured.shape.triangles = triangles_of(triangles, count);
-  mesh.measured.sd_m = values_of<float>("sd_m", sd_m, count);
-  mesh.measured.labels = values_of<std::uint16_t>("labels", labels, count);
-  mesh.measured.confidence = values_of<float>("confidence", confidence, count);
+  mesh.measured.shape.triangles = triangles_of(triangles, count, broken);
+  mesh.measured.sd_m = values_of<float>(sd_rule, sd_m, count, broken);
+  mesh.measured.labels = values_of<std::uint16_t>(label_rule, labels, count, broken);
+  mesh.measured.confidence = values_of<float>(confidence_rule, confidence, count, broken);
   mesh.georeference.origin_w_m = {origin_w_m[0], origin_w_m[1], origin_w_m[2]};
+  broken.unless(std::ranges::all_of(origin_w_m, [](double x) { return std::isfinite(x); }),
+                "origin_w_m = ({}, {}, {}) must be finite", origin_w_m[0], origin_w_m[1],
+                origin_w_m[2]);
+  broken.throw_if_any();
   check_mesh(mesh.measured.shape, "mesh", EmptyMesh::Allow);
   return mesh;
 }
@@ -90,9 +112,9 @@ std::optional<AnyArray> known(nb::handle_t<Mesh> self, const std::vector<T> Meas
 constexpr const char* mesh_doc = R"(Triangles that share vertices, in the frame D.
 
   vertices_m  n x 3, metres
-  triangles   m x 3, numbers of vertices, counter-clockwise as seen from outside
-  sd_m, labels, confidence  of each vertex: standard deviation along its line of sight (m),
-              semantic class, and 0 to 1 how squarely it was seen; or None
+  triangles   m x 3, whole numbers of vertices, counter-clockwise as seen from outside
+  sd_m, labels, confidence  of each vertex: standard deviation along its line of sight (m, finite),
+              semantic class (0 to 65535), and 0 to 1 how squarely it was seen; or None
   origin_w_m  where D begins in W
 
 The arrays given are copied; those asked for are views that may not be written to.
@@ -108,7 +130,9 @@ void bind_mesh(nb::module_& module) {
              const std::optional<GivenNumbers>& sd_m, const std::optional<GivenNumbers>& labels,
              const std::optional<GivenNumbers>& confidence,
              const std::array<double, 3>& origin_w_m) {
-            new (place) Mesh(mesh_of(vertices_m, triangles, sd_m, labels, confidence, origin_w_m));
+            new (place) Mesh(without_gil([&](const StopRequest&) {
+              return mesh_of(vertices_m, triangles, sd_m, labels, confidence, origin_w_m);
+            }));
           },
           "vertices_m"_a, "triangles"_a, nb::kw_only(), "sd_m"_a = nb::none(),
           "labels"_a = nb::none(), "confidence"_a = nb::none(),

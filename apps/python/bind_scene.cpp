@@ -46,12 +46,17 @@ SharedScene build(SceneSpec spec, std::optional<std::uint64_t> seed) {
 }
 
 SharedScene load(const std::filesystem::path& path, std::optional<std::uint64_t> seed) {
-  return build(load_scene(path, data_folder() / "sensors"), seed);
+  return build(
+      without_gil([&](const StopRequest&) { return load_scene(path, data_folder() / "sensors"); }),
+      seed);
 }
 
 SharedScene parse(const std::string& text, const std::filesystem::path& path,
                   std::optional<std::uint64_t> seed) {
-  return build(parse_scene(text, path, data_folder() / "sensors"), seed);
+  return build(without_gil([&](const StopRequest&) {
+                 return parse_scene(text, path, data_folder() / "sensors");
+               }),
+               seed);
 }
 
 template <typename Placed>

@@ -218,13 +218,16 @@ AnyArray directions_of(nb::handle_t<SceneCamera> self) {
 
 AnyArray project(const SceneCamera& camera, const GivenPoints& points_m) {
   constexpr double none = std::numeric_limits<double>::quiet_NaN();
-  const Lens& lens = camera.placed().camera.lens();
-  std::vector<double> pixels;
-  for (std::size_t i = 0; i < points_m.rows(); ++i) {
-    const auto pixel = lens.project({points_m(i, 0), points_m(i, 1), points_m(i, 2)});
-    pixels.push_back(pixel ? pixel->x : none);
-    pixels.push_back(pixel ? pixel->y : none);
-  }
+  std::vector<double> pixels = without_gil([&](const StopRequest&) {
+    const Lens& lens = camera.placed().camera.lens();
+    std::vector<double> places;
+    for (std::size_t i = 0; i < points_m.rows(); ++i) {
+      const auto pixel = lens.project({points_m(i, 0), points_m(i, 1), points_m(i, 2)});
+      places.push_back(pixel ? pixel->x : none);
+      places.push_back(pixel ? pixel->y : none);
+    }
+    return places;
+  });
   return array_of(std::move(pixels), {points_m.rows(), 2});
 }
 

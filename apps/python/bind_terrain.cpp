@@ -87,13 +87,15 @@ Points cast(const TerrainModel& terrain, const GivenPoints& origins_m,
 }
 
 AnyArray heights_at(const TerrainModel& terrain, const GivenPlaces& places_m) {
-  std::vector<double> heights_m(places_m.rows());
-  for (std::size_t i = 0; i < heights_m.size(); ++i) {
-    heights_m[i] = terrain.dem()
-                       .grid.height_m_at({places_m(i, 0), places_m(i, 1)})
-                       .value_or(std::numeric_limits<double>::quiet_NaN());
-  }
-  return array_of(std::move(heights_m));
+  return array_of(without_gil([&](const StopRequest&) {
+    const HeightGrid& grid = terrain.dem().grid;
+    std::vector<double> heights_m(places_m.rows());
+    for (std::size_t i = 0; i < heights_m.size(); ++i) {
+      heights_m[i] = grid.height_m_at({places_m(i, 0), places_m(i, 1)})
+                         .value_or(std::numeric_limits<double>::quiet_NaN());
+    }
+    return heights_m;
+  }));
 }
 
 Mesh mesh_of(const TerrainModel& terrain, double max_error_m) {
@@ -130,7 +132,9 @@ void bind_terrain(nb::module_& module) {
           "__init__",
           [](TerrainModel* place, const GivenRaster& heights_m, double cell_m,
              const Pair& south_west_w_m, const std::string& crs_wkt) {
-            new (place) TerrainModel(dem_of(heights_m, cell_m, south_west_w_m, crs_wkt));
+            new (place) TerrainModel(without_gil([&](const StopRequest&) {
+              return dem_of(heights_m, cell_m, south_west_w_m, crs_wkt);
+            }));
           },
           "heights_m"_a, "cell_m"_a = 1.0, "south_west_w_m"_a = Pair{0, 0}, "crs_wkt"_a = "")
       .def_prop_ro(

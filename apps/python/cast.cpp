@@ -24,6 +24,18 @@ glm::dvec3 row_of(const GivenPoints& rows, std::size_t i) {
   return {rows(i, 0), rows(i, 1), rows(i, 2)};
 }
 
+// Its components' greatest size.
+double extent(const glm::dvec3& v) {
+  return std::max({std::abs(v.x), std::abs(v.y), std::abs(v.z)});
+}
+
+// Scaled by a power of two first, which rounds nothing: squares neither overflow nor underflow.
+glm::dvec3 unit(const glm::dvec3& v) {
+  const int exponent = std::ilogb(extent(v));
+  return glm::normalize(glm::dvec3(std::scalbn(v.x, -exponent), std::scalbn(v.y, -exponent),
+                                   std::scalbn(v.z, -exponent)));
+}
+
 bool is_finite(const glm::dvec3& v) {
   return std::isfinite(v.x) && std::isfinite(v.y) && std::isfinite(v.z);
 }
@@ -80,7 +92,7 @@ GivenRays::GivenRays(GivenPoints origins_m, GivenPoints directions, std::chrono:
 
 Ray GivenRays::operator[](std::size_t row) const {
   return {.origin = row_of(origins_m_, row),
-          .direction = glm::normalize(row_of(directions_, row)),
+          .direction = unit(row_of(directions_, row)),
           .time = time_};
 }
 
@@ -97,8 +109,7 @@ SensorBox GivenRays::box() const {
 void GivenRays::check() const {
   for (std::size_t i = 0; i < size(); ++i) {
     const glm::dvec3 origin = row_of(origins_m_, i), along = row_of(directions_, i);
-    const double square = glm::dot(along, along);
-    if (is_finite(origin) && square > 0 && std::isfinite(square)) continue;
+    if (is_finite(origin) && is_finite(along) && extent(along) > 0) continue;
     throw Error(
         "ray {}: origin ({}, {}, {}) and direction ({}, {}, {}) must be finite, and the direction "
         "not zero",

@@ -4,26 +4,38 @@
 
 #include <cstddef>
 #include <cstdint>
+#include <exception>
+#include <type_traits>
 #include <utility>
 
 /// Numbers that Python hands over: arrays, or lists and whatever else NumPy makes arrays of.
 namespace groundray::python {
 
-/// An array of the type and shape that `Array` says, converted to them where it was not.
+/// An array of the type and shape that `Array` says, converted to them where it was not; but whole
+/// numbers are made of whole numbers only. What is asked first of an array that could not be made
+/// for want of memory, say, throws the error that Python raised.
 template <typename Array>
 class Given {
  public:
   Given() = default;
   explicit Given(Array array) : array_(std::move(array)) {}
+  explicit Given(std::exception_ptr fault) : fault_(std::move(fault)) {}
 
-  std::size_t rows() const { return array_.shape(0); }
-  std::size_t columns() const { return array_.shape(1); }
-  std::size_t size() const { return array_.size(); }
+  std::size_t rows() const { return array().shape(0); }
+  std::size_t columns() const { return array().shape(1); }
+  std::size_t size() const { return array().size(); }
+  const auto* data() const { return array().data(); }
+  /// To be asked for when `rows` or another of these has been.
   auto operator()(auto... place) const { return array_(place...); }
-  const auto* data() const { return array_.data(); }
 
  private:
+  const Array& array() const {
+    if (fault_) std::rethrow_exception(fault_);
+    return array_;
+  }
+
   Array array_;
+  std::exception_ptr fault_;
 };
 
 template <typename T, typename Shape>
@@ -43,23 +55,41 @@ namespace nanobind::detail {
 template <typename Array>
 struct type_caster<groundray::python::Given<Array>> {
   using ArrayCaster = make_caster<Array>;
-  NB_TYPE_CASTER(groundray::python::Given<Array>, const_name("numpy.typing.ArrayLike"))
+  static constexpr bool is_whole = std::is_integral_v<std::remove_const_t<typename Array::Scalar>>;
+  NB_TYPE_CASTER(groundray::python::Given<Array>,
+                 const_name<is_whole>("numpy.typing.NDArray[numpy.integer[typing.Any]] | "
+                                      "collections.abc.Sequence[collections.abc.Sequence[int]]",
+                                      "numpy.typing.ArrayLike"))
 
   bool from_python(handle source, std::uint8_t flags, cleanup_list* cleanup) noexcept {
-    ArrayCaster caster;
-    if (caster.from_python(source, flags, cleanup)) {
-      value = groundray::python::Given<Array>(std::move(caster.value));
-      return true;
-    }
-    if ((flags & static_cast<std::uint8_t>(cast_flags::convert)) == 0) return false;
+    constexpr auto convert = static_cast<std::uint8_t>(cast_flags::convert);
+    const auto as_it_is = static_cast<std::uint8_t>(flags & ~convert);
+    if (take(source, is_whole ? as_it_is : flags, cleanup)) return true;
+    if ((flags & convert) == 0) return false;
     try {
       const object made = module_::import_("numpy").attr("asarray")(source);
-      if (!caster.from_python(made, flags, cleanup)) return false;
-      value = groundray::python::Given<Array>(std::move(caster.value));
+      return (!is_whole || holds_whole(made)) && take(made, flags, cleanup);
+    } catch (python_error& error) {
+      // It is no array: the signature is told instead.
+      if (error.matches(PyExc_TypeError) || error.matches(PyExc_ValueError)) return false;
+      value = groundray::python::Given<Array>(std::current_exception());
       return true;
-    } catch (python_error&) {  // it is no array: the signature is told instead
-      return false;
     }
+  }
+
+ private:
+  bool take(handle source, std::uint8_t flags, cleanup_list* cleanup) noexcept {
+    ArrayCaster caster;
+    if (!caster.from_python(source, flags, cleanup)) return false;
+    value = groundray::python::Given<Array>(std::move(caster.value));
+    return true;
+  }
+
+  // Neither fractions nor truths; of an array without values NumPy cannot tell what they are.
+  static bool holds_whole(const object& array) {
+    const str kind(array.attr("dtype").attr("kind"));
+    return kind.equal(str("i")) || kind.equal(str("u")) ||
+           cast<std::size_t>(array.attr("size")) == 0;
   }
 };
 

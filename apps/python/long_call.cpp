@@ -1,6 +1,8 @@
 #include "apps/python/long_call.h"
 
+#include <cxxabi.h>
 #include <nanobind/nanobind.h>
+#include <unistd.h>
 
 #include <chrono>
 #include <condition_variable>
@@ -11,6 +13,31 @@ namespace groundray::python {
 namespace {
 
 namespace nb = nanobind;
+
+/// Holds no GIL. Where Python has ended meanwhile nobody may take it again: until 3.13 Python then
+/// unwinds the thread, which frames of C++ that may not throw answer by ending the process. Such a
+/// thread, a daemon, waits here instead for the process to end, as Python itself has it from 3.14
+/// on.
+class Release {
+ public:
+  Release() : state_(PyEval_SaveThread()) {}
+  Release(const Release&) = delete;
+  Release& operator=(const Release&) = delete;
+  ~Release() {
+    try {
+      PyEval_RestoreThread(state_);
+    } catch (abi::__forced_unwind&) {
+      for (;;) pause();
+    }
+  }
+
+ private:
+  PyThreadState* state_;
+};
+
+// Whether this is the process's first thread: Python's main one, which alone sees signals, unless a
+// program embeds Python in another.
+bool is_main_thread() { return gettid() == getpid(); }
 
 // What a handler of signals raised, or null.
 std::exception_ptr raised_by_signals() {
@@ -23,9 +50,8 @@ std::exception_ptr raised_by_signals() {
   }
 }
 
-}  // namespace
-
-void call_heeding_signals(const std::function<void(const StopRequest&)>& work) {
+// Has `work` done by another thread while this one looks for signals.
+void call_watching(const std::function<void(const StopRequest&)>& work) {
   constexpr std::chrono::milliseconds patience(50);
   StopRequest stop;
   std::exception_ptr fault;
@@ -44,7 +70,7 @@ void call_heeding_signals(const std::function<void(const StopRequest&)>& work) {
   };
   std::exception_ptr raised;
   {
-    const nb::gil_scoped_release release;
+    const Release release;
     std::thread thread(run);
     std::unique_lock lock(mutex);
     while (!change.wait_for(lock, patience, [&] { return is_done; })) {
@@ -59,6 +85,14 @@ void call_heeding_signals(const std::function<void(const StopRequest&)>& work) {
   }
   if (raised) std::rethrow_exception(raised);
   if (fault) std::rethrow_exception(fault);
+}
+
+}  // namespace
+
+void call_heeding_signals(const std::function<void(const StopRequest&)>& work) {
+  if (is_main_thread()) return call_watching(work);
+  const Release release;
+  work(StopRequest());
 }
 
 }  // namespace groundray::python

@@ -26,9 +26,11 @@ class StopRequest {
   std::atomic<bool> is_made_ = false;
 };
 
-/// Does `work` without the GIL, on a thread of its own; this one meanwhile lets Python see signals.
-/// If a handler raises an exception, as Ctrl-C does, `work` is asked to stop, and when it has the
-/// exception is raised. Work that never asks ends first.
+/// Does `work` without the GIL. Called by Python's main thread it is done by another, while this
+/// one lets Python see signals: if a handler raises an exception, as Ctrl-C does, `work` is asked
+/// to stop, and when it has the exception is raised. Work that never asks ends first. Python shows
+/// other threads no signals: theirs is done in place, to its end. If Python ends before it, as it
+/// may before daemons, the call never returns.
 /// @throws What `work` does, but for Stopped; nanobind::python_error.
 void call_heeding_signals(const std::function<void(const StopRequest&)>& work);
 

@@ -169,7 +169,7 @@ std::filesystem::path data_folder() {
   std::error_code ignored;
   const auto program = std::filesystem::read_symlink("/proc/self/exe", ignored);
   for (const auto& folder :
-       {program.parent_path().parent_path() / "share/groundray", own_file().parent_path() / "data"})
+       {own_file().parent_path() / "data", program.parent_path().parent_path() / "share/groundray"})
     if (std::filesystem::exists(folder / "sensors", ignored)) return folder;
   return GROUNDRAY_SOURCE_DATA;
 }

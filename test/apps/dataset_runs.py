@@ -1,5 +1,6 @@
 """A small run of two lidars and a camera, for tests of whole datasets."""
 
+import hashlib
 import os
 import subprocess
 from pathlib import Path
@@ -67,6 +68,16 @@ def files(folder):
     return {
         p.relative_to(folder).as_posix(): p.read_bytes() for p in folder.rglob("*") if p.is_file()
     }
+
+
+def rewrite(dataset, *changes):
+    """Replaces texts of dataset.yaml once each, and sums it up anew: so changed by intent."""
+    text = (dataset / "dataset.yaml").read_text().rsplit("sha256_above", 1)[0]
+    for before, after in changes:
+        assert before in text
+        text = text.replace(before, after, 1)
+    digits = hashlib.sha256(text.encode()).hexdigest()
+    (dataset / "dataset.yaml").write_text(f'{text}sha256_above: "{digits}"\n')
 
 
 def make_whole(folder):

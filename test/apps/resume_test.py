@@ -296,3 +296,27 @@ def test_progress_tells_rate_and_time_left_on_a_terminal(tmp_path):
     assert run.wait() == 0
     assert re.search(rb"\rframes \d/9, [\d.e-]+/s, [\d.]+ s left", said), said
     assert re.search(rb"\rframes 9/9 in [\d.]+ s *\r?\n$", said), said
+
+
+def test_info_counts_what_the_journal_of_a_run_has(whole, tmp_path):
+    lines = as_cut_off(whole, tmp_path / "out", 4)
+    with (tmp_path / "out/dataset.journal").open("a") as journal:
+        journal.write(lines[0] + lines[1][:-20])
+    said = groundray("info", tmp_path / "out").stdout
+    assert "4 of 9 frames are there; a run is at work, or was cut off" in said
+    assert "3 of 3" in said
+    assert "1 of 3" in said
+    assert "0 of 3" in said
+
+
+def test_frames_after_a_line_that_was_changed_are_kept(whole, tmp_path):
+    shutil.copytree(whole, tmp_path / "out")
+    record = (tmp_path / "out/dataset.yaml").read_text()
+    changed = record.replace('  - {sensor: "top", frame: 0', '  * {sensor: "top", frame: 0', 1)
+    (tmp_path / "out/dataset.yaml").write_text(changed)
+    result = resumed(tmp_path)
+    assert "not as it was written; its frame is made again" in result.stderr
+    assert "dataset.yaml: changed since it was written" in result.stderr
+    assert "5 scans were there already" in result.stdout
+    assert "3 images were there already" in result.stdout
+    assert files(tmp_path / "out") == files(whole)

@@ -1,5 +1,8 @@
 """Shares of a run, made one by one, and what is joined from them."""
 
+import fcntl
+import os
+import resource
 import shutil
 import signal
 import subprocess
@@ -7,7 +10,7 @@ import time
 
 import pytest
 import yaml
-from dataset_runs import PROGRAM, files, generate, groundray, make_whole
+from dataset_runs import PROGRAM, files, generate, groundray, make_whole, rewrite
 
 
 @pytest.fixture(scope="module")
@@ -132,6 +135,63 @@ def test_a_file_that_has_changed_is_not_joined(whole, shards, tmp_path, fault):
     again = groundray("merge", *shards, "-o", joined, "--resume")
     assert again.returncode == 0, again.stderr
     assert files(joined) == files(whole)
+
+
+@pytest.mark.parametrize(
+    ("before", "after"),
+    [
+        ("kind: lidar", "kind: ../x"),
+        ("kind: lidar", 'kind: "{there}"'),
+        ('name: "top"', "name: ../x"),
+        ('name: "top"', 'name: "{there}"'),
+        ('name: "top"', 'name: "front"'),
+    ],
+)
+def test_nothing_is_written_outside_of_the_dataset(shards, tmp_path, before, after):
+    """Whatever the names of sensors in shards."""
+    parts = []
+    for k, shard in enumerate(shards):
+        parts.append(tmp_path / f"parts/{k}")
+        shutil.copytree(shard, parts[-1])
+        rewrite(parts[-1], (before, after.format(there=tmp_path / "x")))
+    result = merge(tmp_path / "to/joined", *parts)
+    refused(result, "dataset.yaml:", f"key '{before[:4]}'")
+    assert sorted(p.name for p in tmp_path.iterdir()) == ["parts"]
+
+
+def test_more_shards_than_files_may_be_open_are_joined_or_refused(whole, shards, tmp_path):
+    def limited(soft, hard):
+        return groundray(
+            "merge", *shards, "-o", tmp_path / "joined",
+            preexec_fn=lambda: resource.setrlimit(resource.RLIMIT_NOFILE, (soft, hard)),
+        )  # fmt: skip
+
+    most = resource.getrlimit(resource.RLIMIT_NOFILE)[1]
+    refused(limited(30, 40), "3 shards take ", " and the system allows 40", "ulimit")
+    assert not (tmp_path / "joined").exists()
+    result = limited(16, most)
+    assert result.returncode == 0, result.stderr
+    assert files(tmp_path / "joined") == files(whole)
+
+
+def test_a_merge_killed_before_it_had_written_anything_goes_on(whole, shards, tmp_path):
+    joined = tmp_path / "joined"
+    joined.mkdir()
+    (joined / "dataset.yaml.part").write_text("groundray_data")
+    result = groundray("merge", *shards, "-o", joined, "--resume")
+    assert result.returncode == 0, result.stderr
+    assert files(joined) == files(whole)
+
+
+def test_a_folder_in_which_a_run_is_at_work_is_not_merged_into(shards, tmp_path):
+    joined = tmp_path / "joined"
+    joined.mkdir()
+    (joined / "notes.txt").write_text("")
+    held = os.open(joined, os.O_RDONLY)
+    fcntl.flock(held, fcntl.LOCK_EX)
+    refused(merge(joined, *shards), "another run is at work")
+    os.close(held)
+    refused(merge(joined, *shards), "not empty")
 
 
 def test_a_merge_that_was_killed_goes_on(whole, shards, tmp_path):

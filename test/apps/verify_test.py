@@ -2,11 +2,13 @@
 
 import hashlib
 import random
+import re
 import shutil
+import time
 
 import pytest
 import yaml
-from dataset_runs import files, groundray, make_whole
+from dataset_runs import files, groundray, make_whole, rewrite
 
 
 @pytest.fixture(scope="module")
@@ -19,7 +21,7 @@ def sum_of(data):
 
 
 def faulty(dataset, *words):
-    """It is told, once for all, and nothing else is."""
+    """Returns the lines that tell of its faults, all these words among them."""
     result = groundray("verify", dataset)
     assert result.returncode == 1, result.stdout
     assert result.stderr.splitlines()[-1].startswith("groundray: 1 of 1 datasets is at fault")
@@ -53,7 +55,7 @@ def test_a_sound_dataset_passes(whole, tmp_path):
 
 
 def test_any_flipped_bit_is_found(whole, tmp_path):
-    """One bit of each file, and each tenth byte of the record, one after the other."""
+    """One bit of each file, and of 22 bytes of the record, one after the other."""
     draw = random.Random(5)
     copy = tmp_path / "copy"
     shutil.copytree(whole, copy)
@@ -143,6 +145,99 @@ def test_a_run_that_was_cut_off_is_told(whole, tmp_path):
     shutil.copytree(whole, copy)
     (copy / "dataset.journal").write_text("")
     faulty(copy, "dataset.journal: a run was cut off", "--resume")
+
+
+@pytest.mark.parametrize(
+    ("key", "before"), [("kind", "kind: lidar"), ("name", 'name: "front"'), ("name", 'name: "eye"')]
+)
+@pytest.mark.parametrize("place", ["../x", "/tmp", "a/../../x", "top/../../x"])
+def test_a_sensor_named_as_a_place_elsewhere_is_a_fault(whole, tmp_path, key, before, place):
+    copy = tmp_path / "copy"
+    shutil.copytree(whole, copy)
+    rewrite(copy, (before, f'{key}: "{place}"'))
+    faulty(copy, f"{copy}/dataset.yaml:", f"key '{key}'", place)
+
+
+def test_a_line_that_was_changed_hides_no_frame(whole, tmp_path):
+    """Faults of frames after it are told too."""
+    copy = tmp_path / "copy"
+    shutil.copytree(whole, copy)
+    (copy / "camera/eye/000002.exr").unlink()
+    rewrite(copy, ('  - {sensor: "top", frame: 1', '  + {sensor: "top", frame: 1'))
+    said = faulty(
+        copy, "000002.exr: missing", ": not as it was written", "000001.ply: of a frame that is not"
+    )
+    assert "incomplete: 8 of 9 frames" in "".join(said)
+    assert not any("frame" in line and "000002" in line for line in said)
+
+
+def test_any_number_of_frames_is_reckoned_at_once(whole, tmp_path):
+    copy = tmp_path / "copy"
+    shutil.copytree(whole, copy)
+    rewrite(copy, ("frames: 3}", "frames: 4294967295}"), ("frames:\n", 'shard: "2/3"\nframes:\n'))
+    begin = time.monotonic()
+    faulty(copy, "incomplete: 9 of 1431655767 frames")
+    assert "9 of 1431655767" in groundray("info", copy).stdout
+    assert time.monotonic() - begin < 5
+
+
+def test_folders_that_are_links_are_gone_through(whole, tmp_path):
+    copy = tmp_path / "copy"
+    shutil.copytree(whole, copy)
+    for name in ("lidar/top", "lidar", "poses"):
+        elsewhere = tmp_path / f"elsewhere_{name.replace('/', '_')}"
+        (copy / name).rename(elsewhere)
+        (copy / name).symlink_to(elsewhere)
+    assert groundray("verify", copy).returncode == 0
+    (copy / "lidar/top/notes.txt").write_text("")
+    (copy / "more").symlink_to(tmp_path)
+    assert len(faulty(copy, "lidar/top/notes.txt: not a file", "more: not a file")) == 3
+
+
+def test_what_cannot_be_read_is_a_fault_and_all_others_are_told(whole, tmp_path):
+    copy = tmp_path / "copy"
+    shutil.copytree(whole, copy)
+    (copy / "poses/top.tum").unlink()
+    for name in ("lidar/top/000001.ply", "dataset.journal"):
+        (copy / name).unlink(missing_ok=True)
+        (copy / name).symlink_to((copy / name).name)
+    shutil.rmtree(copy / "camera")
+    (copy / "camera").symlink_to("camera")
+    loop = tmp_path / "loop"
+    loop.symlink_to("loop")
+    result = groundray("verify", copy, loop, whole)
+    assert result.returncode == 1
+    assert "2 of 3 datasets are at fault" in result.stderr
+    for words in (
+        "poses/top.tum: missing",
+        "lidar/top/000001.ply: not to be read: Too many",
+        "camera/eye/000000.exr: not to be read: Too many",
+        "dataset.journal: ",
+        f"{loop}: the folder holds no dataset.yaml that can be read (Too many",
+        f"{whole}: {len(files(whole))} files",
+    ):
+        assert words in result.stdout, result.stdout
+
+
+def test_what_a_merge_left_that_was_cut_off_is_told(whole, tmp_path):
+    copy = tmp_path / "copy"
+    shutil.copytree(whole, copy)
+    text = (copy / "dataset.yaml").read_text()
+    text = re.sub(r"state: done.*", "state: pending}", text)
+    (copy / "dataset.yaml").write_text(text)
+    rewrite(copy)
+    said = faulty(copy, "incomplete: 0 of 9 frames", "`groundray merge --resume`")
+    frames = [p for p in files(whole) if p.startswith(("lidar/", "camera/"))]
+    for path in frames:
+        assert any(f"{path}: of a frame that is not done" in line for line in said), path
+    assert len(said) == len(frames) + 2
+
+
+def test_info_of_a_folder_that_is_no_dataset_is_that_of_a_raster(tmp_path):
+    result = groundray("info", tmp_path)
+    assert result.returncode == 1
+    assert "dataset.yaml" not in result.stderr
+    assert str(tmp_path) in result.stderr
 
 
 def test_info_tells_what_is_there(whole):

@@ -1,21 +1,92 @@
+#include <unistd.h>
+
 #include <cstddef>
 #include <cstdint>
 #include <cstdlib>
+#include <filesystem>
+#include <fstream>
 #include <string>
 #include <string_view>
 
+#include "apps/dataset/dataset_summary.h"
+#include "apps/dataset/dataset_text.h"
 #include "apps/dataset/frame_entry.h"
+#include "apps/groundray/run/expected_files.h"
+#include "apps/groundray/run/journal.h"
+#include "core/error.h"
 
-/// Whatever the line, what is read of it stays the same when it is written and read again.
-extern "C" int LLVMFuzzerTestOneInput(const std::uint8_t* data, std::size_t size) {
-  const std::string_view text(reinterpret_cast<const char*>(data), size);
+namespace {
+
+namespace fs = std::filesystem;
+
+/// A folder of this process, which is gone when it ends.
+class Folder {
+ public:
+  Folder() : path_(fs::temp_directory_path() / ("dataset_fuzz_" + std::to_string(getpid()))) {
+    fs::create_directories(path_);
+  }
+  ~Folder() {
+    std::error_code ignored;
+    fs::remove_all(path_, ignored);
+  }
+  const fs::path& path() const { return path_; }
+
+ private:
+  fs::path path_;
+};
+
+void require(bool holds) {
+  if (!holds) std::abort();
+}
+
+void read_line(std::string_view text) {
   if (const auto entry = groundray::parse_entry(text)) {
     const std::string again = groundray::text_of(*entry);
     const auto read = groundray::parse_entry(again);
-    if (!read || groundray::text_of(*read) != again) std::abort();
+    require(read && groundray::text_of(*read) == again);
   }
   if (const auto file = groundray::parse_named_sum(text)) {
-    if (groundray::text_of(*file) != text) std::abort();
+    require(groundray::text_of(*file) == text);
   }
+}
+
+// No path of what is read leads out of the dataset, and it all is expected there.
+void read_record(const fs::path& folder) {
+  const groundray::DatasetSummary summary = groundray::read_summary(folder);
+  groundray::ExpectedFiles expected(summary);
+  groundray::DatasetText text(folder);
+  while (const auto line = text.next_entry()) {
+    const auto entry = groundray::parse_entry(*line);
+    const auto stem = entry ? summary.stem_of(*entry) : std::nullopt;
+    if (!stem) continue;
+    require(fs::path(*stem).is_relative() && stem->find("..") == std::string::npos);
+    if (!entry->is_done || !expected.add(*entry)) continue;
+    for (const groundray::ProductSum& file : entry->files)
+      require(file.suffix.find('/') == std::string::npos);
+  }
+  for (const groundray::NamedSum& file : text.files()) {
+    const fs::path path(file.path);
+    require(path.is_relative() && path.lexically_normal().generic_string() == file.path);
+    expected.add(file);
+    require(!expected.fault_of(file.path));
+  }
+}
+
+}  // namespace
+
+/// Whatever the bytes: a line that is read of them stays the same when it is written and read
+/// again; and as a whole dataset.yaml, or a journal, they are read, or refused by an Error.
+extern "C" int LLVMFuzzerTestOneInput(const std::uint8_t* data, std::size_t size) {
+  static const Folder folder;
+  const std::string_view text(reinterpret_cast<const char*>(data), size);
+  read_line(text);
+  const fs::path record = folder.path() / groundray::dataset_file;
+  std::ofstream(record, std::ios::binary) << text;
+  try {
+    read_record(folder.path());
+  } catch (const groundray::Error&) {
+    // Said in words.
+  }
+  groundray::read_journal(record, [](const std::string& entry) { read_line(entry); });
   return 0;
 }

@@ -47,13 +47,6 @@ void make_folder(const fs::path& folder) {
   }
 }
 
-// A run that was cut off before it had written anything leaves no more than that.
-bool is_as_new(const fs::path& folder) {
-  return std::ranges::all_of(fs::directory_iterator(folder), [](const fs::directory_entry& entry) {
-    return entry.path().filename() == fmt::format("{}{}", dataset_file, aside);
-  });
-}
-
 // Whether a name is that of a frame's file with one of the suffixes while that is being written.
 bool is_aside(const std::string& name, const std::vector<std::string>& suffixes) {
   const std::size_t digits = std::min(name.find_first_not_of("0123456789"), name.size());
@@ -73,6 +66,12 @@ std::string shard_words(const std::optional<Shard>& shard) {
 }
 
 }  // namespace
+
+bool is_as_new(const fs::path& folder) {
+  return std::ranges::all_of(fs::directory_iterator(folder), [](const fs::directory_entry& entry) {
+    return entry.path().filename() == fmt::format("{}{}", dataset_file, aside);
+  });
+}
 
 // A frame that is looked at.
 struct Dataset::Check {
@@ -183,6 +182,8 @@ void Dataset::take_entries(Journal& journal) {
                                     dataset_file, text.line()));
     }
   }
+  if (!text.is_intact())
+    faults_.push_back(fmt::format("{}: changed since it was written, or cut short", dataset_file));
   if (fs::exists(folder_ / journal_file)) {
     const std::size_t torn =
         read_journal(folder_ / journal_file, [&](const std::string& entry) { take(entry); });
@@ -207,8 +208,10 @@ void Dataset::check_entries(Journal& journal) {
   Progress progress(stderr, "frames checked", total);
   std::vector<Check> checks;
   const auto flush = [&] {
-    stop_if_interrupted();
-    tbb::parallel_for(std::size_t{0}, checks.size(), [&](std::size_t i) { check(checks[i]); });
+    tbb::parallel_for(std::size_t{0}, checks.size(), [&](std::size_t i) {
+      stop_if_interrupted();
+      check(checks[i]);
+    });
     for (Check& each : checks) {
       auto& after = sensors_[each.sensor].entry_after[static_cast<std::size_t>(each.frame)];
       if (!each.faults.empty())

@@ -24,6 +24,10 @@ inline constexpr std::string_view convergence_comment = "convergence ";
 /// version and shard has made, which is then kept as far as it is sound.
 enum class FolderUse { New, Resume };
 
+/// Whether a folder is empty, or holds no more than a run or a merge leaves that was cut off before
+/// it had written anything. @throws std::filesystem::filesystem_error if it cannot be read.
+bool is_as_new(const std::filesystem::path& folder);
+
 /// The folder that a run fills (docs/formats.md). Sensors are numbered as in dataset.yaml: lidars,
 /// then cameras. Frames may be noted by another thread than the one that asks for others.
 class Dataset {

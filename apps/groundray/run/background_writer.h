@@ -1,8 +1,10 @@
 #pragma once
 
-#include <chrono>
+#include <exception>
 #include <future>
 #include <utility>
+
+#include "core/error.h"
 
 namespace groundray {
 
@@ -20,24 +22,29 @@ class BackgroundWriter {
 
   /// Waits until the job is done. @throws what it threw, once.
   void wait() {
-    if (!job_.valid()) return;
-    const auto begin = std::chrono::steady_clock::now();
-    job_.wait();
-    waited_ += std::chrono::steady_clock::now() - begin;
-    job_.get();
+    if (job_.valid()) job_.get();
   }
 
-  /// As wait, but leaves aside what the job threw.
-  void settle() noexcept {
-    if (job_.valid()) job_.wait();
-    job_ = {};
+  /// Waits, for a caller that has failed itself.
+  /// @throws the caller's fault and the job's as one Error, if both are such; else the job's, if
+  /// there is one, and the caller's, if there is none.
+  [[noreturn]] void fail(const std::exception_ptr& callers) {
+    try {
+      wait();
+    } catch (const std::exception& own) {
+      try {
+        std::rethrow_exception(callers);
+      } catch (const std::exception& fault) {
+        throw Error("{}\n{}", fault.what(), own.what());
+      } catch (...) {
+        // The caller was only asked to stop.
+      }
+      throw;
+    }
+    std::rethrow_exception(callers);
   }
-
-  /// How long its caller has waited so far.
-  std::chrono::duration<double> waited() const noexcept { return waited_; }
 
  private:
-  std::chrono::duration<double> waited_{0};
   std::future<void> job_;  // of std::async: its end is waited for
 };
 

@@ -10,8 +10,11 @@ namespace groundray {
 
 std::optional<std::string> fault_of(const std::filesystem::path& file, const FileSum& as_written) {
   std::error_code fault;
-  if (!std::filesystem::exists(file, fault)) return "missing";
-  if (!std::filesystem::is_regular_file(file, fault)) return "no file any more";
+  const std::filesystem::file_status status = std::filesystem::status(file, fault);
+  if (status.type() == std::filesystem::file_type::not_found) return "missing";
+  if (status.type() == std::filesystem::file_type::none)
+    return "not to be read: " + fault.message();
+  if (!std::filesystem::is_regular_file(status)) return "no file any more";
   if (const auto bytes = std::filesystem::file_size(file, fault);
       !fault && bytes != as_written.bytes) {
     return fmt::format("of {} bytes instead of {}: {}", bytes, as_written.bytes,

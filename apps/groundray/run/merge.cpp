@@ -1,10 +1,12 @@
 #include "apps/groundray/run/merge.h"
 
 #include <fmt/format.h>
+#include <sys/resource.h>
 #include <tbb/parallel_for.h>
+#include <tbb/task_arena.h>
 
 #include <algorithm>
-#include <array>
+#include <cerrno>
 #include <cstddef>
 #include <cstdint>
 #include <cstdio>
@@ -16,6 +18,7 @@
 #include <string_view>
 #include <system_error>
 #include <utility>
+#include <vector>
 
 #include "apps/dataset/dataset_summary.h"
 #include "apps/dataset/dataset_text.h"
@@ -39,17 +42,35 @@ struct SharedFrame {
   FrameEntry entry;
 };
 
+// Each shard is open twice, locked and read; threads read and write files besides.
+// @throws Error if the system does not let this process have as many.
+void allow_open_files(std::size_t shards) {
+  constexpr std::size_t others = 64;
+  const auto threads = static_cast<std::size_t>(tbb::this_task_arena::max_concurrency());
+  const rlim_t needed = 2 * shards + 2 * threads + others;
+  rlimit limit{};
+  if (getrlimit(RLIMIT_NOFILE, &limit) != 0 || limit.rlim_cur >= needed) return;
+  const rlim_t allowed = limit.rlim_max;
+  limit.rlim_cur = needed;
+  if (allowed >= needed && setrlimit(RLIMIT_NOFILE, &limit) == 0) return;
+  throw Error(
+      "{} shards take {} files open at a time, and the system allows {}; `ulimit -Hn` or its "
+      "administrator raises that",
+      shards, needed, allowed);
+}
+
 // The files dataset.yaml of all shards, read side by side.
 class ShardTexts {
  public:
-  explicit ShardTexts(const std::vector<fs::path>& folders)
-      : folders_(folders), summary_(read_summary(folders[0])) {
+  // @param folders, summary  are to outlive this; the summary is that of any of them.
+  ShardTexts(const std::vector<fs::path>& folders, const DatasetSummary& summary)
+      : folders_(folders), summary_(summary) {
     for (const fs::path& folder : folders) texts_.push_back(std::make_unique<DatasetText>(folder));
+    skip_finished_sensors();
   }
 
   const std::string& header() const { return texts_[0]->header(); }
   const std::vector<NamedSum>& files() const { return texts_[0]->files(); }
-  const DatasetSummary& summary() const { return summary_; }
 
   // @throws Error unless they are all shards of one run.
   void check_shards() const {
@@ -113,9 +134,14 @@ class ShardTexts {
     return sensor_ < summary_.sensors.size() ? summary_.sensors[sensor_].name : std::string_view();
   }
   void to_next_frame() {
-    if (++frame_ < summary_.sensors[sensor_].frames) return;
-    ++sensor_;
-    frame_ = 0;
+    ++frame_;
+    skip_finished_sensors();
+  }
+  void skip_finished_sensors() {
+    while (sensor_ < summary_.sensors.size() && frame_ >= summary_.sensors[sensor_].frames) {
+      ++sensor_;
+      frame_ = 0;
+    }
   }
 
   // The folder that should have the frame.
@@ -148,11 +174,33 @@ class ShardTexts {
   }
 
   const std::vector<fs::path>& folders_;
-  DatasetSummary summary_;
+  const DatasetSummary& summary_;
   std::vector<std::unique_ptr<DatasetText>> texts_;
   std::size_t sensor_ = 0;  // of the frame that comes next
   std::int64_t frame_ = 0;
 };
+
+// What the shards of a run are together.
+struct Joined {
+  DatasetSummary summary;  // of one of them
+  std::string header;
+  std::vector<NamedSum> files;  // of no frame, which all have
+  std::uint64_t frames = 0;
+};
+
+// @throws Error unless they are all shards of one run, each there once and complete.
+Joined check_shards(const std::vector<fs::path>& shards) {
+  Joined joined{.summary = read_summary(shards[0]), .header = {}, .files = {}};
+  ShardTexts texts(shards, joined.summary);
+  texts.check_shards();
+  while (texts.next()) {
+    stop_if_interrupted();
+    ++joined.frames;
+  }
+  joined.header = texts.header();
+  joined.files = texts.files();
+  return joined;
+}
 
 // A file on its way from a shard to the whole.
 struct Copy {
@@ -163,9 +211,14 @@ struct Copy {
 // @throws Error if it is not as its shard says.
 void copy_file(const Copy& copy) {
   std::ifstream file(copy.from, std::ios::binary);
+  if (const int fault = errno; !file && fault != ENOENT) {
+    throw Error("{}: cannot be read: {}; `groundray verify` finds all such", copy.from.string(),
+                std::generic_category().message(fault));
+  }
   std::vector<char> block(256 << 10);
   Sha256 sum;
   write_blocks(copy.to, [&]() -> std::string_view {
+    stop_if_interrupted();
     file.read(block.data(), static_cast<std::streamsize>(block.size()));
     const std::string_view read(block.data(), static_cast<std::size_t>(file.gcount()));
     sum.add(read);
@@ -178,22 +231,25 @@ void copy_file(const Copy& copy) {
 }
 
 void copy_all(std::span<const Copy> copies, FolderUse use) {
-  stop_if_interrupted();
   tbb::parallel_for(std::size_t{0}, copies.size(), [&](std::size_t i) {
+    stop_if_interrupted();
     const Copy& copy = copies[i];
     if (use == FolderUse::Resume && !fault_of(copy.to, copy.sum)) return;
     copy_file(copy);
   });
 }
 
-void check_out(const fs::path& out, FolderUse use, const std::string& header) {
+void make_folder(const fs::path& out) {
   std::error_code fault;
   fs::create_directories(out, fault);
   if (fault) {
     throw Error("{}: cannot make this folder: {}; choose another one with -o", out.string(),
                 fault.message());
   }
-  if (fs::is_empty(out)) return;
+}
+
+void check_out(const fs::path& out, FolderUse use, const std::string& header) {
+  if (is_as_new(out)) return;
   if (use == FolderUse::New)
     throw Error(
         "{}: the folder is not empty; choose a new one with -o{}", out.string(),
@@ -205,8 +261,8 @@ void check_out(const fs::path& out, FolderUse use, const std::string& header) {
 
 // All of it once, before anything is written: that every frame is there. What is written then says
 // of none that it is done.
-void write_pending(const std::vector<fs::path>& shards, const fs::path& out) {
-  ShardTexts texts(shards);
+void write_pending(const std::vector<fs::path>& shards, const Joined& joined, const fs::path& out) {
+  ShardTexts texts(shards, joined.summary);
   const auto next = [&]() -> std::optional<std::string> {
     auto frame = texts.next();
     if (!frame) return std::nullopt;
@@ -215,34 +271,26 @@ void write_pending(const std::vector<fs::path>& shards, const fs::path& out) {
     frame->entry.files.clear();
     return text_of(frame->entry);
   };
-  write_dataset_text(out, texts.header(), std::nullopt, next, {});
+  write_dataset_text(out, joined.header, std::nullopt, next, {});
 }
 
-void write_done(const std::vector<fs::path>& shards, const fs::path& out) {
-  ShardTexts texts(shards);
-  std::vector<NamedSum> files;
-  {
-    ShardTexts ahead(shards);  // what comes after the frames
-    while (ahead.next()) {
-    }
-    files = ahead.files();
-  }
+void write_done(const std::vector<fs::path>& shards, const Joined& joined, const fs::path& out) {
+  ShardTexts texts(shards, joined.summary);
   const auto next = [&]() -> std::optional<std::string> {
     auto frame = texts.next();
     return frame ? std::optional(std::move(frame->text)) : std::nullopt;
   };
-  write_dataset_text(out, texts.header(), std::nullopt, next, files);
+  write_dataset_text(out, joined.header, std::nullopt, next, joined.files);
 }
 
 // Returns how many bytes were copied, or found there.
-std::uint64_t copy_shards(const std::vector<fs::path>& shards, const fs::path& out, FolderUse use) {
+std::uint64_t copy_shards(const std::vector<fs::path>& shards, const Joined& joined,
+                          const fs::path& out, FolderUse use) {
   constexpr std::size_t block = 256;  // files at a time
-  ShardTexts texts(shards);
+  ShardTexts texts(shards, joined.summary);
   std::vector<Copy> copies;
-  std::uint64_t bytes = 0, frames = 0, total = 0;
-  for (const DatasetSummary::Sensor& sensor : texts.summary().sensors)
-    total += static_cast<std::uint64_t>(sensor.frames);
-  Progress progress(stderr, "frames joined", total);
+  std::uint64_t bytes = 0, frames = 0;
+  Progress progress(stderr, "frames joined", joined.frames);
   const auto add = [&](std::size_t shard, const std::string& path, const FileSum& sum) {
     copies.push_back({shards[shard] / path, out / path, sum});
     bytes += sum.bytes;
@@ -251,16 +299,16 @@ std::uint64_t copy_shards(const std::vector<fs::path>& shards, const fs::path& o
     copies.clear();
     progress.update(frames);
   };
-  for (const DatasetSummary::Sensor& sensor : texts.summary().sensors)
-    fs::create_directories(out / sensor.kind / sensor.name);
-  for (const char* name : {"poses", "calibration"}) fs::create_directories(out / name);
+  for (const DatasetSummary::Sensor& sensor : joined.summary.sensors)
+    make_folder(out / sensor.kind / sensor.name);
+  for (const char* name : {"poses", "calibration"}) make_folder(out / name);
   while (const auto frame = texts.next()) {
     ++frames;
-    const auto stem = texts.summary().stem_of(frame->entry);
+    const auto stem = joined.summary.stem_of(frame->entry);
     for (const ProductSum& file : frame->entry.files)
       add(frame->shard, *stem + file.suffix, file.sum);
   }
-  for (const NamedSum& file : texts.files()) add(0, file.path, file.sum);
+  for (const NamedSum& file : joined.files) add(0, file.path, file.sum);
   copy_all(copies, use);
   return bytes;
 }
@@ -268,21 +316,20 @@ std::uint64_t copy_shards(const std::vector<fs::path>& shards, const fs::path& o
 }  // namespace
 
 void merge(const std::vector<fs::path>& shards, const fs::path& out, FolderUse use) {
+  allow_open_files(shards.size());
   std::vector<std::unique_ptr<FolderLock>> locks;
   for (const fs::path& shard : shards)
     locks.push_back(std::make_unique<FolderLock>(shard, FolderLock::Use::Read));
-  ShardTexts texts(shards);
-  texts.check_shards();
-  std::uint64_t frames = 0;
-  while (texts.next()) ++frames;
-  check_out(out, use, texts.header());
+  const Joined joined = check_shards(shards);
+  make_folder(out);
   const FolderLock lock(out, FolderLock::Use::Write);
-  write_pending(shards, out);
-  const std::uint64_t bytes = copy_shards(shards, out, use);
-  write_done(shards, out);
+  check_out(out, use, joined.header);
+  write_pending(shards, joined, out);
+  const std::uint64_t bytes = copy_shards(shards, joined, out, use);
+  write_done(shards, joined, out);
   std::error_code ignored;
   fs::remove(out / journal_file, ignored);
-  fmt::print("{} frames of {} shards, {:.1f} MiB\ndataset: {}\n", frames, shards.size(),
+  fmt::print("{} frames of {} shards, {:.1f} MiB\ndataset: {}\n", joined.frames, shards.size(),
              static_cast<double>(bytes) / (1 << 20), out.string());
 }
 

@@ -2,19 +2,20 @@
 
 #include <fmt/format.h>
 #include <tbb/parallel_for.h>
+#include <unistd.h>
 
 #include <cstddef>
 #include <cstdint>
 #include <cstdio>
-#include <exception>
-#include <iterator>
 #include <optional>
-#include <set>
 #include <string>
+#include <string_view>
+#include <system_error>
 #include <utility>
 
 #include "apps/dataset/dataset_summary.h"
 #include "apps/dataset/dataset_text.h"
+#include "apps/groundray/run/expected_files.h"
 #include "apps/groundray/run/file_check.h"
 #include "apps/groundray/run/folder_lock.h"
 #include "apps/groundray/run/journal.h"
@@ -27,30 +28,31 @@ namespace {
 
 namespace fs = std::filesystem;
 
-// The files of a dataset, gone through in the order of dataset.yaml.
+// The files of a dataset, gone through in the order of dataset.yaml. Faults are printed as they are
+// found.
 class Verification {
  public:
   explicit Verification(const fs::path& folder)
-      : folder_(folder),
-        summary_(read_summary(folder)),
-        progress_(stderr, "frames checked", summary_.done) {}
+      : folder_(folder), summary_(read_summary(folder)), expected_(summary_) {}
 
   void run() {
     check_record();
-    flush();
-    if (fs::exists(folder_ / journal_file)) {
-      add_fault(journal_file,
-                "a run was cut off; `groundray generate --resume` checks its frames and goes on");
-      expected_.emplace(journal_file);
+    std::error_code fault;
+    const bool is_open = fs::exists(folder_ / journal_file, fault);
+    if (is_open || fault) {
+      tell(journal_file,
+           "a run was cut off; `groundray generate --resume` checks its frames and goes on");
     } else if (summary_.done < summary_.asked_for) {
-      faults_.push_back(fmt::format(
-          "{}: incomplete: {} of {} frames are there; `groundray generate --resume` makes the rest",
-          folder_.string(), summary_.done, summary_.asked_for));
+      tell("", fmt::format("incomplete: {} of {} frames are there; `groundray generate --resume` "
+                           "makes the rest, and `groundray merge --resume` goes on with a merge "
+                           "that was cut off",
+                           summary_.done, summary_.asked_for));
     }
-    find_strangers();
+    // A run that goes on or was cut off has files that are not listed yet.
+    if (!is_open) find_strangers("");
   }
 
-  const std::vector<std::string>& faults() const { return faults_; }
+  std::size_t faults() const { return faults_; }
   std::size_t files() const { return files_; }
   std::uint64_t bytes() const { return bytes_; }
 
@@ -61,71 +63,91 @@ class Verification {
     std::optional<std::string> fault;
   };
 
-  void add_fault(std::string_view path, std::string_view words) {
-    faults_.push_back(fmt::format("{}: {}", (folder_ / path).string(), words));
+  void tell(std::string_view path, std::string_view words) {
+    fmt::print("{}: {}\n", (path.empty() ? folder_ : folder_ / path).string(), words);
+    ++faults_;
   }
 
   void add_task(std::string path, const FileSum& sum) {
     constexpr std::size_t block = 256;  // how many files are checked at a time
-    expected_.insert(path);
     tasks_.push_back({std::move(path), sum, {}});
     if (tasks_.size() == block) flush();
   }
 
   void flush() {
-    stop_if_interrupted();
     tbb::parallel_for(std::size_t{0}, tasks_.size(), [this](std::size_t i) {
+      stop_if_interrupted();
       tasks_[i].fault = fault_of(folder_ / tasks_[i].path, tasks_[i].sum);
     });
+    bool is_line_open = progress_ && isatty(STDERR_FILENO) == 1;  // that of the progress
     for (const Task& task : tasks_) {
-      if (task.fault) add_fault(task.path, *task.fault);
       bytes_ += task.sum.bytes;
+      if (!task.fault) continue;
+      if (std::exchange(is_line_open, false)) std::fputc('\n', stderr);
+      tell(task.path, *task.fault);
     }
+    std::fflush(stdout);
     files_ += tasks_.size();
     tasks_.clear();
-    progress_.update(frames_);
+    progress_->update(frames_);
+  }
+
+  void check_entry(const std::string& line, std::size_t number) {
+    const std::string place = fmt::format("{}:{}", dataset_file, number);
+    const auto entry = parse_entry(line);
+    const auto stem = entry ? summary_.stem_of(*entry) : std::nullopt;
+    if (!stem) return tell(place, "not as it was written");
+    if (!entry->is_done) return;
+    if (!expected_.add(*entry))
+      return tell(place, "a frame that is not of the run, or listed twice");
+    ++frames_;
+    if (entry->files.empty())
+      tell(place, "the frame is without checksums: an earlier version made it");
+    for (const ProductSum& file : entry->files) add_task(*stem + file.suffix, file.sum);
   }
 
   void check_record() {
+    progress_.emplace(stderr, "frames checked", summary_.done);
     DatasetText text(folder_);
-    while (const auto line = text.next_entry()) {
-      const auto entry = parse_entry(*line);
-      const auto stem = entry ? summary_.stem_of(*entry) : std::nullopt;
-      if (!stem) {
-        add_fault(fmt::format("{}:{}", dataset_file, text.line()), "not as it was written");
-        continue;
-      }
-      if (!entry->is_done) continue;
-      ++frames_;
-      if (entry->files.empty()) {
-        add_fault(fmt::format("{}:{}", dataset_file, text.line()),
-                  "the frame is without checksums: an earlier version made it");
-      }
-      for (const ProductSum& file : entry->files) add_task(*stem + file.suffix, file.sum);
+    while (const auto line = text.next_entry()) check_entry(*line, text.line());
+    for (const NamedSum& file : text.files()) {
+      expected_.add(file);
+      add_task(file.path, file.sum);
     }
-    for (const NamedSum& file : text.files()) add_task(file.path, file.sum);
-    expected_.emplace(dataset_file);
     ++files_;
-    if (!text.is_intact()) add_fault(dataset_file, "changed since it was written, or cut short");
+    flush();
+    progress_.reset();
+    if (!text.is_intact()) tell(dataset_file, "changed since it was written, or cut short");
   }
 
-  // A run that goes on or was cut off has files that are not listed yet.
-  void find_strangers() {
-    if (expected_.contains(std::string(journal_file))) return;
-    for (const fs::directory_entry& entry : fs::recursive_directory_iterator(folder_)) {
-      if (entry.is_directory() && !entry.is_symlink()) continue;
-      const std::string path = entry.path().lexically_relative(folder_).generic_string();
-      if (!expected_.contains(path)) add_fault(path, "not a file of the dataset");
+  // Of a folder in the dataset, and of those in it.
+  void find_strangers(const std::string& path) {
+    std::error_code fault;
+    fs::directory_iterator it(path.empty() ? folder_ : folder_ / path, fault);
+    std::vector<std::string> folders;
+    for (; !fault && it != fs::directory_iterator(); it.increment(fault)) {
+      stop_if_interrupted();
+      const std::string name = it->path().filename().string();
+      std::string child = path.empty() ? name : fmt::format("{}/{}", path, name);
+      std::error_code ignored;
+      const bool is_walked =
+          it->is_directory(ignored) && (!it->is_symlink(ignored) || expected_.has_folder(child));
+      if (is_walked) {
+        folders.push_back(std::move(child));
+      } else if (const auto words = expected_.fault_of(child)) {
+        tell(child, *words);
+      }
     }
+    if (fault) tell(path, "the folder cannot be read: " + fault.message());
+    for (const std::string& each : folders) find_strangers(each);
   }
 
   fs::path folder_;
   DatasetSummary summary_;
-  Progress progress_;
-  std::set<std::string> expected_;
+  ExpectedFiles expected_;
+  std::optional<Progress> progress_;  // while files are checked
   std::vector<Task> tasks_;
-  std::vector<std::string> faults_;
-  std::size_t files_ = 0, frames_ = 0;
+  std::size_t faults_ = 0, files_ = 0, frames_ = 0;
   std::uint64_t bytes_ = 0;
 };
 
@@ -134,13 +156,11 @@ bool verify_one(const fs::path& folder) {
   const FolderLock lock(folder, FolderLock::Use::Read);
   Verification verification(folder);
   verification.run();
-  for (const std::string& fault : verification.faults()) fmt::print("{}\n", fault);
   fmt::print("{}: {} files of {:.1f} MiB checked, {}\n", folder.string(), verification.files(),
              static_cast<double>(verification.bytes()) / (1 << 20),
-             verification.faults().empty()
-                 ? "all as they were written"
-                 : fmt::format("{} faults", verification.faults().size()));
-  return verification.faults().empty();
+             verification.faults() == 0 ? "all as they were written"
+                                        : fmt::format("{} faults", verification.faults()));
+  return verification.faults() == 0;
 }
 
 }  // namespace
@@ -153,6 +173,8 @@ void verify(const std::vector<fs::path>& datasets) {
       is_sound = verify_one(dataset);
     } catch (const Error& error) {
       fmt::print("{}\n", error.what());
+    } catch (const std::system_error& error) {
+      fmt::print("{}: {}\n", dataset.string(), error.what());
     }
     if (!is_sound) ++at_fault;
   }

@@ -87,6 +87,23 @@ TEST(DatasetText, ThatWasChangedOrCutAnywhereIsNotIntact) {
   EXPECT_FALSE(is_intact(whole + whole.substr(whole.find("sha256_above"))));
 }
 
+// A line that is changed hides none after it: each is handed out, and is an entry's or refused.
+TEST(DatasetText, LosesNoFrameAfterALineThatIsChanged) {
+  const testing::TemporaryFolder folder;
+  write(folder.path());
+  const std::string whole = read_text(folder / "dataset.yaml");
+  const std::string marker = "  - {sensor: \"a\", frame: 0}";
+  for (const std::string bad : {"  + {sensor: \"a\", frame: 0}", " - {sensor", "", "filez:"}) {
+    std::string text = whole;
+    write_text(folder / "dataset.yaml", text.replace(text.find(marker), marker.size(), bad));
+    DatasetText read(folder.path());
+    EXPECT_THAT(read_entries(read), ElementsAre(bad, entries[1]));
+    EXPECT_FALSE(parse_entry(bad));
+    EXPECT_EQ(read.files().size(), 1u);
+    EXPECT_FALSE(read.is_intact());
+  }
+}
+
 TEST(DatasetText, DiffersWhereTheFirstLineDoes) {
   EXPECT_EQ(first_difference("a: 1\nb: 2\nc: 3\n", "a: 1\nb: 7\nc: 4\n"),
             "'b: 2' instead of 'b: 7'");

@@ -33,11 +33,20 @@ TEST(Shard, SharesOutAllFramesEvenly) {
           }
           EXPECT_EQ(owners, 1) << frame << " of " << frames << " by " << count;
         }
+        for (std::uint32_t k = 0; k < count; ++k)
+          EXPECT_EQ((Shard{k + 1, count}.share(sensor, frames)), sizes[k]);
         const auto [least, most] = std::ranges::minmax(sizes);
         EXPECT_LE(most - least, 1) << frames << " by " << count;
       }
     }
   }
+}
+
+TEST(Shard, OfNoOrTheMostFramesIsReckonedAtOnce) {
+  EXPECT_EQ((Shard{2, 3}.share(0, 0)), 0);
+  EXPECT_FALSE((Shard{2, 3}.has(0, 0, 0)));
+  EXPECT_EQ((Shard{1, 1}.share(0, 4'294'967'295)), 4'294'967'295);
+  EXPECT_EQ((Shard{1'000'000, 1'000'000}.share(7, 4'294'967'295)), 4294);
 }
 
 // Sensors of one frame each do not all go to one shard.

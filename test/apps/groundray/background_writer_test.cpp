@@ -5,8 +5,10 @@
 #include <algorithm>
 #include <atomic>
 #include <chrono>
+#include <exception>
 #include <memory>
 #include <stdexcept>
+#include <string>
 #include <thread>
 #include <utility>
 #include <vector>
@@ -51,9 +53,29 @@ TEST(BackgroundWriter, TellsOnceWhatAJobThrew) {
   EXPECT_THROW(writer.begin([&] { is_begun = true; }), std::runtime_error);
   writer.wait();
   EXPECT_FALSE(is_begun);
-  writer.begin([] { throw std::runtime_error("full"); });
-  writer.settle();
-  writer.wait();
+}
+
+// What a caller that failed with `callers` throws, once its job has ended.
+template <typename Callers, typename Job>
+std::string failure(const Callers& callers, const Job& job) {
+  BackgroundWriter writer;
+  writer.begin(job);
+  try {
+    writer.fail(std::make_exception_ptr(callers));
+  } catch (const std::exception& fault) {
+    return fault.what();
+  } catch (const int& stop) {
+    return std::to_string(stop);
+  }
+}
+
+TEST(BackgroundWriter, TellsItsOwnFaultBesideItsCallers) {
+  const auto full = [] { throw std::runtime_error("full"); };
+  const auto well = [] {};
+  EXPECT_EQ(failure(std::runtime_error("torn"), full), "torn\nfull");
+  EXPECT_EQ(failure(std::runtime_error("torn"), well), "torn");
+  EXPECT_EQ(failure(7, full), "full");  // as of one that was asked to stop
+  EXPECT_EQ(failure(7, well), "7");
 }
 
 TEST(BackgroundWriter, EndsItsJobBeforeItGoes) {
