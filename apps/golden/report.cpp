@@ -7,6 +7,18 @@
 
 namespace groundray::golden {
 
+const char* word_of(Verdict verdict) {
+  switch (verdict) {
+    case Verdict::Passed:
+      return "passed";
+    case Verdict::Failed:
+      return "failed";
+    case Verdict::Told:
+      break;
+  }
+  return "told";
+}
+
 Verdict verdict_of(const std::vector<Measure>& measures) {
   const auto any = [&](Verdict verdict) {
     return std::ranges::find(measures, verdict, &Measure::verdict) != measures.end();

@@ -17,6 +17,9 @@ enum class Verdict {
   Told,  ///< a figure that is held against nothing
 };
 
+/// Returns it as reports have it: "passed", "failed" or "told".
+const char* word_of(Verdict verdict);
+
 /// A figure, and what it was held against.
 struct Measure {
   std::string name;

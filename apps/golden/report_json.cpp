@@ -9,18 +9,6 @@ namespace {
 
 using Json = nlohmann::ordered_json;
 
-const char* word_of(Verdict verdict) {
-  switch (verdict) {
-    case Verdict::Passed:
-      return "passed";
-    case Verdict::Failed:
-      return "failed";
-    case Verdict::Told:
-      break;
-  }
-  return "told";
-}
-
 Json json_of(const Measure& measure) {
   return {{"name", measure.name},       {"value", measure.value},
           {"unit", measure.unit},       {"limit", measure.limit ? Json(*measure.limit) : Json()},

@@ -30,11 +30,6 @@ using golden::Section;
 using golden::Subject;
 using nb::literals::operator""_a;
 
-const char* word_of(golden::Verdict verdict) {
-  if (verdict == golden::Verdict::Passed) return "passed";
-  return verdict == golden::Verdict::Failed ? "failed" : "told";
-}
-
 nb::dict dict_of(const golden::Histogram& histogram) {
   nb::dict all;
   all["title"] = histogram.title;

@@ -126,20 +126,6 @@ Halt halt_of(std::optional<double> max_vertical_error_m, std::optional<double> m
   return halts.front();
 }
 
-const char* word_of(HaltReason reason) {
-  switch (reason) {
-    case HaltReason::Bound:
-      return "bound";
-    case HaltReason::Budget:
-      return "budget";
-    case HaltReason::Knee:
-      return "knee";
-    case HaltReason::Shape:
-      break;
-  }
-  return "shape";
-}
-
 nb::dict figures_of(const OneSidedError& error) {
   nb::dict all;
   all["at_least_m"] = error.at_least_m;

@@ -286,6 +286,20 @@ Simplified Simplifier::measured(Simplified result, TriangleMesh local) const {
 
 }  // namespace
 
+const char* word_of(HaltReason reason) {
+  switch (reason) {
+    case HaltReason::Bound:
+      return "bound";
+    case HaltReason::Budget:
+      return "budget";
+    case HaltReason::Knee:
+      return "knee";
+    case HaltReason::Shape:
+      break;
+  }
+  return "shape";
+}
+
 Simplified simplify(const MeasuredMesh& mesh, const Halt& halt, const SimplifyOptions& options,
                     const Work& work) {
   check_simplify(mesh, halt, options);

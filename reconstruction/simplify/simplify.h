@@ -83,6 +83,9 @@ enum class HaltReason {
   Shape    ///< every further collapse would turn triangles over or change what is connected
 };
 
+/// Returns it as reports have it: "bound", "budget", "knee" or "shape".
+const char* word_of(HaltReason reason);
+
 /// What was wrong with the mesh and was put right.
 struct MeshRepairs {
   std::size_t dropped_triangles = 0;  ///< that repeated a vertex or another triangle

@@ -31,20 +31,6 @@ const char* word_of(HoleLeft why) {
   return "crossing";
 }
 
-const char* word_of(HaltReason reason) {
-  switch (reason) {
-    case HaltReason::Bound:
-      return "bound";
-    case HaltReason::Budget:
-      return "budget";
-    case HaltReason::Knee:
-      return "knee";
-    case HaltReason::Shape:
-      break;
-  }
-  return "shape";
-}
-
 const char* sentence_of(HaltReason reason) {
   switch (reason) {
     case HaltReason::Bound:
