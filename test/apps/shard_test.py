@@ -204,6 +204,9 @@ def test_a_merge_that_was_killed_goes_on(whole, shards, tmp_path):
         time.sleep(0.0005)
     run.send_signal(signal.SIGKILL)
     run.wait()
+    said = groundray("verify", joined).stdout.splitlines()
+    strangers = [line for line in said if "not a file of the dataset" in line]
+    assert not [line for line in strangers if ".part" not in line]
     again = groundray("merge", *shards, "-o", joined, "--resume")
     assert again.returncode == 0, again.stderr
     assert files(joined) == files(whole)

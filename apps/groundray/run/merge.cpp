@@ -271,7 +271,7 @@ void write_pending(const std::vector<fs::path>& shards, const Joined& joined, co
     frame->entry.files.clear();
     return text_of(frame->entry);
   };
-  write_dataset_text(out, joined.header, std::nullopt, next, {});
+  write_dataset_text(out, joined.header, std::nullopt, next, joined.files);
 }
 
 void write_done(const std::vector<fs::path>& shards, const Joined& joined, const fs::path& out) {
@@ -302,13 +302,13 @@ std::uint64_t copy_shards(const std::vector<fs::path>& shards, const Joined& joi
   for (const DatasetSummary::Sensor& sensor : joined.summary.sensors)
     make_folder(out / sensor.kind / sensor.name);
   for (const char* name : {"poses", "calibration"}) make_folder(out / name);
+  for (const NamedSum& file : joined.files) add(0, file.path, file.sum);
   while (const auto frame = texts.next()) {
     ++frames;
     const auto stem = joined.summary.stem_of(frame->entry);
     for (const ProductSum& file : frame->entry.files)
       add(frame->shard, *stem + file.suffix, file.sum);
   }
-  for (const NamedSum& file : joined.files) add(0, file.path, file.sum);
   copy_all(copies, use);
   return bytes;
 }

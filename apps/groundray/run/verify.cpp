@@ -159,7 +159,8 @@ bool verify_one(const fs::path& folder) {
   fmt::print("{}: {} files of {:.1f} MiB checked, {}\n", folder.string(), verification.files(),
              static_cast<double>(verification.bytes()) / (1 << 20),
              verification.faults() == 0 ? "all as they were written"
-                                        : fmt::format("{} faults", verification.faults()));
+                                        : fmt::format("{} fault{}", verification.faults(),
+                                                      verification.faults() == 1 ? "" : "s"));
   return verification.faults() == 0;
 }
 
