@@ -160,17 +160,15 @@ def suite_of(name: str) -> str:
 
 
 def listed_results(build: Path) -> list[Path]:
-    """Returns the files that CTest has the tests write: one that crashed leaves none."""
-    lists = sorted((build / "test").glob("*_tests.cmake"))
+    """Returns the files that CTest has the tests write."""
+    lists = [*sorted((build / "test").glob("*_tests.cmake")), build / "test/CTestTestfile.cmake"]
     text = "".join(file.read_text() for file in lists)
-    return [Path(file) for file in re.findall(r"--gtest_output=xml:(.*?\.xml)\]", text)]
+    return [Path(file) for file in re.findall(r"--gtest_output=xml:(.*?\.xml)[\]\"]", text)]
 
 
-def read_cpp_results(file: Path, results: Path, run: Run) -> None:
+def read_cpp_results(file: Path, run: Run) -> None:
     if not file.exists():
-        suite, _, name = file.relative_to(results).as_posix().partition("/")[2].partition(".")
-        run.add(f"{suite_of(suite)}.{name.removesuffix('.xml').split('/')[0]}", "not run")
-        return
+        raise AccuracyError(f"{file}: there is none: its tests crashed or did not run")
     for test in ET.parse(file).getroot().iter("testcase"):
         suite = suite_of(test.get("classname"))
         add_test(test, f"{suite}.{test.get('name').split('/')[0]}", run)
@@ -214,7 +212,7 @@ def read_run(build: Path, golden: Path) -> Run:
         if not file.exists():
             raise AccuracyError(f"{file}: there are no results; run ./dev {command} first")
     for file in listed_results(build):
-        read_cpp_results(file, build / "results", run)
+        read_cpp_results(file, run)
     proofs = build / "results/python_proofs.xml"  # of `./dev prove`, at full size
     for file in (python, proofs) if proofs.exists() else (python,):
         read_python_results(file, run)

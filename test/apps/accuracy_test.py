@@ -129,7 +129,10 @@ def folder(tmp_path, monkeypatch):
     for i, share in enumerate((0.25, 0.0123456)):
         write_cube(tmp_path, i, share)
     (tmp_path / "test/core_test[1]_tests.cmake").write_text(
-        "".join(f"add_test([=[x]=] y [==[--gtest_output=xml:{file}]==])\n" for file in results)
+        f"add_test([=[x]=] y [==[--gtest_output=xml:{results[0]}]==])\n"  # one of a proof
+    )
+    (tmp_path / "test/CTestTestfile.cmake").write_text(
+        f'add_test(x "y" "--gtest_output=xml:{results[1]}")\n'
     )
     (tmp_path / "results/python.xml").write_text(PYTHON.format(""))
     write_report(tmp_path, "passed")
@@ -287,15 +290,21 @@ def test_a_test_that_was_skipped_is_told_apart_by_its_reason(folder, why, said):
 
 
 def test_what_failed_or_did_not_run_is_an_error(folder):
-    (folder / "results/core/All/Cubes.AreCubes/0.xml").unlink()  # as one that crashed
     write_cube(folder, 1, 0.5, "<failure message='no'/>")
     (folder / "results/python.xml").write_text("<testsuites/>")
     write_report(folder, "failed")
     with pytest.raises(lister.AccuracyError) as fault:
         table(folder)
-    for said in ("Cubes.AreCubes: failed", "Cubes.AreCubes: not run", "test_c: not run"):
+    for said in ("Cubes.AreCubes: failed", "test_c: not run"):
         assert said in str(fault.value)
     assert "golden lens: failed" in str(fault.value)
+
+
+@pytest.mark.parametrize("i", [0, 1])
+def test_results_of_tests_that_crashed_are_missed(folder, i):
+    (folder / f"results/core/All/Cubes.AreCubes/{i}.xml").unlink()
+    with pytest.raises(lister.AccuracyError, match=rf"{i}\.xml: there is none: its tests crashed"):
+        table(folder)
 
 
 @pytest.mark.parametrize(
