@@ -4,7 +4,8 @@
 
 BUILD is the folder whose results/ `./dev test` and `./dev prove` wrote, build/release if not given,
 and GOLDEN that of the report of `./dev golden`, out/golden. Every test that a claim names must have
-run and passed; else nothing is written, and the tests are listed. A figure beyond its limit is no
+run and passed; else nothing is written, and the tests, or the results that are not there, are
+listed. A figure beyond its limit is no
 failure by itself: times are, where much else runs. It is told beside the claim and above the table.
 """
 
@@ -167,8 +168,6 @@ def listed_results(build: Path) -> list[Path]:
 
 
 def read_cpp_results(file: Path, run: Run) -> None:
-    if not file.exists():
-        raise AccuracyError(f"{file}: there is none: its tests crashed or did not run")
     for test in ET.parse(file).getroot().iter("testcase"):
         suite = suite_of(test.get("classname"))
         add_test(test, f"{suite}.{test.get('name').split('/')[0]}", run)
@@ -211,7 +210,12 @@ def read_run(build: Path, golden: Path) -> Run:
     for file, command in ((python, "test"), (report, "golden")):
         if not file.exists():
             raise AccuracyError(f"{file}: there are no results; run ./dev {command} first")
-    for file in listed_results(build):
+    listed = listed_results(build)
+    if missing := [
+        f"{file}: its tests crashed or did not run" for file in listed if not file.exists()
+    ]:
+        raise AccuracyError("\n".join([*missing, "run ./dev test first"]))
+    for file in listed:
         read_cpp_results(file, run)
     proofs = build / "results/python_proofs.xml"  # of `./dev prove`, at full size
     for file in (python, proofs) if proofs.exists() else (python,):

@@ -118,10 +118,12 @@ bool are_near(const Mesh& mesh, std::uint32_t rim, const Vertices& points) {
 // triangles as they are: first of a nearly flat patch, then of the plate itself, which takes three
 // tenths off what misses a ball. More rounds change little.
 bool fair(Mesh& mesh, const Vertices& points, std::uint32_t rim) {
-  constexpr int rounds = 2;
-  for (int round = 0; round < rounds; ++round) {
-    if (!pmp::fair(mesh, points) || !are_near(mesh, rim, points)) return false;
-  }
+  const auto try_once = [&] { return pmp::fair(mesh, points) && are_near(mesh, rim, points); };
+  if (!try_once()) return false;
+  std::vector<Mesh::Point> once;
+  for (const auto vertex : points) once.push_back(mesh.point(vertex));
+  if (try_once()) return true;
+  for (std::size_t i = 0; i < points.size(); ++i) mesh.point(points[i]) = once[i];
   return true;
 }
 

@@ -204,9 +204,23 @@ def test_a_merge_that_was_killed_goes_on(whole, shards, tmp_path):
         time.sleep(0.0005)
     run.send_signal(signal.SIGKILL)
     run.wait()
-    said = groundray("verify", joined).stdout.splitlines()
-    strangers = [line for line in said if "not a file of the dataset" in line]
-    assert not [line for line in strangers if ".part" not in line]
     again = groundray("merge", *shards, "-o", joined, "--resume")
+    assert again.returncode == 0, again.stderr
+    assert files(joined) == files(whole)
+
+
+def test_a_merge_that_was_cut_off_has_no_strangers(whole, shards, tmp_path):
+    broken = shutil.copytree(shards[0], tmp_path / "broken")
+    scan = sorted(broken.glob("lidar/*/*.ply"))[-1]
+    kept = scan.rename(tmp_path / "kept.ply")
+    joined = tmp_path / "joined"
+    refused(merge(joined, broken, *shards[1:]), f"{scan}: missing")
+    result = groundray("verify", joined)
+    assert result.returncode == 1
+    assert f"{joined}: incomplete: 0 of 9 frames are there" in result.stdout
+    assert "not a file of the dataset" not in result.stdout
+    assert "merge --resume" in result.stderr
+    kept.rename(scan)
+    again = groundray("merge", broken, *shards[1:], "-o", joined, "--resume")
     assert again.returncode == 0, again.stderr
     assert files(joined) == files(whole)
