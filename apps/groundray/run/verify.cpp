@@ -180,11 +180,8 @@ void verify(const std::vector<fs::path>& datasets) {
     if (!is_sound) ++at_fault;
   }
   if (at_fault > 0) {
-    throw Error(
-        "{} of {} datasets {} at fault; `groundray generate --resume` makes frames again, "
-        "`groundray "
-        "merge --resume` copies them again",
-        at_fault, datasets.size(), at_fault == 1 ? "is" : "are");
+    throw Error("{} of {} datasets {} at fault; `groundray generate --resume` makes frames again",
+                at_fault, datasets.size(), at_fault == 1 ? "is" : "are");
   }
 }
 
