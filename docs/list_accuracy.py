@@ -5,8 +5,8 @@
 BUILD is the folder whose results/ `./dev test` and `./dev prove` wrote, build/release if not given,
 and GOLDEN that of the report of `./dev golden`, out/golden. Every test that a claim names must have
 run and passed; else nothing is written, and the tests, or the results that are not there, are
-listed. A figure beyond its limit is no
-failure by itself: times are, where much else runs. It is told beside the claim and above the table.
+listed. A figure beyond its limit is no failure by itself: times are, where much else runs. It is
+told beside the claim and above the table.
 """
 
 import json

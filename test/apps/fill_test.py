@@ -1,7 +1,6 @@
 """Blank areas of DEMs filled from the command line, judged against other people's ways."""
 
 import importlib.util
-import os
 import re
 import subprocess
 import sys
@@ -30,15 +29,14 @@ def fill(*arguments):
 LARGEST_SHARES = {"thin plate": 1, "SciPy RBF": 1.02, "GDAL": 0.95, "Telea": 0.95, "NS": 0.95}
 # Shadows come with bounds by lines of sight; others' ways make no use of these.
 JUDGED = (*(kind for kind in peers.KINDS if kind != "shadows"), peers.BOUNDED)
-IS_FULL = os.environ.get("GROUNDRAY_PROOF") == "full"
-SIZE, MASKS = ("full", 10) if IS_FULL else ("reduced", 4)
+MASKS = 10
 # A DEM and kind alone exceeds a share by chance in 1 of 100 runs of all such comparisons (Sidak).
 CHANCE = 1 - 0.99 ** (1 / (2 * len(JUDGED) * len(LARGEST_SHARES)))
 
 
 @pytest.fixture(scope="module")
 def runs():
-    """What came of the first of the masks that ./dev bench fill judges: by kind, of both DEMs."""
+    """What came of the masks that ./dev bench fill judges: by kind, of both DEMs."""
     others = {name: fill for name, fill in peers.PEERS.items() if name in LARGEST_SHARES}
     found = {}
     for dem in ("jacksboro", "fractal"):
@@ -51,13 +49,12 @@ def runs():
 
 
 @pytest.mark.parametrize("kind", JUDGED)
-def test_fills_no_worse_than_other_people(runs, kind, record_property):
-    record_property("size", SIZE)
+def test_fills_no_worse_than_other_people(runs, kind):
     both = [peers.summarise(of_dem)["shares"] for of_dem in runs[kind].values()]
     for peer, most in LARGEST_SHARES.items():
         # As the shares are averaged by ./dev bench fill; no slack.
         assert np.exp(np.mean([np.log(shares[peer]) for shares in both])) <= most, peer
-        for dem, of_dem in runs[kind].items() if IS_FULL else ():  # too few masks tell little
+        for dem, of_dem in runs[kind].items():
             # Each alone must not be worse but by chance: Student's t of the masks' log ratios.
             logs = [np.log(run["own"][peer] / run["squares"][peer]) / 2 for run in of_dem]
             worse = np.array(logs) - np.log(most)
@@ -66,16 +63,14 @@ def test_fills_no_worse_than_other_people(runs, kind, record_property):
                 assert chance > CHANCE, (dem, peer)
 
 
-def test_bounds_by_lines_of_sight_lower_errors_in_shadows(runs, record_property):
-    record_property("size", SIZE)
+def test_bounds_by_lines_of_sight_lower_errors_in_shadows(runs):
     for dem, held in runs[peers.BOUNDED].items():
         free = runs["shadows"][dem]
         assert peers.summarise(held)["rmse"] <= 0.97 * peers.summarise(free)["rmse"], dem
 
 
 @pytest.mark.parametrize("kind", JUDGED)
-def test_stated_sds_hold(runs, kind, record_property):
-    record_property("size", SIZE)
+def test_stated_sds_hold(runs, kind):
     found = peers.summarise([run for of_dem in runs[kind].values() for run in of_dem])
     assert 0.85 <= found["rms_sds"] <= 1.15
     # What normal errors cover that are 1.15 and 0.85 of their stated sds.
