@@ -16,7 +16,7 @@
 namespace groundray {
 namespace {
 
-constexpr double pi = std::numbers::pi;
+using std::numbers::pi;
 
 // Below, wo.z > 0.
 

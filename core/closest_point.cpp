@@ -15,10 +15,13 @@
 namespace groundray {
 namespace {
 
-constexpr float infinity = std::numeric_limits<float>::infinity();
+float float_below(double value) {
+  return std::nextafter(static_cast<float>(value), -std::numeric_limits<float>::infinity());
+}
 
-float float_below(double value) { return std::nextafter(static_cast<float>(value), -infinity); }
-float float_above(double value) { return std::nextafter(static_cast<float>(value), infinity); }
+float float_above(double value) {
+  return std::nextafter(static_cast<float>(value), std::numeric_limits<float>::infinity());
+}
 
 bool is_before(const glm::dvec3& a, const glm::dvec3& b) noexcept {
   if (a.x != b.x) return a.x < b.x;
@@ -126,7 +129,7 @@ void bound_triangle(const RTCBoundsFunctionArguments* arguments) {
                           float_above(high.x), float_above(high.y), float_above(high.z), 0};
 }
 
-TriangleMesh checked(TriangleMesh mesh) {
+TriangleMesh checked_mesh(TriangleMesh mesh) {
   check_mesh(mesh, "mesh", EmptyMesh::Refuse);
   if (mesh.triangles.size() >= std::numeric_limits<std::uint32_t>::max())
     throw Error("mesh: {} triangles must be below 2^32 - 1; part it", mesh.triangles.size());
@@ -136,7 +139,7 @@ TriangleMesh checked(TriangleMesh mesh) {
 }  // namespace
 
 ClosestPoint::Impl::Impl(TriangleMesh content, const RayDevice& with)
-    : mesh(checked(std::move(content))), device(with), scene(new_scene(with)) {
+    : mesh(checked_mesh(std::move(content))), device(with), scene(new_scene(with)) {
   glm::dvec3 low = mesh.vertices_m[mesh.triangles[0].x], high = low;
   for (const glm::uvec3& corners : mesh.triangles) {
     for (int k = 0; k < 3; ++k) {

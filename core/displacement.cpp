@@ -16,7 +16,7 @@
 namespace groundray {
 namespace {
 
-void check(const Model& model, const Displacement& by) {
+void check_displacement(const Model& model, const Displacement& by) {
   Violations broken("displacement");
   broken.unless(!model.uv.empty(), "the model has no uv to lay an image on");
   broken.unless(by.cell_m > 0 && std::isfinite(by.cell_m), "cell_m = {} must be positive",
@@ -169,7 +169,7 @@ glm::dvec3 unit(const glm::dvec3& v) {
 }  // namespace
 
 Model displaced(const Model& model, const Displacement& by) {
-  check(model, by);
+  check_displacement(model, by);
   const Texture heights(by.image, Wrap::Repeat);
   Model result = model;
   Refiner(result, by.cell_m).run();

@@ -25,9 +25,9 @@ constexpr std::size_t most_name_bytes = 255;  // what OpenEXR reads back
 
 /// OpenEXR's own file stream loses faults in destructors, so a file is made in memory and then
 /// written.
-class MemoryStream : public Imf::OStream {
+class MemoryOStream : public Imf::OStream {
  public:
-  MemoryStream() : OStream("memory") {}
+  MemoryOStream() : OStream("memory") {}
   void write(const char bytes[], int count) override {
     const auto size = static_cast<std::size_t>(count);
     bytes_.replace(position_, size, bytes, size);
@@ -42,8 +42,8 @@ class MemoryStream : public Imf::OStream {
   std::size_t position_ = 0;
 };
 
-constexpr Imf::PixelType type_of(const ImageF*) { return Imf::FLOAT; }
-constexpr Imf::PixelType type_of(const Image32*) { return Imf::UINT; }
+constexpr Imf::PixelType pixel_type_of(const ImageF*) { return Imf::FLOAT; }
+constexpr Imf::PixelType pixel_type_of(const Image32*) { return Imf::UINT; }
 
 void check_names(const std::vector<ExrLayer>& layers, Violations& broken) {
   std::set<std::string> names;
@@ -102,10 +102,10 @@ void insert(Imf::Header& header, Imf::FrameBuffer& pixels, const std::vector<std
             const Image<T>& image) {
   const std::size_t stride = names.size() * sizeof(T);
   for (std::size_t i = 0; i < names.size(); ++i) {
-    header.channels().insert(names[i], Imf::Channel(type_of(&image)));
+    header.channels().insert(names[i], Imf::Channel(pixel_type_of(&image)));
     // The library takes a pointer to mutable values and only reads them.
     auto* const base = reinterpret_cast<char*>(const_cast<T*>(image.values().data() + i));
-    pixels.insert(names[i], Imf::Slice(type_of(&image), base, stride,
+    pixels.insert(names[i], Imf::Slice(pixel_type_of(&image), base, stride,
                                        stride * static_cast<std::size_t>(image.width())));
   }
 }
@@ -130,7 +130,7 @@ void write_exr(const std::filesystem::path& path, const std::vector<ExrLayer>& l
     std::visit([&](const auto* image) { insert(header, pixels, layer.names, *image); },
                layer.image);
   }
-  MemoryStream stream;
+  MemoryOStream stream;
   {
     Imf::OutputFile file(stream, header);
     file.setFrameBuffer(pixels);

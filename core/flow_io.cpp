@@ -15,7 +15,7 @@
 namespace groundray {
 namespace {
 
-void check_channels(const std::filesystem::path& path, const ImageF& flow_px) {
+void check_flow_channels(const std::filesystem::path& path, const ImageF& flow_px) {
   if (flow_px.channels() == 2) return;
   throw Error("{}: optical flow must have 2 channels, u and v; this has {}", path.string(),
               flow_px.channels());
@@ -36,7 +36,7 @@ std::optional<std::uint16_t> kitti_code(float flow_px) {
 }  // namespace
 
 void write_flo(const std::filesystem::path& path, const ImageF& flow_px) {
-  check_channels(path, flow_px);
+  check_flow_channels(path, flow_px);
   static_assert(std::endian::native == std::endian::little, "the format's bytes are");
   constexpr float tag = 202021.25f;  // in bytes "PIEH"
   const std::array<std::int32_t, 3> head{std::bit_cast<std::int32_t>(tag), flow_px.width(),
@@ -51,7 +51,7 @@ void write_flo(const std::filesystem::path& path, const ImageF& flow_px) {
 }
 
 std::size_t write_kitti_flow(const std::filesystem::path& path, const ImageF& flow_px) {
-  check_channels(path, flow_px);
+  check_flow_channels(path, flow_px);
   Image16 codes(flow_px.width(), flow_px.height(), 3);
   std::size_t left_out = 0;
   for (int y = 0; y < flow_px.height(); ++y) {

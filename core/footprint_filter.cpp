@@ -14,7 +14,7 @@ namespace {
 constexpr double infinity = std::numeric_limits<double>::infinity();
 
 /// A convex polygon: a parallelogram cut by up to eight lines.
-struct Polygon {
+struct ConvexPolygon {
   std::array<glm::dvec2, 12> corners;
   std::size_t size = 0;
 
@@ -38,8 +38,9 @@ struct Span {
 /// Returns the part of a polygon on one side of a line across an axis: `sign` is 1 for the part
 /// beyond `bound`, -1 for the part before it. The new corners lie on the line exactly.
 /// @see Sutherland and Hodgman, Reentrant polygon clipping (1974).
-Polygon cut(const Polygon& polygon, glm::length_t axis, double bound, double sign) noexcept {
-  Polygon kept;
+ConvexPolygon cut(const ConvexPolygon& polygon, glm::length_t axis, double bound,
+                  double sign) noexcept {
+  ConvexPolygon kept;
   for (std::size_t i = 0; i < polygon.size; ++i) {
     const glm::dvec2& a = polygon.corners[i];
     const glm::dvec2& b = polygon.corners[i + 1 == polygon.size ? 0 : i + 1];
@@ -55,14 +56,14 @@ Polygon cut(const Polygon& polygon, glm::length_t axis, double bound, double sig
 }
 
 /// Returns the part of a polygon in a span.
-Polygon cut(const Polygon& polygon, glm::length_t axis, Span span) noexcept {
+ConvexPolygon cut(const ConvexPolygon& polygon, glm::length_t axis, Span span) noexcept {
   const bool begins = polygon.least(axis)<span.begin, ends = polygon.greatest(axis)> span.end;
   if (!begins && !ends) return polygon;
-  const Polygon beyond = begins ? cut(polygon, axis, span.begin, 1) : polygon;
+  const ConvexPolygon beyond = begins ? cut(polygon, axis, span.begin, 1) : polygon;
   return ends ? cut(beyond, axis, span.end, -1) : beyond;
 }
 
-double area(const Polygon& polygon) noexcept {
+double area(const ConvexPolygon& polygon) noexcept {
   double doubled = 0;
   for (std::size_t i = 2; i < polygon.size; ++i) {
     const glm::dvec2 a = polygon.corners[i - 1] - polygon.corners[0];
@@ -74,7 +75,7 @@ double area(const Polygon& polygon) noexcept {
 
 /// Returns the columns [begin, end) whose cells the part of a polygon in a row covers wholly.
 /// @param strip  the polygon cut to `row`; convex, so its chords at both ends of the row say it.
-Span whole_columns(const Polygon& strip, Span row) noexcept {
+Span whole_columns(const ConvexPolygon& strip, Span row) noexcept {
   Span columns{-infinity, infinity};
   for (const double y : {row.begin, row.end}) {
     Span chord{infinity, -infinity};
@@ -106,11 +107,11 @@ struct Cells {
 /// Takes a polygon apart along the sides of cells: calls whole(row, begin, end) for columns
 /// [begin, end) of cells that lie inside, and part(row, column, cut polygon) for each on its rim.
 template <typename Whole, typename Part>
-void cover(const Polygon& polygon, Cells columns, Cells rows, const Whole& whole,
+void cover(const ConvexPolygon& polygon, Cells columns, Cells rows, const Whole& whole,
            const Part& part) noexcept {
   const double last_row = rows.at(polygon.greatest(1));
   for (double row = rows.at(polygon.least(1)); row <= last_row; ++row) {
-    const Polygon strip = cut(polygon, 1, rows.span(row));
+    const ConvexPolygon strip = cut(polygon, 1, rows.span(row));
     if (strip.size < 3) continue;
     Span inside = whole_columns(strip, rows.span(row));
     if (columns.count < infinity) {
@@ -122,7 +123,7 @@ void cover(const Polygon& polygon, Cells columns, Cells rows, const Whole& whole
     for (double column = columns.at(strip.least(0)); column <= last_column; ++column) {
       if (has_inside && column == inside.begin) column = inside.end;
       if (column > last_column) break;
-      const Polygon cell = cut(strip, 0, columns.span(column));
+      const ConvexPolygon cell = cut(strip, 0, columns.span(column));
       if (cell.size >= 3) part(row, column, cell);
     }
   }
@@ -172,10 +173,10 @@ glm::dvec3 Texture::exact_color(glm::dvec2 uv, const Footprint& footprint) const
   }
   const glm::dvec2 right = glm::dvec2(a.x, -a.y) / 2.0, up = glm::dvec2(b.x, -b.y) / 2.0;
   const glm::dvec2 c = centre * texels;
-  const Polygon polygon{{c - right - up, c + right - up, c + right + up, c - right + up}, 4};
+  const ConvexPolygon polygon{{c - right - up, c + right - up, c + right + up, c - right + up}, 4};
 
   Sum sum;
-  const auto add_image = [&](const Polygon& part) {
+  const auto add_image = [&](const ConvexPolygon& part) {
     cover(
         part, {texels.x}, {texels.y},
         [&](double row, double begin, double end) {
@@ -183,7 +184,7 @@ glm::dvec3 Texture::exact_color(glm::dvec2 uv, const Footprint& footprint) const
               row_sum(static_cast<int>(row), static_cast<int>(begin), static_cast<int>(end) - 1);
           sum.area += end - begin;
         },
-        [&](double row, double column, const Polygon& cell) {
+        [&](double row, double column, const ConvexPolygon& cell) {
           const double share = area(cell);
           const auto x = static_cast<int>(column);
           sum.light += share * row_sum(static_cast<int>(row), x, x);
@@ -193,7 +194,7 @@ glm::dvec3 Texture::exact_color(glm::dvec2 uv, const Footprint& footprint) const
   if (!repeats) {
     add_image(polygon);
   } else {
-    Polygon images = polygon;
+    ConvexPolygon images = polygon;
     for (std::size_t i = 0; i < images.size; ++i) images.corners[i] /= texels;
     cover(
         images, {}, {},
@@ -202,8 +203,8 @@ glm::dvec3 Texture::exact_color(glm::dvec2 uv, const Footprint& footprint) const
           sum.light += count * mean_;
           sum.area += count;
         },
-        [&](double row, double column, const Polygon& part) {
-          Polygon image = part;
+        [&](double row, double column, const ConvexPolygon& part) {
+          ConvexPolygon image = part;
           for (std::size_t i = 0; i < image.size; ++i) {
             image.corners[i] = (image.corners[i] - glm::dvec2(column, row)) * texels;
           }

@@ -7,7 +7,7 @@
 namespace groundray::ggx {
 namespace {
 
-constexpr double pi = std::numbers::pi;
+using std::numbers::pi;
 
 // cos (1 + 2 Lambda), with Smith's Lambda: never divides by the cosine.
 double masked_cosine(double cosine, double alpha) noexcept {

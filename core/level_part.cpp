@@ -95,14 +95,14 @@ void add_leaf(const LeafCells& cells, unsigned first_point, LevelPart& out,
   }
 }
 
-void attach(RTCScene scene, RTCGeometry geometry, unsigned id) {
+void attach_and_release(RTCScene scene, RTCGeometry geometry, unsigned id) {
   rtcCommitGeometry(geometry);
   rtcAttachGeometryByID(scene, geometry, id);
   rtcReleaseGeometry(geometry);
 }
 
 template <typename T>
-T* checked(void* memory) {
+T* checked_memory(void* memory) {
   if (memory == nullptr)
     throw Error("ray tracer: there is not enough memory for a level's geometry");
   return static_cast<T*>(memory);
@@ -111,11 +111,11 @@ T* checked(void* memory) {
 template <typename T>
 void copy_to_buffer(RTCGeometry geometry, RTCBufferType type, RTCFormat format,
                     const std::vector<T>& values) {
-  std::ranges::copy(values, checked<T>(rtcSetNewGeometryBuffer(geometry, type, 0, format, sizeof(T),
-                                                               values.size())));
+  std::ranges::copy(values, checked_memory<T>(rtcSetNewGeometryBuffer(geometry, type, 0, format,
+                                                                      sizeof(T), values.size())));
 }
 
-void build_fast(RTCDevice device, const LevelScene::Impl& level, LevelPart& part) {
+void build_fast_part(RTCDevice device, const LevelScene::Impl& level, LevelPart& part) {
   const std::vector<Leaf>& leaves = part.leaves;
   std::vector<unsigned> first_points(leaves.size());
   std::size_t point_count = 0;
@@ -129,7 +129,7 @@ void build_fast(RTCDevice device, const LevelScene::Impl& level, LevelPart& part
     throw Error("ray tracer: a level has {} points, more than Embree counts", point_count);
   RTCBuffer buffer = rtcNewBuffer(
       device, point_count * sizeof(glm::vec3) + 16);  // Embree reads 16 bytes at a time
-  auto* points = checked<glm::vec3>(buffer == nullptr ? nullptr : rtcGetBufferData(buffer));
+  auto* points = checked_memory<glm::vec3>(buffer == nullptr ? nullptr : rtcGetBufferData(buffer));
   tbb::parallel_for(std::size_t{0}, leaves.size(), [&](std::size_t n) {
     write_points({level, leaves[n]}, level, points + first_points[n]);
   });
@@ -143,7 +143,7 @@ void build_fast(RTCDevice device, const LevelScene::Impl& level, LevelPart& part
     rtcSetGeometryBuffer(geometry, RTC_BUFFER_TYPE_VERTEX, 0, RTC_FORMAT_FLOAT3, buffer, 0,
                          sizeof(glm::vec3), point_count);
     copy_to_buffer(geometry, kind, format, list);
-    attach(part.scene, geometry, id);
+    attach_and_release(part.scene, geometry, id);
   };
   add(RTC_GEOMETRY_TYPE_GRID, block_geometry, RTC_BUFFER_TYPE_GRID, RTC_FORMAT_GRID,
       primitives.grids);
@@ -209,7 +209,7 @@ void intersect_leaf(const RTCIntersectFunctionNArguments* arguments) {
   }
 }
 
-void build_exact(RTCDevice device, const LevelScene::Impl& level, LevelPart& part) {
+void build_exact_part(RTCDevice device, const LevelScene::Impl& level, LevelPart& part) {
   part.built_for = &level;
   for (const Leaf& leaf : part.leaves) {
     const LeafCells cells{level, leaf};
@@ -221,7 +221,7 @@ void build_exact(RTCDevice device, const LevelScene::Impl& level, LevelPart& par
   rtcSetGeometryUserData(geometry, &part);
   rtcSetGeometryBoundsFunction(geometry, leaf_bounds, nullptr);
   rtcSetGeometryIntersectFunction(geometry, intersect_leaf);
-  attach(part.scene, geometry, block_geometry);
+  attach_and_release(part.scene, geometry, block_geometry);
 }
 
 }  // namespace
@@ -238,9 +238,9 @@ std::shared_ptr<const LevelPart> build_part(const LevelScene::Impl& level, glm::
   part->slack_m = 2 * level.slack_m;  // so that it serves while the level's own grows a little
   part->scene = new_scene(level.device);
   if (level.tracing == Tracing::Exact) {
-    build_exact(handle(level.device), level, *part);
+    build_exact_part(handle(level.device), level, *part);
   } else {
-    build_fast(handle(level.device), level, *part);
+    build_fast_part(handle(level.device), level, *part);
   }
   commit(part->scene);
   part->built_for = nullptr;

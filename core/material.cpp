@@ -12,7 +12,7 @@
 namespace groundray {
 namespace {
 
-constexpr double pi = std::numbers::pi;
+using std::numbers::pi;
 
 void check_order(const Spectrum& spectrum, std::string_view field, Violations& broken) {
   broken.unless(!spectrum.empty(), "{}: there must be at least one sample", field);
@@ -39,24 +39,24 @@ void check_alpha(double alpha, Violations& broken) {
   broken.unless(alpha >= 0.01 && alpha <= 1, "alpha = {} must be in [0.01, 1]", alpha);
 }
 
-void check(const Lambertian& surface, Violations& broken) {
+void check_reflection(const Lambertian& surface, Violations& broken) {
   check_shares(surface.spectrum, "spectrum", broken);
 }
 
-void check(const RoughDiffuse& surface, Violations& broken) {
+void check_reflection(const RoughDiffuse& surface, Violations& broken) {
   check_shares(surface.spectrum, "spectrum", broken);
   broken.unless(surface.roughness >= 0 && surface.roughness <= 1,
                 "roughness = {} must be in [0, 1]: it is no angle", surface.roughness);
 }
 
-void check(const Coated& surface, Violations& broken) {
+void check_reflection(const Coated& surface, Violations& broken) {
   check_shares(surface.spectrum, "spectrum", broken);
   broken.unless(surface.refractive_index > 1 && surface.refractive_index <= 4,
                 "refractive_index = {} must be in (1, 4]", surface.refractive_index);
   check_alpha(surface.alpha, broken);
 }
 
-void check(const Conductor& surface, Violations& broken) {
+void check_reflection(const Conductor& surface, Violations& broken) {
   check_order(surface.refractive_index, "refractive_index", broken);
   for (const auto& [wavelength_nm, n] : surface.refractive_index) {
     broken.unless(n > 0 && std::isfinite(n), "refractive_index at {} nm = {} must be positive",
@@ -71,7 +71,7 @@ void check(const Conductor& surface, Violations& broken) {
 }
 
 // Both are linear between their samples, so their sum is greatest at one of them.
-void check(const PlantLeaf& leaf, Violations& broken) {
+void check_reflection(const PlantLeaf& leaf, Violations& broken) {
   check_shares(leaf.reflectance, "reflectance", broken);
   check_shares(leaf.transmittance, "transmittance", broken);
   for (const Spectrum* spectrum : {&leaf.reflectance, &leaf.transmittance}) {
@@ -85,7 +85,7 @@ void check(const PlantLeaf& leaf, Violations& broken) {
   }
 }
 
-void check(const RetroReflector& surface, Violations& broken) {
+void check_reflection(const RetroReflector& surface, Violations& broken) {
   const double coefficient = surface.coefficient_cd_lx_m2;
   broken.unless(coefficient > 0 && std::isfinite(coefficient),
                 "coefficient_cd_lx_m2 = {} must be positive and finite", coefficient);
@@ -152,7 +152,7 @@ RetroBrdf retro(const BlackBsdf&) { return {}; }
 
 void check_material(const Material& material) {
   Violations broken("Material '" + material.name + "'");
-  std::visit([&](const auto& surface) { check(surface, broken); }, material.reflection);
+  std::visit([&](const auto& surface) { check_reflection(surface, broken); }, material.reflection);
   for (glm::length_t k = 0; k < 3; ++k) {
     broken.unless(material.emitted[k] >= 0 && std::isfinite(material.emitted[k]),
                   "emitted[{}] = {} must be finite and >= 0", k, material.emitted[k]);

@@ -24,7 +24,7 @@
 namespace groundray {
 namespace {
 
-constexpr std::size_t rows_per_block = 1 << 13;  // some 200 kB: they stay in the cache
+constexpr std::size_t block_rows = 1 << 13;  // some 200 kB: they stay in the cache
 
 /// Colours of levels 0, 1, ...; after the last come the first again.
 constexpr std::array<std::array<std::uint8_t, 3>, 8> level_colours{{{68, 119, 170},
@@ -55,7 +55,7 @@ void write_tables(const std::filesystem::path& path, const std::string& header,
       row = 0;
     }
     if (table < tables.size()) {
-      const std::size_t end = std::min(row + rows_per_block, tables[table].rows);
+      const std::size_t end = std::min(row + block_rows, tables[table].rows);
       tables[table].append(row, end, block);
       row = end;
     }
@@ -166,8 +166,8 @@ PlyProperty property(std::string_view type, std::string_view name) {
 }
 
 /// Adds a property for each column. @throws Error if it cannot be one.
-void add_columns(const PointCloud& columns, PlyElement& element,
-                 const std::filesystem::path& path) {
+void add_column_properties(const PointCloud& columns, PlyElement& element,
+                           const std::filesystem::path& path) {
   if (!columns.columns().empty() && columns.rows() != element.rows) {
     throw Error("{}: columns of {} rows are not of the element {}, which has {}", path.string(),
                 columns.rows(), element.name, element.rows);
@@ -226,8 +226,8 @@ void write_ply(const std::filesystem::path& path, const TriangleMesh& mesh,
       face.properties.push_back(property("uchar", name));
     }
   }
-  add_columns(columns.vertices, vertex, path);
-  add_columns(columns.triangles, face, path);
+  add_column_properties(columns.vertices, vertex, path);
+  add_column_properties(columns.triangles, face, path);
   const auto append_vertices = [&](std::size_t first, std::size_t last, std::string& block) {
     append_rows(columns.vertices, first, last, block,
                 [&](std::size_t i, std::string& row) { append_bytes(row, mesh.vertices_m[i]); });

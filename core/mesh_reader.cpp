@@ -26,7 +26,7 @@ namespace {
 namespace fs = std::filesystem;
 using nlohmann::json;
 
-struct Reading {
+struct MeshReading {
   PolygonSoup soup;
   Georeference georeference;
   std::size_t dropped = 0;  // polygons that are not even in the soup
@@ -115,10 +115,10 @@ Georeference gltf_georeference(std::string_view bytes) {
 
 /// Assimp leaves out triangles whose indices are out of range: they are counted against what the
 /// file says.
-Reading read_gltf(const fs::path& path) {
+MeshReading read_gltf_mesh(const fs::path& path) {
   const std::string bytes = read_text(path);
   const std::size_t named = check_gltf(bytes, path.string());
-  Reading reading{.soup = read_scene_file(path, SceneForm::Gltf)};
+  MeshReading reading{.soup = read_scene_file(path, SceneForm::Gltf)};
   for (glm::dvec3& p : reading.soup.positions) p = {p.x, -p.z, p.y};
   for (glm::vec3& n : reading.soup.normals) n = {n.x, -n.z, n.y};
   reading.dropped = named - std::min(named, reading.soup.faces);
@@ -132,9 +132,9 @@ Reading read_gltf(const fs::path& path) {
   return reading;
 }
 
-Reading read_file(const fs::path& path) {
+MeshReading read_mesh_file(const fs::path& path) {
   const std::string form = file_ending(path);
-  if (form == ".gltf" || form == ".glb") return read_gltf(path);
+  if (form == ".gltf" || form == ".glb") return read_gltf_mesh(path);
   if (form == ".stl")
     return {.soup = read_scene_file(path, SceneForm::Stl), .georeference = stl_georeference(path)};
   if (form == ".ply") {
@@ -162,7 +162,7 @@ void check_some(const MeshFile& file, const std::string& name) {
 }  // namespace
 
 MeshFile read_mesh(const fs::path& path) {
-  Reading reading = read_file(path);
+  MeshReading reading = read_mesh_file(path);
   for (PolygonSoup::Polygon& polygon : reading.soup.polygons) polygon.surface = 0;
   for (PolygonSoup::Corner& corner : reading.soup.corners) corner = {.position = corner.position};
   ModelFaults faults;

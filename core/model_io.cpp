@@ -25,17 +25,17 @@ namespace groundray {
 namespace {
 
 namespace fs = std::filesystem;
-using Surface = PolygonSoup::Surface;
+using SoupSurface = PolygonSoup::Surface;
 
-enum class Form { Obj, Ply, Stl, Gltf, Collada };
+enum class ModelForm { Obj, Ply, Stl, Gltf, Collada };
 
-Form form_of(const fs::path& path) {
+ModelForm model_form_of(const fs::path& path) {
   const std::string ending = file_ending(path);
-  if (ending == ".obj") return Form::Obj;
-  if (ending == ".ply") return Form::Ply;
-  if (ending == ".stl") return Form::Stl;
-  if (ending == ".gltf" || ending == ".glb") return Form::Gltf;
-  if (ending == ".dae") return Form::Collada;
+  if (ending == ".obj") return ModelForm::Obj;
+  if (ending == ".ply") return ModelForm::Ply;
+  if (ending == ".stl") return ModelForm::Stl;
+  if (ending == ".gltf" || ending == ".glb") return ModelForm::Gltf;
+  if (ending == ".dae") return ModelForm::Collada;
   throw Error("{}: the name of a model must end in .obj, .ply, .stl, .gltf, .glb or .dae",
               path.string());
 }
@@ -77,9 +77,9 @@ fs::path find_beside(const fs::path& model, const std::string& written) {
   throw Error("{:?} is missing: there is no {}", written, tried);
 }
 
-void find_images(const fs::path& model, std::vector<Surface>& surfaces) {
+void find_images(const fs::path& model, std::vector<SoupSurface>& surfaces) {
   Violations broken(model.string());
-  const auto find = [&](const Surface& surface, const char* what, const std::string& written,
+  const auto find = [&](const SoupSurface& surface, const char* what, const std::string& written,
                         ModelImage& image) {
     if (written.empty()) return;
     try {
@@ -88,7 +88,7 @@ void find_images(const fs::path& model, std::vector<Surface>& surfaces) {
       broken.unless(false, "surface {:?}: its {} {}", surface.looks.name, what, fault.what());
     }
   };
-  for (Surface& surface : surfaces) {
+  for (SoupSurface& surface : surfaces) {
     if (surface.opacity == surface.albedo) surface.opacity.clear();  // its alpha says the same
     find(surface, "albedo map", surface.albedo, surface.looks.albedo);
     find(surface, "normal map", surface.normal, surface.looks.normal);
@@ -97,7 +97,7 @@ void find_images(const fs::path& model, std::vector<Surface>& surfaces) {
   broken.throw_if_any();
 }
 
-struct Reading {
+struct ModelReading {
   PolygonSoup soup;
   double metres_per_unit = 1;  // as the file says
   double unit_of_soup_m = 1;
@@ -105,12 +105,12 @@ struct Reading {
   std::size_t out_of_range = 0;  // polygons that are not even in the soup
 };
 
-Reading read_obj(const fs::path& path) {
+ModelReading read_obj(const fs::path& path) {
   const auto read_mtl = [&](const std::string& name) { return read_text(find_beside(path, name)); };
   return {.soup = parse_obj(read_text(path), path.string(), read_mtl)};
 }
 
-Reading read_collada(const fs::path& path) {
+ModelReading read_collada(const fs::path& path) {
   const ColladaAsset asset = check_collada(read_text(path), path.string());
   return {.soup = read_scene_file(path, SceneForm::Collada),
           .metres_per_unit = asset.metres_per_unit,
@@ -120,23 +120,23 @@ Reading read_collada(const fs::path& path) {
 
 /// assimp leaves out triangles whose indices are out of range and tells but its log, so they are
 /// counted against what the file says.
-Reading read_gltf(const fs::path& path) {
+ModelReading read_gltf_model(const fs::path& path) {
   const std::size_t named = check_gltf(read_text(path), path.string());
-  Reading reading{.soup = read_scene_file(path, SceneForm::Gltf), .up = UpAxis::Y};
+  ModelReading reading{.soup = read_scene_file(path, SceneForm::Gltf), .up = UpAxis::Y};
   reading.out_of_range = named - std::min(named, reading.soup.faces);
   return reading;
 }
 
-Reading read_file(const fs::path& path, Form form) {
+ModelReading read_model_file(const fs::path& path, ModelForm form) {
   switch (form) {
-    case Form::Obj:
+    case ModelForm::Obj:
       return read_obj(path);
-    case Form::Ply:
+    case ModelForm::Ply:
       return {.soup = parse_ply_faces(read_text(path), path.string())};
-    case Form::Stl:
+    case ModelForm::Stl:
       return {.soup = read_scene_file(path, SceneForm::Stl)};
-    case Form::Gltf:
-      return read_gltf(path);
+    case ModelForm::Gltf:
+      return read_gltf_model(path);
     default:
       return read_collada(path);
   }
@@ -149,7 +149,7 @@ V turned_up(const V& v, UpAxis up) {
   return v;
 }
 
-void turn_and_scale(Reading& reading, const ModelOptions& options) {
+void turn_and_scale(ModelReading& reading, const ModelOptions& options) {
   const UpAxis up = options.up.value_or(reading.up);
   const double scale =
       options.metres_per_unit.value_or(reading.metres_per_unit) / reading.unit_of_soup_m;
@@ -159,10 +159,10 @@ void turn_and_scale(Reading& reading, const ModelOptions& options) {
 }
 
 /// Moves to the model those surfaces that its triangles have, and numbers them anew.
-void take_surfaces(const fs::path& path, std::vector<Surface> surfaces, Model& model) {
+void take_surfaces(const fs::path& path, std::vector<SoupSurface> surfaces, Model& model) {
   std::vector<std::uint16_t> numbers(surfaces.size());
   for (const std::uint16_t surface : model.surface_of) numbers[surface] = 1;
-  std::vector<Surface> used;
+  std::vector<SoupSurface> used;
   for (std::size_t i = 0; i < surfaces.size(); ++i) {
     if (numbers[i] == 0) continue;
     numbers[i] = static_cast<std::uint16_t>(used.size());
@@ -170,7 +170,7 @@ void take_surfaces(const fs::path& path, std::vector<Surface> surfaces, Model& m
   }
   for (std::uint16_t& surface : model.surface_of) surface = numbers[surface];
   find_images(path, used);
-  for (Surface& surface : used) model.surfaces.push_back(std::move(surface.looks));
+  for (SoupSurface& surface : used) model.surfaces.push_back(std::move(surface.looks));
 }
 
 void refuse_faults(const fs::path& path, const ModelFile& file) {
@@ -200,8 +200,8 @@ ModelFile read_model(const fs::path& path, const ModelOptions& options) {
   if (!(scale > 0 && std::isfinite(scale))) {
     throw Error("{}: metres_per_unit = {} must be positive", path.string(), scale);
   }
-  const Form form = form_of(path);
-  Reading reading = read_file(path, form);
+  const ModelForm form = model_form_of(path);
+  ModelReading reading = read_model_file(path, form);
   PolygonSoup& soup = reading.soup;
   turn_and_scale(reading, options);
   if (soup.surfaces.size() > std::numeric_limits<std::uint16_t>::max()) {

@@ -13,7 +13,7 @@
 namespace groundray {
 namespace {
 
-Model checked(Model model) {
+Model checked_model(Model model) {
   check_model(model, "model");
   return model;
 }
@@ -36,7 +36,8 @@ Owned<RTCGeometry> new_geometry(const ModelScene::Impl& model, RTCGeometryType t
   return Owned<RTCGeometry>(rtcNewGeometry(handle(model.device), type));
 }
 
-void attach(const ModelScene::Impl& model, const Owned<RTCGeometry>& geometry, unsigned id) {
+void attach_geometry(const ModelScene::Impl& model, const Owned<RTCGeometry>& geometry,
+                     unsigned id) {
   rtcCommitGeometry(geometry.get());
   rtcAttachGeometryByID(model.scene.get(), geometry.get(), id);
 }
@@ -87,7 +88,7 @@ void add_triangles(const ModelScene::Impl& model, const Owned<RTCBuffer>& vertic
     rtcSetGeometryUserData(geometry.get(), const_cast<ModelScene::Impl*>(&model));
     rtcSetGeometryIntersectFilterFunction(geometry.get(), filter_cut);
   }
-  attach(model, geometry, id);
+  attach_geometry(model, geometry, id);
 }
 
 void triangle_bounds(const RTCBoundsFunctionArguments* arguments) {
@@ -127,20 +128,20 @@ void intersect_triangle(const RTCIntersectFunctionNArguments* arguments) {
   }
 }
 
-void build_exact(ModelScene::Impl& model) {
+void build_exact_model(ModelScene::Impl& model) {
   const auto geometry = new_geometry(model, RTC_GEOMETRY_TYPE_USER);
   rtcSetGeometryUserPrimitiveCount(geometry.get(),
                                    static_cast<unsigned>(model.model.mesh.triangles.size()));
   rtcSetGeometryUserData(geometry.get(), &model);
   rtcSetGeometryBoundsFunction(geometry.get(), triangle_bounds, nullptr);
   rtcSetGeometryIntersectFunction(geometry.get(), intersect_triangle);
-  attach(model, geometry, 0);
+  attach_geometry(model, geometry, 0);
 }
 
 }  // namespace
 
 ModelScene::Impl::Impl(const RayDevice& with, Model content, Tracing how)
-    : device(with), model(checked(std::move(content))), tracing(how), stars(model.mesh) {
+    : device(with), model(checked_model(std::move(content))), tracing(how), stars(model.mesh) {
   for (const ModelSurface& surface : model.surfaces)
     textures.push_back(groundray::textures_of(surface));
   for (std::size_t i = 0; i < textures.size() && model.uv.empty(); ++i) {
@@ -162,7 +163,7 @@ ModelScene::Impl::Impl(const RayDevice& with, Model content, Tracing how)
     (textures_of(i).least_alpha > 0 ? cut : solid).push_back(i);
   scene.reset(new_scene(device));
   if (tracing == Tracing::Exact) {
-    build_exact(*this);
+    build_exact_model(*this);
   } else {
     const auto vertices = vertices_of(*this);
     add_triangles(*this, vertices, 0, solid);

@@ -10,7 +10,7 @@
 namespace groundray {
 namespace {
 
-std::string type_of(const std::vector<NpyField>& fields) {
+std::string descr_of(const std::vector<NpyField>& fields) {
   if (fields.size() == 1 && fields[0].name.empty()) return fmt::format("'{}'", fields[0].type);
   std::vector<std::string> parts;
   for (const NpyField& field : fields)
@@ -24,7 +24,7 @@ void write_npy(const std::filesystem::path& path, const std::vector<NpyField>& f
                std::size_t rows, std::span<const std::byte> bytes) {
   constexpr std::size_t alignment = 64;  // of the data in the file, as NumPy writes it
   std::string text = fmt::format("{{'descr': {}, 'fortran_order': False, 'shape': ({},), }}",
-                                 type_of(fields), rows);
+                                 descr_of(fields), rows);
   const std::size_t preamble = 10;
   text.append(alignment - 1 - (preamble + text.size()) % alignment, ' ');
   text += '\n';

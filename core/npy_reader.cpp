@@ -21,7 +21,7 @@ namespace {
 constexpr std::size_t most_columns = 4096;
 
 /// One field of a row, or what of it is no number.
-struct Field {
+struct RowField {
   std::string name;
   std::optional<NumberType> type;  // nothing for what is passed over
   ByteOrder order = ByteOrder::Little;
@@ -57,10 +57,10 @@ std::optional<NumberType> number_type_of(char kind, std::size_t bytes) {
 }
 
 /// Of a type as NumPy spells it: "<f4", "|u1", "|V12", "<U3".
-Field field_of(std::string_view type) {
+RowField field_of(std::string_view type) {
   constexpr std::string_view orders = "<>|=";
   const std::string_view fault = type.substr(0, 40);
-  Field field;
+  RowField field;
   if (type.empty() || orders.find(type[0]) == std::string_view::npos) {
     throw Error("there is no type {:?}", fault);
   }
@@ -104,7 +104,7 @@ std::vector<std::uint64_t> shape_of(const PythonLiteral* literal) {
 }
 
 /// Of ('name', type) or ('name', type, shape); a name may be ('title', 'name').
-Field field_of(const PythonLiteral& entry) {
+RowField field_of(const PythonLiteral& entry) {
   const auto* const parts = entry.as<PythonLiteral::List>();
   if (parts == nullptr || parts->size() < 2) throw Error("descr must list names and types");
   const auto* name = (*parts)[0].as<std::string>();
@@ -115,7 +115,7 @@ Field field_of(const PythonLiteral& entry) {
   if (name == nullptr || type == nullptr) {
     throw Error("descr has a field that is a record itself: save its parts as fields");
   }
-  Field field = field_of(*type);
+  RowField field = field_of(*type);
   field.name = *name;
   if (parts->size() > 2) {
     const auto* const extent = (*parts)[2].as<std::int64_t>();
@@ -125,20 +125,20 @@ Field field_of(const PythonLiteral& entry) {
   return field;
 }
 
-struct Header {
-  std::vector<Field> fields;  // one without a name of a plain array
+struct NpyHeader {
+  std::vector<RowField> fields;  // one without a name of a plain array
   bool is_structured = false, is_fortran = false;
   std::vector<std::uint64_t> shape;
 };
 
-Header parse_header(std::string_view text) {
+NpyHeader parse_npy_header(std::string_view text) {
   const PythonLiteral dict = parse_python_literal(text);
   const PythonLiteral* const descr = dict.find("descr");
   const PythonLiteral* const fortran = dict.find("fortran_order");
   if (descr == nullptr || fortran == nullptr || fortran->as<bool>() == nullptr) {
     throw Error("the header must have descr, fortran_order and shape");
   }
-  Header header;
+  NpyHeader header;
   header.is_fortran = *fortran->as<bool>();
   header.shape = shape_of(dict.find("shape"));
   if (const auto* const type = descr->as<std::string>()) {
@@ -153,7 +153,7 @@ Header parse_header(std::string_view text) {
 }
 
 /// Splits off the header and leaves the numbers in `bytes`.
-Header take_header(std::string_view& bytes) {
+NpyHeader take_npy_header(std::string_view& bytes) {
   constexpr std::string_view magic = "\x93NUMPY";
   constexpr std::size_t preamble = 8;
   if (!bytes.starts_with(magic) || bytes.size() < preamble + 4) {
@@ -167,7 +167,7 @@ Header take_header(std::string_view& bytes) {
   const std::size_t length = std::bit_cast<std::uint32_t>(raw);
   bytes.remove_prefix(preamble + length_bytes);
   if (length > bytes.size()) throw Error("the header is cut short");
-  const Header header = parse_header(bytes.substr(0, length));
+  const NpyHeader header = parse_npy_header(bytes.substr(0, length));
   bytes.remove_prefix(length);
   return header;
 }
@@ -191,10 +191,10 @@ std::string in_c_order(std::string_view bytes, const std::vector<std::uint64_t>&
   return out;
 }
 
-void add_fields(std::string_view bytes, const Header& header, std::size_t row_bytes,
+void add_fields(std::string_view bytes, const NpyHeader& header, std::size_t row_bytes,
                 NpyArray& array) {
   const char* at = bytes.data();
-  for (const Field& field : header.fields) {
+  for (const RowField& field : header.fields) {
     const bool is_named = header.is_structured && field.count > 1;
     for (std::size_t i = 0; field.type && i < field.count; ++i) {
       const NumberRun run{at + i * field.item_bytes, row_bytes, *field.type, field.order};
@@ -210,10 +210,10 @@ void add_fields(std::string_view bytes, const Header& header, std::size_t row_by
 }
 
 /// Returns why a file that is whole holds no numbers, or nothing.
-std::optional<std::string> fault_of(const Header& header) {
-  if (std::ranges::any_of(header.fields, &Field::is_object)) return "it holds Python objects";
+std::optional<std::string> fault_of(const NpyHeader& header) {
+  if (std::ranges::any_of(header.fields, &RowField::is_object)) return "it holds Python objects";
   const bool has_numbers =
-      std::ranges::any_of(header.fields, [](const Field& f) { return f.type.has_value(); });
+      std::ranges::any_of(header.fields, [](const RowField& f) { return f.type.has_value(); });
   if (!has_numbers) return "it holds no numbers";
   return std::nullopt;
 }
@@ -224,12 +224,12 @@ void check_columns(std::size_t columns) {
 }
 
 /// Reads the numbers that follow the header.
-NpyArray parse_numbers(std::string_view bytes, Header header) {
+NpyArray parse_numbers(std::string_view bytes, NpyHeader header) {
   NpyArray array;
   array.shape = header.shape;
   array.is_structured = header.is_structured;
   std::size_t rows = product_of(header.shape), columns = 0, item_bytes = 0;
-  for (const Field& field : header.fields) {
+  for (const RowField& field : header.fields) {
     check_columns(columns += std::min(field.count, most_columns + 1));
     item_bytes += field.bytes();
   }
@@ -267,7 +267,7 @@ void parse_member(std::string_view archive, const ZipMember& member, NpzFile& fi
   const std::string name = member.name.substr(0, member.name.size() - ending.size());
   const std::string unpacked = unpack_member(archive, member);
   std::string_view bytes = unpacked;
-  Header header = take_header(bytes);
+  NpyHeader header = take_npy_header(bytes);
   if (const auto fault = fault_of(header)) {
     file.unread.emplace_back(name, *fault);
     return;
@@ -284,7 +284,7 @@ NpyArray read_npy(const std::filesystem::path& path) {
 
 NpyArray parse_npy(std::string_view bytes, const std::string& name) {
   try {
-    Header header = take_header(bytes);
+    NpyHeader header = take_npy_header(bytes);
     if (const auto fault = fault_of(header)) throw Error("{}", *fault);
     return parse_numbers(bytes, std::move(header));
   } catch (const Error& rule) {

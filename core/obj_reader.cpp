@@ -17,7 +17,7 @@ namespace groundray {
 namespace {
 
 using Words = std::vector<std::string_view>;
-using Surface = PolygonSoup::Surface;
+using SoupSurface = PolygonSoup::Surface;
 
 /// All of a line after its first word, without blanks at the ends: names may have blanks within.
 std::string rest_of(std::string_view line, std::string_view first) {
@@ -114,8 +114,8 @@ std::string lower(std::string_view text) {
   return out;
 }
 
-std::vector<Surface> parse_mtl(std::string_view text, const std::string& name) {
-  std::vector<Surface> surfaces;
+std::vector<SoupSurface> parse_mtl(std::string_view text, const std::string& name) {
+  std::vector<SoupSurface> surfaces;
   for_each_line(text, name, [&](std::string_view line, const Words& words) {
     const std::string key = lower(words[0]);
     if (key == "newmtl") {
@@ -126,7 +126,7 @@ std::vector<Surface> parse_mtl(std::string_view text, const std::string& name) {
                           key == "map_kn" || key == "map_bump" || key == "bump";
     if (!is_known) return;
     if (surfaces.empty()) throw Error("{} must follow a newmtl", words[0]);
-    Surface& surface = surfaces.back();
+    SoupSurface& surface = surfaces.back();
     if (key == "kd") {
       // A spectrum's file, or CIE XYZ: they are rare, and white is better than a guess.
       if (words.size() < 2 || words[1] == "spectral" || words[1] == "xyz") return;
@@ -173,7 +173,7 @@ class ObjReader {
 
   PolygonSoup soup() && {
     drop_comments();
-    for (Surface& surface : soup_.surfaces) {
+    for (SoupSurface& surface : soup_.surfaces) {
       const auto found = library_.find(surface.looks.name);
       if (found != library_.end()) surface = found->second;
     }
@@ -223,10 +223,10 @@ class ObjReader {
       const auto [added, is_new] = library_.try_emplace(without_comment(name), surface);
       added->second.looks.name = added->first;
     }
-    const std::vector<Surface> named = std::exchange(soup_.surfaces, {});
+    const std::vector<SoupSurface> named = std::exchange(soup_.surfaces, {});
     std::vector<std::uint32_t> number_now;
     numbers_.clear();
-    for (const Surface& surface : named) {
+    for (const SoupSurface& surface : named) {
       const std::string& name = surface.looks.name;
       use(in_full.contains(name) ? name : without_comment(name));
       number_now.push_back(surface_);
@@ -235,7 +235,7 @@ class ObjReader {
   }
 
   void add(const std::string& name, const std::string& mtl) {
-    for (Surface& surface : parse_mtl(mtl, name)) {
+    for (SoupSurface& surface : parse_mtl(mtl, name)) {
       library_.try_emplace(surface.looks.name, surface);
     }
   }
@@ -263,7 +263,7 @@ class ObjReader {
   const std::function<std::string(const std::string&)>& read_mtl_;
   PolygonSoup soup_;
   std::map<std::string, std::uint32_t, std::less<>> numbers_;  // of surfaces
-  std::map<std::string, Surface, std::less<>> library_;
+  std::map<std::string, SoupSurface, std::less<>> library_;
   std::uint32_t surface_ = 0;
 };
 

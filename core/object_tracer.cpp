@@ -6,6 +6,7 @@
 #include <array>
 #include <cmath>
 #include <glm/mat3x3.hpp>
+#include <limits>
 #include <utility>
 
 #include "core/device.h"
@@ -17,27 +18,10 @@ namespace {
 
 using std::chrono::nanoseconds;
 
-constexpr double infinity = std::numeric_limits<double>::infinity();
 constexpr unsigned placed_geometry = 0;
 constexpr unsigned moving_geometry = 1;
 // Embree leaves out, in silence, what is beyond 1.8e18; and one far object makes all floats coarse.
 constexpr double most_m = 1e9;
-
-// A box in D.
-struct Box {
-  glm::dvec3 low{infinity};
-  glm::dvec3 high{-infinity};
-  void add(const Box& other) noexcept {
-    low = glm::min(low, other.low);
-    high = glm::max(high, other.high);
-  }
-};
-
-// A stretch of a moving object's path, and all places that it takes meanwhile.
-struct Stretch {
-  nanoseconds begin{0}, end{0};
-  Box box;
-};
 
 // Embree's most: steps of time at which it is told of moving boxes.
 constexpr std::size_t most_time_steps = RTC_MAX_TIME_STEP_COUNT;
@@ -91,6 +75,22 @@ void clip(const glm::dvec3& origin, const glm::dvec3& direction, const glm::dvec
 }  // namespace
 
 struct ObjectTracer::Impl {
+  // A box in D.
+  struct Box {
+    glm::dvec3 low{std::numeric_limits<double>::infinity()};
+    glm::dvec3 high{-std::numeric_limits<double>::infinity()};
+    void add(const Box& other) noexcept {
+      low = glm::min(low, other.low);
+      high = glm::max(high, other.high);
+    }
+  };
+
+  // A stretch of a moving object's path, and all places that it takes meanwhile.
+  struct Stretch {
+    nanoseconds begin{0}, end{0};
+    Box box;
+  };
+
   RayDevice device;
   std::vector<ModelScene> models;
   std::vector<PlacedObject> placed;
@@ -150,7 +150,7 @@ struct ObjectTracer::Impl {
   void trace(std::span<const Ray> rays, std::span<Hit> hits) const noexcept;
 };
 
-Box ObjectTracer::Impl::box_of(const PlacedObject& object) const noexcept {
+auto ObjectTracer::Impl::box_of(const PlacedObject& object) const noexcept -> Box {
   const ModelScene::Impl& shape = model(object.model);
   const glm::dmat3 R_DO = glm::mat3_cast(object.R_DO);
   const glm::dvec3 half_m = (shape.high_m - shape.low_m) / 2.0;
@@ -163,7 +163,7 @@ Box ObjectTracer::Impl::box_of(const PlacedObject& object) const noexcept {
 
 // Between two poses the object's origin leaves the straight line between them by no more than the
 // height of the arc that turns by the same angle; a ball round it holds the rest.
-std::vector<Stretch> ObjectTracer::Impl::stretches_of(const MovingObject& object) const {
+auto ObjectTracer::Impl::stretches_of(const MovingObject& object) const -> std::vector<Stretch> {
   std::vector<Stretch> stretches;
   const auto& samples = object.X_DO.samples();
   const double ball_m = object.scale * model(object.model).radius_m;

@@ -7,7 +7,7 @@
 namespace groundray::oren_nayar {
 namespace {
 
-constexpr double pi = std::numbers::pi;
+using std::numbers::pi;
 
 }  // namespace
 

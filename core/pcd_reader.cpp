@@ -21,7 +21,7 @@ using Words = std::vector<std::string_view>;
 
 constexpr std::size_t most_numbers = 4096;  // of a point; the longest known descriptor has 1344
 
-struct Field {
+struct PcdField {
   std::string name;
   NumberType type = NumberType::Float32;
   std::size_t count = 1;
@@ -29,14 +29,14 @@ struct Field {
   std::size_t bytes() const { return count * size_of(type); }
 };
 
-enum class Form { Text, Binary, Compressed };
+enum class DataForm { Text, Binary, Compressed };
 
-struct Header {
+struct PcdHeader {
   std::vector<std::string_view> names, types;
   std::vector<std::size_t> sizes, counts;
   std::optional<std::uint64_t> width, height, points;
   Pose X_FS;
-  std::optional<Form> form;
+  std::optional<DataForm> form;
 };
 
 std::vector<std::size_t> numbers_of(const Words& words) {
@@ -74,16 +74,16 @@ Pose viewpoint_of(const Words& words) {
   return {.rotation = glm::normalize(rotation), .translation_m = {x, y, z}};
 }
 
-Form form_of(const Words& words) {
+DataForm data_form_of(const Words& words) {
   if (words.size() == 2) {
-    if (words[1] == "ascii") return Form::Text;
-    if (words[1] == "binary") return Form::Binary;
-    if (words[1] == "binary_compressed") return Form::Compressed;
+    if (words[1] == "ascii") return DataForm::Text;
+    if (words[1] == "binary") return DataForm::Binary;
+    if (words[1] == "binary_compressed") return DataForm::Compressed;
   }
   throw Error("DATA must be ascii, binary or binary_compressed");
 }
 
-void parse_header_line(const Words& words, Header& header) {
+void parse_pcd_header_line(const Words& words, PcdHeader& header) {
   const std::string_view key = words[0];
   if (key == "FIELDS" || key == "COLUMNS") {
     header.names.assign(words.begin() + 1, words.end());
@@ -102,26 +102,26 @@ void parse_header_line(const Words& words, Header& header) {
   } else if (key == "VIEWPOINT") {
     header.X_FS = viewpoint_of(words);
   } else if (key == "DATA") {
-    header.form = form_of(words);
+    header.form = data_form_of(words);
   } else if (key != "VERSION") {
     throw Error("{:?} must be a key of a PCD header or #: is this a PCD file?", key.substr(0, 40));
   }
 }
 
-Header parse_header(TextLines& lines) {
-  Header header;
+PcdHeader parse_pcd_header(TextLines& lines) {
+  PcdHeader header;
   while (!header.form) {
     const auto line = lines.next();
     if (!line || !lines.ended()) {
       throw Error("the header lacks its last line, DATA: is this a PCD file, and whole?");
     }
     const Words words = words_of(*line);
-    if (!words.empty() && !words[0].starts_with('#')) parse_header_line(words, header);
+    if (!words.empty() && !words[0].starts_with('#')) parse_pcd_header_line(words, header);
   }
   return header;
 }
 
-NumberType type_of(std::string_view type, std::size_t size) {
+NumberType field_type_of(std::string_view type, std::size_t size) {
   struct Entry {
     char letter;
     std::size_t size;
@@ -145,7 +145,7 @@ NumberType type_of(std::string_view type, std::size_t size) {
 }
 
 /// Each line must have a value for each field, or be left out where files of old did without.
-std::vector<Field> fields_of(const Header& header) {
+std::vector<PcdField> fields_of(const PcdHeader& header) {
   const std::size_t n = header.names.size();
   if (n == 0) throw Error("the header must have FIELDS");
   const auto check = [n](const char* key, std::size_t count) {
@@ -156,11 +156,11 @@ std::vector<Field> fields_of(const Header& header) {
   check("SIZE", header.sizes.size());
   check("TYPE", header.types.size());
   check("COUNT", header.counts.size());
-  std::vector<Field> fields;
+  std::vector<PcdField> fields;
   std::size_t numbers = 0;
   for (std::size_t i = 0; i < n; ++i) {
-    const NumberType type = type_of(header.types.empty() ? "F" : header.types[i],
-                                    header.sizes.empty() ? 4 : header.sizes[i]);
+    const NumberType type = field_type_of(header.types.empty() ? "F" : header.types[i],
+                                          header.sizes.empty() ? 4 : header.sizes[i]);
     const std::size_t count = header.counts.empty() ? 1 : header.counts[i];
     if (count > most_numbers - numbers) {
       throw Error("a point has more than {} numbers by COUNT: is the header damaged?",
@@ -173,7 +173,7 @@ std::vector<Field> fields_of(const Header& header) {
 }
 
 /// Settles how many points there are.
-void settle_size(const Header& header, PcdFile& file) {
+void settle_size(const PcdHeader& header, PcdFile& file) {
   const std::uint64_t points = header.points.value_or(header.width.value_or(0));
   file.height = header.height.value_or(1);
   file.width = header.width.value_or(points);
@@ -193,7 +193,7 @@ void settle_size(const Header& header, PcdFile& file) {
   file.cloud = PointCloud(size);
 }
 
-void append_number(std::string_view word, const Field& field, std::string& out) {
+void append_number(std::string_view word, const PcdField& field, std::string& out) {
   const auto append = [&]<typename T>(T /*of the type*/) {
     const auto value = number_of<T>(word);
     if (!value) {
@@ -226,9 +226,10 @@ void append_number(std::string_view word, const Field& field, std::string& out) 
 }
 
 /// Returns the rows of a text as they would be in a binary file.
-std::string parse_rows(TextLines& lines, const std::vector<Field>& fields, std::size_t rows) {
+std::string parse_pcd_rows(TextLines& lines, const std::vector<PcdField>& fields,
+                           std::size_t rows) {
   std::size_t numbers = 0, stride = 0;
-  for (const Field& field : fields) {
+  for (const PcdField& field : fields) {
     numbers += field.count;
     stride += field.bytes();
   }
@@ -247,7 +248,7 @@ std::string parse_rows(TextLines& lines, const std::vector<Field>& fields, std::
       throw Error("it has {} values; a point has {}", words.size(), numbers);
     }
     auto word = words.begin();
-    for (const Field& field : fields) {
+    for (const PcdField& field : fields) {
       for (std::size_t i = 0; i < field.count; ++i) append_number(*word++, field, bytes);
     }
     ++row;
@@ -259,14 +260,14 @@ std::string parse_rows(TextLines& lines, const std::vector<Field>& fields, std::
 }
 
 /// Adds the columns of points that lie one after the other, or field by field.
-void add_columns(std::string_view bytes, const std::vector<Field>& fields, Form form,
-                 PcdFile& file) {
+void add_field_columns(std::string_view bytes, const std::vector<PcdField>& fields, DataForm form,
+                       PcdFile& file) {
   std::size_t stride = 0;
-  for (const Field& field : fields) stride += field.bytes();
+  for (const PcdField& field : fields) stride += field.bytes();
   const std::size_t rows = file.cloud.rows();
   const char* at = bytes.data();
-  for (const Field& field : fields) {
-    const bool is_apart = form == Form::Compressed;
+  for (const PcdField& field : fields) {
+    const bool is_apart = form == DataForm::Compressed;
     for (std::size_t i = 0; i < field.count && field.name != "_"; ++i) {
       const NumberRun run{.first = at + i * size_of(field.type),
                           .step_bytes = is_apart ? field.bytes() : stride,
@@ -303,29 +304,29 @@ std::string unpack(std::string_view bytes, std::size_t expected) {
   return unpack_lzf(bytes.substr(0, sizes[0]), expected);
 }
 
-void parse_body(TextLines& lines, const Header& header, PcdFile& file) {
-  const std::vector<Field> fields = fields_of(header);
+void parse_pcd_body(TextLines& lines, const PcdHeader& header, PcdFile& file) {
+  const std::vector<PcdField> fields = fields_of(header);
   settle_size(header, file);
   std::size_t stride = 0;
-  for (const Field& field : fields) stride += field.bytes();
+  for (const PcdField& field : fields) stride += field.bytes();
   const std::size_t rows = file.cloud.rows();
   if (stride == 0 || rows > std::numeric_limits<std::size_t>::max() / 2 / stride) {
     throw Error("there cannot be {} points of {} bytes: is the header damaged?", rows, stride);
   }
-  if (*header.form == Form::Text) {
-    return add_columns(parse_rows(lines, fields, rows), fields, Form::Text, file);
+  if (*header.form == DataForm::Text) {
+    return add_field_columns(parse_pcd_rows(lines, fields, rows), fields, DataForm::Text, file);
   }
   const std::string_view bytes = lines.rest();
-  if (*header.form == Form::Compressed) {
+  if (*header.form == DataForm::Compressed) {
     const std::string unpacked = rows == 0 ? "" : unpack(bytes, rows * stride);
-    return add_columns(unpacked, fields, Form::Compressed, file);
+    return add_field_columns(unpacked, fields, DataForm::Compressed, file);
   }
   if (rows * stride > bytes.size()) {
     throw Error("{} points of {} bytes take {} bytes, but {} are there: is it cut short?", rows,
                 stride, rows * stride, bytes.size());
   }
   check_filling(bytes.substr(rows * stride));
-  add_columns(bytes, fields, Form::Binary, file);
+  add_field_columns(bytes, fields, DataForm::Binary, file);
 }
 
 }  // namespace
@@ -336,15 +337,16 @@ PcdFile read_pcd(const std::filesystem::path& path) {
 
 PcdFile parse_pcd(std::string_view bytes, const std::string& name) {
   TextLines lines(bytes);
-  Header header;
+  PcdHeader header;
   try {
-    header = parse_header(lines);
+    header = parse_pcd_header(lines);
     PcdFile file;
     file.X_FS = header.X_FS;
-    parse_body(lines, header, file);
+    parse_pcd_body(lines, header, file);
     return file;
   } catch (const Error& rule) {
-    if (header.form.value_or(Form::Text) != Form::Text) throw Error("{}: {}", name, rule.what());
+    if (header.form.value_or(DataForm::Text) != DataForm::Text)
+      throw Error("{}: {}", name, rule.what());
     throw Error("{}:{}: {}", name, lines.number(), rule.what());
   }
 }

@@ -33,7 +33,7 @@ struct HdrHeader {
 };
 
 /// Returns the header at the front of `bytes` and takes it off.
-HdrHeader take_header(std::string_view& bytes, const std::string& name) {
+HdrHeader take_hdr_header(std::string_view& bytes, const std::string& name) {
   HdrHeader header;
   TextLines lines(bytes);
   for (auto line = lines.next(); line && !line->empty(); line = lines.next()) {
@@ -138,8 +138,8 @@ class HdrRows {
   const std::string& name_;
 };
 
-ImageF parse_hdr(std::string_view bytes, const std::string& name) {
-  const HdrHeader header = take_header(bytes, name);
+ImageF parse_hdr_picture(std::string_view bytes, const std::string& name) {
+  const HdrHeader header = take_hdr_header(bytes, name);
   ImageF image(header.width, header.height, 3);
   std::vector<Rgbe> row(static_cast<std::size_t>(header.width));
   HdrRows rows(bytes, name);
@@ -158,9 +158,9 @@ ImageF parse_hdr(std::string_view bytes, const std::string& name) {
   return image;
 }
 
-class MemoryStream : public Imf::IStream {
+class MemoryIStream : public Imf::IStream {
  public:
-  MemoryStream(std::string_view bytes, const std::string& name)
+  MemoryIStream(std::string_view bytes, const std::string& name)
       : IStream(name.c_str()), bytes_(bytes) {}
   bool read(char to[], int count) override {
     const auto size = static_cast<std::size_t>(count);
@@ -203,7 +203,7 @@ std::vector<std::string> color_channels(const Imf::ChannelList& channels, const 
 }
 
 ImageF decode_exr(std::string_view bytes, const std::string& name) {
-  MemoryStream stream(bytes, name);
+  MemoryIStream stream(bytes, name);
   Imf::InputFile file(stream);
   const Imath::Box2i data = file.header().dataWindow();
   if (data != file.header().displayWindow()) {
@@ -227,7 +227,7 @@ ImageF decode_exr(std::string_view bytes, const std::string& name) {
   return image;
 }
 
-ImageF parse_exr(std::string_view bytes, const std::string& name) {
+ImageF parse_exr_picture(std::string_view bytes, const std::string& name) {
   try {
     return decode_exr(bytes, name);
   } catch (const Error&) {
@@ -262,8 +262,8 @@ ImageF read_image_f(const std::filesystem::path& path, PictureOf what) {
 
 ImageF parse_image_f(std::string_view bytes, const std::string& name, PictureOf what) {
   std::optional<ImageF> image;
-  if (bytes.starts_with(hdr_magic)) image = parse_hdr(bytes, name);
-  if (bytes.starts_with(exr_magic)) image = parse_exr(bytes, name);
+  if (bytes.starts_with(hdr_magic)) image = parse_hdr_picture(bytes, name);
+  if (bytes.starts_with(exr_magic)) image = parse_exr_picture(bytes, name);
   if (!image) {
     throw Error("{}: it is neither a Radiance (.hdr) nor an OpenEXR (.exr) picture{}", name,
                 bytes.empty() ? ": it is empty" : ", whatever its name: convert it");

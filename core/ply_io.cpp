@@ -30,7 +30,7 @@ auto with_type(std::size_t type, const F& f) {
   return f(typename std::variant_alternative_t<I, PointCloud::AnyValues>::value_type{});
 }
 
-std::size_t size_of(std::size_t type) {
+std::size_t type_bytes(std::size_t type) {
   return with_type(type, [](auto value) { return sizeof value; });
 }
 
@@ -61,7 +61,7 @@ void gather_rows(const PointCloud& cloud, std::size_t first, std::size_t rows, s
 
 enum class Format { Ascii, LittleEndian, BigEndian };
 
-struct Header {
+struct PlyHeader {
   std::optional<Format> format;
   std::vector<PlyElement> elements;
   std::vector<std::string> comments;
@@ -96,7 +96,7 @@ PlyProperty parse_property(const std::vector<std::string_view>& words) {
   return {std::string(words[4]), ply_type_of(words[3]), count_type};
 }
 
-void add_property(Header& header, PlyProperty property) {
+void add_property(PlyHeader& header, PlyProperty property) {
   if (header.elements.empty()) throw Error("a property must follow its element");
   PlyElement& element = header.elements.back();
   if (property.count_type && element.name == "vertex") {
@@ -110,7 +110,7 @@ void add_property(Header& header, PlyProperty property) {
   element.properties.push_back(std::move(property));
 }
 
-void parse_header_line(std::string_view line, Header& header) {
+void parse_ply_header_line(std::string_view line, PlyHeader& header) {
   const std::vector<std::string_view> words = words_of(line);
   const std::string_view keyword = words.empty() ? std::string_view() : words[0];
   if (keyword == "comment") {
@@ -134,14 +134,14 @@ void parse_header_line(std::string_view line, Header& header) {
   }
 }
 
-Header parse_header(TextLines& lines) {
+PlyHeader parse_ply_header(TextLines& lines) {
   if (lines.next() != "ply" || !lines.ended())
     throw Error("the first line must be 'ply': is this a PLY file?");
-  Header header;
+  PlyHeader header;
   for (auto line = lines.next(); line != "end_header" || !lines.ended(); line = lines.next()) {
     if (!line || !lines.ended())
       throw Error("the header lacks its last line, end_header: is the file cut short?");
-    parse_header_line(*line, header);
+    parse_ply_header_line(*line, header);
   }
   if (!header.format) throw Error("the header must name a format");
   if (std::ranges::find(header.elements, "vertex", &PlyElement::name) == header.elements.end()) {
@@ -154,7 +154,7 @@ Header parse_header(TextLines& lines) {
 std::size_t least_row_bytes(const PlyElement& element, Format format) {
   std::size_t bytes = 0;
   for (const PlyProperty& property : element.properties) {
-    bytes += format == Format::Ascii ? 2 : size_of(property.count_type.value_or(property.type));
+    bytes += format == Format::Ascii ? 2 : type_bytes(property.count_type.value_or(property.type));
   }
   return bytes;
 }
@@ -172,7 +172,7 @@ void check_fits(const PlyElement& element, Format format, std::size_t bytes) {
 }
 
 template <typename T>
-T load(const char* from, Format format) {
+T load_property(const char* from, Format format) {
   std::array<char, sizeof(T)> bytes;
   std::copy_n(from, sizeof(T), bytes.begin());
   if (format == Format::BigEndian) std::ranges::reverse(bytes);
@@ -189,21 +189,21 @@ void skip_binary(const PlyElement& element, Format format, std::string_view& byt
       std::uint64_t count = 1;
       if (property.count_type) {
         const char* const at = bytes.data();
-        drop(1, size_of(*property.count_type));
+        drop(1, type_bytes(*property.count_type));
         const auto length = with_type(*property.count_type, [at, format](auto value) {
-          return static_cast<std::int64_t>(load<decltype(value)>(at, format));
+          return static_cast<std::int64_t>(load_property<decltype(value)>(at, format));
         });
         if (length < 0)
           throw Error("row {} of element {} has a list of {} numbers", row, element.name, length);
         count = static_cast<std::uint64_t>(length);
       }
-      drop(count, size_of(property.type));
+      drop(count, type_bytes(property.type));
     }
   }
 }
 
 /// Adds a column for each property and returns where the values of each begin.
-std::vector<void*> add_columns(const PlyElement& vertex, PointCloud& cloud) {
+std::vector<void*> add_property_columns(const PlyElement& vertex, PointCloud& cloud) {
   std::vector<void*> columns;
   for (const PlyProperty& property : vertex.properties) {
     columns.push_back(with_type(property.type, [&](auto value) -> void* {
@@ -224,7 +224,7 @@ void scatter_rows(std::string_view bytes, Format format, const PlyElement& verte
       from += with_type(vertex.properties[i].type, [&](auto value) {
         auto* const column = static_cast<decltype(value)*>(columns[i]);
         for (std::size_t row = first; row < end; ++row) {
-          column[row] = load<decltype(value)>(from + row * stride, format);
+          column[row] = load_property<decltype(value)>(from + row * stride, format);
         }
         return sizeof value;
       });
@@ -232,7 +232,7 @@ void scatter_rows(std::string_view bytes, Format format, const PlyElement& verte
   }
 }
 
-void parse_rows(TextLines& lines, const PlyElement& vertex, const std::vector<void*>& columns) {
+void parse_ply_rows(TextLines& lines, const PlyElement& vertex, const std::vector<void*>& columns) {
   for (std::size_t row = 0; row < vertex.rows; ++row) {
     const auto line = lines.next();
     if (!line || !lines.ended()) throw Error("the last line lacks its end: is the file cut short?");
@@ -254,7 +254,7 @@ void parse_rows(TextLines& lines, const PlyElement& vertex, const std::vector<vo
   }
 }
 
-PointCloud parse_body(TextLines& lines, const Header& header) {
+PointCloud parse_ply_body(TextLines& lines, const PlyHeader& header) {
   const Format format = *header.format;
   std::string_view bytes = lines.rest();
   auto element = header.elements.begin();
@@ -269,9 +269,9 @@ PointCloud parse_body(TextLines& lines, const Header& header) {
   }
   check_fits(*element, format, bytes.size());
   PointCloud cloud(element->rows);
-  const std::vector<void*> columns = add_columns(*element, cloud);
+  const std::vector<void*> columns = add_property_columns(*element, cloud);
   if (format == Format::Ascii) {
-    parse_rows(lines, *element, columns);
+    parse_ply_rows(lines, *element, columns);
     bytes = lines.rest();
     bytes.remove_prefix(std::min(bytes.find_first_not_of(" \t\r\n"), bytes.size()));
   } else {
@@ -296,7 +296,7 @@ void write_ply(const std::filesystem::path& path, const PointCloud& cloud,
   for (const auto& [name, values] : cloud.columns()) {
     broken.unless(is_visible(name), "the column {:?} must have a name of visible ASCII characters",
                   name);
-    stride += size_of(values.index());
+    stride += type_bytes(values.index());
   }
   for (const std::string& comment : comments) {
     broken.unless(comment.find_first_of("\r\n") == std::string::npos,
@@ -323,10 +323,10 @@ PlyFile read_ply(const std::filesystem::path& path) {
 
 PlyFile parse_ply(std::string_view bytes, const std::string& name) {
   TextLines lines(bytes);
-  Header header;
+  PlyHeader header;
   try {
-    header = parse_header(lines);
-    PointCloud cloud = parse_body(lines, header);
+    header = parse_ply_header(lines);
+    PointCloud cloud = parse_ply_body(lines, header);
     return {std::move(cloud), std::move(header.comments)};
   } catch (const Error& rule) {
     if (header.format.value_or(Format::Ascii) != Format::Ascii)

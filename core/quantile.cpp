@@ -7,14 +7,9 @@
 #include <utility>
 
 namespace groundray {
-namespace {
-
-constexpr double nan = std::numeric_limits<double>::quiet_NaN();
-
-}  // namespace
 
 double quantile(std::vector<double> values, double share) {
-  if (values.empty()) return nan;
+  if (values.empty()) return std::numeric_limits<double>::quiet_NaN();
   constexpr double rounding = 1e-12;  // 0.95 of 20 is 19, and no more
   const double count = std::ceil(share * static_cast<double>(values.size()) * (1 - rounding));
   const auto at = values.begin() + static_cast<std::ptrdiff_t>(std::max(count, 1.0)) - 1;
@@ -23,7 +18,7 @@ double quantile(std::vector<double> values, double share) {
 }
 
 double median(std::vector<double> values) {
-  if (values.empty()) return nan;
+  if (values.empty()) return std::numeric_limits<double>::quiet_NaN();
   const auto half = values.begin() + static_cast<std::ptrdiff_t>(values.size() / 2);
   std::ranges::nth_element(values, half);
   const double upper = *half;

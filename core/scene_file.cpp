@@ -31,7 +31,7 @@
 namespace groundray {
 namespace {
 
-using Surface = PolygonSoup::Surface;
+using SoupSurface = PolygonSoup::Surface;
 
 /// Adds what assimp read to a soup. Whatever its indices say, nothing beyond an array is touched.
 class SceneReader {
@@ -145,7 +145,7 @@ class SceneReader {
   }
 
   void read(const aiMaterial& material) {
-    Surface& surface = soup_.surfaces.back();
+    SoupSurface& surface = soup_.surfaces.back();
     const auto image = [&](std::initializer_list<aiTextureType> types, ModelImage& pixels) {
       return this->image(material, types, pixels);
     };
@@ -233,13 +233,13 @@ std::string_view reader_of(SceneForm form) {
 }
 
 /// Whether every URI of a glTF holds its data, instead of the name of a file.
-bool holds_all_data(std::string_view json) {
+bool holds_all_data(std::string_view text) {
   constexpr std::string_view key = "\"uri\"", blank = " \t\r\n";
-  for (std::size_t at = json.find(key); at != std::string_view::npos; at = json.find(key, at)) {
-    at = json.find_first_not_of(blank, at + key.size());
-    if (at == std::string_view::npos || json[at] != ':') continue;  // it is no key
-    at = json.find_first_not_of(blank, at + 1);
-    if (at == std::string_view::npos || !json.substr(at).starts_with("\"data:")) return false;
+  for (std::size_t at = text.find(key); at != std::string_view::npos; at = text.find(key, at)) {
+    at = text.find_first_not_of(blank, at + key.size());
+    if (at == std::string_view::npos || text[at] != ':') continue;  // it is no key
+    at = text.find_first_not_of(blank, at + 1);
+    if (at == std::string_view::npos || !text.substr(at).starts_with("\"data:")) return false;
   }
   return true;
 }
@@ -254,8 +254,8 @@ std::string json_alone(const std::filesystem::path& path) {
   std::uint32_t length = 0;
   bytes.copy(reinterpret_cast<char*>(&length), sizeof length, 12);
   if (bytes.size() != header_bytes + length) return {};
-  std::string json = bytes.substr(header_bytes);
-  return holds_all_data(json) ? json : std::string();
+  std::string text = bytes.substr(header_bytes);
+  return holds_all_data(text) ? text : std::string();
 }
 
 }  // namespace

@@ -8,7 +8,7 @@ namespace groundray {
 namespace {
 
 constexpr double nan = std::numeric_limits<double>::quiet_NaN();
-constexpr double infinity = std::numeric_limits<double>::infinity();
+constexpr double never_m = std::numeric_limits<double>::infinity();  // a range that is not reached
 
 // The points of a leaf, thinned along the sides that face coarser leaves.
 class LeafPoints {
@@ -70,7 +70,7 @@ class LeafPoints {
 
 // The t at which a ray leaves a range of coordinates.
 double exit_m(double start, double slope, double per_index_m, int low, int high) {
-  if (slope == 0) return infinity;
+  if (slope == 0) return never_m;
   return ((slope > 0 ? high : low) - start) * per_index_m;
 }
 
@@ -230,7 +230,7 @@ double rises_to(const Cell& cell, const GridRay& ray, double above_m, double t_i
     const double lacks_m = above_m - clearance_m(ray, plane, t_in);
     if (lacks_m <= 0 || std::isnan(lacks_m)) continue;
     const double rate = ray.dz - (plane.u_slope_m * ray.du + plane.v_slope_m * ray.dv);
-    rise_m = rate > 0 ? std::max(rise_m, t_in + lacks_m / rate) : infinity;
+    rise_m = rate > 0 ? std::max(rise_m, t_in + lacks_m / rate) : never_m;
   }
   return rise_m;
 }
@@ -369,23 +369,24 @@ class BandDescent {
       return deviation_m > 0 && out_m(plane, t_out) > -deviation_m && give_up();
     }
     const double near_m = falls_to(deviation_m, plane, in_m, t_in, t_out);
-    if (near_m < infinity && deviation_m > 0) band_.is_exact = false;
+    if (near_m < never_m && deviation_m > 0) band_.is_exact = false;
     band_.near_m = std::min(band_.near_m, near_m);
     band_.far_m = falls_to(-deviation_m, plane, in_m, t_in, t_out);
-    return band_.far_m < infinity;
+    return band_.far_m < never_m;
   }
   bool give_up() {
     band_.is_certain = false;
     return true;
   }
   double out_m(const FacetPlane& plane, double t_out) const {
-    return std::isinf(t_out) ? ray_.dz * infinity : clearance_m(ray_, plane, t_out);
+    return std::isinf(t_out) ? ray_.dz * std::numeric_limits<double>::infinity()
+                             : clearance_m(ray_, plane, t_out);
   }
   // Where in [t_in, t_out] the clearance falls below `level_m`.
   double falls_to(double level_m, const FacetPlane& plane, double in_m, double t_in,
                   double t_out) const {
     if (in_m < level_m) return t_in;
-    if (!(out_m(plane, t_out) < level_m)) return infinity;
+    if (!(out_m(plane, t_out) < level_m)) return never_m;
     GridRay lifted = ray_;
     lifted.z0 -= level_m;
     return std::clamp(intersect(lifted, plane), t_in, t_out);

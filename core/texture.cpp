@@ -16,20 +16,20 @@
 namespace groundray {
 namespace {
 
-using Table = std::array<float, 256>;
+using DecodingTable = std::array<float, 256>;
 
-const Table& linear_table() {
-  static const Table table = [] {
-    Table values{};
+const DecodingTable& linear_table() {
+  static const DecodingTable table = [] {
+    DecodingTable values{};
     for (std::size_t i = 0; i < values.size(); ++i) values[i] = static_cast<float>(i) / 255;
     return values;
   }();
   return table;
 }
 
-const Table& srgb_table() {
-  static const Table table = [] {
-    Table values{};
+const DecodingTable& srgb_table() {
+  static const DecodingTable table = [] {
+    DecodingTable values{};
     for (std::size_t i = 0; i < values.size(); ++i) {
       values[i] = static_cast<float>(linear_of_srgb(static_cast<double>(i) / 255));
     }
@@ -167,7 +167,7 @@ void halve_row(const Store& fine, int row, glm::ivec2 size, T* to) noexcept {
   }
 }
 
-void check_channels(int channels) {
+void check_texture_channels(int channels) {
   if (channels < 1 || channels > 4) {
     throw Error(
         "texture: its image has {} channels; it must have 1 (grey), 2 (grey, alpha), 3 (RGB) or 4 "
@@ -183,7 +183,7 @@ Texture::Texture(Image8 image, Encoding encoding, Wrap wrap)
       wrap_(wrap),
       color_table_((encoding == Encoding::Srgb ? srgb_table() : linear_table()).data()),
       bytes_(std::move(image)) {
-  check_channels(channels_);
+  check_texture_channels(channels_);
   build();
   build_mips(byte_mips_);
   if (!has_alpha()) return;
@@ -195,7 +195,7 @@ Texture::Texture(Image8 image, Encoding encoding, Wrap wrap)
 
 Texture::Texture(ImageF image, Wrap wrap)
     : channels_(image.channels()), wrap_(wrap), floats_(std::move(image)) {
-  check_channels(channels_);
+  check_texture_channels(channels_);
   if (!std::ranges::all_of(floats_.values(), [](float value) { return std::isfinite(value); })) {
     throw Error("texture: its image holds a value that is not finite: mend the image");
   }

@@ -6,13 +6,14 @@
 #include <numbers>
 
 #include "core/error.h"
+#include "sensors/normal_spread.h"
 
 namespace groundray {
 namespace {
 
 constexpr double most_steps = 1e7;
 
-void check(const AtmosphereSpec& spec, double wavelength_nm) {
+void check_atmosphere(const AtmosphereSpec& spec, double wavelength_nm) {
   Violations broken("AtmosphereSpec");
   broken.unless(spec.visibility_m > 0, "visibility_m = {} must be positive, or infinite",
                 spec.visibility_m);
@@ -33,7 +34,7 @@ void check(const AtmosphereSpec& spec, double wavelength_nm) {
   broken.throw_if_any();
 }
 
-void check(const Overlap& overlap, const SoftReturnGrid& grid) {
+void check_overlap(const Overlap& overlap, const SoftReturnGrid& grid) {
   Violations broken("Soft return");
   broken.unless(overlap.none_below_m > 0, "none_below_m = {} must be positive",
                 overlap.none_below_m);
@@ -53,13 +54,10 @@ void check(const Overlap& overlap, const SoftReturnGrid& grid) {
 }
 
 // Abramowitz and Stegun, Handbook of Mathematical Functions (1964), table 25.4: 8 points.
-struct Node {
-  double position;
-  double weight;
-};
-constexpr std::array gauss_legendre{
-    Node{0.1834346424956498, 0.3626837833783620}, Node{0.5255324099163290, 0.3137066458778873},
-    Node{0.7966664774136267, 0.2223810344533745}, Node{0.9602898564975363, 0.1012285362903763}};
+constexpr std::array gauss_legendre{QuadratureNode{0.1834346424956498, 0.3626837833783620},
+                                    QuadratureNode{0.5255324099163290, 0.3137066458778873},
+                                    QuadratureNode{0.7966664774136267, 0.2223810344533745},
+                                    QuadratureNode{0.9602898564975363, 0.1012285362903763}};
 
 // Integrals over range of what a metre of air sends back, and of that times the range.
 struct Moments {
@@ -97,7 +95,7 @@ class SoftTarget {
   void add_piece(double from, double to, Moments& sum) const noexcept {
     const double middle = (from + to) / 2;
     const double half = (to - from) / 2;
-    for (const Node& node : gauss_legendre) {
+    for (const QuadratureNode& node : gauss_legendre) {
       const double near = middle - half * node.position;
       const double far = middle + half * node.position;
       const double weight = half * node.weight;
@@ -161,7 +159,7 @@ Atmosphere::Atmosphere(const AtmosphereSpec& spec, double wavelength_nm)
                         rain_extinction_per_m(spec.rain_mm_h)),
       backscatter_per_m_sr_(fog_backscatter_per_m_sr(spec.fog_range_m) + spec.backscatter_per_m_sr),
       group_index_(spec.group_index) {
-  check(spec, wavelength_nm);
+  check_atmosphere(spec, wavelength_nm);
 }
 
 double Atmosphere::transmission(double range_m) const noexcept {
@@ -170,7 +168,7 @@ double Atmosphere::transmission(double range_m) const noexcept {
 
 std::vector<SoftReturn> Atmosphere::soft_return(const RadarEquation& radar, const Overlap& overlap,
                                                 const SoftReturnGrid& grid) const {
-  check(overlap, grid);
+  check_overlap(overlap, grid);
   std::vector<SoftReturn> returns;
   const SoftTarget air(extinction_per_m_, overlap);
   const double energy_m_j = radar.energy_area_j_m2() * backscatter_per_m_sr_;

@@ -36,7 +36,7 @@ void check_pair(Violations& broken, const char* field, const glm::dvec2& value, 
                 "{} = ({}, {}) {}", field, value.x, value.y, rule);
 }
 
-void check(const BeamSpec& spec) {
+void check_beam_spec(const BeamSpec& spec) {
   Violations broken("BeamSpec");
   check_pair(broken, "divergence_rad", spec.divergence_rad, std::numbers::pi / 2,
              "must be in [0, pi/2): is it in milliradians or degrees?");
@@ -195,7 +195,7 @@ class Nearest {
       found_;  // in a mesh of triangles a vertex has six neighbours
 };
 
-bool before(const glm::ivec2& a, const glm::ivec2& b) {
+bool pair_precedes(const glm::ivec2& a, const glm::ivec2& b) {
   return std::pair(a.x, a.y) < std::pair(b.x, b.y);
 }
 
@@ -220,7 +220,7 @@ std::vector<glm::ivec2> nearest_pairs(std::span<const Point> points) {
       pairs.emplace_back(std::min(*here, i), std::max(*here, i));
     }
   }
-  std::ranges::sort(pairs, before);
+  std::ranges::sort(pairs, pair_precedes);
   const auto repeated = std::ranges::unique(pairs);
   pairs.erase(repeated.begin(), repeated.end());
   return pairs;
@@ -232,7 +232,7 @@ LaserBeam::LaserBeam(const BeamSpec& spec)
     : waist_m_(half(spec.aperture_m, spec)),
       tangent_(half(2. * glm::tan(0.5 * spec.divergence_rad), spec)),
       turn_(spec.turn) {
-  check(spec);
+  check_beam_spec(spec);
   const Layout layout = layout_of(waist_m_, tangent_);
   const bool gaussian = spec.profile == BeamSpec::Profile::Gaussian;
   for (int n = spec.sub_rays; n <= spec.most_sub_rays; n *= 2) {

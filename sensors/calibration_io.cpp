@@ -12,14 +12,13 @@
 #include "core/error.h"
 #include "core/product_io.h"
 #include "core/text_lines.h"
+#include "sensors/calibration_limits.h"
 #include "sensors/csv_cells.h"
 
 namespace groundray {
 namespace {
 
 namespace fs = std::filesystem;
-
-constexpr std::size_t most_beams = 65536;  // rings have 16 bits
 
 std::string lower(std::string_view text) {
   std::string result(text);

@@ -31,10 +31,9 @@ using yaml::Need;
 using yaml::Node;
 using yaml::not_negative;
 using yaml::positive;
+using yaml::positive_share_rule;
 using yaml::Rule;
 
-constexpr Rule share_rule{[](double value) { return value > 0 && value <= 1; },
-                          "must be > 0 and at most 1"};
 constexpr Rule efficiency_rule{[](double value) { return value > 0 && value <= 4; },
                                "must be > 0 and at most 4"};
 constexpr Rule time_rule{[](double value) { return value >= 0 && value <= 1e9; },
@@ -96,7 +95,7 @@ void read_aperture(Map map, std::optional<ApertureSpec>& into) {
   map.read_scaled("focal_length_mm", Need::Optional, 1e-3, aperture.focal_length_m, positive);
   double focus_m = 0;
   if (map.read_number("focus_m", Need::Optional, focus_m, positive)) aperture.focus_m = focus_m;
-  map.read_number("transmission", Need::Optional, aperture.transmission, share_rule);
+  map.read_number("transmission", Need::Optional, aperture.transmission, positive_share_rule);
   read_triple(map, "vignetting", aperture.vignetting, yaml::any_number);
   using Pupil = ApertureSpec::Pupil;
   map.read_choice<Pupil>("pupil", Need::Optional, aperture.pupil,

@@ -11,7 +11,7 @@
 namespace groundray {
 namespace {
 
-constexpr double pi = std::numbers::pi;
+using std::numbers::pi;
 constexpr int table_width = 256, table_height = 128;
 
 // The midpoint rule over azimuth and elevation.

@@ -48,8 +48,8 @@ void read_mask(Map& entry, const fs::path& path, CoverSpec& spec, Faults& faults
   if (none != nullptr) faults.add(*none, "mask_nodata", "is about a 'mask', which is not there");
 }
 
-CoverSpec read_layer(const Node& node, const fs::path& path, const DataFolders& folders,
-                     Faults& faults) {
+CoverSpec read_cover_layer(const Node& node, const fs::path& path, const DataFolders& folders,
+                           Faults& faults) {
   Map entry(node, "cover", faults);
   CoverSpec spec;
   if (const Node* const material = entry.find("material", Need::Required))
@@ -91,7 +91,7 @@ std::vector<CoverSpec> read_cover(Map& terrain, const fs::path& path, const Data
                                   Faults& faults) {
   std::vector<CoverSpec> layers;
   for (const Node& entry : terrain.list("cover", Need::Optional))
-    layers.push_back(read_layer(entry, path, folders, faults));
+    layers.push_back(read_cover_layer(entry, path, folders, faults));
   constexpr std::size_t most = GroundCover::most_layers - 1;  // the terrain's own is one, too
   if (layers.size() > most) {
     faults.add(*terrain.find("cover", Need::Optional), "cover", "has {} layers, but at most {} fit",

@@ -17,7 +17,7 @@
 namespace groundray {
 namespace {
 
-constexpr double pi = std::numbers::pi;
+using std::numbers::pi;
 constexpr int most_named = 5;  // faulty pixels
 
 // Grey, grey with alpha, RGB, RGB with alpha.
@@ -31,7 +31,7 @@ glm::dvec3 rgb(std::span<const float> pixel) {
 }
 
 // Notes the first few pixels that hold no light, and counts the others.
-void check_pixels(const ImageF& image, Violations& broken) {
+void check_light(const ImageF& image, Violations& broken) {
   int faulty = 0;
   for (int y = 0; y < image.height(); ++y) {
     for (int x = 0; x < image.width(); ++x) {
@@ -46,13 +46,13 @@ void check_pixels(const ImageF& image, Violations& broken) {
                 faulty - most_named);
 }
 
-ImageF checked(ImageF image) {
+ImageF checked_image(ImageF image) {
   Violations broken("Environment image");
   const bool is_picture = image.channels() >= 1 && image.channels() <= 4;
   broken.unless(is_picture,
                 "has {} channels, but must have 1 (grey) or 3 (R, G, B), and may have alpha",
                 image.channels());
-  if (is_picture) check_pixels(image, broken);
+  if (is_picture) check_light(image, broken);
   broken.throw_if_any();
   const auto shines = [&](int y) {
     for (int x = 0; x < image.width(); ++x)
@@ -109,7 +109,7 @@ double scale_of(const EnvironmentScale& scale, const glm::dvec3& irradiance) {
 
 EnvironmentMap::EnvironmentMap(ImageF image, double center_azimuth_rad,
                                const EnvironmentScale& scale)
-    : image_(checked(std::move(image))),
+    : image_(checked_image(std::move(image))),
       sampler_(LatLongGrid(image_.width(), image_.height(), center_azimuth_rad),
                luminances(image_)) {
   scale_ = scale_of(scale, horizontal_irradiance());

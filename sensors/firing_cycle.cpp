@@ -9,14 +9,14 @@
 namespace groundray {
 namespace {
 
-constexpr double full_turn_rad = 2 * std::numbers::pi;
+using std::numbers::pi;
 
 // Returns the angle in [0, 2 pi). A tiny negative one would round up to the whole turn.
 double wrapped(double angle_rad) {
-  const bool inside = std::abs(angle_rad) < full_turn_rad;  // where fmod would return its argument
-  const double angle = inside ? angle_rad : std::fmod(angle_rad, full_turn_rad);
-  const double positive = angle < 0 ? angle + full_turn_rad : angle;
-  return positive < full_turn_rad ? positive : 0;
+  const bool inside = std::abs(angle_rad) < 2 * pi;  // where fmod would return its argument
+  const double angle = inside ? angle_rad : std::fmod(angle_rad, 2 * pi);
+  const double from_zero = angle < 0 ? angle + 2 * pi : angle;
+  return from_zero < 2 * pi ? from_zero : 0;
 }
 
 // The fused operations are written out, for GCC 12 fuses this pair by itself where it makes vectors
@@ -48,7 +48,7 @@ double turn_fraction(double rate_hz, double time_s) noexcept {
 }
 
 double HeadTurn::angle_rad(double time_s) const noexcept {
-  return wrapped(start_rad + full_turn_rad * turn_fraction(rate_hz, time_s));
+  return wrapped(start_rad + 2 * pi * turn_fraction(rate_hz, time_s));
 }
 
 FiringCycle::FiringCycle(std::vector<Firing> firings, double period_s, const HeadTurn& head)

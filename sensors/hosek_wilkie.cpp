@@ -13,36 +13,37 @@
 namespace groundray {
 namespace {
 
-constexpr int turbidities = 10, albedos = 2, nodes = 6, channels = 3, parameters = 10;
-constexpr double table[] = {
+constexpr int turbidities = 10, albedos = 2, elevation_nodes = 6, channels = 3, parameters = 10;
+constexpr double coefficient_table[] = {
 #include <sky/hosek_wilkie_rgb.inc>
 };
-static_assert(std::size(table) ==
-              std::size_t{turbidities} * albedos * nodes * channels * parameters);
+static_assert(std::size(coefficient_table) ==
+              std::size_t{turbidities} * albedos * elevation_nodes * channels * parameters);
 
 // The Bernstein polynomials of the fifth degree: the model's curve over the sun's elevation.
-std::array<double, nodes> node_weights(double elevation_rad) {
-  constexpr std::array<double, nodes> binomials{1, 5, 10, 10, 5, 1};
+std::array<double, elevation_nodes> node_weights(double elevation_rad) {
+  constexpr std::array<double, elevation_nodes> binomials{1, 5, 10, 10, 5, 1};
   const double x = std::cbrt(elevation_rad / (std::numbers::pi / 2));
-  std::array<double, nodes> weights;
-  for (int i = 0; i < nodes; ++i) {
-    weights[static_cast<std::size_t>(i)] =
-        binomials[static_cast<std::size_t>(i)] * std::pow(x, i) * std::pow(1 - x, nodes - 1 - i);
+  std::array<double, elevation_nodes> weights;
+  for (int i = 0; i < elevation_nodes; ++i) {
+    weights[static_cast<std::size_t>(i)] = binomials[static_cast<std::size_t>(i)] * std::pow(x, i) *
+                                           std::pow(1 - x, elevation_nodes - 1 - i);
   }
   return weights;
 }
 
 double coefficient(int turbidity, int albedo, int channel, int parameter,
-                   const std::array<double, nodes>& weights) {
+                   const std::array<double, elevation_nodes>& weights) {
   double sum = 0;
-  for (int node = 0; node < nodes; ++node) {
-    const int row = ((turbidity * albedos + albedo) * nodes + node) * channels + channel;
-    sum += weights[static_cast<std::size_t>(node)] * table[row * parameters + parameter];
+  for (int node = 0; node < elevation_nodes; ++node) {
+    const int row = ((turbidity * albedos + albedo) * elevation_nodes + node) * channels + channel;
+    sum +=
+        weights[static_cast<std::size_t>(node)] * coefficient_table[row * parameters + parameter];
   }
   return sum;
 }
 
-void check(double turbidity, const glm::dvec3& albedo, const glm::dvec3& sun) {
+void check_analytic_sky(double turbidity, const glm::dvec3& albedo, const glm::dvec3& sun) {
   Violations broken("Analytic sky");
   broken.unless(turbidity >= 1 && turbidity <= 10, "turbidity = {} must be in [1, 10]", turbidity);
   for (int channel = 0; channel < channels; ++channel) {
@@ -63,7 +64,7 @@ void check(double turbidity, const glm::dvec3& albedo, const glm::dvec3& sun) {
 
 HosekWilkie::HosekWilkie(double turbidity, const glm::dvec3& ground_albedo, const glm::dvec3& sun)
     : sun_(sun) {
-  check(turbidity, ground_albedo, sun);
+  check_analytic_sky(turbidity, ground_albedo, sun);
   const auto weights = node_weights(std::atan2(sun.z, std::hypot(sun.x, sun.y)));
   const int below = std::min(static_cast<int>(turbidity), turbidities - 1) - 1;
   const double above_share = turbidity - (below + 1);

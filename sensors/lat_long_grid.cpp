@@ -9,7 +9,7 @@
 namespace groundray {
 namespace {
 
-constexpr double pi = std::numbers::pi;
+using std::numbers::pi;
 
 // cos a - cos b without cancellation.
 double cosine_difference(double a_rad, double b_rad) {

@@ -26,19 +26,17 @@ using yaml::Node;
 using yaml::not_negative;
 using yaml::positive;
 using yaml::Rule;
+using yaml::share_rule;
 
-constexpr Rule share_rule{[](double value) { return value >= 0 && value <= 1; },
-                          "must be from 0 to 1"};
-
-glm::dvec2 read_pair(Map& map, std::string_view key, Rule rule) {
+glm::dvec2 read_required_pair(Map& map, std::string_view key, Rule rule) {
   std::array<double, 2> pair{};
   map.read_numbers(key, Need::Required, pair, rule);
   return {pair[0], pair[1]};
 }
 
 PixelScale read_scale(Map& map) {
-  PixelScale scale{read_pair(map, "focal_px", positive),
-                   read_pair(map, "centre_px", yaml::any_number)};
+  PixelScale scale{read_required_pair(map, "focal_px", positive),
+                   read_required_pair(map, "centre_px", yaml::any_number)};
   map.read_number("skew", Need::Optional, scale.skew);
   return scale;
 }
@@ -79,7 +77,7 @@ LensModel read_kannala_brandt(Map& map, Faults& faults) {
 }
 
 LensModel read_f_theta(Map& map, Faults& faults) {
-  FTheta model{.centre_px = read_pair(map, "centre_px", yaml::any_number), .k = {}};
+  FTheta model{.centre_px = read_required_pair(map, "centre_px", yaml::any_number), .k = {}};
   map.read_choice<FTheta::Polynomial>("polynomial", Need::Required, model.direction,
                                       {{"angle_to_pixels", FTheta::Polynomial::AngleToPixels},
                                        {"pixels_to_angle", FTheta::Polynomial::PixelsToAngle}});
@@ -139,7 +137,7 @@ constexpr std::array<NamedModel, 9> models{{{"pinhole", read_pinhole},
                                             {"equirectangular", read_equirectangular}}};
 
 // Reads the one model of a map, whose keys are known now.
-LensModel read_model(Map& lens, Faults& faults) {
+LensModel read_lens_model(Map& lens, Faults& faults) {
   LensModel result;
   std::vector<std::string_view> found, names;
   for (const NamedModel& model : models) {
@@ -201,7 +199,7 @@ LensOfFile read_lens(const Node& node, const fs::path& path, Faults& faults) {
   if (const Node* file = lens.find("calibration", Need::Optional)) {
     result = read_calibrated(lens, *file, path, faults);
   } else {
-    result.model = read_model(lens, faults);
+    result.model = read_lens_model(lens, faults);
   }
   lens.close();
   return result;

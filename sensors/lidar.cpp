@@ -32,7 +32,7 @@ std::optional<LightSpec> without_noise(const std::optional<Light>& light) {
   return spec;
 }
 
-void check(const LidarSpec& spec) {
+void check_lidar(const LidarSpec& spec) {
   Violations broken(spec.model.empty() ? "lidar" : spec.model);
   const RangeGate& gate = spec.gate;
   broken.unless(gate.near_m >= 0 && gate.near_m < gate.far_m,
@@ -57,7 +57,7 @@ void check(const LidarSpec& spec) {
 }  // namespace
 
 Lidar::Lidar(const LidarSpec& spec, const AtmosphereSpec& air)
-    : spec_((check(spec), spec)),
+    : spec_((check_lidar(spec), spec)),
       pattern_(spec.pattern),
       beam_(with_one_level_more(spec.beam)),
       last_level_(beam_.levels() -

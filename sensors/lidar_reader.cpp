@@ -12,21 +12,19 @@
 namespace groundray {
 namespace {
 
+using yaml::at_least_one;
 using yaml::Faults;
 using yaml::Map;
 using yaml::Need;
 using yaml::Node;
 using yaml::not_negative;
 using yaml::positive;
+using yaml::positive_share_rule;
 using yaml::Rule;
 
 namespace fs = std::filesystem;
 
-constexpr Rule share_rule{[](double value) { return value > 0 && value <= 1; },
-                          "must be > 0 and at most 1"};
-constexpr Rule at_least_one{[](double value) { return value >= 1; }, "must be 1 or more"};
-
-void read_pair(Map& map, std::string_view key, double scale, glm::dvec2& into) {
+void read_scaled_pair(Map& map, std::string_view key, double scale, glm::dvec2& into) {
   std::array<double, 2> pair{};
   if (map.read_numbers(key, Need::Optional, pair, not_negative))
     into = glm::dvec2(pair[0], pair[1]) * scale;
@@ -39,8 +37,8 @@ void read_beam(Map beam, BeamSpec& spec) {
   beam.read_choice<BeamSpec::Width>("width", Need::Optional, spec.width,
                                     {{"fwhm", BeamSpec::Width::FullWidthHalfMaximum},
                                      {"inverse_e_square", BeamSpec::Width::InverseESquare}});
-  read_pair(beam, "divergence_mrad", 1e-3, spec.divergence_rad);
-  read_pair(beam, "aperture_mm", 1e-3, spec.aperture_m);
+  read_scaled_pair(beam, "divergence_mrad", 1e-3, spec.divergence_rad);
+  read_scaled_pair(beam, "aperture_mm", 1e-3, spec.aperture_m);
   std::uint32_t sub_rays = static_cast<std::uint32_t>(spec.sub_rays);
   if (beam.read_whole("sub_rays", Need::Optional, sub_rays))
     spec.sub_rays = spec.most_sub_rays = static_cast<int>(std::min(sub_rays, 1u << 20));
@@ -71,14 +69,16 @@ void read_laser(Map laser, LightSpec& light, Faults& faults) {
   laser.read_number("wavelength_nm", Need::Required, light.wavelength_nm, positive);
   laser.read_scaled("pulse_energy_nj", Need::Required, 1e-9, light.optics.pulse_energy_j, positive);
   read_pulse(laser, light.pulse, faults);
-  laser.read_number("efficiency", Need::Optional, light.optics.emitter_efficiency, share_rule);
+  laser.read_number("efficiency", Need::Optional, light.optics.emitter_efficiency,
+                    positive_share_rule);
   laser.close();
 }
 
 void read_noise(Map map, LightSpec& light) {
   NoiseSpec noise;
   map.read_number("nep_w_per_sqrt_hz", Need::Required, noise.nep_w_per_sqrt_hz, positive);
-  map.read_number("quantum_efficiency", Need::Optional, noise.quantum_efficiency, share_rule);
+  map.read_number("quantum_efficiency", Need::Optional, noise.quantum_efficiency,
+                  positive_share_rule);
   map.read_number("excess_noise_factor", Need::Optional, noise.excess_noise_factor, at_least_one);
   map.read_number("false_alarm_rate_hz", Need::Optional, noise.false_alarm_rate_hz, not_negative);
   double sun_w_m2_nm = 0;
@@ -107,7 +107,8 @@ void read_intensity(Map& map, IntensitySpec& intensity) {
 void read_receiver(Map map, LightSpec& light) {
   ReceiverSpec& receiver = light.receiver;
   map.read_scaled("aperture_mm", Need::Required, 1e-3, light.optics.aperture_diameter_m, positive);
-  map.read_number("efficiency", Need::Optional, light.optics.receiver_efficiency, share_rule);
+  map.read_number("efficiency", Need::Optional, light.optics.receiver_efficiency,
+                  positive_share_rule);
   map.read_scaled("response_fwhm_ns", Need::Optional, 1e-9, receiver.response_fwhm_s);
   map.read_scaled("sample_interval_ns", Need::Optional, 1e-9, receiver.sample_interval_s);
   using Timing = ReceiverSpec::Timing;

@@ -12,8 +12,9 @@ namespace {
 
 using Mirror = LinePattern::Mirror;
 
-constexpr double pi = std::numbers::pi;
-constexpr double tolerance = 1e-9;  // rates and angles are decimal figures that doubles approximate
+using std::numbers::pi;
+// Rates and angles are decimal figures that doubles approximate.
+constexpr double rate_tolerance = 1e-9;
 constexpr int most_facets = 1000;
 constexpr int most_lines = 1'000'000;
 
@@ -28,7 +29,7 @@ double active_fraction(const LinePattern& pattern) {
 double pulses_of_line(const LinePattern& pattern) {
   const double fraction = active_fraction(pattern);
   const double steps = fraction * pattern.pulse_rate_hz / pattern.line_rate_hz;
-  return std::floor(steps * (1 + tolerance)) + (fraction < 1 - tolerance ? 1 : 0);
+  return std::floor(steps * (1 + rate_tolerance)) + (fraction < 1 - rate_tolerance ? 1 : 0);
 }
 
 void check_polygon(const LinePattern& pattern, Violations& broken) {
@@ -39,20 +40,20 @@ void check_polygon(const LinePattern& pattern, Violations& broken) {
   }
   broken.unless(pattern.facets >= 3 && pattern.facets <= most_facets,
                 "facets = {} must be from 3 to {}", pattern.facets, most_facets);
-  broken.unless(active_fraction(pattern) <= 1 + tolerance,
+  broken.unless(active_fraction(pattern) <= 1 + rate_tolerance,
                 "a facet of {} sweeps {:.6g} rad, less than the {:.6g} rad from from_rad to to_rad",
                 pattern.facets, 4 * pi / pattern.facets,
                 std::abs(pattern.to_rad - pattern.from_rad));
 }
 
-void check(const LinePattern& pattern) {
+void check_line_pattern(const LinePattern& pattern) {
   Violations broken("LinePattern");
-  const auto positive = [&](double value, const char* name) {
+  const auto check_positive = [&](double value, const char* name) {
     broken.unless(value > 0 && std::isfinite(value), "{} = {} must be positive and finite", name,
                   value);
   };
-  positive(pattern.line_rate_hz, "line_rate_hz");
-  positive(pattern.pulse_rate_hz, "pulse_rate_hz");
+  check_positive(pattern.line_rate_hz, "line_rate_hz");
+  check_positive(pattern.pulse_rate_hz, "pulse_rate_hz");
   for (const double angle_rad : {pattern.from_rad, pattern.to_rad}) {
     broken.unless(std::abs(angle_rad) <= 2 * pi,
                   "scan angle {} must be in [-2 pi, 2 pi]: is it in degrees?", angle_rad);
@@ -100,8 +101,8 @@ FiringCycle::Firing firing_at(LinePattern::Plane plane, double angle_rad) {
   return firing;
 }
 
-FiringCycle cycle_of(const LinePattern& pattern) {
-  check(pattern);
+FiringCycle line_cycle(const LinePattern& pattern) {
+  check_line_pattern(pattern);
   const auto pulses = static_cast<int>(pulses_of_line(pattern));
   const double period_s = 1 / pattern.line_rate_hz;
   const double begin_s = period_s * std::max(0., 1 - active_fraction(pattern)) / 2;
@@ -122,7 +123,7 @@ FiringCycle cycle_of(const LinePattern& pattern) {
 
 LineScan::LineScan(const LinePattern& pattern)
     : lines_per_sweep_(pattern.lines_per_sweep),
-      cycle_(cycle_of(pattern)),
+      cycle_(line_cycle(pattern)),
       pulses_per_line_(static_cast<std::int64_t>(pulses_of_line(pattern))) {}
 
 void LineScan::fill(std::int64_t sweep, NumberRange pulses, PulseBatch& batch) const noexcept {

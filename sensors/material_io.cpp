@@ -19,9 +19,8 @@ using yaml::Node;
 using yaml::not_negative;
 using yaml::positive;
 using yaml::Rule;
+using yaml::share_rule;
 
-constexpr Rule share_rule{[](double value) { return value >= 0 && value <= 1; },
-                          "must be from 0 to 1"};
 constexpr Rule index_rule{[](double value) { return value > 1 && value <= 4; },
                           "must be > 1 and <= 4"};
 constexpr Rule alpha_rule{[](double value) { return value >= 0.01 && value <= 1; },

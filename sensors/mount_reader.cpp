@@ -29,7 +29,7 @@ using yaml::Node;
 using yaml::not_negative;
 
 // What sensors of a scene there are, by their names.
-using Names = std::map<std::string, std::string_view>;
+using SensorNames = std::map<std::string, std::string_view>;
 
 Pose read_mount(Map mount) {
   Pose X_BS;
@@ -54,7 +54,7 @@ bool is_file_name(std::string_view name) {
 }
 
 // Reads the name of a sensor or pair, which no other has.
-std::string read_name(Map& entry, std::string_view kind, Names& names, Faults& faults) {
+std::string read_name(Map& entry, std::string_view kind, SensorNames& names, Faults& faults) {
   std::string name;
   const Node* const at = entry.read_text("name", Need::Required, name);
   if (!at) return name;
@@ -104,7 +104,7 @@ void read_source(Map& entry, std::string_view list, SensorKind kind, const fs::p
 }
 
 MountedLidar read_mounted_lidar(Map entry, const fs::path& path, const fs::path& preset_folder,
-                                Names& names, Faults& faults) {
+                                SensorNames& names, Faults& faults) {
   MountedLidar mounted;
   mounted.name = read_name(entry, "lidar", names, faults);
   read_source(entry, "lidars", SensorKind::Lidar, path, preset_folder, mounted, faults,
@@ -123,7 +123,7 @@ Pose of_camera(const Pose& X_BS) {
 
 // Reads a text that names a sensor of a kind.
 std::string read_reference(const Node& node, std::string_view key, std::string_view kind,
-                           const Names& names, Faults& faults) {
+                           const SensorNames& names, Faults& faults) {
   if (!yaml::is_text(node, key, faults)) return {};
   const auto found = names.find(node.text);
   if (found != names.end() && found->second == kind) return node.text;
@@ -138,7 +138,7 @@ std::string read_reference(const Node& node, std::string_view key, std::string_v
   return {};
 }
 
-MountedCamera::Trigger read_trigger(Map map, const Names& names, Faults& faults) {
+MountedCamera::Trigger read_trigger(Map map, const SensorNames& names, Faults& faults) {
   MountedCamera::Trigger trigger;
   if (const Node* at = map.find("lidar", Need::Required))
     trigger.lidar = read_reference(*at, "lidar", "lidar", names, faults);
@@ -147,7 +147,7 @@ MountedCamera::Trigger read_trigger(Map map, const Names& names, Faults& faults)
   return trigger;
 }
 
-void read_projected(Map& entry, const Names& names, std::vector<std::string>& into,
+void read_projected(Map& entry, const SensorNames& names, std::vector<std::string>& into,
                     Faults& faults) {
   for (const Node& item : entry.list("project", Need::Optional)) {
     const std::string name = read_reference(item, "project", "lidar", names, faults);
@@ -158,7 +158,7 @@ void read_projected(Map& entry, const Names& names, std::vector<std::string>& in
 }
 
 MountedCamera read_mounted_camera(Map entry, const fs::path& path, const fs::path& preset_folder,
-                                  Names& names, Faults& faults) {
+                                  SensorNames& names, Faults& faults) {
   MountedCamera mounted;
   mounted.name = read_name(entry, "camera", names, faults);
   const std::size_t before = faults.count();
@@ -199,8 +199,8 @@ bool are_in_step(const MountedCamera& a, const MountedCamera& b) {
          a.camera.first_s == b.camera.first_s;
 }
 
-StereoSpec read_pair(Map entry, std::span<const MountedCamera> cameras, Names& names,
-                     Faults& faults) {
+StereoSpec read_stereo_pair(Map entry, std::span<const MountedCamera> cameras, SensorNames& names,
+                            Faults& faults) {
   StereoSpec pair;
   const auto camera = [&](const char* key, std::string& into) -> const MountedCamera* {
     if (const Node* at = entry.find(key, Need::Required))
@@ -230,7 +230,7 @@ StereoSpec read_pair(Map entry, std::span<const MountedCamera> cameras, Names& n
 
 void read_sensors(Map& root, const fs::path& path, const fs::path& preset_folder, SceneSpec& scene,
                   Faults& faults) {
-  Names names;
+  SensorNames names;
   for (const Node& entry : root.list("lidars", Need::Optional))
     scene.lidars.push_back(
         read_mounted_lidar(Map(entry, "lidars", faults), path, preset_folder, names, faults));
@@ -238,7 +238,8 @@ void read_sensors(Map& root, const fs::path& path, const fs::path& preset_folder
     scene.cameras.push_back(
         read_mounted_camera(Map(entry, "cameras", faults), path, preset_folder, names, faults));
   for (const Node& entry : root.list("stereo", Need::Optional))
-    scene.stereo.push_back(read_pair(Map(entry, "stereo", faults), scene.cameras, names, faults));
+    scene.stereo.push_back(
+        read_stereo_pair(Map(entry, "stereo", faults), scene.cameras, names, faults));
   if (!scene.lidars.empty() || !scene.cameras.empty()) return;
   const Node* const lidars = root.find("lidars", Need::Optional);
   const bool is_list = lidars && lidars->kind == Node::Kind::List;

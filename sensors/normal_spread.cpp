@@ -5,7 +5,7 @@
 namespace groundray {
 namespace {
 
-constexpr double far_sigmas = 8;       // an end so far away is never met: 1e-15
+constexpr double unmet_sigmas = 8;     // an end so far away is never met: 1e-15
 constexpr double widest_spread = 1e4;  // of the interval's length: from there on both ends alone
 
 double density(double z) {
@@ -18,7 +18,7 @@ double share_below(double z) { return 0.5 * std::erfc(-z / std::numbers::sqrt2);
 
 double clamped_normal_deviation(double deviation, double lowest, double highest) noexcept {
   if (!(highest > lowest)) return 0;
-  if (-lowest >= far_sigmas * deviation && highest >= far_sigmas * deviation) return deviation;
+  if (-lowest >= unmet_sigmas * deviation && highest >= unmet_sigmas * deviation) return deviation;
   const double sigma = std::min(deviation, widest_spread * (highest - lowest));
   const double low = lowest / sigma, high = highest / sigma;
   const double below = share_below(low), above = share_below(-high);

@@ -173,7 +173,7 @@ void read_models(Map& entry, ScatterLayer& layer, const Reading& with) {
     with.faults.add(*list, "models", "is an empty list, but a layer needs at least one");
 }
 
-ScatterLayer read_layer(Map entry, const Reading& with) {
+ScatterLayer read_scatter_layer(Map entry, const Reading& with) {
   ScatterLayer layer;
   entry.read_text("name", Need::Required, layer.name);
   entry.read_whole("label", Need::Required, layer.label);
@@ -207,9 +207,9 @@ std::uint32_t hash_of(std::string_view name) {
 }
 
 // Notes names that two entries share.
-class Names {
+class UniqueNames {
  public:
-  Names(std::string_view what, Faults& faults) : what_(what), faults_(faults) {}
+  UniqueNames(std::string_view what, Faults& faults) : what_(what), faults_(faults) {}
   void add(const Node& entry, const std::string& name) {
     if (!name.empty() && !names_.insert(name).second)
       faults_.add(entry, "name", "'{}' is taken by an earlier {}: names must differ", name, what_);
@@ -249,7 +249,7 @@ std::vector<ObjectSpec> read_objects(Map& root, const fs::path& path, const Data
                                      Faults& faults) {
   const Reading with{path, folders, faults};
   std::vector<ObjectSpec> objects;
-  Names names("object", faults);
+  UniqueNames names("object", faults);
   for (const Node& node : root.list("objects", Need::Optional)) {
     Map entry(node, "objects", faults);
     ObjectSpec& object = objects.emplace_back();
@@ -267,9 +267,9 @@ std::vector<ObjectSpec> read_objects(Map& root, const fs::path& path, const Data
 std::vector<ScatterLayer> read_scatter(Map& root, const fs::path& path, const DataFolders& folders,
                                        Faults& faults) {
   std::vector<ScatterLayer> layers;
-  Names names("layer", faults);
+  UniqueNames names("layer", faults);
   for (const Node& node : root.list("scatter", Need::Optional)) {
-    ScatterLayer layer = read_layer(Map(node, "scatter", faults), {path, folders, faults});
+    ScatterLayer layer = read_scatter_layer(Map(node, "scatter", faults), {path, folders, faults});
     layer.scatter.layer = hash_of(layer.name);
     names.add(node, layer.name);
     for (const ScatterLayer& other : layers) {

@@ -10,14 +10,14 @@
 #include "core/product_io.h"
 #include "core/text_lines.h"
 #include "sensors/calibration_io.h"
+#include "sensors/calibration_limits.h"
 
 namespace groundray {
 namespace {
 
 using nlohmann::json;
 
-constexpr double pi = std::numbers::pi;
-constexpr std::size_t most_beams = 65536;  // rings have 16 bits
+using std::numbers::pi;
 
 // Reads keys of a metadata file, wherever its layout keeps them, and notes every fault.
 class OusterReader {

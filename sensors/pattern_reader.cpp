@@ -14,6 +14,7 @@ namespace groundray {
 namespace {
 
 using yaml::any_number;
+using yaml::at_least_one;
 using yaml::Faults;
 using yaml::Map;
 using yaml::Need;
@@ -24,10 +25,8 @@ using yaml::Rule;
 
 namespace fs = std::filesystem;
 
-constexpr Rule elevation_rule{[](double value) { return std::abs(value) <= 90; },
-                              "must be from -90 to 90"};
-
-constexpr Rule at_least_one{[](double value) { return value >= 1; }, "must be 1 or more"};
+constexpr Rule elevation_deg_rule{[](double value) { return std::abs(value) <= 90; },
+                                  "must be from -90 to 90"};
 
 // A column of the beam table: where its number goes, and in which unit the file gives it.
 struct BeamColumn {
@@ -47,7 +46,7 @@ constexpr std::array beam_columns{
     BeamColumn{"loop", loop_rule, [](Beam& b, double v) { b.loop = static_cast<int>(v); }, false},
     BeamColumn{"ring", ring_rule, [](Beam& b, double v) { b.ring = static_cast<std::uint16_t>(v); },
                true},
-    BeamColumn{"elevation_deg", elevation_rule,
+    BeamColumn{"elevation_deg", elevation_deg_rule,
                [](Beam& b, double v) { b.elevation_rad = glm::radians(v); }, true},
     BeamColumn{"azimuth_offset_deg", any_number,
                [](Beam& b, double v) { b.azimuth_offset_rad = glm::radians(v); }, false},

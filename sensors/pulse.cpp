@@ -10,11 +10,11 @@ namespace groundray {
 namespace {
 
 const double cut_off_sigmas = std::sqrt(-2 * std::log(SystemPulse::cut_off));  // 5.678
-constexpr int scan_steps = 4096;  // over a table's support, in search of its peak and edges
-constexpr int halvings = 64;      // of a bracket: to the last bit
-constexpr double far_sigmas = 9;  // beyond it a smooth ramp equals the sharp one: Phi(-9) = 1e-19
+constexpr int scan_steps = 4096;    // over a table's support, in search of its peak and edges
+constexpr int halvings = 64;        // of a bracket: to the last bit
+constexpr double sharp_sigmas = 9;  // beyond it a smooth ramp equals the sharp one: Phi(-9) = 1e-19
 
-void check(const PulseSpec& spec) {
+void check_pulse(const PulseSpec& spec) {
   Violations broken("pulse");
   if (spec.shape.empty()) {
     broken.unless(spec.fwhm_s > 0 && std::isfinite(spec.fwhm_s),
@@ -36,7 +36,7 @@ double normal_density(double x) { return std::exp(-0.5 * x * x) / std::sqrt(2 * 
 
 // max(x, 0) convolved with a Gaussian.
 double smooth_ramp(double x, double sigma) {
-  if (std::abs(x) >= far_sigmas * sigma) return std::max(x, 0.0);
+  if (std::abs(x) >= sharp_sigmas * sigma) return std::max(x, 0.0);
   const double z = x / sigma;
   return x * 0.5 * std::erfc(-z / std::numbers::sqrt2) + sigma * normal_density(z);
 }
@@ -45,7 +45,7 @@ double smooth_ramp(double x, double sigma) {
 
 SystemPulse::SystemPulse(const PulseSpec& spec, double response_sigma_s)
     : sigma_s_(response_sigma_s) {
-  check(spec);
+  check_pulse(spec);
   if (spec.shape.empty()) {
     sigma_s_ = std::hypot(spec.fwhm_s / fwhm_per_sigma, response_sigma_s);
     end_s_ = cut_off_sigmas * sigma_s_;
@@ -81,7 +81,7 @@ double SystemPulse::operator()(double time_s) const {
   double sum = 0;
   for (std::size_t i = 0; i < ramps_.size(); ++i) {
     const double since_s = time_s - (first_ramp_s_ + static_cast<double>(i) * step_s_);
-    if (since_s <= -far_sigmas * sigma_s_) break;
+    if (since_s <= -sharp_sigmas * sigma_s_) break;
     sum += ramps_[i] * smooth_ramp(since_s, sigma_s_);
   }
   return std::max(sum, 0.0);  // far behind the table the ramps cancel but for rounding

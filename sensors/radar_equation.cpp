@@ -8,9 +8,9 @@
 namespace groundray {
 namespace {
 
-constexpr double pi = std::numbers::pi;
+using std::numbers::pi;
 
-void check(const LidarOptics& optics) {
+void check_optics(const LidarOptics& optics) {
   Violations broken("LidarOptics");
   broken.unless(optics.pulse_energy_j > 0 && std::isfinite(optics.pulse_energy_j),
                 "pulse_energy_j = {} must be positive and finite", optics.pulse_energy_j);
@@ -37,7 +37,7 @@ RadarEquation::RadarEquation(const LidarOptics& optics)
       receiver_efficiency_(optics.receiver_efficiency),
       energy_area_j_m2_(optics.pulse_energy_j * optics.emitter_efficiency *
                         optics.receiver_efficiency * receiver_area_m2_) {
-  check(optics);
+  check_optics(optics);
 }
 
 double RadarEquation::solar_power_w(const SolarBackground& sun, double reflectance) const {

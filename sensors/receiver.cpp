@@ -85,7 +85,7 @@ void check_noise(const ReceiverSpec& spec, Violations& broken) {
                 rate_hz, highest_hz);
 }
 
-ReceiverSpec checked(const ReceiverSpec& spec) {
+ReceiverSpec checked_receiver(const ReceiverSpec& spec) {
   Violations broken("receiver");
   broken.unless(finite_from(0, spec.response_fwhm_s),
                 "response_fwhm_s = {} must be finite and not negative", spec.response_fwhm_s);
@@ -198,7 +198,7 @@ void blank(double dead_m, Detections& found) {
 }  // namespace
 
 Receiver::Receiver(const PulseSpec& pulse, const ReceiverSpec& spec)
-    : spec_(checked(spec)),
+    : spec_(checked_receiver(spec)),
       response_sigma_s_(spec.response_fwhm_s / fwhm_per_sigma),
       pulse_(pulse, response_sigma_s_),
       sampler_(pulse_, interval_of(spec, pulse_)),

@@ -12,9 +12,9 @@
 namespace groundray {
 namespace {
 
-constexpr double pi = std::numbers::pi;
+using std::numbers::pi;
 constexpr std::size_t most_prisms = 3;
-constexpr double tolerance = 1e-9;
+constexpr double sequence_tolerance = 1e-9;
 
 // Returns a bound on the angle from x at which light leaves a prism that it meets at `angle_rad` or
 // less; NaN or more than a right angle if it might not pass. A face turns light about its normal by
@@ -60,7 +60,7 @@ void check_prisms(const RisleyPattern& pattern, Violations& broken) {
   }
 }
 
-void check(const RisleyPattern& pattern) {
+void check_risley_pattern(const RisleyPattern& pattern) {
   Violations broken("RisleyPattern");
   const double period_s = pattern.firing_period_s;
   broken.unless(period_s > 0 && std::isfinite(period_s),
@@ -68,7 +68,7 @@ void check(const RisleyPattern& pattern) {
   broken.unless(pattern.sweep_rate_hz > 0 && std::isfinite(pattern.sweep_rate_hz),
                 "sweep_rate_hz = {} must be positive and finite", pattern.sweep_rate_hz);
   const double sequences = 1 / (pattern.sweep_rate_hz * period_s);
-  broken.unless(sequences >= 1 - tolerance && sequences <= RisleyScan::most_sequences,
+  broken.unless(sequences >= 1 - sequence_tolerance && sequences <= RisleyScan::most_sequences,
                 "a sweep has {} firing sequences, but must have 1 to {}: is the period in seconds?",
                 sequences, RisleyScan::most_sequences);
   broken.unless(!pattern.beams.empty(), "beams: there must be at least one");
@@ -89,7 +89,7 @@ void check(const RisleyPattern& pattern) {
 }
 
 FiringCycle sequence_of(const RisleyPattern& pattern) {
-  check(pattern);
+  check_risley_pattern(pattern);
   std::vector<FiringCycle::Firing> firings;
   for (const Beam& beam : pattern.beams) {
     firings.push_back(firing_towards(beam.azimuth_offset_rad, beam.elevation_rad));
@@ -142,7 +142,7 @@ RisleyScan::RisleyScan(const RisleyPattern& pattern)
 std::int64_t RisleyScan::first_sequence(std::int64_t sweep) const noexcept {
   constexpr double epsilon = std::numeric_limits<double>::epsilon();
   const double sweeps = static_cast<double>(sweep);
-  const double early = tolerance + 4 * epsilon * sweeps;
+  const double early = sequence_tolerance + 4 * epsilon * sweeps;
   const double first = std::ceil((sweeps - early) / (sweep_rate_hz_ * sequence_.period_s()));
   return std::max<std::int64_t>(0, static_cast<std::int64_t>(first));
 }

@@ -10,9 +10,9 @@
 namespace groundray {
 namespace {
 
-constexpr double pi = std::numbers::pi;
+using std::numbers::pi;
 
-ConstantSky checked(const ConstantSky& sky) {
+ConstantSky checked_sky(const ConstantSky& sky) {
   Violations broken("Constant sky");
   for (int channel = 0; channel < 3; ++channel) {
     const double value = sky.radiance[channel];
@@ -44,7 +44,7 @@ Sky::Dome Sky::build_dome(const SkySpec& spec, ImageF image, const std::optional
     return EnvironmentMap(std::move(image), glm::radians(environment->center_azimuth_deg),
                           environment->scale);
   }
-  if (!analytic) return checked(std::get<ConstantSky>(spec.dome));
+  if (!analytic) return checked_sky(std::get<ConstantSky>(spec.dome));
   return ClearSky(spec.air.turbidity, analytic->ground_albedo, sun->direction(), sun->irradiance());
 }
 

@@ -24,10 +24,8 @@ using yaml::Node;
 using yaml::not_negative;
 using yaml::positive;
 using yaml::Rule;
+using yaml::share_rule;
 using Time = std::chrono::sys_time<std::chrono::milliseconds>;
-
-constexpr Rule share_rule{[](double value) { return value >= 0 && value <= 1; },
-                          "must be from 0 to 1"};
 
 // One number for all channels, or three.
 void read_rgb(Map& map, std::string_view key, Need need, Rule rule, Faults& faults,

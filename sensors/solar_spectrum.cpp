@@ -18,7 +18,7 @@ struct Row {
   double water, ozone, mixed;  // absorption coefficients
   double rgb_nm[3];
 };
-constexpr Row table[] = {
+constexpr Row spectrum_table[] = {
 #include <sky/solar_spectrum.inc>
 };
 
@@ -82,14 +82,15 @@ double air_mass(double elevation_rad) noexcept {
 
 double direct_irradiance_w_m2_nm(double wavelength_nm, double elevation_rad, const ClearAir& air) {
   check_air(air);
-  const Row& first = *std::begin(table);
-  const Row& last = *(std::end(table) - 1);
+  const Row& first = *std::begin(spectrum_table);
+  const Row& last = *(std::end(spectrum_table) - 1);
   if (!(wavelength_nm >= first.wavelength_nm && wavelength_nm <= last.wavelength_nm)) {
     throw Error("Sunlight: wavelength {} nm must be in [{}, {}]", wavelength_nm,
                 first.wavelength_nm, last.wavelength_nm);
   }
-  const Row* above = std::ranges::lower_bound(std::begin(table) + 1, std::end(table), wavelength_nm,
-                                              {}, &Row::wavelength_nm);
+  const Row* above =
+      std::ranges::lower_bound(std::begin(spectrum_table) + 1, std::end(spectrum_table),
+                               wavelength_nm, {}, &Row::wavelength_nm);
   const Row* below = above - 1;
   const Transmission transmission(elevation_rad, air);
   const auto irradiance = [&](const Row& row) {
@@ -104,7 +105,7 @@ glm::dvec3 direct_irradiance_rgb(double elevation_rad, const ClearAir& air) {
   check_air(air);
   const Transmission transmission(elevation_rad, air);
   glm::dvec3 sum(0);
-  for (const Row& row : table) {
+  for (const Row& row : spectrum_table) {
     sum += row.irradiance_w_m2_nm * transmission.of(row) *
            glm::dvec3(row.rgb_nm[0], row.rgb_nm[1], row.rgb_nm[2]);
   }

@@ -11,12 +11,12 @@
 namespace groundray {
 namespace {
 
-constexpr double full_turn_rad = 2 * std::numbers::pi;
+using std::numbers::pi;
 constexpr double tolerance_turns = 1e-9;
 constexpr int most_loops = 1000;
 
 void check_beam(const Beam& beam, std::size_t i, double period_s, Violations& broken) {
-  broken.unless(std::abs(beam.elevation_rad) <= std::numbers::pi / 2,
+  broken.unless(std::abs(beam.elevation_rad) <= pi / 2,
                 "beams[{}].elevation_rad = {} must be in [-pi/2, pi/2]: is it in degrees?", i,
                 beam.elevation_rad);
   broken.unless(std::isfinite(beam.azimuth_offset_rad),
@@ -34,7 +34,7 @@ void check_beam(const Beam& beam, std::size_t i, double period_s, Violations& br
 void check_view(const AzimuthInterval& view, double step_rad, Violations& broken) {
   const double width_rad = view.to_rad - view.from_rad;
   broken.unless(std::isfinite(view.from_rad) && std::isfinite(view.to_rad) &&
-                    width_rad <= full_turn_rad * (1 + tolerance_turns),
+                    width_rad <= 2 * pi * (1 + tolerance_turns),
                 "field_of_view = [{}, {}] rad must be finite and at most one turn wide: is it in "
                 "degrees?",
                 view.from_rad, view.to_rad);
@@ -53,7 +53,7 @@ void check_loops(const std::vector<Beam>& beams, Violations& broken) {
                 loops.size(), loops.empty() ? 0 : *loops.rbegin());
 }
 
-void check(const SpinningPattern& pattern) {
+void check_spinning_pattern(const SpinningPattern& pattern) {
   Violations broken("SpinningPattern");
   const double rate_hz = pattern.rate_hz;
   const double period_s = pattern.firing_period_s;
@@ -73,7 +73,7 @@ void check(const SpinningPattern& pattern) {
   }
   check_loops(pattern.beams, broken);
   if (pattern.field_of_view) {
-    check_view(*pattern.field_of_view, full_turn_rad / sequences, broken);
+    check_view(*pattern.field_of_view, 2 * pi / sequences, broken);
   }
   broken.throw_if_any();
 }
@@ -96,8 +96,8 @@ std::vector<FiringCycle::Firing> firings_of(const SpinningPattern& pattern) {
   return firings;
 }
 
-FiringCycle cycle_of(const SpinningPattern& pattern) {
-  check(pattern);
+FiringCycle spinning_cycle(const SpinningPattern& pattern) {
+  check_spinning_pattern(pattern);
   return {firings_of(pattern), pattern.firing_period_s,
           HeadTurn{signed_rate_hz(pattern), pattern.start_azimuth_rad}};
 }
@@ -120,15 +120,15 @@ FiringCycle::Firing firing_towards(double azimuth_rad, double elevation_rad) noe
 }
 
 SpinningScan::SpinningScan(const SpinningPattern& pattern)
-    : rate_hz_(pattern.rate_hz), cycle_(cycle_of(pattern)) {
+    : rate_hz_(pattern.rate_hz), cycle_(spinning_cycle(pattern)) {
   if (!pattern.field_of_view) return;
   const auto [from_rad, to_rad] = *pattern.field_of_view;
-  const double width = (to_rad - from_rad) / full_turn_rad;
+  const double width = (to_rad - from_rad) / (2 * pi);
   if (width >= 1 - tolerance_turns) return;
   const double ahead_rad = pattern.sense == SpinningPattern::Sense::Clockwise
                                ? pattern.start_azimuth_rad - to_rad
                                : from_rad - pattern.start_azimuth_rad;
-  const double turns = ahead_rad / full_turn_rad;
+  const double turns = ahead_rad / (2 * pi);
   const double open = turns - std::floor(turns);
   window_ = Window{open < 1 - tolerance_turns ? open : 0, width};
 }

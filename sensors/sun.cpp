@@ -11,7 +11,7 @@
 namespace groundray {
 namespace {
 
-constexpr double pi = std::numbers::pi;
+using std::numbers::pi;
 
 // Auwers (1891), the radius that The Astronomical Almanac uses: 0.26656 degrees at 1 au.
 constexpr double radius_at_1_au_rad = 959.63 / 3600 * pi / 180;

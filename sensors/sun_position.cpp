@@ -13,14 +13,14 @@ namespace {
 using Time = std::chrono::sys_time<std::chrono::milliseconds>;
 using Days = std::chrono::duration<double, std::chrono::days::period>;
 
-constexpr double pi = std::numbers::pi;
+using std::numbers::pi;
 constexpr double days_per_century = 36525;
 // Terrestrial less universal time: 57 s in 1990, 69 s in 2020 (Espenak and Meeus). The sun moves by
 // 0.0001 degrees in 10 s.
 constexpr double delta_t_s = 69;
 constexpr double parallax_deg = 8.794 / 3600;  // of the sun at 1 au, on the horizon
 
-void check(Time utc, const Place& place) {
+void check_time_and_place(Time utc, const Place& place) {
   const std::chrono::year_month_day date(std::chrono::floor<std::chrono::days>(utc));
   Violations broken("Sun");
   broken.unless(date.year() >= std::chrono::year(1900) && date.year() <= std::chrono::year(2100),
@@ -78,7 +78,7 @@ glm::dvec3 direction_of(double azimuth_rad, double elevation_rad) noexcept {
 }
 
 SunPosition sun_position(Time utc, const Place& place) {
-  check(utc, place);
+  check_time_and_place(utc, place);
   constexpr auto noon_of_j2000 =
       std::chrono::sys_days(std::chrono::year(2000) / 1 / 1) + std::chrono::hours(12);
   const double days = std::chrono::duration_cast<Days>(utc - noon_of_j2000).count();

@@ -20,7 +20,7 @@
 namespace groundray {
 namespace {
 
-constexpr double pi = std::numbers::pi;
+using std::numbers::pi;
 constexpr int most_sweeps = 1'000'000;
 
 void check_shot(const TablePattern& pattern, std::size_t i, Violations& broken) {
@@ -41,7 +41,7 @@ void check_shot(const TablePattern& pattern, std::size_t i, Violations& broken) 
                 "shots[{}].origin_m = ({}, {}, {}) must be finite", i, p.x, p.y, p.z);
 }
 
-void check(const TablePattern& pattern) {
+void check_table_pattern(const TablePattern& pattern) {
   Violations broken("TablePattern");
   broken.unless(pattern.period_s > 0 && std::isfinite(pattern.period_s),
                 "period_s = {} must be positive and finite", pattern.period_s);
@@ -58,8 +58,8 @@ void check(const TablePattern& pattern) {
   broken.throw_if_any();
 }
 
-FiringCycle cycle_of(const TablePattern& pattern) {
-  check(pattern);
+FiringCycle table_cycle(const TablePattern& pattern) {
+  check_table_pattern(pattern);
   std::vector<FiringCycle::Firing> firings;
   firings.reserve(pattern.shots.size());
   for (const TablePattern::Shot& shot : pattern.shots) {
@@ -137,7 +137,7 @@ TablePattern::Shot read_row(std::string_view line, const Columns& columns, doubl
           .ring = static_cast<std::uint16_t>(channel)};
 }
 
-void check_pixels(const PixelArray& pixels, Violations& broken) {
+void check_pixel_array(const PixelArray& pixels, Violations& broken) {
   const bool plane = pixels.spacing == PixelArray::Spacing::EqualTangents;
   constexpr int most = 65536;  // rings have 16 bits
   broken.unless(
@@ -194,7 +194,7 @@ TablePattern::Shot pixel_shot(const PixelArray& pixels, int row, int column) {
 TablePattern raster_pattern(const PixelArray& pixels, double row_period_s, double column_period_s,
                             double frame_period_s) {
   Violations broken("raster");
-  check_pixels(pixels, broken);
+  check_pixel_array(pixels, broken);
   check_times(pixels, row_period_s, column_period_s, frame_period_s, broken);
   broken.throw_if_any();
   TablePattern table;
@@ -251,7 +251,7 @@ TablePattern parse_table(std::string_view text, const std::string& name, double 
   return table;
 }
 
-TableScan::TableScan(const TablePattern& pattern) : cycle_(cycle_of(pattern)) {
+TableScan::TableScan(const TablePattern& pattern) : cycle_(table_cycle(pattern)) {
   const double sweep_s = pattern.period_s / pattern.sweeps_per_period;
   for (int sweep = 0; sweep < pattern.sweeps_per_period; ++sweep) {
     // Times are decimal figures that doubles only approximate: a billionth early is on time.

@@ -12,6 +12,7 @@
 #include "core/product_io.h"
 #include "core/text_lines.h"
 #include "sensors/calibration_io.h"
+#include "sensors/calibration_limits.h"
 #include "sensors/yaml_reader.h"
 
 namespace groundray {
@@ -19,8 +20,7 @@ namespace {
 
 namespace fs = std::filesystem;
 
-constexpr double pi = std::numbers::pi;
-constexpr std::size_t most_beams = 65536;  // rings have 16 bits
+using std::numbers::pi;
 
 struct Laser {
   double id = 0;
@@ -55,8 +55,8 @@ std::vector<Beam> beams_of(std::vector<Laser> lasers) {
   return beams;
 }
 
-constexpr yaml::Rule elevation_rule{[](double value) { return std::abs(value) <= pi / 2; },
-                                    "must be in [-pi/2, pi/2]: is it in degrees?"};
+constexpr yaml::Rule elevation_rad_rule{[](double value) { return std::abs(value) <= pi / 2; },
+                                        "must be in [-pi/2, pi/2]: is it in degrees?"};
 constexpr yaml::Rule number_rule{
     [](double value) { return value >= 0 && value < most_beams && value == std::floor(value); },
     "must be a whole number from 0 to 65535"};
@@ -100,7 +100,7 @@ Laser read_px(const tinyxml2::XMLElement& px, Violations& broken) {
   laser.left_m = metres_per_cm * read_field(px, "horizOffsetCorrection_", false, broken);
   broken.unless(number_rule.holds(laser.id), "line {}: id_ = {} {}", px.GetLineNum(), laser.id,
                 number_rule.words);
-  broken.unless(elevation_rule.holds(laser.elevation_rad),
+  broken.unless(elevation_rad_rule.holds(laser.elevation_rad),
                 "line {}: vertCorrection_ must be from -90 to 90 degrees", px.GetLineNum());
   return laser;
 }
@@ -133,7 +133,7 @@ std::vector<Beam> parse_velodyne_yaml(std::string_view text, const fs::path& pat
     const yaml::Node* id = read("laser_id", Required, laser.id, number_rule);
     if (id && !ids.insert(laser.id).second) faults.add(*id, "laser_id", "{} is repeated", laser.id);
     read("rot_correction", Required, laser.rotation_rad, yaml::any_number);
-    read("vert_correction", Required, laser.elevation_rad, elevation_rule);
+    read("vert_correction", Required, laser.elevation_rad, elevation_rad_rule);
     read("vert_offset_correction", Optional, laser.up_m, yaml::any_number);
     read("horiz_offset_correction", Optional, laser.left_m, yaml::any_number);
     lasers.push_back(laser);

@@ -15,7 +15,7 @@ std::int64_t vectors_down(std::int64_t bin) { return bin & -vector_bins; }
 std::int64_t vectors_up(std::int64_t bin) { return vectors_down(bin + vector_bins - 1); }
 
 // By range, then energy, so that a sum does not depend on how its parts were listed.
-bool before(const Arrival& a, const Arrival& b) {
+bool arrival_precedes(const Arrival& a, const Arrival& b) {
   return a.range_m != b.range_m ? a.range_m < b.range_m : a.energy_j < b.energy_j;
 }
 
@@ -83,9 +83,9 @@ void Waveform::lay_out(Bins kept, std::int64_t width) {
 void PulseSampler::sample(std::span<const Arrival> arrivals, double s_per_m, Bins kept,
                           Waveform& waveform) const noexcept {
   waveform.interval_s_ = interval_s_;
-  if (!std::ranges::is_sorted(arrivals, before)) {
+  if (!std::ranges::is_sorted(arrivals, arrival_precedes)) {
     waveform.arrivals_.assign(arrivals.begin(), arrivals.end());
-    std::ranges::sort(waveform.arrivals_, before);
+    std::ranges::sort(waveform.arrivals_, arrival_precedes);
     arrivals = waveform.arrivals_;
   }
   waveform.pulses_.resize(arrivals.size());

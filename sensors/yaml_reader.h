@@ -81,6 +81,13 @@ struct Rule {
 inline constexpr Rule any_number{[](double) { return true; }, ""};
 inline constexpr Rule positive{[](double value) { return value > 0; }, "must be > 0"};
 inline constexpr Rule not_negative{[](double value) { return value >= 0; }, "must be >= 0"};
+inline constexpr Rule at_least_one{[](double value) { return value >= 1; }, "must be 1 or more"};
+/// A share of a whole.
+inline constexpr Rule share_rule{[](double value) { return value >= 0 && value <= 1; },
+                                 "must be from 0 to 1"};
+/// A share of a whole that is not nothing.
+inline constexpr Rule positive_share_rule{[](double value) { return value > 0 && value <= 1; },
+                                          "must be > 0 and at most 1"};
 
 enum class Need { Required, Optional };
 

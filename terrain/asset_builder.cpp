@@ -11,7 +11,7 @@
 namespace groundray {
 namespace {
 
-constexpr double pi = std::numbers::pi;
+using std::numbers::pi;
 
 struct NamedColor {
   std::string_view material;

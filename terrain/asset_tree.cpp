@@ -179,7 +179,7 @@ void add_stem(Skeleton& wood, const glm::dvec3& foot, const glm::dvec3& head, do
   }
 }
 
-std::size_t count_of(double usual, double detail) {
+std::size_t scaled_count(double usual, double detail) {
   return static_cast<std::size_t>(std::lround(usual * detail));
 }
 
@@ -207,8 +207,8 @@ Model make_broadleaf_tree(double height_m, double leaf_area_index, double detail
   add_stem(plant.wood, {0, 0, -0.03}, fork, 0.05, random);
   colonise(plant.wood, crown, random);
   thicken(plant.wood, 0.5 / 45);  // height over diameter: stable below 80 (Wonn, O'Hara, 2001)
-  plant.wood_budget = count_of(900, detail);
-  plant.cards = scatter_cards(plant.wood, crown.center, count_of(540, detail), random);
+  plant.wood_budget = scaled_count(900, detail);
+  plant.cards = scatter_cards(plant.wood, crown.center, scaled_count(540, detail), random);
   return put_together(plant, height_m, leaf_area_index);
 }
 
@@ -232,8 +232,8 @@ Model make_shrub(double height_m, double leaf_area_index, double detail, AssetRa
   }
   colonise(plant.wood, crown, random);
   thicken(plant.wood, 0.016);
-  plant.wood_budget = count_of(800, detail);
-  plant.cards = scatter_cards(plant.wood, {0, 0, 0.2}, count_of(480, detail), random);
+  plant.wood_budget = scaled_count(800, detail);
+  plant.cards = scatter_cards(plant.wood, {0, 0, 0.2}, scaled_count(480, detail), random);
   return put_together(plant, height_m, leaf_area_index);
 }
 
@@ -301,7 +301,7 @@ Model make_conifer(double height_m, double leaf_area_index, double detail, Asset
   plant.spray = SprayKind::Needles;
   add_stem(plant.wood, {0, 0, -0.03}, {0, 0, 1}, 0.05, random);
   const std::vector<Bough> boughs =
-      boughs_of_conifer(static_cast<int>(count_of(75, detail)), random);
+      boughs_of_conifer(static_cast<int>(scaled_count(75, detail)), random);
   const std::size_t stem_size = plant.wood.size();
   for (const Bough& bough : boughs) {
     const auto joint =
@@ -314,8 +314,8 @@ Model make_conifer(double height_m, double leaf_area_index, double detail, Asset
     }
   }
   thicken(plant.wood, 0.5 / 55);  // as the broad-leaved tree's
-  plant.wood_budget = count_of(900, detail);
-  plant.cards = cards_on(boughs, count_of(540, detail), random);
+  plant.wood_budget = scaled_count(900, detail);
+  plant.cards = cards_on(boughs, scaled_count(540, detail), random);
   return put_together(plant, height_m, leaf_area_index);
 }
 

@@ -14,18 +14,18 @@
 namespace groundray {
 namespace {
 
-constexpr double pi = std::numbers::pi;
+using std::numbers::pi;
 
-constexpr double length = 5.265, width = 1.855, height = 1.865;
+constexpr double body_length = 5.265, body_width = 1.855, body_height = 1.865;
 constexpr double wheelbase = 3.085, track = 1.550;
 constexpr double tyre_radius = (17 * 0.0254 + 2 * 0.65 * 0.265) / 2, tyre_width = 0.265;
 constexpr double tub_length = 1.550, tub_depth = 0.490;
-constexpr double front = wheelbase / 2 + 1.03, rear = front - length;
+constexpr double front = wheelbase / 2 + 1.03, rear = front - body_length;
 constexpr double sill = 0.45, belt = 1.14, hood = 1.06, cowl = 1.15;  // heights
 constexpr double floor_z = 0.70, rail = floor_z + tub_depth;          // of the tub
 constexpr double tailgate = 0.08;
 constexpr double cab_rear = rear + tailgate + tub_length;
-constexpr double inner = 0.60, outer = width / 2;  // half-widths of the hull and of its flanks
+constexpr double inner = 0.60, outer = body_width / 2;  // half-widths of the hull and of its flanks
 constexpr double arch_radius = 0.43;
 
 using Profile = std::vector<glm::dvec2>;  // x and z, counter-clockwise as seen from the right
@@ -133,7 +133,7 @@ class Pickup {
                   {x_rear, half_width, z_rear}}};
     };
     const Rim low = rim(cab_rear, 1.20, outer - 0.03, belt - 0.03, belt - 0.03);
-    const Rim high = rim(cab_rear + 0.16, 0.42, 0.68, height, height);
+    const Rim high = rim(cab_rear + 0.16, 0.42, 0.68, body_height, body_height);
     builder_.add_loft(low, high, metal_);
     for (std::size_t i = 0; i < 4; ++i)
       add_pane(low[i], low[(i + 1) % 4], high[i], high[(i + 1) % 4]);
@@ -184,7 +184,7 @@ class Pickup {
 
 Model make_vehicle(double length_m) {
   // The grille and the plate stand out by 4 mm each.
-  return Pickup().take(length_m / (length + 0.008));
+  return Pickup().take(length_m / (body_length + 0.008));
 }
 
 }  // namespace groundray

@@ -33,7 +33,7 @@ struct Certificate::Files {
 
 namespace {
 
-std::string key_of(const DemFile& dem) {
+std::string certificate_key(const DemFile& dem) {
   return fmt::format("block_cells {}\n{}", Certificate::block_cells, dem.fingerprint());
 }
 
@@ -52,7 +52,7 @@ std::string folders_text(const std::vector<std::filesystem::path>& folders) {
 }
 
 // Cuts the bands of a raster of nodes apart.
-NodeLevel nodes_of(glm::ivec2 size, const std::vector<float>& values) {
+NodeLevel nodes_from_bands(glm::ivec2 size, const std::vector<float>& values) {
   NodeLevel nodes{.size = size};
   auto from = values.begin();
   const std::ptrdiff_t count = std::ssize(values) / 5;
@@ -83,7 +83,7 @@ std::optional<Certificate> Certificate::open_in(const std::filesystem::path& fol
 }
 
 std::optional<Certificate> Certificate::open(const DemFile& dem) {
-  const std::string key = key_of(dem);
+  const std::string key = certificate_key(dem);
   for (const auto& folder : certificate_folders(dem)) {
     if (auto found = open_in(folder, key, dem.header())) return found;
   }
@@ -93,7 +93,7 @@ std::optional<Certificate> Certificate::open(const DemFile& dem) {
 Certificate Certificate::open_or_make(const DemFile& dem, const Making& making) {
   check_making(making);
   if (auto found = open(dem)) return *std::move(found);
-  const std::string key = key_of(dem);
+  const std::string key = certificate_key(dem);
   const Lattice lattice{dem.header().samples, block_cells};
   const auto folders = certificate_folders(dem);
   for (const auto& folder : folders) {
@@ -103,7 +103,7 @@ Certificate Certificate::open_or_make(const DemFile& dem, const Making& making) 
     if (auto found = open_in(folder, key, dem.header())) return *std::move(found);
     const auto summary = certify_file(dem, lattice, in_making->path(), making);
     write_summary(in_making->path(), key, lattice, summary);
-    if (key_of(dem) != key) {
+    if (certificate_key(dem) != key) {
       throw Error("{}: it changed while it was certified; certify it again", dem.path().string());
     }
     in_making->publish();
@@ -132,7 +132,7 @@ std::vector<float> Certificate::heights(int level, glm::ivec2 first, glm::ivec2 
 
 NodeLevel Certificate::nodes(int level, glm::ivec2 first, glm::ivec2 size) const {
   const int rasters = raster_levels(lattice());
-  if (level < rasters) return nodes_of(size, files_->nodes.read(level, first, size));
+  if (level < rasters) return nodes_from_bands(size, files_->nodes.read(level, first, size));
   if (level > lattice().top_level() || first != glm::ivec2(0) || size != glm::ivec2(1)) {
     throw Error("{}: there are no {} x {} nodes from {}, {} on in level {}", folder().string(),
                 size.x, size.y, first.x, first.y, level);

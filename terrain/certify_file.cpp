@@ -15,16 +15,13 @@
 
 #include "core/error.h"
 #include "terrain/deviation.h"
+#include "terrain/row_major.h"
 
 namespace groundray {
 namespace {
 
 // Of the time that the work takes; the rest goes into deviations.
 constexpr double share_of_heights = 0.2;
-
-std::size_t area(glm::ivec2 size) {
-  return static_cast<std::size_t>(size.x) * static_cast<std::size_t>(size.y);
-}
 
 // Where a cell of a rectangle is among the rectangle's cells, row by row.
 std::ptrdiff_t offset(glm::ivec2 size, glm::ivec2 cell) {
@@ -41,7 +38,7 @@ struct Patch {
 };
 
 // Returns a level's points among the samples of a patch.
-Patch points_of(const Lattice& lattice, int level, const Patch& samples) {
+Patch level_points(const Lattice& lattice, int level, const Patch& samples) {
   const auto up = [&](glm::ivec2 sample) { return ((sample - 1) >> level) + 1; };
   const glm::ivec2 beyond = samples.first + samples.size;
   const glm::ivec2 all = lattice.points(level);
@@ -51,12 +48,11 @@ Patch points_of(const Lattice& lattice, int level, const Patch& samples) {
   Patch points{up(samples.first), {}, {}};
   points.size = end - points.first;
   if (points.size.x <= 0 || points.size.y <= 0) return {};
-  points.heights_m.reserve(area(points.size));
+  points.heights_m.reserve(value_count(points.size));
   for (int row = points.first.y; row < end.y; ++row) {
     for (int column = points.first.x; column < end.x; ++column) {
       const glm::ivec2 at = lattice.sample(level, {column, row}) - samples.first;
-      points.heights_m.push_back(
-          samples.heights_m[area({samples.size.x, at.y}) + static_cast<std::size_t>(at.x)]);
+      points.heights_m.push_back(samples.heights_m[value_index(at, samples.size.x)]);
     }
   }
   return points;
@@ -132,7 +128,7 @@ void write_heights(const DemFile& dem, const Lattice& lattice, const std::filesy
   for (std::size_t done = 0; done < tiles.count(); ++done) {
     const Patch samples = tiles.next();
     for (int level = 1; level <= lattice.top_level(); ++level) {
-      const Patch points = points_of(lattice, level, samples);
+      const Patch points = level_points(lattice, level, samples);
       if (points.heights_m.empty()) continue;
       const std::array bands{points.heights_m.data()};
       files[static_cast<std::size_t>(level) - 1]->write(0, points.first, points.size, bands);
@@ -176,7 +172,7 @@ class NodePass {
       const glm::ivec2 first = node_of(level, samples.first);
       const glm::ivec2 size = node_of(level, samples.first + samples.size - 2) - first + 1;
       NodeLevel nodes = unknown_nodes(size, NodeDetail::Full);
-      const Patch points = level == 0 ? Patch{} : points_of(lattice_, level, samples);
+      const Patch points = level == 0 ? Patch{} : level_points(lattice_, level, samples);
       accumulate_deviations(lattice_, level, samples.window(),
                             level == 0 ? samples.window() : points.window(), first, nodes);
       if (level > 0) saturate_keys(nodes, first, below, first_below);

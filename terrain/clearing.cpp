@@ -11,16 +11,16 @@
 namespace groundray {
 namespace {
 
-bool is_finite(glm::dvec2 p) { return std::isfinite(p.x) && std::isfinite(p.y); }
+bool is_finite_point(glm::dvec2 p) { return std::isfinite(p.x) && std::isfinite(p.y); }
 
-void check(std::span<const Clearing> clearings) {
+void check_clearings(std::span<const Clearing> clearings) {
   Violations broken("clearings");
   for (std::size_t i = 0; i < clearings.size(); ++i) {
     const auto& [points, half_width_m, shape] = clearings[i];
     const std::size_t least = shape == Clearing::Shape::Polygon ? 3 : 1;
     broken.unless(points.size() >= least, "clearing {} has {} points; it needs {} or more", i,
                   points.size(), least);
-    broken.unless(std::ranges::all_of(points, is_finite),
+    broken.unless(std::ranges::all_of(points, is_finite_point),
                   "clearing {} has a point that is not finite", i);
     broken.unless(half_width_m >= 0 && std::isfinite(half_width_m),
                   "clearing {} has half_width_m = {}; it must be 0 or more", i, half_width_m);
@@ -62,7 +62,7 @@ bool meets(const Area& area, glm::dvec2 a, glm::dvec2 b, double margin_m) {
 }  // namespace
 
 ClearedGround::ClearedGround(std::span<const Clearing> clearings) {
-  check(clearings);
+  check_clearings(clearings);
   for (const auto& [points, half_width_m, shape] : clearings) {
     const bool is_polygon = shape == Clearing::Shape::Polygon;
     if (points.size() == 1) strips_.push_back({points[0], points[0], half_width_m});

@@ -9,25 +9,26 @@
 
 #include "core/error.h"
 #include "terrain/quadtree.h"
+#include "terrain/row_major.h"
 
 namespace groundray {
+
+// A rectangle of nodes.
+struct NodeRectangle {
+  glm::ivec2 first{0}, end{0};
+  friend bool operator==(const NodeRectangle&, const NodeRectangle&) = default;
+};
+
 namespace {
 
-constexpr int block_cells = Certificate::block_cells;
 constexpr int unit_nodes = 2;  // windows are aligned to nodes of the next coarser level
 constexpr int part_cells =
     32;  // small enough that a snap builds little, large enough to trace well
-constexpr int unit_cells = unit_nodes * block_cells;
+constexpr int unit_cells = unit_nodes * Certificate::block_cells;
 constexpr int smallest_half = 2;       // units from the viewpoint to a window's side
 constexpr double bytes_per_cell = 40;  // measured, of terrain without holes
 
 int ceil_div(int a, int b) { return (a + b - 1) / b; }
-
-// A rectangle of nodes.
-struct Rectangle {
-  glm::ivec2 first{0}, end{0};
-  friend bool operator==(const Rectangle&, const Rectangle&) = default;
-};
 
 // Copies the part of tiles of `pitch` values a row that lies in a rectangle; tile t begins with the
 // value at `t * span`.
@@ -42,10 +43,6 @@ void assemble(const float* from, glm::ivec2 tile, int span, int pitch, glm::ivec
         begin, std::max(0, high.x - low.x),
         out.begin() + static_cast<std::ptrdiff_t>(row - first.y) * size.x + (low.x - first.x));
   }
-}
-
-std::size_t area(glm::ivec2 size) {
-  return static_cast<std::size_t>(size.x) * static_cast<std::size_t>(size.y);
 }
 
 }  // namespace
@@ -66,7 +63,7 @@ struct Clipmap::Plan {
   glm::ivec2 wanted_half(int level) const;
   void size_windows(int most_units);
   double bytes() const;
-  Rectangle window(int level, const glm::dvec2& centre) const;
+  NodeRectangle window(int level, const glm::dvec2& centre) const;
   glm::dvec2 centre(const SensorBox& sensors) const;
   MeshBound bound(const SensorBox& sensors) const;
 };
@@ -74,11 +71,11 @@ struct Clipmap::Plan {
 namespace {
 
 // The nodes of a rectangle; `tile_at` gives the tiles.
-NodeLevel assemble_nodes(const Rectangle& where, const auto& tile_at) {
+NodeLevel assemble_nodes(const NodeRectangle& where, const auto& tile_at) {
   NodeLevel nodes;
   nodes.size = where.end - where.first;
   const auto copy = [&](const Tile::NodeValues& from, glm::ivec2 tile, std::vector<float>& to) {
-    to.resize(area(nodes.size));
+    to.resize(value_count(nodes.size));
     assemble(from.data(), tile, Tile::nodes, Tile::nodes, where.first, nodes.size, to);
   };
   for (int y = where.first.y / Tile::nodes; y <= (where.end.y - 1) / Tile::nodes; ++y) {
@@ -94,7 +91,7 @@ NodeLevel assemble_nodes(const Rectangle& where, const auto& tile_at) {
   return nodes;
 }
 
-void check(const ClipmapSettings& settings) {
+void check_settings(const ClipmapSettings& settings) {
   const auto is_length = [](double value) { return value >= 0 && std::isfinite(value); };
   Violations broken("terrain levels");
   broken.unless(is_length(settings.tolerance_m), "tolerance = {} m must be finite and not negative",
@@ -111,7 +108,7 @@ void check(const ClipmapSettings& settings) {
 Clipmap::Plan::Plan(std::shared_ptr<const TileSource> from, const GridFrame& grid,
                     const ClipmapSettings& chosen)
     : source(std::move(from)), frame(grid), settings(chosen), lattice(source->lattice()) {
-  check(settings);
+  check_settings(settings);
   int units = ceil_div(std::max(lattice.cells(0).x, lattice.cells(0).y), unit_cells);
   size_windows(units);
   while (bytes() > static_cast<double>(settings.memory_bytes)) {
@@ -190,7 +187,7 @@ glm::dvec2 Clipmap::Plan::centre(const SensorBox& sensors) const {
   return glm::clamp(middle, glm::dvec2(0), glm::dvec2(frame.samples - 1));
 }
 
-Rectangle Clipmap::Plan::window(int level, const glm::dvec2& centre) const {
+NodeRectangle Clipmap::Plan::window(int level, const glm::dvec2& centre) const {
   const glm::ivec2 nodes = lattice.nodes(level);
   if (level == outermost) return {{0, 0}, nodes};
   const glm::ivec2 middle(glm::round(centre / static_cast<double>(unit_cells << level)));
@@ -214,30 +211,31 @@ struct Clipmap::Window {
     std::shared_ptr<const Tile> content;
   };
   int level = 0;
-  Rectangle nodes_in;
+  NodeRectangle nodes_in;
   glm::ivec2 slots{0};
   std::vector<Slot> tiles;
   NodeLevel nodes;
   HeightArray heights;
 
-  Window(const Plan& plan, int level, const Rectangle& where, const Window* before);
-  static glm::ivec2 first_tile(const Rectangle& where) { return where.first / Tile::nodes; }
-  static glm::ivec2 last_tile(const Rectangle& where) { return (where.end - 1) / Tile::nodes; }
+  Window(const Plan& plan, int level, const NodeRectangle& where, const Window* before);
+  static glm::ivec2 first_tile(const NodeRectangle& where) { return where.first / Tile::nodes; }
+  static glm::ivec2 last_tile(const NodeRectangle& where) { return (where.end - 1) / Tile::nodes; }
   Slot& slot(glm::ivec2 tile) {
     return tiles[static_cast<std::size_t>(tile.y % slots.y) * static_cast<std::size_t>(slots.x) +
                  static_cast<std::size_t>(tile.x % slots.x)];
   }
   std::vector<float> assemble_heights(const Plan& plan);
-  glm::ivec2 first_point() const { return nodes_in.first * block_cells; }
+  glm::ivec2 first_point() const { return nodes_in.first * Certificate::block_cells; }
   glm::ivec2 points(const Lattice& lattice) const {
-    return glm::min(nodes_in.end * block_cells + 1, lattice.points(level)) - first_point();
+    return glm::min(nodes_in.end * Certificate::block_cells + 1, lattice.points(level)) -
+           first_point();
   }
 
  private:
   HeightArray fill(const Plan& plan, const Window* before);
 };
 
-Clipmap::Window::Window(const Plan& plan, int of, const Rectangle& where, const Window* before)
+Clipmap::Window::Window(const Plan& plan, int of, const NodeRectangle& where, const Window* before)
     : level(of), nodes_in(where), heights(fill(plan, before)) {
   nodes =
       assemble_nodes(nodes_in, [&](glm::ivec2 tile) -> const Tile& { return *slot(tile).content; });
@@ -247,7 +245,7 @@ HeightArray Clipmap::Window::fill(const Plan& plan, const Window* before) {
   const glm::ivec2 all = tile_count(plan.lattice, level);
   const glm::ivec2 widest = 2 * plan.half[static_cast<std::size_t>(level)] * unit_nodes;
   slots = glm::min(all, (widest - 1) / Tile::nodes + 2);
-  tiles = before != nullptr ? before->tiles : std::vector<Slot>(area(slots));
+  tiles = before != nullptr ? before->tiles : std::vector<Slot>(value_count(slots));
   const glm::ivec2 first = first_tile(nodes_in), last = last_tile(nodes_in);
   for (Slot& old : tiles) {
     if (glm::any(glm::lessThan(old.tile, first)) || glm::any(glm::greaterThan(old.tile, last)))
@@ -264,7 +262,7 @@ HeightArray Clipmap::Window::fill(const Plan& plan, const Window* before) {
 
 std::vector<float> Clipmap::Window::assemble_heights(const Plan& plan) {
   const glm::ivec2 size = points(plan.lattice);
-  std::vector<float> out(area(size));
+  std::vector<float> out(value_count(size));
   for (const Slot& slot : tiles) {
     if (slot.content == nullptr) continue;
     assemble(slot.content->heights_m.data(), slot.tile, Tile::cells, Tile::points, first_point(),
@@ -284,8 +282,8 @@ Clipmap Clipmap::moved_to(const SensorBox& sensors) const {
                                       glm::dvec2(plan_->frame.samples - 1));
   std::vector<TileName> coming;
   for (int level = plan_->finest; level < plan_->outermost; ++level) {
-    const Rectangle now = plan_->window(level, here);
-    const Rectangle then = plan_->window(level, ahead);
+    const NodeRectangle now = plan_->window(level, here);
+    const NodeRectangle then = plan_->window(level, ahead);
     const glm::ivec2 first = Window::first_tile(now), last = Window::last_tile(now);
     for (int y = Window::first_tile(then).y; y <= Window::last_tile(then).y; ++y) {
       for (int x = Window::first_tile(then).x; x <= Window::last_tile(then).x; ++x) {
@@ -304,7 +302,7 @@ Clipmap::Clipmap(std::shared_ptr<const Plan> plan, const SensorBox& sensors, con
   windows_.resize(static_cast<std::size_t>(plan_->outermost) + 1);
   for (int level = plan_->finest; level <= plan_->outermost; ++level) {
     const auto i = static_cast<std::size_t>(level);
-    const Rectangle where = plan_->window(level, centre);
+    const NodeRectangle where = plan_->window(level, centre);
     const Window* old = before != nullptr ? before->windows_[i].get() : nullptr;
     windows_[i] = old != nullptr && old->nodes_in == where
                       ? before->windows_[i]
@@ -335,7 +333,7 @@ void Clipmap::select_leaves(const SensorBox& sensors) {
                        .heights = window.heights,
                        .first = window.first_point() << level,
                        .step = 1 << level,
-                       .leaf_cells = block_cells,
+                       .leaf_cells = Certificate::block_cells,
                        .part_cells = part_cells,
                        .leaves = {}});
   }

@@ -98,7 +98,7 @@ void accumulate(const Lattice& lattice, int level, const Heights& samples, const
   run(pass, runner);
 }
 
-Heights view(const HeightWindow& window) {
+Heights heights_of(const HeightWindow& window) {
   return {window.heights_m, window.row_stride, window.first, window.size};
 }
 
@@ -119,7 +119,8 @@ NodeLevel unknown_nodes(glm::ivec2 size, NodeDetail detail) {
 void accumulate_deviations(const Lattice& lattice, int level, const HeightWindow& samples,
                            const HeightWindow& points, glm::ivec2 first_node, NodeLevel& nodes,
                            const PassRunner& runner) {
-  accumulate(lattice, level, view(samples), {view(points)}, arrays_of(nodes, first_node), runner);
+  accumulate(lattice, level, heights_of(samples), {heights_of(points)},
+             arrays_of(nodes, first_node), runner);
 }
 
 void saturate_keys(NodeLevel& nodes, glm::ivec2 first_node, const NodeLevel& children,

@@ -210,7 +210,7 @@ Image8 read_photo(GDALDataset& dataset) {
 }
 
 // Returns the photo as GDAL sees it, without a copy; its last band is alpha.
-GDALDatasetUniquePtr dataset_of(Image8& photo, RasterHeader& header) {
+GDALDatasetUniquePtr photo_dataset(Image8& photo, RasterHeader& header) {
   GDALDriver* const memory = GetGDALDriverManager()->GetDriverByName("MEM");
   GDALDatasetUniquePtr dataset(
       memory->Create("", photo.width(), photo.height(), 0, GDT_Byte, nullptr));
@@ -233,7 +233,7 @@ GDALDatasetUniquePtr dataset_of(Image8& photo, RasterHeader& header) {
 // `header` to that of the result.
 Image8 warped(Image8 photo, RasterHeader& header, const std::string& target,
               const std::filesystem::path& path) {
-  const GDALDatasetUniquePtr source = dataset_of(photo, header);
+  const GDALDatasetUniquePtr source = photo_dataset(photo, header);
   CPLStringList words;
   // Scales of 1, or they would differ from block to block.
   for (const char* word : {"-of", "VRT", "-r", "bilinear", "-et", "0.01", "-novshift", "-wo",

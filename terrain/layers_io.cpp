@@ -20,8 +20,8 @@
 namespace groundray {
 namespace {
 
-void check(const GridFrame& frame, const Georeference& georeference,
-           std::span<const RasterLayer> layers) {
+void check_raster_layers(const GridFrame& frame, const Georeference& georeference,
+                         std::span<const RasterLayer> layers) {
   Violations broken("not layers of a raster");
   broken.unless(!layers.empty(), "there is none");
   broken.unless(frame.samples.x >= 2 && frame.samples.y >= 2,
@@ -124,9 +124,9 @@ void place(GDALDataset& dataset, const GridFrame& frame, const Georeference& geo
   dataset.SetSpatialRef(&crs);
 }
 
-GDALDatasetUniquePtr dataset_of(const GridFrame& frame, const Georeference& georeference,
-                                std::span<const RasterLayer> layers, double nodata,
-                                const RasterForm& form) {
+GDALDatasetUniquePtr layers_dataset(const GridFrame& frame, const Georeference& georeference,
+                                    std::span<const RasterLayer> layers, double nodata,
+                                    const RasterForm& form) {
   GDALDriver& memory = *GetGDALDriverManager()->GetDriverByName("MEM");
   GDALDatasetUniquePtr dataset(
       memory.Create("", frame.samples.x, frame.samples.y, 0, GDT_Float32, nullptr));
@@ -137,7 +137,7 @@ GDALDatasetUniquePtr dataset_of(const GridFrame& frame, const Georeference& geor
   return dataset;
 }
 
-CPLStringList creation_options(std::span<const RasterLayer> layers) {
+CPLStringList cog_options(std::span<const RasterLayer> layers) {
   const bool are_lengths =
       std::ranges::none_of(layers, [](const RasterLayer& layer) { return layer.unit.empty(); });
   CPLStringList options;
@@ -188,7 +188,7 @@ RasterForm read_form(const std::filesystem::path& path) {
 void write_layers(const std::filesystem::path& path, const GridFrame& frame,
                   const Georeference& georeference, std::span<const RasterLayer> layers,
                   const RasterForm& form) {
-  about(path, [&] { check(frame, georeference, layers); });
+  about(path, [&] { check_raster_layers(frame, georeference, layers); });
   start_gdal();
   const CPLErrorHandlerPusher quiet(CPLQuietErrorHandler);
   constexpr double nan = std::numeric_limits<double>::quiet_NaN();
@@ -204,8 +204,8 @@ void write_layers(const std::filesystem::path& path, const GridFrame& frame,
       layer.values = copies.back();
     }
   }
-  const GDALDatasetUniquePtr source = dataset_of(frame, georeference, stored, nodata, form);
-  copy_whole(path, *source, creation_options(layers));
+  const GDALDatasetUniquePtr source = layers_dataset(frame, georeference, stored, nodata, form);
+  copy_whole(path, *source, cog_options(layers));
 }
 
 }  // namespace groundray

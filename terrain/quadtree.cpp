@@ -10,6 +10,7 @@
 #include "core/error.h"
 #include "terrain/passes/leaf_list.h"
 #include "terrain/passes/selection.h"
+#include "terrain/row_major.h"
 
 namespace groundray {
 namespace {
@@ -19,11 +20,7 @@ using passes::NodeRuns;
 using passes::StateWindow;
 using passes::WindowSpan;
 
-std::size_t count_of(glm::ivec2 size) {
-  return static_cast<std::size_t>(size.x) * static_cast<std::size_t>(size.y);
-}
-
-void check(const MeshBound& bound) {
+void check_mesh_bound(const MeshBound& bound) {
   Violations broken("mesh bound");
   broken.unless(bound.tolerance_m >= 0, "tolerance_m = {} must be 0 or more", bound.tolerance_m);
   for (int axis = 0; axis < 3; ++axis) {
@@ -83,7 +80,9 @@ bool is_whole(const Lattice& lattice, const NodeWindow& window, int level) {
   return window.size == lattice.nodes(level);
 }
 
-StateWindow view(Selection::Level& level) { return {level.first, level.size, level.state.data()}; }
+StateWindow state_window(Selection::Level& level) {
+  return {level.first, level.size, level.state.data()};
+}
 
 struct Splitter {
   const Lattice& lattice;
@@ -103,8 +102,8 @@ struct Splitter {
                    level,
                    lattice.block_cells,
                    lattice.samples - 1};
-    passes::SplitPass pass{runs, windows[at], view(selection.levels[at]), {}, test};
-    if (level > 0) pass.children = view(selection.levels[at - 1]);
+    passes::SplitPass pass{runs, windows[at], state_window(selection.levels[at]), {}, test};
+    if (level > 0) pass.children = state_window(selection.levels[at - 1]);
     std::vector<WindowSpan> columns;
     std::vector<WindowSpan> rows;
     if (!finer_are_whole(level)) {
@@ -150,14 +149,14 @@ NodeWindow whole_window(const NodeLevel& level) {
 
 Selection select_nodes(const Lattice& lattice, std::span<const NodeWindow> windows,
                        const MeshBound& bound, const PassRunner& runner) {
-  check(bound);
+  check_mesh_bound(bound);
   assert(windows.size() == static_cast<std::size_t>(lattice.top_level()) + 1);
   Selection selection{lattice, {}};
   for (std::size_t level = 0; level < windows.size(); ++level) {
     assert(is_well_placed(lattice, windows, level));
     const NodeWindow& window = windows[level];
     selection.levels.push_back({window.first, window.size, {}});
-    selection.levels.back().state.resize(count_of(window.size));
+    selection.levels.back().state.resize(value_count(window.size));
   }
   const Splitter splitter{lattice, windows, bound, runner};
   const int top = lattice.top_level();
@@ -165,8 +164,8 @@ Selection select_nodes(const Lattice& lattice, std::span<const NodeWindow> windo
   for (int level = 0; level <= top; ++level) {
     const auto at = static_cast<std::size_t>(level);
     const NodeRuns runs{windows[at].size};
-    passes::LeafPass pass{runs, view(selection.levels[at]), {}, lattice.nodes(level)};
-    if (level < top) pass.parents = view(selection.levels[at + 1]);
+    passes::LeafPass pass{runs, state_window(selection.levels[at]), {}, lattice.nodes(level)};
+    if (level < top) pass.parents = state_window(selection.levels[at + 1]);
     run_pass(runner, runs.count(), pass);
   }
   return selection;

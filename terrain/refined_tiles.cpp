@@ -7,28 +7,24 @@
 #include <vector>
 
 #include "terrain/passes/node_arrays.h"
+#include "terrain/row_major.h"
 
 namespace groundray {
 namespace {
 
 using passes::rounded_up;
 
-constexpr float infinity = std::numeric_limits<float>::infinity();
-
-std::size_t index_of(glm::ivec2 place, int columns) {
-  return static_cast<std::size_t>(place.y) * static_cast<std::size_t>(columns) +
-         static_cast<std::size_t>(place.x);
-}
+constexpr float infinite_m = std::numeric_limits<float>::infinity();
 
 // What is known of a node from the surface of the DEM there.
 struct GroundBelow {
   bool exists = false;  // somewhere
   bool is_missing = false;
-  double low_m = infinity, high_m = -infinity;
+  double low_m = infinite_m, high_m = -infinite_m;
 };
 
-float lower(double value_m) { return std::nextafter(static_cast<float>(value_m), -infinity); }
-float higher(double value_m) { return std::nextafter(static_cast<float>(value_m), infinity); }
+float lower(double value_m) { return std::nextafter(static_cast<float>(value_m), -infinite_m); }
+float higher(double value_m) { return std::nextafter(static_cast<float>(value_m), infinite_m); }
 
 void write_node(Tile& tile, std::size_t at, const GroundBelow& dem, const Relief::Node& relief) {
   if (!dem.exists) return;
@@ -155,7 +151,7 @@ std::shared_ptr<const Tile> RefinedTiles::finer_tile(const TileName& name) const
     for (int x = 0; x < points.x; ++x) {
       const glm::ivec2 sample = (first_point + glm::ivec2(x, y)) << level;
       const Cell cell = cell_of(*dem, glm::min(sample >> exponent, last_cell));
-      tile->heights_m[index_of({x, y}, Tile::points)] = relief_->height_m(cell, sample);
+      tile->heights_m[value_index({x, y}, Tile::points)] = relief_->height_m(cell, sample);
     }
   }
   const glm::ivec2 first_node = name.which * Tile::nodes;
@@ -166,7 +162,7 @@ std::shared_ptr<const Tile> RefinedTiles::finer_tile(const TileName& name) const
       const glm::ivec2 node = first_node + glm::ivec2(x, y);
       const glm::ivec2 first = node * node_cells;
       const glm::ivec2 last = glm::min(first + node_cells, lattice_.samples - 1);
-      const std::size_t at = index_of({x, y}, Tile::nodes);
+      const std::size_t at = value_index({x, y}, Tile::nodes);
       write_node(*tile, at, ground_below(*dem, exponent, first, last), relief_->node(level, node));
       if (level == 0) tile->full_m[at] = 0;  // the surface itself
     }
@@ -183,7 +179,7 @@ std::shared_ptr<const Tile> RefinedTiles::displaced_tile(const TileName& name) c
       glm::min(glm::ivec2(Tile::points), lattice_.points(name.level) - first_point);
   for (int y = 0; y < points.y; ++y) {
     for (int x = 0; x < points.x; ++x) {
-      const std::size_t at = index_of({x, y}, Tile::points);
+      const std::size_t at = value_index({x, y}, Tile::points);
       const glm::ivec2 sample = lattice_.sample(name.level, first_point + glm::ivec2(x, y));
       tile->heights_m[at] = static_cast<float>(static_cast<double>(dem->heights_m[at]) +
                                                relief_->displacement_m(sample));

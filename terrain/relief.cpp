@@ -17,7 +17,7 @@
 namespace groundray {
 namespace {
 
-constexpr int block_cells = 8;
+constexpr int period_block_cells = 8;
 // So that a pair of nodes of any level is no wider than an int can say.
 constexpr double most_cells = 1 << 26;
 constexpr double smallest_period = 64;  // samples
@@ -27,7 +27,7 @@ constexpr double most_stretch = 0.1;
 // and nodes.
 constexpr double bytes_per_sample = 32;
 
-void check(const FractalSpec& spec, double cell_m, Violations& broken) {
+void check_fractal(const FractalSpec& spec, double cell_m, Violations& broken) {
   broken.unless(spec.rms_m >= 0 && std::isfinite(spec.rms_m),
                 "fractal: rms_m = {} must be finite and not negative", spec.rms_m);
   broken.unless(0 <= spec.hurst && spec.hurst <= 1, "fractal: hurst = {} must be from 0 to 1",
@@ -41,7 +41,7 @@ void check(const FractalSpec& spec, double cell_m, Violations& broken) {
                 spec.shortest_m, spec.longest_m);
 }
 
-void check(const ImageRelief& spec, double cell_m, Violations& broken) {
+void check_image_relief(const ImageRelief& spec, double cell_m, Violations& broken) {
   broken.unless(std::isfinite(spec.amplitude_m), "image: amplitude_m = {} must be finite",
                 spec.amplitude_m);
   broken.unless(std::isfinite(spec.middle), "image: middle = {} must be finite", spec.middle);
@@ -57,16 +57,16 @@ void check(const ImageRelief& spec, double cell_m, Violations& broken) {
   }
 }
 
-void check(const ReliefSpec& spec) {
+void check_relief(const ReliefSpec& spec) {
   const auto is_length = [](double value) { return value > 0 && std::isfinite(value); };
   Violations broken("relief");
   broken.unless(is_length(spec.cell_m), "cell_m = {} must be positive", spec.cell_m);
   broken.unless(is_length(spec.period_m) && spec.period_m <= 1e6,
                 "period_m = {:g} must be positive and at most 1e6", spec.period_m);
   broken.unless(spec.image || spec.fractal, "it needs an image, a fractal or both");
-  if (spec.image) check(*spec.image, spec.cell_m, broken);
+  if (spec.image) check_image_relief(*spec.image, spec.cell_m, broken);
   if (spec.fractal) {
-    check(*spec.fractal, spec.cell_m, broken);
+    check_fractal(*spec.fractal, spec.cell_m, broken);
     broken.unless(!(spec.fractal->longest_m > spec.period_m),
                   "fractal: longest_m = {} must not exceed period_m = {}", spec.fractal->longest_m,
                   spec.period_m);
@@ -163,7 +163,7 @@ double facet_height_m(const Cell& cell, double x, double y) noexcept {
 }  // namespace
 
 Relief::Relief(const ReliefSpec& spec, const GridFrame& dem, std::size_t memory_bytes)
-    : exponent_((check(spec), halvings(dem, spec.cell_m))),
+    : exponent_((check_relief(spec), halvings(dem, spec.cell_m))),
       frame_(refined_frame(dem, exponent_)),
       displacement_(make_displacement(spec, frame_, memory_bytes)) {
   // Levels above have no values of their own: any template's height is a mean of displacements, as
@@ -177,7 +177,7 @@ Relief::Relief(const ReliefSpec& spec, const GridFrame& dem, std::size_t memory_
 // Certifies the middle one of three by three periods, so that all nodes have neighbours.
 void Relief::certify_period() {
   const glm::ivec2 size = period();
-  const Lattice lattice{3 * size + 1, block_cells};
+  const Lattice lattice{3 * size + 1, period_block_cells};
   std::vector<float> samples, thinned;
   const auto fill = [&](int level, std::vector<float>& out) {
     out.clear();
@@ -191,9 +191,9 @@ void Relief::certify_period() {
                         .row_stride = (size.x >> level) + 1};
   };
   const HeightWindow all = fill(0, samples);
-  for (int level = 0; level < exponent_ && (block_cells << level) <= std::min(size.x, size.y);
-       ++level) {
-    const glm::ivec2 first = size / (block_cells << level);
+  for (int level = 0;
+       level < exponent_ && (period_block_cells << level) <= std::min(size.x, size.y); ++level) {
+    const glm::ivec2 first = size / (period_block_cells << level);
     levels_.push_back(unknown_nodes(first, NodeDetail::Full));
     accumulate_deviations(lattice, level, all, fill(level, thinned), first, levels_.back());
     if (level > 0) saturate_keys(levels_.back(), first, levels_[levels_.size() - 2], 2 * first);

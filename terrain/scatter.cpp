@@ -27,13 +27,13 @@ constexpr double max_darts_in_all = 1e9;
 
 double radians(double angle_deg) { return angle_deg * pi / 180; }
 
-bool is_finite(const Interval& range) { return std::isfinite(range.low + range.high); }
+bool is_finite_range(const Interval& range) { return std::isfinite(range.low + range.high); }
 
 double share_in(const Interval& range, double share) {
   return std::min(range.low + (range.high - range.low) * share, range.high);
 }
 
-void check(const ScatterSpec& spec) {
+void check_scatter(const ScatterSpec& spec) {
   Violations broken("ScatterSpec");
   broken.unless(spec.min_distance_m >= 0 && std::isfinite(spec.min_distance_m),
                 "min_distance_m = {} must be 0 or more, and finite", spec.min_distance_m);
@@ -48,10 +48,10 @@ void check(const ScatterSpec& spec) {
   broken.unless(spec.slope_deg.high >= 0 && spec.slope_deg.low <= 90,
                 "slope_deg = [{}, {}] leaves out all slopes from 0 to 90", spec.slope_deg.low,
                 spec.slope_deg.high);
-  broken.unless(spec.scale.low > 0 && is_finite(spec.scale),
+  broken.unless(spec.scale.low > 0 && is_finite_range(spec.scale),
                 "scale = [{}, {}] must be positive and finite", spec.scale.low, spec.scale.high);
-  broken.unless(is_finite(spec.yaw_deg), "yaw_deg = [{}, {}] must be finite", spec.yaw_deg.low,
-                spec.yaw_deg.high);
+  broken.unless(is_finite_range(spec.yaw_deg), "yaw_deg = [{}, {}] must be finite",
+                spec.yaw_deg.low, spec.yaw_deg.high);
   broken.unless(std::isfinite(spec.sink_m), "sink_m = {} must be finite", spec.sink_m);
   const double weight = std::accumulate(spec.weights.begin(), spec.weights.end(), 0.0);
   broken.unless(weight > 0 && std::isfinite(weight) &&
@@ -89,7 +89,7 @@ Area area_of(const GridFrame& frame) {
   return {glm::min(a, b), glm::max(a, b)};
 }
 
-std::uint64_t key_of(glm::ivec2 cell, std::uint32_t number) {
+std::uint64_t placement_key(glm::ivec2 cell, std::uint32_t number) {
   const auto bits = [](std::int64_t index) { return static_cast<std::uint64_t>(index + max_cell); };
   return bits(cell.y) << 35 | bits(cell.x) << 6 | number;
 }
@@ -148,7 +148,7 @@ Scatter::Impl::Impl(Ground where, DensityMap wish, const ScatterSpec& wishes, Se
       spec(wishes),
       cleared(spec.clearings),
       area(area_of(ground.frame()) & density.area()) {
-  check(spec);
+  check_scatter(spec);
   if (area.is_empty()) {
     const Area all = area_of(ground.frame());
     const Area map = density.area();
@@ -200,7 +200,7 @@ Placement Scatter::Impl::placed(const Dart& dart, const Footing& footing) const 
   // The first whose share goes beyond: never one of weight 0.
   placement.prototype = static_cast<std::uint32_t>(std::ranges::upper_bound(shares_up_to, u.z) -
                                                    shares_up_to.begin());
-  placement.key = key_of(dart.cell, dart.number);
+  placement.key = placement_key(dart.cell, dart.number);
   return placement;
 }
 

@@ -19,12 +19,10 @@
 #include <utility>
 
 #include "core/error.h"
+#include "terrain/row_major.h"
 
 namespace groundray {
 namespace {
-
-constexpr float hole = std::numeric_limits<float>::quiet_NaN();
-constexpr float infinity = std::numeric_limits<float>::infinity();
 
 // A rectangle of a level.
 struct Window {
@@ -32,12 +30,12 @@ struct Window {
   glm::ivec2 size;
 };
 
-Window points_of(const Lattice& lattice, const TileName& name) {
+Window tile_points(const Lattice& lattice, const TileName& name) {
   const glm::ivec2 first = name.which * Tile::cells;
   return {first, glm::min(glm::ivec2(Tile::points), lattice.points(name.level) - first)};
 }
 
-Window nodes_of(const Lattice& lattice, const TileName& name) {
+Window tile_nodes(const Lattice& lattice, const TileName& name) {
   const glm::ivec2 first = name.which * Tile::nodes;
   return {first, glm::min(glm::ivec2(Tile::nodes), lattice.nodes(name.level) - first)};
 }
@@ -54,11 +52,6 @@ void check_name(const Lattice& lattice, const TileName& name) {
   }
   throw Error("there is no {}: levels go to {}, this one has {} x {} tiles", text_of(name),
               lattice.top_level(), count.x, count.y);
-}
-
-std::size_t index_of(glm::ivec2 place, int columns) {
-  return static_cast<std::size_t>(place.y) * static_cast<std::size_t>(columns) +
-         static_cast<std::size_t>(place.x);
 }
 
 // Copies rows of `size` values into a square of `side`.
@@ -83,7 +76,7 @@ void copy_nodes(const NodeLevel& nodes, glm::ivec2 first, glm::ivec2 size, Tile&
 float largest_finite(const std::vector<float>& keys_m) {
   float largest = 0;
   for (const float key_m : keys_m) {
-    if (key_m < infinity) largest = std::max(largest, key_m);
+    if (key_m < std::numeric_limits<float>::infinity()) largest = std::max(largest, key_m);
   }
   return largest;
 }
@@ -93,10 +86,10 @@ float largest_finite(const std::vector<float>& keys_m) {
 std::shared_ptr<Tile> empty_tile(const Lattice& lattice, const TileName& name) {
   check_name(lattice, name);
   auto tile = std::make_shared<Tile>();
-  tile->heights_m.fill(hole);
+  tile->heights_m.fill(std::numeric_limits<float>::quiet_NaN());
   tile->key_m.fill(-1);
-  tile->low_m.fill(infinity);
-  tile->high_m.fill(-infinity);
+  tile->low_m.fill(std::numeric_limits<float>::infinity());
+  tile->high_m.fill(-std::numeric_limits<float>::infinity());
   return tile;
 }
 
@@ -123,14 +116,15 @@ float MemoryTiles::max_key_m(int level) const {
 
 std::shared_ptr<const Tile> MemoryTiles::tile(const TileName& name) const {
   auto tile = empty_tile(lattice_, name);
-  const Window points = points_of(lattice_, name);
+  const Window points = tile_points(lattice_, name);
   for (int row = 0; row < points.size.y; ++row) {
     for (int column = 0; column < points.size.x; ++column) {
       const glm::ivec2 sample = lattice_.sample(name.level, points.first + glm::ivec2(column, row));
-      tile->heights_m[index_of({column, row}, Tile::points)] = grid_.height_m(sample.x, sample.y);
+      tile->heights_m[value_index({column, row}, Tile::points)] =
+          grid_.height_m(sample.x, sample.y);
     }
   }
-  const Window nodes = nodes_of(lattice_, name);
+  const Window nodes = tile_nodes(lattice_, name);
   copy_nodes(levels_[static_cast<std::size_t>(name.level)], nodes.first, nodes.size, *tile);
   return tile;
 }
@@ -217,12 +211,12 @@ class FileTiles::Cache {
     try {
       const Lattice& lattice = certificate_.lattice();
       auto tile = empty_tile(lattice, name);
-      const Window points = points_of(lattice, name);
+      const Window points = tile_points(lattice, name);
       const auto heights_m = name.level == 0
                                  ? dem_.read(points.first, points.size)
                                  : certificate_.heights(name.level, points.first, points.size);
       copy_rows(heights_m.data(), points.size.x, points.size, tile->heights_m.data(), Tile::points);
-      const Window nodes = nodes_of(lattice, name);
+      const Window nodes = tile_nodes(lattice, name);
       copy_nodes(certificate_.nodes(name.level, nodes.first, nodes.size), {0, 0}, nodes.size,
                  *tile);
       return tile;

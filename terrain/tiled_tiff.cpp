@@ -10,12 +10,10 @@
 #include <numeric>
 #include <utility>
 
+#include "terrain/row_major.h"
+
 namespace groundray {
 namespace {
-
-std::size_t area(glm::ivec2 size) {
-  return static_cast<std::size_t>(size.x) * static_cast<std::size_t>(size.y);
-}
 
 GDALDataset& image_of(GDALDataset& dataset, int image) {
   if (image == 0) return dataset;
@@ -24,7 +22,7 @@ GDALDataset& image_of(GDALDataset& dataset, int image) {
 
 int bands_of(const TiffSpec& spec) { return static_cast<int>(spec.bands.size()); }
 
-CPLStringList creation_options(int tile) {
+CPLStringList tiff_options(int tile) {
   CPLStringList options;
   options.AddNameValue("TILED", "YES");
   options.AddNameValue("BLOCKXSIZE", fmt::format("{}", tile).c_str());
@@ -72,7 +70,7 @@ TiledTiffWriter::TiledTiffWriter(const std::filesystem::path& path, const TiffSp
   CPLErrorReset();
   GDALDriver& driver = *GetGDALDriverManager()->GetDriverByName("GTiff");
   dataset_.reset(driver.Create(path.c_str(), spec.size.x, spec.size.y, bands_of(spec), GDT_Float32,
-                               creation_options(spec.tile).List()));
+                               tiff_options(spec.tile).List()));
   if (dataset_ == nullptr) refuse_faults();
   double transform[] = {spec.corner_w_m.x, spec.cell_m.x, 0, spec.corner_w_m.y, 0, spec.cell_m.y};
   dataset_->SetGeoTransform(transform);
@@ -124,16 +122,16 @@ void TiledTiffWriter::add_to_tile(int image, glm::ivec2 tile, glm::ivec2 first, 
   const glm::ivec2 part = glm::min(first + size, corner + whole) - low;
   for (std::size_t band = 0; band < bands.size(); ++band) {
     for (int row = low.y; row < low.y + part.y; ++row) {
-      const float* from = bands[band] + area({size.x, row - first.y}) + (low.x - first.x);
-      std::copy_n(
-          from, part.x,
-          pending.values.begin() +
-              static_cast<std::ptrdiff_t>(band * side * side + area({spec_.tile, row - corner.y})) +
-              (low.x - corner.x));
+      const float* from = bands[band] + value_count({size.x, row - first.y}) + (low.x - first.x);
+      std::copy_n(from, part.x,
+                  pending.values.begin() +
+                      static_cast<std::ptrdiff_t>(band * side * side +
+                                                  value_count({spec_.tile, row - corner.y})) +
+                      (low.x - corner.x));
     }
   }
-  pending.cells += area(part);
-  if (pending.cells < area(whole)) return;
+  pending.cells += value_count(part);
+  if (pending.cells < value_count(whole)) return;
   write_tile(image, tile, pending.values);
   pending_.erase(key);
 }
@@ -177,7 +175,7 @@ std::vector<float> TiledTiff::read(int image, glm::ivec2 first, glm::ivec2 size)
       throw Error("a window of {} x {} cells from column {}, row {} on leaves image {} of {} x {}",
                   size.x, size.y, first.x, first.y, image, all.x, all.y);
     }
-    std::vector<float> values(area(size) * spec_.bands.size());
+    std::vector<float> values(value_count(size) * spec_.bands.size());
     CPLErrorReset();
     const CPLErr result =
         image_of(*dataset_, image)

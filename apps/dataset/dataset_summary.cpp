@@ -34,8 +34,8 @@ std::string read_name(yaml::Map& map, std::set<std::string>& names, yaml::Faults
   return name;
 }
 
-void read_sensor(const yaml::Node& node, yaml::Faults& faults, std::set<std::string>& names,
-                 DatasetSummary& summary) {
+void summarise_sensor(const yaml::Node& node, yaml::Faults& faults, std::set<std::string>& names,
+                      DatasetSummary& summary) {
   yaml::Map map(node, "sensors", faults);
   DatasetSummary::Sensor sensor;
   sensor.name = read_name(map, names, faults);
@@ -77,7 +77,7 @@ DatasetSummary read_summary(const std::filesystem::path& folder) {
   root.read_whole("seed", Need::Required, summary.seed);
   std::set<std::string> names;
   for (const yaml::Node& sensor : root.list("sensors", Need::Required))
-    read_sensor(sensor, faults, names, summary);
+    summarise_sensor(sensor, faults, names, summary);
   root.close_partly();
   faults.throw_if_any();
   while (const auto line = text.next_entry()) {

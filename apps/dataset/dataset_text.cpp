@@ -8,10 +8,10 @@
 #include <cerrno>
 #include <cstddef>
 #include <cstdio>
-#include <memory>
 #include <system_error>
 #include <utility>
 
+#include "apps/dataset/owned_file.h"
 #include "core/error.h"
 #include "core/product_io.h"
 
@@ -24,10 +24,6 @@ constexpr std::string_view frames_line = "frames:", files_line = "files:";
 constexpr std::string_view item = "  - ";
 constexpr std::string_view shard_begin = "shard: \"",
                            sum_key = "sha256_above:", sum_begin = "sha256_above: \"", quote = "\"";
-
-struct CloseFile {
-  void operator()(std::FILE* file) const noexcept { std::fclose(file); }
-};
 
 // Lines on their way to a file, and what they sum up to.
 class LineSink {
@@ -50,7 +46,7 @@ class LineSink {
  private:
   [[noreturn]] static void fail() { throw std::system_error(errno, std::generic_category()); }
 
-  std::unique_ptr<std::FILE, CloseFile> file_;
+  OwnedFile file_;
   Sha256 sum_;
 };
 

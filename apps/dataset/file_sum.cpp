@@ -11,21 +11,16 @@
 #include <system_error>
 #include <vector>
 
+#include "apps/dataset/owned_file.h"
 #include "core/error.h"
 
 namespace groundray {
 namespace {
 
-struct CloseFile {
-  void operator()(std::FILE* file) const noexcept { std::fclose(file); }
-};
-struct FreeContext {
-  void operator()(EVP_MD_CTX* context) const noexcept { EVP_MD_CTX_free(context); }
-};
-using Context = std::unique_ptr<EVP_MD_CTX, FreeContext>;
+using Context = std::unique_ptr<EVP_MD_CTX, decltype(&EVP_MD_CTX_free)>;
 
 Context make_context() {
-  Context context(EVP_MD_CTX_new());
+  Context context(EVP_MD_CTX_new(), EVP_MD_CTX_free);
   if (!context) throw std::bad_alloc();
   return context;
 }
@@ -69,7 +64,7 @@ std::string sha256_of(std::string_view bytes) {
 
 FileSum sum_file(const std::filesystem::path& path) {
   constexpr std::size_t block_bytes = 256 << 10;
-  const std::unique_ptr<std::FILE, CloseFile> file(std::fopen(path.c_str(), "rb"));
+  const OwnedFile file(std::fopen(path.c_str(), "rb"));
   std::vector<char> block(block_bytes);
   Sha256 sum;
   FileSum result;

@@ -15,6 +15,7 @@
 #include "apps/golden/suite/golden_case.h"
 #include "apps/golden/suite/suite.h"
 #include "apps/interruption.h"
+#include "apps/source_folder.h"
 #include "core/error.h"
 
 namespace {
@@ -87,7 +88,7 @@ int run(int argc, char** argv) {
   app.set_version_flag("--version", "groundray-golden " GROUNDRAY_VERSION);
   app.require_subcommand(1);
 
-  fs::path folder = GROUNDRAY_SOURCE_GOLDEN;
+  fs::path folder = groundray::source_folder() / "test/golden";
   SuiteOptions options{.program = own_folder() / "groundray",
                        .out = "out/golden",
                        .jobs = std::max(1U, std::thread::hardware_concurrency())};

@@ -1,5 +1,6 @@
 #include "apps/groundray/reconstruct_commands.h"
 
+#include <CLI/CLI.hpp>
 #include <array>
 #include <cmath>
 #include <filesystem>
@@ -27,11 +28,13 @@ std::optional<double> radians(const std::optional<double>& angle_deg) {
   return *angle_deg * radians_per_degree;
 }
 
-enum class Preset { Ground, Strict, Object };
+}  // namespace
+
+enum class SurfacePreset { Ground, Strict, Object };
 
 // What is taken for surface, and for one surface.
 struct SurfaceOptions {
-  std::optional<Preset> preset;
+  std::optional<SurfacePreset> preset;
   std::optional<double> incidence_deg, longest_m, noise_sds;
   std::optional<double> turned_deg, perimeter_m, apart_m;
   bool is_unorganised = false;
@@ -39,8 +42,9 @@ struct SurfaceOptions {
 
   void add(CLI::App* command) {
     CLI::App* surface = command->add_option_group("Surface");
-    const Words<Preset> presets{
-        {"ground", Preset::Ground}, {"strict", Preset::Strict}, {"object", Preset::Object}};
+    const Words<SurfacePreset> presets{{"ground", SurfacePreset::Ground},
+                                       {"strict", SurfacePreset::Strict},
+                                       {"object", SurfacePreset::Object}};
     add_words(surface, "--preset", preset,
               "Between which returns there is surface: ground (88 deg, 3 m), strict (85 "
               "deg, 2 m), object (75.5 deg)",
@@ -78,9 +82,9 @@ struct SurfaceOptions {
                     .apart_m = apart_m};
     if (turned_deg) meshing.merging.turned_rad = *turned_deg * radians_per_degree;
     if (is_unorganised) meshing.perimeter_m = perimeter_m.value_or(usual_perimeter_m);
-    if (preset == Preset::Ground) meshing.screening = ScreeningLimits::ground();
-    if (preset == Preset::Strict) meshing.screening = ScreeningLimits::strict();
-    if (preset == Preset::Object) meshing.screening = ScreeningLimits::object();
+    if (preset == SurfacePreset::Ground) meshing.screening = ScreeningLimits::ground();
+    if (preset == SurfacePreset::Strict) meshing.screening = ScreeningLimits::strict();
+    if (preset == SurfacePreset::Object) meshing.screening = ScreeningLimits::object();
     return meshing;
   }
 };
@@ -171,8 +175,6 @@ struct OutputOptions {
       finishing.most_bytes = *memory_mb * bytes_per_mb;
   }
 };
-
-}  // namespace
 
 struct ReconstructCommands::Options {
   CLI::App *all = nullptr, *mesh = nullptr, *simplify = nullptr, *fill = nullptr;

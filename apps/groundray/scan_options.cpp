@@ -1,5 +1,7 @@
 #include "apps/groundray/scan_options.h"
 
+#include <CLI/CLI.hpp>
+
 #include "apps/scan/word_option.h"
 
 namespace groundray {

@@ -1,12 +1,15 @@
 #pragma once
 
-#include <CLI/CLI.hpp>
 #include <string>
 
 #include "apps/dataset/scan_files.h"
 #include "apps/dataset/scan_input.h"
 #include "apps/scan/number_checks.h"
 #include "apps/scan/scan_flags.h"
+
+namespace CLI {
+class App;
+}
 
 namespace groundray {
 

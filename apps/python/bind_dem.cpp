@@ -309,9 +309,9 @@ AnyArray smoothed(const GivenRaster& heights_m, const GivenRaster& variance_m2, 
   return array_of(std::move(result.heights_m), {heights_m.rows(), heights_m.columns()});
 }
 
-nb::dict filled(const GivenRaster& heights_m, double cell_m, const std::string& reach,
-                std::optional<double> farthest_m, double largest_share,
-                const std::optional<GivenRaster>& most_m) {
+nb::dict filled_dem(const GivenRaster& heights_m, double cell_m, const std::string& reach,
+                    std::optional<double> farthest_m, double largest_share,
+                    const std::optional<GivenRaster>& most_m) {
   if (most_m) check_alike("fill_dem", heights_m, "most_m", *most_m);
   const FillOptions options{.reach = chosen<FillReach>("reach", reach,
                                                        {{"enclosed", FillReach::Enclosed},
@@ -348,8 +348,9 @@ void bind_dem(nb::module_& module) {
   curvature_sd_per_m  what second derivatives of the true ground are like; else what heights show
 
 Returns heights of the same shape, NaN where nothing was measured.)");
-  module.def("fill_dem", &filled, "heights_m"_a, nb::kw_only(), "cell_m"_a, "reach"_a = "enclosed",
-             "farthest_m"_a = nb::none(), "largest_share"_a = 0.2, "most_m"_a = nb::none(),
+  module.def("fill_dem", &filled_dem, "heights_m"_a, nb::kw_only(), "cell_m"_a,
+             "reach"_a = "enclosed", "farthest_m"_a = nb::none(), "largest_share"_a = 0.2,
+             "most_m"_a = nb::none(),
              nb::sig("def fill_dem(heights_m: numpy.typing.ArrayLike, *, cell_m: float, "
                      "reach: str = 'enclosed', farthest_m: float | None = None, "
                      "largest_share: float = 0.2, most_m: numpy.typing.ArrayLike | None = None)"

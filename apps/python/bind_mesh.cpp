@@ -43,8 +43,8 @@ constexpr ColumnRule label_rule{"labels", std::numeric_limits<std::uint16_t>::ma
 constexpr ColumnRule confidence_rule{"confidence", 1, "from 0 to 1"};
 
 template <typename T>
-std::vector<T> values_of(const ColumnRule& rule, const std::optional<GivenNumbers>& given,
-                         std::size_t vertices, Violations& broken) {
+std::vector<T> column_values(const ColumnRule& rule, const std::optional<GivenNumbers>& given,
+                             std::size_t vertices, Violations& broken) {
   std::vector<T> values;
   if (!given) return values;
   broken.unless(given->rows() == vertices,
@@ -78,10 +78,10 @@ std::vector<glm::uvec3> triangles_of(const GivenIndices& given, std::size_t vert
   return triangles;
 }
 
-Mesh mesh_of(const GivenPoints& vertices_m, const GivenIndices& triangles,
-             const std::optional<GivenNumbers>& sd_m, const std::optional<GivenNumbers>& labels,
-             const std::optional<GivenNumbers>& confidence,
-             const std::array<double, 3>& origin_w_m) {
+Mesh given_mesh(const GivenPoints& vertices_m, const GivenIndices& triangles,
+                const std::optional<GivenNumbers>& sd_m, const std::optional<GivenNumbers>& labels,
+                const std::optional<GivenNumbers>& confidence,
+                const std::array<double, 3>& origin_w_m) {
   const std::size_t count = vertices_m.rows();
   Violations broken("mesh");
   Mesh mesh;
@@ -89,9 +89,9 @@ Mesh mesh_of(const GivenPoints& vertices_m, const GivenIndices& triangles,
     mesh.measured.shape.vertices_m.emplace_back(vertices_m(i, 0), vertices_m(i, 1),
                                                 vertices_m(i, 2));
   mesh.measured.shape.triangles = triangles_of(triangles, count, broken);
-  mesh.measured.sd_m = values_of<float>(sd_rule, sd_m, count, broken);
-  mesh.measured.labels = values_of<std::uint16_t>(label_rule, labels, count, broken);
-  mesh.measured.confidence = values_of<float>(confidence_rule, confidence, count, broken);
+  mesh.measured.sd_m = column_values<float>(sd_rule, sd_m, count, broken);
+  mesh.measured.labels = column_values<std::uint16_t>(label_rule, labels, count, broken);
+  mesh.measured.confidence = column_values<float>(confidence_rule, confidence, count, broken);
   mesh.georeference.origin_w_m = {origin_w_m[0], origin_w_m[1], origin_w_m[2]};
   broken.unless(std::ranges::all_of(origin_w_m, [](double x) { return std::isfinite(x); }),
                 "origin_w_m = ({}, {}, {}) must be finite", origin_w_m[0], origin_w_m[1],
@@ -131,7 +131,7 @@ void bind_mesh(nb::module_& module) {
              const std::optional<GivenNumbers>& confidence,
              const std::array<double, 3>& origin_w_m) {
             new (place) Mesh(without_gil([&](const StopRequest&) {
-              return mesh_of(vertices_m, triangles, sd_m, labels, confidence, origin_w_m);
+              return given_mesh(vertices_m, triangles, sd_m, labels, confidence, origin_w_m);
             }));
           },
           "vertices_m"_a, "triangles"_a, nb::kw_only(), "sd_m"_a = nb::none(),

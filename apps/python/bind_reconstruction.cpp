@@ -48,8 +48,8 @@ bool knows_noise(const ScanMesh& scan) {
   return std::ranges::any_of(scan.mesh.sd_m, [](float sd_m) { return sd_m > 0; });
 }
 
-MergedMesh mesh_of(const std::vector<const Sweep*>& sweeps, const Linking& linking,
-                   std::optional<double> apart_m, const StopRequest& stop) {
+MergedMesh merged_mesh(const std::vector<const Sweep*>& sweeps, const Linking& linking,
+                       std::optional<double> apart_m, const StopRequest& stop) {
   std::vector<ScanMesh> meshes;
   for (const Sweep* sweep : sweeps) {
     stop.obey();
@@ -86,8 +86,8 @@ MeshAndFigures reconstruct_mesh(const std::vector<const Sweep*>& scans, const st
   linking.screening.incidence_rad = incidence_rad.value_or(linking.screening.incidence_rad);
   linking.screening.longest_m = longest_m.value_or(linking.screening.longest_m);
   linking.screening.noise_sds = noise_sds.value_or(linking.screening.noise_sds);
-  MergedMesh merged =
-      without_gil([&](const StopRequest& stop) { return mesh_of(scans, linking, apart_m, stop); });
+  MergedMesh merged = without_gil(
+      [&](const StopRequest& stop) { return merged_mesh(scans, linking, apart_m, stop); });
   const DemHeader& header = scans.front()->state->world.terrain.header();
   nb::dict figures;
   figures["redundant"] = merged.counts.redundant;
@@ -158,7 +158,7 @@ MeshAndFigures simplified(const Mesh& mesh, std::optional<double> max_vertical_e
   return {Mesh{std::move(result.mesh), mesh.georeference}, std::move(figures)};
 }
 
-MeshAndFigures filled(const Mesh& mesh, double longest_m) {
+MeshAndFigures filled_mesh(const Mesh& mesh, double longest_m) {
   FilledMesh result = without_gil([&](const StopRequest& stop) {
     return fill_holes(mesh.measured, {.longest_m = longest_m},
                       {.progress = [&](double /*share*/) { stop.obey(); }});
@@ -209,7 +209,7 @@ void bind_reconstruction(nb::module_& module) {
              "max_vertical_error_m"_a = nb::none(), "max_error_m"_a = nb::none(),
              "triangles"_a = nb::none(), "noise_sds"_a = nb::none(), "knee"_a = false,
              "border_m"_a = nb::none(), "crease_rad"_a = nb::none(), simplify_doc);
-  module.def("fill_holes", &filled, "mesh"_a, "longest_m"_a,
+  module.def("fill_holes", &filled_mesh, "mesh"_a, "longest_m"_a,
              R"(Fills the holes of a mesh whose rim is no longer than this, metres, smoothly.
 
 Returns the mesh, in which what was measured comes first, and figures: how many holes were filled

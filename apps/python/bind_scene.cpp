@@ -45,7 +45,7 @@ SharedScene build(SceneSpec spec, std::optional<std::uint64_t> seed) {
   });
 }
 
-SharedScene load(const std::filesystem::path& path, std::optional<std::uint64_t> seed) {
+SharedScene open_scene(const std::filesystem::path& path, std::optional<std::uint64_t> seed) {
   return build(
       without_gil([&](const StopRequest&) { return load_scene(path, data_folder() / "sensors"); }),
       seed);
@@ -97,8 +97,8 @@ std::shared_ptr<const Scene> scene_for(SceneState& state, const SensorBox& box) 
                                              world.content.cover});
 }
 
-Points cast(SceneState& state, const GivenPoints& origins_m, const GivenPoints& directions,
-            double t_s, bool error_bound) {
+Points cast_in_scene(SceneState& state, const GivenPoints& origins_m, const GivenPoints& directions,
+                     double t_s, bool error_bound) {
   const auto time = nanoseconds_of(t_s);
   if (time < std::chrono::nanoseconds(0) || time > run_time(state.world.spec))
     throw Error("cast_rays: t_s = {} must be within the scene's time, 0 to {} s", t_s,
@@ -112,7 +112,7 @@ Points cast(SceneState& state, const GivenPoints& origins_m, const GivenPoints& 
   });
 }
 
-AnyArray heights_at(const SceneState& state, const GivenPlaces& places_m) {
+AnyArray ground_heights(const SceneState& state, const GivenPlaces& places_m) {
   return array_of(without_gil([&](const StopRequest&) {
     const Ground& ground = state.world.terrain.ground();
     std::vector<double> heights_m(places_m.rows());
@@ -191,13 +191,13 @@ See load_scene and scene. Immutable: any number of threads may use one.)")
       .def_prop_ro("objects", &groups_of,
                    nb::sig("def objects(self) -> list[dict[str, typing.Any]]"),
                    "Entries with objects: name, label, and their instances: count from first on.")
-      .def("heights_at", &heights_at, "places_m"_a,
+      .def("heights_at", &ground_heights, "places_m"_a,
            R"(Heights of the ground's reference surface, n metres, in doubles.
 
   places_m  n x 2, x and y in the frame D
 
 NaN outside of the DEM and in its holes. Objects are left out.)")
-      .def("cast_rays", &cast, "origins_m"_a, "directions"_a, "t_s"_a = 0.0, nb::kw_only(),
+      .def("cast_rays", &cast_in_scene, "origins_m"_a, "directions"_a, "t_s"_a = 0.0, nb::kw_only(),
            "error_bound"_a = false, cast_doc)
       .def("__repr__", [](const SceneState& scene) {
         return fmt::format("<Scene of {} s: lidars [{}], cameras [{}]>",
@@ -205,7 +205,7 @@ NaN outside of the DEM and in its holes. Objects are left out.)")
                            fmt::join(sensor_names(scene.world.lidars), ", "),
                            fmt::join(sensor_names(scene.world.cameras), ", "));
       });
-  module.def("load_scene", &load, "path"_a, "seed"_a = nb::none(),
+  module.def("load_scene", &open_scene, "path"_a, "seed"_a = nb::none(),
              R"(Loads a scene file (docs/scene.md) and everything it names.
 
 `seed` takes the place of the scene's own. Ctrl-C ends the certification of a large DEM.

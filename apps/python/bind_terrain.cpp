@@ -61,8 +61,8 @@ Dem dem_of(const GivenRaster& heights_m, double cell_m, const Pair& south_west_w
 
 using SharedTerrain = std::shared_ptr<TerrainModel>;
 
-SharedTerrain load(const std::filesystem::path& path, std::optional<double> nodata,
-                   const std::string& reproject_to) {
+SharedTerrain open_terrain(const std::filesystem::path& path, std::optional<double> nodata,
+                           const std::string& reproject_to) {
   return without_gil([&](const StopRequest&) {
     return std::make_shared<TerrainModel>(load_dem(path, {nodata, reproject_to}));
   });
@@ -77,8 +77,8 @@ void save(const TerrainModel& terrain, const std::filesystem::path& path) {
   });
 }
 
-Points cast(const TerrainModel& terrain, const GivenPoints& origins_m,
-            const GivenPoints& directions) {
+Points cast_on_terrain(const TerrainModel& terrain, const GivenPoints& origins_m,
+                       const GivenPoints& directions) {
   const GivenRays rays(origins_m, directions, {});
   return without_gil([&](const StopRequest& stop) {
     rays.check();
@@ -86,7 +86,7 @@ Points cast(const TerrainModel& terrain, const GivenPoints& origins_m,
   });
 }
 
-AnyArray heights_at(const TerrainModel& terrain, const GivenPlaces& places_m) {
+AnyArray dem_heights(const TerrainModel& terrain, const GivenPlaces& places_m) {
   return array_of(without_gil([&](const StopRequest&) {
     const HeightGrid& grid = terrain.dem().grid;
     std::vector<double> heights_m(places_m.rows());
@@ -98,7 +98,7 @@ AnyArray heights_at(const TerrainModel& terrain, const GivenPlaces& places_m) {
   }));
 }
 
-Mesh mesh_of(const TerrainModel& terrain, double max_error_m) {
+Mesh terrain_mesh(const TerrainModel& terrain, double max_error_m) {
   return without_gil([&](const StopRequest&) {
     const Dem& dem = terrain.dem();
     TerrainMesh built = build_terrain_mesh(dem.grid, {.tolerance_m = max_error_m});
@@ -171,20 +171,20 @@ void bind_terrain(nb::module_& module) {
       .def_prop_ro(
           "crs", [](const TerrainModel& terrain) { return terrain.dem().crs_name; },
           "W's coordinate reference system, for people.")
-      .def("heights_at", &heights_at, "places_m"_a,
+      .def("heights_at", &dem_heights, "places_m"_a,
            R"(Heights of the surface, n metres, in doubles.
 
   places_m  n x 2, x and y in the frame D
 
 NaN outside of the DEM and in its holes.)")
-      .def("cast_rays", &cast, "origins_m"_a, "directions"_a,
+      .def("cast_rays", &cast_on_terrain, "origins_m"_a, "directions"_a,
            R"(Casts rays at the surface, every facet decided in double, on all cores.
 
   origins_m   n x 3, metres in the frame D
   directions  n x 3, axes of D, of any length but zero
 
 As Scene.cast_rays; what stands on the ground is not there, and its label is 1.)")
-      .def("mesh", &mesh_of, "max_error_m"_a,
+      .def("mesh", &terrain_mesh, "max_error_m"_a,
            R"(The triangle mesh that is nowhere farther than this from the surface, vertically.
 
 Certified, at samples and between them; without T-junctions. 0 keeps all but what is flat.)")
@@ -195,7 +195,8 @@ Certified, at samples and between them; without T-junctions. 0 keeps all but wha
         return fmt::format("<Terrain: {} x {} samples of {} m, {}>", grid.columns(), grid.rows(),
                            std::abs(grid.step_m().x), terrain.dem().crs_name);
       });
-  module.def("load_terrain", &load, "path"_a, "nodata"_a = nb::none(), "reproject_to"_a = "",
+  module.def("load_terrain", &open_terrain, "path"_a, "nodata"_a = nb::none(),
+             "reproject_to"_a = "",
              R"(Loads a DEM as a whole: GeoTIFF, HGT, ESRI ASCII and whatever else GDAL reads.
 
   nodata        a stored value that means "no height", besides the file's own

@@ -14,7 +14,7 @@
 namespace groundray {
 namespace {
 
-using Words = std::vector<std::string>;
+using LineWords = std::vector<std::string>;
 
 // Where rows are in a file, and what tells of them.
 struct Layout {
@@ -25,9 +25,9 @@ struct Layout {
   std::uint64_t row_bytes = 0;
 };
 
-Words words_of(std::string_view line) {
+LineWords words_of(std::string_view line) {
   std::istringstream stream{std::string(line)};
-  Words words;
+  LineWords words;
   for (std::string word; stream >> word;) words.push_back(word);
   return words;
 }
@@ -52,13 +52,13 @@ std::uint64_t bytes_of(const std::vector<std::string_view>& lines) {
 
 std::uint64_t whole(const std::string& word) { return number_of<std::uint64_t>(word).value_or(0); }
 
-Layout of_floats(std::uint64_t file_bytes, std::size_t columns) {
+Layout layout_of_floats(std::uint64_t file_bytes, std::size_t columns) {
   constexpr std::size_t kitti = 4;
   const std::uint64_t row_bytes = sizeof(float) * (columns == 0 ? kitti : columns);
   return {.head = {""}, .rows = file_bytes / row_bytes, .row_bytes = row_bytes};
 }
 
-Layout of_npy(std::string_view head, std::uint64_t file_bytes) {
+Layout layout_of_npy(std::string_view head, std::uint64_t file_bytes) {
   constexpr std::size_t first = 10, later = 12;  // of versions, to where the text begins
   if (head.size() < later || !head.starts_with("\x93NUMPY")) return {};
   const auto byte = [&](std::size_t i) {
@@ -106,13 +106,13 @@ std::uint64_t bytes_of_ply(const std::string& type) {
 }
 
 // Points come first; what follows them is left out.
-Layout of_ply(std::string_view head) {
+Layout layout_of_ply(std::string_view head) {
   const auto lines = lines_up_to(head, "end_header");
   Layout layout{.begin = bytes_of(lines)};
   std::string before, after;
   int elements = 0;
   for (const std::string_view line : lines) {
-    const Words words = words_of(line);
+    const LineWords words = words_of(line);
     if (words.size() < 2) continue;  // the first and the last
     if (words[0] == "format" && !words[1].starts_with("binary")) return {};
     if (words[0] == "element" && ++elements == 1) {
@@ -132,13 +132,13 @@ Layout of_ply(std::string_view head) {
   return layout;
 }
 
-Layout of_pcd(std::string_view head) {
+Layout layout_of_pcd(std::string_view head) {
   const auto lines = lines_up_to(head, "DATA binary");
   Layout layout{.begin = bytes_of(lines)};
   std::string before;
-  Words sizes, counts;
+  LineWords sizes, counts;
   for (const std::string_view line : lines) {
-    const Words words = words_of(line);
+    const LineWords words = words_of(line);
     if (words.size() < 2) continue;
     if (words[0] == "DATA" && words[1] != "binary") return {};  // compressed
     if (words[0] == "SIZE") sizes = words;
@@ -156,10 +156,10 @@ Layout of_pcd(std::string_view head) {
 
 Layout layout_of(const std::string& ending, std::string_view head, std::uint64_t file_bytes,
                  std::size_t columns) {
-  if (ending == ".bin") return of_floats(file_bytes, columns);
-  if (ending == ".npy") return of_npy(head, file_bytes);
-  if (ending == ".ply") return of_ply(head);
-  if (ending == ".pcd") return of_pcd(head);
+  if (ending == ".bin") return layout_of_floats(file_bytes, columns);
+  if (ending == ".npy") return layout_of_npy(head, file_bytes);
+  if (ending == ".ply") return layout_of_ply(head);
+  if (ending == ".pcd") return layout_of_pcd(head);
   return {};
 }
 

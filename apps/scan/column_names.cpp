@@ -10,7 +10,7 @@
 namespace groundray {
 namespace {
 
-using Words = std::span<const std::string_view>;
+using Synonyms = std::span<const std::string_view>;
 
 constexpr std::array<std::string_view, 10> x_words{
     "x", "xm", "positionx", "positions0", "position0", "posx", "pointx", "px", "xyz0", "points0"};
@@ -45,22 +45,22 @@ constexpr std::array<std::string_view, 7> column_words{
 constexpr std::array<std::string_view, 6> range_sd_words{
     "rangesd", "rangesigma", "rangestd", "rangestddev", "rangestandarddeviation", "sigmarange"};
 
-Words words_for(std::string_view ours) {
-  const std::array<std::pair<std::string_view, Words>, 13> all{{{"x", x_words},
-                                                                {"y", y_words},
-                                                                {"z", z_words},
-                                                                {"intensity", intensity_words},
-                                                                {"ring", ring_words},
-                                                                {"time", time_words},
-                                                                {"return_index", return_words},
-                                                                {"pulse", pulse_words},
-                                                                {"label", label_words},
-                                                                {"incidence", incidence_words},
-                                                                {"range", range_words},
-                                                                {"column", column_words},
-                                                                {"range_sd", range_sd_words}}};
-  const auto found = std::ranges::find(all, ours, &std::pair<std::string_view, Words>::first);
-  return found == all.end() ? Words() : found->second;
+Synonyms synonyms_of(std::string_view ours) {
+  const std::array<std::pair<std::string_view, Synonyms>, 13> all{{{"x", x_words},
+                                                                   {"y", y_words},
+                                                                   {"z", z_words},
+                                                                   {"intensity", intensity_words},
+                                                                   {"ring", ring_words},
+                                                                   {"time", time_words},
+                                                                   {"return_index", return_words},
+                                                                   {"pulse", pulse_words},
+                                                                   {"label", label_words},
+                                                                   {"incidence", incidence_words},
+                                                                   {"range", range_words},
+                                                                   {"column", column_words},
+                                                                   {"range_sd", range_sd_words}}};
+  const auto found = std::ranges::find(all, ours, &std::pair<std::string_view, Synonyms>::first);
+  return found == all.end() ? Synonyms() : found->second;
 }
 
 /// Letters and digits alone, in lower case; "scalar_" before them is CloudCompare's.
@@ -101,7 +101,7 @@ std::optional<NamedColumn> find_column(const std::vector<std::string>& columns,
                                        std::string_view ours) {
   const bool has_green =  // then r is red
       std::ranges::any_of(columns, [](const std::string& name) { return plain(name) == "g"; });
-  for (const std::string_view word : words_for(ours)) {
+  for (const std::string_view word : synonyms_of(ours)) {
     if (word == "r" && has_green) continue;
     for (const std::string& name : columns) {
       const auto [stem, unit_s] = ours == "time"

@@ -1,5 +1,6 @@
 #include "apps/scan/number_checks.h"
 
+#include <CLI/CLI.hpp>
 #include <cmath>
 #include <optional>
 #include <string>

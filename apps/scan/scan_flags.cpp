@@ -1,5 +1,6 @@
 #include "apps/scan/scan_flags.h"
 
+#include <CLI/CLI.hpp>
 #include <chrono>
 #include <cmath>
 #include <glm/gtc/quaternion.hpp>

@@ -60,26 +60,22 @@ PlacedObject stand(const StandingObject& place, const Terrain& terrain, double s
   return object;
 }
 
-double seconds(std::chrono::nanoseconds time) {
-  return std::chrono::duration<double>(time).count();
-}
-
-Trajectory lay_path(const RecordedPath& path, const SceneSpec& spec, const Terrain& terrain,
-                    std::chrono::nanoseconds begin) {
+Trajectory lay_object_path(const RecordedPath& path, const SceneSpec& spec, const Terrain& terrain,
+                           std::chrono::nanoseconds begin) {
   Trajectory X_DO = recorded_path(path, terrain, begin);
   const std::chrono::nanoseconds end = begin + run_time(spec);
   if (X_DO.end_time() < std::chrono::nanoseconds(0) || run_time(spec) < X_DO.begin_time()) {
     throw Error(
         "{}: it lasts from {:.3f} s to {:.3f} s, and misses the run, from {:.3f} s to {:.3f} s; "
         "are its times on the clock of the platform's trajectory?",
-        path.tum.string(), seconds(X_DO.begin_time() + begin), seconds(X_DO.end_time() + begin),
-        seconds(begin), seconds(end));
+        path.tum.string(), in_seconds(X_DO.begin_time() + begin),
+        in_seconds(X_DO.end_time() + begin), in_seconds(begin), in_seconds(end));
   }
   return X_DO;
 }
 
-Trajectory lay_path(const DrivenPath& path, const SceneSpec& spec, const Terrain& terrain,
-                    std::chrono::nanoseconds /*begin*/) {
+Trajectory lay_object_path(const DrivenPath& path, const SceneSpec& spec, const Terrain& terrain,
+                           std::chrono::nanoseconds /*begin*/) {
   return extended(driven_path(path, terrain, run_time(spec)), spec);
 }
 
@@ -92,9 +88,9 @@ void add_object(const ObjectSpec& object, const SceneSpec& spec, const Terrain& 
     return;
   }
   const auto* recorded = std::get_if<RecordedPath>(&object.place);
-  into.moving.push_back({recorded != nullptr
-                             ? lay_path(*recorded, spec, terrain, begin)
-                             : lay_path(std::get<DrivenPath>(object.place), spec, terrain, begin),
+  into.moving.push_back({recorded != nullptr ? lay_object_path(*recorded, spec, terrain, begin)
+                                             : lay_object_path(std::get<DrivenPath>(object.place),
+                                                               spec, terrain, begin),
                          object.scale, model});
   into.moving_groups.push_back(
       {object.name, object.label, static_cast<std::uint32_t>(into.moving.size()), 1});

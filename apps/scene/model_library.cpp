@@ -63,7 +63,7 @@ void check_names(const ModelSpec& spec, const Model& model) {
   }
 }
 
-void add(const Model& model, Fingerprint& print) {
+void add_model(const Model& model, Fingerprint& print) {
   print.add(std::span(model.mesh.vertices_m));
   print.add(std::span(model.mesh.triangles));
   print.add(std::span(model.uv));
@@ -124,7 +124,7 @@ std::vector<ModelScene> ModelLibrary::models() const {
 }
 
 void ModelLibrary::add_to(Fingerprint& print) const {
-  for (const ModelScene& shape : shapes_) groundray::add(shape.model(), print);
+  for (const ModelScene& shape : shapes_) add_model(shape.model(), print);
   print.add(std::span(shape_of_));
   for (const ModelTruth& truth : truths_) print.add(std::span(truth.materials));
 }

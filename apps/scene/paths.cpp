@@ -9,13 +9,6 @@
 #include "terrain/ground_path.h"
 
 namespace groundray {
-namespace {
-
-double seconds(std::chrono::nanoseconds time) {
-  return std::chrono::duration<double>(time).count();
-}
-
-}  // namespace
 
 std::chrono::nanoseconds run_time(const SceneSpec& spec) {
   return std::chrono::nanoseconds(std::llround(spec.duration_s * 1e9));
@@ -39,7 +32,8 @@ Trajectory extended(const Trajectory& path, const SceneSpec& spec) {
   Pose onwards;
   if (samples.size() > 1) {
     const auto& [time_before, X_DB_before] = samples[samples.size() - 2];
-    onwards = Screw(inverse(X_DB_before) * X_DB).at(seconds(more) / seconds(time - time_before));
+    onwards =
+        Screw(inverse(X_DB_before) * X_DB).at(in_seconds(more) / in_seconds(time - time_before));
   }
   samples.push_back({time + more, X_DB * onwards});
   return Trajectory(std::move(samples));

@@ -10,6 +10,11 @@
 
 namespace groundray {
 
+/// Returns a time in seconds.
+inline double in_seconds(std::chrono::nanoseconds time) {
+  return std::chrono::duration<double>(time).count();
+}
+
 /// How long a scene runs.
 std::chrono::nanoseconds run_time(const SceneSpec& spec);
 

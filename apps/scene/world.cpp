@@ -15,6 +15,7 @@
 
 #include "apps/scene/certifying.h"
 #include "apps/scene/paths.h"
+#include "apps/source_folder.h"
 #include "core/error.h"
 #include "core/image_io.h"
 #include "core/product_io.h"
@@ -23,26 +24,22 @@
 namespace groundray {
 namespace {
 
-double seconds(std::chrono::nanoseconds time) {
-  return std::chrono::duration<double>(time).count();
-}
-
 // The path in D, from time 0 on; `begin` is told when that was on the recorder's clock.
-Trajectory lay_path(const RecordedPath& path, const SceneSpec& spec, const Terrain& terrain,
-                    std::chrono::nanoseconds& begin) {
+Trajectory lay_platform_path(const RecordedPath& path, const SceneSpec& spec,
+                             const Terrain& terrain, std::chrono::nanoseconds& begin) {
   begin = read_tum(path.tum).begin_time();
   Trajectory X_DB = recorded_path(path, terrain, begin);
   if (X_DB.end_time() < run_time(spec)) {
     throw Error(
         "{}: the trajectory lasts {:.3f} s but the scene's duration_s is {} s; record longer or "
         "run shorter",
-        path.tum.string(), seconds(X_DB.end_time()), spec.duration_s);
+        path.tum.string(), in_seconds(X_DB.end_time()), spec.duration_s);
   }
   return X_DB;
 }
 
-Trajectory lay_path(const DrivenPath& path, const SceneSpec& spec, const Terrain& terrain,
-                    std::chrono::nanoseconds& /*begin*/) {
+Trajectory lay_platform_path(const DrivenPath& path, const SceneSpec& spec, const Terrain& terrain,
+                             std::chrono::nanoseconds& /*begin*/) {
   return driven_path(path, terrain, run_time(spec));
 }
 
@@ -68,7 +65,7 @@ void check_place(const std::string& sensor, const Trajectory& X_DS, double reach
         "{}: at {:.3f} s it is {:.3f} m below the ground, at ({:.3f}, {:.3f}, {:.3f}) m in W; "
         "raise its mount or the platform's height, or check that the trajectory and the DEM share "
         "a vertical datum",
-        sensor, seconds(time), *ground_m - p_DS.z, p_WS.x, p_WS.y, p_WS.z);
+        sensor, in_seconds(time), *ground_m - p_DS.z, p_WS.x, p_WS.y, p_WS.z);
   }
   if (in_reach) return;
   const glm::dvec3 p_DS = X_DS.samples().front().pose.translation_m;
@@ -171,7 +168,7 @@ std::filesystem::path data_folder() {
   for (const auto& folder :
        {own_file().parent_path() / "data", program.parent_path().parent_path() / "share/groundray"})
     if (std::filesystem::exists(folder / "sensors", ignored)) return folder;
-  return GROUNDRAY_SOURCE_DATA;
+  return source_folder() / "data";
 }
 
 World load_world(const std::filesystem::path& scene, std::optional<Seed> seed) {
@@ -185,10 +182,10 @@ World build_world(SceneSpec spec, const Terrain::Progress& progress) {
   Terrain terrain(spec.terrain.dem, spec.terrain.options, spec.terrain.detail, progress,
                   spec.terrain.relief);
   std::chrono::nanoseconds begin{0};
-  const Trajectory X_DB =
-      extended(std::visit([&](const auto& path) { return lay_path(path, spec, terrain, begin); },
-                          spec.platform),
-               spec);
+  const Trajectory X_DB = extended(
+      std::visit([&](const auto& path) { return lay_platform_path(path, spec, terrain, begin); },
+                 spec.platform),
+      spec);
   std::vector<PlacedLidar> lidars = place_lidars(spec, X_DB);
   std::vector<PlacedCamera> cameras = place_cameras(spec, X_DB);
   for (const auto& [mounted, lidar, X_DS, sweeps] : lidars) {

@@ -20,7 +20,7 @@ namespace {
 
 using std::chrono::nanoseconds;
 
-constexpr std::array<std::pair<std::string_view, std::string_view>, 22> units{
+constexpr std::array<std::pair<std::string_view, std::string_view>, 22> echo_units{
     {{"x", "m"},           {"y", "m"},        {"z", "m"},           {"time", "s"},
      {"world_x", "m"},     {"world_y", "m"},  {"world_z", "m"},     {"range_true", "m"},
      {"incidence", "rad"}, {"range_sd", "m"}, {"error_bound", "m"}, {"error_estimate", "m"},
@@ -28,9 +28,10 @@ constexpr std::array<std::pair<std::string_view, std::string_view>, 22> units{
      {"vz", "m/s"},        {"sd_m", "m"},     {"range", "m"},       {"origin_x", "m"},
      {"origin_y", "m"},    {"origin_z", "m"}}};
 
-std::string unit_of(const std::string& column) {
-  const auto found = std::ranges::find(units, column, [](const auto& unit) { return unit.first; });
-  return found == units.end() ? "" : " " + std::string(found->second);
+std::string unit_suffix(const std::string& column) {
+  const auto found =
+      std::ranges::find(echo_units, column, [](const auto& unit) { return unit.first; });
+  return found == echo_units.end() ? "" : " " + std::string(found->second);
 }
 
 void check_row(const PointCloud& scan, std::size_t row) {
@@ -83,17 +84,18 @@ std::string name_of(const PointCloud::Column& column, std::uint32_t number,
   return number == 0 ? " (the ground)" : "";
 }
 
-std::string text_of(const PointCloud::Column& column, std::size_t row, const RecordedNames& names) {
+std::string cell_text(const PointCloud::Column& column, std::size_t row,
+                      const RecordedNames& names) {
   const double value = value_of(column, row);
   const bool is_double = std::holds_alternative<PointCloud::Values<double>>(column.values);
   if (is_double || std::holds_alternative<PointCloud::Values<float>>(column.values)) {
     if (std::isnan(value)) return "none";
-    return fmt::format("{:.{}g}{}", value, is_double ? 12 : 7, unit_of(column.name));
+    return fmt::format("{:.{}g}{}", value, is_double ? 12 : 7, unit_suffix(column.name));
   }
   const auto number = static_cast<std::int64_t>(value);
   const std::string name =
       number < 0 ? "" : name_of(column, static_cast<std::uint32_t>(number), names);
-  return fmt::format("{}{}{}", number, unit_of(column.name), name);
+  return fmt::format("{}{}{}", number, unit_suffix(column.name), name);
 }
 
 // A pulse as it left the sensor, in S as it fired.
@@ -158,10 +160,6 @@ std::optional<FiredPulse> find_pulse(const RecordedSensor& lidar, const Recorded
   const double rounding_s = 2e-9 + std::abs(*time_s) * 1.2e-7;
   return pulse_at(pattern, frame.number, stamp_s + *time_s, rounding_s,
                   static_cast<std::uint16_t>(*ring));
-}
-
-Pose pose_at(const RecordedSensor& lidar, nanoseconds time) {
-  return lidar.X_DS.pose_at(std::clamp(time, lidar.X_DS.begin_time(), lidar.X_DS.end_time()));
 }
 
 // Whether a point lies on a pulse, but for what floats and noise of angles leave.
@@ -232,7 +230,7 @@ std::vector<EchoValue> echo_values(const PointCloud& scan, std::size_t row,
   check_row(scan, row);
   std::vector<EchoValue> values;
   for (const PointCloud::Column& column : scan.columns())
-    values.push_back({column.name, text_of(column, row, names)});
+    values.push_back({column.name, cell_text(column, row, names)});
   return values;
 }
 

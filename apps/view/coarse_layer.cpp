@@ -120,9 +120,9 @@ std::vector<std::uint32_t> first_of_cells(std::span<const float> at, const glm::
 }
 
 // Gathers triangles that stay, and numbers their vertices anew.
-class Gathered {
+class KeptTriangles {
  public:
-  explicit Gathered(std::size_t vertices)
+  explicit KeptTriangles(std::size_t vertices)
       : number_(vertices, std::numeric_limits<std::uint32_t>::max()) {}
 
   void add(glm::uvec3 corner, std::size_t cell) {
@@ -160,7 +160,7 @@ glm::uvec3 least_first(const glm::uvec3& corner) {
 Clustered cluster(std::span<const float> at, std::span<const std::int32_t> corner,
                   const glm::dvec3& low, double cell_m) {
   const std::vector<std::uint32_t> first = first_of_cells(at, low, cell_m);
-  Gathered gathered(first.size());
+  KeptTriangles gathered(first.size());
   std::unordered_set<glm::uvec3, Scattered> seen;
   for (std::size_t i = 0; i + 2 < corner.size(); i += 3) {
     glm::uvec3 place;
@@ -200,8 +200,8 @@ Clustered cluster_to(std::span<const float> at, std::span<const std::int32_t> co
 }
 
 // The largest triangles; of equal ones, some from everywhere.
-Clustered largest(std::span<const std::int32_t> corner, std::span<const double> areas_m2,
-                  std::size_t vertices, std::size_t triangles) {
+Clustered largest_triangles(std::span<const std::int32_t> corner, std::span<const double> areas_m2,
+                            std::size_t vertices, std::size_t triangles) {
   std::vector<std::uint32_t> cells(areas_m2.size());
   std::iota(cells.begin(), cells.end(), 0U);
   const auto end = cells.begin() + static_cast<std::ptrdiff_t>(triangles);
@@ -211,7 +211,7 @@ Clustered largest(std::span<const std::int32_t> corner, std::span<const double> 
     return first != second ? first > second : scatter(a) < scatter(b);
   });
   std::sort(cells.begin(), end);
-  Gathered gathered(vertices);
+  KeptTriangles gathered(vertices);
   for (auto cell = cells.begin(); cell != end; ++cell) {
     const std::int32_t* const c = &corner[std::size_t{3} * *cell];
     gathered.add(glm::uvec3(c[0], c[1], c[2]), *cell);
@@ -243,7 +243,7 @@ vtkSmartPointer<vtkPolyData> thin_triangles(const Layer& surface, std::size_t tr
   const double area_m2 = std::accumulate(areas.begin(), areas.end(), 0.0);
   Clustered kept = cluster_to(at, corner, area_m2, triangles);
   if (8 * kept.triangles.size() < triangles)
-    kept = largest(corner, areas, at.size() / 3, triangles);
+    kept = largest_triangles(corner, areas, at.size() / 3, triangles);
   auto thinned = take_points(*surface.data, kept.vertices);
   set_triangles(*thinned, kept.triangles);
   copy_rows(*thinned->GetCellData(), *surface.data->GetCellData(), kept.cells);

@@ -26,9 +26,9 @@ constexpr std::array<std::uint32_t, 9> blue_to_red = {
 constexpr std::array<std::uint32_t, 6> earth = {0x2f5d50, 0x5d8257, 0x99a36b,
                                                 0xc8b98a, 0xe0d0b1, 0xf8f4ec};
 // Told apart by people with any sort of colour vision as far as ten can be: 0 is grey, for nothing.
-constexpr std::array<std::uint32_t, 13> kinds = {0x9a9a9a, 0x4e79a7, 0xf28e2b, 0x59a14f, 0xe15759,
-                                                 0x76b7b2, 0xedc948, 0xb07aa1, 0xff9da7, 0x9c755f,
-                                                 0x1b9e77, 0xd95f02, 0x7570b3};
+constexpr std::array<std::uint32_t, 13> kind_colours = {
+    0x9a9a9a, 0x4e79a7, 0xf28e2b, 0x59a14f, 0xe15759, 0x76b7b2, 0xedc948,
+    0xb07aa1, 0xff9da7, 0x9c755f, 0x1b9e77, 0xd95f02, 0x7570b3};
 
 glm::dvec3 rgb(std::uint32_t hex) {
   return glm::dvec3((hex >> 16U) & 255U, (hex >> 8U) & 255U, hex & 255U) / 255.0;
@@ -63,8 +63,8 @@ glm::dvec3 colour_on(ColourScale scale, double share) {
 }
 
 glm::dvec3 colour_of_kind(int kind) {
-  if (kind <= 0) return rgb(kinds[0]);
-  return rgb(kinds[1 + static_cast<std::size_t>(kind - 1) % (kinds.size() - 1)]);
+  if (kind <= 0) return rgb(kind_colours[0]);
+  return rgb(kind_colours[1 + static_cast<std::size_t>(kind - 1) % (kind_colours.size() - 1)]);
 }
 
 glm::dvec3 colour_of_kind(const LayerColumn& column, int kind) {

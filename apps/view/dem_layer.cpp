@@ -89,7 +89,7 @@ PointCloud table_of(const RasterBands& bands) {
   return table;
 }
 
-std::vector<float> slopes_deg(const Layer& layer) {
+std::vector<float> layer_slopes_deg(const Layer& layer) {
   const auto places = coordinates(*layer.data);
   const auto corner = corners(*layer.data);
   const auto at = [&](std::int32_t i) {
@@ -137,7 +137,7 @@ void add_bands(Layer& layer, const RasterBands& bands, const std::vector<std::si
   }
 }
 
-std::vector<std::string> facts_of(const DemHeader& header, int all_bands, int step) {
+std::vector<std::string> raster_facts(const DemHeader& header, int all_bands, int step) {
   std::vector<std::string> facts = {
       fmt::format("{} x {} samples, {} bands", header.samples.x, header.samples.y, all_bands)};
   if (all_bands > most_bands)
@@ -169,9 +169,9 @@ Layer dem_layer(const std::string& name, const std::filesystem::path& path,
   Layer layer = surface_of(name, header, bands, heights, kept);
   add_bands(layer, bands, kept.rows);
   add_column(layer, {.name = "slope", .unit = "deg", .of = LayerColumn::Of::Cells},
-             slopes_deg(layer));
+             layer_slopes_deg(layer));
   layer.coloured_by = "height";
-  layer.facts = facts_of(header, inspect_raster(path).bands, bands.step);
+  layer.facts = raster_facts(header, inspect_raster(path).bands, bands.step);
   return layer;
 }
 

@@ -19,7 +19,7 @@
 namespace groundray {
 namespace {
 
-constexpr float nan = std::numeric_limits<float>::quiet_NaN();
+constexpr float not_measured = std::numeric_limits<float>::quiet_NaN();
 constexpr std::size_t block_places = 65'536;  // between looks at what others ask for
 
 // Fills one deviation for each place on all cores; stops in between if it is asked to.
@@ -27,7 +27,7 @@ constexpr std::size_t block_places = 65'536;  // between looks at what others as
 template <typename Measure>
 Deviation measured(std::size_t count, const std::stop_token& stop, const ShareDone& progress,
                    const Measure& measure) {
-  Deviation deviation{.signed_m = std::vector<float>(count, nan), .figures = {}};
+  Deviation deviation{.signed_m = std::vector<float>(count, not_measured), .figures = {}};
   for (std::size_t begin = 0; begin < count; begin += block_places) {
     if (stop.stop_requested()) throw Interrupted{};
     if (progress) progress(static_cast<double>(begin) / static_cast<double>(count));
@@ -113,7 +113,7 @@ DeviationFigures figures_of(const std::vector<float>& signed_m) {
   figures.rms_m = std::sqrt(sum2_m2 / count);
   if (values.empty()) {
     figures.median_m = figures.nmad_m = figures.p95_m = figures.largest_m = figures.low_m =
-        figures.high_m = nan;
+        figures.high_m = not_measured;
     return figures;
   }
   const auto [low, high] = std::ranges::minmax(values);

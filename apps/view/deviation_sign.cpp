@@ -9,11 +9,12 @@
 #include <utility>
 
 #include "apps/view/deviation.h"
+#include "reconstruction/accuracy/angle_spread.h"
 
 namespace groundray {
 namespace {
 
-constexpr double nan = std::numeric_limits<double>::quiet_NaN();
+constexpr double no_sign = std::numeric_limits<double>::quiet_NaN();
 
 // Returns, for each vertex, the first one at its place.
 std::vector<std::uint32_t> first_at_place(const std::vector<glm::dvec3>& vertices_m) {
@@ -31,10 +32,6 @@ std::vector<std::uint32_t> first_at_place(const std::vector<glm::dvec3>& vertice
   return first;
 }
 
-double angle_between(const glm::dvec3& a, const glm::dvec3& b) {
-  return std::atan2(glm::length(glm::cross(a, b)), glm::dot(a, b));
-}
-
 // How far a point is from the segment a, b.
 double distance_m(const glm::dvec3& p, const glm::dvec3& a, const glm::dvec3& b) {
   const glm::dvec3 along = b - a;
@@ -43,7 +40,7 @@ double distance_m(const glm::dvec3& p, const glm::dvec3& a, const glm::dvec3& b)
   return glm::distance(p, a + share * along);
 }
 
-double largest(const glm::dvec3& v) {
+double largest_coordinate(const glm::dvec3& v) {
   return std::max({std::abs(v.x), std::abs(v.y), std::abs(v.z)});
 }
 
@@ -127,7 +124,8 @@ TrueMesh::Feature TrueMesh::feature_of(const NearestPoint& nearest) const {
   const double size_m = std::max({glm::distance(corners_m[0], corners_m[1]),
                                   glm::distance(corners_m[1], corners_m[2]),
                                   glm::distance(corners_m[2], corners_m[0])});
-  const double tolerance_m = 1e-7 * size_m + 1e-14 * (largest(nearest.point) + nearest.distance_m);
+  const double tolerance_m =
+      1e-7 * size_m + 1e-14 * (largest_coordinate(nearest.point) + nearest.distance_m);
   const auto number = [&](std::uint32_t k) { return 3 * nearest.triangle + k; };
   for (std::uint32_t k = 0; k < 3; ++k) {
     if (glm::distance(nearest.point, corners_m[k]) <= tolerance_m) return {Part::Corner, number(k)};
@@ -140,7 +138,7 @@ TrueMesh::Feature TrueMesh::feature_of(const NearestPoint& nearest) const {
 }
 
 double TrueMesh::signed_distance_m(const glm::dvec3& p, std::uint32_t& near) const {
-  if (!std::isfinite(p.x + p.y + p.z)) return nan;
+  if (!std::isfinite(p.x + p.y + p.z)) return no_sign;
   const NearestPoint nearest = nearest_.nearest(p, near);
   near = nearest.triangle;
   const Feature feature = feature_of(nearest);
@@ -161,7 +159,7 @@ double TrueMesh::signed_distance_m(const glm::dvec3& p, std::uint32_t& near) con
   if (is_border) {
     const double aside_m =
         length > 0 ? glm::length(to_p - above_m * normal / length) : nearest.distance_m;
-    if (aside_m > std::abs(above_m)) return nan;
+    if (aside_m > std::abs(above_m)) return no_sign;
   }
   return above_m < 0 ? -nearest.distance_m : nearest.distance_m;
 }

@@ -28,7 +28,7 @@ constexpr int most_squares = 12;    // 4096 x 3072 texels
 constexpr double border_px = 2;     // that triangles keep off, for what is between texels
 constexpr double texel_rad = 1e-3;  // as a pixel, seen from the eye straight down
 constexpr double smallest_texel_m = 2e-3;
-constexpr auto none = std::numeric_limits<std::uint32_t>::max();
+constexpr auto no_triangle = std::numeric_limits<std::uint32_t>::max();
 
 // The triangles of a layer's data, in its own frame.
 struct Surface {
@@ -123,7 +123,7 @@ bool is_in_smaller(int square, const glm::ivec2& texel) {
 // Which triangle lies under the middle of each texel of a square.
 std::vector<std::uint32_t> triangles_under(const Squares& squares, int square,
                                            const Surface& surface) {
-  std::vector<std::uint32_t> under(std::size_t{side_px} * side_px, none);
+  std::vector<std::uint32_t> under(std::size_t{side_px} * side_px, no_triangle);
   for (std::size_t i = 0; i < surface.triangles(); ++i) {
     const glm::dvec2 a = squares.texel_at(square, glm::dvec2(surface.place(i, 0)));
     const glm::dvec2 b = squares.texel_at(square, glm::dvec2(surface.place(i, 1)));
@@ -162,14 +162,14 @@ class SquarePainter {
       for (int x = 0; x < side_px; ++x) {
         if (is_in_smaller(square_, {x, y})) {
           take_from_smaller({x, y});
-        } else if (under({x, y}) != none) {
+        } else if (under({x, y}) != no_triangle) {
           put({x, y}, colour_at({x, y}));
         }
       }
     });
     for (int y = 0; y < side_px; ++y) {
       for (int x = 0; x < side_px; ++x) {
-        if (under({x, y}) == none) put({x, y}, colour_beside({x, y}));
+        if (under({x, y}) == no_triangle) put({x, y}, colour_beside({x, y}));
       }
     }
   }
@@ -218,7 +218,7 @@ class SquarePainter {
       for (int dx = -1; dx <= 1; ++dx) {
         const glm::ivec2 at = texel + glm::ivec2(dx, dy);
         if (at.x < 0 || at.y < 0 || at.x >= side_px || at.y >= side_px) continue;
-        if (under(at) != none) return get(square_, at);
+        if (under(at) != no_triangle) return get(square_, at);
       }
     }
     return glm::u8vec3(128);

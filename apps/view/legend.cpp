@@ -30,48 +30,6 @@ namespace {
 constexpr std::size_t most_kinds = 24;
 constexpr int strips = 128;  // that a bar is made of
 
-// Rectangles in pixels from the lower left.
-class Rectangles {
- public:
-  Rectangles() {
-    colours_->SetNumberOfComponents(3);
-    data_->SetPoints(points_);
-    data_->SetPolys(cells_);
-    data_->GetCellData()->SetScalars(colours_);
-    mapper_->SetInputData(data_);
-    mapper_->SetColorModeToDirectScalars();
-    mapper_->SetScalarModeToUseCellData();
-    actor_->SetMapper(mapper_);
-  }
-
-  vtkActor2D& actor() { return *actor_; }
-  void clear() {
-    points_->Reset();
-    cells_->Reset();
-    colours_->Reset();
-    data_->Modified();
-  }
-  void add(glm::dvec2 low_px, glm::dvec2 high_px, const glm::dvec3& colour) {
-    const std::array<vtkIdType, 4> corners = {points_->InsertNextPoint(low_px.x, low_px.y, 0),
-                                              points_->InsertNextPoint(high_px.x, low_px.y, 0),
-                                              points_->InsertNextPoint(high_px.x, high_px.y, 0),
-                                              points_->InsertNextPoint(low_px.x, high_px.y, 0)};
-    cells_->InsertNextCell(4, corners.data());
-    const glm::dvec3 bytes = 255.0 * colour;
-    colours_->InsertNextTuple3(bytes.x, bytes.y, bytes.z);
-    points_->Modified();
-    data_->Modified();
-  }
-
- private:
-  vtkNew<vtkPoints> points_;
-  vtkNew<vtkCellArray> cells_;
-  vtkNew<vtkUnsignedCharArray> colours_;
-  vtkNew<vtkPolyData> data_;
-  vtkNew<vtkPolyDataMapper2D> mapper_;
-  vtkNew<vtkActor2D> actor_;
-};
-
 struct Mark {
   double share = 0;  // of the bar's height
   std::string text;
@@ -110,6 +68,48 @@ std::vector<Mark> marks_in(glm::dvec2 range) {
 }  // namespace
 
 struct Legend::Parts {
+  // Rectangles in pixels from the lower left.
+  class Rectangles {
+   public:
+    Rectangles() {
+      colours_->SetNumberOfComponents(3);
+      data_->SetPoints(points_);
+      data_->SetPolys(cells_);
+      data_->GetCellData()->SetScalars(colours_);
+      mapper_->SetInputData(data_);
+      mapper_->SetColorModeToDirectScalars();
+      mapper_->SetScalarModeToUseCellData();
+      actor_->SetMapper(mapper_);
+    }
+
+    vtkActor2D& actor() { return *actor_; }
+    void clear() {
+      points_->Reset();
+      cells_->Reset();
+      colours_->Reset();
+      data_->Modified();
+    }
+    void add(glm::dvec2 low_px, glm::dvec2 high_px, const glm::dvec3& colour) {
+      const std::array<vtkIdType, 4> corners = {points_->InsertNextPoint(low_px.x, low_px.y, 0),
+                                                points_->InsertNextPoint(high_px.x, low_px.y, 0),
+                                                points_->InsertNextPoint(high_px.x, high_px.y, 0),
+                                                points_->InsertNextPoint(low_px.x, high_px.y, 0)};
+      cells_->InsertNextCell(4, corners.data());
+      const glm::dvec3 bytes = 255.0 * colour;
+      colours_->InsertNextTuple3(bytes.x, bytes.y, bytes.z);
+      points_->Modified();
+      data_->Modified();
+    }
+
+   private:
+    vtkNew<vtkPoints> points_;
+    vtkNew<vtkCellArray> cells_;
+    vtkNew<vtkUnsignedCharArray> colours_;
+    vtkNew<vtkPolyData> data_;
+    vtkNew<vtkPolyDataMapper2D> mapper_;
+    vtkNew<vtkActor2D> actor_;
+  };
+
   vtkRenderer* renderer = nullptr;
   Rectangles panel, bar;
   std::vector<vtkSmartPointer<vtkTextActor>> texts;

@@ -21,7 +21,7 @@ struct Shown {
   PlacedObject place;
 };
 
-std::optional<Materials::InColour> colours_of(const World& world) {
+std::optional<Materials::InColour> material_colours(const World& world) {
   try {
     if (world.content.materials.all().empty()) return std::nullopt;
     return world.content.materials.in_colour();
@@ -90,7 +90,7 @@ void add_model(const World& world, const Shown& shown,
 Layer object_layer(const World& world, std::size_t group, std::chrono::nanoseconds time,
                    const glm::dvec3& near_m, std::size_t most_triangles) {
   const Content::Group& entry = world.content.groups.at(group);
-  const auto colours = colours_of(world);
+  const auto colours = material_colours(world);
   const std::vector<Shown> shown = nearest(world, entry, time, near_m, most_triangles);
   TriangleMesh mesh;
   Cells cells;

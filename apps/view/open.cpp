@@ -116,7 +116,7 @@ void open_scene(Opened& opened, const OpenLimits& limits, const std::stop_token&
   for (Layer& layer : sensor_layers(*world)) opened.layers.push_back(std::move(layer));
 }
 
-void name_labels(Layer& layer, const RecordedNames& names) {
+void name_label_categories(Layer& layer, const RecordedNames& names) {
   for (LayerColumn& column : layer.columns) {
     if (column.name != "label" && column.name != "second_label") continue;
     for (auto& [kind, name] : column.categories) {
@@ -137,7 +137,7 @@ void open_dataset(Opened& opened, const std::stop_token& stop) {
     if (lidar.frames.empty()) continue;
     stop_if_asked(stop);
     Layer layer = scan_layer(*opened.dataset, lidar, lidar.frames.front(), "lidar/" + lidar.name);
-    name_labels(layer, opened.run->names);
+    name_label_categories(layer, opened.run->names);
     if (!opened.look) {
       const Pose X_DS = lidar.X_DS.pose_at(lidar.X_DS.begin_time());
       opened.look = look_at(X_DS.translation_m + opened.dataset->georeference.origin_w_m,

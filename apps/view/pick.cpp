@@ -91,7 +91,7 @@ Candidate pick_point(const Layer& layer, std::size_t number, const PickRay& ray,
                               Candidate{}, try_all, least);
 }
 
-bool is_surface(const Layer& layer) {
+bool can_be_hit(const Layer& layer) {
   return layer.kind == LayerKind::Terrain || layer.kind == LayerKind::Mesh ||
          layer.kind == LayerKind::Picture;
 }
@@ -102,7 +102,7 @@ std::optional<PickedRow> pick(std::span<const Layer* const> layers, const PickRa
                               double near_px) {
   Candidate surface, cloud;
   for (std::size_t i = 0; i < layers.size(); ++i) {
-    if (layers[i]->visible && is_surface(*layers[i]))
+    if (layers[i]->visible && can_be_hit(*layers[i]))
       surface = least(surface, pick_triangle(*layers[i], i, ray));
   }
   for (std::size_t i = 0; i < layers.size(); ++i) {

@@ -18,7 +18,7 @@ namespace groundray {
 namespace {
 
 // What the lightest pixels but a few have in their lightest channel.
-float white_of(const ImageF& light) {
+float white_level(const ImageF& light) {
   std::vector<float> brightest;
   const auto channels = static_cast<std::size_t>(std::min(light.channels(), 3));
   for (int y = 0; y < light.height(); ++y) {
@@ -87,7 +87,7 @@ Layer picture_layer(const std::string& name, const Image8& picture) {
 }
 
 Image8 expose(const ImageF& light) {
-  const float white = white_of(light);
+  const float white = white_level(light);
   Image8 picture(light.width(), light.height(), light.channels() >= 3 ? 3 : 1);
   for (int y = 0; y < light.height(); ++y) {
     for (int x = 0; x < light.width(); ++x) {

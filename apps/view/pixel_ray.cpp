@@ -8,15 +8,9 @@
 namespace groundray {
 namespace {
 
-using std::chrono::nanoseconds;
-
-const CameraFacts& facts_of(const RecordedSensor& camera) {
+const CameraFacts& camera_facts(const RecordedSensor& camera) {
   if (!camera.camera) throw Error("'{}' is no camera: pixels have rays of cameras", camera.name);
   return *camera.camera;
-}
-
-Pose pose_at(const RecordedSensor& camera, nanoseconds time) {
-  return camera.X_DS.pose_at(std::clamp(time, camera.X_DS.begin_time(), camera.X_DS.end_time()));
 }
 
 // How far along a pixel's ray the surface is: what the image tells of the pixel's centre.
@@ -38,7 +32,7 @@ std::optional<double> range_m(const RecordedImage& image, glm::dvec2 pixel,
 
 std::optional<SeenPixel> seen_pixel(const RecordedSensor& camera, const RecordedFrame& frame,
                                     glm::dvec2 pixel, const RecordedImage* image) {
-  const CameraFacts& facts = facts_of(camera);
+  const CameraFacts& facts = camera_facts(camera);
   const auto ray = facts.lens.ray(pixel);
   if (!ray) return std::nullopt;
   const double last_row = facts.lens.size_px().y - 1;
@@ -56,7 +50,7 @@ std::optional<SeenPixel> seen_pixel(const RecordedSensor& camera, const Recorded
 
 std::optional<glm::dvec2> pixel_of(const RecordedSensor& camera, const RecordedFrame& frame,
                                    const glm::dvec3& p_D) {
-  const CameraFacts& facts = facts_of(camera);
+  const CameraFacts& facts = camera_facts(camera);
   const double last_row = facts.lens.size_px().y - 1;
   double row = last_row / 2;
   std::optional<glm::dvec2> pixel;

@@ -39,7 +39,7 @@ void make_names_unique(std::vector<ImageChannel>& channels) {
   }
 }
 
-std::string text_of(const ImageChannel& channel, double value) {
+std::string value_text(const ImageChannel& channel, double value) {
   if (std::isnan(value)) return "none";
   if (std::isinf(value)) return channel.kind == Kind::Distance ? "sky" : "infinite";
   const bool is_whole = !std::holds_alternative<ImageF>(channel.values);
@@ -58,16 +58,16 @@ std::string value_text(const ImageChannel& channel, const std::vector<double>& v
   if (channel.kind == Kind::Categories) {
     const double value = values[0];
     const bool counts = value >= 0 && value <= 4294967295.0 && value == std::floor(value);
-    if (!counts) return text_of(channel, value);
+    if (!counts) return value_text(channel, value);
     const std::string name = name_of(channel, static_cast<std::uint32_t>(value), names);
     return name.empty() ? fmt::format("{}", value) : fmt::format("{} ({})", value, name);
   }
-  if (values.size() == 1) return with_unit(text_of(channel, values[0]), channel.unit);
+  if (values.size() == 1) return with_unit(value_text(channel, values[0]), channel.unit);
   if (std::ranges::all_of(values, [](double value) { return std::isnan(value); })) return "none";
   std::vector<std::string> texts;
   const bool is_flow = channel.kind == Kind::Flow;
   for (std::size_t k = 0; k < (is_flow ? 2 : values.size()); ++k)
-    texts.push_back(text_of(channel, values[k]));
+    texts.push_back(value_text(channel, values[k]));
   const bool is_hidden = is_flow && values.size() > 2 && values[2] == 0;
   return with_unit(fmt::format("({})", fmt::join(texts, ", ")), channel.unit) +
          (is_hidden ? ", hidden or outside there" : "");

@@ -226,7 +226,7 @@ ImageLegend legend_of(const ImageChannel& channel, const RecordedNames& names,
   return legend;
 }
 
-ColourAt colours_of(const ImageChannel& channel, const ImageLegend& legend) {
+ColourAt channel_colours(const ImageChannel& channel, const ImageLegend& legend) {
   switch (channel.kind) {
     case Kind::Number:
     case Kind::Distance:
@@ -252,7 +252,7 @@ DrawnChannel draw_channel(const ImageChannel& channel, const RecordedNames& name
                           std::optional<std::pair<double, double>> range) {
   const glm::ivec2 size_px = size_of(channel.values);
   DrawnChannel drawn{Image8(size_px.x, size_px.y, 3), legend_of(channel, names, range)};
-  const ColourAt colour_at = colours_of(channel, drawn.legend);
+  const ColourAt colour_at = channel_colours(channel, drawn.legend);
   tbb::parallel_for(0, size_px.y, [&](int y) {
     for (int x = 0; x < size_px.x; ++x) paint(drawn.picture, x, y, colour_at({x, y}));
   });

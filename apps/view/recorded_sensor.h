@@ -1,5 +1,6 @@
 #pragma once
 
+#include <algorithm>
 #include <chrono>
 #include <cstddef>
 #include <cstdint>
@@ -48,6 +49,11 @@ struct RecordedSensor {
   std::optional<LidarFacts> lidar;                        ///< of lidars, if the dataset tells
   std::optional<CameraFacts> camera;                      ///< of cameras
 };
+
+/// Returns a sensor's pose at a time; before and after its path, that at the nearer end.
+inline Pose pose_at(const RecordedSensor& sensor, std::chrono::nanoseconds time) {
+  return sensor.X_DS.pose_at(std::clamp(time, sensor.X_DS.begin_time(), sensor.X_DS.end_time()));
+}
 
 /// What the numbers in a dataset's columns and channels mean.
 struct RecordedNames {

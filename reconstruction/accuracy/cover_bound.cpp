@@ -44,34 +44,6 @@ struct Outline {
   }
 };
 
-/// Numbers in the order in which they were added, each once.
-class NumberSet {
- public:
-  std::size_t size() const { return numbers_.size(); }
-  std::uint32_t operator[](std::size_t i) const { return numbers_[i]; }
-
-  void add(std::uint32_t number) {
-    if (2 * numbers_.size() >= slots_.size()) grow();
-    if (put(number)) numbers_.push_back(number);
-  }
-
- private:
-  static constexpr std::uint32_t empty = std::numeric_limits<std::uint32_t>::max();
-
-  bool put(std::uint32_t number) {
-    std::size_t slot = std::size_t{number} * 2654435761u & (slots_.size() - 1);
-    while (slots_[slot] != empty && slots_[slot] != number) slot = (slot + 1) & (slots_.size() - 1);
-    return std::exchange(slots_[slot], number) == empty;
-  }
-
-  void grow() {
-    slots_.assign(std::max<std::size_t>(64, 4 * slots_.size()), empty);
-    for (const std::uint32_t number : numbers_) put(number);
-  }
-
-  std::vector<std::uint32_t> numbers_, slots_;
-};
-
 }  // namespace
 
 CoverBound::CoverBound(const TriangleMesh& mesh)
@@ -96,6 +68,35 @@ CoverBound::CoverBound(const TriangleMesh& mesh)
 /// without cover, and so nothing is: each point has one of the mesh along the direction, no farther
 /// than at corners of what two triangles have in common.
 class CoverBound::Walk {
+  /// Numbers in the order in which they were added, each once.
+  class NumberSet {
+   public:
+    std::size_t size() const { return numbers_.size(); }
+    std::uint32_t operator[](std::size_t i) const { return numbers_[i]; }
+
+    void add(std::uint32_t number) {
+      if (2 * numbers_.size() >= slots_.size()) grow();
+      if (put(number)) numbers_.push_back(number);
+    }
+
+   private:
+    static constexpr std::uint32_t empty = std::numeric_limits<std::uint32_t>::max();
+
+    bool put(std::uint32_t number) {
+      std::size_t slot = std::size_t{number} * 2654435761u & (slots_.size() - 1);
+      while (slots_[slot] != empty && slots_[slot] != number)
+        slot = (slot + 1) & (slots_.size() - 1);
+      return std::exchange(slots_[slot], number) == empty;
+    }
+
+    void grow() {
+      slots_.assign(std::max<std::size_t>(64, 4 * slots_.size()), empty);
+      for (const std::uint32_t number : numbers_) put(number);
+    }
+
+    std::vector<std::uint32_t> numbers_, slots_;
+  };
+
  public:
   Walk(const CoverBound& cover, const std::array<glm::dvec3, 3>& corners,
        const glm::dvec3& direction, double shrunk_m)

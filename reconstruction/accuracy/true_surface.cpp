@@ -34,7 +34,7 @@ void check_radius(double radius_m) {
 }
 
 /// A part where the largest distance may be.
-struct Suspect {
+struct TrueSuspect {
   SurfacePart part;
   double at_most_m = 0;
 };
@@ -47,7 +47,7 @@ struct TrueLot {
   ShareSums shares;
   AngleSpread turn;
   double at_least_m = 0, at_most_m = 0;  // of what is no suspect
-  std::vector<Suspect> suspects;
+  std::vector<TrueSuspect> suspects;
 
   void see(const SurfacePart& part, const PartDistance& distance) {
     at_least_m = std::max(at_least_m, distance.middle_m);
@@ -56,7 +56,7 @@ struct TrueLot {
 
   /// Lets go of suspects that cannot be farther than a known point, but for a hundredth.
   void settle() {
-    std::erase_if(suspects, [&](const Suspect& suspect) {
+    std::erase_if(suspects, [&](const TrueSuspect& suspect) {
       if (suspect.at_most_m > 1.01 * at_least_m) return false;
       at_most_m = std::max(at_most_m, suspect.at_most_m);
       return true;
@@ -69,7 +69,7 @@ struct TrueLot {
     turn.add(more.turn);
     at_least_m = std::max(at_least_m, more.at_least_m);
     at_most_m = std::max(at_most_m, more.at_most_m);
-    for (const Suspect& suspect : more.suspects) {
+    for (const TrueSuspect& suspect : more.suspects) {
       // Where so many places are equally far, they are not looked at more closely.
       if (suspect.at_most_m > 1.01 * at_least_m && suspects.size() < most_suspects) {
         suspects.push_back(suspect);
@@ -128,7 +128,7 @@ class TrueMeasure {
     constexpr int most_rounds = 30;
     lot.settle();
     for (int round = 0; round < most_rounds && lot.suspects.size() < most_suspects; ++round) {
-      const std::vector<Suspect> before = std::exchange(lot.suspects, {});
+      const std::vector<TrueSuspect> before = std::exchange(lot.suspects, {});
       std::vector<std::array<PartDistance, 4>> found(before.size());
       std::vector<std::array<SurfacePart, 4>> quarters(before.size());
       tbb::parallel_for(std::size_t{0}, before.size(), [&](std::size_t i) {
@@ -141,7 +141,7 @@ class TrueMeasure {
       }
       lot.settle();
     }
-    for (const Suspect& suspect : lot.suspects)
+    for (const TrueSuspect& suspect : lot.suspects)
       lot.at_most_m = std::max(lot.at_most_m, suspect.at_most_m);
   }
 

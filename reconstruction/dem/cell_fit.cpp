@@ -21,15 +21,14 @@ constexpr double crest_points = 4;
 // Heights of outliers are spread over so much, more or less.
 constexpr double outliers_reach_m = 2;
 constexpr std::size_t few_points = 2;
-constexpr int enough_neighbours = 5;
-
-struct Inverse {
-  double hh = 0, hx = 0, hy = 0, xx = 0, xy = 0, yy = 0;
-};
 
 }  // namespace
 
 struct CellFit::Sums {
+  struct Inverse {
+    double hh = 0, hx = 0, hy = 0, xx = 0, xy = 0, yy = 0;
+  };
+
   double w = 0, x = 0, y = 0, z = 0, xx = 0, xy = 0, yy = 0, xz = 0, yz = 0;
 
   // Inverse of the normal equations' matrix, with what is known of the slopes added.
@@ -162,7 +161,7 @@ std::optional<CellHeight> CellFit::operator()(std::span<const PackedPoint> point
   if (is_weighed && neighbours.cells >= enough_neighbours)
     return fit_few_points(neighbours, step_m, reference * PackedPoint::height_step_m);
   plane.height_m = median_height(plane);
-  const Inverse found =
+  const Sums::Inverse found =
       iterate(plane, neighbours, scale(plane), huber_rounds, [](const FloatLanes& size) {
         return huber_limit / larger(size, all_of(huber_limit));
       }).inverse(neighbours);
@@ -239,7 +238,7 @@ void CellFit::compare(const SurfacePlane& plane, double bias_m2, CellHeight& fou
 
 // How the height at the sample depends on points: it rises by points_.size with each one's.
 struct CellFit::Levers {
-  Inverse inverse;
+  Sums::Inverse inverse;
   double noise_m2 = 0, bias_m2 = 0;
   double bend_x = 0, bend_y = 0, bend_xy = 0;  // with second differences of the ground
 };
@@ -247,7 +246,7 @@ struct CellFit::Levers {
 CellFit::Levers CellFit::levers(const Sums& sums, const NeighbourSurface& neighbours,
                                 glm::dvec2 step_m) {
   Levers found{.inverse = sums.inverse(neighbours)};
-  const Inverse& m = found.inverse;
+  const Sums::Inverse& m = found.inverse;
   const auto lever_h = static_cast<float>(m.hh), lever_x = static_cast<float>(m.hx),
              lever_y = static_cast<float>(m.hy);
   const auto per_x = static_cast<float>(1 / step_m.x), per_y = static_cast<float>(1 / step_m.y);
@@ -277,7 +276,7 @@ CellHeight CellFit::finish(const SurfacePlane& plane, const Sums& sums,
                            const NeighbourSurface& neighbours, glm::dvec2 step_m) {
   CellHeight found{.plane = plane};
   const Levers by = levers(sums, neighbours, step_m);
-  const Inverse& m = by.inverse;
+  const Sums::Inverse& m = by.inverse;
   compare(plane, by.bias_m2, found);
   const double inside = found.lidar + found.stereo;
   const double known = m.xx * neighbours.information_xx + 2 * m.xy * neighbours.information_xy +

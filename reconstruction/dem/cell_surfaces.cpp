@@ -22,10 +22,6 @@ std::uint32_t binomial_limit(std::uint32_t points, double share) {
   return k + 1;
 }
 
-constexpr double height_m(const PackedPoint& point) {
-  return point.height * PackedPoint::height_step_m;
-}
-
 }  // namespace
 
 OutlierRule::OutlierRule(double share) : share_(share), small_(257) {
@@ -71,11 +67,11 @@ CellSurface lower_part(std::span<const PackedPoint> ascending, const CellSurface
                        std::uint32_t credible, double tallest_m) noexcept {
   const std::uint32_t from = surface.begin + std::min(credible, surface.size()) - 1;
   const PackedPoint& foot = ascending[from];
-  if (height_m(ascending[surface.end - 1]) - height_m(foot) <= tallest_m) return surface;
-  const double highest_m = height_m(foot) + tallest_m + 6 * total_sd_m(foot);
+  if (ascending[surface.end - 1].height_m() - foot.height_m() <= tallest_m) return surface;
+  const double highest_m = foot.height_m() + tallest_m + 6 * total_sd_m(foot);
   const auto end = std::upper_bound(
       ascending.begin() + from, ascending.begin() + surface.end, highest_m,
-      [](double limit_m, const PackedPoint& point) { return limit_m < height_m(point); });
+      [](double limit_m, const PackedPoint& point) { return limit_m < point.height_m(); });
   return {surface.begin, static_cast<std::uint32_t>(end - ascending.begin())};
 }
 

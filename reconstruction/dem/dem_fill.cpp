@@ -22,10 +22,10 @@
 namespace groundray {
 namespace {
 
-constexpr double long_shape = 15;       // area / largest distance^2; a disc has 3
-constexpr double usual_tension = 0.05;  // for compact holes
-constexpr double least_share = 0.1;     // of filled samples, for a kind of holes to be tried
-constexpr std::size_t bytes_per_sample = 40;
+constexpr double long_shape = 15;          // area / largest distance^2; a disc has 3
+constexpr double usual_tension = 0.05;     // for compact holes
+constexpr double least_tried_share = 0.1;  // of filled samples, for a kind of holes to be tried
+constexpr std::size_t fill_bytes_per_sample = 40;
 // For each sample of a hole, times the binary logarithm of their number: what nested dissection
 // leaves grows with it. Measured for squares of 1e3 to 1e6 samples: 102 to 115, with smoothness 178
 // to 200; under bounds up to 2.6 times as much.
@@ -41,8 +41,8 @@ void check_numbers(std::span<const float> values, const char* name, int columns,
                 at % columns, at / columns);
 }
 
-void check(const GridFrame& frame, std::span<const float> heights_m, std::span<const float> most_m,
-           const FillOptions& options) {
+void check_fill_inputs(const GridFrame& frame, std::span<const float> heights_m,
+                       std::span<const float> most_m, const FillOptions& options) {
   Violations broken("filling a DEM");
   const auto samples = std::int64_t{frame.samples.x} * frame.samples.y;
   broken.unless(frame.samples.x >= 2 && frame.samples.y >= 2,
@@ -174,8 +174,9 @@ std::vector<Filling::Kind> Filling::kinds() const {
   std::vector<Kind> kinds;
   std::size_t in_last = all;
   for (const auto& [octave, holes] : octaves) {
-    const bool goes_on = !kinds.empty() && kinds.back().shape == octave.first &&
-                         static_cast<double>(in_last) < least_share * static_cast<double>(all);
+    const bool goes_on =
+        !kinds.empty() && kinds.back().shape == octave.first &&
+        static_cast<double>(in_last) < least_tried_share * static_cast<double>(all);
     if (!goes_on) {
       kinds.push_back({octave.first, octave.second, octave.second + 1, {}});
       in_last = 0;
@@ -201,7 +202,7 @@ void Filling::check_memory(std::span<const std::vector<std::uint32_t>> sets) con
                       (most_m_.empty() ? 1 : more_under_bounds) *
                       std::log2(static_cast<double>(std::max<std::size_t>(largest, 2)));
   const std::size_t bytes =
-      bytes_per_sample * heights_m_.size() +
+      fill_bytes_per_sample * heights_m_.size() +
       static_cast<std::size_t>(each * static_cast<double>(std::min(all, threads * largest)));
   if (bytes <= work_.most_bytes) return;
   throw Error(
@@ -330,13 +331,13 @@ FilledHeights Filling::run() {
 FilledHeights fill_dem(const GridFrame& frame, std::span<const float> heights_m,
                        std::span<const float> most_m, const FillOptions& options,
                        const Work& work) {
-  check(frame, heights_m, most_m, options);
+  check_fill_inputs(frame, heights_m, most_m, options);
   return Filling(frame, heights_m, most_m, options, work).run();
 }
 
 FilledHeights take_filling(const GridFrame& frame, std::span<const float> heights_m,
                            std::span<const float> filled_m, const FillOptions& options) {
-  check(frame, heights_m, filled_m, options);
+  check_fill_inputs(frame, heights_m, filled_m, options);
   FilledHeights result;
   result.heights_m.assign(heights_m.begin(), heights_m.end());
   result.sd_m.assign(heights_m.size(), std::numeric_limits<float>::quiet_NaN());

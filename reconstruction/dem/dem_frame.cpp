@@ -8,7 +8,7 @@
 namespace groundray {
 namespace {
 
-constexpr double most_samples = 1 << 30;
+constexpr double most_samples_per_side = 1 << 30;
 
 void refuse_area(Violations& broken, const Area& area) {
   const bool is_bounded = std::isfinite(area.low_m.x) && std::isfinite(area.low_m.y) &&
@@ -19,13 +19,13 @@ void refuse_area(Violations& broken, const Area& area) {
 }
 
 // The samples `first` to `last`, counted from one at `zero_m`; at least two.
-struct Samples {
+struct SampleRange {
   double first = 0;
   double count = 0;
 };
 
 // Samples, counted from one at zero_m, of the cells that meet the interval's inside.
-Samples samples_over(double low_m, double high_m, double zero_m, double step_m) {
+SampleRange samples_over(double low_m, double high_m, double zero_m, double step_m) {
   const double a = (low_m - zero_m) / step_m + 0.5, b = (high_m - zero_m) / step_m + 0.5;
   const double low = std::min(a, b), high = std::max(a, b);
   // Borders that are an area's own but for rounding take no cells along.
@@ -35,9 +35,9 @@ Samples samples_over(double low_m, double high_m, double zero_m, double step_m) 
 }
 
 GridFrame frame_of(const Area& area, glm::dvec2 zero_m, glm::dvec2 step_m) {
-  const Samples x = samples_over(area.low_m.x, area.high_m.x, zero_m.x, step_m.x);
-  const Samples y = samples_over(area.low_m.y, area.high_m.y, zero_m.y, step_m.y);
-  if (std::max(x.count, y.count) > most_samples) {
+  const SampleRange x = samples_over(area.low_m.x, area.high_m.x, zero_m.x, step_m.x);
+  const SampleRange y = samples_over(area.low_m.y, area.high_m.y, zero_m.y, step_m.y);
+  if (std::max(x.count, y.count) > most_samples_per_side) {
     throw Error(
         "cells of {} x {} m over {:.6g} x {:.6g} m are {:.3g} x {:.3g}: more than 2^30 along a "
         "side; choose larger cells or a smaller area",

@@ -15,15 +15,16 @@ namespace {
 
 using Matrix = Eigen::SparseMatrix<double, Eigen::ColMajor, int>;
 
-constexpr std::size_t bytes_per_sample = 640;
+constexpr std::size_t smooth_bytes_per_sample = 640;
 constexpr std::int64_t most_samples = 300'000'000;  // 7 entries each are counted in 31 bits
 constexpr double still_sds = 1e-3;                  // a pull that ends the rounds
 // What a round leaves of the pull: the next one, of other weights, takes of that as well.
 constexpr double solved_share = 0.03;
 constexpr int most_steps = 10000;  // of one round
 
-void check(const GridFrame& frame, std::span<const float> heights_m,
-           std::span<const float> variance_m2, const SmoothOptions& options, const Work& work) {
+void check_smooth_inputs(const GridFrame& frame, std::span<const float> heights_m,
+                         std::span<const float> variance_m2, const SmoothOptions& options,
+                         const Work& work) {
   Violations broken("smoothing a DEM");
   const auto samples = std::int64_t{frame.samples.x} * frame.samples.y;
   broken.unless(frame.samples.x >= 2 && frame.samples.y >= 2 && samples <= most_samples,
@@ -47,7 +48,7 @@ void check(const GridFrame& frame, std::span<const float> heights_m,
       "a variance is 0, negative or infinite; it must be above 0, or NaN where nothing was "
       "measured");
   broken.throw_if_any();
-  const std::size_t bytes = heights_m.size() * bytes_per_sample;
+  const std::size_t bytes = heights_m.size() * smooth_bytes_per_sample;
   if (bytes > work.most_bytes)
     throw Error(
         "smoothing a DEM of {} x {} samples takes {} MB, more than the {} MB allowed; "
@@ -71,7 +72,7 @@ class Smoothing {
             std::span<const float> variance_m2);
 
   double usual_curvature() const;
-  SmoothHeights run(double curvature_sd_per_m, std::size_t most_rounds, const Work& work);
+  SmoothHeights iterate(double curvature_sd_per_m, std::size_t most_rounds, const Work& work);
 
  private:
   // The number of the unknown that far from a sample; -1 for none.
@@ -237,7 +238,8 @@ Eigen::VectorXd Smoothing::solve(double curvature_sd_per_m) const {
   return moves;
 }
 
-SmoothHeights Smoothing::run(double curvature_sd_per_m, std::size_t most_rounds, const Work& work) {
+SmoothHeights Smoothing::iterate(double curvature_sd_per_m, std::size_t most_rounds,
+                                 const Work& work) {
   SmoothHeights result;
   result.curvature_sd_per_m = curvature_sd_per_m;
   find_pattern();
@@ -262,11 +264,11 @@ SmoothHeights Smoothing::run(double curvature_sd_per_m, std::size_t most_rounds,
 SmoothHeights smooth_dem(const GridFrame& frame, std::span<const float> heights_m,
                          std::span<const float> variance_m2, const SmoothOptions& options,
                          const Work& work) {
-  check(frame, heights_m, variance_m2, options, work);
+  check_smooth_inputs(frame, heights_m, variance_m2, options, work);
   Smoothing smoothing(frame, heights_m, variance_m2);
   const double k =
       options.curvature_sd_per_m ? *options.curvature_sd_per_m : smoothing.usual_curvature();
-  return smoothing.run(k, options.most_rounds, work);
+  return smoothing.iterate(k, options.most_rounds, work);
 }
 
 }  // namespace groundray

@@ -50,8 +50,8 @@ bool drop_loose(HiddenPiece& piece) {
 }
 
 // Of each sample of a set, NaN for none; nothing if the piece has no bounds.
-std::vector<double> bounds_of(const HiddenPiece& piece, const std::vector<std::uint32_t>& set,
-                              const std::vector<std::int32_t>& order) {
+std::vector<double> upper_bounds_of(const HiddenPiece& piece, const std::vector<std::uint32_t>& set,
+                                    const std::vector<std::int32_t>& order) {
   std::vector<double> most_m;
   if (piece.most_m.empty()) return most_m;
   for (const std::uint32_t sample : set) {
@@ -62,7 +62,7 @@ std::vector<double> bounds_of(const HiddenPiece& piece, const std::vector<std::u
   return most_m;
 }
 
-void fill(HiddenPiece& piece, std::span<const PlateForm> forms, PieceErrors& found) {
+void fill_piece(HiddenPiece& piece, std::span<const PlateForm> forms, PieceErrors& found) {
   std::vector<std::uint8_t> is_open(piece.numbers.size());
   std::ranges::transform(piece.numbers, is_open.begin(),
                          [](std::int32_t number) { return number >= 0 ? 1 : 0; });
@@ -75,7 +75,7 @@ void fill(HiddenPiece& piece, std::span<const PlateForm> forms, PieceErrors& fou
     std::int32_t number = 0;
     for (const std::uint32_t sample : set) piece.numbers[sample] = number++;
     PlateSystem system({piece.size, piece.step_m, piece.heights_m, piece.numbers}, set);
-    const std::vector<double> most_m = bounds_of(piece, set, order);
+    const std::vector<double> most_m = upper_bounds_of(piece, set, order);
     for (std::size_t form = 0; form < forms.size(); ++form) {
       const std::vector<double> heights_m = most_m.empty()
                                                 ? system.solve(forms[form])
@@ -92,7 +92,7 @@ void fill(HiddenPiece& piece, std::span<const PlateForm> forms, PieceErrors& fou
 }
 
 // How far hidden samples are from data, and how rough it is there.
-void describe(const HiddenPiece& piece, double usual_roughness_m, PieceErrors& found) {
+void describe_piece(const HiddenPiece& piece, double usual_roughness_m, PieceErrors& found) {
   std::vector<std::uint8_t> has_data(piece.heights_m.size());
   std::ranges::transform(piece.heights_m, has_data.begin(),
                          [](float z) { return std::isnan(z) ? 0 : 1; });
@@ -198,8 +198,8 @@ std::vector<PieceErrors> try_pieces(const PieceMaker& maker, std::vector<PlateFo
     tbb::parallel_for(std::uint32_t{0}, batch, [&](std::uint32_t i) {
       std::optional<HiddenPiece> piece = maker.make(first + i);
       if (!piece || !drop_loose(*piece)) return;
-      describe(*piece, usual_roughness_m, tried[i]);
-      fill(*piece, forms, tried[i]);
+      describe_piece(*piece, usual_roughness_m, tried[i]);
+      fill_piece(*piece, forms, tried[i]);
     });
     for (PieceErrors& found : tried) {
       if (found.errors_m.empty()) continue;

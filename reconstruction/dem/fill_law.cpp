@@ -16,7 +16,7 @@ constexpr double usual_power = 1.5, usual_roughness_power = 2;  // of the varian
 constexpr double usual_weight = 10;                             // how many errors speak for these
 constexpr double most_power = 6, most_roughness_power = 3;
 
-Eigen::Vector3d terms_of(double distance_cells, double roughness_m) {
+Eigen::Vector3d law_terms(double distance_cells, double roughness_m) {
   return {1, std::log(std::max(distance_cells, 1e-3)),
           std::log(std::max(roughness_m, least_roughness_m))};
 }
@@ -40,7 +40,7 @@ double misfit_of(const std::vector<Sample>& samples, const Eigen::Vector3d& fact
 }
 
 // Raises or lowers the whole law until squared errors are its variance in the mean.
-void level(const std::vector<Sample>& samples, Eigen::Vector3d& factors) {
+void level_law(const std::vector<Sample>& samples, Eigen::Vector3d& factors) {
   double sum = 0;
   for (const Sample& sample : samples)
     sum += sample.square_m2 * std::exp(-sample.terms.dot(factors));
@@ -72,7 +72,7 @@ bool improve(const std::vector<Sample>& samples, const Eigen::Vector3d& usual,
 }  // namespace
 
 double FillLaw::sd_m(double distance_cells, double roughness_m) const {
-  const Eigen::Vector3d terms = terms_of(distance_cells, roughness_m);
+  const Eigen::Vector3d terms = law_terms(distance_cells, roughness_m);
   return std::exp((terms[0] * factors[0] + terms[1] * factors[1] + terms[2] * factors[2]) / 2);
 }
 
@@ -81,18 +81,18 @@ std::optional<FillLaw> fit_law(std::span<const FillError> errors) {
   std::vector<Sample> samples;
   samples.reserve(errors.size());
   for (const FillError& error : errors) {
-    samples.push_back({terms_of(error.distance_cells, error.roughness_m),
+    samples.push_back({law_terms(error.distance_cells, error.roughness_m),
                        std::max(double{error.error_m} * error.error_m, least_m2)});
   }
   const Eigen::Vector3d usual(0, usual_power, usual_roughness_power);
   Eigen::Vector3d factors = usual;
-  level(samples, factors);
+  level_law(samples, factors);
   constexpr int most_steps = 50;
   for (int step = 0; step < most_steps && improve(samples, usual, factors); ++step) {
   }
   factors[1] = std::clamp(factors[1], 0.0, most_power);
   factors[2] = std::clamp(factors[2], 0.0, most_roughness_power);
-  level(samples, factors);
+  level_law(samples, factors);
   return FillLaw{{factors[0], factors[1], factors[2]}};
 }
 

@@ -37,9 +37,9 @@ std::size_t way_along(const PlateRaster& raster, glm::dvec2 ahead) {
 }
 
 // A raster's samples by column and row.
-class Samples {
+class RasterSamples {
  public:
-  explicit Samples(const PlateRaster& raster) : raster_(raster) {}
+  explicit RasterSamples(const PlateRaster& raster) : raster_(raster) {}
 
   std::size_t index(glm::ivec2 at) const {
     return static_cast<std::size_t>(at.y) * static_cast<std::size_t>(raster_.size.x) +
@@ -63,7 +63,7 @@ class Samples {
 // How bounds rise on the mean, by columns and rows in metres; nothing if too few are neighbours.
 std::optional<glm::dvec2> mean_rise(const PlateRaster& raster, std::span<const float> most_m,
                                     std::span<const std::uint32_t> hole) {
-  const Samples samples(raster);
+  const RasterSamples samples(raster);
   glm::dvec2 sum_m(0), count(0);
   for (const std::uint32_t sample : hole) {
     const glm::ivec2 at = samples.place(sample);
@@ -87,7 +87,7 @@ class Lines {
       : first_(low),
         size_(high - low + 1),
         lines_m_(static_cast<std::size_t>(size_.x) * static_cast<std::size_t>(size_.y)) {
-    const Samples samples(raster);
+    const RasterSamples samples(raster);
     for (int j = 0; j < size_.y; ++j) {
       for (int i = 0; i < size_.x; ++i) {
         const glm::ivec2 at =
@@ -123,7 +123,7 @@ std::optional<GrazingSight> sight_over(const PlateRaster& raster, std::span<cons
   const auto rise = mean_rise(raster, most_m, hole);
   if (!rise || !(glm::length(*rise) > 0)) return std::nullopt;
   GrazingSight sight{.ahead = -glm::normalize(*rise), .fall = glm::length(*rise)};
-  const Samples samples(raster);
+  const RasterSamples samples(raster);
   const glm::ivec2 way = ways[way_along(raster, sight.ahead)];
   const double step_m = glm::length(in_metres(raster, way));
   double bounded = 0, first = 0;
@@ -150,7 +150,7 @@ CastShadow cast_shadow(const PlateRaster& raster, const GrazingSight& sight, std
   const Lines lines(raster, way, sight.fall * glm::length(in_metres(raster, way)),
                     glm::max(low - glm::max(far, glm::ivec2(0)), glm::ivec2(0)),
                     glm::min(high - glm::min(far, glm::ivec2(0)), raster.size - 1));
-  const Samples samples(raster);
+  const RasterSamples samples(raster);
   CastShadow shadow;
   for (int row = low.y; row <= high.y; ++row) {
     for (int column = low.x; column <= high.x; ++column) {

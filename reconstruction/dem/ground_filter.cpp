@@ -15,7 +15,7 @@
 namespace groundray {
 namespace {
 
-void check(const GroundFilterOptions& o) {
+void check_filter_options(const GroundFilterOptions& o) {
   Violations broken("GroundFilterOptions");
   const auto positive = [](double value) { return value > 0 && std::isfinite(value); };
   const auto not_negative = [](double value) { return value >= 0 && std::isfinite(value); };
@@ -42,7 +42,7 @@ struct Box {
 };
 
 // The points' bounds, once all are known to be sound.
-Box bounds_of(std::span<const glm::dvec3> points_m) {
+Box checked_bounds(std::span<const glm::dvec3> points_m) {
   if (points_m.empty())
     throw Error("filter_ground: there are no points: is the cloud empty, or all of it cut off?");
   if (points_m.size() >= std::numeric_limits<std::uint32_t>::max())
@@ -130,13 +130,13 @@ GroundCounts counts_of(const GroundPoints& found, const SurfacePins& lowest) {
 
 GroundPoints filter_ground(std::span<const glm::dvec3> points_m, const GroundFilterOptions& options,
                            const Work& work) {
-  check(options);
+  check_filter_options(options);
   const auto progress = [&](double share) {
     if (work.progress) work.progress(share);
   };
   const double cell_m = options.cell_m;
   const CellFrame frame =
-      frame_around(bounds_of(points_m), points_m.size(), cell_m, work.most_bytes);
+      frame_around(checked_bounds(points_m), points_m.size(), cell_m, work.most_bytes);
   const SurfacePins lowest = lowest_points(points_m, frame);
   progress(0.2);
   GroundSurface ground =

@@ -15,7 +15,7 @@
 namespace groundray {
 namespace {
 
-constexpr float none = std::numeric_limits<float>::quiet_NaN();
+constexpr float no_height = std::numeric_limits<float>::quiet_NaN();
 
 // Radii of the discs, to the widest: each a cell wider than the last, or a tenth, so that fine
 // cells do not need hundreds.
@@ -34,7 +34,7 @@ std::size_t drop_pits(const Raster& surface, float depth_m, SurfacePins& pins) {
   for (std::size_t i = 0; i < surface.values.size(); ++i) {
     float& pin = pins.height_m.values[i];
     if (std::isnan(pin) || closed.values[i] - surface.values[i] <= depth_m) continue;
-    pin = none;
+    pin = no_height;
     ++count;
   }
   return count;
@@ -55,7 +55,7 @@ std::size_t cut_by_net(const SurfaceRules& rules, Raster& surface, SurfacePins& 
       surface(column, row) = opened(column, row);
       float& pin = pins.height_m(column, row);
       count += static_cast<std::size_t>(!std::isnan(pin));
-      pin = none;
+      pin = no_height;
     }
   }
   return count;
@@ -142,7 +142,7 @@ GroundSurface ground_below(SurfacePins lowest, const SurfaceRules& rules,
       objects_on(std::move(surface), rules, [&](double share) { progress(0.2 + 0.6 * share); });
   for (std::size_t i = 0; i < is_object.size(); ++i) {
     if (is_object[i] == 0 || std::isnan(lowest.height_m.values[i])) continue;
-    lowest.height_m.values[i] = none;
+    lowest.height_m.values[i] = no_height;
     ++ground.object_cells;
   }
   ground.height_m = membrane_through(lowest, PinPlace::Measured);

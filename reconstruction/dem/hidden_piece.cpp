@@ -10,9 +10,9 @@ namespace groundray {
 namespace {
 
 constexpr int shifts_tried = 12;
-constexpr int near_cells = 6;        // about what is hidden, where other holes are filled as well
-constexpr double least_share = 0.3;  // of a piece, that must come upon known ground
-constexpr double alike = 0.8;        // a shadow as large as the one wanted, near enough
+constexpr int near_cells = 6;  // about what is hidden, where other holes are filled as well
+constexpr double least_known_share = 0.3;  // of a piece, that must come upon known ground
+constexpr double alike = 0.8;              // a shadow as large as the one wanted, near enough
 constexpr int least_half_cells = 6, most_half_cells = 24;
 
 // Number n of a sequence that fills [0, 1) evenly, and cubes by three sequences.
@@ -88,7 +88,7 @@ glm::ivec2 PieceMaker::shift(const Cut& cut, std::uint32_t number) const {
 // What casts as much shadow as the piece of the hole has, as nearly as can be.
 std::optional<HiddenPiece> PieceMaker::make_shadow(const Cut& cut, std::uint32_t number) const {
   const auto wanted = static_cast<double>(cut.samples.size());
-  double best = least_share;
+  double best = least_known_share;
   CastShadow found;
   for (std::uint32_t i = 0; i < shifts_tried; ++i) {
     const std::uint32_t of = number * shifts_tried + i;
@@ -113,7 +113,7 @@ std::optional<HiddenPiece> PieceMaker::make_shadow(const Cut& cut, std::uint32_t
 std::optional<HiddenPiece> PieceMaker::make(std::uint32_t number) const {
   const Cut piece = cut(number);
   if (piece.hole->sight) return make_shadow(piece, number);
-  double best = least_share;
+  double best = least_known_share;
   std::optional<glm::ivec2> where;
   for (std::uint32_t i = 0; i < shifts_tried; ++i) {
     const glm::ivec2 tried = shift(piece, number * shifts_tried + i);

@@ -11,9 +11,9 @@
 namespace groundray {
 namespace {
 
-constexpr int reach = 2;
-constexpr std::size_t across = 5;
-constexpr std::size_t window = across * across;
+constexpr int window_reach = 2;
+constexpr std::size_t window_side = 5;
+constexpr std::size_t window = window_side * window_side;
 
 // Second differences may be larger than the scatter about a plane, but not by much more: a surface
 // that bends by d scatters by 0.84 d about its plane.
@@ -39,8 +39,8 @@ Neighbours gather(const GroundGuess* guess, std::ptrdiff_t stride, glm::dvec2 st
   Neighbours near;
   const auto per_x = static_cast<float>(1 / step_m.x), per_y = static_cast<float>(1 / step_m.y);
   std::size_t i = 0;
-  for (int row = -reach; row <= reach; ++row) {
-    for (int column = -reach; column <= reach; ++column, ++i) {
+  for (int row = -window_reach; row <= window_reach; ++row) {
+    for (int column = -window_reach; column <= window_reach; ++column, ++i) {
       const GroundGuess& one = guess[row * stride + column];
       near.variance[i] = 1;
       if ((row == 0 && column == 0) || std::isnan(one.height_m)) continue;
@@ -82,7 +82,7 @@ double median_slope(const Neighbours& near, const QuadricColumn& place, std::siz
   constexpr std::array<std::array<std::size_t, 2>, 4> pairs{{{0, 2}, {1, 3}, {2, 4}, {0, 4}}};
   QuadricColumn slopes;
   std::size_t count = 0;
-  for (std::size_t line = 0; line < across; ++line) {
+  for (std::size_t line = 0; line < window_side; ++line) {
     for (const auto& pair : pairs) {
       const std::size_t i = line * beside + pair[0] * along, j = line * beside + pair[1] * along;
       slopes[count] = (near.places.z[j] - near.places.z[i]) / (place[j] - place[i]);
@@ -153,8 +153,8 @@ Excess excess(const Neighbours& near, double noise_m2, double freedom) noexcept 
 }
 
 QuadricTerms start(Neighbours& near) noexcept {
-  QuadricTerms plane{0, median_slope(near, near.places.u, 1, across),
-                     median_slope(near, near.places.v, across, 1)};
+  QuadricTerms plane{0, median_slope(near, near.places.u, 1, window_side),
+                     median_slope(near, near.places.v, window_side, 1)};
   set_residuals(near.places, plane, near.residual);
   QuadricColumn found;
   const std::size_t count = residuals(near, found);
@@ -164,7 +164,7 @@ QuadricTerms start(Neighbours& near) noexcept {
 }
 
 // Takes a plane off heights, so that what is known beforehand is of the rest.
-void level(Neighbours& near, const QuadricTerms& plane) noexcept {
+void remove_plane(Neighbours& near, const QuadricTerms& plane) noexcept {
   set_residuals(near.places, {plane[0], plane[1], plane[2]}, near.places.z);
 }
 
@@ -213,8 +213,8 @@ void set_slopes(NeighbourSurface& found, const Neighbours& near, const QuadricMa
 std::uint32_t most_common_group(const GroundGuess* guess, std::ptrdiff_t stride) noexcept {
   std::uint32_t group = no_group;
   int votes = 0;
-  for (int row = -reach; row <= reach; ++row) {
-    for (int column = -reach; column <= reach; ++column) {
+  for (int row = -window_reach; row <= window_reach; ++row) {
+    for (int column = -window_reach; column <= window_reach; ++column) {
       const GroundGuess& one = guess[row * stride + column];
       if ((row == 0 && column == 0) || std::isnan(one.height_m)) continue;
       if (votes == 0) group = one.group;
@@ -233,8 +233,8 @@ void set_bias(NeighbourSurface& found, const GroundGuess* guess, std::ptrdiff_t 
   const bool is_stereo = (found.group & 1U) != 0;
   double sum_m = 0, all = 0;
   std::size_t i = 0;
-  for (int row = -reach; row <= reach; ++row) {
-    for (int column = -reach; column <= reach; ++column, ++i) {
+  for (int row = -window_reach; row <= window_reach; ++row) {
+    for (int column = -window_reach; column <= window_reach; ++column, ++i) {
       const GroundGuess& one = guess[row * stride + column];
       const double weight = near.places.weight[i];
       all += weight;
@@ -273,7 +273,7 @@ NeighbourSketch sketch_neighbours(const GroundGuess* guess, std::ptrdiff_t strid
   const double noise_m2 = mean_variance(near);
   double plane_m2 = std::max(0.0, excess(near, noise_m2, near.count).m2);
   set_weights(near, plane_m2);
-  level(near, plane);
+  remove_plane(near, plane);
   QuadricFit fit;
   if (near.count >= cells_for_plane) {
     fit = fit_quadric(near.places, hold_of(step_m, slope_sd, 0));
@@ -317,7 +317,7 @@ NeighbourSurface neighbour_surface(const GroundGuess* guess, std::ptrdiff_t stri
   set_residuals(near.places, sketched, near.residual);
   const double rough_m2 = scatter.quadric_m2;
   set_weights(near, rough_m2);
-  level(near, sketched);
+  remove_plane(near, sketched);
   QuadricFit fit = fit_quadric(near.places, hold_of(step_m, slope_sd, scatter.plane_m2));
   add_plane(fit.terms, sketched);
   const QuadricTerms& t = fit.terms;

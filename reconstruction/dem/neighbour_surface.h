@@ -14,6 +14,9 @@ namespace groundray {
 /// The name of no group of points.
 inline constexpr std::uint32_t no_group = std::numeric_limits<std::uint32_t>::max();
 
+/// Neighbours that are enough to contradict a cell's own points.
+inline constexpr int enough_neighbours = 5;
+
 /// What is known of a cell's ground at first sight.
 struct GroundGuess {
   double height_m = std::numeric_limits<double>::quiet_NaN();  ///< NaN for none

@@ -14,7 +14,8 @@
 namespace groundray {
 namespace {
 
-void check(std::size_t points, const GroundPoints& ground, const GridFrame& frame, double gap_m) {
+void check_overhang_inputs(std::size_t points, const GroundPoints& ground, const GridFrame& frame,
+                           double gap_m) {
   Violations broken("find_overhangs");
   broken.unless(ground.classes.size() == points && ground.height_m.size() == points,
                 "{} points but {} classes and {} heights: is the ground that of these points?",
@@ -66,7 +67,7 @@ CellLists listed(std::span<const glm::dvec3> points_m, const GroundPoints& groun
 
 Overhangs find_overhangs(std::span<const glm::dvec3> points_m, const GroundPoints& ground,
                          const GridFrame& frame, double gap_m) {
-  check(points_m.size(), ground, frame, gap_m);
+  check_overhang_inputs(points_m.size(), ground, frame, gap_m);
   constexpr float none = std::numeric_limits<float>::quiet_NaN();
   CellLists lists = listed(points_m, ground, frame);
   const std::size_t cells = lists.begins.size() - 2;

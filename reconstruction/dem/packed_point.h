@@ -31,6 +31,7 @@ struct PackedPoint {
   PointOrigin origin() const noexcept {
     return (group & 1U) == 0 ? PointOrigin::Lidar : PointOrigin::Stereo;
   }
+  double height_m() const noexcept { return height * height_step_m; }
   /// Returns the place in the cell from its sample, in cells: -1/2 to 1/2.
   static float from_sample(std::uint16_t place) noexcept {
     return (static_cast<float>(place) - 32767.5F) * (1.0F / 65536);

@@ -15,8 +15,8 @@
 namespace groundray {
 namespace {
 
-constexpr int reach = 3;  // of the equations, in columns and rows
-constexpr std::size_t side = 2 * reach + 1;
+constexpr int stencil_reach = 3;  // of the equations, in columns and rows
+constexpr std::size_t stencil_side = 2 * stencil_reach + 1;
 
 // Where a term of the sum reaches, from its first sample on, and how.
 struct TermSample {
@@ -33,7 +33,7 @@ struct Term {
 // Keeps neighbours together where nothing else does, too weak to be seen.
 constexpr double least_link = 1e-12;
 
-std::vector<Term> terms_of(glm::dvec2 step_m, const PlateForm& form) {
+std::vector<Term> plate_terms(glm::dvec2 step_m, const PlateForm& form) {
   const double a = std::abs(step_m.y / step_m.x);  // h^2 / dx^2
   const double bend = 1 - form.tension, pull = form.tension + least_link, turn = form.smoothness;
   std::vector<Term> terms{
@@ -52,13 +52,16 @@ std::vector<Term> terms_of(glm::dvec2 step_m, const PlateForm& form) {
   return terms;
 }
 
-int reach_of(const PlateForm& form) { return form.smoothness > 0 ? reach : reach - 1; }
+int reach_of(const PlateForm& form) {
+  return form.smoothness > 0 ? stencil_reach : stencil_reach - 1;
+}
 
 // The equation of one sample: factors of the samples about it.
-using Stencil = std::array<double, side * side>;
+using Stencil = std::array<double, stencil_side * stencil_side>;
 
 std::size_t stencil_place(int columns, int rows) {
-  return static_cast<std::size_t>(rows + reach) * side + static_cast<std::size_t>(columns + reach);
+  return static_cast<std::size_t>(rows + stencil_reach) * stencil_side +
+         static_cast<std::size_t>(columns + stencil_reach);
 }
 
 struct EquationEntry {
@@ -69,8 +72,8 @@ struct EquationEntry {
 class EquationMaker {
  public:
   EquationMaker(const PlateRaster& raster, const PlateForm& form, int wide)
-      : raster_(raster), terms_(terms_of(raster.step_m, form)), wide_(wide) {
-    entries_.reserve(side * side);
+      : raster_(raster), terms_(plate_terms(raster.step_m, form)), wide_(wide) {
+    entries_.reserve(stencil_side * stencil_side);
     for (const Term& term : terms_)
       for (const TermSample& self : term.samples) add(term, self, whole_);
   }
@@ -152,8 +155,8 @@ std::vector<std::vector<std::uint32_t>> coupled_samples(glm::ivec2 size,
     is_open[first] = 0;
     for (std::size_t i = 0; i < set.size(); ++i) {
       const int column = static_cast<int>(set[i]) % size.x, row = static_cast<int>(set[i]) / size.x;
-      for (int down = -reach; down <= reach; ++down) {
-        const int most = reach - std::abs(down);
+      for (int down = -stencil_reach; down <= stencil_reach; ++down) {
+        const int most = stencil_reach - std::abs(down);
         for (int across = -most; across <= most; ++across) {
           const int c = column + across, r = row + down;
           if (c < 0 || r < 0 || c >= size.x || r >= size.y) continue;
@@ -189,8 +192,8 @@ struct PlateSystem::Equations {
   double base_m = std::numeric_limits<double>::quiet_NaN();  // the first known height met
   PlateMatrix matrix;
   std::vector<double> right;
-  std::vector<glm::ivec2> places;                           // of the samples: columns and rows
-  std::array<std::optional<Dissection>, reach + 1> orders;  // by the reach of the equations
+  std::vector<glm::ivec2> places;  // of the samples: columns and rows
+  std::array<std::optional<Dissection>, stencil_reach + 1> orders;  // by the reach of the equations
   std::vector<double> below;  // the latest heights under bounds, above the base
 
   void assemble(const PlateRaster& raster, std::span<const std::uint32_t> samples,

@@ -19,8 +19,8 @@ template <std::size_t degree>
 using Moments = std::array<std::array<FloatLanes, degree + 1>, degree + 1>;
 
 template <std::size_t degree>
-void add(FloatLanes weight, const FloatLanes& u, const FloatLanes& v,
-         Moments<degree>& sums) noexcept {
+void add_moments(FloatLanes weight, const FloatLanes& u, const FloatLanes& v,
+                 Moments<degree>& sums) noexcept {
   for (std::size_t j = 0; j <= degree; ++j, weight *= v) {
     FloatLanes power = weight;
     for (std::size_t i = 0; i + j <= degree; ++i, power *= u) sums[i][j] += power;
@@ -38,8 +38,8 @@ Equations equations(const QuadricPlaces& places) noexcept {
   Moments<2> heights{};
   for (std::size_t i = 0; i < quadric_places; i += lanes) {
     const FloatLanes u = load(&places.u[i]), v = load(&places.v[i]), w = load(&places.weight[i]);
-    add<4>(w, u, v, moments);
-    add<2>(w * load(&places.z[i]), u, v, heights);
+    add_moments<4>(w, u, v, moments);
+    add_moments<2>(w * load(&places.z[i]), u, v, heights);
   }
   std::array<std::array<double, 5>, 5> sums{};
   for (std::size_t i = 0; i < sums.size(); ++i)
@@ -71,7 +71,7 @@ void factorise(QuadricMatrix& m) noexcept {
   }
 }
 
-void solve(const QuadricMatrix& factor, QuadricTerms& x) noexcept {
+void solve_factorised(const QuadricMatrix& factor, QuadricTerms& x) noexcept {
   for (std::size_t i = 0; i < six; ++i) {
     for (std::size_t k = 0; k < i; ++k) x[i] -= factor[i][k] * x[k];
     x[i] *= factor[i][i];
@@ -110,7 +110,7 @@ QuadricFit fit_quadric(const QuadricPlaces& places, const QuadricTerms& hold) no
   for (std::size_t i = 0; i < six; ++i) sums.matrix[i][i] += hold[i];
   factorise(sums.matrix);
   QuadricFit fit{sums.right, sums.matrix};
-  solve(fit.factor, fit.terms);
+  solve_factorised(fit.factor, fit.terms);
   return fit;
 }
 

@@ -8,7 +8,7 @@
 namespace groundray {
 namespace {
 
-constexpr std::uint32_t none = std::numeric_limits<std::uint32_t>::max();
+constexpr std::uint32_t no_sample = std::numeric_limits<std::uint32_t>::max();
 
 bool is_measured(const DemLayers& layers, std::size_t i) {
   const HeightSource source = layers.source[i];
@@ -20,7 +20,9 @@ bool is_measured(const DemLayers& layers, std::size_t i) {
 class NearestMeasured {
  public:
   explicit NearestMeasured(const DemLayers& layers)
-      : size_(layers.frame.samples), step_m_(layers.frame.step_m), of_(layers.source.size(), none) {
+      : size_(layers.frame.samples),
+        step_m_(layers.frame.step_m),
+        of_(layers.source.size(), no_sample) {
     for (std::size_t i = 0; i < of_.size(); ++i) {
       if (is_measured(layers, i)) of_[i] = static_cast<std::uint32_t>(i);
     }
@@ -37,7 +39,7 @@ class NearestMeasured {
   }
 
   double distance2_m2(glm::ivec2 at, std::uint32_t to) const {
-    if (to == none) return std::numeric_limits<double>::infinity();
+    if (to == no_sample) return std::numeric_limits<double>::infinity();
     const auto columns = static_cast<std::uint32_t>(size_.x);
     const glm::ivec2 there(to % columns, to / columns);
     const glm::dvec2 apart(there - at);
@@ -93,7 +95,7 @@ double variance_about_m2(const DemLayers& layers, std::uint32_t nearest) {
 void add_rim_variance(DemLayers& layers) {
   const NearestMeasured nearest(layers);
   for (std::size_t i = 0; i < layers.fill_sd_m.size(); ++i) {
-    if (std::isnan(layers.fill_sd_m[i]) || nearest.of(i) == none) continue;
+    if (std::isnan(layers.fill_sd_m[i]) || nearest.of(i) == no_sample) continue;
     const double sd_m = std::hypot(static_cast<double>(layers.fill_sd_m[i]),
                                    std::sqrt(variance_about_m2(layers, nearest.of(i))));
     layers.fill_sd_m[i] = static_cast<float>(sd_m);

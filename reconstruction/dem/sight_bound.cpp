@@ -15,8 +15,8 @@ namespace {
 
 bool is_finite(const glm::dvec3& p) { return std::isfinite(p.x + p.y + p.z); }
 
-void check(const GridFrame& frame, const OcclusionFaces& faces, std::span<const SightLine> lines,
-           double margin_m) {
+void check_sight_lines(const GridFrame& frame, const OcclusionFaces& faces,
+                       std::span<const SightLine> lines, double margin_m) {
   Violations broken("bounds by lines of sight");
   broken.unless(frame.samples.x >= 1 && frame.samples.y >= 1, "samples = [{}, {}] must be positive",
                 frame.samples.x, frame.samples.y);
@@ -117,7 +117,7 @@ void Bounds::lower(const SightLine& line) {
 
 std::vector<float> sight_bound(const GridFrame& frame, const OcclusionFaces& faces,
                                std::span<const SightLine> lines, double margin_m) {
-  check(frame, faces, lines, margin_m);
+  check_sight_lines(frame, faces, lines, margin_m);
   Bounds bounds(frame, margin_m);
   const auto& vertices_m = faces.shape.vertices_m;
   for (const glm::uvec3& t : faces.shape.triangles) {

@@ -26,8 +26,8 @@ Sets empty_samples(glm::ivec2 size, std::span<const std::uint8_t> has_data,
   return linked_samples(size, is_wanted);
 }
 
-RasterHole describe(glm::ivec2 size, const std::vector<std::uint32_t>& set,
-                    std::span<const float> to_data_m) {
+RasterHole describe_hole(glm::ivec2 size, const std::vector<std::uint32_t>& set,
+                         std::span<const float> to_data_m) {
   RasterHole hole{.first = size, .last = glm::ivec2(-1), .samples = set.size()};
   for (const std::uint32_t sample : set) {
     const glm::ivec2 at(static_cast<int>(sample) % size.x, static_cast<int>(sample) / size.x);
@@ -76,12 +76,12 @@ SortedHoles sort_holes(const GridFrame& frame, std::span<const std::uint8_t> has
   SortedHoles sorted;
   sorted.samples = empty_samples(size, has_data, is_inside, 1);
   for (const auto& set : sorted.samples) {
-    RasterHole& hole = sorted.holes.emplace_back(describe(size, set, to_data_m));
+    RasterHole& hole = sorted.holes.emplace_back(describe_hole(size, set, to_data_m));
     const bool is_open = options.reach == FillReach::Enclosed && touches_edge(hole, size);
     hole.fate = is_open ? HoleFate::Open : fate_of(hole, frame, options);
   }
   for (auto& set : empty_samples(size, has_data, is_inside, 0)) {
-    sorted.holes.emplace_back(describe(size, set, to_data_m)).fate = HoleFate::Open;
+    sorted.holes.emplace_back(describe_hole(size, set, to_data_m)).fate = HoleFate::Open;
     sorted.samples.push_back(std::move(set));
   }
   order(sorted);

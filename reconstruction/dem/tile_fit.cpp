@@ -21,7 +21,6 @@ namespace {
 
 constexpr int rim = CellTiling::rim;
 constexpr int width = CellTiling::width;
-constexpr int enough_neighbours = 5;  // to contradict a cell's own points
 
 // Cells this far off tell how rough the ground is: their neighbours are in the rim, too.
 constexpr int rough_reach = 1;
@@ -229,7 +228,7 @@ class RowFit {
         tallest_m_(tallest_ground_m(rules)),
         cell_fit_(rules.outliers.share()) {}
 
-  void fit(int column, int row, std::size_t at, DemLayers& layers);
+  void fit_cell(int column, int row, std::size_t at, DemLayers& layers);
   const TileCounts& counts() const noexcept { return counts_; }
 
  private:
@@ -240,7 +239,8 @@ class RowFit {
   double top_of_ground() const;
   CellSurface foot(const CellSurface& wall) const;
   static void set_overhang(std::size_t at, double overhang_m, double top_m, DemLayers& layers);
-  void fill(std::size_t at, const CellHeight& ground, double reference_m, DemLayers& layers) const;
+  void set_ground(std::size_t at, const CellHeight& ground, double reference_m,
+                  DemLayers& layers) const;
 
   const TilePoints& points_;
   const TileRules& rules_;
@@ -252,8 +252,6 @@ class RowFit {
   TileCounts counts_;
 };
 
-double height_m(const PackedPoint& point) { return point.height * PackedPoint::height_step_m; }
-
 // Whether the neighbours' ground passes through these heights, give or take what they may err.
 bool RowFit::agrees(double low_m, double high_m, double variance_m2, double give_m) const {
   give_m += 3 * std::sqrt(variance_m2 + around_.height_variance_m2);
@@ -262,7 +260,7 @@ bool RowFit::agrees(double low_m, double high_m, double variance_m2, double give
 
 // Whether neighbours tell that the foot of a wall or trunk is not seen.
 bool RowFit::stands_clear(const CellSurface& wall) const {
-  const double low_m = height_m(cell_[wall.begin]);
+  const double low_m = cell_[wall.begin].height_m();
   return around_.cells >= enough_neighbours && low_m > around_.plane.height_m &&
          !agrees(low_m, low_m, 0, rules_.gap_m);
 }
@@ -275,8 +273,8 @@ CellSurface RowFit::foot(const CellSurface& wall) const {
   const double highest_m = around_.plane.height_m + 3 * std::sqrt(around_.height_variance_m2) +
                            3 * total_sd_m(cell_[wall.begin]);
   CellSurface foot = wall;
-  while (foot.size() > enough && height_m(cell_[foot.end - 1]) > highest_m) --foot.end;
-  return height_m(cell_[foot.end - 1]) > highest_m ? wall : foot;
+  while (foot.size() > enough && cell_[foot.end - 1].height_m() > highest_m) --foot.end;
+  return cell_[foot.end - 1].height_m() > highest_m ? wall : foot;
 }
 
 // Few points are believed if neighbours know where the ground is, and that it is there. Three or
@@ -292,7 +290,7 @@ bool RowFit::is_credible(const CellSurface& surface) const {
                                   : std::sqrt(around_.height_variance_m2) <= rules_.gap_m / 3;
   if (!is_known) return is_enough;
   const double sd_m = total_sd_m(cell_[surface.begin]);
-  return agrees(height_m(cell_[surface.begin]), height_m(cell_[surface.end - 1]), sd_m * sd_m,
+  return agrees(cell_[surface.begin].height_m(), cell_[surface.end - 1].height_m(), sd_m * sd_m,
                 is_enough ? rules_.gap_m : 0);
 }
 
@@ -322,18 +320,19 @@ std::optional<CellSurface> RowFit::ground(std::size_t at, DemLayers& layers) {
                  tallest_m_);
   if (ground.end < lowest.end) {
     if (stands_clear(lowest)) {
-      set_overhang(at, height_m(cell_[lowest.begin]), top_of_ground(), layers);
+      set_overhang(at, cell_[lowest.begin].height_m(), top_of_ground(), layers);
       return std::nullopt;
     }
     ground = foot(ground);
   }
   if (surfaces_.size() > 1) {
-    set_overhang(at, height_m(cell_[surfaces_[1].begin]), height_m(cell_[lowest.end - 1]), layers);
+    set_overhang(at, cell_[surfaces_[1].begin].height_m(), cell_[lowest.end - 1].height_m(),
+                 layers);
   }
   return ground;
 }
 
-void RowFit::fit(int column, int row, std::size_t at, DemLayers& layers) {
+void RowFit::fit_cell(int column, int row, std::size_t at, DemLayers& layers) {
   cell_ = points_.cell(column, row);
   if (cell_.empty()) return;
   around_ = points_.neighbours(column, row);
@@ -355,12 +354,12 @@ void RowFit::fit(int column, int row, std::size_t at, DemLayers& layers) {
   } else if (!(found->variance_m2 <= rules_.most_sd_m * rules_.most_sd_m)) {
     ++counts_.uncertain;
   } else {
-    fill(at, *found, reference * PackedPoint::height_step_m, layers);
+    set_ground(at, *found, reference * PackedPoint::height_step_m, layers);
   }
 }
 
-void RowFit::fill(std::size_t at, const CellHeight& ground, double reference_m,
-                  DemLayers& layers) const {
+void RowFit::set_ground(std::size_t at, const CellHeight& ground, double reference_m,
+                        DemLayers& layers) const {
   layers.elevation_m[at] = static_cast<float>(reference_m + ground.plane.height_m);
   layers.variance_m2[at] = static_cast<float>(ground.variance_m2);
   layers.chi2[at] = static_cast<float>(ground.chi2);
@@ -386,7 +385,7 @@ TileCounts fit_tile(const PointParts& parts, glm::ivec2 size, glm::ivec2 first,
         static_cast<std::size_t>(first.y + row) * static_cast<std::size_t>(layers.frame.samples.x) +
         static_cast<std::size_t>(first.x);
     for (int column = 0; column < size.x; ++column)
-      fit.fit(column, row, begin + static_cast<std::size_t>(column), layers);
+      fit.fit_cell(column, row, begin + static_cast<std::size_t>(column), layers);
     without_ground += fit.counts().without_ground;
     uncertain += fit.counts().uncertain;
   });

@@ -1,28 +1,21 @@
 #include "reconstruction/merge/border_crossing.h"
 
-#include <tbb/parallel_for.h>
-
 #include <algorithm>
 #include <cmath>
 #include <glm/common.hpp>
 #include <glm/geometric.hpp>
 #include <utility>
 
+#include "reconstruction/merge/for_blocks.h"
+
 namespace groundray {
 namespace {
 
-constexpr std::size_t in_block = 256;
+constexpr std::size_t places_in_block = 256;
 constexpr double most_parts = 16;  // that an edge is looked at in
 constexpr int halvings = 6;        // of what a crossing is known to: 1/64 of a part
 
 bool is_inside(Cover cover) { return cover == Cover::Inside; }
-
-template <typename Visit>
-void for_blocks(std::size_t count, const Visit& visit) {
-  tbb::parallel_for(std::size_t{0}, (count + in_block - 1) / in_block, [&](std::size_t block) {
-    visit(block * in_block, std::min(count, (block + 1) * in_block));
-  });
-}
 
 struct Edge {
   std::uint32_t from = 0, to = 0;
@@ -59,7 +52,7 @@ class BorderSearch {
   /// Asks about vertices that were added.
   void ask_from(std::size_t first) {
     answers_.resize(quilt_.vertices.size());
-    for_blocks(answers_.size() - first, [&](std::size_t begin, std::size_t end) {
+    for_blocks(answers_.size() - first, places_in_block, [&](std::size_t begin, std::size_t end) {
       std::uint32_t near = 0;
       for (std::size_t v = first + begin; v < first + end; ++v) {
         if (!quilt_.vertices[v].is_shared) continue;
@@ -154,7 +147,7 @@ void split_between_crossings(Quilt& quilt, BorderSearch& search) {
   const std::vector<Edge> edges =
       edges_where(quilt, [&](const Edge& edge) { return search.is_long(edge); });
   std::vector<std::vector<EdgePlace>> found(edges.size());
-  for_blocks(edges.size(), [&](std::size_t begin, std::size_t end) {
+  for_blocks(edges.size(), places_in_block, [&](std::size_t begin, std::size_t end) {
     for (std::size_t i = begin; i < end; ++i) found[i] = search.runs_within(edges[i]);
   });
   std::vector<EdgePlace> places;
@@ -176,7 +169,7 @@ BorderCrossings find_border_crossings(Quilt& quilt, const CoverSurface& surface)
     return is_inside(found.covers[edge.from]) != is_inside(found.covers[edge.to]);
   });
   found.crossings.resize(crossing.size());
-  for_blocks(crossing.size(), [&](std::size_t begin, std::size_t end) {
+  for_blocks(crossing.size(), places_in_block, [&](std::size_t begin, std::size_t end) {
     for (std::size_t i = begin; i < end; ++i) found.crossings[i] = search.crossing_of(crossing[i]);
   });
   return found;

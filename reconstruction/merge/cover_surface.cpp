@@ -9,7 +9,7 @@ namespace groundray {
 namespace {
 
 // A patch of some four rings of triangles: its rim turns by a quarter of what a triangle's would.
-constexpr int smoothing_rounds = 3;
+constexpr int normal_smoothing_rounds = 3;
 
 // A place beside the border by less than this share of a triangle's size is on it.
 constexpr double rim_share = 0.1;
@@ -33,12 +33,12 @@ glm::vec3 unit(const glm::dvec3& v) {
 std::vector<glm::vec3> smooth_normals(const TriangleMesh& mesh) {
   std::vector<glm::dvec3> faces(mesh.triangles.size()), vertices(mesh.vertices_m.size());
   for (std::size_t i = 0; i < faces.size(); ++i) faces[i] = area_vector(mesh, i);
-  for (int round = 0; round < smoothing_rounds; ++round) {
+  for (int round = 0; round < normal_smoothing_rounds; ++round) {
     std::ranges::fill(vertices, glm::dvec3(0));
     for (std::size_t i = 0; i < faces.size(); ++i) {
       for (int k = 0; k < 3; ++k) vertices[mesh.triangles[i][k]] += faces[i];
     }
-    if (round + 1 == smoothing_rounds) break;
+    if (round + 1 == normal_smoothing_rounds) break;
     for (std::size_t i = 0; i < faces.size(); ++i) {
       const glm::uvec3& t = mesh.triangles[i];
       faces[i] = (vertices[t.x] + vertices[t.y] + vertices[t.z]) / 9.0;

@@ -1,7 +1,5 @@
 #include "reconstruction/merge/redundant_faces.h"
 
-#include <tbb/parallel_for.h>
-
 #include <algorithm>
 #include <array>
 #include <cmath>
@@ -10,20 +8,15 @@
 #include <limits>
 #include <tuple>
 
+#include "reconstruction/merge/for_blocks.h"
+
 namespace groundray {
 namespace {
 
-constexpr int smoothing_rounds = 10;
-constexpr int border_rings = 3;        // of triangles that are worth less
-constexpr std::size_t in_island = 64;  // triangles, at most
-constexpr std::size_t in_block = 512;  // neighbours in the list, which are near each other in space
-
-template <typename Visit>
-void for_blocks(std::size_t count, const Visit& visit) {
-  tbb::parallel_for(std::size_t{0}, (count + in_block - 1) / in_block, [&](std::size_t block) {
-    visit(block * in_block, std::min(count, (block + 1) * in_block));
-  });
-}
+constexpr int worth_smoothing_rounds = 10;
+constexpr int border_rings = 3;                 // of triangles that are worth less
+constexpr std::size_t in_island = 64;           // triangles, at most
+constexpr std::size_t vertices_in_block = 512;  // neighbours in the list are near in space
 
 /// How many triangles there are from each to the border, at most `border_rings`.
 std::vector<int> rings_to_border(const CoverSurface& surface) {
@@ -256,17 +249,18 @@ class Selection {
 /// Notes which vertices of a surface another scan covers.
 void note_covers(const CoverSurface& own, const RatedSurface& other, std::size_t number,
                  VertexCovers& covers) {
-  for_blocks(own.mesh().vertices_m.size(), [&](std::size_t begin, std::size_t end) {
-    std::uint32_t near = 0;
-    for (std::size_t v = begin; v < end; ++v) {
-      const auto vertex = static_cast<std::uint32_t>(v);
-      const MeasuredPlace place{own.mesh().vertices_m[v], own.normals()[v], own.sd_m(vertex)};
-      const CoverAnswer answer = other.surface.at(place, 0, near);
-      near = answer.nearest.triangle;
-      if (answer.cover == Cover::Inside && !other.refutes(near))
-        covers.triangles[v * covers.scans + number] = near;
-    }
-  });
+  for_blocks(
+      own.mesh().vertices_m.size(), vertices_in_block, [&](std::size_t begin, std::size_t end) {
+        std::uint32_t near = 0;
+        for (std::size_t v = begin; v < end; ++v) {
+          const auto vertex = static_cast<std::uint32_t>(v);
+          const MeasuredPlace place{own.mesh().vertices_m[v], own.normals()[v], own.sd_m(vertex)};
+          const CoverAnswer answer = other.surface.at(place, 0, near);
+          near = answer.nearest.triangle;
+          if (answer.cover == Cover::Inside && !other.refutes(near))
+            covers.triangles[v * covers.scans + number] = near;
+        }
+      });
 }
 
 }  // namespace
@@ -276,7 +270,7 @@ std::vector<float> rate_faces(const CoverSurface& surface, std::span<const float
   std::ranges::copy(confidence, worth.begin());
   const std::vector<int> rings = rings_to_border(surface);
   std::vector<float> before(worth.size());
-  for (int round = 0; round < smoothing_rounds; ++round) {
+  for (int round = 0; round < worth_smoothing_rounds; ++round) {
     before = worth;
     for (std::size_t i = 0; i < worth.size(); ++i) {
       float sum = before[i], count = 1;

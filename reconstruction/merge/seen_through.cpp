@@ -14,7 +14,7 @@
 namespace groundray {
 namespace {
 
-constexpr std::size_t in_block = 512;  // beams
+constexpr std::size_t beams_in_block = 512;
 
 // Noise moves vertices along beams, and across a triangle by less: most of those that are long for
 // their beams' spacing are seen at 60 degrees and more.
@@ -56,10 +56,12 @@ class LongTriangles {
   /// Returns what the beams of another scan have passed.
   std::vector<Passage> passed_by(const BeamSurface& other) const {
     if (numbers_.empty()) return {};
-    const std::size_t beams = other.origins_m.size(), blocks = (beams + in_block - 1) / in_block;
+    const std::size_t beams = other.origins_m.size(),
+                      blocks = (beams + beams_in_block - 1) / beams_in_block;
     std::vector<std::vector<Passage>> passed(blocks);
     tbb::parallel_for(std::size_t{0}, blocks, [&](std::size_t block) {
-      passed[block] = passed_by(other, block * in_block, std::min(beams, (block + 1) * in_block));
+      passed[block] =
+          passed_by(other, block * beams_in_block, std::min(beams, (block + 1) * beams_in_block));
     });
     std::vector<Passage> all;
     for (const std::vector<Passage>& part : passed) all.insert(all.end(), part.begin(), part.end());

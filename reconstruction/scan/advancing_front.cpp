@@ -97,7 +97,7 @@ bool is_before(const glm::dvec3& a, const glm::dvec3& b) {
 }
 
 // The points that take part, ascending: of those at one place the first.
-std::vector<std::uint32_t> distinct(std::span<const glm::dvec3> points_m, FrontMesh& out) {
+std::vector<std::uint32_t> distinct_points(std::span<const glm::dvec3> points_m, FrontMesh& out) {
   std::vector<std::uint32_t> order;
   for (std::uint32_t i = 0; i < points_m.size(); ++i) {
     if (is_finite(points_m[i])) order.push_back(i);
@@ -302,7 +302,7 @@ FrontMesh advance_front(std::span<const glm::dvec3> points_m, double longest_per
                         std::span<const glm::dvec3> origins_m, const Work& work) {
   check(points_m, longest_perimeter_m, origins_m, work);
   FrontMesh out;
-  const std::vector<std::uint32_t> taken = distinct(points_m, out);
+  const std::vector<std::uint32_t> taken = distinct_points(points_m, out);
   std::vector<Point> points;
   double farthest_m = 0;  // from zero along an axis
   for (const std::uint32_t i : taken) {

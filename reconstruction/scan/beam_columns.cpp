@@ -4,30 +4,22 @@
 #include <cmath>
 #include <complex>
 #include <cstddef>
-#include <numbers>
 #include <numeric>
 #include <tuple>
 #include <utility>
 
 #include "core/error.h"
+#include "reconstruction/scan/angle.h"
 #include "reconstruction/scan/firing_lattice.h"
+#include "reconstruction/scan/grid_check.h"
+#include "reconstruction/scan/upper_median.h"
 
 namespace groundray {
 namespace {
 
-constexpr double two_pi = 2 * std::numbers::pi;
 constexpr double least_slope_rad = 1e-6;  // of columns in a turn, as many as there can be
-constexpr std::size_t few = 64;           // returns tell nothing of regularity
 constexpr std::int64_t narrow = 3;        // columns that may be empty for pulses that came late
 constexpr double most_cells_each = 64;    // columns for each return of a ring
-
-double wrapped(double angle_rad) { return angle_rad - two_pi * std::round(angle_rad / two_pi); }
-
-double median_of(std::vector<double>& values) {
-  const auto middle = values.begin() + static_cast<std::ptrdiff_t>(values.size() / 2);
-  std::ranges::nth_element(values, middle);
-  return *middle;
-}
 
 /// Numbers of pulses, with the order in which each ring's follow each other.
 struct Numbered {
@@ -73,7 +65,7 @@ double slope_rad(const Numbered& pulses) {
     if (columns <= 4) slopes.push_back(slope(a, b, columns));
   });
   if (slopes.empty()) return 0;
-  const double median = median_of(slopes);
+  const double median = upper_median(slopes);
   if (std::abs(median) < least_slope_rad) return 0;
   const auto like = std::ranges::count_if(
       slopes, [median](double s) { return std::abs(s - median) <= std::abs(median) / 2; });
@@ -123,7 +115,7 @@ bool goes_round(const Numbered& pulses, double slope, std::int64_t turn) {
     off.push_back(wrapped(pulses.azimuth_rad[first] - pulses.azimuth_rad[last] - step_rad) / slope);
   });
   if (off.empty()) return false;
-  const double middle = median_of(off);
+  const double middle = upper_median(off);
   return -1 < middle && middle <= 0.5;
 }
 
@@ -141,7 +133,7 @@ std::vector<std::int64_t> aside(const Numbered& pulses, double slope) {
     off.push_back(
         std::abs(wrapped(rest(i) - std::arg(sum[static_cast<std::size_t>(pulses.row[i])]))));
   std::vector<std::int64_t> shift(rows, 0);
-  if (median_of(off) > 2 * std::abs(slope)) return shift;
+  if (upper_median(off) > 2 * std::abs(slope)) return shift;
   std::vector<double> turned;
   double zero = 0;
   for (int pass = 0; pass < 2; ++pass) {  // about the first ring, then about the middle
@@ -149,7 +141,7 @@ std::vector<std::int64_t> aside(const Numbered& pulses, double slope) {
     for (const std::complex<double>& s : sum) {
       if (s != 0.0) turned.push_back(wrapped(std::arg(s) - zero));
     }
-    if (!turned.empty()) zero += median_of(turned);
+    if (!turned.empty()) zero += upper_median(turned);
   }
   for (std::size_t r = 0; r < rows; ++r) {
     if (sum[r] != 0.0) shift[r] = std::llround(wrapped(std::arg(sum[r]) - zero) / slope);
@@ -157,7 +149,7 @@ std::vector<std::int64_t> aside(const Numbered& pulses, double slope) {
   return shift;
 }
 
-BeamColumns columns_of(Numbered& pulses, RowOrder order) {
+BeamColumns columns_of_pulses(Numbered& pulses, RowOrder order) {
   BeamColumns columns;
   if (pulses.number.empty()) return columns;
   double slope = slope_rad(pulses);
@@ -209,7 +201,7 @@ BeamColumns columns_of_numbers(std::span<const std::int32_t> numbers, std::int32
                   .rows = rows.count,
                   .azimuth_rad = azimuths_rad};
   pulses.sort();
-  BeamColumns columns = columns_of(pulses, order);
+  BeamColumns columns = columns_of_pulses(pulses, order);
   columns.off.assign(numbers.size(), 0);
   return columns;
 }
@@ -230,7 +222,7 @@ std::optional<BeamColumns> columns_of_times(std::span<const double> times_s, con
   if (cells > most_cells_each * static_cast<double>(times_s.size())) return std::nullopt;
   pulses.sort();
   if (!has_distinct_pulses(pulses, lattice.off)) return std::nullopt;
-  BeamColumns columns = columns_of(pulses, order);
+  BeamColumns columns = columns_of_pulses(pulses, order);
   columns.off = std::move(lattice.off);
   return columns;
 }
@@ -239,7 +231,7 @@ BeamColumns columns_of_azimuths(const BeamRows& rows, std::span<const double> az
   BeamColumns columns;
   if (azimuths_rad.empty()) return columns;
   FiringLattice lattice = number_firings(azimuths_rad, rows.row, rows.count, two_pi);
-  if (lattice.evenness < 0.2 && azimuths_rad.size() > few) {
+  if (lattice.evenness < 0.2 && azimuths_rad.size() > few_returns) {
     throw Error(
         "the azimuths of the rings' returns are not at equal steps (evenness {:.2f} of 1, steps "
         "of {:.4f} degrees): give the columns, or link them as points without order",

@@ -5,11 +5,11 @@
 #include <cstddef>
 #include <functional>
 #include <limits>
-#include <numbers>
 #include <numeric>
 #include <utility>
 
 #include "core/error.h"
+#include "reconstruction/scan/angle.h"
 
 namespace groundray {
 namespace {
@@ -22,10 +22,9 @@ constexpr double jump_turns = 0.01;         // back, from ring to ring
 constexpr double most_spread = 0.5;         // of elevations in a ring, over gaps between rings
 constexpr std::size_t most_sectors = 36;    // of a turn, in which elevations are a ring's
 constexpr std::size_t sector_returns = 16;  // of a ring, in the mean
-constexpr double two_pi = 2 * std::numbers::pi;
 
 /// Returns the numbers that there are, in order, each once.
-std::vector<std::int32_t> distinct(std::span<const std::int32_t> numbers) {
+std::vector<std::int32_t> distinct_numbers(std::span<const std::int32_t> numbers) {
   std::vector<std::int32_t> sorted(numbers.begin(), numbers.end());
   std::ranges::sort(sorted);
   sorted.erase(std::unique(sorted.begin(), sorted.end()), sorted.end());
@@ -102,8 +101,9 @@ double typical_gap(const std::vector<double>& median, const std::vector<std::siz
 
 /// Returns how far elevations are from their ring's median in their sector of the turn, in the
 /// mean.
-double spread_rad(std::span<const std::int32_t> ring, std::size_t rings, std::size_t sectors,
-                  std::span<const double> azimuths_rad, std::span<const double> elevations_rad) {
+double ring_spread_rad(std::span<const std::int32_t> ring, std::size_t rings, std::size_t sectors,
+                       std::span<const double> azimuths_rad,
+                       std::span<const double> elevations_rad) {
   std::vector<std::int32_t> place(ring.size());
   for (std::size_t i = 0; i < place.size(); ++i) {
     const auto sector =
@@ -163,9 +163,9 @@ Turns turns_of(std::vector<std::int32_t> run, std::span<const double> azimuths_r
   turns.jumps = static_cast<double>(jumps) / static_cast<double>(rings);
   const std::size_t sectors =
       std::clamp<std::size_t>(turns.ring.size() / (sector_returns * rings), 1, most_sectors);
-  turns.spread = spread_rad(turns.ring, rings, 1, azimuths_rad, elevations_rad) / gap_rad;
+  turns.spread = ring_spread_rad(turns.ring, rings, 1, azimuths_rad, elevations_rad) / gap_rad;
   turns.local_spread =
-      spread_rad(turns.ring, rings, sectors, azimuths_rad, elevations_rad) / gap_rad;
+      ring_spread_rad(turns.ring, rings, sectors, azimuths_rad, elevations_rad) / gap_rad;
   return turns;
 }
 
@@ -191,7 +191,7 @@ BeamRows rows_of_rings(std::span<const std::int32_t> rings, std::span<const doub
                        RowOrder order) {
   BeamRows rows;
   if (rings.empty()) return rows;
-  const std::vector<std::int32_t> numbers = distinct(rings);
+  const std::vector<std::int32_t> numbers = distinct_numbers(rings);
   const std::int64_t span = std::int64_t{numbers.back()} - numbers.front() + 1;
   const std::int64_t count =
       order == RowOrder::Number ? span : static_cast<std::int64_t>(numbers.size());

@@ -4,15 +4,16 @@
 #include <cmath>
 #include <complex>
 #include <cstddef>
-#include <numbers>
 #include <utility>
+
+#include "reconstruction/scan/angle.h"
+#include "reconstruction/scan/upper_median.h"
 
 namespace groundray {
 namespace {
 
 using Phasor = std::complex<double>;
 
-constexpr double two_pi = 2 * std::numbers::pi;
 constexpr double most_steps = 1e6;       // in a turn, or all the way
 constexpr int most_missing = 16;         // of this many pulses one may be there
 constexpr std::size_t enough = 512;      // differences tell of a ring
@@ -28,12 +29,6 @@ double coherence_of(std::span<const double> differences, double step) {
   return sum / static_cast<double>(differences.size());
 }
 
-double median_of(std::vector<double>& values) {
-  const auto middle = values.begin() + static_cast<std::ptrdiff_t>(values.size() / 2);
-  std::ranges::nth_element(values, middle);
-  return *middle;
-}
-
 /// The step of a ring, how far its pulses reach, and how even its steps are.
 struct RingStep {
   double step = 0, reach = 0, evenness = 0;
@@ -41,7 +36,7 @@ struct RingStep {
 
 /// Takes the differences of one ring, of which there is at least one.
 RingStep step_of(std::vector<double>& differences) {
-  const double median = median_of(differences);
+  const double median = upper_median(differences);
   std::vector<double> near;
   for (const double d : differences) {
     if (d <= 3.5 * median && near.size() < enough) near.push_back(d);
@@ -78,7 +73,7 @@ double coarsest(std::vector<RingStep> rings) {
   for (const RingStep& ring : rings) {
     if (std::abs(ring.step / rings[found].step - 1) < 0.25) like.push_back(ring.step);
   }
-  return median_of(like);
+  return upper_median(like);
 }
 
 /// Returns the steps of rings: of those that tell enough, or of all if none does.

@@ -12,7 +12,6 @@
 namespace groundray {
 namespace {
 
-constexpr std::size_t few = 64;          // returns tell nothing of regularity
 constexpr std::size_t least_share = 4;   // one of this many may turn the other way
 constexpr std::size_t least_above = 10;  // one of this many must have one above
 constexpr double one_row_rad = 5e-2;     // of elevations, from the middle
@@ -40,14 +39,14 @@ Turning turning_of(const OrganisedScan& scan) {
 }
 
 /// How far elevations of returns are from their median, in the median.
-double spread_rad(const OrganisedScan& scan) {
+double elevation_spread_rad(const OrganisedScan& scan) {
   std::vector<double> elevations_rad;
   for (std::size_t i = 0; i < scan.points_m.size(); ++i) {
     const glm::dvec3 way_m = scan.points_m[i] - scan.origins_m[i];
     if (!std::isnan(way_m.x))
       elevations_rad.push_back(std::atan2(way_m.z, std::hypot(way_m.x, way_m.y)));
   }
-  if (elevations_rad.size() <= few) return 0;
+  if (elevations_rad.size() <= few_returns) return 0;
   const auto middle = [&] {
     const auto at = elevations_rad.begin() + static_cast<std::ptrdiff_t>(elevations_rad.size() / 2);
     std::ranges::nth_element(elevations_rad, at);
@@ -69,7 +68,7 @@ void check_rows_meet(const OrganisedScan& scan) {
     ++used;
     above += i + columns < chosen.size() && chosen[i + columns] != OrganisedScan::none;
   }
-  if (scan.rows < 2 || used <= few || least_above * above >= used) return;
+  if (scan.rows < 2 || used <= few_returns || least_above * above >= used) return;
   throw Error(
       "the returns have no ring; their elevations seem to be of {} beams, but only {} of {} "
       "returns have one of the next beam above them: give the rings, or link them as points "
@@ -81,7 +80,7 @@ void check_beams_turn(const OrganisedScan& scan) {
   const Turning turning = turning_of(scan);
   const std::size_t all = turning.left + turning.right;
   const std::size_t fewer = std::min(turning.left, turning.right);
-  if (all > few && least_share * fewer > all) {
+  if (all > few_returns && least_share * fewer > all) {
     throw Error(
         "the beams lie on no grid of rows and columns: of {} neighbours {} turn one way and {} the "
         "other, as those of a rosette do, or of points that are not in the sensor's frame: give "
@@ -89,7 +88,7 @@ void check_beams_turn(const OrganisedScan& scan) {
         all, all - fewer, fewer);
   }
   if (scan.rows != 1) return;
-  const double spread = spread_rad(scan);
+  const double spread = elevation_spread_rad(scan);
   if (spread <= one_row_rad) return;
   throw Error(
       "all returns are of one ring, whose elevations are {:.1f} degrees from their middle: it is "

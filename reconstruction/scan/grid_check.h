@@ -6,6 +6,9 @@
 
 namespace groundray {
 
+/// Number of returns up to which they tell nothing of regularity.
+inline constexpr std::size_t few_returns = 64;
+
 /// Beams that were found by their elevations must look at the same columns.
 /// @throws Error if few returns have one in the next row.
 void check_rows_meet(const OrganisedScan& scan);

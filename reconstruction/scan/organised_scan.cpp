@@ -17,12 +17,13 @@
 namespace groundray {
 namespace {
 
-constexpr double farthest_m = 1e15;  // as check_mesh
+constexpr double farthest_point_m = 1e15;  // as check_mesh
 constexpr double longest_s = 1e12;
 constexpr float one_pulse = 1.f / 16;  // of a column, apart
 
 bool is_position(const glm::dvec3& p) {
-  return std::abs(p.x) <= farthest_m && std::abs(p.y) <= farthest_m && std::abs(p.z) <= farthest_m;
+  return std::abs(p.x) <= farthest_point_m && std::abs(p.y) <= farthest_point_m &&
+         std::abs(p.z) <= farthest_point_m;
 }
 
 void check_returns(const ScanReturns& returns, ReturnChoice choice) {
@@ -43,8 +44,8 @@ void check_returns(const ScanReturns& returns, ReturnChoice choice) {
                 OrganisedScan::none - 1);
   broken.unless(choice != ReturnChoice::Strongest || !returns.intensity.empty() || rows == 0,
                 "the strongest return is asked for, but intensity is not given");
-  const auto bad =
-      std::ranges::find_if(returns.sd_m, [](float sd) { return !(sd >= 0 && sd <= farthest_m); });
+  const auto bad = std::ranges::find_if(
+      returns.sd_m, [](float sd) { return !(sd >= 0 && sd <= farthest_point_m); });
   broken.unless(bad == returns.sd_m.end(), "sd_m of row {} = {} must be >= 0 and finite",
                 bad - returns.sd_m.begin(), bad == returns.sd_m.end() ? 0.f : *bad);
   broken.throw_if_any();
@@ -59,7 +60,7 @@ struct Beams {
   std::vector<double> range_m;
 };
 
-Beams beams_of(const ScanReturns& returns) {
+Beams beams_of_returns(const ScanReturns& returns) {
   Beams beams;
   for (std::size_t i = 0; i < returns.p_S.size(); ++i) {
     const glm::dvec3& p = returns.p_S[i];
@@ -79,7 +80,8 @@ Beams beams_of(const ScanReturns& returns) {
 }
 
 template <typename T>
-std::vector<T> picked(const std::vector<T>& values, const std::vector<std::uint32_t>& rows) {
+std::vector<T> values_of_rows(const std::vector<T>& values,
+                              const std::vector<std::uint32_t>& rows) {
   std::vector<T> out;
   out.reserve(rows.size());
   for (const std::uint32_t row : rows) out.push_back(values[row]);
@@ -97,10 +99,10 @@ BeamRows rows_of(const ScanReturns& returns, const Beams& beams, RowOrder order)
         beams.source.size());
   }
   if (order == RowOrder::Elevation)
-    return rows_of_rings(picked(returns.rings, beams.source), beams.elevation_rad, order);
+    return rows_of_rings(values_of_rows(returns.rings, beams.source), beams.elevation_rad, order);
   // Lines without a return are lines.
   BeamRows all = rows_of_rings(returns.rings, {}, order);
-  return {picked(all.row, beams.source), all.count};
+  return {values_of_rows(all.row, beams.source), all.count};
 }
 
 /// Returns azimuths that tell how rings look aside: of points at one stamp, without the parallax
@@ -112,17 +114,17 @@ std::vector<double> azimuths_of(const std::vector<double>& clock, const Beams& b
   return as_fired ? *std::move(as_fired) : beams.azimuth_rad;
 }
 
-BeamColumns columns_of(const ScanReturns& returns, const Beams& beams, const BeamRows& rows,
-                       RowOrder order) {
+BeamColumns columns_of_returns(const ScanReturns& returns, const Beams& beams, const BeamRows& rows,
+                               RowOrder order) {
   if (!returns.columns.empty()) {
     const auto [first, last] = std::ranges::minmax(returns.columns);
-    const std::vector<std::int32_t> numbers = picked(returns.columns, beams.source);
+    const std::vector<std::int32_t> numbers = values_of_rows(returns.columns, beams.source);
     const std::vector<double> clock(numbers.begin(), numbers.end());
     return columns_of_numbers(numbers, first, last, rows, azimuths_of(clock, beams, rows, order),
                               order);
   }
   if (!returns.times_s.empty()) {
-    const std::vector<double> times_s = picked(returns.times_s, beams.source);
+    const std::vector<double> times_s = values_of_rows(returns.times_s, beams.source);
     const bool are_times =
         std::ranges::all_of(times_s, [](double t) { return std::abs(t) <= longest_s; });
     if (are_times) {
@@ -253,11 +255,11 @@ OrganisedScan empty_scan(int rows, int columns, bool with_labels) {
 
 OrganisedReturns organise(const ScanReturns& returns, ReturnChoice choice, RowOrder order) {
   check_returns(returns, choice);
-  const Beams beams = beams_of(returns);
+  const Beams beams = beams_of_returns(returns);
   OrganisedReturns made;
   made.counts.no_returns = returns.p_S.size() - beams.source.size();
   const BeamRows rows = rows_of(returns, beams, order);
-  BeamColumns columns = columns_of(returns, beams, rows, order);
+  BeamColumns columns = columns_of_returns(returns, beams, rows, order);
   check_size(rows, columns, returns.p_S.size());
   made.scan = empty_scan(rows.count, static_cast<int>(columns.count), !returns.labels.empty());
   made.scan.is_round = columns.is_round;
@@ -321,12 +323,12 @@ void check_scan(const OrganisedScan& scan, const char* name) {
   check("sd_m", scan.sd_m.size(), false);
   check("labels", scan.labels.size(), true);
   check("returns", scan.returns.size(), true);
-  const auto bad_sd =
-      std::ranges::find_if(scan.sd_m, [](float sd) { return !(sd >= 0 && sd <= farthest_m); });
+  const auto bad_sd = std::ranges::find_if(
+      scan.sd_m, [](float sd) { return !(sd >= 0 && sd <= farthest_point_m); });
   broken.unless(bad_sd == scan.sd_m.end(), "sd_m of cell {} must be >= 0 and finite",
                 bad_sd - scan.sd_m.begin());
   const auto is_far = [](const glm::dvec3& p) {
-    return std::max({std::abs(p.x), std::abs(p.y), std::abs(p.z)}) > farthest_m;  // not NaN
+    return std::max({std::abs(p.x), std::abs(p.y), std::abs(p.z)}) > farthest_point_m;  // not NaN
   };
   const auto far = std::ranges::find_if(scan.points_m, is_far);
   broken.unless(far == scan.points_m.end(),

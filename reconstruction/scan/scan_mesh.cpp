@@ -49,7 +49,7 @@ void check_limits(const ScreeningLimits& limits) {
   broken.throw_if_any();
 }
 
-std::vector<Beam> beams_of(const OrganisedScan& scan) {
+std::vector<Beam> beams_of_scan(const OrganisedScan& scan) {
   std::vector<Beam> beams(scan.points_m.size());
   for (std::size_t i = 0; i < beams.size(); ++i) {
     const glm::dvec3 way_m = scan.points_m[i] - scan.origins_m[i];
@@ -65,7 +65,7 @@ class Linker {
  public:
   Linker(const OrganisedScan& scan, const ScreeningLimits& limits)
       : scan_(scan),
-        beams_(beams_of(scan)),
+        beams_(beams_of_scan(scan)),
         secant_(1 / std::max(std::cos(limits.incidence_rad), 1e-12)),
         tangent_(std::min(std::tan(limits.incidence_rad), 1e12)),
         longest_m_(limits.longest_m),
@@ -282,7 +282,8 @@ std::vector<std::uint32_t> number_cells(const std::vector<Face>& faces, std::siz
 
 /// Returns the values of some cells, if there are any.
 template <typename T>
-std::vector<T> picked(const std::vector<T>& values, const std::vector<std::uint32_t>& cells) {
+std::vector<T> values_of_cells(const std::vector<T>& values,
+                               const std::vector<std::uint32_t>& cells) {
   std::vector<T> out;
   if (values.empty()) return out;
   out.reserve(cells.size());
@@ -312,15 +313,15 @@ void Linker::give_confidence(ScanMesh& made) const {
 ScanMesh Linker::mesh() const {
   ScanMesh made;
   made.cells = number_cells(faces_, beams_.size(), made.mesh.shape.triangles);
-  made.mesh.shape.vertices_m = picked(scan_.points_m, made.cells);
-  made.mesh.sd_m = picked(scan_.sd_m, made.cells);
-  made.mesh.labels = picked(scan_.labels, made.cells);
-  made.origins_m = picked(scan_.origins_m, made.cells);
+  made.mesh.shape.vertices_m = values_of_cells(scan_.points_m, made.cells);
+  made.mesh.sd_m = values_of_cells(scan_.sd_m, made.cells);
+  made.mesh.labels = values_of_cells(scan_.labels, made.cells);
+  made.origins_m = values_of_cells(scan_.origins_m, made.cells);
   give_confidence(made);
   OcclusionFaces& hidden = made.occlusion;
   const auto cells = number_cells(rejected_, beams_.size(), hidden.shape.triangles);
-  hidden.shape.vertices_m = picked(scan_.points_m, cells);
-  hidden.origins_m = picked(scan_.origins_m, cells);
+  hidden.shape.vertices_m = values_of_cells(scan_.points_m, cells);
+  hidden.origins_m = values_of_cells(scan_.origins_m, cells);
   return made;
 }
 

@@ -7,30 +7,23 @@
 #include <complex>
 #include <cstddef>
 #include <cstdint>
-#include <numbers>
 #include <numeric>
 #include <tuple>
+
+#include "reconstruction/scan/angle.h"
+#include "reconstruction/scan/upper_median.h"
 
 namespace groundray {
 namespace {
 
-constexpr double two_pi = 2 * std::numbers::pi;
-constexpr double even_steps = 1. / 8;  // off in the middle: nothing is to be mended
-constexpr double least_gain = 2;       // in evenness, or it is no motion
-constexpr double farthest_m = 100;     // that a sensor drives in a scan, about
+constexpr double even_steps = 1. / 8;     // off in the middle: nothing is to be mended
+constexpr double least_gain = 2;          // in evenness, or it is no motion
+constexpr double farthest_drive_m = 100;  // that a sensor drives in a scan, about
 constexpr std::size_t least_returns = 64;
 constexpr int most_passes = 10;
 
 // How fast azimuth grows from (c + w clock) on: rate, c and w.
 using Fit = Eigen::Matrix<double, 5, 1>;
-
-double wrapped(double angle_rad) { return angle_rad - two_pi * std::round(angle_rad / two_pi); }
-
-double median_of(std::vector<double> values) {
-  const auto middle = values.begin() + static_cast<std::ptrdiff_t>(values.size() / 2);
-  std::ranges::nth_element(values, middle);
-  return *middle;
-}
 
 /// How azimuth grows from pulse to pulse of a ring.
 struct Pace {
@@ -54,11 +47,11 @@ Pace pace_of(std::span<const double> clock, std::span<const std::int32_t> row,
     rates.push_back(step_rad / (clock[b] - clock[a]));
   }
   if (rates.size() < least_returns) return {};
-  const double rate = median_of(rates);
+  const double rate = upper_median(rates);
   const auto like = std::ranges::count_if(
       rates, [rate](double r) { return std::abs(r - rate) <= std::abs(rate) / 2; });
   if (static_cast<double>(like) < 0.75 * static_cast<double>(rates.size())) return {};
-  return {rate, median_of(steps)};
+  return {rate, upper_median(steps)};
 }
 
 /// Fits how azimuths grow, each ring from an angle of its own.
@@ -95,7 +88,7 @@ class MotionFit {
   double middle_off_rad() const {
     std::vector<double> off(off_rad_.size());
     std::ranges::transform(off_rad_, off.begin(), [](double o) { return std::abs(o); });
-    return median_of(std::move(off));
+    return upper_median(off);
   }
   std::vector<double> azimuths_rad() && { return std::move(azimuth_rad_); }
 
@@ -167,7 +160,7 @@ void MotionFit::improve(Eigen::Index unknowns) {
     right += weight(i) * (off_rad_[i] - mean_off[ring(i)]) * row;
   }
   // What returns do not tell stays where it is.
-  normal.diagonal().array() += scale_rad * scale_rad / (farthest_m * farthest_m);
+  normal.diagonal().array() += scale_rad * scale_rad / (farthest_drive_m * farthest_drive_m);
   const Fit step = [&] {
     Fit found = Fit::Zero();
     found.head(unknowns) =

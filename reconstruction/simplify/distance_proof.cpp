@@ -15,7 +15,7 @@
 namespace groundray {
 namespace {
 
-constexpr std::size_t most_parts = 200'000;  // that are split where the nearest triangle changes
+constexpr std::size_t most_split_pieces = 200'000;  // where the nearest triangle changes
 
 /// Looks at one triangle after another.
 class Prover {
@@ -44,7 +44,7 @@ class Prover {
   Beyond search(const std::array<glm::dvec3, 3>& corners_m, const Beyond& found) const {
     const SearchLimits limits{.tolerance_m = 1e-3 * most_m_,
                               .rounding_m = rounding_m_,
-                              .most_pieces = most_parts,
+                              .most_pieces = most_split_pieces,
                               .enough_m = most_m_};
     FarthestProbe so_far;
     so_far.probe.distance_m = most_m_ - limits.tolerance_m;

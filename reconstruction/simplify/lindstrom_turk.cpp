@@ -61,9 +61,9 @@ void take_triangles(const CollapsibleMesh& mesh, const std::vector<glm::dvec3>& 
   }
 }
 
-ReducedMesh result_of(const CollapsibleMesh& mesh, const std::vector<glm::dvec3>& places_m,
-                      const ManifoldMesh& manifold, Merges& merges, const TriangleMesh& original,
-                      const glm::dvec3& origin_m) {
+ReducedMesh make_reduced_mesh(const CollapsibleMesh& mesh, const std::vector<glm::dvec3>& places_m,
+                              const ManifoldMesh& manifold, Merges& merges,
+                              const TriangleMesh& original, const glm::dvec3& origin_m) {
   ReducedMesh out;
   std::vector<std::uint32_t> numbers(manifold.sources.size(), none);
   take_triangles(mesh, places_m, numbers, out.mesh);
@@ -89,8 +89,8 @@ ReducedMesh result_of(const CollapsibleMesh& mesh, const std::vector<glm::dvec3>
   return out;
 }
 
-void collapse_to(std::size_t triangles, bool is_flat, double away_m, const Work& work,
-                 CollapsibleMesh& mesh, std::vector<glm::dvec3>& places_m, Merges& merges) {
+void collapse_edges(std::size_t triangles, bool is_flat, double away_m, const Work& work,
+                    CollapsibleMesh& mesh, std::vector<glm::dvec3>& places_m, Merges& merges) {
   constexpr double looking = 0.1;  // of the time, at all edges first
   const auto tell = [&](double share) {
     if (work.progress) work.progress(share);
@@ -111,7 +111,7 @@ void collapse_to(std::size_t triangles, bool is_flat, double away_m, const Work&
   }
 }
 
-void check_size(const TriangleMesh& mesh, const Work& work) {
+void check_triangle_count(const TriangleMesh& mesh, const Work& work) {
   constexpr std::size_t most_triangles = 1'400'000'000;  // whose half-edges 32 bits can number
   if (mesh.triangles.size() >= most_triangles) {
     throw Error("reducing a mesh: {} triangles must be fewer than {}; cut the mesh in parts",
@@ -132,7 +132,7 @@ void check_size(const TriangleMesh& mesh, const Work& work) {
 ReducedMesh reduce(const TriangleMesh& mesh, std::size_t triangles, const Work& work) {
   check_mesh(mesh, "mesh to reduce", EmptyMesh::Refuse);
   if (triangles == 0) throw Error("reducing a mesh: triangles = 0 must be at least 1");
-  check_size(mesh, work);
+  check_triangle_count(mesh, work);
   const ManifoldMesh manifold = cut_to_manifold(mesh);
   const bool is_flat = is_height_field(manifold.shape);
   const glm::dvec3 origin_m = origin_amid(mesh);
@@ -143,8 +143,8 @@ ReducedMesh reduce(const TriangleMesh& mesh, std::size_t triangles, const Work& 
   merges.into.resize(manifold.sources.size());
   std::iota(merges.into.begin(), merges.into.end(), 0u);
   if (rest.triangles() > triangles)
-    collapse_to(triangles, is_flat, farthest_m(mesh), work, rest, places_m, merges);
-  ReducedMesh out = result_of(rest, places_m, manifold, merges, mesh, origin_m);
+    collapse_edges(triangles, is_flat, farthest_m(mesh), work, rest, places_m, merges);
+  ReducedMesh out = make_reduced_mesh(rest, places_m, manifold, merges, mesh, origin_m);
   out.tangled_edges = manifold.tangled_edges;
   out.dropped = manifold.dropped;
   out.is_height_field = is_flat;

@@ -8,7 +8,7 @@
 namespace groundray {
 namespace {
 
-constexpr std::size_t most_parts = 64;  // where no cover is found
+constexpr std::size_t most_uncovered_parts = 64;  // where no cover is found
 
 }  // namespace
 
@@ -48,7 +48,7 @@ bool NearSurface::holds_in_parts(const std::array<glm::dvec3, 3>& corners_m, std
   if (deeper == 0) {
     const ProofCorner a = look_at(a_m, middle.nearest), b = look_at(b_m, a.nearest),
                       c = look_at(c_m, b.nearest);
-    return proof_.holds({a, b, c}, most_parts, *this);
+    return proof_.holds({a, b, c}, most_uncovered_parts, *this);
   }
   const glm::dvec3 ab_m = 0.5 * (a_m + b_m), bc_m = 0.5 * (b_m + c_m), ca_m = 0.5 * (c_m + a_m);
   const std::array<std::array<glm::dvec3, 3>, 4> parts{

@@ -36,8 +36,8 @@ struct HaltCheck {
 };
 
 template <typename Value>
-void check_size(Violations& broken, const std::vector<Value>& column, const char* name,
-                const MeasuredMesh& mesh) {
+void check_column(Violations& broken, const std::vector<Value>& column, const char* name,
+                  const MeasuredMesh& mesh) {
   broken.unless(column.empty() || column.size() == mesh.shape.vertices_m.size(),
                 "{} has {} values, which must be one for each of {} vertices or none", name,
                 column.size(), mesh.shape.vertices_m.size());
@@ -48,9 +48,9 @@ void check_size(Violations& broken, const std::vector<Value>& column, const char
 void check_simplify(const MeasuredMesh& mesh, const Halt& halt, const SimplifyOptions& options) {
   check_mesh(mesh.shape, "mesh to simplify", EmptyMesh::Refuse);
   Violations broken("simplify");
-  check_size(broken, mesh.sd_m, "sd_m", mesh);
-  check_size(broken, mesh.labels, "labels", mesh);
-  check_size(broken, mesh.confidence, "confidence", mesh);
+  check_column(broken, mesh.sd_m, "sd_m", mesh);
+  check_column(broken, mesh.labels, "labels", mesh);
+  check_column(broken, mesh.confidence, "confidence", mesh);
   const auto bad = std::find_if(mesh.sd_m.begin(), mesh.sd_m.end(),
                                 [](float sd_m) { return !(sd_m >= 0) || !std::isfinite(sd_m); });
   broken.unless(bad == mesh.sd_m.end(),

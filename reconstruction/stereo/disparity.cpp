@@ -2,7 +2,6 @@
 
 #include <algorithm>
 #include <cmath>
-#include <limits>
 
 #include "core/error.h"
 #include "reconstruction/stereo/disparity_refinement.h"
@@ -10,8 +9,6 @@
 
 namespace groundray {
 namespace {
-
-constexpr float nothing = std::numeric_limits<float>::quiet_NaN();
 
 bool is_within(double value, double least, double most) { return least <= value && value <= most; }
 
@@ -29,7 +26,7 @@ void check_images(const RectifiedImage& left, const RectifiedImage& right, Viola
       left.grey.height(), right.grey.width(), right.grey.height());
 }
 
-void check(const MatchOptions& options, Violations& broken) {
+void check_match_options(const MatchOptions& options, Violations& broken) {
   const auto is_odd = [](int side, int least, int most) {
     return least <= side && side <= most && side % 2 == 1;
   };
@@ -106,7 +103,7 @@ void keep_consistent(const Image8& left_seen, const Image8& right_seen, const Ma
       } else {
         continue;
       }
-      value = nothing;
+      value = no_disparity;
     }
   }
 }
@@ -163,12 +160,12 @@ DisparityMap match(const RectifiedImage& left, const RectifiedImage& right,
                    const MatchOptions& options) {
   Violations broken("stereo pair to match");
   check_images(left, right, broken);
-  check(options, broken);
+  check_match_options(options, broken);
   broken.throw_if_any();
   const ImageF empty(left.grey.width(), left.grey.height(), 1);
   DisparityMap map{empty, empty, empty, {}, {}};
-  std::ranges::fill(map.disparity_px.values(), nothing);
-  std::ranges::fill(map.sd_px.values(), nothing);
+  std::ranges::fill(map.disparity_px.values(), no_disparity);
+  std::ranges::fill(map.sd_px.values(), no_disparity);
 
   const RectifiedImage clean_left = cleaned(left), clean_right = cleaned(right);
   const SearchedImage left_search = searched(clean_left), right_search = searched(clean_right);

@@ -9,14 +9,14 @@
 #include <glm/mat3x3.hpp>
 #include <glm/matrix.hpp>
 #include <glm/vec3.hpp>
-#include <limits>
 #include <optional>
 #include <vector>
+
+#include "reconstruction/stereo/semi_global.h"
 
 namespace groundray {
 namespace {
 
-constexpr float nothing = std::numeric_limits<float>::quiet_NaN();
 constexpr int most_steps = 8;
 constexpr double done_px = 0.002;
 constexpr double most_shift_px = 1;  // from the start
@@ -242,8 +242,8 @@ RefinedDisparity refine(const ImageF& left, const ImageF& right, const ImageF& s
     for (int x = 0; x < left.width(); ++x) {
       const auto refined = refinement.at(x, y);
       result.disparity_px.at(x, y)[0] =
-          refined ? static_cast<float>(refined->disparity_px) : nothing;
-      result.sd_px.at(x, y)[0] = refined ? static_cast<float>(refined->sd_px) : nothing;
+          refined ? static_cast<float>(refined->disparity_px) : no_disparity;
+      result.sd_px.at(x, y)[0] = refined ? static_cast<float>(refined->sd_px) : no_disparity;
       result.explained.at(x, y)[0] = refined ? static_cast<float>(refined->explained) : 0;
     }
   });

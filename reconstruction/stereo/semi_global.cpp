@@ -18,7 +18,6 @@
 namespace groundray {
 namespace {
 
-constexpr float nothing = std::numeric_limits<float>::quiet_NaN();
 constexpr int search_width_px = 320;
 constexpr int gradient_cap = 63;
 
@@ -72,7 +71,7 @@ ImageF pixels_of(const cv::Mat& found, const DisparityRange& range) {
     for (int x = 0; x < found.cols; ++x) {
       const int value = found.at<short>(y, x);
       result.at(x, y)[0] =
-          value < 16 * range.least_px ? nothing : static_cast<float>(value) / 16.0F;
+          value < 16 * range.least_px ? no_disparity : static_cast<float>(value) / 16.0F;
     }
   }
   return result;
@@ -154,7 +153,7 @@ std::uint64_t remove_speckles(ImageF& disparity_px, int pixels) {
     for (int x = 0; x < fixed.cols; ++x) {
       float& value = disparity_px.at(x, y)[0];
       if (fixed.at<short>(y, x) != none || std::isnan(value)) continue;
-      value = nothing;
+      value = no_disparity;
       ++removed;
     }
   }
@@ -175,7 +174,7 @@ std::optional<DisparityRange> common_range(const SearchedImage& left, const Sear
       if (there < 0 || there >= kept.width() ||
           !(std::abs(found.right_px.at(there, y)[0] - value) <= 1) ||
           !is_seen_round(left.seen, x, y, step) || !is_seen_round(right.seen, there, y, step))
-        value = nothing;
+        value = no_disparity;
     }
   }
   constexpr int least_pixels = 32;

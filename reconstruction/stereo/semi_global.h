@@ -1,6 +1,7 @@
 #pragma once
 
 #include <cstdint>
+#include <limits>
 #include <optional>
 
 #include "core/image.h"
@@ -10,6 +11,9 @@ namespace groundray {
 
 /// Disparities are kept in 16 bits, times 16, so they are no farther from 0 than this.
 inline constexpr int farthest_px = 2000;
+
+/// Disparity, or its standard deviation, where there is none.
+inline constexpr float no_disparity = std::numeric_limits<float>::quiet_NaN();
 
 /// An image to search, 1 channel each.
 struct SearchedImage {

@@ -12,8 +12,8 @@ namespace {
 
 bool is_sd(double sd) { return sd >= 0 && std::isfinite(sd); }
 
-void check(const PinholePair& pair, const StereoView& left, const DisparityMap& map,
-           const StereoPointOptions& options) {
+void check_stereo_inputs(const PinholePair& pair, const StereoView& left, const DisparityMap& map,
+                         const StereoPointOptions& options) {
   Violations broken("stereo points");
   const StereoNoise& noise = options.noise;
   broken.unless(is_sd(noise.match_px.value_or(0)), "match_px = {} must be 0 or more",
@@ -81,7 +81,7 @@ StereoPoint stereo_point(const PinholePair& pair, glm::dvec2 pixel, double dispa
 
 StereoPoints stereo_points(const PinholePair& pair, const StereoView& left, const DisparityMap& map,
                            const StereoPointOptions& options) {
-  check(pair, left, map, options);
+  check_stereo_inputs(pair, left, map, options);
   const StereoNoise& noise = options.noise;
   StereoPoints points;
   points.together = variance_together(options.stride_px);

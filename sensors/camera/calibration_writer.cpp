@@ -184,7 +184,7 @@ Format format_of(CalibrationFormat format) {
           true, true};
 }
 
-void check(std::span<const CameraCalibration> cameras, CalibrationFormat kind) {
+void check_calibrations(std::span<const CameraCalibration> cameras, CalibrationFormat kind) {
   const Format format = format_of(kind);
   Violations broken(fmt::format("cameras to write for {}", format.name));
   broken.unless(!cameras.empty(), "there is none");
@@ -373,7 +373,7 @@ std::string basalt_text(std::span<const CameraCalibration> cameras) {
 
 std::string camera_calibrations_text(std::span<const CameraCalibration> cameras,
                                      CalibrationFormat format) {
-  check(cameras, format);
+  check_calibrations(cameras, format);
   switch (format) {
     case CalibrationFormat::RosYaml:
       return ros_text(cameras[0]);

@@ -54,25 +54,7 @@ std::uint32_t sequence_of(const RandomKey& key, std::uint32_t pixel, Paths paths
                       .stream = RandomStream::Paths})[0];
 }
 
-// Sums over the paths of a pixel.
-struct Sums {
-  glm::dvec3 radiance{0}, squares{0};
-  int count = 0;
-  void add(const glm::dvec3& value) {
-    radiance += value;
-    squares += value * value;
-    ++count;
-  }
-  glm::dvec3 mean() const { return radiance / static_cast<double>(count); }
-  glm::dvec3 standard_error() const {
-    if (count < 2) return glm::dvec3(std::numeric_limits<double>::infinity());
-    const double n = count;
-    const glm::dvec3 spread = glm::max(squares / n - mean() * mean(), glm::dvec3(0));
-    return glm::sqrt(spread / (n - 1));
-  }
-};
-
-void check(const CameraSpec& spec) {
+void check_camera(const CameraSpec& spec) {
   Violations broken("camera");
   broken.unless(spec.rate_hz > 0 && std::isfinite(spec.rate_hz), "rate_hz = {} must be positive",
                 spec.rate_hz);
@@ -110,8 +92,8 @@ void check(const CameraSpec& spec) {
   broken.throw_if_any();
 }
 
-CameraSpec checked(CameraSpec spec) {
-  check(spec);
+CameraSpec checked_camera(CameraSpec spec) {
+  check_camera(spec);
   return spec;
 }
 
@@ -123,7 +105,7 @@ struct Camera::Directions {
 };
 
 Camera::Camera(const CameraSpec& spec)
-    : spec_(checked(spec)),
+    : spec_(checked_camera(spec)),
       lens_(spec.lens, spec.size_px),
       directions_(std::make_shared<Directions>()) {}
 
@@ -191,6 +173,24 @@ class Camera::Rows {
   }
 
  private:
+  // Sums over the paths of a pixel.
+  struct Sums {
+    glm::dvec3 radiance{0}, squares{0};
+    int count = 0;
+    void add(const glm::dvec3& value) {
+      radiance += value;
+      squares += value * value;
+      ++count;
+    }
+    glm::dvec3 mean() const { return radiance / static_cast<double>(count); }
+    glm::dvec3 standard_error() const {
+      if (count < 2) return glm::dvec3(std::numeric_limits<double>::infinity());
+      const double n = count;
+      const glm::dvec3 spread = glm::max(squares / n - mean() * mean(), glm::dvec3(0));
+      return glm::sqrt(spread / (n - 1));
+    }
+  };
+
   Sums& sums_of(const glm::ivec2& pixel) {
     return sums_[static_cast<std::size_t>(pixel.y - first_) * static_cast<std::size_t>(width_) +
                  static_cast<std::size_t>(pixel.x)];

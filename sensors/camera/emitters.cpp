@@ -14,7 +14,7 @@ namespace {
 
 using std::chrono::nanoseconds;
 
-void check(const Scene& scene) {
+void check_emitters(const Scene& scene) {
   const auto materials = scene.materials.all();
   Violations broken("light");
   const auto exists = [&](const std::string& whose, std::size_t material) {
@@ -82,7 +82,7 @@ auto pick(const Sums& all, double uniform, const Sum& sum) {
 }  // namespace
 
 Emitters::Emitters(const Scene& scene) : objects_(scene.objects) {
-  check(scene);
+  check_emitters(scene);
   const std::size_t models = objects_.models().size();
   glows_.resize(models);
   shapes_.resize(models);

@@ -19,7 +19,6 @@ namespace {
 using std::chrono::nanoseconds;
 
 constexpr float nan = std::numeric_limits<float>::quiet_NaN();
-constexpr float infinity = std::numeric_limits<float>::infinity();
 
 constexpr int pixels_at_once =
     256;  // of a row: their rays stay in the cache; a multiple of packets
@@ -166,8 +165,8 @@ void RowTruth::bound(int row, ImageF& into) {
 
 void RowTruth::tell_nothing(int x, int y, ImageTruth& into) const {
   into.is_valid.at(x, y)[0] = 0;
-  into.range_m.at(x, y)[0] = infinity;
-  into.depth_m.at(x, y)[0] = infinity;
+  into.range_m.at(x, y)[0] = std::numeric_limits<float>::infinity();
+  into.depth_m.at(x, y)[0] = std::numeric_limits<float>::infinity();
   put(into.p_DQ, x, y, glm::dvec3(std::numeric_limits<double>::quiet_NaN()));
   for (ImageF* image : {&into.normal, &into.shading_normal, &into.albedo})
     put(*image, x, y, glm::vec3(nan));

@@ -17,7 +17,7 @@ namespace {
 
 double pixel_sr(const PixelRay& ray) { return glm::length(glm::cross(ray.by_u, ray.by_v)); }
 
-void check(const Lens& lens, const ApertureSpec& aperture, double pixel_pitch_m) {
+void check_aperture(const Lens& lens, const ApertureSpec& aperture, double pixel_pitch_m) {
   Violations broken("aperture");
   const auto positive = [&](const char* name, double value) {
     broken.unless(value > 0 && std::isfinite(value), "{} = {} must be positive and finite", name,
@@ -84,7 +84,7 @@ void check_rim(const ImageF& pupil_sr, const glm::dvec3& vignetting) {
 }  // namespace
 
 ImageF pupil_sr(const Lens& lens, const ApertureSpec& aperture, double pixel_pitch_m) {
-  check(lens, aperture, pixel_pitch_m);
+  check_aperture(lens, aperture, pixel_pitch_m);
   const Falloff falloff(lens, aperture);
   const int width = lens.size_px().x, height = lens.size_px().y;
   const double diameter_m = aperture.focal_length_m / aperture.f_number;

@@ -18,7 +18,7 @@ namespace {
 
 using namespace lens;  // NOLINT(google-build-using-namespace)
 
-constexpr double pi = std::numbers::pi;
+using std::numbers::pi;
 constexpr double infinity = std::numeric_limits<double>::infinity();
 constexpr int azimuths = 720;     // at which limits are looked for
 constexpr int even_angles = 256;  // from the axis to the far side, likewise
@@ -109,7 +109,7 @@ std::vector<double> reach_of(const Model& model, std::span<const double> limits_
   return turned == azimuths ? reach_px : unknown_px;
 }
 
-LensModel checked(LensModel model, glm::ivec2 size_px) {
+LensModel checked_lens(LensModel model, glm::ivec2 size_px) {
   Violations broken("lens");
   broken.unless(
       size_px.x > 0 && size_px.y > 0 && std::int64_t{size_px.x} * size_px.y <= most_image_pixels,
@@ -206,7 +206,7 @@ class RowFiller {
 }  // namespace
 
 Lens::Lens(LensModel model, glm::ivec2 size_px)
-    : model_(checked(std::move(model), size_px)), size_px_(size_px) {
+    : model_(checked_lens(std::move(model), size_px)), size_px_(size_px) {
   std::visit(
       [&]<typename Model>(const Model& kind) {
         limits_rad_.assign(azimuths, infinity);

@@ -13,7 +13,7 @@
 namespace groundray {
 namespace {
 
-void check(const PixelScale& scale, Violations& broken) {
+void check_scale(const PixelScale& scale, Violations& broken) {
   broken.unless(scale.focal_px.x > 0 && scale.focal_px.y > 0 &&
                     std::isfinite(scale.focal_px.x + scale.focal_px.y),
                 "focal lengths of ({}, {}) px must be positive and finite", scale.focal_px.x,
@@ -29,16 +29,18 @@ void check_finite(const Numbers& numbers, Violations& broken) {
                   numbers[i]);
 }
 
-void check(const Pinhole& model, Violations& broken) { check(model.scale, broken); }
-void check(const BrownConrady& model, Violations& broken) {
-  check(model.scale, broken);
+void check_parameters(const Pinhole& model, Violations& broken) {
+  check_scale(model.scale, broken);
+}
+void check_parameters(const BrownConrady& model, Violations& broken) {
+  check_scale(model.scale, broken);
   check_finite(model.k, broken);
 }
-void check(const KannalaBrandt& model, Violations& broken) {
-  check(model.scale, broken);
+void check_parameters(const KannalaBrandt& model, Violations& broken) {
+  check_scale(model.scale, broken);
   check_finite(model.k, broken);
 }
-void check(const FTheta& model, Violations& broken) {
+void check_parameters(const FTheta& model, Violations& broken) {
   check_finite(model.k, broken);
   broken.unless(!model.k.empty() && model.k[0] > 0,
                 "its polynomial must rise at 0: the coefficient of the first power is {}",
@@ -48,25 +50,25 @@ void check(const FTheta& model, Violations& broken) {
       std::isfinite(model.centre_px.x + model.centre_px.y) && area > 0 && std::isfinite(area),
       "its centre must be finite and its linear map keep orientation: c - d e = {}", area);
 }
-void check(const Eucm& model, Violations& broken) {
-  check(model.scale, broken);
+void check_parameters(const Eucm& model, Violations& broken) {
+  check_scale(model.scale, broken);
   broken.unless(0 <= model.alpha && model.alpha <= 1, "alpha = {} must be from 0 to 1",
                 model.alpha);
   broken.unless(model.beta > 0 && std::isfinite(model.beta), "beta = {} must be positive",
                 model.beta);
 }
-void check(const DoubleSphere& model, Violations& broken) {
-  check(model.scale, broken);
+void check_parameters(const DoubleSphere& model, Violations& broken) {
+  check_scale(model.scale, broken);
   broken.unless(0 <= model.alpha && model.alpha <= 1, "alpha = {} must be from 0 to 1",
                 model.alpha);
   broken.unless(model.xi > -1 && std::isfinite(model.xi), "xi = {} must be more than -1", model.xi);
 }
-void check(const Mei& model, Violations& broken) {
-  check(model.scale, broken);
+void check_parameters(const Mei& model, Violations& broken) {
+  check_scale(model.scale, broken);
   check_finite(model.k, broken);
   broken.unless(model.xi >= 0 && std::isfinite(model.xi), "xi = {} must be 0 or more", model.xi);
 }
-void check(const Equirectangular& /*model*/, Violations& /*broken*/) {}
+void check_parameters(const Equirectangular& /*model*/, Violations& /*broken*/) {}
 
 // Where r n(r^2) / d(r^2) has a fold, a root or a pole.
 std::vector<double> radial_turns(const Polynomial& n, const Polynomial& d) {
@@ -121,7 +123,7 @@ std::vector<double> turns_rad(const LensModel& model) {
 }
 
 void check_lens(const LensModel& model, Violations& broken) {
-  std::visit([&](const auto& kind) { check(kind, broken); }, model);
+  std::visit([&](const auto& kind) { check_parameters(kind, broken); }, model);
 }
 
 glm::dmat3 sensor_homography(double tau_x_rad, double tau_y_rad) {

@@ -15,22 +15,6 @@ namespace {
 // put them below.
 double lift_m(double range_m) { return 1e-6 + 2e-9 * range_m; }
 
-// Axes of a surface: z is `normal`. @see Duff et al., Building an orthonormal basis, revisited,
-// JCGT 6(1) (2017).
-struct Axes {
-  glm::dvec3 x, y, z;
-  explicit Axes(const glm::dvec3& normal) : z(normal) {
-    const double sign = std::copysign(1.0, normal.z);
-    const double a = -1 / (sign + normal.z), b = normal.x * normal.y * a;
-    x = {1 + sign * normal.x * normal.x * a, sign * b, -sign * normal.x};
-    y = {b, sign + normal.y * normal.y * a, -normal.y};
-  }
-  glm::dvec3 into(const glm::dvec3& d) const {
-    return {glm::dot(d, x), glm::dot(d, y), glm::dot(d, z)};
-  }
-  glm::dvec3 out_of(const glm::dvec3& d) const { return d.x * x + d.y * y + d.z * z; }
-};
-
 bool is_dark(const glm::vec3& light) { return std::max({light.r, light.g, light.b}) <= 0; }
 
 // The balance heuristic: how much counts what a path of density `own` has found, if another way of
@@ -80,6 +64,22 @@ class Scatterer {
 
 // Where a path meets a surface.
 struct PathTracer::Vertex {
+  // Axes of a surface: z is `normal`. @see Duff et al., Building an orthonormal basis, revisited,
+  // JCGT 6(1) (2017).
+  struct Axes {
+    glm::dvec3 x, y, z;
+    explicit Axes(const glm::dvec3& normal) : z(normal) {
+      const double sign = std::copysign(1.0, normal.z);
+      const double a = -1 / (sign + normal.z), b = normal.x * normal.y * a;
+      x = {1 + sign * normal.x * normal.x * a, sign * b, -sign * normal.x};
+      y = {b, sign + normal.y * normal.y * a, -normal.y};
+    }
+    glm::dvec3 into(const glm::dvec3& d) const {
+      return {glm::dot(d, x), glm::dot(d, y), glm::dot(d, z)};
+    }
+    glm::dvec3 out_of(const glm::dvec3& d) const { return d.x * x + d.y * y + d.z * z; }
+  };
+
   Vertex(const Ray& ray, const Hit& hit, const glm::dvec3& shading_normal)
       : at(ray.origin + ray.direction * hit.range_m),
         facet(glm::normalize(glm::dvec3(hit.normal))),

@@ -22,12 +22,12 @@ glm::dvec3 grey_gains(const ImagerSpec& imager) {
   return std::max({share.r, share.g, share.b}) / share;
 }
 
-double top_of(int bits) { return std::exp2(bits) - 1; }
+double highest_code(int bits) { return std::exp2(bits) - 1; }
 
 // Digital numbers from black to where the pixel or its number is full.
 double white_dn(const ImagerSpec& imager) {
   const double full_dn = std::round(imager.black_dn + imager.gain_dn_e * imager.full_well_e);
-  return std::min(full_dn, top_of(imager.bits)) - imager.black_dn;
+  return std::min(full_dn, highest_code(imager.bits)) - imager.black_dn;
 }
 
 int conversion_of(ColorFilter filter) {
@@ -70,7 +70,7 @@ RawDeveloper::RawDeveloper(const PictureSpec& spec, const ImagerSpec& imager)
       "a full well of {} e is no digital number above black with {} DN/e: raise gain_dn_e",
       imager.full_well_e, imager.gain_dn_e);
   broken.throw_if_any();
-  const double raised = std::exp2(16 - bits_), top = top_of(spec.bits);
+  const double raised = std::exp2(16 - bits_), top = highest_code(spec.bits);
   for (std::size_t channel = 0; channel < 3; ++channel) {
     const double gain = gains_[static_cast<glm::length_t>(channel)] / white;
     codes_[channel].resize(raised_values);
@@ -107,7 +107,7 @@ Picture RawDeveloper::develop(const Image16& raw) const {
   // Raised to 16 bits, interpolated colours are rounded to less than a digital number; and black
   // is taken off thereafter, so that noise below it is not cut off before its mean is taken.
   Image16 colors = raw;
-  const auto top = static_cast<std::uint16_t>(top_of(bits_));
+  const auto top = static_cast<std::uint16_t>(highest_code(bits_));
   for (std::uint16_t& value : colors.values())
     value = static_cast<std::uint16_t>(std::min(value, top) << (16 - bits_));
   if (is_mosaic) colors = demosaiced(std::move(colors), filter_);

@@ -40,7 +40,7 @@ double focal_px(const Lens& lens) {
 }
 
 // Where a lens looks at the middle of a side of its image, or as near to it as it looks anywhere.
-std::optional<glm::dvec3> look(const Lens& lens, const glm::dvec2& side) {
+std::optional<glm::dvec3> look_towards(const Lens& lens, const glm::dvec2& side) {
   const glm::dvec2 middle = (glm::dvec2(lens.size_px()) - 1.0) / 2.0;
   constexpr int steps = 64;
   for (int step = steps; step > 0; --step) {
@@ -62,7 +62,7 @@ glm::dvec2 mean_on_plane(const char* camera, const Lens& lens, const glm::dquat&
                          Violations& broken) {
   glm::dvec2 sum(0);
   for (const Side& side : sides) {
-    const auto direction = look(lens, side.towards);
+    const auto direction = look_towards(lens, side.towards);
     broken.unless(direction.has_value(),
                   "the {} camera sees nothing between the middle and the "
                   "{} side of its image: is its centre_px right?",

@@ -7,7 +7,6 @@
 #include <algorithm>
 #include <chrono>
 #include <cmath>
-#include <ctime>
 #include <glm/geometric.hpp>
 #include <numbers>
 #include <utility>
@@ -15,9 +14,10 @@
 #include "sensors/camera/image_truth.h"
 #include "sensors/camera/path_tracer.h"
 #include "terrain/terrain_scene.h"
+#include "test/benchmark/landscape.h"
 #include "test/benchmark/raw_embree.h"
+#include "test/benchmark/timing.h"
 #include "test/support/camera_scene.h"
-#include "test/support/sample_terrain.h"
 
 namespace groundray::benchmark {
 namespace {
@@ -28,22 +28,9 @@ constexpr glm::ivec2 size_px(1920, 1080);
 constexpr double pixels = static_cast<double>(size_px.x) * size_px.y;
 constexpr double albedo = 0.4;
 
-// Seconds of processors that `act` takes, on all threads of this program.
-template <typename Act>
-double time(const Act& act) {
-  const std::clock_t begin = std::clock();
-  act();
-  return static_cast<double>(std::clock() - begin) / CLOCKS_PER_SEC;
-}
-
-const HeightGrid& ground() {
-  static const HeightGrid grid = testing::fractal(1025, 5, 375, Seed{12345});
-  return grid;
-}
-
-Scene scene() {
+Scene grey_hills() {
   const Material soil{"soil", Lambertian{{{300, albedo}, {2500, albedo}}}};
-  return {RayTracer({full_resolution_level(ground())}, {0, 0, 0}, Tracing::Fast), {}, {soil}};
+  return {RayTracer({full_resolution_level(hills())}, {0, 0, 0}, Tracing::Fast), {}, {soil}};
 }
 
 // A pinhole that sees 64 degrees, from where it stands.
@@ -62,20 +49,20 @@ View view(const glm::dvec3& from, const glm::dvec3& to) {
 }
 
 // Two metres above the ground, looking slightly down.
-View driven() {
-  const glm::dvec3 from(0, 0, *ground().height_m_at({0, 0}) + 2);
+View driven_view() {
+  const glm::dvec3 from(0, 0, *hills().height_m_at({0, 0}) + 2);
   return view(from, from + glm::dvec3(1, 0.2, -0.2));
 }
 
 // From above a corner over the whole landscape.
-View flown() {
-  const double half_m = -ground().origin_m().x;
-  return view({-0.7 * half_m, -0.7 * half_m, ground().max_height_m() + 0.1 * half_m},
-              {0.1 * half_m, 0.1 * half_m, ground().min_height_m()});
+View flown_view() {
+  const double half_m = -hills().origin_m().x;
+  return view({-0.7 * half_m, -0.7 * half_m, hills().max_height_m() + 0.1 * half_m},
+              {0.1 * half_m, 0.1 * half_m, hills().min_height_m()});
 }
 
 // Of the centres of pixels.
-std::vector<Ray> rays_of(const View& view) {
+std::vector<Ray> pixel_rays(const View& view) {
   const Pose X_DC = view.X_DC.pose_at(0s);
   std::vector<Ray> rays;
   for (const glm::dvec3& direction : view.camera.directions())
@@ -94,7 +81,7 @@ void trace(const Scene& world, std::span<const Ray> rays, std::span<Hit> hits) {
 
 // Floats alone are off by some tenths of a millimetre, along slanting rays by more, and decide
 // otherwise at silhouettes.
-const char* fault_of(const ImageTruth& truth, std::span<const float> raw_m) {
+const char* truth_fault(const ImageTruth& truth, std::span<const float> raw_m) {
   double differ = 0;
   for (std::size_t i = 0; i < raw_m.size(); ++i) {
     const float range_m = truth.range_m.values()[i];
@@ -104,7 +91,7 @@ const char* fault_of(const ImageTruth& truth, std::span<const float> raw_m) {
     if (is_sky != std::isinf(raw_m[i]) ||
         (!is_sky && std::abs(range_m - raw_m[i]) > 0.01f + 1e-4f * range_m))
       differ += 1;
-    if (!is_sky && std::abs(*ground().height_m_at({p_DQ.x, p_DQ.y}) - p_DQ.z) > 1e-5)
+    if (!is_sky && std::abs(*hills().height_m_at({p_DQ.x, p_DQ.y}) - p_DQ.z) > 1e-5)
       return "points of the truth are off the ground";
   }
   return differ > 1e-4 * pixels ? "the truth and raw Embree disagree" : nullptr;
@@ -112,9 +99,9 @@ const char* fault_of(const ImageTruth& truth, std::span<const float> raw_m) {
 
 void camera_truth(::benchmark::State& state, View (*view_of)()) {
   const View view = view_of();
-  const Scene world = scene();
-  const auto rays = rays_of(view);
-  RawEmbree raw(ground(), rays);
+  const Scene world = grey_hills();
+  const auto rays = pixel_rays(view);
+  RawEmbree raw(hills(), rays);
   std::vector<Hit> hits(rays.size());
   ImageTruth truth;
   const auto tell = [&] {
@@ -122,12 +109,12 @@ void camera_truth(::benchmark::State& state, View (*view_of)()) {
                         std::move(truth));
   };
   tell();
-  if (const char* fault = fault_of(truth, raw.trace())) return state.SkipWithError(fault);
+  if (const char* fault = truth_fault(truth, raw.trace())) return state.SkipWithError(fault);
   double raw_s = 0, trace_s = 0, truth_s = 0;
   for (auto _ : state) {
-    raw_s += time([&] { ::benchmark::DoNotOptimize(raw.trace()); });
-    trace_s += time([&] { trace(world, rays, hits); });
-    const double this_s = time(tell);
+    raw_s += processor_s_of([&] { ::benchmark::DoNotOptimize(raw.trace()); });
+    trace_s += processor_s_of([&] { trace(world, rays, hits); });
+    const double this_s = processor_s_of(tell);
     state.SetIterationTime(this_s);
     truth_s += this_s;
   }
@@ -139,11 +126,11 @@ void camera_truth(::benchmark::State& state, View (*view_of)()) {
   state.counters["of_trace"] = trace_s / truth_s;
   state.counters["trace_of_raw"] = raw_s / trace_s;
 }
-BENCHMARK_CAPTURE(camera_truth, driven, driven)
+BENCHMARK_CAPTURE(camera_truth, driven, driven_view)
     ->UseManualTime()
     ->Unit(::benchmark::kMillisecond)
     ->MinTime(2);
-BENCHMARK_CAPTURE(camera_truth, flown, flown)
+BENCHMARK_CAPTURE(camera_truth, flown, flown_view)
     ->UseManualTime()
     ->Unit(::benchmark::kMillisecond)
     ->MinTime(2);
@@ -175,7 +162,7 @@ std::vector<double> direct_light(const Scene& world, std::span<const Ray> rays) 
     shadow.push_back({p, sun.direction()});
     shadow.push_back({p, by_cosine(normal, static_cast<std::uint32_t>(i))});
   }
-  RawEmbree raw(ground(), shadow);
+  RawEmbree raw(hills(), shadow);
   const auto met_m = raw.trace();
   const double dome = sky().dome_radiance({0, 0, 1}).y;
   std::vector<double> light;
@@ -189,9 +176,9 @@ std::vector<double> direct_light(const Scene& world, std::span<const Ray> rays) 
 }
 
 // Compares some ten thousand rays: means within five of their standard errors, p = 6e-7.
-const char* fault_of(const View& view, const Scene& world) {
+const char* light_fault(const View& view, const Scene& world) {
   std::vector<Ray> rays;
-  const auto all = rays_of(view);
+  const auto all = pixel_rays(view);
   for (std::size_t i = 0; i < all.size(); i += 97) rays.push_back(all[i]);
   std::vector<PathTracer::Sample> samples;
   for (std::uint32_t i = 0; i < rays.size(); ++i)
@@ -216,15 +203,15 @@ const char* fault_of(const View& view, const Scene& world) {
 
 void camera_light(::benchmark::State& state, View (*view_of)()) {
   const View view = view_of();
-  const Scene world = scene();
-  if (const char* fault = fault_of(view, world)) return state.SkipWithError(fault);
-  RawEmbree raw(ground(), rays_of(view));
+  const Scene world = grey_hills();
+  if (const char* fault = light_fault(view, world)) return state.SkipWithError(fault);
+  RawEmbree raw(hills(), pixel_rays(view));
   const SamplingSpec& sampling = view.camera.spec().sampling;
   const PathTracer light(world, sky(), sampling.depth, std::nullopt);
   double raw_s = 0, light_s = 0;
   for (auto _ : state) {
-    raw_s += time([&] { ::benchmark::DoNotOptimize(raw.trace()); });
-    const double this_s = time(
+    raw_s += processor_s_of([&] { ::benchmark::DoNotOptimize(raw.trace()); });
+    const double this_s = processor_s_of(
         [&] { ::benchmark::DoNotOptimize(view.camera.expose(light, view.X_DC, 0s, {Seed{7}})); });
     state.SetIterationTime(this_s);
     light_s += this_s;
@@ -237,11 +224,11 @@ void camera_light(::benchmark::State& state, View (*view_of)()) {
   state.counters["Mpaths/CPU-s"] = 1e-6 * paths / light_s;
   state.counters["raw_Mrays/CPU-s"] = 1e-6 * paths / sampling.samples / raw_s;
 }
-BENCHMARK_CAPTURE(camera_light, driven, driven)
+BENCHMARK_CAPTURE(camera_light, driven, driven_view)
     ->UseManualTime()
     ->Unit(::benchmark::kMillisecond)
     ->MinTime(4);
-BENCHMARK_CAPTURE(camera_light, flown, flown)
+BENCHMARK_CAPTURE(camera_light, flown, flown_view)
     ->UseManualTime()
     ->Unit(::benchmark::kMillisecond)
     ->MinTime(4);
@@ -267,7 +254,8 @@ void camera_table(::benchmark::State& state) {
     look += 1;
   }
   if (farthest_px > 1e-9) return state.SkipWithError("rays are not imaged at their pixels");
-  for (auto _ : state) state.SetIterationTime(time([&] { lens.fill(0, size_px.y, rays); }));
+  for (auto _ : state)
+    state.SetIterationTime(processor_s_of([&] { lens.fill(0, size_px.y, rays); }));
   state.counters["look"] = look / pixels;
   state.counters["farthest_px"] = farthest_px;
 }

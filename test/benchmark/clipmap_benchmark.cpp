@@ -4,7 +4,6 @@
 
 #include <algorithm>
 #include <array>
-#include <chrono>
 #include <cmath>
 #include <cstdlib>
 #include <filesystem>
@@ -15,18 +14,14 @@
 #include "terrain/deviation.h"
 #include "terrain/terrain_scene.h"
 #include "terrain/tile_source.h"
+#include "test/benchmark/timing.h"
 #include "test/support/sample_terrain.h"
 #include "test/support/temporary_folder.h"
 
 namespace groundray::benchmark {
 namespace {
 
-using Clock = std::chrono::steady_clock;
 namespace fs = std::filesystem;
-
-double seconds_since(Clock::time_point begin) {
-  return std::chrono::duration<double>(Clock::now() - begin).count();
-}
 
 // The Moon's DEM in metres, warped once and kept beside the build; empty without the shared data.
 fs::path moon() {
@@ -164,7 +159,7 @@ std::vector<Ray> lidar_rays(const HeightGrid& grid) {
 }
 
 // As one level, but of single triangles.
-Level triangles_of(const HeightGrid& grid) {
+Level level_of_triangles(const HeightGrid& grid) {
   Level level = full_resolution_level(grid);
   for (Leaf& leaf : level.leaves) leaf.has_holes = true;  // those are built triangle by triangle
   return level;
@@ -181,7 +176,7 @@ void terrain_rays(::benchmark::State& state) {
   const std::array<RayTracer, 3> tracers = {
       build_tracer(clipmap, p_DL, Tracing::Fast),
       RayTracer({full_resolution_level(grid)}, p_DL, Tracing::Fast),
-      RayTracer({triangles_of(grid)}, p_DL, Tracing::Fast)};
+      RayTracer({level_of_triangles(grid)}, p_DL, Tracing::Fast)};
   std::vector<Hit> hits(rays.size()), truth(rays.size());
   tracers[2].trace(rays, truth);
   tracers[1].trace(rays, hits);

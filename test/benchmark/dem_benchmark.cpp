@@ -3,20 +3,18 @@
 #include <gdal_priv.h>
 
 #include <algorithm>
-#include <ctime>
 #include <fstream>
 #include <string>
 
 #include "core/ray_tracer.h"
 #include "terrain/dem_io.h"
 #include "terrain/terrain_scene.h"
+#include "test/benchmark/timing.h"
 #include "test/support/sample_terrain.h"
 #include "test/support/temporary_folder.h"
 
 namespace groundray::benchmark {
 namespace {
-
-double cpu_s() { return static_cast<double>(std::clock()) / CLOCKS_PER_SEC; }
 
 // Memory that the process has mapped and holds, bytes.
 double resident_bytes() {
@@ -50,10 +48,10 @@ void load_and_build_4097(::benchmark::State& state) {
   double bytes = 0;
   for (auto _ : state) {
     const double before_bytes = resident_bytes();
-    const double begin_s = cpu_s();
+    const double begin_s = processor_s();
     const Dem dem = load_dem(path);
     const RayTracer tracer({full_resolution_level(dem.grid)}, {0, 0, 0}, Tracing::Fast);
-    state.SetIterationTime(cpu_s() - begin_s);
+    state.SetIterationTime(processor_s() - begin_s);
     bytes = std::max(bytes, resident_bytes() - before_bytes);  // later rounds reuse memory
     Hit hit;
     const Ray down{{0, 0, 1e5}, {0, 0, -1}};

@@ -5,15 +5,13 @@
 
 #include <cmath>
 #include <cstdint>
-#include <ctime>
 
 #include "reconstruction/dem/dem_frame.h"
 #include "reconstruction/dem/dem_fusion.h"
+#include "test/benchmark/timing.h"
 
 namespace groundray::benchmark {
 namespace {
-
-double processor_s() { return static_cast<double>(std::clock()) / CLOCKS_PER_SEC; }
 
 // Points of 5 scans and 15 stereo pairs over a square of gentle hills, with noise and 1.5 %
 // outliers, block by block. Made by a small generator: Philox would take longer than the fusion.

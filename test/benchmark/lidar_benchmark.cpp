@@ -5,43 +5,30 @@
 #include <algorithm>
 #include <chrono>
 #include <cmath>
-#include <ctime>
 #include <glm/geometric.hpp>
 
 #include "sensors/lidar.h"
 #include "sensors/pulse_cast.h"
 #include "sensors/spec_io.h"
 #include "terrain/terrain_scene.h"
+#include "test/benchmark/landscape.h"
 #include "test/benchmark/raw_embree.h"
-#include "test/support/sample_terrain.h"
+#include "test/benchmark/timing.h"
 #include "test/support/temporary_folder.h"
 
 namespace groundray::benchmark {
 namespace {
 
 using namespace std::chrono_literals;
-using Clock = std::chrono::steady_clock;
 
-double seconds_since(Clock::time_point begin) {
-  return std::chrono::duration<double>(Clock::now() - begin).count();
-}
-
-// Of all threads of this program.
-double processor_s() { return static_cast<double>(std::clock()) / CLOCKS_PER_SEC; }
-
-const HeightGrid& ground() {
-  static const HeightGrid grid = testing::fractal(1025, 5, 375, Seed{12345});
-  return grid;
-}
-
-Scene scene() {
+Scene lidar_hills() {
   const Material soil{"soil", Lambertian{{{400, 0.3}, {2000, 0.3}}}};
-  return {RayTracer({full_resolution_level(ground())}, {0, 0, 0}, Tracing::Fast), {}, {soil}};
+  return {RayTracer({full_resolution_level(hills())}, {0, 0, 0}, Tracing::Fast), {}, {soil}};
 }
 
 // Straight on, swaying.
 Trajectory path_at(double height_m, double speed_m_s) {
-  const double z_m = *ground().height_m_at({0, 0}) + height_m;
+  const double z_m = *hills().height_m_at({0, 0}) + height_m;
   std::vector<Trajectory::Sample> samples;
   for (int k = 0; k <= 100; ++k) {
     samples.push_back(
@@ -59,14 +46,14 @@ struct Ride {
 };
 
 // 120 000 pulses of a spinning lidar on a mast, 20 turns a second, of which 97 % meet the ground.
-Ride driven() {
+Ride driven_ride() {
   LidarSpec spec = load_lidar(testing::data_folder() / "sensors/velodyne_vls128.yaml");
   std::get<SpinningPattern>(spec.pattern).rate_hz = 20;
   return {spec, path_at(4, 10)};
 }
 
 // 79 600 pulses of a polygon scanner 800 m above the ground, which all meet it.
-Ride flown() {
+Ride flown_ride() {
   LidarSpec spec;
   spec.pattern = LinePattern{.mirror = LinePattern::Mirror::Polygon,
                              .plane = LinePattern::Plane::Across,
@@ -150,9 +137,9 @@ bool agree(double a, double b, double tolerance) { return std::abs(a - b) <= tol
 
 void lidar_one_ray(::benchmark::State& state, Ride (*ride_of)()) {
   const Ride ride = ride_of();
-  const Scene world = scene();
+  const Scene world = lidar_hills();
   const auto rays = sub_rays_of(ride, world);
-  RawEmbree raw(ground(), rays);
+  RawEmbree raw(hills(), rays);
   const RangeGate gate = ride.spec.gate;
   const double met = static_cast<double>(std::ranges::count_if(
       raw.trace(), [&](float range_m) { return gate.near_m <= range_m && range_m <= gate.far_m; }));
@@ -165,11 +152,11 @@ void lidar_one_ray(::benchmark::State& state, Ride (*ride_of)()) {
   run(state, ride, world, raw, rays.size());
 }
 
-BENCHMARK_CAPTURE(lidar_one_ray, driven, driven)
+BENCHMARK_CAPTURE(lidar_one_ray, driven, driven_ride)
     ->UseManualTime()
     ->Unit(::benchmark::kMillisecond)
     ->MinTime(2);
-BENCHMARK_CAPTURE(lidar_one_ray, flown, flown)
+BENCHMARK_CAPTURE(lidar_one_ray, flown, flown_ride)
     ->UseManualTime()
     ->Unit(::benchmark::kMillisecond)
     ->MinTime(2);
@@ -196,7 +183,7 @@ Errors errors_of(const PointCloud& echoes) {
 // less than 5 mm: its standard deviation of centimetres over the root of 80 000. On a slope the
 // edge that is timed comes before the centroid, by less than a quarter of the pulse as received,
 // 0.2 m.
-const char* fault_of(const Ride& ride, const Scene& world) {
+const char* scan_fault(const Ride& ride, const Scene& world) {
   const auto scan = [&](const LidarSpec& spec) {
     return Lidar(spec).scan(world, ride.X_DS, 0, Seed{7}, 0).echoes;
   };
@@ -225,22 +212,22 @@ void lidar_light(::benchmark::State& state, Ride (*ride_of)(), double pulse_ener
   Ride ride = ride_of();
   ride.spec = with_light(ride.spec, pulse_energy_j);
   ride.spec.waveforms = waveforms;
-  const Scene world = scene();
+  const Scene world = lidar_hills();
   const auto rays = sub_rays_of(ride, world);
-  RawEmbree raw(ground(), rays);
-  if (const char* fault = fault_of(ride, world)) return state.SkipWithError(fault);
+  RawEmbree raw(hills(), rays);
+  if (const char* fault = scan_fault(ride, world)) return state.SkipWithError(fault);
   run(state, ride, world, raw, rays.size());
 }
 using WaveformOutput = LidarSpec::WaveformOutput;
-BENCHMARK_CAPTURE(lidar_light, driven, driven, 100e-9, WaveformOutput::Omit)
+BENCHMARK_CAPTURE(lidar_light, driven, driven_ride, 100e-9, WaveformOutput::Omit)
     ->UseManualTime()
     ->Unit(::benchmark::kMillisecond)
     ->MinTime(2);
-BENCHMARK_CAPTURE(lidar_light, driven_waveforms, driven, 100e-9, WaveformOutput::Keep)
+BENCHMARK_CAPTURE(lidar_light, driven_waveforms, driven_ride, 100e-9, WaveformOutput::Keep)
     ->UseManualTime()
     ->Unit(::benchmark::kMillisecond)
     ->MinTime(2);
-BENCHMARK_CAPTURE(lidar_light, flown, flown, 100e-6, WaveformOutput::Omit)
+BENCHMARK_CAPTURE(lidar_light, flown, flown_ride, 100e-6, WaveformOutput::Omit)
     ->UseManualTime()
     ->Unit(::benchmark::kMillisecond)
     ->MinTime(2);

@@ -6,7 +6,6 @@
 #include <algorithm>
 #include <chrono>
 #include <cmath>
-#include <ctime>
 
 #include "core/scene.h"
 #include "sensors/lidar.h"
@@ -15,6 +14,7 @@
 #include "terrain/asset.h"
 #include "terrain/scatter.h"
 #include "terrain/terrain_scene.h"
+#include "test/benchmark/timing.h"
 #include "test/support/sample_terrain.h"
 #include "test/support/temporary_folder.h"
 
@@ -23,26 +23,24 @@ namespace {
 
 using namespace std::chrono_literals;
 
-double processor_s() { return static_cast<double>(std::clock()) / CLOCKS_PER_SEC; }
-
-const HeightGrid& ground() {
+const HeightGrid& planted_ground() {
   static const HeightGrid grid = testing::fractal(1025, 1, 60, Seed{12345});
   return grid;
 }
 
 std::vector<PlacedObject> plants(double per_m2) {
-  const Scatter scatter(ground(), DensityMap(per_m2), {.scale = {0.5, 1.5}}, Seed{3});
+  const Scatter scatter(planted_ground(), DensityMap(per_m2), {.scale = {0.5, 1.5}}, Seed{3});
   std::vector<PlacedObject> objects;
   for (const Placement& at : scatter.placements())
     objects.push_back({at.p_DO, at.R_DO, at.scale, at.prototype});
   return objects;
 }
 
-Scene scene(Model model, std::vector<PlacedObject> objects) {
+Scene planted_scene(Model model, std::vector<PlacedObject> objects) {
   const RayDevice device;
   std::vector<ModelScene> models{{device, std::move(model), Tracing::Fast}};
   const std::size_t surfaces = models[0].model().surfaces.size();
-  return {RayTracer({full_resolution_level(ground())}, {0, 0, 0}, Tracing::Fast),
+  return {RayTracer({full_resolution_level(planted_ground())}, {0, 0, 0}, Tracing::Fast),
           {.label = 1},
           {},
           {device, std::move(models), std::move(objects), {}},
@@ -50,11 +48,11 @@ Scene scene(Model model, std::vector<PlacedObject> objects) {
 }
 
 // The rays of a sweep of a VLS-128 two metres above the ground.
-std::vector<Ray> rays_of(const Scene& world) {
+std::vector<Ray> sweep_rays(const Scene& world) {
   const LidarSpec spec = load_lidar(testing::data_folder() / "sensors/velodyne_vls128.yaml");
   const ScanPattern pattern(spec.pattern);
   const LaserBeam beam(spec.beam);
-  const Pose X_DS{{1, 0, 0, 0}, {0, 0, *ground().height_m_at({0, 0}) + 2}};
+  const Pose X_DS{{1, 0, 0, 0}, {0, 0, *planted_ground().height_m_at({0, 0}) + 2}};
   const Trajectory path({{0s, X_DS}, {1s, X_DS}});
   PulseCast cast;
   cast.cast({pattern, path}, 0, pattern.pulses(0), {.beam = beam, .far_m = spec.gate.far_m}, {},
@@ -64,7 +62,7 @@ std::vector<Ray> rays_of(const Scene& world) {
 
 // Seconds of a processor that tracing takes on one thread.
 template <typename Trace>
-double time(const Trace& trace, std::span<const Ray> rays, std::vector<Hit>& hits) {
+double tracing_s(const Trace& trace, std::span<const Ray> rays, std::vector<Hit>& hits) {
   hits.resize(rays.size());
   const double begin_s = processor_s();
   trace(rays, hits);
@@ -91,13 +89,13 @@ void objects_build(::benchmark::State& state) {
 BENCHMARK(objects_build)->UseManualTime()->Iterations(1)->Unit(::benchmark::kMillisecond);
 
 void objects_among(::benchmark::State& state, AssetKind kind, double per_m2) {
-  const Scene world = scene(make_asset({.kind = kind}), plants(per_m2));
-  const auto rays = rays_of(world);
+  const Scene world = planted_scene(make_asset({.kind = kind}), plants(per_m2));
+  const auto rays = sweep_rays(world);
   std::vector<Hit> hits, bare;
   double with_s = 0, without_s = 0;
   for (auto _ : state) {
-    with_s += time([&](auto of, auto& into) { world.trace(of, into); }, rays, hits);
-    without_s += time([&](auto of, auto& into) { world.rays.trace(of, into); }, rays, bare);
+    with_s += tracing_s([&](auto of, auto& into) { world.trace(of, into); }, rays, hits);
+    without_s += tracing_s([&](auto of, auto& into) { world.rays.trace(of, into); }, rays, bare);
   }
   for (std::size_t i = 0; i < rays.size(); ++i) {
     if (hits[i].range_m > bare[i].range_m)
@@ -118,14 +116,14 @@ void objects_alpha(::benchmark::State& state) {
   const auto objects = plants(0.01);
   Model whole = make_asset({.kind = AssetKind::Conifer});
   for (ModelSurface& surface : whole.surfaces) surface.least_alpha = 0;
-  const Scene cut = scene(make_asset({.kind = AssetKind::Conifer}), objects);
-  const Scene opaque = scene(std::move(whole), objects);
-  const auto rays = rays_of(cut);
+  const Scene cut = planted_scene(make_asset({.kind = AssetKind::Conifer}), objects);
+  const Scene opaque = planted_scene(std::move(whole), objects);
+  const auto rays = sweep_rays(cut);
   std::vector<Hit> of_cut, of_opaque;
   double cut_s = 0, opaque_s = 0;
   for (auto _ : state) {
-    cut_s += time([&](auto of, auto& into) { cut.trace(of, into); }, rays, of_cut);
-    opaque_s += time([&](auto of, auto& into) { opaque.trace(of, into); }, rays, of_opaque);
+    cut_s += tracing_s([&](auto of, auto& into) { cut.trace(of, into); }, rays, of_cut);
+    opaque_s += tracing_s([&](auto of, auto& into) { opaque.trace(of, into); }, rays, of_opaque);
   }
   for (std::size_t i = 0; i < rays.size(); ++i) {
     if (of_cut[i].range_m < of_opaque[i].range_m - 1e-6)

@@ -13,24 +13,15 @@
 #include "sensors/lidar.h"
 #include "sensors/spec_io.h"
 #include "terrain/terrain_scene.h"
+#include "test/benchmark/landscape.h"
 #include "test/benchmark/raw_embree.h"
-#include "test/support/sample_terrain.h"
+#include "test/benchmark/timing.h"
 #include "test/support/temporary_folder.h"
 
 namespace groundray::benchmark {
 namespace {
 
 using namespace std::chrono_literals;
-using Clock = std::chrono::steady_clock;
-
-double seconds_since(Clock::time_point begin) {
-  return std::chrono::duration<double>(Clock::now() - begin).count();
-}
-
-const HeightGrid& ground() {
-  static const HeightGrid grid = testing::fractal(4097, 5, 1500, Seed{12345});
-  return grid;
-}
 
 // Where the share of pulses that return is the median of 100 random places on this ground, 60 %,
 // and where it is the lowest, 18 %: rays that miss are cheap for Embree, and cost the scan as much
@@ -46,13 +37,13 @@ Trajectory ride_from(const glm::dvec2& start) {
     samples.push_back(
         {10ms * k,
          {rotation_from_yaw_pitch_roll(0.2, 0.05 * std::sin(0.1 * k), 0.05 * std::cos(0.1 * k)),
-          {p, *ground().height_m_at(p) + 2.5}}});
+          {p, *mountains().height_m_at(p) + 2.5}}});
   }
   return Trajectory(std::move(samples));
 }
 
-Scene scene(Tracing tracing) {
-  return {RayTracer({full_resolution_level(ground())}, {0, 0, 0}, tracing), {}};
+Scene bare_mountains(Tracing tracing) {
+  return {RayTracer({full_resolution_level(mountains())}, {0, 0, 0}, tracing), {}};
 }
 
 LidarSpec vls128() { return load_lidar(testing::data_folder() / "sensors/velodyne_vls128.yaml"); }
@@ -84,10 +75,10 @@ std::vector<Ray> rays_of_sweep(const ScanPattern& pattern, const Trajectory& rid
 
 // For other programs to trace the same rays over the same samples: raw doubles and floats, see
 // open3d_baseline.py.
-void export_case(const std::filesystem::path& folder, std::span<const Ray> rays) {
+void export_rays(const std::filesystem::path& folder, std::span<const Ray> rays) {
   std::filesystem::create_directories(folder);
   std::ofstream samples(folder / "heights.f32", std::ios::binary);
-  const auto heights_m = ground().heights_m();
+  const auto heights_m = mountains().heights_m();
   samples.write(reinterpret_cast<const char*>(heights_m.data()),
                 static_cast<std::streamsize>(heights_m.size_bytes()));
   std::ofstream out(folder / "rays.f64", std::ios::binary);
@@ -97,19 +88,19 @@ void export_case(const std::filesystem::path& folder, std::span<const Ray> rays)
   }
   std::ofstream frame(folder / "frame.txt");
   frame.precision(17);
-  frame << ground().columns() << ' ' << ground().rows() << ' ' << ground().origin_m().x << ' '
-        << ground().origin_m().y << ' ' << ground().step_m().x << ' ' << ground().step_m().y
-        << '\n';
+  frame << mountains().columns() << ' ' << mountains().rows() << ' ' << mountains().origin_m().x
+        << ' ' << mountains().origin_m().y << ' ' << mountains().step_m().x << ' '
+        << mountains().step_m().y << '\n';
 }
 
 void scan_vls128(::benchmark::State& state, const glm::dvec2& place) {
   const Trajectory ride = ride_from(place);
   const LidarSpec spec = vls128();
   const Lidar lidar(spec);
-  const Scene world = scene(Tracing::Fast);
+  const Scene world = bare_mountains(Tracing::Fast);
   const auto rays = rays_of_sweep(lidar.pattern(), ride, spec.gate.far_m);
-  if (const char* folder = std::getenv("GROUNDRAY_BENCH_EXPORT")) export_case(folder, rays);
-  RawEmbree raw(ground(), rays);
+  if (const char* folder = std::getenv("GROUNDRAY_BENCH_EXPORT")) export_rays(folder, rays);
+  RawEmbree raw(mountains(), rays);
 
   std::size_t met = 0;
   for (const float range_m : raw.trace()) met += range_m < spec.gate.far_m ? 1 : 0;
@@ -151,8 +142,8 @@ void exact_against_fast(::benchmark::State& state) {
   const LidarSpec spec = vls128();
   const auto rays = rays_of_sweep(ScanPattern(spec.pattern), ride, spec.gate.far_m);
   const Lidar lidar(spec);
-  const Scene fast = scene(Tracing::Fast);
-  const Scene exact = scene(Tracing::Exact);
+  const Scene fast = bare_mountains(Tracing::Fast);
+  const Scene exact = bare_mountains(Tracing::Exact);
   const PointCloud a = lidar.scan(fast, ride, 0, Seed{7}, 0).echoes;
   const PointCloud b = lidar.scan(exact, ride, 0, Seed{7}, 0).echoes;
   if (std::abs(static_cast<double>(a.rows()) - static_cast<double>(b.rows())) >

@@ -6,7 +6,6 @@
 #include <array>
 #include <cstdint>
 #include <cstdlib>
-#include <ctime>
 #include <filesystem>
 #include <fstream>
 #include <string>
@@ -14,22 +13,16 @@
 
 #include "terrain/deviation.h"
 #include "terrain/terrain_mesh.h"
+#include "test/benchmark/landscape.h"
 #include "test/benchmark/pointer_quadtree.h"
+#include "test/benchmark/timing.h"
 #include "test/support/mesh_oracle.h"
 #include "test/support/mesh_topology.h"
-#include "test/support/sample_terrain.h"
 
 namespace groundray::benchmark {
 namespace {
 
 constexpr int block_cells = 2;
-
-double cpu_s() { return static_cast<double>(std::clock()) / CLOCKS_PER_SEC; }
-
-const HeightGrid& ground() {
-  static const HeightGrid grid = testing::fractal(4097, 5, 1500, Seed{12345});
-  return grid;
-}
 
 // The most memory that the process has held since `forget_peak`, bytes.
 void forget_peak() {
@@ -45,10 +38,10 @@ double peak_bytes() {
 }
 
 // For other programs to mesh the same samples: see terrain_peers.py.
-void export_case(const std::filesystem::path& folder) {
+void export_heights(const std::filesystem::path& folder) {
   std::filesystem::create_directories(folder);
-  std::ofstream(folder / "size.txt") << ground().columns() << ' ' << ground().rows() << '\n';
-  const auto heights_m = ground().heights_m();
+  std::ofstream(folder / "size.txt") << mountains().columns() << ' ' << mountains().rows() << '\n';
+  const auto heights_m = mountains().heights_m();
   std::ofstream(folder / "heights.f32", std::ios::binary)
       .write(reinterpret_cast<const char*>(heights_m.data()),
              static_cast<std::streamsize>(heights_m.size_bytes()));
@@ -56,14 +49,14 @@ void export_case(const std::filesystem::path& folder) {
 
 // The whole way: certify every node, select, balance, emit.
 void terrain_mesh(::benchmark::State& state) {
-  if (const char* folder = std::getenv("GROUNDRAY_BENCH_EXPORT")) export_case(folder);
+  if (const char* folder = std::getenv("GROUNDRAY_BENCH_EXPORT")) export_heights(folder);
   const MeshBound bound{.tolerance_m = static_cast<double>(state.range(0))};
   {
-    const TerrainMesh mesh = build_terrain_mesh(ground(), bound, block_cells);
-    const auto found = testing::largest_deviation(ground(), mesh.vertices, mesh.triangles);
+    const TerrainMesh mesh = build_terrain_mesh(mountains(), bound, block_cells);
+    const auto found = testing::largest_deviation(mountains(), mesh.vertices, mesh.triangles);
     if (found.largest_m > bound.tolerance_m * (1 + 1e-15))
       return state.SkipWithError("the mesh is too far off");
-    if (!testing::topology_faults(ground(), mesh.vertices, mesh.triangles).empty()) {
+    if (!testing::topology_faults(mountains(), mesh.vertices, mesh.triangles).empty()) {
       return state.SkipWithError("the mesh does not conform");
     }
     state.counters["largest_m"] = found.largest_m;
@@ -72,9 +65,9 @@ void terrain_mesh(::benchmark::State& state) {
   double bytes = 0;
   for (auto _ : state) {
     forget_peak();
-    const double begin_s = cpu_s();
-    ::benchmark::DoNotOptimize(build_terrain_mesh(ground(), bound, block_cells));
-    state.SetIterationTime(cpu_s() - begin_s);
+    const double begin_s = processor_s();
+    ::benchmark::DoNotOptimize(build_terrain_mesh(mountains(), bound, block_cells));
+    state.SetIterationTime(processor_s() - begin_s);
     bytes = std::max(bytes, peak_bytes());
   }
   state.counters["peak_MB"] = 1e-6 * bytes;  // with the 67 MB of heights, and the program itself
@@ -88,7 +81,7 @@ BENCHMARK(terrain_mesh)
     ->Iterations(5);
 
 // Triangles as a sorted list of the samples at their corners, the least first.
-std::vector<std::array<std::int64_t, 3>> triangles_of(const TerrainMesh& mesh) {
+std::vector<std::array<std::int64_t, 3>> sorted_triangles(const TerrainMesh& mesh) {
   std::vector<std::array<std::int64_t, 3>> triangles;
   for (const glm::uvec3& t : mesh.triangles) {
     std::array<std::int64_t, 3> corners{};
@@ -111,7 +104,7 @@ struct PassClock {
 
   PassRunner runner() {
     return [this](std::size_t count, const auto& work) {
-      if (passes++ == skipped) begin_s = cpu_s();
+      if (passes++ == skipped) begin_s = processor_s();
       run_in_parallel(count, work);
     };
   }
@@ -123,21 +116,21 @@ struct PassClock {
 void terrain_against_pointer_quadtree(::benchmark::State& state) {
   const auto tolerance_m = static_cast<double>(state.range(0));
   PassClock certifying;
-  const auto levels = certify(ground(), block_cells, NodeDetail::KeysOnly, certifying.runner());
+  const auto levels = certify(mountains(), block_cells, NodeDetail::KeysOnly, certifying.runner());
   const MeshBound bound{.tolerance_m = tolerance_m};
-  const auto ours = triangles_of(build_terrain_mesh(ground(), bound, block_cells));
-  if (ours != triangles_of(mesh_by_pointers(ground(), levels, block_cells, tolerance_m))) {
+  const auto ours = sorted_triangles(build_terrain_mesh(mountains(), bound, block_cells));
+  if (ours != sorted_triangles(mesh_by_pointers(mountains(), levels, block_cells, tolerance_m))) {
     return state.SkipWithError("the meshes differ");
   }
   double ours_s = 0, pointers_s = 0;
   for (auto _ : state) {
     PassClock clock{.skipped = certifying.passes};
-    ::benchmark::DoNotOptimize(build_terrain_mesh(ground(), bound, block_cells, clock.runner()));
-    const double this_s = cpu_s() - clock.begin_s;
+    ::benchmark::DoNotOptimize(build_terrain_mesh(mountains(), bound, block_cells, clock.runner()));
+    const double this_s = processor_s() - clock.begin_s;
     ours_s += this_s;
-    const double begin_s = cpu_s();
-    ::benchmark::DoNotOptimize(mesh_by_pointers(ground(), levels, block_cells, tolerance_m));
-    pointers_s += cpu_s() - begin_s;
+    const double begin_s = processor_s();
+    ::benchmark::DoNotOptimize(mesh_by_pointers(mountains(), levels, block_cells, tolerance_m));
+    pointers_s += processor_s() - begin_s;
     state.SetIterationTime(this_s);
   }
   state.counters["triangles"] = static_cast<double>(ours.size());

@@ -17,7 +17,7 @@
 #include "core/oren_nayar.h"
 #include "core/random.h"
 
-namespace groundray {
+namespace groundray::bsdf_test {
 namespace {
 
 using ::testing::ThrowsMessage;
@@ -513,4 +513,4 @@ TEST(Bsdf, RetroReflectorIsBlackToWhoeverIsNotAtTheSource) {
 }
 
 }  // namespace
-}  // namespace groundray
+}  // namespace groundray::bsdf_test

@@ -14,7 +14,7 @@
 #include "core/error.h"
 #include "test/support/solid.h"
 
-namespace groundray {
+namespace groundray::closest_point_test {
 namespace {
 
 using ::testing::HasSubstr;
@@ -289,4 +289,4 @@ TEST(ClosestPoint, EveryFaultOfTheMeshIsNamed) {
 }
 
 }  // namespace
-}  // namespace groundray
+}  // namespace groundray::closest_point_test

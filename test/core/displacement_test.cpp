@@ -17,7 +17,7 @@
 #include "core/object_tracer.h"
 #include "test/support/solid.h"
 
-namespace groundray {
+namespace groundray::displacement_test {
 namespace {
 
 using ::testing::HasSubstr;
@@ -178,4 +178,4 @@ TEST(Displacement, SaysWhatIsWrong) {
 }
 
 }  // namespace
-}  // namespace groundray
+}  // namespace groundray::displacement_test

@@ -22,7 +22,7 @@
 #include "test/support/file_size_limit.h"
 #include "test/support/temporary_folder.h"
 
-namespace groundray {
+namespace groundray::exr_io_test {
 namespace {
 
 using ::testing::AllOf;
@@ -158,4 +158,4 @@ TEST(WriteExr, LeavesNothingBehindBeyondTheFileSizeLimit) {
 }
 
 }  // namespace
-}  // namespace groundray
+}  // namespace groundray::exr_io_test

@@ -26,7 +26,7 @@
 #include "core/product_io.h"
 #include "test/support/temporary_folder.h"
 
-namespace groundray {
+namespace groundray::exr_reader_test {
 namespace {
 
 using ::testing::AllOf;
@@ -290,4 +290,4 @@ TEST(ReadExr, RefusesWhatIsCutShortAndSurvivesDamage) {
 }
 
 }  // namespace
-}  // namespace groundray
+}  // namespace groundray::exr_reader_test

@@ -2,7 +2,7 @@
 
 #include <gtest/gtest.h>
 
-namespace groundray {
+namespace groundray::file_ending_test {
 namespace {
 
 TEST(FileEnding, IsWhatFollowsTheLastDotInSmallLetters) {
@@ -13,4 +13,4 @@ TEST(FileEnding, IsWhatFollowsTheLastDotInSmallLetters) {
 }
 
 }  // namespace
-}  // namespace groundray
+}  // namespace groundray::file_ending_test

@@ -14,7 +14,7 @@
 #include "test/support/png_file.h"
 #include "test/support/temporary_folder.h"
 
-namespace groundray {
+namespace groundray::flow_io_test {
 namespace {
 
 using ::testing::HasSubstr;
@@ -105,4 +105,4 @@ TEST(WriteFlow, RefusesOtherChannels) {
 }
 
 }  // namespace
-}  // namespace groundray
+}  // namespace groundray::flow_io_test

@@ -6,7 +6,7 @@
 
 #include "core/random.h"
 
-namespace groundray {
+namespace groundray::footprint_test {
 namespace {
 
 // Numbers of size 1 to 10 that pass through some ten operations, and divisions by areas and cosines
@@ -98,4 +98,4 @@ TEST(Footprint, IsAPointWithoutTextureCoordinates) {
 }
 
 }  // namespace
-}  // namespace groundray
+}  // namespace groundray::footprint_test

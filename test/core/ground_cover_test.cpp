@@ -12,7 +12,7 @@
 
 #include "core/error.h"
 
-namespace groundray {
+namespace groundray::ground_cover_test {
 namespace {
 
 using ::testing::HasSubstr;
@@ -195,4 +195,4 @@ TEST(GroundCover, SaysWhatIsWrong) {
 }
 
 }  // namespace
-}  // namespace groundray
+}  // namespace groundray::ground_cover_test

@@ -11,7 +11,7 @@
 #include "test/support/reference_tracer.h"
 #include "test/support/sample_terrain.h"
 
-namespace groundray {
+namespace groundray::height_grid_test {
 namespace {
 
 using ::testing::HasSubstr;
@@ -75,4 +75,4 @@ TEST(HeightGrid, RefusesWhatIsNoSurfaceAndSaysWhy) {
 }
 
 }  // namespace
-}  // namespace groundray
+}  // namespace groundray::height_grid_test

@@ -21,7 +21,7 @@
 // libjpeg's header needs <cstdio> before it.
 #include <jpeglib.h>
 
-namespace groundray {
+namespace groundray::image_io_test {
 namespace {
 
 using namespace std::string_literals;
@@ -413,4 +413,4 @@ TEST(ReadImage, SurvivesDamage) {
 }
 
 }  // namespace
-}  // namespace groundray
+}  // namespace groundray::image_io_test

@@ -10,7 +10,7 @@
 
 #include "core/error.h"
 
-namespace groundray {
+namespace groundray::material_test {
 namespace {
 
 using ::testing::AllOf;
@@ -145,4 +145,4 @@ TEST(Material, RoughGroundIsBrighterThanLambertianAtGrazingIncidence) {
 }
 
 }  // namespace
-}  // namespace groundray
+}  // namespace groundray::material_test

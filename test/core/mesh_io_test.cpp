@@ -21,7 +21,7 @@
 #include "test/support/file_size_limit.h"
 #include "test/support/temporary_folder.h"
 
-namespace groundray {
+namespace groundray::mesh_io_test {
 namespace {
 
 using ::testing::ElementsAre;
@@ -348,4 +348,4 @@ TEST_F(MeshIo, NothingIsLeftWhereAFileCannotBeWritten) {
 }
 
 }  // namespace
-}  // namespace groundray
+}  // namespace groundray::mesh_io_test

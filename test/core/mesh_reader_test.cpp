@@ -17,7 +17,7 @@
 #include "test/support/solid.h"
 #include "test/support/temporary_folder.h"
 
-namespace groundray {
+namespace groundray::mesh_reader_test {
 namespace {
 
 using ::testing::HasSubstr;
@@ -211,4 +211,4 @@ TEST_F(MeshReader, EveryFaultIsNamed) {
 }
 
 }  // namespace
-}  // namespace groundray
+}  // namespace groundray::mesh_reader_test

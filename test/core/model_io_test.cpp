@@ -27,7 +27,7 @@
 #include "test/support/mesh_neighbours.h"
 #include "test/support/temporary_folder.h"
 
-namespace groundray {
+namespace groundray::model_io_test {
 namespace {
 
 using ::testing::AllOf;
@@ -849,4 +849,4 @@ TEST(Model, BoundsAreThoseOfTriangles) {
 }
 
 }  // namespace
-}  // namespace groundray
+}  // namespace groundray::model_io_test

@@ -6,7 +6,7 @@
 
 #include "core/random.h"
 
-namespace groundray {
+namespace groundray::normal_map_test {
 namespace {
 
 // A chain of some twenty operations on numbers of size 1, each rounding by 1e-16.
@@ -78,4 +78,4 @@ TEST(ShadingNormal, WithoutTangentsIsTheBase) {
 }
 
 }  // namespace
-}  // namespace groundray
+}  // namespace groundray::normal_map_test

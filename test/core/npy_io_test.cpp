@@ -9,7 +9,7 @@
 #include "core/product_io.h"
 #include "test/support/temporary_folder.h"
 
-namespace groundray {
+namespace groundray::npy_io_test {
 namespace {
 
 // What numpy.save writes, by NumPy 2.4: its header and the data.
@@ -40,4 +40,4 @@ TEST(WriteNpy, WritesRowsOfSeveralFields) {
 }
 
 }  // namespace
-}  // namespace groundray
+}  // namespace groundray::npy_io_test

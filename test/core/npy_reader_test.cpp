@@ -14,7 +14,7 @@
 #include "core/zip_reader.h"
 #include "test/support/temporary_folder.h"
 
-namespace groundray {
+namespace groundray::npy_reader_test {
 namespace {
 
 using namespace std::string_literals;
@@ -217,4 +217,4 @@ TEST(ReadNpy, NamesTheRuleOfABadHeader) {
 }
 
 }  // namespace
-}  // namespace groundray
+}  // namespace groundray::npy_reader_test

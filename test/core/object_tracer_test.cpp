@@ -13,7 +13,7 @@
 #include "test/support/margin.h"
 #include "test/support/solid.h"
 
-namespace groundray {
+namespace groundray::object_tracer_test {
 namespace {
 
 using std::chrono::milliseconds;
@@ -674,4 +674,4 @@ TEST(ObjectTracer, WhatFailsToBuildIsGivenBack) {
 }
 
 }  // namespace
-}  // namespace groundray
+}  // namespace groundray::object_tracer_test

@@ -14,7 +14,7 @@
 #include "core/product_io.h"
 #include "test/support/temporary_folder.h"
 
-namespace groundray {
+namespace groundray::pcd_reader_test {
 namespace {
 
 using namespace std::string_literals;
@@ -227,4 +227,4 @@ TEST(ReadPcd, NamesAFileThatIsMissing) {
 }
 
 }  // namespace
-}  // namespace groundray
+}  // namespace groundray::pcd_reader_test

@@ -16,7 +16,7 @@
 #include "test/support/file_size_limit.h"
 #include "test/support/temporary_folder.h"
 
-namespace groundray {
+namespace groundray::ply_io_test {
 namespace {
 
 using namespace std::string_literals;
@@ -325,4 +325,4 @@ TEST(WritePly, LeavesNothingBehindBeyondTheFileSizeLimit) {
 }
 
 }  // namespace
-}  // namespace groundray
+}  // namespace groundray::ply_io_test

@@ -5,7 +5,7 @@
 
 #include "core/error.h"
 
-namespace groundray {
+namespace groundray::point_cloud_test {
 namespace {
 
 using ::testing::ElementsAre;
@@ -34,4 +34,4 @@ TEST(PointCloud, SaysWhatIsWrongWithAColumn) {
 }
 
 }  // namespace
-}  // namespace groundray
+}  // namespace groundray::point_cloud_test

@@ -11,7 +11,7 @@
 #include "core/random.h"
 #include "test/support/margin.h"
 
-namespace groundray {
+namespace groundray::pose_test {
 namespace {
 
 Pose random_pose(std::uint32_t number, double reach_m) {
@@ -88,4 +88,4 @@ TEST(Screw, StraightMotionStaysStraight) {
 }
 
 }  // namespace
-}  // namespace groundray
+}  // namespace groundray::pose_test

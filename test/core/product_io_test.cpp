@@ -19,7 +19,7 @@
 #include "test/support/png_file.h"
 #include "test/support/temporary_folder.h"
 
-namespace groundray {
+namespace groundray::product_io_test {
 namespace {
 
 namespace fs = std::filesystem;
@@ -363,4 +363,4 @@ TEST(Tum, DoesNotDependOnTheLocale) {
 }
 
 }  // namespace
-}  // namespace groundray
+}  // namespace groundray::product_io_test

@@ -12,7 +12,7 @@
 #include <chrono>
 #include <memory>
 
-namespace groundray {
+namespace groundray::progress_test {
 namespace {
 
 using namespace std::chrono_literals;
@@ -147,4 +147,4 @@ TEST(DurationText, ReadsAsPeopleWriteIt) {
 }
 
 }  // namespace
-}  // namespace groundray
+}  // namespace groundray::progress_test

@@ -7,7 +7,7 @@
 #include <numeric>
 #include <random>
 
-namespace groundray {
+namespace groundray::quantile_test {
 namespace {
 
 // By counting: so many do not exceed it, and of the next smaller one too few are there.
@@ -40,4 +40,4 @@ TEST(Quantile, OfDistancesToTheMedianIsTheNmad) {
 }
 
 }  // namespace
-}  // namespace groundray
+}  // namespace groundray::quantile_test

@@ -7,7 +7,7 @@
 #include <set>
 #include <tuple>
 
-namespace groundray {
+namespace groundray::random_test {
 namespace {
 
 // Known answers of philox4x32-10 published with Random123 (kat_vectors).
@@ -93,4 +93,4 @@ TEST(RandomPoisson, HasItsMeanAndVarianceAtLargeMeans) {
 }
 
 }  // namespace
-}  // namespace groundray
+}  // namespace groundray::random_test

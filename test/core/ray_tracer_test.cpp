@@ -19,7 +19,7 @@
 #include "test/support/sample_terrain.h"
 #include "test/support/temporary_folder.h"
 
-namespace groundray {
+namespace groundray::ray_tracer_test {
 namespace {
 
 using testing::fractal;
@@ -403,4 +403,4 @@ TEST(FloatFrame, LiesOnALatticeOf2048MetresNearTheViewpoint) {
 }
 
 }  // namespace
-}  // namespace groundray
+}  // namespace groundray::ray_tracer_test

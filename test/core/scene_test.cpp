@@ -10,7 +10,7 @@
 
 #include "terrain/terrain_scene.h"
 
-namespace groundray {
+namespace groundray::scene_test {
 namespace {
 
 using std::chrono::milliseconds;
@@ -210,4 +210,4 @@ TEST(Scene, TheGroundsTruthIsOfTheLayerWithTheLargestShare) {
 }
 
 }  // namespace
-}  // namespace groundray
+}  // namespace groundray::scene_test

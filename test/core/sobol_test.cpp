@@ -6,7 +6,7 @@
 #include <set>
 #include <vector>
 
-namespace groundray {
+namespace groundray::sobol_test {
 namespace {
 
 glm::dvec2 pair_of(std::uint32_t seed, std::uint32_t index, int pair) {
@@ -75,4 +75,4 @@ TEST(SobolPairs, IntegrateSmoothFunctionsFarBetterThanRandomNumbers) {
 }
 
 }  // namespace
-}  // namespace groundray
+}  // namespace groundray::sobol_test

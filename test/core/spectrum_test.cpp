@@ -6,7 +6,7 @@
 #include <limits>
 #include <string>
 
-namespace groundray {
+namespace groundray::spectrum_test {
 namespace {
 
 constexpr double epsilon = std::numeric_limits<double>::epsilon();
@@ -83,4 +83,4 @@ TEST(Spectrum, WhatLiesBeyondTheColoursReachAddsLittle) {
 }
 
 }  // namespace
-}  // namespace groundray
+}  // namespace groundray::spectrum_test

@@ -13,7 +13,7 @@
 
 #include "core/error.h"
 
-namespace groundray {
+namespace groundray::texture_test {
 namespace {
 
 using ::testing::HasSubstr;
@@ -446,4 +446,4 @@ TEST(Texture, MayHaveOnePixelOrRowsOfSixteenThousand) {
 }
 
 }  // namespace
-}  // namespace groundray
+}  // namespace groundray::texture_test

@@ -10,7 +10,7 @@
 #include "core/error.h"
 #include "test/support/margin.h"
 
-namespace groundray {
+namespace groundray::trajectory_test {
 namespace {
 
 using namespace std::chrono_literals;
@@ -68,4 +68,4 @@ TEST(Trajectory, ListsEveryBadPoseAtOnce) {
 }
 
 }  // namespace
-}  // namespace groundray
+}  // namespace groundray::trajectory_test

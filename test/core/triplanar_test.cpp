@@ -10,7 +10,7 @@
 
 #include "core/random.h"
 
-namespace groundray {
+namespace groundray::triplanar_test {
 namespace {
 
 constexpr float ulp = std::numeric_limits<float>::epsilon();
@@ -79,4 +79,4 @@ TEST(Triplanar, OneColorStaysThatColor) {
 }
 
 }  // namespace
-}  // namespace groundray
+}  // namespace groundray::triplanar_test

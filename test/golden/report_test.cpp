@@ -16,7 +16,7 @@
 #include "core/product_io.h"
 #include "test/support/temporary_folder.h"
 
-namespace groundray::golden {
+namespace groundray::golden::report_test {
 namespace {
 
 using groundray::testing::TemporaryFolder;
@@ -191,4 +191,4 @@ TEST(Report, RefusesToWriteWhereItCannot) {
 }
 
 }  // namespace
-}  // namespace groundray::golden
+}  // namespace groundray::golden::report_test

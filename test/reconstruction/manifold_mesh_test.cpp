@@ -11,7 +11,7 @@
 #include "test/support/solid.h"
 #include "test/support/surface_check.h"
 
-namespace groundray {
+namespace groundray::manifold_mesh_test {
 namespace {
 
 using ::testing::Each;
@@ -158,4 +158,4 @@ TEST(ManifoldMesh, OfNothingIsNothing) {
 }
 
 }  // namespace
-}  // namespace groundray
+}  // namespace groundray::manifold_mesh_test

@@ -15,7 +15,7 @@
 #include "test/support/solid.h"
 #include "test/support/temporary_folder.h"
 
-namespace groundray {
+namespace groundray::measured_mesh_io_test {
 namespace {
 
 using ::testing::HasSubstr;
@@ -165,4 +165,4 @@ TEST_F(MeasuredMeshIo, NamesWhatIsWrong) {
 }
 
 }  // namespace
-}  // namespace groundray
+}  // namespace groundray::measured_mesh_io_test

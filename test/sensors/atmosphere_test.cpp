@@ -10,7 +10,7 @@
 #include "core/error.h"
 #include "test/support/margin.h"
 
-namespace groundray {
+namespace groundray::atmosphere_test {
 namespace {
 
 using ::testing::AllOf;
@@ -268,4 +268,4 @@ TEST(Atmosphere, ErrorListsEveryFault) {
 }
 
 }  // namespace
-}  // namespace groundray
+}  // namespace groundray::atmosphere_test

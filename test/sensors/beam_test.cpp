@@ -16,7 +16,7 @@
 #include "core/error.h"
 #include "test/support/margin.h"
 
-namespace groundray {
+namespace groundray::beam_test {
 namespace {
 
 using ::testing::AllOf;
@@ -620,4 +620,4 @@ TEST(LaserBeam, RefusesCountsThatDoNotDouble) {
 }
 
 }  // namespace
-}  // namespace groundray
+}  // namespace groundray::beam_test

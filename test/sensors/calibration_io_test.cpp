@@ -16,7 +16,7 @@
 #include "sensors/spec_io.h"
 #include "test/support/temporary_folder.h"
 
-namespace groundray {
+namespace groundray::calibration_io_test {
 namespace {
 
 using groundray::testing::data_folder;
@@ -311,4 +311,4 @@ TEST(Calibration, EveryPublishedFileIsRead) {
 }
 
 }  // namespace
-}  // namespace groundray
+}  // namespace groundray::calibration_io_test

@@ -14,7 +14,7 @@
 #include "sensors/spec_io.h"
 #include "test/support/temporary_folder.h"
 
-namespace groundray {
+namespace groundray::camera_preset_test {
 namespace {
 
 using groundray::testing::data_folder;
@@ -107,4 +107,4 @@ TEST(CameraPreset, KeepTheirCalibrationsToTheLastBit) {
 }
 
 }  // namespace
-}  // namespace groundray
+}  // namespace groundray::camera_preset_test

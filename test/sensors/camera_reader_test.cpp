@@ -13,7 +13,7 @@
 #include "test/support/lidar_file.h"
 #include "test/support/temporary_folder.h"
 
-namespace groundray {
+namespace groundray::camera_reader_test {
 namespace {
 
 using groundray::testing::lidar_text;
@@ -362,4 +362,4 @@ TEST(CameraFile, ThatIsNotThereIsNamed) {
 }
 
 }  // namespace
-}  // namespace groundray
+}  // namespace groundray::camera_reader_test

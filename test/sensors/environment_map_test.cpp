@@ -17,7 +17,7 @@
 #include "core/luminance.h"
 #include "test/support/temporary_folder.h"
 
-namespace groundray {
+namespace groundray::environment_map_test {
 namespace {
 
 using groundray::testing::shared_data_folder;
@@ -319,4 +319,4 @@ TEST(EnvironmentMap, GreyIsWhiteLight) {
 }
 
 }  // namespace
-}  // namespace groundray
+}  // namespace groundray::environment_map_test

@@ -16,7 +16,7 @@
 #include "terrain/terrain_scene.h"
 #include "test/support/margin.h"
 
-namespace groundray {
+namespace groundray::lidar_light_test {
 namespace {
 
 using namespace std::chrono_literals;
@@ -709,4 +709,4 @@ TEST(LidarLight, RefusesWhatNeedsLightOrASpectrum) {
 }
 
 }  // namespace
-}  // namespace groundray
+}  // namespace groundray::lidar_light_test

@@ -14,7 +14,7 @@
 #include "test/support/solid.h"
 #include "test/support/temporary_folder.h"
 
-namespace groundray {
+namespace groundray::lidar_objects_test {
 namespace {
 
 using namespace std::chrono_literals;
@@ -173,4 +173,4 @@ TEST(LidarObjects, ObjectsOnGroundAtFullResolutionHaveNoError) {
 }
 
 }  // namespace
-}  // namespace groundray
+}  // namespace groundray::lidar_objects_test

@@ -11,7 +11,7 @@
 #include "test/support/lidar_file.h"
 #include "test/support/temporary_folder.h"
 
-namespace groundray {
+namespace groundray::lidar_reader_test {
 namespace {
 
 using groundray::testing::lidar_text;
@@ -300,4 +300,4 @@ TEST(LidarFile, ReadsLoopsAndAFieldOfView) {
 }
 
 }  // namespace
-}  // namespace groundray
+}  // namespace groundray::lidar_reader_test

@@ -15,7 +15,7 @@
 #include "test/support/sample_terrain.h"
 #include "test/support/temporary_folder.h"
 
-namespace groundray {
+namespace groundray::lidar_sweep_test {
 namespace {
 
 using namespace std::chrono_literals;
@@ -266,4 +266,4 @@ TEST(LidarSweep, ConvergenceComparesEvery64thPulseWithTwiceItsSubRays) {
 }
 
 }  // namespace
-}  // namespace groundray
+}  // namespace groundray::lidar_sweep_test

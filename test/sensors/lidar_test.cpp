@@ -18,7 +18,7 @@
 #include "test/support/sample_terrain.h"
 #include "test/support/temporary_folder.h"
 
-namespace groundray {
+namespace groundray::lidar_test {
 namespace {
 
 using namespace std::chrono_literals;
@@ -270,4 +270,4 @@ TEST(Lidar, RefusesAGateThatIsUpsideDown) {
 }
 
 }  // namespace
-}  // namespace groundray
+}  // namespace groundray::lidar_test

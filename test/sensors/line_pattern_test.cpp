@@ -11,7 +11,7 @@
 #include "core/error.h"
 #include "sensors/scan_pattern.h"
 
-namespace groundray {
+namespace groundray::line_pattern_test {
 namespace {
 
 using ::testing::AllOf;
@@ -163,4 +163,4 @@ TEST(LinePattern, RefusesAFieldOfViewThatNoFacetCovers) {
 }
 
 }  // namespace
-}  // namespace groundray
+}  // namespace groundray::line_pattern_test

@@ -12,7 +12,7 @@
 #include "core/error.h"
 #include "test/support/temporary_folder.h"
 
-namespace groundray {
+namespace groundray::material_io_test {
 namespace {
 
 using groundray::testing::data_folder;
@@ -242,4 +242,4 @@ TEST(MaterialIo, LeafIsTheMeanOfTheLibrarysSpectra) {
 }
 
 }  // namespace
-}  // namespace groundray
+}  // namespace groundray::material_io_test

@@ -9,7 +9,7 @@
 
 #include "test/support/margin.h"
 
-namespace groundray {
+namespace groundray::normal_spread_test {
 namespace {
 
 using std::numbers::pi;
@@ -103,4 +103,4 @@ TEST(NormalSpread, ClampedIsItsOwnFarFromTheEndsAndThatOfTheEndsAtLast) {
 }
 
 }  // namespace
-}  // namespace groundray
+}  // namespace groundray::normal_spread_test

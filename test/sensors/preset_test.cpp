@@ -13,7 +13,7 @@
 #include "sensors/yaml_reader.h"
 #include "test/support/temporary_folder.h"
 
-namespace groundray {
+namespace groundray::preset_test {
 namespace {
 
 using groundray::testing::data_folder;
@@ -181,4 +181,4 @@ TEST(Preset, OusterOS2IsThePublishedUnit) {
 }
 
 }  // namespace
-}  // namespace groundray
+}  // namespace groundray::preset_test

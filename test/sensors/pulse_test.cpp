@@ -8,7 +8,7 @@
 
 #include "core/error.h"
 
-namespace groundray {
+namespace groundray::pulse_test {
 namespace {
 
 using ::testing::HasSubstr;
@@ -122,4 +122,4 @@ TEST(Pulse, RefusesAPulseThatIsNone) {
 }
 
 }  // namespace
-}  // namespace groundray
+}  // namespace groundray::pulse_test

@@ -10,7 +10,7 @@
 #include "core/error.h"
 #include "core/material.h"
 
-namespace groundray {
+namespace groundray::radar_equation_test {
 namespace {
 
 using ::testing::AllOf;
@@ -135,4 +135,4 @@ TEST(RadarEquation, ErrorListsEveryFault) {
 }
 
 }  // namespace
-}  // namespace groundray
+}  // namespace groundray::radar_equation_test

@@ -16,7 +16,7 @@
 #include "sensors/receiver.h"
 #include "test/support/margin.h"
 
-namespace groundray {
+namespace groundray::receiver_noise_test {
 namespace {
 
 using Timing = ReceiverSpec::Timing;
@@ -475,4 +475,4 @@ TEST(ReceiverNoise, IsAFunctionOfItsKey) {
 }
 
 }  // namespace
-}  // namespace groundray
+}  // namespace groundray::receiver_noise_test

@@ -12,7 +12,7 @@
 #include "sensors/lidar.h"
 #include "test/support/margin.h"
 
-namespace groundray {
+namespace groundray::receiver_test {
 namespace {
 
 using Timing = ReceiverSpec::Timing;
@@ -505,4 +505,4 @@ TEST(Receiver, RefusesWhatCannotBe) {
 }
 
 }  // namespace
-}  // namespace groundray
+}  // namespace groundray::receiver_test

@@ -12,7 +12,7 @@
 #include "core/error.h"
 #include "sensors/scan_pattern.h"
 
-namespace groundray {
+namespace groundray::risley_pattern_test {
 namespace {
 
 using ::testing::AllOf;
@@ -172,4 +172,4 @@ TEST(RisleyPattern, RefusesAPatternWithEveryFaultInOneError) {
 }
 
 }  // namespace
-}  // namespace groundray
+}  // namespace groundray::risley_pattern_test

@@ -12,7 +12,7 @@
 
 #include "core/error.h"
 
-namespace groundray {
+namespace groundray::scan_pattern_test {
 namespace {
 
 using namespace std::chrono_literals;
@@ -393,4 +393,4 @@ TEST(ScanPattern, RefusesFieldsOfViewAndLoopsOutOfBounds) {
 }
 
 }  // namespace
-}  // namespace groundray
+}  // namespace groundray::scan_pattern_test

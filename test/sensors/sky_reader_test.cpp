@@ -11,7 +11,7 @@
 #include "core/error.h"
 #include "test/support/temporary_folder.h"
 
-namespace groundray {
+namespace groundray::sky_reader_test {
 namespace {
 
 using namespace std::chrono_literals;
@@ -175,4 +175,4 @@ TEST(SkyReader, SkiesThatCannotBeAreRefusedWithTheirPlace) {
 }
 
 }  // namespace
-}  // namespace groundray
+}  // namespace groundray::sky_reader_test

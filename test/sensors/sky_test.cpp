@@ -15,7 +15,7 @@
 #include "core/luminance.h"
 #include "sensors/aerial_perspective.h"
 
-namespace groundray {
+namespace groundray::sky_test {
 namespace {
 
 using ::testing::AllOf;
@@ -218,4 +218,4 @@ TEST(AerialPerspective, LeavesTwoPercentOfContrastAtTheVisibility) {
 }
 
 }  // namespace
-}  // namespace groundray
+}  // namespace groundray::sky_test

@@ -15,7 +15,7 @@
 #include "test/support/lidar_file.h"
 #include "test/support/temporary_folder.h"
 
-namespace groundray {
+namespace groundray::spec_io_test {
 namespace {
 
 using groundray::testing::data_folder;
@@ -640,4 +640,4 @@ TEST(PresetNames, AreOfTheKindAskedFor) {
 }
 
 }  // namespace
-}  // namespace groundray
+}  // namespace groundray::spec_io_test

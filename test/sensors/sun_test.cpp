@@ -11,7 +11,7 @@
 #include "core/error.h"
 #include "test/support/margin.h"
 
-namespace groundray {
+namespace groundray::sun_test {
 namespace {
 
 using namespace std::chrono_literals;
@@ -229,4 +229,4 @@ TEST(Sun, ErrorListsEveryFault) {
 }
 
 }  // namespace
-}  // namespace groundray
+}  // namespace groundray::sun_test

@@ -11,7 +11,7 @@
 #include "core/error.h"
 #include "sensors/scan_pattern.h"
 
-namespace groundray {
+namespace groundray::table_pattern_test {
 namespace {
 
 using namespace std::chrono_literals;
@@ -181,4 +181,4 @@ TEST(TablePattern, RefusesARasterThatDoesNotFitItsFrame) {
 }
 
 }  // namespace
-}  // namespace groundray
+}  // namespace groundray::table_pattern_test

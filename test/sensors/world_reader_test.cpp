@@ -10,7 +10,7 @@
 #include "sensors/spec_io.h"
 #include "test/support/temporary_folder.h"
 
-namespace groundray {
+namespace groundray::world_reader_test {
 namespace {
 
 using groundray::testing::data_folder;
@@ -291,4 +291,4 @@ scatter: {name: b}
 }
 
 }  // namespace
-}  // namespace groundray
+}  // namespace groundray::world_reader_test

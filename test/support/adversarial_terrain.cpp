@@ -30,7 +30,7 @@ HeightGrid without(const HeightGrid& grid, auto is_hole) {
   });
 }
 
-double uniform(Seed seed, int column, int row) {
+double uniform_at(Seed seed, int column, int row) {
   return random_uniform(
              {seed, 0, static_cast<std::uint32_t>(column), static_cast<std::uint32_t>(row)})
       .x;
@@ -44,7 +44,7 @@ HeightGrid plane(glm::ivec2 samples) {
 HeightGrid hills(glm::ivec2 samples) {
   return grid_of(samples, [](int c, int r) {
     return 40 * std::sin(0.05 * c) * std::cos(0.07 * r) + 6 * std::sin(0.6 * c + 0.4 * r) +
-           uniform(Seed{3}, c, r);
+           uniform_at(Seed{3}, c, r);
   });
 }
 
@@ -84,7 +84,7 @@ void add_noise(Terrains& out) {
   const auto low_m = 8192.0F;
   const float high_m = std::nextafter(low_m, 9000.0F);
   out.push_back({"noise of one ulp at 8192 m", grid_of({65, 65}, [&](int c, int r) {
-                   return uniform(Seed{4}, c, r) < 0.5 ? low_m : high_m;
+                   return uniform_at(Seed{4}, c, r) < 0.5 ? low_m : high_m;
                  })});
 }
 
@@ -132,10 +132,10 @@ void add_large_holes(Terrains& out) {
       {"ring", without(ground, [&](int c, int r) { return !round(c, r, 38) || round(c, r, 20); })});
   out.push_back({"half", without(plane({100, 37}), [](int c, int r) { return c > 2 * r + 20; })});
   out.push_back({"archipelago", without(ground, [](int c, int r) {
-                   return uniform(Seed{8}, c / 5, r / 4) < 0.6;
+                   return uniform_at(Seed{8}, c / 5, r / 4) < 0.6;
                  })});
   out.push_back({"half of the samples",
-                 without(ground, [](int c, int r) { return uniform(Seed{9}, c, r) < 0.5; })});
+                 without(ground, [](int c, int r) { return uniform_at(Seed{9}, c, r) < 0.5; })});
   out.push_back({"holes in a fractal", with_holes(fractal(129, 5, 200, Seed{5}), 30, 5, Seed{7})});
   out.push_back(
       {"strip with holes", without(hills({90, 2}), [](int c, int r) { return c % 13 == r; })});
@@ -158,7 +158,7 @@ std::vector<NamedTerrain> planes() {
 }
 
 HeightGrid white_noise(glm::ivec2 samples, double relief_m, Seed seed) {
-  return grid_of(samples, [&](int c, int r) { return relief_m * uniform(seed, c, r); });
+  return grid_of(samples, [&](int c, int r) { return relief_m * uniform_at(seed, c, r); });
 }
 
 std::vector<NamedTerrain> adversarial_terrain() {

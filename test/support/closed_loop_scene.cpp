@@ -29,7 +29,7 @@ constexpr double radians_per_degree = std::numbers::pi / 180;
 enum class Draw : std::uint32_t { Ground, Boulder, Trunk, Pose, Visible, Mesh };
 
 // Two numbers between 0 and 1.
-glm::dvec2 uniform(Seed seed, Draw draw, std::size_t index, std::uint32_t of = 0) {
+glm::dvec2 uniform_draw(Seed seed, Draw draw, std::size_t index, std::uint32_t of = 0) {
   return random_uniform({seed, static_cast<std::uint32_t>(draw), of,
                          static_cast<std::uint32_t>(index), 0, RandomStream::Asset});
 }
@@ -70,13 +70,14 @@ TriangleMesh mesh_of(const HeightGrid& grid) {
 // A ball with some waves of its own on it.
 Model boulder(Seed seed, std::size_t number) {
   constexpr int splits = 4, waves = 6;
-  Model model = icosphere(0.35 + 0.9 * std::pow(uniform(seed, Draw::Boulder, number).x, 2), splits);
+  Model model =
+      icosphere(0.35 + 0.9 * std::pow(uniform_draw(seed, Draw::Boulder, number).x, 2), splits);
   for (glm::dvec3& p_m : model.mesh.vertices_m) {
     const glm::dvec3 direction = glm::normalize(p_m);
     double swell = 1;
     for (std::uint32_t wave = 1; wave <= waves; ++wave) {
-      const glm::dvec2 way = uniform(seed, Draw::Boulder, number, 8 + 2 * wave);
-      const glm::dvec2 size = uniform(seed, Draw::Boulder, number, 9 + 2 * wave);
+      const glm::dvec2 way = uniform_draw(seed, Draw::Boulder, number, 8 + 2 * wave);
+      const glm::dvec2 size = uniform_draw(seed, Draw::Boulder, number, 9 + 2 * wave);
       const double up = 2 * way.x - 1, turn_rad = 2 * std::numbers::pi * way.y;
       const double across = std::sqrt(1 - up * up);
       const glm::dvec3 axis(across * std::cos(turn_rad), across * std::sin(turn_rad), up);
@@ -98,12 +99,12 @@ class SceneMaker {
   ClosedLoopScene make() && {
     for (std::size_t i = 0; i < boulders; ++i) {
       Model model = boulder(seed_, i);
-      const double buried = 0.5 * uniform(seed_, Draw::Boulder, i, 1).x - 0.2;
+      const double buried = 0.5 * uniform_draw(seed_, Draw::Boulder, i, 1).x - 0.2;
       const double reach_m = glm::length(model.mesh.vertices_m.front());
       stand(std::move(model), Draw::Boulder, i, buried * reach_m);
     }
     for (std::size_t i = 0; i < trunks; ++i) {
-      const glm::dvec2 size = uniform(seed_, Draw::Trunk, i);
+      const glm::dvec2 size = uniform_draw(seed_, Draw::Trunk, i);
       stand(cylinder(0.1 + 0.2 * size.x, 4 + 4 * size.y, 32), Draw::Trunk, i, -0.4);
     }
     RayTracer rays({full_resolution_level(grid_)}, {0, 0, 0}, Tracing::Exact);
@@ -128,8 +129,8 @@ class SceneMaker {
       const double along_m = (k - 0.5 * (poses - 1)) * apart_m;
       const glm::dvec2 p(along_m, 4 * std::sin(along_m / 8));
       const auto number = static_cast<std::size_t>(k);
-      const glm::dvec2 turn = uniform(seed_, Draw::Pose, number);
-      const double roll_rad = 0.1 * (uniform(seed_, Draw::Pose, number, 1).x - 0.5);
+      const glm::dvec2 turn = uniform_draw(seed_, Draw::Pose, number);
+      const double roll_rad = 0.1 * (uniform_draw(seed_, Draw::Pose, number, 1).x - 0.5);
       X_DS.push_back({rotation_from_yaw_pitch_roll(2 * std::numbers::pi * turn.x,
                                                    0.1 * (turn.y - 0.5), roll_rad),
                       glm::dvec3(p, grid_.height_m_at(p).value_or(0) + eye_m)});
@@ -150,7 +151,7 @@ class SceneMaker {
   void stand(Model model, Draw draw, std::size_t number, double above_m) {
     glm::dvec2 p;
     for (std::uint32_t attempt = 100;; ++attempt) {
-      p = (2.0 * uniform(seed_, draw, number, attempt) - 1.0) * (half_m - 2);
+      p = (2.0 * uniform_draw(seed_, draw, number, attempt) - 1.0) * (half_m - 2);
       if (is_clear(p)) break;
     }
     const glm::dvec3 p_DO(p, grid_.height_m_at(p).value_or(0) + above_m);
@@ -185,12 +186,12 @@ std::vector<glm::dvec3> area_samples(const TriangleMesh& mesh, std::size_t count
   }
   std::vector<glm::dvec3> samples(count);
   run_pass(run_in_parallel, count, [&](std::size_t i) {
-    const double within = uniform(seed, draw, i, 0).x;
+    const double within = uniform_draw(seed, draw, i, 0).x;
     const double at_m2 = area_m2 * (static_cast<double>(i) + within) / static_cast<double>(count);
     const auto found = std::ranges::upper_bound(until_m2, at_m2);
     const auto triangle =
         std::min(static_cast<std::size_t>(found - until_m2.begin()), mesh.triangles.size() - 1);
-    const glm::dvec2 place = uniform(seed, draw, i, 1);
+    const glm::dvec2 place = uniform_draw(seed, draw, i, 1);
     const double root = std::sqrt(place.x);
     const glm::uvec3 t = mesh.triangles[triangle];
     samples[i] = (1 - root) * corner(t.x) + root * (1 - place.y) * corner(t.y) +

@@ -41,7 +41,7 @@ GroundFilterOptions options_of(std::span<char*> words) {
   return options;
 }
 
-void run(std::span<char*> arguments) {
+void filter_file(std::span<char*> arguments) {
   const groundray::NpyArray read = groundray::read_npy(arguments[0]);
   std::vector<glm::dvec3> points_m(read.cloud.rows());
   for (int axis = 0; axis < 3; ++axis) {
@@ -65,7 +65,7 @@ void run(std::span<char*> arguments) {
 int main(int argc, char** argv) {
   if (argc < 4) return 2;
   try {
-    run(std::span(argv, static_cast<std::size_t>(argc)).subspan(1));
+    filter_file(std::span(argv, static_cast<std::size_t>(argc)).subspan(1));
   } catch (const std::exception& error) {
     fmt::print(stderr, "{}\n", error.what());
     return 1;

@@ -148,7 +148,7 @@ constexpr const char* usage =
     "usage: reconstruct_closed_loop rebuild FOLDER SEED POSES RINGS COLUMNS\n"
     "       reconstruct_closed_loop evaluate FOLDER MESH\n";
 
-int run(std::span<char*> arguments) {
+int run_command(std::span<char*> arguments) {
   const std::string command = arguments.size() > 1 ? arguments[1] : "";
   if (command == "rebuild" && arguments.size() == 7) {
     rebuild_all(arguments[2], Seed{std::stoull(arguments[3])}, std::stoi(arguments[4]),
@@ -168,7 +168,7 @@ int run(std::span<char*> arguments) {
 
 int main(int argc, char** argv) {
   try {
-    return groundray::testing::run({argv, static_cast<std::size_t>(argc)});
+    return groundray::testing::run_command({argv, static_cast<std::size_t>(argc)});
   } catch (const std::exception& error) {
     fmt::print(stderr, "reconstruct_closed_loop: {}\n", error.what());
     return 1;

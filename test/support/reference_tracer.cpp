@@ -15,7 +15,7 @@ struct Line {
   Real at(Real t) const { return start + t * slope; }
 };
 
-struct Triangle {
+struct RealTriangle {
   std::array<std::array<Real, 3>, 3> corner;  // column, row, height
 
   // Height of the triangle's plane over a point, by barycentric coordinates.
@@ -39,7 +39,7 @@ Located locate(const HeightGrid& grid, Real u, Real v) {
   return {column, row, (u - column) + (v - row) > 1};
 }
 
-Triangle triangle(const HeightGrid& grid, const Located& at) {
+RealTriangle real_triangle(const HeightGrid& grid, const Located& at) {
   const auto sample = [&](int column, int row) -> std::array<Real, 3> {
     const auto index = static_cast<std::size_t>(row) * static_cast<std::size_t>(grid.columns()) +
                        static_cast<std::size_t>(column);
@@ -97,7 +97,7 @@ std::optional<ReferenceHit> trace_reference(const HeightGrid& grid, const Ray& r
     first.pass();
     const Real middle = (t + next) / 2;
     const Located at = locate(grid, u.at(middle), v.at(middle));
-    const Triangle facet = triangle(grid, at);
+    const RealTriangle facet = real_triangle(grid, at);
     const Real above = z.at(t) - facet.height(u.at(t), v.at(t));
     const Real after = z.at(next) - facet.height(u.at(next), v.at(next));
     if (above >= 0 && after < 0) {
@@ -115,7 +115,7 @@ double reference_height_m(const HeightGrid& grid, double x_m, double y_m) {
   if (u < 0 || v < 0 || u > grid.columns() - 1 || v > grid.rows() - 1) {
     return std::numeric_limits<double>::quiet_NaN();
   }
-  return static_cast<double>(triangle(grid, locate(grid, u, v)).height(u, v));
+  return static_cast<double>(real_triangle(grid, locate(grid, u, v)).height(u, v));
 }
 
 }  // namespace groundray::testing

@@ -13,7 +13,7 @@
 namespace groundray::testing {
 namespace {
 
-glm::dvec2 uniform(Seed seed, std::size_t index, std::uint32_t of = 0) {
+glm::dvec2 uniform_pair(Seed seed, std::size_t index, std::uint32_t of = 0) {
   return random_uniform(
       {seed, of, static_cast<std::uint32_t>(index >> 32), static_cast<std::uint32_t>(index)});
 }
@@ -29,7 +29,7 @@ HeightGrid fractal(int samples, double step_m, double relief_m, Seed seed) {
   const double roughness = std::exp2(-0.95);  // Hurst exponent 0.95
   double scale_m = relief_m / 2;
   const auto noise = [&](std::size_t column, std::size_t row) {
-    return (uniform(seed, row * n + column).x - 0.5) * 2 * scale_m;
+    return (uniform_pair(seed, row * n + column).x - 0.5) * 2 * scale_m;
   };
   for (std::size_t block = n - 1; block > 1; block /= 2, scale_m *= roughness) {
     const std::size_t half = block / 2;
@@ -62,7 +62,7 @@ HeightGrid fractal(int samples, double step_m, double relief_m, Seed seed) {
 HeightGrid with_holes(const HeightGrid& grid, int count, int radius, Seed seed) {
   std::vector<float> heights(grid.heights_m().begin(), grid.heights_m().end());
   for (int hole = 0; hole < count; ++hole) {
-    const glm::dvec2 place = uniform(seed, static_cast<std::size_t>(hole));
+    const glm::dvec2 place = uniform_pair(seed, static_cast<std::size_t>(hole));
     const int column = static_cast<int>(place.x * grid.columns());
     const int row = static_cast<int>(place.y * grid.rows());
     const int reach = hole % (radius + 1);
@@ -91,9 +91,9 @@ std::vector<Ray> random_rays(const HeightGrid& grid, std::size_t count, Seed see
   const glm::dvec2 extent_m = glm::dvec2(grid.columns() - 1, grid.rows() - 1) * grid.step_m();
   std::vector<Ray> rays(count);
   for (std::size_t i = 0; i < count; ++i) {
-    const glm::dvec2 place = uniform(seed, i, 0) * 1.1 - 0.05;
-    const glm::dvec2 turn = uniform(seed, i, 1);
-    const glm::dvec2 other = uniform(seed, i, 2);
+    const glm::dvec2 place = uniform_pair(seed, i, 0) * 1.1 - 0.05;
+    const glm::dvec2 turn = uniform_pair(seed, i, 1);
+    const glm::dvec2 other = uniform_pair(seed, i, 2);
     const glm::dvec2 p = grid.origin_m() + place * extent_m;
     const double ground_m = grid.height_m_at(p).value_or(grid.max_height_m());
     const double sine = 0.15 - 1.15 * turn.x * std::sqrt(turn.x);

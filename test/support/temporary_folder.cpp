@@ -6,6 +6,8 @@
 #include <stdexcept>
 #include <string>
 
+#include "apps/source_folder.h"
+
 namespace groundray::testing {
 
 TemporaryFolder::TemporaryFolder() {
@@ -19,11 +21,11 @@ TemporaryFolder::~TemporaryFolder() {
   std::filesystem::remove_all(path_, ignored);
 }
 
-std::filesystem::path data_folder() { return std::filesystem::path(GROUNDRAY_SOURCE_DIR) / "data"; }
+std::filesystem::path data_folder() { return source_folder() / "data"; }
 
 std::filesystem::path shared_data_folder() {
   if (const char* chosen = std::getenv("GROUNDRAY_SHARED_DATA")) return chosen;
-  return std::filesystem::path(GROUNDRAY_SOURCE_DIR).parent_path() / "shared/data";
+  return source_folder().parent_path() / "shared/data";
 }
 
 }  // namespace groundray::testing

@@ -12,7 +12,7 @@
 
 #include "test/support/sample_terrain.h"
 
-namespace groundray {
+namespace groundray::adsorption_test {
 namespace {
 
 using std::numbers::pi;
@@ -113,4 +113,4 @@ TEST(Adsorption, ThrownIsTheIntegralOfWhatOneDiscTakes) {
 }
 
 }  // namespace
-}  // namespace groundray
+}  // namespace groundray::adsorption_test

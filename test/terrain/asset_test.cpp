@@ -20,7 +20,7 @@
 #include "core/error.h"
 #include "terrain/byte_hash.h"
 
-namespace groundray {
+namespace groundray::asset_test {
 namespace {
 
 using ::testing::AllOf;
@@ -638,4 +638,4 @@ TEST(Asset, RefusesWhatItsKindHasNot) {
 }
 
 }  // namespace
-}  // namespace groundray
+}  // namespace groundray::asset_test

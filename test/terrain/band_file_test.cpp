@@ -10,7 +10,7 @@
 #include "test/support/geotiff.h"
 #include "test/support/temporary_folder.h"
 
-namespace groundray {
+namespace groundray::band_file_test {
 namespace {
 
 using ::testing::AllOf;
@@ -116,4 +116,4 @@ TEST(BandFile, NamesTheFileAtFault) {
 }
 
 }  // namespace
-}  // namespace groundray
+}  // namespace groundray::band_file_test

@@ -30,7 +30,7 @@
 #include "test/support/sample_terrain.h"
 #include "test/support/temporary_folder.h"
 
-namespace groundray {
+namespace groundray::certificate_test {
 namespace {
 
 using ::testing::AllOf;
@@ -584,4 +584,4 @@ TEST_F(CertificateTest, ADemThatChangesMeanwhileIsAnError) {
 }
 
 }  // namespace
-}  // namespace groundray
+}  // namespace groundray::certificate_test

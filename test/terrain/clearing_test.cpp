@@ -10,7 +10,7 @@
 #include "core/error.h"
 #include "core/random.h"
 
-namespace groundray {
+namespace groundray::clearing_test {
 namespace {
 
 using ::testing::AllOf;
@@ -105,4 +105,4 @@ TEST(Clearing, ErrorListsEveryFault) {
 }
 
 }  // namespace
-}  // namespace groundray
+}  // namespace groundray::clearing_test

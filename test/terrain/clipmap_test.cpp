@@ -19,7 +19,7 @@
 #include "test/support/sample_clipmap.h"
 #include "test/support/sample_terrain.h"
 
-namespace groundray {
+namespace groundray::clipmap_test {
 namespace {
 
 using testing::certified_tiles;
@@ -256,4 +256,4 @@ TEST(Clipmap, RefusesSettingsThatCannotBeAndSaysWhy) {
 }
 
 }  // namespace
-}  // namespace groundray
+}  // namespace groundray::clipmap_test

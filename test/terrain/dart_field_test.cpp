@@ -8,7 +8,7 @@
 #include <tuple>
 #include <vector>
 
-namespace groundray {
+namespace groundray::dart_field_test {
 namespace {
 
 // All of a dart that others can know it by.
@@ -82,4 +82,4 @@ TEST(DartField, CellsHoldPoissonNumbers) {
 }
 
 }  // namespace
-}  // namespace groundray
+}  // namespace groundray::dart_field_test

@@ -16,7 +16,7 @@
 #include "test/support/geotiff.h"
 #include "test/support/temporary_folder.h"
 
-namespace groundray {
+namespace groundray::dem_file_test {
 namespace {
 
 using testing::GeoTiff;
@@ -333,4 +333,4 @@ TEST_F(DemFileTest, TheFingerprintOfAMosaicNoticesItsParts) {
 }
 
 }  // namespace
-}  // namespace groundray
+}  // namespace groundray::dem_file_test

@@ -20,7 +20,7 @@
 #include "core/error.h"
 #include "test/support/temporary_folder.h"
 
-namespace groundray {
+namespace groundray::dem_io_test {
 namespace {
 
 using ::testing::ElementsAre;
@@ -648,4 +648,4 @@ TEST_F(SharedDem, ASrtmTileLoadsOutOfItsArchive) {
 }
 
 }  // namespace
-}  // namespace groundray
+}  // namespace groundray::dem_io_test

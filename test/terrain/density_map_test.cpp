@@ -14,7 +14,7 @@
 #include "test/support/geotiff.h"
 #include "test/support/temporary_folder.h"
 
-namespace groundray {
+namespace groundray::density_map_test {
 namespace {
 
 using ::testing::AllOf;
@@ -176,4 +176,4 @@ TEST(DensityMap, BadFilesAreNamed) {
 }
 
 }  // namespace
-}  // namespace groundray
+}  // namespace groundray::density_map_test

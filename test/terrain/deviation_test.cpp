@@ -18,7 +18,7 @@
 #include "test/support/node_oracle.h"
 #include "test/support/shuffled_runner.h"
 
-namespace groundray {
+namespace groundray::deviation_test {
 namespace {
 
 using groundray::testing::certify_slowly;
@@ -436,4 +436,4 @@ TEST(Deviation, OddBlocksAreRefused) {
 }
 
 }  // namespace
-}  // namespace groundray
+}  // namespace groundray::deviation_test

@@ -26,7 +26,7 @@
 #include "test/support/margin.h"
 #include "test/support/temporary_folder.h"
 
-namespace groundray {
+namespace groundray::drape_io_test {
 namespace {
 
 using ::testing::AllOf;
@@ -597,4 +597,4 @@ TEST_F(DrapeIo, TooManyPixelsAreRefusedWithTheSizeThatFits) {
 }
 
 }  // namespace
-}  // namespace groundray
+}  // namespace groundray::drape_io_test

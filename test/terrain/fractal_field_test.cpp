@@ -10,7 +10,7 @@
 
 #include "test/support/shuffled_runner.h"
 
-namespace groundray {
+namespace groundray::fractal_field_test {
 namespace {
 
 using Complex = std::complex<double>;
@@ -112,4 +112,4 @@ TEST(FractalField, IsTheSameForAnyRunnerAndAnotherForAnotherSeed) {
 }
 
 }  // namespace
-}  // namespace groundray
+}  // namespace groundray::fractal_field_test

@@ -9,7 +9,7 @@
 
 #include "core/error.h"
 
-namespace groundray {
+namespace groundray::gdal_fill_test {
 namespace {
 
 using ::testing::Each;
@@ -29,4 +29,4 @@ TEST(GdalFill, FillsWhatIsNearAndLeavesWhatIsFar) {
 }
 
 }  // namespace
-}  // namespace groundray
+}  // namespace groundray::gdal_fill_test

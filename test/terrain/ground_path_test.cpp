@@ -12,7 +12,7 @@
 #include "core/error.h"
 #include "core/pose.h"
 
-namespace groundray {
+namespace groundray::ground_path_test {
 namespace {
 
 using namespace std::chrono_literals;
@@ -212,4 +212,4 @@ TEST(GroundPath, AHoleUnderAWheelNamesWheelTimeAndPlace) {
 }
 
 }  // namespace
-}  // namespace groundray
+}  // namespace groundray::ground_path_test

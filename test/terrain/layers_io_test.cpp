@@ -16,7 +16,7 @@
 #include "test/support/geotiff.h"
 #include "test/support/temporary_folder.h"
 
-namespace groundray {
+namespace groundray::layers_io_test {
 namespace {
 
 using ::testing::AnyOf;
@@ -185,4 +185,4 @@ TEST_F(LayersIo, SaysWhichFileCannotBeWritten) {
 }
 
 }  // namespace
-}  // namespace groundray
+}  // namespace groundray::layers_io_test

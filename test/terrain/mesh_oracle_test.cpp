@@ -16,7 +16,7 @@
 #include "test/support/reference_tracer.h"
 #include "test/support/sample_terrain.h"
 
-namespace groundray::testing {
+namespace groundray::testing::mesh_oracle_test {
 namespace {
 
 using ::testing::ElementsAre;
@@ -218,4 +218,4 @@ TEST(MeshOracle, AMeshMustEndAtTheRimOfAHole) {
 }
 
 }  // namespace
-}  // namespace groundray::testing
+}  // namespace groundray::testing::mesh_oracle_test

@@ -7,7 +7,7 @@
 
 #include "core/random.h"
 
-namespace groundray {
+namespace groundray::periodic_image_test {
 namespace {
 
 ImageF noise(int width, int height) {
@@ -65,4 +65,4 @@ TEST(PeriodicImage, OfOnePixelIsOneValue) {
 }
 
 }  // namespace
-}  // namespace groundray
+}  // namespace groundray::periodic_image_test

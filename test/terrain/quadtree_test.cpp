@@ -19,7 +19,7 @@
 #include "test/support/shuffled_runner.h"
 #include "test/support/slow_quadtree.h"
 
-namespace groundray {
+namespace groundray::quadtree_test {
 namespace {
 
 using groundray::testing::bound_of;
@@ -270,4 +270,4 @@ TEST(Quadtree, ABoundThatIsNoneIsRefused) {
 }
 
 }  // namespace
-}  // namespace groundray
+}  // namespace groundray::quadtree_test

@@ -24,7 +24,7 @@
 #include "test/support/sample_terrain.h"
 #include "test/support/temporary_folder.h"
 
-namespace groundray {
+namespace groundray::relief_test {
 namespace {
 
 using testing::certified_tiles;
@@ -464,4 +464,4 @@ TEST(Terrain, WithReliefIsTheSameSurfaceFromAFileLargerThanMemory) {
 }
 
 }  // namespace
-}  // namespace groundray
+}  // namespace groundray::relief_test

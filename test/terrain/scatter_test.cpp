@@ -18,7 +18,7 @@
 #include "test/support/sample_terrain.h"
 #include "test/support/shuffled_runner.h"
 
-namespace groundray {
+namespace groundray::scatter_test {
 namespace {
 
 using std::numbers::pi;
@@ -418,4 +418,4 @@ TEST(Scatter, ErrorTellsHowManyAreTooMany) {
 }
 
 }  // namespace
-}  // namespace groundray
+}  // namespace groundray::scatter_test

@@ -20,7 +20,7 @@
 #include "test/support/sample_terrain.h"
 #include "test/support/temporary_folder.h"
 
-namespace groundray {
+namespace groundray::terrain_mesh_proof_test {
 namespace {
 
 using ::testing::IsEmpty;
@@ -274,4 +274,4 @@ TEST(TerrainMeshProof, ALargerToleranceOnlyLeavesSamplesOut) {
 }
 
 }  // namespace
-}  // namespace groundray
+}  // namespace groundray::terrain_mesh_proof_test

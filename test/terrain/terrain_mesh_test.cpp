@@ -20,7 +20,7 @@
 #include "test/support/sample_terrain.h"
 #include "test/support/shuffled_runner.h"
 
-namespace groundray {
+namespace groundray::terrain_mesh_test {
 namespace {
 
 using ::testing::HasSubstr;
@@ -207,4 +207,4 @@ TEST(TerrainMesh, WhatIsNoBoundOrNoBlockIsRefused) {
 }
 
 }  // namespace
-}  // namespace groundray
+}  // namespace groundray::terrain_mesh_test

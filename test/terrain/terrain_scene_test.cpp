@@ -13,7 +13,7 @@
 #include "test/support/sample_clipmap.h"
 #include "test/support/sample_terrain.h"
 
-namespace groundray {
+namespace groundray::terrain_scene_test {
 namespace {
 
 using testing::certified_tiles;
@@ -354,4 +354,4 @@ TEST(TerrainScene, LevelsThatDidNotChangeAreNotBuiltAgain) {
 }
 
 }  // namespace
-}  // namespace groundray
+}  // namespace groundray::terrain_scene_test

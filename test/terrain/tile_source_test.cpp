@@ -21,7 +21,7 @@
 #include "test/support/sample_terrain.h"
 #include "test/support/temporary_folder.h"
 
-namespace groundray {
+namespace groundray::tile_source_test {
 namespace {
 
 using namespace std::chrono_literals;
@@ -313,4 +313,4 @@ TEST_F(TileSourceTest, WhatIsPrefetchedLaterReplacesWhatWasToBe) {
 }
 
 }  // namespace
-}  // namespace groundray
+}  // namespace groundray::tile_source_test

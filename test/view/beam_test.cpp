@@ -19,7 +19,7 @@
 #include "test/support/temporary_folder.h"
 #include "test/view/sample_dataset.h"
 
-namespace groundray {
+namespace groundray::beam_test {
 namespace {
 
 using groundray::testing::SampleDataset;
@@ -172,4 +172,4 @@ TEST(Beam, TellsAllColumnsOfAnEcho) {
 }
 
 }  // namespace
-}  // namespace groundray
+}  // namespace groundray::beam_test

@@ -13,7 +13,7 @@
 
 #include "apps/view/mesh_layer.h"
 
-namespace groundray {
+namespace groundray::coarse_layer_test {
 namespace {
 
 Layer numbered_points(std::size_t count) {
@@ -207,4 +207,4 @@ TEST(CoarseLayer, ThinsASphereToOne) {
 }
 
 }  // namespace
-}  // namespace groundray
+}  // namespace groundray::coarse_layer_test

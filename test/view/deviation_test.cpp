@@ -15,7 +15,7 @@
 #include "test/support/margin.h"
 #include "test/support/sample_terrain.h"
 
-namespace groundray {
+namespace groundray::deviation_test {
 namespace {
 
 using ::testing::ElementsAre;
@@ -336,4 +336,4 @@ TEST(AgreementUntil, IsTheAgreementUnlessStopped) {
 }
 
 }  // namespace
-}  // namespace groundray
+}  // namespace groundray::deviation_test

@@ -26,7 +26,7 @@
 #include "test/support/temporary_folder.h"
 #include "test/view/sample_dataset.h"
 
-namespace groundray {
+namespace groundray::ground_texture_test {
 namespace {
 
 // The hills of the sample scene, with an orthophoto that grows redder to the east and greener to
@@ -158,4 +158,4 @@ TEST(GroundTexture, IsSharpNearTheEye) {
 }
 
 }  // namespace
-}  // namespace groundray
+}  // namespace groundray::ground_texture_test

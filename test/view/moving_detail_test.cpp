@@ -2,7 +2,7 @@
 
 #include <gtest/gtest.h>
 
-namespace groundray {
+namespace groundray::moving_detail_test {
 namespace {
 
 std::size_t points_after(MovingDetail& detail, double seconds, int pictures) {
@@ -33,4 +33,4 @@ TEST(MovingDetail, StaysWithinBounds) {
 }
 
 }  // namespace
-}  // namespace groundray
+}  // namespace groundray::moving_detail_test

@@ -17,7 +17,7 @@
 #include "test/view/opened_samples.h"
 #include "test/view/sample_dataset.h"
 
-namespace groundray {
+namespace groundray::open_faults_test {
 namespace {
 
 using ::testing::AllOf;
@@ -200,4 +200,4 @@ TEST(OpenFaults, StopsWhenAsked) {
 }
 
 }  // namespace
-}  // namespace groundray
+}  // namespace groundray::open_faults_test

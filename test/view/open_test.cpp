@@ -19,7 +19,7 @@
 #include "test/view/opened_samples.h"
 #include "test/view/sample_dataset.h"
 
-namespace groundray {
+namespace groundray::open_test {
 namespace {
 
 using ::testing::AllOf;
@@ -294,4 +294,4 @@ TEST(Open, ThinsWhatIsTooMuch) {
 }
 
 }  // namespace
-}  // namespace groundray
+}  // namespace groundray::open_test

@@ -24,7 +24,7 @@
 #include "test/support/temporary_folder.h"
 #include "test/view/sample_dataset.h"
 
-namespace groundray {
+namespace groundray::recorded_image_test {
 namespace {
 
 using groundray::testing::SampleDataset;
@@ -328,4 +328,4 @@ TEST(RecordedImage, NamesWhatIsAtFault) {
 }
 
 }  // namespace
-}  // namespace groundray
+}  // namespace groundray::recorded_image_test

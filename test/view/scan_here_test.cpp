@@ -21,7 +21,7 @@
 #include "test/support/temporary_folder.h"
 #include "test/view/sample_dataset.h"
 
-namespace groundray {
+namespace groundray::scan_here_test {
 namespace {
 
 using namespace std::chrono_literals;
@@ -255,4 +255,4 @@ TEST(ScanHere, StopsAmidASweep) {
 }
 
 }  // namespace
-}  // namespace groundray
+}  // namespace groundray::scan_here_test

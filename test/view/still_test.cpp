@@ -15,7 +15,7 @@
 #include "core/image_io.h"
 #include "test/support/temporary_folder.h"
 
-namespace groundray {
+namespace groundray::still_test {
 namespace {
 
 using ::testing::HasSubstr;
@@ -147,4 +147,4 @@ TEST(Still, NamesWhatIsNotThere) {
 }
 
 }  // namespace
-}  // namespace groundray
+}  // namespace groundray::still_test

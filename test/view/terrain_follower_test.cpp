@@ -11,7 +11,7 @@
 #include "test/support/sample_terrain.h"
 #include "test/support/temporary_folder.h"
 
-namespace groundray {
+namespace groundray::terrain_follower_test {
 namespace {
 
 using testing::TemporaryFolder;
@@ -99,4 +99,4 @@ TEST_F(Followed, IsCoarserForMoving) {
 }
 
 }  // namespace
-}  // namespace groundray
+}  // namespace groundray::terrain_follower_test

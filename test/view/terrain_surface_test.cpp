@@ -16,7 +16,7 @@
 #include "test/support/sample_clipmap.h"
 #include "test/support/sample_terrain.h"
 
-namespace groundray {
+namespace groundray::terrain_surface_test {
 namespace {
 
 using testing::certified_tiles;
@@ -172,4 +172,4 @@ TEST(TerrainSurface, SlopeIsThatOfAPlane) {
 }
 
 }  // namespace
-}  // namespace groundray
+}  // namespace groundray::terrain_surface_test

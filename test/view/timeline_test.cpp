@@ -15,7 +15,7 @@
 #include "test/support/temporary_folder.h"
 #include "test/view/sample_dataset.h"
 
-namespace groundray {
+namespace groundray::timeline_test {
 namespace {
 
 using namespace std::chrono_literals;
@@ -186,4 +186,4 @@ TEST(Timeline, PlacesWhatMovesWhereScansSawIt) {
 }
 
 }  // namespace
-}  // namespace groundray
+}  // namespace groundray::timeline_test

@@ -15,7 +15,7 @@
 #include "apps/view/view.h"
 #include "test/support/sample_terrain.h"
 
-namespace groundray {
+namespace groundray::view_proof_test {
 namespace {
 
 double wave_m(double x, double y) { return 20 * std::sin(x / 40) * std::cos(y / 55); }
@@ -98,4 +98,4 @@ TEST(ViewProof, KeepsUpWhileMoving) {
 }
 
 }  // namespace
-}  // namespace groundray
+}  // namespace groundray::view_proof_test

@@ -16,7 +16,7 @@
 #include "apps/view/off_screen_window.h"
 #include "core/error.h"
 
-namespace groundray {
+namespace groundray::view_test {
 namespace {
 
 using ::testing::HasSubstr;
@@ -317,4 +317,4 @@ TEST(View, FitsWhatIsVisible) {
 }
 
 }  // namespace
-}  // namespace groundray
+}  // namespace groundray::view_test

@@ -8,7 +8,7 @@
 #include "test/view/sample_dataset.h"
 #include "test/view/window_fixture.h"
 
-namespace groundray {
+namespace groundray::window_compare_test {
 namespace {
 
 using testing::SampleDataset;
@@ -82,4 +82,4 @@ TEST_F(WindowCompareTest, TerrainIsItsOwnTruthAfterItFollowedTheEye) {
 }
 
 }  // namespace
-}  // namespace groundray
+}  // namespace groundray::window_compare_test

@@ -22,7 +22,7 @@
 #include "test/view/sample_dataset.h"
 #include "test/view/window_fixture.h"
 
-namespace groundray {
+namespace groundray::window_files_test {
 namespace {
 
 using testing::SampleDataset;
@@ -307,4 +307,4 @@ TEST_F(WindowFilesTest, HelpTellsOfAllKeys) {
 }
 
 }  // namespace
-}  // namespace groundray
+}  // namespace groundray::window_files_test

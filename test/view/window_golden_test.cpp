@@ -14,7 +14,7 @@
 #include "test/view/sample_dataset.h"
 #include "test/view/window_fixture.h"
 
-namespace groundray {
+namespace groundray::window_golden_test {
 namespace {
 
 using testing::SampleDataset;
@@ -197,4 +197,4 @@ TEST_F(WindowGoldenTest, TextsAreNotCutOff) {
 }
 
 }  // namespace
-}  // namespace groundray
+}  // namespace groundray::window_golden_test

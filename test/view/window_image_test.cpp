@@ -9,7 +9,7 @@
 #include "test/view/sample_dataset.h"
 #include "test/view/window_fixture.h"
 
-namespace groundray {
+namespace groundray::window_image_test {
 namespace {
 
 using testing::SampleDataset;
@@ -120,4 +120,4 @@ TEST_F(WindowImageTest, ABrokenImageDoesNotHoldUpTheNext) {
 }
 
 }  // namespace
-}  // namespace groundray
+}  // namespace groundray::window_image_test

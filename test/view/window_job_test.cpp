@@ -8,7 +8,7 @@
 #include "core/error.h"
 #include "test/view/window_fixture.h"
 
-namespace groundray {
+namespace groundray::window_job_test {
 namespace {
 
 using namespace std::chrono_literals;
@@ -137,4 +137,4 @@ TEST_F(JobTest, MayGoWhileItWorks) {
 }
 
 }  // namespace
-}  // namespace groundray
+}  // namespace groundray::window_job_test

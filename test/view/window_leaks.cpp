@@ -6,7 +6,7 @@
 #include <gtest/gtest.h>
 #include <sanitizer/lsan_interface.h>
 
-namespace groundray {
+namespace groundray::window_leaks {
 namespace {
 
 struct LeakCheck : public ::testing::Environment {
@@ -17,6 +17,6 @@ struct LeakCheck : public ::testing::Environment {
     ::testing::AddGlobalTestEnvironment(new LeakCheck);
 
 }  // namespace
-}  // namespace groundray
+}  // namespace groundray::window_leaks
 #endif
 #endif

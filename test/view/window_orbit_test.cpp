@@ -6,7 +6,7 @@
 
 #include "apps/view/window/orbit.h"
 
-namespace groundray {
+namespace groundray::window_orbit_test {
 namespace {
 
 constexpr double tolerance_m = 1e-6;  // coordinates of 5e6 m are known to 1e-9
@@ -73,4 +73,4 @@ TEST(Orbit, KnowsHowWideAPixelIs) {
 }
 
 }  // namespace
-}  // namespace groundray
+}  // namespace groundray::window_orbit_test

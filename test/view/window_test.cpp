@@ -20,7 +20,7 @@
 #include "test/view/sample_dataset.h"
 #include "test/view/window_fixture.h"
 
-namespace groundray {
+namespace groundray::window_test {
 namespace {
 
 using testing::SampleDataset;
@@ -343,4 +343,4 @@ TEST_F(WindowTest, SavesPicturesOfAnySize) {
 }
 
 }  // namespace
-}  // namespace groundray
+}  // namespace groundray::window_test

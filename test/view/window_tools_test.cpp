@@ -12,7 +12,7 @@
 #include "test/view/sample_dataset.h"
 #include "test/view/window_fixture.h"
 
-namespace groundray {
+namespace groundray::window_tools_test {
 namespace {
 
 using testing::SampleDataset;
@@ -397,4 +397,4 @@ TEST_F(WindowToolsTest, LevelsFollowAPlaceThatIsClicked) {
 }
 
 }  // namespace
-}  // namespace groundray
+}  // namespace groundray::window_tools_test

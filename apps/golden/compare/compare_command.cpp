@@ -2,6 +2,7 @@
 
 #include <fmt/format.h>
 
+#include <CLI/CLI.hpp>
 #include <array>
 #include <string>
 #include <utility>
@@ -21,37 +22,6 @@ namespace {
 
 namespace fs = std::filesystem;
 
-struct ImageFlags {
-  PngMeaning png = PngMeaning::Picture;
-  double depth_unit_m = 1;
-  std::vector<std::string> channels;
-
-  void add(CLI::App* group, const std::string& prefix) {
-    add_words(group, "--" + prefix + "png", png, "What the numbers of a PNG are",
-              Words<PngMeaning>{{"picture", PngMeaning::Picture},
-                                {"kitti_depth", PngMeaning::KittiDepth},
-                                {"millimetre_depth", PngMeaning::MillimetreDepth},
-                                {"kitti_flow", PngMeaning::KittiFlow},
-                                {"label", PngMeaning::Label}});
-    group->add_option("--" + prefix + "depth-unit-m", depth_unit_m, "Unit of depths, in metres")
-        ->check(CLI::PositiveNumber);
-    group
-        ->add_option("--" + prefix + "channels", channels,
-                     "THEIRS=OURS: what channels are, in the names of docs/formats.md")
-        ->delimiter(',');
-  }
-  ImageReading reading() const {
-    ImageReading reading{.png = png, .depth_unit_m = depth_unit_m, .names = {}};
-    for (const std::string& channel : channels) {
-      const std::size_t equals = channel.find('=');
-      if (equals == std::string::npos)
-        throw Error("--channels: '{}' must be THEIRS=OURS, such as nn.X=N.X", channel);
-      reading.names[channel.substr(0, equals)] = channel.substr(equals + 1);
-    }
-    return reading;
-  }
-};
-
 void add_dem_flags(CLI::App* group, const std::string& prefix, DemOptions& options) {
   group->add_option("--" + prefix + "nodata", options.nodata, "A height that means 'none'");
   group->add_option("--" + prefix + "reproject-to", options.reproject_to,
@@ -61,6 +31,37 @@ void add_dem_flags(CLI::App* group, const std::string& prefix, DemOptions& optio
 }  // namespace
 
 struct CompareCommand::Options {
+  struct ImageFlags {
+    PngMeaning png = PngMeaning::Picture;
+    double depth_unit_m = 1;
+    std::vector<std::string> channels;
+
+    void add(CLI::App* group, const std::string& prefix) {
+      add_words(group, "--" + prefix + "png", png, "What the numbers of a PNG are",
+                Words<PngMeaning>{{"picture", PngMeaning::Picture},
+                                  {"kitti_depth", PngMeaning::KittiDepth},
+                                  {"millimetre_depth", PngMeaning::MillimetreDepth},
+                                  {"kitti_flow", PngMeaning::KittiFlow},
+                                  {"label", PngMeaning::Label}});
+      group->add_option("--" + prefix + "depth-unit-m", depth_unit_m, "Unit of depths, in metres")
+          ->check(CLI::PositiveNumber);
+      group
+          ->add_option("--" + prefix + "channels", channels,
+                       "THEIRS=OURS: what channels are, in the names of docs/formats.md")
+          ->delimiter(',');
+    }
+    ImageReading reading() const {
+      ImageReading reading{.png = png, .depth_unit_m = depth_unit_m, .names = {}};
+      for (const std::string& channel : channels) {
+        const std::size_t equals = channel.find('=');
+        if (equals == std::string::npos)
+          throw Error("--channels: '{}' must be THEIRS=OURS, such as nn.X=N.X", channel);
+        reading.names[channel.substr(0, equals)] = channel.substr(equals + 1);
+      }
+      return reading;
+    }
+  };
+
   fs::path reference, other;
   fs::path out = "out/compare";
   std::optional<Subject> subject;
@@ -158,6 +159,8 @@ CompareCommand::CompareCommand(CLI::App& app)
 }
 
 CompareCommand::~CompareCommand() = default;
+
+bool CompareCommand::is_asked_for() const { return command_->parsed(); }
 
 Verdict CompareCommand::run() const {
   const fs::path& out = options_->out;

@@ -1,11 +1,14 @@
 #pragma once
 
-#include <CLI/CLI.hpp>
 #include <filesystem>
 #include <memory>
 #include <optional>
 
 #include "apps/golden/report.h"
+
+namespace CLI {
+class App;
+}
 
 namespace groundray::golden {
 
@@ -16,7 +19,7 @@ class CompareCommand {
   explicit CompareCommand(CLI::App& app);
   ~CompareCommand();
 
-  bool is_asked_for() const { return command_->parsed(); }
+  bool is_asked_for() const;
 
   /// Writes report.html and report.json, and prints the figures.
   /// @return what was found: Failed if a limit is broken or they have nothing in common.

@@ -24,7 +24,7 @@
 namespace groundray::golden {
 namespace {
 
-constexpr double nothing = std::numeric_limits<double>::quiet_NaN();
+constexpr double no_height = std::numeric_limits<double>::quiet_NaN();
 constexpr double same_place = 1e-6;  // of a cell: what geotransforms lose in text and floats
 
 /// Heights on the reference's grid; NaN where there is none.
@@ -49,7 +49,7 @@ struct Heights {
 };
 
 /// What is held against what.
-struct Pair {
+struct DemPair {
   Heights reference, other;
   std::size_t beyond = 0;        // samples that lie beyond the other's extent
   std::size_t interpolated = 0;  // samples between the other's
@@ -76,10 +76,10 @@ double height_m_at(const HeightGrid& grid, glm::dvec2 at) {
   return plane.height_m + plane.u_slope_m * at.x + plane.v_slope_m * at.y;
 }
 
-Pair paired(const Dem& reference, const Dem& other) {
+DemPair paired(const Dem& reference, const Dem& other) {
   const HeightGrid& grid = reference.grid;
-  Pair pair{{grid.frame(), {grid.heights_m().begin(), grid.heights_m().end()}},
-            {grid.frame(), std::vector<double>(grid.heights_m().size(), nothing)}};
+  DemPair pair{{grid.frame(), {grid.heights_m().begin(), grid.heights_m().end()}},
+               {grid.frame(), std::vector<double>(grid.heights_m().size(), no_height)}};
   const glm::dvec2 shift_m(reference.origin_w_m - other.origin_w_m);
   const glm::ivec2 last = other.grid.frame().samples - 1;
   std::size_t index = 0;
@@ -108,7 +108,7 @@ glm::dvec2 gradient(const Heights& heights, int column, int row) {
       const int x = column + times * dx, y = row + times * dy;
       const bool is_in =
           x >= 0 && y >= 0 && x < heights.frame.samples.x && y < heights.frame.samples.y;
-      return is_in ? heights(x, y) : nothing;
+      return is_in ? heights(x, y) : no_height;
     };
     const double before = height_at(-1), here = height_at(0), after = height_at(1);
     if (std::isnan(before)) return (after - here) / step_m;
@@ -124,7 +124,7 @@ struct Sample {
   glm::dvec2 slope{0};  // of the reference
 };
 
-std::vector<Sample> samples_of(const Pair& pair) {
+std::vector<Sample> samples_of(const DemPair& pair) {
   std::vector<Sample> samples;
   for (int row = 0; row < pair.samples().y; ++row) {
     for (int column = 0; column < pair.samples().x; ++column) {
@@ -136,15 +136,15 @@ std::vector<Sample> samples_of(const Pair& pair) {
   return samples;
 }
 
-std::vector<double> errors_of(const std::vector<Sample>& samples) {
+std::vector<double> height_errors(const std::vector<Sample>& samples) {
   std::vector<double> errors_m(samples.size());
   std::ranges::transform(samples, errors_m.begin(), &Sample::error_m);
   return errors_m;
 }
 
-void tell_vertical(const Pair& pair, const glm::dvec3& origin_w_m,
+void tell_vertical(const DemPair& pair, const glm::dvec3& origin_w_m,
                    const std::vector<Sample>& samples, Section& into) {
-  const std::vector<double> errors_m = errors_of(samples);
+  const std::vector<double> errors_m = height_errors(samples);
   const ErrorFigures figures = figures_of(errors_m);
   tell_errors(into, "height", "m", errors_m);
   tell(into, "height: median error", figures.median, "m");
@@ -187,7 +187,7 @@ void tell_by_slope(const std::vector<Sample>& samples, Section& into) {
 }
 
 /// Of both triangles of each cell that both surfaces have.
-void tell_slopes(const Pair& pair, Section& into) {
+void tell_slopes(const DemPair& pair, Section& into) {
   std::vector<double> angles_deg, slopes_deg;
   const GridFrame& frame = pair.reference.frame;
   for (int row = 0; row + 1 < pair.samples().y; ++row) {
@@ -209,7 +209,7 @@ void tell_slopes(const Pair& pair, Section& into) {
   tell_sizes(into, "angle between triangles", "deg", angles_deg);
 }
 
-void tell_holes(const Pair& pair, Section& into) {
+void tell_holes(const DemPair& pair, Section& into) {
   std::size_t only_reference = 0, only_other = 0, both = 0;
   for (std::size_t i = 0; i < pair.other.m.size(); ++i) {
     const bool is_hole = std::isnan(pair.reference.m[i]),
@@ -253,7 +253,7 @@ std::optional<Shift> fitted_shift(const std::vector<Sample>& samples) {
   return Shift{glm::dvec2(solution), 1 - left / about_mean};
 }
 
-void suspect_shift(const Pair& pair, const std::vector<Sample>& samples, Section& into) {
+void suspect_shift(const DemPair& pair, const std::vector<Sample>& samples, Section& into) {
   const auto fit = fitted_shift(samples);
   if (!fit || !(fit->explained > 0.5)) return;
   const glm::dvec2 cells = glm::abs(fit->shift_m * pair.reference.frame.cells_per_m);
@@ -277,7 +277,7 @@ ImageLayer layer_of(const Heights& heights) {
   return layer;
 }
 
-void draw(const Pair& pair, Section& into) {
+void draw(const DemPair& pair, Section& into) {
   const ImageLayer reference = layer_of(pair.reference), other = layer_of(pair.other);
   Image<double> differences = other.values;
   for (std::size_t i = 0; i < pair.other.m.size(); ++i)
@@ -285,7 +285,7 @@ void draw(const Pair& pair, Section& into) {
   draw_layers(reference, other, differences, " m", into);
 }
 
-void say_how(const Pair& pair, const Dem& other, Section& into) {
+void say_how(const DemPair& pair, const Dem& other, Section& into) {
   into.text +=
       fmt::format("{} x {} samples of the reference, {} x {} of the other; ", pair.samples().x,
                   pair.samples().y, other.grid.columns(), other.grid.rows());
@@ -305,8 +305,8 @@ std::string warp_words(const Dem& reference, const std::string& file) {
   return fmt::format("-t_srs \"$(gdalsrsinfo -o wkt2_2018 --single-line '{}')\"", file);
 }
 
-void check_crs(const Dem& reference, const Dem& other, const std::string& reference_file,
-               const std::string& other_file) {
+void check_dem_crs(const Dem& reference, const Dem& other, const std::string& reference_file,
+                   const std::string& other_file) {
   if (reference.crs_wkt.empty() || other.crs_wkt.empty() || reference.crs_wkt == other.crs_wkt)
     return;
   const bool has_code = reference.crs_name.find("(EPSG:") != std::string::npos;
@@ -324,7 +324,7 @@ Section compare_dems(const std::filesystem::path& reference, const std::filesyst
                      const DemReadings& readings) {
   const Dem of_reference = load_dem(reference, readings.reference);
   const Dem of_other = load_dem(other, readings.other);
-  check_crs(of_reference, of_other, reference.string(), other.string());
+  check_dem_crs(of_reference, of_other, reference.string(), other.string());
   Section section;
   try {
     section = compare_dems(of_reference, of_other,
@@ -343,7 +343,7 @@ Section compare_dems(const std::filesystem::path& reference, const std::filesyst
 }
 
 Section compare_dems(const Dem& reference, const Dem& other, const std::string& title) {
-  const Pair pair = paired(reference, other);
+  const DemPair pair = paired(reference, other);
   const std::vector<Sample> samples = samples_of(pair);
   if (samples.empty()) {
     const glm::dvec2 from = reference.grid.origin_m() + glm::dvec2(reference.origin_w_m);

@@ -67,15 +67,9 @@ std::string every_caption(int step) {
   return step > 1 ? fmt::format("; one pixel of {0} x {0}", step) : "";
 }
 
-double length(std::span<const double> value) {
-  double squares = 0;
-  for (const double part : value) squares += part * part;
-  return std::sqrt(squares);
-}
-
 /// What of a pixel is shown by false colours; NaN for nothing.
 double shown(const ImageLayer& layer, std::span<const double> value) {
-  const double size = value.size() > 1 ? length(value) : value[0];
+  const double size = value.size() > 1 ? length_of(value) : value[0];
   const bool is_there = std::isfinite(size) && (layer.kind != LayerKind::Depth || is_depth(size));
   return is_there ? size : std::numeric_limits<double>::quiet_NaN();
 }

@@ -8,7 +8,7 @@
 namespace groundray::golden {
 namespace {
 
-constexpr double unknown = std::numeric_limits<double>::quiet_NaN();
+constexpr double no_figure = std::numeric_limits<double>::quiet_NaN();
 
 std::vector<double> sizes_of(const std::vector<double>& errors) {
   std::vector<double> sizes(errors.size());
@@ -18,7 +18,7 @@ std::vector<double> sizes_of(const std::vector<double>& errors) {
 
 /// As quantile, but puts the values in another order.
 double take_quantile(std::vector<double>& values, double share) {
-  if (values.empty()) return unknown;
+  if (values.empty()) return no_figure;
   const double place = share * static_cast<double>(values.size() - 1);
   const auto rank = static_cast<std::ptrdiff_t>(place);
   const auto at = values.begin() + rank;
@@ -40,15 +40,15 @@ double quantile(std::vector<double> values, double share) { return take_quantile
 
 ErrorFigures figures_of(const std::vector<double>& errors) {
   if (errors.empty()) {
-    return {.mean = unknown,
-            .rms = unknown,
-            .mean_size = unknown,
-            .median = unknown,
-            .median_size = unknown,
-            .p95_size = unknown,
-            .p99_size = unknown,
-            .largest = unknown,
-            .nmad = unknown};
+    return {.mean = no_figure,
+            .rms = no_figure,
+            .mean_size = no_figure,
+            .median = no_figure,
+            .median_size = no_figure,
+            .p95_size = no_figure,
+            .p99_size = no_figure,
+            .largest = no_figure,
+            .nmad = no_figure};
   }
   ErrorFigures figures{.count = errors.size()};
   double sum = 0, sizes = 0, squares = 0;

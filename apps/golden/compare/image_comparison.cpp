@@ -18,10 +18,10 @@ namespace groundray::golden {
 namespace {
 
 // What the light's tests use.
-constexpr std::array<std::string_view, 2> of_tests{"StdError", "Samples"};
+constexpr std::array<std::string_view, 2> test_layers{"StdError", "Samples"};
 
 bool is_of_tests(const ImageLayer& layer) {
-  return std::ranges::find(of_tests, layer.name) != of_tests.end();
+  return std::ranges::find(test_layers, layer.name) != test_layers.end();
 }
 
 std::string names_of(const ImageFile& file) {

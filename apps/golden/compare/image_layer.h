@@ -1,6 +1,7 @@
 #pragma once
 
 #include <cmath>
+#include <span>
 #include <string>
 #include <vector>
 
@@ -20,6 +21,13 @@ enum class LayerKind {
 
 /// Whether a depth is one: neither 0 nor one of the large numbers that stand for nothing.
 inline bool is_depth(double depth_m) { return std::abs(depth_m) < 1e9 && depth_m != 0; }
+
+/// Returns the length of the vector that a pixel's channels make up.
+inline double length_of(std::span<const double> pixel) {
+  double squares = 0;
+  for (const double value : pixel) squares += value * value;
+  return std::sqrt(squares);
+}
 
 struct NamedChannel {
   std::string name;

@@ -28,12 +28,6 @@ bool is_finite(Pixel pixel) {
   return std::ranges::all_of(pixel, [](double value) { return std::isfinite(value); });
 }
 
-double length(Pixel pixel) {
-  double squares = 0;
-  for (const double value : pixel) squares += value * value;
-  return std::sqrt(squares);
-}
-
 double distance(Pixel a, Pixel b) {
   double squares = 0;
   for (std::size_t k = 0; k < a.size(); ++k) squares += (a[k] - b[k]) * (a[k] - b[k]);
@@ -156,7 +150,7 @@ double angle_deg(Pixel a, Pixel b) {
 void compare_normals(const ImageLayer& reference, const ImageLayer& other, Section& into) {
   const std::string& name = reference.name;
   const Errors errors = errors_of(
-      reference, other, [](Pixel pixel) { return is_finite(pixel) && length(pixel) > 0; },
+      reference, other, [](Pixel pixel) { return is_finite(pixel) && length_of(pixel) > 0; },
       angle_deg);
   if (!tell_presence(name, errors, into)) return;
   tell_sizes(into, name + ": angle", "deg", errors.all);
@@ -259,7 +253,7 @@ void compare_flows(const ImageLayer& reference, const ImageLayer& other, Section
   for (std::size_t i = 0; i < errors.all.size(); ++i) {
     const glm::ivec2 at = errors.place(i);
     const Pixel a = reference.values.at(at.x, at.y), b = other.values.at(at.x, at.y);
-    if (errors.all[i] > 3 && errors.all[i] > 0.05 * length(a)) ++outliers;
+    if (errors.all[i] > 3 && errors.all[i] > 0.05 * length_of(a)) ++outliers;
     reversed_px += std::hypot(a[0] + b[0], a[1] + b[1]);
     error_px += errors.all[i];
   }

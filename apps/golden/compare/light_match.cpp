@@ -17,7 +17,7 @@
 namespace groundray::golden {
 namespace {
 
-constexpr std::size_t colours = 3;
+constexpr std::size_t colour_channels = 3;
 // Two values that were rounded to floats; less is no difference.
 constexpr double float_rounding = 1.2e-7;
 
@@ -44,7 +44,7 @@ struct Light {
   }
 };
 
-struct Pair {
+struct LightPair {
   Light reference, other;
 
   double off(int x, int y, std::size_t k) const {
@@ -80,7 +80,7 @@ template <typename Each>
 void each_value(const Image<double>& image, const Each& each) {
   for (int y = 0; y < image.height(); ++y) {
     for (int x = 0; x < image.width(); ++x) {
-      for (std::size_t k = 0; k < colours; ++k) each(x, y, k);
+      for (std::size_t k = 0; k < colour_channels; ++k) each(x, y, k);
     }
   }
 }
@@ -93,7 +93,7 @@ struct Values {
   std::vector<double> deviations;
 };
 
-Values test_values(const Pair& pair, double level) {
+Values test_values(const LightPair& pair, double level) {
   Values result;
   const Image<double>& size = pair.reference.light->values;
   each_value(size, [&](int x, int y, std::size_t k) {
@@ -120,7 +120,7 @@ Values test_values(const Pair& pair, double level) {
 }
 
 /// How many standard errors the mean of some pixels is off.
-double deviations_of(const Pair& pair, std::size_t k, int x0, int y0, int width, int height) {
+double deviations_of(const LightPair& pair, std::size_t k, int x0, int y0, int width, int height) {
   const Image<double>& size = pair.reference.light->values;
   double off = 0, variance = 0, rounding = 0;
   for (int y = y0; y < std::min(y0 + height, size.height()); ++y) {
@@ -156,13 +156,13 @@ void hold_values(const Values& values, const Significance& significance, const s
        static_cast<double>(values.all - values.tests));
 }
 
-void test_blocks(const Pair& pair, double level, const std::string& because, Section& into) {
+void test_blocks(const LightPair& pair, double level, const std::string& because, Section& into) {
   const Image<double>& size = pair.reference.light->values;
   double worst = 0;
   std::size_t blocks = 0;
   for (int y = 0; y < size.height(); y += block_px) {
     for (int x = 0; x < size.width(); x += block_px) {
-      for (std::size_t k = 0; k < colours; ++k, ++blocks)
+      for (std::size_t k = 0; k < colour_channels; ++k, ++blocks)
         worst = std::max(worst, deviations_of(pair, k, x, y, block_px, block_px));
     }
   }
@@ -170,13 +170,13 @@ void test_blocks(const Pair& pair, double level, const std::string& because, Sec
        "standard errors", normal_limit(level, blocks), because);
 }
 
-void test_channels(const Pair& pair, double level, const std::string& because, Section& into) {
+void test_channels(const LightPair& pair, double level, const std::string& because, Section& into) {
   const Image<double>& size = pair.reference.light->values;
   constexpr std::array names{"R", "G", "B"};
-  for (std::size_t k = 0; k < colours; ++k) {
+  for (std::size_t k = 0; k < colour_channels; ++k) {
     hold(into, fmt::format("RGB: mean of {} over the image", names[k]),
          deviations_of(pair, k, 0, 0, size.width(), size.height()), "standard errors",
-         normal_limit(level, colours), because);
+         normal_limit(level, colour_channels), because);
   }
 }
 
@@ -184,7 +184,7 @@ void test_channels(const Pair& pair, double level, const std::string& because, S
 
 void match_light(const ImageFile& reference, const ImageFile& other,
                  const Significance& significance, Section& into) {
-  const Pair pair{Light(reference), Light(other)};
+  const LightPair pair{Light(reference), Light(other)};
   if (pair.reference.error == nullptr && pair.other.error == nullptr) return;
   const std::string because = fmt::format(
       "significance {} of all tests of the kind (Šidák), from the standard errors of {}",

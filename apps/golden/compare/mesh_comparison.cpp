@@ -139,8 +139,8 @@ void list_largest(Section& into, const Way& way) {
   into.tables.push_back(std::move(table));
 }
 
-void check_crs(const std::filesystem::path& reference, const Georeference& of_reference,
-               const std::filesystem::path& other, const Georeference& of_other) {
+void check_mesh_crs(const std::filesystem::path& reference, const Georeference& of_reference,
+                    const std::filesystem::path& other, const Georeference& of_other) {
   if (of_reference.crs_name.empty() || of_other.crs_name.empty()) return;
   if (of_reference.crs_name == of_other.crs_name) return;
   throw Error(
@@ -169,7 +169,7 @@ Section compare_meshes(const std::filesystem::path& reference, const std::filesy
                        const MeshFineness& fineness) {
   const MeshFile of_reference = read_mesh(reference);
   MeshFile of_other = read_mesh(other);
-  check_crs(reference, of_reference.georeference, other, of_other.georeference);
+  check_mesh_crs(reference, of_reference.georeference, other, of_other.georeference);
   const bool both_say = says_where(of_reference.georeference) && says_where(of_other.georeference);
   if (both_say) {
     const glm::dvec3 shift_m =

@@ -12,7 +12,7 @@
 namespace groundray::golden {
 namespace {
 
-constexpr std::uint32_t none = std::numeric_limits<std::uint32_t>::max();
+constexpr std::uint32_t no_first = std::numeric_limits<std::uint32_t>::max();
 constexpr std::size_t most_returns = 16;  // of a pulse: sensors report up to five
 
 /// Numbers groups in the order of their first member.
@@ -83,11 +83,11 @@ Pulses pulses_by(const Scan& scan, const std::vector<std::uint32_t>& groups,
 
 std::vector<std::uint32_t> firsts_of(const std::vector<glm::dvec3>& directions) {
   const DirectionTree tree(directions);
-  std::vector<std::uint32_t> firsts(directions.size(), none);
+  std::vector<std::uint32_t> firsts(directions.size(), no_first);
   for (std::uint32_t i = 0; i < firsts.size(); ++i) {
-    if (firsts[i] != none) continue;
+    if (firsts[i] != no_first) continue;
     tree.for_each_within(directions[i], same_pulse_rad, [&](std::uint32_t other, double) {
-      if (firsts[other] == none) firsts[other] = i;
+      if (firsts[other] == no_first) firsts[other] = i;
     });
     firsts[i] = i;  // also if it is no direction
   }

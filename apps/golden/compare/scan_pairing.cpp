@@ -57,7 +57,7 @@ struct Ring {
   std::vector<std::pair<double, std::uint32_t>> pulses;
 };
 
-constexpr double turn_rad = 2 * std::numbers::pi;
+constexpr double full_turn_rad = 2 * std::numbers::pi;
 
 /// What pairs pulses of a ring: their time, or their azimuth from 0 to a turn.
 std::vector<double> places_of(const Pulses& pulses, PairingRule rule) {
@@ -65,7 +65,7 @@ std::vector<double> places_of(const Pulses& pulses, PairingRule rule) {
   std::vector<double> azimuths;
   for (const glm::dvec3& d : pulses.directions) {
     const double azimuth_rad = std::atan2(d.y, d.x);
-    azimuths.push_back(azimuth_rad < 0 ? azimuth_rad + turn_rad : azimuth_rad);
+    azimuths.push_back(azimuth_rad < 0 ? azimuth_rad + full_turn_rad : azimuth_rad);
   }
   return azimuths;
 }
@@ -123,7 +123,7 @@ Candidates candidates_in_rings(const Pulses& reference, const Pulses& other,
   for (const auto& [number, ring] : reference_rings) {
     const auto same = other_rings.find(number);
     if (same == other_rings.end()) continue;
-    for (const double shift : {0., -turn_rad, turn_rad}) {
+    for (const double shift : {0., -full_turn_rad, full_turn_rad}) {
       if (shift != 0 && is_by_time) break;
       add_from_ring(ring, same->second, pairs.tolerance, shift, reference.size(), candidates);
     }

@@ -55,9 +55,9 @@ Difference differences(const std::vector<double>& values, const std::vector<doub
   return found;
 }
 
-void draw(const std::string& what, const std::vector<double>& values,
-          const std::vector<double>& expected, const Difference& found, const Columns& columns,
-          Section& into) {
+void draw_difference(const std::string& what, const std::vector<double>& values,
+                     const std::vector<double>& expected, const Difference& found,
+                     const Columns& columns, Section& into) {
   double widest = 0;
   for (const double tolerance : found.tolerance) {
     if (std::isfinite(tolerance)) widest = std::max(widest, 2 * tolerance);
@@ -147,7 +147,7 @@ void check_rows(const RowsCheck& check, const std::string& because, const Column
        .limit = found.tolerance[found.worst],
        .because = "",
        .verdict = Verdict::Told});
-  draw(what, values, expected, found, columns, into);
+  draw_difference(what, values, expected, found, columns, into);
 }
 
 void check_figure(const FigureCheck& check, const std::string& because, const Columns& columns,

@@ -17,7 +17,7 @@ constexpr double significance = 0.01;  // of each kind of test, as Mitsuba's tes
 // Below it a mean and an image, both stored as floats, do not tell a difference.
 constexpr double float_rounding = 2.4e-7;
 
-const Columns::Column& column_of(const Columns& columns, const std::string& name) {
+const Columns::Column& required_column(const Columns& columns, const std::string& name) {
   const Columns::Column* column = columns.find(name);
   if (column == nullptr) throw Error("there is no column {}", name);
   return *column;
@@ -92,8 +92,8 @@ Image<double> image_of(const std::vector<double>& values, glm::ivec2 size_px) {
   return image;
 }
 
-void draw(const std::string& name, const Channel& channel, const std::vector<double>& deviations,
-          Section& into) {
+void draw_channel(const std::string& name, const Channel& channel,
+                  const std::vector<double>& deviations, Section& into) {
   const auto [low, high] = finite_range(channel.mean);
   tell(into, name + ": structural similarity, an aid to the eye",
        structural_similarity(image_of(channel.mean, channel.size_px),
@@ -121,7 +121,7 @@ void Moments::add(const Columns& product) {
   if (product.size_px != mean_.size_px) throw Error("its size differs from run to run");
   ++runs_;
   for (std::size_t k = 0; k < names_.size(); ++k) {
-    const auto& values = column_of(product, names_[k]).values;
+    const auto& values = required_column(product, names_[k]).values;
     auto& means = mean_.all[2 * k].values;
     auto& squares = mean_.all[2 * k + 1].values;
     for (std::size_t i = 0; i < values.size(); ++i) {  // Welford (1962)
@@ -154,10 +154,11 @@ void check_statistically(const StatisticalCheck& check, const std::string& becau
   std::size_t beyond = 0;
   double of_blocks = 0, of_channels = 0;
   for (const std::string& name : check.columns) {
-    const Channel channel{column_of(image, name).values, column_of(moments, "Mean_" + name).values,
-                          column_of(moments, "Variance_" + name).values, image.size_px};
-    refuse_unsound(column_of(moments, "Mean_" + name));
-    refuse_unsound(column_of(moments, "Variance_" + name));
+    const Channel channel{required_column(image, name).values,
+                          required_column(moments, "Mean_" + name).values,
+                          required_column(moments, "Variance_" + name).values, image.size_px};
+    refuse_unsound(required_column(moments, "Mean_" + name));
+    refuse_unsound(required_column(moments, "Variance_" + name));
     std::vector<double> deviations(image.rows);
     for (int y = 0; y < image.size_px.y; ++y) {
       for (int x = 0; x < image.size_px.x; ++x)
@@ -169,7 +170,7 @@ void check_statistically(const StatisticalCheck& check, const std::string& becau
     of_channels = std::max(of_channels, channel.deviations(0, 0, image.size_px.x, image.size_px.y));
     tell(into, name + ": would be noticed if all of it were off by",
          100 * noticeable_share(channel, normal_limit(significance, check.columns.size())), "%");
-    draw(name, channel, deviations, into);
+    draw_channel(name, channel, deviations, into);
   }
   hold(into, fmt::format("values more than {:.2f} standard deviations off", limit),
        static_cast<double>(beyond), fmt::format("of {}", tests),

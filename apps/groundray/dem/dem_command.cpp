@@ -2,6 +2,7 @@
 
 #include <unistd.h>
 
+#include <CLI/CLI.hpp>
 #include <algorithm>
 #include <array>
 #include <cmath>
@@ -26,8 +27,6 @@ namespace {
 // Less is a sag of a thousandth of a millimetre in a metre: no ground has it, and it takes long.
 constexpr double least_curvature_per_m = 1e-5, most_curvature_per_m = 1e3;
 
-enum class FilterPreset { None, Ground, Air };
-
 // What the machine has: who takes more may be ended by the system without a word.
 std::size_t machine_bytes() {
   const auto pages = sysconf(_SC_PHYS_PAGES), page_bytes = sysconf(_SC_PAGESIZE);
@@ -38,6 +37,8 @@ std::size_t machine_bytes() {
 }  // namespace
 
 struct DemCommand::Options {
+  enum class FilterPreset { None, Ground, Air };
+
   CLI::App* command = nullptr;
   ScanOptions scans;
   DemRequest request;

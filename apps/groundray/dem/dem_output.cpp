@@ -18,7 +18,7 @@ namespace {
 
 namespace fs = std::filesystem;
 
-constexpr float nan = std::numeric_limits<float>::quiet_NaN();
+constexpr float no_height = std::numeric_limits<float>::quiet_NaN();
 
 template <typename T>
 std::vector<float> numbers(const std::vector<T>& values) {
@@ -59,8 +59,8 @@ float slope_along(const DemLayers& layers, std::ptrdiff_t i, int place, int coun
   const auto height_m = [&](std::ptrdiff_t at) {
     return layers.elevation_m[static_cast<std::size_t>(at)];
   };
-  const float before_m = place > 0 ? height_m(i - stride) : nan;
-  const float after_m = place + 1 < count ? height_m(i + stride) : nan;
+  const float before_m = place > 0 ? height_m(i - stride) : no_height;
+  const float after_m = place + 1 < count ? height_m(i + stride) : no_height;
   const auto step = static_cast<float>(step_m);
   if (!std::isnan(before_m) && !std::isnan(after_m)) return (after_m - before_m) / (2 * step);
   return (std::isnan(after_m) ? height_m(i) - before_m : after_m - height_m(i)) / step;
@@ -91,7 +91,7 @@ void set_slopes(DemLayers& layers) {
       const float x = slope_along(layers, i, column, samples.x, 1, layers.frame.step_m.x);
       const float y = slope_along(layers, i, row, samples.y, samples.x, layers.frame.step_m.y);
       layers.slope_rad[static_cast<std::size_t>(i)] =
-          std::isnan(layers.elevation_m[static_cast<std::size_t>(i)]) ? nan
+          std::isnan(layers.elevation_m[static_cast<std::size_t>(i)]) ? no_height
                                                                       : std::atan(std::hypot(x, y));
     }
   }

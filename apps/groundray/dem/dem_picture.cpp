@@ -16,7 +16,7 @@ namespace groundray {
 namespace {
 
 constexpr int panel_width = 600, gap = 8;
-const Colour nothing(0.12, 0.14, 0.2), filled(1, 0.6, 0.2);
+const Colour empty_colour(0.12, 0.14, 0.2), filled_colour(1, 0.6, 0.2);
 
 // Samples as pixels: several pixels for each of a small DEM, every so many samples of a large one.
 class PanelLayout {
@@ -121,8 +121,8 @@ void draw_shades(Image8& image, const PanelLayout& layout, const DemLayers& laye
       const glm::ivec2 at = layout.sample(x, y);
       const auto light = shading.light(at);
       const bool is_filled = layers.source[shading.index(at)] == HeightSource::Filled;
-      const Colour tint = is_filled ? filled : Colour(1);
-      paint(image, left + x, y, light ? *light * tint : nothing);
+      const Colour tint = is_filled ? filled_colour : Colour(1);
+      paint(image, left + x, y, light ? *light * tint : empty_colour);
     }
   }
 }
@@ -143,7 +143,7 @@ Image8 draw_dem(const DemLayers& layers, const std::vector<float>& error_m, Pict
   for (int y = 0; y < layout.size().y; ++y) {
     for (int x = 0; x < width; ++x) {
       const float value = values[shading.index(layout.sample(x, y))];
-      Colour colour = nothing;
+      Colour colour = empty_colour;
       if (std::isfinite(value))
         colour =
             has_errors ? error_colour(value / scale.most_m) : range_colour(value / scale.most_m);

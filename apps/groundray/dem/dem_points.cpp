@@ -22,7 +22,7 @@ struct BeamErrors {
   float bias_sd_m = 0;
 };
 
-BeamErrors errors_of(const glm::dvec3& beam_m, double range_sd_m, const PointNoise& noise) {
+BeamErrors beam_errors(const glm::dvec3& beam_m, double range_sd_m, const PointNoise& noise) {
   if (noise.beams == BeamOrigin::Above) {
     return {{.sd_m = static_cast<float>(range_sd_m),
              .across_sd_m = static_cast<float>(noise.across_sd_m)},
@@ -109,7 +109,7 @@ bool LidarPoints::next(LidarBlock& block) {
   points.across_sd_m.reserve(size);
   for (std::size_t i = 0; i < size; ++i) {
     const BeamErrors errors =
-        errors_of(input.points_m[i] - input.origins_m[i], input.sd_m[i], noise_);
+        beam_errors(input.points_m[i] - input.origins_m[i], input.sd_m[i], noise_);
     points.sd_m.push_back(errors.noise.sd_m);
     points.lean.push_back(errors.noise.lean);
     points.bias_sd_m.push_back(errors.bias_sd_m);

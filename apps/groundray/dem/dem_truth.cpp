@@ -12,12 +12,13 @@
 namespace groundray {
 namespace {
 
-constexpr float nan = std::numeric_limits<float>::quiet_NaN();
+constexpr float unknown = std::numeric_limits<float>::quiet_NaN();
 
 double share_within(const std::vector<double>& squares, double sds) {
   const auto within =
       std::ranges::count_if(squares, [sds](double square) { return square <= sds * sds; });
-  return squares.empty() ? nan : static_cast<double>(within) / static_cast<double>(squares.size());
+  return squares.empty() ? unknown
+                         : static_cast<double>(within) / static_cast<double>(squares.size());
 }
 
 void set_normalised(HeightErrors& errors, const std::vector<double>& squares) {
@@ -31,8 +32,8 @@ void set_normalised(HeightErrors& errors, const std::vector<double>& squares) {
   errors.within_2sd = share_within(squares, 2);
 }
 
-HeightErrors errors_of(std::string name, const TruthComparison& all,
-                       const std::function<bool(std::size_t)>& is_asked) {
+HeightErrors height_errors(std::string name, const TruthComparison& all,
+                           const std::function<bool(std::size_t)>& is_asked) {
   std::vector<double> errors_m, squares;
   for (std::size_t i = 0; i < all.error_m.size(); ++i) {
     if (std::isnan(all.error_m[i]) || !is_asked(i)) continue;
@@ -72,8 +73,8 @@ TruthComparison compare_with_truth(const DemLayers& layers, const Georeference& 
   const GridFrame& frame = layers.frame;
   const glm::dvec3 apart_m = georeference.origin_w_m - truth.origin_w_m;
   TruthComparison comparison{.errors = {},
-                             .error_m = std::vector<float>(layers.elevation_m.size(), nan),
-                             .normalised = std::vector<float>(layers.elevation_m.size(), nan)};
+                             .error_m = std::vector<float>(layers.elevation_m.size(), unknown),
+                             .normalised = std::vector<float>(layers.elevation_m.size(), unknown)};
   for (int row = 0; row < frame.samples.y; ++row) {
     for (int column = 0; column < frame.samples.x; ++column) {
       const std::size_t i =
@@ -92,11 +93,11 @@ TruthComparison compare_with_truth(const DemLayers& layers, const Georeference& 
     return [&layers, source](std::size_t i) { return layers.source[i] == source; };
   };
   const auto is_measured = [&](std::size_t i) { return layers.source[i] != HeightSource::Filled; };
-  comparison.errors = {errors_of("measured", comparison, is_measured),
-                       errors_of("lidar", comparison, of(HeightSource::Lidar)),
-                       errors_of("stereo", comparison, of(HeightSource::Stereo)),
-                       errors_of("fused", comparison, of(HeightSource::Fused)),
-                       errors_of("filled", comparison, of(HeightSource::Filled))};
+  comparison.errors = {height_errors("measured", comparison, is_measured),
+                       height_errors("lidar", comparison, of(HeightSource::Lidar)),
+                       height_errors("stereo", comparison, of(HeightSource::Stereo)),
+                       height_errors("fused", comparison, of(HeightSource::Fused)),
+                       height_errors("filled", comparison, of(HeightSource::Filled))};
   return comparison;
 }
 

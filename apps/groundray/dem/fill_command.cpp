@@ -2,6 +2,7 @@
 
 #include <fmt/format.h>
 
+#include <CLI/CLI.hpp>
 #include <cmath>
 #include <cstddef>
 #include <cstdint>
@@ -29,8 +30,6 @@ namespace groundray {
 namespace {
 
 namespace fs = std::filesystem;
-
-enum class Method { Tension, Cgal, Gdal, Telea, NavierStokes };
 
 // Shows how far filling is, and stops it when asked to.
 Work shown_work(std::optional<Progress>& progress) {
@@ -95,6 +94,8 @@ void print_bounds(const FillTally& tally) {
 }  // namespace
 
 struct FillCommand::Options {
+  enum class Method { Tension, Cgal, Gdal, Telea, NavierStokes };
+
   CLI::App* command = nullptr;
   fs::path dem, out, sd_out, bound;
   DemOptions reading;

@@ -1,5 +1,7 @@
 #include "apps/groundray/dem/fill_options.h"
 
+#include <CLI/CLI.hpp>
+
 #include "apps/scan/number_checks.h"
 #include "apps/scan/word_option.h"
 

@@ -1,10 +1,13 @@
 #pragma once
 
-#include <CLI/CLI.hpp>
 #include <cstddef>
 #include <optional>
 
 #include "reconstruction/dem/dem_fill.h"
+
+namespace CLI {
+class App;
+}
 
 namespace groundray {
 

@@ -17,7 +17,7 @@ namespace groundray {
 namespace {
 
 constexpr int largest_px = 640;  // of one panel's sides
-constexpr int gap = 8;
+constexpr int panel_gap = 8;
 
 using ColourAt = std::function<Colour(int, int)>;
 
@@ -93,10 +93,10 @@ Image8 draw_image_preview(const Exposure* light, const ImageTruth* truth) {
   const int w = (width + stride - 1) / stride, h = (height + stride - 1) / stride;
   const int columns = panels.size() > 2 ? 2 : static_cast<int>(panels.size());
   const int rows = (static_cast<int>(panels.size()) + columns - 1) / columns;
-  Image8 picture(columns * (w + gap) - gap, rows * (h + gap) - gap, 3);
+  Image8 picture(columns * (w + panel_gap) - panel_gap, rows * (h + panel_gap) - panel_gap, 3);
   std::ranges::fill(picture.values(), std::uint8_t{255});
   for (int i = 0; i < static_cast<int>(panels.size()); ++i) {
-    const int left = i % columns * (w + gap), top = i / columns * (h + gap);
+    const int left = i % columns * (w + panel_gap), top = i / columns * (h + panel_gap);
     for (int y = 0; y < h; ++y) {
       for (int x = 0; x < w; ++x)
         paint(picture, left + x, top + y,

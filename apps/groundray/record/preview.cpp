@@ -15,7 +15,7 @@
 namespace groundray {
 namespace {
 
-constexpr int width = 900;
+constexpr int preview_width = 900;
 constexpr int gap = 8;
 
 // The range below which a share of the echoes lies.
@@ -75,7 +75,7 @@ void draw_ranges(Image8& image, const PointCloud& scan, const RangeRows& rows, d
   for (std::size_t i = 0; i < scan.rows(); ++i) {
     if (std::isnan(range_m[i])) continue;
     const double turn = 0.5 - std::atan2(y[i], x[i]) / (2 * std::numbers::pi);
-    const int column = std::min(static_cast<int>(turn * width), width - 1);
+    const int column = std::min(static_cast<int>(turn * preview_width), preview_width - 1);
     for (int k = 0; k < rows.band; ++k)
       paint(image, column, rows.row(scan, i) + k, range_colour(range_m[i] / far_m));
   }
@@ -88,13 +88,13 @@ struct MapWindow {
   int top;
 
   glm::dvec2 point(int x, int y) const {
-    const glm::dvec2 share((x + 0.5) / width * 2 - 1, 1 - (y + 0.5) / width * 2);
+    const glm::dvec2 share((x + 0.5) / preview_width * 2 - 1, 1 - (y + 0.5) / preview_width * 2);
     return centre_m + share * half_m;
   }
   glm::ivec2 pixel(glm::dvec2 p) const {
     const glm::dvec2 share = (p - centre_m) / half_m;
-    return {static_cast<int>(std::floor((share.x + 1) / 2 * width)),
-            top + static_cast<int>(std::floor((1 - share.y) / 2 * width))};
+    return {static_cast<int>(std::floor((share.x + 1) / 2 * preview_width)),
+            top + static_cast<int>(std::floor((1 - share.y) / 2 * preview_width))};
   }
 };
 
@@ -103,10 +103,10 @@ struct MapWindow {
 class HeightLattice {
  public:
   HeightLattice(const MapWindow& window, const Ground& ground, int reach)
-      : reach_(reach), side_(width + 2 * reach) {
+      : reach_(reach), side_(preview_width + 2 * reach) {
     heights_m_.reserve(static_cast<std::size_t>(side_) * static_cast<std::size_t>(side_));
-    for (int y = -reach; y < width + reach; ++y) {
-      for (int x = -reach; x < width + reach; ++x) {
+    for (int y = -reach; y < preview_width + reach; ++y) {
+      for (int x = -reach; x < preview_width + reach; ++x) {
         heights_m_.push_back(ground.height_m_at(window.point(x, y))
                                  .value_or(std::numeric_limits<double>::quiet_NaN()));
       }
@@ -126,12 +126,12 @@ void draw_hillshade(Image8& image, const MapWindow& window, const Ground& ground
   const glm::dvec3 sun =
       glm::normalize(glm::dvec3(-1, 1, 1.4));  // from the north-west, as maps have it
   constexpr int farthest = 32;                 // pixels; cells of more show as facets
-  const double pixel_m = 2 * window.half_m / width;
+  const double pixel_m = 2 * window.half_m / preview_width;
   const int reach = static_cast<int>(std::clamp(
       std::ceil(0.5 * std::abs(ground.frame().step_m.x) / pixel_m), 1.0, double{farthest}));
   const HeightLattice heights_m(window, ground, reach);
-  for (int y = 0; y < width; ++y) {
-    for (int x = 0; x < width; ++x) {
+  for (int y = 0; y < preview_width; ++y) {
+    for (int x = 0; x < preview_width; ++x) {
       const glm::dvec3 up(heights_m.at(x - reach, y) - heights_m.at(x + reach, y),
                           heights_m.at(x, y + reach) - heights_m.at(x, y - reach),
                           2 * reach * pixel_m);
@@ -178,7 +178,7 @@ void draw_sensor(Image8& image, const MapWindow& window, const Pose& X_DS) {
 Image8 draw_preview(const PointCloud& scan, const PlacedLidar& lidar, const Ground& ground,
                     std::int64_t frame) {
   const RangeRows rows(scan, lidar.spec.lidar.pattern);
-  Image8 image(width, rows.height + gap + width, 3);
+  Image8 image(preview_width, rows.height + gap + preview_width, 3);
   const auto range_m = scan.column<double>("range_true");
   const double far_m = std::max(quantile_m(range_m, 0.95), 1.0);
   const Pose X_DS = lidar.X_DS.pose_at(lidar.lidar.pattern().stamp(frame));

@@ -1,5 +1,6 @@
 #include "apps/groundray/run/run_commands.h"
 
+#include <CLI/CLI.hpp>
 #include <cstdint>
 #include <filesystem>
 #include <optional>

@@ -14,11 +14,11 @@
 #include <numeric>
 
 #include "apps/view/window/orbit.h"
+#include "apps/view/window/style.h"
 
 namespace groundray {
 namespace {
 
-constexpr int drag_begins_px = 4;
 constexpr int rest_ms = 250;
 constexpr int flight_ms = 16;
 constexpr double turn_rad_px = 0.006;

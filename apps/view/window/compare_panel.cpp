@@ -13,14 +13,11 @@
 #include <algorithm>
 
 #include "apps/view/window/histogram_plot.h"
+#include "apps/view/window/style.h"
 #include "core/error.h"
 
 namespace groundray {
 namespace {
-
-constexpr int progress_steps = 1000;
-
-QString text_of(const std::string& text) { return QString::fromStdString(text); }
 
 FactTable::Facts facts_of(const Comparison& comparison) {
   const DeviationFigures& figures = comparison.deviation.figures;
@@ -45,7 +42,7 @@ FactTable::Facts facts_of(const Comparison& comparison) {
 void fill(QComboBox& box, const std::vector<std::string>& names) {
   const QString before = box.currentText();
   box.clear();
-  for (const std::string& name : names) box.addItem(text_of(name));
+  for (const std::string& name : names) box.addItem(QString::fromStdString(name));
   const int index = box.findText(before);
   if (index >= 0) box.setCurrentIndex(index);
 }
@@ -111,7 +108,7 @@ void ComparePanel::offer(const std::vector<std::string>& layers, std::vector<Tru
 
 void ComparePanel::choose(const std::string& layer, const std::string& truth) {
   for (const auto& [box, name] : {std::pair(layer_, layer), {truth_, truth}}) {
-    const int index = box->findText(text_of(name));
+    const int index = box->findText(QString::fromStdString(name));
     if (index >= 0) box->setCurrentIndex(index);
   }
 }
@@ -166,7 +163,8 @@ void ComparePanel::compare_chosen() {
 }
 
 void ComparePanel::show_comparison(const Comparison& comparison) {
-  title_->setText(text_of(fmt::format("{}  against  {}", comparison.layer, comparison.truth)));
+  title_->setText(
+      QString::fromStdString(fmt::format("{}  against  {}", comparison.layer, comparison.truth)));
   const double end_m = comparison.deviation.figures.p95_m;
   const double colours_m = end_m > 0 ? end_m : 1;
   plot_->show_histogram(comparison.histogram, {-colours_m, colours_m});

@@ -8,7 +8,7 @@ namespace groundray {
 namespace {
 
 constexpr int row_px = 14;
-constexpr int margin_px = 6;
+constexpr int strip_margin_px = 6;
 
 QColor sensor_colour(std::size_t sensor) {
   return QColor::fromHsv(static_cast<int>((200 + sensor * 67) % 360), 150, 230);
@@ -44,14 +44,14 @@ int EventStrip::names_width() const {
   for (const RecordedSensor& sensor : timeline_->sensors()) {
     width = std::max(width, fontMetrics().horizontalAdvance(QString::fromStdString(sensor.name)));
   }
-  return width + 2 * margin_px;
+  return width + 2 * strip_margin_px;
 }
 
 double EventStrip::x_of(std::chrono::nanoseconds time) const {
   const double span = static_cast<double>((timeline_->end() - timeline_->begin()).count());
   const double share =
       span > 0 ? static_cast<double>((time - timeline_->begin()).count()) / span : 0;
-  return names_width() + share * (width() - names_width() - margin_px);
+  return names_width() + share * (width() - names_width() - strip_margin_px);
 }
 
 void EventStrip::paintEvent(QPaintEvent*) {
@@ -62,10 +62,10 @@ void EventStrip::paintEvent(QPaintEvent*) {
     const int top = 2 + static_cast<int>(i) * row_px;
     const RecordedSensor& sensor = timeline_->sensors()[i];
     painter.setPen(palette().text().color());
-    painter.drawText(QRect(margin_px, top, names_width(), row_px), Qt::AlignVCenter,
+    painter.drawText(QRect(strip_margin_px, top, names_width(), row_px), Qt::AlignVCenter,
                      QString::fromStdString(sensor.name));
     painter.setPen(palette().mid().color());
-    painter.drawLine(names_width(), top + row_px / 2, width() - margin_px, top + row_px / 2);
+    painter.drawLine(names_width(), top + row_px / 2, width() - strip_margin_px, top + row_px / 2);
     const auto current = timeline_->current(i, time_);
     double last_x = -1;
     for (std::size_t k = 0; k < sensor.frames.size(); ++k) {
@@ -83,7 +83,7 @@ void EventStrip::paintEvent(QPaintEvent*) {
 
 void EventStrip::go(int x) {
   if (timeline_ == nullptr || !went_) return;
-  const int room = width() - names_width() - margin_px;
+  const int room = width() - names_width() - strip_margin_px;
   const double share =
       room > 0 ? std::clamp(static_cast<double>(x - names_width()) / room, 0.0, 1.0) : 0;
   const double span = static_cast<double>((timeline_->end() - timeline_->begin()).count());

@@ -7,16 +7,13 @@
 #include <glm/vec3.hpp>
 
 #include "apps/view/colour_table.h"
+#include "apps/view/window/style.h"
 
 namespace groundray {
 namespace {
 
-constexpr int margin_px = 8;
+constexpr int plot_margin_px = 8;
 constexpr int ticks = 5;
-
-QColor colour_of(const glm::dvec3& colour) {
-  return QColor::fromRgbF(colour.r, colour.g, colour.b);
-}
 
 }  // namespace
 
@@ -39,8 +36,8 @@ void HistogramPlot::paintEvent(QPaintEvent*) {
   painter.fillRect(rect(), palette().base());
   if (!histogram_ || histogram_->counts.empty()) return;
   const QFontMetrics metrics = painter.fontMetrics();
-  const QRectF plot(margin_px, margin_px, width() - 2 * margin_px,
-                    height() - 2 * margin_px - metrics.height() - 4);
+  const QRectF plot(plot_margin_px, plot_margin_px, width() - 2 * plot_margin_px,
+                    height() - 2 * plot_margin_px - metrics.height() - 4);
   const std::vector<std::size_t>& counts = histogram_->counts;
   const double most = static_cast<double>(
       std::max<std::size_t>(1, *std::max_element(counts.begin(), counts.end())));

@@ -20,8 +20,6 @@ namespace {
 constexpr int name_role = Qt::UserRole;
 const QString one_colour = QStringLiteral("one colour");
 
-QString text_of(const std::string& text) { return QString::fromStdString(text); }
-
 QString kind_text(LayerKind kind) {
   switch (kind) {
     case LayerKind::Terrain:
@@ -65,7 +63,7 @@ class LayerTree : public QTreeWidget {
   }
 };
 
-QDoubleSpinBox* number_box(QDoubleSpinBox* box, double least, double most, int decimals) {
+QDoubleSpinBox* set_up_number_box(QDoubleSpinBox* box, double least, double most, int decimals) {
   box->setDecimals(decimals);  // first: it rounds the ends
   box->setRange(least, most);
   box->setKeyboardTracking(false);
@@ -136,9 +134,9 @@ QWidget* LayerPanel::build_looks() {
   form->addRow("Colour by", column_);
   constexpr double any = 1e38;
   constexpr int any_decimals = 60;
-  low_ = number_box(new EndBox, -any, any, any_decimals);
+  low_ = set_up_number_box(new EndBox, -any, any, any_decimals);
   low_->setObjectName("range_low");
-  high_ = number_box(new EndBox, -any, any, any_decimals);
+  high_ = set_up_number_box(new EndBox, -any, any, any_decimals);
   high_->setObjectName("range_high");
   range_ = new QWidget;
   auto* ends = new QHBoxLayout(range_);
@@ -151,7 +149,7 @@ QWidget* LayerPanel::build_looks() {
   opacity_->setObjectName("opacity");
   opacity_->setRange(0, 100);
   form->addRow("Opacity", opacity_);
-  point_size_ = number_box(new QDoubleSpinBox, 1, 32, 1);
+  point_size_ = set_up_number_box(new QDoubleSpinBox, 1, 32, 1);
   point_size_->setSuffix(" px");
   form->addRow("Point size", point_size_);
   wireframe_ = new QCheckBox("Wireframe");
@@ -224,14 +222,14 @@ QTreeWidgetItem* LayerPanel::branch(const QStringList& path) {
 }
 
 void LayerPanel::add_leaf(const Layer& layer) {
-  QStringList path = text_of(layer.name).split('/');
+  QStringList path = QString::fromStdString(layer.name).split('/');
   const QString last = path.takeLast();
   auto* item = new QTreeWidgetItem(branch(path), {last, kind_text(layer.kind)});
-  item->setData(0, name_role, text_of(layer.name));
+  item->setData(0, name_role, QString::fromStdString(layer.name));
   item->setFlags(item->flags() | Qt::ItemIsUserCheckable);
   item->setCheckState(0, layer.visible ? Qt::Checked : Qt::Unchecked);
   QStringList facts;
-  for (const std::string& fact : layer.facts) facts << text_of(fact);
+  for (const std::string& fact : layer.facts) facts << QString::fromStdString(fact);
   item->setToolTip(0, facts.join('\n'));
   for (QTreeWidgetItem* above = item->parent(); above != nullptr; above = above->parent()) {
     update_branch(above);
@@ -263,7 +261,8 @@ void LayerPanel::select(const std::string& layer) {
   is_filling_ = true;
   const auto found = tree_->findItems("*", Qt::MatchWildcard | Qt::MatchRecursive);
   for (QTreeWidgetItem* item : found) {
-    if (item->data(0, name_role).toString() != text_of(layer) || layer.empty()) continue;
+    if (item->data(0, name_role).toString() != QString::fromStdString(layer) || layer.empty())
+      continue;
     tree_->setCurrentItem(item);
   }
   is_filling_ = false;
@@ -304,7 +303,7 @@ void LayerPanel::show_looks() {
   point_size_->setValue(layer->point_size_px);
   point_size_->setEnabled(has_points_alone(*layer));
   QStringList facts;
-  for (const std::string& fact : layer->facts) facts << text_of(fact);
+  for (const std::string& fact : layer->facts) facts << QString::fromStdString(fact);
   facts_->setText(facts.join('\n'));
   is_filling_ = false;
 }
@@ -313,8 +312,10 @@ void LayerPanel::show_columns(const Layer& layer) {
   column_->clear();
   column_->addItem(one_colour, QString());
   for (const LayerColumn& column : layer.columns) {
-    const QString unit = column.unit.empty() ? QString() : text_of(" [" + column.unit + "]");
-    column_->addItem(text_of(column.name) + unit, text_of(column.name));
+    const QString unit =
+        column.unit.empty() ? QString() : QString::fromStdString(" [" + column.unit + "]");
+    column_->addItem(QString::fromStdString(column.name) + unit,
+                     QString::fromStdString(column.name));
     if (column.name == layer.coloured_by) column_->setCurrentIndex(column_->count() - 1);
   }
 }

@@ -5,18 +5,15 @@
 #include <QPainter>
 #include <cmath>
 
+#include "apps/view/window/style.h"
+
 namespace groundray {
 namespace {
 
-constexpr int margin_px = 6;
+constexpr int legend_margin_px = 6;
 constexpr int band_px = 12;
 constexpr int band_ticks = 5;
 constexpr int few_ticks = 3;  // where there is no room for more
-
-QColor colour_of(const glm::dvec3& colour) {
-  return QColor::fromRgbF(std::clamp(colour.r, 0.0, 1.0), std::clamp(colour.g, 0.0, 1.0),
-                          std::clamp(colour.b, 0.0, 1.0));
-}
 
 double value_at(const ImageLegend& legend, double share) {
   return legend.is_logarithmic && legend.low > 0
@@ -44,7 +41,7 @@ void LegendStrip::show_legend(std::optional<ImageLegend> legend) {
 }
 
 QSize LegendStrip::sizeHint() const {
-  return {300, band_px + fontMetrics().height() + 3 * margin_px / 2};
+  return {300, band_px + fontMetrics().height() + 3 * legend_margin_px / 2};
 }
 
 void LegendStrip::paintEvent(QPaintEvent*) {
@@ -58,7 +55,7 @@ void LegendStrip::paintEvent(QPaintEvent*) {
 }
 
 void LegendStrip::paint_band(QPainter& painter) const {
-  const QRect band(margin_px, margin_px / 2, width() - 2 * margin_px, band_px);
+  const QRect band(legend_margin_px, legend_margin_px / 2, width() - 2 * legend_margin_px, band_px);
   QLinearGradient colours(band.topLeft(), band.topRight());
   if (legend_->colours.empty()) {
     colours.setColorAt(0, Qt::black);
@@ -86,14 +83,14 @@ void LegendStrip::paint_band(QPainter& painter) const {
 }
 
 void LegendStrip::paint_categories(QPainter& painter) const {
-  int x = margin_px;
-  int y = margin_px / 2;
+  int x = legend_margin_px;
+  int y = legend_margin_px / 2;
   const int line_px = painter.fontMetrics().height() + 1;
   for (const ImageLegend::Category& each : legend_->categories) {
     const QString text = QString::fromStdString(each.name);
     const int wide_px = band_px + 4 + painter.fontMetrics().horizontalAdvance(text) + 10;
-    if (x + wide_px > width() && x > margin_px) {
-      x = margin_px;
+    if (x + wide_px > width() && x > legend_margin_px) {
+      x = legend_margin_px;
       y += line_px;
     }
     if (y + line_px > height() + 4) return;  // the tool tip has them all

@@ -7,10 +7,11 @@
 #include <cmath>
 #include <cstring>
 
+#include "apps/view/window/style.h"
+
 namespace groundray {
 namespace {
 
-constexpr int drag_begins_px = 4;
 constexpr double most_zoom = 200;
 
 QImage::Format format_of(const Image8& picture) {

@@ -10,7 +10,9 @@ namespace {
 
 const QString key = QStringLiteral("recent");
 
-QString text_of(const std::filesystem::path& path) { return QString::fromStdString(path.string()); }
+QString path_text(const std::filesystem::path& path) {
+  return QString::fromStdString(path.string());
+}
 
 std::filesystem::path whole_path(const std::filesystem::path& path) {
   std::error_code fault;
@@ -23,7 +25,7 @@ std::filesystem::path whole_path(const std::filesystem::path& path) {
 
 RecentFiles::RecentFiles(std::filesystem::path file) : file_(std::move(file)) {
   if (file_.empty()) return;
-  const QSettings kept(text_of(file_), QSettings::IniFormat);
+  const QSettings kept(path_text(file_), QSettings::IniFormat);
   for (const QString& path : kept.value(key).toStringList()) {
     if (paths_.size() < most_files && !path.isEmpty()) paths_.emplace_back(path.toStdString());
   }
@@ -45,8 +47,8 @@ void RecentFiles::clear() {
 void RecentFiles::keep() const {
   if (file_.empty()) return;
   QStringList texts;
-  for (const std::filesystem::path& path : paths_) texts << text_of(path);
-  QSettings kept(text_of(file_), QSettings::IniFormat);
+  for (const std::filesystem::path& path : paths_) texts << path_text(path);
+  QSettings kept(path_text(file_), QSettings::IniFormat);
   kept.setValue(key, texts);
 }
 

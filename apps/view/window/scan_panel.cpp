@@ -18,11 +18,11 @@
 
 #include "apps/view/cloud_layer.h"
 #include "apps/view/window/line_layer.h"
+#include "apps/view/window/style.h"
 
 namespace groundray {
 namespace {
 
-constexpr int progress_steps = 1000;
 constexpr double marker_m = 1.5;
 const QString no_ground = QStringLiteral("Open a scene or a DEM: its ground can be scanned.");
 const QString bare_ground = QStringLiteral(

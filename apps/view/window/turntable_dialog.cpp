@@ -25,7 +25,7 @@ constexpr int most_pictures = 9999;  // of four digits
 constexpr int pictures_at_first = 36;
 constexpr int largest_px = 16384;
 
-QSpinBox* number_box(const char* name, int least, int most, int value) {
+QSpinBox* whole_number_box(const char* name, int least, int most, int value) {
   auto* box = new QSpinBox;
   box->setObjectName(name);
   box->setRange(least, most);
@@ -47,10 +47,10 @@ TurntableDialog::TurntableDialog(const Look& begin, glm::ivec2 size_px, Hooks ho
 }
 
 void TurntableDialog::build(glm::ivec2 size_px) {
-  pictures_ = number_box("turntable_pictures", 2, most_pictures, pictures_at_first);
+  pictures_ = whole_number_box("turntable_pictures", 2, most_pictures, pictures_at_first);
   pictures_->setToolTip("Of a whole turn: 36 are one for every ten degrees");
-  width_ = number_box("turntable_width", 16, largest_px, size_px.x);
-  height_ = number_box("turntable_height", 16, largest_px, size_px.y);
+  width_ = whole_number_box("turntable_width", 16, largest_px, size_px.x);
+  height_ = whole_number_box("turntable_height", 16, largest_px, size_px.y);
   for (QSpinBox* box : {width_, height_}) box->setSuffix(" px");
   asked_ = new QWidget;
   auto* form = new QFormLayout(asked_);

@@ -16,7 +16,7 @@
 #include "core/error.h"
 #include "test/support/temporary_folder.h"
 
-namespace groundray {
+namespace groundray::dataset_reader_test {
 namespace {
 
 using ::testing::AllOf;
@@ -156,4 +156,4 @@ TEST(DatasetReader, FaultsNameFileLineAndRule) {
 }
 
 }  // namespace
-}  // namespace groundray
+}  // namespace groundray::dataset_reader_test

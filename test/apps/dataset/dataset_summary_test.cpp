@@ -13,7 +13,7 @@
 #include "core/error.h"
 #include "test/support/temporary_folder.h"
 
-namespace groundray {
+namespace groundray::dataset_summary_test {
 namespace {
 
 using ::testing::AllOf;
@@ -68,4 +68,4 @@ TEST(DatasetSummary, CountsAnyNumberOfFramesAtOnce) {
 }
 
 }  // namespace
-}  // namespace groundray
+}  // namespace groundray::dataset_summary_test

@@ -13,7 +13,7 @@
 #include "core/product_io.h"
 #include "test/support/temporary_folder.h"
 
-namespace groundray {
+namespace groundray::dataset_text_test {
 namespace {
 
 using ::testing::ElementsAre;
@@ -135,4 +135,4 @@ TEST(DatasetText, ThatIsNoneIsAnError) {
 }
 
 }  // namespace
-}  // namespace groundray
+}  // namespace groundray::dataset_text_test

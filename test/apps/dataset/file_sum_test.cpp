@@ -12,7 +12,7 @@
 #include "core/product_io.h"
 #include "test/support/temporary_folder.h"
 
-namespace groundray {
+namespace groundray::file_sum_test {
 namespace {
 
 using ::testing::HasSubstr;
@@ -57,4 +57,4 @@ TEST(FileSum, OfAFileThatCannotBeReadIsAnError) {
 }
 
 }  // namespace
-}  // namespace groundray
+}  // namespace groundray::file_sum_test

@@ -9,7 +9,7 @@
 #include <string>
 #include <utility>
 
-namespace groundray {
+namespace groundray::frame_entry_test {
 namespace {
 
 using std::chrono::nanoseconds;
@@ -124,4 +124,4 @@ TEST(NamedSum, IsOfAFileInAFolderOfTheDataset) {
 }
 
 }  // namespace
-}  // namespace groundray
+}  // namespace groundray::frame_entry_test

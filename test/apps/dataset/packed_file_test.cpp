@@ -12,7 +12,7 @@
 #include "core/error.h"
 #include "test/support/temporary_folder.h"
 
-namespace groundray {
+namespace groundray::packed_file_test {
 namespace {
 
 using ::testing::HasSubstr;
@@ -78,4 +78,4 @@ TEST(PackedFile, WhatIsCutShortOrDamagedIsRefused) {
 }
 
 }  // namespace
-}  // namespace groundray
+}  // namespace groundray::packed_file_test

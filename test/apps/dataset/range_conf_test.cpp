@@ -11,7 +11,7 @@
 
 #include "core/error.h"
 
-namespace groundray {
+namespace groundray::range_conf_test {
 namespace {
 
 using ::testing::AllOf;
@@ -74,4 +74,4 @@ TEST(RangeConf, OfOtherLinesNothingIsMade) {
 }
 
 }  // namespace
-}  // namespace groundray
+}  // namespace groundray::range_conf_test

@@ -13,7 +13,7 @@
 #include "core/error.h"
 #include "test/support/temporary_folder.h"
 
-namespace groundray {
+namespace groundray::scan_files_test {
 namespace {
 
 using ::testing::AllOf;
@@ -190,4 +190,4 @@ TEST(ScanFiles, FarPosesGetAnOriginInWholeMetres) {
 }
 
 }  // namespace
-}  // namespace groundray
+}  // namespace groundray::scan_files_test

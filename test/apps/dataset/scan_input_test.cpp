@@ -18,7 +18,7 @@
 #include "core/product_io.h"
 #include "test/support/temporary_folder.h"
 
-namespace groundray {
+namespace groundray::scan_input_test {
 namespace {
 
 using ::testing::AllOf;
@@ -222,4 +222,4 @@ TEST(ScanInput, CloudsWithoutAGridAreSentToAnotherWay) {
 }
 
 }  // namespace
-}  // namespace groundray
+}  // namespace groundray::scan_input_test

@@ -6,7 +6,7 @@
 #include <cstdint>
 #include <vector>
 
-namespace groundray {
+namespace groundray::shard_test {
 namespace {
 
 TEST(Shard, IsReadFromItsText) {
@@ -56,4 +56,4 @@ TEST(Shard, SharesOutSensorsOfFewFrames) {
 }
 
 }  // namespace
-}  // namespace groundray
+}  // namespace groundray::shard_test

@@ -13,7 +13,7 @@
 #include <utility>
 #include <vector>
 
-namespace groundray {
+namespace groundray::background_writer_test {
 namespace {
 
 using namespace std::chrono_literals;
@@ -92,4 +92,4 @@ TEST(BackgroundWriter, EndsItsJobBeforeItGoes) {
 }
 
 }  // namespace
-}  // namespace groundray
+}  // namespace groundray::background_writer_test

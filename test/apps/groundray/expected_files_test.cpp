@@ -8,7 +8,7 @@
 #include <string>
 #include <vector>
 
-namespace groundray {
+namespace groundray::expected_files_test {
 namespace {
 
 using ::testing::HasSubstr;
@@ -70,4 +70,4 @@ TEST(ExpectedFiles, HaveTheFoldersOfSensorsAndOfOtherFiles) {
 }
 
 }  // namespace
-}  // namespace groundray
+}  // namespace groundray::expected_files_test

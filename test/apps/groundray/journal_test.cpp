@@ -14,7 +14,7 @@
 #include "core/product_io.h"
 #include "test/support/temporary_folder.h"
 
-namespace groundray {
+namespace groundray::journal_test {
 namespace {
 
 using ::testing::ElementsAre;
@@ -114,4 +114,4 @@ TEST(Journal, ThatCannotBeWrittenIsAnError) {
 }
 
 }  // namespace
-}  // namespace groundray
+}  // namespace groundray::journal_test

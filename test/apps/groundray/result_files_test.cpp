@@ -10,7 +10,7 @@
 #include "core/error.h"
 #include "test/support/temporary_folder.h"
 
-namespace groundray {
+namespace groundray::result_files_test {
 namespace {
 
 using groundray::testing::TemporaryFolder;
@@ -146,4 +146,4 @@ TEST(ResultFiles, AreCheckedBeforeWork) {
 }
 
 }  // namespace
-}  // namespace groundray
+}  // namespace groundray::result_files_test

@@ -12,7 +12,7 @@
 #include "core/product_io.h"
 #include "test/support/temporary_folder.h"
 
-namespace groundray {
+namespace groundray::cloud_blocks_test {
 namespace {
 
 using namespace groundray::testing;  // NOLINT(google-build-using-namespace)
@@ -115,4 +115,4 @@ TEST(CloudBlocks, OtherFilesAreLeft) {
 }
 
 }  // namespace
-}  // namespace groundray
+}  // namespace groundray::cloud_blocks_test

@@ -10,7 +10,7 @@
 #include "core/error.h"
 #include "test/support/temporary_folder.h"
 
-namespace groundray {
+namespace groundray::cloud_file_test {
 namespace {
 
 using namespace std::string_literals;
@@ -148,4 +148,4 @@ TEST(CloudFile, ReadsAScanOfARealSensor) {
 }
 
 }  // namespace
-}  // namespace groundray
+}  // namespace groundray::cloud_file_test

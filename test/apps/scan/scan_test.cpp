@@ -11,7 +11,7 @@
 #include "core/error.h"
 #include "test/support/sample_scan.h"
 
-namespace groundray {
+namespace groundray::scan_test {
 namespace {
 
 using ::testing::AllOf;
@@ -201,4 +201,4 @@ TEST(Scan, NamesColumnsThatAreMissing) {
 }
 
 }  // namespace
-}  // namespace groundray
+}  // namespace groundray::scan_test

@@ -6,7 +6,7 @@
 #include <optional>
 #include <string>
 
-namespace groundray {
+namespace groundray::word_option_test {
 namespace {
 
 using ::testing::AllOf;
@@ -55,4 +55,4 @@ TEST(WordOption, TellsTheWordsThatThereAre) {
 }
 
 }  // namespace
-}  // namespace groundray
+}  // namespace groundray::word_option_test

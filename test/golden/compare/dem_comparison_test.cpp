@@ -14,7 +14,7 @@
 #include "core/text_lines.h"
 #include "test/support/temporary_folder.h"
 
-namespace groundray::golden {
+namespace groundray::golden::dem_comparison_test {
 namespace {
 
 using groundray::testing::TemporaryFolder;
@@ -219,4 +219,4 @@ TEST(CompareDems, ReadsFilesAndRefusesWhatDoesNotMatch) {
 }
 
 }  // namespace
-}  // namespace groundray::golden
+}  // namespace groundray::golden::dem_comparison_test

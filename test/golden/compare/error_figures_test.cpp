@@ -5,7 +5,7 @@
 
 #include <cmath>
 
-namespace groundray::golden {
+namespace groundray::golden::error_figures_test {
 namespace {
 
 using ::testing::DoubleEq;
@@ -68,4 +68,4 @@ TEST(ErrorFigures, AreHeldAgainstTheirLimits) {
 }
 
 }  // namespace
-}  // namespace groundray::golden
+}  // namespace groundray::golden::error_figures_test

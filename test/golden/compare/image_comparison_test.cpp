@@ -16,7 +16,7 @@
 #include "test/support/sample_image.h"
 #include "test/support/temporary_folder.h"
 
-namespace groundray::golden {
+namespace groundray::golden::image_comparison_test {
 namespace {
 
 using groundray::testing::figure;
@@ -313,4 +313,4 @@ TEST(CompareImages, ReadsFilesAndRefusesWhatDoesNotMatch) {
 }
 
 }  // namespace
-}  // namespace groundray::golden
+}  // namespace groundray::golden::image_comparison_test

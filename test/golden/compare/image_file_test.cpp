@@ -15,7 +15,7 @@
 #include "core/product_io.h"
 #include "test/support/temporary_folder.h"
 
-namespace groundray::golden {
+namespace groundray::golden::image_file_test {
 namespace {
 
 using groundray::testing::TemporaryFolder;
@@ -229,4 +229,4 @@ TEST(ImageFile, RefusesWhatIsNoImage) {
 }
 
 }  // namespace
-}  // namespace groundray::golden
+}  // namespace groundray::golden::image_file_test

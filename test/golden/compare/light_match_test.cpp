@@ -12,7 +12,7 @@
 #include "apps/golden/compare/image_comparison.h"
 #include "test/support/sample_image.h"
 
-namespace groundray::golden {
+namespace groundray::golden::light_match_test {
 namespace {
 
 using groundray::testing::figure;
@@ -155,4 +155,4 @@ TEST(CompareImages, HoldsValuesWithoutSpreadToBeEqual) {
 }
 
 }  // namespace
-}  // namespace groundray::golden
+}  // namespace groundray::golden::light_match_test

@@ -14,7 +14,7 @@
 #include "test/support/solid.h"
 #include "test/support/temporary_folder.h"
 
-namespace groundray::golden {
+namespace groundray::golden::mesh_comparison_test {
 namespace {
 
 using ::testing::HasSubstr;
@@ -142,4 +142,4 @@ TEST(MeshComparison, RefusesWhatIsNoSurface) {
 }
 
 }  // namespace
-}  // namespace groundray::golden
+}  // namespace groundray::golden::mesh_comparison_test

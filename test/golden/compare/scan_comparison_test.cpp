@@ -13,7 +13,7 @@
 #include "test/support/sample_scan.h"
 #include "test/support/temporary_folder.h"
 
-namespace groundray::golden {
+namespace groundray::golden::scan_comparison_test {
 namespace {
 
 using groundray::testing::direction_of;
@@ -361,4 +361,4 @@ TEST(CompareScans, ComparesFilesOfDifferentForms) {
 }
 
 }  // namespace
-}  // namespace groundray::golden
+}  // namespace groundray::golden::scan_comparison_test

@@ -15,7 +15,7 @@
 #include "apps/golden/compare/pulses.h"
 #include "test/support/sample_scan.h"
 
-namespace groundray::golden {
+namespace groundray::golden::scan_pairing_test {
 namespace {
 
 using groundray::testing::direction_of;
@@ -241,4 +241,4 @@ TEST(PairScans, TakesNoTimeForABeamThatStandsStill) {
 }
 
 }  // namespace
-}  // namespace groundray::golden
+}  // namespace groundray::golden::scan_pairing_test

@@ -7,7 +7,7 @@
 
 #include "core/error.h"
 
-namespace groundray::golden {
+namespace groundray::golden::exact_match_test {
 namespace {
 
 Columns one(double value, Stored stored) { return {.rows = 1, .all = {{"x", {value}, stored}}}; }
@@ -59,4 +59,4 @@ TEST(ExactMatch, NamesWhatDiffersInShape) {
 }
 
 }  // namespace
-}  // namespace groundray::golden
+}  // namespace groundray::golden::exact_match_test

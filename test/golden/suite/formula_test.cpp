@@ -8,7 +8,7 @@
 
 #include "core/error.h"
 
-namespace groundray::golden {
+namespace groundray::golden::formula_test {
 namespace {
 
 Columns two_columns() {
@@ -59,4 +59,4 @@ TEST(Formula, ShowsWhatIsWrong) {
 TEST(Formula, OfNoRowsIsEmpty) { EXPECT_TRUE(evaluate("x", {.rows = 0}).empty()); }
 
 }  // namespace
-}  // namespace groundray::golden
+}  // namespace groundray::golden::formula_test

@@ -7,7 +7,7 @@
 #include "core/product_io.h"
 #include "test/support/temporary_folder.h"
 
-namespace groundray::golden {
+namespace groundray::golden::golden_case_test {
 namespace {
 
 using ::testing::HasSubstr;
@@ -100,4 +100,4 @@ TEST(GoldenCase, FoldersAreReadByNameAndFiltered) {
 }
 
 }  // namespace
-}  // namespace groundray::golden
+}  // namespace groundray::golden::golden_case_test

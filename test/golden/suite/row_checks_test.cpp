@@ -10,7 +10,7 @@
 
 #include "core/error.h"
 
-namespace groundray::golden {
+namespace groundray::golden::row_checks_test {
 namespace {
 
 constexpr double infinity = std::numeric_limits<double>::infinity();
@@ -40,7 +40,7 @@ TEST(RowChecks, CountRowsBeyondTheirTolerance) {
   EXPECT_EQ(section.measures[0].value, 1);
   EXPECT_EQ(section.measures[0].verdict, Verdict::Failed);
   EXPECT_EQ(section.measures[0].because, "said so");
-  EXPECT_THAT(section.measures[1].name, testing::HasSubstr("at row 2"));
+  EXPECT_THAT(section.measures[1].name, ::testing::HasSubstr("at row 2"));
   EXPECT_DOUBLE_EQ(section.measures[1].value, 0.5);
   EXPECT_DOUBLE_EQ(section.measures[1].limit.value(), 0.25);
 }
@@ -136,4 +136,4 @@ TEST(RowChecks, DrawImages) {
 }
 
 }  // namespace
-}  // namespace groundray::golden
+}  // namespace groundray::golden::row_checks_test

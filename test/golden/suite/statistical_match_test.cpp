@@ -9,7 +9,7 @@
 
 #include "core/error.h"
 
-namespace groundray::golden {
+namespace groundray::golden::statistical_match_test {
 namespace {
 
 constexpr glm::ivec2 size_px(32, 24);
@@ -82,8 +82,8 @@ TEST(StatisticalMatch, WithoutNoiseOnlyRoundingIsAllowed) {
     return Columns{.rows = 1, .all = {{"R", {value}, Stored::Float}}, .size_px = {1, 1}};
   };
   for (int k = 0; k < statistical_runs; ++k) moments.add(image(1));
-  EXPECT_THAT(match(image(1 + 1e-7F), moments.columns()), testing::Each(Verdict::Passed));
-  EXPECT_THAT(match(image(1 + 1e-5F), moments.columns()), testing::Contains(Verdict::Failed));
+  EXPECT_THAT(match(image(1 + 1e-7F), moments.columns()), ::testing::Each(Verdict::Passed));
+  EXPECT_THAT(match(image(1 + 1e-5F), moments.columns()), ::testing::Contains(Verdict::Failed));
 }
 
 TEST(StatisticalMatch, RefusesMomentsThatTellNothing) {
@@ -99,7 +99,7 @@ TEST(StatisticalMatch, RefusesMomentsThatTellNothing) {
     EXPECT_THROW(of_runs.columns(), Error);
     Columns odd = draw(1000);
     odd.all[0].values[7] = bad;
-    EXPECT_THAT(match(odd, stored()), testing::Each(Verdict::Failed));
+    EXPECT_THAT(match(odd, stored()), ::testing::Each(Verdict::Failed));
   }
 }
 
@@ -114,4 +114,4 @@ TEST(StatisticalMatch, RefusesAnotherSizeAndMissingColumns) {
 }
 
 }  // namespace
-}  // namespace groundray::golden
+}  // namespace groundray::golden::statistical_match_test

@@ -18,7 +18,7 @@
 #include "core/pose.h"
 #include "test/support/solid.h"
 
-namespace groundray {
+namespace groundray::accuracy_test {
 namespace {
 
 using ::testing::AllOf;
@@ -386,4 +386,4 @@ TEST(MeshDistance, EveryFaultIsNamed) {
 }
 
 }  // namespace
-}  // namespace groundray
+}  // namespace groundray::accuracy_test

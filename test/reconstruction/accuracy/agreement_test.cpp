@@ -18,7 +18,7 @@
 #include "reconstruction/accuracy/accuracy.h"
 #include "test/support/solid.h"
 
-namespace groundray {
+namespace groundray::agreement_test {
 namespace {
 
 using ::testing::HasSubstr;
@@ -208,4 +208,4 @@ TEST(Agreement, NamesWhatIsWrong) {
 }
 
 }  // namespace
-}  // namespace groundray
+}  // namespace groundray::agreement_test

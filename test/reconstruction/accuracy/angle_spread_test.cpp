@@ -12,7 +12,7 @@
 #include "core/mesh.h"
 #include "reconstruction/accuracy/accuracy.h"
 
-namespace groundray {
+namespace groundray::angle_spread_test {
 namespace {
 
 constexpr double resolution = 0.011;  // of percentiles
@@ -85,4 +85,4 @@ TEST(AngleSpread, OfTurnedSquaresIsTheirAnglesByArea) {
 }
 
 }  // namespace
-}  // namespace groundray
+}  // namespace groundray::angle_spread_test

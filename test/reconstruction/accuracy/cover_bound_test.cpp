@@ -13,7 +13,7 @@
 #include "core/closest_point.h"
 #include "test/support/solid.h"
 
-namespace groundray {
+namespace groundray::cover_bound_test {
 namespace {
 
 using Corners = std::array<glm::dvec3, 3>;
@@ -184,4 +184,4 @@ TEST(CoverBound, HoldsOverABall) {
 }
 
 }  // namespace
-}  // namespace groundray
+}  // namespace groundray::cover_bound_test

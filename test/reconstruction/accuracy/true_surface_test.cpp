@@ -15,7 +15,7 @@
 #include "core/error.h"
 #include "test/support/solid.h"
 
-namespace groundray {
+namespace groundray::true_surface_test {
 namespace {
 
 using ::testing::HasSubstr;
@@ -200,4 +200,4 @@ TEST(TrueDistance, NamesWhatIsWrong) {
 }
 
 }  // namespace
-}  // namespace groundray
+}  // namespace groundray::true_surface_test

@@ -15,7 +15,7 @@
 #include "core/error.h"
 #include "test/support/solid.h"
 
-namespace groundray {
+namespace groundray::two_sided_error_test {
 namespace {
 
 using testing::box_model;
@@ -211,4 +211,4 @@ TEST(TwoSidedError, NamesWhatIsWrong) {
 }
 
 }  // namespace
-}  // namespace groundray
+}  // namespace groundray::two_sided_error_test

@@ -12,7 +12,7 @@
 #include "core/error.h"
 #include "test/support/plan_check.h"
 
-namespace groundray {
+namespace groundray::vertical_error_test {
 namespace {
 
 const TriangleMesh slope{{{0, 0, 0}, {10, 0, 5}, {10, 10, 5}, {0, 10, 0}}, {{0, 1, 2}, {0, 2, 3}}};
@@ -92,4 +92,4 @@ TEST(VerticalError, RefusesWhatIsNoSurface) {
 }
 
 }  // namespace
-}  // namespace groundray
+}  // namespace groundray::vertical_error_test

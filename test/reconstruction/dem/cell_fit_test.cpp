@@ -15,7 +15,7 @@
 #include "test/reconstruction/dem/rolling_ground.h"
 #include "test/support/margin.h"
 
-namespace groundray {
+namespace groundray::cell_fit_test {
 namespace {
 
 using testing::add_point;
@@ -329,4 +329,4 @@ TEST(CellFit, ErrorsAlongLinesOfSightAreAsTold) {
 }
 
 }  // namespace
-}  // namespace groundray
+}  // namespace groundray::cell_fit_test

@@ -10,7 +10,7 @@
 #include "core/error.h"
 #include "reconstruction/dem/raster_holes.h"
 
-namespace groundray {
+namespace groundray::data_distance_test {
 namespace {
 
 using ::testing::Each;
@@ -108,4 +108,4 @@ TEST(RasterHoles, HullHoldsWhatNoLineThroughDataPartsFromThem) {
 }
 
 }  // namespace
-}  // namespace groundray
+}  // namespace groundray::data_distance_test

@@ -13,7 +13,7 @@
 #include "test/support/margin.h"
 #include "test/support/sample_terrain.h"
 
-namespace groundray {
+namespace groundray::dem_fill_proof_test {
 namespace {
 
 using testing::fractal_ground;
@@ -90,4 +90,4 @@ TEST(DemFillProof, TakesNoMoreThanASecondFor100000SamplesUnderBounds) {
 }
 
 }  // namespace
-}  // namespace groundray
+}  // namespace groundray::dem_fill_proof_test

@@ -15,7 +15,7 @@
 #include "test/reconstruction/dem/holed_ground.h"
 #include "test/support/margin.h"
 
-namespace groundray {
+namespace groundray::dem_fill_test {
 namespace {
 
 using ::testing::Each;
@@ -366,4 +366,4 @@ TEST(DemFill, RefusesWhatIsNoDem) {
 }
 
 }  // namespace
-}  // namespace groundray
+}  // namespace groundray::dem_fill_test

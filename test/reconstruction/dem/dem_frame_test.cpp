@@ -7,7 +7,7 @@
 
 #include "core/error.h"
 
-namespace groundray {
+namespace groundray::dem_frame_test {
 namespace {
 
 using ::testing::HasSubstr;
@@ -80,4 +80,4 @@ TEST(DemFrame, NamesEveryFaultOfAFrame) {
 }
 
 }  // namespace
-}  // namespace groundray
+}  // namespace groundray::dem_frame_test

@@ -12,7 +12,7 @@
 #include "test/support/margin.h"
 #include "test/support/sample_terrain.h"
 
-namespace groundray {
+namespace groundray::dem_fusion_proof_test {
 namespace {
 
 using testing::proof_size;
@@ -163,4 +163,4 @@ TEST(DemFusionProof, ClosedLoopOnRollingGround) {
 }
 
 }  // namespace
-}  // namespace groundray
+}  // namespace groundray::dem_fusion_proof_test

@@ -19,7 +19,7 @@
 #include "test/support/margin.h"
 #include "test/support/temporary_folder.h"
 
-namespace groundray {
+namespace groundray::dem_fusion_test {
 namespace {
 
 using testing::add_point;
@@ -451,4 +451,4 @@ TEST(DemFusion, WhatProgressThrowsEndsTheWork) {
 }
 
 }  // namespace
-}  // namespace groundray
+}  // namespace groundray::dem_fusion_test

@@ -14,7 +14,7 @@
 
 #include "core/error.h"
 
-namespace groundray {
+namespace groundray::dem_smooth_test {
 namespace {
 
 using ::testing::HasSubstr;
@@ -256,4 +256,4 @@ TEST(DemSmooth, TakesOddRastersAndRefusesWhatIsNoDem) {
 }
 
 }  // namespace
-}  // namespace groundray
+}  // namespace groundray::dem_smooth_test

@@ -7,7 +7,7 @@
 #include <limits>
 #include <random>
 
-namespace groundray {
+namespace groundray::disc_opening_test {
 namespace {
 
 constexpr float infinity = std::numeric_limits<float>::infinity();
@@ -76,4 +76,4 @@ TEST(DiscOpening, KeepsWhatTheDiscFitsInto) {
 }
 
 }  // namespace
-}  // namespace groundray
+}  // namespace groundray::disc_opening_test

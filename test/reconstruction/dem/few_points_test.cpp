@@ -8,7 +8,7 @@
 
 #include "core/random.h"
 
-namespace groundray {
+namespace groundray::few_points_test {
 namespace {
 
 constexpr glm::dvec2 step_m(0.5, 0.25);
@@ -103,4 +103,4 @@ TEST(FewPoints, WhatASurfaceAndAPointHaveInCommonStays) {
 }
 
 }  // namespace
-}  // namespace groundray
+}  // namespace groundray::few_points_test

@@ -6,7 +6,7 @@
 #include <random>
 #include <vector>
 
-namespace groundray {
+namespace groundray::fill_law_test {
 namespace {
 
 // Errors of sd = scale distance^(power / 2) roughness^(rough / 2).
@@ -72,4 +72,4 @@ TEST(FillLaw, TellsNothingFromTooFewErrors) {
 }
 
 }  // namespace
-}  // namespace groundray
+}  // namespace groundray::fill_law_test

@@ -15,7 +15,7 @@
 #include "test/support/margin.h"
 #include "test/support/sample_terrain.h"
 
-namespace groundray {
+namespace groundray::fill_shadow_test {
 namespace {
 
 using testing::proof_size;
@@ -175,4 +175,4 @@ TEST(FillShadowProof, StatedSdsHoldInShadowsUnderBounds) {
 }
 
 }  // namespace
-}  // namespace groundray
+}  // namespace groundray::fill_shadow_test

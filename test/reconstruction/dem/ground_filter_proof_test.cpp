@@ -14,7 +14,7 @@
 #include "test/support/sample_terrain.h"
 #include "test/support/temporary_folder.h"
 
-namespace groundray {
+namespace groundray::ground_filter_proof_test {
 namespace {
 
 using testing::record_margin;
@@ -147,4 +147,4 @@ TEST(GroundFilterProof, MillionsOfPointsASecond) {
 }
 
 }  // namespace
-}  // namespace groundray
+}  // namespace groundray::ground_filter_proof_test

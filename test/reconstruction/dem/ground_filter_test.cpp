@@ -13,7 +13,7 @@
 
 #include "core/error.h"
 
-namespace groundray {
+namespace groundray::ground_filter_test {
 namespace {
 
 using ::testing::AllOf;
@@ -366,4 +366,4 @@ TEST(GroundFilter, RefusesWhatItCannotTell) {
 }
 
 }  // namespace
-}  // namespace groundray
+}  // namespace groundray::ground_filter_test

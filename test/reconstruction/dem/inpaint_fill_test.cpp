@@ -10,7 +10,7 @@
 
 #include "core/error.h"
 
-namespace groundray {
+namespace groundray::inpaint_fill_test {
 namespace {
 
 // Both are means of what is near, so flat ground goes on, and measured ground is not touched.
@@ -35,4 +35,4 @@ TEST(InpaintFill, GoesOnFlatAndLeavesWhatWasMeasured) {
 }
 
 }  // namespace
-}  // namespace groundray
+}  // namespace groundray::inpaint_fill_test

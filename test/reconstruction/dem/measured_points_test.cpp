@@ -9,7 +9,7 @@
 #include "core/random.h"
 #include "reconstruction/dem/packed_point.h"
 
-namespace groundray {
+namespace groundray::measured_points_test {
 namespace {
 
 // Errors are drawn along a line of sight and across it; how far points end above planes is
@@ -68,4 +68,4 @@ TEST(PackedLean, IsRoundedToOnePartIn4096) {
 }
 
 }  // namespace
-}  // namespace groundray
+}  // namespace groundray::measured_points_test

@@ -9,7 +9,7 @@
 #include "reconstruction/dem/dem_fill.h"
 #include "test/reconstruction/dem/holed_ground.h"
 
-namespace groundray {
+namespace groundray::mesh_fill_test {
 namespace {
 
 using testing::fractal_ground;
@@ -61,4 +61,4 @@ TEST(MeshFill, ComesNearAThinPlateAlsoOnVerySteepGround) {
 }
 
 }  // namespace
-}  // namespace groundray
+}  // namespace groundray::mesh_fill_test

@@ -8,7 +8,7 @@
 
 #include "core/random.h"
 
-namespace groundray {
+namespace groundray::neighbour_surface_test {
 namespace {
 
 constexpr std::ptrdiff_t stride = 5;
@@ -140,4 +140,4 @@ TEST(NeighbourSurface, HeightsAndSlopesErrAsTold) {
 }
 
 }  // namespace
-}  // namespace groundray
+}  // namespace groundray::neighbour_surface_test

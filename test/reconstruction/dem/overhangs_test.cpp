@@ -8,7 +8,7 @@
 
 #include "core/error.h"
 
-namespace groundray {
+namespace groundray::overhangs_test {
 namespace {
 
 using ::testing::AllOf;
@@ -104,4 +104,4 @@ TEST(Overhangs, RefuseWhatDoesNotFit) {
 }
 
 }  // namespace
-}  // namespace groundray
+}  // namespace groundray::overhangs_test

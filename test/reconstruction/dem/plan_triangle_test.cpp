@@ -6,7 +6,7 @@
 #include <set>
 #include <utility>
 
-namespace groundray {
+namespace groundray::plan_triangle_test {
 namespace {
 
 GridFrame frame_of(glm::ivec2 samples, glm::dvec2 step_m) {
@@ -69,4 +69,4 @@ TEST(PlanTriangle, TakesTimeForItsSamplesAlone) {
 }
 
 }  // namespace
-}  // namespace groundray
+}  // namespace groundray::plan_triangle_test

@@ -14,7 +14,7 @@
 #include "reconstruction/dem/plate_system.h"
 #include "test/reconstruction/dem/difference_plate.h"
 
-namespace groundray {
+namespace groundray::plate_descent_test {
 namespace {
 
 using testing::difference_plate;
@@ -115,4 +115,4 @@ TEST(PlateDescent, TakesWhatNeedsNoBoundsAndWhatIsAllHeldDown) {
 }
 
 }  // namespace
-}  // namespace groundray
+}  // namespace groundray::plate_descent_test

@@ -14,7 +14,7 @@
 #include "reconstruction/dem/plate_dissection.h"
 #include "test/reconstruction/dem/difference_plate.h"
 
-namespace groundray {
+namespace groundray::plate_factor_test {
 namespace {
 
 using testing::difference_plate;
@@ -105,4 +105,4 @@ TEST(PlateFactor, RefusesEquationsWithoutSolution) {
 }
 
 }  // namespace
-}  // namespace groundray
+}  // namespace groundray::plate_factor_test

@@ -9,7 +9,7 @@
 
 #include "core/random.h"
 
-namespace groundray {
+namespace groundray::quadric_test {
 namespace {
 
 constexpr std::size_t six = 6;
@@ -122,4 +122,4 @@ TEST(Quadric, WithoutPlacesTermsAreWhatIsKnown) {
 }
 
 }  // namespace
-}  // namespace groundray
+}  // namespace groundray::quadric_test

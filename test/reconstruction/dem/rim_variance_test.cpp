@@ -9,7 +9,7 @@
 #include <random>
 #include <vector>
 
-namespace groundray {
+namespace groundray::rim_variance_test {
 namespace {
 
 constexpr float nan = std::numeric_limits<float>::quiet_NaN();
@@ -113,4 +113,4 @@ TEST(RimVariance, LeavesWhatNothingIsKnownOf) {
 }
 
 }  // namespace
-}  // namespace groundray
+}  // namespace groundray::rim_variance_test

@@ -19,7 +19,7 @@
 #include "test/support/margin.h"
 #include "test/support/sample_terrain.h"
 
-namespace groundray {
+namespace groundray::sight_bound_test {
 namespace {
 
 using testing::fractal;
@@ -214,4 +214,4 @@ TEST(SightBound, RefusesWhatCannotBe) {
 }
 
 }  // namespace
-}  // namespace groundray
+}  // namespace groundray::sight_bound_test

@@ -7,7 +7,7 @@
 #include <functional>
 #include <random>
 
-namespace groundray {
+namespace groundray::surface_pins_test {
 namespace {
 
 // A share of the cells with a point anywhere in them.
@@ -116,4 +116,4 @@ TEST(MembraneThrough, OfOnePointIsLevel) {
 }
 
 }  // namespace
-}  // namespace groundray
+}  // namespace groundray::surface_pins_test

@@ -25,7 +25,7 @@
 #include "test/support/surface_check.h"
 #include "test/support/temporary_folder.h"
 
-namespace groundray {
+namespace groundray::hole_fill_test {
 namespace {
 
 using std::numbers::pi;
@@ -432,4 +432,4 @@ TEST(HoleFill, ClosesTheBunny) {
 }
 
 }  // namespace
-}  // namespace groundray
+}  // namespace groundray::hole_fill_test

@@ -9,7 +9,7 @@
 
 #include "reconstruction/holes/island_bridge.h"
 
-namespace groundray {
+namespace groundray::mesh_rims_test {
 namespace {
 
 // Six triangles round vertex 0, of which some are there.
@@ -77,4 +77,4 @@ TEST(MeshPieces, AreTrianglesThatShareEdges) {
 }
 
 }  // namespace
-}  // namespace groundray
+}  // namespace groundray::mesh_rims_test

@@ -12,7 +12,7 @@
 #include <utility>
 #include <vector>
 
-namespace groundray {
+namespace groundray::triangle_crossing_test {
 namespace {
 
 using ::testing::IsEmpty;
@@ -118,4 +118,4 @@ TEST(TriangleCrossing, IsFoundAmongManyTriangles) {
 }
 
 }  // namespace
-}  // namespace groundray
+}  // namespace groundray::triangle_crossing_test

@@ -5,7 +5,7 @@
 #include <array>
 #include <vector>
 
-namespace groundray {
+namespace groundray::consensus_test {
 namespace {
 
 constexpr CoverTolerance limits{.apart_m = 0.1, .least_cosine = 0.5};
@@ -39,4 +39,4 @@ TEST(Consensus, AsksNothingOfWhatIsRefuted) {
 }
 
 }  // namespace
-}  // namespace groundray
+}  // namespace groundray::consensus_test

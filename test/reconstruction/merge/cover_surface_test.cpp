@@ -2,7 +2,7 @@
 
 #include <gtest/gtest.h>
 
-namespace groundray {
+namespace groundray::cover_surface_test {
 namespace {
 
 const CoverTolerance limits{.apart_m = 0.1, .least_cosine = 0.5};
@@ -37,4 +37,4 @@ TEST(CoverSurface, CoversNothingWhereItHasNoNormal) {
 }
 
 }  // namespace
-}  // namespace groundray
+}  // namespace groundray::cover_surface_test

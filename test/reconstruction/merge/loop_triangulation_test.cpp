@@ -9,7 +9,7 @@
 #include <random>
 #include <vector>
 
-namespace groundray {
+namespace groundray::loop_triangulation_test {
 namespace {
 
 using ::testing::UnorderedElementsAre;
@@ -74,4 +74,4 @@ TEST(LoopTriangulation, ALoopThatRunsTheOtherWayIsNotUpright) {
 }
 
 }  // namespace
-}  // namespace groundray
+}  // namespace groundray::loop_triangulation_test

@@ -24,7 +24,7 @@
 #include "test/support/surface_check.h"
 #include "test/support/temporary_folder.h"
 
-namespace groundray {
+namespace groundray::mesh_merge_proof_test {
 namespace {
 
 using ::testing::IsEmpty;
@@ -105,4 +105,4 @@ TEST(MeshMergeProof, TenScansOfTheBunnyMakeItsSurface) {
 }
 
 }  // namespace
-}  // namespace groundray
+}  // namespace groundray::mesh_merge_proof_test

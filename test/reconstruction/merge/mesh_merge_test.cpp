@@ -24,7 +24,7 @@
 #include "test/support/margin.h"
 #include "test/support/surface_check.h"
 
-namespace groundray {
+namespace groundray::mesh_merge_test {
 namespace {
 
 using ::testing::AllOf;
@@ -681,4 +681,4 @@ TEST(MeshMerge, ProgressRisesAndMayEndTheWork) {
 }
 
 }  // namespace
-}  // namespace groundray
+}  // namespace groundray::mesh_merge_test

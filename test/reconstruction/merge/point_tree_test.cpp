@@ -7,7 +7,7 @@
 #include <glm/geometric.hpp>
 #include <random>
 
-namespace groundray {
+namespace groundray::point_tree_test {
 namespace {
 
 using ::testing::IsEmpty;
@@ -38,4 +38,4 @@ TEST(PointTree, FindsNothingFarAway) {
 }
 
 }  // namespace
-}  // namespace groundray
+}  // namespace groundray::point_tree_test

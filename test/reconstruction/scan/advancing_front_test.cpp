@@ -17,7 +17,7 @@
 #include "core/error.h"
 #include "test/support/surface_check.h"
 
-namespace groundray {
+namespace groundray::advancing_front_test {
 namespace {
 
 using std::numbers::pi;
@@ -266,4 +266,4 @@ TEST(AdvancingFront, TellsHowFarItIsAndEndsWhenToldTo) {
 }
 
 }  // namespace
-}  // namespace groundray
+}  // namespace groundray::advancing_front_test

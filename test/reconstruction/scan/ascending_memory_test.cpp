@@ -6,7 +6,7 @@
 #include <list>
 #include <vector>
 
-namespace groundray {
+namespace groundray::ascending_memory_test {
 namespace {
 
 TEST(AscendingMemory, IsHandedOutInOrderHoweverMuchIsGivenBack) {
@@ -40,4 +40,4 @@ TEST(AscendingMemory, IsNotNeeded) {
 }
 
 }  // namespace
-}  // namespace groundray
+}  // namespace groundray::ascending_memory_test

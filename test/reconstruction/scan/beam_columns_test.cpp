@@ -12,7 +12,7 @@
 #include "test/support/beam_fan.h"
 #include "test/support/organised_cells.h"
 
-namespace groundray {
+namespace groundray::beam_columns_test {
 namespace {
 
 using namespace groundray::testing;  // NOLINT(google-build-using-namespace)
@@ -282,4 +282,4 @@ TEST(BeamColumns, TimesOfAnyKindDoNoHarm) {
 }
 
 }  // namespace
-}  // namespace groundray
+}  // namespace groundray::beam_columns_test

@@ -16,7 +16,7 @@
 #include "test/support/beam_fan.h"
 #include "test/support/organised_cells.h"
 
-namespace groundray {
+namespace groundray::beam_rows_test {
 namespace {
 
 using ::testing::AllOf;
@@ -219,4 +219,4 @@ TEST(BeamRows, LinesWithoutReturnsAreNoFault) {
 }
 
 }  // namespace
-}  // namespace groundray
+}  // namespace groundray::beam_rows_test

@@ -17,7 +17,7 @@
 #include "test/support/organised_cells.h"
 #include "test/support/temporary_folder.h"
 
-namespace groundray {
+namespace groundray::grid_check_test {
 namespace {
 
 using ::testing::AllOf;
@@ -117,4 +117,4 @@ TEST(GridCheck, TellsHowManyNeighboursTurnWhichWay) {
 }
 
 }  // namespace
-}  // namespace groundray
+}  // namespace groundray::grid_check_test

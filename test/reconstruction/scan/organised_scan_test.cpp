@@ -17,7 +17,7 @@
 #include "test/support/beam_fan.h"
 #include "test/support/organised_cells.h"
 
-namespace groundray {
+namespace groundray::organised_scan_test {
 namespace {
 
 using ::testing::AllOf;
@@ -190,4 +190,4 @@ TEST(OrganisedScan, EachPulseHasItsOwnPose) {
 }
 
 }  // namespace
-}  // namespace groundray
+}  // namespace groundray::organised_scan_test

@@ -20,7 +20,7 @@
 #include "test/support/organised_cells.h"
 #include "test/support/temporary_folder.h"
 
-namespace groundray {
+namespace groundray::ouster_scan_proof_test {
 namespace {
 
 using namespace groundray::testing;  // NOLINT(google-build-using-namespace)
@@ -139,4 +139,4 @@ TEST(OusterScanProof, RowsAreShiftedAsTheMakerSays) {
 }
 
 }  // namespace
-}  // namespace groundray
+}  // namespace groundray::ouster_scan_proof_test

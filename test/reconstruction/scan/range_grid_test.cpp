@@ -16,7 +16,7 @@
 #include "test/support/gzip_file.h"
 #include "test/support/temporary_folder.h"
 
-namespace groundray {
+namespace groundray::range_grid_test {
 namespace {
 
 using ::testing::AllOf;
@@ -135,4 +135,4 @@ TEST(RangeGrid, StanfordScansAreRead) {
 }
 
 }  // namespace
-}  // namespace groundray
+}  // namespace groundray::range_grid_test

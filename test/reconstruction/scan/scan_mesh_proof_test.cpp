@@ -26,7 +26,7 @@
 #include "test/support/sample_terrain.h"
 #include "test/support/temporary_folder.h"
 
-namespace groundray {
+namespace groundray::scan_mesh_proof_test {
 namespace {
 
 using ::testing::HasSubstr;
@@ -281,4 +281,4 @@ TEST(ScanMeshProof, RealScansAreOrganised) {
 }
 
 }  // namespace
-}  // namespace groundray
+}  // namespace groundray::scan_mesh_proof_test

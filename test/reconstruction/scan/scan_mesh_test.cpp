@@ -17,7 +17,7 @@
 #include "test/support/beam_fan.h"
 #include "test/support/linked_scan.h"
 
-namespace groundray {
+namespace groundray::scan_mesh_test {
 namespace {
 
 using ::testing::AllOf;
@@ -255,4 +255,4 @@ TEST(ScanMesh, FaultsAreNamedAllAtOnce) {
 }
 
 }  // namespace
-}  // namespace groundray
+}  // namespace groundray::scan_mesh_test

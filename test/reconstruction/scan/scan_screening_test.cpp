@@ -13,7 +13,7 @@
 #include "test/support/beam_fan.h"
 #include "test/support/linked_scan.h"
 
-namespace groundray {
+namespace groundray::scan_screening_test {
 namespace {
 
 using namespace groundray::testing;  // NOLINT(google-build-using-namespace)
@@ -274,4 +274,4 @@ TEST(ScanScreening, NoiseAloneTearsNoHoles) {
 }
 
 }  // namespace
-}  // namespace groundray
+}  // namespace groundray::scan_screening_test

@@ -17,7 +17,7 @@
 #include "test/support/margin.h"
 #include "test/support/organised_cells.h"
 
-namespace groundray {
+namespace groundray::sensor_motion_test {
 namespace {
 
 using namespace groundray::testing;  // NOLINT(google-build-using-namespace)
@@ -189,4 +189,4 @@ TEST(SensorMotion, NothingIsMadeOfWhatIsNoMotion) {
 }
 
 }  // namespace
-}  // namespace groundray
+}  // namespace groundray::sensor_motion_test

@@ -9,7 +9,7 @@
 #include "test/support/plan_check.h"
 #include "test/support/solid.h"
 
-namespace groundray {
+namespace groundray::collapsible_mesh_test {
 namespace {
 
 using Random = std::mt19937_64;
@@ -113,4 +113,4 @@ TEST(CollapsibleMesh, StaysTheManifoldThatItWas) {
 }
 
 }  // namespace
-}  // namespace groundray
+}  // namespace groundray::collapsible_mesh_test

@@ -10,7 +10,7 @@
 
 #include "core/closest_point.h"
 
-namespace groundray {
+namespace groundray::convex_proof_test {
 namespace {
 
 using Triangle = std::array<glm::dvec3, 3>;
@@ -112,4 +112,4 @@ TEST(ConvexProof, NeverHoldsOfWhatIsTooFar) {
 }
 
 }  // namespace
-}  // namespace groundray
+}  // namespace groundray::convex_proof_test

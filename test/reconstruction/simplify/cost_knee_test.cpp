@@ -4,7 +4,7 @@
 
 #include <cmath>
 
-namespace groundray {
+namespace groundray::cost_knee_test {
 namespace {
 
 // Cost that grows as one power of 1 / triangles and then as a larger one has its knee where the
@@ -40,4 +40,4 @@ TEST(CostKnee, IsThatOfTheMiddle) {
 }
 
 }  // namespace
-}  // namespace groundray
+}  // namespace groundray::cost_knee_test

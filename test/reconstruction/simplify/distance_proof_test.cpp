@@ -7,7 +7,7 @@
 
 #include "reconstruction/accuracy/accuracy.h"
 
-namespace groundray {
+namespace groundray::distance_proof_test {
 namespace {
 
 using Random = std::mt19937_64;
@@ -71,4 +71,4 @@ TEST(DistanceProof, ProvesThatOnePlaneIsAnother) {
 }
 
 }  // namespace
-}  // namespace groundray
+}  // namespace groundray::distance_proof_test

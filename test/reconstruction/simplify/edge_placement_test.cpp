@@ -8,7 +8,7 @@
 #include <random>
 #include <vector>
 
-namespace groundray {
+namespace groundray::edge_placement_test {
 namespace {
 
 using Triangle = std::array<glm::dvec3, 3>;
@@ -122,4 +122,4 @@ TEST(EdgePlacement, StaysOnAStraightBorder) {
 }
 
 }  // namespace
-}  // namespace groundray
+}  // namespace groundray::edge_placement_test

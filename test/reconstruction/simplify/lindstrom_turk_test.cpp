@@ -29,7 +29,7 @@
 #include "test/support/surface_check.h"
 #include "test/support/temporary_folder.h"
 
-namespace groundray {
+namespace groundray::lindstrom_turk_test {
 namespace {
 
 using ::testing::HasSubstr;
@@ -393,4 +393,4 @@ TEST(LindstromTurkProof, IsAsAccurateAsMeasuredElsewhereOnTheBunny) {
 }
 
 }  // namespace
-}  // namespace groundray
+}  // namespace groundray::lindstrom_turk_test

@@ -18,7 +18,7 @@
 #include "test/support/sample_terrain.h"
 #include "test/support/temporary_folder.h"
 
-namespace groundray {
+namespace groundray::simplify_proof_test {
 namespace {
 
 double cpu_s() { return static_cast<double>(std::clock()) / CLOCKS_PER_SEC; }
@@ -185,4 +185,4 @@ TEST(SimplifyProof, LargeMeshesTakeLittleMemoryToABudget) {
 }
 
 }  // namespace
-}  // namespace groundray
+}  // namespace groundray::simplify_proof_test

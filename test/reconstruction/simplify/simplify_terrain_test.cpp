@@ -8,7 +8,7 @@
 #include "reconstruction/simplify/vector_to_edge.h"
 #include "test/support/plan_check.h"
 
-namespace groundray {
+namespace groundray::simplify_terrain_test {
 namespace {
 
 using Random = std::mt19937_64;
@@ -324,4 +324,4 @@ TEST(SimplifyTerrain, WhereLabelsChangeStaysWhereItWas) {
 }
 
 }  // namespace
-}  // namespace groundray
+}  // namespace groundray::simplify_terrain_test

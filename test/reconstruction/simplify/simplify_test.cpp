@@ -14,7 +14,7 @@
 #include "test/support/plan_check.h"
 #include "test/support/solid.h"
 
-namespace groundray {
+namespace groundray::simplify_test {
 namespace {
 
 using ::testing::AllOf;
@@ -342,4 +342,4 @@ TEST(Simplify, SmallestMeshesStayAsTheyAre) {
 }
 
 }  // namespace
-}  // namespace groundray
+}  // namespace groundray::simplify_test

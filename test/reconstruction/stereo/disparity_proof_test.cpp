@@ -16,7 +16,7 @@
 #include "test/support/margin.h"
 #include "test/support/temporary_folder.h"
 
-namespace groundray {
+namespace groundray::disparity_proof_test {
 namespace {
 
 constexpr float nothing = std::numeric_limits<float>::quiet_NaN();
@@ -175,4 +175,4 @@ TEST_F(MotorcycleProof, IsConfidentOfWhatIsRight) {
 }
 
 }  // namespace
-}  // namespace groundray
+}  // namespace groundray::disparity_proof_test

@@ -18,7 +18,7 @@
 #include "test/support/margin.h"
 #include "test/support/wave_texture.h"
 
-namespace groundray {
+namespace groundray::disparity_test {
 namespace {
 
 using testing::add_noise;
@@ -382,4 +382,4 @@ TEST(Disparity, RefusesWhatCannotBeMatched) {
 }
 
 }  // namespace
-}  // namespace groundray
+}  // namespace groundray::disparity_test

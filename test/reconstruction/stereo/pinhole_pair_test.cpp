@@ -17,7 +17,7 @@
 #include "test/support/margin.h"
 #include "test/support/stereo_views.h"
 
-namespace groundray {
+namespace groundray::pinhole_pair_test {
 namespace {
 
 using ::testing::AllOf;
@@ -263,4 +263,4 @@ TEST(PinholePair, TakesCamerasThatSquint) {
 }
 
 }  // namespace
-}  // namespace groundray
+}  // namespace groundray::pinhole_pair_test

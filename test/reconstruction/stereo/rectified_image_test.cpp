@@ -12,7 +12,7 @@
 #include "test/support/stereo_views.h"
 #include "test/support/wave_texture.h"
 
-namespace groundray {
+namespace groundray::rectified_image_test {
 namespace {
 
 using testing::centred;
@@ -137,4 +137,4 @@ TEST(RectifiedImage, TakesLuminanceForGrey) {
 }
 
 }  // namespace
-}  // namespace groundray
+}  // namespace groundray::rectified_image_test

@@ -21,7 +21,7 @@
 #include "test/support/stereo_views.h"
 #include "test/support/wave_texture.h"
 
-namespace groundray {
+namespace groundray::stereo_points_proof_test {
 namespace {
 
 using namespace std::chrono_literals;
@@ -289,4 +289,4 @@ TEST(StereoPointsProof, OfRenderedPairsErrAsStated) {
 }
 
 }  // namespace
-}  // namespace groundray
+}  // namespace groundray::stereo_points_proof_test

@@ -16,7 +16,7 @@
 #include "test/support/margin.h"
 #include "test/support/stereo_views.h"
 
-namespace groundray {
+namespace groundray::stereo_points_test {
 namespace {
 
 using testing::centred;
@@ -226,4 +226,4 @@ TEST(StereoPoints, RefuseWhatCannotBe) {
 }
 
 }  // namespace
-}  // namespace groundray
+}  // namespace groundray::stereo_points_test

@@ -18,7 +18,7 @@
 #include "test/support/margin.h"
 #include "test/support/temporary_folder.h"
 
-namespace groundray {
+namespace groundray::calibration_test {
 namespace {
 
 using groundray::testing::centred;
@@ -427,4 +427,4 @@ TEST_F(PublishedCalibrations, OfAChainCloseTheirLoop) {
 }
 
 }  // namespace
-}  // namespace groundray
+}  // namespace groundray::calibration_test

@@ -17,7 +17,7 @@
 #include "test/support/margin.h"
 #include "test/support/solid.h"
 
-namespace groundray {
+namespace groundray::camera_test {
 namespace {
 
 using namespace std::chrono_literals;
@@ -367,4 +367,4 @@ TEST(Camera, NeedsAPathThatCoversTheExposure) {
 }
 
 }  // namespace
-}  // namespace groundray
+}  // namespace groundray::camera_test

@@ -16,7 +16,7 @@
 #include "terrain/terrain_scene.h"
 #include "test/support/solid.h"
 
-namespace groundray {
+namespace groundray::emitters_test {
 namespace {
 
 using std::chrono::milliseconds;
@@ -171,4 +171,4 @@ TEST(Emitters, EmitFiniteLight) {
 }
 
 }  // namespace
-}  // namespace groundray
+}  // namespace groundray::emitters_test

@@ -20,7 +20,7 @@
 #include "test/support/margin.h"
 #include "test/support/solid.h"
 
-namespace groundray {
+namespace groundray::image_truth_test {
 namespace {
 
 using namespace std::chrono_literals;
@@ -580,4 +580,4 @@ TEST(ImageTruth, NeedsAPathAndAlbedos) {
 }
 
 }  // namespace
-}  // namespace groundray
+}  // namespace groundray::image_truth_test

@@ -13,7 +13,7 @@
 #include "core/error.h"
 #include "test/support/margin.h"
 
-namespace groundray {
+namespace groundray::imager_test {
 namespace {
 
 using ::testing::AllOf;
@@ -281,4 +281,4 @@ TEST(Imager, SaysWhatIsWrong) {
 }
 
 }  // namespace
-}  // namespace groundray
+}  // namespace groundray::imager_test

@@ -13,7 +13,7 @@
 #include "core/error.h"
 #include "test/support/margin.h"
 
-namespace groundray {
+namespace groundray::irradiance_test {
 namespace {
 
 using std::numbers::pi;
@@ -181,4 +181,4 @@ TEST(Irradiance, SaysWhatIsWrong) {
 }
 
 }  // namespace
-}  // namespace groundray
+}  // namespace groundray::irradiance_test

@@ -15,7 +15,7 @@
 #include "test/support/margin.h"
 
 // What OpenCV says, where its functions are of the same models.
-namespace groundray {
+namespace groundray::lens_opencv_test {
 namespace {
 
 using groundray::testing::LensSample;
@@ -146,4 +146,4 @@ TEST(CalibrationAgainstOpenCv, PassesThroughItsFiles) {
 }
 
 }  // namespace
-}  // namespace groundray
+}  // namespace groundray::lens_opencv_test

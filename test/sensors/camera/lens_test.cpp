@@ -18,7 +18,7 @@
 #include "test/support/lens_samples.h"
 #include "test/support/margin.h"
 
-namespace groundray {
+namespace groundray::lens_test {
 namespace {
 
 using groundray::testing::centred;
@@ -460,4 +460,4 @@ TEST(Lens, TellsEveryFaultOfItsSpec) {
 }
 
 }  // namespace
-}  // namespace groundray
+}  // namespace groundray::lens_test

@@ -20,7 +20,7 @@
 #include "test/support/solid.h"
 #include "test/support/temporary_folder.h"
 
-namespace groundray {
+namespace groundray::lidar_image_test {
 namespace {
 
 using namespace std::chrono_literals;
@@ -265,4 +265,4 @@ TEST(LidarImage, RefusesImagesThatThePathDoesNotCover) {
 }
 
 }  // namespace
-}  // namespace groundray
+}  // namespace groundray::lidar_image_test

@@ -20,7 +20,7 @@
 #include "test/support/margin.h"
 #include "test/support/solid.h"
 
-namespace groundray {
+namespace groundray::path_tracer_test {
 namespace {
 
 using std::chrono::nanoseconds;
@@ -592,4 +592,4 @@ TEST(PathTracer, RefusesDepthsThatAreNone) {
 }
 
 }  // namespace
-}  // namespace groundray
+}  // namespace groundray::path_tracer_test

@@ -12,7 +12,7 @@
 #include "core/error.h"
 #include "core/srgb.h"
 
-namespace groundray {
+namespace groundray::picture_test {
 namespace {
 
 using ::testing::AllOf;
@@ -177,4 +177,4 @@ TEST(Picture, SaysWhatIsWrong) {
 }
 
 }  // namespace
-}  // namespace groundray
+}  // namespace groundray::picture_test

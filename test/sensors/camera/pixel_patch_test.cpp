@@ -9,7 +9,7 @@
 #include "test/support/lens_samples.h"
 #include "test/support/margin.h"
 
-namespace groundray {
+namespace groundray::pixel_patch_test {
 namespace {
 
 using groundray::testing::LensSample;
@@ -56,4 +56,4 @@ INSTANTIATE_TEST_SUITE_P(Sample, PixelPatchOf, ::testing::ValuesIn(sample_lenses
                          });
 
 }  // namespace
-}  // namespace groundray
+}  // namespace groundray::pixel_patch_test

@@ -17,7 +17,7 @@
 #include "terrain/terrain_scene.h"
 #include "test/support/margin.h"
 
-namespace groundray {
+namespace groundray::rendered_calibration_test {
 namespace {
 
 using namespace std::chrono_literals;
@@ -373,4 +373,4 @@ TEST(RenderedChessboard, LetsOpenCvFindTheFisheye) {
 }
 
 }  // namespace
-}  // namespace groundray
+}  // namespace groundray::rendered_calibration_test

@@ -15,7 +15,7 @@
 #include "test/support/lens_samples.h"
 #include "test/support/margin.h"
 
-namespace groundray {
+namespace groundray::stereo_test {
 namespace {
 
 using ::testing::AllOf;
@@ -196,4 +196,4 @@ TEST(StereoRectification, IsWrittenToRosFiles) {
 }
 
 }  // namespace
-}  // namespace groundray
+}  // namespace groundray::stereo_test

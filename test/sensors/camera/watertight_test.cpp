@@ -10,7 +10,7 @@
 #include "test/support/camera_scene.h"
 #include "test/support/sample_terrain.h"
 
-namespace groundray {
+namespace groundray::watertight_test {
 namespace {
 
 using groundray::testing::plane_ground;
@@ -125,4 +125,4 @@ TEST(WatertightProof, NoRayToAnEdgeOrVertexOfAnObjectGoesThrough) {
 }
 
 }  // namespace
-}  // namespace groundray
+}  // namespace groundray::watertight_test

@@ -8,7 +8,7 @@
 #include <cmath>
 #include <limits>
 
-namespace groundray {
+namespace groundray::dem_picture_test {
 namespace {
 
 using ::testing::Each;
@@ -120,4 +120,4 @@ TEST(DemPicture, HasNorthUpAndLightFromTheNorthWest) {
 }
 
 }  // namespace
-}  // namespace groundray
+}  // namespace groundray::dem_picture_test

@@ -12,7 +12,7 @@
 #include "terrain/dem_io.h"
 #include "test/support/temporary_folder.h"
 
-namespace groundray {
+namespace groundray::dem_place_test {
 namespace {
 
 using ::testing::AllOf;
@@ -123,4 +123,4 @@ TEST(DemPlace, RefusesAnotherCrs) {
 }
 
 }  // namespace
-}  // namespace groundray
+}  // namespace groundray::dem_place_test

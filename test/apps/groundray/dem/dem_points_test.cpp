@@ -19,7 +19,7 @@
 #include "reconstruction/dem/sight_bound.h"
 #include "test/support/temporary_folder.h"
 
-namespace groundray {
+namespace groundray::dem_points_test {
 namespace {
 
 using ::testing::ElementsAre;
@@ -316,4 +316,4 @@ TEST(DemSight, LinesRiseByWhatTheirPointsMayBeOff) {
 }
 
 }  // namespace
-}  // namespace groundray
+}  // namespace groundray::dem_points_test

@@ -16,7 +16,7 @@
 #include "test/support/temporary_folder.h"
 #include "test/support/wave_texture.h"
 
-namespace groundray {
+namespace groundray::dem_stereo_test {
 namespace {
 
 using std::chrono::nanoseconds;
@@ -187,4 +187,4 @@ TEST(DemStereo, NamesWhatIsWrong) {
 }
 
 }  // namespace
-}  // namespace groundray
+}  // namespace groundray::dem_stereo_test

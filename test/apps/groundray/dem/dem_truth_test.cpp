@@ -6,7 +6,7 @@
 #include <limits>
 #include <vector>
 
-namespace groundray {
+namespace groundray::dem_truth_test {
 namespace {
 
 constexpr float nan = std::numeric_limits<float>::quiet_NaN();
@@ -137,4 +137,4 @@ TEST(DemTruth, HasNoFiguresOfNothing) {
 }
 
 }  // namespace
-}  // namespace groundray
+}  // namespace groundray::dem_truth_test
