@@ -118,8 +118,8 @@ Terrain::Terrain(Loaded loaded, const TerrainDetail& detail)
       relief_(std::move(loaded.relief)) {}
 
 double Terrain::whole_bytes(glm::ivec2 samples) noexcept {
-  constexpr double bytes_per_sample = 36;  // measured
-  return bytes_per_sample * samples.x * samples.y;
+  constexpr double sample_bytes = 36;  // measured
+  return sample_bytes * samples.x * samples.y;
 }
 
 Clipmap Terrain::clipmap(const SensorBox& sensors, double reach_m) const {

@@ -18,7 +18,7 @@ namespace {
 
 // Earth is dark; light is as strong as makes it well seen.
 constexpr double exposure = 1.6;
-constexpr double patch_m = 0.5;  // points stand for so wide a part of the ground
+constexpr double point_patch_m = 0.5;  // points stand for so wide a part of the ground
 
 }  // namespace
 
@@ -70,7 +70,7 @@ void add_ground_colour(Layer& terrain, const World& world) {
     point.p_D = offset + glm::dvec3(places[3 * i], places[3 * i + 1], places[3 * i + 2]);
     for (int k = 0; k < 3; ++k)
       point.normal[k] = normals.GetComponent(static_cast<vtkIdType>(i), k);
-    const glm::u8vec3 colour = colours->shown_at(point, patch_m);
+    const glm::u8vec3 colour = colours->shown_at(point, point_patch_m);
     for (std::size_t k = 0; k < 3; ++k) rgb[3 * i + k] = colour[static_cast<glm::length_t>(k)];
   });
   add_colours(terrain, {.name = "colour", .unit = ""}, rgb);

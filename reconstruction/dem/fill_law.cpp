@@ -87,8 +87,8 @@ std::optional<FillLaw> fit_law(std::span<const FillError> errors) {
   const Eigen::Vector3d usual(0, usual_power, usual_roughness_power);
   Eigen::Vector3d factors = usual;
   level_law(samples, factors);
-  constexpr int most_steps = 50;
-  for (int step = 0; step < most_steps && improve(samples, usual, factors); ++step) {
+  constexpr int most_improvements = 50;
+  for (int step = 0; step < most_improvements && improve(samples, usual, factors); ++step) {
   }
   factors[1] = std::clamp(factors[1], 0.0, most_power);
   factors[2] = std::clamp(factors[2], 0.0, most_roughness_power);
