@@ -15,6 +15,7 @@ takes ZZZ s.
 """
 
 import concurrent.futures
+import contextlib
 import functools
 import hashlib
 import json
@@ -93,15 +94,13 @@ def commands(build: Path, root: Path) -> dict[str, str]:
     }
 
 
-def check(clang_tidy: str, build: str, path: str, stamp: Path) -> bool:
+def passes(clang_tidy: str, build: str, path: str) -> bool:
     done = subprocess.run(
         [clang_tidy, "-p", build, "--quiet", path], capture_output=True, text=True, check=False
     )
-    noise = re.compile(r"^\d+ warnings?( and \d+ errors?)? generated")
-    said = [line for line in done.stderr.splitlines() if not noise.match(line)]
-    if done.returncode == 0:
-        stamp.touch()
-    else:
+    if done.returncode != 0:
+        noise = re.compile(r"^\d+ warnings?( and \d+ errors?)? generated")
+        said = [line for line in done.stderr.splitlines() if not noise.match(line)]
         print(done.stdout, *said, sep="\n", flush=True)
     return done.returncode == 0
 
@@ -109,8 +108,9 @@ def check(clang_tidy: str, build: str, path: str, stamp: Path) -> bool:
 def delete_old(folder: Path) -> None:
     oldest = time.time() - KEPT_DAYS * 86400
     for stamp in folder.iterdir():
-        if stamp.stat().st_mtime < oldest:
-            stamp.unlink(missing_ok=True)
+        with contextlib.suppress(FileNotFoundError):  # another clone may delete it too
+            if stamp.stat().st_mtime < oldest:
+                stamp.unlink()
 
 
 def main() -> int:
@@ -121,21 +121,32 @@ def main() -> int:
     command_of = commands(Path(build), root)
     folder = stamp_folder()
     folder.mkdir(parents=True, exist_ok=True)
-    wanted = []
+
+    def stamp(tree: SourceTree, path: str) -> Path:
+        # For a source of no target, clang-tidy takes the command of one whose name is near.
+        command = command_of.get(path) or json.dumps(command_of)
+        return folder / tree.stamp(path, f"{common}\0{command}")
+
+    wanted = {}
     for path in map(os.path.normpath, sources):
-        stamp = folder / tree.stamp(path, f"{common}\0{command_of.get(path)}")
-        if stamp.exists():
-            stamp.touch()
+        passed = stamp(tree, path)
+        if passed.exists():
+            passed.touch()
         else:
-            wanted.append((path, stamp))
-    delete_old(folder)
+            wanted[path] = passed
+
+    def check(path: str) -> bool:
+        good = passes(clang_tidy, build, path)
+        if good and stamp(SourceTree(root), path) == wanted[path]:  # not changed meanwhile
+            wanted[path].touch()
+        return good
+
     with concurrent.futures.ThreadPoolExecutor(os.cpu_count()) as pool:
-        passed = list(pool.map(lambda job: check(clang_tidy, build, *job), wanted))
-    print(
-        f"clang-tidy: {len(sources)} sources, {len(sources) - len(wanted)} passed before, "
-        f"{passed.count(False)} failed"
-    )
-    return 0 if all(passed) else 1
+        failed = list(pool.map(check, wanted)).count(False)
+    delete_old(folder)
+    before = len(sources) - len(wanted)
+    print(f"clang-tidy: {len(sources)} sources, {before} passed before, {failed} failed")
+    return 1 if failed else 0
 
 
 if __name__ == "__main__":

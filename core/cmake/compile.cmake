@@ -9,7 +9,8 @@ if(CCACHE)
     CCACHE_NOHASHDIR=1                    # -ffile-prefix-map below keeps the folder out of objects
     CCACHE_ABSSTDERR=1                    # messages name files by absolute paths all the same
     CCACHE_SLOPPINESS=pch_defines,time_macros)  # without it nothing that uses a precompiled header is cached
-  if(NOT DEFINED ENV{CCACHE_MAXSIZE})
+  execute_process(COMMAND ${CCACHE} --get-config max_size OUTPUT_VARIABLE cache_size)
+  if(cache_size MATCHES "^5\\.0")  # ccache's default, which is too little for all builds of CI
     list(APPEND cache_settings CCACHE_MAXSIZE=10G)
   endif()
   set(CMAKE_CXX_COMPILER_LAUNCHER ${CMAKE_COMMAND} -E env ${cache_settings} ${CCACHE})
@@ -97,6 +98,12 @@ function(join_sources target)
       file(CONFIGURE OUTPUT ${joined} CONTENT "${includes}" @ONLY)
       target_sources(${target} PRIVATE ${joined})
       list(TRANSFORM places PREPEND ${PROJECT_SOURCE_DIR}/)
+      foreach(place ${places})
+        get_source_file_property(joined_before ${place} HEADER_FILE_ONLY)
+        if(joined_before)
+          message(FATAL_ERROR "${place} is in two targets of one CMakeLists.txt: make it a library that both link")
+        endif()
+      endforeach()
       set_source_files_properties(${places} PROPERTIES HEADER_FILE_ONLY ON)
     endforeach()
   endforeach()

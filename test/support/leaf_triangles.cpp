@@ -4,6 +4,8 @@
 #include <cmath>
 #include <set>
 
+#include "test/support/real.h"
+
 namespace groundray::testing {
 namespace {
 
@@ -119,7 +121,6 @@ std::vector<SampleTriangle> leaf_triangles(const HeightGrid& grid, std::span<con
 
 std::optional<double> trace_triangles(const HeightGrid& grid,
                                       std::span<const SampleTriangle> triangles, const Ray& ray) {
-  using Real = long double;
   const glm::dvec2 origin = grid.origin_m(), step = grid.step_m();
   const Real u0 = (Real(ray.origin.x) - origin.x) / step.x, du = Real(ray.direction.x) / step.x;
   const Real v0 = (Real(ray.origin.y) - origin.y) / step.y, dv = Real(ray.direction.y) / step.y;

@@ -5,11 +5,10 @@
 #include <cstdint>
 
 #include "test/support/facet_set.h"
+#include "test/support/real.h"
 
 namespace groundray::testing {
 namespace {
-
-using Real = long double;
 
 std::int64_t floor_of(std::int64_t numerator, std::int64_t denominator) {
   const std::int64_t quotient = numerator / denominator;

@@ -6,10 +6,9 @@
 #include "core/height_grid.h"
 #include "terrain/lattice.h"
 #include "test/support/leaf_triangles.h"
+#include "test/support/real.h"
 
 namespace groundray::testing {
-
-using Real = long double;
 
 /// Whether all three samples have heights.
 bool exists(const HeightGrid& grid, const SampleTriangle& triangle);

@@ -5,10 +5,10 @@
 #include <cmath>
 #include <limits>
 
+#include "test/support/real.h"
+
 namespace groundray::testing {
 namespace {
-
-using Real = long double;
 
 struct Line {
   Real start, slope;  // coordinate at t = 0, and per metre
