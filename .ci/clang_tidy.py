@@ -8,10 +8,9 @@ of all that the verdict depends on: the texts of the source and of the headers o
 includes, directly or not; its compile command; clang-tidy's version and settings; the versions of
 installed headers. Paths count from the root of the tree, so that all clones share their stamps.
 
-Hand-written, for published caches of clang-tidy run the preprocessor to find out what a source
-includes: XXX s a source, YYY minutes of two cores for a tree in which nothing changed. Here every
-include names a file by its path from the root, so that reading the includes of the whole tree
-takes ZZZ s.
+Hand-written, for neither PyPI nor Debian has a cache of clang-tidy's results; ccache keeps none.
+Includes are read, not preprocessed: they name files by their paths from the root. For the whole
+tree that takes half a second, where clang's preprocessor takes 90.
 """
 
 import concurrent.futures

@@ -5,7 +5,7 @@
 Sources of a folder compile together, several as one (core/cmake/compile.cmake). Two definitions of
 one name are an error then, but two overloads are not: a call could silently find the other
 source's function. Reads sources as clang-format leaves them, where what begins in the first column
-is at namespace scope.
+is at namespace scope. Operators, and names that headers declare, are not compared.
 """
 
 import collections
@@ -35,7 +35,7 @@ def private_names(text: str) -> dict[str, tuple[int, str]]:
         elif line.startswith("}  // namespace"):
             spaces.pop()
         elif "" in spaces and re.match(r"[A-Za-z\[]", line):
-            line = re.sub(r"^\[\[\w+\]\] ", "", line)
+            line = re.sub(r"^\[\[\w+\]\] |<[^<>]*>", "", line)
             found = next(filter(None, (form.match(line) for form in DEFINITIONS)), None)
             if found:
                 names["::".join(filter(None, [*spaces, found[1]]))] = (number, line)
