@@ -13,7 +13,12 @@ import pytest
 from markdown_page import known_files
 
 ROOT = Path(__file__).resolve().parents[2]
-COMPILERS = [name for name in ("g++", "clang++-16") if shutil.which(name)]
+COMPILERS = [
+    pytest.param(
+        name, marks=pytest.mark.skipif(not shutil.which(name), reason=f"there is no {name}")
+    )
+    for name in ("g++", "clang++-16")
+]
 
 
 def load_clang_tidy():
