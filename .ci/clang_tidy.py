@@ -1,16 +1,16 @@
-"""Runs clang-tidy on every source that has not passed before in its present state.
+"""Runs clang-tidy on every source whose current state has not passed before.
 
     clang_tidy.py BUILD CLANG_TIDY SOURCE...
 
 BUILD holds compile_commands.json. A source that passes leaves a stamp in
 $XDG_CACHE_HOME/groundray/clang-tidy (~/.cache/groundray/clang-tidy). The name of a stamp is a hash
-of all that the verdict depends on: the texts of the source and of the headers of this tree that it
+of all inputs of the result: the texts of the source and of the headers of this tree that it
 includes, directly or not; its compile command; clang-tidy's version and settings; the versions of
-installed headers. Paths count from the root of the tree, so that all clones share their stamps.
+installed headers. Paths are relative to the root of the tree, so all clones share their stamps.
 
-Hand-written, for neither PyPI nor Debian has a cache of clang-tidy's results; ccache keeps none.
-Includes are read, not preprocessed: they name files by their paths from the root. For the whole
-tree that takes half a second, where clang's preprocessor takes 90.
+Neither PyPI nor Debian has a cache of clang-tidy's results, and ccache stores none.
+Includes are parsed, not preprocessed: they are paths from the root. This takes half a second for
+the complete tree; clang's preprocessor takes 90.
 """
 
 import concurrent.futures
@@ -26,8 +26,8 @@ import time
 from pathlib import Path
 
 INCLUDE = re.compile(r'^ *# *include *(["<])([^">]+)[">]', re.MULTILINE)
-FOLDERS = ("", "data")  # that includes name files of
-KEPT_DAYS = 90  # a stamp that nothing has asked for this long is deleted
+FOLDERS = ("", "data")  # search path of includes
+KEPT_DAYS = 90  # stamps unused for this long are deleted
 
 
 def stamp_folder() -> Path:
@@ -51,7 +51,7 @@ class SourceTree:
             if place:
                 found.append(os.path.normpath(place))
             elif mark == '"':
-                sys.exit(f'{path}: #include "{name}" names no file of this tree')
+                sys.exit(f'{path}: #include "{name}" is not a file of this tree')
         return tuple(found)
 
     def dependencies(self, path: str) -> list[str]:
@@ -122,7 +122,7 @@ def main() -> int:
     folder.mkdir(parents=True, exist_ok=True)
 
     def stamp(tree: SourceTree, path: str) -> Path:
-        # For a source of no target, clang-tidy takes the command of one whose name is near.
+        # For a source of no target, clang-tidy uses the command of a source with a similar name.
         command = command_of.get(path) or json.dumps(command_of)
         return folder / tree.stamp(path, f"{common}\0{command}")
 
@@ -136,7 +136,7 @@ def main() -> int:
 
     def check(path: str) -> bool:
         good = passes(clang_tidy, build, path)
-        if good and stamp(SourceTree(root), path) == wanted[path]:  # not changed meanwhile
+        if good and stamp(SourceTree(root), path) == wanted[path]:  # unchanged during the run
             wanted[path].touch()
         return good
 

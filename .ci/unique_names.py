@@ -4,8 +4,8 @@
 
 Sources of a folder compile together, several as one (core/cmake/compile.cmake). Two definitions of
 one name are an error then, but two overloads are not: a call could silently find the other
-source's function. Reads sources as clang-format leaves them, where what begins in the first column
-is at namespace scope. Operators, and names that headers declare, are not compared.
+source's function. Expects sources formatted by clang-format, where lines that start in the first
+column are at namespace scope. Operators, and names that headers declare, are not compared.
 """
 
 import collections

@@ -8,14 +8,14 @@
 #include <glm/common.hpp>
 #include <glm/vec3.hpp>
 
-#include "core/image.h"
+#include "core/image/image.h"
 
-// What previews are painted with.
+// Painting of previews.
 namespace groundray {
 
 using Colour = glm::dvec3;  ///< red, green and blue, 0 to 1
 
-/// Paints a pixel; beside the image it does nothing.
+/// Paints a pixel; does nothing outside the image.
 inline void paint(Image8& image, int x, int y, const Colour& colour) {
   if (x < 0 || y < 0 || x >= image.width() || y >= image.height()) return;
   const auto pixel = image.at(x, y);
@@ -25,8 +25,8 @@ inline void paint(Image8& image, int x, int y, const Colour& colour) {
   }
 }
 
-/// Returns the colour of a place between near, 0 and yellow, and far, 1 and violet, by five colours
-/// of the viridis map.
+/// Maps 0 (near, yellow) to 1 (far, violet) to a colour, by interpolation of five colours of
+/// viridis. Other values are clamped.
 inline Colour range_colour(double share) {
   constexpr std::array<std::array<double, 3>, 5> map = {{{0.993, 0.906, 0.144},
                                                          {0.369, 0.789, 0.383},

@@ -55,7 +55,7 @@ void Progress::update(std::uint64_t done) {
 
 void Progress::draw(const std::string& line) {
   const char* const end = terminal_ && !finished_ ? "" : "\n";
-  // Blanks cover what a longer line left.
+  // Blanks overwrite the rest of a longer line.
   const std::string text =
       terminal_ ? fmt::format("\r{:<{}}{}", line, drawn_width_, end) : line + end;
   std::fputs(text.c_str(), out_);

@@ -8,21 +8,22 @@
 
 namespace groundray {
 
-/// Reports long work: on a terminal one line, `scans 3/10, 2.1/s, 3 s left`, redrawn at most ten
-/// times a second; elsewhere a plain line at most every 5 s; and one at the end. Faults of the
-/// stream are ignored, for the work matters more. One thread at a time may call it.
+/// Reports the progress of long work: on a terminal one line, `scans 3/10, 2.1/s, 3 s left`,
+/// redrawn at most ten times a second; elsewhere a plain line at most every 5 s; and one at the
+/// end. Errors of the stream are ignored so that the work continues. Only one thread at a time may
+/// call it.
 class Progress {
  public:
-  /// @param out    where to report; nullptr for nowhere. Must outlive this.
-  /// @param label  what is being done: "scans".
-  /// @param total  how many steps there are.
+  /// @param out    stream to report to; nullptr for none. Must outlive this.
+  /// @param label  name of the steps: "scans".
+  /// @param total  number of steps.
   Progress(std::FILE* out, std::string label, std::uint64_t total);
-  /// Ends the line if work stopped early, so that what is printed next begins a line of its own.
+  /// Ends the line if work stopped early, so that later output begins on a new line.
   ~Progress();
   Progress(const Progress&) = delete;
   Progress& operator=(const Progress&) = delete;
 
-  /// Notes that `done` of the steps are done.
+  /// Records that `done` steps are complete.
   void update(std::uint64_t done);
 
  private:
@@ -38,7 +39,7 @@ class Progress {
   std::chrono::steady_clock::time_point reported_;
 };
 
-/// Returns a duration as people write it: "0.4 s", "12 s", "3 min 20 s", "2 h 5 min".
+/// Returns a duration in readable form: "0.4 s", "12 s", "3 min 20 s", "2 h 5 min".
 std::string duration_text(std::chrono::duration<double> duration);
 
 }  // namespace groundray

@@ -10,7 +10,7 @@ namespace groundray {
 
 double quantile(std::vector<double> values, double share) {
   if (values.empty()) return std::numeric_limits<double>::quiet_NaN();
-  constexpr double rounding = 1e-12;  // 0.95 of 20 is 19, and no more
+  constexpr double rounding = 1e-12;  // so that 0.95 of 20 is 19 despite rounding
   const double count = std::ceil(share * static_cast<double>(values.size()) * (1 - rounding));
   const auto at = values.begin() + static_cast<std::ptrdiff_t>(std::max(count, 1.0)) - 1;
   std::ranges::nth_element(values, at);

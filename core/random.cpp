@@ -11,7 +11,7 @@
 namespace groundray {
 namespace {
 
-// 52 bits and a half step: never 0, never 1.
+// Maps 52 bits to (0, 1), with a half step added: never 0, never 1.
 double open_unit(std::uint32_t high, std::uint32_t low) noexcept {
   const std::uint64_t bits = (std::uint64_t{high} << 32 | low) >> 12;
   return (static_cast<double>(bits) + 0.5) * 0x1p-52;
@@ -20,7 +20,7 @@ double open_unit(std::uint32_t high, std::uint32_t low) noexcept {
 }  // namespace
 
 std::array<std::uint32_t, 4> random_bits(const RandomKey& key) noexcept {
-  // A sensor has at most 2^20 sub-rays of a pulse and 2^12 streams, so both share a counter word.
+  // A pulse has at most 2^20 sub-rays and 2^12 streams, so both share a word of the counter.
   const r123::Philox4x32::ctr_type counter = {
       {key.frame, key.pulse, key.sub_ray << 12 | static_cast<std::uint32_t>(key.stream),
        key.sensor}};
@@ -44,7 +44,7 @@ glm::dvec2 random_normal(const RandomKey& key) noexcept {
 
 namespace {
 
-// log(n!), by Stirling's series above 9: the next term is less than 1e-12.
+// Returns log(n!), for n above 9 by Stirling's series, whose first omitted term is less than 1e-12.
 double log_factorial(double n) noexcept {
   constexpr std::array<double, 10> small{1, 1, 2, 6, 24, 120, 720, 5040, 40320, 362880};
   if (n < 10) return std::log(small[static_cast<std::size_t>(n)]);
@@ -53,7 +53,7 @@ double log_factorial(double n) noexcept {
          (1.0 / 12 - inverse * (1.0 / 360 - inverse * (1.0 / 1260 - inverse / 1680))) / m;
 }
 
-// Counts how many arrivals fit, for means below 10.
+// Samples by inversion of the cumulative distribution, for means below 10.
 double poisson_by_inversion(const RandomKey& key, double mean) noexcept {
   double left = random_uniform(key).x, probability = std::exp(-mean), count = 0;
   while (left > probability && probability > 0) {

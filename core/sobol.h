@@ -6,16 +6,16 @@
 
 namespace groundray {
 
-/// Points that fill the unit square evenly, pair of dimensions by pair: Sobol's first two
-/// dimensions, scrambled as Owen does by hashing, and in an order that is shuffled anew for each
-/// pair. Every power of two of points from the start is a net: each elementary interval has its
-/// share of them.
+/// Points that fill the unit square evenly, one pair of dimensions after the other: Sobol's first
+/// two dimensions, with hash-based Owen scrambling and in an order that is shuffled anew for each
+/// pair. The first 2^k points form a net for every k: all elementary intervals contain equal
+/// numbers of them.
 /// @see Burley, Practical hash-based Owen scrambling, JCGT 9(4) (2020); Laine and Karras,
 ///      Stratified sampling for stochastic transparency, EGSR (2011); constants of the hash:
 ///      Vegdahl, Building a better LK hash (2021).
 class SobolPairs {
  public:
-  /// @param seed  of a pixel and frame: sequences of different seeds are independent.
+  /// @param seed  identifies pixel and frame: sequences of different seeds are independent.
   /// @param index  of the sample in its sequence.
   constexpr SobolPairs(std::uint32_t seed, std::uint32_t index) : seed_(seed), index_(index) {}
 
@@ -28,7 +28,8 @@ class SobolPairs {
     return {x * 0x1p-32, y * 0x1p-32};
   }
 
-  /// A hash that mixes all bits. @see Ellis and Wellons, lowbias32 (2018).
+  /// Returns a hash that mixes all bits.
+  /// @see Ellis and Wellons, lowbias32 (2018).
   static constexpr std::uint32_t mixed(std::uint32_t x) noexcept {
     x ^= x >> 16;
     x *= 0x7feb352du;
@@ -45,7 +46,7 @@ class SobolPairs {
     x = (x >> 8 & 0x00ff00ffu) | (x & 0x00ff00ffu) << 8;
     return x >> 16 | x << 16;
   }
-  // Flips each bit by a hash of the bits below it.
+  // Flips each bit depending on a hash of the bits below it.
   static constexpr std::uint32_t flipped(std::uint32_t x, std::uint32_t seed) noexcept {
     x ^= x * 0x3d20adeau;
     x += seed;
@@ -56,13 +57,13 @@ class SobolPairs {
   static constexpr std::uint32_t scrambled(std::uint32_t x, std::uint32_t seed) noexcept {
     return reversed(flipped(reversed(x), seed));
   }
-  // The first dimension of Sobol is the index with its bits reversed, so that the reversal before
-  // the flips and that of the dimension undo each other.
+  // The first Sobol dimension is the index with its bits reversed; this reversal and the one before
+  // the flips cancel each other.
   static constexpr std::uint32_t reversed_scramble(std::uint32_t x, std::uint32_t seed) noexcept {
     return reversed(flipped(x, seed));
   }
-  // The second dimension with its bits reversed: each the sum of those
-  // bits whose number has all the bits of its own, Pascal's triangle modulo 2.
+  // Returns the second Sobol dimension with its bits reversed. Bit i is the sum modulo 2 of those
+  // bits of x whose number has all the bits of i: Pascal's triangle modulo 2.
   static constexpr std::uint32_t second(std::uint32_t x) noexcept {
     x ^= x >> 16;
     x ^= x >> 8 & 0x00ff00ffu;

@@ -8,7 +8,7 @@
 #include <string>
 #include <string_view>
 
-#include "terrain/asset.h"
+#include "terrain/assets/asset.h"
 
 namespace {
 

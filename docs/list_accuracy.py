@@ -1,12 +1,12 @@
-"""Writes the table of docs/accuracy.md: what is claimed (claims.yaml), and what the last run found.
+"""Writes the tables of docs/accuracy/*.md and the summary of docs/accuracy.md.
 
     python docs/list_accuracy.py [BUILD] [GOLDEN]
 
-BUILD is the folder whose results/ `./dev test` and `./dev prove` wrote, build/release if not given,
-and GOLDEN that of the report of `./dev golden`, out/golden. Every test that a claim names must have
-run and passed; else nothing is written, and the tests, or the results that are not there, are
-listed. A figure beyond its limit is no failure by itself: times are, where much else runs. It is
-told beside the claim and above the table.
+BUILD is the folder with the results/ of `./dev test` and `./dev prove`, by default build/release,
+and GOLDEN that of the report of `./dev golden`, by default out/golden. Every test that a claim
+names must have run and passed; otherwise nothing is written, and the failed tests or missing
+results are listed. A figure beyond its limit is not a failure by itself, since times exceed limits
+on a busy machine. It is reported beside the claim and above the table.
 """
 
 import json
@@ -22,24 +22,25 @@ from pathlib import Path
 import yaml
 
 ROOT = Path(__file__).resolve().parents[1]
-PAGE = ROOT / "docs/accuracy.md"
+SUMMARY = ROOT / "docs/accuracy.md"
+PAGES = ROOT / "docs/accuracy"
 BEGIN = "<!-- What follows is by docs/list_accuracy.py, of docs/claims.yaml and the last run. -->\n"
 END = "<!-- What follows is by hand. -->\n"
-AT_FULL_SIZE = "at full size only"  # so begins why a proof is skipped at a reduced size
-ROUNDING = 1e-9  # of a share: a figure that meets its limit is not over it
+AT_FULL_SIZE = "at full size only"  # prefix of a proof's skip reason at a reduced size
+ROUNDING = 1e-9  # relative: a figure that equals its limit is not over it
 
 
 class AccuracyError(Exception):
-    """Says what is wrong, where, and what to do."""
+    """An invalid claim or missing results, with location and remedy."""
 
 
 @dataclass
 class Result:
-    """What runs of a test or a golden case found, of all its parameters."""
+    """Results of a test or a golden case over all its parameters."""
 
     verdicts: set[str] = field(default_factory=set)  # passed, failed, skipped, not run
     margins: dict[str, tuple] = field(default_factory=dict)  # share, measured, tolerance, unit
-    sizes: set[str] = field(default_factory=set)  # full, reduced; none if there is but one
+    sizes: set[str] = field(default_factory=set)  # full, reduced; empty for tests of one size
     reasons: set[str] = field(default_factory=set)  # why it was skipped
 
     def add(self, verdict: str, margins: dict[str, tuple]) -> None:
@@ -49,7 +50,7 @@ class Result:
 
 @dataclass
 class Run:
-    """Results by the tests' names, and what the page says of the run."""
+    """Results by test name, and the facts of the run that the page states."""
 
     results: dict[str, Result] = field(default_factory=dict)
     days: set[date] = field(default_factory=set)
@@ -62,18 +63,19 @@ class Run:
 
 
 def keep_nearest(margins: dict[str, tuple], others: dict[str, tuple]) -> None:
-    """Keeps of margins of one name that which is nearest its tolerance."""
+    """Keeps the margin of each name that is nearest its tolerance."""
     for name, margin in others.items():
         if name not in margins or margins[name][0] < margin[0]:
             margins[name] = margin
 
 
-def read_claims() -> list[dict]:
+def read_claims() -> dict[str, list[dict]]:
+    """Returns the claims of each page of docs/accuracy."""
     return yaml.safe_load((ROOT / "docs/claims.yaml").read_text())
 
 
 def tests_of_file(file: Path) -> list[str]:
-    """Returns the names of the tests that a source file holds."""
+    """Returns the names of the tests in a source file."""
     text = file.read_text()
     if file.suffix == ".py":
         return re.findall(r"^def (test_\w+)", text, re.MULTILINE)
@@ -82,7 +84,7 @@ def tests_of_file(file: Path) -> list[str]:
 
 
 def tests_by_file() -> dict[str, list[str]]:
-    """Returns the names of all tests, by the names of their files."""
+    """Returns the names of all tests by file name."""
     files = [file for suffix in ("cpp", "py") for file in ROOT.glob(f"test/**/*_test.{suffix}")]
     by_file: dict[str, list[str]] = {}
     for file in sorted(files):
@@ -95,7 +97,7 @@ def golden_cases() -> list[str]:
 
 
 def tests_of_claim(claim: dict, by_file: dict[str, list[str]], cases: list[str]) -> list[str]:
-    """Returns the names of the tests and cases that hold a claim, none of which may be unknown."""
+    """Returns the names of the tests and cases that support a claim; all must exist."""
     names = []
     for test in claim.get("tests", []):
         is_file = test.endswith((".cpp", ".py"))
@@ -125,7 +127,7 @@ def verdict_of(test: ET.Element) -> str:
 
 
 def margin_of(text: str) -> tuple:
-    """Reads what test/support/margin.h writes, and tests in Python as it does."""
+    """Reads a margin as written by test/support/margin.h and by tests in Python."""
     share, measured, tolerance, *unit = text.split(" ", 3)
     nearest = math.inf if math.isnan(float(share)) else float(share)
     return nearest, float(measured), float(tolerance), "".join(unit)
@@ -136,7 +138,7 @@ def is_over(margin: tuple) -> bool:
 
 
 def reason_of(skipped: ET.Element) -> str:
-    """Returns what a test says of why it was skipped, without where in the source it says so."""
+    """Returns the reason why a test was skipped, without the source location."""
     said = (skipped.get("message") or "").splitlines()
     reason = " ".join(said[1:] if len(said) > 1 else said).strip()
     return reason.replace(f"{ROOT}/", "").replace(f"{ROOT.parent}/", "../")
@@ -156,12 +158,12 @@ def add_test(test: ET.Element, name: str, run: Run) -> None:
 
 
 def suite_of(name: str) -> str:
-    """Returns a suite as the source names it, without what instantiates it: All/Cubes, Cubes/0."""
+    """Returns a suite's name in the source, without its instantiation: All/Cubes, Cubes/0."""
     return next(part for part in reversed(name.split("/")) if not part.isdigit())
 
 
 def listed_results(build: Path) -> list[Path]:
-    """Returns the files that CTest has the tests write."""
+    """Returns the result files that CTest passes to the tests."""
     lists = [*sorted((build / "test").glob("*_tests.cmake")), build / "test/CTestTestfile.cmake"]
     text = "".join(file.read_text() for file in lists)
     return [Path(file) for file in re.findall(r"--gtest_output=xml:(.*?\.xml)[\]\"]", text)]
@@ -175,7 +177,7 @@ def read_cpp_results(file: Path, run: Run) -> None:
 
 
 def read_python_results(file: Path, run: Run) -> None:
-    """Takes these results in place of those that the run has of the same tests."""
+    """Replaces the run's results of the same tests."""
     found = Run()
     for test in ET.parse(file).getroot().iter("testcase"):
         add_test(test, test.get("name").split("[")[0], found)
@@ -184,7 +186,7 @@ def read_python_results(file: Path, run: Run) -> None:
 
 
 def read_golden_results(file: Path, run: Run) -> None:
-    """Of measures with a limit the nearest to it; where some rows may be beyond, not the worst."""
+    """Keeps the measure nearest its limit; not the worst row where some may exceed it."""
     report = json.loads(file.read_text())
     facts = {fact["name"]: fact["value"] for fact in report["facts"]}
     run.made_by = f"version {facts['version']} ({facts['made with']})"
@@ -249,18 +251,18 @@ def text_of_margin(name: str, margin: tuple) -> str:
 def why_skipped(result: Result) -> str:
     if result.reasons and all(reason.startswith(AT_FULL_SIZE) for reason in result.reasons):
         return "runs at full size only"
-    return ": ".join(["needs what is absent", *sorted(result.reasons - {""})])
+    return ": ".join(["lacks a prerequisite", *sorted(result.reasons - {""})])
 
 
 def size_of(names: list[str], run: Run) -> str:
-    """Returns the size at which tests ran, if they are of those that grow."""
+    """Returns the size at which tests ran, if they have two sizes."""
     sizes = {name: run.results[name].sizes for name in names if run.results[name].sizes}
     reduced = [name for name, of in sizes.items() if "reduced" in of]
     if not sizes:
         return ""
     if len(reduced) == len(sizes):
         return " at a reduced size"
-    return " at full size" + "".join(f", but for `{name}`" for name in reduced)
+    return " at full size" + "".join(f", except `{name}`" for name in reduced)
 
 
 def last_run(claim: dict, names: list[str], run: Run) -> str:
@@ -294,22 +296,22 @@ def text_of_tests(claim: dict) -> str:
     golden = ", ".join(f"`{case}`" for case in claim.get("golden", []))
     text = ", ".join(said + ([f"golden {golden}"] if golden else []))
     if "see" in claim:
-        text += f" ([{claim['see']}]({claim['see']}))"
+        text += f" ([{Path(claim['see']).name}](../{claim['see']}))"
     return text + (f": {claim['how']}" if "how" in claim else "")
 
 
 def check(names: list[list[str]], run: Run) -> None:
-    """Every test that a claim names has run and none failed."""
+    """Raises unless every test that a claim names has run and passed."""
     faults = []
     for name in dict.fromkeys(name for some in names for name in some):
         verdicts = run.results[name].verdicts if name in run.results else {"not run"}
         faults += [f"{name}: {bad}" for bad in ("failed", "not run") if bad in verdicts]
     if faults:
-        raise AccuracyError("these hold claims but did not pass:\n  " + "\n  ".join(faults))
+        raise AccuracyError("\n  ".join(["these tests support claims but did not pass:", *faults]))
 
 
 def limits_told(run: Run) -> str:
-    """Returns how many figures of the run are over their limits, and which."""
+    """Returns a sentence that lists the figures over their limits."""
     margins = [
         (test, name, margin)
         for test, result in run.results.items()
@@ -325,7 +327,7 @@ def limits_told(run: Run) -> str:
 
 
 def sizes_told(names: list[list[str]], run: Run) -> str:
-    """Returns how many rows ran at which size."""
+    """Returns a sentence with the number of rows by size."""
     sizes = [size_of(some, run) for some in names]
     growing = len(sizes) - sizes.count("")
     full, reduced = sizes.count(" at full size"), sizes.count(" at a reduced size")
@@ -335,20 +337,16 @@ def sizes_told(names: list[list[str]], run: Run) -> str:
     return f"{growing} of {len(sizes)} rows have tests of two sizes: {told}; each row says which."
 
 
-def table(claims: list[dict], run: Run) -> str:
-    """Returns what stands between the page's two comments."""
-    by_file, cases = tests_by_file(), golden_cases()
-    names = [tests_of_claim(claim, by_file, cases) for claim in claims]
-    check(names, run)
+def summary(names: list[list[str]], run: Run) -> str:
+    """Returns what the run was, and which of its figures are over their limits."""
     days = sorted({min(run.days), max(run.days)})
-    lines = [
-        f"The last run: {run.made_by}, {' to '.join(map(str, days))}. {sizes_told(names, run)}",
-        "",
-        limits_told(run),
-        "",
-        "| claim | test | tolerance, and why | last run |",
-        "|---|---|---|---|",
-    ]
+    made = f"The last run: {run.made_by}, {' to '.join(map(str, days))}. {sizes_told(names, run)}"
+    return f"{made}\n\n{limits_told(run)}\n"
+
+
+def table(claims: list[dict], names: list[list[str]], run: Run) -> str:
+    """Returns a page's table."""
+    lines = ["| claim | test | tolerance, and why | last run |", "|---|---|---|---|"]
     for claim, some in zip(claims, names, strict=True):
         cells = [claim["claim"], text_of_tests(claim), claim["tolerance"]]
         cells.append(last_run(claim, some, run))
@@ -356,7 +354,20 @@ def table(claims: list[dict], run: Run) -> str:
     return "\n".join(lines) + "\n"
 
 
-def write_table(page: Path, made: str) -> None:
+def texts(claims: dict[str, list[dict]], run: Run) -> dict[Path, str]:
+    """Returns the text between the two comments of the summary and of each page."""
+    by_file, cases = tests_by_file(), golden_cases()
+    names = {
+        page: [tests_of_claim(claim, by_file, cases) for claim in some]
+        for page, some in claims.items()
+    }
+    every = [some for of_page in names.values() for some in of_page]
+    check(every, run)
+    tables = {PAGES / f"{page}.md": table(claims[page], names[page], run) for page in claims}
+    return {SUMMARY: summary(every, run)} | tables
+
+
+def write_text(page: Path, made: str) -> None:
     text = page.read_text()
     if text.count(BEGIN) != 1 or text.count(END) != 1:
         raise AccuracyError(f"{page}: must have these two lines once: {BEGIN}{END}")
@@ -368,7 +379,8 @@ def main() -> None:
     build = Path(sys.argv[1]) if len(sys.argv) > 1 else ROOT / "build/release"
     golden = Path(sys.argv[2]) if len(sys.argv) > 2 else ROOT / "out/golden"
     try:
-        write_table(PAGE, table(read_claims(), read_run(build, golden)))
+        for page, text in texts(read_claims(), read_run(build, golden)).items():
+            write_text(page, text)
     except AccuracyError as fault:
         sys.exit(f"list_accuracy: {fault}")
 

@@ -5,8 +5,8 @@
 namespace groundray {
 namespace {
 
-constexpr double unmet_sigmas = 8;     // an end so far away is never met: 1e-15
-constexpr double widest_spread = 1e4;  // of the interval's length: from there on both ends alone
+constexpr double unmet_sigmas = 8;     // an end this far away has no effect: 1e-15
+constexpr double widest_spread = 1e4;  // in interval lengths: beyond it only the two ends matter
 
 double density(double z) {
   return std::exp(-0.5 * z * z) * std::numbers::inv_sqrtpi / std::numbers::sqrt2;

@@ -6,15 +6,17 @@
 
 namespace groundray {
 
-/// Returns the standard deviation of a normal number of mean 0 and this deviation, of which what
-/// leaves [lowest, highest] is put on its nearer end; in the unit of all three.
+/// Returns the standard deviation of a normal number of mean 0 and standard deviation `deviation`
+/// after clamping to [lowest, highest]; all in the same unit.
 double clamped_normal_deviation(double deviation, double lowest, double highest) noexcept;
 
-/// A place on one side of 0 and its weight in a quadrature rule; there is another on the other.
+/// Node of a symmetric quadrature rule: its position on one side of 0, and its weight. The mirrored
+/// node has the same weight.
 struct QuadratureNode {
   double position = 0, weight = 0;
 };
-/// Abramowitz and Stegun, Handbook of Mathematical Functions (1964), table 25.4: 16 points.
+/// Gauss-Legendre rule of 16 points: Abramowitz and Stegun, Handbook of Mathematical Functions
+/// (1964), table 25.4.
 inline constexpr std::array legendre_16{QuadratureNode{0.095012509837637440, 0.189450610455068496},
                                         QuadratureNode{0.281603550779258913, 0.182603415044923589},
                                         QuadratureNode{0.458016777657227386, 0.169156519395002538},
@@ -23,14 +25,14 @@ inline constexpr std::array legendre_16{QuadratureNode{0.095012509837637440, 0.1
                                         QuadratureNode{0.865631202387831744, 0.095158511682492785},
                                         QuadratureNode{0.944575023073232576, 0.062253523938647893},
                                         QuadratureNode{0.989400934991649933, 0.027152459411754095}};
-/// Mean over standard normal numbers by 5 points, one of them 0, which has the rest of the weight:
-/// positions sqrt(5 -+ sqrt(10)), weights (7 +- 2 sqrt(10)) / 60 (table 25.10).
+/// Rule of 5 points for means over the standard normal distribution. The point at 0 has the rest of
+/// the weight; positions sqrt(5 -+ sqrt(10)), weights (7 +- 2 sqrt(10)) / 60 (table 25.10).
 inline constexpr std::array hermite_5{QuadratureNode{1.355626179974266, 0.2220759220056126},
                                       QuadratureNode{2.856970013872806, 0.01125741132772069}};
 
 /// Returns the standard deviation of value(z) over those standard normal numbers z that exceed
-/// `least`, by quadrature: to 1e-3 of itself for a smooth `value`, and to 2 % for one with a root's
-/// singularity beside `least`.
+/// `least`, by quadrature. The relative error is 1e-3 for a smooth `value`, and 2 % for one with
+/// the singularity of a square root near `least`.
 template <typename Value>
 double deviation_above(double least, const Value& value) noexcept {
   constexpr double reach = 5;  // the density falls by exp(-reach^2 / 2)
@@ -38,7 +40,7 @@ double deviation_above(double least, const Value& value) noexcept {
   const double low = std::max(least, -reach);
   const double high = std::hypot(std::max(low, 0.0), reach);
   const double middle = is_whole ? 0 : 0.5 * (low + high), half = 0.5 * (high - low);
-  const double origin = value(middle);  // so that differences alone are squared
+  const double origin = value(middle);  // so that only differences are squared
   double weights = 0, sum = 0, squares = 0;
   const auto add = [&](double z, double weight) {
     const double offset = value(z) - origin;

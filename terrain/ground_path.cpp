@@ -8,7 +8,7 @@
 #include <utility>
 
 #include "core/error.h"
-#include "core/pose.h"
+#include "core/geometry/pose.h"
 
 namespace groundray {
 namespace {
@@ -26,7 +26,7 @@ struct Cubic {
   glm::dvec2 at(double t) const { return c[0] + t * (c[1] + t * (c[2] + t * c[3])); }
   glm::dvec2 velocity(double t) const { return c[1] + t * (2.0 * c[2] + t * (3.0 * c[3])); }
 
-  // Gauss-Legendre quadrature with five nodes.
+  // Returns the arc length, by Gauss-Legendre quadrature with five nodes.
   double length_m(double t_begin, double t_end) const {
     constexpr std::array<std::pair<double, double>, 5> nodes{
         {{0, 0.5688888888888889},
@@ -43,8 +43,8 @@ struct Cubic {
   }
 };
 
-// The Catmull-Rom segment from p[1] to p[2], with knots as far apart as the square roots of the
-// chords.
+// Returns the centripetal Catmull-Rom segment from p[1] to p[2]: the knots are separated by the
+// square roots of the chords.
 Cubic catmull_rom(const std::array<glm::dvec2, 4>& p) {
   const double before = std::sqrt(glm::distance(p[0], p[1]));
   const double across = std::sqrt(glm::distance(p[1], p[2]));
@@ -56,7 +56,7 @@ Cubic catmull_rom(const std::array<glm::dvec2, 4>& p) {
   return {{p[1], m1, 3.0 * chord - 2.0 * m1 - m2, m1 + m2 - 2.0 * chord}};
 }
 
-// A curve through waypoints, by length along it.
+// Curve through waypoints, parametrised by arc length.
 class Curve {
  public:
   struct Point {
@@ -85,7 +85,7 @@ class Curve {
     const auto after = std::ranges::upper_bound(pieces_, s_m, {}, &Piece::start_m);
     const Piece& piece = *std::prev(after);
     double t = piece.t;
-    for (int step = 0; step < 20; ++step) {  // Newton's method; three or four steps do
+    for (int step = 0; step < 20; ++step) {  // Newton's method; three or four steps suffice
       const double rest_m = s_m - piece.start_m - piece.cubic.length_m(piece.t, t);
       if (std::abs(rest_m) <= 1e-14 * length_m_) break;
       t = std::clamp(t + rest_m / glm::length(piece.cubic.velocity(t)), piece.t,
@@ -96,17 +96,17 @@ class Curve {
   }
 
  private:
-  static constexpr int pieces_per_segment = 64;  // of each segment, short enough for the quadrature
+  static constexpr int pieces_per_segment = 64;  // short enough for the quadrature
   struct Piece {
     Cubic cubic;
-    double t;        // where it begins on its segment
-    double start_m;  // and on the curve
+    double t;        // parameter of its start on the segment
+    double start_m;  // arc length of its start on the curve
   };
   std::vector<Piece> pieces_;
   double length_m_ = 0;
 };
 
-// A vehicle on the ground: poses from the heights below its centre and its wheels.
+// Vehicle on the ground: poses from the heights below its centre and its wheels.
 class Vehicle {
  public:
   Vehicle(const Ground& ground, double height_m, glm::dvec2 footprint_m)
@@ -121,7 +121,8 @@ class Vehicle {
     const double front_right = ground_m(point.p_m + ahead - left, "front right wheel", time);
     const double rear_left = ground_m(point.p_m - ahead + left, "rear left wheel", time);
     const double rear_right = ground_m(point.p_m - ahead - left, "rear right wheel", time);
-    // The plane's slopes forward and to the left: least squares over four corners of a rectangle.
+    // Slopes of the plane forward and to the left: least squares over the four corners of a
+    // rectangle.
     const double forward =
         (front_left + front_right - rear_left - rear_right) / (2 * footprint_m_.x);
     const double leftward =
@@ -156,17 +157,17 @@ void check_waypoints(std::span<const glm::dvec2> p, Violations& broken) {
                   p[i].x, p[i].y);
     if (i == 0) continue;
     const double chord_m = glm::distance(p[i - 1], p[i]);
-    broken.unless(!(chord_m < least_spacing_m),
-                  "waypoints_m[{}] lies {} m from the one before; it must lie {} m off or more: is "
-                  "it there twice?",
-                  i, chord_m, least_spacing_m);
+    broken.unless(
+        !(chord_m < least_spacing_m),
+        "waypoints_m[{}] is {} m from the previous one; the distance must be {} m or more: "
+        "is it a duplicate?",
+        i, chord_m, least_spacing_m);
     if (i + 1 == p.size()) continue;
     const glm::dvec2 in = glm::normalize(p[i] - p[i - 1]);
     const glm::dvec2 out = glm::normalize(p[i + 1] - p[i]);
-    broken.unless(
-        !(glm::distance(in, -out) < 1e-3),
-        "the path turns back on itself at waypoints_m[{}] = ({}, {}); give it points to turn round",
-        i, p[i].x, p[i].y);
+    broken.unless(!(glm::distance(in, -out) < 1e-3),
+                  "the path reverses at waypoints_m[{}] = ({}, {}); add waypoints for the turn", i,
+                  p[i].x, p[i].y);
   }
 }
 
@@ -187,10 +188,10 @@ Trajectory build_ground_path(const Ground& ground, const GroundPathSpec& spec) {
 
   const Curve curve(spec.waypoints_m);
   const double drive_m = spec.speed_m_s * duration_s;
-  constexpr double rounding = 1e-9;  // of lengths that are meant to be equal
+  constexpr double rounding = 1e-9;  // tolerance for lengths that are meant to be equal
   broken.unless(drive_m <= curve.length_m() * (1 + rounding),
-                "the curve through the waypoints is {:.3f} m long but {} s at {} m/s take {:.3f} "
-                "m; drive shorter or slower, or add waypoints",
+                "the curve through the waypoints is {:.3f} m long, but {} s at {} m/s cover {:.3f} "
+                "m; reduce the duration or the speed, or add waypoints",
                 curve.length_m(), duration_s, spec.speed_m_s, drive_m);
   broken.throw_if_any();
 

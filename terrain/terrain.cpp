@@ -9,9 +9,9 @@
 #include <utility>
 
 #include "core/error.h"
-#include "terrain/byte_hash.h"
-#include "terrain/deviation.h"
-#include "terrain/refined_tiles.h"
+#include "terrain/dem/byte_hash.h"
+#include "terrain/lod/deviation.h"
+#include "terrain/relief/refined_tiles.h"
 
 namespace groundray {
 namespace {
@@ -47,7 +47,7 @@ bool fits(glm::ivec2 samples, const TerrainDetail& detail) {
   return Terrain::whole_bytes(samples) <= static_cast<double>(memory_bytes(detail));
 }
 
-// What the DEM is told apart by.
+// Returns hashes of heights and grid, which identify the DEM.
 std::string fingerprint_of(const HeightGrid& grid) {
   const double place[] = {grid.origin_m().x, grid.origin_m().y, grid.step_m().x, grid.step_m().y};
   return fmt::format("{:016x}{:016x}", byte_hash(bytes_of(grid.heights_m())),
@@ -56,7 +56,8 @@ std::string fingerprint_of(const HeightGrid& grid) {
 
 }  // namespace
 
-// Loads a DEM as whole or by tiles, as the surface that `relief` makes of it asks for.
+// Loads a DEM without its relief, as a whole or by tiles, depending on the size of the surface with
+// `relief`, which may be null.
 Terrain::Loaded Terrain::load_dem_alone(const std::filesystem::path& path,
                                         const DemOptions& options, const TerrainDetail& detail,
                                         const Progress& progress, const Relief* relief) {
@@ -118,7 +119,7 @@ Terrain::Terrain(Loaded loaded, const TerrainDetail& detail)
       relief_(std::move(loaded.relief)) {}
 
 double Terrain::whole_bytes(glm::ivec2 samples) noexcept {
-  constexpr double sample_bytes = 36;  // measured
+  constexpr double sample_bytes = 36;  // bytes, measured
   return sample_bytes * samples.x * samples.y;
 }
 

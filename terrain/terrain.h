@@ -8,55 +8,55 @@
 #include <string>
 #include <variant>
 
-#include "terrain/clipmap.h"
-#include "terrain/dem_file.h"
+#include "terrain/dem/dem_file.h"
 #include "terrain/ground.h"
-#include "terrain/relief.h"
+#include "terrain/lod/clipmap.h"
+#include "terrain/relief/relief.h"
 
 namespace groundray {
 
-/// How finely a terrain is traced, and what that may cost.
+/// Tolerances of the traced terrain, and its memory limit.
 struct TerrainDetail {
-  double tolerance_m = 0;    ///< vertical deviation from the reference surface allowed everywhere
-  double tolerance_rad = 0;  ///< and for each metre of distance from the sensors; both 0: none
-  std::uint32_t memory_mib = 4096;  ///< for the surface that is traced, as in ClipmapSettings
+  double tolerance_m = 0;    ///< vertical deviation from the reference surface permitted everywhere
+  double tolerance_rad = 0;  ///< and per metre of distance from the sensors; both 0: none
+  std::uint32_t memory_mib = 4096;  ///< limit for the traced surface, as in ClipmapSettings
 };
 
-/// A DEM ready for tracing, with relief on it if asked for: in memory as a whole if the surface
-/// fits there, else served by tiles, from its file if the DEM does not fit. Immutable; any number
-/// of threads may use it.
+/// DEM ready for tracing, with relief on request. It is kept as a whole if the surface fits into
+/// memory and both tolerances are 0. Otherwise it is served by tiles, from its file if the DEM does
+/// not fit. Immutable; any number of threads may use it.
 class Terrain {
  public:
-  /// Is told now and then which share of a long preparation is done, 0 to 1.
+  /// Progress callback: receives the fraction of a long preparation that is done, 0 to 1.
   using Progress = std::function<void(double share)>;
 
-  /// @throws Error as load_dem, DemFile, Certificate::open_or_make and Relief, and for a detail
-  /// that
-  ///         is negative or not finite.
+  /// @throws Error as load_dem, DemFile, Certificate::open_or_make and Relief.
   Terrain(const std::filesystem::path& dem, const DemOptions& options, const TerrainDetail& detail,
           const Progress& progress = {}, const std::optional<ReliefSpec>& relief = {});
 
-  /// Of the DEM itself.
+  /// Returns the header of the DEM itself.
   const DemHeader& header() const noexcept { return header_; }
-  /// The reference surface: the DEM's, or that with relief.
+  /// Returns the reference surface: the DEM's, with relief if there is any.
   const Ground& ground() const noexcept { return ground_; }
-  /// Where its samples stand in D.
+  /// Returns the grid of its samples in D.
   const GridFrame& frame() const noexcept { return ground_.frame(); }
-  /// What lies on the DEM, or null.
+  /// Returns the relief on the DEM, or null.
   const Relief* relief() const noexcept { return relief_.get(); }
 
-  /// Stands for all heights: equal texts mean equal surfaces, as far as that can be told without
-  /// reading a DEM larger than memory again.
+  /// Returns a text that identifies all heights: equal texts mean equal surfaces, as far as this
+  /// can be known without reading a DEM larger than memory again.
   const std::string& fingerprint() const noexcept { return fingerprint_; }
 
-  /// The surface if it is traced as it is, at full resolution; else null.
+  /// Returns the surface if it is traced as a whole, at full resolution; else null.
   const HeightGrid* whole() const noexcept { return std::get_if<HeightGrid>(&content_); }
 
-  /// Bytes that tracing a DEM of so many columns and rows takes at full resolution, about.
+  /// Returns about how many bytes tracing a DEM of `samples` columns and rows takes at full
+  /// resolution.
   static double whole_bytes(glm::ivec2 samples) noexcept;
 
-  /// Returns the levels round sensors, none of which is farther than `reach_m` from its frame's
-  /// viewpoint. Only if whole() is null.
+  /// Returns the levels around the sensors, none of which is farther than `reach_m` from its
+  /// frame's viewpoint. Only if whole() is null.
+  /// @throws Error as Clipmap, also for a tolerance that is negative or not finite.
   Clipmap clipmap(const SensorBox& sensors, double reach_m) const;
 
  private:

@@ -7,9 +7,9 @@
 #include <utility>
 
 #include "core/error.h"
-#include "terrain/deviation.h"
-#include "terrain/lattice.h"
-#include "terrain/passes/emission.h"
+#include "terrain/lod/deviation.h"
+#include "terrain/lod/lattice.h"
+#include "terrain/lod/passes/emission.h"
 
 namespace groundray {
 namespace {
@@ -17,13 +17,13 @@ namespace {
 using passes::LeafTree;
 using passes::VertexNumbers;
 
-// Arrays that are not cleared: each element is written before it is read.
+// Returns an uninitialised array; each element is written before it is read.
 template <typename T>
 std::unique_ptr<T[]> uncleared(std::size_t count) {
   return std::make_unique_for_overwrite<T[]>(count);
 }
 
-// Replaces counts by the sums of those before; returns the sum of all.
+// Replaces counts by the sums of those before; returns the total.
 std::uint32_t sum_up(std::uint32_t* counts, std::size_t size, const char* what) {
   std::uint64_t total = 0;
   for (std::size_t i = 0; i < size; ++i) {
@@ -31,15 +31,14 @@ std::uint32_t sum_up(std::uint32_t* counts, std::size_t size, const char* what) 
   }
   if (total > std::numeric_limits<std::uint32_t>::max()) {
     throw Error(
-        "terrain mesh: it has {} {}, more than 32 bits can number; raise the tolerance, or mesh "
-        "the "
+        "terrain mesh: {} {} exceed the range of 32-bit indices; raise the tolerance, or mesh the "
         "DEM in parts",
         total, what);
   }
   return static_cast<std::uint32_t>(total);
 }
 
-// The leaves of a bound, with what is known of them; the certificate itself is gone.
+// Leaves that satisfy a bound, and their selection; the certificate itself is not kept.
 struct LeafList {
   Selection selection;
   std::vector<Leaf> leaves;
@@ -115,7 +114,7 @@ class MeshBuilder {
   }
 
   const PassRunner& runner_;
-  std::size_t count_;  // of leaves
+  std::size_t count_;  // number of leaves
   VertexNumbers numbers_;
   std::vector<std::unique_ptr<std::uint32_t[]>> leaf_of_node_;
   std::vector<std::uint32_t> mark_of_;

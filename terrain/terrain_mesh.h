@@ -5,13 +5,13 @@
 #include <glm/vec3.hpp>
 #include <vector>
 
-#include "core/height_grid.h"
-#include "terrain/pass.h"
-#include "terrain/quadtree.h"
+#include "core/geometry/height_grid.h"
+#include "terrain/lod/pass.h"
+#include "terrain/lod/quadtree.h"
 
 namespace groundray {
 
-/// A triangle mesh of terrain on samples of its DEM, without T-junctions.
+/// Triangle mesh of terrain on samples of its DEM, without T-junctions.
 struct TerrainMesh {
   std::vector<glm::ivec2> vertices;   ///< column and row of a sample; each is used by a triangle
   std::vector<glm::uvec3> triangles;  ///< vertices, counter-clockwise in D as seen from above
@@ -19,13 +19,13 @@ struct TerrainMesh {
   std::vector<std::uint8_t> levels;
 };
 
-/// Returns the mesh of the coarsest quadtree that keeps the bound, triangles of finer levels first.
-/// At level l a triangle exists iff its samples do; nowhere else is the mesh farther than the bound
-/// from the reference surface, at samples or between them.
+/// Returns the mesh of the coarsest quadtree that satisfies the bound, triangles of finer levels
+/// first. A triangle exists if and only if its samples exist. Wherever the mesh exists, it deviates
+/// from the reference surface by at most the bound, at samples and between them.
 /// @param bound        bound.cell_m is taken from the grid.
-/// @param block_cells  cells along a leaf's side: even, from 2 to Lattice::max_block_cells; 2
-///                     gives the fewest triangles.
-/// @throws Error if block_cells is none of these, the bound negative or not a number, or the
+/// @param block_cells  cells along a leaf's side: even, from 2 to Lattice::max_block_cells; 2 gives
+///                     the fewest triangles.
+/// @throws Error if block_cells is invalid, if the bound is negative or not a number, or if the
 ///         mesh has more vertices or triangles than 32 bits can number.
 TerrainMesh build_terrain_mesh(const HeightGrid& grid, const MeshBound& bound, int block_cells = 2,
                                const PassRunner& runner = run_in_parallel);

@@ -28,7 +28,7 @@ Content content(const HeightGrid& grid, glm::ivec2 low, glm::ivec2 high) {
   return found;
 }
 
-// Heights are told apart by where they lie in memory: clipmaps share those that did not change.
+// Heights are compared by address: clipmaps share those that did not change.
 bool is_same(const Level& a, const Level& b) {
   return a.first == b.first && a.step == b.step &&
          a.heights.heights_m().data() == b.heights.heights_m().data() && a.leaves == b.leaves;

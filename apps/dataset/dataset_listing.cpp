@@ -9,8 +9,8 @@
 
 #include "apps/dataset/dataset_text.h"
 #include "apps/dataset/frame_entry.h"
+#include "apps/scene/yaml_reader.h"
 #include "core/error.h"
-#include "sensors/yaml_reader.h"
 
 namespace groundray {
 namespace {
@@ -19,7 +19,7 @@ namespace fs = std::filesystem;
 using yaml::Need;
 
 constexpr yaml::Rule stamp_rule{[](double value) { return std::abs(value) < 9e9; },
-                                "must be within 9e9 s"};  // what nanoseconds hold
+                                "must be within 9e9 s"};  // range of nanoseconds
 
 Georeference read_georeference(yaml::Map& root) {
   Georeference georeference;
@@ -27,14 +27,14 @@ Georeference read_georeference(yaml::Map& root) {
   root.read_numbers("origin_w_m", Need::Required, origin_m);
   georeference.origin_w_m = {origin_m[0], origin_m[1], origin_m[2]};
   const auto read_text = [&](const char* key, std::string& into) {
-    if (const yaml::Node* node = root.find(key, Need::Optional)) into = node->text;  // or empty
+    if (const yaml::Node* node = root.find(key, Need::Optional)) into = node->text;  // else empty
   };
   read_text("crs", georeference.crs_name);
   read_text("crs_wkt", georeference.crs_wkt);
   return georeference;
 }
 
-// What is listed of frames must be as many as the sensor says that it has.
+// Reports a fault if the number of listed frames differs from the sensor's own count.
 void check_count(const std::string& name, yaml::Map& sensor, yaml::Faults& faults,
                  const DatasetListing& listing) {
   std::uint64_t count = 0;
@@ -42,11 +42,11 @@ void check_count(const std::string& name, yaml::Map& sensor, yaml::Faults& fault
   const DatasetListing::Frames frames = listing.frames_of(name);
   const std::size_t listed = frames.done.size() + frames.pending;
   if (node != nullptr && listed != count)
-    faults.add(*node, "frames", "{} has {} frames, but {} are listed: was the file cut short?",
+    faults.add(*node, "frames", "{} has {} frames, but {} are listed: was the file truncated?",
                name, count, listed);
 }
 
-// After the frames are known.
+// Requires the frames to be known.
 void read_sensor(const yaml::Node& node, yaml::Faults& faults, DatasetListing& listing) {
   yaml::Map sensor(node, "sensors", faults);
   DatasetListing::Pair pair;
@@ -84,8 +84,8 @@ void read_frame(const yaml::Node& node, yaml::Faults& faults, DatasetListing& li
   frame.close_partly();
 }
 
-// All that precedes the frames of a file that is as the generator writes it, which may list any
-// number of them; nothing if it is any other.
+// Returns the part before the frames, and adds the frames to `listing`, if the file is as the
+// generator writes it (it may list any number of frames); nothing for any other file.
 std::optional<yaml::Node> read_generated(const fs::path& folder, DatasetListing& listing) {
   try {
     DatasetText text(folder);
@@ -101,7 +101,7 @@ std::optional<yaml::Node> read_generated(const fs::path& folder, DatasetListing&
     return text.is_intact() ? std::optional(yaml::parse(text.header(), folder / dataset_file))
                             : std::nullopt;
   } catch (const Error&) {
-    return std::nullopt;  // what is wrong with it is told where it is read as any other
+    return std::nullopt;  // the general reader reports the fault
   }
 }
 
@@ -142,7 +142,7 @@ std::string read_run_text(const fs::path& folder) {
     }
     if (text.is_intact()) return text.header();
   } catch (const Error&) {
-    // Then it is any other file.
+    // Not as the generator writes it: read below as any other file.
   }
   return yaml::read_file(folder / dataset_file);
 }

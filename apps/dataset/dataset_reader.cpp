@@ -4,8 +4,8 @@
 
 #include <utility>
 
-#include "core/product_io.h"
-#include "sensors/yaml_reader.h"
+#include "apps/scene/yaml_reader.h"
+#include "core/io/tum_io.h"
 
 namespace groundray {
 namespace {
@@ -13,7 +13,7 @@ namespace {
 namespace fs = std::filesystem;
 using yaml::Need;
 
-// What a lidar's calibration says that its points cannot be used without. The rest is left alone.
+// Reads the keys of a lidar's calibration that are needed to use its points; ignores the others.
 void read_calibration(const fs::path& path, RecordedLidar& lidar) {
   yaml::Faults faults(path);
   const yaml::Node node = yaml::parse(yaml::read_file(path), path);

@@ -8,7 +8,7 @@
 #include <utility>
 
 #include "apps/dataset/dataset_text.h"
-#include "sensors/yaml_reader.h"
+#include "apps/scene/yaml_reader.h"
 
 namespace groundray {
 namespace {
@@ -17,7 +17,7 @@ using yaml::Need;
 
 enum class Kind { Lidar, Camera, Stereo };
 
-// Reads the name of a sensor or a pair: a file's, which no other has.
+// Reads the name of a sensor or pair, which must be unique and valid as the name of a file.
 std::string read_name(yaml::Map& map, std::set<std::string>& names, yaml::Faults& faults) {
   constexpr std::string_view letters =
       "abcdefghijklmnopqrstuvwxyzABCDEFGHIJKLMNOPQRSTUVWXYZ0123456789_-";
@@ -26,7 +26,7 @@ std::string read_name(yaml::Map& map, std::set<std::string>& names, yaml::Faults
   if (at == nullptr) return name;
   if (name.find_first_not_of(letters) != std::string::npos) {
     faults.add(*at, "name",
-               "is {}, but names files: only letters, digits, '_' and '-' can be in it",
+               "is {}, but is part of file names: only letters, digits, '_' and '-' are permitted",
                yaml::shown(*at));
   }
   if (!names.insert(name).second)

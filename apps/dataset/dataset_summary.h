@@ -12,28 +12,28 @@
 
 namespace groundray {
 
-/// What a dataset is, and how much of it is there.
+/// Summary of a dataset: its sensors, and the numbers of requested and finished frames.
 struct DatasetSummary {
   struct Sensor {
-    std::string name, kind, model;  ///< name: as of a file. kind: "lidar" or "camera"
-    std::int64_t frames = 0;        ///< of the whole run
-    std::size_t asked_for = 0;      ///< of this shard; all of them, if it is none
+    std::string name, kind, model;  ///< name: also of its files; kind: "lidar" or "camera"
+    std::int64_t frames = 0;        ///< number of frames of the whole run
+    std::size_t asked_for = 0;      ///< number of frames of the shard, or of the whole run
     std::size_t done = 0;
-    std::uint64_t bytes = 0;  ///< of its frames
+    std::uint64_t bytes = 0;  ///< size of its frames' files
   };
   std::string version;
   std::uint64_t seed = 0;
   std::optional<Shard> shard;
-  std::vector<Sensor> sensors;          ///< by number
-  std::size_t asked_for = 0, done = 0;  ///< frames of all sensors
+  std::vector<Sensor> sensors;          ///< indexed by the sensor's number
+  std::size_t asked_for = 0, done = 0;  ///< numbers of frames of all sensors
 
-  /// Returns where the files of a frame are: what their names begin with, in the dataset. Nothing
-  /// if there is no such sensor.
+  /// Returns the common beginning of the paths of a frame's files, relative to the dataset; nothing
+  /// for an unknown sensor.
   std::optional<std::string> stem_of(const FrameEntry& entry) const;
 };
 
-/// Reads dataset.yaml in a folder. Names of sensors are made sure of, for they name files.
-/// @throws Error if that is at fault, or cannot be read.
+/// Reads dataset.yaml in a folder. Checks the names of sensors, because they are names of files.
+/// @throws Error if the file is invalid or cannot be read.
 DatasetSummary read_summary(const std::filesystem::path& folder);
 
 }  // namespace groundray

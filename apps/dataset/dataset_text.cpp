@@ -13,7 +13,7 @@
 
 #include "apps/dataset/owned_file.h"
 #include "core/error.h"
-#include "core/product_io.h"
+#include "core/io/file_io.h"
 
 namespace groundray {
 namespace {
@@ -25,7 +25,7 @@ constexpr std::string_view item = "  - ";
 constexpr std::string_view shard_begin = "shard: \"",
                            sum_key = "sha256_above:", sum_begin = "sha256_above: \"", quote = "\"";
 
-// Lines on their way to a file, and what they sum up to.
+// Writes lines to a file and computes their checksum.
 class LineSink {
  public:
   explicit LineSink(const fs::path& path) : file_(std::fopen(path.c_str(), "wb")) {
@@ -50,8 +50,8 @@ class LineSink {
   Sha256 sum_;
 };
 
-// Waits until the names in a folder are on the disk, for a file's own bytes do not take its name
-// there. Some file systems cannot; then there is nothing to wait for.
+// Waits until the names in a folder are on the disk: synchronising a file does not write its name.
+// Some file systems cannot do this, which is ignored.
 void sync_folder(const fs::path& folder) {
   const int descriptor = open(folder.c_str(), O_RDONLY | O_DIRECTORY | O_CLOEXEC);
   const bool is_done = descriptor >= 0 && fsync(descriptor) == 0;
@@ -62,7 +62,7 @@ void sync_folder(const fs::path& folder) {
               std::generic_category().message(fault));
 }
 
-// What stands between the two; nothing if the text is something else.
+// Returns the text between `begin` and `end`; nothing if the text has another form.
 std::optional<std::string_view> between(std::string_view text, std::string_view begin,
                                         std::string_view end) {
   if (text.size() < begin.size() + end.size() || !text.starts_with(begin) || !text.ends_with(end))
@@ -76,7 +76,7 @@ DatasetText::DatasetText(const fs::path& folder)
     : path_(folder / dataset_file), file_(path_, std::ios::binary) {
   if (!file_) {
     throw Error(
-        "{}: the folder holds no {} that can be read ({}): is it what `groundray generate` made?",
+        "{}: the folder contains no readable {} ({}): was it written by `groundray generate`?",
         folder.string(), dataset_file, std::generic_category().message(errno));
   }
   while (const auto line = next_line()) {
@@ -86,7 +86,7 @@ DatasetText::DatasetText(const fs::path& folder)
     if (shard) shard_ = parse_shard(*shard);
     if (!shard || !shard_) header_ += *line + "\n";
   }
-  throw Error("{}: it lists no frames: it was cut short, or groundray did not write it",
+  throw Error("{}: no frames are listed: it was truncated, or groundray did not write it",
               path_.string());
 }
 
@@ -115,7 +115,7 @@ std::optional<std::string> DatasetText::next_entry() {
 void DatasetText::read_end(std::string line) {
   do {
     if (const auto digits = between(line, sum_begin, quote)) {
-      // The last line, and a whole one.
+      // Intact only if this is the last line, and complete.
       is_intact_ = *digits == sum_.digits() && !file_.eof() && !next_line();
       return;
     }
@@ -127,7 +127,7 @@ void DatasetText::read_end(std::string line) {
 }
 
 std::string first_difference(std::string_view text, std::string_view other) {
-  constexpr std::size_t before = 40, most = 80;  // characters that are shown
+  constexpr std::size_t before = 40, most = 80;  // numbers of characters shown
   const auto at = static_cast<std::size_t>(std::ranges::mismatch(text, other).in1 - text.begin());
   const auto part = [at](std::string_view whole) {
     const std::size_t line = at == 0 ? 0 : whole.rfind('\n', at - 1) + 1;  // npos + 1 is 0

@@ -15,31 +15,32 @@
 
 namespace groundray {
 
-/// The name of the file that says what a dataset holds.
+/// Name of the file that lists a dataset's contents.
 inline constexpr std::string_view dataset_file = "dataset.yaml";
 
-/// The file dataset.yaml as the generator writes it (docs/formats.md), read line by line: however
-/// many frames it lists, little of it is in memory.
+/// Reader of dataset.yaml in the form that the generator writes (docs/reference/formats.md). It
+/// reads line by line, so that memory does not grow with the number of frames.
 class DatasetText {
  public:
-  /// Reads what precedes the frames. @throws Error if the folder has no such file, or it cannot be
-  /// read or lists no frames.
+  /// Reads the part before the frames.
+  /// @throws Error if the folder has no such file, or it cannot be read or lists no frames.
   explicit DatasetText(const std::filesystem::path& folder);
 
-  /// What it says of the run: all lines before those of the frames, but not of which shard it is.
+  /// Description of the run: all lines before the frames, except that of the shard.
   const std::string& header() const noexcept { return header_; }
-  /// Nothing if it is of the whole run.
+  /// Shard of the run; nothing for a whole run.
   const std::optional<Shard>& shard() const noexcept { return shard_; }
 
-  /// Returns the text of the entry of the next frame; nothing after the last one. A line that is
-  /// none is returned too, for parse_entry to refuse: what was changed hides no frame after it.
+  /// Returns the text of the next frame's entry; nothing after the last. Lines that are not entries
+  /// are returned as well, and rejected by parse_entry, so that an altered line does not hide the
+  /// frames after it.
   std::optional<std::string> next_entry();
-  /// The line that was read last, from 1.
+  /// Number of the line that was read last, from 1.
   std::size_t line() const noexcept { return line_; }
 
-  /// After the last frame: the files that are of no frame.
+  /// Files that belong to no frame; valid after the last frame.
   const std::vector<NamedSum>& files() const noexcept { return files_; }
-  /// After the last frame: whether the file is, to the bit, as it was written.
+  /// True if the file is exactly as it was written; valid after the last frame.
   bool is_intact() const noexcept { return is_intact_; }
 
  private:
@@ -56,12 +57,12 @@ class DatasetText {
   bool is_in_frames_ = true, is_intact_ = false;
 };
 
-/// Returns in words where one header, or any other text, differs from another first: a short part
-/// of a line of each.
+/// Returns a message with the first difference between two texts: a short part of the line of each.
 std::string first_difference(std::string_view text, std::string_view other);
 
-/// Writes dataset.yaml as a whole file, and waits until it is on the disk.
-/// @param next_entry  as of DatasetText. @throws Error as write_whole.
+/// Writes dataset.yaml by write_whole, and waits until it is on the disk.
+/// @param next_entry  returns entries as DatasetText::next_entry.
+/// @throws Error as write_whole.
 void write_dataset_text(const std::filesystem::path& folder, std::string_view header,
                         const std::optional<Shard>& shard,
                         const std::function<std::optional<std::string>()>& next_entry,

@@ -26,7 +26,7 @@ Context make_context() {
 }
 
 void check(int is_done) {
-  if (is_done != 1) throw Error("OpenSSL cannot reckon SHA-256; is its configuration at fault?");
+  if (is_done != 1) throw Error("OpenSSL cannot compute SHA-256: check its configuration");
 }
 
 }  // namespace
@@ -46,7 +46,7 @@ void Sha256::add(std::string_view bytes) {
 }
 
 std::string Sha256::digits() const {
-  const Context copy = make_context();  // so that more may be added
+  const Context copy = make_context();  // the original stays open for more bytes
   check(EVP_MD_CTX_copy_ex(copy.get(), state_->context.get()));
   std::array<unsigned char, EVP_MAX_MD_SIZE> digest{};
   unsigned size = 0;
@@ -74,7 +74,7 @@ FileSum sum_file(const std::filesystem::path& path) {
     result.bytes += read;
   }
   if (!file || std::ferror(file.get()) != 0) {
-    throw Error("{}: cannot be read: {}; check the disk, and that you may read it", path.string(),
+    throw Error("{}: cannot be read: {}; check the disk and the file's permissions", path.string(),
                 std::generic_category().message(errno));
   }
   result.sha256 = sum.digits();

@@ -8,14 +8,14 @@
 
 namespace groundray {
 
-/// What tells a file's bytes from all others.
+/// Size and checksum that identify the contents of a file.
 struct FileSum {
   std::uint64_t bytes = 0;
   std::string sha256;  ///< 64 hexadecimal digits, as sha256sum prints them
   friend bool operator==(const FileSum&, const FileSum&) = default;
 };
 
-/// SHA-256 of bytes that come piece by piece.
+/// Incremental SHA-256.
 /// @see FIPS 180-4, Secure Hash Standard (2015).
 class Sha256 {
  public:
@@ -25,7 +25,7 @@ class Sha256 {
   Sha256& operator=(const Sha256&) = delete;
 
   void add(std::string_view bytes);
-  /// Returns the 64 digits of all that was added so far.
+  /// Returns the 64 hexadecimal digits for all bytes added so far.
   std::string digits() const;
 
  private:
@@ -33,10 +33,11 @@ class Sha256 {
   std::unique_ptr<State> state_;
 };
 
-/// Returns that of bytes in memory.
+/// Returns the SHA-256 of bytes in memory, as Sha256::digits.
 std::string sha256_of(std::string_view bytes);
 
-/// Reads a file through. @throws Error if it cannot be read.
+/// Reads a whole file and returns its size and checksum.
+/// @throws Error if it cannot be read.
 FileSum sum_file(const std::filesystem::path& path);
 
 }  // namespace groundray

@@ -14,12 +14,12 @@ namespace {
 constexpr std::string_view letters_and_digits =
     "abcdefghijklmnopqrstuvwxyzABCDEFGHIJKLMNOPQRSTUVWXYZ0123456789";
 
-// Takes a line apart from its begin on; once something does not fit, nothing does.
+// Parses a line from left to right. After the first mismatch, every step fails.
 class Scanner {
  public:
   explicit Scanner(std::string_view text) : rest_(text) {}
 
-  // Whether the rest begins with `word`, which is then taken.
+  // Removes `word` from the start of the rest; returns false if it is not there.
   bool try_take(std::string_view word) {
     if (!fits_ || !rest_.starts_with(word)) return false;
     rest_.remove_prefix(word.size());
@@ -27,7 +27,7 @@ class Scanner {
   }
   void take(std::string_view word) { fits_ = try_take(word); }
 
-  // At least one of the letters, digits and `more`.
+  // Takes letters, digits and characters of `more`; requires at least one.
   std::string take_word(std::string_view more) {
     std::size_t size = 0;
     while (size < rest_.size() && (letters_and_digits.find(rest_[size]) != std::string_view::npos ||
@@ -36,7 +36,7 @@ class Scanner {
     return std::string(take_some(size));
   }
 
-  // Up to `end`, which stays.
+  // Takes the text before `end`; requires at least one character.
   std::string take_until(char end) {
     const std::size_t size = rest_.find(end);
     return std::string(take_some(size == std::string_view::npos ? 0 : size));
@@ -46,7 +46,7 @@ class Scanner {
   T take_number() {
     T number{};
     const auto [end, fault] = std::from_chars(rest_.data(), rest_.data() + rest_.size(), number);
-    // One way to write each number alone.
+    // Accepts only the canonical spelling of a number.
     const auto size = static_cast<std::size_t>(end - rest_.data());
     fits_ = fits_ && fault == std::errc{} && fmt::format("{}", number) == rest_.substr(0, size);
     take_some(fits_ ? size : 0);
@@ -83,7 +83,7 @@ class Scanner {
   bool fits_ = true;
 };
 
-// Decimals to the nanosecond, whatever the size.
+// Formats seconds with nine decimals, exactly for any size.
 std::string stamp_text(std::chrono::nanoseconds stamp) {
   const std::int64_t count = stamp.count();
   return fmt::format("{}{}.{:09}", count < 0 ? "-" : "", std::abs(count / 1'000'000'000),
@@ -92,7 +92,7 @@ std::string stamp_text(std::chrono::nanoseconds stamp) {
 
 std::chrono::nanoseconds take_stamp(Scanner& scanner) {
   constexpr std::size_t digits = 9;
-  constexpr std::int64_t most_seconds = 9'000'000'000;  // what nanoseconds hold
+  constexpr std::int64_t most_seconds = 9'000'000'000;  // range of nanoseconds
   const bool is_negative = scanner.try_take("-");
   const auto seconds = scanner.take_number<std::int64_t>();
   scanner.take(".");
@@ -165,7 +165,7 @@ std::optional<NamedSum> parse_named_sum(std::string_view text) {
   Scanner scanner(text);
   NamedSum file;
   scanner.take("{path: \"");
-  file.path = scanner.take_word("_-") + "/";  // in a folder of the dataset, and nowhere else
+  file.path = scanner.take_word("_-") + "/";  // only directly in a folder of the dataset
   scanner.take("/");
   const std::string name = scanner.take_word("._-");
   scanner.require(!name.starts_with('.'));

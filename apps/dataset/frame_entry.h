@@ -11,32 +11,32 @@
 
 namespace groundray {
 
-/// A file of a frame.
+/// Checksum of a file of a frame.
 struct ProductSum {
-  std::string suffix;  ///< of its name, after the frame's number
+  std::string suffix;  ///< end of its name, after the frame's number
   FileSum sum;
 };
 
-/// What dataset.yaml says of a frame (docs/formats.md).
+/// Entry of a frame in dataset.yaml (docs/reference/formats.md).
 struct FrameEntry {
   std::string sensor;
   std::int64_t frame = 0;
   std::chrono::nanoseconds stamp{0};
   bool is_done = false;
-  std::string convergence;        ///< a YAML mapping; empty if there is none
-  std::vector<ProductSum> files;  ///< of a frame that is done
+  std::string convergence;        ///< YAML mapping, or empty
+  std::vector<ProductSum> files;  ///< empty unless the frame is finished
 };
 
-/// Returns the entry as one line of YAML, without what makes it an item of a list.
+/// Returns the entry as one line of YAML, without the marker of a list item.
 std::string text_of(const FrameEntry& entry);
 
-/// Returns the entry that such a line stands for: nothing, if it is not as text_of writes it. Names
-/// that it returns are of letters, digits, '_', '-' and, of suffixes, '.'.
+/// Parses an entry; returns nothing if it is not as text_of writes it. The returned names consist
+/// of letters, digits, '_' and '-'; suffixes may also contain '.'.
 std::optional<FrameEntry> parse_entry(std::string_view text);
 
-/// A file that belongs to no frame.
+/// Checksum of a file that belongs to no frame.
 struct NamedSum {
-  std::string path;  ///< in the dataset, with slashes
+  std::string path;  ///< relative to the dataset, with slashes
   FileSum sum;
 };
 std::string text_of(const NamedSum& file);

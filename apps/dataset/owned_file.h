@@ -5,12 +5,12 @@
 
 namespace groundray {
 
-/// Closes a file of the C library, whatever becomes of it.
+/// Deleter that closes a file of the C library.
 struct CloseFile {
   void operator()(std::FILE* file) const noexcept { std::fclose(file); }
 };
 
-/// A file of the C library that is closed with its owner.
+/// File of the C library, closed by its owner's destructor.
 using OwnedFile = std::unique_ptr<std::FILE, CloseFile>;
 
 }  // namespace groundray

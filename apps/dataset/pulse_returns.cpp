@@ -12,7 +12,7 @@
 namespace groundray {
 namespace {
 
-// Keeps of each thing those whose place is in `kept`.
+// Keeps the elements whose indices are in `kept`, which is sorted.
 template <typename T>
 void keep(const std::vector<std::size_t>& kept, std::vector<T>& things) {
   for (std::size_t i = 0; i < kept.size(); ++i) things[i] = things[kept[i]];
@@ -25,7 +25,7 @@ bool tells_pulses(const Scan& scan) {
   return has_firings || scan.find(Quantity::Pulse) != nullptr;
 }
 
-// The pulse of each return, by numbers that returns of one have in common.
+// Key of each return's pulse: equal for returns of the same pulse.
 std::vector<std::array<double, 2>> pulses_of(const Scan& scan) {
   const auto* pulse = scan.find(Quantity::Pulse);
   const auto *ring = scan.find(Quantity::Ring), *time = scan.find(Quantity::Time);
@@ -48,7 +48,7 @@ void take_returns(ReturnChoice choice, Scan& scan) {
   if (index == nullptr || std::ranges::all_of(*index, [](double i) { return i == 1; })) return;
   if (!tells_pulses(scan)) {
     scan.notes.emplace_back(
-        "no column tells which returns are of one pulse (pulse, or ring and time): all are taken");
+        "no column identifies the returns of one pulse (pulse, or ring and time): all are used");
     return;
   }
   const auto pulses = pulses_of(scan);

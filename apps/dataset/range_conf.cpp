@@ -8,7 +8,7 @@
 #include <glm/gtc/quaternion.hpp>
 
 #include "core/error.h"
-#include "core/text_lines.h"
+#include "core/io/text_lines.h"
 
 namespace groundray {
 namespace {
@@ -21,19 +21,18 @@ Pose pose_of(const std::array<double, 7>& numbers) {
 
 ConfScan bmesh(const std::vector<std::string_view>& words, const std::string& place) {
   constexpr std::size_t count = 9;
-  constexpr double most_off = 1e-3;  // what three decimals leave
+  constexpr double most_off = 1e-3;  // rounding to three decimals
   constexpr double farthest = 1e15;
   std::array<double, 7> numbers{};
   bool is_sound = words.size() == count;
   for (std::size_t i = 0; is_sound && i < numbers.size(); ++i) {
     const auto number = number_of<double>(words[i + 2]);
-    is_sound = number && std::abs(*number) <= farthest;  // not NaN
+    is_sound = number && std::abs(*number) <= farthest;  // rejects NaN
     numbers[i] = number.value_or(0);
   }
   if (!is_sound) {
-    throw Error(
-        "{}: it must be `bmesh FILE tx ty tz qx qy qz qw`, numbers within {:.0e} all but the first",
-        place, farthest);
+    throw Error("{}: it must be `bmesh FILE tx ty tz qx qy qz qw`, with all numbers within {:.0e}",
+                place, farthest);
   }
   const double norm = std::hypot(std::hypot(numbers[3], numbers[4]), numbers[5], numbers[6]);
   if (!(std::abs(norm - 1) <= most_off))
@@ -48,7 +47,7 @@ std::vector<ConfScan> parse_conf(std::string_view text, const std::string& name)
   TextLines lines(text);
   while (const auto line = lines.next()) {
     const auto words = words_of(*line);
-    if (words.empty() || words[0] != "bmesh") continue;  // cameras and meshes are not for us
+    if (words.empty() || words[0] != "bmesh") continue;  // lines for cameras and meshes are ignored
     scans.push_back(bmesh(words, fmt::format("{}:{}", name, lines.number())));
   }
   return scans;

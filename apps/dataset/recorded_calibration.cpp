@@ -4,7 +4,7 @@
 #include <cmath>
 #include <glm/gtc/quaternion.hpp>
 
-#include "sensors/lens_reader.h"
+#include "apps/scene/readers/lens_reader.h"
 
 namespace groundray {
 namespace {
@@ -30,7 +30,7 @@ Pose read_mount(yaml::Map& root, std::string_view key, yaml::Faults& faults) {
   mount->close_partly();
   const glm::dquat rotation(q[3], q[0], q[1], q[2]);
   if (std::abs(glm::length(rotation) - 1) > 1e-6) {
-    faults.add(mount->node(), "rotation_xyzw", "must be of length 1, but is of {}",
+    faults.add(mount->node(), "rotation_xyzw", "must have length 1, but has {}",
                glm::length(rotation));
   }
   return {rotation, {p_m[0], p_m[1], p_m[2]}};

@@ -5,25 +5,26 @@
 #include <string>
 #include <string_view>
 
-#include "core/pose.h"
-#include "sensors/camera/lens_models.h"
-#include "sensors/yaml_reader.h"
+#include "apps/scene/yaml_reader.h"
+#include "core/geometry/pose.h"
+#include "sensors/camera/lens/lens_models.h"
 
 namespace groundray {
 
-/// What calibration/<camera>.yaml of a dataset tells (docs/formats.md).
+/// Contents of calibration/<camera>.yaml of a dataset (docs/reference/formats.md).
 struct RecordedCalibration {
-  std::string model;  ///< for people; may be empty
-  Pose X_BC;          ///< how the camera is mounted
+  std::string model;  ///< informative; may be empty
+  Pose X_BC;          ///< mount
   LensModel lens = Pinhole{};
   glm::ivec2 size_px{0};
   double exposure_s = 0, row_s = 0;
 };
 
+/// Reads the calibration of a camera.
 /// @throws Error naming file, line and rule of each fault.
 RecordedCalibration read_camera_calibration(const std::filesystem::path& path);
 
-/// Reads how a sensor is mounted; at the origin of the platform, if it does not say.
+/// Reads the mount of a sensor; the identity if the key is missing.
 Pose read_mount(yaml::Map& calibration, std::string_view key, yaml::Faults& faults);
 
 }  // namespace groundray

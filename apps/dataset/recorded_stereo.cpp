@@ -8,9 +8,9 @@
 #include <utility>
 
 #include "apps/dataset/recorded_calibration.h"
+#include "apps/scene/yaml_reader.h"
 #include "core/error.h"
-#include "core/product_io.h"
-#include "sensors/yaml_reader.h"
+#include "core/io/tum_io.h"
 
 namespace groundray {
 namespace {
@@ -18,7 +18,7 @@ namespace {
 namespace fs = std::filesystem;
 using std::chrono::nanoseconds;
 
-// The picture that the camera gives, else the light that it was made of.
+// Returns the camera's picture, or else its radiance image.
 fs::path image_file(const fs::path& dataset, const std::string& camera, std::int64_t number) {
   const fs::path stem = dataset / "camera" / camera / fmt::format("{:06}", number);
   for (const char* ending : {".png", ".exr"}) {
@@ -27,10 +27,9 @@ fs::path image_file(const fs::path& dataset, const std::string& camera, std::int
     if (fs::is_regular_file(file, ignored)) return file;
   }
   throw Error(
-      "{}: there is neither {}.png nor {}.exr, though dataset.yaml says that the image is done: "
-      "was it removed, or may you not read it? If the scene does not ask for it, give the camera "
-      "the product picture or "
-      "radiance",
+      "{}: there is neither {}.png nor {}.exr, although dataset.yaml lists the image as done: was "
+      "it removed, or is it unreadable? If the scene does not request it, add the product picture "
+      "or radiance to the camera",
       dataset.string(), stem.string(), stem.string());
 }
 
@@ -48,7 +47,7 @@ RecordedCamera read_camera(const fs::path& dataset, const std::string& name,
   return camera;
 }
 
-// The pair that a name or two names of cameras mean.
+// Returns the pair with that name, or a pair of the two named cameras.
 DatasetListing::Pair pair_named(const std::string& word, const DatasetListing& listing,
                                 const fs::path& dataset) {
   const auto pair = std::ranges::find(listing.pairs, word, &DatasetListing::Pair::name);

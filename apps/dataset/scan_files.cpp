@@ -11,11 +11,12 @@
 
 #include "apps/dataset/dataset_reader.h"
 #include "apps/dataset/range_conf.h"
+#include "apps/scene/yaml_reader.h"
 #include "core/error.h"
-#include "core/file_ending.h"
-#include "core/product_io.h"
-#include "core/text_lines.h"
-#include "sensors/yaml_reader.h"
+#include "core/io/file_ending.h"
+#include "core/io/file_io.h"
+#include "core/io/text_lines.h"
+#include "core/io/tum_io.h"
 
 namespace groundray {
 namespace {
@@ -25,7 +26,7 @@ using std::chrono::nanoseconds;
 
 bool is_range_grid(const fs::path& path) {
   const std::string ending = file_ending(path);
-  if (ending == ".gz") return true;  // as Stanford's come
+  if (ending == ".gz") return true;  // as distributed by Stanford
   if (ending != ".ply") return false;
   std::ifstream file(path, std::ios::binary);
   for (std::string line; std::getline(file, line) && !line.starts_with("end_header");) {
@@ -55,9 +56,10 @@ ScanFiles scans_of_conf(const fs::path& path, double unit_m) {
   return files;
 }
 
-// ----- poses beside scans
+// ----- poses for scans
 
-// The time that a name is: seconds with a point, else nanoseconds, of many digits.
+// Reads the time from a file's name: nanoseconds if it is a whole number of more than 10 digits,
+// else seconds.
 nanoseconds time_of_name(const fs::path& file) {
   constexpr std::int64_t ns_per_s = 1'000'000'000, most_s = 9'000'000'000;
   const std::string stem = file.stem().string();
@@ -89,14 +91,14 @@ void check_covers(const Trajectory& X_DS, nanoseconds stamp, const ScanFile& sca
               s(X_DS.end_time()));
 }
 
-// A pose for each line, or the path at the scan's stamp.
+// Assigns to each scan the pose on its line, or that of the trajectory at its stamp.
 void pose_scans(const ScanChoice& choice, LidarSpec::Points points, ScanFiles& files) {
   std::vector<ScanFile>& scans = files.scans;
   const Trajectory X_DS = read_tum(*choice.poses);
   if (choice.order == PoseOrder::Line && X_DS.samples().size() != scans.size()) {
     throw Error(
-        "{}: it has {} poses for {} scans; there must be one for each, in order, or names that are "
-        "stamps (--pose-by name)",
+        "{}: it has {} poses for {} scans; there must be one per scan, in order, or files named by "
+        "their stamps (--pose-by name)",
         choice.poses->string(), X_DS.samples().size(), scans.size());
   }
   for (std::size_t i = 0; i < scans.size(); ++i) {
@@ -150,7 +152,7 @@ ScanFiles scans_of_dataset(const ScanChoice& choice) {
   if (choice.need == ScanNeed::None) return {.georeference = read_listing(folder).georeference};
   RecordedDataset dataset = read_dataset(folder);
   if (dataset.lidars.empty() && (choice.need == ScanNeed::Some || choice.poses))
-    throw Error("{}: the dataset has no lidar; `reconstruct dem` takes its stereo pairs alone, too",
+    throw Error("{}: the dataset has no lidar; `reconstruct dem` can use its stereo pairs",
                 (folder / "dataset.yaml").string());
   check_sensors(choice, dataset);
   std::erase_if(dataset.lidars, [&](const RecordedLidar& lidar) {
@@ -159,7 +161,7 @@ ScanFiles scans_of_dataset(const ScanChoice& choice) {
   });
   if (choice.poses) {
     if (dataset.lidars.size() > 1)
-      throw Error("--poses: they are of one sensor: say which by --sensor");
+      throw Error("--poses: the poses belong to one sensor: select it by --sensor");
     dataset.lidars[0].X_DS = read_tum(*choice.poses);
   }
   ScanFiles files{.georeference = std::move(dataset.georeference)};
@@ -167,12 +169,12 @@ ScanFiles scans_of_dataset(const ScanChoice& choice) {
   return files;
 }
 
-// Some of a dataset's lidars' scans are wanted, but none is there.
+// Reports that scans are requested from a dataset's lidars, but none exists.
 [[noreturn]] void refuse_no_scan(const ScanChoice& choice, const ScanFiles& files) {
   std::string rest;
-  for (const std::string& note : files.notes) rest += "; " + note;  // of what is pending
-  if (choice.need == ScanNeed::IfThere) rest += "; --no-lidar takes stereo pairs alone";
-  throw Error("{}: there is no scan among the frames asked for{}", choice.inputs[0].string(), rest);
+  for (const std::string& note : files.notes) rest += "; " + note;  // about pending frames
+  if (choice.need == ScanNeed::IfThere) rest += "; --no-lidar uses only stereo pairs";
+  throw Error("{}: there is no scan among the requested frames{}", choice.inputs[0].string(), rest);
 }
 
 // ----- files
@@ -205,7 +207,7 @@ Pose moved(const Pose& X_WS, const glm::dvec3& origin_m) {
   return {.rotation = X_WS.rotation, .translation_m = X_WS.translation_m - origin_m};
 }
 
-// So that floats in files and in memory are of use.
+// Keeps coordinates small enough for single precision.
 void choose_origin(ScanFiles& files) {
   constexpr double far_m = 10'000;
   const glm::dvec3 first_m = files.scans.front().X_DS.translation_m;
@@ -244,8 +246,8 @@ InputKind kind_of(const std::vector<fs::path>& inputs) {
   if (fs::is_directory(first, ignored)) {
     if (!is_there(first / "dataset.yaml")) {
       throw Error(
-          "{}: the folder holds no dataset.yaml; give a folder that `groundray generate` wrote, or "
-          "the scans themselves",
+          "{}: the folder contains no dataset.yaml; give a folder that `groundray generate` wrote, "
+          "or the scans themselves",
           first.string());
     }
     return InputKind::Dataset;
@@ -253,7 +255,7 @@ InputKind kind_of(const std::vector<fs::path>& inputs) {
   return first.extension() == ".conf" ? InputKind::Conf : InputKind::Files;
 }
 
-// None of these may be written over.
+// Returns the files that outputs must not overwrite.
 std::vector<fs::path> files_read(const ScanChoice& choice, const ScanFiles& files, InputKind kind) {
   std::vector<fs::path> read;
   if (choice.poses) read.push_back(*choice.poses);
@@ -274,21 +276,21 @@ void check_options(const ScanChoice& choice, InputKind kind) {
     if (kind != InputKind::Dataset)
       throw Error("--no-lidar: only a dataset has stereo pairs: give its folder");
     if (!choice.sensors.empty() || choice.poses)
-      throw Error("--no-lidar: --sensor and --poses are of lidars: leave one out");
+      throw Error("--no-lidar: --sensor and --poses apply to lidars: omit one of them");
   }
   if (kind != InputKind::Dataset && !choice.sensors.empty())
     throw Error("--sensor: only datasets have sensors by name");
   if (kind == InputKind::Conf && choice.poses)
     throw Error("--poses: {} has poses of its own", choice.inputs[0].string());
   if (kind == InputKind::Dataset && choice.order == PoseOrder::Name)
-    throw Error("--pose-by name: a dataset knows the stamps of its scans");
+    throw Error("--pose-by name: a dataset contains the stamps of its scans");
   if (choice.order == PoseOrder::Name && !choice.poses)
-    throw Error("--pose-by name: it says which of the poses is a file's: give them by --poses");
+    throw Error("--pose-by name: it assigns poses to files: give the poses by --poses");
   if (choice.points == LidarSpec::Points::AsFired && kind != InputKind::Dataset &&
       choice.order != PoseOrder::Name) {
     throw Error(
-        "--points as_fired: each point needs a pose of its own: give a path by --poses, and names "
-        "that are stamps (--pose-by name)");
+        "--points as_fired: each point needs its own pose: give a trajectory by --poses, and files "
+        "named by their stamps (--pose-by name)");
   }
 }
 
@@ -327,7 +329,7 @@ ScanFiles find_scans(const ScanChoice& choice) {
   if (kind == InputKind::Conf) files = scans_of_conf(choice.inputs[0], choice.conf_unit_m);
   if (kind == InputKind::Files) files = scans_of_files(choice);
   if (kind != InputKind::Dataset) keep_frames(choice.frames, files.scans);
-  const bool is_of_pairs = kind == InputKind::Dataset && files.paths.empty();  // of no lidar
+  const bool is_of_pairs = kind == InputKind::Dataset && files.paths.empty();  // without lidars
   if (files.scans.empty() && !is_of_pairs) refuse_no_scan(choice, files);
   if (kind != InputKind::Dataset) choose_origin(files);
   files.read = files_read(choice, files, kind);

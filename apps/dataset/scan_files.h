@@ -9,14 +9,14 @@
 #include <string_view>
 #include <vector>
 
-#include "core/mesh_io.h"
-#include "core/pose.h"
-#include "core/trajectory.h"
-#include "sensors/lidar_spec.h"
+#include "core/geometry/pose.h"
+#include "core/geometry/trajectory.h"
+#include "core/io/mesh_io.h"
+#include "sensors/lidar/lidar_spec.h"
 
 namespace groundray {
 
-/// Some of numbered things: from `first` on, each `step`-th before `end`.
+/// Range of numbers: every `step`-th number from `first`, below `end`.
 struct FrameRange {
   std::size_t first = 0;
   std::size_t end = std::numeric_limits<std::size_t>::max();
@@ -27,61 +27,61 @@ struct FrameRange {
   }
 };
 
-/// Reads `A:B:STEP`, parts of which may be left out, or the number of one frame.
-/// @throws Error that names the option if it is neither, or takes no frame.
+/// Parses `A:B:STEP`, of which parts may be omitted, or the number of one frame.
+/// @throws Error naming the option if the text has neither form, or selects no frame.
 FrameRange parse_frames(std::string_view text, std::string_view option = "--frames");
 
-/// How poses of a file belong to scans.
+/// Assignment of the poses in a file to scans.
 enum class PoseOrder {
-  Line,  ///< the first pose to the first scan, and so on
-  Name,  ///< by time, which each scan's name is
+  Line,  ///< the first pose belongs to the first scan, and so on
+  Name,  ///< each file's name is its stamp
 };
 
-/// Whether a run can do without scans, for a dataset's stereo pairs measure as well.
+/// Need for lidar scans; a dataset's stereo pairs provide measurements as well.
 enum class ScanNeed {
-  Some,     ///< there must be one
-  IfThere,  ///< but a dataset may have no lidar
-  None,     ///< a dataset's lidars are left alone
+  Some,     ///< at least one scan is required
+  IfThere,  ///< required, unless a dataset has no lidar
+  None,     ///< a dataset's lidars are ignored
 };
 
-/// Which scans there are, and what their files do not say of where they were made.
+/// Selection of scans, with information that their files lack.
 struct ScanChoice {
-  std::vector<std::filesystem::path> inputs;  ///< a dataset, a .conf, or files of scans
+  std::vector<std::filesystem::path> inputs;  ///< a dataset, a .conf, or scan files
   ScanNeed need = ScanNeed::Some;
-  std::vector<std::string> sensors;  ///< of a dataset; empty for all its lidars
+  std::vector<std::string> sensors;  ///< lidars of a dataset; empty for all
   FrameRange frames;
-  std::optional<std::filesystem::path> poses;  ///< instead of a dataset's own
+  std::optional<std::filesystem::path> poses;  ///< replaces a dataset's own poses
   PoseOrder order = PoseOrder::Line;
-  double conf_unit_m = 1;                   ///< of the poses of a .conf: that of its scans
-  std::optional<LidarSpec::Points> points;  ///< else as a dataset says, or at the stamp
+  double conf_unit_m = 1;  ///< unit of a .conf's poses, which is that of its scans, m
+  std::optional<LidarSpec::Points> points;  ///< default: as a dataset states, else AtStamp
 };
 
-/// One scan that is there to be read.
+/// Scan to be read.
 struct ScanFile {
-  std::string name;  ///< for people
+  std::string name;  ///< name in messages
   std::filesystem::path file;
-  Pose X_DS;                          ///< of the sensor at the stamp
-  std::optional<std::size_t> path;    ///< of the sensor, among those of the run
-  std::chrono::nanoseconds stamp{0};  ///< on the path's clock: a point's time is added to it
+  Pose X_DS;                          ///< pose of the sensor at the stamp
+  std::optional<std::size_t> path;    ///< index of the sensor's trajectory in ScanFiles::paths
+  std::chrono::nanoseconds stamp{0};  ///< time on the trajectory's clock; origin of points' times
   LidarSpec::Points points = LidarSpec::Points::AtStamp;
-  double range_noise_sigma_m = 0;  ///< where the scan itself does not tell
-  bool is_range_grid = false;      ///< of Stanford's form, beams along z
+  double range_noise_sigma_m = 0;  ///< used if the scan itself has none
+  bool is_range_grid = false;      ///< true for Stanford's range grids, with beams along z
 };
 
-/// The scans of a run.
+/// Scans of a run.
 struct ScanFiles {
   std::vector<ScanFile> scans;
-  std::vector<Trajectory> paths;            ///< X_DS
-  Georeference georeference;                ///< of D
-  std::vector<std::filesystem::path> read;  ///< all files that say something of them
-  std::vector<std::string> notes;           ///< for people: what was left out
-  bool are_posed = true;                    ///< false: D is the frame of the one scan's sensor
+  std::vector<Trajectory> paths;            ///< trajectories X_DS of the sensors
+  Georeference georeference;                ///< georeference of D
+  std::vector<std::filesystem::path> read;  ///< all input files
+  std::vector<std::string> notes;           ///< messages about omitted frames
+  bool are_posed = true;                    ///< false if D is the frame of the single scan's sensor
 };
 
-/// Finds the scans and where each was made. Poses farther than 10 km from their zero get an origin
-/// near the first of them, in whole metres.
-/// @throws Error if there is no scan though one is needed, a scan has no pose, kinds of input are
-///         mixed, or an option does not suit them; and as read_dataset and read_tum.
+/// Finds the scans and their poses. Except for datasets, if the first pose is farther than 10 km
+/// from the origin, D's origin is moved there, rounded to whole metres.
+/// @throws Error if there is no scan though one is required, a scan has no pose, kinds of input are
+///         mixed, or an option does not suit the input; and as read_dataset and read_tum.
 ScanFiles find_scans(const ScanChoice& choice);
 
 }  // namespace groundray

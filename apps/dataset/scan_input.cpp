@@ -14,7 +14,7 @@
 #include "apps/dataset/packed_file.h"
 #include "apps/dataset/pulse_returns.h"
 #include "core/error.h"
-#include "reconstruction/scan/range_grid.h"
+#include "reconstruction/mesh/scan/range_grid.h"
 
 namespace groundray {
 namespace {
@@ -25,10 +25,10 @@ nanoseconds after(nanoseconds stamp, double time_s) {
   return stamp + nanoseconds(std::llround(time_s * 1e9));
 }
 
-// The pose at each return, where times tell; else at the stamp.
+// Pose of the sensor at each return if times are known, else at the stamp.
 class SensorAt {
  public:
-  /// @throws Error if points as they were fired have times that the path does not cover.
+  /// @throws Error if points as fired have no times, or times that the trajectory does not cover.
   SensorAt(const ScanFiles& files, const ScanFile& file, const Scan& scan) : file_(file) {
     if (!file.path || scan.row.empty()) return;
     X_DS_ = &files.paths[*file.path];
@@ -36,18 +36,19 @@ class SensorAt {
     const std::string fault = take_times();
     if (fault.empty()) return;
     if (file.points == LidarSpec::Points::AsFired)
-      throw Error("{}: its points are as they were fired, but {}", file.file.string(), fault);
+      throw Error("{}: its points are in the sensor's moving frame (as_fired), but {}",
+                  file.file.string(), fault);
     X_DS_ = nullptr;
     if (!times_s_.empty()) unused_ = fault;
   }
 
-  /// Says why times of points at one stamp were of no use.
+  /// Adds a note that states why the times of points at the stamp were not used.
   void add_note(std::vector<std::string>& notes) const {
     if (unused_.empty()) return;
     notes.push_back("the sensor's motion within scans was not used: " + unused_);
   }
 
-  // From the first beam to the last, and the stamp.
+  // Interval from the first beam to the last, extended to contain the stamp.
   std::pair<nanoseconds, nanoseconds> span() const {
     if (!is_path() || times_s_.empty()) return {file_.stamp, file_.stamp};
     const auto [first, last] = std::ranges::minmax(times_s_);
@@ -64,10 +65,10 @@ class SensorAt {
   }
 
  private:
-  // Returns what is wrong with the times, if anything.
+  // Validates and clamps the times; returns a description of the fault, or an empty text.
   std::string take_times() {
-    constexpr double slack_s = 1e-6;  // what floats round
-    constexpr double most_s = 1e6;    // of one sweep: else the unit is another, or the clock
+    constexpr double slack_s = 1e-6;  // rounding of floats
+    constexpr double most_s = 1e6;    // of one sweep: otherwise the unit or the clock is wrong
     if (times_s_.empty())
       return "they have no times (a column of unknown unit needs --time-unit-s)";
     const auto since_stamp_s = [&](nanoseconds time) {
@@ -78,7 +79,7 @@ class SensorAt {
     const auto [first, last] = std::ranges::minmax(times_s_);
     if (first < std::max(begin_s - slack_s, -most_s) || last > std::min(end_s + slack_s, most_s)) {
       return fmt::format(
-          "the times, {:.9g} to {:.9g} s after the stamp, are not those of the poses, {:.9g} to "
+          "the times, {:.9g} to {:.9g} s after the stamp, are not covered by the poses, {:.9g} to "
           "{:.9g} s (--time-unit-s, --time-zero-s)",
           first, last, begin_s, end_s);
     }
@@ -92,7 +93,7 @@ class SensorAt {
   std::string unused_;
 };
 
-// In S as each pulse was fired, wherever the file has them.
+// Returns the points in S at each pulse's firing, undoing any de-skewing.
 std::vector<glm::dvec3> as_fired(const ScanFile& file, Scan& scan, const SensorAt& sensor) {
   std::vector<glm::dvec3> p_S = std::move(scan.p_S);
   if (file.points == LidarSpec::Points::AsFired || !sensor.is_path()) return p_S;
@@ -122,7 +123,7 @@ std::vector<float> sds_of(const ScanFile& file, const Scan& scan, const ScanTaki
   return sd_m;
 }
 
-// Whole numbers of a column, or none if it is not there.
+// Returns a column as integers; empty if there is no such column.
 template <typename T>
 std::vector<T> whole(const ScanFile& file, const Scan& scan, Quantity quantity, const char* what) {
   const auto* column = scan.find(quantity);
@@ -147,11 +148,11 @@ std::vector<std::uint16_t> labels_of(const ScanFile& file, const Scan& scan,
   return whole<std::uint16_t>(file, scan, Quantity::Label, "label");
 }
 
-// Rows and columns of the file's own image.
+// Takes rings and columns from the file's own image.
 void take_image(const ScanFile& file, const Scan& scan, ScanReturns& returns) {
   if (scan.image.columns == 0) {
     throw Error(
-        "{}: --grid file needs points that are an image: a PCD with HEIGHT above 1, or an array "
+        "{}: --grid file needs points arranged as an image: a PCD with HEIGHT above 1, or an array "
         "of rows x columns x values",
         file.file.string());
   }
@@ -183,13 +184,13 @@ ScanReturns returns_of(const ScanFile& file, Scan& scan, const SensorAt& sensor,
   return returns;
 }
 
-// Beams of range grids are parallel and have no times.
+// Reads a range grid, whose beams are parallel and have no times.
 OrganisedInput read_grid(const ScanFile& file, const ScanTaking& taking) {
   const bool is_placed = !std::holds_alternative<Pose>(taking.columns.X_FS) ||
                          std::get<Pose>(taking.columns.X_FS) != Pose();
   if (is_placed || !taking.columns.columns.empty() || taking.grid == GridSource::File) {
     throw Error(
-        "{}: --sensor-pose, --viewpoint, --columns and --grid say nothing of range grids, whose "
+        "{}: --sensor-pose, --viewpoint, --columns and --grid do not apply to range grids, whose "
         "beams are known",
         file.file.string());
   }
@@ -206,7 +207,7 @@ OrganisedInput read_grid(const ScanFile& file, const ScanTaking& taking) {
   return {.cells = place(std::move(grid), file.X_DS), .rows = returns, .returns = returns};
 }
 
-// As `organise`, and names the option that links points without order.
+// Calls `organise`; its error also names the option that links points without order.
 OrganisedReturns organised_returns(const ScanReturns& returns, const ScanTaking& taking) {
   const RowOrder order = taking.grid == GridSource::File ? RowOrder::Number : RowOrder::Elevation;
   try {
@@ -214,7 +215,7 @@ OrganisedReturns organised_returns(const ScanReturns& returns, const ScanTaking&
   } catch (const Error& error) {
     const std::string_view what = error.what();
     if (!what.ends_with("as points without order")) throw;
-    throw Error("{} (--unorganised); of a dataset other lidars may do (--sensor)", what);
+    throw Error("{} (--unorganised), or select another lidar of the dataset (--sensor)", what);
   }
 }
 
@@ -264,7 +265,7 @@ PointInput points_of(const ScanFiles& files, const ScanFile& file, const ScanTak
   return input;
 }
 
-// With the file's name before what is wrong, unless it is there.
+// Prepends the file's name to an error that does not begin with it.
 template <typename Read>
 auto naming(const ScanFile& file, Read&& read) {
   try {
@@ -301,16 +302,16 @@ void PointReader::open() {
   ahead_.reset();
 }
 
-// Of a file in memory there are its bytes, its columns, and what is made of them.
+// A file in memory takes its bytes, its columns, and the results made from them.
 void PointReader::check_memory() const {
   constexpr std::uintmax_t times = 8;
   std::error_code fault;
   const std::uintmax_t bytes = std::filesystem::file_size(scan_.file, fault);
   if (fault || bytes <= taking_.most_bytes / times) return;
   throw Error(
-      "it has {} MB, takes up to {} times that in memory, more than there is or --memory-mb "
-      "allows, and cannot be read in blocks: these are .npy, .bin, binary .ply and .pcd without "
-      "poses by time and without several returns of a pulse; or split it",
+      "it has {} MB, needs up to {} times that in memory, more than available or allowed by "
+      "--memory-mb, and cannot be read in blocks: this is possible for .npy, .bin, binary .ply and "
+      ".pcd without poses by time and without several returns per pulse; or split it",
       bytes / 1'000'000, times);
 }
 

@@ -12,65 +12,65 @@
 #include "apps/dataset/scan_files.h"
 #include "apps/scan/cloud_blocks.h"
 #include "apps/scan/scan.h"
-#include "reconstruction/scan/organised_scan.h"
+#include "reconstruction/mesh/scan/organised_scan.h"
 
 namespace groundray {
 
-/// What makes beams neighbours.
+/// Criterion for neighbouring beams.
 enum class GridSource {
-  Beams,  ///< rings, and columns, times or azimuths, as `organise` finds them
-  File,   ///< the rows and columns of the file's own image
+  Beams,  ///< rings, and columns, times or azimuths, as for `organise`
+  File,   ///< rows and columns of the file's own image
 };
 
-/// Whether semantic classes go along with the points.
+/// Use of semantic classes: carried along with the points, or left out.
 enum class LabelUse { Carry, Leave };
 
-/// How files of scans are read.
+/// Options for reading scan files.
 struct ScanTaking {
   ScanReading columns;
   ReturnChoice returns = ReturnChoice::Last;
   GridSource grid = GridSource::Beams;
   LabelUse labels = LabelUse::Carry;
-  std::optional<double> range_sd_m;  ///< instead of what scan and sensor say
-  /// Files of points that take more in memory, and cannot be read in blocks, are refused.
+  std::optional<double> range_sd_m;  ///< replaces the values of scan and sensor
+  /// Limit of memory: a file of points that needs more, and cannot be read in blocks, is rejected.
   std::size_t most_bytes = std::numeric_limits<std::size_t>::max();
 };
 
-/// A scan on the grid of its beams, in D.
+/// Scan on the grid of its beams, in D.
 struct OrganisedInput {
   OrganisedScan cells;
-  std::size_t rows = 0;            ///< of the file
-  std::size_t returns = 0;         ///< among them
-  OrganisedCounts counts;          ///< of the returns
-  std::vector<std::string> notes;  ///< for people
+  std::size_t rows = 0;            ///< number of rows in the file
+  std::size_t returns = 0;         ///< number of rows with a return
+  OrganisedCounts counts;          ///< statistics of `organise`
+  std::vector<std::string> notes;  ///< messages for the user
 };
 
 /// Points of a scan without order, in D.
 struct PointInput {
   std::vector<glm::dvec3> points_m;
-  std::vector<glm::dvec3> origins_m;  ///< where each beam began
-  std::vector<float> sd_m;            ///< of each range
-  std::vector<std::uint16_t> labels;  ///< one for each, or none
-  std::size_t rows = 0;               ///< of the file
-  std::chrono::nanoseconds begin{0};  ///< on the path's clock: when the first beam went
-  std::chrono::nanoseconds end{0};    ///< and the last
-  std::vector<std::string> notes;     ///< for people
+  std::vector<glm::dvec3> origins_m;  ///< origin of each beam
+  std::vector<float> sd_m;            ///< standard deviation of each range
+  std::vector<std::uint16_t> labels;  ///< one per point, or empty
+  std::size_t rows = 0;               ///< number of rows read from the file
+  std::chrono::nanoseconds begin{0};  ///< first firing or stamp, on the trajectory's clock
+  std::chrono::nanoseconds end{0};    ///< last firing or stamp
+  std::vector<std::string> notes;     ///< messages for the user
 };
 
-/// Reads a scan: the points that the sensor reported at the poses that it knew, never what a
-/// simulated scan tells of the truth.
+/// Reads a scan: the points as reported by the sensor, at the poses known to the run. Ground truth
+/// in a simulated scan is never used.
 /// @param scan  one of `files`.
-/// @throws Error naming the file, as read_scan and organise; or if a path does not cover the
+/// @throws Error naming the file, as read_scan and organise; or if a trajectory does not cover the
 ///         times, or a standard deviation is negative or not finite.
 OrganisedInput read_organised(const ScanFiles& files, const ScanFile& scan,
                               const ScanTaking& taking);
 
-/// Reads a scan as read_organised does, of clouds whose beams need not lie on a grid. Where columns
-/// tell the returns of a pulse (pulse, or else ring and time, beside return_index), one of each is
-/// taken.
+/// Reader for the points of a scan, as read_organised, whose beams need not form a grid. If columns
+/// identify the returns of a pulse (pulse, or else ring and time, with return_index), one return
+/// per pulse is taken.
 ///
-/// Files whose rows are of one size (CloudBlocks) are read in blocks, unless points need poses at
-/// times or there are several returns of a pulse: all rows are then in memory.
+/// Files with rows of constant size (CloudBlocks) are read in blocks. All rows are read at once if
+/// points need poses at their own times or pulses have several returns.
 class PointReader {
  public:
   static constexpr std::size_t usual_block_bytes = std::size_t{8} << 20U;
@@ -79,8 +79,8 @@ class PointReader {
   PointReader(const ScanFiles& files, const ScanFile& scan, ScanTaking taking,
               std::size_t block_bytes = usual_block_bytes);
 
-  /// Returns false after the last; there is one block at least.
-  /// @throws Error as read_organised; or if the file would take more than taking.most_bytes.
+  /// Reads the next block; returns false after the last. There is at least one block.
+  /// @throws Error as read_organised; or if the file would need more than taking.most_bytes.
   bool next(PointInput& block);
 
  private:

@@ -4,7 +4,7 @@
 
 #include <cstddef>
 
-#include "core/text_lines.h"
+#include "core/io/text_lines.h"
 
 namespace groundray {
 namespace {
@@ -20,8 +20,7 @@ bool Shard::has(std::uint32_t sensor, std::int64_t frame, std::int64_t frames) c
   return owner + 1 == index;
 }
 
-// The frames that go to a shard by `frame * count / frames` are those from one ratio, rounded up,
-// to the next.
+// The frames with `frame * count / frames` = k start at k * frames / count, rounded up.
 std::int64_t Shard::share(std::uint32_t sensor, std::int64_t frames) const noexcept {
   std::int64_t part = index - 1;
   if (frames < count) part = (part + count - sensor % count) % count;

@@ -14,8 +14,8 @@
 #include "apps/golden/suite/exact_match.h"
 #include "apps/golden/suite/golden_case.h"
 #include "apps/golden/suite/suite.h"
-#include "apps/interruption.h"
-#include "apps/source_folder.h"
+#include "apps/scene/interruption.h"
+#include "apps/scene/source_folder.h"
 #include "core/error.h"
 
 namespace {
@@ -50,7 +50,7 @@ void print(const Section& section) {
 int run_suite(const fs::path& folder, const std::vector<std::string>& filters,
               const SuiteOptions& options) {
   for (const char* name : {"report.html", "report.json", "junit.xml"})
-    fs::remove(options.out / name);  // those of another run say nothing of this one
+    fs::remove(options.out / name);  // left by an earlier run
   Report report =
       groundray::golden::run_cases(groundray::golden::read_cases(folder, filters), options);
   report.facts = {{"version", GROUNDRAY_VERSION},
@@ -70,8 +70,7 @@ int run_suite(const fs::path& folder, const std::vector<std::string>& filters,
 int accept(const fs::path& folder, const std::vector<std::string>& names,
            const SuiteOptions& options) {
   for (const std::string& name : names) {
-    const fs::path place =
-        (folder / name / "").parent_path();  // shells complete names with a slash
+    const fs::path place = (folder / name / "").parent_path();  // drops a trailing slash
     groundray::golden::accept_case(groundray::golden::read_case(place), options);
     fmt::print("stored: {}\n", (place / "expected").string());
   }
@@ -80,8 +79,8 @@ int accept(const fs::path& folder, const std::vector<std::string>& names,
 
 int run(int argc, char** argv) {
   CLI::App app(
-      "groundray-golden holds groundray against what it must give (closed forms, stored truth and "
-      "statistics of small scenes), and anybody's scans, images, DEMs and meshes against others.");
+      "groundray-golden checks groundray's results for small scenes against closed forms, golden "
+      "files and statistics, and compares scans, images, DEMs and meshes from any source.");
   app.footer(
       "A first run:  groundray-golden run\n"
       "Exit codes:   0 all passed, 1 failed, 2 wrong usage, 130 interrupted");
@@ -93,11 +92,12 @@ int run(int argc, char** argv) {
                        .out = "out/golden",
                        .jobs = std::max(1U, std::thread::hardware_concurrency())};
   const auto add_options = [&](CLI::App* command) {
-    command->add_option("--cases", folder, "Folder of cases; those of groundray, if not given");
-    command->add_option("--program", options.program, "The `groundray` to run");
+    command->add_option("--cases", folder, "Folder of cases; groundray's own by default");
+    command->add_option("--program", options.program, "The `groundray` executable to test");
     command->add_option("-o,--output", options.out, "Folder for datasets and reports")
         ->capture_default_str();
-    command->add_option("-j,--jobs", options.jobs, "Cases at a time")->check(CLI::Range(1U, 1024U));
+    command->add_option("-j,--jobs", options.jobs, "Number of cases that run in parallel")
+        ->check(CLI::Range(1U, 1024U));
   };
   std::vector<std::string> filters;
   auto* run_command =
@@ -106,7 +106,7 @@ int run(int argc, char** argv) {
   run_command->add_option("--filter", filters, "Only cases whose names contain one of these");
   std::vector<std::string> names;
   auto* accept_command = app.add_subcommand(
-      "accept", "Store what cases expect from now on; say why in the commit that keeps it");
+      "accept", "Store new golden files of cases; give the reason in the commit message");
   add_options(accept_command);
   accept_command->add_option("CASE", names, "Names of cases")->required();
 
@@ -118,7 +118,7 @@ int run(int argc, char** argv) {
     return app.exit(error) == 0 ? done : wrong_usage;
   }
   if (compare.is_asked_for()) return compare.run() == Verdict::Failed ? failed : done;
-  groundray::catch_interruptions();  // what is written by then stays whole
+  groundray::catch_interruptions();  // finished files remain complete
   return run_command->parsed() ? run_suite(folder, filters, options)
                                : accept(folder, names, options);
 }

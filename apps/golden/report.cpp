@@ -69,7 +69,7 @@ Histogram histogram_of(std::string title, std::string unit, const std::vector<do
       ++histogram.below;
     } else if (value > high || !has_steps) {
       ++histogram.above;
-    } else {  // the last step is closed on both sides
+    } else {  // the last step includes its upper limit
       const double place = (value - low) / (high - low) * static_cast<double>(bins);
       ++histogram.counts[std::min(static_cast<std::size_t>(place), bins - 1)];
     }

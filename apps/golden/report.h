@@ -7,30 +7,30 @@
 #include <utility>
 #include <vector>
 
-#include "core/image.h"
+#include "core/image/image.h"
 
 namespace groundray::golden {
 
 enum class Verdict {
   Passed,
   Failed,
-  Told,  ///< a figure that is held against nothing
+  Told,  ///< figure without a limit
 };
 
-/// Returns it as reports have it: "passed", "failed" or "told".
+/// Returns the name of a verdict in reports: "passed", "failed" or "told".
 const char* word_of(Verdict verdict);
 
-/// A figure, and what it was held against.
+/// Figure with its limit, if it has one.
 struct Measure {
   std::string name;
   double value = 0;
   std::string unit;                 ///< "m", "px", "rows"; empty for a plain number
-  std::optional<double> limit;      ///< the value must not exceed it
-  std::string because;              ///< where the limit comes from
-  Verdict verdict = Verdict::Told;  ///< without a limit it is Told, or Failed whatever the value
+  std::optional<double> limit;      ///< largest permitted value
+  std::string because;              ///< origin of the limit
+  Verdict verdict = Verdict::Told;  ///< without a limit: Told, or Failed whatever the value
 };
 
-/// How often values fell into equal steps from `low` to `high`; those outside are counted apart.
+/// Counts of values in equal steps from `low` to `high`; values outside are counted separately.
 struct Histogram {
   std::string title;
   std::string unit;
@@ -41,24 +41,24 @@ struct Histogram {
   std::uint64_t above = 0;
 };
 
-/// Figures by class: a row for each, of as many cells as there are columns.
+/// Table of figures by class; each row has as many cells as there are columns.
 struct Table {
   std::string title;
   std::vector<std::string> columns;
   std::vector<std::vector<std::string>> rows;
 };
 
-/// An aid to the reader's eye, of 1 or 3 channels.
+/// Picture of 1 or 3 channels for visual inspection.
 struct Picture {
   std::string caption;
   Image8 image;
 };
 
-/// What was found about one thing.
+/// Results of one case or comparison.
 struct Section {
   std::string title;
   Verdict verdict = Verdict::Told;
-  std::string text;  ///< a paragraph; empty for none
+  std::string text;  ///< paragraph; may be empty
   std::vector<Measure> measures;
   std::vector<Table> tables;
   std::vector<Histogram> histograms;
@@ -67,33 +67,33 @@ struct Section {
 
 struct Report {
   std::string title;
-  std::vector<std::pair<std::string, std::string>> facts;  ///< name and value: version, files, time
+  std::vector<std::pair<std::string, std::string>> facts;  ///< name and value, such as version
   std::vector<Section> sections;
 };
 
-/// Failed if any measure failed, else Passed if any passed, else Told.
+/// Returns Failed if any measure failed, else Passed if any passed, else Told.
 Verdict verdict_of(const std::vector<Measure>& measures);
 
-/// Tells a figure that is held against nothing.
+/// Adds a figure without a limit.
 void tell(Section& into, std::string name, double value, std::string unit = {});
 
-/// Holds a figure against a limit.
+/// Adds a figure that passes if it is at most `limit`.
 void hold(Section& into, std::string name, double value, std::string unit, double limit,
           std::string because);
 
-/// Tells a figure that fails though there is no limit to it: there is nothing to hold.
+/// Adds a figure that fails without a limit, because nothing can be checked.
 void fail(Section& into, std::string name, double value, std::string unit, std::string because);
 
-/// Returns the counts of the finite `values` in `bins` equal steps from `low` to `high`; without
-/// steps, as of infinite limits, all are above or below.
+/// Counts the finite `values` in `bins` equal steps from `low` to `high`. Without valid steps, e.g.
+/// for infinite limits, all values count as below or above.
 Histogram histogram_of(std::string title, std::string unit, const std::vector<double>& values,
                        double low, double high, std::size_t bins = 60);
 
-/// Writes one HTML file that needs no other: pictures and charts are in it.
+/// Writes a self-contained HTML file with all pictures and charts.
 /// @throws Error as write_whole.
 void write_html(const std::filesystem::path& path, const Report& report);
 
-/// Writes facts, measures, tables and histograms as JSON; numbers that are not finite are null.
+/// Writes facts, texts, measures, tables and histograms as JSON; non-finite numbers become null.
 /// @throws Error as write_whole.
 void write_json(const std::filesystem::path& path, const Report& report);
 

@@ -13,8 +13,8 @@
 #include <vector>
 
 #include "apps/golden/report.h"
-#include "core/png_bytes.h"
-#include "core/product_io.h"
+#include "core/image/png_io.h"
+#include "core/io/file_io.h"
 
 namespace groundray::golden {
 namespace {
@@ -68,7 +68,7 @@ std::string escaped(std::string_view text) {
         result += "&#39;";
         break;
       default:
-        // Other controls may not be in a page.
+        // HTML permits no other control characters.
         result += static_cast<unsigned char>(c) < ' ' && c != '\n' && c != '\t' ? ' ' : c;
     }
   }
@@ -123,7 +123,7 @@ std::string base64(std::string_view bytes) {
   return result;
 }
 
-/// Writes the page, part by part.
+/// Builds the page part by part.
 class Page {
  public:
   std::string of(const Report& report) {
@@ -179,7 +179,8 @@ class Page {
     add("</section>\n");
   }
 
-  /// What is held against something in one table, the rest in small ones by what it is of.
+  /// Adds figures with a limit or verdict in one table, the others in small tables by the prefix of
+  /// their names.
   void add_measures(const Section& section) {
     const auto is_held = [](const Measure& measure) {
       return measure.limit || measure.verdict != Verdict::Told;

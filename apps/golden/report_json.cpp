@@ -2,7 +2,7 @@
 #include <string>
 
 #include "apps/golden/report.h"
-#include "core/product_io.h"
+#include "core/io/file_io.h"
 
 namespace groundray::golden {
 namespace {
@@ -51,7 +51,7 @@ void write_json(const std::filesystem::path& path, const Report& report) {
     facts.push_back({{"name", fact.first}, {"value", fact.second}});
   const Json whole{
       {"title", report.title}, {"facts", std::move(facts)}, {"sections", json_of(report.sections)}};
-  // Names of files may be no UTF-8.
+  // File names may be invalid UTF-8.
   write_text(path, whole.dump(2, ' ', false, Json::error_handler_t::replace) + "\n");
 }
 

@@ -8,7 +8,7 @@
 namespace groundray::golden {
 namespace {
 
-// On both sides together it is beyond with the chance of one test.
+// Two-sided limit: each tail has half of the significance of one test.
 template <typename Distribution>
 double limit(const Distribution& distribution, double level, std::size_t tests) {
   return boost::math::quantile(

@@ -20,8 +20,8 @@
 #include "apps/groundray/run/frame_maker.h"
 #include "apps/groundray/run/frame_plan.h"
 #include "apps/groundray/run/run_log.h"
-#include "apps/interruption.h"
-#include "apps/scene/world.h"
+#include "apps/scene/interruption.h"
+#include "apps/scene/simulation.h"
 #include "core/error.h"
 #include "core/progress.h"
 
@@ -43,9 +43,10 @@ struct Tally {
   std::chrono::duration<double> scanning{0};
 };
 
-void count_scan(const World& world, const MadeFrame& made, Tally& tally, FrameDone& done) {
+void count_scan(const Simulation& simulation, const MadeFrame& made, Tally& tally,
+                FrameDone& done) {
   const auto& scan = std::get<LidarScan>(made.product);
-  const PlacedLidar& lidar = world.lidars[made.name.sensor];
+  const PlacedLidar& lidar = simulation.lidars[made.name.sensor];
   tally.scanning += made.tracing;
   tally.points += scan.echoes.rows();
   tally.pulses += static_cast<std::uint64_t>(lidar.lidar.pattern().pulses(made.name.number));
@@ -55,8 +56,10 @@ void count_scan(const World& world, const MadeFrame& made, Tally& tally, FrameDo
   done.count = scan.echoes.rows();
 }
 
-void count_image(const World& world, const MadeFrame& made, Tally& tally, FrameDone& done) {
-  const MountedCamera& camera = world.cameras[made.name.sensor - world.lidars.size()].spec;
+void count_image(const Simulation& simulation, const MadeFrame& made, Tally& tally,
+                 FrameDone& done) {
+  const MountedCamera& camera =
+      simulation.cameras[made.name.sensor - simulation.lidars.size()].spec;
   const glm::ivec2 size_px = camera.camera.size_px;
   done.sensor = camera.name;
   done.samples = "pixels";
@@ -67,26 +70,27 @@ void count_image(const World& world, const MadeFrame& made, Tally& tally, FrameD
   ++tally.images;
 }
 
-// What the processor has done for this thread.
+// Returns the processor time of this thread.
 std::chrono::duration<double> thread_cpu() {
   timespec time{};
   clock_gettime(CLOCK_THREAD_CPUTIME_ID, &time);
   return std::chrono::seconds(time.tv_sec) + std::chrono::nanoseconds(time.tv_nsec);
 }
 
-// Writes a frame and takes it into the dataset.
-FrameDone write_frame(const World& world, Dataset& dataset, const MadeFrame& made, Tally& tally) {
+// Writes a frame and records it in the dataset.
+FrameDone write_frame(const Simulation& simulation, DatasetWriter& dataset, const MadeFrame& made,
+                      Tally& tally) {
   const auto begin = Clock::now();
   const auto cpu_begin = thread_cpu();
   const auto [sensor, number] = made.name;
   FrameDone done{.sensor = {}, .frame = number, .samples = {}, .tracing = made.making};
-  if (sensor < world.lidars.size()) {
-    write_scan(world, dataset, sensor, number, std::get<LidarScan>(made.product));
-    count_scan(world, made, tally, done);
+  if (sensor < simulation.lidars.size()) {
+    write_scan(simulation, dataset, sensor, number, std::get<LidarScan>(made.product));
+    count_scan(simulation, made, tally, done);
   } else {
-    tally.flows_left_out += write_image(world, dataset, sensor - world.lidars.size(), number,
-                                        std::get<MadeImage>(made.product));
-    count_image(world, made, tally, done);
+    tally.flows_left_out += write_image(simulation, dataset, sensor - simulation.lidars.size(),
+                                        number, std::get<MadeImage>(made.product), made.echoes);
+    count_image(simulation, made, tally, done);
   }
   done.bytes = dataset.note(sensor, number);
   done.writing = Clock::now() - begin;
@@ -94,10 +98,10 @@ FrameDone write_frame(const World& world, Dataset& dataset, const MadeFrame& mad
   return done;
 }
 
-// Makes frames, the next one while one is being written.
-void make_frames(const World& world, Dataset& dataset, const std::vector<FrameName>& frames,
-                 RunLog& log, Tally& tally) {
-  FrameMaker maker(world, dataset);
+// Makes frames; each is written while the next one is made.
+void make_frames(const Simulation& simulation, DatasetWriter& dataset,
+                 const std::vector<FrameName>& frames, RunLog& log, Tally& tally) {
+  FrameMaker maker(simulation, dataset);
   std::atomic<std::uint64_t> written = 0;
   Progress progress(stderr, "frames", frames.size());
   BackgroundWriter writer;
@@ -105,15 +109,16 @@ void make_frames(const World& world, Dataset& dataset, const std::vector<FrameNa
   try {
     for (const FrameName& name : frames) {
       if (is_interrupted()) break;
-      const bool is_image = name.sensor >= world.lidars.size();
+      const bool is_image = name.sensor >= simulation.lidars.size();
       if (is_image && was_scan) writer.wait();  // images may show scans
       was_scan = !is_image;
       auto made = std::make_unique<MadeFrame>(maker.make(name));
-      writer.begin([&world, &dataset, &log, &tally, &written, made = std::move(made)]() mutable {
-        log.frame_done(write_frame(world, dataset, *made, tally));
-        made.reset();
-        ++written;
-      });
+      writer.begin(
+          [&simulation, &dataset, &log, &tally, &written, made = std::move(made)]() mutable {
+            log.frame_done(write_frame(simulation, dataset, *made, tally));
+            made.reset();
+            ++written;
+          });
       progress.update(written);
     }
     writer.wait();
@@ -130,12 +135,12 @@ void say_faults(const fs::path& out, const std::vector<std::string>& faults) {
   if (faults.size() > most) fmt::print(stderr, "and {} more\n", faults.size() - most);
 }
 
-void say(const World& world, const fs::path& out, const FramePlan& plan, const Tally& tally,
-         std::FILE* to) {
+void say(const Simulation& simulation, const fs::path& out, const FramePlan& plan,
+         const Tally& tally, std::FILE* to) {
   if (tally.scans < plan.scans)
-    fmt::print(to, "{} scans were there already\n", plan.scans - tally.scans);
+    fmt::print(to, "{} scans already existed\n", plan.scans - tally.scans);
   if (tally.images < plan.images)
-    fmt::print(to, "{} images were there already\n", plan.images - tally.images);
+    fmt::print(to, "{} images already existed\n", plan.images - tally.images);
   if (tally.scans > 0) {
     fmt::print(to, "{} scans, {} points of {} pulses, {:.2f} M pulses/s\n", tally.scans,
                tally.points, tally.pulses,
@@ -151,45 +156,45 @@ void say(const World& world, const fs::path& out, const FramePlan& plan, const T
                tally.flows_left_out);
   }
   fmt::print(to, "dataset: {}\n", out.string());
-  for (const PlacedLidar& lidar : world.lidars) {
+  for (const PlacedLidar& lidar : simulation.lidars) {
     fmt::print(to, "  {}: scans and pictures (*_preview.png) in {}\n", lidar.spec.name,
                (out / "lidar" / lidar.spec.name).string());
   }
-  for (const PlacedCamera& camera : world.cameras) {
+  for (const PlacedCamera& camera : simulation.cameras) {
     fmt::print(to, "  {}: images and pictures (*_preview.png) in {}\n", camera.spec.name,
                (out / "camera" / camera.spec.name).string());
   }
 }
 
 void run(const fs::path& scene, const fs::path& out, const GenerateOptions& options, RunLog& log) {
-  const World world = load_world(scene, options.seed);
-  if (world.terrain.whole() == nullptr) {
-    // Says what memory is too small before anything is written.
-    world.terrain.clipmap(sensor_box(first_frame(world)), world.reach_m);
+  const Simulation simulation = load_simulation(scene, options.seed);
+  if (simulation.terrain.whole() == nullptr) {
+    // Reports insufficient memory before anything is written.
+    simulation.terrain.clipmap(sensor_box(first_frame(simulation)), simulation.reach_m);
   }
-  Dataset dataset(out, world, options.use, options.shard);
+  DatasetWriter dataset(out, simulation, options.use, options.shard);
   say_faults(out, dataset.faults());
-  const FramePlan plan = plan_frames(world, dataset, options.shard);
+  const FramePlan plan = plan_frames(simulation, dataset, options.shard);
   log.begun({.scene = scene,
              .output = out,
-             .seed = world.spec.seed.value,
+             .seed = simulation.spec.seed.value,
              .shard = options.shard ? text_of(*options.shard) : "",
              .frames = plan.frames.size(),
              .there = plan.scans + plan.images - plan.frames.size()});
   Tally tally;
   try {
-    make_frames(world, dataset, plan.frames, log, tally);
+    make_frames(simulation, dataset, plan.frames, log, tally);
   } catch (...) {
     try {
       dataset.close();
     } catch (const Error&) {
-      // What has stopped the run is what there is to tell.
+      // Not reported: the error that stopped the run is rethrown.
     }
     throw;
   }
   dataset.close();
   if (tally.scans + tally.images < plan.frames.size()) throw Interrupted{};
-  say(world, out, plan, tally, log.takes_output() ? stderr : stdout);
+  say(simulation, out, plan, tally, log.takes_output() ? stderr : stdout);
 }
 
 }  // namespace

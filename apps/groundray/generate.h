@@ -5,24 +5,24 @@
 #include <string>
 
 #include "apps/dataset/shard.h"
-#include "apps/groundray/record/dataset.h"
+#include "apps/groundray/record/dataset_writer.h"
 #include "core/random.h"
 
 namespace groundray {
 
-/// How a scene is to be run.
+/// Options of a run.
 struct GenerateOptions {
-  std::optional<Seed>
-      seed;  ///< instead of the scene's own: another draw of noise and of scattering
+  std::optional<Seed> seed;  ///< replaces the scene's own, for other noise and scattering
   FolderUse use = FolderUse::New;
-  std::optional<Shard> shard;  ///< of the frames; nothing for all of them
-  std::string log;             ///< as of RunLog
+  std::optional<Shard> shard;  ///< part of the frames; nothing for all frames
+  std::string log;             ///< target, as for RunLog
 };
 
-/// Runs a scene and writes its dataset; says on standard output what was made, shows progress on
-/// standard error. A frame is written while the next one is traced, so that two are in memory at
-/// most. Frames made so far stay when it stops early, for a run with FolderUse::Resume.
-/// @throws Error as load_world, Dataset and RunLog; Interrupted between two frames.
+/// Runs a scene and writes its dataset. Shows progress on standard error, and prints a summary on
+/// standard output, or on standard error if the log is on standard output. A frame is written while
+/// the next one is traced, so that at most two are in memory. If the run stops early, finished
+/// frames stay for a run with FolderUse::Resume.
+/// @throws Error as load_simulation, Dataset and RunLog; Interrupted between two frames.
 void generate(const std::filesystem::path& scene, const std::filesystem::path& out,
               const GenerateOptions& options);
 

@@ -17,10 +17,10 @@
 #include "apps/dataset/dataset_summary.h"
 #include "apps/dataset/dataset_text.h"
 #include "apps/groundray/run/journal.h"
-#include "apps/scene/world.h"
-#include "terrain/certificate.h"
-#include "terrain/dem_file.h"
-#include "terrain/dem_io.h"
+#include "apps/scene/simulation.h"
+#include "terrain/dem/dem_file.h"
+#include "terrain/dem/dem_io.h"
+#include "terrain/lod/certificate.h"
 #include "terrain/terrain_scene.h"
 
 namespace groundray {
@@ -47,20 +47,20 @@ void print_heights(const HeightGrid& grid) {
 void print_certificate(const DemFile& dem) {
   const std::optional<Certificate> certificate = Certificate::open(dem);
   if (!certificate) {
-    fmt::print("certified no; `groundray terrain certify` does\n");
+    fmt::print("certified no; use `groundray terrain certify`\n");
     return;
   }
   const LevelSummary& root = certificate->levels().back();
   fmt::print("certified yes, in {}: ", certificate->folder().string());
   if (root.mixed > 0) {
-    fmt::print("it has holes; {} of {} blocks of 8 x 8 cells meet one\n",
+    fmt::print("it has holes; {} of {} blocks of 8 x 8 cells touch one\n",
                certificate->levels().front().mixed, certificate->levels().front().nodes);
   } else {
-    fmt::print("one cell for all of it is within {:.6g} m\n", root.max_deviation_m);
+    fmt::print("a single cell deviates by at most {:.6g} m\n", root.max_deviation_m);
   }
 }
 
-// What the header tells comes first: it may be all there is to tell of a DEM that cannot be traced.
+// Prints the header first: there may be nothing else to print for a DEM that cannot be traced.
 void print_dem(const std::filesystem::path& path) {
   const DemInfo info = inspect_dem(path);
   fmt::print("format    {}, {}\nsize      {} x {} samples\nCRS       {}\n", info.driver,
@@ -76,16 +76,17 @@ void print_dem(const std::filesystem::path& path) {
   print_certificate(dem);
 }
 
-// The surface round the first frame's sensors.
-void print_levels(const World& world) {
-  const Terrain& terrain = world.terrain;
-  const Exposed first = first_frame(world);
+// Prints the terrain's levels round the sensors of the first frame.
+void print_levels(const Simulation& simulation) {
+  const Terrain& terrain = simulation.terrain;
+  const Exposed first = first_frame(simulation);
   const SensorBox sensors = sensor_box(first);
   const glm::dvec3 p_DL = float_frame_origin(first.X_DS->pose_at(first.begin).translation_m);
   const RayTracer rays =
       terrain.whole() != nullptr
-          ? RayTracer({full_resolution_level(*terrain.whole())}, p_DL, world.spec.tracing)
-          : build_tracer(terrain.clipmap(sensors, world.reach_m), p_DL, world.spec.tracing);
+          ? RayTracer({full_resolution_level(*terrain.whole())}, p_DL, simulation.spec.tracing)
+          : build_tracer(terrain.clipmap(sensors, simulation.reach_m), p_DL,
+                         simulation.spec.tracing);
   std::size_t triangles = 0;
   double bytes = static_cast<double>(rays.device().memory_bytes());
   fmt::print("levels    round the first frame; deviation is the certified bound, in height\n");
@@ -115,19 +116,20 @@ void print_cover(const TerrainSpec& terrain, const GroundCover& cover) {
   }
 }
 
-// Materials are numbered for lasers and cameras.
-void print_materials(const World& world) {
+// Prints the materials if cameras or lidars with light use them.
+void print_materials(const Simulation& simulation) {
   const auto has_light = [](const PlacedLidar& lidar) {
     return lidar.spec.lidar.light.has_value();
   };
-  if (world.cameras.empty() && std::ranges::none_of(world.lidars, has_light)) return;
+  if (simulation.cameras.empty() && std::ranges::none_of(simulation.lidars, has_light)) return;
   std::vector<std::string_view> names;
-  for (const Material& material : world.content.materials.all()) names.push_back(material.name);
+  for (const Material& material : simulation.content.materials.all())
+    names.push_back(material.name);
   fmt::print("materials {}\n", fmt::join(names, ", "));
 }
 
-void print_content(const Content& content) {
-  for (const Content::Group& group : content.groups) {
+void print_content(const SceneObjects& content) {
+  for (const SceneObjects::Group& group : content.groups) {
     fmt::print("objects   {}: {} of label {}, instances from {}\n", group.name, group.count,
                group.label, group.first);
   }
@@ -144,14 +146,14 @@ void print_content(const Content& content) {
 }
 
 std::string words_for(const ConstantSky& sky, const ClearAir& /*air*/) {
-  return fmt::format("the same everywhere: ({}, {}, {}) W/(m2 sr)", sky.radiance.x, sky.radiance.y,
+  return fmt::format("uniform: ({}, {}, {}) W/(m2 sr)", sky.radiance.x, sky.radiance.y,
                      sky.radiance.z);
 }
 std::string words_for(const EnvironmentImage& sky, const ClearAir& /*air*/) {
   return sky.image.string();
 }
 std::string words_for(const AnalyticSky& /*sky*/, const ClearAir& air) {
-  return fmt::format("clear, of turbidity {}", air.turbidity);
+  return fmt::format("clear, turbidity {}", air.turbidity);
 }
 
 void print_sky(const SkySpec& spec) {
@@ -192,26 +194,26 @@ void print_camera(const PlacedCamera& placed) {
   }
 }
 
-void print_scene(const World& world) {
-  fmt::print("seed      {}\n", world.spec.seed.value);
-  fmt::print("duration  {} s, {} tracing\n", world.spec.duration_s,
-             world.spec.tracing == Tracing::Fast ? "fast" : "exact");
-  fmt::print("terrain   {}\n", world.spec.terrain.dem.string());
-  fmt::print("CRS       {}\n", world.terrain.header().crs_name);
-  print_frame(world.terrain.frame(), world.terrain.header().origin_w_m);
-  if (world.terrain.whole() != nullptr) print_heights(*world.terrain.whole());
-  print_levels(world);
-  print_cover(world.spec.terrain, world.content.cover);
-  print_content(world.content);
-  print_materials(world);
-  if (world.spec.sky) print_sky(*world.spec.sky);
-  for (const PlacedLidar& lidar : world.lidars) print_lidar(lidar);
-  for (const PlacedCamera& camera : world.cameras) print_camera(camera);
+void print_scene(const Simulation& simulation) {
+  fmt::print("seed      {}\n", simulation.spec.seed.value);
+  fmt::print("duration  {} s, {} tracing\n", simulation.spec.duration_s,
+             simulation.spec.tracing == Tracing::Fast ? "fast" : "exact");
+  fmt::print("terrain   {}\n", simulation.spec.terrain.dem.string());
+  fmt::print("CRS       {}\n", simulation.terrain.header().crs_name);
+  print_frame(simulation.terrain.frame(), simulation.terrain.header().origin_w_m);
+  if (simulation.terrain.whole() != nullptr) print_heights(*simulation.terrain.whole());
+  print_levels(simulation);
+  print_cover(simulation.spec.terrain, simulation.content.cover);
+  print_content(simulation.content);
+  print_materials(simulation);
+  if (simulation.spec.sky) print_sky(*simulation.spec.sky);
+  for (const PlacedLidar& lidar : simulation.lidars) print_lidar(lidar);
+  for (const PlacedCamera& camera : simulation.cameras) print_camera(camera);
 }
 
-// A run's journal has all of its frames that are there; dataset.yaml comes up to date when it ends.
+// Counts frames in the journal of a run, because dataset.yaml is updated only when the run ends.
 void count_journal(const std::filesystem::path& journal, DatasetSummary& dataset) {
-  std::vector<std::vector<bool>> noted(dataset.sensors.size());  // by sensor and frame
+  std::vector<std::vector<bool>> noted(dataset.sensors.size());  // indexed by sensor and frame
   dataset.done = 0;
   for (DatasetSummary::Sensor& sensor : dataset.sensors) sensor.done = sensor.bytes = 0;
   read_journal(journal, [&](const std::string& text) {
@@ -236,11 +238,11 @@ void print_dataset(const std::filesystem::path& folder) {
   const std::filesystem::path journal = folder / journal_file;
   const bool is_open = std::filesystem::exists(journal);
   if (is_open) count_journal(journal, dataset);
-  fmt::print("dataset   {} of {} frames are there{}\n", dataset.done, dataset.asked_for,
-             is_open ? "; a run is at work, or was cut off and goes on by --resume"
+  fmt::print("dataset   {} of {} frames are complete{}\n", dataset.done, dataset.asked_for,
+             is_open ? "; a run is in progress, or was interrupted and continues with --resume"
              : dataset.done < dataset.asked_for
-                 ? "; --resume of `groundray generate`, or of `groundray merge` if that was cut "
-                   "off, brings the rest"
+                 ? "; --resume of `groundray generate`, or of `groundray merge` if that was "
+                   "interrupted, adds the rest"
                  : "");
   if (dataset.shard) fmt::print("shard     {}\n", text_of(*dataset.shard));
   fmt::print("version   {}\nseed      {}\n", dataset.version, dataset.seed);
@@ -256,7 +258,7 @@ void print_dataset(const std::filesystem::path& folder) {
 void print_info(const std::filesystem::path& file) {
   if (std::filesystem::exists(file / dataset_file)) return print_dataset(file);
   if (file.extension() == ".yaml" || file.extension() == ".yml")
-    return print_scene(load_world(file));
+    return print_scene(load_simulation(file));
   print_dem(file);
 }
 

@@ -11,7 +11,7 @@
 #include "apps/groundray/reconstruct_commands.h"
 #include "apps/groundray/run/run_commands.h"
 #include "apps/groundray/terrain_commands.h"
-#include "apps/interruption.h"
+#include "apps/scene/interruption.h"
 #include "core/error.h"
 
 namespace {
@@ -23,12 +23,12 @@ constexpr int interrupted = 130;
 
 int run(int argc, char** argv) {
   CLI::App app(
-      "groundray makes ground truth of lidars and cameras over real terrain: every point and pixel "
-      "with its true place, range and normal.");
+      "groundray simulates lidars and cameras over real terrain with ground truth: the true "
+      "position, range and normal of every point and pixel.");
   app.footer(
-      "A first run:  groundray generate data/scenes/first_light.yaml -o out/first_light\n"
-      "Exit codes:   0 done, 1 failed, 2 wrong usage, 130 interrupted (--resume goes on)\n"
-      "Data:         presets are looked up in $GROUNDRAY_DATA/sensors, else beside the program");
+      "A first run:  groundray generate data/scenes/first_light.yaml -o out/first_light\nExit "
+      "codes:   0 done, 1 failed, 2 wrong usage, 130 interrupted (--resume continues)\nData:       "
+      "  presets are looked up in $GROUNDRAY_DATA/sensors, else beside the program");
   app.set_version_flag("--version", "groundray " GROUNDRAY_VERSION);
   app.require_subcommand(1);
 
@@ -36,11 +36,10 @@ int run(int argc, char** argv) {
 
   std::filesystem::path out;
   std::filesystem::path file;
-  auto* info = app.add_subcommand("info", "Say what a file is and what it would take");
-  info->add_option(
-          "FILE", file,
-          "A DEM (GeoTIFF, HGT, ASCII grid, ...): size, CRS, cell, heights, holes, memory; "
-          "a scene (.yaml): what it would make; or a dataset: what is there")
+  auto* info = app.add_subcommand("info", "Describe a file and the resources that it needs");
+  info->add_option("FILE", file,
+                   "A DEM (GeoTIFF, HGT, ASCII grid, ...): size, CRS, cell, heights, holes, "
+                   "memory; a scene (.yaml): its expected output; or a dataset: its contents")
       ->required();
 
   auto* terrain = app.add_subcommand("terrain", "Work on a DEM");
@@ -51,7 +50,7 @@ int run(int argc, char** argv) {
         ->add_option("DEM", file, "Any raster of heights that GDAL reads (GeoTIFF, VRT, HGT, ...)")
         ->required();
     command->add_option("--nodata", dem_options.nodata,
-                        "A height that means 'none', besides the one that the file declares");
+                        "Additional nodata value, besides the one that the file declares");
     command->add_option("--reproject-to", dem_options.reproject_to,
                         "A CRS to warp to, such as EPSG:32631, or utm for the zone that fits");
   };
@@ -59,7 +58,7 @@ int run(int argc, char** argv) {
   std::vector<double> viewpoint;
   double angle_mrad = 0;
   auto* mesh = terrain->add_subcommand(
-      "mesh", "Write a DEM as triangles, none farther from it than asked, without cracks");
+      "mesh", "Write a DEM as a mesh without cracks, within an error bound");
   add_dem(mesh);
   mesh->add_option("-o,--output", out, "Mesh to write: .ply (doubles), .obj, .stl or .glb")
       ->required();
@@ -68,8 +67,9 @@ int run(int argc, char** argv) {
       ->required()
       ->check(CLI::NonNegativeNumber);
   auto* angle =
-      mesh->add_option("--angle-mrad", angle_mrad,
-                       "Allow so many milliradians, seen from --viewpoint, where that is more")
+      mesh->add_option(
+              "--angle-mrad", angle_mrad,
+              "Permitted angle in milliradians, seen from --viewpoint, where that is larger")
           ->check(CLI::NonNegativeNumber);
   auto* from = mesh->add_option("--viewpoint", viewpoint, "X,Y,Z in the DEM's CRS, metres")
                    ->delimiter(',')
@@ -78,7 +78,7 @@ int run(int argc, char** argv) {
   angle->needs(from);
   auto* certify = terrain->add_subcommand(
       "certify",
-      "Work out how far each node of the DEM's quadtree deviates, keep that beside the DEM, and "
+      "Compute the deviation of each node of the DEM's quadtree, store it beside the DEM, and "
       "print a summary; `generate` uses it for DEMs larger than memory");
   add_dem(certify);
 
@@ -120,18 +120,18 @@ int run(int argc, char** argv) {
 
 int main(int argc, char** argv) {
   std::signal(SIGXFSZ,
-              SIG_IGN);  // a limit on file size is then an error of the write, with a message
+              SIG_IGN);  // a write beyond the limit of file size then fails with a message
   groundray::catch_interruptions();
   try {
     return run(argc, argv);
   } catch (const groundray::Interrupted&) {
     fmt::print(stderr,
-               "\ngroundray: interrupted; a run or a merge goes on with --resume, other commands "
-               "begin anew\n");
+               "\ngroundray: interrupted; a run or a merge continues with --resume, other commands "
+               "start again\n");
     return interrupted;
   } catch (const std::bad_alloc&) {
     fmt::print(stderr,
-               "groundray: there is not enough memory; `groundray info` tells how much a DEM or "
+               "groundray: there is not enough memory; `groundray info` reports how much a DEM or "
                "scene needs\n");
   } catch (const std::exception& error) {
     fmt::print(stderr, "groundray: {}\n", error.what());

@@ -32,7 +32,7 @@ std::optional<double> radians(const std::optional<double>& angle_deg) {
 
 enum class SurfacePreset { Ground, Strict, Object };
 
-// What is taken for surface, and for one surface.
+// Options for accepting triangles as surface and for merging surfaces.
 struct SurfaceOptions {
   std::optional<SurfacePreset> preset;
   std::optional<double> incidence_deg, longest_m, noise_sds;
@@ -46,30 +46,33 @@ struct SurfaceOptions {
                                        {"strict", SurfacePreset::Strict},
                                        {"object", SurfacePreset::Object}};
     add_words(surface, "--preset", preset,
-              "Between which returns there is surface: ground (88 deg, 3 m), strict (85 "
-              "deg, 2 m), object (75.5 deg)",
+              "Criteria for surface between returns: ground (88 deg, 3 m), strict (85 deg, 2 m), "
+              "object (75.5 deg)",
               presets);
     surface
-        ->add_option("--incidence-deg", incidence_deg, "Angle of incidence at most, instead of its")
+        ->add_option("--incidence-deg", incidence_deg,
+                     "Largest angle of incidence, instead of the preset's")
         ->check(CLI::Range(0.0, 90.0));
-    surface->add_option("--longest-m", longest_m, "Edges at most")->check(positive());
+    surface->add_option("--longest-m", longest_m, "Longest edge")->check(positive());
     surface
         ->add_option("--noise-sds", noise_sds,
-                     "How many standard deviations of range an edge may owe to noise")
+                     "Standard deviations of range that are attributed to noise in an edge")
         ->check(not_negative());
     auto* unorganised = surface->add_flag(
         "--unorganised", is_unorganised,
-        "Points have no order: join them by CGAL's advancing front, scans and all at once");
-    surface->add_option("--perimeter-m", perimeter_m, "Of such a triangle, at most (3)")
+        "Points have no order: mesh all scans together by CGAL's advancing front");
+    surface->add_option("--perimeter-m", perimeter_m, "Largest perimeter of such a triangle (3)")
         ->check(positive())
         ->needs(unorganised);
     surface
-        ->add_option("--merge-sds", merging.noise_sds,
-                     "How many standard deviations of both one surface may be apart in two scans")
+        ->add_option(
+            "--merge-sds", merging.noise_sds,
+            "Largest distance between one surface in two scans, in standard deviations of both")
         ->check(not_negative());
-    surface->add_option("--apart-m", apart_m, "And this besides: what poses are off")
+    surface->add_option("--apart-m", apart_m, "Permitted distance in addition, for errors of poses")
         ->check(not_negative());
-    surface->add_option("--turned-deg", turned_deg, "And how far it may be turned")
+    surface
+        ->add_option("--turned-deg", turned_deg, "Largest angle between one surface in two scans")
         ->check(positive() & CLI::Range(0.0, 90.0));
   }
 
@@ -89,8 +92,8 @@ struct SurfaceOptions {
   }
 };
 
-// Where simplification halts: one of these.
-struct HaltOptions {
+// Options for the end of simplification, of which one may be given.
+struct StopOptions {
   std::optional<double> vertical_m, error_m, border_m, sds, crease_deg;
   std::optional<std::size_t> triangles;
   bool at_knee = false;
@@ -98,39 +101,41 @@ struct HaltOptions {
   enum class Need { One, None };
 
   void add(CLI::App* command, Need need) {
-    CLI::App* halt = command->add_option_group(
-        "Simplify", "Until one of these; the error is measured and told in any case");
-    CLI::App* one = halt->add_option_group("Halt");
+    CLI::App* stop = command->add_option_group(
+        "Simplify", "Until one of these; the error is always measured and reported");
+    CLI::App* one = stop->add_option_group("Stop criterion");
     one->add_option("--max-vertical-error-m", vertical_m,
-                    "Of terrain: until a vertex would be farther above or below")
+                    "For terrain: until a vertical distance would be larger")
         ->check(positive());
-    one->add_option("--max-error-m", error_m, "Until a point of either would be farther away")
+    one->add_option("--max-error-m", error_m,
+                    "Until the distance of a point of either mesh would be larger")
         ->check(positive());
-    one->add_option("--triangles", triangles, "Until so many are left")->check(positive());
+    one->add_option("--triangles", triangles, "Until this many are left")->check(positive());
     one->add_option("--noise-halt", sds,
-                    "Until the error is so many standard deviations of the measurements")
+                    "Until the error reaches this many standard deviations of the measurements")
         ->check(positive());
-    one->add_flag("--knee", at_knee, "Until errors begin to rise faster than triangles go");
+    one->add_flag("--knee", at_knee,
+                  "Until errors begin to rise faster than the number of triangles falls");
     one->require_option(need == Need::One ? 1 : 0, 1);
-    halt->add_option(
-            "--border-m", border_m,
-            "How far borders may move, under --max-error-m and --max-vertical-error-m; else "
-            "as the error")
+    stop->add_option("--border-m", border_m,
+                     "Largest movement of borders, for --max-error-m and --max-vertical-error-m "
+                     "(that bound)")
         ->check(not_negative());
-    halt->add_option("--crease-deg", crease_deg,
-                     "Keep edges that are sharper (60); 180 for none. Of --triangles only where "
+    stop->add_option("--crease-deg", crease_deg,
+                     "Keep edges that are sharper (60); 180 for none. With --triangles only if "
                      "labels are kept")
         ->check(CLI::Range(0.0, 180.0));
   }
 
-  /// @throws Error if an option would do nothing.
-  std::optional<Halt> halt() const {
+  /// Returns the condition that ends simplification, or nothing.
+  /// @throws Error if an option would have no effect.
+  std::optional<StopCriterion> stop() const {
     if (border_m && !vertical_m && !error_m)
-      throw Error(
-          "--border-m: only --max-error-m and --max-vertical-error-m leave borders a bound");
+      throw Error("--border-m: only --max-error-m and --max-vertical-error-m bound the borders");
     const bool is_none = !vertical_m && !error_m && !triangles && !sds && !at_knee;
     if (crease_deg && is_none)
-      throw Error("--crease-deg: nothing is simplified without an option that says until when");
+      throw Error(
+          "--crease-deg: nothing is simplified without a stopping option, such as --max-error-m");
     if (vertical_m) return VerticalBound{*vertical_m, border_m.value_or(*vertical_m)};
     if (error_m) return DistanceBound{*error_m, border_m.value_or(*error_m)};
     if (triangles) return FaceBudget{*triangles};
@@ -146,20 +151,19 @@ struct HaltOptions {
   }
 };
 
-// What all of them write, and how much memory they may take.
+// Options for the output files and the memory limit of all commands.
 struct OutputOptions {
   RebuildOutput output;
   std::optional<std::uint64_t> memory_mb;
 
   void add(CLI::App* command) {
     command
-        ->add_option("-o,--output", output.mesh,
-                     "Mesh to write: .ply (doubles, and what is known of vertices), .obj, .stl or "
-                     ".glb")
+        ->add_option(
+            "-o,--output", output.mesh,
+            "Mesh to write: .ply (doubles, with attributes of vertices), .obj, .stl or .glb")
         ->required();
-    command->add_option("--report", output.report, "JSON file for all figures");
-    command->add_option("--memory-mb", memory_mb, "Begin no work that would take more")
-        ->check(positive());
+    command->add_option("--report", output.report, "JSON file of all results");
+    command->add_option("--memory-mb", memory_mb, "Limit of memory")->check(positive());
   }
 
   void close(const std::string& command, const std::vector<fs::path>& inputs) {
@@ -180,26 +184,27 @@ struct ReconstructCommands::Options {
   CLI::App *all = nullptr, *mesh = nullptr, *simplify = nullptr, *fill = nullptr;
   ScanOptions scans;
   SurfaceOptions surface;
-  std::array<HaltOptions, 2> halt;  // of mesh, of simplify
+  std::array<StopOptions, 2> stop;  // for mesh and simplify
   std::array<OutputOptions, 3> out;
   std::optional<DemCommand> dem;
   std::optional<double> fill_m, sd_m;
-  fs::path input;  // of simplify and fill
+  fs::path input;  // for simplify and fill
 
   void add_mesh() {
-    mesh = all->add_subcommand("mesh", "Link scans to meshes, screen and merge them to one");
+    mesh = all->add_subcommand(
+        "mesh", "Link scans into meshes, check them against other scans, and merge them into one");
     mesh->add_option("INPUT", scans.choice.inputs,
                      "A dataset folder; or scans (.ply .pcd .npy .npz .bin); or a .conf of "
                      "Stanford's range scans")
         ->required();
     out[0].add(mesh);
     mesh->add_option("--occlusion", out[0].output.occlusion,
-                     "Mesh for what beams passed by: links that were not taken for surface");
+                     "Mesh of occlusions: links that were rejected as surface");
     scans.add(mesh);
     scans.add_grid(mesh);
     surface.add(mesh);
     add_fill(mesh)->required(false);
-    halt[0].add(mesh, HaltOptions::Need::None);
+    stop[0].add(mesh, StopOptions::Need::None);
     CLI::Option* unorganised = mesh->get_option("--unorganised");
     for (const char* of_grids :
          {"--occlusion", "--grid", "--preset", "--incidence-deg", "--longest-m", "--noise-sds",
@@ -208,7 +213,8 @@ struct ReconstructCommands::Options {
   }
 
   CLI::Option* add_fill(CLI::App* command) {
-    return command->add_option("--fill-m", fill_m, "Fill holes whose rim is no longer than this")
+    return command
+        ->add_option("--fill-m", fill_m, "Fill holes whose boundary is no longer than this")
         ->check(positive());
   }
 
@@ -216,11 +222,9 @@ struct ReconstructCommands::Options {
     simplify = all->add_subcommand("simplify", "Simplify a mesh within bounds");
     add_input(simplify);
     out[1].add(simplify);
-    simplify
-        ->add_option("--sd-m", sd_m,
-                     "Standard deviation of vertices, instead of what the mesh tells")
+    simplify->add_option("--sd-m", sd_m, "Standard deviation of vertices, instead of the mesh's")
         ->check(positive());
-    halt[1].add(simplify, HaltOptions::Need::One);
+    stop[1].add(simplify, StopOptions::Need::One);
   }
 
   void add_filling() {
@@ -238,7 +242,7 @@ struct ReconstructCommands::Options {
     scans.close();
     out[0].close("reconstruct mesh", scans.choice.inputs);
     Finishing finishing{
-        .fill_m = fill_m, .halt = halt[0].halt(), .simplify = halt[0].options(), .sd_m = {}};
+        .fill_m = fill_m, .stop = stop[0].stop(), .simplify = stop[0].options(), .sd_m = {}};
     out[0].limit(finishing);
     rebuild_mesh(scans.choice, scans.taking, surface.meshing(), finishing, out[0].output);
   }
@@ -248,7 +252,7 @@ struct ReconstructCommands::Options {
     OutputOptions& to = out[is_simplify ? 1 : 2];
     to.close(is_simplify ? "reconstruct simplify" : "reconstruct fill", {input});
     Finishing finishing{
-        .fill_m = fill_m, .halt = halt[1].halt(), .simplify = halt[1].options(), .sd_m = sd_m};
+        .fill_m = fill_m, .stop = stop[1].stop(), .simplify = stop[1].options(), .sd_m = sd_m};
     to.limit(finishing);
     finish_mesh(input, finishing, to.output);
   }
@@ -256,7 +260,8 @@ struct ReconstructCommands::Options {
 
 ReconstructCommands::ReconstructCommands(CLI::App& app) : options_(std::make_unique<Options>()) {
   options_->all = app.add_subcommand(
-      "reconstruct", "Meshes and DEMs from scans (docs/reconstruction.md, docs/dem.md)");
+      "reconstruct",
+      "Meshes and DEMs from scans (docs/theory/reconstruction.md, docs/theory/dem.md)");
   options_->all->require_subcommand(1);
   options_->add_mesh();
   options_->add_simplify();

@@ -8,10 +8,10 @@ class App;
 
 namespace groundray {
 
-/// The command `reconstruct`: meshes from scans, and what can be done to a mesh.
+/// Command `groundray reconstruct`: meshes and DEMs from measurements, and operations on meshes.
 class ReconstructCommands {
  public:
-  /// Adds the command to a program's.
+  /// Adds the command to `app`.
   explicit ReconstructCommands(CLI::App& app);
   ~ReconstructCommands();
   ReconstructCommands(const ReconstructCommands&) = delete;
@@ -19,8 +19,8 @@ class ReconstructCommands {
 
   bool is_asked_for() const;
 
-  /// Does what was asked for, writes the mesh and prints what was done.
-  /// @throws Error as rebuild_mesh and finish_mesh.
+  /// Runs the requested command: writes the results and prints a report.
+  /// @throws Error as rebuild_mesh, finish_mesh and DemCommand::run.
   void run() const;
 
  private:

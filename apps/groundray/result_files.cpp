@@ -10,7 +10,7 @@
 #include <system_error>
 
 #include "core/error.h"
-#include "core/file_ending.h"
+#include "core/io/file_ending.h"
 
 namespace groundray {
 namespace {
@@ -27,10 +27,10 @@ void check_place(const fs::path& path) {
                 path.string());
   }
   if (access(folder.c_str(), W_OK) != 0)
-    throw Error("{}: you may not write in the folder {}", path.string(), folder.string());
+    throw Error("{}: no permission to write in the folder {}", path.string(), folder.string());
 }
 
-// A name beside a file's, with the same ending.
+// Returns a temporary name in the file's folder, with the same extension.
 fs::path beside(const fs::path& path, int number) {
   fs::path name = path.stem();
   name += fmt::format(".part-{}-{}", getpid(), number);
@@ -38,12 +38,12 @@ fs::path beside(const fs::path& path, int number) {
   return path.parent_path() / name;
 }
 
-// An empty file beside another, of a name that no file had.
+// Creates an empty temporary file next to another, under an unused name.
 fs::path new_file_beside(const fs::path& path) {
   for (int number = 0;; ++number) {
     fs::path aside = beside(path, number);
     const int file = open(aside.c_str(), O_CREAT | O_EXCL | O_WRONLY | O_CLOEXEC, 0666);
-    if (file < 0 && errno == EEXIST) continue;  // it is somebody else's
+    if (file < 0 && errno == EEXIST) continue;  // the name is taken
     if (file < 0) {
       throw Error("{}: cannot be written: {}", path.string(),
                   std::generic_category().message(errno));
@@ -68,11 +68,11 @@ void check_results(std::span<const fs::path> results, std::span<const fs::path> 
     std::error_code ignored;
     const fs::path place = fs::weakly_canonical(fs::absolute(result), ignored);
     if (std::ranges::find(places, place) != places.end())
-      throw Error("{}: two results cannot have one name", result.string());
+      throw Error("{}: two results cannot have the same name", result.string());
     places.push_back(place);
     for (const fs::path& input : inputs) {
       if (fs::equivalent(input, result, ignored)) {
-        throw Error("{}: it is read, so it cannot be written over; choose another name",
+        throw Error("{}: it is an input and cannot be overwritten; choose another name",
                     result.string());
       }
     }
@@ -118,7 +118,7 @@ void ResultFiles::appear() {
   files_.clear();
 }
 
-// Gives what has a file's name another one besides.
+// Gives an existing file at the path a second name.
 void ResultFiles::spare(File& file) const {
   std::error_code fault;
   file.is_new = !fs::exists(fs::symlink_status(file.path, fault));
@@ -132,8 +132,8 @@ void ResultFiles::spare(File& file) const {
   }
 }
 
-// Undoes the first of what appeared; says what could not be. A spare that cannot have its name back
-// is all that is left of the user's file: it stays.
+// Restores the first `count` paths; returns a description of those that could not be restored. A
+// spare that cannot be renamed back is the only copy of the user's file, and so it is kept.
 std::string ResultFiles::take_back(std::size_t count) {
   std::string left;
   for (std::size_t i = 0; i < count; ++i) {
@@ -146,9 +146,9 @@ std::string ResultFiles::take_back(std::size_t count) {
     }
     const bool is_left = fault || (file.spare.empty() && !file.is_new);
     if (!is_left) continue;
-    left += fmt::format("; {} is written all the same", file.path.string());
+    left += fmt::format("; {} is written nevertheless", file.path.string());
     if (file.spare.empty()) continue;
-    left += fmt::format(", and what it was is kept as {}", file.spare.string());
+    left += fmt::format(", and its previous version is kept as {}", file.spare.string());
     file.spare.clear();
   }
   return left;

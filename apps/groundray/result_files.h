@@ -10,17 +10,18 @@
 
 namespace groundray {
 
-/// @throws Error unless the name ends in one of `endings`, whatever its case.
+/// Checks the extension of a name.
+/// @throws Error unless the name ends in one of `endings`, in upper or lower case.
 void check_ending(const std::filesystem::path& path, std::initializer_list<const char*> endings);
 
-/// Checks, before work that may take long, that results can be written, each to a file of its own.
-/// @param inputs  what will be read: none of these may be written over.
+/// Checks, before long computations, that the results can be written, each to its own file.
+/// @param inputs  input files, which must not be overwritten.
 /// @throws Error naming the first fault.
 void check_results(std::span<const std::filesystem::path> results,
                    std::span<const std::filesystem::path> inputs);
 
-/// Files none of which appears before each is whole, and none unless all do. What has not appeared
-/// is removed in the end.
+/// Group of files that appear together: none appears before all are complete. The destructor
+/// removes those that have not appeared.
 class ResultFiles {
  public:
   ResultFiles() = default;
@@ -28,23 +29,25 @@ class ResultFiles {
   ResultFiles(const ResultFiles&) = delete;
   ResultFiles& operator=(const ResultFiles&) = delete;
 
-  /// Has `write` fill the file under another name meanwhile: beside it, with the same ending, that
-  /// no file had. @throws Error if it cannot be; and as `write`, with the file's own name.
+  /// Calls `write` to fill the file under a temporary name: in the same folder, with the same
+  /// extension, unused before.
+  /// @throws Error if that fails; and as `write`, with the file's own name in messages.
   void write(const std::filesystem::path& path,
              const std::function<void(const std::filesystem::path&)>& write);
 
-  /// Gives each file its name. If one cannot have it, the others are taken back: names have what
-  /// they had before; but a file that was written over is lost where the disk knows no hard links.
-  /// @throws Error naming the file that cannot get its name, and any that could not be taken back;
-  ///         and under which name what they were is kept.
+  /// Renames the files to their paths. If one cannot be renamed, the others are undone: paths have
+  /// their previous contents again. Without hard links in the file system, an overwritten file is
+  /// lost.
+  /// @throws Error naming the file that cannot be renamed, and any that could not be undone, with
+  ///         the names under which their previous contents are kept.
   void appear();
 
  private:
   struct File {
     std::filesystem::path path;
-    std::filesystem::path aside;  // where it is meanwhile
-    std::filesystem::path spare;  // another name of what had the path before; or none
-    bool is_new = true;           // nothing had it
+    std::filesystem::path aside;  // temporary name
+    std::filesystem::path spare;  // second name of the file that was at the path; or empty
+    bool is_new = true;           // true if no file was at the path
   };
   void spare(File& file) const;
   std::string take_back(std::size_t count);

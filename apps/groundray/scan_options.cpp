@@ -7,40 +7,38 @@
 namespace groundray {
 void ScanOptions::add(CLI::App* command) {
   CLI::App* scans = command->add_option_group("Scans");
-  scans->add_option("--sensor", choice.sensors, "Lidars of a dataset; all without it")
-      ->delimiter(',');
-  scans->add_option("--frames", frames, "A:B:STEP, from A on to before B: frames, or files");
+  scans->add_option("--sensor", choice.sensors, "Lidars of a dataset (all)")->delimiter(',');
+  scans->add_option("--frames", frames, "A:B:STEP: frames or files from A to before B");
   add_poses(scans);
   const Words<ReturnChoice> choices{{"last", ReturnChoice::Last},
                                     {"strongest", ReturnChoice::Strongest},
                                     {"first", ReturnChoice::First}};
-  add_words(scans, "--returns", taking.returns, "Which return of a pulse is taken", choices);
+  add_words(scans, "--returns", taking.returns, "Return of each pulse to use", choices);
   scans
       ->add_option("--range-sd-m", taking.range_sd_m,
-                   "Standard deviation of ranges, instead of what scans tell")
+                   "Standard deviation of ranges, instead of the scans'")
       ->check(not_negative());
-  scans->add_flag("--no-labels", leaves_labels, "Leave semantic classes out");
+  scans->add_flag("--no-labels", leaves_labels, "Omit semantic classes");
   columns.add(scans, "");
 }
 
 void ScanOptions::add_grid(CLI::App* command) {
   const Words<GridSource> grids{{"beams", GridSource::Beams}, {"file", GridSource::File}};
   add_words(command, "--grid", taking.grid,
-            "What makes points neighbours: rings and azimuths, or the file's own image", grids);
+            "Neighbours of points: by rings and azimuths, or by the file's own image", grids);
 }
 
 void ScanOptions::add_poses(CLI::App* scans) {
-  scans->add_option("--poses", choice.poses,
-                    "Poses of the sensor (TUM: t x y z qx qy qz qw) for files, or instead of a "
-                    "dataset's");
+  scans->add_option(
+      "--poses", choice.poses,
+      "Poses of the sensor (TUM: t x y z qx qy qz qw) for files, or instead of the dataset's");
   const Words<PoseOrder> orders{{"line", PoseOrder::Line}, {"name", PoseOrder::Name}};
   add_words(scans, "--pose-by", choice.order,
-            "Which pose is a file's: that of its line, or by the stamp that is its name", orders);
+            "Pose of each file: by line, or by the stamp in the file's name", orders);
   const Words<LidarSpec::Points> frames_of{{"as_fired", LidarSpec::Points::AsFired},
                                            {"at_stamp", LidarSpec::Points::AtStamp}};
   add_words(scans, "--points", choice.points,
-            "In which frame points are: the sensor's as each was measured, or at the "
-            "scan's stamp",
+            "Frame of the points: the sensor's when each was measured, or at the scan's stamp",
             frames_of);
 }
 

@@ -13,7 +13,7 @@ class App;
 
 namespace groundray {
 
-/// The options that say which scans, and how their files are to be read.
+/// Options that select scans and control the reading of their files.
 struct ScanOptions {
   ScanChoice choice;
   ScanTaking taking;
@@ -22,9 +22,10 @@ struct ScanOptions {
   bool leaves_labels = false;
 
   void add(CLI::App* command);
-  /// Which of the points are neighbours, for who links them.
+  /// Adds the option that defines neighbouring points, for commands that link them.
   void add_grid(CLI::App* command);
-  /// Call it once the line is read. @throws Error as parse_frames and ScanFlags.
+  /// Completes `choice` and `taking`; to be called after the command line has been parsed.
+  /// @throws Error as parse_frames and ScanFlags.
   void close();
 
  private:

@@ -9,12 +9,12 @@
 #include <map>
 #include <utility>
 
-#include "apps/interruption.h"
 #include "apps/scene/certifying.h"
-#include "core/mesh_io.h"
-#include "terrain/certificate.h"
-#include "terrain/dem_file.h"
-#include "terrain/sensor_box.h"
+#include "apps/scene/interruption.h"
+#include "core/io/mesh_io.h"
+#include "terrain/dem/dem_file.h"
+#include "terrain/lod/certificate.h"
+#include "terrain/lod/sensor_box.h"
 #include "terrain/terrain_mesh.h"
 
 namespace groundray {

@@ -7,11 +7,11 @@
 #include <algorithm>
 #include <filesystem>
 
-#include "apps/python/bind.h"
-#include "apps/python/long_call.h"
-#include "apps/python/points.h"
+#include "apps/python/binding/bind.h"
+#include "apps/python/binding/long_call.h"
+#include "apps/python/binding/points.h"
 #include "core/error.h"
-#include "core/ply_io.h"
+#include "core/io/ply_io.h"
 
 namespace groundray::python {
 namespace {
@@ -24,11 +24,11 @@ bool has(const Points& points, const std::string& name) {
 }
 
 void bind_points(nb::module_& module) {
-  nb::class_<Points>(module, "Points", R"(A table of points: columns of one length.
+  nb::class_<Points>(module, "Points", R"(A table of points: columns of equal length.
 
-points["range_true_m"] is a column as a NumPy array, a view that may not be written to and that
-keeps the table alive. Names are those of the files (docs/formats.md) with their units:
-docs/python.md lists them. dict(points) is a dict of all columns; len(points) counts rows.)")
+points["range_true_m"] is a column as a NumPy array, a read-only view that keeps the table alive.
+Names are those of the files (docs/reference/formats.md) with their units:
+docs/guide/python.md lists them. dict(points) is a dict of all columns; len(points) counts rows.)")
       .def("__len__", [](const Points& points) { return points.cloud.rows(); })
       .def(
           "__getitem__",
@@ -39,7 +39,7 @@ docs/python.md lists them. dict(points) is a dict of all columns; len(points) co
       .def("__contains__", &has, "name"_a)
       .def(
           "__iter__", [](const Points& points) { return nb::iter(nb::cast(names_of(points))); },
-          "Goes over the names of the columns.")
+          "Iterates over the names of the columns.")
       .def("keys", &names_of, "The names of the columns, as `columns`.")
       .def_prop_ro("columns", &names_of, "The names of the columns, in the order of the files.")
       .def(
@@ -52,9 +52,9 @@ docs/python.md lists them. dict(points) is a dict of all columns; len(points) co
             });
           },
           "path"_a, "comments"_a = std::vector<std::string>{},
-          R"(Writes the table as a binary PLY file, columns by the names of docs/formats.md.
+          R"(Writes the table as a binary PLY file, columns by the names of docs/reference/formats.md.
 
-The file appears only when it is whole. `comments` become lines of its header.)")
+The file appears only when it is complete. `comments` become lines of its header.)")
       .def("__repr__", [](const Points& points) {
         return fmt::format("<Points: {} rows of {}>", points.cloud.rows(),
                            fmt::join(names_of(points), ", "));
@@ -67,7 +67,7 @@ The file appears only when it is whole. `comments` become lines of its header.)"
       "path"_a,
       R"(Reads the points of a PLY file, such as a scan that `groundray generate` wrote.
 
-Columns that docs/formats.md knows get names with units; others keep theirs.
+Columns listed in docs/reference/formats.md get names with units; others keep theirs.
 Raises groundray.Error if the file cannot be read.)");
 }
 
@@ -75,7 +75,7 @@ Raises groundray.Error if the file cannot be read.)");
 
 void bind_core(nb::module_& module) {
   nb::exception<Error>(module, "Error", PyExc_RuntimeError).doc() =
-      "What was wrong, where, by which rule, and what may mend it: a line for each fault.";
+      "An invalid input or a failure: what is wrong, where, the rule and the likely fix, by line.";
   bind_points(module);
 }
 

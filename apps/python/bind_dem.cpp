@@ -15,17 +15,17 @@
 #include <utility>
 #include <vector>
 
-#include "apps/python/arrays.h"
-#include "apps/python/bind.h"
-#include "apps/python/given.h"
-#include "apps/python/long_call.h"
+#include "apps/python/binding/arrays.h"
+#include "apps/python/binding/bind.h"
+#include "apps/python/binding/enum_from_text.h"
+#include "apps/python/binding/long_call.h"
+#include "apps/python/binding/numpy_argument.h"
 #include "apps/python/placed_returns.h"
-#include "apps/python/word_choice.h"
 #include "core/error.h"
-#include "reconstruction/dem/dem_fill.h"
 #include "reconstruction/dem/dem_frame.h"
-#include "reconstruction/dem/dem_fusion.h"
-#include "reconstruction/dem/dem_smooth.h"
+#include "reconstruction/dem/fill/dem_fill.h"
+#include "reconstruction/dem/fusion/dem_fusion.h"
+#include "reconstruction/dem/smooth/dem_smooth.h"
 
 namespace groundray::python {
 namespace {
@@ -36,7 +36,7 @@ double squared(double x) { return x * x; }
 
 // ----- points
 
-/// What is known of the errors of points besides the noise of their ranges.
+/// Errors of points in addition to the noise of their ranges.
 struct PoseNoise {
   double divergence_rad = 0, position_sd_m = 0, attitude_sd_rad = 0;
 };
@@ -53,7 +53,7 @@ void check(const char* call, const PoseNoise& noise) {
   broken.throw_if_any();
 }
 
-// As `groundray reconstruct dem` has it: docs/dem.md.
+// Same error model as in `groundray reconstruct dem`: docs/theory/dem.md.
 void add_point(const glm::dvec3& p_m, const glm::dvec3& origin_m, double range_sd_m,
                std::uint32_t group, const PoseNoise& noise, MeasuredPoints& into) {
   if (!(range_sd_m >= 0) || !std::isfinite(range_sd_m))
@@ -83,8 +83,8 @@ MeasuredPoints points_of(const GivenPoints& points_m, const GivenPoints& origins
   if (origins_m.rows() != count || range_sd_m.rows() != count ||
       (groups && groups->rows() != count))
     throw Error(
-        "fuse_points: there are {} points, {} origins, {} values of range_sd_m{}; there must be as "
-        "many of each",
+        "fuse_points: there are {} points, {} origins, {} values of range_sd_m{}; these "
+        "numbers must be equal",
         count, origins_m.rows(), range_sd_m.rows(),
         groups ? fmt::format(" and {} groups", groups->rows()) : "");
   MeasuredPoints points;
@@ -114,7 +114,7 @@ MeasuredPoints points_of(const std::vector<const Sweep*>& scans, std::optional<d
 
 // ----- fusion
 
-/// A DEM that was fused.
+/// Fused DEM.
 struct FusedDem {
   DemLayers layers;
   FusionCounts counts;
@@ -122,7 +122,7 @@ struct FusedDem {
 
 using GivenArea = std::optional<std::array<double, 4>>;
 
-// Of the cells around all points, or in the area.
+// Returns the grid of cells that covers the area, or by default all points.
 GridFrame frame_of(const MeasuredPoints& points, double cell_m, const GivenArea& area_m) {
   if (area_m)
     return frame_over({{(*area_m)[0], (*area_m)[1]}, {(*area_m)[2], (*area_m)[3]}}, cell_m);
@@ -132,8 +132,8 @@ GridFrame frame_of(const MeasuredPoints& points, double cell_m, const GivenArea&
     if (!std::isfinite(p_m.x) || !std::isfinite(p_m.y)) continue;
     area = {glm::min(area.low_m, glm::dvec2(p_m)), glm::max(area.high_m, glm::dvec2(p_m))};
   }
-  if (!(area.low_m.x <= area.high_m.x)) throw Error("fuse: there is no point with a place");
-  constexpr double share_of_cell = 1e-6;  // the area is without its high sides
+  if (!(area.low_m.x <= area.high_m.x)) throw Error("fuse: no point has finite coordinates");
+  constexpr double share_of_cell = 1e-6;  // the area excludes its upper sides
   area.low_m -= cell_m * share_of_cell;
   area.high_m += cell_m * share_of_cell;
   return frame_over(area, cell_m);
@@ -174,31 +174,36 @@ void add_layer(nb::class_<FusedDem>& type, const char* name, std::vector<T> DemL
 }
 
 void bind_fused(nb::module_& module) {
-  nb::class_<FusedDem> type(module, "FusedDem", R"(A DEM with what is known of each height.
+  nb::class_<FusedDem> type(module, "FusedDem",
+                            R"(A DEM with the variance and source of each height.
 
-Layers are rasters, rows x columns, the northernmost row first: views that may not be written to.
-Sample (row, column) stands at first_sample_m + (column, row) * step_m in the frame D.)");
-  add_layer(type, "elevation_m", &DemLayers::elevation_m, "Heights of the ground; NaN for none.");
-  add_layer(type, "variance_m2", &DemLayers::variance_m2, "Of measured heights; NaN elsewhere.");
-  add_layer(type, "lidar_points", &DemLayers::lidar, "How many points tell the height.");
-  add_layer(type, "chi2", &DemLayers::chi2, "Of the fit, per degree of freedom.");
-  add_layer(type, "surfaces", &DemLayers::surfaces, "How many, one above the other.");
-  add_layer(type, "overhang_m", &DemLayers::overhang_m, "The lowest height clear of the ground.");
-  add_layer(type, "clearance_m", &DemLayers::clearance_m, "Free height below it.");
-  add_layer(type, "distance_to_data_m", &DemLayers::to_data_m, "To the nearest measured sample.");
-  add_layer(type, "source", &DemLayers::source, "0 none, 1 lidar.");
+Layers are rasters, rows x columns, the northernmost row first: read-only views.
+Sample (row, column) is at first_sample_m + (column, row) * step_m in the frame D.)");
+  add_layer(type, "elevation_m", &DemLayers::elevation_m,
+            "Heights of the ground; NaN where unknown.");
+  add_layer(type, "variance_m2", &DemLayers::variance_m2,
+            "Variances of measured heights; NaN elsewhere.");
+  add_layer(type, "lidar_points", &DemLayers::lidar, "Number of points that determine the height.");
+  add_layer(type, "chi2", &DemLayers::chi2, "Chi-squared of the fit per degree of freedom.");
+  add_layer(type, "surfaces", &DemLayers::surfaces, "Number of surfaces above each other.");
+  add_layer(type, "overhang_m", &DemLayers::overhang_m,
+            "Height of the lowest surface above the ground.");
+  add_layer(type, "clearance_m", &DemLayers::clearance_m, "Free height below the overhang.");
+  add_layer(type, "distance_to_data_m", &DemLayers::to_data_m,
+            "Distance to the nearest measured sample.");
+  add_layer(type, "source", &DemLayers::source, "Source of the height: 0 none, 1 lidar.");
   type.def_prop_ro(
           "first_sample_m",
           [](const FusedDem& dem) {
             return std::array<double, 2>{dem.layers.frame.origin_m.x, dem.layers.frame.origin_m.y};
           },
-          "Where sample (0, 0) stands, in D.")
+          "Position of sample (0, 0) in D.")
       .def_prop_ro(
           "step_m",
           [](const FusedDem& dem) {
             return std::array<double, 2>{dem.layers.frame.step_m.x, dem.layers.frame.step_m.y};
           },
-          "From column to column and row to row; below 0 southwards.")
+          "Spacing of columns and of rows; negative southwards.")
       .def_prop_ro(
           "counts",
           [](const FusedDem& dem) {
@@ -211,7 +216,8 @@ Sample (row, column) stands at first_sample_m + (column, row) * step_m in the fr
             return all;
           },
           nb::sig("def counts(self) -> dict[str, int]"),
-          "Points given, outside and unusable; cells without_ground and uncertain.")
+          "Numbers of points, of those outside or unusable, and of cells without_ground or "
+          "uncertain.")
       .def("__repr__", [](const FusedDem& dem) {
         return fmt::format("<FusedDem: {} x {} samples of {} m>", dem.layers.frame.samples.x,
                            dem.layers.frame.samples.y, std::abs(dem.layers.frame.step_m.x));
@@ -220,18 +226,18 @@ Sample (row, column) stands at first_sample_m + (column, row) * step_m in the fr
 
 constexpr double unlimited = std::numeric_limits<double>::infinity();
 
-constexpr const char* fuse_doc = R"(Fuses scans to a DEM that tells how far off it may be.
+constexpr const char* fuse_doc = R"(Fuses scans to a DEM with the variances of its heights.
 
-  scans            of Lidar.scan, as reported at the poses that the sensor knew
-  cell_m           side of the DEM's cells, whose borders are at whole multiples of it in D
-  area_m           west, south, east, north in D: no cell beyond; else around all points
-  range_sd_m       standard deviation of ranges, instead of what scan and sensor say
-  divergence_rad   of beams, full angle between the 1/e^2 points
-  position_sd_m, attitude_sd_rad  of each scan's pose, along and about each axis
-  most_sd_m        samples whose height is known worse than this stay unmeasured
-  outlier_share    of all points, 0 to 0.5
+  scans            scans of Lidar.scan; points as reported, at the sensor's poses
+  cell_m           side of the DEM's cells, whose borders are at multiples of it in D
+  area_m           limits of the DEM in D: west, south, east, north; by default those of all points
+  range_sd_m       standard deviation of ranges; by default that of scan and sensor
+  divergence_rad   divergence of beams, full angle between the 1/e^2 points
+  position_sd_m, attitude_sd_rad  standard deviations of each scan's pose, along and about each axis
+  most_sd_m        samples whose height has a larger standard deviation stay unmeasured
+  outlier_share    expected fraction of outliers, 0 to 0.5
 
-The same bytes for any number of threads. Raises groundray.Error naming every fault.)";
+The result does not depend on the number of threads. Raises groundray.Error naming every fault.)";
 
 void bind_fusion(nb::module_& module) {
   module.def(
@@ -267,10 +273,10 @@ void bind_fusion(nb::module_& module) {
       "groups"_a = nb::none(), "area_m"_a = nb::none(), "divergence_rad"_a = 0.0,
       "position_sd_m"_a = 0.0, "attitude_sd_rad"_a = 0.0, "most_sd_m"_a = unlimited,
       "outlier_share"_a = 0.02,
-      R"(As fuse_dem, of points of anybody's.
+      R"(Like fuse_dem, for points of any origin.
 
-  points_m    n x 3, in the frame D    origins_m  n x 3, where each beam began
-  range_sd_m  n                        groups     n numbers of scans, else all are of one)");
+  points_m    n x 3, in the frame D    origins_m  n x 3, origins of the beams
+  range_sd_m  n                        groups     n numbers of scans; by default all are equal)");
 }
 
 // ----- smoothing and filling
@@ -279,8 +285,8 @@ GridFrame frame_of(const GivenRaster& heights_m, double cell_m) {
   constexpr std::size_t most = std::numeric_limits<int>::max();
   if (!(cell_m > 0) || !std::isfinite(cell_m)) throw Error("cell_m = {} must be positive", cell_m);
   if (heights_m.rows() > most || heights_m.columns() > most)
-    throw Error("heights_m is of {} x {} samples; there may be 2^31 - 1 each way", heights_m.rows(),
-                heights_m.columns());
+    throw Error("heights_m has {} x {} samples; at most 2^31 - 1 are permitted each way",
+                heights_m.rows(), heights_m.columns());
   return {{static_cast<int>(heights_m.columns()), static_cast<int>(heights_m.rows())},
           {0, 0},
           {cell_m, -cell_m},
@@ -294,7 +300,7 @@ std::span<const float> values_of(const GivenRaster& raster) {
 void check_alike(const char* call, const GivenRaster& heights_m, const char* name,
                  const GivenRaster& other) {
   if (other.rows() != heights_m.rows() || other.columns() != heights_m.columns())
-    throw Error("{}: {} is of {} x {} samples, but heights_m of {} x {}; they must be alike", call,
+    throw Error("{}: {} has {} x {} samples, but heights_m has {} x {}; they must be equal", call,
                 name, other.rows(), other.columns(), heights_m.rows(), heights_m.columns());
 }
 
@@ -341,11 +347,12 @@ void bind_dem(nb::module_& module) {
   bind_fusion(module);
   module.def("smooth_dem", &smoothed, "heights_m"_a, "variance_m2"_a, nb::kw_only(), "cell_m"_a,
              "curvature_sd_per_m"_a = nb::none(),
-             R"(Smooths measured heights as far as their noise calls for it; edges stay.
+             R"(Smooths measured heights according to their noise; edges are kept.
 
-  heights_m           rows x columns, metres; NaN where there is none
-  variance_m2         of each height; NaN where it was not measured
-  curvature_sd_per_m  what second derivatives of the true ground are like; else what heights show
+  heights_m           rows x columns, metres; NaN where unknown
+  variance_m2         variance of each height; NaN where it was not measured
+  curvature_sd_per_m  standard deviation of the true ground's second derivatives; by default
+                      estimated from the heights
 
 Returns heights of the same shape, NaN where nothing was measured.)");
   module.def("fill_dem", &filled_dem, "heights_m"_a, nb::kw_only(), "cell_m"_a,
@@ -355,16 +362,16 @@ Returns heights of the same shape, NaN where nothing was measured.)");
                      "reach: str = 'enclosed', farthest_m: float | None = None, "
                      "largest_share: float = 0.2, most_m: numpy.typing.ArrayLike | None = None)"
                      " -> dict[str, typing.Any]"),
-             R"(Fills blank areas of a DEM, and tells how far off what is filled may be.
+             R"(Fills blank areas of a DEM, with standard deviations of the filled heights.
 
-  heights_m      rows x columns, metres; NaN where there is none
-  reach          "enclosed" holes, the "hull" of what is measured, or "everywhere"
-  farthest_m     a hole stays if some of it is farther from data; else 50 cells
-  largest_share  of the raster's samples; a larger hole stays
-  most_m         heights that lines of sight passed at, rows x columns; NaN for none
+  heights_m      rows x columns, metres; NaN where unknown
+  reach          area to fill: "enclosed" holes, the "hull" of measured samples, or "everywhere"
+  farthest_m     a hole stays if part of it is farther from data; 50 cells by default
+  largest_share  fraction of the raster's samples; a larger hole stays
+  most_m         upper bounds of heights from lines of sight, rows x columns; NaN for none
 
-Returns heights_m (measured ones as they were), sd_m of filled heights, distance_to_data_m, and
-how many samples were filled of how many holes.)");
+Returns heights_m (measured ones unchanged), sd_m of filled heights, distance_to_data_m, and the
+numbers of filled samples and of holes.)");
 }
 
 }  // namespace groundray::python

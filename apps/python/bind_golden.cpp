@@ -10,17 +10,17 @@
 #include <vector>
 
 #include "apps/golden/compare/dem_comparison.h"
-#include "apps/golden/compare/image_comparison.h"
+#include "apps/golden/compare/images/image_comparison.h"
 #include "apps/golden/compare/mesh_comparison.h"
-#include "apps/golden/compare/scan_comparison.h"
+#include "apps/golden/compare/scans/scan_comparison.h"
 #include "apps/golden/compare/subject.h"
-#include "apps/python/arrays.h"
-#include "apps/python/bind.h"
-#include "apps/python/long_call.h"
-#include "apps/python/mesh.h"
-#include "apps/python/points.h"
+#include "apps/python/binding/arrays.h"
+#include "apps/python/binding/bind.h"
+#include "apps/python/binding/enum_from_text.h"
+#include "apps/python/binding/long_call.h"
+#include "apps/python/binding/mesh.h"
+#include "apps/python/binding/points.h"
 #include "apps/python/terrain_model.h"
-#include "apps/python/word_choice.h"
 #include "core/error.h"
 
 namespace groundray::python {
@@ -42,7 +42,7 @@ nb::dict dict_of(const golden::Histogram& histogram) {
   return all;
 }
 
-// As report.json has it; figures by their names, for they are what is asked for.
+// Returns a section as in report.json, but with figures keyed by name.
 nb::dict dict_of(const Section& section) {
   nb::dict figures, units, failed;
   for (const golden::Measure& measure : section.measures) {
@@ -89,7 +89,7 @@ nb::dict compare_files(const std::filesystem::path& reference, const std::filesy
                                : golden::subject_of(reference, other);
   if (what != Subject::Mesh && !within_m.empty())
     throw Error(
-        "compare: within_m is for meshes, but {} and {} are none: leave it out, or say subject = "
+        "compare: within_m requires meshes, but {} and {} are not: omit it, or give subject = "
         "'mesh' if they are",
         reference.string(), other.string());
   return compared([&]() -> Section {
@@ -111,14 +111,14 @@ Scan scan_of_points(const Points& points, const char* name) {
   return scan_of({.form = "points in memory", .cloud = points.cloud}, name, {});
 }
 
-constexpr const char* compare_doc = R"(Holds one thing against another that is taken for true.
+constexpr const char* compare_doc = R"(Compares data with a reference that is taken as true.
 
-Both are scans, meshes, terrains, or paths of files of scans, images, DEMs or meshes by anybody;
-`subject` ("scan", "image", "dem", "mesh") says of files what their names do not tell.
+Both are scans, meshes, terrains, or paths of files of scans, images, DEMs or meshes of any origin;
+`subject` ("scan", "image", "dem", "mesh") gives the kind of files if their names do not.
   within_m  tolerances for precision, completeness and F1 of meshes
 
-Returns what `groundray-golden compare` reports (docs/golden.md): figures by name and their units,
-text that tells what seems to be misread, tables, histograms, and the verdict with what failed.
+Returns what `groundray-golden compare` reports (docs/reference/golden.md): figures by name and their units,
+text with likely misreadings, tables, histograms, and the verdict with the figures that failed.
 Raises groundray.Error if the two have nothing in common.)";
 
 }  // namespace

@@ -16,21 +16,21 @@
 #include <utility>
 #include <vector>
 
-#include "apps/python/arrays.h"
-#include "apps/python/bind.h"
-#include "apps/python/given.h"
-#include "apps/python/long_call.h"
-#include "apps/python/mesh.h"
+#include "apps/python/binding/arrays.h"
+#include "apps/python/binding/bind.h"
+#include "apps/python/binding/long_call.h"
+#include "apps/python/binding/mesh.h"
+#include "apps/python/binding/numpy_argument.h"
 #include "core/error.h"
-#include "core/mesh_check.h"
-#include "reconstruction/measured_mesh_io.h"
+#include "core/geometry/mesh_check.h"
+#include "reconstruction/mesh/measured_mesh_io.h"
 
 namespace groundray::python {
 namespace {
 
 using nb::literals::operator""_a;
 
-/// What the values of a column may be, from 0 on.
+/// Rule for the values of a column: from 0 to `most`.
 struct ColumnRule {
   const char* name;
   double most;
@@ -55,7 +55,7 @@ std::vector<T> column_values(const ColumnRule& rule, const std::optional<GivenNu
     const bool is_sound =
         value >= 0 && value <= rule.most && (!std::is_integral_v<T> || value == std::floor(value));
     broken.unless(is_sound, "{} of vertex {}, {}, must be {}", rule.name, i, value, rule.says);
-    if (!is_sound) break;  // the column's first says what is wrong with it
+    if (!is_sound) break;  // reports only the column's first fault
     values.push_back(static_cast<T>(value));
   }
   return values;
@@ -101,7 +101,7 @@ Mesh given_mesh(const GivenPoints& vertices_m, const GivenIndices& triangles,
   return mesh;
 }
 
-// A view of what is known of each vertex, or None.
+// Returns a view of a property of the vertices, or None if it is unknown.
 template <typename T>
 std::optional<AnyArray> known(nb::handle_t<Mesh> self, const std::vector<T> MeasuredMesh::*column) {
   const std::vector<T>& values = nb::cast<const Mesh&>(self).measured.*column;
@@ -109,16 +109,17 @@ std::optional<AnyArray> known(nb::handle_t<Mesh> self, const std::vector<T> Meas
   return view(values.data(), {values.size()}, self);
 }
 
-constexpr const char* mesh_doc = R"(Triangles that share vertices, in the frame D.
+constexpr const char* mesh_doc = R"(A triangle mesh with shared vertices, in the frame D.
 
   vertices_m  n x 3, metres
-  triangles   m x 3, whole numbers of vertices, counter-clockwise as seen from outside
+  triangles   m x 3, vertex indices, counter-clockwise as seen from outside
   sd_m, labels, confidence  of each vertex: standard deviation along its line of sight (m, finite),
-              semantic class (0 to 65535), and 0 to 1 how squarely it was seen; or None
-  origin_w_m  where D begins in W
+              semantic class (0 to 65535) and confidence (0 to 1, highest at normal incidence), or
+              None
+  origin_w_m  origin of D in W
 
-The arrays given are copied; those asked for are views that may not be written to.
-Raises groundray.Error for numbers that are no mesh.)";
+Arguments are copied; properties are read-only views.
+Raises groundray.Error for an invalid mesh.)";
 
 }  // namespace
 
@@ -142,13 +143,13 @@ void bind_mesh(nb::module_& module) {
           [](nb::handle_t<Mesh> self) {
             return view(nb::cast<const Mesh&>(self).measured.shape.vertices_m, self);
           },
-          "Places in D, n x 3, metres: a view.")
+          "Positions in D, n x 3, metres: a view.")
       .def_prop_ro(
           "triangles",
           [](nb::handle_t<Mesh> self) {
             return view(nb::cast<const Mesh&>(self).measured.shape.triangles, self);
           },
-          "Numbers of vertices, m x 3, counter-clockwise as seen from outside: a view.")
+          "Vertex indices, m x 3, counter-clockwise as seen from outside: a view.")
       .def_prop_ro(
           "sd_m", [](nb::handle_t<Mesh> self) { return known(self, &MeasuredMesh::sd_m); },
           "Standard deviation of each vertex along its line of sight, m; or None.")
@@ -158,14 +159,14 @@ void bind_mesh(nb::module_& module) {
       .def_prop_ro(
           "confidence",
           [](nb::handle_t<Mesh> self) { return known(self, &MeasuredMesh::confidence); },
-          "Of each vertex, 0 to 1, how squarely it was seen; or None.")
+          "Confidence of each vertex, 0 to 1, highest at normal incidence; or None.")
       .def_prop_ro(
           "origin_w_m",
           [](const Mesh& mesh) {
             const glm::dvec3 p = mesh.georeference.origin_w_m;
             return std::array<double, 3>{p.x, p.y, p.z};
           },
-          "Where D begins in W.")
+          "Origin of D in W.")
       .def(
           "save",
           [](const Mesh& mesh, const std::filesystem::path& path) {
@@ -175,7 +176,8 @@ void bind_mesh(nb::module_& module) {
             });
           },
           "path"_a,
-          "Writes a .ply, .obj, .stl or .glb, by the name's end. It appears only when whole.")
+          "Writes a .ply, .obj, .stl or .glb file, by its extension. It appears only when "
+          "complete.")
       .def("__repr__", [](const Mesh& mesh) {
         return fmt::format("<Mesh: {} vertices, {} triangles>",
                            mesh.measured.shape.vertices_m.size(),
@@ -190,9 +192,9 @@ void bind_mesh(nb::module_& module) {
         });
       },
       "path"_a,
-      R"(Reads the triangles of a .ply, .obj, .stl, .gltf or .glb, whoever wrote it.
+      R"(Reads the triangles of a .ply, .obj, .stl, .gltf or .glb file.
 
-Raises groundray.Error if it cannot be read or holds no triangle.)");
+Raises groundray.Error if it cannot be read or contains no triangle.)");
 }
 
 }  // namespace groundray::python

@@ -11,17 +11,17 @@
 #include <utility>
 #include <vector>
 
-#include "apps/python/arrays.h"
-#include "apps/python/bind.h"
-#include "apps/python/long_call.h"
-#include "apps/python/mesh.h"
+#include "apps/python/binding/arrays.h"
+#include "apps/python/binding/bind.h"
+#include "apps/python/binding/enum_from_text.h"
+#include "apps/python/binding/long_call.h"
+#include "apps/python/binding/mesh.h"
 #include "apps/python/placed_returns.h"
-#include "apps/python/word_choice.h"
 #include "core/error.h"
-#include "reconstruction/holes/hole_fill.h"
-#include "reconstruction/merge/mesh_merge.h"
-#include "reconstruction/scan/scan_mesh.h"
-#include "reconstruction/simplify/simplify.h"
+#include "reconstruction/mesh/holes/hole_fill.h"
+#include "reconstruction/mesh/merge/mesh_merge.h"
+#include "reconstruction/mesh/scan/scan_mesh.h"
+#include "reconstruction/mesh/simplify/simplify.h"
 
 namespace groundray::python {
 namespace {
@@ -59,13 +59,13 @@ MergedMesh merged_mesh(const std::vector<const Sweep*>& sweeps, const Linking& l
   }
   if (meshes.empty())
     throw Error(
-        "reconstruct_mesh: no two returns of any of the {} scans were taken for one surface; "
-        "preset, longest_m and range_sd_m say what is surface",
+        "reconstruct_mesh: no neighbouring returns of the {} scans were accepted as surface; "
+        "preset, longest_m and range_sd_m control this",
         sweeps.size());
   if (meshes.size() > 1 && !apart_m && std::ranges::none_of(meshes, knows_noise))
     throw Error(
-        "reconstruct_mesh: no noise is known of these scans, so nothing tells how far apart one "
-        "surface may be in two of them: give the standard deviation of ranges as range_sd_m, or "
+        "reconstruct_mesh: the noise of these scans is unknown, and with it the distance up to "
+        "which two scans show one surface: give the standard deviation of ranges as range_sd_m, or "
         "that distance as apart_m");
   return merge(meshes, {.apart_m = apart_m.value_or(0)},
                {.progress = [&](double /*share*/) { stop.obey(); }});
@@ -88,10 +88,10 @@ MeshAndFigures reconstruct_mesh(const std::vector<const Sweep*>& scans, const st
   linking.screening.noise_sds = noise_sds.value_or(linking.screening.noise_sds);
   MergedMesh merged = without_gil(
       [&](const StopRequest& stop) { return merged_mesh(scans, linking, apart_m, stop); });
-  const DemHeader& header = scans.front()->state->world.terrain.header();
+  const DemHeader& header = scans.front()->state->simulation.terrain.header();
   nb::dict figures;
   figures["redundant"] = merged.counts.redundant;
-  figures["seen_through"] = merged.counts.seen_through;
+  figures["seen_through"] = merged.counts.visibility_conflicts;
   figures["clipped"] = merged.counts.clipped;
   figures["filled"] = merged.counts.filled;
   figures["bridged"] = merged.counts.bridged;
@@ -101,29 +101,30 @@ MeshAndFigures reconstruct_mesh(const std::vector<const Sweep*>& scans, const st
           std::move(figures)};
 }
 
-// ----- what can be done to a mesh
+// ----- mesh processing
 
-// The one criterion that was given.
-Halt halt_of(std::optional<double> max_vertical_error_m, std::optional<double> max_error_m,
-             std::optional<std::size_t> triangles, std::optional<double> noise_sds, bool knee,
-             std::optional<double> border_m) {
-  std::vector<Halt> halts;
+// Returns the stop criterion; exactly one must be given.
+StopCriterion criterion_from(std::optional<double> max_vertical_error_m,
+                             std::optional<double> max_error_m,
+                             std::optional<std::size_t> triangles, std::optional<double> noise_sds,
+                             bool knee, std::optional<double> border_m) {
+  std::vector<StopCriterion> criteria;
   if (max_vertical_error_m)
-    halts.emplace_back(
+    criteria.emplace_back(
         VerticalBound{*max_vertical_error_m, border_m.value_or(*max_vertical_error_m)});
-  if (max_error_m) halts.emplace_back(DistanceBound{*max_error_m, border_m.value_or(*max_error_m)});
-  if (triangles) halts.emplace_back(FaceBudget{*triangles});
-  if (noise_sds) halts.emplace_back(NoiseBound{*noise_sds});
-  if (knee) halts.emplace_back(CostKnee{});
-  if (halts.size() != 1)
+  if (max_error_m)
+    criteria.emplace_back(DistanceBound{*max_error_m, border_m.value_or(*max_error_m)});
+  if (triangles) criteria.emplace_back(FaceBudget{*triangles});
+  if (noise_sds) criteria.emplace_back(NoiseBound{*noise_sds});
+  if (knee) criteria.emplace_back(CostKnee{});
+  if (criteria.size() != 1)
     throw Error(
-        "simplify: give one of max_vertical_error_m, max_error_m, triangles, noise_sds and knee, "
-        "which says until when; there are {}",
-        halts.size());
+        "simplify: give one of max_vertical_error_m, max_error_m, triangles, noise_sds and knee as "
+        "stop criterion; {} are given",
+        criteria.size());
   if (border_m && !max_vertical_error_m && !max_error_m)
-    throw Error(
-        "simplify: border_m: only max_error_m and max_vertical_error_m leave borders a bound");
-  return halts.front();
+    throw Error("simplify: border_m requires max_error_m or max_vertical_error_m");
+  return criteria.front();
 }
 
 nb::dict figures_of(const OneSidedError& error) {
@@ -139,12 +140,12 @@ MeshAndFigures simplified(const Mesh& mesh, std::optional<double> max_vertical_e
                           std::optional<double> max_error_m, std::optional<std::size_t> triangles,
                           std::optional<double> noise_sds, bool knee,
                           std::optional<double> border_m, std::optional<double> crease_rad) {
-  const Halt halt =
-      halt_of(max_vertical_error_m, max_error_m, triangles, noise_sds, knee, border_m);
+  const StopCriterion criterion =
+      criterion_from(max_vertical_error_m, max_error_m, triangles, noise_sds, knee, border_m);
   SimplifyOptions options;
   options.crease_rad = crease_rad.value_or(options.crease_rad);
   Simplified result = without_gil([&](const StopRequest& stop) {
-    return simplify(mesh.measured, halt, options,
+    return simplify(mesh.measured, criterion, options,
                     {.progress = [&](double /*share*/) { stop.obey(); }});
   });
   nb::dict figures;
@@ -172,31 +173,31 @@ MeshAndFigures filled_mesh(const Mesh& mesh, double longest_m) {
 }
 
 constexpr const char* reconstruct_doc =
-    R"(Links each scan to a mesh and merges these, in the frame D.
+    R"(Links each scan to a mesh and merges the meshes, in the frame D.
 
-  scans          of Lidar.scan, as reported at the poses that the sensor knew: nothing of the truth
-  preset         which links are surface: "ground", "strict" or "object"
-  incidence_rad, longest_m, noise_sds  instead of the preset's (docs/reconstruction.md)
-  returns        which return of a pulse stands for it: "last", "strongest" or "first"
-  range_sd_m     standard deviation of ranges, instead of what scan and sensor say
-  apart_m        how far apart one surface may be in two scans besides noise: what poses are off
+  scans          scans of Lidar.scan; points as reported, at the sensor's poses
+  preset         criteria of links: "ground", "strict" or "object"
+  incidence_rad, longest_m, noise_sds  replace those of the preset (docs/theory/reconstruction.md)
+  returns        return of a pulse that is used: "last", "strongest" or "first"
+  range_sd_m     standard deviation of ranges; by default that of scan and sensor
+  apart_m        distance between one surface in two scans beyond noise, as errors of poses cause
 
-Returns the mesh, and what merging did: triangles that were redundant, seen_through, clipped,
-filled, bridged and left_out, and vertices moved. The same bytes for any number of threads.
-Raises groundray.Error, if nothing is surface or no noise is known of several scans.)";
+Returns the mesh and counts: triangles that were redundant, seen_through, clipped, filled, bridged
+and left_out, and vertices moved. The result does not depend on the number of threads.
+Raises groundray.Error if nothing is surface or the noise of several scans is unknown.)";
 
 constexpr const char* simplify_doc = R"(Simplifies a mesh by collapsing edges, cheapest first, until
 
   max_vertical_error_m  a vertex would be farther above or below the result (terrain)
-  max_error_m           a point of either surface would be farther from the other: proved
-  triangles             so many are left
-  noise_sds             an error would reach so many standard deviations of the vertices
-  knee                  errors begin to rise faster than triangles go
+  max_error_m           a point of either surface would be farther from the other, proven
+  triangles             this number of triangles is reached
+  noise_sds             an error would reach this many standard deviations of the vertices
+  knee                  errors rise faster than the number of triangles falls
 
-Give one of these; border_m bounds borders apart from the rest, and crease_rad says from which
-angle on edges stay edges. Returns the mesh, and figures: halted_by ("bound", "budget", "knee",
-"shape"), and the error from_original and to_original as at_least_m and at_most_m, between which
-the largest distance lies, mean_m and rms_m.)";
+Give one of these; border_m is a separate bound for boundaries, and crease_rad the angle from which
+edges are kept as creases. Returns the mesh and figures: halted_by ("bound", "budget", "knee",
+"shape"), and the errors from_original and to_original: at_least_m and at_most_m, bounds of the
+largest distance, mean_m and rms_m.)";
 
 }  // namespace
 
@@ -210,10 +211,10 @@ void bind_reconstruction(nb::module_& module) {
              "triangles"_a = nb::none(), "noise_sds"_a = nb::none(), "knee"_a = false,
              "border_m"_a = nb::none(), "crease_rad"_a = nb::none(), simplify_doc);
   module.def("fill_holes", &filled_mesh, "mesh"_a, "longest_m"_a,
-             R"(Fills the holes of a mesh whose rim is no longer than this, metres, smoothly.
+             R"(Fills holes of a mesh smoothly, if their boundary is at most longest_m metres long.
 
-Returns the mesh, in which what was measured comes first, and figures: how many holes were filled
-and left, measured_vertices and measured_triangles.)");
+Returns the mesh, with measured vertices and triangles first, and figures: the numbers of holes
+filled and left, measured_vertices and measured_triangles.)");
 }
 
 }  // namespace groundray::python

@@ -19,16 +19,16 @@
 #include <string>
 #include <vector>
 
-#include "apps/python/bind.h"
+#include "apps/python/binding/bind.h"
+#include "apps/python/binding/long_call.h"
+#include "apps/python/binding/numpy_argument.h"
+#include "apps/python/binding/points.h"
 #include "apps/python/cast.h"
 #include "apps/python/frame_choice.h"
-#include "apps/python/given.h"
-#include "apps/python/long_call.h"
-#include "apps/python/points.h"
 #include "apps/python/scene_state.h"
 #include "apps/scene/paths.h"
+#include "apps/scene/readers/spec_io.h"
 #include "core/error.h"
-#include "sensors/spec_io.h"
 #include "terrain/terrain_scene.h"
 
 namespace groundray::python {
@@ -41,7 +41,7 @@ SharedScene build(SceneSpec spec, std::optional<std::uint64_t> seed) {
   return without_gil([&](const StopRequest& stop) {
     if (seed) spec.seed = {*seed};
     return std::make_shared<SceneState>(
-        build_world(std::move(spec), [&](double /*share*/) { stop.obey(); }));
+        build_simulation(std::move(spec), [&](double /*share*/) { stop.obey(); }));
   });
 }
 
@@ -72,37 +72,38 @@ std::size_t find_sensor(const std::vector<Placed>& sensors, const std::string& n
   const std::vector<std::string> names = sensor_names(sensors);
   const auto found = std::ranges::find(names, name);
   if (found != names.end()) return static_cast<std::size_t>(found - names.begin());
-  if (names.empty()) throw Error("the scene has no {} '{}', nor any other", kind, name);
+  if (names.empty()) throw Error("the scene has no {} '{}'; it has none", kind, name);
   throw Error("the scene has no {} '{}'; it has {}", kind, name, fmt::join(names, ", "));
 }
 
 // ----- rays
 
-// What rays from a box see: as sensors there would.
+// Returns the scene that rays from a box see, as sensors there would.
 std::shared_ptr<const Scene> scene_for(SceneState& state, const SensorBox& box) {
-  const World& world = state.world;
+  const Simulation& simulation = state.simulation;
   const glm::dvec3 middle = (box.low_m + box.high_m) / 2.0;
-  if (world.terrain.whole() != nullptr) {
+  if (simulation.terrain.whole() != nullptr) {
     const Trajectory here({{.pose = {.translation_m = middle}}});
     return state.frames.of({&here, here.begin_time(), here.end_time()});
   }
   const double reach_m = glm::distance(glm::dvec2(box.low_m), glm::dvec2(box.high_m)) / 2;
-  RayTracer rays = build_tracer(world.terrain.clipmap(box, std::max(reach_m, world.reach_m)),
-                                float_frame_origin(middle), world.spec.tracing);
+  RayTracer rays =
+      build_tracer(simulation.terrain.clipmap(box, std::max(reach_m, simulation.reach_m)),
+                   float_frame_origin(middle), simulation.spec.tracing);
   return std::make_shared<const Scene>(Scene{std::move(rays),
-                                             {.label = world.spec.terrain.label},
-                                             world.content.materials,
-                                             world.content.objects,
-                                             world.content.models,
-                                             world.content.cover});
+                                             {.label = simulation.spec.terrain.label},
+                                             simulation.content.materials,
+                                             simulation.content.objects,
+                                             simulation.content.models,
+                                             simulation.content.cover});
 }
 
 Points cast_in_scene(SceneState& state, const GivenPoints& origins_m, const GivenPoints& directions,
                      double t_s, bool error_bound) {
   const auto time = nanoseconds_of(t_s);
-  if (time < std::chrono::nanoseconds(0) || time > run_time(state.world.spec))
+  if (time < std::chrono::nanoseconds(0) || time > run_time(state.simulation.spec))
     throw Error("cast_rays: t_s = {} must be within the scene's time, 0 to {} s", t_s,
-                state.world.spec.duration_s);
+                state.simulation.spec.duration_s);
   const GivenRays rays(origins_m, directions, time);
   return without_gil([&](const StopRequest& stop) {
     rays.check();
@@ -114,7 +115,7 @@ Points cast_in_scene(SceneState& state, const GivenPoints& origins_m, const Give
 
 AnyArray ground_heights(const SceneState& state, const GivenPlaces& places_m) {
   return array_of(without_gil([&](const StopRequest&) {
-    const Ground& ground = state.world.terrain.ground();
+    const Ground& ground = state.simulation.terrain.ground();
     std::vector<double> heights_m(places_m.rows());
     for (std::size_t i = 0; i < heights_m.size(); ++i) {
       heights_m[i] = ground.height_m_at({places_m(i, 0), places_m(i, 1)})
@@ -126,7 +127,7 @@ AnyArray ground_heights(const SceneState& state, const GivenPlaces& places_m) {
 
 nb::list groups_of(const SceneState& state) {
   nb::list all;
-  for (const Content::Group& group : state.world.content.groups) {
+  for (const SceneObjects::Group& group : state.simulation.content.groups) {
     nb::dict one;
     one["name"] = group.name;
     one["label"] = group.label;
@@ -138,82 +139,82 @@ nb::list groups_of(const SceneState& state) {
 }
 
 constexpr const char* cast_doc =
-    R"(Casts rays through the scene, on all cores, and tells what each meets first.
+    R"(Casts rays through the scene on all cores and returns the first hit of each.
 
   origins_m    n x 3, metres in the frame D
-  directions   n x 3, axes of D, of any length but zero
-  t_s          when, in seconds of the scene's time: where objects are that move
-  error_bound  also tells how far each range may be from the reference surface's
+  directions   n x 3, axes of D, of any length except zero
+  t_s          time in seconds of the scene's time, for the poses of moving objects
+  error_bound  adds a bound of each range's difference from that on the reference surface
 
-The result has a row for each ray: range_true_m along it (infinite if it meets nothing), world_x_m,
-world_y_m, world_z_m (in D), nx, ny, nz, incidence_rad (NaN for nothing), label, instance (0 for
-the ground) and error_bound_m if asked for. The ground is met from above only.
-Raises groundray.Error for rays that are none.)";
+The result has a row for each ray: range_true_m along it (infinite without a hit), world_x_m,
+world_y_m, world_z_m (in D), nx, ny, nz, incidence_rad (NaN without a hit), label, instance (0 for
+the ground) and error_bound_m if requested. The ground is hit from above only.
+Raises groundray.Error for invalid rays.)";
 
 }  // namespace
 
 void bind_scene(nb::module_& module) {
   nb::class_<SceneState>(module, "Scene", nb::is_weak_referenceable(),
-                         R"(A scene with all that its file names, ready to run.
+                         R"(A scene and everything that its file names, ready to run.
 
 See load_scene and scene. Immutable: any number of threads may use one.)")
       .def_prop_ro(
-          "lidars", [](const SceneState& scene) { return sensor_names(scene.world.lidars); },
+          "lidars", [](const SceneState& scene) { return sensor_names(scene.simulation.lidars); },
           "Names, in the order of the file.")
       .def_prop_ro(
-          "cameras", [](const SceneState& scene) { return sensor_names(scene.world.cameras); },
+          "cameras", [](const SceneState& scene) { return sensor_names(scene.simulation.cameras); },
           "Names, in the order of the file.")
       .def(
           "lidar",
           [](const SharedScene& scene, const std::string& name) {
-            return SceneLidar{scene, find_sensor(scene->world.lidars, name, "lidar")};
+            return SceneLidar{scene, find_sensor(scene->simulation.lidars, name, "lidar")};
           },
           "name"_a, "The lidar of this name. Raises groundray.Error if there is none.")
       .def(
           "camera",
           [](const SharedScene& scene, const std::string& name) {
-            return SceneCamera{scene, find_sensor(scene->world.cameras, name, "camera")};
+            return SceneCamera{scene, find_sensor(scene->simulation.cameras, name, "camera")};
           },
           "name"_a, "The camera of this name. Raises groundray.Error if there is none.")
       .def_prop_ro("duration_s",
-                   [](const SceneState& scene) { return scene.world.spec.duration_s; })
-      .def_prop_ro("seed", [](const SceneState& scene) { return scene.world.spec.seed.value; })
+                   [](const SceneState& scene) { return scene.simulation.spec.duration_s; })
+      .def_prop_ro("seed", [](const SceneState& scene) { return scene.simulation.spec.seed.value; })
       .def_prop_ro(
           "origin_w_m",
           [](const SceneState& scene) {
-            const glm::dvec3 p = scene.world.terrain.header().origin_w_m;
+            const glm::dvec3 p = scene.simulation.terrain.header().origin_w_m;
             return std::array<double, 3>{p.x, p.y, p.z};
           },
-          "Where the frame D begins in W, the coordinates of the DEM: add it to places in D.")
+          "Origin of the frame D in W, the coordinates of the DEM: add it to positions in D.")
       .def_prop_ro(
-          "crs", [](const SceneState& scene) { return scene.world.terrain.header().crs_name; },
-          "W's coordinate reference system, for people.")
+          "crs", [](const SceneState& scene) { return scene.simulation.terrain.header().crs_name; },
+          "Name of W's coordinate reference system.")
       .def_prop_ro("objects", &groups_of,
                    nb::sig("def objects(self) -> list[dict[str, typing.Any]]"),
-                   "Entries with objects: name, label, and their instances: count from first on.")
+                   "Groups of objects: name, label, first instance and count.")
       .def("heights_at", &ground_heights, "places_m"_a,
            R"(Heights of the ground's reference surface, n metres, in doubles.
 
   places_m  n x 2, x and y in the frame D
 
-NaN outside of the DEM and in its holes. Objects are left out.)")
+NaN outside of the DEM and in its holes. Objects are ignored.)")
       .def("cast_rays", &cast_in_scene, "origins_m"_a, "directions"_a, "t_s"_a = 0.0, nb::kw_only(),
            "error_bound"_a = false, cast_doc)
       .def("__repr__", [](const SceneState& scene) {
         return fmt::format("<Scene of {} s: lidars [{}], cameras [{}]>",
-                           scene.world.spec.duration_s,
-                           fmt::join(sensor_names(scene.world.lidars), ", "),
-                           fmt::join(sensor_names(scene.world.cameras), ", "));
+                           scene.simulation.spec.duration_s,
+                           fmt::join(sensor_names(scene.simulation.lidars), ", "),
+                           fmt::join(sensor_names(scene.simulation.cameras), ", "));
       });
   module.def("load_scene", &open_scene, "path"_a, "seed"_a = nb::none(),
-             R"(Loads a scene file (docs/scene.md) and everything it names.
+             R"(Loads a scene file (docs/reference/scene.md) and everything it names.
 
-`seed` takes the place of the scene's own. Ctrl-C ends the certification of a large DEM.
+`seed` replaces the scene's own. Ctrl-C stops the certification of a large DEM.
 Raises groundray.Error, with a line for each fault: file, line, key, rule and likely fix.)");
   module.def("parse_scene", &parse, "text"_a, "path"_a, "seed"_a = nb::none(),
-             R"(As load_scene, of the text of a scene file.
+             R"(Like load_scene, for the text of a scene file.
 
-`path` stands for the file in messages; what the text names is looked for in its folder.)");
+`path` names the file in messages; files that the text names are relative to its folder.)");
 }
 
 }  // namespace groundray::python

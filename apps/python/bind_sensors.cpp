@@ -17,13 +17,14 @@
 #include <utility>
 #include <vector>
 
-#include "apps/python/bind.h"
+#include "apps/python/binding/bind.h"
+#include "apps/python/binding/long_call.h"
+#include "apps/python/binding/numpy_argument.h"
+#include "apps/python/binding/pose_matrix.h"
 #include "apps/python/camera_image.h"
 #include "apps/python/frame_choice.h"
-#include "apps/python/given.h"
-#include "apps/python/long_call.h"
-#include "apps/python/pose_matrix.h"
 #include "apps/python/sweep.h"
+#include "apps/scene/frames.h"
 #include "core/error.h"
 
 namespace groundray::python {
@@ -43,11 +44,9 @@ FrameTimes times_of(const SceneLidar& lidar) {
 Sweep scan(const SceneLidar& lidar, std::optional<double> t_s, std::optional<std::int64_t> frame) {
   const std::int64_t sweep = chosen_frame(times_of(lidar), t_s, frame);
   return without_gil([&](const StopRequest& stop) {
-    const PlacedLidar& placed = lidar.placed();
-    const auto scene = lidar.state->frames.of(exposed(placed, sweep));
-    LidarScan scan = placed.lidar.scan(*scene, placed.X_DS, sweep, lidar.state->world.spec.seed,
-                                       static_cast<std::uint32_t>(lidar.index),
-                                       [&](double) { return !stop.is_made(); });
+    const auto scene = lidar.state->frames.of(exposed(lidar.placed(), sweep));
+    LidarScan scan = make_scan(lidar.state->simulation, lidar.index, sweep, *scene,
+                               [&](double) { return !stop.is_made(); });
     return Sweep{{std::move(scan.echoes)},
                  {std::move(scan.no_returns)},
                  std::move(scan.waveforms),
@@ -65,26 +64,27 @@ Give either of
   frame  its number, from 0, as in the names of the files of `groundray generate`
 
 The result has a row for each echo, in firing order and by range, and the columns of
-docs/python.md: x_m, y_m, z_m in the frame S of the sensor as its pulse fired (x forward, y left,
+docs/guide/python.md: x_m, y_m, z_m in the frame S of the sensor as its pulse fired (x forward, y left,
 z up), range_true_m, world_x_m, world_y_m, world_z_m and normals nx, ny, nz in the dataset's frame
 D (x east, y north, z up, from `Scene.origin_w_m`), incidence_rad, time_s since the sweep began,
-label, instance and more. The same seed gives the same bytes, those of `groundray generate`.
+label, instance and more. The same seed yields the same bytes as `groundray generate`.
 
-Other Python threads go on meanwhile, and may scan themselves. Ctrl-C ends the sweep.
-Raises groundray.Error if no sweep begins then.)";
+Other Python threads keep running, and may scan too. Ctrl-C stops the sweep.
+Raises groundray.Error if no sweep begins at t_s.)";
 
 void bind_lidar(nb::module_& module) {
   nb::class_<SceneLidar>(module, "Lidar", "A lidar on a scene's platform. See Scene.lidar.")
       .def_prop_ro("name", [](const SceneLidar& lidar) { return lidar.placed().spec.name; })
       .def_prop_ro(
           "model", [](const SceneLidar& lidar) { return lidar.placed().spec.lidar.model; },
-          "Make and model, for people.")
+          "Make and model.")
       .def_prop_ro(
           "sweep_rate_hz",
           [](const SceneLidar& lidar) { return lidar.placed().lidar.pattern().sweep_rate_hz(); })
       .def_prop_ro(
           "times_s", [](const SceneLidar& lidar) { return all_times_s(times_of(lidar)); },
-          nb::rv_policy::automatic, "When the whole sweeps of the scene begin: n seconds.")
+          nb::rv_policy::automatic,
+          "Times at which the complete sweeps of the scene begin: n seconds.")
       .def("scan", &scan, nb::kw_only(), "t_s"_a = nb::none(), "frame"_a = nb::none(), scan_doc)
       .def(
           "pose",
@@ -94,7 +94,7 @@ void bind_lidar(nb::module_& module) {
           "t_s"_a,
           R"(The pose X_DS of the sensor at a time of the scene: a 4 x 4 matrix.
 
-It takes points of the sensor's frame S, as columns (x, y, z, 1) in metres, to the frame D.
+It transforms points of the sensor's frame S, as columns (x, y, z, 1) in metres, to the frame D.
 Raises groundray.Error outside the scene's time.)")
       .def("__repr__", [](const SceneLidar& lidar) {
         return fmt::format("<Lidar '{}': {}, {} sweeps>", lidar.placed().spec.name,
@@ -102,7 +102,7 @@ Raises groundray.Error outside the scene's time.)")
       });
 }
 
-// ----- what a scan has besides echoes
+// ----- other data of a scan
 
 AnyArray field_of(nb::handle_t<Sweep> self, const auto WaveformRun::*field) {
   const Waveforms& all = nb::cast<const Sweep&>(self).waveforms;
@@ -140,8 +140,8 @@ nb::object convergence_of(const Sweep& sweep) {
 void bind_scan(nb::module_& module) {
   nb::class_<Sweep, Points>(module, "Scan", R"(One sweep of a lidar: a row for each echo.
 
-scan["range_true_m"] is a column; see Points for how columns are asked for, Lidar.scan for what
-they are.)")
+scan["range_true_m"] is a column; see Points for access to columns, Lidar.scan for their
+meaning.)")
       .def_ro("frame", &Sweep::frame, "The sweep's number, from 0.")
       .def_prop_ro(
           "t_s", [](const Sweep& sweep) { return seconds_of(sweep.stamp()); },
@@ -154,21 +154,22 @@ they are.)")
                             self);
           },
           nb::sig("def no_returns(self) -> Points"),
-          R"(Pulses without an echo, where the sensor's file asks for them (else no rows).
+          R"(Pulses without an echo, if the sensor's file requests them (else no rows).
 
-Columns: pulse, time_s, ring, dx, dy, dz (where the pulse went, axes of D) and reason.)")
+Columns: pulse, time_s, ring, dx, dy, dz (direction of the pulse, axes of D) and reason.)")
       .def_prop_ro("waveforms", &waveforms_of,
                    nb::sig("def waveforms(self) -> dict[str, typing.Any] | None"),
-                   R"(The power received over time, where the sensor's file asks for it, or None.
+                   R"(The received power over time, if the sensor's file requests it, or None.
 
-interval_s from sample to sample; power_w, all samples; and of each run of samples pulse (of the
-sweep), count, first_sample (index in power_w) and start_s, its time after the pulse left.)")
-      .def_prop_ro("convergence", &convergence_of,
-                   nb::sig("def convergence(self) -> dict[str, float] | None"),
-                   R"(How much twice the sub-rays would change, or None of single rays.
+interval_s between samples; power_w, all samples; and for each run of samples pulse (in the sweep),
+count, first_sample (index in power_w) and start_s, its time since the emission of the pulse.)")
+      .def_prop_ro(
+          "convergence", &convergence_of,
+          nb::sig("def convergence(self) -> dict[str, float] | None"),
+          R"(Convergence of the footprint: the change by twice the sub-rays; None for single rays.
 
-Of every 64th pulse: pulses looked at, other_echoes (how many of them would have another number of
-echoes), range_rms_m and range_max_m, of the differences in range of the others' first echoes.)")
+Of every 64th pulse: pulses compared, other_echoes (pulses whose number of echoes would change),
+range_rms_m and range_max_m, the differences in range of the other pulses' first echoes.)")
       .def("__repr__", [](const Sweep& sweep) {
         return fmt::format("<Scan {} of lidar '{}', {} s: {} echoes of {}>", sweep.frame,
                            sweep.placed().spec.name, seconds_of(sweep.stamp()), sweep.cloud.rows(),
@@ -196,17 +197,17 @@ CameraImage expose(const SceneCamera& camera, std::optional<double> t_s,
 constexpr const char* expose_doc = R"(Makes one image, on all cores.
 
 Give either of
-  t_s    when the image's first row begins to see, in seconds of the scene's time: of `times_s`
+  t_s    when the first row's exposure begins, in seconds of the scene's time: one of `times_s`
   frame  its number, from 0, as in the names of the files of `groundray generate`
 
-What the result holds is up to `products` in the camera's file: docs/python.md lists the channels,
+`products` in the camera's file selects the channels of the result: docs/guide/python.md lists them,
 such as radiance_w_m2_sr (height x width x 3, linear sRGB), depth_m, range_m (height x width,
 infinite for sky), position_m (in the frame D), normal, label, instance and picture. Integer
-coordinates are centres of pixels; row 0 is uppermost. The same seed gives the same bytes, those of
+coordinates are centres of pixels; row 0 is uppermost. The same seed yields the same bytes as
 `groundray generate`.
 
-Other Python threads go on meanwhile. Ctrl-C ends light, which takes longest.
-Raises groundray.Error if no image begins then.)";
+Other Python threads keep running. Ctrl-C stops the light transport, the longest part.
+Raises groundray.Error if no image begins at t_s.)";
 
 AnyArray directions_of(nb::handle_t<SceneCamera> self) {
   const auto& camera = nb::cast<const SceneCamera&>(self);
@@ -236,7 +237,7 @@ void bind_camera(nb::module_& module) {
       .def_prop_ro("name", [](const SceneCamera& camera) { return camera.placed().spec.name; })
       .def_prop_ro(
           "model", [](const SceneCamera& camera) { return camera.placed().spec.camera.model; },
-          "Make and model, for people.")
+          "Make and model.")
       .def_prop_ro(
           "size_px",
           [](const SceneCamera& camera) {
@@ -246,17 +247,17 @@ void bind_camera(nb::module_& module) {
           "Width and height.")
       .def_prop_ro(
           "times_s", [](const SceneCamera& camera) { return all_times_s(times_of(camera)); },
-          nb::rv_policy::automatic, "When the images of the scene begin: n seconds.")
+          nb::rv_policy::automatic, "Times at which the images of the scene begin: n seconds.")
       .def("expose", &expose, nb::kw_only(), "t_s"_a = nb::none(), "frame"_a = nb::none(),
            expose_doc)
       .def_prop_ro("directions", &directions_of,
-                   R"(Where the centres of all pixels look: height x width x 3, a view.
+                   R"(Viewing directions of all pixel centres: height x width x 3, a view.
 
-Unit vectors in the camera's frame C (x right, y down, z ahead); zero where a pixel looks nowhere.)")
+Unit vectors in the camera's frame C (x right, y down, z ahead); zero for pixels without a ray.)")
       .def("project", &project, "points_m"_a,
-           R"(Where points of the camera's frame C (n x 3, metres) fall: n x 2, column and row, px.
+           R"(Projects points of the camera's frame C (n x 3, metres): n x 2, column and row, px.
 
-Inside of the image or not; NaN where the lens images nothing.)")
+Results may be outside of the image; NaN for points that the lens cannot image.)")
       .def(
           "pose",
           [](const SceneCamera& camera, double t_s) {
@@ -265,7 +266,7 @@ Inside of the image or not; NaN where the lens images nothing.)")
           "t_s"_a,
           R"(The pose X_DC of the camera at a time of the scene: a 4 x 4 matrix.
 
-It takes points of the camera's frame C, as columns (x, y, z, 1) in metres, to the frame D.
+It transforms points of the camera's frame C, as columns (x, y, z, 1) in metres, to the frame D.
 Raises groundray.Error outside the scene's time.)")
       .def("__repr__", [](const SceneCamera& camera) {
         const PlacedCamera& placed = camera.placed();
@@ -287,7 +288,7 @@ AnyArray channel_of(nb::handle_t<CameraImage> self, const std::string& name) {
   const auto& image = nb::cast<const CameraImage&>(self);
   const auto found = std::ranges::find(image.channels, name, &CameraImage::Channel::name);
   if (found == image.channels.end()) {
-    const std::string text = fmt::format("there is no channel '{}'; the camera's products give {}",
+    const std::string text = fmt::format("there is no channel '{}'; the camera's products are {}",
                                          name, fmt::join(names_of(image), ", "));
     throw nb::key_error(text.c_str());
   }
@@ -304,10 +305,10 @@ AnyArray channel_of(nb::handle_t<CameraImage> self, const std::string& name) {
 }
 
 void bind_image(nb::module_& module) {
-  nb::class_<CameraImage>(module, "Image", R"(One image of a camera: channels of one size.
+  nb::class_<CameraImage>(module, "Image", R"(One image of a camera: channels of equal size.
 
-image["depth_m"] is a channel as a NumPy array, height x width or height x width x n, a view that
-may not be written to and that keeps the image alive. dict(image) is a dict of all channels.)")
+image["depth_m"] is a channel as a NumPy array, height x width or height x width x n, a
+read-only view that keeps the image alive. dict(image) is a dict of all channels.)")
       .def("__getitem__", &channel_of, "name"_a, "The channel of this name: a view.")
       .def("__len__", [](const CameraImage& image) { return image.channels.size(); })
       .def(
@@ -320,20 +321,20 @@ may not be written to and that keeps the image alive. dict(image) is a dict of a
       .def(
           "__iter__", [](const CameraImage& image) { return nb::iter(nb::cast(names_of(image))); },
           nb::sig("def __iter__(self) -> collections.abc.Iterator[str]"),
-          "Goes over the names of the channels.")
+          "Iterates over the names of the channels.")
       .def(
           "keys", [](const CameraImage& image) { return names_of(image); },
           "The names of the channels.")
       .def_prop_ro(
           "labels", [](const CameraImage& image) { return image.labels; },
-          "Which classes the layers of `coverage` are of; 0 is the sky.")
+          "Classes of the layers of `coverage`; 0 is the sky.")
       .def_ro("frame", &CameraImage::frame, "The image's number, from 0.")
       .def_prop_ro(
           "t_s",
           [](const CameraImage& image) {
             return seconds_of(image.placed().begins[static_cast<std::size_t>(image.frame)]);
           },
-          "When its first row began to see, in seconds of the scene's time.")
+          "When the exposure of its first row began, in seconds of the scene's time.")
       .def_prop_ro("sensor", [](const CameraImage& image) { return image.placed().spec.name; })
       .def("__repr__", [](const CameraImage& image) {
         return fmt::format("<Image {} of camera '{}': {}>", image.frame, image.placed().spec.name,

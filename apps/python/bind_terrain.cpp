@@ -13,17 +13,17 @@
 #include <optional>
 #include <vector>
 
-#include "apps/python/arrays.h"
-#include "apps/python/bind.h"
+#include "apps/python/binding/arrays.h"
+#include "apps/python/binding/bind.h"
+#include "apps/python/binding/long_call.h"
+#include "apps/python/binding/mesh.h"
+#include "apps/python/binding/numpy_argument.h"
+#include "apps/python/binding/points.h"
 #include "apps/python/cast.h"
-#include "apps/python/given.h"
-#include "apps/python/long_call.h"
-#include "apps/python/mesh.h"
-#include "apps/python/points.h"
 #include "apps/python/terrain_model.h"
 #include "core/error.h"
-#include "terrain/dem_io.h"
-#include "terrain/layers_io.h"
+#include "terrain/dem/dem_io.h"
+#include "terrain/dem/layers_io.h"
 #include "terrain/terrain_mesh.h"
 
 namespace groundray::python {
@@ -32,7 +32,7 @@ namespace {
 using nb::literals::operator""_a;
 using Pair = std::array<double, 2>;
 
-// In W, of whole metres, near the raster: D begins there.
+// Returns the origin of D in W: the south-west sample's position, rounded down to whole metres.
 glm::dvec3 origin_for(const Pair& south_west_w_m) {
   return {std::floor(south_west_w_m[0]), std::floor(south_west_w_m[1]), 0};
 }
@@ -42,8 +42,8 @@ Dem dem_of(const GivenRaster& heights_m, double cell_m, const Pair& south_west_w
   constexpr std::size_t most = std::numeric_limits<int>::max();
   Violations broken("Terrain");
   broken.unless(heights_m.rows() <= most && heights_m.columns() <= most,
-                "heights_m is of {} x {} samples; there may be 2^31 - 1 each way", heights_m.rows(),
-                heights_m.columns());
+                "heights_m has {} x {} samples; at most 2^31 - 1 are permitted each way",
+                heights_m.rows(), heights_m.columns());
   broken.unless(cell_m > 0 && std::isfinite(cell_m), "cell_m = {} must be positive", cell_m);
   broken.unless(std::isfinite(south_west_w_m[0]) && std::isfinite(south_west_w_m[1]),
                 "south_west_w_m = ({}, {}) must be finite", south_west_w_m[0], south_west_w_m[1]);
@@ -112,17 +112,17 @@ Mesh terrain_mesh(const TerrainModel& terrain, double max_error_m) {
   });
 }
 
-constexpr const char* terrain_doc = R"(A DEM in memory: the reference surface that rays meet.
+constexpr const char* terrain_doc = R"(A DEM in memory: the reference surface that rays hit.
 
-  heights_m       rows x columns, metres, the northernmost row first; NaN where there is none.
+  heights_m       rows x columns, metres, the northernmost row first; NaN where unknown.
                   Heights are kept as float32.
-  cell_m          from sample to sample, both ways
-  south_west_w_m  where the first sample of the last row stands in W
-  crs_wkt         W's coordinate reference system as WKT, or nothing: local metres
+  cell_m          spacing of samples in both directions
+  south_west_w_m  position of the first sample of the last row in W
+  crs_wkt         W's coordinate reference system as WKT, or empty for local metres
 
-Each cell is two triangles, split from sample (column + 1, row) to (column, row + 1). Places are
-in the frame D: W less `origin_w_m`, the whole metres of south_west_w_m. Immutable: any number of
-threads may use one. Raises groundray.Error naming every fault.)";
+Each cell is two triangles, split from sample (column + 1, row) to (column, row + 1). Positions
+are in the frame D: W minus `origin_w_m`, which is south_west_w_m rounded down to whole metres.
+Immutable: any number of threads may use one. Raises groundray.Error naming every fault.)";
 
 }  // namespace
 
@@ -146,31 +146,31 @@ void bind_terrain(nb::module_& module) {
                 {static_cast<std::size_t>(grid.rows()), static_cast<std::size_t>(grid.columns())},
                 self);
           },
-          "Heights of the samples, rows x columns, metres, as the file has them: a view.")
+          "Heights of the samples, rows x columns, metres, as in the file: a view.")
       .def_prop_ro(
           "first_sample_m",
           [](const TerrainModel& terrain) {
             const glm::dvec2 p = terrain.dem().grid.origin_m();
             return Pair{p.x, p.y};
           },
-          "Where sample (0, 0) stands, in D.")
+          "Position of sample (0, 0) in D.")
       .def_prop_ro(
           "step_m",
           [](const TerrainModel& terrain) {
             const glm::dvec2 step_m = terrain.dem().grid.step_m();
             return Pair{step_m.x, step_m.y};
           },
-          "From column to column and row to row; below 0 southwards.")
+          "Spacing of columns and of rows; negative southwards.")
       .def_prop_ro(
           "origin_w_m",
           [](const TerrainModel& terrain) {
             const glm::dvec3 p = terrain.dem().origin_w_m;
             return std::array<double, 3>{p.x, p.y, p.z};
           },
-          "Where the frame D begins in W: add it to places in D.")
+          "Origin of the frame D in W: add it to positions in D.")
       .def_prop_ro(
           "crs", [](const TerrainModel& terrain) { return terrain.dem().crs_name; },
-          "W's coordinate reference system, for people.")
+          "Name of W's coordinate reference system.")
       .def("heights_at", &dem_heights, "places_m"_a,
            R"(Heights of the surface, n metres, in doubles.
 
@@ -178,18 +178,19 @@ void bind_terrain(nb::module_& module) {
 
 NaN outside of the DEM and in its holes.)")
       .def("cast_rays", &cast_on_terrain, "origins_m"_a, "directions"_a,
-           R"(Casts rays at the surface, every facet decided in double, on all cores.
+           R"(Casts rays at the surface on all cores, with intersections in double precision.
 
   origins_m   n x 3, metres in the frame D
-  directions  n x 3, axes of D, of any length but zero
+  directions  n x 3, axes of D, of any length except zero
 
-As Scene.cast_rays; what stands on the ground is not there, and its label is 1.)")
+Like Scene.cast_rays, but without objects; the label is 1.)")
       .def("mesh", &terrain_mesh, "max_error_m"_a,
-           R"(The triangle mesh that is nowhere farther than this from the surface, vertically.
+           R"(Returns a triangle mesh within max_error_m of the surface, vertically.
 
-Certified, at samples and between them; without T-junctions. 0 keeps all but what is flat.)")
+The bound is certified at samples and between them. There are no T-junctions. 0 simplifies only
+flat areas.)")
       .def("save", &save, "path"_a,
-           "Writes a GeoTIFF of float32 heights. It appears only when whole.")
+           "Writes a GeoTIFF of float32 heights. It appears only when complete.")
       .def("__repr__", [](const TerrainModel& terrain) {
         const HeightGrid& grid = terrain.dem().grid;
         return fmt::format("<Terrain: {} x {} samples of {} m, {}>", grid.columns(), grid.rows(),
@@ -197,12 +198,12 @@ Certified, at samples and between them; without T-junctions. 0 keeps all but wha
       });
   module.def("load_terrain", &open_terrain, "path"_a, "nodata"_a = nb::none(),
              "reproject_to"_a = "",
-             R"(Loads a DEM as a whole: GeoTIFF, HGT, ESRI ASCII and whatever else GDAL reads.
+             R"(Loads a complete DEM: GeoTIFF, HGT, ESRI ASCII and any other format that GDAL reads.
 
-  nodata        a stored value that means "no height", besides the file's own
+  nodata        a stored value that means "no height", in addition to the file's own
   reproject_to  a projected CRS in metres to warp to, such as "EPSG:32631", or "utm"
 
-Raises groundray.Error, with the command that mends the file where one can.)");
+Raises groundray.Error, with the command that repairs the file if there is one.)");
 }
 
 }  // namespace groundray::python

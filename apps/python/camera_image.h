@@ -8,28 +8,28 @@
 #include <vector>
 
 #include "apps/python/scene_state.h"
-#include "core/image.h"
+#include "core/image/image.h"
 
 namespace groundray::python {
 
-/// One image of a scene's camera: channels by names with units.
+/// Image of a scene's camera: channels whose names include their units.
 struct CameraImage {
   struct Channel {
     std::string name;
     std::variant<ImageF, Image<double>, Image8, Image16, Image32> pixels;
   };
   std::vector<Channel> channels;
-  std::vector<std::uint16_t> labels;  ///< of the layers of `coverage`
+  std::vector<std::uint16_t> labels;  ///< labels of the layers of `coverage`
   std::int64_t frame = 0;
   std::shared_ptr<const SceneState> state;
-  std::size_t camera = 0;  ///< among the scene's
+  std::size_t camera = 0;  ///< index in the scene
 
-  const PlacedCamera& placed() const { return state->world.cameras[camera]; }
+  const PlacedCamera& placed() const { return state->simulation.cameras[camera]; }
 };
 
-/// Makes an image with all products that the camera's file asks for.
-/// @param check  called now and then; what it throws ends the image.
-/// @throws Error as the parts do.
+/// Makes an image with all products that the camera's file requests.
+/// @param check  called repeatedly, on any thread; an exception from it ends the image.
+/// @throws Error as the functions that make the products.
 CameraImage make_image(const std::shared_ptr<SceneState>& state, std::size_t camera,
                        std::int64_t frame, const std::function<void()>& check);
 

@@ -24,12 +24,13 @@ glm::dvec3 row_of(const GivenPoints& rows, std::size_t i) {
   return {rows(i, 0), rows(i, 1), rows(i, 2)};
 }
 
-// Its components' greatest size.
+// Returns the largest magnitude of the components.
 double extent(const glm::dvec3& v) {
   return std::max({std::abs(v.x), std::abs(v.y), std::abs(v.z)});
 }
 
-// Scaled by a power of two first, which rounds nothing: squares neither overflow nor underflow.
+// Normalises after scaling by a power of two, which is exact, so that squares neither overflow nor
+// underflow.
 glm::dvec3 unit(const glm::dvec3& v) {
   const int exponent = std::ilogb(extent(v));
   return glm::normalize(glm::dvec3(std::scalbn(v.x, -exponent), std::scalbn(v.y, -exponent),
@@ -40,7 +41,7 @@ bool is_finite(const glm::dvec3& v) {
   return std::isfinite(v.x) && std::isfinite(v.y) && std::isfinite(v.z);
 }
 
-/// The columns of a cast.
+/// Columns of the result of cast_rays.
 struct Columns {
   explicit Columns(PointCloud& cloud, ErrorBounds bounds)
       : range_m(cloud.add<double>("range_true")),
@@ -86,7 +87,7 @@ struct Columns {
 GivenRays::GivenRays(GivenPoints origins_m, GivenPoints directions, std::chrono::nanoseconds time)
     : origins_m_(std::move(origins_m)), directions_(std::move(directions)), time_(time) {
   if (origins_m_.rows() != directions_.rows())
-    throw Error("rays: there are {} origins but {} directions; there must be as many",
+    throw Error("rays: there are {} origins but {} directions; the numbers must be equal",
                 origins_m_.rows(), directions_.rows());
 }
 

@@ -4,29 +4,30 @@
 #include <cstddef>
 #include <functional>
 
-#include "apps/python/given.h"
-#include "core/point_cloud.h"
-#include "core/scene.h"
-#include "terrain/sensor_box.h"
+#include "apps/python/binding/numpy_argument.h"
+#include "core/io/point_cloud.h"
+#include "core/tracing/scene.h"
+#include "terrain/lod/sensor_box.h"
 
 namespace groundray::python {
 
-/// Whether rays are told how far their ranges may be from those on the reference surface.
+/// Choice of reporting bounds of range errors relative to the reference surface.
 enum class ErrorBounds { Omit, Report };
 
-/// Rays as Python gives them: points in D, and directions of any length.
+/// Rays as given in Python: origins in D, m, and directions of any length.
 class GivenRays {
  public:
-  /// @throws Error if there are more of one than of the other.
+  /// @throws Error if the numbers of origins and directions differ.
   GivenRays(GivenPoints origins_m, GivenPoints directions, std::chrono::nanoseconds time);
 
   std::size_t size() const { return origins_m_.rows(); }
-  /// Returns a ray, its direction a unit vector.
+  /// Returns a ray with a unit direction.
   Ray operator[](std::size_t row) const;
-  /// Returns the box of where rays begin.
+  /// Returns the bounding box of the origins.
   SensorBox box() const;
 
-  /// @throws Error naming the first row that is no ray.
+  /// Checks that all numbers are finite and no direction is zero.
+  /// @throws Error that names the first invalid row.
   void check() const;
 
  private:
@@ -34,12 +35,12 @@ class GivenRays {
   std::chrono::nanoseconds time_;
 };
 
-/// Casts rays, on all cores.
-/// @param rays   that have been checked.
-/// @param check  called now and then; what it throws ends the work.
-/// @return a row for each ray: range_true, world_x world_y world_z, nx ny nz, incidence, label and
-///         instance, as a scan has them, and error_bound if asked for. Of a ray that meets nothing
-///         the range is infinite, and place, normal and incidence are NaN.
+/// Casts rays on all cores.
+/// @param rays  rays that have been checked.
+/// @param check  called repeatedly, on any thread; an exception from it ends the work.
+/// @return one row per ray: range_true, world_x world_y world_z, nx ny nz, incidence, label and
+///         instance, as in a scan, and error_bound if requested. For a ray without a hit the range
+///         is infinite, and position, normal and incidence are NaN.
 PointCloud cast_rays(const Scene& scene, const GivenRays& rays, ErrorBounds bounds,
                      const std::function<void()>& check);
 

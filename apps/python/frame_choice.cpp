@@ -12,7 +12,7 @@ namespace {
 
 using std::chrono::nanoseconds;
 
-// Of at least one frame.
+// Requires at least one frame.
 std::int64_t nearest_frame(const FrameTimes& times, nanoseconds time) {
   const auto frames = std::views::iota(std::int64_t{0}, times.count);
   const auto after = std::ranges::partition_point(
@@ -43,11 +43,10 @@ AnyArray all_times_s(const FrameTimes& times) {
 std::int64_t chosen_frame(const FrameTimes& times, std::optional<double> t_s,
                           std::optional<std::int64_t> frame) {
   if (t_s.has_value() == frame.has_value())
-    throw Error("{}: give t_s, when the frame begins, or frame, its number; one of both",
-                times.sensor);
+    throw Error("{}: give either t_s, when the frame begins, or frame, its number", times.sensor);
   if (frame) {
     if (0 <= *frame && *frame < times.count) return *frame;
-    throw Error("{}: there is no frame {}; the scene has {}, from 0 on", times.sensor, *frame,
+    throw Error("{}: there is no frame {}; the scene has {}, numbered from 0", times.sensor, *frame,
                 times.count);
   }
   constexpr nanoseconds slack = std::chrono::microseconds(1);

@@ -1,9 +1,9 @@
 #include <nanobind/nanobind.h>
 
-#include "apps/python/bind.h"
+#include "apps/python/binding/bind.h"
 
 NB_MODULE(_core, module) {
-  module.doc() = "What groundray's libraries do, for Python. Import groundray instead.";
+  module.doc() = "Bindings of groundray's libraries. Import groundray instead.";
   module.attr("version") = GROUNDRAY_VERSION;
   groundray::python::bind_core(module);
   groundray::python::bind_mesh(module);

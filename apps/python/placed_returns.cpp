@@ -14,13 +14,14 @@ namespace {
 
 using std::chrono::nanoseconds;
 
-// When each echo's pulse fired, since the stamp.
+// Returns the time at which each echo's pulse fired, since the stamp.
 std::vector<double> times_s(const Sweep& sweep) {
   const auto column = sweep.cloud.column<float>("time");
   return {column.begin(), column.end()};
 }
 
-// The pose of the sensor at each of these times; floats may tell times just beside the path.
+// Returns the sensor's pose at each of these times. They are clamped, because as floats they may
+// lie just outside the trajectory.
 std::vector<Pose> poses_at(const Sweep& sweep, std::span<const double> all_s) {
   const Trajectory& X_DS = sweep.placed().X_DS;
   std::vector<Pose> poses;
@@ -32,7 +33,7 @@ std::vector<Pose> poses_at(const Sweep& sweep, std::span<const double> all_s) {
   return poses;
 }
 
-// In S as each pulse fired.
+// Returns the points in S at the time at which each pulse fired.
 std::vector<glm::dvec3> points_as_fired(const Sweep& sweep, std::span<const Pose> poses) {
   const auto x = sweep.cloud.column<float>("x");
   const auto y = sweep.cloud.column<float>("y");

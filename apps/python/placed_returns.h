@@ -5,26 +5,28 @@
 #include <vector>
 
 #include "apps/python/sweep.h"
-#include "reconstruction/scan/organised_scan.h"
+#include "reconstruction/mesh/scan/organised_scan.h"
 
 namespace groundray::python {
 
-/// @throws Error unless there is a scan and none of them is None. @param who  for the message.
+/// Checks that there is at least one scan and none is None.
+/// @param who  name of the caller, for the message.
+/// @throws Error otherwise.
 void check_scans(const char* who, const std::vector<const Sweep*>& scans);
 
-/// The echoes of a sweep as the sensor reported them, at the poses that it knew: nothing of the
-/// truth.
+/// Echoes of a sweep as the sensor reports them, at the poses that it knows, without ground truth.
 struct PlacedReturns {
   std::vector<glm::dvec3> points_m;   ///< in D
-  std::vector<glm::dvec3> origins_m;  ///< where each beam began, in D
-  std::vector<float> sd_m;            ///< of each range
+  std::vector<glm::dvec3> origins_m;  ///< origin of each beam, in D
+  std::vector<float> sd_m;            ///< standard deviation of each range
 };
 
-/// @param range_sd_m  instead of what sweep and sensor say.
+/// Returns the echoes of a sweep in D.
+/// @param range_sd_m  replaces the standard deviations of the sweep or sensor.
 PlacedReturns placed_returns(const Sweep& sweep, std::optional<double> range_sd_m);
 
-/// Returns a sweep on the grid of its beams, in D, with semantic classes.
-/// @throws Error as organise, if there is no such grid.
+/// Returns a sweep as an organised scan in D, with semantic classes.
+/// @throws Error as organise, if the beams form no grid.
 OrganisedScan organised(const Sweep& sweep, std::optional<double> range_sd_m, ReturnChoice choice);
 
 }  // namespace groundray::python

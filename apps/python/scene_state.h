@@ -4,33 +4,33 @@
 #include <memory>
 #include <utility>
 
-#include "apps/python/frame_scenes.h"
-#include "apps/scene/world.h"
+#include "apps/python/frame_scene_cache.h"
+#include "apps/scene/simulation.h"
 
 namespace groundray::python {
 
-/// A scene that is loaded, and what its frames see. All that Python has of it shares it.
+/// Loaded scene and the scenes that its frames see. All Python objects of a scene share it.
 struct SceneState {
-  explicit SceneState(World loaded) : world(std::move(loaded)), frames(world) {}
+  explicit SceneState(Simulation loaded) : simulation(std::move(loaded)), frames(simulation) {}
 
-  World world;
-  FrameScenes frames;
+  Simulation simulation;
+  FrameSceneCache frames;
 };
 
-/// A lidar of a scene.
+/// Lidar of a scene.
 struct SceneLidar {
   std::shared_ptr<SceneState> state;
   std::size_t index = 0;
 
-  const PlacedLidar& placed() const { return state->world.lidars[index]; }
+  const PlacedLidar& placed() const { return state->simulation.lidars[index]; }
 };
 
-/// A camera of a scene.
+/// Camera of a scene.
 struct SceneCamera {
   std::shared_ptr<SceneState> state;
   std::size_t index = 0;
 
-  const PlacedCamera& placed() const { return state->world.cameras[index]; }
+  const PlacedCamera& placed() const { return state->simulation.cameras[index]; }
 };
 
 }  // namespace groundray::python

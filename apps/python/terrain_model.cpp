@@ -10,7 +10,7 @@ const Scene& TerrainModel::scene() const {
   std::call_once(once_, [&] {
     const GridFrame& frame = dem_.grid.frame();
     const glm::dvec2 middle = (frame.to_D({0, 0}) + frame.to_D(frame.samples - 1)) / 2.0;
-    const double low_m = dem_.grid.min_height_m();  // NaN if there is none
+    const double low_m = dem_.grid.min_height_m();  // NaN without any height
     scene_ = std::make_unique<const Scene>(Scene{
         .rays =
             RayTracer({full_resolution_level(dem_.grid)},

@@ -4,19 +4,21 @@
 #include <mutex>
 #include <utility>
 
-#include "core/scene.h"
-#include "terrain/dem.h"
+#include "core/tracing/scene.h"
+#include "terrain/dem/dem.h"
 
 namespace groundray::python {
 
-/// A DEM in memory, and what rays see of it: built when it is asked for first.
+/// DEM in memory with the scene that rays see, built on first use.
 class TerrainModel {
  public:
   explicit TerrainModel(Dem dem) : dem_(std::move(dem)) {}
 
   const Dem& dem() const { return dem_; }
 
-  /// Of the reference surface itself, every facet decided in double. @throws Error as RayTracer.
+  /// Returns the scene of the reference surface itself, traced in double precision
+  /// (Tracing::Exact). Thread-safe.
+  /// @throws Error as RayTracer.
   const Scene& scene() const;
 
  private:

@@ -9,18 +9,18 @@
 #include <utility>
 
 #include "core/error.h"
-#include "core/text_lines.h"
+#include "core/io/text_lines.h"
 
 namespace groundray {
 namespace {
 
 using LineWords = std::vector<std::string>;
 
-// Where rows are in a file, and what tells of them.
+// Position and size of the rows in a file, with the header for a block of them.
 struct Layout {
   std::vector<std::string> head{};
   std::size_t digits = 0;
-  std::uint64_t begin = 0;  // of the rows, bytes
+  std::uint64_t begin = 0;  // position of the first row, bytes
   std::uint64_t rows = 0;
   std::uint64_t row_bytes = 0;
 };
@@ -32,7 +32,7 @@ LineWords words_of(std::string_view line) {
   return words;
 }
 
-// The lines up to the one that begins with `key`; none if that is not there.
+// Returns the lines up to the one that begins with `key`; empty if there is none.
 std::vector<std::string_view> lines_up_to(std::string_view text, std::string_view key) {
   std::vector<std::string_view> lines;
   while (true) {
@@ -59,7 +59,7 @@ Layout layout_of_floats(std::uint64_t file_bytes, std::size_t columns) {
 }
 
 Layout layout_of_npy(std::string_view head, std::uint64_t file_bytes) {
-  constexpr std::size_t first = 10, later = 12;  // of versions, to where the text begins
+  constexpr std::size_t first = 10, later = 12;  // offset of the text, by version
   if (head.size() < later || !head.starts_with("\x93NUMPY")) return {};
   const auto byte = [&](std::size_t i) {
     return static_cast<std::size_t>(static_cast<unsigned char>(head[i]));
@@ -80,7 +80,7 @@ Layout layout_of_npy(std::string_view head, std::uint64_t file_bytes) {
   return layout;
 }
 
-// 0 for what is no number: a list.
+// Returns the size of a number; 0 for other types, such as lists.
 std::uint64_t bytes_of_ply(const std::string& type) {
   static constexpr std::array<std::pair<std::string_view, std::uint64_t>, 16> types{
       {{"char", 1},
@@ -105,7 +105,7 @@ std::uint64_t bytes_of_ply(const std::string& type) {
   return 0;
 }
 
-// Points come first; what follows them is left out.
+// The points must be the first element; later elements are ignored.
 Layout layout_of_ply(std::string_view head) {
   const auto lines = lines_up_to(head, "end_header");
   Layout layout{.begin = bytes_of(lines)};
@@ -113,7 +113,7 @@ Layout layout_of_ply(std::string_view head) {
   int elements = 0;
   for (const std::string_view line : lines) {
     const LineWords words = words_of(line);
-    if (words.size() < 2) continue;  // the first and the last
+    if (words.size() < 2) continue;  // first and last line
     if (words[0] == "format" && !words[1].starts_with("binary")) return {};
     if (words[0] == "element" && ++elements == 1) {
       if (words[1] != "vertex" || words.size() < 3) return {};
@@ -205,8 +205,8 @@ std::optional<CloudFile> CloudBlocks::next() {
   bytes.resize(begin + count);
   file_.read(bytes.data() + begin, static_cast<std::streamsize>(count));
   if (static_cast<std::size_t>(file_.gcount()) != count)
-    throw Error("{}: it cannot be read from row {} on: was it changed meanwhile?", path_.string(),
-                rows_read_);
+    throw Error("{}: it cannot be read from row {} on: was it changed during reading?",
+                path_.string(), rows_read_);
   rows_read_ += rows;
   return parse_cloud(bytes, path_.string(), columns_);
 }

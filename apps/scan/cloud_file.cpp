@@ -8,10 +8,10 @@
 #include <utility>
 
 #include "core/error.h"
-#include "core/npy_reader.h"
-#include "core/pcd_reader.h"
-#include "core/ply_io.h"
-#include "core/product_io.h"
+#include "core/io/file_io.h"
+#include "core/io/npy_reader.h"
+#include "core/io/pcd_reader.h"
+#include "core/io/ply_io.h"
 
 namespace groundray {
 namespace {
@@ -25,7 +25,7 @@ std::string lower(std::string text) {
   return text;
 }
 
-/// Names for `count` columns that have none.
+/// Returns names for `count` columns without names.
 Names names_for(std::size_t count, const Names& asked) {
   if (!asked.empty()) {
     if (asked.size() == count) return asked;
@@ -40,7 +40,7 @@ Names names_for(std::size_t count, const Names& asked) {
   return names;
 }
 
-/// Moves the columns of `from` over, by the new names; a name that is empty leaves one out.
+/// Copies the columns of `from` under new names; omits those with an empty name.
 void take_columns(const PointCloud& from, const std::vector<ColumnOrigin>& origins,
                   const Names& names, CloudFile& to) {
   for (std::size_t i = 0; i < names.size(); ++i) {
@@ -71,7 +71,7 @@ CloudFile of_pcd(std::string_view bytes, const std::string& name) {
       .image = file.height > 1 ? ImageLayout{file.height, file.width} : ImageLayout{}};
 }
 
-/// Names the columns of an array as they shall be called in a cloud.
+/// Returns the names of an array's columns in a cloud.
 Names names_of(const NpyArray& array, const Names& asked) {
   if (array.is_structured) {
     Names names;
@@ -98,8 +98,8 @@ bool holds_points(const NpyArray& array) {
   return std::ranges::find(names, lower(array.name)) != names.end() && array.shape.size() > 1;
 }
 
-/// Arrays of one length are the columns of a cloud: which length, those that hold points tell, or
-/// else an array called x.
+/// Returns the number of rows of a cloud, which consists of all arrays of that length: that of the
+/// first array that holds points or is called x.
 std::size_t rows_of(const NpzFile& file) {
   for (const NpyArray& array : file.arrays) {
     if (array.is_structured || holds_points(array) || lower(array.name) == "x") {
@@ -109,7 +109,7 @@ std::size_t rows_of(const NpzFile& file) {
   Names names;
   for (const NpyArray& array : file.arrays) names.push_back(array.name);
   throw Error(
-      "none of its arrays holds points: call one xyz (n x 3), or three x, y, z; there are: {}",
+      "none of its arrays contains points: name one xyz (n x 3), or three x, y, z; it has: {}",
       fmt::join(names, ", "));
 }
 
@@ -153,8 +153,8 @@ CloudFile of_floats(std::string_view bytes, const Names& asked) {
   const std::size_t point_bytes = names.size() * sizeof(float);
   if (bytes.size() % point_bytes != 0) {
     throw Error(
-        "its {} bytes are no multiple of {}, for points of {} floats ({}): if they have others, "
-        "name the columns (--columns; of the reference, --reference-columns)",
+        "its {} bytes are not a multiple of {}, for points of {} floats ({}): if the columns "
+        "differ, name them (--columns; for the reference, --reference-columns)",
         bytes.size(), point_bytes, names.size(), fmt::join(names, ", "));
   }
   CloudFile file{.form = fmt::format("KITTI's, {} floats a point", names.size()),
@@ -170,7 +170,7 @@ constexpr std::string_view las_advice =
     R"py(convert it to PLY first, for instance by laspy and plyfile:
   python3 -c "import laspy, numpy as np, plyfile; p = laspy.read('{0}'); n = ['x', 'y', 'z', 'intensity', 'return_number', 'classification'] + ['gps_time'] * ('gps_time' in p.point_format.dimension_names); a = np.rec.fromarrays([np.asarray(p[k]) for k in n], names=n); plyfile.PlyData([plyfile.PlyElement.describe(a, 'vertex')]).write('{1}')")py";
 
-/// Tells what to do with a file that is not read.
+/// Throws an Error that suggests how to convert a file in an unsupported format.
 [[noreturn]] void refuse(const std::filesystem::path& name, const std::string& ending) {
   const std::string ply = std::filesystem::path(name).replace_extension(".ply").string();
   if (ending == ".las" || ending == ".laz") {
@@ -186,8 +186,9 @@ constexpr std::string_view las_advice =
   for (const auto& [other, advice] : others) {
     if (ending == other) throw Error("{}", advice);
   }
-  throw Error("the ending {:?} is of no point file that is read: .ply, .pcd, .npy, .npz, .bin",
-              ending);
+  throw Error(
+      "the extension {:?} is not one of the supported point files: .ply, .pcd, .npy, .npz, .bin",
+      ending);
 }
 
 }  // namespace

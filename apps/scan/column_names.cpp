@@ -63,7 +63,7 @@ Synonyms synonyms_of(std::string_view ours) {
   return found == all.end() ? Synonyms() : found->second;
 }
 
-/// Letters and digits alone, in lower case; "scalar_" before them is CloudCompare's.
+/// Reduces a name to its letters and digits in lower case, without CloudCompare's prefix "scalar_".
 std::string plain(std::string_view name) {
   std::string out;
   for (const char c : name) {
@@ -75,7 +75,7 @@ std::string plain(std::string_view name) {
   return out;
 }
 
-/// Splits "time_offset_ns" into "time_offset" and the unit.
+/// Splits "time_offset_ns" into "time_offset" and the unit in seconds.
 std::pair<std::string_view, std::optional<double>> without_time_unit(std::string_view name) {
   static constexpr std::array<std::pair<std::string_view, double>, 10> units{{{"s", 1},
                                                                               {"sec", 1},
@@ -99,7 +99,7 @@ std::pair<std::string_view, std::optional<double>> without_time_unit(std::string
 
 std::optional<NamedColumn> find_column(const std::vector<std::string>& columns,
                                        std::string_view ours) {
-  const bool has_green =  // then r is red
+  const bool has_green =  // r is then red, not range
       std::ranges::any_of(columns, [](const std::string& name) { return plain(name) == "g"; });
   for (const std::string_view word : synonyms_of(ours)) {
     if (word == "r" && has_green) continue;

@@ -7,15 +7,15 @@
 
 namespace groundray {
 
-/// How a column was found.
+/// Column that was identified by its name.
 struct NamedColumn {
-  std::string name;              ///< its own
-  std::optional<double> unit_s;  ///< of a time, if the name ends in a unit
+  std::string name;              ///< name in the file
+  std::optional<double> unit_s;  ///< unit of a time, if the name ends in one
 };
 
-/// Returns which of `columns` is called by a word for what groundray calls `ours`
-/// (docs/formats.md): the first in the order of the words, whatever the case and the signs between
-/// letters. Nothing if there is none.
+/// Returns the column whose name is a synonym of groundray's name `ours`
+/// (docs/reference/formats.md), ignoring case and all characters except letters and digits; nothing
+/// if there is none. If there are several, the first one in the order of the synonyms.
 std::optional<NamedColumn> find_column(const std::vector<std::string>& columns,
                                        std::string_view ours);
 

@@ -6,10 +6,10 @@ class Validator;
 
 namespace groundray {
 
-/// Takes numbers above 0. Unlike CLI's own it refuses NaN and infinity.
+/// Returns a check for numbers above 0. Unlike that of CLI11, it rejects NaN and infinity.
 CLI::Validator positive();
 
-/// Takes numbers of 0 and more, likewise.
+/// Returns a check for numbers of 0 or more, which also rejects NaN and infinity.
 CLI::Validator not_negative();
 
 }  // namespace groundray

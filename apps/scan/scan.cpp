@@ -13,8 +13,8 @@
 #include <utility>
 
 #include "apps/scan/column_names.h"
+#include "apps/scene/yaml_reader.h"
 #include "core/error.h"
-#include "sensors/yaml_reader.h"
 
 namespace groundray {
 namespace {
@@ -23,11 +23,11 @@ constexpr std::array<std::string_view, quantity_count> quantity_names{
     "intensity", "ring",      "time",  "return_index", "pulse",
     "label",     "incidence", "range", "column",       "range_sd"};
 
-/// A column's values as doubles, and whether they are stored as whole numbers.
+/// Values of a column as doubles.
 struct Numbers {
   std::vector<double> values;
   bool are_whole = false;
-  std::int64_t origin = 0;  ///< taken off
+  std::int64_t origin = 0;  ///< still to be added to the values
 };
 
 class Reader {
@@ -124,13 +124,13 @@ class Reader {
     } else if (quantity == Quantity::ReturnIndex) {
       note = count_from_one(numbers);
     } else if (quantity == Quantity::Range) {
-      note = "held against x, y, z alone";
+      note = "only compared with x, y, z";
     }
     scan_.values[static_cast<std::size_t>(quantity)] = std::move(numbers.values);
     note_column(found->name, ours, std::move(note));
   }
 
-  /// As asked, as the name says, or seconds if that is possible for floats.
+  /// Returns the requested unit, that of the name, or seconds if the values are plausible floats.
   std::optional<double> time_unit_of(const NamedColumn& column, const Numbers& numbers) {
     if (reading_.time_unit_s) return reading_.time_unit_s;
     if (column.unit_s) return column.unit_s;
@@ -138,9 +138,8 @@ class Reader {
     const auto [low, high] = finite_limits(numbers.values);
     if (!numbers.are_whole && !(high - low > longest_scan_s)) return 1;
     scan_.notes.push_back(fmt::format(
-        "The column {} of {} does not say its unit ({}), so it was not used: give it "
-        "(--time-unit-s "
-        "1e-9 for nanoseconds; of the reference, --reference-time-unit-s).",
+        "The unit of column {} of {} is unknown ({}), so it was not used: give it (--time-unit-s "
+        "1e-9 for nanoseconds; for the reference, --reference-time-unit-s).",
         column.name, scan_.name,
         numbers.are_whole ? "whole numbers"
                           : fmt::format("as seconds, the scan would last {:.4g} s", high - low)));
@@ -162,10 +161,11 @@ class Reader {
     const auto unit_ns =
         static_cast<std::int64_t>(std::round(std::clamp(unit_s * ns_per_s, 1., most_ns)));
     const bool is_whole = std::abs(static_cast<double>(unit_ns) / ns_per_s / unit_s - 1) < 1e-12;
-    // Stamps since 1970 have no nanoseconds as doubles, so what is taken off is whole if it can be.
+    // Doubles cannot represent stamps since 1970 to the nanosecond, so integers are subtracted
+    // where possible.
     const std::int64_t zero_ns = reading_.time_zero.count();
     const std::int64_t taken = is_whole ? zero_ns / unit_ns : 0;
-    const auto shift = static_cast<double>(  // unsigned: an absurd stamp must not overflow
+    const auto shift = static_cast<double>(  // unsigned: an extreme stamp must not overflow
         static_cast<std::int64_t>(static_cast<std::uint64_t>(numbers.origin) -
                                   static_cast<std::uint64_t>(taken)));
     const double rest_s = static_cast<double>(zero_ns - taken * unit_ns) / ns_per_s;
@@ -180,7 +180,7 @@ class Reader {
     return "counted from 0 there";
   }
 
-  /// Counts a row if it is no return. A range that is not finite tells more than a position.
+  /// Returns true for a return; counts any other row. A non-finite range overrides the position.
   bool is_return(std::size_t row, const glm::dvec3& p) {
     NoReturns& none = scan_.no_returns;
     const auto* const ranges = scan_.find(Quantity::Range);
@@ -211,7 +211,7 @@ class Reader {
       if (!is_return(row, scan_.p_S[row])) continue;
       const glm::dvec3 p_S = X_SF * (scan_.p_S[row] * reading_.unit_m);
       const double range_m = glm::length(p_S);
-      constexpr double least_m = 1e-30, most_m = 1e30;  // else it has no direction, or no range
+      constexpr double least_m = 1e-30, most_m = 1e30;  // else no valid direction or range
       if (range_m < least_m || range_m > most_m) {
         ++scan_.no_returns.invalid;
         continue;
@@ -227,7 +227,7 @@ class Reader {
     }
   }
 
-  /// A key must be a number in every row.
+  /// Discards keys that are not finite for every return.
   void drop_broken_keys() {
     for (const Quantity key :
          {Quantity::Ring, Quantity::Time, Quantity::ReturnIndex, Quantity::Pulse}) {
@@ -238,37 +238,35 @@ class Reader {
       if (broken == 0) continue;
       values.reset();
       scan_.notes.push_back(
-          fmt::format("Of {}, {} values of {} are no finite numbers, so it was not used.",
+          fmt::format("In {}, {} values of {} are not finite, so the column was not used.",
                       scan_.name, broken, quantity_names[static_cast<std::size_t>(key)]));
     }
   }
 
-  /// Returns the pose of the points' frame in the sensor's.
+  /// Returns the pose of the points' frame in the sensor's frame.
   Pose sensor_from_file() {
     Pose X_FS;
     const Pose none;
     if (std::holds_alternative<FileViewpoint>(reading_.X_FS)) {
       if (!file_.X_FS) {
-        throw Error(
-            "{}: it tells no viewpoint of its own, as PCD files do: give the pose "
-            "(--sensor-pose)",
-            scan_.name);
+        throw Error("{}: only PCD files contain a viewpoint: give the pose (--sensor-pose)",
+                    scan_.name);
       }
       X_FS = *file_.X_FS;
-      X_FS.translation_m *= reading_.unit_m;  // in the file's unit
+      X_FS.translation_m *= reading_.unit_m;  // it is in the file's unit
     } else {
       X_FS = std::get<Pose>(reading_.X_FS);
       if (file_.X_FS && *file_.X_FS != none && X_FS == none) {
         scan_.notes.push_back(
-            fmt::format("{} has a VIEWPOINT other than the origin, which was not used: ask for it "
-                        "(--viewpoint; of the reference, --reference-viewpoint) if its points are "
+            fmt::format("{} has a VIEWPOINT other than the origin, which was not used: enable it "
+                        "(--viewpoint; for the reference, --reference-viewpoint) if its points are "
                         "not in the sensor's frame.",
                         scan_.name));
       }
     }
-    scan_.frame = fmt::format(
-        "Points of {} are taken {}, x forward, y left, z up.", scan_.name,
-        X_FS == none ? "as in the sensor's frame" : "into the sensor's frame by its pose");
+    scan_.frame = fmt::format("Points of {} are {}, x forward, y left, z up.", scan_.name,
+                              X_FS == none ? "taken as in the sensor's frame"
+                                           : "transformed to the sensor's frame by its pose");
     return X_FS == none ? none : inverse(X_FS);
   }
 

@@ -11,9 +11,10 @@
 namespace groundray {
 namespace {
 
-/// @param option  that gave the numbers x, y, z, qx, qy, qz, qw.
+/// Converts the numbers x, y, z, qx, qy, qz, qw to a pose.
+/// @param option  name of their option, for messages.
 Pose sensor_pose(const std::vector<double>& numbers, const std::string& option) {
-  constexpr double most_off = 1e-3;  // what three decimals leave
+  constexpr double most_off = 1e-3;  // rounding to three decimals
   const glm::dquat rotation(numbers[6], numbers[3], numbers[4], numbers[5]);
   const double norm = glm::length(rotation);
   if (!(std::abs(norm - 1) <= most_off)) {
@@ -34,22 +35,24 @@ void ScanFlags::add(CLI::App* group, const std::string& prefix) {
   group->add_option("--" + prefix + "time-unit-s", time_unit_s_, "Unit of time, in seconds")
       ->check(positive());
   group->add_option("--" + prefix + "time-zero-s", time_zero_s_,
-                    "What the clock shows at the scan's stamp");
+                    "Clock reading at the scan's stamp, in seconds");
   auto* posed = group
                     ->add_option("--" + prefix + "sensor-pose", pose_,
                                  "x,y,z,qx,qy,qz,qw of the sensor in the frame of the points")
                     ->delimiter(',')
                     ->expected(7);
-  group->add_flag("--" + prefix + "viewpoint", viewpoint_, "The pose is PCD's VIEWPOINT")
+  group
+      ->add_flag("--" + prefix + "viewpoint", viewpoint_,
+                 "Use the VIEWPOINT of the PCD file as the pose")
       ->excludes(posed);
-  group->add_option("--" + prefix + "columns", columns_, "Names of columns that have none")
+  group->add_option("--" + prefix + "columns", columns_, "Names of unnamed columns")
       ->delimiter(',');
 }
 
 ScanReading ScanFlags::reading() const {
   ScanReading reading{
       .unit_m = unit_m_, .time_unit_s = time_unit_s_, .X_FS = {}, .columns = columns_};
-  constexpr double latest_s = 9e9;  // nanoseconds hold it
+  constexpr double latest_s = 9e9;  // range of nanoseconds
   if (!(std::abs(time_zero_s_) <= latest_s)) {
     throw Error("--{}time-zero-s: {} s must be within 9e9 s of 0: is it in another unit?", whose_,
                 time_zero_s_);

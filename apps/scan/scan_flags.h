@@ -12,13 +12,14 @@ class App;
 
 namespace groundray {
 
-/// What a command line says of files of points, beside their names.
+/// Command-line options about the contents of files of points.
 class ScanFlags {
  public:
   /// Adds the options to a group, each name with `prefix` after the dashes.
   void add(CLI::App* group, const std::string& prefix);
 
-  /// @throws Error if the pose's quaternion is not of length 1.
+  /// Returns the values of the options.
+  /// @throws Error if the pose's quaternion is not of length 1, or the time zero is out of range.
   ScanReading reading() const;
 
  private:

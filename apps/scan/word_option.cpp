@@ -5,7 +5,7 @@
 namespace groundray {
 namespace {
 
-// As in "a", "a or b", "a, b or c".
+// Joins words as in "a", "a or b", "a, b or c".
 std::string said(const Words<std::string>& texts) {
   std::string all;
   for (std::size_t i = 0; i < texts.size(); ++i) {

@@ -8,8 +8,8 @@
 #include "apps/scene/paths.h"
 #include "core/error.h"
 #include "sensors/camera/irradiance.h"
-#include "sensors/camera/stereo.h"
-#include "sensors/scan_pattern.h"
+#include "sensors/camera/lens/stereo.h"
+#include "sensors/lidar/pattern/scan_pattern.h"
 
 namespace groundray {
 namespace {
@@ -18,7 +18,7 @@ using std::chrono::nanoseconds;
 
 nanoseconds time_of(double seconds) { return nanoseconds(std::llround(seconds * 1e9)); }
 
-// When a camera begins its images, whether or not the run has ended by then.
+// Returns the start times of a camera's images, including images that end after the run.
 std::vector<nanoseconds> begins_of(const MountedCamera& mounted, const SceneSpec& spec) {
   std::vector<nanoseconds> begins;
   if (const auto& trigger = mounted.trigger) {
@@ -34,7 +34,7 @@ std::vector<nanoseconds> begins_of(const MountedCamera& mounted, const SceneSpec
   };
   constexpr double most = 1e6;
   if (mounted.camera.rate_hz * spec.duration_s > most) {
-    throw Error("camera '{}': {} Hz for {} s are {:.3g} images; a run may have {:.0e}",
+    throw Error("camera '{}': {} Hz for {} s are {:.3g} images, but a run may have at most {:.0e}",
                 mounted.name, mounted.camera.rate_hz, spec.duration_s,
                 mounted.camera.rate_hz * spec.duration_s, most);
   }
@@ -43,7 +43,7 @@ std::vector<nanoseconds> begins_of(const MountedCamera& mounted, const SceneSpec
   return begins;
 }
 
-// What neither the camera's file nor the scene's shows by itself.
+// Checks conditions that depend on both the camera's file and the scene's.
 void check_work(const MountedCamera& mounted, const std::vector<nanoseconds>& begins) {
   const CameraSpec& camera = mounted.camera;
   const std::string& name = mounted.name;
@@ -60,8 +60,8 @@ void check_work(const MountedCamera& mounted, const std::vector<nanoseconds>& be
   if (gives(camera, CameraProduct::Picture) && camera.imager->filter != ColorFilter::Mono &&
       std::min(camera.size_px.x, camera.size_px.y) < 3) {
     throw Error(
-        "camera '{}': a picture of a mosaic needs at least 3 x 3 px, but size_px is "
-        "[{}, {}]; enlarge it, or leave 'picture' out of the products",
+        "camera '{}': a picture of a mosaic needs at least 3 x 3 px, but size_px is [{}, {}]; "
+        "enlarge it, or remove 'picture' from the products",
         name, camera.size_px.x, camera.size_px.y);
   }
 }
@@ -77,7 +77,7 @@ PlacedCamera place(const MountedCamera& mounted, const SceneSpec& spec, const Tr
   if (placed.begins.empty()) {
     throw Error(
         "camera '{}': no image of {:.6g} s begins and ends within the run of {} s; lengthen "
-        "duration_s, or look at first_ms, trigger and shutter",
+        "duration_s, or check first_ms, trigger and shutter",
         mounted.name, 1e-9 * static_cast<double>(placed.camera.duration().count()),
         spec.duration_s);
   }
@@ -92,7 +92,7 @@ PlacedCamera place(const MountedCamera& mounted, const SceneSpec& spec, const Tr
   return placed;
 }
 
-// Makes the cameras of a rectified pair what they are rectified to, and tells all how to rectify.
+// Computes the rectification of a stereo pair; for rectified images, applies it to the cameras.
 void pair_up(const StereoSpec& stereo, std::vector<MountedCamera>& cameras,
              std::vector<std::optional<Rectification>>& rectifications) {
   const auto find = [&](const std::string& name) {
@@ -103,8 +103,8 @@ void pair_up(const StereoSpec& stereo, std::vector<MountedCamera>& cameras,
   for (const std::size_t camera : {l, r}) {
     if (!rectifications[camera]) continue;
     throw Error(
-        "stereo '{}': camera '{}' is in an earlier pair too, but can be rectified to one "
-        "alone; give the scene another camera at its place",
+        "stereo '{}': camera '{}' is also in an earlier pair, but can be rectified for one pair "
+        "only; add another camera with the same mount",
         stereo.name, cameras[camera].name);
   }
   MountedCamera &left = cameras[l], &right = cameras[r];

@@ -4,13 +4,13 @@
 #include <cstdio>
 #include <optional>
 
-#include "apps/interruption.h"
+#include "apps/scene/interruption.h"
 #include "core/progress.h"
 
 namespace groundray {
 
-/// Says how far the certification of a terrain is, nothing as long as there is none; and stops it
-/// when asked to.
+/// Progress display for the certification of a terrain; shows nothing if there is none. Stops the
+/// certification on interruption.
 class Certifying {
  public:
   void update(double share) {

@@ -8,17 +8,17 @@
 
 #include "apps/scene/fingerprint.h"
 #include "core/error.h"
-#include "core/image_io.h"
-#include "terrain/drape_io.h"
+#include "core/image/image_io.h"
+#include "terrain/dem/drape_io.h"
 
 namespace groundray {
 namespace {
 
 namespace fs = std::filesystem;
 
-constexpr int points_across = 256;  // of the lattice that an orthophoto's means are taken on
+constexpr int points_across = 256;  // side of the lattice for an orthophoto's means
 
-// Loads images and keeps count of them.
+// Loads images, and sums up their memory and fingerprint.
 class Images {
  public:
   std::optional<GroundTexture> texture(const std::optional<GroundTextureSpec>& spec) {
@@ -71,7 +71,7 @@ CoverLayer load_layer(const CoverSpec& spec, const TerrainSpec& ground, const De
   return layer;
 }
 
-// Points of the ground under an orthophoto, on a lattice.
+// Returns a lattice of points on the ground under an orthophoto.
 std::vector<GroundCover::Point> points_under(const Drape& orthophoto, const Terrain& terrain) {
   const GridFrame& frame = terrain.frame();
   const glm::dvec2 a = frame.origin_m, b = frame.to_D(frame.samples - 1);
@@ -79,8 +79,8 @@ std::vector<GroundCover::Point> points_under(const Drape& orthophoto, const Terr
   const glm::dvec2 high = glm::min(orthophoto.corner_m + orthophoto.size_m, glm::max(a, b));
   if (!(low.x < high.x && low.y < high.y)) {
     throw Error(
-        "it does not overlap the DEM: it reaches from ({:.1f}, {:.1f}) to ({:.1f}, {:.1f}) m from "
-        "the DEM's origin; does it say the right CRS?",
+        "it does not overlap the DEM: it covers ({:.1f}, {:.1f}) to ({:.1f}, {:.1f}) m from the "
+        "DEM's origin; is its CRS correct?",
         orthophoto.corner_m.x, orthophoto.corner_m.y, orthophoto.corner_m.x + orthophoto.size_m.x,
         orthophoto.corner_m.y + orthophoto.size_m.y);
   }

@@ -4,12 +4,11 @@
 #include <cstdint>
 #include <span>
 
-#include "core/material.h"
+#include "core/appearance/material.h"
 
 namespace groundray {
 
-/// FNV-1a over the numbers that a run starts from: tells runs apart whose scene files read the
-/// same.
+/// FNV-1a hash of the input values of a run, which distinguishes runs with equal scene files.
 class Fingerprint {
  public:
   /// Adds values of a type without padding.
@@ -29,7 +28,7 @@ class Fingerprint {
   std::uint64_t value_ = 0xcbf29ce484222325;
 };
 
-/// Returns that of all that a material says, its name included.
+/// Returns the fingerprint of a material, including its name.
 std::uint64_t fingerprint_of(const Material& material);
 
 }  // namespace groundray

@@ -8,18 +8,17 @@
 #include <tuple>
 #include <utility>
 
-#include "core/displacement.h"
 #include "core/error.h"
-#include "core/image_io.h"
-#include "core/model_io.h"
-#include "core/product_io.h"
-#include "terrain/asset.h"
+#include "core/image/image_io.h"
+#include "core/io/file_io.h"
+#include "core/model/displacement.h"
+#include "core/model/model_io.h"
+#include "terrain/assets/asset.h"
 
 namespace groundray {
 namespace {
 
-// All that says what a source makes; another member does not go unnoticed, for then this does not
-// compile.
+// Returns all members of a source, for comparison. If a member is added, this does not compile.
 auto parts(const AssetSpec& spec) {
   const auto& [kind, size_m, width_m, sag_m, square_m, leaf_area_index, seed, detail] = spec;
   return std::tuple(kind, size_m, width_m, sag_m, square_m, leaf_area_index, seed.value, detail);
@@ -52,13 +51,13 @@ Model make(const std::variant<AssetSpec, ModelSource>& source) {
   }
 }
 
-// Materials are given to surfaces that are there.
+// Checks that the surfaces to which materials are assigned exist.
 void check_names(const ModelSpec& spec, const Model& model) {
   for (const auto& [name, material] : spec.materials) {
     if (std::ranges::count(model.surfaces, name, &ModelSurface::name) > 0) continue;
     std::vector<std::string_view> names;
     for (const ModelSurface& surface : model.surfaces) names.push_back(surface.name);
-    throw Error("materials names the surface '{}', but the model has {}", name,
+    throw Error("materials has the surface '{}', but the model has {}", name,
                 fmt::join(names, ", "));
   }
 }

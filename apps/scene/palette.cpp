@@ -4,10 +4,10 @@
 #include <optional>
 
 #include "apps/scene/fingerprint.h"
-#include "apps/scene/world.h"
-#include "core/bsdf.h"
+#include "apps/scene/readers/material_io.h"
+#include "apps/scene/simulation.h"
+#include "core/appearance/bsdf.h"
 #include "core/error.h"
-#include "sensors/material_io.h"
 
 namespace groundray {
 
@@ -27,8 +27,8 @@ std::uint16_t Palette::index_of(const ModelSpec& model, const std::string& surfa
   const std::filesystem::path built_in = data_folder() / "materials" / (surface + ".yaml");
   if (!surface.empty() && std::filesystem::exists(built_in)) return add(load_material(built_in));
   throw Error(
-      "its surface '{}' has no material, which lasers and cameras need: give the entry material: "
-      "NAME, or materials: {{{}: NAME}}",
+      "its surface '{}' has no material, which lasers and cameras need: add material: NAME, or "
+      "materials: {{{}: NAME}}, to the entry",
       surface, surface);
 }
 
@@ -42,7 +42,7 @@ void check_colours(const Material& material) {
   try {
     bsdf_in_colour(material);
   } catch (const Error& fault) {
-    throw Error("cameras cannot see its material: {}", fault.what());
+    throw Error("its material cannot be used with cameras: {}", fault.what());
   }
 }
 

@@ -4,21 +4,23 @@
 #include <string>
 #include <vector>
 
-#include "core/materials.h"
-#include "sensors/scene_spec.h"
+#include "apps/scene/scene_spec.h"
+#include "core/appearance/materials.h"
 
 namespace groundray {
 
-/// Gathers the materials that a scene uses, each once, and numbers them. Surfaces without one take
-/// the built-in material of their name; in a scene without lasers and cameras all have number 0.
+/// Numbered list of the distinct materials of a scene. A surface without a material gets the
+/// built-in material of its name. In a scene without lasers and cameras, all numbers are 0.
 class Palette {
  public:
   explicit Palette(const SceneSpec& spec);
 
-  /// Returns the number of a surface's material. @throws Error if it has none, or its spectrum
-  /// lacks a laser's wavelength or, for cameras, some of what is visible.
+  /// Returns the number of a surface's material.
+  /// @throws Error if it has none, or its spectrum lacks a laser's wavelength or, for cameras, a
+  ///         part of the visible range.
   std::uint16_t index_of(const ModelSpec& model, const std::string& surface);
-  /// Returns the number of a material of the ground. @throws Error likewise.
+  /// Returns the number of a material of the ground; 0 if there is none.
+  /// @throws Error as for a surface.
   std::uint16_t index_of(const std::optional<Material>& material);
 
   Materials take() { return Materials(std::move(all_)); }
@@ -27,8 +29,8 @@ class Palette {
   bool is_asked_for() const { return are_colours_seen_ || !wavelengths_nm_.empty(); }
   std::uint16_t add(const Material& material);
 
-  std::vector<double> wavelengths_nm_;  // of lasers
-  bool are_colours_seen_ = false;       // by cameras
+  std::vector<double> wavelengths_nm_;  // of the lasers
+  bool are_colours_seen_ = false;       // true if there are cameras
   std::vector<Material> all_;
 };
 

@@ -5,7 +5,7 @@
 #include <utility>
 #include <vector>
 
-#include "core/product_io.h"
+#include "core/io/tum_io.h"
 #include "terrain/ground_path.h"
 
 namespace groundray {

@@ -12,8 +12,8 @@
 #include <string_view>
 
 #include "core/error.h"
-#include "sensors/beam.h"
-#include "sensors/scan_pattern.h"
+#include "sensors/lidar/beam/beam.h"
+#include "sensors/lidar/pattern/scan_pattern.h"
 
 namespace groundray {
 namespace {
@@ -36,7 +36,7 @@ std::string unit_suffix(const std::string& column) {
 
 void check_row(const PointCloud& scan, std::size_t row) {
   if (row >= scan.rows())
-    throw Error("the scan has {} rows, but row {} was asked for", scan.rows(), row);
+    throw Error("the scan has {} rows, but row {} was requested", scan.rows(), row);
 }
 
 const PointCloud::Column* find_column(const PointCloud& scan, std::string_view name) {
@@ -98,7 +98,7 @@ std::string cell_text(const PointCloud::Column& column, std::size_t row,
   return fmt::format("{}{}{}", number, unit_suffix(column.name), name);
 }
 
-// A pulse as it left the sensor, in S as it fired.
+// Pulse as it leaves the sensor, in S at the time of firing.
 struct FiredPulse {
   glm::dvec3 origin_m{0}, direction{0}, horizontal{0};
   nanoseconds time{0};
@@ -118,7 +118,8 @@ double time_of_pulse(const ScanPattern& pattern, std::int64_t sweep, std::int64_
   return batch.volleys.front().time_s;
 }
 
-// The pulse of a ring that fired at a time, or nearest to it: times in files are rounded to floats.
+// Returns the pulse of a ring that fires nearest to a time, within `rounding_s`: files store times
+// as floats.
 std::optional<FiredPulse> pulse_at(const ScanPattern& pattern, std::int64_t sweep, double time_s,
                                    double rounding_s, std::uint16_t ring) {
   std::int64_t begin = 0, end = pattern.pulses(sweep);
@@ -162,7 +163,7 @@ std::optional<FiredPulse> find_pulse(const RecordedSensor& lidar, const Recorded
                   static_cast<std::uint16_t>(*ring));
 }
 
-// Whether a point lies on a pulse, but for what floats and noise of angles leave.
+// Returns true if a point lies on a pulse's axis, up to the rounding of floats and angular noise.
 bool lies_on(const glm::dvec3& point_m, const FiredPulse& pulse) {
   const glm::dvec3 to_m = point_m - pulse.origin_m;
   const double along_m = glm::dot(to_m, pulse.direction);
@@ -170,7 +171,7 @@ bool lies_on(const glm::dvec3& point_m, const FiredPulse& pulse) {
   return along_m > 0 && aside_m < 1e-4 + 1e-5 * along_m;
 }
 
-// Where an echo's beam left, and how it is turned, in D.
+// Sets origin, direction and cross-section axes of an echo's beam, in D.
 void lay_axis(const RecordedSensor& lidar, const RecordedFrame& frame, const PointCloud& scan,
               std::size_t row, const glm::dvec3& point_S, EchoBeam& beam) {
   const double time_s = value_of(scan, "time", row).value_or(0);
@@ -184,7 +185,8 @@ void lay_axis(const RecordedSensor& lidar, const RecordedFrame& frame, const Poi
   beam.is_origin_exact = pulse.has_value();
   beam.origin_m = pulse ? X_DS * pulse->origin_m : X_DS.translation_m;
   beam.range_m = glm::distance(beam.origin_m, beam.reported_m);
-  if (beam.range_m == 0) throw Error("row {} has no direction: it lies where its beam began", row);
+  if (beam.range_m == 0)
+    throw Error("row {} has no direction: it coincides with the origin of its beam", row);
   beam.direction = (beam.reported_m - beam.origin_m) / beam.range_m;
   glm::dvec3 across = pulse ? X_DS.rotation * pulse->horizontal
                             : glm::cross(X_DS.rotation * glm::dvec3(0, 0, 1), beam.direction);
@@ -194,7 +196,7 @@ void lay_axis(const RecordedSensor& lidar, const RecordedFrame& frame, const Poi
   beam.vertical = glm::cross(beam.direction, beam.horizontal);
 }
 
-// The beam's rim as a closed ring, a distance away.
+// Returns the beam's edge at a range as a closed ring.
 std::vector<glm::dvec3> ring_of(const EchoBeam& beam, double range_m, const glm::dvec2& radius_m,
                                 std::size_t points) {
   std::vector<glm::dvec3> ring;
@@ -208,7 +210,7 @@ std::vector<glm::dvec3> ring_of(const EchoBeam& beam, double range_m, const glm:
   return ring;
 }
 
-// Where the lines from one ring to the next meet the plane of the surface.
+// Intersects the lines from waist_m to across_m with the plane of the surface.
 std::vector<glm::dvec3> on_plane(const EchoBeam& beam, const glm::dvec3& point_m,
                                  const glm::dvec3& normal) {
   constexpr double least_slope = 0.02;
@@ -237,7 +239,8 @@ std::vector<EchoValue> echo_values(const PointCloud& scan, std::size_t row,
 EchoBeam echo_beam(const RecordedSensor& lidar, const RecordedFrame& frame, const PointCloud& scan,
                    std::size_t row, std::size_t points) {
   check_row(scan, row);
-  if (lidar.kind != SensorKind::Lidar) throw Error("'{}' is no lidar: it has no beams", lidar.name);
+  if (lidar.kind != SensorKind::Lidar)
+    throw Error("'{}' is not a lidar: it has no beams", lidar.name);
   const auto point_S = vector_of(scan, {"x", "y", "z"}, row);
   if (!point_S) throw Error("row {} has no finite x, y and z", row);
   EchoBeam beam;

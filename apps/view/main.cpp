@@ -9,10 +9,10 @@
 #include <string>
 #include <vector>
 
-#include "apps/view/deviation.h"
-#include "apps/view/off_screen_window.h"
-#include "apps/view/open.h"
-#include "apps/view/still.h"
+#include "apps/view/compare/deviation.h"
+#include "apps/view/load_input.h"
+#include "apps/view/rendering/off_screen_window.h"
+#include "apps/view/rendering/offscreen_render.h"
 #include "apps/view/window/comparison.h"
 #include "apps/view/window/run_window.h"
 #include "core/error.h"
@@ -40,29 +40,32 @@ void add_options(CLI::App& app, Arguments& arguments) {
   app.add_option("INPUT", arguments.inputs,
                  "Scene (.yaml), dataset (folder), mesh, cloud, DEM or picture; any number");
   app.add_option("--screenshot", arguments.screenshot,
-                 "Write a picture (.png) of them and end: without a window, display or X server");
-  app.add_option("--size", arguments.size, "Of the picture that --screenshot writes, px: 1280x720");
-  app.add_option("--look-from", arguments.look_from, "X,Y,Z of the eye, m, as the map has them");
-  app.add_option("--look-at", arguments.look_at, "X,Y,Z of what is in the picture's middle");
+                 "Write a picture (.png) and exit; needs no window, display or X server");
+  app.add_option("--size", arguments.size,
+                 "Size of the picture that --screenshot writes, px: 1280x720");
+  app.add_option("--look-from", arguments.look_from, "X,Y,Z of the eye in map coordinates, m");
+  app.add_option("--look-at", arguments.look_at, "X,Y,Z of the point at the centre of the picture");
   app.add_option("--follow", arguments.follow,
-                 "X,Y,Z whose terrain is drawn by --screenshot, if not the eye's");
+                 "X,Y,Z of the terrain's viewpoint for --screenshot, instead of the eye");
   app.add_option("--colour-by", arguments.still.colour_by,
-                 "COLUMN of all layers that have it, or LAYER=COLUMN; any number");
+                 "COLUMN of all layers that have it, or LAYER=COLUMN; may be repeated");
   app.add_option("--range", arguments.range,
-                 "LOW,HIGH that the colours of --colour-by and --compare-with span");
-  app.add_option("--hide", arguments.still.hide, "LAYER, or what its name begins with: objects");
-  app.add_option("--point-size", arguments.point_size, "Of clouds, px")
+                 "LOW,HIGH: range of the colours of --colour-by and --compare-with");
+  app.add_option("--hide", arguments.still.hide, "LAYER, or a group of layers: objects");
+  app.add_option("--point-size", arguments.point_size, "Size of the points of clouds, px")
       ->check(CLI::Range(1.0, 32.0));
   app.add_option("--compare-with", arguments.compare_with,
-                 "Scene, DEM or mesh: colour clouds and meshes by how far they are from it, and "
-                 "say so; with --screenshot");
-  app.add_option("--tolerance-m", arguments.tolerance_m,
-                 "Of --compare-with a mesh: say how much lies within it")
+                 "Scene, DEM or mesh: colour clouds and meshes by their deviation from it, and "
+                 "print statistics; with --screenshot");
+  app.add_option(
+         "--tolerance-m", arguments.tolerance_m,
+         "With --compare-with a mesh: print precision and completeness within this distance")
       ->check(CLI::PositiveNumber);
-  app.add_flag("--wireframe", arguments.still.is_wireframe, "Surfaces by their edges");
-  app.add_flag("--no-legend", arguments.no_legend, "Leave out what the colours mean");
-  app.add_option("--turntable", arguments.turntable,
-                 "Write so many pictures of a whole turn into the folder that --screenshot names");
+  app.add_flag("--wireframe", arguments.still.is_wireframe, "Draw surfaces as wireframes");
+  app.add_flag("--no-legend", arguments.no_legend, "Omit the legend");
+  app.add_option(
+      "--turntable", arguments.turntable,
+      "Write this many pictures of a complete turn into the folder given by --screenshot");
 }
 
 void read_spec(Arguments& arguments) {
@@ -73,7 +76,7 @@ void read_spec(Arguments& arguments) {
   if (!arguments.follow.empty()) spec.follow_w_m = parse_place(arguments.follow, "--follow");
   if (!arguments.range.empty()) spec.range = parse_range(arguments.range);
   if (spec.from_w_m && spec.from_w_m == spec.at_w_m)
-    throw Error("--look-from and --look-at are one place: an eye looks somewhere else");
+    throw Error("--look-from and --look-at are the same point: they must differ");
   spec.point_size_px = arguments.point_size;
   spec.has_legend = !arguments.no_legend;
 }
@@ -81,20 +84,20 @@ void read_spec(Arguments& arguments) {
 Truth open_truth(const std::filesystem::path& path) {
   Opened opened = open_any(path);
   const std::string name = path.filename().string();
-  if (opened.world) return {name, opened.world};
+  if (opened.simulation) return {name, opened.simulation};
   if (opened.kind == InputKind::Dem) return {name, Truth::DemFile{path}};
   if (opened.kind == InputKind::Mesh) return {name, opened.layers.front()};
-  throw Error("--compare-with {}: a scene, a DEM or a mesh is the truth", path.string());
+  throw Error("--compare-with {}: the truth must be a scene, a DEM or a mesh", path.string());
 }
 
-// Colours clouds and meshes by how far they are from the truth, and prints the numbers.
+// Colours clouds and meshes by their deviation from the truth, and prints the statistics.
 void compare_inputs(std::vector<Opened>& inputs, const Arguments& arguments) {
   const Truth truth = open_truth(arguments.compare_with);
   int compared = 0;
   for (Opened& input : inputs) {
     for (Layer& layer : input.layers) {
       if (layer.kind != LayerKind::Cloud && layer.kind != LayerKind::Mesh) continue;
-      if (input.world) continue;  // what stands in a scene is no measurement
+      if (input.simulation) continue;  // layers of a scene are no measurements
       const Comparison found = compare(layer, truth, arguments.tolerance_m, {}, {});
       layer = coloured_by_deviation(layer, found);
       fmt::print("{} from {}:\n", layer.name, truth.name);
@@ -105,12 +108,12 @@ void compare_inputs(std::vector<Opened>& inputs, const Arguments& arguments) {
     }
   }
   if (compared == 0)
-    throw Error("--compare-with: of the inputs none is a cloud, a dataset with scans or a mesh");
+    throw Error("--compare-with: no input is a cloud, a dataset with scans or a mesh");
 }
 
 int take_stills(const Arguments& arguments) {
   if (arguments.inputs.empty())
-    throw Error("--screenshot: there is nothing to be shown; name a file or a folder");
+    throw Error("--screenshot: there is nothing to show; give a file or a folder");
   const StillSpec& spec = arguments.still;
   std::vector<Opened> inputs;
   for (const std::filesystem::path& input : arguments.inputs) {
@@ -141,7 +144,8 @@ int show_window(int& argc, char** argv, const Arguments& arguments) {
   return run_window(argc, argv, start);
 }
 
-// Returns an option that serves pictures alone, if there is one but no picture is asked for.
+// Returns the name of an option that requires --screenshot but is given without it; empty if there
+// is none.
 std::string without_screenshot(const Arguments& arguments) {
   if (!arguments.screenshot.empty()) return "";
   if (arguments.turntable != 0) return "--turntable";
@@ -176,7 +180,7 @@ int run(int argc, char** argv) {
   }
   read_spec(arguments);
   if (arguments.screenshot.empty()) return show_window(argc, argv, arguments);
-  vtkObject::GlobalWarningDisplayOff();  // faults are thrown
+  vtkObject::GlobalWarningDisplayOff();  // errors are thrown instead
   return take_stills(arguments);
 }
 

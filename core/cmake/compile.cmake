@@ -37,11 +37,23 @@ set(precompiled_headers
   <algorithm> <array> <chrono> <cmath> <filesystem> <functional> <map> <memory> <optional> <span> <string> <variant>
   <vector> <fmt/format.h> <fmt/ranges.h> <glm/glm.hpp> <glm/gtc/quaternion.hpp>)
 file(CONFIGURE OUTPUT ${PROJECT_BINARY_DIR}/precompiled.cpp CONTENT "")
-add_library(groundray_precompiled OBJECT ${PROJECT_BINARY_DIR}/precompiled.cpp)
-target_compile_features(groundray_precompiled PRIVATE cxx_std_20)
-target_compile_options(groundray_precompiled PRIVATE -ffp-contract=off)
-target_link_libraries(groundray_precompiled PRIVATE groundray_build_flags fmt::fmt glm::glm)
-target_precompile_headers(groundray_precompiled PRIVATE ${precompiled_headers})
+
+# groundray_precompile(TARGET HEADER...): precompiles headers in a target of its own, one for each CMakeLists.txt. When CMake
+# compiles the header anew, its own command (-include cmake_pch.hxx) makes ccache hash the old cmake_pch.hxx.gch that lies
+# beside it: the tree would no longer share objects with clean clones. A header with no such neighbour is included instead.
+macro(groundray_precompile target)
+  add_library(${target} OBJECT ${PROJECT_BINARY_DIR}/precompiled.cpp)
+  target_compile_features(${target} PRIVATE cxx_std_20)
+  target_compile_options(${target} PRIVATE -ffp-contract=off)
+  target_link_libraries(${target} PRIVATE groundray_build_flags fmt::fmt glm::glm)
+  target_precompile_headers(${target} PRIVATE ${ARGN})
+  set(includes ${ARGN})
+  list(TRANSFORM includes REPLACE "(.+)" "#include \\1\n")
+  list(JOIN includes "" includes)
+  file(CONFIGURE OUTPUT ${CMAKE_CURRENT_BINARY_DIR}/precompiled.h CONTENT "${includes}" @ONLY)
+  set(CMAKE_CXX_COMPILE_OPTIONS_CREATE_PCH -Winvalid-pch -x c++-header -include ${CMAKE_CURRENT_BINARY_DIR}/precompiled.h)
+endmacro()
+groundray_precompile(groundray_precompiled ${precompiled_headers})
 
 # Compiles up to eight sources of a folder as one: the build takes half of the time, for what they share is compiled once.
 # Names that a source keeps to itself must then be unique in its folder, which `./dev lint` checks. Not CMAKE_UNITY_BUILD:

@@ -155,7 +155,7 @@ def write(material: Material, wavelengths: list[int], spectra: list[list[float]]
     means = [statistics.fmean(column) for column in columns]
     deviations = [statistics.stdev(column) for column in columns]
     (HERE / f"{material.name}.yaml").write_text(
-        f"# {material.comment} Made by make.py; format: docs/materials.md.\n"
+        f"# {material.comment} Made by make.py; format: docs/reference/materials.md.\n"
         "groundray_material: 1\n"
         f"name: {material.name}\n"
         "spectrum:\n"
@@ -273,7 +273,7 @@ def make_ecostress(folder: Path) -> None:
 def make_retro_reflector() -> None:
     (HERE / "retro_reflector.yaml").write_text(
         "# White retro-reflecting sheeting of encapsulated beads, at the least that its class "
-        "allows. Made by make.py; format: docs/materials.md.\n"
+        "allows. Made by make.py; format: docs/reference/materials.md.\n"
         "groundray_material: 1\n"
         "name: retro_reflector\n"
         "coefficient_cd_lx_m2: 250\n"
@@ -285,7 +285,7 @@ def make_retro_reflector() -> None:
     )
 
 
-HEADER = "Made by make.py; format: docs/materials.md.\ngroundray_material: 1\n"
+HEADER = "Made by make.py; format: docs/reference/materials.md.\ngroundray_material: 1\n"
 
 
 def make_wet_soil(library: Earthlib) -> None:

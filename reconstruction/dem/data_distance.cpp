@@ -11,12 +11,13 @@ namespace {
 
 constexpr double far_m2 = std::numeric_limits<double>::infinity();
 
-// Squared distances along one line of samples to the lowest of the parabolas that stand on them.
+// Squared distances along one line of samples: the lower envelope of parabolas over the samples.
 class Line {
  public:
   explicit Line(std::size_t samples) : places_(samples), begins_(samples), values_(samples) {}
 
-  // In place. @param step_m  between two values. @param stride  of the values in memory.
+  // Transforms values in place. @param step_m  spacing of the values. @param stride  spacing of the
+  // values in memory.
   void transform(double* values_m2, std::size_t stride, double step_m) {
     const std::size_t samples = values_.size();
     for (std::size_t i = 0; i < samples; ++i) values_[i] = values_m2[i * stride];
@@ -42,14 +43,14 @@ class Line {
   }
 
  private:
-  // Where the parabola over `b` gets below that over `a`, in samples.
+  // Returns the position, in samples, beyond which the parabola over `b` is below that over `a`.
   double meeting(std::size_t a, std::size_t b, double step_m) const {
     const auto x = static_cast<double>(a), y = static_cast<double>(b);
     return (x + y) / 2 + (values_[b] - values_[a]) / (2 * step_m * step_m * (y - x));
   }
 
-  std::vector<std::size_t> places_;  // of the parabolas that are lowest somewhere
-  std::vector<double> begins_;       // of where they are
+  std::vector<std::size_t> places_;  // samples whose parabolas are the lowest somewhere
+  std::vector<double> begins_;       // positions from which these are the lowest
   std::vector<double> values_;
 };
 

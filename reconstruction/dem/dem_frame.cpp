@@ -18,17 +18,17 @@ void refuse_area(Violations& broken, const Area& area) {
                 area.low_m.y, area.high_m.x, area.high_m.y);
 }
 
-// The samples `first` to `last`, counted from one at `zero_m`; at least two.
+// Range of samples: the first, counted from the sample at `zero_m`, and their number, at least two.
 struct SampleRange {
   double first = 0;
   double count = 0;
 };
 
-// Samples, counted from one at zero_m, of the cells that meet the interval's inside.
+// Returns the samples, counted from the one at zero_m, whose cells overlap the interval's interior.
 SampleRange samples_over(double low_m, double high_m, double zero_m, double step_m) {
   const double a = (low_m - zero_m) / step_m + 0.5, b = (high_m - zero_m) / step_m + 0.5;
   const double low = std::min(a, b), high = std::max(a, b);
-  // Borders that are an area's own but for rounding take no cells along.
+  // Cell boundaries that equal an area's except for rounding add no cells.
   const double slack = 1e-9 * std::max({1.0, std::abs(low), std::abs(high)});
   const double first = std::floor(low + slack);
   return {first, std::max(2.0, std::ceil(high - slack) - first)};

@@ -3,35 +3,36 @@
 #include <cstdint>
 #include <vector>
 
-#include "core/grid_frame.h"
+#include "core/geometry/grid_frame.h"
 
 namespace groundray {
 
-/// Where a cell's height comes from.
+/// Origin of a cell's height.
 enum class HeightSource : std::uint8_t { None, Lidar, Stereo, Fused, Filled };
 
-/// A DEM with what is known of each height: columns of one entry for each sample of the frame, row
-/// by row. Heights are in D; NaN where there is none.
+/// DEM with the properties of each height: columns with one entry per sample of the frame, in row
+/// order. Heights are in D; NaN where there is none.
 struct DemLayers {
   GridFrame frame;
-  std::vector<float> elevation_m;    ///< of the ground, at the sample
-  std::vector<float> variance_m2;    ///< of measured heights; NaN elsewhere
-  std::vector<std::uint32_t> lidar;  ///< how many points each kind gave the ground
+  std::vector<float> elevation_m;  ///< height of the ground at the sample
+  std::vector<float> variance_m2;  ///< variance of measured heights; NaN elsewhere
+  /// Number of points of each kind that the ground was fitted to.
+  std::vector<std::uint32_t> lidar;
   std::vector<std::uint32_t> stereo;
-  std::vector<float> chi2;              ///< of the fit, per degree of freedom; NaN for a lone point
-  std::vector<std::uint16_t> surfaces;  ///< how many, one above the other
-  std::vector<float> overhang_m;        ///< the lowest height of what is clear of the ground
-  /// Free height up to the overhang, from the highest of what was measured below it, or where
-  /// nothing was from the highest that the ground around comes to within the cell.
+  std::vector<float> chi2;  ///< chi² of the fit per degree of freedom; NaN for a single point
+  std::vector<std::uint16_t> surfaces;  ///< number of surfaces, one above the other
+  std::vector<float> overhang_m;        ///< lowest height that is clear of the ground
+  /// Free height below the overhang, from the highest point measured below it; if there is none,
+  /// from the greatest height of the surrounding ground within the cell.
   std::vector<float> clearance_m;
   std::vector<HeightSource> source;
-  std::vector<float> to_data_m;      ///< to the nearest measured sample, in plan
-  std::vector<float> fill_sd_m;      ///< of filled heights
-  std::vector<float> upper_bound_m;  ///< lines of sight passed here: the ground is no higher
-  std::vector<float> slope_rad;      ///< of the surface, against the horizontal
+  std::vector<float> to_data_m;      ///< distance to the nearest measured sample, in plan
+  std::vector<float> fill_sd_m;      ///< sd of filled heights
+  std::vector<float> upper_bound_m;  ///< upper bound of the ground, where lines of sight pass
+  std::vector<float> slope_rad;      ///< slope of the surface against the horizontal
 };
 
-/// Returns layers of which nothing is known: no sample has a source, and all else is 0 or NaN.
+/// Returns layers without any information: no sample has a source, and all else is 0 or NaN.
 DemLayers unknown_layers(const GridFrame& frame);
 
 }  // namespace groundray

@@ -7,18 +7,19 @@
 #include <glm/vec3.hpp>
 #include <limits>
 
-#include "core/grid_frame.h"
+#include "core/geometry/grid_frame.h"
 
-// Samples below a triangle, private to this library.
+// Samples within the plan of a triangle, private to this library.
 namespace groundray {
 
-/// Columns of a triangle's plan in a row; low above high if it does not reach the row.
+/// Interval of columns of a triangle's plan in a row; low above high if the triangle does not reach
+/// the row.
 struct PlanSpan {
   double low = std::numeric_limits<double>::infinity();
   double high = -std::numeric_limits<double>::infinity();
 };
 
-/// Returns the span of a triangle of columns and rows in a row, a little too wide.
+/// Returns the interval in a row of a triangle given in columns and rows, slightly too wide.
 inline PlanSpan span_in_row(const std::array<glm::dvec2, 3>& p, double row) {
   constexpr double rounding = 1e-9;
   PlanSpan span;
@@ -41,8 +42,9 @@ inline PlanSpan span_in_row(const std::array<glm::dvec2, 3>& p, double row) {
   return span;
 }
 
-/// Calls `visit(column, row, height_m)` for each sample of the frame in the triangle's plan, its
-/// border included; never for an upright one. Takes time in proportion to these and the rows.
+/// Calls `visit(column, row, height_m)` for each sample of the frame in the triangle's plan,
+/// including its boundary; never for an upright triangle. The time is proportional to the number of
+/// these samples and rows.
 template <typename Visit>
 void visit_samples(const GridFrame& frame, const std::array<glm::dvec3, 3>& corners_m,
                    const Visit& visit) {
@@ -52,7 +54,7 @@ void visit_samples(const GridFrame& frame, const std::array<glm::dvec3, 3>& corn
   const double area = cross(p[1] - p[0], p[2] - p[0]);
   if (area == 0) return;
   const auto [top, bottom] = std::minmax({p[0].y, p[1].y, p[2].y});
-  static constexpr double most = 1 << 30;  // what is beyond is outside of any frame
+  static constexpr double most = 1 << 30;  // beyond any frame
   const auto first = [](double at) {
     return static_cast<int>(std::ceil(std::clamp(at, 0.0, most)));
   };

@@ -19,11 +19,11 @@ bool is_sound(const RectifiedImage& image) {
 
 void check_images(const RectifiedImage& left, const RectifiedImage& right, Violations& broken) {
   broken.unless(is_sound(left) && is_sound(right),
-                "each image must have pixels of 1 channel, and tell of each whether it is seen");
+                "each image must have pixels of 1 channel, and a mask of the same size");
   broken.unless(
       left.grey.width() == right.grey.width() && left.grey.height() == right.grey.height(),
-      "the left image is {} x {} px, the right one {} x {}: they must be equal", left.grey.width(),
-      left.grey.height(), right.grey.width(), right.grey.height());
+      "the left image has {} x {} px, the right one {} x {}: the sizes must be equal",
+      left.grey.width(), left.grey.height(), right.grey.width(), right.grey.height());
 }
 
 void check_match_options(const MatchOptions& options, Violations& broken) {
@@ -52,11 +52,11 @@ void check_match_options(const MatchOptions& options, Violations& broken) {
   const DisparityRange& range = *options.range;
   broken.unless(-farthest_px <= range.least_px && range.least_px < range.most_px &&
                     range.most_px <= farthest_px,
-                "range = {} to {} px must not be empty, nor beyond {} px on either side",
+                "range = {} to {} px must not be empty or exceed {} px on either side",
                 range.least_px, range.most_px, farthest_px);
 }
 
-// What is no number is not seen.
+// Marks pixels that are not finite as unseen.
 RectifiedImage cleaned(RectifiedImage image) {
   for (std::size_t i = 0; i < image.grey.values().size(); ++i) {
     if (std::isfinite(image.grey.values()[i])) continue;
@@ -74,7 +74,7 @@ SearchedImage searched(const RectifiedImage& image) {
   return result;
 }
 
-// Whether an image shows all of a window, but for what is beside it.
+// Returns whether an image shows all of a window, except for parts beyond the image.
 bool shows_window(const Image8& seen, int x, int y, int reach) {
   for (int dy = -reach; dy <= reach; dy += reach) {
     for (int dx = -reach; dx <= reach; dx += reach) {
@@ -86,7 +86,7 @@ bool shows_window(const Image8& seen, int x, int y, int reach) {
   return true;
 }
 
-// Leaves the disparities that are found back from the right image.
+// Removes the disparities that those of the right image do not confirm.
 void keep_consistent(const Image8& left_seen, const Image8& right_seen, const MatchOptions& options,
                      SemiGlobalDisparity& found, UnmatchedCounts& counts) {
   for (int y = 0; y < left_seen.height(); ++y) {
@@ -108,7 +108,7 @@ void keep_consistent(const Image8& left_seen, const Image8& right_seen, const Ma
   }
 }
 
-// Where least squares start: nowhere but where something consistent was found.
+// Returns the starting values of least squares: only where consistent disparities were found.
 ImageF starts(const SearchedImage& left, const SearchedImage& right, const MatchOptions& options,
               DisparityMap& map) {
   SemiGlobalDisparity found = semi_global(left.grey, right.grey, map.range, options);
@@ -148,8 +148,8 @@ DisparityRange disparity_range(const PinholePair& pair, double nearest_m, double
   const double most_px = pair.focal_px * pair.baseline_m / nearest_m;
   if (!(nearest_m > 0 && nearest_m < farthest_m && most_px < farthest_px)) {
     throw Error(
-        "disparities from {} to {} m are {:.4g} to {:.4g} px: the nearest depth must be "
-        "positive, below the farthest, and of less than {} px",
+        "depths from {} to {} m have disparities of {:.4g} to {:.4g} px: the nearest depth must be "
+        "positive, below the farthest, and have less than {} px",
         nearest_m, farthest_m, most_px, pair.focal_px * pair.baseline_m / farthest_m, farthest_px);
   }
   return {static_cast<int>(std::floor(pair.focal_px * pair.baseline_m / farthest_m)) - 1,
@@ -171,7 +171,7 @@ DisparityMap match(const RectifiedImage& left, const RectifiedImage& right,
   const SearchedImage left_search = searched(clean_left), right_search = searched(clean_right);
   auto range = options.range ? options.range : common_range(left_search, right_search, options);
   if (range) {
-    // No pixel is matched with one that is farther away than the image is wide.
+    // No pixel matches one that is farther away than the image is wide.
     const int most_px = std::min(farthest_px, left.grey.width() - 1);
     range->least_px = std::max(range->least_px, -most_px);
     range->most_px = std::min(range->most_px, most_px);

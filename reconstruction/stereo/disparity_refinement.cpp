@@ -21,13 +21,13 @@ constexpr int most_steps = 8;
 constexpr double done_px = 0.002;
 constexpr double most_shift_px = 1;  // from the start
 constexpr double most_off_plane_px = 1;
-constexpr double steepest = 0.8;  // change of disparity from pixel to pixel
-// What independent noise of both images, together of variance 1, adds to the mean square of their
-// mean slope: a quarter of a spline's mean square slope there, 9 (2 / sqrt(3) - 1) = 1.39 at
-// pixels and little more between them.
+constexpr double steepest = 0.8;  // largest change of disparity from pixel to pixel
+// Contribution of independent noise of both images, together of variance 1, to the mean square of
+// their mean slope: a quarter of a spline's mean square slope, which is 9 (2 / sqrt(3) - 1) = 1.39
+// at pixels and little more between them.
 constexpr double noise_slope = 0.36;
-constexpr double least_texture = 0.1;  // share of the slopes that is not noise
-// Of rounding to 255 steps; no image is known better.
+constexpr double least_texture = 0.1;  // least fraction of the slopes that is not noise
+// Noise of rounding to 255 steps; no image is more accurate.
 constexpr double least_noise = 0.29 / 255;
 
 // Rows of an image as cubic splines through its pixels.
@@ -65,7 +65,7 @@ class RowSplines {
   double coefficient(int x, int row) const {
     return static_cast<double>(coefficients_[index(std::clamp(x, 0, width_ - 1), row)]);
   }
-  // Beyond the rims an image is mirrored, rim pixels twice; so are the coefficients.
+  // The image is mirrored beyond its edges, with edge pixels repeated; so are the coefficients.
   void prefilter(int row) {
     const double pole = std::sqrt(3.0) - 2;
     const std::size_t first = index(0, row), last = index(width_ - 1, row);
@@ -80,7 +80,7 @@ class RowSplines {
                            [](double value) { return static_cast<float>(value); });
   }
 
-  // The first value, and those that are mirrored before it, each by a power of the pole.
+  // Returns the first value plus its mirrored predecessors, each times a power of the pole.
   static double mirrored_sum(const std::vector<double>& values, double pole) {
     const std::size_t period = 2 * values.size();
     double sum = values[0], power = 1;
@@ -146,7 +146,7 @@ class Refinement {
     }
   }
 
-  // Of what is given near a pixel; level where there is too little.
+  // Fits a plane to the starting values near a pixel; level if there are too few.
   Plane plane_at(int x, int y, double start) const {
     glm::dmat3 normal(0);
     glm::dvec3 right_side(0);
@@ -170,7 +170,7 @@ class Refinement {
     return {plane.x, plane.y, plane.z};
   }
 
-  // left = gain right + offset - gain right' shift, by least squares.
+  // Fits left = gain right + offset - gain right' shift by least squares.
   std::optional<Fit> fit_at(int x, int y, const Plane& plane, double begin_px, double gain) const {
     glm::dmat3 normal(0), spread(0);
     glm::dvec3 right_side(0);

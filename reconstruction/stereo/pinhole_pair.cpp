@@ -16,7 +16,7 @@ namespace {
 constexpr double most_turn_deg = 60;
 constexpr double least_from_axis_deg = 45;
 constexpr double most_pixels = 1 << 26;
-constexpr int look_steps = 128;  // places along each side of an image where it is asked for rays
+constexpr int look_steps = 128;  // steps between the rays sampled along each side of an image
 
 double angle_deg(const glm::dvec3& a, const glm::dvec3& b) {
   return glm::degrees(std::atan2(glm::length(glm::cross(a, b)), glm::dot(a, b)));
@@ -30,12 +30,13 @@ double turn_deg(const glm::dquat& a, const glm::dquat& b) {
 
 void check_view(const char* name, const StereoView& view, Violations& broken) {
   broken.unless(view.size_px.x > 0 && view.size_px.y > 0,
-                "the {} image has {} x {} px: there must be some", name, view.size_px.x,
+                "the {} image has {} x {} px: both must be positive", name, view.size_px.x,
                 view.size_px.y);
   broken.unless(view.project && view.ray, "the {} view has no lens: set project and ray", name);
 }
 
-// Half of the way between both cameras, then turned so that x lies along the baseline p_LR (D).
+// Returns the rotation half-way between both cameras, turned so that x lies along the baseline p_LR
+// (D).
 glm::dquat common_turn(const glm::dquat& half_way, const glm::dvec3& p_LR) {
   const glm::dvec3 towards = glm::conjugate(half_way) * p_LR;
   const double quarters = std::round(std::atan2(towards.y, towards.x) * 2 / std::numbers::pi);
@@ -43,12 +44,13 @@ glm::dquat common_turn(const glm::dquat& half_way, const glm::dvec3& p_LR) {
   const glm::dquat rolled = quarters == 0 ? half_way
                                           : half_way * glm::dquat(std::cos(half_angle_rad), 0, 0,
                                                                   std::sin(half_angle_rad));
-  // The least turn that takes x to a unit vector, which is not its opposite.
+  // The least rotation that takes x to a unit vector other than its opposite.
   const glm::dvec3 v = glm::normalize(glm::conjugate(rolled) * p_LR);
   return glm::normalize(rolled * glm::normalize(glm::dquat(1 + v.x, 0, -v.z, v.y)));
 }
 
-// That of a pinhole whose pixels on the axis are as large, as solid angles; central differences.
+// Returns the focal length of a pinhole whose pixels on the axis are as large, as solid angles, as
+// those of the view; by central differences.
 std::optional<double> focal_px(const StereoView& view) {
   constexpr double step = 1e-5;
   const auto right = view.project({step, 0, 1}), left = view.project({-step, 0, 1});
@@ -60,14 +62,15 @@ std::optional<double> focal_px(const StereoView& view) {
   return focal_px;
 }
 
-// What an image shows of the plane z = 1 of the pinholes' frame.
+// Field of an image on the plane z = 1 of the pinholes' frame.
 struct Field {
   glm::dvec2 least{std::numeric_limits<double>::infinity()};
   glm::dvec2 most{-std::numeric_limits<double>::infinity()};
-  std::vector<std::optional<glm::dvec2>> looks;  // nothing where it is not before the plane
+  std::vector<std::optional<glm::dvec2>> looks;  // nothing for rays that point away from the plane
 };
 
-// Asks a camera for rays all over its image and at its rim, and takes them to the frame R.
+// Samples a camera's rays all over its image, including its boundary, and rotates them to the frame
+// R.
 Field field_of(const StereoView& view, const glm::dquat& R_RC, double most_tangent) {
   Field field;
   const glm::dvec2 last(view.size_px - 1);
@@ -80,7 +83,7 @@ Field field_of(const StereoView& view, const glm::dquat& R_RC, double most_tange
       if (!(turned.z > 0)) continue;
       look = glm::dvec2(turned) / turned.z;
       const glm::dvec2 within = glm::clamp(*look, -most_tangent, most_tangent);
-      // What lies beside the limit in one direction says nothing about the other.
+      // Rays beyond the limit in one direction do not extend the other.
       if (std::abs(look->y) <= most_tangent) {
         field.least.x = std::min(field.least.x, within.x);
         field.most.x = std::max(field.most.x, within.x);
@@ -103,22 +106,24 @@ double lost_share(const Field& field, const glm::dvec2& least, const glm::dvec2&
                              : static_cast<double>(lost) / static_cast<double>(field.looks.size());
 }
 
-// A direction that the left camera sees no further left than the right one does: infinitely far
-// things have no disparity, near ones a positive one.
+// Returns whether the fields allow a point to be seen by both cameras: its disparity is 0 at
+// infinity and otherwise positive, so it lies no further left in the left image than in the right
+// one.
 bool share_something(const Field& left, const Field& right) {
   return left.most.x > right.least.x &&
          std::min(left.most.y, right.most.y) > std::max(left.least.y, right.least.y);
 }
 
 void frame_image(const Field& left, const Field& right, PinholePair& pair, Violations& broken) {
-  constexpr double margin = 1e-9;  // of a pixel: sizes that are whole but for rounding stay so
+  constexpr double margin = 1e-9;  // in tangents: sizes that are whole except for rounding stay so
   const glm::dvec2 least(std::min(left.least.x, right.least.x),
                          std::max(left.least.y, right.least.y));
   const glm::dvec2 most(std::max(left.most.x, right.most.x), std::min(left.most.y, right.most.y));
   const glm::dvec2 size = glm::ceil((most - least) * pair.focal_px - margin * pair.focal_px) + 1.0;
-  broken.unless(size.x * size.y <= most_pixels,
-                "its images would have {} x {} px, more than {}: limit its field", size.x, size.y,
-                most_pixels);
+  broken.unless(
+      size.x * size.y <= most_pixels,
+      "the rectified images would have {} x {} px, more than {} in total: limit the field of view",
+      size.x, size.y, most_pixels);
   if (!(size.x * size.y <= most_pixels)) return;
   pair.size_px = glm::ivec2(size);
   pair.centre_px = (size - 1.0) / 2.0 - pair.focal_px * (least + most) / 2.0;
@@ -136,12 +141,12 @@ void check_mounting(const StereoView& left, const StereoView& right, const glm::
       glm::conjugate(half_way) * (right.X_DC.translation_m - left.X_DC.translation_m);
   const double baseline_m = glm::length(p_LR);
   broken.unless(baseline_m > 0 && std::isfinite(baseline_m),
-                "the cameras are {} m apart: stereo needs two places", baseline_m);
+                "the cameras are {} m apart: stereo needs two positions", baseline_m);
   const double off_axis_deg = angle_deg({0, 0, 1}, p_LR);
   broken.unless(!(baseline_m > 0) || (off_axis_deg >= least_from_axis_deg &&
                                       off_axis_deg <= 180 - least_from_axis_deg),
-                "the right camera lies ({:.4g}, {:.4g}, {:.4g}) m (right, down, ahead) of the left "
-                "one, {:.1f} deg from where they look: it must be {} deg or more aside",
+                "the right camera is ({:.4g}, {:.4g}, {:.4g}) m (right, down, ahead) from the left "
+                "one, {:.1f} deg from the viewing direction: it must be at least {} deg from it",
                 p_LR.x, p_LR.y, p_LR.z, off_axis_deg, least_from_axis_deg);
 }
 
@@ -173,7 +178,7 @@ PinholePair pinhole_pair(const StereoView& left, const StereoView& right, double
   };
   const Field left_field = field(left), right_field = field(right);
   broken.unless(share_something(left_field, right_field),
-                "within {:.0f} deg there is nothing that both cameras see: are their poses right?",
+                "within {:.0f} deg the fields of view do not overlap: are the poses right?",
                 glm::degrees(most_field_rad));
   broken.throw_if_any();
   frame_image(left_field, right_field, pair, broken);

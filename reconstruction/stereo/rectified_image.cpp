@@ -9,7 +9,7 @@
 #include <vector>
 
 #include "core/error.h"
-#include "core/luminance.h"
+#include "core/image/luminance.h"
 
 namespace groundray {
 namespace {
@@ -21,7 +21,7 @@ double sinc(double x) {
   return std::abs(turn) < 1e-8 ? 1 : std::sin(turn) / turn;
 }
 
-// How many of the camera's pixels one of the pinhole's is wide on its axis, at least 1.
+// Returns the width of a pinhole's pixel on the axis in pixels of the camera, at least 1.
 double scale_of(const PinholePair& pair, StereoSide side, const StereoView& view) {
   const auto at = [&](double x, double y) {
     return source_px(pair, side, view, pair.centre_px + glm::dvec2(x, y));
@@ -31,7 +31,7 @@ double scale_of(const PinholePair& pair, StereoSide side, const StereoView& view
   return std::max({1.0, glm::distance(*left, *right), glm::distance(*upper, *lower)});
 }
 
-// The weights of the pixels round a place in one direction.
+// Weights of the pixels around a position in one direction.
 struct Taps {
   int first = 0;
   std::vector<double> weights;
@@ -70,14 +70,14 @@ RectifiedImage resample(const ImageF& grey, const PinholePair& pair, StereoSide 
                         const StereoView& view) {
   if (grey.channels() != 1 || grey.width() != view.size_px.x || grey.height() != view.size_px.y) {
     throw Error(
-        "the {} image has {} x {} px and {} channels, but its camera {} x {} px: it must "
-        "be grey, of the camera's size",
+        "the {} image has {} x {} px and {} channels, but its camera {} x {} px: it must be grey "
+        "and of the camera's size",
         side == StereoSide::Left ? "left" : "right", grey.width(), grey.height(), grey.channels(),
         view.size_px.x, view.size_px.y);
   }
   RectifiedImage result{{pair.size_px.x, pair.size_px.y, 1}, {pair.size_px.x, pair.size_px.y, 1}};
   const double scale = scale_of(pair, side, view);
-  constexpr double rounding = 1e-6;  // of places at the rim
+  constexpr double rounding = 1e-6;  // of positions at the boundary
   const glm::dvec2 last(view.size_px - 1);
   tbb::parallel_for(0, pair.size_px.y, [&](int row) {
     Taps columns, rows;
@@ -99,7 +99,8 @@ RectifiedImage resample(const ImageF& grey, const PinholePair& pair, StereoSide 
 
 ImageF grey_of(const Image8& image) {
   if (image.channels() < 1 || image.channels() > 4)
-    throw Error("image of {} channels: 1 to 4 can be made grey", image.channels());
+    throw Error("image of {} channels: only 1 to 4 channels can be converted to grey",
+                image.channels());
   ImageF grey(image.width(), image.height(), 1);
   for (int y = 0; y < image.height(); ++y) {
     for (int x = 0; x < image.width(); ++x) {

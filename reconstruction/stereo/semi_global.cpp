@@ -28,7 +28,7 @@ cv::Mat mat_of(const Image8& image) {
   return mat;
 }
 
-// SGBM wants a multiple of 16.
+// StereoSGBM requires a multiple of 16.
 int count_of(const DisparityRange& range) {
   return (range.most_px - range.least_px + 16) / 16 * 16;
 }
@@ -39,15 +39,14 @@ void check_bytes(const Image8& image, const DisparityRange& range, const MatchOp
   const double bytes = 8 * columns * image.height() * (range.most_px - range.least_px + 16);
   if (bytes <= static_cast<double>(options.most_bytes)) return;
   throw Error(
-      "matching {} x {} px over disparities of {} to {} px would take {:.3g} GB, more than "
-      "the {:.3g} GB allowed (most_bytes): allow more, give a narrower range, or ask for paths "
-      "Five",
+      "matching {} x {} px over disparities of {} to {} px would take {:.3g} GB, more than the "
+      "{:.3g} GB allowed (most_bytes): allow more, use a narrower range, or use paths Five",
       image.width(), image.height(), range.least_px, range.most_px, bytes / 1e9,
       static_cast<double>(options.most_bytes) / 1e9);
 }
 
-// The disparities, times 16, of the first image. Both are made wider, so that all of the first
-// one's pixels have all disparities.
+// Returns the disparities, times 16, of the first image. Both images are widened, so that all
+// disparities are searched at all pixels of the first one.
 cv::Mat found_from(const cv::Mat& first, const cv::Mat& second, const DisparityRange& range,
                    const MatchOptions& options) {
   const int count = count_of(range);
@@ -88,8 +87,8 @@ Image8 shrunk(const Image8& image, int step) {
   return small;
 }
 
-// Whether a pixel of a shrunk image is not beside the rim of what is seen: both images' rims look
-// alike, wherever they are.
+// Returns whether a pixel of a shrunk image is away from the boundary of the seen area: the
+// boundaries of both images look alike, wherever they are.
 bool is_seen_round(const Image8& seen, int x, int y, int step) {
   constexpr int beside = 3;
   for (int dy = -beside; dy <= beside; dy += beside) {
@@ -103,7 +102,7 @@ bool is_seen_round(const Image8& seen, int x, int y, int step) {
 }
 
 #ifdef GROUNDRAY_XIMGPROC
-// As OpenCV keeps disparities, times `sign`.
+// Converts disparities, times `sign`, to OpenCV's format.
 cv::Mat fixed(const ImageF& image, float sign, int none) {
   cv::Mat mat(image.height(), image.width(), CV_16SC1);
   for (int y = 0; y < mat.rows; ++y) {
@@ -127,7 +126,7 @@ SemiGlobalDisparity semi_global(const Image8& left, const Image8& right,
   tbb::parallel_invoke(
       [&] { result.left_px = pixels_of(found_from(left_mat, right_mat, range, options), range); },
       [&] {
-        // Mirrored, the right image is the left one of a pair with the same disparities.
+        // The mirrored right image is the left one of a pair with the same disparities.
         cv::Mat left_mirrored, right_mirrored, found;
         cv::flip(left_mat, left_mirrored, 1);
         cv::flip(right_mat, right_mirrored, 1);
@@ -147,7 +146,7 @@ std::uint64_t remove_speckles(ImageF& disparity_px, int pixels) {
           std::isnan(value) ? none : static_cast<short>(std::lround(value * 16.0F));
     }
   }
-  cv::filterSpeckles(fixed, none, pixels - 1, 16);  // up to so many
+  cv::filterSpeckles(fixed, none, pixels - 1, 16);  // largest patch that is removed
   std::uint64_t removed = 0;
   for (int y = 0; y < fixed.rows; ++y) {
     for (int x = 0; x < fixed.cols; ++x) {
@@ -204,8 +203,8 @@ ImageF smooth_guided(const Image8& left, const SemiGlobalDisparity& found,
   const cv::Mat from_left = fixed(found.left_px, 1, 16 * (range.least_px - 1));
   const cv::Mat from_right = fixed(found.right_px, -1, 16 * -(range.least_px + count));
   const auto filter = cv::ximgproc::createDisparityWLSFilterGeneric(true);
-  // A tenth of OpenCV's smoothness and half of its tolerance of edges are best on Middlebury's
-  // Motorcycle, and twice the values or half of them not much worse.
+  // Chosen on Middlebury's Motorcycle, where twice these values or half of them are not much worse.
+  // OpenCV documents 8000 and 0.8 to 2.0 as typical.
   filter->setLambda(200);
   filter->setSigmaColor(0.8);
   filter->setLRCthresh(24);  // 1.5 px

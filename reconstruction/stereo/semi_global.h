@@ -4,30 +4,30 @@
 #include <limits>
 #include <optional>
 
-#include "core/image.h"
+#include "core/image/image.h"
 #include "reconstruction/stereo/disparity.h"
 
 namespace groundray {
 
-/// Disparities are kept in 16 bits, times 16, so they are no farther from 0 than this.
+/// Largest absolute disparity: disparities are stored in 16 bits, times 16.
 inline constexpr int farthest_px = 2000;
 
-/// Disparity, or its standard deviation, where there is none.
+/// Value of a missing disparity or standard deviation.
 inline constexpr float no_disparity = std::numeric_limits<float>::quiet_NaN();
 
-/// An image to search, 1 channel each.
+/// Image to search, 1 channel each.
 struct SearchedImage {
   Image8 grey;
   Image8 seen;
 };
 
-/// What semi-global matching finds: disparities of both images to 1/16 px, NaN where there is none.
+/// Result of semi-global matching: disparities of both images to 1/16 px, NaN for none.
 struct SemiGlobalDisparity {
   ImageF left_px;
-  ImageF right_px;  ///< of the right image's pixels: u_left - u_right too
+  ImageF right_px;  ///< at the right image's pixels; also u_left - u_right
 };
 
-/// Matches two images of one size, from each side.
+/// Matches two images of equal size, from each side.
 /// @param range  up to farthest_px on either side.
 /// @throws Error if that takes more bytes than options.most_bytes.
 /// @see Birchfield, Tomasi, A pixel dissimilarity measure that is insensitive to image sampling,
@@ -35,18 +35,18 @@ struct SemiGlobalDisparity {
 SemiGlobalDisparity semi_global(const Image8& left, const Image8& right,
                                 const DisparityRange& range, const MatchOptions& options);
 
-/// Returns the disparities that two images have in common, found at a width of at most 320 px,
-/// where those from -2 px to half the width are looked for; nothing if there are none.
+/// Returns the range of the disparities that two images have in common, searched from -2 px to half
+/// the width at a width of at most 320 px; nothing if there are none.
 /// @throws Error if that takes more bytes than options.most_bytes.
 std::optional<DisparityRange> common_range(const SearchedImage& left, const SearchedImage& right,
                                            const MatchOptions& options);
 
-/// Removes patches of less than `pixels` whose disparities differ from pixel to pixel by no more
-/// than 1 px. @return how many pixels were removed.
+/// Removes patches of less than `pixels` pixels within which disparities change from pixel to pixel
+/// by at most 1 px. @return number of pixels removed.
 std::uint64_t remove_speckles(ImageF& disparity_px, int pixels);
 
-/// Returns the left disparities smoothed along the image's edges, with holes filled; as found if
-/// OpenCV came without ximgproc.
+/// Returns the left disparities smoothed along the image's edges, with holes filled; unchanged if
+/// OpenCV has no ximgproc.
 ImageF smooth_guided(const Image8& left, const SemiGlobalDisparity& found,
                      const DisparityRange& range);
 

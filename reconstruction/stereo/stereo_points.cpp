@@ -21,10 +21,10 @@ void check_stereo_inputs(const PinholePair& pair, const StereoView& left, const 
   broken.unless(is_sd(noise.bias_px), "bias_px = {} must be 0 or more", noise.bias_px);
   broken.unless(is_sd(noise.place_px), "place_px = {} must be 0 or more", noise.place_px);
   broken.unless(options.nearest_m >= 0 && options.nearest_m < options.farthest_m,
-                "there is no depth from nearest_m = {} to farthest_m = {}: are they swapped?",
+                "nearest_m = {} and farthest_m = {} enclose no depth: are they swapped?",
                 options.nearest_m, options.farthest_m);
   broken.unless(options.most_relative_sd > 0 && options.most_relative_sd <= 1,
-                "most_relative_sd = {} must be above 0, up to 1", options.most_relative_sd);
+                "most_relative_sd = {} must be above 0 and at most 1", options.most_relative_sd);
   broken.unless(options.stride_px > 0, "stride_px = {} must be 1 or more", options.stride_px);
   broken.unless(
       pair.focal_px > 0 && pair.baseline_m > 0,
@@ -36,14 +36,14 @@ void check_stereo_inputs(const PinholePair& pair, const StereoView& left, const 
   };
   broken.unless(is_of_pair(map.disparity_px) && is_of_pair(map.confidence) &&
                     (map.sd_px.width() == 0 || is_of_pair(map.sd_px)),
-                "the disparities are of {} x {} px, the pair of {} x {}: they must be equal",
+                "the disparities have {} x {} px, the pair {} x {}: the sizes must be equal",
                 map.disparity_px.width(), map.disparity_px.height(), pair.size_px.x,
                 pair.size_px.y);
   broken.throw_if_any();
 }
 
-// Of four points of a square, whose errors are alike the more the nearer they are: on rendered
-// pairs half at 4 px, 0.3 at 8.
+// Returns the variance of the mean of four points of a square, relative to independent points.
+// Errors of near points are correlated: on rendered pairs by half at 4 px, 0.3 at 8.
 double variance_together(double stride_px) {
   constexpr double alike_px = 6;
   return 1 + 2 * std::exp(-stride_px / alike_px) + std::exp(-std::sqrt(2.0) * stride_px / alike_px);
@@ -118,7 +118,7 @@ void append(const StereoPoints& points, std::uint32_t group, MeasuredPoints& to)
     to.sd_m.push_back(errors.sd_m);
     to.bias_sd_m.push_back(std::abs(points.bias_m[i].z));
     to.lean.push_back(errors.lean);
-    to.across_sd_m.push_back(  // with a pixel's square
+    to.across_sd_m.push_back(  // including a pixel's square
         static_cast<float>(std::hypot(errors.across_sd_m, footprint_m / std::sqrt(12.0))));
     to.groups.push_back(group);
     to.origins.push_back(PointOrigin::Stereo);

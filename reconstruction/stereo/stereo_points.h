@@ -15,74 +15,78 @@
 
 namespace groundray {
 
-/// What is taken for the errors of matches, standard deviations.
+/// Assumed errors of matches: standard deviations.
 struct StereoNoise {
-  /// Of all disparities alike; without it each has its own, or this much where it has none:
+  /// Error of all disparities; none: each has its own, or usual_match_px if it has none.
   std::optional<double> match_px = {};
-  double bias_px = 0.1;   ///< of what all disparities of a pair have in common
-  double place_px = 0.3;  ///< of where in the image a match belongs to, each way
+  double bias_px = 0.1;   ///< error common to all disparities of a pair
+  double place_px = 0.3;  ///< error of a match's position in the image, each way
 };
 
-/// The match noise of disparities that do not tell their own.
+/// Standard deviation of disparities that do not have their own.
 inline constexpr double usual_match_px = 0.3;
 
-/// Which matches become points.
+/// Selection of the matches that become points.
 struct StereoPointOptions {
   StereoNoise noise = {};
   double least_confidence = 0.5;
-  double nearest_m = 0, farthest_m = std::numeric_limits<double>::infinity();  ///< depth
-  /// Points whose disparity's standard deviation, with the bias', is more than this of it are left
-  /// out: beyond, an error of depth is neither symmetric nor linear in the disparity's.
+  double nearest_m = 0, farthest_m = std::numeric_limits<double>::infinity();  ///< range of depths
+  /// Largest standard deviation of a disparity, including the bias, as a fraction of the disparity.
+  /// Points beyond it are omitted: their error of depth is neither symmetric nor linear in that of
+  /// the disparity.
   double most_relative_sd = 0.1;
-  /// Every so many columns and rows: windows overlap, and so neighbours' errors are alike.
+  /// Spacing of points in columns and rows: windows overlap, so that errors of neighbours are
+  /// correlated.
   int stride_px = 6;
 };
 
-/// Points in D that a pair of images measured, one entry of each column for each.
+/// Points in D measured by a pair of images, one entry of each column per point.
 struct StereoPoints {
   std::vector<glm::dvec3> p_m;
-  std::vector<glm::mat3> covariance_m2;  ///< of the noise, axes of D
-  /// One standard deviation of the pair's common bias: it moves all points together, each by its
-  /// own vector here times the same number. Not in the covariance.
+  std::vector<glm::mat3> covariance_m2;  ///< covariance of the noise, in axes of D
+  /// One standard deviation of the pair's common bias, in axes of D: it moves all points together,
+  /// each by its own vector times the same number. Not included in the covariance.
   std::vector<glm::vec3> bias_m;
-  std::vector<glm::vec2> pixels;   ///< where in the left camera's own image
-  std::vector<float> depth_m;      ///< along the axis of the rectified pair
-  std::vector<float> depth_sd_m;   ///< of its noise
+  std::vector<glm::vec2> pixels;   ///< positions in the left camera's own image
+  std::vector<float> depth_m;      ///< depth along the axis of the rectified pair
+  std::vector<float> depth_sd_m;   ///< sd of the depth's noise
   std::vector<float> confidence;   ///< see DisparityMap
-  std::vector<float> footprint_m;  ///< how wide a pixel is there, across the line of sight
-  /// By which factor the mean of a few neighbouring points varies more than if each erred apart.
+  std::vector<float> footprint_m;  ///< width of a pixel at the point, across the line of sight
+  /// Factor by which the variance of the mean of a few neighbouring points exceeds that of
+  /// independent ones.
   double together = 1;
-  std::uint64_t too_uncertain = 0;  ///< matches that most_relative_sd left out
-  std::uint64_t out_of_limits = 0;  ///< that depth or confidence left out
+  std::uint64_t too_uncertain = 0;  ///< matches omitted by most_relative_sd
+  std::uint64_t out_of_limits = 0;  ///< matches omitted by depth or confidence
 
   std::size_t size() const noexcept { return p_m.size(); }
 };
 
-/// A disparity as a point of the left pinhole's frame.
+/// Disparity as a point of the left pinhole's frame.
 struct StereoPoint {
   glm::dvec3 p_m{0};
   glm::dmat3 covariance_m2{0};
-  glm::dvec3 by_disparity_m{0};  ///< derivative, m/px
+  glm::dvec3 by_disparity_m{0};  ///< derivative by the disparity, m/px
 };
 
-/// Returns the point that a pixel of the left pinhole and its disparity stand for, and its noise to
-/// first order: J diag(place, place, match)^2 J^T.
+/// Returns the point that corresponds to a pixel of the left pinhole and its disparity, and its
+/// noise to first order: J diag(place, place, match)^2 J^T.
 /// @param disparity_px  positive.
 /// @see Matthies, Shafer, Error modeling in stereo navigation (1987)
 StereoPoint stereo_point(const PinholePair& pair, glm::dvec2 pixel, double disparity_px,
                          double match_px, double place_px);
 
-/// Returns the points of a pair's disparities, row by row.
-/// @param left  the camera whose image was resampled.
-/// @throws Error naming every option that is out of bounds, or if the map is not of the pair's
-/// size.
+/// Returns the points of a pair's disparities, in row order.
+/// @param left  camera whose image was resampled.
+/// @throws Error naming every option that is out of bounds, or if the map does not have the pair's
+///         size.
 StereoPoints stereo_points(const PinholePair& pair, const StereoView& left, const DisparityMap& map,
                            const StereoPointOptions& options = {});
 
-/// Adds points to those of a DEM: of the noise the share of height, how it leans, and the rest in
-/// plan, the mean of both ways with the pixel's footprint; of the bias the share of height.
-/// Variances of noise are times `together`, for means are taken as if each point erred apart.
-/// @param group  number of the pair: its points have one bias.
+/// Appends points to those of a DEM: of the noise, the sd of the height, its lean, and the
+/// remainder in plan, averaged over both directions, with the pixel's footprint; of the bias, the
+/// vertical component. Variances of noise are multiplied by `together`, because means assume
+/// independent points.
+/// @param group  number of the pair, whose points have one common bias.
 void append(const StereoPoints& points, std::uint32_t group, MeasuredPoints& to);
 
 }  // namespace groundray

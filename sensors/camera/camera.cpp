@@ -14,20 +14,20 @@
 #include <vector>
 
 #include "core/error.h"
-#include "core/luminance.h"
-#include "sensors/camera/pixel_patch.h"
+#include "core/image/luminance.h"
+#include "sensors/camera/lens/pixel_patch.h"
 
 namespace groundray {
 namespace {
 
 using std::chrono::nanoseconds;
 
-constexpr int block_px = 4;  // side of the blocks of pixels that are traced one after the other
+constexpr int block_px = 4;  // side of the blocks of pixels that are traced in succession
 constexpr std::size_t paths_at_once = 4096;
 
 nanoseconds time_of(double seconds) { return nanoseconds(std::llround(seconds * 1e9)); }
 
-// A point of the unit disc, by the map of squares to discs that keeps areas and neighbours.
+// Maps the unit square to the unit disc; preserves areas and adjacency.
 // @see Shirley and Chiu, A low distortion map between disk and square, JGT 2(3) (1997).
 glm::dvec2 on_disc(const glm::dvec2& u) {
   const glm::dvec2 p = 2.0 * u - 1.0;
@@ -39,12 +39,11 @@ glm::dvec2 on_disc(const glm::dvec2& u) {
   return radius * glm::dvec2(std::cos(angle_rad), std::sin(angle_rad));
 }
 
-// Which paths of a pixel are followed: those that its light is the mean of, or those before that
-// tell how many these must be. They share no numbers, so that the mean does not depend on what
-// they told.
+// Set of paths of a pixel: those that its light is the mean of, or those of the pilot that chooses
+// their number. They share no random numbers, so that the choice does not bias the mean.
 enum class Paths : std::uint32_t { OfMean, OfPilot };
 
-// Names the sequence of a pixel's paths in a frame.
+// Returns the seed of the Sobol sequence of a pixel's paths in a frame.
 std::uint32_t sequence_of(const RandomKey& key, std::uint32_t pixel, Paths paths) {
   return random_bits({.seed = key.seed,
                       .sensor = key.sensor,
@@ -114,7 +113,7 @@ std::span<const glm::dvec3> Camera::directions() const {
   const auto find = [&] {
     const auto width = static_cast<std::size_t>(spec_.size_px.x);
     all.resize(width * static_cast<std::size_t>(spec_.size_px.y));
-    // Isolated: a thread that waits here must not take on work that waits for it.
+    // Isolated: a thread that waits here must not take up another task that waits for this result.
     tbb::this_task_arena::isolate([&] {
       tbb::parallel_for(0, spec_.size_px.y, [&](int row) {
         std::vector<PixelRay> rays(width);
@@ -136,7 +135,7 @@ nanoseconds Camera::middle_of(double row) const noexcept {
   return time_of(spec_.shutter.row_s * row + spec_.shutter.exposure_s / 2);
 }
 
-// Makes the light of some rows.
+// Renders the light of a block of rows.
 class Camera::Rows {
  public:
   Rows(const Camera& camera, const PathTracer& light, const Trajectory& X_DC, nanoseconds begin,
@@ -195,7 +194,8 @@ class Camera::Rows {
     return sums_[static_cast<std::size_t>(pixel.y - first_) * static_cast<std::size_t>(width_) +
                  static_cast<std::size_t>(pixel.x)];
   }
-  // Pixels whose centres look somewhere, block by block: neighbours' rays are alike.
+  // Returns the pixels that have a viewing direction, block by block, so that consecutive rays are
+  // coherent.
   std::vector<glm::ivec2> looking() const {
     std::vector<glm::ivec2> pixels;
     for (int left = 0; left < width_; left += block_px) {
@@ -207,7 +207,8 @@ class Camera::Rows {
     }
     return pixels;
   }
-  // How many paths bring the error of a mean to what is asked for, by those of the pilot.
+  // Returns the number of paths, at most most_samples, that reduces the standard error of the mean
+  // to the requested one, estimated from the pilot.
   int needed(const Sums& pilot) const {
     const SamplingSpec& sampling = spec_.sampling;
     double error = luminance(pilot.standard_error());
@@ -236,7 +237,7 @@ class Camera::Rows {
   std::vector<PathTracer::Sample> samples_;
   std::vector<glm::ivec2> pixel_of_;  // of each sample
   std::vector<glm::vec3> radiance_;
-  std::vector<std::uint16_t> seen_;  // label, of each sample
+  std::vector<std::uint16_t> seen_;  // label of each sample's first hit
   PathTracer::Workspace work_;
 };
 

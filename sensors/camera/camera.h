@@ -8,33 +8,34 @@
 #include <span>
 #include <vector>
 
-#include "core/image.h"
+#include "core/geometry/trajectory.h"
+#include "core/image/image.h"
 #include "core/random.h"
-#include "core/scene.h"
-#include "core/trajectory.h"
+#include "core/tracing/scene.h"
 #include "sensors/camera/camera_spec.h"
-#include "sensors/camera/lens.h"
+#include "sensors/camera/lens/lens.h"
 #include "sensors/camera/path_tracer.h"
 
 namespace groundray {
 
-/// The light of an image: means over each pixel's square, the aperture and the exposure. Of pixels
-/// at the rim of what the lens images, those parts count that look somewhere; a pixel whose centre
-/// looks nowhere has none.
+/// Light of an image: means over each pixel's square, the aperture and the exposure. A pixel at the
+/// boundary of the lens' field shows the mean over the positions that the lens images; a pixel
+/// whose centre has no viewing direction shows nothing.
 struct Exposure {
-  ImageF radiance;        ///< linear red, green and blue, W/(m^2 sr), see docs/sky.md; 0 where a
-                          ///< pixel looks nowhere
-  ImageF standard_error;  ///< of each of them; infinite where there is but one path
-  ImageF samples;         ///< how many paths each pixel took
-  /// How much of each pixel shows things of a label, a channel for each label asked for; 0 where a
-  /// pixel looks nowhere. No image if none was asked for.
+  ImageF
+      radiance;  ///< linear sRGB, W/(m^2 sr), see docs/theory/sky.md; 0 without a viewing direction
+  ImageF standard_error;  ///< standard error of each channel; infinite for a single path
+  ImageF samples;         ///< number of paths of each pixel
+  /// Fraction of each pixel that shows a label, one channel per requested label; 0 where a pixel
+  /// has no viewing direction. Empty if no label was requested.
   ImageF coverage;
 };
 
-/// Returns all labels that a scene can show, ascending: 0, of the sky, is always one.
+/// Returns all labels that a scene can show, ascending; the first is 0, for the sky.
 std::vector<std::uint16_t> labels_of(const Scene& scene);
 
-/// A camera. Immutable; any number of threads may expose with one.
+/// Camera: a lens with aperture, shutter and sampling. Immutable; any number of threads may expose
+/// with one.
 class Camera {
  public:
   /// @throws Error listing every field of `spec` that is out of bounds.
@@ -43,28 +44,31 @@ class Camera {
   const CameraSpec& spec() const noexcept { return spec_; }
   const Lens& lens() const noexcept { return lens_; }
 
-  /// Returns where the centres of all pixels look, in C, row by row; zero for those that look
-  /// nowhere. Found when asked for first; 24 bytes a pixel. Copies share it.
+  /// Returns the viewing directions of all pixel centres, unit vectors in C, row by row; zero for
+  /// pixels without one. Computed at the first call, 24 bytes per pixel, and shared by copies of
+  /// the camera.
   std::span<const glm::dvec3> directions() const;
 
-  /// Returns the light of one image, on all cores.
-  /// @param X_DC  must cover `begin` to the end of the last row's exposure.
-  /// @param begin  when the first row begins to see.
+  /// Renders the light of one image, on all cores.
+  /// @param X_DC  trajectory of the camera; must cover `begin` to the end of the last row's
+  ///        exposure.
+  /// @param begin  start of the first row's exposure.
   /// @param key  names sensor and frame: equal keys give equal images, on any number of threads.
-  /// @param labels  whose coverage is wanted, ascending.
-  /// @param check  called by any thread before each few rows; what it throws ends the image.
-  /// @throws Error if the path does not cover the exposure.
+  /// @param labels  labels whose coverage is requested, ascending.
+  /// @param check  called on any thread before each block of rows; an exception from it ends the
+  ///        image.
+  /// @throws Error if X_DC does not cover the exposure.
   Exposure expose(const PathTracer& light, const Trajectory& X_DC, std::chrono::nanoseconds begin,
                   const RandomKey& key, std::span<const std::uint16_t> labels = {},
                   const std::function<void()>& check = {}) const;
 
-  /// Returns when the last row has seen all, after the image's begin.
+  /// Returns the time from the image's start to the end of the last row's exposure.
   std::chrono::nanoseconds duration() const noexcept;
-  /// Returns the middle of a row's exposure, after the image's begin.
-  /// @param row  whole or, between two, a fraction.
+  /// Returns the time from the image's start to the middle of a row's exposure.
+  /// @param row  row number; may be fractional.
   std::chrono::nanoseconds middle_of(double row) const noexcept;
 
-  /// @throws Error unless `X_DC` covers an image that begins at `begin`.
+  /// Checks that X_DC covers an image that begins at `begin`. @throws Error if it does not.
   void check_cover(const Trajectory& X_DC, std::chrono::nanoseconds begin) const;
 
  private:

@@ -8,96 +8,98 @@
 #include <vector>
 
 #include "sensors/camera/imager.h"
-#include "sensors/camera/lens_models.h"
+#include "sensors/camera/lens/lens_models.h"
 
 namespace groundray {
 
-/// When rows see the world: each from its begin for `exposure_s`.
+/// Shutter, global or rolling: each row is exposed for `exposure_s` from its own start.
 struct ShutterSpec {
   double exposure_s = 0.005;
-  double row_s =
-      0;  ///< from the begin of a row to that of the next one below; 0 for a global shutter
+  /// Time from the start of a row to that of the next one below; 0 for a global shutter.
+  double row_s = 0;
 };
 
-/// What light passes on its way to the sensor.
+/// Aperture of the lens, and its losses of light.
 struct ApertureSpec {
   double focal_length_m = 0;
   double f_number = 0;
-  /// Distance of the plane that is sharp, from the lens along the axis, may be infinite. Without it
-  /// all is sharp, as through a pinhole.
+  /// Distance of the plane in focus from the lens, along the axis, m; may be infinite. Without it
+  /// everything is in focus, as through a pinhole.
   std::optional<double> focus_m = {};
-  double transmission = 1;  ///< of the glass, > 0 up to 1
-  /// v1, v2, v3 of the light that the rim keeps back: 1 + v1 r^2 + v2 r^4 + v3 r^6, where r is the
+  double transmission = 1;  ///< transmission of the glass, > 0 up to 1
+  /// Coefficients v1, v2, v3 of the vignetting 1 + v1 r^2 + v2 r^4 + v3 r^6, where r is the
   /// distance from the principal point over half the image's diagonal.
   glm::dvec3 vignetting{0};
-  /// How the pupil stands to light from aside.
+  /// Area that the pupil presents to light from off the axis.
   enum class Pupil {
-    Flat,     ///< across the axis: it takes in the cosine of what it would on the axis
-    Turning,  ///< towards the light, as fisheyes' do: it takes in the same from everywhere
+    Flat,     ///< disc perpendicular to the axis: the area decreases with the cosine
+    Turning,  ///< tilts towards the light, as in fisheyes: the same area for all directions
   };
   Pupil pupil = Pupil::Flat;
 };
 
-/// How many paths the light of a pixel is the mean of.
+/// Number of paths per pixel. If most_samples exceeds samples, it is chosen for each pixel by a
+/// pilot of `samples` paths, which is then discarded (docs/theory/camera_light.md, adaptive
+/// sampling).
 struct SamplingSpec {
-  int samples = 16;           ///< of every pixel, a power of two
-  int most_samples = 16;      ///< up to where they are doubled if that many before, which are then
-                              ///< dropped, tell...
-  double relative_error = 0;  ///< ...that the mean's standard error is more than this of it
-  int depth = 4;              ///< longest paths, in rays; see PathTracer
+  int samples = 16;           ///< fewest paths of a pixel, a power of two
+  int most_samples = 16;      ///< most paths of a pixel, a power of two
+  double relative_error = 0;  ///< requested standard error of a pixel's mean, relative to the mean
+  int depth = 4;              ///< most rays in a path; see PathTracer
 };
 
-/// What a camera gives of each image.
+/// Output of a camera for each image.
 enum class CameraProduct {
-  Radiance,    ///< with its standard error and number of samples
-  Truth,       ///< what each pixel's centre sees
-  Bound,       ///< of the truth's ranges, certified; takes many times as long as the truth
-  Flow,        ///< in the EXR file, forward and backward
-  FlowFlo,     ///< forward, as Middlebury's .flo
-  FlowKitti,   ///< forward, as KITTI's PNG
-  Coverage,    ///< share of each pixel by label
-  Irradiance,  ///< of the sensor
-  Photons,     ///< on each pixel
-  Electrons,   ///< after the exposure
+  Radiance,    ///< radiance, with its standard error and number of samples
+  Truth,       ///< ground truth at each pixel's centre
+  Bound,       ///< certified bound of the truth's ranges; takes many times as long as the truth
+  Flow,        ///< forward and backward flow, in the EXR file
+  FlowFlo,     ///< forward flow, as Middlebury's .flo
+  FlowKitti,   ///< forward flow, as KITTI's PNG
+  Coverage,    ///< fraction of each pixel by label
+  Irradiance,  ///< irradiance of the sensor
+  Photons,     ///< photons on each pixel
+  Electrons,   ///< electrons at the end of the exposure
   Raw,         ///< digital numbers
-  Picture,     ///< for people: developed from the raw image
+  Picture,     ///< picture for viewing, developed from the raw image
 };
 
-/// How raw images become pictures.
+/// Conversion of raw images to pictures.
 struct PictureSpec {
   enum class Encoding { Srgb, Linear };
   Encoding encoding = Encoding::Srgb;
-  int bits = 8;                          ///< 8 or 16
-  std::optional<glm::dvec3> gains = {};  ///< of red, green and blue; without them those that show
-                                         ///< grey surfaces in light of equal R, G and B as grey
+  int bits = 8;  ///< 8 or 16
+  /// Gains of red, green and blue. By default, grey surfaces in light of equal R, G and B appear
+  /// grey.
+  std::optional<glm::dvec3> gains = {};
 };
 
-/// Everything that makes one camera.
+/// Parameters of one camera.
 struct CameraSpec {
-  std::string model = {};  ///< for people: "Intel RealSense D455, left infrared"
+  std::string model = {};  ///< description: "Intel RealSense D455, left infrared"
   LensModel lens;
   glm::ivec2 size_px{0};
   double rate_hz = 10;
-  double first_s = 0;  ///< when the first image begins
+  double first_s = 0;  ///< time at which the first image begins
   ShutterSpec shutter = {};
-  std::optional<ApertureSpec> aperture = {};  ///< there must be one if there is an imager
+  std::optional<ApertureSpec> aperture = {};  ///< required if there is an imager
   SamplingSpec sampling = {};
   std::optional<ImagerSpec> imager = {};
   PictureSpec picture = {};
   std::vector<CameraProduct> products = {CameraProduct::Radiance, CameraProduct::Truth};
 };
 
-/// Whether a product is asked for.
+/// Returns true if a product of the camera is requested.
 inline bool gives(const CameraSpec& camera, CameraProduct product) {
   return std::ranges::find(camera.products, product) != camera.products.end();
 }
 
-/// Whether a product is made of the light of the scene.
+/// Returns true if a product is computed from the light of the scene.
 constexpr bool is_of_light(CameraProduct product) {
   return product == CameraProduct::Radiance || product >= CameraProduct::Coverage;
 }
 
-/// Whether any product of a camera is.
+/// Returns true if any product of the camera is computed from the light of the scene.
 inline bool needs_light(const CameraSpec& camera) {
   return std::ranges::any_of(camera.products, is_of_light);
 }

@@ -5,9 +5,9 @@
 #include <glm/gtc/quaternion.hpp>
 #include <string>
 
-#include "core/corner_stars.h"
 #include "core/error.h"
-#include "core/luminance.h"
+#include "core/geometry/corner_stars.h"
+#include "core/image/luminance.h"
 
 namespace groundray {
 namespace {
@@ -18,15 +18,16 @@ void check_emitters(const Scene& scene) {
   const auto materials = scene.materials.all();
   Violations broken("light");
   const auto exists = [&](const std::string& whose, std::size_t material) {
-    broken.unless(material < materials.size(), "{} is of material {}, but the scene has {}", whose,
-                  material, materials.size());
+    broken.unless(material < materials.size(), "{} has material {}, but the scene has {} materials",
+                  whose, material, materials.size());
     return material < materials.size();
   };
   const auto check_ground = [&](const std::string& whose, std::size_t material) {
     if (!exists(whose, material)) return;
-    broken.unless(materials[material].emitted == glm::dvec3(0),
-                  "{} is of '{}', which emits light: only objects can; lay one on the ground",
-                  whose, materials[material].name);
+    broken.unless(
+        materials[material].emitted == glm::dvec3(0),
+        "{} has material '{}', which emits light, but only objects can: place one on the ground",
+        whose, materials[material].name);
   };
   if (scene.cover.empty()) check_ground("the ground", scene.terrain.material);
   for (std::size_t i = 0; i < scene.cover.layers().size(); ++i)
@@ -47,7 +48,7 @@ bool may_be_cut_out(const ModelSurface& surface) {
   return surface.least_alpha > 0 && (surface.albedo.exists() || surface.opacity.exists());
 }
 
-// Of twins, one is drawn.
+// True for the first of the triangles with the same corners, which is the only one sampled.
 bool is_first_twin(const CornerStars& stars, std::uint32_t triangle) {
   for (std::uint32_t i = stars.next_twin(triangle); i != triangle; i = stars.next_twin(i)) {
     if (i < triangle) return false;
@@ -55,7 +56,7 @@ bool is_first_twin(const CornerStars& stars, std::uint32_t triangle) {
   return true;
 }
 
-// The corner that the others are seen from, and the edges to them.
+// First corner of a triangle, and the edges from it to the others.
 struct Corner {
   glm::dvec3 at, a, b;
   Corner(const TriangleMesh& mesh, std::uint32_t triangle) {
@@ -66,12 +67,14 @@ struct Corner {
   }
 };
 
-// Keeps areas and neighbours. @see Heitz, A low-distortion map between triangle and square (2019).
+// Maps the unit square to barycentric coordinates; preserves areas and adjacency.
+// @see Heitz, A low-distortion map between triangle and square (2019).
 glm::dvec2 on_triangle(const glm::dvec2& u) {
   return u.y > u.x ? glm::dvec2(u.x / 2, u.y - u.x / 2) : glm::dvec2(u.x - u.y / 2, u.y / 2);
 }
 
-// The first whose running sum exceeds a share of all.
+// Returns the index of the first entry whose running sum exceeds the fraction `uniform` of the
+// total.
 template <typename Sums, typename Sum>
 auto pick(const Sums& all, double uniform, const Sum& sum) {
   const double target = uniform * sum(all.back());
@@ -102,7 +105,7 @@ Emitters::Emitters(const Scene& scene) : objects_(scene.objects) {
   }
 }
 
-// Until all are found the density is the luminance.
+// Stores the luminance as density; the constructor divides it by the total when that is known.
 void Emitters::find_shape(std::size_t model, const std::vector<ModelTruth>& truths,
                           const Materials& materials) {
   const Model& shape = objects_.models()[model].model();

@@ -6,52 +6,54 @@
 #include <glm/vec3.hpp>
 #include <vector>
 
-#include "core/object_tracer.h"
-#include "core/scene.h"
+#include "core/tracing/object_tracer.h"
+#include "core/tracing/scene.h"
 
 namespace groundray {
 
-/// What shines of a scene itself: the triangles of all objects whose material emits. Points are
-/// drawn evenly over each, and each triangle by its share of the sum of area times luminance. So
-/// the density per area is a matter of the material alone, wherever its object is.
+/// Emitting surfaces of a scene: the triangles of all objects whose material emits. Triangles are
+/// sampled in proportion to area times luminance, and points uniformly on a triangle, so that the
+/// density by area depends on the material alone, wherever the object is.
 ///
-/// Triangles that lie on one another, corner by corner, are one. A surface that images may cut out
-/// shines too, but is not drawn. Immutable; any number of threads may use one.
+/// Triangles with the same three corners act as one. A surface that an image may cut out emits, but
+/// is not sampled. Immutable; any number of threads may use one.
+/// @see docs/theory/camera_light.md
 class Emitters {
  public:
-  /// @throws Error listing layers of the ground whose material emits, for the ground cannot shine,
-  ///         and materials that the scene names but does not have.
+  /// @throws Error listing layers of the ground whose material emits (only objects can), surfaces
+  ///         without a material, and materials that the scene names but does not have.
   explicit Emitters(const Scene& scene);
 
   bool any_shines() const noexcept { return any_shines_; }
   bool any_is_drawn() const noexcept { return !sources_.empty(); }
 
-  /// How a surface shines.
+  /// Emission of a surface.
   struct Glow {
-    glm::dvec3 radiance{0};  ///< the same from both sides; linear sRGB, W/(m^2 sr)
-    double pdf_per_m2 = 0;   ///< with which `draw` chooses each point of it; 0 if it does not
+    glm::dvec3 radiance{0};  ///< emitted radiance, equal on both sides; linear sRGB, W/(m^2 sr)
+    double pdf_per_m2 = 0;   ///< density with which `draw` samples its points; 0 if it does not
   };
-  /// Returns that of what a ray met.
+  /// Returns the emission of the surface that a ray hit.
   Glow glow_of(const Hit& hit) const noexcept;
 
-  /// A point that was drawn.
+  /// Sampled point.
   struct Point {
     glm::dvec3 p_DQ;
-    glm::dvec3 normal;  ///< of its facet, unit, in D, on any side
+    glm::dvec3 normal;  ///< facet normal, unit, in D, on either side
     Glow glow;
   };
-  /// Draws a point, if any can be.
-  /// @param which  uniform in [0, 1)^2: the triangle. @param where  likewise: the point on it.
-  /// @param time  when objects that move are met.
+  /// Samples a point; any_is_drawn() must be true.
+  /// @param which  uniform in [0, 1)^2: selects object (x) and triangle (y).
+  /// @param where  uniform in [0, 1)^2: selects the point on the triangle.
+  /// @param time  time of the moving objects' poses.
   Point draw(const glm::dvec2& which, const glm::dvec2& where,
              std::chrono::nanoseconds time) const noexcept;
 
  private:
-  struct Source {  // an object
+  struct Source {  // an object with sampled triangles
     std::uint32_t number;
-    double power_until;  // sum of area times luminance, this one's included
+    double power_until;  // running sum of area times luminance, including this object
   };
-  struct Shape {  // the triangles of a model that are drawn, by the object's size 1
+  struct Shape {  // sampled triangles of a model, at scale 1
     std::vector<std::uint32_t> triangles;
     std::vector<double> power_until;
   };

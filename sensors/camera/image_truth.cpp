@@ -20,10 +20,11 @@ using std::chrono::nanoseconds;
 
 constexpr float nan = std::numeric_limits<float>::quiet_NaN();
 
-constexpr int pixels_at_once =
-    256;  // of a row: their rays stay in the cache; a multiple of packets
+// Pixels of a row that are traced together: their rays stay in the cache; a multiple of packets.
+constexpr int pixels_at_once = 256;
 
-// A ray towards a point meets it if their ranges agree so well: both are known to 1e-9 of them.
+// Largest difference of ranges at which a ray towards a point hits that point rather than another.
+// Both ranges are accurate to 1e-9, relative.
 double same_range_m(double range_m) { return 1e-6 * range_m + 1e-6; }
 
 template <typename T, typename V>
@@ -64,7 +65,7 @@ void shape(ImageTruth& truth, glm::ivec2 size, const TruthRequest& request) {
   shape(truth.backward, size, request.before);
 }
 
-// Makes the truth of rows. One for each thread: it keeps its buffers.
+// Computes the truth of rows. Each thread has its own, to reuse the buffers.
 class RowTruth {
  public:
   RowTruth(const Camera& camera, const Scene& scene, const Materials::InColour& materials,
@@ -90,15 +91,15 @@ class RowTruth {
   const Scene& scene_;
   const Materials::InColour& materials_;
   const Trajectory& X_DC_;
-  bool is_plain_;                           // each material has one albedo
-  std::span<const glm::dvec3> directions_;  // of the row, in C
-  int first_ = 0, end_ = 0;                 // columns at hand
-  // Of those that look somewhere:
+  bool is_plain_;                           // true if each material has a single albedo
+  std::span<const glm::dvec3> directions_;  // viewing directions of the row, in C
+  int first_ = 0, end_ = 0;                 // columns being processed
+  // Pixels of these columns that have a viewing direction:
   std::vector<int> columns_;
   std::vector<Ray> rays_;
   std::vector<Hit> hits_;
   std::vector<double> bounds_m_;
-  // Of those that another image may see:
+  // Pixels whose points are imaged inside the other image:
   std::vector<int> seen_columns_;
   std::vector<Ray> seen_rays_;
   std::vector<Hit> seen_hits_;
@@ -180,7 +181,7 @@ void RowTruth::tell_surface(int x, int y, const Ray& ray, const Hit& hit, ImageT
   const glm::dvec3 normal = glm::normalize(glm::dvec3(hit.normal));
   put(into.p_DQ, x, y, p_DQ);
   put(into.normal, x, y, normal);
-  const bool is_bare = hit.object == 0 && scene_.cover.empty();  // no bumps
+  const bool is_bare = hit.object == 0 && scene_.cover.empty();  // no bump maps
   put(into.shading_normal, x, y,
       is_bare ? normal : scene_.shading_normal_of(ray, hit, 0, Filtering::Fast));
   const auto sine = static_cast<float>(glm::length(glm::cross(ray.direction, normal)));
@@ -241,7 +242,7 @@ void check_albedos(const Scene& scene, std::size_t albedos) {
   const auto check = [&](std::uint16_t material) {
     if (material >= albedos)
       throw Error(
-          "truth of an image: the scene names material {} but there are {} albedos; there must be "
+          "truth of an image: the scene uses material {}, but there are {} albedos; there must be "
           "one for each of its materials",
           material, albedos);
   };

@@ -9,16 +9,16 @@
 #include <cstdint>
 
 #include "core/error.h"
-#include "core/luminance.h"
+#include "core/image/luminance.h"
 
 namespace groundray {
 namespace {
 
 constexpr double planck_j_s = 6.62607015e-34;  // exact in the SI
-constexpr double light_m_s = 299'792'458;      // likewise
-constexpr double green_m = 555e-9;             // where 1 W is 683 lm
+constexpr double light_m_s = 299'792'458;      // exact in the SI
+constexpr double green_m = 555e-9;             // wavelength at which 1 W is 683 lm
 
-// Names a pixel's random numbers of a frame.
+// Returns the key of a pixel's random numbers in a frame.
 RandomKey of_pixel(RandomKey key, std::size_t pixel, RandomStream stream) {
   key.pulse = static_cast<std::uint32_t>(pixel);
   key.sub_ray = 0;
@@ -26,14 +26,14 @@ RandomKey of_pixel(RandomKey key, std::size_t pixel, RandomStream stream) {
   return key;
 }
 
-// What makes a pixel differ from the others, in all frames alike: of its responsivity and of its
-// offset, in standard deviations.
+// Returns the deviations of a pixel's responsivity and offset, in standard deviations; they are
+// equal in all frames.
 glm::dvec2 fixed_pattern(RandomKey key, std::size_t pixel) {
   key.frame = 0;
   return random_normal(of_pixel(key, pixel, RandomStream::FixedPattern));
 }
 
-// Calls act(x, y, number of the pixel) for all pixels, on all cores.
+// Calls act(x, y, index of the pixel) for all pixels, on all cores.
 template <typename Act>
 void for_each_pixel(int width, int height, const Act& act) {
   tbb::parallel_for(0, height, [&](int y) {
@@ -44,7 +44,7 @@ void for_each_pixel(int width, int height, const Act& act) {
 
 void check_image(const ImageF& image, int channels, const char* what) {
   if (image.channels() == channels) return;
-  throw Error("imager: an image of {} has {} channels, but this one {}", what, channels,
+  throw Error("imager: an image of {} must have {} channels, but has {}", what, channels,
               image.channels());
 }
 
@@ -79,9 +79,9 @@ Imager::Imager(const ImagerSpec& spec, double exposure_s) : spec_(spec), exposur
   for (glm::length_t i = 0; i < 3; ++i) {
     const double share = spec.quantum_efficiency[i];
     broken.unless(0 < share && share <= 4,
-                  "quantum_efficiency {} must be > 0 and at most 4: is it in per cent?", share);
+                  "quantum_efficiency {} must be > 0 and at most 4: is it in percent?", share);
   }
-  // Above, a float would not hold every whole number.
+  // Above the limit, a float would not represent every whole number.
   broken.unless(1 <= spec.full_well_e && spec.full_well_e <= 1e7,
                 "full_well_e = {} must be from 1 to 1e7", spec.full_well_e);
   broken.unless(std::isfinite(spec.temperature_c) && std::isfinite(spec.reference_c),
@@ -90,7 +90,7 @@ Imager::Imager(const ImagerSpec& spec, double exposure_s) : spec_(spec), exposur
   broken.unless(8 <= spec.bits && spec.bits <= 16, "bits = {} must be from 8 to 16", spec.bits);
   const double top_dn = std::exp2(spec.bits) - 1;
   broken.unless(0 <= spec.black_dn && spec.black_dn < top_dn,
-                "black_dn = {} must be 0 or more, and less than the {} that {} bits hold",
+                "black_dn = {} must be 0 or more, and less than {}, the greatest value of {} bits",
                 spec.black_dn, top_dn, spec.bits);
   broken.throw_if_any();
 }

@@ -32,7 +32,8 @@ void check_aperture(const Lens& lens, const ApertureSpec& aperture, double pixel
   broken.unless(std::isfinite(v.x) && std::isfinite(v.y) && std::isfinite(v.z),
                 "vignetting = [{}, {}, {}] must be finite", v.x, v.y, v.z);
   broken.throw_if_any();
-  // Calibrated focal lengths are some per cent off the nominal ones; units and binning are not.
+  // Calibrated focal lengths differ from nominal ones by a few per cent; wrong units or binning
+  // change them by a factor of 2 or more.
   constexpr double most_ratio = 1.5;
   const auto axis = lens.project({0, 0, 1});
   const std::optional<PixelRay> ray = axis ? lens.ray(*axis) : std::nullopt;
@@ -47,8 +48,8 @@ void check_aperture(const Lens& lens, const ApertureSpec& aperture, double pixel
   broken.throw_if_any();
 }
 
-// What reaches a pixel beside one on the axis, but for its solid angle: less than 0 is a fault of
-// the vignetting.
+// Light on a pixel relative to one on the axis, without the factor of its solid angle. Negative
+// values indicate an invalid vignetting.
 class Falloff {
  public:
   Falloff(const Lens& lens, const ApertureSpec& aperture)
@@ -77,7 +78,7 @@ void check_rim(const ImageF& pupil_sr, const glm::dvec3& vignetting) {
   const auto pixel = bad - pupil_sr.values().begin();
   throw Error(
       "aperture: vignetting = [{}, {}, {}] is negative at the pixel ({}, {}); it must be 0 or more "
-      "in all of the image: are its terms those of half the diagonal?",
+      "in the entire image: are its coefficients relative to half the diagonal?",
       vignetting.x, vignetting.y, vignetting.z, pixel % pupil_sr.width(), pixel / pupil_sr.width());
 }
 
@@ -91,7 +92,8 @@ ImageF pupil_sr(const Lens& lens, const ApertureSpec& aperture, double pixel_pit
   const double on_axis = aperture.transmission * std::numbers::pi / 4 * diameter_m * diameter_m /
                          (pixel_pitch_m * pixel_pitch_m);
   ImageF result(width, height, 1);
-  // Blocks of rows are the same on any number of threads: rays depend on theirs by rounding.
+  // Fixed blocks of rows give the same result on any number of threads: a ray depends, to rounding,
+  // on its block.
   constexpr int rows_at_once = 16;
   tbb::parallel_for(0, (height + rows_at_once - 1) / rows_at_once, [&](int block) {
     const int first = block * rows_at_once, end = std::min(first + rows_at_once, height);

@@ -9,7 +9,7 @@
 #include <glm/geometric.hpp>
 #include <optional>
 
-#include "core/npy_io.h"
+#include "core/io/npy_io.h"
 #include "sensors/camera/sighting.h"
 
 namespace groundray {
@@ -19,7 +19,7 @@ using std::chrono::nanoseconds;
 
 constexpr std::size_t echoes_at_once = 2048;
 
-// What is read of a scan.
+// Columns of a scan that are used.
 struct Columns {
   explicit Columns(const PointCloud& cloud)
       : x(cloud.column<double>("world_x")),
@@ -37,9 +37,10 @@ struct Columns {
   std::span<const std::uint32_t> object;
 };
 
-// A ray that meets what hides a point from the camera, and not the point's own surface. The point
-// is off its surface by the error of the lidar's range, a hit by that of the ray's, however small
-// the angle between ray and surface is; objects move less than 0.5 um in the error of `time`.
+// Returns a ray that hits whatever hides a point from the camera, but not the point's own surface.
+// Its end is above the surface by more than the errors of the lidar's range and of the ray's hits,
+// however small the angle between ray and surface. Objects move by less than 0.5 um within the
+// error of `time`.
 Ray towards(const Sighting& seen, const glm::dvec3& normal, double lidar_range_m) {
   const double lift_m = 1e-6 + 1e-9 * (2 + lidar_range_m + glm::length(seen.towards));
   const glm::dvec3 above =
@@ -48,7 +49,7 @@ Ray towards(const Sighting& seen, const glm::dvec3& normal, double lidar_range_m
   return {seen.X_DC.translation_m, above / range_m, range_m, seen.time};
 }
 
-// Images some echoes of a scan.
+// Projects blocks of a scan's echoes.
 class Imaging {
  public:
   Imaging(const Camera& camera, const Scene& scene, const Trajectory& X_DC, nanoseconds begin,
@@ -58,8 +59,8 @@ class Imaging {
   std::vector<ImagedEcho> fill(std::size_t begin, std::size_t end) const {
     std::vector<ImagedEcho> imaged;
     std::vector<Ray> rays;
-    std::vector<std::size_t> inside;  // of `imaged`, those with a ray
-    double row = 0;                   // near that of the next echo
+    std::vector<std::size_t> inside;  // indices in `imaged` that have a ray
+    double row = 0;                   // first guess for the next echo
     for (std::size_t i = begin; i < end; ++i) {
       const glm::dvec3 p_DQ(echoes_.x[i], echoes_.y[i], echoes_.z[i]);
       const nanoseconds time = stamp_ + nanoseconds(std::llround(1e9 * double{echoes_.time_s[i]}));

@@ -5,43 +5,43 @@
 #include <glm/geometric.hpp>
 #include <utility>
 
+#include "core/appearance/normal_map.h"
 #include "core/error.h"
-#include "core/normal_map.h"
 
 namespace groundray {
 namespace {
 
-// Rays leave surfaces from so far above them that the error of their range, and rounding, do not
-// put them below.
+// Height above a surface at which rays start: more than the error of the range and rounding, which
+// could put them below.
 double lift_m(double range_m) { return 1e-6 + 2e-9 * range_m; }
 
 bool is_dark(const glm::vec3& light) { return std::max({light.r, light.g, light.b}) <= 0; }
 
-// The balance heuristic: how much counts what a path of density `own` has found, if another way of
-// density `other` may find it too. The eye's rays, of density 0, nothing else draws.
-double share_of(double own, double other) { return own > 0 ? own / (own + other) : 1.0; }
+// Balance heuristic: weight of a contribution sampled with density `own` that another strategy
+// samples with density `other`. Camera rays, of density 0, have no other strategy.
+double balance_heuristic(double own, double other) { return own > 0 ? own / (own + other) : 1.0; }
 
-// The density by direction of a point of a surface that is chosen by area.
+// Converts a density by area on a surface to a density by direction.
 double pdf_per_sr(double pdf_per_m2, const glm::dvec3& normal, const glm::dvec3& direction,
                   double distance_m) {
   const double cosine = std::abs(glm::dot(normal, direction));
   return cosine > 0 ? pdf_per_m2 * distance_m * distance_m / cosine : 0;
 }
 
-// A shading normal that looks away from the eye is turned until it does not, so that no surface is
-// black for being seen at a small angle.
+// Turns a shading normal that faces away from the camera until it does not, so that surfaces are
+// not black at grazing angles.
 glm::dvec3 towards_eye(const glm::dvec3& normal, const glm::dvec3& to_eye) {
   const double cosine = glm::dot(normal, to_eye);
   if (cosine >= least_shading_cosine) return normal;
   return glm::normalize(normal + (least_shading_cosine - cosine) * to_eye);
 }
 
-// How a surface scatters that a path meets.
+// BSDF of the surface that a path hits, tinted by its textures.
 class Scatterer {
  public:
   Scatterer(std::span<const Bsdf> bsdfs, const Appearance& seen, SobolPairs& numbers) {
     std::uint32_t part = 0;
-    if (seen.count > 1) {  // one layer for all of the path
+    if (seen.count > 1) {  // choose one layer, with a probability equal to its share
       double left = numbers.next().x;
       while (part + 1 < seen.count && left >= static_cast<double>(seen.parts[part].share))
         left -= static_cast<double>(seen.parts[part++].share);
@@ -57,15 +57,15 @@ class Scatterer {
 
  private:
   const Bsdf* bsdf_;
-  std::optional<Bsdf> tinted_;  // most are not, and are large
+  std::optional<Bsdf> tinted_;  // optional because a Bsdf is large and most surfaces have no tint
 };
 
 }  // namespace
 
-// Where a path meets a surface.
+// Surface point of a path.
 struct PathTracer::Vertex {
-  // Axes of a surface: z is `normal`. @see Duff et al., Building an orthonormal basis, revisited,
-  // JCGT 6(1) (2017).
+  // Orthonormal axes of a surface; z is `normal`. @see Duff et al., Building an orthonormal basis,
+  // revisited, JCGT 6(1) (2017).
   struct Axes {
     glm::dvec3 x, y, z;
     explicit Axes(const glm::dvec3& normal) : z(normal) {
@@ -89,11 +89,12 @@ struct PathTracer::Vertex {
         axes(towards_eye(shading_normal, -ray.direction)),
         to_eye(axes.into(-ray.direction)) {}
 
-  // Where a ray starts that leaves to the side of a direction.
+  // Returns the origin of a ray that leaves to the side of a direction.
   glm::dvec3 start(const glm::dvec3& direction) const {
     return at + facet * std::copysign(above_m, glm::dot(direction, facet));
   }
-  // Light passes on the side of the facet that the shading normal has it on, or not at all.
+  // True if a direction is on the same side of the facet and of the shading normal; no other light
+  // passes.
   bool lets_pass(const glm::dvec3& direction) const {
     return glm::dot(direction, facet) * glm::dot(direction, axes.z) > 0;
   }
@@ -101,7 +102,7 @@ struct PathTracer::Vertex {
     if (!lets_pass(direction)) return std::nullopt;
     return Ray{start(direction), direction, far_m, time};
   }
-  // Ends just before a point, by more than its range may err.
+  // Returns a shadow ray that ends before a point, by more than the error of its range.
   std::optional<Ray> leave_for(const glm::dvec3& point) const {
     const glm::dvec3 origin = start(point - at);
     const double distance_m = glm::distance(origin, point);
@@ -114,7 +115,7 @@ struct PathTracer::Vertex {
   double above_m, far_m;
   std::chrono::nanoseconds time;
   Axes axes;          // z is the shading normal
-  glm::dvec3 to_eye;  // in them
+  glm::dvec3 to_eye;  // in `axes`
 };
 
 PathTracer::PathTracer(const Scene& scene, const Sky& sky, int depth,
@@ -144,7 +145,7 @@ void PathTracer::trace(std::span<const Sample> samples, std::span<glm::vec3> rad
       labels[i] = work.hits[i] ? scene_.truth_of(work.rays[i], work.hits[i]).label : 0;
     work.next_paths.clear();
     work.next_rays.clear();
-    for (Workspace::Asked* asked : {&work.of_sun, &work.of_others}) {
+    for (Workspace::ShadowQueue* asked : {&work.of_sun, &work.of_others}) {
       asked->rays.clear();
       asked->lights.clear();
     }
@@ -153,15 +154,15 @@ void PathTracer::trace(std::span<const Sample> samples, std::span<glm::vec3> rad
       radiance[path.sample] += found(work.rays[k], work.hits[k], path);
       if (work.hits[k] && rays < depth_) scatter(work.rays[k], work.hits[k], path, work);
     }
-    add_light(work.of_sun, Batch::FromSurfaces, radiance, work);
+    add_light(work.of_sun, Batch::ShadowRays, radiance, work);
     add_light(work.of_others, Batch::Scattered, radiance, work);
     std::swap(work.paths, work.next_paths);
     std::swap(work.rays, work.next_rays);
   }
 }
 
-// Adds what nothing is in the way of.
-void PathTracer::add_light(const Workspace::Asked& asked, Batch batch,
+// Adds unoccluded direct light.
+void PathTracer::add_light(const Workspace::ShadowQueue& asked, Batch batch,
                            std::span<glm::vec3> radiance, Workspace& work) const noexcept {
   work.light_hits.resize(asked.rays.size());
   scene_.trace(asked.rays, work.light_hits, batch);
@@ -171,7 +172,8 @@ void PathTracer::add_light(const Workspace::Asked& asked, Batch batch,
   }
 }
 
-// The light that a path's ray finds itself. Where it meets a surface the path fades by the air.
+// Returns emission and sky light that the path's own ray hits, MIS-weighted, and light that the air
+// adds; attenuates the throughput by the air.
 glm::vec3 PathTracer::found(const Ray& ray, const Hit& hit, Workspace::Path& path) const noexcept {
   if (!hit) return path.throughput * glm::vec3(found_sky(ray.direction, path.pdf_per_sr));
   glm::vec3 sum(0);
@@ -183,22 +185,23 @@ glm::vec3 PathTracer::found(const Ray& ray, const Hit& hit, Workspace::Path& pat
   }
   if (!emitters_.any_shines()) return sum;
   const auto [shines, drawn_per_m2] = emitters_.glow_of(hit);
-  const double share =
-      share_of(path.pdf_per_sr, pdf_per_sr(drawn_per_m2, hit.normal, ray.direction, hit.range_m));
+  const double share = balance_heuristic(
+      path.pdf_per_sr, pdf_per_sr(drawn_per_m2, hit.normal, ray.direction, hit.range_m));
   return sum + path.throughput * glm::vec3(shines * share);
 }
 
 glm::dvec3 PathTracer::found_sky(const glm::dvec3& direction, double pdf_per_sr) const noexcept {
   if (!(pdf_per_sr > 0)) return sky_.radiance(direction);
   const double other = sky_.is_constant_dome() ? 0 : sky_.dome_pdf_per_sr(direction);
-  return sky_.dome_radiance(direction) * share_of(pdf_per_sr, other);
+  return sky_.dome_radiance(direction) * balance_heuristic(pdf_per_sr, other);
 }
 
-// The sun's disc is so small that hardly any path finds it, and no lobe of a surface is much
-// narrower: asking is enough. A constant dome nothing draws better than the surface.
-void PathTracer::ask_for_light(const Vertex& vertex, const Bsdf& bsdf, Workspace::Path& path,
+// Next-event estimation. The sun is sampled here alone: hardly any path hits its disc by chance,
+// and no lobe of a BSDF is much narrower. A constant dome is omitted: no density samples it better
+// than the BSDF's.
+void PathTracer::sample_direct(const Vertex& vertex, const Bsdf& bsdf, Workspace::Path& path,
                                Workspace& work) const noexcept {
-  const auto ask = [&](Workspace::Asked& asked, const std::optional<Ray>& to_light,
+  const auto ask = [&](Workspace::ShadowQueue& asked, const std::optional<Ray>& to_light,
                        const glm::dvec3& radiance, const auto& density) {
     if (!to_light) return;
     const glm::dvec3 wi = vertex.axes.into(to_light->direction);
@@ -243,7 +246,7 @@ void PathTracer::scatter(const Ray& ray, const Hit& hit, Workspace::Path path,
   const Scatterer scatterer(bsdfs_, scene_.appearance_of(ray, hit, 0, Filtering::Fast),
                             path.numbers);
   const Bsdf& bsdf = *scatterer;
-  ask_for_light(vertex, bsdf, path, work);
+  sample_direct(vertex, bsdf, path, work);
   const auto [wi, weight, pdf_per_sr] = bsdf.sample(vertex.to_eye, path.numbers.next());
   if (!(pdf_per_sr > 0)) return;
   const auto onward = vertex.leave(vertex.axes.out_of(wi));

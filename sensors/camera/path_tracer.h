@@ -6,69 +6,71 @@
 #include <span>
 #include <vector>
 
-#include "core/bsdf.h"
-#include "core/scene.h"
+#include "core/appearance/bsdf.h"
 #include "core/sobol.h"
-#include "sensors/aerial_perspective.h"
+#include "core/tracing/scene.h"
 #include "sensors/camera/emitters.h"
-#include "sensors/sky.h"
+#include "sensors/sky/aerial_perspective.h"
+#include "sensors/sky/sky.h"
 
 namespace groundray {
 
-/// Light along rays, by paths from the eye. At every surface a path asks for light from the sun, a
-/// point of what shines in the scene, and a direction of the dome; where it goes on, it finds light
-/// itself. The sun counts by asking alone, a constant dome by finding alone; of all else both
-/// count, weighed by the balance heuristic. Nothing is clamped or smoothed: the mean over paths
-/// converges to the light of paths of at most `depth` rays. Immutable; any number of threads may
-/// use one.
+/// Path tracer from the camera. At every surface, next-event estimation samples the sun, a point of
+/// an emitter and a direction of the dome, and BSDF sampling continues the path, which may hit an
+/// emitter or reach the sky. The sun counts by next-event estimation alone (except for camera
+/// rays), a constant dome by BSDF sampling alone; of all other lights both count, weighted by the
+/// balance heuristic. Nothing is clamped or filtered: the mean over paths converges to the light of
+/// paths of at most `depth` rays. Immutable; any number of threads may use one.
 /// @see Veach, Robust Monte Carlo methods for light transport simulation (1997), chapters 8 and 9;
-///      docs/camera_light.md
+///      docs/theory/camera_light.md
 class PathTracer {
  public:
   /// @param scene, sky  must live as long as this.
-  /// @param depth  of the longest paths, in rays: 1 sees what shines, 2 what that lights, 3 what is
-  ///        lit by that.
-  /// @param air  what fades things with distance, or nothing.
-  /// @throws Error unless depth is from 1 to 64; as bsdf_in_colour, of any of the materials; or as
+  /// @param depth  most rays in a path: 1 shows only emitted light, 2 adds direct light, and each
+  ///        further ray adds one bounce.
+  /// @param air  aerial perspective, or nothing.
+  /// @throws Error unless depth is from 1 to 64; as bsdf_in_colour, for any of the materials; or as
   ///         Emitters.
   PathTracer(const Scene& scene, const Sky& sky, int depth,
              const std::optional<AerialPerspective>& air);
 
-  /// A ray of a camera, and the numbers that its path draws.
+  /// Camera ray, and the random numbers of its path.
   struct Sample {
     Ray ray;
     SobolPairs numbers;
   };
 
-  /// Buffers of one thread; what is in them is the tracer's.
+  /// Buffers of one thread; their content is private to the tracer.
   struct Workspace {
-    /// A path under way.
+    /// Path in progress.
     struct Path {
       std::uint32_t sample;
-      float pdf_per_sr;  // of its direction; 0 for a camera's, which nothing else could draw
+      // Density of its direction; 0 for camera rays, which light sampling cannot generate.
+      float pdf_per_sr;
       glm::vec3 throughput;
       SobolPairs numbers;
     };
-    /// Light that arrives unless something is in its way.
+    /// Contribution of a shadow ray if that is not occluded.
     struct Light {
       std::uint32_t sample;
       glm::vec3 radiance;
     };
-    /// Rays to one kind of light, and what they bring.
-    struct Asked {
+    /// Shadow rays to one kind of light, and their contributions.
+    struct ShadowQueue {
       std::vector<Ray> rays;
       std::vector<Light> lights;
     };
     std::vector<Path> paths, next_paths;
     std::vector<Ray> rays, next_rays;
     std::vector<Hit> hits, light_hits;
-    Asked of_sun, of_others;
+    ShadowQueue of_sun, of_others;
   };
 
-  /// Follows one path for each sample.
-  /// @param radiance  what arrives along each ray: linear sRGB, W/(m^2 sr), see docs/sky.md.
-  /// @param labels  of what each ray meets first, as Scene::truth_of has them, 0 for the sky; empty
-  ///        if they are not wanted.
+  /// Traces one path for each sample.
+  /// @param radiance  radiance that arrives along each ray: linear sRGB, W/(m^2 sr), see
+  ///        docs/theory/sky.md.
+  /// @param labels  labels of each ray's first hit, as in Scene::truth_of, 0 for the sky; empty if
+  ///        they are not requested.
   void trace(std::span<const Sample> samples, std::span<glm::vec3> radiance, Workspace& work,
              std::span<std::uint16_t> labels = {}) const noexcept;
 
@@ -78,9 +80,9 @@ class PathTracer {
   glm::dvec3 found_sky(const glm::dvec3& direction, double pdf_per_sr) const noexcept;
   void scatter(const Ray& ray, const Hit& hit, Workspace::Path path,
                Workspace& work) const noexcept;
-  void ask_for_light(const Vertex& vertex, const Bsdf& bsdf, Workspace::Path& path,
+  void sample_direct(const Vertex& vertex, const Bsdf& bsdf, Workspace::Path& path,
                      Workspace& work) const noexcept;
-  void add_light(const Workspace::Asked& asked, Batch batch, std::span<glm::vec3> radiance,
+  void add_light(const Workspace::ShadowQueue& asked, Batch batch, std::span<glm::vec3> radiance,
                  Workspace& work) const noexcept;
 
   const Scene& scene_;

@@ -7,15 +7,15 @@
 #include <utility>
 
 #include "core/error.h"
-#include "core/srgb.h"
+#include "core/image/srgb.h"
 
 namespace groundray {
 namespace {
 
 constexpr std::size_t raised_values = std::size_t{1} << 16;
 
-// Those that show grey surfaces in light of equal red, green and blue as grey; the least is 1, so
-// that what saturates all channels is white.
+// Returns the gains with which grey surfaces in light of equal red, green and blue appear grey. The
+// smallest is 1, so that pixels with all channels saturated are white.
 glm::dvec3 grey_gains(const ImagerSpec& imager) {
   const glm::dvec3& share = imager.quantum_efficiency;
   if (imager.filter == ColorFilter::Mono) return glm::dvec3(1);
@@ -24,7 +24,7 @@ glm::dvec3 grey_gains(const ImagerSpec& imager) {
 
 double highest_code(int bits) { return std::exp2(bits) - 1; }
 
-// Digital numbers from black to where the pixel or its number is full.
+// Returns the digital numbers from black to saturation, of the pixel or of its number.
 double white_dn(const ImagerSpec& imager) {
   const double full_dn = std::round(imager.black_dn + imager.gain_dn_e * imager.full_well_e);
   return std::min(full_dn, highest_code(imager.bits)) - imager.black_dn;
@@ -67,7 +67,7 @@ RawDeveloper::RawDeveloper(const PictureSpec& spec, const ImagerSpec& imager)
   const double white = white_dn(imager);
   broken.unless(
       white >= 1,
-      "a full well of {} e is no digital number above black with {} DN/e: raise gain_dn_e",
+      "a full well of {} e is less than one digital number above black at {} DN/e: raise gain_dn_e",
       imager.full_well_e, imager.gain_dn_e);
   broken.throw_if_any();
   const double raised = std::exp2(16 - bits_), top = highest_code(spec.bits);
@@ -98,14 +98,14 @@ Image<T> RawDeveloper::encoded(const Image16& colors) const {
 Picture RawDeveloper::develop(const Image16& raw) const {
   const bool is_mosaic = filter_ != ColorFilter::Mono;
   if (raw.channels() != 1) {
-    throw Error("picture: a raw image has 1 channel, but this one {}", raw.channels());
+    throw Error("picture: a raw image must have 1 channel, but has {}", raw.channels());
   }
   if (is_mosaic && (raw.width() < 3 || raw.height() < 3)) {
-    throw Error("picture: a mosaic of {} x {} px has not all colours; it must have at least 3 x 3",
+    throw Error("picture: a mosaic of {} x {} px lacks some colours; it must have at least 3 x 3",
                 raw.width(), raw.height());
   }
-  // Raised to 16 bits, interpolated colours are rounded to less than a digital number; and black
-  // is taken off thereafter, so that noise below it is not cut off before its mean is taken.
+  // Scaled to 16 bits, interpolated colours are rounded to less than a digital number. Black is
+  // subtracted after interpolation, so that noise below black is averaged rather than clipped.
   Image16 colors = raw;
   const auto top = static_cast<std::uint16_t>(highest_code(bits_));
   for (std::uint16_t& value : colors.values())

@@ -6,28 +6,28 @@
 #include <variant>
 #include <vector>
 
-#include "core/image.h"
+#include "core/image/image.h"
 #include "sensors/camera/camera_spec.h"
 
 namespace groundray {
 
-/// An image to look at: red, green and blue, or grey.
+/// Image for viewing: red, green and blue, or grey.
 using Picture = std::variant<Image8, Image16>;
 
-/// Makes pictures of an imager's raw images. Immutable; any number of threads may use one.
-/// @see docs/camera_imager.md
+/// Converts an imager's raw images to pictures. Immutable; any number of threads may use one.
+/// @see docs/theory/camera_imager.md
 class RawDeveloper {
  public:
   /// @throws Error listing every field that is out of bounds.
   RawDeveloper(const PictureSpec& spec, const ImagerSpec& imager);
 
-  /// What red, green and blue are multiplied by.
+  /// Returns the factors of red, green and blue.
   const glm::dvec3& gains() const noexcept { return gains_; }
 
-  /// Returns the picture of a raw image, encoded and of as many bits as asked for, over all of
-  /// them. Colours are interpolated bilinearly; the outermost pixels of a mosaic have those of the
-  /// next.
-  /// @throws Error unless `raw` has one channel and, of a mosaic, at least 3 x 3 px.
+  /// Returns the picture of a raw image, encoded over the full range of the requested bit depth.
+  /// Mosaics are demosaiced bilinearly; their outermost pixels copy the colours of their inner
+  /// neighbours.
+  /// @throws Error unless `raw` has one channel and, for a mosaic, at least 3 x 3 px.
   Picture develop(const Image16& raw) const;
 
  private:
@@ -36,9 +36,9 @@ class RawDeveloper {
 
   PictureSpec spec_;
   ColorFilter filter_;
-  int bits_;  // of raw images
+  int bits_;  // bit depth of raw images
   glm::dvec3 gains_;
-  std::array<std::vector<std::uint16_t>, 3> codes_;  // of each channel's values, raised to 16 bits
+  std::array<std::vector<std::uint16_t>, 3> codes_;  // by channel and raw value, scaled to 16 bits
 };
 
 }  // namespace groundray

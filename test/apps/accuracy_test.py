@@ -1,4 +1,4 @@
-"""The table of docs/accuracy.md: its claims name tests that are there, and it tells what ran."""
+"""The tables of docs/accuracy: claims name existing tests, and rows report the last run."""
 
 import importlib.util
 import json
@@ -22,10 +22,19 @@ def load_lister():
 lister = load_lister()
 
 
-def test_every_claim_names_tests_that_are_there():
+def every_claim():
+    return [claim for page in lister.read_claims().values() for claim in page]
+
+
+def test_every_page_of_claims_has_a_file():
+    pages = {file.stem for file in (ROOT / "docs/accuracy").glob("*.md")}
+    assert pages == set(lister.read_claims())
+
+
+def test_every_claim_names_existing_tests():
     by_file, cases = lister.tests_by_file(), lister.golden_cases()
     all_tests = [name for tests in by_file.values() for name in set(tests)]
-    for claim in lister.read_claims():
+    for claim in every_claim():
         names = lister.tests_of_claim(claim, by_file, cases)
         assert all(all_tests.count(name) <= 1 for name in names), "results go by the tests' names"
         assert claim["tolerance"]
@@ -33,8 +42,8 @@ def test_every_claim_names_tests_that_are_there():
         assert (ROOT / "docs" / claim.get("see", "accuracy.md")).exists()
 
 
-def test_every_golden_case_holds_a_claim():
-    held = {case for claim in lister.read_claims() for case in claim.get("golden", [])}
+def test_every_golden_case_supports_a_claim():
+    held = {case for claim in every_claim() for case in claim.get("golden", [])}
     assert held == set(lister.golden_cases()), "docs/claims.yaml must name each case of test/golden"
 
 
@@ -42,7 +51,7 @@ def test_every_golden_case_holds_a_claim():
     "library",
     ["core", "terrain", "sensors", "reconstruction", "golden", "apps", "view"],
 )
-def test_the_names_in_the_sources_are_those_of_the_programs(library):
+def test_names_in_the_sources_match_the_programs(library):
     listed = subprocess.run(
         [PROGRAMS / f"{library}_test", "--gtest_list_tests"],
         capture_output=True,
@@ -60,8 +69,8 @@ def test_the_names_in_the_sources_are_those_of_the_programs(library):
     assert names <= {name for tests in lister.tests_by_file().values() for name in tests}
 
 
-def test_what_proofs_say_of_their_size_can_be_told():
-    """Why a test is skipped is told apart by its words, and sizes are recorded as tests run."""
+def test_skip_reasons_of_proofs_are_recognised():
+    """Skip reasons are classified by their text, and sizes are recorded while tests run."""
     sources = [file.read_text() for file in ROOT.glob("test/**/*_test.cpp")]
     skips = [
         line
@@ -77,7 +86,7 @@ def test_what_proofs_say_of_their_size_can_be_told():
         )
 
 
-def test_claims_may_name_many_files_and_suites():
+def test_claims_may_name_files_and_suites_by_wildcard():
     by_file = {"a_test.cpp": ["A.One"], "a_proof_test.cpp": ["AProof.Two"], "b_test.py": ["test_b"]}
     for pattern, expected in (
         ("a*_test.cpp", ["A.One", "AProof.Two"]),
@@ -94,7 +103,13 @@ def test_claims_may_name_many_files_and_suites():
 
 CLAIMS = [
     {"claim": "a | b", "tests": ["Cubes.*"], "golden": ["lens"], "tolerance": "1e-9 px"},
-    {"claim": "c", "tests": ["test_c"], "how": "by hand", "see": "sky.md", "tolerance": "none"},
+    {
+        "claim": "c",
+        "tests": ["test_c"],
+        "how": "by hand",
+        "see": "theory/sky.md",
+        "tolerance": "none",
+    },
 ]
 CUBE = """<testsuites><testsuite name="All/Cubes"><testcase name="AreCubes/{0}" status="run"
   result="completed" timestamp="2026-01-02T03:04:05.678" classname="All/Cubes"><properties>
@@ -122,7 +137,7 @@ LENS = [
 
 @pytest.fixture
 def folder(tmp_path, monkeypatch):
-    """Results of two parameters of one test, of a check in Python and of a case."""
+    """Results of two parameters of one test, a check in Python and a golden case."""
     (tmp_path / "test").mkdir()
     results = [tmp_path / f"results/core/All/Cubes.AreCubes/{i}.xml" for i in range(2)]
     results[0].parent.mkdir(parents=True)
@@ -158,15 +173,16 @@ def write_report(folder, verdict):
 
 
 def table(folder):
-    return lister.table(CLAIMS, lister.read_run(folder, folder))
+    """Returns the summary, and the table of a single page below it."""
+    return "\n".join(lister.texts({"page": CLAIMS}, lister.read_run(folder, folder)).values())
 
 
 def rows(folder):
-    """Returns what the last column says of the two claims."""
+    """Returns the last column of the two claims' rows."""
     return [line.split(" | ")[-1].removesuffix(" |") for line in table(folder).splitlines()[-2:]]
 
 
-def test_the_table_tells_the_margin_that_is_nearest_its_tolerance(folder):
+def test_the_table_shows_the_margin_nearest_its_tolerance(folder):
     made = table(folder)
     assert "version 0.1.0 (gcc), 2026-01-02 to 20" in made
     assert made.splitlines()[2:] == [
@@ -176,11 +192,11 @@ def test_the_table_tells_the_margin_that_is_nearest_its_tolerance(folder):
         "|---|---|---|---|",
         r"| a \| b | `Cubes.*`, golden `lens` | 1e-9 px | holds at full size; side: 0.25 of 1 px; "
         "range: 25 % of the tolerance; golden: 30 % of the tolerance at most |",
-        "| c | `test_c` ([sky.md](sky.md)): by hand | none | holds |",
+        "| c | `test_c` ([sky.md](../theory/sky.md)): by hand | none | holds |",
     ]
 
 
-def test_what_is_over_its_limit_is_told_beside_it_and_above_the_table(folder):
+def test_exceeded_limits_are_reported_in_their_row_and_above_the_table(folder):
     write_cube(folder, 1, 1.25)
     write_python(folder, TIME.format(2.18, "reduced"))
     assert (
@@ -201,13 +217,13 @@ def test_what_is_over_its_limit_is_told_beside_it_and_above_the_table(folder):
     ("share", "is_over"),
     [("1", False), ("1.0000000000000058", False), ("1.001", True), ("nan", True), ("inf", True)],
 )
-def test_a_limit_that_is_met_to_rounding_is_not_exceeded(folder, share, is_over):
+def test_a_limit_met_within_rounding_is_not_exceeded(folder, share, is_over):
     write_cube(folder, 1, share)
     assert ("over its limit** in" in table(folder)) == is_over
     assert ("None of the 3 figures" in table(folder)) != is_over
 
 
-def test_a_figure_that_may_not_be_there_at_all_is_told():
+def test_figures_with_a_limit_of_zero_are_formatted():
     assert lister.text_of_margin("rays", lister.margin_of("0 0 0 rays")) == "rays: none"
     assert lister.text_of_margin("rays", lister.margin_of("inf 3 0 rays")) == (
         "rays: 3 of 0 rays (**over its limit** in this run)"
@@ -216,7 +232,7 @@ def test_a_figure_that_may_not_be_there_at_all_is_told():
     assert lister.figure_of("off", lister.margin_of("0.2 0.03 0.15")) == "off: 0.03 of 0.15"
 
 
-def test_a_figure_over_its_limit_is_told_where_no_row_shows_it(folder, monkeypatch):
+def test_an_exceeded_limit_is_reported_even_if_no_row_shows_it(folder, monkeypatch):
     write_cube(folder, 1, 1.25)
     monkeypatch.setitem(CLAIMS[0], "margins", ["side"])
     assert "side: 1.25 of 1 px" in rows(folder)[0]
@@ -236,7 +252,7 @@ def test_a_figure_over_its_limit_is_told_where_no_row_shows_it(folder, monkeypat
         ),
     ],
 )
-def test_each_row_tells_the_size_that_it_ran_at(folder, sizes, said, above):
+def test_each_row_states_the_size_at_which_it_ran(folder, sizes, said, above):
     for i, size in enumerate(sizes):
         write_cube(folder, i, 0.5, size=size)
     assert rows(folder)[0].startswith(said + ";")
@@ -244,17 +260,17 @@ def test_each_row_tells_the_size_that_it_ran_at(folder, sizes, said, above):
     assert "1 of 2 rows have tests of two sizes: " + above in table(folder)
 
 
-def test_a_row_of_both_sizes_names_what_was_reduced(folder, monkeypatch):
+def test_a_row_of_both_sizes_names_the_reduced_tests(folder, monkeypatch):
     monkeypatch.setitem(CLAIMS[0], "tests", ["Cubes.*", "test_c"])
     write_python(folder, TIME.format(0.5, "reduced"))
-    assert rows(folder)[0].startswith("holds at full size, but for `test_c`; side")
+    assert rows(folder)[0].startswith("holds at full size, except `test_c`; side")
     assert (
         "2 of 2 rows have tests of two sizes: 0 ran at the size given here, 1 at a reduced size, "
         "1 at a reduced size in part; each row says which."
     ) in table(folder)
 
 
-def test_proofs_in_python_at_full_size_take_the_place_of_reduced_ones(folder):
+def test_python_proofs_at_full_size_replace_reduced_ones(folder):
     write_python(folder, TIME.format(0.5, "reduced"))
     assert rows(folder)[1] == "holds at a reduced size; time: 0.5 of 1 s"
     write_python(folder, TIME.format(0.25, "full"), "python_proofs")
@@ -265,9 +281,9 @@ def skipped(why):
     return f"""<skipped message="{why}"/>"""
 
 
-def test_what_was_skipped_is_told_with_its_reason(folder):
+def test_skipped_tests_are_reported_with_their_reason(folder):
     write_python(folder, skipped(f"there is no {ROOT.parent}/shared/x.laz"))
-    said = "**not run here**: it needs what is absent"
+    said = "**not run here**: it lacks a prerequisite"
     assert rows(folder)[1] == f"{said}: there is no ../shared/x.laz"
     write_python(folder, "<skipped/>")
     assert rows(folder)[1] == said
@@ -277,10 +293,10 @@ def test_what_was_skipped_is_told_with_its_reason(folder):
     ("why", "said"),
     [
         ("/a/cubes_test.cpp:7&#x0A;at full size only: takes long", "runs at full size only"),
-        ("/a/cubes_test.cpp:7&#x0A;no cubes", "needs what is absent: no cubes"),
+        ("/a/cubes_test.cpp:7&#x0A;no cubes", "lacks a prerequisite: no cubes"),
     ],
 )
-def test_a_test_that_was_skipped_is_told_apart_by_its_reason(folder, why, said):
+def test_skipped_tests_are_classified_by_their_reason(folder, why, said):
     write_cube(folder, 1, 0.5, skipped(why), "reduced")
     assert rows(folder)[0].endswith(f"; without a part of `Cubes.AreCubes`, which {said}")
     write_cube(folder, 0, 0.5, skipped(why), "reduced")
@@ -289,7 +305,7 @@ def test_a_test_that_was_skipped_is_told_apart_by_its_reason(folder, why, said):
     assert made.endswith(f"; without `Cubes.AreCubes`, which {said}")
 
 
-def test_what_failed_or_did_not_run_is_an_error(folder):
+def test_failed_tests_and_tests_that_did_not_run_are_an_error(folder):
     write_cube(folder, 1, 0.5, "<failure message='no'/>")
     (folder / "results/python.xml").write_text("<testsuites/>")
     write_report(folder, "failed")
@@ -301,7 +317,7 @@ def test_what_failed_or_did_not_run_is_an_error(folder):
 
 
 @pytest.mark.parametrize("gone", [[0], [1], [0, 1]])
-def test_results_of_tests_that_crashed_are_missed(folder, gone):
+def test_missing_results_of_crashed_tests_are_an_error(folder, gone):
     for i in gone:
         (folder / f"results/core/All/Cubes.AreCubes/{i}.xml").unlink()
     with pytest.raises(lister.AccuracyError) as fault:
@@ -315,18 +331,18 @@ def test_results_of_tests_that_crashed_are_missed(folder, gone):
     ("absent", "command"),
     [("results/python.xml", "test"), ("report.json", "golden")],
 )
-def test_absent_results_name_the_command_that_makes_them(folder, absent, command):
+def test_missing_results_name_the_command_that_makes_them(folder, absent, command):
     (folder / absent).rename(folder / "elsewhere")
     with pytest.raises(lister.AccuracyError, match=f"run ./dev {command} first"):
         table(folder)
 
 
-def test_the_table_stands_between_its_comments(tmp_path):
+def test_the_table_is_written_between_its_comments(tmp_path):
     page = tmp_path / "page.md"
     page.write_text(f"before\n{lister.BEGIN}old\n{lister.END}after\n")
     for _ in range(2):
-        lister.write_table(page, "new\n")
+        lister.write_text(page, "new\n")
         assert page.read_text() == f"before\n{lister.BEGIN}\nnew\n\n{lister.END}after\n"
     page.write_text("neither\n")
     with pytest.raises(lister.AccuracyError, match="must have these two lines"):
-        lister.write_table(page, "new\n")
+        lister.write_text(page, "new\n")

@@ -1,4 +1,4 @@
-"""Images and what comes with them, read by OpenEXR, OpenCV, NumPy and PyYAML.
+"""Images and their other files, read by OpenEXR, OpenCV, NumPy and PyYAML.
 
 One run of a lidar and two cameras that move past a vehicle, a rock and grass: `left` has a
 distorting lens, all products and the lidar's trigger, `eye` is a fisheye that sees beyond 90
@@ -130,7 +130,7 @@ def image(out, camera, number):
 
 
 def picture(out, suffix, number=1, camera="left"):
-    """Channels in the file's order, where OpenCV has them reversed."""
+    """Returns channels in the file's order; OpenCV reverses them."""
     pixels = cv2.imread(str(out / f"camera/{camera}/{number:06}{suffix}"), cv2.IMREAD_UNCHANGED)
     return pixels if pixels.ndim == 2 else pixels[:, :, ::-1]
 
@@ -169,7 +169,7 @@ def turn_of(R):
 
 
 class PosePath:
-    """A pose file, by constant twists between its rows: X_DC at any time."""
+    """A pose file, interpolated by constant twists between its rows: X_DC at any time."""
 
     def __init__(self, file):
         rows = np.loadtxt(file)
@@ -189,7 +189,7 @@ class PosePath:
 
     @staticmethod
     def spread(turn):
-        """What a constant twist makes of its velocity: the integral of its rotation."""
+        """Returns the integral of a constant twist's rotation, which acts on its velocity."""
         angle = np.linalg.norm(turn)
         if angle < 1e-9:
             return np.eye(3)
@@ -203,7 +203,7 @@ class PosePath:
 
 
 class Camera:
-    """What other people know of a camera: its ROS calibration and its pose file."""
+    """A camera as other software sees it: its ROS calibration and its pose file."""
 
     def __init__(self, out, name):
         info = yaml.safe_load((out / f"calibration/{name}.ros.yaml").read_text())
@@ -258,14 +258,14 @@ def rounding_px(camera, exr, hit):
 
 
 def around(values, uv):
-    """The least and the largest of the 3 x 3 pixels round each place."""
+    """Returns the minimum and maximum of the 3 x 3 pixels around each position."""
     u, v = np.rint(uv).astype(int).T
     padded = np.pad(values, 1, mode="edge")
     each = np.stack([padded[v + i, u + j] for i in range(3) for j in range(3)])
     return each.min(axis=0), each.max(axis=0)
 
 
-def test_there_are_the_files_of_the_docs_and_no_others(out):
+def test_exactly_the_documented_files_are_written(out):
     of_images = {
         "left": (".exr .flo .png _electrons.exr _flow.png _irradiance.exr _photons.exr"
                  " _preview.png _raw.png _top.npy"),
@@ -282,7 +282,7 @@ def test_there_are_the_files_of_the_docs_and_no_others(out):
     assert {str(p.relative_to(out)) for p in out.rglob("*") if p.is_file()} == expected
 
 
-def test_channels_have_the_names_and_types_of_the_docs(out):
+def test_channels_have_the_documented_names_and_types(out):
     forward = {"FlowForward.u", "FlowForward.v", "FlowForward.seen"}
     backward = {name.replace("Forward", "Backward") for name in forward}
     flows = (forward, forward | backward, backward)
@@ -297,7 +297,7 @@ def test_channels_have_the_names_and_types_of_the_docs(out):
                 assert pixels.shape == shape
 
 
-def test_attributes_tell_of_light_and_pose(out):
+def test_attributes_describe_light_and_pose(out):
     for name in CAMERAS:
         camera, header = Camera(out, name), image(out, name, 1).header
         assert header["compression"] == OpenEXR.ZIP_COMPRESSION
@@ -315,7 +315,7 @@ def test_attributes_tell_of_light_and_pose(out):
 
 @pytest.mark.parametrize("name", CAMERAS)
 @pytest.mark.parametrize("number", [0, 1, 2])
-def test_points_are_imaged_at_the_centres_of_their_pixels(out, name, number):
+def test_points_project_to_the_centres_of_their_pixels(out, name, number):
     camera, exr = Camera(out, name), image(out, name, number)
     hit = np.isfinite(exr["Z"])
     assert 0.3 < hit.mean() < 0.95
@@ -330,7 +330,7 @@ def test_points_are_imaged_at_the_centres_of_their_pixels(out, name, number):
         assert exr["Z"][hit].min() < 0  # it sees beyond 90 degrees
 
 
-def test_depth_is_distance_times_the_rays_share_of_the_axis(out):
+def test_depth_is_distance_times_the_cosine_to_the_axis(out):
     camera, exr = Camera(out, "left"), image(out, "left", 1)
     exactly = (cv2.TERM_CRITERIA_MAX_ITER, 100, 0)
     flat = cv2.undistortPoints(camera.pixels(), camera.K, camera.D, criteria=exactly)
@@ -341,7 +341,7 @@ def test_depth_is_distance_times_the_rays_share_of_the_axis(out):
 
 
 @pytest.mark.parametrize("name", CAMERAS)
-def test_normals_turn_to_the_eye_at_the_angle_that_is_told(out, name):
+def test_normals_face_the_camera_at_the_recorded_incidence(out, name):
     camera, exr = Camera(out, name), image(out, name, 0)
     hit = np.isfinite(exr["Z"])
     times = camera.time_of(0, camera.pixels()[hit.ravel()][:, 1])
@@ -355,7 +355,7 @@ def test_normals_turn_to_the_eye_at_the_angle_that_is_told(out, name):
     assert np.abs(np.linalg.norm(exr.stack("Ns")[hit], axis=1) - 1).max() < 2e-7
 
 
-def test_sky_has_what_the_docs_say(out):
+def test_sky_pixels_have_the_documented_values(out):
     for name in CAMERAS:
         exr = image(out, name, 1)
         sky = np.isinf(exr["Z"])
@@ -373,7 +373,7 @@ def test_sky_has_what_the_docs_say(out):
 
 
 @pytest.mark.parametrize("name", CAMERAS)
-def test_ids_are_those_of_the_record(out, name):
+def test_ids_match_the_dataset_record(out, name):
     told, exr = record(out), image(out, name, 1)
     hit = np.isfinite(exr["Z"])
     label = np.where(hit, 1, 0)
@@ -405,7 +405,7 @@ def test_coverage_sums_to_one_and_agrees_with_labels(out):
 
 @pytest.mark.parametrize("name", CAMERAS)
 @pytest.mark.parametrize(("way", "other"), [("Forward", 2), ("Backward", 0)])
-def test_flow_is_where_other_images_have_the_point(out, name, way, other):
+def test_flow_leads_to_the_same_point_in_other_images(out, name, way, other):
     camera, exr, beside = Camera(out, name), image(out, name, 1), image(out, name, other)
     stands = np.isfinite(exr["Z"]) & (exr["Label"] != 10) & np.isfinite(exr[f"Flow{way}.u"])
     flow = exr.stack(f"Flow{way}", ("u", "v"))[stands]
@@ -426,7 +426,7 @@ def test_flow_is_where_other_images_have_the_point(out, name, way, other):
     assert (near_m[inside][hidden] > 0.95 * low[hidden]).all()
 
 
-def test_flow_files_hold_the_flow(out):
+def test_flow_files_contain_the_flow(out):
     for number in range(3):
         flo = cv2.readOpticalFlow(str(out / f"camera/left/{number:06}.flo"))
         kitti = picture(out, "_flow.png", number)
@@ -446,7 +446,7 @@ def test_flow_files_hold_the_flow(out):
         assert (kitti[~known] == 0).all()
 
 
-def test_light_becomes_photons_electrons_numbers_and_a_picture(out):
+def test_light_is_converted_to_photons_electrons_numbers_and_a_picture(out):
     stem = out / "camera/left/000001"
     radiance = image(out, "left", 1)
     irradiance, photons, electrons = (
@@ -489,7 +489,7 @@ def test_light_becomes_photons_electrons_numbers_and_a_picture(out):
 
 @pytest.mark.parametrize("name", CAMERAS)
 @pytest.mark.parametrize("number", [0, 2])
-def test_echoes_are_where_the_lens_has_them(out, name, number):
+def test_echoes_are_listed_at_the_pixels_that_the_lens_projects_to(out, name, number):
     camera, exr = Camera(out, name), image(out, name, number)
     scan = PlyData.read(out / f"lidar/top/{number:06}.ply")["vertex"].data
     found = np.load(out / f"camera/{name}/{number:06}_top.npy")
@@ -519,7 +519,7 @@ def test_echoes_are_where_the_lens_has_them(out, name, number):
     assert (visible & behind).sum() <= 0.02 * behind.sum()
 
 
-def test_images_that_a_lidar_triggers_are_in_step_with_it(out):
+def test_images_triggered_by_a_lidar_are_synchronised_with_it(out):
     for number in range(3):
         stamp_s = begin_s(out, "top", number)
         assert begin_s(out, "left", number) == pytest.approx(stamp_s + 0.02, abs=1e-9)
@@ -544,7 +544,7 @@ def test_cameras_are_mounted_where_the_scene_says(out):
             assert np.abs(X_DS @ X_SC - X_DC).max() < 1e-12
 
 
-def test_calibrations_are_read_by_others(out):
+def test_calibrations_are_readable_by_other_software(out):
     file = cv2.FileStorage(str(out / "calibration/left.ros.yaml"), cv2.FILE_STORAGE_READ)
     assert [file.getNode(f"image_{side}").real() for side in ("width", "height")] == [64, 48]
     kalibr = yaml.safe_load((out / "calibration/eye.kalibr.yaml").read_text())["cam0"]

@@ -1,4 +1,4 @@
-"""Runs with cameras: stereo pairs, equal bytes whatever happens, and bad input."""
+"""Runs with cameras: stereo pairs, reproducible bytes, and invalid input."""
 
 import os
 import resource
@@ -117,7 +117,7 @@ def pair(request, tmp_path_factory):
 
 
 def test_stereo_pairs_have_equal_rows_and_the_disparity_of_their_baseline(pair):
-    """What the left image sees, through the right camera's R and P as ROS has them."""
+    """Points of the left image are projected by the right camera's R and P of ROS."""
     images, out = pair
     read = {
         name: yaml.safe_load((out / f"calibration/{name}.ros.yaml").read_text())
@@ -173,7 +173,7 @@ def test_stereo_pairs_have_equal_rows_and_the_disparity_of_their_baseline(pair):
 
 
 @pytest.mark.parametrize("pair", ["rectified"], indirect=True)
-def test_rectified_images_show_the_same_thing_a_disparity_apart(pair):
+def test_rectified_images_match_after_a_shift_by_the_disparity(pair):
     _, out = pair
     record = yaml.safe_load((out / "calibration/right.yaml").read_text())["rectification"]
     assert record["state"] == "done"
@@ -187,8 +187,8 @@ def test_rectified_images_show_the_same_thing_a_disparity_apart(pair):
     assert (np.abs(ratio - 1) < 0.05).mean() > 0.97
 
 
-def test_pixels_beyond_the_fold_of_a_lens_look_nowhere(tmp_path):
-    """A lens r + k1 r^3 + k2 r^5 + k3 r^7 sees up to where that is largest."""
+def test_pixels_beyond_the_fold_of_a_lens_are_invalid(tmp_path):
+    """A lens r + k1 r^3 + k2 r^5 + k3 r^7 images points up to its maximum."""
     k1, k2, k3 = -0.36, 0.14, -0.024
     camera = CAMERA.replace("[-0.2, 0.04, 0.001, -0.002]", f"[{k1}, {k2}, 0, 0, {k3}]")
     camera = camera.replace("[52, 51]", "[36, 36]").replace(
@@ -214,15 +214,15 @@ def test_pixels_beyond_the_fold_of_a_lens_look_nowhere(tmp_path):
     assert (exr["Samples"][nowhere] == 0).all()
 
 
-def test_scenes_have_the_same_bytes_for_one_thread(dataset, tmp_path):
-    """TBB starts as many threads as the process may use processors."""
+def test_images_have_the_same_bytes_on_one_thread(dataset, tmp_path):
+    """TBB starts one thread per processor that the process may use."""
     one = sorted(os.sched_getaffinity(0))[:1]
     result = generate(tmp_path, ALL, preexec_fn=lambda: os.sched_setaffinity(0, one))
     assert result.returncode == 0, result.stderr
     assert files(tmp_path / "out") == files(dataset)
 
 
-def test_a_killed_run_goes_on_and_ends_with_the_same_bytes(dataset, tmp_path):
+def test_a_killed_run_with_cameras_resumes_to_the_same_bytes(dataset, tmp_path):
     for name, text in (("scene", ALL), ("camera", CAMERA)):
         (tmp_path / f"{name}.yaml").write_text(text)
     out = tmp_path / "out"
@@ -236,14 +236,14 @@ def test_a_killed_run_goes_on_and_ends_with_the_same_bytes(dataset, tmp_path):
     (out / "camera/front/000000_top.npy").unlink()  # an image is done when all of it is there
     result = generate(tmp_path, ALL, more=["--resume"])
     assert result.returncode == 0, result.stderr
-    assert "2 scans were there already" in result.stdout
+    assert "2 scans already existed" in result.stdout
     assert files(out) == files(dataset)
     again = generate(tmp_path, ALL, more=["--resume"])
-    assert "2 images were there already" in again.stdout
+    assert "2 images already existed" in again.stdout
     assert files(out) == files(dataset)
 
 
-def test_an_interrupt_ends_a_long_image_between_its_rows(tmp_path):
+def test_an_interrupt_stops_a_long_image_between_its_rows(tmp_path):
     """The image would take 25 million paths: half a minute."""
     long = ALL.replace("{samples: 4, most_samples: 16, relative_error: 0.1}", "{samples: 8192}")
     for name, text in (("scene", long), ("camera", CAMERA)):
@@ -265,7 +265,7 @@ def test_an_interrupt_ends_a_long_image_between_its_rows(tmp_path):
     assert "pending" in states
 
 
-def test_another_lens_is_another_dataset(dataset, tmp_path):
+def test_a_folder_of_another_lens_is_kept(dataset, tmp_path):
     assert generate(tmp_path, ALL).returncode == 0
     before = files(tmp_path / "out")
     result = generate(tmp_path, ALL, CAMERA.replace("[52, 51]", "[52, 52]"))
@@ -282,7 +282,7 @@ def test_previews_show_all_panels(dataset):
             assert len(np.unique(preview[rows, columns].reshape(-1, 3), axis=0)) >= 3
 
 
-def test_info_tells_of_cameras(tmp_path):
+def test_info_describes_cameras(tmp_path):
     (tmp_path / "camera.yaml").write_text(CAMERA)
     (tmp_path / "scene.yaml").write_text(ALL)
     command = [PROGRAM, "info", "scene.yaml"]
@@ -299,8 +299,8 @@ FOCAL = "focal_px: [52, 51]"
 @pytest.mark.parametrize(
     ("scene", "camera", "words"),
     [
-        (ALL.replace(LIGHT, ""), CAMERA, "key 'sky': missing, but the camera 'front' sees light"),
-        (ALL.replace(", material: dry_soil", ""), CAMERA, "must name a material"),
+        (ALL.replace(LIGHT, ""), CAMERA, "key 'sky': missing, but the camera 'front' measures"),
+        (ALL.replace(", material: dry_soil", ""), CAMERA, "must have a material"),
         (ALL.replace("project: [top]", "project: [tip]"), CAMERA, "did you mean 'top'?"),
         (ALL.replace(TRIGGER, "{lidar: tip}"), CAMERA, "did you mean 'top'?"),
         (SCENE + LIT, CAMERA, "the scene has no lidar"),
@@ -314,14 +314,14 @@ FOCAL = "focal_px: [52, 51]"
         (ALL, CAMERA.replace("-0.002]", "-0.002, 0, 1]"), "has 6 numbers"),
         (ALL.replace("[1, 0, 1.2]", "[1, 0, -2]"), CAMERA, "below the ground"),
         (ALL.replace("f_number: 4", "f_number: 4, focal_length_mm: 5"), CAMERA, "does not fit"),
-        (SCENE + PAIR.replace("yaw_deg: 3", "yaw_deg: 180"), CAMERA, "turned by 180.0 deg"),
+        (SCENE + PAIR.replace("yaw_deg: 3", "yaw_deg: 180"), CAMERA, "the cameras is 180.0 deg"),
         (SCENE + PAIR.replace("left: left, right: right", "left: right, right: left"), CAMERA,
          "are they swapped"),
         (SCENE + PAIR + "  - {name: again, left: left, right: right}\n", CAMERA,
-         "camera 'left' is in an earlier pair too"),
+         "camera 'left' is also in an earlier pair"),
     ],
 )  # fmt: skip
-def test_a_fault_is_told_before_anything_is_written(tmp_path, scene, camera, words):
+def test_camera_errors_are_reported_before_anything_is_written(tmp_path, scene, camera, words):
     assert (scene, camera) != (ALL, CAMERA)
     result = generate(tmp_path, scene, camera)
     assert result.returncode == 1, result.stderr
@@ -335,10 +335,10 @@ def test_a_folder_that_cannot_be_written_is_an_error(tmp_path):
     (tmp_path / "file").write_text("")
     result = generate(tmp_path, ALL, out="file/out")
     assert result.returncode == 1
-    assert "file/out: cannot make this folder" in result.stderr
+    assert "file/out: cannot create this folder" in result.stderr
 
 
-def test_a_full_disk_leaves_no_half_image(tmp_path):
+def test_a_full_disk_leaves_no_partial_image(tmp_path):
     """A limit on file size makes the EXR file fail while it is written, as a full disk does."""
     limit = lambda: resource.setrlimit(resource.RLIMIT_FSIZE, (200_000, 200_000))  # noqa: E731
     scene = (SCENE + PAIR).replace(LIGHT, "")

@@ -1,4 +1,4 @@
-"""Our pulses against real captures, as the decoders of others understand them."""
+"""Compares our pulses with real captures, as read by other decoders."""
 
 import io
 import json
@@ -40,7 +40,7 @@ def vectors(table, *names):
 
 
 def ouster_frame(name):
-    """The SDK's description of a sensor, and the last whole frame of its capture."""
+    """Returns the SDK's description of a sensor and the last complete frame of its capture."""
     core = pytest.importorskip("ouster.sdk.core", reason="NO DECODER: install ouster-sdk")
     sdk = pytest.importorskip("ouster.sdk")
     metadata = SHARED / f"ouster/{name}.json"
@@ -50,7 +50,7 @@ def ouster_frame(name):
 
 
 @pytest.mark.parametrize("name", OUSTERS)
-def test_ouster_beams_are_those_of_the_sdk(name):
+def test_ouster_beams_match_the_sdk(name):
     """Rings and columns one by one. The SDK computes in double: a few roundings, and 10 m."""
     core, info, _, metadata = ouster_frame(name)
     ours = pulses(metadata)
@@ -71,7 +71,7 @@ def test_ouster_beams_are_those_of_the_sdk(name):
 
 
 @pytest.mark.parametrize("name", OUSTERS)
-def test_ouster_columns_fire_when_the_capture_says(name):
+def test_ouster_columns_fire_at_the_times_of_the_capture(name):
     """Columns are triggered by the encoder of a motor that is 0.2 % off its rate and wobbles: each
     fires within half a period of ours once the motor's mean rate is taken out."""
     _, info, frame, metadata = ouster_frame(name)
@@ -108,7 +108,7 @@ def by_ring(ours):
 
 
 @pytest.mark.parametrize(("file", "model", "name", "period"), VELODYNES)
-def test_velodyne_elevations_are_those_of_the_capture(file, model, name, period):
+def test_velodyne_elevations_match_the_capture(file, model, name, period):
     """The decoder adds where its beams leave, so a ring's points lie on a line of that slope.
     Points are float32: up to 4e-6 m off at 100 m, along lines metres long."""
     _, elevation, _ = by_ring(preset(name))
@@ -123,7 +123,7 @@ def test_velodyne_elevations_are_those_of_the_capture(file, model, name, period)
 
 
 @pytest.mark.parametrize(("file", "model", "name", "period"), VELODYNES)
-def test_velodyne_lasers_fire_when_and_where_the_decoder_says(file, model, name, period):
+def test_velodyne_firing_times_and_azimuths_match_the_decoder(file, model, name, period):
     """Within a sequence, less our own times and angles, nothing may be left but roundings: times
     are float32 near 0.1 s (7.5 ns), azimuths lie between two of hundredths of a degree."""
     firing, _, azimuth = by_ring(preset(name))
@@ -162,7 +162,7 @@ def read_pcd(path):
         ("vlp32_1713492677464078412", "velodyne_vlp32c"),
     ],
 )
-def test_every_point_of_nebula_lies_at_one_of_our_elevations(cloud, name):
+def test_every_point_of_nebula_has_one_of_our_elevations(cloud, name):
     """Coordinates are float32: 1e-7 of the range, a few roundings."""
     x, y, z = vectors(read_pcd(SHARED / f"nebula_velodyne_hesai/{cloud}.pcd"), "x", "y", "z").T
     ours = by_ring(preset(name))[1]
@@ -171,7 +171,7 @@ def test_every_point_of_nebula_lies_at_one_of_our_elevations(cloud, name):
     assert nearest.max() < 1e-6
 
 
-def test_nebula_vlp16_fires_at_our_times():
+def test_nebula_vlp16_firing_times_match_ours():
     """Nebula's stamps went through steps of 2^-22 s."""
     points = read_pcd(SHARED / "nebula_velodyne_hesai/vlp16_1673400472138016708.pcd")
     firing, elevation, _ = by_ring(preset("velodyne_vlp16"))

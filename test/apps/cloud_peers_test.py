@@ -1,4 +1,4 @@
-"""Clouds that other people's libraries write are read to the last bit.
+"""Clouds written by other libraries are read exactly.
 
 The oracles are the arrays that NumPy, Open3D and laspy were given.
 """
@@ -29,7 +29,7 @@ def run(source: Path, *columns: str) -> subprocess.CompletedProcess:
 
 
 def convert(source: Path, *columns: str) -> tuple[np.ndarray, dict[str, int], list[str]]:
-    """Returns the rows, what was taken off which columns, and what was not read."""
+    """Returns the rows, the offsets subtracted from columns, and the columns not read."""
     done = run(source, *columns)
     assert done.returncode == 0, done.stderr
     rows = peer("plyfile").PlyData.read(source.with_suffix(".out.ply"))["vertex"].data
@@ -39,7 +39,7 @@ def convert(source: Path, *columns: str) -> tuple[np.ndarray, dict[str, int], li
 
 
 def random_values(kind: str, shape: tuple[int, ...], seed: int = 7) -> np.ndarray:
-    """Any bits of a type, but for 64-bit whole numbers: stamps within a second."""
+    """Returns random bits of a type; for 64-bit integers, stamps within a second."""
     random = np.random.default_rng(seed)
     dtype = np.dtype(kind)
     if dtype.kind == "b":
@@ -64,7 +64,7 @@ def expect_column(read: np.ndarray, origin: int, expected: np.ndarray) -> None:
 @pytest.mark.parametrize(
     "kind", ["<f2", "<f4", ">f4", "<f8", ">f8", "<i1", ">i2", "<i4", ">i8", "<u1", ">u2", "<u8"]
 )
-def test_plain_arrays_of_numpy(tmp_path: Path, kind: str, order: str) -> None:
+def test_plain_numpy_arrays_are_read(tmp_path: Path, kind: str, order: str) -> None:
     for columns in (3, 4, 5):
         values = random_values(kind, (POINTS, columns))
         np.save(tmp_path / "a.npy", np.asarray(values, order=order))
@@ -75,7 +75,7 @@ def test_plain_arrays_of_numpy(tmp_path: Path, kind: str, order: str) -> None:
             expect_column(rows[name], origins.get(name, 0), values[:, i])
 
 
-def test_an_image_of_points(tmp_path: Path) -> None:
+def test_an_array_of_rows_and_columns_of_points_is_read(tmp_path: Path) -> None:
     values = random_values("<f4", (16, 32, 3))
     for order in ("C", "F"):
         np.save(tmp_path / "a.npy", np.asarray(values, order=order))
@@ -85,7 +85,7 @@ def test_an_image_of_points(tmp_path: Path) -> None:
 
 
 @pytest.mark.parametrize("align", [False, True])
-def test_records_of_numpy(tmp_path: Path, align: bool) -> None:
+def test_numpy_record_arrays_are_read(tmp_path: Path, align: bool) -> None:
     fields = [("x", "<f8"), ("ring", "u1"), ("y", ">f4"), ("z", "<f2"), ("t", ">u8"), ("hit", "?")]
     dtype = np.dtype([*fields, ("name", "<U5"), ("n", "<i2", (2, 3))], align=align)
     values = np.zeros(POINTS, dtype)
@@ -102,7 +102,7 @@ def test_records_of_numpy(tmp_path: Path, align: bool) -> None:
 
 
 @pytest.mark.parametrize("save", [np.savez, np.savez_compressed])
-def test_archives_of_numpy(tmp_path: Path, save) -> None:
+def test_numpy_archives_are_read(tmp_path: Path, save) -> None:
     arrays = {
         "xyz": random_values("<f4", (POINTS, 3)),
         "t": random_values("<i8", (POINTS,)),
@@ -117,11 +117,11 @@ def test_archives_of_numpy(tmp_path: Path, save) -> None:
         expect_column(rows[f"normals_{i}"], 0, arrays["normals"][:, i])
     expect_column(rows["t"], origins["t"], arrays["t"])
     expect_column(rows["ring"], 0, arrays["ring"])
-    assert unread == ["pose (of 4 rows)", "sensor (it holds no numbers)"]
+    assert unread == ["pose (of 4 rows)", "sensor (it contains no numbers)"]
 
 
 @pytest.mark.parametrize("form", ["ascii", "binary", "compressed"])
-def test_pcd_of_open3d(tmp_path: Path, form: str) -> None:
+def test_pcd_files_of_open3d_are_read(tmp_path: Path, form: str) -> None:
     o3d = peer("open3d")
     random = np.random.default_rng(7)
     columns = {
@@ -144,7 +144,7 @@ def test_pcd_of_open3d(tmp_path: Path, form: str) -> None:
         np.testing.assert_allclose(rows[name], columns[name][:, 0], rtol=relative)
 
 
-def test_the_advice_on_las_works(tmp_path: Path) -> None:
+def test_the_documented_conversion_of_las_works(tmp_path: Path) -> None:
     laspy = peer("laspy")
     las = laspy.create(point_format=1, file_version="1.2")
     las.header.scales = [0.001] * 3

@@ -27,7 +27,7 @@ def compare(reference, other, *options, out):
 
 
 def figures(reference, other, *options, out):
-    """Returns the figures by name, and all of the report."""
+    """Returns the figures by name, and the complete report."""
     result = compare(reference, other, *options, out=out)
     assert result.returncode in (0, 1), result.stderr
     report = json.loads((out / "report.json").read_text())
@@ -84,7 +84,7 @@ WRITERS = {
 
 
 @pytest.mark.parametrize("name", WRITERS)
-def test_scans_of_any_form_have_the_errors_that_were_put_in(name, scan, tmp_path):
+def test_scans_in_any_format_show_the_injected_errors(name, scan, tmp_path):
     """5 cm too far, a tenth missing, in random order; floats of 20 m are 2e-6 m apart."""
     direction, range_m, ring = scan
     reference = write_ply(tmp_path / "reference.ply", direction * range_m[:, None], ring=ring)
@@ -129,7 +129,7 @@ def write_exr(path, **channels):
     return path
 
 
-def test_images_have_the_errors_that_were_put_in(tmp_path):
+def test_images_show_the_injected_errors(tmp_path):
     rng = np.random.default_rng(3)
     depth = rng.uniform(2, 30, (40, 60))
     reference = write_exr(tmp_path / "reference.exr", Z=depth)
@@ -139,7 +139,7 @@ def test_images_have_the_errors_that_were_put_in(tmp_path):
     assert mean == pytest.approx(0.125, abs=1e-6)
 
 
-def test_kitti_depths_are_read_as_asked(tmp_path):
+def test_kitti_depths_are_read_on_request(tmp_path):
     depth = np.random.default_rng(3).uniform(2, 30, (40, 60))
     reference = write_exr(tmp_path / "reference.exr", Z=depth)
     cv2.imwrite(str(tmp_path / "other.png"), np.round(256 * depth).astype(np.uint16))
@@ -150,7 +150,7 @@ def test_kitti_depths_are_read_as_asked(tmp_path):
     assert largest <= 0.5 / 256 + 1e-6
 
 
-def test_dems_have_the_errors_that_were_put_in(tmp_path):
+def test_dems_show_the_injected_errors(tmp_path):
     lifted = tmp_path / "other.tif"
     translate = ["gdal_translate", "-q", "-of", "GTiff", "-ot", "Float64"]
     subprocess.run([*translate, "-a_offset", "0.25", DEM, lifted], check=True)
@@ -160,8 +160,8 @@ def test_dems_have_the_errors_that_were_put_in(tmp_path):
     assert figure["slope of triangles: largest error"] < 1e-3
 
 
-def test_meshes_have_the_distance_that_was_put_in(tmp_path):
-    """Two spheres of 1 and 1.05 m about one centre: 5 cm, but for the facets' sagitta."""
+def test_meshes_show_the_injected_distance(tmp_path):
+    """Two spheres of 1 and 1.05 m about one centre: 5 cm apart, except for the facets' sagitta."""
     small, large = (trimesh.creation.icosphere(4, radius) for radius in (1, 1.05))
     small.export(tmp_path / "small.ply")
     large.export(tmp_path / "large.obj")
@@ -173,8 +173,8 @@ def test_meshes_have_the_distance_that_was_put_in(tmp_path):
 
 
 @pytest.mark.parametrize("form", ["ply", "obj", "stl", "glb"])
-def test_meshes_of_every_form_agree_as_far_as_they_overlap(tmp_path, form):
-    """Strips of 10 m and 8 m that have 6 m in common: what is beyond is as far as it reaches."""
+def test_meshes_in_every_format_agree_where_they_overlap(tmp_path, form):
+    """Strips of 10 m and 8 m with 6 m in common: distances beyond equal the overhang."""
     for name, begin, end in (("truth", 0, 10), ("mesh", 4, 12)):
         corners = [(begin, 0, 0), (end, 0, 0), (end, 0, 1), (begin, 0, 1)]  # glTF's y is up
         if form != "glb":
@@ -199,10 +199,10 @@ def test_meshes_of_every_form_agree_as_far_as_they_overlap(tmp_path, form):
     assert figure["other to reference: angle between normals, 99 % of the area up to"] == 0
 
 
-def test_other_peoples_software_agrees(tmp_path):
-    """The example of docs/golden.md: Open3D traces the same surface in floats."""
+def test_other_software_agrees(tmp_path):
+    """The example of docs/reference/golden.md: Open3D traces the same surface in floats."""
     pytest.importorskip("open3d")
-    command = [sys.executable, ROOT / "docs/compare_peers.py", tmp_path, PROGRAM.parent]
+    command = [sys.executable, ROOT / "docs/guide/compare_peers.py", tmp_path, PROGRAM.parent]
     result = subprocess.run(command, capture_output=True, text=True, timeout=300, check=False)
     assert result.returncode == 0, result.stdout + result.stderr
     report = json.loads((tmp_path / "scan_report/report.json").read_text())
@@ -227,16 +227,16 @@ def test_other_peoples_software_agrees(tmp_path):
             "cut.pcd",
             b"VERSION .7\nFIELDS x y z\nSIZE 4 4 4\nTYPE F F F\nCOUNT 1 1 1\n"
             b"WIDTH 9\nHEIGHT 1\nPOINTS 9\nDATA binary\nabc",
-            "cut.pcd: 9 points of 12 bytes take 108 bytes, but 3 are there",
+            "cut.pcd: 9 points of 12 bytes need 108 bytes, but the file has 3",
         ),
-        ("odd.bin", b"123", "3 bytes are no multiple of 16"),
+        ("odd.bin", b"123", "3 bytes are not a multiple of 16"),
         ("theirs.las", b"LASF", "LAS is not read: convert it to PLY first, for instance by laspy"),
-        ("bad.npy", b"\x93NUMPY\x09", "bad.npy: it does not begin as a NumPy array does"),
-        ("bad.npz", b"PK\x03\x04", "bad.npz: it lacks the end of a ZIP archive"),
-        ("what.xyz", b"1 2 3", "the name does not tell what it holds; say so by --as"),
+        ("bad.npy", b"\x93NUMPY\x09", "bad.npy: it does not begin with the NumPy signature"),
+        ("bad.npz", b"PK\x03\x04", "bad.npz: it has no ZIP end record"),
+        ("what.xyz", b"1 2 3", "the name does not show the kind of file; give it with --as"),
     ],
 )
-def test_garbage_is_one_clear_error(name, content, expected, scan, tmp_path):
+def test_garbage_causes_one_clear_error(name, content, expected, scan, tmp_path):
     direction, range_m, ring = scan
     reference = write_ply(tmp_path / "reference.ply", direction * range_m[:, None], ring=ring)
     (tmp_path / name).write_bytes(content)
@@ -250,8 +250,8 @@ def test_garbage_is_one_clear_error(name, content, expected, scan, tmp_path):
 
 
 @pytest.mark.parametrize("prefix", ["", "reference-"])
-def test_the_rotation_of_a_pose_has_length_one(prefix, scan, tmp_path):
-    """Three decimals are enough; what is longer or shorter is another thing."""
+def test_the_quaternion_of_a_pose_must_have_length_one(prefix, scan, tmp_path):
+    """Three decimals are accurate enough; other lengths are rejected."""
     direction, range_m, ring = scan
     reference = write_ply(tmp_path / "reference.ply", direction * range_m[:, None], ring=ring)
     out = tmp_path / "out"
@@ -266,7 +266,7 @@ def test_the_rotation_of_a_pose_has_length_one(prefix, scan, tmp_path):
     assert good.returncode == 0, good.stderr
 
 
-def test_what_is_compared_is_asked_for_if_two_names_disagree(scan, tmp_path):
+def test_inputs_of_different_kinds_are_rejected_unless_as_is_given(scan, tmp_path):
     direction, range_m, ring = scan
     points = direction * range_m[:, None]
     reference = write_ply(tmp_path / "reference.ply", points, ring=ring)
@@ -275,17 +275,17 @@ def test_what_is_compared_is_asked_for_if_two_names_disagree(scan, tmp_path):
     for name, kind in [("sphere.ply", "a mesh"), ("image.exr", "an image")]:
         result = compare(reference, tmp_path / name, out=tmp_path / "out")
         assert result.returncode == 1
-        assert f"{name} {kind}: they must be of one kind" in result.stderr
+        assert f"{name} {kind}: both must be of the same kind" in result.stderr
         assert "--as" in result.stderr
     asked = compare(reference, tmp_path / "sphere.ply", "--as", "mesh", out=tmp_path / "out")
     assert "reference.ply: there is no triangle" in asked.stderr
     # What a name does not tell is what the reference is.
     write_ply(tmp_path / "theirs.points", points)
     untold = compare(reference, tmp_path / "theirs.points", out=tmp_path / "out")
-    assert "is of no point file that is read" in untold.stderr
+    assert "is not one of the supported point files" in untold.stderr
     (tmp_path / "model.dae").write_text("<COLLADA/>")
     unread = compare(tmp_path / "model.dae", tmp_path / "model.dae", out=tmp_path / "out")
-    assert "the name does not tell what it holds" in unread.stderr
+    assert "the name does not show the kind of file" in unread.stderr
 
 
 def test_images_without_a_pixel_in_common_fail(tmp_path):
@@ -297,11 +297,11 @@ def test_images_without_a_pixel_in_common_fail(tmp_path):
     )
     assert result.returncode == 1
     assert "FAILED Z: in both: 0" in result.stdout
-    assert "nothing in common" in section["text"]
+    assert "no pixel in common" in section["text"]
     assert not any("error" in name for name in figure)
 
 
-def test_light_that_is_no_number_fails(tmp_path):
+def test_light_that_is_not_a_number_fails(tmp_path):
     rng = np.random.default_rng(2)
     names = "RGB"
     sigma = {f"StdError.{k}": np.full((20, 30), 0.01) for k in names}
@@ -321,7 +321,7 @@ def test_light_that_is_no_number_fails(tmp_path):
     assert "FAILED RGB: values that could be tested: 0 of 1800" in result.stdout
 
 
-def test_images_of_two_sizes_are_refused(tmp_path):
+def test_images_of_different_sizes_are_rejected(tmp_path):
     a = write_exr(tmp_path / "a.exr", Z=np.ones((4, 5)))
     b = write_exr(tmp_path / "b.exr", Z=np.ones((5, 4)))
     result = compare(a, b, out=tmp_path / "out")

@@ -1,4 +1,4 @@
-"""Heights by `groundray reconstruct dem` of a real airborne scan, against points it was not shown.
+"""Heights by `groundray reconstruct dem` of a real airborne scan, compared with held-out points.
 
 Those who made the scan say which points are ground; the oracles are such points, held out, and
 SciPy's triangles of the others.
@@ -19,20 +19,20 @@ from scipy.ndimage import map_coordinates
 
 
 def bilinear(raster, band, x, y):
-    """NaN where one of the four samples around has none."""
+    """Interpolates bilinearly; NaN if one of the four samples is missing."""
     u = (x - raster.west) / raster.cell - 0.5
     v = (raster.north - y) / raster.cell - 0.5
     return map_coordinates(band, [v, u], order=1, mode="constant", cval=np.nan)
 
 
 def triangulated(points, at):
-    """Heights of SciPy's triangles of points, coordinates being near 0."""
+    """Interpolates heights on SciPy's triangulation, in coordinates near 0."""
     middle = points[:, :2].mean(axis=0)
     return LinearNDInterpolator(points[:, :2] - middle, points[:, 2])(at[:, :2] - middle)
 
 
 def lowest_of(points, side):
-    """The lowest point of each square."""
+    """Returns the lowest point of each square."""
     square = np.floor((points[:, :2] - points[:, :2].min(axis=0)) / side).astype(int)
     key = square[:, 0] * 100_000 + square[:, 1]
     order = np.lexsort((points[:, 2], key))
@@ -63,7 +63,7 @@ def record_held_out(layers, held, name, record_property):
 WHOLE = ("--reach", "hull", "--largest-share", "1", "--farthest-m", "12")
 
 
-def test_labelled_ground_predicts_what_was_held_out_of_it(tmp_path, record_property):
+def test_labelled_ground_predicts_held_out_points(tmp_path, record_property):
     """A tenth of the points that those who made a scan call ground, from the others: as near as
     SciPy's triangles of the others are. One hole is most of it, and cells of 0.25 m take longer."""
     points, is_ground = coromandel()
@@ -84,7 +84,7 @@ def test_labelled_ground_predicts_what_was_held_out_of_it(tmp_path, record_prope
     assert ours_m <= theirs_m
 
 
-def test_ground_under_bush_is_nearer_than_lowest_points(tmp_path, record_property):
+def test_ground_under_bush_is_more_accurate_than_lowest_points(tmp_path, record_property):
     """From all points, labels unseen, the ground that was held out: as near as triangles of the
     lowest points of squares, at whatever side of these is the best afterwards. What hides the
     ground altogether is taken for it by both, so the middle of the errors is judged."""

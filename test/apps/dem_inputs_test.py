@@ -1,7 +1,7 @@
-"""What `groundray reconstruct dem` takes, and how it says what is wrong with it.
+"""Inputs of `groundray reconstruct dem`, and errors in them.
 
-A dataset with a lidar and a stereo pair is broken in one place at a time: each fault is one message
-that names the place, and no file is there that was not before.
+A dataset with a lidar and a stereo pair is damaged in one place at a time: each fault causes one
+message that names the place, and no new file.
 """
 
 import os
@@ -66,7 +66,7 @@ def recorded(tmp_path_factory):
 
 @pytest.fixture
 def data(recorded, tmp_path):
-    """A copy to break."""
+    """A copy that tests may modify."""
     return Path(shutil.copytree(recorded, tmp_path / "data"))
 
 
@@ -90,8 +90,8 @@ def bands(path, folder):
     return np.fromfile(raw, "<f4").reshape(len(LAYERS), -1)
 
 
-def test_pairs_measure_alone(recorded, data, tmp_path):
-    """Of a dataset with a lidar, and, to the byte the same, of one without."""
+def test_stereo_pairs_alone_make_a_dem(recorded, data, tmp_path):
+    """The bytes are equal for datasets with and without a lidar."""
     alone = ["--cell-m", "0.5", "-o", tmp_path / "alone.tif", "--no-lidar"]
     assert "pair/000000" in made(recorded, *alone)
     named = ["--cell-m", "0.5", "-o", tmp_path / "named.tif", "--no-lidar", "--stereo", "pair"]
@@ -108,26 +108,26 @@ def test_pairs_measure_alone(recorded, data, tmp_path):
     assert whole == (tmp_path / "named.tif").read_bytes()
 
 
-def test_bytes_of_pairs_and_smooth_ground_do_not_depend_on_threads(recorded, tmp_path):
+def test_bytes_of_stereo_and_smoothed_dems_do_not_depend_on_threads(recorded, tmp_path):
     options = ["--cell-m", "0.25", "--smooth", "--reach", "hull"]
     assert same_bytes_on_any_threads(tmp_path, recorded, *options)
     layers = bands(tmp_path / "one.tif", tmp_path)
     assert {1, 2, 3, 4} <= set(np.unique(layers[6]))  # source: all kinds are in it
 
 
-def test_what_does_not_measure_is_told(data, tmp_path):
+def test_inputs_without_measurements_are_reported(data, tmp_path):
     out = ["--cell-m", "1", "-o", tmp_path / "dem.tif"]
-    refused(tmp_path, data, *out, "--no-lidar", "--no-stereo", words=["leave nothing"])
+    refused(tmp_path, data, *out, "--no-lidar", "--no-stereo", words=["exclude all measurements"])
     refused(tmp_path, data, *out, "--no-lidar", "--sensor", "top", words=["--sensor"])
     late = ["--no-lidar", "--stereo-frames", "9:"]
-    refused(tmp_path, data, *out, *late, words=["no images", "(--stereo-frames)"])
+    refused(tmp_path, data, *out, *late, words=["no simultaneous images", "(--stereo-frames)"])
     words = ["--stereo-frames: 'x' must be"]
     refused(tmp_path, data, *out, "--stereo-frames", "x", words=words)
     refused(tmp_path, data, *out, "--frames", "9:", words=["no scan among", "--no-lidar"])
     without_lidar(data)
     refused(tmp_path, data, *out, "--no-stereo", words=["dataset.yaml", "has no lidar"])
     changed(data / "dataset.yaml", r"^.*kind: stereo.*\n", "")
-    refused(tmp_path, data, *out, words=["takes a stereo pair", "--stereo LEFT,RIGHT"])
+    refused(tmp_path, data, *out, words=["a stereo pair is needed", "--stereo LEFT,RIGHT"])
     assert "left,right/000000" in made(data, *out, "--stereo", "left,right")
 
 
@@ -149,7 +149,7 @@ def first_poses(path):
 
 
 def gap_in_a_scan(path):
-    """Poses to 0.03 s, then 3 s: at the stamps of scans there is one."""
+    """Poses up to 0.03 s, then at 3 s: stamps of scans are covered, across a gap."""
     lines = path.read_text().splitlines(keepends=True)
     kept = [line for line in lines if line.startswith("#") or float(line.split()[0]) <= 0.03]
     path.write_text("".join([*kept, "3" + lines[-1][lines[-1].index(" ") :]]))
@@ -166,25 +166,25 @@ def frames_lost(path):
         (
             "camera/left/000000.png",
             Path.unlink,
-            ["left/000000.exr", "one is light", "was one removed"],
+            ["left/000000.exr", "this one is radiance", "was one removed"],
         ),
-        ("camera/left/000000.png", cut, ["left/000000.png", "cut short"]),
+        ("camera/left/000000.png", cut, ["left/000000.png", "truncated"]),
         ("camera/right/000000.png", other_size, ["right/000000.png", "64 x 48", "640 x 480"]),
         ("poses/left.tum", last_pose_late, ["poses/left.tum", "have a gap", "--pose-gap-s"]),
         ("poses/top.tum", last_pose_late, ["top/00000", "have a gap", "--pose-gap-s"]),
         ("poses/top.tum", gap_in_a_scan, ["top/000000", "have a gap", "--pose-gap-s"]),
-        ("poses/right.tum", first_poses, ["poses/right.tum", "covers 0 to", "cut short?"]),
-        ("lidar/top/000000.ply", cut, ["top/000000.ply", "cut short?"]),
-        ("dataset.yaml", frames_lost, ["dataset.yaml:", "'frames'", "are listed", "cut short?"]),
+        ("poses/right.tum", first_poses, ["poses/right.tum", "covers 0 to", "truncated?"]),
+        ("lidar/top/000000.ply", cut, ["top/000000.ply", "truncated?"]),
+        ("dataset.yaml", frames_lost, ["dataset.yaml:", "'frames'", "are listed", "truncated?"]),
         ("calibration/left.yaml", Path.unlink, ["left.yaml", "no such file"]),
     ],
 )
-def test_faults_of_a_dataset_name_their_file(data, tmp_path, file, fault, words):
+def test_errors_in_a_dataset_name_their_file(data, tmp_path, file, fault, words):
     fault(data / file)
     refused(tmp_path, data, "--cell-m", "1", "-o", tmp_path / "dem.tif", words=words)
 
 
-def test_missing_images_and_keys_are_told(data, tmp_path):
+def test_missing_images_and_keys_are_reported(data, tmp_path):
     out = ["--cell-m", "1", "-o", tmp_path / "dem.tif"]
     for name in ("left", "right"):
         (data / f"camera/{name}/000000.png").unlink()
@@ -199,7 +199,7 @@ def test_missing_images_and_keys_are_told(data, tmp_path):
     refused(tmp_path, data, *only, words=["dataset.yaml:", "key 'origin_w_m': missing"])
 
 
-def test_places_and_sizes_that_cannot_be_are_told(recorded, tmp_path):
+def test_invalid_areas_are_reported(recorded, tmp_path):
     out = ["--no-stereo", "-o", tmp_path / "dem.tif"]
     box = ["--area", "429450", "5150650", "429400", "5150700"]
     refused(tmp_path, recorded, *out, "--cell-m", "1", *box, words=["--area: 429450", "W < E"])
@@ -208,14 +208,14 @@ def test_places_and_sizes_that_cannot_be_are_told(recorded, tmp_path):
     refused(tmp_path, recorded, *out, "--cell-m", "1e-4", words=["samples", "larger cells"])
 
 
-def test_a_dataset_is_not_written_over(data, tmp_path):
+def test_a_dataset_is_not_overwritten(data, tmp_path):
     out = ["--cell-m", "1", "-o", tmp_path / "dem.tif"]
     for option, file in (("--report", "dataset.yaml"), ("--picture", "camera/left/000000.png")):
         refused(tmp_path, data, *out, option, data / file, words=[file, "another name"])
 
 
-def test_a_disk_without_space_leaves_nothing_and_names_the_file(recorded, tmp_path):
-    """A limit on sizes of files stands for it, as `ulimit -f` sets it."""
+def test_a_full_disk_leaves_no_dem_and_the_error_names_the_file(recorded, tmp_path):
+    """A limit on file sizes, as set by `ulimit -f`, simulates it."""
     limit = ["bash", "-c", 'ulimit -f 8; exec "$@"', "bash", PROGRAM, "reconstruct", "dem"]
     command = [*limit, recorded, "--no-stereo", "--cell-m", "0.25", "-o", tmp_path / "dem.tif"]
     result = subprocess.run([*map(str, command)], capture_output=True, text=True, timeout=300)
@@ -224,17 +224,17 @@ def test_a_disk_without_space_leaves_nothing_and_names_the_file(recorded, tmp_pa
     assert list(tmp_path.iterdir()) == []
 
 
-def test_scans_without_noise_are_told(data, tmp_path):
+def test_scans_without_noise_are_reported(data, tmp_path):
     changed(data / "calibration/top.yaml", r"^range_noise_sigma_m: .*$", "range_noise_sigma_m: 0")
     for path in sorted((data / "lidar/top").glob("*[0-9].ply")):
         path.write_bytes(path.read_bytes().replace(b"float range_sd\n", b"float other_no\n", 1))
     out = ["--no-stereo", "--cell-m", "1", "-o", tmp_path / "dem.tif"]
-    assert "tell no standard deviation of their ranges" in made(data, *out)
-    assert "tell no standard deviation" not in made(data, *out, "--range-sd-m", "0.02")
+    assert "have no standard deviation of range" in made(data, *out)
+    assert "have no standard deviation" not in made(data, *out, "--range-sd-m", "0.02")
 
 
 @pytest.mark.parametrize("vertical", [5703, 6360])  # NAVD88, in metres and in US feet
-def test_a_datum_of_heights_stays(tmp_path, vertical):
+def test_a_vertical_datum_is_kept(tmp_path, vertical):
     dem, made_of = tmp_path / "dem.tif", tmp_path / "filled.tif"
     system = f"EPSG:26915+{vertical}"
     subprocess.run(["gdal_translate", "-q", "-a_srs", system, PRAIRIE, dem], check=True)
@@ -249,7 +249,7 @@ def test_a_datum_of_heights_stays(tmp_path, vertical):
 
 
 def test_files_are_cloud_optimised(recorded, tmp_path):
-    """By GDAL's own check."""
+    """Checked by GDAL."""
     check = ["/usr/bin/python3", "-m", "osgeo_utils.samples.validate_cloud_optimized_geotiff"]
     probe = subprocess.run([*check, PRAIRIE], capture_output=True, text=True)
     if "No module" in probe.stderr or not Path(check[0]).exists():
@@ -262,7 +262,7 @@ def test_files_are_cloud_optimised(recorded, tmp_path):
 
 
 def survey(path, rows=3000, **more):
-    """Level ground of a map, without poses, 0.2 m too high, with a blank in the middle."""
+    """Level ground in map coordinates, without poses, 0.2 m too high, with a hole in the middle."""
     random = np.random.default_rng(8)
     columns = {name: random.uniform(0, 30, rows) for name in "xy"}
     columns["z"] = 240.2 + random.normal(0, 0.01, rows)
@@ -275,8 +275,8 @@ def survey(path, rows=3000, **more):
     return path
 
 
-def test_filled_heights_carry_what_all_data_are_off(tmp_path):
-    """Measured ones are known to 0.2 m, their common error; so filled ones are known no better."""
+def test_filled_heights_include_the_common_error(tmp_path):
+    """Measured heights have a common error of 0.2 m, so filled ones cannot be better."""
     points = survey(tmp_path / "points.npy", 12000)
     noise = ["--airborne", "--range-sd-m", "0.01", "--position-sd-m", "0.2"]
     made(points, *noise, "--cell-m", "1", "-o", tmp_path / "dem.tif")
@@ -289,7 +289,7 @@ def test_filled_heights_carry_what_all_data_are_off(tmp_path):
     assert 0.8 < np.sqrt(np.mean(z**2)) < 1.1
 
 
-def test_sparse_points_are_told(tmp_path):
+def test_sparse_points_are_reported(tmp_path):
     """One point in nine cells, no more than an outlier in fifty: none is known to be of the ground,
     unless there are no outliers."""
     cells = np.stack(np.meshgrid(np.arange(0, 90, 3), np.arange(0, 90, 3)), axis=-1).reshape(-1, 2)
@@ -305,7 +305,7 @@ def test_sparse_points_are_told(tmp_path):
     assert "have too few" not in made(points, *out, "--outlier-share", "0")
 
 
-def test_coordinates_of_a_map_take_poses_or_a_word(tmp_path):
+def test_map_coordinates_require_poses_or_airborne(tmp_path):
     points = survey(tmp_path / "points.npy")
     out = ["--cell-m", "1", "-o", tmp_path / "dem.tif"]
     words = ["points.npy", "km from the sensor", "--airborne", "--poses"]
@@ -313,8 +313,8 @@ def test_coordinates_of_a_map_take_poses_or_a_word(tmp_path):
     assert "sensor's frame" not in made(points, *out, "--airborne")
 
 
-def test_returns_of_pulses_are_chosen(tmp_path):
-    """First ones are leaves 3 m above the ground, of last ones."""
+def test_returns_are_selected(tmp_path):
+    """First returns are leaves 3 m above the ground; last returns are ground."""
     rows = 3000
     pulse = np.arange(rows) // 2
     index = 1 + np.arange(rows) % 2
@@ -342,11 +342,11 @@ def test_returns_of_pulses_are_chosen(tmp_path):
         (["--no-fill", "--method", "cgal", "--most-edges", "9"], ["--method", "--no-fill"]),
     ],
 )
-def test_options_that_would_do_nothing_are_refused(recorded, tmp_path, options, words):
+def test_options_without_effect_are_rejected(recorded, tmp_path, options, words):
     refused(tmp_path, recorded, "--cell-m", "1", "-o", tmp_path / "dem.tif", *options, words=words)
 
 
-def test_options_of_noise_and_form_do_what_they_say(recorded, tmp_path):
+def test_options_of_noise_and_filling_have_their_documented_effect(recorded, tmp_path):
     def layers(name, *options):
         out = tmp_path / f"{name}.tif"
         made(
@@ -374,8 +374,8 @@ def test_options_of_noise_and_form_do_what_they_say(recorded, tmp_path):
     assert few.shape[1] == 20 * 20
 
 
-def test_the_picture_shows_what_is_what(recorded, tmp_path):
-    """Three panels of the DEM's samples: filled ones are orange in the second alone."""
+def test_the_picture_distinguishes_measured_and_filled_samples(recorded, tmp_path):
+    """Three panels of the DEM's samples: filled ones are orange, and only in the second."""
     out, picture = tmp_path / "dem.tif", tmp_path / "dem.png"
     made(recorded, "--no-stereo", "--cell-m", "0.5", "-o", out, "--picture", picture)
     image = cv2.imread(str(picture)).astype(int)

@@ -1,4 +1,4 @@
-"""Layers of a DEM besides its heights: how high the ground can be, and what stands clear of it.
+"""Layers of a DEM besides heights: upper bounds of the ground, and overhangs.
 
 The oracles: the triangles of the DEM that was scanned, what the test did to ranges, and the deck
 that it built.
@@ -90,7 +90,7 @@ def too_long(prairie):
     return np.concatenate(begins), np.concatenate(ends)
 
 
-def test_bounds_are_below_the_ground_by_outliers_alone(prairie, tmp_path):
+def test_only_outliers_cause_bounds_below_the_ground(prairie, tmp_path):
     """A range that is too long takes its beam under a crest, and out again: such a beam, and no
     other, passes the cell of each bound that is too low. These are few."""
     made(prairie / "data", "--cell-m", "0.25", "-o", tmp_path / "dem.tif")
@@ -142,7 +142,7 @@ def bridge(folder):
 
 
 @pytest.mark.parametrize("choice", ["none", "ground"])
-def test_what_is_clear_of_the_ground_is_told(tmp_path, choice):
+def test_overhangs_and_clearances_are_reported(tmp_path, choice):
     """Of each cell that is all under the deck its underside's height, to five standard deviations
     of the ranges, and the way that is free below: by that, and what the ground rises in a cell."""
     cell = 0.25

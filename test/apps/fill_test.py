@@ -1,4 +1,4 @@
-"""Blank areas of DEMs filled from the command line, judged against other people's ways."""
+"""Blank areas of DEMs filled from the command line, compared with other methods."""
 
 import importlib.util
 import re
@@ -36,7 +36,7 @@ CHANCE = 1 - 0.99 ** (1 / (2 * len(JUDGED) * len(LARGEST_SHARES)))
 
 @pytest.fixture(scope="module")
 def runs():
-    """What came of the masks that ./dev bench fill judges: by kind, of both DEMs."""
+    """Results of both DEMs by kind, for the masks of ./dev bench fill."""
     others = {name: fill for name, fill in peers.PEERS.items() if name in LARGEST_SHARES}
     found = {}
     for dem in ("jacksboro", "fractal"):
@@ -49,7 +49,7 @@ def runs():
 
 
 @pytest.mark.parametrize("kind", JUDGED)
-def test_fills_no_worse_than_other_people(runs, kind):
+def test_fills_no_worse_than_other_software(runs, kind):
     both = [peers.summarise(of_dem)["shares"] for of_dem in runs[kind].values()]
     for peer, most in LARGEST_SHARES.items():
         # As the shares are averaged by ./dev bench fill; no slack.
@@ -63,14 +63,14 @@ def test_fills_no_worse_than_other_people(runs, kind):
                 assert chance > CHANCE, (dem, peer)
 
 
-def test_bounds_by_lines_of_sight_lower_errors_in_shadows(runs):
+def test_line_of_sight_bounds_reduce_errors_in_shadows(runs):
     for dem, held in runs[peers.BOUNDED].items():
         free = runs["shadows"][dem]
         assert peers.summarise(held)["rmse"] <= 0.97 * peers.summarise(free)["rmse"], dem
 
 
 @pytest.mark.parametrize("kind", JUDGED)
-def test_stated_sds_hold(runs, kind):
+def test_stated_standard_deviations_are_correct(runs, kind):
     found = peers.summarise([run for of_dem in runs[kind].values() for run in of_dem])
     assert 0.85 <= found["rms_sds"] <= 1.15
     # What normal errors cover that are 1.15 and 0.85 of their stated sds.
@@ -80,7 +80,7 @@ def test_stated_sds_hold(runs, kind):
 
 
 @pytest.mark.parametrize("method", ["telea", "ns"])
-def test_inpainting_is_that_of_opencv(method):
+def test_inpainting_matches_opencv(method):
     ground = peers.cut(peers.load("jacksboro"), np.random.default_rng(6), 64)
     mask, _ = peers.make_mask("blob 5 %", ground, np.random.default_rng(2))
     ours = peers.by_groundray(ground, mask, "--method", method)[0]
@@ -90,7 +90,7 @@ def test_inpainting_is_that_of_opencv(method):
     assert np.abs(ours - theirs)[mask].max() < 0.01 * np.ptp(ground)
 
 
-def test_thin_plate_is_the_one_of_scipy():
+def test_thin_plate_matches_scipy():
     ground = peers.cut(peers.load("jacksboro"), np.random.default_rng(1), 96)
     mask, _ = peers.make_mask("blob 20 %", ground, np.random.default_rng(2))
     ours = peers.by_groundray(ground, mask, "--tension", 0)[0]
@@ -99,7 +99,7 @@ def test_thin_plate_is_the_one_of_scipy():
 
 
 @pytest.mark.parametrize("cell_m", [1, 30])  # ground of some 80 and 10 degrees
-def test_meshes_of_cgal_come_near_a_thin_plate(cell_m):
+def test_cgal_meshes_approximate_a_thin_plate(cell_m):
     ground = peers.cut(peers.load("jacksboro"), np.random.default_rng(3), 96)
     mask, _ = peers.make_mask("blob 5 %", ground, np.random.default_rng(4))
     ours = peers.by_groundray(ground, mask, "--method", "cgal", cell_m=cell_m)[0]
@@ -111,7 +111,7 @@ def test_meshes_of_cgal_come_near_a_thin_plate(cell_m):
     assert rmse[0] <= 1.1 * rmse[1]
 
 
-def test_holes_stay_when_asked_to(tmp_path):
+def test_holes_beyond_the_limits_stay(tmp_path):
     ground = peers.cut(peers.load("jacksboro"), np.random.default_rng(5), 64)
     ground[5:8, 5:8] = np.nan
     ground[20:40, 20:40] = np.nan
@@ -130,7 +130,7 @@ def test_holes_stay_when_asked_to(tmp_path):
     assert (out[known] == ground[known].astype(np.float32)).all()
 
 
-def test_what_is_written_is_a_dem_again(tmp_path):
+def test_the_filled_file_is_a_dem(tmp_path):
     result = fill(PRAIRIE, "-o", tmp_path / "out.tif")
     assert result.returncode == 0, result.stderr
     info = [
@@ -167,12 +167,12 @@ def read_voids(path):
 @pytest.mark.parametrize(
     ("options", "message"),
     [
-        (["--method", "gdal", "--tension", "0.1"], "go with --method tension alone"),
-        (["--tension", "1"], "tension = 1 must be 0 to below 1"),
-        (["--bound", str(JACKSBORO)], "its samples are not those of the DEM"),
+        (["--method", "gdal", "--tension", "0.1"], "apply only to --method tension"),
+        (["--tension", "1"], "tension = 1 must be at least 0 and below 1"),
+        (["--bound", str(JACKSBORO)], "its samples do not match the DEM's"),
     ],
 )
-def test_faults_of_a_filling_are_told_and_nothing_is_written(tmp_path, options, message):
+def test_fill_errors_are_reported_and_nothing_is_written(tmp_path, options, message):
     peers.write_grid(tmp_path / "in.asc", np.ones((8, 8)))
     result = fill(tmp_path / "in.asc", "-o", tmp_path / "out.tif", *options)
     assert result.returncode == 1

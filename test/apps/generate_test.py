@@ -1,4 +1,4 @@
-"""The program as a user meets it: datasets that other people's tools read, and bad input."""
+"""The program for users: datasets as read by other software, and invalid input."""
 
 import math
 import os
@@ -55,7 +55,7 @@ def generate(folder, scene=SCENE, out="out", resume=False, **options):
 
 
 def refused(result, *words):
-    """The run failed with one message that holds all the words, and no trace of a crash."""
+    """Checks that the run failed with one message that contains all words, without a crash."""
     assert result.returncode == 1, result
     assert result.stderr.startswith("groundray: "), result.stderr
     for word in words:
@@ -76,7 +76,7 @@ def dataset(tmp_path_factory):
 
 
 def heights_of(dem, folder):
-    """Samples and geotransform of a DEM, as GDAL's own program writes them out."""
+    """Returns samples and geotransform of a DEM as written by GDAL's program."""
     grid = folder / "grid.asc"
     subprocess.run(
         ["gdal_translate", "-q", "-of", "AAIGrid", "-co", "SIGNIFICANT_DIGITS=12", dem, grid],
@@ -91,7 +91,7 @@ def heights_of(dem, folder):
     return heights, west, north, cell
 
 
-def test_every_column_is_there_with_its_type(dataset):
+def test_every_column_is_present_with_its_type(dataset):
     for frame in range(3):
         vertex = PlyData.read(dataset / f"lidar/top/{frame:06}.ply")["vertex"]
         assert {p.name: p.val_dtype for p in vertex.properties} == COLUMNS
@@ -117,7 +117,7 @@ def test_points_lie_on_the_surface_that_gdal_reads(dataset, tmp_path):
     assert np.abs(points["world_z"] - surface).max() < 1e-8
 
 
-def test_pose_file_takes_sensor_points_to_the_world(dataset):
+def test_pose_file_transforms_sensor_points_to_the_world(dataset):
     poses = np.loadtxt(dataset / "poses/top.tum")
     record = yaml.safe_load((dataset / "dataset.yaml").read_text())
     for frame in record["frames"]:
@@ -136,7 +136,7 @@ def test_pose_file_takes_sensor_points_to_the_world(dataset):
         assert np.abs(world - truth).max() < 1e-4
 
 
-def test_record_says_what_there_is(dataset):
+def test_record_describes_the_dataset(dataset):
     record = yaml.safe_load((dataset / "dataset.yaml").read_text())
     assert record["seed"] == 7
     assert record["scene"] == SCENE
@@ -150,7 +150,7 @@ def test_record_says_what_there_is(dataset):
     assert (dataset / "lidar/top/000000_preview.png").read_bytes().startswith(b"\x89PNG")
 
 
-def test_same_seed_gives_the_same_bytes(dataset, tmp_path):
+def test_same_seed_yields_the_same_bytes(dataset, tmp_path):
     assert generate(tmp_path).returncode == 0
     assert files(tmp_path / "out") == files(dataset)
 
@@ -170,7 +170,7 @@ scatter:
 
 
 def test_a_scene_of_objects_has_the_same_bytes_for_any_number_of_threads(tmp_path):
-    """TBB starts as many threads as the process may use processors."""
+    """TBB starts one thread per processor that the process may use."""
     scene = SCENE.replace("duration_s: 0.3", "duration_s: 0.1")
     scene = scene.replace(f"terrain: {{dem: {PRAIRIE}}}\n", f"terrain:\n  dem: {PRAIRIE}\n{WORLD}")
     all_ = sorted(os.sched_getaffinity(0))
@@ -183,17 +183,17 @@ def test_a_scene_of_objects_has_the_same_bytes_for_any_number_of_threads(tmp_pat
     assert {1, 2, 4, 10} == set(np.unique(scan["label"]))
 
 
-def test_run_goes_on_where_it_stopped_and_ends_with_the_same_bytes(dataset, tmp_path):
+def test_stopped_run_resumes_to_the_same_bytes(dataset, tmp_path):
     shutil.copytree(dataset, tmp_path / "out")
     for name in ("000001.ply", "000002.ply", "000002_preview.png"):
         (tmp_path / "out/lidar/top" / name).unlink()
     result = generate(tmp_path, resume=True)
     assert result.returncode == 0, result.stderr
-    assert "1 scans were there already" in result.stdout
+    assert "1 scans already existed" in result.stdout
     assert files(tmp_path / "out") == files(dataset)
 
 
-def test_interrupt_leaves_whole_frames_and_exit_code_130(dataset, tmp_path):
+def test_interrupt_leaves_complete_frames_and_exit_code_130(dataset, tmp_path):
     (tmp_path / "scene.yaml").write_text(
         SCENE.replace("0.3", "2.5").replace("speed_m_s: 10", "speed_m_s: 4")
     )
@@ -207,7 +207,7 @@ def test_interrupt_leaves_whole_frames_and_exit_code_130(dataset, tmp_path):
     run.send_signal(signal.SIGINT)
     _, said = run.communicate(timeout=60)
     assert run.returncode == 130, said
-    assert "goes on with --resume" in said
+    assert "continues with --resume" in said
     names = sorted(p.name for p in (out / "lidar/top").iterdir())
     assert all(re.fullmatch(r"\d{6}(\.ply|_preview\.png)", name) for name in names), names
     for scan in (out / "lidar/top").glob("*.ply"):
@@ -217,9 +217,9 @@ def test_interrupt_leaves_whole_frames_and_exit_code_130(dataset, tmp_path):
     assert "pending" in states
 
 
-def test_folder_of_another_run_is_left_alone(dataset, tmp_path):
+def test_folder_of_another_run_is_kept(dataset, tmp_path):
     shutil.copytree(dataset, tmp_path / "out")
-    assert refused(generate(tmp_path), "holds a dataset of this run already", "add --resume")
+    assert refused(generate(tmp_path), "already contains a dataset of this run", "add --resume")
     assert refused(generate(tmp_path, SCENE.replace("seed: 7", "seed: 8")), "another scene, DEM")
     assert files(tmp_path / "out") == files(dataset)
     (tmp_path / "mine").mkdir()
@@ -241,7 +241,7 @@ def test_folder_of_another_run_is_left_alone(dataset, tmp_path):
         (("duration_s: 0.3", "duration_s: 0.05"), ["shorter than one sweep"]),
     ],
 )
-def test_a_fault_in_the_scene_is_named(tmp_path, change, words):
+def test_an_error_in_the_scene_is_located(tmp_path, change, words):
     assert change[0] in SCENE
     assert refused(generate(tmp_path, SCENE.replace(*change)), *words)
     assert not (tmp_path / "out").exists()
@@ -261,7 +261,7 @@ def test_a_fault_in_the_scene_is_named(tmp_path, change, words):
         (["0 429440 5150660 100 0 0 0 1", "1 429441 5150660 100 0 0 0 1"], ["below the ground"]),
     ],
 )
-def test_a_fault_in_the_trajectory_is_named(tmp_path, lines, words):
+def test_an_error_in_the_trajectory_is_located(tmp_path, lines, words):
     (tmp_path / "path.tum").write_text("\n".join(lines) + "\n")
     scene = re.sub(
         r"platform:.*?lidars:", "platform: {trajectory: path.tum}\nlidars:", SCENE, flags=re.S
@@ -270,8 +270,8 @@ def test_a_fault_in_the_trajectory_is_named(tmp_path, lines, words):
 
 
 @pytest.mark.parametrize("kind", ["trajectory", "dem", "sensor"])
-def test_folder_of_a_run_with_other_inputs_is_left_alone(tmp_path, kind):
-    """The scene file reads the same, but what it names has changed."""
+def test_folder_of_a_run_with_other_inputs_is_kept(tmp_path, kind):
+    """The scene file is unchanged, but a file that it names has changed."""
     scene = re.sub(
         r"platform:.*?lidars:", "platform: {trajectory: path.tum}\nlidars:", SCENE, flags=re.S
     )
@@ -319,10 +319,10 @@ def test_recorded_trajectory_with_epoch_times_starts_at_zero(tmp_path):
 
 def test_output_that_cannot_be_written_is_an_error(tmp_path):
     (tmp_path / "file").write_text("")
-    assert refused(generate(tmp_path, out="file/out"), "file/out", "cannot make this folder")
+    assert refused(generate(tmp_path, out="file/out"), "file/out", "cannot create this folder")
 
 
-def test_full_disk_is_an_error_and_leaves_no_half_file(tmp_path):
+def test_file_size_limit_is_an_error_and_leaves_no_partial_file(tmp_path):
     """A limit on file size makes every scan fail while it is written, as a full disk does."""
     limit = lambda: resource.setrlimit(resource.RLIMIT_FSIZE, (200_000, 200_000))  # noqa: E731
     result = generate(tmp_path, preexec_fn=limit)
@@ -331,7 +331,7 @@ def test_full_disk_is_an_error_and_leaves_no_half_file(tmp_path):
 
 
 @pytest.mark.skipif(os.geteuid() != 0, reason="mounting a small disk needs root")
-def test_disk_without_space_is_an_error_and_leaves_no_half_file(tmp_path):
+def test_full_disk_is_an_error_and_leaves_no_partial_file(tmp_path):
     disk = tmp_path / "disk"
     disk.mkdir()
     mount = ["mount", "-t", "tmpfs", "-o", "size=400k", "tmpfs", disk]
@@ -344,14 +344,14 @@ def test_disk_without_space_is_an_error_and_leaves_no_half_file(tmp_path):
         subprocess.run(["umount", disk], check=True)
 
 
-def test_wrong_usage_is_exit_code_2():
+def test_wrong_usage_exits_with_code_2():
     assert groundray().returncode == 2
     assert groundray("generate").returncode == 2
     assert groundray("generate", "x.yaml", "-o", "y", "--fast").returncode == 2
     assert groundray("frobnicate").returncode == 2
 
 
-def test_help_and_version_are_enough_to_begin_with():
+def test_help_lists_the_commands_and_version_is_printed():
     said = groundray("--help")
     assert said.returncode == 0
     for word in ("generate", "info", "Exit codes", "first_light.yaml"):
@@ -359,7 +359,7 @@ def test_help_and_version_are_enough_to_begin_with():
     assert re.fullmatch(r"groundray \d+\.\d+\.\d+\n", groundray("--version").stdout)
 
 
-def test_info_tells_of_a_dem_and_of_a_scene(tmp_path):
+def test_info_describes_a_dem_and_a_scene(tmp_path):
     said = groundray("info", PRAIRIE).stdout
     for word in ("400 x 400", "26915", "1 x 1 m", "379.659 to 410.759", "holes     0", "MiB"):
         assert word in said

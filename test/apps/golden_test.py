@@ -1,4 +1,4 @@
-"""The golden suite as its users run it: it passes, finds what is wrong, and says where."""
+"""The golden suite for users: it passes, detects faults and locates them."""
 
 import json
 import os
@@ -27,7 +27,7 @@ def golden(*arguments, **options):
 
 
 def copy_of_cases(folder):
-    """Cases name the DEMs of data/ by paths beside them."""
+    """Cases name the DEMs of data/ by relative paths."""
     shutil.copytree(CASES, folder / "test/golden", ignore=shutil.ignore_patterns("*.cpp"))
     (folder / "data").symlink_to(ROOT / "data")
     return folder / "test/golden"
@@ -48,7 +48,7 @@ def failures(junit):
 
 
 class Outline(HTMLParser):
-    """What a page holds: words, pictures, and links to other files."""
+    """Contents of a page: words, pictures and links to other files."""
 
     def __init__(self):
         super().__init__()
@@ -83,7 +83,7 @@ def test_all_cases_pass(whole):
     assert all(int(suite.get("tests")) > 0 for suite in suites)
 
 
-def test_the_report_needs_no_other_file(whole):
+def test_the_report_is_self_contained(whole):
     _, out = whole
     page = Outline()
     page.feed((out / "report.html").read_text())
@@ -202,7 +202,7 @@ FAULTS = {
 
 
 @pytest.mark.parametrize("fault", FAULTS)
-def test_a_fault_is_found_where_it_is(fault, tmp_path):
+def test_a_fault_fails_exactly_its_case(fault, tmp_path):
     file, old, new, found_by = FAULTS[fault]
     cases = copy_of_cases(tmp_path)
     replace(cases / file, old, new)
@@ -214,7 +214,7 @@ def test_a_fault_is_found_where_it_is(fault, tmp_path):
     assert f"passed {control}" in result.stdout
 
 
-def test_a_damaged_reference_or_none_fails_its_case(tmp_path):
+def test_a_damaged_or_missing_reference_fails_its_case(tmp_path):
     cases = copy_of_cases(tmp_path)
     stored = cases / "camera_truth/expected/camera/ahead/000001.exr"
     stored.write_bytes(stored.read_bytes()[:-100])
@@ -228,7 +228,7 @@ def test_a_damaged_reference_or_none_fails_its_case(tmp_path):
     assert "000000.moments.exr: " in result.stdout
 
 
-def test_a_program_that_fails_fails_its_case(tmp_path):
+def test_a_failing_program_fails_its_case(tmp_path):
     cases = copy_of_cases(tmp_path)
     replace(cases / "camera_flow/scene.yaml", "duration_s: 0.3", "duration_s: -1")
     result = golden("run", "--cases", cases, "--filter", "camera_flow", "-o", tmp_path / "out")
@@ -237,7 +237,7 @@ def test_a_program_that_fails_fails_its_case(tmp_path):
     assert "duration_s" in result.stdout
 
 
-def test_accepting_stores_what_then_passes(tmp_path):
+def test_accepted_results_pass(tmp_path):
     cases = copy_of_cases(tmp_path)
     out = tmp_path / "out"
     replace(cases / "camera_truth/truth.yaml", "focal_px: [40, 40]", "focal_px: [41, 41]")
@@ -276,8 +276,8 @@ sys.exit(code)
 """
 
 
-def test_rows_that_are_lost_are_missed(tmp_path):
-    """Each row that is left is right, so only their number tells."""
+def test_missing_rows_are_detected(tmp_path):
+    """All remaining rows are correct: only their number shows the fault."""
     program = tmp_path / "lossy"
     program.write_text(ROWS_LOST.format(program=PROGRAM).replace("/usr/bin/env python3", PYTHON))
     program.chmod(0o755)
@@ -290,7 +290,7 @@ def test_rows_that_are_lost_are_missed(tmp_path):
     assert failures(tmp_path / "out/junit.xml") == asked
 
 
-def test_whatever_a_program_prints_the_reports_can_be_read(tmp_path):
+def test_reports_are_readable_whatever_a_program_prints(tmp_path):
     program = tmp_path / "noisy"
     program.write_text("#!/bin/sh\nprintf '\\033[31m\\001\\377 <&> bad'\nexit 3\n")
     program.chmod(0o755)
@@ -317,7 +317,7 @@ def test_one_run_at_a_time_writes_into_a_folder(tmp_path):
     assert "another run writes there" in second.stderr
 
 
-def test_a_run_that_stops_leaves_no_report_of_an_earlier_one(tmp_path):
+def test_a_stopped_run_leaves_no_earlier_report(tmp_path):
     out = tmp_path / "out"
     assert golden("run", "--filter", "camera_flow", "-o", out).returncode == 0
     stopped = golden("run", "--filter", "camera_flow", "--program", "/nonexistent", "-o", out)
@@ -326,7 +326,7 @@ def test_a_run_that_stops_leaves_no_report_of_an_earlier_one(tmp_path):
     assert not list(out.glob("*.html")) + list(out.glob("*.json")) + list(out.glob("*.xml"))
 
 
-def test_an_interrupt_ends_a_run(tmp_path):
+def test_an_interrupt_stops_the_suite(tmp_path):
     command = [GOLDEN, "run", "-o", tmp_path / "out"]
     quiet = {"stdout": subprocess.DEVNULL, "stderr": subprocess.DEVNULL}
     with subprocess.Popen(command, **quiet, start_new_session=True) as run:
@@ -338,12 +338,12 @@ def test_an_interrupt_ends_a_run(tmp_path):
     assert not (tmp_path / "out/report.json").exists()
 
 
-def test_wrong_usage_and_missing_folders_are_told(tmp_path):
+def test_wrong_usage_and_missing_folders_are_reported(tmp_path):
     assert golden("run", "--jobs", "0").returncode == 2
     assert golden("judge").returncode == 2
     missing = golden("run", "--cases", tmp_path / "none")
     assert missing.returncode == 1
-    assert "no such folder of cases" in missing.stderr
+    assert "the folder of cases does not exist" in missing.stderr
     unknown = golden("run", "--filter", "no_such_case")
     assert unknown.returncode == 1
-    assert "holds no case with 'no_such_case'" in unknown.stderr
+    assert "contains no case with 'no_such_case'" in unknown.stderr

@@ -25,7 +25,7 @@ from markdown_page import Block, Page
 ROOT = Path(__file__).resolve().parents[2]
 PROGRAMS = ROOT / "build/release/bin"
 PACKAGE = Path(os.environ.get("GROUNDRAY_PYTHON", ROOT / "build/release/python"))
-PAGES = ["docs/guide.md", "README.md"]
+PAGES = ["docs/guide/guide.md", "README.md"]
 COMMANDS = ("sh", "console", "python")
 LEFT_OUT = 8  # blocks that are not run; a new one is a choice to make here, too
 
@@ -45,7 +45,7 @@ def reason_left_out(block: Block) -> str | None:
 
 @pytest.fixture(scope="module")
 def folders(tmp_path_factory: pytest.TempPathFactory) -> dict[str, Path]:
-    """A folder for each page, with what its examples take as given."""
+    """A folder for each page, with the files that its examples require."""
     made = {}
     for page in PAGES:
         folder = made[page] = tmp_path_factory.mktemp(Path(page).stem)
@@ -57,7 +57,7 @@ def folders(tmp_path_factory: pytest.TempPathFactory) -> dict[str, Path]:
 
 
 def write_programs(folder: Path) -> None:
-    """What `pip install .` puts on the path."""
+    """The commands that `pip install .` puts on the path."""
     folder.mkdir()
     program = folder / "groundray-export"
     program.write_text(f'#!/bin/sh\nexec {sys.executable} -m groundray.export.command "$@"\n')
@@ -65,7 +65,7 @@ def write_programs(folder: Path) -> None:
 
 
 def make_small_demo(folder: Path) -> None:
-    """What `./dev demo` makes, of a shorter run with smaller images."""
+    """The result of `./dev demo`, from a shorter run with smaller images."""
     scenes = folder / "data/scenes"
     scene = (scenes / "offroad_trail.yaml").read_text(encoding="utf-8")
     camera = (scenes / "trail_camera.yaml").read_text(encoding="utf-8")
@@ -90,7 +90,7 @@ def make_small_demo(folder: Path) -> None:
 
 
 def environment(folder: Path) -> dict[str, str]:
-    """A shell's, with the programs and this Python first, and no display."""
+    """The shell's environment, with the programs and this Python first, without a display."""
     first = [PROGRAMS, folder / "bin", Path(sys.executable).parent]
     path = os.pathsep.join([*map(str, first), os.environ["PATH"]])
     hidden = ("DISPLAY", "WAYLAND_DISPLAY")
@@ -113,7 +113,7 @@ def run(arguments: list[str], folder: Path) -> subprocess.CompletedProcess[str]:
 
 
 def output_of(result: subprocess.CompletedProcess[str]) -> str:
-    """Results, then messages and progress, whose order among each other a file does not keep."""
+    """Results, then messages and progress, whose relative order is lost in files."""
     return (result.stdout + result.stderr).strip()
 
 
@@ -126,7 +126,7 @@ def fail(where: str, why: str) -> NoReturn:
 
 
 def pattern_of(expected: str) -> str:
-    """Returns an expression for what is printed: a line of ... is any lines, else any text."""
+    """Returns a regular expression for output: a line of ... is any lines, otherwise any text."""
     pattern = ""
     for line in expected.strip().splitlines():
         text = r".*".join(re.escape(piece) for piece in line.split("..."))
@@ -166,16 +166,14 @@ def run_block(block: Block, folder: Path, where: str) -> None:
 
 
 @pytest.mark.parametrize(("page", "section"), sections())
-def test_examples_run_as_they_are_written(
-    page: str, section: str, folders: dict[str, Path]
-) -> None:
+def test_examples_run_as_written(page: str, section: str, folders: dict[str, Path]) -> None:
     blocks = [block for block in Page(ROOT / page).blocks if block.section == section]
     for block in blocks:
         if reason_left_out(block) is None:
             run_block(block, folders[page], f"{page}:{block.line}")
 
 
-def test_examples_left_out_are_marked_and_few() -> None:
+def test_skipped_examples_are_marked_and_few() -> None:
     blocks = [block for page in PAGES for block in Page(ROOT / page).blocks]
     left_out = [reason for block in blocks if (reason := reason_left_out(block))]
     assert len(left_out) == LEFT_OUT, left_out

@@ -1,4 +1,4 @@
-"""Lidars with light through the program: what it writes, read by NumPy and plyfile."""
+"""Lidars with simulated light: the program's files, read by NumPy and plyfile."""
 
 import os
 import re
@@ -81,8 +81,8 @@ def test_ranges_are_multiples_of_their_step_and_near_the_truth(noisy):
     assert e["return_count"].max() <= 2  # dual
 
 
-def test_centroids_of_waveforms_are_the_ranges(exact):
-    """Two programs' arithmetic on the same floats: a centre of gravity is the centroid."""
+def test_centroids_of_waveforms_match_the_ranges(exact):
+    """Computed twice from the same floats: the centre of gravity is the centroid."""
     interval_s = float(exact.comment(r"waveform_interval_s (\S+)")[1])
     e, index = exact.echoes, exact.index
     runs = {}
@@ -104,7 +104,7 @@ def test_centroids_of_waveforms_are_the_ranges(exact):
     assert checked > 100
 
 
-def test_convergence_is_told(exact):
+def test_convergence_is_reported(exact):
     told = yaml.safe_load(exact.comment(r"convergence (.*)")[1])
     assert told["pulses"] == 1809 * 16 // 64 + 1
     assert 0 <= told["other_echoes"] <= told["pulses"]
@@ -112,7 +112,7 @@ def test_convergence_is_told(exact):
     assert exact.record["frames"][0]["convergence"] == told
 
 
-def test_another_laser_or_material_is_another_dataset(noisy, tmp_path):
+def test_a_folder_of_another_laser_or_material_is_rejected(noisy, tmp_path):
     material = tmp_path / "mine.yaml"
     text = (ROOT / "data/materials/dry_grass.yaml").read_text()
     scene = SCENE.replace("material: dry_grass", f"material: {material}")
@@ -130,12 +130,12 @@ def test_another_laser_or_material_is_another_dataset(noisy, tmp_path):
     [
         ({"pulse_fwhm_ns: 5": "pulse_fwhm_ns: 5\n      pulse_shape: [0, 1, 0]"}, "pulse"),
         ({"sub_rays: 16 ": "sub_rays: 24 "}, "sub_rays = 24"),
-        ({"material: dry_grass": "label: 1"}, "must name a material"),
+        ({"material: dry_grass": "label: 1"}, "must have a material"),
         ({"visibility_m: 2000": "fog_range_m: 50", "overlap_m: [0.5, 1]": ""}, "needs overlap_m"),
         ({"wavelength_nm: 905": "wavelength_nm: 2200"}, "2200"),
     ],
 )
-def test_a_lidar_that_cannot_work_is_refused_before_anything_is_written(tmp_path, changes, words):
+def test_an_invalid_lidar_is_rejected_before_anything_is_written(tmp_path, changes, words):
     scene = SCENE
     for old, new in changes.items():
         assert old in scene

@@ -1,4 +1,4 @@
-"""Meshes go between groundray and other people's readers and writers in every form.
+"""Meshes are exchanged between groundray and other readers and writers in every format.
 
 The oracle is numpy: a ball with a value for each vertex, near D's origin or in UTM itself.
 """
@@ -61,7 +61,7 @@ def write_ply(path: Path, vertices: np.ndarray, faces: np.ndarray, *comments: st
 
 
 def origin_of(path: Path) -> np.ndarray:
-    """What each form says of D's origin."""
+    """D's origin as stored in each format."""
     head = path.read_bytes()[:4096].decode("latin-1")
     if path.suffix == ".glb":
         words = head.split('"origin_w_m":[')[1].split("]")[0].split(",")
@@ -71,7 +71,7 @@ def origin_of(path: Path) -> np.ndarray:
 
 
 def corners_of(path: Path, reader: str) -> np.ndarray:
-    """Triangles as a peer reads them, in D."""
+    """Returns triangles as read by a peer, in D."""
     if reader == "trimesh":
         loaded = peer("trimesh").load(path, process=False)
         mesh = loaded.to_mesh() if path.suffix == ".glb" else loaded
@@ -102,7 +102,7 @@ def test_peers_read_millimetres_of_large_coordinates(program, ball, tmp_path, fo
         np.testing.assert_allclose(corners, vertices[faces] + at, rtol=0, atol=atol)
 
 
-def test_columns_of_a_ply_survive(program, ball, tmp_path):
+def test_ply_columns_are_kept(program, ball, tmp_path):
     vertices, faces = ball
     rows = write_ply(tmp_path / "a.ply", vertices, faces, "made by hand", "origin_w 1 2 3")
     convert(program, tmp_path / "a.ply", tmp_path / "b.ply")
@@ -124,7 +124,7 @@ def test_columns_of_a_ply_survive(program, ball, tmp_path):
 
 @pytest.mark.parametrize("writer", ["trimesh", "open3d"])
 @pytest.mark.parametrize("form", [*FORMS, "gltf"])
-def test_what_peers_write_is_read_as_one_surface(program, ball, tmp_path, form, writer):
+def test_meshes_written_by_peers_are_read_as_one_surface(program, ball, tmp_path, form, writer):
     vertices, faces = ball
     path = tmp_path / f"theirs.{form}"
     trimesh = peer("trimesh")
@@ -162,7 +162,7 @@ def test_what_peers_write_is_read_as_one_surface(program, ball, tmp_path, form, 
 
 
 @pytest.mark.parametrize("form", FORMS)
-def test_a_file_that_is_cut_short_is_refused(program, ball, tmp_path, form):
+def test_a_truncated_mesh_file_is_rejected(program, ball, tmp_path, form):
     vertices, faces = ball
     write_ply(tmp_path / "a.ply", vertices, faces)
     whole, cut = tmp_path / f"b.{form}", tmp_path / f"cut.{form}"

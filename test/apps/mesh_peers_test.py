@@ -1,6 +1,7 @@
-"""Other people's readers see the terrain mesh that groundray wrote, in each form.
+"""Other readers load groundray's terrain mesh in every format.
 
-The oracle is numpy, given the layout that docs/formats.md promises, and GDAL's own view of the DEM.
+The oracle is numpy, given the layout that docs/reference/formats.md promises, and GDAL's own view
+of the DEM.
 """
 
 import json
@@ -29,7 +30,7 @@ def folder(tmp_path_factory: pytest.TempPathFactory) -> Path:
 
 
 class Mesh:
-    """The PLY as numpy reads it."""
+    """The PLY file read by NumPy."""
 
     def __init__(self, path: Path) -> None:
         header, end, body = path.read_bytes().partition(b"end_header\n")

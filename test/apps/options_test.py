@@ -1,4 +1,4 @@
-"""Options that pages of docs give to the programs are options that the programs have."""
+"""Options on pages of docs exist in the programs."""
 
 import functools
 import os
@@ -43,7 +43,7 @@ def help_of(program: str, command: str) -> str:
 
 
 def code_of(path: Path) -> str:
-    """Returns blocks, indented lines and code within sentences, a command in each line."""
+    """Returns blocks, indented lines and inline code, one command per line."""
     page = Page(path)
     text = path.read_text(encoding="utf-8")
     indented = [line[4:] for line in text.splitlines() if line.startswith("    ")]
@@ -71,12 +71,12 @@ def unknown_options(path: Path) -> list[str]:
     return unknown
 
 
-def test_options_of_commands_on_pages_are_the_programs() -> None:
+def test_options_of_commands_on_pages_exist() -> None:
     unknown = [fault for path in PAGES for fault in unknown_options(path)]
     assert not unknown, "\n".join(unknown)
 
 
-def test_options_named_alone_on_pages_are_some_programs() -> None:
+def test_options_named_alone_on_pages_exist() -> None:
     known = "".join(
         help_of(program, name) for program, names in COMMANDS.items() for name in ["", *names]
     )
@@ -89,6 +89,6 @@ def test_options_named_alone_on_pages_are_some_programs() -> None:
     assert not unknown, "\n".join(unknown)
 
 
-def test_enough_commands_are_looked_at() -> None:
+def test_enough_commands_are_checked() -> None:
     calls = [call for path in PAGES for call in CALL.findall(code_of(path))]
     assert sum("--" in rest for _, rest in calls) > 25

@@ -1,6 +1,6 @@
-"""Other people's PLY readers see every column of a scan as groundray wrote it.
+"""Other PLY readers load every column of a scan as groundray wrote it.
 
-The oracle is numpy, given the layout that docs/formats.md promises.
+The oracle is numpy, given the layout that docs/reference/formats.md promises.
 """
 
 import subprocess
@@ -63,7 +63,7 @@ def test_trimesh_reads_every_column(sample: Path, table: np.ndarray) -> None:
         np.testing.assert_array_equal(np.ravel(raw[name]), table[name], name)
 
 
-def test_open3d_reads_every_column_of_a_type_it_knows(sample: Path, table: np.ndarray) -> None:
+def test_open3d_reads_every_column_of_a_supported_type(sample: Path, table: np.ndarray) -> None:
     cloud = peer("open3d").t.io.read_point_cloud(str(sample))
     columns = {name: cloud.point[name].numpy() for name in cloud.point}
     seen = dict(zip(("x", "y", "z"), columns.pop("positions").T, strict=True))

@@ -1,7 +1,7 @@
-"""`groundray reconstruct dem` as a user meets it: DEMs from datasets and from others' points.
+"""`groundray reconstruct dem` for users: DEMs from datasets and from points of other software.
 
-The oracles: GDAL's own programs read what is written, and NumPy knows the ground: that which the
-test made, or the triangles of the DEM that was scanned.
+The oracles: GDAL's programs read the output, and NumPy computes the ground: a surface made by the
+test, or the triangles of the scanned DEM.
 """
 
 import json
@@ -43,7 +43,7 @@ JACKSBORO = ROOT / "data/terrain/jacksboro.tif"
 
 @pytest.fixture(scope="module")
 def prairie(tmp_path_factory):
-    """Five scans over the prairie, with noise and 1.5 % outliers; and what became of them."""
+    """Five scans of the prairie with noise and 1.5 % outliers, and their DEM."""
     folder = tmp_path_factory.mktemp("prairie")
     done("generate", scene(folder, PRAIRIE, (429448, 5150664)), "-o", folder / "data")
     add_outliers(folder / "data", 0.015, 1)
@@ -83,7 +83,7 @@ def judge(errors, stated_m, name, record_property):
     assert 0.85 <= rms <= 1.15
 
 
-def test_heights_and_what_is_said_of_them_are_true(prairie, tmp_path, record_property):
+def test_heights_and_their_stated_errors_are_correct(prairie, tmp_path, record_property):
     dem, truth = Raster(prairie / "out/dem.tif", tmp_path), Raster(PRAIRIE, tmp_path)
     error = dem["elevation"] - triangle_heights(truth, *dem.places())
     is_measured = np.isin(dem["source"], (1, 2, 3))
@@ -138,7 +138,7 @@ def test_layers_agree_with_each_other_and_the_file_with_gdal(prairie, tmp_path):
     assert np.nanmax(np.abs(apart)) < 0.02
 
 
-def test_a_dem_is_a_terrain_again(prairie, tmp_path):
+def test_a_dem_is_usable_as_terrain(prairie, tmp_path):
     said = done("info", prairie / "out/dem.tif")
     assert "UTM zone 15N" in said
     done("terrain", "fill", prairie / "out/dem.tif", "-o", tmp_path / "again.tif")
@@ -157,7 +157,7 @@ def test_bytes_of_a_dem_do_not_depend_on_threads(prairie, tmp_path):
     assert same_bytes_on_any_threads(tmp_path, prairie / "data", "--cell-m", "0.25", *filters)
 
 
-def test_blank_areas_stay_when_asked_to(prairie, tmp_path):
+def test_blank_areas_stay_on_request(prairie, tmp_path):
     done(
         *("reconstruct", "dem", prairie / "data", "--cell-m", "0.25", "--no-fill"),
         *("-o", tmp_path / "open.tif", "--sight", "none"),
@@ -167,7 +167,7 @@ def test_blank_areas_stay_when_asked_to(prairie, tmp_path):
     assert np.all(np.isnan(dem["upper_bound"]))
 
 
-def test_faults_are_told_and_leave_nothing(prairie, tmp_path):
+def test_dem_errors_are_reported_and_leave_no_files(prairie, tmp_path):
     out = ["-o", tmp_path / "dem.tif"]
     data = prairie / "data"
     cell = ["--cell-m", "1"]
@@ -175,18 +175,20 @@ def test_faults_are_told_and_leave_nothing(prairie, tmp_path):
     one = points_file(tmp_path / "one.npy", [[10, 20, 30]])
     refused(tmp_path, one, *cell, *air, *out, words=["only 1 point"])
     none = points_file(tmp_path / "none.npy", np.full((4, 3), np.nan))
-    refused(tmp_path, none, *cell, *air, *out, words=["nothing to make a DEM of"])
+    refused(tmp_path, none, *cell, *air, *out, words=["a DEM cannot be computed"])
     rng = np.random.default_rng(5)
     wild = rng.uniform([0, 0, -500], [60, 60, 500], (400, 3))
     outliers = points_file(tmp_path / "outliers.npy", wild)
-    refused(tmp_path, outliers, *cell, *air, *out, words=["none of the 400 points makes ground"])
+    refused(
+        tmp_path, outliers, *cell, *air, *out, words=["none of the 400 points is usable as ground"]
+    )
     refused(tmp_path, data, *out, words=["--cell-m", "--like"])
     other = write_dem(prairie / "other.tif", np.zeros((9, 9)), 429440, 5150670, 1)
     for option in ("--like", "--truth"):
         words = ["other.tif", "its CRS is", "gdalwarp"]
         refused(tmp_path, data, *out, option, other, words=words)
     far = write_dem(prairie / "far.tif", np.zeros((9, 9)), 1000, 1000, 1, "EPSG:26915")
-    refused(tmp_path, data, *out, "--like", far, words=["lie outside of the DEM's frame"])
+    refused(tmp_path, data, *out, "--like", far, words=["are outside the DEM's extent"])
     refused(tmp_path, data, *cell, *out, "--stereo", "pear", words=["no stereo pair 'pear'"])
     refused(tmp_path, one, *cell, *out, "--stereo", "pear", words=["only a dataset has stereo"])
     refused(tmp_path, data, *cell, "-o", tmp_path / "dem.png", words=["must end in .tif"])
@@ -195,7 +197,7 @@ def test_faults_are_told_and_leave_nothing(prairie, tmp_path):
     refused(tmp_path, data, *cell, *out, "--memory-mb", "1", words=["more than"])
 
 
-def test_a_gap_of_the_poses_is_told(prairie, tmp_path):
+def test_a_gap_in_the_poses_is_reported(prairie, tmp_path):
     poses = (prairie / "data/poses/top.tum").read_text().splitlines(keepends=True)
     (tmp_path / "gap.tum").write_text("".join([*poses[:2], "4" + poses[-1].lstrip("0")]))
     words = ["the poses have a gap of", "--pose-gap-s"]
@@ -203,8 +205,8 @@ def test_a_gap_of_the_poses_is_told(prairie, tmp_path):
     refused(tmp_path, *command, "-o", tmp_path / "dem.tif", words=words)
 
 
-def test_an_interrupted_run_leaves_nothing(prairie, tmp_path):
-    """It is interrupted as soon as it says what it does, long before it is done."""
+def test_an_interrupted_dem_run_leaves_no_files(prairie, tmp_path):
+    """Interrupts the run at its first message, long before the end."""
     command = [PROGRAM, "reconstruct", "dem", prairie / "data", "--cell-m", "0.05"]
     run = subprocess.Popen(
         [*map(str, command), "-o", str(tmp_path / "dem.tif")], stderr=subprocess.PIPE
@@ -218,7 +220,7 @@ def test_an_interrupted_run_leaves_nothing(prairie, tmp_path):
 
 @dataclass(frozen=True)
 class Ground:
-    """A DEM to drive over, about where, and which cells are to come of it."""
+    """A DEM, the centre of the drive on it, and the cells to reconstruct."""
 
     dem: Path
     middle: tuple[float, float]
@@ -254,7 +256,7 @@ def jacksboro_with_relief(folder):
 
 
 def coromandel_ground(folder):
-    """What is labelled ground, blank areas filled: 38 degrees steep in the mean, and rough."""
+    """Labelled ground with blank areas filled: rough, with a mean slope of 38 degrees."""
     points, is_ground = coromandel()
     labelled = points_file(folder / "ground.npy", points[is_ground])
     done(
@@ -291,7 +293,7 @@ def closed_loop(folder, ground, pairs):
 @pytest.mark.parametrize(
     "ground", [prairie_of_1_m, fractal_ground, jacksboro_with_relief, coromandel_ground]
 )
-def test_scans_and_stereo_give_the_ground_back(tmp_path, record_property, ground):
+def test_scans_and_stereo_reproduce_the_ground(tmp_path, record_property, ground):
     """As many pairs as the issue's proof has under `./dev prove`, else two."""
     record_property("size", "full" if IS_FULL else "reduced")
     name = ground.__name__.replace("_", " ")

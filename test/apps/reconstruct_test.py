@@ -40,7 +40,7 @@ lidars:
     mount: {{translation_m: [-1, 0, 1.5], yaw_deg: 90}}
     points: at_stamp
 """
-FLOAT_M = 1e-4  # what docs/formats.md says of x, y, z as floats, at its poses
+FLOAT_M = 1e-4  # what docs/reference/formats.md says of x, y, z as floats, at its poses
 
 
 def groundray(*arguments, **options):
@@ -56,7 +56,7 @@ def reconstruct(*arguments, **options):
 
 
 def refused(*arguments, words):
-    """One message that holds all words, and no file that was not there."""
+    """Checks for one message that contains all words, and no new file."""
     out = Path(arguments[arguments.index("-o") + 1])
     before = sorted(out.parent.iterdir()) if out.parent.is_dir() else []
     result = groundray("reconstruct", *arguments)
@@ -70,7 +70,7 @@ def refused(*arguments, words):
 
 
 class Mesh:
-    """A PLY as plyfile reads it."""
+    """A PLY file read by plyfile."""
 
     def __init__(self, path: Path) -> None:
         self.ply = PlyData.read(path)
@@ -87,7 +87,7 @@ class Mesh:
         return float(np.linalg.norm(np.cross(b - a, c - a), axis=1).sum() / 2)
 
     def edge_counts(self) -> np.ndarray:
-        """How many triangles each directed edge has."""
+        """Returns the number of triangles of each directed edge."""
         edges = np.concatenate([self.faces[:, [k, (k + 1) % 3]] for k in range(3)])
         return np.unique(edges, axis=0, return_counts=True)[1]
 
@@ -117,7 +117,7 @@ def world(scan: np.ndarray) -> np.ndarray:
 
 
 def distances_from(points: np.ndarray, p: np.ndarray) -> np.ndarray:
-    """How far each of p is from the nearest of the points."""
+    """Returns the distance of each of p to the nearest point."""
     tree = o3d.geometry.KDTreeFlann(o3d.geometry.PointCloud(o3d.utility.Vector3dVector(points)))
     return np.array([np.sqrt(tree.search_knn_vector_3d(q, 1)[2][0]) for q in p])
 
@@ -145,7 +145,7 @@ def terrain(tmp_path_factory: pytest.TempPathFactory) -> Path:
 
 
 @pytest.mark.parametrize("lidar", ["top", "rear"])
-def test_vertices_are_where_the_truth_is_if_there_is_no_noise(dataset, tmp_path, lidar):
+def test_vertices_match_the_truth_without_noise(dataset, tmp_path, lidar):
     out = tmp_path / "mesh.ply"
     reconstruct("mesh", dataset, "--sensor", lidar, "--frames", "1", "-o", out)
     mesh = Mesh(out)
@@ -168,7 +168,7 @@ def test_mesh_keeps_the_datasets_origin_and_crs(dataset, tmp_path):
 
 
 def test_triangles_face_the_sensor_and_lie_on_the_ground(dataset, tmp_path):
-    """The DEM at full resolution is the truth; no incidence beyond the limit is there."""
+    """The DEM at full resolution is the truth; all incidences are within the limit."""
     out, dem = tmp_path / "mesh.ply", tmp_path / "dem.ply"
     reconstruct("mesh", dataset, "--sensor", "rear", "--frames", "0", "-o", out)
     groundray("terrain", "mesh", PRAIRIE, "-o", dem, "--max-error-m", "0")
@@ -211,7 +211,7 @@ def test_scans_merge_to_one_manifold_surface(dataset, tmp_path):
         assert scan["used"] + left_out == rows
 
 
-def test_frames_and_sensors_are_chosen(dataset, tmp_path):
+def test_frames_and_sensors_are_selected(dataset, tmp_path):
     def names(*choice):
         report = tmp_path / "report.json"
         reconstruct("mesh", dataset, "-o", tmp_path / "mesh.ply", "--report", report, *choice)
@@ -222,7 +222,7 @@ def test_frames_and_sensors_are_chosen(dataset, tmp_path):
     assert names("--frames", "2") == ["top/000002", "rear/000002"]
 
 
-def test_occlusion_faces_are_all_that_was_rejected(dataset, tmp_path):
+def test_occlusion_faces_are_exactly_the_rejected_triangles(dataset, tmp_path):
     out, occlusion, report = (tmp_path / name for name in ("m.ply", "o.ply", "r.json"))
     chosen = ["--sensor", "top", "--frames", "0:2"]
     command = ["mesh", dataset, *chosen, "-o", out, "--occlusion", occlusion, "--report", report]
@@ -240,7 +240,7 @@ def as_table(scan: np.ndarray, names: str) -> np.ndarray:
     return np.stack([scan[name].astype("f4") for name in names.split()], axis=1)
 
 
-def test_other_peoples_files_with_poses_give_the_same_mesh(dataset, tmp_path):
+def test_files_of_other_software_with_poses_yield_the_same_mesh(dataset, tmp_path):
     """Scans at the stamp as arrays, with a pose for each."""
     ours, theirs = tmp_path / "ours.ply", tmp_path / "theirs.ply"
     poses = np.loadtxt(dataset / "poses/rear.tum")
@@ -275,7 +275,7 @@ def test_other_peoples_files_with_poses_give_the_same_mesh(dataset, tmp_path):
 
 
 def test_kitti_points_without_rings_are_meshed(dataset, tmp_path):
-    """Beams are told apart by elevation; the frame is the sensor's, for there is no pose."""
+    """Beams are distinguished by elevation; the frame is the sensor's, since there is no pose."""
     scan = scan_of(dataset, "top", 0)
     as_table(scan, "x y z intensity").tofile(tmp_path / "scan.bin")
     said = reconstruct("mesh", tmp_path / "scan.bin", "-o", tmp_path / "mesh.ply")
@@ -286,8 +286,8 @@ def test_kitti_points_without_rings_are_meshed(dataset, tmp_path):
     assert len(mesh.faces) == pytest.approx(len(Mesh(tmp_path / "ours.ply").faces), rel=0.03)
 
 
-def test_poses_by_name_and_far_origin(tmp_path):
-    """Names are stamps between two poses; UTM's size moves to an origin in whole metres."""
+def test_file_names_select_poses_and_large_coordinates_get_an_origin(tmp_path):
+    """File names are stamps between two poses; UTM coordinates get an origin in whole metres."""
     rows, columns = 8, 60
     elevation = np.radians(np.linspace(-30, -10, rows))[:, None] + np.zeros(columns)
     azimuth = np.zeros((rows, 1)) + np.linspace(-0.5, 0.5, columns)
@@ -335,7 +335,7 @@ def range_grid(path: Path, heights: np.ndarray) -> np.ndarray:
     return p
 
 
-def test_stanfords_conf_places_its_range_scans(tmp_path):
+def test_stanford_conf_file_places_its_range_scans(tmp_path):
     """p = R(q)^T p + t, as its SOURCE says; one of the files is packed."""
     flat, holed = np.zeros((12, 15)), np.zeros((12, 15))
     holed[2, 3] = np.nan
@@ -360,8 +360,8 @@ def test_stanfords_conf_places_its_range_scans(tmp_path):
     assert [scan["accepted_faces"] for scan in figures["scans"]] == [308, 304]
 
 
-def test_points_without_order_are_joined(tmp_path):
-    """A sheet of jittered points: one surface of its area, facing where it was seen from."""
+def test_unorganised_points_are_meshed(tmp_path):
+    """A sheet of jittered points: one surface of its area that faces the viewpoint."""
     random = np.random.default_rng(3)
     x, y = np.mgrid[:15, :15].reshape(2, -1) + random.uniform(-0.2, 0.2, (2, 225))
     np.save(tmp_path / "points.npy", np.stack([x + 1, y - 7, np.full(225, -5.0)], axis=1))
@@ -398,14 +398,14 @@ def test_vertical_bound_holds_by_rays_from_every_vertex(terrain, tmp_path):
     assert figures["to_simplified"]["rms"]["value_m"] < bound
 
 
-def test_budget_is_met(terrain, tmp_path):
+def test_triangle_budget_is_met(terrain, tmp_path):
     out = tmp_path / "simple.obj"
     reconstruct("simplify", terrain, "-o", out, "--triangles", "1000")
     faces = sum(line.startswith("f ") for line in out.read_text().splitlines())
     assert 999 <= faces <= 1000
 
 
-def test_noise_halts_simplification_of_flat_noise(tmp_path):
+def test_noise_bound_stops_simplification(tmp_path):
     """A plane with noise of 1 cm is a few triangles at 4 sd and nearly all of it at 0.01."""
     random = np.random.default_rng(5)
     y, x = np.mgrid[:40, :40]
@@ -425,7 +425,7 @@ def test_noise_halts_simplification_of_flat_noise(tmp_path):
     )
 
 
-def test_hole_of_a_plane_is_filled_flat(tmp_path):
+def test_hole_in_a_plane_is_filled_flat(tmp_path):
     y, x = np.mgrid[:12, :12]
     p = np.stack([x, y, np.full(x.shape, 3.0)], axis=-1).reshape(-1, 3)
     first = (12 * np.arange(11)[:, None] + np.arange(11)).ravel()
@@ -448,14 +448,14 @@ def test_hole_of_a_plane_is_filled_flat(tmp_path):
 
 
 @pytest.mark.parametrize("ending", ["ply", "obj", "stl", "glb"])
-def test_every_form_is_written(dataset, tmp_path, ending):
+def test_every_format_is_written(dataset, tmp_path, ending):
     out = tmp_path / f"mesh.{ending}"
     reconstruct("mesh", dataset, "--sensor", "top", "--frames", "0", "-o", out)
     mesh = o3d.io.read_triangle_mesh(str(out))
     assert len(mesh.triangles) > 5000
 
 
-def test_noise_comes_from_the_scan_unless_it_is_given(tmp_path):
+def test_noise_is_taken_from_the_scan_by_default(tmp_path):
     scene = SCENE[: SCENE.index("  - name: rear")].replace(
         "pitch_deg: 3}", "pitch_deg: 3}, range_noise_sigma_m: 0.02"
     )
@@ -481,7 +481,7 @@ def test_bytes_do_not_depend_on_threads(dataset, tmp_path):
     assert one.read_bytes() == all_.read_bytes()
 
 
-def test_faults_are_told_and_nothing_is_written(dataset, tmp_path):
+def test_mesh_errors_are_reported_and_nothing_is_written(dataset, tmp_path):
     out = tmp_path / "out/mesh.ply"
     out.parent.mkdir()
     scan = dataset / "lidar/top/000000.ply"
@@ -512,7 +512,7 @@ def test_faults_are_told_and_nothing_is_written(dataset, tmp_path):
         ([dataset, scan, *to], ["only input"]),
         ([dataset, "-o", tmp_path / "out/mesh.xyz"], [".ply, .obj, .stl or .glb"]),
         ([dataset, "-o", tmp_path / "nowhere/mesh.ply"], ["no folder"]),
-        ([dataset, *to, "--report", out], ["one name"]),
+        ([dataset, *to, "--report", out], ["the same name"]),
         ([dataset, *to, "--poses", tmp_path / "one.tum"], ["--sensor"]),
         ([scan, scan, *to], ["--poses"]),
         ([scan, scan, "--poses", tmp_path / "one.tum", *to], ["1 poses for 2 scans"]),
@@ -524,20 +524,20 @@ def test_faults_are_told_and_nothing_is_written(dataset, tmp_path):
         ([tmp_path / "zero.npy", *to], ["no scan has a return"]),
         ([tmp_path / "apart.npy", "--grid", "file", *to], ["no two returns", "--preset"]),
         ([dataset, "--memory-mb", "1", *to], ["--memory-mb"]),
-        ([tmp_path / "short.ply.gz", *to], ["short.ply.gz", "cut short"]),
+        ([tmp_path / "short.ply.gz", *to], ["short.ply.gz", "truncated"]),
         ([tmp_path / "plain.ply.gz", *to], ["plain.ply.gz", "gzip"]),
         ([tmp_path / "negative.npy", *to], ["standard deviation", "row 0", "--range-sd-m"]),
         ([tmp_path / "zero.npy", *by_name, *to], ["must be its stamp"]),
         (
             [tmp_path / "5.01.npz", *by_name, "--points", "as_fired", *to],
-            ["those of the poses"],
+            ["not covered by the poses"],
         ),
         ([tmp_path / "nan.npy", "--unorganised", *to], ["no three", "--perimeter-m"]),
         ([tmp_path / "cloud.npy", *to], ["--unorganised"]),
         ([dataset, "--noise-halt", "2", *to], ["--noise-halt", "--range-sd-m"]),
         ([dataset, "--border-m", "2", *to], ["--border-m", "--max-error-m"]),
         ([dataset, "--crease-deg", "20", *to], ["--crease-deg"]),
-        ([dataset, *to, "--report", tmp_path / "out/../out/mesh.ply"], ["one name"]),
+        ([dataset, *to, "--report", tmp_path / "out/../out/mesh.ply"], ["the same name"]),
         ([dataset, *to, "--report", out.parent], ["folder"]),
         (
             [
@@ -547,7 +547,7 @@ def test_faults_are_told_and_nothing_is_written(dataset, tmp_path):
                 "--report",
                 tmp_path / "grid.ply.gz",
             ],
-            ["it is read"],
+            ["it is an input"],
         ),
     ]
     for arguments, words in cases:
@@ -557,7 +557,7 @@ def test_faults_are_told_and_nothing_is_written(dataset, tmp_path):
     wall = np.array([[0.0, 0, 0], [1, 0, 0], [1, 0, 1], [0, 0, 1]])
     mesh = write_mesh(tmp_path / "wall.ply", wall, np.array([[0, 1, 2], [0, 2, 3]]))
     assert refused(
-        "simplify", mesh, *to, "--max-vertical-error-m", "1", words=["hangs over", "any direction"]
+        "simplify", mesh, *to, "--max-vertical-error-m", "1", words=["overhangs", "any direction"]
     )
 
 
@@ -578,12 +578,12 @@ def test_faults_are_told_and_nothing_is_written(dataset, tmp_path):
         ["mend"],
     ],
 )
-def test_wrong_usage_is_exit_code_two(arguments):
+def test_wrong_usage_exits_with_code_two(arguments):
     assert groundray("reconstruct", *arguments).returncode == 2
 
 
-def test_what_cannot_be_whole_leaves_what_was_there(terrain, tmp_path):
-    """A limit on file size stands for a full disk: the report fits, the mesh does not."""
+def test_a_failed_write_keeps_the_existing_file(terrain, tmp_path):
+    """A limit on file size simulates a full disk: the report fits, the mesh does not."""
     mesh, report = tmp_path / "mesh.ply", tmp_path / "report.json"
     report.write_text("before")
     most_bytes = 20_000
@@ -598,21 +598,21 @@ def test_what_cannot_be_whole_leaves_what_was_there(terrain, tmp_path):
     assert report.read_text() == "before"
 
 
-def test_a_mesh_is_not_written_over_what_is_read(terrain, tmp_path):
+def test_a_mesh_does_not_overwrite_its_input(terrain, tmp_path):
     mesh = tmp_path / "mesh.ply"
     mesh.write_bytes(terrain.read_bytes())
     (tmp_path / "folder").mkdir()
     same = tmp_path / "folder/../mesh.ply"
-    assert refused("simplify", mesh, "-o", same, "--triangles", "9", words=["it is read"])
+    assert refused("simplify", mesh, "-o", same, "--triangles", "9", words=["it is an input"])
     assert mesh.read_bytes() == terrain.read_bytes()
 
 
-def test_what_a_file_holds_besides_triangles_is_told(tmp_path):
+def test_skipped_parts_of_a_mesh_file_are_reported(tmp_path):
     (tmp_path / "mesh.obj").write_text(
         "v 0 0 0\nv 1 0 0\nv 0 1 0\nv 2 0 0\nf 1 2 3\nf 1 2 4\nl 1 2\n"
     )
     said = reconstruct("fill", tmp_path / "mesh.obj", "-o", tmp_path / "out.ply", "--fill-m", "1")
-    assert "left out of the file" in said
+    assert "ignored in the file" in said
 
 
 def test_scans_without_noise_are_merged_by_their_spacing(tmp_path):
@@ -628,8 +628,8 @@ def test_scans_without_noise_are_merged_by_their_spacing(tmp_path):
 
 
 @pytest.mark.parametrize("ending", ["stl", "glb"])
-def test_forms_of_floats_get_an_origin_near_the_mesh(tmp_path, ending):
-    """UTM's numbers as floats would be off by a quarter of a metre: trimesh reads what is there."""
+def test_single_precision_formats_get_an_origin_near_the_mesh(tmp_path, ending):
+    """UTM coordinates as floats would be wrong by up to a quarter of a metre; read by trimesh."""
     import trimesh
 
     p = np.array([[500000.25, 5e6, 300], [500001.25, 5e6, 300], [500000.25, 5e6 + 1, 300.125]])
@@ -645,7 +645,7 @@ def test_forms_of_floats_get_an_origin_near_the_mesh(tmp_path, ending):
     assert np.sort(Mesh(back).p + origin, axis=0) == pytest.approx(np.sort(p, axis=0), abs=1e-9)
 
 
-def test_interrupted_run_leaves_nothing(dataset, tmp_path):
+def test_an_interrupted_mesh_run_leaves_no_files(dataset, tmp_path):
     command = ["reconstruct", "mesh", dataset, "-o", tmp_path / "mesh.ply", "--max-error-m", "0.05"]
     run = subprocess.Popen(
         [PROGRAM, *map(str, command)], stderr=subprocess.PIPE, stdout=subprocess.PIPE, text=True
@@ -657,8 +657,8 @@ def test_interrupted_run_leaves_nothing(dataset, tmp_path):
     assert list(tmp_path.iterdir()) == []
 
 
-def test_truth_scores_full_and_a_shifted_truth_nothing(tmp_path):
-    """What judges the closed loop, judged: the truth itself, lifted by 5 cm, and by 2 m."""
+def test_truth_scores_one_and_a_shifted_truth_zero(tmp_path):
+    """Tests the evaluation of the closed loop: the truth itself, lifted by 5 cm, and by 2 m."""
     from reconstruction_peers import closed_loop
 
     closed_loop("rebuild", tmp_path, 1, 1, 8, 90)
@@ -671,7 +671,7 @@ def test_truth_scores_full_and_a_shifted_truth_nothing(tmp_path):
 
 
 def with_least_times(runs):
-    """The first run with the least time of each method in any: what else a machine does adds."""
+    """Returns the first run with each method's shortest time, since other load only adds time."""
     return {
         method: figures | {"cpu_s": min(run[method]["cpu_s"] for run in runs)}
         for method, figures in runs[0].items()
@@ -679,8 +679,8 @@ def with_least_times(runs):
 
 
 @pytest.mark.parametrize("scans", [1, 3])
-def test_known_scene_is_built_anew_better_than_by_others(scans):
-    """One seed at half the resolution; `./dev prove` takes the mean of ten in full."""
+def test_known_scene_is_reconstructed_better_than_by_others(scans):
+    """One seed at half the resolution; `./dev prove` takes the mean of ten at full resolution."""
     import reconstruction_peers
 
     is_full = os.environ.get("GROUNDRAY_PROOF") == "full"

@@ -1,4 +1,4 @@
-"""Runs that a signal, a full disk or a changed file cuts off go on to the bytes of one run."""
+"""Runs interrupted by a signal, a full disk or a changed file resume to the same bytes."""
 
 import hashlib
 import os
@@ -48,8 +48,8 @@ def kill_after(arguments, delay_s):
     run.wait()
 
 
-def test_a_run_killed_at_any_moment_goes_on_to_the_same_bytes(whole, tmp_path):
-    """A third of the runs are killed once more while they go on."""
+def test_a_run_killed_at_any_moment_resumes_to_the_same_bytes(whole, tmp_path):
+    """A third of the runs are killed again after resuming."""
     (tmp_path / "timed").mkdir()
     lasts_s = seconds_to_make(tmp_path / "timed")
     moments = random.Random(11)
@@ -65,7 +65,7 @@ def test_a_run_killed_at_any_moment_goes_on_to_the_same_bytes(whole, tmp_path):
 
 
 def as_cut_off(whole, out, frames):
-    """The folder as a run leaves it that is killed after so many frames."""
+    """Makes the folder of a run that was killed after this number of frames."""
     shutil.copytree(whole, out)
     record = (out / "dataset.yaml").read_text()
     head, rest = record.split("frames:\n")
@@ -83,7 +83,7 @@ def as_cut_off(whole, out, frames):
     return lines
 
 
-def test_leftovers_of_a_killed_run_go(whole, tmp_path):
+def test_leftovers_of_a_killed_run_are_removed(whole, tmp_path):
     out = tmp_path / "out"
     as_cut_off(whole, out, 4)
     for name in (
@@ -95,12 +95,12 @@ def test_leftovers_of_a_killed_run_go(whole, tmp_path):
         "poses/eye.tum",
     ):
         (out / f"{name}.part").write_text("half")
-    assert "4 scans were there already" in resumed(tmp_path).stdout
+    assert "4 scans already existed" in resumed(tmp_path).stdout
     assert files(out) == files(whole)
 
 
 @pytest.mark.parametrize("fault", ["cut", "flipped", "garbage", "empty", "no newline", "twice"])
-def test_a_torn_journal_costs_its_torn_lines_alone(whole, tmp_path, fault):
+def test_a_damaged_journal_loses_only_its_damaged_lines(whole, tmp_path, fault):
     out = tmp_path / "out"
     lines = as_cut_off(whole, out, 5)
     text = "".join(lines).encode()
@@ -114,12 +114,12 @@ def test_a_torn_journal_costs_its_torn_lines_alone(whole, tmp_path, fault):
     }[fault]
     (out / "dataset.journal").write_bytes(torn)
     result = resumed(tmp_path)
-    assert (f"{kept} scans were there already" in result.stdout) == (kept > 0), result.stdout
-    assert ("torn" in result.stderr) == (fault in ("cut", "flipped", "garbage")), result.stderr
+    assert (f"{kept} scans already existed" in result.stdout) == (kept > 0), result.stdout
+    assert ("damaged" in result.stderr) == (fault in ("cut", "flipped", "garbage")), result.stderr
     assert files(out) == files(whole)
 
 
-def test_what_was_changed_is_told_and_made_again(whole, tmp_path):
+def test_changed_files_are_reported_and_generated_again(whole, tmp_path):
     out = tmp_path / "out"
     shutil.copytree(whole, out)
     scan = out / "lidar/top/000001.ply"
@@ -136,21 +136,21 @@ def test_what_was_changed_is_told_and_made_again(whole, tmp_path):
     (out / "calibration/eye.yaml").write_text("mine")
     result = resumed(tmp_path)
     for words in (
-        "lidar/top/000001.ply: changed: its SHA-256 is another; made again",
-        "lidar/front/000000_no_returns.ply: missing; made again",
-        f"of {image_bytes - 1} bytes instead of {image_bytes}: cut short; made again",
-        "lidar/top/000000_preview.png: of",
+        "lidar/top/000001.ply: changed: its SHA-256 differs; created again",
+        "lidar/front/000000_no_returns.ply: missing; created again",
+        f"has {image_bytes - 1} bytes instead of {image_bytes}: truncated; created again",
+        "lidar/top/000000_preview.png: has",
         "poses/top.tum: missing; it is written again",
-        "calibration/eye.yaml: of 4 bytes instead of",
+        "calibration/eye.yaml: has 4 bytes instead of",
     ):
         assert words in result.stderr, result.stderr
-    assert "3 scans were there already" in result.stdout
-    assert "2 images were there already" in result.stdout
+    assert "3 scans already existed" in result.stdout
+    assert "2 images already existed" in result.stdout
     assert files(out) == files(whole)
 
 
-def test_a_changed_record_is_mended(whole, tmp_path):
-    """What a line says is held against the frame, and what is no line of one is left out."""
+def test_a_changed_record_is_repaired(whole, tmp_path):
+    """Lines are compared with their frames, and other lines are ignored."""
     out = tmp_path / "out"
     shutil.copytree(whole, out)
     record = (out / "dataset.yaml").read_text()
@@ -163,72 +163,72 @@ def test_a_changed_record_is_mended(whole, tmp_path):
         record = record.replace(old, new)
     (out / "dataset.yaml").write_text(record)
     result = resumed(tmp_path)
-    assert result.stderr.count("not as it was written; its frame is made again") == 2
+    assert result.stderr.count("changed since it was written; its frame is created again") == 2
     assert files(out) == files(whole)
 
 
-def test_a_damaged_head_of_the_record_is_shown_and_may_be_put_right(whole, tmp_path):
+def test_a_changed_setting_in_the_record_is_shown_and_may_be_corrected(whole, tmp_path):
     out = tmp_path / "out"
     shutil.copytree(whole, out)
     record = (out / "dataset.yaml").read_bytes()
     (out / "dataset.yaml").write_bytes(record.replace(b"seed: 7", b"seed: 5", 1))
     refused(generate(tmp_path, "--resume"), "another scene", "'seed: 5' instead of 'seed: 7'")
     (out / "dataset.yaml").write_bytes(record)
-    assert "6 scans were there already" in resumed(tmp_path).stdout
+    assert "6 scans already existed" in resumed(tmp_path).stdout
     assert files(out) == files(whole)
 
 
-def test_resuming_begins_where_nothing_is(whole, tmp_path):
+def test_resuming_without_a_folder_starts_a_run(whole, tmp_path):
     resumed(tmp_path)
     assert files(tmp_path / "out") == files(whole)
     again = resumed(tmp_path)
-    assert "6 scans were there already" in again.stdout
+    assert "6 scans already existed" in again.stdout
     assert files(tmp_path / "out") == files(whole)
 
 
-def test_only_the_same_run_goes_on(whole, tmp_path):
+def test_only_the_same_run_is_resumed(whole, tmp_path):
     shutil.copytree(whole, tmp_path / "out")
-    refused(generate(tmp_path), "holds a dataset of this run already", "add --resume")
+    refused(generate(tmp_path), "already contains a dataset of this run", "add --resume")
     refused(generate(tmp_path, "--resume", "--seed", "8"), "another scene")
-    refused(generate(tmp_path, "--resume", "--shard", "1/2"), "the whole", "shard 1/2")
+    refused(generate(tmp_path, "--resume", "--shard", "1/2"), "all frames", "shard 1/2")
     (tmp_path / "mine").mkdir()
     (tmp_path / "mine/notes.txt").write_text("keep")
     refused(generate(tmp_path, "--resume", out="mine"), "not empty")
     assert files(tmp_path / "out") == files(whole)
 
 
-def test_one_run_at_a_time_has_a_folder(tmp_path):
+def test_only_one_run_at_a_time_may_use_a_folder(tmp_path):
     long = SCENE.replace("duration_s: 0.3", "duration_s: 1.2")
     first = subprocess.Popen(
         command(tmp_path, scene=long), stdout=subprocess.DEVNULL, stderr=subprocess.DEVNULL
     )
     while not (tmp_path / "out/lidar/top/000000.ply").exists() and first.poll() is None:
         time.sleep(0.01)
-    refused(generate(tmp_path, "--resume", scene=long), "another run is at work in this folder")
+    refused(generate(tmp_path, "--resume", scene=long), "another run is using this folder")
     first.send_signal(signal.SIGKILL)
     first.wait()
     assert generate(tmp_path, "--resume", scene=long).returncode == 0
 
 
-def test_an_interrupted_run_goes_on_to_the_same_bytes(whole, tmp_path):
+def test_an_interrupted_run_resumes_to_the_same_bytes(whole, tmp_path):
     run = subprocess.Popen(command(tmp_path), stdout=subprocess.DEVNULL, stderr=subprocess.PIPE)
     while not (tmp_path / "out/lidar/top/000001.ply").exists() and run.poll() is None:
         time.sleep(0.002)
     run.send_signal(signal.SIGINT)
     said = run.communicate(timeout=60)[1].decode()
     assert run.returncode == 130, said
-    assert "goes on with --resume" in said
+    assert "continues with --resume" in said
     assert not list((tmp_path / "out").rglob("*.part"))
     assert not (tmp_path / "out/dataset.journal").exists()
     incomplete = groundray("verify", tmp_path / "out")
     assert incomplete.returncode == 1
-    assert re.search(r"incomplete: \d of 9 frames are there", incomplete.stdout)
+    assert re.search(r"incomplete: \d of 9 frames are complete", incomplete.stdout)
     resumed(tmp_path)
     assert files(tmp_path / "out") == files(whole)
 
 
 @pytest.mark.parametrize("limit_bytes", [3_000, 100_000, 500_000])
-def test_a_run_that_may_write_no_more_goes_on_to_the_same_bytes(whole, tmp_path, limit_bytes):
+def test_a_run_stopped_by_a_file_size_limit_resumes_to_the_same_bytes(whole, tmp_path, limit_bytes):
     """A limit on file size makes writes fail, as a full disk does."""
     limits = (limit_bytes, limit_bytes)
     result = generate(
@@ -241,7 +241,7 @@ def test_a_run_that_may_write_no_more_goes_on_to_the_same_bytes(whole, tmp_path,
 
 
 @pytest.mark.skipif(os.geteuid() != 0, reason="mounting a small disk needs root")
-def test_a_run_on_a_full_disk_goes_on_to_the_same_bytes_once_there_is_room(whole, tmp_path):
+def test_a_run_on_a_full_disk_resumes_to_the_same_bytes_once_space_is_free(whole, tmp_path):
     disk = tmp_path / "disk"
     disk.mkdir()
     mount = ["mount", "-t", "tmpfs", "-o", "size=4k", "tmpfs", disk]
@@ -282,7 +282,7 @@ def test_memory_does_not_grow_with_the_number_of_frames(tmp_path):
     assert peaks[1] - peaks[0] < 10 * 1024, peaks
 
 
-def test_progress_tells_rate_and_time_left_on_a_terminal(tmp_path):
+def test_progress_shows_rate_and_remaining_time_on_a_terminal(tmp_path):
     master, slave = pty.openpty()
     run = subprocess.Popen(command(tmp_path), stdout=subprocess.DEVNULL, stderr=slave)
     os.close(slave)
@@ -298,25 +298,25 @@ def test_progress_tells_rate_and_time_left_on_a_terminal(tmp_path):
     assert re.search(rb"\rframes 9/9 in [\d.]+ s *\r?\n$", said), said
 
 
-def test_info_counts_what_the_journal_of_a_run_has(whole, tmp_path):
+def test_info_counts_the_frames_of_a_journal(whole, tmp_path):
     lines = as_cut_off(whole, tmp_path / "out", 4)
     with (tmp_path / "out/dataset.journal").open("a") as journal:
         journal.write(lines[0] + lines[1][:-20])
     said = groundray("info", tmp_path / "out").stdout
-    assert "4 of 9 frames are there; a run is at work, or was cut off" in said
+    assert "4 of 9 frames are complete; a run is in progress, or was interrupted" in said
     assert "3 of 3" in said
     assert "1 of 3" in said
     assert "0 of 3" in said
 
 
-def test_frames_after_a_line_that_was_changed_are_kept(whole, tmp_path):
+def test_frames_after_a_changed_line_are_kept(whole, tmp_path):
     shutil.copytree(whole, tmp_path / "out")
     record = (tmp_path / "out/dataset.yaml").read_text()
     changed = record.replace('  - {sensor: "top", frame: 0', '  * {sensor: "top", frame: 0', 1)
     (tmp_path / "out/dataset.yaml").write_text(changed)
     result = resumed(tmp_path)
-    assert "not as it was written; its frame is made again" in result.stderr
+    assert "changed since it was written; its frame is created again" in result.stderr
     assert "dataset.yaml: changed since it was written" in result.stderr
-    assert "5 scans were there already" in result.stdout
-    assert "3 images were there already" in result.stdout
+    assert "5 scans already existed" in result.stdout
+    assert "3 images already existed" in result.stdout
     assert files(tmp_path / "out") == files(whole)

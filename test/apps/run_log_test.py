@@ -1,4 +1,4 @@
-"""What `groundray generate --log-json` tells programs."""
+"""The log of `groundray generate --log-json`."""
 
 import json
 import signal
@@ -18,7 +18,7 @@ def lines_of(text):
     return lines
 
 
-def test_a_run_logs_its_begin_each_frame_and_its_end(tmp_path):
+def test_a_run_logs_its_start_each_frame_and_its_end(tmp_path):
     log = tmp_path / "log.jsonl"
     assert generate(tmp_path, "--log-json", log).returncode == 0
     first, *frames, last = lines_of(log.read_text())
@@ -49,7 +49,7 @@ def test_a_run_logs_its_begin_each_frame_and_its_end(tmp_path):
     assert (begun["event"], begun["frames"], begun["there"]) == ("begin", 0, 9)
 
 
-def test_standard_output_is_the_log_alone_if_asked_for(tmp_path):
+def test_standard_output_contains_only_the_log_on_request(tmp_path):
     result = generate(tmp_path, "--log-json", "-", "--shard", "2/3")
     assert result.returncode == 0
     first, *frames, last = lines_of(result.stdout)
@@ -59,7 +59,7 @@ def test_standard_output_is_the_log_alone_if_asked_for(tmp_path):
     assert "dataset: " in result.stderr
 
 
-def test_a_run_that_fails_says_why(tmp_path):
+def test_a_failed_run_logs_the_reason(tmp_path):
     result = generate(tmp_path, "--log-json", "-", scene=SCENE.replace("seed: 7", "sed: 7"))
     assert result.returncode == 1
     (line,) = lines_of(result.stdout)
@@ -71,7 +71,7 @@ def test_a_run_that_fails_says_why(tmp_path):
     assert "--log-json" in nowhere.stderr
 
 
-def test_an_interrupted_run_says_so(tmp_path):
+def test_an_interrupted_run_logs_the_interruption(tmp_path):
     run = subprocess.Popen(
         command(tmp_path, "--log-json", "-"), stdout=subprocess.PIPE, stderr=subprocess.PIPE
     )
@@ -85,8 +85,8 @@ def test_an_interrupted_run_says_so(tmp_path):
     assert lines[-1]["done"] == len(lines) - 2
 
 
-def test_frames_come_in_parts_of_ten_seconds_and_in_each_by_sensor(tmp_path):
-    """So that the time left of a long run is told of the mean of all sensors."""
+def test_frames_are_ordered_by_ten_seconds_and_then_by_sensor(tmp_path):
+    """The remaining time of a long run is then estimated from all sensors."""
     cameras = SCENE.split("cameras:")[1].replace(
         "{lidar: top, delay_ms: 20}\n    project: [top]", "X"
     )
@@ -103,7 +103,7 @@ def test_frames_come_in_parts_of_ten_seconds_and_in_each_by_sensor(tmp_path):
     ]
 
 
-def test_a_run_goes_on_when_nobody_reads_its_log(tmp_path):
+def test_a_run_continues_if_its_log_is_closed(tmp_path):
     run = subprocess.Popen(
         command(tmp_path, "--log-json", "-"), stdout=subprocess.PIPE, stderr=subprocess.DEVNULL
     )

@@ -1,4 +1,4 @@
-"""Shares of a run, made one by one, and what is joined from them."""
+"""Shards of a run, generated one by one and merged."""
 
 import fcntl
 import os
@@ -47,7 +47,7 @@ def done_in(dataset):
     return {(f["sensor"], f["frame"]) for f in record["frames"] if f["state"] == "done"}
 
 
-def test_shards_have_each_frame_once_and_join_to_the_whole(whole, shards, tmp_path):
+def test_shards_contain_each_frame_once_and_merge_to_the_complete_dataset(whole, shards, tmp_path):
     done = [done_in(shard) for shard in shards]
     assert [len(part) for part in done] == [3, 3, 3]
     assert set.union(*done) == done_in(whole)
@@ -59,8 +59,8 @@ def test_shards_have_each_frame_once_and_join_to_the_whole(whole, shards, tmp_pa
     assert "shard     2/3" in groundray("info", shards[1]).stdout
 
 
-def test_a_sensor_with_fewer_frames_than_shards_joins_too(whole, tmp_path):
-    """Images show echoes of scans that other shards have."""
+def test_a_sensor_with_fewer_frames_than_shards_is_merged(whole, tmp_path):
+    """Images list echoes of scans in other shards."""
     parts = make_shards(tmp_path, 5)
     sizes = sorted(len(done_in(part)) for part in parts)
     assert sum(sizes) == 9
@@ -69,35 +69,35 @@ def test_a_sensor_with_fewer_frames_than_shards_joins_too(whole, tmp_path):
     assert files(tmp_path / "joined") == files(whole)
 
 
-def test_a_shard_is_resumed_and_no_other(shards, tmp_path):
+def test_only_the_same_shard_is_resumed(shards, tmp_path):
     part = tmp_path / "1_of_3"
     shutil.copytree(shards[0], part)
     (part / "camera/eye/000000.exr").unlink()
     again = generate(tmp_path, "--shard", "1/3", "--resume", out="1_of_3")
     assert again.returncode == 0, again.stderr
-    assert "000000.exr: missing; made again" in again.stderr
+    assert "000000.exr: missing; created again" in again.stderr
     assert files(part) == files(shards[0])
     other = generate(tmp_path, "--shard", "2/3", "--resume", out="1_of_3")
-    refused(other, "shard 1/3", "shard 2/3", "a folder of its own")
-    refused(generate(tmp_path, "--resume", out="1_of_3"), "shard 1/3", "the whole")
+    refused(other, "shard 1/3", "shard 2/3", "a separate folder")
+    refused(generate(tmp_path, "--resume", out="1_of_3"), "shard 1/3", "all frames")
 
 
 @pytest.mark.parametrize("text", ["0/3", "4/3", "3", "1/0", "a/b", "1/3/2", "-1/3", "1/ 3", ""])
-def test_a_share_that_is_none_is_wrong_usage(tmp_path, text):
+def test_an_invalid_shard_number_is_wrong_usage(tmp_path, text):
     result = generate(tmp_path, "--shard", text)
     assert result.returncode == 2
     assert not (tmp_path / "out").exists()
 
 
-def test_shards_that_do_not_belong_together_are_not_joined(whole, shards, tmp_path):
+def test_shards_of_different_runs_are_not_merged(whole, shards, tmp_path):
     out = tmp_path / "joined"
     assert generate(tmp_path, "--shard", "3/3", "--seed", "8", out="seed").returncode == 0
     assert generate(tmp_path, "--shard", "1/2", out="half").returncode == 0
     refused(merge(out, *shards[:2], tmp_path / "seed"), "another run", "'seed: 8'", "'seed: 7'")
     refused(merge(out, *shards[:2], tmp_path / "half"), "shard 1/2", "1/3")
     refused(merge(out, *shards[:2]), "shard 3/3 is missing")
-    refused(merge(out, *shards, shards[1]), "shard 2/3 is there twice")
-    refused(merge(out, *shards, whole), "whole already")
+    refused(merge(out, *shards, shards[1]), "shard 2/3 is given twice")
+    refused(merge(out, *shards, whole), "is complete, not a shard")
     refused(merge(out, *shards[:2], tmp_path / "none"), "dataset.yaml")
     assert not out.exists()
     shutil.copytree(whole, out)
@@ -105,7 +105,7 @@ def test_shards_that_do_not_belong_together_are_not_joined(whole, shards, tmp_pa
     assert files(out) == files(whole)
 
 
-def test_a_shard_that_is_not_complete_is_not_joined(shards, tmp_path):
+def test_an_incomplete_shard_is_not_merged(shards, tmp_path):
     part = tmp_path / "part"
     shutil.copytree(shards[1], part)
     (part / "dataset.journal").write_text("")
@@ -118,7 +118,7 @@ def test_a_shard_that_is_not_complete_is_not_joined(shards, tmp_path):
 
 
 @pytest.mark.parametrize("fault", ["flipped", "missing", "short"])
-def test_a_file_that_has_changed_is_not_joined(whole, shards, tmp_path, fault):
+def test_a_changed_file_is_not_merged(whole, shards, tmp_path, fault):
     part = tmp_path / "part"
     shutil.copytree(shards[1], part)
     file = part / "lidar/front/000001.ply"
@@ -148,7 +148,7 @@ def test_a_file_that_has_changed_is_not_joined(whole, shards, tmp_path, fault):
     ],
 )
 def test_nothing_is_written_outside_of_the_dataset(shards, tmp_path, before, after):
-    """Whatever the names of sensors in shards."""
+    """Tested for several sensor names in shards."""
     parts = []
     for k, shard in enumerate(shards):
         parts.append(tmp_path / f"parts/{k}")
@@ -159,7 +159,7 @@ def test_nothing_is_written_outside_of_the_dataset(shards, tmp_path, before, aft
     assert sorted(p.name for p in tmp_path.iterdir()) == ["parts"]
 
 
-def test_more_shards_than_files_may_be_open_are_joined_or_refused(whole, shards, tmp_path):
+def test_more_shards_than_the_open_file_limit_are_merged_or_rejected(whole, shards, tmp_path):
     def limited(soft, hard):
         return groundray(
             "merge", *shards, "-o", tmp_path / "joined",
@@ -167,14 +167,14 @@ def test_more_shards_than_files_may_be_open_are_joined_or_refused(whole, shards,
         )  # fmt: skip
 
     most = resource.getrlimit(resource.RLIMIT_NOFILE)[1]
-    refused(limited(30, 40), "3 shards take ", " and the system allows 40", "ulimit")
+    refused(limited(30, 40), "3 shards need ", " but the system allows 40", "ulimit")
     assert not (tmp_path / "joined").exists()
     result = limited(16, most)
     assert result.returncode == 0, result.stderr
     assert files(tmp_path / "joined") == files(whole)
 
 
-def test_a_merge_killed_before_it_had_written_anything_goes_on(whole, shards, tmp_path):
+def test_a_merge_killed_before_writing_anything_resumes(whole, shards, tmp_path):
     joined = tmp_path / "joined"
     joined.mkdir()
     (joined / "dataset.yaml.part").write_text("groundray_data")
@@ -183,18 +183,18 @@ def test_a_merge_killed_before_it_had_written_anything_goes_on(whole, shards, tm
     assert files(joined) == files(whole)
 
 
-def test_a_folder_in_which_a_run_is_at_work_is_not_merged_into(shards, tmp_path):
+def test_a_folder_in_use_by_a_run_is_not_merged_into(shards, tmp_path):
     joined = tmp_path / "joined"
     joined.mkdir()
     (joined / "notes.txt").write_text("")
     held = os.open(joined, os.O_RDONLY)
     fcntl.flock(held, fcntl.LOCK_EX)
-    refused(merge(joined, *shards), "another run is at work")
+    refused(merge(joined, *shards), "another run is using this folder")
     os.close(held)
     refused(merge(joined, *shards), "not empty")
 
 
-def test_a_merge_that_was_killed_goes_on(whole, shards, tmp_path):
+def test_a_killed_merge_resumes(whole, shards, tmp_path):
     joined = tmp_path / "joined"
     run = subprocess.Popen(
         [PROGRAM, "merge", *shards, "-o", joined],
@@ -209,7 +209,7 @@ def test_a_merge_that_was_killed_goes_on(whole, shards, tmp_path):
     assert files(joined) == files(whole)
 
 
-def test_a_merge_that_was_cut_off_has_no_strangers(whole, shards, tmp_path):
+def test_an_interrupted_merge_has_no_unexpected_files(whole, shards, tmp_path):
     broken = shutil.copytree(shards[0], tmp_path / "broken")
     scan = sorted(broken.glob("lidar/*/*.ply"))[-1]
     kept = scan.rename(tmp_path / "kept.ply")
@@ -217,7 +217,7 @@ def test_a_merge_that_was_cut_off_has_no_strangers(whole, shards, tmp_path):
     refused(merge(joined, broken, *shards[1:]), f"{scan}: missing")
     result = groundray("verify", joined)
     assert result.returncode == 1
-    assert f"{joined}: incomplete: 0 of 9 frames are there" in result.stdout
+    assert f"{joined}: incomplete: 0 of 9 frames are complete" in result.stdout
     assert "not a file of the dataset" not in result.stdout
     assert "merge --resume" in result.stdout
     kept.rename(scan)

@@ -1,4 +1,4 @@
-"""Terrain of any size from the command line, judged against runs at full resolution."""
+"""Terrain of any size from the command line, compared with runs at full resolution."""
 
 import os
 import re
@@ -56,7 +56,7 @@ def whole(tmp_path_factory):
 
 @pytest.fixture
 def dem(tmp_path):
-    """A copy, for its certificate is made beside it."""
+    """A copy, since its certificate is written beside it."""
     return Path(shutil.copy(PRAIRIE, tmp_path))
 
 
@@ -92,7 +92,7 @@ def test_error_bound_holds_for_every_echo_of_a_simplified_terrain(tmp_path, dem,
     assert not list(tmp_path.glob("*.groundray")), "a DEM that fits in memory needs no certificate"
 
 
-def test_dem_that_exceeds_its_memory_is_served_from_its_certificate(tmp_path, dem, whole):
+def test_dem_larger_than_its_memory_limit_is_read_through_its_certificate(tmp_path, dem, whole):
     scans = generate(tmp_path, dem, "memory_mib: 3", "capped")
     assert (tmp_path / "prairie_1m.tif.groundray/certificate.txt").exists()
     assert check_against_whole(scans, whole) < 0.5
@@ -104,7 +104,7 @@ def test_dem_that_exceeds_its_memory_is_served_from_its_certificate(tmp_path, de
         assert ply.read_bytes() == (tmp_path / "single/lidar/top" / ply.name).read_bytes()
 
 
-def test_frames_do_not_depend_on_those_before(tmp_path, dem):
+def test_frames_do_not_depend_on_earlier_frames(tmp_path, dem):
     generate(tmp_path, dem, "memory_mib: 3, tolerance_mrad: 0.5", "run")
     last = tmp_path / "run/lidar/top/000001.ply"
     before = last.read_bytes()
@@ -113,7 +113,7 @@ def test_frames_do_not_depend_on_those_before(tmp_path, dem):
     assert last.read_bytes() == before
 
 
-def test_info_tells_levels_triangles_and_bound(tmp_path, dem):
+def test_info_lists_levels_triangles_and_bound(tmp_path, dem):
     (tmp_path / "s.yaml").write_text(
         SCENE.replace("DEM", str(dem)).replace("DETAIL", "memory_mib: 3")
     )
@@ -126,7 +126,7 @@ def test_info_tells_levels_triangles_and_bound(tmp_path, dem):
     assert total == sum(int(row[1]) for row in rows)
 
 
-def test_certify_prints_how_far_each_level_deviates(tmp_path):
+def test_certify_prints_the_deviation_of_each_level(tmp_path):
     dem = Path(shutil.copy(JACKSBORO, tmp_path))
     first = groundray("terrain", "certify", dem)
     assert first.returncode == 0, first.stderr
@@ -154,7 +154,7 @@ def test_certify_prints_how_far_each_level_deviates(tmp_path):
         (["-o", "no/such/folder/m.ply", "--max-error-m", "1"], "m.ply"),
     ],
 )
-def test_mesh_refuses_what_cannot_be(tmp_path, arguments, words):
+def test_mesh_rejects_invalid_options(tmp_path, arguments, words):
     said = groundray("terrain", "mesh", JACKSBORO, *arguments, cwd=tmp_path)
     assert said.returncode == 1
     assert said.stderr.startswith("groundray: ")
@@ -172,13 +172,13 @@ def test_mesh_refuses_what_cannot_be(tmp_path, arguments, words):
         ["-o", "m.ply", "--max-error-m", "1", "--angle-mrad", "1", "--viewpoint", "1,2"],
     ],
 )
-def test_mesh_says_how_it_is_used(tmp_path, arguments):
+def test_mesh_prints_its_usage(tmp_path, arguments):
     said = groundray("terrain", "mesh", JACKSBORO, *arguments, cwd=tmp_path)
     assert said.returncode == 2
     assert not list(tmp_path.iterdir())
 
 
-def test_mesh_needs_a_viewpoint_that_is_somewhere(tmp_path):
+def test_mesh_requires_a_viewpoint_on_the_dem(tmp_path):
     result = groundray(
         *("terrain", "mesh", JACKSBORO, "-o", tmp_path / "m.ply", "--max-error-m", 5),
         *("--viewpoint", "nan,0,0", "--angle-mrad", 1),
@@ -189,7 +189,7 @@ def test_mesh_needs_a_viewpoint_that_is_somewhere(tmp_path):
 
 
 def test_sparse_dem_far_from_the_sensor_is_traced(tmp_path):
-    """None of the few heights is a sample of the coarse levels that reach them."""
+    """None of the few heights is a sample of the coarse levels that cover them."""
     heights = np.full((400, 400), -9999.0)
     heights[377:384, 377:384] = 50
     grid = tmp_path / "island.asc"
@@ -208,7 +208,7 @@ def test_sparse_dem_far_from_the_sensor_is_traced(tmp_path):
     assert result.returncode == 0, result.stderr
 
 
-def test_interrupted_certification_leaves_nothing(tmp_path):
+def test_interrupted_certification_leaves_no_files(tmp_path):
     vrt = tmp_path / "big.vrt"
     subprocess.run(
         ["python3", ROOT / "test/benchmark/make_big_vrt.py", PRAIRIE, "24", vrt], check=True
@@ -223,7 +223,7 @@ def test_interrupted_certification_leaves_nothing(tmp_path):
     assert list(tmp_path.iterdir()) == [vrt]
 
 
-def test_memory_that_is_too_small_is_refused_before_anything_is_written(tmp_path, dem):
+def test_too_small_a_memory_limit_is_rejected_before_anything_is_written(tmp_path, dem):
     text = SCENE.replace("DEM", str(dem)).replace("DETAIL", "memory_mib: 0")
     (tmp_path / "scene.yaml").write_text(text)
     result = groundray("generate", tmp_path / "scene.yaml", "-o", tmp_path / "out")

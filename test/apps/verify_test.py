@@ -1,4 +1,4 @@
-"""Checksums of datasets, held against Python's, and the command that checks them."""
+"""Checksums of datasets, compared with Python's, and the command that verifies them."""
 
 import hashlib
 import random
@@ -21,10 +21,12 @@ def sum_of(data):
 
 
 def faulty(dataset, *words):
-    """Returns the lines that tell of its faults, all these words among them."""
+    """Returns the lines that report faults, which must contain all words."""
     result = groundray("verify", dataset)
     assert result.returncode == 1, result.stdout
-    assert result.stderr.splitlines()[-1].startswith("groundray: 1 of 1 datasets is at fault")
+    assert result.stderr.splitlines()[-1].startswith(
+        "groundray: 1 of 1 datasets is damaged or incomplete"
+    )
     for word in words:
         assert word in result.stdout, result.stdout
     return result.stdout.splitlines()
@@ -45,16 +47,16 @@ def test_every_file_is_listed_with_its_size_and_sha_256(whole):
     assert listed == {path: sum_of(data) for path, data in there.items()}
 
 
-def test_a_sound_dataset_passes(whole, tmp_path):
+def test_an_intact_dataset_passes(whole, tmp_path):
     count = len(files(whole))
     shutil.copytree(whole, tmp_path / "copy")
     result = groundray("verify", whole, tmp_path / "copy")
     assert result.returncode == 0, result.stderr
     assert result.stdout.count(f": {count} files of ") == 2
-    assert result.stdout.count("all as they were written") == 2
+    assert result.stdout.count("all unchanged") == 2
 
 
-def test_any_flipped_bit_is_found(whole, tmp_path):
+def test_any_flipped_bit_is_detected(whole, tmp_path):
     """One bit of each file, and of 22 bytes of the record, one after the other."""
     draw = random.Random(5)
     copy = tmp_path / "copy"
@@ -79,21 +81,24 @@ def test_any_flipped_bit_is_found(whole, tmp_path):
 @pytest.mark.parametrize(
     "path", ["lidar/front/000001_no_returns.ply", "camera/eye/000000.exr", "poses/top.tum"]
 )
-def test_a_file_that_is_cut_short_longer_or_gone_is_found(whole, tmp_path, path):
+def test_truncated_extended_and_missing_files_are_detected(whole, tmp_path, path):
     copy = tmp_path / "copy"
     shutil.copytree(whole, copy)
     data = (whole / path).read_bytes()
     (copy / path).write_bytes(data[:-1])
-    assert len(faulty(copy, f"{path}: of {len(data) - 1} bytes instead of {len(data)}: cut")) == 2
+    assert (
+        len(faulty(copy, f"{path}: has {len(data) - 1} bytes instead of {len(data)}: truncated"))
+        == 2
+    )
     (copy / path).write_bytes(data + b"\n")
-    assert len(faulty(copy, f"{path}: of {len(data) + 1} bytes", "something was added")) == 2
+    assert len(faulty(copy, f"{path}: has {len(data) + 1} bytes", "data was appended")) == 2
     (copy / path).unlink()
     assert len(faulty(copy, f"{path}: missing")) == 2
     (copy / path).mkdir()
-    faulty(copy, f"{path}: no file any more")
+    faulty(copy, f"{path}: not a regular file")
 
 
-def test_a_file_more_is_found_wherever_it_is(whole, tmp_path):
+def test_unexpected_files_are_detected_in_any_folder(whole, tmp_path):
     copy = tmp_path / "copy"
     shutil.copytree(whole, copy)
     strangers = [
@@ -119,13 +124,13 @@ def test_all_faults_are_listed_and_all_datasets_are_checked(whole, tmp_path):
         (copy / name).unlink()
     result = groundray("verify", copy, whole, tmp_path / "nothing")
     assert result.returncode == 1
-    assert "2 of 3 datasets are at fault" in result.stderr
+    assert "2 of 3 datasets are damaged or incomplete" in result.stderr
     assert result.stdout.count(": missing") == 3
     assert f"{whole}: {len(files(whole))} files" in result.stdout
-    assert "holds no dataset.yaml" in result.stdout
+    assert "contains no readable dataset.yaml" in result.stdout
 
 
-def test_a_record_that_was_cut_short_is_found(whole, tmp_path):
+def test_a_truncated_record_is_detected(whole, tmp_path):
     copy = tmp_path / "copy"
     shutil.copytree(whole, copy)
     text = (whole / "dataset.yaml").read_bytes()
@@ -140,38 +145,43 @@ def test_a_record_that_was_cut_short_is_found(whole, tmp_path):
         faulty(copy, "dataset.yaml")
 
 
-def test_a_run_that_was_cut_off_is_told(whole, tmp_path):
+def test_an_incomplete_run_is_reported(whole, tmp_path):
     copy = tmp_path / "copy"
     shutil.copytree(whole, copy)
     (copy / "dataset.journal").write_text("")
-    faulty(copy, "dataset.journal: a run was cut off", "--resume")
+    faulty(copy, "dataset.journal: a run was interrupted", "--resume")
 
 
 @pytest.mark.parametrize(
     ("key", "before"), [("kind", "kind: lidar"), ("name", 'name: "front"'), ("name", 'name: "eye"')]
 )
 @pytest.mark.parametrize("place", ["../x", "/tmp", "a/../../x", "top/../../x"])
-def test_a_sensor_named_as_a_place_elsewhere_is_a_fault(whole, tmp_path, key, before, place):
+def test_a_sensor_name_that_leads_out_of_the_dataset_is_a_fault(
+    whole, tmp_path, key, before, place
+):
     copy = tmp_path / "copy"
     shutil.copytree(whole, copy)
     rewrite(copy, (before, f'{key}: "{place}"'))
     faulty(copy, f"{copy}/dataset.yaml:", f"key '{key}'", place)
 
 
-def test_a_line_that_was_changed_hides_no_frame(whole, tmp_path):
-    """Faults of frames after it are told too."""
+def test_a_changed_line_hides_no_other_frame(whole, tmp_path):
+    """Faults of later frames are reported too."""
     copy = tmp_path / "copy"
     shutil.copytree(whole, copy)
     (copy / "camera/eye/000002.exr").unlink()
     rewrite(copy, ('  - {sensor: "top", frame: 1', '  + {sensor: "top", frame: 1'))
     said = faulty(
-        copy, "000002.exr: missing", ": not as it was written", "000001.ply: of a frame that is not"
+        copy,
+        "000002.exr: missing",
+        ": changed since it was written",
+        "000001.ply: of an unfinished frame",
     )
     assert "incomplete: 8 of 9 frames" in "".join(said)
     assert not any("frame" in line and "000002" in line for line in said)
 
 
-def test_any_number_of_frames_is_reckoned_at_once(whole, tmp_path):
+def test_any_number_of_frames_is_counted_in_constant_time(whole, tmp_path):
     copy = tmp_path / "copy"
     shutil.copytree(whole, copy)
     rewrite(copy, ("frames: 3}", "frames: 4294967295}"), ("frames:\n", 'shard: "2/3"\nframes:\n'))
@@ -181,7 +191,7 @@ def test_any_number_of_frames_is_reckoned_at_once(whole, tmp_path):
     assert time.monotonic() - begin < 5
 
 
-def test_folders_that_are_links_are_gone_through(whole, tmp_path):
+def test_linked_folders_are_verified(whole, tmp_path):
     copy = tmp_path / "copy"
     shutil.copytree(whole, copy)
     for name in ("lidar/top", "lidar", "poses"):
@@ -194,7 +204,7 @@ def test_folders_that_are_links_are_gone_through(whole, tmp_path):
     assert len(faulty(copy, "lidar/top/notes.txt: not a file", "more: not a file")) == 3
 
 
-def test_what_cannot_be_read_is_a_fault_and_all_others_are_told(whole, tmp_path):
+def test_an_unreadable_file_is_a_fault_and_all_others_are_reported(whole, tmp_path):
     copy = tmp_path / "copy"
     shutil.copytree(whole, copy)
     (copy / "poses/top.tum").unlink()
@@ -207,19 +217,19 @@ def test_what_cannot_be_read_is_a_fault_and_all_others_are_told(whole, tmp_path)
     loop.symlink_to("loop")
     result = groundray("verify", copy, loop, whole)
     assert result.returncode == 1
-    assert "2 of 3 datasets are at fault" in result.stderr
+    assert "2 of 3 datasets are damaged or incomplete" in result.stderr
     for words in (
         "poses/top.tum: missing",
-        "lidar/top/000001.ply: not to be read: Too many",
-        "camera/eye/000000.exr: not to be read: Too many",
+        "lidar/top/000001.ply: unreadable: Too many",
+        "camera/eye/000000.exr: unreadable: Too many",
         "dataset.journal: ",
-        f"{loop}: the folder holds no dataset.yaml that can be read (Too many",
+        f"{loop}: the folder contains no readable dataset.yaml (Too many",
         f"{whole}: {len(files(whole))} files",
     ):
         assert words in result.stdout, result.stdout
 
 
-def test_what_a_merge_left_that_was_cut_off_is_told(whole, tmp_path):
+def test_leftovers_of_an_interrupted_merge_are_reported(whole, tmp_path):
     copy = tmp_path / "copy"
     shutil.copytree(whole, copy)
     text = (copy / "dataset.yaml").read_text()
@@ -229,18 +239,23 @@ def test_what_a_merge_left_that_was_cut_off_is_told(whole, tmp_path):
     said = faulty(copy, "incomplete: 0 of 9 frames", "`groundray merge --resume`")
     frames = [p for p in files(whole) if p.startswith(("lidar/", "camera/"))]
     for path in frames:
-        assert any(f"{path}: of a frame that is not done" in line for line in said), path
+        assert any(f"{path}: of an unfinished frame" in line for line in said), path
     assert len(said) == len(frames) + 2
 
 
-def test_info_of_a_folder_that_is_no_dataset_is_that_of_a_raster(tmp_path):
+def test_info_reads_a_folder_without_a_dataset_as_a_raster(tmp_path):
     result = groundray("info", tmp_path)
     assert result.returncode == 1
     assert "dataset.yaml" not in result.stderr
     assert str(tmp_path) in result.stderr
 
 
-def test_info_tells_what_is_there(whole):
+def test_info_describes_a_dataset(whole):
     said = groundray("info", whole).stdout
-    for words in ("9 of 9 frames are there", "seed      7", "lidar     front: Velodyne", "3 of 3"):
+    for words in (
+        "9 of 9 frames are complete",
+        "seed      7",
+        "lidar     front: Velodyne",
+        "3 of 3",
+    ):
         assert words in said

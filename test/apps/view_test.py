@@ -14,7 +14,7 @@ DEM = ROOT / "data/terrain/jacksboro.tif"
 
 
 def view(*arguments: object, timeout_s: float = 120) -> subprocess.CompletedProcess[str]:
-    """Runs it without any display."""
+    """Runs the viewer without a display."""
     environment = {
         name: value
         for name, value in os.environ.items()
@@ -39,7 +39,7 @@ def test_pictures_need_no_display(tmp_path: Path) -> None:
     assert len(np.unique(picture.reshape(-1, 3), axis=0)) > 1000
 
 
-def test_equal_commands_give_equal_pictures(tmp_path: Path) -> None:
+def test_equal_commands_yield_equal_pictures(tmp_path: Path) -> None:
     for name in ("a.png", "b.png"):
         assert view(DEM, "--screenshot", tmp_path / name, "--colour-by", "slope").returncode == 0
     assert (tmp_path / "a.png").read_bytes() == (tmp_path / "b.png").read_bytes()
@@ -69,7 +69,7 @@ def write_inputs(folder: Path) -> list[Path]:
     return sorted(folder.iterdir())
 
 
-def test_clouds_and_pictures_of_others_are_shown(tmp_path: Path) -> None:
+def test_clouds_and_pictures_of_other_software_are_shown(tmp_path: Path) -> None:
     (tmp_path / "in").mkdir()
     for path in write_inputs(tmp_path / "in"):
         result = view(path, "--screenshot", tmp_path / "out.png", "--size", "320x180")
@@ -79,8 +79,8 @@ def test_clouds_and_pictures_of_others_are_shown(tmp_path: Path) -> None:
         assert np.any(np.ptp(picture.astype(int), axis=1) > 20), path.name
 
 
-def test_pictures_stay_what_they_are(tmp_path: Path) -> None:
-    """The middle of a picture has its colours."""
+def test_pictures_keep_their_colours(tmp_path: Path) -> None:
+    """The centres of both halves have the picture's colours."""
     bands = np.zeros((40, 60, 3), np.uint8)
     bands[:, :30] = (200, 60, 20)
     bands[:, 30:] = (10, 90, 220)
@@ -111,10 +111,10 @@ def test_pictures_stay_what_they_are(tmp_path: Path) -> None:
         ("scan.las", b"LASF", "laspy"),
         ("dataset.yaml", b"groundray_dataset: 99\n", "dataset.yaml"),
         ("scene.yaml", b"groundray: [", "scene.yaml"),
-        ("notes.txt", b"hello", "nothing that can be shown"),
+        ("notes.txt", b"hello", "it cannot be shown"),
     ],
 )
-def test_broken_inputs_are_named(tmp_path: Path, name: str, content: bytes, said: str) -> None:
+def test_broken_inputs_are_reported(tmp_path: Path, name: str, content: bytes, said: str) -> None:
     (tmp_path / name).write_bytes(content)
     result = view(tmp_path / name, "--screenshot", tmp_path / "out.png")
     assert result.returncode == 1
@@ -148,7 +148,7 @@ def test_distances_from_the_truth_are_printed_and_shown(tmp_path: Path) -> None:
         assert (red > blue) == is_red
 
 
-def test_usage(tmp_path: Path) -> None:
+def test_options_are_checked(tmp_path: Path) -> None:
     assert view("--help").returncode == 0
     assert view("--version").stdout.startswith("groundray-view ")
     assert view("--no-such-option").returncode == 2
@@ -172,7 +172,7 @@ def test_usage(tmp_path: Path) -> None:
         assert wrong[0] in result.stderr
 
 
-def test_a_window_without_a_display_is_refused() -> None:
+def test_a_window_without_a_display_is_rejected() -> None:
     result = view(DEM)
     assert result.returncode == 1
     assert "display" in result.stderr.lower()

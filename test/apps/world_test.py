@@ -1,4 +1,4 @@
-"""Scenes with a world through the program: shipped and small ones, read by NumPy and plyfile."""
+"""Scenes with objects and textures, shipped and small ones, read by NumPy and plyfile."""
 
 import os
 import re
@@ -35,7 +35,7 @@ def trail(tmp_path_factory):
     return folder / "out"
 
 
-def test_instances_are_those_that_the_dataset_lists(trail):
+def test_instances_match_those_that_the_dataset_lists(trail):
     record = yaml.safe_load((trail / "dataset.yaml").read_text())
     firsts = [group["first_instance"] for group in record["objects"]]
     counts = [group["count"] for group in record["objects"]]
@@ -63,7 +63,7 @@ def test_only_the_leader_moves(trail):
     assert abs(np.median(in_plan) - 8) < 1  # m/s, as it drives; points turn with the body
 
 
-def test_info_counts_what_stands_there(trail, tmp_path):
+def test_info_counts_the_objects(trail, tmp_path):
     record = yaml.safe_load((trail / "dataset.yaml").read_text())
     result = run("info", SCENE, tmp_path)
     assert result.returncode == 0, result.stderr
@@ -78,7 +78,7 @@ def test_shipped_scene_has_a_stereo_pair_and_a_fisheye():
         assert f"camera    {camera}" in result.stdout
 
 
-def test_a_laser_asks_for_materials(tmp_path):
+def test_a_laser_requires_materials(tmp_path):
     light = """    laser: {wavelength_nm: 905, pulse_energy_nj: 300, pulse_fwhm_ns: 5}
     receiver: {aperture_mm: 20, threshold_w: 1.0e-8, timing: peak, returns: dual}
 """
@@ -182,7 +182,7 @@ def test_a_mask_lays_gravel_over_soil(tmp_path):
     assert "mask_full: 255" in result.stderr
 
 
-def test_images_of_the_ground_that_are_missing_are_named(tmp_path):
+def test_missing_images_of_the_ground_are_reported(tmp_path):
     for place in ("  orthophoto: none.tif", "  texture: {albedo: none.png, size_m: 1}"):
         result = run("generate", GROUND.replace("PLACE", place), tmp_path)
         assert result.returncode == 1
@@ -195,7 +195,7 @@ BARE = GROUND.replace("PLACE\n", "")
 
 
 def refused(scene, folder, *words):
-    """Nothing is written, and one message holds all the words."""
+    """Checks that nothing is written and that one message contains all words."""
     for command in ("info", "generate"):
         result = run(command, scene, folder)
         assert result.returncode == 1, result.stdout
@@ -229,7 +229,7 @@ def test_the_quarry_has_its_relief(tmp_path):
     assert 0.04 < np.sqrt((rest**2).mean()) < 0.12
 
 
-def test_info_tells_what_a_scene_holds(tmp_path):
+def test_info_describes_the_objects_of_a_scene(tmp_path):
     place = """  texture: {albedo: soil.png, size_m: 2}
   cover:
     - {material: gravel, label: 9, slope_deg: [10, 90]}"""
@@ -252,7 +252,7 @@ def test_info_tells_what_a_scene_holds(tmp_path):
         "objects   car: 1 of label 5, instances from 1",
         "models    1 of 1260 triangles for 1 objects",
         "materials dry_soil, gravel, metal, asphalt, retro_reflector",
-        "sky       clear, of turbidity 4",
+        "sky       clear, turbidity 4",
         "sun       elevation 30.00, azimuth 250.00 degrees in W",
     ):
         assert line in result.stdout.splitlines(), result.stdout
@@ -265,7 +265,7 @@ def memory_mib(text):
 
 
 def test_equal_models_are_loaded_once(tmp_path):
-    """Fifty trees take what one does, and each entry keeps its own label and material."""
+    """Fifty trees take the memory of one, and each entry keeps its own label and material."""
     tree = "asset: conifer, detail: 16, at_m: [%d, 5150690]"
     one = BARE + "objects:\n" + object_of("tree", tree % 429440)
     first = run("info", one, tmp_path)
@@ -310,7 +310,7 @@ def test_equal_models_have_the_materials_of_their_entries(tmp_path):
 
 
 def test_a_driven_object_moves_until_the_last_pulse(tmp_path):
-    """Seen from inside a ball that drives; the last sweep ends 9.7 us after the run."""
+    """Scanned from inside a moving ball; the last sweep ends 9.7 us after the run."""
     ball = """asset: sphere_target, size_m: 60, drive: {waypoints_m: [[429450, 5150684],
     [429460, 5150684]], speed_m_s: 5, height_m: 0}"""
     result = run("generate", BARE + "objects:\n" + object_of("ball", ball), tmp_path)
@@ -322,7 +322,7 @@ def test_a_driven_object_moves_until_the_last_pulse(tmp_path):
     assert speed.min() > 1
 
 
-def test_a_recorded_object_must_meet_the_run(tmp_path):
+def test_the_times_of_a_recorded_object_must_overlap_the_run(tmp_path):
     scene = BARE + "objects:\n" + object_of("car", "asset: vehicle, trajectory: car.tum")
 
     def path(begin, end):
@@ -330,10 +330,10 @@ def test_a_recorded_object_must_meet_the_run(tmp_path):
         (tmp_path / "car.tum").write_text("".join(rows))
 
     path(7, 9)
-    words = ["object 'car'", "car.tum", "from 7.000 s to 9.000 s", "from 0.000 s to 0.100 s"]
+    words = ["object 'car'", "car.tum", "covers 7.000 s to 9.000 s", "the run, 0.000 s to 0.100 s"]
     assert refused(scene, tmp_path, *words)
     path(-3, -0.5)
-    assert refused(scene, tmp_path, "from -3.000 s to -0.500 s")
+    assert refused(scene, tmp_path, "covers -3.000 s to -0.500 s")
     path(0.05, 9)
     assert run("info", scene, tmp_path).returncode == 0
 
@@ -346,7 +346,7 @@ def test_an_object_on_a_slope_needs_ground(tmp_path):
     assert run("info", scene, tmp_path).returncode == 0
 
 
-def test_an_image_of_the_sky_that_is_missing_is_named(tmp_path):
+def test_a_missing_image_of_the_sky_is_reported(tmp_path):
     scene = BARE + "sky: {environment: {image: none.hdr}}\n"
     assert refused(scene, tmp_path, "scene.yaml:", "key 'image'", "none.hdr")
 
@@ -360,7 +360,7 @@ WALL = """objects:
 """
 
 
-def test_a_displaced_model_stands_where_its_image_puts_it(tmp_path):
+def test_a_displaced_model_is_moved_by_its_image(tmp_path):
     corners = ["0 -4 -2", "0 4 -2", "0 4 4", "0 -4 4"]  # seen from the west
     (tmp_path / "wall.obj").write_text(
         "".join(f"v {corner}\n" for corner in corners)
@@ -393,4 +393,4 @@ def test_a_displaced_model_stands_where_its_image_puts_it(tmp_path):
     result = run("generate", fine, tmp_path)
     assert result.returncode == 1
     assert "object 'wall'" in result.stderr
-    assert "triangles, more than 16777216; give a larger cell_m" in result.stderr
+    assert "triangles, more than 16777216; increase cell_m" in result.stderr

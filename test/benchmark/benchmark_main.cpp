@@ -2,7 +2,8 @@
 #include <malloc.h>
 
 int main(int argc, char** argv) {
-  // As the program does: memory of one scan serves the next, instead of going back to the system.
+  // As in the applications: freed memory of one scan is kept for the next, not returned to the
+  // system.
   mallopt(M_MMAP_THRESHOLD, 1 << 30);
   mallopt(M_TRIM_THRESHOLD, 1 << 30);
   benchmark::Initialize(&argc, argv);

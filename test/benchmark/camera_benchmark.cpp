@@ -1,6 +1,6 @@
-// What cameras cost: the truth of an image against its rays alone, light by paths, and the table of
-// where pixels look. What is compared runs in turn in every iteration, so that ratios are of one
-// moment of one machine; times are those of all processors.
+// Cost of cameras: an image's truth compared with its rays alone, path-traced light, and the table
+// of pixel directions. Compared variants run alternately in every iteration, so that their ratio is
+// measured under the same load. Times are CPU times of all threads.
 #include <benchmark/benchmark.h>
 #include <tbb/parallel_for.h>
 
@@ -17,7 +17,7 @@
 #include "test/benchmark/landscape.h"
 #include "test/benchmark/raw_embree.h"
 #include "test/benchmark/timing.h"
-#include "test/support/camera_scene.h"
+#include "test/support/scans/camera_scene.h"
 
 namespace groundray::benchmark {
 namespace {
@@ -33,7 +33,7 @@ Scene grey_hills() {
   return {RayTracer({full_resolution_level(hills())}, {0, 0, 0}, Tracing::Fast), {}, {soil}};
 }
 
-// A pinhole that sees 64 degrees, from where it stands.
+// A pinhole camera with a field of view of 64 degrees, and its pose.
 struct View {
   Camera camera;
   Trajectory X_DC;
@@ -54,14 +54,14 @@ View driven_view() {
   return view(from, from + glm::dvec3(1, 0.2, -0.2));
 }
 
-// From above a corner over the whole landscape.
+// Above a corner, looking over the whole landscape.
 View flown_view() {
   const double half_m = -hills().origin_m().x;
   return view({-0.7 * half_m, -0.7 * half_m, hills().max_height_m() + 0.1 * half_m},
               {0.1 * half_m, 0.1 * half_m, hills().min_height_m()});
 }
 
-// Of the centres of pixels.
+// Rays through the pixel centres.
 std::vector<Ray> pixel_rays(const View& view) {
   const Pose X_DC = view.X_DC.pose_at(0s);
   std::vector<Ray> rays;
@@ -70,17 +70,17 @@ std::vector<Ray> pixel_rays(const View& view) {
   return rays;
 }
 
-// As image_truth does: on all cores, by batches that stay in the cache.
-void trace(const Scene& world, std::span<const Ray> rays, std::span<Hit> hits) {
+// As image_truth does: on all cores, in batches that fit into the cache.
+void trace(const Scene& simulation, std::span<const Ray> rays, std::span<Hit> hits) {
   constexpr std::size_t at_once = 256;
   tbb::parallel_for(std::size_t{0}, (rays.size() + at_once - 1) / at_once, [&](std::size_t batch) {
     const std::size_t begin = batch * at_once, count = std::min(at_once, rays.size() - begin);
-    world.trace(rays.subspan(begin, count), hits.subspan(begin, count));
+    simulation.trace(rays.subspan(begin, count), hits.subspan(begin, count));
   });
 }
 
-// Floats alone are off by some tenths of a millimetre, along slanting rays by more, and decide
-// otherwise at silhouettes.
+// Single precision alone errs by some tenths of a millimetre, by more along slanting rays, and
+// decides differently at silhouettes.
 const char* truth_fault(const ImageTruth& truth, std::span<const float> raw_m) {
   double differ = 0;
   for (std::size_t i = 0; i < raw_m.size(); ++i) {
@@ -99,13 +99,13 @@ const char* truth_fault(const ImageTruth& truth, std::span<const float> raw_m) {
 
 void camera_truth(::benchmark::State& state, View (*view_of)()) {
   const View view = view_of();
-  const Scene world = grey_hills();
+  const Scene simulation = grey_hills();
   const auto rays = pixel_rays(view);
   RawEmbree raw(hills(), rays);
   std::vector<Hit> hits(rays.size());
   ImageTruth truth;
   const auto tell = [&] {
-    truth = image_truth(view.camera, world, world.materials.in_colour(), view.X_DC, {},
+    truth = image_truth(view.camera, simulation, simulation.materials.in_colour(), view.X_DC, {},
                         std::move(truth));
   };
   tell();
@@ -113,7 +113,7 @@ void camera_truth(::benchmark::State& state, View (*view_of)()) {
   double raw_s = 0, trace_s = 0, truth_s = 0;
   for (auto _ : state) {
     raw_s += processor_s_of([&] { ::benchmark::DoNotOptimize(raw.trace()); });
-    trace_s += processor_s_of([&] { trace(world, rays, hits); });
+    trace_s += processor_s_of([&] { trace(simulation, rays, hits); });
     const double this_s = processor_s_of(tell);
     state.SetIterationTime(this_s);
     truth_s += this_s;
@@ -141,18 +141,18 @@ const Sky& sky() {
   return sky;
 }
 
-// A direction in proportion to its cosine to `normal`.
+// Cosine-weighted random direction about `normal`.
 glm::dvec3 by_cosine(const glm::dvec3& normal, std::uint32_t number) {
   const glm::dvec2 u = random_uniform({.seed = {5}, .pulse = number});
   const double z = 1 - 2 * u.x, turn = 2 * std::numbers::pi * u.y, side = std::sqrt(1 - z * z);
   return glm::normalize(normal + glm::dvec3(side * std::cos(turn), side * std::sin(turn), z));
 }
 
-// Green light along each ray that the sky sends directly or by one surface: by raw Embree, with one
-// ray to the middle of the sun and one to a random place of the dome.
-std::vector<double> direct_light(const Scene& world, std::span<const Ray> rays) {
+// Green light along each ray that comes from the sky directly or via one surface: by raw Embree,
+// with one ray to the centre of the sun and one to a random point of the dome.
+std::vector<double> direct_light(const Scene& simulation, std::span<const Ray> rays) {
   std::vector<Hit> hits(rays.size());
-  world.trace(rays, hits);
+  simulation.trace(rays, hits);
   const Sun& sun = *sky().sun();
   std::vector<Ray> shadow;
   for (std::size_t i = 0; i < rays.size(); ++i) {
@@ -175,8 +175,8 @@ std::vector<double> direct_light(const Scene& world, std::span<const Ray> rays) 
   return light;
 }
 
-// Compares some ten thousand rays: means within five of their standard errors, p = 6e-7.
-const char* light_fault(const View& view, const Scene& world) {
+// Compares some ten thousand rays: means must agree within five standard errors, p = 6e-7.
+const char* light_fault(const View& view, const Scene& simulation) {
   std::vector<Ray> rays;
   const auto all = pixel_rays(view);
   for (std::size_t i = 0; i < all.size(); i += 97) rays.push_back(all[i]);
@@ -185,9 +185,9 @@ const char* light_fault(const View& view, const Scene& world) {
     samples.push_back({rays[i], SobolPairs(SobolPairs::mixed(i), 0)});
   std::vector<glm::vec3> direct(rays.size()), bounced(rays.size());
   PathTracer::Workspace work;
-  PathTracer(world, sky(), 2, std::nullopt).trace(samples, direct, work);
-  PathTracer(world, sky(), 3, std::nullopt).trace(samples, bounced, work);
-  const auto expected = direct_light(world, rays);
+  PathTracer(simulation, sky(), 2, std::nullopt).trace(samples, direct, work);
+  PathTracer(simulation, sky(), 3, std::nullopt).trace(samples, bounced, work);
+  const auto expected = direct_light(simulation, rays);
   double sum = 0, squares = 0, more = 0, all_light = 0;
   for (std::size_t i = 0; i < rays.size(); ++i) {
     const double difference = double{direct[i].y} - expected[i];
@@ -203,11 +203,11 @@ const char* light_fault(const View& view, const Scene& world) {
 
 void camera_light(::benchmark::State& state, View (*view_of)()) {
   const View view = view_of();
-  const Scene world = grey_hills();
-  if (const char* fault = light_fault(view, world)) return state.SkipWithError(fault);
+  const Scene simulation = grey_hills();
+  if (const char* fault = light_fault(view, simulation)) return state.SkipWithError(fault);
   RawEmbree raw(hills(), pixel_rays(view));
   const SamplingSpec& sampling = view.camera.spec().sampling;
-  const PathTracer light(world, sky(), sampling.depth, std::nullopt);
+  const PathTracer light(simulation, sky(), sampling.depth, std::nullopt);
   double raw_s = 0, light_s = 0;
   for (auto _ : state) {
     raw_s += processor_s_of([&] { ::benchmark::DoNotOptimize(raw.trace()); });
@@ -233,7 +233,8 @@ BENCHMARK_CAPTURE(camera_light, flown, flown_view)
     ->Unit(::benchmark::kMillisecond)
     ->MinTime(4);
 
-// All fourteen coefficients. With the shorter focal length the lens folds within its image.
+// All fourteen coefficients. At the shorter focal length the distortion folds over within the
+// image.
 void camera_table(::benchmark::State& state) {
   const auto focal_px = static_cast<double>(state.range(0));
   const double tau_x_rad = 0.035, tau_y_rad = -0.052;

@@ -1,7 +1,7 @@
-"""The path tracer beside Mitsuba 3: the same landscape, light, pinhole and depth.
+"""Compares the path tracer with Mitsuba 3: the same landscape, light, pinhole and depth.
 
-The answers are compared first, then the paths that each traces in a second of one core.
-test/apps/camera_peers_test.py does the first part alone. Run by `./dev bench camera`.
+Images are compared first, then the paths that each traces in a second of one core.
+test/apps/camera_peers_test.py does only the first part. Run by `./dev bench camera`.
 """
 
 import ctypes.util
@@ -35,7 +35,7 @@ class Picture:
 
 
 def ours(folder: Path, width: int, samples: int, terrain: int) -> tuple[dict, Picture]:
-    """Returns what the scene is, and our picture of it; the terrain goes to `folder`."""
+    """Returns the scene and our picture of it; writes the terrain to `folder`."""
     command = [PROGRAM, folder, width, samples, DEPTH, terrain]
     run = subprocess.run(list(map(str, command)), stdout=subprocess.PIPE, check=True)
     scene = json.loads(run.stdout)
@@ -49,7 +49,7 @@ def ours(folder: Path, width: int, samples: int, terrain: int) -> tuple[dict, Pi
 
 
 def write_ply(folder: Path, scene: dict) -> None:
-    """Each cell is two triangles, parted from its north-east to its south-west."""
+    """Each cell is two triangles, split from its north-east to its south-west."""
     n = scene["terrain_samples"]
     heights = np.load(folder / "heights.npy")
     row, column = np.divmod(np.arange(n * n), n)
@@ -82,7 +82,7 @@ def mitsuba(variant: str) -> ModuleType:
 
 
 def theirs(mi: ModuleType, folder: Path, scene: dict) -> object:
-    """Returns Mitsuba's scene: the sun is a disc so far away that all of it looks the same way."""
+    """Returns Mitsuba's scene: the sun is a disc far enough away that its light is parallel."""
     T = mi.ScalarTransform4f
     columns, rows = scene["size_px"]
     distance_m, angle_rad = 1e6, scene["sun_radius_rad"]
@@ -142,8 +142,8 @@ def cpu_s() -> float:
 
 
 def picture(mi: ModuleType, scene: object, samples: int, batches: int) -> Picture:
-    """The mean of independent pictures; their spread tells its error."""
-    render(mi, scene, 1, 1000)  # what the first call compiles is no part of the work
+    """Returns the mean of independent pictures, and its standard error from their spread."""
+    render(mi, scene, 1, 1000)  # excludes the compilation in the first call
     begin_s = cpu_s()
     parts = np.array([render(mi, scene, samples, seed) for seed in range(batches)])
     took_s = cpu_s() - begin_s
@@ -154,16 +154,16 @@ def picture(mi: ModuleType, scene: object, samples: int, batches: int) -> Pictur
 
 @dataclass
 class Agreement:
-    """How two pictures of one scene agree."""
+    """Agreement of two pictures of one scene."""
 
-    pixels: float  # share of them whose difference chance explains
+    pixels: float  # share of them whose difference is not significant
     blocks: float  # likewise, of means over 8 x 8 pixels
     bias: float  # of the mean over all, relative
     bias_sigma: float  # its standard deviation
 
     def holds(self) -> bool:
-        """Mitsuba's own tests ask for 99.75 % of pixels. They are far too noisy to miss a bounce of
-        light, so that blocks and the mean are looked at as well."""
+        """Mitsuba's own tests require 99.75 % of pixels. Pixels are too noisy to show a missing
+        bounce of light, so blocks and the mean are tested too."""
         share = min(self.pixels, self.blocks)
         return share >= 0.9975 and abs(self.bias) <= 4 * self.bias_sigma
 
@@ -206,8 +206,7 @@ def check(mi: ModuleType, folder: Path) -> Agreement:
 
 
 def bench(variant: str) -> None:
-    """Checks and measures a variant in this process, which is there for it alone: Mitsuba aborts it
-    if LLVM is too old."""
+    """Checks and measures a variant in its own process: Mitsuba aborts it if LLVM is too old."""
     mi = mitsuba(variant)
     with tempfile.TemporaryDirectory() as name:
         agreement = check(mi, Path(name))

@@ -1,4 +1,4 @@
-// What it costs to follow a moving sensor over a large DEM, and to trace through the levels.
+// Cost of following a moving sensor over a large DEM, and of tracing through the levels.
 #include <benchmark/benchmark.h>
 #include <fmt/format.h>
 
@@ -10,20 +10,21 @@
 #include <glm/geometric.hpp>
 #include <vector>
 
-#include "terrain/dem_io.h"
-#include "terrain/deviation.h"
+#include "terrain/dem/dem_io.h"
+#include "terrain/lod/deviation.h"
+#include "terrain/lod/tile_source.h"
 #include "terrain/terrain_scene.h"
-#include "terrain/tile_source.h"
 #include "test/benchmark/timing.h"
-#include "test/support/sample_terrain.h"
 #include "test/support/temporary_folder.h"
+#include "test/support/terrain/sample_terrain.h"
 
 namespace groundray::benchmark {
 namespace {
 
 namespace fs = std::filesystem;
 
-// The Moon's DEM in metres, warped once and kept beside the build; empty without the shared data.
+// The DEM of the Moon in metres, warped once and kept beside the build; empty without the shared
+// data.
 fs::path moon() {
   const fs::path source =
       testing::shared_data_folder() / "dem/moon_gld100_8193/moon_gld100_8193.tif";
@@ -47,7 +48,7 @@ std::shared_ptr<const FileTiles> open_tiles(const fs::path& path, GridFrame& fra
                                            std::size_t{64} << 20);
 }
 
-// Levels of 512 x 512 cells at their own step, as far as the DEM goes.
+// Windows of 512 x 512 cells of each level, for all levels of the DEM.
 ClipmapSettings windows_of_512(const Lattice& lattice) {
   std::size_t levels = 1;
   for (int level = 0; std::max(lattice.cells(level).x, lattice.cells(level).y) > 512; ++level)
@@ -55,7 +56,7 @@ ClipmapSettings windows_of_512(const Lattice& lattice) {
   return {.memory_bytes = 40 * std::size_t{512} * (512 + 32) * levels};
 }
 
-// A path of one snap of level 0 each step: diagonal, straight, and round corners.
+// A path that moves by one snap of level 0 per step: diagonally, straight, and round corners.
 std::vector<glm::dvec3> snaps(const GridFrame& frame, int steps) {
   const glm::dvec2 unit_m = 16.0 * glm::abs(frame.step_m);
   const double room_m = 0.3 * std::min(std::abs(frame.step_m.x) * frame.samples.x,
@@ -130,7 +131,7 @@ void terrain_step_65536(::benchmark::State& state) {
 }
 BENCHMARK(terrain_step_65536)->Unit(::benchmark::kMillisecond)->Iterations(1);
 
-// The same number of cells in its finest windows, from a DEM of 1/64 the size.
+// The same number of cells in the finest windows, from a DEM with 1/64 of the width.
 void terrain_step_1025(::benchmark::State& state) {
   const HeightGrid grid = testing::fractal(1025, 100, 3000, Seed{1});
   const auto tiles = std::make_shared<const MemoryTiles>(
@@ -158,10 +159,11 @@ std::vector<Ray> lidar_rays(const HeightGrid& grid) {
   return rays;
 }
 
-// As one level, but of single triangles.
+// The grid as one level, built of single triangles.
 Level level_of_triangles(const HeightGrid& grid) {
   Level level = full_resolution_level(grid);
-  for (Leaf& leaf : level.leaves) leaf.has_holes = true;  // those are built triangle by triangle
+  for (Leaf& leaf : level.leaves)
+    leaf.has_holes = true;  // leaves with holes are built triangle by triangle
   return level;
 }
 

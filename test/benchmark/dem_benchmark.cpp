@@ -6,17 +6,17 @@
 #include <fstream>
 #include <string>
 
-#include "core/ray_tracer.h"
-#include "terrain/dem_io.h"
+#include "core/tracing/ray_tracer.h"
+#include "terrain/dem/dem_io.h"
 #include "terrain/terrain_scene.h"
 #include "test/benchmark/timing.h"
-#include "test/support/sample_terrain.h"
 #include "test/support/temporary_folder.h"
+#include "test/support/terrain/sample_terrain.h"
 
 namespace groundray::benchmark {
 namespace {
 
-// Memory that the process has mapped and holds, bytes.
+// Resident memory of the process, bytes.
 double resident_bytes() {
   std::ifstream status("/proc/self/status");
   for (std::string line; std::getline(status, line);) {
@@ -40,7 +40,7 @@ void write_geotiff(const std::string& path, const HeightGrid& grid) {
   GDALClose(file);
 }
 
-// From a GeoTIFF to rays: CPU time of all threads, and memory for each cell.
+// From a GeoTIFF to a tracer: CPU time of all threads, and memory per cell.
 void load_and_build_4097(::benchmark::State& state) {
   const testing::TemporaryFolder folder;
   const std::string path = (folder / "dem.tif").string();

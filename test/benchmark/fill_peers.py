@@ -1,18 +1,18 @@
-"""How well blank areas of DEMs are filled, beside other people's ways to do it.
+"""Compares the filling of blank areas of DEMs with other software.
 
 Masks are cut from real and fractal ground: blobs that take 1, 5 and 20 % of it, stripes, and the
-shadows of a sensor (by casting rays). Each is filled by groundray, by a thin plate (an own sparse
-solve with SciPy), SciPy's radial basis functions (thin plate spline of 64 neighbours), GDAL's
-FillNodata, OpenCV's inpainting by Telea and by Navier-Stokes, and CGAL (meshes triangulated,
-refined and faired; it and GDAL's through `groundray terrain fill --method`). Told are groundray's
-RMSE and its share of the others'; for shadows twice, without and with the bounds by lines of sight
-that come with them, and what share these leave of the RMSE. The last columns are the errors in
-groundray's stated standard deviations: their root mean square, and how many are within one and two.
+shadows of a sensor (by casting rays). Each is filled by groundray, by a thin plate (a separate
+sparse solve with SciPy), SciPy's radial basis functions (thin plate spline of 64 neighbours),
+GDAL's FillNodata, OpenCV's inpainting by Telea and by Navier-Stokes, and CGAL (meshes triangulated,
+refined and faired; it and GDAL's through `groundray terrain fill --method`). Printed are
+groundray's RMSE and its ratio to the others'; for shadows twice, without and with the bounds by
+lines of sight, and the ratio of both RMSEs (gain). The last columns are the errors in groundray's
+stated standard deviations: their root mean square, and the fractions within one and two.
 
-The judged masks are those of seeds 0, 1, ...; what groundray's code takes as given (forms tried,
-how many trials, when a form is preferred) was chosen on masks of seeds from 1000 on.
+The masks have seeds 0, 1, ...; the constants in groundray's code (forms and numbers of trials,
+preference of a form) were chosen on masks of seeds from 1000 on.
 
-Run by `./dev bench fill`; arguments: how many masks of each kind, DEMs.
+Run by `./dev bench fill`; arguments: number of masks of each kind, DEMs.
 """
 
 import os
@@ -42,11 +42,11 @@ DEMS = {
     "fractal": (None, None),
 }
 HOLE = -99999
-cv2.utils.logging.setLogLevel(cv2.utils.logging.LOG_LEVEL_ERROR)  # tags of GeoTIFFs are new to it
+cv2.utils.logging.setLogLevel(cv2.utils.logging.LOG_LEVEL_ERROR)  # it warns about tags of GeoTIFFs
 
 
 def noise(size: int, random: np.random.Generator, gain) -> np.ndarray:
-    """A random field: white noise whose waves of f cycles per cell are multiplied by gain(f)."""
+    """Returns a random field: white noise with waves of f cycles per cell multiplied by gain(f)."""
     waves = np.fft.fftfreq(size)
     f = np.hypot(*np.meshgrid(waves, waves))
     f[0, 0] = 1
@@ -66,7 +66,7 @@ def load(name: str) -> np.ndarray:
 
 
 def cut(dem: np.ndarray, random: np.random.Generator, size: int = 192) -> np.ndarray:
-    """A square without holes that is not flat."""
+    """Returns a square without holes that is not flat."""
     for _ in range(1000):
         row, column = (int(random.integers(0, n - size + 1)) for n in dem.shape)
         part = dem[row : row + size, column : column + size]
@@ -76,7 +76,7 @@ def cut(dem: np.ndarray, random: np.random.Generator, size: int = 192) -> np.nda
 
 
 def horizon(heights: np.ndarray, sensor: np.ndarray) -> np.ndarray:
-    """How high the line of sight passes that just clears the ground before each sample."""
+    """Returns the height of the lowest line of sight that clears the ground before each sample."""
     size = len(heights)
     y, x = np.mgrid[:size, :size].astype(float)
     dx, dy = x - sensor[0], y - sensor[1]
@@ -94,7 +94,7 @@ def horizon(heights: np.ndarray, sensor: np.ndarray) -> np.ndarray:
 
 
 def shadows(heights: np.ndarray, random: np.random.Generator) -> tuple[np.ndarray, np.ndarray]:
-    """What a sensor does not see, near 15 % of all, and the bounds there."""
+    """Returns a mask of samples that a sensor does not see, some 15 %, and their upper bounds."""
     best = None
     relief = np.ptp(heights)
     for _ in range(12):
@@ -109,14 +109,14 @@ def shadows(heights: np.ndarray, random: np.random.Generator) -> tuple[np.ndarra
 
 
 def enclosed(mask: np.ndarray) -> np.ndarray:
-    """The mask without what touches the edge."""
+    """Returns the mask without parts that touch the edge."""
     labels, _ = scipy.ndimage.label(mask, np.ones((3, 3)))
     edge = np.concatenate([labels[0], labels[-1], labels[:, 0], labels[:, -1]])
     return mask & ~np.isin(labels, edge[edge > 0])
 
 
 def make_mask(kind: str, heights: np.ndarray, random: np.random.Generator):
-    """Which samples are hidden, and the bounds of these or nothing."""
+    """Returns the mask of hidden samples, and their bounds or None."""
     size = len(heights)
     if kind == "shadows":
         mask, bound = shadows(heights, random)
@@ -136,7 +136,7 @@ def make_mask(kind: str, heights: np.ndarray, random: np.random.Generator):
 
 
 def write_grid(path: Path, heights: np.ndarray, cell_m: float = 1) -> None:
-    """An ESRI ASCII grid; NaN becomes a hole."""
+    """Writes an ESRI ASCII grid; NaN becomes a hole."""
     rows, columns = heights.shape
     head = f"ncols {columns}\nnrows {rows}\nxllcorner 0\nyllcorner 0\ncellsize {cell_m}\n"
     with path.open("w") as file:
@@ -152,7 +152,7 @@ def read_tiff(path: Path) -> np.ndarray:
 def by_groundray(
     heights: np.ndarray, mask: np.ndarray, *options: object, bound=None, cell_m: float = 1
 ):
-    """Heights, and their sd (with the method of its own)."""
+    """Returns heights, and their standard deviations for groundray's own method."""
     with tempfile.TemporaryDirectory() as name:
         folder = Path(name)
         write_grid(folder / "in.asc", np.where(mask, np.nan, heights), cell_m)
@@ -170,7 +170,7 @@ def by_groundray(
 
 
 def thin_plate(heights: np.ndarray, mask: np.ndarray) -> np.ndarray:
-    """The least sum of squared second differences, those across twice."""
+    """Minimises the sum of squared second differences, with mixed ones counted twice."""
     rows, columns = heights.shape
     number = np.arange(heights.size).reshape(heights.shape)
     energy = 0
@@ -200,7 +200,7 @@ def radial_basis(heights: np.ndarray, mask: np.ndarray) -> np.ndarray:
     rim = scipy.ndimage.binary_dilation(mask, iterations=6) & ~mask
     base = heights[rim].mean()
     filled = heights.copy()
-    for neighbours in (64, 128, 512):  # so many as do not lie in one line
+    for neighbours in (64, 128, 512):  # until they are not collinear
         try:
             spline = scipy.interpolate.RBFInterpolator(
                 np.argwhere(rim).astype(float), heights[rim] - base, neighbors=neighbours
@@ -213,8 +213,8 @@ def radial_basis(heights: np.ndarray, mask: np.ndarray) -> np.ndarray:
 
 
 def inpaint(heights: np.ndarray, mask: np.ndarray, method: int) -> np.ndarray:
-    """By the OpenCV of Python, which is newer than a system's and treats edges better. Heights as
-    groundray scales them: Telea's way adds up to two grey levels."""
+    """Uses Python's OpenCV, which is newer than the system's and treats edges better. Heights are
+    scaled as in groundray: Telea's method adds up to two grey levels."""
     known = heights[~mask]
     middle, scale = (known.min() + known.max()) / 2, 1e5 / np.ptp(known)
     grey = np.where(mask, 0, (heights - middle) * scale).astype(np.float32)
@@ -236,8 +236,8 @@ PEERS = {
 
 
 def compare(dem: np.ndarray, kind: str, seed: int, peers=PEERS, size: int = 192) -> list[dict]:
-    """One result, or for shadows two: without bounds and with them. Each with sums of squared
-    errors by method, groundray's where the method leaves nothing, errors in stated sds."""
+    """Returns one result, or two for shadows: without and with bounds. Each has sums of squared
+    errors by method, groundray's on the samples that the method fills, and errors in stated sds."""
     random = np.random.default_rng([seed, KINDS.index(kind)])
     heights = cut(dem, random, min(size, *dem.shape))
     mask, bound = make_mask(kind, heights, random)
@@ -250,7 +250,7 @@ def compare(dem: np.ndarray, kind: str, seed: int, peers=PEERS, size: int = 192)
             continue
         filled, sd = by_groundray(heights, mask, bound=most)
         squares, own = {}, {}
-        for peer, z in others.items():  # meshes leave holes whose rims touch themselves
+        for peer, z in others.items():  # meshes skip holes whose boundaries touch themselves
             done = mask & np.isfinite(z)
             squares[peer] = ((z - heights)[done] ** 2).sum()
             own[peer] = ((filled - heights)[done] ** 2).sum()
@@ -268,7 +268,7 @@ def compare(dem: np.ndarray, kind: str, seed: int, peers=PEERS, size: int = 192)
 
 
 def summarise(runs: list[dict]) -> dict:
-    """groundray's RMSE, its share of the others', and its errors in stated sds."""
+    """Returns groundray's RMSE, its ratio to the others', and its errors in stated sds."""
 
     def total(key, peer):
         return sum(run[key][peer] for run in runs)
@@ -287,7 +287,7 @@ def summarise(runs: list[dict]) -> dict:
 
 
 def compare_all(dem: np.ndarray, masks: int, kinds=KINDS) -> dict[str, dict]:
-    """What summarise tells of each kind and, in "gain", what bounds leave of the RMSE."""
+    """Returns summaries by kind and, as "gain", the ratio of RMSEs with and without bounds."""
     found = {}
     for kind in kinds:
         runs = [run for seed in range(masks) for run in compare(dem, kind, seed)]
@@ -305,14 +305,14 @@ def line_of(shares: dict) -> str:
 def main() -> None:
     masks = int(sys.argv[1]) if len(sys.argv) > 1 else 10
     shares: dict[str, list[dict]] = {}
-    print(f"{masks} masks of each kind; RMSE in m, then groundray's share of the others'")
+    print(f"{masks} masks of each kind; RMSE in m, then its ratio to the others'")
     head = "".join(f"{name:>11}" for name in PEERS)
     print(
         f"{'DEM':12}{'kind':10}{'groundray':>10}{head}{'gain':>7}{'z rms':>7}{'1 sd':>6}{'2 sd':>6}"
     )
     for name in [n for n in DEMS if not sys.argv[2:] or re.search("|".join(sys.argv[2:]), n)]:
         if DEMS[name][0] is not None and not DEMS[name][0].exists():
-            print(f"{name:12}is not there: {DEMS[name][0]}; set GROUNDRAY_SHARED_DATA")
+            print(f"{name:12}does not exist: {DEMS[name][0]}; set GROUNDRAY_SHARED_DATA")
             continue
         for kind, found in compare_all(load(name), masks).items():
             shares.setdefault(kind, []).append(found["shares"])

@@ -1,5 +1,5 @@
-// What a second of processor time fuses, with the points' way through the temporary file. Making
-// the points is not counted.
+// Points fused per second of CPU time, including their passage through the temporary file but not
+// their generation.
 #include <benchmark/benchmark.h>
 #include <sys/resource.h>
 
@@ -7,14 +7,15 @@
 #include <cstdint>
 
 #include "reconstruction/dem/dem_frame.h"
-#include "reconstruction/dem/dem_fusion.h"
+#include "reconstruction/dem/fusion/dem_fusion.h"
 #include "test/benchmark/timing.h"
 
 namespace groundray::benchmark {
 namespace {
 
 // Points of 5 scans and 15 stereo pairs over a square of gentle hills, with noise and 1.5 %
-// outliers, block by block. Made by a small generator: Philox would take longer than the fusion.
+// outliers, block by block. Uses a small random generator, since Philox would take longer than the
+// fusion.
 class Survey {
  public:
   Survey(std::uint64_t points, double half_m) : points_(points), half_m_(half_m) {}
@@ -112,7 +113,7 @@ void fuse_survey(::benchmark::State& state) {
   state.counters["peak_MB"] = static_cast<double>(used.ru_maxrss) / 1024;
 }
 BENCHMARK(fuse_survey)
-    ->Args({10, 50})    // 60 points a cell
+    ->Args({10, 50})    // 60 points per cell
     ->Args({10, 125})   // 10
     ->Args({100, 125})  // 100, beyond memory
     ->UseManualTime()

@@ -1,7 +1,7 @@
 #pragma once
 
-#include "core/height_grid.h"
-#include "test/support/sample_terrain.h"
+#include "core/geometry/height_grid.h"
+#include "test/support/terrain/sample_terrain.h"
 
 namespace groundray::benchmark {
 
@@ -11,7 +11,7 @@ inline const HeightGrid& hills() {
   return grid;
 }
 
-/// Returns mountains of 4097 x 4097 samples, 5 m apart: more than caches hold.
+/// Returns mountains of 4097 x 4097 samples, 5 m apart: larger than the caches.
 inline const HeightGrid& mountains() {
   static const HeightGrid grid = testing::fractal(4097, 5, 1500, Seed{12345});
   return grid;

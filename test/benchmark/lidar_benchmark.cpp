@@ -1,5 +1,5 @@
-// What lidars cost: with light against the rays alone, which run in turn in every iteration so that
-// their ratio is of one moment of one machine; and pulses for each second of a processor.
+// Cost of lidars: with simulated light compared with the rays alone, which run alternately in every
+// iteration so that their ratio is measured under the same load; and pulses per second of CPU time.
 #include <benchmark/benchmark.h>
 
 #include <algorithm>
@@ -7,9 +7,9 @@
 #include <cmath>
 #include <glm/geometric.hpp>
 
-#include "sensors/lidar.h"
-#include "sensors/pulse_cast.h"
-#include "sensors/spec_io.h"
+#include "apps/scene/readers/spec_io.h"
+#include "sensors/lidar/beam/pulse_tracer.h"
+#include "sensors/lidar/lidar.h"
 #include "terrain/terrain_scene.h"
 #include "test/benchmark/landscape.h"
 #include "test/benchmark/raw_embree.h"
@@ -26,7 +26,7 @@ Scene lidar_hills() {
   return {RayTracer({full_resolution_level(hills())}, {0, 0, 0}, Tracing::Fast), {}, {soil}};
 }
 
-// Straight on, swaying.
+// A straight, swaying trajectory.
 Trajectory path_at(double height_m, double speed_m_s) {
   const double z_m = *hills().height_m_at({0, 0}) + height_m;
   std::vector<Trajectory::Sample> samples;
@@ -39,20 +39,21 @@ Trajectory path_at(double height_m, double speed_m_s) {
   return Trajectory(std::move(samples));
 }
 
-// A lidar on its way, without light.
+// A lidar, without simulated light, and its trajectory.
 struct Ride {
   LidarSpec spec;
   Trajectory X_DS;
 };
 
-// 120 000 pulses of a spinning lidar on a mast, 20 turns a second, of which 97 % meet the ground.
+// 120 000 pulses of a spinning lidar on a mast, 20 turns per second; 97 % of the pulses hit the
+// ground.
 Ride driven_ride() {
   LidarSpec spec = load_lidar(testing::data_folder() / "sensors/velodyne_vls128.yaml");
   std::get<SpinningPattern>(spec.pattern).rate_hz = 20;
   return {spec, path_at(4, 10)};
 }
 
-// 79 600 pulses of a polygon scanner 800 m above the ground, which all meet it.
+// 79 600 pulses of a polygon scanner 800 m above the ground; all of them hit it.
 Ride flown_ride() {
   LidarSpec spec;
   spec.pattern = LinePattern{.mirror = LinePattern::Mirror::Polygon,
@@ -67,7 +68,7 @@ Ride flown_ride() {
   return {spec, path_at(800, 60)};
 }
 
-// A laser diode and an avalanche photodiode, in clear air: not any vendor's.
+// A laser diode and an avalanche photodiode in clear air; not a particular product.
 LidarSpec with_light(LidarSpec spec, double pulse_energy_j) {
   spec.beam = {.divergence_rad = {3e-3, 1.5e-3}, .sub_rays = 16, .most_sub_rays = 16};
   spec.light = {.wavelength_nm = 905,
@@ -84,13 +85,13 @@ LidarSpec with_light(LidarSpec spec, double pulse_energy_j) {
   return spec;
 }
 
-// The rays of sweep 0 as a lidar casts them.
+// The sub-rays of sweep 0 as a lidar casts them.
 std::vector<Ray> sub_rays_of(const Ride& ride, const Scene& scene) {
   const ScanPattern pattern(ride.spec.pattern);
   const LaserBeam beam(ride.spec.beam);
-  const PulseCast::Settings settings{.beam = beam, .far_m = ride.spec.gate.far_m};
+  const PulseTracer::Settings settings{.beam = beam, .far_m = ride.spec.gate.far_m};
   std::vector<Ray> rays;
-  PulseCast cast;
+  PulseTracer cast;
   const std::int64_t per_cast = 2048 / ride.spec.beam.sub_rays;
   for (std::int64_t begin = 0; begin < pattern.pulses(0); begin += per_cast) {
     const std::int64_t end = std::min(begin + per_cast, pattern.pulses(0));
@@ -100,7 +101,7 @@ std::vector<Ray> sub_rays_of(const Ride& ride, const Scene& scene) {
   return rays;
 }
 
-// Sums up the seconds of a part of each iteration.
+// Sums the time of one part of each iteration, s.
 struct Stopwatch {
   double wall_s = 0, cpu_s = 0;
   template <typename Act>
@@ -115,14 +116,14 @@ struct Stopwatch {
   }
 };
 
-void run(::benchmark::State& state, const Ride& ride, const Scene& world, RawEmbree& raw,
+void run(::benchmark::State& state, const Ride& ride, const Scene& simulation, RawEmbree& raw,
          std::size_t rays) {
   const Lidar lidar(ride.spec, {.visibility_m = 23e3});
   Stopwatch of_raw, of_scan;
   for (auto _ : state) {
     of_raw.time([&] { ::benchmark::DoNotOptimize(raw.trace()); });
     state.SetIterationTime(of_scan.time(
-        [&] { ::benchmark::DoNotOptimize(lidar.scan(world, ride.X_DS, 0, Seed{7}, 0)); }));
+        [&] { ::benchmark::DoNotOptimize(lidar.scan(simulation, ride.X_DS, 0, Seed{7}, 0)); }));
   }
   const double scans = static_cast<double>(state.iterations());
   const double pulses = static_cast<double>(lidar.pattern().pulses(0)) * scans;
@@ -130,26 +131,27 @@ void run(::benchmark::State& state, const Ride& ride, const Scene& world, RawEmb
   state.counters["Mrays/s"] = 1e-6 * static_cast<double>(rays) * scans / of_scan.wall_s;
   state.counters["raw_Mrays/s"] = 1e-6 * static_cast<double>(rays) * scans / of_raw.wall_s;
   state.counters["of_raw"] = of_raw.wall_s / of_scan.wall_s;
-  state.counters["of_raw_cpu"] = of_raw.cpu_s / of_scan.cpu_s;  // whoever else is on the machine
+  state.counters["of_raw_cpu"] =
+      of_raw.cpu_s / of_scan.cpu_s;  // CPU time: independent of other load
 }
 
 bool agree(double a, double b, double tolerance) { return std::abs(a - b) <= tolerance * b; }
 
 void lidar_one_ray(::benchmark::State& state, Ride (*ride_of)()) {
   const Ride ride = ride_of();
-  const Scene world = lidar_hills();
-  const auto rays = sub_rays_of(ride, world);
+  const Scene simulation = lidar_hills();
+  const auto rays = sub_rays_of(ride, simulation);
   RawEmbree raw(hills(), rays);
   const RangeGate gate = ride.spec.gate;
   const double met = static_cast<double>(std::ranges::count_if(
       raw.trace(), [&](float range_m) { return gate.near_m <= range_m && range_m <= gate.far_m; }));
-  const auto rows = Lidar(ride.spec).scan(world, ride.X_DS, 0, Seed{7}, 0).echoes.rows();
-  // Floats alone decide otherwise at silhouettes, and where a hit lies within a float's breadth of
-  // the gate.
+  const auto rows = Lidar(ride.spec).scan(simulation, ride.X_DS, 0, Seed{7}, 0).echoes.rows();
+  // Single precision alone decides differently at silhouettes, and where a hit lies within a
+  // float's precision of the range gate.
   if (!agree(static_cast<double>(rows), met, 1e-4))
     return state.SkipWithError("the scan and raw Embree disagree on how many rays hit");
   state.counters["returns"] = static_cast<double>(rows) / static_cast<double>(rays.size());
-  run(state, ride, world, raw, rays.size());
+  run(state, ride, simulation, raw, rays.size());
 }
 
 BENCHMARK_CAPTURE(lidar_one_ray, driven, driven_ride)
@@ -161,7 +163,7 @@ BENCHMARK_CAPTURE(lidar_one_ray, flown, flown_ride)
     ->Unit(::benchmark::kMillisecond)
     ->MinTime(2);
 
-// How far reported ranges are from the truth, where one surface made the echo.
+// Errors of the reported ranges where a single surface made the echo.
 struct Errors {
   double mean_m = 0, rms_m = 0;
 };
@@ -179,13 +181,12 @@ Errors errors_of(const PointCloud& echoes) {
   return {sum_m / count, std::sqrt(sum_m2 / count)};
 }
 
-// Nearly all echoes here are far above the noise, which hides or makes few and moves their mean by
-// less than 5 mm: its standard deviation of centimetres over the root of 80 000. On a slope the
-// edge that is timed comes before the centroid, by less than a quarter of the pulse as received,
-// 0.2 m.
-const char* scan_fault(const Ride& ride, const Scene& world) {
+// Nearly all echoes here are far above the noise. Noise hides or causes few of them and moves their
+// mean by less than 5 mm: its standard deviation of centimetres over the root of 80 000. On a slope
+// the timed edge precedes the centroid by less than a quarter of the received pulse's width, 0.2 m.
+const char* scan_fault(const Ride& ride, const Scene& simulation) {
   const auto scan = [&](const LidarSpec& spec) {
-    return Lidar(spec).scan(world, ride.X_DS, 0, Seed{7}, 0).echoes;
+    return Lidar(spec).scan(simulation, ride.X_DS, 0, Seed{7}, 0).echoes;
   };
   LidarSpec quiet = ride.spec;
   quiet.light->receiver.threshold_w = 5e-9;
@@ -212,11 +213,11 @@ void lidar_light(::benchmark::State& state, Ride (*ride_of)(), double pulse_ener
   Ride ride = ride_of();
   ride.spec = with_light(ride.spec, pulse_energy_j);
   ride.spec.waveforms = waveforms;
-  const Scene world = lidar_hills();
-  const auto rays = sub_rays_of(ride, world);
+  const Scene simulation = lidar_hills();
+  const auto rays = sub_rays_of(ride, simulation);
   RawEmbree raw(hills(), rays);
-  if (const char* fault = scan_fault(ride, world)) return state.SkipWithError(fault);
-  run(state, ride, world, raw, rays.size());
+  if (const char* fault = scan_fault(ride, simulation)) return state.SkipWithError(fault);
+  run(state, ride, simulation, raw, rays.size());
 }
 using WaveformOutput = LidarSpec::WaveformOutput;
 BENCHMARK_CAPTURE(lidar_light, driven, driven_ride, 100e-9, WaveformOutput::Omit)

@@ -1,6 +1,6 @@
-"""Lays copies of a raster side by side as one virtual raster, to have a DEM larger than memory.
+"""Tiles copies of a raster into one virtual raster, for a DEM larger than memory.
 
-For the one of 65,536 x 65,536 samples that docs/accuracy.md quotes:
+For the DEM of 65,536 x 65,536 samples in docs/accuracy.md:
 
     gdalwarp -t_srs '+proj=tmerc +lat_0=30 +lon_0=16 +R=1737400 +units=m +no_defs' \
         -te -400000 -400000 400000 400000 -ts 8192 8192 -r bilinear -ot Int16 \

@@ -1,6 +1,6 @@
-// groundray_mesh_error FOLDER NAME...: what test/support/mesh_oracle.h says of meshes that other
-// programs left in FOLDER, or for a number of metres instead of a name, of groundray's mesh of that
-// tolerance; one line of JSON for each.
+// groundray_mesh_error FOLDER NAME...: prints the measures of test/support/terrain/mesh_oracle.h,
+// one line of JSON each, for meshes that other programs left in FOLDER. A number of metres instead
+// of a name selects groundray's own mesh of that tolerance.
 //
 //   size.txt             columns and rows of samples
 //   heights.f32          heights, row by row
@@ -18,8 +18,8 @@
 #include <vector>
 
 #include "terrain/terrain_mesh.h"
-#include "test/support/mesh_oracle.h"
-#include "test/support/mesh_topology.h"
+#include "test/support/scans/mesh_topology.h"
+#include "test/support/terrain/mesh_oracle.h"
 
 namespace groundray::benchmark {
 namespace {

@@ -1,22 +1,22 @@
-// What objects cost: a million plants to build and to hold, lidar rays among them against the bare
-// ground, and leaves cut out by alpha against the same leaves whole. What is compared runs in turn
-// in every iteration, so that ratios are of one moment of one machine.
+// Cost of objects: build time and memory of a million plants, lidar rays among them compared with
+// the bare ground, and alpha-cut leaves compared with opaque ones. Compared variants run
+// alternately in every iteration, so that their ratio is measured under the same load.
 #include <benchmark/benchmark.h>
 
 #include <algorithm>
 #include <chrono>
 #include <cmath>
 
-#include "core/scene.h"
-#include "sensors/lidar.h"
-#include "sensors/pulse_cast.h"
-#include "sensors/spec_io.h"
-#include "terrain/asset.h"
-#include "terrain/scatter.h"
+#include "apps/scene/readers/spec_io.h"
+#include "core/tracing/scene.h"
+#include "sensors/lidar/beam/pulse_tracer.h"
+#include "sensors/lidar/lidar.h"
+#include "terrain/assets/asset.h"
+#include "terrain/scatter/scatter.h"
 #include "terrain/terrain_scene.h"
 #include "test/benchmark/timing.h"
-#include "test/support/sample_terrain.h"
 #include "test/support/temporary_folder.h"
+#include "test/support/terrain/sample_terrain.h"
 
 namespace groundray::benchmark {
 namespace {
@@ -47,20 +47,20 @@ Scene planted_scene(Model model, std::vector<PlacedObject> objects) {
           {{2, std::vector<std::uint16_t>(surfaces)}}};
 }
 
-// The rays of a sweep of a VLS-128 two metres above the ground.
-std::vector<Ray> sweep_rays(const Scene& world) {
+// The rays of one sweep of a VLS-128 two metres above the ground.
+std::vector<Ray> sweep_rays(const Scene& simulation) {
   const LidarSpec spec = load_lidar(testing::data_folder() / "sensors/velodyne_vls128.yaml");
   const ScanPattern pattern(spec.pattern);
   const LaserBeam beam(spec.beam);
   const Pose X_DS{{1, 0, 0, 0}, {0, 0, *planted_ground().height_m_at({0, 0}) + 2}};
   const Trajectory path({{0s, X_DS}, {1s, X_DS}});
-  PulseCast cast;
+  PulseTracer cast;
   cast.cast({pattern, path}, 0, pattern.pulses(0), {.beam = beam, .far_m = spec.gate.far_m}, {},
-            world);
+            simulation);
   return {cast.all_rays().begin(), cast.all_rays().end()};
 }
 
-// Seconds of a processor that tracing takes on one thread.
+// CPU time of tracing on one thread, s.
 template <typename Trace>
 double tracing_s(const Trace& trace, std::span<const Ray> rays, std::vector<Hit>& hits) {
   hits.resize(rays.size());
@@ -69,7 +69,7 @@ double tracing_s(const Trace& trace, std::span<const Ray> rays, std::vector<Hit>
   return processor_s() - begin_s;
 }
 
-// What the issue of a lidar scene is: a plant of about 2,000 triangles on each square metre.
+// The design case of a lidar scene: one plant of about 2,000 triangles per square metre.
 void objects_build(::benchmark::State& state) {
   const auto objects = plants(0.95);
   for (auto _ : state) {
@@ -89,13 +89,14 @@ void objects_build(::benchmark::State& state) {
 BENCHMARK(objects_build)->UseManualTime()->Iterations(1)->Unit(::benchmark::kMillisecond);
 
 void objects_among(::benchmark::State& state, AssetKind kind, double per_m2) {
-  const Scene world = planted_scene(make_asset({.kind = kind}), plants(per_m2));
-  const auto rays = sweep_rays(world);
+  const Scene simulation = planted_scene(make_asset({.kind = kind}), plants(per_m2));
+  const auto rays = sweep_rays(simulation);
   std::vector<Hit> hits, bare;
   double with_s = 0, without_s = 0;
   for (auto _ : state) {
-    with_s += tracing_s([&](auto of, auto& into) { world.trace(of, into); }, rays, hits);
-    without_s += tracing_s([&](auto of, auto& into) { world.rays.trace(of, into); }, rays, bare);
+    with_s += tracing_s([&](auto of, auto& into) { simulation.trace(of, into); }, rays, hits);
+    without_s +=
+        tracing_s([&](auto of, auto& into) { simulation.rays.trace(of, into); }, rays, bare);
   }
   for (std::size_t i = 0; i < rays.size(); ++i) {
     if (hits[i].range_m > bare[i].range_m)

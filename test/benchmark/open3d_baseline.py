@@ -1,4 +1,4 @@
-"""How a whole scan of groundray compares with the rays alone in Open3D's RaycastingScene.
+"""Compares a complete scan of groundray with the rays alone in Open3D's RaycastingScene.
 
 Both trace the rays of one VLS-128 over one surface of 4097 x 4097 samples: triangles, in Open3D.
 Run by `./dev bench open3d`; needs about 8 GB.
@@ -18,7 +18,7 @@ PROGRAM = Path(__file__).resolve().parents[2] / "build/release/bin/groundray_ben
 
 
 def groundray_mrays_s(folder: Path) -> float:
-    """Million rays a second of a scan, end to end; leaves the case in `folder`."""
+    """Returns million rays per second of a scan, end to end; writes the case to `folder`."""
     run = subprocess.run(
         [PROGRAM, "--benchmark_filter=scan_vls128/typical", "--benchmark_format=json"],
         env={**os.environ, "GROUNDRAY_BENCH_EXPORT": str(folder)},
@@ -61,7 +61,7 @@ def main() -> None:
             best = min(best, time.perf_counter() - begin)
         theirs = 1e-6 * len(rays) / best
         ours.append(groundray_mrays_s(folder))
-    print(f"groundray, whole scan   {ours[0]:6.2f} and {ours[1]:6.2f} Mrays/s (before and after)")
+    print(f"groundray, full scan    {ours[0]:6.2f} and {ours[1]:6.2f} Mrays/s (before and after)")
     print(f"Open3D, rays alone      {theirs:6.2f} Mrays/s (best of 10)")
     print(f"ratio                   {min(ours) / theirs:6.2f} to {max(ours) / theirs:.2f}")
 

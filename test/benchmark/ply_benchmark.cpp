@@ -2,9 +2,9 @@
 
 #include <filesystem>
 
-#include "core/ply_io.h"
-#include "sensors/lidar.h"
-#include "sensors/spec_io.h"
+#include "apps/scene/readers/spec_io.h"
+#include "core/io/ply_io.h"
+#include "sensors/lidar/lidar.h"
 #include "terrain/terrain_scene.h"
 #include "test/support/temporary_folder.h"
 
@@ -13,7 +13,7 @@ namespace {
 
 using namespace std::chrono_literals;
 
-// A real scan's columns: flat ground seen by 128 beams.
+// The columns of a real scan: flat ground seen by 128 beams.
 void write_scan(::benchmark::State& state) {
   const HeightGrid flat({2, 2}, {-2000, -2000}, {4000, 4000}, {0, 0, 0, 0});
   const Scene scene{RayTracer({full_resolution_level(flat)}, {0, 0, 0}, Tracing::Fast), {}};

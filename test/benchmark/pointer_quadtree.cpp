@@ -6,7 +6,7 @@
 #include <memory>
 #include <unordered_map>
 
-#include "terrain/lattice.h"
+#include "terrain/lod/lattice.h"
 
 namespace groundray::benchmark {
 namespace {
@@ -27,7 +27,7 @@ std::size_t child_at(glm::ivec2 place) {
   return static_cast<std::size_t>(index);
 }
 
-// The node beyond a side, as large or larger; null where the DEM ends.
+// Neighbour of equal or larger size across a side; null at the DEM's boundary.
 Node* neighbour(const Node& node, Side side) {
   if (node.parent == nullptr) return nullptr;
   const bool vertical = side == North || side == South;
@@ -65,7 +65,7 @@ class Mesher {
         static_cast<std::size_t>(node.place.x);
     if (!(static_cast<double>(level.key_m[index]) > tolerance_m_)) return;
     if (node.level == 0) {
-      // It exceeds the bound if thinned: no neighbour may be coarser.
+      // The node exceeds the bound if thinned, so no neighbour may be coarser.
       split_coarser_neighbours(node);
     } else {
       split(node);
@@ -114,9 +114,10 @@ class Mesher {
     glm::ivec2 first{0};  // cell of the level
     glm::ivec2 cells{0};
     std::array<bool, 4> thinned{};
-    int last = 0;  // cell along a side of a whole block
+    int last = 0;  // cells along a side of a whole block
 
-    // A point of the block that the coarser neighbour lacks. An odd one at the end is the DEM's.
+    // True for a point of the block that the coarser neighbour lacks. An odd last point lies on the
+    // DEM's boundary and stays.
     bool dropped(glm::ivec2 p) const {
       const bool odd_column = p.x % 2 == 1 && p.x < cells.x;
       const bool odd_row = p.y % 2 == 1 && p.y < cells.y;
@@ -148,7 +149,7 @@ class Mesher {
     emit_borders(block);
   }
 
-  // Both halves of a cell, but those at a dropped point.
+  // Emits both halves of a cell, except those at a dropped point.
   void emit_cell(const Block& block, glm::ivec2 c) {
     const glm::ivec2 east = c + glm::ivec2(1, 0);
     const glm::ivec2 south = c + glm::ivec2(0, 1);
@@ -162,7 +163,8 @@ class Mesher {
     }
   }
 
-  // Where a point is dropped, one triangle from the border's even points to the point inside.
+  // At each dropped point, emits one triangle from the boundary's even points to the interior
+  // point.
   void emit_borders(const Block& block) {
     for (int i = 1; i < block.cells.x; i += 2) {
       if (block.thinned[North]) emit(block, {{{i - 1, 0}, {i + 1, 0}, {i, 1}}});

@@ -6,7 +6,7 @@
 #include <algorithm>
 #include <limits>
 
-#include "core/embree_adapter.h"
+#include "core/tracing/embree_adapter.h"
 
 namespace groundray::benchmark {
 

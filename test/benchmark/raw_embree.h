@@ -5,13 +5,14 @@
 #include <span>
 #include <vector>
 
-#include "core/height_grid.h"
-#include "core/ray_tracer.h"
+#include "core/geometry/height_grid.h"
+#include "core/tracing/ray_tracer.h"
 
 namespace groundray::benchmark {
 
-/// The limit to compare with: the surface as one Embree grid scene, robust, traced in native
-/// packets that were filled beforehand, on all threads, nothing but the float distance kept.
+/// Upper limit of the achievable speed: the surface as one robust Embree grid scene, traced on all
+/// threads in native packets that were filled beforehand; only the single-precision distance is
+/// kept.
 class RawEmbree {
  public:
   RawEmbree(const HeightGrid& grid, std::span<const Ray> rays);
@@ -19,7 +20,7 @@ class RawEmbree {
   RawEmbree(const RawEmbree&) = delete;
   RawEmbree& operator=(const RawEmbree&) = delete;
 
-  /// Traces all rays and returns their float ranges, infinite for none.
+  /// Traces all rays and returns their single-precision ranges, infinite for misses.
   std::span<const float> trace();
 
  private:

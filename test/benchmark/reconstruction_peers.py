@@ -1,11 +1,11 @@
-"""How meshes from simulated scans compare with other people's, in accuracy and CPU time.
+"""Compares meshes from simulated scans with other software, in accuracy and CPU time.
 
 A known scene (fractal ground, boulders, trunks) is scanned from 1, 3 and 10 poses with 2 cm of
-noise and built anew from the same points by groundray, by CGAL's advancing front (perimeter at most
-3 m) and by Open3D's ball pivoting, which is given the true normals for nothing. Precision is the
-share of the mesh's area within 10 cm of the truth, completeness the share of the truth that could
-be seen from within 25 m that is within 10 cm of the mesh. Times are of the process, all threads.
-Run by `./dev bench reconstruction`; arguments: how many seeds, numbers of poses.
+noise and reconstructed from the same points by groundray, by CGAL's advancing front (perimeter at
+most 3 m) and by Open3D's ball pivoting, which is given the true normals. Precision is the share of
+the mesh's area within 10 cm of the truth, completeness the share of the truth visible from within
+25 m that is within 10 cm of the mesh. Times are of the process, all threads.
+Run by `./dev bench reconstruction`; arguments: number of seeds, numbers of poses.
 """
 
 import json
@@ -34,7 +34,7 @@ def closed_loop(*arguments: object) -> dict:
 
 
 def ball_pivoting(folder: Path) -> float:
-    """CPU seconds; leaves the mesh in `folder`."""
+    """Returns CPU seconds; writes the mesh to `folder`."""
     cloud = o3d.io.read_point_cloud(str(folder / "points.ply"))
     assert cloud.has_normals()
     begin = time.process_time()
@@ -47,7 +47,7 @@ def ball_pivoting(folder: Path) -> float:
 
 
 def compare(seed: int, poses: int, rings: int = 64, columns: int = 1800) -> dict[str, dict]:
-    """Of each method: triangles, cpu_s, precision, completeness, f1."""
+    """Returns triangles, cpu_s, precision, completeness and f1 of each method."""
     with tempfile.TemporaryDirectory() as name:
         folder = Path(name)
         found = closed_loop("rebuild", folder, seed, poses, rings, columns)
@@ -87,7 +87,7 @@ def main() -> None:
             wins = sum(run["groundray"]["f1"] >= run[method]["f1"] for run in runs)
             share = max(run["groundray"]["cpu_s"] / run[method]["cpu_s"] for run in runs)
             print(
-                f"  groundray's F1 is no less than {METHODS[method]}'s in {wins} of {seeds} scenes,"
+                f"  groundray's F1 is at least {METHODS[method]}'s in {wins} of {seeds} scenes,"
                 f" at {share:.3f} of its CPU time at most"
             )
 

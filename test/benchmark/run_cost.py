@@ -1,9 +1,9 @@
-"""What writing costs a run, and whether its memory grows: data/scenes/offroad_trail.yaml, long.
+"""Measures a run's time for writing and its memory: data/scenes/offroad_trail.yaml, prolonged.
 
-The trail with its VLP-16 alone, pulses of 16 sub-rays, noise, every column and the picture of each
-scan, run for 10 and for 100 frames. "writing" is the processor's time of the thread that writes, as
-a share of all of the run's: what a run would gain without it, if its other threads kept all cores
-busy. Run by `./dev bench run`; arguments: numbers of frames.
+The trail with only its VLP-16, pulses of 16 sub-rays, noise, every column and the picture of each
+scan, run for 10 and for 100 frames. "writing" is the CPU time of the writing thread as a share of
+the run's: the gain without it if the other threads kept all cores busy. Run by `./dev bench run`;
+arguments: numbers of frames.
 """
 
 import json
@@ -41,7 +41,7 @@ lidars:
 
 
 def long_trail(folder: Path, frames: int) -> Path:
-    """The scene of so many frames, in which the vehicles go as slowly as that takes."""
+    """Writes a scene of this many frames, with vehicles slowed down accordingly."""
     text = (ROOT / "data/scenes/offroad_trail.yaml").read_text().split("lidars:")[0]
     text = text.replace("../terrain", str(ROOT / "data/terrain"))
     text = text.replace("duration_s: 1", f"duration_s: {frames / 10 + 0.05}")

@@ -1,5 +1,5 @@
-// What a whole scan costs against the rays alone. Both run in turn in every iteration, so that
-// their ratio is of one moment of one machine.
+// Cost of a whole scan compared with the rays alone. Both run alternately in every iteration, so
+// that their ratio is measured under the same load.
 #include <benchmark/benchmark.h>
 
 #include <chrono>
@@ -10,8 +10,8 @@
 #include <glm/geometric.hpp>
 #include <glm/gtc/quaternion.hpp>
 
-#include "sensors/lidar.h"
-#include "sensors/spec_io.h"
+#include "apps/scene/readers/spec_io.h"
+#include "sensors/lidar/lidar.h"
 #include "terrain/terrain_scene.h"
 #include "test/benchmark/landscape.h"
 #include "test/benchmark/raw_embree.h"
@@ -23,13 +23,13 @@ namespace {
 
 using namespace std::chrono_literals;
 
-// Where the share of pulses that return is the median of 100 random places on this ground, 60 %,
-// and where it is the lowest, 18 %: rays that miss are cheap for Embree, and cost the scan as much
+// Positions with the median (60 %) and the lowest (18 %) fraction of returned pulses among 100
+// random positions on this ground. Rays that miss are cheap for Embree, but cost the scan as much
 // as others.
 constexpr glm::dvec2 typical_place(5000, -1000);
 constexpr glm::dvec2 ridge(0, 0);
 
-// 10 m/s, swaying.
+// A swaying trajectory at 10 m/s.
 Trajectory ride_from(const glm::dvec2& start) {
   std::vector<Trajectory::Sample> samples;
   for (int k = 0; k <= 100; ++k) {
@@ -48,8 +48,8 @@ Scene bare_mountains(Tracing tracing) {
 
 LidarSpec vls128() { return load_lidar(testing::data_folder() / "sensors/velodyne_vls128.yaml"); }
 
-// The rays of one sweep, beam by beam in blocks of 32 firing sequences: the order that suits
-// packets best.
+// The rays of one sweep, beam by beam in blocks of 32 firing sequences: the most coherent order for
+// packets.
 std::vector<Ray> rays_of_sweep(const ScanPattern& pattern, const Trajectory& ride, double far_m) {
   PulseBatch pulses;
   pattern.fill(0, 0, pattern.pulses(0), pulses);
@@ -73,8 +73,8 @@ std::vector<Ray> rays_of_sweep(const ScanPattern& pattern, const Trajectory& rid
   return rays;
 }
 
-// For other programs to trace the same rays over the same samples: raw doubles and floats, see
-// open3d_baseline.py.
+// Writes the rays and samples as raw doubles and floats, so that other programs can trace the same
+// input; see open3d_baseline.py.
 void export_rays(const std::filesystem::path& folder, std::span<const Ray> rays) {
   std::filesystem::create_directories(folder);
   std::ofstream samples(folder / "heights.f32", std::ios::binary);
@@ -97,16 +97,16 @@ void scan_vls128(::benchmark::State& state, const glm::dvec2& place) {
   const Trajectory ride = ride_from(place);
   const LidarSpec spec = vls128();
   const Lidar lidar(spec);
-  const Scene world = bare_mountains(Tracing::Fast);
+  const Scene simulation = bare_mountains(Tracing::Fast);
   const auto rays = rays_of_sweep(lidar.pattern(), ride, spec.gate.far_m);
   if (const char* folder = std::getenv("GROUNDRAY_BENCH_EXPORT")) export_rays(folder, rays);
   RawEmbree raw(mountains(), rays);
 
   std::size_t met = 0;
   for (const float range_m : raw.trace()) met += range_m < spec.gate.far_m ? 1 : 0;
-  const std::size_t rows = lidar.scan(world, ride, 0, Seed{7}, 0).echoes.rows();
-  // Floats alone decide otherwise at silhouettes, and where a hit lies within a float's breadth of
-  // the gate.
+  const std::size_t rows = lidar.scan(simulation, ride, 0, Seed{7}, 0).echoes.rows();
+  // Single precision alone decides differently at silhouettes, and where a hit lies within a
+  // float's precision of the range gate.
   if (std::abs(static_cast<double>(met) - static_cast<double>(rows)) >
       1e-4 * static_cast<double>(rows)) {
     return state.SkipWithError("the scan and raw Embree disagree on how many rays hit");
@@ -117,7 +117,7 @@ void scan_vls128(::benchmark::State& state, const glm::dvec2& place) {
     ::benchmark::DoNotOptimize(raw.trace());
     raw_s += seconds_since(begin);
     begin = Clock::now();
-    ::benchmark::DoNotOptimize(lidar.scan(world, ride, 0, Seed{7}, 0));
+    ::benchmark::DoNotOptimize(lidar.scan(simulation, ride, 0, Seed{7}, 0));
     const double this_s = seconds_since(begin);
     scan_s += this_s;
     state.SetIterationTime(this_s);

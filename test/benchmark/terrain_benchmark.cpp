@@ -1,4 +1,4 @@
-// From heights to a mesh: CPU time of all threads, memory, and what a textbook quadtree takes.
+// From heights to a mesh: CPU time of all threads, memory, and the cost of a textbook quadtree.
 #include <benchmark/benchmark.h>
 #include <malloc.h>
 
@@ -11,20 +11,20 @@
 #include <string>
 #include <vector>
 
-#include "terrain/deviation.h"
+#include "terrain/lod/deviation.h"
 #include "terrain/terrain_mesh.h"
 #include "test/benchmark/landscape.h"
 #include "test/benchmark/pointer_quadtree.h"
 #include "test/benchmark/timing.h"
-#include "test/support/mesh_oracle.h"
-#include "test/support/mesh_topology.h"
+#include "test/support/scans/mesh_topology.h"
+#include "test/support/terrain/mesh_oracle.h"
 
 namespace groundray::benchmark {
 namespace {
 
 constexpr int block_cells = 2;
 
-// The most memory that the process has held since `forget_peak`, bytes.
+// Peak memory of the process since `forget_peak`, bytes.
 void forget_peak() {
   malloc_trim(0);
   std::ofstream("/proc/self/clear_refs") << "5";
@@ -37,7 +37,7 @@ double peak_bytes() {
   return 0;
 }
 
-// For other programs to mesh the same samples: see terrain_peers.py.
+// Writes the samples so that other programs can mesh the same heights; see terrain_peers.py.
 void export_heights(const std::filesystem::path& folder) {
   std::filesystem::create_directories(folder);
   std::ofstream(folder / "size.txt") << mountains().columns() << ' ' << mountains().rows() << '\n';
@@ -47,7 +47,7 @@ void export_heights(const std::filesystem::path& folder) {
              static_cast<std::streamsize>(heights_m.size_bytes()));
 }
 
-// The whole way: certify every node, select, balance, emit.
+// The whole pipeline: certify every node, select, balance, emit.
 void terrain_mesh(::benchmark::State& state) {
   if (const char* folder = std::getenv("GROUNDRAY_BENCH_EXPORT")) export_heights(folder);
   const MeshBound bound{.tolerance_m = static_cast<double>(state.range(0))};
@@ -70,7 +70,7 @@ void terrain_mesh(::benchmark::State& state) {
     state.SetIterationTime(processor_s() - begin_s);
     bytes = std::max(bytes, peak_bytes());
   }
-  state.counters["peak_MB"] = 1e-6 * bytes;  // with the 67 MB of heights, and the program itself
+  state.counters["peak_MB"] = 1e-6 * bytes;  // includes the 67 MB of heights and the program itself
 }
 BENCHMARK(terrain_mesh)
     ->ArgName("tolerance_m")
@@ -80,7 +80,7 @@ BENCHMARK(terrain_mesh)
     ->Unit(::benchmark::kMillisecond)
     ->Iterations(5);
 
-// Triangles as a sorted list of the samples at their corners, the least first.
+// Each triangle as the samples at its corners, the least first; the list is sorted.
 std::vector<std::array<std::int64_t, 3>> sorted_triangles(const TerrainMesh& mesh) {
   std::vector<std::array<std::int64_t, 3>> triangles;
   for (const glm::uvec3& t : mesh.triangles) {
@@ -96,7 +96,7 @@ std::vector<std::array<std::int64_t, 3>> sorted_triangles(const TerrainMesh& mes
   return triangles;
 }
 
-// Counts the passes that are run, and notes when the one after the first `skipped` begins.
+// Counts the passes that are run, and notes the start of the first one after `skipped`.
 struct PassClock {
   std::size_t skipped = 0;
   std::size_t passes = 0;
@@ -110,9 +110,9 @@ struct PassClock {
   }
 };
 
-// Selection, balance and emission alone, both from the same keys: of ours, what comes after the
-// passes of `certify`. Both run in turn in every iteration, so that their ratio is of one moment of
-// one machine.
+// Selection, balancing and emission alone, both from the same keys: for groundray, the passes after
+// those of `certify`. Both run alternately in every iteration, so that their ratio is measured
+// under the same load.
 void terrain_against_pointer_quadtree(::benchmark::State& state) {
   const auto tolerance_m = static_cast<double>(state.range(0));
   PassClock certifying;

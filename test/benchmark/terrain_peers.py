@@ -1,11 +1,11 @@
-"""The terrain mesh beside those of pydelatin and pymartini, of the same 4097 x 4097 samples.
+"""Compares terrain meshes with those of pydelatin and pymartini, on the same 4097 x 4097 samples.
 
-All are asked for a largest error of 5 m. What each mesh really keeps is measured by one oracle,
-exactly: every triangle against the surface of groundray's definition, at samples and wherever
-edges cross. Then the peers' tolerances are searched for the coarsest mesh that truly keeps 5 m.
+All have a tolerance of 5 m. The true error of each mesh is measured exactly by one oracle:
+every triangle against the surface of groundray's definition, at samples and wherever
+edges cross. Then the peers' tolerances are searched for the coarsest mesh within 5 m.
 
 pydelatin is the algorithm of hmm (greedy insertion into a Delaunay triangulation), which is in no
-package registry itself; pymartini is Martini's (right-triangulated irregular network).
+package registry; pymartini is Martini's (right-triangulated irregular network).
 Run by `./dev bench terrain`.
 """
 
@@ -49,10 +49,10 @@ def cpu_s() -> float:
 
 
 def mesh_here(peer: str, tolerance_m: float) -> None:
-    """Makes a mesh in this process, which is there for it alone, and prints what that took."""
+    """Makes a mesh in its own process, and prints time and memory."""
     columns, rows = map(int, (FOLDER / "size.txt").read_text().split())
     heights = np.fromfile(FOLDER / "heights.f32", np.float32).reshape(rows, columns)
-    PEERS[peer](heights[:5, :5], tolerance_m)  # what the first call loads is no work on the mesh
+    PEERS[peer](heights[:5, :5], tolerance_m)  # excludes the loading in the first call
     begin_s = cpu_s()
     vertices, triangles = PEERS[peer](heights, tolerance_m)
     took_s = cpu_s() - begin_s
@@ -92,9 +92,9 @@ def our_mesh() -> dict:
 
 
 def coarsest_that_keeps(peer: str, tolerance_m: float) -> dict | None:
-    """Bisects the peer's tolerance for a mesh that just keeps `tolerance_m`.
+    """Bisects the peer's tolerance for the coarsest mesh within `tolerance_m`.
 
-    What it truly keeps goes up and down with what is asked, so there may be a coarser one.
+    The true error is not monotonic in the tolerance, so there may be a coarser one.
     """
     best = None
     low, high = tolerance_m / 64, tolerance_m
@@ -118,7 +118,7 @@ def show(name: str, row: dict) -> None:
 
 
 def show_at_equal_error(row: dict) -> None:
-    """groundray keeps what it is asked for, so it is asked for what the peer truly keeps."""
+    """Compares with groundray at the peer's true error, since groundray keeps its tolerance."""
     ours = judged(str(row["largest_m"]))
     print(
         f"{'':>37} {ours['triangles']:11,}{ours['largest_m']:10.3f} m{ours['rms_m']:8.3f} m"
@@ -129,7 +129,7 @@ def show_at_equal_error(row: dict) -> None:
 
 def main() -> None:
     print(
-        f"{'':17}{'asked':>10}{'CPU':>10}{'peak':>10}{'triangles':>12}{'true error':>12}{'RMS':>10}"
+        f"{'':17}{'bound':>10}{'CPU':>10}{'peak':>10}{'triangles':>12}{'true error':>12}{'RMS':>10}"
     )
     ours = our_mesh()
     show("groundray", ours)
@@ -139,11 +139,11 @@ def main() -> None:
         show(f"{peer} {version(peer)}", row)
         show_at_equal_error(row)
         cpu_ratios.append(f"{ours['cpu_s'] / row['cpu_s']:.2f} x {peer}'s")
-    print(f"\nAsked for less, until what they truly keep is {TOLERANCE_M} m:")
+    print(f"\nWith smaller tolerances, for a true error of {TOLERANCE_M} m:")
     for peer in PEERS:
         found = coarsest_that_keeps(peer, TOLERANCE_M)
         if found is None:
-            print(f"{peer}: not for any tolerance above a 64th of that")
+            print(f"{peer}: for no tolerance above a 64th of that")
             continue
         show(f"{peer} {version(peer)}", found)
         show_at_equal_error(found)

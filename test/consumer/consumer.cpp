@@ -1,9 +1,9 @@
-// Uses something of each library, through the installed headers alone.
-#include <groundray/core/pose.h>
-#include <groundray/core/ray_tracer.h>
-#include <groundray/reconstruction/accuracy/accuracy.h>
-#include <groundray/reconstruction/simplify/lindstrom_turk.h>
-#include <groundray/sensors/scan_pattern.h>
+// Uses a part of each library through the installed headers alone.
+#include <groundray/core/geometry/pose.h>
+#include <groundray/core/tracing/ray_tracer.h>
+#include <groundray/reconstruction/mesh/accuracy/accuracy.h>
+#include <groundray/reconstruction/mesh/simplify/lindstrom_turk.h>
+#include <groundray/sensors/lidar/pattern/scan_pattern.h>
 #include <groundray/terrain/terrain_scene.h>
 
 #include <chrono>

@@ -33,7 +33,7 @@ std::string text_of(std::FILE* file) {
   return text;
 }
 
-/// A terminal that keeps what is drawn on it.
+/// A terminal that records its output.
 class Terminal {
  public:
   Terminal() : screen_(posix_openpt(O_RDWR | O_NOCTTY)) {
@@ -45,7 +45,7 @@ class Terminal {
   Terminal(const Terminal&) = delete;
   Terminal& operator=(const Terminal&) = delete;
   std::FILE* file() const { return file_.get(); }
-  /// All that was drawn; the kernel may hand it over in pieces, a little later.
+  /// Everything written so far; the kernel may deliver it in pieces, a little later.
   std::string text() const {
     std::string text;
     std::array<char, 4096> piece;
@@ -68,7 +68,7 @@ void work(Progress& progress, std::chrono::milliseconds duration) {
   while (std::chrono::steady_clock::now() < end) progress.update(3);
 }
 
-TEST(Progress, SaysInAFileOnlyThatShortWorkIsDone) {
+TEST(Progress, WritesOnlyTheFinalLineOfShortWorkToAFile) {
   const File file(std::tmpfile());
   {
     Progress progress(file.get(), "scans", 10);
@@ -100,10 +100,10 @@ TEST(Progress, RedrawsATerminalAtMostTenTimesASecond) {
        at = text.find("\rscans", at + 1))
     ++lines;
   EXPECT_GE(lines, 3u);
-  EXPECT_LE(lines, 1u + 5u + 1u);  // the first, one each 100 ms, the last
+  EXPECT_LE(lines, 1u + 5u + 1u);  // the first, one per 100 ms, the last
 }
 
-TEST(Progress, CoversALongerLineWithBlanks) {
+TEST(Progress, PadsAShorterLineWithBlanks) {
   const Terminal terminal;
   if (terminal.file() == nullptr) GTEST_SKIP() << "there are no pseudo terminals here";
   {
@@ -114,7 +114,7 @@ TEST(Progress, CoversALongerLineWithBlanks) {
   const std::string text = terminal.text();
   const std::size_t last = text.rfind("\rscans");
   const std::size_t before = text.rfind("\rscans", last - 1);
-  EXPECT_EQ(text.size() - last - 2, last - before);  // but for the line's end, CR LF
+  EXPECT_EQ(text.size() - last - 2, last - before);  // except for the line end, CR LF
 }
 
 TEST(Progress, EndsTheLineOfWorkThatStopsEarly) {
@@ -124,14 +124,14 @@ TEST(Progress, EndsTheLineOfWorkThatStopsEarly) {
   EXPECT_EQ(terminal.text(), "\rscans 0/10\r\n");
 }
 
-TEST(Progress, OutlivesAFullDisk) {
+TEST(Progress, SurvivesAFullDisk) {
   const File file(std::fopen("/dev/full", "w"));
   ASSERT_NE(file, nullptr);
   Progress progress(file.get(), "scans", 1);
   EXPECT_NO_THROW(progress.update(1));
 }
 
-TEST(DurationText, ReadsAsPeopleWriteIt) {
+TEST(DurationText, UsesReadableUnits) {
   EXPECT_EQ(duration_text(0s), "0.0 s");
   EXPECT_EQ(duration_text(400ms), "0.4 s");
   EXPECT_EQ(duration_text(949ms), "0.9 s");

@@ -10,8 +10,9 @@
 namespace groundray::quantile_test {
 namespace {
 
-// By counting: so many do not exceed it, and of the next smaller one too few are there.
-TEST(Quantile, IsTheSmallestThatAShareDoesNotExceed) {
+// Oracle by counting: enough values do not exceed the quantile, and too few do not exceed the next
+// smaller value.
+TEST(Quantile, IsTheSmallestValueThatCoversTheFraction) {
   std::mt19937 random(3);
   for (int count = 1; count <= 400; ++count) {
     std::vector<double> values(static_cast<std::size_t>(count));
@@ -26,7 +27,7 @@ TEST(Quantile, IsTheSmallestThatAShareDoesNotExceed) {
   EXPECT_TRUE(std::isnan(quantile({}, 0.5)));
 }
 
-TEST(Quantile, OfAHalfMayLieBetweenTwo) {
+TEST(Quantile, MedianOfAnEvenCountIsTheMeanOfTheMiddleTwo) {
   EXPECT_EQ(median({3}), 3);
   EXPECT_EQ(median({4, 1}), 2.5);
   EXPECT_EQ(median({9, 1, 4}), 4);
@@ -34,8 +35,8 @@ TEST(Quantile, OfAHalfMayLieBetweenTwo) {
   EXPECT_TRUE(std::isnan(median({})));
 }
 
-TEST(Quantile, OfDistancesToTheMedianIsTheNmad) {
-  EXPECT_DOUBLE_EQ(nmad({1, 2, 4, 8, 100}), 1.4826 * 3);  // of 3, 2, 0, 4 and 96
+TEST(Quantile, NmadIsTheScaledMedianDistanceToTheMedian) {
+  EXPECT_DOUBLE_EQ(nmad({1, 2, 4, 8, 100}), 1.4826 * 3);  // median of 3, 2, 0, 4 and 96
   EXPECT_TRUE(std::isnan(nmad({})));
 }
 

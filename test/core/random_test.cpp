@@ -11,7 +11,7 @@ namespace groundray::random_test {
 namespace {
 
 // Known answers of philox4x32-10 published with Random123 (kat_vectors).
-TEST(Random, IsPhilox) {
+TEST(Random, MatchesPhilox) {
   EXPECT_EQ(random_bits({}),
             (std::array<std::uint32_t, 4>{0x6627e8d5, 0xe169c58d, 0xbc57ac4c, 0x9b00dbd8}));
 }
@@ -51,9 +51,9 @@ TEST(Random, UniformNumbersStayInsideTheOpenInterval) {
   }
 }
 
-// Pearson's chi-squared against the probabilities, in bins of at least 10 expected counts; their
-// statistic stays below its mean by 5 standard deviations (p = 3e-6 and less).
-TEST(RandomPoisson, HasPoissonsProbabilities) {
+// Pearson's chi-squared test against the probabilities, in bins of at least 10 expected counts; the
+// statistic must stay below its mean plus 5 standard deviations (p = 3e-6 and less).
+TEST(RandomPoisson, MatchesPoissonProbabilities) {
   for (const double mean : {0.01, 0.7, 3.0, 9.99, 10.0, 35.0, 400.0}) {
     constexpr int draws = 100'000;
     std::map<int, int> counts;
@@ -77,7 +77,7 @@ TEST(RandomPoisson, HasPoissonsProbabilities) {
   }
 }
 
-TEST(RandomPoisson, HasItsMeanAndVarianceAtLargeMeans) {
+TEST(RandomPoisson, HasTheCorrectMeanAndVarianceAtLargeMeans) {
   for (const double mean : {1e4, 1e7}) {
     constexpr int draws = 20'000;
     double sum = 0, squares = 0;

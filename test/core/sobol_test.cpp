@@ -16,7 +16,7 @@ glm::dvec2 pair_of(std::uint32_t seed, std::uint32_t index, int pair) {
   return point;
 }
 
-TEST(SobolPairs, EveryPowerOfTwoOfPointsHasOneInEachElementaryInterval) {
+TEST(SobolPairs, PointsStratifyEveryElementaryInterval) {
   for (std::uint32_t seed = 1; seed <= 5; ++seed) {
     for (int pair = 0; pair < 4; ++pair) {
       for (int m = 1; m <= 10; ++m) {
@@ -35,8 +35,9 @@ TEST(SobolPairs, EveryPowerOfTwoOfPointsHasOneInEachElementaryInterval) {
   }
 }
 
-// Means over seeds of what a single sequence gives must be unbiased, and pairs independent: sums
-// over 20,000 seeds of products of uniform numbers less their mean are normal; 5 standard errors.
+// The means of single sequences must be unbiased over seeds, and pairs must be independent: sums
+// over 20,000 seeds of products of uniform numbers minus their mean are normal; the bound is 5
+// standard errors.
 TEST(SobolPairs, AreUniformAndIndependentAcrossSeedsAndPairs) {
   constexpr int seeds = 20'000;
   double mean = 0, product_of_axes = 0, product_of_pairs = 0, product_of_seeds = 0;
@@ -55,9 +56,9 @@ TEST(SobolPairs, AreUniformAndIndependentAcrossSeedsAndPairs) {
     EXPECT_LT(std::abs(sum), 5 * std::sqrt(n) / 12);
 }
 
-// The variance of the mean over a smooth function falls with n^-3 for a scrambled net, with 1/n for
+// The variance of the mean of a smooth function falls with n^-3 for a scrambled net, with 1/n for
 // random numbers.
-TEST(SobolPairs, IntegrateSmoothFunctionsFarBetterThanRandomNumbers) {
+TEST(SobolPairs, IntegrateSmoothFunctionsMoreAccuratelyThanRandomNumbers) {
   const auto error_of = [](std::uint32_t count) {
     double squares = 0;
     for (std::uint32_t seed = 0; seed < 200; ++seed) {
@@ -71,7 +72,7 @@ TEST(SobolPairs, IntegrateSmoothFunctionsFarBetterThanRandomNumbers) {
     }
     return std::sqrt(squares / 200);
   };
-  EXPECT_LT(error_of(1024), error_of(16) / 200);  // 64^1.5 = 512, less what logarithms take
+  EXPECT_LT(error_of(1024), error_of(16) / 200);  // 64^1.5 = 512, less logarithmic factors
 }
 
 }  // namespace

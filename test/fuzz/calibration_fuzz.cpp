@@ -2,9 +2,9 @@
 #include <cstdint>
 #include <string_view>
 
+#include "apps/scene/calibration/calibration_io.h"
 #include "core/error.h"
-#include "sensors/calibration_io.h"
-#include "sensors/scan_pattern.h"
+#include "sensors/lidar/pattern/scan_pattern.h"
 
 namespace {
 
@@ -18,8 +18,8 @@ void returns_or_throws_error(const Read& read) {
 
 }  // namespace
 
-// Whatever the bytes, each reader of calibrations returns what it reads or throws Error, and an
-// Ouster's metadata makes a pattern.
+// For any bytes, each reader of calibrations returns a result or throws Error, and the metadata of
+// an Ouster yield a pattern.
 extern "C" int LLVMFuzzerTestOneInput(const std::uint8_t* data, std::size_t size) {
   const std::string_view text(reinterpret_cast<const char*>(data), size);
   returns_or_throws_error(

@@ -2,13 +2,13 @@
 #include <cstdint>
 #include <string>
 
+#include "apps/scene/calibration/camera_calibration.h"
+#include "apps/scene/readers/spec_io.h"
 #include "core/error.h"
-#include "sensors/camera/calibration.h"
-#include "sensors/camera/lens.h"
-#include "sensors/spec_io.h"
+#include "sensors/camera/lens/lens.h"
 
-// Whatever the bytes, reading them as a camera or as calibrations gives those or an Error, and a
-// lens that is read images the rays of its pixels or has none: no crash, no hang.
+// For any bytes, the readers of cameras and calibrations return a result or throw Error, and a lens
+// that is read either images the rays of its pixels or reports none: no crash, no hang.
 extern "C" int LLVMFuzzerTestOneInput(const std::uint8_t* data, std::size_t size) {
   const std::string text(reinterpret_cast<const char*>(data), size);
   try {

@@ -5,7 +5,7 @@
 #include "apps/dataset/range_conf.h"
 #include "core/error.h"
 
-/// Whatever the text, parse_conf returns poses or throws Error.
+/// For any text, parse_conf returns poses or throws Error.
 extern "C" int LLVMFuzzerTestOneInput(const std::uint8_t* data, std::size_t size) {
   try {
     groundray::parse_conf({reinterpret_cast<const char*>(data), size}, "fuzz.conf");

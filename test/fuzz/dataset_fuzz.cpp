@@ -19,7 +19,7 @@ namespace {
 
 namespace fs = std::filesystem;
 
-/// A folder of this process, which is gone when it ends.
+/// A folder of this process, removed when the process ends.
 class Folder {
  public:
   Folder() : path_(fs::temp_directory_path() / ("dataset_fuzz_" + std::to_string(getpid()))) {
@@ -50,7 +50,7 @@ void read_line(std::string_view text) {
   }
 }
 
-// No path of what is read leads out of the dataset, and it all is expected there.
+// No path in the record leads out of the dataset, and all its files are expected there.
 void read_record(const fs::path& folder) {
   const groundray::DatasetSummary summary = groundray::read_summary(folder);
   groundray::ExpectedFiles expected(summary);
@@ -74,8 +74,8 @@ void read_record(const fs::path& folder) {
 
 }  // namespace
 
-/// Whatever the bytes: a line that is read of them stays the same when it is written and read
-/// again; and as a whole dataset.yaml, or a journal, they are read, or refused by an Error.
+/// Any line that is read from the bytes is unchanged after being written and read again. As a whole
+/// dataset.yaml or journal, the bytes are read or rejected by an Error.
 extern "C" int LLVMFuzzerTestOneInput(const std::uint8_t* data, std::size_t size) {
   static const Folder folder;
   const std::string_view text(reinterpret_cast<const char*>(data), size);
@@ -85,7 +85,7 @@ extern "C" int LLVMFuzzerTestOneInput(const std::uint8_t* data, std::size_t size
   try {
     read_record(folder.path());
   } catch (const groundray::Error&) {
-    // Said in words.
+    // Rejected with a message.
   }
   groundray::read_journal(record, [](const std::string& entry) { read_line(entry); });
   return 0;

@@ -5,7 +5,7 @@
 #include "apps/dataset/packed_file.h"
 #include "core/error.h"
 
-/// Whatever the bytes, unpack returns what is in them or throws Error.
+/// For any bytes, unpack returns their contents or throws Error.
 extern "C" int LLVMFuzzerTestOneInput(const std::uint8_t* data, std::size_t size) {
   try {
     groundray::unpack({reinterpret_cast<const char*>(data), size}, "fuzz.gz");

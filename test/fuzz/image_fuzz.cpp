@@ -3,10 +3,10 @@
 #include <string_view>
 
 #include "core/error.h"
-#include "core/exr_reader.h"
-#include "core/image_io.h"
+#include "core/image/exr_reader.h"
+#include "core/image/image_io.h"
 
-/// Whatever the bytes, the readers of pictures return one or throw Error.
+/// For any bytes, the readers of pictures return one or throw Error.
 extern "C" int LLVMFuzzerTestOneInput(const std::uint8_t* data, std::size_t size) {
   const std::string_view bytes(reinterpret_cast<const char*>(data), size);
   try {

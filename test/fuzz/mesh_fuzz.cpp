@@ -3,10 +3,10 @@
 #include <string_view>
 
 #include "core/error.h"
-#include "core/mesh_io.h"
+#include "core/model/mesh_reader.h"
 
-/// Whatever the bytes, parse_stored_mesh returns a mesh with a triangle, whose indices are those of
-/// its vertices, or throws Error.
+/// For any bytes, parse_stored_mesh returns a mesh with at least one triangle and valid vertex
+/// indices, or throws Error.
 extern "C" int LLVMFuzzerTestOneInput(const std::uint8_t* data, std::size_t size) {
   try {
     const groundray::StoredMesh stored =

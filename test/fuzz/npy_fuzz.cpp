@@ -3,9 +3,9 @@
 #include <string_view>
 
 #include "core/error.h"
-#include "core/npy_reader.h"
+#include "core/io/npy_reader.h"
 
-/// Whatever the bytes, as an array and as an archive, they give numbers or an Error.
+/// For any bytes, the readers of arrays and archives return numbers or throw Error.
 extern "C" int LLVMFuzzerTestOneInput(const std::uint8_t* data, std::size_t size) {
   const std::string_view bytes(reinterpret_cast<const char*>(data), size);
   try {

@@ -4,9 +4,10 @@
 #include <string_view>
 
 #include "core/error.h"
-#include "core/obj_reader.h"
+#include "core/model/obj_reader.h"
 
-// Whatever the bytes, as .obj and as the .mtl that it names, they give a model or an Error.
+// For any bytes, used both as the .obj and as the .mtl that it names, the reader returns a model or
+// throws Error.
 extern "C" int LLVMFuzzerTestOneInput(const std::uint8_t* data, std::size_t size) {
   const std::string_view text(reinterpret_cast<const char*>(data), size);
   try {

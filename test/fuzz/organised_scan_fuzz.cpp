@@ -5,11 +5,11 @@
 #include <span>
 
 #include "core/error.h"
-#include "reconstruction/scan/scan_mesh.h"
+#include "reconstruction/mesh/scan/scan_mesh.h"
 
 namespace {
 
-/// Takes numbers of any type one after the other from bytes; zeros after the last.
+/// Reads numbers of any type one after the other from bytes; zeros after the last byte.
 class Numbers {
  public:
   explicit Numbers(std::span<const std::uint8_t> bytes) : bytes_(bytes) {}
@@ -30,8 +30,8 @@ class Numbers {
 
 }  // namespace
 
-/// Whatever the returns, organise makes a scan that link takes or throws Error. The first byte says
-/// what is given of them.
+/// For any returns, organise makes a scan that link accepts, or throws Error. The first byte
+/// selects the columns of the returns.
 extern "C" int LLVMFuzzerTestOneInput(const std::uint8_t* data, std::size_t size) {
   Numbers numbers({data, size});
   const auto kind = numbers.next<std::uint8_t>();

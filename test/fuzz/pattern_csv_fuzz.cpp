@@ -3,9 +3,9 @@
 #include <string_view>
 
 #include "core/error.h"
-#include "sensors/scan_pattern.h"
+#include "sensors/lidar/pattern/scan_pattern.h"
 
-// Whatever the text, reading it as a table gives a pattern that fills its first sweep, or an Error.
+// For any text, reading it as a table yields a pattern that fills its first sweep, or an Error.
 extern "C" int LLVMFuzzerTestOneInput(const std::uint8_t* data, std::size_t size) {
   try {
     const groundray::ScanPattern scan(

@@ -3,9 +3,9 @@
 #include <string_view>
 
 #include "core/error.h"
-#include "core/pcd_reader.h"
+#include "core/io/pcd_reader.h"
 
-/// Whatever the bytes, parse_pcd returns a cloud or throws Error.
+/// For any bytes, parse_pcd returns a cloud or throws Error.
 extern "C" int LLVMFuzzerTestOneInput(const std::uint8_t* data, std::size_t size) {
   try {
     groundray::parse_pcd({reinterpret_cast<const char*>(data), size}, "fuzz.pcd");

@@ -3,10 +3,10 @@
 #include <string_view>
 
 #include "core/error.h"
-#include "reconstruction/scan/range_grid.h"
-#include "reconstruction/scan/scan_mesh.h"
+#include "reconstruction/mesh/scan/range_grid.h"
+#include "reconstruction/mesh/scan/scan_mesh.h"
 
-/// Whatever the bytes, parse_range_grid returns a scan that link takes or throws Error.
+/// For any bytes, parse_range_grid returns a scan that link accepts, or throws Error.
 extern "C" int LLVMFuzzerTestOneInput(const std::uint8_t* data, std::size_t size) {
   groundray::OrganisedScan scan;
   try {

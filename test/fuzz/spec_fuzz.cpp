@@ -2,11 +2,10 @@
 #include <cstdint>
 #include <string>
 
+#include "apps/scene/readers/spec_io.h"
 #include "core/error.h"
-#include "sensors/spec_io.h"
 
-// Whatever the bytes, reading them as a scene or a lidar gives a spec or an Error: no crash, no
-// hang.
+// For any bytes, reading them as a scene or a lidar yields a spec or an Error: no crash, no hang.
 extern "C" int LLVMFuzzerTestOneInput(const std::uint8_t* data, std::size_t size) {
   const std::string text(reinterpret_cast<const char*>(data), size);
   try {

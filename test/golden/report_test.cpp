@@ -12,8 +12,8 @@
 #include <string_view>
 
 #include "core/error.h"
-#include "core/image_io.h"
-#include "core/product_io.h"
+#include "core/image/image_io.h"
+#include "core/io/file_io.h"
 #include "test/support/temporary_folder.h"
 
 namespace groundray::golden::report_test {
@@ -29,7 +29,7 @@ constexpr double nan = std::numeric_limits<double>::quiet_NaN();
 
 Measure measure(Verdict verdict) { return {.name = "a", .verdict = verdict}; }
 
-TEST(Report, OneFailureFailsAll) {
+TEST(Report, OneFailedMeasureFailsTheSection) {
   const Measure passed = measure(Verdict::Passed), failed = measure(Verdict::Failed),
                 told = measure(Verdict::Told);
   EXPECT_EQ(verdict_of({}), Verdict::Told);
@@ -38,7 +38,7 @@ TEST(Report, OneFailureFailsAll) {
   EXPECT_EQ(verdict_of({passed, failed, told}), Verdict::Failed);
 }
 
-TEST(Report, HistogramsWithoutStepsCountEachValueAbove) {
+TEST(Report, HistogramsOfEmptyRangesCountValuesOutside) {
   for (const double high : {infinity, 0.0, nan}) {
     const Histogram histogram = histogram_of("", "", {1, 2, nan}, -high, high, 4);
     EXPECT_EQ(histogram.below + histogram.above, 2U) << high;
@@ -73,7 +73,7 @@ Report sample() {
           .sections = {range, {.title = "nothing"}}};
 }
 
-// Gathers what an XML tree holds.
+// Collects the contents of an XML tree.
 struct Gatherer : tinyxml2::XMLVisitor {
   std::set<std::string> ids, links, elements;
   std::string text, source;
@@ -107,8 +107,8 @@ std::string decoded(std::string_view base64) {
   return bytes;
 }
 
-// An XML parser, which knows no leniency, reads the page and finds all texts as they were given.
-TEST(Report, PageIsWellFormedAndShowsAllAsItIs) {
+// A strict XML parser reads the page and finds all texts unchanged.
+TEST(Report, PageIsWellFormedAndEscapesTexts) {
   const TemporaryFolder folder;
   write_html(folder / "a.html", sample());
   const std::string html = read_text(folder / "a.html");
@@ -127,7 +127,7 @@ TEST(Report, PageIsWellFormedAndShowsAllAsItIs) {
   EXPECT_THAT(html, Not(HasSubstr("\x01")));
 }
 
-TEST(Report, PageNeedsNoOtherFile) {
+TEST(Report, PageIsSelfContained) {
   const TemporaryFolder folder;
   write_html(folder / "a.html", sample());
   const std::string html = read_text(folder / "a.html");
@@ -146,8 +146,8 @@ TEST(Report, PageNeedsNoOtherFile) {
             std::string::npos);
 }
 
-// The bars' heights are as 1 : 2 : 1 of the counts 1, 2, 1 and 0.
-TEST(Report, BarsAreAsTallAsTheirCounts) {
+// The counts 1, 2, 1 and 0 give bars with heights of 1 : 2 : 1.
+TEST(Report, BarHeightsMatchCounts) {
   const TemporaryFolder folder;
   Report report = sample();
   report.sections[0].histograms = {histogram_of("h", "", {0.5, 1.5, 1.6, 2.5}, 0, 4, 4)};
@@ -160,7 +160,7 @@ TEST(Report, BarsAreAsTallAsTheirCounts) {
   EXPECT_THAT(heights, ElementsAre(70, 140, 70));
 }
 
-TEST(Report, JsonHoldsAllFigures) {
+TEST(Report, JsonContainsAllMeasures) {
   const TemporaryFolder folder;
   Report report = sample();
   report.facts.emplace_back("file", "no UTF-8: \xff");
@@ -185,7 +185,7 @@ TEST(Report, JsonHoldsAllFigures) {
   EXPECT_TRUE(json["sections"][1]["measures"].is_array());
 }
 
-TEST(Report, RefusesToWriteWhereItCannot) {
+TEST(Report, RejectsUnwritableFiles) {
   EXPECT_THROW(write_html("/nowhere/a.html", sample()), Error);
   EXPECT_THROW(write_json("/nowhere/a.json", sample()), Error);
 }

@@ -48,7 +48,7 @@ def of(everything, topic):
 
 @functools.cache
 def whole_bag() -> tuple[Path, list]:
-    """The bag of the whole dataset, made once for all tests, and its messages."""
+    """The bag of the complete dataset, made once for all tests, and its messages."""
     out = run_folder().parent / "bag"
     assert export("mcap", out, "--depth") == 0
     return out, list(messages(out))

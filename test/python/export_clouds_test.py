@@ -23,7 +23,7 @@ def pcd(tmp_path_factory):
 
 
 @pytest.mark.parametrize("lidar", LIDARS)
-def test_pypcd4_reads_every_column_of_a_pcd_file_to_the_bit(pcd, lidar):
+def test_pypcd4_reads_every_column_of_a_pcd_file_exactly(pcd, lidar):
     pypcd4 = pytest.importorskip("pypcd4", reason="pip install -r test/requirements.txt")
     for i, (stamp_s, rows) in enumerate(scans(lidar)):
         read = pypcd4.PointCloud.from_path(pcd / lidar / f"{i:06}.pcd")
@@ -42,7 +42,7 @@ def test_pypcd4_reads_every_column_of_a_pcd_file_to_the_bit(pcd, lidar):
         np.testing.assert_allclose(turned, X[:3, :3], atol=1e-5)
 
 
-def test_open3d_reads_points_of_a_pcd_file_in_the_frame_that_is_asked_for(pcd, tmp_path):
+def test_open3d_reads_points_of_a_pcd_file_in_the_requested_frame(pcd, tmp_path):
     o3d = pytest.importorskip("open3d", reason="pip install -r test/requirements.txt")
     options = ["--lidar", "bare-16", "--columns", "x,y,z,nx,ny,nz,label"]
     assert export("pcd", tmp_path / "world", *options, "--frame", "world") == 0
@@ -63,7 +63,7 @@ def test_open3d_reads_points_of_a_pcd_file_in_the_frame_that_is_asked_for(pcd, t
         np.testing.assert_allclose(stamp @ X[:3, :3].T + X[:3, 3], world_of(rows), atol=3e-4)
 
 
-def test_a_column_that_is_not_there_is_an_error(tmp_path, capsys):
+def test_an_unknown_column_is_rejected(tmp_path, capsys):
     assert export("pcd", tmp_path / "out", "--columns", "x,y,z,colour") == 1
     assert "it has no column colour; it has x, y, z, intensity" in capsys.readouterr().err
     assert not (tmp_path / "out").exists()
@@ -97,8 +97,8 @@ def laz(tmp_path_factory):
 
 
 @pytest.mark.parametrize("lidar", LIDARS)
-def test_laz_points_are_the_measured_ones_in_the_crs(laz, lidar):
-    """The path between its lines by slerp here, by screws there: well below a millimetre."""
+def test_laz_points_are_the_measured_points_in_the_crs(laz, lidar):
+    """Slerp here and screws in the exporter differ by well below a millimetre."""
     import laspy
 
     for i, (stamp_s, rows) in enumerate(scans(lidar)):
@@ -114,7 +114,7 @@ def test_laz_points_are_the_measured_ones_in_the_crs(laz, lidar):
             np.testing.assert_allclose(read.xyz, expected, atol=1e-4 + 0.5e-4)
 
 
-def test_laz_columns_are_those_of_the_scan(laz):
+def test_laz_columns_match_the_scan(laz):
     import laspy
 
     for lidar in LIDARS:
@@ -137,14 +137,14 @@ def test_laz_columns_are_those_of_the_scan(laz):
     assert len(about) == len(rows.dtype.names)
 
 
-def test_laz_files_name_the_crs_and_are_of_version_1_4(laz):
+def test_laz_files_have_version_1_4_and_the_crs(laz):
     import laspy
 
     pyproj = pytest.importorskip("pyproj", reason="pip install -r test/requirements.txt")
     file = laz / "top/000000.laz"
     read = laspy.read(file)
     text = read.header.vlrs.get("WktCoordinateSystemVlr")[0].string
-    assert text.startswith("PROJCS[")  # the older form, which LAS 1.4 asks for
+    assert text.startswith("PROJCS[")  # WKT 1, which LAS 1.4 requires
     assert pyproj.CRS.from_wkt(text).to_epsg() == 26915
     assert read.header.parse_crs().to_epsg() == 26915
     # Bytes of the header by the specification: version, WKT bit, point format, scales, offsets.
@@ -156,7 +156,7 @@ def test_laz_files_name_the_crs_and_are_of_version_1_4(laz):
     assert struct.unpack_from("<6d", data, 131) == (1e-4, 1e-4, 1e-4, *record()["origin_w_m"])
 
 
-def test_a_dataset_without_a_crs_says_so_and_gives_files_without_one(tmp_path, capsys):
+def test_a_dataset_without_a_crs_is_exported_without_one(tmp_path, capsys):
     import laspy
 
     run = shutil.copytree(run_folder(), tmp_path / "run")
@@ -174,7 +174,7 @@ def test_a_dataset_without_a_crs_says_so_and_gives_files_without_one(tmp_path, c
     assert "crs_wkt is not a CRS" in capsys.readouterr().err
 
 
-def test_las_of_truth_is_the_truth_merged_or_not(tmp_path):
+def test_las_files_of_the_truth_are_correct_merged_or_not(tmp_path):
     import laspy
 
     (tmp_path / "map.yaml").write_text("labels: {40: 2, 72: 3}\nothers: 1\n")
@@ -198,7 +198,7 @@ def test_las_of_truth_is_the_truth_merged_or_not(tmp_path):
     np.testing.assert_allclose(merged.header.mins, merged.xyz.min(axis=0), atol=1e-9)
 
 
-def test_times_of_las_follow_the_clock_of_the_dataset():
+def test_las_times_follow_the_clock_of_the_dataset():
     """The GPS day of the 1st of January 2020, when GPS was 18 s ahead of UTC."""
     import dataclasses
 

@@ -1,4 +1,4 @@
-"""The command groundray-export: what it refuses, and that it leaves nothing half-written."""
+"""The command groundray-export: it rejects invalid usage and leaves no partial files."""
 
 import os
 import shutil
@@ -18,7 +18,7 @@ COMMAND = [sys.executable, "-m", "groundray.export.command"]
 
 @pytest.fixture
 def run(tmp_path):
-    """A copy of the dataset that may be spoiled."""
+    """A copy of the dataset that tests may modify."""
     return shutil.copytree(run_folder(), tmp_path / "run")
 
 
@@ -29,7 +29,7 @@ def edit(file, old, new, count=1):
 
 
 def only(run, kind, frames=None):
-    """Leaves sensors of one kind in dataset.yaml; with `frames`, one lidar and so many scans."""
+    """Keeps sensors of one kind in dataset.yaml; with `frames`, one lidar and this many scans."""
     record = yaml.safe_load((run / "dataset.yaml").read_text())
     sensors = [each for each in record["sensors"] if each["kind"] == kind]
     if frames is not None:
@@ -47,7 +47,7 @@ def only(run, kind, frames=None):
 
 
 @pytest.mark.parametrize("form", FORMS)
-def test_equal_datasets_give_equal_files_of_every_form(tmp_path, form):
+def test_equal_datasets_yield_equal_files_in_every_format(tmp_path, form):
     assert export(form, tmp_path / "a" / "one") == 0
     (tmp_path / "two").mkdir()  # an empty folder will do
     assert export(form, tmp_path / "two") == 0
@@ -62,7 +62,7 @@ def test_equal_datasets_give_equal_files_of_every_form(tmp_path, form):
 
 
 @pytest.mark.parametrize("form", FORMS)
-def test_a_folder_that_is_not_empty_is_left_alone(tmp_path, capsys, form):
+def test_a_folder_that_is_not_empty_is_kept(tmp_path, capsys, form):
     (tmp_path / "out").mkdir()
     (tmp_path / "out/mine.txt").write_text("mine")
     assert export(form, tmp_path / "out") == 1
@@ -71,11 +71,11 @@ def test_a_folder_that_is_not_empty_is_left_alone(tmp_path, capsys, form):
     assert names_in(tmp_path / "out") == ["mine.txt"]
 
 
-def test_a_file_or_a_place_within_the_dataset_is_no_place_to_write_to(run, capsys):
+def test_output_to_a_file_or_into_the_dataset_is_rejected(run, capsys):
     assert export("npz", run / "dataset.yaml", source=run) == 1
-    assert "there is a file of this name" in capsys.readouterr().err
+    assert "a file of this name exists" in capsys.readouterr().err
     assert export("npz", run / "npz", source=run) == 1
-    assert "it lies within the dataset" in capsys.readouterr().err
+    assert "it is inside the dataset" in capsys.readouterr().err
     assert not (run / "npz").exists()
 
 
@@ -83,9 +83,9 @@ def test_a_file_or_a_place_within_the_dataset_is_no_place_to_write_to(run, capsy
     ("options", "rule"),
     [
         (["--to", "rosbag"], "invalid choice: 'rosbag'"),
-        (["--to", "npz", "--merge"], "--merge is of las, laz, not of npz"),
-        (["--to", "tum", "--lidar", "top"], "--lidar is of"),
-        (["--to", "kitti", "--labels", "map.yaml"], "--labels is of las, laz, semantic-kitti"),
+        (["--to", "npz", "--merge"], "--merge applies to las, laz, not to npz"),
+        (["--to", "tum", "--lidar", "top"], "--lidar applies to"),
+        (["--to", "kitti", "--labels", "map.yaml"], "--labels applies to las, laz, semantic-kitti"),
         (["--to", "tum", "--depth-per-m", "0"], "0 must be above 0"),
         (["--to", "kitti", "--sequence", "100"], "100 must be from 0 to 99"),
         (["--to", "mcap", "--shift-s", "1e10"], "must be within 2^31 s"),
@@ -93,7 +93,7 @@ def test_a_file_or_a_place_within_the_dataset_is_no_place_to_write_to(run, capsy
         ([], "--to"),
     ],
 )
-def test_wrong_usage_is_told_before_anything_is_read(tmp_path, capsys, options, rule):
+def test_wrong_usage_is_reported_before_anything_is_read(tmp_path, capsys, options, rule):
     from groundray.export import command
 
     with pytest.raises(SystemExit) as stopped:
@@ -103,18 +103,18 @@ def test_wrong_usage_is_told_before_anything_is_read(tmp_path, capsys, options, 
     assert names_in(tmp_path) == []
 
 
-def test_frames_that_are_pending_are_refused_or_told(run, capsys):
+def test_pending_frames_are_rejected_or_reported(run, capsys):
     text = (run / "dataset.yaml").read_text()
     line = next(each for each in text.splitlines() if 'sensor: "bare-16", frame: 1' in each)
     edit(run / "dataset.yaml", line, line.replace("done", "pending"))
     told = fails(capsys, run, "npz")
     assert "1 of its frames are pending; finish it with groundray generate" in told
     assert export("npz", run.parent / "out", "--skip-pending", source=run) == 0
-    assert "note: 1 frames are pending and left out" in capsys.readouterr().out
+    assert "note: 1 frames are pending and skipped" in capsys.readouterr().out
     assert names_in(run.parent / "out/bare-16") == ["000000.npz", "000002.npz"]
 
 
-def test_sensors_are_chosen_by_name_or_all_in_folders_of_their_own(tmp_path, capsys):
+def test_sensors_are_selected_by_name_and_have_their_own_folders(tmp_path, capsys):
     assert export("pcd", tmp_path / "all") == 0
     assert names_in(tmp_path / "all") == ["bare-16", "front", "top"]
     assert export("pcd", tmp_path / "one", "--lidar", "top") == 0
@@ -128,32 +128,32 @@ def test_sensors_are_chosen_by_name_or_all_in_folders_of_their_own(tmp_path, cap
     assert "it has no camera rear; it has: left, right, eye" in capsys.readouterr().err
 
 
-def test_datasets_without_cameras_or_lidars_say_what_they_lack(run, capsys):
+def test_datasets_without_cameras_or_lidars_are_reported(run, capsys):
     whole = (run / "dataset.yaml").read_text()
     only(run, "lidar")
     assert export("kitti", run.parent / "kitti", source=run) == 0
     assert "note: without a camera, camera 0 stands at the lidar" in capsys.readouterr().out
-    assert "it has no camera, and TUM RGB-D is of cameras" in fails(capsys, run, "tum")
+    assert "it has no camera, but TUM RGB-D needs images" in fails(capsys, run, "tum")
     assert export("mcap", run.parent / "mcap", source=run) == 0
     (run / "dataset.yaml").write_text(whole)
     capsys.readouterr()
     only(run, "camera")
-    assert "it has no lidar, and kitti is of scans" in fails(capsys, run, "kitti")
+    assert "it has no lidar, but kitti needs scans" in fails(capsys, run, "kitti")
     assert export("mcap", run.parent / "images", source=run) == 0
 
 
-def test_kitti_refuses_cameras_that_are_no_pinholes_and_several_without_a_pair(run, capsys):
+def test_kitti_rejects_non_pinhole_and_unpaired_cameras(run, capsys):
     line = fails(capsys, run, "kitti", "--camera", "eye")
-    assert "camera eye has no pictures; give it the product picture, or export with --no-" in line
+    assert "camera eye has no pictures; add picture to its products, or export with --no-" in line
     for frame in range(3):
         shutil.copy(run / "camera/left/000000.png", run / f"camera/eye/{frame:06}.png")
     line = fails(capsys, run, "kitti", "--camera", "eye")
-    assert "camera eye is a kannala_brandt, but KITTI's images are of pinholes" in line
+    assert "camera eye has the lens kannala_brandt, but KITTI needs pinholes" in line
     line = fails(capsys, run, "kitti", "--camera", "eye", "--camera", "right")
     assert "it has the cameras right, eye and no rectified pair among them" in line
 
 
-def test_powers_have_no_full_scale_of_their_own(run, capsys):
+def test_powers_need_an_explicit_full_scale(run, capsys):
     edit(run / "dataset.yaml", "intensity: reflectance", "intensity: power")
     line = fails(capsys, run, "las", "--lidar", "top")
     assert "powers in watts, which have no full scale; give one with --intensity-full-scale" in line
@@ -162,7 +162,7 @@ def test_powers_have_no_full_scale_of_their_own(run, capsys):
     assert export("npz", run.parent / "npz", source=run) == 0  # needs none
 
 
-def test_echoes_of_nothing_are_counted_where_nothing_marks_them(run, capsys):
+def test_echoes_of_air_and_false_alarms_are_counted(run, capsys):
     file = run / "lidar/top/000000.ply"
     data = file.read_bytes()
     begin = data.index(b"end_header\n") + len(b"end_header\n")
@@ -175,7 +175,7 @@ def test_echoes_of_nothing_are_counted_where_nothing_marks_them(run, capsys):
     file.write_bytes(data[:begin] + rows.tobytes())
     assert export("kitti", run.parent / "out", "--lidar", "top", source=run) == 0
     told = capsys.readouterr().out
-    assert "note: 7 points are echoes of air or false alarms, which nothing marks" in told
+    assert "note: 7 points are unmarked echoes of air or false alarms" in told
 
 
 @pytest.mark.parametrize(
@@ -183,16 +183,20 @@ def test_echoes_of_nothing_are_counted_where_nothing_marks_them(run, capsys):
     [
         (
             "kitti",
-            ["points have x, y, z and intensity alone", "waveforms are not", "of images pictures"],
+            [
+                "points have only x, y, z and intensity",
+                "waveforms are not",
+                "images are exported as pictures only",
+            ],
         ),
-        ("semantic-kitti", ["of the truth points have labels and instances alone"]),
-        ("tum", ["tum is of cameras alone", "of images pictures and depths are exported, and no"]),
-        ("npz", ["npz is of scans alone", "pulses without an echo are not", "waveforms are not"]),
-        ("laz", ["laz is of scans alone: images are not exported"]),
-        ("mcap", ["points have the fields of the velodyne layout alone, and no truth"]),
+        ("semantic-kitti", ["labels and instances are the only truth of points"]),
+        ("tum", ["tum contains only cameras", "images are exported as pictures and depths only"]),
+        ("npz", ["npz contains only scans", "pulses without an echo are not", "waveforms are not"]),
+        ("laz", ["laz contains only scans: images are not exported"]),
+        ("mcap", ["points have only the fields of the velodyne layout, and no truth"]),
     ],
 )
-def test_what_a_form_has_no_place_for_is_told_once(run, capsys, form, told):
+def test_data_that_a_format_omits_is_reported_once(run, capsys, form, told):
     for frame in range(3):
         (run / f"lidar/top/{frame:06}_no_returns.ply").write_bytes(b"")
         (run / f"lidar/top/{frame:06}_wave.npy").write_bytes(b"")
@@ -215,7 +219,7 @@ def environment():
 
 
 @pytest.mark.parametrize("stop", [signal.SIGINT, signal.SIGTERM])
-def test_an_interrupted_export_leaves_nothing(long_run, stop):
+def test_an_interrupted_export_leaves_no_files(long_run, stop):
     arguments = [long_run, "--to", "laz", "-o", long_run.parent / "out"]
     with subprocess.Popen(
         [*COMMAND, *arguments], env=environment(), stderr=subprocess.PIPE, text=True
@@ -232,7 +236,7 @@ def test_an_interrupted_export_leaves_nothing(long_run, stop):
     assert names_in(long_run.parent) == ["run"]
 
 
-def test_a_caller_keeps_its_own_handler_of_sigterm(tmp_path, capsys):
+def test_the_sigterm_handler_of_the_caller_is_restored(tmp_path, capsys):
     before = signal.signal(signal.SIGTERM, signal.SIG_IGN)
     try:
         assert export("npz", tmp_path / "out") == 0
@@ -244,7 +248,7 @@ def test_a_caller_keeps_its_own_handler_of_sigterm(tmp_path, capsys):
 
 
 def test_any_thread_may_export(tmp_path, capsys):
-    """Handlers of signals are the main thread's alone to set."""
+    """Only the main thread may set signal handlers."""
     before = signal.getsignal(signal.SIGTERM)
     with ThreadPoolExecutor(1) as threads:
         assert threads.submit(export, "npz", tmp_path / "out").result(timeout=120) == 0
@@ -253,8 +257,8 @@ def test_any_thread_may_export(tmp_path, capsys):
 
 
 @pytest.mark.parametrize("form", FORMS)
-def test_a_disk_that_is_full_is_told_and_nothing_remains(tmp_path, form):
-    """Files may not grow beyond 20 kB, of small images beyond 2 kB; every form needs more."""
+def test_a_full_disk_is_reported_and_leaves_no_files(tmp_path, form):
+    """Files are limited to 20 kB, small images to 2 kB; every format needs more."""
     import resource
 
     most_bytes = 2_000 if form == "tum" else 20_000
@@ -275,7 +279,7 @@ def test_a_disk_that_is_full_is_told_and_nothing_remains(tmp_path, form):
 
 @pytest.mark.parametrize("form", ["kitti", "laz", "npz", "mcap"])
 def test_memory_does_not_grow_with_the_number_of_scans(run, form):
-    """A scan more in memory at a time would be 3 MB; 46 of them 140 MB."""
+    """One more scan in memory takes 3 MB; 46 of them take 140 MB."""
     peaks_kb = []
     for frames in (4, 50):
         only(run, "lidar", frames=frames)

@@ -1,4 +1,4 @@
-"""Datasets that are broken: one error that says where, and nothing written."""
+"""Damaged datasets: one error with the location, and nothing written."""
 
 import re
 import shutil
@@ -10,17 +10,17 @@ from export_runs import export, fails, names_in, run_folder
 
 @pytest.fixture
 def run(tmp_path):
-    """A copy of the dataset that may be spoiled."""
+    """A copy of the dataset that tests may modify."""
     return shutil.copytree(run_folder(), tmp_path / "run")
 
 
-def test_datasets_that_are_none_or_broken_are_told(run, capsys):
+def test_missing_and_broken_datasets_are_reported(run, capsys):
     record = run / "dataset.yaml"
     text = record.read_text()
     for spoiled, rule in (
         (text[: len(text) // 2], "dataset.yaml"),
         (text.replace("groundray_dataset: 1", "groundray_dataset: 2"), "must be 1"),
-        (text.replace("origin_w_m: [", "origin_w_m: [east, "), "must be of numbers"),
+        (text.replace("origin_w_m: [", "origin_w_m: [east, "), "must be numeric"),
         (text[: text.rindex("  - {sensor")], "was the file cut short?"),
         (text.replace("kind: lidar", "kind: sonar", 1), "must be lidar, camera or stereo"),
         ("", "must be a map"),
@@ -29,16 +29,16 @@ def test_datasets_that_are_none_or_broken_are_told(run, capsys):
         record.write_text(spoiled)
         assert rule in fails(capsys, run, "npz")
     record.unlink()
-    assert "it holds no dataset.yaml" in fails(capsys, run, "npz")
+    assert "it contains no dataset.yaml" in fails(capsys, run, "npz")
 
 
 @pytest.mark.parametrize("form", ["kitti", "npz", "mcap", "laz"])
-def test_scans_that_are_missing_or_damaged_are_told(run, capsys, form):
+def test_missing_and_damaged_scans_are_reported(run, capsys, form):
     file = run / "lidar/front/000001.ply"
     data = file.read_bytes()
     for spoiled, rule in (
-        (data[:-1], "its header asks for"),
-        (data + b"\0", "its header asks for"),
+        (data[:-1], "its header requires"),
+        (data + b"\0", "its header requires"),
         (data[:100], "is it damaged?"),
         (data.replace(b"property float x\n", b"property float q\n", 1), "it lacks x"),
         (data.replace(b"binary_little_endian", b"ascii", 1), "is it damaged?"),
@@ -49,11 +49,11 @@ def test_scans_that_are_missing_or_damaged_are_told(run, capsys, form):
         assert "lidar/front/000001.ply: " in line
         assert rule in line
     file.unlink()
-    assert "though dataset.yaml says that it is done; was it removed?" in fails(capsys, run, form)
+    assert "although dataset.yaml lists it as done; was it removed?" in fails(capsys, run, form)
 
 
 @pytest.mark.parametrize("form", ["kitti", "tum", "mcap"])
-def test_images_that_are_missing_or_damaged_are_told(run, capsys, form):
+def test_missing_and_damaged_images_are_reported(run, capsys, form):
     file = run / "camera/right/000001.png"
     data = file.read_bytes()
     for spoiled in (data[:-10], b"", data[:12] + b"JUNK" + data[16:], None):
@@ -68,14 +68,14 @@ def test_images_that_are_missing_or_damaged_are_told(run, capsys, form):
 
 
 @pytest.mark.parametrize("form", ["kitti", "tum", "mcap"])
-def test_a_first_picture_that_is_missing_does_not_hide_the_others(run, capsys, form):
+def test_a_missing_first_picture_is_reported(run, capsys, form):
     (run / "camera/left/000000.png").unlink()
     line = fails(capsys, run, form, "--camera", "left", "--camera", "right")
     assert "camera/left/000000.png: " in line
     assert "was it removed?" in line
 
 
-def test_points_that_lie_nowhere_are_told(run, capsys):
+def test_points_with_invalid_coordinates_or_times_are_reported(run, capsys):
     file = run / "lidar/front/000001.ply"
     data = file.read_bytes()
     begin = data.index(b"end_header\n") + len(b"end_header\n")
@@ -83,10 +83,10 @@ def test_points_that_lie_nowhere_are_told(run, capsys):
         spoiled = bytearray(data)
         spoiled[begin + place : begin + place + 4] = np.float32(value).tobytes()
         file.write_bytes(spoiled)
-        assert "points that lie nowhere, or at no time" in fails(capsys, run, "npz")
+        assert "points with invalid coordinates or times" in fails(capsys, run, "npz")
 
 
-def test_depths_that_are_missing_or_damaged_are_told(run, capsys):
+def test_missing_and_damaged_depths_are_reported(run, capsys):
     file = run / "camera/eye/000001.exr"
     data = file.read_bytes()
     for spoiled in (data[: len(data) // 2], data[:40], b"", None):
@@ -97,13 +97,13 @@ def test_depths_that_are_missing_or_damaged_are_told(run, capsys):
 
 
 @pytest.mark.parametrize("form", ["kitti", "pcd", "npz", "las", "mcap"])
-def test_paths_that_are_broken_are_told(run, capsys, form):
+def test_broken_trajectories_are_reported(run, capsys, form):
     file = run / "poses/top.tum"
     lines = file.read_text().splitlines()
     for spoiled, rule in (
         ([*lines[:-1], lines[-1][:40]], "eight finite numbers"),
         ([*lines, lines[-1]], "its times do not increase"),
-        ([*lines[:-1], re.sub(r"\S+$", "7", lines[-1])], "the quaternion must be of length 1"),
+        ([*lines[:-1], re.sub(r"\S+$", "7", lines[-1])], "the quaternion must have length 1"),
         ([*lines[:-1], re.sub(r"\S+$", "nan", lines[-1])], "eight finite numbers"),
         (["# nothing"], "it has no pose"),
         (lines[20:], "the path begins at"),
@@ -121,7 +121,7 @@ ABSURD = ["inf", "-inf", "nan", "1e30", "-1e30", "1e999999999", "5000000000", "s
 
 @pytest.mark.parametrize("form", ["kitti", "tum", "npz", "laz", "mcap"])
 @pytest.mark.parametrize("time", ABSURD)
-def test_times_that_cannot_be_are_told(run, capsys, form, time):
+def test_times_out_of_range_are_reported(run, capsys, form, time):
     """Stamps, the origin, lines of paths, and exposures."""
     sensor = "left" if form == "tum" else "top"
     for name, place, told in (
@@ -141,21 +141,21 @@ def test_times_that_cannot_be_are_told(run, capsys, form, time):
 
 
 @pytest.mark.parametrize("form", ["kitti", "npz", "laz", "mcap"])
-def test_a_scan_long_after_its_path_is_told(run, capsys, form):
+def test_a_scan_long_after_its_trajectory_is_reported(run, capsys, form):
     record = run / "dataset.yaml"
     text = re.sub(
         r"(sensor: \"bare-16\", frame: 2,.*? stamp_s: )[^,}]+", r"\g<1>4e9", record.read_text()
     )
     assert "4e9" in text
     record.write_text(text)
-    options = ["--no-images"] if form == "kitti" else []  # else scans without an image are left out
+    options = ["--no-images"] if form == "kitti" else []  # else scans without an image are skipped
     line = fails(capsys, run, form, "--lidar", "bare-16", *options)
-    assert "is asked for 4000000000.0" in line
+    assert "but 4000000000.0" in line
     assert "the path ends at 0." in line
 
 
-def test_damage_anywhere_gives_one_error_or_none(run, capsys):
-    """Bits flipped and ends cut at random, in all that is read but pixels and points."""
+def test_random_damage_causes_one_error_or_none(run, capsys):
+    """Random bits are flipped and ends cut, in everything except pixels and points."""
     random = np.random.default_rng(3)
     files = ["dataset.yaml", "poses/front.tum", "calibration/front.yaml", "calibration/left.yaml"]
     files += ["calibration/left.ros.yaml", "lidar/front/000000.ply"]

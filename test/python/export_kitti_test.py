@@ -33,7 +33,7 @@ def frame_times_s():
 
 
 @pytest.mark.parametrize(("sequence", "lidar"), [("00", "front"), ("01", "bare-16")])
-def test_pykitti_puts_every_point_where_the_truth_is(kitti, sequence, lidar):
+def test_pykitti_places_every_point_at_its_true_position(kitti, sequence, lidar):
     read = pykitti.odometry(kitti, sequence)
     times_s = frame_times_s()
     assert len(read) == len(times_s) == 3
@@ -50,7 +50,7 @@ def test_pykitti_puts_every_point_where_the_truth_is(kitti, sequence, lidar):
         np.testing.assert_allclose(in_world, world_of(rows), atol=3e-4)
 
 
-def test_poses_are_those_of_the_left_camera_seen_from_its_first(kitti):
+def test_poses_are_left_camera_poses_relative_to_the_first(kitti):
     read = pykitti.odometry(kitti, "00")
     times_s = frame_times_s()
     first = np.linalg.inv(pose_between("left", times_s[0]))
@@ -77,8 +77,8 @@ def test_cameras_are_the_rectified_pair(kitti):
 
 
 @pytest.mark.parametrize(("sequence", "lidar"), [("00", "front"), ("01", "bare-16")])
-def test_points_fall_on_the_pixels_that_show_them(kitti, sequence, lidar):
-    """The oracle is the run's own table of where its image shows which echo."""
+def test_points_project_to_the_pixels_that_show_them(kitti, sequence, lidar):
+    """The oracle is the run's table of echoes and their pixels."""
     read = pykitti.odometry(kitti, sequence)
     checked = 0
     for i, (_, rows) in enumerate(scans(lidar)):
@@ -97,8 +97,8 @@ def test_points_fall_on_the_pixels_that_show_them(kitti, sequence, lidar):
     assert checked > 1000
 
 
-def test_depths_of_images_agree_with_the_points_that_fall_on_them(kitti):
-    """On the plane that the truth has at the pixel, where it and its neighbours show ground."""
+def test_image_depths_agree_with_projected_points(kitti):
+    """Compared on the true plane of the pixel, where it and its neighbours show ground."""
     import OpenEXR
 
     read = pykitti.odometry(kitti, "01")
@@ -149,7 +149,7 @@ def test_without_images_every_scan_is_a_frame(semantic):
 
 
 def instances_of(folder, labels, instances):
-    """What instances.txt makes of the dataset's numbers; themselves, if there is none."""
+    """Maps the dataset's instances by instances.txt; returns them unchanged without it."""
     file = folder / "instances.txt"
     if not file.exists():
         return instances
@@ -160,7 +160,7 @@ def instances_of(folder, labels, instances):
     return np.array([here[pair] if pair[1] else 0 for pair in pairs])
 
 
-def test_labels_are_those_of_the_points_in_their_order(semantic):
+def test_labels_are_in_the_order_of_the_points(semantic):
     folder = semantic / "sequences/08"
     for i, (_, rows) in enumerate(scans("top")):
         scan = np.fromfile(folder / f"velodyne/{i:06}.bin", dtype=np.float32).reshape(-1, 4)
@@ -172,7 +172,7 @@ def test_labels_are_those_of_the_points_in_their_order(semantic):
     assert {10, 40, 70, 72} <= set(np.unique(label & 0xFFFF))
 
 
-def test_a_map_gives_other_labels_and_keeps_instances_of_some(tmp_path):
+def test_a_label_map_replaces_labels_and_keeps_selected_instances(tmp_path):
     (tmp_path / "map.yaml").write_text("labels: {10: 252, 40: 49}\nothers: 70\ninstances: [10]\n")
     options = ["--labels", str(tmp_path / "map.yaml"), "--lidar", "bare-16", "--no-images"]
     assert export("semantic-kitti", tmp_path / "out", *options) == 0
@@ -186,7 +186,7 @@ def test_a_map_gives_other_labels_and_keeps_instances_of_some(tmp_path):
     assert np.any(kept)
 
 
-def test_a_map_without_a_label_that_is_seen_is_an_error(tmp_path, capsys):
+def test_a_label_map_without_an_occurring_label_is_rejected(tmp_path, capsys):
     (tmp_path / "map.yaml").write_text("labels: {40: 49}\n")
     options = ["--labels", str(tmp_path / "map.yaml"), "--lidar", "top", "--no-images"]
     assert export("semantic-kitti", tmp_path / "out", *options) == 1
@@ -194,7 +194,7 @@ def test_a_map_without_a_label_that_is_seen_is_an_error(tmp_path, capsys):
     assert sorted(each.name for each in tmp_path.iterdir()) == ["map.yaml"]
 
 
-def test_instances_beyond_16_bits_are_numbered_anew_and_told():
+def test_instances_beyond_16_bits_are_renumbered():
     from groundray.dataset import Dataset, ObjectGroup
     from groundray.export.labels import Instances, LabelMap
 

@@ -59,7 +59,7 @@ def everything():
     return whole_bag()[1]
 
 
-def test_definitions_in_the_bag_are_those_of_ros(bag):
+def test_message_definitions_match_those_of_ros(bag):
     from mcap.reader import make_reader
 
     with next(bag.glob("*.mcap")).open("rb") as file:
@@ -73,7 +73,7 @@ def test_definitions_in_the_bag_are_those_of_ros(bag):
             assert fields == TYPES.FIELDDEFS[name], name
 
 
-def test_topics_follow_each_other_in_time_and_static_transforms_are_latched(bag, everything):
+def test_messages_are_in_time_order_and_static_transforms_are_latched(bag, everything):
     times_ns = [time_ns for _, time_ns, _ in everything]
     assert times_ns == sorted(times_ns)
     assert everything[0][0] == "/tf_static"
@@ -99,7 +99,7 @@ def test_topics_follow_each_other_in_time_and_static_transforms_are_latched(bag,
 
 
 @pytest.mark.parametrize("lidar", ["top", "front", "bare-16"])
-def test_full_points_are_the_rows_of_the_scan(everything, lidar):
+def test_the_full_layout_contains_the_rows_of_the_scan(everything, lidar):
     topic = lidar.replace("-", "_")
     read = of(everything, f"/{topic}/points")
     for (time_ns, message), (begin_s, rows) in zip(read, scans(lidar), strict=True):
@@ -113,7 +113,7 @@ def test_full_points_are_the_rows_of_the_scan(everything, lidar):
 
 
 @pytest.mark.parametrize("layout", LAYOUTS)
-def test_layouts_of_drivers_have_their_fields_where_those_have_them(tmp_path, layout):
+def test_driver_layouts_have_the_field_offsets_of_the_drivers(tmp_path, layout):
     assert (
         export("mcap", tmp_path / "out", "--points", layout, "--lidar", "top", "--no-images") == 0
     )
@@ -150,7 +150,7 @@ def test_layouts_of_drivers_have_their_fields_where_those_have_them(tmp_path, la
 
 
 def expected_return_types(rows):
-    """Pulse by pulse: 7 alone; of two the first 3 or 5, the last 6 or 4, as it is the stronger."""
+    """By pulse: 7 for one return; of two the first 3 or 5, the last 6 or 4, by strength."""
     types = np.zeros(len(rows), int)
     for i, row in enumerate(rows):
         if row["return_count"] == 1:
@@ -162,7 +162,7 @@ def expected_return_types(rows):
     return types
 
 
-def test_images_are_the_pictures_and_depths_of_the_run(everything):
+def test_images_match_the_pictures_and_depths_of_the_run(everything):
     for camera in ("left", "right"):
         infos = of(everything, f"/{camera}/camera_info")
         images = of(everything, f"/{camera}/image_raw")
@@ -188,7 +188,7 @@ def test_images_are_the_pictures_and_depths_of_the_run(everything):
     ("encoding", "shape", "kind"),
     [("mono8", (), "u1"), ("mono16", (), "<u2"), ("rgb16", (3,), "<u2")],
 )
-def test_pictures_of_any_kind_keep_their_values(tmp_path, encoding, shape, kind):
+def test_pictures_of_any_encoding_keep_their_values(tmp_path, encoding, shape, kind):
     run = shutil.copytree(run_folder(), tmp_path / "run")
     random = np.random.default_rng(9)
     pictures = random.integers(0, 256 ** np.dtype(kind).itemsize, (3, 72, 96, *shape)).astype(kind)
@@ -207,7 +207,7 @@ def test_pictures_of_any_kind_keep_their_values(tmp_path, encoding, shape, kind)
     assert folders == ({"image_2", "image_3"} if shape else {"image_0", "image_1"})
 
 
-def test_camera_infos_are_those_of_the_rectified_pair(everything):
+def test_camera_infos_match_the_rectified_pair(everything):
     for camera in ("left", "right"):
         file = run_folder() / f"calibration/{camera}.ros.yaml"
         expected = yaml.safe_load(file.read_text())
@@ -255,7 +255,7 @@ def test_stamps_of_a_recorded_clock_keep_their_nanoseconds(tmp_path):
     assert names == [f"{sec}.{nanosec:09}" for sec, nanosec in expected]
 
 
-def test_mcap_ros2_reads_the_bag_too(bag):
+def test_mcap_ros2_reads_the_bag(bag):
     from mcap.reader import make_reader
     from mcap_ros2.decoder import DecoderFactory
 
@@ -267,7 +267,7 @@ def test_mcap_ros2_reads_the_bag_too(bag):
         assert message.width == len(read_scan(dataset(), lidar, frame))
 
 
-def test_a_lens_that_ros_has_no_words_for_is_refused(tmp_path, capsys):
+def test_a_lens_without_an_equivalent_in_ros_is_rejected(tmp_path, capsys):
     shutil.copytree(run_folder(), tmp_path / "run")
     (tmp_path / "run/calibration/eye.ros.yaml").unlink()
     calibration = tmp_path / "run/calibration/eye.yaml"
@@ -277,7 +277,7 @@ def test_a_lens_that_ros_has_no_words_for_is_refused(tmp_path, capsys):
     calibration.write_text(text[:begin] + lens + text[text.index("\n", begin) :])
     assert export("mcap", tmp_path / "out", source=tmp_path / "run") == 1
     told = capsys.readouterr().err
-    assert "camera eye is a eucm, which CameraInfo has no words for" in told
-    assert "leave it out" in told
+    assert "camera eye has the lens eucm, unknown to CameraInfo" in told
+    assert "exclude it" in told
     options = ["--camera", "left", "--camera", "right"]
     assert export("mcap", tmp_path / "out", *options, source=tmp_path / "run") == 0

@@ -1,4 +1,4 @@
-"""Paths between and beyond their lines, and rotations as quaternions."""
+"""Interpolation and extrapolation of paths, and rotations as quaternions."""
 
 import numpy as np
 import pytest
@@ -26,7 +26,7 @@ def twist(turn, move):
 
 
 @pytest.mark.parametrize("turn", [(0.3, -1.7, 2.1), (0, 0, 1e-9), (0, 0, 0), (0, 3.1, 0)])
-def test_a_constant_twist_is_followed_exactly_between_and_beyond_lines(tmp_path, turn):
+def test_a_constant_twist_is_interpolated_and_extrapolated_exactly(tmp_path, turn):
     """The oracle is SciPy's exponential of a matrix; lines are a second apart."""
     generator, begin = twist(turn, (5.0, -2.0, 0.4)), twist((0.2, 0.5, -0.9), (100, -30, 7))
     path = write(
@@ -41,17 +41,17 @@ def test_a_constant_twist_is_followed_exactly_between_and_beyond_lines(tmp_path,
         np.testing.assert_allclose(p_m, expected[:3, 3], atol=1e-11)
 
 
-def test_a_path_of_one_line_stands_and_none_goes_back(tmp_path):
+def test_a_single_pose_is_constant_and_earlier_times_are_rejected(tmp_path):
     pose = expm(twist((0.1, 0.2, 0.3), (1, 2, 3)))
     path = write(tmp_path / "a.tum", [5], [pose])
     np.testing.assert_allclose(path.pose_at(9 * 10**9), pose, atol=1e-15)
     with pytest.raises(
-        Exception, match=r"a\.tum: the path begins at 5\.0 s but is asked for 4\.0 s"
+        Exception, match=r"a\.tum: the path begins at 5\.0 s, but 4\.0 s is requested"
     ):
         path.pose_at(4 * 10**9)
     path.pose_at(3605 * 10**9)
     with pytest.raises(
-        Exception, match=r"a\.tum: the path ends at 5\.0 s but is asked for 3606\.0 s"
+        Exception, match=r"a\.tum: the path ends at 5\.0 s, but 3606\.0 s is requested"
     ):
         path.pose_at(3606 * 10**9)
     rotations, positions_m = path.at(np.zeros(0, np.int64))
@@ -59,7 +59,7 @@ def test_a_path_of_one_line_stands_and_none_goes_back(tmp_path):
     assert positions_m.shape == (0, 3)
 
 
-def test_lines_are_where_the_run_wrote_them():
+def test_poses_match_the_lines_of_the_file():
     for sensor in (*dataset().lidars, *dataset().cameras):
         file = dataset().path_file(sensor)
         table = np.loadtxt(file)
@@ -71,7 +71,7 @@ def test_lines_are_where_the_run_wrote_them():
         np.testing.assert_allclose(rotations, expected, atol=1e-14)
 
 
-def test_quaternions_are_those_of_scipy_at_any_angle():
+def test_quaternions_match_scipy_at_any_angle():
     turns = Rotation.random(1000, rng=np.random.default_rng(4)).as_matrix()
     axes = np.eye(3)
     half_turns = [2 * np.outer(a, a) - np.eye(3) for a in (*axes, np.ones(3) / np.sqrt(3))]

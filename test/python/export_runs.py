@@ -153,7 +153,7 @@ def names_in(folder):
 
 
 def fails(capsys, run, form, *options, code=1):
-    """The one line that the command says; nothing is written, no folder above it either."""
+    """Returns the command's only line; nothing is written, not even a parent folder."""
     before = names_in(run.parent)
     assert export(form, run.parent / "a/b/out", *options, source=run) == code
     told = capsys.readouterr()
@@ -165,7 +165,7 @@ def fails(capsys, run, form, *options, code=1):
 
 
 def scans(name: str):
-    """The scans of a lidar as plyfile reads them, with their stamps in seconds."""
+    """Yields the scans of a lidar read by plyfile, with their stamps in seconds."""
     import plyfile
 
     record = yaml.safe_load((run_folder() / "dataset.yaml").read_text())
@@ -180,12 +180,12 @@ def world_of(rows) -> np.ndarray:
 
 
 def still(rows) -> np.ndarray:
-    """Which points are of things that stand."""
+    """Returns a mask of points on static objects."""
     return (rows["vx"] == 0) & (rows["vy"] == 0) & (rows["vz"] == 0)
 
 
 def mount(name: str, key: str) -> np.ndarray:
-    """A pose of the calibration, by SciPy."""
+    """Returns a pose of the calibration, by SciPy."""
     from scipy.spatial.transform import Rotation
 
     said = yaml.safe_load((run_folder() / f"calibration/{name}.yaml").read_text())[key]
@@ -196,7 +196,7 @@ def mount(name: str, key: str) -> np.ndarray:
 
 
 def poses_between(name: str, times_s) -> tuple[np.ndarray, np.ndarray]:
-    """Rotations and places of a sensor in D, between lines of its path by slerp and straight on."""
+    """Returns rotations and positions of a sensor in D by slerp and linear interpolation."""
     from scipy.spatial.transform import Rotation, Slerp
 
     table = np.loadtxt(run_folder() / f"poses/{name}.tum")
@@ -206,7 +206,7 @@ def poses_between(name: str, times_s) -> tuple[np.ndarray, np.ndarray]:
 
 
 def pose_between(name: str, time_s: float) -> np.ndarray:
-    """One of these poses as a 4 x 4 matrix."""
+    """Returns one of these poses as a 4 x 4 matrix."""
     X = np.eye(4)
     X[:3, :3], X[:3, 3] = poses_between(name, time_s)
     return X

@@ -1,4 +1,4 @@
-"""Transforms and camera infos of bags: where they put points, in the world and on pixels."""
+"""Transforms and camera infos of bags: positions of points in the world and in images."""
 
 import cv2
 import numpy as np
@@ -15,7 +15,7 @@ def everything():
 
 
 class Frames:
-    """Transforms of /tf and /tf_static, looked up as tf2 does: straight on, and by slerp."""
+    """Transforms of /tf and /tf_static, interpolated as in tf2: linearly, and by slerp."""
 
     def __init__(self, everything):
         self.fixed, times, moved = {}, [], []
@@ -36,7 +36,7 @@ class Frames:
         self.times_ns, self.moved = np.array(times), np.array(moved)
 
     def in_map(self, points, frame, times_ns):
-        """Points of a frame at times to the map."""
+        """Transforms points of a frame, each at its time, to the map."""
         fixed = np.array(self.fixed[frame])
         points = Rotation.from_quat(fixed[3:]).apply(points) + fixed[:3]
         turns = Slerp(self.times_ns - self.times_ns[0], Rotation.from_quat(self.moved[:, 3:]))
@@ -48,7 +48,7 @@ class Frames:
         return turns(since).apply(points) + np.stack(places, axis=-1)
 
     def in_sensor(self, points, frame, time_ns):
-        """Points of the map to a frame at one time."""
+        """Transforms points of the map to a frame at one time."""
         X = np.eye(4)
         for axis in range(3):
             X[:3, axis] = self.in_map(np.eye(3)[[axis]], frame, [time_ns])[0]
@@ -58,7 +58,7 @@ class Frames:
 
 
 @pytest.mark.parametrize("lidar", ["front", "bare-16"])
-def test_transforms_put_points_where_the_truth_is(everything, lidar):
+def test_transforms_place_points_at_their_true_positions(everything, lidar):
     frames = Frames(everything)
     topic = lidar.replace("-", "_")
     for _, message in of(everything, f"/{topic}/points"):
@@ -72,8 +72,8 @@ def test_transforms_put_points_where_the_truth_is(everything, lidar):
 
 
 @pytest.mark.parametrize("camera", ["left", "eye"])
-def test_transforms_and_camera_infos_put_points_on_their_pixels(everything, camera):
-    """OpenCV projects; the oracle is the run's own table of where its image shows which echo."""
+def test_transforms_and_camera_infos_project_points_to_their_pixels(everything, camera):
+    """OpenCV projects; the oracle is the run's table of echoes and their pixels."""
     frames = Frames(everything)
     bare = list(scans("bare-16"))
     said = yaml.safe_load((run_folder() / f"calibration/{camera}.yaml").read_text())

@@ -20,13 +20,13 @@ def stamps_s(camera):
 
 
 def read_list(file):
-    """As TUM's tools do: time and the rest of each line that is no comment."""
+    """Reads a list as TUM's tools do: time and rest of each line except comments."""
     lines = [line for line in file.read_text().splitlines() if line and not line.startswith("#")]
     return {float(line.split()[0]): line.split()[1:] for line in lines}
 
 
 def associate(first, second, max_difference_s):
-    """The pairs that TUM's tools would make: closest first, each time once."""
+    """Returns pairs as TUM's tools do: closest first, each time once."""
     close = sorted(
         (abs(a - b), a, b) for a in first for b in second if abs(a - b) < max_difference_s
     )
@@ -51,7 +51,7 @@ def depths_m(camera, i):
 
 
 @pytest.mark.parametrize("camera", ["left", "right", "eye"])
-def test_depths_are_those_of_the_images_in_fifths_of_a_millimetre(tum, camera):
+def test_depths_match_the_images_in_steps_of_a_fifth_of_a_millimetre(tum, camera):
     listed = read_list(tum / camera / "depth.txt")
     np.testing.assert_allclose(sorted(listed), stamps_s(camera), atol=1e-9)
     for i, (_, (name,)) in enumerate(sorted(listed.items())):
@@ -66,7 +66,7 @@ def test_depths_are_those_of_the_images_in_fifths_of_a_millimetre(tum, camera):
         np.testing.assert_allclose(depth[is_told] / 5000, expected_m[is_told], atol=0.5001 / 5000)
 
 
-def test_pictures_are_those_of_the_run_and_go_with_depths_and_poses(tum):
+def test_pictures_match_the_run_and_are_associated_with_depths_and_poses(tum):
     folder = tum / "left"
     pictures, depths = read_list(folder / "rgb.txt"), read_list(folder / "depth.txt")
     poses = read_list(folder / "groundtruth.txt")
@@ -80,7 +80,7 @@ def test_pictures_are_those_of_the_run_and_go_with_depths_and_poses(tum):
         assert matches[time_s] == pytest.approx(time_s, abs=1e-9)
 
 
-def test_evo_reads_the_path_of_the_run(tum):
+def test_evo_reads_the_trajectory_of_the_run(tum):
     pytest.importorskip("evo", reason="pip install -r test/requirements.txt")
     from evo.tools import file_interface
 
@@ -95,12 +95,12 @@ def test_evo_reads_the_path_of_the_run(tum):
             np.testing.assert_allclose(pose, pose_between("left", time_s), atol=1e-4)
 
 
-def test_a_single_camera_is_the_folder_itself_and_depths_may_have_another_scale(tmp_path, capsys):
+def test_a_single_camera_has_no_subfolder_and_the_depth_scale_is_selectable(tmp_path, capsys):
     assert export("tum", tmp_path / "out", "--camera", "eye", "--depth-per-m", "500") == 0
     told = capsys.readouterr().out
     assert "note: camera eye has no pictures (product picture): there is no rgb.txt" in told
-    assert "a metre of depth is 500, where TUM's is 5000" in told
-    assert "rows of eye are exposed one after another" in told
+    assert "a metre of depth is 500, not TUM's 5000" in told
+    assert "camera eye has a rolling shutter" in told
     assert not (tmp_path / "out/rgb.txt").exists()
     ((_, (name,)), *_) = sorted(read_list(tmp_path / "out/depth.txt").items())
     depth = cv2.imread(str(tmp_path / "out" / name), cv2.IMREAD_UNCHANGED)

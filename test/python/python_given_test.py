@@ -1,4 +1,4 @@
-"""What Python hands over is taken as it is meant, or refused in words."""
+"""Arguments from Python are converted, or rejected with a message."""
 
 import os
 import shutil
@@ -16,7 +16,7 @@ CORNERS = [[0, 0, 0], [1, 0, 0], [1, 1, 0], [0, 1, 0]]
 
 
 @pytest.mark.parametrize("scale", [1, 5e-324, 1e-310, 1e-200, 1e-160, 1e160, 3e305])
-def test_directions_are_of_any_length(scale):
+def test_directions_may_have_any_length(scale):
     # z = 0 from above: of a direction (a, b, -c) the range is height |direction| / c.
     terrain = groundray.Terrain(np.zeros((50, 50), np.float32))
     steps = np.array([[0, 0, -4.0], [1, 2, -2], [-3, 0, -4], [2, -1, -2]])
@@ -27,7 +27,7 @@ def test_directions_are_of_any_length(scale):
     assert np.allclose(rays["world_x_m"] - 25, 10 * steps[:, 0] / -steps[:, 2], atol=1e-11)
 
 
-def test_directions_of_no_length_or_without_bound_are_refused():
+def test_zero_and_non_finite_directions_are_rejected():
     terrain = groundray.Terrain(np.zeros((5, 5), np.float32))
     for direction in ([0, 0, 0], [0, 0, -np.inf], [np.nan, 0, -1]):
         with pytest.raises(groundray.Error, match=r"ray 0: .* must be finite, and the direction"):
@@ -35,7 +35,7 @@ def test_directions_of_no_length_or_without_bound_are_refused():
 
 
 @pytest.mark.parametrize("dtype", [np.int8, np.uint16, np.int32, np.uint32, np.int64, np.uint64])
-def test_vertices_are_named_by_integers_of_any_width(dtype):
+def test_vertex_indices_may_be_integers_of_any_width(dtype):
     triangles = np.array([[0, 1, 2], [0, 2, 3]], dtype)
     mesh = groundray.Mesh(CORNERS, triangles)
     assert np.array_equal(mesh.triangles, triangles)
@@ -57,7 +57,7 @@ def test_vertices_are_named_by_integers_of_any_width(dtype):
         [[0, 1, None]],
     ],
 )
-def test_vertices_are_not_named_by_fractions_or_truths(triangles):
+def test_vertex_indices_must_be_integers(triangles):
     with pytest.raises(TypeError, match=r"triangles: numpy\.typing\.NDArray\[numpy\.integer"):
         groundray.Mesh(CORNERS, triangles)
 
@@ -67,7 +67,7 @@ def test_a_mesh_may_have_no_triangles():
 
 
 class Failing:
-    """What fails to become an array."""
+    """An object whose conversion to an array fails."""
 
     def __init__(self, error):
         self.error = error
@@ -77,7 +77,7 @@ class Failing:
 
 
 @pytest.mark.parametrize("error", [MemoryError, KeyboardInterrupt, RuntimeError])
-def test_what_python_raised_while_an_array_was_made_is_raised(error):
+def test_exceptions_during_array_conversion_propagate(error):
     terrain = groundray.Terrain(np.zeros((5, 5), np.float32))
     failing = Failing(error("of its own"))
     with pytest.raises(error, match="of its own"):
@@ -97,28 +97,26 @@ def test_what_python_raised_while_an_array_was_made_is_raised(error):
 
 
 @pytest.mark.parametrize("error", [TypeError, ValueError])
-def test_what_is_no_array_is_told_by_the_signature(error):
+def test_arguments_that_are_not_arrays_report_the_signature(error):
     with pytest.raises(TypeError, match=r"heights_at\(self, places_m: numpy\.typing\.ArrayLike"):
         groundray.Terrain(np.zeros((5, 5))).heights_at(Failing(error("of its own")))
 
 
-def test_rasters_that_belong_together_are_alike():
+def test_rasters_of_one_call_must_have_the_same_shape():
     heights_m = np.zeros((4, 6), np.float32)
     with pytest.raises(
         groundray.Error,
-        match=r"smooth_dem: variance_m2 is of 6 x 4 samples, but heights_m of 4 x 6; they must be",
+        match=r"smooth_dem: variance_m2 has 6 x 4 samples, but heights_m has 4 x 6; they must",
     ):
         groundray.smooth_dem(heights_m, np.full((6, 4), 0.01), cell_m=1)
-    with pytest.raises(
-        groundray.Error, match=r"fill_dem: most_m is of 3 x 8 samples, but .* 4 x 6"
-    ):
+    with pytest.raises(groundray.Error, match=r"fill_dem: most_m has 3 x 8 samples, but .* 4 x 6"):
         groundray.fill_dem(heights_m, cell_m=1, most_m=np.zeros((3, 8)))
 
 
 NOISE = {"divergence_rad": -1e-3, "position_sd_m": float("nan"), "attitude_sd_rad": float("inf")}
 
 
-def test_noise_below_nothing_is_named_with_every_fault():
+def test_invalid_noise_of_points_reports_every_fault():
     points = [[0, 0, 0]] * 2, [[0, 0, 1]] * 2, [0.1, 0.1]
     with pytest.raises(groundray.Error) as raised:
         groundray.fuse_points(*points, cell_m=1, **NOISE)
@@ -130,7 +128,7 @@ def test_noise_below_nothing_is_named_with_every_fault():
             groundray.fuse_points(*points, cell_m=1, **{name: value})
 
 
-def test_noise_of_scans_is_named_with_every_fault(tmp_path):
+def test_invalid_noise_of_scans_reports_every_fault(tmp_path):
     terrain = groundray.Terrain(small_scene.heights_m(), small_scene.CELL_M)
     scene = groundray.scene(small_scene.spec(tmp_path), folder=tmp_path, terrain=terrain)
     scan = scene.lidar("roof").scan(frame=0)
@@ -140,7 +138,7 @@ def test_noise_of_scans_is_named_with_every_fault(tmp_path):
     assert all(name in str(raised.value) for name in NOISE)
 
 
-def test_a_mesh_is_refused_with_every_fault():
+def test_an_invalid_mesh_reports_every_fault():
     with pytest.raises(groundray.Error) as raised:
         groundray.Mesh(
             CORNERS,
@@ -166,12 +164,12 @@ def test_a_mesh_is_refused_with_every_fault():
     assert list(kept.confidence) == [0, 1, 0.5, 0.25]
 
 
-def test_tolerances_of_meshes_are_refused_for_what_is_none(tmp_path):
+def test_within_m_is_rejected_for_anything_but_meshes(tmp_path):
     terrain = groundray.Terrain(small_scene.heights_m(20, 20))
     file = tmp_path / "ground.tif"
     terrain.save(file)
     with pytest.raises(
-        groundray.Error, match=r"compare: within_m is for meshes, but .*ground\.tif"
+        groundray.Error, match=r"compare: within_m requires meshes, but .*ground\.tif"
     ):
         groundray.compare(file, file, within_m=[0.1])
     with pytest.raises(TypeError, match="within_m"):
@@ -179,7 +177,7 @@ def test_tolerances_of_meshes_are_refused_for_what_is_none(tmp_path):
     assert groundray.compare(file, file)["figures"]
 
 
-def test_data_beside_the_module_goes_before_a_strangers(tmp_path):
+def test_data_beside_the_module_takes_precedence_over_the_prefix(tmp_path):
     # A Python whose prefix has a share/groundray of somebody else, with another preset of the name.
     program = tmp_path / "stranger/bin/python"
     foreign = tmp_path / "stranger/share/groundray/sensors"

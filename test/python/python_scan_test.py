@@ -1,4 +1,4 @@
-"""Scans from Python: the bytes of `groundray generate`, without copies, by any threads."""
+"""Scans from Python: the same bytes as `groundray generate`, without copies, from any thread."""
 
 import gc
 import subprocess
@@ -15,7 +15,7 @@ from groundray._scene import to_yaml
 
 @pytest.fixture(scope="module")
 def made(tmp_path_factory):
-    """A dataset by the program, and the same scene in Python."""
+    """A dataset made by the program, and the same scene in Python."""
     folder = tmp_path_factory.mktemp("python_scan")
     terrain = groundray.Terrain(small_scene.heights_m(), small_scene.CELL_M)
     terrain.save(folder / "ground.tif")
@@ -32,7 +32,7 @@ def lidar(made):
 
 
 @pytest.mark.parametrize("sensor", ["roof", "light"])
-def test_scan_from_python_has_the_bytes_of_the_generator(made, sensor):
+def test_scan_from_python_has_the_same_bytes_as_generate(made, sensor):
     folder, scene = made
     for frame in range(2):
         scan = scene.lidar(sensor).scan(frame=frame)
@@ -44,7 +44,7 @@ def test_scan_from_python_has_the_bytes_of_the_generator(made, sensor):
             assert scan[name].tobytes() == file[name].tobytes(), name
 
 
-def test_what_comes_with_a_scan_has_the_bytes_of_the_generator(made):
+def test_no_returns_and_waveforms_have_the_same_bytes_as_generate(made):
     folder, scene = made
     scan = scene.lidar("light").scan(frame=1)
     begin = folder / "out/lidar/light/000001"
@@ -58,7 +58,7 @@ def test_what_comes_with_a_scan_has_the_bytes_of_the_generator(made):
     assert scene.lidar("roof").scan(frame=0).waveforms is None
 
 
-def test_a_scene_of_dicts_is_the_scene_of_its_file(made):
+def test_a_scene_from_dicts_equals_the_scene_from_its_file(made):
     folder, scene = made
     spec = small_scene.spec(folder)
     terrain = groundray.Terrain(small_scene.heights_m(), small_scene.CELL_M)
@@ -72,7 +72,7 @@ def test_a_scene_of_dicts_is_the_scene_of_its_file(made):
     assert (other["range_true_m"][:100] == theirs["range_true_m"][:100]).all()
 
 
-def test_a_scan_is_asked_for_by_time_or_by_number(lidar):
+def test_a_scan_is_selected_by_time_or_number(lidar):
     times_s = lidar.times_s
     assert len(times_s) == 2
     scan = lidar.scan(t_s=times_s[1])
@@ -83,7 +83,7 @@ def test_a_scan_is_asked_for_by_time_or_by_number(lidar):
         lidar.scan(t_s=0.05)
     with pytest.raises(groundray.Error, match="there is no frame 2; the scene has 2"):
         lidar.scan(frame=2)
-    with pytest.raises(groundray.Error, match="give t_s, when the frame begins, or frame"):
+    with pytest.raises(groundray.Error, match="give either t_s, when the frame begins, or frame"):
         lidar.scan()
     with pytest.raises(groundray.Error, match="t_s = nan"):
         lidar.scan(t_s=float("nan"))
@@ -91,7 +91,7 @@ def test_a_scan_is_asked_for_by_time_or_by_number(lidar):
         lidar.scan(t_s="now")
 
 
-def test_columns_are_views_that_may_not_be_written_to(lidar):
+def test_columns_are_read_only_views(lidar):
     scan = lidar.scan(frame=0)
     for name in scan.columns:
         column = scan[name]
@@ -110,7 +110,7 @@ def test_columns_are_views_that_may_not_be_written_to(lidar):
     assert "x" not in scan
 
 
-def test_arrays_outlive_all_that_made_them(made):
+def test_arrays_outlive_the_scan_and_the_scene(made):
     folder, _ = made
     scan = groundray.load_scene(folder / "scene.yaml").lidar("light").scan(frame=0)
     column, power, none = scan["range_true_m"], scan.waveforms["power_w"], scan.no_returns
@@ -124,7 +124,7 @@ def test_arrays_outlive_all_that_made_them(made):
     assert len(none["pulse"]) == len(none)
 
 
-def test_memory_of_scans_is_given_back(lidar):
+def test_memory_of_scans_is_released(lidar):
     def resident_kb():
         with open("/proc/self/statm") as file:
             return int(file.read().split()[1]) * 4
@@ -137,7 +137,7 @@ def test_memory_of_scans_is_given_back(lidar):
     assert resident_kb() - before_kb < 50_000
 
 
-def test_scans_of_several_threads_at_once_have_the_same_bytes(made):
+def test_concurrent_scans_have_the_same_bytes(made):
     folder, scene = made
     wanted = [(sensor, frame) for sensor in ("roof", "light") for frame in (0, 1)] * 3
     alone = {key: scene.lidar(key[0]).scan(frame=key[1])["x_m"].tobytes() for key in set(wanted)}
@@ -156,7 +156,7 @@ def test_scans_of_several_threads_at_once_have_the_same_bytes(made):
     assert got == [alone[key] for key in wanted]
 
 
-def test_a_scan_from_python_costs_less_than_a_millisecond_more(made, tmp_path):
+def test_python_adds_less_than_a_millisecond_to_a_scan(made, tmp_path):
     (tmp_path / "few.csv").write_text("time_s,azimuth_deg,elevation_deg\n0.01,0,-20\n0.02,10,-20\n")
     (tmp_path / "few.yaml").write_text(
         "groundray_lidar: 1\nmodel: Two pulses\n"
@@ -176,7 +176,7 @@ def test_a_scan_from_python_costs_less_than_a_millisecond_more(made, tmp_path):
     assert min(spent_s) < 1e-3
 
 
-def test_faults_of_a_scene_are_told_as_the_program_tells_them(made, tmp_path):
+def test_errors_in_a_scene_are_those_of_the_program(made, tmp_path):
     folder, _ = made
     text = (folder / "scene.yaml").read_text().replace("speed_m_s: 5", "speed_km_h: 5")
     (folder / "wrong.yaml").write_text(text)
@@ -199,7 +199,7 @@ def test_faults_of_a_scene_are_told_as_the_program_tells_them(made, tmp_path):
         groundray.load_scene(tmp_path / "absent.yaml")
 
 
-def test_dicts_become_the_yaml_that_they_are():
+def test_dicts_round_trip_through_yaml():
     yaml = pytest.importorskip("yaml")
     spec = {
         "a": [1, 2.5, -1e-7, True, None, "x: y", "yes", '"', "a\\b", "ä", ""],

@@ -1,4 +1,4 @@
-"""The programs of docs/python.md run, and come to what they say."""
+"""The scripts of docs/guide/python.md run and print the expected results."""
 
 import re
 import subprocess
@@ -11,7 +11,7 @@ import small_scene
 
 def run(name, *arguments):
     done = subprocess.run(
-        [sys.executable, small_scene.ROOT / "docs" / name, *map(str, arguments)],
+        [sys.executable, small_scene.ROOT / "docs/guide" / name, *map(str, arguments)],
         capture_output=True,
         text=True,
         env={"PYTHONPATH": str(small_scene.PACKAGE)},
@@ -26,14 +26,14 @@ def number(pattern, text):
     return float(re.search(pattern, text).group(1))
 
 
-def test_program_of_a_first_scan_finds_its_noise_and_its_truth_again():
+def test_first_scan_script_recovers_noise_and_truth():
     told = run("python_first_scan.py")
     assert number(r"off by ([0-9.]+) mm RMS", told) == pytest.approx(20, abs=0.5)
     assert number(r"(\d+) on the rock", told) > 10
     assert number(r"rays agree to ([0-9.e-]+) m", told) < 5e-6  # a float of 30 m
 
 
-def test_program_of_reconstruction_finds_the_ground_again(tmp_path):
+def test_reconstruction_script_recovers_the_ground(tmp_path):
     told = run("python_reconstruct.py", tmp_path)
     assert number(r"it lies (\d+) mm RMS", told) < 30
     assert number(r"(\d+) % within two standard deviations", told) > 90

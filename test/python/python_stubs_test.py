@@ -1,4 +1,4 @@
-"""What the package tells people and type checkers of itself."""
+"""Docstrings and stubs of the package."""
 
 import inspect
 import pydoc
@@ -17,7 +17,7 @@ STRICT = "[mypy]\nstrict = True\n[mypy-groundray._core]\ndisallow_any_generics =
 
 
 def check(folder, text):
-    """Returns what mypy says of a program that uses the package."""
+    """Runs mypy on a program that uses the package."""
     (folder / "sample.py").write_text(text)
     return mypy(folder, STRICT, "sample.py")
 
@@ -34,7 +34,7 @@ def mypy(folder, settings, *what):
     )
 
 
-def test_types_of_a_program_are_checked_by_the_stubs(tmp_path):
+def test_stubs_let_mypy_check_a_program(tmp_path):
     right = check(
         tmp_path,
         """\
@@ -73,8 +73,8 @@ groundray.simplify("mesh.ply")
     assert kinds == ["3arg-type]", "4call-arg]", "5attr-defined]", "6arg-type]"], wrong.stdout
 
 
-def test_types_within_the_package_are_right(tmp_path):
-    """Those of its Python files, groundray-export among them."""
+def test_the_package_passes_mypy(tmp_path):
+    """Covers its Python files, including groundray-export."""
     foreign = ("OpenEXR", "cv2", "laspy", "lazrs", "mcap", "mcap_ros2", "pyproj")  # some have types
     settings = STRICT + "".join(
         f"[mypy-{name}.*]\nignore_missing_imports = True\n" for name in foreign
@@ -85,7 +85,7 @@ def test_types_within_the_package_are_right(tmp_path):
     assert files >= len(list((small_scene.ROOT / "apps/python/groundray").rglob("*.py")))
 
 
-def test_everything_public_tells_what_it_is():
+def test_every_public_name_has_a_docstring():
     for name in PUBLIC:
         thing = getattr(groundray, name)
         assert inspect.getdoc(thing), name
@@ -104,7 +104,7 @@ def test_everything_public_tells_what_it_is():
     assert groundray.__version__ in (small_scene.ROOT / "CMakeLists.txt").read_text()
 
 
-def test_help_tells_shapes_units_and_frames():
+def test_help_states_shapes_units_and_frames():
     text = pydoc.render_doc(groundray.Lidar.scan)
     for words in ("t_s", "frame", "range_true_m", "x forward, y left", "seconds", "Raises"):
         assert words in text
@@ -112,8 +112,8 @@ def test_help_tells_shapes_units_and_frames():
     assert "height x width" in pydoc.render_doc(groundray.Camera.expose)
 
 
-@pytest.mark.parametrize("page", ["docs/python.md"])
-def test_the_page_lists_every_name_there_is(page):
+@pytest.mark.parametrize("page", ["docs/guide/python.md"])
+def test_the_page_lists_every_public_name(page):
     text = (small_scene.ROOT / page).read_text()
     missing = [
         name for name in PUBLIC if f"`{name}" not in text and f"`groundray.{name}" not in text

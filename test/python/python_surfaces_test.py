@@ -12,7 +12,7 @@ from groundray._scene import to_yaml
 
 @pytest.fixture(scope="module")
 def made(tmp_path_factory):
-    """A dataset by the program, and the same scene in Python."""
+    """A dataset made by the program, and the same scene in Python."""
     folder = tmp_path_factory.mktemp("python_surfaces")
     groundray.Terrain(small_scene.heights_m(), small_scene.CELL_M).save(folder / "ground.tif")
     spec = small_scene.spec(folder, camera=True)
@@ -55,7 +55,7 @@ def exr_channels(path):
 
 
 @pytest.mark.parametrize("frame", [0, 1])
-def test_image_from_python_has_the_values_of_the_generator(made, frame):
+def test_image_from_python_has_the_same_values_as_generate(made, frame):
     folder, scene = made
     image = scene.camera("eye").expose(frame=frame)
     begin = folder / f"out/camera/eye/{frame:06}"
@@ -79,7 +79,7 @@ def test_image_from_python_has_the_values_of_the_generator(made, frame):
     assert image["electrons"].shape == (36, 48)
 
 
-def test_channels_are_views_of_height_by_width(made):
+def test_channels_are_read_only_views_of_height_by_width(made):
     camera = made[1].camera("eye")
     image = camera.expose(t_s=camera.times_s[0])
     assert camera.size_px == (48, 36)
@@ -89,7 +89,7 @@ def test_channels_are_views_of_height_by_width(made):
     for name in image:
         assert not image[name].flags.writeable
         assert np.shares_memory(image[name], image[name])
-    with pytest.raises(KeyError, match="there is no channel 'Z'; the camera's products give"):
+    with pytest.raises(KeyError, match="there is no channel 'Z'; the camera's products are"):
         image["Z"]
     depth_m = image["depth_m"]
     expected = depth_m.copy()
@@ -97,7 +97,7 @@ def test_channels_are_views_of_height_by_width(made):
     assert np.array_equal(depth_m, expected)
 
 
-def test_a_lens_images_what_its_pixels_look_at(made):
+def test_pixel_directions_project_back_to_their_pixels(made):
     camera = made[1].camera("eye")
     directions = camera.directions
     assert directions.shape == (36, 48, 3)
@@ -110,7 +110,7 @@ def test_a_lens_images_what_its_pixels_look_at(made):
     assert np.isnan(camera.project([[0, 0, -1]])).all()
 
 
-def test_pixels_see_what_rays_of_their_poses_meet(made):
+def test_pixels_match_rays_cast_from_their_poses(made):
     _, scene = made
     camera = scene.camera("eye")
     image = camera.expose(frame=0)
@@ -136,7 +136,7 @@ def test_pixels_see_what_rays_of_their_poses_meet(made):
 
 
 def surface_m(heights, cell_m, x_m, y_m):
-    """The surface of two triangles a cell, by its definition; rows run north to south."""
+    """Returns heights on the two triangles of each cell by definition; rows run north to south."""
     rows = heights.shape[0]
     column, row = x_m / cell_m, rows - 1 - y_m / cell_m
     c = np.minimum(np.floor(column).astype(int), heights.shape[1] - 2)
@@ -149,7 +149,7 @@ def surface_m(heights, cell_m, x_m, y_m):
     return np.where(u + v > 1, far, near)
 
 
-def test_heights_and_vertical_rays_are_on_the_two_triangles_of_each_cell():
+def test_heights_and_vertical_rays_match_the_two_triangles_of_each_cell():
     heights = small_scene.heights_m()
     terrain = groundray.Terrain(heights, small_scene.CELL_M)
     places = np.random.default_rng(5).uniform([0, 0], [99.5, 79.5], (20_000, 2))
@@ -161,7 +161,7 @@ def test_heights_and_vertical_rays_are_on_the_two_triangles_of_each_cell():
     assert np.isnan(terrain.heights_at([[-1, 0], [0, 80]])).all()
 
 
-def test_rays_meet_a_slope_where_its_plane_is():
+def test_rays_hit_a_slope_on_its_plane():
     # z = x / 2: a ray from (10, 20, 30) along (1, 0, -1) meets it at x = 10 + t, 30 - t = x / 2.
     heights = np.tile(np.arange(100) / 2, (50, 1))
     rays = groundray.Terrain(heights).cast_rays(
@@ -177,7 +177,7 @@ def test_rays_meet_a_slope_where_its_plane_is():
     assert np.isnan(rays["world_x_m"][1])
 
 
-def test_rays_that_are_none_are_named():
+def test_invalid_rays_are_reported():
     terrain = groundray.Terrain(np.zeros((4, 4)))
     with pytest.raises(groundray.Error, match=r"ray 1: .* must be finite"):
         terrain.cast_rays([[1, 1, 1], [np.nan, 1, 1]], [[0, 0, -1]] * 2)
@@ -191,7 +191,7 @@ def test_rays_that_are_none_are_named():
 
 
 @pytest.mark.parametrize("max_error_m", [0.05, 0.5])
-def test_mesh_of_terrain_keeps_its_bound(max_error_m):
+def test_terrain_mesh_keeps_its_error_bound(max_error_m):
     heights = small_scene.heights_m()
     terrain = groundray.Terrain(heights, small_scene.CELL_M)
     mesh = terrain.mesh(max_error_m)
@@ -203,7 +203,7 @@ def test_mesh_of_terrain_keeps_its_bound(max_error_m):
     assert len(mesh.triangles) < 2 * heights.size
 
 
-def test_terrain_comes_back_from_its_file(tmp_path):
+def test_terrain_round_trips_through_its_file(tmp_path):
     heights = small_scene.heights_m()
     heights[3, 4] = np.nan
     terrain = groundray.Terrain(heights, 0.5, (500_000.25, 4_600_000.5))
@@ -225,7 +225,7 @@ def test_terrain_comes_back_from_its_file(tmp_path):
 # ----- meshes and reconstruction
 
 
-def test_reconstruction_from_python_is_that_of_the_program(made, tmp_path):
+def test_reconstruction_from_python_matches_the_program(made, tmp_path):
     folder, scene = made
     scans = [scene.lidar("roof").scan(frame=frame) for frame in range(2)]
     mesh, counts = groundray.reconstruct_mesh(scans)
@@ -244,7 +244,7 @@ def test_reconstruction_from_python_is_that_of_the_program(made, tmp_path):
     assert counts["moved"] > 0
 
 
-def test_simplified_mesh_from_python_is_that_of_the_program(tmp_path):
+def test_simplified_mesh_from_python_matches_the_program(tmp_path):
     terrain = groundray.Terrain(small_scene.heights_m(60, 80), small_scene.CELL_M)
     mesh = terrain.mesh(0)
     mesh.save(tmp_path / "m.ply")
@@ -261,7 +261,7 @@ def test_simplified_mesh_from_python_is_that_of_the_program(tmp_path):
     assert 0.05 < figures["vertical_largest_m"] <= 0.1 + 1e-9
 
 
-def test_dem_from_python_is_that_of_the_program(made, tmp_path):
+def test_dem_from_python_matches_the_program(made, tmp_path):
     folder, scene = made
     scans = [scene.lidar("roof").scan(frame=frame) for frame in range(2)]
     dem = groundray.fuse_dem(scans, cell_m=1, position_sd_m=0.01)
@@ -292,7 +292,7 @@ def test_fused_points_of_a_plane_lie_on_it():
     off_sds = (dem.elevation_m - (0.2 * at[..., 0] - 0.1 * at[..., 1])) / np.sqrt(dem.variance_m2)
     assert np.sqrt(np.mean(off_sds**2)) < 1.3
     assert np.abs(off_sds).max() < 5
-    with pytest.raises(groundray.Error, match="there must be as many of each"):
+    with pytest.raises(groundray.Error, match="these numbers must be equal"):
         groundray.fuse_points(np.c_[x, y, z], origins[:5], np.full(len(x), 0.02), cell_m=1)
 
 
@@ -308,12 +308,12 @@ def test_planes_are_smoothed_and_filled_exactly():
     assert filled["holes"] == 1
     assert np.abs(filled["heights_m"] - plane).max() < 1e-4
     with pytest.raises(
-        groundray.Error, match="reach = 'all' is none of enclosed, hull, everywhere"
+        groundray.Error, match="reach = 'all' must be one of enclosed, hull, everywhere"
     ):
         groundray.fill_dem(holed, cell_m=1, reach="all")
 
 
-def test_meshes_are_made_of_arrays_and_checked(tmp_path):
+def test_meshes_are_built_from_arrays_and_validated(tmp_path):
     vertices = [[0, 0, 0], [1, 0, 0], [1, 1, 0], [0, 1, 0]]
     mesh = groundray.Mesh(vertices, [[0, 1, 2], [0, 2, 3]], labels=[1, 2, 3, 4])
     assert mesh.sd_m is None
@@ -335,7 +335,7 @@ def test_meshes_are_made_of_arrays_and_checked(tmp_path):
         groundray.simplify(mesh)
 
 
-def test_scans_that_are_none_are_named():
+def test_invalid_scans_are_reported():
     with pytest.raises(groundray.Error, match="reconstruct_mesh: scan 0 of scans is None"):
         groundray.reconstruct_mesh([None])
     with pytest.raises(groundray.Error, match="fuse_dem: scans is empty"):
@@ -353,7 +353,7 @@ def told(tmp_path, *arguments):
     return {measure["name"]: measure["value"] for measure in section["measures"]}
 
 
-def test_comparison_from_python_has_the_figures_of_the_program(made, tmp_path):
+def test_comparison_from_python_matches_the_program(made, tmp_path):
     folder, scene = made
     files = [folder / f"out/lidar/roof/{frame:06}.ply" for frame in range(2)]
     in_memory = groundray.compare(*(scene.lidar("roof").scan(frame=frame) for frame in range(2)))
@@ -372,7 +372,7 @@ def test_comparison_from_python_has_the_figures_of_the_program(made, tmp_path):
     shifted = groundray.Terrain(small_scene.heights_m() + np.float32(0.25), small_scene.CELL_M)
     of_dems = groundray.compare(terrain, shifted)["figures"]
     assert any(abs(value - 0.25) < 1e-5 for value in of_dems.values())
-    with pytest.raises(groundray.Error, match="of one kind"):
+    with pytest.raises(groundray.Error, match="of the same kind"):
         groundray.compare(files[0], folder / "ground.tif")
     with pytest.raises(TypeError):
         groundray.compare(terrain, fine)

@@ -1,4 +1,4 @@
-"""Long calls: other threads go on, Ctrl-C ends them, and Python may end before they do."""
+"""Long calls: other threads run, Ctrl-C stops calls, and Python may exit during them."""
 
 import signal
 import subprocess
@@ -45,7 +45,7 @@ def lasting(least_s):
 
 
 def python(folder, script, **options):
-    """Starts a Python of its own with the script."""
+    """Starts a separate Python with the script."""
     (folder / "script.py").write_text(script)
     path = f"{small_scene.PACKAGE}:{Path(small_scene.__file__).parent}"
     return subprocess.Popen(
@@ -58,7 +58,7 @@ def python(folder, script, **options):
 
 
 def ticks_during(call):
-    """Returns how long a call takes, and how often another thread was awake meanwhile."""
+    """Returns the time of a call, and how often another thread ran during it."""
     seen, is_done = [], threading.Event()
 
     def tick():
@@ -115,7 +115,7 @@ def terrain(made, count):
 
 
 @pytest.mark.parametrize("work", [cast, heights, project, mesh, terrain])
-def test_other_threads_go_on_during_a_long_call(made, work):
+def test_other_threads_run_during_a_long_call(made, work):
     spent_s, ticks, count = 0, 0, 1 << 15
     while (spent_s < 0.2 or ticks == 0) and count < 1 << 24:  # the work that shows it here
         count *= 2
@@ -149,7 +149,7 @@ def test_ctrl_c_ends_a_long_call(tmp_path):
         "groundray.load_terrain(folder / 'absent.tif')",
     ],
 )
-def test_python_may_end_during_calls_of_daemons(tmp_path, call, delay_s):
+def test_python_may_exit_during_calls_of_daemon_threads(tmp_path, call, delay_s):
     # Nothing asks them to stop: those who are in the call are to be left where they are.
     script = BEGIN + (
         "camera, _ = lasting(0.5)\n"

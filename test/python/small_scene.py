@@ -69,7 +69,7 @@ def heights_m(rows=160, columns=200, seed=11):
 
 
 def spec(folder, *, camera=False):
-    """Returns a scene as dicts; its terrain is still to be given."""
+    """Returns a scene as dicts, without terrain."""
     all_of_it = {
         "groundray": 1,
         "seed": 7,
@@ -111,7 +111,7 @@ def spec(folder, *, camera=False):
 
 
 def run(program, *arguments):
-    """Runs one of the build's programs; what it prints is told if it fails."""
+    """Runs one of the build's programs; its output is shown if it fails."""
     command = [str(BIN / program), *map(str, arguments)]
     done = subprocess.run(command, capture_output=True, text=True, timeout=600)
     assert done.returncode == 0, done.stdout + done.stderr

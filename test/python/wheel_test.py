@@ -1,4 +1,4 @@
-"""The package as pip installs it, and what the wheel says of itself.
+"""The package as installed by pip, and the metadata of the wheel.
 
 A wheel is put together of two parts, by the tools that `pip install .` uses: its Python files,
 licences and metadata by scikit-build-core, its module, stubs and data by CMake's component `python`
@@ -83,7 +83,7 @@ def wheel(tmp_path_factory):
 
 @pytest.fixture(scope="module")
 def installed(wheel, tmp_path_factory):
-    """A folder with the whole package and nothing else."""
+    """A folder with only the complete package."""
     folder = tmp_path_factory.mktemp("installed")
     run(
         *(sys.executable, "-m", "pip", "install", "--quiet", "--disable-pip-version-check"),
@@ -101,7 +101,7 @@ def metadata_of(wheel):
         return email.message_from_bytes(file.read(name))
 
 
-def test_the_wheel_says_what_it_is_under_and_brings_the_texts(wheel):
+def test_the_wheel_states_its_licences_and_contains_their_texts(wheel):
     metadata = metadata_of(wheel)
     assert metadata["Name"] == "groundray"
     assert (
@@ -126,7 +126,7 @@ def test_the_wheel_says_what_it_is_under_and_brings_the_texts(wheel):
     assert "Goetghebuer-Planchon" in texts["apps/python/licences/robin_map.txt"]
 
 
-def test_the_whole_package_is_installed_and_nothing_beside_it(installed):
+def test_the_complete_package_is_installed_and_nothing_else(installed):
     tops = {each.name for each in installed.iterdir()} - {"bin"}
     assert {re.sub(r"-.*dist-info$", ".dist-info", each) for each in tops} == {
         "groundray",
@@ -145,8 +145,8 @@ def test_the_whole_package_is_installed_and_nothing_beside_it(installed):
     assert {each for each in data if "__pycache__" not in each} <= found
 
 
-def test_it_scans_with_presets_of_its_own_and_nothing_else_of_groundray(installed, tmp_path):
-    """A preset that is in the installed folder alone is found, so no other folder is read."""
+def test_the_installed_package_scans_with_its_own_presets(installed, tmp_path):
+    """A preset that only the installed folder has is found, so no other folder is read."""
     sensors = installed / "groundray/data/sensors"
     shutil.copy(sensors / "velodyne_vlp16.yaml", sensors / "only_here.yaml")
     try:
@@ -164,7 +164,7 @@ def test_it_scans_with_presets_of_its_own_and_nothing_else_of_groundray(installe
     assert package == str(installed / "groundray")
 
 
-def test_its_program_runs(installed):
+def test_the_installed_program_runs(installed):
     told = run(installed / "bin/groundray-export", "--help", PYTHONPATH=str(installed))
     assert told.startswith("usage: groundray-export ")
     module = run(
@@ -174,15 +174,15 @@ def test_its_program_runs(installed):
     assert module == told
 
 
-def test_pip_and_the_tests_use_the_same_tools():
-    """Else the wheel would be built by others than those that are tested."""
+def test_pip_and_the_tests_use_the_same_build_tools():
+    """Otherwise the wheel would be built by other versions than tested."""
     pins = (ROOT / "test/requirements.txt").read_text().splitlines()
     requires = SETTINGS["build-system"]["requires"]
     assert {each.split("==")[0] for each in requires} == {"nanobind", "scikit-build-core"}
     assert [each for each in requires if each not in pins] == []
 
 
-def test_what_pip_builds_is_what_cmake_has():
+def test_targets_and_options_of_pip_exist_in_cmake():
     settings = SETTINGS["tool"]["scikit-build"]
     assert settings["wheel"]["packages"] == ["apps/python/groundray"]
     cmake = (ROOT / "apps/python/CMakeLists.txt").read_text()

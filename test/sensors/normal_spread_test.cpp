@@ -14,7 +14,8 @@ namespace {
 
 using std::numbers::pi;
 
-// Of value(z) over z > least: the midpoint rule with 400,000 steps, over ten deviations.
+// Standard deviation of value(z) over z > least: the midpoint rule with 400,000 steps, over ten
+// standard deviations.
 double summed_deviation(double least, const std::function<double(double)>& value) {
   constexpr int steps = 400'000;
   const double low = std::max(least, -10.0), high = std::max(low, 0.0) + 10;
@@ -29,7 +30,7 @@ double summed_deviation(double least, const std::function<double(double)>& value
   return std::sqrt(squares / weights - sum / weights * sum / weights);
 }
 
-TEST(NormalSpread, RulesAreExactForPolynomialsOfTwiceTheirPointsLessOne) {
+TEST(NormalSpread, QuadratureIsExactUpToItsPolynomialDegree) {
   const auto sum = [](const auto& rule, int degree) {
     double both_sides = 0;
     for (const QuadratureNode& node : rule)
@@ -38,7 +39,7 @@ TEST(NormalSpread, RulesAreExactForPolynomialsOfTwiceTheirPointsLessOne) {
   };
   for (int degree = 0; degree <= 30; degree += 2)
     EXPECT_NEAR(sum(legendre_16, degree), 2.0 / (degree + 1), 1e-15) << degree;
-  // Moments of normal numbers; of degree 0 the point at 0 has what lacks.
+  // Moments of a normal distribution; for degree 0, the node at 0 has the remaining weight.
   double moment = 1;
   for (int degree = 2; degree <= 8; degree += 2) {
     moment *= degree - 1;
@@ -46,19 +47,19 @@ TEST(NormalSpread, RulesAreExactForPolynomialsOfTwiceTheirPointsLessOne) {
   }
 }
 
-TEST(NormalSpread, OfHalfANormalNumberIsItsClosedForm) {
+TEST(NormalSpread, DeviationAboveAThresholdHasItsClosedForm) {
   const auto self = [](double z) { return z; };
   const double inf = std::numeric_limits<double>::infinity();
-  // What is beyond five deviations adds 1.5e-5 to the variance.
+  // The tails beyond five standard deviations add 1.5e-5 to the variance.
   EXPECT_NEAR(deviation_above(-inf, self), 1, 1e-5);
   EXPECT_NEAR(deviation_above(-40, self), 1, 1e-5);
   EXPECT_NEAR(deviation_above(0, self), std::sqrt(1 - 2 / pi), 1e-5);
   EXPECT_EQ(deviation_above(0, [](double) { return 7.0; }), 0);
 }
 
-// The rise of a Gaussian of a peak of p thresholds to a level that noise moves, as a leading edge
-// sees it: all but linear far below the peak, of a root's shape beside it.
-TEST(NormalSpread, OfAnEdgeOfAGaussianIsThatOfItsSum) {
+// Leading-edge time at which a Gaussian with a peak of p thresholds reaches a level disturbed by
+// noise: nearly linear far below the peak, and like a square root near it.
+TEST(NormalSpread, DeviationOfALeadingEdgeMatchesBruteForce) {
   for (const double threshold_sigmas : {4.0, 6.0, 10.0, 100.0}) {
     for (const double peak : {0.95, 1.0, 1.02, 1.1, 1.5, 3.0, 30.0, 1000.0}) {
       const double least = (1 - peak) * threshold_sigmas;
@@ -77,14 +78,14 @@ TEST(NormalSpread, OfAnEdgeOfAGaussianIsThatOfItsSum) {
   }
 }
 
-TEST(NormalSpread, ClampedIsThatOfItsSum) {
+TEST(NormalSpread, ClampedDeviationMatchesBruteForce) {
   for (const double deviation : {0.1, 0.5, 1.0, 4.0, 100.0}) {
     for (const double low : {-3.0, -1.0, -0.2}) {
       for (const double high : {0.1, 1.0, 2.5}) {
         const double expected =
             summed_deviation(-std::numeric_limits<double>::infinity(),
                              [&](double z) { return std::clamp(deviation * z, low, high); });
-        // Steps of 5e-5 deviations, of which one at each end is cut.
+        // Steps of 5e-5 standard deviations; one step is cut off at each end.
         EXPECT_NEAR(clamped_normal_deviation(deviation, low, high), expected, 1e-4 * expected)
             << deviation << ' ' << low << ' ' << high;
       }
@@ -92,10 +93,10 @@ TEST(NormalSpread, ClampedIsThatOfItsSum) {
   }
 }
 
-TEST(NormalSpread, ClampedIsItsOwnFarFromTheEndsAndThatOfTheEndsAtLast) {
+TEST(NormalSpread, ClampedDeviationHasItsLimits) {
   EXPECT_EQ(clamped_normal_deviation(0.25, -2, 2), 0.25);
   EXPECT_NEAR(clamped_normal_deviation(0.25, -1.99, 1.99), 0.25, 1e-14);
-  // Heads or tails: half of their distance.
+  // Two equally likely values: half of their distance.
   EXPECT_NEAR(clamped_normal_deviation(1e5, -1, 3), 2, 1e-4);
   EXPECT_NEAR(clamped_normal_deviation(std::numeric_limits<double>::infinity(), -1, 3), 2, 1e-4);
   EXPECT_EQ(clamped_normal_deviation(1, 0, 0), 0);

@@ -7,8 +7,8 @@
 
 namespace groundray::testing {
 
-/// While it lives, no file of this process can grow beyond a size: writes then fail with "File too
-/// large".
+/// Limits the size of files written by this process during its lifetime; writes beyond it fail with
+/// "File too large".
 class FileSizeLimit {
  public:
   explicit FileSizeLimit(rlim_t bytes) : handler_(std::signal(SIGXFSZ, SIG_IGN)) {

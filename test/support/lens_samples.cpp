@@ -20,7 +20,7 @@ std::vector<LensSample> sample_lenses() {
       {"radtan 5", BrownConrady{mild, {-0.30, 0.12, 1e-3, -5e-4, -0.02}}, wide},
       {"radtan 5, pincushion", BrownConrady{mild, {0.2, 0.05, -1e-3, 2e-3, 0.01}}, wide},
       {"action camera", BrownConrady{centred(125, wide), {-0.36, 0.14, 0, 0, -0.024}}, wide},
-      // github.com/opencv/opencv/issues/20736: it has a pole and a root 1e-5 apart.
+      // github.com/opencv/opencv/issues/20736: a pole and a root 1e-5 apart.
       {"rational 8, pole",
        BrownConrady{
            centred(151, wide),
@@ -38,7 +38,7 @@ std::vector<LensSample> sample_lenses() {
       {"tangential, strong", BrownConrady{mild, {-0.3, 0.1, 0.05, -0.08}}, wide},
       {"fisheye, ideal", KannalaBrandt{centred(60, square), {}}, square},
       {"fisheye 150", KannalaBrandt{centred(70, wide), {0.01, -5e-3, 2e-3, -1e-3}}, wide},
-      // As TUM-VI has it: 0.3 of its image's size.
+      // Calibration of TUM-VI, at 0.3 of its image size.
       {"fisheye 190", KannalaBrandt{{{59.7, 59.6}, {79.3, 80.1}, 0}, {3.5e-3, 7e-4, -2e-3, 2e-4}},
        square},
       {"fisheye, folds", KannalaBrandt{centred(50, square), {-0.08, 0.01, -0.002, 1e-4}}, square},

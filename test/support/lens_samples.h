@@ -4,7 +4,7 @@
 #include <string>
 #include <vector>
 
-#include "sensors/camera/lens_models.h"
+#include "sensors/camera/lens/lens_models.h"
 
 namespace groundray::testing {
 
@@ -14,10 +14,11 @@ struct LensSample {
   glm::ivec2 size_px;
 };
 
-/// Returns lenses of every model, mild and wild: some fold within their image.
+/// Returns lenses of every model, with mild and strong distortion: some fold over within their
+/// image.
 std::vector<LensSample> sample_lenses();
 
-/// A scale with the pixel centre of the middle of an image for its centre.
+/// Returns a scale whose principal point is the centre of the image, in pixel-centre coordinates.
 PixelScale centred(double focal_px, glm::ivec2 size_px);
 
 }  // namespace groundray::testing

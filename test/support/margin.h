@@ -10,9 +10,10 @@
 
 namespace groundray::testing {
 
-/// Writes into the running test's results how near it came to its tolerance, for the table of
-/// docs/accuracy.md; expects nothing. Of several calls by one name the nearest is kept. A tolerance
-/// of 1 without a unit is that of a share: of tolerances that vary.
+/// Records in the running test's results the fraction of the tolerance that it used, for the table
+/// of docs/accuracy.md; checks nothing. Of several calls with the same name the largest fraction is
+/// kept. A tolerance of 1 without a unit means that `measured` is already a fraction, of tolerances
+/// that vary.
 inline void record_margin(const std::string& name, double measured, double tolerance,
                           std::string_view unit = "") {
   const std::string key = "margin: " + name;

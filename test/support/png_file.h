@@ -7,11 +7,12 @@
 #include <memory>
 #include <stdexcept>
 
-#include "core/image.h"
+#include "core/image/image.h"
 
 namespace groundray::testing {
 
-/// Reads a PNG file of 16 bits a value, number by number. @throws std::runtime_error if it is none.
+/// Reads the values of a PNG file with 16 bits per value. @throws std::runtime_error if it is not
+/// one.
 inline Image16 read_png16(const std::filesystem::path& path) {
   const std::unique_ptr<std::FILE, int (*)(std::FILE*)> file(std::fopen(path.c_str(), "rb"),
                                                              std::fclose);

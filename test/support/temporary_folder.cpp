@@ -6,7 +6,7 @@
 #include <stdexcept>
 #include <string>
 
-#include "apps/source_folder.h"
+#include "apps/scene/source_folder.h"
 
 namespace groundray::testing {
 

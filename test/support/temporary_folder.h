@@ -4,7 +4,7 @@
 
 namespace groundray::testing {
 
-/// An empty folder that goes with the object.
+/// An empty folder that is removed with the object.
 class TemporaryFolder {
  public:
   TemporaryFolder();
@@ -22,8 +22,8 @@ class TemporaryFolder {
 /// The folder of the project's own data files.
 std::filesystem::path data_folder();
 
-/// The folder of large public data sets that some tests use, which need not exist: the
-/// environment's GROUNDRAY_SHARED_DATA, or shared/data beside the repository.
+/// The folder of large public data sets that some tests use: the environment's
+/// GROUNDRAY_SHARED_DATA, or shared/data beside the repository. It need not exist.
 std::filesystem::path shared_data_folder();
 
 }  // namespace groundray::testing

@@ -5,16 +5,16 @@
 #include <glm/vec2.hpp>
 #include <numbers>
 
-#include "core/image.h"
+#include "core/image/image.h"
 #include "core/random.h"
 
 namespace groundray::testing {
 
-/// Grey values from waves of all directions, mean 0.5, from 0 to 1 but for rare peaks: known at any
-/// place, and nowhere alike.
+/// Grey values from a sum of waves in all directions, with mean 0.5 and a range of 0 to 1 except
+/// for rare peaks: defined at any position, and without repetition.
 class WaveTexture {
  public:
-  /// @param shortest_px  wavelength; the longest is 12 times that.
+  /// @param shortest_px  shortest wavelength; the longest is 12 times that.
   explicit WaveTexture(double shortest_px, Seed seed = {5}) {
     for (std::size_t i = 0; i < waves_.size(); ++i) {
       const RandomKey key{.seed = seed, .pulse = static_cast<std::uint32_t>(i)};
@@ -35,7 +35,7 @@ class WaveTexture {
     return 0.5 + 0.04 * sum;
   }
 
-  /// An image whose pixels show the texture where `place_of` says.
+  /// An image whose pixels show the texture at the position that `place_of` returns.
   template <typename PlaceOf>
   ImageF image(glm::ivec2 size_px, PlaceOf&& place_of) const {
     ImageF result(size_px.x, size_px.y, 1);

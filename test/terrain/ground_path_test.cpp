@@ -10,7 +10,7 @@
 #include <vector>
 
 #include "core/error.h"
-#include "core/pose.h"
+#include "core/geometry/pose.h"
 
 namespace groundray::ground_path_test {
 namespace {
@@ -24,7 +24,7 @@ constexpr double north_slope = -0.125;  // both exact in float, as are all heigh
 
 double plane_m(double x, double y) { return 10 + east_slope * x + north_slope * y; }
 
-// 100 m x 100 m about D's origin, 1 m apart, north up.
+// 100 m x 100 m, centred on D's origin, spacing 1 m, north up.
 HeightGrid ground_of(auto height_m) {
   std::vector<float> heights;
   for (int row = 0; row < side_samples; ++row) {
@@ -56,7 +56,7 @@ std::string error_of(const HeightGrid& ground, const GroundPathSpec& spec) {
   return "no error";
 }
 
-TEST(GroundPath, AStraightDriveIsUniformMotion) {
+TEST(GroundPath, StraightPathIsUniformMotion) {
   const Trajectory path = build_ground_path(
       flat(), {.waypoints_m = {{1, 2}, {31, 42}}, .speed_m_s = 5, .height_m = 2, .duration = 10s});
   EXPECT_EQ(path.begin_time(), 0ns);
@@ -69,7 +69,7 @@ TEST(GroundPath, AStraightDriveIsUniformMotion) {
   }
 }
 
-TEST(GroundPath, TheLastPoseStandsAtTheEndOfTheDrive) {
+TEST(GroundPath, LastPoseIsAtTheEndOfTheDuration) {
   const Trajectory path =
       build_ground_path(flat(), {.waypoints_m = {{0, 0}, {10, 0}}, .duration = 123456789ns});
   EXPECT_EQ(path.end_time(), 123456789ns);
@@ -77,12 +77,11 @@ TEST(GroundPath, TheLastPoseStandsAtTheEndOfTheDrive) {
   EXPECT_NEAR(path.samples().back().pose.translation_m.x, 0.123456789, 1e-15);
 }
 
-// On a plane the body's axes are known without angles: z is the normal, and x lies above the
-// heading.
-TEST(GroundPath, OnATiltedPlaneTheBodyLiesInThePlane) {
+// On a plane the body's axes are known without angles: z is the normal, and x is the heading
+// projected vertically onto the plane.
+TEST(GroundPath, BodyIsParallelToATiltedPlane) {
   const glm::dvec3 normal = glm::normalize(glm::dvec3(-east_slope, -north_slope, 1));
-  constexpr double tolerance =
-      1e-13;  // a few roundings of slopes taken over 2 m of heights near 20 m
+  constexpr double tolerance = 1e-13;  // a few roundings of slopes over 2 m, from heights near 20 m
   const Trajectory path = build_ground_path(tilted_plane(), bends());
   for (const auto& [time, X_DB] : path.samples()) {
     const glm::dvec3 p = X_DB.translation_m;
@@ -92,9 +91,9 @@ TEST(GroundPath, OnATiltedPlaneTheBodyLiesInThePlane) {
   }
 }
 
-TEST(GroundPath, PitchAndRollOnATiltedPlaneHaveTheirClosedForms) {
-  // Eastwards the ground rises by a quarter ahead: the nose is up, which is negative pitch. It
-  // falls to the north, which is left, by an eighth: the left side is down, negative roll.
+TEST(GroundPath, PitchAndRollOnATiltedPlaneMatchTheClosedForm) {
+  // The ground rises to the east, which is ahead, by 1/4: the nose is up, a negative pitch. It
+  // falls to the north, which is left, by 1/8: the left side is down, a negative roll.
   const Trajectory path =
       build_ground_path(tilted_plane(), {.waypoints_m = {{0, 0}, {20, 0}}, .duration = 10s});
   const double pitch_rad = -std::atan(0.25);
@@ -107,9 +106,9 @@ TEST(GroundPath, PitchAndRollOnATiltedPlaneHaveTheirClosedForms) {
   EXPECT_LT(left.z, -0.1);
 }
 
-TEST(GroundPath, TheWheelsNotTheCentreSetPitchAndRoll) {
+TEST(GroundPath, PitchAndRollFollowTheWheelsNotTheCentre) {
   // A ridge along x = 0, 1 m high and 2 m wide, under the centre of a vehicle whose wheels stand on
-  // the flat.
+  // the flat ground.
   const HeightGrid ridge =
       ground_of([](double x, double) { return std::max(0.0, 1 - std::abs(x)); });
   const Pose X_DB =
@@ -122,9 +121,9 @@ TEST(GroundPath, TheWheelsNotTheCentreSetPitchAndRoll) {
   EXPECT_EQ(X_DB.rotation, glm::dquat(1, 0, 0, 0));
 }
 
-// A chord of a curve of radius r falls short of its arc s by s^3 / 24 r^2; the sharpest bend here
-// has r > 1 m.
-TEST(GroundPath, SpeedIsConstantInPlan) {
+// On a curve of radius r, the chord of an arc s is shorter than s by s^3 / (24 r^2); the sharpest
+// bend here has r > 1 m.
+TEST(GroundPath, HorizontalSpeedIsConstant) {
   constexpr double step_m = 5 * 0.01;
   const auto samples = build_ground_path(flat(), bends()).samples();
   for (std::size_t i = 1; i < samples.size(); ++i) {
@@ -136,7 +135,7 @@ TEST(GroundPath, SpeedIsConstantInPlan) {
 }
 
 // Poses are 5 cm apart, so one of them lies within 2.5 cm of each waypoint along the curve.
-TEST(GroundPath, ThePathPassesThroughItsWaypointsInOrderHeadingAlongTheBisector) {
+TEST(GroundPath, PassesThroughWaypointsInOrderAlongTheBisector) {
   GroundPathSpec spec = bends();
   spec.duration = 33s;
   const auto samples = build_ground_path(flat(), spec).samples();
@@ -148,8 +147,8 @@ TEST(GroundPath, ThePathPassesThroughItsWaypointsInOrderHeadingAlongTheBisector)
       ++next;
     ASSERT_LT(next, samples.size()) << "waypoint " << i;
     if (i == 0) continue;
-    // The knots' spacing makes the tangent there bisect the chords; 2.5 cm off it turns by 0.05 rad
-    // at most.
+    // The spacing of the knots makes the tangent at a waypoint bisect the chords; within 2.5 cm it
+    // turns by at most 0.05 rad.
     const glm::dvec2 in = glm::normalize(spec.waypoints_m[i] - spec.waypoints_m[i - 1]);
     const glm::dvec2 out = glm::normalize(spec.waypoints_m[i + 1] - spec.waypoints_m[i]);
     const glm::dvec3 heading = samples[next].pose.rotation * glm::dvec3(1, 0, 0);
@@ -157,24 +156,25 @@ TEST(GroundPath, ThePathPassesThroughItsWaypointsInOrderHeadingAlongTheBisector)
   }
 }
 
-TEST(GroundPath, TheHeadingIsTheDirectionOfMotion) {
+TEST(GroundPath, HeadingIsTheDirectionOfMotion) {
   const auto samples = build_ground_path(flat(), bends()).samples();
   for (std::size_t i = 1; i + 1 < samples.size(); ++i) {
     const glm::dvec3 moved = samples[i + 1].pose.translation_m - samples[i - 1].pose.translation_m;
-    // A symmetric difference is off by the change of curvature over a step, squared.
+    // The error of a central difference is of second order in the step: a sixth of the derivative
+    // of curvature times the squared step.
     EXPECT_LT(glm::distance(glm::normalize(moved), samples[i].pose.rotation * glm::dvec3(1, 0, 0)),
               2e-3);
   }
 }
 
-TEST(GroundPath, EveryBrokenRuleIsNamedAtOnce) {
+TEST(GroundPath, ErrorListsEveryFault) {
   constexpr double nan = std::numeric_limits<double>::quiet_NaN();
   const std::string message = error_of(flat(), {.waypoints_m = {{0, 0}, {0, 0.001}, {nan, 1}},
                                                 .speed_m_s = 0,
                                                 .height_m = nan,
                                                 .footprint_m = {0, 1}});
   EXPECT_THAT(message, HasSubstr("ground path:"));
-  EXPECT_THAT(message, HasSubstr("waypoints_m[1] lies 0.001 m from the one before"));
+  EXPECT_THAT(message, HasSubstr("waypoints_m[1] is 0.001 m from the previous one"));
   EXPECT_THAT(message, HasSubstr("waypoints_m[2] = (nan, 1) must be finite"));
   EXPECT_THAT(message, HasSubstr("speed_m_s = 0 must be positive"));
   EXPECT_THAT(message, HasSubstr("height_m = nan must be finite"));
@@ -184,26 +184,26 @@ TEST(GroundPath, EveryBrokenRuleIsNamedAtOnce) {
               HasSubstr("waypoints_m has 1 point"));
 }
 
-TEST(GroundPath, ADriveLongerThanTheCurveIsRefused) {
+TEST(GroundPath, RejectsADriveLongerThanTheCurve) {
   EXPECT_THAT(error_of(flat(), {.waypoints_m = {{0, 0}, {30, 0}}, .speed_m_s = 2, .duration = 20s}),
-              HasSubstr("is 30.000 m long but 20 s at 2 m/s take 40.000 m"));
+              HasSubstr("is 30.000 m long, but 20 s at 2 m/s cover 40.000 m"));
 }
 
-TEST(GroundPath, TurningBackOnTheSpotIsRefused) {
+TEST(GroundPath, RejectsAReversalAtAWaypoint) {
   EXPECT_THAT(error_of(flat(), {.waypoints_m = {{0, 0}, {30, 0}, {10, 0}}, .duration = 1s}),
-              HasSubstr("turns back on itself at waypoints_m[1] = (30, 0)"));
+              HasSubstr("reverses at waypoints_m[1] = (30, 0)"));
 }
 
-TEST(GroundPath, LeavingTheDemNamesWheelTimeAndPlace) {
-  // Half a wheel base of 1 m ahead of the centre, the DEM ends at x = 50 when the centre is
-  // past 49.
+TEST(GroundPath, ReportsWheelTimeAndPositionOutsideTheDem) {
+  // The front wheels are half a wheel base, 1 m, ahead of the centre: the DEM ends at x = 50 when
+  // the centre passes 49.
   const std::string message =
       error_of(flat(), {.waypoints_m = {{40, 0}, {60, 0}}, .duration = 15s});
   EXPECT_THAT(message, HasSubstr("at 9.01 s the vehicle's front left wheel would stand outside the "
                                  "DEM at (50.010, 0.750) m"));
 }
 
-TEST(GroundPath, AHoleUnderAWheelNamesWheelTimeAndPlace) {
+TEST(GroundPath, ReportsWheelTimeAndPositionInAHole) {
   constexpr double nan = std::numeric_limits<double>::quiet_NaN();
   const HeightGrid holed =
       ground_of([](double x, double y) { return x == 10 && y == -1 ? nan : 0; });

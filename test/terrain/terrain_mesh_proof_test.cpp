@@ -1,4 +1,4 @@
-// The promises of build_terrain_mesh, held against the oracles of test/support.
+// Tests the guarantees of build_terrain_mesh with the oracles of test/support.
 #include <fmt/format.h>
 #include <gmock/gmock.h>
 #include <gtest/gtest.h>
@@ -11,14 +11,14 @@
 #include <limits>
 #include <vector>
 
-#include "terrain/dem_io.h"
+#include "terrain/dem/dem_io.h"
 #include "terrain/terrain_mesh.h"
-#include "test/support/adversarial_terrain.h"
 #include "test/support/margin.h"
-#include "test/support/mesh_oracle.h"
-#include "test/support/mesh_topology.h"
-#include "test/support/sample_terrain.h"
+#include "test/support/scans/mesh_topology.h"
 #include "test/support/temporary_folder.h"
+#include "test/support/terrain/adversarial_terrain.h"
+#include "test/support/terrain/mesh_oracle.h"
+#include "test/support/terrain/sample_terrain.h"
 
 namespace groundray::terrain_mesh_proof_test {
 namespace {
@@ -31,20 +31,20 @@ using testing::proof_size;
 constexpr std::array tolerances_m{0.1, 0.3, 1.0, 3.0, 10.0, 50.0};
 constexpr std::array block_sizes{2, 4, 8};
 
-// The library certifies in double, this is at most what its interpolated heights are rounded by:
-// products, sums and differences of numbers no larger than the heights, eight of them; the bound
-// itself is compared after as many operations.
+// Relative rounding of the library, which certifies in double: at most eight products, sums and
+// differences of numbers no larger than the heights. Comparing the bound itself takes as many
+// operations.
 constexpr double rounding = 8 * std::numeric_limits<double>::epsilon();
 
-// What the oracle itself is rounded by, see its header.
+// Rounding of the oracle itself; see its header.
 constexpr double oracle_rounding_m = 1e-14;
 
 double distance_m(const glm::dvec3& p, const MeshBound& bound) {
   return glm::distance(p, glm::clamp(p, bound.low_m, bound.high_m));
 }
 
-// What a mesh may deviate at a point of the surface: a leaf's distance is that of its box, which
-// holds the point, so the point is no nearer.
+// Deviation permitted at a point of the surface. A leaf's distance is that of its box, which
+// contains the point, so the point is at least as far away.
 double allowed_m(const HeightGrid& grid, const MeshBound& bound, const glm::dvec3& point) {
   const glm::dvec2 step_m = glm::abs(grid.step_m());
   const glm::dvec3 p_m = point * glm::dvec3(step_m, 1);
@@ -52,7 +52,7 @@ double allowed_m(const HeightGrid& grid, const MeshBound& bound, const glm::dvec
   return std::max(bound.tolerance_m, angular_m) * (1 + rounding);
 }
 
-// Holds a mesh against everything that is promised of any.
+// Checks a mesh against all guarantees that hold for any mesh.
 void expect_keeps_its_promises(const HeightGrid& grid, const MeshBound& bound,
                                const TerrainMesh& mesh) {
   const auto faults = testing::topology_faults(grid, mesh.vertices, mesh.triangles);
@@ -89,8 +89,8 @@ void expect_mesh_keeps_its_promises(const HeightGrid& grid, const MeshBound& bou
   expect_keeps_its_promises(grid, bound, build_terrain_mesh(grid, bound, block_cells));
 }
 
-// A place in or around the grid, most often near the ground, sometimes the box of a drive; angles
-// of 0.1 to 10 mrad.
+// Random position in or around the grid, most often near the ground, sometimes the bounding box of
+// a drive; angles of 0.1 to 10 mrad.
 MeshBound random_viewpoint(const HeightGrid& grid, std::uint32_t number) {
   const auto uniform = [number](std::uint32_t of) {
     return random_uniform({.seed = Seed{77}, .sensor = number, .frame = of});
@@ -128,7 +128,7 @@ TEST(TerrainMeshProof, AdversarialTerrainStaysWithinTheBoundWithoutCracks) {
   }
 }
 
-TEST(TerrainMeshProof, OurDemsStayWithinTheBoundWithoutCracks) {
+TEST(TerrainMeshProof, BundledDemsStayWithinTheBoundWithoutCracks) {
   for (const char* name : {"jacksboro.tif", "prairie_1m.tif"}) {
     SCOPED_TRACE(name);
     const Dem dem = load_dem(testing::data_folder() / "terrain" / name);
@@ -136,7 +136,7 @@ TEST(TerrainMeshProof, OurDemsStayWithinTheBoundWithoutCracks) {
   }
 }
 
-TEST(TerrainMeshProof, AFractalStaysWithinTheBoundWithoutCracks) {
+TEST(TerrainMeshProof, FractalTerrainStaysWithinTheBoundWithoutCracks) {
   const auto samples = static_cast<int>(proof_size(257, 2049));
   const HeightGrid ground = testing::fractal(samples, 5, 1500, Seed{12345});
   expect_every_mesh_keeps_its_promises(ground, proof_size(1, 5));
@@ -174,11 +174,11 @@ TEST(TerrainMeshProof, PublicDemsStayWithinTheBoundWithoutCracks) {
   }
   for (const auto& [path, options] : sources) {
     SCOPED_TRACE(path);
-    const Dem dem = load_dem(dems / path, options);  // an absolute path stays as it is
+    const Dem dem = load_dem(dems / path, options);  // an absolute path remains unchanged
     expect_every_mesh_keeps_its_promises(dem.grid, proof_size(1, 10));
   }
   if (!all) return;
-  // 8193 x 8193 samples: a minute for each mesh, so only some.
+  // 8193 x 8193 samples: each mesh takes a minute, so only some are built.
   const Dem moon =
       load_dem(dems / "moon_gld100_8193/moon_gld100_8193.tif", {.reproject_to = "utm"});
   for (const double tolerance_m : {3.0, 50.0}) {
@@ -187,7 +187,7 @@ TEST(TerrainMeshProof, PublicDemsStayWithinTheBoundWithoutCracks) {
   expect_mesh_keeps_its_promises(moon.grid, random_viewpoint(moon.grid, 4), 8);
 }
 
-TEST(TerrainMeshProof, APlaneIsTwoTrianglesWhateverItsSize) {
+TEST(TerrainMeshProof, PlaneIsTwoTrianglesAtAnySize) {
   for (const auto& [name, grid] : testing::planes()) {
     for (const int block_cells : block_sizes) {
       for (const double tolerance_m : {0.0, 0.1, 50.0}) {
@@ -202,13 +202,13 @@ TEST(TerrainMeshProof, APlaneIsTwoTrianglesWhateverItsSize) {
   }
 }
 
-TEST(TerrainMeshProof, WithoutToleranceNoiseIsMeshedFacetByFacet) {
+TEST(TerrainMeshProof, ZeroToleranceKeepsEveryFacetOfNoise) {
   for (const glm::ivec2 size : {glm::ivec2(33, 33), glm::ivec2(2, 2), glm::ivec2(50, 23),
                                 glm::ivec2(2, 40), glm::ivec2(31, 64)}) {
     for (const int block_cells : block_sizes) {
       const HeightGrid noise = testing::white_noise(size, 30, Seed{5});
       const TerrainMesh mesh = build_terrain_mesh(noise, {}, block_cells);
-      // As many triangles as facets, none of which deviates: they are the facets.
+      // There are as many triangles as facets and none deviates: they are the facets.
       EXPECT_EQ(std::ssize(mesh.triangles), 2 * (size.x - 1) * (size.y - 1));
       EXPECT_LT(largest_deviation(noise, mesh.vertices, mesh.triangles).largest_m,
                 oracle_rounding_m);
@@ -217,7 +217,7 @@ TEST(TerrainMeshProof, WithoutToleranceNoiseIsMeshedFacetByFacet) {
   }
 }
 
-TEST(TerrainMeshProof, WithoutToleranceNothingDeviates) {
+TEST(TerrainMeshProof, ZeroToleranceHasNoDeviation) {
   for (const auto& [name, grid] : testing::adversarial_terrain()) {
     SCOPED_TRACE(name);
     const TerrainMesh mesh = build_terrain_mesh(grid, {});
@@ -225,7 +225,7 @@ TEST(TerrainMeshProof, WithoutToleranceNothingDeviates) {
   }
 }
 
-TEST(TerrainMeshProof, ATerrainWithoutFacetsIsAnEmptyMesh) {
+TEST(TerrainMeshProof, TerrainWithoutFacetsIsAnEmptyMesh) {
   constexpr float hole = std::numeric_limits<float>::quiet_NaN();
   for (const int block_cells : block_sizes) {
     const HeightGrid nothing({5, 6}, {0, 0}, {1, 1}, std::vector<float>(30, hole));
@@ -242,8 +242,8 @@ std::vector<std::int64_t> places_of(const TerrainMesh& mesh) {
   return places;
 }
 
-// Leaves of a larger tolerance are unions of those of a smaller one, so a sample that the coarse
-// mesh needs the fine one needs too.
+// Leaves of a larger tolerance are unions of those of a smaller one, so the fine mesh contains
+// every sample of the coarse one.
 void expect_monotone(const HeightGrid& grid, MeshBound bound, int block_cells) {
   bound.tolerance_m = 0;
   std::vector<std::int64_t> finer = places_of(build_terrain_mesh(grid, bound, block_cells));
@@ -260,7 +260,7 @@ void expect_monotone(const HeightGrid& grid, MeshBound bound, int block_cells) {
   }
 }
 
-TEST(TerrainMeshProof, ALargerToleranceOnlyLeavesSamplesOut) {
+TEST(TerrainMeshProof, LargerToleranceOnlyRemovesSamples) {
   const HeightGrid ground = testing::fractal(129, 5, 200, Seed{8});
   for (const int block_cells : block_sizes) {
     for (const HeightGrid& grid : {ground, testing::with_holes(ground, 12, 4, Seed{1}),

@@ -14,11 +14,11 @@
 
 #include "core/error.h"
 #include "core/random.h"
-#include "terrain/deviation.h"
-#include "test/support/leaf_triangles.h"
-#include "test/support/mesh_topology.h"
-#include "test/support/sample_terrain.h"
-#include "test/support/shuffled_runner.h"
+#include "terrain/lod/deviation.h"
+#include "test/support/scans/mesh_topology.h"
+#include "test/support/terrain/leaf_triangles.h"
+#include "test/support/terrain/sample_terrain.h"
+#include "test/support/terrain/shuffled_runner.h"
 
 namespace groundray::terrain_mesh_test {
 namespace {
@@ -28,7 +28,7 @@ using ::testing::IsEmpty;
 
 constexpr double infinity = std::numeric_limits<double>::infinity();
 
-// A piece of a fractal landscape, of any size.
+// Part of a fractal landscape, of any size up to 129 x 129.
 HeightGrid landscape(glm::ivec2 size, Seed seed, glm::dvec2 step_m = {4, -4}) {
   const HeightGrid square = groundray::testing::fractal(129, 4, 120, seed);
   std::vector<float> heights;
@@ -50,7 +50,7 @@ std::vector<MeshBound> some_bounds() {
           {.tolerance_m = 0.2, .angle_rad = 0.02, .low_m = {90, 70, 10}, .high_m = {120, 70, 30}}};
 }
 
-// A triangle by its samples in some order that does not depend on which comes first, and its level.
+// A triangle as its sorted samples, independent of the first vertex, and its level.
 using Place = std::array<std::pair<int, int>, 3>;
 using Piece = std::pair<Place, int>;
 
@@ -71,7 +71,7 @@ std::vector<Piece> pieces_of(const TerrainMesh& mesh) {
   return pieces;
 }
 
-// What the leaves of the certificate stand for, drawn by test/support.
+// The triangles that the leaves of the certificate represent, made by test/support.
 std::vector<Piece> pieces_of_leaves(const HeightGrid& grid, MeshBound bound, int block_cells) {
   bound.cell_m = {std::abs(grid.step_m().x), std::abs(grid.step_m().y)};
   const Lattice lattice{{grid.columns(), grid.rows()}, block_cells};
@@ -90,7 +90,7 @@ std::vector<Piece> pieces_of_leaves(const HeightGrid& grid, MeshBound bound, int
   return pieces;
 }
 
-TEST(TerrainMesh, ItsTrianglesAreThoseThatItsLeavesStandFor) {
+TEST(TerrainMesh, TrianglesMatchTheLeaves) {
   for (const glm::ivec2 size :
        {glm::ivec2{2, 2}, {5, 4}, {33, 33}, {70, 41}, {100, 3}, {90, 129}}) {
     const HeightGrid whole = landscape(size, Seed{1});
@@ -110,7 +110,7 @@ TEST(TerrainMesh, ItsTrianglesAreThoseThatItsLeavesStandFor) {
   }
 }
 
-TEST(TerrainMesh, TrianglesRunCounterClockwiseAsSeenFromAboveWhereverRowsAndColumnsRun) {
+TEST(TerrainMesh, TrianglesAreCounterClockwiseFromAboveForAnyGridDirection) {
   for (const glm::dvec2 step_m : {glm::dvec2{2, -2}, {2, 3}, {-2, 3}, {-1, -3}}) {
     const HeightGrid grid = with_holes(landscape({60, 50}, Seed{2}, step_m));
     const TerrainMesh mesh = build_terrain_mesh(grid, {.tolerance_m = 1}, 4);
@@ -123,7 +123,7 @@ TEST(TerrainMesh, TrianglesRunCounterClockwiseAsSeenFromAboveWhereverRowsAndColu
   }
 }
 
-TEST(TerrainMesh, WithoutABoundItIsTwoTriangles) {
+TEST(TerrainMesh, InfiniteToleranceYieldsTwoTriangles) {
   for (const glm::ivec2 size : {glm::ivec2{2, 2}, {129, 129}, {100, 7}, {3, 90}}) {
     const TerrainMesh mesh =
         build_terrain_mesh(landscape(size, Seed{3}), {.tolerance_m = infinity});
@@ -132,7 +132,7 @@ TEST(TerrainMesh, WithoutABoundItIsTwoTriangles) {
   }
 }
 
-TEST(TerrainMesh, APlaneIsTwoTrianglesThoughNothingMayDeviate) {
+TEST(TerrainMesh, PlaneIsTwoTrianglesAtZeroTolerance) {
   for (const glm::ivec2 size : {glm::ivec2{2, 2}, {129, 65}, {100, 7}, {3, 90}, {50, 77}}) {
     std::vector<float> heights;
     for (int r = 0; r < size.y; ++r) {
@@ -145,9 +145,9 @@ TEST(TerrainMesh, APlaneIsTwoTrianglesThoughNothingMayDeviate) {
   }
 }
 
-TEST(TerrainMesh, ASampleWithoutATriangleIsNoVertex) {
+TEST(TerrainMesh, SamplesWithoutTrianglesAreNotVertices) {
   const float nan = std::numeric_limits<float>::quiet_NaN();
-  // Of 4 x 3 samples, the last column and the north-western corner are cut off from any triangle.
+  // In 4 x 3 samples, the last column and the north-western corner belong to no triangle.
   const HeightGrid grid({4, 3}, {0, 0}, {1, -1},
                         {1, nan, nan, 1,  //
                          nan, 1, 1, nan,  //
@@ -159,7 +159,7 @@ TEST(TerrainMesh, ASampleWithoutATriangleIsNoVertex) {
   EXPECT_EQ(mesh.vertices.size(), 5u);
 }
 
-TEST(TerrainMesh, CellsOfTheBoundAreThoseOfTheGrid) {
+TEST(TerrainMesh, UsesTheCellSizeOfTheGrid) {
   const HeightGrid grid = landscape({90, 80}, Seed{4}, {3, -5});
   MeshBound bound{.angle_rad = 0.01, .low_m = {90, 70, 10}, .high_m = {120, 70, 30}};
   const TerrainMesh expected = build_terrain_mesh(grid, bound);
@@ -167,7 +167,7 @@ TEST(TerrainMesh, CellsOfTheBoundAreThoseOfTheGrid) {
   EXPECT_EQ(build_terrain_mesh(grid, bound).vertices, expected.vertices);
 }
 
-TEST(TerrainMesh, TheOrderOfIndicesAndTheNumberOfThreadsChangeNothing) {
+TEST(TerrainMesh, DoesNotDependOnExecutionOrderOrThreads) {
   const HeightGrid grid = with_holes(landscape({129, 120}, Seed{6}));
   const auto runners = [] {
     std::vector<PassRunner> all;
@@ -191,7 +191,7 @@ TEST(TerrainMesh, TheOrderOfIndicesAndTheNumberOfThreadsChangeNothing) {
   }
 }
 
-TEST(TerrainMesh, WhatIsNoBoundOrNoBlockIsRefused) {
+TEST(TerrainMesh, RejectsInvalidBoundsAndBlocks) {
   const HeightGrid grid = landscape({9, 9}, Seed{7});
   const auto message = [&](const MeshBound& bound, int block_cells) -> std::string {
     try {

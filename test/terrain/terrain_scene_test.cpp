@@ -8,10 +8,10 @@
 #include <glm/geometric.hpp>
 #include <iostream>
 
-#include "test/support/leaf_triangles.h"
 #include "test/support/margin.h"
-#include "test/support/sample_clipmap.h"
-#include "test/support/sample_terrain.h"
+#include "test/support/terrain/leaf_triangles.h"
+#include "test/support/terrain/sample_clipmap.h"
+#include "test/support/terrain/sample_terrain.h"
 
 namespace groundray::terrain_scene_test {
 namespace {
@@ -42,7 +42,7 @@ RayTracer whole(const HeightGrid& grid, Tracing tracing) {
   return {{full_resolution_level(grid)}, {0, 0, 0}, tracing};
 }
 
-// A sensor 10 m above ground, and rays from it and from close by.
+// Position of a sensor 10 m above the ground.
 glm::dvec3 above(const HeightGrid& grid, glm::dvec2 p) {
   return {p, grid.height_m_at(p).value_or(grid.max_height_m()) + 10};
 }
@@ -52,7 +52,7 @@ std::vector<Ray> rays_from(const glm::dvec3& p, std::size_t count, Seed seed) {
   for (std::size_t i = 0; i < count; ++i) {
     const auto turn = random_uniform({seed, 0, 0, static_cast<std::uint32_t>(i)});
     const auto more = random_uniform({seed, 1, 0, static_cast<std::uint32_t>(i)});
-    // Neighbours are alike, as a sensor's are; half look close to the horizon.
+    // Neighbouring rays are similar, as in a sensor; half of them point close to the horizon.
     const std::size_t fan = i / 16;
     const double azimuth =
         6.2831853 * (16 * static_cast<double>(fan) / static_cast<double>(count) + 0.001 * turn.x);
@@ -64,7 +64,7 @@ std::vector<Ray> rays_from(const glm::dvec3& p, std::size_t count, Seed seed) {
   return rays;
 }
 
-// A landscape with planes in it: parts that are flat, and parts that slope evenly.
+// Landscape that contains planes: parts that are flat, and parts of constant slope.
 HeightGrid partly_plane(int samples) {
   const HeightGrid rough = fractal(samples, 5, 400, Seed{51});
   std::vector<float> heights(rough.heights_m().begin(), rough.heights_m().end());
@@ -79,7 +79,7 @@ HeightGrid partly_plane(int samples) {
   return {{samples, samples}, rough.origin_m(), rough.step_m(), heights};
 }
 
-TEST(TerrainSceneProof, WithoutToleranceRangesAreThoseOfTheWholeDemToTheLastBit) {
+TEST(TerrainSceneProof, WithoutToleranceRangesEqualTheFullResolutionBitForBit) {
   const HeightGrid grid = with_holes(partly_plane(513), 60, 5, Seed{52});
   const Clipmap clipmap(certified_tiles(grid), grid.frame(), {}, sensor_at({0, 0, 300}));
   bool merged = false;
@@ -92,8 +92,8 @@ TEST(TerrainSceneProof, WithoutToleranceRangesAreThoseOfTheWholeDemToTheLastBit)
     std::size_t different = 0;
     for (std::size_t i = 0; i < rays.size(); ++i)
       different += hits[i].range_m != expected[i].range_m ? 1 : 0;
-    // Where Embree chooses, other boxes round the same facets may let it choose otherwise at
-    // silhouettes.
+    // In fast tracing Embree selects the hit: different bounding boxes round the same facets may
+    // change its selection at silhouettes.
     const double allowed = tracing == Tracing::Exact ? 0 : 5e-6 * static_cast<double>(rays.size());
     EXPECT_LE(static_cast<double>(different), allowed);
     testing::record_margin(
@@ -122,8 +122,9 @@ std::vector<Case> small_cases() {
           {odd, {.tolerance_m = 3}}};
 }
 
-// Every ray is tried against every triangle, which are made from the leaves' definition alone.
-TEST(TerrainSceneProof, RaysMeetTheSurfaceThatTheLeavesDefineAcrossSeamsToo) {
+// Tests every ray against every triangle; the triangles follow from the definition of the leaves
+// alone.
+TEST(TerrainSceneProof, RaysHitTheSurfaceDefinedByTheLeavesAcrossSeams) {
   for (const auto& [grid, settings] : small_cases()) {
     const glm::dvec3 sensor = above(grid, {20, 30});
     const Clipmap clipmap(certified_tiles(grid), grid.frame(), settings, sensor_at(sensor));
@@ -134,7 +135,7 @@ TEST(TerrainSceneProof, RaysMeetTheSurfaceThatTheLeavesDefineAcrossSeamsToo) {
     }
     auto rays = rays_from(sensor, proof_size(1'000, 50'000), Seed{56});
     const auto others = random_rays(grid, proof_size(1'000, 50'000), Seed{57});
-    rays.insert(rays.end(), others.begin(), others.end());  // from outside the finest window too
+    rays.insert(rays.end(), others.begin(), others.end());  // also from outside the finest window
     for (const Tracing tracing : modes) {
       const auto hits = trace(build_tracer(clipmap, {0, 0, 0}, tracing), rays);
       std::size_t different = 0, met = 0;
@@ -157,8 +158,8 @@ TEST(TerrainSceneProof, RaysMeetTheSurfaceThatTheLeavesDefineAcrossSeamsToo) {
   }
 }
 
-// Alike is what the test above compares with the leaves.
-TEST(TerrainScene, RaysFromTheSurfaceMeetTheSameInBatchesOfEveryKindAcrossSeamsToo) {
+// The oracle is Batch::Alike, which the test above compares with the leaves.
+TEST(TerrainScene, RaysFromTheSurfaceHitTheSameInEveryKindOfBatch) {
   for (const auto& [grid, settings] : small_cases()) {
     const glm::dvec3 sensor = above(grid, {20, 30});
     const Clipmap clipmap(certified_tiles(grid), grid.frame(), settings, sensor_at(sensor));
@@ -178,7 +179,7 @@ TEST(TerrainScene, RaysFromTheSurfaceMeetTheSameInBatchesOfEveryKindAcrossSeamsT
                            side * mirrored});
       }
       const auto expected = trace(surface, leaving);
-      for (const Batch batch : {Batch::FromSurfaces, Batch::Scattered}) {
+      for (const Batch batch : {Batch::ShadowRays, Batch::Scattered}) {
         std::vector<Hit> met(leaving.size());
         surface.trace(leaving, met, batch);
         std::size_t different = 0;
@@ -190,7 +191,7 @@ TEST(TerrainScene, RaysFromTheSurfaceMeetTheSameInBatchesOfEveryKindAcrossSeamsT
   }
 }
 
-// Points at samples, edges and within triangles of the mesh; many on seams between levels.
+// Points at samples, on edges and within triangles of the mesh; many on seams between levels.
 std::vector<glm::dvec3> targets_on(const HeightGrid& grid,
                                    const std::vector<testing::SampleTriangle>& triangles,
                                    std::size_t count, Seed seed) {
@@ -208,7 +209,7 @@ std::vector<glm::dvec3> targets_on(const HeightGrid& grid,
   return targets;
 }
 
-TEST(TerrainSceneProof, RaysFromAboveAtVerticesAndEdgesOfAllLevelsDoNotLeak) {
+TEST(TerrainSceneProof, RaysFromAboveDoNotLeakAtVerticesAndEdgesOfAnyLevel) {
   const HeightGrid grid = fractal(513, 5, 400, Seed{58});
   const glm::dvec3 sensor = above(grid, {15, -25});
   const Clipmap clipmap(certified_tiles(grid), grid.frame(), capped(0.05, 2e-3, 96, 4),
@@ -220,7 +221,7 @@ TEST(TerrainSceneProof, RaysFromAboveAtVerticesAndEdgesOfAllLevelsDoNotLeak) {
     triangles.insert(triangles.end(), some.begin(), some.end());
   }
   const auto targets = targets_on(grid, triangles, proof_size(200'000, 10'000'000), Seed{59});
-  // From high above every line of sight is free: each ray must stop where it was aimed at.
+  // From high above every line of sight is free: each ray must end at its target.
   std::vector<Ray> rays(targets.size());
   for (std::size_t i = 0; i < rays.size(); ++i) {
     const auto turn = random_uniform({Seed{60}, 0, 0, static_cast<std::uint32_t>(i)});
@@ -231,7 +232,7 @@ TEST(TerrainSceneProof, RaysFromAboveAtVerticesAndEdgesOfAllLevelsDoNotLeak) {
     const auto hits = trace(build_tracer(clipmap, {0, 0, 0}, tracing), rays);
     std::size_t on_coarse = 0;
     for (std::size_t i = 0; i < rays.size(); ++i) {
-      // At the rim rounding decides whether a ray passes the DEM's side.
+      // At the boundary, rounding decides whether a ray passes the side of the DEM.
       const glm::dvec2 at = grid.frame().to_grid(glm::dvec2(targets[i]));
       if (at.x < 1e-6 || at.y < 1e-6 || at.x > 512 - 1e-6 || at.y > 512 - 1e-6) continue;
       ASSERT_NEAR(hits[i].range_m, glm::length(targets[i] - rays[i].origin), 1e-6)
@@ -240,7 +241,7 @@ TEST(TerrainSceneProof, RaysFromAboveAtVerticesAndEdgesOfAllLevelsDoNotLeak) {
     }
     EXPECT_GT(on_coarse, rays.size() / 10);
   }
-  // From below nothing is hit.
+  // Rays from below hit nothing.
   std::vector<Ray> up(rays.size() / 10);
   for (std::size_t i = 0; i < up.size(); ++i) {
     up[i].origin = {glm::dvec2(targets[i]), grid.min_height_m() - 50};
@@ -251,8 +252,8 @@ TEST(TerrainSceneProof, RaysFromAboveAtVerticesAndEdgesOfAllLevelsDoNotLeak) {
   }
 }
 
-// Rays from above. Where a window ends, its leaves leave points out, which may take the rim of a
-// hole along.
+// Vertical rays from above at leaves with thinned boundaries and holes: omitting points at the
+// border of a window can also move the boundary of a hole.
 std::vector<Ray> rays_at_thinned_borders(const HeightGrid& grid, const Clipmap& clipmap,
                                          Seed seed) {
   std::vector<Ray> rays;
@@ -309,7 +310,8 @@ TEST(TerrainSceneProof, ErrorBoundHoldsForEveryRay) {
             "{} samples missing, tolerance {} m, {} rad: {:.1f} % of bounds finite\n", holes,
             settings.tolerance_m, settings.angle_rad,
             100. * static_cast<double>(finite) / static_cast<double>(rays.size()));
-        // A tolerance lets leaves bridge what is missing everywhere; of those nothing is certain.
+        // With a tolerance, leaves bridge the samples that are missing everywhere in `salted`; no
+        // finite bound holds there.
         if (ground != &salted || settings.angle_rad + settings.tolerance_m == 0) {
           EXPECT_GT(finite, rays.size() / 2);
           testing::record_margin("rays without a finite bound",
@@ -321,7 +323,7 @@ TEST(TerrainSceneProof, ErrorBoundHoldsForEveryRay) {
   }
 }
 
-TEST(TerrainScene, FullResolutionHasNoErrorToBound) {
+TEST(TerrainScene, ErrorBoundIsZeroAtFullResolution) {
   const HeightGrid grid = fractal(129, 5, 100, Seed{65});
   const RayTracer tracer = whole(grid, Tracing::Fast);
   const auto rays = random_rays(grid, 1000, Seed{66});
@@ -334,7 +336,7 @@ TEST(TerrainScene, FullResolutionHasNoErrorToBound) {
   }
 }
 
-TEST(TerrainScene, LevelsThatDidNotChangeAreNotBuiltAgain) {
+TEST(TerrainScene, UnchangedLevelsAreNotRebuilt) {
   const HeightGrid grid = fractal(1025, 5, 400, Seed{67});
   const Clipmap here(certified_tiles(grid), grid.frame(), capped(0.05, 3e-3, 128, 4),
                      sensor_at({30, 40, 500}));

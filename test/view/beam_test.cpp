@@ -14,7 +14,7 @@
 
 #include "apps/groundray/generate.h"
 #include "core/error.h"
-#include "core/ply_io.h"
+#include "core/io/ply_io.h"
 #include "test/support/margin.h"
 #include "test/support/temporary_folder.h"
 #include "test/view/sample_dataset.h"
@@ -45,23 +45,24 @@ glm::dvec3 true_point(const PointCloud& scan, std::size_t row) {
           scan.column<double>("world_z")[row]};
 }
 
-// Heights at which the beams of the VLP-16's rings leave, as its table has them.
+// Heights of the VLP-16's beam origins by ring, from the sensor's table.
 constexpr std::array ring_height_m{0.0112,  0.0097,  0.0081,  0.0066,  0.0051,  0.0037,
                                    0.0022,  0.0007,  -0.0007, -0.0022, -0.0037, -0.0051,
                                    -0.0066, -0.0081, -0.0097, -0.0112};
 
-// The truth lies on the beam, whatever noise there is along it, and where it left is the table's.
-TEST(Beam, RunsFromItsOwnOriginThroughTheTruth) {
+// The true point lies on the beam, whatever the noise along it, and the beam's origin is that of
+// the table.
+TEST(Beam, StartsAtItsOwnOriginAndContainsTheTruePoint) {
   const SampleScan sample = scan_of(SampleDataset::get().path(), 2);
   for (std::size_t row = 0; row < sample.scan.rows(); row += 97) {
     const EchoBeam beam = echo_beam(sample.lidar(), sample.frame, sample.scan, row);
     ASSERT_TRUE(beam.is_origin_exact) << row;
     const glm::dvec3 to_m = true_point(sample.scan, row) - beam.origin_m;
     const double aside_m = glm::length(glm::cross(to_m, beam.direction));
-    EXPECT_LT(aside_m, 2e-5) << row;  // floats of 60 m
+    EXPECT_LT(aside_m, 2e-5) << row;  // single precision at 60 m
     groundray::testing::record_margin("truth aside of its beam", aside_m, 2e-5, "m");
     EXPECT_NEAR(glm::length(to_m), sample.scan.column<double>("range_true")[row], 1e-6);
-    EXPECT_NEAR(beam.range_m, glm::length(to_m), 5 * 0.02);  // five times the noise
+    EXPECT_NEAR(beam.range_m, glm::length(to_m), 5 * 0.02);  // five sigma of noise
     const Pose X_DS = sample.lidar().X_DS.pose_at(sample.frame.stamp +
                                                   time_of(sample.scan.column<float>("time")[row]));
     const glm::dvec3 origin_S = inverse(X_DS) * beam.origin_m;
@@ -70,7 +71,7 @@ TEST(Beam, RunsFromItsOwnOriginThroughTheTruth) {
   }
 }
 
-// Radii of 1/e^2 by the scene's beam: w(R)^2 = w0^2 + (R tan(divergence / 2))^2.
+// 1/e^2 radii from the scene's beam: w(R)^2 = w0^2 + (R tan(divergence / 2))^2.
 TEST(Beam, HasTheFootprintOfItsDivergence) {
   const SampleScan sample = scan_of(SampleDataset::get().path(), 0);
   const std::size_t row = sample.scan.rows() / 2;
@@ -99,8 +100,8 @@ TEST(Beam, HasTheFootprintOfItsDivergence) {
     EXPECT_NEAR(glm::dot(p - true_point(sample.scan, row), glm::normalize(normal)), 0, 1e-9);
 }
 
-// Points in S at the stamp, and pulses by their number: a sensor with a laser.
-TEST(Beam, IsFoundByItsPulseAndAtTheStamp) {
+// A sensor with a laser: its points are in S at the stamp, and its pulses are identified by number.
+TEST(Beam, IsIdentifiedByPulseNumberInDeskewedScans) {
   const TemporaryFolder folder;
   std::string text = groundray::testing::sample_scene();
   text.erase(text.find("cameras:"));
@@ -124,7 +125,7 @@ TEST(Beam, IsFoundByItsPulseAndAtTheStamp) {
   EXPECT_EQ(exact, rows);
 }
 
-TEST(Beam, BeginsAtTheSensorWhereNothingElseIsKnown) {
+TEST(Beam, StartsAtTheSensorIfTheOriginIsUnknown) {
   SampleScan sample = scan_of(SampleDataset::get().path(), 1);
   sample.run.sensors[0].lidar.reset();
   const EchoBeam beam = echo_beam(sample.lidar(), sample.frame, sample.scan, 10);
@@ -138,7 +139,7 @@ TEST(Beam, BeginsAtTheSensorWhereNothingElseIsKnown) {
   EXPECT_LT(glm::distance(beam.reported_m, X_DS * glm::dvec3(x[10], y[10], z[10])), 1e-12);
 }
 
-TEST(Beam, RefusesWhatHasNone) {
+TEST(Beam, RejectsEchoesWithoutABeam) {
   const SampleScan sample = scan_of(SampleDataset::get().path(), 0);
   EXPECT_THROW(echo_beam(sample.lidar(), sample.frame, sample.scan, sample.scan.rows()), Error);
   EXPECT_THROW(echo_beam(sample.run.sensors[1], sample.frame, sample.scan, 0), Error);
@@ -149,7 +150,7 @@ TEST(Beam, RefusesWhatHasNone) {
   EXPECT_THROW(echo_beam(sample.lidar(), sample.frame, here, 0), Error);
 }
 
-TEST(Beam, TellsAllColumnsOfAnEcho) {
+TEST(Beam, ListsAllColumnsOfAnEcho) {
   PointCloud scan(2);
   scan.add<float>("x")[1] = 1.5F;
   scan.add<double>("range_true")[1] = std::numeric_limits<double>::quiet_NaN();

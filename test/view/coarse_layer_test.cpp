@@ -1,4 +1,4 @@
-#include "apps/view/coarse_layer.h"
+#include "apps/view/layers/coarse_layer.h"
 
 #include <gmock/gmock.h>
 #include <gtest/gtest.h>
@@ -11,7 +11,7 @@
 #include <glm/geometric.hpp>
 #include <set>
 
-#include "apps/view/mesh_layer.h"
+#include "apps/view/layers/mesh_layer.h"
 
 namespace groundray::coarse_layer_test {
 namespace {
@@ -33,22 +33,22 @@ std::set<float> numbers_in(vtkPolyData& data) {
   std::set<float> numbers;
   for (vtkIdType i = 0; i < column.GetNumberOfTuples(); ++i) {
     numbers.insert(static_cast<float>(column.GetComponent(i, 0)));
-    EXPECT_EQ(column.GetComponent(i, 0), data.GetPoint(i)[0]);  // they stay with their points
+    EXPECT_EQ(column.GetComponent(i, 0), data.GetPoint(i)[0]);  // values stay with their points
   }
   return numbers;
 }
 
-TEST(CoarseLayer, ThinsPointsAboutEvenly) {
+TEST(CoarseLayer, ThinsPointsRoughlyEvenly) {
   const Layer cloud = numbered_points(100'000);
   const auto few = thin_points(cloud, 10'000);
-  // Binomial: sd 95; 6 of them.
+  // Binomial distribution with a standard deviation of 95; the tolerance is 6 of them.
   EXPECT_NEAR(static_cast<double>(few->GetNumberOfPoints()), 10'000, 570);
   const std::set<float> numbers = numbers_in(*few);
   const auto first_half = std::distance(numbers.begin(), numbers.lower_bound(50'000));
   EXPECT_NEAR(static_cast<double>(first_half), 5'000, 420);
 }
 
-TEST(CoarseLayer, MorePointsHoldTheFewer) {
+TEST(CoarseLayer, LargerSubsetContainsTheSmaller) {
   const Layer cloud = numbered_points(20'000);
   const std::set<float> few = numbers_in(*thin_points(cloud, 1'000));
   const std::set<float> more = numbers_in(*thin_points(cloud, 5'000));
@@ -56,13 +56,13 @@ TEST(CoarseLayer, MorePointsHoldTheFewer) {
   EXPECT_EQ(numbers_in(*thin_points(cloud, 20'000)).size(), 20'000u);
 }
 
-TEST(CoarseLayer, SmallCloudsStayWhole) {
+TEST(CoarseLayer, KeepsSmallCloudsComplete) {
   const Layer cloud = numbered_points(400);
   EXPECT_EQ(thin_points(cloud, 0), cloud.data);
   EXPECT_EQ(thin_points(Layer{.name = "none", .data = make_points(0)}, 0)->GetNumberOfPoints(), 0);
 }
 
-// Triangles on a grid of columns x rows points, each of height(column, row).
+// Triangles on a grid of columns x rows points with heights height(column, row).
 template <typename Height>
 Layer relief(int columns, int rows, double step_m, const glm::dvec3& low, const Height& height) {
   TriangleMesh mesh;
@@ -97,9 +97,10 @@ double area_m2(vtkPolyData& data) {
   return area;
 }
 
-// A plane about the origin, whose quadrants it crosses, and the same one far off: so many triangles
-// as are asked for, a quarter of them at least, that cover it but for a cell at its rim.
-TEST(CoarseLayer, PlanesStayWhole) {
+// A plane through all quadrants round the origin, and the same plane far away. At most the
+// requested number of triangles remains, and at least a quarter of it; they cover the plane except
+// for one cell at its boundary.
+TEST(CoarseLayer, KeepsPlanesWithoutGaps) {
   for (const double low_m : {-40.0, 0.0, 1e5}) {
     const Layer plane = relief(201, 201, 0.4, glm::dvec3(low_m), [](int, int) { return 0.0; });
     for (const std::size_t most : {0U, 700U, 5'000U, 30'000U}) {
@@ -115,8 +116,8 @@ TEST(CoarseLayer, PlanesStayWhole) {
   }
 }
 
-// Spikes have much more area than their grid has cells; and no limit takes all of them away.
-TEST(CoarseLayer, RoughSurfacesStay) {
+// Spikes have much more area than their grid has cells. No limit removes all of them.
+TEST(CoarseLayer, KeepsRoughSurfaces) {
   const Layer rough = relief(150, 150, 0.1, {-7, -7, 0}, [](int column, int row) {
     return (column * 7 + row * 13) % 11 * 0.3;
   });
@@ -128,8 +129,9 @@ TEST(CoarseLayer, RoughSurfacesStay) {
   }
 }
 
-// A thousand tetrahedra of 10 cm on a square kilometre, each smaller than any cell that would do.
-TEST(CoarseLayer, ThingsSmallerThanACellDoNotVanish) {
+// A thousand tetrahedra of 10 cm on a square kilometre, each smaller than any cell that would meet
+// the limit.
+TEST(CoarseLayer, KeepsObjectsSmallerThanACell) {
   TriangleMesh posts;
   for (std::uint32_t i = 0; i < 1000; ++i) {
     const glm::dvec3 foot(i % 32 * 31, i / 32 * 31, 0);
@@ -148,14 +150,14 @@ TEST(CoarseLayer, ThingsSmallerThanACellDoNotVanish) {
   thinned->GetBounds(bounds.data());
   EXPECT_GT(bounds[1] - bounds[0], 760);  // of 961 m
   EXPECT_GT(bounds[3] - bounds[2], 760);
-  // One that has few triangles is drawn as it is.
+  // A mesh with few triangles is drawn unchanged.
   posts.triangles.resize(60);
   const Layer few = mesh_layer("few", posts, glm::dvec3(0));
   EXPECT_EQ(thin_triangles(few, 0), few.data);
 }
 
-// Triangles without extent or area have no cell at all.
-TEST(CoarseLayer, BearsWhatHasNoExtent) {
+// Degenerate triangles, without extent or area, define no cell size.
+TEST(CoarseLayer, AcceptsDegenerateTriangles) {
   for (const double length_m : {0.0, 1e-30, 3.0}) {
     TriangleMesh line;
     for (std::uint32_t i = 0; i < 3000; ++i) {
@@ -172,8 +174,8 @@ TEST(CoarseLayer, BearsWhatHasNoExtent) {
   }
 }
 
-// A sphere of radius 1: its thinned surface is made of its own vertices, all round.
-TEST(CoarseLayer, ThinsASphereToOne) {
+// A sphere of radius 1: the thinned surface uses only its vertices and covers it on all sides.
+TEST(CoarseLayer, ThinnedSphereRemainsASphere) {
   TriangleMesh sphere;
   constexpr int rings = 120, steps = 240;
   for (int i = 0; i <= rings; ++i) {

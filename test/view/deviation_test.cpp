@@ -1,4 +1,4 @@
-#include "apps/view/deviation.h"
+#include "apps/view/compare/deviation.h"
 
 #include <gmock/gmock.h>
 #include <gtest/gtest.h>
@@ -10,10 +10,10 @@
 #include <random>
 #include <stop_token>
 
-#include "apps/interruption.h"
+#include "apps/scene/interruption.h"
 #include "core/error.h"
 #include "test/support/margin.h"
-#include "test/support/sample_terrain.h"
+#include "test/support/terrain/sample_terrain.h"
 
 namespace groundray::deviation_test {
 namespace {
@@ -23,7 +23,7 @@ using ::testing::HasSubstr;
 
 constexpr double nan = std::numeric_limits<double>::quiet_NaN();
 
-// A sphere of unit radius about the origin, in quarters of degrees of latitude and longitude.
+// A unit sphere about the origin, divided into `bands` bands of latitude and twice as many columns.
 TriangleMesh sphere(std::uint32_t bands) {
   TriangleMesh mesh;
   const std::uint32_t columns = 2 * bands;
@@ -41,7 +41,7 @@ TriangleMesh sphere(std::uint32_t bands) {
       if (i > 0) mesh.triangles.emplace_back(a, b + columns, b);
     }
   }
-  // The poles are one vertex each, as the others.
+  // Each pole becomes a single vertex, shared like the others.
   for (glm::uvec3& triangle : mesh.triangles) {
     for (glm::length_t k = 0; k < 3; ++k) {
       if (triangle[k] < columns) triangle[k] = 0;
@@ -51,7 +51,7 @@ TriangleMesh sphere(std::uint32_t bands) {
   return mesh;
 }
 
-// Each triangle with corners of its own, as in an STL.
+// A triangle soup: each triangle has its own vertices, as in an STL file.
 TriangleMesh soup_of(const TriangleMesh& mesh) {
   TriangleMesh soup;
   for (const glm::uvec3& triangle : mesh.triangles) {
@@ -62,8 +62,8 @@ TriangleMesh soup_of(const TriangleMesh& mesh) {
   return soup;
 }
 
-// How often a closed mesh winds round a point: 1 inside, 0 outside. Van Oosterom and Strackee, The
-// solid angle of a plane triangle (1983).
+// Winding number of a closed mesh about a point: 1 inside, 0 outside. Van Oosterom and Strackee,
+// The solid angle of a plane triangle (1983).
 double winding(const TriangleMesh& mesh, const glm::dvec3& p) {
   double sum = 0;
   for (const glm::uvec3& triangle : mesh.triangles) {
@@ -85,8 +85,8 @@ std::vector<glm::dvec3> random_places(std::size_t count, double size_m) {
   return places_m;
 }
 
-// The mesh lies within its sagitta inside of the sphere.
-TEST(DeviationFromTruth, FromASphereIsTheDifferenceOfRadii) {
+// The mesh lies inside the sphere, by its sagitta at most.
+TEST(DeviationFromTruth, OfConcentricSpheresIsTheDifferenceOfRadii) {
   constexpr std::uint32_t bands = 60;
   const TrueMesh truth(sphere(bands));
   const double side_rad = std::numbers::pi / bands;
@@ -96,7 +96,7 @@ TEST(DeviationFromTruth, FromASphereIsTheDifferenceOfRadii) {
   const Deviation deviation = deviation_from_mesh(places_m, truth);
   for (std::size_t i = 0; i < places_m.size(); ++i) {
     const double off_m = deviation.signed_m[i] - (glm::length(places_m[i]) - 1);
-    EXPECT_GT(off_m, -1e-6);  // floats
+    EXPECT_GT(off_m, -1e-6);  // single precision
     EXPECT_LT(off_m, sagitta_m + 1e-6);
     farthest_m = std::max(farthest_m, off_m);
   }
@@ -106,7 +106,7 @@ TEST(DeviationFromTruth, FromASphereIsTheDifferenceOfRadii) {
   EXPECT_EQ(deviation.figures.beyond, 0U);
 }
 
-TEST(DeviationFromTruth, FromASoupIsThatFromTheMesh) {
+TEST(DeviationFromTruth, IsTheSameForATriangleSoup) {
   const TriangleMesh mesh = sphere(12);
   const auto places_m = random_places(2'000, 1.5);
   const Deviation whole = deviation_from_mesh(places_m, TrueMesh(mesh));
@@ -115,13 +115,13 @@ TEST(DeviationFromTruth, FromASoupIsThatFromTheMesh) {
   EXPECT_EQ(whole.figures.beyond, 0U);
 }
 
-// What was found of the sides of a star's places.
+// Counts of the sides that were computed for points in and round a star.
 struct StarSides {
   int inside = 0, wrong = 0;
-  int wrong_by_face = 0;  // if the normal of the nearest triangle alone told
+  int wrong_by_face = 0;  // with the normal of the nearest triangle alone
 };
 
-// Asks about places in and round a star with sharp spikes and deep folds.
+// Queries points in and round a star with sharp spikes and deep folds.
 StarSides look_at_star(std::uint64_t seed, std::size_t places) {
   TriangleMesh star = sphere(8);
   std::mt19937_64 random(seed);
@@ -144,20 +144,20 @@ StarSides look_at_star(std::uint64_t seed, std::size_t places) {
   return sides;
 }
 
-TEST(DeviationFromTruth, TellsInsideFromOutsideOfAStar) {
+TEST(DeviationFromTruth, DistinguishesInsideAndOutsideOfAStar) {
   const StarSides sides = look_at_star(3, 5'000);
   EXPECT_EQ(sides.wrong, 0);
   EXPECT_GT(sides.inside, 200);
-  EXPECT_GT(sides.wrong_by_face, 10);  // the star is a trial
+  EXPECT_GT(sides.wrong_by_face, 10);  // the star is a difficult case
 }
 
-TEST(DeviationFromTruthProof, TellsInsideFromOutsideOfManyStars) {
+TEST(DeviationFromTruthProof, DistinguishesInsideAndOutsideOfManyStars) {
   const std::size_t stars = groundray::testing::proof_size(4, 200);
   for (std::uint64_t seed = 10; seed < 10 + stars; ++seed)
     EXPECT_EQ(look_at_star(seed, 4'000).wrong, 0) << "star " << seed;
 }
 
-TEST(DeviationFromTruth, IsNoneBesideTheBorder) {
+TEST(DeviationFromTruth, IsNaNBeyondTheBoundary) {
   const TrueMesh plate({.vertices_m = {{0, 0, 1}, {2, 0, 1}, {2, 2, 1}, {0, 2, 1}},
                         .triangles = {{0, 1, 2}, {0, 2, 3}},
                         .levels = {}});
@@ -172,8 +172,9 @@ TEST(DeviationFromTruth, IsNoneBesideTheBorder) {
   EXPECT_TRUE(std::isnan(plate.signed_distance_m({nan, 0, 0}, near)));
 }
 
-// The plane z = x / 2 - y / 4 + 3; distances across it are those up times the normal's z.
-TEST(DeviationFromTruth, FromATiltedPlaneHasAClosedForm) {
+// The plane z = x / 2 - y / 4 + 3: a distance perpendicular to it is the vertical distance times
+// the normal's z.
+TEST(DeviationFromTruth, MatchesTheClosedFormForATiltedPlane) {
   const auto height_m = [](double x, double y) { return x / 2 - y / 4 + 3; };
   std::vector<float> heights_m;
   for (int row = 0; row < 9; ++row) {
@@ -188,7 +189,7 @@ TEST(DeviationFromTruth, FromATiltedPlaneHasAClosedForm) {
                        .triangles = {{0, 1, 2}, {0, 2, 3}},
                        .levels = {}});
   const double normal_z = 1 / std::sqrt(1 + 0.25 + 0.0625);
-  const glm::dvec3 shift_m(100, 200, 7);  // from the places' D to the truth's
+  const glm::dvec3 shift_m(100, 200, 7);  // from the points' D to the truth's D
   std::vector<glm::dvec3> places_m;
   std::vector<double> above_m;
   for (const glm::dvec3& random : random_places(1'000, 1)) {
@@ -212,7 +213,7 @@ TEST(DeviationFromTruth, FromATiltedPlaneHasAClosedForm) {
   EXPECT_NEAR(across.figures.rms_m, normal_z * up.figures.rms_m, 1e-7);
 }
 
-TEST(DeviationFromTruth, OfADemFromItselfIsZeroButForHoles) {
+TEST(DeviationFromTruth, OfADemFromItselfIsZeroExceptInHoles) {
   std::vector<float> heights_m(30, 2);
   heights_m[7] = static_cast<float>(nan);
   const HeightGrid grid({6, 5}, {10, 20}, {2, -2}, heights_m);
@@ -226,8 +227,8 @@ TEST(DeviationFromTruth, OfADemFromItselfIsZeroButForHoles) {
   EXPECT_GE(deviation.figures.beyond, 1U);
 }
 
-// By hand: of -1, 0, 1, 2, 10 the median is 1, and the distances to it are 2, 1, 0, 1, 9.
-TEST(DeviationFromTruth, HasTheUsualFigures) {
+// Computed by hand: the median of -1, 0, 1, 2, 10 is 1, and the distances to it are 2, 1, 0, 1, 9.
+TEST(DeviationFromTruth, StatisticsMatchTheirDefinitions) {
   const auto nothing = static_cast<float>(nan);
   const DeviationFigures figures = figures_of({10, nothing, -1, 1, 0, 2, nothing});
   EXPECT_EQ(figures.count, 5U);
@@ -236,11 +237,11 @@ TEST(DeviationFromTruth, HasTheUsualFigures) {
   EXPECT_DOUBLE_EQ(figures.rms_m, std::sqrt(106 / 5.0));
   EXPECT_DOUBLE_EQ(figures.median_m, 1);
   EXPECT_DOUBLE_EQ(figures.nmad_m, 1.4826);
-  EXPECT_DOUBLE_EQ(figures.p95_m, 10);  // four of five do not exceed 2: less than 95 %
+  EXPECT_DOUBLE_EQ(figures.p95_m, 10);  // four of five are 2 or less, which is below 95 %
   EXPECT_DOUBLE_EQ(figures.largest_m, 10);
   EXPECT_DOUBLE_EQ(figures.low_m, -1);
   EXPECT_DOUBLE_EQ(figures.high_m, 10);
-  EXPECT_THAT(figure_lines(figures), ::testing::Contains("2 places beyond the truth"));
+  EXPECT_THAT(figure_lines(figures), ::testing::Contains("2 points beyond the truth"));
   const DeviationFigures none = figures_of({nothing});
   EXPECT_EQ(none.count, 0U);
   EXPECT_TRUE(std::isnan(none.mean_m));
@@ -248,7 +249,7 @@ TEST(DeviationFromTruth, HasTheUsualFigures) {
   EXPECT_THAT(figure_lines(none)[1], HasSubstr("none"));
 }
 
-TEST(DeviationFromTruth, IsCountedInBins) {
+TEST(DeviationFromTruth, HistogramCountsEachBin) {
   const std::vector<float> values{-2, -1, -0.5F, 0, 0.5F, 1, 3, static_cast<float>(nan)};
   const DeviationHistogram histogram = histogram_of(values, 4, std::pair(-1.0, 1.0));
   EXPECT_THAT(histogram.counts, ElementsAre(1, 1, 1, 2));
@@ -273,7 +274,7 @@ TEST(DeviationFromTruth, IsTheSameForAnyNumberOfThreads) {
   EXPECT_EQ(deviation_from_mesh(places_m, truth).signed_m, many.signed_m);
 }
 
-TEST(DeviationFromTruth, TellsHowFarItIsAndStops) {
+TEST(DeviationFromTruth, ReportsProgressAndStops) {
   const TrueMesh truth(sphere(6));
   const auto places_m = random_places(150'000, 2);
   std::vector<double> shares;
@@ -292,12 +293,13 @@ TEST(DeviationFromTruth, TellsHowFarItIsAndStops) {
   EXPECT_EQ(told, 2U);
 }
 
-TEST(DeviationFromTruth, RefusesOrBearsBadMeshes) {
+TEST(DeviationFromTruth, RejectsOrToleratesBadMeshes) {
   EXPECT_THROW(TrueMesh(TriangleMesh{}), Error);
   EXPECT_THROW(
       TrueMesh({.vertices_m = {{0, 0, nan}, {1, 0, 0}, {0, 1, 0}}, .triangles = {{0, 1, 2}}}),
       Error);
-  // Three triangles on one side, one of them without area, and one face twice, back to back.
+  // One edge with three triangles on the same side, one of them without area, and one face twice,
+  // back to back.
   const TrueMesh wild({.vertices_m = {{0, 0, 0}, {1, 0, 0}, {0, 1, 0}, {0, 0, 1}, {0.5, 0, 0}},
                        .triangles = {{0, 1, 2}, {0, 2, 1}, {1, 0, 3}, {0, 1, 4}},
                        .levels = {}});
@@ -307,7 +309,7 @@ TEST(DeviationFromTruth, RefusesOrBearsBadMeshes) {
   EXPECT_EQ(deviation_from_mesh({}, wild).figures.count, 0U);
 }
 
-TEST(DeviationFromTruth, SaysHowMuchAgrees) {
+TEST(DeviationFromTruth, ReportsPrecisionAndCompleteness) {
   const TriangleMesh plate{.vertices_m = {{0, 0, 0}, {1, 0, 0}, {1, 1, 0}, {0, 1, 0}},
                            .triangles = {{0, 1, 2}, {0, 2, 3}},
                            .levels = {}};
@@ -316,8 +318,8 @@ TEST(DeviationFromTruth, SaysHowMuchAgrees) {
               ElementsAre("within 0.01 m: precision 100.00 %, completeness 100.00 %, F1 100.00 %"));
 }
 
-// Two squares that lie 5 cm apart and overlap in half of each.
-TEST(AgreementUntil, IsTheAgreementUnlessStopped) {
+// Two rectangles that are 5 cm apart and overlap in half of each.
+TEST(AgreementUntil, MatchesAgreementUnlessStopped) {
   const TriangleMesh truth{
       {{0, 0, 0}, {2, 0, 0}, {2, 1, 0}, {0, 1, 0}}, {{0, 1, 2}, {0, 2, 3}}, {}};
   TriangleMesh mesh = truth;
@@ -329,7 +331,7 @@ TEST(AgreementUntil, IsTheAgreementUnlessStopped) {
   ASSERT_EQ(all.size(), 1u);
   EXPECT_EQ(all[0].precision.value, expected[0].precision.value);
   EXPECT_EQ(all[0].completeness.value, expected[0].completeness.value);
-  // The tolerance reaches sqrt(0.06^2 - 0.05^2) m beyond the edge.
+  // The tolerance extends sqrt(0.06^2 - 0.05^2) m beyond the edge.
   EXPECT_NEAR(all[0].precision.value, (1 + std::sqrt(0.0011)) / 2, 0.02);
   stop.request_stop();
   EXPECT_THROW(agreement_until(mesh, truth, tolerances_m, stop.get_token()), Interrupted);

@@ -1,4 +1,4 @@
-#include "apps/view/ground_texture.h"
+#include "apps/view/layers/ground_texture.h"
 
 #include <gtest/gtest.h>
 #include <vtkDataArray.h>
@@ -19,19 +19,20 @@
 #include <tuple>
 #include <utility>
 
-#include "apps/scene/world.h"
-#include "apps/view/terrain_follower.h"
-#include "core/product_io.h"
-#include "test/support/geotiff.h"
+#include "apps/scene/simulation.h"
+#include "apps/view/layers/terrain_follower.h"
+#include "core/image/png_io.h"
 #include "test/support/temporary_folder.h"
+#include "test/support/terrain/geotiff.h"
 #include "test/view/sample_dataset.h"
 
 namespace groundray::ground_texture_test {
 namespace {
 
-// The hills of the sample scene, with an orthophoto that grows redder to the east and greener to
-// the north, or with a texture of stripes 10 cm wide.
-std::shared_ptr<const World> world_of(const std::filesystem::path& folder, const char* ground) {
+// The sample scene's hills with an orthophoto, whose red increases to the east and green to the
+// north, or with a texture of stripes 10 cm wide.
+std::shared_ptr<const Simulation> world_of(const std::filesystem::path& folder,
+                                           const char* ground) {
   std::string text = testing::sample_scene();
   text.replace(text.find("material: dry_soil"), 18, ground);
   constexpr int size = 161;
@@ -50,7 +51,8 @@ std::shared_ptr<const World> world_of(const std::filesystem::path& folder, const
       std::ranges::fill(stripes.at(x, y), std::uint8_t(x < 10 ? 40 : 200));
   }
   write_png(folder / "stripes.png", stripes);
-  return std::make_shared<const World>(load_world(testing::write_sample_scene(folder, text)));
+  return std::make_shared<const Simulation>(
+      load_simulation(testing::write_sample_scene(folder, text)));
 }
 
 glm::dvec3 texel(const Layer& layer, glm::ivec2 at) {
@@ -60,7 +62,7 @@ glm::dvec3 texel(const Layer& layer, glm::ivec2 at) {
   return colour;
 }
 
-// The texture at coordinates, as it is drawn: linear between the middles of texels.
+// Samples the texture at texture coordinates as it is drawn: bilinearly between texel centres.
 glm::dvec3 texture_at(const Layer& layer, const glm::dvec2& place) {
   std::array<int, 3> size{};
   layer.texture->GetInput()->GetDimensions(size.data());
@@ -80,11 +82,11 @@ glm::dvec2 place_of(vtkPolyData& data, vtkIdType point) {
   return place;
 }
 
-// At corners of triangles the column says what the ground looks like there.
-TEST(GroundTexture, ShowsWhatTheGroundLooksLike) {
+// At triangle corners, the colour column is the oracle for the texture.
+TEST(GroundTexture, MatchesTheAppearanceOfTheGround) {
   testing::TemporaryFolder folder;
-  const auto world = world_of(folder.path(), "material: dry_soil, orthophoto: photo.tif");
-  TerrainFollower follower(world);
+  const auto simulation = world_of(folder.path(), "material: dry_soil, orthophoto: photo.tif");
+  TerrainFollower follower(simulation);
   const FollowedTerrain terrain = follower.follow({70, 90, 58});
   const Layer& layer = terrain.layer;
   ASSERT_NE(layer.texture, nullptr);
@@ -98,16 +100,17 @@ TEST(GroundTexture, ShowsWhatTheGroundLooksLike) {
       const glm::dvec3 off = glm::abs(texture_at(layer, place_of(*data, i)) - expected);
       worst = std::max({worst, off.x, off.y, off.z});
     }
-    // A colour changes by about one in a metre, and texels are 0.3 m at most; bytes are rounded.
+    // A colour value changes by about one per metre, and texels are 0.3 m at most; bytes are
+    // rounded.
     EXPECT_LT(worst, 3);
   }
   const glm::dvec2 span(layer.find("colour")->range);
   EXPECT_LT(span.x, span.y);
 }
 
-// A corner that takes its colours from several squares is there for each, with the same numbers;
-// and no triangle went.
-TEST(GroundTexture, KeepsTheTerrain) {
+// A vertex that takes its colours from several squares of the texture is repeated for each of them,
+// with the same values; no triangle is lost.
+TEST(GroundTexture, KeepsTheTerrainsGeometry) {
   testing::TemporaryFolder folder;
   const glm::dvec3 eye(70, 90, 58);
   TerrainFollower plain(world_of(folder.path(), "material: dry_soil"));
@@ -124,16 +127,16 @@ TEST(GroundTexture, KeepsTheTerrain) {
   }
 }
 
-// Triangles of a metre show stripes that are ten times finer.
+// Triangles with sides of a metre show stripes that are ten times finer.
 TEST(GroundTexture, IsSharpNearTheEye) {
   testing::TemporaryFolder folder;
-  const auto world =
+  const auto simulation =
       world_of(folder.path(), "material: dry_soil, texture: {albedo: stripes.png, size_m: 0.2}");
-  TerrainFollower follower(world);
+  TerrainFollower follower(simulation);
   const glm::dvec3 eye(80.3, 80.4, 55);
   const Layer layer = follower.follow(eye).layer;
   ASSERT_NE(layer.texture, nullptr);
-  // The triangle that is nearest to the eye, along its longest side.
+  // Samples the triangle nearest to the eye along its longest side.
   const auto corner = corners(*layer.data);
   std::size_t nearest = 0;
   double least_m = 1e9;

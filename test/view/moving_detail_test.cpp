@@ -1,4 +1,4 @@
-#include "apps/view/moving_detail.h"
+#include "apps/view/layers/moving_detail.h"
 
 #include <gtest/gtest.h>
 
@@ -11,13 +11,13 @@ std::size_t points_after(MovingDetail& detail, double seconds, int pictures) {
   return detail.points();
 }
 
-TEST(MovingDetail, FollowsWhatPicturesTake) {
+TEST(MovingDetail, FollowsTheRenderingTime) {
   MovingDetail detail;
   const std::size_t first = detail.points();
-  EXPECT_EQ(points_after(detail, 0.05, 20), first);  // as wanted
+  EXPECT_EQ(points_after(detail, 0.05, 20), first);  // frames take as long as intended
   EXPECT_EQ(points_after(detail, 0.01, 20), 2 * first);
   EXPECT_EQ(points_after(detail, 0.2, 20), first);
-  EXPECT_EQ(points_after(detail, 0.2, 3), first);  // too few to tell
+  EXPECT_EQ(points_after(detail, 0.2, 3), first);  // too few frames for a decision
   EXPECT_EQ(points_after(detail, 0.2, 20), first / 2);
 }
 

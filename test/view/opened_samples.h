@@ -10,13 +10,13 @@
 #include <string>
 #include <vector>
 
-#include "core/exr_io.h"
-#include "core/mesh_io.h"
-#include "core/npy_io.h"
-#include "core/product_io.h"
-#include "terrain/layers_io.h"
-#include "test/support/geotiff.h"
+#include "core/image/exr_io.h"
+#include "core/image/png_io.h"
+#include "core/io/mesh_io.h"
+#include "core/io/npy_io.h"
+#include "terrain/dem/layers_io.h"
 #include "test/support/temporary_folder.h"
+#include "test/support/terrain/geotiff.h"
 #include "test/view/sample_dataset.h"
 
 namespace groundray::testing {
@@ -37,7 +37,7 @@ inline TriangleMesh tetrahedron() {
           {}};
 }
 
-// Elevations 10 + column / 2 with a void of 2 x 2 samples, and a second band of twice the row.
+// Writes elevations 10 + column / 2 with a void of 2 x 2 samples, and a second band of 2 * row.
 inline void write_two_bands(const std::filesystem::path& path) {
   constexpr int columns = 12, rows = 9;
   std::vector<float> height, other;
@@ -54,7 +54,7 @@ inline void write_two_bands(const std::filesystem::path& path) {
   write_layers(path, frame, {.origin_w_m = {500'000, 4'000'000, 0}}, layers);
 }
 
-/// A file of each kind that is opened; made once.
+/// One file of each supported kind, written once per program.
 class OpenedSamples {
  public:
   static const OpenedSamples& get() {
@@ -99,7 +99,8 @@ class OpenedSamples {
     ImageF light(16, 8, 3), depth(16, 8, 1);
     for (std::size_t i = 0; i < depth.values().size(); ++i)
       depth.values()[i] = static_cast<float>(i);
-    // Two pixels of 1 and 2 in red, and half of that in blue (RGBE: mantissa / 256 * 2^(e - 128)).
+    // Red is 1 in the first pixel and 2 in the second; blue is half of red (RGBE: mantissa / 256 *
+    // 2^(e - 128)).
     write_bytes(folder_ / "light.hdr", "#?RADIANCE\nFORMAT=32-bit_rle_rgbe\n\n-Y 1 +X 2\n" +
                                            std::string("\x80\0\x40\x81\x80\0\x40\x82", 8));
     write_exr(folder_ / "light.exr", {{{"R", "G", "B"}, &light}, {{"Z"}, &depth}});

@@ -1,4 +1,4 @@
-#include "apps/view/recorded_image.h"
+#include "apps/view/recorded/recorded_image.h"
 
 #include <gmock/gmock.h>
 #include <gtest/gtest.h>
@@ -13,12 +13,12 @@
 #include <string>
 
 #include "apps/colour_map.h"
-#include "apps/view/pixel_ray.h"
+#include "apps/view/recorded/pixel_ray.h"
 #include "core/error.h"
-#include "core/exr_io.h"
-#include "core/flow_io.h"
-#include "core/npy_io.h"
-#include "core/product_io.h"
+#include "core/image/exr_io.h"
+#include "core/image/flow_io.h"
+#include "core/image/png_io.h"
+#include "core/io/npy_io.h"
 #include "sensors/camera/lidar_image.h"
 #include "test/support/margin.h"
 #include "test/support/temporary_folder.h"
@@ -85,7 +85,7 @@ TEST(RecordedImage, HasAllChannelsOfAFrame) {
   }
 }
 
-TEST(RecordedImage, NamesWhatItShows) {
+TEST(RecordedImage, ListsLabelsWithTheirNames) {
   const RecordedImage image = image_of(0);
   const DrawnChannel labels = image.draw(*image.find("label"));
   std::size_t pixels = 0;
@@ -108,7 +108,7 @@ TEST(RecordedImage, NamesWhatItShows) {
 }
 
 // The oracle is the channel of positions, which the ray tracer wrote from its own poses and lens.
-TEST(RecordedImage, HasRaysThatMeetWhatItSaw) {
+TEST(RecordedImage, PixelRaysHitTheRecordedSurface) {
   const RecordedImage image = image_of(2);
   const RecordedFrame& frame = eye().frames[2];
   const std::size_t position = *image.find("position");
@@ -125,7 +125,7 @@ TEST(RecordedImage, HasRaysThatMeetWhatItSaw) {
         continue;
       }
       const glm::dvec3 truth(p[0], p[1], p[2]);
-      EXPECT_LT(glm::distance(*ray->p_D_m, truth), 3e-5) << x << ", " << y;  // floats of 100 m
+      EXPECT_LT(glm::distance(*ray->p_D_m, truth), 3e-5) << x << ", " << y;  // floats at 100 m
       worst_m = std::max(worst_m, glm::distance(*ray->p_D_m, truth));
       const auto pixel = pixel_of(eye(), frame, truth);
       ASSERT_TRUE(pixel);
@@ -137,7 +137,7 @@ TEST(RecordedImage, HasRaysThatMeetWhatItSaw) {
   groundray::testing::record_margin("surface under a pixel", worst_m, 3e-5, "m");
 }
 
-TEST(RecordedImage, FindsTheSurfaceByDepthAlone) {
+TEST(RecordedImage, LocatesTheSurfaceByDepthAlone) {
   const RecordedImage whole = image_of(0);
   const TemporaryFolder folder;
   const auto& depth = std::get<ImageF>(whole.channels()[*whole.find("depth")].values);
@@ -153,7 +153,7 @@ TEST(RecordedImage, FindsTheSurfaceByDepthAlone) {
   EXPECT_THROW(seen_pixel(sample_run().sensors[0], eye().frames[0], {3, 4}, nullptr), Error);
 }
 
-TEST(RecordedImage, DrawsNumbersFromLowToHigh) {
+TEST(RecordedImage, MapsNumbersToColours) {
   const TemporaryFolder folder;
   ImageF values(5, 1, 1);
   for (std::size_t i = 0; i < 5; ++i)
@@ -161,7 +161,7 @@ TEST(RecordedImage, DrawsNumbersFromLowToHigh) {
   write_exr(folder / "a.exr", {{{"Z"}, &values}});
   write_exr(folder / "b.exr", {{{"Incidence"}, &values}});
   const RecordedImage depth(folder / "a.exr"), incidence(folder / "b.exr");
-  // Equal steps of the logarithm, near is bright.
+  // Logarithmic scale; near is bright.
   const DrawnChannel near = depth.draw(0, std::pair(1.0, 100.0));
   EXPECT_TRUE(near.legend.is_logarithmic);
   const auto same = [](const Colour& a, const Colour& b) { return glm::distance(a, b) < 0.004; };
@@ -171,7 +171,7 @@ TEST(RecordedImage, DrawsNumbersFromLowToHigh) {
   EXPECT_EQ(colour_at(near.picture, 3, 0), Colour(0));
   EXPECT_EQ(colour_at(near.picture, 4, 0), Colour(0));
   EXPECT_TRUE(same(near.legend.colours.front(), range_colour(0)));
-  // Equal steps, high is bright.
+  // Linear scale; high is bright.
   const DrawnChannel even = incidence.draw(0, std::pair(1.0, 19.0));
   EXPECT_FALSE(even.legend.is_logarithmic);
   EXPECT_TRUE(same(colour_at(even.picture, 0, 0), range_colour(1)));
@@ -180,7 +180,7 @@ TEST(RecordedImage, DrawsNumbersFromLowToHigh) {
   EXPECT_THROW(depth.draw(0, std::pair(2.0, 1.0)), Error);
 }
 
-TEST(RecordedImage, BearsImagesWithoutAnyNumber) {
+TEST(RecordedImage, AcceptsImagesWithoutFiniteValues) {
   const TemporaryFolder folder;
   ImageF values(3, 2, 6);
   std::ranges::fill(values.values(), nan);
@@ -192,8 +192,8 @@ TEST(RecordedImage, BearsImagesWithoutAnyNumber) {
   EXPECT_EQ(value_at(image, "normal", {0, 0}), "none");
 }
 
-// Files of others may hold what no kind's number is.
-TEST(RecordedImage, TellsNumbersThatAreNoKind) {
+// Files of other programs may hold values that are no valid label.
+TEST(RecordedImage, ShowsInvalidLabelsAsNumbers) {
   const TemporaryFolder folder;
   const double infinite = std::numeric_limits<double>::infinity();
   ImageF values(5, 1, 1);
@@ -208,8 +208,9 @@ TEST(RecordedImage, TellsNumbersThatAreNoKind) {
   EXPECT_EQ(image.draw(0).picture.width(), 5);
 }
 
-// Of light 1 % is cut off; sRGB makes the middle of the rest brighter.
-TEST(RecordedImage, DrawsLight) {
+// The brightest 1 % of radiances is clipped; sRGB encoding brightens the middle of the remaining
+// range.
+TEST(RecordedImage, ExposesRadiance) {
   const TemporaryFolder folder;
   ImageF rgb(100, 1, 3);
   for (std::size_t i = 0; i < 300; ++i) rgb.values()[i] = std::floor(static_cast<float>(i) / 3) + 1;
@@ -219,12 +220,12 @@ TEST(RecordedImage, DrawsLight) {
   const DrawnChannel drawn = image.draw(0);
   EXPECT_NEAR(drawn.legend.high, 99, 1.01);
   EXPECT_EQ(colour_at(drawn.picture, 99, 0), Colour(1));
-  EXPECT_NEAR(colour_at(drawn.picture, 49, 0).x, 0.7354, 0.01);  // sRGB of a half
+  EXPECT_NEAR(colour_at(drawn.picture, 49, 0).x, 0.7354, 0.01);  // sRGB of 0.5
   EXPECT_EQ(value_at(image, "light", {4, 0}), "(5, 5, 5) W/(m² sr)");
 }
 
-// Right, up, left and down have hues of their own; what stands is white.
-TEST(RecordedImage, ReadsFlowInEachForm) {
+// Right, up, left and down have different hues; zero flow is white.
+TEST(RecordedImage, ReadsFlowInEachFormat) {
   const TemporaryFolder folder;
   ImageF flow_px(3, 2, 2);
   const std::array<float, 12> values{8, 0, -8, 0, 0, 8, 0, -8, 0, 0, nan, nan};
@@ -266,8 +267,8 @@ TEST(RecordedImage, ReadsPicturesOf8And16Bits) {
   EXPECT_EQ(image.draw(*image.find("picture")).picture.at(0, 0)[0], 200);
 }
 
-// A lidar's echoes as dots of 3 x 3 px, those that are hidden left out, the nearest uppermost.
-TEST(RecordedImage, ShowsWhereEchoesLie) {
+// A lidar's echoes are dots of 3 x 3 px: hidden ones are omitted, and the nearest is on top.
+TEST(RecordedImage, ShowsPositionsOfEchoes) {
   const TemporaryFolder folder;
   write_png(folder / "000000.png", Image8(12, 8, 3));
   const std::vector<ImagedEcho> echoes{{0, 2.2, 3.4, 7, true, true},
@@ -284,7 +285,7 @@ TEST(RecordedImage, ShowsWhereEchoesLie) {
   EXPECT_EQ(value_at(image, "echoes of top", {10, 6}), "8 m");
 }
 
-TEST(RecordedImage, GivesEachLayerANameOfItsOwn) {
+TEST(RecordedImage, NamesOfLayersAreUnique) {
   const TemporaryFolder folder;
   const ImageF values(1, 1, 6);
   write_exr(folder / "a.exr", {{{"a.R", "a.G", "a.B", "a.X", "a.Y", "a.Z"}, &values}});
@@ -294,7 +295,7 @@ TEST(RecordedImage, GivesEachLayerANameOfItsOwn) {
   EXPECT_EQ(image.channels()[1].name, "a (2)");
 }
 
-TEST(RecordedImage, ShowsSharesOfClassesFromNothingToAll) {
+TEST(RecordedImage, ShowsCoverageFromZeroToOne) {
   const TemporaryFolder folder;
   ImageF shares(2, 1, 2);
   std::ranges::copy(std::array{0.25F, 0.75F, 0.5F, 0.5F}, shares.values().begin());
@@ -310,21 +311,20 @@ TEST(RecordedImage, ShowsSharesOfClassesFromNothingToAll) {
   EXPECT_EQ(drawn.legend.high, 1);
 }
 
-TEST(RecordedImage, NamesWhatIsAtFault) {
+TEST(RecordedImage, ReportsTheFileAtFault) {
   const TemporaryFolder folder;
   constexpr double zero = 0;
   EXPECT_THAT(refusal(folder / "000003"), HasSubstr("there is no image of this frame"));
   write_png(folder / "000000.png", Image8(2, 1, 3));
   write_png(folder / "000000_raw.png", Image16(3, 1, 1));
-  EXPECT_THAT(refusal(folder / "000000"),
-              HasSubstr("000000.png is of 2 x 1 px, but 000000_raw.png"));
+  EXPECT_THAT(refusal(folder / "000000"), HasSubstr("000000.png has 2 x 1 px, but 000000_raw.png"));
   std::ofstream(folder / "000001.exr") << "no EXR";
   EXPECT_THAT(refusal(folder / "000001"), HasSubstr("000001.exr"));
   write_npy(folder / "000000_top.npy", {{"u_px", "<f8"}}, 1, std::as_bytes(std::span(&zero, 1)));
   std::filesystem::remove(folder / "000000_raw.png");
-  EXPECT_THAT(refusal(folder / "000000"), HasSubstr("000000_top.npy: it tells no echoes"));
+  EXPECT_THAT(refusal(folder / "000000"), HasSubstr("000000_top.npy: it does not contain echoes"));
   std::ofstream(folder / "000002.flo") << "PIEH\x02";
-  EXPECT_THAT(refusal(folder / "000002"), HasSubstr("no whole .flo"));
+  EXPECT_THAT(refusal(folder / "000002"), HasSubstr("not a complete .flo"));
 }
 
 }  // namespace

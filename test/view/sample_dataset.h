@@ -12,7 +12,8 @@
 
 namespace groundray::testing {
 
-/// Hilly ground of 161 x 161 m, without CRS: its corner is at (0, 0).
+/// Writes hilly ground of 161 x 161 m, without a CRS, as an ESRI ASCII grid with its corner at (0,
+/// 0).
 inline void write_hills(const std::filesystem::path& path) {
   constexpr int samples = 161;
   std::ofstream file(path);
@@ -25,8 +26,8 @@ inline void write_hills(const std::filesystem::path& path) {
   }
 }
 
-/// A scene on those hills. A body turns and rolls over them for half a second, with a lidar and a
-/// camera with a rolling shutter; there are a post and a vehicle that drives.
+/// Sample scene on those hills. For half a second, a body with a lidar and a rolling-shutter camera
+/// turns and rolls over them; there are a post and a moving vehicle.
 inline std::string sample_scene() {
   return "groundray: 1\n"
          "seed: 11\n"
@@ -51,7 +52,7 @@ inline std::string sample_scene() {
          "    mount: {translation_m: [0.5, 0.1, 1.4], pitch_deg: 8}\n";
 }
 
-/// Writes the scene with the files that it names. @return its path.
+/// Writes the scene and the files that it names. @return path of the scene file.
 inline std::filesystem::path write_sample_scene(const std::filesystem::path& folder,
                                                 const std::string& text) {
   write_hills(folder / "hills.asc");
@@ -71,7 +72,7 @@ inline std::filesystem::path write_sample_scene(const std::filesystem::path& fol
   return folder / "scene.yaml";
 }
 
-/// That scene's dataset, made once for all tests of a program.
+/// Dataset of the sample scene, generated once per test program.
 class SampleDataset {
  public:
   static const SampleDataset& get() {

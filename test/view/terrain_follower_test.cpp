@@ -1,4 +1,4 @@
-#include "apps/view/terrain_follower.h"
+#include "apps/view/layers/terrain_follower.h"
 
 #include <gmock/gmock.h>
 #include <gtest/gtest.h>
@@ -7,9 +7,9 @@
 #include <string>
 #include <vector>
 
-#include "test/support/geotiff.h"
-#include "test/support/sample_terrain.h"
 #include "test/support/temporary_folder.h"
+#include "test/support/terrain/geotiff.h"
+#include "test/support/terrain/sample_terrain.h"
 
 namespace groundray::terrain_follower_test {
 namespace {
@@ -36,7 +36,7 @@ std::vector<float> places_of(const FollowedTerrain& terrain) {
   return {places.begin(), places.end()};
 }
 
-TEST_F(Followed, TerrainIsAFunctionOfTheViewpoint) {
+TEST_F(Followed, TerrainDependsOnTheViewpointOnly) {
   TerrainFollower follower(dem(), {.triangles = 60'000});
   const std::vector<float> here = places_of(follower.follow(eye(0)));
   const std::vector<float> there = places_of(follower.follow(eye(400)));
@@ -46,7 +46,7 @@ TEST_F(Followed, TerrainIsAFunctionOfTheViewpoint) {
   EXPECT_EQ(there, places_of(other.follow(eye(400))));
 }
 
-TEST_F(Followed, KeepsToItsTriangles) {
+TEST_F(Followed, TerrainKeepsToTheTriangleBudget) {
   for (const std::size_t most : {20'000u, 100'000u}) {
     TerrainFollower follower(dem(), {.triangles = most});
     const FollowedTerrain terrain = follower.follow(eye(0));
@@ -57,8 +57,8 @@ TEST_F(Followed, KeepsToItsTriangles) {
   }
 }
 
-// The angle that it kept bounds what is certified of each triangle, by its distance from the eye.
-TEST_F(Followed, DeviatesByTheAngleAtMost) {
+// The kept angle, times the distance from the eye, bounds the certified deviation of each triangle.
+TEST_F(Followed, TerrainKeepsTheCertifiedAngle) {
   TerrainFollower follower(dem(), {.triangles = 60'000});
   const FollowedTerrain terrain = follower.follow(eye(0));
   const LayerColumn* const deviation = terrain.layer.find("certified deviation");
@@ -72,16 +72,17 @@ TEST_F(Followed, DeviatesByTheAngleAtMost) {
   }
 }
 
-// What is asked for twice is made once, also where a view's own frame has rounded the eye's place.
-TEST_F(Followed, IsNotMadeTwiceForOnePlace) {
+// A repeated request reuses the terrain, also if the view's own frame has rounded the position of
+// the eye.
+TEST_F(Followed, TerrainIsReusedForTheSameViewpoint) {
   TerrainFollower follower(dem());
   const FollowedTerrain terrain = follower.follow(eye(0));
   EXPECT_EQ(follower.follow(eye(1e-9)).layer.data, terrain.layer.data);
   EXPECT_NE(follower.follow(eye(1)).layer.data, terrain.layer.data);
 }
 
-// With less memory than it takes the angle is not kept everywhere, and that is told.
-TEST_F(Followed, TellsWhereItsMemoryEnds) {
+// If the memory does not suffice, the angle is not kept everywhere, and this is reported.
+TEST_F(Followed, TerrainReportsALackOfMemory) {
   const FollowedTerrain whole = TerrainFollower(dem()).follow(eye(0));
   EXPECT_TRUE(whole.is_angle_kept);
   const FollowedTerrain part = TerrainFollower(dem(), {.memory_bytes = 1'600'000}).follow(eye(0));
@@ -91,7 +92,7 @@ TEST_F(Followed, TellsWhereItsMemoryEnds) {
   EXPECT_NE(part.layer.facts[1].find("as far as its windows reach"), std::string::npos);
 }
 
-TEST_F(Followed, IsCoarserForMoving) {
+TEST_F(Followed, TerrainIsCoarserDuringMotion) {
   TerrainFollower follower(dem());
   const FollowedTerrain terrain = follower.follow(eye(0));
   EXPECT_LT(terrain.layer.coarse->GetNumberOfPolys(), 100'001);

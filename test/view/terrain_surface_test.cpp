@@ -1,4 +1,4 @@
-#include "apps/view/terrain_surface.h"
+#include "apps/view/layers/terrain_surface.h"
 
 #include <gmock/gmock.h>
 #include <gtest/gtest.h>
@@ -12,9 +12,9 @@
 #include <map>
 #include <set>
 
-#include "test/support/leaf_triangles.h"
-#include "test/support/sample_clipmap.h"
-#include "test/support/sample_terrain.h"
+#include "test/support/terrain/leaf_triangles.h"
+#include "test/support/terrain/sample_clipmap.h"
+#include "test/support/terrain/sample_terrain.h"
 
 namespace groundray::terrain_surface_test {
 namespace {
@@ -47,7 +47,7 @@ glm::ivec2 sample_at(const Layer& layer, int point, const GridFrame& frame) {
   return {glm::round(frame.to_grid(p))};
 }
 
-// The triangles of a layer by the samples at their corners, told by their places alone.
+// Triangles of a layer by the samples at their corners, which are identified by position alone.
 std::vector<SampleTriangle> triangles_of(const Layer& layer, const GridFrame& frame) {
   const auto corner = corners(*layer.data);
   std::vector<SampleTriangle> triangles;
@@ -67,8 +67,8 @@ class SurfaceOf : public ::testing::TestWithParam<int> {
   }
 };
 
-// The oracle knows the leaves' shapes from docs/terrain.md alone.
-TEST_P(SurfaceOf, LeavesAreTheTrianglesOfTheirDefinition) {
+// The oracle derives the leaves' triangles from docs/theory/terrain.md alone.
+TEST_P(SurfaceOf, LeavesMatchTheirDefinition) {
   const HeightGrid grid = this->grid();
   const std::vector<Level> levels = levels_over(grid, 0.01);
   ASSERT_GT(levels.size(), 2u);
@@ -86,7 +86,7 @@ TEST_P(SurfaceOf, LeavesAreTheTrianglesOfTheirDefinition) {
   EXPECT_LE(layer.triangles(), count_triangles(levels));
 }
 
-TEST_P(SurfaceOf, PointsStandOnTheDem) {
+TEST_P(SurfaceOf, PointsLieOnTheDem) {
   const HeightGrid grid = this->grid();
   const Layer layer = terrain_layer(levels_over(grid, 0.01), glm::dvec3(0), {20, -30, 0});
   const auto places = coordinates(*layer.data);
@@ -98,8 +98,9 @@ TEST_P(SurfaceOf, PointsStandOnTheDem) {
   }
 }
 
-// No edge has two triangles on one side: the surface is counter-clockwise from above all over, and
-// without T-junctions each edge has two triangles but at the rim and round holes.
+// No edge has two triangles on the same side, so the surface is counter-clockwise from above
+// everywhere. Without T-junctions, each edge has two triangles, except at the boundary and round
+// holes.
 TEST_P(SurfaceOf, TrianglesFaceUpAndShareEdges) {
   const HeightGrid grid = this->grid();
   const Layer layer = terrain_layer(levels_over(grid, 0.01), glm::dvec3(0), {20, -30, 0});
@@ -128,8 +129,9 @@ TEST_P(SurfaceOf, TrianglesFaceUpAndShareEdges) {
 
 INSTANTIATE_TEST_SUITE_P(Terrains, SurfaceOf, ::testing::Values(2, 3, 4, 5));
 
-// A triangle deviates no more than is certified of its leaf: looked for at all samples below it.
-TEST(TerrainSurface, TellsTheCertifiedDeviationOfEachTriangle) {
+// A triangle deviates by no more than its leaf's certified deviation, checked at all samples below
+// it.
+TEST(TerrainSurface, HasTheCertifiedDeviationOfEachTriangle) {
   const HeightGrid grid = testing::fractal(129, 2, 60, Seed{9});
   const Layer layer = terrain_layer(levels_over(grid, 0.02), glm::dvec3(0), {20, -30, 0});
   const LayerColumn* const deviation = layer.find("certified deviation");
@@ -157,7 +159,7 @@ TEST(TerrainSurface, TellsTheCertifiedDeviationOfEachTriangle) {
   EXPECT_GT(worst_m, 0.1);
 }
 
-TEST(TerrainSurface, SlopeIsThatOfAPlane) {
+TEST(TerrainSurface, SlopeOfAPlaneIsExact) {
   std::vector<float> heights;
   for (int row = 0; row < 17; ++row) {
     for (int column = 0; column < 17; ++column)

@@ -1,4 +1,4 @@
-#include "apps/view/timeline.h"
+#include "apps/view/recorded/timeline.h"
 
 #include <gmock/gmock.h>
 #include <gtest/gtest.h>
@@ -8,10 +8,9 @@
 #include <glm/geometric.hpp>
 #include <string>
 
-#include "apps/scene/world.h"
+#include "apps/scene/simulation.h"
 #include "core/error.h"
-#include "core/ply_io.h"
-#include "core/product_io.h"
+#include "core/io/ply_io.h"
 #include "test/support/temporary_folder.h"
 #include "test/view/sample_dataset.h"
 
@@ -29,7 +28,8 @@ void write(const std::filesystem::path& path, const std::string& text) {
   std::ofstream(path) << text;
 }
 
-// Two lidars whose frames come out of order, one of them at the time of one of the other's.
+// Writes a dataset of two lidars whose frames are not listed in order of time; two frames of
+// different lidars have the same stamp.
 void write_dataset(const TemporaryFolder& folder) {
   write(folder / "dataset.yaml",
         "groundray_dataset: 1\norigin_w_m: [400000, 5000000, 100]\ncrs: EPSG:32632\nsensors:\n"
@@ -85,8 +85,8 @@ TEST(Timeline, StepsFromFrameToFrame) {
   EXPECT_EQ(timeline.previous(100ms), std::nullopt);
 }
 
-// The path turns half round the middle of its two ends as it moves on: a twist, half a circle of
-// diameter 1 m.
+// Between the two poses the body turns by half a turn as it moves. A constant twist traces a
+// semicircle of diameter 1 m about the midpoint.
 TEST(Timeline, FollowsAPathOfConstantTwist) {
   const TemporaryFolder folder;
   write_dataset(folder);
@@ -105,7 +105,7 @@ TEST(Timeline, FollowsAPathOfConstantTwist) {
   EXPECT_EQ(timeline.pose_at(0, 5s).translation_m, glm::dvec3(2, 2, 3));
 }
 
-TEST(Timeline, OfNoFramesIsEmpty) {
+TEST(Timeline, IsEmptyWithoutFrames) {
   const TemporaryFolder folder;
   write(folder / "dataset.yaml",
         "groundray_dataset: 1\norigin_w_m: [0, 0, 0]\nsensors: []\nframes: []\n");
@@ -116,7 +116,7 @@ TEST(Timeline, OfNoFramesIsEmpty) {
   EXPECT_EQ(timeline.next(0ns), std::nullopt);
 }
 
-TEST(Timeline, NamesWhatIsAtFault) {
+TEST(Timeline, ReportsTheFileAtFault) {
   const TemporaryFolder folder;
   write_dataset(folder);
   write(folder / "calibration/top.yaml",
@@ -125,11 +125,11 @@ TEST(Timeline, NamesWhatIsAtFault) {
     const Timeline timeline(folder.path());
     FAIL();
   } catch (const Error& fault) {
-    EXPECT_THAT(fault.what(), AllOf(HasSubstr("top.yaml:1"), HasSubstr("must be of length 1")));
+    EXPECT_THAT(fault.what(), AllOf(HasSubstr("top.yaml:1"), HasSubstr("must have length 1")));
   }
 }
 
-TEST(Timeline, TellsAllOfAGeneratedDataset) {
+TEST(Timeline, ReadsAGeneratedDataset) {
   const Timeline timeline(SampleDataset::get().path());
   ASSERT_EQ(timeline.sensors().size(), 2U);
   const RecordedSensor& top = timeline.sensors()[0];
@@ -154,10 +154,11 @@ TEST(Timeline, TellsAllOfAGeneratedDataset) {
   EXPECT_EQ(timeline.end(), top.frames.back().stamp + top.lasts);
 }
 
-// Points of the cart, moved back by its pose, lie within its model's box at any time.
-TEST(Timeline, PlacesWhatMovesWhereScansSawIt) {
-  const World world = load_world(SampleDataset::get().scene());
-  const std::vector<MovingThing> things = moving_things(world);
+// Points of the cart, transformed back by its pose, lie within its model's bounding box at any
+// time.
+TEST(Timeline, PlacesMovingObjectsWhereScansHitThem) {
+  const Simulation simulation = load_simulation(SampleDataset::get().scene());
+  const std::vector<MovingThing> things = moving_things(simulation);
   ASSERT_EQ(things.size(), 1U);
   EXPECT_EQ(things[0].name, "cart");
   EXPECT_EQ(things[0].label, 10);
@@ -172,7 +173,7 @@ TEST(Timeline, PlacesWhatMovesWhereScansSawIt) {
                z = scan.column<double>("world_z");
     for (std::size_t i = 0; i < scan.rows(); ++i) {
       if (instance[i] != things[0].instance) continue;
-      const PlacedObject at = place_of(world, things[0], frame.stamp + time_of(time[i]));
+      const PlacedObject at = place_of(simulation, things[0], frame.stamp + time_of(time[i]));
       const glm::dvec3 p_O =
           glm::inverse(at.R_DO) * (glm::dvec3(x[i], y[i], z[i]) - at.p_DO) / at.scale;
       EXPECT_LT(std::abs(p_O.x), 3.0);

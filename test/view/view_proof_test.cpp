@@ -10,10 +10,10 @@
 #include <glm/trigonometric.hpp>
 #include <vector>
 
-#include "apps/view/mesh_layer.h"
-#include "apps/view/off_screen_window.h"
-#include "apps/view/view.h"
-#include "test/support/sample_terrain.h"
+#include "apps/view/layers/mesh_layer.h"
+#include "apps/view/rendering/off_screen_window.h"
+#include "apps/view/rendering/view.h"
+#include "test/support/terrain/sample_terrain.h"
 
 namespace groundray::view_proof_test {
 namespace {
@@ -54,7 +54,7 @@ Layer points(std::size_t count, double size_m) {
   return layer;
 }
 
-// What a layer is drawn with now.
+// Data that a layer is currently drawn with.
 vtkPolyData& drawn(const View& view, const std::string& layer) {
   return *vtkPolyDataMapper::SafeDownCast(view.find(layer)->actor->GetMapper())->GetInput();
 }
@@ -72,8 +72,8 @@ double frames_per_s(View& view, double size_m, int frames) {
 }
 
 // A million triangles and two million points, in a window of 1280 x 720 px without a graphics card:
-// at least 15 pictures a second while it moves.
-TEST(ViewProof, KeepsUpWhileMoving) {
+// at least 15 frames per second during motion.
+TEST(ViewProof, KeepsTheFrameRateDuringMotion) {
   const int cells = static_cast<int>(testing::proof_size(250, 708));
   View view(make_off_screen_window({1280, 720}));
   view.add(surface(cells));
@@ -92,7 +92,7 @@ TEST(ViewProof, KeepsUpWhileMoving) {
     EXPECT_GE(moving, 15);
   }
   EXPECT_GT(moving, 1);
-  // However slow it was: both are still there.
+  // However slow the rendering: both layers are still there.
   EXPECT_GT(drawn(view, "surface").GetNumberOfPolys(), 1'000);
   EXPECT_GT(drawn(view, "points").GetNumberOfPoints(), 1'000);
 }

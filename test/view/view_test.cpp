@@ -1,4 +1,4 @@
-#include "apps/view/view.h"
+#include "apps/view/rendering/view.h"
 
 #include <gmock/gmock.h>
 #include <gtest/gtest.h>
@@ -12,8 +12,8 @@
 #include <glm/trigonometric.hpp>
 #include <string>
 
-#include "apps/view/mesh_layer.h"
-#include "apps/view/off_screen_window.h"
+#include "apps/view/layers/mesh_layer.h"
+#include "apps/view/rendering/off_screen_window.h"
 #include "core/error.h"
 
 namespace groundray::view_test {
@@ -22,9 +22,9 @@ namespace {
 using ::testing::HasSubstr;
 using ::testing::ThrowsMessage;
 
-constexpr glm::dvec3 far_away{429'452, 5'150'685, 300};  // as UTM coordinates are
+constexpr glm::dvec3 far_away{429'452, 5'150'685, 300};  // magnitude of UTM coordinates
 
-// Points of one colour each, as large as is easily found again.
+// Points with one colour each, drawn large enough to be found in the picture.
 Layer points_at(const std::string& name, const std::vector<glm::dvec3>& p_m,
                 const std::vector<glm::u8vec3>& rgb) {
   Layer layer{.name = name, .kind = LayerKind::Cloud, .data = make_points(p_m.size())};
@@ -45,7 +45,7 @@ Layer points_at(const std::string& name, const std::vector<glm::dvec3>& p_m,
   return layer;
 }
 
-// A square of side 2 in the plane z = height.
+// A square of side 2 m in the plane z = height.
 Layer square_at(const std::string& name, double height_m) {
   TriangleMesh mesh;
   mesh.vertices_m = {{-1, -1, height_m}, {1, -1, height_m}, {1, 1, height_m}, {-1, 1, height_m}};
@@ -53,8 +53,8 @@ Layer square_at(const std::string& name, double height_m) {
   return mesh_layer(name, mesh, far_away);
 }
 
-// Where a pinhole of VTK's view angle of 40 degrees images a point: looking down from above, north
-// up.
+// Projects a point through a pinhole with VTK's view angle of 40 degrees that looks down from
+// above, with north up.
 glm::dvec2 imaged(const glm::dvec3& p_m, double eye_m, glm::ivec2 size_px) {
   const double focal_px = size_px.y / 2.0 / std::tan(glm::radians(20.0));
   return glm::dvec2(size_px) / 2.0 + focal_px / (eye_m - p_m.z) * glm::dvec2(p_m.x, -p_m.y);
@@ -62,7 +62,7 @@ glm::dvec2 imaged(const glm::dvec3& p_m, double eye_m, glm::ivec2 size_px) {
 
 Look from_above(double eye_m) { return {far_away + glm::dvec3(0, 0, eye_m), far_away, {0, 1, 0}}; }
 
-// For messages.
+// Converts a pixel to integers for messages.
 std::vector<int> numbers(std::span<const std::uint8_t> pixel) {
   return {pixel.begin(), pixel.end()};
 }
@@ -76,7 +76,7 @@ const std::vector<glm::dvec3> places = {
 const std::vector<glm::u8vec3> colours = {
     {250, 10, 10}, {10, 240, 10}, {20, 20, 250}, {250, 250, 0}};
 
-TEST(View, DrawsPointsWhereAPinholeHasThem) {
+TEST(View, DrawsPointsAtTheirPinholeProjection) {
   constexpr glm::ivec2 size(300, 200);
   View view(make_off_screen_window(size));
   view.add(points_at("cloud", places, colours));
@@ -90,7 +90,7 @@ TEST(View, DrawsPointsWhereAPinholeHasThem) {
   }
 }
 
-// 5000 px are more than one tile is wide.
+// 5000 px are wider than one tile.
 TEST(View, DrawsLargePicturesInTiles) {
   constexpr glm::ivec2 size(5000, 400);
   View view(make_off_screen_window({300, 200}));
@@ -118,7 +118,7 @@ TEST(View, DrawsLargePicturesInTiles) {
   EXPECT_GT(seen, 10);
 }
 
-TEST(View, RefusesImpossiblePictures) {
+TEST(View, RejectsInvalidPictureSizes) {
   View view(make_off_screen_window({30, 20}));
   for (const glm::ivec2 size : {glm::ivec2(0, 10), {10, -1}, {70'000, 10}}) {
     EXPECT_THAT([&] { view.picture(size); }, ThrowsMessage<Error>(HasSubstr("1 x 1 to 65535")));
@@ -146,7 +146,7 @@ TEST(View, PicksThePointUnderAPixel) {
   EXPECT_FALSE(view.pick(2, 2));
 }
 
-TEST(View, PicksNothingThatIsHidden) {
+TEST(View, PicksNoOccludedPoints) {
   constexpr glm::ivec2 size(300, 200);
   View view(make_off_screen_window(size));
   view.add(points_at("cloud", {{0.2, 0.1, 0}, {0.3, 0.1, 1.5}}, {{255, 0, 0}, {0, 255, 0}}));
@@ -165,8 +165,9 @@ TEST(View, PicksNothingThatIsHidden) {
   EXPECT_EQ(view.pick(below.x, below.y)->layer, "cloud");
 }
 
-// The line of sight meets the plane where the pinhole says, whatever way the view looks.
-TEST(View, LooksAlongLinesOfSight) {
+// The line of sight intersects the plane where the pinhole model predicts, whatever the direction
+// of view.
+TEST(View, LinesOfSightMatchAPinhole) {
   constexpr glm::ivec2 size(320, 240);
   View view(make_off_screen_window(size));
   view.add(square_at("floor", 0));
@@ -204,7 +205,7 @@ TEST(View, DrawsFewerPointsWhileMoving) {
   EXPECT_EQ(drawn_points(view, "cloud"), 600'000);
 }
 
-TEST(View, KeepsTheLookOfALayerThatIsReplaced) {
+TEST(View, KeepsTheStyleOfAReplacedLayer) {
   View view(make_off_screen_window({30, 20}));
   view.add(points_at("cloud", places, colours));
   view.colour_by("cloud", "number");
@@ -220,7 +221,7 @@ TEST(View, KeepsTheLookOfALayerThatIsReplaced) {
   view.remove("cloud");
 }
 
-TEST(View, NamesWhatItHasNot) {
+TEST(View, ReportsMissingLayersAndColumns) {
   View view(make_off_screen_window({30, 20}));
   view.add(points_at("cloud", places, colours));
   EXPECT_THAT([&] { view.colour_by("cluod", "number"); }, ThrowsMessage<Error>(HasSubstr("cluod")));
@@ -236,7 +237,7 @@ TEST(View, NamesWhatItHasNot) {
   EXPECT_THAT([&] { view.add(wrong); }, ThrowsMessage<Error>(HasSubstr("absent")));
 }
 
-TEST(View, ExplainsItsColours) {
+TEST(View, LegendExplainsTheColours) {
   constexpr glm::ivec2 size(400, 300);
   View view(make_off_screen_window(size));
   view.add(points_at("cloud", places, colours));
@@ -256,7 +257,7 @@ TEST(View, ExplainsItsColours) {
   };
   EXPECT_GT(changed(without, with), 5000);
   EXPECT_EQ(changed(without, again), 0);
-  // The yellow and the violet end of viridis are there.
+  // The legend contains the yellow and the violet end of viridis.
   int yellow = 0, violet = 0;
   for (int y = 0; y < 300; ++y) {
     for (int x = 250; x < 400; ++x) {
@@ -268,8 +269,8 @@ TEST(View, ExplainsItsColours) {
   EXPECT_GT(violet, 5);
 }
 
-// Ranges that no round numbers divide, or doubles do not resolve.
-TEST(View, ExplainsAnyRange) {
+// Ranges without round subdivisions, or which doubles do not resolve.
+TEST(View, LegendAcceptsAnyRange) {
   constexpr glm::ivec2 size(200, 150);
   View view(make_off_screen_window(size));
   view.add(points_at("cloud", places, colours));
@@ -284,8 +285,8 @@ TEST(View, ExplainsAnyRange) {
   }
 }
 
-// Small things are not thinned away beside large ones.
-TEST(View, KeepsSmallThingsWhileMoving) {
+// Small layers are not thinned to nothing when a large layer is drawn as well.
+TEST(View, KeepsSmallLayersWhileMoving) {
   std::vector<glm::dvec3> many(600'000, glm::dvec3(0));
   View view(make_off_screen_window({300, 200}));
   view.add(points_at("cloud", many, std::vector<glm::u8vec3>(many.size())));
@@ -307,7 +308,7 @@ TEST(View, KeepsSmallThingsWhileMoving) {
   EXPECT_LT(drawn_points(view, "field"), 270'000);
 }
 
-TEST(View, FitsWhatIsVisible) {
+TEST(View, FitsTheVisibleLayers) {
   View view(make_off_screen_window({200, 200}));
   view.add(square_at("floor", 0));
   view.fit();

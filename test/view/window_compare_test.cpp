@@ -3,8 +3,8 @@
 #include <string>
 
 #include "apps/view/window/window.h"
-#include "core/mesh_io.h"
-#include "core/ply_io.h"
+#include "core/io/mesh_io.h"
+#include "core/io/ply_io.h"
 #include "test/view/sample_dataset.h"
 #include "test/view/window_fixture.h"
 
@@ -25,7 +25,8 @@ TEST_F(WindowCompareTest, ComparesWithTheTruth) {
   constexpr unsigned side = 11;
   for (unsigned i = 0; i < side * side; ++i) {
     truth.vertices_m.emplace_back(i % side, i / side, 0);
-    // Half of it above, the rest below, so that the mean is not the whole story.
+    // Half of the vertices are raised, the rest lowered, so that the mean alone does not describe
+    // the deviation.
     raised.vertices_m.emplace_back(i % side, i / side, i % 2 == 0 ? offset_m : -offset_m);
   }
   for (unsigned row = 0; row + 1 < side; ++row) {
@@ -47,7 +48,7 @@ TEST_F(WindowCompareTest, ComparesWithTheTruth) {
   QTest::mouseClick(panel.findChild<QPushButton*>("compare"), Qt::LeftButton);
   settle();
   EXPECT_EQ(dismiss_fault(), "");
-  // 61 of the 121 vertices are above, 60 below; no metre is rounded in floats of 1/4.
+  // 61 of the 121 vertices are above, 60 below; offsets of 1/4 m are exact in single precision.
   EXPECT_EQ(panel.figures().value("points"), "121");
   EXPECT_NEAR(metres(panel.figures().value("mean")), offset_m / 121, 1e-5);
   EXPECT_NEAR(metres(panel.figures().value("RMS")), offset_m, 1e-5);
@@ -62,8 +63,8 @@ TEST_F(WindowCompareTest, ComparesWithTheTruth) {
   }
 }
 
-// Its levels have changed since it was offered, and so has its surface.
-TEST_F(WindowCompareTest, TerrainIsItsOwnTruthAfterItFollowedTheEye) {
+// The terrain's levels, and thus its surface, have changed since it was offered as the truth.
+TEST_F(WindowCompareTest, TerrainMatchesItselfAfterFollowingTheEye) {
   Window& window = shown();
   open(SampleDataset::get().scene());
   const auto before = window.view().find("scene.yaml/terrain")->data;

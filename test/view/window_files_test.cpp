@@ -10,15 +10,15 @@
 #include <fstream>
 #include <set>
 
-#include "apps/view/still.h"
-#include "apps/view/window/help.h"
+#include "apps/view/rendering/offscreen_render.h"
+#include "apps/view/window/panels/help.h"
+#include "apps/view/window/panels/turntable_dialog.h"
 #include "apps/view/window/recent_files.h"
-#include "apps/view/window/turntable_dialog.h"
 #include "apps/view/window/window.h"
-#include "core/image_io.h"
-#include "core/mesh_io.h"
-#include "core/ply_io.h"
-#include "test/support/geotiff.h"
+#include "core/image/image_io.h"
+#include "core/io/mesh_io.h"
+#include "core/io/ply_io.h"
+#include "test/support/terrain/geotiff.h"
 #include "test/view/sample_dataset.h"
 #include "test/view/window_fixture.h"
 
@@ -32,7 +32,7 @@ using Paths = std::vector<std::filesystem::path>;
 
 class WindowFilesTest : public testing::WindowTest {
  protected:
-  // A mesh of one triangle.
+  // Writes a mesh with one triangle.
   static std::filesystem::path write_mesh(const std::filesystem::path& path) {
     const TriangleMesh mesh{
         .vertices_m = {{0, 0, 0}, {4, 0, 0}, {2, 3, 1}}, .triangles = {{0, 1, 2}}, .levels = {}};
@@ -40,7 +40,8 @@ class WindowFilesTest : public testing::WindowTest {
     return path;
   }
 
-  // A scene whose terrain may take so little memory that its DEM is certified first, for seconds.
+  // Writes a scene with so small a memory limit for the terrain that its DEM is certified first,
+  // which takes seconds.
   static std::filesystem::path write_slow_scene(const TemporaryFolder& folder) {
     testing::GeoTiff dem{.size = {2500, 2500}};
     dem.values.resize(2500UL * 2500UL);
@@ -73,7 +74,7 @@ class WindowFilesTest : public testing::WindowTest {
   }
 };
 
-TEST_F(WindowFilesTest, CancelStopsAnOpeningAndWhatIsToFollow) {
+TEST_F(WindowFilesTest, CancelStopsLoadingOfAllFiles) {
   const TemporaryFolder folder;
   const auto slow = write_slow_scene(folder);
   const auto mesh = write_mesh(folder / "mesh.ply");
@@ -98,12 +99,12 @@ TEST_F(WindowFilesTest, CancelStopsAnOpeningAndWhatIsToFollow) {
     EXPECT_EQ(dismiss_fault(), "");
     EXPECT_TRUE(window.view().layers().empty());
   }
-  open(mesh);  // and goes on
+  open(mesh);  // the window remains usable
   EXPECT_TRUE(has("mesh.ply"));
   EXPECT_FALSE(cancel->isVisible());
 }
 
-TEST_F(WindowFilesTest, MayBeClosedWhileItOpens) {
+TEST_F(WindowFilesTest, MayBeClosedWhileLoading) {
   const TemporaryFolder folder;
   const auto slow = write_slow_scene(folder);
   shown().open(slow);
@@ -119,11 +120,11 @@ TEST_F(WindowFilesTest, MayBeClosedWhileItOpens) {
   const qint64 opened_ms = clock.elapsed();
   EXPECT_EQ(dismiss_fault(), "");
   EXPECT_TRUE(has("slow.yaml/terrain"));
-  // It waits for a block of the terrain at most, of which there are dozens.
+  // Closing waits for at most one block of the terrain, of which there are dozens.
   EXPECT_LT(closed_ms, 300 + opened_ms / 4);
 }
 
-TEST_F(WindowFilesTest, WhatIsDeletedStaysDeletedUntilOpenedAgain) {
+TEST_F(WindowFilesTest, DeletedLayersReturnOnlyWhenOpenedAgain) {
   shown();
   open(SampleDataset::get().path());
   go_to(100);
@@ -134,7 +135,7 @@ TEST_F(WindowFilesTest, WhatIsDeletedStaysDeletedUntilOpenedAgain) {
   for (const char* layer : {"dataset/sensors/eye", "dataset/lidar/top", "dataset/trail"}) {
     EXPECT_FALSE(has(layer)) << layer;
   }
-  EXPECT_TRUE(has("dataset/sensors/top"));  // what was not deleted stays, too
+  EXPECT_TRUE(has("dataset/sensors/top"));  // layers that were not deleted remain
   open(SampleDataset::get().scene());
   remove_layer("scene.yaml/objects/cart");
   go_to(400);
@@ -150,8 +151,9 @@ TEST_F(WindowFilesTest, WhatIsDeletedStaysDeletedUntilOpenedAgain) {
   EXPECT_TRUE(has("scene.yaml/objects/cart"));
 }
 
-// While a dataset is played, those of its scene would stand where they began.
-TEST_F(WindowFilesTest, OfASceneAndItsDatasetTheDatasetsSensorsAreSeen) {
+// The scene's sensors are hidden while its dataset is played: they would remain at their initial
+// poses.
+TEST_F(WindowFilesTest, DatasetHidesTheSensorsOfItsScene) {
   Window& window = shown();
   open(SampleDataset::get().scene());
   const auto is_seen = [&](const char* layer) { return window.view().find(layer)->visible; };
@@ -170,7 +172,7 @@ TEST_F(WindowFilesTest, OfASceneAndItsDatasetTheDatasetsSensorsAreSeen) {
   EXPECT_TRUE(is_seen("scene.yaml/sensors/top"));
 }
 
-TEST_F(WindowFilesTest, RemembersWhatWasOpenedLast) {
+TEST_F(WindowFilesTest, RemembersRecentFiles) {
   const TemporaryFolder folder;
   const auto settings = folder / "kept" / "view.ini";
   const auto mesh = write_mesh(folder / "a, b & 100%.ply");
@@ -189,19 +191,19 @@ TEST_F(WindowFilesTest, RemembersWhatWasOpenedLast) {
   recent->actions().front()->trigger();
   settle();
   EXPECT_TRUE(has(mesh.filename().string()));
-  EXPECT_EQ(RecentFiles(settings).paths(), Paths{mesh});  // what could not be opened is not there
+  EXPECT_EQ(RecentFiles(settings).paths(), Paths{mesh});  // failed files are not listed
   recent->actions().back()->trigger();
   EXPECT_TRUE(RecentFiles(settings).paths().empty());
 }
 
-TEST(RecentFilesTest, KeepTheLastTenEachOnce) {
+TEST(RecentFilesTest, KeepTheLastTenWithoutDuplicates) {
   const TemporaryFolder folder;
   const auto file = folder / "view.ini";
   RecentFiles recent(file);
   for (int i = 0; i < 14; ++i) recent.add(folder / fmt::format("{}.ply", i));
   recent.add(folder / "9.ply");
   recent.add(folder / "dataset/");
-  recent.add(folder / "sub" / ".." / "dataset");  // the same
+  recent.add(folder / "sub" / ".." / "dataset");  // the same path
   Paths expected{folder / "dataset", folder / "9.ply"};
   for (const int i : {13, 12, 11, 10, 8, 7, 6, 5}) {
     expected.push_back(folder / fmt::format("{}.ply", i));
@@ -235,7 +237,7 @@ TEST_F(WindowFilesTest, WritesATurntable) {
   EXPECT_TRUE(wait_until([&] { return !dialog->is_writing(); }));
   EXPECT_EQ(dismiss_fault(), "");
   EXPECT_EQ(window.view().current_look().from_w_m, before.from_w_m);
-  // As groundray-view --turntable writes them.
+  // The oracle is the output of groundray-view --turntable.
   window.canvas().doneCurrent();
   write_turntable(window.view(), folder / "still", pictures, size_px);
   std::size_t unlike = 0, colours = 0;
@@ -249,12 +251,12 @@ TEST_F(WindowFilesTest, WritesATurntable) {
     colours += std::set(a.begin(), a.end()).size();
   }
   EXPECT_GT(colours, 30UL * pictures);
-  // Eyes differ in the last bit, and so do pixels on edges.
+  // Eye positions differ in the last bit, and so do pixels on edges.
   EXPECT_LT(unlike, 3UL * pictures * 20);
   EXPECT_FALSE(std::filesystem::exists(turn / "0005.png"));
 }
 
-TEST_F(WindowFilesTest, ATurntableCanBeStoppedAndTellsFaults) {
+TEST_F(WindowFilesTest, TurntableCanBeStoppedAndReportsErrors) {
   Window& window = shown();
   const TemporaryFolder folder;
   open(write_mesh(folder / "mesh.ply"));
@@ -267,7 +269,7 @@ TEST_F(WindowFilesTest, ATurntableCanBeStoppedAndTellsFaults) {
   to->setText(QString::fromStdString((folder / "file" / "turn").string()));
   QTest::mouseClick(write, Qt::LeftButton);
   EXPECT_FALSE(dialog->is_writing());
-  EXPECT_NE(dismiss_fault().find("the folder cannot be made"), std::string::npos);
+  EXPECT_NE(dismiss_fault().find("the folder cannot be created"), std::string::npos);
   to->setText(QString::fromStdString((folder / "turn").string()));
   dialog->findChild<QSpinBox*>("turntable_pictures")->setValue(9999);
   QTest::mouseClick(write, Qt::LeftButton);
@@ -280,7 +282,7 @@ TEST_F(WindowFilesTest, ATurntableCanBeStoppedAndTellsFaults) {
   EXPECT_FALSE(dialog->isVisible());
 }
 
-TEST_F(WindowFilesTest, HelpTellsOfAllKeys) {
+TEST_F(WindowFilesTest, HelpListsAllKeys) {
   const Window& window = shown();
   const QString help = help_text();
   const QString table = help.mid(help.indexOf("<h3>Keys</h3>"));

@@ -19,8 +19,8 @@
 
 namespace groundray::testing {
 
-/// The one application of a test program. It is never taken down: Qt and the drivers do not agree
-/// on who goes first.
+/// Returns the only application of a test program. It is never destroyed: Qt and the drivers
+/// conflict in the order of their destruction.
 inline QApplication& application() {
   static QApplication* const made = [] {
     qputenv("GROUNDRAY_DATA", QByteArray::fromStdString(data_folder().string()));
@@ -35,7 +35,7 @@ inline QApplication& application() {
   return *made;
 }
 
-/// Lets the application work until something holds. @return whether it does in time.
+/// Processes events until a condition holds. @return true if it holds within the time limit.
 inline bool wait_until(const std::function<bool()>& holds, int most_ms = 60'000) {
   QElapsedTimer clock;
   clock.start();
@@ -46,7 +46,7 @@ inline bool wait_until(const std::function<bool()>& holds, int most_ms = 60'000)
   return true;
 }
 
-/// A window as someone has it who just started the program.
+/// Fixture with a window in the state in which the program starts.
 class WindowTest : public ::testing::Test {
  protected:
   WindowTest() { application(); }
@@ -56,18 +56,18 @@ class WindowTest : public ::testing::Test {
     window_->resize(1100, 760);
     window_->show();
     EXPECT_TRUE(QTest::qWaitForWindowExposed(window_.get()));
-    QApplication::setActiveWindow(window_.get());  // there is no window manager to do so
+    QApplication::setActiveWindow(window_.get());  // no window manager does it
     return *window_;
   }
 
-  /// Opens something and waits till all that follows from it is there.
+  /// Opens a file and waits until everything that follows from it is finished.
   void open(const std::filesystem::path& path) {
     window_->open(path);
     settle();
   }
 
   void settle() {
-    int quiet = 0;  // looked so often, and nothing went on
+    int quiet = 0;  // consecutive checks without activity
     EXPECT_TRUE(wait_until([&] {
       const bool goes_on = window_->is_busy() || window_->canvas().is_moving();
       quiet = goes_on && fault() == nullptr ? 0 : quiet + 1;
@@ -75,7 +75,7 @@ class WindowTest : public ::testing::Test {
     }));
   }
 
-  /// Returns the message box of a fault, null if there is none.
+  /// Returns the message box of an error, or null if there is none.
   QMessageBox* fault() const {
     for (auto* box : window_->findChildren<QMessageBox*>("fault")) {
       if (box->isVisible()) return box;
@@ -83,7 +83,7 @@ class WindowTest : public ::testing::Test {
     return nullptr;
   }
 
-  /// Returns the message of the fault that is shown, and closes it; empty if there is none.
+  /// Returns the message of the displayed error and closes it; empty if there is none.
   std::string dismiss_fault() const {
     QMessageBox* box = fault();
     if (box == nullptr) return "";
@@ -93,8 +93,7 @@ class WindowTest : public ::testing::Test {
     return text;
   }
 
-  /// Returns on how many of the screen's pixels a layer is seen: those that change when it is
-  /// hidden.
+  /// Returns the number of screen pixels that show a layer: those that change when it is hidden.
   std::size_t pixels_of(const std::string& layer) const {
     View& view = window_->view();
     view.set_legend_visible(false);

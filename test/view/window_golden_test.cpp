@@ -20,9 +20,9 @@ namespace {
 using testing::SampleDataset;
 using Rectangles = std::map<std::string, QRect>;
 
-constexpr QSize view_px(520, 520);  // whatever room the fonts take from it
+constexpr QSize view_px(520, 520);  // fixed, whatever space the fonts require
 
-// Brightness in blocks of 4 x 4 pixels: how letters are drawn changes it little.
+// Brightness in blocks of 4 x 4 pixels, on which differences of font rendering have little effect.
 std::vector<std::vector<double>> brightness(const QImage& picture) {
   constexpr int block_px = 4;
   std::vector<std::vector<double>> rows;
@@ -39,8 +39,8 @@ std::vector<std::vector<double>> brightness(const QImage& picture) {
   return rows;
 }
 
-// Structural similarity, 1 of equal pictures: Wang, Bovik, Sheikh and Simoncelli, Image quality
-// assessment, IEEE Transactions on Image Processing 13(4) (2004), over windows of 8 x 8 blocks.
+// Structural similarity, 1 for equal images, over windows of 8 x 8 blocks: Wang, Bovik, Sheikh and
+// Simoncelli, Image quality assessment, IEEE Transactions on Image Processing 13(4) (2004).
 double similarity(const QImage& one, const QImage& other) {
   constexpr std::size_t side = 8;
   constexpr double c1 = 0.01 * 255 * 0.01 * 255, c2 = 0.03 * 255 * 0.03 * 255;
@@ -71,7 +71,7 @@ QRect rectangle_of(const QWidget& widget, const QWidget& window) {
   return {widget.mapTo(&window, QPoint(0, 0)), widget.size()};
 }
 
-// Where the view and the panels are that are seen.
+// Rectangles of the view and the visible panels.
 Rectangles rectangles_of(Window& window) {
   Rectangles all{{"view", rectangle_of(window.canvas(), window)}};
   for (const QDockWidget* dock : window.findChildren<QDockWidget*>()) {
@@ -102,7 +102,7 @@ double shared_share(const QRect& a, const QRect& b) {
 
 class WindowGoldenTest : public testing::WindowTest {
  protected:
-  // A scene with its dataset, at a time at which all sensors have seen something.
+  // Shows a scene and its dataset at a time at which all sensors have recorded something.
   void show_work() {
     shown();
     window_->canvas().setFixedSize(view_px);
@@ -126,9 +126,9 @@ class WindowGoldenTest : public testing::WindowTest {
   }
 };
 
-// The golden picture and its rectangles are what this test writes into the folder that
-// GROUNDRAY_NEW_GOLDEN names.
-TEST_F(WindowGoldenTest, TheWindowLooksAsBefore) {
+// To renew the golden picture and its rectangles, set GROUNDRAY_NEW_GOLDEN to the folder into which
+// this test then writes them.
+TEST_F(WindowGoldenTest, WindowMatchesTheGoldenImage) {
   show_work();
   const QImage now = on_screen();
   const Rectangles rectangles = rectangles_of(*window_);
@@ -146,21 +146,22 @@ TEST_F(WindowGoldenTest, TheWindowLooksAsBefore) {
   ASSERT_EQ(then.size(), rectangles.size());
   for (const auto& [name, rectangle] : then) {
     ASSERT_TRUE(rectangles.contains(name)) << name;
-    // Fonts that are a fifth wider move an edge by as much, and so two of a panel's four.
+    // Fonts that are a fifth wider can move two of a panel's four edges by as much.
     EXPECT_GT(shared_share(rectangle, rectangles.at(name)), 0.65) << name;
   }
-  // What is drawn does not depend on fonts but for the legend, which takes a tenth of it.
+  // The picture depends on fonts only in the legend, which covers a tenth of it.
   const QImage view_now = now.copy(rectangles.at("view"));
   const QImage view_then = golden.copy(then.at("view"));
   ASSERT_EQ(view_now.size(), view_then.size());
   EXPECT_GT(similarity(view_now, view_then), 0.9);
   EXPECT_GT(similarity(now, golden), 0.6);
-  // What is saved is what is seen.
+  // The saved picture equals the displayed one.
   const testing::TemporaryFolder folder;
   window_->save_picture(folder / "saved.png", {view_px.width(), view_px.height()});
   const QImage saved(QString::fromStdString((folder / "saved.png").string()));
   EXPECT_GT(similarity(saved, view_now), 0.9);
-  // The measure tells a view without a scan from one with it, and a window without panels.
+  // Check of the measure: it distinguishes views with and without a scan, and a window without
+  // panels.
   window_->view().set_visible("dataset/lidar/top", false);
   view_on_screen();
   EXPECT_LT(similarity(on_screen().copy(rectangles.at("view")), view_then), 0.9);
@@ -169,7 +170,7 @@ TEST_F(WindowGoldenTest, TheWindowLooksAsBefore) {
   EXPECT_LT(similarity(bare, golden), 0.5);
 }
 
-// Of what is seen, texts have the room that they need; at the size of a small screen, too.
+// All visible texts have the space that they need, also in a window that fits a small screen.
 TEST_F(WindowGoldenTest, TextsAreNotCutOff) {
   show_work();
   window_->canvas().setMinimumSize(200, 150);

@@ -2,10 +2,10 @@
 #include <array>
 #include <fstream>
 
-#include "apps/view/window/picture_area.h"
+#include "apps/view/window/panels/picture_area.h"
 #include "apps/view/window/window.h"
-#include "core/image_io.h"
-#include "core/product_io.h"
+#include "core/image/image_io.h"
+#include "core/image/png_io.h"
 #include "test/view/sample_dataset.h"
 #include "test/view/window_fixture.h"
 
@@ -25,7 +25,7 @@ void write_picture(const std::filesystem::path& path, int width_px) {
   write_png(path, picture);
 }
 
-// A TIFF of 3 bands of bytes, by hand: TIFF 6.0, one strip, nothing compressed.
+// Writes an uncompressed TIFF 6.0 file with 3 bands of bytes in one strip, without a library.
 void write_tiff(const std::filesystem::path& path, std::uint32_t width_px,
                 std::uint32_t height_px) {
   std::string bytes = "II";
@@ -60,7 +60,7 @@ void write_tiff(const std::filesystem::path& path, std::uint32_t width_px,
   std::ofstream(path, std::ios::binary) << bytes;
 }
 
-TEST_F(WindowImageTest, AForeignPictureHasNoRay) {
+TEST_F(WindowImageTest, PictureWithoutCameraHasNoRay) {
   Window& window = shown();
   const TemporaryFolder folder;
   write_picture(folder / "picture.png", 64);
@@ -82,7 +82,7 @@ TEST_F(WindowImageTest, AForeignPictureHasNoRay) {
   EXPECT_NE(window.picked().value("picture"), "");
 }
 
-TEST_F(WindowImageTest, ShowsATiff) {
+TEST_F(WindowImageTest, ShowsTiffFiles) {
   Window& window = shown();
   const TemporaryFolder folder;
   write_tiff(folder / "colours.tif", 40, 30);
@@ -94,7 +94,7 @@ TEST_F(WindowImageTest, ShowsATiff) {
   EXPECT_EQ(image.numbers_at(0, {1, 0}), (std::vector<double>{15, 20, 25}));
 }
 
-TEST_F(WindowImageTest, WhatIsClearedDoesNotComeBack) {
+TEST_F(WindowImageTest, ClearedImageDoesNotReappear) {
   Window& window = shown();
   const TemporaryFolder folder;
   write_picture(folder / "picture.png", 64);
@@ -106,7 +106,7 @@ TEST_F(WindowImageTest, WhatIsClearedDoesNotComeBack) {
   EXPECT_EQ(panel.image(), nullptr);
 }
 
-TEST_F(WindowImageTest, ABrokenImageDoesNotHoldUpTheNext) {
+TEST_F(WindowImageTest, BrokenImageDoesNotBlockTheNext) {
   Window& window = shown();
   const TemporaryFolder folder;
   std::ofstream(folder / "broken.png") << "no picture";

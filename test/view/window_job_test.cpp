@@ -3,7 +3,7 @@
 #include <stdexcept>
 #include <vector>
 
-#include "apps/interruption.h"
+#include "apps/scene/interruption.h"
 #include "apps/view/window/job.h"
 #include "core/error.h"
 #include "test/view/window_fixture.h"
@@ -24,7 +24,7 @@ struct JobTest : public ::testing::Test {
             .ended = [this] { ++ends; }};
   }
 
-  // Waits to be stopped, as a well-behaved work does.
+  // Waits for a request to stop and obeys it.
   static int wait_for_stop(const std::stop_token& stop) {
     while (!stop.stop_requested()) std::this_thread::sleep_for(1ms);
     throw Interrupted{};
@@ -37,7 +37,7 @@ struct JobTest : public ::testing::Test {
   int result = 0;
 };
 
-TEST_F(JobTest, WorksElsewhereAndComesBackHere) {
+TEST_F(JobTest, RunsInAnotherThreadAndReturnsInThisOne) {
   Job job;
   const auto here = std::this_thread::get_id();
   std::thread::id worked, done;
@@ -61,7 +61,7 @@ TEST_F(JobTest, WorksElsewhereAndComesBackHere) {
   EXPECT_FALSE(job.is_running());
 }
 
-TEST_F(JobTest, TellsOfFaults) {
+TEST_F(JobTest, ReportsErrors) {
   Job job;
   job.start([](const auto&, const auto&) -> int { throw Error("the file is gone"); },
             [&](int value) { result = value; }, hooks());
@@ -74,14 +74,14 @@ TEST_F(JobTest, TellsOfFaults) {
   EXPECT_EQ(result, 0);
 }
 
-TEST_F(JobTest, StopsWhenItIsAskedTo) {
+TEST_F(JobTest, StopsOnRequest) {
   Job job;
   job.start([](const std::stop_token& stop, const auto&) { return wait_for_stop(stop); },
             [&](int value) { result = value; }, hooks());
   job.cancel();
   EXPECT_TRUE(wait_until([&] { return ends == 1; }));
   EXPECT_TRUE(is_cancelled);
-  // What ends in spite of that counts as cancelled, too.
+  // Work that finishes in spite of a request to stop also counts as cancelled.
   is_cancelled = false;
   std::atomic<bool> may_end = false;
   job.start(
@@ -97,7 +97,7 @@ TEST_F(JobTest, StopsWhenItIsAskedTo) {
   EXPECT_EQ(result, 0);
 }
 
-TEST_F(JobTest, HearsOnlyOfTheLast) {
+TEST_F(JobTest, ReportsOnlyTheLastJob) {
   Job job;
   for (int i = 1; i <= 20; ++i) {
     job.start(
@@ -117,7 +117,7 @@ TEST_F(JobTest, HearsOnlyOfTheLast) {
   EXPECT_EQ(ends, 1);
 }
 
-TEST_F(JobTest, MayGoWhileItWorks) {
+TEST_F(JobTest, MayBeDestroyedWhileRunning) {
   std::atomic<bool> has_ended = false;
   {
     Job job;
@@ -130,7 +130,7 @@ TEST_F(JobTest, MayGoWhileItWorks) {
         [&](int value) { result = value; }, hooks());
     QTest::qWait(5);
   }
-  EXPECT_TRUE(has_ended);  // it waited for it
+  EXPECT_TRUE(has_ended);  // the destructor waited for it
   QTest::qWait(20);
   EXPECT_EQ(result, 0);
   EXPECT_EQ(ends, 0);

@@ -1,6 +1,6 @@
-// Under the address sanitizer leaks are looked for while the application still stands. At exit Qt's
-// own threads end unjoined, and the sanitizer, which reads the storage of every thread, crashes if
-// it meets one that is just going.
+// With the address sanitizer, leaks are checked while the application still exists. At exit, Qt's
+// own threads end without being joined, and the sanitizer, which reads the storage of every thread,
+// crashes if a thread is just ending.
 #if defined(__has_feature)
 #if __has_feature(address_sanitizer)
 #include <gtest/gtest.h>
@@ -10,7 +10,7 @@ namespace groundray::window_leaks {
 namespace {
 
 struct LeakCheck : public ::testing::Environment {
-  void TearDown() override { __lsan_do_leak_check(); }  // the one at exit is then left out
+  void TearDown() override { __lsan_do_leak_check(); }  // replaces the check at exit
 };
 
 [[maybe_unused]] const ::testing::Environment* const leak_check =

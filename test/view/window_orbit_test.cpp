@@ -9,7 +9,7 @@
 namespace groundray::window_orbit_test {
 namespace {
 
-constexpr double tolerance_m = 1e-6;  // coordinates of 5e6 m are known to 1e-9
+constexpr double tolerance_m = 1e-6;  // coordinates of 5e6 m have a resolution of 1e-9 m
 const Look from_south{
     .from_w_m = {430000, 5150000 - 100, 300}, .at_w_m = {430000, 5150000, 300}, .up = {0, 0, 1}};
 
@@ -18,9 +18,9 @@ void expect_near(const glm::dvec3& a, const glm::dvec3& b) {
       << a.x << ' ' << a.y << ' ' << a.z << " against " << b.x << ' ' << b.y << ' ' << b.z;
 }
 
-TEST(Orbit, TurnsRoundWhatIsLookedAt) {
+TEST(Orbit, TurnsAboutTheFocalPoint) {
   constexpr double quarter_rad = std::numbers::pi / 2;
-  // A quarter counter-clockwise from above leads from the south to the east.
+  // A quarter turn, counter-clockwise from above, moves the eye from the south to the east.
   expect_near(orbited(from_south, quarter_rad, 0).from_w_m,
               from_south.at_w_m + glm::dvec3(100, 0, 0));
   expect_near(orbited(from_south, 0, quarter_rad / 3).from_w_m,
@@ -30,24 +30,24 @@ TEST(Orbit, TurnsRoundWhatIsLookedAt) {
   expect_near(look.from_w_m, from_south.from_w_m);
 }
 
-TEST(Orbit, StopsShortOfStraightUpAndDown) {
+TEST(Orbit, StopsBeforeThePoles) {
   for (const double pitch_rad : {10.0, -10.0}) {
     const Look look = orbited(from_south, 0.3, pitch_rad);
     EXPECT_NEAR(glm::distance(look.from_w_m, look.at_w_m), 100, tolerance_m);
     const glm::dvec3 ahead = glm::normalize(look.at_w_m - look.from_w_m);
-    EXPECT_GT(std::hypot(ahead.x, ahead.y), 1e-4);  // so that up stays up in the picture
+    EXPECT_GT(std::hypot(ahead.x, ahead.y), 1e-4);  // not vertical, so up is defined
     EXPECT_EQ(look.up, glm::dvec3(0, 0, 1));
   }
 }
 
-TEST(Orbit, FromStraightAboveGoesOnWithItsPictureUpright) {
+TEST(Orbit, KeepsThePictureUprightFromStraightAbove) {
   const Look above{.from_w_m = {0, 0, 50}, .at_w_m = {0, 0, 0}, .up = {0, 1, 0}};
   const Look tilted = orbited(above, 0, -0.5);
-  EXPECT_LT(tilted.from_w_m.y, -1);  // north was up: so it is seen from the south
+  EXPECT_LT(tilted.from_w_m.y, -1);  // north was up, so the eye moves south
   EXPECT_NEAR(tilted.from_w_m.x, 0, tolerance_m);
 }
 
-TEST(Orbit, MovesAlongThePicture) {
+TEST(Orbit, MovesParallelToThePicture) {
   const Look moved = panned(from_south, 3, 4);
   expect_near(moved.from_w_m, from_south.from_w_m + glm::dvec3(3, 0, 4));
   expect_near(moved.at_w_m, from_south.at_w_m + glm::dvec3(3, 0, 4));
@@ -58,17 +58,17 @@ TEST(Orbit, MovesAlongThePicture) {
   expect_near(turned_left.at_w_m, from_south.from_w_m + glm::dvec3(-100, 0, 0));
 }
 
-TEST(Orbit, ZoomsTowardsWhatIsPointedAt) {
+TEST(Orbit, ZoomsTowardsThePointer) {
   const glm::dvec3 towards = from_south.at_w_m + glm::dvec3(20, 0, 10);
   const Look near = zoomed(from_south, 0.5, towards);
   EXPECT_NEAR(glm::distance(near.from_w_m, near.at_w_m), 50, tolerance_m);
-  // It stays where it is in the picture: in the same direction from the eye.
+  // The target keeps its position in the picture: the same direction from the eye.
   expect_near(glm::normalize(towards - near.from_w_m),
               glm::normalize(towards - from_south.from_w_m));
 }
 
-TEST(Orbit, KnowsHowWideAPixelIs) {
-  // At 100 m, 90 degrees are 200 m high.
+TEST(Orbit, ComputesTheWidthOfAPixel) {
+  // At a distance of 100 m, 90 degrees cover a height of 200 m.
   EXPECT_NEAR(metres_per_pixel(from_south, std::numbers::pi / 2, 400), 0.5, 1e-12);
 }
 

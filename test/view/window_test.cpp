@@ -13,10 +13,10 @@
 #include <fstream>
 #include <glm/geometric.hpp>
 
-#include "core/image_io.h"
-#include "core/mesh_io.h"
-#include "core/ply_io.h"
-#include "core/product_io.h"
+#include "core/image/image_io.h"
+#include "core/image/png_io.h"
+#include "core/io/mesh_io.h"
+#include "core/io/ply_io.h"
 #include "test/view/sample_dataset.h"
 #include "test/view/window_fixture.h"
 
@@ -62,7 +62,7 @@ void write_cloud(const std::filesystem::path& path) {
   write_ply(path, cloud, {});
 }
 
-// Of the screen, for what is seen at all: 400 points of a few pixels have more.
+// Fewest screen pixels of a visible layer: 400 points of a few pixels each cover more.
 constexpr std::size_t few_pixels = 400;
 
 TEST_F(WindowTest, OpensEachKindOfFile) {
@@ -109,7 +109,7 @@ TEST_F(WindowTest, OpensADatasetAndItsScene) {
   EXPECT_NE(window.status().value("rebuilt in"), "");
 }
 
-TEST_F(WindowTest, TellsOfWhatIsNoInputAndStaysAlive) {
+TEST_F(WindowTest, ReportsInvalidInputsAndRemainsUsable) {
   Window& window = shown();
   const TemporaryFolder folder;
   write_ply(folder / "whole.ply", pyramid(), {});
@@ -128,12 +128,12 @@ TEST_F(WindowTest, TellsOfWhatIsNoInputAndStaysAlive) {
     EXPECT_NE(message.find(name), std::string::npos) << name << ": " << message;
     EXPECT_TRUE(names_of(window).empty()) << name;
   }
-  open(folder / "whole.ply");  // and goes on
+  open(folder / "whole.ply");  // the window remains usable
   EXPECT_EQ(dismiss_fault(), "");
   EXPECT_TRUE(has(window, "whole.ply"));
 }
 
-TEST_F(WindowTest, RefusesWhatIsTooLarge) {
+TEST_F(WindowTest, RejectsOversizedFiles) {
   WindowStart start;
   start.limits.file_bytes = 100;
   shown(start);
@@ -145,7 +145,7 @@ TEST_F(WindowTest, RefusesWhatIsTooLarge) {
   EXPECT_TRUE(names_of(*window_).empty());
 }
 
-TEST_F(WindowTest, TakesWhatIsDroppedIntoIt) {
+TEST_F(WindowTest, OpensDroppedFiles) {
   Window& window = shown();
   const TemporaryFolder folder;
   write_ply(folder / "pyramid.ply", pyramid(), {});
@@ -163,7 +163,7 @@ TEST_F(WindowTest, TakesWhatIsDroppedIntoIt) {
   EXPECT_TRUE(has(window, "cloud.ply"));
 }
 
-TEST_F(WindowTest, ReadsAgainWhatIsOpenedAgain) {
+TEST_F(WindowTest, ReloadsAFileThatIsOpenedAgain) {
   Window& window = shown();
   const TemporaryFolder folder;
   write_ply(folder / "mesh.ply", pyramid(), {});
@@ -174,14 +174,14 @@ TEST_F(WindowTest, ReadsAgainWhatIsOpenedAgain) {
   open(folder / "mesh.ply");
   EXPECT_EQ(names_of(window), std::vector<std::string>{"mesh.ply"});
   EXPECT_EQ(window.view().find("mesh.ply")->triangles(), 3U);
-  // Another one of that name is another document.
+  // Another file of the same name is another document.
   std::filesystem::create_directory(folder / "other");
   write_ply(folder / "other" / "mesh.ply", pyramid(), {});
   open(folder / "other" / "mesh.ply");
   EXPECT_EQ(names_of(window), (std::vector<std::string>{"mesh.ply", "mesh.ply (2)"}));
 }
 
-TEST_F(WindowTest, KeysDoWhatTheHelpSays) {
+TEST_F(WindowTest, KeysMatchTheHelp) {
   Window& window = shown();
   const TemporaryFolder folder;
   write_ply(folder / "pyramid.ply", pyramid(), {});
@@ -200,7 +200,7 @@ TEST_F(WindowTest, KeysDoWhatTheHelpSays) {
   EXPECT_NEAR(above.from_w_m.y, above.at_w_m.y, 1e-6);
   EXPECT_GT(above.from_w_m.z, above.at_w_m.z);
   press(Qt::Key_2);
-  EXPECT_LT(window.view().current_look().from_w_m.y, above.at_w_m.y - 1);  // in the south
+  EXPECT_LT(window.view().current_look().from_w_m.y, above.at_w_m.y - 1);  // south of the target
   press(Qt::Key_F1);
   auto* help = window.findChild<QDialog*>("help");
   ASSERT_NE(help, nullptr);
@@ -212,7 +212,7 @@ TEST_F(WindowTest, KeysDoWhatTheHelpSays) {
   EXPECT_TRUE(names_of(window).empty());
 }
 
-TEST_F(WindowTest, MouseTurnsMovesAndComesNearer) {
+TEST_F(WindowTest, MouseTurnsMovesAndZooms) {
   Window& window = shown();
   const TemporaryFolder folder;
   write_ply(folder / "pyramid.ply", pyramid(), {});
@@ -221,7 +221,7 @@ TEST_F(WindowTest, MouseTurnsMovesAndComesNearer) {
   const auto drag = [&](Qt::MouseButton button, Qt::KeyboardModifiers keys, QPoint by) {
     const QPoint from(canvas.width() / 2, canvas.height() / 2);
     QTest::mousePress(&canvas, button, keys, from);
-    // QTest::mouseMove tells of no buttons.
+    // QTest::mouseMove reports no buttons.
     for (int i = 1; i <= 4; ++i) {
       QMouseEvent move(QEvent::MouseMove, from + i * by / 4, Qt::NoButton, button, keys);
       QApplication::sendEvent(&canvas, &move);
@@ -238,9 +238,10 @@ TEST_F(WindowTest, MouseTurnsMovesAndComesNearer) {
   EXPECT_LT(glm::distance(turned.at_w_m, first.at_w_m), 1e-6);
   EXPECT_NEAR(distance_m(), glm::distance(first.from_w_m, first.at_w_m), 1e-6);
   EXPECT_GT(glm::distance(turned.from_w_m, first.from_w_m), 0.5);
-  EXPECT_NEAR(turned.from_w_m.z, first.from_w_m.z, 1e-6);  // up stays up
+  EXPECT_NEAR(turned.from_w_m.z, first.from_w_m.z, 1e-6);  // up remains up
 
-  // What is dragged stays under the mouse: its line of sight still meets the target's plane there.
+  // The dragged point stays under the mouse: its line of sight still intersects the target's plane
+  // there.
   const int middle_x = canvas.width() / 2, middle_y = canvas.height() / 2;
   drag(Qt::MiddleButton, Qt::NoModifier, {60, 40});
   const auto [eye, direction] = window.view().line_of_sight(middle_x + 60, middle_y + 40);
@@ -253,7 +254,7 @@ TEST_F(WindowTest, MouseTurnsMovesAndComesNearer) {
   drag(Qt::RightButton, Qt::NoModifier, {0, -60});
   EXPECT_LT(distance_m(), 0.8 * before_m);
 
-  // The wheel keeps what is pointed at.
+  // Zooming with the wheel keeps the point under the mouse.
   const auto sight = window.view().line_of_sight(200, 150);
   QWheelEvent wheel({200, 150}, canvas.mapToGlobal(QPoint(200, 150)), {}, {0, 240}, Qt::NoButton,
                     Qt::NoModifier, Qt::NoScrollPhase, false);
@@ -263,7 +264,7 @@ TEST_F(WindowTest, MouseTurnsMovesAndComesNearer) {
   EXPECT_TRUE(wait_until([&] { return canvas.frames_per_s() > 0; }, 5000));
 }
 
-TEST_F(WindowTest, TreeAndBoxesSayHowALayerLooks) {
+TEST_F(WindowTest, LayerPanelSetsTheStyleOfALayer) {
   Window& window = shown();
   const TemporaryFolder folder;
   write_cloud(folder / "cloud.ply");
@@ -282,7 +283,7 @@ TEST_F(WindowTest, TreeAndBoxesSayHowALayerLooks) {
   EXPECT_NEAR(window.view().find("cloud.ply")->opacity, 0.4, 1e-9);
 }
 
-TEST_F(WindowTest, RangesKeepTheDigitsOfTheirEnds) {
+TEST_F(WindowTest, RangesKeepTheDigitsOfTheirLimits) {
   Window& window = shown();
   const TemporaryFolder folder;
   PointCloud cloud(10);
@@ -304,10 +305,10 @@ TEST_F(WindowTest, RangesKeepTheDigitsOfTheirEnds) {
   EXPECT_NEAR(low->value(), before.x, 1e-12 * before.x);
   EXPECT_NEAR(high->text().toDouble(), before.y, 1e-8 * before.y);
   high->setValue(5e-9);
-  EXPECT_EQ(range(), glm::dvec2(before.x, 5e-9));  // the other end is as it was, to the last bit
+  EXPECT_EQ(range(), glm::dvec2(before.x, 5e-9));  // the other end is unchanged to the last bit
 }
 
-TEST_F(WindowTest, BeginsAsTheProgramWasAsked) {
+TEST_F(WindowTest, AppliesTheCommandLine) {
   const TemporaryFolder folder;
   write_ply(folder / "pyramid.ply", pyramid(), {});
   write_cloud(folder / "cloud.ply");
@@ -339,7 +340,7 @@ TEST_F(WindowTest, SavesPicturesOfAnySize) {
     EXPECT_EQ(glm::ivec2(picture.width(), picture.height()), size_px);
   }
   QTest::qWait(100);
-  EXPECT_GT(pixels_of("pyramid.ply"), few_pixels);  // the window still shows what it did
+  EXPECT_GT(pixels_of("pyramid.ply"), few_pixels);  // the window still shows the layer
 }
 
 }  // namespace

@@ -6,9 +6,9 @@
 #include <cmath>
 #include <glm/geometric.hpp>
 
-#include "apps/view/window/picture_area.h"
+#include "apps/view/window/panels/picture_area.h"
 #include "apps/view/window/window.h"
-#include "core/ply_io.h"
+#include "core/io/ply_io.h"
 #include "test/view/sample_dataset.h"
 #include "test/view/window_fixture.h"
 
@@ -19,10 +19,10 @@ using testing::SampleDataset;
 using testing::TemporaryFolder;
 using testing::wait_until;
 
-// The sample scene's ground, as write_hills has it; between samples 1 m apart, heights are off by
-// what triangles make of a wave: its second derivative over 8, 0.004 m.
+// Height of the sample scene's ground, as write_hills() defines it. Between samples, which are 1 m
+// apart, triangles deviate from the wave by up to its second derivative over 8: 0.004 m.
 double hill_m(double x, double y) {
-  constexpr double last_row_m = 160.5;  // from the corner: samples stand in the middle of cells
+  constexpr double last_row_m = 160.5;  // from the corner: samples are at the centres of cells
   return 50 + 2 * std::sin((x - 0.5) * 0.08) + 1.5 * std::cos((last_row_m - y) * 0.11);
 }
 
@@ -39,7 +39,7 @@ class WindowToolsTest : public testing::WindowTest {
     return const_cast<FactTable&>(window_->picked()).parentWidget()->findChild<QLabel*>();
   }
 
-  // Clicks into the view until something of a layer is picked.
+  // Clicks into the view until a point of the layer is picked.
   bool pick_in(const std::string& layer) {
     Canvas& canvas = window_->canvas();
     for (int y = 20; y < canvas.height() - 20; y += 9) {
@@ -61,7 +61,7 @@ TEST_F(WindowToolsTest, PickingAnEchoShowsItsColumnsBeamAndFootprint) {
   ASSERT_TRUE(pick_in("dataset/lidar/top"));
   EXPECT_EQ(dismiss_fault(), "");
   const std::size_t row = Rows{picked_title()->text().toStdString()}.number();
-  // What the file has in that row, read without the window.
+  // The oracle is that row of the file, read without the window.
   const PointCloud scan = read_ply(SampleDataset::get().path() / "lidar/top/000000.ply").cloud;
   ASSERT_LT(row, scan.rows());
   for (const PointCloud::Column& column : scan.columns()) {
@@ -75,7 +75,7 @@ TEST_F(WindowToolsTest, PickingAnEchoShowsItsColumnsBeamAndFootprint) {
       window.timeline_panel().timeline()->georeference().origin_w_m +
       glm::dvec3(scan.column<double>("world_x")[row], scan.column<double>("world_y")[row],
                  scan.column<double>("world_z")[row]);
-  constexpr double noise_m = 0.02;  // of the ranges, as the scene says
+  constexpr double noise_m = 0.02;  // of the ranges, from the scene file
   EXPECT_LT(glm::distance(shown_m, true_m), 6 * noise_m);
   for (const char* layer : {"picked/beam", "picked/footprint", "picked/place"}) {
     EXPECT_NE(window.view().find(layer), nullptr) << layer;
@@ -85,14 +85,14 @@ TEST_F(WindowToolsTest, PickingAnEchoShowsItsColumnsBeamAndFootprint) {
   EXPECT_LT(glm::distance(beam.p_w_m(1), shown_m), 0.002);
   QTest::keyClick(&window, Qt::Key_Escape);
   EXPECT_EQ(window.view().find("picked/beam"), nullptr);
-  // Nor does a beam stay when its dataset is read anew.
+  // The beam also disappears when its dataset is opened again.
   ASSERT_TRUE(pick_in("dataset/lidar/top"));
   ASSERT_NE(window.view().find("picked/beam"), nullptr);
   open(SampleDataset::get().path());
   EXPECT_EQ(window.view().find("picked/beam"), nullptr);
 }
 
-TEST_F(WindowToolsTest, OfSeveralPicksTheLastIsToldOf) {
+TEST_F(WindowToolsTest, ReportsOnlyTheLastPick) {
   Window& window = shown();
   open(SampleDataset::get().path());
   std::vector<std::string> told;
@@ -100,7 +100,7 @@ TEST_F(WindowToolsTest, OfSeveralPicksTheLastIsToldOf) {
   Picker picker(window.view(),
                 {.told = [&](const std::string& title, const auto&) { told.push_back(title); },
                  .failed = [&](const std::string& message) { failed = message; }});
-  ShownScan scan;  // of a file that is not there: reading it fails, which is heard of if it is
+  ShownScan scan;  // in a missing file: an attempt to read it reports an error
   scan.frame.file = "/nowhere/000000.ply";
   const Picked picked{.layer = "dataset/lidar/top", .row = 1};
   picker.pick(picked, &scan);
@@ -112,7 +112,7 @@ TEST_F(WindowToolsTest, OfSeveralPicksTheLastIsToldOf) {
   EXPECT_EQ(told, std::vector<std::string>{"dataset/lidar/top: point 1"});
 }
 
-TEST_F(WindowToolsTest, PickingASurfaceTellsItsNumbers) {
+TEST_F(WindowToolsTest, PickingASurfaceShowsItsValues) {
   Window& window = shown();
   open(SampleDataset::get().scene());
   ASSERT_TRUE(pick_in("scene.yaml/terrain"));
@@ -122,7 +122,7 @@ TEST_F(WindowToolsTest, PickingASurfaceTellsItsNumbers) {
   EXPECT_NE(window.picked().value("slope"), "");
 }
 
-TEST_F(WindowToolsTest, TimelineShowsTheScansOfItsTime) {
+TEST_F(WindowToolsTest, TimelineShowsTheCurrentScans) {
   Window& window = shown();
   open(SampleDataset::get().path());
   TimelinePanel& panel = window.timeline_panel();
@@ -140,7 +140,7 @@ TEST_F(WindowToolsTest, TimelineShowsTheScansOfItsTime) {
     EXPECT_EQ(dismiss_fault(), "");
     EXPECT_EQ(rows_shown(), rows_of(panel.time())) << place;
   }
-  // Steps go through the stamps.
+  // Steps go from stamp to stamp.
   QTest::keyClick(&window, Qt::Key_Period);
   settle();
   const auto second = panel.time();
@@ -148,7 +148,7 @@ TEST_F(WindowToolsTest, TimelineShowsTheScansOfItsTime) {
   QTest::keyClick(&window, Qt::Key_Comma);
   settle();
   EXPECT_EQ(panel.time(), timeline.begin());
-  // Playing ends at the end.
+  // Playback stops at the end.
   QTest::mouseClick(panel.findChild<QWidget*>("play"), Qt::LeftButton);
   EXPECT_TRUE(panel.is_playing());
   EXPECT_TRUE(wait_until([&] { return !panel.is_playing(); }, 10'000));
@@ -158,7 +158,7 @@ TEST_F(WindowToolsTest, TimelineShowsTheScansOfItsTime) {
   EXPECT_GT(window.view().find("dataset/trail")->points(), 2U);
 }
 
-TEST_F(WindowToolsTest, WhatMovesIsWhereItIsAtTheTime) {
+TEST_F(WindowToolsTest, MovingObjectsFollowTheTimeline) {
   Window& window = shown();
   open(SampleDataset::get().path());
   open(SampleDataset::get().scene());
@@ -182,7 +182,7 @@ TEST_F(WindowToolsTest, WhatMovesIsWhereItIsAtTheTime) {
   const glm::dvec3 platform_m = timeline.pose_at(0, panel.time()).translation_m;
   panel.go_to(std::chrono::milliseconds(450));
   settle();
-  // It drives north at 8 m/s along the slope, and leans as the ground does: 0.2 rad at most.
+  // The cart drives north at 8 m/s and leans with the slope of the ground: 0.2 rad at most.
   EXPECT_NEAR(middle_y_m() - before_m, 8 * 0.4, 0.25);
   const glm::dvec3 ridden_m = window.view().current_look().from_w_m - look.from_w_m;
   const glm::dvec3 driven_m = timeline.pose_at(0, panel.time()).translation_m - platform_m;
@@ -190,7 +190,7 @@ TEST_F(WindowToolsTest, WhatMovesIsWhereItIsAtTheTime) {
   EXPECT_GT(glm::length(driven_m), 1);
 }
 
-TEST_F(WindowToolsTest, AClickedPixelShowsItsRayAndTheSurface) {
+TEST_F(WindowToolsTest, ClickedPixelShowsItsRayAndTheSurface) {
   Window& window = shown();
   open(SampleDataset::get().path());
   window.timeline_panel().go_to(window.timeline_panel().timeline()->end());
@@ -207,7 +207,7 @@ TEST_F(WindowToolsTest, AClickedPixelShowsItsRayAndTheSurface) {
   ASSERT_TRUE(label);
   int of_ground = 0;
   for (const glm::ivec2 pixel : {glm::ivec2(31, 40), glm::ivec2(10, 44), glm::ivec2(55, 36)}) {
-    constexpr double ground = 3;  // as the scene's terrain says
+    constexpr double ground = 3;  // label of the terrain in the scene file
     if (panel.image()->numbers_at(*label, pixel).front() != ground) continue;
     ++of_ground;
     const QPoint place = panel.area().place_of(pixel).toPoint();
@@ -220,7 +220,7 @@ TEST_F(WindowToolsTest, AClickedPixelShowsItsRayAndTheSurface) {
   EXPECT_GT(of_ground, 0);
 }
 
-TEST_F(WindowToolsTest, ScansFromWhereTheMousePutsTheSensor) {
+TEST_F(WindowToolsTest, ScansFromTheClickedPlace) {
   Window& window = shown();
   open(SampleDataset::get().scene());
   ScanPanel& panel = window.scan_panel();
@@ -256,7 +256,7 @@ TEST_F(WindowToolsTest, ScansFromWhereTheMousePutsTheSensor) {
   EXPECT_NE(window.view().find("picked/beam"), nullptr);
 }
 
-TEST_F(WindowToolsTest, ScansADemAlone) {
+TEST_F(WindowToolsTest, ScansABareDem) {
   Window& window = shown();
   open(SampleDataset::get().scene().parent_path() / "hills.asc");
   ScanPanel& panel = window.scan_panel();
@@ -272,12 +272,12 @@ TEST_F(WindowToolsTest, ScansADemAlone) {
   const Layer* scan = window.view().find("scan here/1 velodyne_vlp16");
   ASSERT_NE(scan, nullptr);
   ASSERT_GT(scan->points(), 1000U);
-  // There is ground alone; 6 sigma of the range noise are 0.18 m along the beam.
+  // There is only ground; 6 sigma of the range noise are 0.18 m along the beam.
   for (vtkIdType i = 0; i < static_cast<vtkIdType>(scan->points()); ++i) {
     const glm::dvec3 p = scan->p_w_m(i);
     ASSERT_NEAR(p.z, hill_m(p.x, p.y), 0.2) << i;
   }
-  open(SampleDataset::get().scene());  // which has more to be scanned
+  open(SampleDataset::get().scene());  // contains objects in addition to the ground
   EXPECT_FALSE(panel.has_place());
   window.layer_panel().select("hills.asc");
   QTest::keyClick(&window, Qt::Key_Delete);
@@ -285,7 +285,7 @@ TEST_F(WindowToolsTest, ScansADemAlone) {
   EXPECT_TRUE(panel.has_place());
 }
 
-TEST_F(WindowToolsTest, AScanCanBeCancelled) {
+TEST_F(WindowToolsTest, ScanCanBeCancelled) {
   Window& window = shown();
   open(SampleDataset::get().scene());
   ScanPanel& panel = window.scan_panel();
@@ -303,9 +303,9 @@ TEST_F(WindowToolsTest, AScanCanBeCancelled) {
   EXPECT_TRUE(panel.findChild<QPushButton*>("scan")->isEnabled());
 }
 
-TEST_F(WindowToolsTest, TheWindowGoesOnWhileItWorks) {
+TEST_F(WindowToolsTest, WindowRemainsResponsiveWhileLoading) {
   Window& window = shown();
-  open(SampleDataset::get().scene());  // once, so that it is known what a picture of it takes
+  open(SampleDataset::get().scene());  // first opened to measure how long a picture of it takes
   ASSERT_NE(window.view().find("scene.yaml/terrain"), nullptr);
   QElapsedTimer of_picture;
   of_picture.start();
@@ -315,7 +315,7 @@ TEST_F(WindowToolsTest, TheWindowGoesOnWhileItWorks) {
   window.close_all();
   settle();
   window.open(SampleDataset::get().scene());
-  // The thread of the window is never held up for long: its clock goes on ticking.
+  // The window's thread is never blocked for long: its clock keeps running.
   QElapsedTimer clock;
   clock.start();
   qint64 longest_ms = 0, last_ms = 0;
@@ -324,13 +324,14 @@ TEST_F(WindowToolsTest, TheWindowGoesOnWhileItWorks) {
     longest_ms = std::max(longest_ms, clock.elapsed() - last_ms);
     last_ms = clock.elapsed();
   }
-  // What the window's own thread does at once: a few pictures, the first with its data to be sent.
+  // Work of the window's own thread between events: a few pictures, including the upload of the
+  // data for the first.
   EXPECT_LT(longest_ms, 500 + 10 * picture_ms);
   settle();
   EXPECT_NE(window.view().find("scene.yaml/terrain"), nullptr);
 }
 
-TEST_F(WindowToolsTest, MayBeClosedWhileItWorks) {
+TEST_F(WindowToolsTest, MayBeClosedDuringAJob) {
   shown().open(SampleDataset::get().scene());
   window_.reset();
   Window& window = shown();
@@ -340,7 +341,7 @@ TEST_F(WindowToolsTest, MayBeClosedWhileItWorks) {
   window.scan_panel().scan();
   EXPECT_TRUE(window.scan_panel().is_scanning());
   window_.reset();
-  QTest::qWait(50);  // what was on its way finds nobody
+  QTest::qWait(50);  // queued results have no receiver any more
 }
 
 TEST_F(WindowToolsTest, ComparesWithASceneAndADem) {
@@ -352,7 +353,7 @@ TEST_F(WindowToolsTest, ComparesWithASceneAndADem) {
   const auto x = points.add<double>("x"), y = points.add<double>("y"), z = points.add<double>("z");
   for (std::size_t i = 0; i < points.rows(); ++i) {
     const std::size_t line = i / 100;
-    // On samples of the DEM, whose centres are half a metre inside.
+    // The points are on DEM samples, whose centres are half a metre inside the border.
     x[i] = static_cast<double>(20 + i % 100) + 0.5;
     y[i] = static_cast<double>(20 + 10 * line) + 0.5;
     z[i] = hill_m(x[i], y[i]) + above_m;
@@ -368,13 +369,13 @@ TEST_F(WindowToolsTest, ComparesWithASceneAndADem) {
     settle();
     EXPECT_EQ(dismiss_fault(), "") << truth;
     EXPECT_EQ(panel.figures().value("points"), "500") << truth;
-    // Heights are stored with four digits, points in floats of metres.
+    // Heights are stored with four decimal places, points as floats in metres.
     EXPECT_NEAR(metres(panel.figures().value("mean")), above_m, 2e-4) << truth;
     EXPECT_LT(std::abs(metres(panel.figures().value("NMAD"))), 2e-4) << truth;
   }
 }
 
-TEST_F(WindowToolsTest, LevelsFollowAPlaceThatIsClicked) {
+TEST_F(WindowToolsTest, LevelsFollowAClickedPlace) {
   Window& window = shown();
   open(SampleDataset::get().scene());
   const QPoint middle(window.canvas().width() / 2, window.canvas().height() / 2 + 40);
@@ -388,9 +389,9 @@ TEST_F(WindowToolsTest, LevelsFollowAPlaceThatIsClicked) {
   settle();
   EXPECT_EQ(window.tracker().follows(), TerrainTracker::Follows::Place);
   EXPECT_NE(window.view().find("viewpoint"), nullptr);
-  const glm::dvec3 eyes_m(0, 0, 2);  // above the ground, as of one who stands there
+  const glm::dvec3 eyes_m(0, 0, 2);  // eye level of a person who stands on the ground
   EXPECT_LT(glm::distance(*window.tracker().viewpoint_w_m(), ground->p_w_m + eyes_m), 1e-6);
-  // From now on the eye may go anywhere: the levels stay.
+  // The levels now stay as they are, wherever the eye moves.
   QTest::keyClick(&window, Qt::Key_1);
   settle();
   EXPECT_LT(glm::distance(*window.tracker().viewpoint_w_m(), ground->p_w_m + eyes_m), 1e-6);

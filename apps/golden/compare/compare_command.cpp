@@ -9,9 +9,9 @@
 #include <vector>
 
 #include "apps/golden/compare/dem_comparison.h"
-#include "apps/golden/compare/image_comparison.h"
+#include "apps/golden/compare/images/image_comparison.h"
 #include "apps/golden/compare/mesh_comparison.h"
-#include "apps/golden/compare/scan_comparison.h"
+#include "apps/golden/compare/scans/scan_comparison.h"
 #include "apps/golden/compare/subject.h"
 #include "apps/scan/scan_flags.h"
 #include "apps/scan/word_option.h"
@@ -23,9 +23,10 @@ namespace {
 namespace fs = std::filesystem;
 
 void add_dem_flags(CLI::App* group, const std::string& prefix, DemOptions& options) {
-  group->add_option("--" + prefix + "nodata", options.nodata, "A height that means 'none'");
+  group->add_option("--" + prefix + "nodata", options.nodata,
+                    "Height that marks missing samples (nodata)");
   group->add_option("--" + prefix + "reproject-to", options.reproject_to,
-                    "A CRS to warp to, such as EPSG:32631, or utm");
+                    "CRS to reproject to, such as EPSG:32631, or utm");
 }
 
 }  // namespace
@@ -37,7 +38,7 @@ struct CompareCommand::Options {
     std::vector<std::string> channels;
 
     void add(CLI::App* group, const std::string& prefix) {
-      add_words(group, "--" + prefix + "png", png, "What the numbers of a PNG are",
+      add_words(group, "--" + prefix + "png", png, "Meaning of a PNG's values",
                 Words<PngMeaning>{{"picture", PngMeaning::Picture},
                                   {"kitti_depth", PngMeaning::KittiDepth},
                                   {"millimetre_depth", PngMeaning::MillimetreDepth},
@@ -47,7 +48,7 @@ struct CompareCommand::Options {
           ->check(CLI::PositiveNumber);
       group
           ->add_option("--" + prefix + "channels", channels,
-                       "THEIRS=OURS: what channels are, in the names of docs/formats.md")
+                       "THEIRS=OURS: maps channel names to those of docs/reference/formats.md")
           ->delimiter(',');
     }
     ImageReading reading() const {
@@ -65,7 +66,7 @@ struct CompareCommand::Options {
   fs::path reference, other;
   fs::path out = "out/compare";
   std::optional<Subject> subject;
-  std::array<ScanFlags, 2> scan;  // of the other, of the reference
+  std::array<ScanFlags, 2> scan;  // [0] other, [1] reference; likewise below
   std::array<ImageFlags, 2> image;
   DemReadings dem;
   MeshFineness mesh;
@@ -75,21 +76,30 @@ struct CompareCommand::Options {
   Significance significance;
 
   void add_scan(CLI::App* group) {
-    add_words(group, "--pair-by", pairing.rule, "How pulses are paired",
+    add_words(group, "--pair-by", pairing.rule, "Rule for pairing pulses",
               Words<PairingRule>{{"best", PairingRule::Best},
                                  {"pulse", PairingRule::Pulse},
                                  {"ring_time", PairingRule::RingTime},
                                  {"ring_azimuth", PairingRule::RingAzimuth},
                                  {"direction", PairingRule::Direction}});
-    group->add_option("--pair-mrad", tolerance_mrad, "How far apart directions of a pair may be")
+    group
+        ->add_option("--pair-mrad", tolerance_mrad,
+                     "Largest angle between the directions of a pair")
         ->check(CLI::PositiveNumber);
-    group->add_option("--pair-s", pairing.tolerance_s, "How far apart times of a pair may be")
+    group
+        ->add_option("--pair-s", pairing.tolerance_s,
+                     "Largest difference between the times of a pair")
         ->check(CLI::PositiveNumber);
-    group->add_option("--most-range-mean-m", limits.range_mean_m, "Fail beyond it");
-    group->add_option("--most-range-rms-m", limits.range_rms_m, "Fail beyond it");
-    group->add_option("--most-range-p99-m", limits.range_p99_m, "Fail beyond it");
-    group->add_option("--most-missing", limits.missing_share, "Share; fail beyond it");
-    group->add_option("--most-extra", limits.extra_share, "Share; fail beyond it");
+    group->add_option("--most-range-mean-m", limits.range_mean_m,
+                      "Fail if the magnitude of the mean range error is larger");
+    group->add_option("--most-range-rms-m", limits.range_rms_m,
+                      "Fail if the RMS range error is larger");
+    group->add_option("--most-range-p99-m", limits.range_p99_m,
+                      "Fail if the 99th percentile of range errors is larger");
+    group->add_option("--most-missing", limits.missing_share,
+                      "Fail if a larger fraction of returns is missing");
+    group->add_option("--most-extra", limits.extra_share,
+                      "Fail if a larger fraction of returns is extra");
   }
 
   Section compare() const {
@@ -119,11 +129,11 @@ struct CompareCommand::Options {
 CompareCommand::CompareCommand(CLI::App& app)
     : options_(std::make_unique<Options>()),
       command_(app.add_subcommand(
-          "compare", "Hold a scan, image, DEM or mesh, whoever made it, against a reference")) {
+          "compare", "Compare a scan, image, DEM or mesh from any source with a reference")) {
   Options& into = *options_;
-  command_->add_option("REFERENCE", into.reference, "What is taken for true")->required();
-  command_->add_option("OTHER", into.other, "What is judged")->required();
-  add_words(command_, "--as", into.subject, "What both are, if their names do not tell",
+  command_->add_option("REFERENCE", into.reference, "File that is taken as the truth")->required();
+  command_->add_option("OTHER", into.other, "File that is compared with it")->required();
+  add_words(command_, "--as", into.subject, "Kind of both files, if their names do not show it",
             Words<Subject>{{"scan", Subject::Scan},
                            {"image", Subject::Image},
                            {"dem", Subject::Dem},
@@ -139,7 +149,7 @@ CompareCommand::CompareCommand(CLI::App& app)
   into.image[1].add(images, "reference-");
   images
       ->add_option("--share-beyond", into.significance.beyond_share,
-                   "Share of values of light that may fail their test")
+                   "Fraction of radiance values that may fail their test")
       ->check(CLI::Range(0.0, 1.0));
   CLI::App* dems = command_->add_option_group("DEMs");
   add_dem_flags(dems, "", into.dem.other);
@@ -147,13 +157,13 @@ CompareCommand::CompareCommand(CLI::App& app)
   CLI::App* meshes = command_->add_option_group("Meshes");
   meshes
       ->add_option("--tolerance-m", into.mesh.tolerance_m,
-                   "Between the bounds of largest distances")
+                   "Permitted gap between the bounds of the largest distance")
       ->check(CLI::PositiveNumber);
-  meshes->add_option("--step-m", into.mesh.step_m, "Between samples of mean distances")
+  meshes->add_option("--step-m", into.mesh.step_m, "Spacing of the samples for mean distances")
       ->check(CLI::PositiveNumber);
   meshes
       ->add_option("--within-m", into.mesh.within_m,
-                   "Tell precision, completeness and F1 within so much; may be given again")
+                   "Report precision, completeness and F1 within this distance; may be repeated")
       ->delimiter(',')
       ->check(CLI::PositiveNumber);
 }

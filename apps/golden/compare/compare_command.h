@@ -12,17 +12,17 @@ class App;
 
 namespace groundray::golden {
 
-/// The command `compare`: holds one file against another and writes a report.
+/// Command `compare`: compares a file with a reference and writes a report.
 class CompareCommand {
  public:
-  /// Adds the command to a program's.
+  /// Adds the command to `app`, which must outlive this object.
   explicit CompareCommand(CLI::App& app);
   ~CompareCommand();
 
   bool is_asked_for() const;
 
-  /// Writes report.html and report.json, and prints the figures.
-  /// @return what was found: Failed if a limit is broken or they have nothing in common.
+  /// Compares the files, prints the figures, and writes report.html and report.json.
+  /// @return Failed if a limit is exceeded or the inputs have nothing in common.
   /// @throws Error as compare_scans, compare_images, compare_dems and compare_meshes.
   Verdict run() const;
 

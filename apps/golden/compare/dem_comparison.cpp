@@ -15,19 +15,19 @@
 #include <utility>
 #include <vector>
 
-#include "apps/golden/compare/difference_picture.h"
 #include "apps/golden/compare/error_figures.h"
-#include "apps/golden/compare/image_layer.h"
-#include "core/cell.h"
+#include "apps/golden/compare/images/difference_picture.h"
+#include "apps/golden/compare/images/image_layer.h"
 #include "core/error.h"
+#include "core/geometry/cell.h"
 
 namespace groundray::golden {
 namespace {
 
 constexpr double no_height = std::numeric_limits<double>::quiet_NaN();
-constexpr double same_place = 1e-6;  // of a cell: what geotransforms lose in text and floats
+constexpr double same_place = 1e-6;  // cells; rounding of geotransforms in text and floats
 
-/// Heights on the reference's grid; NaN where there is none.
+/// Heights on the reference's grid, m; NaN in holes.
 struct Heights {
   GridFrame frame;
   std::vector<double> m;
@@ -48,18 +48,18 @@ struct Heights {
   }
 };
 
-/// What is held against what.
+/// Heights of both DEMs at the reference's samples.
 struct DemPair {
   Heights reference, other;
-  std::size_t beyond = 0;        // samples that lie beyond the other's extent
-  std::size_t interpolated = 0;  // samples between the other's
+  std::size_t beyond = 0;        // samples outside the other's extent
+  std::size_t interpolated = 0;  // samples that lie between samples of the other
 
   glm::ivec2 samples() const { return reference.frame.samples; }
 };
 
 bool is_whole(glm::dvec2 at) { return at == glm::round(at); }
 
-/// Returns `at` with coordinates that are whole but for rounding made whole.
+/// Returns `at` with each coordinate that is within `same_place` of a whole number rounded to it.
 glm::dvec2 snapped(glm::dvec2 at) {
   for (glm::length_t i = 0; i < 2; ++i) {
     if (std::abs(at[i] - std::round(at[i])) <= same_place) at[i] = std::round(at[i]);
@@ -67,7 +67,7 @@ glm::dvec2 snapped(glm::dvec2 at) {
   return at;
 }
 
-/// Returns the surface's height at grid coordinates that lie in the grid; NaN in a hole.
+/// Returns the height of the surface at grid coordinates within the grid, m; NaN in a hole.
 double height_m_at(const HeightGrid& grid, glm::dvec2 at) {
   if (is_whole(at)) return grid.height_m(static_cast<int>(at.x), static_cast<int>(at.y));
   const Cell cell = grid.cell(std::min(static_cast<int>(at.x), grid.columns() - 2),
@@ -100,8 +100,8 @@ DemPair paired(const Dem& reference, const Dem& other) {
   return pair;
 }
 
-/// Slope along x and y of D, by central differences; one-sided beside holes and edges; NaN if
-/// neither side has a height.
+/// Returns the slope along x and y of D by central differences, one-sided next to holes and edges;
+/// NaN if neither neighbour has a height.
 glm::dvec2 gradient(const Heights& heights, int column, int row) {
   const auto along = [&](int dx, int dy, double step_m) {
     const auto height_at = [&](int times) {
@@ -117,11 +117,11 @@ glm::dvec2 gradient(const Heights& heights, int column, int row) {
   return {along(1, 0, heights.frame.step_m.x), along(0, 1, heights.frame.step_m.y)};
 }
 
-/// A sample that both have.
+/// Sample with a height in both DEMs.
 struct Sample {
   int column = 0, row = 0;
   double error_m = 0;
-  glm::dvec2 slope{0};  // of the reference
+  glm::dvec2 slope{0};  // gradient of the reference
 };
 
 std::vector<Sample> samples_of(const DemPair& pair) {
@@ -154,8 +154,8 @@ void tell_vertical(const DemPair& pair, const glm::dvec3& origin_w_m,
   const glm::dvec2 p_W =
       pair.reference.frame.to_D({worst.column, worst.row}) + glm::dvec2(origin_w_m);
   into.text += fmt::format(
-      "Heights are worst in column {}, row {} (east {:.3f} m, north {:.3f} m): {:.6g} m where the "
-      "reference has {:.6g} m.\n",
+      "The largest height error is in column {}, row {} (east {:.3f} m, north {:.3f} m): {:.6g} m "
+      "where the reference has {:.6g} m.\n",
       worst.column, worst.row, p_W.x, p_W.y, pair.other(worst.column, worst.row) + origin_w_m.z,
       pair.reference(worst.column, worst.row) + origin_w_m.z);
 }
@@ -186,7 +186,7 @@ void tell_by_slope(const std::vector<Sample>& samples, Section& into) {
   into.tables.push_back(std::move(table));
 }
 
-/// Of both triangles of each cell that both surfaces have.
+/// Compares the normals of both triangles of each cell that both surfaces have.
 void tell_slopes(const DemPair& pair, Section& into) {
   std::vector<double> angles_deg, slopes_deg;
   const GridFrame& frame = pair.reference.frame;
@@ -225,8 +225,8 @@ void tell_holes(const DemPair& pair, Section& into) {
   tell(into, "beyond the other's extent", static_cast<double>(pair.beyond), "samples");
 }
 
-/// Where the other lies, by least squares over e = c - slope . shift, and what share of the errors'
-/// variance that explains.
+/// Horizontal shift of the other DEM, fitted by least squares to e = c - slope . shift, and the
+/// fraction of the errors' variance that it explains.
 struct Shift {
   glm::dvec2 shift_m{0};
   double explained = 0;
@@ -261,10 +261,8 @@ void suspect_shift(const DemPair& pair, const std::vector<Sample>& samples, Sect
   if (!(0.05 < most_cells && most_cells < 3)) return;
   into.text += fmt::format(
       "THE OTHER SEEMS TO BE SHIFTED: by {:.3g} m to the east and {:.3g} m to the north ({:.2g} "
-      "and "
-      "{:.2g} cells), which explains {:.0f} % of the errors' variance. Half a cell is what "
-      "mistaking "
-      "pixel centres for corners makes (GeoTIFF's PixelIsArea and PixelIsPoint).\n",
+      "and {:.2g} cells), which explains {:.0f} % of the errors' variance. Mistaking pixel centres "
+      "for corners shifts by half a cell (GeoTIFF's PixelIsArea and PixelIsPoint).\n",
       fit->shift_m.x, fit->shift_m.y, cells.x, cells.y, 100 * fit->explained);
 }
 
@@ -289,15 +287,15 @@ void say_how(const DemPair& pair, const Dem& other, Section& into) {
   into.text +=
       fmt::format("{} x {} samples of the reference, {} x {} of the other; ", pair.samples().x,
                   pair.samples().y, other.grid.columns(), other.grid.rows());
-  into.text += pair.interpolated == 0
-                   ? "held against each other sample by sample.\n"
-                   : fmt::format(
-                         "at {} of the reference's samples the other's height is that of "
-                         "its triangles.\n",
-                         pair.interpolated);
+  into.text += pair.interpolated == 0 ? "compared sample by sample.\n"
+                                      : fmt::format(
+                                            "at {} of the reference's samples the other's height "
+                                            "is interpolated on its triangles.\n",
+                                            pair.interpolated);
 }
 
-/// How gdalwarp is told a reference system: by its EPSG code if it has one.
+/// Returns the gdalwarp arguments that select the reference's CRS: its EPSG code if it has one,
+/// else its WKT.
 std::string warp_words(const Dem& reference, const std::string& file) {
   const std::size_t code = reference.crs_name.rfind("(EPSG:");
   if (code != std::string::npos && reference.crs_name.ends_with(')'))
@@ -310,7 +308,7 @@ void check_dem_crs(const Dem& reference, const Dem& other, const std::string& re
   if (reference.crs_wkt.empty() || other.crs_wkt.empty() || reference.crs_wkt == other.crs_wkt)
     return;
   const bool has_code = reference.crs_name.find("(EPSG:") != std::string::npos;
-  if (has_code && reference.crs_name == other.crs_name) return;  // texts of other programs differ
+  if (has_code && reference.crs_name == other.crs_name) return;  // WKT differs between programs
   throw Error(
       "{}: its reference system is {} and that of {} is {}; they must be the same; run\n"
       "  gdalwarp {} -r bilinear '{}' other_as_reference.tif",
@@ -335,7 +333,7 @@ Section compare_dems(const std::filesystem::path& reference, const std::filesyst
   }
   if (of_reference.crs_wkt.empty() != of_other.crs_wkt.empty()) {
     section.text +=
-        fmt::format("The {} names no reference system: it is taken as of the same as the {}.\n",
+        fmt::format("The {} has no coordinate reference system: that of the {} is assumed.\n",
                     of_other.crs_wkt.empty() ? "other" : "reference",
                     of_other.crs_wkt.empty() ? "reference" : "other");
   }
@@ -349,8 +347,7 @@ Section compare_dems(const Dem& reference, const Dem& other, const std::string& 
     const glm::dvec2 from = reference.grid.origin_m() + glm::dvec2(reference.origin_w_m);
     const glm::dvec2 other_from = other.grid.origin_m() + glm::dvec2(other.origin_w_m);
     throw Error(
-        "they do not overlap: the first sample of the reference lies at east {} m, north {} m, "
-        "that "
+        "they do not overlap: the first sample of the reference is at east {} m, north {} m, that "
         "of the other at east {} m, north {} m",
         from.x, from.y, other_from.x, other_from.y);
   }

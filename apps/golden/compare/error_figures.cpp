@@ -16,7 +16,7 @@ std::vector<double> sizes_of(const std::vector<double>& errors) {
   return sizes;
 }
 
-/// As quantile, but puts the values in another order.
+/// As quantile, but reorders the values.
 double take_quantile(std::vector<double>& values, double share) {
   if (values.empty()) return no_figure;
   const double place = share * static_cast<double>(values.size() - 1);
@@ -28,7 +28,7 @@ double take_quantile(std::vector<double>& values, double share) {
   return *at + part * (*std::min_element(at + 1, values.end()) - *at);
 }
 
-/// How far a histogram goes: most errors are far smaller than the largest.
+/// Returns the end of a histogram's axis; most errors are far smaller than the largest.
 double reach_of(const ErrorFigures& figures) {
   if (figures.p95_size > 0) return 2 * figures.p95_size;
   return figures.p99_size > 0 ? figures.p99_size : figures.largest;

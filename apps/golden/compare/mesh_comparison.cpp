@@ -13,18 +13,19 @@
 
 #include "apps/golden/compare/error_figures.h"
 #include "core/error.h"
-#include "core/mesh_check.h"
-#include "core/mesh_io.h"
-#include "core/model.h"
-#include "reconstruction/accuracy/accuracy.h"
-#include "reconstruction/accuracy/agreement.h"
+#include "core/geometry/mesh_check.h"
+#include "core/io/mesh_io.h"
+#include "core/model/mesh_reader.h"
+#include "core/model/model.h"
+#include "reconstruction/mesh/accuracy/accuracy.h"
+#include "reconstruction/mesh/accuracy/agreement.h"
 
 namespace groundray::golden {
 namespace {
 
 constexpr std::size_t bin_count = 60;
 
-/// One way of a comparison.
+/// Distances from one mesh to the other.
 struct Way {
   std::string name;
   const TriangleMesh& from;
@@ -91,7 +92,7 @@ void tell_agreement(Section& into, const Way& there, const Way& back,
   }
 }
 
-/// Counts areas in millionths of the whole.
+/// Adds a histogram of area by distance, in millionths of the whole area.
 void draw_spread(Section& into, const Way& way) {
   Histogram histogram{.title = way.name + ": area by distance, in millionths",
                       .unit = "m",
@@ -106,8 +107,8 @@ void draw_spread(Section& into, const Way& way) {
   into.histograms.push_back(std::move(histogram));
 }
 
-/// Lists where the largest distances are: the largest, then triangles by the largest of their
-/// samples, each some way off from those before.
+/// Adds a table of the positions of the largest distances: the largest, then centroids of triangles
+/// by their largest sampled distance, spaced by at least 2 % of the mesh's size.
 void list_largest(Section& into, const Way& way) {
   constexpr std::size_t most_rows = 10;
   const double apart_m = 0.02 * size_m(way.from);
@@ -144,8 +145,8 @@ void check_mesh_crs(const std::filesystem::path& reference, const Georeference& 
   if (of_reference.crs_name.empty() || of_other.crs_name.empty()) return;
   if (of_reference.crs_name == of_other.crs_name) return;
   throw Error(
-      "{}: its reference system is {} and that of {} is {}; they must be the same: bring one to "
-      "the other's first",
+      "{}: its reference system is {} and that of {} is {}; they must be the same: reproject one "
+      "of them first",
       other.string(), of_other.crs_name, reference.string(), of_reference.crs_name);
 }
 
@@ -153,7 +154,7 @@ bool says_where(const Georeference& georeference) {
   return georeference.origin_w_m != glm::dvec3(0) || !georeference.crs_name.empty();
 }
 
-/// Tells what reading left out or lost.
+/// Reports elements that were dropped or skipped in reading, and the rounding of coordinates.
 void tell_reading(Section& into, const std::string& name, const MeshFile& file) {
   if (file.dropped > 0)
     tell(into, name + ": broken polygons left out", static_cast<double>(file.dropped));
@@ -182,7 +183,7 @@ Section compare_meshes(const std::filesystem::path& reference, const std::filesy
   if (says_where(of_reference.georeference) != says_where(of_other.georeference)) {
     const bool silent_other = says_where(of_reference.georeference);
     section.text +=
-        fmt::format(" The {} does not say where its origin lies: it is taken as in the {}'s frame.",
+        fmt::format(" The {} has no georeference: it is assumed to be in the {}'s frame.",
                     silent_other ? "other" : "reference", silent_other ? "reference" : "other");
   }
   tell_reading(section, "reference", of_reference);
@@ -201,9 +202,9 @@ Section compare_meshes(const TriangleMesh& reference, const TriangleMesh& other,
   Section section;
   section.title = title;
   section.text =
-      "From the other to the reference tells how far it strays, from the reference to the other "
-      "what it lacks. Bounds of largest distances are proved between vertices too, those of means "
-      "follow from a distance changing no more than the place does.";
+      "Distances from the other to the reference measure its errors, those from the reference to "
+      "the other its gaps. Bounds of largest distances hold between vertices too; bounds of means "
+      "follow from the Lipschitz constant 1 of a distance.";
   tell(section, "Hausdorff distance, at least", both.at_least_m, "m");
   tell(section, "Hausdorff distance, at most", both.at_most_m, "m");
   tell_agreement(section, there, back, fineness.within_m);

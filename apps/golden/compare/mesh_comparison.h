@@ -5,29 +5,33 @@
 #include <vector>
 
 #include "apps/golden/report.h"
-#include "core/mesh.h"
+#include "core/geometry/mesh.h"
+#include "core/model/mesh_reader.h"
 
 namespace groundray::golden {
 
-/// How finely two meshes are compared. 0 stands for what suits the reference's size: 1e-6 of the
-/// diagonal of its box, and about a million samples each way.
+/// Resolution of a mesh comparison. 0 selects a value that suits the reference's size: 1e-6 of the
+/// diagonal of its bounding box (at least 8 rounding errors), and about a million samples in each
+/// direction.
 struct MeshFineness {
-  double tolerance_m = 0;        ///< between the bounds of largest distances
-  double step_m = 0;             ///< between samples of mean distances, and of areas
+  double tolerance_m = 0;        ///< permitted gap between the bounds of a largest distance
+  double step_m = 0;             ///< spacing of samples for mean distances and areas
   std::vector<double> within_m;  ///< tolerances for precision and completeness
 };
 
-/// Holds a mesh against a reference, both ways: from the other to the reference tells how far it
-/// strays, from the reference to the other what it lacks. Tells the Hausdorff distance between
-/// bounds that are proved, means with bounds, precision and completeness at tolerances, angles
-/// between normals, areas, how distances are spread, and where they are largest. Nothing is held
-/// against limits. Files may be any that read_mesh reads; where both say where their origin lies,
-/// that is heeded.
-/// @throws Error as read_mesh; if both name a reference system and these differ; as MeshDistance.
+/// Compares a mesh with a reference in both directions: distances from the other to the reference
+/// show where it deviates, distances from the reference to the other what it lacks. Reports the
+/// Hausdorff distance between proven bounds, mean and RMS distances with bounds, precision and
+/// completeness at tolerances, angles between normals, areas, the distribution of distances, and
+/// the positions of the largest ones. Nothing is checked against limits. Accepts any file that
+/// read_mesh reads; if both files state their origins, the other is shifted to the reference's
+/// frame.
+/// @throws Error as read_mesh; if both name a CRS and these differ; as MeshDistance.
 Section compare_meshes(const std::filesystem::path& reference, const std::filesystem::path& other,
                        const MeshFineness& fineness = {});
 
-/// As above, of meshes in memory, in one frame. @param title  of the section.
+/// As above, for meshes in memory, in a common frame.
+/// @param title  title of the section.
 /// @throws Error as MeshDistance.
 Section compare_meshes(const TriangleMesh& reference, const TriangleMesh& other,
                        const std::string& title, const MeshFineness& fineness = {});

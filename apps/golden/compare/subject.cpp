@@ -9,7 +9,7 @@
 #include <string_view>
 
 #include "core/error.h"
-#include "core/file_ending.h"
+#include "core/io/file_ending.h"
 
 namespace groundray::golden {
 namespace {
@@ -24,7 +24,7 @@ bool has_faces(const fs::path& ply) {
   return false;
 }
 
-/// Nothing if the name does not tell.
+/// Returns the kind by the file name, or nothing if the extension is unknown.
 std::optional<Subject> told_subject_of(const fs::path& file) {
   const std::string ending = file_ending(file);
   const auto is_one_of = [&](std::initializer_list<std::string_view> endings) {
@@ -48,7 +48,7 @@ std::string_view name_of(Subject subject) {
 
 Subject subject_of(const fs::path& file) {
   if (const auto told = told_subject_of(file)) return *told;
-  throw Error("{}: the name does not tell what it holds; say so by --as", file.string());
+  throw Error("{}: the name does not show the kind of file; give it with --as", file.string());
 }
 
 Subject subject_of(const fs::path& reference, const fs::path& other) {
@@ -56,7 +56,7 @@ Subject subject_of(const fs::path& reference, const fs::path& other) {
   const Subject of_other = told_subject_of(other).value_or(subject);
   if (of_other == subject) return subject;
   throw Error(
-      "{} seems to be {} and {} {}: they must be of one kind; if both are, say which by --as",
+      "{} seems to be {} and {} {}: both must be of the same kind; if they are, give it with --as",
       reference.string(), name_of(subject), other.string(), name_of(of_other));
 }
 

@@ -4,16 +4,16 @@
 
 namespace groundray::golden {
 
-/// What is compared.
+/// Kind of the compared files.
 enum class Subject { Scan, Image, Dem, Mesh };
 
-/// Returns what a file holds, by the end of its name and, for PLY, whether it has faces.
-/// @throws Error if that does not tell, with the option that does.
+/// Returns the kind of a file by its extension and, for PLY, by whether it has faces.
+/// @throws Error for an unknown extension; the message names the option --as.
 Subject subject_of(const std::filesystem::path& file);
 
-/// Returns what two files hold, each as above; what the other's name does not tell is the
-/// reference's.
-/// @throws Error also if they hold different things.
+/// Returns the common kind of two files; an unknown extension of `other` is taken as the
+/// reference's kind.
+/// @throws Error as above, or if the kinds differ.
 Subject subject_of(const std::filesystem::path& reference, const std::filesystem::path& other);
 
 }  // namespace groundray::golden

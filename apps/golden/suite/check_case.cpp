@@ -20,7 +20,8 @@
 namespace groundray::golden {
 namespace {
 
-// Names each row's place: `row` from 0, and of an image the pixel, `u` to the right and `v` down.
+// Adds the position of each row: `row` from 0 and, for images, the pixel's `u` (to the right) and
+// `v` (down).
 void name_places(Columns& columns) {
   const auto add = [&](const char* name, const auto& place) {
     std::vector<double> values(columns.rows);
@@ -39,7 +40,7 @@ void keep(const std::string& condition, Columns& columns) {
   const std::vector<double> kept = evaluate(condition, columns);
   std::size_t rows = 0;
   for (const double is_kept : kept) {
-    if (std::isnan(is_kept)) throw Error("rows: '{}' is no number in some row", condition);
+    if (std::isnan(is_kept)) throw Error("rows: '{}' is not a number in some row", condition);
     rows += is_kept != 0 ? 1 : 0;
   }
   for (Columns::Column& column : columns.all) {
@@ -49,15 +50,15 @@ void keep(const std::string& condition, Columns& columns) {
     }
     column.values.resize(rows);
   }
-  if (rows < columns.rows) columns.size_px = {0, 0};  // no image any more
+  if (rows < columns.rows) columns.size_px = {0, 0};  // no longer an image
   columns.rows = rows;
 }
 
-// The columns with those that the case names, of the rows that it chooses.
+// Returns the columns, with those that the case defines, of the rows that it selects.
 Columns chosen(const ProductChecks& product, Columns columns) {
   name_places(columns);
   for (const auto& [name, formula] : product.names) {
-    if (columns.find(name) != nullptr) throw Error("let: there is a column '{}' already", name);
+    if (columns.find(name) != nullptr) throw Error("let: column '{}' already exists", name);
     columns.all.push_back({name, evaluate(formula, columns), Stored::Double});
   }
   if (!product.rows.empty()) keep(product.rows, columns);

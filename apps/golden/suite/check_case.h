@@ -7,9 +7,9 @@
 
 namespace groundray::golden {
 
-/// Holds a dataset against what its case expects. A file that is missing or damaged, or a formula
-/// that cannot be worked out, fails the check that needs it.
-/// @param dataset  what `groundray generate` made of the case's scene.
+/// Checks a dataset against the expectations of its case. A missing or damaged file, or a formula
+/// that cannot be evaluated, fails the check that needs it.
+/// @param dataset  folder that `groundray generate` made from the case's scene.
 Section check_case(const GoldenCase& golden, const std::filesystem::path& dataset);
 
 }  // namespace groundray::golden

@@ -9,16 +9,17 @@
 #include <variant>
 
 #include "core/error.h"
-#include "core/exr_reader.h"
-#include "core/image_io.h"
-#include "core/npy_reader.h"
-#include "core/ply_io.h"
-#include "core/product_io.h"
+#include "core/image/exr_reader.h"
+#include "core/image/image_io.h"
+#include "core/io/file_io.h"
+#include "core/io/npy_reader.h"
+#include "core/io/ply_io.h"
+#include "core/io/tum_io.h"
 
 namespace groundray::golden {
 namespace {
 
-// What formulas can name.
+// Returns a name that formulas can use.
 std::string plain(std::string name) {
   std::ranges::replace_if(
       name, [](char c) { return c == '.' || c == '-'; }, '_');
@@ -64,7 +65,7 @@ Columns read_exr_columns(const std::filesystem::path& file) {
   return columns;
 }
 
-// The first byte after the size in a PNG's header.
+// Reads the bit depth: the first byte after the image size in a PNG's header.
 bool has_16_bits(const std::filesystem::path& file) {
   constexpr std::size_t place = 24;
   const std::string bytes = read_text(file);

@@ -9,10 +9,10 @@
 
 namespace groundray::golden {
 
-/// What the numbers of a column were stored as: how near the next one is.
+/// Type in which the values of a column were stored; determines their resolution.
 enum class Stored { Double, Float, Whole };
 
-/// Named columns of one length: the echoes of a scan, or the pixels of an image row by row.
+/// Named columns of equal length: the echoes of a scan, or the pixels of an image row by row.
 struct Columns {
   struct Column {
     std::string name;
@@ -21,16 +21,15 @@ struct Columns {
   };
   std::size_t rows = 0;
   std::vector<Column> all;
-  glm::ivec2 size_px{0};  ///< of an image; else 0
+  glm::ivec2 size_px{0};  ///< size of an image; 0 for other files
 
-  /// Returns a column by its name, or null.
+  /// Returns the column with this name, or null.
   const Column* find(std::string_view name) const;
 };
 
-/// Returns what a file of a dataset holds: the vertices of a PLY file, the channels of an EXR file
-/// or of a PNG (`v0`, `v1`, ..., as stored), the fields of a NumPy array, or the poses of a TUM
-/// file
-/// (`time`, `x` to `z`, `qx` to `qw`). Dots and dashes in names become underscores.
+/// Reads a file of a dataset: the vertices of a PLY file, the channels of an EXR file or of a PNG
+/// (`v0`, `v1`, ..., as stored), the fields of a NumPy array, or the poses of a TUM file (`time`,
+/// `x` to `z`, `qx` to `qw`). Dots and dashes in names become underscores.
 /// @throws Error if the file is missing, damaged, or of another kind.
 Columns read_columns(const std::filesystem::path& file);
 

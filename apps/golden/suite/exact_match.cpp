@@ -11,14 +11,14 @@
 #include <limits>
 #include <vector>
 
-#include "apps/golden/suite/false_colour.h"
+#include "apps/golden/false_colour.h"
 #include "core/error.h"
 
 namespace groundray::golden {
 namespace {
 
-// FNV-1a over what the C library's functions return: it has several of each, for processors with
-// and without fused multiply-add.
+// FNV-1a hash of values that the C library's functions return. The library has several versions of
+// them, for processors with and without fused multiply-add.
 std::uint64_t print_of_functions() {
   std::uint64_t print = 0xcbf29ce484222325;
   const auto add = [&](double value) {

@@ -8,18 +8,18 @@
 
 namespace groundray::golden {
 
-/// The C library, compiler and processor of this program, with a print of what the library's
-/// functions return here: stored files share their last bits.
+/// Returns the C library, compiler and processor of this program, with a hash of values that the
+/// library's functions return here. Files stored with the same text must match bit for bit.
 std::string made_with();
 
-/// Which values count as those that are stored.
+/// Criterion for equality with stored values.
 enum class Equal {
-  Bits,   ///< equal; NaN is NaN
-  Nearly  ///< doubles to 1e-12 relative, floats equal or neighbours: of another C library
+  Bits,   ///< equal values; NaN equals NaN
+  Nearly  ///< for another C library: doubles to 1e-12 relative, floats equal or adjacent
 };
 
-/// Holds a product against a stored one, column by column. @throws Error if they do not have the
-/// same columns and rows.
+/// Compares a product with a stored one, column by column.
+/// @throws Error if the names of their columns or their sizes differ.
 void check_equal(const Columns& columns, const Columns& stored, Equal equal,
                  const std::string& because, Section& into);
 

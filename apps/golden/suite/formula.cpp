@@ -17,12 +17,12 @@ double erf_of(double value) { return std::erf(value); }
 double mod_of(double x, double y) { return x - y * std::floor(x / y); }
 double hypot_of(double x, double y) { return std::hypot(x, y); }
 
-// muParser wants places that it could write to.
+// muParser takes pointers to variables that it could modify.
 void define(mu::Parser& parser, const std::string& name, const std::vector<double>& values) {
   parser.DefineVar(name, const_cast<double*>(values.data()));
 }
 
-// muParser would take `=` for an assignment, and of `a, b` the last value.
+// muParser would read `=` as an assignment, and evaluate `a, b` to the last value.
 void check_spelling(const std::string& formula) {
   int depth = 0;
   for (std::size_t i = 0; i < formula.size(); ++i) {
@@ -33,7 +33,7 @@ void check_spelling(const std::string& formula) {
     if (c != '=') continue;
     const bool ends = i > 0 && std::string_view("=<>!").find(formula[i - 1]) != std::string::npos;
     const bool begins = i + 1 < formula.size() && formula[i + 1] == '=';
-    if (!ends && !begins) throw Error("formula '{}': has '=': equal is '=='", formula);
+    if (!ends && !begins) throw Error("formula '{}': has '=': equality is '=='", formula);
   }
 }
 

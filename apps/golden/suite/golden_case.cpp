@@ -4,8 +4,8 @@
 #include <array>
 #include <optional>
 
+#include "apps/scene/yaml_reader.h"
 #include "core/error.h"
-#include "sensors/yaml_reader.h"
 
 namespace groundray::golden {
 namespace {
@@ -107,8 +107,9 @@ void read_product(const yaml::Node& node, GoldenCase& into, Faults& faults) {
   for (const yaml::Node& item : map.list("checks", Need::Required))
     read_check(item, product, faults);
   if (!sees_all_rows(product)) {
-    faults.add(node, "checks",
-               "must have a count, or exact or statistical: the others pass if rows are missing");
+    faults.add(
+        node, "checks",
+        "must have a count, exact or statistical check: the others pass if rows are missing");
   }
   map.close();
   into.products.push_back(std::move(product));
@@ -134,7 +135,7 @@ GoldenCase read_case(const std::filesystem::path& folder) {
   for (const yaml::Node& item : map.list("products", Need::Required))
     read_product(item, into, faults);
   if (into.products.empty() && faults.count() == 0)
-    faults.add(root, "products", "must have one at least");
+    faults.add(root, "products", "must have at least one");
   map.close();
   faults.throw_if_any();
   return into;
@@ -143,7 +144,7 @@ GoldenCase read_case(const std::filesystem::path& folder) {
 std::vector<GoldenCase> read_cases(const std::filesystem::path& folder,
                                    const std::vector<std::string>& filters) {
   if (!std::filesystem::is_directory(folder)) {
-    throw Error("{}: there is no such folder of cases; name one by --cases", folder.string());
+    throw Error("{}: the folder of cases does not exist; give one with --cases", folder.string());
   }
   std::vector<std::filesystem::path> folders;
   for (const auto& entry : std::filesystem::directory_iterator(folder)) {
@@ -156,9 +157,9 @@ std::vector<GoldenCase> read_cases(const std::filesystem::path& folder,
     if (std::ranges::none_of(folders, [&](const auto& each) {
           return each.filename().string().find(filter) != std::string::npos;
         }))
-      throw Error("{}: holds no case with '{}' in its name", folder.string(), filter);
+      throw Error("{}: contains no case with '{}' in its name", folder.string(), filter);
   }
-  if (folders.empty()) throw Error("{}: holds no case", folder.string());
+  if (folders.empty()) throw Error("{}: contains no case", folder.string());
   std::ranges::sort(folders);
   std::vector<GoldenCase> cases;
   for (const auto& each : folders) cases.push_back(read_case(each));

@@ -8,46 +8,47 @@
 
 namespace groundray::golden {
 
-/// Each row's value is that of another formula, to a tolerance.
+/// Check that each row's value equals that of another formula, within a tolerance.
 struct RowsCheck {
   std::string value, is, within;  ///< formulas
-  double share = 1;               ///< of the rows, at least
+  double share = 1;               ///< fraction of the rows that must pass
 };
 
-/// A figure of all rows is a number, to a tolerance.
+/// Check that a statistic of all rows equals a number, within a tolerance.
 struct FigureCheck {
   enum class Kind { Count, Mean, Deviation, Smallest, Largest };
   Kind kind = Kind::Mean;
-  std::string value, is, within;  ///< formulas; those of `is` and `within` are of `rows` alone
+  std::string value, is, within;  ///< formulas; `is` and `within` may use only `rows`
 };
 
-/// All columns are those of a stored file: bit for bit with the C library that it was made with.
+/// Check that all columns equal those of a stored file: exactly, if that was stored with the same
+/// made_with().
 struct ExactCheck {};
 
-/// Columns are draws of which mean and variance are stored.
+/// Check that columns are samples of distributions with a stored mean and variance.
 struct StatisticalCheck {
   std::vector<std::string> columns;
-  double share = 1;  ///< of the values, at least
+  double share = 1;  ///< fraction of the values that must pass
 };
 
 struct Check {
   std::variant<RowsCheck, FigureCheck, ExactCheck, StatisticalCheck> what;
-  std::string because;  ///< where the tolerance comes from
-  int line = 0;         ///< of the case's file
+  std::string because;  ///< origin of the tolerance
+  int line = 0;         ///< line in the case's file
 };
 
-/// What is expected of one file of a dataset.
+/// Expectations for one file of a dataset.
 struct ProductChecks {
-  std::string product;                                     ///< path in the dataset
-  std::vector<std::pair<std::string, std::string>> names;  ///< formulas, each may use those before
-  std::string rows;                                        ///< a condition; empty for all rows
+  std::string product;                                     ///< path relative to the dataset
+  std::vector<std::pair<std::string, std::string>> names;  ///< formulas; each may use earlier ones
+  std::string rows;                                        ///< condition; empty for all rows
   std::vector<Check> checks;
 };
 
-/// A scene and what is expected of its dataset: a folder with `scene.yaml`, `case.yaml`, and what
-/// is stored in `expected`.
+/// Scene with the expectations for its dataset: a folder with `scene.yaml`, `case.yaml`, and stored
+/// files in `expected`.
 struct GoldenCase {
-  std::string name;  ///< of the folder
+  std::string name;  ///< name of the folder
   std::filesystem::path folder;
   std::string title;
   std::vector<ProductChecks> products;
@@ -56,11 +57,14 @@ struct GoldenCase {
   std::filesystem::path expected() const { return folder / "expected"; }
 };
 
-/// Reads the case in a folder. @throws Error listing all that is wrong, each with file and line.
+/// Reads the case in a folder.
+/// @throws Error that lists all faults, each with file and line.
 GoldenCase read_case(const std::filesystem::path& folder);
 
-/// Reads all cases of a folder whose names contain one of `filters` (all, if there is none), by
-/// name. @throws Error likewise; if there is none, or none for one of the filters.
+/// Reads all cases in a folder whose names contain one of `filters` (all cases if `filters` is
+/// empty), sorted by name.
+/// @throws Error as read_case; if the folder does not exist, or there is no case, or none for one
+///         of the filters.
 std::vector<GoldenCase> read_cases(const std::filesystem::path& folder,
                                    const std::vector<std::string>& filters);
 

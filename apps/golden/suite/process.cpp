@@ -14,7 +14,7 @@
 namespace groundray::golden {
 namespace {
 
-// Sends standard output and standard error to a file.
+// Redirects standard output and standard error to a file.
 class ToFile {
  public:
   explicit ToFile(const std::filesystem::path& log) {
@@ -49,7 +49,7 @@ int run_process(const std::vector<std::string>& command, const std::filesystem::
   }
   int status = 0;
   while (waitpid(child, &status, 0) < 0) {
-    if (errno != EINTR) throw Error("{}: is lost", command[0]);
+    if (errno != EINTR) throw Error("{}: waiting for the process failed", command[0]);
   }
   return WIFEXITED(status) ? WEXITSTATUS(status) : 128 + WTERMSIG(status);
 }

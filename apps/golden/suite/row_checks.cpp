@@ -8,7 +8,7 @@
 #include <numeric>
 #include <vector>
 
-#include "apps/golden/suite/false_colour.h"
+#include "apps/golden/false_colour.h"
 #include "apps/golden/suite/formula.h"
 #include "core/error.h"
 
@@ -17,19 +17,19 @@ namespace {
 
 struct Difference {
   std::vector<double> of_rows;    // value - expected
-  std::vector<double> tolerance;  // of each
-  std::size_t beyond = 0;         // how many exceed it
-  std::size_t worst = 0;          // row of the largest share of its tolerance
+  std::vector<double> tolerance;  // of each row
+  std::size_t beyond = 0;         // number of rows beyond the tolerance
+  std::size_t worst = 0;          // row with the largest fraction of its tolerance
 };
 
-// What is infinite must be equal, and NaN is equal to nothing.
+// Infinite values must be equal, and NaN equals nothing: other differences are infinite.
 double difference(double value, double expected) {
   if (value == expected) return 0;
   const double apart = value - expected;
   return std::isfinite(apart) ? apart : std::numeric_limits<double>::infinity();
 }
 
-// A tolerance that is not finite allows nothing but equality.
+// An infinite tolerance permits only equal values, and NaN permits none.
 bool is_within(double apart, double tolerance) {
   return apart == 0 ? tolerance >= 0 : std::isfinite(tolerance) && std::abs(apart) <= tolerance;
 }
@@ -43,7 +43,7 @@ Difference differences(const std::vector<double>& values, const std::vector<doub
     const double apart = found.of_rows[i] = difference(values[i], expected[i]);
     const bool holds = is_within(apart, found.tolerance[i]);
     if (!holds) ++found.beyond;
-    // A tolerance of 0 that holds is used up to nothing, not to 0 / 0.
+    // Fraction of the tolerance that is used: 0, not 0 / 0, for equal values without tolerance.
     const double used = apart == 0 ? (holds ? 0 : std::numeric_limits<double>::infinity())
                                    : std::abs(apart) / std::max(found.tolerance[i],
                                                                 std::numeric_limits<double>::min());
@@ -76,7 +76,7 @@ void draw_difference(const std::string& what, const std::vector<double>& values,
 void refuse_nan(const std::string& formula, const std::vector<double>& values) {
   const auto bad = std::ranges::find_if(values, [](double value) { return std::isnan(value); });
   if (bad != values.end())
-    throw Error("formula '{}': is no number in row {}", formula, bad - values.begin());
+    throw Error("formula '{}': is not a number in row {}", formula, bad - values.begin());
 }
 
 double sum_of(const std::vector<double>& values) {
@@ -120,7 +120,7 @@ const char* word_of(FigureCheck::Kind kind) {
   return "largest";
 }
 
-// The value of a formula of the number of rows.
+// Evaluates a formula of the number of rows.
 double number_of(const std::string& formula, std::size_t rows) {
   const Columns one{.rows = 1, .all = {{"rows", {static_cast<double>(rows)}, Stored::Whole}}};
   return evaluate(formula, one).front();
@@ -131,12 +131,12 @@ double number_of(const std::string& formula, std::size_t rows) {
 void check_rows(const RowsCheck& check, const std::string& because, const Columns& columns,
                 Section& into) {
   const std::string what = fmt::format("{} = {}", check.value, check.is);
-  if (columns.rows == 0) throw Error("{}: there is no row to hold against it", what);
+  if (columns.rows == 0) throw Error("{}: there is no row to check", what);
   const std::vector<double> values = evaluate(check.value, columns);
   const std::vector<double> expected = evaluate(check.is, columns);
   const Difference found = differences(values, expected, evaluate(check.within, columns));
   const double at_most = std::floor(static_cast<double>(columns.rows) * (1 - check.share) *
-                                    (1 + 1e-12));  // 1 - 0.9 is a little less than a tenth
+                                    (1 + 1e-12));  // because 1 - 0.9 is rounded to less than 0.1
   hold(into, fmt::format("{}, rows beyond {}", what, check.within),
        static_cast<double>(found.beyond), fmt::format("of {}", columns.rows), at_most, because);
   into.measures.push_back(

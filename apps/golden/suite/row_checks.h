@@ -6,14 +6,15 @@
 
 namespace groundray::golden {
 
-/// Holds each row's value against its formula; pictures show them if the rows are pixels. An
-/// infinite value must be equal, and NaN passes nothing. @throws Error as evaluate; if there is no
-/// row.
+/// Checks each row's value against its formula; adds pictures if the rows are pixels. Infinite
+/// values must be equal, and NaN never passes.
+/// @throws Error as evaluate, or if there are no rows.
 void check_rows(const RowsCheck& check, const std::string& because, const Columns& columns,
                 Section& into);
 
-/// Holds a figure of all rows against a number. @throws Error as evaluate; if there is no row, or
-/// one whose value is NaN.
+/// Checks a statistic of all rows against a number.
+/// @throws Error as evaluate; if a value is NaN, the tolerance is not finite, or, except for a
+///         count, there are no rows.
 void check_figure(const FigureCheck& check, const std::string& because, const Columns& columns,
                   Section& into);
 

@@ -5,16 +5,16 @@
 #include <algorithm>
 #include <cmath>
 
-#include "apps/golden/compare/image_similarity.h"
+#include "apps/golden/compare/images/image_similarity.h"
+#include "apps/golden/false_colour.h"
 #include "apps/golden/significance.h"
-#include "apps/golden/suite/false_colour.h"
 #include "core/error.h"
 
 namespace groundray::golden {
 namespace {
 
-constexpr double significance = 0.01;  // of each kind of test, as Mitsuba's tests take it
-// Below it a mean and an image, both stored as floats, do not tell a difference.
+constexpr double significance = 0.01;  // of each kind of test, as in Mitsuba's tests
+// Relative rounding of a mean and an image stored as floats; smaller differences count as none.
 constexpr double float_rounding = 2.4e-7;
 
 const Columns::Column& required_column(const Columns& columns, const std::string& name) {
@@ -23,12 +23,13 @@ const Columns::Column& required_column(const Columns& columns, const std::string
   return *column;
 }
 
-// What a sum of squares or a mean cannot be.
+// Rejects means and variances that are not finite, and negative variances.
 void refuse_unsound(const Columns::Column& column) {
   const bool is_variance = column.name.starts_with("Variance_");
   for (const double value : column.values) {
     if (!std::isfinite(value) || (is_variance && value < 0))
-      throw Error("{} has a value of {}, which tells nothing of an image", column.name, value);
+      throw Error("{} has the value {}: means must be finite, variances finite and not negative",
+                  column.name, value);
   }
 }
 
@@ -41,8 +42,8 @@ struct Channel {
            static_cast<std::size_t>(x);
   }
 
-  // Of the mean of some pixels: how many standard deviations it is off. The stored mean has a
-  // variance too.
+  // Returns the magnitude of the error of the mean over a block of pixels, in standard deviations;
+  // these include the variance of the stored mean.
   double deviations(int x0, int y0, int x1, int y1) const {
     double off = 0, variances = 0, light = 0;
     for (int y = y0; y < y1; ++y) {
@@ -60,7 +61,8 @@ struct Channel {
   }
 };
 
-// How much of a channel's light must be wrong everywhere to be noticed in its mean.
+// Returns the smallest relative error of all of a channel's light that the test of its mean
+// detects.
 double noticeable_share(const Channel& channel, double limit) {
   double light = 0, variances = 0;
   for (std::size_t i = 0; i < channel.mean.size(); ++i) {
@@ -110,7 +112,7 @@ void draw_channel(const std::string& name, const Channel& channel,
 }  // namespace
 
 void Moments::add(const Columns& product) {
-  if (product.size_px.x == 0) throw Error("it is no image");
+  if (product.size_px.x == 0) throw Error("it is not an image");
   if (runs_ == 0) {
     mean_ = {.rows = product.rows, .all = {}, .size_px = product.size_px};
     for (const std::string& name : names_) {

@@ -9,31 +9,35 @@
 
 namespace groundray::golden {
 
-/// How many runs with seeds of their own are behind a stored mean and variance.
+/// Number of runs, with different seeds, behind a stored mean and variance.
 inline constexpr int statistical_runs = 64;
 
-/// Mean and variance of the runs of a product, value by value: columns `Mean_<name>` and
+/// Mean and variance of the values of a product over several runs: columns `Mean_<name>` and
 /// `Variance_<name>`.
 class Moments {
  public:
   explicit Moments(std::vector<std::string> columns) : names_(std::move(columns)) {}
 
-  /// @throws Error if the product lacks a column, is no image, or of another size than those
-  /// before.
+  /// Adds a run.
+  /// @throws Error if the product lacks a column, is not an image, or differs in size from earlier
+  ///         ones.
   void add(const Columns& product);
 
-  /// The variance is that of one run, unbiased. Two runs at least.
+  /// Returns the columns; the variance is the unbiased one of a single run. Requires at least two
+  /// runs.
+  /// @throws Error if a value is not finite.
   Columns columns() const;
 
  private:
   std::vector<std::string> names_;
   int runs_ = 0;
-  Columns mean_;  // and sum of squares about it, by turns
+  Columns mean_;  // means alternate with sums of squared deviations
 };
 
-/// Holds an image against stored moments, by Student's t: each value, each block of 8 x 8 pixels
-/// and each whole channel, at a significance of 1 % for all of a kind (Šidák's correction).
-/// Single values alone are blind for what is everywhere a little wrong.
+/// Tests an image against stored moments: each value by Student's t, and the means of each block of
+/// 8 x 8 pixels and of each whole channel by the normal distribution, at a significance of 1 % for
+/// all tests of a kind (Šidák's correction). Tests of single values are insensitive to a small
+/// error of the whole image.
 /// @throws Error if columns are missing or sizes differ.
 /// @see Šidák, Rectangular confidence regions for the means of multivariate normal distributions
 ///      (1967).

@@ -9,20 +9,21 @@
 #include "apps/golden/suite/exact_match.h"
 #include "apps/golden/suite/statistical_match.h"
 #include "core/error.h"
-#include "core/exr_io.h"
-#include "core/product_io.h"
+#include "core/image/exr_io.h"
+#include "core/io/file_io.h"
 
 namespace groundray::golden {
 namespace {
 
-// Of the runs behind moments: none that a scene would have, or the tested run would be one of them.
+// Base of the seeds of the runs for moments. Scenes do not use these seeds: otherwise the tested
+// run would be one of the stored ones.
 constexpr std::uint64_t first_seed = 0x676f6c64656e0000;
 
 std::filesystem::path note_of(const GoldenCase& golden) {
   return golden.expected() / "made_with.txt";
 }
 
-// Copies whole files: what is there already is kept if that fails.
+// Copies a file atomically: an existing one remains if this fails.
 void copy_whole(const std::filesystem::path& from, const std::filesystem::path& to) {
   std::filesystem::create_directories(to.parent_path());
   write_text(to, read_text(from));
@@ -30,7 +31,7 @@ void copy_whole(const std::filesystem::path& from, const std::filesystem::path& 
 
 void write_columns(const std::filesystem::path& file, const Columns& columns) {
   std::vector<ImageF> images;
-  images.reserve(columns.all.size());  // the layers point at them
+  images.reserve(columns.all.size());  // keeps the layers' pointers valid
   std::vector<ExrLayer> layers;
   for (const Columns::Column& column : columns.all) {
     ImageF& image = images.emplace_back(columns.size_px.x, columns.size_px.y, 1);
@@ -42,7 +43,7 @@ void write_columns(const std::filesystem::path& file, const Columns& columns) {
   write_exr(file, layers);
 }
 
-// The product of each check of a kind.
+// Returns the checks of a kind, each with its product.
 template <typename Kind>
 std::vector<std::pair<std::string, Kind>> checks_of(const GoldenCase& golden) {
   std::vector<std::pair<std::string, Kind>> found;
@@ -76,7 +77,7 @@ void store(const GoldenCase& golden,
   const auto exact = checks_of<ExactCheck>(golden);
   const auto statistical = checks_of<StatisticalCheck>(golden);
   if (exact.empty() && statistical.empty()) {
-    throw Error("{}: expects closed forms alone; there is nothing to store",
+    throw Error("{}: has only closed-form checks; there is nothing to store",
                 (golden.folder / "case.yaml").string());
   }
   if (!exact.empty()) {

@@ -9,19 +9,20 @@
 
 namespace groundray::golden {
 
-/// The file that a product is held against, bit for bit.
+/// Returns the path of the file that a product must equal.
 std::filesystem::path stored_file(const GoldenCase& golden, const std::string& product);
 
-/// The EXR file of mean and variance that a product is held against.
+/// Returns the path of the EXR file with the mean and variance of a product.
 std::filesystem::path stored_moments(const GoldenCase& golden, const std::string& product);
 
-/// What the stored files were made with, as made_with says it. @throws Error if that is missing.
+/// Returns made_with() of the program that stored the files.
+/// @throws Error if it is missing.
 std::string stored_made_with(const GoldenCase& golden);
 
-/// Stores what a case expects from now on: the files of one run, and the moments of
+/// Stores present results as the expected ones of a case: the files of one run, and the moments of
 /// `statistical_runs` runs.
-/// @param run  makes the dataset of a seed of its own, or of the scene's own for 0, and returns its
-///             folder, which may be replaced by the next one.
+/// @param run  makes the dataset with a given seed, or with the scene's own seed for 0, and returns
+///             its folder, which the next call may replace.
 /// @throws Error if there is nothing to store; as read_columns, Moments and write_whole.
 void store(const GoldenCase& golden,
            const std::function<std::filesystem::path(std::uint64_t seed)>& run);

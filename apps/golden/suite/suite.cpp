@@ -19,9 +19,9 @@
 #include "apps/golden/suite/check_case.h"
 #include "apps/golden/suite/process.h"
 #include "apps/golden/suite/stored.h"
-#include "apps/interruption.h"
+#include "apps/scene/interruption.h"
 #include "core/error.h"
-#include "core/product_io.h"
+#include "core/io/file_io.h"
 #include "core/progress.h"
 
 namespace groundray::golden {
@@ -29,7 +29,8 @@ namespace {
 
 using Clock = std::chrono::steady_clock;
 
-// A program that fails may print anything; XML and terminals want no control characters.
+// Replaces all but printable ASCII, newlines and tabs: a failing program may print anything, and
+// XML permits no control characters.
 std::string printable(std::string text) {
   std::ranges::replace_if(
       text,
@@ -47,7 +48,8 @@ std::string tail_of(const std::filesystem::path& log) {
   return text.size() <= most ? text : "..." + text.substr(text.size() - most);
 }
 
-// Makes a case's dataset anew. @return what the program said if it failed.
+// Generates a case's dataset.
+// @return the program's output if it failed.
 std::optional<std::string> make_dataset(const GoldenCase& golden, const SuiteOptions& options,
                                         const std::filesystem::path& dataset,
                                         std::optional<std::uint64_t> seed) {
@@ -63,7 +65,7 @@ std::optional<std::string> make_dataset(const GoldenCase& golden, const SuiteOpt
   return fmt::format("groundray ended with code {}: {}", code, tail_of(log));
 }
 
-// Keeps other runs out of a folder while it lives.
+// Locks a folder against other runs during its lifetime.
 class FolderLock {
  public:
   explicit FolderLock(const std::filesystem::path& folder) {
@@ -71,10 +73,10 @@ class FolderLock {
     const std::filesystem::path file = folder / ".lock";
     descriptor_ = open(file.c_str(), O_RDWR | O_CREAT | O_CLOEXEC, 0644);
     if (descriptor_ < 0)
-      throw Error("{}: cannot be written: choose another folder by -o", file.string());
+      throw Error("{}: cannot be written: choose another folder with -o", file.string());
     if (flock(descriptor_, LOCK_EX | LOCK_NB) == 0) return;
     close(descriptor_);
-    throw Error("{}: another run writes there: wait, or choose another folder by -o",
+    throw Error("{}: another run writes there: wait, or choose another folder with -o",
                 folder.string());
   }
   ~FolderLock() { close(descriptor_); }
@@ -100,8 +102,8 @@ Section run_case(const GoldenCase& golden, const SuiteOptions& options) {
   return section;
 }
 
-// Runs `work(i)` for each index below `count` in some threads. @throws what the first of them
-// threw.
+// Runs `work(i)` for each index below `count` in several threads.
+// @throws the first exception that any of them threw.
 template <typename Work>
 void in_threads(std::size_t count, unsigned threads, const Work& work) {
   std::atomic<std::size_t> next{0};

@@ -24,10 +24,10 @@
 namespace groundray {
 namespace {
 
-// Less is a sag of a thousandth of a millimetre in a metre: no ground has it, and it takes long.
+// Lower limit: a sag of about 0.001 mm over 1 m. No ground is that flat, and smoothing takes long.
 constexpr double least_curvature_per_m = 1e-5, most_curvature_per_m = 1e3;
 
-// What the machine has: who takes more may be ended by the system without a word.
+// Returns the machine's memory: the system may end a process that takes more, without a message.
 std::size_t machine_bytes() {
   const auto pages = sysconf(_SC_PHYS_PAGES), page_bytes = sysconf(_SC_PAGESIZE);
   if (pages <= 0 || page_bytes <= 0) return std::numeric_limits<std::size_t>::max();
@@ -62,14 +62,13 @@ struct DemCommand::Options {
     DemOutput& output = request.output;
     command->add_option("-o,--output", output.dem, "GeoTIFF to write, a band for each layer")
         ->required();
-    command->add_option("--picture", output.picture,
-                        "PNG: what was measured, what was filled, and the error or its sd");
+    command->add_option(
+        "--picture", output.picture,
+        "PNG of measured heights, filled heights, and errors or standard deviations");
     auto* truth = command->add_option("--truth", request.truth, "A DEM to compare with");
     command->add_option("--error-map", output.error_map, "GeoTIFF of the errors")->needs(truth);
-    command->add_option("--report", output.report, "JSON file for all figures");
-    command
-        ->add_option("--memory-mb", memory_mb,
-                     "Begin no work that would take more (what the machine has)")
+    command->add_option("--report", output.report, "JSON file of all results");
+    command->add_option("--memory-mb", memory_mb, "Limit of memory (what the machine has)")
         ->check(positive());
   }
 
@@ -77,60 +76,64 @@ struct DemCommand::Options {
     CLI::App* place = command->add_option_group("Place");
     auto* cell = place->add_option("--cell-m", request.cell_m, "Side of the DEM's cells");
     cell->check(positive());
-    place->add_option("--like", request.like, "Take the samples of this DEM")->excludes(cell);
-    place->add_option("--area", area, "W S E N: in the CRS, metres: no cell beyond")->expected(4);
+    place->add_option("--like", request.like, "Use the samples of this DEM")->excludes(cell);
+    place->add_option("--area", area, "W S E N in the CRS, metres: limits of the DEM")->expected(4);
   }
 
   void add_noise() {
     CLI::App* noise = command->add_option_group("Noise");
     noise
-        ->add_option("--divergence-mrad", divergence_mrad,
-                     "Of beams, full angle between the 1/e^2 points, instead of what a dataset "
-                     "tells")
+        ->add_option(
+            "--divergence-mrad", divergence_mrad,
+            "Beam divergence, full angle between the 1/e^2 points, instead of the dataset's")
         ->check(not_negative());
     noise
         ->add_option("--position-sd-m", request.noise.position_sd_m,
-                     "Of each pose, along each axis")
+                     "Standard deviation of each pose along each axis")
         ->check(not_negative());
-    noise->add_option("--attitude-sd-mrad", attitude_sd_mrad, "Of each pose, about each axis")
+    noise
+        ->add_option("--attitude-sd-mrad", attitude_sd_mrad,
+                     "Standard deviation of each pose about each axis")
         ->check(not_negative());
     noise
         ->add_option("--across-sd-m", request.noise.across_sd_m,
-                     "Of points in plan, each way, besides")
+                     "Additional horizontal standard deviation of points, along each axis")
         ->check(not_negative());
     noise
         ->add_option("--pose-gap-s", request.noise.longest_pose_gap_s,
-                     "Between poses, at most, where a scan was made (1)")
+                     "Longest gap between poses during a scan (1)")
         ->check(positive());
     noise->add_flag("--airborne", is_airborne,
-                    "Points were measured from far above, in the coordinates of a map");
+                    "Points were measured from far above and are in map coordinates");
     noise
         ->add_option("--most-sd-m", request.fusion.most_sd_m,
-                     "Leave samples unmeasured whose height is known worse than this")
+                     "Mark samples of larger standard deviation as unmeasured")
         ->check(positive());
-    noise->add_option("--outlier-share", request.fusion.outlier_share, "Of all points (0.02)")
+    noise
+        ->add_option("--outlier-share", request.fusion.outlier_share,
+                     "Share of outliers among all points (0.02)")
         ->check(CLI::Range(0.0, 0.5));
   }
 
   void add_stereo() {
     CLI::App* stereo = command->add_option_group("Stereo");
     stereo->add_option("--stereo", request.pairs.names,
-                       "Pairs of a dataset by name, or cameras LEFT,RIGHT; all pairs without it");
-    stereo->add_flag("--no-stereo", without_stereo, "Take lidars alone");
-    stereo->add_flag("--no-lidar", without_lidar, "Take a dataset's stereo pairs alone");
-    stereo->add_option("--stereo-frames", stereo_frames, "A:B:STEP, as --frames, of images");
+                       "Pairs of a dataset by name, or cameras LEFT,RIGHT (all pairs)");
+    stereo->add_flag("--no-stereo", without_stereo, "Use only lidars");
+    stereo->add_flag("--no-lidar", without_lidar, "Use only the stereo pairs of a dataset");
+    stereo->add_option("--stereo-frames", stereo_frames, "A:B:STEP of images, as --frames");
     StereoPointOptions& points = request.stereo.points;
-    stereo->add_option("--nearest-m", points.nearest_m, "Depth of matches, at least")
+    stereo->add_option("--nearest-m", points.nearest_m, "Smallest depth of matches")
         ->check(not_negative());
-    stereo->add_option("--farthest-depth-m", points.farthest_m, "Depth of matches, at most")
+    stereo->add_option("--farthest-depth-m", points.farthest_m, "Largest depth of matches")
         ->check(positive());
     stereo
         ->add_option("--match-sd-px", points.noise.match_px,
-                     "Of each disparity, instead of what matching tells")
+                     "Standard deviation of each disparity, instead of the matcher's")
         ->check(positive());
     stereo
         ->add_option("--bias-sd-px", points.noise.bias_px,
-                     "Of what all disparities of a pair have in common (0.1)")
+                     "Standard deviation of the bias that all disparities of a pair share (0.1)")
         ->check(not_negative());
   }
 
@@ -139,20 +142,23 @@ struct DemCommand::Options {
     const Words<FilterPreset> presets{
         {"none", FilterPreset::None}, {"ground", FilterPreset::Ground}, {"air", FilterPreset::Air}};
     add_words(group, "--ground-filter", filter,
-              "Leave out what stands on the ground, as scans from the ground or from the air show "
-              "it; none (default): the lowest surface of each cell is the ground",
+              "Remove objects above the ground, for scans from the ground or from the air; none "
+              "(default): the lowest surface of each cell is the ground",
               presets);
-    group->add_option("--filter-cell-m", filter_cell_m, "Of its raster")->check(positive());
-    group->add_option("--filter-slope", filter_slope, "Steeper is no ground")->check(positive());
-    group->add_option("--filter-radius-m", filter_radius_m, "Half the width of what is no ground")
+    group->add_option("--filter-cell-m", filter_cell_m, "Cell size of the filter's raster")
+        ->check(positive());
+    group->add_option("--filter-slope", filter_slope, "Largest slope of ground")->check(positive());
+    group->add_option("--filter-radius-m", filter_radius_m, "Half the width of the largest object")
         ->check(not_negative());
-    group->add_option("--filter-threshold-m", filter_threshold_m, "How far points may lie off")
+    group
+        ->add_option("--filter-threshold-m", filter_threshold_m,
+                     "Largest distance of points from the ground")
         ->check(positive());
   }
 
   void add_filling() {
     CLI::App* group = command->add_option_group("Blank areas");
-    group->add_flag("--no-fill", without_filling, "Leave them blank");
+    group->add_flag("--no-fill", without_filling, "Do not fill blank areas");
     const Words<FillMethod> methods{{"tension", FillMethod::Tension}, {"cgal", FillMethod::Mesh}};
     add_words(group, "--method", request.fill_method,
               "tension: the smoothest surface (default); cgal: faired meshes", methods);
@@ -163,21 +169,25 @@ struct DemCommand::Options {
     CLI::App* group = command->add_option_group("Sight and smoothness");
     const Words<SightUse> uses{{"none", SightUse::None}, {"beams", SightUse::Beams}};
     add_words(group, "--sight", request.sight,
-              "What bounds the ground from above: beams that passed (default)", uses);
-    group->add_option("--sight-margin-m", request.sight_margin_m, "Added (a quarter of a cell)")
+              "Upper bounds of the ground: beams that passed above it (default)", uses);
+    group
+        ->add_option("--sight-margin-m", request.sight_margin_m,
+                     "Margin added to upper bounds (a quarter of a cell)")
         ->check(not_negative());
     auto* smooth = group->add_flag("--smooth", is_smoothed, "Smooth measured heights first");
-    group->add_option("--curvature-sd-per-m", curvature_sd_per_m, "Of true ground, for --smooth")
+    group
+        ->add_option("--curvature-sd-per-m", curvature_sd_per_m,
+                     "Standard deviation of the true ground's curvature, for --smooth")
         ->check(positive())
         ->check(CLI::Range(least_curvature_per_m, most_curvature_per_m))
         ->needs(smooth);
   }
 
-  // What would be read and then left unused is rather refused.
+  // Rejects options that would have no effect.
   void refuse(std::initializer_list<const char*> options, const char* why) const {
     for (const char* option : options) {
       if (command->get_option(option)->count() > 0)
-        throw Error("{}: {}: leave one of them out", option, why);
+        throw Error("{}: {}: omit one of them", option, why);
     }
   }
 
@@ -185,25 +195,25 @@ struct DemCommand::Options {
     if (without_stereo)
       refuse({"--stereo", "--stereo-frames", "--nearest-m", "--farthest-depth-m", "--match-sd-px",
               "--bias-sd-px"},
-             "--no-stereo leaves pairs out");
+             "--no-stereo excludes stereo pairs");
     if (is_airborne)
       refuse({"--divergence-mrad", "--attitude-sd-mrad", "--sight", "--sight-margin-m"},
-             "with --airborne nothing is known of beams");
+             "with --airborne the beams are unknown");
     if (without_filling)
       refuse({"--method", "--reach", "--farthest-m", "--largest-share", "--most-edges"},
              "--no-fill fills nothing");
     if (request.fill_method == FillMethod::Mesh)
-      refuse({"--sight", "--sight-margin-m"}, "--method cgal takes no bounds");
+      refuse({"--sight", "--sight-margin-m"}, "--method cgal does not support bounds");
     else
-      refuse({"--most-edges"}, "only --method cgal goes by rims");
+      refuse({"--most-edges"}, "only --method cgal limits the edges of boundaries");
     if (without_stereo && without_lidar)
-      throw Error("--no-lidar and --no-stereo leave nothing that measures: leave one out");
+      throw Error("--no-lidar and --no-stereo exclude all measurements: omit one of them");
   }
 
   std::optional<GroundFilterOptions> ground_filter() const {
     if (filter == FilterPreset::None) {
       if (filter_cell_m || filter_slope || filter_radius_m || filter_threshold_m)
-        throw Error("--filter-...: there is no filter to set: say --ground-filter ground or air");
+        throw Error("--filter-...: no filter is selected: add --ground-filter ground or air");
       return std::nullopt;
     }
     GroundFilterOptions options = filter == FilterPreset::Ground
@@ -271,7 +281,7 @@ struct DemCommand::Options {
 
 DemCommand::DemCommand(CLI::App& reconstruct) : options_(std::make_unique<Options>()) {
   options_->command = reconstruct.add_subcommand(
-      "dem", "Fuse scans and stereo pairs to a DEM that tells how far off it may be");
+      "dem", "Fuse scans and stereo pairs into a DEM with standard deviations");
   options_->add_files();
   options_->add_place();
   options_->scans.add(options_->command);

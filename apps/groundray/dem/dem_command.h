@@ -8,18 +8,19 @@ class App;
 
 namespace groundray {
 
-/// The command `groundray reconstruct dem`: its options, and what they do.
+/// Command `groundray reconstruct dem` with its options.
 class DemCommand {
  public:
-  /// Adds itself to `reconstruct`, which must outlive this.
+  /// Adds the command to `reconstruct`, which must outlive this.
   explicit DemCommand(CLI::App& reconstruct);
   ~DemCommand();
   DemCommand(const DemCommand&) = delete;
   DemCommand& operator=(const DemCommand&) = delete;
 
-  /// Whether the command line asks for it.
+  /// Returns true if the command line requests this command.
   bool is_asked_for() const;
 
+  /// Runs the command.
   /// @throws Error as rebuild_dem, or if options contradict each other.
   void run() const;
 

@@ -10,7 +10,7 @@
 #include <span>
 #include <utility>
 
-#include "apps/groundray/stage.h"
+#include "apps/groundray/progress_stage.h"
 #include "core/error.h"
 
 namespace groundray {
@@ -28,18 +28,18 @@ Area around(std::span<const glm::dvec3> points_m, Area area) {
   return area;
 }
 
-// What is wrong with stereo pairs that nobody named need not stop who has lidars.
+// Runs `step`; its error suggests to use lidars alone if scans exist and no pairs were named.
 template <typename Step>
 auto or_lidars_alone(const PairChoice& choice, const ScanFiles& files, const Step& step) {
   try {
     return step();
   } catch (const Error& fault) {
     if (files.scans.empty() || !choice.names.empty()) throw;
-    throw Error("{}; --no-stereo takes lidars alone", fault.what());
+    throw Error("{}; --no-stereo uses only lidars", fault.what());
   }
 }
 
-// What is said of several scans but for their names is said of the first of them.
+// Merges notes that differ only by the scan's name: keeps the first, with the number of others.
 std::vector<std::string> notes_of_scans(const ScanFiles& files,
                                         const std::vector<PointTally>& scans) {
   std::vector<std::string> notes, nameless;
@@ -61,7 +61,7 @@ std::vector<std::string> notes_of_scans(const ScanFiles& files,
     }
   }
   for (std::size_t i = 0; i < notes.size(); ++i)
-    if (more[i] > 0) notes[i] += fmt::format(" (so of {} more scans)", more[i]);
+    if (more[i] > 0) notes[i] += fmt::format(" (also for {} more scans)", more[i]);
   return notes;
 }
 
@@ -69,10 +69,9 @@ std::vector<std::string> notes_of_scans(const ScanFiles& files,
 
 void check_count(std::size_t points) {
   if (points == 0)
-    throw Error(
-        "no scan has a return and no stereo pair a match: there is nothing to make a DEM of");
+    throw Error("no scan has a return and no stereo pair has a match: a DEM cannot be computed");
   if (points < 3)
-    throw Error("there {} only {} point{}: a DEM takes three or more", points == 1 ? "is" : "are",
+    throw Error("there {} only {} point{}: a DEM needs three or more", points == 1 ? "is" : "are",
                 points, points == 1 ? "" : "s");
 }
 
@@ -89,8 +88,8 @@ std::vector<RecordedPair> find_pairs(const DemRequest& request, const ScanFiles&
       or_lidars_alone(choice, files, [&] { return read_stereo_pairs(dataset, choice.names); });
   if (pairs.empty() && files.scans.empty())
     throw Error(
-        "{}: without lidars it takes a stereo pair to measure, but the dataset lists none: "
-        "--stereo LEFT,RIGHT makes one of two cameras",
+        "{}: without lidars a stereo pair is needed, but the dataset lists none: define one from "
+        "two cameras by --stereo LEFT,RIGHT",
         dataset.string());
   return pairs;
 }
@@ -107,18 +106,19 @@ void DemInput::match(const std::vector<RecordedPair>& recorded) {
   if (images.empty()) {
     if (!request_.pairs.names.empty() || files_.scans.empty())
       throw Error(
-          "{}: the stereo pairs have no images of one time among those asked for "
+          "{}: the stereo pairs have no simultaneous images among those requested "
           "(--stereo-frames){}",
           request_.choice.inputs.at(0).string(),
           notes_.empty() ? "" : fmt::format("; {}", fmt::join(notes_, "; ")));
     return;
   }
   if (request_.choice.poses)
-    notes_.emplace_back("--poses are the lidar's: cameras keep those of the dataset");
+    notes_.emplace_back("--poses applies to the lidar: cameras keep the poses of the dataset");
   const bool moves = std::ranges::any_of(
       recorded, [](const RecordedPair& pair) { return pair.cameras[0].row_s > 0; });
   if (moves)
-    notes_.emplace_back("rolling shutters: all rows are taken as seen at the middle's time");
+    notes_.emplace_back(
+        "rolling shutters: all rows are treated as exposed at the time of the middle row");
   Stage stage("matching");
   for (std::size_t i = 0; i < images.size(); ++i) {
     stage.update(static_cast<double>(i) / static_cast<double>(images.size()));
@@ -177,8 +177,8 @@ std::vector<std::string> DemInput::notes() const {
       scans_, [](const PointTally& scan) { return scan.is_noiseless && scan.points > 0; });
   if (noiseless > 0)
     notes.push_back(
-        fmt::format("{} of {} scans tell no standard deviation of their ranges, so those of "
-                    "heights are too small: give it by --range-sd-m",
+        fmt::format("{} of {} scans have no standard deviation of range, so those of heights are "
+                    "too small: give it by --range-sd-m",
                     noiseless, scans_.size()));
   return notes;
 }

@@ -11,41 +11,42 @@
 #include "apps/groundray/dem/dem_points.h"
 #include "apps/groundray/dem/dem_request.h"
 #include "reconstruction/dem/measured_points.h"
-#include "terrain/area.h"
+#include "terrain/dem/area.h"
 
 namespace groundray {
 
-/// Reads what a dataset tells of the stereo pairs that are asked for; none if the input is none.
-/// @throws Error as read_stereo_pairs; or if there is nothing else to measure with, but no pair; or
-///         a pair is asked for by name of what is no dataset.
+/// Reads the requested stereo pairs of a dataset; returns none if the input is not a dataset.
+/// @throws Error as read_stereo_pairs; or if there are neither scans nor pairs; or if pairs are
+///         named, but the input is not a dataset.
 std::vector<RecordedPair> find_pairs(const DemRequest& request, const ScanFiles& files);
 
-/// The points that a DEM is asked to be made of: those of stereo pairs, which are kept, and those
-/// of scans, which are read whenever they are asked for.
+/// Points for a DEM: those of stereo pairs, which are kept in memory, and those of scans, which are
+/// read anew in each pass.
 class DemInput {
  public:
-  /// Matches the images of stereo pairs. All three must outlive this.
-  /// @throws Error if pairs are asked for and have no images, or there is nothing else to measure
-  ///         with; and as add_stereo_points.
+  /// Matches the images of the stereo pairs. All arguments must outlive this.
+  /// @throws Error if there are no images of pairs, but pairs are named or there are no scans; and
+  ///         as add_stereo_points.
   DemInput(const DemRequest& request, const ScanFiles& files,
            const std::vector<RecordedPair>& pairs);
 
-  /// Fills a block with the points of all pairs, then scan by scan, large ones in several blocks;
-  /// false after the last.
+  /// Fills a block: first with the points of all pairs, then scan by scan, with several blocks for
+  /// large scans. Returns false after the last block.
   /// @throws Error as LidarPoints.
   bool next(MeasuredPoints& block);
-  /// Begins anew.
+  /// Restarts at the first block.
   void rewind() noexcept;
 
-  /// Reads all to find where points lie in plan. @throws Error if there are fewer than three.
+  /// Reads all points and returns the rectangle that bounds them in plan.
+  /// @throws Error if there are fewer than three.
   Area extent();
 
-  /// The points of one scan, by its number.
+  /// Returns a reader for the points of the scan with index `scan`.
   LidarPoints points_of(std::size_t scan);
 
   const std::vector<PointTally>& scans() const noexcept { return scans_; }
   const std::vector<PointTally>& pairs() const noexcept { return pairs_; }
-  /// For people, once all is read.
+  /// Notes for the user; complete after all points are read.
   std::vector<std::string> notes() const;
 
  private:
@@ -55,14 +56,15 @@ class DemInput {
   const DemRequest& request_;
   const ScanFiles& files_;
   MeasuredPoints stereo_;
-  std::size_t next_ = 0;  // 0: stereo's; then scans
+  std::size_t next_ = 0;  // 0: stereo; i > 0: scan i - 1
   std::optional<LidarPoints> reading_;
   std::vector<PointTally> scans_, pairs_;
-  std::map<std::string, std::optional<double>> divergences_rad_;  // by sensor
+  std::map<std::string, std::optional<double>> divergences_rad_;  // by the sensor's name
   std::vector<std::string> notes_;
 };
 
-/// @throws Error unless `points` make three or more.
+/// Checks the number of points.
+/// @throws Error unless there are three or more.
 void check_count(std::size_t points);
 
 }  // namespace groundray

@@ -10,8 +10,8 @@
 #include "apps/groundray/dem/dem_picture.h"
 #include "apps/groundray/result_files.h"
 #include "core/error.h"
-#include "core/product_io.h"
-#include "terrain/layers_io.h"
+#include "core/image/png_io.h"
+#include "terrain/dem/layers_io.h"
 
 namespace groundray {
 namespace {
@@ -53,7 +53,7 @@ void write_layers(const fs::path& path, const DemLayers& layers, const Georefere
   write_layers(path, layers.frame, georeference, bands);
 }
 
-// The rise over run along one axis; NaN without a neighbour that has a height.
+// Returns the slope (rise over run) along one axis; NaN if neither neighbour has a height.
 float slope_along(const DemLayers& layers, std::ptrdiff_t i, int place, int count,
                   std::ptrdiff_t stride, double step_m) {
   const auto height_m = [&](std::ptrdiff_t at) {

@@ -10,16 +10,18 @@
 
 namespace groundray {
 
-/// Checks, before work that may take long, that results can be written. @throws Error if not.
+/// Checks, before long computations, that the results can be written.
+/// @throws Error if not.
 void check_output(const DemOutput& output, std::span<const std::filesystem::path> inputs);
 
-/// Sets the slope of each sample that has a height and, along rows and columns, a neighbour.
+/// Sets the slope of each sample that has a height and at least one neighbour both along its row
+/// and along its column.
 void set_slopes(DemLayers& layers);
 
-/// Writes all that is asked for; either all files appear, each whole, or none. Sets the picture's
-/// scale in the report.
-/// @param truth  or null.
-/// @throws Error as the functions for their forms.
+/// Writes all requested results: either all files appear, each complete, or none. Sets the
+/// picture's scale in the report.
+/// @param truth  comparison with the truth, or null.
+/// @throws Error as the writers of the formats.
 void write_output(const DemOutput& output, const DemLayers& layers, const TruthComparison* truth,
                   DemReport& report);
 

@@ -18,7 +18,8 @@ namespace {
 constexpr int panel_width = 600, gap = 8;
 const Colour empty_colour(0.12, 0.14, 0.2), filled_colour(1, 0.6, 0.2);
 
-// Samples as pixels: several pixels for each of a small DEM, every so many samples of a large one.
+// Maps pixels to samples: several pixels per sample for a small DEM, several samples per pixel for
+// a large one.
 class PanelLayout {
  public:
   explicit PanelLayout(const GridFrame& frame) : frame_(frame) {
@@ -32,7 +33,7 @@ class PanelLayout {
 
   glm::ivec2 size() const { return size_; }
 
-  // Returns the sample that a pixel shows, north and west first.
+  // Returns the sample that a pixel shows; the first pixel is in the north-west.
   glm::ivec2 sample(int x, int y) const {
     const glm::dvec2 at((x + 0.5) * per_pixel_, (y + 0.5) * row_per_pixel_);
     const glm::ivec2 last = frame_.samples - 1;
@@ -60,7 +61,7 @@ class Shading {
     return layers_.elevation_m[i];
   }
 
-  // As maps have it, from the north-west; nothing where there is no height.
+  // Returns the hillshade, lit from the north-west as on maps; nothing if the sample has no height.
   std::optional<double> light(glm::ivec2 at) const {
     const float here_m = height_m(at);
     if (std::isnan(here_m)) return std::nullopt;
@@ -76,7 +77,7 @@ class Shading {
   }
 
  private:
-  // Between neighbours, or from one if the other has no height.
+  // Returns the central difference, or a one-sided one if a neighbour has no height.
   double slope(float here_m, glm::ivec2 at, glm::ivec2 by, double step_m) const {
     const float after_m = height_m(at + by), before_m = height_m(at - by);
     if (std::isnan(after_m) && std::isnan(before_m)) return 0;
@@ -89,7 +90,7 @@ class Shading {
   bool with_filled_;
 };
 
-// The size that 95 % do not exceed.
+// Returns the 95 % quantile of the absolute values.
 double usual_size(const std::vector<float>& values) {
   std::vector<double> sizes;
   for (const float value : values)
@@ -98,7 +99,7 @@ double usual_size(const std::vector<float>& values) {
   return size_m > 0 ? size_m : 1;
 }
 
-// White of no error; red of too high, blue of too low.
+// Returns white for no error, red for too high, blue for too low.
 Colour error_colour(double share) {
   const Colour full = share > 0 ? Colour(0.75, 0.1, 0.1) : Colour(0.1, 0.25, 0.75);
   return glm::mix(Colour(0.97), full, std::min(std::abs(share), 1.0));

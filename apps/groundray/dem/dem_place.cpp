@@ -5,12 +5,12 @@
 
 #include "core/error.h"
 #include "reconstruction/dem/dem_frame.h"
-#include "terrain/dem_io.h"
+#include "terrain/dem/dem_io.h"
 
 namespace groundray {
 namespace {
 
-// A frame of one D in that of another.
+// Converts a frame from one D to another.
 GridFrame moved(GridFrame frame, const glm::dvec3& from_w_m, const glm::dvec3& to_w_m) {
   frame.origin_m += glm::dvec2(from_w_m - to_w_m);
   return frame;
@@ -28,12 +28,12 @@ void agree(const NamedDem& other, Georeference& points) {
                                               : is_same_crs(points.crs_wkt, dem.crs_wkt);
   if (is_same) return;
   throw Error(
-      "{}: its CRS is {}, but that of the points is {}: warp it with `gdalwarp -t_srs`, or take "
-      "the DEM that the points were measured over",
+      "{}: its CRS is {}, but that of the points is {}: warp it with `gdalwarp -t_srs`, or use the "
+      "DEM that the points were measured over",
       other.file.string(), dem.crs_name, points.crs_name);
 }
 
-// The rectangle with a little more around, for the last point lies on its border.
+// Enlarges the rectangle slightly, because the outermost points lie on its border.
 Area with_border(const Area& area, double by_m) {
   return {area.low_m - glm::dvec2(by_m), area.high_m + glm::dvec2(by_m)};
 }
@@ -65,7 +65,8 @@ GridFrame choose_frame(const PlaceChoice& choice, const Georeference& georeferen
     return frame_over(choice.area_w ? area : with_border(area, *choice.cell_m * share_of_cell),
                       *choice.cell_m);
   }
-  if (!choice.truth) throw Error("how fine is the DEM to be? Say --cell-m, or --like another DEM");
+  if (!choice.truth)
+    throw Error("the resolution of the DEM is missing: give --cell-m, or --like another DEM");
   const Dem& truth = choice.truth->dem;
   const GridFrame frame = moved(truth.grid.frame(), truth.origin_w_m, origin_w_m);
   const glm::dvec2 a = frame.to_D({0, 0}), b = frame.to_D(frame.samples - 1);
@@ -73,8 +74,9 @@ GridFrame choose_frame(const PlaceChoice& choice, const Georeference& georeferen
       with_border({glm::min(a, b), glm::max(a, b)}, glm::length(frame.step_m) * share_of_cell);
   const Area both = area & known;
   if (both.is_empty()) {
-    throw Error("{}: no point lies over it: is it the DEM that the points were measured over?",
-                choice.truth->file.string());
+    throw Error(
+        "{}: no point is within its extent: is it the DEM that the points were measured over?",
+        choice.truth->file.string());
   }
   return frame_like(frame, both);
 }

@@ -7,16 +7,16 @@
 #include <numbers>
 #include <utility>
 
+#include "apps/scene/readers/spec_io.h"
+#include "apps/scene/yaml_reader.h"
 #include "core/error.h"
-#include "sensors/spec_io.h"
-#include "sensors/yaml_reader.h"
 
 namespace groundray {
 namespace {
 
 double squared(double x) { return x * x; }
 
-// What is known of the errors of one beam's point.
+// Errors of the point of one beam.
 struct BeamErrors {
   PointErrors noise;
   float bias_sd_m = 0;
@@ -56,7 +56,7 @@ void check_gap(const std::string& name, const Trajectory& path, std::chrono::nan
     if (s(to - from) <= longest_s) continue;
     throw Error(
         "{}: the poses have a gap of {:.6g} s there, from {:.9g} to {:.9g} s, more than {:g} s: "
-        "leave it out (--frames, --stereo-frames), or say by --pose-gap-s what gap may be bridged",
+        "exclude it (--frames, --stereo-frames), or permit longer gaps by --pose-gap-s",
         name, s(to - from), s(from), s(to), longest_s);
   }
 }
@@ -80,8 +80,8 @@ void LidarPoints::check(const PointInput& input) const {
     const double range_m = glm::distance(input.points_m[i], input.origins_m[i]);
     if (range_m <= far_m) continue;
     throw Error(
-        "{}: a point lies {:.4g} km from the sensor, which without poses is where points have "
-        "their zero: are these the coordinates of a map? Say --airborne, or give --poses",
+        "{}: a point is {:.4g} km from the sensor, which without poses is at the origin: are these "
+        "map coordinates? Add --airborne or --poses",
         scan_.file.string(), range_m / 1000);
   }
 }

@@ -11,67 +11,67 @@
 
 #include "apps/dataset/scan_files.h"
 #include "apps/dataset/scan_input.h"
-#include "core/trajectory.h"
+#include "core/geometry/trajectory.h"
 #include "reconstruction/dem/measured_points.h"
 
 namespace groundray {
 
-/// From where beams came, if files do not tell: from their sensor's place, or straight from above
-/// and far away, as for points of a survey from the air in the coordinates of a map.
+/// Origin of beams: the position of their sensor, or vertically above and far away, as for airborne
+/// surveys in map coordinates.
 enum class BeamOrigin { Sensor, Above };
 
-/// What is known of the errors of lidar points besides the noise of their ranges.
+/// Errors of lidar points other than the noise of their ranges.
 struct PointNoise {
   BeamOrigin beams = BeamOrigin::Sensor;
-  /// Full angle far from the sensor; none: what a dataset's calibration says of lidars with light.
+  /// Full angle far from the sensor; if empty, calibrated_divergence_rad() of a dataset's lidar.
   std::optional<double> divergence_rad;
-  double position_sd_m = 0;    ///< of a scan's pose, each way
-  double attitude_sd_rad = 0;  ///< of a scan's pose, about each axis
-  double across_sd_m = 0;      ///< of places in plan, besides
+  double position_sd_m = 0;    ///< standard deviation of a scan's pose, along each axis
+  double attitude_sd_rad = 0;  ///< standard deviation of a scan's pose, about each axis
+  double across_sd_m = 0;      ///< additional standard deviation of points in plan, per axis
   double longest_pose_gap_s = 1;
 };
 
-/// What became of a scan or a stereo pair.
+/// Statistics of a scan or a stereo pair.
 struct PointTally {
   std::string name;
-  std::size_t rows = 0;            ///< of the file, or pixels that were matched
-  std::size_t points = 0;          ///< that measured the DEM
-  bool is_noiseless = false;       ///< no standard deviation of ranges is known
-  std::vector<std::string> notes;  ///< for people
+  std::size_t rows = 0;            ///< rows of the file, or matched pixels
+  std::size_t points = 0;          ///< number of points passed on to the DEM
+  bool is_noiseless = false;       ///< true if no standard deviation of ranges is known
+  std::vector<std::string> notes;  ///< messages for the user
 };
 
-/// Between poses that are far apart in time nobody knows where a sensor was.
-/// @param name  of what it measured from `begin` to `end`.
-/// @throws Error if the path has a gap within this time, or about it, that is longer.
+/// Checks that poses have no long gap in time, in which the sensor's position is unknown.
+/// @param name  name of the data measured from `begin` to `end`, for messages.
+/// @throws Error if a gap of the trajectory that overlaps this interval is longer than `longest_s`.
 void check_gap(const std::string& name, const Trajectory& path, std::chrono::nanoseconds begin,
                std::chrono::nanoseconds end, double longest_s);
 
-/// Points with what is known of their errors, and where their beams began.
+/// Points with their errors, and the origins of their beams.
 struct LidarBlock {
   MeasuredPoints points;
   std::vector<glm::dvec3> origins_m;
 };
 
-/// Reads the points of a scan with what is known of their errors, in blocks as PointReader. Of a
-/// point at the slant range r along the unit vector d, with the range's sd s and the divergence a:
-///     C = s^2 d d' + (r a / 4)^2 (1 - d d')                    of the point
-///     sd^2 = C_zz = (s d_z)^2 + (r a / 4)^2 (1 - d_z^2)        of the height
-///     lean = (C_xz, C_yz) / C_zz                               of the place with the height
-///     across^2 = (C_xx + C_yy - lean^2 sd^2) / 2               of the rest of the place, each way
-///     bias^2 = position^2 + (r attitude)^2 (1 - d_z^2)         that all of the scan have in common
+/// Reader for the points of a scan and their errors, in blocks as PointReader. For a point at slant
+/// range r along the unit vector d, with the range's standard deviation s and the divergence a:
+///     C = s^2 d d' + (r a / 4)^2 (1 - d d')               covariance of the point
+///     sd^2 = C_zz = (s d_z)^2 + (r a / 4)^2 (1 - d_z^2)   variance of the height
+///     lean = (C_xz, C_yz) / C_zz                          shift in plan per error of the height
+///     across^2 = (C_xx + C_yy - lean^2 sd^2) / 2          remaining variance in plan, per axis
+///     bias^2 = position^2 + (r attitude)^2 (1 - d_z^2)    variance common to the scan's points
 class LidarPoints {
  public:
   /// @param files, scan  must outlive this.
-  /// @param group        number of the scan among all that measured.
+  /// @param group        number of the scan among all scans and pairs of images.
   LidarPoints(const ScanFiles& files, const ScanFile& scan, ScanTaking taking,
               const PointNoise& noise, std::uint32_t group);
 
-  /// Returns false after the last.
-  /// @throws Error as PointReader; if the path has a gap while the scan was made; or a point is too
-  ///         far from a sensor that has no pose, as one in the coordinates of a map is.
+  /// Reads the next block; returns false after the last.
+  /// @throws Error as PointReader; if the trajectory has a gap during the scan; or if a point is
+  ///         too far from a sensor without a pose, which suggests map coordinates.
   bool next(LidarBlock& block);
 
-  /// What has been read so far.
+  /// Statistics of the points read so far.
   const PointTally& tally() const noexcept { return tally_; }
 
  private:
@@ -86,13 +86,13 @@ class LidarPoints {
   PointTally tally_;
 };
 
-/// Moves D's origin to height 0, so that heights in D are those in W.
+/// Moves D's origin to height 0, so that heights in D equal those in W.
 void level_origin(ScanFiles& files);
 
-/// Returns the divergence that the file of a dataset's lidar tells, rad: full angle between the
-/// 1/e^2 points, both ways' mean, as much wider as the jitter of the beams makes it. Without light
-/// there is only jitter: points lie where the axes of beams meet something. Nothing if `scan` is of
-/// no dataset.
+/// Returns the divergence of a dataset's lidar according to its calibration, rad: full angle
+/// between the 1/e^2 points, as the root mean square of both axes, widened by the jitter of the
+/// beams. Without light, only the jitter counts: points lie where the axes of the beams hit.
+/// Nothing if there is no calibration file, as when `scan` is not of a dataset.
 std::optional<double> calibrated_divergence_rad(const std::filesystem::path& dataset,
                                                 const ScanFile& scan);
 

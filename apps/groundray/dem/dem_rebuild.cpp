@@ -14,35 +14,18 @@
 #include "apps/groundray/dem/dem_place.h"
 #include "apps/groundray/dem/dem_report.h"
 #include "apps/groundray/dem/dem_request.h"
-#include "apps/groundray/stage.h"
+#include "apps/groundray/progress_stage.h"
 #include "core/error.h"
-#include "reconstruction/dem/mesh_fill.h"
-#include "reconstruction/dem/overhangs.h"
-#include "reconstruction/dem/rim_variance.h"
-#include "terrain/dem_io.h"
-#include "terrain/layers_io.h"
+#include "reconstruction/dem/fill/boundary_variance.h"
+#include "reconstruction/dem/fill/mesh_fill.h"
+#include "reconstruction/dem/ground/overhangs.h"
+#include "terrain/dem/dem_io.h"
+#include "terrain/dem/layers_io.h"
 
 namespace groundray {
 namespace {
 
 namespace fs = std::filesystem;
-
-// Notes how long a stage took.
-class Timing {
- public:
-  Timing(DemReport& report, std::string stage) : report_(report), stage_(std::move(stage)) {}
-  ~Timing() {
-    const std::chrono::duration<double> took = std::chrono::steady_clock::now() - begin_;
-    report_.seconds.emplace_back(stage_, took.count());
-  }
-  Timing(const Timing&) = delete;
-  Timing& operator=(const Timing&) = delete;
-
- private:
-  DemReport& report_;
-  std::string stage_;
-  std::chrono::steady_clock::time_point begin_ = std::chrono::steady_clock::now();
-};
 
 // ----- points
 
@@ -59,7 +42,7 @@ void add(MeasuredPoints& all, const MeasuredPoints& more) {
   append(all.origins, more.origins);
 }
 
-// Keeps the points for which `is_kept` is true of their number.
+// Keeps the points whose index satisfies `is_kept`.
 template <typename IsKept>
 void keep(MeasuredPoints& points, const IsKept& is_kept) {
   const auto keep_column = [&](auto& column) {
@@ -81,7 +64,7 @@ void keep(MeasuredPoints& points, const IsKept& is_kept) {
   points.p_m = std::move(kept_m);
 }
 
-// Points that tell of the frame's cells, or of what stands beside them.
+// Keeps the points over the frame's cells and a margin, whose points affect the ground filter.
 void keep_around(const GridFrame& frame, double margin_m, MeasuredPoints& points) {
   const glm::dvec2 a = frame.to_D({0, 0}), b = frame.to_D(frame.samples - 1);
   const glm::dvec2 border = glm::dvec2(margin_m) + glm::abs(frame.step_m);
@@ -92,13 +75,13 @@ void keep_around(const GridFrame& frame, double margin_m, MeasuredPoints& points
   });
 }
 
-// A ground filter looks at all points at once.
+// Limits the number of points, because a ground filter needs all of them at once.
 void check_memory(std::size_t points, std::size_t most_bytes) {
   constexpr std::size_t point_bytes = 100;
   if (points <= most_bytes / point_bytes) return;
   throw Error(
-      "--ground-filter: with {} points and more it takes over {} MB: take fewer (--frames, "
-      "--area), none of it, or give more by --memory-mb",
+      "--ground-filter: {} points or more need over {} MB: use fewer (--frames, --area), omit the "
+      "filter, or raise --memory-mb",
       points, most_bytes / 1'000'000);
 }
 
@@ -114,10 +97,10 @@ Fusion fuse_ground(const DemRequest& request, DemInput& input, const GridFrame& 
   check_count(all.size());
   keep_around(frame, 2 * filter.window_radius_m, all);
   if (all.size() == 0)
-    throw Error("no point lies in the DEM's frame: is it of another place? (--area, --like)");
+    throw Error("no point is within the DEM's extent: is it at another location? (--area, --like)");
   GroundPoints ground;
   {
-    const Timing timing(report, "ground");
+    const StageTimer timer(report.seconds, "ground");
     Stage stage("finding the ground");
     ground = filter_ground(all.p_m, filter, stage.work(request.most_bytes));
     stage.update(1);
@@ -125,7 +108,7 @@ Fusion fuse_ground(const DemRequest& request, DemInput& input, const GridFrame& 
   report.ground = ground.counts;
   Overhangs overhangs = find_overhangs(all.p_m, ground, frame, request.fusion.surface_gap_m);
   keep(all, [&](std::size_t i) { return ground.classes[i] == GroundClass::Ground; });
-  const Timing timing(report, "fuse");
+  const StageTimer timer(report.seconds, "fuse");
   Stage stage("fusing");
   bool is_first = true;
   Fusion fusion = fuse(
@@ -144,7 +127,7 @@ Fusion fuse_ground(const DemRequest& request, DemInput& input, const GridFrame& 
 
 Fusion fuse_all(const DemRequest& request, DemInput& input, const GridFrame& frame,
                 DemReport& report) {
-  const Timing timing(report, "fuse");
+  const StageTimer timer(report.seconds, "fuse");
   Stage stage("fusing");
   Fusion fusion = fuse([&](MeasuredPoints& block) { return input.next(block); }, frame,
                        request.fusion, stage.work(request.most_bytes));
@@ -160,30 +143,30 @@ void check_ground(const Fusion& fusion) {
   const FusionCounts& counts = fusion.counts;
   if (counts.outside == counts.points)
     throw Error(
-        "all {} points lie outside of the DEM's frame: is it of another place? (--area, --like)",
+        "all {} points are outside the DEM's extent: is it at another location? (--area, --like)",
         counts.points);
   if (counts.uncertain > 0) {
-    throw Error("all {} cells with ground are known worse than --most-sd-m: ask for less",
+    throw Error("all {} cells with ground have a standard deviation above --most-sd-m: raise it",
                 counts.uncertain);
   }
   throw Error(
-      "none of the {} points makes ground: {} are outside of the frame, {} unusable, and in {} "
-      "cells they are too few or contradict each other: are the poses right? Larger cells "
-      "(--cell-m) hold more points, --outlier-share says how many are outliers",
+      "none of the {} points is usable as ground: {} are outside the extent, {} invalid, and in {} "
+      "cells they are too few or inconsistent: are the poses right? Larger cells (--cell-m) "
+      "contain more points, --outlier-share sets the share of outliers",
       counts.points, counts.outside, counts.unusable, counts.without_ground);
 }
 
-// Sparse points make ground of few cells, and people wonder why.
+// Adds a note if most cells with points are too sparse to be measured.
 void note_sparse_cells(const Fusion& fusion, DemReport& report) {
   const auto measured = std::ranges::count_if(
       fusion.layers.source, [](HeightSource source) { return source != HeightSource::None; });
   if (fusion.counts.without_ground <= static_cast<std::size_t>(measured)) return;
-  report.notes.push_back(fmt::format(
-      "{} of {} cells with points have too few to tell ground from outliers: larger cells "
-      "(--cell-m) "
-      "hold more, --outlier-share says how many are outliers (0 where a filter left them out)",
-      fusion.counts.without_ground,
-      fusion.counts.without_ground + static_cast<std::size_t>(measured)));
+  report.notes.push_back(
+      fmt::format("{} of {} cells with points have too few to distinguish ground from outliers: "
+                  "larger cells (--cell-m) contain more, --outlier-share sets the share of "
+                  "outliers (0 if a filter removed them)",
+                  fusion.counts.without_ground,
+                  fusion.counts.without_ground + static_cast<std::size_t>(measured)));
 }
 
 // ----- after fusion
@@ -192,9 +175,9 @@ void bound(const DemRequest& request, DemInput& input, DemLayers& layers, DemRep
   if (request.sight == SightUse::None || request.noise.beams == BeamOrigin::Above) return;
   const std::size_t scans = input.scans().size();
   if (scans == 0) return;
-  const Timing timing(report, "sight");
-  Stage stage("looking along beams");
-  constexpr double share_of_cell = 0.25;  // half a cell, rising by one in two
+  const StageTimer timer(report.seconds, "sight");
+  Stage stage("tracing lines of sight");
+  constexpr double share_of_cell = 0.25;  // half a cell on a slope of 1/2
   const glm::dvec2 cell_m = glm::abs(layers.frame.step_m);
   const double margin_m =
       request.sight_margin_m.value_or(share_of_cell * std::max(cell_m.x, cell_m.y));
@@ -217,7 +200,7 @@ void bound(const DemRequest& request, DemInput& input, DemLayers& layers, DemRep
 
 void smooth(const DemRequest& request, DemLayers& layers, DemReport& report) {
   if (!request.smooth) return;
-  const Timing timing(report, "smooth");
+  const StageTimer timer(report.seconds, "smooth");
   Stage stage("smoothing");
   SmoothHeights smoothed = smooth_dem(layers.frame, layers.elevation_m, layers.variance_m2,
                                       *request.smooth, stage.work(request.most_bytes));
@@ -230,7 +213,7 @@ void smooth(const DemRequest& request, DemLayers& layers, DemReport& report) {
 
 void fill(const DemRequest& request, DemLayers& layers, DemReport& report) {
   if (!request.fill) return;
-  const Timing timing(report, "fill");
+  const StageTimer timer(report.seconds, "fill");
   Stage stage("filling");
   FilledHeights filled =
       request.fill_method == FillMethod::Mesh
@@ -246,10 +229,10 @@ void fill(const DemRequest& request, DemLayers& layers, DemReport& report) {
     layers.source[i] = HeightSource::Filled;
     if (!filled.sd_m.empty()) layers.fill_sd_m[i] = filled.sd_m[i];
   }
-  add_rim_variance(layers);
+  add_boundary_variance(layers);
 }
 
-// ----- all of it
+// ----- the whole command
 
 std::optional<NamedDem> load(const std::optional<fs::path>& path) {
   if (!path) return std::nullopt;
@@ -294,7 +277,7 @@ std::vector<std::string> notes_of(const DemRequest& request, const ScanFiles& fi
 
 DemInput read_input(const DemRequest& request, const ScanFiles& files,
                     const std::vector<RecordedPair>& pairs, DemReport& report) {
-  const Timing timing(report, "match");
+  const StageTimer timer(report.seconds, "match");
   return {request, files, pairs};
 }
 

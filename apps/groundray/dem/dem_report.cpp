@@ -6,7 +6,7 @@
 #include <cmath>
 #include <nlohmann/json.hpp>
 
-#include "core/product_io.h"
+#include "core/io/file_io.h"
 
 namespace groundray {
 namespace {
@@ -32,7 +32,7 @@ void print_points(const char* what, const char* rows, const std::vector<PointTal
 
 void print_fill(const FillTally& fill) {
   print_fates(fill);
-  if (fill.at_bound > 0) fmt::print("lines of sight hold {} filled samples down\n", fill.at_bound);
+  if (fill.at_bound > 0) fmt::print("lines of sight limit {} filled samples\n", fill.at_bound);
   print_not_least(fill);
 }
 
@@ -50,7 +50,7 @@ void print_errors(const std::vector<HeightErrors>& errors) {
   }
 }
 
-// JSON has no word for NaN.
+// JSON cannot represent NaN.
 Json number(double value) { return std::isfinite(value) ? Json(value) : Json(nullptr); }
 
 Json json_of(const std::vector<PointTally>& tallies, const char* rows) {
@@ -117,7 +117,7 @@ Json json_of(const GridFrame& frame) {
           {"step_m", {frame.step_m.x, frame.step_m.y}}};
 }
 
-// The parts that were not asked for.
+// Adds the results of the optional steps.
 void add_options(const DemReport& report, Json& json) {
   if (const auto& ground = report.ground)
     json["ground_filter"] = {
@@ -145,10 +145,10 @@ void print(const DemReport& report) {
   fmt::print("fused: {} points, {} outside, {} unusable; {} cells without credible ground\n",
              fusion.points, fusion.outside, fusion.unusable, fusion.without_ground);
   if (fusion.uncertain > 0)
-    fmt::print("{} cells are known worse than asked for, and stay unmeasured\n", fusion.uncertain);
+    fmt::print("{} cells exceed --most-sd-m and stay unmeasured\n", fusion.uncertain);
   if (const auto& bound = report.bound)
-    fmt::print("lines of sight bound {} samples; {} measured ones are above\n", bound->samples,
-               bound->broken);
+    fmt::print("lines of sight bound {} samples; {} measured ones are above their bounds\n",
+               bound->samples, bound->broken);
   if (const auto& smooth = report.smoothed)
     fmt::print("smoothed in {} rounds for curvatures of {:.3g} 1/m\n", smooth->rounds,
                smooth->curvature_sd_per_m);
@@ -159,7 +159,7 @@ void print(const DemReport& report) {
   fmt::print("{} x {} samples: {}\n", report.frame.samples.x, report.frame.samples.y, sources);
   if (!report.errors.empty()) print_errors(report.errors);
   if (report.colour_m > 0)
-    fmt::print("the picture's fullest colour is {:.3g} m\n", report.colour_m);
+    fmt::print("the picture's most saturated colour is {:.3g} m\n", report.colour_m);
   for (const std::string& note : report.notes) fmt::print("note: {}\n", note);
 }
 

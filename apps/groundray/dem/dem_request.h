@@ -13,33 +13,33 @@
 #include "apps/groundray/dem/dem_points.h"
 #include "apps/groundray/dem/dem_sight.h"
 #include "apps/groundray/dem/dem_stereo.h"
-#include "reconstruction/dem/dem_fill.h"
-#include "reconstruction/dem/dem_fusion.h"
-#include "reconstruction/dem/dem_smooth.h"
-#include "reconstruction/dem/ground_filter.h"
-#include "terrain/area.h"
+#include "reconstruction/dem/fill/dem_fill.h"
+#include "reconstruction/dem/fusion/dem_fusion.h"
+#include "reconstruction/dem/ground/ground_filter.h"
+#include "reconstruction/dem/smooth/dem_smooth.h"
+#include "terrain/dem/area.h"
 
 namespace groundray {
 
-/// What fills blank areas: a smoothest surface, or meshes.
+/// Method for filling blank areas: the smoothest surface, or faired meshes.
 enum class FillMethod { Tension, Mesh };
 
-/// Which stereo pairs of a dataset measure.
+/// Selection of a dataset's stereo pairs.
 struct PairChoice {
   bool are_any = true;
-  std::vector<std::string> names;  ///< or LEFT,RIGHT; none for all
+  std::vector<std::string> names;  ///< names of pairs, or LEFT,RIGHT; empty for all
 };
 
-/// Where results go.
+/// Output files.
 struct DemOutput {
   std::filesystem::path dem;
   std::optional<std::filesystem::path> report;             ///< JSON
   std::optional<std::filesystem::path> picture;            ///< PNG
   std::optional<std::filesystem::path> error_map;          ///< GeoTIFF
-  std::vector<std::pair<std::string, std::string>> facts;  ///< for the report
+  std::vector<std::pair<std::string, std::string>> facts;  ///< names and values for the report
 };
 
-/// How scans and stereo pairs become one DEM.
+/// Request for a DEM from scans and stereo pairs.
 struct DemRequest {
   ScanChoice choice;
   ScanTaking taking;
@@ -51,21 +51,21 @@ struct DemRequest {
   std::optional<std::filesystem::path> like, truth;
   std::optional<Area> area_w;
 
-  std::optional<GroundFilterOptions> filter;  ///< of points; none for all points
+  std::optional<GroundFilterOptions> filter;  ///< filter for the points; none to use all points
   FusionOptions fusion;
   std::optional<SmoothOptions> smooth;
   std::optional<FillOptions> fill = FillOptions{};
   FillMethod fill_method = FillMethod::Tension;
-  std::size_t most_rim_edges = 1000;  ///< of holes that meshes fill
+  std::size_t most_rim_edges = 1000;  ///< limit for holes that meshes fill
   SightUse sight = SightUse::Beams;
-  std::optional<double> sight_margin_m;  ///< else a quarter of a cell
+  std::optional<double> sight_margin_m;  ///< default: a quarter of a cell
 
   DemOutput output;
   std::size_t most_bytes = std::numeric_limits<std::size_t>::max();
 };
 
-/// Makes a DEM as asked for, writes it and prints what became of it.
-/// @throws Error naming what is wrong with the request or its files, or that no point makes ground.
+/// Makes the requested DEM, writes it and prints a report.
+/// @throws Error describing a fault of the request or its files, or if no point yields ground.
 void rebuild_dem(const DemRequest& request);
 
 }  // namespace groundray

@@ -5,12 +5,12 @@
 #include <glm/common.hpp>
 #include <vector>
 
-#include "reconstruction/dem/sight_bound.h"
+#include "reconstruction/dem/fill/sight_bound.h"
 
 namespace groundray {
 namespace {
 
-// Whether a point lies on the measured ground or above it: within what the bound will be raised by.
+// Returns true if a point is above measured ground, or below it by at most the bound's rise.
 bool is_sound(const DemLayers& layers, const glm::dvec3& end_m, double margin_m) {
   constexpr double sds = 2;
   const glm::dvec2 at = glm::round(layers.frame.to_grid(glm::dvec2(end_m)));
@@ -22,7 +22,7 @@ bool is_sound(const DemLayers& layers, const glm::dvec3& end_m, double margin_m)
   return below_m <= margin_m + sds * std::sqrt(layers.variance_m2[i]);
 }
 
-// The samples of a frame that lines pass, and where they are in it.
+// Part of a frame that lines of sight cross.
 struct Window {
   glm::ivec2 first{0};
   GridFrame frame;
@@ -37,7 +37,7 @@ Window window_of(const GridFrame& frame, const std::vector<SightLine>& lines) {
       high = glm::max(high, at);
     }
   }
-  const glm::dvec2 most(frame.samples - 1), least_last(1);  // a frame has two rows and columns
+  const glm::dvec2 most(frame.samples - 1), least_last(1);  // a frame has 2 x 2 samples at least
   const glm::ivec2 last(glm::clamp(glm::ceil(high) + 1., least_last, most));
   const glm::ivec2 first(glm::clamp(glm::floor(low) - 1., glm::dvec2(0), glm::dvec2(last - 1)));
   Window window{first, frame};

@@ -5,14 +5,14 @@
 
 namespace groundray {
 
-/// What tells how high the ground can be where nothing measured it: nothing, or beams that passed.
+/// Source of upper bounds for ground that was not measured: none, or passing beams.
 enum class SightUse { None, Beams };
 
-/// Lowers `layers.upper_bound_m` to the heights that beams of a scan pass at, each raised by two
-/// standard deviations of its point's height, those of its pose counted. A beam that ends where
-/// nothing was measured, or below what was, is left out: its point may be an outlier.
-/// @param points    of the scan, from the first on.
-/// @param margin_m  added, see sight_bound.
+/// Lowers `layers.upper_bound_m` to the heights at which beams of a scan pass, each raised by two
+/// standard deviations of its point's height, including those of its pose. Beams that end where
+/// nothing was measured, or below the measured ground, are omitted: their points may be outliers.
+/// @param points    points of the scan, none of which have been read.
+/// @param margin_m  margin added to the bound, see sight_bound.
 /// @throws Error as LidarPoints.
 void bound_by_sight(LidarPoints& points, double margin_m, DemLayers& layers);
 

@@ -10,11 +10,11 @@
 #include <utility>
 
 #include "core/error.h"
-#include "core/exr_reader.h"
-#include "core/image_io.h"
+#include "core/image/exr_reader.h"
+#include "core/image/image_io.h"
 #include "reconstruction/stereo/pinhole_pair.h"
 #include "reconstruction/stereo/rectified_image.h"
-#include "sensors/camera/lens.h"
+#include "sensors/camera/lens/lens.h"
 
 namespace groundray {
 namespace {
@@ -33,7 +33,7 @@ StereoView view_of(const RecordedCamera& camera, const RecordedFrame& frame) {
           }};
 }
 
-// Luminance of linear light.
+// Reads the luminance of a radiance image.
 ImageF light_of(const fs::path& file) {
   const ExrFile exr = read_exr(file);
   std::array<const ImageF*, 3> colours{};
@@ -42,8 +42,8 @@ ImageF light_of(const fs::path& file) {
     if (channel != nullptr) colours[i] = std::get_if<ImageF>(&channel->image);
     if (colours[i] == nullptr)
       throw Error(
-          "{}: it has no picture and no radiance (channels R, G, B): ask for one of these "
-          "products of the camera",
+          "{}: it has no picture and no radiance (channels R, G, B): request one of these products "
+          "for the camera",
           file.string());
   }
   constexpr std::array<float, 3> weights{0.2126f, 0.7152f, 0.0722f};  // ITU-R BT.709
@@ -56,7 +56,7 @@ ImageF light_of(const fs::path& file) {
   return light;
 }
 
-// Encodes light for the eye, so that a share of both images' pixels is within 0 to 1.
+// Scales both images so that 99 % of their pixels are within 0 to 1, and applies a gamma of 2.2.
 void encode(ImageF& left, ImageF& right) {
   constexpr double share = 0.99;
   std::vector<float> all(left.values().begin(), left.values().end());
@@ -86,8 +86,8 @@ std::array<ImageF, 2> read_images(const ImagePair& pair) {
   const auto is_light = [](const fs::path& file) { return file.extension() == ".exr"; };
   if (is_light(left) != is_light(right)) {
     throw Error(
-        "{}: of the pair's images one is light (.exr) and {} a picture (.png): was one removed? "
-        "Ask both cameras for the product picture",
+        "{}: the pair's images differ: this one is radiance (.exr), and {} is a picture (.png): "
+        "was one removed? Request the product picture for both cameras",
         is_light(left) ? left.string() : right.string(),
         is_light(left) ? right.string() : left.string());
   }
@@ -108,13 +108,13 @@ void check_poses(const RecordedCamera& camera, const RecordedFrame& frame, doubl
   if (at < camera.X_DC.begin_time() || at > camera.X_DC.end_time()) {
     throw Error(
         "poses/{}.tum: it covers {:.9g} to {:.9g} s, but the image was exposed at {:.9g} s: was "
-        "the file cut short?",
+        "the file truncated?",
         camera.name, s(camera.X_DC.begin_time()), s(camera.X_DC.end_time()), s(at));
   }
   check_gap(fmt::format("poses/{}.tum", camera.name), camera.X_DC, at, at, longest_gap_s);
 }
 
-// Adds what the cameras' poses are off to the bias of points from `first` on.
+// Adds the errors of the cameras' poses to the bias of the points from `first` on.
 void add_pose_bias(const PointNoise& noise, const glm::dvec3& eye_m, std::size_t first,
                    MeasuredPoints& points) {
   for (std::size_t i = first; i < points.size(); ++i) {
@@ -125,7 +125,7 @@ void add_pose_bias(const PointNoise& noise, const glm::dvec3& eye_m, std::size_t
   }
 }
 
-// Images are of one size and options are sound: what is wrong is the memory that it takes.
+// Matches two images. As their sizes are equal and the options valid, an error is about memory.
 DisparityMap match_within(const RectifiedImage& left, const RectifiedImage& right,
                           const MatchOptions& options) {
   try {
@@ -182,7 +182,7 @@ std::vector<ImagePair> image_pairs(const std::vector<RecordedPair>& pairs, const
                         .right = static_cast<std::size_t>(right - rights.begin())});
     }
     if (alone > 0)
-      notes.push_back(fmt::format("{}: {} image{} no other one at {} time", pair.name, alone,
+      notes.push_back(fmt::format("{}: {} image{} no counterpart at {} time", pair.name, alone,
                                   alone == 1 ? " has" : "s have", alone == 1 ? "its" : "their"));
   }
   return images;

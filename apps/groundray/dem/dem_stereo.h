@@ -13,28 +13,28 @@
 
 namespace groundray {
 
-/// How the pairs of a dataset become points.
+/// Options for measuring points by stereo pairs.
 struct StereoTaking {
   FrameRange frames;
   MatchOptions matching;
   StereoPointOptions points;
 };
 
-/// Two images of a pair, taken at one time.
+/// Two simultaneous images of a stereo pair.
 struct ImagePair {
-  std::string name;  ///< for people
+  std::string name;  ///< name in messages
   const RecordedPair* pair = nullptr;
-  std::size_t left = 0, right = 0;  ///< numbers in the cameras' lists
+  std::size_t left = 0, right = 0;  ///< indices in RecordedCamera::frames
 };
 
-/// Returns the images of pairs that belong together: of one number and within a microsecond.
-/// @param notes  gets a sentence of images that have no partner.
+/// Returns the pairs of images with the same frame number and stamps within a microsecond.
+/// @param notes  receives a note about images without a partner.
 std::vector<ImagePair> image_pairs(const std::vector<RecordedPair>& pairs, const FrameRange& frames,
                                    std::vector<std::string>& notes);
 
-/// Rectifies and matches two images, and adds their points. Poses' standard deviations add to the
-/// bias that the points of a pair have in common.
-/// @throws Error naming the image, as pinhole_pair and match.
+/// Rectifies and matches two images, and adds their points. The standard deviations of the poses
+/// are added to the bias that all points of a pair have in common.
+/// @throws Error naming the images, as pinhole_pair and match.
 PointTally add_stereo_points(const ImagePair& images, const StereoTaking& taking,
                              const PointNoise& noise, std::uint32_t group, MeasuredPoints& to);
 

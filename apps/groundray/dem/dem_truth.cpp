@@ -22,7 +22,7 @@ double share_within(const std::vector<double>& squares, double sds) {
 }
 
 void set_normalised(HeightErrors& errors, const std::vector<double>& squares) {
-  constexpr double median_of_chi2 = 0.454936;  // of one degree of freedom
+  constexpr double median_of_chi2 = 0.454936;  // for one degree of freedom
   double sum = 0;
   for (const double square : squares) sum += square;
   errors.stated = squares.size();
@@ -59,7 +59,7 @@ HeightErrors height_errors(std::string name, const TruthComparison& all,
   return figures;
 }
 
-// The stated standard deviation of a sample's height; 0 where there is none.
+// Returns the stated standard deviation of a sample's height; 0 if there is none.
 double sd_m(const DemLayers& layers, std::size_t i) {
   const float sd_m = layers.source[i] == HeightSource::Filled ? layers.fill_sd_m[i]
                                                               : std::sqrt(layers.variance_m2[i]);

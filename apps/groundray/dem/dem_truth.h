@@ -5,38 +5,39 @@
 #include <utility>
 #include <vector>
 
-#include "core/mesh_io.h"
+#include "core/io/mesh_io.h"
 #include "reconstruction/dem/dem_layers.h"
-#include "terrain/dem.h"
+#include "terrain/dem/dem.h"
 
 namespace groundray {
 
-/// What a DEM's heights are off, over some of its samples. NaN of no sample.
+/// Errors of a DEM's heights over a set of samples; NaN for an empty set.
 struct HeightErrors {
-  std::string of;           ///< which samples: "measured", "filled", ...
-  std::size_t samples = 0;  ///< that the truth has, too
+  std::string of;           ///< name of the set: "measured", "filled", ...
+  std::size_t samples = 0;  ///< number of samples with a height in both
   double bias_m = 0;        ///< mean error
   double rmse_m = 0;
-  double nmad_m = 0;  ///< 1.4826 times the median of distances to the median
-  double p95_m = 0;   ///< 95 % of errors are no larger
+  double nmad_m = 0;  ///< 1.4826 times the median absolute deviation from the median
+  double p95_m = 0;   ///< 95 % quantile of the absolute error
   double largest_m = 0;
-  /// Of errors over their stated standard deviations, where these are above 0:
+  /// Number of samples with a stated standard deviation above 0; the figures below are of their
+  /// errors, divided by it.
   std::size_t stated = 0;
-  double normalised_rms = 0;     ///< 1 if the standard deviations are honest
-  double normalised_robust = 0;  ///< the same by the median of squares
-  double within_1sd = 0;         ///< share; 0.683 of normal errors
-  double within_2sd = 0;         ///< 0.954
+  double normalised_rms = 0;     ///< 1 if the standard deviations are correct
+  double normalised_robust = 0;  ///< the same from the median of squares
+  double within_1sd = 0;         ///< fraction; 0.683 for normal errors
+  double within_2sd = 0;         ///< fraction; 0.954 for normal errors
 };
 
-/// A DEM held against the truth.
+/// Comparison of a DEM with the truth.
 struct TruthComparison {
-  std::vector<HeightErrors> errors;  ///< of measured samples, each source and filled ones
-  std::vector<float> error_m;        ///< of each sample; NaN where either has no height
-  std::vector<float> normalised;     ///< over the stated standard deviation; NaN likewise
+  std::vector<HeightErrors> errors;  ///< errors of measured samples, each source, filled samples
+  std::vector<float> error_m;        ///< error of each sample; NaN where either has no height
+  std::vector<float> normalised;     ///< error over stated standard deviation, or NaN
 };
 
-/// Compares heights with those of the truth's surface at the samples' places.
-/// @param georeference  of the layers' D, whose height is W's.
+/// Compares heights with those of the truth's surface at the samples' positions.
+/// @param georeference  georeference of the layers' D.
 TruthComparison compare_with_truth(const DemLayers& layers, const Georeference& georeference,
                                    const Dem& truth);
 

@@ -15,24 +15,24 @@
 #include "apps/groundray/dem/fill_options.h"
 #include "apps/groundray/dem/fill_report.h"
 #include "apps/groundray/result_files.h"
-#include "apps/interruption.h"
 #include "apps/scan/word_option.h"
+#include "apps/scene/interruption.h"
 #include "core/error.h"
 #include "core/progress.h"
-#include "reconstruction/dem/dem_fill.h"
-#include "reconstruction/dem/inpaint_fill.h"
-#include "reconstruction/dem/mesh_fill.h"
-#include "terrain/dem_io.h"
-#include "terrain/gdal_fill.h"
-#include "terrain/layers_io.h"
+#include "reconstruction/dem/fill/dem_fill.h"
+#include "reconstruction/dem/fill/inpaint_fill.h"
+#include "reconstruction/dem/fill/mesh_fill.h"
+#include "terrain/dem/dem_io.h"
+#include "terrain/dem/gdal_fill.h"
+#include "terrain/dem/layers_io.h"
 
 namespace groundray {
 namespace {
 
 namespace fs = std::filesystem;
 
-// Shows how far filling is, and stops it when asked to.
-Work shown_work(std::optional<Progress>& progress) {
+// Returns work that shows its progress and stops on interruption.
+RunControl shown_work(std::optional<Progress>& progress) {
   return {.progress = [&progress](double share) {
     stop_if_interrupted();
     constexpr std::uint64_t steps = 1000;
@@ -41,28 +41,28 @@ Work shown_work(std::optional<Progress>& progress) {
   }};
 }
 
-// Heights of another raster of the same samples.
+// Loads heights from another raster, which must have the same samples.
 std::vector<float> load_bounds(const fs::path& path, const Dem& dem) {
   const Dem bounds = load_dem(path);
   const GridFrame &a = dem.grid.frame(), &b = bounds.grid.frame();
   const glm::dvec2 apart = (b.to_D({0, 0}) + glm::dvec2(bounds.origin_w_m)) -
                            (a.to_D({0, 0}) + glm::dvec2(dem.origin_w_m));
-  constexpr double tolerance = 1e-6;  // of a cell
+  constexpr double tolerance = 1e-6;  // fraction of a cell
   const auto differs = [&](double by_m, double step_m) {
     return !(std::abs(by_m) <= tolerance * std::abs(step_m));
   };
   if (a.samples != b.samples || differs(apart.x, a.step_m.x) || differs(apart.y, a.step_m.y) ||
       differs(b.step_m.x - a.step_m.x, a.step_m.x) || differs(b.step_m.y - a.step_m.y, a.step_m.y))
     throw Error(
-        "{}: its samples are not those of the DEM: {} x {} instead of {} x {}, or elsewhere; warp "
-        "it with gdalwarp -te ... -ts {} {}",
+        "{}: its samples do not match the DEM's: {} x {} instead of {} x {}, or at other "
+        "positions; warp it with gdalwarp -te ... -ts {} {}",
         path.string(), b.samples.x, b.samples.y, a.samples.x, a.samples.y, a.samples.x,
         a.samples.y);
   const auto heights_m = bounds.grid.heights_m();
   return {heights_m.begin(), heights_m.end()};
 }
 
-// A dash for what nothing tells.
+// Formats a fraction in percent; a dash for NaN.
 std::string percent(double share) {
   return std::isnan(share) ? "-" : fmt::format("{:.1f} %", 100 * share);
 }
@@ -76,7 +76,7 @@ void print_trials(const FilledHeights& filled) {
         fmt::format("{}{}, {:.0f} to {:.0f}", trial.is_shadow ? "shadow, " : "",
                     trial.is_long ? "long" : "compact", trial.from_cells, trial.to_cells);
     if (trial.samples == 0) {
-      fmt::print("{:>28} {:>8g} {:>11g}  no ground to try it on\n", kind, trial.form.tension,
+      fmt::print("{:>28} {:>8g} {:>11g}  no ground for a trial\n", kind, trial.form.tension,
                  trial.form.smoothness);
       continue;
     }
@@ -87,7 +87,7 @@ void print_trials(const FilledHeights& filled) {
 }
 
 void print_bounds(const FillTally& tally) {
-  fmt::print("{} filled samples are held down by a bound\n", tally.at_bound);
+  fmt::print("{} filled samples are limited by a bound\n", tally.at_bound);
   print_not_least(tally);
 }
 
@@ -112,9 +112,9 @@ struct FillCommand::Options {
     command->add_option("--sd-out", sd_out,
                         "GeoTIFF for the standard deviation of filled heights (tension only)");
     command->add_option("--bound", bound,
-                        "Raster of the same samples: heights that filled ones stay below");
+                        "Raster of the same samples: upper bounds of filled heights");
     command->add_option("--nodata", reading.nodata,
-                        "A height that means 'none', besides the one that the file declares");
+                        "Additional nodata value, besides the one that the file declares");
     command->add_option("--reproject-to", reading.reproject_to,
                         "A CRS to warp to, such as EPSG:32631, or utm for the zone that fits");
   }
@@ -125,13 +125,12 @@ struct FillCommand::Options {
                                 {"gdal", Method::Gdal},
                                 {"telea", Method::Telea},
                                 {"ns", Method::NavierStokes}};
-    add_words(
-        command, "--method", method,
-        "tension: smoothest surface (default); cgal: by triangulated, refined and faired "
-        "meshes; to compare with: gdal, as gdal_fillnodata; telea and ns, OpenCV's inpainting",
-        methods);
+    add_words(command, "--method", method,
+              "tension: smoothest surface (default); cgal: triangulated, refined and faired "
+              "meshes; for comparison: gdal, as gdal_fillnodata; telea and ns, OpenCV's inpainting",
+              methods);
     limits.add(command);
-    command->add_option("--tension", tension, "0 to below 1, instead of what trials show is best");
+    command->add_option("--tension", tension, "0 to below 1, instead of the best of trials");
     command->add_option("--smoothness", smoothness, "0 or more, likewise");
   }
 
@@ -140,7 +139,7 @@ struct FillCommand::Options {
     const auto heights_m = read.grid.heights_m();
     FillOptions filling = limits.filling;
     if (tension || smoothness)
-      filling.form = PlateForm{tension.value_or(0), smoothness.value_or(0)};
+      filling.form = ThinPlateEnergy{tension.value_or(0), smoothness.value_or(0)};
     std::optional<Progress> progress;
     if (method == Method::Cgal)
       return fill_dem_by_mesh(frame, heights_m, filling, limits.edges(), shown_work(progress));
@@ -161,12 +160,12 @@ struct FillCommand::Options {
 
   void refuse_mixtures() const {
     if (limits.most_edges && method != Method::Cgal)
-      throw Error("--most-edges goes with --method cgal alone; leave it out, or say so");
+      throw Error("--most-edges applies only to --method cgal; omit it, or select that method");
     if (method == Method::Tension) return;
     if (!sd_out.empty() || !bound.empty() || tension || smoothness)
       throw Error(
-          "--sd-out, --bound, --tension and --smoothness go with --method tension alone; leave "
-          "them out, or the method");
+          "--sd-out, --bound, --tension and --smoothness apply only to --method tension; omit "
+          "them, or the method");
   }
 
   void check_files() const {
@@ -211,7 +210,7 @@ struct FillCommand::Options {
 
 FillCommand::FillCommand(CLI::App& terrain) : options_(std::make_unique<Options>()) {
   options_->command = terrain.add_subcommand(
-      "fill", "Fill blank areas of a DEM, and tell how far off the filled heights may be");
+      "fill", "Fill blank areas of a DEM and estimate the errors of the filled heights");
   options_->add_files();
   options_->add_choices();
 }

@@ -8,7 +8,7 @@ class App;
 
 namespace groundray {
 
-/// The command `terrain fill`: fills the blank areas of a DEM.
+/// Command `groundray terrain fill`: fills the blank areas of a DEM.
 class FillCommand {
  public:
   /// Adds the command to `terrain`.
@@ -19,7 +19,7 @@ class FillCommand {
 
   bool is_asked_for() const;
 
-  /// Fills, writes and prints what was done.
+  /// Fills the DEM, writes the results and prints a report.
   /// @throws Error as load_dem, fill_dem and write_layers.
   void run() const;
 

@@ -17,15 +17,16 @@ void FillLimits::add(CLI::App* command) {
             reaches);
   command
       ->add_option("--farthest-m", filling.farthest_m,
-                   "Leave holes some of which is farther from data (50 cells)")
+                   "Skip holes that reach farther from data (50 cells)")
       ->check(positive());
   command
       ->add_option("--largest-share", filling.largest_share,
-                   "Leave holes that are a larger share of the raster (0.2)")
+                   "Skip holes that cover a larger share of the raster (0.2)")
       ->check(CLI::Range(0.0, 1.0));
   command
-      ->add_option("--most-edges", most_edges,
-                   "Of a rim, for cgal: leave holes with more (1000); times grow with its square")
+      ->add_option(
+          "--most-edges", most_edges,
+          "For cgal: skip holes with more boundary edges (1000); time grows with their square")
       ->check(positive());
 }
 

@@ -3,7 +3,7 @@
 #include <cstddef>
 #include <optional>
 
-#include "reconstruction/dem/dem_fill.h"
+#include "reconstruction/dem/fill/dem_fill.h"
 
 namespace CLI {
 class App;
@@ -11,15 +11,15 @@ class App;
 
 namespace groundray {
 
-/// The options that say which blank areas of a DEM are filled.
+/// Options that select the blank areas of a DEM to be filled.
 struct FillLimits {
   FillOptions filling;
   std::optional<std::size_t> most_edges;
 
-  /// Adds them to a command or a group of one.
+  /// Adds the options to a command or option group.
   void add(CLI::App* command);
 
-  /// Of a rim, for fill_dem_by_mesh.
+  /// Largest number of edges of a hole's boundary, for fill_dem_by_mesh.
   std::size_t edges() const { return most_edges.value_or(1000); }
 };
 

@@ -22,11 +22,11 @@ const char* sentence_of(HoleFate fate) {
     case HoleFate::TooLarge:
       return "left: too large (--largest-share)";
     case HoleFate::NoGround:
-      return "left: nothing measured beside them";
+      return "left: no measured samples beside them";
     case HoleFate::Partly:
       break;
   }
-  return "left, all or in part: the method does not reach them (of cgal: --most-edges)";
+  return "left, completely or in part: the method does not reach them (for cgal: --most-edges)";
 }
 
 }  // namespace
@@ -50,7 +50,7 @@ FillTally tally_of(const FilledHeights& filled) {
 
 void print_fates(const FillTally& tally) {
   if (tally.fates.empty()) return;
-  fmt::print("{:>8} {:>12} {:>12}  what became of blank areas\n", "holes", "samples", "farthest m");
+  fmt::print("{:>8} {:>12} {:>12}  result for blank areas\n", "holes", "samples", "farthest m");
   for (const FateTally& fate : tally.fates) {
     fmt::print("{:>8} {:>12} {:>12.4g}  {}\n", fate.holes, fate.samples, fate.farthest_m,
                sentence_of(fate.fate));
@@ -60,8 +60,8 @@ void print_fates(const FillTally& tally) {
 void print_not_least(const FillTally& tally) {
   if (tally.not_least == 0) return;
   fmt::print(
-      "{} holes are filled below their bounds, but maybe far from the best surface that is: the "
-      "search for it was given up\n",
+      "{} holes are filled below their bounds, but the surface may be far from the optimum: the "
+      "search was stopped early\n",
       tally.not_least);
 }
 

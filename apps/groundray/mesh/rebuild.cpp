@@ -10,10 +10,10 @@
 #include <string_view>
 
 #include "apps/groundray/mesh/rebuild_report.h"
-#include "apps/groundray/stage.h"
+#include "apps/groundray/progress_stage.h"
 #include "core/error.h"
-#include "reconstruction/measured_mesh_io.h"
-#include "reconstruction/scan/advancing_front.h"
+#include "reconstruction/mesh/measured_mesh_io.h"
+#include "reconstruction/mesh/scan/advancing_front.h"
 
 namespace groundray {
 namespace {
@@ -21,28 +21,11 @@ namespace {
 namespace fs = std::filesystem;
 using Clock = std::chrono::steady_clock;
 
-/// A mesh on its way, and what has been done to it.
-struct Making {
+/// Mesh in progress, with the results of the steps so far.
+struct MeshRebuild {
   MeasuredMesh mesh;
   OcclusionFaces occlusion;
   RebuildReport report;
-};
-
-// Times a part of the work for the report.
-class Timing {
- public:
-  Timing(RebuildReport& report, std::string stage) : report_(report), stage_(std::move(stage)) {}
-  ~Timing() {
-    const std::chrono::duration<double> spent = Clock::now() - begin_;
-    report_.seconds.emplace_back(std::move(stage_), spent.count());
-  }
-  Timing(const Timing&) = delete;
-  Timing& operator=(const Timing&) = delete;
-
- private:
-  RebuildReport& report_;
-  std::string stage_;
-  Clock::time_point begin_ = Clock::now();
 };
 
 // ----- scans
@@ -86,16 +69,17 @@ double median_edge_m(std::span<const ScanMesh> scans) {
   return *middle;
 }
 
-// How far apart one surface may be in two scans of which no noise is known: between points either
-// is a guess, and range scans were registered to each other, to no better than their spacing.
+// Sets the distance up to which two scans show one surface if no noise is known. It is a fraction
+// of the spacing, because surfaces between points are estimated; for range grids it is the spacing
+// itself, because they were registered to each other no more accurately.
 MergeLimits limits_without_noise(std::span<const ScanMesh> scans, const ScanFiles& files,
                                  MergeLimits limits, RebuildReport& report) {
   constexpr double share = 0.1;
   const bool are_grids = std::ranges::all_of(files.scans, &ScanFile::is_range_grid);
   limits.apart_m = (are_grids ? 1 : share) * median_edge_m(scans);
   report.notes.push_back(fmt::format(
-      "no noise is known of these scans: surfaces up to {:.3g} m apart, {} the median edge, are "
-      "taken for one; --range-sd-m or --apart-m tell better",
+      "the noise of these scans is unknown: surfaces up to {:.3g} m apart, {} the median edge, are "
+      "treated as one; for better results set --range-sd-m or --apart-m",
       limits.apart_m, are_grids ? "as long as" : "a tenth of"));
   return limits;
 }
@@ -108,59 +92,59 @@ bool knows_noise(std::span<const ScanMesh> scans) {
   return std::ranges::any_of(scans, [](const ScanMesh& scan) { return knows_noise(scan.mesh); });
 }
 
-// Some know theirs: the merge takes the others to be as noisy.
+// Adds a note if noise is known for some scans only: the merge assumes the same for the others.
 void note_unknown_noise(std::span<const ScanMesh> scans, RebuildReport& report) {
   const auto known =
       std::ranges::count_if(scans, [](const ScanMesh& scan) { return knows_noise(scan.mesh); });
   if (known == 0 || known == std::ssize(scans)) return;
-  report.notes.push_back(fmt::format(
-      "no noise is known of {} of the {} scans: they are taken to be as noisy as the others; "
-      "--range-sd-m tells better",
-      std::ssize(scans) - known, scans.size()));
+  report.notes.push_back(
+      fmt::format("the noise of {} of the {} scans is unknown: that of the others is assumed; for "
+                  "better results set --range-sd-m",
+                  std::ssize(scans) - known, scans.size()));
 }
 
 bool is_noise_halt(const Finishing& finishing) {
-  return finishing.halt && std::holds_alternative<NoiseBound>(*finishing.halt);
+  return finishing.stop && std::holds_alternative<NoiseBound>(*finishing.stop);
 }
 
 void check_halt_without_noise(const Finishing& finishing) {
   if (!is_noise_halt(finishing)) return;
   throw Error(
-      "--noise-halt: no noise is known of these scans, neither from a column range_sd nor from the "
-      "sensor's calibration: give the standard deviation of ranges by --range-sd-m");
+      "--noise-halt: the noise of these scans is unknown, neither from a column range_sd nor from "
+      "the sensor's calibration: give the standard deviation of ranges by --range-sd-m");
 }
 
 [[noreturn]] void fail_without_surface(const RebuildReport& report) {
   const bool has_points =
       std::ranges::any_of(report.scans, [](const ScanTally& scan) { return scan.used > 0; });
-  if (!has_points) throw Error("no scan has a return: all rows are missing or no numbers");
+  if (!has_points) throw Error("no scan has a return: all rows are missing or not finite");
   throw Error(
-      "no two returns of any scan were taken for one surface: are the poses and the unit right "
-      "(--unit-m)? `--preset`, `--longest-m` and `--range-sd-m` say what is surface; points that "
-      "are in no order need --unorganised, and maybe --perimeter-m");
+      "no two returns of any scan were linked as surface: are the poses and the unit right "
+      "(--unit-m)? `--preset`, `--longest-m` and `--range-sd-m` define what is surface; unordered "
+      "points need --unorganised, and possibly --perimeter-m");
 }
 
-// Each sentence once, however many scans it is true of.
+// Adds each distinct note once.
 void add_notes(const std::vector<std::string>& notes, RebuildReport& report) {
   for (const std::string& note : notes) {
     if (std::ranges::find(report.notes, note) == report.notes.end()) report.notes.push_back(note);
   }
 }
 
-// Links one scan after another; occlusion faces are kept where they are asked for.
+// Links the scans one by one; keeps occlusion faces only if requested.
 std::vector<ScanMesh> link_scans(const ScanFiles& files, const ScanTaking& taking,
                                  const Meshing& meshing, const Finishing& finishing,
-                                 const RebuildOutput& output, Making& making) {
-  const Timing timing(making.report, "link");
+                                 const RebuildOutput& output, MeshRebuild& rebuild) {
+  const StageTimer timer(rebuild.report.seconds, "link");
   Progress progress(stderr, "scans", files.scans.size());
   std::vector<ScanMesh> meshes;
   std::size_t bytes = 0;
   for (const ScanFile& file : files.scans) {
     stop_if_interrupted();
     const OrganisedInput input = read_organised(files, file, taking);
-    add_notes(input.notes, making.report);
+    add_notes(input.notes, rebuild.report);
     ScanMesh mesh = link(input.cells, limits_for(file, meshing));
-    making.report.scans.push_back(
+    rebuild.report.scans.push_back(
         {.name = file.name,
          .rows = input.rows,
          .no_returns = input.rows - input.returns + input.counts.no_returns,
@@ -170,13 +154,13 @@ std::vector<ScanMesh> link_scans(const ScanFiles& files, const ScanTaking& takin
                  input.counts.crowded,
          .accepted = mesh.mesh.shape.triangles.size(),
          .rejected = mesh.occlusion.shape.triangles.size()});
-    if (output.occlusion) append(making.occlusion, mesh.occlusion);
+    if (output.occlusion) append(rebuild.occlusion, mesh.occlusion);
     mesh.occlusion = {};
     bytes += bytes_of(mesh);
     if (bytes > finishing.most_bytes) {
       throw Error(
-          "{}: with this scan the meshes take {} MB, more than --memory-mb allows; take fewer "
-          "scans (--frames)",
+          "{}: with this scan the meshes need {} MB, more than --memory-mb allows; use fewer scans "
+          "(--frames)",
           file.file.string(), bytes / 1'000'000);
     }
     meshes.push_back(std::move(mesh));
@@ -186,40 +170,40 @@ std::vector<ScanMesh> link_scans(const ScanFiles& files, const ScanTaking& takin
 }
 
 void merge_scans(std::vector<ScanMesh> scans, const ScanFiles& files, const Meshing& meshing,
-                 const Finishing& finishing, Making& making) {
+                 const Finishing& finishing, MeshRebuild& rebuild) {
   std::erase_if(scans, [](const ScanMesh& scan) { return scan.mesh.shape.triangles.empty(); });
-  if (scans.empty()) fail_without_surface(making.report);
+  if (scans.empty()) fail_without_surface(rebuild.report);
   const bool has_noise = knows_noise(scans);
   if (!has_noise) check_halt_without_noise(finishing);
-  note_unknown_noise(scans, making.report);
+  note_unknown_noise(scans, rebuild.report);
   if (scans.size() == 1) {
-    making.mesh = merge(scans, meshing.merging).mesh;
+    rebuild.mesh = merge(scans, meshing.merging).mesh;
     return;
   }
-  const Timing timing(making.report, "merge");
+  const StageTimer timer(rebuild.report.seconds, "merge");
   Stage stage("merging");
   MergeLimits limits = meshing.merging;
   if (meshing.apart_m) {
     limits.apart_m = *meshing.apart_m;
   } else if (!has_noise) {
-    limits = limits_without_noise(scans, files, limits, making.report);
+    limits = limits_without_noise(scans, files, limits, rebuild.report);
   }
   MergedMesh merged = merge(scans, limits, stage.work(finishing.most_bytes));
   stage.update(1);
-  making.mesh = std::move(merged.mesh);
-  making.report.merged = merged.counts;
+  rebuild.mesh = std::move(merged.mesh);
+  rebuild.report.merged = merged.counts;
 }
 
 // ----- points without order
 
 void join_points(const ScanFiles& files, const ScanTaking& taking, const Meshing& meshing,
-                 const Finishing& finishing, Making& making) {
+                 const Finishing& finishing, MeshRebuild& rebuild) {
   PointInput all;
   bool has_labels = true;
   for (const ScanFile& file : files.scans) {
     stop_if_interrupted();
     const PointInput scan = read_points(files, file, taking);
-    add_notes(scan.notes, making.report);
+    add_notes(scan.notes, rebuild.report);
     const auto add = [](auto& to, const auto& from) {
       to.insert(to.end(), from.begin(), from.end());
     };
@@ -228,62 +212,62 @@ void join_points(const ScanFiles& files, const ScanTaking& taking, const Meshing
     add(all.sd_m, scan.sd_m);
     add(all.labels, scan.labels);
     has_labels = has_labels && scan.labels.size() == scan.points_m.size();
-    making.report.scans.push_back({.name = file.name,
-                                   .rows = scan.rows,
-                                   .no_returns = scan.rows - scan.points_m.size(),
-                                   .used = scan.points_m.size()});
+    rebuild.report.scans.push_back({.name = file.name,
+                                    .rows = scan.rows,
+                                    .no_returns = scan.rows - scan.points_m.size(),
+                                    .used = scan.points_m.size()});
   }
   if (!has_labels) all.labels.clear();
   if (std::ranges::none_of(all.sd_m, [](float sd_m) { return sd_m > 0; }))
     check_halt_without_noise(finishing);
-  const Timing timing(making.report, "join");
+  const StageTimer timer(rebuild.report.seconds, "join");
   Stage stage("joining");
   FrontMesh joined = advance_front(all.points_m, *meshing.perimeter_m, all.origins_m,
                                    stage.work(finishing.most_bytes));
   stage.update(1);
   if (joined.mesh.triangles.empty()) {
     throw Error(
-        "no three of the {} points make a triangle whose perimeter is within {} m: are the unit "
+        "no three of the {} points form a triangle whose perimeter is within {} m: are the unit "
         "(--unit-m) and --perimeter-m right?",
         all.points_m.size(), *meshing.perimeter_m);
   }
   for (const std::uint32_t source : joined.sources) {
-    making.mesh.sd_m.push_back(all.sd_m[source]);
-    if (has_labels) making.mesh.labels.push_back(all.labels[source]);
+    rebuild.mesh.sd_m.push_back(all.sd_m[source]);
+    if (has_labels) rebuild.mesh.labels.push_back(all.labels[source]);
   }
-  making.mesh.shape = std::move(joined.mesh);
+  rebuild.mesh.shape = std::move(joined.mesh);
 }
 
 // ----- finishing
 
-void fill(const Finishing& finishing, Making& making) {
+void fill(const Finishing& finishing, MeshRebuild& rebuild) {
   if (!finishing.fill_m) return;
-  const Timing timing(making.report, "fill");
+  const StageTimer timer(rebuild.report.seconds, "fill");
   Stage stage("filling");
-  FilledMesh filled = fill_holes(std::move(making.mesh), {.longest_m = *finishing.fill_m},
+  FilledMesh filled = fill_holes(std::move(rebuild.mesh), {.longest_m = *finishing.fill_m},
                                  stage.work(finishing.most_bytes));
   stage.update(1);
-  making.mesh = std::move(filled.mesh);
+  rebuild.mesh = std::move(filled.mesh);
   HoleTally tally{.filled = filled.filled.size(), .left = std::move(filled.left)};
   for (const FilledHole& hole : filled.filled) tally.triangles += hole.triangles;
-  making.report.holes = std::move(tally);
+  rebuild.report.holes = std::move(tally);
 }
 
-void simplify(const Finishing& finishing, Making& making) {
-  if (!finishing.halt) return;
-  const Timing timing(making.report, "simplify");
+void simplify(const Finishing& finishing, MeshRebuild& rebuild) {
+  if (!finishing.stop) return;
+  const StageTimer timer(rebuild.report.seconds, "simplify");
   Stage stage("simplifying");
-  const std::size_t from = making.mesh.shape.triangles.size();
-  Simplified simplified = groundray::simplify(making.mesh, *finishing.halt, finishing.simplify,
+  const std::size_t from = rebuild.mesh.shape.triangles.size();
+  Simplified simplified = groundray::simplify(rebuild.mesh, *finishing.stop, finishing.simplify,
                                               stage.work(finishing.most_bytes));
   stage.update(1);
-  making.mesh = std::move(simplified.mesh);
-  making.report.simplified = SimplifyTally{.from = from,
-                                           .to = making.mesh.shape.triangles.size(),
-                                           .halted_by = simplified.halted_by,
-                                           .repairs = simplified.repairs,
-                                           .error = simplified.error,
-                                           .vertical = simplified.vertical};
+  rebuild.mesh = std::move(simplified.mesh);
+  rebuild.report.simplified = SimplifyTally{.from = from,
+                                            .to = rebuild.mesh.shape.triangles.size(),
+                                            .halted_by = simplified.halted_by,
+                                            .repairs = simplified.repairs,
+                                            .error = simplified.error,
+                                            .vertical = simplified.vertical};
 }
 
 double area_m2(const TriangleMesh& mesh) {
@@ -304,27 +288,27 @@ void take_noise(const Finishing& finishing, MeasuredMesh& mesh) {
   }
 }
 
-void finish(const Finishing& finishing, const RebuildOutput& output, Making& making) {
-  fill(finishing, making);
-  simplify(finishing, making);
-  RebuildReport& report = making.report;
+void finish(const Finishing& finishing, const RebuildOutput& output, MeshRebuild& rebuild) {
+  fill(finishing, rebuild);
+  simplify(finishing, rebuild);
+  RebuildReport& report = rebuild.report;
   report.facts = output.facts;
-  report.vertices = making.mesh.shape.vertices_m.size();
-  report.triangles = making.mesh.shape.triangles.size();
-  report.area_m2 = area_m2(making.mesh.shape);
+  report.vertices = rebuild.mesh.shape.vertices_m.size();
+  report.triangles = rebuild.mesh.shape.triangles.size();
+  report.area_m2 = area_m2(rebuild.mesh.shape);
   stop_if_interrupted();
-  write_output(output, making.mesh, making.occlusion, report);
+  write_output(output, rebuild.mesh, rebuild.occlusion, report);
   print(report);
   fmt::print("written to {}\n", output.mesh.string());
 }
 
-// What its file holds besides triangles is told.
+// Adds a note about contents of the file that are not valid triangles.
 void note_left_out(const MeasuredMeshFile& file, RebuildReport& report) {
   if (file.dropped + file.skipped == 0) return;
-  report.notes.push_back(fmt::format(
-      "left out of the file: polygons and triangles that are broken or have no area: {}; points, "
-      "lines and curved patches: {}",
-      file.dropped, file.skipped));
+  report.notes.push_back(
+      fmt::format("ignored in the file: polygons and triangles that are invalid or have no area: "
+                  "{}; points, lines and curved patches: {}",
+                  file.dropped, file.skipped));
 }
 
 }  // namespace
@@ -333,27 +317,27 @@ void rebuild_mesh(const ScanChoice& choice, const ScanTaking& taking, const Mesh
                   const Finishing& finishing, const RebuildOutput& output) {
   const ScanFiles files = find_scans(choice);
   check_output(output, files.read);
-  Making making;
-  making.report.georeference = files.georeference;
-  making.report.notes = files.notes;
+  MeshRebuild rebuild;
+  rebuild.report.georeference = files.georeference;
+  rebuild.report.notes = files.notes;
   if (!files.are_posed)
-    making.report.notes.emplace_back("without poses the mesh is in the sensor's frame");
+    rebuild.report.notes.emplace_back("without poses the mesh is in the sensor's frame");
   if (meshing.perimeter_m) {
-    join_points(files, taking, meshing, finishing, making);
+    join_points(files, taking, meshing, finishing, rebuild);
   } else {
-    merge_scans(link_scans(files, taking, meshing, finishing, output, making), files, meshing,
-                finishing, making);
+    merge_scans(link_scans(files, taking, meshing, finishing, output, rebuild), files, meshing,
+                finishing, rebuild);
   }
-  finish(finishing, output, making);
+  finish(finishing, output, rebuild);
 }
 
 void finish_mesh(const fs::path& path, const Finishing& finishing, const RebuildOutput& output) {
   check_output(output, {&path, 1});
   MeasuredMeshFile file = read_measured_mesh(path);
-  Making making{.mesh = std::move(file.mesh), .report = {.georeference = file.georeference}};
-  note_left_out(file, making.report);
-  take_noise(finishing, making.mesh);
-  finish(finishing, output, making);
+  MeshRebuild rebuild{.mesh = std::move(file.mesh), .report = {.georeference = file.georeference}};
+  note_left_out(file, rebuild.report);
+  take_noise(finishing, rebuild.mesh);
+  finish(finishing, output, rebuild);
 }
 
 }  // namespace groundray

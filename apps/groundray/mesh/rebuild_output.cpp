@@ -8,8 +8,8 @@
 
 #include "apps/groundray/result_files.h"
 #include "core/error.h"
-#include "core/file_ending.h"
-#include "reconstruction/measured_mesh_io.h"
+#include "core/io/file_ending.h"
+#include "reconstruction/mesh/measured_mesh_io.h"
 
 namespace groundray {
 namespace {
@@ -22,7 +22,7 @@ void check_mesh_name(const fs::path& path) {
     throw Error("{}: the name of a mesh must end in .ply, .obj, .stl or .glb", path.string());
 }
 
-// In a .ply each vertex tells where its beam began.
+// Writes occlusion faces; a .ply has the origin of the beam at each vertex.
 void write_occlusion(const fs::path& path, const OcclusionFaces& faces,
                      const Georeference& georeference) {
   if (file_ending(path) != ".ply")

@@ -8,26 +8,26 @@
 #include <vector>
 
 #include "apps/groundray/mesh/rebuild_report.h"
-#include "reconstruction/measured_mesh.h"
-#include "reconstruction/scan/scan_mesh.h"
+#include "reconstruction/mesh/measured_mesh.h"
+#include "reconstruction/mesh/scan/scan_mesh.h"
 
 namespace groundray {
 
-/// Where results go.
+/// Output files.
 struct RebuildOutput {
   std::filesystem::path mesh;
-  std::optional<std::filesystem::path> occlusion;          ///< what beams passed by
+  std::optional<std::filesystem::path> occlusion;          ///< mesh of the rejected links
   std::optional<std::filesystem::path> report;             ///< JSON
-  std::vector<std::pair<std::string, std::string>> facts;  ///< for the report
+  std::vector<std::pair<std::string, std::string>> facts;  ///< names and values for the report
 };
 
-/// Checks, before work that may take long, that results can be written, each to a file of its own.
-/// @param inputs  what will be read: none of these may be written over.
+/// Checks, before long computations, that the results can be written, each to its own file.
+/// @param inputs  input files, which must not be overwritten.
 /// @throws Error naming the first fault.
 void check_output(const RebuildOutput& output, std::span<const std::filesystem::path> inputs);
 
-/// Writes all that `output` asks for; no file appears before each is whole.
-/// @throws Error as the functions for their forms.
+/// Writes all requested results; no file appears before all are complete.
+/// @throws Error as the writers of the formats.
 void write_output(const RebuildOutput& output, const MeasuredMesh& mesh,
                   const OcclusionFaces& occlusion, const RebuildReport& report);
 

@@ -6,7 +6,7 @@
 #include <array>
 #include <nlohmann/json.hpp>
 
-#include "core/product_io.h"
+#include "core/io/file_io.h"
 
 namespace groundray {
 namespace {
@@ -60,7 +60,7 @@ ScanTally sum_of(const std::vector<ScanTally>& scans) {
   return sum;
 }
 
-// Scans that were joined, not linked, have no triangles of their own.
+// Scans that were joined instead of linked have no triangles of their own.
 void print_scans(const std::vector<ScanTally>& scans) {
   constexpr std::size_t most = 12;
   const auto print_row = [](const ScanTally& scan) {
@@ -98,7 +98,7 @@ void print_simplified(const SimplifyTally& tally) {
              percent(tally.to, tally.from), sentence_of(tally.halted_by));
   const MeshRepairs& repairs = tally.repairs;
   if (repairs.dropped_triangles + repairs.cut_edges + repairs.parted_vertices > 0) {
-    fmt::print("repaired before: {} triangles dropped, {} edges cut open, {} vertices parted\n",
+    fmt::print("repaired before: {} triangles dropped, {} edges cut open, {} vertices split\n",
                repairs.dropped_triangles, repairs.cut_edges, repairs.parted_vertices);
   }
   fmt::print(
@@ -107,7 +107,8 @@ void print_simplified(const SimplifyTally& tally) {
   if (const auto& heights = tally.vertical) {
     fmt::print("error of heights: largest {:.4g} m, mean {:.4g} m, root mean square {:.4g} m",
                heights->largest_m, heights->mean_m, heights->rms_m);
-    if (heights->aside_m > 0) fmt::print("; the border went up to {:.4g} m in", heights->aside_m);
+    if (heights->aside_m > 0)
+      fmt::print("; the border moved inwards by up to {:.4g} m", heights->aside_m);
     fmt::print("\n");
   }
 }
@@ -143,7 +144,7 @@ Json json_of(const ScanTally& scan) {
 }
 
 Json json_of(const MergeCounts& counts) {
-  return {{"redundant", counts.redundant}, {"seen_through", counts.seen_through},
+  return {{"redundant", counts.redundant}, {"seen_through", counts.visibility_conflicts},
           {"clipped", counts.clipped},     {"filled", counts.filled},
           {"bridged", counts.bridged},     {"moved", counts.moved},
           {"left_out", counts.left_out}};
@@ -187,10 +188,10 @@ void print(const RebuildReport& report) {
   if (!report.scans.empty()) print_scans(report.scans);
   if (const auto& merged = report.merged; merged && report.scans.size() > 1) {
     fmt::print(
-        "merged: {} redundant triangles went and {} that others saw through, {} were clipped, {} "
-        "left out; {} filled slits and {} bridged gaps, {} vertices moved\n",
-        merged->redundant, merged->seen_through, merged->clipped, merged->left_out, merged->filled,
-        merged->bridged, merged->moved);
+        "merged: {} redundant triangles and {} in visibility conflicts removed, {} clipped, {} "
+        "left out; {} slits filled, {} gaps bridged, {} vertices moved\n",
+        merged->redundant, merged->visibility_conflicts, merged->clipped, merged->left_out,
+        merged->filled, merged->bridged, merged->moved);
   }
   if (report.holes) print_holes(*report.holes);
   if (report.simplified) print_simplified(*report.simplified);
@@ -219,7 +220,7 @@ void write_json(const std::filesystem::path& path, const RebuildReport& report) 
                      {"area_m2", report.area_m2}}},
                    {"seconds", std::move(seconds)},
                    {"notes", report.notes}};
-  // Names of files may be no UTF-8.
+  // Names of files may be invalid UTF-8.
   write_text(path, whole.dump(2, ' ', false, Json::error_handler_t::replace) + "\n");
 }
 

@@ -6,10 +6,10 @@
 #include <numbers>
 #include <variant>
 
+#include "apps/scene/calibration/camera_calibration.h"
+#include "apps/scene/readers/spec_io.h"
 #include "core/error.h"
-#include "core/product_io.h"
-#include "sensors/camera/calibration.h"
-#include "sensors/spec_io.h"
+#include "core/io/file_io.h"
 
 namespace groundray {
 namespace {
@@ -45,7 +45,6 @@ std::string spinning_text(const SpinningPattern& pattern) {
 
 }  // namespace
 
-// A double-quoted YAML scalar.
 std::string yaml_text(std::string_view text) {
   std::string out = "\"";
   for (const char c : text) {
@@ -61,7 +60,7 @@ std::string yaml_text(std::string_view text) {
   return out + "\"";
 }
 
-// All else is told by the text of the lidar's own file, and by the scene's.
+// Everything else is in the texts of the lidar's own file and of the scene.
 std::string calibration_text(const PlacedLidar& placed) {
   const LidarSpec& lidar = placed.spec.lidar;
   std::string text = fmt::format(
@@ -77,7 +76,7 @@ std::string calibration_text(const PlacedLidar& placed) {
   return text + fmt::format("lidar_file: {}\n", yaml_text(placed.spec.text));
 }
 
-// Likewise; but what a pair is rectified to is nowhere else.
+// As for lidars; the rectification of a stereo pair is stored nowhere else.
 std::string calibration_text(const PlacedCamera& placed) {
   const CameraSpec& camera = placed.spec.camera;
   std::string text = fmt::format(
@@ -117,13 +116,13 @@ std::vector<std::string> write_exchange_calibrations(const std::filesystem::path
     try {
       text = camera_calibrations_text({&calibration, 1}, format);
     } catch (const Error&) {
-      return;  // it has no words for this lens
+      return;  // the format cannot describe this lens
     }
     write_text(stem.string() + suffix, text);
     written.emplace_back(suffix);
   };
   write(".ros.yaml", CalibrationFormat::RosYaml);
-  calibration.rectification.reset();  // Kalibr's files are of cameras as they are mounted
+  calibration.rectification.reset();  // Kalibr's files describe cameras as mounted
   write(".kalibr.yaml", CalibrationFormat::KalibrYaml);
   return written;
 }

@@ -5,19 +5,20 @@
 #include <string_view>
 #include <vector>
 
-#include "apps/scene/world.h"
+#include "apps/scene/simulation.h"
 
 namespace groundray {
 
 /// Returns a text as a double-quoted YAML scalar.
 std::string yaml_text(std::string_view text);
 
-/// Returns what calibration/<sensor>.yaml says of a sensor (docs/formats.md).
+/// Returns the text of calibration/<sensor>.yaml (docs/reference/formats.md).
 std::string calibration_text(const PlacedLidar& lidar);
 std::string calibration_text(const PlacedCamera& camera);
 
-/// Writes a camera's calibration in the formats of others that can say it, as <stem>.ros.yaml and
-/// <stem>.kalibr.yaml. @return what the names of those that were written end with.
+/// Writes a camera's calibration as <stem>.ros.yaml and <stem>.kalibr.yaml, unless the format
+/// cannot describe its lens.
+/// @return suffixes of the written files.
 /// @throws Error as write_text.
 std::vector<std::string> write_exchange_calibrations(const std::filesystem::path& stem,
                                                      const PlacedCamera& camera);

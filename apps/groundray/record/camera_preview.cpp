@@ -10,18 +10,18 @@
 #include <vector>
 
 #include "apps/colour_map.h"
-#include "core/luminance.h"
-#include "core/srgb.h"
+#include "core/image/luminance.h"
+#include "core/image/srgb.h"
 
 namespace groundray {
 namespace {
 
-constexpr int largest_px = 640;  // of one panel's sides
+constexpr int largest_px = 640;  // longer side of a panel
 constexpr int panel_gap = 8;
 
 using ColourAt = std::function<Colour(int, int)>;
 
-// The value below which a share of an image's finite ones lies.
+// Returns a quantile of an image's finite and positive values; 1 if there are none.
 float quantile(const ImageF& image, double share) {
   std::vector<float> values;
   std::ranges::copy_if(image.values(), std::back_inserter(values),
@@ -33,7 +33,7 @@ float quantile(const ImageF& image, double share) {
   return *at;
 }
 
-// Nearly all of the image is exposed well: 1 % of its values are cut off.
+// Draws the radiance, with 1 % of its values clipped to white.
 ColourAt light_of(const Exposure& light) {
   const float white = quantile(light.radiance, 0.99);
   return [&light, white](int x, int y) {
@@ -45,7 +45,7 @@ ColourAt light_of(const Exposure& light) {
   };
 }
 
-// Near is yellow, far is violet, in equal steps of the logarithm; the sky is black.
+// Draws near as yellow, far as violet, on a logarithmic scale; the sky is black.
 ColourAt depth_of(const ImageTruth& truth) {
   const float near_m = quantile(truth.depth_m, 0.01), far_m = quantile(truth.depth_m, 0.99);
   return [&truth, near_m, far_m](int x, int y) {
@@ -66,7 +66,7 @@ ColourAt normal_of(const ImageTruth& truth) {
 
 ColourAt label_of(const ImageTruth& truth) {
   return [&truth](int x, int y) {
-    // Hues a golden angle apart are told apart, however many there are.
+    // Hues at multiples of the golden angle differ for any number of labels.
     const std::uint32_t label = truth.label.at(x, y)[0];
     if (label == 0) return Colour(0);
     const double hue = label * 0.6180339887498949;

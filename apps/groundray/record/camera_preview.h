@@ -1,14 +1,14 @@
 #pragma once
 
-#include "core/image.h"
+#include "core/image/image.h"
 #include "sensors/camera/camera.h"
 #include "sensors/camera/image_truth.h"
 
 namespace groundray {
 
-/// Draws an image for people: its light, as bright as suits the eye, and of its truth the depth,
-/// the normals and the labels, side by side; what is not there is left out.
-/// @param light, truth  may be null.
+/// Draws a preview of an image, as panels: its radiance, with automatic brightness, and the depth,
+/// normals and labels of its truth. Missing parts are omitted.
+/// @param light, truth  one of them may be null.
 Image8 draw_image_preview(const Exposure* light, const ImageTruth* truth);
 
 }  // namespace groundray

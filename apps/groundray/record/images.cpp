@@ -14,17 +14,12 @@
 #include <variant>
 
 #include "apps/groundray/record/camera_preview.h"
-#include "apps/interruption.h"
-#include "core/exr_io.h"
-#include "core/flow_io.h"
-#include "core/luminance.h"
-#include "core/product_io.h"
+#include "core/image/exr_io.h"
+#include "core/image/flow_io.h"
+#include "core/image/luminance.h"
+#include "core/image/png_io.h"
 #include "sensors/camera/image_truth.h"
-#include "sensors/camera/imager.h"
-#include "sensors/camera/irradiance.h"
 #include "sensors/camera/lidar_image.h"
-#include "sensors/camera/path_tracer.h"
-#include "sensors/camera/picture.h"
 
 namespace groundray {
 namespace {
@@ -32,23 +27,12 @@ namespace {
 using std::chrono::nanoseconds;
 using Product = CameraProduct;
 
-bool needs_truth(const CameraSpec& camera) {
-  return gives(camera, Product::Truth) || gives(camera, Product::Bound) ||
-         gives(camera, Product::Flow) || gives(camera, Product::FlowFlo) ||
-         gives(camera, Product::FlowKitti);
-}
-
-bool needs_imager(const CameraSpec& camera) {
-  return std::ranges::any_of(camera.products,
-                             [](Product product) { return product >= Product::Irradiance; });
-}
-
-// What goes into the image's EXR file.
+// Returns true if the product is stored in the image's EXR file.
 bool is_layer(Product product) { return product <= Product::Flow || product == Product::Coverage; }
 
 std::string echoes_suffix(const std::string& lidar) { return "_" + lidar + ".npy"; }
 
-// What is gathered for one EXR file.
+// Channels collected for one EXR file.
 struct Layers {
   std::vector<ExrLayer> all;
 
@@ -71,7 +55,7 @@ void add_light(const Exposure& light, const CameraSpec& camera,
   layers.add(std::move(names), light.coverage);
 }
 
-// The channels of a truth that are of another type in files.
+// Channels of a truth that are stored with another type.
 struct TruthInFile {
   ImageF p_DQ;
   Image32 is_valid, forward_is_seen, backward_is_seen;
@@ -121,7 +105,8 @@ void add_truth(const ImageTruth& truth, const TruthInFile& in_file, const Camera
   add_flow("FlowBackward", truth.backward, in_file.backward_is_seen, layers);
 }
 
-// Of D, in the middle of the image's time: rows of a rolling shutter have poses of their own.
+// Returns the transform from D to C in the middle of the image's time: with a rolling shutter, each
+// row has its own pose.
 glm::mat4 world_to_camera(const PlacedCamera& placed, nanoseconds begin) {
   const Pose X_CD = inverse(placed.X_DC.pose_at(begin + placed.camera.duration() / 2));
   glm::mat4 matrix(glm::mat3_cast(glm::quat(X_CD.rotation)));
@@ -143,89 +128,64 @@ std::vector<ExrAttribute> attributes_of(const PlacedCamera& placed, nanoseconds 
   return attributes;
 }
 
-// Light on its way to a picture, each stage in a file of its own if it is asked for.
-void write_stages(const PlacedCamera& placed, const ImageF& radiance, const RandomKey& key,
+// Writes each requested stage of the imager to its own file.
+void write_stages(const CameraSpec& camera, const ImagerStages& stages,
                   const std::function<std::filesystem::path(const char*)>& path_of) {
-  const CameraSpec& camera = placed.spec.camera;
-  const Imager imager(*camera.imager, camera.shutter.exposure_s);
-  const ImageF light = irradiance(radiance, placed.pupil_sr);
   if (gives(camera, Product::Irradiance))
-    write_exr(path_of("_irradiance.exr"), {{{"R", "G", "B"}, &light}});
-  const ImageF photons = imager.photons(light);
-  if (gives(camera, Product::Photons)) write_exr(path_of("_photons.exr"), {{{"Y"}, &photons}});
-  const ImageF electrons = imager.electrons(photons, key);
+    write_exr(path_of("_irradiance.exr"), {{{"R", "G", "B"}, &stages.irradiance_w_m2}});
+  if (gives(camera, Product::Photons))
+    write_exr(path_of("_photons.exr"), {{{"Y"}, &stages.photons}});
   if (gives(camera, Product::Electrons))
-    write_exr(path_of("_electrons.exr"), {{{"Y"}, &electrons}});
-  const Image16 raw = imager.digital(electrons, key);
-  if (gives(camera, Product::Raw)) write_png(path_of("_raw.png"), raw);
-  if (!gives(camera, Product::Picture)) return;
-  const Picture picture = RawDeveloper(camera.picture, *camera.imager).develop(raw);
-  std::visit([&](const auto& image) { write_png(path_of(".png"), image); }, picture);
+    write_exr(path_of("_electrons.exr"), {{{"Y"}, &stages.electrons}});
+  if (gives(camera, Product::Raw)) write_png(path_of("_raw.png"), stages.raw_dn);
+  if (stages.picture)
+    std::visit([&](const auto& image) { write_png(path_of(".png"), image); }, *stages.picture);
 }
 
-// The last scan that has begun when the image is half exposed, or the first one.
+// Returns the last scan that has begun by the middle of the image's time, or the first scan.
 std::int64_t scan_at(const PlacedLidar& lidar, nanoseconds time) {
   std::int64_t scan = 0;
   while (scan + 1 < lidar.sweeps && lidar.lidar.pattern().stamp(scan + 1) <= time) ++scan;
   return scan;
 }
 
-// The last image has none after it: all of its flow is unknown.
+// Returns a flow that is unknown everywhere, as for the last image, which has no next one.
 ImageF unknown_flow(glm::ivec2 size_px) {
   ImageF flow_px(size_px.x, size_px.y, 2);
   std::ranges::fill(flow_px.values(), std::numeric_limits<float>::quiet_NaN());
   return flow_px;
 }
 
-// Returns how many flows KITTI's file has no room for.
+// Returns the number of flows that exceed the range of KITTI's format.
 std::size_t write_flows(const CameraSpec& camera, const ImageF& forward_px,
                         const std::function<std::filesystem::path(const char*)>& path_of) {
   if (gives(camera, Product::FlowFlo)) write_flo(path_of(".flo"), forward_px);
   return gives(camera, Product::FlowKitti) ? write_kitti_flow(path_of("_flow.png"), forward_px) : 0;
 }
 
-TruthRequest request_of(const PlacedCamera& placed, std::size_t image) {
-  const CameraSpec& camera = placed.spec.camera;
-  TruthRequest request{.begin = placed.begins[image],
-                       .before = {},
-                       .after = {},
-                       .bounds = gives(camera, Product::Bound)};
-  const bool flows = gives(camera, Product::Flow);
-  const bool to_file = gives(camera, Product::FlowFlo) || gives(camera, Product::FlowKitti);
-  if (flows && image > 0) request.before = placed.begins[image - 1];
-  if ((flows || to_file) && image + 1 < placed.begins.size())
-    request.after = placed.begins[image + 1];
-  return request;
-}
-
-RandomKey key_of(const World& world, std::size_t camera, std::int64_t image) {
-  return {.seed = world.spec.seed,
-          .sensor = static_cast<std::uint32_t>(world.lidars.size() + camera),
-          .frame = static_cast<std::uint32_t>(image)};
-}
-
 }  // namespace
 
-std::vector<ShownScan> shown_scans(const World& world, std::size_t camera, std::int64_t image) {
-  const PlacedCamera& placed = world.cameras[camera];
+std::vector<OverlaidScan> shown_scans(const Simulation& simulation, std::size_t camera,
+                                      std::int64_t image) {
+  const PlacedCamera& placed = simulation.cameras[camera];
   const nanoseconds begin = placed.begins[static_cast<std::size_t>(image)];
-  std::vector<ShownScan> scans;
+  std::vector<OverlaidScan> scans;
   for (const std::string& name : placed.spec.lidars) {
-    const auto lidar = std::ranges::find(world.lidars, name,
+    const auto lidar = std::ranges::find(simulation.lidars, name,
                                          [](const PlacedLidar& each) { return each.spec.name; });
-    scans.push_back({static_cast<std::uint32_t>(lidar - world.lidars.begin()),
+    scans.push_back({static_cast<std::uint32_t>(lidar - simulation.lidars.begin()),
                      scan_at(*lidar, begin + placed.camera.duration() / 2)});
   }
   return scans;
 }
 
-std::vector<ImagedEcho> show_echoes(const World& world, std::size_t camera, std::int64_t image,
-                                    const ShownScan& shown, const PointCloud& echoes,
-                                    const Scene& scene) {
-  const PlacedCamera& placed = world.cameras[camera];
+std::vector<ImagedEcho> show_echoes(const Simulation& simulation, std::size_t camera,
+                                    std::int64_t image, const OverlaidScan& shown,
+                                    const PointCloud& echoes, const Scene& scene) {
+  const PlacedCamera& placed = simulation.cameras[camera];
   return image_echoes(placed.camera, scene, placed.X_DC,
                       placed.begins[static_cast<std::size_t>(image)], echoes,
-                      world.lidars[shown.lidar].lidar.pattern().stamp(shown.scan));
+                      simulation.lidars[shown.lidar].lidar.pattern().stamp(shown.scan));
 }
 
 std::vector<std::string> image_suffixes(const MountedCamera& mounted) {
@@ -246,38 +206,17 @@ std::vector<std::string> image_suffixes(const MountedCamera& mounted) {
   return suffixes;
 }
 
-MadeImage make_image(const World& world, std::size_t which, std::int64_t image,
-                     const Scene& scene) {
-  const PlacedCamera& placed = world.cameras[which];
-  const CameraSpec& camera = placed.spec.camera;
-  const auto number = static_cast<std::size_t>(image);
-  MadeImage made;
-  if (needs_light(camera)) {
-    if (gives(camera, Product::Coverage)) made.labels = labels_of(scene);
-    const PathTracer tracer(scene, *world.sky, camera.sampling.depth, world.air);
-    made.light =
-        placed.camera.expose(tracer, placed.X_DC, placed.begins[number],
-                             key_of(world, which, image), made.labels, stop_if_interrupted);
-    for (const float samples : made.light->samples.values())
-      made.paths += static_cast<std::uint64_t>(samples);
-  }
-  if (needs_truth(camera)) {
-    made.truth = image_truth(placed.camera, scene, world.content.materials.in_colour(), placed.X_DC,
-                             request_of(placed, number));
-  }
-  return made;
-}
-
-std::uint64_t write_image(const World& world, const Dataset& dataset, std::size_t which,
-                          std::int64_t image, const MadeImage& made) {
-  const PlacedCamera& placed = world.cameras[which];
+std::uint64_t write_image(const Simulation& simulation, const DatasetWriter& dataset,
+                          std::size_t which, std::int64_t image, const MadeImage& made,
+                          std::span<const std::vector<ImagedEcho>> echoes) {
+  const PlacedCamera& placed = simulation.cameras[which];
   const CameraSpec& camera = placed.spec.camera;
   const auto path_of = [&](std::string_view suffix) {
-    return dataset.product_path(static_cast<std::uint32_t>(world.lidars.size() + which), image,
+    return dataset.product_path(static_cast<std::uint32_t>(simulation.lidars.size() + which), image,
                                 suffix);
   };
-  for (std::size_t i = 0; i < made.echoes.size(); ++i)
-    write_imaged_echoes(path_of(echoes_suffix(placed.spec.lidars[i])), made.echoes[i]);
+  for (std::size_t i = 0; i < echoes.size(); ++i)
+    write_imaged_echoes(path_of(echoes_suffix(placed.spec.lidars[i])), echoes[i]);
   std::uint64_t flows_left_out = 0;
   Layers layers;
   if (made.light) add_light(*made.light, camera, made.labels, layers);
@@ -289,8 +228,9 @@ std::uint64_t write_image(const World& world, const Dataset& dataset, std::size_
     flows_left_out =
         write_flows(camera, flow_px.width() > 0 ? flow_px : unknown_flow(camera.size_px), path_of);
   }
-  if (needs_imager(camera))
-    write_stages(placed, made.light->radiance, key_of(world, which, image), path_of);
+  if (made.light)
+    if (const auto stages = simulate_imager(simulation, which, image, made.light->radiance))
+      write_stages(camera, *stages, path_of);
   write_png(path_of("_preview.png"), draw_image_preview(made.light ? &*made.light : nullptr,
                                                         made.truth ? &*made.truth : nullptr));
   if (!layers.all.empty()) {

@@ -2,57 +2,47 @@
 
 #include <cstddef>
 #include <cstdint>
-#include <optional>
+#include <span>
 #include <string>
 #include <vector>
 
-#include "apps/groundray/record/dataset.h"
-#include "apps/scene/world.h"
-#include "core/point_cloud.h"
-#include "core/scene.h"
-#include "sensors/camera/camera.h"
-#include "sensors/camera/image_truth.h"
+#include "apps/groundray/record/dataset_writer.h"
+#include "apps/scene/frames.h"
+#include "apps/scene/simulation.h"
+#include "core/io/point_cloud.h"
+#include "core/tracing/scene.h"
 #include "sensors/camera/lidar_image.h"
 
 namespace groundray {
 
-/// Returns what the names of all files of an image of a camera end with.
+/// Returns the suffixes of all files of a camera's image.
 std::vector<std::string> image_suffixes(const MountedCamera& camera);
 
-/// A scan whose echoes an image shows.
-struct ShownScan {
-  std::uint32_t lidar = 0;  ///< index among the world's
+/// Scan whose echoes an image shows.
+struct OverlaidScan {
+  std::uint32_t lidar = 0;  ///< index in Simulation::lidars
   std::int64_t scan = 0;
 };
 
-/// Returns those of an image, in the order in which its camera names the lidars: of each the last
-/// scan that has begun when the image is half exposed, or else the first.
-/// @param camera  index among the world's. @param image  number of the camera's.
-std::vector<ShownScan> shown_scans(const World& world, std::size_t camera, std::int64_t image);
+/// Returns the scans that an image shows, in the order in which its camera lists the lidars: from
+/// each, the last scan that has begun by the middle of the image's time, or else the first.
+/// @param camera  index in Simulation::cameras.
+/// @param image   number of the camera's image.
+std::vector<OverlaidScan> shown_scans(const Simulation& simulation, std::size_t camera,
+                                      std::int64_t image);
 
-/// Returns where an image shows the echoes of a scan.
-/// @param scene  of the scan, on whose surface the echoes lie: what hides them is looked for there.
-std::vector<ImagedEcho> show_echoes(const World& world, std::size_t camera, std::int64_t image,
-                                    const ShownScan& shown, const PointCloud& echoes,
-                                    const Scene& scene);
+/// Returns the positions of a scan's echoes in an image.
+/// @param scene  scene of the scan, on whose surfaces the echoes lie; used to find occluded echoes.
+std::vector<ImagedEcho> show_echoes(const Simulation& simulation, std::size_t camera,
+                                    std::int64_t image, const OverlaidScan& shown,
+                                    const PointCloud& echoes, const Scene& scene);
 
-/// An image in memory, with all that is asked for with it.
-struct MadeImage {
-  std::optional<Exposure> light;
-  std::optional<ImageTruth> truth;
-  std::vector<std::uint16_t> labels;            ///< of the channels of the light's coverage
-  std::vector<std::vector<ImagedEcho>> echoes;  ///< of each lidar that the camera shows
-  std::uint64_t paths = 0;                      ///< of light, that it took
-};
-
-/// Makes an image, without echoes. @throws Interrupted.
-MadeImage make_image(const World& world, std::size_t camera, std::int64_t image,
-                     const Scene& scene);
-
-/// Takes the imager's part in an image, and writes all of it.
-/// @return how many flows are beyond what KITTI's files hold.
+/// Simulates the imager if necessary, and writes all files of an image.
+/// @param echoes  positions of the echoes of each lidar that the camera shows, as show_echoes.
+/// @return number of flows that exceed the range of KITTI's format.
 /// @throws Error if a file cannot be written.
-std::uint64_t write_image(const World& world, const Dataset& dataset, std::size_t camera,
-                          std::int64_t image, const MadeImage& made);
+std::uint64_t write_image(const Simulation& simulation, const DatasetWriter& dataset,
+                          std::size_t camera, std::int64_t image, const MadeImage& made,
+                          std::span<const std::vector<ImagedEcho>> echoes);
 
 }  // namespace groundray

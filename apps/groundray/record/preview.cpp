@@ -18,7 +18,7 @@ namespace {
 constexpr int preview_width = 900;
 constexpr int gap = 8;
 
-// The range below which a share of the echoes lies.
+// Returns a quantile of the ranges, ignoring NaN; 1 if there are none.
 double quantile_m(std::span<const double> ranges_m, double share) {
   std::vector<double> sorted;
   std::ranges::copy_if(ranges_m, std::back_inserter(sorted),
@@ -30,11 +30,11 @@ double quantile_m(std::span<const double> ranges_m, double share) {
   return *at;
 }
 
-// Rows of the range image: a band for each ring of a spinning head, from the top; else elevations,
-// from the highest point down to the lowest.
+// Rows of the range image: for a spinning head, a band per ring, from the highest to the lowest;
+// otherwise elevations from the highest point to the lowest.
 struct RangeRows {
   static constexpr int rows_of_elevations = 160;
-  std::vector<int> places;  // by ring
+  std::vector<int> places;  // index of the band, by ring
   int height = rows_of_elevations;
   int band = 1;
   float low_rad = 0, high_rad = 0;
@@ -81,7 +81,7 @@ void draw_ranges(Image8& image, const PointCloud& scan, const RangeRows& rows, d
   }
 }
 
-// A square of the map, north up.
+// Square section of the map, north up.
 struct MapWindow {
   glm::dvec2 centre_m;
   double half_m;
@@ -98,8 +98,8 @@ struct MapWindow {
   }
 };
 
-// Heights at the points of a lattice with a pixel's pitch, which reaches beyond
-// the window by `reach` pixels; NaN where there is no ground.
+// Heights on a lattice with the spacing of pixels, which extends beyond the window by `reach`
+// pixels; NaN where there is no ground.
 class HeightLattice {
  public:
   HeightLattice(const MapWindow& window, const Ground& ground, int reach)
@@ -123,9 +123,8 @@ class HeightLattice {
 };
 
 void draw_hillshade(Image8& image, const MapWindow& window, const Ground& ground) {
-  const glm::dvec3 sun =
-      glm::normalize(glm::dvec3(-1, 1, 1.4));  // from the north-west, as maps have it
-  constexpr int farthest = 32;                 // pixels; cells of more show as facets
+  const glm::dvec3 sun = glm::normalize(glm::dvec3(-1, 1, 1.4));  // from the north-west, as on maps
+  constexpr int farthest = 32;  // pixels; larger cells appear as facets
   const double pixel_m = 2 * window.half_m / preview_width;
   const int reach = static_cast<int>(std::clamp(
       std::ceil(0.5 * std::abs(ground.frame().step_m.x) / pixel_m), 1.0, double{farthest}));
@@ -157,7 +156,7 @@ void draw_points(Image8& image, const MapWindow& window, const PointCloud& scan,
   }
 }
 
-// A red dot where the sensor is, and a line to where it looks.
+// Draws a red dot at the sensor, and a line in its forward direction.
 void draw_sensor(Image8& image, const MapWindow& window, const Pose& X_DS) {
   const glm::dvec3 forward = X_DS.rotation * glm::dvec3(1, 0, 0);
   for (int step = 0; step <= 200; ++step) {

@@ -2,12 +2,13 @@
 
 #include <string>
 
-#include "apps/scene/world.h"
+#include "apps/scene/simulation.h"
 
 namespace groundray {
 
-/// Returns what dataset.yaml says of a run itself (docs/formats.md): equal texts make equal frames.
+/// Returns the part of dataset.yaml that describes the run (docs/reference/formats.md). Runs with
+/// equal texts make equal frames.
 /// @throws Error if an image of the sky cannot be read.
-std::string run_header(const World& world);
+std::string run_header(const Simulation& simulation);
 
 }  // namespace groundray

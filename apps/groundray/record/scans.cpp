@@ -9,9 +9,9 @@
 
 #include "apps/dataset/dataset_listing.h"
 #include "apps/groundray/record/preview.h"
-#include "core/npy_io.h"
-#include "core/ply_io.h"
-#include "core/product_io.h"
+#include "core/image/png_io.h"
+#include "core/io/npy_io.h"
+#include "core/io/ply_io.h"
 
 namespace groundray {
 namespace {
@@ -28,8 +28,8 @@ bool has_waveforms(const LidarSpec& lidar) {
   return lidar.waveforms != LidarSpec::WaveformOutput::Omit;
 }
 
-std::vector<std::string> comments_of(const World& world, const LidarScan& scan) {
-  const glm::dvec3 origin_m = world.terrain.header().origin_w_m;
+std::vector<std::string> comments_of(const Simulation& simulation, const LidarScan& scan) {
+  const glm::dvec3 origin_m = simulation.terrain.header().origin_w_m;
   std::vector<std::string> comments{
       fmt::format("origin_w {} {} {}", origin_m.x, origin_m.y, origin_m.z)};
   const Convergence& seen = scan.convergence;
@@ -59,25 +59,25 @@ std::vector<std::string> scan_suffixes(const MountedLidar& mounted) {
   return suffixes;
 }
 
-void write_scan(const World& world, const Dataset& dataset, std::uint32_t sensor,
+void write_scan(const Simulation& simulation, const DatasetWriter& dataset, std::uint32_t sensor,
                 std::int64_t frame, const LidarScan& scan) {
-  const PlacedLidar& lidar = world.lidars[sensor];
+  const PlacedLidar& lidar = simulation.lidars[sensor];
   const auto path_of = [&](std::string_view suffix) {
     return dataset.product_path(sensor, frame, suffix);
   };
   write_png(path_of(preview_suffix),
-            draw_preview(scan.echoes, lidar, world.terrain.ground(), frame));
+            draw_preview(scan.echoes, lidar, simulation.terrain.ground(), frame));
   if (has_no_returns(lidar.spec.lidar)) write_ply(path_of(no_returns_suffix), scan.no_returns, {});
   if (has_waveforms(lidar.spec.lidar)) {
     const Waveforms& waveforms = scan.waveforms;
     write_npy(path_of(wave_suffix), {{"", "<f4"}}, waveforms.power_w.size(),
               std::as_bytes(std::span(waveforms.power_w)));
-    static_assert(sizeof(WaveformRun) == 24);  // as the fields below say
+    static_assert(sizeof(WaveformRun) == 24);  // sum of the fields below
     write_npy(path_of(wave_index_suffix),
               {{"pulse", "<u4"}, {"count", "<u4"}, {"first_sample", "<u8"}, {"start_s", "<f8"}},
               waveforms.runs.size(), std::as_bytes(std::span(waveforms.runs)));
   }
-  write_ply(path_of(scan_suffix), scan.echoes, comments_of(world, scan));
+  write_ply(path_of(scan_suffix), scan.echoes, comments_of(simulation, scan));
 }
 
 }  // namespace groundray

@@ -8,26 +8,27 @@
 
 namespace groundray {
 
-/// Does one job after the other on a thread beside the caller's: while one is under way, the next
-/// waits, and with it whoever brings it.
+/// Executor of one job at a time on a second thread. Starting a job blocks until the previous one
+/// has ended.
 class BackgroundWriter {
  public:
-  /// Begins a job once the one before is done.
-  /// @throws what that one threw; the job is then not begun.
+  /// Starts a job when the previous one has ended.
+  /// @throws the previous job's exception; the new job is then not started.
   template <typename Job>
   void begin(Job&& job) {
     wait();
     job_ = std::async(std::launch::async, std::forward<Job>(job));
   }
 
-  /// Waits until the job is done. @throws what it threw, once.
+  /// Waits until the job has ended.
+  /// @throws its exception, once.
   void wait() {
     if (job_.valid()) job_.get();
   }
 
-  /// Waits, for a caller that has failed itself.
-  /// @throws the caller's fault and the job's as one Error, if both are such; else the job's, if
-  /// there is one, and the caller's, if there is none.
+  /// Waits for the job after the caller itself has failed.
+  /// @throws one Error with both messages if both exceptions are std::exception; else the job's
+  ///         exception, or the caller's if the job has none.
   [[noreturn]] void fail(const std::exception_ptr& callers) {
     try {
       wait();
@@ -37,7 +38,7 @@ class BackgroundWriter {
       } catch (const std::exception& fault) {
         throw Error("{}\n{}", fault.what(), own.what());
       } catch (...) {
-        // The caller was only asked to stop.
+        // The caller was only interrupted.
       }
       throw;
     }
@@ -45,7 +46,7 @@ class BackgroundWriter {
   }
 
  private:
-  std::future<void> job_;  // of std::async: its end is waited for
+  std::future<void> job_;  // of std::async: its destructor waits
 };
 
 }  // namespace groundray

@@ -6,7 +6,7 @@
 #include <utility>
 
 #include "apps/dataset/dataset_text.h"
-#include "core/text_lines.h"
+#include "core/io/text_lines.h"
 
 namespace groundray {
 namespace {
@@ -22,7 +22,7 @@ ExpectedFiles::ExpectedFiles(const DatasetSummary& dataset)
     add_folders(fmt::format("{}/{}/", sensor.kind, sensor.name));
 }
 
-// All that end with a slash.
+// Adds all folders in a path.
 void ExpectedFiles::add_folders(const std::string& path) {
   for (std::size_t slash = path.find('/'); slash != std::string::npos;
        slash = path.find('/', slash + 1))
@@ -66,8 +66,8 @@ std::optional<std::string> ExpectedFiles::fault_of(std::string_view path) const 
   const std::vector<Run>& runs = runs_[static_cast<std::size_t>(sensor - dataset_.sensors.begin())];
   const auto run = std::ranges::upper_bound(runs, *number, {}, &Run::end);
   if (run == runs.end() || *number < run->begin)
-    return "of a frame that is not done; --resume of `groundray generate`, or of `groundray merge` "
-           "if that was cut off, goes on with it";
+    return "of an unfinished frame; --resume of `groundray generate`, or of `groundray merge` if "
+           "that was interrupted, continues with it";
   if (run->suffixes->contains(name.substr(digits))) return std::nullopt;
   return std::string(no_file);
 }

@@ -14,38 +14,37 @@
 
 namespace groundray {
 
-/// The files that a dataset should have: what of others is a stranger. Frames that follow each
-/// other with files of the same kinds take one place together, so that it is small however many
-/// there are.
+/// Set of the files that belong to a dataset; all others are reported. Consecutive frames with the
+/// same suffixes are stored as one run, so that the set stays small for any number of frames.
 class ExpectedFiles {
  public:
-  /// @param dataset  is to outlive this.
+  /// @param dataset  must outlive this.
   explicit ExpectedFiles(const DatasetSummary& dataset);
 
-  /// Adds the files of a frame that is done. Frames of a sensor come in their order.
-  /// @return false if they do not, or it is not of the run: it is then left out.
+  /// Adds the files of a finished frame. Frames of a sensor must be added in ascending order.
+  /// @return false if they are not, or the frame is not of the run; it is then ignored.
   bool add(const FrameEntry& frame);
-  /// Adds a file that is of no frame.
+  /// Adds a file that belongs to no frame.
   void add(const NamedSum& file);
 
-  /// Returns in words why a file is not expected; nothing if it is.
-  /// @param path  in the dataset, with slashes.
+  /// Returns a description of why a file is not expected; nothing if it is.
+  /// @param path  relative to the dataset, with slashes.
   std::optional<std::string> fault_of(std::string_view path) const;
-  /// Whether files are expected in a folder, or in one within.
+  /// Returns true if files are expected in a folder, or in one of its subfolders.
   bool has_folder(const std::string& path) const { return folders_.contains(path); }
 
  private:
   using Suffixes = std::set<std::string, std::less<>>;
   struct Run {
-    std::int64_t begin = 0, end = 0;  // frames
+    std::int64_t begin = 0, end = 0;  // range of frame numbers
     const Suffixes* suffixes = nullptr;
   };
 
   void add_folders(const std::string& path);
 
   const DatasetSummary& dataset_;
-  std::set<Suffixes> kinds_;            // that occur
-  std::vector<std::vector<Run>> runs_;  // by sensor; by number
+  std::set<Suffixes> kinds_;            // all that occur
+  std::vector<std::vector<Run>> runs_;  // by sensor; sorted by frame number
   std::set<std::string, std::less<>> files_, folders_;
 };
 

@@ -8,8 +8,8 @@
 
 namespace groundray {
 
-/// Returns in words what makes a file another one than it was, reading it through; nothing if it is
-/// the same to the bit. Any number of threads may check.
+/// Reads a whole file and returns a description of its difference from `as_written`; nothing if
+/// there is none. Any number of threads may call this.
 std::optional<std::string> fault_of(const std::filesystem::path& file, const FileSum& as_written);
 
 }  // namespace groundray

@@ -20,7 +20,7 @@
 namespace groundray {
 namespace {
 
-// Whether locks of folders are, as on most of them, those of one machine alone.
+// Returns true on network file systems, most of which lock folders only within one machine.
 bool is_on_network(int folder) {
   constexpr std::uint32_t smb2 = 0xFE534D42, lustre = 0x0BD00BD0, gpfs = 0x47504653;
   constexpr std::array<std::uint32_t, 6> networks{
@@ -31,8 +31,7 @@ bool is_on_network(int folder) {
 }
 
 void warn(const std::filesystem::path& folder, const std::string& why) {
-  fmt::print(stderr,
-             "{}: warning: {}: see to it yourself that no other run is at work in this folder\n",
+  fmt::print(stderr, "{}: warning: {}: make sure that no other run uses this folder\n",
              folder.string(), why);
 }
 
@@ -48,12 +47,12 @@ FolderLock::FolderLock(const std::filesystem::path& folder, Use use)
   const int kind = use == Use::Write ? LOCK_EX : LOCK_SH;
   if (flock(descriptor_, kind | LOCK_NB) == 0) {
     if (use == Use::Write && is_on_network(descriptor_))
-      warn(folder, "locks on a network keep runs of this machine out alone");
+      warn(folder, "locks on a network file system exclude only runs of this machine");
     return;
   }
   if (errno == EWOULDBLOCK) {
     close(descriptor_);
-    throw Error("{}: another run is at work in this folder: wait until it ends, or choose another",
+    throw Error("{}: another run is using this folder: wait until it ends, or choose another",
                 folder.string());
   }
   if (use == Use::Write) {

@@ -4,15 +4,17 @@
 
 namespace groundray {
 
-/// Keeps a folder for one run, or for those that only read it, while it lives. A process that ends,
-/// however it does, gives it free. On a file system of a network it keeps the processes of one
-/// machine apart, on one without locks none: who writes there is warned on standard error.
+/// Lock of a folder for one run, or for any number of readers, released by the destructor or when
+/// the process ends for any reason. On a network file system, it is only effective among the
+/// processes of one machine; on a file system without locks, not at all. In both cases, a writer
+/// gets a warning on standard error.
 class FolderLock {
  public:
   enum class Use { Write, Read };
 
-  /// @throws Error if another process has the folder for another use, or writes into it as well, or
-  /// if too many files are open. A folder that is not there is nobody's.
+  /// Locks the folder; does nothing if it does not exist.
+  /// @throws Error if another process has locked it and at least one of the two writes, or if too
+  ///         many files are open.
   FolderLock(const std::filesystem::path& folder, Use use);
   ~FolderLock();
   FolderLock(const FolderLock&) = delete;

@@ -3,7 +3,8 @@
 #include <cstddef>
 
 #include "apps/dataset/dataset_listing.h"
-#include "core/ply_io.h"
+#include "apps/scene/interruption.h"
+#include "core/io/ply_io.h"
 
 namespace groundray {
 namespace {
@@ -15,46 +16,42 @@ using Clock = std::chrono::steady_clock;
 MadeFrame FrameMaker::make(const FrameName& name) {
   const auto begin = Clock::now();
   MadeFrame made{.name = name, .product = {}};
-  if (name.sensor < world_.lidars.size()) {
-    made.product = make_scan(name.sensor, name.number, made.tracing);
+  if (name.sensor < simulation_.lidars.size()) {
+    made.product = trace_scan(name.sensor, name.number, made.tracing);
   } else {
-    const std::size_t camera = name.sensor - world_.lidars.size();
-    std::vector<std::vector<ImagedEcho>> echoes;
-    for (const ShownScan& shown : shown_scans(world_, camera, name.number)) {
+    const std::size_t camera = name.sensor - simulation_.lidars.size();
+    for (const OverlaidScan& shown : shown_scans(simulation_, camera, name.number)) {
       const PointCloud& cloud = echoes_of(shown);
-      const Scene& scene = scene_for_(exposed(world_.lidars[shown.lidar], shown.scan));
-      echoes.push_back(show_echoes(world_, camera, name.number, shown, cloud, scene));
+      const Scene& scene = scene_for_(exposed(simulation_.lidars[shown.lidar], shown.scan));
+      made.echoes.push_back(show_echoes(simulation_, camera, name.number, shown, cloud, scene));
     }
-    const Scene& scene = scene_for_(exposed(world_.cameras[camera], name.number));
+    const Scene& scene = scene_for_(exposed(simulation_.cameras[camera], name.number));
     const auto traced_from = Clock::now();
-    MadeImage image = make_image(world_, camera, name.number, scene);
+    made.product = make_image(simulation_, camera, name.number, scene, stop_if_interrupted);
     made.tracing = Clock::now() - traced_from;
-    image.echoes = std::move(echoes);
-    made.product = std::move(image);
   }
   made.making = Clock::now() - begin;
   return made;
 }
 
-LidarScan FrameMaker::make_scan(std::uint32_t sensor, std::int64_t frame,
-                                std::chrono::duration<double>& tracing) {
-  const PlacedLidar& lidar = world_.lidars[sensor];
-  const Scene& scene = scene_for_(exposed(lidar, frame));
+LidarScan FrameMaker::trace_scan(std::uint32_t sensor, std::int64_t frame,
+                                 std::chrono::duration<double>& tracing) {
+  const Scene& scene = scene_for_(exposed(simulation_.lidars[sensor], frame));
   const auto begin = Clock::now();
-  LidarScan scan = lidar.lidar.scan(scene, lidar.X_DS, frame, world_.spec.seed, sensor);
+  LidarScan scan = make_scan(simulation_, sensor, frame, scene);
   tracing += Clock::now() - begin;
   return scan;
 }
 
-// From its file, or, where that is another shard's, made once more.
-const PointCloud& FrameMaker::echoes_of(const ShownScan& shown) {
+// Returns the echoes from their file, or makes the scan again if it belongs to another shard.
+const PointCloud& FrameMaker::echoes_of(const OverlaidScan& shown) {
   const auto last = shown_last_.find(shown.lidar);
   if (last != shown_last_.end() && last->second.first == shown.scan) return last->second.second;
   std::chrono::duration<double> tracing{0};
   PointCloud echoes =
       dataset_.has(shown.lidar, shown.scan)
           ? read_ply(dataset_.product_path(shown.lidar, shown.scan, scan_suffix)).cloud
-          : make_scan(shown.lidar, shown.scan, tracing).echoes;
+          : trace_scan(shown.lidar, shown.scan, tracing).echoes;
   return shown_last_.insert_or_assign(shown.lidar, std::pair(shown.scan, std::move(echoes)))
       .first->second.second;
 }

@@ -7,50 +7,53 @@
 #include <variant>
 #include <vector>
 
-#include "apps/groundray/record/dataset.h"
+#include "apps/groundray/record/dataset_writer.h"
 #include "apps/groundray/record/images.h"
-#include "apps/scene/frame_scene.h"
-#include "apps/scene/world.h"
-#include "core/point_cloud.h"
-#include "sensors/lidar.h"
+#include "apps/scene/frame_scene_builder.h"
+#include "apps/scene/frames.h"
+#include "apps/scene/simulation.h"
+#include "core/io/point_cloud.h"
+#include "sensors/lidar/lidar.h"
 
 namespace groundray {
 
-/// Which frame of a run: sensors are numbered as in dataset.yaml.
+/// Identifier of a frame in a run; sensors are numbered as in dataset.yaml.
 struct FrameName {
   std::uint32_t sensor = 0;
   std::int64_t number = 0;
 };
 
-/// A frame in memory.
+/// Frame in memory.
 struct MadeFrame {
   FrameName name;
   std::variant<LidarScan, MadeImage> product;
-  std::chrono::duration<double> tracing{0};  ///< of rays
-  std::chrono::duration<double> making{0};   ///< with the scene that they meet
+  std::vector<std::vector<ImagedEcho>> echoes;  ///< of an image: per lidar that its camera shows
+  std::chrono::duration<double> tracing{0};     ///< duration of ray tracing
+  std::chrono::duration<double> making{0};      ///< duration including the preparation of the scene
 };
 
-/// Makes the frames of a run, one at a time. What a frame is depends on the run and its name alone,
-/// not on which others were made before.
+/// Generator of a run's frames, one at a time. A frame depends only on the run and on its name, not
+/// on the frames made before.
 class FrameMaker {
  public:
-  /// @param world, dataset  are to outlive this.
-  FrameMaker(const World& world, const Dataset& dataset)
-      : world_(world), dataset_(dataset), scene_for_(world) {}
+  /// @param simulation, dataset  must outlive this.
+  FrameMaker(const Simulation& simulation, const DatasetWriter& dataset)
+      : simulation_(simulation), dataset_(dataset), scene_for_(simulation) {}
 
+  /// Makes a frame.
   /// @throws Error if there is too little memory, or a scan that an image shows cannot be read;
-  /// Interrupted.
+  ///         Interrupted.
   MadeFrame make(const FrameName& name);
 
  private:
-  LidarScan make_scan(std::uint32_t lidar, std::int64_t frame,
-                      std::chrono::duration<double>& tracing);
-  const PointCloud& echoes_of(const ShownScan& shown);
+  LidarScan trace_scan(std::uint32_t lidar, std::int64_t frame,
+                       std::chrono::duration<double>& tracing);
+  const PointCloud& echoes_of(const OverlaidScan& shown);
 
-  const World& world_;
-  const Dataset& dataset_;
-  FrameScene scene_for_;
-  std::map<std::uint32_t, std::pair<std::int64_t, PointCloud>> shown_last_;  // by lidar: its scan
+  const Simulation& simulation_;
+  const DatasetWriter& dataset_;
+  FrameSceneBuilder scene_for_;
+  std::map<std::uint32_t, std::pair<std::int64_t, PointCloud>> shown_last_;  // last scan by lidar
 };
 
 }  // namespace groundray

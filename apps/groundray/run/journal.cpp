@@ -22,7 +22,7 @@ std::string mark_of(std::string_view entry) { return sha256_of(entry).substr(0, 
 
 [[noreturn]] void fail_to(const char* what, const std::filesystem::path& path) {
   const int fault = errno;
-  throw Error("{}: cannot be {}: {}; check the disk's space, and that you may write there",
+  throw Error("{}: cannot be {}: {}; check the disk's space and the folder's permissions",
               path.string(), what, std::generic_category().message(fault));
 }
 

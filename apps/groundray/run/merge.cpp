@@ -25,9 +25,9 @@
 #include "apps/groundray/run/file_check.h"
 #include "apps/groundray/run/folder_lock.h"
 #include "apps/groundray/run/journal.h"
-#include "apps/interruption.h"
+#include "apps/scene/interruption.h"
 #include "core/error.h"
-#include "core/product_io.h"
+#include "core/io/file_io.h"
 #include "core/progress.h"
 
 namespace groundray {
@@ -35,15 +35,16 @@ namespace {
 
 namespace fs = std::filesystem;
 
-// A frame of a run, and the shard that has it.
+// Frame of a run, and the shard that has it.
 struct SharedFrame {
-  std::size_t shard = 0;  // index among the folders
-  std::string text;       // of its entry
+  std::size_t shard = 0;  // index in the folders
+  std::string text;       // text of its entry
   FrameEntry entry;
 };
 
-// Each shard is open twice, locked and read; threads read and write files besides.
-// @throws Error if the system does not let this process have as many.
+// Raises the limit of open files if necessary: each shard is open twice, for its lock and for
+// reading, and threads open files to read and write.
+// @throws Error if the system does not permit it.
 void allow_open_files(std::size_t shards) {
   constexpr std::size_t others = 64;
   const auto threads = static_cast<std::size_t>(tbb::this_task_arena::max_concurrency());
@@ -54,15 +55,15 @@ void allow_open_files(std::size_t shards) {
   limit.rlim_cur = needed;
   if (allowed >= needed && setrlimit(RLIMIT_NOFILE, &limit) == 0) return;
   throw Error(
-      "{} shards take {} files open at a time, and the system allows {}; `ulimit -Hn` or its "
-      "administrator raises that",
+      "{} shards need {} open files at a time, but the system allows {}; raise the limit by "
+      "`ulimit -Hn`, or ask its administrator",
       shards, needed, allowed);
 }
 
-// The files dataset.yaml of all shards, read side by side.
+// Reads the dataset.yaml files of all shards in step.
 class ShardTexts {
  public:
-  // @param folders, summary  are to outlive this; the summary is that of any of them.
+  // @param folders, summary  must outlive this; the summary may be that of any shard.
   ShardTexts(const std::vector<fs::path>& folders, const DatasetSummary& summary)
       : folders_(folders), summary_(summary) {
     for (const fs::path& folder : folders) texts_.push_back(std::make_unique<DatasetText>(folder));
@@ -72,37 +73,38 @@ class ShardTexts {
   const std::string& header() const { return texts_[0]->header(); }
   const std::vector<NamedSum>& files() const { return texts_[0]->files(); }
 
-  // @throws Error unless they are all shards of one run.
+  // @throws Error unless the folders are all shards of one run.
   void check_shards() const {
     std::vector<std::optional<fs::path>> found;
     for (std::size_t i = 0; i < texts_.size(); ++i) {
       const DatasetText& text = *texts_[i];
       const std::string name = folders_[i].string();
-      if (!text.shard()) throw Error("{}: the dataset is whole already, no shard", name);
+      if (!text.shard()) throw Error("{}: the dataset is complete, not a shard", name);
       if (text.header() != header()) {
-        throw Error("{}: it is of another run than {}: {}", name, folders_[0].string(),
+        throw Error("{}: it belongs to another run than {}: {}", name, folders_[0].string(),
                     first_difference(text.header(), header()));
       }
       if (fs::exists(folders_[i] / journal_file)) throw_incomplete(i);
       found.resize(texts_[0]->shard()->count);
       if (text.shard()->count != found.size()) {
-        throw Error("{}: it is shard {}, but {} is {}: shards of one cut alone can be joined", name,
+        throw Error("{}: it is shard {}, but {} is {}: all shards must have the same N", name,
                     text_of(*text.shard()), folders_[0].string(), text_of(*texts_[0]->shard()));
       }
       auto& place = found[text.shard()->index - 1];
       if (place)
-        throw Error("{}: shard {} is there twice: in {} too", name, text_of(*text.shard()),
+        throw Error("{}: shard {} is given twice: also in {}", name, text_of(*text.shard()),
                     place->string());
       place = folders_[i];
     }
     const auto missing = std::ranges::find_if(found, [](const auto& place) { return !place; });
     if (missing == found.end()) return;
-    throw Error("shard {}/{} is missing; make it by `groundray generate --shard`, or name it",
-                missing - found.begin() + 1, found.size());
+    throw Error(
+        "shard {}/{} is missing; create it with `groundray generate --shard`, or add its folder",
+        missing - found.begin() + 1, found.size());
   }
 
-  // Returns the next frame; nothing after the last one. @throws Error if none or two shards have
-  // it.
+  // Returns the next frame; nothing after the last one.
+  // @throws Error if no shard or two shards have it.
   std::optional<SharedFrame> next() {
     std::optional<SharedFrame> frame;
     std::size_t ended = 0;
@@ -144,7 +146,7 @@ class ShardTexts {
     }
   }
 
-  // The folder that should have the frame.
+  // Returns the index of the folder that should have the frame.
   std::size_t owner() const {
     const auto it = std::ranges::find_if(texts_, [&](const auto& text) {
       return text->shard()->has(static_cast<std::uint32_t>(sensor_), frame_,
@@ -165,30 +167,30 @@ class ShardTexts {
   }
 
   [[noreturn]] void throw_incomplete(std::size_t i) const {
-    throw Error("{}: shard {} is not complete; go on with it by `groundray generate --resume`",
+    throw Error("{}: shard {} is not complete; continue it with `groundray generate --resume`",
                 folders_[i].string(), text_of(*texts_[i]->shard()));
   }
   [[noreturn]] void throw_broken(std::size_t i) const {
-    throw Error("{}: changed since it was written; `groundray verify` says more",
+    throw Error("{}: changed since it was written; `groundray verify` reports details",
                 (folders_[i] / dataset_file).string());
   }
 
   const std::vector<fs::path>& folders_;
   const DatasetSummary& summary_;
   std::vector<std::unique_ptr<DatasetText>> texts_;
-  std::size_t sensor_ = 0;  // of the frame that comes next
+  std::size_t sensor_ = 0;  // of the next frame
   std::int64_t frame_ = 0;
 };
 
-// What the shards of a run are together.
+// Common properties of the shards of a run.
 struct Joined {
-  DatasetSummary summary;  // of one of them
+  DatasetSummary summary;  // of any shard
   std::string header;
-  std::vector<NamedSum> files;  // of no frame, which all have
+  std::vector<NamedSum> files;  // files that belong to no frame; every shard has them
   std::uint64_t frames = 0;
 };
 
-// @throws Error unless they are all shards of one run, each there once and complete.
+// @throws Error unless these are all shards of one run, each given once and complete.
 Joined check_shards(const std::vector<fs::path>& shards) {
   Joined joined{.summary = read_summary(shards[0]), .header = {}, .files = {}};
   ShardTexts texts(shards, joined.summary);
@@ -202,18 +204,18 @@ Joined check_shards(const std::vector<fs::path>& shards) {
   return joined;
 }
 
-// A file on its way from a shard to the whole.
+// File to be copied from a shard to the merged dataset.
 struct Copy {
   fs::path from, to;
   FileSum sum;
 };
 
-// @throws Error if it is not as its shard says.
+// @throws Error if the file is not as its shard states.
 void copy_file(const Copy& copy) {
   std::ifstream file(copy.from, std::ios::binary);
   if (const int fault = errno; !file && fault != ENOENT) {
-    throw Error("{}: cannot be read: {}; `groundray verify` finds all such", copy.from.string(),
-                std::generic_category().message(fault));
+    throw Error("{}: cannot be read: {}; `groundray verify` lists all such files",
+                copy.from.string(), std::generic_category().message(fault));
   }
   std::vector<char> block(256 << 10);
   Sha256 sum;
@@ -223,8 +225,9 @@ void copy_file(const Copy& copy) {
     const std::string_view read(block.data(), static_cast<std::size_t>(file.gcount()));
     sum.add(read);
     if (read.empty() && sum.digits() != copy.sum.sha256) {
-      throw Error("{}: missing or changed since it was written; `groundray verify` finds all such",
-                  copy.from.string());
+      throw Error(
+          "{}: missing or changed since it was written; `groundray verify` lists all such files",
+          copy.from.string());
     }
     return read;
   });
@@ -243,7 +246,7 @@ void make_folder(const fs::path& out) {
   std::error_code fault;
   fs::create_directories(out, fault);
   if (fault) {
-    throw Error("{}: cannot make this folder: {}; choose another one with -o", out.string(),
+    throw Error("{}: cannot create this folder: {}; choose another one with -o", out.string(),
                 fault.message());
   }
 }
@@ -253,14 +256,13 @@ void check_out(const fs::path& out, FolderUse use, const std::string& header) {
   if (use == FolderUse::New)
     throw Error(
         "{}: the folder is not empty; choose a new one with -o{}", out.string(),
-        fs::exists(out / dataset_file) ? ", or go on with a merge into it by --resume" : "");
+        fs::exists(out / dataset_file) ? ", or continue a merge into it with --resume" : "");
   const DatasetText before(out);
   if (before.header() != header || before.shard())
-    throw Error("{}: the folder holds another dataset; choose a new one with -o", out.string());
+    throw Error("{}: the folder contains another dataset; choose a new one with -o", out.string());
 }
 
-// All of it once, before anything is written: that every frame is there. What is written then says
-// of none that it is done.
+// Writes a dataset.yaml in which no frame is done, provided that the shards have every frame.
 void write_pending(const std::vector<fs::path>& shards, const Joined& joined, const fs::path& out) {
   ShardTexts texts(shards, joined.summary);
   const auto next = [&]() -> std::optional<std::string> {
@@ -283,14 +285,14 @@ void write_done(const std::vector<fs::path>& shards, const Joined& joined, const
   write_dataset_text(out, joined.header, std::nullopt, next, joined.files);
 }
 
-// Returns how many bytes were copied, or found there.
+// Returns the number of bytes that were copied or already in the folder.
 std::uint64_t copy_shards(const std::vector<fs::path>& shards, const Joined& joined,
                           const fs::path& out, FolderUse use) {
-  constexpr std::size_t block = 256;  // files at a time
+  constexpr std::size_t block = 256;  // number of files at a time
   ShardTexts texts(shards, joined.summary);
   std::vector<Copy> copies;
   std::uint64_t bytes = 0, frames = 0;
-  Progress progress(stderr, "frames joined", joined.frames);
+  Progress progress(stderr, "frames merged", joined.frames);
   const auto add = [&](std::size_t shard, const std::string& path, const FileSum& sum) {
     copies.push_back({shards[shard] / path, out / path, sum});
     bytes += sum.bytes;

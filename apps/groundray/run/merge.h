@@ -3,16 +3,17 @@
 #include <filesystem>
 #include <vector>
 
-#include "apps/groundray/record/dataset.h"
+#include "apps/groundray/record/dataset_writer.h"
 
 namespace groundray {
 
-/// Joins the shards of a run to the dataset that one run would have made, to the bit: copies their
-/// files, each held against its checksum on the way. Prints what was done, shows progress on
+/// Joins the shards of a run to the dataset that a single run would have made, bit for bit: copies
+/// their files, and verifies each checksum on the way. Prints a summary, and shows progress on
 /// standard error.
-/// @param use  Resume keeps what an earlier merge into the folder has copied already.
-/// @throws Error if the shards are not all of one run, each there once and complete, a file of
-/// theirs has changed, or the folder holds anything else or cannot be written; Interrupted.
+/// @param use  Resume keeps the files that an earlier merge into the folder has copied.
+/// @throws Error if the shards are not all of one run, each given once and complete; if one of
+///         their files has changed; or if the folder has other contents or cannot be written;
+///         Interrupted.
 void merge(const std::vector<std::filesystem::path>& shards, const std::filesystem::path& out,
            FolderUse use);
 

@@ -16,7 +16,7 @@ namespace {
 
 namespace fs = std::filesystem;
 
-// What CLI11 says of a text that is no shard.
+// Returns CLI11's message for a text that is not a shard; empty if it is one.
 std::string check_shard(const std::string& text) {
   return parse_shard(text) ? "" : "'" + text + "' must be one of 1/N to N/N, such as 2/8";
 }
@@ -35,22 +35,23 @@ struct RunCommands::Options {
     generate = app.add_subcommand(
         "generate",
         "Run a scene and write its dataset: scans, images, poses, calibration, pictures");
-    generate->add_option("SCENE", scene, "Scene file (YAML, see docs/scene.md)")->required();
-    generate->add_option("-o,--output", out, "Folder for the dataset; made if missing")->required();
+    generate->add_option("SCENE", scene, "Scene file (YAML, see docs/reference/scene.md)")
+        ->required();
+    generate->add_option("-o,--output", out, "Folder for the dataset; created if missing")
+        ->required();
     generate->add_option("--seed", seed,
-                         "Instead of the scene's own: another draw of noise and scattered things");
-    generate->add_flag(
-        "--resume", resume,
-        "Go on in a folder where the same run was cut off: check all that is there, make what is "
-        "missing or was changed; begins anew where nothing is there");
+                         "Seed of noise and scattered objects, instead of the scene's");
+    generate->add_flag("--resume", resume,
+                       "Continue an interrupted run in its folder: check all existing files and "
+                       "create those that are missing or changed");
     generate
         ->add_option("--shard", shard,
-                     "I/N, I from 1 to N: make the I-th of N shares of the frames, in a folder of "
-                     "its own; `groundray merge` joins them")
+                     "I/N, I from 1 to N: make shard I of N of the frames, in a separate folder; "
+                     "`groundray merge` joins them")
         ->check(check_shard);
     generate->add_option("--log-json", log,
-                         "File to add a line of JSON to for each frame, or - for standard output "
-                         "(docs/runs.md)");
+                         "File that receives a line of JSON for each frame, or - for standard "
+                         "output (docs/reference/runs.md)");
   }
 
   void add_verify(CLI::App& app) {
@@ -60,11 +61,11 @@ struct RunCommands::Options {
   }
 
   void add_merge(CLI::App& app) {
-    merge = app.add_subcommand(
-        "merge", "Join the shards of a run to the dataset that one run would have made");
+    merge =
+        app.add_subcommand("merge", "Join the shards of a run into the dataset of a single run");
     merge->add_option("SHARD", datasets, "Folders of all shards")->required();
-    merge->add_option("-o,--output", out, "Folder for the dataset; made if missing")->required();
-    merge->add_flag("--resume", resume, "Go on in a folder where a merge was cut off");
+    merge->add_option("-o,--output", out, "Folder for the dataset; created if missing")->required();
+    merge->add_flag("--resume", resume, "Continue an interrupted merge in its folder");
   }
 };
 

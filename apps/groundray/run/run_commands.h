@@ -8,10 +8,10 @@ class App;
 
 namespace groundray {
 
-/// The commands `generate`, `verify` and `merge`: datasets made, checked and joined.
+/// Commands `generate`, `verify` and `merge`, which make, check and join datasets.
 class RunCommands {
  public:
-  /// Adds the commands to a program's.
+  /// Adds the commands to `app`.
   explicit RunCommands(CLI::App& app);
   ~RunCommands();
   RunCommands(const RunCommands&) = delete;
@@ -19,7 +19,8 @@ class RunCommands {
 
   bool is_asked_for() const;
 
-  /// Does what was asked for. @throws Error as generate, verify and merge; Interrupted.
+  /// Runs the requested command.
+  /// @throws Error as generate, verify and merge; Interrupted.
   void run() const;
 
  private:

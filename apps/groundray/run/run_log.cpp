@@ -16,7 +16,7 @@ namespace {
 
 using Json = nlohmann::ordered_json;
 
-// Milliseconds will do.
+// Rounds to milliseconds.
 double rounded_s(std::chrono::duration<double> time) {
   return std::chrono::duration<double>(std::chrono::round<std::chrono::milliseconds>(time)).count();
 }
@@ -29,7 +29,7 @@ Json event(std::string_view name) {
                                (now - second).count())}};
 }
 
-// Names of files may be of any bytes.
+// Names of files may have any bytes: invalid UTF-8 is replaced.
 std::string line_of(const Json& object) {
   return object.dump(-1, ' ', false, Json::error_handler_t::replace) + "\n";
 }
@@ -40,7 +40,7 @@ RunLog::RunLog(const std::string& target) {
   if (target.empty()) return;
   if (target == "-") {
     out_ = stdout;
-    std::signal(SIGPIPE, SIG_IGN);  // a run does not end because nobody reads on
+    std::signal(SIGPIPE, SIG_IGN);  // a closed pipe must not end the run
     return;
   }
   file_.reset(std::fopen(target.c_str(), "ab"));

@@ -12,40 +12,41 @@
 
 namespace groundray {
 
-/// What a run is about to do.
+/// Start of a run.
 struct RunBegin {
   std::filesystem::path scene, output;
   std::uint64_t seed = 0;
-  std::string shard;       ///< "2/8"; empty for all
-  std::size_t frames = 0;  ///< to be made
-  std::size_t there = 0;   ///< that need not be made again
+  std::string shard;       ///< "2/8"; empty for a whole run
+  std::size_t frames = 0;  ///< number of frames to be made
+  std::size_t there = 0;   ///< number of frames that exist already
 };
 
-/// A frame that is on the disk.
+/// Frame that has been written.
 struct FrameDone {
   std::string sensor;
   std::int64_t frame = 0;
-  std::string_view samples;  ///< what is counted: "points" or "pixels"
+  std::string_view samples;  ///< unit of `count`: "points" or "pixels"
   std::uint64_t count = 0, bytes = 0;
   std::chrono::duration<double> tracing{0}, writing{0};
-  std::chrono::duration<double> writing_cpu{0};  ///< of the thread that writes
+  std::chrono::duration<double> writing_cpu{0};  ///< processor time of the writing thread
 };
 
-/// Tells programs how a run goes: one JSON object a line (docs/runs.md). Any number of threads may
-/// use one. Faults of the file are ignored once it is open, for the run matters more.
+/// Log of a run for programs: one JSON object per line (docs/reference/runs.md). Any number of
+/// threads may use it. Errors of the file after it was opened are ignored, because the run is more
+/// important.
 class RunLog {
  public:
-  /// @param target  a file, to whose end lines are added, "-" for standard output, or empty for
-  /// none.
+  /// @param target  file to append to, "-" for standard output, or empty for no log.
   /// @throws Error if the file cannot be written.
   explicit RunLog(const std::string& target);
 
-  /// Whether it takes standard output for itself.
+  /// Returns true if the log is written to standard output.
   bool takes_output() const noexcept { return out_ == stdout; }
 
   void begun(const RunBegin& run);
   void frame_done(const FrameDone& frame);
-  /// @param how  "end", "interrupted" or "failed". @param message  for people, may be empty.
+  /// @param how      "end", "interrupted" or "failed".
+  /// @param message  text for the user, or empty.
   void ended(std::string_view how, std::string_view message);
 
  private:

@@ -19,7 +19,7 @@
 #include "apps/groundray/run/file_check.h"
 #include "apps/groundray/run/folder_lock.h"
 #include "apps/groundray/run/journal.h"
-#include "apps/interruption.h"
+#include "apps/scene/interruption.h"
 #include "core/error.h"
 #include "core/progress.h"
 
@@ -28,8 +28,7 @@ namespace {
 
 namespace fs = std::filesystem;
 
-// The files of a dataset, gone through in the order of dataset.yaml. Faults are printed as they are
-// found.
+// Checks the files of a dataset in the order of dataset.yaml. Prints faults immediately.
 class Verification {
  public:
   explicit Verification(const fs::path& folder)
@@ -41,14 +40,14 @@ class Verification {
     const bool is_open = fs::exists(folder_ / journal_file, fault);
     if (is_open || fault) {
       tell(journal_file,
-           "a run was cut off; `groundray generate --resume` checks its frames and goes on");
+           "a run was interrupted; `groundray generate --resume` checks its frames and continues");
     } else if (summary_.done < summary_.asked_for) {
-      tell("", fmt::format("incomplete: {} of {} frames are there; `groundray generate --resume` "
-                           "makes the rest, and `groundray merge --resume` goes on with a merge "
-                           "that was cut off",
-                           summary_.done, summary_.asked_for));
+      tell("", fmt::format(
+                   "incomplete: {} of {} frames are complete; `groundray generate --resume` adds "
+                   "the rest, and `groundray merge --resume` continues an interrupted merge",
+                   summary_.done, summary_.asked_for));
     }
-    // A run that goes on or was cut off has files that are not listed yet.
+    // A run that is active or was interrupted has files that are not listed yet.
     if (!is_open) find_strangers("");
   }
 
@@ -69,7 +68,7 @@ class Verification {
   }
 
   void add_task(std::string path, const FileSum& sum) {
-    constexpr std::size_t block = 256;  // how many files are checked at a time
+    constexpr std::size_t block = 256;  // number of files checked at a time
     tasks_.push_back({std::move(path), sum, {}});
     if (tasks_.size() == block) flush();
   }
@@ -79,7 +78,7 @@ class Verification {
       stop_if_interrupted();
       tasks_[i].fault = fault_of(folder_ / tasks_[i].path, tasks_[i].sum);
     });
-    bool is_line_open = progress_ && isatty(STDERR_FILENO) == 1;  // that of the progress
+    bool is_line_open = progress_ && isatty(STDERR_FILENO) == 1;  // line of the progress display
     for (const Task& task : tasks_) {
       bytes_ += task.sum.bytes;
       if (!task.fault) continue;
@@ -96,13 +95,13 @@ class Verification {
     const std::string place = fmt::format("{}:{}", dataset_file, number);
     const auto entry = parse_entry(line);
     const auto stem = entry ? summary_.stem_of(*entry) : std::nullopt;
-    if (!stem) return tell(place, "not as it was written");
+    if (!stem) return tell(place, "changed since it was written");
     if (!entry->is_done) return;
     if (!expected_.add(*entry))
-      return tell(place, "a frame that is not of the run, or listed twice");
+      return tell(place, "a frame that does not belong to the run, or is listed twice");
     ++frames_;
     if (entry->files.empty())
-      tell(place, "the frame is without checksums: an earlier version made it");
+      tell(place, "the frame has no checksums: an earlier version wrote it");
     for (const ProductSum& file : entry->files) add_task(*stem + file.suffix, file.sum);
   }
 
@@ -117,10 +116,10 @@ class Verification {
     ++files_;
     flush();
     progress_.reset();
-    if (!text.is_intact()) tell(dataset_file, "changed since it was written, or cut short");
+    if (!text.is_intact()) tell(dataset_file, "changed since it was written, or truncated");
   }
 
-  // Of a folder in the dataset, and of those in it.
+  // Reports unexpected files in a folder of the dataset and its subfolders.
   void find_strangers(const std::string& path) {
     std::error_code fault;
     fs::directory_iterator it(path.empty() ? folder_ : folder_ / path, fault);
@@ -151,14 +150,14 @@ class Verification {
   std::uint64_t bytes_ = 0;
 };
 
-// Whether all is well.
+// Returns true if there are no faults.
 bool verify_one(const fs::path& folder) {
   const FolderLock lock(folder, FolderLock::Use::Read);
   Verification verification(folder);
   verification.run();
   fmt::print("{}: {} files of {:.1f} MiB checked, {}\n", folder.string(), verification.files(),
              static_cast<double>(verification.bytes()) / (1 << 20),
-             verification.faults() == 0 ? "all as they were written"
+             verification.faults() == 0 ? "all unchanged"
                                         : fmt::format("{} fault{}", verification.faults(),
                                                       verification.faults() == 1 ? "" : "s"));
   return verification.faults() == 0;
@@ -180,8 +179,10 @@ void verify(const std::vector<fs::path>& datasets) {
     if (!is_sound) ++at_fault;
   }
   if (at_fault > 0) {
-    throw Error("{} of {} datasets {} at fault; `groundray generate --resume` makes frames again",
-                at_fault, datasets.size(), at_fault == 1 ? "is" : "are");
+    throw Error(
+        "{} of {} datasets {} damaged or incomplete; `groundray generate --resume` creates frames "
+        "again",
+        at_fault, datasets.size(), at_fault == 1 ? "is" : "are");
   }
 }
 

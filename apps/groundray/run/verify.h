@@ -5,10 +5,10 @@
 
 namespace groundray {
 
-/// Reads every file of datasets through and holds it against what their dataset.yaml says; prints
-/// each fault, and how much was checked. A dataset or a shard of which frames are missing yet, and
-/// a file that is none of its own, are at fault as well.
-/// @throws Error after all were checked, if any is at fault; Interrupted.
+/// Reads every file of datasets and compares it with its entry in dataset.yaml; prints each fault,
+/// and the number of files checked. Missing frames of a dataset or shard, and files that do not
+/// belong to it, are faults as well.
+/// @throws Error after all datasets have been checked, if any has a fault; Interrupted.
 void verify(const std::vector<std::filesystem::path>& datasets);
 
 }  // namespace groundray

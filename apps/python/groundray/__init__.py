@@ -5,7 +5,8 @@
     scan = groundray.load_scene("trail.yaml").lidar("roof").scan(t_s=0.0)
     scan["range_true_m"]
 
-Results are NumPy arrays that view groundray's own memory; names end in their units: docs/python.md.
+Results are NumPy arrays that view groundray's own memory; names end in their units (see
+docs/guide/python.md).
 """
 
 from groundray._core import (

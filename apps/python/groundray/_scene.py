@@ -1,4 +1,4 @@
-"""Scenes that are made in code."""
+"""Scenes built in code."""
 
 import math
 import numbers
@@ -19,27 +19,25 @@ def scene(
     terrain: Terrain | None = None,
     seed: int | None = None,
 ) -> Scene:
-    """Makes a scene of what a scene file would say (docs/scene.md).
+    """Builds a scene from the contents of a scene file (docs/reference/scene.md).
 
       spec     the text of a scene file, or the same as dicts and lists
-      folder   where files that it names are looked for
-      terrain  the ground, in place of the key `dem` of `terrain`
-      seed     in place of the scene's own
+      folder   base folder of the files that it names
+      terrain  the ground, instead of the key `dem` of `terrain`
+      seed     replaces the scene's own
 
-    Raises groundray.Error as load_scene does; lines and columns of messages are those of the
-    text, into which dicts are turned: str(error) quotes the keys.
+    Raises groundray.Error as load_scene does. Dicts are converted to YAML: lines and columns in
+    messages refer to that text, and str(error) quotes the keys.
     """
     path = Path(folder) / "scene"
     if terrain is None:
         return parse_scene(spec if isinstance(spec, str) else to_yaml(spec), path, seed)
     if isinstance(spec, str):
-        raise TypeError(
-            "scene: with terrain=... spec must be a dict, of which 'terrain' has no 'dem'"
-        )
+        raise TypeError("scene: with terrain=... spec must be a dict whose 'terrain' has no 'dem'")
     ground = dict(spec.get("terrain", {}))
     if "dem" in ground:
         raise ValueError("scene: give terrain=... or spec['terrain']['dem'], not both")
-    # Large terrain is read from its file as it is needed, so that stays as long as the scene.
+    # Large terrain is read from its file on demand, so the file is kept as long as the scene.
     kept = tempfile.TemporaryDirectory(prefix="groundray-")
     try:
         file = Path(kept.name) / "terrain.tif"
@@ -95,13 +93,13 @@ def _scalar(value: Any) -> str:
     if isinstance(value, numbers.Real):
         number = float(value)
         if math.isfinite(number):
-            text = repr(number)  # of which YAML 1.1 takes 1.0e-07 for a number, but not 1e-07
+            text = repr(number)  # YAML 1.1 reads 1.0e-07 as a number, but not 1e-07
             return text if "." in text else text.replace("e", ".0e")
         return ".nan" if math.isnan(number) else (".inf" if number > 0 else "-.inf")
     if isinstance(value, str | os.PathLike):
         return _text(os.fspath(value))
     raise TypeError(
-        f"scene: {value!r} is a {type(value).__name__}; there may be dicts, lists, texts, numbers, "
+        f"scene: {value!r} is a {type(value).__name__}; allowed are dicts, lists, texts, numbers, "
         "paths and arrays"
     )
 

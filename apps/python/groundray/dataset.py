@@ -1,8 +1,8 @@
-"""Datasets as `groundray generate` writes them: what they hold, and their scans, paths and cameras.
+"""Reader of datasets written by `groundray generate`: contents, scans, paths and cameras.
 
-Files are read when they are asked for, one at a time. Lengths are metres, angles radians; times are
-whole nanoseconds on the dataset's own clock, which begins at `Dataset.time_origin_ns`. Frames: D is
-the dataset's (east, north, up; W less `origin_w_m`), B the body, S a lidar, C a camera.
+Files are read on request, one at a time. Lengths are metres, angles radians; times are whole
+nanoseconds on the dataset's own clock, which begins at `Dataset.time_origin_ns`. Frames: D is the
+dataset frame (east, north, up; W minus `origin_w_m`), B the body, S a lidar, C a camera.
 """
 
 from __future__ import annotations
@@ -25,7 +25,7 @@ __all__ = ["Camera", "Dataset", "Error", "Frame", "Lidar", "ObjectGroup", "Stere
 Floats = NDArray[np.float64]
 
 MOST_S = 2**32
-"""Times are below: until the year 2106, and the sum of two is whole nanoseconds in 64 bits."""
+"""Upper bound of times: the year 2106; the sum of two fits into 64 bits as nanoseconds."""
 _OF_TIMES = "must be within 2^32 s; was the file damaged?"
 
 _LOADER: Any = getattr(yaml, "CBaseLoader", yaml.BaseLoader)  # all scalars stay text
@@ -33,7 +33,7 @@ _LOADER: Any = getattr(yaml, "CBaseLoader", yaml.BaseLoader)  # all scalars stay
 
 @dataclass(frozen=True)
 class Frame:
-    """A scan or an image that is done: its number, and when it begins."""
+    """A finished scan or image: its number, and the time at which it begins."""
 
     number: int
     stamp_ns: int
@@ -41,10 +41,10 @@ class Frame:
 
 @dataclass(frozen=True)
 class Lidar:
-    """A lidar. `is_deskewed`: x, y, z are of S at the stamp, else of S as each pulse fired.
+    """A lidar. `is_deskewed`: x, y, z are in S at the stamp, else in S as each pulse fired.
 
-    `intensity_scale` is what its column means: `cosine` (without light), `power`, `reflectance` or
-    `eight_bit`. `returns` is which echoes of a pulse it reports.
+    `intensity_scale` is the meaning of its column: `cosine` (without light), `power`, `reflectance`
+    or `eight_bit`. `returns` names the echoes of a pulse that it reports.
     """
 
     name: str
@@ -59,9 +59,9 @@ class Lidar:
 
 @dataclass(frozen=True)
 class Camera:
-    """A camera: its lens is `lens_model` with what the calibration says of it.
+    """A camera: its lens is `lens_model` with the parameters of the calibration.
 
-    X_BC is the mount of C as it is rendered. Row v sees from stamp + v `row_s` for `exposure_s`.
+    X_BC is the mount of C as rendered. Row v is exposed from stamp + v `row_s` for `exposure_s`.
     """
 
     name: str
@@ -77,11 +77,11 @@ class Camera:
 
     @property
     def middle_ns(self) -> int:
-        """From an image's stamp to the middle of its middle row's exposure."""
+        """Time from an image's stamp to the middle of its middle row's exposure."""
         return round((self.exposure_s + self.row_s * (self.size_px[1] - 1)) / 2 * 1e9)
 
     def pinhole_matrix(self) -> Floats | None:
-        """Returns K, 3 x 3, px; none of a lens that is not a pinhole."""
+        """Returns K, 3 x 3, px; None if the lens is not a pinhole."""
         has_distortion = any(float(k) for k in self.lens.get("coefficients", []))
         if self.lens_model not in ("pinhole", "brown_conrady") or has_distortion:
             return None
@@ -113,9 +113,9 @@ class ObjectGroup:
 
 
 def nanoseconds_of(text: str) -> int:
-    """Returns seconds as whole nanoseconds: a double has too few digits.
+    """Converts the text of seconds to whole nanoseconds: a double has too few digits.
 
-    Raises ValueError with the rule if the text is no number, or farther from 0 than `MOST_S`.
+    Raises ValueError with the rule if the text is not a number within `MOST_S` of 0.
     """
     try:
         seconds = Decimal(text)
@@ -142,7 +142,7 @@ def matrix_of(
 
 
 class _Map:
-    """A map of a YAML file whose every wrong value is one error that says where."""
+    """A map of a YAML file; errors of its values state file and key."""
 
     def __init__(self, path: Path, value: Any, where: str = "") -> None:
         self.path = path
@@ -159,13 +159,13 @@ class _Map:
 
     def get(self, key: str) -> Any:
         if key not in self.values:
-            raise self.fault(key, "is missing: is this a file of groundray, and whole?")
+            raise self.fault(key, "is missing: is this a complete file of groundray?")
         return self.values[key]
 
     def text(self, key: str, default: str | None = None) -> str:
         value = self.values.get(key, default) if default is not None else self.get(key)
         if not isinstance(value, str):
-            raise self.fault(key, "must be a text")
+            raise self.fault(key, "must be text")
         return value
 
     def numbers(self, key: str, count: int | None = None) -> list[float]:
@@ -173,9 +173,10 @@ class _Map:
         try:
             numbers = [float(each) for each in value] if isinstance(value, list) else [float(value)]
         except (TypeError, ValueError):
-            raise self.fault(key, f"= {value} must be of numbers") from None
+            raise self.fault(key, f"= {value} must be numeric") from None
         if (count is not None and len(numbers) != count) or not np.all(np.isfinite(numbers)):
-            raise self.fault(key, f"= {value} must be {count or 'finite'} finite numbers")
+            expected = "finite numbers" if count is None else f"{count} finite numbers"
+            raise self.fault(key, f"= {value} must be {expected}")
         return numbers
 
     def whole(self, key: str) -> int:
@@ -185,7 +186,7 @@ class _Map:
         return int(number)
 
     def time_ns(self, key: str) -> int:
-        """Seconds as they are written, to the nanosecond."""
+        """Reads seconds exactly, to the nanosecond."""
         try:
             return nanoseconds_of(self.text(key))
         except ValueError as fault:
@@ -218,9 +219,9 @@ def _read_map(path: Path) -> _Map:
     try:
         text = path.read_text(encoding="utf-8")
     except OSError as fault:
-        raise Error(f"{path}: cannot read it: {fault.strerror}; is this a whole dataset?") from None
+        raise Error(f"{path}: cannot read it: {fault.strerror}; is the dataset complete?") from None
     except UnicodeDecodeError:
-        raise Error(f"{path}: it is not text in UTF-8; was it damaged?") from None
+        raise Error(f"{path}: it is not UTF-8 text; is it damaged?") from None
     return _Map(path, _load_yaml(text, path))
 
 
@@ -230,23 +231,23 @@ def _read_mount(calibration: _Map, key: str) -> Floats:
         return np.eye(4)
     rotation_xyzw = mount.numbers("rotation_xyzw", 4)
     if abs(np.linalg.norm(rotation_xyzw) - 1) > 1e-6:
-        raise mount.fault("rotation_xyzw", "must be of length 1")
+        raise mount.fault("rotation_xyzw", "must have length 1")
     return matrix_of(rotation_xyzw, mount.numbers("translation_m", 3))
 
 
 class Dataset:
-    """What `dataset.yaml` and the calibrations of a folder say."""
+    """Contents of the `dataset.yaml` and the calibrations of a folder."""
 
     def __init__(self, folder: str | Path) -> None:
-        """Reads all but scans, images and paths.
+        """Reads everything except scans, images and paths.
 
-        Raises Error if the folder holds no dataset, or a file of it says what cannot be.
+        Raises Error if the folder contains no dataset, or one of its files is invalid.
         """
         self.folder = Path(folder)
         record = self.folder / "dataset.yaml"
         if not record.is_file():
             raise Error(
-                f"{self.folder}: it holds no dataset.yaml; give a folder of groundray generate"
+                f"{self.folder}: it contains no dataset.yaml; give an output of groundray generate"
             )
         root = _read_map(record)
         if root.text("groundray_dataset") != "1":
@@ -279,7 +280,7 @@ class Dataset:
         ]
 
     def _read_frames(self, root: _Map) -> dict[str, list[Frame | None]]:
-        """Returns the frames of each sensor; none for one that is pending."""
+        """Returns the frames of each sensor; None for a pending frame."""
         frames: dict[str, list[Frame | None]] = {}
         for each in root.maps("frames"):
             state = each.text("state")
@@ -292,7 +293,7 @@ class Dataset:
     def _read_sensor(self, sensor: _Map, frames: dict[str, list[Frame | None]]) -> None:
         name, kind = sensor.text("name"), sensor.text("kind")
         if not re.fullmatch(r"[A-Za-z0-9_-]+", name):
-            raise sensor.fault("name", f"= {name!r} must be of letters, digits, _ and -")
+            raise sensor.fault("name", f"= {name!r} must consist of letters, digits, _ and -")
         if kind == "stereo":
             is_rectified = sensor.text("images", "") == "rectified"
             self.pairs.append(
@@ -315,19 +316,19 @@ class Dataset:
             raise sensor.fault("kind", f"= {kind} must be lidar, camera or stereo")
 
     def scan_file(self, lidar: Lidar, frame: Frame, suffix: str = ".ply") -> Path:
-        """Returns where that scan is."""
+        """Returns the file of a scan."""
         return self.folder / "lidar" / lidar.name / f"{frame.number:06}{suffix}"
 
     def image_file(self, camera: Camera, frame: Frame, suffix: str) -> Path:
-        """Returns where that product of an image is, or would be."""
+        """Returns the file of an image's product, which need not exist."""
         return self.folder / "camera" / camera.name / f"{frame.number:06}{suffix}"
 
     def path_file(self, sensor: Lidar | Camera) -> Path:
-        """Returns where the sensor's path through D is."""
+        """Returns the file of the sensor's path through D."""
         return self.folder / "poses" / f"{sensor.name}.tum"
 
     def camera_info_file(self, camera: Camera) -> Path:
-        """Returns where the lens is as ROS has it, if ROS has words for it."""
+        """Returns the file of the ROS camera_info; it exists if ROS supports the lens."""
         return self.folder / "calibration" / f"{camera.name}.ros.yaml"
 
 
@@ -357,7 +358,7 @@ def _camera(name: str, number: int, frames: tuple[Frame, ...], calibration: _Map
 
 
 def _receiver(name: str, calibration: _Map, scene: str) -> dict[str, Any]:
-    """The receiver of the lidar's file, or of the scene in its place; nothing without a laser."""
+    """Returns the receiver of the scene, else of the lidar's file; empty without a laser."""
     own = _load_yaml(calibration.text("lidar_file", "{}"), calibration.path)
     settings: dict[str, Any] = dict(own) if isinstance(own, dict) else {}
     of_scene = _load_yaml(scene, calibration.path) if scene else {}

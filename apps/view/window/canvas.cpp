@@ -26,7 +26,7 @@ constexpr double zoom_step = 0.85;
 constexpr double key_turn_rad = std::numbers::pi / 36;
 constexpr std::size_t timed_pictures = 20;
 
-// Ahead, to the right and up.
+// Directions of flight: ahead, right, up.
 const std::map<int, glm::dvec3>& flying_keys() {
   static const std::map<int, glm::dvec3> keys{{Qt::Key_W, {1, 0, 0}}, {Qt::Key_S, {-1, 0, 0}},
                                               {Qt::Key_D, {0, 1, 0}}, {Qt::Key_A, {0, -1, 0}},
@@ -43,7 +43,7 @@ double view_angle_rad(const View& view) {
 Canvas::Canvas(QWidget* parent) : QVTKOpenGLNativeWidget(parent) {
   const vtkNew<vtkGenericOpenGLRenderWindow> window;
   setRenderWindow(window);
-  interactor()->SetInteractorStyle(nullptr);  // the mouse is ours
+  interactor()->SetInteractorStyle(nullptr);  // this class handles the mouse itself
   window_ = window;
   view_ = std::make_unique<View>(window_);
   setFocusPolicy(Qt::StrongFocus);
@@ -63,7 +63,7 @@ Canvas::Canvas(QWidget* parent) : QVTKOpenGLNativeWidget(parent) {
 }
 
 Canvas::~Canvas() {
-  makeCurrent();  // what the view drew with is given back
+  makeCurrent();  // the view releases its OpenGL resources
   view_.reset();
 }
 
@@ -137,7 +137,7 @@ void Canvas::mouseReleaseEvent(QMouseEvent* event) {
   }
 }
 
-// What is clicked twice becomes what the view turns round.
+// Makes the point under a double click the centre of rotation.
 void Canvas::mouseDoubleClickEvent(QMouseEvent* event) {
   const glm::ivec2 at_px = pixel_of(event->pos());
   if (const auto picked = view_->pick(at_px.x, at_px.y)) {
@@ -147,7 +147,7 @@ void Canvas::mouseDoubleClickEvent(QMouseEvent* event) {
   }
 }
 
-// Left turns, with Shift or in the middle moves, right comes nearer.
+// The left button rotates, Shift + left or the middle button pans, the right button zooms.
 void Canvas::drag(const Press& press, QPoint step) {
   const Look before = view_->current_look();
   const bool pans = press.button == Qt::MiddleButton || (press.keys & Qt::ShiftModifier) != 0;
@@ -219,7 +219,7 @@ void Canvas::focusOutEvent(QFocusEvent* event) {
   QVTKOpenGLNativeWidget::focusOutEvent(event);
 }
 
-// A second of flight goes half as far as one looks.
+// Flies half the distance to the target per second.
 void Canvas::fly() {
   const Look before = view_->current_look();
   const double step_m = glm::distance(before.at_w_m, before.from_w_m) * 0.5 * flight_ms / 1000;

@@ -11,20 +11,20 @@
 #include <optional>
 #include <set>
 
-#include "apps/view/view.h"
+#include "apps/view/rendering/view.h"
 
 namespace groundray {
 
-/// The view in the window: it is turned, moved and clicked into with the mouse and by keys.
+/// View in the window, controlled by mouse and keyboard.
 class Canvas : public QVTKOpenGLNativeWidget {
  public:
-  /// What is called as it is used; any may be empty. Pixels are the view's.
+  /// Callbacks; any may be empty. Pixels are those of the view.
   struct Hooks {
     std::function<void(glm::ivec2 at_px, Qt::KeyboardModifiers)> clicked{};
-    /// With `take_place`: pressed at one pixel, let go at another.
+    /// Called after `take_place`, with the pixels where the button was pressed and released.
     std::function<void(glm::ivec2 at_px, glm::ivec2 towards_px)> placed{};
-    std::function<void()> moving{};  ///< the eye has moved, and may go on
-    std::function<void()> rested{};  ///< it has not moved for a while
+    std::function<void()> moving{};  ///< the eye has moved and may move on
+    std::function<void()> rested{};  ///< the eye has not moved for a while
   };
 
   explicit Canvas(QWidget* parent = nullptr);
@@ -33,16 +33,17 @@ class Canvas : public QVTKOpenGLNativeWidget {
   void set_hooks(Hooks hooks) { hooks_ = std::move(hooks); }
   View& view() noexcept { return *view_; }
 
-  /// Draws soon: once for all that asked till then.
+  /// Schedules a redraw; requests made before it are combined.
   void draw();
-  /// Looks from elsewhere, as one who moves; drawn soon.
+  /// Moves the eye, with reduced detail until it rests; schedules a redraw.
   void look(const Look& look);
-  /// The next press and release of the mouse are a place and a direction, not a turn.
+  /// Makes the next press and release of the mouse define a position and a direction, not a
+  /// rotation.
   void take_place(bool on);
   bool is_moving() const noexcept { return is_moving_; }
   bool is_taking_place() const noexcept { return taking_place_; }
 
-  /// Returns how many pictures a second drawing gives while moving: of the last ones; none yet, 0.
+  /// Returns the frame rate of the last frames drawn while moving; 0 if there are none.
   double frames_per_s() const;
 
  protected:
@@ -74,11 +75,11 @@ class Canvas : public QVTKOpenGLNativeWidget {
   std::unique_ptr<View> view_;
   Hooks hooks_;
   std::optional<Press> press_;
-  std::set<int> keys_down_;  // of those that fly
+  std::set<int> keys_down_;  // flight keys that are held down
   bool taking_place_ = false;
   bool is_moving_ = false;
   QTimer soon_, rest_, flight_;
-  std::deque<double> drawn_s_;  // how long the last pictures took
+  std::deque<double> drawn_s_;  // drawing times of the last frames
 };
 
 }  // namespace groundray

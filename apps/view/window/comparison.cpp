@@ -5,9 +5,9 @@
 #include <cmath>
 #include <utility>
 
-#include "apps/view/dem_layer.h"
+#include "apps/view/layers/dem_layer.h"
 #include "core/error.h"
-#include "terrain/dem_io.h"
+#include "terrain/dem/dem_io.h"
 
 namespace groundray {
 namespace {
@@ -31,7 +31,7 @@ TriangleMesh mesh_of(const Layer& layer, const glm::dvec3& origin_w_m) {
     mesh.triangles.emplace_back(numbers[i], numbers[i + 1], numbers[i + 2]);
   }
   if (mesh.triangles.empty()) {
-    throw Error("{}: has no triangle, so nothing can be measured against it", layer.name);
+    throw Error("{}: has no triangle, so distances to it are undefined", layer.name);
   }
   return mesh;
 }
@@ -51,8 +51,8 @@ Comparison compare(const Layer& layer, const Truth& truth, double tolerance_m,
   Comparison comparison;
   comparison.layer = layer.name;
   comparison.truth = truth.name;
-  if (const auto* world = std::get_if<std::shared_ptr<const World>>(&truth.what)) {
-    const Terrain& terrain = (*world)->terrain;
+  if (const auto* simulation = std::get_if<std::shared_ptr<const Simulation>>(&truth.what)) {
+    const Terrain& terrain = (*simulation)->terrain;
     comparison.deviation = deviation_from_ground(places_m(layer, terrain.header().origin_w_m),
                                                  terrain.ground(), glm::dvec3(0), stop, progress);
   } else if (const auto* file = std::get_if<Truth::DemFile>(&truth.what)) {
@@ -67,7 +67,7 @@ Comparison compare(const Layer& layer, const Truth& truth, double tolerance_m,
     comparison.agreements = agreements_of(layer, mesh, surface.origin_w_m, tolerance_m, stop);
   }
   if (comparison.deviation.figures.count == 0) {
-    throw Error("{} has no point near {}: are both in one frame?", layer.name, truth.name);
+    throw Error("{} has no point near {}: are both in the same frame?", layer.name, truth.name);
   }
   comparison.histogram = histogram_of(comparison.deviation.signed_m, bins);
   return comparison;
@@ -75,10 +75,10 @@ Comparison compare(const Layer& layer, const Truth& truth, double tolerance_m,
 
 Layer coloured_by_deviation(Layer layer, const Comparison& comparison) {
   const auto data = vtkSmartPointer<vtkPolyData>::New();
-  data->ShallowCopy(layer.data);  // the view draws what it has till it gets this
+  data->ShallowCopy(layer.data);  // the view draws the old data until it receives this layer
   layer.data = data;
   layer.actor = nullptr;
-  layer.coarse = nullptr;  // it lacks the column
+  layer.coarse = nullptr;  // lacks the column
   std::erase_if(layer.columns, [](const LayerColumn& each) { return each.name == column_name; });
   add_column(layer, {.name = column_name, .unit = "m", .scale = ColourScale::Signed},
              comparison.deviation.signed_m);

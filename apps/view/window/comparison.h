@@ -7,39 +7,39 @@
 #include <variant>
 #include <vector>
 
-#include "apps/scene/world.h"
-#include "apps/view/deviation.h"
-#include "apps/view/layer.h"
+#include "apps/scene/simulation.h"
+#include "apps/view/compare/deviation.h"
+#include "apps/view/rendering/layer.h"
 
 namespace groundray {
 
-/// What something shown is measured against.
+/// Reference that a layer is compared with.
 struct Truth {
-  /// A DEM's file.
+  /// DEM file.
   struct DemFile {
     std::filesystem::path path;
   };
-  std::string name;  ///< for people, unique among those that are offered
-  /// The reference surface of a scene; that of a DEM file; or a surface that is shown.
-  std::variant<std::shared_ptr<const World>, DemFile, Layer> what;
+  std::string name;  ///< name for display, unique among the truths that are offered
+  /// Reference surface of a scene, that of a DEM file, or a displayed surface.
+  std::variant<std::shared_ptr<const Simulation>, DemFile, Layer> what;
 };
 
-/// How a layer compares with the truth.
+/// Comparison of a layer with the truth.
 struct Comparison {
   std::string layer, truth;
-  Deviation deviation;  ///< of each of the layer's points
+  Deviation deviation;  ///< deviations of the layer's points
   DeviationHistogram histogram;
-  std::vector<Agreement> agreements;  ///< of two surfaces, if a tolerance is given
+  std::vector<Agreement> agreements;  ///< agreement of two surfaces, if a tolerance is given
 };
 
-/// Measures how far a layer's points are from the truth. Any thread may call it.
-/// @param tolerance_m  at which precision and completeness of surfaces are told; 0 for none.
-/// @throws Interrupted if asked to stop. @throws Error if a file is at fault, or a surface has no
-///         triangle.
+/// Measures the distances of a layer's points from the truth. Thread-safe.
+/// @param tolerance_m  tolerance for precision and completeness of two surfaces; 0 to omit them.
+/// @throws Interrupted if a stop is requested.
+/// @throws Error if a file is invalid, the truth has no triangle, or no point has a deviation.
 Comparison compare(const Layer& layer, const Truth& truth, double tolerance_m,
                    const std::stop_token& stop, const ShareDone& progress);
 
-/// Returns the layer with its deviations as the column "deviation", coloured by that.
+/// Returns the layer coloured by its deviations, as the column "deviation".
 Layer coloured_by_deviation(Layer layer, const Comparison& comparison);
 
 }  // namespace groundray

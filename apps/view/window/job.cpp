@@ -3,7 +3,7 @@
 #include <exception>
 #include <new>
 
-#include "apps/interruption.h"
+#include "apps/scene/interruption.h"
 
 namespace groundray {
 
@@ -29,7 +29,7 @@ void Job::run(Work work, Hooks hooks) {
 Job::Finish Job::worked(const Work& work, const std::stop_token& stop, std::uint64_t turn) {
   const auto failure = [this](std::string message) -> Finish {
     return [this, message = std::move(message)] {
-      const auto failed = hooks_.failed;  // it may start what has other hooks
+      const auto failed = hooks_.failed;  // copied, as it may start a job and so replace hooks_
       if (failed) failed(message);
     };
   };
@@ -46,7 +46,7 @@ Job::Finish Job::worked(const Work& work, const std::stop_token& stop, std::uint
   } catch (const Interrupted&) {
     return cancelled;
   } catch (const std::bad_alloc&) {
-    return failure("there is not enough memory for that");
+    return failure("there is not enough memory");
   } catch (const std::exception& error) {
     return failure(error.what());
   }
@@ -62,7 +62,7 @@ void Job::tell(std::uint64_t turn, double share, const std::string& step) {
 
 void Job::end(std::uint64_t turn, const Finish& finish) {
   threads_.remove_if([turn](const Thread& each) { return each.turn == turn; });
-  if (turn != turn_) return;  // another has taken its place
+  if (turn != turn_) return;  // replaced by another job
   is_running_ = false;
   try {
     finish();

@@ -12,30 +12,30 @@
 
 namespace groundray {
 
-/// What work tells on its way: the share that is done, 0 to 1, and of what.
+/// Progress callback: receives the completed fraction, 0 to 1, and the name of the current step.
 using Told = std::function<void(double share, const std::string& step)>;
 
-/// Work off the window's thread; what comes of it comes back there. One at a time: what is started
-/// takes the place of what runs, which is asked to stop and not heard of again. Only for the
-/// window's thread, but for what is said of `Told`.
+/// Work in another thread, whose result is delivered in the window's thread. One job is active at a
+/// time: starting another stops the present one, whose hooks are no longer called. All functions
+/// are for the window's thread only, except for calls of `Told`.
 class Job {
  public:
-  /// What is called in the window's thread; any may be empty.
+  /// Callbacks in the window's thread; any may be empty.
   struct Hooks {
-    Told told{};                                       ///< now and then, while it runs
-    std::function<void(const std::string&)> failed{};  ///< with the fault's message
-    std::function<void()> cancelled{};                 ///< it stopped because it was asked to
-    std::function<void()> ended{};                     ///< after done, failed or cancelled
+    Told told{};                                       ///< progress, repeatedly while it runs
+    std::function<void(const std::string&)> failed{};  ///< error message
+    std::function<void()> cancelled{};                 ///< the job stopped on request
+    std::function<void()> ended{};                     ///< called after done, failed or cancelled
   };
 
   Job();
-  /// Asks what runs to stop, and waits for that.
+  /// Requests a stop and waits for it.
   ~Job();
   Job(const Job&) = delete;
   Job& operator=(const Job&) = delete;
 
-  /// Calls `work(stop, told)` in a thread of its own and then `done` with its result in this one.
-  /// `told` may be called from any thread. If `done` throws, that is a fault, too.
+  /// Calls `work(stop, told)` in a new thread and then `done` with its result in the window's
+  /// thread. `told` may be called from any thread. If `done` throws, the job counts as failed.
   template <typename Work, typename Done>
   void start(Work work, Done done, Hooks hooks) {
     run(
@@ -48,9 +48,9 @@ class Job {
         std::move(hooks));
   }
 
-  /// Asks what runs to stop; `cancelled` is called when it has.
+  /// Requests a stop; `cancelled` is called once the job has stopped.
   void cancel();
-  /// Likewise, but is not heard of again: nothing runs any more, as far as this tells.
+  /// Requests a stop and disables the job's hooks; is_running() is false at once.
   void abandon();
   bool is_running() const noexcept { return is_running_; }
 
@@ -68,7 +68,7 @@ class Job {
   void tell(std::uint64_t turn, double share, const std::string& step);
   void end(std::uint64_t turn, const Finish& finish);
 
-  QObject here_;  // lives in the window's thread: calls are posted to it
+  QObject here_;  // lives in the window's thread, which receives the posted calls
   Hooks hooks_;
   std::uint64_t turn_ = 0;
   bool is_running_ = false;

@@ -1,6 +1,6 @@
 #include "apps/view/window/line_layer.h"
 
-#include "apps/view/sensor_layer.h"
+#include "apps/view/layers/sensor_layer.h"
 
 namespace groundray {
 

@@ -11,7 +11,7 @@ namespace {
 constexpr double steepest_rad = std::numbers::pi / 2 - 1e-3;
 constexpr glm::dvec3 up{0, 0, 1};
 
-// A direction as its angle from east to north, and above the horizon.
+// Direction as azimuth, from east towards north, and elevation.
 struct Heading {
   double yaw_rad, pitch_rad;
 };
@@ -27,7 +27,7 @@ glm::dvec3 direction_of(const Heading& heading) {
           std::cos(pitch_rad) * std::sin(heading.yaw_rad), std::sin(pitch_rad)};
 }
 
-// The yaw of someone who looks straight down is told by which way is up in the picture.
+// For a vertical line of sight, the up vector defines the yaw.
 Heading sight_of(const Look& look) {
   const glm::dvec3 ahead = look.at_w_m - look.from_w_m;
   Heading heading = heading_of(ahead);

@@ -5,9 +5,9 @@
 #include <algorithm>
 #include <cmath>
 
-#include "apps/view/cloud_layer.h"
+#include "apps/view/layers/cloud_layer.h"
 #include "apps/view/window/line_layer.h"
-#include "core/ply_io.h"
+#include "core/io/ply_io.h"
 
 namespace groundray {
 namespace {
@@ -50,7 +50,7 @@ void add_beam(FactTable::Facts& facts, const EchoBeam& beam) {
 std::vector<Layer> beam_layers(const EchoBeam& beam, const glm::dvec3& origin_w_m) {
   const glm::dvec3 end_m = beam.origin_m + beam.range_m * beam.direction;
   Lines along{{beam.origin_m, end_m}};
-  // Four lines along the rim.
+  // Four lines along the edge.
   const std::size_t quarter = beam.across_m.size() / 4;
   for (std::size_t i = 0; quarter > 0 && i < 4; ++i) {
     along.push_back({beam.waist_m[i * quarter], beam.across_m[i * quarter]});
@@ -80,7 +80,7 @@ void Picker::clear() {
 void Picker::pick(const Picked& picked, const ShownScan* scan) {
   const Layer* layer = view_.find(picked.layer);
   if (layer == nullptr) return;
-  job_.abandon();  // an echo that was clicked before is not to be told of any more
+  job_.abandon();  // an echo clicked earlier must not be shown any more
   for (const std::string& name : {beam_name, footprint_name}) view_.remove(name);
   if (scan != nullptr && picked.of == LayerColumn::Of::Points) {
     show_echo(*layer, picked, *scan);
@@ -91,7 +91,7 @@ void Picker::pick(const Picked& picked, const ShownScan* scan) {
   if (hooks_.changed) hooks_.changed();
 }
 
-// A cross, as large as a hundredth of how far it is away.
+// Marks a point by a cross, whose arms are 1.2 % of the point's distance from the eye.
 void Picker::mark(const glm::dvec3& p_w_m) {
   const double half_m = 0.012 * glm::distance(view_.current_look().from_w_m, p_w_m);
   Lines cross;

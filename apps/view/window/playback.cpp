@@ -4,9 +4,9 @@
 
 #include <algorithm>
 
-#include "apps/view/object_layer.h"
-#include "apps/view/open.h"
-#include "apps/view/scene_layers.h"
+#include "apps/view/layers/object_layer.h"
+#include "apps/view/layers/scene_layers.h"
+#include "apps/view/load_input.h"
 #include "apps/view/window/line_layer.h"
 
 namespace groundray {
@@ -14,14 +14,14 @@ namespace {
 
 using std::chrono::nanoseconds;
 constexpr Pen trail_pen{{255, 158, 41}, 2.5};
-constexpr std::size_t most_triangles = 200'000;  // of an object that moves
+constexpr std::size_t most_triangles = 200'000;  // limit per moving object
 
 const RecordedLidar* lidar_named(const RecordedDataset& dataset, const std::string& name) {
   const auto found = std::ranges::find(dataset.lidars, name, &RecordedLidar::name);
   return found == dataset.lidars.end() ? nullptr : &*found;
 }
 
-// The sensors where they are at a time, as they are drawn where they begin.
+// Adds the sensors at their poses at a time.
 void add_sensors(std::vector<Layer>& layers, const Timeline& timeline, nanoseconds time,
                  const std::string& prefix) {
   RecordedRun now{.georeference = timeline.georeference(), .sensors = {}, .names = {}};
@@ -37,14 +37,14 @@ void add_sensors(std::vector<Layer>& layers, const Timeline& timeline, nanosecon
   }
 }
 
-// The objects of a scene that move, where they are at a time.
-void add_moving(std::vector<Layer>& layers, const World& world, nanoseconds time,
+// Adds the moving objects of a scene at their poses at a time.
+void add_moving(std::vector<Layer>& layers, const Simulation& simulation, nanoseconds time,
                 const std::string& prefix) {
-  for (const MovingThing& thing : moving_things(world)) {
-    const auto& groups = world.content.groups;
-    const auto group = std::ranges::find(groups, thing.name, &Content::Group::name);
-    layers.push_back(object_layer(world, static_cast<std::size_t>(group - groups.begin()), time,
-                                  place_of(world, thing, time).p_DO, most_triangles));
+  for (const MovingThing& thing : moving_things(simulation)) {
+    const auto& groups = simulation.content.groups;
+    const auto group = std::ranges::find(groups, thing.name, &SceneObjects::Group::name);
+    layers.push_back(object_layer(simulation, static_cast<std::size_t>(group - groups.begin()),
+                                  time, place_of(simulation, thing, time).p_DO, most_triangles));
     layers.back().name = prefix + layers.back().name;
   }
 }
@@ -71,8 +71,8 @@ void Playback::close() {
   frames_.clear();
 }
 
-void Playback::set_world(std::shared_ptr<const World> world, const std::string& prefix) {
-  world_ = std::move(world);
+void Playback::set_world(std::shared_ptr<const Simulation> simulation, const std::string& prefix) {
+  simulation_ = std::move(simulation);
   world_prefix_ = prefix;
 }
 
@@ -145,7 +145,7 @@ std::optional<glm::dvec3> Playback::platform_w_m() const {
   return timeline.georeference().origin_w_m + timeline.pose_at(0, time_).translation_m;
 }
 
-// All that belongs to a time, but for scans that are shown already. Any thread may call it.
+// Builds everything for a time, except for scans that are already shown. Thread-safe.
 Playback::Step Playback::step_to(const Request& asked) {
   const Timeline& timeline = *asked.recording.timeline;
   const std::string& prefix = asked.recording.prefix;
@@ -172,15 +172,15 @@ Playback::Step Playback::step_to(const Request& asked) {
     step.layers.push_back(line_layer(prefix + "trail", LayerKind::Trail, origin_w_m,
                                      {timeline.trail_m(0, asked.time)}, trail_pen));
   }
-  if (asked.world != nullptr) {
-    add_moving(step.layers, *asked.world, asked.time, asked.world_prefix);
+  if (asked.simulation != nullptr) {
+    add_moving(step.layers, *asked.simulation, asked.time, asked.world_prefix);
   }
   return step;
 }
 
 void Playback::begin_step() {
   is_stale_ = false;
-  const Request asked{recording_, world_, world_prefix_, frames_, time_, has_trail_};
+  const Request asked{recording_, simulation_, world_prefix_, frames_, time_, has_trail_};
   const auto ended = [this] {
     if (is_stale_ && is_open()) begin_step();
   };
@@ -193,7 +193,7 @@ void Playback::take(Step step) {
   if (!is_open()) return;
   for (Layer& layer : step.layers) {
     if (kept_away_.contains(layer.name)) continue;
-    // Colours keep their meaning from scan to scan.
+    // The colour range is kept from scan to scan.
     const Layer* before = view_.find(layer.name);
     const LayerColumn* column = before == nullptr ? nullptr : before->find(before->coloured_by);
     if (column != nullptr && !column->is_rgb) {

@@ -11,86 +11,86 @@
 #include <vector>
 
 #include "apps/dataset/dataset_reader.h"
-#include "apps/scene/world.h"
-#include "apps/view/timeline.h"
-#include "apps/view/view.h"
-#include "apps/view/window/image_panel.h"
+#include "apps/scene/simulation.h"
+#include "apps/view/recorded/timeline.h"
+#include "apps/view/rendering/view.h"
 #include "apps/view/window/job.h"
-#include "core/point_cloud.h"
+#include "apps/view/window/panels/image_panel.h"
+#include "core/io/point_cloud.h"
 
 namespace groundray {
 
-/// A scan that is shown: what tells of its echoes besides the layer.
+/// Displayed scan with the data of its echoes that the layer lacks.
 struct ShownScan {
   std::shared_ptr<const RecordedSensor> sensor;
   RecordedFrame frame;
-  std::shared_ptr<const PointCloud> cloud;  ///< null: to be read from the frame's file
+  std::shared_ptr<const PointCloud> cloud;  ///< null: read from the frame's file when needed
   RecordedNames names;
-  glm::dvec3 origin_w_m{0};  ///< of D
+  glm::dvec3 origin_w_m{0};  ///< origin of D, in W
 };
 
-/// A dataset that is played.
+/// Dataset or scene that is played.
 struct Recording {
-  std::shared_ptr<const RecordedDataset> dataset;  ///< null: a scene, which has no scans
+  std::shared_ptr<const RecordedDataset> dataset;  ///< null for a scene, which has no scans
   std::shared_ptr<const Timeline> timeline;
-  std::string prefix;  ///< of its layers' names
+  std::string prefix;  ///< prefix of its layers' names
 };
 
-/// Brings the view to a time of a dataset: the scans that are current then, where the sensors are
-/// and have been, and what moves. Reads off the window's thread; of times asked for meanwhile, only
-/// the last is gone to.
+/// Brings the view to a time of a dataset: the current scans, the sensors and their trail, and
+/// moving objects. Reads in another thread; of several requests made meanwhile, only the last is
+/// carried out.
 class Playback {
  public:
   struct Hooks {
-    std::function<void()> changed{};                  ///< the view holds something else
-    std::function<void(const ImageSource&)> image{};  ///< the chosen camera's, at the time
-    /// It has none yet, but will from a time on, if it has any.
+    std::function<void()> changed{};                  ///< the layers of the view have changed
+    std::function<void(const ImageSource&)> image{};  ///< current image of the selected camera
+    /// Called if the camera has no image yet, with the time of its first one, if there is any.
     std::function<void(std::optional<std::chrono::nanoseconds>)> no_image{};
     std::function<void(const std::string&)> failed{};
   };
 
-  /// @param view  is to outlive this.
+  /// @param view  must outlive this.
   Playback(View& view, Hooks hooks);
 
   void open(Recording recording);
   void close();
   bool is_open() const noexcept { return recording_.timeline != nullptr; }
   const Recording& recording() const noexcept { return recording_; }
-  /// What moves comes of a scene: a dataset does not say where it was. Null for none.
+  /// Sets the scene that defines the moving objects, which datasets do not record; null for none.
   /// @param prefix  of the names of the scene's layers.
-  void set_world(std::shared_ptr<const World> world, const std::string& prefix);
+  void set_world(std::shared_ptr<const Simulation> simulation, const std::string& prefix);
 
   void go_to(std::chrono::nanoseconds time);
   void set_trail(bool on);
   void set_camera(const std::string& name);
 
-  /// Shows a layer no more, whatever the time.
+  /// Hides a layer permanently, whatever the time.
   void keep_away(const std::string& layer);
-  /// Shows those again whose names begin with something.
+  /// Reverts keep_away() for layers whose names begin with `prefix`.
   void show_again(const std::string& prefix);
 
-  /// Returns what is known of a scan layer, null if it is none of the dataset's.
+  /// Returns the scan of a layer; null if it is not a scan of the dataset.
   const ShownScan* scan(const std::string& layer) const;
-  /// Returns the chosen camera's frame at the time, as its sensor's and its number among the
-  /// frames; what is shown may be another for a while.
+  /// Returns the indices of the selected camera and its current frame on the timeline. The
+  /// displayed image may lag behind.
   std::optional<std::pair<std::size_t, std::size_t>> camera_frame() const;
-  /// Returns where the platform is at the time, in W: its first sensor.
+  /// Returns the current position of the platform (its first sensor) in W.
   std::optional<glm::dvec3> platform_w_m() const;
   bool is_busy() const noexcept { return job_.is_running(); }
 
  private:
   struct Request {
     Recording recording;
-    std::shared_ptr<const World> world;
+    std::shared_ptr<const Simulation> simulation;
     std::string world_prefix;
-    std::map<std::size_t, std::size_t> frames;  // by sensor: which is shown already
+    std::map<std::size_t, std::size_t> frames;  // index of the frame already shown, by sensor
     std::chrono::nanoseconds time{0};
     bool has_trail = true;
   };
   struct Step {
     std::vector<Layer> layers;
     std::map<std::string, ShownScan> scans;
-    std::map<std::size_t, std::size_t> frames;  // by sensor: which is shown
+    std::map<std::size_t, std::size_t> frames;  // index of the frame shown, by sensor
   };
 
   static Step step_to(const Request& asked);
@@ -102,11 +102,11 @@ class Playback {
   View& view_;
   Hooks hooks_;
   Recording recording_;
-  std::shared_ptr<const World> world_;
+  std::shared_ptr<const Simulation> simulation_;
   std::string world_prefix_;
   std::chrono::nanoseconds time_{0};
   bool has_trail_ = true;
-  bool is_stale_ = false;  // what is under way is not the time that is wanted
+  bool is_stale_ = false;  // the job under way is for another time than requested
   std::string camera_;
   std::set<std::string> kept_away_;
   std::map<std::string, ShownScan> scans_;

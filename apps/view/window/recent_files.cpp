@@ -18,7 +18,7 @@ std::filesystem::path whole_path(const std::filesystem::path& path) {
   std::error_code fault;
   std::filesystem::path whole = std::filesystem::absolute(path, fault).lexically_normal();
   if (fault) return path;
-  return whole.has_filename() ? whole : whole.parent_path();  // a folder by one name
+  return whole.has_filename() ? whole : whole.parent_path();  // without a trailing slash
 }
 
 }  // namespace

@@ -5,14 +5,14 @@
 
 namespace groundray {
 
-/// What was opened last, kept in a file from one start of the program to the next.
+/// Recently opened files, stored between runs of the program.
 class RecentFiles {
  public:
-  /// @param file  where they are kept; if it cannot be read or written, they are kept no longer
-  ///              than this. Empty for none.
+  /// @param file  file that stores them. If it cannot be read or written, or is empty, they are
+  ///              lost with this object.
   explicit RecentFiles(std::filesystem::path file);
 
-  /// Returns them, the last first: most_files at most.
+  /// Returns the paths, most recent first, `most_files` at most.
   const std::vector<std::filesystem::path>& paths() const noexcept { return paths_; }
   void add(const std::filesystem::path& path);
   void clear();

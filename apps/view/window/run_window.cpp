@@ -34,7 +34,7 @@ int run_window(int& argc, char** argv, const WindowStart& start) {
 #ifdef __linux__
   if (!has_display()) {
     throw Error(
-        "there is no display to show a window on: $DISPLAY is empty. --screenshot FILE writes a "
+        "there is no display for a window: $DISPLAY is empty. Use --screenshot FILE to write a "
         "picture without one");
   }
 #endif

@@ -40,12 +40,12 @@ RecordedSensor sensor_of(const PlacedCamera& placed) {
 
 }  // namespace
 
-RecordedRun run_of(const World& world) {
+RecordedRun run_of(const Simulation& simulation) {
   RecordedRun run;
-  run.georeference.origin_w_m = world.terrain.header().origin_w_m;
-  run.georeference.crs_name = world.terrain.header().crs_name;
-  for (const PlacedLidar& lidar : world.lidars) run.sensors.push_back(sensor_of(lidar));
-  for (const PlacedCamera& camera : world.cameras) run.sensors.push_back(sensor_of(camera));
+  run.georeference.origin_w_m = simulation.terrain.header().origin_w_m;
+  run.georeference.crs_name = simulation.terrain.header().crs_name;
+  for (const PlacedLidar& lidar : simulation.lidars) run.sensors.push_back(sensor_of(lidar));
+  for (const PlacedCamera& camera : simulation.cameras) run.sensors.push_back(sensor_of(camera));
   return run;
 }
 

@@ -55,7 +55,7 @@ void draw_fit(QPainter& painter) {
   painter.drawEllipse(QPointF(12, 12), 3.5, 3.5);
 }
 
-// A box with one of its sides filled.
+// Draws a box with one side filled.
 void draw_box(QPainter& painter, const QPolygonF& side) {
   painter.setBrush(accent_colour);
   painter.drawPolygon(side);
@@ -140,7 +140,7 @@ void draw_close(QPainter& painter) {
   painter.drawLine(QPointF(6, 18), QPointF(18, 6));
 }
 
-// A window that is taken out of another.
+// Draws a window that is detached from another.
 void draw_float(QPainter& painter) {
   painter.drawRect(QRectF(5, 9, 10, 10));
   painter.drawPolyline(QPolygonF(QVector<QPointF>{{9, 9}, {9, 5}, {19, 5}, {19, 15}, {15, 15}}));
@@ -197,7 +197,7 @@ QPalette dark_palette() {
   return palette;
 }
 
-// Seen on dark ground, whether checked or not.
+// Draws a check box that is visible on a dark background in every state.
 void draw_check_box(QPainter& painter, const QRect& place, QStyle::State state) {
   const bool is_enabled = (state & QStyle::State_Enabled) != 0;
   const double side = std::min({place.width(), place.height(), 14}) - 1;
@@ -222,7 +222,7 @@ void draw_check_box(QPainter& painter, const QRect& place, QStyle::State state) 
   painter.restore();
 }
 
-// Fusion, whose panels' buttons and check boxes are made for light windows.
+// Fusion with dock buttons and check boxes that suit dark windows.
 class CalmStyle : public QProxyStyle {
  public:
   CalmStyle() : QProxyStyle(QStyleFactory::create("Fusion")) {}

@@ -9,22 +9,22 @@ class QApplication;
 
 namespace groundray {
 
-/// A press of the mouse that moves so far is a drag.
+/// Distance from which a mouse movement with a pressed button is a drag.
 inline constexpr int drag_begins_px = 4;
 
-/// Steps in which bars show progress.
+/// Number of steps of a progress bar.
 inline constexpr int progress_steps = 1000;
 
-/// Returns a colour as Qt has it; its components are cut off at 0 and 1.
+/// Returns a colour for Qt; its components are clamped to [0, 1].
 inline QColor colour_of(const glm::dvec3& colour) {
   return QColor::fromRgbF(std::clamp(colour.r, 0.0, 1.0), std::clamp(colour.g, 0.0, 1.0),
                           std::clamp(colour.b, 0.0, 1.0));
 }
 
-/// Gives the program its looks: dark and calm, so that colours of data stand out.
+/// Sets the appearance of the program: dark and unsaturated, so that the colours of data stand out.
 void set_style(QApplication& application);
 
-/// What the toolbar's buttons show.
+/// Icons of buttons.
 enum class Sign {
   Open,
   OpenFolder,
@@ -47,7 +47,7 @@ enum class Sign {
   Float
 };
 
-/// Returns a sign, drawn in lines.
+/// Returns an icon, drawn in lines.
 QIcon icon_of(Sign sign);
 
 }  // namespace groundray

@@ -14,7 +14,7 @@
 #include <QStatusBar>
 #include <QVBoxLayout>
 
-#include "core/product_io.h"
+#include "core/image/png_io.h"
 
 namespace groundray {
 namespace {
@@ -23,11 +23,11 @@ constexpr int status_ms = 500;
 constexpr double mib = 1024.0 * 1024.0;
 constexpr QSize size_at_first(1440, 900);
 constexpr const char* hint =
-    "<p style='font-size: 16px'><b>Drop something here</b></p>"
-    "<p>a scene, a dataset's folder, a mesh,<br>a cloud, a DEM or a picture</p>"
-    "<p>or press <b>Ctrl+O</b>; <b>F1</b> tells what mouse and keys do</p>";
+    "<p style='font-size: 16px'><b>Drop something here</b></p><p>a scene, a dataset's folder, a "
+    "mesh,<br>a cloud, a DEM or a picture</p><p>or press <b>Ctrl+O</b>; <b>F1</b> lists mouse "
+    "actions and keys</p>";
 
-// What does not fit is reached by scrolling, so that the window may be small.
+// Makes a panel scrollable, so that the window may be small.
 QScrollArea* scrolled(QWidget* content) {
   auto* area = new QScrollArea;
   area->setWidgetResizable(true);
@@ -86,7 +86,7 @@ void Window::build_status_bar() {
   busy_->setMaximumWidth(140);
   cancel_ = new QPushButton("Cancel");
   cancel_->setObjectName("cancel_opening");
-  cancel_->setToolTip("Opens no more (Escape)");
+  cancel_->setToolTip("Cancel loading (Escape)");
   cancel_->setFocusPolicy(Qt::NoFocus);
   connect(cancel_, &QPushButton::clicked, this, [this] { cancel_opening(); });
   statusBar()->addWidget(message_, 1);
@@ -155,7 +155,7 @@ QWidget* Window::build_status() {
   follows_->addItems({"the eye", "the platform", "a place (Ctrl + click)"});
   follows_->setSizeAdjustPolicy(QComboBox::AdjustToMinimumContentsLengthWithIcon);
   follows_->setMinimumContentsLength(10);
-  follows_->setToolTip("Whose place the terrain's quadtree and clipmap follow");
+  follows_->setToolTip("Viewpoint that the terrain's quadtree and clipmap follow");
   connect(follows_, qOverload<int>(&QComboBox::activated), this, [this](int index) {
     tracker_->set_follows(static_cast<TerrainTracker::Follows>(index));
   });
@@ -218,7 +218,7 @@ void Window::build_workers() {
                     .failed = failed});
 }
 
-// The view holds something else: the tree shows it, and a picture is drawn.
+// Updates the tree and redraws after a change of the view's layers.
 void Window::changed() {
   std::vector<std::string> names;
   for (const Layer* layer : view().layers()) names.push_back(layer->name);
@@ -279,7 +279,7 @@ bool Window::is_busy() const {
 }
 
 void Window::save_picture(const std::filesystem::path& path, glm::ivec2 size_px) {
-  canvas_->doneCurrent();  // it is drawn elsewhere, and a thread draws in one place at a time
+  canvas_->doneCurrent();  // the picture needs another context, and a thread has one at a time
   write_png(path, view().picture(size_px));
   canvas_->draw();
 }

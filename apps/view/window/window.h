@@ -12,22 +12,22 @@
 #include <string>
 #include <vector>
 
-#include "apps/view/open.h"
-#include "apps/view/timeline.h"
+#include "apps/view/load_input.h"
+#include "apps/view/recorded/timeline.h"
 #include "apps/view/window/canvas.h"
-#include "apps/view/window/compare_panel.h"
-#include "apps/view/window/fact_table.h"
-#include "apps/view/window/image_panel.h"
 #include "apps/view/window/job.h"
-#include "apps/view/window/layer_panel.h"
+#include "apps/view/window/panels/compare_panel.h"
+#include "apps/view/window/panels/fact_table.h"
+#include "apps/view/window/panels/image_panel.h"
+#include "apps/view/window/panels/layer_panel.h"
+#include "apps/view/window/panels/scan_panel.h"
+#include "apps/view/window/panels/timeline_panel.h"
 #include "apps/view/window/picker.h"
 #include "apps/view/window/playback.h"
 #include "apps/view/window/recent_files.h"
 #include "apps/view/window/run_window.h"
-#include "apps/view/window/scan_panel.h"
 #include "apps/view/window/style.h"
 #include "apps/view/window/terrain_tracker.h"
-#include "apps/view/window/timeline_panel.h"
 
 class QComboBox;
 class QLabel;
@@ -38,24 +38,23 @@ class QToolBar;
 
 namespace groundray {
 
-/// The viewer's window: what is open, as it looks, and what can be asked of it. Work that takes
-/// long is done off its thread.
+/// Main window of the viewer. Long tasks run in other threads.
 class Window : public QMainWindow {
  public:
   explicit Window(WindowStart start = {});
   ~Window() override;
 
-  /// Opens one thing after the other; a fault is shown in a message box.
+  /// Opens an input after those requested before; errors are shown in a message box.
   void open(const std::filesystem::path& path);
-  /// Stops what is being opened, and forgets what was to follow.
+  /// Cancels opening: stops the input in progress and discards those that wait.
   void cancel_opening();
-  /// Closes everything.
+  /// Closes all documents and layers.
   void close_all();
   /// Writes a picture of the view. @throws Error if it cannot be written.
   void save_picture(const std::filesystem::path& path, glm::ivec2 size_px);
-  /// Shows a fault; one that is shown already is not shown twice.
+  /// Shows an error message, unless the same one is on display.
   void fault(const std::string& message);
-  /// Whether anything is being read or worked out.
+  /// Returns true if any task is running or waiting.
   bool is_busy() const;
 
   Canvas& canvas() noexcept { return *canvas_; }
@@ -74,16 +73,16 @@ class Window : public QMainWindow {
   void dropEvent(QDropEvent* event) override;
 
  private:
-  // What came of one input.
+  // Opened input.
   struct Document {
     std::filesystem::path path;
     InputKind kind = InputKind::Mesh;
-    std::string name;  // heads its layers' names
+    std::string name;  // first part of its layers' names
     std::shared_ptr<TerrainFollower> follower;
-    std::string terrain;        // the layer that follows
-    bool has_one_band = false;  // of a DEM: its heights
-    std::shared_ptr<const World> world;
-    std::shared_ptr<const RecordedDataset> dataset;  // null of a scene
+    std::string terrain;        // name of the terrain's layer
+    bool has_one_band = false;  // true if a DEM's heights are shown by a follower
+    std::shared_ptr<const Simulation> simulation;
+    std::shared_ptr<const RecordedDataset> dataset;  // null for a scene
     std::shared_ptr<const Timeline> timeline;
   };
   struct Loaded {
@@ -155,10 +154,10 @@ class Window : public QMainWindow {
   void take_comparison(const Comparison& comparison, const Layer& measured);
 
   WindowStart start_;
-  std::set<std::string> unmet_;  // of what the program was asked to show, what no layer has met
+  std::set<std::string> unmet_;  // options of the program that no layer has satisfied yet
   std::vector<Document> documents_;
-  std::vector<std::string> hidden_sensors_;      // of scenes, while a dataset is played
-  std::map<std::string, ShownScan> scans_here_;  // by layer
+  std::vector<std::string> hidden_sensors_;  // sensors of scenes, hidden while a dataset is played
+  std::map<std::string, ShownScan> scans_here_;  // scans by layer
   std::deque<std::filesystem::path> queue_;
   RecentFiles recent_;
   bool has_looked_ = false;
@@ -170,13 +169,13 @@ class Window : public QMainWindow {
   QLabel *picked_title_ = nullptr, *hint_ = nullptr, *message_ = nullptr;
   QComboBox* follows_ = nullptr;
   QProgressBar* busy_ = nullptr;
-  QPushButton* cancel_ = nullptr;  // of opening
+  QPushButton* cancel_ = nullptr;  // cancels opening
   QMenu* recent_menu_ = nullptr;
   TimelinePanel* timeline_ = nullptr;
   ImagePanel* images_ = nullptr;
   ScanPanel* scan_ = nullptr;
   ComparePanel* compare_ = nullptr;
-  std::map<QWidget*, QDockWidget*> docks_;  // by content
+  std::map<QWidget*, QDockWidget*> docks_;  // docks by content
   QTimer status_clock_;
   std::unique_ptr<TerrainTracker> tracker_;
   std::unique_ptr<Playback> playback_;

@@ -11,8 +11,8 @@
 #include <QToolBar>
 #include <glm/geometric.hpp>
 
-#include "apps/view/window/help.h"
-#include "apps/view/window/turntable_dialog.h"
+#include "apps/view/window/panels/help.h"
+#include "apps/view/window/panels/turntable_dialog.h"
 #include "apps/view/window/window.h"
 #include "core/error.h"
 
@@ -22,11 +22,10 @@ namespace {
 constexpr int largest_picture_px = 32768;
 
 const char* const open_filter =
-    "All that can be opened (*.yaml *.ply *.pcd *.bin *.npy *.npz *.obj *.stl *.glb *.gltf *.tif "
-    "*.tiff *.hgt *.asc *.vrt *.nc *.dem *.zip *.png *.jpg *.jpeg *.exr *.hdr);;"
-    "Any file (*)";
+    "All supported files (*.yaml *.ply *.pcd *.bin *.npy *.npz *.obj *.stl *.glb *.gltf *.tif "
+    "*.tiff *.hgt *.asc *.vrt *.nc *.dem *.zip *.png *.jpg *.jpeg *.exr *.hdr);;Any file (*)";
 
-// Asks for a picture's size; none if the user thinks better of it.
+// Asks for a picture's size; std::nullopt if the user cancels.
 std::optional<glm::ivec2> ask_for_size(QWidget* parent, QSize at_first) {
   QDialog dialog(parent);
   dialog.setWindowTitle("Size of the picture");
@@ -132,7 +131,7 @@ void Window::build_view_actions(QMenu& menu, QToolBar& bar) {
   action(menu, &bar, "From the &east", Qt::Key_3, Sign::East, [this] {
     look_along({-1, 0, -0.05}, {0, 0, 1});
   });
-  action(menu, &bar, "Aslan&t", Qt::Key_4, Sign::Oblique, [this] {
+  action(menu, &bar, "Obli&que", Qt::Key_4, Sign::Oblique, [this] {
     look_along({0.6, 1, -0.8}, {0, 0, 1});
   });
   menu.addSeparator();
@@ -159,15 +158,14 @@ void Window::build_tool_actions(QMenu& menu, QToolBar& bar) {
   menu.addSeparator();
   QAction* play = action(menu, nullptr, "&Play", Qt::Key_Space, {},
                          [this] { timeline_->play(!timeline_->is_playing()); });
-  // Elsewhere the space bar presses what has the focus.
+  // Only here: elsewhere, the space bar presses the widget with the focus.
   play->setShortcutContext(Qt::WidgetWithChildrenShortcut);
   canvas_->addAction(play);
   docks_.at(timeline_)->addAction(play);
-  action(menu, nullptr, "The &next frame", Qt::Key_Period, {},
-         [this] { timeline_->step_forward(); });
-  action(menu, nullptr, "The frame &before", Qt::Key_Comma, {}, [this] { timeline_->step_back(); });
+  action(menu, nullptr, "&Next frame", Qt::Key_Period, {}, [this] { timeline_->step_forward(); });
+  action(menu, nullptr, "Pre&vious frame", Qt::Key_Comma, {}, [this] { timeline_->step_back(); });
   menu.addSeparator();
-  action(menu, nullptr, "&Stop and take back", Qt::Key_Escape, {}, [this] { escape(); });
+  action(menu, nullptr, "Cancel and clear pic&ks", Qt::Key_Escape, {}, [this] { escape(); });
 }
 
 void Window::ask_to_open() {
@@ -208,7 +206,7 @@ void Window::ask_for_turntable() {
   dialog->open();
 }
 
-// They are told by their folders, too, as far as that is not the home folder.
+// Lists recent files by their full paths, with the home folder abbreviated.
 void Window::fill_recent() {
   recent_menu_->clear();
   for (const std::filesystem::path& path : recent_.paths()) {
@@ -219,15 +217,15 @@ void Window::fill_recent() {
             [this, path] { open(path); });
   }
   if (recent_.paths().empty()) {
-    recent_menu_->addAction("nothing yet")->setEnabled(false);
+    recent_menu_->addAction("empty")->setEnabled(false);
     return;
   }
   recent_menu_->addSeparator();
-  connect(recent_menu_->addAction("&Forget these"), &QAction::triggered, this,
+  connect(recent_menu_->addAction("&Clear the list"), &QAction::triggered, this,
           [this] { recent_.clear(); });
 }
 
-// All is seen from a side.
+// Shows everything from a direction.
 void Window::look_along(const glm::dvec3& direction, const glm::dvec3& up) {
   view().fit();
   const Look fitted = view().current_look();

@@ -13,7 +13,7 @@
 #include <cmath>
 #include <utility>
 
-#include "apps/interruption.h"
+#include "apps/scene/interruption.h"
 #include "apps/view/window/scene_run.h"
 #include "apps/view/window/window.h"
 
@@ -58,8 +58,8 @@ void Window::open_next() {
     if (stop.stop_requested()) throw Interrupted();
     if (loaded.opened.run != nullptr) {
       loaded.timeline = std::make_shared<const Timeline>(*loaded.opened.run);
-    } else if (loaded.opened.world != nullptr) {
-      loaded.timeline = std::make_shared<const Timeline>(run_of(*loaded.opened.world));
+    } else if (loaded.opened.simulation != nullptr) {
+      loaded.timeline = std::make_shared<const Timeline>(run_of(*loaded.opened.simulation));
     }
     return loaded;
   };
@@ -77,12 +77,12 @@ void Window::cancel_opening() {
   show_documents();
 }
 
-// What the program was asked to show, and is not there.
+// Reports the options of the program that no layer has satisfied.
 void Window::tell_unmet() {
   if (unmet_.empty()) return;
-  const std::string message = fmt::format(
-      "{}: no layer has that name or column; the tree and \"Colour by\" tell what there is",
-      fmt::join(unmet_, ", "));
+  const std::string message =
+      fmt::format("{}: no layer has that name or column; see the layer tree and \"Colour by\"",
+                  fmt::join(unmet_, ", "));
   unmet_.clear();
   fault(message);
 }
@@ -99,7 +99,7 @@ std::string Window::name_for(const std::filesystem::path& path) const {
   return name;
 }
 
-// A document's only layer has the document's name, others are under it.
+// A document's only layer has the document's name; several are below it in the tree.
 void Window::name_layers(std::vector<Layer>& layers, const std::string& document) {
   for (Layer& layer : layers) {
     if (layer.kind == LayerKind::Terrain) layer.name = "terrain";
@@ -109,8 +109,8 @@ void Window::name_layers(std::vector<Layer>& layers, const std::string& document
   }
 }
 
-// As the program was asked to show it.
-// @param own_name  by which it goes in its document.
+// Applies the program's options to a layer.
+// @param own_name  name within the document.
 void Window::dress(Layer& layer, const std::string& own_name) {
   for (const std::string& wish : start_.coloured_by) {
     const std::size_t equals = wish.rfind('=');
@@ -136,14 +136,14 @@ void Window::dress(Layer& layer, const std::string& own_name) {
 void Window::take(Loaded loaded) {
   Opened& opened = loaded.opened;
   const auto again = std::ranges::find(documents_, opened.path, &Document::path);
-  if (again != documents_.end()) forget(again->name);  // what is opened again is read anew
+  if (again != documents_.end()) forget(again->name);  // reopened inputs are read again
   Document document{.path = opened.path,
                     .kind = opened.kind,
                     .name = name_for(opened.path),
                     .follower = opened.follower,
                     .terrain = "",
                     .has_one_band = opened.follower != nullptr,
-                    .world = opened.world,
+                    .simulation = opened.simulation,
                     .dataset = opened.dataset,
                     .timeline = loaded.timeline};
   name_layers(opened.layers, document.name);
@@ -165,7 +165,7 @@ void Window::take(Loaded loaded) {
   first_look(opened, names);
   use(document);
   offer_ground();
-  // While a dataset is played, the sensors of a scene would stand where they began.
+  // During playback of a dataset, a scene's sensors would be shown at their initial poses.
   const bool is_played = playback_->is_open() && playback_->recording().dataset != nullptr;
   if (document.timeline != nullptr && is_played) hide_sensors_of_scenes();
   offer_comparisons();
@@ -192,14 +192,15 @@ void Window::first_look(const Opened& opened, const std::vector<std::string>& la
   canvas_->look(view().current_look());
 }
 
-// What came last is what is scanned, followed and played.
+// Makes a document the current one, whose terrain is followed and whose timeline is played.
 void Window::use(const Document& document) {
-  if (document.world != nullptr) playback_->set_world(document.world, document.name + "/");
+  if (document.simulation != nullptr)
+    playback_->set_world(document.simulation, document.name + "/");
   if (document.follower != nullptr) {
     tracker_->open(document.follower, document.terrain);
     follow_eye();
   }
-  // What was recorded is played rather than what a scene would do.
+  // Recorded data take precedence over a scene's simulated run.
   const bool is_recorded_elsewhere = document.dataset == nullptr && playback_->is_open() &&
                                      playback_->recording().dataset != nullptr;
   if (document.timeline != nullptr && !is_recorded_elsewhere) play(document);
@@ -219,16 +220,16 @@ void Window::play(const Document& document) {
   timeline_->show_timeline(document.timeline);
 }
 
-// The scene that came last is scanned; if there is none, the DEM.
+// Offers the scene opened last for scanning; if there is none, the DEM opened last.
 void Window::offer_ground() {
   const Document* scene = nullptr;
   const Document* dem = nullptr;
   for (const Document& each : documents_) {
-    if (each.world != nullptr) scene = &each;
+    if (each.simulation != nullptr) scene = &each;
     if (each.kind == InputKind::Dem && each.has_one_band) dem = &each;
   }
   if (scene == nullptr && dem != nullptr) return scan_->set_dem(dem->path);
-  scan_->set_world(scene == nullptr ? nullptr : scene->world);
+  scan_->set_world(scene == nullptr ? nullptr : scene->simulation);
 }
 
 void Window::hide_sensors_of_scenes() {
@@ -236,7 +237,7 @@ void Window::hide_sensors_of_scenes() {
   for (const Layer* layer : view().layers()) {
     const bool may_be = layer->kind == LayerKind::Sensors || layer->kind == LayerKind::Trail;
     const auto of = std::ranges::find(documents_, document_of(layer->name), &Document::name);
-    if (may_be && layer->visible && of != documents_.end() && of->world != nullptr)
+    if (may_be && layer->visible && of != documents_.end() && of->simulation != nullptr)
       sensors.push_back(layer->name);
   }
   for (const std::string& name : sensors) view().set_visible(name, false);
@@ -275,11 +276,11 @@ void Window::show_images() {
 void Window::remove_layer(const std::string& name) {
   view().remove(name);
   scans_here_.erase(name);
-  // It would come back as soon as the eye moves.
+  // Otherwise it would reappear as soon as the eye moves.
   if (tracker_->is_open() && tracker_->layer() == name) tracker_->close();
 }
 
-// A document and all of its layers are gone, and what was picked of them.
+// Removes a document with all of its layers, and the display of the last click.
 void Window::forget(const std::string& document) {
   picker_->clear();
   view().remove("picked/ray");
@@ -293,7 +294,7 @@ void Window::forget(const std::string& document) {
   const Document gone = std::move(*found);
   documents_.erase(found);
   if (gone.follower != nullptr) tracker_->close();
-  if (gone.world != nullptr) playback_->set_world(nullptr, "");
+  if (gone.simulation != nullptr) playback_->set_world(nullptr, "");
   const std::optional<ImageSource>& shown = images_->shown();
   if (gone.kind == InputKind::Picture && shown && shown->file == gone.path) images_->clear();
   if (gone.timeline != nullptr) {
@@ -305,7 +306,7 @@ void Window::forget(const std::string& document) {
   }
   for (const Document& each : documents_) {
     if ((gone.follower != nullptr && each.follower != nullptr) ||
-        (gone.world != nullptr && each.world != nullptr) ||
+        (gone.simulation != nullptr && each.simulation != nullptr) ||
         (gone.timeline != nullptr && each.timeline != nullptr)) {
       use(each);
     }
@@ -335,7 +336,8 @@ void Window::offer_comparisons() {
   std::vector<std::string> measured;
   std::vector<Truth> truths;
   for (const Document& document : documents_) {
-    if (document.world != nullptr) truths.push_back({"ground of " + document.name, document.world});
+    if (document.simulation != nullptr)
+      truths.push_back({"ground of " + document.name, document.simulation});
     if (document.kind == InputKind::Dem) {
       truths.push_back({"heights of " + document.name, Truth::DemFile{document.path}});
     }

@@ -43,7 +43,7 @@ void write(const std::filesystem::path& path, const std::string& text) {
   std::ofstream(path) << text;
 }
 
-// A dataset of two lidars and a camera.
+// Writes a dataset with two lidars and a camera.
 void write_dataset(const TemporaryFolder& folder, const std::string& text) {
   write(folder / "dataset.yaml", text);
   for (const std::string name : {"top", "rear"})
@@ -61,7 +61,7 @@ std::string refusal(const std::filesystem::path& folder) {
   return "";
 }
 
-TEST(DatasetReader, TellsWhatIsThere) {
+TEST(DatasetReader, ReadsFinishedFramesOfEachLidar) {
   const TemporaryFolder folder;
   write_dataset(folder, yaml);
   const RecordedDataset dataset = read_dataset(folder.path());
@@ -89,7 +89,8 @@ std::string changed(const std::string& from, const std::string& to) {
   return text;
 }
 
-// As the generator writes it: read line by line, for it may be larger than any other file.
+// The generator writes the entries one by one, and the reader reads the file line by line, because
+// it may be larger than any other file of the dataset.
 TEST(DatasetReader, ReadsAnyNumberOfFrames) {
   constexpr std::int64_t frames = 100'000;
   const TemporaryFolder folder;
@@ -121,9 +122,9 @@ TEST(DatasetReader, ReadsAnyNumberOfFrames) {
   EXPECT_EQ(dataset.georeference.origin_w_m, glm::dvec3(4, 5, 6));
 }
 
-TEST(DatasetReader, FaultsNameFileLineAndRule) {
+TEST(DatasetReader, ErrorsNameFileLineAndRule) {
   const std::vector<std::pair<std::string, std::string>> bad{
-      {changed("dataset: 1", "dataset: 2"), "reads format 1 alone"},
+      {changed("dataset: 1", "dataset: 2"), "reads only format 1"},
       {changed("state: done", "state: gone"), "dataset.yaml:9:"},
       {changed("stamp_s: 0.1", "stamp_s: 1e300"), "must be within 9e9 s"},
       {changed("stamp_s: 0.1", "stamp_s: nan"), "stamp_s"},
@@ -135,8 +136,8 @@ TEST(DatasetReader, FaultsNameFileLineAndRule) {
        "dataset.yaml:9:5: key 'sensor': missing"},
       {changed(", state: pending", ""), "key 'state': missing"},
       {changed("kind: camera}", "kind: camera, frames: 3}"),
-       "dataset.yaml:7:39: key 'frames': eye has 3 frames, but 1 are listed: was the file cut "
-       "short?"},
+       "dataset.yaml:7:39: key 'frames': eye has 3 frames, but 1 are listed: was the file "
+       "truncated?"},
       {changed("sensors:", "sensors: 3 #"), "dataset.yaml"},
       {"", "dataset.yaml"},
       {"[", "dataset.yaml"}};

@@ -20,7 +20,7 @@ using ::testing::AllOf;
 using ::testing::HasSubstr;
 using ::testing::ThrowsMessage;
 
-// Reads a dataset of these sensors, none of whose frames are listed.
+// Reads a dataset with these sensors and no listed frames.
 DatasetSummary read(const std::vector<std::string>& sensors,
                     const std::optional<Shard>& shard = std::nullopt) {
   const testing::TemporaryFolder folder;
@@ -30,7 +30,7 @@ DatasetSummary read(const std::vector<std::string>& sensors,
   return read_summary(folder.path());
 }
 
-TEST(DatasetSummary, TellsOfSensorsButNotOfPairs) {
+TEST(DatasetSummary, ListsSensorsButNotStereoPairs) {
   const DatasetSummary dataset =
       read({"name: top-1, kind: lidar, frames: 3", "name: eye_L, kind: camera, frames: 2",
             "name: pair, kind: stereo, left: eye_L, right: eye_L"});
@@ -39,8 +39,8 @@ TEST(DatasetSummary, TellsOfSensorsButNotOfPairs) {
   EXPECT_EQ(dataset.stem_of({.sensor = "eye_L", .frame = 1}), "camera/eye_L/000001");
 }
 
-// Names are made paths, to which files are written: none leads out of the dataset.
-TEST(DatasetSummary, RefusesNamesThatLeadElsewhere) {
+// Names become parts of paths to which files are written, so no name may lead out of the dataset.
+TEST(DatasetSummary, RejectsNamesThatLeaveTheDataset) {
   for (const std::string name : {"../x", "/tmp/x", "a/b", ".", "..", "a b", "\"\\0\"", "\u00e4"}) {
     EXPECT_THAT([&] { read({"name: " + name + ", kind: lidar, frames: 1"}); },
                 ThrowsMessage<Error>(AllOf(HasSubstr("dataset.yaml:5"), HasSubstr("name"))))
@@ -57,8 +57,8 @@ TEST(DatasetSummary, RefusesNamesThatLeadElsewhere) {
       ThrowsMessage<Error>(HasSubstr("'a' is taken by an earlier sensor")));
 }
 
-// As soon as it is asked, and without memory for each.
-TEST(DatasetSummary, CountsAnyNumberOfFramesAtOnce) {
+// Counting takes no time or memory per frame.
+TEST(DatasetSummary, CountsFramesInConstantTime) {
   const std::string most = "name: a, kind: lidar, frames: 4294967295";
   EXPECT_EQ(read({most}).asked_for, 4294967295u);
   std::size_t of_shards = 0;

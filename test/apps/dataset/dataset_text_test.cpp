@@ -10,7 +10,7 @@
 #include <vector>
 
 #include "core/error.h"
-#include "core/product_io.h"
+#include "core/io/file_io.h"
 #include "test/support/temporary_folder.h"
 
 namespace groundray::dataset_text_test {
@@ -38,7 +38,7 @@ std::vector<std::string> read_entries(DatasetText& text) {
   return read;
 }
 
-TEST(DatasetText, IsReadAsItWasWritten) {
+TEST(DatasetText, RoundTrips) {
   const testing::TemporaryFolder folder;
   for (const std::optional<Shard>& shard : {std::optional<Shard>(), std::optional(Shard{2, 3})}) {
     write(folder.path(), shard);
@@ -54,7 +54,7 @@ TEST(DatasetText, IsReadAsItWasWritten) {
   }
 }
 
-TEST(DatasetText, EndsWithTheSumOfAllAbove) {
+TEST(DatasetText, EndsWithTheChecksumOfAllLinesAbove) {
   const testing::TemporaryFolder folder;
   write(folder.path());
   const std::string text = read_text(folder / "dataset.yaml");
@@ -62,7 +62,7 @@ TEST(DatasetText, EndsWithTheSumOfAllAbove) {
   EXPECT_EQ(text.substr(last), "sha256_above: \"" + sha256_of(text.substr(0, last)) + "\"\n");
 }
 
-TEST(DatasetText, ThatWasChangedOrCutAnywhereIsNotIntact) {
+TEST(DatasetText, DetectsChangesAndTruncation) {
   const testing::TemporaryFolder folder;
   write(folder.path());
   const std::string whole = read_text(folder / "dataset.yaml");
@@ -87,8 +87,9 @@ TEST(DatasetText, ThatWasChangedOrCutAnywhereIsNotIntact) {
   EXPECT_FALSE(is_intact(whole + whole.substr(whole.find("sha256_above"))));
 }
 
-// A line that is changed hides none after it: each is handed out, and is an entry's or refused.
-TEST(DatasetText, LosesNoFrameAfterALineThatIsChanged) {
+// A damaged line hides none of the lines after it: each is passed on, either as an entry or to be
+// rejected.
+TEST(DatasetText, ReadsAllFramesAfterAChangedLine) {
   const testing::TemporaryFolder folder;
   write(folder.path());
   const std::string whole = read_text(folder / "dataset.yaml");
@@ -104,7 +105,7 @@ TEST(DatasetText, LosesNoFrameAfterALineThatIsChanged) {
   }
 }
 
-TEST(DatasetText, DiffersWhereTheFirstLineDoes) {
+TEST(DatasetText, QuotesTheFirstDifferingLine) {
   EXPECT_EQ(first_difference("a: 1\nb: 2\nc: 3\n", "a: 1\nb: 7\nc: 4\n"),
             "'b: 2' instead of 'b: 7'");
   EXPECT_EQ(first_difference("x: 1\n", "a: 1\n"), "'x: 1' instead of 'a: 1'");
@@ -116,7 +117,7 @@ TEST(DatasetText, DiffersWhereTheFirstLineDoes) {
                 blanks.substr(0, 40) + "2" + blanks.substr(0, 39) + "'");
 }
 
-TEST(DatasetText, OfAnEarlierVersionHasNoSums) {
+TEST(DatasetText, ReadsEarlierVersionsWithoutChecksums) {
   const testing::TemporaryFolder folder;
   write_text(folder / "dataset.yaml", header + "frames:\n  - {sensor: a, frame: 0}\n");
   DatasetText text(folder.path());
@@ -126,12 +127,12 @@ TEST(DatasetText, OfAnEarlierVersionHasNoSums) {
   EXPECT_FALSE(text.is_intact());
 }
 
-TEST(DatasetText, ThatIsNoneIsAnError) {
+TEST(DatasetText, RejectsMissingFilesAndMissingFrameLists) {
   const testing::TemporaryFolder folder;
   const auto open = [&] { DatasetText text(folder.path()); };
-  EXPECT_THAT(open, ThrowsMessage<Error>(HasSubstr("holds no dataset.yaml")));
+  EXPECT_THAT(open, ThrowsMessage<Error>(HasSubstr("contains no readable dataset.yaml")));
   write_text(folder / "dataset.yaml", header);
-  EXPECT_THAT(open, ThrowsMessage<Error>(HasSubstr("it lists no frames")));
+  EXPECT_THAT(open, ThrowsMessage<Error>(HasSubstr("no frames are listed")));
 }
 
 }  // namespace

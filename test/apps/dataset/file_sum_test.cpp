@@ -9,7 +9,7 @@
 #include <string_view>
 
 #include "core/error.h"
-#include "core/product_io.h"
+#include "core/io/file_io.h"
 #include "test/support/temporary_folder.h"
 
 namespace groundray::file_sum_test {
@@ -18,8 +18,8 @@ namespace {
 using ::testing::HasSubstr;
 using ::testing::ThrowsMessage;
 
-// NIST's examples of SHA-256.
-TEST(FileSum, IsThatOfThePublishedExamples) {
+// NIST's example values of SHA-256.
+TEST(FileSum, MatchesTheNistExamples) {
   EXPECT_EQ(sha256_of(""), "e3b0c44298fc1c149afbf4c8996fb92427ae41e4649b934ca495991b7852b855");
   EXPECT_EQ(sha256_of("abc"), "ba7816bf8f01cfea414140de5dae2223b00361a396177a9cb410ff61f20015ad");
   EXPECT_EQ(sha256_of("abcdbcdecdefdefgefghfghighijhijkijkljklmklmnlmnomnopnopq"),
@@ -28,7 +28,7 @@ TEST(FileSum, IsThatOfThePublishedExamples) {
             "cdc76e5c9914fb9281a1c7e284d73e67f1809a48a497200e046d39ccc7112cd0");
 }
 
-TEST(FileSum, DoesNotDependOnThePiecesThatBytesComeIn) {
+TEST(FileSum, IsIndependentOfTheChunkSize) {
   const std::string bytes(300'000, 'x');
   const testing::TemporaryFolder folder;
   write_text(folder / "file", bytes);
@@ -42,7 +42,7 @@ TEST(FileSum, DoesNotDependOnThePiecesThatBytesComeIn) {
   }
 }
 
-TEST(FileSum, GoesOnAfterItsDigitsWereAsked) {
+TEST(FileSum, AcceptsMoreBytesAfterReturningDigits) {
   Sha256 sum;
   sum.add("a");
   EXPECT_EQ(sum.digits(), sha256_of("a"));
@@ -50,7 +50,7 @@ TEST(FileSum, GoesOnAfterItsDigitsWereAsked) {
   EXPECT_EQ(sum.digits(), sha256_of("abc"));
 }
 
-TEST(FileSum, OfAFileThatCannotBeReadIsAnError) {
+TEST(FileSum, RejectsUnreadableFiles) {
   const testing::TemporaryFolder folder;
   EXPECT_THAT([&] { sum_file(folder / "none"); }, ThrowsMessage<Error>(HasSubstr("none")));
   EXPECT_THAT([&] { sum_file(folder.path()); }, ThrowsMessage<Error>(HasSubstr("cannot be read")));

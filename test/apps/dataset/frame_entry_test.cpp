@@ -15,16 +15,17 @@ namespace {
 using std::chrono::nanoseconds;
 
 const std::string empty_digits =
-    "e3b0c44298fc1c149afbf4c8996fb92427ae41e4649b934ca495991b7852b855";  // SHA-256 of nothing
+    "e3b0c44298fc1c149afbf4c8996fb92427ae41e4649b934ca495991b7852b855";  // SHA-256 of the empty
+                                                                         // string
 
-// As docs/formats.md has it.
+// The example of docs/reference/formats.md.
 const std::string done_line =
     R"({sensor: "top", frame: 3, stamp_s: 0.300036096, state: done, )"
     R"(convergence: {pulses: 12, other_echoes: 0, range_rms_m: 1e-05, range_max_m: 0.01}, )"
     R"(files: {"_preview.png": {bytes: 17, sha256: ")" +
     empty_digits + R"("}, ".ply": {bytes: 0, sha256: ")" + empty_digits + R"("}}})";
 
-TEST(FrameEntry, IsReadFromItsLine) {
+TEST(FrameEntry, ParsesItsLine) {
   const auto entry = parse_entry(done_line);
   ASSERT_TRUE(entry);
   EXPECT_EQ(entry->sensor, "top");
@@ -41,7 +42,7 @@ TEST(FrameEntry, IsReadFromItsLine) {
   EXPECT_EQ(text_of(*entry), done_line);
 }
 
-TEST(FrameEntry, OfAFrameThatIsNotThereHasNoFiles) {
+TEST(FrameEntry, PendingFramesHaveNoFiles) {
   const std::string line = R"({sensor: "a-b_1", frame: 0, stamp_s: -0.000000001, state: pending})";
   const auto entry = parse_entry(line);
   ASSERT_TRUE(entry);
@@ -53,14 +54,14 @@ TEST(FrameEntry, OfAFrameThatIsNotThereHasNoFiles) {
       << "an earlier version wrote no checksums";
 }
 
-TEST(FrameEntry, IsNotReadFromAnyBeginOfItsLine) {
+TEST(FrameEntry, RejectsTruncatedLines) {
   for (std::size_t size = 0; size < done_line.size(); ++size)
     EXPECT_FALSE(parse_entry(done_line.substr(0, size))) << size;
   EXPECT_FALSE(parse_entry(done_line + " "));
   EXPECT_FALSE(parse_entry(done_line + "\n"));
 }
 
-TEST(FrameEntry, OfAnythingElseIsNone) {
+TEST(FrameEntry, RejectsMalformedLines) {
   for (const auto& [old, now] : {std::pair<std::string, std::string>{"\"top\"", "\"../top\""},
                                  {"\"top\"", "\"\""},
                                  {"frame: 3", "frame: -3"},
@@ -85,8 +86,8 @@ TEST(FrameEntry, OfAnythingElseIsNone) {
   }
 }
 
-// Whatever becomes of a line, what is read of it can be written and read again.
-TEST(FrameEntry, IsTheSameWrittenAndReadAgain) {
+// Whatever the damage to a line, an entry that is read from it can be written and read again.
+TEST(FrameEntry, ParsedEntriesRoundTrip) {
   std::mt19937 random(3);
   std::size_t read = 0;
   for (int i = 0; i < 20'000; ++i) {
@@ -108,7 +109,7 @@ TEST(FrameEntry, IsTheSameWrittenAndReadAgain) {
   EXPECT_GT(read, 100u);
 }
 
-TEST(NamedSum, IsOfAFileInAFolderOfTheDataset) {
+TEST(NamedSum, AcceptsOnlyFilesInFoldersOfTheDataset) {
   const std::string line = R"({path: "poses/top.tum", bytes: 5, sha256: ")" + empty_digits + "\"}";
   const auto file = parse_named_sum(line);
   ASSERT_TRUE(file);

@@ -18,7 +18,7 @@ namespace {
 using ::testing::HasSubstr;
 using namespace groundray::testing;  // NOLINT(google-build-using-namespace)
 
-// As zlib itself writes files.
+// Packs bytes with zlib's own file writer.
 std::string packed(const std::string& bytes) {
   const TemporaryFolder folder;
   const std::filesystem::path path = folder / "a.gz";
@@ -45,7 +45,7 @@ std::string noise(std::size_t bytes) {
   return out;
 }
 
-TEST(PackedFile, BytesComeBack) {
+TEST(PackedFile, RoundTrips) {
   for (const std::string& bytes :
        {std::string(), std::string("ply\n"), noise(3'000'000), std::string(5'000'000, '\0')}) {
     EXPECT_EQ(unpack(packed(bytes), "a"), bytes);
@@ -57,24 +57,24 @@ TEST(PackedFile, BytesComeBack) {
   }
 }
 
-// As gunzip has it: members follow each other, and zeros at the end are padding.
-TEST(PackedFile, MembersFollowEachOther) {
+// As in gunzip, members follow each other, and zeros at the end are padding.
+TEST(PackedFile, ReadsConcatenatedMembers) {
   const std::string both = packed("one ") + packed(noise(2'000'000)) + packed("");
   EXPECT_EQ(unpack(both, "a"), "one " + noise(2'000'000));
   EXPECT_EQ(unpack(both + std::string(100, '\0'), "a"), "one " + noise(2'000'000));
   EXPECT_THAT(refusal(both + "more"), HasSubstr("a.ply.gz: it is damaged"));
 }
 
-TEST(PackedFile, WhatIsCutShortOrDamagedIsRefused) {
+TEST(PackedFile, RejectsTruncatedAndDamagedData) {
   const std::string whole = packed(noise(5000));
   EXPECT_EQ(refusal(whole), "");
   for (std::size_t size = 2; size < whole.size(); size += 41)
-    EXPECT_THAT(refusal(whole.substr(0, size)), HasSubstr("a.ply.gz: it is cut short")) << size;
+    EXPECT_THAT(refusal(whole.substr(0, size)), HasSubstr("a.ply.gz: it is truncated")) << size;
   std::string bad = whole;
-  bad[whole.size() / 2] ^= 1;  // its checksum tells
+  bad[whole.size() / 2] ^= 1;  // detected by the checksum
   EXPECT_THAT(refusal(bad), HasSubstr("a.ply.gz: it is damaged"));
   for (const std::string text : {"", "\x1f", "ply\n"})
-    EXPECT_THAT(refusal(text), HasSubstr("it is not packed by gzip, as its name says"));
+    EXPECT_THAT(refusal(text), HasSubstr("it is not in gzip format"));
 }
 
 }  // namespace

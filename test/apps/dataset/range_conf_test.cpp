@@ -26,9 +26,9 @@ std::string refusal(const std::string& text) {
   return "";
 }
 
-// A quarter turn about z by the file's quaternion takes D's x axis to the scan's y: so the scan's y
-// axis lies along D's x, p_D = R^T p_S + t.
-TEST(RangeConf, RotationsTakeTheScansAxesBack) {
+// The file's quaternion is a quarter turn about z that maps D's x axis to the scan's y axis. The
+// scan's y axis therefore lies along D's x axis: p_D = R^T p_S + t.
+TEST(RangeConf, InvertsTheRotationsOfTheFile) {
   const double half = std::numbers::sqrt2 / 2;
   const auto scans = parse_conf(
       "camera 1 2 3 0 0 0 1\nmesh bun.ply 0 0 0 0 0 0 1\n\n"
@@ -45,13 +45,13 @@ TEST(RangeConf, RotationsTakeTheScansAxesBack) {
   EXPECT_GT(y_of_scan.x, 0);
 }
 
-TEST(RangeConf, QuaternionsOfThreeDecimalsAreMadeUnits) {
+TEST(RangeConf, NormalisesRoundedQuaternions) {
   const auto scans = parse_conf("bmesh a 0 0 0 0.056 0.168 0 0.984\n", "a.conf");
   ASSERT_EQ(scans.size(), 1u);
   EXPECT_NEAR(glm::length(scans[0].X_DS.rotation), 1, 1e-15);
 }
 
-TEST(RangeConf, FaultsNameLineAndRule) {
+TEST(RangeConf, ErrorsNameLineAndRule) {
   const std::vector<std::pair<std::string, std::string>> bad{
       {"bmesh a 1 2 3 0 0 0", "must be `bmesh FILE tx ty tz qx qy qz qw`"},
       {"bmesh a 1 2 3 0 0 0 1 7", "must be `bmesh"},
@@ -68,7 +68,7 @@ TEST(RangeConf, FaultsNameLineAndRule) {
   }
 }
 
-TEST(RangeConf, OfOtherLinesNothingIsMade) {
+TEST(RangeConf, IgnoresOtherLines) {
   for (const std::string text : {"", "\n", "bmeshes a 0 0 0 0 0 0 1", "# bmesh a 0", "\0\xff"})
     EXPECT_TRUE(parse_conf(text, "a.conf").empty());
 }

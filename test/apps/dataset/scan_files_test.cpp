@@ -34,7 +34,7 @@ std::string refusal(const ScanChoice& choice) {
   return "";
 }
 
-TEST(FrameRange, IsWhatWasWritten) {
+TEST(FrameRange, ParsesBeginEndAndStep) {
   const auto taken = [](const std::string& text) {
     const FrameRange range = parse_frames(text);
     std::vector<std::size_t> numbers;
@@ -55,13 +55,14 @@ TEST(FrameRange, IsWhatWasWritten) {
     EXPECT_THROW(parse_frames(text), Error) << text;
 }
 
-// The greatest number is a frame like others, though none can follow it.
-TEST(FrameRange, OfTheGreatestNumberIsNoFaultOfOurs) {
+// The greatest number of 64 bits cannot be a frame, because no end can follow it; the number before
+// it can.
+TEST(FrameRange, RejectsTheLargest64BitNumber) {
   EXPECT_THROW(parse_frames("18446744073709551615"), Error);
   EXPECT_EQ(parse_frames("18446744073709551614").end, 18446744073709551615u);
 }
 
-TEST(ScanFiles, ConfsNameScansBesideThem) {
+TEST(ScanFiles, ReadsScansListedInAConf) {
   const TemporaryFolder folder;
   write(folder / "a.ply", "ply\nelement range_grid 4\nend_header\n");
   write(folder / "b.ply.gz", "");
@@ -83,13 +84,13 @@ TEST(ScanFiles, ConfsNameScansBesideThem) {
   ASSERT_EQ(some.scans.size(), 2u);
   EXPECT_EQ(some.scans[1].name, "c.ply");
   EXPECT_THAT(refusal({.inputs = {conf}, .frames = parse_frames("3:")}),
-              HasSubstr("no scan among the frames"));
+              HasSubstr("no scan among the requested frames"));
   EXPECT_THAT(refusal({.inputs = {conf}, .poses = conf}), HasSubstr("has poses of its own"));
   EXPECT_THAT(refusal({.inputs = {conf, folder / "a.ply"}}), HasSubstr("must be the only input"));
 }
 
-// A dataset of one lidar, whose second scan is not there yet, or of a camera.
-TEST(ScanFiles, DatasetsNeedNoLidarWherePairsMeasure) {
+// Writes a dataset with one camera, or with one lidar whose second scan is still pending.
+TEST(ScanFiles, LidarIsOptionalWhereStereoPairsAreUsed) {
   const TemporaryFolder folder;
   const auto dataset_of = [&](const std::string& kind) {
     write(folder / "dataset.yaml",
@@ -109,7 +110,7 @@ TEST(ScanFiles, DatasetsNeedNoLidarWherePairsMeasure) {
               HasSubstr("it has no lidar 'top'; it has: none"));
   EXPECT_THAT(refusal({.inputs = inputs, .need = ScanNeed::IfThere, .poses = "p.tum"}),
               HasSubstr("the dataset has no lidar"));
-  dataset_of("lidar");  // nothing says where it was or what it is
+  dataset_of("lidar");  // no file with the lidar's poses or specification
   EXPECT_TRUE(find_scans({.inputs = inputs, .need = ScanNeed::None}).scans.empty());
   EXPECT_THAT(refusal({.inputs = inputs, .need = ScanNeed::IfThere}), HasSubstr("top.tum"));
   std::filesystem::create_directories(folder / "poses");
@@ -118,7 +119,7 @@ TEST(ScanFiles, DatasetsNeedNoLidarWherePairsMeasure) {
   write(folder / "calibration/top.yaml", "range_noise_sigma_m: 0.02\n");
   EXPECT_EQ(find_scans({.inputs = inputs, .need = ScanNeed::IfThere}).scans.size(), 1u);
   EXPECT_THAT(refusal({.inputs = inputs, .need = ScanNeed::IfThere, .frames = parse_frames("1:")}),
-              AllOf(HasSubstr("no scan among the frames asked for; top: 1 frames are pending"),
+              AllOf(HasSubstr("no scan among the requested frames; top: 1 frames are pending"),
                     HasSubstr("--no-lidar")));
   EXPECT_THAT(refusal({.inputs = inputs, .need = ScanNeed::None, .sensors = {"top"}}),
               HasSubstr("--no-lidar: --sensor"));
@@ -127,7 +128,7 @@ TEST(ScanFiles, DatasetsNeedNoLidarWherePairsMeasure) {
               HasSubstr("only a dataset has stereo pairs"));
 }
 
-TEST(ScanFiles, PosesBelongToScansByLine) {
+TEST(ScanFiles, AssignsPosesToScansByLine) {
   const TemporaryFolder folder;
   const auto a = write(folder / "a.pcd", ""), b = write(folder / "b.pcd", "");
   const auto poses = write(folder / "p.tum", "0 1 0 0 0 0 0 1\n1 2 0 0 0 0 0 1\n");
@@ -140,16 +141,16 @@ TEST(ScanFiles, PosesBelongToScansByLine) {
   EXPECT_THAT(refusal({.inputs = {a, b, a}, .poses = poses}), HasSubstr("2 poses for 3 scans"));
   EXPECT_THAT(refusal({.inputs = {a, b}}), HasSubstr("2 scans and no poses"));
   EXPECT_THAT(refusal({.inputs = {a}, .points = LidarSpec::Points::AsFired}),
-              HasSubstr("each point needs a pose of its own"));
+              HasSubstr("each point needs its own pose"));
   EXPECT_THAT(refusal({.inputs = {a}, .sensors = {"top"}}), HasSubstr("only datasets have"));
   EXPECT_THAT(refusal({.inputs = {folder / "none.pcd"}}), HasSubstr("no such file"));
-  EXPECT_THAT(refusal({.inputs = {folder.path()}}), HasSubstr("holds no dataset.yaml"));
+  EXPECT_THAT(refusal({.inputs = {folder.path()}}), HasSubstr("contains no dataset.yaml"));
   const ScanFiles alone = find_scans({.inputs = {a}});
   EXPECT_EQ(alone.scans.at(0).X_DS, Pose{});
   EXPECT_FALSE(alone.are_posed);
 }
 
-TEST(ScanFiles, NamesAreStamps) {
+TEST(ScanFiles, ReadsStampsFromFileNames) {
   const TemporaryFolder folder;
   const auto poses =
       write(folder / "p.tum", "1317354879.0 0 0 0 0 0 0 1\n1317354880.0 8 0 0 0 0 0 1\n");
@@ -175,8 +176,8 @@ TEST(ScanFiles, NamesAreStamps) {
               HasSubstr("is outside the poses"));
 }
 
-// UTM's size leaves no room for millimetres in floats.
-TEST(ScanFiles, FarPosesGetAnOriginInWholeMetres) {
+// At the magnitude of UTM coordinates, single precision does not resolve millimetres.
+TEST(ScanFiles, ShiftsFarPosesByWholeMetres) {
   const TemporaryFolder folder;
   const auto a = write(folder / "a.pcd", ""), b = write(folder / "b.pcd", "");
   const auto poses =

@@ -14,8 +14,7 @@
 #include <vector>
 
 #include "core/error.h"
-#include "core/ply_io.h"
-#include "core/product_io.h"
+#include "core/io/ply_io.h"
 #include "test/support/temporary_folder.h"
 
 namespace groundray::scan_input_test {
@@ -29,7 +28,7 @@ using std::chrono::nanoseconds;
 constexpr int rings = 8, steps = 120;
 constexpr double sweep_s = 0.1;
 
-// A sensor that drives 10 m/s along D's x axis, and turns.
+// Pose of a sensor that moves at 10 m/s along D's x axis while it turns.
 Pose pose_at(double t_s) {
   return {rotation_from_yaw_pitch_roll(0.4 * t_s, 0, 0), {10 * t_s, 0, 2}};
 }
@@ -42,12 +41,12 @@ Trajectory path() {
 }
 
 struct Return {
-  glm::dvec3 p_S, p_D;  // as it fired, and in D
+  glm::dvec3 p_S, p_D;  // at its firing time, and in D
   int ring = 0;
   double time_s = 0;
 };
 
-// Of a drum about D's z axis.
+// Returns from a cylinder about D's z axis.
 std::vector<Return> returns(double stamp_s) {
   std::vector<Return> out;
   for (int step = 0; step < steps; ++step) {
@@ -64,7 +63,7 @@ std::vector<Return> returns(double stamp_s) {
 
 enum class In { S, Stamp };
 
-// Writes a scan, its points as they were fired or all at the stamp.
+// Writes a scan with its points in S at each firing time or all in S at the stamp.
 void write_scan(
     const std::filesystem::path& path, const std::vector<Return>& all, double stamp_s, In frame,
     const std::vector<std::pair<std::string, std::function<double(std::size_t)>>>& more = {}) {
@@ -101,8 +100,9 @@ ScanFiles files_of(const std::filesystem::path& path_of_scan, double stamp_s,
           .notes = {}};
 }
 
-// Wherever a file has its points, cells are the same, in D, with the origin that each beam had.
-TEST(ScanInput, PointsAsFiredAndAtTheStampAreOneScan) {
+// Whichever of the two frames a file's points are in, the cells are the same: in D, with the origin
+// of each beam.
+TEST(ScanInput, PointsAsFiredAndAtTheStampYieldTheSameScan) {
   const TemporaryFolder folder;
   const double stamp_s = 0.05;
   const auto all = returns(stamp_s);
@@ -130,8 +130,9 @@ TEST(ScanInput, PointsAsFiredAndAtTheStampAreOneScan) {
   }
 }
 
-// Without a path the sensor is where it was at the stamp, and its points are where they are.
-TEST(ScanInput, WithoutAPathThereIsOnePose) {
+// Without a path, the sensor has its pose at the stamp for the whole scan, and its points are taken
+// in that pose.
+TEST(ScanInput, WithoutATrajectoryThePoseIsConstant) {
   const TemporaryFolder folder;
   const auto all = returns(0);
   write_scan(folder / "a.ply", all, 0, In::Stamp);
@@ -146,7 +147,7 @@ TEST(ScanInput, WithoutAPathThereIsOnePose) {
   }
 }
 
-TEST(ScanInput, DeviationsAndLabelsGoAlong) {
+TEST(ScanInput, KeepsStandardDeviationsAndLabels) {
   const TemporaryFolder folder;
   const auto all = returns(0);
   write_scan(folder / "a.ply", all, 0, In::S,
@@ -164,7 +165,7 @@ TEST(ScanInput, DeviationsAndLabelsGoAlong) {
   EXPECT_EQ(other.cells.sd_m[3], 0.5f);
 }
 
-TEST(ScanInput, FaultsNameTheFile) {
+TEST(ScanInput, ErrorsNameTheFile) {
   const TemporaryFolder folder;
   const auto all = returns(0);
   const auto refusal = [&](const ScanFiles& files, const ScanTaking& taking) -> std::string {
@@ -178,9 +179,9 @@ TEST(ScanInput, FaultsNameTheFile) {
   write_scan(folder / "a.ply", all, 0, In::S);
   ScanFiles files = files_of(folder / "a.ply", 0, LidarSpec::Points::AsFired);
   EXPECT_THAT(refusal(files, {.grid = GridSource::File}),
-              AllOf(HasSubstr("a.ply"), HasSubstr("points that are an image")));
+              AllOf(HasSubstr("a.ply"), HasSubstr("points arranged as an image")));
   EXPECT_THAT(refusal(files, {.returns = ReturnChoice::Strongest}),
-              AllOf(HasSubstr("a.ply"), HasSubstr("intensity is not given")));
+              AllOf(HasSubstr("a.ply"), HasSubstr("there is no intensity")));
   files.scans[0].stamp = std::chrono::seconds(5);
   EXPECT_THAT(refusal(files, {}), AllOf(HasSubstr("a.ply"), HasSubstr("--time-zero-s")));
   const std::vector<std::pair<std::string, double>> bad{
@@ -195,8 +196,8 @@ TEST(ScanInput, FaultsNameTheFile) {
   }
 }
 
-// Points of no grid: the message names the option that takes them.
-TEST(ScanInput, CloudsWithoutAGridAreSentToAnotherWay) {
+// Points without a grid are rejected with a message that names the option that accepts them.
+TEST(ScanInput, SuggestsUnorganisedForCloudsWithoutAGrid) {
   const TemporaryFolder folder;
   PointCloud cloud(2000);
   for (const std::string name : {"x", "y", "z"}) {

@@ -9,7 +9,7 @@
 namespace groundray::shard_test {
 namespace {
 
-TEST(Shard, IsReadFromItsText) {
+TEST(Shard, ParsesIndexAndCount) {
   EXPECT_EQ(parse_shard("1/1"), (Shard{1, 1}));
   EXPECT_EQ(parse_shard("17/400"), (Shard{17, 400}));
   EXPECT_EQ(text_of({17, 400}), "17/400");
@@ -18,8 +18,9 @@ TEST(Shard, IsReadFromItsText) {
     EXPECT_FALSE(parse_shard(text)) << text;
 }
 
-// Each frame is in one of the shards, none of which has two more than another of one sensor's.
-TEST(Shard, SharesOutAllFramesEvenly) {
+// Each frame belongs to exactly one shard, and the shards' numbers of frames of a sensor differ by
+// one at most.
+TEST(Shard, DistributesFramesEvenly) {
   for (const std::uint32_t count : {1u, 2u, 3u, 7u, 40u}) {
     for (const std::int64_t frames : {1, 2, 5, 6, 39, 100}) {
       for (const std::uint32_t sensor : {0u, 1u, 5u}) {
@@ -42,15 +43,15 @@ TEST(Shard, SharesOutAllFramesEvenly) {
   }
 }
 
-TEST(Shard, OfNoOrTheMostFramesIsReckonedAtOnce) {
+TEST(Shard, HandlesNoFramesAndTheMaximumOfFrames) {
   EXPECT_EQ((Shard{2, 3}.share(0, 0)), 0);
   EXPECT_FALSE((Shard{2, 3}.has(0, 0, 0)));
   EXPECT_EQ((Shard{1, 1}.share(0, 4'294'967'295)), 4'294'967'295);
   EXPECT_EQ((Shard{1'000'000, 1'000'000}.share(7, 4'294'967'295)), 4294);
 }
 
-// Sensors of one frame each do not all go to one shard.
-TEST(Shard, SharesOutSensorsOfFewFrames) {
+// Sensors with one frame each are distributed over the shards.
+TEST(Shard, DistributesSensorsWithOneFrame) {
   for (std::uint32_t sensor = 0; sensor < 6; ++sensor)
     EXPECT_TRUE((Shard{1 + sensor % 3, 3}.has(sensor, 0, 1))) << sensor;
 }

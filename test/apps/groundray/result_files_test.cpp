@@ -51,7 +51,7 @@ TEST(ResultFiles, AppearTogether) {
   EXPECT_EQ(text_of(b), "B");
 }
 
-TEST(ResultFiles, LeaveNothingUnlessTheyAppear) {
+TEST(ResultFiles, LeaveNoTemporaryFilesOnFailure) {
   const TemporaryFolder folder;
   const fs::path a = folder.path() / "a.tif";
   const auto fail = [](const fs::path& path) { throw Error("{}: no space", path.string()); };
@@ -61,13 +61,14 @@ TEST(ResultFiles, LeaveNothingUnlessTheyAppear) {
     FAIL();
   } catch (const Error& error) {
     EXPECT_EQ(std::string(error.what()),
-              a.string() + ": no space");  // by the name that people know
+              a.string() + ": no space");  // the final path, not that of the temporary file
   }
   EXPECT_THAT(names_in(folder.path()), ElementsAre());
 }
 
-// A folder stands where the third is to be: the first was new, the second wrote over another.
-TEST(ResultFiles, AreTakenBackIfOneCannotAppear) {
+// A folder is in the way of the third file; the first file was new, and the second replaced
+// another.
+TEST(ResultFiles, AreRolledBackIfOneCannotAppear) {
   const TemporaryFolder folder;
   const fs::path a = folder.path() / "a.tif", b = folder.path() / "b.json",
                  c = folder.path() / "c.png";
@@ -83,16 +84,16 @@ TEST(ResultFiles, AreTakenBackIfOneCannotAppear) {
       FAIL();
     } catch (const Error& error) {
       EXPECT_THAT(error.what(), AllOf(HasSubstr("c.png: cannot be written"),
-                                      Not(HasSubstr("written all the same"))));
+                                      Not(HasSubstr("written nevertheless"))));
     }
   }
   EXPECT_THAT(names_in(folder.path()), ElementsAre("b.json", "c.png"));
   EXPECT_EQ(text_of(b), "old");
 }
 
-// The second takes the place of the link by which the first is reached, so that this cannot be
-// taken back until that is.
-TEST(ResultFiles, KeepWhatCannotBeTakenBack) {
+// The second file replaces the link through which the first is reached, so the first cannot be
+// undone before the second.
+TEST(ResultFiles, KeepBackupsIfRollbackFails) {
   const TemporaryFolder folder;
   const fs::path real = folder.path() / "real", link = folder.path() / "link.tif",
                  full = folder.path() / "full.tif", old = link / "b.tif";
@@ -116,14 +117,14 @@ TEST(ResultFiles, KeepWhatCannotBeTakenBack) {
   EXPECT_THAT(names_in(folder.path()), ElementsAre("full.tif", "link.tif", "real"));
   EXPECT_EQ(text_of(real / "b.tif"), "new");
   EXPECT_THAT(told, AllOf(HasSubstr("full.tif: cannot be written"),
-                          HasSubstr("b.tif is written all the same")));
-  const std::string words = "what it was is kept as ";
+                          HasSubstr("b.tif is written nevertheless")));
+  const std::string words = "its previous version is kept as ";
   ASSERT_THAT(told, HasSubstr(words));
   EXPECT_EQ(text_of(told.substr(told.find(words) + words.size())), "old");
   EXPECT_EQ(names_in(real).size(), 2u);
 }
 
-TEST(ResultFiles, AreCheckedBeforeWork) {
+TEST(ResultFiles, RejectInvalidPathsInAdvance) {
   const TemporaryFolder folder;
   const fs::path a = folder.path() / "a.tif", b = folder.path() / "b.tif";
   put(b, "old");
@@ -137,8 +138,8 @@ TEST(ResultFiles, AreCheckedBeforeWork) {
     return "none";
   };
   EXPECT_EQ(fault_of({a, b}, {}), "none");
-  EXPECT_THAT(fault_of({a, folder.path() / "." / "a.tif"}, {}), HasSubstr("one name"));
-  EXPECT_THAT(fault_of({a, b}, {b}), HasSubstr("it is read"));
+  EXPECT_THAT(fault_of({a, folder.path() / "." / "a.tif"}, {}), HasSubstr("the same name"));
+  EXPECT_THAT(fault_of({a, b}, {b}), HasSubstr("it is an input"));
   EXPECT_THAT(fault_of({folder.path() / "no" / "a.tif"}, {}), HasSubstr("there is no folder"));
   EXPECT_THAT(fault_of({folder.path()}, {}), HasSubstr("a folder"));
   EXPECT_NO_THROW(check_ending("x.TIF", {".tif", ".tiff"}));

@@ -9,7 +9,7 @@
 #include <vector>
 
 #include "core/error.h"
-#include "core/product_io.h"
+#include "core/io/file_io.h"
 #include "test/support/temporary_folder.h"
 
 namespace groundray::cloud_blocks_test {
@@ -61,8 +61,8 @@ std::vector<float> column(const CloudFile& file, std::size_t i) {
                             std::get<0>(file.cloud.columns()[i].values).end());
 }
 
-// All rows once, in order, whatever the block: as the reader of whole files has them.
-TEST(CloudBlocks, TogetherAreTheFile) {
+// Blocks of any size give all rows once, in order, as the reader of whole files does.
+TEST(CloudBlocks, TogetherEqualTheFile) {
   const TemporaryFolder folder;
   const std::string face = "element face 0\nproperty list uchar int vertex_indices\n";
   const std::vector<std::pair<std::string, std::string>> files{
@@ -92,8 +92,9 @@ TEST(CloudBlocks, TogetherAreTheFile) {
   }
 }
 
-// Texts, columns one after the other, lists, and files that are cut short are left to others.
-TEST(CloudBlocks, OtherFilesAreLeft) {
+// Text files, columns stored one after the other, lists, and truncated files are left to the reader
+// of whole files.
+TEST(CloudBlocks, RejectsLayoutsThatCannotBeSplit) {
   const TemporaryFolder folder;
   const std::string list = "property list uchar int of\n";
   const std::string whole = ply("binary_little_endian", "");

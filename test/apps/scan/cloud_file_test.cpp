@@ -58,7 +58,7 @@ TEST(CloudFile, ReadsPlyAndPcd) {
   EXPECT_EQ(pcd.X_FS, Pose());
 }
 
-TEST(CloudFile, ReadsTheFloatsOfKitti) {
+TEST(CloudFile, ReadsKittiFiles) {
   const std::string bytes = floats({1, 2, 3, 0.5, 4, 5, 6, 0.25});
   const CloudFile file = parse_cloud(bytes, "000000.bin", {});
   EXPECT_THAT(names_of(file), ElementsAre("x", "y", "z", "intensity"));
@@ -68,7 +68,7 @@ TEST(CloudFile, ReadsTheFloatsOfKitti) {
   EXPECT_THAT(names_of(named), ElementsAre("z"));
   EXPECT_EQ(named.cloud.column<float>("z")[1], 3);
   EXPECT_THAT(message_of([&] { parse_cloud(bytes + "abc", "a.bin", {}); }),
-              AllOf(StartsWith("a.bin: its 35 bytes are no multiple of 16"),
+              AllOf(StartsWith("a.bin: its 35 bytes are not a multiple of 16"),
                     HasSubstr("4 floats (x, y, z, intensity)")));
 }
 
@@ -99,7 +99,7 @@ TEST(CloudFile, NamesTheColumnsOfNumpyArrays) {
 TEST(CloudFile, JoinsTheArraysOfAnArchive) {
   const CloudFile joined = read_cloud(corpus("npy/stored.npz"), {});
   EXPECT_THAT(names_of(joined), ElementsAre("x", "y", "z", "ring"));
-  EXPECT_THAT(joined.unread, ElementsAre("scale (of 1 rows)", "names (it holds no numbers)"));
+  EXPECT_THAT(joined.unread, ElementsAre("scale (of 1 rows)", "names (it contains no numbers)"));
   const CloudFile apart = read_cloud(corpus("npy/deflated.npz"), {});
   EXPECT_THAT(names_of(apart), ElementsAre("x", "y", "z"));
   EXPECT_EQ(apart.cloud.rows(), 100u);
@@ -110,7 +110,7 @@ TEST(CloudFile, JoinsTheArraysOfAnArchive) {
   EXPECT_EQ(records.origins[0].column, "t");
 }
 
-TEST(CloudFile, TellsWhatToDoWithOtherForms) {
+TEST(CloudFile, SuggestsConversionOfOtherFormats) {
   const auto fault_of = [](const char* name) {
     return message_of([name] { read_cloud(name, {}); });
   };
@@ -119,18 +119,19 @@ TEST(CloudFile, TellsWhatToDoWithOtherForms) {
   EXPECT_THAT(fault_of("a.LAZ"), HasSubstr("LAS is not read"));
   EXPECT_THAT(fault_of("a.e57"), HasSubstr("a.e57: E57 is not read: save it as PLY"));
   EXPECT_THAT(fault_of("a.pcap"), HasSubstr("packets are not read"));
-  EXPECT_THAT(fault_of("a.xyz"), HasSubstr("the ending \".xyz\" is of no point file that is read"));
+  EXPECT_THAT(fault_of("a.xyz"),
+              HasSubstr("the extension \".xyz\" is not one of the supported point files"));
   EXPECT_THAT(fault_of("/no/a.ply"), HasSubstr("/no/a.ply: cannot be read"));
 }
 
-TEST(CloudFile, GarbageIsAnErrorInEveryForm) {
+TEST(CloudFile, RejectsGarbageInEveryFormat) {
   for (const char* name : {"a.ply", "a.pcd", "a.npy", "a.npz", "a.bin"}) {
     EXPECT_THAT(message_of([name] { parse_cloud("garbage", name, {}); }), StartsWith("a."));
   }
 }
 
-// A scan of a VLP-16, decoded by the Nebula driver. The driver's own distance is that of the
-// point.
+// A scan of a VLP-16, decoded by the Nebula driver. The driver's own distance column equals the
+// distance of the point.
 TEST(CloudFile, ReadsAScanOfARealSensor) {
   const auto path =
       testing::shared_data_folder() / "lidar/nebula_velodyne_hesai/vlp16_1673400472138016708.pcd";
@@ -142,7 +143,7 @@ TEST(CloudFile, ReadsAScanOfARealSensor) {
   const auto* const ranges = scan.find(Quantity::Range);
   ASSERT_NE(ranges, nullptr);
   for (std::size_t i = 0; i < scan.p_S.size(); ++i) {
-    // Floats up to 130 m.
+    // Single precision at up to 130 m.
     EXPECT_NEAR((*ranges)[i], glm::length(scan.p_S[i]), 2e-5) << i;
   }
 }

@@ -9,7 +9,7 @@
 
 #include "apps/scan/column_names.h"
 #include "core/error.h"
-#include "test/support/sample_scan.h"
+#include "test/support/scans/sample_scan.h"
 
 namespace groundray::scan_test {
 namespace {
@@ -31,7 +31,7 @@ std::string message_of(F&& f) {
   return "no Error was thrown";
 }
 
-/// A cloud of one point (3, 4, 0) and more columns of the type T.
+/// A cloud with one point (3, 4, 0) and one more column of type T.
 template <typename T>
 CloudFile one_point(const std::string& name, T value) {
   CloudFile file{.form = "made up", .cloud = PointCloud(1)};
@@ -42,7 +42,7 @@ CloudFile one_point(const std::string& name, T value) {
   return file;
 }
 
-TEST(ColumnNames, AreKnownInEverySpelling) {
+TEST(ColumnNames, RecognisesCommonSpellings) {
   const auto found = [](const std::vector<std::string>& columns, const char* ours) {
     const auto column = find_column(columns, ours);
     return column ? column->name : "none";
@@ -57,7 +57,7 @@ TEST(ColumnNames, AreKnownInEverySpelling) {
   EXPECT_EQ(found({"return_number"}, "return_index"), "return_number");
   EXPECT_EQ(found({"Classification"}, "label"), "Classification");
   EXPECT_EQ(found({"r"}, "range"), "r");
-  EXPECT_EQ(found({"r", "g", "b"}, "range"), "none");  // red
+  EXPECT_EQ(found({"r", "g", "b"}, "range"), "none");  // r is red
   EXPECT_EQ(found({"range_true"}, "range"), "none");
   EXPECT_EQ(found({"world_x", "nx"}, "x"), "none");
   EXPECT_EQ(found({"x"}, "no such name"), "none");
@@ -67,14 +67,14 @@ TEST(ColumnNames, AreKnownInEverySpelling) {
   EXPECT_EQ(found({"range_sd"}, "range"), "none");
 }
 
-TEST(ColumnNames, TellTheUnitOfATime) {
+TEST(ColumnNames, SuffixSetsTheUnitOfTime) {
   EXPECT_EQ(find_column({"t_ns"}, "time")->unit_s, 1e-9);
   EXPECT_EQ(find_column({"time_offset_us"}, "time")->unit_s, 1e-6);
   EXPECT_EQ(find_column({"time_s"}, "time")->unit_s, 1);
   EXPECT_EQ(find_column({"time_stamp"}, "time")->unit_s, std::nullopt);
 }
 
-TEST(Scan, TakesColumnsAndDeviationsOfItsReturnsAlone) {
+TEST(Scan, ReadsColumnsOfReturnsOnly) {
   CloudFile file{.form = "made up", .cloud = PointCloud(3), .image = {1, 3}};
   const float x[] = {1, 0, 2}, sd[] = {0.01f, 0.02f, 0.03f};
   const std::uint16_t columns[] = {7, 8, 9};
@@ -89,7 +89,7 @@ TEST(Scan, TakesColumnsAndDeviationsOfItsReturnsAlone) {
   EXPECT_EQ(scan.image.columns, 3);
 }
 
-TEST(Scan, SortsRowsThatAreNoReturns) {
+TEST(Scan, ClassifiesRowsWithoutReturns) {
   const double x[] = {1, 0, nan, infinity, -infinity, 1, 1, 1, -0.};
   const double y[] = {2, 0, 0, 0, -infinity, 1, 1, 1, 0};
   const double range[] = {1, 0, 1, 1, 1, infinity, -infinity, nan, 0};
@@ -109,29 +109,29 @@ TEST(Scan, SortsRowsThatAreNoReturns) {
   EXPECT_EQ(scan.no_returns.zero, 2u);
 }
 
-TEST(Scan, BringsPointsToTheSensorAndMetres) {
+TEST(Scan, TransformsPointsToTheSensorFrameInMetres) {
   CloudFile file = one_point("i", std::uint8_t{7});
   ScanReading reading{.unit_m = 0.5};
-  // The sensor looks along the file's y axis and stands at (1, 0, 0) m: its x is their y.
+  // The sensor looks along the file's y axis from (1, 0, 0) m: its x axis is the file's y axis.
   reading.X_FS = Pose{.rotation = glm::dquat(std::sqrt(0.5), 0, 0, std::sqrt(0.5)),
                       .translation_m = {1, 0, 0}};
-  const Scan scan = scan_of(file, "a", reading);  // (1.5, 2, 0) m less (1, 0, 0)
+  const Scan scan = scan_of(file, "a", reading);  // (1.5, 2, 0) m - (1, 0, 0) m
   EXPECT_NEAR(glm::distance(scan.p_S[0], glm::dvec3(2, -0.5, 0)), 0, 1e-15);
   EXPECT_THAT(*scan.find(Quantity::Intensity), ElementsAre(7));
   reading.X_FS = FileViewpoint{};
   EXPECT_THAT(message_of([&] { scan_of(file, "a", reading); }),
-              AllOf(HasSubstr("it tells no viewpoint of its own"), HasSubstr("(--sensor-pose)")));
+              AllOf(HasSubstr("only PCD files contain a viewpoint"), HasSubstr("(--sensor-pose)")));
   file.X_FS = Pose{.translation_m = {1, 0, 0}};  // in the file's unit
   EXPECT_EQ(scan_of(file, "a", reading).p_S[0], glm::dvec3(1, 2, 0));
   EXPECT_THAT(scan_of(file, "a", {}).notes[0],
               AllOf(HasSubstr("VIEWPOINT other than the origin"), HasSubstr("(--viewpoint;")));
 }
 
-TEST(Scan, TakesTimesInTheUnitThatIsTold) {
+TEST(Scan, AppliesTheUnitOfTime) {
   const auto time_of = [](const CloudFile& file, const ScanReading& reading) {
     return scan_of(file, "a", reading).find(Quantity::Time)->at(0);
   };
-  EXPECT_EQ(time_of(one_point("t", 0.25), {}), 0.25);  // floats: seconds
+  EXPECT_EQ(time_of(one_point("t", 0.25), {}), 0.25);  // floating-point numbers are seconds
   EXPECT_EQ(time_of(one_point("t_ns", 2.5e8), {}), 0.25);
   EXPECT_EQ(time_of(one_point("t", std::uint32_t{250'000'000}), {.time_unit_s = 1e-9}), 0.25);
   EXPECT_EQ(time_of(one_point("t", 10.25), {.time_zero = std::chrono::seconds(10)}), 0.25);
@@ -140,24 +140,24 @@ TEST(Scan, TakesTimesInTheUnitThatIsTold) {
               1.2e-9, 1e-23);
   const Scan asked = scan_of(one_point("t", std::uint32_t{5}), "a", {});
   EXPECT_EQ(asked.find(Quantity::Time), nullptr);
-  EXPECT_THAT(asked.notes, ElementsAre(AllOf(HasSubstr("The column t of a does not say its unit"),
+  EXPECT_THAT(asked.notes, ElementsAre(AllOf(HasSubstr("The unit of column t of a is unknown"),
                                              HasSubstr("give it (--time-unit-s 1e-9"))));
   EXPECT_THAT(asked.frame, HasSubstr("taken as in the sensor's frame"));
   EXPECT_THAT(asked.unused, ElementsAre("t"));
 }
 
-// A double has 256 ns between numbers there.
-TEST(Scan, KeepsNanosecondsOfStampsSince1970) {
+// At this magnitude, neighbouring doubles are 256 ns apart.
+TEST(Scan, KeepsNanosecondsOfUnixTimes) {
   CloudFile file = one_point("timestamp_ns", 22.);
   file.origins = {{"timestamp_ns", 1'673'400'471'837'873'200}};
   ScanReading reading{.time_zero = std::chrono::nanoseconds(1'673'400'471'837'873'197)};
   EXPECT_DOUBLE_EQ(scan_of(file, "a", reading).find(Quantity::Time)->at(0), 25e-9);
   file.origins[0].origin /= 1000;
-  reading.time_unit_s = 1e-6;  // 22 us after ...873 us, of a clock that showed 873.197 us
+  reading.time_unit_s = 1e-6;  // 22 us after ...873 us; time zero is at ...873.197 us
   EXPECT_DOUBLE_EQ(scan_of(file, "a", reading).find(Quantity::Time)->at(0), 21.803e-6);
 }
 
-TEST(Scan, DoesNotTakeHoursForSeconds) {
+TEST(Scan, IgnoresTimesOfImplausibleDuration) {
   CloudFile file{.form = "made up", .cloud = PointCloud(2)};
   for (const char* name : {"x", "y", "z"}) std::ranges::fill(file.cloud.add<float>(name), 1.f);
   std::ranges::copy(std::array{1.6e18, 1.6e18 + 1e8}, file.cloud.add<double>("timestamp").begin());
@@ -174,13 +174,13 @@ TEST(Scan, CountsReturnsFromOne) {
   EXPECT_EQ(index_of(0), 1);
 }
 
-TEST(Scan, LeavesOutKeysThatAreNoNumbers) {
+TEST(Scan, IgnoresColumnsWithNonFiniteValues) {
   const Scan scan = scan_of(one_point("ring", nan), "a", {});
   EXPECT_EQ(scan.find(Quantity::Ring), nullptr);
-  EXPECT_THAT(scan.notes.back(), HasSubstr("1 values of ring are no finite numbers"));
+  EXPECT_THAT(scan.notes.back(), HasSubstr("1 values of ring are not finite"));
 }
 
-TEST(Scan, TellsWhatItTookForWhat) {
+TEST(Scan, ReportsTheMeaningOfEachColumn) {
   const Scan scan = scan_of(one_point("laser_id", std::uint8_t{3}), "a", {.unit_m = 0.001});
   ASSERT_EQ(scan.read.size(), 4u);
   EXPECT_EQ(scan.read[0].note, "of 0.001 m");
@@ -189,7 +189,7 @@ TEST(Scan, TellsWhatItTookForWhat) {
   EXPECT_THAT(scan_of(one_point("curvature", 1.f), "a", {}).unused, ElementsAre("curvature"));
 }
 
-TEST(Scan, NamesColumnsThatAreMissing) {
+TEST(Scan, ReportsMissingColumns) {
   CloudFile file{.form = "made up", .cloud = PointCloud(1)};
   for (const char* name : {"x", "Y", "zz", "red"}) file.cloud.add<float>(name)[0] = 1;
   EXPECT_THAT(

@@ -17,7 +17,7 @@ enum class Fruit { Apple = 7, Pear = -2, Quince = 0 };
 const Words<Fruit> fruits{
     {"pear", Fruit::Pear}, {"apple", Fruit::Apple}, {"quince", Fruit::Quince}};
 
-// The fault of a line, or nothing.
+// Returns the error message for a command line; empty if there is none.
 std::string fault_of(CLI::App& app, const std::string& line) {
   try {
     app.parse(line);
@@ -27,7 +27,7 @@ std::string fault_of(CLI::App& app, const std::string& line) {
   return "";
 }
 
-TEST(WordOption, GivesWhatAWordStandsFor) {
+TEST(WordOption, MapsWordsToValues) {
   for (const auto& [word, value] : fruits) {
     CLI::App app;
     Fruit fruit = Fruit::Quince;
@@ -42,13 +42,13 @@ TEST(WordOption, GivesWhatAWordStandsFor) {
   }
 }
 
-TEST(WordOption, TellsTheWordsThatThereAre) {
+TEST(WordOption, ListsTheAcceptedWords) {
   CLI::App app;
   Fruit fruit = Fruit::Apple;
   add_words(&app, "--fruit", fruit, "Of a tree", fruits);
   EXPECT_THAT(fault_of(app, "--fruit plum"),
               AllOf(HasSubstr("--fruit"), HasSubstr("'plum' must be pear, apple or quince")));
-  EXPECT_NE(fault_of(app, "--fruit 7"), "");  // a number is no word
+  EXPECT_NE(fault_of(app, "--fruit 7"), "");  // the number of an enumerator is not accepted
   EXPECT_NE(fault_of(app, "--fruit Apple"), "");
   EXPECT_EQ(fruit, Fruit::Apple);
   EXPECT_THAT(app.help(), AllOf(HasSubstr("--fruit pear|apple|quince"), Not(HasSubstr("7"))));

@@ -10,8 +10,8 @@
 #include <string_view>
 
 #include "core/error.h"
-#include "core/product_io.h"
-#include "core/text_lines.h"
+#include "core/io/file_io.h"
+#include "core/io/text_lines.h"
 #include "test/support/temporary_folder.h"
 
 namespace groundray::golden::dem_comparison_test {
@@ -26,7 +26,7 @@ using ::testing::ThrowsMessage;
 
 constexpr float hole = std::numeric_limits<float>::quiet_NaN();
 
-/// A DEM of 2 m cells from north to south whose heights are what `height(x, y)` says, of D.
+/// A DEM with rows from north to south and heights `height(x, y)`, with x and y in D.
 template <typename Height>
 Dem dem(glm::ivec2 size, glm::dvec2 first_m, double step_m, const Height& height) {
   std::vector<float> heights_m;
@@ -38,7 +38,7 @@ Dem dem(glm::ivec2 size, glm::dvec2 first_m, double step_m, const Height& height
   return {HeightGrid(size, first_m, {step_m, -step_m}, std::move(heights_m)), {}, {}, {}};
 }
 
-/// With the height of one sample, or all, changed.
+/// Returns a copy of a DEM with its heights modified by `change`.
 template <typename Change>
 Dem changed(const Dem& from, const Change& change) {
   std::vector<float> heights_m(from.grid.heights_m().begin(), from.grid.heights_m().end());
@@ -61,7 +61,7 @@ double figure(const Section& section, const std::string& name) {
   return 0;
 }
 
-TEST(CompareDems, FindsNoDifferenceBetweenEqualOnes) {
+TEST(CompareDems, FindsNoDifferenceBetweenEqualDems) {
   const Dem one = dem({30, 20}, {0, 100}, 2, hills);
   const Section section = compare_dems(one, one, "a");
   for (const char* name : {"height: RMS error", "slope of triangles: largest error",
@@ -74,8 +74,9 @@ TEST(CompareDems, FindsNoDifferenceBetweenEqualOnes) {
   EXPECT_EQ(section.pictures.size(), 1u);
 }
 
-// On a plane of heights 0, with 0.5 m added everywhere, 2 m at a sample, and three holes.
-TEST(CompareDems, ReportsTheErrorsThatWereMade) {
+// A level plane against itself with 0.5 m added everywhere; one sample has an error of -2 m, and
+// there are three holes.
+TEST(CompareDems, ReportsKnownErrors) {
   const Dem flat = dem({20, 10}, {0, 0}, 2, [](double, double) { return 100.0; });
   const Dem reference = changed(flat, [](std::vector<float>& heights) { heights[0] = hole; });
   const Dem other = changed(flat, [](std::vector<float>& heights) {
@@ -93,13 +94,14 @@ TEST(CompareDems, ReportsTheErrorsThatWereMade) {
   EXPECT_NEAR(figure(section, "height: median error"), 0.5, 1e-12);
   EXPECT_EQ(figure(section, "height: NMAD, 1.4826 times the median of |error - median|"), 0);
   EXPECT_NEAR(figure(section, "height: largest error"), 2, 1e-12);
-  EXPECT_THAT(section.text, HasSubstr("Heights are worst in column 7, row 3 (east 14.000 m, north "
-                                      "-6.000 m): 98 m where the reference has 100 m."));
+  EXPECT_THAT(section.text,
+              HasSubstr("The largest height error is in column 7, row 3 (east 14.000 m, north "
+                        "-6.000 m): 98 m where the reference has 100 m."));
   EXPECT_THAT(section.tables[0].rows,
               ElementsAre(ElementsAre("0 to 5", "197", ::testing::_, ::testing::_, "0", "0.5")));
 }
 
-// The plane z = x tan(30 degrees) against z = x tan(40 degrees), and against its mirror.
+// The plane z = x tan(30 degrees) against z = x tan(40 degrees), and against its mirror image.
 TEST(CompareDems, MeasuresSlopesOfTriangles) {
   const auto tilted = [](double slope_deg) {
     const double slope = std::tan(slope_deg * std::numbers::pi / 180);
@@ -114,24 +116,25 @@ TEST(CompareDems, MeasuresSlopesOfTriangles) {
   EXPECT_THAT(steeper.tables[0].rows[0][0], "20 to 30");
 }
 
-// A grid of half the step that has a height of its own between the samples of the coarse one: the
-// coarse reference sees its samples alone. The other way round the coarse one's triangles count,
-// split from north-east to south-west: in the middle of a cell that is the mean of those two.
-TEST(CompareDems, HoldsOtherGridsAgainstTheReferencesSamples) {
+// The fine grid has half the step and heights of its own between the coarse samples: a coarse
+// reference compares only its own samples. A fine reference is compared with the coarse grid's
+// triangles, split from north-east to south-west: at a cell's centre their height is the mean of
+// these two corners.
+TEST(CompareDems, ComparesOtherGridsAtTheReferencesSamples) {
   const auto saddle = [](double x, double y) { return x * y / 4; };
   const Dem coarse = dem({2, 2}, {0, 2}, 2, saddle), fine = dem({3, 3}, {0, 2}, 1, saddle);
   EXPECT_EQ(figure(compare_dems(coarse, fine, "a"), "height: largest error"), 0);
   const Section section = compare_dems(fine, coarse, "a");
   EXPECT_EQ(figure(section, "samples that both have"), 9);
-  EXPECT_THAT(section.text, HasSubstr("at 5 of the reference's samples the other's height is that "
-                                      "of its triangles"));
-  // North-east is 1 m, south-west 0; the saddle has 1/4 m there.
+  EXPECT_THAT(section.text, HasSubstr("at 5 of the reference's samples the other's height is "
+                                      "interpolated on its triangles"));
+  // The north-east corner is at 1 m, the south-west one at 0; the saddle is at 1/4 m there.
   EXPECT_NEAR(figure(section, "height: largest error"), 0.25, 1e-12);
   EXPECT_THAT(section.text, HasSubstr("column 1, row 1"));
   EXPECT_NEAR(figure(section, "height: mean error"), 0.25 / 9, 1e-12);
 }
 
-TEST(CompareDems, FindsTheSamePlaceWhateverTheOriginAndExtent) {
+TEST(CompareDems, AlignsGridsWithDifferentOriginsAndExtents) {
   const Dem whole = dem({30, 20}, {0, 100}, 2, hills);
   Dem part = dem({10, 10}, {20, 90}, 2, hills);
   part.grid = HeightGrid({10, 10}, {20 - 7 + 1e-7, 90 + 3 - 1e-7}, {2, -2},
@@ -144,14 +147,14 @@ TEST(CompareDems, FindsTheSamePlaceWhateverTheOriginAndExtent) {
   EXPECT_THAT(section.text, HasSubstr("sample by sample"));
 }
 
-TEST(CompareDems, SeesThatAllIsShiftedByHalfACell) {
+TEST(CompareDems, DetectsAShiftOfHalfACell) {
   const Dem reference = dem({60, 50}, {0, 100}, 2, hills);
   const Dem shifted =
       dem({60, 50}, {0, 100}, 2, [](double x, double y) { return hills(x - 1, y + 1) + 0.3; });
   const Section section = compare_dems(reference, shifted, "a");
   EXPECT_THAT(section.text,
               AllOf(HasSubstr("THE OTHER SEEMS TO BE SHIFTED"), HasSubstr("PixelIs")));
-  // "by EAST m to the east and NORTH m to the north"
+  // Reads "by EAST m to the east and NORTH m to the north".
   const std::string_view text = section.text;
   const auto words = words_of(text.substr(text.find("by ", text.find("SHIFTED"))));
   ASSERT_GT(words.size(), 7u);
@@ -167,7 +170,7 @@ TEST(CompareDems, SeesThatAllIsShiftedByHalfACell) {
   EXPECT_THAT(compare_dems(reference, noisy, "a").text, Not(HasSubstr("SHIFTED")));
 }
 
-/// Writes an ESRI ASCII grid, and a reference system if there is one.
+/// Writes an ESRI ASCII grid and, if `crs` is not empty, its coordinate reference system.
 void write_asc(const TemporaryFolder& folder, const std::string& name, double x, double y,
                const std::string& heights, const std::string& crs) {
   write_text(folder / (name + ".asc"), "ncols 3\nnrows 2\nxllcorner " + std::to_string(x) +
@@ -187,7 +190,7 @@ std::string utm(int meridian_deg, int zone) {
          "\"Meter\",1.0]]";
 }
 
-TEST(CompareDems, ReadsFilesAndRefusesWhatDoesNotMatch) {
+TEST(CompareDems, ReadsFilesAndRejectsIncompatibleOnes) {
   const TemporaryFolder folder;
   write_asc(folder, "a", 500000, 5e6, "1 2 3\n4 5 6", utm(3, 31));
   write_asc(folder, "b", 500000, 5e6, "1 2 3\n4 5 7", utm(3, 31));
@@ -202,7 +205,7 @@ TEST(CompareDems, ReadsFilesAndRefusesWhatDoesNotMatch) {
     EXPECT_THAT(measure.name, Not(HasSubstr("triangles")));
   const Section without = compare_dems(folder / "a.asc", folder / "c.asc");
   EXPECT_EQ(figure(without, "holes in the other alone, and what lies beyond it"), 1);
-  EXPECT_THAT(without.text, HasSubstr("The other names no reference system"));
+  EXPECT_THAT(without.text, HasSubstr("The other has no coordinate reference system"));
   EXPECT_THAT([&] { compare_dems(folder / "a.asc", folder / "d.asc"); },
               ThrowsMessage<Error>(AllOf(HasSubstr("d.asc: its reference system is "),
                                          HasSubstr("they must be the "

@@ -11,8 +11,8 @@ namespace {
 using ::testing::DoubleEq;
 using ::testing::ElementsAre;
 
-// numpy.quantile([3, 1, 4, 1, 5, 9, 2, 6], q).
-TEST(ErrorFigures, QuantilesAreThoseOfNumPy) {
+// Expected values: numpy.quantile([3, 1, 4, 1, 5, 9, 2, 6], q).
+TEST(ErrorFigures, QuantilesMatchNumPy) {
   const std::vector<double> values{3, 1, 4, 1, 5, 9, 2, 6};
   EXPECT_DOUBLE_EQ(quantile(values, 0), 1);
   EXPECT_DOUBLE_EQ(quantile(values, 0.25), 1.75);
@@ -23,7 +23,7 @@ TEST(ErrorFigures, QuantilesAreThoseOfNumPy) {
   EXPECT_TRUE(std::isnan(quantile({}, 0.5)));
 }
 
-TEST(ErrorFigures, AreWhatTheirNamesSay) {
+TEST(ErrorFigures, MatchTheirDefinitions) {
   const ErrorFigures figures = figures_of({1, -5, 2, 2, 5});
   EXPECT_EQ(figures.count, 5u);
   EXPECT_DOUBLE_EQ(figures.mean, 1);
@@ -34,11 +34,11 @@ TEST(ErrorFigures, AreWhatTheirNamesSay) {
   EXPECT_DOUBLE_EQ(figures.p95_size, 5);
   EXPECT_DOUBLE_EQ(figures.largest, 5);
   EXPECT_EQ(figures.worst, 1u);
-  EXPECT_DOUBLE_EQ(figures.nmad, 1.4826);  // of 1, 7, 0, 0, 3
+  EXPECT_DOUBLE_EQ(figures.nmad, 1.4826);  // median of 1, 7, 0, 0, 3, times 1.4826
   EXPECT_EQ(figures_of({}).count, 0u);
 }
 
-TEST(ErrorFigures, OfNoErrorsAreNoNumbersAndAreNotTold) {
+TEST(ErrorFigures, AreNaNAndNotReportedWithoutErrors) {
   const ErrorFigures figures = figures_of({});
   for (const double figure :
        {figures.mean, figures.rms, figures.mean_size, figures.median, figures.median_size,
@@ -51,7 +51,7 @@ TEST(ErrorFigures, OfNoErrorsAreNoNumbersAndAreNotTold) {
   EXPECT_TRUE(section.histograms.empty());
 }
 
-TEST(ErrorFigures, AreHeldAgainstTheirLimits) {
+TEST(ErrorFigures, AreComparedWithTheirLimits) {
   Section section;
   tell(section, "a", 3, "m");
   hold(section, "b", 3, "m", 3, "why");

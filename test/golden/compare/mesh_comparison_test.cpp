@@ -10,8 +10,8 @@
 #include <string>
 
 #include "core/error.h"
-#include "core/mesh_io.h"
-#include "test/support/solid.h"
+#include "core/io/mesh_io.h"
+#include "test/support/scans/solid.h"
 #include "test/support/temporary_folder.h"
 
 namespace groundray::golden::mesh_comparison_test {
@@ -33,14 +33,14 @@ TriangleMesh moved(TriangleMesh mesh, const glm::dvec3& by_m) {
   return mesh;
 }
 
-// A cube of side 2 within one of side 2.5: 0.25 from face to face, and from the outer's corners to
-// the inner's 0.25 sqrt(3).
-TEST(MeshComparison, OfTwoCubesIsThatOfFacesAndCorners) {
+// A cube of side 2 m inside one of 2.5 m: 0.25 m from face to face, and 0.25 sqrt(3) m from the
+// outer corners to the inner ones.
+TEST(MeshComparison, MatchesClosedFormsForNestedCubes) {
   const TriangleMesh inner = testing::box_model({2, 2, 2}).mesh;
   const TriangleMesh outer = testing::box_model({2.5, 2.5, 2.5}).mesh;
   const Section section = compare_meshes(inner, outer, "cubes");
   const double corner_m = 0.25 * std::sqrt(3.0);
-  constexpr double tolerance_m = 1e-6 * 3.5;  // of the inner's diagonal
+  constexpr double tolerance_m = 1e-6 * 3.5;  // relative to the inner diagonal, 2 sqrt(3) m
   EXPECT_LE(value_of(section, "Hausdorff distance, at least"), corner_m);
   EXPECT_GE(value_of(section, "Hausdorff distance, at most"), corner_m);
   EXPECT_NEAR(value_of(section, "Hausdorff distance, at most"), corner_m, tolerance_m);
@@ -55,9 +55,10 @@ TEST(MeshComparison, OfTwoCubesIsThatOfFacesAndCorners) {
   EXPECT_EQ(section.verdict, Verdict::Told);
 }
 
-// Of the outer's face of 2.5 m, a square of 2 m is 0.25 m away; strips beside it are up to 0.25 m
-// off its edges. From the inner, all is 0.25 m.
-TEST(MeshComparison, TellsPrecisionAndCompletenessWithinTolerances) {
+// On an outer face of side 2.5 m, a square of side 2 m is 0.25 m from the inner cube; the strips
+// round it are up to 0.25 m beyond that square's edges. All of the inner cube is 0.25 m from the
+// outer.
+TEST(MeshComparison, ReportsPrecisionAndCompletenessWithinTolerances) {
   const TriangleMesh inner = testing::box_model({2, 2, 2}).mesh;
   const TriangleMesh outer = testing::box_model({2.5, 2.5, 2.5}).mesh;
   const Section section =
@@ -65,7 +66,7 @@ TEST(MeshComparison, TellsPrecisionAndCompletenessWithinTolerances) {
   EXPECT_EQ(value_of(section, "precision within 0.2 m"), 0);
   EXPECT_EQ(value_of(section, "completeness within 0.2 m"), 0);
   EXPECT_EQ(value_of(section, "F1 within 0.2 m"), 0);
-  // Within 0.26 m are the points at most r = sqrt(0.26^2 - 0.25^2) off the square.
+  // Points within 0.26 m are at most r = sqrt(0.26^2 - 0.25^2) outside the square.
   const double r = std::sqrt(0.26 * 0.26 - 0.25 * 0.25);
   const double share = (4 + 8 * r + std::numbers::pi * r * r) / 6.25;
   EXPECT_NEAR(value_of(section, "precision within 0.26 m"), 100 * share, 0.2);
@@ -78,7 +79,7 @@ TEST(MeshComparison, TellsPrecisionAndCompletenessWithinTolerances) {
             0);
 }
 
-TEST(MeshComparison, TellsHowDistancesAreSpreadAndWhereTheyAreLargest) {
+TEST(MeshComparison, ReportsTheDistributionAndTheLargestDistances) {
   const TriangleMesh ball = testing::icosphere(1, 3).mesh;
   TriangleMesh dented = ball;
   dented.vertices_m[5] *= 1.2;
@@ -87,7 +88,7 @@ TEST(MeshComparison, TellsHowDistancesAreSpreadAndWhereTheyAreLargest) {
   for (const Histogram& histogram : section.histograms) {
     const auto whole = std::accumulate(histogram.counts.begin(), histogram.counts.end(),
                                        histogram.below + histogram.above);
-    EXPECT_NEAR(static_cast<double>(whole), 1e6, 60);  // each bin is rounded to one
+    EXPECT_NEAR(static_cast<double>(whole), 1e6, 60);  // the count of each bin is rounded
     EXPECT_GT(histogram.counts[0], 900'000u);
   }
   ASSERT_EQ(section.tables.size(), 2u);
@@ -109,19 +110,19 @@ class MeshFiles : public ::testing::Test {
   TemporaryFolder folder_;
 };
 
-TEST_F(MeshFiles, AreComparedWhereTheyLie) {
+TEST_F(MeshFiles, AreComparedInWorldCoordinates) {
   const TriangleMesh ball = testing::icosphere(10, 2).mesh;
   const auto here = put("a.ply", ball, {{435000, 5150500, 0}, "UTM 15N", ""});
   const auto there =
       put("b.glb", moved(ball, {-100, 20, 3}), {{435100, 5150480, -3}, "UTM 15N", ""});
   const Section same = compare_meshes(here, there);
-  // glTF's floats are off by half an ulp, 2^-18 m below 128 m, along each axis.
+  // glTF stores floats: below 128 m they are off by up to half an ulp, 2^-18 m, along each axis.
   EXPECT_LT(value_of(same, "Hausdorff distance, at most"), 2e-5);
   EXPECT_THAT(same.title, HasSubstr("b.glb against "));
   const auto silent = put("c.obj", ball, {});
   const Section taken = compare_meshes(here, silent);
   EXPECT_LT(value_of(taken, "Hausdorff distance, at most"), 1e-9 + 1e-6 * 35);
-  EXPECT_THAT(taken.text, HasSubstr("other does not say where its origin lies"));
+  EXPECT_THAT(taken.text, HasSubstr("other has no georeference"));
   const auto elsewhere = put("d.ply", ball, {{435000, 5150500, 0}, "UTM 16N", ""});
   try {
     compare_meshes(here, elsewhere);
@@ -131,7 +132,7 @@ TEST_F(MeshFiles, AreComparedWhereTheyLie) {
   }
 }
 
-TEST(MeshComparison, RefusesWhatIsNoSurface) {
+TEST(MeshComparison, RejectsAMeshWithoutTriangles) {
   const TriangleMesh ball = testing::icosphere(1, 1).mesh;
   try {
     compare_meshes(ball, {}, "nothing");

@@ -18,7 +18,7 @@ Verdict match(double value, double stored, Stored type, Equal equal) {
   return section.measures.front().verdict;
 }
 
-TEST(ExactMatch, TellsTheLastBit) {
+TEST(ExactMatch, DetectsADifferenceInTheLastBit) {
   const double next = std::nextafter(1.0, 2.0);
   EXPECT_EQ(match(1, 1, Stored::Double, Equal::Bits), Verdict::Passed);
   EXPECT_EQ(match(next, 1, Stored::Double, Equal::Bits), Verdict::Failed);
@@ -26,7 +26,7 @@ TEST(ExactMatch, TellsTheLastBit) {
   EXPECT_EQ(match(NAN, 1, Stored::Double, Equal::Bits), Verdict::Failed);
 }
 
-TEST(ExactMatch, OfAnotherLibraryAllowsItsRounding) {
+TEST(ExactMatch, NearlyEqualAllowsRoundingOfAnotherLibrary) {
   EXPECT_EQ(match(1 + 9e-13, 1, Stored::Double, Equal::Nearly), Verdict::Passed);
   EXPECT_EQ(match(1 + 3e-12, 1, Stored::Double, Equal::Nearly), Verdict::Failed);
   const float neighbour = std::nextafter(1.0F, 2.0F);
@@ -36,13 +36,13 @@ TEST(ExactMatch, OfAnotherLibraryAllowsItsRounding) {
   EXPECT_EQ(match(2, 1, Stored::Whole, Equal::Nearly), Verdict::Failed);
 }
 
-TEST(ExactMatch, OfAnotherTypeIsNone) {
+TEST(ExactMatch, RejectsAnotherType) {
   Section section;
   check_equal(one(1, Stored::Double), one(1, Stored::Float), Equal::Bits, "", section);
   EXPECT_EQ(section.measures.front().verdict, Verdict::Failed);
 }
 
-TEST(ExactMatch, NamesWhatDiffersInShape) {
+TEST(ExactMatch, ReportsDifferencesInColumnsAndRows) {
   const auto message = [](const Columns& columns) {
     Section section;
     try {

@@ -15,14 +15,14 @@ Columns two_columns() {
   return {.rows = 3, .all = {{"x", {1, 2, 3}, Stored::Double}, {"ring", {0, 1, 2}, Stored::Whole}}};
 }
 
-TEST(Formula, GivesEachRowItsValue) {
+TEST(Formula, EvaluatesEachRow) {
   EXPECT_THAT(evaluate("x^2 + 10 * ring", two_columns()), testing::ElementsAre(1, 14, 29));
   EXPECT_THAT(evaluate("ring == 1 ? -x : x", two_columns()), testing::ElementsAre(1, -2, 3));
   EXPECT_THAT(evaluate("mod(x - 4, 2)", two_columns()), testing::ElementsAre(1, 0, 1));
   EXPECT_THAT(evaluate("7", two_columns()), testing::ElementsAre(7, 7, 7));
 }
 
-TEST(Formula, KnowsTheFunctionsThatItSays) {
+TEST(Formula, HasTheDocumentedFunctions) {
   const Columns one{.rows = 1, .all = {{"x", {0.3}, Stored::Double}}};
   const auto value = [&](const char* formula) { return evaluate(formula, one).front(); };
   EXPECT_DOUBLE_EQ(value("sin(x) + cos(x) * tan(x)"), 2 * std::sin(0.3));
@@ -37,7 +37,7 @@ TEST(Formula, KnowsTheFunctionsThatItSays) {
   EXPECT_DOUBLE_EQ(value("2 * pi"), 2 * std::numbers::pi);
 }
 
-TEST(Formula, ShowsWhatIsWrong) {
+TEST(Formula, ReportsSyntaxErrors) {
   const auto message = [](const char* formula) {
     try {
       evaluate(formula, two_columns());
@@ -50,13 +50,14 @@ TEST(Formula, ShowsWhatIsWrong) {
   EXPECT_THAT(message("x + rong"), testing::HasSubstr("\"rong\""));
   EXPECT_THAT(message("sin(x"), testing::HasSubstr("parenthesis"));
   EXPECT_THAT(message(""), testing::HasSubstr("formula ''"));
-  // Assignments would change the columns and be true, and of several values the last would count.
-  EXPECT_THAT(message("ring = 1"), testing::HasSubstr("equal is '=='"));
+  // An assignment would change the column and count as true; of several values, the last would
+  // count.
+  EXPECT_THAT(message("ring = 1"), testing::HasSubstr("equality is '=='"));
   EXPECT_THAT(message("x, ring"), testing::HasSubstr("comma"));
   EXPECT_EQ(message("ring == 1 || x <= 2 && x >= 1 && x != 7"), "");
 }
 
-TEST(Formula, OfNoRowsIsEmpty) { EXPECT_TRUE(evaluate("x", {.rows = 0}).empty()); }
+TEST(Formula, IsEmptyForAnEmptyTable) { EXPECT_TRUE(evaluate("x", {.rows = 0}).empty()); }
 
 }  // namespace
 }  // namespace groundray::golden::formula_test

@@ -4,7 +4,7 @@
 #include <gtest/gtest.h>
 
 #include "core/error.h"
-#include "core/product_io.h"
+#include "core/io/file_io.h"
 #include "test/support/temporary_folder.h"
 
 namespace groundray::golden::golden_case_test {
@@ -27,7 +27,7 @@ std::string fault_of(const std::string& text) {
   return {};
 }
 
-TEST(GoldenCase, HasProductsNamesAndChecks) {
+TEST(GoldenCase, ReadsProductsVariablesAndChecks) {
   const GoldenCase golden = read(R"(groundray_golden: 1
 title: A test
 products:
@@ -57,7 +57,7 @@ products:
   EXPECT_EQ(std::get<StatisticalCheck>(product.checks[4].what).columns.size(), 2U);
 }
 
-TEST(GoldenCase, FaultsHaveTheirLine) {
+TEST(GoldenCase, ReportsErrorsWithTheirLine) {
   const std::string head = "groundray_golden: 1\ntitle: A\nproducts:\n";
   EXPECT_THAT(
       fault_of(head + "  - file: a.ply\n    checks:\n      - {each: x, is: 1, within: 0}\n"),
@@ -77,7 +77,7 @@ TEST(GoldenCase, FaultsHaveTheirLine) {
       fault_of(head + "  - file: a.ply\n    checks:\n      - {statistical: [], because: y}\n"),
       HasSubstr("must name a column"));
   EXPECT_THAT(fault_of(head + "  - {file: a.ply, checks: []}\n"), HasSubstr("must have a count"));
-  EXPECT_THAT(fault_of("groundray_golden: 1\ntitle: A\nproducts: []\n"), HasSubstr("one at least"));
+  EXPECT_THAT(fault_of("groundray_golden: 1\ntitle: A\nproducts: []\n"), HasSubstr("at least one"));
   EXPECT_THAT(fault_of("groundray_golden: 2\ntitle: A\nproducts: []\n"), HasSubstr("case.yaml:1"));
 }
 

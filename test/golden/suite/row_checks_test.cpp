@@ -33,7 +33,7 @@ Verdict figure(const FigureCheck& check, const Columns& columns) {
   return section.measures.front().verdict;
 }
 
-TEST(RowChecks, CountRowsBeyondTheirTolerance) {
+TEST(RowChecks, CountRowsBeyondTheTolerance) {
   const Columns columns = column({1, 2, 3.5, 4.25});
   const Section section =
       rows_section({.value = "x", .is = "rint(x)", .within = "0.25 * (x > 3)"}, columns);
@@ -56,7 +56,7 @@ TEST(RowChecks, PassAtTheToleranceAndFailJustBeyond) {
   EXPECT_EQ(verdict(std::nextafter(0.5, 1)), Verdict::Failed);
 }
 
-TEST(RowChecks, WhatIsNotFiniteMustBeEqual) {
+TEST(RowChecks, NonFiniteValuesMustBeEqual) {
   const auto verdict = [](double value, const char* is) {
     return rows_section({.value = "x", .is = is, .within = "1e9"}, column({value}))
         .measures[0]
@@ -66,10 +66,10 @@ TEST(RowChecks, WhatIsNotFiniteMustBeEqual) {
   EXPECT_EQ(verdict(-infinity, "1 / 0"), Verdict::Failed);
   EXPECT_EQ(verdict(nan, "0"), Verdict::Failed);
   EXPECT_EQ(verdict(0, "0 / 0"), Verdict::Failed);
-  EXPECT_EQ(verdict(nan, "0 / 0"), Verdict::Failed);  // NaN passes nothing
+  EXPECT_EQ(verdict(nan, "0 / 0"), Verdict::Failed);  // NaN always fails
 }
 
-TEST(RowChecks, AnInfiniteToleranceAllowsNothingButEquality) {
+TEST(RowChecks, InfiniteToleranceRequiresEquality) {
   const auto verdict = [](double value, const char* is) {
     return rows_section({.value = "x", .is = is, .within = "1 / 0"}, column({value}))
         .measures[0]
@@ -81,7 +81,7 @@ TEST(RowChecks, AnInfiniteToleranceAllowsNothingButEquality) {
   EXPECT_THROW(figure({.value = "x", .is = "0", .within = "1 / 0"}, column({1})), Error);
 }
 
-TEST(RowChecks, FiguresOfNaNAreFaults) {
+TEST(RowChecks, RejectStatisticsOfNaN) {
   using Kind = FigureCheck::Kind;
   for (const Kind kind : {Kind::Mean, Kind::Deviation, Kind::Smallest, Kind::Largest}) {
     EXPECT_THROW(figure({.kind = kind, .value = "x", .is = "1", .within = "9"}, column({1, nan})),
@@ -89,13 +89,13 @@ TEST(RowChecks, FiguresOfNaNAreFaults) {
   }
 }
 
-TEST(RowChecks, AToleranceThatIsNoNumberHoldsNothing) {
+TEST(RowChecks, NaNToleranceFails) {
   EXPECT_EQ(
       rows_section({.value = "x", .is = "0", .within = "0 / 0"}, column({1})).measures[0].verdict,
       Verdict::Failed);
 }
 
-TEST(RowChecks, AShareOfRowsMayBeBeyond) {
+TEST(RowChecks, AllowAFractionOfRowsBeyondTheTolerance) {
   const Columns columns = column({0, 0, 0, 0, 0, 0, 0, 0, 9, 9});
   const auto verdict = [&](double share) {
     return rows_section({.value = "x", .is = "0", .within = "1", .share = share}, columns)
@@ -106,14 +106,14 @@ TEST(RowChecks, AShareOfRowsMayBeBeyond) {
   EXPECT_EQ(verdict(0.81), Verdict::Failed);
 }
 
-TEST(RowChecks, OfNoRowsAreFaults) {
+TEST(RowChecks, RejectEmptyTables) {
   EXPECT_THROW(rows_section({.value = "x", .is = "0", .within = "1"}, column({})), Error);
   EXPECT_THROW(figure({.value = "x", .is = "0", .within = "1"}, column({})), Error);
 }
 
-TEST(RowChecks, FiguresAreThoseOfStatistics) {
+TEST(RowChecks, StatisticsMatchTheirDefinitions) {
   using Kind = FigureCheck::Kind;
-  const Columns columns = column({2, 4, 4, 4, 5, 5, 7, 9});  // sum 40, squares about 5: 32
+  const Columns columns = column({2, 4, 4, 4, 5, 5, 7, 9});  // sum 40, squared deviations 32
   const auto holds = [&](Kind kind, const char* is) {
     return figure({.kind = kind, .value = "x", .is = is, .within = "1e-15"}, columns) ==
            Verdict::Passed;

@@ -14,7 +14,7 @@ namespace {
 
 constexpr glm::ivec2 size_px(32, 24);
 
-// An image whose values are normal about 5 + the column, with a deviation of 0.1.
+// An image with normally distributed values: mean 5 + the column, standard deviation 0.1.
 Columns draw(std::uint64_t seed, double shift = 0) {
   std::mt19937_64 engine(seed);
   std::normal_distribution<double> normal(0, 0.1);
@@ -50,9 +50,9 @@ TEST(StatisticalMatch, MomentsAreMeanAndUnbiasedVariance) {
   EXPECT_DOUBLE_EQ(columns.find("Variance_R")->values[0], 7);
 }
 
-TEST(StatisticalMatch, AcceptsAnotherDraw) {
-  // 1 % is the chance that one of three kinds fails a good draw: some of 200 do, 25 only once in
-  // 1e9.
+TEST(StatisticalMatch, AcceptsAnotherSample) {
+  // Each of the three kinds of tests fails for a correct draw with a probability of 1 %: of 200
+  // draws some fail, and 25 or more only with a probability of 1e-9.
   const Columns moments = stored();
   std::int64_t failed = 0;
   for (std::uint64_t seed = 1000; seed < 1200; ++seed)
@@ -60,7 +60,7 @@ TEST(StatisticalMatch, AcceptsAnotherDraw) {
   EXPECT_LT(failed, 25);
 }
 
-TEST(StatisticalMatch, FindsAnOddPixelABlockAndAShiftOfTheWhole) {
+TEST(StatisticalMatch, DetectsDeviationsOfAPixelABlockAndTheMean) {
   const Columns moments = stored();
   Columns pixel = draw(1000);
   pixel.all[0].values[100] += 1;
@@ -69,7 +69,7 @@ TEST(StatisticalMatch, FindsAnOddPixelABlockAndAShiftOfTheWhole) {
   for (std::size_t y = 8; y < 16; ++y) {
     for (std::size_t x = 8; x < 16; ++x) block.all[0].values[y * 32 + x] += 0.1;
   }
-  EXPECT_EQ(match(block, moments)[0], Verdict::Passed);  // blind for it
+  EXPECT_EQ(match(block, moments)[0], Verdict::Passed);  // the first test cannot detect it
   EXPECT_EQ(match(block, moments)[1], Verdict::Failed);
   const Columns shifted = draw(1000, 0.02);
   EXPECT_EQ(match(shifted, moments)[0], Verdict::Passed);
@@ -86,7 +86,7 @@ TEST(StatisticalMatch, WithoutNoiseOnlyRoundingIsAllowed) {
   EXPECT_THAT(match(image(1 + 1e-5F), moments.columns()), ::testing::Contains(Verdict::Failed));
 }
 
-TEST(StatisticalMatch, RefusesMomentsThatTellNothing) {
+TEST(StatisticalMatch, RejectsNonFiniteMoments) {
   for (const double bad : {std::nan(""), HUGE_VAL}) {
     Columns moments = stored();
     moments.all[1].values[7] = bad;
@@ -103,7 +103,7 @@ TEST(StatisticalMatch, RefusesMomentsThatTellNothing) {
   }
 }
 
-TEST(StatisticalMatch, RefusesAnotherSizeAndMissingColumns) {
+TEST(StatisticalMatch, RejectsAnotherSizeAndMissingColumns) {
   const Columns moments = stored();
   Columns turned = draw(1);
   turned.size_px = {24, 32};

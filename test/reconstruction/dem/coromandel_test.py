@@ -1,8 +1,8 @@
-"""Bush on steep land: the ground of a real airborne scan against the labels it came with.
+"""Bush on steep land: the ground of a real airborne scan against the labels of its file.
 
-The labels are of who made the scan: 1.7 % of the points are ground, and much that lies on it is
-"low vegetation". So what they call ground should be found, and the surface should pass where they
-say it is; that other points are taken for ground, too, is counted but not judged hard.
+The labels are the surveyor's: 1.7 % of the points are ground, and many points on it are "low
+vegetation". So labelled ground should be classified as ground, and the surface should pass through
+it; other points that are classified as ground are counted, with a lenient limit.
 """
 
 import os
@@ -24,11 +24,11 @@ OPTIONS = {
     # For land as steep as here and 32 points a square metre.
     "for this land": ("airborne", "slope=0.6", "threshold_m=0.3", "scaling_m=0.3"),
 }
-# What the cloth simulation has of samp11, the bush on steep land of the ISPRS filter test, with the
-# options that its authors chose for it: Zhang et al. (2016), table 3.
+# Errors of the cloth simulation filter on samp11, bush on steep land of the ISPRS filter test, with
+# the options that its authors chose for it: Zhang et al. (2016), table 3.
 MOST_MISSED, MOST_TAKEN = 0.0723, 0.1844
-# The surface has one height for each cell of this side, and the land rises by 0.8 in the median:
-# heights may be off as between cells, and in the middle by no more than half of that.
+# The surface has one height per cell of this size, and the median slope of the land is 0.8: heights
+# may deviate by the rise within a cell, and their median by no more than half of that.
 CELL_M, RISE = 1, 0.8
 
 

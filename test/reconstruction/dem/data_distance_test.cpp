@@ -8,7 +8,7 @@
 #include <random>
 
 #include "core/error.h"
-#include "reconstruction/dem/raster_holes.h"
+#include "reconstruction/dem/fill/raster_holes.h"
 
 namespace groundray::data_distance_test {
 namespace {
@@ -24,7 +24,7 @@ std::vector<std::uint8_t> random_mask(glm::ivec2 size, double share, unsigned se
   return mask;
 }
 
-TEST(DataDistance, IsThatOfTheNearestSampleOfAll) {
+TEST(DataDistance, DistanceToTheNearestSampleMatchesBruteForce) {
   constexpr glm::ivec2 size(23, 31);
   constexpr double rounding = 2 * std::numeric_limits<float>::epsilon();
   for (const glm::dvec2 step_m : {glm::dvec2(1, -1), glm::dvec2(0.5, 3), glm::dvec2(-30, 20)}) {
@@ -49,12 +49,12 @@ TEST(DataDistance, IsThatOfTheNearestSampleOfAll) {
   }
 }
 
-TEST(DataDistance, IsInfiniteWithoutAnyData) {
+TEST(DataDistance, IsInfiniteWithoutData) {
   EXPECT_THAT(data_distance_m({3, 2}, {1, 1}, std::vector<std::uint8_t>(6)),
               Each(std::numeric_limits<float>::infinity()));
 }
 
-TEST(DataDistance, RefusesWhatIsNoRaster) {
+TEST(DataDistance, RejectsInvalidRasters) {
   const std::vector<std::uint8_t> mask(5);
   try {
     (void)data_distance_m({3, 2}, {0, 1}, mask);
@@ -65,9 +65,9 @@ TEST(DataDistance, RefusesWhatIsNoRaster) {
   }
 }
 
-// A sample is in the hull if no line through two samples with data has all of these strictly on its
-// other side.
-TEST(RasterHoles, HullHoldsWhatNoLineThroughDataPartsFromThem) {
+// A sample is in the hull unless a line through two samples with data has all samples with data
+// strictly on its other side.
+TEST(RasterHoles, HullContainsSamplesThatNoLineSeparatesFromTheData) {
   static constexpr glm::ivec2 size(9, 8);
   const auto place = [](std::size_t i) {
     return glm::ivec2(static_cast<int>(i) % size.x, static_cast<int>(i) / size.x);
@@ -83,7 +83,7 @@ TEST(RasterHoles, HullHoldsWhatNoLineThroughDataPartsFromThem) {
       if (mask[i] != 0) data.push_back(i);
     const auto found = inside_hull(size, mask);
     for (std::size_t q = 0; q < mask.size(); ++q) {
-      // Directions from q to all data fit in less than half a turn, or they do not and q is inside.
+      // q is inside if it lies in a triangle of three samples with data.
       bool is_inside = false;
       for (const std::size_t a : data)
         for (const std::size_t b : data)
@@ -95,7 +95,7 @@ TEST(RasterHoles, HullHoldsWhatNoLineThroughDataPartsFromThem) {
             if (area != 0 && ((d >= 0 && e >= 0 && f >= 0) || (d <= 0 && e <= 0 && f <= 0)))
               is_inside = true;
           }
-      // Without area: on a segment between two.
+      // Degenerate triangle: q lies on a segment between two samples.
       for (const std::size_t a : data)
         for (const std::size_t b : data) {
           const glm::ivec2 u = place(a) - place(q), v = place(b) - place(q);

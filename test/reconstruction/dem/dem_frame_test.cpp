@@ -21,15 +21,15 @@ void expect_refusal(const std::function<void()>& act, const char* message) {
   }
 }
 
-TEST(DemFrame, CellsOfAnAreaOfWholeCellsAreItsOwn) {
+TEST(DemFrame, CellsFillAnAreaOfWholeCellsExactly) {
   const GridFrame frame = frame_over({{-3, 2}, {7, 5}}, 0.5);
   EXPECT_EQ(frame.samples, glm::ivec2(20, 6));
-  EXPECT_EQ(frame.origin_m, glm::dvec2(-2.75, 4.75));  // north-west, in the middle of its cell
+  EXPECT_EQ(frame.origin_m, glm::dvec2(-2.75, 4.75));  // north-west, at the centre of its cell
   EXPECT_EQ(frame.step_m, glm::dvec2(0.5, -0.5));
   EXPECT_EQ(frame.cells_per_m, glm::dvec2(2, -2));
 }
 
-TEST(DemFrame, CellsCoverAnAreaWhateverItsPlace) {
+TEST(DemFrame, CellsCoverTheAreaAndAlignToMultiplesOfTheirSize) {
   const Area area{{10.03, -7.7}, {12.9, -3.31}};
   for (const double cell_m : {0.1, 0.25, 0.7, 1.0, 3.0}) {
     const GridFrame frame = frame_over(area, cell_m);
@@ -42,13 +42,13 @@ TEST(DemFrame, CellsCoverAnAreaWhateverItsPlace) {
     EXPECT_LT(first.y, area.high_m.y + cell_m);
     EXPECT_GE(last.x, area.high_m.x - rounding_m);
     EXPECT_LE(last.y, area.low_m.y + rounding_m);
-    // Borders at whole multiples of the cell, so areas side by side give frames side by side.
+    // Borders lie at whole multiples of the cell, so adjacent areas give adjacent frames.
     EXPECT_NEAR(std::remainder(first.x, cell_m), 0, 1e-12);
     EXPECT_NEAR(std::remainder(first.y, cell_m), 0, 1e-12);
   }
 }
 
-TEST(DemFrame, SamplesOfADemAreAmongThoseOfAFrameLikeIt) {
+TEST(DemFrame, FinerFramesContainTheSamplesOfTheDem) {
   const GridFrame dem{{100, 80}, {3.125, 40.5}, {0.25, -0.5}, {4, -2}};
   for (const int finer : {1, 2, 5}) {
     const GridFrame frame = frame_like(dem, {{-2, 20}, {50, 33}}, finer);
@@ -63,7 +63,7 @@ TEST(DemFrame, SamplesOfADemAreAmongThoseOfAFrameLikeIt) {
   }
 }
 
-TEST(DemFrame, RefusesWhatIsNoArea) {
+TEST(DemFrame, RejectsInvalidAreasAndCellSizes) {
   const double infinity = std::numeric_limits<double>::infinity();
   expect_refusal([] { frame_over({{0, 0}, {0, 5}}, 1); }, "must be bounded and not empty");
   expect_refusal([&] { frame_over({{0, 0}, {infinity, 5}}, 1); }, "must be bounded");
@@ -72,7 +72,7 @@ TEST(DemFrame, RefusesWhatIsNoArea) {
   expect_refusal([] { frame_like({}, {{0, 0}, {1, 5}}, 0); }, "finer = 0 must be at least 1");
 }
 
-TEST(DemFrame, NamesEveryFaultOfAFrame) {
+TEST(DemFrame, ReportsAllInvalidFields) {
   const GridFrame frame{{1, 5}, {0, 0}, {0, 1}, {1, 2}};
   expect_refusal([&] { refuse_faults(frame); }, "1 x 5 samples must be at least 2 x 2");
   expect_refusal([&] { refuse_faults(frame); }, "step_m = 0 along axis 0");

@@ -8,13 +8,13 @@
 #include <utility>
 #include <vector>
 
-#include "reconstruction/dem/plate_factor.h"
+#include "reconstruction/dem/thin_plate/ldlt.h"
 
-// Equations of plates to test solvers with.
+// Equations of plates for tests of solvers.
 namespace groundray::testing {
 
-/// Squared differences of an order along columns and rows of a raster, summed up, and a thousandth
-/// of squared heights: as a matrix.
+/// Matrix of the summed squared differences of an order along columns and rows of a raster, plus a
+/// thousandth of the squared heights.
 struct DifferencePlate {
   std::vector<glm::ivec2> places;
   PlateMatrix matrix;

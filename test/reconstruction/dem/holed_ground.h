@@ -8,10 +8,10 @@
 #include <limits>
 #include <vector>
 
-#include "core/grid_frame.h"
-#include "terrain/fractal_field.h"
+#include "core/geometry/grid_frame.h"
+#include "terrain/relief/fractal_field.h"
 
-// Rasters of heights with holes, to try fillings on.
+// Rasters of heights with holes, for tests of filling.
 namespace groundray::testing {
 
 inline constexpr float none = std::numeric_limits<float>::quiet_NaN();
@@ -20,7 +20,7 @@ inline GridFrame frame_of(glm::ivec2 samples, glm::dvec2 step_m = {1, -1}) {
   return {.samples = samples, .origin_m = {5, 7}, .step_m = step_m, .cells_per_m = 1.0 / step_m};
 }
 
-// The number of a sample of a raster, counted row by row.
+// Row-major index of a raster's sample.
 inline std::size_t index_of(int column, int row, int columns) {
   return static_cast<std::size_t>(row) * static_cast<std::size_t>(columns) +
          static_cast<std::size_t>(column);
@@ -35,7 +35,7 @@ inline std::vector<float> sampled(glm::ivec2 samples,
   return heights_m;
 }
 
-// The heights without those where `is_gone`.
+// Heights with those where `is_gone` set to nodata.
 inline std::vector<float> without(std::vector<float> heights_m, glm::ivec2 samples,
                                   const std::function<bool(int, int)>& is_gone) {
   for (int row = 0; row < samples.y; ++row)

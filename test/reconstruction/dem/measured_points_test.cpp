@@ -7,15 +7,16 @@
 #include <glm/matrix.hpp>
 
 #include "core/random.h"
-#include "reconstruction/dem/packed_point.h"
+#include "reconstruction/dem/fusion/packed_point.h"
 
 namespace groundray::measured_points_test {
 namespace {
 
-// Errors are drawn along a line of sight and across it; how far points end above planes is
-// measured. A variance of 40,000 draws scatters by 0.7 %: five times that. The rest of the place is
-// told as the mean of both ways, so what slopes of the same rise, two at right angles, do is added.
-TEST(PointErrors, TellDistancesFromPlanesOfDrawnPoints) {
+// Errors are drawn along a line of sight and across it, and the distances of the points from planes
+// are measured. A variance of 40,000 draws scatters by 0.7 %: five times that. The remaining
+// position error is stated as the mean over both directions, so the effects on two slopes of equal
+// rise at right angles are added.
+TEST(PointErrors, MatchDistancesOfDrawnPointsFromPlanes) {
   constexpr int draws = 40'000;
   constexpr double along_sd_m = 0.1, across_sd_m = 0.01;
   for (const double dip_rad : {0.1, 0.4, 1.2}) {
@@ -42,12 +43,12 @@ TEST(PointErrors, TellDistancesFromPlanesOfDrawnPoints) {
   }
 }
 
-TEST(PointErrors, OfLevelSightHaveALeanCutAndTheRestInPlan) {
+TEST(PointErrors, LevelSightLimitsTheLeanAndStatesTheRestInPlan) {
   const PointErrors level = point_errors({{0.01, 0, 0}, {0, 0.0004, 0}, {0, 0, 0}});
   EXPECT_EQ(level.sd_m, 0);
   EXPECT_EQ(level.lean, glm::vec2(0));
   EXPECT_NEAR(level.across_sd_m, std::sqrt(0.0104 / 2), 1e-8);
-  // 1 m of plan along x for 1 mm of height: 60 mm of it lean, what is left is 0.94 m along x.
+  // 1 m in plan along x per 1 mm of height: the lean takes 60 mm of it, and 0.94 m remain along x.
   const PointErrors grazing = point_errors({{1, 0, 1e-3}, {0, 0, 0}, {1e-3, 0, 1e-6}});
   EXPECT_NEAR(grazing.lean.x, MeasuredPoints::most_lean, 1e-4);
   EXPECT_EQ(grazing.lean.y, 0);
@@ -55,7 +56,7 @@ TEST(PointErrors, OfLevelSightHaveALeanCutAndTheRestInPlan) {
 }
 
 // 11 bits behind the leading one: half a unit of 2^-11.
-TEST(PackedLean, IsRoundedToOnePartIn4096) {
+TEST(PackedLean, RoundsToOnePartIn4096) {
   for (std::uint32_t i = 0; i < 2000; ++i) {
     const glm::dvec2 dice = random_uniform({.seed = {5}, .pulse = i});
     const auto value =

@@ -13,7 +13,7 @@ GridFrame frame_of(glm::ivec2 samples, glm::dvec2 step_m) {
   return {.samples = samples, .origin_m = {5, 7}, .step_m = step_m, .cells_per_m = 1.0 / step_m};
 }
 
-TEST(PlanTriangle, VisitsEachSampleInItsPlanOnceAtItsHeight) {
+TEST(PlanTriangle, VisitsEachSampleInPlanOnceAtItsHeight) {
   std::mt19937 random(2);
   std::uniform_real_distribution<double> uniform(-20, 40);
   for (int round = 0; round < 400; ++round) {
@@ -55,9 +55,9 @@ TEST(PlanTriangle, VisitsEachSampleInItsPlanOnceAtItsHeight) {
   }
 }
 
-// Between neighbouring beams triangles are long and narrow: 10^10 samples are in the box of one of
-// these, and some 10^5 within.
-TEST(PlanTriangle, TakesTimeForItsSamplesAlone) {
+// Triangles between neighbouring beams are long and narrow: the bounding box of one of these
+// contains 10^10 samples, the triangle some 10^5.
+TEST(PlanTriangle, TimeDependsOnCoveredSamplesOnly) {
   const GridFrame frame = frame_of({100'000, 100'000}, {1, 1});
   std::size_t visited = 0;
   for (int k = 0; k < 20; ++k) {

@@ -12,14 +12,14 @@
 #include <optional>
 #include <vector>
 
-#include "core/grid_frame.h"
+#include "core/geometry/grid_frame.h"
 #include "core/random.h"
 #include "reconstruction/dem/measured_points.h"
 
 namespace groundray::testing {
 
 /// Rolling ground with boulders, which are part of it, and trunks, which are not: all in closed
-/// form, and rays cast on it by marching, apart from groundray's own tracer.
+/// form, with rays cast by marching, independent of groundray's own tracer.
 class RollingGround {
  public:
   RollingGround(double half_m, int boulders, int trunks, Seed seed) : seed_(seed) {
@@ -50,7 +50,7 @@ class RollingGround {
     return false;
   }
 
-  /// Returns how far along the ray something is met; nothing beyond far_m.
+  /// Returns the distance along the ray to the first hit, or nothing beyond far_m.
   std::optional<double> meet(const glm::dvec3& from, const glm::dvec3& along, double far_m) const {
     double nearest = far_m;
     for (const Trunk& trunk : trunks_) nearest = std::min(nearest, meet(trunk, from, along));
@@ -115,13 +115,13 @@ class RollingGround {
   std::vector<Trunk> trunks_;
 };
 
-/// Returns the number of a sample in the columns of a DEM.
+/// Returns the index of a sample in the columns of a DEM.
 inline std::size_t number_of(const GridFrame& frame, glm::ivec2 sample) {
   return static_cast<std::size_t>(sample.y) * static_cast<std::size_t>(frame.samples.x) +
          static_cast<std::size_t>(sample.x);
 }
 
-/// Adds a point to all columns.
+/// Appends a point to all columns.
 inline void add_point(MeasuredPoints& points, const glm::dvec3& p_m, double sd_m, double bias_sd_m,
                       double across_sd_m, std::uint32_t group, PointOrigin origin,
                       glm::vec2 lean = glm::vec2(0)) {
@@ -134,8 +134,8 @@ inline void add_point(MeasuredPoints& points, const glm::dvec3& p_m, double sd_m
   points.origins.push_back(origin);
 }
 
-/// A lidar of 32 rings from 25 degrees below the horizon to 5 below: noise of range and of
-/// direction, a bias of range for each scan, 1 % outliers.
+/// Simulates a lidar of 32 rings from 25 to 5 degrees below the horizon: noise of range and of
+/// direction, a range bias for each scan, 1 % outliers.
 inline MeasuredPoints scan_by_lidar(const RollingGround& ground, const glm::dvec3& from,
                                     int azimuths, std::uint32_t group, Seed seed) {
   constexpr double range_sd_m = 0.02, bias_sd_m = 0.004, angle_sd = 0.0009, far_m = 60;
@@ -180,8 +180,8 @@ inline MeasuredPoints scan_by_lidar(const RollingGround& ground, const glm::dvec
   return points;
 }
 
-/// What a stereo pair would measure: disparities with noise of 0.3 px, a bias of 0.1 px for each
-/// pair, and 2 % mismatches.
+/// Simulates the points of a stereo pair: disparities with noise of 0.3 px, a bias of 0.1 px for
+/// each pair, and 2 % mismatches.
 inline MeasuredPoints match_by_stereo(const RollingGround& ground, const glm::dvec3& from,
                                       double yaw_rad, int columns, std::uint32_t group, Seed seed) {
   constexpr double focal_px = 800, baseline_m = 0.5, noise_px = 0.3, bias_px = 0.1, far_m = 25;
@@ -207,13 +207,13 @@ inline MeasuredPoints match_by_stereo(const RollingGround& ground, const glm::dv
                        spread = random_normal({one.seed, one.sensor, 4, one.pulse});
       // 53 by 41 degrees, whatever the number of columns.
       const glm::dvec2 px((column + 0.5) / columns - 0.5, 0.75 * ((row + 0.5) / rows - 0.5));
-      const glm::dvec3 ray = ahead + px.x * right + px.y * down;  // 1 m ahead
+      const glm::dvec3 ray = ahead + px.x * right + px.y * down;  // 1 m deep
       const auto met = ground.meet(from, ray / glm::length(ray), far_m);
       if (!met) continue;
       const double depth_m = *met / glm::length(ray);
       const double disparity = focal_px * baseline_m / depth_m + noise_px * noise.x + shift_px;
       const double seen_m = dice.x < 0.02 ? 2 + 25 * dice.y : focal_px * baseline_m / disparity;
-      const double per_px = seen_m / (focal_px * baseline_m);  // share of the depth
+      const double per_px = seen_m / (focal_px * baseline_m);  // as a fraction of the depth
       const double side_m = seen_m / focal_px * noise_px;
       const glm::dvec3 seen =
           seen_m * (ray + noise_px / focal_px * (spread.x * right + spread.y * down));

@@ -10,8 +10,8 @@
 #include <variant>
 #include <vector>
 
-#include "core/image_io.h"
-#include "core/npy_reader.h"
+#include "core/image/image_io.h"
+#include "core/io/npy_reader.h"
 #include "reconstruction/stereo/disparity.h"
 #include "test/support/margin.h"
 #include "test/support/temporary_folder.h"
@@ -45,7 +45,7 @@ ImageF truth_of(const std::filesystem::path& path, int width, int height) {
   return truth;
 }
 
-// OpenCV's matcher with its own check from both sides and its own removal of speckles.
+// Reference: OpenCV's matcher with its own left-right check and its own speckle removal.
 ImageF plain_sgbm(const RectifiedImage& left, const RectifiedImage& right, int mode) {
   const int width = left.grey.width(), height = left.grey.height();
   const auto mat_of = [&](const ImageF& grey) {
@@ -77,7 +77,7 @@ struct Score {
   double bad_or_missing_percent() const { return 100 * (known - given + bad) / known; }
 };
 
-// Middlebury's bad-2.0, of the pixels whose truth is known.
+// Middlebury's bad-2.0, over the pixels with known truth.
 Score score_of(const ImageF& disparity_px, const ImageF& truth_px) {
   Score score;
   for (std::size_t i = 0; i < truth_px.values().size(); ++i) {
@@ -106,9 +106,9 @@ class MotorcycleProof : public ::testing::Test {
   ImageF truth_px_;
 };
 
-TEST_F(MotorcycleProof, HasFewerBadPixelsThanOpenCvs) {
+TEST_F(MotorcycleProof, HasFewerBadPixelsThanOpenCv) {
   const Score sure = score_of(match(left_, right_, {.range = range}).disparity_px, truth_px_);
-  // All that was found from both sides, however uncertain.
+  // All disparities that pass the left-right check, however uncertain.
   const Score all =
       score_of(match(left_, right_,
                      {.range = range, .smoothing = MatchOptions::Smoothing::None, .most_sd_px = 9})
@@ -130,10 +130,10 @@ TEST_F(MotorcycleProof, HasFewerBadPixelsThanOpenCvs) {
   EXPECT_GT(sure.given, 0.75 * sure.known);
 }
 
-// The truth is given to 0.1 px or so, and mismatches beside edges are not what the standard
-// deviation speaks of: so the median of errors is compared, of pixels alike in what is stated. It
-// is held to what is asked of a DEM's errors, 0.85 to 1.15.
-TEST_F(MotorcycleProof, ErrsAsStated) {
+// The truth is accurate to about 0.1 px, and the standard deviation does not cover mismatches at
+// edges: therefore the median of errors is compared, over pixels with similar stated values. The
+// limits are those of a DEM's errors, 0.85 to 1.15.
+TEST_F(MotorcycleProof, StatedErrorsAreCorrect) {
   const DisparityMap map = match(left_, right_, {.range = range});
   constexpr std::array<double, 5> steps_px{0.1, 0.12, 0.17, 0.24, 0.4};
   for (std::size_t step = 1; step < steps_px.size(); ++step) {
@@ -154,8 +154,8 @@ TEST_F(MotorcycleProof, ErrsAsStated) {
   }
 }
 
-// The more confident, the fewer mismatches.
-TEST_F(MotorcycleProof, IsConfidentOfWhatIsRight) {
+// Higher confidence, fewer mismatches.
+TEST_F(MotorcycleProof, HigherConfidenceMeansFewerMismatches) {
   const DisparityMap map = match(left_, right_, {.range = range});
   double before = 1;
   for (const double least : {0.5, 0.7, 0.8, 0.9}) {

@@ -39,13 +39,13 @@ struct Pair {
   RectifiedImage left, right;
 };
 
-// A plane of disparities: at_px in the middle of the left image.
+// Plane of disparities: at_px in the centre of the left image.
 struct Slant {
   double at_px = 0, by_x = 0, by_y = 0;
   double of(glm::dvec2 left) const {
     return at_px + by_x * (left.x - size_px.x / 2.0) + by_y * (left.y - size_px.y / 2.0);
   }
-  // The left place that a right pixel shows: u_right = u_left - of(left).
+  // Left position of the point that a right pixel shows: u_right = u_left - of(left).
   glm::dvec2 left_of(glm::dvec2 right) const {
     const double x =
         (right.x + at_px - by_x * size_px.x / 2.0 + by_y * (right.y - size_px.y / 2.0)) /
@@ -93,14 +93,14 @@ Errors errors_of(const DisparityMap& map, const Slant& slant) {
   return errors;
 }
 
-// Of a wave of 3.5 px, the shortest, with w = 2 pi / 3.5 a pixel, a spline through the pixels keeps
-// H = sinc(w / 2)^4 / ((2 + cos w) / 3) = 0.971, and adds its alias, H (w / (2 pi - w))^4 = 0.025.
-// So halfway between pixels its values are off by 0.054 of the wave's, and over its slope, w, that
-// is 0.03 px. The longer waves are known better.
+// For the shortest wave, 3.5 px, with w = 2 pi / 3.5 per pixel, a spline through the pixels keeps H
+// = sinc(w / 2)^4 / ((2 + cos w) / 3) = 0.971 and adds its alias, H (w / (2 pi - w))^4 = 0.025. So
+// halfway between pixels its values differ from the wave's by 0.054; divided by its slope, w, this
+// is 0.03 px. Longer waves have smaller errors.
 constexpr double spline_px = 0.03;
 
-// Of images without noise, whatever the disparity's fraction.
-TEST(Disparity, IsFoundToAFewHundredthsOfAPixel) {
+// Noise-free images, for any fraction of the disparity.
+TEST(Disparity, IsExactToAFewHundredthsOfAPixel) {
   for (const Slant& slant : {Slant{12.0, 0, 0}, Slant{12.25, 0, 0}, Slant{12.5, 0, 0},
                              Slant{15, 0.05, 0.1}, Slant{15, -0.08, 0.12}}) {
     const Pair pair = pair_of(slant);
@@ -108,7 +108,7 @@ TEST(Disparity, IsFoundToAFewHundredthsOfAPixel) {
     EXPECT_GT(errors.count, 0.8 * size_px.x * size_px.y) << slant.at_px;
     EXPECT_LE(errors.gross, errors.count / 1000) << slant.at_px << " " << slant.by_x;
     EXPECT_LT(errors.rms_px, spline_px) << slant.at_px << " " << slant.by_x;
-    // A tenth of the bias that points of a pair state.
+    // A tenth of the bias that a pair's points state.
     EXPECT_LT(std::abs(errors.mean_px), StereoNoise{}.bias_px / 10);
     testing::record_margin("rms", errors.rms_px, spline_px, "px");
   }
@@ -122,9 +122,9 @@ TEST(Disparity, DoesNotDependOnBrightnessOrContrast) {
   EXPECT_LT(errors.rms_px, spline_px);
 }
 
-// White noise is what least squares are told to expect, so their own standard deviation, without
-// factor or floor, must be that of the errors. Splines between pixels keep 2/3 of the noise's
-// variance or so, hence the lower limit.
+// White noise is the model of the least squares, so their own standard deviation, without factor or
+// floor, must be that of the errors. Splines between pixels keep about 2/3 of the noise's variance,
+// hence the lower limit.
 TEST(Disparity, StatesTheEffectOfWhiteNoise) {
   for (const double noise : {0.01, 0.03}) {
     const Slant slant{14.4, 0.03, 0.06};
@@ -139,8 +139,8 @@ TEST(Disparity, StatesTheEffectOfWhiteNoise) {
   }
 }
 
-// A near square hides a strip of what is behind it from the right camera: no disparity there.
-TEST(Disparity, HasNoneForWhatOneCameraSeesAlone) {
+// A near square hides a strip of the background from the right camera: no disparity there.
+TEST(Disparity, IsMissingInOcclusions) {
   constexpr int left_edge = 90, right_edge = 130, top = 40, bottom = 80, near = 20, far = 8;
   const WaveTexture back(3.5), front(3.5, {9});
   const auto is_front = [&](double x, double y) {
@@ -159,7 +159,7 @@ TEST(Disparity, HasNoneForWhatOneCameraSeesAlone) {
   for (int y = 0; y < size_px.y; ++y) {
     for (int x = far; x < size_px.x; ++x) {
       const float disparity_px = map.disparity_px.at(x, y)[0];
-      // Just left of the square: its right image covers what lies there.
+      // Just left of the square: the square's right image covers these points.
       if (y >= top && y < bottom && x >= left_edge - (near - far) && x < left_edge) {
         hidden += std::isnan(disparity_px) ? 0 : 1;
         continue;
@@ -172,12 +172,12 @@ TEST(Disparity, HasNoneForWhatOneCameraSeesAlone) {
   EXPECT_LT(hidden, 0.2 * (near - far) * (bottom - top));
   const int visible = (size_px.x - far) * size_px.y - (near - far) * (bottom - top);
   EXPECT_GT(found, 0.8 * visible);
-  // Were the square found wider by half a block, 1 px, along its 160 px of edges, these were 160.
+  // Were the square widened by half a block, 1 px, along its 160 px of edges, this would be 160.
   EXPECT_LT(wrong, 60);
   EXPECT_GT(map.unmatched.inconsistent, 0U);
 }
 
-TEST(Disparity, FindsItsRangeByItself) {
+TEST(Disparity, EstimatesItsRange) {
   for (const double at_px : {3.0, 40.0, 70.0}) {
     const Slant slant{at_px, 0, 0.05};
     const Pair pair = pair_of(slant);
@@ -192,8 +192,8 @@ TEST(Disparity, FindsItsRangeByItself) {
   }
 }
 
-// Disparities are kept in 16 bits, times 16: those beyond 2000 px are not looked for.
-TEST(Disparity, IsNeverBeyondWhatItsBitsHold) {
+// Disparities are stored in 16 bits, times 16: those beyond 2000 px are not searched.
+TEST(Disparity, StaysWithinTheRangeOf16Bits) {
   const WaveTexture texture(8);
   const glm::ivec2 wide_px(4400, 98);
   const RectifiedImage left =
@@ -217,7 +217,7 @@ TEST(Disparity, IsNeverBeyondWhatItsBitsHold) {
   }
 }
 
-TEST(Disparity, HasNoneWithoutTexture) {
+TEST(Disparity, IsMissingWithoutTexture) {
   ImageF grey(size_px.x, size_px.y, 1);
   for (const float value : {0.0F, 0.5F, 1.0F}) {
     std::ranges::fill(grey.values(), value);
@@ -228,7 +228,7 @@ TEST(Disparity, HasNoneWithoutTexture) {
           std::ranges::all_of(map.disparity_px.values(), [](float d) { return std::isnan(d); }));
     }
   }
-  // Nor where the texture does not change along rows.
+  // No disparity either where the texture is constant along rows.
   const WaveTexture texture(3.5);
   const ImageF stripes =
       texture.image(size_px, [](glm::dvec2 place) { return glm::dvec2(0, place.y); });
@@ -237,8 +237,8 @@ TEST(Disparity, HasNoneWithoutTexture) {
       std::ranges::all_of(map.disparity_px.values(), [](float d) { return std::isnan(d); }));
 }
 
-// Two images that have nothing to do with each other.
-TEST(Disparity, IsRareBetweenImagesOfOtherThings) {
+// Two unrelated images.
+TEST(Disparity, IsRareBetweenUnrelatedImages) {
   const RectifiedImage left =
       seen_whole(WaveTexture(3.5).image(size_px, [](glm::dvec2 p) { return p; }));
   const RectifiedImage right =
@@ -249,7 +249,7 @@ TEST(Disparity, IsRareBetweenImagesOfOtherThings) {
   EXPECT_LT(sure, 0.02 * size_px.x * size_px.y);
 }
 
-TEST(Disparity, CountsWhyThereIsNone) {
+TEST(Disparity, CountsUnmatchedPixelsByReason) {
   Pair pair = pair_of({12, 0, 0});
   for (int y = 0; y < size_px.y; ++y) {
     for (int x = 0; x < 30; ++x) pair.left.seen.at(x, y)[0] = 0;
@@ -265,12 +265,12 @@ TEST(Disparity, CountsWhyThereIsNone) {
             static_cast<std::uint64_t>(size_px.x * size_px.y));
   for (int y = 0; y < size_px.y; ++y) {
     EXPECT_TRUE(std::isnan(map.disparity_px.at(29, y)[0]));
-    EXPECT_TRUE(std::isnan(map.disparity_px.at(170, y)[0]));  // beyond what the right one shows
+    EXPECT_TRUE(std::isnan(map.disparity_px.at(170, y)[0]));  // outside the right image
   }
 }
 
-// The range is to be found, and there is none.
-TEST(Disparity, CountsWhyThereIsNoneWithoutARange) {
+// The range must be estimated, and there is none.
+TEST(Disparity, CountsUnmatchedPixelsWithoutARange) {
   RectifiedImage blank = seen_whole(ImageF(size_px.x, size_px.y, 1));
   for (int y = 0; y < size_px.y; ++y)
     for (int x = 0; x < 30; ++x) blank.seen.at(x, y)[0] = 0;
@@ -281,7 +281,7 @@ TEST(Disparity, CountsWhyThereIsNoneWithoutARange) {
   EXPECT_EQ(none.ambiguous, (size_px.x - 30U) * size_px.y);
 }
 
-TEST(Disparity, KeepsPatchesOfSoManyPixels) {
+TEST(Disparity, RemovesSpecklesBelowTheGivenSize) {
   for (const int least : {0, 1, 5, 6}) {
     ImageF patch(20, 10, 1);
     std::ranges::fill(patch.values(), nothing);
@@ -291,14 +291,15 @@ TEST(Disparity, KeepsPatchesOfSoManyPixels) {
   }
 }
 
-// An image is 0 px from itself, whatever its values at the rim: a spline that misses these by some
-// percent of full scale would move the windows beside it by hundredths of a pixel.
-TEST(Disparity, OfAnImageAndItselfIsNoneAtTheRimToo) {
+// The disparity between an image and itself is 0 px, whatever its values at the border: a spline
+// with errors of some percent of full scale there would shift the windows beside it by hundredths
+// of a pixel.
+TEST(Disparity, IsZeroBetweenEqualImagesEvenAtTheBorder) {
   ImageF noise(30, 20, 1), start_px(30, 20, 1);
   testing::add_noise(noise, 0.2, {4});
   const RefinedDisparity refined = refine(noise, noise, start_px, 9);
   for (const float disparity_px : refined.disparity_px.values())
-    EXPECT_NEAR(disparity_px, 0, 1e-6);  // of coefficients, which are floats
+    EXPECT_NEAR(disparity_px, 0, 1e-6);  // rounding of the coefficients, which are floats
 }
 
 std::vector<std::uint32_t> bits_of(const ImageF& image) {
@@ -325,7 +326,7 @@ TEST(Disparity, IsTheSameForAnyNumberOfThreads) {
   }
 }
 
-TEST(Disparity, TakesImagesOfAnySize) {
+TEST(Disparity, AcceptsImagesOfAnySize) {
   const WaveTexture texture(3.5);
   for (const glm::ivec2 size : {glm::ivec2(1, 1), glm::ivec2(1, 40), glm::ivec2(40, 1),
                                 glm::ivec2(3, 2), glm::ivec2(17, 9), glm::ivec2(900, 4)}) {
@@ -349,7 +350,7 @@ TEST(Disparity, RangesFollowDepths) {
   EXPECT_EQ(disparity_range(pair, 4.1, std::numeric_limits<double>::infinity()),
             (DisparityRange{-1, 26}));
   EXPECT_EQ(disparity_range(pair, 2, 8), (DisparityRange{11, 51}));
-  // 1999.6 px: the one more on the near side is not one beyond what is matched.
+  // 1999.6 px: the extra pixel on the near side does not exceed the limit of matching.
   EXPECT_EQ(disparity_range(pair, 100 / 1999.6, 100), (DisparityRange{0, 2000}));
   for (const auto& depths_m : {std::pair(0.0, 5.0), std::pair(3.0, 2.0), std::pair(-1.0, 2.0),
                                std::pair(0.01, 2.0), std::pair(1.0, std::nan(""))})
@@ -357,7 +358,7 @@ TEST(Disparity, RangesFollowDepths) {
                 ThrowsMessage<Error>(HasSubstr("the nearest depth must be")));
 }
 
-TEST(Disparity, RefusesWhatCannotBeMatched) {
+TEST(Disparity, RejectsInvalidImagesAndOptions) {
   const Pair pair = pair_of({12, 0, 0});
   const auto expect_refused = [&](const MatchOptions& options, const char* part) {
     EXPECT_THAT([&] { match(pair.left, pair.right, options); },
@@ -373,8 +374,8 @@ TEST(Disparity, RefusesWhatCannotBeMatched) {
   expect_refused({.most_sd_px = 0}, "most_sd_px = 0");
   expect_refused({.range = {{5, 5}}}, "range = 5 to 5 px");
   expect_refused({.range = {{0, 5000}}}, "range = 0 to 5000 px");
-  expect_refused({.range = {{0, 31}}, .most_bytes = 1000}, "ask for paths Five");
-  expect_refused({.most_bytes = 1000}, "give a narrower range");
+  expect_refused({.range = {{0, 31}}, .most_bytes = 1000}, "use paths Five");
+  expect_refused({.most_bytes = 1000}, "use a narrower range");
   const RectifiedImage small = seen_whole(ImageF(199, 120, 1));
   EXPECT_THAT([&] { match(pair.left, small); },
               ThrowsMessage<Error>(HasSubstr("the right one 199 x 120")));

@@ -15,7 +15,7 @@
 #include "core/error.h"
 #include "test/support/lens_samples.h"
 #include "test/support/margin.h"
-#include "test/support/stereo_views.h"
+#include "test/support/scans/stereo_views.h"
 
 namespace groundray::pinhole_pair_test {
 namespace {
@@ -28,7 +28,7 @@ using testing::turned;
 using testing::view_of;
 
 constexpr glm::ivec2 size_px{640, 480};
-// Some pose of a vehicle far from D's origin.
+// Arbitrary pose of a vehicle far from D's origin.
 const Pose X_DB{glm::normalize(glm::dquat(0.3, -0.5, 0.4, 0.7)), {1200, -340, 87}};
 
 LensModel brown() {
@@ -59,15 +59,16 @@ std::vector<Pair> pairs() {
       {"swapped", camera(brown(), at, {0, 0, 1}), camera(wide(), {-0.3, 0.01, 0.02}, {3, 0, -2})}};
 }
 
-// Where a point of D falls in a pinhole, by the definition of one.
+// Projection of a point of D into a pinhole, by definition.
 glm::dvec2 pinhole_px(const PinholePair& pair, StereoSide side, const glm::dvec3& p_DQ) {
   const glm::dvec3 p_RQ = inverse(pair.X_D(side)) * p_DQ;
   return pair.focal_px * glm::dvec2(p_RQ) / p_RQ.z + pair.centre_px;
 }
 
-// The lens says where a point is in the camera's own image; the pair must say the same place for
-// the pixel of its pinhole that shows the point, and both pinholes' rows must be one.
-TEST(PinholePair, HasAllPointsInEqualRowsAndAtTheirExactPlaces) {
+// Oracle: the lens projects a point into the camera's own image; the pair must give the same
+// position for the pinhole's pixel that shows the point, and the rows in both pinholes must be
+// equal.
+TEST(PinholePair, PointsAreInEqualRowsAtTheirExactPositions) {
   constexpr double tolerance_px = 1e-6;  // directions are rounded to 1e-16 of 1.2 km
   std::mt19937_64 random(6);
   std::uniform_real_distribution<double> share(-1, 1), depth_m(0.5, 80);
@@ -99,8 +100,8 @@ TEST(PinholePair, HasAllPointsInEqualRowsAndAtTheirExactPlaces) {
 }
 
 // The right camera is always on the right, wherever it is mounted, and neither camera is turned
-// more than it must be.
-TEST(PinholePair, LooksWhereBothCamerasLook) {
+// more than necessary.
+TEST(PinholePair, FacesTheDirectionOfBothCameras) {
   for (const Pair& views : pairs()) {
     const PinholePair pair = pinhole_pair(views.left, views.right);
     const glm::dvec3 p_LR = inverse(pair.X_DL) * pair.X_DR.translation_m;
@@ -114,11 +115,11 @@ TEST(PinholePair, LooksWhereBothCamerasLook) {
   }
 }
 
-TEST(PinholePair, LeavesARectifiedPairAsItIs) {
+TEST(PinholePair, KeepsARectifiedPair) {
   const LensModel lens = Pinhole{{{500, 500}, {310, 245}, 0}};
   const PinholePair pair =
       pinhole_pair(camera(lens, {0, 0, 0}, {0, 0, 0}), camera(lens, {0.12, 0, 0}, {0, 0, 0}));
-  EXPECT_NEAR(pair.focal_px, 500, 1e-6);  // by central differences
+  EXPECT_NEAR(pair.focal_px, 500, 1e-6);  // derived by central differences
   EXPECT_LT(glm::distance(pair.centre_px, {310, 245}), 1e-6);
   EXPECT_EQ(pair.size_px, size_px);
   EXPECT_NEAR(pair.baseline_m, 0.12, 1e-12);
@@ -135,7 +136,7 @@ cv::Matx33d matrix_of(const PixelScale& s) {
   return {s.focal_px.x, 0, s.centre_px.x, 0, s.focal_px.y, s.centre_px.y, 0, 0, 1};
 }
 
-TEST(PinholePair, IsTurnedAsOpenCvTurnsIt) {
+TEST(PinholePair, RotationMatchesOpenCv) {
   const Pair views = pairs()[0];
   const PinholePair pair = pinhole_pair(views.left, views.right);
   const Pose X_RL = inverse(views.right.X_DC) * views.left.X_DC;
@@ -171,7 +172,7 @@ void expect_places(const PinholePair& pair, const StereoView& view, const cv::Ma
   }
 }
 
-TEST(PinholePair, HasThePlacesOfOpenCvsMaps) {
+TEST(PinholePair, MapsMatchOpenCv) {
   for (const bool is_fisheye : {false, true}) {
     const Pair views = pairs()[is_fisheye ? 1 : 0];
     const PinholePair pair = pinhole_pair(views.left, views.right);
@@ -194,8 +195,9 @@ TEST(PinholePair, HasThePlacesOfOpenCvsMaps) {
   }
 }
 
-// A pinhole whose field is 2 atan(2) wide, limited to 90 degrees: the middle half of its columns.
-TEST(PinholePair, LimitsItsFieldAndSaysWhatIsLost) {
+// A pinhole with a field of view of 2 atan(2), limited to 90 degrees: the middle half of its
+// columns.
+TEST(PinholePair, LimitsTheFieldOfViewAndReportsTheLostShare) {
   const LensModel lens = Pinhole{centred(160, {641, 161})};
   const auto view = [&](double x_m) {
     return view_of(lens, {641, 161}, {{1, 0, 0, 0}, {x_m, 0, 0}});
@@ -203,13 +205,13 @@ TEST(PinholePair, LimitsItsFieldAndSaysWhatIsLost) {
   const PinholePair pair = pinhole_pair(view(0), view(0.1), glm::radians(90.0));
   EXPECT_NEAR(pair.size_px.x, 321, 1);
   EXPECT_NEAR(pair.size_px.y, 161, 1);
-  for (const double lost : pair.lost_share) EXPECT_NEAR(lost, 0.5, 2.0 / 128);  // of places asked
+  for (const double lost : pair.lost_share) EXPECT_NEAR(lost, 0.5, 2.0 / 128);  // of the samples
   const PinholePair all = pinhole_pair(view(0), view(0.1), glm::radians(150.0));
   EXPECT_EQ(all.lost_share[0], 0);
 }
 
-// Half of what a fisheye sees of a sphere is behind a pinhole; what it keeps is as large as before.
-TEST(PinholePair, KeepsTheSizeOfPixelsOnTheAxisOfAFisheye) {
+// Half of a fisheye's field of view is behind a pinhole; the remainder keeps its size.
+TEST(PinholePair, KeepsTheFocalLengthOnTheAxisOfAFisheye) {
   const Pair views = pairs()[1];
   const PinholePair pair = pinhole_pair(views.left, views.right);
   EXPECT_NEAR(pair.focal_px, 260, 1e-6);
@@ -223,18 +225,19 @@ void expect_refused(const StereoView& left, const StereoView& right, const char*
               ThrowsMessage<Error>(AllOf(HasSubstr("stereo pair"), HasSubstr(part))));
 }
 
-TEST(PinholePair, RefusesCamerasThatHaveNoPair) {
+TEST(PinholePair, RejectsCamerasThatCannotBeRectified) {
   const StereoView left = camera(brown(), {0, 0, 0}, {0, 0, 0});
-  expect_refused(left, camera(brown(), {0.01, 0, 0.4}, {0, 0, 0}), "deg from where they look");
-  expect_refused(left, camera(brown(), {0.01, 0, -0.4}, {0, 0, 0}), "or more aside");
+  expect_refused(left, camera(brown(), {0.01, 0, 0.4}, {0, 0, 0}),
+                 "deg from the viewing direction");
+  expect_refused(left, camera(brown(), {0.01, 0, -0.4}, {0, 0, 0}), "it must be at least");
   expect_refused(left, camera(brown(), {0.3, 0, 0}, {0, 90, 0}), "turned by 90.0 deg");
   expect_refused(left, camera(brown(), {0.3, 0, 0}, {0, 0, 90}), "turned by 90.0 deg");
   expect_refused(left, left, "0 m apart");
   const LensModel narrow = Pinhole{centred(3000, size_px)};
   expect_refused(camera(narrow, {0, 0, 0}, {0, -15, 0}), camera(narrow, {0.3, 0, 0}, {0, 15, 0}),
-                 "nothing that both cameras see");
+                 "the fields of view do not overlap");
   expect_refused(camera(narrow, {0, 0, 0}, {-10, 0, 0}), camera(narrow, {0.3, 0, 0}, {10, 0, 0}),
-                 "nothing that both cameras see");
+                 "the fields of view do not overlap");
   StereoView blind = left;
   blind.ray = nullptr;
   expect_refused(blind, left, "the left view has no lens");
@@ -254,8 +257,8 @@ TEST(PinholePair, RefusesCamerasThatHaveNoPair) {
       ThrowsMessage<Error>(HasSubstr("below pi")));
 }
 
-// Cameras that squint see the same things near by, if not far away.
-TEST(PinholePair, TakesCamerasThatSquint) {
+// Converging cameras see the same objects near by, even if not far away.
+TEST(PinholePair, AcceptsConvergingCameras) {
   const LensModel narrow = Pinhole{centred(3000, size_px)};
   const PinholePair pair =
       pinhole_pair(camera(narrow, {0, 0, 0}, {0, 15, 0}), camera(narrow, {0.3, 0, 0}, {0, -15, 0}));

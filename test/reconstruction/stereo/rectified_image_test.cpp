@@ -9,7 +9,7 @@
 #include "core/error.h"
 #include "test/support/lens_samples.h"
 #include "test/support/margin.h"
-#include "test/support/stereo_views.h"
+#include "test/support/scans/stereo_views.h"
 #include "test/support/wave_texture.h"
 
 namespace groundray::rectified_image_test {
@@ -29,13 +29,15 @@ StereoView fisheye(double x_m, const glm::dvec3& turn_deg) {
                  {turned(turn_deg), {x_m, 0, 0}});
 }
 
-// The texture is known between pixels, so each resampled pixel has a value that needs no image.
-TEST(RectifiedImage, ShowsWhatIsAtTheExactPlaces) {
+// The texture is known between pixels, so the expected value of each resampled pixel needs no
+// image.
+TEST(RectifiedImage, ResamplesAtTheExactPositions) {
   const StereoView left = fisheye(0, {2, 3, -2}), right = fisheye(0.2, {-1, -2, 4});
   const PinholePair pair = pinhole_pair(left, right);
   const WaveTexture texture(4);
   const ImageF image = texture.image(size_px, [](glm::dvec2 place) { return place; });
-  // Three lobes pass waves of 4 px within 2 % of their height, 0.04 each; ten are nearly as short.
+  // Three lobes reproduce waves of 4 px within 2 % of their amplitude, 0.04 each; ten waves are
+  // nearly as short.
   constexpr double tolerance = 0.008;
   const RectifiedImage result = resample(image, pair, StereoSide::Left, left);
   int seen = 0;
@@ -60,7 +62,7 @@ TEST(RectifiedImage, ShowsWhatIsAtTheExactPlaces) {
   EXPECT_GT(seen, 10000);
 }
 
-TEST(RectifiedImage, IsTheImageItselfOfAPairThatIsRectified) {
+TEST(RectifiedImage, KeepsTheImageOfARectifiedPair) {
   const auto view = [](double x_m) {
     return view_of(Pinhole{centred(180, size_px)}, size_px, {{1, 0, 0, 0}, {x_m, 0, 0}});
   };
@@ -69,14 +71,14 @@ TEST(RectifiedImage, IsTheImageItselfOfAPairThatIsRectified) {
   ASSERT_EQ(pair.size_px, size_px);
   const RectifiedImage result = resample(image, pair, StereoSide::Right, view(0.1));
   for (std::size_t i = 0; i < image.values().size(); ++i) {
-    // Places are 1e-8 px off, slopes are 1/px at most.
+    // Positions have errors of 1e-8 px, and slopes are at most 1/px.
     ASSERT_NEAR(result.grey.values()[i], image.values()[i], 1e-6F);
     ASSERT_EQ(result.seen.values()[i], 1);
   }
 }
 
-// Waves that the coarser camera could not have seen vanish instead of coming back as others.
-TEST(RectifiedImage, AveragesWhatAFinerCameraSees) {
+// Waves that the coarser camera cannot resolve vanish instead of aliasing.
+TEST(RectifiedImage, AveragesTheImageOfAFinerCamera) {
   const auto view = [](double focal_px, double x_m) {
     return view_of(Pinhole{centred(focal_px, size_px)}, size_px, {{1, 0, 0, 0}, {x_m, 0, 0}});
   };
@@ -100,7 +102,7 @@ TEST(RectifiedImage, AveragesWhatAFinerCameraSees) {
   }
 }
 
-TEST(RectifiedImage, LeavesOutWhatIsNoNumber) {
+TEST(RectifiedImage, ExcludesNanPixels) {
   const auto view = [](double x_m) {
     return view_of(Pinhole{centred(180, size_px)}, size_px, {{1, 0, 0, 0}, {x_m, 0, 0}});
   };
@@ -115,7 +117,7 @@ TEST(RectifiedImage, LeavesOutWhatIsNoNumber) {
   EXPECT_FLOAT_EQ(result.grey.at(56, 60)[0], 0.25F);
 }
 
-TEST(RectifiedImage, RefusesImagesThatAreNotTheCameras) {
+TEST(RectifiedImage, RejectsImagesOfAnotherSize) {
   const StereoView left = fisheye(0, {0, 0, 0}), right = fisheye(0.2, {0, 0, 0});
   const PinholePair pair = pinhole_pair(left, right);
   for (const ImageF& image : {ImageF(), ImageF(200, 149, 1), ImageF(200, 150, 3)})
@@ -123,7 +125,7 @@ TEST(RectifiedImage, RefusesImagesThatAreNotTheCameras) {
                 ThrowsMessage<Error>(HasSubstr("the right image has")));
 }
 
-TEST(RectifiedImage, TakesLuminanceForGrey) {
+TEST(RectifiedImage, ConvertsColourToLuminance) {
   Image8 image(1, 1, 4);
   image.values()[0] = 255;
   image.values()[1] = 51;

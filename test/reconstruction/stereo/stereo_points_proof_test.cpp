@@ -8,17 +8,17 @@
 #include <utility>
 #include <vector>
 
-#include "core/luminance.h"
-#include "core/scene.h"
+#include "core/image/luminance.h"
+#include "core/tracing/scene.h"
 #include "reconstruction/stereo/stereo_points.h"
 #include "sensors/camera/camera.h"
-#include "sensors/sky.h"
+#include "sensors/sky/sky.h"
 #include "terrain/terrain_scene.h"
-#include "test/support/camera_scene.h"
 #include "test/support/lens_samples.h"
 #include "test/support/margin.h"
-#include "test/support/sample_terrain.h"
-#include "test/support/stereo_views.h"
+#include "test/support/scans/camera_scene.h"
+#include "test/support/scans/stereo_views.h"
+#include "test/support/terrain/sample_terrain.h"
 #include "test/support/wave_texture.h"
 
 namespace groundray::stereo_points_proof_test {
@@ -29,7 +29,7 @@ using testing::centred;
 using testing::turned;
 using testing::view_of;
 
-// Rough ground in the light of a low sun, which gives it its texture, and two cameras over it.
+// Rough ground in the light of a low sun, which gives it texture, and two cameras above it.
 struct Shot {
   std::string name;
   LensModel left, right;
@@ -43,7 +43,7 @@ Scene rough_ground(const HeightGrid& grid) {
                {{"grey", Lambertian{{{300, 0.4}, {2500, 0.4}}}}}};
 }
 
-// As a camera of 8 bits gives it, with noise of 1 %.
+// Image as from an 8-bit camera, with noise of 1 %.
 ImageF picture(const LensModel& lens, glm::ivec2 size_px, const Pose& X_DC, const PathTracer& light,
                std::uint32_t number) {
   CameraSpec spec;
@@ -60,23 +60,23 @@ ImageF picture(const LensModel& lens, glm::ivec2 size_px, const Pose& X_DC, cons
       grey.at(x, y)[0] = static_cast<float>(luminance({rgb[0], rgb[1], rgb[2]}));
     }
   }
-  // All pictures are exposed alike: white is the light of a white surface that faces the sun.
+  // All images have the same exposure: white is the light of a white surface that faces the sun.
   for (float& value : grey.values()) value = std::pow(std::clamp(value / 40.0F, 0.0F, 1.0F), 0.45F);
   testing::add_noise(grey, 0.01, {number});
   for (float& value : grey.values()) value = std::round(std::clamp(value, 0.0F, 1.0F) * 255) / 255;
   return grey;
 }
 
-// Errors over their stated standard deviations.
+// Errors divided by their stated standard deviations.
 struct Residuals {
   std::vector<double> normalised;
-  std::vector<double> by_bias;  // what one standard deviation of bias does to each
+  std::vector<double> by_bias;  // effect of one standard deviation of bias on each
   double outlier_share = 0;
 };
 
-constexpr double gross = 5;  // standard deviations: mismatches, which are counted by themselves
+constexpr double gross = 5;  // standard deviations: mismatches, which are counted separately
 
-// What a ray along each point's line of sight says of its depth.
+// Residuals of depth, from a ray along each point's line of sight.
 Residuals residuals_of(const StereoPoints& points, const PinholePair& pair, const Scene& scene) {
   std::vector<Ray> rays;
   for (const glm::dvec3& p_m : points.p_m)
@@ -106,10 +106,10 @@ struct SurfaceResiduals {
   Residuals facing, averted;  // of ground that rises away from the camera, and that falls
 };
 
-// What the plane that touches the ground says, where a point's line of sight meets it: along its
-// normal n an error of the covariance C has the variance n' C n. The square is the least
-// Mahalanobis distance of the point to the plane, chi^2 of one degree of freedom, and takes all of
-// C. The plane is that of rays as far to each side as a match's place may be off.
+// Residuals from the tangent plane of the ground where a point's line of sight hits it: along its
+// normal n an error of covariance C has the variance n' C n. The square is the smallest Mahalanobis
+// distance of the point to the plane, chi^2 with one degree of freedom, and involves all of C. The
+// plane is that of rays offset to each side by the possible error of a match's position.
 SurfaceResiduals surface_residuals_of(const StereoPoints& points, const PinholePair& pair,
                                       const Scene& scene) {
   const double aside = StereoNoise{}.place_px / pair.focal_px;
@@ -148,7 +148,7 @@ SurfaceResiduals surface_residuals_of(const StereoPoints& points, const PinholeP
   return result;
 }
 
-// How many standard deviations of bias explain the residuals best.
+// Bias, in standard deviations, that best explains the residuals.
 double bias_of(const Residuals& residuals) {
   double common = 0, own = 0;
   for (std::size_t i = 0; i < residuals.normalised.size(); ++i) {
@@ -193,7 +193,7 @@ struct View {
   ImageF picture;
 };
 
-// @param bias_px  that all disparities get.
+// @param bias_px  added to all disparities.
 Measured measure(const View& left, const View& right, float bias_px) {
   const PinholePair pair = pinhole_pair(left.camera, right.camera);
   DisparityMap map = match(resample(left.picture, pair, StereoSide::Left, left.camera),
@@ -202,11 +202,11 @@ Measured measure(const View& left, const View& right, float bias_px) {
   return {pair, stereo_points(pair, left.camera, map)};
 }
 
-// What the limits below hold of the residuals, but for a bias.
+// Checks the limits of the residuals after removal of a bias.
 void expect_stated(const std::string& name, const Residuals& residuals, double bias) {
-  // One factor stands for cameras that spread their noise over neighbours, by demosaicing or
-  // resampling, and for those that do not: a mean of two pixels has half of their variance, hence
-  // the root of that.
+  // One factor covers cameras that spread their noise over neighbours, by demosaicing or
+  // resampling, and those that do not: a mean of two pixels has half of their variance, hence the
+  // root of that.
   EXPECT_GT(rms(residuals, bias), 0.7) << name;
   EXPECT_LT(rms(residuals, bias), 1.15) << name;
   EXPECT_GT(share_within(residuals, bias, 1), 0.65) << name;
@@ -215,10 +215,10 @@ void expect_stated(const std::string& name, const Residuals& residuals, double b
   testing::record_margin("beyond two sd", 1 - share_within(residuals, bias, 2), 0.08);
 }
 
-// By what factor the stated standard deviations are too small, told by squares at two quantiles of
-// chi^2: 1 if they are right, and from 0.7 to 1.15 as expect_stated allows. To these limits 3.1
-// standard errors of a sample's quantile are added, which is 5 % for all 24 comparisons; of two
-// neighbours, whose windows overlap, one counts.
+// Factor by which the stated standard deviations are too small, from squares at two quantiles of
+// chi^2: 1 if they are correct, and from 0.7 to 1.15 as expect_stated permits. These limits are
+// widened by 3.1 standard errors of a sample's quantile, which is 5 % for all 24 comparisons; of
+// two neighbours, whose windows overlap, one counts.
 void expect_chi2(const std::string& name, const Residuals& residuals, double bias) {
   struct Quantile {
     double share, chi, density;  // of the root of chi^2 there
@@ -243,7 +243,7 @@ void expect_chi2(const std::string& name, const Residuals& residuals, double bia
   }
 }
 
-// One picture of the ground by each camera of a shot.
+// Images of the ground by both cameras of a shot.
 std::pair<View, View> views_of(const Shot& shot, glm::ivec2 size_px, const HeightGrid& grid,
                                const Scene& scene) {
   const Sky sky({ConstantSky{{3, 4, 5}},
@@ -258,7 +258,7 @@ std::pair<View, View> views_of(const Shot& shot, glm::ivec2 size_px, const Heigh
           {view_of(shot.right, size_px, X_DR), picture(shot.right, size_px, X_DR, light, 2)}};
 }
 
-TEST(StereoPointsProof, OfRenderedPairsErrAsStated) {
+TEST(StereoPointsProof, StatedErrorsAreCorrectForRenderedPairs) {
   const int width = static_cast<int>(testing::proof_size(320, 960));
   const glm::ivec2 size_px(width, width * 3 / 4);
   const double step_m = 32.0 / width;  // facets of a few pixels
@@ -272,7 +272,7 @@ TEST(StereoPointsProof, OfRenderedPairsErrAsStated) {
     EXPECT_LT(residuals.outlier_share, 0.02) << shot.name;
     testing::record_margin("mismatches", residuals.outlier_share, 0.02);
     expect_stated(shot.name, residuals, 0);
-    // Pixel-locking and the rest of what a pair has in common, of a stated sd of 0.1 px.
+    // Pixel-locking and the pair's other common errors, with a stated sd of 0.1 px.
     const double own_bias = bias_of(residuals);
     EXPECT_LT(std::abs(own_bias), 1) << shot.name;
     testing::record_margin("bias", own_bias, 1, "sd");
@@ -280,7 +280,7 @@ TEST(StereoPointsProof, OfRenderedPairsErrAsStated) {
     expect_chi2(shot.name + ", facing", surface.facing, own_bias);
     expect_chi2(shot.name + ", averted", surface.averted, own_bias);
 
-    // Three standard deviations of bias are told apart from the noise by their pattern alone.
+    // A bias of three standard deviations is distinguished from the noise by its pattern alone.
     const Measured biased = measure(left, right, 0.3F);
     const Residuals shifted = residuals_of(biased.points, biased.pair, scene);
     EXPECT_NEAR(std::abs(bias_of(shifted) - own_bias), 3, 0.3) << shot.name;

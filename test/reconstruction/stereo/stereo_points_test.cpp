@@ -14,7 +14,7 @@
 #include "core/random.h"
 #include "test/support/lens_samples.h"
 #include "test/support/margin.h"
-#include "test/support/stereo_views.h"
+#include "test/support/scans/stereo_views.h"
 
 namespace groundray::stereo_points_test {
 namespace {
@@ -42,9 +42,9 @@ DisparityMap map_of(const PinholePair& pair, float disparity_px) {
   return map;
 }
 
-// Points of a landscape are put into the map by where both cameras see them; out must come the
-// points, and where the left camera's own image shows them.
-TEST(StereoPoints, AreTheOnesThatBothCamerasSaw) {
+// Points of a landscape are entered into the map where both cameras see them; the results must be
+// these points, and their positions in the left camera's own image.
+TEST(StereoPoints, MatchThePointsSeenByBothCameras) {
   const StereoView left = camera(0), right = camera(0.4);
   const PinholePair pair = pinhole_pair(left, right);
   DisparityMap map = map_of(pair, nothing);
@@ -54,7 +54,7 @@ TEST(StereoPoints, AreTheOnesThatBothCamerasSaw) {
       const double depth_m = 2 + 0.01 * x + 0.03 * y;
       const glm::dvec3 p_LQ(depth_m * (glm::dvec2(x, y) - pair.centre_px) / pair.focal_px, depth_m);
       truth.push_back(pair.X_DL * p_LQ);
-      // As the right pinhole sees the point.
+      // Projection of the point into the right pinhole.
       const glm::dvec3 p_RQ = inverse(pair.X_DR) * truth.back();
       const double u_right = pair.focal_px * p_RQ.x / p_RQ.z + pair.centre_px.x;
       map.disparity_px.at(x, y)[0] = static_cast<float>(x - u_right);
@@ -71,8 +71,8 @@ TEST(StereoPoints, AreTheOnesThatBothCamerasSaw) {
   }
 }
 
-// Matthies and Shafer's own form: sd of depth is Z^2 / (f B) times that of the disparity.
-TEST(StereoPoints, StateTheUncertaintyOfDepthByItsSquare) {
+// Formula of Matthies and Shafer: the sd of depth is Z^2 / (f B) times that of the disparity.
+TEST(StereoPoints, DepthSdGrowsWithTheSquareOfDepth) {
   const StereoView left = camera(0);
   const PinholePair pair = pinhole_pair(left, camera(0.4));
   const DisparityMap map = map_of(pair, 5);
@@ -90,8 +90,8 @@ TEST(StereoPoints, StateTheUncertaintyOfDepthByItsSquare) {
 }
 
 // Draws pixels and disparities, makes points of them, and compares their spread with the stated
-// covariance: at 1 % the two differ by second-order terms of 3e-4 and the sample's own spread.
-TEST(StereoPoints, HaveTheCovarianceOfDrawnOnes) {
+// covariance: the limit of 1 % covers second-order terms of 3e-4 and the sample's own scatter.
+TEST(StereoPoints, CovarianceMatchesDrawnPoints) {
   const PinholePair pair{
       .focal_px = 500, .centre_px = {310, 240}, .size_px = {640, 480}, .baseline_m = 0.3};
   constexpr int draws = 200000;
@@ -119,7 +119,7 @@ TEST(StereoPoints, HaveTheCovarianceOfDrawnOnes) {
       testing::record_margin("covariance", off, 0.015);
     }
   }
-  // The derivative by a difference.
+  // Derivative by finite differences.
   constexpr double step = 1e-4;
   const glm::dvec3 slope = (stereo_point(pair, pixel, disparity_px + step, 0, 0).p_m -
                             stereo_point(pair, pixel, disparity_px - step, 0, 0).p_m) /
@@ -127,7 +127,7 @@ TEST(StereoPoints, HaveTheCovarianceOfDrawnOnes) {
   EXPECT_LT(glm::distance(slope, point.by_disparity_m), 1e-8);
 }
 
-TEST(StereoPoints, AreTurnedToD) {
+TEST(StereoPoints, CovarianceIsRotatedToD) {
   const StereoView left = camera(0);
   const PinholePair pair = pinhole_pair(left, camera(0.4));
   const StereoPoints points = stereo_points(pair, left, map_of(pair, 5));
@@ -138,7 +138,7 @@ TEST(StereoPoints, AreTurnedToD) {
       pair, glm::dvec2(p_LQ) / p_LQ.z * pair.focal_px + pair.centre_px, 5, usual_match_px, 0.3);
   const double alone_m2 = glm::dot(up, point.covariance_m2 * up);
   EXPECT_NEAR(points.covariance_m2[i][2][2], alone_m2, 1e-5 * alone_m2);
-  // Four neighbours 6 px apart, with errors that are alike by exp(-distance / 6 px).
+  // Four neighbours 6 px apart, with errors correlated by exp(-distance / 6 px).
   EXPECT_NEAR(points.together, 1 + 2 * std::exp(-1.0) + std::exp(-std::sqrt(2.0)), 1e-12);
   const double variance_m2 = points.together * alone_m2;
   MeasuredPoints measured;
@@ -147,8 +147,9 @@ TEST(StereoPoints, AreTurnedToD) {
   ASSERT_EQ(measured.size(), 2 * points.size());
   EXPECT_NEAR(measured.sd_m[i], std::sqrt(variance_m2), 1e-5 * std::sqrt(variance_m2));
   EXPECT_NEAR(measured.bias_sd_m[i], std::abs(glm::dot(up, point.by_disparity_m) * 0.1), 1e-6);
-  // Distances from planes of slope g vary by n' C n with n = (-g, 1), whatever the slope; the rest
-  // of the place counts as the mean of both ways, so slopes of two ways at right angles are added.
+  // Distances from planes of slope g have the variance n' C n with n = (-g, 1), for any slope; the
+  // remaining position error counts as the mean over both directions, so slopes in two directions
+  // at right angles are added.
   const double footprint_m = p_LQ.z / pair.focal_px;
   for (const glm::dvec2 slope : {glm::dvec2(0.5, -0.2), {0.1, 0.9}, {-0.3, -0.3}}) {
     double told_m2 = 0, true_m2 = 0;
@@ -166,14 +167,14 @@ TEST(StereoPoints, AreTurnedToD) {
   EXPECT_EQ(measured.origins[i], PointOrigin::Stereo);
 }
 
-TEST(StereoPoints, LeavesOutWhatIsTooUncertainOrBeyondLimits) {
+TEST(StereoPoints, ExcludesUncertainAndOutOfLimitPoints) {
   const StereoView left = camera(0);
   const PinholePair pair = pinhole_pair(left, camera(0.4));
   DisparityMap map = map_of(pair, 5);
   const auto all =
       static_cast<std::uint64_t>(pair.size_px.x) * static_cast<std::uint64_t>(pair.size_px.y);
   const StereoPoints points = stereo_points(pair, left, map, {.stride_px = 1});
-  EXPECT_EQ(points.size() + points.out_of_limits, all);  // out is what the lens does not image
+  EXPECT_EQ(points.size() + points.out_of_limits, all);  // out of limits: not imaged by the lens
   EXPECT_EQ(points.too_uncertain, 0U);
   // 0.3 and 0.1 px are 6.3 % of 5.
   EXPECT_EQ(
@@ -186,13 +187,13 @@ TEST(StereoPoints, LeavesOutWhatIsTooUncertainOrBeyondLimits) {
   EXPECT_EQ(stereo_points(pair, left, map).size(), 0U);
   for (const float none : {0.0F, -3.0F, nothing, std::numeric_limits<float>::infinity()})
     EXPECT_EQ(stereo_points(pair, left, map_of(pair, none)).size(), 0U) << none;
-  // Without any noise what is infinitely far is not to be had either.
+  // Even without noise, points at infinity are omitted.
   EXPECT_EQ(
       stereo_points(pair, left, map_of(pair, 0), {.noise = {.match_px = 0, .bias_px = 0}}).size(),
       0U);
 }
 
-TEST(StereoPoints, TakeTheMapsOwnUncertaintyUnlessTold) {
+TEST(StereoPoints, UsesTheSdOfTheMapUnlessGiven) {
   const StereoView left = camera(0);
   const PinholePair pair = pinhole_pair(left, camera(0.4));
   DisparityMap map = map_of(pair, 5);
@@ -205,7 +206,7 @@ TEST(StereoPoints, TakeTheMapsOwnUncertaintyUnlessTold) {
               0.2 * per_px_m, 1e-5);
 }
 
-TEST(StereoPoints, RefuseWhatCannotBe) {
+TEST(StereoPoints, RejectsInvalidInput) {
   const StereoView left = camera(0);
   const PinholePair pair = pinhole_pair(left, camera(0.4));
   const DisparityMap map = map_of(pair, 5);
@@ -222,7 +223,7 @@ TEST(StereoPoints, RefuseWhatCannotBe) {
   EXPECT_THAT([&] { stereo_points({}, left, map); },
               ThrowsMessage<Error>(HasSubstr("focal length of 0")));
   EXPECT_THAT([&] { stereo_points(pair, left, {}); },
-              ThrowsMessage<Error>(HasSubstr("the disparities are of 0 x 0 px")));
+              ThrowsMessage<Error>(HasSubstr("the disparities have 0 x 0 px")));
 }
 
 }  // namespace

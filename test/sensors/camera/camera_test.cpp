@@ -12,10 +12,10 @@
 #include <vector>
 
 #include "core/error.h"
-#include "test/support/camera_scene.h"
 #include "test/support/lens_samples.h"
 #include "test/support/margin.h"
-#include "test/support/solid.h"
+#include "test/support/scans/camera_scene.h"
+#include "test/support/scans/solid.h"
 
 namespace groundray::camera_test {
 namespace {
@@ -48,20 +48,20 @@ const Sky& even_sky() {
   return sky;
 }
 
-// How much of each pixel shows the first model.
+// Fraction of each pixel that shows the first model.
 ImageF share_of_model(const Camera& camera, const Scene& scene, const Trajectory& path) {
   const PathTracer light(scene, even_sky(), 1, std::nullopt);
   const std::vector<std::uint16_t> labels{first_model_label};
   return camera.expose(light, path, 0ns, {.seed = {5}}, labels).coverage;
 }
 
-// Something that ends at y = 0 and is wider than the image otherwise: the right half of the image.
+// An object whose edge is at y = 0 and which otherwise exceeds the image: it covers the right half.
 Scene right_half(double depth_m) {
   return scene_of(plane_ground(0, 0, -1000), {board(100)}, {{.p_DO = {depth_m, -100, 0}}});
 }
 
-// Mean and variance of how an edge is spread across columns, px: the steps between columns are
-// its spread, twice blurred by a pixel's width, which adds 1/6 to the variance.
+// Mean and variance of an edge's spread across columns, px: the steps between columns are the
+// spread blurred twice by a pixel's width, which adds 1/6 to the variance.
 struct Spread {
   double mean_px = 0, variance_px2 = 0;
 };
@@ -84,10 +84,9 @@ Spread spread_of(const ImageF& share, int first_row, int end_row) {
   return spread;
 }
 
-// A uniform disc of diameter c has a variance of c^2 / 16 across. On the sensor it is
-// A f |Z - Z_f| / (Z (Z_f - f)) wide, and so many pixels as f_px and the image distance say,
-// f Z_f / (Z_f - f).
-TEST(Camera, BlursWhatIsOutOfFocusToTheDiscOfAThinLens) {
+// A uniform disc of diameter c has a variance of c^2 / 16 along one axis. On the sensor c is A f |Z
+// - Z_f| / (Z (Z_f - f)); f_px and the image distance f Z_f / (Z_f - f) convert it to pixels.
+TEST(Camera, DefocusBlursToTheDiscOfAThinLens) {
   const double focal_m = 0.05, f_number = 1.25, aperture_m = focal_m / f_number;
   for (const auto& [focus_m, depth_m] :
        {std::pair(8.0, 3.0), {8.0, 40.0}, {std::numeric_limits<double>::infinity(), 4.0}}) {
@@ -109,7 +108,7 @@ TEST(Camera, BlursWhatIsOutOfFocusToTheDiscOfAThinLens) {
   }
 }
 
-TEST(Camera, IsSharpInFocusAndWithoutOne) {
+TEST(Camera, IsSharpInFocusAndWithoutAFocusDistance) {
   for (const auto& focus_m : {std::optional(10.0), std::optional<double>()}) {
     CameraSpec spec = pinhole(2000, {16, 16}, 64);
     spec.aperture = {{.focal_length_m = 0.05, .f_number = 1.25, .focus_m = focus_m}};
@@ -121,8 +120,8 @@ TEST(Camera, IsSharpInFocusAndWithoutOne) {
   }
 }
 
-// Uniform over a width w = f v T / Z, of variance w^2 / 12, whoever moves.
-TEST(Camera, BlursMotionOverSpeedTimesExposure) {
+// Uniform over a width w = f v T / Z, of variance w^2 / 12, whether the camera or the object moves.
+TEST(Camera, MotionBlurIsSpeedTimesExposure) {
   for (const double exposure_s : {0.01, 0.03}) {
     CameraSpec spec = pinhole(500, {64, 16}, 256);
     spec.shutter.exposure_s = exposure_s;
@@ -144,14 +143,15 @@ TEST(Camera, BlursMotionOverSpeedTimesExposure) {
   }
 }
 
-// The edge moves by f v t_row / Z px from row to row; none with a global shutter.
-TEST(Camera, RollsItsShutterRowByRow) {
+// The edge moves by f v t_row / Z px from row to row, and not at all with a global shutter.
+TEST(Camera, RollingShutterShiftsRowByRow) {
   for (const double row_s : {0.0, 0.5e-3}) {
     CameraSpec spec = pinhole(500, {48, 64}, 256);
     spec.shutter = {.exposure_s = 0.008, .row_s = row_s};
     const ImageF share =
         share_of_model(Camera(spec), right_half(10), gliding(looking(here, ahead), {0, -8, 0}));
-    // A line through the edges of all rows: an edge's place is what the model leaves of its row.
+    // A line fitted to the edges of all rows; an edge's position is the part of its row that the
+    // model leaves free.
     double slope_px = 0, weight = 0;
     for (int y = 0; y < 64; ++y) {
       double edge_px = 48;
@@ -160,14 +160,15 @@ TEST(Camera, RollsItsShutterRowByRow) {
       weight += (y - 31.5) * (y - 31.5);
     }
     slope_px /= weight;
-    // Some pixels of each row are mixed, to 1/256 each as stratified: 0.01 px, over 64 rows 1e-4.
+    // Some pixels of each row are mixed, known to 1/256 each by stratification: 0.01 px, and over
+    // 64 rows 1e-4.
     EXPECT_NEAR(slope_px, -500 * 8 * row_s / 10, 1e-3);
     testing::record_margin("rolling shutter", slope_px + 500 * 8 * row_s / 10, 1e-3, "px a row");
   }
 }
 
 // A board across the line of sight covers (f side / Z)^2 px.
-TEST(Camera, CoverageSumsToOneAndToWhatThingsCover) {
+TEST(Camera, CoverageSumsToOneAndMatchesTheCoveredArea) {
   const Scene scene = scene_of(plane_ground(0, 0, -2), {board(1), icosphere(0.7, 2)},
                                {{.p_DO = {10, 1, 0}}, {.p_DO = {8, -2, 0}, .model = 1}});
   const std::vector<std::uint16_t> labels = labels_of(scene);
@@ -184,24 +185,24 @@ TEST(Camera, CoverageSumsToOneAndToWhatThingsCover) {
       board_px += double(shares[2]);
     }
   }
-  // 75 pixels on its rim are known to 1/64 or so each.
+  // 75 pixels on its boundary are each known to about 1/64.
   EXPECT_NEAR(board_px, 93.7 * 93.7 * 4 / 100, 4.0 / 64 * std::sqrt(75));
   EXPECT_EQ(camera.expose(light, gliding(looking(here, ahead), {}), 0ns, {}).coverage.width(), 0);
 }
 
-// Pixels beyond the fold look nowhere; of those on it, the part before it counts.
-TEST(Camera, ShowsNothingBeyondTheRim) {
+// Pixels beyond the fold have no ray; of pixels on the fold, only the part inside it counts.
+TEST(Camera, IsDarkBeyondTheFold) {
   const auto lenses = sample_lenses();
   const auto folds =
       std::ranges::find(lenses, "fisheye, folds", &groundray::testing::LensSample::name);
-  const Scene scene = scene_of(plane_ground(0, 0, -1e6), {});  // a speck straight behind us
+  const Scene scene = scene_of(plane_ground(0, 0, -1e6), {});  // a speck straight behind the camera
   const PathTracer light(scene, even_sky(), 1, std::nullopt);
   const Camera camera({.lens = folds->model,
                        .size_px = folds->size_px,
                        .sampling = {.samples = 8, .most_samples = 8, .depth = 1}});
   const std::vector<std::uint16_t> labels{0};
   const Exposure exposure = camera.expose(light, gliding(looking(here, {0.01, 0, 1}), {}), 0ns, {},
-                                          labels);  // at the sky
+                                          labels);  // in view of the sky
   int nowhere = 0, in_part = 0;
   for (int y = 0; y < folds->size_px.y; ++y) {
     for (int x = 0; x < folds->size_px.x; ++x) {
@@ -219,8 +220,8 @@ TEST(Camera, ShowsNothingBeyondTheRim) {
   EXPECT_GT(in_part, 20);
 }
 
-// Only where the light differs within a pixel more paths are asked for.
-TEST(Camera, TakesMorePathsWhereTheErrorIsLarge) {
+// More paths are requested only where the radiance differs within a pixel.
+TEST(Camera, TracesMorePathsWhereTheErrorIsLarge) {
   const Scene scene = right_half(10);  // unlit at depth 1
   const PathTracer light(scene, even_sky(), 1, std::nullopt);
   CameraSpec spec = pinhole(500, {17, 8}, 8);  // the edge is in the middle of column 8
@@ -233,16 +234,16 @@ TEST(Camera, TakesMorePathsWhereTheErrorIsLarge) {
       EXPECT_EQ(exposure.samples.at(x, y)[0], x == 8 ? 128 : 8);
       EXPECT_EQ(exposure.standard_error.at(x, y)[0] > 0, x == 8);
     }
-    // Half of it, within 4 strata of 128; paths either see 2 or 0: sigma / sqrt(n - 1).
+    // Half of 2, to within 4 strata of 128; each path sees either 2 or 0: sigma / sqrt(n - 1).
     EXPECT_NEAR(exposure.radiance.at(8, y)[0], 1, 2 * 4.0 / 128);
     EXPECT_NEAR(exposure.standard_error.at(8, y)[0], 1 / std::sqrt(127), 1e-3);
   }
 }
 
-// A sliver of 1/64 of a column is missed by most pilots of 4 paths: their pixels take but 4, which
-// must not pull the mean of many images down. Means of 512 images x 8 rows, each of variance
-// 4 p (1 - p) / 4 at most, differ from 2 p by 4.9 deviations with a chance of 1e-6.
-TEST(Camera, MeansDoNotDependOnHowManyPathsTheErrorAsksFor) {
+// Most pilots of 4 paths miss a sliver of 1/64 of a column. Their pixels then take only 4 paths,
+// which must not bias the mean of many images low. Means of 512 images x 8 rows, each of variance
+// at most 4 p (1 - p) / 4, differ from 2 p by 4.9 standard deviations with a probability of 1e-6.
+TEST(Camera, AdaptiveSamplingIsUnbiased) {
   const Scene scene = right_half(10);  // unlit at depth 1
   const PathTracer light(scene, even_sky(), 1, std::nullopt);
   CameraSpec spec = pinhole(500, {17, 8}, 4);
@@ -267,7 +268,7 @@ TEST(Camera, MeansDoNotDependOnHowManyPathsTheErrorAsksFor) {
   EXPECT_NEAR(sum / (frames * 8), expected, 4.9 * sigma / std::sqrt(frames * 8));
 }
 
-TEST(Camera, KnowsNoErrorOfOnePath) {
+TEST(Camera, StandardErrorOfOnePathIsInfinite) {
   const Scene scene = right_half(10);
   const PathTracer light(scene, even_sky(), 1, std::nullopt);
   CameraSpec spec = pinhole(500, {3, 3}, 1);
@@ -307,7 +308,7 @@ TEST(Camera, ExposesTheSameOnAnyNumberOfThreads) {
   EXPECT_FALSE(std::ranges::equal(expose(1).radiance.values(), first.radiance.values()));
 }
 
-TEST(Camera, ListsAllThatIsOutOfBounds) {
+TEST(Camera, ErrorListsEveryFault) {
   CameraSpec spec = pinhole(100, {64, 48}, 24);
   spec.shutter = {.exposure_s = 0, .row_s = -1};
   spec.sampling.most_samples = 8;
@@ -320,7 +321,7 @@ TEST(Camera, ListsAllThatIsOutOfBounds) {
                   HasSubstr("transmission = 0"))));
 }
 
-TEST(Camera, RefusesImagesOfNoPixelsOrTooMany) {
+TEST(Camera, RejectsImagesWithoutPixelsOrWithTooMany) {
   EXPECT_THAT(
       [] {
         Camera{pinhole(100, {0, 48}, 1)};
@@ -329,20 +330,20 @@ TEST(Camera, RefusesImagesOfNoPixelsOrTooMany) {
   EXPECT_THAT(
       [] {
         Camera{pinhole(100, {40000, 25000}, 1)};
-      },  // 72 bytes a pixel
+      },  // 72 bytes per pixel
       ThrowsMessage<Error>(AllOf(HasSubstr("an image of 40000 x 25000 px must have"),
                                  HasSubstr("its rays take 68664 MiB"))));
 }
 
-// Coefficients in another order than OpenCV's, a focal length of 0.
-TEST(Camera, RefusesLensesThatImageNothing) {
+// Coefficients in an order other than OpenCV's; a focal length of 0.
+TEST(Camera, RejectsLensesThatImageNothing) {
   EXPECT_THAT([] { Camera{pinhole(0, {64, 48}, 1)}; }, ThrowsMessage<Error>(HasSubstr("focal")));
   CameraSpec spec = pinhole(100, {64, 48}, 1);
   spec.lens = Eucm{centred(100, {64, 48}), 2, 1};
   EXPECT_THAT([&] { Camera{spec}; }, ThrowsMessage<Error>(HasSubstr("alpha")));
 }
 
-TEST(Camera, StopsBetweenRowsWhenAsked) {
+TEST(Camera, StopsBetweenRowsOnRequest) {
   struct Stopped {};
   const Scene scene = scene_of(plane_ground(0, 0, -2), {});
   const PathTracer light(scene, even_sky(), 1, std::nullopt);
@@ -355,7 +356,7 @@ TEST(Camera, StopsBetweenRowsWhenAsked) {
                Stopped);
 }
 
-TEST(Camera, NeedsAPathThatCoversTheExposure) {
+TEST(Camera, RejectsATrajectoryThatDoesNotCoverTheExposure) {
   const Scene scene = scene_of(plane_ground(0, 0, -2), {});
   const PathTracer light(scene, even_sky(), 1, std::nullopt);
   EXPECT_THAT(

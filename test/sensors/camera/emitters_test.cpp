@@ -9,12 +9,12 @@
 #include <limits>
 #include <utility>
 
+#include "apps/scene/readers/material_io.h"
 #include "core/error.h"
-#include "core/luminance.h"
+#include "core/image/luminance.h"
 #include "core/random.h"
-#include "sensors/material_io.h"
 #include "terrain/terrain_scene.h"
-#include "test/support/solid.h"
+#include "test/support/scans/solid.h"
 
 namespace groundray::emitters_test {
 namespace {
@@ -30,7 +30,7 @@ Material lamp(const glm::dvec3& radiance) {
   return {"lamp", Lambertian{{{300, 0.5}, {2500, 0.5}}}, radiance};
 }
 
-// A box that stands, 2 wide, a ball that goes, and a dark one; of these materials.
+// A box at rest, 2 wide, a moving ball and a dark object, with these materials.
 Scene scene_of(const glm::dvec3& box, const glm::dvec3& ball, const glm::dvec3& ground = {}) {
   const RayDevice device;
   const Trajectory path({{milliseconds(0), {{1, 0, 0, 0}, {0, 9, 5}}},
@@ -61,7 +61,7 @@ glm::dvec2 uniform(std::uint32_t stream, std::uint32_t index) {
   return random_uniform({.seed = {4}, .sensor = stream, .pulse = index});
 }
 
-TEST(Emitters, AreDrawnByAreaTimesLuminance) {
+TEST(Emitters, AreSampledByAreaTimesLuminance) {
   const glm::dvec3 red(5, 0, 0), green(0, 1, 0);
   const Emitters emitters(scene_of(red, green));
   const double box_m2 = 6 * 4, ball_m2 = area_m2(icosphere(1, 1)) / 4;
@@ -79,8 +79,8 @@ TEST(Emitters, AreDrawnByAreaTimesLuminance) {
   EXPECT_NEAR(of_box, share * count, 3.5 * std::sqrt(count * share * (1 - share)));
 }
 
-// A ray to the point meets a surface there that shines as the point does.
-TEST(Emitters, LieWhereTheirObjectsAre) {
+// A ray to the sampled point hits a surface there that has the sampled point's radiance.
+TEST(Emitters, SamplesLieOnTheirObjects) {
   const Scene scene = scene_of({2, 2, 2}, {0, 3, 0});
   const Emitters emitters(scene);
   for (std::uint32_t i = 0; i < 2000; ++i) {
@@ -102,14 +102,14 @@ TEST(Emitters, LieWhereTheirObjectsAre) {
   }
 }
 
-TEST(Emitters, AreNoneWhereNothingShines) {
+TEST(Emitters, AreEmptyWithoutEmission) {
   const Emitters emitters(scene_of({}, {}));
   EXPECT_FALSE(emitters.any_shines());
   EXPECT_FALSE(emitters.any_is_drawn());
 }
 
-// Holes do not shine, and only rays know where they are.
-TEST(Emitters, ThatImagesCutOutShineButAreNotDrawn) {
+// Cut-out holes do not emit, and only rays can detect them.
+TEST(Emitters, WithCutOutsEmitButAreNotSampled) {
   const RayDevice device;
   Model leafy = box_model({1, 1, 1});
   leafy.uv.assign(leafy.mesh.vertices_m.size(), {0, 0});
@@ -128,25 +128,26 @@ TEST(Emitters, ThatImagesCutOutShineButAreNotDrawn) {
   EXPECT_EQ(glow.pdf_per_m2, 0);
 }
 
-TEST(Emitters, AreNoneOfTheGround) {
+TEST(Emitters, ExcludeTheGround) {
   EXPECT_THAT(
       [] {
         Emitters(scene_of({}, {}, {0, 1, 0}));
       },
-      ThrowsMessage<Error>(HasSubstr("the ground is of 'lamp', which emits light: only objects")));
+      ThrowsMessage<Error>(
+          HasSubstr("the ground has material 'lamp', which emits light, but only objects")));
 }
 
-TEST(Emitters, NeedTheMaterialsThatTheSceneNames) {
+TEST(Emitters, RejectUnknownMaterials) {
   Scene scene = scene_of({}, {});
   scene.models[1].materials[0] = 8;
   scene.models.pop_back();
   EXPECT_THAT([&] { Emitters{scene}; },
               ThrowsMessage<Error>(
-                  AllOf(HasSubstr("surface 0 of model 1 is of material 8, but the scene has 4"),
+                  AllOf(HasSubstr("surface 0 of model 1 has material 8, but the scene has 4"),
                         HasSubstr("surface 0 of model 2 has no material"))));
 }
 
-TEST(Emitters, EmitWhatTheirFileSays) {
+TEST(Emitters, ReadEmissionFromTheMaterialFile) {
   const std::string head =
       "groundray_material: 1\nname: lamp\n"
       "spectrum: {wavelengths_nm: [400, 700], reflectances: [0.1, 0.1]}\n";
@@ -160,7 +161,7 @@ TEST(Emitters, EmitWhatTheirFileSays) {
               ThrowsMessage<Error>(HasSubstr("a.yaml:4:")));
 }
 
-TEST(Emitters, EmitFiniteLight) {
+TEST(Emitters, RejectNegativeAndNonFiniteEmission) {
   for (const double wrong : {-1.0, std::numeric_limits<double>::infinity(), std::nan("")}) {
     EXPECT_THAT(
         [&] {

@@ -13,12 +13,12 @@
 #include <set>
 #include <vector>
 
-#include "core/displacement.h"
 #include "core/error.h"
-#include "test/support/camera_scene.h"
+#include "core/model/displacement.h"
 #include "test/support/lens_samples.h"
 #include "test/support/margin.h"
-#include "test/support/solid.h"
+#include "test/support/scans/camera_scene.h"
+#include "test/support/scans/solid.h"
 
 namespace groundray::image_truth_test {
 namespace {
@@ -39,7 +39,7 @@ using groundray::testing::scene_of;
 using ::testing::HasSubstr;
 using ::testing::ThrowsMessage;
 
-constexpr double float_rounding = 1.2e-7;  // twice that of a float, relative
+constexpr double float_rounding = 1.2e-7;  // relative; twice the rounding error of a float
 
 const Materials::InColour grey{{{LambertianBsdf{glm::dvec3(0.5)}}}, {glm::vec3(0.5f)}};
 
@@ -64,8 +64,8 @@ void for_each_pixel(const Camera& camera, const Act& act) {
   }
 }
 
-// Where OpenCV images points of C by a model; none where it does not have it, or not so far off
-// the axis.
+// Pixels at which OpenCV images points of C; none if OpenCV does not have the model, or not that
+// far off the axis.
 std::vector<cv::Point2d> images_by_opencv(const LensModel& model,
                                           const std::vector<cv::Point3d>& points) {
   const cv::Vec3d still(0, 0, 0);
@@ -86,7 +86,7 @@ std::vector<cv::Point2d> images_by_opencv(const LensModel& model,
   return images;
 }
 
-// The same by the equations of docs/camera_lens.md, where OpenCV has none.
+// The same by the equations of docs/theory/camera_lens.md, for models that OpenCV does not have.
 glm::dvec2 image_by_hand(const Pinhole& model, const glm::dvec3& p) {
   const glm::dvec2 m = glm::dvec2(p) / p.z;
   return {model.scale.focal_px.x * (m.x + model.scale.skew * m.y) + model.scale.centre_px.x,
@@ -110,16 +110,16 @@ glm::dvec2 image_by_hand(const DoubleSphere& model, const glm::dvec3& p) {
          model.scale.centre_px;
 }
 glm::dvec2 image_by_hand(const Equirectangular&, const glm::dvec3& p) {
-  constexpr double pi = std::numbers::pi;  // of 240 x 120 px
+  constexpr double pi = std::numbers::pi;  // for an image of 240 x 120 px
   return {(std::atan2(p.x, p.z) / (2 * pi) + 0.5) * 240 - 0.5,
           (std::asin(p.y / glm::length(p)) / pi + 0.5) * 120 - 0.5};
 }
 
-// Cameras within a box: all that they see is its walls, so that positions have an oracle of their
-// own, and where these are imaged another.
+// Cameras inside a box see nothing but its walls, so positions have one independent oracle and
+// their pixels another.
 class EveryLensInABox : public ::testing::TestWithParam<LensSample> {};
 
-TEST_P(EveryLensInABox, SeesPointsOfTheWallsWhereTheyAreImaged) {
+TEST_P(EveryLensInABox, PositionsLieOnTheWallsAndProjectToTheirPixels) {
   const glm::dvec3 half(10, 8, 6);
   const Scene scene = scene_of(plane_ground(0, 0, -100), {box_model(2.0 * half)}, {{}});
   const Camera camera({.lens = GetParam().model, .size_px = GetParam().size_px});
@@ -149,8 +149,8 @@ TEST_P(EveryLensInABox, SeesPointsOfTheWallsWhereTheyAreImaged) {
     pixels.emplace_back(x, y);
   });
   ASSERT_GT(points.size(), 100u);
-  // Rays are right to 1e-9 px, and positions on them to 4e-15 m of rounding; beside the pole of
-  // one model its image moves by 1e9 px for each radian.
+  // Rays are accurate to 1e-9 px, and positions on them to 4e-15 m of rounding; near the pole of
+  // one model its image moves by 1e9 px per radian.
   const double tolerance_px = GetParam().name == "rational 8, pole" ? 1e-4 : 1e-6;
   const auto images = images_by_opencv(GetParam().model, points);
   for (std::size_t i = 0; i < images.size(); ++i) {
@@ -179,8 +179,8 @@ INSTANTIATE_TEST_SUITE_P(Sample, EveryLensInABox, ::testing::ValuesIn(sample_len
                            return name;
                          });
 
-// Z = d / (n K^-1 (u, v, 1)), n and d of the plane in C; range = Z |K^-1 (u, v, 1)|.
-TEST(ImageTruth, DepthAndRangeOfAPlaneAreTheClosedForms) {
+// Z = d / (n K^-1 (u, v, 1)) for the plane's n and d in C; range = Z |K^-1 (u, v, 1)|.
+TEST(ImageTruth, DepthAndRangeOfAPlaneMatchTheClosedForms) {
   const glm::dvec3 n_D = glm::normalize(glm::dvec3(-0.25, 0.125, 1));  // z = x/4 - y/8 - 30
   const Scene scene = scene_of(plane_ground(0.25, -0.125, -30), {});
   for (const Tracing tracing : {Tracing::Fast, Tracing::Exact}) {
@@ -200,7 +200,7 @@ TEST(ImageTruth, DepthAndRangeOfAPlaneAreTheClosedForms) {
       testing::record_margin("its range", truth.range_m.at(x, y)[0] / range_m - 1, float_rounding);
       const auto normal = truth.normal.at(x, y);
       EXPECT_LT(glm::distance(glm::dvec3(normal[0], normal[1], normal[2]), n_D), 1e-6);
-      // The arc cosine of a float is blunt near 0; the angle is not.
+      // The arc cosine is ill-conditioned in single precision near 0; the angle itself is not.
       EXPECT_NEAR(truth.incidence_rad.at(x, y)[0], std::acos(-glm::dot(n_C, m) / glm::length(m)),
                   1e-6);
       EXPECT_EQ(truth.label.at(x, y)[0], ground_label);
@@ -210,8 +210,8 @@ TEST(ImageTruth, DepthAndRangeOfAPlaneAreTheClosedForms) {
   }
 }
 
-// Facets lie between the sphere and the smaller one that touches the nearest of them.
-TEST(ImageTruth, SeesTheNearSideOfASphere) {
+// Facets lie between the sphere and the smaller concentric one that touches the nearest of them.
+TEST(ImageTruth, DepthIsOfTheNearSideOfASphere) {
   const double radius_m = 2;
   const Model ball = icosphere(radius_m, 3);
   double inner_radius_m = radius_m;
@@ -228,7 +228,7 @@ TEST(ImageTruth, SeesTheNearSideOfASphere) {
   int seen = 0;
   for_each_pixel(camera, [&](int x, int y) {
     const glm::dvec3 d = glm::normalize(glm::dvec3(1, (31.5 - x) / 100, (23.5 - y) / 100));
-    // The smaller root of |t d - c| = r, for the spheres inside and outside of the facets.
+    // The smaller root of |t d - c| = r, for the spheres that circumscribe and inscribe the facets.
     const auto root = [&](double r) {
       const double along = glm::dot(d, centre);
       return along - std::sqrt(along * along - glm::dot(centre, centre) + r * r);
@@ -237,7 +237,7 @@ TEST(ImageTruth, SeesTheNearSideOfASphere) {
     if (std::isnan(outer_m)) {
       EXPECT_EQ(truth.instance.at(x, y)[0], 0u);
     }
-    if (std::isnan(inner_m)) return;  // between the two, the facets decide
+    if (std::isnan(inner_m)) return;  // between the two spheres, the facets decide
     ++seen;
     EXPECT_EQ(truth.instance.at(x, y)[0], 1u);
     EXPECT_LE(truth.range_m.at(x, y)[0], inner_m * (1 + float_rounding));
@@ -246,8 +246,8 @@ TEST(ImageTruth, SeesTheNearSideOfASphere) {
   EXPECT_GT(seen, 500);
 }
 
-// A box across the line of sight, turned: its slabs say what is seen, sky or which thing.
-TEST(ImageTruth, IdsAreThoseOfTheThingThatIsSeenAndOfNoOther) {
+// A rotated box; its slab intersection decides whether sky is seen, and which object otherwise.
+TEST(ImageTruth, IdsAreOfTheVisibleObject) {
   const glm::dquat turned = glm::angleAxis(0.6, glm::normalize(glm::dvec3(1, 2, 3)));
   const glm::dvec3 half(1, 2, 1.5);
   const std::vector<PlacedObject> boxes{
@@ -290,11 +290,12 @@ TEST(ImageTruth, IdsAreThoseOfTheThingThatIsSeenAndOfNoOther) {
   EXPECT_EQ(seen, (std::set<std::uint32_t>{0, ground_label, 10, 11}));
 }
 
-TEST(ImageTruth, BumpsMoveNothingAndDisplacementAll) {
+TEST(ImageTruth, BumpsKeepPositionsAndDisplacementMovesThem) {
   const Camera camera(pinhole());
   const auto truth_of = [&](Model model) {
-    const Scene scene = scene_of(plane_ground(0, 0, -100), {std::move(model)},
-                                 {{.p_DO = {10, 0, 0}, .R_DO = {0, 0, 0, 1}}});  // facing us
+    const Scene scene =
+        scene_of(plane_ground(0, 0, -100), {std::move(model)},
+                 {{.p_DO = {10, 0, 0}, .R_DO = {0, 0, 0, 1}}});  // facing the camera
     return image_truth(camera, scene, grey, gliding(looking(here, ahead), {}), {});
   };
   Model bumpy = board(2);
@@ -311,15 +312,16 @@ TEST(ImageTruth, BumpsMoveNothingAndDisplacementAll) {
                 plain.instance.at(x, y)[0] == 0);
     if (plain.instance.at(x, y)[0] == 0) return;
     EXPECT_NEAR(plain.depth_m.at(x, y)[0], 10, 1e-6);
-    EXPECT_NEAR(moved.depth_m.at(x, y)[0], 9.75, 1e-6);  // by 0.5 (1 - 0.5), out of its front
+    EXPECT_NEAR(moved.depth_m.at(x, y)[0], 9.75,
+                1e-6);  // displaced by 0.5 (1 - 0.5) towards its front
     EXPECT_GT(std::abs(bumped.shading_normal.at(x, y)[1]), 0.1f);
     EXPECT_EQ(plain.shading_normal.at(x, y)[0], -1);
   });
 }
 
-// Two texels side by side, over and over, linear between their centres: light is to the material's
-// albedo as it is to their mean, up to 1.
-TEST(ImageTruth, AlbedosVaryAsTheTextureDoes) {
+// Two texels side by side, repeated, linear between their centres: the albedo is the material's,
+// times the ratio of the texture to its mean, and at most 1.
+TEST(ImageTruth, AlbedosVaryWithTheTexture) {
   Model model = board(2);
   Image8 texels(2, 1, 1);
   texels.at(0, 0)[0] = 64;
@@ -349,8 +351,8 @@ TEST(ImageTruth, AlbedosVaryAsTheTextureDoes) {
   EXPECT_GT(checked, 300);
 }
 
-// Points x of the plane n x = d go by x' = R x + t = (R + t n^T / d) x: by a homography of rays,
-// and of pixels after the lens.
+// Points x of the plane n x = d move by x' = R x + t = (R + t n^T / d) x: a homography of rays, and
+// of pixels after the lens.
 TEST(ImageTruthFlow, OfAPlaneIsAHomographyThroughAnyDistortion) {
   const Scene scene = scene_of(plane_ground(0.25, -0.125, -8), {});
   const PixelScale scale = centred(100, {64, 48});
@@ -360,7 +362,7 @@ TEST(ImageTruthFlow, OfAPlaneIsAHomographyThroughAnyDistortion) {
   const Pose first = looking({0, 0, 0}, {3, 0.5, -3});
   const Pose second = looking({0.5, -0.3, 0.2}, {3.6, 0, -2.9});
   const Trajectory path({{-1s, first}, {0s, first}, {1s, second}, {2s, second}});
-  // The middles of the exposures, 2.5 ms long halves, fall where the camera stands.
+  // The middles of the exposures, 2.5 ms after their start, fall where the camera is at rest.
   const TruthRequest request{.begin = -500ms, .before = 1500ms, .after = 1100ms};
   const ImageTruth truth = image_truth(camera, scene, grey, path, request);
   const glm::dvec3 n_D = glm::normalize(glm::dvec3(-0.25, 0.125, 1));
@@ -378,7 +380,7 @@ TEST(ImageTruthFlow, OfAPlaneIsAHomographyThroughAnyDistortion) {
                       cv::Matx33d(100, 0, scale.centre_px.x, 0, 100, scale.centre_px.y, 0, 0, 1),
                       std::vector<double>(k.begin(), k.end()), image);
     const glm::dvec2 to(image[0].x, image[0].y);
-    // Offsets are floats of some 10 px.
+    // Offsets are floats of about 10 px.
     EXPECT_LT(glm::distance(flow(truth.forward, x, y), to - glm::dvec2(x, y)), 1e-5);
     EXPECT_LT(glm::distance(flow(truth.backward, x, y), to - glm::dvec2(x, y)), 1e-5);
     testing::record_margin("flow of a plane",
@@ -392,8 +394,9 @@ TEST(ImageTruthFlow, OfAPlaneIsAHomographyThroughAnyDistortion) {
   EXPECT_LT(inside, 64 * 48);
 }
 
-// A board 5 m ahead before a wall at 20 m, from two places side by side: by similar triangles.
-TEST(ImageTruthFlow, TellsWhatABoardInFrontHides) {
+// A board 5 m ahead, in front of a wall at 20 m, from two positions side by side: by similar
+// triangles.
+TEST(ImageTruthFlow, ReportsOcclusionByABoardInFront) {
   const Scene scene = scene_of(plane_ground(0, 0, -100), {board(1), board(50)},
                                {{.p_DO = {5, 0, 0}}, {.p_DO = {20, 0, 0}, .model = 1}});
   const Camera camera(pinhole(60));
@@ -403,7 +406,7 @@ TEST(ImageTruthFlow, TellsWhatABoardInFrontHides) {
   for_each_pixel(camera, [&](int x, int y) {
     const glm::dvec3 p = point(truth, x, y);
     const double near_m = p.x;
-    const double du = 60 * 0.7 / near_m;  // to the right: the camera goes to the left
+    const double du = 60 * 0.7 / near_m;  // to the right, because the camera moves to the left
     EXPECT_NEAR(flow(truth.forward, x, y).x, du, 1e-5);
     testing::record_margin("of a board", flow(truth.forward, x, y).x - du, 1e-5, "px");
     EXPECT_NEAR(flow(truth.forward, x, y).y, 0, 1e-5);
@@ -417,8 +420,8 @@ TEST(ImageTruthFlow, TellsWhatABoardInFrontHides) {
   EXPECT_GT(hidden, 100);
 }
 
-// A board that turns about the optical axis while it goes sideways.
-TEST(ImageTruthFlow, FollowsThingsThatMove) {
+// A board that turns about the optical axis while it moves sideways.
+TEST(ImageTruthFlow, FollowsMovingObjects) {
   const glm::dvec3 going(0, -1, 0.5);
   const double turning_rad_s = 0.4;
   std::vector<Trajectory::Sample> samples;
@@ -440,7 +443,7 @@ TEST(ImageTruthFlow, FollowsThingsThatMove) {
     const glm::dvec3 p = point(truth, x, y);
     if (truth.instance.at(x, y)[0] == 0) {
       if (!std::isinf(truth.range_m.at(x, y)[0])) return;
-      // The sky stays where it is, and is hidden where the board lies then.
+      // The sky is static, and is occluded where the board will be at that time.
       EXPECT_LT(glm::length(flow(truth.forward, x, y)), 1e-5);
       const glm::dvec3 at(10, (31.5 - x) / 10, (23.5 - y) / 10);
       const glm::dvec3 p_O = glm::angleAxis(-turning_rad_s * 0.5, glm::dvec3(1, 0, 0)) *
@@ -454,8 +457,8 @@ TEST(ImageTruthFlow, FollowsThingsThatMove) {
     const glm::dvec3 velocity =
         going + turning_rad_s * glm::cross(glm::dvec3(1, 0, 0), p - glm::dvec3(10, 0, 0));
     const auto told = truth.velocity_m_s.at(x, y);
-    // Between poses 0.1 s apart the path is an arc of 0.04 rad, at whose begin it is off the
-    // straight line by half of that.
+    // Between poses 0.1 s apart the path is an arc of 0.04 rad; at its start the direction differs
+    // from the chord by half of that.
     EXPECT_LT(glm::distance(glm::dvec3(told[0], told[1], told[2]), velocity),
               0.021 * glm::length(going));
     for (const auto& [of, t] : {std::pair(&truth.forward, 0.5), {&truth.backward, -0.5}}) {
@@ -472,9 +475,9 @@ TEST(ImageTruthFlow, FollowsThingsThatMove) {
   EXPECT_GT(covered, 20);
 }
 
-// A wall at Z, from a camera that glides at v: row r is seen when t = r t_row, so that what is
-// upright leans by f v t_row / Z px for each row; and not at all with a global shutter.
-TEST(ImageTruth, ARollingShutterLeansByTheClosedForm) {
+// A wall at Z, seen from a camera that moves at v: row r is exposed at t = r t_row, so that an
+// upright edge leans by f v t_row / Z px per row, and not at all with a global shutter.
+TEST(ImageTruth, RollingShutterSkewMatchesTheClosedForm) {
   const Scene scene = scene_of(plane_ground(0, 0, -100), {board(50)}, {{.p_DO = {10, 0, 0}}});
   const double speed_m_s = 8;
   for (const double row_s : {0.0, 1e-4, 2e-3}) {
@@ -484,7 +487,7 @@ TEST(ImageTruth, ARollingShutterLeansByTheClosedForm) {
     const Trajectory path = gliding(looking(here, ahead), {0, -speed_m_s, 0});  // to the right
     const ImageTruth truth = image_truth(camera, scene, grey, path, {});
     for_each_pixel(camera, [&](int x, int y) {
-      // Where the point would be imaged from the place at the begin.
+      // Pixel of the point from the camera's initial position.
       const glm::dvec3 p = point(truth, x, y);
       const double still_px = 31.5 - 100 * p.y / p.x;
       const double lean_px = 100 * speed_m_s * (row_s * y + 0.002) / 10;
@@ -493,9 +496,9 @@ TEST(ImageTruth, ARollingShutterLeansByTheClosedForm) {
   }
 }
 
-// Up and down a rolling shutter the row changes with the time that it is seen at: from
-// r' = r + k (T + (r' - r) t_row), k the rows per second: r' - r = k T / (1 - k t_row).
-TEST(ImageTruthFlow, SolvesForTheRowThatSees) {
+// For motion along the columns the row, and with it the time of exposure, changes: r' = r + k (T +
+// (r' - r) t_row), k in rows per second, so r' - r = k T / (1 - k t_row).
+TEST(ImageTruthFlow, SolvesForTheExposedRow) {
   const Scene scene = scene_of(plane_ground(0, 0, -100), {board(50)}, {{.p_DO = {10, 0, 0}}});
   for (const double speed_m_s : {-3.0, 3.0, 20.0}) {
     CameraSpec spec = pinhole();
@@ -505,7 +508,8 @@ TEST(ImageTruthFlow, SolvesForTheRowThatSees) {
     const ImageTruth truth = image_truth(camera, scene, grey, path, {.after = 50ms});
     const double k = 100 * speed_m_s / 10, rows = k * 0.05 / (1 - k * 1e-3);
     for_each_pixel(camera, [&](int x, int y) {
-      if (y + rows < 0 || y + rows > 47) return;  // rows beyond are taken at the last one's time
+      if (y + rows < 0 || y + rows > 47)
+        return;  // rows outside the image take the time of the last row
       EXPECT_NEAR(flow(truth.forward, x, y).x, 0, 1e-5);
       EXPECT_NEAR(flow(truth.forward, x, y).y, rows, 1e-5);
       testing::record_margin("to rows of a rolling shutter", flow(truth.forward, x, y).y - rows,
@@ -514,8 +518,8 @@ TEST(ImageTruthFlow, SolvesForTheRowThatSees) {
   }
 }
 
-// Facets of the ground at full resolution are the reference.
-TEST(ImageTruth, BoundsAreToldIfAskedFor) {
+// The ground's facets at full resolution are the reference.
+TEST(ImageTruth, ReportsBoundsOnRequest) {
   const Scene scene = scene_of(plane_ground(0, 0, -4), {board(1)}, {{.p_DO = {10, 0, 0}}});
   const Camera camera(pinhole());
   const Trajectory path = gliding(looking(here, ahead), {});
@@ -547,7 +551,7 @@ void expect_same(const ImageTruth& a, const ImageTruth& b) {
   }
 }
 
-TEST(ImageTruth, IsTheSameOnAnyNumberOfThreadsAndInMemoryOfAnother) {
+TEST(ImageTruth, IsTheSameOnAnyNumberOfThreadsAndInReusedMemory) {
   const Scene scene = scene_of(plane_ground(0.125, 0, -4), {icosphere(2, 2)},
                                {{.p_DO = {10, 0, 0}}, {.p_DO = {14, 3, 1}}});
   CameraSpec spec{.lens = sample_lenses()[14].model, .size_px = sample_lenses()[14].size_px};
@@ -566,7 +570,7 @@ TEST(ImageTruth, IsTheSameOnAnyNumberOfThreadsAndInMemoryOfAnother) {
   expect_same(image_truth(camera, scene, grey, path, request, std::move(other)), first);
 }
 
-TEST(ImageTruth, NeedsAPathAndAlbedos) {
+TEST(ImageTruth, RequiresATrajectoryAndAlbedos) {
   const Scene scene = scene_of(plane_ground(0, 0, -4), {});
   const Camera camera(pinhole());
   const Trajectory path = gliding(looking(here, ahead), {});
@@ -576,7 +580,7 @@ TEST(ImageTruth, NeedsAPathAndAlbedos) {
                   "covers [-1.000000, 2.000000] s")));
   EXPECT_THAT(
       [&] { image_truth(camera, scene, {}, path, {}); },
-      ThrowsMessage<Error>(HasSubstr("the scene names material 0 but there are 0 albedos")));
+      ThrowsMessage<Error>(HasSubstr("the scene uses material 0, but there are 0 albedos")));
 }
 
 }  // namespace

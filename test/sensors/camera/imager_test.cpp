@@ -40,10 +40,10 @@ double variance_of(const auto& values) {
   return sum / static_cast<double>(std::size(values) - 1);
 }
 
-// The worked number: 281 lx on pixels of 3.45 um for 1/500 s are 27,140 photons and 16,280
-// electrons, at 550 nm by lumens of 683 per watt there; at 555 nm, where that number holds, 555/550
-// times as many.
-TEST(Imager, CountsPhotonsOfTheLight) {
+// The worked example: 281 lx on pixels of 3.45 um for 1/500 s are 27,140 photons and 16,280
+// electrons at 550 nm with 683 lm/W. That efficacy holds at 555 nm, where there are 555/550 times
+// as many.
+TEST(Imager, PhotonsMatchTheWorkedExample) {
   const Imager imager(
       {.pixel_pitch_m = 3.45e-6, .full_well_e = 1e5, .dark_current_e_s = 0, .noise = false},
       1.0 / 500);
@@ -52,7 +52,7 @@ TEST(Imager, CountsPhotonsOfTheLight) {
   EXPECT_NEAR(imager.electrons(photons, {}).at(0, 0)[0], 16'280 * 555.0 / 550, 25);
 }
 
-TEST(Imager, MosaicsSeeTheirColours) {
+TEST(Imager, MosaicPixelsMeasureTheirColours) {
   ImageF light(4, 2, 3);
   for (int y = 0; y < 2; ++y) {
     for (int x = 0; x < 4; ++x) {
@@ -80,8 +80,8 @@ TEST(Imager, MosaicsSeeTheirColours) {
   EXPECT_NEAR(mono.at(1, 1)[0] / red, luminance, 1e-6);
 }
 
-// What EMVA 1288 has of two images of one exposure: the mean, and the variance in time from their
-// difference, so that what pixels differ in does not count.
+// EMVA 1288 statistics of two images of one exposure: the mean, and the temporal variance from
+// their difference, so that differences between pixels cancel.
 struct Transfer {
   double mean_dn, variance_dn2;
 };
@@ -100,7 +100,7 @@ Transfer transfer_of(const ImagerSpec& spec, double light_w_m2, double exposure_
   return {(mean_of(a.values()) + mean_of(b.values())) / 2, variance_of(differences) / 2};
 }
 
-// A sensor that has every kind of noise.
+// A sensor with every kind of noise.
 ImagerSpec noisy_sensor() {
   return {.filter = ColorFilter::Mono,
           .full_well_e = 2e4,
@@ -112,11 +112,11 @@ ImagerSpec noisy_sensor() {
           .black_dn = 64};
 }
 
-// Photon transfer: sigma_y^2 = K^2 sigma_d^2 + 1/12 + K (mean - dark mean), here up to 70 % of
-// saturation by longer and longer exposures, whose dark images are taken off.
-TEST(Imager, PhotonTransferGivesTheGain) {
+// Photon transfer: sigma_y^2 = K^2 sigma_d^2 + 1/12 + K (mean - dark mean), here for increasing
+// exposures of up to 70 % of saturation, with dark images subtracted.
+TEST(Imager, PhotonTransferYieldsTheGain) {
   const ImagerSpec spec = noisy_sensor();
-  // 0.05 W/m^2 on 3.45 um squared, by 3.579e-19 J a photon.
+  // 0.05 W/m^2 on (3.45 um)^2, at 3.579e-19 J per photon.
   constexpr double light_w_m2 = 0.05, electrons_s = 997'644;
   constexpr int side = 160;
   double xx = 0, xy = 0;
@@ -129,28 +129,29 @@ TEST(Imager, PhotonTransferGivesTheGain) {
     xx += x * x;
     xy += x * (lit.variance_dn2 - dark.variance_dn2);
   }
-  // A variance of 25,600 pixels is known to sqrt(2 / 25,600) = 0.9 %, the slope of 20 of them,
-  // weighed like this, to 0.26 %: 1 % is nearly 4 standard errors.
+  // A variance over 25,600 pixels has a standard error of sqrt(2 / 25,600) = 0.9 %, the slope
+  // through 20 of them with these weights 0.26 %: 1 % is nearly 4 standard errors.
   EXPECT_NEAR(xy / xx, spec.gain_dn_e, 0.01 * spec.gain_dn_e);
   testing::record_margin("gain", xy / xx / spec.gain_dn_e - 1, 0.01);
 }
 
-// 300^2 pixels know a standard deviation to 0.24 %: 1 % is 4 standard errors.
-TEST(Imager, DarkImagesGiveReadNoiseAndThatOfTheDarkCurrent) {
+// The standard deviation over 300^2 pixels has a standard error of 0.24 %: 1 % is 4 standard
+// errors.
+TEST(Imager, DarkImagesYieldReadAndDarkCurrentNoise) {
   const ImagerSpec spec = noisy_sensor();
   for (const double exposure_s : {1e-5, 0.05}) {
     const Transfer dark = transfer_of(spec, 0, exposure_s, 300);
     const double dark_e = spec.dark_current_e_s * exposure_s;
     EXPECT_NEAR(dark.mean_dn, spec.black_dn + spec.gain_dn_e * dark_e,
-                0.05);  // of 12 e / 300, 6 times
+                0.05);  // 6 standard errors, each 12 e / 300
     const double sigma_e = std::sqrt(dark.variance_dn2 - 1.0 / 12) / spec.gain_dn_e;
     EXPECT_NEAR(sigma_e, std::sqrt(64 + dark_e), 0.01 * sigma_e);
   }
 }
 
-// As EMVA 1288 measures them: of means over frames, dark and at half of saturation, the variances
-// over the image less those that are left of time's.
-TEST(Imager, PixelsDifferAsPrnuAndDsnuSay) {
+// As EMVA 1288 measures them: variances over the image of the mean over frames, dark and at half of
+// saturation, less the remaining temporal variance.
+TEST(Imager, PixelsVaryByPrnuAndDsnu) {
   ImagerSpec spec = noisy_sensor();
   spec.gain_dn_e = 1;
   spec.bits = 16;
@@ -174,8 +175,8 @@ TEST(Imager, PixelsDifferAsPrnuAndDsnuSay) {
   };
   const auto [dark, dark_variance] = spatial(0);
   const auto [half, half_variance] = spatial(1e4 / 0.6);
-  // 90,000 pixels know a standard deviation to 0.24 %, and less what is taken off: 1 % is 4
-  // standard errors.
+  // The standard deviation over 90,000 pixels has a standard error of 0.24 %, a little more after
+  // the subtraction: 1 % is about 4 standard errors.
   EXPECT_NEAR(std::sqrt(dark_variance), spec.dsnu_e, 0.01 * spec.dsnu_e);
   const double prnu = std::sqrt(half_variance - dark_variance) / (half - dark);
   EXPECT_NEAR(prnu, spec.prnu, 0.01 * spec.prnu);
@@ -210,8 +211,8 @@ TEST(Imager, SaturatesAtTheFullWellAndClipsAtTheBits) {
   EXPECT_EQ(imager.digital(flat(1, -50, 1), {}).at(0, 0)[0], 0);
 }
 
-// Once the well is full, light adds no noise: what is left is that of reading, and of offsets.
-TEST(Imager, FullWellsAreReadWithNoise) {
+// Once the well is full, light adds no noise: read noise and the pixels' offsets remain.
+TEST(Imager, FullWellsHaveReadNoiseOnly) {
   ImagerSpec spec = noisy_sensor();
   EXPECT_GT(transfer_of(spec, 0.05, 0.015, 100).variance_dn2, 300);
   const Transfer full = transfer_of(spec, 0.05, 0.04, 300);
@@ -220,7 +221,7 @@ TEST(Imager, FullWellsAreReadWithNoise) {
   EXPECT_NEAR(full.mean_dn, spec.black_dn + spec.gain_dn_e * spec.full_well_e, 0.05);
 }
 
-TEST(Imager, ElectronsAreCounted) {
+TEST(Imager, ElectronsAreWholeNumbers) {
   const Imager imager(noisy_sensor(), 0.001);
   for (const double photons : {0.0, 0.5, 30.0, 1e4, 1e6}) {
     const ImageF electrons = imager.electrons(flat(50, photons, 1), {.seed = Seed{1}});
@@ -232,8 +233,8 @@ TEST(Imager, ElectronsAreCounted) {
   }
 }
 
-// Infinite or no light, and what is not even a number, are pixels like others.
-TEST(Imager, BearsAccidentsOfNumbers) {
+// Infinite, zero and not-a-number irradiances are processed like any other.
+TEST(Imager, ToleratesNonFiniteAndNegativeIrradiance) {
   const Imager imager({.filter = ColorFilter::Mono, .noise = false}, 0.01);
   ImageF light(3, 1, 3);
   std::ranges::fill(light.at(0, 0), std::nanf(""));
@@ -263,7 +264,7 @@ TEST(Imager, EqualKeysGiveEqualImagesOnAnyNumberOfThreads) {
   EXPECT_NE(image({.seed = Seed{2}, .sensor = 2, .frame = 3}, 1), one);
 }
 
-TEST(Imager, SaysWhatIsWrong) {
+TEST(Imager, ErrorListsEveryFault) {
   const auto make = [](ImagerSpec spec, double exposure_s = 0.01) {
     return [spec, exposure_s] { Imager imager(spec, exposure_s); };
   };
@@ -275,9 +276,9 @@ TEST(Imager, SaysWhatIsWrong) {
   EXPECT_THAT(make({}, -1), ThrowsMessage<Error>(HasSubstr("exposure_s = -1 must be positive")));
   EXPECT_THAT(make({.bits = 17}), ThrowsMessage<Error>(HasSubstr("from 8 to 16")));
   EXPECT_THAT(make({.black_dn = 300, .bits = 8}),
-              ThrowsMessage<Error>(HasSubstr("less than the 255 that 8 bits hold")));
+              ThrowsMessage<Error>(HasSubstr("less than 255, the greatest value of 8 bits")));
   EXPECT_THAT([] { Imager({}, 0.01).photons(flat(1, 0, 1)); },
-              ThrowsMessage<Error>(HasSubstr("has 3 channels, but this one 1")));
+              ThrowsMessage<Error>(HasSubstr("must have 3 channels, but has 1")));
 }
 
 }  // namespace

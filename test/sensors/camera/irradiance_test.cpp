@@ -22,7 +22,8 @@ using ::testing::ThrowsMessage;
 using enum ApertureSpec::Pupil;
 
 constexpr double pitch_m = 3e-6;
-// Derivatives of rays are right to 1e-6, the solid angle has two of them, and results are floats.
+// Derivatives of rays are accurate to 1e-6, the solid angle has two of them, and results are
+// floats.
 constexpr double tolerance = 2.2e-6;
 
 Lens pinhole(double focal_px, glm::ivec2 size_px = {81, 61}) {
@@ -33,8 +34,8 @@ ApertureSpec f_over(double f_number, double focal_px) {
   return {.focal_length_m = focal_px * pitch_m, .f_number = f_number};
 }
 
-TEST(Irradiance, OfAPinholeFallsWithTheFourthPowerOfTheCosine) {
-  for (const double focal_px : {20.0, 60.0, 500.0}) {  // to 68 degrees from the axis
+TEST(Irradiance, OfAPinholeFollowsTheFourthPowerOfTheCosine) {
+  for (const double focal_px : {20.0, 60.0, 500.0}) {  // up to 68 degrees from the axis
     ApertureSpec aperture = f_over(2.8, focal_px);
     aperture.transmission = 0.93;
     const ImageF sr = pupil_sr(pinhole(focal_px), aperture, pitch_m);
@@ -49,16 +50,16 @@ TEST(Irradiance, OfAPinholeFallsWithTheFourthPowerOfTheCosine) {
   }
 }
 
-// Focused near, an image forms at f (1 + m), which is what a calibration finds.
-TEST(Irradiance, FallsWithTheMagnificationThatTheCalibrationHas) {
+// With a near focus the image forms at f (1 + m), the distance that a calibration yields.
+TEST(Irradiance, FallsWithTheMagnificationOfTheCalibration) {
   constexpr double m = 0.2;
   const ImageF sr = pupil_sr(pinhole(500 * (1 + m)), f_over(4, 500), pitch_m);
   const double closed = pi / 64 / ((1 + m) * (1 + m));
   EXPECT_NEAR(sr.at(40, 30)[0], closed, tolerance * closed);
 }
 
-// A surface of 6366 cd/m^2 at f/4 with 0.9 of the light makes 281 lx.
-TEST(Irradiance, IsThatOfTheWorkedNumber) {
+// A surface of 6366 cd/m^2 at f/4 with a transmission of 0.9 gives 281 lx.
+TEST(Irradiance, MatchesTheWorkedExample) {
   ApertureSpec aperture = f_over(4, 500);
   aperture.transmission = 0.9;
   ImageF radiance(81, 61, 3);
@@ -67,14 +68,14 @@ TEST(Irradiance, IsThatOfTheWorkedNumber) {
   EXPECT_NEAR(light.at(40, 30)[1] * 683, 281, 0.5);
 }
 
-// The solid angle of a triangle on the unit sphere.
+// Solid angle of a triangle on the unit sphere, sr.
 // @see Van Oosterom and Strackee, IEEE Trans. Biomed. Eng. 30 (1983).
 double triangle_sr(const glm::dvec3& a, const glm::dvec3& b, const glm::dvec3& c) {
   const double volume = std::abs(glm::dot(a, glm::cross(b, c)));
   return 2 * std::atan2(volume, 1 + glm::dot(a, b) + glm::dot(b, c) + glm::dot(c, a));
 }
 
-TEST(Irradiance, OfAFisheyeIsThatOfThePupilAndOfThePixelsSolidAngle) {
+TEST(Irradiance, OfAFisheyeFollowsThePupilAndThePixelsSolidAngle) {
   const glm::ivec2 size_px(401, 401);
   const double focal_px = 118;  // 190 degrees across
   const Lens lens(KannalaBrandt{{glm::dvec2(focal_px), glm::dvec2(200)}, {0.02, -0.004, 0.001, 0}},
@@ -91,8 +92,8 @@ TEST(Irradiance, OfAFisheyeIsThatOfThePupilAndOfThePixelsSolidAngle) {
       const glm::dvec3 a = ray(-.5, -.5), b = ray(.5, -.5), c = ray(.5, .5), d = ray(-.5, .5);
       const double cos = std::max(ray(0, 0).z, 0.0);
       const double sr = triangle_sr(a, b, c) + triangle_sr(a, c, d);
-      // Across a pixel, 1/118 rad wide, a solid angle changes by its curvature: less than 1/24 of
-      // 118^-2 times some.
+      // Across a pixel, 1/118 rad wide, the solid angle changes by its curvature: less than 1/24 of
+      // 118^-2 times a small factor.
       constexpr double curvature = 2e-5;
       EXPECT_NEAR(turning.at(x, y)[0], pupil_px2 * sr, curvature * pupil_px2 * sr);
       EXPECT_NEAR(flat.at(x, y)[0], pupil_px2 * sr * cos, curvature * pupil_px2 * sr);
@@ -103,8 +104,8 @@ TEST(Irradiance, OfAFisheyeIsThatOfThePupilAndOfThePixelsSolidAngle) {
   EXPECT_GT(beyond, 20);
 }
 
-// All directions are 4 pi sr; with the cosine in front, pi.
-TEST(Irradiance, AddsUpToTheWholeSphere) {
+// All directions are 4 pi sr; weighted with the cosine, the front hemisphere is pi.
+TEST(Irradiance, SolidAnglesSumToTheSphere) {
   const glm::ivec2 size_px(120, 60);
   const Lens lens(Equirectangular{size_px}, size_px);
   ApertureSpec aperture = f_over(4, 120 / (2 * pi));
@@ -116,26 +117,27 @@ TEST(Irradiance, AddsUpToTheWholeSphere) {
     for (const float value : image.values()) sr += value / pupil_px2;
     return sr;
   };
-  const double step_rad = pi / 60;  // sums over midpoints err by step^2 / 24 for each angle
+  const double step_rad = pi / 60;  // midpoint sums err by step^2 / 24 per angle
   EXPECT_NEAR(sum(Turning), 4 * pi, 4 * pi * step_rad * step_rad / 24 * 1.01);
   EXPECT_NEAR(sum(Flat), pi, pi * step_rad * step_rad / 6);
 }
 
-TEST(Irradiance, LosesWhatTheRimKeepsBack) {
+TEST(Irradiance, IsReducedByVignetting) {
   ApertureSpec aperture = f_over(4, 500);
   const ImageF open = pupil_sr(pinhole(500), aperture, pitch_m);
   aperture.vignetting = {-0.3, 0.1, -0.05};
   const ImageF dim = pupil_sr(pinhole(500), aperture, pitch_m);
-  const double r2 = (40 * 40 + 30 * 30) / ((81 * 81 + 61 * 61) / 4.0);  // of a corner's centre
+  const double r2 =
+      (40 * 40 + 30 * 30) / ((81 * 81 + 61 * 61) / 4.0);  // at the centre of the corner pixel
   const double rim = 1 - 0.3 * r2 + 0.1 * r2 * r2 - 0.05 * r2 * r2 * r2;
   EXPECT_NEAR(dim.at(0, 0)[0] / open.at(0, 0)[0], rim, 1e-6);
   EXPECT_NEAR(dim.at(80, 60)[0] / open.at(80, 60)[0], rim, 1e-6);
   EXPECT_EQ(dim.at(40, 30)[0], open.at(40, 30)[0]);
 }
 
-TEST(Irradiance, IsDarkWhereAPixelLooksNowhere) {
+TEST(Irradiance, IsZeroForPixelsWithoutARay) {
   const glm::ivec2 size_px(201, 201);
-  // Folds at r = 1 / sqrt(0.9), 70 px from the centre.
+  // The lens folds at r = 1 / sqrt(0.9), imaged 70 px from the centre.
   const Lens lens(BrownConrady{{glm::dvec2(100), glm::dvec2(100)}, {-0.3}}, size_px);
   const ImageF sr = pupil_sr(lens, f_over(4, 100), pitch_m);
   EXPECT_EQ(sr.at(0, 0)[0], 0);
@@ -157,7 +159,7 @@ TEST(Irradiance, IsTheSameOnAnyNumberOfThreads) {
   EXPECT_EQ(values(5), one);
 }
 
-TEST(Irradiance, SaysWhatIsWrong) {
+TEST(Irradiance, ErrorListsEveryFault) {
   const auto with = [](ApertureSpec aperture, double pitch = pitch_m) {
     return [aperture, pitch] { pupil_sr(pinhole(500), aperture, pitch); };
   };

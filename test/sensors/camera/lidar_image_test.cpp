@@ -11,14 +11,14 @@
 #include <glm/geometric.hpp>
 #include <iterator>
 
+#include "apps/scene/readers/spec_io.h"
 #include "core/error.h"
-#include "sensors/lidar.h"
-#include "sensors/spec_io.h"
+#include "sensors/lidar/lidar.h"
 #include "terrain/terrain_scene.h"
 #include "test/support/margin.h"
-#include "test/support/sample_terrain.h"
-#include "test/support/solid.h"
+#include "test/support/scans/solid.h"
 #include "test/support/temporary_folder.h"
+#include "test/support/terrain/sample_terrain.h"
 
 namespace groundray::lidar_image_test {
 namespace {
@@ -29,14 +29,14 @@ using testing::box_model;
 using ::testing::HasSubstr;
 using ::testing::ThrowsMessage;
 
-// The axes of a camera that looks along x of D.
+// Axes of a camera that looks along x of D.
 const glm::dquat R_DC(0.5, -0.5, 0.5, -0.5);
 const glm::dvec3 sides_m(2, 3, 2);
 constexpr double focal_px = 300;
 constexpr glm::ivec2 size_px{320, 240};
 constexpr glm::dvec2 centre_px{160, 120};
 
-// Flat ground at the height 0, and boxes.
+// Flat ground at height 0, and boxes.
 Scene scene_of(Tracing tracing, std::vector<PlacedObject> placed,
                std::vector<MovingObject> moving) {
   const RayDevice device;
@@ -69,7 +69,7 @@ LidarSpec vlp16() {
   return spec;
 }
 
-// Whether the way between two points passes through a box round the origin.
+// Returns true if the segment between two points intersects a box centred at the origin.
 bool passes(const glm::dvec3& from, const glm::dvec3& to) {
   double enter = 0, leave = 1;
   for (int k = 0; k < 3; ++k) {
@@ -81,9 +81,9 @@ bool passes(const glm::dvec3& from, const glm::dvec3& to) {
   return enter < leave;
 }
 
-// The camera stands a metre beside the lidar, so that the box hides from it what the lidar sees,
+// The camera is a metre beside the lidar, so that the box hides from it points that the lidar sees,
 // and it looks along the ground.
-TEST(LidarImage, ShowsEchoesWhereAPinholeHasThemUnlessABoxIsInTheWay) {
+TEST(LidarImage, ProjectsEchoesThroughAPinholeUnlessOccluded) {
   const glm::dvec3 p_DO(12, 0.5, 1), p_DC(0.3, -1, 0.4);
   for (const Tracing tracing : {Tracing::Fast, Tracing::Exact}) {
     const Scene scene = scene_of(tracing, {{.p_DO = p_DO}}, {});
@@ -110,7 +110,8 @@ TEST(LidarImage, ShowsEchoesWhereAPinholeHasThemUnlessABoxIsInTheWay) {
       EXPECT_NEAR(echo.depth_m, way.x, 1e-12);
       const bool is_inside = -0.5 <= u && u < 319.5 && -0.5 <= v && v < 239.5;
       EXPECT_EQ(echo.is_inside, is_inside);
-      // The box's own points are at its surface: pass up to a micrometre before them.
+      // The box's own points lie on its surface: the segment ends up to ten micrometres before
+      // them.
       const double share = 1 - 1e-5 / glm::length(way);
       const bool is_visible = is_inside && !passes(p_DC - p_DO, p_DC + way * share - p_DO);
       EXPECT_EQ(echo.is_visible, is_visible) << u << ' ' << v << ' ' << way.x;
@@ -122,8 +123,9 @@ TEST(LidarImage, ShowsEchoesWhereAPinholeHasThemUnlessABoxIsInTheWay) {
   }
 }
 
-// What the lidar met first a camera at its place meets first, however slanting the beams are.
-TEST(LidarImage, ShowsEveryEchoToACameraAtTheLidarsPlace) {
+// The lidar's first hit is also the first hit of a camera at the lidar's position, at any
+// incidence.
+TEST(LidarImage, EveryEchoIsVisibleToACameraAtTheLidar) {
   const HeightGrid ground = testing::fractal(257, 1, 40, Seed{3});
   const glm::dvec3 p_DS(3.3, -7.1, ground.height_m_at({3.3, -7.1}).value() + 0.6);
   LidarSpec flash;
@@ -145,7 +147,8 @@ TEST(LidarImage, ShowsEveryEchoToACameraAtTheLidarsPlace) {
   }
 }
 
-// Between its echo and the image a box drives and turns; what it hides is where it is then.
+// Between its echo and the image a box moves and turns; it occludes from its pose at the time of
+// the image.
 TEST(LidarImage, MovesPointsWithTheirObjects) {
   const Pose first{rotation_from_yaw_pitch_roll(0.3, 0, 0), {10, 3, 1}};
   const Pose last{rotation_from_yaw_pitch_roll(0.9, 0, 0), {11, -5, 1}};
@@ -204,9 +207,9 @@ PointCloud cloud_of(const std::vector<glm::dvec3>& points) {
   return cloud;
 }
 
-// A camera that flies by and sinks, its rows one after the other: with t = t0 + row_s v and
-// v = c + f (h - s t) / Z, v is the quotient below.
-TEST(LidarImage, SeesPointsWhenTheirRowsDo) {
+// A camera that flies past and sinks, with a rolling shutter: with t = t0 + row_s v and v = c + f
+// (h - s t) / Z, v is the quotient below.
+TEST(LidarImage, ProjectsPointsAtTheExposureOfTheirRows) {
   const ShutterSpec shutter{0.004, 50e-6};
   const glm::dvec3 p_DC(0, 0, 3), velocity_m_s(0, 6, -4);
   const Scene scene = scene_of(Tracing::Exact, {}, {});
@@ -221,7 +224,7 @@ TEST(LidarImage, SeesPointsWhenTheirRowsDo) {
     const double t0 = 0.1 + shutter.exposure_s / 2, pace = focal_px * velocity_m_s.z / p.x;
     const double v =
         (centre_px.y - focal_px * (p.z - p_DC.z) / p.x + pace * t0) / (1 - pace * shutter.row_s);
-    if (v < 0 || v > size_px.y - 1) continue;  // such points are seen by the first or last row
+    if (v < 0 || v > size_px.y - 1) continue;  // the first or last row exposes such points
     const double t = t0 + shutter.row_s * v;
     const double u = centre_px.x - focal_px * (p.y - p_DC.y - velocity_m_s.y * t) / p.x;
     // Times are whole nanoseconds, in which the image moves less than 1e-6 px.
@@ -233,7 +236,7 @@ TEST(LidarImage, SeesPointsWhenTheirRowsDo) {
   EXPECT_GT(inside, 20);
 }
 
-TEST(LidarImage, IsWrittenAsRowsThatNumPyReads) {
+TEST(LidarImage, WritesRowsThatNumPyReads) {
   const testing::TemporaryFolder folder;
   const auto file = folder.path() / "top.npy";
   const std::vector<ImagedEcho> rows{{7, 1.5, 2.5, 30, true, false}, {9, -4, 2, 3, false, false}};
@@ -249,7 +252,7 @@ TEST(LidarImage, IsWrittenAsRowsThatNumPyReads) {
   EXPECT_EQ(text[text.size() - 32], '\1');
 }
 
-TEST(LidarImage, RefusesImagesThatThePathDoesNotCover) {
+TEST(LidarImage, RejectsImagesThatTheTrajectoryDoesNotCover) {
   const Scene scene = scene_of(Tracing::Fast, {}, {});
   const Trajectory X_DC = path({R_DC, {0, 0, 1}}, {0, 0, 0});
   EXPECT_THAT(

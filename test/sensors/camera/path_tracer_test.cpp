@@ -1,4 +1,4 @@
-// Light along rays, against closed forms.
+// Radiance along rays, compared with closed forms.
 #include "sensors/camera/path_tracer.h"
 
 #include <gmock/gmock.h>
@@ -18,7 +18,7 @@
 #include "core/random.h"
 #include "terrain/terrain_scene.h"
 #include "test/support/margin.h"
-#include "test/support/solid.h"
+#include "test/support/scans/solid.h"
 
 namespace groundray::path_tracer_test {
 namespace {
@@ -31,8 +31,8 @@ using ::testing::ThrowsMessage;
 
 constexpr double pi = std::numbers::pi;
 
-// Two-sided quantile of all statistical tests here: 1 % by Sidak over some 100 comparisons. The
-// standard errors are those of independent paths; nets of Sobol err less.
+// Two-sided quantile of all statistical tests here: 1 % by Sidak over about 100 comparisons. The
+// standard errors are those of independent paths; Sobol nets have smaller errors.
 constexpr double sigmas = 3.9;
 
 Spectrum flat(double value) { return {{300, value}, {2500, value}}; }
@@ -41,7 +41,7 @@ Material lamp(double radiance, double reflectance = 0) {
   return {"lamp", Lambertian{flat(reflectance)}, glm::dvec3(radiance)};
 }
 
-// A rectangle in the x-y plane, from its least corner.
+// A rectangle in the x-y plane, given by two opposite corners.
 Model rectangle(const glm::dvec2& low, const glm::dvec2& high) {
   Model model;
   model.mesh.vertices_m = {
@@ -53,7 +53,7 @@ Model rectangle(const glm::dvec2& low, const glm::dvec2& high) {
   return model;
 }
 
-// Makes every facet bumpy: one texel for all of it.
+// Applies a normal map with a single texel, the same for every facet.
 Model bumpy(Model model, std::uint8_t x, std::uint8_t y, std::uint8_t z) {
   Image8 image(1, 1, 3);
   std::ranges::copy(std::initializer_list<std::uint8_t>{x, y, z}, image.values().begin());
@@ -61,7 +61,7 @@ Model bumpy(Model model, std::uint8_t x, std::uint8_t y, std::uint8_t z) {
   return model;
 }
 
-// A sphere to the eye: its facets are shaded as the sphere that they touch from inside.
+// A sphere with smooth shading: its facets have the normals of the sphere that circumscribes them.
 Model smooth_sphere(int splits) {
   Model model = icosphere(1, splits);
   for (const glm::dvec3& vertex_m : model.mesh.vertices_m)
@@ -77,7 +77,7 @@ struct Thing {
   double scale = 1;
 };
 
-// Things, labelled 1, 2 and so on, over flat ground, 9.
+// Objects labelled 1, 2 and so on, over flat ground labelled 9.
 Scene scene_of(std::vector<Thing> things, const Material& ground = grey(0),
                double height_m = -1000) {
   const RayDevice device;
@@ -142,7 +142,7 @@ std::vector<glm::vec3> traced(const PathTracer& light,
   return radiance;
 }
 
-// The mean of a net of paths that begin with one ray.
+// Mean of a net of paths that begin with the same ray.
 Estimate light_along(const PathTracer& light, const Ray& ray, std::uint32_t paths,
                      std::uint32_t seed = 1) {
   std::vector<PathTracer::Sample> samples;
@@ -156,7 +156,7 @@ glm::dvec3 any_direction(std::uint32_t stream, std::uint32_t index) {
   return {level * std::cos(2 * pi * u.y), level * std::sin(2 * pi * u.y), height};
 }
 
-// One of each kind of material, none of which keeps light.
+// One of each kind of material, none of which absorbs light.
 std::vector<Material> white_materials() {
   return {{"matt", Lambertian{flat(1)}},
           {"rough", RoughDiffuse{flat(1), 1}},
@@ -167,8 +167,8 @@ std::vector<Material> white_materials() {
           {"leaf", PlantLeaf{flat(0.6), flat(0.4)}}};
 }
 
-// Facts 5.1, 7. Tables of shares are good to 5e-4.
-TEST(PathTracer, WhiteThingsCannotBeSeenInEvenLight) {
+// Facts 5.1, 7. Tabulated albedos are accurate to 5e-4.
+TEST(PathTracer, WhiteObjectsPassTheFurnaceTest) {
   constexpr double radiance = 3;
   const Sky sky = even_sky(radiance);
   std::vector<PathTracer::Sample> samples;
@@ -185,15 +185,15 @@ TEST(PathTracer, WhiteThingsCannotBeSeenInEvenLight) {
       testing::record_margin("white things", off / radiance, 1e-3);
       EXPECT_LT(off, sigmas * found.standard_error[k] + 5e-4 * radiance) << white.name;
     }
-    // Nothing but the surface itself draws directions: its paths do not differ.
+    // Only the surface itself samples directions, so its paths do not differ.
     if (white.name == "matt") {
       EXPECT_LT(glm::length(found.standard_error), 1e-6);
     }
   }
 }
 
-// Facts 5.1, 8. What closes the space does not matter, so a ball of 80 facets is exact.
-TEST(PathTracer, GreyShiningInsidesAddUpRayByRay) {
+// Facts 5.1, 8. The shape of the enclosure does not matter, so a ball of 80 facets is exact.
+TEST(PathTracer, GreyEmittingEnclosureSumsTheGeometricSeries) {
   constexpr double shines = 0.5, reflects = 0.5;
   const Scene scene = scene_of({{icosphere(2, 1), lamp(shines, reflects)}});
   const Sky sky = even_sky(7);  // not seen
@@ -207,11 +207,12 @@ TEST(PathTracer, GreyShiningInsidesAddUpRayByRay) {
   }
 }
 
-// Facts 5.1, 9. What noise there is comes from the cosine over the sun's disc of radius r, drawn
-// evenly: 1 + r tan(incidence) sqrt(u) cos(2 pi v). Its variation by Hardy and Krause is
-// 9 r tan(incidence), and 2^16 points of a (0, m, 2)-net have a discrepancy of at most
-// (16 / 2 + 3 / 2) / 2^16 (Niederreiter 1987): by Koksma and Hlawka at most 9e-6 at 35 degrees.
-TEST(PathTracer, MattGroundInTheSunShinesByLambertsLaw) {
+// Facts 5.1, 9. The only noise comes from the cosine over the sun's disc of radius r, sampled
+// uniformly: 1 + r tan(incidence) sqrt(u) cos(2 pi v). Its variation in the sense of Hardy and
+// Krause is 9 r tan(incidence), and 2^16 points of a (0, m, 2)-net have a discrepancy of at most
+// (16 / 2 + 3 / 2) / 2^16 (Niederreiter 1987): by the Koksma-Hlawka inequality the error is at most
+// 9e-6 at 35 degrees.
+TEST(PathTracer, SunlitMattGroundFollowsLambertsLaw) {
   constexpr double reflectance = 0.3;
   const Scene scene = scene_of({}, grey(reflectance), 0);
   for (const double elevation_deg : {35., 50., 90.}) {
@@ -230,9 +231,10 @@ TEST(PathTracer, MattGroundInTheSunShinesByLambertsLaw) {
   }
 }
 
-// As above: relative to a surface across the sun's rays at most 9 r sin(incidence) 9 / 2^15 = 9e-6.
-// The shading normal of a point on a smooth sphere's facet is that of the sphere beyond it.
-TEST(PathTracer, ASphereInTheSunBehindTheEyeShinesByLambertsLaw) {
+// As above: relative to a surface perpendicular to the sun's rays the error is at most 9 r
+// sin(incidence) 9 / 2^15 = 9e-6. The shading normal of a point on a smooth sphere's facet is that
+// of the sphere beyond it.
+TEST(PathTracer, SunlitMattSphereFollowsLambertsLaw) {
   const Scene scene = scene_of({{smooth_sphere(3), grey(1)}});
   const Sky sky = sun_alone(90);
   const PathTracer light(scene, sky, 2, {});
@@ -249,13 +251,13 @@ TEST(PathTracer, ASphereInTheSunBehindTheEyeShinesByLambertsLaw) {
   }
 }
 
-// How much of a uniform disc of radius 1 is on one side of a line, `s` from its middle.
+// Fraction of a uniform disc of radius 1 on one side of a line at distance `s` from its centre.
 double disc_beside(double s) {
   return std::abs(s) < 1 ? 0.5 + (std::asin(s) + s * std::sqrt(1 - s * s)) / pi : s > 0;
 }
 
-// Facts 5.1, 10: within 1 % of the width, as the edge is at most 2 / pi steep per radius.
-TEST(PathTracer, TheShadowOfAnEdgeIsAsWideAsTheSun) {
+// Facts 5.1, 10: within 1 % of the width, as the edge's slope is at most 2 / pi per radius.
+TEST(PathTracer, PenumbraOfAnEdgeIsAsWideAsTheSun) {
   constexpr double tolerance = 2 / pi * 0.02;
   constexpr double height_m = 3;
   constexpr double penumbra_m = 9.32e-3 * height_m;
@@ -266,7 +268,7 @@ TEST(PathTracer, TheShadowOfAnEdgeIsAsWideAsTheSun) {
     const Sun& sun = *sky.sun();
     const PathTracer light(scene, sky, 2, {});
     const double all = 0.5 * sun.irradiance().g / pi;
-    // Of a darkened disc, sums over strips.
+    // For a limb-darkened disc: sums over strips.
     std::vector<double> strips(201);
     for (int i = 0; i < 201; ++i) {
       for (int k = 0; k < 201; ++k) {
@@ -291,12 +293,12 @@ TEST(PathTracer, TheShadowOfAnEdgeIsAsWideAsTheSun) {
 }
 
 // Facts 5.1, 11.
-TEST(PathTracer, WallsHideTheirShareOfAnEvenSky) {
+TEST(PathTracer, WallsOccludeTheirShareOfAUniformSky) {
   constexpr double radiance = 2, tolerance = 2e-3;
   const Sky sky = even_sky(radiance);
   for (const double rises_deg : {10., 35., 60., 80.}) {
     const double rises_rad = glm::radians(rises_deg);
-    // A wall beside the point, so long that its ends hide nothing.
+    // A wall beside the point, so long that its ends have no effect.
     const glm::dquat upright = glm::angleAxis(pi / 2, glm::dvec3(0, -1, 0));
     const double wall_m = std::tan(rises_rad);
     const Thing wall{rectangle({0, -1e4}, {wall_m, 1e4}), grey(0), {1, 0, 0}, upright};
@@ -328,7 +330,7 @@ TEST(PathTracer, WallsHideTheirShareOfAnEvenSky) {
   }
 }
 
-// Dim, with a patch of a thousandth of all directions that gives most of the light.
+// A dim sky with a patch of a thousandth of all directions that gives most of the light.
 ImageF sky_with_a_lamp() {
   ImageF image(64, 32, 3);
   for (float& value : image.values()) value = 0.1f;
@@ -340,9 +342,9 @@ ImageF sky_with_a_lamp() {
   return image;
 }
 
-// Asking the dome and finding it are two estimates of one integral. The oracle only finds, by
-// directions of the surface's alone; for matt ground the sky knows the integral in closed form.
-TEST(PathTracer, DomesThatAreAskedShineAsThoseThatAreFound) {
+// Next-event estimation and BSDF sampling of the dome are two estimators of one integral. The
+// oracle uses BSDF sampling alone; for matt ground the sky has the integral in closed form.
+TEST(PathTracer, NextEventEstimationOfTheDomeMatchesBsdfSampling) {
   const Sky sky({.dome = EnvironmentImage{.image = "lamp.exr"}}, sky_with_a_lamp());
   const std::vector<Material> materials{grey(0.5),
                                         {"rough", RoughDiffuse{flat(0.5), 0.7}},
@@ -371,7 +373,8 @@ TEST(PathTracer, DomesThatAreAskedShineAsThoseThatAreFound) {
   }
 }
 
-// What a point gets from a parallel rectangle whose corner stands over it, of the most it can get.
+// Irradiance at a point from a parallel rectangle whose corner is directly above it, as a fraction
+// of that from a full hemisphere of the same radiance.
 // @see Howell, A catalog of radiation heat transfer configuration factors, B-3.
 double corner_share(double a_m, double b_m, double height_m) {
   const double a = a_m / height_m, b = b_m / height_m;
@@ -379,9 +382,10 @@ double corner_share(double a_m, double b_m, double height_m) {
   return (a / p * std::atan(b / p) + b / q * std::atan(a / q)) / (2 * pi);
 }
 
-// Near lamps are mostly found, far ones mostly drawn: that at 1000 m is found by 2e-6 of all paths,
-// which count as much as the others, so that it may be without them.
-TEST(PathTracer, ARectangleShinesByItsConfigurationFactor) {
+// Near lamps are mostly hit by BSDF sampling, far ones mostly by next-event estimation: only 2e-6
+// of all BSDF-sampled paths hit the lamp at 1000 m. These count as much as the others, so a mean
+// may lack them.
+TEST(PathTracer, IrradianceOfARectangularLampIsItsConfigurationFactor) {
   constexpr double shines = 10, reflects = 0.8;
   const Sky dark = even_sky(0);
   for (const double height_m : {1e-3, 0.1, 1., 30., 1000.}) {
@@ -393,13 +397,13 @@ TEST(PathTracer, ARectangleShinesByItsConfigurationFactor) {
     EXPECT_NEAR(found.mean.g, expected, 2e-3 * expected) << height_m;
     testing::record_margin("a rectangle", found.mean.g / expected - 1, 2e-3);
     EXPECT_NEAR(found.mean.g, expected, sigmas * found.standard_error.g + 3e-6 * expected);
-    // Neither way of finding it can give more than the lamp's light times the reflectance.
+    // Each of the two estimators contributes at most the lamp's radiance times the reflectance.
     EXPECT_LE(found.most.g, 2 * shines * reflects);
   }
 }
 
-// Two triangles in one place are one to rays, so they are one to the light.
-TEST(PathTracer, ALampOfTwoLayersShinesOnce) {
+// Two coincident triangles are one to rays, so they must be one to the sampling of lights.
+TEST(PathTracer, CoincidentLampTrianglesEmitOnce) {
   Model twice = rectangle({0, 0}, {2, 3});
   twice.mesh.triangles.insert(twice.mesh.triangles.end(), {{0, 2, 1}, {0, 3, 2}});
   twice.surface_of.assign(4, 0);
@@ -411,8 +415,8 @@ TEST(PathTracer, ALampOfTwoLayersShinesOnce) {
   EXPECT_NEAR(found.mean.g, expected, 2e-3 * expected);
 }
 
-// Lambert's formula for what an upward surface at the origin gets from a polygon above it, of the
-// most it can get: any polygon, at any angle.
+// Lambert's formula for the irradiance of an upward surface at the origin from a polygon above it,
+// as a fraction of that from a full hemisphere: any polygon, at any angle.
 double polygon_share(const std::vector<glm::dvec3>& corners) {
   double sum = 0;
   for (std::size_t i = 0; i < corners.size(); ++i) {
@@ -424,8 +428,8 @@ double polygon_share(const std::vector<glm::dvec3>& corners) {
   return std::abs(sum) / (2 * pi);
 }
 
-// Two lamps of unlike size and brightness, one of them on its way.
-TEST(PathTracer, LampsShineFromWhereTheyAreAtTheTimeOfTheRay) {
+// Two lamps of different size and radiance, one of them moving.
+TEST(PathTracer, MovingLampsEmitFromTheirPoseAtTheRaysTime) {
   const RayDevice device;
   const glm::dquat tilt = glm::angleAxis(0.4, glm::normalize(glm::dvec3(1, 2, 0.5)));
   const Trajectory path({{seconds(0), {tilt, {-4, 1, 3}}}, {seconds(2), {tilt, {4, -1, 5}}}});
@@ -459,11 +463,12 @@ TEST(PathTracer, LampsShineFromWhereTheyAreAtTheTimeOfTheRay) {
   }
 }
 
-// A lamp all round a point is at one distance, so air dims all of it alike, asked or found.
-TEST(PathTracer, AirDimsLampsThatAreAskedAndFound) {
+// A lamp that surrounds the point is at one distance, so air attenuates all of it equally, both in
+// next-event estimation and where BSDF sampling hits it.
+TEST(PathTracer, AirAttenuatesLampsInBothSamplingStrategies) {
   constexpr double radius_m = 50, shines = 4, reflects = 0.5;
   const AerialPerspective air({.visibility_m = 200});
-  const Sky sky = even_sky(0);  // of air that shines itself there is another test
+  const Sky sky = even_sky(0);  // another test covers the air's in-scattered light
   const Scene scene = scene_of({{icosphere(radius_m, 3), lamp(shines)},
                                 {rectangle({-1e-3, -1e-3}, {1e-3, 1e-3}), grey(reflects)}});
   const PathTracer light(scene, sky, 2, air);
@@ -471,14 +476,14 @@ TEST(PathTracer, AirDimsLampsThatAreAskedAndFound) {
   const auto direct = light_along(light, {{0, 0, 1e-3}, {0, 0, 1}}, 1);
   const auto lit = light_along(light, {{0, 0, 1e-3}, {0, 0, -1}}, 1 << 14);
   for (glm::length_t k = 0; k < 3; ++k) {
-    // Facets lie up to 0.6 % inside of the sphere.
+    // Facets lie up to 0.6 % inside the sphere.
     EXPECT_NEAR(direct.mean[k], shines * left[k], 0.01 * left[k]);
     EXPECT_NEAR(lit.mean[k], shines * reflects * left[k], 0.01 * shines * reflects * left[k]);
   }
 }
 
-// Koschmieder's law: docs/sky.md.
-TEST(PathTracer, AirTurnsWhatIsFarIntoTheHorizon) {
+// Koschmieder's model: docs/theory/sky.md.
+TEST(PathTracer, AirFadesDistantSurfacesIntoTheHorizon) {
   const AerialPerspective air({.visibility_m = 1000});
   const Sky sky = even_sky(0.3);
   const Scene scene =
@@ -489,9 +494,9 @@ TEST(PathTracer, AirTurnsWhatIsFarIntoTheHorizon) {
     EXPECT_NEAR(found.mean[k], 5 * left[k] + 0.3 * (1 - left[k]), 1e-6);
 }
 
-// The angle between two normals hides what the sky loses behind a slope: of the hemisphere round
-// the shading normal the part below the facet is dark.
-TEST(PathTracer, BumpsLoseTheLightBelowTheSurfaceAndNoOther) {
+// Light from the sky below the slope is lost over the angle between the two normals: the part of
+// the shading normal's hemisphere that lies below the facet is dark.
+TEST(PathTracer, BumpsLoseOnlyTheLightBelowTheSurface) {
   constexpr double radiance = 2;
   const Sky sky = even_sky(radiance);
   for (const std::uint8_t x : std::initializer_list<std::uint8_t>{128, 180, 230}) {
@@ -521,9 +526,9 @@ TEST(PathTracer, BumpsLetNoLightThroughASurface) {
   }
 }
 
-// Toward its rim a coarse sphere has facets that are seen while their shading normals look away.
-// The sky is hidden from at most half of what such a normal sees.
-TEST(PathTracer, SmoothThingsHaveNoDarkRims) {
+// Near its silhouette a coarse sphere has visible facets whose shading normals face away from the
+// camera. At most half of the hemisphere of such a normal is cut off from the sky.
+TEST(PathTracer, SmoothObjectsHaveNoDarkSilhouettes) {
   const Sky sky = even_sky(1);
   const Scene scene =
       scene_of({{smooth_sphere(1), grey(1), {}, glm::angleAxis(0.3, glm::dvec3(1, 0, 0))}});
@@ -544,7 +549,7 @@ TEST(PathTracer, SmoothThingsHaveNoDarkRims) {
   EXPECT_GT(away, 5);
 }
 
-TEST(PathTracer, LabelsAreOfWhatEachRayMeetsFirst) {
+TEST(PathTracer, LabelsAreOfEachRaysFirstHit) {
   const Scene scene = scene_of({{icosphere(1, 1), grey(0.5), {0, 0, 2}},
                                 {rectangle({-1, -1}, {1, 1}), grey(0.5), {5, 0, 2}}},
                                grey(0.5), 0);
@@ -560,8 +565,8 @@ TEST(PathTracer, LabelsAreOfWhatEachRayMeetsFirst) {
   EXPECT_THAT(labels, ::testing::ElementsAre(1, 2, 9, 0));
 }
 
-// The same bytes, whatever else is traced at the time.
-TEST(PathTracer, APathIsTheSameAloneAsAmongOthers) {
+// The same bytes, whatever else is traced at the same time.
+TEST(PathTracer, PathsDoNotDependOnTheirBatch) {
   const Scene scene =
       scene_of({{icosphere(1, 2), {"paint", Coated{flat(0.6), 1.5, 0.2}}, {0, 0, 1}},
                 {rectangle({-1, -1}, {1, 1}), lamp(9, 0.2), {0, 0, 4}}},
@@ -582,7 +587,7 @@ TEST(PathTracer, APathIsTheSameAloneAsAmongOthers) {
   }
 }
 
-TEST(PathTracer, RefusesDepthsThatAreNone) {
+TEST(PathTracer, RejectsInvalidDepths) {
   const Scene scene = scene_of({});
   const Sky sky = even_sky(1);
   for (const int depth : {-1, 0, 65}) {

@@ -10,7 +10,7 @@
 #include <random>
 
 #include "core/error.h"
-#include "core/srgb.h"
+#include "core/image/srgb.h"
 
 namespace groundray::picture_test {
 namespace {
@@ -24,7 +24,7 @@ using enum PictureSpec::Encoding;
 constexpr std::array mosaics{ColorFilter::Rggb, ColorFilter::Bggr, ColorFilter::Grbg,
                              ColorFilter::Gbrg};
 
-// What raw images of a colour are: the same number on all pixels that see the same.
+// Raw image of a uniform colour: the same number at all pixels with the same filter.
 Image16 mosaic_of(ColorFilter filter, glm::ivec2 size_px, std::array<std::uint16_t, 3> color) {
   Image16 raw(size_px.x, size_px.y, 1);
   for (int y = 0; y < size_px.y; ++y) {
@@ -56,7 +56,7 @@ TEST(Picture, OfAConstantColourIsConstantInEveryPixel) {
   }
 }
 
-// A pixel that does not see a colour has the mean of the nearest that do: 2 or 4.
+// A pixel without a colour's filter takes the mean of the nearest pixels with it: 2 or 4.
 double bilinear(const Image16& raw, ColorFilter filter, glm::ivec2 at, int channel) {
   if (channel_of(filter, at) == channel) return raw.at(at.x, at.y)[0];
   for (const int distance2 : {1, 2}) {
@@ -75,7 +75,7 @@ double bilinear(const Image16& raw, ColorFilter filter, glm::ivec2 at, int chann
   return std::numeric_limits<double>::quiet_NaN();
 }
 
-TEST(Picture, InterpolatesColoursBilinearlyInsideOfAMosaic) {
+TEST(Picture, DemosaicsBilinearly) {
   std::mt19937 random(3);
   Image16 raw(53, 31, 1);
   for (std::uint16_t& value : raw.values()) value = static_cast<std::uint16_t>(random());
@@ -86,7 +86,7 @@ TEST(Picture, InterpolatesColoursBilinearlyInsideOfAMosaic) {
     for (int y = 1; y < 30; ++y) {
       for (int x = 1; x < 52; ++x) {
         for (int channel = 0; channel < 3; ++channel) {
-          // Means are rounded to the next number.
+          // Means are rounded to the nearest number.
           ASSERT_NEAR(picture.at(x, y)[static_cast<std::size_t>(channel)],
                       bilinear(raw, filter, {x, y}, channel), 0.5)
               << x << ", " << y << " channel " << channel;
@@ -96,19 +96,19 @@ TEST(Picture, InterpolatesColoursBilinearlyInsideOfAMosaic) {
   }
 }
 
-// Sums of 12 bits keep their fractions: a mean of 2 or 4 numbers is exact.
-TEST(Picture, RoundsButOnce) {
+// Sums of 12-bit numbers keep their fractions: a mean of 2 or 4 numbers is exact.
+TEST(Picture, RoundsOnce) {
   Image16 raw(5, 5, 1);
-  raw.at(2, 1)[0] = 1;  // one of the four greens about (2, 2), red in RGGB
+  raw.at(2, 1)[0] = 1;  // one of the four greens around (2, 2), red in RGGB
   const RawDeveloper developer({.encoding = Linear, .bits = 16, .gains = glm::dvec3(1)},
                                {.full_well_e = 4095, .gain_dn_e = 1});
   const auto picture = std::get<Image16>(developer.develop(raw));
   EXPECT_EQ(picture.at(2, 2)[1], 4);  // 65535 / 4095 / 4
 }
 
-TEST(Picture, EncodesAsIec61966Does) {
-  // Linear values and what they are encoded as, from the standard's two equations: at the ends, on
-  // both sides of where they meet, and at the 18 % of a grey card.
+TEST(Picture, EncodesAsIec61966) {
+  // Linear values and their encoding, from the standard's two equations: at the ends, on both sides
+  // of their junction, and at the 18 % of a grey card.
   constexpr std::array<std::pair<double, double>, 6> table{{{0, 0},
                                                             {0.001, 0.01292},
                                                             {0.0031308, 0.0404499},
@@ -116,7 +116,7 @@ TEST(Picture, EncodesAsIec61966Does) {
                                                             {0.5, 0.735357},
                                                             {1, 1}}};
   for (const auto& [linear, encoded] : table) EXPECT_NEAR(srgb_of_linear(linear), encoded, 5e-7);
-  // Each of the 256 codes comes back from its linear value, as 16 bits of a raw image.
+  // Each of the 256 codes is reproduced from its linear value, given as a 16-bit raw image.
   const ImagerSpec sensor{
       .filter = ColorFilter::Mono, .full_well_e = 65535, .gain_dn_e = 1, .bits = 16};
   const RawDeveloper developer({.encoding = Srgb, .bits = 8}, sensor);
@@ -129,7 +129,7 @@ TEST(Picture, EncodesAsIec61966Does) {
   for (int code = 0; code < 256; ++code) EXPECT_EQ(picture.at(code, 0)[0], code);
 }
 
-// The whole way: light of equal red, green and blue through filters of different efficiency.
+// The complete chain: light of equal red, green and blue through filters of different efficiency.
 TEST(Picture, ShowsGreySurfacesAsGreyAndFullPixelsAsWhite) {
   for (const ColorFilter filter : mosaics) {
     const ImagerSpec spec{
@@ -145,7 +145,7 @@ TEST(Picture, ShowsGreySurfacesAsGreyAndFullPixelsAsWhite) {
     };
     const Image16 grey = picture_in(0.02f), white = picture_in(10);
     const double electrons = 0.02 * 3.45e-6 * 3.45e-6 * 0.01 / 3.5792e-19 * 0.6;
-    // Raw numbers are rounded: half of one of 3995 from black to the top, times the gain.
+    // Raw numbers are rounded: half a step of 3995 from black to white, times the gain.
     for (const std::uint16_t value : grey.values())
       EXPECT_NEAR(value, 65535 * electrons * 0.4 / 3995, 65535 / 3995.0);
     EXPECT_THAT(white.values(), Each(65535));
@@ -163,7 +163,7 @@ TEST(Picture, OfAMonochromeSensorIsGrey) {
   EXPECT_THAT(picture.values(), ::testing::ElementsAre(128, 255));
 }
 
-TEST(Picture, SaysWhatIsWrong) {
+TEST(Picture, ErrorListsEveryFault) {
   EXPECT_THAT([] { RawDeveloper({.bits = 12, .gains = glm::dvec3(1, 0, 1)}, {}); },
               ThrowsMessage<Error>(AllOf(HasSubstr("bits = 12 must be 8 or 16"),
                                          HasSubstr("gain 0 must be positive"))));
@@ -171,9 +171,9 @@ TEST(Picture, SaysWhatIsWrong) {
               ThrowsMessage<Error>(HasSubstr("raise gain_dn_e")));
   const RawDeveloper developer({}, {});
   EXPECT_THAT([&] { developer.develop(Image16(4, 4, 3)); },
-              ThrowsMessage<Error>(HasSubstr("has 1 channel, but this one 3")));
+              ThrowsMessage<Error>(HasSubstr("must have 1 channel, but has 3")));
   EXPECT_THAT([&] { developer.develop(Image16(4, 2, 1)); },
-              ThrowsMessage<Error>(HasSubstr("a mosaic of 4 x 2 px has not all colours")));
+              ThrowsMessage<Error>(HasSubstr("a mosaic of 4 x 2 px lacks some colours")));
 }
 
 }  // namespace

@@ -1,4 +1,4 @@
-// Rays of cameras aimed at what surfaces are made of: no ray slips between facets.
+// Camera rays aimed at edges and vertices of surfaces: no ray slips between facets.
 #include <gtest/gtest.h>
 #include <tbb/parallel_for.h>
 
@@ -7,8 +7,8 @@
 #include <glm/geometric.hpp>
 #include <vector>
 
-#include "test/support/camera_scene.h"
-#include "test/support/sample_terrain.h"
+#include "test/support/scans/camera_scene.h"
+#include "test/support/terrain/sample_terrain.h"
 
 namespace groundray::watertight_test {
 namespace {
@@ -23,8 +23,8 @@ const glm::dvec3 eye(3.3, -1.7, 7.9);
 
 enum class Aim { Edges, EdgesAndVertices };
 
-// Where on the plane a ray is aimed: at a place on an edge along either side, on a diagonal, or at
-// a vertex. Steps of the vertices are binary fractions, so that floats have them exactly.
+// Point on the plane at which a ray is aimed: on an edge along either side, on a diagonal, or at a
+// vertex. Steps of the vertices are binary fractions, so floats represent them exactly.
 glm::dvec3 place(Aim aim, std::size_t ray) {
   const std::size_t kinds = aim == Aim::Edges ? 3 : 4, kind = ray % kinds;
   constexpr std::size_t all_cells = std::size_t{cells} * cells;
@@ -32,7 +32,7 @@ glm::dvec3 place(Aim aim, std::size_t ray) {
   const std::size_t column = cell % cells, row = cell / cells;
   const double step_m = side_m / cells;
   const double x = static_cast<double>(column), y = static_cast<double>(row);
-  // The golden ratio's multiples fill the edge evenly.
+  // Multiples of the golden ratio fill the edge evenly.
   const double golden = 0.6180339887498949 * static_cast<double>(turn + 1);
   const double along = golden - std::floor(golden);
   const glm::dvec2 at = kind == 0   ? glm::dvec2(x + along, y + 1)
@@ -42,7 +42,7 @@ glm::dvec3 place(Aim aim, std::size_t ray) {
   return {at * step_m - side_m / 2, 0};
 }
 
-// How many of the rays to such places miss the surface there. `object` is what they should meet.
+// Number of rays to such points that miss the surface there. `object` is the expected hit.
 std::size_t leaks(const Scene& scene, const glm::dvec3& normal, std::uint32_t object, Aim aim,
                   std::size_t count) {
   constexpr std::size_t batch = 4096;
@@ -66,7 +66,8 @@ std::size_t leaks(const Scene& scene, const glm::dvec3& normal, std::uint32_t ob
   return sum;
 }
 
-// The plane n p = 0 over the square, and some cells beyond, so that no ray is aimed at its rim.
+// The plane n p = 0 over the square and some cells beyond it, so that no ray is aimed at its
+// boundary.
 HeightGrid plane_grid(const glm::dvec3& normal) {
   constexpr int samples = cells + 3;
   const double step_m = side_m / cells, first_m = -side_m / 2 - step_m;
@@ -102,10 +103,10 @@ Model plane_model(const glm::dvec3& normal) {
   return model;
 }
 
-// All in all a million rays, 10^8 when it is a proof.
+// A million rays in total, 10^8 in a proof run.
 std::size_t rays_each() { return proof_size(125'000, 12'500'000); }
 
-TEST(WatertightProof, NoRayToAnEdgeOrVertexOfTheGroundGoesThrough) {
+TEST(WatertightProof, NoRayPassesThroughEdgesOrVerticesOfTheGround) {
   for (const Tracing tracing : {Tracing::Fast, Tracing::Exact}) {
     for (const glm::dvec3& normal : {glm::dvec3(0, 0, 1), glm::dvec3(-0.25, 0.5, 1)}) {
       const Scene scene = scene_of(plane_grid(normal), {}, {}, {}, tracing);
@@ -114,7 +115,7 @@ TEST(WatertightProof, NoRayToAnEdgeOrVertexOfTheGroundGoesThrough) {
   }
 }
 
-TEST(WatertightProof, NoRayToAnEdgeOrVertexOfAnObjectGoesThrough) {
+TEST(WatertightProof, NoRayPassesThroughEdgesOrVerticesOfObjects) {
   for (const Tracing tracing : {Tracing::Fast, Tracing::Exact}) {
     for (const glm::dvec3& normal : {glm::dvec3(0, 0, 1), glm::dvec3(-0.25, 0.5, 1)}) {
       const Scene scene =

@@ -1,1 +1,1 @@
-"""Exports of datasets to the forms that other people's programs read: see docs/export.md."""
+"""Exports of datasets to third-party formats; see docs/reference/export.md."""

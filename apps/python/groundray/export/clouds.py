@@ -20,9 +20,9 @@ _PCD_KINDS = {"f": "F", "i": "I", "u": "U"}
 def write_pcd(
     dataset: Dataset, lidars: Sequence[Lidar], columns: Sequence[str], frame: str, out: Path
 ) -> str:
-    """Writes `<lidar>/000000.pcd`, binary, with these columns (all, if none are named).
+    """Writes `<lidar>/000000.pcd`, binary, with these columns (all if the list is empty).
 
-    `frame` is that of x, y, z: `fired`, as the scan has them; `stamp`, S at the stamp; `world`, D.
+    `frame` is that of x, y, z: `fired`, as in the scan; `stamp`, S at the stamp; `world`, D.
     """
     count = 0
     for lidar in lidars:
@@ -52,7 +52,7 @@ def write_pcd(
 
 
 def chosen_columns(rows: NDArray[Any], columns: Sequence[str], file: str) -> NDArray[Any]:
-    """Returns these columns, packed, in this order. Raises Error for one that is not there."""
+    """Returns these columns, packed, in this order. Raises Error for an unknown one."""
     names = tuple(rows.dtype.names or ())
     missing = [name for name in columns if name not in names]
     if missing:
@@ -108,15 +108,13 @@ def write_npz(dataset: Dataset, lidars: Sequence[Lidar], out: Path) -> str:
 
 
 def name_with_unit(column: str) -> str:
-    """Returns the name of a column with its unit: range_true_m of range_true."""
+    """Returns the name of a column with its unit: range_true_m for range_true."""
     unit = UNITS.get(column, "").replace("/", "_").lower()
     return f"{column}_{unit}" if unit else column
 
 
 def tell_of_scan(scan: Scan, notes: Notes) -> None:
-    """Tells of the rows that are echoes of nothing, which forms without `kind` cannot mark."""
+    """Notes echoes of air and false alarms, which formats without `kind` cannot mark."""
     if "kind" in scan.names:
-        sentence = (
-            "{} points are echoes of air or false alarms, which nothing marks; their label is 0"
-        )
+        sentence = "{} points are unmarked echoes of air or false alarms; their label is 0"
         notes.count(sentence, int(np.count_nonzero(scan.rows["kind"])))

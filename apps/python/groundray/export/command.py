@@ -20,11 +20,11 @@ from groundray.export.labels import LabelMap
 from groundray.export.left_out import tell_of_columns, tell_of_products
 from groundray.export.notes import Notes
 
-DONE, FAILED, INTERRUPTED = 0, 1, 130  # argparse exits with 2 of wrong usage
+DONE, FAILED, INTERRUPTED = 0, 1, 130  # argparse exits with 2 on wrong usage
 
 _FORMS = ("kitti", "semantic-kitti", "tum", "pcd", "las", "laz", "npz", "mcap")
 _KITTI, _LAS = {"kitti", "semantic-kitti"}, {"las", "laz"}
-# Which forms an option is for; all others take it.
+# Formats that an option applies to; options not listed apply to all.
 _ONLY_OF = {
     "lidar": set(_FORMS) - {"tum"},
     "camera": _KITTI | {"tum", "mcap"},
@@ -43,7 +43,7 @@ _ONLY_OF = {
     "compression": {"mcap"},
     "shift_s": {"mcap"},
 }
-# Which packages a form is written with, by the names that pip knows.
+# Modules that a format needs, with their names in pip.
 _PACKAGES = {
     "tum": {"cv2": "opencv-python-headless", "OpenEXR": "openexr"},
     "las": {"laspy": "laspy", "pyproj": "pyproj"},
@@ -60,27 +60,29 @@ _PACKAGES = {
 def _parser() -> argparse.ArgumentParser:
     parser = argparse.ArgumentParser(
         prog="groundray-export",
-        description="Write a dataset of groundray generate in the form that other programs read.",
-        epilog="What each form holds, and what it cannot say: docs/export.md. Exit codes: "
-        "0 done, 1 failed, 2 wrong usage, 130 interrupted. OUT appears only when whole.",
+        description="Convert a dataset of groundray generate to a format that other programs read.",
+        epilog="Contents and limits of each format: docs/reference/export.md. Exit codes: "
+        "0 done, 1 failed, 2 wrong usage, 130 interrupted. OUT appears only when complete.",
         allow_abbrev=False,
     )
     parser.add_argument("dataset", metavar="DATASET", type=Path, help="folder with a dataset.yaml")
-    parser.add_argument("--to", required=True, choices=_FORMS, help="form of the files")
+    parser.add_argument("--to", required=True, choices=_FORMS, help="format of the files")
     parser.add_argument(
         "-o",
         "--output",
         required=True,
         type=Path,
         metavar="OUT",
-        help="a new folder, or an empty one",
+        help="a new or empty folder",
     )
     parser.add_argument(
-        "--skip-pending", action="store_true", help="export what is done of an unfinished dataset"
+        "--skip-pending",
+        action="store_true",
+        help="export finished frames if some are pending",
     )
-    _add_choices(parser.add_argument_group("what of it"))
+    _add_choices(parser.add_argument_group("selection"))
     _add_points(parser.add_argument_group("points"))
-    _add_others(parser.add_argument_group("others"))
+    _add_others(parser.add_argument_group("other options"))
     return parser
 
 
@@ -88,22 +90,22 @@ def _add_choices(group: argparse._ArgumentGroup) -> None:
     add = group.add_argument
     add("--lidar", action="append", metavar="NAME", help="only this lidar; may be repeated")
     add("--camera", action="append", metavar="NAME", help="only this camera; may be repeated")
-    text = "no cameras (kitti, semantic-kitti, mcap)"
+    text = "omit cameras (kitti, semantic-kitti, mcap)"
     add("--no-images", action="store_true", default=None, help=text)
 
 
 def _add_points(group: argparse._ArgumentGroup) -> None:
     add = group.add_argument
-    text = "intensity that is 1, 255 or 65535 in forms with such a scale"
+    text = "intensity that becomes 1, 255 or 65535 in formats with such a scale"
     add("--intensity-full-scale", type=_positive, metavar="I", help=text)
-    text = "other numbers for labels (semantic-kitti, las, laz)"
+    text = "map of labels to other numbers (semantic-kitti, las, laz)"
     add("--labels", type=Path, metavar="MAP.yaml", help=text)
-    add("--columns", metavar="A,B,...", help="columns of a PCD file; all if not given")
-    text = "frame of x, y, z in a PCD file (fired)"
+    add("--columns", metavar="A,B,...", help="columns of a PCD file (default: all)")
+    text = "frame of x, y, z in a PCD file (default: fired)"
     add("--frame", choices=("fired", "stamp", "world"), help=text)
-    text = "which points a LAS file has (measured)"
+    text = "points of a LAS file (default: measured)"
     add("--place", choices=("measured", "truth"), help=text)
-    text = "what the dataset's seconds are, for LAS (run)"
+    text = "clock of the dataset's times, for LAS (default: run)"
     add("--clock", choices=("run", "gps", "unix"), help=text)
     text = "one LAS file for each lidar"
     add("--merge", action="store_true", default=None, help=text)
@@ -111,14 +113,16 @@ def _add_points(group: argparse._ArgumentGroup) -> None:
 
 def _add_others(group: argparse._ArgumentGroup) -> None:
     add = group.add_argument
-    add("--sequence", type=_whole, metavar="N", help="number of KITTI's first sequence (0)")
-    text = "what a metre is in TUM's depths (5000)"
+    text = "number of KITTI's first sequence (default: 0)"
+    add("--sequence", type=_whole, metavar="N", help=text)
+    text = "depth value of a metre in TUM (default: 5000)"
     add("--depth-per-m", type=_positive, metavar="N", help=text)
-    text = "layout of ROS 2 points (full)"
+    text = "layout of ROS 2 points (default: full)"
     add("--points", choices=("velodyne", "ouster", "autoware", "full"), help=text)
-    add("--depth", action="store_true", default=None, help="depth images too, in a bag")
-    add("--compression", choices=("zstd", "lz4", "none"), help="of a bag (zstd)")
-    add("--shift-s", type=_seconds_ns, metavar="T", help="added to all stamps of a bag")
+    add("--depth", action="store_true", default=None, help="add depth images to a bag")
+    text = "compression of a bag (default: zstd)"
+    add("--compression", choices=("zstd", "lz4", "none"), help=text)
+    add("--shift-s", type=_seconds_ns, metavar="T", help="seconds added to all stamps of a bag")
 
 
 def _positive(text: str) -> float:
@@ -145,9 +149,8 @@ def _seconds_ns(text: str) -> int:
 def _check_options(parser: argparse.ArgumentParser, options: argparse.Namespace) -> None:
     for name, forms in _ONLY_OF.items():
         if getattr(options, name) is not None and options.to not in forms:
-            parser.error(
-                f"--{name.replace('_', '-')} is of {', '.join(sorted(forms))}, not of {options.to}"
-            )
+            rule = f"applies to {', '.join(sorted(forms))}, not to {options.to}"
+            parser.error(f"--{name.replace('_', '-')} {rule}")
     if options.camera and options.no_images:
         parser.error("--camera and --no-images exclude each other")
 
@@ -171,7 +174,7 @@ def _export(options: argparse.Namespace, out: Path, dataset: Dataset, notes: Not
     if options.no_images:
         cameras = []
     if not lidars and options.to not in ("tum", "mcap"):
-        raise Error(f"{dataset.folder}: it has no lidar, and {options.to} is of scans")
+        raise Error(f"{dataset.folder}: it has no lidar, but {options.to} needs scans")
     full_scale = FullScale(options.intensity_full_scale)
     if lidars:
         tell_of_columns(options.to, options.points or "full", notes)
@@ -211,7 +214,7 @@ def _check_packages(form: str) -> None:
         if importlib.util.find_spec(module) is None
     ]
     if missing:
-        rule = f"{form} is written with {', '.join(missing)}, which is not installed"
+        rule = f"{form} needs {', '.join(missing)}, which is not installed"
         raise Error(f"{rule}: pip install {' '.join(missing)}, or groundray[export]")
 
 
@@ -230,7 +233,7 @@ def _interrupt(_signal: int, _frame: FrameType | None) -> None:
 
 @contextmanager
 def _sigterm_interrupts() -> Iterator[None]:
-    """SIGTERM is as Ctrl-C meanwhile; in other threads than the main one it stays what it was."""
+    """Handles SIGTERM as Ctrl-C, if called in the main thread; restores the handler at the end."""
     if threading.current_thread() is not threading.main_thread():
         yield
         return
@@ -242,7 +245,7 @@ def _sigterm_interrupts() -> Iterator[None]:
 
 
 def _guarded(work: Callable[[], str]) -> tuple[int, str]:
-    """Runs work; returns the exit code and what to say."""
+    """Runs work; returns the exit code and a message."""
     try:
         return DONE, work()
     except KeyboardInterrupt:
@@ -265,7 +268,7 @@ def main(arguments: Sequence[str] | None = None) -> int:
         _check_packages(options.to)
         dataset = _open(options)
         if dataset.pending:
-            notes.tell(f"{dataset.pending} frames are pending and left out")
+            notes.tell(f"{dataset.pending} frames are pending and skipped")
         with written_aside(options.output, options.dataset) as folder:
             return _export(options, folder, dataset, notes)
 

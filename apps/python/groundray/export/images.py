@@ -20,7 +20,7 @@ _GREY, _COLOUR = 0, 2  # colour types of PNG
 
 
 class Picture(NamedTuple):
-    """A picture as its PNG file has it."""
+    """A picture and the data of its PNG file."""
 
     file: Path
     data: bytes
@@ -29,28 +29,28 @@ class Picture(NamedTuple):
 
 
 def has_pictures(dataset: Dataset, camera: Camera) -> bool:
-    """Whether any image of the camera has a picture: then all must."""
+    """Returns whether any image of the camera has a picture; then all must have one."""
     return any(dataset.image_file(camera, frame, ".png").is_file() for frame in camera.frames)
 
 
 def has_depths(dataset: Dataset, camera: Camera) -> bool:
-    """Whether any image of the camera has the truth: then all must."""
+    """Returns whether any image of the camera has depths; then all must have them."""
     files = (dataset.image_file(camera, frame, ".exr") for frame in camera.frames)
     first = next((file for file in files if file.is_file()), None)
     return first is not None and "Z" in _channels(first, only_names=True)
 
 
 def read_picture(dataset: Dataset, camera: Camera, frame: Frame) -> Picture:
-    """Reads a picture. Raises Error if it is missing, cut short or of another size."""
+    """Reads a picture. Raises Error if it is missing, truncated or of another size."""
     file = dataset.image_file(camera, frame, ".png")
     data = _read(file)
     # Signature, then the chunk IHDR; the last one is IEND, which is empty.
     if data[:8] != b"\x89PNG\r\n\x1a\n" or data[12:16] != b"IHDR" or data[-8:-4] != b"IEND":
-        raise Error(f"{file}: it is no whole PNG file: it is damaged; generate it again")
+        raise Error(f"{file}: it is not a complete PNG file: it is damaged; generate it again")
     width, height, bits, colours = struct.unpack(">IIBB", data[16:26])
     if (width, height) != camera.size_px or bits not in (8, 16) or colours not in (_GREY, _COLOUR):
         rule = f"must have {camera.size_px[0]} x {camera.size_px[1]} pixels, grey or RGB"
-        raise Error(f"{file}: it {rule}, as the camera's calibration says; is it another's?")
+        raise Error(f"{file}: it {rule}, as its calibration states; is it from another camera?")
     return Picture(file, data, bits, colours == _COLOUR)
 
 
@@ -77,11 +77,11 @@ def read_depths_m(dataset: Dataset, camera: Camera, frame: Frame) -> NDArray[np.
     file = dataset.image_file(camera, frame, ".exr")
     channels = _channels(file)
     if "Z" not in channels:
-        raise Error(f"{file}: it has no depths; give the camera the product truth")
+        raise Error(f"{file}: it has no depths; add truth to the camera's products")
     depths_m = np.asarray(channels["Z"], dtype=np.float32)
     if depths_m.shape != camera.size_px[::-1]:
         rule = f"must have {camera.size_px[0]} x {camera.size_px[1]} pixels"
-        raise Error(f"{file}: it {rule}, as the camera's calibration says; is it another's?")
+        raise Error(f"{file}: it {rule}, as its calibration states; is it from another camera?")
     return depths_m
 
 
@@ -89,13 +89,13 @@ def _read(file: Path) -> bytes:
     try:
         return file.read_bytes()
     except OSError as fault:
-        rule = f"cannot read it: {fault.strerror}, though dataset.yaml says that the image is done"
+        rule = f"cannot read it: {fault.strerror}, although dataset.yaml lists the image as done"
         raise Error(f"{file}: {rule}; was it removed?") from None
 
 
 @contextmanager
 def _quiet_library() -> Iterator[io.StringIO]:
-    """Gives what is printed meanwhile; what the library's C code says on stderr goes nowhere."""
+    """Captures standard output, and discards what the library's C code prints to stderr."""
     sys.stderr.flush()
     saved, nowhere = os.dup(2), os.open(os.devnull, os.O_WRONLY)
     try:
@@ -112,10 +112,10 @@ def _channels(file: Path, *, only_names: bool = False) -> dict[str, Any]:
     import OpenEXR
 
     if not file.is_file():
-        rule = "it is not there, though dataset.yaml says that the image is done"
+        rule = "it does not exist, although dataset.yaml lists the image as done"
         raise Error(f"{file}: {rule}; was it removed?")
     try:
-        # Of damaged pixels the library tells by printing alone.
+        # The library reports damaged pixels only by printing.
         with (
             _quiet_library() as printed,
             OpenEXR.File(str(file), separate_channels=True, header_only=only_names) as image,
@@ -126,5 +126,5 @@ def _channels(file: Path, *, only_names: bool = False) -> dict[str, Any]:
             if printed.getvalue():
                 raise ValueError(printed.getvalue().strip())
             return channels
-    except Exception as fault:  # whatever the library makes of a damaged file
+    except Exception as fault:  # whatever the library raises for a damaged file
         raise Error(f"{file}: cannot read it: {fault}: it is damaged; generate it again") from None

@@ -1,4 +1,4 @@
-"""Intensities on scales that other people's forms have."""
+"""Intensities on the scales of other formats."""
 
 from __future__ import annotations
 
@@ -10,12 +10,13 @@ from numpy.typing import NDArray
 from groundray.dataset import Error, Lidar
 from groundray.export.sensor_path import Floats
 
-# What of the sensor's own scale is full scale: a white plane, met squarely; of 8 bits their most.
+# Intensity that is exported as full scale: a white plane at normal incidence, or the largest 8-bit
+# value.
 _FULL_SCALES = {"cosine": 1.0, "reflectance": 1.0, "eight_bit": 255.0}
 
 
 class FullScale:
-    """What intensities are divided by: the user's choice, or what the sensor's scale implies."""
+    """Divisor of intensities: the user's choice, or the one that the sensor's scale implies."""
 
     def __init__(self, chosen: float | None) -> None:
         self.chosen = chosen

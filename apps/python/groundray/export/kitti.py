@@ -20,7 +20,7 @@ from groundray.export.sensor_path import Floats, SensorPath
 
 @dataclass(frozen=True)
 class KittiOptions:
-    """`labels` is none of KITTI odometry."""
+    """`labels` is None for KITTI odometry."""
 
     first_sequence: int
     full_scale: FullScale
@@ -29,7 +29,7 @@ class KittiOptions:
 
 @dataclass(frozen=True)
 class _View:
-    """What stands for KITTI's four cameras: a left one, and a right one if there is a pair."""
+    """Replacement of KITTI's four cameras: a left one, and a right one if there is a pair."""
 
     left: Camera | None
     right: Camera | None
@@ -39,7 +39,7 @@ class _View:
         return self.left.X_BC if self.left else lidar.X_BS @ _X_SC
 
 
-# Where there is no camera: one at the lidar, which looks along its x.
+# Without a camera: a virtual one at the lidar, which looks along its x.
 _X_SC = np.array([[0, 0, 1, 0], [-1, 0, 0, 0], [0, -1, 0, 0], [0, 0, 0, 1]], dtype=float)
 
 
@@ -61,7 +61,7 @@ def write_kitti(
     """Writes the sequences of these lidars, with the pictures of a camera or a rectified pair."""
     view = _view_of(dataset, cameras, notes)
     notes.tell(
-        "points are moved to the pose of their frame's time; what moves is where its pulses met it"
+        "points are relative to the pose at their frame's time; moving objects are not corrected"
     )
     counts = []
     for i, lidar in enumerate(lidars):
@@ -73,7 +73,7 @@ def write_kitti(
 
 
 def _view_of(dataset: Dataset, cameras: Sequence[Camera], notes: Notes) -> _View:
-    """The camera that was named or the only one, else the first rectified pair."""
+    """Returns the selected or only camera, else the first rectified pair."""
     names = {camera.name: camera for camera in cameras}
     chosen = (each for each in dataset.pairs if {each.left, each.right} <= set(names))
     pair = next((each for each in chosen if each.is_rectified), None)
@@ -86,21 +86,21 @@ def _view_of(dataset: Dataset, cameras: Sequence[Camera], notes: Notes) -> _View
     if pair is None and len(cameras) > 1:
         rule = f"it has the cameras {', '.join(names)} and no rectified pair among them"
         raise Error(
-            f"{dataset.folder}: {rule}; choose one with --camera, or --no-images for scans alone"
+            f"{dataset.folder}: {rule}; choose one with --camera, or export none with --no-images"
         )
     left = names[pair.left] if pair else cameras[0]
     right = names[pair.right] if pair else None
     P_left = np.hstack([_pinhole(dataset, left), np.zeros((3, 1))])
     if right is None:
-        notes.tell(f"camera {left.name} stands for all four of KITTI's: P0 to P3 are the same")
+        notes.tell(f"camera {left.name} replaces all four of KITTI's: P0 to P3 are equal")
         return _View(left, None, (P_left, P_left))
     left_out = [name for name in names if name not in (left.name, right.name)]
     if left_out:
-        notes.tell(f"KITTI has one pair of cameras: {', '.join(left_out)} is left out")
+        notes.tell(f"KITTI has one pair of cameras: {', '.join(left_out)} not exported")
     X_RL = np.linalg.inv(right.X_BC) @ left.X_BC
     if np.abs(X_RL[:3, :3] - np.eye(3)).max() > 1e-9:
-        rule = f"cameras {left.name} and {right.name} are turned from each other"
-        raise Error(f"{dataset.folder}: {rule}; give their pair images: rectified")
+        rule = f"cameras {left.name} and {right.name} are not parallel"
+        raise Error(f"{dataset.folder}: {rule}; set images: rectified for their pair")
     K_right = _pinhole(dataset, right)
     return _View(left, right, (P_left, K_right @ X_RL[:3]))
 
@@ -108,39 +108,39 @@ def _view_of(dataset: Dataset, cameras: Sequence[Camera], notes: Notes) -> _View
 def _pinhole(dataset: Dataset, camera: Camera) -> Floats:
     if camera.frames and not has_pictures(dataset, camera):
         rule = f"camera {camera.name} has no pictures"
-        fix = "give it the product picture, or export with --no-images"
+        fix = "add picture to its products, or export with --no-images"
         raise Error(f"{dataset.folder}: {rule}; {fix}")
     K = camera.pinhole_matrix()
     if K is None:
-        rule = f"camera {camera.name} is a {camera.lens_model}, but KITTI's images are of pinholes"
-        fix = "give it a pinhole, or images: rectified to its pair, or export with --no-images"
+        rule = f"camera {camera.name} has the lens {camera.lens_model}, but KITTI needs pinholes"
+        fix = "use a pinhole, set images: rectified for its pair, or export with --no-images"
         raise Error(f"{dataset.folder}: {rule}; {fix}")
     return K
 
 
 def _frames_of(lidar: Lidar, view: _View, notes: Notes) -> list[_KittiFrame]:
-    """A frame for each scan; with images, for each image that has a scan of its own.
+    """Returns a frame for each scan; with images, for each image that has a scan of its own.
 
-    An image's scan is the last that has begun in the middle of its exposure, or else the first.
+    The scan of an image is the last one begun by the middle of its exposure, else the first.
     """
     if not lidar.frames:
-        raise Error(f"lidar {lidar.name}: it has no scan that is done; generate them first")
+        raise Error(f"lidar {lidar.name}: it has no finished scan; generate one first")
     if view.left is None:
         return [_KittiFrame(each.stamp_ns, each, None) for each in lidar.frames]
     if not view.left.frames:
-        rule = f"camera {view.left.name}: it has no image that is done"
-        raise Error(f"{rule}; generate them, or give --no-images")
+        rule = f"camera {view.left.name}: it has no finished image"
+        raise Error(f"{rule}; generate one, or give --no-images")
     stamps = np.array([each.stamp_ns for each in lidar.frames])
     frames: list[_KittiFrame] = []
     for image in view.left.frames:
         time_ns = image.stamp_ns + view.left.middle_ns
         i = max(int(np.searchsorted(stamps, time_ns, side="right")) - 1, 0)
         if frames and frames[-1].scan == lidar.frames[i]:
-            notes.count("{} images are left out: another image has their scan", 1)
+            notes.count("{} images are skipped: another image has their scan", 1)
         else:
             frames.append(_KittiFrame(time_ns, lidar.frames[i], image))
     sentence = (
-        "{} scans of " + lidar.name + " are left out: no image has them; --no-images exports all"
+        "{} scans of " + lidar.name + " are skipped: they have no image; --no-images exports all"
     )
     notes.count(sentence, len(lidar.frames) - len(frames))
     return frames
@@ -186,7 +186,7 @@ def _write_poses(
     out: Path,
     number: int,
 ) -> None:
-    """Of camera 0, in its frame at the begin: poses/NN.txt, of SemanticKITTI poses.txt."""
+    """Writes poses of camera 0 relative to the first: poses/NN.txt; SemanticKITTI: poses.txt."""
     X_SC = np.linalg.inv(lidar.X_BS) @ view.X_BC(lidar)
     X_DC = [path.pose_at(each.time_ns) @ X_SC for each in frames]
     poses = [np.linalg.inv(X_DC[0]) @ each for each in X_DC]
@@ -226,7 +226,7 @@ def _write_pictures(
             continue
         frame = next((each for each in camera.frames if each.number == image.number), None)
         if frame is None:
-            rule = f"it has no image {image.number}, which the other of its pair has"
+            rule = f"it has no image {image.number}, but the other camera of its pair has"
             raise Error(f"camera {camera.name}: {rule}; generate it")
         picture = read_picture(dataset, camera, frame)
         _tell_of_bits(picture, notes)
@@ -238,9 +238,7 @@ def _write_pictures(
 
 def _tell_of_bits(picture: Picture, notes: Notes) -> None:
     if picture.bits == 16:
-        notes.tell(
-            "pictures have 16 bits, where KITTI's have 8: some programs read their upper 8 alone"
-        )
+        notes.tell("pictures have 16 bits, but KITTI's have 8: some programs read only the upper 8")
 
 
 class _LabelWriter:
@@ -259,15 +257,15 @@ class _LabelWriter:
         (self._folder / f"labels/{i:06}.label").write_bytes(values.tobytes())
 
     def finish(self, notes: Notes) -> None:
-        """Writes which object each number is, where they are not the dataset's own."""
+        """Writes the dataset's number of each instance if they were renumbered."""
         if self._labels.file is None:
             notes.tell(
-                "labels are the dataset's own numbers, not SemanticKITTI's; --labels gives others"
+                "labels are the dataset's own numbers, not SemanticKITTI's; --labels replaces them"
             )
         if not self._instances.is_renumbered:
             return
         notes.tell(
-            "instances are numbered anew for each label, to fit 16 bits: instances.txt tells them"
+            "instances are renumbered per label to fit 16 bits: instances.txt lists the originals"
         )
         lines = [
             f"{label} {number} {instance}\n"

@@ -1,4 +1,4 @@
-"""Semantic classes and instances in the numbers of other people's data sets."""
+"""Semantic classes and instances in the numbers of other datasets."""
 
 from __future__ import annotations
 
@@ -15,10 +15,10 @@ Numbers = NDArray[np.uint32]
 
 
 class LabelMap:
-    """The dataset's labels to others, from a file of `labels`, `others` and `instances`."""
+    """Map of the dataset's labels to others, from a file of `labels`, `others` and `instances`."""
 
     def __init__(self, file: Path | None, most: int) -> None:
-        """Without a file labels stay. Raises Error if the file says what cannot be."""
+        """Keeps all labels if there is no file. Raises Error if the file is invalid."""
         self.file = file
         self.most = most
         self.labels: dict[int, int] = {}
@@ -36,10 +36,10 @@ class LabelMap:
             raise Error(f"{file}: it is not YAML: {fault}") from None
         known = {"labels", "others", "instances"}
         if not isinstance(values, dict) or "labels" not in values or set(values) - known:
-            raise Error(f"{file}: it must be a map of labels and, perhaps, others and instances")
+            raise Error(f"{file}: it must be a map of labels and, optionally, others and instances")
         pairs = values["labels"]
         if not isinstance(pairs, dict):
-            raise Error(f"{file}: labels must be a map of the dataset's labels to others")
+            raise Error(f"{file}: labels must map the dataset's labels to other numbers")
         self.labels = {
             self._checked(ours, 65535): self._checked(theirs, self.most)
             for ours, theirs in pairs.items()
@@ -57,7 +57,7 @@ class LabelMap:
         return number
 
     def of(self, labels: NDArray[Any]) -> Numbers:
-        """Returns the labels in the other numbers. Raises Error for one that has none."""
+        """Returns the mapped labels. Raises Error for a label without a number."""
         ours, which = np.unique(labels, return_inverse=True)
         theirs = np.array([self._one(int(label)) for label in ours], dtype=np.uint32)
         return theirs[which] if theirs.size else np.zeros(0, np.uint32)
@@ -69,17 +69,17 @@ class LabelMap:
             if self.others is not None:
                 return self.others
             if label == 0:
-                return 0  # nothing here, nothing there
+                return 0  # unlabelled stays unlabelled
             rule = f"it has no number for the label {label}"
-            raise Error(f"{self.file}: {rule}; add it to labels, or say what others become")
+            raise Error(f"{self.file}: {rule}; add it to labels, or set others")
         if label > self.most:
-            rule = f"label {label} is above {self.most}, the most of this form"
-            raise Error(f"{rule}; give other numbers with --labels")
+            rule = f"label {label} is above {self.most}, the limit of this format"
+            raise Error(f"{rule}; map it to another number with --labels")
         return label
 
 
 class Instances:
-    """Numbers of objects in 16 bits: their own if all fit, else in the order of being seen."""
+    """Numbers of objects in 16 bits: their own if all fit, else in the order of occurrence."""
 
     most = 65535
 
@@ -93,17 +93,15 @@ class Instances:
         self._used: dict[int, int] = {}
 
     def of(self, rows: NDArray[Any], theirs: Numbers) -> Numbers:
-        """Returns the numbers of instances; 0 for what has none."""
+        """Returns the numbers of instances; 0 for points without one."""
         ours = rows["instance"].astype(np.uint32)
         if self._labels.with_instances is not None:
             kept = np.isin(rows["label"], sorted(self._labels.with_instances))
             ours = np.where(kept, ours, np.uint32(0))
         if not self.is_renumbered:
             if ours.size and ours.max() > self.most:
-                rule = (
-                    f"a scan has the instance {ours.max()}, which dataset.yaml lists no object for"
-                )
-                raise Error(f"{rule}: is it of this dataset?")
+                rule = f"a scan has the instance {ours.max()}, which dataset.yaml does not list"
+                raise Error(f"{rule}: is the scan from this dataset?")
             return ours
         keys, first, which = np.unique(
             theirs.astype(np.uint64) << np.uint64(32) | ours, return_index=True, return_inverse=True
@@ -119,8 +117,8 @@ class Instances:
         if (label, instance) not in self.numbers:
             self._used[label] = self._used.get(label, 0) + 1
             if self._used[label] > self.most:
-                rule = f"more than {self.most} objects of the label {label} are seen"
-                fix = "list the labels whose instances matter as instances in the file of --labels"
-                raise Error(f"{rule}, more than this form can number; {fix}")
+                rule = f"more than {self.most} objects of the label {label} occur"
+                fix = "list the labels with relevant instances as instances in the file of --labels"
+                raise Error(f"{rule}, more than this format can number; {fix}")
             self.numbers[label, instance] = self._used[label]
         return self.numbers[label, instance]

@@ -19,11 +19,11 @@ from groundray.export.scan import MEANINGS, UNITS, Scan, read_scan
 from groundray.export.sensor_path import Floats, SensorPath
 
 _POINT_FORMAT = 6
-_MOST_RETURNS = 15  # what four bits of point format 6 hold
-_NO_DAY = datetime.date(2000, 1, 1)  # the same for ever, so that equal datasets give equal files
+_MOST_RETURNS = 15  # limit of the four bits in point format 6
+_NO_DAY = datetime.date(2000, 1, 1)  # constant, so that equal datasets yield equal files
 _GPS_ADJUSTED_S = 10**9
 _GPS_EPOCH_UNIX_S = 315964800  # 1980-01-06
-# Since these days (Unix seconds) GPS is ahead of UTC by one second more; the first is the 10th one.
+# Leap seconds since the GPS epoch, Unix seconds: each puts GPS one more second ahead of UTC.
 _LEAP_SECONDS = (
     362793600, 394329600, 425865600, 489024000, 567993600, 631152000, 662688000, 709948800,
     741484800, 773020800, 820454400, 867715200, 915148800, 1136073600, 1230768000, 1341100800,
@@ -33,9 +33,9 @@ _LEAP_SECONDS = (
 
 @dataclass(frozen=True)
 class LasOptions:
-    """`place`: `measured`, the points as reported, or `truth`, the points of the surface.
+    """`place`: `measured`, the points as reported, or `truth`, the points on the surface.
 
-    `clock` is what the dataset's seconds are: `run`, `gps` or `unix`.
+    `clock` is that of the dataset's times: `run`, `gps` or `unix`.
     """
 
     suffix: str
@@ -57,12 +57,12 @@ class _Form:
         # 32 bits of 0.1 mm reach 214 km, of 1 mm 2147 km.
         self.scale_m = 1e-4 if reach_m < 150e3 else 1e-3
         if reach_m > 2000e3:
-            rule = f"its paths go {reach_m:.0f} m from origin_w_m, farther than LAS files reach"
+            rule = f"its paths extend {reach_m:.0f} m from origin_w_m, too far for LAS files"
             raise Error(f"{dataset.folder}: {rule}")
         self.wkt = _wkt1(dataset)
 
     def header(self, scan: Scan, number: int) -> Any:
-        """Returns the header of a file whose points are like those of this scan."""
+        """Returns the header of a file with the columns of this scan."""
         import laspy
         from laspy.vlrs.known import WktCoordinateSystemVlr
 
@@ -90,7 +90,7 @@ class _Form:
         return header
 
     def points(self, scan: Scan, path: SensorPath, header: Any, notes: Notes) -> Any:
-        """Returns the scan's rows as LAS has them."""
+        """Returns the scan's rows as LAS points."""
         import laspy
 
         rows = scan.rows
@@ -104,11 +104,11 @@ class _Form:
         whole = np.rint((D_m + (self.dataset.origin_w_m - self.offset_m)) / self.scale_m)
         if not np.all(np.abs(whole) < 2**31 - 1):
             file = self.dataset.scan_file(scan.lidar, scan.frame)
-            raise Error(f"{file}: points are farther from origin_w_m than LAS files reach")
+            raise Error(f"{file}: points are too far from origin_w_m for LAS files")
         record.X, record.Y, record.Z = (whole[:, i].astype(np.int32) for i in range(3))
         intensity, clipped = self.options.full_scale.whole(scan.lidar, rows, 65535)
         notes.count(
-            "{} intensities are cut off at full scale; the column intensity_own has them", clipped
+            "{} intensities are clipped at full scale; intensity_own has their values", clipped
         )
         record.intensity = intensity.astype(np.uint16)
         count = np.minimum(rows["return_count"], _MOST_RETURNS)
@@ -116,7 +116,7 @@ class _Form:
         record.number_of_returns = count
         many = int(np.count_nonzero(rows["return_count"] > _MOST_RETURNS))
         notes.count(
-            "{} points are of pulses with more than 15 returns, which LAS cannot number", many
+            "{} points belong to pulses with more than 15 returns, which LAS cannot number", many
         )
         if self.options.labels:
             record.classification = self.options.labels.of(rows["label"]).astype(np.uint8)
@@ -138,21 +138,21 @@ class _Form:
 
 
 def _extra_name(column: str) -> str:
-    """LAS has fields of its own called x, y, z, intensity: those of the sensor get other names."""
+    """Renames x, y, z and intensity of the sensor: LAS has fields of these names."""
     if column in "xyz":
         return f"sensor_{column}"
     return {"intensity": "intensity_own"}.get(column, column)
 
 
 def _meaning(column: str) -> str:
-    """At most 32 bytes: what fits of unit and meaning."""
+    """Returns unit and meaning, cut off at 32 bytes."""
     meaning = "as reported, in the lidar" if column in "xyz" else MEANINGS.get(column, "")
     unit = UNITS.get(column)
     return (f"{unit}; {meaning}" if unit else meaning)[:32]
 
 
 def _wkt1(dataset: Dataset) -> str:
-    """The CRS as LAS 1.4 wants it, in the older form of WKT; as it is where that has no words."""
+    """Returns the CRS as WKT 1, which LAS 1.4 requires; unchanged if WKT 1 cannot express it."""
     import pyproj
 
     if not dataset.crs_wkt:
@@ -170,18 +170,16 @@ def _wkt1(dataset: Dataset) -> str:
 def write_las(
     dataset: Dataset, lidars: Sequence[Lidar], options: LasOptions, out: Path, notes: Notes
 ) -> str:
-    """Writes `<lidar>/000000.las`, or `<lidar>.las` with all scans if they are to be merged."""
+    """Writes `<lidar>/000000.las`, or `<lidar>.las` with all scans if they are merged."""
     paths = [SensorPath(dataset.path_file(lidar)) for lidar in lidars]
     form = _Form(dataset, paths, options)
     if not form.wkt:
         notes.tell("the dataset has no CRS: the files have none, and coordinates are those of W")
     if options.clock == "run":
-        notes.tell(
-            "times are seconds of the dataset's clock, marked as GPS week time: --clock gps or unix"
-        )
+        notes.tell("times are seconds of the dataset's clock, marked as GPS week time; see --clock")
     if options.labels is None:
         notes.tell(
-            "classes are all 0, never classified: the column label has the dataset's; see --labels"
+            "all classes are 0, never classified: the column label has the dataset's; see --labels"
         )
     for lidar, path in zip(lidars, paths, strict=True):
         _write_lidar(form, lidar, path, out, notes)
@@ -199,7 +197,7 @@ def _write_lidar(form: _Form, lidar: Lidar, path: SensorPath, out: Path, notes: 
             name = lidar.name if is_merged else f"{lidar.name}/{frame.number:06}"
             file = _LasFile(out / f"{name}.{suffix}", form.header(scan, lidar.number), scan.names)
         if scan.names != file.columns:
-            rule = "it has other columns than the scans before"
+            rule = "its columns differ from those of the previous scans"
             place = form.dataset.scan_file(lidar, frame)
             raise Error(f"{place}: {rule}; export without --merge")
         file.write(form.points(scan, path, file.header, notes))
@@ -210,7 +208,7 @@ def _write_lidar(form: _Form, lidar: Lidar, path: SensorPath, out: Path, notes: 
 
 
 class _LasFile:
-    """A file that is being written; failures of the compressor are failures to write."""
+    """A file that is being written; errors of the compressor are raised as write errors."""
 
     def __init__(self, place: Path, header: Any, columns: tuple[str, ...]) -> None:
         import laspy
@@ -234,6 +232,6 @@ class _LasFile:
     def _guarded(self, work: Callable[[], object]) -> None:
         try:
             work()
-        except RuntimeError as fault:  # what the compressor makes of a full disk
+        except RuntimeError as fault:  # raised by the compressor for a full disk
             self._stream.close()
             raise OSError(errno.EIO, f"cannot write: {fault}", str(self._place)) from None

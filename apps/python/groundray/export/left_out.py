@@ -1,4 +1,4 @@
-"""What a dataset holds and a form has no place for, told once."""
+"""Notes on data that a format omits, each printed once."""
 
 from __future__ import annotations
 
@@ -15,33 +15,31 @@ _PRODUCTS = {
 
 
 def tell_of_columns(form: str, layout: str, notes: Notes) -> None:
-    """Tells which columns the points of a form lack. `layout` is that of a bag's points."""
+    """Notes which columns the points of a format lack. `layout` is that of a bag's points."""
     if form == "kitti":
-        notes.tell("points have x, y, z and intensity alone: no times, rings, returns or truth")
+        notes.tell("points have only x, y, z and intensity: no times, rings, returns or truth")
     elif form == "semantic-kitti":
-        notes.tell(
-            "of the truth points have labels and instances alone; no times, rings or returns"
-        )
+        notes.tell("labels and instances are the only truth of points; no times, rings or returns")
     elif form == "mcap" and layout != "full":
-        notes.tell(f"points have the fields of the {layout} layout alone, and no truth")
+        notes.tell(f"points have only the fields of the {layout} layout, and no truth")
 
 
 def tell_of_products(
     dataset: Dataset, form: str, lidars: Sequence[Lidar], cameras: Sequence[Camera], notes: Notes
 ) -> None:
-    """Tells which files of the sensors are not exported."""
+    """Notes which files of the sensors are not exported."""
     for lidar in lidars if form != "tum" else ():
         for suffix, sentence in _PRODUCTS.items():
             if any(dataset.scan_file(lidar, each, suffix).is_file() for each in lidar.frames[:1]):
                 notes.tell(sentence)
     if form in _OF_SCANS and dataset.cameras:
-        notes.tell(f"{form} is of scans alone: images are not exported")
+        notes.tell(f"{form} contains only scans: images are not exported")
     elif form == "tum" and dataset.lidars:
-        notes.tell("tum is of cameras alone: lidars are not exported")
+        notes.tell("tum contains only cameras: lidars are not exported")
     if form in _OF_SCANS:
         return
     for camera in cameras:
         if any(dataset.image_file(camera, each, ".exr").is_file() for each in camera.frames[:1]):
             has_depths = form in ("tum", "mcap")
             kept = "pictures and depths" if has_depths else "pictures"
-            notes.tell(f"of images {kept} are exported, and no other channels")
+            notes.tell(f"images are exported as {kept} only, without other channels")

@@ -11,7 +11,7 @@ from groundray.export.ros_messages import DEFINITIONS
 
 
 class Message(NamedTuple):
-    """A message to be written: its time, then what orders messages of one time."""
+    """A message to write: its time, then its order among messages of the same time."""
 
     time_ns: int
     order: int
@@ -21,7 +21,7 @@ class Message(NamedTuple):
 
 
 class Bag:
-    """An MCAP file that is being written, and what its metadata.yaml says."""
+    """An MCAP file that is being written, and the contents of its metadata.yaml."""
 
     def __init__(self, path: Path, compression: str) -> None:
         from mcap.writer import CompressionType
@@ -39,7 +39,7 @@ class Bag:
         self._writer.add_metadata("groundray", facts)
 
     def write(self, message: Message) -> None:
-        """Appends a message; times must not fall."""
+        """Appends a message; times must not decrease."""
         time_ns, _, topic, kind, values = message
         if kind not in self._schemas:
             self._schemas[kind] = self._writer.register_msgdef(kind, DEFINITIONS[kind])
@@ -54,7 +54,7 @@ class Bag:
         self._writer.finish()  # type: ignore[no-untyped-call]
 
     def record(self) -> str:
-        """Returns metadata.yaml; it says that /tf_static is latched."""
+        """Returns the text of metadata.yaml, which marks /tf_static as latched."""
         first_ns, last_ns = self._times_ns or (0, 0)
         topics = [
             {
@@ -86,7 +86,7 @@ class Bag:
         return str(yaml.safe_dump({"rosbag2_bagfile_information": information}, sort_keys=False))
 
 
-# Keep the last, depth 1, reliable, transient local, all by rosbag2's numbers; no deadlines.
+# Keep last, depth 1, reliable, transient local, in rosbag2's numbers; no deadlines.
 _LATCHED = """\
 - history: 1
   depth: 1

@@ -1,20 +1,20 @@
-"""What a form cannot say, told once each, with how often it happened."""
+"""Notes on what a format cannot express, each printed once, with a count."""
 
 from __future__ import annotations
 
 
 class Notes:
-    """Sentences in the order in which they first came up."""
+    """Sentences in the order of their first occurrence."""
 
     def __init__(self) -> None:
         self._counts: dict[str, int] = {}
 
     def tell(self, sentence: str) -> None:
-        """Keeps a sentence, once."""
+        """Adds a sentence once."""
         self._counts.setdefault(sentence, 0)
 
     def count(self, sentence: str, number: int) -> None:
-        """Adds to the number of a sentence that has `{}` for it; nothing for 0."""
+        """Adds to the number that replaces `{}` in a sentence; ignores 0."""
         if number:
             self._counts[sentence] = self._counts.get(sentence, 0) + int(number)
 

@@ -1,4 +1,4 @@
-"""Bags of ROS 2 in MCAP: points, images, camera infos and transforms, in the order of time."""
+"""ROS 2 bags in MCAP: points, images, camera infos and transforms, in time order."""
 
 from __future__ import annotations
 
@@ -34,7 +34,7 @@ _MODELS = ("plumb_bob", "rational_polynomial", "equidistant")
 
 @dataclass(frozen=True)
 class BagOptions:
-    """`shift_ns` is added to all times; if none is given, a second where the clock begins at 0."""
+    """`shift_ns` is added to all times; None adds one second if the clock begins at 0."""
 
     layout: str
     compression: str
@@ -51,7 +51,7 @@ def write_bag(
     out: Path,
     notes: Notes,
 ) -> str:
-    """Writes a bag as `ros2 bag` has it: `metadata.yaml` and `<name>.mcap` beside it."""
+    """Writes a bag as `ros2 bag` does: `metadata.yaml` and `<name>.mcap`."""
     source = _Source(dataset, lidars, cameras, options, notes)
     bag = Bag(out / f"{dataset.folder.resolve().name or 'dataset'}.mcap", options.compression)
     try:
@@ -103,11 +103,11 @@ class _Source:
             shift_ns = 10**9 if self.dataset.time_origin_ns == 0 else 0
         if shift_ns and self.options.shift_ns is None:
             self.notes.tell(
-                "stamps are times and 1 s: ROS takes a stamp of 0 for the latest; see --shift-s"
+                "stamps are shifted by 1 s: ROS reads a stamp of 0 as the latest; see --shift-s"
             )
         first_ns = self.dataset.time_origin_ns + shift_ns
         if not 0 <= first_ns < (2**31 - 10**7) * 10**9:
-            rule = "stamps of ROS go from 0 to 2^31 s"
+            rule = "ROS stamps must be from 0 to 2^31 s"
             raise Error(f"{self.dataset.folder}: {rule}; choose another --shift-s")
         return shift_ns
 
@@ -124,7 +124,7 @@ class _Source:
         return Message(self._log_time(time_ns), order, topic, kind, values)
 
     def messages(self) -> Iterator[Message]:
-        """Yields all messages by time, reading one frame after another."""
+        """Yields all messages in time order, reading one frame after another."""
         sensors: list[Lidar | Camera] = [*self.lidars, *self.cameras]
         path = SensorPath(self.dataset.path_file(sensors[0]))
         mount = sensors[0].X_BS if isinstance(sensors[0], Lidar) else sensors[0].X_BC
@@ -165,11 +165,11 @@ class _Source:
         }
 
     def _body(self, path: SensorPath, X_SB: Floats) -> Iterator[Message]:
-        """X_DB where the path is recorded, and on to the end of the last sweep."""
+        """Yields X_DB at the poses of the path, extended to the end of the last sweep."""
         times_ns = path.times_ns
         last_ns = max((self._last_time_ns(lidar) for lidar in self.lidars), default=0)
         if last_ns > times_ns[-1]:
-            path.pose_at(last_ns)  # an error if it is far beyond
+            path.pose_at(last_ns)  # raises if it is far beyond the path
         step_ns = 10**7
         more = np.arange(times_ns[-1] + step_ns, last_ns + 2 * step_ns, step_ns, dtype=np.int64)
         times_ns = np.concatenate([times_ns, more]) if last_ns > times_ns[-1] else times_ns
@@ -206,13 +206,13 @@ class _Source:
         with_depths = self.options.with_depths and has_depths(self.dataset, camera)
         if not with_pictures:
             self.notes.tell(
-                f"camera {camera.name} has no pictures (product picture), only its camera_info"
+                f"camera {camera.name} has no pictures (product picture), only a camera_info"
             )
         if self.options.with_depths and not with_depths:
             self.notes.tell(f"camera {camera.name} has no depths (product truth)")
         if camera.row_s:
             self.notes.tell(
-                f"rows of {camera.name} are exposed one after another; stamps are of the middle row"
+                f"camera {camera.name} has a rolling shutter; stamps are those of the middle row"
             )
         for frame in camera.frames:
             time_ns = frame.stamp_ns + camera.middle_ns
@@ -240,14 +240,14 @@ class _Source:
 
 
 def _topic_names(sensors: Sequence[Lidar | Camera]) -> dict[str, str]:
-    """Names of ROS have letters, digits and _, and begin with a letter."""
+    """Returns valid ROS names: letters, digits and _, beginning with a letter."""
     names: dict[str, str] = {}
     for sensor in sensors:
         name = sensor.name.replace("-", "_")
         name = name if name[0].isalpha() else f"sensor_{name}".replace("__", "_")
         if name in names.values() or name in ("tf", "tf_static", MAP, BODY):
-            rule = f"sensor {sensor.name}: ROS would call it {name}, as another"
-            raise Error(f"{rule}; export it apart, with --lidar or --camera")
+            rule = f"sensor {sensor.name}: its ROS name {name} is already in use"
+            raise Error(f"{rule}; export it separately with --lidar or --camera")
         names[sensor.name] = name
     return names
 
@@ -287,11 +287,11 @@ def _image(pixels: NDArray[Any], encoding: str, header: dict[str, Any]) -> dict[
 
 
 def _camera_info(dataset: Dataset, camera: Camera) -> dict[str, Any]:
-    """CameraInfo without its header, from the file that says the lens as ROS has it."""
+    """Returns CameraInfo without its header, from the file with the lens in ROS's terms."""
     file = dataset.camera_info_file(camera)
     if not file.is_file():
-        rule = f"camera {camera.name} is a {camera.lens_model}, which CameraInfo has no words for"
-        fix = "leave it out: name the others with --camera, or give --no-images"
+        rule = f"camera {camera.name} has the lens {camera.lens_model}, unknown to CameraInfo"
+        fix = "exclude it: name the others with --camera, or give --no-images"
         raise Error(f"{dataset.folder}: {rule} ({', '.join(_MODELS)}); {fix}")
     try:
         read = yaml.safe_load(file.read_text(encoding="utf-8"))
@@ -305,7 +305,7 @@ def _camera_info(dataset: Dataset, camera: Camera) -> dict[str, Any]:
             "p": [float(each) for each in read["projection_matrix"]["data"]],
         }
     except (OSError, yaml.YAMLError, KeyError, TypeError, ValueError, UnicodeDecodeError) as fault:
-        raise Error(f"{file}: it is no camera_info of ROS: {fault!r}: is it damaged?") from None
+        raise Error(f"{file}: it is not a camera_info of ROS: {fault!r}: is it damaged?") from None
     sizes = {name: len(values[name]) for name in ("k", "r", "p")}  # type: ignore[arg-type]
     if sizes != {"k": 9, "r": 9, "p": 12} or values["distortion_model"] not in _MODELS:
         raise Error(

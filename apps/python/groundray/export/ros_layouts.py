@@ -1,4 +1,4 @@
-"""Layouts of points as drivers of ROS 2 publish them in PointCloud2."""
+"""PointCloud2 layouts of ROS 2 drivers."""
 
 from __future__ import annotations
 
@@ -13,7 +13,7 @@ from groundray.export.scan import Scan
 
 Rows = NDArray[Any]
 
-# Offsets of fields are those of the drivers' own structures, gaps included.
+# Field offsets are those of the drivers' own structures, padding included.
 VELODYNE = np.dtype(
     [
         ("x", "<f4"),
@@ -43,7 +43,7 @@ AUTOWARE = np.dtype(
 # Return types of Autoware.
 _INVALID, _SINGLE_STRONGEST, _SINGLE_LAST, _DUAL_ONLY = 0, 1, 2, 7
 _STRONGEST_FIRST, _STRONGEST_LAST, _WEAK_FIRST, _WEAK_LAST = 3, 4, 5, 6
-# Of a pulse's only echo, by which ones the lidar reports; all others are single strongest.
+# Type of a pulse's only echo, by the lidar's choice of returns; otherwise single strongest.
 _OF_ONE = {"last": _SINGLE_LAST, "dual": _DUAL_ONLY, "all": _DUAL_ONLY}
 
 
@@ -82,17 +82,17 @@ def _ouster(scan: Scan, full_scale: FullScale, notes: Notes) -> Rows:
     rows["intensity"] = scan.rows["intensity"]
     rows["t"] = _offsets_ns(scan)
     rows["reflectivity"], clipped = full_scale.whole(scan.lidar, scan.rows, 255)
-    notes.count("{} reflectivities are cut off at 255", clipped)
+    notes.count("{} reflectivities are clipped at 255", clipped)
     rows["ring"] = scan.rows["ring"]
     rows["range"] = np.rint(np.linalg.norm(scan.points_m, axis=1) * 1000)
-    notes.tell("ambient of the Ouster layout is 0: the dataset has no such light")
+    notes.tell("ambient of the Ouster layout is 0: the dataset has no ambient light")
     return rows
 
 
 def _autoware(scan: Scan, full_scale: FullScale, notes: Notes) -> Rows:
     rows = _with_places(scan, AUTOWARE)
     rows["intensity"], clipped = full_scale.whole(scan.lidar, scan.rows, 255)
-    notes.count("{} intensities are cut off at 255", clipped)
+    notes.count("{} intensities are clipped at 255", clipped)
     rows["return_type"] = _return_types(scan, notes)
     rows["channel"] = scan.rows["ring"]
     x, y, z = scan.points_m.T
@@ -104,13 +104,13 @@ def _autoware(scan: Scan, full_scale: FullScale, notes: Notes) -> Rows:
 
 
 def _return_types(scan: Scan, notes: Notes) -> NDArray[np.uint8]:
-    """Of one echo: by what the lidar reports. Of two: by order and strength. Of more: none."""
+    """Returns types: one echo by the lidar's returns, two by order and strength, more as 0."""
     rows = scan.rows
     count, index = rows["return_count"], rows["return_index"]
     of_one = _OF_ONE.get(scan.lidar.returns, _SINGLE_STRONGEST)
     if scan.lidar.returns in ("first", "second"):
         notes.tell(
-            f"return_type of {scan.lidar.returns} echoes is single strongest: it has no such"
+            f"return_type of {scan.lidar.returns} echoes is single strongest: it has no other"
         )
     types = np.where(count == 1, of_one, _INVALID).astype(np.uint8)
     # Echoes of one pulse follow each other.
@@ -122,7 +122,7 @@ def _return_types(scan: Scan, notes: Notes) -> NDArray[np.uint8]:
     types[first] = np.where(is_first_stronger, _STRONGEST_FIRST, _WEAK_FIRST)
     types[first + 1] = np.where(is_first_stronger, _WEAK_LAST, _STRONGEST_LAST)
     notes.count(
-        "{} points are of pulses with more than two returns: their return_type is 0",
+        "{} points belong to pulses with more than two returns: their return_type is 0",
         int(np.count_nonzero(count > 2)),
     )
     return types

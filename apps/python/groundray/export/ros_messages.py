@@ -1,4 +1,4 @@
-"""Definitions of the ROS 2 messages that bags hold, as the format ros2msg wants them: whole."""
+"""Complete definitions of the ROS 2 messages in bags, in the format ros2msg."""
 
 from __future__ import annotations
 

@@ -1,4 +1,4 @@
-"""Scans: their rows, and where the points are in other frames."""
+"""Scans: their rows, and their points in other frames."""
 
 from __future__ import annotations
 
@@ -12,7 +12,7 @@ from numpy.typing import NDArray
 from groundray.dataset import Dataset, Error, Frame, Lidar
 from groundray.export.sensor_path import Floats, SensorPath
 
-# Units and meanings of the columns that docs/formats.md defines.
+# Units and meanings of the columns that docs/reference/formats.md defines.
 UNITS = {
     **dict.fromkeys(["x", "y", "z", "world_x", "world_y", "world_z", "range_true"], "m"),
     **dict.fromkeys(["error_estimate", "range_sd", "error_bound"], "m"),
@@ -65,7 +65,7 @@ _REQUIRED = (
 
 @dataclass(frozen=True)
 class Scan:
-    """The rows of one scan, as its file has them; columns have the names of docs/formats.md."""
+    """The rows of one scan's file; columns have the names of docs/reference/formats.md."""
 
     lidar: Lidar
     frame: Frame
@@ -81,17 +81,17 @@ class Scan:
 
     @property
     def points_m(self) -> Floats:
-        """n x 3: x, y, z, in the frame that `Lidar.is_deskewed` tells."""
+        """n x 3: x, y, z, in the frame given by `Lidar.is_deskewed`."""
         return np.stack([self.rows[axis].astype(float) for axis in "xyz"], axis=-1)
 
     @property
     def times_ns(self) -> NDArray[np.int64]:
-        """When each pulse fired, on the dataset's clock."""
+        """Firing time of each pulse on the dataset's clock."""
         offsets_ns = np.rint(self.rows["time"].astype(float) * 1e9).astype(np.int64)
         return np.add(offsets_ns, self.frame.stamp_ns, dtype=np.int64)
 
     def points_in_world_m(self, path: SensorPath) -> Floats:
-        """Returns the points as reported, in D, by the true path: n x 3."""
+        """Returns the reported points in D by the true path: n x 3."""
         times_ns = self.times_ns
         if self.lidar.is_deskewed:
             times_ns = np.full_like(times_ns, self.frame.stamp_ns)
@@ -100,7 +100,7 @@ class Scan:
         return (rotations[which] @ self.points_m[..., None])[..., 0] + positions_m[which]
 
     def points_at_m(self, path: SensorPath, time_ns: int) -> Floats:
-        """Returns the points as reported, in S as it was at one time: n x 3."""
+        """Returns the reported points in S at one time: n x 3."""
         if self.lidar.is_deskewed and time_ns == self.frame.stamp_ns:
             return self.points_m
         X_DS = path.pose_at(time_ns)
@@ -108,32 +108,32 @@ class Scan:
 
 
 def read_scan(dataset: Dataset, lidar: Lidar, frame: Frame) -> Scan:
-    """Reads one scan. Raises Error if it is missing, cut short, or no scan of groundray."""
+    """Reads one scan. Raises Error if it is missing, truncated, or not a scan of groundray."""
     file = dataset.scan_file(lidar, frame)
     try:
         data = file.read_bytes()
     except OSError as fault:
-        rule = f"cannot read it: {fault.strerror}, though dataset.yaml says that it is done"
+        rule = f"cannot read it: {fault.strerror}, although dataset.yaml lists it as done"
         raise Error(f"{file}: {rule}; was it removed?") from None
     dtype, count, offset = _read_header(data, file)
     expected = offset + count * dtype.itemsize
     if len(data) != expected:
-        rule = f"it has {len(data)} bytes but its header asks for {expected}"
+        rule = f"it has {len(data)} bytes, but its header requires {expected}"
         raise Error(f"{file}: {rule}: it is damaged; generate it again")
     rows = np.frombuffer(data, dtype, count, offset)
     finite = np.isfinite([rows[axis] for axis in "xyz"]).all()
     if not finite or not np.all((rows["time"] >= 0) & (rows["time"] < 3600)):
-        rule = "it has points that lie nowhere, or at no time of a scan"
+        rule = "it has points with invalid coordinates or times"
         raise Error(f"{file}: {rule}: it is damaged; generate it again")
     return Scan(lidar, frame, rows)
 
 
 def _read_header(data: bytes, file: Path) -> tuple[np.dtype[Any], int, int]:
-    """Returns the type of a row, how many rows there are, and where they begin."""
+    """Returns the type of a row, the number of rows and their offset."""
     end = data.find(b"end_header\n", 0, 1 << 20)
     lines = data[: max(end, 0)].decode("ascii", "replace").split("\n")
     if end < 0 or lines[:2] != ["ply", "format binary_little_endian 1.0"]:
-        raise Error(f"{file}: it is not a PLY file as groundray writes scans: is it damaged?")
+        raise Error(f"{file}: it is not a PLY file of a groundray scan: is it damaged?")
     count = -1
     columns: list[tuple[str, str]] = []
     for line in lines[2:]:
@@ -147,6 +147,6 @@ def _read_header(data: bytes, file: Path) -> tuple[np.dtype[Any], int, int]:
     names = [name for name, _ in columns]
     missing = [name for name in _REQUIRED if name not in names]
     if count < 0 or missing or len(set(names)) != len(names):
-        what = f"it lacks {', '.join(missing)}" if missing else "its rows are not told once"
-        raise Error(f"{file}: {what}: is it a scan of groundray?")
+        what = f"lacks {', '.join(missing)}" if missing else "has no row count or repeats a column"
+        raise Error(f"{file}: it {what}: is it a scan of groundray?")
     return np.dtype(columns), count, end + len(b"end_header\n")

@@ -1,4 +1,4 @@
-"""The path of a sensor through D: poses at any time, as the simulation had them."""
+"""The path of a sensor through D: poses at any time, interpolated as in the simulation."""
 
 from __future__ import annotations
 
@@ -12,7 +12,7 @@ from groundray.dataset import Error, nanoseconds_of
 Floats = NDArray[np.float64]
 Times = NDArray[np.int64]
 
-_LONGEST_NS = 3600 * 10**9  # beyond the path's end, which no sweep is
+_LONGEST_NS = 3600 * 10**9  # limit of extrapolation, longer than any sweep
 
 
 def _cross_matrices(v: Floats) -> Floats:
@@ -22,13 +22,13 @@ def _cross_matrices(v: Floats) -> Floats:
 
 
 def _rotations(q: Floats) -> Floats:
-    """Unit quaternions x, y, z, w to matrices."""
+    """Converts unit quaternions x, y, z, w to matrices."""
     K = _cross_matrices(q[..., :3])
     return np.eye(3) + 2 * (q[..., 3, None, None] * K + K @ K)
 
 
 def _rotation_vectors(q: Floats) -> Floats:
-    """The short way round: angles up to pi."""
+    """Converts unit quaternions to rotation vectors with angles up to pi."""
     q = np.where(q[..., 3:] < 0, -q, q)
     sine = np.linalg.norm(q[..., :3], axis=-1, keepdims=True)
     angle = 2 * np.arctan2(sine, q[..., 3:])
@@ -36,7 +36,7 @@ def _rotation_vectors(q: Floats) -> Floats:
 
 
 def _exponentials(phi: Floats) -> tuple[Floats, Floats]:
-    """Rotation exp([phi]x) and the mean of it on the way, which moves what drives along."""
+    """Returns the rotation exp([phi]x) and the left Jacobian of SO(3), its mean along the way."""
     angle = np.linalg.norm(phi, axis=-1)[..., None, None]
     small = angle < 1e-4
     safe = np.where(small, 1.0, angle)
@@ -55,10 +55,10 @@ def _quaternion_products(p: Floats, q: Floats) -> Floats:
 
 
 class SensorPath:
-    """Poses that move with constant twist from each line of a TUM file to the next."""
+    """Poses interpolated with constant twist between the lines of a TUM file."""
 
     def __init__(self, file: Path) -> None:
-        """Reads the path. Raises Error if the file is broken or its times do not increase."""
+        """Reads the path. Raises Error if the file is invalid or its times do not increase."""
         self.file = file
         self.times_ns, self.positions_m, self.quaternions_xyzw = _read_tum(file)
         self.rotations = _rotations(self.quaternions_xyzw)
@@ -72,15 +72,17 @@ class SensorPath:
     def at(self, times_ns: Times) -> tuple[Floats, Floats]:
         """Returns rotations (n, 3, 3) and positions (n, 3) in D.
 
-        Beyond its end the path goes on as it last moved, for an hour at most. Raises Error before
-        its begin and later.
+        Beyond its end the path continues with its last twist for up to an hour. Raises Error for
+        times before its begin or after that hour.
         """
         if times_ns.size and times_ns.min() < self.times_ns[0]:
             first_s, asked_s = self.times_ns[0] * 1e-9, times_ns.min() * 1e-9
-            raise Error(f"{self.file}: the path begins at {first_s} s but is asked for {asked_s} s")
+            rule = f"the path begins at {first_s} s, but {asked_s} s is requested"
+            raise Error(f"{self.file}: {rule}")
         if times_ns.size and times_ns.max() - self.times_ns[-1] > _LONGEST_NS:
             last_s, asked_s = self.times_ns[-1] * 1e-9, times_ns.max() * 1e-9
-            raise Error(f"{self.file}: the path ends at {last_s} s but is asked for {asked_s} s")
+            rule = f"the path ends at {last_s} s, but {asked_s} s is requested"
+            raise Error(f"{self.file}: {rule}")
         if self.times_ns.size == 1:
             return self.rotations[[0] * times_ns.size], self.positions_m[[0] * times_ns.size]
         i = np.searchsorted(self.times_ns, times_ns, side="right") - 1
@@ -101,7 +103,7 @@ class SensorPath:
 
 def quaternion_wxyz(R: Floats) -> tuple[float, float, float, float]:
     """Returns the unit quaternion of a rotation, w >= 0."""
-    # Of the four, the largest component is sure to be far from 0.
+    # The largest of the four components is at least 1/2.
     squares = [
         1 + R[0, 0] + R[1, 1] + R[2, 2],
         1 + R[0, 0] - R[1, 1] - R[2, 2],
@@ -135,11 +137,11 @@ def _read_tum(file: Path) -> tuple[Times, Floats, Floats]:
                 times.append(time_ns)
                 values.append(pose)
     except OSError as fault:
-        raise Error(f"{file}: cannot read it: {fault.strerror}; is the dataset whole?") from None
+        raise Error(f"{file}: cannot read it: {fault.strerror}; is the dataset complete?") from None
     except UnicodeDecodeError:
-        raise Error(f"{file}: it is not text in UTF-8; was it damaged?") from None
+        raise Error(f"{file}: it is not UTF-8 text; is it damaged?") from None
     if not times:
-        raise Error(f"{file}: it has no pose; is the dataset whole?")
+        raise Error(f"{file}: it has no pose; is the dataset complete?")
     times_ns = np.array(times, dtype=np.int64)
     if np.any(np.diff(times_ns) <= 0):
         raise Error(f"{file}: its times do not increase; was it edited?")
@@ -158,7 +160,7 @@ def _read_pose(words: list[str], place: str) -> tuple[int, list[float]]:
         rule = "a pose must be eight finite numbers: t x y z qx qy qz qw"
         raise Error(f"{place}: {rule}; was the file cut short?")
     if abs(np.linalg.norm(numbers[4:]) - 1) > 1e-6:
-        rule = "the quaternion must be of length 1"
+        rule = "the quaternion must have length 1"
         raise Error(f"{place}: {rule}; are its values in the order qx qy qz qw?")
     try:
         return nanoseconds_of(words[0]), numbers[1:]

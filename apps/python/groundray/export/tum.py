@@ -23,11 +23,11 @@ from groundray.export.sensor_path import Floats, SensorPath, quaternion_wxyz
 def write_tum(
     dataset: Dataset, cameras: Sequence[Camera], depth_per_m: float, out: Path, notes: Notes
 ) -> str:
-    """Writes a camera into `out`, several into folders of their names."""
+    """Writes one camera into `out`, several into folders named after them."""
     if not cameras:
-        raise Error(f"{dataset.folder}: it has no camera, and TUM RGB-D is of cameras alone")
+        raise Error(f"{dataset.folder}: it has no camera, but TUM RGB-D needs images")
     if depth_per_m != 5000:
-        notes.tell(f"a metre of depth is {depth_per_m:g}, where TUM's is 5000: tell your reader so")
+        notes.tell(f"a metre of depth is {depth_per_m:g}, not TUM's 5000: set this in the reader")
     count = 0
     for camera in cameras:
         folder = out if len(cameras) == 1 else out / camera.name
@@ -40,11 +40,11 @@ def _write_camera(
     dataset: Dataset, camera: Camera, depth_per_m: float, folder: Path, notes: Notes
 ) -> int:
     if not camera.frames:
-        raise Error(f"camera {camera.name}: it has no image that is done; generate them first")
+        raise Error(f"camera {camera.name}: it has no finished image; generate one first")
     with_pictures, with_depths = has_pictures(dataset, camera), has_depths(dataset, camera)
     if not with_pictures and not with_depths:
         rule = f"camera {camera.name} has neither pictures nor depths"
-        raise Error(f"{dataset.folder}: {rule}; give it the products picture and truth")
+        raise Error(f"{dataset.folder}: {rule}; add picture and truth to its products")
     times_ns = [frame.stamp_ns + camera.middle_ns for frame in camera.frames]
     if with_pictures:
         _write_pictures(dataset, camera, times_ns, folder)
@@ -59,12 +59,10 @@ def _write_camera(
         dataset.folder / "calibration" / f"{camera.name}.yaml", folder / "calibration.yaml"
     )
     if camera.pinhole_matrix() is None:
-        notes.tell(
-            f"TUM RGB-D has no words for the lens of {camera.name}: calibration.yaml tells it"
-        )
+        notes.tell(f"TUM RGB-D cannot express the lens of {camera.name}: see calibration.yaml")
     if camera.row_s:
         notes.tell(
-            f"rows of {camera.name} are exposed one after another; stamps are of the middle row"
+            f"camera {camera.name} has a rolling shutter; stamps are those of the middle row"
         )
     return len(camera.frames)
 
@@ -112,17 +110,17 @@ def _depths_of(
     ahead = np.isfinite(depths_m) & (depths_m > 0)
     scaled = np.rint(np.where(ahead, depths_m, 0).astype(float) * depth_per_m)
     far = scaled > 65535
-    sentence = "{} pixels are 0, which means unknown: they are farther than the "
-    sentence += f"{65535 / depth_per_m:.6g} m that 16 bits hold; --depth-per-m says another scale"
+    sentence = "{} pixels are 0, which means unknown: they are beyond the "
+    sentence += f"{65535 / depth_per_m:.6g} m that 16 bits can store; see --depth-per-m"
     notes.count(sentence, int(np.count_nonzero(far)))
     behind = np.isfinite(depths_m) & (scaled == 0)
-    sentence = "{} pixels are 0, since they show something on or behind the camera's plane"
+    sentence = "{} pixels are 0: their points are on or behind the camera's plane"
     notes.count(sentence, int(np.count_nonzero(behind)))
     return np.where(far, 0, scaled).astype(np.uint16)
 
 
 def _write_path(dataset: Dataset, camera: Camera, times_ns: Sequence[int], file: Path) -> None:
-    """The recorded poses, and those of the images, so that each has one of exactly its time."""
+    """Writes the recorded poses and a pose at the exact time of each image."""
     path = SensorPath(dataset.path_file(camera))
     all_ns = np.union1d(path.times_ns, np.array(times_ns, dtype=np.int64))
     rotations, positions_m = path.at(all_ns)

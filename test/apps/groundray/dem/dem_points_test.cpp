@@ -15,8 +15,8 @@
 
 #include "apps/groundray/dem/dem_sight.h"
 #include "core/error.h"
-#include "core/ply_io.h"
-#include "reconstruction/dem/sight_bound.h"
+#include "core/io/ply_io.h"
+#include "reconstruction/dem/fill/sight_bound.h"
 #include "test/support/temporary_folder.h"
 
 namespace groundray::dem_points_test {
@@ -73,7 +73,8 @@ struct Spread {
   double height_m = 0, across_m = 0;
 };
 
-// Draws errors of a point and measures how far they spread it: in height, and in plan each way.
+// Draws errors of a point and measures their standard deviations: in height, and in each horizontal
+// direction.
 Spread drawn(const std::function<glm::dvec3(std::function<double()>)>& error_m) {
   constexpr int draws = 40'000;
   std::mt19937 random(5);
@@ -87,11 +88,12 @@ Spread drawn(const std::function<glm::dvec3(std::function<double()>)>& error_m) 
   return {std::sqrt(up_m2 / draws), std::sqrt(flat_m2 / draws)};
 }
 
-// A variance of n draws scatters by sqrt(2 / n), an sd by half of it: five times that.
+// The relative standard deviation of a variance of n draws is sqrt(2 / n), that of a standard
+// deviation half of it. The tolerance is five times that.
 constexpr double share = 5 * 0.0036;
 
-// Errors drawn along the beam and across it, without the formulas.
-TEST(DemPoints, NoiseOfRangesAndBeamsBecomesThatOfHeightsAndPlaces) {
+// The oracle draws errors along and across the beam and does not use the formulas under test.
+TEST(DemPoints, PropagatesRangeAndBeamNoiseToHeightsAndPositions) {
   const TemporaryFolder folder;
   constexpr double range_sd_m = 0.03, divergence_rad = 0.012;
   const auto ends_m = ends_of_beams();
@@ -106,18 +108,19 @@ TEST(DemPoints, NoiseOfRangesAndBeamsBecomesThatOfHeightsAndPlaces) {
     const glm::dvec3 d = ends_m[i] / range_m;
     const glm::dvec3 side = glm::normalize(glm::cross(d, glm::dvec3(0.3, 0.5, 0.8)));
     const glm::dvec3 other = glm::cross(d, side);
-    // Light falls off as exp(-2 (w / w0)^2), so w0 at 1/e^2 is two standard deviations.
+    // The beam's profile exp(-2 (w / w0)^2) makes its 1/e^2 radius w0 two standard deviations.
     const double foot_m = range_m * (divergence_rad / 2) / 2;
     const Spread spread = drawn([&](const auto& normal) {
       return range_sd_m * normal() * d + foot_m * (normal() * side + normal() * other);
     });
     EXPECT_NEAR(points.sd_m[i], spread.height_m, share * spread.height_m) << i;
-    // The place: what leans with the height, and the rest.
+    // The horizontal error has a part that is correlated with the height (`lean`) and an
+    // independent rest.
     const double leaning_m = glm::length(points.lean[i]) * points.sd_m[i] / std::sqrt(2.0);
     EXPECT_NEAR(std::hypot(points.across_sd_m[i], leaning_m), spread.across_m,
                 share * spread.across_m)
         << i;
-    // On ground that rises along the beam.
+    // Height error on ground that rises along the beam.
     const glm::dvec2 ahead = glm::dvec2(d) / std::max(1e-9, glm::length(glm::dvec2(d)));
     const double slope = 0.5;
     const Spread tilted = drawn([&](const auto& normal) {
@@ -125,7 +128,8 @@ TEST(DemPoints, NoiseOfRangesAndBeamsBecomesThatOfHeightsAndPlaces) {
           range_sd_m * normal() * d + foot_m * (normal() * side + normal() * other);
       return glm::dvec3(0, 0, e.z - slope * glm::dot(ahead, glm::dvec2(e)));
     });
-    // Of the rest only the mean of both ways is told: the two ends of it.
+    // The points hold only the mean of the rest over both horizontal directions, so the true value
+    // lies between these two bounds.
     const double tilt = 1 - slope * glm::dot(ahead, glm::dvec2(points.lean[i]));
     const double told_m = std::abs(points.sd_m[i] * tilt);
     EXPECT_LE(told_m, (1 + share) * tilted.height_m) << i;
@@ -136,7 +140,7 @@ TEST(DemPoints, NoiseOfRangesAndBeamsBecomesThatOfHeightsAndPlaces) {
   }
 }
 
-TEST(DemPoints, ErrorsOfPosesBecomeWhatPointsShare) {
+TEST(DemPoints, PoseErrorsBecomeACommonBias) {
   const TemporaryFolder folder;
   const auto ends_m = ends_of_beams();
   write_scan(folder / "a.ply", ends_m);
@@ -155,7 +159,7 @@ TEST(DemPoints, ErrorsOfPosesBecomeWhatPointsShare) {
   }
 }
 
-TEST(DemPoints, FromTheAirRangesAreHeights) {
+TEST(DemPoints, AirborneRangeNoiseIsHeightNoise) {
   const TemporaryFolder folder;
   write_scan(folder / "a.ply", {{600'000, 5'000'000, 240}});
   ScanFiles files = files_of(folder / "a.ply");
@@ -167,15 +171,15 @@ TEST(DemPoints, FromTheAirRangesAreHeights) {
   EXPECT_THAT(points.sd_m, ElementsAre(0.04f));
   EXPECT_THAT(points.bias_sd_m, ElementsAre(0.2f));
   EXPECT_THAT(points.across_sd_m, ElementsAre(0.3f));
-  // As if a sensor were at the map's zero.
+  // Beams would have to start at a sensor at the origin of the map.
   noise.beams = BeamOrigin::Sensor;
   LidarPoints wrong(files, files.scans[0], taking, noise, 0);
   LidarBlock block;
   EXPECT_THAT([&] { wrong.next(block); },
-              ::testing::ThrowsMessage<Error>(HasSubstr("Say --airborne, or give --poses")));
+              ::testing::ThrowsMessage<Error>(HasSubstr("Add --airborne or --poses")));
 }
 
-// Poses each 10 ms from 0 to 300 ms but for a gap.
+// Poses every 10 ms from 0 to 300 ms, except for a gap.
 ScanFiles with_gap(const std::filesystem::path& file, int from_ms, int to_ms) {
   ScanFiles files = files_of(file);
   std::vector<Trajectory::Sample> samples;
@@ -189,8 +193,9 @@ ScanFiles with_gap(const std::filesystem::path& file, int from_ms, int to_ms) {
   return files;
 }
 
-// A scan from 100 to 200 ms, of which the stamp's own interval tells nothing.
-TEST(DemPoints, GapsOfPosesAnywhereInAScanAreRefused) {
+// The scan lasts from 100 to 200 ms; checking only the interval that contains the stamp would miss
+// most gaps.
+TEST(DemPoints, RejectsPoseGapsAnywhereInAScan) {
   const TemporaryFolder folder;
   write_scan(folder / "a.ply", {{4, 0, -3}, {0, 4, -3}, {4, 4, -3}}, {{"time", {0, 0.05, 0.1}}});
   const PointNoise noise{.longest_pose_gap_s = 0.025};
@@ -209,7 +214,7 @@ TEST(DemPoints, GapsOfPosesAnywhereInAScanAreRefused) {
     EXPECT_EQ(read(from_ms, to_ms), 3U) << from_ms;
 }
 
-TEST(DemPoints, OneReturnOfAPulseIsTaken) {
+TEST(DemPoints, TakesOneReturnPerPulse) {
   const TemporaryFolder folder;
   const std::vector<glm::dvec3> points_m{
       {1, 0, -1}, {2, 0, -2}, {3, 0, -3}, {0, 1, -1}, {0, 2, -2}};
@@ -234,10 +239,10 @@ TEST(DemPoints, OneReturnOfAPulseIsTaken) {
     EXPECT_THAT(heights_m(keys, ReturnChoice::Last), ElementsAre(-3, -2));
     EXPECT_THAT(heights_m(keys, ReturnChoice::Strongest), ElementsAre(-2, -1));
   }
-  EXPECT_THAT(heights_m({}, ReturnChoice::First), SizeIs(5));  // nothing tells what is of a pulse
+  EXPECT_THAT(heights_m({}, ReturnChoice::First), SizeIs(5));  // pulses unknown: all are kept
 }
 
-TEST(DemPoints, BlocksHoldWhatTheWholeFileHolds) {
+TEST(DemPoints, BlocksContainAllPointsOfTheFile) {
   const TemporaryFolder folder;
   std::mt19937 random(2);
   std::uniform_real_distribution<double> anywhere(-50, 50);
@@ -266,7 +271,7 @@ TEST(DemPoints, BlocksHoldWhatTheWholeFileHolds) {
   EXPECT_EQ(all.sd_m, whole.sd_m);
 }
 
-TEST(DemPoints, WhatCannotBeReadInBlocksIsHeldAgainstTheMemory) {
+TEST(DemPoints, ChecksMemoryForFilesThatCannotBeReadInBlocks) {
   const TemporaryFolder folder;
   std::ofstream(folder / "a.ply")
       << "ply\nformat ascii 1.0\nelement vertex 2\nproperty float x\n"
@@ -286,8 +291,9 @@ DemLayers flat_layers() {
   return layers;
 }
 
-// Each line rises by two standard deviations of its own point; samples elsewhere stay unbound.
-TEST(DemSight, LinesRiseByWhatTheirPointsMayBeOff) {
+// Each line of sight rises by two standard deviations of its own point; samples elsewhere stay
+// unbounded.
+TEST(DemSight, RaisesLinesByTheErrorsOfTheirPoints) {
   const TemporaryFolder folder;
   write_scan(folder / "a.ply", {{20, 3, -eye_height_m}, {-9, 15, -eye_height_m}});
   const ScanFiles files = files_of(folder / "a.ply");

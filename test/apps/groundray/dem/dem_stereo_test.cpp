@@ -12,7 +12,7 @@
 #include <vector>
 
 #include "core/error.h"
-#include "core/product_io.h"
+#include "core/image/png_io.h"
 #include "test/support/temporary_folder.h"
 #include "test/support/wave_texture.h"
 
@@ -35,7 +35,7 @@ RecordedFrame frame_at(int number, int stamp_us) {
 
 RecordedPair pair_of(std::vector<RecordedFrame> left, std::vector<RecordedFrame> right) {
   const auto camera = [](const char* name, double x_m, std::vector<RecordedFrame> frames) {
-    // Straight down: C's x is D's, its y and z are against D's.
+    // Nadir view: C's x axis is D's, its y and z axes are opposite to D's.
     const Pose X_DC{.rotation = {0, 1, 0, 0}, .translation_m = {x_m, 0, height_m}};
     return RecordedCamera{
         .name = name,
@@ -62,24 +62,24 @@ std::vector<std::string> names_of(const std::vector<RecordedPair>& pairs, const 
   return names;
 }
 
-TEST(DemStereo, PairsImagesOfOneNumberAndTime) {
+TEST(DemStereo, PairsImagesOfEqualNumberAndTime) {
   const std::vector<RecordedPair> pairs{
       pair_of({frame_at(0, 0), frame_at(1, 100), frame_at(2, 200), frame_at(4, 400)},
               {frame_at(0, 0), frame_at(2, 201), frame_at(3, 300), frame_at(4, 402)})};
   std::vector<std::string> notes;
   EXPECT_THAT(names_of(pairs, {}, notes), ElementsAre("pair/000000", "pair/000002"));
-  EXPECT_THAT(notes, ElementsAre("pair: 2 images have no other one at their time"));
+  EXPECT_THAT(notes, ElementsAre("pair: 2 images have no counterpart at their time"));
   notes.clear();
   EXPECT_THAT(names_of(pairs, {.first = 1, .end = 4, .step = 1}, notes),
               ElementsAre("pair/000002"));
-  EXPECT_THAT(notes, ElementsAre(HasSubstr("1 image has")));  // that were asked for
+  EXPECT_THAT(notes, ElementsAre(HasSubstr("1 image has")));  // among the requested images
   notes.clear();
   EXPECT_THAT(names_of(pairs, {.first = 0, .end = 1, .step = 1}, notes),
               ElementsAre("pair/000000"));
   EXPECT_THAT(notes, IsEmpty());
 }
 
-// Level ground at height 0, painted with waves, as a pair of cameras above it sees it.
+// Synthetic images of textured level ground at height 0, as a pair of cameras above it images it.
 class Pictures {
  public:
   Pictures() : pair_(pair_of({frame_at(0, 100)}, {frame_at(0, 100)})) {
@@ -114,7 +114,7 @@ class Pictures {
 TEST(DemStereo, MeasuresLevelGround) {
   const Pictures pictures;
   MeasuredPoints points;
-  points.p_m.resize(3);  // of others: they stay as they are
+  points.p_m.resize(3);  // points of another source, which must stay unchanged
   points.sd_m.resize(3);
   points.bias_sd_m.resize(3);
   points.lean.resize(3);
@@ -123,25 +123,27 @@ TEST(DemStereo, MeasuresLevelGround) {
   points.origins.resize(3);
   const PointTally tally = add_stereo_points(pictures.images(), {}, {}, 9, points);
   EXPECT_EQ(tally.name, "pair/000000");
-  EXPECT_GT(tally.rows, 8000U);  // of 160 x 120, 13 columns are not seen by both
+  EXPECT_GT(tally.rows, 8000U);  // of 160 x 120 pixels, less 13 columns that only one camera sees
   ASSERT_GT(tally.points, 150U);
   ASSERT_EQ(points.size(), tally.points + 3);
   EXPECT_EQ(points.bias_sd_m[0], 0);
   for (std::size_t i = 3; i < points.size(); ++i) {
-    // Four standard deviations are one in 16,000 normal errors; the pair's bias is of 0.1 px.
+    // Four standard deviations: one in 16,000 normal errors exceeds them. The pair's bias is 0.1
+    // px.
     const double sd_m = std::hypot(points.sd_m[i], points.bias_sd_m[i]);
     EXPECT_LT(std::abs(points.p_m[i].z), 4 * sd_m) << i;
     EXPECT_LT(sd_m, 0.2);
     EXPECT_EQ(points.groups[i], 9U);
     EXPECT_EQ(points.origins[i], PointOrigin::Stereo);
-    // dz / dd is z² / (f b), of depth, and z / f of the place off the axis.
+    // The derivatives with respect to disparity are z² / (f b) for depth, and z / f for the
+    // position off the axis.
     const double depth_m = height_m - points.p_m[i].z;
     const double bias_m = 0.1 * depth_m * depth_m / (focal_px * baseline_m);
     EXPECT_NEAR(points.bias_sd_m[i], bias_m, 0.02 * bias_m);
   }
 }
 
-TEST(DemStereo, PosesAddToTheBias) {
+TEST(DemStereo, PoseErrorsAddToTheBias) {
   const Pictures pictures;
   MeasuredPoints exact, off;
   add_stereo_points(pictures.images(), {}, {}, 0, exact);
@@ -150,7 +152,7 @@ TEST(DemStereo, PosesAddToTheBias) {
   ASSERT_EQ(off.p_m, exact.p_m);
   EXPECT_EQ(off.sd_m, exact.sd_m);
   for (std::size_t i = 0; i < off.size(); ++i) {
-    const double lever_m = glm::length(glm::dvec2(off.p_m[i]));  // the left camera is above 0, 0
+    const double lever_m = glm::length(glm::dvec2(off.p_m[i]));  // the left camera is above (0, 0)
     const double more_m2 = 0.03 * 0.03 + lever_m * lever_m * 1e-4;
     EXPECT_NEAR(off.bias_sd_m[i], std::sqrt(std::pow(exact.bias_sd_m[i], 2) + more_m2), 1e-6);
   }
@@ -167,7 +169,7 @@ std::string fault_of(const Pictures& pictures, const StereoTaking& taking = {}) 
   return "none";
 }
 
-TEST(DemStereo, NamesWhatIsWrong) {
+TEST(DemStereo, ErrorsNameFileAndCause) {
   Pictures pictures;
   EXPECT_EQ(fault_of(pictures), "none");
   StereoTaking small;
@@ -180,10 +182,11 @@ TEST(DemStereo, NamesWhatIsWrong) {
                                         HasSubstr("calibration/right.yaml says 64 x 48")));
   right.size_px = size_px;
   left.frames[0].stamp = nanoseconds(2'000'000'000);
-  EXPECT_THAT(fault_of(pictures), AllOf(HasSubstr("poses/left.tum"), HasSubstr("cut short")));
+  EXPECT_THAT(fault_of(pictures), AllOf(HasSubstr("poses/left.tum"), HasSubstr("truncated")));
   left.frames[0].stamp = nanoseconds(100'000);
   left.frames[0].file = pictures.folder() / "left.exr";
-  EXPECT_THAT(fault_of(pictures), AllOf(HasSubstr("left.exr"), HasSubstr("right.png a picture")));
+  EXPECT_THAT(fault_of(pictures),
+              AllOf(HasSubstr("left.exr"), HasSubstr("right.png is a picture")));
 }
 
 }  // namespace

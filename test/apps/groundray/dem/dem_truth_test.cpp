@@ -10,11 +10,12 @@ namespace groundray::dem_truth_test {
 namespace {
 
 constexpr float nan = std::numeric_limits<float>::quiet_NaN();
-constexpr double rounding_m = 2e-6;  // of floats of some 10 m
+constexpr double rounding_m = 2e-6;  // single precision at some 10 m
 
 double true_height_m(glm::dvec2 p_w_m) { return 12 + 0.5 * p_w_m.x - 0.25 * p_w_m.y; }
 
-// A plane over [0, 40] x [0, 30] m in W, which triangles of any size have exactly; D elsewhere.
+// A plane over [0, 40] x [0, 30] m in W, which triangles of any size represent exactly. Its D has
+// another origin.
 Dem plane() {
   const glm::dvec3 origin_w_m(8, -4, 5);
   std::vector<float> heights_m;
@@ -29,7 +30,7 @@ Dem plane() {
           .crs_name = ""};
 }
 
-// Heights that are off the plane, sample by sample, in a D of its own.
+// Heights with a given error against the plane at each sample, in a D of their own.
 struct Rebuilt {
   Georeference georeference{.origin_w_m = {3, 2, 0}};
   DemLayers layers = unknown_layers(
@@ -47,9 +48,9 @@ struct Rebuilt {
   }
 };
 
-// Twenty errors of 1 to 20 mm. Their squares are 2870 mm² in all; half are below 10.5 mm, from
-// which they are 0.5, 0.5, 1.5, 1.5 ... 9.5, 9.5 mm away; 95 % are 19.
-TEST(DemTruth, HasTheFiguresOfKnownErrors) {
+// Twenty errors of 1 to 20 mm. Their squares sum to 2870 mm². The median is 10.5 mm, and the
+// distances to it are 0.5, 0.5, 1.5, 1.5, ... 9.5, 9.5 mm; 95 % are 19 errors.
+TEST(DemTruth, MatchesStatisticsOfKnownErrors) {
   Rebuilt rebuilt;
   for (std::size_t i = 0; i < 20; ++i)
     rebuilt.set(i, 1e-3 * static_cast<double>(20 - i), HeightSource::Lidar, 0.0105);
@@ -66,7 +67,7 @@ TEST(DemTruth, HasTheFiguresOfKnownErrors) {
     EXPECT_NEAR(e.largest_m, 0.020, rounding_m);
     EXPECT_EQ(e.stated, 20U);
     EXPECT_NEAR(e.normalised_rms, std::sqrt(2870. / 20) / 10.5, 1e-3);
-    // The middle ones' squares are 10² and 11²; of normal errors half are within 0.67449 sd.
+    // The middle squares are 10² and 11² mm²; half of all normal errors are within 0.67449 sd.
     EXPECT_NEAR(e.normalised_robust, std::sqrt((100. + 121) / 2) / 10.5 / 0.67449, 1e-3);
     EXPECT_EQ(e.within_1sd, 0.5);
     EXPECT_EQ(e.within_2sd, 1);
@@ -76,8 +77,8 @@ TEST(DemTruth, HasTheFiguresOfKnownErrors) {
   EXPECT_TRUE(std::isnan(found.error_m[20]));
 }
 
-// Of 21, 95 % are 19.95: only the twentieth is a value that so many do not exceed.
-TEST(DemTruth, NamesASizeThat95PercentDoNotExceed) {
+// 95 % of 21 are 19.95, so the twentieth is the smallest value that so many do not exceed.
+TEST(DemTruth, P95IsTheSmallestErrorThat95PercentDoNotExceed) {
   Rebuilt rebuilt;
   for (std::size_t i = 0; i < 21; ++i)
     rebuilt.set(i, (i % 2 == 0 ? 1e-3 : -1e-3) * static_cast<double>(i + 1), HeightSource::Stereo,
@@ -89,11 +90,11 @@ TEST(DemTruth, NamesASizeThat95PercentDoNotExceed) {
   EXPECT_NEAR(found[2].bias_m, 0.011 / 21, rounding_m);
 }
 
-TEST(DemTruth, TellsSourcesApart) {
+TEST(DemTruth, SeparatesSources) {
   Rebuilt rebuilt;
   rebuilt.set(0, 0.1, HeightSource::Lidar, 0.1);
   rebuilt.set(1, -0.2, HeightSource::Stereo, 0.1);
-  rebuilt.set(2, 0.3, HeightSource::Fused, 0);  // nothing is stated
+  rebuilt.set(2, 0.3, HeightSource::Fused, 0);  // no standard deviation is stated
   rebuilt.set(3, 0.4, HeightSource::Filled, 0.2);
   rebuilt.set(4, 0.5, HeightSource::Filled, nan);
   const TruthComparison found = compare_with_truth(rebuilt.layers, rebuilt.georeference, plane());
@@ -112,19 +113,19 @@ TEST(DemTruth, TellsSourcesApart) {
   EXPECT_TRUE(std::isnan(found.normalised[4]));
 }
 
-// The truth ends at x = 40 in W; samples are at 3, 8, ... 48.
-TEST(DemTruth, IsOnlyWhereBothHaveHeights) {
+// The truth ends at x = 40 m in W; the samples are at 3, 8, ... 48 m.
+TEST(DemTruth, ComparesOnlyWhereBothHaveHeights) {
   Rebuilt rebuilt;
   rebuilt.layers.frame.step_m.x = 5;
   rebuilt.layers.frame.cells_per_m.x = 0.2;
   for (std::size_t i = 0; i < 10; ++i) rebuilt.set(i, 0.01, HeightSource::Lidar, 0.01);
   const TruthComparison found = compare_with_truth(rebuilt.layers, rebuilt.georeference, plane());
   EXPECT_EQ(found.errors[0].samples, 8U);
-  EXPECT_FALSE(std::isnan(found.error_m[7]));  // 38
-  EXPECT_TRUE(std::isnan(found.error_m[8]));   // 43
+  EXPECT_FALSE(std::isnan(found.error_m[7]));  // x = 38 m
+  EXPECT_TRUE(std::isnan(found.error_m[8]));   // x = 43 m
 }
 
-TEST(DemTruth, HasNoFiguresOfNothing) {
+TEST(DemTruth, StatisticsOfNoSamplesAreNan) {
   const Rebuilt rebuilt;
   const auto found = compare_with_truth(rebuilt.layers, rebuilt.georeference, plane()).errors;
   for (const HeightErrors& e : found) {

@@ -1,0 +1,145 @@
+"""Checks the direction of includes, and that each of the big libraries is included in one place.
+
+    include_rules.py
+
+FOLDERS lists, for each folder of a library, the folders whose headers it may include besides its
+own; an entry that nothing uses is an error. LIBRARIES lists where the headers of other libraries
+may be included. Public headers include only the standard library, GLM and {fmt}; PRIVATE lists the
+headers that may include more. Run at the root of the tree.
+"""
+
+import re
+import sys
+from pathlib import Path
+
+ROOTS = ("core", "terrain", "sensors", "reconstruction", "apps")
+INCLUDE = re.compile(r'^ *# *include *(["<])([^">]+)[">]', re.MULTILINE)
+
+FOLDERS: dict[str, str] = {
+    "apps/scene": "apps/scene/calibration apps/scene/readers",
+    "apps/scene/calibration": "apps/scene",
+    "apps/scene/readers": "apps/scene apps/scene/calibration",
+    "core/appearance": "core core/geometry core/image",
+    "core/geometry": "core",
+    "core/image": "core core/io",
+    "core/io": "core core/geometry",
+    "core/model": "core core/appearance core/geometry core/image core/io",
+    "core/tracing": "core core/appearance core/geometry core/image core/model",
+    "reconstruction/dem/fill": "reconstruction reconstruction/dem reconstruction/dem/thin_plate "
+    "reconstruction/mesh/holes reconstruction/mesh/scan",
+    "reconstruction/dem/fusion": "reconstruction reconstruction/dem",
+    "reconstruction/dem/ground": "reconstruction",
+    "reconstruction/dem/smooth": "reconstruction",
+    "reconstruction/mesh/holes": "reconstruction reconstruction/mesh",
+    "reconstruction/mesh/merge": "reconstruction reconstruction/mesh reconstruction/mesh/scan",
+    "reconstruction/mesh/scan": "reconstruction reconstruction/mesh",
+    "reconstruction/mesh/simplify": "reconstruction reconstruction/mesh "
+    "reconstruction/mesh/accuracy reconstruction/mesh/simplify/bounds",
+    "reconstruction/mesh/simplify/bounds": "reconstruction/mesh/accuracy "
+    "reconstruction/mesh/simplify",
+    "reconstruction/stereo": "reconstruction/dem",
+    "sensors/camera": "sensors/camera/lens sensors/sky",
+    "sensors/lidar": "sensors/lidar/beam sensors/lidar/pattern sensors/lidar/receiver sensors/sky",
+    "sensors/lidar/beam": "sensors/lidar sensors/lidar/pattern",
+    "sensors/lidar/receiver": "sensors",
+    "sensors/sky": "sensors sensors/lidar/receiver",
+    "terrain": "terrain/dem terrain/lod terrain/lod/passes terrain/relief",
+    "terrain/lod": "terrain/dem terrain/lod/passes",
+    "terrain/lod/passes": "terrain/lod",
+    "terrain/relief": "terrain/dem terrain/lod terrain/lod/passes",
+    "terrain/scatter": "terrain terrain/dem terrain/lod",
+}
+
+# What libraries as a whole may include, and each folder of apps/.
+SEES = {
+    "core": "",
+    "terrain": "core",
+    "sensors": "core terrain",
+    "reconstruction": "core terrain",
+    "apps": "core",
+    "apps/scene": "core terrain sensors",
+    "apps/scan": "core apps/scene",
+    "apps/dataset": "core sensors reconstruction apps/scan apps/scene",
+    "apps/golden": "core terrain reconstruction apps apps/scan apps/scene",
+    "apps/groundray": "core terrain sensors reconstruction apps apps/dataset apps/scan apps/scene",
+    "apps/python": "core terrain sensors reconstruction apps/golden apps/scene",
+    "apps/view": "core terrain sensors reconstruction apps apps/dataset apps/scan apps/scene",
+}
+
+LIBRARIES = {
+    r"assimp/": r"core/model/assimp_import\.cpp",
+    r"embree": r"core/tracing/embree_adapter\.h",
+    r"((gdal|ogr|cpl)_|tiffio\.h)": r"terrain/dem/(dem_raster\.h|(band_file|dem_file|dem_raster"
+    r"|dem_warp|drape_io|gdal_fill|layers_io|tiled_tiff)\.cpp)",
+    r"opencv2/": r"(sensors/camera/picture|reconstruction/dem/fill/inpaint_fill"
+    r"|reconstruction/stereo/semi_global)\.cpp",
+    r"(CGAL|Eigen)/": r"reconstruction/.*\.cpp",
+    r"openssl/": r"apps/dataset/file_sum\.cpp",
+    r"yaml-cpp/": r"apps/scene/yaml_reader\.cpp",
+    r"(vtk|EGL/)": r"apps/view/.*",
+    r"Q[A-Z]": r"apps/view/window/.*",
+    r"(nanobind/|Python\.h)": r"apps/python/.*",
+}
+
+IN_HEADERS = re.compile(r"glm/.*|fmt/.*|[a-z0-9_]+")
+PRIVATE = ("core/tracing/embree_adapter.h", "terrain/dem/dem_raster.h")
+
+
+def library_of(folder: str) -> str:
+    parts = folder.split("/")
+    return "/".join(parts[:2]) if parts[0] == "apps" else parts[0]
+
+
+def may_include(folder: str, other: str, used: set[tuple[str, str]]) -> bool:
+    """Returns true if sources of `folder` may include headers of `other`."""
+    if folder == other:
+        return True
+    library = library_of(folder)
+    if library != library_of(other):
+        return library_of(other) in SEES[library].split()
+    if library.startswith("apps/") and library != "apps/scene":
+        return True
+    used.add((folder, other))
+    return other in FOLDERS.get(folder, "").split()
+
+
+def faults_of(path: Path, used: set[tuple[str, str]]) -> list[str]:
+    faults = []
+    text = path.read_text()
+    for include in INCLUDE.finditer(text):
+        mark, name = include.groups()
+        line = text.count("\n", 0, include.start()) + 1
+        where = f"{path}:{line}: #include {include[0].split(' ', 1)[1]}"
+        if mark == '"':
+            other = str(Path(name).parent)
+            if other.split("/")[0] in ROOTS and not may_include(str(path.parent), other, used):
+                faults.append(f"{where}: {path.parent} may not include {other}")
+            continue
+        for pattern, places in LIBRARIES.items():
+            if re.match(pattern, name) and not re.fullmatch(places, str(path)):
+                faults.append(f"{where}: only {places} may include it")
+        installed = path.parts[0] != "apps" or path.parts[1] == "scene"
+        public = path.suffix == ".h" and installed and str(path) not in PRIVATE
+        if public and not IN_HEADERS.fullmatch(name):
+            faults.append(f"{where}: a header of a library includes std, GLM and {{fmt}} alone")
+    return faults
+
+
+def main() -> int:
+    used: set[tuple[str, str]] = set()
+    faults = []
+    for root in ROOTS:
+        for path in sorted([*Path(root).rglob("*.h"), *Path(root).rglob("*.cpp")]):
+            faults += faults_of(path, used)
+    for folder, others in FOLDERS.items():
+        faults += [
+            f"{__file__}: FOLDERS: {folder} no longer includes {other}: delete it there"
+            for other in others.split()
+            if (folder, other) not in used
+        ]
+    print(*faults, sep="\n", end="\n" if faults else "")
+    return 1 if faults else 0
+
+
+if __name__ == "__main__":
+    sys.exit(main())

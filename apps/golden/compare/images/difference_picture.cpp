@@ -1,0 +1,185 @@
+#include "apps/golden/compare/images/difference_picture.h"
+
+#include <fmt/format.h>
+
+#include <algorithm>
+#include <cmath>
+#include <glm/common.hpp>
+#include <limits>
+#include <span>
+#include <vector>
+
+#include "apps/colour_map.h"
+#include "apps/golden/compare/error_figures.h"
+#include "apps/golden/false_colour.h"
+#include "core/image/srgb.h"
+
+namespace groundray::golden {
+namespace {
+
+constexpr int most_px = 640;
+const Colour blank(0.85);  // colour of pixels without a value
+
+int step_of(const Image<double>& image) {
+  return (std::max(image.width(), image.height()) + most_px - 1) / most_px;
+}
+
+Image<double> every(const Image<double>& image, int step) {
+  Image<double> result((image.width() + step - 1) / step, (image.height() + step - 1) / step,
+                       image.channels());
+  for (int y = 0; y < result.height(); ++y) {
+    for (int x = 0; x < result.width(); ++x)
+      std::ranges::copy(image.at(x * step, y * step), result.at(x, y).begin());
+  }
+  return result;
+}
+
+/// Returns the value of largest magnitude in each square of `step` x `step` pixels; NaN if there is
+/// none.
+Image<double> largest(const Image<double>& image, int step) {
+  Image<double> result((image.width() + step - 1) / step, (image.height() + step - 1) / step, 1);
+  std::ranges::fill(result.values(), std::numeric_limits<double>::quiet_NaN());
+  for (int y = 0; y < image.height(); ++y) {
+    for (int x = 0; x < image.width(); ++x) {
+      const double value = image.at(x, y)[0];
+      double& now = result.at(x / step, y / step)[0];
+      if (std::isnan(now) || std::abs(value) > std::abs(now)) now = value;
+    }
+  }
+  return result;
+}
+
+std::vector<double> finite(const Image<double>& image) {
+  std::vector<double> values;
+  for (const double value : image.values()) {
+    if (std::isfinite(value)) values.push_back(value);
+  }
+  return values;
+}
+
+/// Returns a colour from blue at -1 through white at 0 to red at 1, by the square root of the
+/// magnitude; larger values are clamped.
+Colour signed_colour(double share) {
+  const double size = std::min(std::abs(share), 1.0);
+  const Colour full = share < 0 ? Colour(0.13, 0.30, 0.65) : Colour(0.70, 0.09, 0.17);
+  return glm::mix(Colour(0.97), full, std::sqrt(size));
+}
+
+std::string every_caption(int step) {
+  return step > 1 ? fmt::format("; one pixel of {0} x {0}", step) : "";
+}
+
+/// Returns the scalar that false colours show, the length for vectors; NaN if the pixel has no
+/// value.
+double shown(const ImageLayer& layer, std::span<const double> value) {
+  const double size = value.size() > 1 ? length_of(value) : value[0];
+  const bool is_there = std::isfinite(size) && (layer.kind != LayerKind::Depth || is_depth(size));
+  return is_there ? size : std::numeric_limits<double>::quiet_NaN();
+}
+
+struct Scale {
+  double low = 0, high = 1;
+  bool is_logarithmic = false;
+
+  double share(double value) const {
+    if (is_logarithmic) return std::log(std::max(value, low) / low) / std::log(high / low);
+    return (value - low) / (high - low);
+  }
+};
+
+/// Returns the scale from the 1st to the 99th percentile. Depths are scaled logarithmically, so
+/// that near ones remain distinguishable; for light, each colour counts separately.
+Scale scale_of(const ImageLayer& layer, const Image<double>& image) {
+  std::vector<double> values;
+  for (std::size_t i = 0; i < image.values().size(); ++i) {
+    const auto channels = static_cast<std::size_t>(image.channels());
+    const bool is_light = layer.kind == LayerKind::Colour;
+    if (!is_light && i % channels != 0) continue;
+    const double value = shown(layer, image.values().subspan(i, is_light ? 1 : channels));
+    if (!std::isnan(value)) values.push_back(value);
+  }
+  if (values.empty()) return {};
+  Scale scale{quantile(values, 0.01), quantile(values, 0.99)};
+  if (!(scale.high > scale.low)) scale.high = scale.low + 1;
+  scale.is_logarithmic = layer.kind == LayerKind::Depth && scale.low > 0;
+  return scale;
+}
+
+Colour colour_of(const ImageLayer& layer, std::span<const double> value, const Scale& scale) {
+  if (layer.kind == LayerKind::Colour) {
+    Colour colour;
+    for (std::size_t k = 0; k < 3; ++k) {
+      const double share = value[std::min(k, value.size() - 1)] / scale.high;
+      colour[static_cast<glm::length_t>(k)] =
+          layer.name == "Picture" ? share : srgb_of_linear(std::max(share, 0.0));
+    }
+    return colour;
+  }
+  if (layer.kind == LayerKind::Normal) return 0.5 + 0.5 * Colour(value[0], value[1], value[2]);
+  const double value_shown = shown(layer, value);
+  return std::isnan(value_shown) ? blank : range_colour(1 - scale.share(value_shown));
+}
+
+Image8 painted(const ImageLayer& layer, const Image<double>& values, const Scale& scale) {
+  Image8 picture(values.width(), values.height(), 3);
+  for (int y = 0; y < picture.height(); ++y) {
+    for (int x = 0; x < picture.width(); ++x) {
+      const auto value = values.at(x, y);
+      const bool is_there = std::ranges::all_of(value, [](double v) { return std::isfinite(v); });
+      paint(picture, x, y, is_there ? colour_of(layer, value, scale) : blank);
+    }
+  }
+  return picture;
+}
+
+}  // namespace
+
+void draw_differences(const std::string& caption, const Image<double>& differences,
+                      const std::string& unit, Section& into) {
+  const int step = step_of(differences);
+  const Image<double> values = largest(differences, step);
+  std::vector<double> sizes = finite(differences);
+  for (double& size : sizes) size = std::abs(size);
+  const double p99 = quantile(sizes, 0.99);
+  const double most = sizes.empty() ? 0 : *std::ranges::max_element(sizes);
+  const double scale = p99 > 0 ? p99 : most > 0 ? most : 1;
+  Image8 picture(values.width(), values.height(), 3);
+  for (int y = 0; y < picture.height(); ++y) {
+    for (int x = 0; x < picture.width(); ++x) {
+      const double value = values.at(x, y)[0];
+      paint(picture, x, y, std::isfinite(value) ? signed_colour(value / scale) : blank);
+    }
+  }
+  into.pictures.push_back(
+      {fmt::format("{}, blue −{:.4g}{} to red {:.4g}{}, square-root scale; grey: no value{}",
+                   caption, scale, unit, scale, unit,
+                   step > 1 ? fmt::format("; the largest of {0} x {0} pixels", step) : ""),
+       std::move(picture)});
+}
+
+void draw_layers(const ImageLayer& reference, const ImageLayer& other,
+                 const Image<double>& differences, const std::string& unit, Section& into) {
+  const int step = step_of(reference.values);
+  const Image<double> of_reference = every(reference.values, step);
+  Scale scale = scale_of(reference, of_reference);
+  std::string range =
+      fmt::format(", {:.4g}{} (violet) to {:.4g}{} (yellow){}", scale.low, unit, scale.high, unit,
+                  scale.is_logarithmic ? ", logarithmic scale" : "");
+  if (reference.kind == LayerKind::Normal) range = ", directions as colours";
+  if (reference.kind == LayerKind::Colour) {
+    if (reference.name == "Picture") scale.high = 1;
+    range = reference.name == "Picture" ? "" : fmt::format(", white is {:.4g}", scale.high);
+  }
+  const bool are_equal = std::ranges::equal(
+      reference.values.values(), other.values.values(),
+      [](double a, double b) { return a == b || (std::isnan(a) && std::isnan(b)); });
+  into.pictures.push_back(
+      {reference.name + (are_equal ? ": both" : ": reference") + range + every_caption(step),
+       painted(reference, of_reference, scale)});
+  if (are_equal) return;
+  into.pictures.push_back({reference.name + ": other, same scale" + every_caption(step),
+                           painted(reference, every(other.values, step), scale)});
+  draw_differences(reference.name + ": other less reference", differences, unit, into);
+}
+
+}  // namespace groundray::golden

@@ -1,0 +1,26 @@
+#pragma once
+
+#include <string>
+#include <vector>
+
+#include "apps/python/binding/arrays.h"
+#include "core/io/point_cloud.h"
+
+namespace groundray::python {
+
+/// Table of points. The names of its columns are those of docs/reference/formats.md with their
+/// units.
+struct Points {
+  PointCloud cloud;
+};
+
+/// Returns the name of a file's column with its unit: "range_true_m" of "range_true".
+std::string name_with_unit(const std::string& column);
+
+std::vector<std::string> names_of(const Points& points);
+
+/// Returns a view of a column.
+/// @throws nanobind::key_error that lists the names, if there is no such column.
+AnyArray column_of(const Points& points, const std::string& name, nb::handle owner);
+
+}  // namespace groundray::python

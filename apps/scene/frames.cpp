@@ -1,0 +1,102 @@
+#include "apps/scene/frames.h"
+
+#include <algorithm>
+#include <initializer_list>
+
+#include "apps/scene/frame_scene_builder.h"
+#include "sensors/camera/imager.h"
+#include "sensors/camera/irradiance.h"
+#include "sensors/camera/path_tracer.h"
+
+namespace groundray {
+namespace {
+
+using Product = CameraProduct;
+
+bool gives_any(const CameraSpec& camera, std::initializer_list<Product> products) {
+  return std::ranges::any_of(products, [&](Product product) { return gives(camera, product); });
+}
+
+RandomKey key_of(const Simulation& simulation, std::size_t camera, std::int64_t image) {
+  return {.seed = simulation.spec.seed,
+          .sensor = static_cast<std::uint32_t>(simulation.lidars.size() + camera),
+          .frame = static_cast<std::uint32_t>(image)};
+}
+
+TruthRequest truth_request(const PlacedCamera& placed, std::size_t image) {
+  const CameraSpec& camera = placed.spec.camera;
+  TruthRequest request{.begin = placed.begins[image],
+                       .before = {},
+                       .after = {},
+                       .bounds = gives(camera, Product::Bound)};
+  const bool both_ways = gives(camera, Product::Flow);
+  if (both_ways && image > 0) request.before = placed.begins[image - 1];
+  if ((both_ways || gives_any(camera, {Product::FlowFlo, Product::FlowKitti})) &&
+      image + 1 < placed.begins.size())
+    request.after = placed.begins[image + 1];
+  return request;
+}
+
+}  // namespace
+
+LidarScan make_scan(const Simulation& simulation, std::size_t lidar, std::int64_t sweep,
+                    const Scene& scene, const SweepWatch& watch) {
+  const PlacedLidar& placed = simulation.lidars[lidar];
+  return placed.lidar.scan(scene, placed.X_DS, sweep, simulation.spec.seed,
+                           static_cast<std::uint32_t>(lidar), watch);
+}
+
+LidarScan make_scan(const Simulation& simulation, std::size_t lidar, std::int64_t sweep) {
+  FrameSceneBuilder scene_for(simulation);
+  return make_scan(simulation, lidar, sweep, scene_for(exposed(simulation.lidars[lidar], sweep)));
+}
+
+MadeImage make_image(const Simulation& simulation, std::size_t camera, std::int64_t image,
+                     const Scene& scene, const std::function<void()>& check) {
+  const PlacedCamera& placed = simulation.cameras[camera];
+  const CameraSpec& spec = placed.spec.camera;
+  const auto number = static_cast<std::size_t>(image);
+  MadeImage made;
+  if (needs_light(spec)) {
+    if (gives(spec, Product::Coverage)) made.labels = labels_of(scene);
+    const PathTracer tracer(scene, *simulation.sky, spec.sampling.depth, simulation.air);
+    made.light = placed.camera.expose(tracer, placed.X_DC, placed.begins[number],
+                                      key_of(simulation, camera, image), made.labels, check);
+    for (const float samples : made.light->samples.values())
+      made.paths += static_cast<std::uint64_t>(samples);
+  }
+  if (gives_any(spec, {Product::Truth, Product::Bound, Product::Flow, Product::FlowFlo,
+                       Product::FlowKitti})) {
+    if (check) check();
+    made.truth = image_truth(placed.camera, scene, simulation.content.materials.in_colour(),
+                             placed.X_DC, truth_request(placed, number));
+  }
+  return made;
+}
+
+MadeImage make_image(const Simulation& simulation, std::size_t camera, std::int64_t image) {
+  FrameSceneBuilder scene_for(simulation);
+  return make_image(simulation, camera, image,
+                    scene_for(exposed(simulation.cameras[camera], image)));
+}
+
+std::optional<ImagerStages> simulate_imager(const Simulation& simulation, std::size_t which,
+                                            std::int64_t image, const ImageF& radiance) {
+  const PlacedCamera& placed = simulation.cameras[which];
+  const CameraSpec& camera = placed.spec.camera;
+  if (!gives_any(camera, {Product::Irradiance, Product::Photons, Product::Electrons, Product::Raw,
+                          Product::Picture}))
+    return std::nullopt;
+  const RandomKey key = key_of(simulation, which, image);
+  const Imager imager(*camera.imager, camera.shutter.exposure_s);
+  ImagerStages stages;
+  stages.irradiance_w_m2 = irradiance(radiance, placed.pupil_sr);
+  stages.photons = imager.photons(stages.irradiance_w_m2);
+  stages.electrons = imager.electrons(stages.photons, key);
+  stages.raw_dn = imager.digital(stages.electrons, key);
+  if (gives(camera, Product::Picture))
+    stages.picture = RawDeveloper(camera.picture, *camera.imager).develop(stages.raw_dn);
+  return stages;
+}
+
+}  // namespace groundray

@@ -1,0 +1,338 @@
+#include "apps/scene/readers/camera_reader.h"
+
+#include <fmt/ranges.h>
+
+#include <algorithm>
+#include <array>
+#include <bit>
+#include <cmath>
+#include <cstdint>
+#include <glm/geometric.hpp>
+#include <limits>
+#include <string>
+#include <string_view>
+#include <utility>
+#include <vector>
+
+#include "apps/scene/readers/lens_reader.h"
+#include "core/error.h"
+#include "core/image/image_io.h"
+#include "sensors/camera/camera.h"
+#include "sensors/camera/imager.h"
+#include "sensors/camera/lens/lens.h"
+
+namespace groundray {
+namespace {
+
+namespace fs = std::filesystem;
+using yaml::Faults;
+using yaml::Map;
+using yaml::Need;
+using yaml::Node;
+using yaml::not_negative;
+using yaml::positive;
+using yaml::positive_share_rule;
+using yaml::Rule;
+
+constexpr Rule efficiency_rule{[](double value) { return value > 0 && value <= 4; },
+                               "must be > 0 and at most 4"};
+constexpr Rule time_rule{[](double value) { return value >= 0 && value <= 1e9; },
+                         "must be from 0 to 1e9"};
+constexpr Rule exposure_rule{[](double value) { return value >= 1e-6 && value <= 3.6e6; },
+                             "must be > 0: from 1e-6, a nanosecond, to 3.6e6, an hour"};
+constexpr Rule row_rule{[](double value) { return value >= 0 && value <= 1e6; },
+                        "must be from 0 to 1e6"};
+
+struct NamedProduct {
+  std::string_view name;
+  CameraProduct product;
+};
+constexpr std::array<NamedProduct, 12> all_products{{{"radiance", CameraProduct::Radiance},
+                                                     {"truth", CameraProduct::Truth},
+                                                     {"bound", CameraProduct::Bound},
+                                                     {"flow", CameraProduct::Flow},
+                                                     {"flow_flo", CameraProduct::FlowFlo},
+                                                     {"flow_kitti", CameraProduct::FlowKitti},
+                                                     {"coverage", CameraProduct::Coverage},
+                                                     {"irradiance", CameraProduct::Irradiance},
+                                                     {"photons", CameraProduct::Photons},
+                                                     {"electrons", CameraProduct::Electrons},
+                                                     {"raw", CameraProduct::Raw},
+                                                     {"picture", CameraProduct::Picture}}};
+
+constexpr bool is_of_imager(CameraProduct product) { return product >= CameraProduct::Irradiance; }
+
+// Reads three numbers; returns false and changes nothing if they are missing or invalid.
+bool read_triple(Map& map, std::string_view key, glm::dvec3& into, Rule rule) {
+  std::array<double, 3> triple{};
+  if (!map.read_numbers(key, Need::Optional, triple, rule)) return false;
+  into = {triple[0], triple[1], triple[2]};
+  return true;
+}
+
+void read_int(Map& map, std::string_view key, Need need, int& into, int low, int high,
+              Faults& faults) {
+  auto value = static_cast<std::uint32_t>(into);
+  const Node* const at = map.read_whole(key, need, value);
+  if (!at) return;
+  if (value < static_cast<std::uint32_t>(low) || value > static_cast<std::uint32_t>(high)) {
+    faults.add(*at, key, "is {}, but must be from {} to {}", value, low, high);
+  } else {
+    into = static_cast<int>(value);
+  }
+}
+
+void read_shutter(Map map, ShutterSpec& shutter) {
+  map.read_scaled("exposure_ms", Need::Optional, 1e-3, shutter.exposure_s, exposure_rule);
+  map.read_scaled("row_us", Need::Optional, 1e-6, shutter.row_s, row_rule);
+  map.close();
+}
+
+void read_aperture(Map map, std::optional<ApertureSpec>& into) {
+  const Need need = into ? Need::Optional : Need::Required;
+  ApertureSpec aperture = into.value_or(ApertureSpec{});
+  map.read_number("f_number", need, aperture.f_number, positive);
+  map.read_scaled("focal_length_mm", Need::Optional, 1e-3, aperture.focal_length_m, positive);
+  double focus_m = 0;
+  if (map.read_number("focus_m", Need::Optional, focus_m, positive)) aperture.focus_m = focus_m;
+  map.read_number("transmission", Need::Optional, aperture.transmission, positive_share_rule);
+  read_triple(map, "vignetting", aperture.vignetting, yaml::any_number);
+  using Pupil = ApertureSpec::Pupil;
+  map.read_choice<Pupil>("pupil", Need::Optional, aperture.pupil,
+                         {{"flat", Pupil::Flat}, {"turning", Pupil::Turning}});
+  map.close();
+  into = aperture;
+}
+
+void read_samples(Map& map, std::string_view key, int& into, Faults& faults) {
+  int samples = into;
+  read_int(map, key, Need::Optional, samples, 1, 1 << 20, faults);
+  const Node* const at = map.find(key, Need::Optional);
+  if (!std::has_single_bit(static_cast<unsigned>(samples))) {
+    faults.add(*at, key, "is {}, but must be a power of 2: {} or {}", samples,
+               std::bit_floor(static_cast<unsigned>(samples)),
+               std::bit_ceil(static_cast<unsigned>(samples)));
+  } else {
+    into = samples;
+  }
+}
+
+void read_sampling(Map map, SamplingSpec& sampling, Faults& faults) {
+  read_samples(map, "samples", sampling.samples, faults);
+  const bool grows = map.find("most_samples", Need::Optional) != nullptr;
+  if (grows) {
+    read_samples(map, "most_samples", sampling.most_samples, faults);
+  } else {
+    sampling.most_samples = std::max(sampling.samples, sampling.most_samples);
+    if (map.find("samples", Need::Optional)) sampling.most_samples = sampling.samples;
+  }
+  if (sampling.most_samples < sampling.samples) {
+    faults.add(map.node(), "most_samples", "is {}, but must be at least the {} of samples",
+               sampling.most_samples, sampling.samples);
+  }
+  map.read_number("relative_error", Need::Optional, sampling.relative_error, not_negative);
+  read_int(map, "depth", Need::Optional, sampling.depth, 1, 64, faults);
+  map.close();
+}
+
+// Photons are those of 555 nm: a sensor with a wider band than the eye's may have more than one
+// electron for each (docs/theory/camera_imager.md).
+void read_efficiency(Map& map, Need need, glm::dvec3& into, Faults& faults) {
+  constexpr std::string_view key = "quantum_efficiency";
+  const Node* const node = map.find(key, need);
+  if (!node) return;
+  if (node->kind == Node::Kind::List) {
+    read_triple(map, key, into, efficiency_rule);
+  } else if (const auto value = yaml::number(*node, key, efficiency_rule, faults)) {
+    into = glm::dvec3(*value);
+  }
+}
+
+void read_imager(Map map, std::optional<ImagerSpec>& into, Faults& faults) {
+  const Need need = into ? Need::Optional : Need::Required;
+  ImagerSpec imager = into.value_or(ImagerSpec{});
+  map.read_scaled("pixel_pitch_um", need, 1e-6, imager.pixel_pitch_m, positive);
+  map.read_choice<ColorFilter>("filter", need, imager.filter,
+                               {{"mono", ColorFilter::Mono},
+                                {"rggb", ColorFilter::Rggb},
+                                {"bggr", ColorFilter::Bggr},
+                                {"grbg", ColorFilter::Grbg},
+                                {"gbrg", ColorFilter::Gbrg}});
+  read_efficiency(map, need, imager.quantum_efficiency, faults);
+  map.read_number("full_well_e", need, imager.full_well_e, positive);
+  map.read_number("read_noise_e", Need::Optional, imager.read_noise_e, not_negative);
+  map.read_number("dark_current_e_s", Need::Optional, imager.dark_current_e_s, not_negative);
+  map.read_number("reference_c", Need::Optional, imager.reference_c);
+  map.read_number("temperature_c", Need::Optional, imager.temperature_c);
+  map.read_number("doubling_k", Need::Optional, imager.doubling_k, positive);
+  map.read_scaled("prnu_percent", Need::Optional, 1e-2, imager.prnu);
+  map.read_number("dsnu_e", Need::Optional, imager.dsnu_e, not_negative);
+  map.read_number("gain_dn_e", need, imager.gain_dn_e, positive);
+  map.read_number("black_dn", Need::Optional, imager.black_dn, not_negative);
+  read_int(map, "bits", need, imager.bits, 8, 16, faults);
+  map.read_choice<bool>("noise", Need::Optional, imager.noise, {{"on", true}, {"off", false}});
+  map.close();
+  into = imager;
+}
+
+void read_picture(Map map, PictureSpec& picture, Faults& faults) {
+  using Encoding = PictureSpec::Encoding;
+  map.read_choice<Encoding>("encoding", Need::Optional, picture.encoding,
+                            {{"srgb", Encoding::Srgb}, {"linear", Encoding::Linear}});
+  std::uint8_t bits = 0;
+  if (const Node* at = map.read_whole("bits", Need::Optional, bits)) {
+    if (bits == 8 || bits == 16) {
+      picture.bits = bits;
+    } else {
+      faults.add(*at, "bits", "is {}, but must be 8 or 16", bits);
+    }
+  }
+  glm::dvec3 gains(1);
+  if (read_triple(map, "gains", gains, positive)) picture.gains = gains;
+  map.close();
+}
+
+void read_products(Map& map, std::vector<CameraProduct>& into, Faults& faults) {
+  constexpr std::string_view key = "products";
+  const Node* const node = map.find(key, Need::Optional);
+  if (!node) return;
+  std::vector<CameraProduct> products;
+  std::vector<std::string> words;
+  for (const NamedProduct& named : all_products) words.emplace_back(named.name);
+  for (const Node& item : map.list(key, Need::Optional)) {
+    if (!yaml::is_text(item, key, faults)) continue;
+    const auto* const named = std::ranges::find(all_products, item.text, &NamedProduct::name);
+    if (named == all_products.end()) {
+      faults.add(item, key, "has '{}', but may have {}{}", item.text, fmt::join(words, ", "),
+                 yaml::suggestion(item.text, words));
+    } else if (std::ranges::count(products, named->product) > 0) {
+      faults.add(item, key, "has '{}' twice", item.text);
+    } else {
+      products.push_back(named->product);
+    }
+  }
+  if (node->kind == Node::Kind::List && node->items.empty())
+    faults.add(*node, key, "is an empty list, but a camera needs at least one product");
+  into = std::move(products);
+}
+
+// Reads the size of the image; by default, that of the calibration.
+glm::ivec2 read_size(Map& root, glm::ivec2 calibrated_px, Faults& faults) {
+  constexpr std::string_view key = "size_px";
+  const bool known = calibrated_px.x > 0 && calibrated_px.y > 0;
+  std::array<double, 2> pair{};
+  const Node* const at =
+      root.read_numbers(key, known ? Need::Optional : Need::Required, pair, positive);
+  if (!at) return calibrated_px;
+  const auto [width, height] = pair;
+  if (width != std::floor(width) || height != std::floor(height)) {
+    faults.add(*at, key, "is [{}, {}], but must be whole numbers of pixels", width, height);
+  } else if (width * height > static_cast<double>(most_image_pixels)) {
+    faults.add(*at, key,
+               "is [{}, {}], but an image has at most {} pixels: the rays of this one alone would "
+               "take {:.3g} GiB",
+               width, height, most_image_pixels, width * height * sizeof(PixelRay) / 0x1p30);
+  } else if (known && glm::dvec2(width, height) != glm::dvec2(calibrated_px)) {
+    faults.add(*at, key, "is [{}, {}], but the calibration is of images of {} x {}", width, height,
+               calibrated_px.x, calibrated_px.y);
+  } else {
+    return {static_cast<int>(width), static_cast<int>(height)};
+  }
+  return {};
+}
+
+// Reads the keys that camera files and scenes have in common.
+void read_settings(Map& map, CameraSpec& camera, Faults& faults) {
+  map.read_number("rate_hz", Need::Optional, camera.rate_hz, positive);
+  map.read_scaled("first_ms", Need::Optional, 1e-3, camera.first_s, time_rule);
+  if (auto shutter = map.map("shutter", Need::Optional))
+    read_shutter(std::move(*shutter), camera.shutter);
+  if (auto aperture = map.map("aperture", Need::Optional))
+    read_aperture(std::move(*aperture), camera.aperture);
+  if (auto sampling = map.map("sampling", Need::Optional))
+    read_sampling(std::move(*sampling), camera.sampling, faults);
+  if (auto imager = map.map("imager", Need::Optional))
+    read_imager(std::move(*imager), camera.imager, faults);
+  if (auto picture = map.map("picture", Need::Optional))
+    read_picture(std::move(*picture), camera.picture, faults);
+  read_products(map, camera.products, faults);
+}
+
+// Returns the focal length of a pinhole whose pixel on the axis has the same solid angle; 0 if the
+// axis is not imaged.
+double focal_px(const Lens& lens) {
+  const auto centre = lens.project({0, 0, 1});
+  const auto ray = centre ? lens.ray(*centre) : std::nullopt;
+  if (!ray) return 0;
+  return 1 / std::sqrt(glm::length(glm::cross(ray->by_u, ray->by_v)));
+}
+
+}  // namespace
+
+CameraSpec read_camera(const Node& node, const fs::path& path, Faults& faults) {
+  CameraSpec camera;
+  Map root(node, "", faults);
+  if (const Node* at = root.find("groundray_lidar", Need::Optional)) {
+    faults.add(*at, "groundray_lidar", "this is a lidar, not a camera: name it under 'lidars'");
+    return camera;
+  }
+  yaml::check_version(root, "groundray_camera", faults);
+  root.read_text("model", Need::Required, camera.model);
+  CameraFileLens lens;
+  if (const Node* at = root.find("lens", Need::Required)) lens = read_lens(*at, path, faults);
+  camera.lens = lens.model;
+  camera.size_px = read_size(root, lens.size_px, faults);
+  read_settings(root, camera, faults);
+  if (const Node* sources = root.find("sources", Need::Optional)) {
+    const Map texts(*sources, "sources", faults);
+    for (std::size_t i = 1; sources->kind == Node::Kind::Map && i < sources->items.size(); i += 2)
+      yaml::is_text(sources->items[i], sources->items[i - 1].text, faults);
+  }
+  root.close();
+  return camera;
+}
+
+void change_camera(Map& entry, CameraSpec& camera, Faults& faults) {
+  read_settings(entry, camera, faults);
+}
+
+void check_rate(const Node& node, const CameraSpec& camera, Faults& faults) {
+  const double period_s = 1 / camera.rate_hz;
+  if (camera.shutter.exposure_s > period_s * (1 + 1e-9)) {
+    faults.add(node, "shutter", "exposes for {:.6g} ms, but an image begins every {:.6g} ms",
+               camera.shutter.exposure_s * 1e3, period_s * 1e3);
+  }
+  const double readout_s = camera.shutter.row_s * camera.size_px.y;
+  if (readout_s > period_s * (1 + 1e-9)) {
+    faults.add(node, "shutter",
+               "reads {} rows of {:.6g} us in {:.6g} ms, but an image begins every {:.6g} ms",
+               camera.size_px.y, camera.shutter.row_s * 1e6, readout_s * 1e3, period_s * 1e3);
+  }
+}
+
+void complete_camera(const Node& node, CameraSpec& camera, Faults& faults) {
+  const std::size_t before = faults.count();
+  for (const auto& [name, product] : all_products) {
+    if (gives(camera, product) && is_of_imager(product) && !camera.imager)
+      faults.add(node, "products", "has '{}', which needs an 'imager'", name);
+  }
+  if (camera.imager && !camera.aperture)
+    faults.add(node, "imager", "needs an 'aperture', which determines how much light arrives");
+  if (faults.count() > before) return;
+  try {
+    if (camera.aperture && camera.aperture->focal_length_m == 0) {
+      if (!camera.imager) {
+        throw Error(
+            "the aperture needs focal_length_mm, or an imager, whose pixel pitch determines it");
+      }
+      const Lens lens(camera.lens, camera.size_px);
+      camera.aperture->focal_length_m = focal_px(lens) * camera.imager->pixel_pitch_m;
+    }
+    const Camera works(camera);
+    if (camera.imager) Imager(*camera.imager, camera.shutter.exposure_s);
+  } catch (const Error& fault) {
+    faults.add(node, "", "the camera is invalid: {}", fault.what());
+  }
+}
+
+}  // namespace groundray

@@ -1,0 +1,288 @@
+#include "apps/scene/readers/object_reader.h"
+
+#include <algorithm>
+#include <array>
+#include <cmath>
+#include <set>
+#include <utility>
+
+#include "apps/scene/readers/interval_reader.h"
+#include "apps/scene/readers/pattern_reader.h"
+#include "core/error.h"
+
+namespace groundray {
+namespace {
+
+namespace fs = std::filesystem;
+using yaml::any_number;
+using yaml::Faults;
+using yaml::Map;
+using yaml::Need;
+using yaml::Node;
+using yaml::not_negative;
+using yaml::positive;
+using yaml::Rule;
+
+// Common arguments of the readers below.
+struct Reading {
+  const fs::path& path;
+  const DataFolders& folders;
+  Faults& faults;
+};
+
+void read_option(Map& map, std::string_view key, std::optional<double>& into, Rule rule) {
+  double value = 0;
+  if (map.read_number(key, Need::Optional, value, rule)) into = value;
+}
+
+AssetSpec read_asset(Map& entry, const Node& name, Faults& faults) {
+  AssetSpec asset;
+  if (!yaml::is_text(name, "asset", faults)) return asset;
+  try {
+    asset.kind = asset_kind(name.text);
+  } catch (const Error& fault) {
+    faults.add(name, "asset", "{}", fault.what());
+  }
+  const std::size_t before = faults.count();
+  read_option(entry, "size_m", asset.size_m, positive);
+  read_option(entry, "width_m", asset.width_m, positive);
+  read_option(entry, "sag_m", asset.sag_m, positive);
+  read_option(entry, "square_m", asset.square_m, positive);
+  read_option(entry, "leaf_area_index", asset.leaf_area_index, positive);
+  entry.read_whole("variant", Need::Optional, asset.seed.value);
+  entry.read_number("detail", Need::Optional, asset.detail, positive);
+  if (faults.count() > before) return asset;
+  try {
+    check_asset(asset);
+  } catch (const Error& fault) {
+    faults.add(name, "asset", "it cannot be generated:\n{}", fault.what());
+  }
+  return asset;
+}
+
+DisplacementSource read_displacement(Map map, const Reading& with) {
+  DisplacementSource displacement;
+  std::string image;
+  if (map.read_text("image", Need::Required, image)) displacement.image = beside(with.path, image);
+  map.read_number("amplitude_m", Need::Required, displacement.amplitude_m, positive);
+  map.read_number("middle", Need::Optional, displacement.middle);
+  map.read_number("cell_m", Need::Required, displacement.cell_m, positive);
+  map.close();
+  return displacement;
+}
+
+ModelSource read_file_source(Map& entry, const Node& file, const Reading& with) {
+  ModelSource source;
+  if (yaml::is_text(file, "model", with.faults)) source.file = beside(with.path, file.text);
+  read_option(entry, "metres_per_unit", source.options.metres_per_unit, positive);
+  UpAxis up = UpAxis::Z;
+  if (entry.read_choice<UpAxis>("up", Need::Optional, up,
+                                {{"x", UpAxis::X}, {"y", UpAxis::Y}, {"z", UpAxis::Z}}))
+    source.options.up = up;
+  entry.read_choice<BrokenParts>("broken", Need::Optional, source.options.broken,
+                                 {{"refuse", BrokenParts::Refuse}, {"drop", BrokenParts::Drop}});
+  if (auto map = entry.map("displacement", Need::Optional))
+    source.displacement = read_displacement(std::move(*map), with);
+  return source;
+}
+
+// Reads the keys of an entry that give its model and materials.
+ModelSpec read_model_spec(Map& entry, const Reading& with) {
+  ModelSpec spec;
+  const Node* const asset = entry.find("asset", Need::Optional);
+  const Node* const file = entry.find("model", Need::Optional);
+  if ((asset == nullptr) == (file == nullptr) && entry.node().kind == Node::Kind::Map)
+    with.faults.add(entry.node(), "model", "there must be exactly one of 'asset' and 'model'");
+  if (asset != nullptr) {
+    spec.source = read_asset(entry, *asset, with.faults);
+  } else if (file != nullptr) {
+    spec.source = read_file_source(entry, *file, with);
+  }
+  if (const Node* const node = entry.find("material", Need::Optional))
+    spec.material = read_material(*node, "material", with.path, with.folders, with.faults);
+  const Node* const materials = entry.find("materials", Need::Optional);
+  if (materials == nullptr) return spec;
+  const Map names(*materials, "materials", with.faults);
+  if (materials->kind != Node::Kind::Map) return spec;
+  for (std::size_t i = 0; i + 1 < materials->items.size(); i += 2) {
+    const std::string& surface = materials->items[i].text;
+    if (auto material =
+            read_material(materials->items[i + 1], surface, with.path, with.folders, with.faults))
+      spec.materials.emplace(surface, std::move(*material));
+  }
+  return spec;
+}
+
+void read_stance(Map& entry, Stance& stance) {
+  entry.read_choice<Stance>("stance", Need::Optional, stance,
+                            {{"upright", Stance::Upright}, {"on_slope", Stance::OnSlope}});
+}
+
+StandingObject read_standing(Map& entry) {
+  StandingObject place;
+  std::array<double, 2> at_m{};
+  entry.read_numbers("at_m", Need::Required, at_m);
+  place.at_m = {at_m[0], at_m[1]};
+  read_option(entry, "height_m", place.height_m, any_number);
+  entry.read_number("yaw_deg", Need::Optional, place.yaw_deg);
+  entry.read_number("pitch_deg", Need::Optional, place.pitch_deg);
+  entry.read_number("roll_deg", Need::Optional, place.roll_deg);
+  read_stance(entry, place.stance);
+  return place;
+}
+
+std::variant<StandingObject, RecordedPath, DrivenPath> read_place(Map& entry, const Reading& with) {
+  std::string tum;
+  const Node* const recorded = entry.read_text("trajectory", Need::Optional, tum);
+  auto drive = entry.map("drive", Need::Optional);
+  if (recorded != nullptr && drive)
+    with.faults.add(*recorded, "trajectory", "must not be given together with 'drive'");
+  if (recorded != nullptr) return RecordedPath{beside(with.path, tum)};
+  if (drive) return read_drive(std::move(*drive), with.faults);
+  return read_standing(entry);
+}
+
+Clearing read_clearing(Map entry, Faults& faults) {
+  Clearing clearing;
+  const bool is_line = entry.find("line_m", Need::Optional) != nullptr;
+  const std::string_view key = is_line ? "line_m" : "polygon_m";
+  if (!is_line) clearing.shape = Clearing::Shape::Polygon;
+  for (const Node& point : entry.list(key, Need::Required)) {
+    std::array<double, 2> p{};
+    if (yaml::numbers(point, key, p, any_number, faults))
+      clearing.points_D.emplace_back(p[0], p[1]);
+  }
+  entry.read_number("half_width_m", is_line ? Need::Required : Need::Optional,
+                    clearing.half_width_m, not_negative);
+  entry.close();
+  return clearing;
+}
+
+void read_models(Map& entry, ScatterLayer& layer, const Reading& with) {
+  layer.scatter.weights.clear();
+  for (const Node& node : entry.list("models", Need::Required)) {
+    Map model(node, "models", with.faults);
+    double weight = 1;
+    model.read_number("weight", Need::Optional, weight, positive);
+    layer.models.push_back(read_model_spec(model, with));
+    layer.scatter.weights.push_back(weight);
+    model.close();
+  }
+  const Node* const list = entry.find("models", Need::Optional);
+  if (list != nullptr && list->kind == Node::Kind::List && layer.models.empty())
+    with.faults.add(*list, "models", "is an empty list, but a layer needs at least one");
+}
+
+ScatterLayer read_scatter_layer(Map entry, const Reading& with) {
+  ScatterLayer layer;
+  entry.read_text("name", Need::Required, layer.name);
+  entry.read_whole("label", Need::Required, layer.label);
+  read_models(entry, layer, with);
+  entry.read_number("density_per_m2", Need::Required, layer.density_per_m2, not_negative);
+  std::string map;
+  if (entry.read_text("density_map", Need::Optional, map))
+    layer.density_map = beside(with.path, map);
+  read_option(entry, "nodata", layer.nodata, any_number);
+  ScatterSpec& scatter = layer.scatter;
+  entry.read_number("min_distance_m", Need::Optional, scatter.min_distance_m, not_negative);
+  scatter.slope_deg = read_interval(entry, "slope_deg", scatter.slope_deg, slope_rule, with.faults);
+  scatter.height_m = read_interval(entry, "height_m", scatter.height_m, any_number, with.faults);
+  scatter.scale = read_interval(entry, "scale", scatter.scale, positive, with.faults);
+  scatter.yaw_deg = read_interval(entry, "yaw_deg", scatter.yaw_deg, any_number, with.faults);
+  entry.read_number("sink_m", Need::Optional, scatter.sink_m);
+  read_stance(entry, scatter.stance);
+  for (const Node& node : entry.list("clearings", Need::Optional))
+    scatter.clearings.push_back(read_clearing(Map(node, "clearings", with.faults), with.faults));
+  entry.close();
+  return layer;
+}
+
+// FNV-1a hash of a layer's name. It is the layer's key among random numbers, so that its plants do
+// not depend on the other layers.
+// @see http://www.isthe.com/chongo/tech/comp/fnv
+std::uint32_t hash_of(std::string_view name) {
+  std::uint32_t hash = 0x811c9dc5;
+  for (const char c : name) hash = (hash ^ static_cast<unsigned char>(c)) * 0x01000193;
+  return hash;
+}
+
+// Records names that an earlier entry already has.
+class UniqueNames {
+ public:
+  UniqueNames(std::string_view what, Faults& faults) : what_(what), faults_(faults) {}
+  void add(const Node& entry, const std::string& name) {
+    if (!name.empty() && !names_.insert(name).second)
+      faults_.add(entry, "name", "'{}' is taken by an earlier {}: names must differ", name, what_);
+  }
+
+ private:
+  std::string_view what_;
+  Faults& faults_;
+  std::set<std::string> names_;
+};
+
+}  // namespace
+
+DrivenPath read_drive(Map drive, Faults& faults) {
+  DrivenPath path;
+  const auto waypoints = drive.list("waypoints_m", Need::Required);
+  for (const Node& waypoint : waypoints) {
+    std::array<double, 2> p{};
+    if (yaml::numbers(waypoint, "waypoints_m", p, any_number, faults)) {
+      path.waypoints_m.emplace_back(p[0], p[1]);
+    }
+  }
+  if (const Node* at = drive.find("waypoints_m", Need::Optional); at && waypoints.size() < 2) {
+    faults.add(*at, "waypoints_m", "has {} points, but a drive needs at least two",
+               waypoints.size());
+  }
+  drive.read_number("speed_m_s", Need::Required, path.speed_m_s, positive);
+  drive.read_number("height_m", Need::Required, path.height_m, not_negative);
+  std::array<double, 2> footprint{path.footprint_m.x, path.footprint_m.y};
+  drive.read_numbers("footprint_m", Need::Optional, footprint, positive);
+  path.footprint_m = {footprint[0], footprint[1]};
+  drive.close();
+  return path;
+}
+
+std::vector<ObjectSpec> read_objects(Map& root, const fs::path& path, const DataFolders& folders,
+                                     Faults& faults) {
+  const Reading with{path, folders, faults};
+  std::vector<ObjectSpec> objects;
+  UniqueNames names("object", faults);
+  for (const Node& node : root.list("objects", Need::Optional)) {
+    Map entry(node, "objects", faults);
+    ObjectSpec& object = objects.emplace_back();
+    entry.read_text("name", Need::Required, object.name);
+    entry.read_whole("label", Need::Required, object.label);
+    entry.read_number("scale", Need::Optional, object.scale, positive);
+    object.model = read_model_spec(entry, with);
+    object.place = read_place(entry, with);
+    entry.close();
+    names.add(node, object.name);
+  }
+  return objects;
+}
+
+std::vector<ScatterLayer> read_scatter(Map& root, const fs::path& path, const DataFolders& folders,
+                                       Faults& faults) {
+  std::vector<ScatterLayer> layers;
+  UniqueNames names("layer", faults);
+  for (const Node& node : root.list("scatter", Need::Optional)) {
+    ScatterLayer layer = read_scatter_layer(Map(node, "scatter", faults), {path, folders, faults});
+    layer.scatter.layer = hash_of(layer.name);
+    names.add(node, layer.name);
+    for (const ScatterLayer& other : layers) {
+      if (other.scatter.layer == layer.scatter.layer && other.name != layer.name) {
+        faults.add(
+            node, "name",
+            "'{}' has the same hash as '{}', so their random positions would be equal: rename one",
+            layer.name, other.name);
+      }
+    }
+    layers.push_back(std::move(layer));
+  }
+  return layers;
+}
+
+}  // namespace groundray

@@ -1,0 +1,292 @@
+#include "apps/scene/readers/spec_io.h"
+
+#include <algorithm>
+#include <cmath>
+#include <span>
+#include <string_view>
+#include <system_error>
+#include <utility>
+
+#include "apps/scene/readers/camera_reader.h"
+#include "apps/scene/readers/cover_reader.h"
+#include "apps/scene/readers/lidar_reader.h"
+#include "apps/scene/readers/material_reader.h"
+#include "apps/scene/readers/mount_reader.h"
+#include "apps/scene/readers/object_reader.h"
+#include "apps/scene/readers/pattern_reader.h"
+#include "apps/scene/readers/relief_reader.h"
+#include "apps/scene/readers/sky_reader.h"
+#include "apps/scene/yaml_reader.h"
+#include "core/appearance/bsdf.h"
+#include "sensors/lidar/lidar.h"
+
+namespace groundray {
+namespace {
+
+namespace fs = std::filesystem;
+using yaml::Faults;
+using yaml::Map;
+using yaml::Need;
+using yaml::Node;
+using yaml::not_negative;
+using yaml::positive;
+using yaml::Rule;
+
+constexpr Rule duration_rule{[](double value) { return value > 0 && value <= 1e6; },
+                             "must be > 0 and at most 1e6"};
+
+AtmosphereSpec read_air(Map map, Faults& faults) {
+  AtmosphereSpec air;
+  map.read_number("visibility_m", Need::Optional, air.visibility_m, positive);
+  map.read_choice<HazeLaw>("haze_law", Need::Optional, air.haze_law,
+                           {{"kruse", HazeLaw::Kruse}, {"kim", HazeLaw::Kim}});
+  map.read_number("fog_range_m", Need::Optional, air.fog_range_m, positive);
+  map.read_number("rain_mm_h", Need::Optional, air.rain_mm_h, not_negative);
+  map.read_number("backscatter_per_m_sr", Need::Optional, air.backscatter_per_m_sr, not_negative);
+  map.read_number("group_index", Need::Optional, air.group_index,
+                  Rule{[](double value) { return value >= 1; }, "must be 1 or more"});
+  if (std::isfinite(air.visibility_m) && std::isfinite(air.fog_range_m))
+    faults.add(map.node(), "weather", "has haze and fog: give one of visibility_m and fog_range_m");
+  map.close();
+  return air;
+}
+
+TerrainSpec read_terrain(Map terrain, const fs::path& path, const DataFolders& folders,
+                         Faults& faults) {
+  TerrainSpec spec;
+  if (const Node* const node = terrain.find("material", Need::Optional))
+    spec.material = read_material(*node, "material", path, folders, faults);
+  if (auto relief = terrain.map("relief", Need::Optional))
+    spec.relief = read_relief(std::move(*relief), path, faults);
+  spec.texture = read_ground_texture(terrain, path, faults);
+  spec.cover = read_cover(terrain, path, folders, faults);
+  std::string orthophoto;
+  if (terrain.read_text("orthophoto", Need::Optional, orthophoto))
+    spec.orthophoto = beside(path, orthophoto);
+  std::string dem;
+  if (terrain.read_text("dem", Need::Required, dem)) spec.dem = beside(path, dem);
+  double nodata = 0;
+  if (terrain.read_number("nodata", Need::Optional, nodata)) spec.options.nodata = nodata;
+  terrain.read_text("reproject_to", Need::Optional, spec.options.reproject_to);
+  terrain.read_whole("label", Need::Optional, spec.label);
+  terrain.read_number("tolerance_m", Need::Optional, spec.detail.tolerance_m, not_negative);
+  double tolerance_mrad = 0;
+  terrain.read_number("tolerance_mrad", Need::Optional, tolerance_mrad, not_negative);
+  spec.detail.tolerance_rad = tolerance_mrad / 1000;
+  if (const Node* at = terrain.read_whole("memory_mib", Need::Optional, spec.detail.memory_mib);
+      at && spec.detail.memory_mib == 0) {
+    faults.add(*at, "memory_mib", "is 0, but must be at least 1");
+  }
+  terrain.close();
+  return spec;
+}
+
+std::variant<RecordedPath, DrivenPath> read_platform(Map platform, const fs::path& path,
+                                                     Faults& faults) {
+  std::variant<RecordedPath, DrivenPath> result;
+  std::string tum;
+  if (platform.read_text("trajectory", Need::Optional, tum)) {
+    result = RecordedPath{beside(path, tum)};
+  }
+  auto drive = platform.map("drive", Need::Optional);
+  const bool recorded = platform.find("trajectory", Need::Optional) != nullptr;
+  if (recorded == drive.has_value() && platform.node().kind == Node::Kind::Map) {
+    faults.add(platform.node(), "platform", "must have exactly one of 'trajectory' and 'drive'");
+  }
+  if (drive) result = read_drive(std::move(*drive), faults);
+  platform.close();
+  return result;
+}
+
+// Checks that lidars, air and ground are compatible.
+void check_lidars(const SceneSpec& scene, const Node& node, std::span<const Node> entries,
+                  Faults& faults) {
+  const bool air_returns =
+      scene.air.backscatter_per_m_sr > 0 || std::isfinite(scene.air.fog_range_m);
+  bool has_light = false;
+  for (std::size_t i = 0; i < scene.lidars.size(); ++i) {
+    const MountedLidar& mounted = scene.lidars[i];
+    const auto& light = mounted.lidar.light;
+    has_light |= light.has_value();
+    if (light && air_returns && light->overlap.full_from_m == 0) {
+      faults.add(entries[i], "lidars",
+                 "the receiver of '{}' needs overlap_m: [from, to], the ranges in which its view "
+                 "of the beam becomes complete: fog scatters light back from every range",
+                 mounted.name);
+      continue;
+    }
+    try {
+      const Lidar works(mounted.lidar, scene.air);
+      if (light && scene.terrain.material)
+        retro_brdf(*scene.terrain.material, light->wavelength_nm);
+    } catch (const Error& fault) {
+      faults.add(entries[i], "lidars", "'{}' is invalid: {}", mounted.name, fault.what());
+    }
+  }
+  if (has_light && !scene.terrain.material) {
+    faults.add(node, "terrain",
+               "must have a material, as a lidar has a laser: for example material: dry_soil");
+  }
+}
+
+// Returns the ground's materials, from the lowest layer up.
+std::vector<const std::optional<Material>*> ground_materials(const TerrainSpec& terrain) {
+  std::vector<const std::optional<Material>*> materials{&terrain.material};
+  for (const CoverSpec& layer : terrain.cover) materials.push_back(&layer.material);
+  return materials;
+}
+
+// Checks that the scene has the sky and the materials that its cameras need.
+void check_cameras(const SceneSpec& scene, const Node& node, Faults& faults) {
+  if (scene.cameras.empty()) return;
+  const auto lit = std::ranges::find_if(
+      scene.cameras, [](const MountedCamera& mounted) { return needs_light(mounted.camera); });
+  if (lit != scene.cameras.end() && !scene.sky) {
+    faults.add(node, "sky",
+               "missing, but the camera '{}' measures light: add a sky, or choose products without "
+               "light, such as products: [truth]",
+               lit->name);
+  }
+  for (const std::optional<Material>* material : ground_materials(scene.terrain)) {
+    if (!*material) {
+      faults.add(node, "terrain",
+                 "must have a material, and so must each layer, for the camera '{}': for example "
+                 "material: dry_soil",
+                 scene.cameras.front().name);
+      continue;
+    }
+    if ((*material)->emitted != glm::dvec3(0)) {
+      faults.add(node, "terrain", "the material '{}' emits light, but only objects can",
+                 (*material)->name);
+    }
+    try {
+      bsdf_in_colour(**material);
+    } catch (const Error& fault) {
+      faults.add(node, "terrain", "the camera '{}' cannot use its material: {}",
+                 scene.cameras.front().name, fault.what());
+    }
+  }
+}
+
+// Sets the sunlight of lidars that do not specify it to that of the sky's sun.
+void light_by_sky(SceneSpec& scene, std::span<const Node> entries, Faults& faults) {
+  if (!scene.sky || !scene.sky->sun) return;
+  const Sun sun(*scene.sky->sun, scene.sky->air);
+  for (std::size_t i = 0; i < scene.lidars.size(); ++i) {
+    auto& light = scene.lidars[i].lidar.light;
+    if (!light || light->sun.irradiance_w_m2_nm) continue;
+    try {
+      light->sun.irradiance_w_m2_nm = solar_irradiance_w_m2_nm(sun, light->wavelength_nm);
+      light->sun.direction = sun.direction();
+    } catch (const Error& fault) {
+      faults.add(entries[i], "lidars",
+                 "the sunlight on '{}' cannot be computed: {}; give sun_w_m2_nm",
+                 scene.lidars[i].name, fault.what());
+    }
+  }
+}
+
+// Rejects a camera file at once, because each of its keys would be unknown to a lidar.
+void refuse_camera(const Node& node, const fs::path& path) {
+  Faults faults(path);
+  const Node* const at = Map(node, "", faults).find("groundray_camera", Need::Optional);
+  if (!at) return;
+  faults.add(*at, "groundray_camera", "this is a camera, not a lidar: name it under 'cameras'");
+  faults.throw_if_any();
+}
+
+SensorKind kind_of(const fs::path& preset) {
+  constexpr std::string_view key = "groundray_camera:";
+  const std::string text = yaml::read_file(preset);
+  const bool is_camera =
+      text.starts_with(key) || text.find("\n" + std::string(key)) != std::string::npos;
+  return is_camera ? SensorKind::Camera : SensorKind::Lidar;
+}
+
+}  // namespace
+
+SceneSpec load_scene(const fs::path& path, const fs::path& preset_folder) {
+  return parse_scene(yaml::read_file(path), path, preset_folder);
+}
+
+SceneSpec parse_scene(const std::string& text, const fs::path& path,
+                      const fs::path& preset_folder) {
+  const Node node = yaml::parse(text, path);
+  Faults faults(path);
+  SceneSpec scene;
+  scene.text = text;
+  Map root(node, "", faults);
+  const DataFolders folders{preset_folder};
+  yaml::check_version(root, "groundray", faults);
+  root.read_whole("seed", Need::Required, scene.seed.value);
+  root.read_number("duration_s", Need::Required, scene.duration_s, duration_rule);
+  root.read_choice<Tracing>("tracing", Need::Optional, scene.tracing,
+                            {{"fast", Tracing::Fast}, {"exact", Tracing::Exact}});
+  if (auto terrain = root.map("terrain", Need::Required)) {
+    scene.terrain = read_terrain(std::move(*terrain), path, folders, faults);
+  }
+  if (auto platform = root.map("platform", Need::Required)) {
+    scene.platform = read_platform(std::move(*platform), path, faults);
+  }
+  if (auto weather = root.map("weather", Need::Optional))
+    scene.air = read_air(std::move(*weather), faults);
+  read_sensors(root, path, preset_folder, scene, faults);
+  scene.objects = read_objects(root, path, folders, faults);
+  scene.scatter = read_scatter(root, path, folders, faults);
+  if (auto sky = root.map("sky", Need::Optional))
+    scene.sky = read_sky(std::move(*sky), path, faults);
+  const auto entries = root.list("lidars", Need::Optional);
+  if (faults.count() == 0) light_by_sky(scene, entries, faults);
+  if (faults.count() == 0) check_lidars(scene, node, entries, faults);
+  if (faults.count() == 0) check_cameras(scene, node, faults);
+  root.close();
+  faults.throw_if_any();
+  return scene;
+}
+
+LidarSpec load_lidar(const fs::path& path) { return parse_lidar(yaml::read_file(path), path); }
+
+LidarSpec parse_lidar(const std::string& text, const fs::path& path) {
+  const Node node = yaml::parse(text, path);
+  Faults faults(path);
+  refuse_camera(node, path);
+  LidarSpec lidar = read_lidar(node, path, faults);
+  faults.throw_if_any();
+  return lidar;
+}
+
+CameraSpec load_camera(const fs::path& path) { return parse_camera(yaml::read_file(path), path); }
+
+CameraSpec parse_camera(const std::string& text, const fs::path& path) {
+  const Node node = yaml::parse(text, path);
+  Faults faults(path);
+  CameraSpec camera = read_camera(node, path, faults);
+  if (faults.count() == 0) check_rate(node, camera, faults);
+  if (faults.count() == 0) complete_camera(node, camera, faults);
+  faults.throw_if_any();
+  return camera;
+}
+
+std::vector<std::string> preset_names(const fs::path& preset_folder) {
+  std::vector<std::string> names;
+  std::error_code fault;
+  for (const fs::directory_entry& entry : fs::directory_iterator(preset_folder, fault)) {
+    if (entry.path().extension() == ".yaml") names.push_back(entry.path().stem().string());
+  }
+  if (fault) {
+    throw Error("{}: the folder of presets cannot be read: {}", preset_folder.string(),
+                fault.message());
+  }
+  std::ranges::sort(names);
+  return names;
+}
+
+std::vector<std::string> preset_names(const fs::path& preset_folder, SensorKind kind) {
+  std::vector<std::string> names = preset_names(preset_folder);
+  std::erase_if(names, [&](const std::string& name) {
+    return kind_of(preset_folder / (name + ".yaml")) != kind;
+  });
+  return names;
+}
+
+}  // namespace groundray

@@ -1,0 +1,197 @@
+#include "apps/scene/scene_objects.h"
+
+#include <fmt/format.h>
+
+#include <chrono>
+#include <glm/trigonometric.hpp>
+#include <span>
+#include <string_view>
+#include <utility>
+#include <variant>
+
+#include "apps/scene/cover.h"
+#include "apps/scene/fingerprint.h"
+#include "apps/scene/model_library.h"
+#include "apps/scene/palette.h"
+#include "apps/scene/paths.h"
+#include "core/error.h"
+#include "terrain/scatter/scatter.h"
+
+namespace groundray {
+namespace {
+
+// Parts that are collected before they are built.
+struct SceneAssembly {
+  ModelLibrary library;
+  std::vector<PlacedObject> placed;
+  std::vector<MovingObject> moving;
+  std::vector<SceneObjects::Group> standing_groups, moving_groups;
+};
+
+glm::dvec3 to_D(const StandingObject& place, const Terrain& terrain) {
+  const glm::dvec3 origin_w_m = terrain.header().origin_w_m;
+  const glm::dvec2 p_D = place.at_m - glm::dvec2(origin_w_m);
+  if (place.height_m) return {p_D, *place.height_m - origin_w_m.z};
+  const auto ground_m = terrain.ground().height_m_at(p_D);
+  if (!ground_m) {
+    throw Error("there is no ground at ({}, {}) m in W: move at_m, or give height_m", place.at_m.x,
+                place.at_m.y);
+  }
+  return {p_D, *ground_m};
+}
+
+PlacedObject stand(const StandingObject& place, const Terrain& terrain, double scale,
+                   std::uint32_t model) {
+  const glm::dvec3 angles_rad =
+      glm::radians(glm::dvec3(place.yaw_deg, place.pitch_deg, place.roll_deg));
+  PlacedObject object{to_D(place, terrain),
+                      rotation_from_yaw_pitch_roll(angles_rad.x, angles_rad.y, angles_rad.z), scale,
+                      model};
+  if (place.stance == Stance::OnSlope) {
+    const auto facet = terrain.ground().facet_at(glm::dvec2(object.p_DO));
+    if (!facet) {
+      throw Error(
+          "there is no ground at ({}, {}) m in W, which stance: on_slope needs: move at_m, or use "
+          "upright",
+          place.at_m.x, place.at_m.y);
+    }
+    object.R_DO = tilt_to(terrain.frame().normal(*facet)) * object.R_DO;
+  }
+  return object;
+}
+
+Trajectory lay_object_path(const RecordedPath& path, const SceneSpec& spec, const Terrain& terrain,
+                           std::chrono::nanoseconds begin) {
+  Trajectory X_DO = recorded_path(path, terrain, begin);
+  const std::chrono::nanoseconds end = begin + run_time(spec);
+  if (X_DO.end_time() < std::chrono::nanoseconds(0) || run_time(spec) < X_DO.begin_time()) {
+    throw Error(
+        "{}: it covers {:.3f} s to {:.3f} s, which does not overlap the run, {:.3f} s to {:.3f} s; "
+        "are its times on the clock of the platform's trajectory?",
+        path.tum.string(), in_seconds(X_DO.begin_time() + begin),
+        in_seconds(X_DO.end_time() + begin), in_seconds(begin), in_seconds(end));
+  }
+  return X_DO;
+}
+
+Trajectory lay_object_path(const DrivenPath& path, const SceneSpec& spec, const Terrain& terrain,
+                           std::chrono::nanoseconds /*begin*/) {
+  return extended(driven_path(path, terrain, run_time(spec)), spec);
+}
+
+void add_object(const ObjectSpec& object, const SceneSpec& spec, const Terrain& terrain,
+                std::chrono::nanoseconds begin, std::uint32_t model, SceneAssembly& into) {
+  if (const auto* place = std::get_if<StandingObject>(&object.place)) {
+    into.placed.push_back(stand(*place, terrain, object.scale, model));
+    into.standing_groups.push_back(
+        {object.name, object.label, static_cast<std::uint32_t>(into.placed.size()), 1});
+    return;
+  }
+  const auto* recorded = std::get_if<RecordedPath>(&object.place);
+  into.moving.push_back({recorded != nullptr ? lay_object_path(*recorded, spec, terrain, begin)
+                                             : lay_object_path(std::get<DrivenPath>(object.place),
+                                                               spec, terrain, begin),
+                         object.scale, model});
+  into.moving_groups.push_back(
+      {object.name, object.label, static_cast<std::uint32_t>(into.moving.size()), 1});
+}
+
+void add_layer(const ScatterLayer& layer, const SceneSpec& spec, const Terrain& terrain,
+               std::uint32_t first_model, SceneAssembly& into) {
+  const glm::dvec3 origin_w_m = terrain.header().origin_w_m;
+  ScatterSpec scatter = layer.scatter;
+  scatter.origin_w_m = glm::dvec2(origin_w_m);
+  scatter.height_m = {scatter.height_m.low - origin_w_m.z, scatter.height_m.high - origin_w_m.z};
+  for (Clearing& clearing : scatter.clearings) {
+    for (glm::dvec2& point : clearing.points_D) point -= glm::dvec2(origin_w_m);
+  }
+  const DensityMap density =
+      layer.density_map.empty()
+          ? DensityMap(layer.density_per_m2)
+          : load_density_map(layer.density_map, {layer.density_per_m2, layer.nodata,
+                                                 terrain.header().crs_wkt, origin_w_m});
+  const auto placements = Scatter(terrain.ground(), density, scatter, spec.seed).placements();
+  const auto first = static_cast<std::uint32_t>(into.placed.size() + 1);
+  into.placed.reserve(into.placed.size() + placements.size());
+  for (const Placement& placement : placements) {
+    into.placed.push_back(
+        {placement.p_DO, placement.R_DO, placement.scale, first_model + placement.prototype});
+  }
+  into.standing_groups.push_back(
+      {layer.name, layer.label, first, static_cast<std::uint32_t>(placements.size())});
+}
+
+// Calls `make`, and prepends the name of the entry to its errors.
+template <typename Make>
+void for_entry(std::string_view kind, const std::string& name, const Make& make) {
+  try {
+    make();
+  } catch (const Error& fault) {
+    throw Error("{} '{}': {}", kind, name, fault.what());
+  }
+}
+
+void gather(const SceneSpec& spec, const Terrain& terrain, std::chrono::nanoseconds begin,
+            Palette& palette, SceneAssembly& into) {
+  ModelLibrary& library = into.library;
+  for (const ObjectSpec& object : spec.objects) {
+    for_entry("object", object.name, [&] {
+      add_object(object, spec, terrain, begin, library.add(object.model, object.label, palette),
+                 into);
+    });
+  }
+  for (const ScatterLayer& layer : spec.scatter) {
+    for_entry("layer", layer.name, [&] {
+      const std::uint32_t first = library.size();
+      for (const ModelSpec& model : layer.models) library.add(model, layer.label, palette);
+      add_layer(layer, spec, terrain, first, into);
+    });
+  }
+}
+
+std::string fingerprint_of(const SceneAssembly& assembly, std::uint64_t cover) {
+  Fingerprint print;
+  print.add_all(cover);
+  assembly.library.add_to(print);
+  for (const auto& [p_DO, R_DO, scale, model] : assembly.placed) {
+    print.add_all(p_DO, R_DO, scale, model);
+  }
+  for (const auto& [X_DO, scale, model] : assembly.moving) {
+    print.add(std::span(X_DO.samples()));
+    print.add_all(scale, model);
+  }
+  return fmt::format("{:016x}", print.value());
+}
+
+}  // namespace
+
+SceneObjects build_scene_objects(const SceneSpec& spec, const Terrain& terrain,
+                                 std::chrono::nanoseconds begin) {
+  const RayDevice device;
+  Palette palette(spec);
+  SceneAssembly assembly{.library = ModelLibrary(device, spec.tracing)};
+  const ModelLibrary& library = assembly.library;
+  SceneObjects content;
+  LoadedCover ground = load_cover(spec.terrain, terrain, palette);
+  gather(spec, terrain, begin, palette, assembly);
+  content.fingerprint = fingerprint_of(assembly, ground.fingerprint);
+  content.groups = std::move(assembly.standing_groups);
+  for (SceneObjects::Group& group : assembly.moving_groups) {
+    group.first += static_cast<std::uint32_t>(assembly.placed.size());
+    content.groups.push_back(std::move(group));
+  }
+  content.cover = std::move(ground.cover);
+  content.memory_bytes =
+      ground.memory_bytes + library.memory_bytes() + assembly.placed.size() * sizeof(PlacedObject);
+  content.materials = palette.take();
+  content.models = library.truths();
+  content.shapes = library.shapes();
+  if (!assembly.placed.empty() || !assembly.moving.empty()) {
+    content.objects = ObjectTracer(device, library.models(), std::move(assembly.placed),
+                                   std::move(assembly.moving));
+  }
+  content.memory_bytes += device.memory_bytes();
+  return content;
+}
+
+}  // namespace groundray

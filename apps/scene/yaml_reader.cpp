@@ -1,0 +1,389 @@
+#include "apps/scene/yaml_reader.h"
+
+#include <fmt/ranges.h>
+#include <yaml-cpp/eventhandler.h>
+#include <yaml-cpp/exceptions.h>
+#include <yaml-cpp/parser.h>
+
+#include <algorithm>
+#include <array>
+#include <charconv>
+#include <cmath>
+#include <fstream>
+#include <iterator>
+#include <map>
+#include <numeric>
+#include <ranges>
+#include <sstream>
+
+namespace groundray::yaml {
+namespace {
+
+constexpr std::size_t deepest_level = 32;
+constexpr std::size_t most_listed = 200;
+
+// Builds the tree of one document. YAML::Node is not used because it reports neither aliases nor
+// repeated keys.
+class TreeBuilder : public YAML::EventHandler {
+ public:
+  explicit TreeBuilder(const std::filesystem::path& path) : path_(path) {}
+
+  Node take_root() { return std::move(root_); }
+
+  void OnDocumentStart(const YAML::Mark&) override {}
+  void OnDocumentEnd() override {}
+  void OnNull(const YAML::Mark& mark, YAML::anchor_t) override {
+    Node node = make(Node::Kind::Null, mark);
+    if (!open_.empty() && open_.back()->kind == Node::Kind::Map &&
+        open_.back()->items.size() % 2 == 1) {
+      node.line = open_.back()->items.back().line;  // an empty value has the next key's mark
+      node.column = open_.back()->items.back().column;
+    }
+    append(std::move(node));
+  }
+  void OnAlias(const YAML::Mark& mark, YAML::anchor_t) override {
+    refuse(mark, "aliases (*name) are not allowed here: write the value out");
+  }
+  void OnScalar(const YAML::Mark& mark, const std::string& tag, YAML::anchor_t,
+                const std::string& value) override {
+    Node node = make(tag == "?" ? Node::Kind::Plain : Node::Kind::Quoted, mark);
+    node.text = value;
+    append(std::move(node));
+  }
+  void OnSequenceStart(const YAML::Mark& mark, const std::string&, YAML::anchor_t,
+                       YAML::EmitterStyle::value) override {
+    begin(make(Node::Kind::List, mark), mark);
+  }
+  void OnSequenceEnd() override { open_.pop_back(); }
+  void OnMapStart(const YAML::Mark& mark, const std::string&, YAML::anchor_t,
+                  YAML::EmitterStyle::value) override {
+    begin(make(Node::Kind::Map, mark), mark);
+  }
+  void OnMapEnd() override { open_.pop_back(); }
+
+ private:
+  static Node make(Node::Kind kind, const YAML::Mark& mark) {
+    return {
+        .kind = kind, .line = mark.line + 1, .column = mark.column + 1, .text = {}, .items = {}};
+  }
+
+  Node& append(Node node) {
+    if (open_.empty()) return root_ = std::move(node);
+    // A list grows only while none of its items is open, so that pointers in open_ stay valid.
+    return open_.back()->items.emplace_back(std::move(node));
+  }
+
+  void begin(Node node, const YAML::Mark& mark) {
+    if (open_.size() == deepest_level) refuse(mark, "nested too deeply for a file of groundray");
+    open_.push_back(&append(std::move(node)));
+  }
+
+  [[noreturn]] void refuse(const YAML::Mark& mark, std::string_view why) const {
+    throw Error("{}:{}:{}: {}", path_.string(), mark.line + 1, mark.column + 1, why);
+  }
+
+  const std::filesystem::path& path_;
+  Node root_;
+  std::vector<Node*> open_;
+};
+
+bool is_scalar(const Node& node) {
+  return node.kind == Node::Kind::Plain || node.kind == Node::Kind::Quoted;
+}
+
+// Returns a text as shown in messages: short, and on one line.
+std::string excerpt(std::string_view text) {
+  constexpr std::size_t longest = 40;
+  std::string shown(text.substr(0, longest));
+  std::ranges::replace_if(
+      shown, [](unsigned char c) { return c < ' ' || c == 127; }, '?');
+  return shown + (text.size() > longest ? "..." : "");
+}
+
+// Returns the number that a text represents; NaN for infinities, NaN and overflow; nullopt for
+// other text.
+std::optional<double> spelled_number(std::string_view text) {
+  constexpr std::array<std::string_view, 3> not_finite{".inf", "-.inf", ".nan"};
+  std::string lower(text);
+  std::ranges::transform(lower, lower.begin(), [](char c) {
+    return c >= 'A' && c <= 'Z' ? static_cast<char>(c + 32) : c;
+  });
+  if (lower.starts_with('+') && !lower.starts_with("+-")) lower.erase(0, 1);
+  if (std::ranges::count(not_finite, lower) > 0) return std::numeric_limits<double>::quiet_NaN();
+  double value = 0;
+  const auto [end, fault] = std::from_chars(lower.data(), lower.data() + lower.size(), value);
+  if (end != lower.data() + lower.size() || fault == std::errc::invalid_argument)
+    return std::nullopt;
+  if (fault != std::errc{}) return std::numeric_limits<double>::quiet_NaN();
+  return value;
+}
+
+// Returns a key without the units at its end.
+std::string_view without_unit(std::string_view key) {
+  constexpr std::array<std::string_view, 25> units{
+      "m",  "km",  "cm",  "mm",  "um",   "nm",  "ft",  "s",   "ms",  "us", "ns", "min", "h",
+      "hz", "khz", "rpm", "rad", "mrad", "deg", "kmh", "kph", "mph", "px", "w",  "kt"};
+  for (auto cut = key.rfind('_'); cut != std::string_view::npos && cut > 0; cut = key.rfind('_')) {
+    if (std::ranges::count(units, key.substr(cut + 1)) == 0) break;
+    key = key.substr(0, cut);
+  }
+  return key;
+}
+
+// Returns the Levenshtein distance.
+std::size_t edit_distance(std::string_view a, std::string_view b) {
+  std::vector<std::size_t> row(b.size() + 1);
+  std::iota(row.begin(), row.end(), std::size_t{0});
+  for (std::size_t i = 0; i < a.size(); ++i) {
+    std::size_t diagonal = std::exchange(row[0], i + 1);
+    for (std::size_t j = 0; j < b.size(); ++j) {
+      const std::size_t replaced = diagonal + (a[i] == b[j] ? 0 : 1);
+      diagonal = row[j + 1];
+      row[j + 1] = std::min({replaced, diagonal + 1, row[j] + 1});
+    }
+  }
+  return row.back();
+}
+
+}  // namespace
+
+std::string read_file(const std::filesystem::path& path) {
+  namespace fs = std::filesystem;
+  constexpr std::uintmax_t largest_file_bytes = 16u << 20;
+  std::error_code fault;
+  if (!fs::is_regular_file(path, fault)) throw Error("{}: there is no such file", path.string());
+  if (fs::file_size(path, fault) > largest_file_bytes) {
+    throw Error("{}: larger than the limit of 16 MiB", path.string());
+  }
+  std::ifstream file(path, std::ios::binary);
+  std::string text{std::istreambuf_iterator<char>(file), {}};
+  if (!file) throw Error("{}: cannot be read", path.string());
+  return text;
+}
+
+Node parse(const std::string& text, const std::filesystem::path& path) {
+  TreeBuilder tree(path);
+  try {
+    std::istringstream stream(text);
+    YAML::Parser parser(stream);
+    if (!parser.HandleNextDocument(tree)) throw Error("{}:1:1: the file is empty", path.string());
+    Node root = tree.take_root();
+    TreeBuilder second(path);
+    if (parser.HandleNextDocument(second)) {
+      throw Error("{}:{}:1: a second document begins here: a file must contain one", path.string(),
+                  second.take_root().line);
+    }
+    return root;
+  } catch (const YAML::Exception& fault) {
+    throw Error("{}:{}:{}: not YAML: {}", path.string(), fault.mark.line + 1, fault.mark.column + 1,
+                fault.msg);
+  }
+}
+
+std::string shown(const Node& node) {
+  if (node.kind == Node::Kind::Null) return "empty";
+  if (node.kind == Node::Kind::List) return fmt::format("a list of {}", node.items.size());
+  if (node.kind == Node::Kind::Map) return "a map";
+  return fmt::format("'{}'", excerpt(node.text));
+}
+
+void Faults::note(const Node& node, std::string_view key, const std::string& message) {
+  faults_.push_back(
+      {node.line, node.column,
+       fmt::format("{}:{}:{}: {}{}", path_.string(), node.line, node.column,
+                   key.empty() ? "" : fmt::format("key '{}': ", excerpt(key)), message)});
+}
+
+void Faults::throw_if_any() {
+  if (faults_.empty()) return;
+  std::ranges::stable_sort(faults_, {}, [](const Fault& f) { return std::pair(f.line, f.column); });
+  std::vector<std::string_view> messages;
+  for (const Fault& fault : faults_ | std::views::take(most_listed)) {
+    messages.push_back(fault.message);
+  }
+  const std::string more = fmt::format("\n... and {} more", faults_.size() - messages.size());
+  throw Error("{}{}", fmt::join(messages, "\n"), faults_.size() > most_listed ? more : "");
+}
+
+std::optional<double> number(const Node& node, std::string_view key, Rule rule, Faults& faults) {
+  const auto value = node.kind == Node::Kind::Plain ? spelled_number(node.text) : std::nullopt;
+  if (!value) {
+    faults.add(
+        node, key,
+        "is {}, but must be a number: write it without quotes or unit, in the unit of the key",
+        shown(node));
+  } else if (!std::isfinite(*value)) {
+    faults.add(node, key, "is {}, but must be a finite number", shown(node));
+  } else if (!rule.holds(*value)) {
+    faults.add(node, key, "is {}, but {}", node.text, rule.words);
+  } else {
+    return value;
+  }
+  return std::nullopt;
+}
+
+bool numbers(const Node& node, std::string_view key, std::span<double> into, Rule rule,
+             Faults& faults) {
+  if (node.kind != Node::Kind::List || node.items.size() != into.size()) {
+    faults.add(node, key, "is {}, but must be a list of {} numbers", shown(node), into.size());
+    return false;
+  }
+  std::vector<double> values;
+  for (const Node& item : node.items) {
+    if (const auto value = number(item, key, rule, faults)) values.push_back(*value);
+  }
+  if (values.size() != into.size()) return false;
+  std::ranges::copy(values, into.begin());
+  return true;
+}
+
+bool is_text(const Node& node, std::string_view key, Faults& faults) {
+  const bool text = is_scalar(node) && !node.text.empty();
+  if (!text) faults.add(node, key, "is {}, but must be a text", shown(node));
+  return text;
+}
+
+Map::Map(const Node& node, std::string_view key, Faults& faults) : node_(node), faults_(faults) {
+  if (node.kind != Node::Kind::Map) {
+    faults.add(node, key, "is {}, but must be a map of keys and values", shown(node));
+    return;
+  }
+  std::map<std::string_view, int> lines;
+  for (std::size_t i = 0; i < node.items.size(); i += 2) {
+    const Node& name = node.items[i];
+    if (!is_scalar(name)) {
+      faults.add(name, key, "{} cannot be a key", shown(name));
+    } else if (const auto [first, fresh] = lines.emplace(name.text, name.line); !fresh) {
+      faults.add(name, name.text, "repeated; first given in line {}", first->second);
+    }
+  }
+}
+
+const Node* Map::find(std::string_view key, Need need) {
+  known_.emplace_back(key);
+  if (node_.kind != Node::Kind::Map) return nullptr;
+  for (std::size_t i = 0; i < node_.items.size(); i += 2) {
+    if (is_scalar(node_.items[i]) && node_.items[i].text == key) return &node_.items[i + 1];
+  }
+  absent_.emplace_back(key);
+  if (need == Need::Required) missing_.emplace_back(key);
+  return nullptr;
+}
+
+const Node* Map::read_number(std::string_view key, Need need, double& into, Rule rule) {
+  const Node* node = find(key, need);
+  const auto value = node ? number(*node, key, rule, faults_) : std::nullopt;
+  if (!value) return nullptr;
+  into = *value;
+  return node;
+}
+
+const Node* Map::read_scaled(std::string_view key, Need need, double scale, double& into,
+                             Rule rule) {
+  double value = 0;
+  const Node* node = read_number(key, need, value, rule);
+  if (node) into = value * scale;
+  return node;
+}
+
+const Node* Map::read_numbers(std::string_view key, Need need, std::span<double> into, Rule rule) {
+  const Node* node = find(key, need);
+  return node && numbers(*node, key, into, rule, faults_) ? node : nullptr;
+}
+
+const Node* Map::read_text(std::string_view key, Need need, std::string& into) {
+  const Node* node = find(key, need);
+  if (!node || !is_text(*node, key, faults_)) return nullptr;
+  into = node->text;
+  return node;
+}
+
+const Node* Map::read_whole(std::string_view key, Need need, std::uint64_t& into,
+                            std::uint64_t max) {
+  const Node* node = find(key, need);
+  if (!node) return nullptr;
+  std::uint64_t value = 0;
+  const char* const end = node->text.data() + node->text.size();
+  const auto [stop, fault] = std::from_chars(node->text.data(), end, value);
+  if (node->kind == Node::Kind::Plain && stop == end && fault == std::errc{} && value <= max) {
+    into = value;
+    return node;
+  }
+  faults_.add(*node, key, "is {}, but must be a whole number from 0 to {}", shown(*node), max);
+  return nullptr;
+}
+
+const Node* Map::read_choice(std::string_view key, Need need, std::size_t& index,
+                             const std::vector<std::string>& words) {
+  const Node* node = find(key, need);
+  if (!node || !is_text(*node, key, faults_)) return nullptr;
+  const auto word = std::ranges::find(words, node->text);
+  if (word != words.end()) {
+    index = static_cast<std::size_t>(word - words.begin());
+    return node;
+  }
+  faults_.add(*node, key, "is {}, but must be one of {}{}", shown(*node), fmt::join(words, ", "),
+              suggestion(node->text, words));
+  return nullptr;
+}
+
+std::span<const Node> Map::list(std::string_view key, Need need) {
+  const Node* node = find(key, need);
+  if (!node) return {};
+  if (node->kind != Node::Kind::List)
+    faults_.add(*node, key, "is {}, but must be a list", shown(*node));
+  return node->kind == Node::Kind::List ? std::span(node->items) : std::span<const Node>();
+}
+
+std::optional<Map> Map::map(std::string_view key, Need need) {
+  const Node* node = find(key, need);
+  if (!node) return std::nullopt;
+  return std::optional<Map>(std::in_place, *node, key, faults_);
+}
+
+void Map::close() {
+  if (node_.kind != Node::Kind::Map) return;
+  for (std::size_t i = 0; i < node_.items.size(); i += 2) {
+    const Node& name = node_.items[i];
+    if (!is_scalar(name) || std::ranges::count(known_, name.text) > 0) continue;
+    faults_.add(name, name.text, "unknown{}", suggestion(name.text, absent_));
+    if (const auto meant = nearest(name.text, absent_)) std::erase(missing_, *meant);
+  }
+  close_partly();
+}
+
+void Map::close_partly() {
+  if (node_.kind != Node::Kind::Map) return;
+  for (const std::string& key : missing_) faults_.add(node_, key, "missing");
+}
+
+std::optional<std::string> nearest(std::string_view word,
+                                   const std::vector<std::string>& candidates) {
+  std::optional<std::string> best;
+  std::size_t best_distance = 1 + word.size() / 3;  // farther apart, it is a different word
+  for (const std::string& candidate : candidates) {
+    if (without_unit(candidate) == without_unit(word)) return candidate;
+    if (candidate.size() > word.size() + best_distance) continue;
+    if (word.size() > candidate.size() + best_distance) continue;
+    const std::size_t distance = edit_distance(word, candidate);
+    if (distance <= best_distance && (!best || distance < best_distance)) {
+      best = candidate;
+      best_distance = distance;
+    }
+  }
+  return best;
+}
+
+void check_version(Map& root, std::string_view key, Faults& faults) {
+  std::uint64_t version = 1;
+  if (const Node* at = root.read_whole(key, Need::Required, version); at && version != 1) {
+    faults.add(*at, key, "is {}, but this version of groundray reads only format 1", version);
+  }
+}
+
+std::string suggestion(std::string_view word, const std::vector<std::string>& candidates) {
+  const auto meant = nearest(word, candidates);
+  return meant ? fmt::format("; did you mean '{}'?", *meant) : "";
+}
+
+}  // namespace groundray::yaml

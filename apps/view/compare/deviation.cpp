@@ -1,0 +1,194 @@
+#include "apps/view/compare/deviation.h"
+
+#include <fmt/format.h>
+#include <tbb/blocked_range.h>
+#include <tbb/parallel_for.h>
+
+#include <algorithm>
+#include <atomic>
+#include <cmath>
+#include <glm/common.hpp>
+#include <glm/geometric.hpp>
+#include <limits>
+
+#include "apps/scene/interruption.h"
+#include "core/error.h"
+#include "core/quantile.h"
+#include "reconstruction/mesh/accuracy/accuracy.h"
+
+namespace groundray {
+namespace {
+
+constexpr float not_measured = std::numeric_limits<float>::quiet_NaN();
+constexpr std::size_t block_places = 65'536;  // points between two checks of the stop token
+
+// Computes one deviation for each point on all cores, with checks of the stop token in between.
+// @param measure  called with the first index, the end index and the output array.
+template <typename Measure>
+Deviation measured(std::size_t count, const std::stop_token& stop, const ShareDone& progress,
+                   const Measure& measure) {
+  Deviation deviation{.signed_m = std::vector<float>(count, not_measured), .figures = {}};
+  for (std::size_t begin = 0; begin < count; begin += block_places) {
+    if (stop.stop_requested()) throw Interrupted{};
+    if (progress) progress(static_cast<double>(begin) / static_cast<double>(count));
+    const std::size_t end = std::min(begin + block_places, count);
+    tbb::parallel_for(tbb::blocked_range<std::size_t>(begin, end, 256),
+                      [&](const tbb::blocked_range<std::size_t>& some) {
+                        measure(some.begin(), some.end(), deviation.signed_m);
+                      });
+  }
+  if (progress) progress(1);
+  deviation.figures = figures_of(deviation.signed_m);
+  return deviation;
+}
+
+std::vector<double> known(const std::vector<float>& signed_m) {
+  std::vector<double> values;
+  values.reserve(signed_m.size());
+  for (const float value : signed_m) {
+    if (std::isfinite(value)) values.push_back(value);
+  }
+  return values;
+}
+
+std::string length_text(double length_m) {
+  return std::isnan(length_m) ? "none" : fmt::format("{:.4g} m", length_m);
+}
+
+}  // namespace
+
+Deviation deviation_from_ground(const std::vector<glm::dvec3>& places_m, const Ground& truth,
+                                const glm::dvec3& shift_m, const std::stop_token& stop,
+                                const ShareDone& progress) {
+  return measured(places_m.size(), stop, progress,
+                  [&](std::size_t begin, std::size_t end, std::vector<float>& into) {
+                    for (std::size_t i = begin; i < end; ++i) {
+                      const glm::dvec3 p = places_m[i] + shift_m;
+                      if (!std::isfinite(p.x + p.y + p.z)) continue;
+                      if (const auto ground_m = truth.height_m_at(glm::dvec2(p)))
+                        into[i] = static_cast<float>(p.z - *ground_m);
+                    }
+                  });
+}
+
+Deviation deviation_from_mesh(const std::vector<glm::dvec3>& places_m, const TrueMesh& truth,
+                              const glm::dvec3& shift_m, const std::stop_token& stop,
+                              const ShareDone& progress) {
+  return measured(places_m.size(), stop, progress,
+                  [&](std::size_t begin, std::size_t end, std::vector<float>& into) {
+                    std::uint32_t near = 0;
+                    for (std::size_t i = begin; i < end; ++i) {
+                      into[i] =
+                          static_cast<float>(truth.signed_distance_m(places_m[i] + shift_m, near));
+                    }
+                  });
+}
+
+// The weight function is called for every sample of the surface, so it can throw on a stop request.
+std::vector<Agreement> agreement_until(const TriangleMesh& mesh, const TriangleMesh& truth,
+                                       std::span<const double> tolerances_m,
+                                       const std::stop_token& stop) {
+  const SurfaceWeight all_alike = [&](std::uint32_t, const glm::dvec3&) {
+    if (stop.stop_requested()) throw Interrupted{};
+    return 1.0;
+  };
+  const auto precision = MeshDistance(mesh, truth).within(tolerances_m, {}, all_alike);
+  const auto completeness = MeshDistance(truth, mesh).within(tolerances_m, {}, all_alike);
+  std::vector<Agreement> all;
+  for (std::size_t k = 0; k < tolerances_m.size(); ++k)
+    all.push_back({tolerances_m[k], precision[k], completeness[k]});
+  return all;
+}
+
+DeviationFigures figures_of(const std::vector<float>& signed_m) {
+  std::vector<double> values = known(signed_m);
+  DeviationFigures figures{.count = values.size(), .beyond = signed_m.size() - values.size()};
+  double sum_m = 0, sum2_m2 = 0;
+  for (const double value : values) {
+    sum_m += value;
+    sum2_m2 += value * value;
+  }
+  const auto count = static_cast<double>(values.size());
+  figures.mean_m = sum_m / count;
+  figures.rms_m = std::sqrt(sum2_m2 / count);
+  if (values.empty()) {
+    figures.median_m = figures.nmad_m = figures.p95_m = figures.largest_m = figures.low_m =
+        figures.high_m = not_measured;
+    return figures;
+  }
+  const auto [low, high] = std::ranges::minmax(values);
+  figures.low_m = low;
+  figures.high_m = high;
+  figures.largest_m = std::max(std::abs(low), std::abs(high));
+  figures.median_m = median(values);
+  figures.nmad_m = nmad(values);
+  for (double& value : values) value = std::abs(value);
+  figures.p95_m = quantile(std::move(values), 0.95);
+  return figures;
+}
+
+DeviationHistogram histogram_of(const std::vector<float>& signed_m, std::size_t bins,
+                                std::optional<std::pair<double, double>> range_m) {
+  std::vector<double> values = known(signed_m);
+  if (!range_m) {
+    range_m = {-1e-3, 1e-3};
+    if (!values.empty()) {
+      const double low = std::min(quantile(values, 0.005), 0.0);
+      const double high = std::max(quantile(values, 0.995), 0.0);
+      if (low < high) range_m = {low, high};
+    }
+  }
+  const auto [low, high] = *range_m;
+  if (bins == 0 || !(low < high) || !std::isfinite(high - low))
+    throw Error("a histogram of {} bins from {} to {} m is empty: are its limits swapped?", bins,
+                low, high);
+  DeviationHistogram histogram{low, high, std::vector<std::size_t>(bins), 0, 0};
+  for (const double value : values) {
+    if (value < low) {
+      ++histogram.below;
+    } else if (value > high) {
+      ++histogram.above;
+    } else {
+      const auto bin =
+          static_cast<std::size_t>((value - low) / (high - low) * static_cast<double>(bins));
+      ++histogram.counts[std::min(bin, bins - 1)];
+    }
+  }
+  return histogram;
+}
+
+std::vector<std::string> figure_lines(const DeviationFigures& figures) {
+  std::vector<std::string> lines{fmt::format("points {}", figures.count),
+                                 fmt::format("mean {}", length_text(figures.mean_m)),
+                                 fmt::format("RMS {}", length_text(figures.rms_m)),
+                                 fmt::format("median {}", length_text(figures.median_m)),
+                                 fmt::format("NMAD {}", length_text(figures.nmad_m)),
+                                 fmt::format("95 % within {}", length_text(figures.p95_m)),
+                                 fmt::format("lowest {}", length_text(figures.low_m)),
+                                 fmt::format("highest {}", length_text(figures.high_m))};
+  if (figures.beyond > 0)
+    lines.push_back(fmt::format("{} points beyond the truth", figures.beyond));
+  return lines;
+}
+
+std::vector<std::string> agreement_lines(const std::vector<Agreement>& agreements) {
+  std::vector<std::string> lines;
+  for (const Agreement& at : agreements) {
+    lines.push_back(fmt::format("within {}: precision {:.2f} %, completeness {:.2f} %, F1 {:.2f} %",
+                                length_text(at.tolerance_m), 100 * at.precision.value,
+                                100 * at.completeness.value, 100 * at.f1().value));
+  }
+  return lines;
+}
+
+std::vector<glm::dvec3> sample_places_m(const HeightGrid& dem) {
+  std::vector<glm::dvec3> places_m;
+  places_m.reserve(dem.heights_m().size());
+  for (int row = 0; row < dem.rows(); ++row) {
+    for (int column = 0; column < dem.columns(); ++column)
+      places_m.emplace_back(dem.frame().to_D({column, row}), dem.height_m(column, row));
+  }
+  return places_m;
+}
+
+}  // namespace groundray

@@ -1,0 +1,126 @@
+#include "apps/view/layers/object_layer.h"
+
+#include <fmt/format.h>
+#include <vtkPointData.h>
+
+#include <algorithm>
+#include <cstdint>
+#include <glm/geometric.hpp>
+#include <optional>
+
+#include "apps/view/layers/ground_colour.h"
+#include "apps/view/layers/mesh_layer.h"
+#include "apps/view/rendering/colour_table.h"
+#include "core/error.h"
+
+namespace groundray {
+namespace {
+
+struct Shown {
+  std::uint32_t number = 0;  // number of the object
+  PlacedObject place;
+};
+
+std::optional<Materials::InColour> material_colours(const Simulation& simulation) {
+  try {
+    if (simulation.content.materials.all().empty()) return std::nullopt;
+    return simulation.content.materials.in_colour();
+  } catch (const Error&) {
+    return std::nullopt;  // the spectra do not cover the visible range
+  }
+}
+
+// Returns the objects nearest to a point, at least one, within a number of triangles; ordered by
+// number.
+std::vector<Shown> nearest(const Simulation& simulation, const SceneObjects::Group& group,
+                           std::chrono::nanoseconds time, const glm::dvec3& near_m,
+                           std::size_t most_triangles) {
+  std::vector<Shown> all;
+  for (std::uint32_t i = 0; i < group.count; ++i)
+    all.push_back({group.first + i, simulation.content.objects.placed_at(group.first + i, time)});
+  const auto distance = [&](const Shown& one) {
+    return glm::length(glm::dvec2(one.place.p_DO - near_m));
+  };
+  std::ranges::stable_sort(all, {}, distance);
+  std::size_t triangles = 0, kept = 0;
+  for (; kept < all.size(); ++kept) {
+    const ModelScene& model = simulation.content.objects.models()[all[kept].place.model];
+    triangles += model.model().mesh.triangles.size();
+    if (triangles > most_triangles && kept > 0) break;
+  }
+  all.resize(kept);
+  std::ranges::sort(all, {}, &Shown::number);
+  return all;
+}
+
+// Values of each triangle.
+struct Cells {
+  std::vector<float> label, instance;
+  std::vector<std::uint8_t> rgb;
+};
+
+glm::dvec3 colour_of(const Simulation& simulation,
+                     const std::optional<Materials::InColour>& colours, std::uint32_t model,
+                     std::uint16_t surface) {
+  const ModelTruth& truth = simulation.content.models[model];
+  if (colours && surface < truth.materials.size() &&
+      truth.materials[surface] < colours->albedos.size())
+    return glm::dvec3(colours->albedos[truth.materials[surface]]);
+  return 0.4 * colour_of_kind(truth.label);
+}
+
+void add_model(const Simulation& simulation, const Shown& shown,
+               const std::optional<Materials::InColour>& colours, TriangleMesh& mesh,
+               Cells& cells) {
+  const Model& model = simulation.content.objects.models()[shown.place.model].model();
+  const auto first = static_cast<std::uint32_t>(mesh.vertices_m.size());
+  for (const glm::dvec3& p : model.mesh.vertices_m)
+    mesh.vertices_m.push_back(shown.place.p_DO + shown.place.R_DO * (shown.place.scale * p));
+  for (std::size_t i = 0; i < model.mesh.triangles.size(); ++i) {
+    mesh.triangles.push_back(model.mesh.triangles[i] + first);
+    const glm::u8vec3 rgb =
+        shown_colour(colour_of(simulation, colours, shown.place.model, model.surface_of[i]));
+    for (glm::length_t k = 0; k < 3; ++k) cells.rgb.push_back(rgb[k]);
+  }
+  const std::size_t count = mesh.triangles.size();
+  cells.label.resize(count, static_cast<float>(simulation.content.models[shown.place.model].label));
+  cells.instance.resize(count, static_cast<float>(shown.number));
+}
+
+}  // namespace
+
+Layer object_layer(const Simulation& simulation, std::size_t group, std::chrono::nanoseconds time,
+                   const glm::dvec3& near_m, std::size_t most_triangles) {
+  const SceneObjects::Group& entry = simulation.content.groups.at(group);
+  const auto colours = material_colours(simulation);
+  const std::vector<Shown> shown = nearest(simulation, entry, time, near_m, most_triangles);
+  TriangleMesh mesh;
+  Cells cells;
+  for (const Shown& one : shown) add_model(simulation, one, colours, mesh, cells);
+  Layer layer = mesh_layer(fmt::format("objects/{}", entry.name), mesh,
+                           simulation.terrain.header().origin_w_m);
+  constexpr auto of_cells = LayerColumn::Of::Cells;
+  add_column(
+      layer,
+      {.name = "label", .unit = "", .of = of_cells, .categories = {{entry.label, entry.name}}},
+      cells.label);
+  add_column(layer, {.name = "instance", .unit = "", .of = of_cells}, cells.instance);
+  add_colours(layer, {.name = "colour", .unit = "", .of = of_cells}, cells.rgb);
+  layer.coloured_by = "colour";
+  layer.facts.insert(layer.facts.begin(),
+                     fmt::format("{} of {} objects", shown.size(), entry.count));
+  return layer;
+}
+
+std::vector<Layer> object_layers(const Simulation& simulation, std::chrono::nanoseconds time,
+                                 const glm::dvec3& near_m, std::size_t most_triangles) {
+  std::vector<Layer> layers;
+  const std::size_t groups = simulation.content.groups.size();
+  for (std::size_t i = 0; i < groups; ++i) {
+    layers.push_back(object_layer(simulation, i, time, near_m, most_triangles / (groups - i)));
+    most_triangles -= std::min(most_triangles, layers.back().triangles());
+  }
+  return layers;
+}
+
+}  // namespace groundray

@@ -1,0 +1,33 @@
+#pragma once
+
+#include <glm/vec3.hpp>
+#include <memory>
+#include <vector>
+
+#include "apps/scene/simulation.h"
+#include "apps/view/recorded/recorded_sensor.h"
+#include "apps/view/rendering/layer.h"
+#include "apps/view/rendering/view.h"
+
+namespace groundray {
+
+/// Returns the layers of a scene's sensors at their first frames: "sensors/NAME" with axes, mount
+/// and field of view, and "path/NAME" with the trajectory.
+std::vector<Layer> sensor_layers(const Simulation& simulation);
+
+/// Returns the same layers for a dataset, at the start of each sensor's trajectory.
+std::vector<Layer> sensor_layers(const RecordedRun& run);
+
+/// Returns the position of a scene's platform in the middle of its run, in D.
+glm::dvec3 middle_of_run(const Simulation& simulation);
+
+/// Returns a viewpoint behind and above a target, as for an eye that follows it.
+/// @param at_w_m      target.
+/// @param ahead       direction of motion; only its horizontal part is used.
+/// @param distance_m  approximate distance from the target.
+Look look_at(const glm::dvec3& at_w_m, const glm::dvec3& ahead, double distance_m);
+
+/// Returns the recommended viewpoint on a scene's platform at the start of its run.
+Look look_at_platform(const Simulation& simulation);
+
+}  // namespace groundray

@@ -1,0 +1,68 @@
+#pragma once
+
+#include <cstddef>
+#include <filesystem>
+#include <glm/vec3.hpp>
+#include <memory>
+#include <stop_token>
+
+#include "apps/scene/simulation.h"
+#include "apps/view/rendering/layer.h"
+
+namespace groundray {
+
+/// Level of detail of displayed terrain.
+struct TerrainDrawing {
+  double angle_rad = 2.5e-4;        ///< permitted deviation per metre of distance
+  std::size_t triangles = 600'000;  ///< approximate limit, kept by doubling the angle
+  std::size_t memory_bytes = std::size_t{512} << 20U;  ///< limit for the clipmap's windows
+};
+
+/// Terrain meshed for one viewpoint.
+struct FollowedTerrain {
+  /// Layer "terrain", as from terrain_layer(); with the column "colour" if it belongs to a scene
+  /// whose ground has materials. Its `coarse` is meshed with a larger angle.
+  Layer layer;
+  std::size_t triangles = 0, leaves = 0;
+  int levels = 0;
+  std::size_t memory_bytes = 0;  ///< memory of the clipmap's samples and of the drawn data
+  double rebuild_s = 0;          ///< time to build this
+  double angle_rad = 0;          ///< permitted deviation per metre of distance, after doublings
+  bool is_angle_kept = true;     ///< false: distant terrain exceeds it, for lack of memory
+};
+
+/// Quadtree and clipmap of a terrain, for moving viewpoints.
+class TerrainFollower {
+ public:
+  /// Constructs the follower of a scene's terrain, with its relief.
+  /// @param stop  requests a stop of the certification that a large DEM requires.
+  /// @throws Error as Terrain.
+  /// @throws Interrupted if a stop is requested.
+  explicit TerrainFollower(std::shared_ptr<const Simulation> simulation,
+                           const TerrainDrawing& drawing = {}, const std::stop_token& stop = {});
+  /// Constructs the follower of a DEM file. A DEM in geographic coordinates is warped to its UTM
+  /// zone.
+  /// @throws Error, Interrupted as above.
+  explicit TerrainFollower(const std::filesystem::path& dem, const TerrainDrawing& drawing = {},
+                           const std::stop_token& stop = {});
+  ~TerrainFollower();
+  TerrainFollower(const TerrainFollower&) = delete;
+  TerrainFollower& operator=(const TerrainFollower&) = delete;
+
+  /// Returns the terrain meshed for a viewpoint. The displayed result depends on the viewpoint
+  /// alone. Any thread may call this; concurrent calls run one after another. Parts that remain in
+  /// use are taken from the previous call.
+  /// @throws Error if a tile cannot be read.
+  FollowedTerrain follow(const glm::dvec3& viewpoint_w_m);
+
+  /// Returns the origin of D, in W.
+  const glm::dvec3& origin_w_m() const;
+  /// Returns a viewpoint, in W, from which the whole terrain is visible.
+  glm::dvec3 overview_w_m() const;
+
+ private:
+  struct Impl;
+  std::unique_ptr<Impl> impl_;
+};
+
+}  // namespace groundray

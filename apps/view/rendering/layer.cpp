@@ -1,0 +1,180 @@
+#include "apps/view/rendering/layer.h"
+
+#include <vtkCellArray.h>
+#include <vtkCellData.h>
+#include <vtkFloatArray.h>
+#include <vtkPointData.h>
+#include <vtkPoints.h>
+#include <vtkTypeInt32Array.h>
+#include <vtkUnsignedCharArray.h>
+
+#include <algorithm>
+#include <cmath>
+#include <limits>
+
+#include "core/error.h"
+
+namespace groundray {
+namespace {
+
+vtkDataSetAttributes* attributes(const Layer& layer, LayerColumn::Of of) {
+  if (of == LayerColumn::Of::Points) return layer.data->GetPointData();
+  return layer.data->GetCellData();
+}
+
+std::size_t rows(const Layer& layer, LayerColumn::Of of) {
+  return static_cast<std::size_t>(of == LayerColumn::Of::Points ? layer.data->GetNumberOfPoints()
+                                                                : layer.data->GetNumberOfCells());
+}
+
+void check_length(const Layer& layer, const LayerColumn& column, std::size_t values) {
+  if (values == rows(layer, column.of)) return;
+  throw Error("column '{}' of layer '{}' has {} rows, its data {}: both must have the same number",
+              column.name, layer.name, values, rows(layer, column.of));
+}
+
+void put(Layer& layer, LayerColumn column) {
+  std::erase_if(layer.columns, [&](const LayerColumn& old) { return old.name == column.name; });
+  layer.columns.push_back(std::move(column));
+}
+
+// VTK's default of 64 bits would take twice the memory.
+vtkSmartPointer<vtkTypeInt32Array> int_array(std::size_t size) {
+  auto array = vtkSmartPointer<vtkTypeInt32Array>::New();
+  array->SetNumberOfValues(static_cast<vtkIdType>(size));
+  return array;
+}
+
+vtkSmartPointer<vtkCellArray> cells_of(vtkTypeInt32Array* offsets, vtkTypeInt32Array* points) {
+  auto cells = vtkSmartPointer<vtkCellArray>::New();
+  cells->SetData(offsets, points);
+  return cells;
+}
+
+}  // namespace
+
+std::size_t Layer::points() const { return static_cast<std::size_t>(data->GetNumberOfPoints()); }
+
+std::size_t Layer::triangles() const { return static_cast<std::size_t>(data->GetNumberOfPolys()); }
+
+const LayerColumn* Layer::find(const std::string& column) const {
+  const auto found =
+      std::ranges::find_if(columns, [&](const LayerColumn& one) { return one.name == column; });
+  return found == columns.end() ? nullptr : &*found;
+}
+
+double Layer::value(const LayerColumn& column, vtkIdType row) const {
+  vtkDataArray* const array = attributes(*this, column.of)->GetArray(column.name.c_str());
+  if (array == nullptr || row < 0 || row >= array->GetNumberOfTuples())
+    return std::numeric_limits<double>::quiet_NaN();
+  return array->GetComponent(row, 0);
+}
+
+glm::dvec3 Layer::p_w_m(vtkIdType point) const {
+  glm::dvec3 p;
+  data->GetPoint(point, &p.x);
+  return p + origin_w_m;
+}
+
+void add_column(Layer& layer, LayerColumn column, std::span<const float> values) {
+  check_length(layer, column, values.size());
+  auto array = vtkSmartPointer<vtkFloatArray>::New();
+  array->SetName(column.name.c_str());
+  array->SetNumberOfValues(static_cast<vtkIdType>(values.size()));
+  std::ranges::copy(values, array->GetPointer(0));
+  attributes(layer, column.of)->AddArray(array);
+  column.range = colour_range(values, column.scale);
+  put(layer, std::move(column));
+}
+
+void add_colours(Layer& layer, LayerColumn column, std::span<const std::uint8_t> rgb) {
+  check_length(layer, column, rgb.size() / 3);
+  auto array = vtkSmartPointer<vtkUnsignedCharArray>::New();
+  array->SetName(column.name.c_str());
+  array->SetNumberOfComponents(3);
+  array->SetNumberOfTuples(static_cast<vtkIdType>(rgb.size() / 3));
+  std::ranges::copy(rgb, array->GetPointer(0));
+  attributes(layer, column.of)->AddArray(array);
+  column.is_rgb = true;
+  column.range = {0, 255};
+  put(layer, std::move(column));
+}
+
+glm::dvec2 colour_range(std::span<const float> values, ColourScale scale) {
+  std::vector<float> finite;
+  finite.reserve(values.size());
+  for (const float value : values) {
+    if (std::isfinite(value)) finite.push_back(value);
+  }
+  if (finite.empty()) return {0, 1};
+  const auto least_and_greatest = std::ranges::minmax(finite);
+  double low = least_and_greatest.min, high = least_and_greatest.max;
+  const auto quantile = [&](std::size_t rank) {
+    std::ranges::nth_element(finite, finite.begin() + static_cast<std::ptrdiff_t>(rank));
+    return static_cast<double>(finite[rank]);
+  };
+  const std::size_t few = finite.size() / 200;
+  const double usual_low = quantile(few), usual_high = quantile(finite.size() - 1 - few);
+  if (usual_high > usual_low && high - low > 2 * (usual_high - usual_low)) {
+    low = usual_low;
+    high = usual_high;
+  }
+  if (scale == ColourScale::Signed && low < 0 && high > 0) {
+    high = std::max(high, -low);
+    low = -high;
+  }
+  return {low, high};
+}
+
+vtkSmartPointer<vtkPolyData> make_points(std::size_t points) {
+  auto places = vtkSmartPointer<vtkPoints>::New();
+  places->SetNumberOfPoints(static_cast<vtkIdType>(points));
+  auto data = vtkSmartPointer<vtkPolyData>::New();
+  data->SetPoints(places);
+  std::ranges::fill(coordinates(*data), 0.0f);
+  return data;
+}
+
+std::span<float> coordinates(vtkPolyData& data) {
+  auto* const array = vtkFloatArray::SafeDownCast(data.GetPoints()->GetData());
+  if (array == nullptr) throw Error("a layer's points must be floats");
+  return {array->GetPointer(0), static_cast<std::size_t>(array->GetNumberOfValues())};
+}
+
+void set_triangles(vtkPolyData& data, std::span<const glm::uvec3> triangles) {
+  const auto offsets = int_array(triangles.size() + 1);
+  const auto points = int_array(triangles.size() * 3);
+  for (std::size_t i = 0; i <= triangles.size(); ++i)
+    offsets->SetValue(static_cast<vtkIdType>(i), static_cast<vtkTypeInt32>(3 * i));
+  for (std::size_t i = 0; i < triangles.size(); ++i) {
+    for (glm::length_t k = 0; k < 3; ++k) {
+      points->SetValue(vtkIdType{3} * static_cast<vtkIdType>(i) + k,
+                       static_cast<vtkTypeInt32>(triangles[i][k]));
+    }
+  }
+  data.SetPolys(cells_of(offsets, points));
+}
+
+void set_lines(vtkPolyData& data, std::span<const std::size_t> lengths) {
+  const auto offsets = int_array(lengths.size() + 1);
+  std::size_t all = 0;
+  offsets->SetValue(0, 0);
+  for (std::size_t i = 0; i < lengths.size(); ++i) {
+    all += lengths[i];
+    offsets->SetValue(static_cast<vtkIdType>(i) + 1, static_cast<vtkTypeInt32>(all));
+  }
+  const auto points = int_array(all);
+  for (std::size_t i = 0; i < all; ++i)
+    points->SetValue(static_cast<vtkIdType>(i), static_cast<vtkTypeInt32>(i));
+  data.SetLines(cells_of(offsets, points));
+}
+
+std::span<const std::int32_t> corners(vtkPolyData& data) {
+  vtkCellArray* const polys = data.GetPolys();
+  if (polys->GetNumberOfCells() == 0) return {};
+  polys->ConvertTo32BitStorage();
+  auto* const points = polys->GetConnectivityArray32();
+  return {points->GetPointer(0), static_cast<std::size_t>(points->GetNumberOfValues())};
+}
+
+}  // namespace groundray

@@ -1,0 +1,94 @@
+#pragma once
+
+#include <vtkRenderWindow.h>
+#include <vtkRenderer.h>
+#include <vtkSmartPointer.h>
+
+#include <glm/vec2.hpp>
+#include <glm/vec3.hpp>
+#include <memory>
+#include <optional>
+#include <string>
+#include <utility>
+#include <vector>
+
+#include "apps/view/rendering/layer.h"
+#include "core/image/image.h"
+
+namespace groundray {
+
+/// Viewpoint and target of a view.
+struct Look {
+  glm::dvec3 from_w_m{0};
+  glm::dvec3 at_w_m{0};
+  glm::dvec3 up{0, 0, 1};
+};
+
+/// Element under a click.
+struct Picked {
+  std::string layer;
+  LayerColumn::Of of = LayerColumn::Of::Points;
+  vtkIdType row = 0;  ///< index of the point or cell in the layer's data
+  glm::dvec3 p_w_m{0};
+};
+
+/// Layers in a render window, on or off screen. Not thread-safe.
+class View {
+ public:
+  /// Constructs an empty view in `window`, which must outlive this.
+  explicit View(const vtkSmartPointer<vtkRenderWindow>& window);
+  ~View();
+  View(const View&) = delete;
+  View& operator=(const View&) = delete;
+
+  /// Adds a layer. A layer of the same name is replaced; the new one takes over its visibility,
+  /// opacity, wireframe, point size and, if it has that column, colours. The reference stays valid
+  /// until the layer is removed or replaced.
+  /// @throws Error if the layer has no data, or names a column that its data lack.
+  Layer& add(Layer layer);
+  void remove(const std::string& name);  ///< no effect if there is none
+  /// Returns the layer of that name, or null.
+  const Layer* find(const std::string& name) const;
+  /// Returns all layers in the order in which they were added.
+  std::vector<const Layer*> layers() const;
+
+  /// Selects the column that a layer is coloured by.
+  /// @throws Error, as do all setters below, that names the missing layer or column.
+  void colour_by(const std::string& layer, const std::string& column);  ///< empty: one colour
+  /// Sets the range that a column's colours span, in the layer and the legend.
+  void set_range(const std::string& layer, const std::string& column, glm::dvec2 range);
+  void set_visible(const std::string& layer, bool visible);
+  void set_opacity(const std::string& layer, double opacity);
+  void set_wireframe(const std::string& layer, bool wireframe);
+  void set_point_size(const std::string& layer, double size_px);
+
+  /// Draws less detail while the view moves, to sustain the frame rate.
+  void set_moving(bool moving);
+  void set_legend_visible(bool visible);
+
+  /// Looks from the south and above at everything that is visible, or at one layer.
+  void fit();
+  void fit(const std::string& layer);
+  void look(const Look& look);
+  Look current_look() const;
+
+  /// Returns the element under a pixel, counted from the window's upper left corner as in Qt: the
+  /// point of a cloud nearest to it within a few pixels, unless a surface hides it; otherwise the
+  /// surface.
+  std::optional<Picked> pick(int x_px, int y_px) const;
+  /// Returns the origin in W and the direction of a pixel's line of sight.
+  std::pair<glm::dvec3, glm::dvec3> line_of_sight(int x_px, int y_px) const;
+
+  void render();
+  /// Returns the view as an RGB picture; drawn in tiles if it is larger than the window may be.
+  Image8 picture(glm::ivec2 size_px);
+
+  vtkRenderer* renderer() const;
+  vtkRenderWindow* window() const;
+
+ private:
+  struct Impl;
+  std::unique_ptr<Impl> impl_;
+};
+
+}  // namespace groundray

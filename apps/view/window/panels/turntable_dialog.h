@@ -1,0 +1,55 @@
+#pragma once
+
+#include <QDialog>
+#include <QTimer>
+#include <filesystem>
+#include <functional>
+#include <glm/vec2.hpp>
+#include <string>
+
+#include "apps/view/rendering/view.h"
+
+class QLabel;
+class QLineEdit;
+class QProgressBar;
+class QPushButton;
+class QSpinBox;
+
+namespace groundray {
+
+/// Dialog for a turntable: writes pictures of a full turn round the target as 0000.png, 0001.png
+/// and so on, one after the other, while the window stays responsive.
+class TurntableDialog : public QDialog {
+ public:
+  struct Hooks {
+    /// Writes a picture from a viewpoint; an exception ends the turn.
+    std::function<void(const Look&, const std::filesystem::path&, glm::ivec2 size_px)> write{};
+    std::function<void(const std::string&)> failed{};  ///< error message
+  };
+
+  /// @param begin  first viewpoint.
+  TurntableDialog(const Look& begin, glm::ivec2 size_px, Hooks hooks, QWidget* parent);
+
+  bool is_writing() const { return next_.isActive(); }
+  void reject() override;  // while writing, only stops that
+
+ private:
+  void build(glm::ivec2 size_px);
+  QWidget* build_folder();
+  void begin();
+  void write_next();
+  void stop(const QString& why);
+
+  Look begin_;
+  Hooks hooks_;
+  QTimer next_;
+  int written_ = 0;
+  QSpinBox *pictures_ = nullptr, *width_ = nullptr, *height_ = nullptr;
+  QLineEdit* folder_ = nullptr;
+  QWidget* asked_ = nullptr;  // all input widgets
+  QProgressBar* progress_ = nullptr;
+  QLabel* status_ = nullptr;
+  QPushButton* write_ = nullptr;
+};
+
+}  // namespace groundray

@@ -1,0 +1,64 @@
+#include "core/geometry/pose.h"
+
+#include <cmath>
+#include <glm/geometric.hpp>
+
+namespace groundray {
+
+Pose operator*(const Pose& X_AB, const Pose& X_BC) {
+  return {X_AB.rotation * X_BC.rotation, X_AB * X_BC.translation_m};
+}
+
+glm::dvec3 operator*(const Pose& X_AB, const glm::dvec3& p_BQ) {
+  return X_AB.translation_m + X_AB.rotation * p_BQ;
+}
+
+Pose inverse(const Pose& X_AB) {
+  const glm::dquat back = glm::conjugate(X_AB.rotation);
+  return {back, -(back * X_AB.translation_m)};
+}
+
+glm::dquat rotation_from_yaw_pitch_roll(double yaw_rad, double pitch_rad, double roll_rad) {
+  return glm::angleAxis(yaw_rad, glm::dvec3(0, 0, 1)) *
+         glm::angleAxis(pitch_rad, glm::dvec3(0, 1, 0)) *
+         glm::angleAxis(roll_rad, glm::dvec3(1, 0, 0));
+}
+
+Screw::Screw(const Pose& end) : axis_(0), along_m_(end.translation_m) {
+  glm::dquat q = end.rotation;
+  if (q.w < 0) q = -q;
+  const glm::dvec3 vector(q.x, q.y, q.z);
+  const double sine = glm::length(vector);
+  if (sine == 0) return;
+  axis_ = vector / sine;
+  angle_rad_ = 2 * std::atan2(sine, q.w);
+
+  // The end point determines the linear part v of the twist: p = V v, where V has an inverse in
+  // closed form. With w = angle * axis,
+  // p(s) = axis (axis . v) s + (sin/angle) v_perp + ((1 - cos)/angle) axis x v.
+  const glm::dvec3& p = end.translation_m;
+  const double half = angle_rad_ / 2;
+  const glm::dvec3 parallel = axis_ * glm::dot(axis_, p);
+  const glm::dvec3 across = p - parallel;
+  const glm::dvec3 v = across * (half / std::tan(half)) - glm::cross(axis_, across) * half;
+  along_m_ = parallel;
+  sine_m_ = v / angle_rad_;
+  versine_m_ = glm::cross(axis_, v) / angle_rad_;
+}
+
+Pose Screw::at(double s) const {
+  const double half = angle_rad_ * s / 2;
+  const double sine = std::sin(half);
+  const double cosine = std::cos(half);
+  const glm::dvec3 translation =
+      along_m_ * s + sine_m_ * (2 * sine * cosine) + versine_m_ * (2 * sine * sine);
+  return {glm::dquat(cosine, axis_ * sine), translation};
+}
+
+Velocity Screw::velocity_at(double s) const {
+  const double angle = angle_rad_ * s;
+  return {along_m_ + angle_rad_ * (sine_m_ * std::cos(angle) + versine_m_ * std::sin(angle)),
+          axis_ * angle_rad_};
+}
+
+}  // namespace groundray

@@ -1,0 +1,280 @@
+#include "core/image/exr_reader.h"
+
+#include <OpenEXR/ImfChannelList.h>
+#include <OpenEXR/ImfDoubleAttribute.h>
+#include <OpenEXR/ImfFloatAttribute.h>
+#include <OpenEXR/ImfFrameBuffer.h>
+#include <OpenEXR/ImfHeader.h>
+#include <OpenEXR/ImfIO.h>
+#include <OpenEXR/ImfInputPart.h>
+#include <OpenEXR/ImfIntAttribute.h>
+#include <OpenEXR/ImfMatrixAttribute.h>
+#include <OpenEXR/ImfMultiPartInputFile.h>
+#include <OpenEXR/ImfPartType.h>
+#include <OpenEXR/ImfStringAttribute.h>
+#include <OpenEXR/ImfTileDescription.h>
+#include <OpenEXR/ImfVecAttribute.h>
+#include <fmt/ranges.h>
+
+#include <algorithm>
+#include <cstddef>
+#include <cstdint>
+#include <cstring>
+#include <iterator>
+#include <optional>
+#include <set>
+#include <span>
+#include <stdexcept>
+#include <type_traits>
+#include <utility>
+
+#include "core/error.h"
+#include "core/image/image_errors.h"
+#include "core/io/file_io.h"
+
+namespace groundray {
+namespace {
+
+constexpr std::int64_t most_values = 4 * most_image_pixels;
+
+class BytesStream : public Imf::IStream {
+ public:
+  BytesStream(std::string_view bytes, const std::string& name)
+      : IStream(name.c_str()), bytes_(bytes) {}
+  bool read(char to[], int count) override {
+    const auto size = static_cast<std::size_t>(std::max(count, 0));
+    if (position_ > bytes_.size() || size > bytes_.size() - position_) {
+      throw std::runtime_error("unexpected end of file");
+    }
+    std::memcpy(to, bytes_.data() + position_, size);
+    position_ += size;
+    return position_ < bytes_.size();
+  }
+  std::uint64_t tellg() override { return position_; }
+  void seekg(std::uint64_t position) override { position_ = position; }
+
+ private:
+  std::string_view bytes_;
+  std::uint64_t position_ = 0;
+};
+
+/// A rectangle of pixels.
+struct Window {
+  Imath::Box2i data;
+  std::int64_t width = 0, height = 0;
+
+  explicit Window(const Imath::Box2i& box)
+      : data(box),
+        width(std::int64_t{box.max.x} - box.min.x + 1),
+        height(std::int64_t{box.max.y} - box.min.y + 1) {}
+};
+
+std::optional<std::string> text_of(const Imf::Attribute& attribute) {
+  const auto joined = [](const auto* values, std::size_t count) {
+    return fmt::format("{}", fmt::join(std::span(values, count), " "));
+  };
+  if (const auto* text = dynamic_cast<const Imf::StringAttribute*>(&attribute))
+    return text->value();
+  if (const auto* whole = dynamic_cast<const Imf::IntAttribute*>(&attribute))
+    return fmt::format("{}", whole->value());
+  if (const auto* number = dynamic_cast<const Imf::FloatAttribute*>(&attribute))
+    return fmt::format("{}", number->value());
+  if (const auto* number = dynamic_cast<const Imf::DoubleAttribute*>(&attribute))
+    return fmt::format("{}", number->value());
+  if (const auto* vector = dynamic_cast<const Imf::V2fAttribute*>(&attribute))
+    return joined(vector->value().getValue(), 2);
+  if (const auto* vector = dynamic_cast<const Imf::V3fAttribute*>(&attribute))
+    return joined(vector->value().getValue(), 3);
+  if (const auto* matrix = dynamic_cast<const Imf::M33fAttribute*>(&attribute))
+    return joined(matrix->value().getValue(), 9);
+  if (const auto* matrix = dynamic_cast<const Imf::M44fAttribute*>(&attribute))
+    return joined(matrix->value().getValue(), 16);
+  return std::nullopt;
+}
+
+/// Rejects unsupported parts before OpenEXR allocates memory for them.
+void check_part(const Imf::Header& header, const Window& window, const Imath::Box2i& first,
+                const std::string& name) {
+  check_size(name, window.width, window.height);
+  if (header.hasType() && Imf::isDeepData(header.type())) {
+    throw Error(
+        "{}: deep pixels are not supported; each channel must have one value per pixel: flatten "
+        "the image",
+        name);
+  }
+  if (window.data != first) {
+    throw Error(
+        "{}: its parts differ in size or position; they must be equal: save each part as a "
+        "separate file (exrmultipart -separate)",
+        name);
+  }
+  if (header.hasTileDescription()) {
+    const Imf::TileDescription& tiles = header.tileDescription();
+    check_size(name + ": its tiles", tiles.xSize, tiles.ySize);
+  }
+  const auto& channels = header.channels();
+  for (auto channel = channels.begin(); channel != channels.end(); ++channel) {
+    if (channel.channel().xSampling == 1 && channel.channel().ySampling == 1) continue;
+    throw Error(
+        "{}: its channel {} is subsampled by {} x {}; each channel must have full resolution: save "
+        "it as RGB",
+        name, channel.name(), channel.channel().xSampling, channel.channel().ySampling);
+  }
+}
+
+/// Returns the name of a channel in the whole file.
+std::string whole_name(const Imf::Header& header, int part, const std::string& channel) {
+  if (part == 0 || !header.hasName() || header.name().empty() ||
+      channel.starts_with(header.name() + ".")) {
+    return channel;
+  }
+  return header.name() + "." + channel;
+}
+
+template <typename T>
+void add(Imf::FrameBuffer& pixels, const char* channel, Imf::PixelType type, const Window& window,
+         Image<T>& image) {
+  image = Image<T>(static_cast<int>(window.width), static_cast<int>(window.height), 1);
+  auto* const base = reinterpret_cast<char*>(image.values().data());
+  pixels.insert(channel, Imf::Slice::Make(type, base, window.data, sizeof(T),
+                                          sizeof(T) * static_cast<std::size_t>(window.width)));
+}
+
+// The frame buffer points to the pixels, which must stay in place while channels are added.
+static_assert(std::is_nothrow_move_constructible_v<ExrChannel>);
+
+std::vector<ExrChannel> read_part(Imf::MultiPartInputFile& file, int part, const Window& window) {
+  const Imf::Header& header = file.header(part);
+  std::vector<ExrChannel> result;
+  Imf::FrameBuffer pixels;
+  const auto& channels = header.channels();
+  for (auto channel = channels.begin(); channel != channels.end(); ++channel) {
+    ExrChannel& to = result.emplace_back(ExrChannel{whole_name(header, part, channel.name()), {}});
+    if (channel.channel().type == Imf::UINT) {
+      add(pixels, channel.name(), Imf::UINT, window, to.image.emplace<Image32>());
+    } else {
+      add(pixels, channel.name(), Imf::FLOAT, window, to.image.emplace<ImageF>());
+    }
+  }
+  Imf::InputPart input(file, part);
+  input.setFrameBuffer(pixels);
+  input.readPixels(window.data.min.y, window.data.max.y);
+  return result;
+}
+
+/// Checks all parts, their total size, and that no two channels have the same name.
+void check_parts(const Imf::MultiPartInputFile& file, const std::string& name) {
+  std::set<std::string> names;
+  std::int64_t values = 0;
+  for (int part = 0; part < file.parts(); ++part) {
+    const Imf::Header& header = file.header(part);
+    const Window window(header.dataWindow());
+    check_part(header, window, file.header(0).dataWindow(), name);
+    for (auto channel = header.channels().begin(); channel != header.channels().end(); ++channel) {
+      const std::string whole = whole_name(header, part, channel.name());
+      if (!names.insert(whole).second) {
+        throw Error("{}: two of its channels are named {}; save each part as a separate file", name,
+                    whole);
+      }
+      values += window.width * window.height;
+      if (values > most_values) {
+        throw Error("{}: it has more than {} values; scale it down or save fewer channels", name,
+                    most_values);
+      }
+    }
+  }
+}
+
+/// Checks the size that each attribute declares: OpenEXR allocates it before it reads the
+/// attribute.
+/// @see OpenEXR File Layout, "Headers".
+void check_attribute_sizes(std::string_view bytes) {
+  constexpr std::size_t version_at = 4, headers_at = 8;
+  constexpr std::uint32_t multipart_flag = 0x1000;
+  std::size_t position = headers_at;
+  const auto ends_too_soon = [] { return std::runtime_error("unexpected end of file"); };
+  const auto read_whole_number = [&](std::size_t at) {  // little-endian
+    if (at > bytes.size() || bytes.size() - at < 4) throw ends_too_soon();
+    std::uint32_t value = 0;
+    for (std::size_t i = 4; i-- > 0;)
+      value = value << 8 | static_cast<unsigned char>(bytes[at + i]);
+    return value;
+  };
+  const auto read_text = [&] {
+    const std::size_t end = bytes.find('\0', position);
+    if (end == std::string_view::npos) throw ends_too_soon();
+    return bytes.substr(std::exchange(position, end + 1), end - position);
+  };
+  const bool has_parts = (read_whole_number(version_at) & multipart_flag) != 0;
+  bool is_header_empty = true;
+  while (true) {
+    const std::string_view name = read_text();
+    if (name.empty()) {  // ends a header; an empty header ends those of a file with several parts
+      if (!has_parts || is_header_empty) return;
+      is_header_empty = true;
+      continue;
+    }
+    is_header_empty = false;
+    read_text();  // type
+    const std::uint32_t size = read_whole_number(position);
+    position += 4;
+    if (size > bytes.size() - position) {
+      throw std::runtime_error(fmt::format(
+          "its attribute {} of {} bytes extends beyond the end of the file", name, size));
+    }
+    position += size;
+  }
+}
+
+ExrFile decode(std::string_view bytes, const std::string& name) {
+  check_attribute_sizes(bytes);
+  BytesStream stream(bytes, name);
+  Imf::MultiPartInputFile file(stream);
+  check_parts(file, name);
+  const Imf::Header& first = file.header(0);
+  const Window window(first.dataWindow());
+  const Window display(first.displayWindow());
+  check_size(name + ": its display window", display.width, display.height);
+  ExrFile result{
+      .width = static_cast<int>(window.width),
+      .height = static_cast<int>(window.height),
+      .corner_px = {window.data.min.x - display.data.min.x, window.data.min.y - display.data.min.y},
+      .display_size_px = {static_cast<int>(display.width), static_cast<int>(display.height)},
+      .channels = {},
+      .attributes = {}};
+  for (auto attribute = first.begin(); attribute != first.end(); ++attribute) {
+    if (auto text = text_of(attribute.attribute()))
+      result.attributes.emplace(attribute.name(), *std::move(text));
+  }
+  for (int part = 0; part < file.parts(); ++part) {
+    std::ranges::move(read_part(file, part, window), std::back_inserter(result.channels));
+  }
+  return result;
+}
+
+}  // namespace
+
+const ExrChannel* ExrFile::find(std::string_view name) const {
+  const auto found = std::ranges::find(channels, name, &ExrChannel::name);
+  return found == channels.end() ? nullptr : &*found;
+}
+
+ExrFile read_exr(const std::filesystem::path& path) {
+  return parse_exr(read_text(path), path.string());
+}
+
+ExrFile parse_exr(std::string_view bytes, const std::string& name) {
+  if (!bytes.starts_with(exr_magic)) {
+    throw Error("{}: it is not an OpenEXR (.exr) image{}", name,
+                bytes.empty() ? ": it is empty" : ", despite its name: convert it");
+  }
+  try {
+    return decode(bytes, name);
+  } catch (const Error&) {
+    throw;
+  } catch (const std::exception& fault) {
+    throw_damaged(name, "OpenEXR", fault.what());
+  }
+}
+
+}  // namespace groundray

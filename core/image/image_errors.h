@@ -1,0 +1,34 @@
+#pragma once
+
+#include <string>
+#include <string_view>
+
+#include "core/error.h"
+#include "core/image/image_io.h"
+
+namespace groundray {
+
+// First bytes of float images.
+inline constexpr std::string_view hdr_magic = "#?";
+inline constexpr std::string_view exr_magic = "\x76\x2f\x31\x01";
+
+inline bool is_image_f(std::string_view bytes) {
+  return bytes.starts_with(hdr_magic) || bytes.starts_with(exr_magic);
+}
+
+[[noreturn]] inline void throw_damaged(const std::string& name, std::string_view format,
+                                       std::string_view fault) {
+  throw Error("{}: it is truncated or damaged: {} ({}); copy or save it again", name, fault,
+              format);
+}
+
+inline void check_size(const std::string& name, std::int64_t width, std::int64_t height) {
+  if (width <= 0 || height <= 0 || width > most_image_pixels / height) {
+    throw Error(
+        "{}: it has {} x {} pixels; it must have at least one and at most {} (16384 x 16384): "
+        "scale it down or split it",
+        name, width, height, most_image_pixels);
+  }
+}
+
+}  // namespace groundray

@@ -1,0 +1,205 @@
+#include "core/image/image_io.h"
+
+#include <png.h>
+
+#include <algorithm>
+#include <array>
+#include <bit>
+#include <csetjmp>
+#include <cstdio>
+#include <cstring>
+#include <limits>
+#include <vector>
+
+#include "core/error.h"
+#include "core/image/image_errors.h"
+#include "core/io/file_io.h"
+// libjpeg's headers need <cstdio> before them.
+#include <jerror.h>
+#include <jpeglib.h>
+
+namespace groundray {
+namespace {
+
+using namespace std::string_view_literals;
+
+constexpr std::string_view png_magic = "\x89PNG\r\n\x1a\n"sv;
+constexpr std::string_view jpeg_magic = "\xff\xd8\xff"sv;
+
+/// Decoder of PNG. libpng and libjpeg report errors by longjmp, which must not skip a destructor:
+/// the steps passed to attempt() only call the library and own nothing.
+class PngReader {
+ public:
+  PngReader(std::string_view bytes, const std::string& name)
+      : name_(name),
+        rest_(bytes),
+        png_(png_create_read_struct(PNG_LIBPNG_VER_STRING, this, on_fault, ignore)),
+        info_(png_ != nullptr ? png_create_info_struct(png_) : nullptr) {
+    if (info_ == nullptr) throw_damaged(name_, "PNG", "not enough memory to read it");
+  }
+  ~PngReader() { png_destroy_read_struct(&png_, &info_, nullptr); }
+  PngReader(const PngReader&) = delete;
+  PngReader& operator=(const PngReader&) = delete;
+
+  /// Returns the image with 8 or 16 bits per value, whatever the file has.
+  template <typename T>
+  Image<T> read() {
+    attempt([this] {
+      png_set_user_limits(png_, PNG_UINT_31_MAX, PNG_UINT_31_MAX);
+      png_set_read_fn(png_, this, next);
+      png_read_info(png_, info_);
+    });
+    const png_uint_32 height = png_get_image_height(png_, info_);
+    check_size(name_, png_get_image_width(png_, info_), height);
+    attempt([this] {
+      png_set_expand(png_);
+      if constexpr (sizeof(T) == 1) {
+        png_set_scale_16(png_);
+      } else {
+        png_set_expand_16(png_);
+        if constexpr (std::endian::native == std::endian::little) png_set_swap(png_);
+      }
+      png_set_interlace_handling(png_);
+      png_read_update_info(png_, info_);
+    });
+    Image<T> image(static_cast<int>(png_get_image_width(png_, info_)), static_cast<int>(height),
+                   png_get_channels(png_, info_));
+    std::vector<png_bytep> rows;
+    for (int y = 0; y < image.height(); ++y) {
+      rows.push_back(reinterpret_cast<png_bytep>(image.at(0, y).data()));
+    }
+    attempt([this, &rows] {
+      png_read_image(png_, rows.data());
+      png_read_end(png_, nullptr);
+    });
+    return image;
+  }
+
+ private:
+  template <typename Step>
+  void attempt(const Step& step) {
+    if (setjmp(png_jmpbuf(png_)) != 0) throw_damaged(name_, "PNG", fault_.data());
+    step();
+  }
+  [[noreturn]] static void on_fault(png_structp png, png_const_charp fault) {
+    auto& self = *static_cast<PngReader*>(png_get_error_ptr(png));
+    std::snprintf(self.fault_.data(), self.fault_.size(), "%s", fault);
+    png_longjmp(png, 1);
+  }
+  static void ignore(png_structp, png_const_charp) {}
+  static void next(png_structp png, png_bytep to, std::size_t size) {
+    auto& self = *static_cast<PngReader*>(png_get_io_ptr(png));
+    if (size > self.rest_.size()) png_error(png, "unexpected end of file");
+    std::memcpy(to, self.rest_.data(), size);
+    self.rest_.remove_prefix(size);
+  }
+
+  const std::string& name_;
+  std::string_view rest_;
+  std::array<char, 128> fault_{};
+  png_structp png_;
+  png_infop info_;
+};
+
+class JpegReader {
+ public:
+  JpegReader(std::string_view bytes, const std::string& name) : name_(name) {
+    jpeg_.err = jpeg_std_error(&faults_);
+    jpeg_.client_data = this;
+    faults_.error_exit = on_fault;
+    faults_.emit_message = on_warning;
+    attempt([&] {
+      jpeg_create_decompress(&jpeg_);
+      jpeg_mem_src(&jpeg_, reinterpret_cast<const unsigned char*>(bytes.data()), bytes.size());
+    });
+  }
+  ~JpegReader() { jpeg_destroy_decompress(&jpeg_); }
+  JpegReader(const JpegReader&) = delete;
+  JpegReader& operator=(const JpegReader&) = delete;
+
+  Image8 read() {
+    attempt([this] { jpeg_read_header(&jpeg_, TRUE); });
+    check_size(name_, jpeg_.image_width, jpeg_.image_height);
+    if (jpeg_.jpeg_color_space == JCS_CMYK || jpeg_.jpeg_color_space == JCS_YCCK) {
+      throw Error("{}: its colours are CMYK; they must be grey or RGB: convert the image", name_);
+    }
+    jpeg_.out_color_space = jpeg_.jpeg_color_space == JCS_GRAYSCALE ? JCS_GRAYSCALE : JCS_RGB;
+    attempt([this] { jpeg_start_decompress(&jpeg_); });
+    Image8 image(static_cast<int>(jpeg_.output_width), static_cast<int>(jpeg_.output_height),
+                 jpeg_.output_components);
+    attempt([this, &image] {
+      while (jpeg_.output_scanline < jpeg_.output_height) {
+        JSAMPROW row = image.at(0, static_cast<int>(jpeg_.output_scanline)).data();
+        jpeg_read_scanlines(&jpeg_, &row, 1);
+      }
+      jpeg_finish_decompress(&jpeg_);
+    });
+    return image;
+  }
+
+ private:
+  template <typename Step>
+  void attempt(const Step& step) {
+    if (setjmp(jump_) != 0) {
+      std::array<char, JMSG_LENGTH_MAX> fault{};
+      faults_.format_message(reinterpret_cast<j_common_ptr>(&jpeg_), fault.data());
+      throw_damaged(name_, "JPEG", fault.data());
+    }
+    step();
+  }
+  [[noreturn]] static void on_fault(j_common_ptr jpeg) {
+    std::longjmp(static_cast<JpegReader*>(jpeg->client_data)->jump_, 1);
+  }
+  /// Treats missing or unreadable data as an error: libjpeg fills it with grey and only warns.
+  static void on_warning(j_common_ptr jpeg, int level) {
+    constexpr std::array harmless{JWRN_ADOBE_XFORM, JWRN_EXTRANEOUS_DATA, JWRN_JFIF_MAJOR,
+                                  JWRN_NOT_SEQUENTIAL, JWRN_TOO_MUCH_DATA};
+    const bool matters = std::ranges::find(harmless, jpeg->err->msg_code) == harmless.end();
+    if (level < 0 && matters) on_fault(jpeg);
+  }
+
+  const std::string& name_;
+  jpeg_decompress_struct jpeg_{};
+  jpeg_error_mgr faults_{};
+  std::jmp_buf jump_{};
+};
+
+/// Returns values as fractions of the maximum of T. Only the quotient is rounded: the integers are
+/// exact in float.
+template <typename T>
+ImageF fractions(const Image<T>& image) {
+  ImageF result(image.width(), image.height(), image.channels());
+  std::ranges::transform(image.values(), result.values().begin(), [](T value) {
+    return static_cast<float>(value) / static_cast<float>(std::numeric_limits<T>::max());
+  });
+  return result;
+}
+
+}  // namespace
+
+Image8 read_image8(const std::filesystem::path& path) {
+  return parse_image8(read_text(path), path.string());
+}
+
+Image8 parse_image8(std::string_view bytes, const std::string& name) {
+  if (bytes.starts_with(png_magic)) return PngReader(bytes, name).read<std::uint8_t>();
+  if (bytes.starts_with(jpeg_magic)) return JpegReader(bytes, name).read();
+  throw Error("{}: it is neither a PNG nor a JPEG image{}", name,
+              bytes.empty() ? ": it is empty" : ", despite its name: convert it");
+}
+
+ImageF read_heights(const std::filesystem::path& path) {
+  return parse_heights(read_text(path), path.string());
+}
+
+ImageF parse_heights(std::string_view bytes, const std::string& name) {
+  if (bytes.starts_with(png_magic)) {
+    return fractions(PngReader(bytes, name).read<std::uint16_t>());
+  }
+  if (bytes.starts_with(jpeg_magic)) return fractions(JpegReader(bytes, name).read());
+  if (is_image_f(bytes)) return parse_image_f(bytes, name, PictureOf::Heights);
+  throw Error("{}: it is not a PNG, JPEG, OpenEXR (.exr) or Radiance (.hdr) image{}", name,
+              bytes.empty() ? ": it is empty" : ", despite its name: convert it");
+}
+
+}  // namespace groundray

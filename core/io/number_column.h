@@ -1,0 +1,58 @@
+#pragma once
+
+#include <cstddef>
+#include <cstdint>
+#include <string>
+#include <string_view>
+#include <vector>
+
+#include "core/io/point_cloud.h"
+
+/// Numbers as stored in third-party point files, and their conversion to PointCloud columns.
+namespace groundray {
+
+/// Type of the numbers of a column.
+enum class NumberType {
+  Float16,
+  Float32,
+  Float64,
+  Int8,
+  Int16,
+  Int32,
+  Int64,
+  UInt8,
+  UInt16,
+  UInt32,
+  UInt64,
+  Bool  ///< one byte
+};
+
+/// Byte order of a number: the least or the most significant byte first.
+enum class ByteOrder { Little, Big };
+
+/// Returns the size of one number, bytes.
+std::size_t size_of(NumberType type);
+
+/// Numbers at a constant stride in memory.
+struct NumberRun {
+  const char* first = nullptr;
+  std::size_t step_bytes = 0;
+  NumberType type = NumberType::Float32;
+  ByteOrder order = ByteOrder::Little;
+};
+
+/// Constant that was subtracted from all values of a column.
+struct ColumnOrigin {
+  std::string column;
+  std::int64_t origin = 0;
+};
+
+/// Adds a column of `cloud.rows()` numbers, bit for bit where PointCloud has their type. A Float16
+/// becomes a float, a Bool one byte. 64-bit integers become doubles. If some of them lie beyond
+/// 2^53 and all span at most 2^53, as time stamps in nanoseconds do, the smallest is subtracted
+/// from all and recorded in `origins`, which is exact. If they span more, they are rounded.
+/// @throws Error if a column of that name exists.
+void add_column(PointCloud& cloud, std::string_view name, const NumberRun& run,
+                std::vector<ColumnOrigin>& origins);
+
+}  // namespace groundray

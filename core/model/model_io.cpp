@@ -1,0 +1,226 @@
+#include "core/model/model_io.h"
+
+#include <algorithm>
+#include <charconv>
+#include <cmath>
+#include <cstdint>
+#include <glm/geometric.hpp>
+#include <limits>
+#include <string>
+#include <string_view>
+#include <system_error>
+#include <utility>
+#include <vector>
+
+#include "core/error.h"
+#include "core/io/file_ending.h"
+#include "core/io/file_io.h"
+#include "core/model/assimp_guard.h"
+#include "core/model/assimp_import.h"
+#include "core/model/obj_reader.h"
+#include "core/model/ply_reader.h"
+#include "core/model/polygon_soup.h"
+
+namespace groundray {
+namespace {
+
+namespace fs = std::filesystem;
+using SoupSurface = PolygonSoup::Surface;
+
+enum class ModelForm { Obj, Ply, Stl, Gltf, Collada };
+
+ModelForm model_form_of(const fs::path& path) {
+  const std::string ending = file_ending(path);
+  if (ending == ".obj") return ModelForm::Obj;
+  if (ending == ".ply") return ModelForm::Ply;
+  if (ending == ".stl") return ModelForm::Stl;
+  if (ending == ".gltf" || ending == ".glb") return ModelForm::Gltf;
+  if (ending == ".dae") return ModelForm::Collada;
+  throw Error("{}: the name of a model must end in .obj, .ply, .stl, .gltf, .glb or .dae",
+              path.string());
+}
+
+/// Decodes percent-encoded characters of a URI, such as %41.
+std::string without_percents(std::string_view text) {
+  std::string out;
+  for (std::size_t i = 0; i < text.size(); ++i) {
+    unsigned code = 0;
+    const char* const digits = text.data() + i + 1;
+    if (text[i] == '%' && i + 2 < text.size() &&
+        std::from_chars(digits, digits + 2, code, 16).ptr == digits + 2) {
+      out += static_cast<char>(code);
+      i += 2;
+    } else {
+      out += text[i];
+    }
+  }
+  return out;
+}
+
+/// Finds a file that the model refers to, relative to the model's folder: first by its path, then
+/// by its last component, because files often contain the folders of their author's machine.
+/// @throws Error listing the paths that were tried.
+fs::path find_beside(const fs::path& model, const std::string& written) {
+  std::string tried;
+  for (std::string name : {written, without_percents(written)}) {
+    if (name.starts_with("file://")) name.erase(0, 7);
+    std::ranges::replace(name, '\\', '/');
+    for (const fs::path& relative : {fs::path(name), fs::path(name).filename()}) {
+      const fs::path path = model.parent_path() / relative;
+      std::error_code ignored;
+      if (fs::is_regular_file(path, ignored)) return path;
+      const std::string words = "'" + path.string() + "'";
+      if (tried.find(words) == std::string::npos)
+        tried += (tried.empty() ? "" : " and no ") + words;
+    }
+  }
+  throw Error("{:?} is missing: there is no {}", written, tried);
+}
+
+void find_images(const fs::path& model, std::vector<SoupSurface>& surfaces) {
+  Violations broken(model.string());
+  const auto find = [&](const SoupSurface& surface, const char* what, const std::string& written,
+                        ModelImage& image) {
+    if (written.empty()) return;
+    try {
+      image.file = find_beside(model, written);
+    } catch (const Error& fault) {
+      broken.unless(false, "surface {:?}: its {} {}", surface.looks.name, what, fault.what());
+    }
+  };
+  for (SoupSurface& surface : surfaces) {
+    if (surface.opacity == surface.albedo) surface.opacity.clear();  // the albedo's alpha decides
+    find(surface, "albedo map", surface.albedo, surface.looks.albedo);
+    find(surface, "normal map", surface.normal, surface.looks.normal);
+    find(surface, "opacity map", surface.opacity, surface.looks.opacity);
+  }
+  broken.throw_if_any();
+}
+
+struct ModelReading {
+  PolygonSoup soup;
+  double metres_per_unit = 1;  // as the file states
+  double unit_of_soup_m = 1;
+  UpAxis up = UpAxis::Z;
+  std::size_t out_of_range = 0;  // invalid polygons that the soup does not contain
+};
+
+ModelReading read_obj(const fs::path& path) {
+  const auto read_mtl = [&](const std::string& name) { return read_text(find_beside(path, name)); };
+  return {.soup = parse_obj(read_text(path), path.string(), read_mtl)};
+}
+
+ModelReading read_collada(const fs::path& path) {
+  const ColladaAsset asset = check_collada(read_text(path), path.string());
+  return {.soup = read_scene_file(path, SceneForm::Collada),
+          .metres_per_unit = asset.metres_per_unit,
+          .unit_of_soup_m = static_cast<float>(asset.metres_per_unit),
+          .up = asset.up};
+}
+
+/// Reads a glTF model. assimp omits triangles whose indices are out of range and only logs this, so
+/// they are counted by comparison with the number in the file.
+ModelReading read_gltf_model(const fs::path& path) {
+  const std::size_t named = check_gltf(read_text(path), path.string());
+  ModelReading reading{.soup = read_scene_file(path, SceneForm::Gltf), .up = UpAxis::Y};
+  reading.out_of_range = named - std::min(named, reading.soup.faces);
+  return reading;
+}
+
+ModelReading read_model_file(const fs::path& path, ModelForm form) {
+  switch (form) {
+    case ModelForm::Obj:
+      return read_obj(path);
+    case ModelForm::Ply:
+      return {.soup = parse_ply_faces(read_text(path), path.string())};
+    case ModelForm::Stl:
+      return {.soup = read_scene_file(path, SceneForm::Stl)};
+    case ModelForm::Gltf:
+      return read_gltf_model(path);
+    default:
+      return read_collada(path);
+  }
+}
+
+template <typename V>
+V turned_up(const V& v, UpAxis up) {
+  if (up == UpAxis::X) return {v.y, v.z, v.x};
+  if (up == UpAxis::Y) return {v.z, v.x, v.y};
+  return v;
+}
+
+void turn_and_scale(ModelReading& reading, const ModelOptions& options) {
+  const UpAxis up = options.up.value_or(reading.up);
+  const double scale =
+      options.metres_per_unit.value_or(reading.metres_per_unit) / reading.unit_of_soup_m;
+  for (glm::dvec3& p : reading.soup.positions) p = scale * turned_up(p, up);
+  for (glm::vec3& n : reading.soup.normals) n = turned_up(n, up);
+  reading.soup.rounding *= scale;
+}
+
+/// Moves the surfaces that triangles use to the model, and renumbers them.
+void take_surfaces(const fs::path& path, std::vector<SoupSurface> surfaces, Model& model) {
+  std::vector<std::uint16_t> numbers(surfaces.size());
+  for (const std::uint16_t surface : model.surface_of) numbers[surface] = 1;
+  std::vector<SoupSurface> used;
+  for (std::size_t i = 0; i < surfaces.size(); ++i) {
+    if (numbers[i] == 0) continue;
+    numbers[i] = static_cast<std::uint16_t>(used.size());
+    used.push_back(std::move(surfaces[i]));
+  }
+  for (std::uint16_t& surface : model.surface_of) surface = numbers[surface];
+  find_images(path, used);
+  for (SoupSurface& surface : used) model.surfaces.push_back(std::move(surface.looks));
+}
+
+void refuse_faults(const fs::path& path, const ModelFile& file) {
+  const ModelFaults& faults = file.dropped;
+  Violations broken(path.string());
+  const auto none = [&](std::size_t count, const char* what) {
+    broken.unless(count == 0, "{} {}; repair the model, or allow them to be dropped", count, what);
+  };
+  none(faults.out_of_range, "polygons refer to a missing vertex or uv");
+  none(faults.not_finite, "polygons have a position or uv that is not finite");
+  none(faults.degenerate, "polygons or triangles have no area");
+  none(faults.entangled, "polygons intersect themselves");
+  const ModelBounds bounds = bounds_of(file.model.mesh);
+  const double size_m = glm::length(bounds.high_m - bounds.low_m);
+  broken.unless(
+      !(file.rounding_m > std::max(1e-6 * size_m, 1e-6)),
+      "positions are stored as floats and rounded by up to {:.2g} m, too much for a size of {:.3g} "
+      "m; move the model to its origin, or write it as .obj or .ply with doubles",
+      file.rounding_m, size_m);
+  broken.throw_if_any();
+}
+
+}  // namespace
+
+ModelFile read_model(const fs::path& path, const ModelOptions& options) {
+  const double scale = options.metres_per_unit.value_or(1);
+  if (!(scale > 0 && std::isfinite(scale))) {
+    throw Error("{}: metres_per_unit = {} must be positive", path.string(), scale);
+  }
+  const ModelForm form = model_form_of(path);
+  ModelReading reading = read_model_file(path, form);
+  PolygonSoup& soup = reading.soup;
+  turn_and_scale(reading, options);
+  if (soup.surfaces.size() > std::numeric_limits<std::uint16_t>::max()) {
+    throw Error("{}: there are {} surfaces; there must be fewer than 2^16", path.string(),
+                soup.surfaces.size());
+  }
+  ModelFile file{.skipped = soup.skipped, .rounding_m = soup.rounding};
+  file.dropped.out_of_range = reading.out_of_range;
+  file.model = model_of(soup, file.dropped);
+  if (options.broken == BrokenParts::Refuse) refuse_faults(path, file);
+  if (file.model.mesh.triangles.empty()) {
+    throw Error(
+        "{}: there is no triangle; {} broken polygons were dropped, and {} points, lines or "
+        "curved patches skipped",
+        path.string(), file.dropped.total(), file.skipped);
+  }
+  take_surfaces(path, std::move(soup.surfaces), file.model);
+  check_model(file.model, path.string());
+  return file;
+}
+
+}  // namespace groundray

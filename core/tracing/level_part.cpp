@@ -1,0 +1,249 @@
+#include <tbb/parallel_for.h>
+
+#include <algorithm>
+#include <array>
+#include <cmath>
+#include <glm/common.hpp>
+#include <limits>
+#include <utility>
+
+#include "core/error.h"
+#include "core/tracing/device.h"
+#include "core/tracing/exact_query.h"
+#include "core/tracing/leaf_cells.h"
+#include "core/tracing/level_scene.h"
+
+namespace groundray {
+namespace {
+
+// Embree's primitives, except for their vertices, gathered leaf by leaf. Each leaf has its own
+// vertices, so that a leaf of any step is one dense grid.
+struct Primitives {
+  std::vector<RTCGrid> grids;
+  std::vector<glm::uvec3> triangles;
+};
+
+// Adds one triangle of a cell, unless a corner has no height. A corner that is omitted on a thinned
+// side is replaced by the next point along the boundary.
+void add_triangle(const LeafCells& cells, unsigned first_point, glm::ivec2 cell, Half half,
+                  bool other_split, LevelPart& out, Primitives& primitives) {
+  const glm::ivec2 nw = cell, ne = cell + glm::ivec2(1, 0), sw = cell + glm::ivec2(0, 1),
+                   se = cell + 1;
+  const bool is_near = half == Half::Near;
+  std::array<glm::ivec2, 3> corners =
+      other_split ? std::array{nw, se, is_near ? ne : sw} : std::array{ne, sw, is_near ? nw : se};
+  bool whole = !other_split && !(cells.leaf.deviation_m == 0 && !cells.leaf.has_holes);
+  whole &= cells.column(cell.x + 1) - cells.column(cell.x) == cells.leaf.step &&
+           cells.row(cell.y + 1) - cells.row(cell.y) == cells.leaf.step;
+  for (glm::ivec2& corner : corners) {
+    if (!cells.drops(corner)) continue;
+    if (!other_split) return;  // the other cell of the pair adds this triangle
+    whole = false;
+    const glm::ivec2 inward = cell + cell + 1 - corner;  // diagonally opposite corner of the cell
+    const bool along_row = corner.x % 2 == 1 && (corner.y == 0 || corner.y == cells.rows);
+    corner += along_row ? glm::ivec2(corner.x - inward.x, 0) : glm::ivec2(0, corner.y - inward.y);
+  }
+  glm::uvec3 triangle;
+  for (int k = 0; k < 3; ++k) {
+    const glm::ivec2 corner = corners[static_cast<std::size_t>(k)];
+    if (std::isnan(cells.height_m(corner))) return;
+    triangle[k] = first_point + static_cast<unsigned>(corner.y * (cells.columns + 1) + corner.x);
+  }
+  primitives.triangles.push_back(triangle);
+  out.triangles.push_back({{cells.column(cell.x), cells.row(cell.y),
+                            static_cast<std::int8_t>(cells.exponent), half, cells.leaf.deviation_m},
+                           whole});
+}
+
+void write_points(const LeafCells& cells, const LevelScene::Impl& level, glm::vec3* out) {
+  for (int j = 0; j <= cells.rows; ++j) {
+    for (int i = 0; i <= cells.columns; ++i) {
+      const float height_m = cells.height_m({i, j});
+      *out++ = glm::vec3(
+          point_L(level, cells.column(i), cells.row(j), std::isnan(height_m) ? 0 : height_m));
+    }
+  }
+}
+
+void add_leaf(const LeafCells& cells, unsigned first_point, LevelPart& out,
+              Primitives& primitives) {
+  const Leaf& leaf = cells.leaf;
+  const auto stride = static_cast<unsigned>(cells.columns + 1);
+  const auto [low, high] = cells.ordinary();
+  const glm::ivec2 size = glm::max(high - low, 0);
+  const bool has_grid = size.x > 0 && size.y > 0;
+  if (has_grid) {
+    const int exponent = cells.level.deciding_exponent(leaf);
+    primitives.grids.push_back(
+        {first_point + static_cast<unsigned>(low.y) * stride + static_cast<unsigned>(low.x), stride,
+         static_cast<unsigned short>(size.x + 1), static_cast<unsigned short>(size.y + 1)});
+    out.grids.push_back({cells.column(low.x), cells.row(low.y), static_cast<std::int8_t>(exponent),
+                         size.x << (cells.exponent - exponent),
+                         size.y << (cells.exponent - exponent), leaf.deviation_m});
+  }
+  for (int j = 0; j < cells.rows; ++j) {
+    for (int i = 0; i < cells.columns; ++i) {
+      if (has_grid && low.x <= i && i < high.x && low.y <= j && j < high.y) {
+        i = high.x - 1;  // covered by the grid
+        continue;
+      }
+      const Cell cell = cells.level.cell_at(leaf, cells.exponent, cells.column(i), cells.row(j));
+      const bool other_split = cell.split != Cell::Split::NorthEastToSouthWest;
+      add_triangle(cells, first_point, {i, j}, Half::Near, other_split, out, primitives);
+      add_triangle(cells, first_point, {i, j}, Half::Far, other_split, out, primitives);
+    }
+  }
+}
+
+void attach_and_release(RTCScene scene, RTCGeometry geometry, unsigned id) {
+  rtcCommitGeometry(geometry);
+  rtcAttachGeometryByID(scene, geometry, id);
+  rtcReleaseGeometry(geometry);
+}
+
+template <typename T>
+T* checked_memory(void* memory) {
+  if (memory == nullptr)
+    throw Error("ray tracer: there is not enough memory for a level's geometry");
+  return static_cast<T*>(memory);
+}
+
+template <typename T>
+void copy_to_buffer(RTCGeometry geometry, RTCBufferType type, RTCFormat format,
+                    const std::vector<T>& values) {
+  std::ranges::copy(values, checked_memory<T>(rtcSetNewGeometryBuffer(geometry, type, 0, format,
+                                                                      sizeof(T), values.size())));
+}
+
+void build_fast_part(RTCDevice device, const LevelScene::Impl& level, LevelPart& part) {
+  const std::vector<Leaf>& leaves = part.leaves;
+  std::vector<unsigned> first_points(leaves.size());
+  std::size_t point_count = 0;
+  for (std::size_t n = 0; n < leaves.size(); ++n) {
+    const LeafCells cells{level, leaves[n]};
+    first_points[n] = static_cast<unsigned>(point_count);
+    point_count +=
+        static_cast<std::size_t>(cells.columns + 1) * static_cast<std::size_t>(cells.rows + 1);
+  }
+  if (point_count > std::numeric_limits<unsigned>::max())
+    throw Error("ray tracer: a level has {} points, more than Embree supports", point_count);
+  RTCBuffer buffer = rtcNewBuffer(
+      device, point_count * sizeof(glm::vec3) + 16);  // Embree reads 16 bytes at a time
+  auto* points = checked_memory<glm::vec3>(buffer == nullptr ? nullptr : rtcGetBufferData(buffer));
+  tbb::parallel_for(std::size_t{0}, leaves.size(), [&](std::size_t n) {
+    write_points({level, leaves[n]}, level, points + first_points[n]);
+  });
+  Primitives primitives;
+  for (std::size_t n = 0; n < leaves.size(); ++n)
+    add_leaf({level, leaves[n]}, first_points[n], part, primitives);
+  const auto add = [&](RTCGeometryType type, unsigned id, auto kind, RTCFormat format,
+                       const auto& list) {
+    if (list.empty()) return;
+    RTCGeometry geometry = rtcNewGeometry(device, type);
+    rtcSetGeometryBuffer(geometry, RTC_BUFFER_TYPE_VERTEX, 0, RTC_FORMAT_FLOAT3, buffer, 0,
+                         sizeof(glm::vec3), point_count);
+    copy_to_buffer(geometry, kind, format, list);
+    attach_and_release(part.scene, geometry, id);
+  };
+  add(RTC_GEOMETRY_TYPE_GRID, block_geometry, RTC_BUFFER_TYPE_GRID, RTC_FORMAT_GRID,
+      primitives.grids);
+  add(RTC_GEOMETRY_TYPE_TRIANGLE, facet_geometry, RTC_BUFFER_TYPE_INDEX, RTC_FORMAT_UINT3,
+      primitives.triangles);
+  rtcReleaseBuffer(buffer);
+}
+
+void leaf_bounds(const RTCBoundsFunctionArguments* arguments) {
+  const auto& part = *static_cast<const LevelPart*>(arguments->geometryUserPtr);
+  const LevelScene::Impl& level = *part.built_for;
+  const LeafCells cells{level, part.leaves[arguments->primID]};
+  float low_m = std::numeric_limits<float>::infinity();
+  float high_m = -low_m;
+  for (int j = 0; j <= cells.rows; ++j) {
+    for (int i = 0; i <= cells.columns; ++i) {
+      low_m = std::min(low_m, cells.height_m({i, j}));
+      high_m = std::max(high_m, cells.height_m({i, j}));
+    }
+  }
+  const glm::dvec3 a = point_L(level, cells.column(0), cells.row(0), low_m);
+  const glm::dvec3 b = point_L(level, cells.column(cells.columns), cells.row(cells.rows), high_m);
+  const glm::vec3 low = glm::vec3(glm::min(a, b)) - part.slack_m;
+  const glm::vec3 high = glm::vec3(glm::max(a, b)) + part.slack_m;
+  RTCBounds& bounds = *arguments->bounds_o;
+  bounds.lower_x = low.x;
+  bounds.lower_y = low.y;
+  bounds.lower_z = low.z;
+  bounds.upper_x = high.x;
+  bounds.upper_y = high.y;
+  bounds.upper_z = high.z;
+}
+
+// Reports the first crossing over one leaf for each ray of a packet, in double.
+void intersect_leaf(const RTCIntersectFunctionNArguments* arguments) {
+  const auto& part = *static_cast<const LevelPart*>(arguments->geometryUserPtr);
+  const auto& query = *reinterpret_cast<const ExactQuery*>(arguments->context);
+  const LevelPart::Area& area = part.areas[arguments->primID];
+  constexpr double rim = 0.5;  // margin, in cells of the DEM
+  const glm::dvec2 low = glm::dvec2(area.first) - rim;
+  const glm::dvec2 high = glm::dvec2(area.last) + rim;
+  RTCRayN* const rays = RTCRayHitN_RayN(arguments->rayhit, arguments->N);
+  RTCHitN* const hits = RTCRayHitN_HitN(arguments->rayhit, arguments->N);
+  for (unsigned i = 0; i < arguments->N; ++i) {
+    if (arguments->valid[i] == 0) continue;
+    const unsigned lane = RTCRayN_id(rays, arguments->N, i);
+    const LevelRay& ray = query.rays[lane];
+    Crossing& best = query.crossings[lane];
+    double begin_m = ray.enter_m;
+    double end_m = std::min(ray.leave_m, best.range_m);
+    clip_range(ray.grid.u0, ray.grid.du, low.x, high.x, begin_m, end_m);
+    clip_range(ray.grid.v0, ray.grid.dv, low.y, high.y, begin_m, end_m);
+    if (!(begin_m <= end_m)) continue;
+    const auto crossing = query.surface->first_crossing(ray.grid, begin_m, end_m);
+    if (!crossing || !(crossing->range_m < best.range_m)) continue;
+    best = *crossing;
+    // tfar only prunes: it may exceed the true range slightly, but is never less.
+    float& far_m = RTCRayN_tfar(rays, arguments->N, i);
+    far_m = std::min(far_m, far_float(best.range_m - ray.enter_m, part.slack_m));
+    RTCHitN_geomID(hits, arguments->N, i) = arguments->geomID;
+    RTCHitN_primID(hits, arguments->N, i) = arguments->primID;
+  }
+}
+
+void build_exact_part(RTCDevice device, const LevelScene::Impl& level, LevelPart& part) {
+  part.built_for = &level;
+  for (const Leaf& leaf : part.leaves) {
+    const LeafCells cells{level, leaf};
+    part.areas.push_back(
+        {{cells.column(0), cells.row(0)}, {cells.column(cells.columns), cells.row(cells.rows)}});
+  }
+  RTCGeometry geometry = rtcNewGeometry(device, RTC_GEOMETRY_TYPE_USER);
+  rtcSetGeometryUserPrimitiveCount(geometry, static_cast<unsigned>(part.leaves.size()));
+  rtcSetGeometryUserData(geometry, &part);
+  rtcSetGeometryBoundsFunction(geometry, leaf_bounds, nullptr);
+  rtcSetGeometryIntersectFunction(geometry, intersect_leaf);
+  attach_and_release(part.scene, geometry, block_geometry);
+}
+
+}  // namespace
+
+LevelPart::~LevelPart() {
+  if (scene != nullptr) rtcReleaseScene(scene);
+}
+
+std::shared_ptr<const LevelPart> build_part(const LevelScene::Impl& level, glm::ivec2 place,
+                                            std::vector<Leaf> leaves) {
+  auto part = std::make_shared<LevelPart>();
+  part->place = place;
+  part->leaves = std::move(leaves);
+  part->slack_m = 2 * level.slack_m;  // so that the level's own slack may grow on reuse
+  part->scene = new_scene(level.device);
+  if (level.tracing == Tracing::Exact) {
+    build_exact_part(handle(level.device), level, *part);
+  } else {
+    build_fast_part(handle(level.device), level, *part);
+  }
+  commit(part->scene);
+  part->built_for = nullptr;
+  return part;
+}
+
+}  // namespace groundray

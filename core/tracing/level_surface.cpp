@@ -1,0 +1,443 @@
+#include "core/tracing/level_surface.h"
+
+#include <algorithm>
+#include <cmath>
+#include <limits>
+
+namespace groundray {
+namespace {
+
+constexpr double nan = std::numeric_limits<double>::quiet_NaN();
+constexpr double never_m = std::numeric_limits<double>::infinity();  // a range that is not reached
+
+// Points of a leaf, thinned along the sides that face coarser leaves.
+class LeafPoints {
+ public:
+  LeafPoints(const LevelScene::Impl& level, const Leaf& leaf, int exponent)
+      : level_(level), leaf_(leaf), exponent_(exponent) {
+    thinned_ = (1 << exponent) == leaf.step ? leaf.coarser : 0;
+  }
+  int column(int i) const { return std::min(leaf_.column + (i << exponent_), last().x); }
+  int row(int j) const { return std::min(leaf_.row + (j << exponent_), last().y); }
+  double height_m(int i, int j) const {
+    if (thinned_ != 0) {
+      if (is_dropped_in_row(i, j)) return between(column(i - 1), column(i), column(i + 1), row(j));
+      if (is_dropped_in_column(i, j)) return below(row(j - 1), row(j), row(j + 1), column(i));
+    }
+    return level_.height_m(column(i), row(j));
+  }
+  // Returns the diagonal of a cell. Along a thinned side, one cell of each pair is split along the
+  // other diagonal.
+  Cell::Split split(int i, int j) const {
+    const int end = level_.level.leaf_cells - 1;
+    const bool other =
+        thinned_ != 0 &&
+        ((j == 0 && is_thinned(Leaf::North) && i % 2 == 0 && column(i + 1) < last().x) ||
+         (i == 0 && is_thinned(Leaf::West) && j % 2 == 0 && row(j + 1) < last().y) ||
+         (j == end && is_thinned(Leaf::South) && i % 2 == 1) ||
+         (i == end && is_thinned(Leaf::East) && j % 2 == 1));
+    return other ? Cell::Split::NorthWestToSouthEast : Cell::Split::NorthEastToSouthWest;
+  }
+
+ private:
+  glm::ivec2 last() const { return level_.level.frame.samples - 1; }
+  bool is_thinned(Leaf::Side side) const { return (thinned_ & side) != 0; }
+  bool is_dropped_in_row(int i, int j) const {
+    return i % 2 == 1 && column(i) < last().x &&
+           ((j == 0 && is_thinned(Leaf::North)) ||
+            (j == level_.level.leaf_cells && is_thinned(Leaf::South)));
+  }
+  bool is_dropped_in_column(int i, int j) const {
+    return j % 2 == 1 && row(j) < last().y &&
+           ((i == 0 && is_thinned(Leaf::West)) ||
+            (i == level_.level.leaf_cells && is_thinned(Leaf::East)));
+  }
+  double between(int before, int at, int after, int row) const {
+    const double a_m = level_.height_m(before, row);
+    return a_m + (level_.height_m(after, row) - a_m) *
+                     (static_cast<double>(at - before) / (after - before));
+  }
+  double below(int before, int at, int after, int column) const {
+    const double a_m = level_.height_m(column, before);
+    return a_m + (level_.height_m(column, after) - a_m) *
+                     (static_cast<double>(at - before) / (after - before));
+  }
+
+  const LevelScene::Impl& level_;
+  const Leaf& leaf_;
+  int exponent_;
+  unsigned thinned_ = 0;
+};
+
+// Returns the t at which a ray leaves a range of coordinates.
+double exit_m(double start, double slope, double per_index_m, int low, int high) {
+  if (slope == 0) return never_m;
+  return ((slope > 0 ? high : low) - start) * per_index_m;
+}
+
+FacetPlane plane_at(const Cell& cell, const GridRay& ray, double t_m) {
+  return cell.plane(cell.half_at(ray.u0 + t_m * ray.du, ray.v0 + t_m * ray.dv));
+}
+
+int next_index(double slope, int low, int high) { return slope > 0 ? high : low - 1; }
+
+}  // namespace
+
+Cell LevelScene::Impl::cell_at(const Leaf& leaf, int exponent, int column, int row) const noexcept {
+  const int size = 1 << exponent;
+  const glm::ivec2 low(column & -size, row & -size);  // leaves are aligned to their step
+  if (leaf.coarser == 0 && low.x + size <= last.x && low.y + size <= last.y) {
+    const int points = size >> step_exponent;
+    const int x = (low.x - level.first.x) >> step_exponent;
+    const int y = (low.y - level.first.y) >> step_exponent;
+    const HeightArray& heights = level.heights;
+    return {low.x,
+            low.y,
+            size,
+            size,
+            heights(x, y),
+            heights(x + points, y),
+            heights(x, y + points),
+            heights(x + points, y + points)};
+  }
+  const LeafPoints points(*this, leaf, exponent);
+  const int i = (column - leaf.column) >> exponent;
+  const int j = (row - leaf.row) >> exponent;
+  Cell cell;
+  cell.column = points.column(i);
+  cell.row = points.row(j);
+  cell.width = points.column(i + 1) - cell.column;
+  cell.height = points.row(j + 1) - cell.row;
+  cell.nw = points.height_m(i, j);
+  cell.ne = points.height_m(i + 1, j);
+  cell.sw = points.height_m(i, j + 1);
+  cell.se = points.height_m(i + 1, j + 1);
+  cell.split = points.split(i, j);
+  return cell;
+}
+
+LevelSurface::LevelSurface(std::vector<const LevelScene::Impl*> levels)
+    : levels_(std::move(levels)) {}
+
+LevelSurface::Place LevelSurface::place_at(int column, int row) const noexcept {
+  std::uint32_t number = 0;
+  while (number + 1 < levels_.size() && !levels_[number]->contains(column, row)) ++number;
+  const LevelScene::Impl& level = *levels_[number];
+  if (const Leaf* leaf = level.leaf_at(column, row)) {
+    const int exponent = level.deciding_exponent(*leaf);
+    return {leaf, number, exponent, level.cell_at(*leaf, exponent, column, row)};
+  }
+  const glm::ivec2 first = level.level.first;
+  const int mask = (1 << level.block_exponent) - 1;
+  Cell none{column - ((column - first.x) & mask), row - ((row - first.y) & mask)};
+  none.width = std::min(mask + 1, level.last.x - none.column);
+  none.height = std::min(mask + 1, level.last.y - none.row);
+  none.nw = none.ne = none.sw = none.se = nan;
+  return {nullptr, number, 0, none};
+}
+
+void LevelSurface::move(Place& place, int column, int row) const noexcept {
+  if (place.leaf != nullptr) {
+    const LevelScene::Impl& level = *levels_[place.level];
+    const auto size = static_cast<unsigned>(level.level.leaf_cells * place.leaf->step);
+    if (static_cast<unsigned>(column - place.leaf->column) < size &&
+        static_cast<unsigned>(row - place.leaf->row) < size) {
+      place.cell = level.cell_at(*place.leaf, place.exponent, column, row);
+      return;
+    }
+  }
+  place = place_at(column, row);
+}
+
+LevelSurface::Place LevelSurface::start(const GridRay& ray, double t_m) const noexcept {
+  const LevelScene::Impl& all = *levels_.back();
+  const auto index = [&](double coordinate, int low, int high) {
+    return std::clamp(static_cast<int>(std::floor(coordinate)), low, high - 1);
+  };
+  return place_at(index(ray.u0 + t_m * ray.du, all.level.first.x, all.last.x),
+                  index(ray.v0 + t_m * ray.dv, all.level.first.y, all.last.y));
+}
+
+LevelSurface::Extent LevelSurface::cell_extent(const Place& place) noexcept {
+  return {place.cell.column, place.cell.row, place.cell.width, place.cell.height};
+}
+
+LevelSurface::Extent LevelSurface::leaf_extent(const Place& place) const noexcept {
+  if (place.leaf == nullptr) return cell_extent(place);
+  const Level& level = levels_[place.level]->level;
+  const int side = level.leaf_cells * place.leaf->step;
+  const glm::ivec2 last = level.frame.samples - 1;
+  return {place.leaf->column, place.leaf->row, std::min(side, last.x - place.leaf->column),
+          std::min(side, last.y - place.leaf->row)};
+}
+
+template <typename ExtentOf, typename Act>
+void LevelSurface::walk(const GridRay& ray, double t_begin_m, double t_end_m,
+                        const ExtentOf& extent_of, const Act& act) const noexcept {
+  const LevelScene::Impl& all = *levels_.back();
+  const glm::ivec2 first = all.level.first;
+  clip_range(ray.u0, ray.du, first.x, all.last.x, t_begin_m, t_end_m);
+  clip_range(ray.v0, ray.dv, first.y, all.last.y, t_begin_m, t_end_m);
+  if (!(t_begin_m <= t_end_m)) return;
+  Place place = start(ray, t_begin_m);
+  const double per_column_m = 1 / ray.du;
+  const double per_row_m = 1 / ray.dv;
+  for (double t_m = t_begin_m;;) {
+    const Extent at = extent_of(place);
+    const double column_exit_m =
+        exit_m(ray.u0, ray.du, per_column_m, at.column, at.column + at.width);
+    const double row_exit_m = exit_m(ray.v0, ray.dv, per_row_m, at.row, at.row + at.height);
+    const double leave_m = std::max(t_m, std::min(column_exit_m, row_exit_m));
+    if (act(place, t_m, std::min(leave_m, t_end_m)) || !(leave_m < t_end_m)) return;
+    int column, row;
+    if (column_exit_m <= row_exit_m) {
+      column = next_index(ray.du, at.column, at.column + at.width);
+      row = std::clamp(static_cast<int>(std::floor(ray.v0 + leave_m * ray.dv)), at.row,
+                       at.row + at.height - 1);
+      if (column < first.x || column >= all.last.x) return;
+    } else {
+      row = next_index(ray.dv, at.row, at.row + at.height);
+      column = std::clamp(static_cast<int>(std::floor(ray.u0 + leave_m * ray.du)), at.column,
+                          at.column + at.width - 1);
+      if (row < first.y || row >= all.last.y) return;
+    }
+    t_m = leave_m;
+    move(place, column, row);
+  }
+}
+
+double LevelSurface::clearance_m(const GridRay& ray, double t_m) const noexcept {
+  const Cell cell = start(ray, t_m).cell;
+  const double u = ray.u0 + t_m * ray.du;
+  const double v = ray.v0 + t_m * ray.dv;
+  return groundray::clearance_m(ray, cell.plane(cell.half_at(u, v)), t_m);
+}
+
+namespace {
+
+// Returns the t at which a ray passes from one triangle of a cell to the other.
+double diagonal_m(const Cell& cell, const GridRay& ray) {
+  const double sign = cell.split == Cell::Split::NorthEastToSouthWest ? 1 : -1;
+  const double offset = sign > 0 ? 1 : 0;
+  const double across = (ray.u0 - cell.column) / cell.width;
+  const double down = (ray.v0 - cell.row) / cell.height;
+  return (offset - (across + sign * down)) / (ray.du / cell.width + sign * (ray.dv / cell.height));
+}
+
+// Returns the first t from t_in on at which a ray is `above_m` above both planes of a cell;
+// infinite if never.
+double rises_to(const Cell& cell, const GridRay& ray, double above_m, double t_in) {
+  double rise_m = t_in;
+  for (const Half half : {Half::Near, Half::Far}) {
+    const FacetPlane plane = cell.plane(half);
+    const double lacks_m = above_m - clearance_m(ray, plane, t_in);
+    if (lacks_m <= 0 || std::isnan(lacks_m)) continue;
+    const double rate = ray.dz - (plane.u_slope_m * ray.du + plane.v_slope_m * ray.dv);
+    rise_m = rate > 0 ? std::max(rise_m, t_in + lacks_m / rate) : never_m;
+  }
+  return rise_m;
+}
+
+// Returns the same for a ray that begins, and stays until then, over one triangle of the cell; else
+// NaN.
+double rises_over_one(const Cell& cell, const GridRay& ray, double above_m) {
+  const Half half = cell.half_at(ray.u0, ray.v0);
+  const FacetPlane plane = cell.plane(half);
+  const double begins_m = clearance_m(ray, plane, 0);
+  const double rate = ray.dz - (plane.u_slope_m * ray.du + plane.v_slope_m * ray.dv);
+  if (!(begins_m >= 0)) return nan;
+  if (begins_m >= above_m) return 0;
+  if (!(rate > 0)) return nan;
+  const double rise_m = (above_m - begins_m) / rate;
+  const double u = ray.u0 + rise_m * ray.du, v = ray.v0 + rise_m * ray.dv;
+  const bool stays = cell.column <= u && u <= cell.column + cell.width && cell.row <= v &&
+                     v <= cell.row + cell.height && cell.half_at(u, v) == half;
+  return stays ? rise_m : nan;
+}
+
+// Follows a ray through the triangles of successive cells. The clearance at the border of two
+// triangles is computed once, so that no crossing is lost between them.
+class Descent {
+ public:
+  explicit Descent(const GridRay& ray) : ray_(ray) {}
+
+  // Returns whether the ray crosses the cell from above in [t_in, t_out]; range_m() and plane()
+  // then describe the crossing.
+  bool meets(const Cell& cell, double t_in, double t_out) {
+    if (passes_clear(cell, t_in, t_out)) return false;
+    const double turn_m = diagonal_m(cell, ray_);
+    if (t_in < turn_m && turn_m < t_out)
+      return meets_half(cell, t_in, turn_m) || meets_half(cell, turn_m, t_out);
+    return meets_half(cell, t_in, t_out);
+  }
+  double range_m() const { return range_m_; }
+  const FacetPlane& plane() const { return plane_; }
+
+ private:
+  // Handles the most common case: the cell is far below the ray.
+  bool passes_clear(const Cell& cell, double t_in, double t_out) {
+    const double low_m = std::min(ray_.z0 + t_in * ray_.dz, ray_.z0 + t_out * ray_.dz);
+    if (!(low_m > cell.nw && low_m > cell.ne && low_m > cell.sw && low_m > cell.se)) return false;
+    above_m_ = 1;  // any positive value
+    return true;
+  }
+  bool meets_half(const Cell& cell, double t_in, double t_out) {
+    const double middle_m = std::isinf(t_out) ? t_in : (t_in + t_out) / 2;
+    const FacetPlane plane = plane_at(cell, ray_, middle_m);
+    const double in_m = std::isnan(above_m_) ? clearance_m(ray_, plane, t_in) : above_m_;
+    // A ray without an end is vertical, over one triangle.
+    const double out_m = std::isinf(t_out) ? ray_.dz : clearance_m(ray_, plane, t_out);
+    above_m_ = out_m;
+    if (!(in_m >= 0 && out_m < 0)) return false;
+    const double range_m = intersect(ray_, plane);
+    if (std::isnan(range_m)) return false;
+    range_m_ = std::clamp(range_m, t_in, t_out);
+    plane_ = plane;
+    return true;
+  }
+
+  const GridRay& ray_;
+  double above_m_ = nan;  // clearance at the last border that the ray passed
+  double range_m_ = 0;
+  FacetPlane plane_;
+};
+
+}  // namespace
+
+std::optional<Crossing> LevelSurface::first_crossing(const GridRay& ray, double t_begin_m,
+                                                     double t_end_m) const noexcept {
+  Descent descent(ray);
+  std::optional<Crossing> crossing;
+  walk(ray, t_begin_m, t_end_m, cell_extent, [&](const Place& place, double t_in, double t_out) {
+    if (!descent.meets(place.cell, t_in, t_out)) return false;
+    crossing = {descent.range_m(), descent.plane(), place.leaf->deviation_m, place.level};
+    return true;
+  });
+  return crossing;
+}
+
+LevelSurface::Escape LevelSurface::escape_surface(const GridRay& ray, double above_m,
+                                                  double t_end_m) const noexcept {
+  const Place first = start(ray, 0);
+  const double alone_m = rises_over_one(first.cell, ray, above_m);
+  if (alone_m <= t_end_m) return {alone_m, {}};
+  Descent descent(ray);
+  Escape escape;
+  walk(ray, 0, t_end_m, cell_extent, [&](const Place& place, double t_in, double t_out) {
+    const double rise_m = place.leaf == nullptr ? t_in : rises_to(place.cell, ray, above_m, t_in);
+    escape.begin_m = std::min(rise_m, t_out);
+    if (place.leaf != nullptr && descent.meets(place.cell, t_in, escape.begin_m)) {
+      escape.begin_m = descent.range_m();
+      escape.crossing = {descent.range_m(), descent.plane(), place.leaf->deviation_m, place.level};
+      return true;
+    }
+    return rise_m <= t_out;
+  });
+  return escape;
+}
+
+namespace {
+
+// Follows a ray down through the band round the surface that contains the reference surface.
+class BandDescent {
+ public:
+  BandDescent(const GridRay& ray, LevelSurface::ErrorBand& band) : ray_(ray), band_(band) {}
+
+  // Follows the ray through one cell. Returns whether the band is fully determined.
+  bool pass(const Cell& cell, double deviation_m, double t_in, double t_out) {
+    const double turn_m = diagonal_m(cell, ray_);
+    if (t_in < turn_m && turn_m < t_out)
+      return pass_half(cell, deviation_m, t_in, turn_m) ||
+             pass_half(cell, deviation_m, turn_m, t_out);
+    return pass_half(cell, deviation_m, t_in, t_out);
+  }
+  void pass_clear() {
+    over_surface_ = true;
+    is_below_ = false;
+  }
+  void pass_hole() { over_surface_ = false; }
+
+ private:
+  bool pass_half(const Cell& cell, double deviation_m, double t_in, double t_out) {
+    const double middle_m = std::isinf(t_out) ? t_in : (t_in + t_out) / 2;
+    const FacetPlane plane = plane_at(cell, ray_, middle_m);
+    const double in_m = clearance_m(ray_, plane, t_in);
+    over_surface_ &= !std::isnan(in_m);
+    if (std::isnan(in_m)) return false;
+    if (!over_surface_) {
+      if (std::abs(in_m) < deviation_m) return give_up();
+      is_below_ = in_m < 0;
+      over_surface_ = true;
+    }
+    if (is_below_) {  // until the ray emerges; hits from below are ignored
+      is_below_ = out_m(plane, t_out) < 0;
+      return deviation_m > 0 && out_m(plane, t_out) > -deviation_m && give_up();
+    }
+    const double near_m = falls_to(deviation_m, plane, in_m, t_in, t_out);
+    if (near_m < never_m && deviation_m > 0) band_.is_exact = false;
+    band_.near_m = std::min(band_.near_m, near_m);
+    band_.far_m = falls_to(-deviation_m, plane, in_m, t_in, t_out);
+    return band_.far_m < never_m;
+  }
+  bool give_up() {
+    band_.is_certain = false;
+    return true;
+  }
+  double out_m(const FacetPlane& plane, double t_out) const {
+    return std::isinf(t_out) ? ray_.dz * std::numeric_limits<double>::infinity()
+                             : clearance_m(ray_, plane, t_out);
+  }
+  // Returns the t in [t_in, t_out] at which the clearance falls below `level_m`; infinite if it
+  // does not.
+  double falls_to(double level_m, const FacetPlane& plane, double in_m, double t_in,
+                  double t_out) const {
+    if (in_m < level_m) return t_in;
+    if (!(out_m(plane, t_out) < level_m)) return never_m;
+    GridRay lifted = ray_;
+    lifted.z0 -= level_m;
+    return std::clamp(intersect(lifted, plane), t_in, t_out);
+  }
+
+  const GridRay& ray_;
+  LevelSurface::ErrorBand& band_;
+  bool over_surface_ = false;
+  bool is_below_ = false;
+};
+
+}  // namespace
+
+LevelSurface::ErrorBand LevelSurface::error_band(const GridRay& ray,
+                                                 double t_end_m) const noexcept {
+  ErrorBand band;
+  BandDescent descent(ray, band);
+  const auto leaf_extent_of = [this](const Place& place) { return leaf_extent(place); };
+  walk(ray, 0, t_end_m, leaf_extent_of, [&](const Place& place, double t_in, double t_out) {
+    if (place.leaf == nullptr) {
+      descent.pass_hole();
+      return false;
+    }
+    const Leaf& leaf = *place.leaf;
+    const double low_m = std::min(ray.z0 + t_in * ray.dz, ray.z0 + t_out * ray.dz);
+    if (low_m > leaf.high_m + leaf.deviation_m) {
+      if (leaf.has_holes) {
+        descent.pass_hole();
+      } else {
+        descent.pass_clear();
+      }
+      return false;
+    }
+    if (leaf.bridges()) {
+      band.is_certain = false;
+      return true;
+    }
+    bool done = false;
+    walk(ray, t_in, t_out, cell_extent, [&](const Place& cell, double from_m, double to_m) {
+      done = descent.pass(cell.cell, leaf.deviation_m, from_m, to_m);
+      return done;
+    });
+    return done;
+  });
+  return band;
+}
+
+}  // namespace groundray

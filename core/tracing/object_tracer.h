@@ -1,0 +1,110 @@
+#pragma once
+
+#include <cstddef>
+#include <cstdint>
+#include <glm/gtc/quaternion.hpp>
+#include <glm/vec3.hpp>
+#include <memory>
+#include <span>
+#include <vector>
+
+#include "core/appearance/footprint.h"
+#include "core/appearance/texture.h"
+#include "core/appearance/tint.h"
+#include "core/geometry/trajectory.h"
+#include "core/model/model.h"
+#include "core/tracing/ray_tracer.h"
+
+namespace groundray {
+
+/// A model with its textures, prepared for tracing. Immutable; copies share the data.
+class ModelScene {
+ public:
+  /// @throws Error as check_model, if a texture cannot be read, or with Embree's message if Embree
+  ///         fails.
+  ModelScene(const RayDevice& device, Model model, Tracing tracing);
+
+  const Model& model() const noexcept;
+  /// Bytes held by the model's textures; geometry is counted by RayDevice::memory_bytes().
+  std::size_t texture_bytes() const noexcept;
+
+  /// Returns whether an image modulates the colour of the surface of a triangle, or of any.
+  bool has_albedo(std::uint32_t triangle) const noexcept;
+  bool has_albedo() const noexcept;
+  /// Returns the ratio of the surface's colour at a point of a triangle to its mean over the model.
+  /// @param p_O  the point, in the model's frame O.
+  /// @param patch_O  patch of the surface that the ray covers there, in O.
+  Tint tint(std::uint32_t triangle, const glm::dvec3& p_O, const SurfacePatch& patch_O,
+            Filtering filtering) const noexcept;
+  /// Returns the unit normal for shading a point, in O: interpolated from the vertices, if they
+  /// have normals, and modified by the normal map.
+  /// @param normal_O  unit normal of the triangle, on the visible side.
+  glm::dvec3 shading_normal(std::uint32_t triangle, const glm::dvec3& p_O,
+                            const glm::dvec3& normal_O, const SurfacePatch& patch_O,
+                            Filtering filtering) const noexcept;
+
+  struct Impl;
+  const Impl& impl() const noexcept { return *impl_; }
+
+ private:
+  std::shared_ptr<const Impl> impl_;
+};
+
+/// A stationary object: the pose of its frame O in D, and its size relative to its model.
+struct PlacedObject {
+  glm::dvec3 p_DO{0};
+  glm::dquat R_DO{1, 0, 0, 0};  ///< unit quaternion
+  double scale = 1;             ///< positive
+  std::uint32_t model = 0;      ///< index into the tracer's models
+};
+
+/// A moving object. It stands still before its trajectory begins and after it ends.
+struct MovingObject {
+  Trajectory X_DO;
+  double scale = 1;
+  std::uint32_t model = 0;
+};
+
+/// Traces rays through objects. Each object is intersected in its own frame O, to which rays are
+/// transformed in double, so that ranges are equally accurate far from the origin and near it.
+/// Surfaces are two-sided. Among objects at equal range, the first counts, and likewise among
+/// triangles; but of coplanar triangles that overlap partially, fast tracing may report any.
+/// Immutable; any number of threads may trace concurrently.
+class ObjectTracer {
+ public:
+  /// Constructs a tracer without objects.
+  ObjectTracer() = default;
+  /// Numbers the objects from 1 in the given order, stationary ones first.
+  /// @throws Error listing objects with a scale that is not positive, a pose that is not finite, or
+  ///         a model that does not exist, and objects that reach beyond 1e9 m from the origin; or
+  ///         with Embree's message if Embree fails.
+  ObjectTracer(const RayDevice& device, std::vector<ModelScene> models,
+               std::vector<PlacedObject> placed, std::vector<MovingObject> moving);
+
+  /// Finds the first object that each ray hits before the range in `hits`; leaves the other hits
+  /// unchanged. Neighbouring rays should be similar, as for RayTracer::trace.
+  /// @param hits  one for each ray.
+  void trace(std::span<const Ray> rays, std::span<Hit> hits) const noexcept;
+
+  std::size_t size() const noexcept;  ///< number of objects
+  bool any_moves() const noexcept;
+  /// Returns the index, in models(), of an object's model.
+  /// @param object  its number, from 1.
+  std::uint32_t model_of(std::uint32_t object) const noexcept;
+  /// Returns the pose, scale and model of an object at a time.
+  /// @param object  its number, from 1.
+  PlacedObject placed_at(std::uint32_t object, std::chrono::nanoseconds time) const noexcept;
+  std::span<const ModelScene> models() const noexcept;
+  /// Returns the velocity of a point that is fixed to an object, m/s in D; 0 while the object
+  /// stands still.
+  /// @param object  its number, from 1.
+  /// @param p_DQ    position of the point at `time`.
+  glm::dvec3 velocity_m_s(std::uint32_t object, const glm::dvec3& p_DQ,
+                          std::chrono::nanoseconds time) const noexcept;
+
+ private:
+  struct Impl;
+  std::shared_ptr<const Impl> impl_;
+};
+
+}  // namespace groundray

@@ -1,0 +1,100 @@
+#include "core/tracing/scene.h"
+
+#include <algorithm>
+#include <glm/geometric.hpp>
+#include <glm/gtc/quaternion.hpp>
+
+namespace groundray {
+namespace {
+
+// Returns the point of the ground that a ray hit.
+GroundCover::Point ground_point(const Ray& ray, const Hit& hit) noexcept {
+  return {ray.origin + ray.direction * hit.range_m, glm::normalize(glm::dvec3(hit.normal))};
+}
+
+// Point of an object that a ray hit, in the object's frame O, and the surface patch that the ray
+// covers there.
+struct ModelPoint {
+  const ModelScene& model;
+  glm::dquat R_DO;
+  glm::dvec3 p_O;
+  glm::dvec3 normal_O;
+  SurfacePatch patch_O;
+};
+ModelPoint model_point(const ObjectTracer& objects, const Ray& ray, const Hit& hit,
+                       double width_m) noexcept {
+  const PlacedObject object = objects.placed_at(hit.object, ray.time);
+  const glm::dquat R_OD = glm::conjugate(object.R_DO);
+  const glm::dvec3 p_DQ = ray.origin + ray.direction * hit.range_m;
+  const glm::dvec3 normal = glm::normalize(glm::dvec3(hit.normal));
+  const SurfacePatch patch = surface_patch(width_m, ray.direction, normal);
+  return {objects.models()[object.model],
+          object.R_DO,
+          R_OD * (p_DQ - object.p_DO) / object.scale,
+          R_OD * normal,
+          {R_OD * patch.a_m / object.scale, R_OD * patch.b_m / object.scale}};
+}
+
+}  // namespace
+
+SurfaceTruth Scene::truth_of(const Ray& ray, const Hit& hit) const noexcept {
+  if (hit.object == 0) {
+    if (cover.empty()) return terrain;
+    const auto shares = cover.shares_at(ground_point(ray, hit));
+    const auto largest =
+        static_cast<std::size_t>(std::ranges::max_element(shares) - shares.begin());
+    const CoverLayer& layer = cover.layers()[largest];
+    return {layer.label, 0, layer.material};
+  }
+  const std::uint32_t model = objects.model_of(hit.object);
+  const std::uint16_t surface = objects.models()[model].model().surface_of[hit.part];
+  return {models[model].label, hit.object, models[model].materials[surface]};
+}
+
+bool Scene::is_plain() const noexcept {
+  return cover.empty() && std::ranges::none_of(objects.models(), [](const ModelScene& scene) {
+           return scene.has_albedo();
+         });
+}
+
+Appearance Scene::appearance_of(const Ray& ray, const Hit& hit, double width_m,
+                                Filtering filtering) const noexcept {
+  Appearance appearance;
+  if (hit.object != 0) {
+    appearance.parts[0] = {truth_of(ray, hit).material, 1, {}};
+    appearance.count = 1;
+    const ModelScene& scene = objects.models()[objects.model_of(hit.object)];
+    if (!scene.has_albedo(hit.part)) return appearance;
+    const ModelPoint at = model_point(objects, ray, hit, width_m);
+    appearance.parts[0].tint = at.model.tint(hit.part, at.p_O, at.patch_O, filtering);
+    return appearance;
+  }
+  if (cover.empty()) {
+    appearance.parts[0] = {terrain.material, 1, {}};
+    appearance.count = 1;
+    return appearance;
+  }
+  const GroundCover::Point point = ground_point(ray, hit);
+  const SurfacePatch patch = surface_patch(width_m, ray.direction, point.normal);
+  const auto shares = cover.shares_at(point);
+  for (std::size_t i = 0; i < cover.layers().size(); ++i) {
+    if (shares[i] == 0) continue;
+    appearance.parts[appearance.count++] = {cover.layers()[i].material, shares[i],
+                                            cover.tint_at(i, point, patch, filtering)};
+  }
+  return appearance;
+}
+
+glm::dvec3 Scene::shading_normal_of(const Ray& ray, const Hit& hit, double width_m,
+                                    Filtering filtering) const noexcept {
+  if (hit.object == 0) {
+    const GroundCover::Point point = ground_point(ray, hit);
+    if (cover.empty()) return point.normal;
+    return cover.shading_normal_at(point, surface_patch(width_m, ray.direction, point.normal),
+                                   filtering);
+  }
+  const ModelPoint at = model_point(objects, ray, hit, width_m);
+  return at.R_DO * at.model.shading_normal(hit.part, at.p_O, at.normal_O, at.patch_O, filtering);
+}
+
+}  // namespace groundray

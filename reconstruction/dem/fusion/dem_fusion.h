@@ -1,0 +1,98 @@
+#pragma once
+
+#include <cstddef>
+#include <cstdint>
+#include <filesystem>
+#include <functional>
+#include <glm/vec2.hpp>
+#include <limits>
+
+#include "reconstruction/dem/dem_layers.h"
+#include "reconstruction/dem/measured_points.h"
+#include "reconstruction/run_control.h"
+
+namespace groundray {
+
+/// Parameters of the fusion of points into a DEM.
+struct FusionOptions {
+  double outlier_share = 0.02;  ///< fraction of all points, 0 to 1/2
+  /// Surfaces are separate where heights leave a gap wider than this plus 3 standard deviations.
+  double surface_gap_m = 0.3;
+  /// Largest rise over run of ground. A surface that rises higher within a cell is a wall or a
+  /// trunk, and only its foot is used.
+  double steepest_slope = 2;
+  double slope_sd = 1;  ///< expected rise over run where neighbours give none
+  /// Largest sd of a height; samples with a larger one stay unmeasured.
+  double most_sd_m = std::numeric_limits<double>::infinity();
+  /// Memory for points and for the tiles in work; further points go to a temporary file.
+  std::size_t memory_bytes = std::size_t{1} << 30U;
+  /// Folder of the temporary file, which is invisible to other programs and always removed; the
+  /// system's (TMPDIR) if empty.
+  std::filesystem::path folder;
+};
+
+/// Numbers of points and cells by their use.
+struct FusionCounts {
+  std::uint64_t points = 0;    ///< points received
+  std::uint64_t outside = 0;   ///< points outside the frame's cells
+  std::uint64_t unusable = 0;  ///< points without a finite position, or with heights beyond 32 km
+  std::uint64_t without_ground = 0;  ///< cells whose points form no ground
+  std::uint64_t uncertain = 0;       ///< cells whose ground has a larger sd than most_sd_m
+  std::uint64_t bytes_on_disk = 0;   ///< total size of the temporary files
+};
+
+/// Source of points: fills a block with the next points and returns true; returns false if there
+/// are none left.
+using PointSource = std::function<bool(MeasuredPoints& block)>;
+
+/// Result of the fusion.
+struct Fusion {
+  DemLayers layers;
+  FusionCounts counts;
+};
+
+/// Part of a DEM: samples from `first` on of the whole frame, as many as layers.frame has.
+struct DemTile {
+  glm::ivec2 first{0};
+  DemLayers layers;
+};
+
+/// Fuses the points of any number of scans and stereo pairs into a DEM. A sample's cell extends
+/// half a step to each side; the height is that of the ground at the sample itself.
+///
+/// Points of a cell lie on one surface or several, one above the other, separated by gaps. A
+/// surface is credible if it has more points than outliers are likely to form, or if it agrees with
+/// the surrounding ground. The lowest credible surface is the ground, the next the overhang. Where
+/// ground and a wall or trunk form one surface, its lowest part is the ground; if neighbouring
+/// cells show that its foot is hidden, there is none.
+///
+/// The bend of the ground is estimated from the 24 cells around and subtracted from the points, and
+/// a plane is fitted to them robustly; see docs/theory/dem.md for the model and its constants. The
+/// variance includes the points' noise (times misfit, chi² per degree of freedom, where above 1);
+/// position errors in plan times slope; the bias of each group, by the group's fraction of the
+/// weight, whatever the number of its points; the slope taken from neighbours; and the bend.
+/// `to_data_m` is 0 or the distance, infinite if nothing was measured at all; fill_sd_m and
+/// upper_bound_m are NaN.
+///
+/// One or two points form ground only if at least five of the cells around determine its height to
+/// a third of surface_gap_m, and agree with it. Each point is then ground or an outlier
+/// (outlier_share, spread over 2 m): height and variance are those of the mixture of all choices,
+/// weighted by Bayes' rule together with the surrounding surface. If all points are outliers with a
+/// probability above 1/2, there is no ground. With an outlier_share of 0 all points are ground.
+///
+/// The result is the same for any number of threads, block sizes, order of the points and memory.
+/// Without points, all layers are those of unknown_layers, except for `to_data_m`.
+/// @throws Error naming every fault of the frame or the options; the first point with a standard
+///         deviation that is no number >= 0, or a group of 2^31 or more; columns of different
+///         lengths; cells with too many points for the memory; a temporary file that cannot be
+///         written; layers that would take more than work.most_bytes.
+/// @see docs/theory/dem.md; Huber, Ronchetti, Robust statistics (2009), chapter 7.
+Fusion fuse(const PointSource& source, const GridFrame& frame, const FusionOptions& options = {},
+            const RunControl& work = {});
+
+/// Fuses points into rasters that do not fit into memory: `sink` receives the tiles of the DEM in
+/// row order, from one thread at a time. Their to_data_m is NaN where nothing was measured.
+FusionCounts fuse(const PointSource& source, const GridFrame& frame, const FusionOptions& options,
+                  const std::function<void(DemTile&&)>& sink, const RunControl& work = {});
+
+}  // namespace groundray

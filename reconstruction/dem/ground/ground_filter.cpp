@@ -1,0 +1,162 @@
+#include "reconstruction/dem/ground/ground_filter.h"
+
+#include <tbb/blocked_range.h>
+#include <tbb/parallel_for.h>
+
+#include <algorithm>
+#include <cmath>
+#include <glm/common.hpp>
+#include <limits>
+#include <utility>
+
+#include "core/error.h"
+#include "reconstruction/dem/ground/ground_surface.h"
+
+namespace groundray {
+namespace {
+
+void check_filter_options(const GroundFilterOptions& o) {
+  Violations broken("GroundFilterOptions");
+  const auto positive = [](double value) { return value > 0 && std::isfinite(value); };
+  const auto not_negative = [](double value) { return value >= 0 && std::isfinite(value); };
+  broken.unless(positive(o.cell_m), "cell_m = {} must be positive and finite", o.cell_m);
+  broken.unless(positive(o.slope), "slope = {} must be positive and finite", o.slope);
+  broken.unless(not_negative(o.window_radius_m), "window_radius_m = {} must be 0 or more",
+                o.window_radius_m);
+  broken.unless(positive(o.threshold_m), "threshold_m = {} must be positive and finite",
+                o.threshold_m);
+  broken.unless(not_negative(o.scaling_m), "scaling_m = {} must be 0 or more", o.scaling_m);
+  broken.unless(not_negative(o.net_m), "net_m = {} must be 0 (no nets) or more", o.net_m);
+  broken.unless(positive(o.pit_slope), "pit_slope = {} must be positive and finite", o.pit_slope);
+  broken.unless(!positive(o.cell_m) || o.window_radius_m <= 1000 * o.cell_m,
+                "window_radius_m = {} is more than 1000 cells of {} m: is it in metres?",
+                o.window_radius_m, o.cell_m);
+  broken.unless(!positive(o.cell_m) || o.net_m <= 1000 * o.cell_m,
+                "net_m = {} is more than 1000 cells of {} m: is it in metres?", o.net_m, o.cell_m);
+  broken.throw_if_any();
+}
+
+struct Box {
+  glm::dvec3 low_m{std::numeric_limits<double>::infinity()};
+  glm::dvec3 high_m{-std::numeric_limits<double>::infinity()};
+};
+
+// Returns the points' bounds, and rejects invalid points.
+Box checked_bounds(std::span<const glm::dvec3> points_m) {
+  if (points_m.empty())
+    throw Error(
+        "filter_ground: there are no points: is the cloud empty, or were all points cropped?");
+  if (points_m.size() >= std::numeric_limits<std::uint32_t>::max())
+    throw Error("filter_ground: {} points exceed the limit of 4e9: filter them tile by tile",
+                points_m.size());
+  constexpr double most_m = 1e5;
+  Box box;
+  for (std::size_t i = 0; i < points_m.size(); ++i) {
+    const glm::dvec3& p = points_m[i];
+    const double off_m = std::max({std::abs(p.x), std::abs(p.y), 1e4 * std::abs(p.z)});
+    if (!std::isfinite(p.x + p.y + p.z) || off_m > 1e4 * most_m) {
+      throw Error(
+          "filter_ground: point {} = ({}, {}, {}) must be finite, within 100 km of height 0 and a "
+          "million km of the origin: remove returns without a hit, and use metres",
+          i, p.x, p.y, p.z);
+    }
+    box.low_m = glm::min(box.low_m, p);
+    box.high_m = glm::max(box.high_m, p);
+  }
+  return box;
+}
+
+// Returns whole cells from D's origin, so that tiles share their cells; at least two each way.
+CellFrame frame_around(const Box& box, std::size_t points, double cell_m, std::size_t most_bytes) {
+  constexpr double bytes_per_cell = 40, bytes_per_point = 5, always_cells = 2.5e6;
+  const glm::dvec2 first = glm::floor(glm::dvec2(box.low_m) / cell_m);
+  const glm::dvec2 cells =
+      glm::max(glm::floor(glm::dvec2(box.high_m) / cell_m) - first + 1., glm::dvec2(2));
+  const double all = cells.x * cells.y;
+  const auto count = static_cast<double>(points);
+  if (!(all <= std::max(always_cells, 64 * count)) || std::max(cells.x, cells.y) > 1e9) {
+    throw Error(
+        "filter_ground: {} points spread over {:g} x {:g} cells of {} m, more than 64 per point: "
+        "remove distant points, or use a larger cell_m",
+        points, cells.x, cells.y, cell_m);
+  }
+  const double bytes = bytes_per_cell * all + bytes_per_point * count;
+  if (bytes > static_cast<double>(most_bytes)) {
+    throw Error(
+        "filter_ground: {} points over {:g} x {:g} cells of {} m take {:.1f} MB, more than the "
+        "{:.1f} MB allowed: filter them tile by tile, or use a larger cell_m",
+        points, cells.x, cells.y, cell_m, bytes * 1e-6, static_cast<double>(most_bytes) * 1e-6);
+  }
+  return {first * cell_m, cell_m, glm::ivec2(cells)};
+}
+
+GroundClass class_of(double height_m, double within_m) noexcept {
+  if (height_m > within_m) return GroundClass::Above;
+  return height_m < -within_m ? GroundClass::Below : GroundClass::Ground;
+}
+
+// Classifies points by their height above the surface.
+void classify(std::span<const glm::dvec3> points_m, const CellFrame& frame,
+              const GroundSurface& ground, double threshold_m, double scaling_m,
+              GroundPoints& into) {
+  into.classes.resize(points_m.size());
+  into.height_m.resize(points_m.size());
+  tbb::parallel_for(tbb::blocked_range<std::size_t>(0, points_m.size(), 1 << 14),
+                    [&](const tbb::blocked_range<std::size_t>& range) {
+                      for (std::size_t i = range.begin(); i < range.end(); ++i) {
+                        const glm::vec2 at(frame.from_first(points_m[i]));
+                        const double height_m =
+                            points_m[i].z - between_cells(ground.height_m, at.x, at.y);
+                        const double slope = between_cells(ground.slope, at.x, at.y);
+                        into.height_m[i] = static_cast<float>(height_m);
+                        into.classes[i] = class_of(height_m, threshold_m + scaling_m * slope);
+                      }
+                    });
+}
+
+GroundCounts counts_of(const GroundPoints& found, const SurfacePins& lowest) {
+  const auto of = [&](GroundClass which) {
+    return static_cast<std::size_t>(std::ranges::count(found.classes, which));
+  };
+  const auto empty = std::ranges::count_if(lowest.height_m.values,
+                                           [](float height_m) { return std::isnan(height_m); });
+  return {.ground = of(GroundClass::Ground),
+          .above = of(GroundClass::Above),
+          .below = of(GroundClass::Below),
+          .cells = lowest.height_m.values.size(),
+          .empty_cells = static_cast<std::size_t>(empty)};
+}
+
+}  // namespace
+
+GroundPoints filter_ground(std::span<const glm::dvec3> points_m, const GroundFilterOptions& options,
+                           const RunControl& work) {
+  check_filter_options(options);
+  const auto progress = [&](double share) {
+    if (work.progress) work.progress(share);
+  };
+  const double cell_m = options.cell_m;
+  const CellFrame frame =
+      frame_around(checked_bounds(points_m), points_m.size(), cell_m, work.most_bytes);
+  const SurfacePins lowest = lowest_points(points_m, frame);
+  progress(0.2);
+  GroundSurface ground =
+      ground_below(lowest,
+                   {.cell_m = cell_m,
+                    .slope = options.slope,
+                    .pit_slope = options.pit_slope,
+                    .radius_cells = static_cast<int>(std::ceil(options.window_radius_m / cell_m)),
+                    .net_cells = static_cast<int>(std::ceil(options.net_m / cell_m))},
+                   [&](double share) { progress(0.2 + 0.6 * share); });
+  GroundPoints found;
+  classify(points_m, frame, ground, options.threshold_m, options.scaling_m, found);
+  found.counts = counts_of(found, lowest);
+  found.counts.object_cells = ground.object_cells;
+  found.counts.pit_cells = ground.pit_cells;
+  found.surface = HeightGrid(frame.cells, frame.origin_m + 0.5 * cell_m, glm::dvec2(cell_m),
+                             std::move(ground.height_m.values));
+  progress(1);
+  return found;
+}
+
+}  // namespace groundray

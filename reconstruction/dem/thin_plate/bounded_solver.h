@@ -1,0 +1,63 @@
+#pragma once
+
+#include <cstddef>
+#include <cstdint>
+#include <span>
+#include <vector>
+
+#include "reconstruction/dem/thin_plate/ldlt.h"
+
+// Plates below bounds, private to this library.
+namespace groundray {
+
+/// Minimiser of the energy z' matrix z / 2 - right' z under the bounds z <= most, by truncated
+/// nonsmooth Newton steps: heights are relaxed one by one, those that reach their bounds are held
+/// there, and the others move towards the solution of their equations as far as bounds permit and
+/// the energy decreases. The energy never increases. If 30 such rounds do not suffice, block
+/// principal pivoting determines the held samples, in up to 500 rounds. If that fails, too, descent
+/// continues until 100 rounds gain less than 1e-9 of the total reduction, or for 10 000 rounds.
+/// Each kind of rounds is limited to 4e7 divided by the number of samples, but not to less than a
+/// hundred.
+/// @see Graeser, Kornhuber, Multigrid methods for obstacle problems, J. Comput. Math. 27 (2009);
+///      Judice, Pires, A block principal pivoting algorithm for large-scale strictly monotone
+///      linear complementarity problems, Comput. Oper. Res. 21 (1994).
+class BoundedSolver {
+ public:
+  /// @param most  upper bounds, infinite for none. All arguments must outlive this.
+  BoundedSolver(const PlateMatrix& matrix, const Dissection& order, std::span<const double> right,
+                std::span<const double> most);
+
+  /// Returns whether the minimum was found. Otherwise heights are within bounds, and the energy is
+  /// no larger than at the start, but heights may be far from the minimum.
+  /// @param start  heights near the minimum; or empty.
+  bool run(std::span<const double> start);
+
+  const std::vector<double>& heights() const noexcept { return z_; }
+
+ private:
+  struct Stretch {
+    double length = 0;  // fraction of the way
+    double falls = 0;   // reduction of the energy
+  };
+  void move_each();
+  bool step();
+  Stretch best_stretch(std::span<const double> way, std::span<const double> lacks) const;
+  bool would_fall(std::size_t i, double lacks) const;
+  bool let_go();
+  bool descend(int rounds);
+  std::vector<std::size_t> misplaced();
+  bool exchange(int rounds);
+  std::vector<double> rest() const;
+  double sum() const;
+
+  const PlateMatrix& matrix_;
+  std::span<const double> right_, most_;
+  std::vector<double> own_;  // diagonal of the matrix
+  LdltFactor factor_;
+  std::vector<double> z_;
+  std::vector<std::uint8_t> is_held_, is_let_go_;
+  double largest_ = 0;  // largest height or bound, approximately
+  double moved_ = 0;    // largest move of the latest step
+};
+
+}  // namespace groundray

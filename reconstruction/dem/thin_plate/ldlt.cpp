@@ -1,0 +1,227 @@
+#include "reconstruction/dem/thin_plate/ldlt.h"
+
+#include <Eigen/Core>
+#include <algorithm>
+#include <cmath>
+#include <iterator>
+
+#include "core/error.h"
+
+namespace groundray {
+
+// Samples that are eliminated together, as positions in the order, ascending.
+struct LdltFactor::Part {
+  std::vector<std::int32_t> own, coupled;  // coupled ones come later
+  // Columns of L, with D on its diagonal: rows of own samples, then of coupled ones.
+  Eigen::MatrixXd columns;
+  // Update matrix of the coupled samples, lower triangle, which later parts add.
+  Eigen::MatrixXd left;
+};
+
+namespace {
+
+constexpr Eigen::Index block = 32;
+
+// Numbers of samples of parts whose update matrices are kept: smaller parts are quickly recomputed,
+// larger ones change nearly always.
+constexpr std::size_t fewest_kept = 200, most_kept = 5000;
+
+// Factorises a small square as L D L', in place. Returns whether that is possible.
+bool factorise_square(Eigen::Ref<Eigen::MatrixXd> a) {
+  const Eigen::Index count = a.cols();
+  for (Eigen::Index j = 0; j < count; ++j) {
+    const double pivot = a(j, j);
+    if (pivot == 0 || !std::isfinite(pivot)) return false;
+    const Eigen::Index rest = count - j - 1;
+    for (Eigen::Index k = j + 1; k < count; ++k)
+      a.col(k).tail(count - k) -= a.col(j).tail(count - k) * (a(k, j) / pivot);
+    a.col(j).tail(rest) /= pivot;
+  }
+  return true;
+}
+
+// Factorises the square at the head of columns as L D L', and computes L of the rows below, in
+// place. Returns whether that is possible.
+bool factorise_columns(Eigen::MatrixXd& columns) {
+  const Eigen::Index own = columns.cols(), all = columns.rows();
+  Eigen::MatrixXd times_d;
+  for (Eigen::Index first = 0; first < own; first += block) {
+    const Eigen::Index wide = std::min(block, own - first), next = first + wide;
+    auto square = columns.block(first, first, wide, wide);
+    if (!factorise_square(square)) return false;
+    if (next == all) continue;
+    auto below = columns.block(next, first, all - next, wide);
+    square.triangularView<Eigen::UnitLower>().transpose().solveInPlace<Eigen::OnTheRight>(below);
+    times_d = below;
+    below *= square.diagonal().cwiseInverse().asDiagonal();
+    const Eigen::Index left = own - next;
+    if (left == 0) continue;
+    columns.block(next, next, left, left).triangularView<Eigen::Lower>() -=
+        below.topRows(left) * times_d.topRows(left).transpose();
+    columns.block(own, next, all - own, left).noalias() -=
+        below.bottomRows(all - own) * times_d.topRows(left).transpose();
+  }
+  return true;
+}
+
+}  // namespace
+
+std::vector<double> PlateMatrix::times(std::span<const double> z) const {
+  std::vector<double> result(size());
+  for (std::size_t row = 0; row < size(); ++row) {
+    double sum = 0;
+    for (std::size_t k = begin_of(row); k < ends[row]; ++k)
+      sum += factors[k] * z[static_cast<std::size_t>(samples[k])];
+    result[row] = sum;
+  }
+  return result;
+}
+
+LdltFactor::LdltFactor(const PlateMatrix& matrix, const Dissection& order, FactorUse use)
+    : matrix_(matrix),
+      order_(order),
+      places_(matrix.size()),
+      local_(matrix.size()),
+      parts_(order.parts.size()) {
+  for (std::size_t k = 0; k < order.order.size(); ++k)
+    places_[static_cast<std::size_t>(order.order[k])] = static_cast<std::int32_t>(k);
+  std::vector<std::size_t> samples;  // of each part and its descendants
+  for (const DissectedPart& part : order.parts) {
+    std::size_t all = part.end - part.begin;
+    for (const std::size_t child : part.children) all += samples[child];
+    samples.push_back(all);
+    const bool is_kept = use == FactorUse::Changing && fewest_kept <= all && all <= most_kept;
+    is_kept_.push_back(is_kept ? 1 : 0);
+  }
+}
+
+LdltFactor::~LdltFactor() = default;
+
+// Returns the parts whose equations have changed, those after them, and those before them whose
+// update matrices are needed but were not kept.
+std::vector<std::uint8_t> LdltFactor::parts_to_do(std::span<const std::uint8_t> is_left_out) const {
+  std::vector<std::uint8_t> is_changed(matrix_.size(), is_left_out_.empty() ? 1 : 0);
+  for (std::size_t row = 0; row < is_left_out_.size(); ++row) {
+    if (is_left_out_[row] == is_left_out[row]) continue;
+    for (std::size_t k = matrix_.begin_of(row); k < matrix_.ends[row]; ++k)
+      is_changed[static_cast<std::size_t>(matrix_.samples[k])] = 1;
+  }
+  std::vector<std::uint8_t> found;
+  for (const DissectedPart& part : order_.parts) {
+    const std::span own(order_.order.data() + part.begin, part.end - part.begin);
+    const bool is = std::ranges::any_of(part.children, [&](auto child) { return found[child]; }) ||
+                    std::ranges::any_of(own, [&](std::int32_t sample) {
+                      return is_changed[static_cast<std::size_t>(sample)] != 0;
+                    });
+    found.push_back(is ? 1 : 0);
+  }
+  for (std::size_t k = found.size(); k > 0; --k) {
+    if (found[k - 1] == 0) continue;
+    for (const std::size_t child : order_.parts[k - 1].children)
+      if (is_kept_[child] == 0) found[child] = 1;
+  }
+  return found;
+}
+
+void LdltFactor::find_coupled(const DissectedPart& from, Part& part) {
+  part.own.clear();
+  part.coupled.clear();
+  const auto end = static_cast<std::int32_t>(from.end);
+  for (std::size_t place = from.begin; place < from.end; ++place) {
+    const auto row = static_cast<std::size_t>(order_.order[place]);
+    if (is_left_out_[row] != 0) continue;
+    local_[place] = static_cast<std::int32_t>(part.own.size());
+    part.own.push_back(static_cast<std::int32_t>(place));
+    for (std::size_t k = matrix_.begin_of(row); k < matrix_.ends[row]; ++k) {
+      const auto other = static_cast<std::size_t>(matrix_.samples[k]);
+      if (is_left_out_[other] == 0 && places_[other] >= end) part.coupled.push_back(places_[other]);
+    }
+  }
+  for (const std::size_t child : from.children)
+    std::ranges::copy_if(parts_[child].coupled, std::back_inserter(part.coupled),
+                         [end](std::int32_t place) { return place >= end; });
+  std::ranges::sort(part.coupled);
+  part.coupled.erase(std::unique(part.coupled.begin(), part.coupled.end()), part.coupled.end());
+  for (std::size_t k = 0; k < part.coupled.size(); ++k)
+    local_[static_cast<std::size_t>(part.coupled[k])] =
+        static_cast<std::int32_t>(part.own.size() + k);
+}
+
+// Assembles the equations of a part's samples and the update matrices of its children.
+void LdltFactor::gather(const DissectedPart& from, Part& part) {
+  find_coupled(from, part);
+  const Eigen::Index own = std::ssize(part.own), later = std::ssize(part.coupled);
+  part.columns.setZero(own + later, own);
+  part.left.setZero(later, later);
+  for (Eigen::Index column = 0; column < own; ++column) {
+    const std::int32_t place = part.own[static_cast<std::size_t>(column)];
+    const auto row = static_cast<std::size_t>(order_.order[static_cast<std::size_t>(place)]);
+    for (std::size_t k = matrix_.begin_of(row); k < matrix_.ends[row]; ++k) {
+      const auto other = static_cast<std::size_t>(matrix_.samples[k]);
+      if (is_left_out_[other] == 0 && places_[other] >= place)
+        part.columns(local_[static_cast<std::size_t>(places_[other])], column) = matrix_.factors[k];
+    }
+  }
+  for (const std::size_t child : from.children) {
+    Part& before = parts_[child];
+    for (Eigen::Index j = 0; j < before.left.cols(); ++j) {
+      const auto row_of = [&](Eigen::Index i) -> Eigen::Index {
+        return local_[static_cast<std::size_t>(before.coupled[static_cast<std::size_t>(i)])];
+      };
+      const Eigen::Index column = row_of(j), first = column < own ? 0 : own;
+      double* const to =
+          column < own ? part.columns.col(column).data() : part.left.col(column - own).data();
+      const double* const added = before.left.col(j).data();
+      for (Eigen::Index i = j; i < before.left.rows(); ++i) to[row_of(i) - first] += added[i];
+    }
+    if (is_kept_[child] == 0) before.left.resize(0, 0);
+  }
+}
+
+void LdltFactor::factorise(std::span<const std::uint8_t> is_left_out) {
+  const auto is_to_do = parts_to_do(is_left_out);
+  is_left_out_.assign(is_left_out.begin(), is_left_out.end());
+  for (std::size_t k = 0; k < parts_.size(); ++k) {
+    if (is_to_do[k] == 0) continue;
+    Part& part = parts_[k];
+    gather(order_.parts[k], part);
+    if (!factorise_columns(part.columns))
+      throw Error("a hole of {} samples cannot be filled: its equations have no solution",
+                  matrix_.size());
+    const Eigen::Index own = part.columns.cols();
+    if (own == 0 || part.coupled.empty()) continue;
+    const auto below = part.columns.bottomRows(part.columns.rows() - own);
+    const Eigen::MatrixXd times_d = below * part.columns.topRows(own).diagonal().asDiagonal();
+    part.left.triangularView<Eigen::Lower>() -= below * times_d.transpose();
+  }
+}
+
+std::vector<double> LdltFactor::solve(std::span<const double> right) const {
+  Eigen::VectorXd z(std::ssize(order_.order));
+  for (std::size_t k = 0; k < order_.order.size(); ++k)
+    z[static_cast<Eigen::Index>(k)] = right[static_cast<std::size_t>(order_.order[k])];
+  Eigen::VectorXd own;
+  for (const Part& part : parts_) {
+    const auto square = part.columns.topRows(part.columns.cols());
+    own = z(part.own);
+    square.triangularView<Eigen::UnitLower>().solveInPlace(own);
+    z(part.coupled) -= part.columns.bottomRows(std::ssize(part.coupled)) * own;
+    z(part.own) = own.cwiseQuotient(square.diagonal());
+  }
+  for (auto part = parts_.rbegin(); part != parts_.rend(); ++part) {
+    const auto square = part->columns.topRows(part->columns.cols());
+    own = z(part->own);
+    own.noalias() -= part->columns.bottomRows(std::ssize(part->coupled)).transpose() *
+                     Eigen::VectorXd(z(part->coupled));
+    square.triangularView<Eigen::UnitLower>().transpose().solveInPlace(own);
+    z(part->own) = own;
+  }
+  std::vector<double> result(places_.size(), 0);
+  for (std::size_t k = 0; k < order_.order.size(); ++k) {
+    const auto sample = static_cast<std::size_t>(order_.order[k]);
+    if (is_left_out_[sample] == 0) result[sample] = z[static_cast<Eigen::Index>(k)];
+  }
+  return result;
+}
+
+}  // namespace groundray

@@ -1,0 +1,34 @@
+#pragma once
+
+#include <span>
+#include <vector>
+
+#include "core/geometry/mesh.h"
+#include "core/tracing/ray_tracer.h"
+#include "reconstruction/mesh/accuracy/area_share.h"
+
+namespace groundray {
+
+/// Agreement of a mesh with the true surface at one tolerance.
+struct Agreement {
+  double tolerance_m = 0;
+  AreaShare precision;     ///< fraction of the mesh that is within the tolerance of the truth
+  AreaShare completeness;  ///< fraction of the truth that is within the tolerance of the mesh
+
+  /// Returns the harmonic mean of both, 0 if both are 0.
+  AreaShare f1() const noexcept;
+};
+
+/// Measures the precision and completeness of a mesh at each tolerance.
+/// @param truth_weight  weight of each point of the truth, uniform if empty; 0 for what could not
+///                      be seen.
+/// @throws Error as MeshDistance and MeshDistance::within.
+/// @see Knapitsch, Park, Zhou, Koltun, Tanks and temples, ACM Transactions on Graphics 36(4)
+///      (2017), section 5: precision, recall and F-score, defined there for points.
+std::vector<Agreement> agreement(const TriangleMesh& mesh, const TriangleMesh& truth,
+                                 std::span<const double> tolerances_m,
+                                 const ShareFineness& fineness = {},
+                                 const SurfaceWeight& truth_weight = {},
+                                 const RayDevice& device = RayDevice());
+
+}  // namespace groundray

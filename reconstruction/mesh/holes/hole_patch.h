@@ -1,0 +1,40 @@
+#pragma once
+
+#include <cstdint>
+#include <glm/vec3.hpp>
+#include <optional>
+#include <span>
+#include <vector>
+
+#include "core/geometry/mesh.h"
+#include "reconstruction/mesh/holes/mesh_rims.h"
+
+namespace groundray {
+
+/// Mesh with its adjacency: edge pairs, boundary chains and vertex stars.
+struct RimmedMesh {
+  const TriangleMesh& mesh;
+  const EdgePairs& pairs;
+  const MeshRims& rims;
+  const VertexStars& stars;
+};
+
+/// Shape of a patch: continued smoothly from the boundary, or flat between its vertices.
+enum class PatchShape { Smooth, Flat };
+
+/// Triangles that close a hole.
+struct HolePatch {
+  std::vector<glm::dvec3> points_m;  ///< added points
+  /// Corners: the n vertices of the boundary are numbered 0 to n - 1 in the order of the chain,
+  /// each at the end of its half-edge; the points follow.
+  std::vector<glm::uvec3> triangles;
+};
+
+/// Closes a hole with triangles as small as the surrounding ones.
+/// @param chain  one of the mesh's boundary chains, of at least 3 edges.
+/// @return nothing if no triangulation of the boundary's vertices is manifold, or if the smooth
+///         patch would lead far away.
+std::optional<HolePatch> patch_hole(const RimmedMesh& at, std::span<const HalfEdge> chain,
+                                    PatchShape shape);
+
+}  // namespace groundray

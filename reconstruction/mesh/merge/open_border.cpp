@@ -1,0 +1,61 @@
+#include "reconstruction/mesh/merge/open_border.h"
+
+#include <algorithm>
+
+#include "reconstruction/mesh/manifold_mesh.h"
+
+namespace groundray {
+
+OpenBorder::OpenBorder(const StitchedMesh& stitched)
+    : number_of_(stitched.vertices.size(), no_vertex) {
+  const std::vector<std::uint32_t> twins =
+      pair_edges(stitched.triangles, stitched.vertices.size()).twins;
+  const auto number = [&](std::uint32_t vertex) {
+    if (number_of_[vertex] == no_vertex) {
+      number_of_[vertex] = static_cast<std::uint32_t>(vertices_.size());
+      vertices_.push_back(vertex);
+      after_.emplace_back();
+      before_.emplace_back();
+    }
+    return number_of_[vertex];
+  };
+  for (std::uint32_t e = 0; e < twins.size(); ++e) {
+    if (twins[e] != none) continue;
+    const std::uint32_t from = corner_of(stitched.triangles, e);
+    const std::uint32_t to = corner_of(stitched.triangles, next_of(e));
+    after_[number(from)].push_back(to);
+    before_[number(to)].push_back(from);
+  }
+  for (std::uint32_t e = 0; e < twins.size(); ++e) {
+    if (twins[e] == none) continue;
+    const std::uint32_t from = corner_of(stitched.triangles, e);
+    const std::uint32_t to = corner_of(stitched.triangles, next_of(e));
+    if (number_of_[from] != no_vertex && number_of_[to] != no_vertex)
+      inner_.insert(key_of(from, to));
+  }
+}
+
+bool OpenBorder::has(std::uint32_t from, std::uint32_t to) const {
+  return std::ranges::find(after(from), to) != after(from).end();
+}
+
+bool OpenBorder::is_free(std::uint32_t from, std::uint32_t to) const {
+  return !has(from, to) && !inner_.contains(key_of(from, to));
+}
+
+void OpenBorder::add(const glm::uvec3& triangle) {
+  for (int k = 0; k < 3; ++k) {
+    const std::uint32_t from = triangle[k], to = triangle[(k + 1) % 3];
+    if (has(to, from)) {
+      std::erase(after_[number_of_[to]], from);
+      std::erase(before_[number_of_[from]], to);
+      inner_.insert(key_of(from, to));
+      inner_.insert(key_of(to, from));
+    } else {
+      after_[number_of_[from]].push_back(to);
+      before_[number_of_[to]].push_back(from);
+    }
+  }
+}
+
+}  // namespace groundray

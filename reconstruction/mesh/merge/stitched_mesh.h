@@ -1,0 +1,56 @@
+#pragma once
+
+#include <cstddef>
+#include <cstdint>
+#include <glm/vec3.hpp>
+#include <span>
+#include <vector>
+
+#include "core/geometry/mesh.h"
+
+namespace groundray {
+
+constexpr std::uint32_t no_vertex = 0xffffffff;
+
+/// Vertex of a mesh that is sewn together from scans.
+struct StitchedVertex {
+  glm::dvec3 p{0};
+  glm::vec3 normal{0};  ///< unit, from its scan
+  float sd_m = 0, confidence = 1;
+  std::uint16_t label = 0;
+  std::uint32_t scan = 0;
+  std::uint32_t vertex = no_vertex;   ///< of that scan; `no_vertex` if it lies on an edge
+  std::uint32_t nearest = no_vertex;  ///< of that scan: itself, or the nearer end of its edge
+  /// True if another scan covers it, or it belongs to a triangle that covers another scan's vertex.
+  bool is_shared = true;
+};
+
+/// Mesh under construction from the triangles of several scans.
+struct StitchedMesh {
+  std::vector<StitchedVertex> vertices;
+  std::vector<glm::uvec3> triangles;
+};
+
+/// Returns the vertex at the fraction `share` of the way between two others.
+StitchedVertex between(const StitchedVertex& from, const StitchedVertex& to, double share);
+
+TriangleMesh mesh_of(const StitchedMesh& stitched);
+std::vector<float> sds_of(const StitchedMesh& stitched);
+
+/// Makes a manifold surface with boundaries: each edge has at most two triangles, which traverse it
+/// in opposite directions, and the triangles at each vertex form a single fan. Removes triangles
+/// that repeat a vertex, or traverse an edge in the same direction as an earlier one; separates
+/// fans by duplicating vertices. Returns the number of removed triangles.
+std::size_t make_manifold(StitchedMesh& stitched);
+
+/// Position on the edge between two vertices.
+struct EdgePlace {
+  std::uint32_t from = 0, to = 0;  ///< vertices, in either order
+  double share = 0;                ///< fraction of the way, above 0 and below 1
+};
+
+/// Splits edges: inserts a vertex at each position, all of them distinct, and subdivides the
+/// triangles at the edge. Returns the vertices' numbers in the order of the positions.
+std::vector<std::uint32_t> split_edges(StitchedMesh& stitched, std::span<const EdgePlace> places);
+
+}  // namespace groundray

@@ -1,0 +1,71 @@
+#include "sensors/camera/lens/pixel_patch.h"
+
+#include <algorithm>
+#include <cmath>
+#include <glm/geometric.hpp>
+#include <utility>
+
+namespace groundray {
+namespace {
+
+constexpr PixelRay no_ray;
+
+bool looks_somewhere(const PixelRay& ray) { return ray.direction != glm::dvec3(0); }
+
+}  // namespace
+
+// Second-order Taylor series, whose second derivatives are differences of the neighbours' tangents.
+// The third derivatives, from second differences of the tangents, give the truncation error: at a
+// corner, where it is largest, (|uuu| + |vvv|) / 48 + (|uuv| + |uvv|) / 16.
+PixelPatch::PixelPatch(const Lens& lens, glm::dvec2 pixel, const PixelRay& ray,
+                       const PixelRay& left, const PixelRay& right, const PixelRay& above,
+                       const PixelRay& below) noexcept
+    : lens_(&lens), pixel_(pixel), ray_(ray) {
+  if (!looks_somewhere(left) || !looks_somewhere(right) || !looks_somewhere(above) ||
+      !looks_somewhere(below))
+    return;
+  by_uu_ = (right.by_u - left.by_u) / 2.0;
+  by_uv_ = (below.by_u - above.by_u) / 2.0;
+  by_vv_ = (below.by_v - above.by_v) / 2.0;
+  const auto bend = [&](const PixelRay& a, const PixelRay& b, glm::dvec3 PixelRay::*by) {
+    return glm::length(a.*by + b.*by - 2.0 * (ray.*by));
+  };
+  const double left_out =
+      (bend(left, right, &PixelRay::by_u) + bend(above, below, &PixelRay::by_v)) / 48 +
+      (bend(left, right, &PixelRay::by_v) + bend(above, below, &PixelRay::by_u)) / 16;
+  const double area_sr = glm::length(glm::cross(ray.by_u, ray.by_v));
+  const double steepest = std::sqrt(glm::dot(ray.by_u, ray.by_u) + glm::dot(ray.by_v, ray.by_v));
+  is_smooth_ = left_out * steepest < error_px / 2 * area_sr;  // half, as a margin for higher terms
+}
+
+std::optional<glm::dvec3> PixelPatch::direction(const glm::dvec2& offset_px) const noexcept {
+  if (is_smooth_) {
+    const double x = offset_px.x, y = offset_px.y;
+    return glm::normalize(ray_.direction + x * (ray_.by_u + x / 2 * by_uu_ + y * by_uv_) +
+                          y * (ray_.by_v + y / 2 * by_vv_));
+  }
+  const auto ray = lens_->ray(pixel_ + offset_px);
+  return ray ? std::optional(ray->direction) : std::nullopt;
+}
+
+RayRows::RayRows(const Lens& lens, int begin, int end)
+    : lens_(lens), first_(std::max(begin - 1, 0)), end_(std::min(end + 1, lens.size_px().y)) {
+  const auto rows = static_cast<std::size_t>(end_ - first_);
+  rays_.resize(rows * static_cast<std::size_t>(lens.size_px().x));
+  lens.fill(first_, end_, rays_);
+}
+
+const PixelRay& RayRows::ray(int x, int y) const noexcept {
+  const int width = lens_.size_px().x;
+  if (x < 0 || x >= width || y < first_ || y >= end_) return no_ray;
+  return rays_[static_cast<std::size_t>(y - first_) * static_cast<std::size_t>(width) +
+               static_cast<std::size_t>(x)];
+}
+
+PixelPatch RayRows::patch(glm::ivec2 pixel) const noexcept {
+  const auto [x, y] = std::pair(pixel.x, pixel.y);
+  return {lens_,         glm::dvec2(pixel), ray(x, y),    ray(x - 1, y),
+          ray(x + 1, y), ray(x, y - 1),     ray(x, y + 1)};
+}
+
+}  // namespace groundray

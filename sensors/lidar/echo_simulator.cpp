@@ -1,0 +1,354 @@
+#include "sensors/lidar/echo_simulator.h"
+
+#include <algorithm>
+#include <array>
+#include <cmath>
+#include <glm/geometric.hpp>
+#include <limits>
+#include <numbers>
+#include <numeric>
+#include <utility>
+
+#include "core/error.h"
+
+namespace groundray {
+namespace {
+
+constexpr double least_air_share = 1e-4;  // fraction of the strongest step; weaker air is omitted
+
+// Returns the receiver's spec with the air's group index and the laser's wavelength.
+ReceiverSpec receiver_in(const LightSpec& spec, const AtmosphereSpec& air) {
+  ReceiverSpec receiver = spec.receiver;
+  receiver.group_index = air.group_index;
+  if (receiver.noise) receiver.noise->wavelength_m = 1e-9 * spec.wavelength_nm;
+  return receiver;
+}
+
+// Divides arrivals [begin, end), sorted by range, into surfaces: hits of one object whose
+// consecutive ranges differ by at most `resolution_m`.
+void part_surfaces(std::span<const Hit> hits, std::size_t begin, std::size_t end,
+                   double resolution_m, EchoSimulator::Workspace& work) {
+  work.surfaces.clear();
+  work.surface_of.resize(end - begin);
+  for (std::size_t k = begin; k < end; ++k) {
+    const auto [range_m, energy_j] = work.arrivals[k];
+    const std::uint32_t object = hits[work.order[k]].object;
+    std::size_t at = work.surfaces.size();
+    while (at > 0 && !(work.surfaces[at - 1].object == object &&
+                       range_m - work.surfaces[at - 1].last_m <= resolution_m))
+      --at;
+    if (at == 0) {
+      work.surfaces.push_back({.object = object});
+      at = work.surfaces.size();
+    }
+    LitSurface& surface = work.surfaces[at - 1];
+    surface.last_m = range_m;
+    surface.energy_j += energy_j;
+    if (energy_j > surface.strongest_j) {
+      surface.strongest_j = energy_j;
+      surface.strongest = k;
+    }
+    work.surface_of[k - begin] = static_cast<std::uint32_t>(at - 1);
+  }
+}
+
+// The two surfaces with the most energy; one without energy represents none.
+struct EnergyShares {
+  LitSurface best, second;
+  std::size_t best_number = 0;
+  double energy_j = 0;
+};
+EnergyShares shares_of(std::span<const LitSurface> surfaces) {
+  EnergyShares shares;
+  for (std::size_t n = 0; n < surfaces.size(); ++n) {
+    shares.energy_j += surfaces[n].energy_j;
+    if (surfaces[n].energy_j > shares.best.energy_j) {
+      shares.second = shares.best;
+      shares.best = surfaces[n];
+      shares.best_number = n;
+    } else if (surfaces[n].energy_j > shares.second.energy_j) {
+      shares.second = surfaces[n];
+    }
+  }
+  return shares;
+}
+
+// Sorts at most `most` hits by range without branches that could be mispredicted: the rank of a hit
+// is the number of nearer hits. Returns false if two ranges are equal.
+template <std::size_t most>
+bool sort_by_counting(std::span<const Hit> hits, std::vector<std::uint32_t>& order) {
+  std::array<double, most> range_m;
+  range_m.fill(std::numeric_limits<double>::infinity());
+  for (std::size_t i = 0; i < hits.size(); ++i) range_m[i] = hits[i].range_m;
+  std::array<std::int64_t, most> nearer{};
+  for (std::size_t j = 0; j < hits.size(); ++j) {
+    const double other_m = range_m[j];
+#pragma omp simd
+    for (std::size_t i = 0; i < most; ++i) nearer[i] += other_m < range_m[i] ? 1 : 0;
+  }
+  std::array<std::uint32_t, most + 1> sorted;
+  std::uint64_t taken = 0;
+  std::size_t met = 0;
+  for (std::uint32_t i = 0; i < hits.size(); ++i) {
+    sorted[static_cast<std::size_t>(nearer[i])] = i;  // misses rank behind all hits
+    taken |= std::uint64_t{1} << nearer[i];
+    met += hits[i] ? 1 : 0;
+  }
+  order.assign(sorted.begin(), sorted.begin() + static_cast<std::ptrdiff_t>(met));
+  return (~taken & ((std::uint64_t{1} << met) - 1)) == 0;
+}
+
+// Lists the hits by range; hits of equal range keep their order.
+void sort_hits(std::span<const Hit> hits, std::vector<std::uint32_t>& order) {
+  if (hits.size() <= 16 && sort_by_counting<16>(hits, order)) return;
+  if (hits.size() <= 32 && sort_by_counting<32>(hits, order)) return;
+  order.clear();
+  for (std::uint32_t i = 0; i < hits.size(); ++i) {
+    if (hits[i]) order.push_back(i);
+  }
+  std::ranges::sort(order, {}, [&](std::uint32_t i) { return std::pair(hits[i].range_m, i); });
+}
+
+// Bound of |x| within which exp_of_small has a relative error below 3e-11.
+constexpr double small_exponent = 0.05;
+double exp_of_small(double x) {
+  return 1 + x * (1 + x * (1. / 2 + x * (1. / 6 + x * (1. / 24 + x * (1. / 120)))));
+}
+
+}  // namespace
+
+RetroBrdfs::RetroBrdfs(const Scene& scene, double wavelength_nm, const LaserBeam& beam)
+    : scene_(scene),
+      by_material_(scene.materials.retro_brdfs(wavelength_nm)),
+      is_plain_(scene.is_plain()),
+      beam_(beam) {
+  const auto check = [&](std::uint16_t material) {
+    if (material >= by_material_.size()) {
+      throw Error(
+          "scene: a surface has material {}, but there are {} materials: a lidar with light needs "
+          "all of them",
+          material, by_material_.size());
+    }
+  };
+  for (const ModelTruth& model : scene.models) std::ranges::for_each(model.materials, check);
+  for (const CoverLayer& layer : scene.cover.layers()) check(layer.material);
+  if (!scene.cover.empty()) return;
+  check(scene.terrain.material);
+  ground_ = by_material_[scene.terrain.material];
+}
+
+// The footprint of a sub-ray is modelled as a square; its variance is that of a Gaussian beam
+// divided by the number of sub-rays.
+RetroBrdfs::Reflection RetroBrdfs::varied_reflection(const Ray& ray, const Hit& hit, double cosine,
+                                                     std::size_t sub_rays) const noexcept {
+  const glm::dvec2 radius_m = beam_.radius_m(hit.range_m);
+  const double width_m = std::sqrt(3 * radius_m.x * radius_m.y / static_cast<double>(sub_rays));
+  const Appearance appearance = scene_.appearance_of(ray, hit, width_m, Filtering::Fast);
+  Reflection sum;
+  for (std::uint32_t i = 0; i < appearance.count; ++i) {
+    const auto& [material, share, tint] = appearance.parts[i];
+    const RetroBrdf& brdf = by_material_[material];
+    const double weight = share;
+    sum.retro_cos_per_sr += weight * tinted_retro_brdf_cos(brdf, cosine, tint.brightness);
+    sum.albedo += weight * tinted_albedo(brdf, tint.brightness);
+  }
+  return sum;
+}
+
+EchoSimulator::EchoSimulator(const LightSpec& spec, const AtmosphereSpec& air,
+                             const RangeGate& gate)
+    : spec_(spec),
+      gate_(gate),
+      atmosphere_(air, spec.wavelength_nm),
+      radar_(spec.optics),
+      receiver_(spec.pulse, receiver_in(spec, air)),
+      resolution_m_(speed_of_light_m_per_s * receiver_.pulse().fwhm_s() / 4),
+      perpendicular_w_m2_(radar_.energy_area_j_m2() / std::numbers::pi *
+                          receiver_.pulse().peak_per_s()),
+      sun_w_(radar_.solar_power_w(spec.sun, 1)) {
+  if (atmosphere_.backscatter_per_m_sr() > 0) sample_air(air);
+}
+
+void EchoSimulator::sample_air(const AtmosphereSpec& air) {
+  const double step_m = speed_of_light_m_per_s / air.group_index * receiver_.interval_s() / 2;
+  constexpr double farthest_m = 1e4;
+  std::vector<Arrival> arrivals;
+  for (const SoftReturn& stretch : atmosphere_.soft_return(
+           radar_, spec_.overlap, {step_m, std::min(gate_.far_m, farthest_m), least_air_share}))
+    arrivals.push_back({stretch.range_m, stretch.energy_j});
+  Waveform waveform;
+  receiver_.sample(arrivals, waveform);
+  const auto segments = waveform.segments();
+  if (segments.empty()) return;
+  first_air_bin_ = segments.front().bins.begin;
+  air_w_.resize(static_cast<std::size_t>(segments.back().bins.end - first_air_bin_));
+  for (const Waveform::Segment& segment : segments) {
+    std::ranges::copy(waveform.power_w(segment),
+                      air_w_.begin() + (segment.bins.begin - first_air_bin_));
+  }
+}
+
+void EchoSimulator::collect(std::span<const Ray> rays, std::span<const Hit> hits,
+                            const RetroBrdfs& brdfs, double extinction_per_m,
+                            Workspace& work) const noexcept {
+  sort_hits(hits, work.order);
+  const std::size_t count = work.order.size();
+  work.arrivals.resize(count);
+  work.sunlit = 0;
+  if (count == 0) return;
+  Arrival* const arrivals = work.arrivals.data();
+  for (std::size_t k = 0; k < count; ++k) {
+    const std::uint32_t i = work.order[k];
+    const auto [retro_cos_per_sr, albedo] = brdfs.reflection_of(rays[i], hits[i], hits.size());
+    arrivals[k] = {hits[i].range_m, retro_cos_per_sr};
+    work.sunlit += albedo * sun_cosine(hits[i].normal);
+  }
+  const double share = 1.0 / static_cast<double>(hits.size());
+  work.sunlit *= share;
+  const auto receive = [&](Arrival& arrival, double transmission) {
+    const double seen = share * overlap_share(spec_.overlap, arrival.range_m);
+    arrival.energy_j =
+        seen > 0 ? radar_.received_energy_j(seen, arrival.energy_j, arrival.range_m, transmission)
+                 : 0;
+  };
+  const double nearest_m = arrivals[0].range_m;
+  if (extinction_per_m * (arrivals[count - 1].range_m - nearest_m) < small_exponent) {
+    const double to_nearest = std::exp(-extinction_per_m * nearest_m);  // one exponential for all
+    for (std::size_t k = 0; k < count; ++k) {
+      const double exponent = extinction_per_m * (nearest_m - arrivals[k].range_m);
+      receive(arrivals[k], to_nearest * exp_of_small(exponent));
+    }
+  } else {
+    for (std::size_t k = 0; k < count; ++k)
+      receive(arrivals[k], std::exp(-extinction_per_m * arrivals[k].range_m));
+  }
+}
+
+// Removes the return of the air behind each surface, which is not lit. It ends there abruptly,
+// which is exact except within the length of a pulse.
+void EchoSimulator::add_air(std::span<const Hit> hits, Workspace& work) const noexcept {
+  work.air_w = air_w_;
+  const float share = 1.0f / static_cast<float>(hits.size());
+  for (const Arrival& arrival : work.arrivals) {
+    const auto end = static_cast<std::int64_t>(
+        std::ceil(receiver_.arrival_s(arrival.range_m) / receiver_.interval_s()));
+    for (auto bin = static_cast<std::size_t>(std::max<std::int64_t>(end - first_air_bin_, 0));
+         bin < work.air_w.size(); ++bin)
+      work.air_w[bin] -= share * air_w_[bin];
+  }
+  work.waveform.add(first_air_bin_, work.air_w);
+}
+
+double EchoSimulator::air_energy_j(const Detection& detection,
+                                   const Workspace& work) const noexcept {
+  if (air_w_.empty()) return 0;
+  const auto bin_of = [&](double time_s) {
+    const double bin = time_s / interval_s() - static_cast<double>(first_air_bin_);
+    return static_cast<std::ptrdiff_t>(
+        std::clamp(std::round(bin), 0.0, static_cast<double>(work.air_w.size())));
+  };
+  const auto first = work.air_w.begin();
+  return interval_s() *
+         std::accumulate(first + bin_of(detection.begin_s), first + bin_of(detection.end_s), 0.0);
+}
+
+void EchoSimulator::receive(std::span<const Ray> rays, std::span<const Hit> hits,
+                            std::span<const double> bounds_m, const RetroBrdfs& brdfs,
+                            const RandomKey& key, Workspace& work) const noexcept {
+  collect(rays, hits, brdfs, atmosphere_.extinction_per_m(), work);
+  if (air_w_.empty()) {
+    receiver_.sample(work.arrivals, work.waveform);
+  } else {
+    receiver_.sample(work.arrivals, work.waveform,
+                     {first_air_bin_, first_air_bin_ + static_cast<std::int64_t>(air_w_.size())});
+    add_air(hits, work);
+  }
+  receiver_.detect(work.waveform, gate_, {key, sun_w_ * work.sunlit}, work.detections);
+  work.echoes.clear();
+  for (const Detection& detection : work.detections)
+    attribute_echo(rays, hits, bounds_m, detection, work);
+  if (work.echoes.empty()) work.reason = reason_for_none(rays, hits, brdfs, work);
+}
+
+void EchoSimulator::attribute_echo(std::span<const Ray> rays, std::span<const Hit> hits,
+                                   std::span<const double> bounds_m, const Detection& detection,
+                                   Workspace& work) const noexcept {
+  Echo& echo = work.echoes.emplace_back();
+  echo.detection = detection;
+  const auto arrival_s = [&](const Arrival& a) { return receiver_.arrival_s(a.range_m); };
+  const auto all_begin = work.arrivals.begin(), all_end = work.arrivals.end();
+  const auto begin = std::ranges::lower_bound(all_begin, all_end, detection.begin_s, {}, arrival_s);
+  const auto end = std::ranges::lower_bound(begin, all_end, detection.end_s, {}, arrival_s);
+  const auto first = static_cast<std::size_t>(begin - all_begin);
+  part_surfaces(hits, first, static_cast<std::size_t>(end - all_begin), resolution_m_, work);
+  const auto [best, second, best_number, energy_j] = shares_of(work.surfaces);
+  const double air_j = air_energy_j(detection, work);
+  if (detection.kind == Detection::Kind::FalseAlarm || best.energy_j <= air_j) {
+    echo.kind =
+        detection.kind == Detection::Kind::FalseAlarm ? Echo::Kind::FalseAlarm : Echo::Kind::Air;
+    return;
+  }
+  glm::dvec3 normal(0);
+  const double per_energy = 1 / best.energy_j;
+  for (std::size_t k = 0; k < work.surface_of.size(); ++k) {
+    if (work.surface_of[k] != best_number) continue;
+    const std::uint32_t i = work.order[first + k];
+    const double weight = work.arrivals[first + k].energy_j * per_energy;
+    echo.range_m += weight * hits[i].range_m;
+    echo.p_DQ += weight * (rays[i].origin + rays[i].direction * hits[i].range_m);
+    normal += weight * glm::dvec3(hits[i].normal);
+    echo.deviation_m = std::max(echo.deviation_m, hits[i].deviation_m);
+    if (!bounds_m.empty()) echo.bound_m = std::max(echo.bound_m, bounds_m[i]);
+  }
+  echo.normal = glm::vec3(glm::normalize(normal));
+  echo.share = static_cast<float>(best.energy_j / (energy_j + air_j));
+  echo.second_share = static_cast<float>(second.energy_j / (energy_j + air_j));
+  echo.hit = work.order[best.strongest];
+  if (second.energy_j > 0) echo.second_hit = work.order[second.strongest];
+}
+
+// Overwrites the arrivals, which are no longer needed.
+NoReturn EchoSimulator::reason_for_none(std::span<const Ray> rays, std::span<const Hit> hits,
+                                        const RetroBrdfs& brdfs, Workspace& work) const noexcept {
+  if (work.order.empty()) return NoReturn::Sky;
+  const auto outside = [&](const Arrival& arrival) {
+    return arrival.range_m < gate_.near_m || gate_.far_m < arrival.range_m;
+  };
+  if (std::ranges::all_of(work.arrivals, outside)) return NoReturn::OutOfGate;
+  const auto above_threshold = [&](const Waveform& waveform) {
+    return std::ranges::any_of(waveform.segments(), [&](const Waveform::Segment& segment) {
+      return std::ranges::max(waveform.power_w(segment)) > receiver_.threshold_w(0);
+    });
+  };
+  // Returns::Second reports nothing if there is only one echo; all others report something.
+  const bool second_alone = spec_.receiver.returns == ReceiverSpec::Returns::Second;
+  if (second_alone && above_threshold(work.waveform)) return NoReturn::Blanked;
+  if (atmosphere_.extinction_per_m() == 0) return NoReturn::BelowThreshold;
+  collect(rays, hits, brdfs, 0, work);
+  std::erase_if(work.arrivals, outside);
+  receiver_.sample(work.arrivals, work.clear_waveform);
+  return above_threshold(work.clear_waveform) ? NoReturn::Absorbed : NoReturn::BelowThreshold;
+}
+
+double EchoSimulator::reported_m(double range_m) const noexcept {
+  const double step_m = spec_.range_step_m;
+  return step_m > 0 ? std::round(range_m / step_m) * step_m : range_m;
+}
+
+double EchoSimulator::reported_sd_m(double sd_m) const noexcept {
+  return std::hypot(sd_m, spec_.range_step_m / std::sqrt(12.0));
+}
+
+float EchoSimulator::intensity(const Detection& detection) const noexcept {
+  const IntensitySpec& spec = spec_.intensity;
+  if (spec.scale == IntensitySpec::Scale::Power)
+    return static_cast<float>(spec.gain * detection.power_w);
+  const double reflectance =
+      detection.power_w * detection.range_m * detection.range_m / perpendicular_w_m2_;
+  if (spec.scale == IntensitySpec::Scale::Reflectance) return static_cast<float>(reflectance);
+  if (reflectance <= 1) return static_cast<float>(std::round(100 * reflectance));
+  const double above = std::log(reflectance) / std::log(spec.full_scale_reflectance);
+  return static_cast<float>(std::min(std::round(101 + 154 * above), 255.0));
+}
+
+}  // namespace groundray

@@ -1,0 +1,71 @@
+#pragma once
+
+#include <cstdint>
+#include <glm/geometric.hpp>
+#include <glm/vec2.hpp>
+#include <glm/vec3.hpp>
+#include <span>
+#include <string_view>
+#include <utility>
+
+#include "core/model/model.h"
+
+namespace groundray {
+
+/// Returns a surface with the name and the colour of a built-in material or of a paint.
+ModelSurface asset_surface(std::string_view material);
+
+/// Returns a unit vector perpendicular to `v`, which must not be 0.
+glm::dvec3 any_normal_to(const glm::dvec3& v);
+
+/// Point on the centre line of a tube, and the tube's radius there.
+struct TubeRing {
+  glm::dvec3 p;
+  double radius = 0;
+};
+
+/// Assembles a model. Either all of its vertices have a normal and texture coordinates, or none
+/// have.
+class AssetBuilder {
+ public:
+  /// Adds a surface and returns its number.
+  std::uint16_t add_surface(ModelSurface surface);
+
+  std::uint32_t add_vertex(const glm::dvec3& p);
+  std::uint32_t add_vertex(const glm::dvec3& p, const glm::dvec3& normal, const glm::dvec2& uv);
+
+  /// Adds a triangle, counter-clockwise as seen from outside.
+  void add_triangle(std::uint32_t a, std::uint32_t b, std::uint32_t c, std::uint16_t surface);
+
+  /// Adds a closed tube. Its cross-section is a regular polygon of mean width 2 radius, so that its
+  /// width averaged over all directions equals that of the round tube (Cauchy). The tube ends in a
+  /// point if the last radius is 0.
+  /// @param rings  at least two, at distinct positions.
+  void add_tube(std::span<const TubeRing> rings, int sides, std::uint16_t surface);
+
+  /// Adds a closed upright cylinder with sharp edges. The corners of its polygonal cross-section
+  /// lie on the circle.
+  void add_cylinder(const glm::dvec3& foot, double height, double radius, int sides,
+                    std::uint16_t surface);
+
+  /// Adds a closed body between two polygons with equal numbers of corners; `low[i]` is joined to
+  /// `high[i]`. Both are counter-clockwise as seen from the outer side of `high`. They may be
+  /// concave; both are triangulated by the shape of `low`.
+  void add_loft(std::span<const glm::dvec3> low, std::span<const glm::dvec3> high,
+                std::uint16_t surface);
+
+  /// Scales all positions about the origin.
+  void scale(double factor);
+  void move(const glm::dvec3& by);
+
+  /// Sets the normal of every vertex to the area-weighted mean of its triangles' normals.
+  void smooth();
+
+  const Model& model() const { return model_; }
+  Model take() { return std::move(model_); }
+
+ private:
+  Model model_;
+};
+
+}  // namespace groundray

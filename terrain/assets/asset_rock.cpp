@@ -1,0 +1,202 @@
+// Rocks, stones and spheres: icospheres whose vertices are moved along their radii. For any radius
+// function, triangles therefore intersect only at shared edges, and all face outward.
+#include <algorithm>
+#include <array>
+#include <cmath>
+#include <cstddef>
+#include <glm/geometric.hpp>
+#include <map>
+#include <numbers>
+#include <string_view>
+#include <utility>
+#include <vector>
+
+#include "terrain/assets/asset_builder.h"
+#include "terrain/assets/asset_kinds.h"
+
+namespace groundray {
+namespace {
+
+using std::numbers::pi;
+
+constexpr std::array<glm::uvec3, 20> icosahedron = {
+    {{0, 11, 5},  {0, 5, 1},  {0, 1, 7},  {0, 7, 10}, {0, 10, 11}, {1, 5, 9}, {5, 11, 4},
+     {11, 10, 2}, {10, 7, 6}, {7, 1, 8},  {3, 9, 4},  {3, 4, 2},   {3, 2, 6}, {3, 6, 8},
+     {3, 8, 9},   {4, 9, 5},  {2, 4, 11}, {6, 2, 10}, {8, 6, 7},   {9, 8, 1}}};
+
+std::array<glm::dvec3, 12> icosahedron_corners() {
+  const double g = std::numbers::phi;
+  return {{{-1, g, 0},
+           {1, g, 0},
+           {-1, -g, 0},
+           {1, -g, 0},
+           {0, -1, g},
+           {0, 1, g},
+           {0, -1, -g},
+           {0, 1, -g},
+           {g, 0, -1},
+           {g, 0, 1},
+           {-g, 0, -1},
+           {-g, 0, 1}}};
+}
+
+struct Icosphere {
+  std::vector<glm::dvec3> directions;
+  std::vector<glm::uvec3> triangles;
+};
+
+// Icosahedron with each edge divided into n: 20 n^2 triangles. A vertex is identified by its
+// weights at the icosahedron's corners, so that adjacent faces share it exactly.
+class IcosphereMaker {
+ public:
+  explicit IcosphereMaker(int n) : n_(n) {
+    for (const glm::uvec3& face : icosahedron) add_face(face);
+  }
+  Icosphere take() { return std::move(sphere_); }
+
+ private:
+  using Weights = std::vector<std::pair<unsigned, int>>;  // by corner; zero weights are omitted
+
+  void add_face(const glm::uvec3& face) {
+    const auto at = [&](int i, int j) { return vertex(face, {n_ - i - j, i, j}); };
+    for (int i = 0; i < n_; ++i) {
+      for (int j = 0; i + j < n_; ++j) {
+        sphere_.triangles.emplace_back(at(i, j), at(i + 1, j), at(i, j + 1));
+        if (i + j + 2 > n_) continue;
+        sphere_.triangles.emplace_back(at(i + 1, j), at(i + 1, j + 1), at(i, j + 1));
+      }
+    }
+  }
+
+  unsigned vertex(const glm::uvec3& face, const std::array<int, 3>& weights) {
+    Weights key;
+    for (int i = 0; i < 3; ++i) {
+      const int weight = weights[static_cast<std::size_t>(i)];
+      if (weight > 0) key.emplace_back(face[i], weight);
+    }
+    std::ranges::sort(key);
+    const auto [it, is_new] = numbers_.try_emplace(key, sphere_.directions.size());
+    if (is_new) {
+      glm::dvec3 sum(0);
+      for (const auto& [corner, weight] : key) sum += corners_[corner] * double(weight);
+      sphere_.directions.push_back(glm::normalize(sum));
+    }
+    return static_cast<unsigned>(it->second);
+  }
+
+  int n_;
+  std::array<glm::dvec3, 12> corners_ = icosahedron_corners();
+  std::map<Weights, std::size_t> numbers_;
+  Icosphere sphere_;
+};
+
+// Parameters of the shape of a rock or stone.
+struct RockShape {
+  std::string_view material;
+  double frequency;  // divisions of an edge of the icosahedron at detail 1
+  double sharpness;  // of the edges between the rock's faces: exponent of a norm
+  double roughness;  // amplitude of the longest waves on the unit sphere
+};
+
+// Radius as a function of direction: faces at random distances, combined by a norm, and waves on
+// them that are no shorter than three edges of the mesh.
+class RockRadius {
+ public:
+  RockRadius(const RockShape& shape, int n, AssetRandom& random) : shape_(shape) {
+    constexpr int face_count = 22;
+    for (int i = 0; i < face_count; ++i) {
+      // Sunflower arrangement (golden angle) on the sphere, so that faces cover all sides.
+      const double z = 1 - (2 * i + 1.0) / face_count, angle = i * pi * (3 - std::sqrt(5.0));
+      const glm::dvec3 even{std::sqrt(1 - z * z) * std::cos(angle),
+                            std::sqrt(1 - z * z) * std::sin(angle), z};
+      const glm::dvec3 normal = glm::normalize(even + 0.28 * random.direction());
+      faces_.push_back(normal / random.between(0.78, 1.04));
+    }
+    // Wave number of the longest waves, and ratio of successive wave numbers.
+    constexpr double longest = 3, ratio = 1.25;
+    const double edge = std::acos(1 / std::sqrt(5.0)) / n;
+    const double shortest = 2 * pi / (3 * edge);
+    for (double number = longest; number < shortest; number *= ratio) {
+      for (int i = 0; i < 2; ++i) {
+        const double amplitude = shape.roughness * std::pow(number / longest, -1.5);
+        waves_.push_back({random.direction() * number, random.angle_rad(), amplitude});
+      }
+    }
+  }
+
+  double operator()(const glm::dvec3& direction) const {
+    double sum = 0;
+    for (const glm::dvec3& face : faces_) {
+      sum += std::pow(std::max(0.0, glm::dot(face, direction)), shape_.sharpness);
+    }
+    double noise = 0;
+    for (const Wave& wave : waves_) {
+      noise += wave.amplitude * std::sin(glm::dot(wave.vector, direction) + wave.phase);
+    }
+    return std::pow(sum, -1 / shape_.sharpness) * std::exp(noise);
+  }
+
+ private:
+  struct Wave {
+    glm::dvec3 vector;
+    double phase;
+    double amplitude;
+  };
+  RockShape shape_;
+  std::vector<glm::dvec3> faces_;  // normal divided by distance
+  std::vector<Wave> waves_;
+};
+
+int cuts(double at_usual, double detail) {
+  return std::max(2, static_cast<int>(std::lround(at_usual * std::sqrt(detail))));
+}
+
+Model boulder(const RockShape& shape, double size_m, double detail, AssetRandom random) {
+  const int n = cuts(shape.frequency, detail);
+  Icosphere sphere = IcosphereMaker(n).take();
+  // Rock fragments have axes of 2 : sqrt 2 : 1 on average (Michikami et al., Icarus 264 (2016)
+  // 316).
+  const glm::dvec3 axes{1, std::numbers::sqrt2 / 2 * random.between(0.85, 1.15),
+                        0.5 * random.between(0.8, 1.2)};
+  const RockRadius radius(shape, n, random);
+  AssetBuilder builder;
+  const std::uint16_t surface = builder.add_surface(asset_surface(shape.material));
+  glm::dvec3 low(1e9), high(-1e9);
+  for (glm::dvec3& p : sphere.directions) {
+    p *= axes * radius(p);
+    low = glm::min(low, p);
+    high = glm::max(high, p);
+  }
+  const glm::dvec3 extent = high - low;
+  const double scale = size_m / std::max({extent.x, extent.y, extent.z});
+  // A fifth of the height is below the ground.
+  const glm::dvec3 origin{(low.x + high.x) / 2, (low.y + high.y) / 2, low.z + 0.2 * extent.z};
+  for (const glm::dvec3& p : sphere.directions) builder.add_vertex((p - origin) * scale);
+  for (const glm::uvec3& t : sphere.triangles) builder.add_triangle(t.x, t.y, t.z, surface);
+  builder.smooth();
+  return builder.take();
+}
+
+}  // namespace
+
+Model make_rock(double size_m, double detail, AssetRandom random) {
+  return boulder({"rock", 8, 22, 0.03}, size_m, detail, random);
+}
+
+Model make_stone(double size_m, double detail, AssetRandom random) {
+  return boulder({"gravel", 4, 6, 0.02}, size_m, detail, random);
+}
+
+Model make_sphere_target(double diameter_m, double detail) {
+  const Icosphere sphere = IcosphereMaker(cuts(16, detail)).take();
+  AssetBuilder builder;
+  const std::uint16_t surface = builder.add_surface(asset_surface("metal"));
+  for (const glm::dvec3& direction : sphere.directions) {
+    builder.add_vertex((direction + glm::dvec3(0, 0, 1)) * (diameter_m / 2));
+  }
+  for (const glm::uvec3& t : sphere.triangles) builder.add_triangle(t.x, t.y, t.z, surface);
+  builder.smooth();
+  return builder.take();
+}
+
+}  // namespace groundray

@@ -1,0 +1,184 @@
+#pragma once
+
+#include <bit>
+#include <cstddef>
+#include <cstdint>
+#include <glm/vec2.hpp>
+#include <glm/vec3.hpp>
+
+#include "terrain/lod/lattice.h"
+#include "terrain/lod/passes/border_thinning.h"
+#include "terrain/lod/passes/leaf_tree.h"
+
+namespace groundray::passes {
+
+/// Calls `act` with the three points of each triangle of a block, counter-clockwise as seen from
+/// above with columns to the east and rows to the south.
+template <typename Act>
+void for_each_triangle(const Block& block, const Act& act) noexcept {
+  for (int row = 0; row < block.cells.y; ++row) {
+    for (int column = 0; column < block.cells.x; ++column) {
+      glm::ivec2 north_west{column, row};
+      glm::ivec2 north_east{column + 1, row};
+      glm::ivec2 south_west{column, row + 1};
+      glm::ivec2 south_east{column + 1, row + 1};
+      // Two halves that share an omitted point along the boundary are one triangle, emitted with
+      // the first of them.
+      if (!block.splits_along_main(column, row)) {
+        if (!block.drops(column, row)) act(north_west, south_west, north_east);
+        if (block.drops(column + 1, row + 1)) {
+          (row + 1 == block.cells.y ? south_east.x : south_east.y) += 1;
+        }
+        act(south_east, north_east, south_west);
+      } else {
+        const bool drops_south_west = block.drops(column, row + 1);
+        if (drops_south_west && column == 0) south_west.y += 1;
+        if (!drops_south_west || column == 0) act(north_west, south_west, south_east);
+        const bool drops_north_east = block.drops(column + 1, row);
+        if (drops_north_east && row == 0) north_east.x += 1;
+        if (!drops_north_east || row == 0) act(north_east, north_west, south_east);
+      }
+    }
+  }
+}
+
+/// Writes the index of each leaf in the list to its node.
+struct NumberLeavesPass {
+  LeafTree tree;
+
+  void operator()(std::size_t index) const noexcept {
+    const LeafBlock leaf = tree.block_of(tree.leaves[index]);
+    const glm::ivec2 node{leaf.first_cell.x / tree.block_cells,
+                          leaf.first_cell.y / tree.block_cells};
+    tree.levels[leaf.level].leaf[tree.node_index(leaf.level, node)] =
+        static_cast<std::uint32_t>(index);
+  }
+};
+
+/// Marks the points of each leaf with holes that are vertices of triangles, its own or its
+/// neighbours': one bit per point.
+struct MarkVerticesPass {
+  LeafTree tree;
+  const std::uint32_t* holed;  ///< indices in the list of the leaves with holes
+  std::uint64_t* marks;
+
+  void operator()(std::size_t index) const noexcept {
+    const LeafBlock leaf = tree.block_of(tree.leaves[holed[index]]);
+    std::uint64_t* const out = marks + index * tree.mark_words();
+    for (int row = 0; row < leaf.own_points.y; ++row) {
+      for (int column = 0; column < leaf.own_points.x; ++column) {
+        if (!leaf.block.drops(column, row) && is_used(leaf, column, row)) {
+          const std::size_t bit = tree.mark_bit(column, row);
+          out[bit / 64] |= std::uint64_t{1} << (bit % 64);
+        }
+      }
+    }
+  }
+
+ private:
+  bool is_used(const LeafBlock& leaf, int column, int row) const noexcept {
+    const glm::ivec2 at = tree.sample(leaf, column, row);
+    if (tree.is_missing(at)) return false;
+    const glm::ivec2 last = tree.last_sample();
+    for (const Corner corner : {NorthWest, NorthEast, SouthWest, SouthEast}) {
+      // The cell of the DEM that has the sample at this corner.
+      const glm::ivec2 cell{at.x - corner % 2, at.y - corner / 2};
+      if (cell.x < 0 || cell.y < 0 || cell.x >= last.x || cell.y >= last.y) continue;
+      const LeafBlock around = tree.block_of(tree.leaves[tree.leaf_at(cell, leaf.level)]);
+      const glm::ivec2 point = tree.point(around, at);
+      const glm::ivec2 large_cell{point.x - corner % 2, point.y - corner / 2};
+      const bool is_main = around.block.splits_along_main(large_cell.x, large_cell.y);
+      // A half without this corner contains the diagonal, whose points form another half with this
+      // corner.
+      for (const Corner half : {NorthWest, NorthEast, SouthWest, SouthEast}) {
+        if (is_main != is_of_anti_diagonal(half) && tree.half_exists(around, large_cell, half)) {
+          return true;
+        }
+      }
+    }
+    return false;
+  }
+};
+
+/// Counts the vertices that each leaf owns, and its triangles.
+struct CountMeshPass {
+  LeafTree tree;
+  const std::uint64_t* marks;    ///< of the leaves with holes
+  const std::uint32_t* mark_of;  ///< index of each leaf among the leaves with holes
+  std::uint32_t* vertices;
+  std::uint32_t* triangles;
+
+  void operator()(std::size_t index) const noexcept {
+    const LeafBlock leaf = tree.block_of(tree.leaves[index]);
+    if (tree.leaves[index].has_holes) {
+      vertices[index] = tree.marked_before(marks, mark_of[index], tree.mark_words() * 64);
+      std::uint32_t count = 0;
+      for_each_triangle(leaf.block, [&](glm::ivec2 a, glm::ivec2 b, glm::ivec2 c) {
+        count += tree.has_all(leaf, a, b, c) ? 1 : 0;
+      });
+      triangles[index] = count;
+    } else {
+      vertices[index] = leaf.own_points_before({0, leaf.own_points.y});
+      triangles[index] = leaf.triangle_count();
+    }
+  }
+};
+
+/// Writes the vertices that each leaf owns.
+struct EmitVerticesPass {
+  VertexNumbers numbers;
+  glm::ivec2* vertices;
+
+  void operator()(std::size_t index) const noexcept {
+    const LeafTree& tree = numbers.tree;
+    const LeafBlock leaf = tree.block_of(tree.leaves[index]);
+    for (int row = 0; row < leaf.own_points.y; ++row) {
+      for (int column = 0; column < leaf.own_points.x; ++column) {
+        if (!numbers.has(index, leaf, column, row)) continue;
+        vertices[numbers.of_own(index, leaf, column, row)] = tree.sample(leaf, column, row);
+      }
+    }
+  }
+};
+
+/// Writes the triangles of each leaf.
+struct EmitTrianglesPass {
+  VertexNumbers numbers;
+  const std::uint32_t* first;  ///< index of each leaf's first triangle
+  bool is_mirrored = false;    ///< true if columns and rows run clockwise as seen from above
+  glm::uvec3* triangles;
+  std::uint8_t* levels;
+
+  void operator()(std::size_t index) const noexcept {
+    const LeafTree& tree = numbers.tree;
+    const LeafBlock leaf = tree.block_of(tree.leaves[index]);
+    const bool has_holes = tree.leaves[index].has_holes;
+    std::uint32_t number[max_points];
+    for (int row = 0; row <= leaf.block.cells.y; ++row) {
+      for (int column = 0; column <= leaf.block.cells.x; ++column) {
+        if (leaf.block.drops(column, row)) continue;
+        if (has_holes && tree.is_missing(tree.sample(leaf, column, row))) continue;
+        number[place({column, row})] = numbers.of(index, leaf, {column, row});
+      }
+    }
+    std::size_t out = first[index];
+    for_each_triangle(leaf.block, [&](glm::ivec2 a, glm::ivec2 b, glm::ivec2 c) {
+      if (has_holes && !tree.has_all(leaf, a, b, c)) return;
+      const std::uint32_t i = number[place(a)];
+      const std::uint32_t j = number[place(b)];
+      const std::uint32_t k = number[place(c)];
+      triangles[out] = is_mirrored ? glm::uvec3{i, k, j} : glm::uvec3{i, j, k};
+      levels[out] = static_cast<std::uint8_t>(leaf.level);
+      ++out;
+    });
+  }
+
+ private:
+  static constexpr int max_points = (Lattice::max_block_cells + 1) * (Lattice::max_block_cells + 1);
+
+  int place(glm::ivec2 point) const noexcept {
+    return point.y * (numbers.tree.block_cells + 1) + point.x;
+  }
+};
+
+}  // namespace groundray::passes

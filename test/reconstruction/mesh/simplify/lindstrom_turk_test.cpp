@@ -1,0 +1,396 @@
+#include "reconstruction/mesh/simplify/lindstrom_turk.h"
+
+#include <fmt/format.h>
+#include <gmock/gmock.h>
+#include <gtest/gtest.h>
+
+#include <algorithm>
+#include <array>
+#include <cmath>
+#include <cstdlib>
+#include <ctime>
+#include <filesystem>
+#include <glm/geometric.hpp>
+#include <limits>
+#include <numbers>
+#include <random>
+#include <stdexcept>
+#include <string>
+#include <vector>
+
+#include "core/error.h"
+#include "core/geometry/height_grid.h"
+#include "core/model/mesh_reader.h"
+#include "reconstruction/mesh/accuracy/accuracy.h"
+#include "terrain/dem/dem_io.h"
+#include "test/support/margin.h"
+#include "test/support/scans/solid.h"
+#include "test/support/temporary_folder.h"
+#include "test/support/terrain/sample_terrain.h"
+#include "test/support/terrain/surface_check.h"
+
+namespace groundray::lindstrom_turk_test {
+namespace {
+
+using ::testing::HasSubstr;
+using ::testing::IsEmpty;
+
+// Two triangles per cell of the grid, counter-clockwise from above.
+TriangleMesh mesh_of(const HeightGrid& grid) {
+  TriangleMesh mesh;
+  const auto columns = static_cast<unsigned>(grid.columns()),
+             rows = static_cast<unsigned>(grid.rows());
+  for (int row = 0; row < grid.rows(); ++row) {
+    for (int column = 0; column < grid.columns(); ++column)
+      mesh.vertices_m.emplace_back(grid.origin_m() + glm::dvec2(column, row) * grid.step_m(),
+                                   grid.height_m(column, row));
+  }
+  for (unsigned row = 0; row + 1 < rows; ++row) {
+    for (unsigned column = 0; column + 1 < columns; ++column) {
+      const unsigned a = row * columns + column, b = a + 1, c = a + columns, d = c + 1;
+      if (grid.step_m().x * grid.step_m().y > 0) {
+        mesh.triangles.insert(mesh.triangles.end(), {{a, b, c}, {b, d, c}});
+      } else {
+        mesh.triangles.insert(mesh.triangles.end(), {{a, c, b}, {b, c, d}});
+      }
+    }
+  }
+  return mesh;
+}
+
+HeightGrid hills(int samples) {
+  std::vector<float> heights_m;
+  for (int row = 0; row < samples; ++row) {
+    for (int column = 0; column < samples; ++column)
+      heights_m.push_back(static_cast<float>(3 * std::sin(0.3 * column) * std::cos(0.2 * row)));
+  }
+  return {{samples, samples}, {0, 0}, {1, 1}, heights_m};
+}
+
+HeightGrid plane(int samples) {
+  std::vector<float> heights_m(static_cast<std::size_t>(samples * samples), 2.f);
+  return {{samples, samples}, {0, 0}, {1, 1}, std::move(heights_m)};
+}
+
+std::size_t folds_in(const TriangleMesh& mesh) {
+  return static_cast<std::size_t>(std::ranges::count_if(mesh.triangles, [&](const glm::uvec3& t) {
+    const glm::dvec3 &a = mesh.vertices_m[t.x], &b = mesh.vertices_m[t.y],
+                     &c = mesh.vertices_m[t.z];
+    return (b.x - a.x) * (c.y - a.y) - (b.y - a.y) * (c.x - a.x) <= 0;
+  }));
+}
+
+void expect_accounted(const ReducedMesh& reduced, const TriangleMesh& original) {
+  const std::vector<glm::dvec3>& to_m = reduced.mesh.vertices_m;
+  ASSERT_EQ(reduced.sources.size(), to_m.size());
+  ASSERT_EQ(reduced.became.size(), original.vertices_m.size());
+  std::vector<double> nearest_m(to_m.size(), std::numeric_limits<double>::infinity());
+  std::vector<int> count(to_m.size(), 0);
+  for (std::size_t i = 0; i < reduced.became.size(); ++i) {
+    const std::uint32_t to = reduced.became[i];
+    ASSERT_LT(to, to_m.size());
+    ++count[to];
+    nearest_m[to] = std::min(nearest_m[to], glm::distance(original.vertices_m[i], to_m[to]));
+  }
+  for (std::size_t i = 0; i < to_m.size(); ++i) {
+    EXPECT_EQ(reduced.became[reduced.sources[i]], i);
+    EXPECT_EQ(glm::distance(original.vertices_m[reduced.sources[i]], to_m[i]), nearest_m[i]);
+    if (count[i] == 1) {
+      EXPECT_EQ(to_m[i], original.vertices_m[reduced.sources[i]]);
+    }
+  }
+}
+
+TEST(LindstromTurk, ReducesToTheRequestedTrianglesOrOneLess) {
+  const TriangleMesh ball = testing::icosphere(3, 4).mesh, hill = mesh_of(hills(41));
+  for (const TriangleMesh& mesh : {ball, hill}) {
+    for (const std::size_t triangles : {2000u, 777u, 100u, 30u}) {
+      const ReducedMesh reduced = reduce(mesh, triangles);
+      EXPECT_LE(reduced.mesh.triangles.size(), triangles);
+      EXPECT_GE(reduced.mesh.triangles.size() + 1, triangles);
+      EXPECT_THAT(testing::surface_faults(reduced.mesh), IsEmpty());
+      EXPECT_EQ(testing::euler_number(reduced.mesh), testing::euler_number(mesh));
+      expect_accounted(reduced, mesh);
+    }
+  }
+}
+
+TEST(LindstromTurk, KeepsMeshesThatAreSmallEnough) {
+  TriangleMesh mesh = mesh_of(hills(9));
+  for (glm::dvec3& p : mesh.vertices_m) p += glm::dvec3(412345.678, 5312345.123, 0.1);
+  for (const std::size_t triangles : {128u, 129u, 1000u}) {
+    const ReducedMesh reduced = reduce(mesh, triangles);
+    EXPECT_EQ(reduced.mesh.vertices_m, mesh.vertices_m);
+    EXPECT_EQ(reduced.mesh.triangles, mesh.triangles);
+  }
+}
+
+// The placement equalises the volumes on both sides of the change: Lindstrom and Turk (1998), 3.2.
+TEST(LindstromTurk, KeepsTheVolume) {
+  const TriangleMesh ball = testing::icosphere(3, 4).mesh;
+  const double volume_m3 = testing::volume_m3(ball);
+  for (const std::size_t triangles : {1000u, 200u, 60u}) {
+    // Thousands of placements, each solved to some 1e-13.
+    EXPECT_NEAR(testing::volume_m3(reduce(ball, triangles).mesh), volume_m3, 1e-9 * volume_m3);
+  }
+}
+
+TEST(LindstromTurk, KeepsAPlaneAndItsBorder) {
+  const TriangleMesh flat = mesh_of(plane(21));
+  const ReducedMesh reduced = reduce(flat, 40);
+  EXPECT_LE(reduced.mesh.triangles.size(), 40u);
+  for (const glm::dvec3& p : reduced.mesh.vertices_m) EXPECT_NEAR(p.z, 2, 1e-12);
+  EXPECT_NEAR(testing::area_m2(reduced.mesh), 400, 1e-9);
+  EXPECT_LT(MeshDistance(flat, reduced.mesh).largest(1e-6).at_most_m, 1e-5);
+}
+
+TEST(LindstromTurk, MakesNoOverhangs) {
+  const HeightGrid rough = testing::fractal(65, 1, 30, Seed{5});
+  const TriangleMesh mesh = mesh_of(rough);
+  ASSERT_EQ(folds_in(mesh), 0u);
+  for (const std::size_t triangles : {2000u, 300u, 40u}) {
+    const ReducedMesh reduced = reduce(mesh, triangles);
+    EXPECT_TRUE(reduced.is_height_field);
+    EXPECT_EQ(folds_in(reduced.mesh), 0u);
+    EXPECT_THAT(testing::surface_faults(reduced.mesh), IsEmpty());
+  }
+  EXPECT_FALSE(reduce(testing::icosphere(3, 2).mesh, 100).is_height_field);
+}
+
+// Cells of 10 nm, at positions rounded to about 1 nm.
+TEST(LindstromTurk, MakesNoOverhangsByRounding) {
+  TriangleMesh mesh = mesh_of(testing::fractal(65, 1, 30, Seed{5}));
+  for (glm::dvec3& p : mesh.vertices_m) p = 1e-8 * p + glm::dvec3(5e5, 5e6, 300);
+  ASSERT_EQ(folds_in(mesh), 0u);
+  for (const std::size_t triangles : {4000u, 2000u, 300u, 40u})
+    EXPECT_EQ(folds_in(reduce(mesh, triangles).mesh), 0u) << triangles;
+}
+
+// Heights and the shift are multiples of 2^-10 m: positions about the origin are the same.
+TEST(LindstromTurk, DoesNotDependOnTheOrigin) {
+  TriangleMesh near = mesh_of(hills(33));
+  for (glm::dvec3& p : near.vertices_m) p.z = std::round(1024 * p.z) / 1024;
+  TriangleMesh far = near;
+  const glm::dvec3 shift_m(524288, 5242880, 512);
+  for (glm::dvec3& p : far.vertices_m) p += shift_m;
+  const ReducedMesh a = reduce(near, 300), b = reduce(far, 300);
+  EXPECT_EQ(a.mesh.triangles, b.mesh.triangles);
+  EXPECT_EQ(a.sources, b.sources);
+  ASSERT_EQ(a.mesh.vertices_m.size(), b.mesh.vertices_m.size());
+  for (std::size_t i = 0; i < a.mesh.vertices_m.size(); ++i)  // an ulp there is 1e-9 m
+    EXPECT_LT(glm::distance(a.mesh.vertices_m[i] + shift_m, b.mesh.vertices_m[i]), 2e-9);
+}
+
+TEST(LindstromTurk, IsReproducible) {
+  const TriangleMesh mesh = mesh_of(testing::fractal(65, 1, 20, Seed{1}));
+  const ReducedMesh once = reduce(mesh, 500), again = reduce(mesh, 500);
+  EXPECT_EQ(once.mesh.vertices_m, again.mesh.vertices_m);
+  EXPECT_EQ(once.mesh.triangles, again.mesh.triangles);
+  EXPECT_EQ(once.became, again.became);
+}
+
+TEST(LindstromTurk, CutsAndCountsNonManifoldParts) {
+  TriangleMesh mesh = mesh_of(hills(21));
+  mesh.vertices_m.insert(mesh.vertices_m.end(), {{3.2, 3.2, 9}, {3.2, 4, -9}, {50, 50, 0}});
+  mesh.triangles.emplace_back(66, 67, 441);     // fin on an edge
+  mesh.triangles.push_back(mesh.triangles[7]);  // duplicate
+  mesh.triangles.emplace_back(5, 5, 9);
+  const ReducedMesh reduced = reduce(mesh, 100);
+  EXPECT_EQ(reduced.tangled_edges, 1u);
+  EXPECT_EQ(reduced.dropped, 2u);
+  EXPECT_THAT(testing::surface_faults(reduced.mesh), IsEmpty());
+  EXPECT_LE(reduced.mesh.triangles.size(), 100u);
+  EXPECT_EQ(reduced.became[442], 0xffffffff) << "no triangle has it";
+  EXPECT_NE(reduced.became[441], 0xffffffff);
+}
+
+TEST(LindstromTurk, MakesASurfaceOfAnyTriangles) {
+  std::mt19937_64 random(8);
+  std::uniform_real_distribution<double> place(-1, 1);
+  for (int trial = 0; trial < 300; ++trial) {
+    TriangleMesh mesh;
+    const auto vertices = 3 + random() % 20, triangles = 1 + random() % 60;
+    for (std::size_t i = 0; i < vertices; ++i) {
+      const double x = place(random), y = place(random);
+      mesh.vertices_m.emplace_back(x, y, trial % 3 == 0 ? 0 : place(random));
+    }
+    if (trial % 5 == 0) std::ranges::fill(mesh.vertices_m, glm::dvec3(1, 2, 3));
+    const auto any = [&] { return static_cast<unsigned>(random() % vertices); };
+    for (std::size_t i = 0; i < triangles; ++i) {
+      const unsigned a = any(), b = any();
+      mesh.triangles.emplace_back(a, b, any());
+    }
+    const ReducedMesh reduced = reduce(mesh, 1 + random() % triangles);
+    EXPECT_THAT(testing::surface_faults(reduced.mesh), IsEmpty()) << "trial " << trial;
+    for (const glm::dvec3& p : reduced.mesh.vertices_m) EXPECT_TRUE(std::isfinite(glm::length(p)));
+  }
+}
+
+// Disc of needles round its centre.
+TriangleMesh fan_of(unsigned count) {
+  TriangleMesh disc{{{0, 0, 0}}, {}, {}};
+  for (unsigned i = 0; i < count; ++i) {
+    const double angle = 2 * std::numbers::pi * i / count;
+    disc.vertices_m.emplace_back(std::cos(angle), std::sin(angle), 0);
+    disc.triangles.emplace_back(0, 1 + i, 1 + (i + 1) % count);
+  }
+  return disc;
+}
+
+// CPU time to reduce a fan to half, minimum of several runs: other processes only lengthen it.
+double fan_time_s(unsigned count) {
+  const TriangleMesh disc = fan_of(count);
+  double least_s = std::numeric_limits<double>::infinity();
+  for (int i = 0; i < 3; ++i) {
+    const std::clock_t begin = std::clock();
+    EXPECT_LE(reduce(disc, count / 2).mesh.triangles.size(), count / 2);
+    least_s = std::min(least_s, static_cast<double>(std::clock() - begin) / CLOCKS_PER_SEC);
+  }
+  return least_s;
+}
+
+// Each collapse changes the cost of all edges at the centre: time grows with the square, 16-fold,
+// but not with the cube, 64-fold. The limit is between these.
+TEST(LindstromTurk, ReducesAFanInQuadraticTime) {
+  constexpr double most = 32;
+  const double found = fan_time_s(2000) / fan_time_s(500);
+  EXPECT_LT(found, most);
+  testing::record_margin("fan of 2000 triangles to half: CPU time over that of 500", found, most);
+}
+
+TEST(LindstromTurk, ReportsProgressWithinAFan) {
+  std::size_t told = 0;
+  reduce(fan_of(2000), 1000, {.progress = [&](double) { ++told; }});
+  EXPECT_GT(told, 50u);
+}
+
+TEST(LindstromTurk, KeepsOneTriangle) {
+  const TriangleMesh one{{{0, 0, 0}, {1, 0, 0}, {0, 1, 0}}, {{0, 1, 2}}};
+  EXPECT_EQ(reduce(one, 1).mesh.triangles, one.triangles);
+}
+
+TEST(LindstromTurk, RejectsInvalidInput) {
+  const auto message = [](const TriangleMesh& mesh, std::size_t triangles, const RunControl& work) {
+    try {
+      reduce(mesh, triangles, work);
+    } catch (const Error& error) {
+      return std::string(error.what());
+    }
+    return std::string("nothing");
+  };
+  TriangleMesh mesh = mesh_of(hills(5));
+  EXPECT_THAT(message(mesh, 0, {}), HasSubstr("triangles = 0 must be at least 1"));
+  EXPECT_THAT(message({}, 5, {}), HasSubstr("there is no triangle"));
+  EXPECT_THAT(message(mesh, 5, {.most_bytes = 1000}), HasSubstr("32 triangles take about"));
+  mesh.vertices_m[3].z = std::nan("");
+  EXPECT_THAT(message(mesh, 5, {}), HasSubstr("vertex 3 must have a finite position"));
+}
+
+TEST(LindstromTurk, ReportsProgressAndStopsOnRequest) {
+  const TriangleMesh mesh = mesh_of(hills(81));
+  std::vector<double> shares;
+  reduce(mesh, 100, {.progress = [&](double share) { shares.push_back(share); }});
+  ASSERT_GT(shares.size(), 3u);
+  EXPECT_TRUE(std::ranges::is_sorted(shares));
+  EXPECT_EQ(shares.back(), 1);
+  const RunControl work{.progress = [](double) { throw std::runtime_error("enough"); }};
+  EXPECT_THROW(reduce(mesh, 100, work), std::runtime_error);
+}
+
+// Root mean square of the vertical distances between the mesh and the grid's samples.
+double vertical_rms_m(const HeightGrid& grid, const TriangleMesh& mesh) {
+  std::vector<double> error_m(grid.heights_m().size(), std::nan(""));
+  const auto columns = static_cast<std::size_t>(grid.columns());
+  for (const glm::uvec3& t : mesh.triangles) {
+    std::array<glm::dvec3, 3> p;  // column, row, height
+    for (int k = 0; k < 3; ++k) {
+      const glm::dvec3& v = mesh.vertices_m[t[k]];
+      p[static_cast<std::size_t>(k)] = {(glm::dvec2(v) - grid.origin_m()) / grid.step_m(), v.z};
+    }
+    const auto across = [](const glm::dvec3& a, const glm::dvec3& b, glm::dvec2 c) {
+      return (b.x - a.x) * (c.y - a.y) - (b.y - a.y) * (c.x - a.x);
+    };
+    const double area = across(p[0], p[1], p[2]);
+    const auto [left, right] = std::minmax({p[0].x, p[1].x, p[2].x});
+    const auto [low, high] = std::minmax({p[0].y, p[1].y, p[2].y});
+    for (int row = std::max(0, static_cast<int>(std::ceil(low)));
+         row <= std::min<double>(high, grid.rows() - 1); ++row) {
+      for (int column = std::max(0, static_cast<int>(std::ceil(left)));
+           column <= std::min<double>(right, grid.columns() - 1); ++column) {
+        const glm::dvec2 at(column, row);
+        const double a = across(p[1], p[2], at) / area, b = across(p[2], p[0], at) / area;
+        if (std::min({a, b, 1 - a - b}) < -1e-9) continue;
+        const double height_m = a * p[0].z + b * p[1].z + (1 - a - b) * p[2].z;
+        error_m[static_cast<std::size_t>(row) * columns + static_cast<std::size_t>(column)] =
+            height_m - grid.height_m(column, row);
+      }
+    }
+  }
+  double sum = 0;
+  std::size_t count = 0;
+  for (const double e : error_m) {
+    if (std::isnan(e)) continue;
+    sum += e * e;
+    ++count;
+  }
+  EXPECT_GT(static_cast<double>(count), 0.997 * static_cast<double>(error_m.size()));
+  return std::sqrt(sum / static_cast<double>(count));
+}
+
+// Results of CGAL's own edge_collapse with this cost and placement, measured with other programs.
+TEST(LindstromTurkProof, IsAsAccurateAsCgalOnADem) {
+  const HeightGrid grid = load_dem(testing::data_folder() / "terrain/jacksboro.tif").grid;
+  const TriangleMesh mesh = mesh_of(grid);
+  struct Case {
+    double share, rms_m;
+  };
+  for (const auto& [share, rms_m] : {Case{0.02, 10.9}, Case{0.1, 3.55}}) {
+    const auto triangles =
+        static_cast<std::size_t>(share * static_cast<double>(mesh.triangles.size()));
+    const ReducedMesh reduced = reduce(mesh, triangles);
+    EXPECT_LE(reduced.mesh.triangles.size(), triangles);
+    EXPECT_EQ(folds_in(reduced.mesh), 0u);
+    const double found_m = vertical_rms_m(grid, reduced.mesh);
+    EXPECT_LE(found_m, 1.02 * rms_m);
+    testing::record_margin(fmt::format("RMS height error of a DEM at {} of its triangles", share),
+                           found_m, 1.02 * rms_m, "m");
+  }
+}
+
+// Results of CGAL 5.5's edge_collapse on the same fractals.
+TEST(LindstromTurkProof, IsAsAccurateAsCgalOnAFractal) {
+  const bool is_full = testing::proof_size(0, 1) == 1;
+  const HeightGrid grid = testing::fractal(is_full ? 1025 : 257, 0.5, 40, Seed{7});
+  const TriangleMesh mesh = mesh_of(grid);
+  const ReducedMesh reduced = reduce(mesh, mesh.triangles.size() / 50);
+  EXPECT_EQ(folds_in(reduced.mesh), 0u);
+  const double found_m = vertical_rms_m(grid, reduced.mesh), cgal_m = is_full ? 0.043218 : 0.16119;
+  EXPECT_LE(found_m, 1.05 * cgal_m);
+  testing::record_margin("RMS height error of a fractal at a fiftieth of its triangles", found_m,
+                         1.05 * cgal_m, "m");
+}
+
+TEST(LindstromTurkProof, IsAsAccurateAsCgalOnTheBunny) {
+  const auto packed = testing::shared_data_folder() / "mesh/stanford_bunny_scans/bun_zipper.ply.gz";
+  if (!std::filesystem::exists(packed))
+    GTEST_SKIP() << "there is no " << packed << "; set GROUNDRAY_SHARED_DATA";
+  const testing::TemporaryFolder folder;
+  const std::string gunzip =
+      fmt::format("gunzip -c '{}' > '{}'", packed.string(), (folder / "bunny.ply").string());
+  ASSERT_EQ(std::system(gunzip.c_str()), 0);
+  const TriangleMesh mesh = read_mesh(folder / "bunny.ply").mesh;
+  const ReducedMesh reduced = reduce(mesh, mesh.triangles.size() / 50);
+  EXPECT_EQ(testing::euler_number(reduced.mesh), testing::euler_number(mesh));
+  constexpr double diagonal_m = 0.2502;  // of the bounding box
+  const double limit_m = 1.02 * 0.00075 * diagonal_m;
+  for (const auto& distance :
+       {MeshDistance(mesh, reduced.mesh), MeshDistance(reduced.mesh, mesh)}) {
+    const double found_m = distance.mean(distance.step_for_m(3e5)).rms.value_m;
+    EXPECT_LE(found_m, limit_m);
+    testing::record_margin("RMS distance of the bunny at a fiftieth of its triangles", found_m,
+                           limit_m, "m");
+  }
+}
+
+}  // namespace
+}  // namespace groundray::lindstrom_turk_test
