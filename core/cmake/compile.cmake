@@ -73,6 +73,18 @@ function(groundray_compile target)
   if(GROUNDRAY_JOIN_SOURCES)
     join_sources(${target})
   endif()
+  set_property(GLOBAL APPEND PROPERTY groundray_objects $<TARGET_OBJECTS:${target}>)
+endfunction()
+
+# Adds the target odr, which merges the objects of all libraries and programs as link-time optimisation does. The compiler
+# thus compares all types of one name, also those in different programs, but generates no code. For the preset odr.
+function(groundray_check_odr)
+  get_property(objects GLOBAL PROPERTY groundray_objects)
+  separate_arguments(flags UNIX_COMMAND "${CMAKE_CXX_FLAGS}")
+  add_custom_command(OUTPUT odr.o
+    COMMAND ${CMAKE_CXX_COMPILER} ${flags} -r -flinker-output=rel -nostdlib -Wl,-z,muldefs ${objects} -o odr.o
+    DEPENDS ${objects} COMMAND_EXPAND_LISTS VERBATIM COMMENT "Comparing types of one name")
+  add_custom_target(odr DEPENDS odr.o)
 endfunction()
 
 # Replaces a target's sources, folder by folder, by files that include them. Those with flags of their own stay alone.
