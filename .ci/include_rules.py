@@ -30,13 +30,12 @@ FOLDERS: dict[str, str] = {
     "reconstruction/dem/fusion": "reconstruction reconstruction/dem",
     "reconstruction/dem/ground": "reconstruction",
     "reconstruction/dem/smooth": "reconstruction",
+    "reconstruction/mesh/accuracy": "reconstruction/mesh",
     "reconstruction/mesh/holes": "reconstruction reconstruction/mesh",
     "reconstruction/mesh/merge": "reconstruction reconstruction/mesh reconstruction/mesh/scan",
     "reconstruction/mesh/scan": "reconstruction reconstruction/mesh",
     "reconstruction/mesh/simplify": "reconstruction reconstruction/mesh "
-    "reconstruction/mesh/accuracy reconstruction/mesh/simplify/bounds",
-    "reconstruction/mesh/simplify/bounds": "reconstruction/mesh/accuracy "
-    "reconstruction/mesh/simplify",
+    "reconstruction/mesh/accuracy",
     "reconstruction/stereo": "reconstruction/dem",
     "sensors/camera": "sensors/camera/lens sensors/sky",
     "sensors/lidar": "sensors/lidar/beam sensors/lidar/pattern sensors/lidar/receiver sensors/sky",

@@ -13,6 +13,11 @@ struct RunControl {
   std::function<void(double share)> progress;
   /// Memory limit: a computation that needs more is not begun; an Error states its requirement.
   std::size_t most_bytes = std::numeric_limits<std::size_t>::max();
+
+  /// Calls `progress`, if there is one.
+  void report(double share) const {
+    if (progress) progress(share);
+  }
 };
 
 }  // namespace groundray

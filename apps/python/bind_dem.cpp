@@ -22,7 +22,7 @@
 #include "apps/python/binding/numpy_argument.h"
 #include "apps/python/placed_returns.h"
 #include "core/error.h"
-#include "reconstruction/dem/dem_frame.h"
+#include "reconstruction/dem/dem_layers.h"
 #include "reconstruction/dem/fill/dem_fill.h"
 #include "reconstruction/dem/fusion/dem_fusion.h"
 #include "reconstruction/dem/smooth/dem_smooth.h"

@@ -1,11 +1,32 @@
 #pragma once
 
 #include <cstdint>
+#include <glm/vec2.hpp>
+#include <span>
 #include <vector>
 
 #include "core/geometry/grid_frame.h"
+#include "terrain/dem/area.h"
 
 namespace groundray {
+
+/// Returns the frame of the samples whose cells cover `area`. A sample is the centre of its cell;
+/// the cells' boundaries are whole multiples of cell_m from D's origin. Rows run from north to
+/// south, as in rasters.
+/// @throws Error if the area is empty or not bounded, cell_m is not above 0, or there would be more
+///         than 2^30 samples along a side.
+GridFrame frame_over(const Area& area, double cell_m);
+
+/// Returns the frame of the samples whose cells cover `area`, aligned with `like`: it contains all
+/// samples of `like` in the area, and `finer` - 1 others between neighbours of these. Columns and
+/// rows run as those of `like`.
+/// @param finer  subdivisions of a step, at least 1.
+/// @throws Error as frame_over, or if `finer` is below 1.
+GridFrame frame_like(const GridFrame& like, const Area& area, int finer = 1);
+
+/// @throws Error naming every fault of a frame: fewer than 2 columns or rows, a step of 0,
+///         cells_per_m that is not its inverse, numbers that are not finite.
+void refuse_faults(const GridFrame& frame);
 
 /// Origin of a cell's height.
 enum class HeightSource : std::uint8_t { None, Lidar, Stereo, Fused, Filled };
@@ -34,5 +55,26 @@ struct DemLayers {
 
 /// Returns layers without any information: no sample has a source, and all else is 0 or NaN.
 DemLayers unknown_layers(const GridFrame& frame);
+
+/// Returns 1 for each value that meets a condition, else 0.
+template <typename Values, typename Condition>
+std::vector<std::uint8_t> marks_of(const Values& values, const Condition& meets) {
+  std::vector<std::uint8_t> marks;
+  marks.reserve(values.size());
+  for (const auto& value : values) marks.push_back(meets(value) ? 1 : 0);
+  return marks;
+}
+
+/// Returns the distance in plan of each sample of a raster to the nearest sample with data, m: 0 at
+/// samples with data, infinite if there are none. Exact except for rounding, for any ratio of the
+/// cells' sides. The time is proportional to the number of samples.
+/// @param size  columns and rows.
+/// @param step_m  step from one sample to the next; components may be negative.
+/// @param has_data  0 or 1 for each sample, in row order.
+/// @throws Error if the raster is empty, the sizes disagree, or a step is zero or not finite.
+/// @see Felzenszwalb, Huttenlocher, Distance transforms of sampled functions, Theory of Computing 8
+///      (2012).
+std::vector<float> data_distance_m(glm::ivec2 size, glm::dvec2 step_m,
+                                   std::span<const std::uint8_t> has_data);
 
 }  // namespace groundray

@@ -2,38 +2,10 @@
 
 #include <algorithm>
 #include <array>
-#include <numeric>
-#include <span>
 #include <utility>
 
 namespace groundray {
 namespace {
-
-// Numbers of items, grouped by bucket.
-struct Buckets {
-  std::vector<std::uint32_t> begins;  // of each bucket, and the end of the last
-  std::vector<std::uint32_t> items;
-
-  std::span<const std::uint32_t> at(std::size_t bucket) const {
-    return std::span(items).subspan(begins[bucket], begins[bucket + 1] - begins[bucket]);
-  }
-};
-
-// Groups items by bucket; items for which `bucket_of` returns `none` are omitted.
-template <typename BucketOf>
-Buckets sorted_in(std::size_t buckets, std::size_t things, const BucketOf& bucket_of) {
-  Buckets sorted{std::vector<std::uint32_t>(buckets + 1), {}};
-  for (std::uint32_t i = 0; i < things; ++i) {
-    if (const std::uint32_t bucket = bucket_of(i); bucket != none) ++sorted.begins[bucket + 1];
-  }
-  std::partial_sum(sorted.begins.begin(), sorted.begins.end(), sorted.begins.begin());
-  sorted.items.resize(sorted.begins.back());
-  std::vector<std::uint32_t> ends(sorted.begins.begin(), sorted.begins.end() - 1);
-  for (std::uint32_t i = 0; i < things; ++i) {
-    if (const std::uint32_t bucket = bucket_of(i); bucket != none) sorted.items[ends[bucket]++] = i;
-  }
-  return sorted;
-}
 
 bool is_degenerate(const glm::uvec3& t) { return t.x == t.y || t.y == t.z || t.z == t.x; }
 
@@ -161,6 +133,18 @@ std::size_t drop_conflicts(std::vector<glm::uvec3>& triangles, std::size_t verti
   const std::size_t dropped = triangles.size() - kept;
   triangles.resize(kept);
   return dropped;
+}
+
+void check_columns(const MeasuredMesh& mesh, Violations& broken) {
+  const std::size_t vertices = mesh.shape.vertices_m.size();
+  const auto check = [&](const char* name, std::size_t count) {
+    broken.unless(count == 0 || count == vertices,
+                  "{} has {} values for {} vertices: it must have one per vertex or none", name,
+                  count, vertices);
+  };
+  check("sd_m", mesh.sd_m.size());
+  check("labels", mesh.labels.size());
+  check("confidence", mesh.confidence.size());
 }
 
 ManifoldMesh cut_to_manifold(const TriangleMesh& mesh) {

@@ -2,12 +2,16 @@
 
 #include <cstddef>
 #include <cstdint>
+#include <glm/geometric.hpp>
 #include <glm/vec3.hpp>
 #include <limits>
+#include <numeric>
 #include <span>
 #include <vector>
 
+#include "core/error.h"
 #include "core/geometry/mesh.h"
+#include "reconstruction/mesh/measured_mesh.h"
 
 namespace groundray {
 
@@ -59,6 +63,53 @@ std::vector<std::uint32_t> part_fans(std::vector<glm::uvec3>& triangles, std::si
 /// Removes triangles that repeat a vertex, and those that traverse an edge in the same direction as
 /// an earlier one, so that no edge is tangled. Returns the number of removed triangles.
 std::size_t drop_conflicts(std::vector<glm::uvec3>& triangles, std::size_t vertices);
+
+/// Returns the normal of a triangle, twice its area long.
+inline glm::dvec3 area_vector_m2(const TriangleMesh& mesh, const glm::uvec3& t) noexcept {
+  const glm::dvec3& a = mesh.vertices_m[t.x];
+  return glm::cross(mesh.vertices_m[t.y] - a, mesh.vertices_m[t.z] - a);
+}
+
+/// Returns some of the values, in the order of their numbers; nothing if there are no values.
+template <typename Value>
+std::vector<Value> picked(const std::vector<Value>& values,
+                          const std::vector<std::uint32_t>& numbers) {
+  std::vector<Value> some;
+  if (values.empty()) return some;
+  some.reserve(numbers.size());
+  for (const std::uint32_t i : numbers) some.push_back(values[i]);
+  return some;
+}
+
+/// Adds a violation for each attribute that does not have one value per vertex or none.
+void check_columns(const MeasuredMesh& mesh, Violations& broken);
+
+/// Numbers of items, grouped by bucket; ascending in each.
+struct Buckets {
+  std::vector<std::uint32_t> begins;  ///< of each bucket, and the end of the last
+  std::vector<std::uint32_t> items;
+
+  std::span<const std::uint32_t> at(std::size_t bucket) const noexcept {
+    return std::span(items).subspan(begins[bucket], begins[bucket + 1] - begins[bucket]);
+  }
+};
+
+/// Groups the items below `count` by bucket; those for which `bucket_of` returns `none` are
+/// omitted.
+template <typename BucketOf>
+Buckets sorted_in(std::size_t buckets, std::size_t count, const BucketOf& bucket_of) {
+  Buckets sorted{std::vector<std::uint32_t>(buckets + 1), {}};
+  for (std::uint32_t i = 0; i < count; ++i) {
+    if (const std::uint32_t bucket = bucket_of(i); bucket != none) ++sorted.begins[bucket + 1];
+  }
+  std::partial_sum(sorted.begins.begin(), sorted.begins.end(), sorted.begins.begin());
+  sorted.items.resize(sorted.begins.back());
+  std::vector<std::uint32_t> ends(sorted.begins.begin(), sorted.begins.end() - 1);
+  for (std::uint32_t i = 0; i < count; ++i) {
+    if (const std::uint32_t bucket = bucket_of(i); bucket != none) sorted.items[ends[bucket]++] = i;
+  }
+  return sorted;
+}
 
 /// Mesh in which each edge has one or two consistently wound triangles, and each vertex one fan.
 struct ManifoldMesh {

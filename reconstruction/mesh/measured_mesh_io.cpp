@@ -15,7 +15,6 @@
 #include "core/geometry/mesh_check.h"
 #include "core/io/file_ending.h"
 #include "core/io/point_cloud.h"
-#include "core/model/mesh_reader.h"
 
 namespace groundray {
 namespace {

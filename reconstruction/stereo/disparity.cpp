@@ -4,7 +4,6 @@
 #include <cmath>
 
 #include "core/error.h"
-#include "reconstruction/stereo/disparity_refinement.h"
 #include "reconstruction/stereo/semi_global.h"
 
 namespace groundray {
@@ -72,18 +71,6 @@ SearchedImage searched(const RectifiedImage& image) {
     return static_cast<std::uint8_t>(std::lround(255 * std::clamp(value, 0.0F, 1.0F)));
   });
   return result;
-}
-
-// Returns whether an image shows all of a window, except for parts beyond the image.
-bool shows_window(const Image8& seen, int x, int y, int reach) {
-  for (int dy = -reach; dy <= reach; dy += reach) {
-    for (int dx = -reach; dx <= reach; dx += reach) {
-      const int column = std::clamp(x + dx, 0, seen.width() - 1);
-      const int row = std::clamp(y + dy, 0, seen.height() - 1);
-      if (seen.at(column, row)[0] == 0) return false;
-    }
-  }
-  return true;
 }
 
 // Removes the disparities that those of the right image do not confirm.

@@ -6,7 +6,6 @@
 
 #include "core/image/image.h"
 #include "reconstruction/stereo/pinhole_pair.h"
-#include "reconstruction/stereo/rectified_image.h"
 
 namespace groundray {
 
@@ -75,21 +74,17 @@ struct DisparityMap {
 /// Returns true if OpenCV has ximgproc, so that Smoothing::Guided takes effect.
 bool has_guided_smoothing() noexcept;
 
-/// Matches the images of a pair. Semi-global matching runs from both sides, and consistent
-/// disparities are kept. Least squares then refine each pixel in a window on both original images,
-/// along the plane of the disparities around it, up to brightness and contrast. The normal
-/// equations give the standard deviation, after the image's noise, as estimated from the residuals,
-/// is subtracted from the texture.
+/// Matches the images of a pair: by semi-global matching from both sides, of which consistent
+/// disparities are kept, and then by least squares in a window on both original images, which also
+/// give the standard deviation.
 ///
 /// Images should be encoded for the eye, 0 to 1; the search clamps to that range and rounds to 255
 /// steps. Results do not depend on the number of threads.
 /// @throws Error naming every option that is out of bounds, images that differ in size or are
 ///         empty, or the number of bytes that matching would take.
 /// @see docs/theory/reconstruction_stereo.md; Hirschmueller, Stereo processing by semiglobal
-/// matching and
-///      mutual information, PAMI 30 (2008); Min et al., Fast global image smoothing based on
-///      weighted least squares, TIP 23 (2014); Foerstner, Guelch (1987), Lucas, Kanade (1981):
-///      least squares
+///      matching and mutual information, PAMI 30 (2008); Min et al., Fast global image smoothing
+///      based on weighted least squares, TIP 23 (2014)
 DisparityMap match(const RectifiedImage& left, const RectifiedImage& right,
                    const MatchOptions& options = {});
 

@@ -1,5 +1,3 @@
-#include "reconstruction/stereo/disparity_refinement.h"
-
 #include <tbb/parallel_for.h>
 
 #include <algorithm>

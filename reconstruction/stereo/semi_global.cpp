@@ -4,14 +4,12 @@
 
 #include <algorithm>
 #include <cmath>
-#include <limits>
 #include <opencv2/calib3d.hpp>
 #include <opencv2/core.hpp>
 #include <opencv2/imgproc.hpp>
 #ifdef GROUNDRAY_XIMGPROC
 #include <opencv2/ximgproc/disparity_filter.hpp>
 #endif
-#include <vector>
 
 #include "core/error.h"
 
@@ -23,8 +21,7 @@ constexpr int gradient_cap = 63;
 
 cv::Mat mat_of(const Image8& image) {
   cv::Mat mat(image.height(), image.width(), CV_8UC1);
-  for (int y = 0; y < image.height(); ++y)
-    std::copy_n(image.at(0, y).data(), static_cast<std::size_t>(image.width()), mat.ptr(y));
+  std::ranges::copy(image.values(), mat.begin<std::uint8_t>());
   return mat;
 }
 
@@ -66,57 +63,42 @@ cv::Mat found_from(const cv::Mat& first, const cv::Mat& second, const DisparityR
 
 ImageF pixels_of(const cv::Mat& found, const DisparityRange& range) {
   ImageF result(found.cols, found.rows, 1);
-  for (int y = 0; y < found.rows; ++y) {
-    for (int x = 0; x < found.cols; ++x) {
-      const int value = found.at<short>(y, x);
-      result.at(x, y)[0] =
-          value < 16 * range.least_px ? no_disparity : static_cast<float>(value) / 16.0F;
-    }
-  }
+  std::transform(found.begin<short>(), found.end<short>(), result.values().begin(), [&](int value) {
+    return value < 16 * range.least_px ? no_disparity : static_cast<float>(value) / 16.0F;
+  });
   return result;
 }
 
 Image8 shrunk(const Image8& image, int step) {
   const cv::Mat full = mat_of(image);
   const cv::Size size(std::max(1, full.cols / step), std::max(1, full.rows / step));
-  cv::Mat mat;
-  cv::resize(full, mat, size, 0, 0, cv::INTER_AREA);
   Image8 small(size.width, size.height, 1);
-  for (int y = 0; y < size.height; ++y)
-    std::copy_n(mat.ptr(y), static_cast<std::size_t>(size.width), small.at(0, y).data());
+  cv::Mat into(size, CV_8UC1, small.values().data());
+  cv::resize(full, into, size, 0, 0, cv::INTER_AREA);
   return small;
 }
 
-// Returns whether a pixel of a shrunk image is away from the boundary of the seen area: the
-// boundaries of both images look alike, wherever they are.
-bool is_seen_round(const Image8& seen, int x, int y, int step) {
-  constexpr int beside = 3;
-  for (int dy = -beside; dy <= beside; dy += beside) {
-    for (int dx = -beside; dx <= beside; dx += beside) {
-      const int column = std::clamp((x + dx) * step, 0, seen.width() - 1);
-      const int row = std::clamp((y + dy) * step, 0, seen.height() - 1);
+// Converts disparities, times `sign`, to OpenCV's format.
+cv::Mat fixed(const ImageF& image, float sign, int none) {
+  cv::Mat mat(image.height(), image.width(), CV_16SC1);
+  std::ranges::transform(image.values(), mat.begin<short>(), [&](float value) {
+    return static_cast<short>(std::isnan(value) ? none : std::lround(sign * value * 16));
+  });
+  return mat;
+}
+
+}  // namespace
+
+bool shows_window(const Image8& seen, int x, int y, int reach) {
+  for (int dy = -reach; dy <= reach; dy += reach) {
+    for (int dx = -reach; dx <= reach; dx += reach) {
+      const int column = std::clamp(x + dx, 0, seen.width() - 1);
+      const int row = std::clamp(y + dy, 0, seen.height() - 1);
       if (seen.at(column, row)[0] == 0) return false;
     }
   }
   return true;
 }
-
-#ifdef GROUNDRAY_XIMGPROC
-// Converts disparities, times `sign`, to OpenCV's format.
-cv::Mat fixed(const ImageF& image, float sign, int none) {
-  cv::Mat mat(image.height(), image.width(), CV_16SC1);
-  for (int y = 0; y < mat.rows; ++y) {
-    for (int x = 0; x < mat.cols; ++x) {
-      const float value = image.at(x, y)[0];
-      mat.at<short>(y, x) =
-          static_cast<short>(std::isnan(value) ? none : std::lround(sign * value * 16));
-    }
-  }
-  return mat;
-}
-#endif
-
-}  // namespace
 
 SemiGlobalDisparity semi_global(const Image8& left, const Image8& right,
                                 const DisparityRange& range, const MatchOptions& options) {
@@ -137,24 +119,15 @@ SemiGlobalDisparity semi_global(const Image8& left, const Image8& right,
 }
 
 std::uint64_t remove_speckles(ImageF& disparity_px, int pixels) {
-  cv::Mat fixed(disparity_px.height(), disparity_px.width(), CV_16SC1);
   constexpr short none = std::numeric_limits<short>::min();
-  for (int y = 0; y < fixed.rows; ++y) {
-    for (int x = 0; x < fixed.cols; ++x) {
-      const float value = disparity_px.at(x, y)[0];
-      fixed.at<short>(y, x) =
-          std::isnan(value) ? none : static_cast<short>(std::lround(value * 16.0F));
-    }
-  }
-  cv::filterSpeckles(fixed, none, pixels - 1, 16);  // largest patch that is removed
+  cv::Mat found = fixed(disparity_px, 1, none);
+  cv::filterSpeckles(found, none, pixels - 1, 16);  // largest patch that is removed
   std::uint64_t removed = 0;
-  for (int y = 0; y < fixed.rows; ++y) {
-    for (int x = 0; x < fixed.cols; ++x) {
-      float& value = disparity_px.at(x, y)[0];
-      if (fixed.at<short>(y, x) != none || std::isnan(value)) continue;
-      value = no_disparity;
-      ++removed;
-    }
+  auto kept = found.begin<short>();
+  for (float& value : disparity_px.values()) {
+    if (*kept++ != none || std::isnan(value)) continue;
+    value = no_disparity;
+    ++removed;
   }
   return removed;
 }
@@ -166,13 +139,15 @@ std::optional<DisparityRange> common_range(const SearchedImage& left, const Sear
   const DisparityRange all{-2, std::max(1, small_left.width() / 2)};
   const SemiGlobalDisparity found = semi_global(small_left, small_right, all, options);
   ImageF kept = found.left_px;
+  constexpr int beside = 3;  // the boundaries of both seen areas look alike, wherever they are
   for (int y = 0; y < kept.height(); ++y) {
     for (int x = 0; x < kept.width(); ++x) {
       float& value = kept.at(x, y)[0];
       const int there = std::isnan(value) ? -1 : x - static_cast<int>(std::lround(value));
       if (there < 0 || there >= kept.width() ||
           !(std::abs(found.right_px.at(there, y)[0] - value) <= 1) ||
-          !is_seen_round(left.seen, x, y, step) || !is_seen_round(right.seen, there, y, step))
+          !shows_window(left.seen, x * step, y * step, beside * step) ||
+          !shows_window(right.seen, there * step, y * step, beside * step))
         value = no_disparity;
     }
   }

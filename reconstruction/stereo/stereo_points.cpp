@@ -1,7 +1,6 @@
 #include "reconstruction/stereo/stereo_points.h"
 
 #include <cmath>
-#include <glm/geometric.hpp>
 #include <glm/gtc/quaternion.hpp>
 #include <glm/matrix.hpp>
 

@@ -11,7 +11,6 @@
 #include "reconstruction/dem/measured_points.h"
 #include "reconstruction/stereo/disparity.h"
 #include "reconstruction/stereo/pinhole_pair.h"
-#include "reconstruction/stereo/stereo_view.h"
 
 namespace groundray {
 

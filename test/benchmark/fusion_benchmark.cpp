@@ -6,7 +6,7 @@
 #include <cmath>
 #include <cstdint>
 
-#include "reconstruction/dem/dem_frame.h"
+#include "reconstruction/dem/dem_layers.h"
 #include "reconstruction/dem/fusion/dem_fusion.h"
 #include "test/benchmark/timing.h"
 

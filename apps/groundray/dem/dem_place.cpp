@@ -4,7 +4,7 @@
 #include <glm/geometric.hpp>
 
 #include "core/error.h"
-#include "reconstruction/dem/dem_frame.h"
+#include "reconstruction/dem/dem_layers.h"
 #include "terrain/dem/dem_io.h"
 
 namespace groundray {

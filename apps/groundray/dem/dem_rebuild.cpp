@@ -16,9 +16,8 @@
 #include "apps/groundray/dem/dem_request.h"
 #include "apps/groundray/progress_stage.h"
 #include "core/error.h"
-#include "reconstruction/dem/fill/boundary_variance.h"
-#include "reconstruction/dem/fill/mesh_fill.h"
-#include "reconstruction/dem/ground/overhangs.h"
+#include "reconstruction/dem/fill/dem_fill.h"
+#include "reconstruction/dem/ground/ground_filter.h"
 #include "terrain/dem/dem_io.h"
 #include "terrain/dem/layers_io.h"
 

@@ -13,7 +13,6 @@
 #include "core/image/exr_reader.h"
 #include "core/image/image_io.h"
 #include "reconstruction/stereo/pinhole_pair.h"
-#include "reconstruction/stereo/rectified_image.h"
 #include "sensors/camera/lens/lens.h"
 
 namespace groundray {

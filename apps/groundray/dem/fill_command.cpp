@@ -20,8 +20,6 @@
 #include "core/error.h"
 #include "core/progress.h"
 #include "reconstruction/dem/fill/dem_fill.h"
-#include "reconstruction/dem/fill/inpaint_fill.h"
-#include "reconstruction/dem/fill/mesh_fill.h"
 #include "terrain/dem/dem_io.h"
 #include "terrain/dem/gdal_fill.h"
 #include "terrain/dem/layers_io.h"

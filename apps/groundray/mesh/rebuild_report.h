@@ -9,7 +9,7 @@
 #include <vector>
 
 #include "core/io/mesh_io.h"
-#include "reconstruction/mesh/accuracy/two_sided_error.h"
+#include "reconstruction/mesh/accuracy/agreement.h"
 #include "reconstruction/mesh/holes/hole_fill.h"
 #include "reconstruction/mesh/merge/mesh_merge.h"
 #include "reconstruction/mesh/simplify/simplify.h"

@@ -1,9 +1,9 @@
-#include "reconstruction/dem/fill/boundary_variance.h"
-
 #include <algorithm>
 #include <cmath>
 #include <limits>
 #include <vector>
+
+#include "reconstruction/dem/fill/dem_fill.h"
 
 namespace groundray {
 namespace {
@@ -16,7 +16,8 @@ bool is_measured(const DemLayers& layers, std::size_t i) {
          std::isfinite(layers.variance_m2[i]);
 }
 
-// Nearest measured sample of each sample, propagated from neighbour to neighbour.
+// Nearest measured sample of each sample, propagated from neighbour to neighbour by two sweeps: it
+// may be farther than the true one by a fraction of a cell.
 class NearestMeasured {
  public:
   explicit NearestMeasured(const DemLayers& layers)

@@ -6,16 +6,14 @@
 #include <algorithm>
 #include <cmath>
 #include <compare>
-#include <limits>
 #include <map>
 #include <mutex>
 #include <utility>
 
 #include "core/error.h"
-#include "reconstruction/dem/data_distance.h"
 #include "reconstruction/dem/fill/fill_calibration.h"
-#include "reconstruction/dem/fill/fill_shadow.h"
-#include "reconstruction/dem/fill/ground_roughness.h"
+#include "reconstruction/dem/fill/fill_error_model.h"
+#include "reconstruction/dem/fill/holdout_mask.h"
 #include "reconstruction/dem/fill/sorted_holes.h"
 #include "reconstruction/dem/thin_plate/thin_plate_system.h"
 
@@ -32,6 +30,8 @@ constexpr std::size_t fill_bytes_per_sample = 40;
 // 178 to 200; under bounds up to 2.6 times as much.
 constexpr double bytes_of_plate = 120, bytes_of_smooth = 210, more_under_bounds = 2.75;
 constexpr double trials_share = 0.3;  // fraction of the reported progress
+
+bool is_height(float z) { return !std::isnan(z); }
 
 void check_numbers(std::span<const float> values, const char* name, int columns,
                    Violations& broken) {
@@ -71,16 +71,9 @@ void check_fill_inputs(const GridFrame& frame, std::span<const float> heights_m,
   broken.throw_if_any();
   check_numbers(heights_m, "the height", frame.samples.x, broken);
   check_numbers(most_m, "the bound or filled height", frame.samples.x, broken);
-  broken.unless(std::ranges::any_of(heights_m, [](float z) { return !std::isnan(z); }),
+  broken.unless(std::ranges::any_of(heights_m, is_height),
                 "there are no heights to fill from: all are NaN; is the nodata value right?");
   broken.throw_if_any();
-}
-
-std::vector<std::uint8_t> find_data(std::span<const float> heights_m) {
-  std::vector<std::uint8_t> has_data(heights_m.size());
-  std::ranges::transform(heights_m, has_data.begin(),
-                         [](float z) { return static_cast<std::uint8_t>(!std::isnan(z)); });
-  return has_data;
 }
 
 // Fills the holes of one raster.
@@ -100,20 +93,21 @@ class Filling {
     int first, end;  // octaves of the largest distance to data
     std::vector<TriedHole> holes;
   };
+  ThinPlateRaster raster_now() const {
+    return {frame_.samples, frame_.step_m, heights_m_, sorted_.numbers};
+  }
   int octave_of(const RasterHole& hole) const;
   Shape shape_of(std::size_t hole) const;
   void find_sights();
   std::vector<Kind> kinds() const;
   void check_memory(std::span<const std::vector<std::uint32_t>> sets) const;
   void try_kinds();
-  void borrow_laws();
+  void borrow_models();
   void fill(const std::vector<std::uint32_t>& set);
   std::size_t trial_of(const std::vector<std::uint32_t>& set) const;
-  const std::optional<FillErrorModel>& law_of(const RasterHole& hole, std::size_t filled_by) const;
-  double sd_at(std::uint32_t sample, const std::optional<FillErrorModel>& law) const;
-  void report(double share) const {
-    if (work_.progress) work_.progress(share);
-  }
+  const std::optional<FillErrorModel>& model_of(const RasterHole& hole,
+                                                std::size_t filled_by) const;
+  double sd_at(std::uint32_t sample, const std::optional<FillErrorModel>& model) const;
 
   GridFrame frame_;
   double cell_m_;
@@ -122,8 +116,8 @@ class Filling {
   const RunControl& work_;
   FilledHeights result_;
   SortedHoles sorted_;
-  std::vector<std::optional<GrazingSight>> sights_;  // of each hole; only for shadows
-  std::vector<std::optional<FillErrorModel>> laws_;  // error model of each trial
+  std::vector<std::optional<GrazingSight>> sights_;    // of each hole; only for shadows
+  std::vector<std::optional<FillErrorModel>> models_;  // error model of each trial
   std::optional<GroundRoughness> roughness_;
 };
 
@@ -135,7 +129,7 @@ Filling::Filling(const GridFrame& frame, std::span<const float> heights_m,
       most_m_(most_m),
       options_(options),
       work_(work) {
-  const auto has_data = find_data(heights_m);
+  const auto has_data = marks_of(heights_m, is_height);
   result_.heights_m.assign(heights_m.begin(), heights_m.end());
   result_.sd_m.assign(heights_m.size(), std::numeric_limits<float>::quiet_NaN());
   result_.to_data_m = data_distance_m(frame.samples, frame.step_m, has_data);
@@ -155,7 +149,7 @@ Filling::Shape Filling::shape_of(std::size_t hole) const {
 void Filling::find_sights() {
   sights_.resize(sorted_.holes.size());
   if (most_m_.empty()) return;
-  const PlateRaster raster{frame_.samples, frame_.step_m, heights_m_, sorted_.numbers};
+  const ThinPlateRaster raster = raster_now();
   tbb::parallel_for(std::size_t{0}, sights_.size(), [&](std::size_t i) {
     if (sorted_.holes[i].fate == HoleFate::Filled)
       sights_[i] = sight_over(raster, most_m_, sorted_.samples[i]);
@@ -216,7 +210,7 @@ void Filling::check_memory(std::span<const std::vector<std::uint32_t>> sets) con
 
 void Filling::try_kinds() {
   const std::vector<Kind> all = kinds();
-  const PlateRaster raster{frame_.samples, frame_.step_m, heights_m_, sorted_.numbers};
+  const ThinPlateRaster raster = raster_now();
   for (const Kind& kind : all) {
     const FillTrial trial = try_filling(raster, kind.holes, options_.form, roughness_->usual_m());
     const ThinPlateEnergy untried{kind.shape.is_shadow || kind.shape.is_long ? 0 : usual_tension,
@@ -225,10 +219,11 @@ void Filling::try_kinds() {
                               std::exp2(kind.end),
                               options_.form.value_or(trial.form.value_or(untried)), trial.samples,
                               trial.cover.within_1sd, trial.cover.within_2sd, trial.widened_by});
-    laws_.push_back(trial.law);
-    report(trials_share * static_cast<double>(laws_.size()) / static_cast<double>(all.size()));
+    models_.push_back(trial.model);
+    work_.report(trials_share * static_cast<double>(models_.size()) /
+                 static_cast<double>(all.size()));
   }
-  borrow_laws();
+  borrow_models();
   for (std::size_t i = 0; i < sorted_.holes.size(); ++i) {
     RasterHole& hole = sorted_.holes[i];
     if (hole.fate != HoleFate::Filled) continue;
@@ -241,12 +236,12 @@ void Filling::try_kinds() {
 }
 
 // Gives kinds without an error model that of the most similar kind, the nearest in their order.
-void Filling::borrow_laws() {
-  const auto own = laws_;
+void Filling::borrow_models() {
+  const auto own = models_;
   for (std::size_t i = 0; i < own.size(); ++i) {
-    for (std::size_t apart = 1; !laws_[i] && apart < own.size(); ++apart) {
-      if (i + apart < own.size() && own[i + apart]) laws_[i] = own[i + apart];
-      if (i >= apart && own[i - apart]) laws_[i] = own[i - apart];
+    for (std::size_t apart = 1; !models_[i] && apart < own.size(); ++apart) {
+      if (i + apart < own.size() && own[i + apart]) models_[i] = own[i + apart];
+      if (i >= apart && own[i - apart]) models_[i] = own[i - apart];
     }
   }
 }
@@ -261,20 +256,19 @@ std::size_t Filling::trial_of(const std::vector<std::uint32_t>& set) const {
   return largest->trial;
 }
 
-double Filling::sd_at(std::uint32_t sample, const std::optional<FillErrorModel>& law) const {
-  if (!law) return std::numeric_limits<double>::quiet_NaN();
+double Filling::sd_at(std::uint32_t sample, const std::optional<FillErrorModel>& model) const {
+  if (!model) return std::numeric_limits<double>::quiet_NaN();
   const double cells = result_.to_data_m[sample] / cell_m_;
-  const glm::ivec2 at(static_cast<int>(sample) % frame_.samples.x,
-                      static_cast<int>(sample) / frame_.samples.x);
-  return law->sd_m(cells, roughness_->at_m(at, roughness_reach(cells), roughness_->usual_m()));
+  const glm::ivec2 at = raster_now().place(sample);
+  return model->sd_m(cells, roughness_->at_m(at, roughness_reach(cells), roughness_->usual_m()));
 }
 
 // Returns the error model of the hole's own kind if that uses the form by which the hole was
 // filled, else that of the kind for which the form was chosen.
-const std::optional<FillErrorModel>& Filling::law_of(const RasterHole& hole,
-                                                     std::size_t filled_by) const {
+const std::optional<FillErrorModel>& Filling::model_of(const RasterHole& hole,
+                                                       std::size_t filled_by) const {
   const auto& trials = result_.trials;
-  return laws_[trials[hole.trial].form == trials[filled_by].form ? hole.trial : filled_by];
+  return models_[trials[hole.trial].form == trials[filled_by].form ? hole.trial : filled_by];
 }
 
 void Filling::fill(const std::vector<std::uint32_t>& set) {
@@ -284,8 +278,8 @@ void Filling::fill(const std::vector<std::uint32_t>& set) {
   std::int32_t number = 0;
   for (const std::uint32_t sample : set)
     holes.push_back(static_cast<std::size_t>(std::exchange(sorted_.numbers[sample], number++)));
-  ThinPlateSystem system({frame_.samples, frame_.step_m, heights_m_, sorted_.numbers}, set);
-  BoundedPlate plate;
+  ThinPlateSystem system(raster_now(), set);
+  BoundedThinPlate plate;
   if (most_m_.empty()) {
     plate.heights_m = system.solve(form);
   } else {
@@ -298,7 +292,7 @@ void Filling::fill(const std::vector<std::uint32_t>& set) {
     RasterHole& hole = sorted_.holes[holes[i]];
     hole.form = form;
     hole.is_least = plate.is_best;
-    result_.sd_m[sample] = static_cast<float>(sd_at(sample, law_of(hole, filled_by)));
+    result_.sd_m[sample] = static_cast<float>(sd_at(sample, model_of(hole, filled_by)));
     float height_m = static_cast<float>(plate.heights_m[i]);
     if (!most_m_.empty() && plate.heights_m[i] >= most_m_[sample]) {
       height_m = most_m_[sample];
@@ -309,10 +303,7 @@ void Filling::fill(const std::vector<std::uint32_t>& set) {
 }
 
 FilledHeights Filling::run() {
-  std::vector<std::uint8_t> is_wanted(heights_m_.size());
-  std::ranges::transform(sorted_.numbers, is_wanted.begin(), [](std::int32_t number) {
-    return static_cast<std::uint8_t>(number >= 0);
-  });
+  const auto is_wanted = marks_of(sorted_.numbers, [](std::int32_t number) { return number >= 0; });
   const auto sets = coupled_samples(frame_.samples, is_wanted);
   check_memory(sets);
   const auto all = static_cast<double>(std::ranges::count(is_wanted, std::uint8_t{1}));
@@ -324,7 +315,7 @@ FilledHeights Filling::run() {
     fill(sets[i]);
     const std::lock_guard lock(one_at_a_time);
     result_.filled += sets[i].size();
-    report(trials_share + (1 - trials_share) * static_cast<double>(result_.filled) / all);
+    work_.report(trials_share + (1 - trials_share) * static_cast<double>(result_.filled) / all);
   });
   result_.holes = std::move(sorted_.holes);
   return std::move(result_);
@@ -345,7 +336,7 @@ FilledHeights take_filling(const GridFrame& frame, std::span<const float> height
   FilledHeights result;
   result.heights_m.assign(heights_m.begin(), heights_m.end());
   result.sd_m.assign(heights_m.size(), std::numeric_limits<float>::quiet_NaN());
-  const auto has_data = find_data(heights_m);
+  const auto has_data = marks_of(heights_m, is_height);
   result.to_data_m = data_distance_m(frame.samples, frame.step_m, has_data);
   SortedHoles sorted = sort_holes(frame, has_data, result.to_data_m, options);
   for (std::size_t i = 0; i < heights_m.size(); ++i) {

@@ -9,6 +9,7 @@
 #include <vector>
 
 #include "core/geometry/grid_frame.h"
+#include "reconstruction/dem/dem_layers.h"
 #include "reconstruction/dem/thin_plate/thin_plate_energy.h"
 #include "reconstruction/run_control.h"
 
@@ -83,23 +84,17 @@ struct FilledHeights {
 /// Fills the holes of a DEM, hole by hole, by the surface that minimises the energy of
 /// ThinPlateEnergy subject to the measured samples, which stay unchanged.
 ///
-/// The form and the standard deviation of filled heights are determined for each kind of holes
-/// (shadows or not, long or compact, and by octaves of the largest distance to data) by hold-out
-/// tests: pieces of their shape are hidden on known ground, filled by seven forms and compared.
-/// With bounds, the fill is the surface of least energy below them; a measured height above its
-/// bound stays. Bounds also reveal holes in the shadow of a crest, which hide ground that falls
-/// off; these are tested by shadows cast from other directions.
+/// The form and the standard deviation of filled heights are determined for each kind of holes by
+/// hold-out tests on known ground. With bounds, the fill is the surface of least energy below them;
+/// a measured height above its bound stays. Bounds also reveal holes in the shadow of a crest,
+/// which hide ground that falls off. Without bounds, take the sd of shadows 1.3 to 2 times as
+/// large.
 ///
-/// On five kinds of terrain 64 to 76 % of errors are within one sd and 91 to 97 % within two.
-/// Without bounds, shadows cannot be identified: take their sd 1.3 to 2 times as large.
-///
-/// Time per filled sample: 1 to 4 us with a thin plate or tension, 2 to 7 us with smoothness; in
-/// one hole of 1e6 samples 6 and 19 us. Bounds take some five times as long, or a hundred times and
-/// more if they are far below a stiff plate. The trials take 0.1 s for each kind of holes (0.2 s
-/// with bounds). Memory: 40 bytes per sample, and, per thread and sample of the largest hole, 110
-/// bytes times the binary logarithm of the number of its samples, 200 with smoothness, and up to
-/// 2.75 times as much with bounds: at 1e5 samples 1.7 and 3.0 kB, with bounds 4 and 8 kB. Results
-/// do not depend on the number of threads.
+/// Time per filled sample: 1 to 4 us with a thin plate or tension, 2 to 7 us with smoothness, more
+/// in large holes, and some five times as much with bounds, or a hundred times and more if they are
+/// far below a stiff plate. Memory: 40 bytes per sample, and, per thread and sample of the largest
+/// hole, 110 bytes times the binary logarithm of the number of its samples, 200 with smoothness,
+/// and up to 2.75 times as much with bounds. Results do not depend on the number of threads.
 /// @param heights_m  heights of the frame's samples in row order; NaN for none.
 /// @param most_m  upper bound of each sample from lines of sight (see sight_bound), NaN for none;
 ///        or empty.
@@ -117,5 +112,46 @@ FilledHeights fill_dem(const GridFrame& frame, std::span<const float> heights_m,
 /// @throws Error as fill_dem.
 FilledHeights take_filling(const GridFrame& frame, std::span<const float> heights_m,
                            std::span<const float> filled_m, const FillOptions& options);
+
+/// Adds the variance of the surrounding measured heights to that of filled heights: fill_dem
+/// estimates how much the ground deviates from the known heights around it, but takes these as
+/// exact. Adds the mean variance of the measured samples at most two rows and columns from the
+/// nearest one, weighted by their numbers of points. This includes all of the noise, which fills
+/// average in part: where noise prevails, the sum is too large by up to the noise.
+///
+/// Samples whose fill_sd_m is NaN stay unchanged, and so do all if nothing is measured. The time is
+/// proportional to the number of samples; memory is 4 bytes for each.
+/// @see Danielsson, Euclidean distance mapping, Computer Graphics and Image Processing 14 (1980).
+void add_boundary_variance(DemLayers& layers);
+
+/// Inpainting method of OpenCV.
+enum class Inpainting : std::uint8_t {
+  Telea,        ///< fast marching (Telea 2004)
+  NavierStokes  ///< continuation of lines of equal brightness (Bertalmio and others 2001)
+};
+
+/// Returns the heights with missing ones filled by OpenCV's inpainting from samples up to three
+/// cells away, for comparison. Heights are scaled to a suitable range meanwhile.
+/// @param size  columns and rows.
+/// @param heights_m  in row order; NaN for none.
+/// @throws Error if the sizes disagree or OpenCV fails.
+std::vector<float> fill_by_inpainting(glm::ivec2 size, std::span<const float> heights_m,
+                                      Inpainting by);
+
+/// Fills holes of a DEM by meshes: the surrounding ground becomes triangles (split as HeightGrid's
+/// cells are), their holes are filled by fill_holes (triangulated, refined, faired), and the result
+/// is resampled. It is an alternative to fill_dem, for comparison and for boundaries that are so
+/// steep or overhanging that no surface of heights joins them: of several heights at a sample the
+/// lowest is used. Ground steeper than one in two on average is flattened to that meanwhile. Gives
+/// no sd.
+///
+/// The time grows at least with the square of the edges of a boundary: see HoleLimits. options.form
+/// is not used.
+/// @param most_edges  largest number of edges of a boundary; holes with more stay open, with the
+///        fate Partly.
+/// @throws Error as fill_dem and fill_holes.
+FilledHeights fill_dem_by_mesh(const GridFrame& frame, std::span<const float> heights_m,
+                               const FillOptions& options, std::size_t most_edges,
+                               const RunControl& work = {});
 
 }  // namespace groundray

@@ -8,9 +8,8 @@
 #include <limits>
 #include <vector>
 
-#include "reconstruction/dem/data_distance.h"
-#include "reconstruction/dem/fill/ground_roughness.h"
-#include "reconstruction/dem/fill/raster_holes.h"
+#include "reconstruction/dem/dem_layers.h"
+#include "reconstruction/dem/fill/sorted_holes.h"
 
 namespace groundray {
 namespace {
@@ -36,15 +35,15 @@ struct PieceErrors {
   std::vector<float> distances_cells, roughness_m;
 };
 
+bool is_to_fill(std::int32_t number) { return number >= 0; }
+
 // Excludes missing samples that are not connected to any known one. Returns whether all hidden
 // samples remain.
 bool drop_loose(HoldoutMask& piece) {
-  std::vector<std::uint8_t> is_open(piece.numbers.size());
-  std::ranges::transform(piece.numbers, is_open.begin(),
-                         [](std::int32_t number) { return number >= 0 ? 1 : 0; });
+  const auto is_open = marks_of(piece.numbers, is_to_fill);
   for (const auto& set : linked_samples(piece.size, is_open)) {
     if (has_known_neighbour(piece.size, piece.numbers, set)) continue;
-    for (const std::uint32_t sample : set) piece.numbers[sample] = plate_absent;
+    for (const std::uint32_t sample : set) piece.numbers[sample] = absent_sample;
   }
   return std::ranges::all_of(piece.hidden,
                              [&](std::uint32_t sample) { return piece.numbers[sample] >= 0; });
@@ -64,9 +63,7 @@ std::vector<double> upper_bounds_of(const HoldoutMask& piece, const std::vector<
 }
 
 void fill_piece(HoldoutMask& piece, std::span<const ThinPlateEnergy> forms, PieceErrors& found) {
-  std::vector<std::uint8_t> is_open(piece.numbers.size());
-  std::ranges::transform(piece.numbers, is_open.begin(),
-                         [](std::int32_t number) { return number >= 0 ? 1 : 0; });
+  const auto is_open = marks_of(piece.numbers, is_to_fill);
   // Index in piece.hidden; -1 for others.
   std::vector<std::int32_t> order(piece.numbers.size(), -1);
   for (std::size_t i = 0; i < piece.hidden.size(); ++i)
@@ -76,7 +73,7 @@ void fill_piece(HoldoutMask& piece, std::span<const ThinPlateEnergy> forms, Piec
     if (std::ranges::all_of(set, [&](std::uint32_t sample) { return order[sample] < 0; })) continue;
     std::int32_t number = 0;
     for (const std::uint32_t sample : set) piece.numbers[sample] = number++;
-    ThinPlateSystem system({piece.size, piece.step_m, piece.heights_m, piece.numbers}, set);
+    ThinPlateSystem system(piece.raster(), set);
     const std::vector<double> most_m = upper_bounds_of(piece, set, order);
     for (std::size_t form = 0; form < forms.size(); ++form) {
       const std::vector<double> heights_m = most_m.empty()
@@ -95,16 +92,13 @@ void fill_piece(HoldoutMask& piece, std::span<const ThinPlateEnergy> forms, Piec
 
 // Determines each hidden sample's distance to data, and the roughness there.
 void describe_piece(const HoldoutMask& piece, double usual_roughness_m, PieceErrors& found) {
-  std::vector<std::uint8_t> has_data(piece.heights_m.size());
-  std::ranges::transform(piece.heights_m, has_data.begin(),
-                         [](float z) { return std::isnan(z) ? 0 : 1; });
+  const auto has_data = marks_of(piece.heights_m, [](float z) { return !std::isnan(z); });
   const double cell_m = std::sqrt(std::abs(piece.step_m.x * piece.step_m.y));
   const auto distances_m = data_distance_m(piece.size, piece.step_m, has_data);
   const GroundRoughness roughness(piece.size, piece.heights_m);
   for (const std::uint32_t sample : piece.hidden) {
     const double cells = distances_m[sample] / cell_m;
-    const glm::ivec2 at(static_cast<int>(sample) % piece.size.x,
-                        static_cast<int>(sample) / piece.size.x);
+    const glm::ivec2 at = piece.raster().place(sample);
     found.distances_cells.push_back(static_cast<float>(cells));
     found.roughness_m.push_back(
         static_cast<float>(roughness.at_m(at, roughness_reach(cells), usual_roughness_m)));
@@ -224,15 +218,15 @@ std::vector<PieceErrors> try_pieces(const HoldoutMaskMaker& maker,
 
 // Fits the error model, and tests the models from each half of the pieces on the other half.
 void judge(std::span<const FillError> errors, FillTrial& trial) {
-  trial.law = fit_law(errors);
+  trial.model = fit_error_model(errors);
   std::array<std::vector<FillError>, 2> halves;
   for (const FillError& error : errors) halves[error.trial % 2].push_back(error);
-  const std::array laws{fit_law(halves[0]), fit_law(halves[1])};
-  if (!trial.law || !laws[0] || !laws[1]) return;
+  const std::array models{fit_error_model(halves[0]), fit_error_model(halves[1])};
+  if (!trial.model || !models[0] || !models[1]) return;
   double all = 0;
   trial.cover = {0, 0, 0};
   for (const std::size_t half : {0u, 1u}) {
-    const FillCover cover = cover_of(halves[half], *laws[1 - half]);
+    const FillCover cover = cover_of(halves[half], *models[1 - half]);
     const auto count = static_cast<double>(halves[half].size());
     trial.cover.within_1sd += count * cover.within_1sd;
     trial.cover.within_2sd += count * cover.within_2sd;
@@ -242,12 +236,12 @@ void judge(std::span<const FillError> errors, FillTrial& trial) {
   trial.cover = {trial.cover.within_1sd / all, trial.cover.within_2sd / all,
                  std::sqrt(trial.cover.rms_sds / all)};
   trial.widened_by = std::max(trial.cover.rms_sds, 1.0);
-  trial.law->factors[0] += 2 * std::log(trial.widened_by);
+  trial.model->factors[0] += 2 * std::log(trial.widened_by);
 }
 
 }  // namespace
 
-FillTrial try_filling(const PlateRaster& raster, std::span<const TriedHole> holes,
+FillTrial try_filling(const ThinPlateRaster& raster, std::span<const TriedHole> holes,
                       const std::optional<ThinPlateEnergy>& form, double usual_roughness_m) {
   std::vector<ThinPlateEnergy> forms = all_forms;
   if (form) forms = {*form};

@@ -15,7 +15,7 @@ namespace groundray {
 /// Hold-out test of one kind of holes: best form and error model.
 struct FillTrial {
   std::optional<ThinPlateEnergy> form;  ///< nothing if too little ground was known
-  std::optional<FillErrorModel> law;    ///< likewise; widened
+  std::optional<FillErrorModel> model;  ///< likewise; widened
   std::size_t samples = 0;              ///< number hidden, filled and compared
   FillCover cover;  ///< of errors by models from the other half of the trials; NaN if either half
                     ///< is too small for a model
@@ -24,16 +24,12 @@ struct FillTrial {
 
 /// Tests how well holes of one kind are filled: hides pieces of their shape on known ground
 /// elsewhere, or, for shadows, the samples that similar lines of sight would leave in shadow there,
-/// fills them by several forms and compares. The best form is the one with the smallest squared
-/// errors, by the mean logarithm over pieces, unless its gain over the usual form is within chance.
-/// The usual form is a thin plate, and one with the smoothness 5 for shadows. The error model is
-/// fitted to the errors by maximum likelihood; if the errors of one half of the trials are larger
-/// than the model of the other half states, sd is widened.
+/// fills them by several forms, chooses the best one and fits the error model to its errors.
 /// @param holes  similar holes, all shadows or none; not empty.
 /// @param form  the only form to test, if given.
 /// @param usual_roughness_m  roughness of the whole raster.
 /// @see docs/theory/dem_fill.md
-FillTrial try_filling(const PlateRaster& raster, std::span<const TriedHole> holes,
+FillTrial try_filling(const ThinPlateRaster& raster, std::span<const TriedHole> holes,
                       const std::optional<ThinPlateEnergy>& form, double usual_roughness_m);
 
 }  // namespace groundray

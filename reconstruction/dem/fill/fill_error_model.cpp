@@ -5,7 +5,7 @@
 #include <algorithm>
 #include <cmath>
 #include <cstddef>
-#include <vector>
+#include <glm/common.hpp>
 
 namespace groundray {
 namespace {
@@ -16,7 +16,7 @@ constexpr double usual_power = 1.5, usual_roughness_power = 2;  // exponents of 
 constexpr double usual_weight = 10;                             // weight of these, in errors
 constexpr double most_power = 6, most_roughness_power = 3;
 
-Eigen::Vector3d law_terms(double distance_cells, double roughness_m) {
+Eigen::Vector3d model_terms(double distance_cells, double roughness_m) {
   return {1, std::log(std::max(distance_cells, 1e-3)),
           std::log(std::max(roughness_m, least_roughness_m))};
 }
@@ -40,7 +40,7 @@ double misfit_of(const std::vector<Sample>& samples, const Eigen::Vector3d& fact
 }
 
 // Scales the model so that squared errors equal its variance on average.
-void level_law(const std::vector<Sample>& samples, Eigen::Vector3d& factors) {
+void level_model(const std::vector<Sample>& samples, Eigen::Vector3d& factors) {
   double sum = 0;
   for (const Sample& sample : samples)
     sum += sample.square_m2 * std::exp(-sample.terms.dot(factors));
@@ -70,44 +70,98 @@ bool improve(const std::vector<Sample>& samples, const Eigen::Vector3d& usual,
   return false;
 }
 
+constexpr double usual_terms = 8;
+
 }  // namespace
 
 double FillErrorModel::sd_m(double distance_cells, double roughness_m) const {
-  const Eigen::Vector3d terms = law_terms(distance_cells, roughness_m);
+  const Eigen::Vector3d terms = model_terms(distance_cells, roughness_m);
   return std::exp((terms[0] * factors[0] + terms[1] * factors[1] + terms[2] * factors[2]) / 2);
 }
 
-std::optional<FillErrorModel> fit_law(std::span<const FillError> errors) {
+std::optional<FillErrorModel> fit_error_model(std::span<const FillError> errors) {
   if (errors.size() < fewest) return std::nullopt;
   std::vector<Sample> samples;
   samples.reserve(errors.size());
   for (const FillError& error : errors) {
-    samples.push_back({law_terms(error.distance_cells, error.roughness_m),
+    samples.push_back({model_terms(error.distance_cells, error.roughness_m),
                        std::max(double{error.error_m} * error.error_m, least_m2)});
   }
   const Eigen::Vector3d usual(0, usual_power, usual_roughness_power);
   Eigen::Vector3d factors = usual;
-  level_law(samples, factors);
+  level_model(samples, factors);
   constexpr int most_improvements = 50;
   for (int step = 0; step < most_improvements && improve(samples, usual, factors); ++step) {
   }
   factors[1] = std::clamp(factors[1], 0.0, most_power);
   factors[2] = std::clamp(factors[2], 0.0, most_roughness_power);
-  level_law(samples, factors);
+  level_model(samples, factors);
   return FillErrorModel{{factors[0], factors[1], factors[2]}};
 }
 
-FillCover cover_of(std::span<const FillError> errors, const FillErrorModel& law) {
+FillCover cover_of(std::span<const FillError> errors, const FillErrorModel& model) {
   if (errors.empty()) return {};
   FillCover cover{0, 0, 0};
   for (const FillError& error : errors) {
-    const double sds = std::abs(error.error_m) / law.sd_m(error.distance_cells, error.roughness_m);
+    const double sds =
+        std::abs(error.error_m) / model.sd_m(error.distance_cells, error.roughness_m);
     cover.within_1sd += sds <= 1 ? 1 : 0;
     cover.within_2sd += sds <= 2 ? 1 : 0;
     cover.rms_sds += sds * sds;
   }
   const auto count = static_cast<double>(errors.size());
   return {cover.within_1sd / count, cover.within_2sd / count, std::sqrt(cover.rms_sds / count)};
+}
+
+int roughness_reach(double distance_cells) noexcept {
+  constexpr double most = 20;
+  return 3 + static_cast<int>(std::ceil(std::min(1.5 * distance_cells, most)));
+}
+
+GroundRoughness::GroundRoughness(glm::ivec2 size, std::span<const float> heights_m)
+    : size_(size),
+      sums_(static_cast<std::size_t>(size.x + 1) * static_cast<std::size_t>(size.y + 1)) {
+  const std::ptrdiff_t wide = size.x;
+  for (int row = 0; row < size.y; ++row) {
+    Sum line;
+    for (int column = 0; column < size.x; ++column) {
+      const float* z = heights_m.data() + row * wide + column;
+      const auto add = [&line](double difference_m) {
+        if (std::isnan(difference_m)) return;
+        line.squares_m2 += difference_m * difference_m;
+        line.count += 1;
+      };
+      if (column > 0 && column + 1 < size.x) add(double(z[-1]) - 2 * double(z[0]) + double(z[1]));
+      if (row > 0 && row + 1 < size.y) add(double(z[-wide]) - 2 * double(z[0]) + double(z[wide]));
+      const auto above = static_cast<std::size_t>(row * (wide + 1) + column + 1);
+      const Sum& before = sums_[above];
+      sums_[above + static_cast<std::size_t>(wide) + 1] = {before.squares_m2 + line.squares_m2,
+                                                           before.count + line.count};
+    }
+  }
+}
+
+GroundRoughness::Sum GroundRoughness::sum_in(glm::ivec2 low, glm::ivec2 high) const noexcept {
+  const auto at = [this](int column, int row) -> const Sum& {
+    return sums_[static_cast<std::size_t>(row) * static_cast<std::size_t>(size_.x + 1) +
+                 static_cast<std::size_t>(column)];
+  };
+  const Sum &a = at(low.x, low.y), &b = at(high.x, low.y), &c = at(low.x, high.y),
+            &d = at(high.x, high.y);
+  return {d.squares_m2 - b.squares_m2 - c.squares_m2 + a.squares_m2,
+          d.count - b.count - c.count + a.count};
+}
+
+double GroundRoughness::at_m(glm::ivec2 sample, int cells, double usual_m) const noexcept {
+  const Sum sum =
+      sum_in(glm::max(sample - cells, glm::ivec2(0)), glm::min(sample + cells + 1, size_));
+  const double squares_m2 = std::fmax(sum.squares_m2, 0) + usual_terms * usual_m * usual_m;
+  return std::sqrt(squares_m2 / (sum.count + usual_terms));
+}
+
+double GroundRoughness::usual_m() const noexcept {
+  const Sum sum = sum_in(glm::ivec2(0), size_);
+  return sum.count > 0 ? std::sqrt(std::fmax(sum.squares_m2, 0) / sum.count) : 0;
 }
 
 }  // namespace groundray

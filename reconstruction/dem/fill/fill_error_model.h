@@ -2,9 +2,11 @@
 
 #include <array>
 #include <cstdint>
+#include <glm/vec2.hpp>
 #include <limits>
 #include <optional>
 #include <span>
+#include <vector>
 
 // Error model of filled heights, private to this library.
 namespace groundray {
@@ -38,9 +40,37 @@ struct FillCover {
 /// + error^2 / sd^2 over all errors, and of 5 (exponent - usual exponent)^2 over both exponents.
 /// @see McCullagh, Nelder, Generalized linear models, 2nd ed. (1989), chapter 8: squared normal
 ///      errors are gamma variables.
-std::optional<FillErrorModel> fit_law(std::span<const FillError> errors);
+std::optional<FillErrorModel> fit_error_model(std::span<const FillError> errors);
 
 /// Returns the agreement of errors with a model; NaN without errors.
-FillCover cover_of(std::span<const FillError> errors, const FillErrorModel& law);
+FillCover cover_of(std::span<const FillError> errors, const FillErrorModel& model);
+
+/// Returns the number of columns and rows around a sample, at a distance from data, over which its
+/// roughness is averaged.
+int roughness_reach(double distance_cells) noexcept;
+
+/// Root mean square of second differences between samples with heights, over any box.
+class GroundRoughness {
+ public:
+  /// @param heights_m  size.x * size.y heights in row order; NaN for none.
+  GroundRoughness(glm::ivec2 size, std::span<const float> heights_m);
+
+  /// Returns the root mean square within `cells` columns and rows of a sample, metres. Some terms
+  /// of `usual_m` are added, so that it does not depend on a few differences.
+  double at_m(glm::ivec2 sample, int cells, double usual_m) const noexcept;
+
+  /// Returns the root mean square of the whole raster, metres; 0 without differences.
+  double usual_m() const noexcept;
+
+ private:
+  struct Sum {
+    double squares_m2 = 0;
+    double count = 0;
+  };
+  Sum sum_in(glm::ivec2 low, glm::ivec2 high) const noexcept;
+
+  glm::ivec2 size_;
+  std::vector<Sum> sums_;  // summed-area table
+};
 
 }  // namespace groundray

@@ -1,5 +1,3 @@
-#include "reconstruction/dem/fill/inpaint_fill.h"
-
 #include <algorithm>
 #include <cmath>
 #include <limits>
@@ -7,6 +5,7 @@
 #include <opencv2/photo.hpp>
 
 #include "core/error.h"
+#include "reconstruction/dem/fill/dem_fill.h"
 
 namespace groundray {
 namespace {

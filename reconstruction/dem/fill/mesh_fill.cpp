@@ -1,5 +1,3 @@
-#include "reconstruction/dem/fill/mesh_fill.h"
-
 #include <algorithm>
 #include <array>
 #include <cmath>
@@ -9,6 +7,7 @@
 #include <utility>
 #include <vector>
 
+#include "reconstruction/dem/fill/dem_fill.h"
 #include "reconstruction/dem/plan_triangle.h"
 #include "reconstruction/mesh/holes/hole_fill.h"
 

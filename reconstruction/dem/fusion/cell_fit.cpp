@@ -4,10 +4,7 @@
 #include <cmath>
 #include <limits>
 
-#include "reconstruction/dem/fusion/curvature_profile.h"
 #include "reconstruction/dem/fusion/float_lanes.h"
-#include "reconstruction/dem/fusion/order_statistic.h"
-#include "reconstruction/dem/fusion/sparse_cell.h"
 
 namespace groundray {
 namespace {

@@ -24,20 +24,10 @@ struct CellHeight {
 
 /// Robust fit of planes to the points of cells, one cell after the other.
 ///
-/// First, the bend of the neighbours' surface and the crest of the cell itself are subtracted from
-/// the points. The crest is n / (n + 4) of NeighbourSurface::crest_m for n points; the ground is
-/// assumed to bend by -2 crests along columns and rows.
-///
-/// The plane starts with the median height and the slope of the neighbours, whose information
-/// constrains the slope throughout. Weights are those of CellColumns, at first with the slope of
-/// the neighbours and its covariance, then with those of the fit. Residuals are in units of their
-/// sd, times 1.4826 of their median where that is above 1. Up to three rounds use Huber's weights
-/// (k = 1.345), and up to five more Tukey's (c = 4.685), with slope and scale of the former.
-///
-/// The variance is that of the linear estimate with the last weights: the sum of the points' noise,
-/// times chi² per degree of freedom where that is above 1; of the bias of each group, by the
-/// group's fraction of the weight, whatever the number of its points; of the slope taken from the
-/// neighbours; and of the bend.
+/// The bend of the neighbours' surface and the crest of the cell itself are subtracted from the
+/// points. The plane starts with the median height and the slope of the neighbours, whose
+/// information constrains the slope throughout. Weights are those of CellColumns, times Huber's and
+/// then Tukey's; the variance is that of the linear estimate with the last ones.
 ///
 /// Cells of one or two points are combined with the neighbours' surface instead: see fit_few.
 /// @see docs/theory/dem.md; Huber, Ronchetti, Robust statistics (2009), chapter 7.

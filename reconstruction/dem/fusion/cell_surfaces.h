@@ -1,7 +1,6 @@
 #pragma once
 
 // Private to the library: the surfaces, one above the other, that the points of a cell lie on.
-#include <cstddef>
 #include <cstdint>
 #include <span>
 #include <vector>

@@ -6,15 +6,11 @@
 #include <atomic>
 #include <cmath>
 #include <glm/geometric.hpp>
-#include <limits>
 #include <system_error>
 #include <utility>
 #include <vector>
 
 #include "core/error.h"
-#include "reconstruction/dem/data_distance.h"
-#include "reconstruction/dem/dem_frame.h"
-#include "reconstruction/dem/fusion/cell_tiling.h"
 #include "reconstruction/dem/fusion/point_spool.h"
 #include "reconstruction/dem/fusion/tile_fit.h"
 
@@ -242,7 +238,7 @@ void TileFusion::split(const CellTiling& tiling, const PointSpool& spool, std::s
   spool.read(tile, [&](std::span<const PackedPoint> some) {
     for (PackedPoint point : some) {
       const glm::ivec2 cell =
-          first - CellTiling::rim +
+          first - CellTiling::margin +
           glm::ivec2(point.cell % CellTiling::width, point.cell / CellTiling::width);
       parts.for_each_view(cell, [&](std::size_t part, std::uint16_t number) {
         point.cell = number;
@@ -269,10 +265,6 @@ std::size_t batch_end(const PointSpool& spool, std::size_t begin, std::size_t mo
   return end;
 }
 
-void report(const RunControl& work, double share) {
-  if (work.progress) work.progress(share);
-}
-
 }  // namespace
 
 FusionCounts fuse(const PointSource& source, const GridFrame& frame, const FusionOptions& options,
@@ -286,7 +278,7 @@ FusionCounts fuse(const PointSource& source, const GridFrame& frame, const Fusio
   Intake intake(frame, tiling, spool);
   for (MeasuredPoints block; source(block);) {
     intake.take(block);
-    report(work, 0);
+    work.report(0);
   }
   TileFusion fusion(frame, options, folder);
   std::vector<DemTile> fused;
@@ -298,7 +290,7 @@ FusionCounts fuse(const PointSource& source, const GridFrame& frame, const Fusio
     });
     for (DemTile& tile : fused) sink(std::move(tile));
     begin = end;
-    report(work, 0.5 + 0.5 * static_cast<double>(begin) / static_cast<double>(spool.bins()));
+    work.report(0.5 + 0.5 * static_cast<double>(begin) / static_cast<double>(spool.bins()));
   }
   FusionCounts counts = intake.counts();
   counts.without_ground = fusion.without_ground();
@@ -336,9 +328,8 @@ void place(const DemTile& tile, DemLayers& whole) {
 }
 
 void set_distances(DemLayers& layers) {
-  std::vector<std::uint8_t> has_data(layers.source.size());
-  for (std::size_t i = 0; i < has_data.size(); ++i)
-    has_data[i] = layers.source[i] == HeightSource::None ? 0 : 1;
+  const auto has_data =
+      marks_of(layers.source, [](HeightSource source) { return source != HeightSource::None; });
   layers.to_data_m = data_distance_m(layers.frame.samples, layers.frame.step_m, has_data);
 }
 

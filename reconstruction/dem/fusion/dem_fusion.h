@@ -58,27 +58,10 @@ struct DemTile {
 };
 
 /// Fuses the points of any number of scans and stereo pairs into a DEM. A sample's cell extends
-/// half a step to each side; the height is that of the ground at the sample itself.
-///
-/// Points of a cell lie on one surface or several, one above the other, separated by gaps. A
-/// surface is credible if it has more points than outliers are likely to form, or if it agrees with
-/// the surrounding ground. The lowest credible surface is the ground, the next the overhang. Where
-/// ground and a wall or trunk form one surface, its lowest part is the ground; if neighbouring
-/// cells show that its foot is hidden, there is none.
-///
-/// The bend of the ground is estimated from the 24 cells around and subtracted from the points, and
-/// a plane is fitted to them robustly; see docs/theory/dem.md for the model and its constants. The
-/// variance includes the points' noise (times misfit, chi² per degree of freedom, where above 1);
-/// position errors in plan times slope; the bias of each group, by the group's fraction of the
-/// weight, whatever the number of its points; the slope taken from neighbours; and the bend.
-/// `to_data_m` is 0 or the distance, infinite if nothing was measured at all; fill_sd_m and
-/// upper_bound_m are NaN.
-///
-/// One or two points form ground only if at least five of the cells around determine its height to
-/// a third of surface_gap_m, and agree with it. Each point is then ground or an outlier
-/// (outlier_share, spread over 2 m): height and variance are those of the mixture of all choices,
-/// weighted by Bayes' rule together with the surrounding surface. If all points are outliers with a
-/// probability above 1/2, there is no ground. With an outlier_share of 0 all points are ground.
+/// half a step to each side; the height is that of the ground at the sample itself: of the lowest
+/// credible surface that the cell's points lie on, fitted robustly. docs/theory/dem.md describes
+/// the model, what the variance includes, and cells of one or two points. `to_data_m` is 0 or the
+/// distance, infinite if nothing was measured at all; fill_sd_m and upper_bound_m are NaN.
 ///
 /// The result is the same for any number of threads, block sizes, order of the points and memory.
 /// Without points, all layers are those of unknown_layers, except for `to_data_m`.

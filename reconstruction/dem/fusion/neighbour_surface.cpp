@@ -1,12 +1,10 @@
 #include "reconstruction/dem/fusion/neighbour_surface.h"
 
 #include <algorithm>
-#include <array>
 #include <cmath>
 #include <cstdlib>
 
 #include "reconstruction/dem/fusion/float_lanes.h"
-#include "reconstruction/dem/fusion/order_statistic.h"
 
 namespace groundray {
 namespace {

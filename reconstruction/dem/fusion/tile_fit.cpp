@@ -2,30 +2,26 @@
 
 #include <tbb/parallel_for.h>
 
-#include <algorithm>
 #include <array>
 #include <atomic>
 #include <cmath>
-#include <limits>
 #include <memory>
 #include <optional>
-#include <span>
 
 #include "reconstruction/dem/fusion/cell_fit.h"
-#include "reconstruction/dem/fusion/cell_tiling.h"
+#include "reconstruction/dem/fusion/float_lanes.h"
 #include "reconstruction/dem/fusion/neighbour_surface.h"
-#include "reconstruction/dem/fusion/order_statistic.h"
 
 namespace groundray {
 namespace {
 
-constexpr int rim = CellTiling::rim;
+constexpr int margin = CellTiling::margin;
 constexpr int width = CellTiling::width;
 
 // Distance of cells from which the roughness of the ground is estimated: their neighbours are in
 // the margin, too.
 constexpr int rough_reach = 1;
-static_assert(rough_reach + 2 <= rim);
+static_assert(rough_reach + 2 <= margin);
 
 // Sorts the points of a cell by height, and those of equal height by their other members.
 class CellSort {
@@ -87,7 +83,8 @@ class TilePoints {
 
  private:
   static std::size_t index(int column, int row) noexcept {
-    return static_cast<std::size_t>(row + rim) * width + static_cast<std::size_t>(column + rim);
+    return static_cast<std::size_t>(row + margin) * width +
+           static_cast<std::size_t>(column + margin);
   }
   GroundScatter scatter(int column, int row) const noexcept;
   void look_at(std::size_t cell, CellSort& sort, std::vector<CellSurface>& surfaces);
@@ -114,7 +111,7 @@ TilePoints::TilePoints(const PointParts& parts, glm::ivec2 size, const TileRules
     : rules_(rules),
       tallest_m_(tallest_ground_m(rules)),
       points_(std::make_unique_for_overwrite<PackedPoint[]>(count_of(parts))) {
-  const std::size_t cells = static_cast<std::size_t>(size.y + 2 * rim) * width;
+  const std::size_t cells = static_cast<std::size_t>(size.y + 2 * margin) * width;
   begins_.assign(cells + 2, 0);
   for (const std::span<const PackedPoint> part : parts)
     for (const PackedPoint& point : part) ++begins_[point.cell + std::size_t{2}];
@@ -122,11 +119,11 @@ TilePoints::TilePoints(const PointParts& parts, glm::ivec2 size, const TileRules
   for (const std::span<const PackedPoint> part : parts)
     for (const PackedPoint& point : part) points_[begins_[point.cell + std::size_t{1}]++] = point;
   guesses_.resize(cells);
-  tbb::parallel_for(0, size.y + 2 * rim, [&](int row) {
+  tbb::parallel_for(0, size.y + 2 * margin, [&](int row) {
     CellSort sort;
     std::vector<CellSurface> surfaces;
-    for (int column = 0; column < size.x + 2 * rim; ++column)
-      look_at(index(column - rim, row - rim), sort, surfaces);
+    for (int column = 0; column < size.x + 2 * margin; ++column)
+      look_at(index(column - margin, row - margin), sort, surfaces);
   });
   sketches_.resize(cells);
   tbb::parallel_for(-rough_reach, size.y + rough_reach, [&](int row) {

@@ -6,6 +6,7 @@
 #include <span>
 #include <vector>
 
+#include "core/geometry/grid_frame.h"
 #include "core/geometry/height_grid.h"
 #include "reconstruction/run_control.h"
 
@@ -70,11 +71,9 @@ struct GroundPoints {
 };
 
 /// Separates the points of the ground, the lowest surface that is nowhere steeper than
-/// `options.slope` over less than the widest disc. Finds the lowest point of each cell, removes
-/// pits, opens the surface by discs of increasing radius, and marks the cells that a disc lowers by
-/// more than the slope allows over its radius. The other cells form the ground's surface; points
-/// within threshold + scaling * slope of it are ground. Cells with several surfaces, as under a
-/// bridge or a tree, keep all points: see find_overhangs.
+/// `options.slope` over less than the widest disc; points within threshold + scaling * slope of it
+/// are ground. Cells with several surfaces, as under a bridge or a tree, keep all points: see
+/// find_overhangs.
 ///
 /// Ground that rises towards the border more steeply than `slope` is lost there, over as many cells
 /// as the ratio of both slopes: give tiles a margin.
@@ -92,5 +91,28 @@ struct GroundPoints {
 ///      the surface, so that slopes are not too low.
 GroundPoints filter_ground(std::span<const glm::dvec3> points_m,
                            const GroundFilterOptions& options = {}, const RunControl& work = {});
+
+/// Surfaces above the ground, for each sample of a frame in row order; a sample's cell extends half
+/// a step to each side.
+struct Overhangs {
+  /// Number of surfaces, one above the other; 0 without points.
+  std::vector<std::uint16_t> surfaces;
+  /// Height in D of the lowest surface that is clear of the ground; NaN for none.
+  std::vector<float> overhang_m;
+  /// Free height between that and the highest point of the ground's surface below it; NaN for none.
+  /// It differs from overhang_m minus a DEM's height, which is fitted, refers to the sample, and is
+  /// filled where an overhang hides the ground.
+  std::vector<float> clearance_m;
+};
+
+/// Separates the surfaces of each cell: points of one surface leave no gap of more than `gap_m`
+/// between their heights above the ground. Features that rise from the ground without such a gap,
+/// such as a bush or a trunk, belong to the ground's surface and are no overhangs. In cells without
+/// a ground point, clearance is measured from `ground.surface`, and surfaces must be clear of it
+/// likewise. Points below the ground or outside the frame are ignored.
+/// @param points_m  the points that `ground` was computed from.
+/// @throws Error if the numbers of points differ, the frame is invalid or gap_m is not positive.
+Overhangs find_overhangs(std::span<const glm::dvec3> points_m, const GroundPoints& ground,
+                         const GridFrame& frame, double gap_m);
 
 }  // namespace groundray

@@ -246,8 +246,7 @@ SmoothHeights Smoothing::iterate(double curvature_sd_per_m, std::size_t most_rou
     const Eigen::VectorXd moves_m = solve(curvature_sd_per_m).cwiseProduct(sds_m_);
     heights_m_ += moves_m;
     result.last_move_m = moves_m.cwiseAbs().maxCoeff();
-    if (work.progress)
-      work.progress(static_cast<double>(result.rounds + 1) / static_cast<double>(most_rounds));
+    work.report(static_cast<double>(result.rounds + 1) / static_cast<double>(most_rounds));
   }
   result.heights_m.assign(numbers_.size(), std::numeric_limits<float>::quiet_NaN());
   for (std::size_t i = 0; i < samples_.size(); ++i)

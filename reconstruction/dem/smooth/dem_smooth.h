@@ -42,9 +42,9 @@ struct SmoothHeights {
 /// left, but smoothed heights are no longer independent of their neighbours, and are biased towards
 /// a smoother surface where the ground is rougher than k.
 ///
-/// Takes some 2 us per measured sample and round, usually for 10 to 15 rounds, and longer if the
-/// curvature sd is a small fraction of the curvature due to noise: 50 us at 1e-5 of it. Memory: 640
-/// bytes per sample. Uses one thread; results are always the same.
+/// Takes some 2 us per measured sample and round, usually for 10 to 15 rounds, and longer for a
+/// very small curvature sd. Memory: 640 bytes per sample. Uses one thread; results are always the
+/// same.
 /// @param heights_m  heights of the frame's samples in row order; NaN for none.
 /// @param variance_m2  variance of each height, above 0; NaN where it is not measured.
 /// @throws Error naming every fault of the arguments, if more memory is needed than `work` allows,

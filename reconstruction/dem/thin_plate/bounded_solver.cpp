@@ -23,7 +23,7 @@ constexpr double least_move = 1e-10, least_push = 1e-14;
 
 }  // namespace
 
-BoundedSolver::BoundedSolver(const PlateMatrix& matrix, const Dissection& order,
+BoundedSolver::BoundedSolver(const ThinPlateMatrix& matrix, const Dissection& order,
                              std::span<const double> right, std::span<const double> most)
     : matrix_(matrix),
       right_(right),

@@ -11,21 +11,17 @@
 namespace groundray {
 
 /// Minimiser of the energy z' matrix z / 2 - right' z under the bounds z <= most, by truncated
-/// nonsmooth Newton steps: heights are relaxed one by one, those that reach their bounds are held
-/// there, and the others move towards the solution of their equations as far as bounds permit and
-/// the energy decreases. The energy never increases. If 30 such rounds do not suffice, block
-/// principal pivoting determines the held samples, in up to 500 rounds. If that fails, too, descent
-/// continues until 100 rounds gain less than 1e-9 of the total reduction, or for 10 000 rounds.
-/// Each kind of rounds is limited to 4e7 divided by the number of samples, but not to less than a
-/// hundred.
+/// nonsmooth Newton steps, which never increase the energy, or, if 30 of these do not suffice, by
+/// block principal pivoting, and more such steps if that fails, too: see docs/theory/dem_fill.md.
+/// Rounds are limited to 4e7 divided by the number of samples, but not to less than a hundred.
 /// @see Graeser, Kornhuber, Multigrid methods for obstacle problems, J. Comput. Math. 27 (2009);
 ///      Judice, Pires, A block principal pivoting algorithm for large-scale strictly monotone
 ///      linear complementarity problems, Comput. Oper. Res. 21 (1994).
 class BoundedSolver {
  public:
   /// @param most  upper bounds, infinite for none. All arguments must outlive this.
-  BoundedSolver(const PlateMatrix& matrix, const Dissection& order, std::span<const double> right,
-                std::span<const double> most);
+  BoundedSolver(const ThinPlateMatrix& matrix, const Dissection& order,
+                std::span<const double> right, std::span<const double> most);
 
   /// Returns whether the minimum was found. Otherwise heights are within bounds, and the energy is
   /// no larger than at the start, but heights may be far from the minimum.
@@ -50,7 +46,7 @@ class BoundedSolver {
   std::vector<double> rest() const;
   double sum() const;
 
-  const PlateMatrix& matrix_;
+  const ThinPlateMatrix& matrix_;
   std::span<const double> right_, most_;
   std::vector<double> own_;  // diagonal of the matrix
   LdltFactor factor_;

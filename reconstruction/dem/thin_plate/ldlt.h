@@ -2,17 +2,35 @@
 
 #include <cstddef>
 #include <cstdint>
+#include <glm/vec2.hpp>
 #include <span>
 #include <vector>
-
-#include "reconstruction/dem/thin_plate/nested_dissection.h"
 
 // Direct solver for the equations of plates, private to this library.
 namespace groundray {
 
+/// Samples that are eliminated together, after the two other parts that they separate.
+struct DissectedPart {
+  std::size_t begin = 0, end = 0;       ///< range in the order
+  std::vector<std::size_t> children{};  ///< two or none, which precede this part
+};
+
+/// Fill-reducing order of samples for eliminating equations that couple neighbours.
+struct Dissection {
+  std::vector<std::int32_t> order;   ///< numbers of samples
+  std::vector<DissectedPart> parts;  ///< the last one is the root
+};
+
+/// Returns a nested dissection: separators that divide the other samples into two halves come last,
+/// and so on within the halves.
+/// @param places  columns and rows; not empty.
+/// @param reach  largest distance of samples coupled by an equation, in columns or rows.
+/// @see George, Nested dissection of a regular finite element mesh, SIAM J. Numer. Anal. 10 (1973).
+Dissection dissect(std::span<const glm::ivec2> places, int reach);
+
 /// Symmetric sparse matrix: each sample's equation consists of samples and their factors, its own
 /// among them.
-struct PlateMatrix {
+struct ThinPlateMatrix {
   std::vector<std::size_t> ends;      ///< end of each equation in the columns below
   std::vector<std::int32_t> samples;  ///< ascending for each equation
   std::vector<double> factors;
@@ -38,7 +56,7 @@ class LdltFactor {
  public:
   /// @param matrix  must outlive this, as must the order.
   /// @param order  dissection of all samples.
-  LdltFactor(const PlateMatrix& matrix, const Dissection& order, FactorUse use);
+  LdltFactor(const ThinPlateMatrix& matrix, const Dissection& order, FactorUse use);
   ~LdltFactor();
   LdltFactor(const LdltFactor&) = delete;
   LdltFactor& operator=(const LdltFactor&) = delete;
@@ -58,7 +76,7 @@ class LdltFactor {
   void gather(const DissectedPart& from, Part& part);
   void find_coupled(const DissectedPart& from, Part& part);
 
-  const PlateMatrix& matrix_;
+  const ThinPlateMatrix& matrix_;
   const Dissection& order_;
   std::vector<std::int32_t> places_;  // position of each sample in the order
   std::vector<std::uint8_t> is_left_out_;

@@ -10,7 +10,6 @@
 
 #include "reconstruction/dem/thin_plate/bounded_solver.h"
 #include "reconstruction/dem/thin_plate/ldlt.h"
-#include "reconstruction/dem/thin_plate/nested_dissection.h"
 
 namespace groundray {
 namespace {
@@ -34,7 +33,7 @@ struct Term {
 // effect.
 constexpr double least_link = 1e-12;
 
-std::vector<Term> plate_terms(glm::dvec2 step_m, const ThinPlateEnergy& form) {
+std::vector<Term> thin_plate_terms(glm::dvec2 step_m, const ThinPlateEnergy& form) {
   const double a = std::abs(step_m.y / step_m.x);  // h^2 / dx^2
   const double bend = 1 - form.tension, pull = form.tension + least_link, turn = form.smoothness;
   std::vector<Term> terms{
@@ -72,8 +71,8 @@ struct EquationEntry {
 
 class EquationMaker {
  public:
-  EquationMaker(const PlateRaster& raster, const ThinPlateEnergy& form, int wide)
-      : raster_(raster), terms_(plate_terms(raster.step_m, form)), wide_(wide) {
+  EquationMaker(const ThinPlateRaster& raster, const ThinPlateEnergy& form, int wide)
+      : raster_(raster), terms_(thin_plate_terms(raster.step_m, form)), wide_(wide) {
     entries_.reserve(stencil_side * stencil_side);
     for (const Term& term : terms_)
       for (const TermSample& self : term.samples) add(term, self, whole_);
@@ -93,21 +92,14 @@ class EquationMaker {
   }
 
  private:
-  // Returns the number of a sample; plate_absent beyond the edge.
+  // Returns the number of a sample; absent_sample beyond the edge.
   std::int32_t number_at(glm::ivec2 place) const {
-    if (place.x < 0 || place.y < 0 || place.x >= raster_.size.x || place.y >= raster_.size.y)
-      return plate_absent;
-    return raster_.numbers[index_of(place)];
-  }
-
-  std::size_t index_of(glm::ivec2 place) const {
-    return static_cast<std::size_t>(place.y) * static_cast<std::size_t>(raster_.size.x) +
-           static_cast<std::size_t>(place.x);
+    return raster_.contains(place) ? raster_.numbers[raster_.index(place)] : absent_sample;
   }
 
   bool is_whole(const Term& term, glm::ivec2 first) const {
     return std::ranges::all_of(term.samples, [&](const TermSample& sample) {
-      return number_at(first + glm::ivec2(sample.column, sample.row)) != plate_absent;
+      return number_at(first + glm::ivec2(sample.column, sample.row)) != absent_sample;
     });
   }
 
@@ -126,17 +118,17 @@ class EquationMaker {
       for (int across = -most; across <= most; ++across) {
         const glm::ivec2 other = place + glm::ivec2(across, down);
         const double factor = stencil[stencil_place(across, down)];
-        if (number_at(other) == plate_absent) {
+        if (number_at(other) == absent_sample) {
           is_whole = false;
         } else if (factor != 0) {
-          entries_.push_back({index_of(other), factor});
+          entries_.push_back({raster_.index(other), factor});
         }
       }
     }
     return is_whole;
   }
 
-  const PlateRaster& raster_;
+  const ThinPlateRaster& raster_;
   std::vector<Term> terms_;
   int wide_;
   Stencil whole_{};
@@ -145,21 +137,24 @@ class EquationMaker {
 
 }  // namespace
 
-std::vector<std::vector<std::uint32_t>> coupled_samples(glm::ivec2 size,
-                                                        std::span<const std::uint8_t> is_wanted) {
+namespace {
+
+// Returns the sets of samples that are connected through neighbours at most `widths[k]` columns
+// away in rows k above and below; ascending, in the order of their first samples.
+std::vector<std::vector<std::uint32_t>> connected_samples(glm::ivec2 size,
+                                                          std::span<const std::uint8_t> is_wanted,
+                                                          std::span<const int> widths) {
+  const int reach = static_cast<int>(widths.size()) - 1;
   std::vector<std::uint8_t> is_open(is_wanted.begin(), is_wanted.end());
   std::vector<std::vector<std::uint32_t>> sets;
   for (std::uint32_t first = 0; first < is_open.size(); ++first) {
-    if (is_open[first] == 0) continue;
+    if (std::exchange(is_open[first], std::uint8_t{0}) == 0) continue;
     std::vector<std::uint32_t> set{first};
-    is_open[first] = 0;
     for (std::size_t i = 0; i < set.size(); ++i) {
       const int column = static_cast<int>(set[i]) % size.x, row = static_cast<int>(set[i]) / size.x;
-      for (int down = -stencil_reach; down <= stencil_reach; ++down) {
-        const int most = stencil_reach - std::abs(down);
-        for (int across = -most; across <= most; ++across) {
-          const int c = column + across, r = row + down;
-          if (c < 0 || r < 0 || c >= size.x || r >= size.y) continue;
+      for (int r = std::max(row - reach, 0); r <= std::min(row + reach, size.y - 1); ++r) {
+        const int width = widths[static_cast<std::size_t>(std::abs(r - row))];
+        for (int c = std::max(column - width, 0); c <= std::min(column + width, size.x - 1); ++c) {
           const auto other = static_cast<std::uint32_t>(r * size.x + c);
           if (std::exchange(is_open[other], std::uint8_t{0}) != 0) set.push_back(other);
         }
@@ -171,6 +166,19 @@ std::vector<std::vector<std::uint32_t>> coupled_samples(glm::ivec2 size,
   return sets;
 }
 
+}  // namespace
+
+std::vector<std::vector<std::uint32_t>> linked_samples(glm::ivec2 size,
+                                                       std::span<const std::uint8_t> is_wanted) {
+  return connected_samples(size, is_wanted, std::array{1, 1});
+}
+
+std::vector<std::vector<std::uint32_t>> coupled_samples(glm::ivec2 size,
+                                                        std::span<const std::uint8_t> is_wanted) {
+  static_assert(stencil_reach == 3);
+  return connected_samples(size, is_wanted, std::array{3, 2, 1, 0});
+}
+
 bool has_known_neighbour(glm::ivec2 size, std::span<const std::int32_t> numbers,
                          std::span<const std::uint32_t> set) {
   return std::ranges::any_of(set, [&](std::uint32_t sample) {
@@ -179,7 +187,7 @@ bool has_known_neighbour(glm::ivec2 size, std::span<const std::int32_t> numbers,
       for (int c = std::max(column - 1, 0); c <= std::min(column + 1, size.x - 1); ++c) {
         const auto other = static_cast<std::size_t>(r) * static_cast<std::size_t>(size.x) +
                            static_cast<std::size_t>(c);
-        if (numbers[other] == plate_known) return true;
+        if (numbers[other] == known_sample) return true;
       }
     }
     return false;
@@ -190,13 +198,13 @@ bool has_known_neighbour(glm::ivec2 size, std::span<const std::int32_t> numbers,
 struct ThinPlateSystem::Equations {
   std::optional<ThinPlateEnergy> form;
   double base_m = std::numeric_limits<double>::quiet_NaN();  // the first known height encountered
-  PlateMatrix matrix;
+  ThinPlateMatrix matrix;
   std::vector<double> right;
   std::vector<glm::ivec2> places;  // columns and rows of the samples
   std::array<std::optional<Dissection>, stencil_reach + 1> orders;  // by the reach of the equations
   std::vector<double> below;  // latest heights under bounds, above the base
 
-  void assemble(const PlateRaster& raster, std::span<const std::uint32_t> samples,
+  void assemble(const ThinPlateRaster& raster, std::span<const std::uint32_t> samples,
                 const ThinPlateEnergy& for_form);
   const Dissection& order();
 };
@@ -208,7 +216,7 @@ const Dissection& ThinPlateSystem::Equations::order() {
   return *order;
 }
 
-void ThinPlateSystem::Equations::assemble(const PlateRaster& raster,
+void ThinPlateSystem::Equations::assemble(const ThinPlateRaster& raster,
                                           std::span<const std::uint32_t> samples,
                                           const ThinPlateEnergy& for_form) {
   if (form == for_form) return;
@@ -221,7 +229,7 @@ void ThinPlateSystem::Equations::assemble(const PlateRaster& raster,
   for (std::size_t i = 0; i < samples.size(); ++i) {
     for (const EquationEntry& entry : maker.at(places[i])) {
       const std::int32_t number = raster.numbers[entry.sample];
-      if (number == plate_known) {
+      if (number == known_sample) {
         const double height_m = raster.heights_m[entry.sample];
         if (std::isnan(base_m)) base_m = height_m;
         right[i] -= entry.factor * (height_m - base_m);
@@ -234,12 +242,9 @@ void ThinPlateSystem::Equations::assemble(const PlateRaster& raster,
   }
 }
 
-ThinPlateSystem::ThinPlateSystem(const PlateRaster& raster, std::vector<std::uint32_t> samples)
+ThinPlateSystem::ThinPlateSystem(const ThinPlateRaster& raster, std::vector<std::uint32_t> samples)
     : raster_(raster), samples_(std::move(samples)), equations_(std::make_unique<Equations>()) {
-  for (const std::uint32_t sample : samples_) {
-    const auto at = static_cast<int>(sample);
-    equations_->places.emplace_back(at % raster_.size.x, at / raster_.size.x);
-  }
+  for (const std::uint32_t sample : samples_) equations_->places.push_back(raster_.place(sample));
 }
 
 ThinPlateSystem::~ThinPlateSystem() = default;
@@ -253,15 +258,15 @@ std::vector<double> ThinPlateSystem::solve(const ThinPlateEnergy& form) {
   return heights_m;
 }
 
-BoundedPlate ThinPlateSystem::solve_below(const ThinPlateEnergy& form,
-                                          std::span<const double> most_m) {
+BoundedThinPlate ThinPlateSystem::solve_below(const ThinPlateEnergy& form,
+                                              std::span<const double> most_m) {
   Equations& equations = *equations_;
   equations.assemble(raster_, samples_, form);
   std::vector<double> most(most_m.begin(), most_m.end());  // bounds above the base
   for (double& bound : most)
     bound = std::isnan(bound) ? std::numeric_limits<double>::infinity() : bound - equations.base_m;
   BoundedSolver descent(equations.matrix, equations.order(), equations.right, most);
-  BoundedPlate result;
+  BoundedThinPlate result;
   result.is_best = descent.run(equations.below);
   equations.below = descent.heights();
   result.heights_m = descent.heights();

@@ -8,15 +8,12 @@
 #include <glm/geometric.hpp>
 #include <limits>
 #include <utility>
-#include <vector>
 
 #include "core/error.h"
 #include "core/geometry/mesh_check.h"
 #include "core/model/model.h"
 #include "reconstruction/mesh/accuracy/cover_bound.h"
-#include "reconstruction/mesh/accuracy/distance_sums.h"
 #include "reconstruction/mesh/accuracy/largest_distance.h"
-#include "reconstruction/mesh/accuracy/share_sums.h"
 #include "reconstruction/mesh/accuracy/surface_parts.h"
 
 namespace groundray {

@@ -47,18 +47,12 @@ struct Outline {
 }  // namespace
 
 CoverBound::CoverBound(const TriangleMesh& mesh)
-    : mesh_(mesh), begins_(mesh.vertices_m.size() + 1), around_(3 * mesh.triangles.size()) {
+    : mesh_(mesh),
+      around_(sorted_in(mesh.vertices_m.size(), 3 * mesh.triangles.size(),
+                        [&](HalfEdge h) { return corner_of(mesh.triangles, h); })) {
   for (const glm::dvec3& p : mesh.vertices_m) {
     const glm::dvec3 away = glm::abs(p);
     size_m_ = std::max({size_m_, away.x, away.y, away.z});
-  }
-  for (const glm::uvec3& t : mesh.triangles) {
-    for (int k = 0; k < 3; ++k) ++begins_[t[k] + std::size_t{1}];
-  }
-  for (std::size_t i = 1; i < begins_.size(); ++i) begins_[i] += begins_[i - 1];
-  std::vector<std::uint32_t> next(begins_.begin(), begins_.end() - 1);
-  for (std::uint32_t i = 0; i < mesh.triangles.size(); ++i) {
-    for (int k = 0; k < 3; ++k) around_[next[mesh.triangles[i][k]]++] = i;
   }
 }
 
@@ -200,8 +194,8 @@ class CoverBound::Walk {
                                       double inner) const {
     const auto& at = cover_.mesh_.vertices_m;
     const glm::dvec3 begin = seen(at[a]), end = seen(at[b]);
-    for (std::uint32_t i = cover_.begins_[a]; i < cover_.begins_[a + std::size_t{1}]; ++i) {
-      const std::uint32_t other = cover_.around_[i];
+    for (const HalfEdge h : cover_.around_.at(a)) {
+      const std::uint32_t other = h / 3;
       const glm::uvec3& t = cover_.mesh_.triangles[other];
       if (other == triangle || (t.x != b && t.y != b && t.z != b)) continue;
       for (int k = 0; k < 3; ++k) {

@@ -4,9 +4,9 @@
 #include <cstdint>
 #include <functional>
 #include <glm/vec3.hpp>
-#include <vector>
 
 #include "core/geometry/mesh.h"
+#include "reconstruction/mesh/manifold_mesh.h"
 
 namespace groundray {
 
@@ -35,9 +35,8 @@ class CoverBound {
   class Walk;
 
   const TriangleMesh& mesh_;
-  double size_m_ = 0;                  // largest coordinate of the mesh
-  std::vector<std::uint32_t> begins_;  // first entry of each vertex in `around_`, and the end
-  std::vector<std::uint32_t> around_;  // triangles at each vertex
+  double size_m_ = 0;  // largest coordinate of the mesh
+  Buckets around_;     // half-edges that begin at each vertex
 };
 
 }  // namespace groundray

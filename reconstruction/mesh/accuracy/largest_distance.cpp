@@ -4,13 +4,10 @@
 #include <tbb/parallel_for.h>
 
 #include <algorithm>
-#include <array>
 #include <cmath>
 #include <glm/geometric.hpp>
-#include <limits>
 #include <optional>
 #include <utility>
-#include <vector>
 
 namespace groundray {
 namespace {
@@ -273,9 +270,7 @@ FarthestProbe find_farthest(const TriangleMesh& from, const ClosestPoint& to,
     pieces[i].corners = {probes[t.x], probes[t.y], probes[t.z]};
     pieces[i].triangle = static_cast<std::uint32_t>(i);
   }
-  FarthestProbe none;
-  none.probe.distance_m = -1;
-  return FarthestSearch(to, limits, none).search(std::move(pieces));
+  return FarthestSearch(to, limits, {.probe = {.distance_m = -1}}).search(std::move(pieces));
 }
 
 FarthestProbe find_farthest(const std::vector<SearchPiece>& pieces, const ClosestPoint& to,

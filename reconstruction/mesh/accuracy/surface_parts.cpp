@@ -2,7 +2,6 @@
 
 #include <tbb/parallel_for.h>
 
-#include <cmath>
 #include <glm/geometric.hpp>
 #include <limits>
 
@@ -109,6 +108,110 @@ double SurfaceParts::sum_rounding() const noexcept {
 
 void SurfaceParts::in_parallel(std::size_t count, const std::function<void(std::size_t)>& work) {
   tbb::parallel_for(std::size_t{0}, count, work);
+}
+
+void DistanceSums::add(double distance_m, double spread_m, double high_m, double high_square_m2,
+                       double part_m2) noexcept {
+  const double low_m = std::max(0.0, distance_m - spread_m);
+  ++samples;
+  area_m2 += part_m2;
+  distance += part_m2 * distance_m;
+  square += part_m2 * distance_m * distance_m;
+  spread += part_m2 * spread_m * spread_m;
+  low += part_m2 * low_m;
+  low_square += part_m2 * low_m * low_m;
+  high += part_m2 * std::min(high_m, distance_m + spread_m);
+  high_square += part_m2 * high_square_m2;
+}
+
+void DistanceSums::operator+=(const DistanceSums& more) noexcept {
+  for (double DistanceSums::*sum :
+       {&DistanceSums::distance, &DistanceSums::square, &DistanceSums::low,
+        &DistanceSums::low_square, &DistanceSums::high, &DistanceSums::high_square,
+        &DistanceSums::spread, &DistanceSums::area_m2})
+    this->*sum += more.*sum;
+  samples += more.samples;
+}
+
+// Over a part, the mean differs from the distance at the centroid by at most the root-mean-square
+// difference (spread). By Minkowski's inequality, root mean squares differ by at most the root mean
+// square of the difference.
+DistanceSums::Means DistanceSums::means(double rounding_m, double sum_rounding) const noexcept {
+  const double slack_m = rounding_m + sum_rounding * high / area_m2;
+  const double rms_m = std::sqrt(square / area_m2), spread_m = std::sqrt(spread / area_m2);
+  const double low_m = std::max(rms_m - spread_m, std::sqrt(low_square / area_m2));
+  const double high_m = std::min(rms_m + spread_m, std::sqrt(high_square / area_m2));
+  return {.mean = {distance / area_m2, std::max(0.0, low / area_m2 - slack_m),
+                   high / area_m2 + slack_m},
+          .rms = {rms_m, std::max(0.0, low_m - slack_m), high_m + slack_m}};
+}
+
+void ShareSums::add(const PartDistance& distance, double area,
+                    std::span<const double> tolerances_m) {
+  all += area;
+  areas.resize(tolerances_m.size());
+  for (std::size_t k = 0; k < areas.size(); ++k) {
+    if (distance.middle_m <= tolerances_m[k]) areas[k].within += area;
+    if (distance.at_most_m <= tolerances_m[k]) areas[k].surely_within += area;
+    if (distance.at_least_m <= tolerances_m[k]) areas[k].maybe_within += area;
+  }
+}
+
+void ShareSums::operator+=(const ShareSums& more) {
+  all += more.all;
+  has_bad_weight = has_bad_weight || more.has_bad_weight;
+  areas.resize(std::max(areas.size(), more.areas.size()));
+  for (std::size_t k = 0; k < more.areas.size(); ++k) {
+    areas[k].within += more.areas[k].within;
+    areas[k].surely_within += more.areas[k].surely_within;
+    areas[k].maybe_within += more.areas[k].maybe_within;
+  }
+}
+
+std::vector<AreaShare> ShareSums::shares(double sum_rounding) const {
+  if (has_bad_weight) {
+    throw Error(
+        "share within a distance: a point of the surface has a weight that is negative or not "
+        "finite; it must be 0 or more");
+  }
+  if (!(all > 0)) {
+    throw Error(
+        "share within a distance: the weighted area of the surface is 0; are all weights 0, or all "
+        "triangles degenerate?");
+  }
+  std::vector<AreaShare> shares;
+  for (const Areas& area : areas) {
+    shares.push_back({std::min(1.0, area.within / all),
+                      std::clamp(area.surely_within / all - 2 * sum_rounding, 0.0, 1.0),
+                      std::clamp(area.maybe_within / all + 2 * sum_rounding, 0.0, 1.0)});
+  }
+  return shares;
+}
+
+void check_tolerances(std::span<const double> tolerances_m) {
+  if (tolerances_m.empty())
+    throw Error("share within a distance: at least one tolerance is required");
+  for (const double tolerance_m : tolerances_m) {
+    if (!(tolerance_m > 0) || !std::isfinite(tolerance_m)) {
+      throw Error("share within a distance: tolerance_m = {} must be positive and finite",
+                  tolerance_m);
+    }
+  }
+}
+
+void check_quarterings(unsigned quarterings) {
+  constexpr unsigned most = 12;
+  if (quarterings <= most) return;
+  throw Error(
+      "share within a distance: quarterings = {} must be at most {}, since each quadruples the "
+      "time; use a smaller step",
+      quarterings, most);
+}
+
+bool is_open(const PartDistance& distance, std::span<const double> tolerances_m) {
+  return std::ranges::any_of(tolerances_m, [&](double tolerance_m) {
+    return distance.at_least_m <= tolerance_m && distance.at_most_m > tolerance_m;
+  });
 }
 
 }  // namespace groundray

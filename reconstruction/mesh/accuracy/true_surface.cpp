@@ -15,8 +15,6 @@
 #include "core/error.h"
 #include "core/geometry/mesh_check.h"
 #include "core/model/model.h"
-#include "reconstruction/mesh/accuracy/distance_sums.h"
-#include "reconstruction/mesh/accuracy/share_sums.h"
 #include "reconstruction/mesh/accuracy/surface_parts.h"
 
 namespace groundray {

@@ -14,8 +14,7 @@
 #include "core/error.h"
 #include "core/geometry/mesh_check.h"
 #include "reconstruction/mesh/holes/hole_patch.h"
-#include "reconstruction/mesh/holes/island_bridge.h"
-#include "reconstruction/mesh/holes/mesh_rims.h"
+#include "reconstruction/mesh/holes/mesh_boundary.h"
 #include "reconstruction/mesh/holes/placed_patch.h"
 
 namespace groundray {
@@ -24,10 +23,10 @@ namespace {
 // Boundary within the limits, and the patch that closes it.
 struct Candidate {
   std::size_t chain = 0;             // number of the boundary chain
-  BridgedRim bridged;                // the boundary, joined with pieces of surface inside it
+  BridgedBoundary bridged;           // the boundary, joined with pieces of surface inside it
   std::vector<std::size_t> islands;  // numbers of these pieces' outlines
   std::optional<HolePatch> patch;
-  std::vector<std::uint32_t> rim;  // vertices, in the patch's order
+  std::vector<std::uint32_t> boundary;  // vertices, in the patch's order
   std::vector<std::uint32_t> crossed;
   PatchShape shape = PatchShape::Smooth;
   bool is_done = false;
@@ -40,43 +39,44 @@ std::vector<std::uint32_t> vertices_of(const TriangleMesh& mesh, std::span<const
   return vertices;
 }
 
-Rim rim_of(const TriangleMesh& mesh, std::span<const HalfEdge> chain) {
-  Rim rim{.vertices = vertices_of(mesh, chain)};
+HoleBoundary boundary_of(const TriangleMesh& mesh, std::span<const HalfEdge> chain) {
+  HoleBoundary boundary{.vertices = vertices_of(mesh, chain)};
   for (const HalfEdge h : chain) {
     const glm::dvec3 &a = mesh.vertices_m[corner_of(mesh.triangles, h)],
                      &b = mesh.vertices_m[corner_of(mesh.triangles, next_of(h))];
     const double length_m = glm::distance(a, b);
-    rim.length_m += length_m;
-    rim.middle_m += length_m * 0.5 * (a + b);
+    boundary.length_m += length_m;
+    boundary.middle_m += length_m * 0.5 * (a + b);
   }
-  rim.middle_m =
-      rim.length_m > 0 ? rim.middle_m / rim.length_m : mesh.vertices_m[rim.vertices.front()];
-  return rim;
+  boundary.middle_m = boundary.length_m > 0 ? boundary.middle_m / boundary.length_m
+                                            : mesh.vertices_m[boundary.vertices.front()];
+  return boundary;
 }
 
 // Returns true if the surface along the boundary is oriented like a sheet inside it.
-bool is_outline(const TriangleMesh& mesh, std::span<const HalfEdge> chain, const Rim& rim) {
+bool is_outline(const TriangleMesh& mesh, std::span<const HalfEdge> chain,
+                const HoleBoundary& boundary) {
   glm::dvec3 area(0), facing(0);
   for (const HalfEdge h : chain) {
-    const glm::dvec3 a = mesh.vertices_m[corner_of(mesh.triangles, h)] - rim.middle_m;
-    const glm::dvec3 b = mesh.vertices_m[corner_of(mesh.triangles, next_of(h))] - rim.middle_m;
-    const glm::dvec3 c = mesh.vertices_m[corner_of(mesh.triangles, before(h))] - rim.middle_m;
+    const glm::dvec3 a = mesh.vertices_m[corner_of(mesh.triangles, h)] - boundary.middle_m;
+    const glm::dvec3 b = mesh.vertices_m[corner_of(mesh.triangles, next_of(h))] - boundary.middle_m;
+    const glm::dvec3 c = mesh.vertices_m[corner_of(mesh.triangles, before(h))] - boundary.middle_m;
     area += glm::cross(a, b);
     const glm::dvec3 normal = glm::cross(b - a, c - a);
     const double size = glm::length(normal);
     if (size > 0) facing += glm::length(b - a) / size * normal;
   }
   constexpr double cosine = 0.5;  // of 60 degrees
-  return glm::dot(area, facing) > cosine * glm::length(area) * rim.length_m;
+  return glm::dot(area, facing) > cosine * glm::length(area) * boundary.length_m;
 }
 
 std::optional<HoleLeft> why_left(const TriangleMesh& mesh, const EdgePairs& pairs,
-                                 std::span<const HalfEdge> chain, const Rim& rim,
+                                 std::span<const HalfEdge> chain, const HoleBoundary& boundary,
                                  const HoleLimits& limits) {
   const auto is_tangled = [&](HalfEdge h) { return pairs.is_tangled[h]; };
   if (chain.size() < 3 || std::ranges::any_of(chain, is_tangled)) return HoleLeft::NotManifold;
-  if (is_outline(mesh, chain, rim)) return HoleLeft::Outline;
-  if (rim.length_m > limits.longest_m) return HoleLeft::TooLong;
+  if (is_outline(mesh, chain, boundary)) return HoleLeft::Outline;
+  if (boundary.length_m > limits.longest_m) return HoleLeft::TooLong;
   if (chain.size() > limits.most_edges) return HoleLeft::TooManyEdges;
   return std::nullopt;
 }
@@ -106,15 +106,15 @@ class Filler {
         limits_(limits),
         work_(work),
         pairs_(pair_edges(mesh.shape.triangles, mesh.shape.vertices_m.size())),
-        rims_(find_rims(mesh.shape, pairs_)),
+        boundary_(find_boundary(mesh.shape, pairs_)),
         stars_(mesh.shape, pairs_) {}
 
   void fill(FilledMesh& out) {
     std::vector<Candidate> candidates = sort_out();
     std::vector<Task> tasks;
     for (Candidate& candidate : candidates)
-      tasks.push_back({&candidate, rims_.chains[candidate.chain]});
-    close(candidates, tasks, {mesh_.shape, pairs_, rims_, stars_});
+      tasks.push_back({&candidate, boundary_.chains[candidate.chain]});
+    close(candidates, tasks, {mesh_.shape, pairs_, boundary_, stars_});
     constexpr int rounds = 3;  // a patch that avoids one piece may intersect another
     for (int round = 0; round < rounds && join_islands(candidates); ++round) {
     }
@@ -132,20 +132,20 @@ class Filler {
   // shorter boundary stays.
   std::vector<Candidate> sort_out() {
     std::vector<std::size_t> chains;
-    for (std::size_t i = 0; i < rims_.chains.size(); ++i) {
-      rim_.push_back(rim_of(mesh_.shape, rims_.chains[i]));
-      why_.push_back(why_left(mesh_.shape, pairs_, rims_.chains[i], rim_[i], limits_));
+    for (std::size_t i = 0; i < boundary_.chains.size(); ++i) {
+      boundaries_.push_back(boundary_of(mesh_.shape, boundary_.chains[i]));
+      why_.push_back(why_left(mesh_.shape, pairs_, boundary_.chains[i], boundaries_[i], limits_));
       if (!why_[i]) chains.push_back(i);
     }
-    std::ranges::stable_sort(chains, {}, [&](std::size_t i) { return rim_[i].length_m; });
+    std::ranges::stable_sort(chains, {}, [&](std::size_t i) { return boundaries_[i].length_m; });
     std::vector<Candidate> candidates;
     for (const std::size_t i : chains)
-      candidates.push_back({.chain = i, .bridged = {rim_[i].vertices, {}}});
+      candidates.push_back({.chain = i, .bridged = {boundaries_[i].vertices, {}}});
     return candidates;
   }
 
   void close(std::vector<Candidate>& candidates, std::span<const Task> tasks,
-             const RimmedMesh& at) {
+             const MeshAdjacency& at) {
     for (const PatchShape shape : {PatchShape::Smooth, PatchShape::Flat}) {
       Progress progress(is_begun_ ? nullptr : &work_, tasks.size());
       is_begun_ = true;
@@ -157,15 +157,15 @@ class Filler {
     }
   }
 
-  static void make_patch(const Task& task, const RimmedMesh& at, PatchShape shape) {
+  static void make_patch(const Task& task, const MeshAdjacency& at, PatchShape shape) {
     Candidate& candidate = *task.candidate;
-    candidate.rim = vertices_of(at.mesh, task.chain);
+    candidate.boundary = vertices_of(at.mesh, task.chain);
     candidate.shape = shape;
     candidate.patch = patch_hole(at, task.chain, shape);
     if (!candidate.patch) return;
     const auto number = [&](std::uint32_t vertex) {
-      return static_cast<std::uint32_t>(std::ranges::find(candidate.rim, vertex) -
-                                        candidate.rim.begin());
+      return static_cast<std::uint32_t>(std::ranges::find(candidate.boundary, vertex) -
+                                        candidate.boundary.begin());
     };
     for (const glm::uvec3& t : candidate.bridged.bridges)
       candidate.patch->triangles.emplace_back(number(t.x), number(t.y), number(t.z));
@@ -176,7 +176,7 @@ class Filler {
     std::vector<Candidate*> owners;  // of `tried`
     for (Candidate& candidate : candidates) {
       if (!candidate.patch) continue;
-      (candidate.is_done ? kept : tried).push_back({&*candidate.patch, candidate.rim});
+      (candidate.is_done ? kept : tried).push_back({&*candidate.patch, candidate.boundary});
       if (!candidate.is_done) owners.push_back(&candidate);
     }
     if (tried.empty()) return;
@@ -206,23 +206,23 @@ class Filler {
       owners.resize(owners.size() + bridges.size(), candidate);
     }
     const EdgePairs pairs = pair_edges(mesh.triangles, mesh.vertices_m.size());
-    const MeshRims rims = find_rims(mesh, pairs);
+    const MeshBoundary boundary = find_boundary(mesh, pairs);
     std::vector<Task> tasks;
-    for (const std::vector<HalfEdge>& chain : rims.chains) {
+    for (const std::vector<HalfEdge>& chain : boundary.chains) {
       const auto is_bridge = [&](HalfEdge h) { return h / 3 >= mesh_.shape.triangles.size(); };
       const auto found = std::ranges::find_if(chain, is_bridge);
       if (found == chain.end()) continue;
       Candidate* candidate = owners[*found / 3 - mesh_.shape.triangles.size()];
       if (chain.size() == candidate->bridged.vertices.size()) tasks.push_back({candidate, chain});
     }
-    close(candidates, tasks, {mesh, pairs, rims, VertexStars(mesh, pairs)});
+    close(candidates, tasks, {mesh, pairs, boundary, VertexStars(mesh, pairs)});
     return true;
   }
 
   // Joins the pieces that a patch intersected to its boundary. Returns false if none can be joined.
   bool take_islands(Candidate& candidate) {
     if (pieces_.empty()) number_outlines();
-    const std::uint32_t own = pieces_[rims_.chains[candidate.chain].front() / 3];
+    const std::uint32_t own = pieces_[boundary_.chains[candidate.chain].front() / 3];
     std::set<std::uint32_t> met;
     for (const std::uint32_t t : candidate.crossed) {
       if (pieces_[t] != none && pieces_[t] != own) met.insert(pieces_[t]);
@@ -231,7 +231,7 @@ class Filler {
     for (const std::uint32_t piece : met) {
       const std::size_t outline = outlines_[piece];
       if (outline == no_outline) continue;
-      auto bridged = bridge(mesh_.shape, stars_, candidate.bridged, rim_[outline].vertices);
+      auto bridged = bridge(mesh_.shape, stars_, candidate.bridged, boundaries_[outline].vertices);
       if (!bridged || bridged->vertices.size() > limits_.most_edges) continue;
       candidate.bridged = std::move(*bridged);
       candidate.islands.push_back(outline);
@@ -250,7 +250,7 @@ class Filler {
     outlines_.assign(count, no_outline);
     std::vector<int> found(count, 0);
     for (std::size_t i = 0; i < why_.size(); ++i) {
-      const std::uint32_t piece = pieces_[rims_.chains[i].front() / 3];
+      const std::uint32_t piece = pieces_[boundary_.chains[i].front() / 3];
       if (why_[i] == HoleLeft::Outline) outlines_[piece] = ++found[piece] == 1 ? i : no_outline;
     }
   }
@@ -260,7 +260,7 @@ class Filler {
     const auto& vertices_m = mesh_.shape.vertices_m;
     for (const glm::dvec3& p : candidate.patch->points_m) {
       const std::uint32_t nearest = *std::ranges::min_element(
-          candidate.rim, {}, [&](std::uint32_t v) { return glm::distance(vertices_m[v], p); });
+          candidate.boundary, {}, [&](std::uint32_t v) { return glm::distance(vertices_m[v], p); });
       const double apart_m = glm::distance(vertices_m[nearest], p);
       if (!mesh_.sd_m.empty())
         mesh_.sd_m.push_back(static_cast<float>(std::hypot(mesh_.sd_m[nearest], apart_m / 3)));
@@ -272,9 +272,9 @@ class Filler {
   FilledHole added(const Candidate& candidate) {
     const auto first_vertex = static_cast<std::uint32_t>(mesh_.shape.vertices_m.size());
     const auto first_triangle = static_cast<std::uint32_t>(mesh_.shape.triangles.size());
-    append(mesh_.shape, {&*candidate.patch, candidate.rim});
+    append(mesh_.shape, {&*candidate.patch, candidate.boundary});
     append_measures(candidate);
-    return {.rim = rim_[candidate.chain],
+    return {.boundary = boundaries_[candidate.chain],
             .first_vertex = first_vertex,
             .vertices = static_cast<std::uint32_t>(candidate.patch->points_m.size()),
             .first_triangle = first_triangle,
@@ -298,7 +298,7 @@ class Filler {
       }
     }
     for (std::size_t i = 0; i < why_.size(); ++i) {
-      if (why_[i]) out.left.push_back({std::move(rim_[i]), *why_[i]});
+      if (why_[i]) out.left.push_back({std::move(boundaries_[i]), *why_[i]});
     }
   }
 
@@ -306,9 +306,9 @@ class Filler {
   const HoleLimits& limits_;
   const RunControl& work_;
   EdgePairs pairs_;
-  MeshRims rims_;
+  MeshBoundary boundary_;
   VertexStars stars_;
-  std::vector<Rim> rim_;                      // of each chain
+  std::vector<HoleBoundary> boundaries_;      // of each chain
   std::vector<std::optional<HoleLeft>> why_;  // of each chain
   static constexpr std::size_t no_outline = std::numeric_limits<std::size_t>::max();
   std::vector<std::uint32_t> pieces_;  // piece of each triangle
@@ -318,18 +318,8 @@ class Filler {
 
 void check(const MeasuredMesh& mesh, const HoleLimits& limits, const RunControl& work) {
   check_mesh(mesh.shape, "mesh to fill", EmptyMesh::Allow);
-  const std::size_t vertices = mesh.shape.vertices_m.size();
   Violations broken("filling holes");
-  const auto fits = [&](std::size_t count) { return count == 0 || count == vertices; };
-  broken.unless(fits(mesh.sd_m.size()),
-                "sd_m has {} values for {} vertices: it must have one per vertex or none",
-                mesh.sd_m.size(), vertices);
-  broken.unless(fits(mesh.labels.size()),
-                "labels has {} values for {} vertices: it must have one per vertex or none",
-                mesh.labels.size(), vertices);
-  broken.unless(fits(mesh.confidence.size()),
-                "confidence has {} values for {} vertices: it must have one per vertex or none",
-                mesh.confidence.size(), vertices);
+  check_columns(mesh, broken);
   broken.unless(limits.longest_m >= 0, "longest_m = {} must be 0 (fill nothing) or more",
                 limits.longest_m);
   constexpr std::size_t bytes_each = 200;  // per triangle, measured
@@ -349,7 +339,7 @@ FilledMesh fill_holes(MeasuredMesh mesh, const HoleLimits& limits, const RunCont
   mesh.shape.levels.clear();
   Filler(mesh, limits, work).fill(out);
   out.mesh = std::move(mesh);
-  if (work.progress) work.progress(1);
+  work.report(1);
   return out;
 }
 

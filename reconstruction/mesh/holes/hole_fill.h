@@ -18,7 +18,7 @@ struct HoleLimits {
 };
 
 /// Closed chain of boundary edges.
-struct Rim {
+struct HoleBoundary {
   std::vector<std::uint32_t> vertices;  ///< in the winding order of triangles that fill it
   double length_m = 0;
   glm::dvec3 middle_m{0};  ///< mean position along the boundary
@@ -36,7 +36,7 @@ enum class HoleLeft {
 
 /// Hole that was filled.
 struct FilledHole {
-  Rim rim;
+  HoleBoundary boundary;
   std::uint32_t first_vertex = 0, vertices = 0;  ///< added vertices, numbered in the mesh
   std::uint32_t first_triangle = 0, triangles = 0;
   std::uint32_t islands = 0;  ///< pieces of surface in the hole that were joined to its boundary
@@ -45,7 +45,7 @@ struct FilledHole {
 
 /// Hole that was left open, and the reason.
 struct OpenHole {
-  Rim rim;
+  HoleBoundary boundary;
   HoleLeft why = HoleLeft::TooLong;
 };
 
@@ -70,9 +70,7 @@ struct FilledMesh {
 /// the boundary at a single vertex are mostly left open.
 ///
 /// Filled-in vertices have confidence 0, the label of the nearest boundary vertex, and a standard
-/// deviation that adds that vertex's `sd_m` and a third of the distance to it in quadrature: three
-/// standard deviations cover surface that leaves the boundary at up to 45 degrees. Levels are
-/// omitted.
+/// deviation that covers surface which leaves the boundary at up to 45 degrees. Levels are omitted.
 ///
 /// Filling moves no vertex, leaves at most two triangles at an edge, and creates no intersections:
 /// where the smooth patch would intersect, a flat one is tried before the hole is left open.

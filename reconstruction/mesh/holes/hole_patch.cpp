@@ -6,28 +6,143 @@
 #include <CGAL/Polygon_mesh_processing/refine.h>
 #include <CGAL/Polygon_mesh_processing/triangulate_hole.h>
 #include <CGAL/Surface_mesh.h>
+#include <CGAL/box_intersection_d.h>
 #include <CGAL/version.h>
 
 #include <algorithm>
-#include <cmath>
+#include <array>
+#include <glm/common.hpp>
 #include <glm/geometric.hpp>
 #include <iterator>
 #include <unordered_map>
 
-#include "reconstruction/mesh/holes/half_edge_mesh.h"
+#include "reconstruction/mesh/manifold_mesh.h"
 
 namespace groundray {
 namespace {
 
 namespace pmp = CGAL::Polygon_mesh_processing;
-using Mesh = CGAL::Surface_mesh<CGAL::Exact_predicates_inexact_constructions_kernel::Point_3>;
+using Kernel = CGAL::Exact_predicates_inexact_constructions_kernel;
+using Point = Kernel::Point_3;
+using Mesh = CGAL::Surface_mesh<Point>;
 using Faces = std::vector<Mesh::Face_index>;
 using Vertices = std::vector<Mesh::Vertex_index>;
+using Corners = std::array<glm::dvec3, 3>;
+
+// Bounding box of a triangle, as CGAL requires.
+struct Box : CGAL::Box_intersection_d::Box_d<double, 3, CGAL::Box_intersection_d::ID_NONE> {
+  std::uint32_t triangle;
+
+  Box(const Corners& at, std::uint32_t number)
+      : Box_d(CGAL::Bbox_3(least(at).x, least(at).y, least(at).z, most(at).x, most(at).y,
+                           most(at).z)),
+        triangle(number) {}
+  std::uint32_t id() const { return triangle; }
+
+ private:
+  static glm::dvec3 least(const Corners& at) { return glm::min(at[0], glm::min(at[1], at[2])); }
+  static glm::dvec3 most(const Corners& at) { return glm::max(at[0], glm::max(at[1], at[2])); }
+};
+
+Point to_cgal(const glm::dvec3& p) { return {p.x, p.y, p.z}; }
+
+Kernel::Triangle_3 triangle_of(const Corners& at) {
+  return {to_cgal(at[0]), to_cgal(at[1]), to_cgal(at[2])};
+}
+
+bool is_needle(const Corners& at) {
+  return CGAL::collinear(to_cgal(at[0]), to_cgal(at[1]), to_cgal(at[2]));
+}
+
+// Moves the corners that both share to the front, in the same order, and returns their number.
+std::size_t align(Corners& a, Corners& b) {
+  std::size_t shared = 0;
+  for (std::size_t i = 0; i < 3; ++i) {
+    const auto found = std::find(b.begin() + static_cast<std::ptrdiff_t>(shared), b.end(), a[i]);
+    if (found == b.end()) continue;
+    std::iter_swap(found, b.begin() + static_cast<std::ptrdiff_t>(shared));
+    std::swap(a[i], a[shared]);
+    ++shared;
+  }
+  return shared;
+}
+
+bool reaches(const Corners& triangle, const Corners& far) {
+  return CGAL::do_intersect(triangle_of(triangle),
+                            Kernel::Segment_3(to_cgal(far[1]), to_cgal(far[2])));
+}
+
+bool do_cross(Corners a, Corners b) {
+  if (is_needle(a) || is_needle(b)) return false;
+  switch (align(a, b)) {
+    case 0:
+      return CGAL::do_intersect(triangle_of(a), triangle_of(b));
+    case 1:  // the edge opposite to the shared corner must not touch the other triangle
+      return reaches(a, b) || reaches(b, a);
+    case 2: {
+      const Point p = to_cgal(a[0]), q = to_cgal(a[1]), r = to_cgal(a[2]), s = to_cgal(b[2]);
+      return CGAL::coplanar(p, q, r, s) && CGAL::coplanar_orientation(p, q, r, s) == CGAL::POSITIVE;
+    }
+    default:
+      return true;
+  }
+}
+
+// Triangles in CGAL's half-edge structure.
+struct HalfEdgeMesh {
+  Mesh mesh;                                     // vertices and faces in the input order
+  std::vector<Mesh::Halfedge_index> half_edges;  // of each input half-edge
+};
+
+// Builds a half-edge structure from paired edges. Adding face by face would reject boundaries that
+// touch at a vertex.
+// @param next_border  returns, for a boundary half-edge, the one that ends where it begins, as
+//                     groundray::next_border.
+template <typename NextBorder>
+HalfEdgeMesh half_edge_mesh(std::span<const glm::dvec3> points_m,
+                            std::span<const glm::uvec3> triangles, const EdgePairs& pairs,
+                            const NextBorder& next_border) {
+  HalfEdgeMesh out;
+  Mesh& mesh = out.mesh;
+  const auto vertices = static_cast<std::uint32_t>(points_m.size());
+  const auto faces = static_cast<std::uint32_t>(triangles.size());
+  mesh.reserve(vertices, 3 * faces / 2 + vertices, faces);
+  for (const glm::dvec3& p : points_m) mesh.add_vertex({p.x, p.y, p.z});
+  out.half_edges.resize(3 * triangles.size());
+  const auto corner = [&](HalfEdge h) {
+    return Mesh::Vertex_index(triangles[h / 3][static_cast<int>(h % 3)]);
+  };
+  for (HalfEdge h = 0; h < out.half_edges.size(); ++h) {
+    const HalfEdge twin = pairs.twins[h];
+    const bool is_new = twin == none || h < twin;
+    out.half_edges[h] =
+        is_new ? mesh.add_edge(corner(h), corner(next_of(h))) : mesh.opposite(out.half_edges[twin]);
+  }
+  for (std::uint32_t t = 0; t < faces; ++t) {
+    const auto face = mesh.add_face();
+    mesh.set_halfedge(face, out.half_edges[3 * t + 2]);  // ends at the first corner
+  }
+  for (HalfEdge h = 0; h < out.half_edges.size(); ++h) {
+    const auto half_edge = out.half_edges[h];
+    mesh.set_next(half_edge, out.half_edges[next_of(h)]);
+    mesh.set_face(half_edge, Mesh::Face_index(h / 3));
+    if (!mesh.halfedge(corner(next_of(h))).is_valid())
+      mesh.set_halfedge(corner(next_of(h)), half_edge);
+  }
+  for (HalfEdge h = 0; h < out.half_edges.size(); ++h) {
+    if (pairs.twins[h] != none) continue;
+    const auto border = mesh.opposite(out.half_edges[h]);
+    mesh.set_next(border, mesh.opposite(out.half_edges[next_border(h)]));
+    mesh.set_halfedge(corner(h), border);  // as CGAL requires of boundary vertices
+  }
+  return out;
+}
 
 // Triangles around a hole. The vertices of the boundary come first.
 class Surroundings {
  public:
-  Surroundings(const RimmedMesh& at, std::span<const HalfEdge> chain) : at_(at), rim_(chain) {
+  Surroundings(const MeshAdjacency& at, std::span<const HalfEdge> chain)
+      : at_(at), boundary_(chain) {
     for (const HalfEdge h : chain) number(corner_of(at.mesh.triangles, next_of(h)));
     origin_m_ = at.mesh.vertices_m[vertices_.front()];
     constexpr int rings = 3;  // fairing uses two
@@ -41,7 +156,7 @@ class Surroundings {
   const glm::dvec3& origin_m() const { return origin_m_; }
   std::uint32_t vertices() const { return static_cast<std::uint32_t>(vertices_.size()); }
 
-  HalfEdgeMesh<Mesh> half_edges() const {
+  HalfEdgeMesh half_edges() const {
     std::vector<glm::dvec3> points_m;
     for (const std::uint32_t vertex : vertices_)
       points_m.push_back(at_.mesh.vertices_m[vertex] - origin_m_);
@@ -54,10 +169,11 @@ class Surroundings {
       for (const HalfEdge h : {3 * t, 3 * t + 1, 3 * t + 2})
         pairs.twins.push_back(local(at_.pairs.twins[h]));
     }
-    return half_edge_mesh<Mesh>(points_m, triangles, pairs, [&](HalfEdge h) {
+    return half_edge_mesh(points_m, triangles, pairs, [&](HalfEdge h) {
       const HalfEdge global = 3 * triangles_[h / 3] + h % 3;
-      const bool is_at_rim = numbers_.at(corner_of(at_.mesh.triangles, global)) < rim_.size();
-      return is_at_rim ? local(at_.rims.next[global]) : next_border(pairs, h);
+      const bool is_at_boundary =
+          numbers_.at(corner_of(at_.mesh.triangles, global)) < boundary_.size();
+      return is_at_boundary ? local(at_.boundary.next[global]) : next_border(pairs, h);
     });
   }
 
@@ -81,8 +197,8 @@ class Surroundings {
     }
   }
 
-  const RimmedMesh& at_;
-  std::span<const HalfEdge> rim_;
+  const MeshAdjacency& at_;
+  std::span<const HalfEdge> boundary_;
   glm::dvec3 origin_m_{0};
   std::vector<std::uint32_t> vertices_, triangles_;  // numbers in the mesh
   std::unordered_map<std::uint32_t, std::uint32_t> numbers_, triangle_numbers_;
@@ -100,15 +216,16 @@ Faces triangulate(Mesh& mesh, Mesh::Halfedge_index hole) {
 }
 
 // Returns true if all points are near the boundary, whose vertices come first; false for NaN.
-bool are_near(const Mesh& mesh, std::uint32_t rim, const Vertices& points) {
+bool are_near(const Mesh& mesh, std::uint32_t boundary, const Vertices& points) {
   const auto position = [&](auto vertex) {
     const auto& p = mesh.point(vertex);
     return glm::dvec3(p.x(), p.y(), p.z());
   };
   glm::dvec3 middle(0);
-  for (std::uint32_t i = 0; i < rim; ++i) middle += position(Mesh::Vertex_index(i)) / double(rim);
+  for (std::uint32_t i = 0; i < boundary; ++i)
+    middle += position(Mesh::Vertex_index(i)) / double(boundary);
   double reach_m = 0;
-  for (std::uint32_t i = 0; i < rim; ++i)
+  for (std::uint32_t i = 0; i < boundary; ++i)
     reach_m = std::max(reach_m, glm::distance(position(Mesh::Vertex_index(i)), middle));
   return std::ranges::all_of(
       points, [&](auto vertex) { return glm::distance(position(vertex), middle) <= 3 * reach_m; });
@@ -118,8 +235,8 @@ bool are_near(const Mesh& mesh, std::uint32_t rim, const Vertices& points) {
 // computed from the current triangles: in the first run those of a nearly flat patch, in the second
 // those of the plate itself, which reduces the deviation from a ball by three tenths. Further runs
 // change little.
-bool fair(Mesh& mesh, const Vertices& points, std::uint32_t rim) {
-  const auto try_once = [&] { return pmp::fair(mesh, points) && are_near(mesh, rim, points); };
+bool fair(Mesh& mesh, const Vertices& points, std::uint32_t boundary) {
+  const auto try_once = [&] { return pmp::fair(mesh, points) && are_near(mesh, boundary, points); };
   if (!try_once()) return false;
   std::vector<Mesh::Point> once;
   for (const auto vertex : points) once.push_back(mesh.point(vertex));
@@ -129,7 +246,7 @@ bool fair(Mesh& mesh, const Vertices& points, std::uint32_t rim) {
 }
 
 HolePatch patch_of(const Mesh& mesh, const Faces& faces, const Surroundings& around,
-                   std::uint32_t rim) {
+                   std::uint32_t boundary) {
   HolePatch patch;
   for (std::uint32_t i = around.vertices(); i < mesh.number_of_vertices(); ++i) {
     const auto& p = mesh.point(Mesh::Vertex_index(i));
@@ -140,7 +257,7 @@ HolePatch patch_of(const Mesh& mesh, const Faces& faces, const Surroundings& aro
     int k = 0;
     for (const auto vertex : vertices_around_face(mesh.halfedge(face), mesh)) {
       const std::uint32_t number = vertex;
-      t[k++] = number < rim ? number : rim + (number - around.vertices());
+      t[k++] = number < boundary ? number : boundary + (number - around.vertices());
     }
     patch.triangles.push_back(t);
   }
@@ -149,10 +266,36 @@ HolePatch patch_of(const Mesh& mesh, const Faces& faces, const Surroundings& aro
 
 }  // namespace
 
-std::optional<HolePatch> patch_hole(const RimmedMesh& at, std::span<const HalfEdge> chain,
+std::vector<std::pair<std::uint32_t, std::uint32_t>> crossings(const TriangleMesh& mesh,
+                                                               std::uint32_t first) {
+  const auto corners = [&](std::uint32_t t) {
+    const glm::uvec3& v = mesh.triangles[t];
+    return Corners{mesh.vertices_m[v.x], mesh.vertices_m[v.y], mesh.vertices_m[v.z]};
+  };
+  std::vector<std::pair<std::uint32_t, std::uint32_t>> found;
+  const auto look = [&](const Box& last, const Box& any) {
+    if (any.triangle >= last.triangle) return;
+    if (do_cross(corners(any.triangle), corners(last.triangle)))
+      found.emplace_back(any.triangle, last.triangle);
+  };
+  const auto triangles = static_cast<std::uint32_t>(mesh.triangles.size());
+  std::vector<Box> last, some;
+  for (std::uint32_t t = first; t < triangles; ++t) last.emplace_back(corners(t), t);
+  constexpr std::uint32_t at_once = 1'000'000;  // limits memory
+  for (std::uint32_t begin = 0; begin < triangles && !last.empty(); begin += at_once) {
+    some.clear();
+    for (std::uint32_t t = begin; t < std::min(triangles, begin + at_once); ++t)
+      some.emplace_back(corners(t), t);
+    CGAL::box_intersection_d(last.begin(), last.end(), some.begin(), some.end(), look);
+  }
+  std::ranges::sort(found);
+  return found;
+}
+
+std::optional<HolePatch> patch_hole(const MeshAdjacency& at, std::span<const HalfEdge> chain,
                                     PatchShape shape) {
   const Surroundings around(at, chain);
-  HalfEdgeMesh<Mesh> half_edges = around.half_edges();
+  HalfEdgeMesh half_edges = around.half_edges();
   Mesh& mesh = half_edges.mesh;
   const auto hole = mesh.opposite(half_edges.half_edges[around.local(chain.front())]);
   Faces faces = triangulate(mesh, hole);
@@ -161,11 +304,11 @@ std::optional<HolePatch> patch_hole(const RimmedMesh& at, std::span<const HalfEd
   Vertices points;
   pmp::refine(mesh, faces, std::back_inserter(more), std::back_inserter(points));
   faces.insert(faces.end(), more.begin(), more.end());
-  const auto rim = static_cast<std::uint32_t>(chain.size());
+  const auto boundary = static_cast<std::uint32_t>(chain.size());
   if (shape == PatchShape::Smooth && !points.empty()) {
-    if (!fair(mesh, points, rim)) return std::nullopt;
+    if (!fair(mesh, points, boundary)) return std::nullopt;
   }
-  return patch_of(mesh, faces, around, rim);
+  return patch_of(mesh, faces, around, boundary);
 }
 
 }  // namespace groundray

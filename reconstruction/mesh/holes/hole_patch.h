@@ -4,18 +4,27 @@
 #include <glm/vec3.hpp>
 #include <optional>
 #include <span>
+#include <utility>
 #include <vector>
 
 #include "core/geometry/mesh.h"
-#include "reconstruction/mesh/holes/mesh_rims.h"
+#include "reconstruction/mesh/holes/mesh_boundary.h"
 
 namespace groundray {
 
+/// Finds the triangles that intersect other than at shared corners and edges, by exact predicates
+/// on the positions as given. Corners at equal positions count as shared. Triangles without area
+/// are ignored.
+/// @param first  only pairs with a triangle from this number on are tested.
+/// @return pairs, smaller number first, sorted.
+std::vector<std::pair<std::uint32_t, std::uint32_t>> crossings(const TriangleMesh& mesh,
+                                                               std::uint32_t first);
+
 /// Mesh with its adjacency: edge pairs, boundary chains and vertex stars.
-struct RimmedMesh {
+struct MeshAdjacency {
   const TriangleMesh& mesh;
   const EdgePairs& pairs;
-  const MeshRims& rims;
+  const MeshBoundary& boundary;
   const VertexStars& stars;
 };
 
@@ -34,7 +43,7 @@ struct HolePatch {
 /// @param chain  one of the mesh's boundary chains, of at least 3 edges.
 /// @return nothing if no triangulation of the boundary's vertices is manifold, or if the smooth
 ///         patch would lead far away.
-std::optional<HolePatch> patch_hole(const RimmedMesh& at, std::span<const HalfEdge> chain,
+std::optional<HolePatch> patch_hole(const MeshAdjacency& at, std::span<const HalfEdge> chain,
                                     PatchShape shape);
 
 }  // namespace groundray

@@ -4,8 +4,6 @@
 #include <set>
 #include <utility>
 
-#include "reconstruction/mesh/holes/triangle_crossing.h"
-
 namespace groundray {
 namespace {
 
@@ -14,13 +12,13 @@ using Edge = std::pair<std::uint32_t, std::uint32_t>;
 // Returns the edges across the hole between vertices of its boundary: those that two of the patch's
 // triangles share.
 std::set<Edge> chords_of(const PlacedPatch& placed) {
-  const auto edges = static_cast<std::uint32_t>(placed.rim.size());
+  const auto edges = static_cast<std::uint32_t>(placed.boundary.size());
   std::set<Edge> once, chords;
   for (const glm::uvec3& t : placed.patch->triangles) {
     for (int k = 0; k < 3; ++k) {
       const std::uint32_t a = t[k], b = t[(k + 1) % 3];
       if (std::max(a, b) >= edges) continue;
-      const Edge edge = std::minmax(placed.rim[a], placed.rim[b]);
+      const Edge edge = std::minmax(placed.boundary[a], placed.boundary[b]);
       if (!once.insert(edge).second) chords.insert(edge);
     }
   }
@@ -48,9 +46,9 @@ std::vector<bool> find_tangled(const TriangleMesh& mesh, const VertexStars& star
 
 void append(TriangleMesh& mesh, const PlacedPatch& placed) {
   const auto first = static_cast<std::uint32_t>(mesh.vertices_m.size());
-  const auto edges = static_cast<std::uint32_t>(placed.rim.size());
+  const auto edges = static_cast<std::uint32_t>(placed.boundary.size());
   const auto number = [&](std::uint32_t v) {
-    return v < edges ? placed.rim[v] : first + (v - edges);
+    return v < edges ? placed.boundary[v] : first + (v - edges);
   };
   const HolePatch& patch = *placed.patch;
   mesh.vertices_m.insert(mesh.vertices_m.end(), patch.points_m.begin(), patch.points_m.end());

@@ -6,14 +6,14 @@
 
 #include "core/geometry/mesh.h"
 #include "reconstruction/mesh/holes/hole_patch.h"
-#include "reconstruction/mesh/holes/mesh_rims.h"
+#include "reconstruction/mesh/holes/mesh_boundary.h"
 
 namespace groundray {
 
 /// Patch and the boundary that it closes.
 struct PlacedPatch {
   const HolePatch* patch = nullptr;
-  std::span<const std::uint32_t> rim;  ///< vertices of the mesh, in the patch's order
+  std::span<const std::uint32_t> boundary;  ///< vertices of the mesh, in the patch's order
 };
 
 /// Appends a patch's points and triangles to the mesh.

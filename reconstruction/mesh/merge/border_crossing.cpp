@@ -1,12 +1,8 @@
-#include "reconstruction/mesh/merge/border_crossing.h"
-
 #include <algorithm>
 #include <cmath>
-#include <glm/common.hpp>
 #include <glm/geometric.hpp>
-#include <utility>
 
-#include "reconstruction/mesh/merge/for_blocks.h"
+#include "reconstruction/mesh/merge/zippering.h"
 
 namespace groundray {
 namespace {

@@ -2,7 +2,6 @@
 
 #include <cstddef>
 #include <span>
-#include <vector>
 
 #include "reconstruction/mesh/measured_mesh.h"
 #include "reconstruction/mesh/merge/redundant_faces.h"

@@ -1,5 +1,7 @@
 #include "reconstruction/mesh/merge/cover_surface.h"
 
+#include <tbb/parallel_for.h>
+
 #include <algorithm>
 #include <cmath>
 #include <glm/geometric.hpp>
@@ -110,6 +112,13 @@ bool CoverSurface::is_on_border(std::uint32_t triangle, const glm::dvec3& shares
     if (shares[k] > 1 - 2 * edge_share && is_at_border(t[k])) return true;
   }
   return false;
+}
+
+void for_blocks(std::size_t count, std::size_t in_block,
+                const std::function<void(std::size_t begin, std::size_t end)>& visit) {
+  tbb::parallel_for(std::size_t{0}, (count + in_block - 1) / in_block, [&](std::size_t block) {
+    visit(block * in_block, std::min(count, (block + 1) * in_block));
+  });
 }
 
 }  // namespace groundray

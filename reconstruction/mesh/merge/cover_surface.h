@@ -2,6 +2,7 @@
 
 #include <cstddef>
 #include <cstdint>
+#include <functional>
 #include <glm/vec3.hpp>
 #include <span>
 #include <vector>
@@ -79,5 +80,9 @@ class CoverSurface {
 /// Returns the barycentric coordinates of a point in a triangle's plane, which add up to one; those
 /// of the first corner if the triangle has no area.
 glm::dvec3 shares_of_corners(const TriangleMesh& mesh, std::uint32_t triangle, const glm::dvec3& p);
+
+/// Calls `visit(begin, end)` for each block of `in_block` numbers below `count`, several at once.
+void for_blocks(std::size_t count, std::size_t in_block,
+                const std::function<void(std::size_t begin, std::size_t end)>& visit);
 
 }  // namespace groundray

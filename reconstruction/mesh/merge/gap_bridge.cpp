@@ -1,5 +1,3 @@
-#include "reconstruction/mesh/merge/gap_bridge.h"
-
 #include <algorithm>
 #include <array>
 #include <cmath>
@@ -13,7 +11,7 @@
 #include <vector>
 
 #include "reconstruction/mesh/merge/open_border.h"
-#include "reconstruction/mesh/merge/point_tree.h"
+#include "reconstruction/mesh/merge/zippering.h"
 
 namespace groundray {
 namespace {
@@ -95,13 +93,14 @@ class Bridging {
   std::vector<glm::uvec3> run() {
     const std::size_t count = border_.vertices().size();
     for (std::size_t i = 0; i < count; ++i) {
-      if (i % steps_each == 0) report(0.5 * static_cast<double>(i) / static_cast<double>(count));
+      if (i % steps_each == 0)
+        work_.report(0.5 * static_cast<double>(i) / static_cast<double>(count));
       const std::uint32_t from = border_.vertices()[i];
       for (const std::uint32_t to : border_.after(from)) look_beside(from, to);
     }
     std::vector<glm::uvec3> added;
     for (std::size_t step = 0; !queue_.empty(); ++step) {
-      if (step % steps_each == 0) report(0.5);  // the remaining number of steps is unknown
+      if (step % steps_each == 0) work_.report(0.5);  // the remaining number of steps is unknown
       const glm::uvec3 t = queue_.top().t;
       queue_.pop();
       if (!border_.has(t.y, t.x)) continue;
@@ -118,10 +117,6 @@ class Bridging {
   }
 
  private:
-  void report(double share) const {
-    if (work_.progress) work_.progress(share);
-  }
-
   const glm::dvec3& p(std::uint32_t vertex) const { return quilt_.vertices[vertex].p; }
 
   std::vector<glm::dvec3> places() const {

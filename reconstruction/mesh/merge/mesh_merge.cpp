@@ -4,7 +4,6 @@
 
 #include <algorithm>
 #include <cmath>
-#include <cstddef>
 #include <cstdint>
 #include <glm/common.hpp>
 #include <iterator>
@@ -19,7 +18,6 @@
 #include "reconstruction/mesh/manifold_mesh.h"
 #include "reconstruction/mesh/merge/consensus.h"
 #include "reconstruction/mesh/merge/cover_surface.h"
-#include "reconstruction/mesh/merge/gap_bridge.h"
 #include "reconstruction/mesh/merge/redundant_faces.h"
 #include "reconstruction/mesh/merge/stitched_mesh.h"
 #include "reconstruction/mesh/merge/visibility_conflict.h"
@@ -148,13 +146,13 @@ class Merging {
       CoverSurface surface(moved(scans_[s]->mesh.shape, -origin_m_), std::move(sds_m[s]), limits_);
       std::vector<float> worth = rate_faces(surface, scans_[s]->face_confidence);
       rated_.push_back({std::move(surface), std::move(worth), {}});
-      report(0.05 * static_cast<double>(s + 1) / static_cast<double>(scans_.size()));
+      work_.report(0.05 * static_cast<double>(s + 1) / static_cast<double>(scans_.size()));
     }
     note_visibility_conflicts();
     covers_ = find_covers(rated_, part_of(work_, 0.1, 0.4));
     kept_ = keep_best_faces(rated_, covers_, interpolation_, part_of(work_, 0.4, 0.6));
     note_shared();
-    report(0.6);
+    work_.report(0.6);
   }
 
   MergedMesh run() {
@@ -166,18 +164,14 @@ class Merging {
     counts_.bridged =
         bridge_gaps(stitched, beams_, limits_, interpolation_, part_of(work_, 0.85, 0.88));
     counts_.filled = fill_slits(stitched, rated_, part_of(work_, 0.88, 0.9));
-    report(0.9);
+    work_.report(0.9);
     counts_.moved = move_to_consensus(stitched, asked);
     MergedMesh merged{.mesh = finished(stitched), .counts = counts_};
-    report(1);
+    work_.report(1);
     return merged;
   }
 
  private:
-  void report(double share) const {
-    if (work_.progress) work_.progress(share);
-  }
-
   void note_visibility_conflicts() {
     for (std::size_t s = 0; s < scans_.size(); ++s) {
       beams_.push_back({&rated_[s], scans_[s]->origins_m});
@@ -230,7 +224,7 @@ class Merging {
       counts_.redundant += sewn.covered;
       counts_.clipped += sewn.clipped;
       counts_.left_out += sewn.left_out;
-      report(0.6 + 0.25 * static_cast<double>(i + 1) / static_cast<double>(order.size()));
+      work_.report(0.6 + 0.25 * static_cast<double>(i + 1) / static_cast<double>(order.size()));
     }
     return stitched;
   }
@@ -318,13 +312,6 @@ class Merging {
   MergeCounts counts_;
 };
 
-template <typename T>
-std::vector<T> taken(const std::vector<T>& values, const std::vector<std::uint32_t>& which) {
-  std::vector<T> out;
-  for (std::size_t i = 0; i < which.size() && !values.empty(); ++i) out.push_back(values[which[i]]);
-  return out;
-}
-
 /// Converts a single scan to a manifold surface; no vertex moves.
 MergedMesh alone(const MeasuredMesh& mesh) {
   const std::size_t vertices = mesh.shape.vertices_m.size();
@@ -345,10 +332,10 @@ MergedMesh alone(const MeasuredMesh& mesh) {
       t[k] = numbers[v];
     }
   }
-  out.mesh.shape.vertices_m = taken(mesh.shape.vertices_m, sources);
-  out.mesh.sd_m = taken(mesh.sd_m, sources);
-  out.mesh.labels = taken(mesh.labels, sources);
-  out.mesh.confidence = taken(mesh.confidence, sources);
+  out.mesh.shape.vertices_m = picked(mesh.shape.vertices_m, sources);
+  out.mesh.sd_m = picked(mesh.sd_m, sources);
+  out.mesh.labels = picked(mesh.labels, sources);
+  out.mesh.confidence = picked(mesh.confidence, sources);
   return out;
 }
 
@@ -366,7 +353,7 @@ MergedMesh merge(std::span<const ScanMesh> scans, const MergeLimits& limits,
   if (seen.empty()) return {};
   if (seen.size() > 1) return Merging(std::move(seen), limits, work).run();
   MergedMesh made = alone(seen.front()->mesh);
-  if (work.progress) work.progress(1);
+  work.report(1);
   return made;
 }
 

@@ -50,8 +50,7 @@ struct MergedMesh {
 ///               scan has none, by that of the noisiest scan, so that unknown noise never gets more
 ///               weight than known noise.
 /// @throws Error listing every fault of a scan or of the limits, or if it takes too much memory.
-/// @see docs/theory/reconstruction.md; Turk, Levoy, Zippered polygon meshes from range images
-/// (1994).
+/// @see docs/theory/reconstruction.md; Turk, Levoy, Zippered polygon meshes (1994).
 MergedMesh merge(std::span<const ScanMesh> scans, const MergeLimits& limits,
                  const RunControl& work = {});
 

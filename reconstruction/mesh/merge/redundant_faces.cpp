@@ -8,8 +8,6 @@
 #include <limits>
 #include <tuple>
 
-#include "reconstruction/mesh/merge/for_blocks.h"
-
 namespace groundray {
 namespace {
 
@@ -204,8 +202,7 @@ class Selection {
     // The best come first, so that kept triangles have greater weights.
     const std::vector<RankedFace> faces = ranked(scans_);
     for (std::size_t i = 0; i < faces.size(); ++i) {
-      if (i % 16384 == 0 && work.progress)
-        work.progress(static_cast<double>(i) / static_cast<double>(faces.size()));
+      if (i % 16384 == 0) work.report(static_cast<double>(i) / static_cast<double>(faces.size()));
       kept_[faces[i].scan][faces[i].triangle] =
           is_covered(faces[i].scan, faces[i].triangle) ? 0 : 1;
     }
@@ -311,8 +308,7 @@ std::vector<VertexCovers> find_covers(std::span<const RatedSurface> scans, const
   for (std::size_t s = 0; s < count; ++s) {
     for (std::size_t by = 0; by < count; ++by) {
       if (s != by) note_covers(scans[s].surface, scans[by], by, covers[s]);
-      if (work.progress)
-        work.progress(static_cast<double>(s * count + by + 1) / static_cast<double>(count * count));
+      work.report(static_cast<double>(s * count + by + 1) / static_cast<double>(count * count));
     }
   }
   return covers;

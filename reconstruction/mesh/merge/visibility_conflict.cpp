@@ -101,9 +101,9 @@ class LongTriangles {
 
   bool is_behind(const BeamSurface& other, std::uint32_t vertex, std::uint32_t triangle) const {
     const glm::uvec3& t = mesh_.triangles[triangle];
-    const glm::dvec3& a = mesh_.vertices_m[t.x];
-    const glm::dvec3 normal = glm::cross(mesh_.vertices_m[t.y] - a, mesh_.vertices_m[t.z] - a);
-    const double off = glm::dot(other.rated->surface.mesh().vertices_m[vertex] - a, normal);
+    const glm::dvec3 normal = area_vector_m2(mesh_, t);
+    const glm::dvec3& p = other.rated->surface.mesh().vertices_m[vertex];
+    const double off = glm::dot(p - mesh_.vertices_m[t.x], normal);
     const double margin = margin_m(other.rated->surface.sd_m(vertex), largest_sd_m(t));
     return std::abs(off) > margin * glm::length(normal);
   }
@@ -142,9 +142,7 @@ std::vector<std::vector<char>> find_visibility_conflicts(std::span<const BeamSur
       if (other == s) continue;
       passages[s * count + other] = triangles.passed_by(scans[other]);
       for (const Passage& passage : passages[s * count + other]) passed[s][passage.triangle] = 1;
-      if (work.progress)
-        work.progress(static_cast<double>(s * count + other + 1) /
-                      static_cast<double>(count * count));
+      work.report(static_cast<double>(s * count + other + 1) / static_cast<double>(count * count));
     }
   }
   std::vector<std::vector<char>> refuted;
@@ -171,8 +169,7 @@ std::vector<char> find_passed(const TriangleMesh& mesh, std::span<const float> s
   std::vector<char> is_passed(mesh.triangles.size());
   for (std::size_t s = 0; s < scans.size(); ++s) {
     for (const Passage& passage : triangles.passed_by(scans[s])) is_passed[passage.triangle] = 1;
-    if (work.progress)
-      work.progress(static_cast<double>(s + 1) / static_cast<double>(scans.size()));
+    work.report(static_cast<double>(s + 1) / static_cast<double>(scans.size()));
   }
   return is_passed;
 }

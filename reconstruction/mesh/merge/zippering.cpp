@@ -2,15 +2,10 @@
 
 #include <algorithm>
 #include <array>
-#include <cstdint>
 #include <glm/geometric.hpp>
-#include <span>
 #include <tuple>
 #include <unordered_map>
 #include <utility>
-
-#include "reconstruction/mesh/merge/border_crossing.h"
-#include "reconstruction/mesh/merge/loop_triangulation.h"
 
 namespace groundray {
 namespace {
@@ -304,8 +299,8 @@ std::size_t fill_slits(StitchedMesh& stitched, std::span<const RatedSurface> see
   std::vector<char> is_done(before.size());
   std::size_t added = 0;
   for (std::uint32_t begin = 0; begin < before.size(); ++begin) {
-    if (begin % 4096 == 0 && work.progress)
-      work.progress(static_cast<double>(begin) / static_cast<double>(before.size()));
+    if (begin % 4096 == 0)
+      work.report(static_cast<double>(begin) / static_cast<double>(before.size()));
     if (before[begin] == no_vertex || is_done[begin] != 0) continue;
     std::vector<std::uint32_t> loop;
     for (std::uint32_t v = begin; v != no_vertex && is_done[v] == 0; v = before[v]) {

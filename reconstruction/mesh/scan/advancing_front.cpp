@@ -136,8 +136,8 @@ class Plausibility {
 
   template <typename Front, typename Cell>
   double operator()(const Front& front, Cell& cell, int index) const {
-    if (++seen_ % 65536 == 0 && work_->progress)
-      work_->progress(std::min(1.0, front.number_of_facets() / (2 * points_)));
+    if (++seen_ % 65536 == 0)
+      work_->report(std::min(1.0, front.number_of_facets() / (2 * points_)));
     const std::array<Point, 3> corners{cell->vertex((index + 1) % 4)->point(),
                                        cell->vertex((index + 2) % 4)->point(),
                                        cell->vertex((index + 3) % 4)->point()};
@@ -189,12 +189,6 @@ std::vector<Triple> triangles_between(const std::vector<Point>& points, double l
   return triangles;
 }
 
-// Returns the triangle's normal, twice its area long.
-glm::dvec3 normal_m2(const TriangleMesh& mesh, const glm::uvec3& t) {
-  const glm::dvec3& a = mesh.vertices_m[t.x];
-  return glm::cross(mesh.vertices_m[t.y] - a, mesh.vertices_m[t.z] - a);
-}
-
 // Triangles connected by edges.
 struct Piece {
   std::vector<std::uint32_t> triangles;
@@ -224,7 +218,7 @@ double facing(const FrontMesh& front, const Piece& piece, std::span<const glm::d
   double sum = 0;
   for (const std::uint32_t triangle : piece.triangles) {
     const glm::uvec3& t = mesh.triangles[triangle];
-    const glm::dvec3 normal = normal_m2(mesh, t);
+    const glm::dvec3 normal = area_vector_m2(mesh, t);
     if (origins_m.empty()) {
       sum += piece.is_closed ? glm::dot(normal, mesh.vertices_m[t.x] - amid_m) : normal.z;
       continue;
@@ -315,7 +309,7 @@ FrontMesh advance_front(std::span<const glm::dvec3> points_m, double longest_per
   if (are_on_a_line(points, farthest_m * std::numeric_limits<double>::epsilon())) return out;
   take_triangles(points_m, taken, triangles_between(points, longest_perimeter_m, work), out);
   wind(out, origins_m);
-  if (work.progress) work.progress(1);
+  work.report(1);
   return out;
 }
 

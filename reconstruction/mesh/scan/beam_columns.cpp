@@ -3,16 +3,14 @@
 #include <algorithm>
 #include <cmath>
 #include <complex>
-#include <cstddef>
+#include <glm/geometric.hpp>
+#include <numbers>
 #include <numeric>
 #include <tuple>
 #include <utility>
 
 #include "core/error.h"
-#include "reconstruction/mesh/scan/angle.h"
 #include "reconstruction/mesh/scan/firing_lattice.h"
-#include "reconstruction/mesh/scan/grid_check.h"
-#include "reconstruction/mesh/scan/upper_median.h"
 
 namespace groundray {
 namespace {
@@ -24,23 +22,30 @@ constexpr double most_cells_each = 64;    // cells per return, at most
 /// Numbers of pulses, and their order within each ring.
 struct Numbered {
   std::vector<std::int64_t> number;
-  std::int64_t first = 0, last = 0;
+  std::int64_t first, last;
   std::span<const std::int32_t> row;
-  int rows = 0;
+  int rows;
   std::span<const double> azimuth_rad;
   std::vector<std::size_t> order;
 
-  std::int64_t span() const { return last - first + 1; }
-  bool is_of_row(std::size_t place, std::size_t of) const {
-    return place < order.size() && row[order[place]] == row[order[of]];
-  }
-
-  void sort() {
-    order.resize(number.size());
+  Numbered(std::vector<std::int64_t> numbers, std::int64_t least, std::int64_t most,
+           const BeamRows& beam_rows, std::span<const double> azimuths_rad)
+      : number(std::move(numbers)),
+        first(least),
+        last(most),
+        row(beam_rows.row),
+        rows(beam_rows.count),
+        azimuth_rad(azimuths_rad),
+        order(number.size()) {
     std::iota(order.begin(), order.end(), std::size_t{0});
     std::ranges::sort(order, [this](std::size_t a, std::size_t b) {
       return std::tuple(row[a], number[a], a) < std::tuple(row[b], number[b], b);
     });
+  }
+
+  std::int64_t span() const { return last - first + 1; }
+  bool is_of_row(std::size_t place, std::size_t of) const {
+    return place < order.size() && row[order[place]] == row[order[of]];
   }
 
   /// Calls use(a, b, columns) for consecutive returns of one ring that are some columns apart.
@@ -188,18 +193,52 @@ bool has_distinct_pulses(const Numbered& pulses, std::span<const float> off) {
   return 50 * crowded <= pulses.number.size() && 8 * cells >= pulses.number.size();
 }
 
+constexpr std::size_t least_share = 4;   // at most one of this many may turn the other way
+constexpr std::size_t least_above = 10;  // at least one of this many must have one above
+constexpr double one_row_rad = 5e-2;     // median deviation of elevations from their median
+constexpr double degrees = 180 / std::numbers::pi;
+
+/// Numbers of cells by the sense in which their neighbours turn.
+struct Turning {
+  std::size_t left = 0, right = 0;
+};
+
+Turning turning_of(const OrganisedScan& scan) {
+  const auto rows = static_cast<std::size_t>(scan.rows);
+  const auto columns = static_cast<std::size_t>(scan.columns);
+  const auto way_m = [&](std::size_t cell) { return scan.points_m[cell] - scan.origins_m[cell]; };
+  Turning turning;
+  for (std::size_t row = 0; row + 1 < rows; ++row) {
+    for (std::size_t column = 0; column + 1 < columns; ++column) {
+      const std::size_t cell = row * columns + column;
+      const double turn = glm::dot(way_m(cell), glm::cross(way_m(cell + 1), way_m(cell + columns)));
+      if (turn > 0) ++turning.left;  // NaN is neither
+      if (turn < 0) ++turning.right;
+    }
+  }
+  return turning;
+}
+
+/// Returns the median absolute deviation of the returns' elevations.
+double elevation_spread_rad(const OrganisedScan& scan) {
+  std::vector<double> elevations_rad;
+  for (std::size_t i = 0; i < scan.points_m.size(); ++i) {
+    const glm::dvec3 way_m = scan.points_m[i] - scan.origins_m[i];
+    if (!std::isnan(way_m.x))
+      elevations_rad.push_back(std::atan2(way_m.z, std::hypot(way_m.x, way_m.y)));
+  }
+  if (elevations_rad.size() <= few_returns) return 0;
+  const double median_rad = upper_median(elevations_rad);
+  for (double& e : elevations_rad) e = std::abs(e - median_rad);
+  return upper_median(elevations_rad);
+}
+
 }  // namespace
 
 BeamColumns columns_of_numbers(std::span<const std::int32_t> numbers, std::int32_t first,
                                std::int32_t last, const BeamRows& rows,
                                std::span<const double> azimuths_rad, RowOrder order) {
-  Numbered pulses{.number = {numbers.begin(), numbers.end()},
-                  .first = first,
-                  .last = last,
-                  .row = rows.row,
-                  .rows = rows.count,
-                  .azimuth_rad = azimuths_rad};
-  pulses.sort();
+  Numbered pulses({numbers.begin(), numbers.end()}, first, last, rows, azimuths_rad);
   BeamColumns columns = columns_of_pulses(pulses, order);
   columns.off.assign(numbers.size(), 0);
   return columns;
@@ -211,15 +250,9 @@ std::optional<BeamColumns> columns_of_times(std::span<const double> times_s, con
   FiringLattice lattice = number_firings(times_s, rows.row, rows.count, 0);
   if (lattice.coherence < 0.5) return std::nullopt;
   const auto [first, last] = std::ranges::minmax(lattice.number);
-  Numbered pulses{.number = std::move(lattice.number),
-                  .first = first,
-                  .last = last,
-                  .row = rows.row,
-                  .rows = rows.count,
-                  .azimuth_rad = azimuths_rad};
-  const double cells = static_cast<double>(pulses.span()) * rows.count;
+  const double cells = static_cast<double>(last - first + 1) * rows.count;
   if (cells > most_cells_each * static_cast<double>(times_s.size())) return std::nullopt;
-  pulses.sort();
+  Numbered pulses(std::move(lattice.number), first, last, rows, azimuths_rad);
   if (!has_distinct_pulses(pulses, lattice.off)) return std::nullopt;
   BeamColumns columns = columns_of_pulses(pulses, order);
   columns.off = std::move(lattice.off);
@@ -256,6 +289,43 @@ BeamColumns columns_of_azimuths(const BeamRows& rows, std::span<const double> az
     columns.column.push_back((number - begin % turn + turn) % turn);
   columns.off = std::move(lattice.off);
   return columns;
+}
+
+void check_rows_meet(const OrganisedScan& scan) {
+  const auto columns = static_cast<std::size_t>(scan.columns);
+  const std::vector<std::uint32_t>& chosen = scan.returns;
+  std::size_t used = 0, above = 0;
+  for (std::size_t i = 0; i < chosen.size(); ++i) {
+    if (chosen[i] == OrganisedScan::none) continue;
+    ++used;
+    above += i + columns < chosen.size() && chosen[i + columns] != OrganisedScan::none;
+  }
+  if (scan.rows < 2 || used <= few_returns || least_above * above >= used) return;
+  throw Error(
+      "the returns have no ring numbers; their elevations suggest {} beams, but only {} of {} "
+      "returns have a neighbour in the next beam: give the rings, or link them as points without "
+      "order",
+      scan.rows, above, used);
+}
+
+void check_beams_turn(const OrganisedScan& scan) {
+  const Turning turning = turning_of(scan);
+  const std::size_t all = turning.left + turning.right;
+  const std::size_t fewer = std::min(turning.left, turning.right);
+  if (all > few_returns && least_share * fewer > all) {
+    throw Error(
+        "the beams form no grid of rows and columns: of {} neighbours {} turn one way and {} the "
+        "other, as in a rosette or for points that are not in the sensor's frame: give the "
+        "sensor's pose, or link them as points without order",
+        all, all - fewer, fewer);
+  }
+  if (scan.rows != 1) return;
+  const double spread = elevation_spread_rad(scan);
+  if (spread <= one_row_rad) return;
+  throw Error(
+      "all returns have the same ring, but their elevations deviate by {:.1f} degrees from the "
+      "median: it is no row of a grid: give the rings, or link them as points without order",
+      spread * degrees);
 }
 
 }  // namespace groundray

@@ -1,5 +1,6 @@
 #pragma once
 
+#include <cstddef>
 #include <cstdint>
 #include <optional>
 #include <span>
@@ -35,5 +36,37 @@ std::optional<BeamColumns> columns_of_times(std::span<const double> times_s, con
 /// consecutive columns are empty; otherwise it begins after the widest gap.
 /// @throws Error if azimuths are not at equal steps.
 BeamColumns columns_of_azimuths(const BeamRows& rows, std::span<const double> azimuths_rad);
+
+/// Number of returns up to which regularity cannot be judged.
+inline constexpr std::size_t few_returns = 64;
+
+/// Checks that beams found by their elevations share columns.
+/// @throws Error if too few returns have one in the next row.
+void check_rows_meet(const OrganisedScan& scan);
+
+/// Checks that the beams of a grid have one orientation: the beams of a cell, of the next column
+/// and of the next row turn counter-clockwise everywhere, or clockwise everywhere. Those of a
+/// rosette, which rotating prisms draw, do not: the times of its pulses would give a grid with
+/// meaningless neighbours. Nor do those of a single beam that moves up and down.
+/// @throws Error if more than a quarter turn the other way than most, or if a scan of one row has
+///         beams at differing elevations.
+void check_beams_turn(const OrganisedScan& scan);
+
+/// Positions of a scan's returns in plan view.
+struct PlanPlaces {
+  std::span<const double> azimuths_rad;
+  std::span<const double> distances_m;  ///< horizontal distance, m
+};
+
+/// Returns azimuths as the sensor saw them when each pulse fired, for points that were de-skewed to
+/// one stamp while it moved: seen from the position at the stamp, rings that hit near surfaces
+/// appear rotated against rings that hit far ones. Estimates the uniform motion in the x-y plane
+/// for which the azimuths of each ring grow most evenly with the clock. The sensor's rotation
+/// cannot be distinguished from that of its head and is left in.
+/// @param clock  of each return, finite: times or column numbers.
+/// @return nothing if azimuths are even already, or no motion makes them so.
+std::optional<std::vector<double>> azimuths_as_fired(std::span<const double> clock,
+                                                     const BeamRows& rows,
+                                                     const PlanPlaces& places);
 
 }  // namespace groundray

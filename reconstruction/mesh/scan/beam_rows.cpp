@@ -9,7 +9,7 @@
 #include <utility>
 
 #include "core/error.h"
-#include "reconstruction/mesh/scan/angle.h"
+#include "reconstruction/mesh/scan/firing_lattice.h"
 
 namespace groundray {
 namespace {
@@ -39,10 +39,7 @@ std::vector<double> medians(std::span<const std::int32_t> ring, std::size_t ring
     of_ring[static_cast<std::size_t>(ring[i])].push_back(elevations_rad[i]);
   std::vector<double> median(rings);
   for (std::size_t r = 0; r < rings; ++r) {
-    if (of_ring[r].empty()) continue;
-    const auto middle = of_ring[r].begin() + static_cast<std::ptrdiff_t>(of_ring[r].size() / 2);
-    std::ranges::nth_element(of_ring[r], middle);
-    median[r] = *middle;
+    if (!of_ring[r].empty()) median[r] = upper_median(of_ring[r]);
   }
   return median;
 }
@@ -93,10 +90,7 @@ double typical_gap(const std::vector<double>& median, const std::vector<std::siz
     last = median[r];
     begun = true;
   }
-  if (apart.empty()) return 0;
-  const auto middle = apart.begin() + static_cast<std::ptrdiff_t>(apart.size() / 2);
-  std::ranges::nth_element(apart, middle);
-  return *middle;
+  return apart.empty() ? 0 : upper_median(apart);
 }
 
 /// Returns the mean absolute deviation of elevations from the median of their ring and sector.

@@ -1,13 +1,7 @@
 #include "reconstruction/mesh/scan/firing_lattice.h"
 
-#include <algorithm>
-#include <cmath>
 #include <complex>
-#include <cstddef>
 #include <utility>
-
-#include "reconstruction/mesh/scan/angle.h"
-#include "reconstruction/mesh/scan/upper_median.h"
 
 namespace groundray {
 namespace {

@@ -1,10 +1,30 @@
 #pragma once
 
+#include <algorithm>
+#include <cmath>
+#include <cstddef>
 #include <cstdint>
+#include <numbers>
 #include <span>
 #include <vector>
 
 namespace groundray {
+
+/// Full turn, rad.
+inline constexpr double two_pi = 2 * std::numbers::pi;
+
+/// Returns the equivalent angle from -pi to pi.
+inline double wrapped(double angle_rad) {
+  return angle_rad - two_pi * std::round(angle_rad / two_pi);
+}
+
+/// Returns the median of `values`, or the upper of two, and changes their order. There must be at
+/// least one value.
+inline double upper_median(std::vector<double>& values) {
+  const auto middle = values.begin() + static_cast<std::ptrdiff_t>(values.size() / 2);
+  std::ranges::nth_element(values, middle);
+  return *middle;
+}
 
 /// Pulses of several rings, numbered by the time or direction in which they fired.
 struct FiringLattice {

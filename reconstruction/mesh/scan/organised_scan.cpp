@@ -5,14 +5,12 @@
 #include <glm/geometric.hpp>
 #include <limits>
 #include <numbers>
-#include <optional>
 #include <utility>
 
 #include "core/error.h"
+#include "reconstruction/mesh/manifold_mesh.h"
 #include "reconstruction/mesh/scan/beam_columns.h"
 #include "reconstruction/mesh/scan/beam_rows.h"
-#include "reconstruction/mesh/scan/grid_check.h"
-#include "reconstruction/mesh/scan/sensor_motion.h"
 
 namespace groundray {
 namespace {
@@ -79,15 +77,6 @@ Beams beams_of_returns(const ScanReturns& returns) {
   return beams;
 }
 
-template <typename T>
-std::vector<T> values_of_rows(const std::vector<T>& values,
-                              const std::vector<std::uint32_t>& rows) {
-  std::vector<T> out;
-  out.reserve(rows.size());
-  for (const std::uint32_t row : rows) out.push_back(values[row]);
-  return out;
-}
-
 BeamRows rows_of(const ScanReturns& returns, const Beams& beams, RowOrder order) {
   if (returns.rings.empty()) {
     if (auto rows = rows_of_elevations(beams.elevation_rad)) return *std::move(rows);
@@ -98,10 +87,10 @@ BeamRows rows_of(const ScanReturns& returns, const Beams& beams, RowOrder order)
         beams.source.size());
   }
   if (order == RowOrder::Elevation)
-    return rows_of_rings(values_of_rows(returns.rings, beams.source), beams.elevation_rad, order);
+    return rows_of_rings(picked(returns.rings, beams.source), beams.elevation_rad, order);
   // Lines without a return keep their rows.
   BeamRows all = rows_of_rings(returns.rings, {}, order);
-  return {values_of_rows(all.row, beams.source), all.count};
+  return {picked(all.row, beams.source), all.count};
 }
 
 /// Returns azimuths that show the offsets of rings: for de-skewed points, without the parallax
@@ -117,13 +106,13 @@ BeamColumns columns_of_returns(const ScanReturns& returns, const Beams& beams, c
                                RowOrder order) {
   if (!returns.columns.empty()) {
     const auto [first, last] = std::ranges::minmax(returns.columns);
-    const std::vector<std::int32_t> numbers = values_of_rows(returns.columns, beams.source);
+    const std::vector<std::int32_t> numbers = picked(returns.columns, beams.source);
     const std::vector<double> clock(numbers.begin(), numbers.end());
     return columns_of_numbers(numbers, first, last, rows, azimuths_of(clock, beams, rows, order),
                               order);
   }
   if (!returns.times_s.empty()) {
-    const std::vector<double> times_s = values_of_rows(returns.times_s, beams.source);
+    const std::vector<double> times_s = picked(returns.times_s, beams.source);
     const bool are_times =
         std::ranges::all_of(times_s, [](double t) { return std::abs(t) <= longest_s; });
     if (are_times) {

@@ -8,6 +8,7 @@
 #include <numbers>
 
 #include "core/error.h"
+#include "reconstruction/mesh/manifold_mesh.h"
 
 namespace groundray {
 namespace {
@@ -282,17 +283,6 @@ std::vector<std::uint32_t> number_cells(const std::vector<Face>& faces, std::siz
   return used;
 }
 
-/// Returns the values of some cells; empty if there are none.
-template <typename T>
-std::vector<T> values_of_cells(const std::vector<T>& values,
-                               const std::vector<std::uint32_t>& cells) {
-  std::vector<T> out;
-  if (values.empty()) return out;
-  out.reserve(cells.size());
-  for (const std::uint32_t cell : cells) out.push_back(values[cell]);
-  return out;
-}
-
 void Linker::give_confidence(ScanMesh& made) const {
   const std::vector<std::uint8_t> depth = depths();
   std::vector<float> sum(made.cells.size()), worth(made.cells.size());
@@ -315,15 +305,15 @@ void Linker::give_confidence(ScanMesh& made) const {
 ScanMesh Linker::mesh() const {
   ScanMesh made;
   made.cells = number_cells(faces_, beams_.size(), made.mesh.shape.triangles);
-  made.mesh.shape.vertices_m = values_of_cells(scan_.points_m, made.cells);
-  made.mesh.sd_m = values_of_cells(scan_.sd_m, made.cells);
-  made.mesh.labels = values_of_cells(scan_.labels, made.cells);
-  made.origins_m = values_of_cells(scan_.origins_m, made.cells);
+  made.mesh.shape.vertices_m = picked(scan_.points_m, made.cells);
+  made.mesh.sd_m = picked(scan_.sd_m, made.cells);
+  made.mesh.labels = picked(scan_.labels, made.cells);
+  made.origins_m = picked(scan_.origins_m, made.cells);
   give_confidence(made);
   OcclusionFaces& hidden = made.occlusion;
   const auto cells = number_cells(rejected_, beams_.size(), hidden.shape.triangles);
-  hidden.shape.vertices_m = values_of_cells(scan_.points_m, cells);
-  hidden.origins_m = values_of_cells(scan_.origins_m, cells);
+  hidden.shape.vertices_m = picked(scan_.points_m, cells);
+  hidden.origins_m = picked(scan_.origins_m, cells);
   return made;
 }
 

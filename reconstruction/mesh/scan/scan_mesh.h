@@ -1,6 +1,5 @@
 #pragma once
 
-#include <cstddef>
 #include <cstdint>
 #include <glm/vec3.hpp>
 #include <vector>
@@ -47,25 +46,19 @@ struct ScanMesh {
 /// shorter diagonal, three make one. All triangles face the origins of their beams.
 ///
 /// An edge is surface if it is at most `longest_m` long and at most as long as two beams could see
-/// on a plane at the incidence limit, plus noise: across / cos(incidence) + noise_sds * sd. Here
-/// `across` is the distance between the beams at the nearer return, from their angle and origins,
-/// and sd is the standard deviation of the difference of the two ranges. A triangle is surface if
-/// its edges are and its own incidence is within the limit, with the same allowance: the slope of
-/// its plane against the beams is linear in the three ranges, so its sd is known. All other
-/// triangles, including those whose beams cross, are occlusion faces. The surface is thus
-/// consistently oriented.
+/// on a plane at the incidence limit, plus noise. A triangle is surface if its edges are and its
+/// own incidence is within the limit, with the same allowance. All other triangles, including those
+/// whose beams cross, are occlusion faces. The surface is thus consistently oriented.
 ///
-/// A face's confidence is the cosine of its incidence, times 4 area / longest² if that is below 1
-/// (it is 1 for half a square), times the mean factor of its vertices, which is 1/4 on the mesh's
-/// boundary and rises to 1 three edges inside. A vertex's confidence is the mean of its faces'
-/// first two factors, times its own factor.
+/// A face's confidence is the cosine of its incidence, times 4 area / longest² if that is below 1,
+/// times the mean factor of its vertices, which is 1/4 on the mesh's boundary and rises to 1 three
+/// edges inside. A vertex's is the mean of its faces' first two factors, times its own factor.
 ///
 /// A scan of one row or column, or without returns, has no triangle. Takes several passes over the
 /// cells, and about 200 bytes per cell.
 /// @throws Error listing every fault of the limits or the scan.
 /// @see docs/theory/reconstruction.md; Turk, Levoy, Zippered polygon meshes from range images
-/// (1994),
-///      sections 3 and 4: links, and confidence that falls towards the boundary.
+///      (1994), sections 3 and 4: links, and confidence that falls towards the boundary.
 ScanMesh link(const OrganisedScan& scan, const ScreeningLimits& limits);
 
 }  // namespace groundray

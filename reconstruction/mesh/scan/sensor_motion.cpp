@@ -1,5 +1,3 @@
-#include "reconstruction/mesh/scan/sensor_motion.h"
-
 #include <Eigen/Cholesky>
 #include <Eigen/Core>
 #include <algorithm>
@@ -10,8 +8,8 @@
 #include <numeric>
 #include <tuple>
 
-#include "reconstruction/mesh/scan/angle.h"
-#include "reconstruction/mesh/scan/upper_median.h"
+#include "reconstruction/mesh/scan/beam_columns.h"
+#include "reconstruction/mesh/scan/firing_lattice.h"
 
 namespace groundray {
 namespace {

@@ -1,6 +1,5 @@
 #include "reconstruction/mesh/simplify/collapsible_mesh.h"
 
-#include <algorithm>
 #include <array>
 
 namespace groundray {

@@ -2,7 +2,7 @@
 
 #include <algorithm>
 #include <cmath>
-#include <glm/geometric.hpp>
+#include <glm/vec2.hpp>
 #include <limits>
 
 namespace groundray {
@@ -127,6 +127,33 @@ double EdgeCollapse::share() const noexcept {
   if (most_queued_ == 0) return 1;
   return 1 - static_cast<double>(std::min(queue_.size(), most_queued_)) /
                  static_cast<double>(most_queued_);
+}
+
+std::size_t find_knee(const std::vector<CostStep>& steps) {
+  const std::size_t all = steps.front().triangles;
+  double so_far = 0;
+  std::size_t knee = all;         // the last without cost, if there is no curve
+  std::vector<glm::dvec2> curve;  // logarithms of triangles and cost
+  std::vector<std::size_t> triangles;
+  for (const CostStep& step : steps) {
+    so_far = std::max(so_far, step.cost);
+    if (!(so_far > 0)) knee = step.triangles;
+    if (!(so_far > 0) || 2 * step.triangles > all || 1000 * step.triangles < all) continue;
+    const auto left = static_cast<double>(std::max<std::size_t>(step.triangles, 1));
+    curve.emplace_back(std::log(left), std::log(so_far));
+    triangles.push_back(step.triangles);
+  }
+  if (curve.size() < 3) return knee;
+  const glm::dvec2 first = curve.front();
+  const double width = curve.back().x - first.x, height = curve.back().y - first.y;
+  double farthest = -1;
+  for (std::size_t i = 0; i < curve.size(); ++i) {
+    const double away = std::abs(first.y + height * (curve[i].x - first.x) / width - curve[i].y);
+    if (away <= farthest) continue;
+    farthest = away;
+    knee = triangles[i];
+  }
+  return knee;
 }
 
 }  // namespace groundray

@@ -92,9 +92,7 @@ ReducedMesh make_reduced_mesh(const CollapsibleMesh& mesh, const std::vector<glm
 void collapse_edges(std::size_t triangles, bool is_flat, double away_m, const RunControl& work,
                     CollapsibleMesh& mesh, std::vector<glm::dvec3>& places_m, Merges& merges) {
   constexpr double looking = 0.1;  // fraction of progress for first evaluating all edges
-  const auto tell = [&](double share) {
-    if (work.progress) work.progress(share);
-  };
+  const auto tell = [&](double share) { work.report(share); };
   constexpr std::uint64_t edges_each = 16384;  // edges evaluated per call of progress
   const std::size_t first = mesh.triangles();
   VolumeCollapse collapse(mesh, places_m, {is_flat ? Overhang::Refuse : Overhang::Allow, away_m},
@@ -148,7 +146,7 @@ ReducedMesh reduce(const TriangleMesh& mesh, std::size_t triangles, const RunCon
   out.tangled_edges = manifold.tangled_edges;
   out.dropped = manifold.dropped;
   out.is_height_field = is_flat;
-  if (work.progress) work.progress(1);
+  work.report(1);
   return out;
 }
 

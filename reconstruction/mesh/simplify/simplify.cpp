@@ -1,21 +1,19 @@
 #include "reconstruction/mesh/simplify/simplify.h"
 
 #include <algorithm>
+#include <array>
 #include <functional>
-#include <optional>
 #include <utility>
-#include <vector>
 
 #include "core/error.h"
-#include "reconstruction/mesh/simplify/bounds/distance_proof.h"
-#include "reconstruction/mesh/simplify/bounds/distance_rules.h"
-#include "reconstruction/mesh/simplify/bounds/shape_rules.h"
-#include "reconstruction/mesh/simplify/bounds/vertical_rules.h"
-#include "reconstruction/mesh/simplify/cost_knee.h"
+#include "reconstruction/mesh/manifold_mesh.h"
+#include "reconstruction/mesh/simplify/decimation_state.h"
+#include "reconstruction/mesh/simplify/distance_proof.h"
+#include "reconstruction/mesh/simplify/distance_rules.h"
 #include "reconstruction/mesh/simplify/edge_collapse.h"
 #include "reconstruction/mesh/simplify/lindstrom_turk.h"
-#include "reconstruction/mesh/simplify/simplify_checks.h"
 #include "reconstruction/mesh/simplify/simplify_original.h"
+#include "reconstruction/mesh/simplify/vertical_rules.h"
 
 namespace groundray {
 namespace {
@@ -25,23 +23,12 @@ constexpr double line_weight = 1;         // where lines are not bounded
 constexpr std::size_t most_rounds = 20;   // until a proof succeeds
 constexpr std::size_t steps_each = 1024;  // per call of progress
 
-template <typename Value>
-std::vector<Value> picked(const std::vector<Value>& all, const std::vector<std::uint32_t>& which) {
-  std::vector<Value> some;
-  if (all.empty()) return some;
-  some.reserve(which.size());
-  for (const std::uint32_t i : which) some.push_back(all[i]);
-  return some;
-}
-
 /// Part of the work, which reports its progress as a fraction of the whole.
 struct Stage {
   const RunControl& work;
   double begin = 0, end = 1;
 
-  void tell(double share) const {
-    if (work.progress) work.progress(begin + share * (end - begin));
-  }
+  void tell(double share) const { work.report(begin + share * (end - begin)); }
 };
 
 /// Remainder of a state, renumbered in the same order.
@@ -287,17 +274,8 @@ Simplified Simplifier::measured(Simplified result, TriangleMesh local) const {
 }  // namespace
 
 const char* word_of(HaltReason reason) {
-  switch (reason) {
-    case HaltReason::Bound:
-      return "bound";
-    case HaltReason::Budget:
-      return "budget";
-    case HaltReason::Knee:
-      return "knee";
-    case HaltReason::Shape:
-      break;
-  }
-  return "shape";
+  constexpr std::array words{"bound", "budget", "knee", "shape"};
+  return words[static_cast<std::size_t>(reason)];
 }
 
 Simplified simplify(const MeasuredMesh& mesh, const StopCriterion& stop,

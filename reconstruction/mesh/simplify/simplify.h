@@ -7,7 +7,7 @@
 #include <variant>
 #include <vector>
 
-#include "reconstruction/mesh/accuracy/two_sided_error.h"
+#include "reconstruction/mesh/accuracy/agreement.h"
 #include "reconstruction/mesh/accuracy/vertical_error.h"
 #include "reconstruction/mesh/measured_mesh.h"
 #include "reconstruction/run_control.h"
@@ -49,12 +49,11 @@ struct NoiseBound {
   double sds = 2;
 };
 
-/// Stopping criterion: the knee of cost over number of triangles, both as logarithms. The knee is
-/// the point farthest from the straight line between the points where half of the triangles are
-/// left, or where cost begins, and where a thousandth is left. Cost is the mean squared distance by
-/// quadrics. Takes two runs, one of them to the end. On a noisy surface the knee is where the noise
-/// is removed; if roughness is similar at all scales, the knee means little and a bound is
-/// preferable.
+/// Stopping criterion: the knee of cost over number of triangles, both as logarithms: the point
+/// farthest from the straight line between the points where half of the triangles are left, or
+/// where cost begins, and where a thousandth is left. Cost is the mean squared distance by
+/// quadrics. Takes two runs, one of them to the end. Where roughness is similar at all scales,
+/// prefer a bound.
 /// @see Satopaa, Albrecht, Irwin, Raghavan, Finding a "kneedle" in a haystack, ICDCS (2011).
 struct CostKnee {};
 
@@ -121,8 +120,7 @@ struct Simplified {
 ///         deviations under a NoiseBound; if the surface has no area; or if more memory is needed
 ///         than `work` allows.
 /// @see docs/theory/reconstruction.md; Garland, Heckbert, Surface simplification using quadric
-/// error
-///      metrics, SIGGRAPH (1997): the order. Ciampalini, Cignoni, Montani, Scopigno,
+///      error metrics, SIGGRAPH (1997): the order. Ciampalini, Cignoni, Montani, Scopigno,
 ///      Multiresolution decimation based on global error, The Visual Computer 13 (1997): the
 ///      original is kept with the triangles that represent it.
 Simplified simplify(const MeasuredMesh& mesh, const StopCriterion& stop,

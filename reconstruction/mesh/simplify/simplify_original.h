@@ -12,6 +12,17 @@
 
 namespace groundray {
 
+/// @throws Error as simplify, except for overhangs and memory.
+void check_simplify(const MeasuredMesh& mesh, const StopCriterion& stop,
+                    const SimplifyOptions& options);
+
+/// Returns a triangle that has no area in plan view or faces down, or `none`. Triangles that repeat
+/// a vertex are ignored.
+std::uint32_t overhanging_triangle(const TriangleMesh& mesh) noexcept;
+
+/// @throws Error naming the triangle that overhangs.
+void refuse_overhang(const TriangleMesh& mesh, std::uint32_t triangle);
+
 /// Tolerances of a simplified mesh.
 struct Tolerances {
   std::vector<float> each_m;       ///< at each vertex of the manifold

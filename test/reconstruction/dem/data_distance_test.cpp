@@ -1,5 +1,3 @@
-#include "reconstruction/dem/data_distance.h"
-
 #include <gmock/gmock.h>
 #include <gtest/gtest.h>
 
@@ -8,7 +6,8 @@
 #include <random>
 
 #include "core/error.h"
-#include "reconstruction/dem/fill/raster_holes.h"
+#include "reconstruction/dem/dem_layers.h"
+#include "reconstruction/dem/fill/sorted_holes.h"
 
 namespace groundray::data_distance_test {
 namespace {

@@ -1,11 +1,10 @@
-#include "reconstruction/dem/dem_frame.h"
-
 #include <gmock/gmock.h>
 #include <gtest/gtest.h>
 
 #include <limits>
 
 #include "core/error.h"
+#include "reconstruction/dem/dem_layers.h"
 
 namespace groundray::dem_frame_test {
 namespace {

@@ -17,7 +17,7 @@ namespace groundray::testing {
 /// thousandth of the squared heights.
 struct DifferencePlate {
   std::vector<glm::ivec2> places;
-  PlateMatrix matrix;
+  ThinPlateMatrix matrix;
 };
 
 /// @param order  1 to 3.

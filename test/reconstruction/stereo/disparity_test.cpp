@@ -12,7 +12,6 @@
 #include <vector>
 
 #include "core/error.h"
-#include "reconstruction/stereo/disparity_refinement.h"
 #include "reconstruction/stereo/semi_global.h"
 #include "reconstruction/stereo/stereo_points.h"
 #include "test/support/margin.h"

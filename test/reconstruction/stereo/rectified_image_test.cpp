@@ -1,5 +1,3 @@
-#include "reconstruction/stereo/rectified_image.h"
-
 #include <gmock/gmock.h>
 #include <gtest/gtest.h>
 
@@ -7,6 +5,7 @@
 #include <limits>
 
 #include "core/error.h"
+#include "reconstruction/stereo/pinhole_pair.h"
 #include "test/support/lens_samples.h"
 #include "test/support/margin.h"
 #include "test/support/scans/stereo_views.h"

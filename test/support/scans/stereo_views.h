@@ -5,7 +5,7 @@
 #include <memory>
 #include <utility>
 
-#include "reconstruction/stereo/stereo_view.h"
+#include "reconstruction/stereo/pinhole_pair.h"
 #include "sensors/camera/lens/lens.h"
 
 namespace groundray::testing {

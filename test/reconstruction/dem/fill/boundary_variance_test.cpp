@@ -1,5 +1,3 @@
-#include "reconstruction/dem/fill/boundary_variance.h"
-
 #include <gtest/gtest.h>
 
 #include <algorithm>
@@ -8,6 +6,8 @@
 #include <limits>
 #include <random>
 #include <vector>
+
+#include "reconstruction/dem/fill/dem_fill.h"
 
 namespace groundray::boundary_variance_test {
 namespace {

@@ -25,11 +25,11 @@ std::vector<FillError> errors_of(std::size_t count, double scale, double power, 
   return errors;
 }
 
-// Objective that the model minimises, as documented at fit_law.
-double sum_of(const std::vector<FillError>& errors, const FillErrorModel& law) {
-  double sum = 5 * (std::pow(law.factors[1] - 1.5, 2) + std::pow(law.factors[2] - 2, 2));
+// Objective that the model minimises, as documented at fit_error_model.
+double sum_of(const std::vector<FillError>& errors, const FillErrorModel& model) {
+  double sum = 5 * (std::pow(model.factors[1] - 1.5, 2) + std::pow(model.factors[2] - 2, 2));
   for (const FillError& error : errors) {
-    const double sd_m = law.sd_m(error.distance_cells, error.roughness_m);
+    const double sd_m = model.sd_m(error.distance_cells, error.roughness_m);
     sum += 2 * std::log(sd_m) + std::pow(error.error_m / sd_m, 2);
   }
   return sum;
@@ -38,10 +38,10 @@ double sum_of(const std::vector<FillError>& errors, const FillErrorModel& law) {
 TEST(FillErrorModel, FitIsAtTheMinimumOfItsCost) {
   for (const unsigned seed : {1u, 2u, 3u}) {
     const auto errors = errors_of(40, 2, 3.5, 0.5, seed);
-    const auto law = fit_law(errors);
-    ASSERT_TRUE(law);
+    const auto model = fit_error_model(errors);
+    ASSERT_TRUE(model);
     for (std::size_t k = 0; k < 3; ++k) {
-      FillErrorModel low = *law, high = *law;
+      FillErrorModel low = *model, high = *model;
       low.factors[k] -= 1e-3;
       high.factors[k] += 1e-3;
       // Central difference: 0 at the minimum, except for its error of 1e-6 and 1e-6 from the last
@@ -53,20 +53,20 @@ TEST(FillErrorModel, FitIsAtTheMinimumOfItsCost) {
 
 TEST(FillErrorModel, RecoversTheModelFromManyErrors) {
   const auto errors = errors_of(40'000, 0.5, 1.0, 2.5, 4);
-  const auto law = fit_law(errors);
-  ASSERT_TRUE(law);
+  const auto model = fit_error_model(errors);
+  ASSERT_TRUE(model);
   // Standard deviations of these are 0.01 to 0.03.
-  EXPECT_NEAR(law->factors[0], 2 * std::log(0.5), 0.1);
-  EXPECT_NEAR(law->factors[1], 1.0, 0.05);
-  EXPECT_NEAR(law->factors[2], 2.5, 0.1);
-  const FillCover cover = cover_of(errors, *law);
+  EXPECT_NEAR(model->factors[0], 2 * std::log(0.5), 0.1);
+  EXPECT_NEAR(model->factors[1], 1.0, 0.05);
+  EXPECT_NEAR(model->factors[2], 2.5, 0.1);
+  const FillCover cover = cover_of(errors, *model);
   EXPECT_NEAR(cover.within_1sd, 0.683, 0.01);
   EXPECT_NEAR(cover.within_2sd, 0.954, 0.005);
   EXPECT_NEAR(cover.rms_sds, 1, 1e-6);
 }
 
 TEST(FillErrorModel, NeedsThirtyErrors) {
-  EXPECT_FALSE(fit_law(errors_of(29, 1, 1, 1, 5)));
+  EXPECT_FALSE(fit_error_model(errors_of(29, 1, 1, 1, 5)));
   const FillCover cover = cover_of({}, FillErrorModel{});
   EXPECT_TRUE(std::isnan(cover.within_1sd) && std::isnan(cover.within_2sd));
   EXPECT_TRUE(std::isnan(cover.rms_sds));

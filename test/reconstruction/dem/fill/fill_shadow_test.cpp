@@ -1,5 +1,3 @@
-#include "reconstruction/dem/fill/fill_shadow.h"
-
 #include <gmock/gmock.h>
 #include <gtest/gtest.h>
 
@@ -11,6 +9,7 @@
 #include <vector>
 
 #include "reconstruction/dem/fill/dem_fill.h"
+#include "reconstruction/dem/fill/holdout_mask.h"
 #include "terrain/relief/fractal_field.h"
 #include "test/support/margin.h"
 #include "test/support/terrain/sample_terrain.h"
@@ -35,7 +34,7 @@ struct Lit {
            static_cast<std::size_t>(p.x);
   }
   bool is_in(glm::ivec2 p) const { return p.x >= 0 && p.y >= 0 && p.x < size.x && p.y < size.y; }
-  PlateRaster raster() const { return {size, step_m, heights_m, numbers}; }
+  ThinPlateRaster raster() const { return {size, step_m, heights_m, numbers}; }
 };
 
 // Highest line over a sample that is blocked by terrain before it, by exhaustive search.
@@ -55,7 +54,7 @@ Lit light_up(glm::ivec2 size, glm::dvec2 step_m, std::vector<float> truth_m, glm
   lit.truth_m = std::move(truth_m);
   lit.heights_m = lit.truth_m;
   lit.most_m.assign(lit.truth_m.size(), none);
-  lit.numbers.assign(lit.truth_m.size(), plate_known);
+  lit.numbers.assign(lit.truth_m.size(), known_sample);
   for (int row = 0; row < size.y; ++row) {
     for (int column = 0; column < size.x; ++column) {
       const std::size_t i = lit.at({column, row});

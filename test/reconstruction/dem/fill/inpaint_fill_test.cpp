@@ -1,5 +1,3 @@
-#include "reconstruction/dem/fill/inpaint_fill.h"
-
 #include <gtest/gtest.h>
 
 #include <cmath>
@@ -9,6 +7,7 @@
 #include <vector>
 
 #include "core/error.h"
+#include "reconstruction/dem/fill/dem_fill.h"
 
 namespace groundray::inpaint_fill_test {
 namespace {

@@ -1,4 +1,3 @@
-#include "reconstruction/dem/fill/mesh_fill.h"
 
 #include <gmock/gmock.h>
 #include <gtest/gtest.h>

@@ -6,7 +6,7 @@
 #include <vector>
 
 #include "core/random.h"
-#include "reconstruction/dem/dem_frame.h"
+#include "reconstruction/dem/dem_layers.h"
 #include "reconstruction/dem/fusion/dem_fusion.h"
 #include "test/reconstruction/dem/rolling_ground.h"
 #include "test/support/margin.h"

@@ -13,7 +13,7 @@
 
 #include "core/error.h"
 #include "core/random.h"
-#include "reconstruction/dem/dem_frame.h"
+#include "reconstruction/dem/dem_layers.h"
 #include "test/reconstruction/dem/rolling_ground.h"
 #include "test/support/file_size_limit.h"
 #include "test/support/margin.h"

@@ -1,5 +1,3 @@
-#include "reconstruction/dem/fusion/sparse_cell.h"
-
 #include <gtest/gtest.h>
 
 #include <array>
@@ -7,6 +5,7 @@
 #include <cstdint>
 
 #include "core/random.h"
+#include "reconstruction/dem/fusion/cell_columns.h"
 
 namespace groundray::sparse_cell_test {
 namespace {

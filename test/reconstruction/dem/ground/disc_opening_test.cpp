@@ -1,11 +1,11 @@
-#include "reconstruction/dem/ground/disc_opening.h"
-
 #include <gtest/gtest.h>
 
 #include <algorithm>
 #include <cmath>
 #include <limits>
 #include <random>
+
+#include "reconstruction/dem/ground/ground_surface.h"
 
 namespace groundray::disc_opening_test {
 namespace {

@@ -1,5 +1,3 @@
-#include "reconstruction/dem/ground/overhangs.h"
-
 #include <gmock/gmock.h>
 #include <gtest/gtest.h>
 
@@ -7,6 +5,7 @@
 #include <random>
 
 #include "core/error.h"
+#include "reconstruction/dem/ground/ground_filter.h"
 
 namespace groundray::overhangs_test {
 namespace {

@@ -1,11 +1,11 @@
-#include "reconstruction/dem/ground/surface_pins.h"
-
 #include <gtest/gtest.h>
 
 #include <algorithm>
 #include <cmath>
 #include <functional>
 #include <random>
+
+#include "reconstruction/dem/ground/ground_surface.h"
 
 namespace groundray::surface_pins_test {
 namespace {

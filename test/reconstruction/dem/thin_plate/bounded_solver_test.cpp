@@ -10,7 +10,7 @@
 #include <random>
 #include <vector>
 
-#include "reconstruction/dem/thin_plate/nested_dissection.h"
+#include "reconstruction/dem/thin_plate/ldlt.h"
 #include "reconstruction/dem/thin_plate/thin_plate_system.h"
 #include "test/reconstruction/dem/difference_plate.h"
 
@@ -75,7 +75,7 @@ TEST(ThinPlateSystem, FindsTheMinimumOfStiffPlatesUnderFewLowBounds) {
   std::mt19937 random(7);
   std::uniform_real_distribution<float> uniform(-1, 1);
   std::vector<float> heights_m;
-  std::vector<std::int32_t> numbers(std::size_t{wide} * wide, plate_known);
+  std::vector<std::int32_t> numbers(std::size_t{wide} * wide, known_sample);
   std::vector<std::uint32_t> samples;
   std::vector<double> most_m;
   for (int row = 0; row < wide; ++row) {
@@ -89,14 +89,14 @@ TEST(ThinPlateSystem, FindsTheMinimumOfStiffPlatesUnderFewLowBounds) {
       samples.push_back(at);
     }
   }
-  const PlateRaster raster{{wide, wide}, {1, 1}, heights_m, numbers};
+  const ThinPlateRaster raster{{wide, wide}, {1, 1}, heights_m, numbers};
   ThinPlateSystem system(raster, samples), other(raster, samples);
-  const BoundedPlate found = system.solve_below({0, 5}, most_m);
+  const BoundedThinPlate found = system.solve_below({0, 5}, most_m);
   EXPECT_TRUE(found.is_best);
   EXPECT_GT(found.at_bound, 10u);
   // The minimum is unique, wherever the search starts.
   (void)other.solve_below({0, 5}, std::vector<double>(samples.size(), -3));
-  const BoundedPlate again = other.solve_below({0, 5}, most_m);
+  const BoundedThinPlate again = other.solve_below({0, 5}, most_m);
   EXPECT_TRUE(again.is_best);
   EXPECT_EQ(again.at_bound, found.at_bound);
   for (std::size_t i = 0; i < samples.size(); ++i)

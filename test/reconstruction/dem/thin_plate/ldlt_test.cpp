@@ -11,7 +11,6 @@
 #include <vector>
 
 #include "core/error.h"
-#include "reconstruction/dem/thin_plate/nested_dissection.h"
 #include "test/reconstruction/dem/difference_plate.h"
 
 namespace groundray::ldlt_test {
@@ -97,7 +96,7 @@ TEST(LdltFactor, SolvesAfterUnknownsAreExcluded) {
 }
 
 TEST(LdltFactor, RejectsSingularEquations) {
-  PlateMatrix matrix{.ends = {1, 2}, .samples = {0, 1}, .factors = {1, 0}};
+  ThinPlateMatrix matrix{.ends = {1, 2}, .samples = {0, 1}, .factors = {1, 0}};
   const std::vector<glm::ivec2> places{{0, 0}, {1, 0}};
   const Dissection dissection = dissect(places, 1);
   LdltFactor factor(matrix, dissection, FactorUse::Once);

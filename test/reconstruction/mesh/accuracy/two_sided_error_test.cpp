@@ -1,5 +1,3 @@
-#include "reconstruction/mesh/accuracy/two_sided_error.h"
-
 #include <gmock/gmock.h>
 #include <gtest/gtest.h>
 #include <tbb/global_control.h>
@@ -13,6 +11,7 @@
 #include <vector>
 
 #include "core/error.h"
+#include "reconstruction/mesh/accuracy/agreement.h"
 #include "test/support/scans/solid.h"
 
 namespace groundray::two_sided_error_test {

@@ -19,7 +19,7 @@
 
 #include "core/error.h"
 #include "core/model/mesh_reader.h"
-#include "reconstruction/mesh/holes/triangle_crossing.h"
+#include "reconstruction/mesh/holes/hole_patch.h"
 #include "test/support/margin.h"
 #include "test/support/scans/solid.h"
 #include "test/support/temporary_folder.h"
@@ -134,7 +134,8 @@ TEST(HoleFill, ClosesAPlaneExactlyAtAnyPosition) {
     const FilledMesh out = filled(open, 100);
     expect_sound(out, open);
     EXPECT_EQ(reasons(out), std::vector{HoleLeft::Outline});
-    EXPECT_NEAR(out.left[0].rim.length_m, 40 * (std::sqrt(1 + 1. / 16) + std::sqrt(1.25)), 1e-6);
+    EXPECT_NEAR(out.left[0].boundary.length_m, 40 * (std::sqrt(1 + 1. / 16) + std::sqrt(1.25)),
+                1e-6);
     ASSERT_EQ(out.filled.size(), 1u);
     EXPECT_EQ(testing::border_edges(out.mesh.shape), 80u);
     EXPECT_EQ(testing::euler_number(out.mesh.shape), 1);
@@ -167,7 +168,7 @@ TEST(HoleFill, ClosesTheWallAndTheEndsOfATube) {
   const FilledMesh wall = filled(open, 5);  // the ends have a circumference of 6.28 m
   expect_sound(wall, open);
   EXPECT_EQ(reasons(wall), (std::vector{HoleLeft::TooLong, HoleLeft::TooLong}));
-  EXPECT_NEAR(wall.left[0].rim.length_m, 2 * pi, 1e-2);
+  EXPECT_NEAR(wall.left[0].boundary.length_m, 2 * pi, 1e-2);
   ASSERT_EQ(wall.filled.size(), 1u);
   for (std::size_t i = wall.measured_vertices; i < wall.mesh.shape.vertices_m.size(); ++i)
     EXPECT_NEAR(glm::length(glm::dvec2(wall.mesh.shape.vertices_m[i])), 1, 0.03);
@@ -195,9 +196,9 @@ TEST(HoleFill, KeepsLargeHolesOpen) {
   expect_sound(small, open);
   EXPECT_EQ(small.filled.size(), 1u);
   ASSERT_EQ(reasons(small), (std::vector{HoleLeft::Outline, HoleLeft::TooLong}));
-  EXPECT_NEAR(small.left[1].rim.length_m, 32, 1e-12);
-  EXPECT_EQ(small.left[1].rim.vertices.size(), 32u);
-  EXPECT_LT(glm::distance(small.left[1].rim.middle_m, glm::dvec3(10, 10, 0)), 1e-12);
+  EXPECT_NEAR(small.left[1].boundary.length_m, 32, 1e-12);
+  EXPECT_EQ(small.left[1].boundary.vertices.size(), 32u);
+  EXPECT_LT(glm::distance(small.left[1].boundary.middle_m, glm::dvec3(10, 10, 0)), 1e-12);
   const FilledMesh few = fill_holes({.shape = open}, {.longest_m = 100, .most_edges = 31});
   EXPECT_EQ(reasons(few), (std::vector{HoleLeft::Outline, HoleLeft::TooManyEdges}));
   EXPECT_EQ(reasons(filled(open, 0)).size(), 3u) << "nothing is filled without a limit";
@@ -291,7 +292,7 @@ TEST(HoleFill, KeepsMeasuredAttributesAndMarksFilledVertices) {
   for (std::size_t i = out.measured_vertices; i < out.mesh.sd_m.size(); ++i) {
     const glm::dvec3& p = out.mesh.shape.vertices_m[i];
     double apart_m = 10;
-    for (const std::uint32_t v : out.filled[0].rim.vertices)
+    for (const std::uint32_t v : out.filled[0].boundary.vertices)
       apart_m = std::min(apart_m, glm::distance(p, mesh.shape.vertices_m[v]));
     EXPECT_NEAR(out.mesh.sd_m[i], std::hypot(0.01 + 0.005 * p.x, apart_m / 3), 0.001);
     EXPECT_EQ(out.mesh.confidence[i], 0);
@@ -329,14 +330,14 @@ TEST(HoleFill, ClosesJaggedHoles) {
     closed += out.filled.size();
     for (const OpenHole& hole : out.left) left += hole.why != HoleLeft::Outline;
     std::size_t borders = 0;
-    for (const OpenHole& hole : out.left) borders += hole.rim.vertices.size();
-    EXPECT_EQ(testing::border_edges(out.mesh.shape), borders) << "each rim is filled or left";
+    for (const OpenHole& hole : out.left) borders += hole.boundary.vertices.size();
+    EXPECT_EQ(testing::border_edges(out.mesh.shape), borders) << "each boundary is filled or left";
     for (const std::string& fault : testing::surface_faults(out.mesh.shape))
       EXPECT_THAT(fault, HasSubstr("joins")) << "edges must have two triangles; seed " << seed;
   }
   EXPECT_GT(closed, 100u);
   EXPECT_LT(static_cast<double>(left), 0.1 * static_cast<double>(closed))
-      << "those with a triangle in them that hangs on the rim by a corner";
+      << "those with a triangle in them that hangs on the boundary by a corner";
 }
 
 TEST(HoleFill, DoesNotDependOnThreads) {

@@ -1,5 +1,3 @@
-#include "reconstruction/mesh/holes/triangle_crossing.h"
-
 #include <gmock/gmock.h>
 #include <gtest/gtest.h>
 
@@ -11,6 +9,8 @@
 #include <set>
 #include <utility>
 #include <vector>
+
+#include "reconstruction/mesh/holes/hole_patch.h"
 
 namespace groundray::triangle_crossing_test {
 namespace {

@@ -1,5 +1,3 @@
-#include "reconstruction/mesh/merge/loop_triangulation.h"
-
 #include <gmock/gmock.h>
 #include <gtest/gtest.h>
 
@@ -8,6 +6,8 @@
 #include <numbers>
 #include <random>
 #include <vector>
+
+#include "reconstruction/mesh/merge/stitched_mesh.h"
 
 namespace groundray::loop_triangulation_test {
 namespace {

@@ -1,11 +1,11 @@
-#include "reconstruction/mesh/merge/point_tree.h"
-
 #include <gmock/gmock.h>
 #include <gtest/gtest.h>
 
 #include <cstddef>
 #include <glm/geometric.hpp>
 #include <random>
+
+#include "reconstruction/mesh/merge/open_border.h"
 
 namespace groundray::point_tree_test {
 namespace {

@@ -1,5 +1,3 @@
-#include "reconstruction/mesh/scan/grid_check.h"
-
 #include <gmock/gmock.h>
 #include <gtest/gtest.h>
 
@@ -12,6 +10,7 @@
 
 #include "apps/scene/readers/spec_io.h"
 #include "core/error.h"
+#include "reconstruction/mesh/scan/beam_columns.h"
 #include "sensors/lidar/pattern/scan_pattern.h"
 #include "test/support/scans/beam_fan.h"
 #include "test/support/scans/organised_cells.h"

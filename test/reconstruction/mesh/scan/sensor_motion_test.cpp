@@ -1,5 +1,3 @@
-#include "reconstruction/mesh/scan/sensor_motion.h"
-
 #include <fmt/format.h>
 #include <gtest/gtest.h>
 
@@ -12,6 +10,7 @@
 #include <vector>
 
 #include "core/geometry/pose.h"
+#include "reconstruction/mesh/scan/beam_columns.h"
 #include "reconstruction/mesh/scan/scan_mesh.h"
 #include "test/support/margin.h"
 #include "test/support/scans/beam_fan.h"

@@ -1,8 +1,8 @@
-#include "reconstruction/mesh/simplify/cost_knee.h"
-
 #include <gtest/gtest.h>
 
 #include <cmath>
+
+#include "reconstruction/mesh/simplify/edge_collapse.h"
 
 namespace groundray::cost_knee_test {
 namespace {

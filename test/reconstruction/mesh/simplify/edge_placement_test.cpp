@@ -1,5 +1,3 @@
-#include "reconstruction/mesh/simplify/edge_placement.h"
-
 #include <gtest/gtest.h>
 
 #include <array>
@@ -7,6 +5,8 @@
 #include <glm/geometric.hpp>
 #include <random>
 #include <vector>
+
+#include "reconstruction/mesh/simplify/volume_collapse.h"
 
 namespace groundray::edge_placement_test {
 namespace {

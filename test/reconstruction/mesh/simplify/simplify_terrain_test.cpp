@@ -4,7 +4,7 @@
 #include <glm/geometric.hpp>
 #include <random>
 
-#include "reconstruction/mesh/simplify/bounds/vector_to_edge.h"
+#include "reconstruction/mesh/simplify/decimation_state.h"
 #include "reconstruction/mesh/simplify/simplify.h"
 #include "test/support/terrain/plan_check.h"
 
