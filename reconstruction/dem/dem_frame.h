@@ -1,7 +1,7 @@
 #pragma once
 
 #include "core/geometry/grid_frame.h"
-#include "terrain/dem/area.h"
+#include "terrain/dem/density_map.h"
 
 namespace groundray {
 

@@ -23,7 +23,6 @@
 #include "reconstruction/dem/fill/inpaint_fill.h"
 #include "reconstruction/dem/fill/mesh_fill.h"
 #include "terrain/dem/dem_io.h"
-#include "terrain/dem/gdal_fill.h"
 #include "terrain/dem/layers_io.h"
 
 namespace groundray {

@@ -11,7 +11,7 @@
 #include <vector>
 
 #include "core/error.h"
-#include "core/geometry/mesh_check.h"
+#include "core/geometry/mesh.h"
 #include "core/model/model.h"
 #include "reconstruction/mesh/accuracy/cover_bound.h"
 #include "reconstruction/mesh/accuracy/distance_sums.h"

@@ -12,7 +12,7 @@
 #include <utility>
 
 #include "core/error.h"
-#include "core/geometry/mesh_check.h"
+#include "core/geometry/mesh.h"
 #include "reconstruction/mesh/holes/hole_patch.h"
 #include "reconstruction/mesh/holes/island_bridge.h"
 #include "reconstruction/mesh/holes/mesh_rims.h"

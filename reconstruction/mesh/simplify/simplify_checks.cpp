@@ -4,7 +4,7 @@
 #include <cmath>
 
 #include "core/error.h"
-#include "core/geometry/mesh_check.h"
+#include "core/geometry/mesh.h"
 #include "reconstruction/mesh/manifold_mesh.h"
 #include "reconstruction/mesh/simplify/bounds/plan_area.h"
 

@@ -1,4 +1,4 @@
-#include "terrain/scatter/adsorption.h"
+#include "terrain/scatter/dart_field.h"
 
 #include <gtest/gtest.h>
 
