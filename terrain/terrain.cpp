@@ -2,13 +2,11 @@
 
 #include <fmt/format.h>
 
-#include <cmath>
 #include <cstddef>
 #include <span>
 #include <string_view>
 #include <utility>
 
-#include "core/error.h"
 #include "terrain/dem/byte_hash.h"
 #include "terrain/lod/deviation.h"
 #include "terrain/relief/refined_tiles.h"
@@ -33,14 +31,6 @@ GridFrame frame_of(const DemHeader& header) {
 
 }  // namespace
 
-struct Terrain::Loaded {
-  DemHeader header;
-  std::variant<HeightGrid, Tiles> content;
-  Ground ground;
-  std::string fingerprint;
-  std::shared_ptr<const Relief> relief;
-};
-
 namespace {
 
 bool fits(glm::ivec2 samples, const TerrainDetail& detail) {
@@ -58,10 +48,8 @@ std::string fingerprint_of(const HeightGrid& grid) {
 
 // Loads a DEM without its relief, as a whole or by tiles, depending on the size of the surface with
 // `relief`, which may be null.
-Terrain::Loaded Terrain::load_dem_alone(const std::filesystem::path& path,
-                                        const DemOptions& options, const TerrainDetail& detail,
+Terrain::Loaded Terrain::load_dem_alone(DemFile file, const TerrainDetail& detail,
                                         const Progress& progress, const Relief* relief) {
-  DemFile file(path, options);
   const DemHeader header = file.header();
   if (!fits(header.samples, detail)) {
     const std::string text = file.fingerprint();
@@ -74,7 +62,7 @@ Terrain::Loaded Terrain::load_dem_alone(const std::filesystem::path& path,
             fmt::format("{:016x}", byte_hash(text)),
             {}};
   }
-  const HeightGrid grid = load_dem(path, options).grid;
+  const HeightGrid grid = file.load().grid;
   const bool is_whole = relief == nullptr || fits(relief->frame().samples, detail);
   if (is_whole && detail.tolerance_m == 0 && detail.tolerance_rad == 0)
     return {header, grid, Ground(grid), fingerprint_of(grid), {}};
@@ -86,13 +74,12 @@ Terrain::Loaded Terrain::load_dem_alone(const std::filesystem::path& path,
           {}};
 }
 
-Terrain::Loaded Terrain::load(const std::filesystem::path& path, const DemOptions& options,
-                              const TerrainDetail& detail, const Progress& progress,
+Terrain::Loaded Terrain::load(DemFile file, const TerrainDetail& detail, const Progress& progress,
                               const std::optional<ReliefSpec>& spec) {
-  if (!spec) return load_dem_alone(path, options, detail, progress, nullptr);
-  const auto relief = std::make_shared<const Relief>(
-      *spec, frame_of(DemFile(path, options).header()), memory_bytes(detail));
-  Loaded loaded = load_dem_alone(path, options, detail, progress, relief.get());
+  if (!spec) return load_dem_alone(std::move(file), detail, progress, nullptr);
+  const auto relief =
+      std::make_shared<const Relief>(*spec, frame_of(file.header()), memory_bytes(detail));
+  Loaded loaded = load_dem_alone(std::move(file), detail, progress, relief.get());
   if (const auto* grid = std::get_if<HeightGrid>(&loaded.content)) {
     loaded.content = relief->refined(*grid);
     loaded.ground = std::get<HeightGrid>(loaded.content);
@@ -108,15 +95,7 @@ Terrain::Loaded Terrain::load(const std::filesystem::path& path, const DemOption
 Terrain::Terrain(const std::filesystem::path& dem, const DemOptions& options,
                  const TerrainDetail& detail, const Progress& progress,
                  const std::optional<ReliefSpec>& relief)
-    : Terrain(load(dem, options, detail, progress, relief), detail) {}
-
-Terrain::Terrain(Loaded loaded, const TerrainDetail& detail)
-    : header_(std::move(loaded.header)),
-      detail_(detail),
-      content_(std::move(loaded.content)),
-      ground_(std::move(loaded.ground)),
-      fingerprint_(std::move(loaded.fingerprint)),
-      relief_(std::move(loaded.relief)) {}
+    : detail_(detail), loaded_(load(DemFile(dem, options), detail, progress, relief)) {}
 
 double Terrain::whole_bytes(glm::ivec2 samples) noexcept {
   constexpr double sample_bytes = 36;  // bytes, measured
@@ -124,7 +103,7 @@ double Terrain::whole_bytes(glm::ivec2 samples) noexcept {
 }
 
 Clipmap Terrain::clipmap(const SensorBox& sensors, double reach_m) const {
-  return {std::get<Tiles>(content_),
+  return {std::get<Tiles>(loaded_.content),
           frame(),
           {.tolerance_m = detail_.tolerance_m,
            .angle_rad = detail_.tolerance_rad,

@@ -35,20 +35,20 @@ class Terrain {
           const Progress& progress = {}, const std::optional<ReliefSpec>& relief = {});
 
   /// Returns the header of the DEM itself.
-  const DemHeader& header() const noexcept { return header_; }
+  const DemHeader& header() const noexcept { return loaded_.header; }
   /// Returns the reference surface: the DEM's, with relief if there is any.
-  const Ground& ground() const noexcept { return ground_; }
+  const Ground& ground() const noexcept { return loaded_.ground; }
   /// Returns the grid of its samples in D.
-  const GridFrame& frame() const noexcept { return ground_.frame(); }
+  const GridFrame& frame() const noexcept { return ground().frame(); }
   /// Returns the relief on the DEM, or null.
-  const Relief* relief() const noexcept { return relief_.get(); }
+  const Relief* relief() const noexcept { return loaded_.relief.get(); }
 
   /// Returns a text that identifies all heights: equal texts mean equal surfaces, as far as this
   /// can be known without reading a DEM larger than memory again.
-  const std::string& fingerprint() const noexcept { return fingerprint_; }
+  const std::string& fingerprint() const noexcept { return loaded_.fingerprint; }
 
   /// Returns the surface if it is traced as a whole, at full resolution; else null.
-  const HeightGrid* whole() const noexcept { return std::get_if<HeightGrid>(&content_); }
+  const HeightGrid* whole() const noexcept { return std::get_if<HeightGrid>(&loaded_.content); }
 
   /// Returns about how many bytes tracing a DEM of `samples` columns and rows takes at full
   /// resolution.
@@ -61,22 +61,20 @@ class Terrain {
 
  private:
   using Tiles = std::shared_ptr<const TileSource>;
-  struct Loaded;
-
-  Terrain(Loaded loaded, const TerrainDetail& detail);
-  static Loaded load(const std::filesystem::path& path, const DemOptions& options,
-                     const TerrainDetail& detail, const Progress& progress,
+  struct Loaded {
+    DemHeader header;
+    std::variant<HeightGrid, Tiles> content;
+    Ground ground;
+    std::string fingerprint;
+    std::shared_ptr<const Relief> relief;
+  };
+  static Loaded load(DemFile file, const TerrainDetail& detail, const Progress& progress,
                      const std::optional<ReliefSpec>& relief);
-  static Loaded load_dem_alone(const std::filesystem::path& path, const DemOptions& options,
-                               const TerrainDetail& detail, const Progress& progress,
+  static Loaded load_dem_alone(DemFile file, const TerrainDetail& detail, const Progress& progress,
                                const Relief* relief);
 
-  DemHeader header_;
   TerrainDetail detail_;
-  std::variant<HeightGrid, Tiles> content_;
-  Ground ground_;
-  std::string fingerprint_;
-  std::shared_ptr<const Relief> relief_;
+  Loaded loaded_;
 };
 
 }  // namespace groundray

@@ -63,7 +63,7 @@ class MeshBuilder {
       : runner_(runner), count_(list.leaves.size()) {
     const Lattice& lattice = list.selection.lattice;
     LeafTree& tree = numbers_.tree;
-    tree.samples = {grid.heights_m().data(), grid.columns(), {0, 0}, lattice.samples};
+    tree.samples = {{0, 0}, lattice.samples, grid.heights_m().data(), grid.columns()};
     tree.block_cells = lattice.block_cells;
     tree.level_count = static_cast<int>(list.selection.levels.size());
     tree.leaves = list.leaves.data();

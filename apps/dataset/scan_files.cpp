@@ -13,7 +13,6 @@
 #include "apps/dataset/range_conf.h"
 #include "apps/scene/yaml_reader.h"
 #include "core/error.h"
-#include "core/io/file_ending.h"
 #include "core/io/file_io.h"
 #include "core/io/text_lines.h"
 #include "core/io/tum_io.h"

@@ -10,7 +10,7 @@
 #include <system_error>
 
 #include "core/error.h"
-#include "core/io/file_ending.h"
+#include "core/io/file_io.h"
 
 namespace groundray {
 namespace {

@@ -14,7 +14,7 @@
 #include "core/io/mesh_io.h"
 #include "terrain/dem/dem_file.h"
 #include "terrain/lod/certificate.h"
-#include "terrain/lod/sensor_box.h"
+#include "terrain/lod/clipmap.h"
 #include "terrain/terrain_mesh.h"
 
 namespace groundray {

@@ -22,7 +22,7 @@
 #include "apps/python/binding/mesh.h"
 #include "apps/python/binding/numpy_argument.h"
 #include "core/error.h"
-#include "core/geometry/mesh_check.h"
+#include "core/geometry/mesh.h"
 #include "reconstruction/mesh/measured_mesh_io.h"
 
 namespace groundray::python {

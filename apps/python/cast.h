@@ -7,7 +7,7 @@
 #include "apps/python/binding/numpy_argument.h"
 #include "core/io/point_cloud.h"
 #include "core/tracing/scene.h"
-#include "terrain/lod/sensor_box.h"
+#include "terrain/lod/clipmap.h"
 
 namespace groundray::python {
 

@@ -5,7 +5,7 @@
 #include <utility>
 
 #include "core/tracing/scene.h"
-#include "terrain/dem/dem.h"
+#include "terrain/dem/dem_io.h"
 
 namespace groundray::python {
 

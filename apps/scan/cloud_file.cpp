@@ -9,7 +9,7 @@
 
 #include "core/error.h"
 #include "core/io/file_io.h"
-#include "core/io/npy_reader.h"
+#include "core/io/npy_io.h"
 #include "core/io/pcd_reader.h"
 #include "core/io/ply_io.h"
 

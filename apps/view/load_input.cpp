@@ -21,7 +21,7 @@
 #include "apps/view/layers/scene_layers.h"
 #include "apps/view/rendering/picture_file.h"
 #include "core/error.h"
-#include "core/io/file_ending.h"
+#include "core/io/file_io.h"
 #include "core/model/mesh_reader.h"
 #include "terrain/dem/band_file.h"
 

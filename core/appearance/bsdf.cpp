@@ -2,14 +2,14 @@
 
 #include <algorithm>
 #include <cmath>
+#include <concepts>
 #include <glm/common.hpp>
 #include <glm/geometric.hpp>
 #include <numbers>
 #include <optional>
 #include <string>
 
-#include "core/appearance/ggx.h"
-#include "core/appearance/oren_nayar.h"
+#include "core/appearance/microfacets.h"
 #include "core/error.h"
 #include "core/sobol.h"
 
@@ -104,27 +104,17 @@ double mirror_chance(const ConductorBsdf& surface, const glm::dvec3& wo) noexcep
   return surface.once(wo.z);
 }
 
-template <typename Mirroring>
-double mirroring_pdf(const Mirroring& surface, const glm::dvec3& wo,
-                     const glm::dvec3& wi) noexcept {
+template <typename T>
+concept Mirroring = std::same_as<T, CoatedBsdf> || std::same_as<T, ConductorBsdf>;
+
+double pdf(const Mirroring auto& surface, const glm::dvec3& wo, const glm::dvec3& wi) noexcept {
   if (!(wi.z > 0)) return 0;
   return std::lerp(wi.z / pi, ggx::pdf_per_sr(wo, wi, surface.alpha), mirror_chance(surface, wo));
 }
 
-template <typename Mirroring>
-glm::dvec3 mirroring_direction(const Mirroring& surface, const glm::dvec3& wo,
-                               glm::dvec2 u) noexcept {
+glm::dvec3 direction(const Mirroring auto& surface, const glm::dvec3& wo, glm::dvec2 u) noexcept {
   return takes_first(mirror_chance(surface, wo), u) ? ggx::sample(wo, surface.alpha, u)
                                                     : sample_cosine(u);
-}
-
-double pdf(const CoatedBsdf& surface, const glm::dvec3& wo, const glm::dvec3& wi) noexcept {
-  return mirroring_pdf(surface, wo, wi);
-}
-
-glm::dvec3 direction(const CoatedBsdf& surface, const glm::dvec3& wo,
-                     const glm::dvec2& u) noexcept {
-  return mirroring_direction(surface, wo, u);
 }
 
 glm::dvec3 eval(const ConductorBsdf& surface, const glm::dvec3& wo, const glm::dvec3& wi) noexcept {
@@ -133,15 +123,6 @@ glm::dvec3 eval(const ConductorBsdf& surface, const glm::dvec3& wo, const glm::d
   const double often = double{1 - surface.once(wo.z)} * double{1 - surface.once(wi.z)};
   return glm::dvec3(surface.reflectance(cosine)) * ggx::brdf_per_sr(wo, wi, surface.alpha) +
          surface.shared_per_sr * often;
-}
-
-double pdf(const ConductorBsdf& surface, const glm::dvec3& wo, const glm::dvec3& wi) noexcept {
-  return mirroring_pdf(surface, wo, wi);
-}
-
-glm::dvec3 direction(const ConductorBsdf& surface, const glm::dvec3& wo,
-                     const glm::dvec2& u) noexcept {
-  return mirroring_direction(surface, wo, u);
 }
 
 glm::dvec3 eval(const PlantLeafBsdf& leaf, const glm::dvec3&, const glm::dvec3& wi) noexcept {

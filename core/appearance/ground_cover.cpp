@@ -6,7 +6,7 @@
 #include <utility>
 
 #include "core/appearance/normal_map.h"
-#include "core/appearance/triplanar.h"
+#include "core/appearance/texture.h"
 #include "core/error.h"
 
 namespace groundray {
@@ -83,8 +83,7 @@ glm::dvec3 bumped(const GroundTexture& texture, const GroundCover::Point& point,
     along.dp_dv[axis] = -texture.size_m * n[v] / n[axis];
     const glm::vec3 texel =
         texture.normal->color(flat(point.p_D), {flat(patch.a_m), flat(patch.b_m)}, filtering);
-    sum +=
-        weights[axis] * shading_normal(along, n, n, decode_normal(texel, NormalMapGreen::AlongV));
+    sum += weights[axis] * shading_normal(along, n, n, decode_normal(texel));
   }
   return sum;
 }

@@ -5,8 +5,7 @@
 #include <string_view>
 
 #include "core/appearance/bsdf.h"
-#include "core/appearance/ggx.h"
-#include "core/appearance/oren_nayar.h"
+#include "core/appearance/microfacets.h"
 #include "core/error.h"
 
 namespace groundray {

@@ -20,10 +20,7 @@ glm::dvec3 lifted(const glm::dvec3& normal, const glm::dvec3& geometric) noexcep
 
 }  // namespace
 
-glm::dvec3 decode_normal(glm::vec3 texel, NormalMapGreen green) noexcept {
-  const glm::dvec3 normal = 2.0 * glm::dvec3(texel) - 1.0;
-  return {normal.x, green == NormalMapGreen::AlongV ? normal.y : -normal.y, normal.z};
-}
+glm::dvec3 decode_normal(glm::vec3 texel) noexcept { return 2.0 * glm::dvec3(texel) - 1.0; }
 
 glm::dvec3 shading_normal(const Tangents& tangents, const glm::dvec3& base,
                           const glm::dvec3& geometric, const glm::dvec3& bump) noexcept {

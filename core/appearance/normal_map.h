@@ -6,18 +6,15 @@
 
 namespace groundray {
 
-/// Direction of a normal map's green: along increasing v (OpenGL, glTF) or against it (DirectX).
-enum class NormalMapGreen { AlongV, AgainstV };
-
 /// Least cosine between a shading normal and the geometric normal.
 inline constexpr double least_shading_cosine = 1e-3;
 
 /// Returns the normal that a texel of a normal map encodes: 2 c - 1 of each value, as in glTF, so
-/// that 0.5 is flat; x along u, y along v, z away from the surface. The result is not normalised:
-/// the mean of texels gives the mean of their normals. Half a step of 8 bits is a tilt of 0.22
-/// degrees.
+/// that 0.5 is flat; x along u, y along v (OpenGL's convention), z away from the surface. The
+/// result is not normalised: the mean of texels gives the mean of their normals. Half a step of 8
+/// bits is a tilt of 0.22 degrees.
 /// @param texel  linear values from 0 to 1.
-glm::dvec3 decode_normal(glm::vec3 texel, NormalMapGreen green) noexcept;
+glm::dvec3 decode_normal(glm::vec3 texel) noexcept;
 
 /// Returns the shading normal, unit: `bump` in the tangent frame of MikkTSpace, with x along the
 /// part of dp_du perpendicular to `base`, y perpendicular to both on the side of dp_dv, and z =

@@ -10,6 +10,7 @@
 
 #include "core/appearance/footprint.h"
 #include "core/image/image.h"
+#include "core/image/luminance.h"
 
 namespace groundray {
 
@@ -112,5 +113,41 @@ class Texture {
   std::vector<std::uint8_t> alpha_;  // of 8-bit images: compact, for the cut-out test of hits
   glm::dvec4 mean_{0};
 };
+
+/// Ratio of a textured surface's colour at a point to its mean. Textures provide only this ratio;
+/// the mean is that of the material's spectrum.
+struct Tint {
+  glm::vec3 color{1};    ///< factor on each of linear red, green and blue
+  float brightness = 1;  ///< factor on the luminance, used for all other wavelengths
+  /// Returns the product of two tints.
+  Tint operator*(const Tint& other) const noexcept {
+    return {color * other.color, brightness * other.brightness};
+  }
+};
+
+/// Returns the ratio of a texel to the mean of its image, both linear; 1 for a channel whose mean
+/// is 0.
+inline Tint tint_of(const glm::vec3& texel, const glm::vec3& mean) noexcept {
+  const auto ratio = [](double value, double by) {
+    return by > 0 ? static_cast<float>(value / by) : 1.0f;
+  };
+  return {{ratio(texel.r, mean.r), ratio(texel.g, mean.g), ratio(texel.b, mean.b)},
+          ratio(luminance(texel), luminance(mean))};
+}
+
+/// Returns the weights of three textures that are projected along the x, y and z axes: not
+/// negative, with sum 1, continuous in the normal. On surfaces within 23 degrees of an axis only
+/// that axis has a weight, and one lookup suffices.
+/// @param normal  unit.
+glm::dvec3 triplanar_weights(const glm::dvec3& normal) noexcept;
+
+/// Returns the colour of a texture that is projected onto a surface along all three axes, so that
+/// it is not stretched on steep ground: (u, v) is (y, z), (x, z) and (x, y) of p_m / period_m.
+/// @param p_m  position, metres, in the frame of the axes.
+/// @param normal  unit.
+/// @param patch  patch of the surface that the ray covers.
+/// @param period_m  metres on the ground for each repeat of the texture; positive.
+glm::vec3 triplanar_color(const Texture& texture, const glm::dvec3& p_m, const glm::dvec3& normal,
+                          const SurfacePatch& patch, double period_m, Filtering filtering) noexcept;
 
 }  // namespace groundray

@@ -12,7 +12,8 @@ bool less(const glm::dvec3& a, const glm::dvec3& b) {
   return std::tie(a.x, a.y, a.z) < std::tie(b.x, b.y, b.z);
 }
 
-/// Numbers the vertices by position: vertices at equal positions get equal numbers.
+}  // namespace
+
 std::vector<std::uint32_t> place_numbers(const std::vector<glm::dvec3>& vertices_m) {
   std::vector<std::uint32_t> order(vertices_m.size());
   std::iota(order.begin(), order.end(), 0u);
@@ -25,8 +26,6 @@ std::vector<std::uint32_t> place_numbers(const std::vector<glm::dvec3>& vertices
   }
   return places;
 }
-
-}  // namespace
 
 CornerStars::CornerStars(const TriangleMesh& mesh) : places_(place_numbers(mesh.vertices_m)) {
   const std::size_t count =

@@ -1,12 +1,16 @@
 #pragma once
 
 #include <cstdint>
+#include <glm/vec3.hpp>
 #include <span>
 #include <vector>
 
 #include "core/geometry/mesh.h"
 
 namespace groundray {
+
+/// Numbers vertices by position, from 0: those at equal positions get equal numbers.
+std::vector<std::uint32_t> place_numbers(const std::vector<glm::dvec3>& vertices_m);
 
 /// Triangles round each corner of a mesh: all that have a corner at the same position, whether or
 /// not they share the vertex, in ascending order. Twins are triangles with the same three corner

@@ -25,14 +25,6 @@ inline Tangents tangents_of_triangle(const std::array<glm::dvec3, 3>& p_m,
   return {(edge_a * b.y - edge_b * a.y) / area, (edge_b * a.x - edge_a * b.x) / area};
 }
 
-/// Returns the tangents of a height field whose texture is projected from above, u to the east and
-/// v to the north.
-/// @param gradient  slope to the east and to the north, m/m.
-/// @param period_m  metres on the map per unit of u and of v.
-inline Tangents tangents_of_gradient(glm::dvec2 gradient, glm::dvec2 period_m) noexcept {
-  return {period_m.x * glm::dvec3(1, 0, gradient.x), period_m.y * glm::dvec3(0, 1, gradient.y)};
-}
-
 /// Returns (du, dv) of a step `d_m` (metres) in the tangent plane; zero if the tangents are
 /// parallel.
 inline glm::dvec2 uv_step(const Tangents& tangents, const glm::dvec3& d_m) noexcept {

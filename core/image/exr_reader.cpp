@@ -1,11 +1,10 @@
-#include "core/image/exr_reader.h"
-
 #include <OpenEXR/ImfChannelList.h>
 #include <OpenEXR/ImfDoubleAttribute.h>
 #include <OpenEXR/ImfFloatAttribute.h>
 #include <OpenEXR/ImfFrameBuffer.h>
 #include <OpenEXR/ImfHeader.h>
 #include <OpenEXR/ImfIO.h>
+#include <OpenEXR/ImfInputFile.h>
 #include <OpenEXR/ImfInputPart.h>
 #include <OpenEXR/ImfIntAttribute.h>
 #include <OpenEXR/ImfMatrixAttribute.h>
@@ -27,8 +26,10 @@
 #include <stdexcept>
 #include <type_traits>
 #include <utility>
+#include <vector>
 
 #include "core/error.h"
+#include "core/image/exr_io.h"
 #include "core/image/image_errors.h"
 #include "core/io/file_io.h"
 
@@ -252,6 +253,65 @@ ExrFile decode(std::string_view bytes, const std::string& name) {
   return result;
 }
 
+/// Returns the names of the channels to read, in order.
+std::vector<std::string> color_channels(const Imf::ChannelList& channels, const std::string& name) {
+  std::vector<std::string> there;
+  bool subsampled = false;
+  for (auto channel = channels.begin(); channel != channels.end(); ++channel) {
+    there.emplace_back(channel.name());
+    subsampled |= channel.channel().xSampling != 1 || channel.channel().ySampling != 1;
+  }
+  const auto has = [&](const char* channel) { return channels.findChannel(channel) != nullptr; };
+  std::vector<std::string> wanted;
+  if (has("R") && has("G") && has("B")) {
+    wanted = {"R", "G", "B"};
+  } else if (has("Y")) {
+    wanted = {"Y"};
+  }
+  if (wanted.empty() || subsampled) {
+    throw Error("{}: its channels are {}{}; it must have R, G and B, or Y, at full resolution",
+                name, fmt::join(there, ", "), subsampled ? ", some of them subsampled" : "");
+  }
+  if (has("A")) wanted.emplace_back("A");
+  return wanted;
+}
+
+ImageF decode_picture(std::string_view bytes, const std::string& name) {
+  BytesStream stream(bytes, name);
+  Imf::InputFile file(stream);
+  const Imath::Box2i data = file.header().dataWindow();
+  if (data != file.header().displayWindow()) {
+    throw Error("{}: its data window is not its display window: save the uncropped image", name);
+  }
+  const std::int64_t width = std::int64_t{data.max.x} - data.min.x + 1;
+  const std::int64_t height = std::int64_t{data.max.y} - data.min.y + 1;
+  check_size(name, width, height);
+  const std::vector<std::string> channels = color_channels(file.header().channels(), name);
+  ImageF image(static_cast<int>(width), static_cast<int>(height),
+               static_cast<int>(channels.size()));
+  Imf::FrameBuffer pixels;
+  for (std::size_t i = 0; i < channels.size(); ++i) {
+    const std::size_t stride = channels.size() * sizeof(float);
+    auto* const base = reinterpret_cast<char*>(image.values().data() + i);
+    pixels.insert(channels[i], Imf::Slice::Make(Imf::FLOAT, base, data, stride,
+                                                stride * static_cast<std::size_t>(width)));
+  }
+  file.setFrameBuffer(pixels);
+  file.readPixels(data.min.y, data.max.y);
+  return image;
+}
+
+/// Returns decode(), whose exceptions are reported as damage.
+auto decoded(const std::string& name, const auto& decode) {
+  try {
+    return decode();
+  } catch (const Error&) {
+    throw;
+  } catch (const std::exception& fault) {
+    throw_damaged(name, "OpenEXR", fault.what());
+  }
+}
+
 }  // namespace
 
 const ExrChannel* ExrFile::find(std::string_view name) const {
@@ -268,13 +328,11 @@ ExrFile parse_exr(std::string_view bytes, const std::string& name) {
     throw Error("{}: it is not an OpenEXR (.exr) image{}", name,
                 bytes.empty() ? ": it is empty" : ", despite its name: convert it");
   }
-  try {
-    return decode(bytes, name);
-  } catch (const Error&) {
-    throw;
-  } catch (const std::exception& fault) {
-    throw_damaged(name, "OpenEXR", fault.what());
-  }
+  return decoded(name, [&] { return decode(bytes, name); });
+}
+
+ImageF parse_exr_picture(std::string_view bytes, const std::string& name) {
+  return decoded(name, [&] { return decode_picture(bytes, name); });
 }
 
 }  // namespace groundray

@@ -31,4 +31,7 @@ inline void check_size(const std::string& name, std::int64_t width, std::int64_t
   }
 }
 
+/// Decodes the colours of an OpenEXR file in memory; see read_image_f.
+ImageF parse_exr_picture(std::string_view bytes, const std::string& name);
+
 }  // namespace groundray

@@ -5,15 +5,20 @@
 #include <algorithm>
 #include <array>
 #include <bit>
+#include <cmath>
 #include <csetjmp>
 #include <cstdio>
 #include <cstring>
+#include <glm/vec3.hpp>
 #include <limits>
+#include <optional>
+#include <utility>
 #include <vector>
 
 #include "core/error.h"
 #include "core/image/image_errors.h"
 #include "core/io/file_io.h"
+#include "core/io/text_lines.h"
 // libjpeg's headers need <cstdio> before them.
 #include <jerror.h>
 #include <jpeglib.h>
@@ -175,6 +180,155 @@ ImageF fractions(const Image<T>& image) {
   return result;
 }
 
+/// Header of a Radiance picture.
+struct HdrHeader {
+  int width = 0, height = 0;
+  glm::dvec3 exposure{1};  ///< factors by which light was multiplied, for each channel
+};
+
+/// Parses the header and removes it from the front of `bytes`.
+HdrHeader take_hdr_header(std::string_view& bytes, const std::string& name) {
+  HdrHeader header;
+  TextLines lines(bytes);
+  for (auto line = lines.next(); line && !line->empty(); line = lines.next()) {
+    const std::size_t sign = line->find('=');
+    const std::string_view key = line->substr(0, sign);
+    const std::string_view value = sign < line->size() ? line->substr(sign + 1) : ""sv;
+    if (key == "FORMAT" && words_of(value) != std::vector{"32-bit_rle_rgbe"sv}) {
+      throw Error("{}: FORMAT = {:?} must be 32-bit_rle_rgbe: convert the image to RGB", name,
+                  value.substr(0, 40));
+    }
+    if (key != "EXPOSURE" && key != "COLORCORR") continue;
+    const auto words = words_of(value);
+    if (words.size() != (key == "EXPOSURE" ? 1 : 3)) {
+      throw_damaged(name, "Radiance", fmt::format("{} = {:?}", key, value.substr(0, 40)));
+    }
+    for (glm::length_t i = 0; i < 3; ++i) {
+      const auto factor = number_of<double>(words[static_cast<std::size_t>(i) % words.size()]);
+      if (!factor || !(*factor > 0) || !std::isfinite(*factor)) {
+        throw Error("{}: {} = {:?} must be positive", name, key, value.substr(0, 40));
+      }
+      header.exposure[i] *= *factor;
+    }
+  }
+  const auto line = lines.next().value_or(""sv);
+  const auto words = words_of(line);
+  const auto height = words.size() == 4 ? number_of<int>(words[1]) : std::nullopt;
+  const auto width = words.size() == 4 ? number_of<int>(words[3]) : std::nullopt;
+  if (!height || !width || words[0] != "-Y" || words[2] != "+X") {
+    throw Error("{}: its size line {:?} must be -Y HEIGHT +X WIDTH, rows from the top", name,
+                line.substr(0, 40));
+  }
+  check_size(name, *width, *height);
+  header.width = *width;
+  header.height = *height;
+  bytes = lines.rest();
+  return header;
+}
+
+using Rgbe = std::array<std::uint8_t, 4>;
+
+/// Decodes rows of shared-exponent pixels in all three encodings: plain, with repeated pixels, and
+/// with runs for each byte of the pixels.
+class HdrRows {
+ public:
+  HdrRows(std::string_view bytes, const std::string& name) : rest_(bytes), name_(name) {}
+
+  void read(std::vector<Rgbe>& row) {
+    const std::size_t width = row.size();
+    const bool has_runs = width >= 8 && width < 32768 && rest_.size() >= 4 &&
+                          rest_.starts_with("\x02\x02"sv) && (rest_[2] & 0x80) == 0;
+    if (!has_runs) return read_pixels(row);
+    rest_.remove_prefix(2);
+    const std::size_t high = take(), low = take();
+    if ((high << 8 | low) != width) fail("a row of wrong length");
+    for (std::size_t channel = 0; channel < 4; ++channel) read_runs(row, channel);
+  }
+
+ private:
+  [[noreturn]] void fail(std::string_view fault) const { throw_damaged(name_, "Radiance", fault); }
+
+  std::uint8_t take() {
+    if (rest_.empty()) fail("unexpected end of file");
+    const auto byte = static_cast<std::uint8_t>(rest_.front());
+    rest_.remove_prefix(1);
+    return byte;
+  }
+
+  void read_runs(std::vector<Rgbe>& row, std::size_t channel) {
+    for (std::size_t x = 0; x < row.size();) {
+      const std::uint8_t count = take();
+      const bool repeats = count > 128;
+      const std::size_t length = repeats ? count - 128u : count;
+      if (length == 0 || length > row.size() - x) fail("a run beyond the end of its row");
+      std::uint8_t value = 0;
+      for (std::size_t i = 0; i < length; ++i) {
+        if (i == 0 || !repeats) value = take();
+        row[x++][channel] = value;
+      }
+    }
+  }
+
+  void read_pixels(std::vector<Rgbe>& row) {
+    int shift = 0;  // consecutive repeat counts are the digits of one number in base 256
+    for (std::size_t x = 0; x < row.size();) {
+      Rgbe pixel{};
+      for (std::uint8_t& byte : pixel) byte = take();
+      if (pixel[0] != 1 || pixel[1] != 1 || pixel[2] != 1) {
+        row[x++] = pixel;
+        shift = 0;
+        continue;
+      }
+      const std::size_t count = std::size_t{pixel[3]} << shift;
+      if (x == 0 || count > row.size() - x || shift > 16) fail("a run beyond the end of its row");
+      const Rgbe previous = row[x - 1];
+      std::fill_n(row.begin() + static_cast<std::ptrdiff_t>(x), count, previous);
+      x += count;
+      shift += 8;
+    }
+  }
+
+  std::string_view rest_;
+  const std::string& name_;
+};
+
+ImageF parse_hdr_picture(std::string_view bytes, const std::string& name) {
+  const HdrHeader header = take_hdr_header(bytes, name);
+  ImageF image(header.width, header.height, 3);
+  std::vector<Rgbe> row(static_cast<std::size_t>(header.width));
+  HdrRows rows(bytes, name);
+  for (int y = 0; y < header.height; ++y) {
+    rows.read(row);
+    float* value = image.at(0, y).data();
+    for (const Rgbe& pixel : row) {
+      // The mantissa's 8 bits count from 2^-8, the exponent from -128; exponent 0 is black.
+      const double unit = pixel[3] == 0 ? 0 : std::ldexp(1.0, pixel[3] - 136);
+      for (std::size_t i = 0; i < 3; ++i) {
+        const double exposure = header.exposure[static_cast<glm::length_t>(i)];
+        *value++ = static_cast<float>(pixel[i] * unit / exposure);
+      }
+    }
+  }
+  return image;
+}
+
+void check_values(const ImageF& image, PictureOf what, const std::string& name) {
+  const auto is_bad = [what](float value) {
+    return !std::isfinite(value) || (what == PictureOf::Light && value < 0);
+  };
+  const auto values = image.values();
+  const auto bad = std::ranges::find_if(values, is_bad);
+  if (bad == values.end()) return;
+  const auto pixel = (bad - values.begin()) / image.channels();
+  throw Error(
+      "{}: channel {} of the pixel in column {}, row {} (from 0, the top) is {}; {}: correct the "
+      "image",
+      name, (bad - values.begin()) % image.channels(), pixel % image.width(), pixel / image.width(),
+      *bad,
+      what == PictureOf::Light ? "light must be finite and not negative"
+                               : "heights must be finite");
+}
+
 }  // namespace
 
 Image8 read_image8(const std::filesystem::path& path) {
@@ -200,6 +354,22 @@ ImageF parse_heights(std::string_view bytes, const std::string& name) {
   if (is_image_f(bytes)) return parse_image_f(bytes, name, PictureOf::Heights);
   throw Error("{}: it is not a PNG, JPEG, OpenEXR (.exr) or Radiance (.hdr) image{}", name,
               bytes.empty() ? ": it is empty" : ", despite its name: convert it");
+}
+
+ImageF read_image_f(const std::filesystem::path& path, PictureOf what) {
+  return parse_image_f(read_text(path), path.string(), what);
+}
+
+ImageF parse_image_f(std::string_view bytes, const std::string& name, PictureOf what) {
+  std::optional<ImageF> image;
+  if (bytes.starts_with(hdr_magic)) image = parse_hdr_picture(bytes, name);
+  if (bytes.starts_with(exr_magic)) image = parse_exr_picture(bytes, name);
+  if (!image) {
+    throw Error("{}: it is neither a Radiance (.hdr) nor an OpenEXR (.exr) image{}", name,
+                bytes.empty() ? ": it is empty" : ", despite its name: convert it");
+  }
+  check_values(*image, what, name);
+  return *std::move(image);
 }
 
 }  // namespace groundray

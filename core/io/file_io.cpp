@@ -1,21 +1,14 @@
 #include "core/io/file_io.h"
 
-#include <fmt/format.h>
-
 #include <algorithm>
-#include <array>
+#include <cctype>
 #include <cerrno>
-#include <chrono>
-#include <cmath>
 #include <cstdio>
-#include <iterator>
 #include <memory>
-#include <optional>
 #include <system_error>
 #include <utility>
 
 #include "core/error.h"
-#include "core/io/text_lines.h"
 
 namespace groundray {
 namespace {
@@ -98,6 +91,13 @@ std::string read_text(const std::filesystem::path& path) {
   }
   text.resize(size);
   return text;
+}
+
+std::string file_ending(const std::filesystem::path& path) {
+  std::string ending = path.extension().string();
+  std::ranges::transform(ending, ending.begin(),
+                         [](unsigned char c) { return static_cast<char>(std::tolower(c)); });
+  return ending;
 }
 
 }  // namespace groundray

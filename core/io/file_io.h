@@ -30,4 +30,8 @@ void write_text(const std::filesystem::path& path, std::string_view text);
 /// @throws Error if it cannot be read.
 std::string read_text(const std::filesystem::path& path);
 
+/// Returns the extension of a file's name in lower case, with its dot: ".ply" for "scan.PLY". Empty
+/// if there is none.
+std::string file_ending(const std::filesystem::path& path);
+
 }  // namespace groundray

@@ -17,7 +17,7 @@
 #include <vector>
 
 #include "core/error.h"
-#include "core/geometry/mesh_check.h"
+#include "core/geometry/mesh.h"
 #include "core/io/file_io.h"
 #include "core/io/ply_header.h"
 
@@ -208,11 +208,6 @@ void write_mesh(const std::filesystem::path& path, const TriangleMesh& mesh,
   if (form == ".stl") return write_stl(path, mesh, georeference);
   if (form == ".glb") return write_glb(path, mesh, georeference);
   throw Error("{}: the name of a mesh must end in .ply, .obj, .stl or .glb", path.string());
-}
-
-void write_ply(const std::filesystem::path& path, const TriangleMesh& mesh,
-               const Georeference& georeference) {
-  write_ply(path, mesh, georeference, MeshColumns());
 }
 
 void write_ply(const std::filesystem::path& path, const TriangleMesh& mesh,

@@ -23,23 +23,19 @@ struct Georeference {
 void write_mesh(const std::filesystem::path& path, const TriangleMesh& mesh,
                 const Georeference& georeference);
 
-/// Writes a mesh as binary little-endian PLY: vertices as doubles in D, `georeference` in comments
-/// and, if the mesh has levels, the level of each face and a colour for it.
-/// @throws Error as write_whole; or if an index, the number of levels or a position is invalid.
-void write_ply(const std::filesystem::path& path, const TriangleMesh& mesh,
-               const Georeference& georeference);
-
 /// Additional data of a mesh: a row for each vertex and for each triangle, in their order. A table
 /// without columns may have any number of rows.
 struct MeshColumns {
   PointCloud vertices{}, triangles{};
 };
 
-/// Writes a mesh as above, with an additional property for each column.
-/// @throws Error as above; or if a table's length differs from the mesh's, or a name is not visible
-///         ASCII or already in use.
+/// Writes a mesh as binary little-endian PLY: vertices as doubles in D, `georeference` in comments
+/// and, if the mesh has levels, the level of each face and a colour for it; and a property for each
+/// column.
+/// @throws Error as write_whole; if an index, the number of levels or a position is invalid; or if
+///         a table's length differs from the mesh's, or a name is not visible ASCII or in use.
 void write_ply(const std::filesystem::path& path, const TriangleMesh& mesh,
-               const Georeference& georeference, const MeshColumns& columns);
+               const Georeference& georeference, const MeshColumns& columns = {});
 
 /// Writes a mesh as Wavefront OBJ: vertices in D with enough digits to restore the doubles,
 /// `georeference` in comments. Levels are omitted.

@@ -6,6 +6,7 @@
 #include <cmath>
 #include <limits>
 #include <span>
+#include <type_traits>
 #include <utility>
 
 namespace groundray {
@@ -87,54 +88,28 @@ void add_wide(PointCloud& cloud, std::string_view name, const NumberRun& run,
 }  // namespace
 
 std::size_t size_of(NumberType type) {
-  switch (type) {
-    case NumberType::Int8:
-    case NumberType::UInt8:
-    case NumberType::Bool:
-      return 1;
-    case NumberType::Float16:
-    case NumberType::Int16:
-    case NumberType::UInt16:
-      return 2;
-    case NumberType::Float32:
-    case NumberType::Int32:
-    case NumberType::UInt32:
-      return 4;
-    case NumberType::Float64:
-    case NumberType::Int64:
-    case NumberType::UInt64:
-      return 8;
+  return with_number_type(type, [](auto number) { return sizeof number; });
+}
+
+std::optional<NumberType> number_type_of(char kind, std::size_t bytes) {
+  constexpr std::string_view kinds = "fffiiiiuuuub";  // of the NumberTypes, in their order
+  for (std::size_t i = 0; i < kinds.size(); ++i) {
+    const auto type = static_cast<NumberType>(i);
+    if (kinds[i] == kind && size_of(type) == bytes) return type;
   }
-  return 0;
+  return std::nullopt;
 }
 
 void add_column(PointCloud& cloud, std::string_view name, const NumberRun& run,
                 std::vector<ColumnOrigin>& origins) {
-  switch (run.type) {
-    case NumberType::Float16:
-      return add_halves(cloud, name, run);
-    case NumberType::Float32:
-      return add_as<float>(cloud, name, run);
-    case NumberType::Float64:
-      return add_as<double>(cloud, name, run);
-    case NumberType::Int8:
-      return add_as<std::int8_t>(cloud, name, run);
-    case NumberType::Int16:
-      return add_as<std::int16_t>(cloud, name, run);
-    case NumberType::Int32:
-      return add_as<std::int32_t>(cloud, name, run);
-    case NumberType::Int64:
-      return add_wide<std::int64_t>(cloud, name, run, origins);
-    case NumberType::Bool:
-    case NumberType::UInt8:
-      return add_as<std::uint8_t>(cloud, name, run);
-    case NumberType::UInt16:
-      return add_as<std::uint16_t>(cloud, name, run);
-    case NumberType::UInt32:
-      return add_as<std::uint32_t>(cloud, name, run);
-    case NumberType::UInt64:
-      return add_wide<std::uint64_t>(cloud, name, run, origins);
-  }
+  if (run.type == NumberType::Float16) return add_halves(cloud, name, run);
+  with_number_type(run.type, [&]<typename T>(T /*of the type*/) {
+    if constexpr (std::is_integral_v<T> && sizeof(T) == 8) {
+      add_wide<T>(cloud, name, run, origins);
+    } else {
+      add_as<T>(cloud, name, run);
+    }
+  });
 }
 
 }  // namespace groundray

@@ -2,8 +2,10 @@
 
 #include <cstddef>
 #include <cstdint>
+#include <optional>
 #include <string>
 #include <string_view>
+#include <tuple>
 #include <vector>
 
 #include "core/io/point_cloud.h"
@@ -30,8 +32,26 @@ enum class NumberType {
 /// Byte order of a number: the least or the most significant byte first.
 enum class ByteOrder { Little, Big };
 
+/// C++ types of the NumberTypes, in their order; a Float16 is held as its bits, a Bool as a byte.
+using NumberTypes =
+    std::tuple<std::uint16_t, float, double, std::int8_t, std::int16_t, std::int32_t, std::int64_t,
+               std::uint8_t, std::uint16_t, std::uint32_t, std::uint64_t, std::uint8_t>;
+
+/// Returns f(T()) for the C++ type T of `type`.
+template <std::size_t I = 0, typename F>
+auto with_number_type(NumberType type, const F& f) {
+  if constexpr (I + 1 < std::tuple_size_v<NumberTypes>) {
+    if (static_cast<std::size_t>(type) != I) return with_number_type<I + 1>(type, f);
+  }
+  return f(std::tuple_element_t<I, NumberTypes>());
+}
+
 /// Returns the size of one number, bytes.
 std::size_t size_of(NumberType type);
+
+/// Returns the type of a kind, in NumPy's notation f, i, u or b, and size; nothing if there is
+/// none.
+std::optional<NumberType> number_type_of(char kind, std::size_t bytes);
 
 /// Numbers at a constant stride in memory.
 struct NumberRun {

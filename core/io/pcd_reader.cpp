@@ -2,16 +2,13 @@
 
 #include <fmt/format.h>
 
-#include <algorithm>
 #include <array>
 #include <cmath>
 #include <limits>
 #include <optional>
-#include <type_traits>
 
 #include "core/error.h"
 #include "core/io/file_io.h"
-#include "core/io/lzf.h"
 #include "core/io/text_lines.h"
 
 namespace groundray {
@@ -122,24 +119,10 @@ PcdHeader parse_pcd_header(TextLines& lines) {
 }
 
 NumberType field_type_of(std::string_view type, std::size_t size) {
-  struct Entry {
-    char letter;
-    std::size_t size;
-    NumberType type;
-  };
-  static constexpr std::array<Entry, 10> entries{{{'F', 4, NumberType::Float32},
-                                                  {'F', 8, NumberType::Float64},
-                                                  {'I', 1, NumberType::Int8},
-                                                  {'I', 2, NumberType::Int16},
-                                                  {'I', 4, NumberType::Int32},
-                                                  {'I', 8, NumberType::Int64},
-                                                  {'U', 1, NumberType::UInt8},
-                                                  {'U', 2, NumberType::UInt16},
-                                                  {'U', 4, NumberType::UInt32},
-                                                  {'U', 8, NumberType::UInt64}}};
-  for (const Entry& entry : entries) {
-    if (type.size() == 1 && type[0] == entry.letter && size == entry.size) return entry.type;
-  }
+  const bool is_known = type == "F" || type == "I" || type == "U";
+  const auto found = is_known ? number_type_of(static_cast<char>(type[0] - 'A' + 'a'), size)
+                              : std::optional<NumberType>();
+  if (found && *found != NumberType::Float16) return *found;
   throw Error("TYPE {:?} of SIZE {} is not supported; use I or U of 1, 2, 4, 8, or F of 4, 8",
               type.substr(0, 40), size);
 }
@@ -195,35 +178,13 @@ void settle_size(const PcdHeader& header, PcdFile& file) {
 }
 
 void append_number(std::string_view word, const PcdField& field, std::string& out) {
-  const auto append = [&]<typename T>(T /*of the type*/) {
+  with_number_type(field.type, [&]<typename T>(T /*of the type*/) {
     const auto value = number_of<T>(word);
     if (!value) {
       throw Error("{} = {:?} is not a number of its TYPE and SIZE", field.name, word.substr(0, 40));
     }
     out.append(reinterpret_cast<const char*>(&*value), sizeof *value);
-  };
-  switch (field.type) {
-    case NumberType::Float64:
-      return append(double{});
-    case NumberType::Int8:
-      return append(std::int8_t{});
-    case NumberType::Int16:
-      return append(std::int16_t{});
-    case NumberType::Int32:
-      return append(std::int32_t{});
-    case NumberType::Int64:
-      return append(std::int64_t{});
-    case NumberType::UInt8:
-      return append(std::uint8_t{});
-    case NumberType::UInt16:
-      return append(std::uint16_t{});
-    case NumberType::UInt32:
-      return append(std::uint32_t{});
-    case NumberType::UInt64:
-      return append(std::uint64_t{});
-    default:
-      return append(float{});
-  }
+  });
 }
 
 /// Returns text rows in the layout of a binary file.
@@ -332,7 +293,51 @@ void parse_pcd_body(TextLines& lines, const PcdHeader& header, PcdFile& file) {
   add_field_columns(bytes, fields, DataForm::Binary, file);
 }
 
+constexpr const char* damaged = "the compressed points are damaged: {}";
+
+/// Consumes bytes from the front.
+class LzfSource {
+ public:
+  explicit LzfSource(std::string_view bytes) : bytes_(bytes) {}
+
+  bool is_empty() const { return bytes_.empty(); }
+  std::size_t next() { return static_cast<unsigned char>(take(1)[0]); }
+  std::string_view take(std::size_t count) {
+    if (count > bytes_.size()) throw Error(damaged, "they end inside a run");
+    const std::string_view taken = bytes_.substr(0, count);
+    bytes_.remove_prefix(count);
+    return taken;
+  }
+
+ private:
+  std::string_view bytes_;
+};
+
 }  // namespace
+
+std::string unpack_lzf(std::string_view packed, std::size_t size) {
+  // 3 bytes encode at most 264: a larger size is rejected before memory is allocated.
+  constexpr std::size_t most_ratio = 88;
+  if (size / most_ratio > packed.size()) throw Error(damaged, "they are too few");
+  std::string out;
+  out.reserve(size);
+  for (LzfSource source(packed); !source.is_empty();) {
+    const std::size_t control = source.next();
+    std::size_t length = control >> 5;
+    if (length == 0) {
+      out += source.take(control + 1);
+    } else {
+      if (length == 7) length += source.next();
+      const std::size_t back = ((control & 0x1f) << 8) + source.next() + 1;
+      if (back > out.size()) throw Error(damaged, "they refer to bytes before the first");
+      if (out.size() + length + 2 > size) break;
+      for (std::size_t i = 0; i < length + 2; ++i) out += out[out.size() - back];  // may overlap
+    }
+    if (out.size() > size) break;
+  }
+  if (out.size() != size) throw Error(damaged, "their unpacked size differs from the header's");
+  return out;
+}
 
 PcdFile read_pcd(const std::filesystem::path& path) {
   return parse_pcd(read_text(path), path.string());

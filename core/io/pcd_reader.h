@@ -1,5 +1,6 @@
 #pragma once
 
+#include <cstddef>
 #include <cstdint>
 #include <filesystem>
 #include <string>
@@ -30,5 +31,9 @@ PcdFile read_pcd(const std::filesystem::path& path);
 
 /// Parses bytes in memory as read_pcd does; `name` is the file name in error messages.
 PcdFile parse_pcd(std::string_view bytes, const std::string& name);
+
+/// Returns the `size` bytes that `packed` encodes in the format of Lehmann's LibLZF.
+/// @throws Error if `packed` encodes more or fewer, or refers to bytes before the first.
+std::string unpack_lzf(std::string_view packed, std::size_t size);
 
 }  // namespace groundray

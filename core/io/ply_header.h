@@ -15,8 +15,9 @@
 
 #include "core/error.h"
 #include "core/io/point_cloud.h"
+#include "core/io/text_lines.h"
 
-/// Header of a PLY file, shared by the code that reads and writes such files.
+/// Header and numbers of a PLY file, shared by the code that reads and writes such files.
 namespace groundray {
 
 static_assert(std::endian::native == std::endian::little, "rows are written as they lie in memory");
@@ -76,5 +77,42 @@ inline std::string ply_header(const std::vector<std::string>& comments,
   }
   return text + "end_header\n";
 }
+
+enum class PlyFormat { Ascii, LittleEndian, BigEndian };
+
+struct PlyHeader {
+  std::optional<PlyFormat> format;
+  std::vector<PlyElement> elements;
+  std::vector<std::string> comments, infos;  ///< texts after `comment` and `obj_info`
+};
+
+/// Reads a header, up to the first row.
+/// @throws Error with the violated rule.
+PlyHeader parse_ply_header(TextLines& lines);
+
+/// Reads the numbers of a PLY file's rows one after the other. Each fits in a double.
+class PlyValues {
+ public:
+  /// @param bytes  all bytes after the header.
+  PlyValues(std::string_view bytes, PlyFormat format) : bytes_(bytes), format_(format) {}
+
+  /// Returns the next number.
+  /// @throws Error if there is none, or it is truncated.
+  double next(std::size_t type);
+
+  /// Returns the length of the list that follows.
+  /// @throws Error naming the element and `row` if the length is invalid, or as next.
+  std::size_t next_count(std::size_t type, const std::string& element, std::uint64_t row);
+
+  /// Checks that at least one byte remains for each row of an element.
+  /// @throws Error if fewer bytes remain than the element has rows.
+  void check_rows(const PlyElement& element) const;
+
+ private:
+  double next_word();
+
+  std::string_view bytes_;
+  PlyFormat format_;
+};
 
 }  // namespace groundray

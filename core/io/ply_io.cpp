@@ -3,6 +3,7 @@
 #include <algorithm>
 #include <array>
 #include <bit>
+#include <cmath>
 #include <cstdint>
 #include <cstring>
 #include <iterator>
@@ -59,19 +60,11 @@ void gather_rows(const PointCloud& cloud, std::size_t first, std::size_t rows, s
   }
 }
 
-enum class Format { Ascii, LittleEndian, BigEndian };
-
-struct PlyHeader {
-  std::optional<Format> format;
-  std::vector<PlyElement> elements;
-  std::vector<std::string> comments;
-};
-
-Format parse_format(const std::vector<std::string_view>& words) {
+PlyFormat parse_format(const std::vector<std::string_view>& words) {
   if (words.size() == 3 && words[2] == "1.0") {
-    if (words[1] == "ascii") return Format::Ascii;
-    if (words[1] == "binary_little_endian") return Format::LittleEndian;
-    if (words[1] == "binary_big_endian") return Format::BigEndian;
+    if (words[1] == "ascii") return PlyFormat::Ascii;
+    if (words[1] == "binary_little_endian") return PlyFormat::LittleEndian;
+    if (words[1] == "binary_big_endian") return PlyFormat::BigEndian;
   }
   throw Error(
       "the format must be ascii, binary_little_endian or binary_big_endian, and the version 1.0");
@@ -129,39 +122,26 @@ void parse_ply_header_line(std::string_view line, PlyHeader& header) {
     header.elements.push_back(std::move(element));
   } else if (keyword == "property") {
     add_property(header, parse_property(words));
-  } else if (keyword != "obj_info") {
+  } else if (keyword == "obj_info") {
+    header.infos.emplace_back(line.substr(line.find(keyword) + keyword.size()));
+  } else {
     throw Error("{:?} must be format, element, property, comment, obj_info or end_header",
                 keyword.substr(0, 40));
   }
 }
 
-PlyHeader parse_ply_header(TextLines& lines) {
-  if (lines.next() != "ply" || !lines.ended())
-    throw Error("the first line must be 'ply': is this a PLY file?");
-  PlyHeader header;
-  for (auto line = lines.next(); line != "end_header" || !lines.ended(); line = lines.next()) {
-    if (!line || !lines.ended())
-      throw Error("the header lacks its last line, end_header: is the file truncated?");
-    parse_ply_header_line(*line, header);
-  }
-  if (!header.format) throw Error("the header must name a format");
-  if (std::ranges::find(header.elements, "vertex", &PlyElement::name) == header.elements.end()) {
-    throw Error("the header must have an element vertex");
-  }
-  return header;
-}
-
 /// Returns the smallest size of a row: lists are empty, and an ASCII value takes a digit and a
 /// blank.
-std::size_t least_row_bytes(const PlyElement& element, Format format) {
+std::size_t least_row_bytes(const PlyElement& element, PlyFormat format) {
   std::size_t bytes = 0;
   for (const PlyProperty& property : element.properties) {
-    bytes += format == Format::Ascii ? 2 : type_bytes(property.count_type.value_or(property.type));
+    bytes +=
+        format == PlyFormat::Ascii ? 2 : type_bytes(property.count_type.value_or(property.type));
   }
   return bytes;
 }
 
-void check_fits(const PlyElement& element, Format format, std::size_t bytes) {
+void check_fits(const PlyElement& element, PlyFormat format, std::size_t bytes) {
   const std::size_t row_bytes = least_row_bytes(element, format);
   if (row_bytes == 0 && element.rows > 0)
     throw Error("the element {} has no property", element.name);
@@ -174,14 +154,14 @@ void check_fits(const PlyElement& element, Format format, std::size_t bytes) {
 }
 
 template <typename T>
-T load_property(const char* from, Format format) {
+T load_property(const char* from, PlyFormat format) {
   std::array<char, sizeof(T)> bytes;
   std::copy_n(from, sizeof(T), bytes.begin());
-  if (format == Format::BigEndian) std::ranges::reverse(bytes);
+  if (format == PlyFormat::BigEndian) std::ranges::reverse(bytes);
   return std::bit_cast<T>(bytes);
 }
 
-void skip_binary(const PlyElement& element, Format format, std::string_view& bytes) {
+void skip_binary(const PlyElement& element, PlyFormat format, std::string_view& bytes) {
   const auto drop = [&](std::uint64_t count, std::size_t size) {
     if (count > bytes.size() / size) throw Error("the element {} is truncated", element.name);
     bytes.remove_prefix(count * size);
@@ -215,7 +195,7 @@ std::vector<void*> add_property_columns(const PlyElement& vertex, PointCloud& cl
   return columns;
 }
 
-void scatter_rows(std::string_view bytes, Format format, const PlyElement& vertex,
+void scatter_rows(std::string_view bytes, PlyFormat format, const PlyElement& vertex,
                   const std::vector<void*>& columns) {
   const std::size_t stride = least_row_bytes(vertex, format);
   const std::size_t rows_per_block = block_bytes / (stride + 1) + 1;
@@ -258,12 +238,12 @@ void parse_ply_rows(TextLines& lines, const PlyElement& vertex, const std::vecto
 }
 
 PointCloud parse_ply_body(TextLines& lines, const PlyHeader& header) {
-  const Format format = *header.format;
+  const PlyFormat format = *header.format;
   std::string_view bytes = lines.rest();
   auto element = header.elements.begin();
   for (; element->name != "vertex"; ++element) {
     check_fits(*element, format, bytes.size());
-    if (format != Format::Ascii) {
+    if (format != PlyFormat::Ascii) {
       skip_binary(*element, format, bytes);
       continue;
     }
@@ -273,7 +253,7 @@ PointCloud parse_ply_body(TextLines& lines, const PlyHeader& header) {
   check_fits(*element, format, bytes.size());
   PointCloud cloud(element->rows);
   const std::vector<void*> columns = add_property_columns(*element, cloud);
-  if (format == Format::Ascii) {
+  if (format == PlyFormat::Ascii) {
     parse_ply_rows(lines, *element, columns);
     bytes = lines.rest();
     bytes.remove_prefix(std::min(bytes.find_first_not_of(" \t\r\n"), bytes.size()));
@@ -289,6 +269,57 @@ PointCloud parse_ply_body(TextLines& lines, const PlyHeader& header) {
 }
 
 }  // namespace
+
+PlyHeader parse_ply_header(TextLines& lines) {
+  if (lines.next() != "ply" || !lines.ended())
+    throw Error("the first line must be 'ply': is this a PLY file?");
+  PlyHeader header;
+  for (auto line = lines.next(); line != "end_header" || !lines.ended(); line = lines.next()) {
+    if (!line || !lines.ended())
+      throw Error("the header lacks its last line, end_header: is the file truncated?");
+    parse_ply_header_line(*line, header);
+  }
+  if (!header.format) throw Error("the header must name a format");
+  if (std::ranges::find(header.elements, "vertex", &PlyElement::name) == header.elements.end()) {
+    throw Error("the header must have an element vertex");
+  }
+  return header;
+}
+
+double PlyValues::next(std::size_t type) {
+  if (format_ == PlyFormat::Ascii) return next_word();
+  return with_type(type, [this](auto value) {
+    if (bytes_.size() < sizeof value) throw Error("the last row is incomplete: is it truncated?");
+    value = load_property<decltype(value)>(bytes_.data(), format_);
+    bytes_.remove_prefix(sizeof value);
+    return static_cast<double>(value);
+  });
+}
+
+std::size_t PlyValues::next_count(std::size_t type, const std::string& element, std::uint64_t row) {
+  const double count = next(type);
+  if (!(count >= 0 && count <= static_cast<double>(bytes_.size())) || count != std::floor(count))
+    throw Error("row {} of element {} has a list of {} numbers", row, element, count);
+  return static_cast<std::size_t>(count);
+}
+
+double PlyValues::next_word() {
+  constexpr std::string_view blanks = " \t\r\n";
+  bytes_.remove_prefix(std::min(bytes_.find_first_not_of(blanks), bytes_.size()));
+  const std::string_view word = bytes_.substr(0, bytes_.find_first_of(blanks));
+  if (word.size() == bytes_.size())
+    throw Error("the last line lacks its line break: is it truncated?");
+  bytes_.remove_prefix(word.size());
+  const auto value = number_of<double>(word);
+  if (!value) throw Error("{:?} is not a number", word.substr(0, 40));
+  return *value;
+}
+
+void PlyValues::check_rows(const PlyElement& element) const {
+  if (element.rows <= bytes_.size()) return;
+  throw Error("{} rows of element {} do not fit in {} bytes: is it truncated?", element.rows,
+              element.name, bytes_.size());
+}
 
 void write_ply(const std::filesystem::path& path, const PointCloud& cloud,
                const std::vector<std::string>& comments) {
@@ -332,7 +363,7 @@ PlyFile parse_ply(std::string_view bytes, const std::string& name) {
     PointCloud cloud = parse_ply_body(lines, header);
     return {std::move(cloud), std::move(header.comments)};
   } catch (const Error& rule) {
-    if (header.format.value_or(Format::Ascii) != Format::Ascii)
+    if (header.format.value_or(PlyFormat::Ascii) != PlyFormat::Ascii)
       throw Error("{}: {}", name, rule.what());
     throw Error("{}:{}: {}", name, lines.number(), rule.what());
   }

@@ -1,5 +1,3 @@
-#include "core/model/assimp_guard.h"
-
 #include <tinyxml2.h>
 
 #include <algorithm>
@@ -13,6 +11,7 @@
 
 #include "core/error.h"
 #include "core/io/text_lines.h"
+#include "core/model/polygon_soup.h"
 
 namespace groundray {
 namespace {

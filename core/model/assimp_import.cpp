@@ -1,5 +1,3 @@
-#include "core/model/assimp_import.h"
-
 #include <assimp/BaseImporter.h>
 #include <assimp/GltfMaterial.h>
 #include <assimp/config.h>
@@ -27,6 +25,7 @@
 #include "core/error.h"
 #include "core/image/image_io.h"
 #include "core/io/file_io.h"
+#include "core/model/polygon_soup.h"
 
 namespace groundray {
 namespace {
@@ -283,6 +282,13 @@ PolygonSoup read_scene_file(const std::filesystem::path& path, SceneForm form) {
   } catch (const std::exception& fault) {
     throw Error("{}: assimp cannot read it: {}", name, fault.what());
   }
+}
+
+PolygonSoup read_gltf(const std::filesystem::path& path, std::string_view bytes) {
+  const std::size_t named = check_gltf(bytes, path.string());
+  PolygonSoup soup = read_scene_file(path, SceneForm::Gltf);
+  soup.omitted = named - std::min(named, soup.faces);
+  return soup;
 }
 
 }  // namespace groundray

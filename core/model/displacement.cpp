@@ -5,13 +5,13 @@
 #include <cmath>
 #include <cstdint>
 #include <glm/geometric.hpp>
-#include <numeric>
 #include <unordered_map>
 #include <utility>
 #include <vector>
 
 #include "core/appearance/texture.h"
 #include "core/error.h"
+#include "core/geometry/corner_stars.h"
 
 namespace groundray {
 namespace {
@@ -131,35 +131,14 @@ class Refiner {
   std::unordered_map<std::uint64_t, std::uint32_t> middles_;  // by edge
 };
 
-// Position number of each vertex, from 0; vertices at the same position have the same number.
-struct Places {
-  std::vector<std::uint32_t> of;
-  std::uint32_t count = 0;
-};
-Places places_of(const std::vector<glm::dvec3>& vertices_m) {
-  std::vector<std::uint32_t> order(vertices_m.size());
-  std::iota(order.begin(), order.end(), 0u);
-  const auto key = [&](std::uint32_t i) {
-    const glm::dvec3& p = vertices_m[i];
-    return std::array{p.x, p.y, p.z};
-  };
-  std::ranges::sort(order, {}, [&](std::uint32_t i) { return std::pair(key(i), i); });
-  Places places{std::vector<std::uint32_t>(vertices_m.size()), 0};
-  for (std::size_t k = 0; k < order.size(); ++k) {
-    if (k > 0 && key(order[k]) != key(order[k - 1])) ++places.count;
-    places.of[order[k]] = places.count;
-  }
-  ++places.count;
-  return places;
-}
-
 // Sums of the area-weighted facet normals at each position; not normalised.
-std::vector<glm::dvec3> facet_normals(const Model& model, const Places& places) {
-  std::vector<glm::dvec3> normals(places.count, glm::dvec3(0));
+std::vector<glm::dvec3> facet_normals(const Model& model,
+                                      const std::vector<std::uint32_t>& places) {
+  std::vector<glm::dvec3> normals(places.size(), glm::dvec3(0));
   const auto& p = model.mesh.vertices_m;
   for (const glm::uvec3& t : model.mesh.triangles) {
     const glm::dvec3 normal = glm::cross(p[t.y] - p[t.x], p[t.z] - p[t.x]);
-    for (int k = 0; k < 3; ++k) normals[places.of[t[k]]] += normal;
+    for (int k = 0; k < 3; ++k) normals[places[t[k]]] += normal;
   }
   return normals;
 }
@@ -177,27 +156,27 @@ Model displaced(const Model& model, const Displacement& by) {
   Model result = model;
   Refiner(result, by.cell_m).run();
   auto& vertices_m = result.mesh.vertices_m;
-  const Places places = places_of(vertices_m);
+  const std::vector<std::uint32_t> places = place_numbers(vertices_m);
   std::vector<glm::dvec3> normals = facet_normals(result, places);
   if (!result.normals.empty()) {
     std::ranges::fill(normals, glm::dvec3(0));
     for (std::size_t i = 0; i < vertices_m.size(); ++i)
-      normals[places.of[i]] += glm::dvec3(result.normals[i]);
+      normals[places[i]] += glm::dvec3(result.normals[i]);
   }
-  std::vector<double> height_m(places.count), copies(places.count);
+  std::vector<double> height_m(places.size()), copies(places.size());
   for (std::size_t i = 0; i < vertices_m.size(); ++i) {
     const double value = heights.color(glm::dvec2(result.uv[i])).r;
-    height_m[places.of[i]] += by.amplitude_m * (value - by.middle);
-    ++copies[places.of[i]];
+    height_m[places[i]] += by.amplitude_m * (value - by.middle);
+    ++copies[places[i]];
   }
   for (std::size_t i = 0; i < vertices_m.size(); ++i) {
-    const std::uint32_t place = places.of[i];
+    const std::uint32_t place = places[i];
     vertices_m[i] += unit(normals[place]) * (height_m[place] / copies[place]);
   }
   if (result.normals.empty()) return result;
   normals = facet_normals(result, places);
   for (std::size_t i = 0; i < vertices_m.size(); ++i) {
-    const glm::dvec3 normal = unit(normals[places.of[i]]);
+    const glm::dvec3 normal = unit(normals[places[i]]);
     result.normals[i] = normal == glm::dvec3(0) ? glm::vec3(0, 0, 1) : glm::vec3(normal);
   }
   return result;

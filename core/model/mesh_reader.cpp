@@ -10,16 +10,11 @@
 #include <utility>
 
 #include "core/error.h"
-#include "core/geometry/mesh_check.h"
-#include "core/io/file_ending.h"
+#include "core/geometry/mesh.h"
 #include "core/io/file_io.h"
 #include "core/io/mesh_io.h"
 #include "core/io/ply_io.h"
 #include "core/io/text_lines.h"
-#include "core/model/assimp_guard.h"
-#include "core/model/assimp_import.h"
-#include "core/model/obj_reader.h"
-#include "core/model/ply_reader.h"
 #include "core/model/polygon_soup.h"
 
 namespace groundray {
@@ -31,7 +26,6 @@ using nlohmann::json;
 struct MeshReading {
   PolygonSoup soup;
   Georeference georeference;
-  std::size_t dropped = 0;  // invalid polygons that the soup does not contain
 };
 
 void check_origin(const glm::dvec3& origin_m) {
@@ -116,15 +110,12 @@ Georeference gltf_georeference(std::string_view bytes) {
   return georeference;
 }
 
-/// Reads a glTF mesh in D's axes. assimp omits triangles whose indices are out of range, so they
-/// are counted by comparison with the number in the file.
+/// Reads a glTF mesh in D's axes.
 MeshReading read_gltf_mesh(const fs::path& path) {
   const std::string bytes = read_text(path);
-  const std::size_t named = check_gltf(bytes, path.string());
-  MeshReading reading{.soup = read_scene_file(path, SceneForm::Gltf)};
+  MeshReading reading{.soup = read_gltf(path, bytes)};
   for (glm::dvec3& p : reading.soup.positions) p = {p.x, -p.z, p.y};
   for (glm::vec3& n : reading.soup.normals) n = {n.x, -n.z, n.y};
-  reading.dropped = named - std::min(named, reading.soup.faces);
   try {
     reading.georeference = gltf_georeference(bytes);
   } catch (const json::exception& fault) {
@@ -171,7 +162,7 @@ MeshFile read_mesh(const fs::path& path) {
   ModelFaults faults;
   MeshFile file{.mesh = model_of(reading.soup, faults).mesh,
                 .georeference = std::move(reading.georeference),
-                .dropped = reading.dropped + faults.total(),
+                .dropped = reading.soup.omitted + faults.total(),
                 .skipped = reading.soup.skipped,
                 .rounding_m = reading.soup.rounding};
   check_some(file, path.string());

@@ -13,12 +13,7 @@
 #include <vector>
 
 #include "core/error.h"
-#include "core/io/file_ending.h"
 #include "core/io/file_io.h"
-#include "core/model/assimp_guard.h"
-#include "core/model/assimp_import.h"
-#include "core/model/obj_reader.h"
-#include "core/model/ply_reader.h"
 #include "core/model/polygon_soup.h"
 
 namespace groundray {
@@ -26,19 +21,6 @@ namespace {
 
 namespace fs = std::filesystem;
 using SoupSurface = PolygonSoup::Surface;
-
-enum class ModelForm { Obj, Ply, Stl, Gltf, Collada };
-
-ModelForm model_form_of(const fs::path& path) {
-  const std::string ending = file_ending(path);
-  if (ending == ".obj") return ModelForm::Obj;
-  if (ending == ".ply") return ModelForm::Ply;
-  if (ending == ".stl") return ModelForm::Stl;
-  if (ending == ".gltf" || ending == ".glb") return ModelForm::Gltf;
-  if (ending == ".dae") return ModelForm::Collada;
-  throw Error("{}: the name of a model must end in .obj, .ply, .stl, .gltf, .glb or .dae",
-              path.string());
-}
 
 /// Decodes percent-encoded characters of a URI, such as %41.
 std::string without_percents(std::string_view text) {
@@ -102,7 +84,6 @@ struct ModelReading {
   double metres_per_unit = 1;  // as the file states
   double unit_of_soup_m = 1;
   UpAxis up = UpAxis::Z;
-  std::size_t out_of_range = 0;  // invalid polygons that the soup does not contain
 };
 
 ModelReading read_obj(const fs::path& path) {
@@ -118,28 +99,16 @@ ModelReading read_collada(const fs::path& path) {
           .up = asset.up};
 }
 
-/// Reads a glTF model. assimp omits triangles whose indices are out of range and only logs this, so
-/// they are counted by comparison with the number in the file.
-ModelReading read_gltf_model(const fs::path& path) {
-  const std::size_t named = check_gltf(read_text(path), path.string());
-  ModelReading reading{.soup = read_scene_file(path, SceneForm::Gltf), .up = UpAxis::Y};
-  reading.out_of_range = named - std::min(named, reading.soup.faces);
-  return reading;
-}
-
-ModelReading read_model_file(const fs::path& path, ModelForm form) {
-  switch (form) {
-    case ModelForm::Obj:
-      return read_obj(path);
-    case ModelForm::Ply:
-      return {.soup = parse_ply_faces(read_text(path), path.string())};
-    case ModelForm::Stl:
-      return {.soup = read_scene_file(path, SceneForm::Stl)};
-    case ModelForm::Gltf:
-      return read_gltf_model(path);
-    default:
-      return read_collada(path);
-  }
+ModelReading read_model_file(const fs::path& path) {
+  const std::string ending = file_ending(path);
+  if (ending == ".obj") return read_obj(path);
+  if (ending == ".ply") return {.soup = parse_ply_faces(read_text(path), path.string())};
+  if (ending == ".stl") return {.soup = read_scene_file(path, SceneForm::Stl)};
+  if (ending == ".gltf" || ending == ".glb")
+    return {.soup = read_gltf(path, read_text(path)), .up = UpAxis::Y};
+  if (ending == ".dae") return read_collada(path);
+  throw Error("{}: the name of a model must end in .obj, .ply, .stl, .gltf, .glb or .dae",
+              path.string());
 }
 
 template <typename V>
@@ -200,8 +169,7 @@ ModelFile read_model(const fs::path& path, const ModelOptions& options) {
   if (!(scale > 0 && std::isfinite(scale))) {
     throw Error("{}: metres_per_unit = {} must be positive", path.string(), scale);
   }
-  const ModelForm form = model_form_of(path);
-  ModelReading reading = read_model_file(path, form);
+  ModelReading reading = read_model_file(path);
   PolygonSoup& soup = reading.soup;
   turn_and_scale(reading, options);
   if (soup.surfaces.size() > std::numeric_limits<std::uint16_t>::max()) {
@@ -209,7 +177,7 @@ ModelFile read_model(const fs::path& path, const ModelOptions& options) {
                 soup.surfaces.size());
   }
   ModelFile file{.skipped = soup.skipped, .rounding_m = soup.rounding};
-  file.dropped.out_of_range = reading.out_of_range;
+  file.dropped.out_of_range = soup.omitted;
   file.model = model_of(soup, file.dropped);
   if (options.broken == BrokenParts::Refuse) refuse_faults(path, file);
   if (file.model.mesh.triangles.empty()) {

@@ -1,8 +1,5 @@
-#include "core/model/obj_reader.h"
-
 #include <algorithm>
 #include <array>
-#include <cmath>
 #include <cstdint>
 #include <limits>
 #include <map>
@@ -12,6 +9,7 @@
 
 #include "core/error.h"
 #include "core/io/text_lines.h"
+#include "core/model/polygon_soup.h"
 
 namespace groundray {
 namespace {

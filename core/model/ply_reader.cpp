@@ -1,5 +1,3 @@
-#include "core/model/ply_reader.h"
-
 #include <algorithm>
 #include <array>
 #include <cmath>
@@ -10,7 +8,7 @@
 #include "core/io/ply_header.h"
 #include "core/io/ply_io.h"
 #include "core/io/text_lines.h"
-#include "core/model/ply_values.h"
+#include "core/model/polygon_soup.h"
 
 namespace groundray {
 namespace {
@@ -105,19 +103,19 @@ void read_lists(const PlyElement& element, PlyValues& values, PolygonSoup& soup)
 }  // namespace
 
 PolygonSoup parse_ply_faces(std::string_view bytes, const std::string& name) {
-  const std::vector<std::string> comments = parse_ply(bytes, name).comments;
+  parse_ply(bytes, name);  // rejects what is wrong with the header or the vertices
+  TextLines lines(bytes);
+  const PlyHeader header = parse_ply_header(lines);
   PolygonSoup soup;
   soup.surfaces.push_back({.looks = {.name = "default"}});
   constexpr std::string_view texture = "TextureFile ";
-  for (const std::string& comment : comments) {
+  for (const std::string& comment : header.comments) {
     if (comment.starts_with(texture)) soup.surfaces[0].albedo = comment.substr(texture.size());
   }
-  TextLines lines(bytes);
-  const PlyLayout layout = ply_layout(lines);
-  PlyValues values(lines.rest(), layout.format);
+  PlyValues values(lines.rest(), *header.format);
   try {
-    for (const PlyElement& element : layout.elements) {
-      check_rows(element, values);
+    for (const PlyElement& element : header.elements) {
+      values.check_rows(element);
       if (element.name == "vertex") {
         read_vertices(element, values, soup);
       } else if (element.name == "tristrips" && element.rows > 0) {

@@ -10,7 +10,6 @@
 #include <span>
 #include <unordered_map>
 
-#include "core/error.h"
 #include "core/image/srgb.h"
 
 namespace groundray {

@@ -2,9 +2,12 @@
 
 #include <cstddef>
 #include <cstdint>
+#include <filesystem>
+#include <functional>
 #include <glm/vec2.hpp>
 #include <glm/vec3.hpp>
 #include <string>
+#include <string_view>
 #include <vector>
 
 #include "core/model/model_io.h"
@@ -37,6 +40,7 @@ struct PolygonSoup {
   std::vector<Surface> surfaces;
   std::size_t skipped = 0;  ///< number of points, lines and curved patches
   std::size_t faces = 0;    ///< polygons of all meshes, without repeated instances
+  std::size_t omitted = 0;  ///< polygons of the file that are not here: their indices are invalid
   double rounding = 0;  ///< bound of the error of a position's coordinates that is due to floats
 };
 
@@ -52,5 +56,60 @@ Model model_of(const PolygonSoup& soup, ModelFaults& faults);
 /// Returns the mesh alone. Its vertices are all positions of the soup in their order, used or not;
 /// polygons are triangulated and counted as by model_of.
 TriangleMesh stored_mesh_of(const PolygonSoup& soup, ModelFaults& faults);
+
+/// Reads Wavefront OBJ: v, vt, vn, f, usemtl and mtllib; l, p and curved patches are counted. Names
+/// of materials and of .mtl files may contain " #": it begins a comment only if the full name does
+/// not exist.
+/// @param name      file name in error messages.
+/// @param read_mtl  returns the text of the named .mtl file, or throws Error if there is none; the
+///         line is added to its Errors.
+/// @throws Error naming file, line and rule.
+/// @see Wavefront, Advanced Visualizer, appendix B1: Object Files (.obj).
+PolygonSoup parse_obj(std::string_view text, const std::string& name,
+                      const std::function<std::string(const std::string&)>& read_mtl);
+
+/// Reads the faces of a PLY file and their vertices. Properties of vertices: x, y, z; nx, ny, nz;
+/// s, t or u, v or texture_u, texture_v. Lists of faces: vertex_indices or vertex_index, and
+/// texcoord, which takes precedence over the vertices' uv. The comment TextureFile names the albedo
+/// image.
+/// @param name  file name in error messages.
+/// @throws Error as parse_ply, if the file is truncated, or if it has triangle strips.
+/// @see Turk, The PLY polygon file format (1994).
+PolygonSoup parse_ply_faces(std::string_view bytes, const std::string& name);
+
+/// Formats that are read by assimp.
+enum class SceneForm { Stl, Gltf, Collada };
+
+/// Reads the polygons of a scene file, in its own axes and, except for Collada, its own units:
+/// assimp converts Collada to metres, with the unit as a float. Transforms of nodes are applied in
+/// double.
+/// @throws Error if assimp cannot read the file, or an image inside it cannot be decoded.
+PolygonSoup read_scene_file(const std::filesystem::path& path, SceneForm form);
+
+/// Reads the polygons of a .gltf or .glb as read_scene_file does, after check_gltf. assimp omits
+/// triangles whose indices are out of range and only logs this, so they are counted by comparison
+/// with the number in the file.
+/// @param bytes  of the file.
+PolygonSoup read_gltf(const std::filesystem::path& path, std::string_view bytes);
+
+// Checks for faults on which assimp would crash or never return, or that it would silently ignore.
+
+/// Checks a .gltf or .glb and returns the number of triangles that it declares.
+/// @param name  file name in error messages.
+/// @throws Error if it is not JSON or is nested more than 100 deep, a chunk of the .glb exceeds the
+///         file, a view exceeds its buffer or an accessor its view, an item that is referred to
+///         does not exist, or nodes are nested as for check_collada.
+std::size_t check_gltf(std::string_view bytes, const std::string& name);
+
+struct ColladaAsset {
+  double metres_per_unit = 1;
+  UpAxis up = UpAxis::Y;
+};
+
+/// Checks a .dae and returns its unit and up axis.
+/// @throws Error if it is not XML, the unit is not positive, numbers are malformed or have no
+///         count, or a node has itself as a part, directly or by `instance_node`, parts nested more
+///         than 1000 deep, or more than 10^6 of them.
+ColladaAsset check_collada(std::string_view text, const std::string& name);
 
 }  // namespace groundray

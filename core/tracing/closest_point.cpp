@@ -1,6 +1,5 @@
 #include "core/tracing/closest_point.h"
 
-#include <algorithm>
 #include <cmath>
 #include <glm/common.hpp>
 #include <glm/geometric.hpp>
@@ -8,7 +7,7 @@
 #include <utility>
 
 #include "core/error.h"
-#include "core/geometry/mesh_check.h"
+#include "core/geometry/mesh.h"
 #include "core/tracing/device.h"
 #include "core/tracing/embree_adapter.h"
 
@@ -151,12 +150,7 @@ ClosestPoint::Impl::Impl(TriangleMesh content, const RayDevice& with)
   }
   centre_m = 0.5 * (low + high);
   rounding_m = 1e-14 * glm::length(high - low);
-  const Owned<RTCGeometry> geometry(rtcNewGeometry(handle(device), RTC_GEOMETRY_TYPE_USER));
-  rtcSetGeometryUserPrimitiveCount(geometry.get(), static_cast<unsigned>(mesh.triangles.size()));
-  rtcSetGeometryUserData(geometry.get(), this);
-  rtcSetGeometryBoundsFunction(geometry.get(), bound_triangle, nullptr);
-  rtcCommitGeometry(geometry.get());
-  rtcAttachGeometryByID(scene.get(), geometry.get(), 0);
+  attach_primitives(device, scene.get(), 0, mesh.triangles.size(), this, bound_triangle, nullptr);
   commit(scene.get());
   check(device, "building a mesh for closest-point queries");
 }

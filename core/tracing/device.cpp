@@ -60,14 +60,29 @@ void commit(RTCScene scene) {
       0, 1, [scene](int) { rtcCommitScene(scene); }, *context);
 }
 
+void attach(RTCScene scene, const Owned<RTCGeometry>& geometry, unsigned id) {
+  rtcCommitGeometry(geometry.get());
+  rtcAttachGeometryByID(scene, geometry.get(), id);
+}
+
+void attach_primitives(const RayDevice& device, RTCScene scene, unsigned id, std::size_t count,
+                       const void* data, RTCBoundsFunction bounds, RTCIntersectFunctionN intersect,
+                       std::size_t time_steps) {
+  const Owned<RTCGeometry> geometry(rtcNewGeometry(handle(device), RTC_GEOMETRY_TYPE_USER));
+  rtcSetGeometryUserPrimitiveCount(geometry.get(), static_cast<unsigned>(count));
+  rtcSetGeometryTimeStepCount(geometry.get(), static_cast<unsigned>(time_steps));
+  rtcSetGeometryUserData(geometry.get(), const_cast<void*>(data));
+  rtcSetGeometryBoundsFunction(geometry.get(), bounds, nullptr);
+  if (intersect != nullptr) rtcSetGeometryIntersectFunction(geometry.get(), intersect);
+  attach(scene, geometry, id);
+}
+
 RTCScene instance_all(const RayDevice& device, std::span<const RTCScene> scenes) {
   RTCScene all = new_scene(device);
   for (unsigned i = 0; i < scenes.size(); ++i) {
-    RTCGeometry instance = rtcNewGeometry(handle(device), RTC_GEOMETRY_TYPE_INSTANCE);
-    rtcSetGeometryInstancedScene(instance, scenes[i]);
-    rtcCommitGeometry(instance);
-    rtcAttachGeometryByID(all, instance, i);
-    rtcReleaseGeometry(instance);
+    const Owned<RTCGeometry> instance(rtcNewGeometry(handle(device), RTC_GEOMETRY_TYPE_INSTANCE));
+    rtcSetGeometryInstancedScene(instance.get(), scenes[i]);
+    attach(all, instance, i);
   }
   commit(all);
   return all;

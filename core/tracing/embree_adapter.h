@@ -29,25 +29,11 @@ struct Release {
 template <typename T>
 using Owned = std::unique_ptr<std::remove_pointer_t<T>, Release>;
 
-/// Embree's struct for packets of W rays, as PacketOf<W>::Type.
+/// Embree's struct for packets of W rays: 1, 4, 8 or 16.
 template <int W>
-struct PacketOf;
-template <>
-struct PacketOf<1> {
-  using Type = RTCRayHit;
-};
-template <>
-struct PacketOf<4> {
-  using Type = RTCRayHit4;
-};
-template <>
-struct PacketOf<8> {
-  using Type = RTCRayHit8;
-};
-template <>
-struct PacketOf<16> {
-  using Type = RTCRayHit16;
-};
+using PacketOf = std::conditional_t<
+    W == 1, RTCRayHit,
+    std::conditional_t<W == 4, RTCRayHit4, std::conditional_t<W == 8, RTCRayHit8, RTCRayHit16>>>;
 
 /// Similarity of neighbouring rays in a packet. Coherent traversal is several times as fast if they
 /// are similar.
@@ -56,8 +42,8 @@ enum class Coherence { Coherent, Incoherent };
 /// Intersects the lanes of a packet whose `valid` is -1 with a scene; callbacks of user geometry
 /// receive `context`.
 template <int W>
-void intersect(RTCScene scene, const int* valid, typename PacketOf<W>::Type& packet,
-               QueryContext& context, Coherence coherence) noexcept {
+void intersect(RTCScene scene, const int* valid, PacketOf<W>& packet, QueryContext& context,
+               Coherence coherence) noexcept {
 #if GROUNDRAY_EMBREE >= 4
   rtcInitRayQueryContext(&context);
   RTCIntersectArguments arguments;

@@ -1,6 +1,7 @@
 #pragma once
 
 #include <cstdint>
+#include <glm/vec2.hpp>
 
 namespace groundray {
 
@@ -22,6 +23,34 @@ struct Leaf {
   /// Returns true if triangles may lie over holes of the DEM, or be missing where it has ground.
   constexpr bool bridges() const noexcept { return has_holes && (step > 1 || coarser != 0); }
   friend bool operator==(const Leaf&, const Leaf&) = default;
+};
+
+/// Rule of thinned sides, for the cells of a leaf or node (pictures: terrain/lod/passes/README.md):
+/// every second point of such a side is omitted, and one cell of each pair at it is split along the
+/// other diagonal. A pair that the DEM's boundary cuts off has one cell and omits no point.
+struct ThinnedBlock {
+  glm::ivec2 cells{2};       ///< columns and rows
+  std::uint8_t thinned = 0;  ///< thinned sides, as Leaf::Side
+
+  constexpr bool thins(Leaf::Side side) const noexcept { return (thinned & side) != 0; }
+
+  /// Returns whether a point is omitted.
+  constexpr bool drops(int column, int row) const noexcept {
+    const bool odd_column = column % 2 == 1 && column < cells.x;
+    const bool odd_row = row % 2 == 1 && row < cells.y;
+    return (odd_column &&
+            ((row == 0 && thins(Leaf::North)) || (row == cells.y && thins(Leaf::South)))) ||
+           (odd_row &&
+            ((column == 0 && thins(Leaf::West)) || (column == cells.x && thins(Leaf::East))));
+  }
+
+  /// Returns whether a cell is split along its main diagonal.
+  constexpr bool splits_along_main(int column, int row) const noexcept {
+    return (row == 0 && thins(Leaf::North) && column % 2 == 0 && column + 1 < cells.x) ||
+           (column == 0 && thins(Leaf::West) && row % 2 == 0 && row + 1 < cells.y) ||
+           (row == cells.y - 1 && thins(Leaf::South) && column % 2 == 1) ||
+           (column == cells.x - 1 && thins(Leaf::East) && row % 2 == 1);
+  }
 };
 
 }  // namespace groundray

@@ -9,9 +9,9 @@
 
 #include "core/error.h"
 #include "core/tracing/device.h"
-#include "core/tracing/exact_query.h"
 #include "core/tracing/leaf_cells.h"
 #include "core/tracing/level_scene.h"
+#include "core/tracing/level_surface.h"
 
 namespace groundray {
 namespace {
@@ -40,8 +40,8 @@ void add_triangle(const LeafCells& cells, unsigned first_point, glm::ivec2 cell,
     if (!other_split) return;  // the other cell of the pair adds this triangle
     whole = false;
     const glm::ivec2 inward = cell + cell + 1 - corner;  // diagonally opposite corner of the cell
-    const bool along_row = corner.x % 2 == 1 && (corner.y == 0 || corner.y == cells.rows);
-    corner += along_row ? glm::ivec2(corner.x - inward.x, 0) : glm::ivec2(0, corner.y - inward.y);
+    corner += cells.drops_in_row(corner) ? glm::ivec2(corner.x - inward.x, 0)
+                                         : glm::ivec2(0, corner.y - inward.y);
   }
   glm::uvec3 triangle;
   for (int k = 0; k < 3; ++k) {
@@ -95,12 +95,6 @@ void add_leaf(const LeafCells& cells, unsigned first_point, LevelPart& out,
   }
 }
 
-void attach_and_release(RTCScene scene, RTCGeometry geometry, unsigned id) {
-  rtcCommitGeometry(geometry);
-  rtcAttachGeometryByID(scene, geometry, id);
-  rtcReleaseGeometry(geometry);
-}
-
 template <typename T>
 T* checked_memory(void* memory) {
   if (memory == nullptr)
@@ -115,7 +109,8 @@ void copy_to_buffer(RTCGeometry geometry, RTCBufferType type, RTCFormat format,
                                                                       sizeof(T), values.size())));
 }
 
-void build_fast_part(RTCDevice device, const LevelScene::Impl& level, LevelPart& part) {
+void build_fast_part(const LevelScene::Impl& level, LevelPart& part) {
+  RTCDevice device = handle(level.device);
   const std::vector<Leaf>& leaves = part.leaves;
   std::vector<unsigned> first_points(leaves.size());
   std::size_t point_count = 0;
@@ -139,11 +134,11 @@ void build_fast_part(RTCDevice device, const LevelScene::Impl& level, LevelPart&
   const auto add = [&](RTCGeometryType type, unsigned id, auto kind, RTCFormat format,
                        const auto& list) {
     if (list.empty()) return;
-    RTCGeometry geometry = rtcNewGeometry(device, type);
-    rtcSetGeometryBuffer(geometry, RTC_BUFFER_TYPE_VERTEX, 0, RTC_FORMAT_FLOAT3, buffer, 0,
+    const Owned<RTCGeometry> geometry(rtcNewGeometry(device, type));
+    rtcSetGeometryBuffer(geometry.get(), RTC_BUFFER_TYPE_VERTEX, 0, RTC_FORMAT_FLOAT3, buffer, 0,
                          sizeof(glm::vec3), point_count);
-    copy_to_buffer(geometry, kind, format, list);
-    attach_and_release(part.scene, geometry, id);
+    copy_to_buffer(geometry.get(), kind, format, list);
+    attach(part.scene, geometry, id);
   };
   add(RTC_GEOMETRY_TYPE_GRID, block_geometry, RTC_BUFFER_TYPE_GRID, RTC_FORMAT_GRID,
       primitives.grids);
@@ -208,19 +203,15 @@ void intersect_leaf(const RTCIntersectFunctionNArguments* arguments) {
   }
 }
 
-void build_exact_part(RTCDevice device, const LevelScene::Impl& level, LevelPart& part) {
+void build_exact_part(const LevelScene::Impl& level, LevelPart& part) {
   part.built_for = &level;
   for (const Leaf& leaf : part.leaves) {
     const LeafCells cells{level, leaf};
     part.areas.push_back(
         {{cells.column(0), cells.row(0)}, {cells.column(cells.columns), cells.row(cells.rows)}});
   }
-  RTCGeometry geometry = rtcNewGeometry(device, RTC_GEOMETRY_TYPE_USER);
-  rtcSetGeometryUserPrimitiveCount(geometry, static_cast<unsigned>(part.leaves.size()));
-  rtcSetGeometryUserData(geometry, &part);
-  rtcSetGeometryBoundsFunction(geometry, leaf_bounds, nullptr);
-  rtcSetGeometryIntersectFunction(geometry, intersect_leaf);
-  attach_and_release(part.scene, geometry, block_geometry);
+  attach_primitives(level.device, part.scene, block_geometry, part.leaves.size(), &part,
+                    leaf_bounds, intersect_leaf);
 }
 
 }  // namespace
@@ -237,9 +228,9 @@ std::shared_ptr<const LevelPart> build_part(const LevelScene::Impl& level, glm::
   part->slack_m = 2 * level.slack_m;  // so that the level's own slack may grow on reuse
   part->scene = new_scene(level.device);
   if (level.tracing == Tracing::Exact) {
-    build_exact_part(handle(level.device), level, *part);
+    build_exact_part(level, *part);
   } else {
-    build_fast_part(handle(level.device), level, *part);
+    build_fast_part(level, *part);
   }
   commit(part->scene);
   part->built_for = nullptr;

@@ -142,6 +142,38 @@ void LevelScene::Impl::make_parts(const Impl* previous) {
   });
 }
 
+Cell LevelScene::Impl::cell_at(const Leaf& leaf, int exponent, int column, int row) const noexcept {
+  const int size = 1 << exponent;
+  const glm::ivec2 low(column & -size, row & -size);  // leaves are aligned to their step
+  if (leaf.coarser == 0 && low.x + size <= last.x && low.y + size <= last.y) {
+    const int points = size >> step_exponent;
+    const int x = (low.x - level.first.x) >> step_exponent;
+    const int y = (low.y - level.first.y) >> step_exponent;
+    const HeightArray& heights = level.heights;
+    return {low.x,
+            low.y,
+            size,
+            size,
+            heights(x, y),
+            heights(x + points, y),
+            heights(x, y + points),
+            heights(x + points, y + points)};
+  }
+  const LeafCells cells{*this, leaf, exponent};
+  const int i = (column - leaf.column) >> exponent;
+  const int j = (row - leaf.row) >> exponent;
+  return {.column = cells.column(i),
+          .row = cells.row(j),
+          .width = cells.column(i + 1) - cells.column(i),
+          .height = cells.row(j + 1) - cells.row(j),
+          .nw = cells.surface_m({i, j}),
+          .ne = cells.surface_m({i + 1, j}),
+          .sw = cells.surface_m({i, j + 1}),
+          .se = cells.surface_m({i + 1, j + 1}),
+          .split = cells.block.splits_along_main(i, j) ? Cell::Split::NorthWestToSouthEast
+                                                       : Cell::Split::NorthEastToSouthWest};
+}
+
 LevelScene::Impl::~Impl() {
   if (scene != nullptr) rtcReleaseScene(scene);
 }

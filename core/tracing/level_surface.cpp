@@ -10,65 +10,6 @@ namespace {
 constexpr double nan = std::numeric_limits<double>::quiet_NaN();
 constexpr double never_m = std::numeric_limits<double>::infinity();  // a range that is not reached
 
-// Points of a leaf, thinned along the sides that face coarser leaves.
-class LeafPoints {
- public:
-  LeafPoints(const LevelScene::Impl& level, const Leaf& leaf, int exponent)
-      : level_(level), leaf_(leaf), exponent_(exponent) {
-    thinned_ = (1 << exponent) == leaf.step ? leaf.coarser : 0;
-  }
-  int column(int i) const { return std::min(leaf_.column + (i << exponent_), last().x); }
-  int row(int j) const { return std::min(leaf_.row + (j << exponent_), last().y); }
-  double height_m(int i, int j) const {
-    if (thinned_ != 0) {
-      if (is_dropped_in_row(i, j)) return between(column(i - 1), column(i), column(i + 1), row(j));
-      if (is_dropped_in_column(i, j)) return below(row(j - 1), row(j), row(j + 1), column(i));
-    }
-    return level_.height_m(column(i), row(j));
-  }
-  // Returns the diagonal of a cell. Along a thinned side, one cell of each pair is split along the
-  // other diagonal.
-  Cell::Split split(int i, int j) const {
-    const int end = level_.level.leaf_cells - 1;
-    const bool other =
-        thinned_ != 0 &&
-        ((j == 0 && is_thinned(Leaf::North) && i % 2 == 0 && column(i + 1) < last().x) ||
-         (i == 0 && is_thinned(Leaf::West) && j % 2 == 0 && row(j + 1) < last().y) ||
-         (j == end && is_thinned(Leaf::South) && i % 2 == 1) ||
-         (i == end && is_thinned(Leaf::East) && j % 2 == 1));
-    return other ? Cell::Split::NorthWestToSouthEast : Cell::Split::NorthEastToSouthWest;
-  }
-
- private:
-  glm::ivec2 last() const { return level_.level.frame.samples - 1; }
-  bool is_thinned(Leaf::Side side) const { return (thinned_ & side) != 0; }
-  bool is_dropped_in_row(int i, int j) const {
-    return i % 2 == 1 && column(i) < last().x &&
-           ((j == 0 && is_thinned(Leaf::North)) ||
-            (j == level_.level.leaf_cells && is_thinned(Leaf::South)));
-  }
-  bool is_dropped_in_column(int i, int j) const {
-    return j % 2 == 1 && row(j) < last().y &&
-           ((i == 0 && is_thinned(Leaf::West)) ||
-            (i == level_.level.leaf_cells && is_thinned(Leaf::East)));
-  }
-  double between(int before, int at, int after, int row) const {
-    const double a_m = level_.height_m(before, row);
-    return a_m + (level_.height_m(after, row) - a_m) *
-                     (static_cast<double>(at - before) / (after - before));
-  }
-  double below(int before, int at, int after, int column) const {
-    const double a_m = level_.height_m(column, before);
-    return a_m + (level_.height_m(column, after) - a_m) *
-                     (static_cast<double>(at - before) / (after - before));
-  }
-
-  const LevelScene::Impl& level_;
-  const Leaf& leaf_;
-  int exponent_;
-  unsigned thinned_ = 0;
-};
-
 // Returns the t at which a ray leaves a range of coordinates.
 double exit_m(double start, double slope, double per_index_m, int low, int high) {
   if (slope == 0) return never_m;
@@ -82,39 +23,6 @@ FacetPlane plane_at(const Cell& cell, const GridRay& ray, double t_m) {
 int next_index(double slope, int low, int high) { return slope > 0 ? high : low - 1; }
 
 }  // namespace
-
-Cell LevelScene::Impl::cell_at(const Leaf& leaf, int exponent, int column, int row) const noexcept {
-  const int size = 1 << exponent;
-  const glm::ivec2 low(column & -size, row & -size);  // leaves are aligned to their step
-  if (leaf.coarser == 0 && low.x + size <= last.x && low.y + size <= last.y) {
-    const int points = size >> step_exponent;
-    const int x = (low.x - level.first.x) >> step_exponent;
-    const int y = (low.y - level.first.y) >> step_exponent;
-    const HeightArray& heights = level.heights;
-    return {low.x,
-            low.y,
-            size,
-            size,
-            heights(x, y),
-            heights(x + points, y),
-            heights(x, y + points),
-            heights(x + points, y + points)};
-  }
-  const LeafPoints points(*this, leaf, exponent);
-  const int i = (column - leaf.column) >> exponent;
-  const int j = (row - leaf.row) >> exponent;
-  Cell cell;
-  cell.column = points.column(i);
-  cell.row = points.row(j);
-  cell.width = points.column(i + 1) - cell.column;
-  cell.height = points.row(j + 1) - cell.row;
-  cell.nw = points.height_m(i, j);
-  cell.ne = points.height_m(i + 1, j);
-  cell.sw = points.height_m(i, j + 1);
-  cell.se = points.height_m(i + 1, j + 1);
-  cell.split = points.split(i, j);
-  return cell;
-}
 
 LevelSurface::LevelSurface(std::vector<const LevelScene::Impl*> levels)
     : levels_(std::move(levels)) {}

@@ -119,8 +119,7 @@ glm::dvec3 ModelScene::shading_normal(std::uint32_t triangle, const glm::dvec3& 
   const Tangents tangents = tangents_of_triangle(corners_m, uv_of(model, triangle));
   const glm::vec3 texel =
       bumps->color(impl_->uv_at(triangle, shares), footprint_of(patch_O, tangents), filtering);
-  return groundray::shading_normal(tangents, base, normal_O,
-                                   decode_normal(texel, NormalMapGreen::AlongV));
+  return groundray::shading_normal(tangents, base, normal_O, decode_normal(texel));
 }
 
 }  // namespace groundray

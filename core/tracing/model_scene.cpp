@@ -1,7 +1,6 @@
 #include "core/tracing/model_scene.h"
 
 #include <algorithm>
-#include <array>
 #include <cmath>
 #include <utility>
 
@@ -30,16 +29,6 @@ ModelScene::Impl::Textures textures_of(const ModelSurface& surface) {
                                  texture_of(surface.opacity, Encoding::Linear)};
   if (all.opacity || (all.albedo && all.albedo->has_alpha())) all.least_alpha = surface.least_alpha;
   return all;
-}
-
-Owned<RTCGeometry> new_geometry(const ModelScene::Impl& model, RTCGeometryType type) {
-  return Owned<RTCGeometry>(rtcNewGeometry(handle(model.device), type));
-}
-
-void attach_geometry(const ModelScene::Impl& model, const Owned<RTCGeometry>& geometry,
-                     unsigned id) {
-  rtcCommitGeometry(geometry.get());
-  rtcAttachGeometryByID(model.scene.get(), geometry.get(), id);
 }
 
 // Rejects hits where a cut-out is transparent, decided in double because floats are too coarse.
@@ -73,7 +62,8 @@ Owned<RTCBuffer> vertices_of(const ModelScene::Impl& model) {
 void add_triangles(const ModelScene::Impl& model, const Owned<RTCBuffer>& vertices, unsigned id,
                    const std::vector<std::uint32_t>& triangles) {
   if (triangles.empty()) return;
-  const auto geometry = new_geometry(model, RTC_GEOMETRY_TYPE_TRIANGLE);
+  const Owned<RTCGeometry> geometry(
+      rtcNewGeometry(handle(model.device), RTC_GEOMETRY_TYPE_TRIANGLE));
   rtcSetGeometryBuffer(geometry.get(), RTC_BUFFER_TYPE_VERTEX, 0, RTC_FORMAT_FLOAT3, vertices.get(),
                        0, sizeof(glm::vec3), model.model.mesh.vertices_m.size());
   auto* const corners = static_cast<glm::uvec3*>(
@@ -88,7 +78,7 @@ void add_triangles(const ModelScene::Impl& model, const Owned<RTCBuffer>& vertic
     rtcSetGeometryUserData(geometry.get(), const_cast<ModelScene::Impl*>(&model));
     rtcSetGeometryIntersectFilterFunction(geometry.get(), filter_cut);
   }
-  attach_geometry(model, geometry, id);
+  attach(model.scene.get(), geometry, id);
 }
 
 void triangle_bounds(const RTCBoundsFunctionArguments* arguments) {
@@ -106,6 +96,17 @@ void triangle_bounds(const RTCBoundsFunctionArguments* arguments) {
                           padded_high.x, padded_high.y, padded_high.z, 0};
 }
 
+// Replaces `best` if the ray hits the triangle before it; returns whether it does.
+bool take_nearer(const ModelScene::Impl& model, std::uint32_t triangle, const ModelRay& ray,
+                 const glm::dvec3& edges, ModelCrossing& best) noexcept {
+  if (!is_inside(edges)) return false;
+  const ModelCrossing crossing{model.range_m(triangle, ray), triangle};
+  if (!(crossing.t_m >= 0 && crossing < best)) return false;
+  if (!model.is_opaque(triangle, model.shares(edges))) return false;
+  best = crossing;
+  return true;
+}
+
 // Intersects one triangle with each ray of a packet, in double.
 void intersect_triangle(const RTCIntersectFunctionNArguments* arguments) {
   const auto& model = *static_cast<const ModelScene::Impl*>(arguments->geometryUserPtr);
@@ -117,25 +118,10 @@ void intersect_triangle(const RTCIntersectFunctionNArguments* arguments) {
     const unsigned lane = RTCRayN_id(rays, arguments->N, i);
     const ModelRay& ray = query.rays[lane];
     ModelCrossing& best = query.crossings[lane];
-    const glm::dvec3 edges = model.edges_of(triangle, ray);
-    if (!is_inside(edges)) continue;
-    const ModelCrossing crossing{model.range_m(triangle, ray), triangle};
-    if (!(crossing.t_m >= 0 && crossing < best)) continue;
-    if (!model.is_opaque(triangle, model.shares(edges))) continue;
-    best = crossing;
+    if (!take_nearer(model, triangle, ray, model.edges_of(triangle, ray), best)) continue;
     float& far_m = RTCRayN_tfar(rays, arguments->N, i);
     far_m = std::min(far_m, far_float(best.t_m - query.enter_m[lane], model.slack_m));
   }
-}
-
-void build_exact_model(ModelScene::Impl& model) {
-  const auto geometry = new_geometry(model, RTC_GEOMETRY_TYPE_USER);
-  rtcSetGeometryUserPrimitiveCount(geometry.get(),
-                                   static_cast<unsigned>(model.model.mesh.triangles.size()));
-  rtcSetGeometryUserData(geometry.get(), &model);
-  rtcSetGeometryBoundsFunction(geometry.get(), triangle_bounds, nullptr);
-  rtcSetGeometryIntersectFunction(geometry.get(), intersect_triangle);
-  attach_geometry(model, geometry, 0);
 }
 
 }  // namespace
@@ -163,7 +149,8 @@ ModelScene::Impl::Impl(const RayDevice& with, Model content, Tracing how)
     (textures_of(i).least_alpha > 0 ? cut : solid).push_back(i);
   scene.reset(new_scene(device));
   if (tracing == Tracing::Exact) {
-    build_exact_model(*this);
+    attach_primitives(device, scene.get(), 0, model.mesh.triangles.size(), this, triangle_bounds,
+                      intersect_triangle);
   } else {
     const auto vertices = vertices_of(*this);
     add_triangles(*this, vertices, 0, solid);
@@ -236,19 +223,6 @@ bool ModelScene::Impl::is_opaque(std::uint32_t triangle, const glm::dvec3& share
   const float alpha = cut_by.has_alpha() ? cut_by.alpha(uv) : cut_by.color(uv).x;
   return alpha >= worn.least_alpha;
 }
-
-namespace {
-
-// Replaces `best` if the ray hits the triangle before it.
-void take_nearer(const ModelScene::Impl& model, std::uint32_t triangle, const ModelRay& ray,
-                 const glm::dvec3& edges, ModelCrossing& best) noexcept {
-  if (!is_inside(edges)) return;
-  const ModelCrossing crossing{model.range_m(triangle, ray), triangle};
-  if (!(crossing.t_m >= 0 && crossing < best)) return;
-  if (model.is_opaque(triangle, model.shares(edges))) best = crossing;
-}
-
-}  // namespace
 
 ModelCrossing ModelScene::Impl::intersect(std::uint32_t triangle,
                                           const ModelRay& ray) const noexcept {

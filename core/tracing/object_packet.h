@@ -34,7 +34,7 @@ template <int W>
 struct ObjectPacket {
   using Doubles = std::array<double, W>;
 
-  alignas(64) typename PacketOf<W>::Type floats;
+  alignas(64) PacketOf<W> floats;
   alignas(64) std::array<int, W> valid;
   alignas(64) Doubles x_m, y_m, z_m, dx, dy, dz;
   Doubles enter_m;  // range at which the float rays begin
@@ -50,7 +50,7 @@ template <int W>
 struct LocalPacket {
   using Doubles = std::array<double, W>;
 
-  alignas(64) typename PacketOf<W>::Type floats;
+  alignas(64) PacketOf<W> floats;
   alignas(64) std::array<int, W> valid;
   alignas(64) Doubles x, y, z, dx, dy, dz;
   Doubles enter_m, leave_m;

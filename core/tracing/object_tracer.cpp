@@ -251,24 +251,12 @@ void ObjectTracer::Impl::build() {
   const auto add = [&](unsigned id, std::size_t count, std::size_t steps,
                        RTCBoundsFunction bounds_of, RTCIntersectFunctionN intersect) {
     if (count == 0) return;
-    const Owned<RTCGeometry> geometry(rtcNewGeometry(handle(device), RTC_GEOMETRY_TYPE_USER));
-    rtcSetGeometryUserPrimitiveCount(geometry.get(), static_cast<unsigned>(count));
-    rtcSetGeometryTimeStepCount(geometry.get(), static_cast<unsigned>(steps));
-    rtcSetGeometryUserData(geometry.get(), this);
-    rtcSetGeometryBoundsFunction(geometry.get(), bounds_of, nullptr);
-    rtcSetGeometryIntersectFunction(geometry.get(), intersect);
-    rtcCommitGeometry(geometry.get());
-    rtcAttachGeometryByID(scene.get(), geometry.get(), id);
+    attach_primitives(device, scene.get(), id, count, this, bounds_of, intersect, steps);
   };
-  const int width = device.impl().width;
-  add(placed_geometry, placed.size(), 1, placed_bounds,
-      width == 16  ? meet_placed<16>
-      : width == 8 ? meet_placed<8>
-                   : meet_placed<4>);
-  add(moving_geometry, moving.size(), time_steps, moving_bounds,
-      width == 16  ? meet_moving<16>
-      : width == 8 ? meet_moving<8>
-                   : meet_moving<4>);
+  with_packet_width(device, [&](auto width) {
+    add(placed_geometry, placed.size(), 1, placed_bounds, meet_placed<width>);
+    add(moving_geometry, moving.size(), time_steps, moving_bounds, meet_moving<width>);
+  });
   commit(scene.get());
   check(device, "building the objects");
 }
@@ -404,10 +392,7 @@ ObjectTracer::ObjectTracer(const RayDevice& device, std::vector<ModelScene> mode
 void ObjectTracer::trace(std::span<const Ray> rays, std::span<Hit> hits) const noexcept {
   if (size() == 0) return;
   const FlushDenormals flush;
-  const int width = impl_->device.impl().width;
-  if (width == 16) return impl_->trace<16>(rays, hits);
-  if (width == 8) return impl_->trace<8>(rays, hits);
-  impl_->trace<4>(rays, hits);
+  with_packet_width(impl_->device, [&](auto width) { impl_->trace<width>(rays, hits); });
 }
 
 std::size_t ObjectTracer::size() const noexcept {

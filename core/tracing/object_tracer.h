@@ -10,7 +10,6 @@
 
 #include "core/appearance/footprint.h"
 #include "core/appearance/texture.h"
-#include "core/appearance/tint.h"
 #include "core/geometry/trajectory.h"
 #include "core/model/model.h"
 #include "core/tracing/ray_tracer.h"

@@ -11,7 +11,7 @@
 #include <limits>
 #include <span>
 
-#include "core/tracing/exact_query.h"
+#include "core/tracing/level_surface.h"
 
 namespace groundray {
 
@@ -40,7 +40,7 @@ template <int W>
 struct Packet {
   using Doubles = std::array<double, W>;
 
-  alignas(64) typename PacketOf<W>::Type floats;
+  alignas(64) PacketOf<W> floats;
   alignas(64) std::array<int, W> valid;
   alignas(64) Doubles x_m, y_m, z_m, dx, dy, dz, far_m;  // the rays as given, in D
   Doubles u0, v0, du, dv;                                // in grid coordinates

@@ -5,11 +5,9 @@
 #include <algorithm>
 #include <cmath>
 #include <glm/common.hpp>
-#include <glm/geometric.hpp>
 #include <mutex>
 #include <utility>
 
-#include "core/error.h"
 #include "core/tracing/device.h"
 #include "core/tracing/ray_packet.h"
 
@@ -343,10 +341,7 @@ RayTracer& RayTracer::operator=(RayTracer&&) noexcept = default;
 
 void RayTracer::trace(std::span<const Ray> rays, std::span<Hit> hits, Batch batch) const noexcept {
   const FlushDenormals flush;
-  const int width = impl_->device.impl().width;
-  if (width == 16) return impl_->trace<16>(rays, hits, batch);
-  if (width == 8) return impl_->trace<8>(rays, hits, batch);
-  impl_->trace<4>(rays, hits, batch);
+  with_packet_width(impl_->device, [&](auto width) { impl_->trace<width>(rays, hits, batch); });
 }
 
 void RayTracer::bound_errors(std::span<const Ray> rays, std::span<const Hit> hits,

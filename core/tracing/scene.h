@@ -9,7 +9,6 @@
 #include "core/appearance/ground_cover.h"
 #include "core/appearance/materials.h"
 #include "core/appearance/texture.h"
-#include "core/appearance/tint.h"
 #include "core/tracing/object_tracer.h"
 #include "core/tracing/ray_tracer.h"
 

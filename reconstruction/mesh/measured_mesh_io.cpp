@@ -12,8 +12,8 @@
 #include <vector>
 
 #include "core/error.h"
-#include "core/geometry/mesh_check.h"
-#include "core/io/file_ending.h"
+#include "core/geometry/mesh.h"
+#include "core/io/file_io.h"
 #include "core/io/point_cloud.h"
 
 namespace groundray {

@@ -4,17 +4,13 @@
 #include <fmt/ranges.h>
 
 #include <array>
-#include <cassert>
 #include <cstddef>
 #include <glm/geometric.hpp>
-#include <string>
 #include <vector>
 
 #include "core/error.h"
-#include "terrain/assets/asset_hull.h"
+#include "terrain/assets/asset_builder.h"
 #include "terrain/assets/asset_kinds.h"
-#include "terrain/assets/asset_leaf.h"
-#include "terrain/assets/asset_random.h"
 
 namespace groundray {
 namespace {
@@ -23,8 +19,10 @@ constexpr std::array<std::string_view, 12> names = {
     "rock",       "stone", "grass_tuft", "shrub",           "conifer",           "broadleaf_tree",
     "fence_post", "wire",  "vehicle",    "person_cylinder", "calibration_board", "sphere_target"};
 
-// Members that a kind has, with their default values; 0 for those that it does not have.
+// Generator of a kind, and the members that the kind has, with their default values; 0 for those
+// that it does not have.
 struct KindRule {
+  Model (*make)(AssetShape shape);
   double size_m = 0;
   double width_m = 0;
   double sag_m = 0;
@@ -39,18 +37,22 @@ struct KindRule {
 // inches are buried. Leaf area indices: Asner et al. (2003), mean of all biomes 4.5 +- 2.5 without
 // outliers, temperate evergreen forests from 5.1.
 constexpr std::array<KindRule, 12> rules = {{
-    {.size_m = 0.8, .has_variants = true},
-    {.size_m = 0.15, .has_variants = true},
-    {.size_m = 0.35, .has_variants = true},
-    {.size_m = 1.2, .leaf_area_index = 3, .has_variants = true},
-    {.size_m = 12, .leaf_area_index = 5.1, .has_variants = true},
-    {.size_m = 9, .leaf_area_index = 4.5, .has_variants = true},
-    {.size_m = 1.37, .width_m = 0.1},
-    {.size_m = 50, .width_m = 0.0101, .sag_m = 1},
-    {.size_m = 5.265, .has_detail = false},
-    {.size_m = 1.75, .width_m = 0.5},
-    {.size_m = 0.8, .width_m = 0.6, .has_squares = true, .has_detail = false},
-    {.size_m = 0.145},
+    {.make = make_rock, .size_m = 0.8, .has_variants = true},
+    {.make = make_stone, .size_m = 0.15, .has_variants = true},
+    {.make = make_grass_tuft, .size_m = 0.35, .has_variants = true},
+    {.make = make_shrub, .size_m = 1.2, .leaf_area_index = 3, .has_variants = true},
+    {.make = make_conifer, .size_m = 12, .leaf_area_index = 5.1, .has_variants = true},
+    {.make = make_broadleaf_tree, .size_m = 9, .leaf_area_index = 4.5, .has_variants = true},
+    {.make = make_fence_post, .size_m = 1.37, .width_m = 0.1},
+    {.make = make_wire, .size_m = 50, .width_m = 0.0101, .sag_m = 1},
+    {.make = make_vehicle, .size_m = 5.265, .has_detail = false},
+    {.make = make_person_cylinder, .size_m = 1.75, .width_m = 0.5},
+    {.make = make_calibration_board,
+     .size_m = 0.8,
+     .width_m = 0.6,
+     .has_squares = true,
+     .has_detail = false},
+    {.make = make_sphere_target, .size_m = 0.145},
 }};
 
 const KindRule& rule_of(AssetKind kind) { return rules[static_cast<std::size_t>(kind)]; }
@@ -126,38 +128,13 @@ AssetKind asset_kind(std::string_view name) {
 Model make_asset(const AssetSpec& spec) {
   check_asset(spec);
   const KindRule& rule = rule_of(spec.kind);
-  const double size_m = spec.size_m.value_or(rule.size_m);
-  const double width_m = spec.width_m.value_or(rule.width_m);
-  const double index = spec.leaf_area_index.value_or(rule.leaf_area_index);
-  const AssetRandom random(spec.kind, spec.seed);
-  switch (spec.kind) {
-    case AssetKind::Rock:
-      return make_rock(size_m, spec.detail, random);
-    case AssetKind::Stone:
-      return make_stone(size_m, spec.detail, random);
-    case AssetKind::GrassTuft:
-      return make_grass_tuft(size_m, spec.detail, random);
-    case AssetKind::Shrub:
-      return make_shrub(size_m, index, spec.detail, random);
-    case AssetKind::Conifer:
-      return make_conifer(size_m, index, spec.detail, random);
-    case AssetKind::BroadleafTree:
-      return make_broadleaf_tree(size_m, index, spec.detail, random);
-    case AssetKind::FencePost:
-      return make_fence_post(size_m, width_m, spec.detail);
-    case AssetKind::Wire:
-      return make_wire(size_m, spec.sag_m.value_or(rule.sag_m), width_m, spec.detail);
-    case AssetKind::Vehicle:
-      return make_vehicle(size_m);
-    case AssetKind::PersonCylinder:
-      return make_person_cylinder(size_m, width_m, spec.detail);
-    case AssetKind::CalibrationBoard:
-      return make_calibration_board(width_m, size_m, spec.square_m);
-    case AssetKind::SphereTarget:
-      return make_sphere_target(size_m, spec.detail);
-  }
-  assert(false);
-  return {};
+  return rule.make({.size_m = spec.size_m.value_or(rule.size_m),
+                    .width_m = spec.width_m.value_or(rule.width_m),
+                    .sag_m = spec.sag_m.value_or(rule.sag_m),
+                    .square_m = spec.square_m,
+                    .leaf_area_index = spec.leaf_area_index.value_or(rule.leaf_area_index),
+                    .detail = spec.detail,
+                    .random = AssetRandom(spec.kind, spec.seed)});
 }
 
 FoliageArea foliage_area(const Model& model) {

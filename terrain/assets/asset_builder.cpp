@@ -35,6 +35,13 @@ constexpr std::array<NamedColor, 12> colors = {{{"rock", {0.202f, 0.170f, 0.140f
                                                 {"white_paint", {0.891f, 0.891f, 0.891f}},
                                                 {"black_paint", {0.032f, 0.032f, 0.032f}}}};
 
+// Returns a unit vector perpendicular to `v`, which must not be 0.
+glm::dvec3 any_normal_to(const glm::dvec3& v) {
+  const glm::dvec3 axis =
+      std::abs(v.z) < 0.7 * glm::length(v) ? glm::dvec3(0, 0, 1) : glm::dvec3(0, 1, 0);
+  return glm::normalize(glm::cross(axis, v));
+}
+
 // Direction of the tube's centre line at a ring.
 glm::dvec3 tangent(std::span<const TubeRing> rings, std::size_t i) {
   const std::size_t before = i == 0 ? 0 : i - 1;
@@ -90,12 +97,6 @@ ModelSurface asset_surface(std::string_view material) {
   }
   assert(false);
   return {};
-}
-
-glm::dvec3 any_normal_to(const glm::dvec3& v) {
-  const glm::dvec3 axis =
-      std::abs(v.z) < 0.7 * glm::length(v) ? glm::dvec3(0, 0, 1) : glm::dvec3(0, 1, 0);
-  return glm::normalize(glm::cross(axis, v));
 }
 
 std::uint16_t AssetBuilder::add_surface(ModelSurface surface) {
@@ -223,10 +224,6 @@ void AssetBuilder::add_loft(std::span<const glm::dvec3> low, std::span<const glm
 
 void AssetBuilder::scale(double factor) {
   for (glm::dvec3& p : model_.mesh.vertices_m) p *= factor;
-}
-
-void AssetBuilder::move(const glm::dvec3& by) {
-  for (glm::dvec3& p : model_.mesh.vertices_m) p += by;
 }
 
 void AssetBuilder::smooth() {

@@ -7,7 +7,9 @@
 #include <span>
 #include <string_view>
 #include <utility>
+#include <vector>
 
+#include "core/image/image.h"
 #include "core/model/model.h"
 
 namespace groundray {
@@ -15,8 +17,19 @@ namespace groundray {
 /// Returns a surface with the name and the colour of a built-in material or of a paint.
 ModelSurface asset_surface(std::string_view material);
 
-/// Returns a unit vector perpendicular to `v`, which must not be 0.
-glm::dvec3 any_normal_to(const glm::dvec3& v);
+/// Kind of spray on a foliage card.
+enum class SprayKind { Leaves, Needles };
+
+/// Returns the surface of a foliage card: the material `broad_leaf`, or `leaf` for needles, with
+/// the image of a spray that grows upward from the middle of the bottom row. The visible pixels
+/// have on average the brightness of the material.
+ModelSurface spray_surface(SprayKind kind);
+
+/// Returns the fraction of an image that alpha leaves visible; 1 without alpha.
+double opaque_share(const Image8& image);
+
+/// Returns the area of the convex hull of points; 0 for fewer than three.
+double hull_area(std::vector<glm::dvec2> points);
 
 /// Point on the centre line of a tube, and the tube's radius there.
 struct TubeRing {
@@ -56,7 +69,6 @@ class AssetBuilder {
 
   /// Scales all positions about the origin.
   void scale(double factor);
-  void move(const glm::dvec3& by);
 
   /// Sets the normal of every vertex to the area-weighted mean of its triangles' normals.
   void smooth();

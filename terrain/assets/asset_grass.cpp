@@ -53,14 +53,14 @@ void add_blade(AssetBuilder& builder, AssetRandom& random, std::uint16_t surface
 
 }  // namespace
 
-Model make_grass_tuft(double height_m, double detail, AssetRandom random) {
+Model make_grass_tuft(AssetShape shape) {
   AssetBuilder builder;
   const std::uint16_t surface = builder.add_surface(asset_surface("dry_grass"));
-  const int blades = std::max(3, static_cast<int>(std::lround(40 * detail)));
-  for (int i = 0; i < blades; ++i) add_blade(builder, random, surface);
+  const int blades = std::max(3, static_cast<int>(std::lround(40 * shape.detail)));
+  for (int i = 0; i < blades; ++i) add_blade(builder, shape.random, surface);
   double top = 0;
   for (const glm::dvec3& p : builder.model().mesh.vertices_m) top = std::max(top, p.z);
-  builder.scale(height_m / top);
+  builder.scale(shape.size_m / top);
   return builder.take();
 }
 

@@ -1,30 +1,72 @@
 #pragma once
 
+#include <cmath>
+#include <cstdint>
+#include <glm/vec3.hpp>
+#include <numbers>
 #include <optional>
 
 #include "core/model/model.h"
-#include "terrain/assets/asset_random.h"
+#include "core/random.h"
+#include "terrain/assets/asset.h"
 
 namespace groundray {
 
-// Generators of the kinds. Parameters are those of AssetSpec and must be valid.
+/// Random numbers of one asset, in the order in which it is generated.
+class AssetRandom {
+ public:
+  AssetRandom(AssetKind kind, Seed seed)
+      : key_{.seed = seed,
+             .sensor = static_cast<std::uint32_t>(kind),
+             .stream = RandomStream::Asset} {}
 
-Model make_rock(double size_m, double detail, AssetRandom random);
-Model make_stone(double size_m, double detail, AssetRandom random);
-Model make_sphere_target(double diameter_m, double detail);
+  /// Returns a random number, uniform between two bounds.
+  double between(double low, double high) {
+    ++key_.pulse;
+    return low + (high - low) * random_uniform(key_).x;
+  }
 
-Model make_grass_tuft(double height_m, double detail, AssetRandom random);
-Model make_shrub(double height_m, double leaf_area_index, double detail, AssetRandom random);
-Model make_conifer(double height_m, double leaf_area_index, double detail, AssetRandom random);
-Model make_broadleaf_tree(double height_m, double leaf_area_index, double detail,
-                          AssetRandom random);
+  /// Returns a normal random number of mean 0 and standard deviation 1.
+  double normal() {
+    ++key_.pulse;
+    return random_normal(key_).x;
+  }
 
-Model make_fence_post(double height_m, double diameter_m, double detail);
-Model make_person_cylinder(double height_m, double diameter_m, double detail);
-Model make_wire(double span_m, double sag_m, double diameter_m, double detail);
-Model make_calibration_board(double width_m, double height_m, std::optional<double> square_m);
+  double angle_rad() { return between(0, 2 * std::numbers::pi); }
 
-Model make_vehicle(double length_m);
+  /// Returns a unit vector, uniform over all directions.
+  glm::dvec3 direction() {
+    const double z = between(-1, 1);
+    const double angle = angle_rad();
+    const double r = std::sqrt(1 - z * z);
+    return {r * std::cos(angle), r * std::sin(angle), z};
+  }
+
+ private:
+  RandomKey key_;
+};
+
+/// Valid members of an AssetSpec, completed with the defaults of its kind.
+struct AssetShape {
+  double size_m = 0, width_m = 0, sag_m = 0;
+  std::optional<double> square_m;
+  double leaf_area_index = 0, detail = 1;
+  AssetRandom random;
+};
+
+// Generators of the kinds.
+Model make_rock(AssetShape shape);
+Model make_stone(AssetShape shape);
+Model make_grass_tuft(AssetShape shape);
+Model make_shrub(AssetShape shape);
+Model make_conifer(AssetShape shape);
+Model make_broadleaf_tree(AssetShape shape);
+Model make_fence_post(AssetShape shape);
+Model make_wire(AssetShape shape);
+Model make_vehicle(AssetShape shape);
+Model make_person_cylinder(AssetShape shape);
+Model make_calibration_board(AssetShape shape);
+Model make_sphere_target(AssetShape shape);
 
 /// Returns the number of squares along a length, from 1 to 1000, or nothing if squares of this side
 /// do not fill it.

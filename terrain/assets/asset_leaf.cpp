@@ -1,4 +1,4 @@
-#include "terrain/assets/asset_leaf.h"
+// Foliage: images of sprays, and the area that leaves cover.
 
 #include <algorithm>
 #include <cmath>
@@ -8,7 +8,9 @@
 #include <glm/vec2.hpp>
 #include <numbers>
 #include <span>
+#include <tuple>
 #include <utility>
+#include <vector>
 
 #include "core/image/srgb.h"
 #include "terrain/assets/asset_builder.h"
@@ -137,6 +139,11 @@ Image8 draw_needles() {
   return spray.take();
 }
 
+// Twice the area of a triangle; negative if it is clockwise.
+double twice_area(const glm::dvec2& o, const glm::dvec2& a, const glm::dvec2& b) {
+  return (a.x - o.x) * (b.y - o.y) - (a.y - o.y) * (b.x - o.x);
+}
+
 }  // namespace
 
 double opaque_share(const Image8& image) {
@@ -159,6 +166,26 @@ ModelSurface spray_surface(SprayKind kind) {
   }
   surface.color *= static_cast<float>(count / sum);
   return surface;
+}
+
+// Andrew's monotone chain (1979).
+double hull_area(std::vector<glm::dvec2> points) {
+  if (points.size() < 3) return 0;
+  std::ranges::sort(points, {}, [](const glm::dvec2& p) { return std::tuple(p.x, p.y); });
+  std::vector<glm::dvec2> hull;
+  const auto add = [&](const glm::dvec2& p, std::size_t kept) {
+    while (hull.size() >= kept + 2 && twice_area(hull[hull.size() - 2], hull.back(), p) <= 0) {
+      hull.pop_back();
+    }
+    hull.push_back(p);
+  };
+  for (const glm::dvec2& p : points) add(p, 0);
+  const std::size_t lower = hull.size() - 1;
+  for (std::size_t i = points.size() - 1; i-- > 0;) add(points[i], lower);
+  double twice = 0;
+  for (std::size_t i = 0; i + 1 < hull.size(); ++i)
+    twice += twice_area(hull[0], hull[i], hull[i + 1]);
+  return twice / 2;
 }
 
 }  // namespace groundray

@@ -151,16 +151,16 @@ int cuts(double at_usual, double detail) {
   return std::max(2, static_cast<int>(std::lround(at_usual * std::sqrt(detail))));
 }
 
-Model boulder(const RockShape& shape, double size_m, double detail, AssetRandom random) {
-  const int n = cuts(shape.frequency, detail);
+Model boulder(const RockShape& rock, AssetShape shape) {
+  const int n = cuts(rock.frequency, shape.detail);
   Icosphere sphere = IcosphereMaker(n).take();
   // Rock fragments have axes of 2 : sqrt 2 : 1 on average (Michikami et al., Icarus 264 (2016)
   // 316).
-  const glm::dvec3 axes{1, std::numbers::sqrt2 / 2 * random.between(0.85, 1.15),
-                        0.5 * random.between(0.8, 1.2)};
-  const RockRadius radius(shape, n, random);
+  const glm::dvec3 axes{1, std::numbers::sqrt2 / 2 * shape.random.between(0.85, 1.15),
+                        0.5 * shape.random.between(0.8, 1.2)};
+  const RockRadius radius(rock, n, shape.random);
   AssetBuilder builder;
-  const std::uint16_t surface = builder.add_surface(asset_surface(shape.material));
+  const std::uint16_t surface = builder.add_surface(asset_surface(rock.material));
   glm::dvec3 low(1e9), high(-1e9);
   for (glm::dvec3& p : sphere.directions) {
     p *= axes * radius(p);
@@ -168,7 +168,7 @@ Model boulder(const RockShape& shape, double size_m, double detail, AssetRandom 
     high = glm::max(high, p);
   }
   const glm::dvec3 extent = high - low;
-  const double scale = size_m / std::max({extent.x, extent.y, extent.z});
+  const double scale = shape.size_m / std::max({extent.x, extent.y, extent.z});
   // A fifth of the height is below the ground.
   const glm::dvec3 origin{(low.x + high.x) / 2, (low.y + high.y) / 2, low.z + 0.2 * extent.z};
   for (const glm::dvec3& p : sphere.directions) builder.add_vertex((p - origin) * scale);
@@ -179,20 +179,16 @@ Model boulder(const RockShape& shape, double size_m, double detail, AssetRandom 
 
 }  // namespace
 
-Model make_rock(double size_m, double detail, AssetRandom random) {
-  return boulder({"rock", 8, 22, 0.03}, size_m, detail, random);
-}
+Model make_rock(AssetShape shape) { return boulder({"rock", 8, 22, 0.03}, shape); }
 
-Model make_stone(double size_m, double detail, AssetRandom random) {
-  return boulder({"gravel", 4, 6, 0.02}, size_m, detail, random);
-}
+Model make_stone(AssetShape shape) { return boulder({"gravel", 4, 6, 0.02}, shape); }
 
-Model make_sphere_target(double diameter_m, double detail) {
-  const Icosphere sphere = IcosphereMaker(cuts(16, detail)).take();
+Model make_sphere_target(AssetShape shape) {
+  const Icosphere sphere = IcosphereMaker(cuts(16, shape.detail)).take();
   AssetBuilder builder;
   const std::uint16_t surface = builder.add_surface(asset_surface("metal"));
   for (const glm::dvec3& direction : sphere.directions) {
-    builder.add_vertex((direction + glm::dvec3(0, 0, 1)) * (diameter_m / 2));
+    builder.add_vertex((direction + glm::dvec3(0, 0, 1)) * (shape.size_m / 2));
   }
   for (const glm::uvec3& t : sphere.triangles) builder.add_triangle(t.x, t.y, t.z, surface);
   builder.smooth();

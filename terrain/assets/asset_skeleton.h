@@ -5,7 +5,7 @@
 #include <optional>
 #include <vector>
 
-#include "terrain/assets/asset_random.h"
+#include "terrain/assets/asset_kinds.h"
 
 namespace groundray {
 

@@ -1,7 +1,6 @@
 // Man-made objects: posts, wires, targets.
 #include <algorithm>
 #include <cmath>
-#include <cstddef>
 #include <vector>
 
 #include "terrain/assets/asset_builder.h"
@@ -36,37 +35,38 @@ double catenary_parameter(double span_m, double sag_m) {
 
 }  // namespace
 
-Model make_fence_post(double height_m, double diameter_m, double detail) {
+Model make_fence_post(AssetShape shape) {
   constexpr double depth_m = 0.46;  // 18 inches: USDA NRCS Mississippi, standard 382 (2000)
   AssetBuilder builder;
   const std::uint16_t surface = builder.add_surface(asset_surface("wood"));
-  builder.add_cylinder({0, 0, -depth_m}, depth_m + height_m, diameter_m / 2, sides_of(16, detail),
+  builder.add_cylinder({0, 0, -depth_m}, depth_m + shape.size_m, shape.width_m / 2,
+                       sides_of(16, shape.detail), surface);
+  return builder.take();
+}
+
+Model make_person_cylinder(AssetShape shape) {
+  AssetBuilder builder;
+  const std::uint16_t surface = builder.add_surface(asset_surface("metal"));
+  builder.add_cylinder({0, 0, 0}, shape.size_m, shape.width_m / 2, sides_of(128, shape.detail),
                        surface);
   return builder.take();
 }
 
-Model make_person_cylinder(double height_m, double diameter_m, double detail) {
-  AssetBuilder builder;
-  const std::uint16_t surface = builder.add_surface(asset_surface("metal"));
-  builder.add_cylinder({0, 0, 0}, height_m, diameter_m / 2, sides_of(128, detail), surface);
-  return builder.take();
-}
-
-Model make_wire(double span_m, double sag_m, double diameter_m, double detail) {
-  const double a = catenary_parameter(span_m, sag_m);
-  const double half_length = a * std::sinh(span_m / (2 * a));
+Model make_wire(AssetShape shape) {
+  const double a = catenary_parameter(shape.size_m, shape.sag_m);
+  const double half_length = a * std::sinh(shape.size_m / (2 * a));
   // A chord of length c deviates from the curve by at most c^2 / (8 a), which is a twentieth of the
   // diameter divided by `detail` here.
-  const double chord = std::sqrt(8 * a * diameter_m / 20 / detail);
+  const double chord = std::sqrt(8 * a * shape.width_m / 20 / shape.detail);
   const int half_count = std::max(4, static_cast<int>(std::ceil(half_length / chord)));
   std::vector<TubeRing> rings;
   for (int i = -half_count; i <= half_count; ++i) {
     const double s = half_length * i / half_count;
     const double x = a * std::asinh(s / a), half_sinh = std::sinh(x / (2 * a));
-    rings.push_back({{x, 0, 2 * a * half_sinh * half_sinh - sag_m}, diameter_m / 2});
+    rings.push_back({{x, 0, 2 * a * half_sinh * half_sinh - shape.sag_m}, shape.width_m / 2});
   }
-  rings.front().p = {-span_m / 2, 0, 0};
-  rings.back().p = {span_m / 2, 0, 0};
+  rings.front().p = {-shape.size_m / 2, 0, 0};
+  rings.back().p = {shape.size_m / 2, 0, 0};
   AssetBuilder builder;
   const std::uint16_t surface = builder.add_surface(asset_surface("metal"));
   builder.add_tube(rings, 8, surface);
@@ -80,18 +80,21 @@ std::optional<int> squares_along(double length_m, double square_m) {
   return static_cast<int>(count);
 }
 
-Model make_calibration_board(double width_m, double height_m, std::optional<double> square_m) {
+Model make_calibration_board(AssetShape shape) {
   constexpr double thickness_m = 0.01;
-  const int columns = square_m ? *squares_along(width_m, *square_m) : 1;
-  const int rows = square_m ? *squares_along(height_m, *square_m) : 1;
+  const int columns = shape.square_m ? *squares_along(shape.width_m, *shape.square_m) : 1;
+  const int rows = shape.square_m ? *squares_along(shape.size_m, *shape.square_m) : 1;
   AssetBuilder builder;
   const std::uint16_t back = builder.add_surface(asset_surface("metal"));
-  const std::uint16_t white = square_m ? builder.add_surface(asset_surface("white_paint")) : back;
-  const std::uint16_t black = square_m ? builder.add_surface(asset_surface("black_paint")) : back;
+  const std::uint16_t white =
+      shape.square_m ? builder.add_surface(asset_surface("white_paint")) : back;
+  const std::uint16_t black =
+      shape.square_m ? builder.add_surface(asset_surface("black_paint")) : back;
   for (const double x : {0.0, -thickness_m}) {
     for (int r = 0; r <= rows; ++r) {
       for (int c = 0; c <= columns; ++c) {
-        builder.add_vertex({x, width_m * c / columns - width_m / 2, height_m * r / rows});
+        builder.add_vertex(
+            {x, shape.width_m * c / columns - shape.width_m / 2, shape.size_m * r / rows});
       }
     }
   }

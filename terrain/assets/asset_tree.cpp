@@ -11,9 +11,7 @@
 #include <vector>
 
 #include "terrain/assets/asset_builder.h"
-#include "terrain/assets/asset_hull.h"
 #include "terrain/assets/asset_kinds.h"
-#include "terrain/assets/asset_leaf.h"
 #include "terrain/assets/asset_skeleton.h"
 
 namespace groundray {
@@ -193,9 +191,9 @@ void refine(CrownShape& crown, double detail) {
 
 }  // namespace
 
-Model make_broadleaf_tree(double height_m, double leaf_area_index, double detail,
-                          AssetRandom random) {
+Model make_broadleaf_tree(AssetShape shape) {
   Plant plant;
+  AssetRandom& random = shape.random;
   const double lean = random.angle_rad();
   const glm::dvec3 fork{0.015 * std::cos(lean), 0.015 * std::sin(lean), random.between(0.26, 0.34)};
   CrownShape crown{.center = {0, 0, 0.62},
@@ -204,17 +202,18 @@ Model make_broadleaf_tree(double height_m, double leaf_area_index, double detail
                    .step = 0.035,
                    .sight = 0.4,
                    .reach = 0.06};
-  refine(crown, detail);
+  refine(crown, shape.detail);
   add_stem(plant.wood, {0, 0, -0.03}, fork, 0.05, random);
   colonise(plant.wood, crown, random);
   thicken(plant.wood, 0.5 / 45);  // height / diameter = 45: stable below 80 (Wonn, O'Hara, 2001)
-  plant.wood_budget = scaled_count(900, detail);
-  plant.cards = scatter_cards(plant.wood, crown.center, scaled_count(540, detail), random);
-  return put_together(plant, height_m, leaf_area_index);
+  plant.wood_budget = scaled_count(900, shape.detail);
+  plant.cards = scatter_cards(plant.wood, crown.center, scaled_count(540, shape.detail), random);
+  return put_together(plant, shape.size_m, shape.leaf_area_index);
 }
 
-Model make_shrub(double height_m, double leaf_area_index, double detail, AssetRandom random) {
+Model make_shrub(AssetShape shape) {
   Plant plant;
+  AssetRandom& random = shape.random;
   CrownShape crown{.center = {0, 0, 0.42},
                    .half = {random.between(0.5, 0.6), random.between(0.5, 0.6), 0.5},
                    .points = 240,
@@ -222,7 +221,7 @@ Model make_shrub(double height_m, double leaf_area_index, double detail, AssetRa
                    .sight = 0.7,
                    .reach = 0.1,
                    .lowest = 0.12};
-  refine(crown, detail);
+  refine(crown, shape.detail);
   constexpr int stem_count = 5;
   const double turn = random.angle_rad();
   for (int i = 0; i < stem_count; ++i) {
@@ -233,9 +232,9 @@ Model make_shrub(double height_m, double leaf_area_index, double detail, AssetRa
   }
   colonise(plant.wood, crown, random);
   thicken(plant.wood, 0.016);
-  plant.wood_budget = scaled_count(800, detail);
-  plant.cards = scatter_cards(plant.wood, {0, 0, 0.2}, scaled_count(480, detail), random);
-  return put_together(plant, height_m, leaf_area_index);
+  plant.wood_budget = scaled_count(800, shape.detail);
+  plant.cards = scatter_cards(plant.wood, {0, 0, 0.2}, scaled_count(480, shape.detail), random);
+  return put_together(plant, shape.size_m, shape.leaf_area_index);
 }
 
 namespace {
@@ -299,12 +298,12 @@ std::vector<Card> cards_on(const std::vector<Bough>& boughs, std::size_t count,
 
 }  // namespace
 
-Model make_conifer(double height_m, double leaf_area_index, double detail, AssetRandom random) {
+Model make_conifer(AssetShape shape) {
   Plant plant;
   plant.spray = SprayKind::Needles;
-  add_stem(plant.wood, {0, 0, -0.03}, {0, 0, 1}, 0.05, random);
+  add_stem(plant.wood, {0, 0, -0.03}, {0, 0, 1}, 0.05, shape.random);
   const std::vector<Bough> boughs =
-      boughs_of_conifer(static_cast<int>(scaled_count(75, detail)), random);
+      boughs_of_conifer(static_cast<int>(scaled_count(75, shape.detail)), shape.random);
   const std::size_t stem_size = plant.wood.size();
   for (const Bough& bough : boughs) {
     const auto joint =
@@ -317,9 +316,9 @@ Model make_conifer(double height_m, double leaf_area_index, double detail, Asset
     }
   }
   thicken(plant.wood, 0.5 / 55);  // height / diameter = 55, as in make_broadleaf_tree
-  plant.wood_budget = scaled_count(900, detail);
-  plant.cards = cards_on(boughs, scaled_count(540, detail), random);
-  return put_together(plant, height_m, leaf_area_index);
+  plant.wood_budget = scaled_count(900, shape.detail);
+  plant.cards = cards_on(boughs, scaled_count(540, shape.detail), shape.random);
+  return put_together(plant, shape.size_m, shape.leaf_area_index);
 }
 
 }  // namespace groundray

@@ -6,7 +6,6 @@
 #include <cmath>
 #include <glm/geometric.hpp>
 #include <numbers>
-#include <utility>
 #include <vector>
 
 #include "terrain/assets/asset_builder.h"
@@ -183,9 +182,9 @@ class Pickup {
 
 }  // namespace
 
-Model make_vehicle(double length_m) {
+Model make_vehicle(AssetShape shape) {
   // The grille and the plate protrude by 4 mm each.
-  return Pickup().take(length_m / (body_length + 0.008));
+  return Pickup().take(shape.size_m / (body_length + 0.008));
 }
 
 }  // namespace groundray

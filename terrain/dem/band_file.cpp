@@ -1,7 +1,6 @@
 #include "terrain/dem/band_file.h"
 
 #include <algorithm>
-#include <cmath>
 #include <cstdint>
 #include <limits>
 

@@ -4,8 +4,10 @@
 #include <cpl_vsi.h>
 #include <fmt/ranges.h>
 
+#include <algorithm>
 #include <array>
 #include <bit>
+#include <cmath>
 #include <cstdint>
 #include <glm/common.hpp>
 #include <mutex>
@@ -144,6 +146,26 @@ std::vector<float> DemFile::read(glm::ivec2 first, glm::ivec2 size) const {
     }
     return heights_m;
   });
+}
+
+Dem DemFile::load() const {
+  const std::filesystem::path& path = opened_->path;
+  const DemHeader& header = opened_->header;
+  const glm::ivec2 samples = header.samples;
+  constexpr std::int64_t max_samples = std::int64_t{1} << 31;
+  if (std::int64_t{samples.x} * samples.y > max_samples) {
+    throw Error("{}: it has {} x {} samples, more than the limit of {}; crop it:{}", path.string(),
+                samples.x, samples.y, max_samples,
+                command(path, "gdal_translate -srcwin 0 0 32768 32768", "_part.tif"));
+  }
+  std::vector<float> heights_m = read({0, 0}, samples);
+  if (std::ranges::all_of(heights_m, [](float z) { return std::isnan(z); })) {
+    throw Error(
+        "{}: none of its {} x {} samples has a height, all are nodata; is that value correct?",
+        path.string(), samples.x, samples.y);
+  }
+  return {HeightGrid(samples, header.origin_m, header.step_m, std::move(heights_m)),
+          header.origin_w_m, header.crs_wkt, header.crs_name};
 }
 
 std::string DemFile::fingerprint() const {

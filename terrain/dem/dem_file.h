@@ -48,6 +48,10 @@ class DemFile {
   ///         or if the window exceeds the grid.
   std::vector<float> read(glm::ivec2 first, glm::ivec2 size) const;
 
+  /// Returns all samples.
+  /// @throws Error as load_dem.
+  Dem load() const;
+
   /// Returns a description of everything that determines the heights, as lines of text: path,
   /// options, header, size and time of each file involved (including those of a mosaic), and a hash
   /// of samples at fixed positions. Equal texts mean equal heights, as far as this can be known

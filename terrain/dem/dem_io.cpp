@@ -1,9 +1,10 @@
 #include "terrain/dem/dem_io.h"
 
+#include <gdal_alg.h>
+
 #include <algorithm>
 #include <cmath>
 #include <cstdint>
-#include <utility>
 #include <vector>
 
 #include "core/error.h"
@@ -13,27 +14,22 @@
 namespace groundray {
 namespace {
 
-constexpr std::int64_t max_samples = std::int64_t{1} << 31;
+// Returns an in-memory raster that holds `values`.
+template <typename Value>
+GDALDatasetUniquePtr raster_of(glm::ivec2 size, std::vector<Value>& values, GDALDataType type) {
+  GDALDatasetUniquePtr dataset(
+      GetGDALDriverManager()->GetDriverByName("MEM")->Create("", size.x, size.y, 1, type, nullptr));
+  const bool is_done = dataset != nullptr && dataset->GetRasterBand(1)->RasterIO(
+                                                 GF_Write, 0, 0, size.x, size.y, values.data(),
+                                                 size.x, size.y, type, 0, 0, nullptr) == CE_None;
+  if (!is_done) throw Error("GDAL cannot allocate a raster: {}", CPLGetLastErrorMsg());
+  return dataset;
+}
 
 }  // namespace
 
 Dem load_dem(const std::filesystem::path& path, const DemOptions& options) {
-  const DemFile file(path, options);
-  const DemHeader& header = file.header();
-  const glm::ivec2 samples = header.samples;
-  if (std::int64_t{samples.x} * samples.y > max_samples) {
-    throw Error("{}: it has {} x {} samples, more than the limit of {}; crop it:{}", path.string(),
-                samples.x, samples.y, max_samples,
-                command(path, "gdal_translate -srcwin 0 0 32768 32768", "_part.tif"));
-  }
-  std::vector<float> heights_m = file.read({0, 0}, samples);
-  if (std::ranges::all_of(heights_m, [](float z) { return std::isnan(z); })) {
-    throw Error(
-        "{}: none of its {} x {} samples has a height, all are nodata; is that value correct?",
-        path.string(), samples.x, samples.y);
-  }
-  return {HeightGrid(samples, header.origin_m, header.step_m, std::move(heights_m)),
-          header.origin_w_m, header.crs_wkt, header.crs_name};
+  return DemFile(path, options).load();
 }
 
 bool is_same_crs(const std::string& wkt, const std::string& other) {
@@ -57,6 +53,28 @@ DemInfo inspect_dem(const std::filesystem::path& path) {
     return DemInfo{header.samples.x, header.samples.y, dataset->GetDriverName(),
                    GDALGetDataTypeName(type), name_of(header.crs)};
   });
+}
+
+std::vector<float> fill_by_gdal(glm::ivec2 size, std::span<const float> heights_m,
+                                double farthest_cells) {
+  if (std::ssize(heights_m) != std::int64_t{size.x} * size.y)
+    throw Error("filling by GDAL: {} heights for {} x {} samples", heights_m.size(), size.x,
+                size.y);
+  start_gdal();
+  const CPLErrorHandlerPusher quiet(CPLQuietErrorHandler);
+  std::vector<float> values(heights_m.begin(), heights_m.end());
+  std::vector<std::uint8_t> has_data(values.size());
+  std::ranges::transform(values, has_data.begin(),
+                         [](float z) { return static_cast<std::uint8_t>(!std::isnan(z)); });
+  const GDALDatasetUniquePtr raster = raster_of(size, values, GDT_Float32);
+  const GDALDatasetUniquePtr mask = raster_of(size, has_data, GDT_Byte);
+  const bool is_done =
+      GDALFillNodata(raster->GetRasterBand(1), mask->GetRasterBand(1), farthest_cells, 0, 0,
+                     nullptr, nullptr, nullptr) == CE_None &&
+      raster->GetRasterBand(1)->RasterIO(GF_Read, 0, 0, size.x, size.y, values.data(), size.x,
+                                         size.y, GDT_Float32, 0, 0, nullptr) == CE_None;
+  if (!is_done) throw Error("filling by GDAL failed: {}", CPLGetLastErrorMsg());
+  return values;
 }
 
 }  // namespace groundray

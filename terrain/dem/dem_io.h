@@ -1,12 +1,25 @@
 #pragma once
 
 #include <filesystem>
+#include <glm/vec2.hpp>
+#include <glm/vec3.hpp>
 #include <optional>
+#include <span>
 #include <string>
+#include <vector>
 
-#include "terrain/dem/dem.h"
+#include "core/geometry/height_grid.h"
 
 namespace groundray {
+
+/// Digital elevation model as loaded: its surface in D, and the position of D.
+struct Dem {
+  HeightGrid grid;
+  glm::dvec3 origin_w_m{0};  ///< D's origin in W, the DEM's CRS: whole metres
+  std::string crs_wkt;       ///< CRS of W, WKT2:2019; empty if none is named
+  /// Name for human readers: "NAD83 / UTM zone 15N (EPSG:26915)"; "local (no CRS)".
+  std::string crs_name;
+};
 
 /// Options for reading a DEM that its file does not contain.
 struct DemOptions {
@@ -61,5 +74,14 @@ struct DemInfo {
 /// Returns the properties in the header of a DEM file.
 /// @throws Error as load_dem if the file is no raster.
 DemInfo inspect_dem(const std::filesystem::path& path);
+
+/// Returns the heights with missing ones filled by GDALFillNodata (gdal_fillnodata.py), for
+/// comparison: means of the data in eight directions, weighted by inverse distance.
+/// @param size            columns and rows.
+/// @param heights_m       row by row; NaN where there is none.
+/// @param farthest_cells  search distance, at least 1; samples without data within it stay NaN.
+/// @throws Error if the sizes disagree or GDAL fails.
+std::vector<float> fill_by_gdal(glm::ivec2 size, std::span<const float> heights_m,
+                                double farthest_cells);
 
 }  // namespace groundray

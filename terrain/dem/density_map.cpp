@@ -8,7 +8,7 @@
 #include <utility>
 
 #include "core/error.h"
-#include "terrain/dem/placed_raster.h"
+#include "terrain/dem/dem_warp.h"
 
 namespace groundray {
 namespace {

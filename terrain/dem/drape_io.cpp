@@ -2,7 +2,6 @@
 
 #include <cpl_string.h>
 #include <fmt/ranges.h>
-#include <gdal_utils.h>
 
 #include <algorithm>
 #include <array>
@@ -11,12 +10,12 @@
 #include <cstdint>
 #include <glm/common.hpp>
 #include <memory>
+#include <string>
 #include <utility>
 #include <vector>
 
 #include "core/image/image_io.h"
 #include "terrain/dem/dem_warp.h"
-#include "terrain/dem/placed_raster.h"
 
 namespace groundray {
 namespace {
@@ -234,18 +233,11 @@ GDALDatasetUniquePtr photo_dataset(Image8& photo, RasterHeader& header) {
 Image8 warped(Image8 photo, RasterHeader& header, const std::string& target,
               const std::filesystem::path& path) {
   const GDALDatasetUniquePtr source = photo_dataset(photo, header);
-  CPLStringList words;
   // Scales of 1; by default, they differ from block to block.
-  for (const char* word : {"-of", "VRT", "-r", "bilinear", "-et", "0.01", "-novshift", "-wo",
-                           "XSCALE=1", "-wo", "YSCALE=1"}) {
-    words.AddString(word);
-  }
-  if (!target.empty()) words.AddString("-t_srs").AddString(target.c_str());
-  const std::unique_ptr<GDALWarpAppOptions, decltype(&GDALWarpAppOptionsFree)> options(
-      GDALWarpAppOptionsNew(words.List(), nullptr), &GDALWarpAppOptionsFree);
-  GDALDatasetH handle = source.get();
-  const GDALDatasetUniquePtr view(
-      GDALDataset::FromHandle(GDALWarp("", nullptr, 1, &handle, options.get(), nullptr)));
+  std::vector<std::string> options{"-r",  "bilinear", "-et", "0.01",    "-novshift",
+                                   "-wo", "XSCALE=1", "-wo", "YSCALE=1"};
+  if (!target.empty()) options.insert(options.end(), {"-t_srs", target});
+  const GDALDatasetUniquePtr view = warped_view(*source, options);
   if (view == nullptr) throw Error("it cannot be warped: {}", CPLGetLastErrorMsg());
   header = read_header(*view);
   check_pixels(path, {photo.width(), photo.height()}, header.samples, most_image_pixels);

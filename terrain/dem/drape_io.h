@@ -5,7 +5,7 @@
 #include <optional>
 #include <string>
 
-#include "core/appearance/drape.h"
+#include "core/appearance/ground_cover.h"
 
 namespace groundray {
 

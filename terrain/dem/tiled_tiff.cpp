@@ -7,8 +7,6 @@
 #include <cassert>
 #include <glm/common.hpp>
 #include <glm/vector_relational.hpp>
-#include <numeric>
-#include <utility>
 
 #include "terrain/dem/row_major.h"
 

@@ -1,6 +1,5 @@
 #include "terrain/lod/certificate.h"
 
-#include <algorithm>
 #include <bit>
 #include <string>
 #include <utility>
@@ -8,7 +7,6 @@
 #include "core/error.h"
 #include "terrain/dem/tiled_tiff.h"
 #include "terrain/lod/certificate_files.h"
-#include "terrain/lod/certify_file.h"
 
 namespace groundray {
 

@@ -11,7 +11,6 @@
 
 #include "terrain/dem/dem_file.h"
 #include "terrain/lod/lattice.h"
-#include "terrain/lod/node_level.h"
 
 namespace groundray {
 

@@ -1,6 +1,6 @@
 #pragma once
 
-// Private to the library: the files of a certificate and their summary.
+// Private to the library: the files of a certificate, their summary, and their computation.
 #include <filesystem>
 #include <optional>
 #include <string>
@@ -10,7 +10,6 @@
 #include "terrain/dem/tiled_tiff.h"
 #include "terrain/lod/certificate.h"
 #include "terrain/lod/lattice.h"
-#include "terrain/lod/node_level.h"
 
 namespace groundray {
 
@@ -72,5 +71,13 @@ class FolderInMaking {
   std::filesystem::path place_, aside_;  // aside_ is empty once published
   int lock_;                             // locked file descriptor of the folder; -1 for none
 };
+
+/// Writes the rasters of the DEM's certificate into `folder`. Both passes visit square tiles of the
+/// DEM in Z order, so that the tiles of each raster are completed one after the other and only a
+/// few of them are in memory.
+/// @throws Error if the DEM cannot be read or has no height, or the files cannot be written.
+CertificateSummary certify_file(const DemFile& dem, const Lattice& lattice,
+                                const std::filesystem::path& folder,
+                                const Certificate::Settings& settings);
 
 }  // namespace groundray

@@ -1,13 +1,10 @@
-#include "terrain/lod/certify_file.h"
-
+// Computation of the rasters of a certificate, in two passes over the DEM.
 #include <algorithm>
 #include <array>
 #include <bit>
 #include <cmath>
-#include <cstdint>
 #include <future>
 #include <glm/common.hpp>
-#include <limits>
 #include <memory>
 #include <string>
 #include <utility>
@@ -15,6 +12,7 @@
 
 #include "core/error.h"
 #include "terrain/dem/row_major.h"
+#include "terrain/lod/certificate_files.h"
 #include "terrain/lod/deviation.h"
 
 namespace groundray {

@@ -12,7 +12,6 @@ namespace {
 
 using passes::CellShape;
 using passes::DeviationPass;
-using passes::Heights;
 using passes::LevelGrid;
 using passes::NodeArrays;
 using passes::Points;
@@ -87,8 +86,8 @@ void run(DeviationPass& pass, const PassRunner& runner) {
            passes::JoinPartsPass{pass.nodes, nodes});
 }
 
-void accumulate(const Lattice& lattice, int level, const Heights& samples, const Points& points,
-                NodeArrays nodes, const PassRunner& runner) {
+void accumulate(const Lattice& lattice, int level, const HeightWindow& samples,
+                const Points& points, NodeArrays nodes, const PassRunner& runner) {
   const auto node_at = [&](int sample) { return (sample >> level) / lattice.block_cells; };
   const glm::ivec2 last = samples.first + samples.size - 2;  // last cell of the DEM in the window
   DeviationPass pass{samples, points, grid_of(lattice, level)};
@@ -96,10 +95,6 @@ void accumulate(const Lattice& lattice, int level, const Heights& samples, const
                   {node_at(last.x) + 1, node_at(last.y) + 1}};
   pass.nodes = nodes;
   run(pass, runner);
-}
-
-Heights heights_of(const HeightWindow& window) {
-  return {window.heights_m, window.row_stride, window.first, window.size};
 }
 
 }  // namespace
@@ -119,8 +114,7 @@ NodeLevel unknown_nodes(glm::ivec2 size, NodeDetail detail) {
 void accumulate_deviations(const Lattice& lattice, int level, const HeightWindow& samples,
                            const HeightWindow& points, glm::ivec2 first_node, NodeLevel& nodes,
                            const PassRunner& runner) {
-  accumulate(lattice, level, heights_of(samples), {heights_of(points)},
-             arrays_of(nodes, first_node), runner);
+  accumulate(lattice, level, samples, {points}, arrays_of(nodes, first_node), runner);
 }
 
 void saturate_keys(NodeLevel& nodes, glm::ivec2 first_node, const NodeLevel& children,
@@ -140,7 +134,7 @@ std::vector<NodeLevel> certify(const HeightGrid& grid, int block_cells, NodeDeta
                 Lattice::max_block_cells);
   }
   const Lattice lattice{{grid.columns(), grid.rows()}, block_cells};
-  const Heights samples{grid.heights_m().data(), grid.columns(), {0, 0}, lattice.samples};
+  const HeightWindow samples{{0, 0}, lattice.samples, grid.heights_m().data(), grid.columns()};
   std::vector<NodeLevel> levels;
   for (int level = 0; level <= lattice.top_level(); ++level) {
     levels.push_back(unknown_nodes(lattice.nodes(level), detail));

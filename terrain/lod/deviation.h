@@ -6,7 +6,6 @@
 
 #include "core/geometry/height_grid.h"
 #include "terrain/lod/lattice.h"
-#include "terrain/lod/node_level.h"
 #include "terrain/lod/pass.h"
 
 namespace groundray {
@@ -21,15 +20,6 @@ enum class NodeDetail { KeysOnly, Full };
 /// @throws Error if block_cells is invalid.
 std::vector<NodeLevel> certify(const HeightGrid& grid, int block_cells, NodeDetail detail,
                                const PassRunner& runner = run_in_parallel);
-
-/// Rectangle of heights in metres: samples of the DEM, or points of a level of its lattice. Holes
-/// are NaN.
-struct HeightWindow {
-  glm::ivec2 first{0};               ///< column and row of the first height
-  glm::ivec2 size{0};                ///< columns and rows
-  const float* heights_m = nullptr;  ///< row by row
-  std::ptrdiff_t row_stride = 0;     ///< offset of the next row, in heights
-};
 
 /// Returns nodes about which nothing is known yet; see accumulate_deviations.
 NodeLevel unknown_nodes(glm::ivec2 size, NodeDetail detail);

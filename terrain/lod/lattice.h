@@ -1,8 +1,10 @@
 #pragma once
 
 #include <algorithm>
+#include <cstddef>
 #include <glm/common.hpp>
 #include <glm/vec2.hpp>
+#include <vector>
 
 namespace groundray {
 
@@ -35,6 +37,37 @@ struct Lattice {
             point.y < last.y ? point.y << level : samples.y - 1};
   }
   friend bool operator==(const Lattice&, const Lattice&) = default;
+};
+
+/// Certified values of the nodes of one level, row by row (see Lattice). Deviations are largest
+/// vertical distances from the reference surface in metres, computed in double and rounded up.
+struct NodeLevel {
+  glm::ivec2 size{0};
+  /// Saturated key: the largest deviation of the node and of all nodes below it. Infinite for a
+  /// node with holes, negative for one without any height.
+  std::vector<float> key_m;
+  /// Largest deviation over all templates of the node that its neighbours can require, i.e. with
+  /// any of its sides thinned for a coarser neighbour (16, fewer at the DEM's boundary). For a node
+  /// with holes, only where both surfaces exist; a sample or an edge of the DEM without a facet
+  /// counts as surface.
+  std::vector<float> deviation_m;
+  /// Deviation of the node with no side thinned; 0 at level 0.
+  std::vector<float> full_m;
+  /// Lowest and highest sample of the DEM in the node, metres; +inf and -inf if there is none.
+  std::vector<float> low_m, high_m;
+};
+
+/// Rectangle of heights in metres: samples of the DEM, or points of a level of its lattice. Holes
+/// are NaN.
+struct HeightWindow {
+  glm::ivec2 first{0};               ///< column and row of the first height
+  glm::ivec2 size{0};                ///< columns and rows
+  const float* heights_m = nullptr;  ///< row by row
+  std::ptrdiff_t row_stride = 0;     ///< offset of the next row, in heights
+
+  const float* at(int column, int row) const noexcept {
+    return heights_m + (row - first.y) * row_stride + (column - first.x);
+  }
 };
 
 }  // namespace groundray

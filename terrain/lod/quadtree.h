@@ -8,7 +8,6 @@
 
 #include "core/tracing/leaf.h"
 #include "terrain/lod/lattice.h"
-#include "terrain/lod/node_level.h"
 #include "terrain/lod/pass.h"
 
 namespace groundray {

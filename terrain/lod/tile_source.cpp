@@ -3,9 +3,7 @@
 #include <fmt/format.h>
 
 #include <algorithm>
-#include <cmath>
 #include <condition_variable>
-#include <cstdint>
 #include <deque>
 #include <glm/common.hpp>
 #include <limits>
@@ -116,14 +114,9 @@ float MemoryTiles::max_key_m(int level) const {
 
 std::shared_ptr<const Tile> MemoryTiles::tile(const TileName& name) const {
   auto tile = empty_tile(lattice_, name);
-  const Window points = tile_points(lattice_, name);
-  for (int row = 0; row < points.size.y; ++row) {
-    for (int column = 0; column < points.size.x; ++column) {
-      const glm::ivec2 sample = lattice_.sample(name.level, points.first + glm::ivec2(column, row));
-      tile->heights_m[value_index({column, row}, Tile::points)] =
-          grid_.height_m(sample.x, sample.y);
-    }
-  }
+  for_each_point(lattice_, name, [&](std::size_t at, glm::ivec2 sample) {
+    tile->heights_m[at] = grid_.height_m(sample.x, sample.y);
+  });
   const Window nodes = tile_nodes(lattice_, name);
   copy_nodes(levels_[static_cast<std::size_t>(name.level)], nodes.first, nodes.size, *tile);
   return tile;

@@ -2,6 +2,7 @@
 
 #include <array>
 #include <cstddef>
+#include <glm/common.hpp>
 #include <glm/vec2.hpp>
 #include <memory>
 #include <span>
@@ -12,7 +13,6 @@
 #include "terrain/dem/dem_file.h"
 #include "terrain/lod/certificate.h"
 #include "terrain/lod/lattice.h"
-#include "terrain/lod/node_level.h"
 
 namespace groundray {
 
@@ -47,6 +47,20 @@ inline glm::ivec2 tile_count(const Lattice& lattice, int level) {
 /// Returns a tile of `name.level` without any height.
 /// @throws Error that names the tile if it does not exist.
 std::shared_ptr<Tile> empty_tile(const Lattice& lattice, const TileName& name);
+
+/// Calls act(index, sample) for each point of a tile that the lattice has: its index in heights_m
+/// and its sample.
+template <typename Act>
+void for_each_point(const Lattice& lattice, const TileName& name, const Act& act) {
+  const glm::ivec2 first = name.which * Tile::cells;
+  const glm::ivec2 size = glm::min(glm::ivec2(Tile::points), lattice.points(name.level) - first);
+  for (int y = 0; y < size.y; ++y) {
+    for (int x = 0; x < size.x; ++x) {
+      act(static_cast<std::size_t>(y * Tile::points + x),
+          lattice.sample(name.level, first + glm::ivec2(x, y)));
+    }
+  }
+}
 
 /// Returns a cell of the DEM from the tile of level 0 that contains it.
 inline Cell cell_of(const Tile& tile, glm::ivec2 cell) {

@@ -146,16 +146,10 @@ std::shared_ptr<const Tile> RefinedTiles::finer_tile(const TileName& name) const
   const std::shared_ptr<const Tile> dem = dem_->tile(from);
   const int exponent = relief_->exponent(), level = name.level;
   const glm::ivec2 last_cell = (from.which + 1) * Tile::cells - 1;  // of the DEM's tile
-  const glm::ivec2 first_point = name.which * Tile::cells;
-  const glm::ivec2 points =
-      glm::min(glm::ivec2(Tile::points), lattice_.points(level) - first_point);
-  for (int y = 0; y < points.y; ++y) {
-    for (int x = 0; x < points.x; ++x) {
-      const glm::ivec2 sample = (first_point + glm::ivec2(x, y)) << level;
-      const Cell cell = cell_of(*dem, glm::min(sample >> exponent, last_cell));
-      tile->heights_m[value_index({x, y}, Tile::points)] = relief_->height_m(cell, sample);
-    }
-  }
+  for_each_point(lattice_, name, [&](std::size_t at, glm::ivec2 sample) {
+    const Cell cell = cell_of(*dem, glm::min(sample >> exponent, last_cell));
+    tile->heights_m[at] = relief_->height_m(cell, sample);
+  });
   const glm::ivec2 first_node = name.which * Tile::nodes;
   const glm::ivec2 nodes = glm::min(glm::ivec2(Tile::nodes), lattice_.nodes(level) - first_node);
   const int node_cells = lattice_.block_cells << level;
@@ -176,17 +170,10 @@ std::shared_ptr<const Tile> RefinedTiles::displaced_tile(const TileName& name) c
   auto tile = empty_tile(lattice_, name);
   const TileName from = below(name);
   const std::shared_ptr<const Tile> dem = dem_->tile(from);
-  const glm::ivec2 first_point = name.which * Tile::cells;
-  const glm::ivec2 points =
-      glm::min(glm::ivec2(Tile::points), lattice_.points(name.level) - first_point);
-  for (int y = 0; y < points.y; ++y) {
-    for (int x = 0; x < points.x; ++x) {
-      const std::size_t at = value_index({x, y}, Tile::points);
-      const glm::ivec2 sample = lattice_.sample(name.level, first_point + glm::ivec2(x, y));
-      tile->heights_m[at] = static_cast<float>(static_cast<double>(dem->heights_m[at]) +
-                                               relief_->displacement_m(sample));
-    }
-  }
+  for_each_point(lattice_, name, [&](std::size_t at, glm::ivec2 sample) {
+    tile->heights_m[at] = static_cast<float>(static_cast<double>(dem->heights_m[at]) +
+                                             relief_->displacement_m(sample));
+  });
   Relief::Node span = relief_->node(name.level, {0, 0});
   for (std::size_t at = 0; at < tile->key_m.size(); ++at) {
     const bool exists = dem->key_m[at] >= 0;

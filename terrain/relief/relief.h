@@ -10,7 +10,7 @@
 #include "core/geometry/grid_frame.h"
 #include "core/geometry/height_grid.h"
 #include "core/image/image.h"
-#include "terrain/lod/node_level.h"
+#include "terrain/lod/lattice.h"
 #include "terrain/relief/fractal_field.h"
 
 namespace groundray {

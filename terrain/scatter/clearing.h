@@ -5,7 +5,7 @@
 #include <span>
 #include <vector>
 
-#include "terrain/dem/area.h"
+#include "terrain/dem/density_map.h"
 
 namespace groundray {
 

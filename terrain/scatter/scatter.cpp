@@ -12,7 +12,6 @@
 #include <utility>
 
 #include "core/error.h"
-#include "terrain/scatter/adsorption.h"
 #include "terrain/scatter/dart_field.h"
 
 namespace groundray {

@@ -10,7 +10,6 @@
 #include <vector>
 
 #include "core/random.h"
-#include "terrain/dem/area.h"
 #include "terrain/dem/density_map.h"
 #include "terrain/ground.h"
 #include "terrain/lod/pass.h"

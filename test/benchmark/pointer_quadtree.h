@@ -3,7 +3,7 @@
 #include <span>
 
 #include "core/geometry/height_grid.h"
-#include "terrain/lod/node_level.h"
+#include "terrain/lod/lattice.h"
 #include "terrain/terrain_mesh.h"
 
 namespace groundray::benchmark {

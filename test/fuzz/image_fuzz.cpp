@@ -3,7 +3,7 @@
 #include <string_view>
 
 #include "core/error.h"
-#include "core/image/exr_reader.h"
+#include "core/image/exr_io.h"
 #include "core/image/image_io.h"
 
 /// For any bytes, the readers of pictures return one or throw Error.

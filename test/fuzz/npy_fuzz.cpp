@@ -3,7 +3,7 @@
 #include <string_view>
 
 #include "core/error.h"
-#include "core/io/npy_reader.h"
+#include "core/io/npy_io.h"
 
 /// For any bytes, the readers of arrays and archives return numbers or throw Error.
 extern "C" int LLVMFuzzerTestOneInput(const std::uint8_t* data, std::size_t size) {

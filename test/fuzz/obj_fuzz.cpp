@@ -4,7 +4,7 @@
 #include <string_view>
 
 #include "core/error.h"
-#include "core/model/obj_reader.h"
+#include "core/model/polygon_soup.h"
 
 // For any bytes, used both as the .obj and as the .mtl that it names, the reader returns a model or
 // throws Error.

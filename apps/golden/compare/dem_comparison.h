@@ -4,7 +4,6 @@
 #include <string>
 
 #include "apps/golden/report.h"
-#include "terrain/dem/dem.h"
 #include "terrain/dem/dem_io.h"
 
 namespace groundray::golden {

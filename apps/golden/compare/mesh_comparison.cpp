@@ -13,7 +13,7 @@
 
 #include "apps/golden/compare/error_figures.h"
 #include "core/error.h"
-#include "core/geometry/mesh_check.h"
+#include "core/geometry/mesh.h"
 #include "core/io/mesh_io.h"
 #include "core/model/mesh_reader.h"
 #include "core/model/model.h"

@@ -9,7 +9,7 @@
 #include <string_view>
 
 #include "core/error.h"
-#include "core/io/file_ending.h"
+#include "core/io/file_io.h"
 
 namespace groundray::golden {
 namespace {

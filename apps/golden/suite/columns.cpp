@@ -9,10 +9,10 @@
 #include <variant>
 
 #include "core/error.h"
-#include "core/image/exr_reader.h"
+#include "core/image/exr_io.h"
 #include "core/image/image_io.h"
 #include "core/io/file_io.h"
-#include "core/io/npy_reader.h"
+#include "core/io/npy_io.h"
 #include "core/io/ply_io.h"
 #include "core/io/tum_io.h"
 

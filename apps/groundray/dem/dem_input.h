@@ -11,7 +11,7 @@
 #include "apps/groundray/dem/dem_points.h"
 #include "apps/groundray/dem/dem_request.h"
 #include "reconstruction/dem/measured_points.h"
-#include "terrain/dem/area.h"
+#include "terrain/dem/density_map.h"
 
 namespace groundray {
 

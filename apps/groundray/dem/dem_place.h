@@ -6,8 +6,8 @@
 
 #include "core/geometry/grid_frame.h"
 #include "core/io/mesh_io.h"
-#include "terrain/dem/area.h"
-#include "terrain/dem/dem.h"
+#include "terrain/dem/dem_io.h"
+#include "terrain/dem/density_map.h"
 
 namespace groundray {
 

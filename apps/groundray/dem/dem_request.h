@@ -17,7 +17,7 @@
 #include "reconstruction/dem/fusion/dem_fusion.h"
 #include "reconstruction/dem/ground/ground_filter.h"
 #include "reconstruction/dem/smooth/dem_smooth.h"
-#include "terrain/dem/area.h"
+#include "terrain/dem/density_map.h"
 
 namespace groundray {
 

@@ -10,7 +10,7 @@
 #include <utility>
 
 #include "core/error.h"
-#include "core/image/exr_reader.h"
+#include "core/image/exr_io.h"
 #include "core/image/image_io.h"
 #include "reconstruction/stereo/pinhole_pair.h"
 #include "sensors/camera/lens/lens.h"

@@ -7,7 +7,7 @@
 
 #include "core/io/mesh_io.h"
 #include "reconstruction/dem/dem_layers.h"
-#include "terrain/dem/dem.h"
+#include "terrain/dem/dem_io.h"
 
 namespace groundray {
 

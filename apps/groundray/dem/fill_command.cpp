@@ -21,7 +21,6 @@
 #include "core/progress.h"
 #include "reconstruction/dem/fill/dem_fill.h"
 #include "terrain/dem/dem_io.h"
-#include "terrain/dem/gdal_fill.h"
 #include "terrain/dem/layers_io.h"
 
 namespace groundray {

@@ -8,7 +8,7 @@
 
 #include "apps/groundray/result_files.h"
 #include "core/error.h"
-#include "core/io/file_ending.h"
+#include "core/io/file_io.h"
 #include "reconstruction/mesh/measured_mesh_io.h"
 
 namespace groundray {

@@ -15,11 +15,10 @@
 #include "apps/view/recorded/recorded_image.h"
 #include "apps/view/rendering/picture_file.h"
 #include "core/error.h"
-#include "core/image/exr_reader.h"
+#include "core/image/exr_io.h"
 #include "core/image/image_io.h"
-#include "core/io/file_ending.h"
 #include "core/io/file_io.h"
-#include "core/io/npy_reader.h"
+#include "core/io/npy_io.h"
 
 namespace groundray {
 namespace {

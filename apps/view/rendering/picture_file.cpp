@@ -10,9 +10,9 @@
 #include "apps/view/layers/picture_layer.h"
 #include "apps/view/rendering/colour_table.h"
 #include "core/error.h"
-#include "core/image/exr_reader.h"
+#include "core/image/exr_io.h"
 #include "core/image/image_io.h"
-#include "core/io/file_ending.h"
+#include "core/io/file_io.h"
 #include "terrain/dem/band_file.h"
 
 namespace groundray {

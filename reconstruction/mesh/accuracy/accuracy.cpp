@@ -10,7 +10,7 @@
 #include <utility>
 
 #include "core/error.h"
-#include "core/geometry/mesh_check.h"
+#include "core/geometry/mesh.h"
 #include "core/model/model.h"
 #include "reconstruction/mesh/accuracy/cover_bound.h"
 #include "reconstruction/mesh/accuracy/largest_distance.h"

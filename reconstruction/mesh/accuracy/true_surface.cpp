@@ -13,7 +13,7 @@
 #include <utility>
 
 #include "core/error.h"
-#include "core/geometry/mesh_check.h"
+#include "core/geometry/mesh.h"
 #include "core/model/model.h"
 #include "reconstruction/mesh/accuracy/surface_parts.h"
 

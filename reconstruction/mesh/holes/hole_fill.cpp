@@ -12,7 +12,7 @@
 #include <utility>
 
 #include "core/error.h"
-#include "core/geometry/mesh_check.h"
+#include "core/geometry/mesh.h"
 #include "reconstruction/mesh/holes/hole_patch.h"
 #include "reconstruction/mesh/holes/mesh_boundary.h"
 #include "reconstruction/mesh/holes/placed_patch.h"

@@ -13,7 +13,7 @@
 #include <vector>
 
 #include "core/error.h"
-#include "core/geometry/mesh_check.h"
+#include "core/geometry/mesh.h"
 #include "core/model/model.h"
 #include "reconstruction/mesh/manifold_mesh.h"
 #include "reconstruction/mesh/merge/consensus.h"

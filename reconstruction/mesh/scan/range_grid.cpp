@@ -8,9 +8,9 @@
 
 #include "core/error.h"
 #include "core/io/file_io.h"
+#include "core/io/ply_header.h"
 #include "core/io/ply_io.h"
 #include "core/io/text_lines.h"
-#include "core/model/ply_values.h"
 
 namespace groundray {
 namespace {
@@ -29,8 +29,8 @@ std::vector<double> coordinates(const PointCloud& cloud, std::string_view name) 
 }
 
 /// Returns the number in a line of obj_info such as `num_cols 512`.
-int count_of(const PlyLayout& layout, std::string_view key) {
-  for (const std::string_view info : layout.infos) {
+int count_of(const PlyHeader& layout, std::string_view key) {
+  for (const std::string& info : layout.infos) {
     const auto words = words_of(info);
     if (words.size() != 2 || words[0] != key) continue;
     const auto count = number_of<std::uint64_t>(words[1]);
@@ -62,7 +62,7 @@ std::uint32_t read_row(const PlyElement& element, std::uint64_t row, std::size_t
   return vertex;
 }
 
-void check_grid(const PlyLayout& layout, int rows, int columns) {
+void check_grid(const PlyHeader& layout, int rows, int columns) {
   const auto grid = std::ranges::find(layout.elements, "range_grid", &PlyElement::name);
   if (grid == layout.elements.end())
     throw Error("there is no element range_grid: is this a mesh or a cloud?");
@@ -80,12 +80,12 @@ void check_grid(const PlyLayout& layout, int rows, int columns) {
 OrganisedScan read_grid(std::string_view bytes, const PointCloud& cloud,
                         const RangeGridBeams& beams) {
   TextLines lines(bytes);
-  const PlyLayout layout = ply_layout(lines);
+  const PlyHeader layout = parse_ply_header(lines);
   OrganisedScan scan{.rows = count_of(layout, "num_rows"), .columns = count_of(layout, "num_cols")};
   check_grid(layout, scan.rows, scan.columns);
-  PlyValues values(lines.rest(), layout.format);
+  PlyValues values(lines.rest(), *layout.format);
   for (const PlyElement& element : layout.elements) {
-    check_rows(element, values);
+    values.check_rows(element);
     for (std::uint64_t row = 0; row < element.rows; ++row) {
       const std::uint32_t vertex = read_row(element, row, cloud.rows(), values);
       if (element.name == "range_grid") scan.returns.push_back(vertex);

@@ -7,7 +7,7 @@
 #include <numeric>
 
 #include "core/error.h"
-#include "core/geometry/mesh_check.h"
+#include "core/geometry/mesh.h"
 #include "core/model/model.h"
 #include "reconstruction/mesh/manifold_mesh.h"
 #include "reconstruction/mesh/simplify/volume_collapse.h"

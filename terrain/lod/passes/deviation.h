@@ -6,8 +6,8 @@
 #include <glm/vec2.hpp>
 #include <limits>
 
+#include "terrain/lod/lattice.h"
 #include "terrain/lod/passes/fine_deviation.h"
-#include "terrain/lod/passes/heights.h"
 #include "terrain/lod/passes/level_grid.h"
 #include "terrain/lod/passes/node_arrays.h"
 #include "terrain/lod/passes/node_deviation.h"
@@ -18,7 +18,7 @@ namespace groundray::passes {
 /// Deviations of the nodes of one level, as far as a window of samples shows them. An index is a
 /// run of nodes in a row, or one of several bands of rows of one node.
 struct DeviationPass {
-  Heights samples;
+  HeightWindow samples;
   Points points;
   LevelGrid grid;
   Rectangle touched;  ///< nodes that share a cell with the window

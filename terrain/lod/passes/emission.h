@@ -6,6 +6,7 @@
 #include <glm/vec2.hpp>
 #include <glm/vec3.hpp>
 
+#include "core/tracing/leaf.h"
 #include "terrain/lod/lattice.h"
 #include "terrain/lod/passes/border_thinning.h"
 #include "terrain/lod/passes/leaf_tree.h"
@@ -15,7 +16,7 @@ namespace groundray::passes {
 /// Calls `act` with the three points of each triangle of a block, counter-clockwise as seen from
 /// above with columns to the east and rows to the south.
 template <typename Act>
-void for_each_triangle(const Block& block, const Act& act) noexcept {
+void for_each_triangle(const ThinnedBlock& block, const Act& act) noexcept {
   for (int row = 0; row < block.cells.y; ++row) {
     for (int column = 0; column < block.cells.x; ++column) {
       glm::ivec2 north_west{column, row};

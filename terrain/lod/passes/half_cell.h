@@ -6,9 +6,9 @@
 #include <cstdint>
 #include <glm/vec2.hpp>
 
+#include "terrain/lod/lattice.h"
 #include "terrain/lod/passes/border_thinning.h"
 #include "terrain/lod/passes/cell_plane.h"
-#include "terrain/lod/passes/heights.h"
 #include "terrain/lod/passes/level_grid.h"
 
 namespace groundray::passes {
@@ -35,7 +35,7 @@ inline double worst_in_row(const float* heights, int begin, int end, double star
 /// Comparison of one half of a cell with the samples in it, and of its diagonal with the edges that
 /// it crosses. The half's other two sides lie on edges of the DEM.
 struct HalfCell {
-  const Heights& samples;
+  const HeightWindow& samples;
   const CellShape& shape;
   glm::ivec2 first;  ///< north-western sample of the cell
   Band band;

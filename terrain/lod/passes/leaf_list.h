@@ -4,7 +4,7 @@
 #include <cstdint>
 
 #include "core/tracing/leaf.h"
-#include "terrain/lod/passes/node_runs.h"
+#include "terrain/lod/passes/node_arrays.h"
 #include "terrain/lod/quadtree.h"
 
 namespace groundray::passes {

@@ -9,8 +9,8 @@
 #include <glm/vec3.hpp>
 
 #include "core/tracing/leaf.h"
+#include "terrain/lod/lattice.h"
 #include "terrain/lod/passes/border_thinning.h"
-#include "terrain/lod/passes/heights.h"
 #include "terrain/lod/quadtree.h"
 
 namespace groundray::passes {
@@ -19,7 +19,7 @@ namespace groundray::passes {
 struct LeafBlock {
   int level = 0;
   glm::ivec2 first_cell{0};  ///< on the lattice of its level
-  Block block;
+  ThinnedBlock block;
   glm::ivec2 own_points{2};  ///< columns and rows of points in its half-open square
 
   /// Returns the number of the leaf's own points that come before `point`, row by row. Only for a
@@ -56,7 +56,7 @@ struct LeafTree {
   };
   static constexpr int max_levels = 31;
 
-  Heights samples;
+  HeightWindow samples;
   int block_cells = 2;
   int level_count = 0;
   Level levels[max_levels];

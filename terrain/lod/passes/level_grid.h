@@ -2,6 +2,9 @@
 
 #include <algorithm>
 #include <glm/vec2.hpp>
+#include <limits>
+
+#include "terrain/lod/lattice.h"
 
 namespace groundray::passes {
 
@@ -51,6 +54,17 @@ struct LevelGrid {
   bool has_all_neighbours(glm::ivec2 node) const noexcept {
     const glm::ivec2 end = (node + 1) * block_cells;
     return node.x > 0 && node.y > 0 && end.x < cells.x && end.y < cells.y;
+  }
+};
+
+/// Points of a level, stored densely, or as every 2^shift-th sample of the DEM and its last.
+struct Points {
+  HeightWindow heights;
+  int shift = 0;
+  glm::ivec2 last{std::numeric_limits<int>::max()};  ///< last sample of the DEM
+
+  double at(int column, int row) const noexcept {
+    return *heights.at(std::min(column << shift, last.x), std::min(row << shift, last.y));
   }
 };
 

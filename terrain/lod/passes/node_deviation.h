@@ -4,9 +4,9 @@
 #include <glm/vec2.hpp>
 
 #include "core/tracing/leaf.h"
+#include "terrain/lod/lattice.h"
 #include "terrain/lod/passes/border_thinning.h"
 #include "terrain/lod/passes/half_cell.h"
-#include "terrain/lod/passes/heights.h"
 #include "terrain/lod/passes/level_grid.h"
 #include "terrain/lod/passes/node_arrays.h"
 
@@ -14,7 +14,7 @@ namespace groundray::passes {
 
 /// Deviations of any node of a level, evaluated half by half and row by row.
 struct NodeDeviation {
-  const Heights& samples;
+  const HeightWindow& samples;
   const Points& points;
   const LevelGrid& grid;
 
@@ -68,7 +68,7 @@ struct NodeDeviation {
     return worst;
   }
 
-  /// Adds the deviations of cell `a` and the next one along a thinned side (see thin.h).
+  /// Adds the deviations of cell `a` and the next one along a thinned side (see border_thinning.h).
   void add_pair(Leaf::Side side, glm::ivec2 a, const Band& band, Deviations& worst) const noexcept {
     const bool is_row = side == Leaf::North || side == Leaf::South;
     const glm::ivec2 b = is_row ? glm::ivec2{a.x + 1, a.y} : glm::ivec2{a.x, a.y + 1};

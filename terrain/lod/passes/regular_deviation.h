@@ -3,6 +3,7 @@
 #include <cmath>
 #include <cstddef>
 
+#include "core/tracing/leaf.h"
 #include "terrain/lod/passes/border_thinning.h"
 #include "terrain/lod/passes/cell_plane.h"
 #include "terrain/lod/passes/fine_deviation.h"
@@ -99,7 +100,7 @@ struct RegularNode {
   /// Returns the largest deviation of the cells on thinned sides. All sides are thinned at once,
   /// which yields every half of any template, except those that two sides replace.
   double thinned(int cells) const noexcept {
-    const Block block{{cells, cells}, Leaf::North | Leaf::East | Leaf::South | Leaf::West};
+    const ThinnedBlock block{{cells, cells}, Leaf::North | Leaf::East | Leaf::South | Leaf::West};
     double worst = 0;
     for (int c = 0; c < cells; ++c) {
       worst = larger(worst, worst_of_thinned(block, c, 0));
@@ -116,7 +117,7 @@ struct RegularNode {
     return worst;
   }
 
-  double worst_of_thinned(const Block& block, int column, int row) const noexcept {
+  double worst_of_thinned(const ThinnedBlock& block, int column, int row) const noexcept {
     const Corners at{{kept(block, column, row), kept(block, column + 1, row),
                       kept(block, column, row + 1), kept(block, column + 1, row + 1)}};
     if (!block.splits_along_main(column, row)) return worst_of_anti(column, row, at);
@@ -131,7 +132,7 @@ struct RegularNode {
   }
 
   /// Returns the height of a point, interpolated if the point is omitted.
-  double kept(const Block& block, int column, int row) const noexcept {
+  double kept(const ThinnedBlock& block, int column, int row) const noexcept {
     if (!block.drops(column, row)) return point(column, row);
     return row == 0 || row == block.cells.y
                ? 0.5 * (point(column - 1, row) + point(column + 1, row))

@@ -8,7 +8,7 @@
 #include <limits>
 
 #include "core/tracing/leaf.h"
-#include "terrain/lod/passes/node_runs.h"
+#include "terrain/lod/passes/node_arrays.h"
 #include "terrain/lod/quadtree.h"
 
 namespace groundray::passes {

@@ -12,8 +12,7 @@
 #include <string>
 #include <vector>
 
-#include "core/appearance/ggx.h"
-#include "core/appearance/oren_nayar.h"
+#include "core/appearance/microfacets.h"
 #include "core/error.h"
 #include "core/random.h"
 

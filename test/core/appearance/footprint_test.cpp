@@ -81,7 +81,7 @@ TEST(Footprint, MatchesTheDifferencesOfNeighbouringRays) {
 
 TEST(Footprint, OnTerrainUsesMapCoordinates) {
   const glm::dvec2 gradient(0.5, -2);
-  const Tangents tangents = tangents_of_gradient(gradient, {10, 20});
+  const Tangents tangents{10.0 * glm::dvec3(1, 0, gradient.x), 20.0 * glm::dvec3(0, 1, gradient.y)};
   const glm::dvec2 step(3, 4);  // metres on the map
   const glm::dvec2 uv = uv_step(tangents, {step, glm::dot(step, gradient)});
   EXPECT_NEAR(uv.x, 0.3, 1e-15);

@@ -1,5 +1,3 @@
-#include "core/appearance/triplanar.h"
-
 #include <gtest/gtest.h>
 
 #include <algorithm>
@@ -8,6 +6,7 @@
 #include <limits>
 #include <utility>
 
+#include "core/appearance/texture.h"
 #include "core/random.h"
 
 namespace groundray::triplanar_test {

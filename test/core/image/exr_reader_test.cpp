@@ -1,4 +1,3 @@
-#include "core/image/exr_reader.h"
 
 #include <OpenEXR/ImfChannelList.h>
 #include <OpenEXR/ImfDeepFrameBuffer.h>

@@ -1,6 +1,6 @@
-#include "core/io/file_ending.h"
-
 #include <gtest/gtest.h>
+
+#include "core/io/file_io.h"
 
 namespace groundray::file_ending_test {
 namespace {

@@ -1,4 +1,3 @@
-#include "core/io/npy_reader.h"
 
 #include <fmt/format.h>
 #include <gmock/gmock.h>

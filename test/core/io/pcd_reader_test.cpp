@@ -11,7 +11,6 @@
 
 #include "core/error.h"
 #include "core/io/file_io.h"
-#include "core/io/lzf.h"
 #include "test/support/temporary_folder.h"
 
 namespace groundray::pcd_reader_test {

@@ -11,7 +11,7 @@
 #include <vector>
 
 #include "core/image/image_io.h"
-#include "core/io/npy_reader.h"
+#include "core/io/npy_io.h"
 #include "reconstruction/stereo/disparity.h"
 #include "test/support/margin.h"
 #include "test/support/temporary_folder.h"

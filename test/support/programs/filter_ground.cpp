@@ -9,7 +9,6 @@
 
 #include "core/error.h"
 #include "core/io/npy_io.h"
-#include "core/io/npy_reader.h"
 #include "reconstruction/dem/ground/ground_filter.h"
 
 /// Classifies the points of an array of shape (n, 3): writes for each point its class (0: ground,

@@ -11,7 +11,6 @@
 #include "core/geometry/height_grid.h"
 #include "terrain/lod/deviation.h"
 #include "terrain/lod/lattice.h"
-#include "terrain/lod/node_level.h"
 #include "terrain/lod/quadtree.h"
 #include "test/support/terrain/node_oracle.h"
 

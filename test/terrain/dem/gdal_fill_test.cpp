@@ -1,5 +1,3 @@
-#include "terrain/dem/gdal_fill.h"
-
 #include <gmock/gmock.h>
 #include <gtest/gtest.h>
 
@@ -8,6 +6,7 @@
 #include <vector>
 
 #include "core/error.h"
+#include "terrain/dem/dem_io.h"
 
 namespace groundray::gdal_fill_test {
 namespace {

@@ -378,8 +378,8 @@ TEST(Deviation, CrossingsOfADiagonalDoNotDependOnTheTiling) {
                                   w == h ? 0 : 1.0 / std::abs(w - h)};
     const auto crossings = [&](glm::ivec2 first, glm::ivec2 last, const passes::Band& band,
                                bool is_anti) {
-      const passes::Heights all{grid.heights_m().data(), size.x + 2, {0, 0}, size + 2};
-      const passes::Heights part{all.at(first.x, first.y), size.x + 2, first, last - first + 1};
+      const HeightWindow all{{0, 0}, size + 2, grid.heights_m().data(), size.x + 2};
+      const HeightWindow part{first, last - first + 1, all.at(first.x, first.y), size.x + 2};
       return passes::HalfCell{part, shape, {1, 1}, band}.along_diagonal(is_anti, {{3, 50, -20, 7}});
     };
     const int cut = 1 + static_cast<int>(uniform(Seed{12}, trial) * w);

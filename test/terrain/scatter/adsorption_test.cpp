@@ -1,5 +1,3 @@
-#include "terrain/scatter/adsorption.h"
-
 #include <gtest/gtest.h>
 
 #include <algorithm>
@@ -10,6 +8,7 @@
 #include <random>
 #include <vector>
 
+#include "terrain/scatter/dart_field.h"
 #include "test/support/terrain/sample_terrain.h"
 
 namespace groundray::adsorption_test {

@@ -13,7 +13,7 @@
 #include <utility>
 
 #include "core/error.h"
-#include "core/image/exr_reader.h"
+#include "core/image/exr_io.h"
 #include "core/image/image_io.h"
 #include "core/io/file_io.h"
 #include "core/io/text_lines.h"

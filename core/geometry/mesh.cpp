@@ -1,4 +1,4 @@
-#include "core/geometry/mesh_check.h"
+#include "core/geometry/mesh.h"
 
 #include <algorithm>
 #include <cmath>

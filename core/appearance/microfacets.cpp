@@ -1,4 +1,4 @@
-#include "core/appearance/ggx.h"
+#include "core/appearance/microfacets.h"
 
 #include <algorithm>
 #include <cmath>
@@ -57,3 +57,27 @@ double sample_weight(const glm::dvec3& wo, const glm::dvec3& wi, double alpha) n
 }
 
 }  // namespace groundray::ggx
+
+namespace groundray::oren_nayar {
+namespace {
+
+using std::numbers::pi;
+
+}  // namespace
+
+double scale(double roughness) noexcept { return 1 / (1 + (0.5 - 2 / (3 * pi)) * roughness); }
+
+double share(double cosine, double roughness) noexcept {
+  const double c = std::clamp(cosine, 0.0, 1.0);
+  const double s = std::sqrt(1 - c * c);
+  // tan(theta) (1 - s^3) of the paper, rewritten without the division by the cosine
+  const double steep = s * c * (1 + s + s * s) / (1 + s);
+  const double g = s * (std::acos(c) - s * c) + 2.0 / 3 * (steep - s);
+  return scale(roughness) * (1 + roughness * g / pi);
+}
+
+double mean_share(double roughness) noexcept {
+  return scale(roughness) * (1 + roughness * (2.0 / 3 - 28 / (15 * pi)));
+}
+
+}  // namespace groundray::oren_nayar
