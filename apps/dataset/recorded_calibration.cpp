@@ -4,7 +4,7 @@
 #include <cmath>
 #include <glm/gtc/quaternion.hpp>
 
-#include "apps/scene/readers/lens_reader.h"
+#include "apps/scene/readers/readers.h"
 
 namespace groundray {
 namespace {

@@ -15,7 +15,7 @@
 #include "apps/golden/suite/golden_case.h"
 #include "apps/golden/suite/suite.h"
 #include "apps/scene/interruption.h"
-#include "apps/scene/source_folder.h"
+#include "apps/scene/simulation.h"
 #include "core/error.h"
 
 namespace {

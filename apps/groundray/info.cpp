@@ -123,7 +123,7 @@ void print_materials(const Simulation& simulation) {
   };
   if (simulation.cameras.empty() && std::ranges::none_of(simulation.lidars, has_light)) return;
   std::vector<std::string_view> names;
-  for (const Material& material : simulation.content.materials.all())
+  for (const Material& material : simulation.scene_objects.materials.all())
     names.push_back(material.name);
   fmt::print("materials {}\n", fmt::join(names, ", "));
 }
@@ -203,8 +203,8 @@ void print_scene(const Simulation& simulation) {
   print_frame(simulation.terrain.frame(), simulation.terrain.header().origin_w_m);
   if (simulation.terrain.whole() != nullptr) print_heights(*simulation.terrain.whole());
   print_levels(simulation);
-  print_cover(simulation.spec.terrain, simulation.content.cover);
-  print_content(simulation.content);
+  print_cover(simulation.spec.terrain, simulation.scene_objects.cover);
+  print_content(simulation.scene_objects);
   print_materials(simulation);
   if (simulation.spec.sky) print_sky(*simulation.spec.sky);
   for (const PlacedLidar& lidar : simulation.lidars) print_lidar(lidar);

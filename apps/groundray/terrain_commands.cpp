@@ -9,7 +9,6 @@
 #include <map>
 #include <utility>
 
-#include "apps/scene/certifying.h"
 #include "apps/scene/interruption.h"
 #include "core/io/mesh_io.h"
 #include "terrain/dem/dem_file.h"

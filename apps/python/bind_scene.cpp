@@ -26,8 +26,8 @@
 #include "apps/python/cast.h"
 #include "apps/python/frame_choice.h"
 #include "apps/python/scene_state.h"
-#include "apps/scene/paths.h"
 #include "apps/scene/readers/spec_io.h"
+#include "apps/scene/simulation.h"
 #include "core/error.h"
 #include "terrain/terrain_scene.h"
 
@@ -92,10 +92,10 @@ std::shared_ptr<const Scene> scene_for(SceneState& state, const SensorBox& box) 
                    float_frame_origin(middle), simulation.spec.tracing);
   return std::make_shared<const Scene>(Scene{std::move(rays),
                                              {.label = simulation.spec.terrain.label},
-                                             simulation.content.materials,
-                                             simulation.content.objects,
-                                             simulation.content.models,
-                                             simulation.content.cover});
+                                             simulation.scene_objects.materials,
+                                             simulation.scene_objects.objects,
+                                             simulation.scene_objects.models,
+                                             simulation.scene_objects.cover});
 }
 
 Points cast_in_scene(SceneState& state, const GivenPoints& origins_m, const GivenPoints& directions,
@@ -127,7 +127,7 @@ AnyArray ground_heights(const SceneState& state, const GivenPlaces& places_m) {
 
 nb::list groups_of(const SceneState& state) {
   nb::list all;
-  for (const SceneObjects::Group& group : state.simulation.content.groups) {
+  for (const SceneObjects::Group& group : state.simulation.scene_objects.groups) {
     nb::dict one;
     one["name"] = group.name;
     one["label"] = group.label;

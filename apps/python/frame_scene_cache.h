@@ -6,7 +6,7 @@
 #include <optional>
 #include <vector>
 
-#include "apps/scene/frame_scene_builder.h"
+#include "apps/scene/frames.h"
 #include "apps/scene/simulation.h"
 
 namespace groundray::python {

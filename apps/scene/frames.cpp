@@ -2,11 +2,11 @@
 
 #include <algorithm>
 #include <initializer_list>
+#include <utility>
 
-#include "apps/scene/frame_scene_builder.h"
 #include "sensors/camera/imager.h"
-#include "sensors/camera/irradiance.h"
 #include "sensors/camera/path_tracer.h"
+#include "terrain/terrain_scene.h"
 
 namespace groundray {
 namespace {
@@ -39,6 +39,29 @@ TruthRequest truth_request(const PlacedCamera& placed, std::size_t image) {
 
 }  // namespace
 
+const Scene& FrameSceneBuilder::operator()(const Exposed& frame) {
+  const glm::dvec3 p_DL = float_frame_origin(frame.X_DS->pose_at(frame.begin).translation_m);
+  const HeightGrid* whole = simulation_.terrain.whole();
+  if (whole == nullptr) {
+    const SensorBox sensors = sensor_box(frame);
+    clipmap_ = clipmap_ ? clipmap_->moved_to(sensors)
+                        : simulation_.terrain.clipmap(sensors, simulation_.reach_m);
+    take(build_tracer(*clipmap_, p_DL, simulation_.spec.tracing, scene_ ? &scene_->rays : nullptr));
+  } else if (!scene_ || p_DL != p_DL_) {
+    scene_.reset();  // first, because two would need twice the memory
+    take({{full_resolution_level(*whole)}, p_DL, simulation_.spec.tracing});
+  }
+  p_DL_ = p_DL;
+  return *scene_;
+}
+
+void FrameSceneBuilder::take(RayTracer rays) {
+  const SceneObjects& objects = simulation_.scene_objects;
+  scene_ = Scene{std::move(rays),   {.label = simulation_.spec.terrain.label},
+                 objects.materials, objects.objects,
+                 objects.models,    objects.cover};
+}
+
 LidarScan make_scan(const Simulation& simulation, std::size_t lidar, std::int64_t sweep,
                     const Scene& scene, const SweepWatch& watch) {
   const PlacedLidar& placed = simulation.lidars[lidar];
@@ -68,7 +91,7 @@ MadeImage make_image(const Simulation& simulation, std::size_t camera, std::int6
   if (gives_any(spec, {Product::Truth, Product::Bound, Product::Flow, Product::FlowFlo,
                        Product::FlowKitti})) {
     if (check) check();
-    made.truth = image_truth(placed.camera, scene, simulation.content.materials.in_colour(),
+    made.truth = image_truth(placed.camera, scene, simulation.scene_objects.materials.in_colour(),
                              placed.X_DC, truth_request(placed, number));
   }
   return made;

@@ -3,11 +3,16 @@
 #include <fmt/ranges.h>
 
 #include <algorithm>
+#include <filesystem>
+#include <optional>
 #include <span>
 #include <string_view>
 #include <tuple>
 #include <utility>
 
+#include "apps/scene/readers/spec_io.h"
+#include "apps/scene/simulation.h"
+#include "core/appearance/bsdf.h"
 #include "core/error.h"
 #include "core/image/image_io.h"
 #include "core/io/file_io.h"
@@ -87,7 +92,84 @@ std::size_t bytes_of(const Model& model) {
   return sum;
 }
 
+void add(const Lambertian& matt, Fingerprint& print) {
+  print.add(std::span<const SpectrumSample>(matt.spectrum));
+}
+void add(const RoughDiffuse& rough, Fingerprint& print) {
+  print.add(std::span<const SpectrumSample>(rough.spectrum));
+  print.add_all(rough.roughness);
+}
+void add(const Coated& coated, Fingerprint& print) {
+  print.add(std::span<const SpectrumSample>(coated.spectrum));
+  print.add_all(coated.refractive_index, coated.alpha);
+}
+void add(const Conductor& metal, Fingerprint& print) {
+  print.add(std::span<const SpectrumSample>(metal.refractive_index));
+  print.add(std::span<const SpectrumSample>(metal.extinction_coefficient));
+  print.add_all(metal.alpha);
+}
+void add(const PlantLeaf& leaf, Fingerprint& print) {
+  print.add(std::span<const SpectrumSample>(leaf.reflectance));
+  print.add(std::span<const SpectrumSample>(leaf.transmittance));
+}
+void add(const RetroReflector& retro, Fingerprint& print) {
+  print.add_all(retro.coefficient_cd_lx_m2);
+}
+
+void check_colours(const Material& material) {
+  try {
+    bsdf_in_colour(material);
+  } catch (const Error& fault) {
+    throw Error("its material cannot be used with cameras: {}", fault.what());
+  }
+}
+
 }  // namespace
+
+std::uint64_t fingerprint_of(const Material& material) {
+  Fingerprint print;
+  print.add(std::span<const char>(material.name));
+  print.add_all(material.reflection.index());
+  std::visit([&](const auto& kind) { add(kind, print); }, material.reflection);
+  print.add_all(material.emitted.r, material.emitted.g, material.emitted.b);
+  return print.value();
+}
+
+Palette::Palette(const SceneSpec& spec) {
+  for (const MountedLidar& mounted : spec.lidars) {
+    if (mounted.lidar.light) wavelengths_nm_.push_back(mounted.lidar.light->wavelength_nm);
+  }
+  are_colours_seen_ = !spec.cameras.empty();
+  if (spec.terrain.material) add(*spec.terrain.material);
+}
+
+std::uint16_t Palette::index_of(const ModelSpec& model, const std::string& surface) {
+  if (!is_asked_for()) return 0;
+  if (const auto found = model.materials.find(surface); found != model.materials.end())
+    return add(found->second);
+  if (model.material) return add(*model.material);
+  const std::filesystem::path built_in = data_folder() / "materials" / (surface + ".yaml");
+  if (!surface.empty() && std::filesystem::exists(built_in)) return add(load_material(built_in));
+  throw Error(
+      "its surface '{}' has no material, which lasers and cameras need: add material: NAME, or "
+      "materials: {{{}: NAME}}, to the entry",
+      surface, surface);
+}
+
+std::uint16_t Palette::index_of(const std::optional<Material>& material) {
+  return !is_asked_for() || !material ? std::uint16_t{0} : add(*material);
+}
+
+std::uint16_t Palette::add(const Material& material) {
+  const std::uint64_t print = fingerprint_of(material);
+  for (std::size_t i = 0; i < all_.size(); ++i) {
+    if (fingerprint_of(all_[i]) == print) return static_cast<std::uint16_t>(i);
+  }
+  for (const double wavelength_nm : wavelengths_nm_) retro_brdf(material, wavelength_nm);  // throws
+  if (are_colours_seen_) check_colours(material);
+  all_.push_back(material);
+  return static_cast<std::uint16_t>(all_.size() - 1);
+}
 
 ModelLibrary::ModelLibrary(RayDevice device, Tracing tracing)
     : device_(std::move(device)), tracing_(tracing) {}

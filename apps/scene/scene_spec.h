@@ -2,25 +2,113 @@
 
 #include <cstdint>
 #include <filesystem>
+#include <glm/vec2.hpp>
+#include <glm/vec3.hpp>
+#include <map>
 #include <optional>
 #include <string>
 #include <variant>
 #include <vector>
 
-#include "apps/scene/world_spec.h"
+#include "core/appearance/ground_cover.h"
 #include "core/appearance/material.h"
 #include "core/geometry/pose.h"
+#include "core/model/model_io.h"
 #include "core/random.h"
 #include "core/tracing/ray_tracer.h"
 #include "sensors/camera/camera_spec.h"
 #include "sensors/lidar/lidar_spec.h"
 #include "sensors/sky/atmosphere.h"
 #include "sensors/sky/sky.h"
+#include "terrain/assets/asset.h"
 #include "terrain/dem/dem_io.h"
+#include "terrain/dem/density_map.h"
 #include "terrain/relief/relief.h"
+#include "terrain/scatter/scatter.h"
 #include "terrain/terrain.h"
 
 namespace groundray {
+
+/// Recorded path of a platform or object: poses of body B in W, in TUM format.
+struct RecordedPath {
+  std::filesystem::path tum;
+};
+
+/// Path driven over the ground (see GroundPathSpec); waypoints in W, the CRS of the DEM.
+struct DrivenPath {
+  std::vector<glm::dvec2> waypoints_m;
+  double speed_m_s = 1;
+  double height_m = 0;
+  glm::dvec2 footprint_m{2, 1.5};
+};
+
+/// Image that displaces a model's surface; see Displacement.
+struct DisplacementSource {
+  std::filesystem::path image;
+  double amplitude_m = 0;
+  double middle = 0.5;
+  double cell_m = 0;
+};
+
+/// Model in a file.
+struct ModelSource {
+  std::filesystem::path file;
+  ModelOptions options;
+  std::optional<DisplacementSource> displacement;
+};
+
+/// Model and its materials.
+struct ModelSpec {
+  std::variant<AssetSpec, ModelSource> source;
+  std::map<std::string, Material> materials;  ///< materials by surface name
+  std::optional<Material> material;           ///< material of all other surfaces
+};
+
+/// Static object: position of its origin in W, and its orientation.
+struct StandingObject {
+  glm::dvec2 at_m{0};
+  std::optional<double> height_m;  ///< height in W; on the ground by default
+  double yaw_deg = 0, pitch_deg = 0, roll_deg = 0;
+  Stance stance = Stance::Upright;
+};
+
+/// Images that repeat over the ground.
+struct GroundTextureSpec {
+  std::filesystem::path albedo, normal;  ///< empty for none
+  double size_m = 1;                     ///< size of one copy
+};
+
+/// Layer of the ground's cover.
+struct CoverSpec {
+  std::optional<Material> material;    ///< required if there is a camera or a lidar with light
+  std::optional<std::uint16_t> label;  ///< the terrain's by default
+  CoverLimits slope_rad{};
+  CoverLimits height_m{};      ///< heights in W
+  std::filesystem::path mask;  ///< empty for none
+  double mask_full = 1;        ///< value of the mask that means full cover
+  std::optional<double> mask_nodata;
+  std::optional<GroundTextureSpec> texture;
+};
+
+/// Object of a scene.
+struct ObjectSpec {
+  std::string name;
+  std::uint16_t label = 0;
+  ModelSpec model;
+  double scale = 1;
+  std::variant<StandingObject, RecordedPath, DrivenPath> place;
+};
+
+/// Layer of scattered objects.
+struct ScatterLayer {
+  std::string name;
+  std::uint16_t label = 0;
+  std::vector<ModelSpec> models;  ///< one for each of the weights of `scatter`
+  double density_per_m2 = 0;  ///< per horizontal square metre; with a map, per unit of its values
+  std::filesystem::path density_map;  ///< empty for the same density everywhere
+  std::optional<double> nodata;       ///< nodata value of the map
+  ScatterSpec scatter;                ///< clearings in W; its `layer` is a hash of the name
+};
 
 /// Ground of a scene.
 struct TerrainSpec {

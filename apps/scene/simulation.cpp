@@ -4,25 +4,154 @@
 #include <fmt/format.h>
 
 #include <algorithm>
-#include <chrono>
 #include <cmath>
 #include <cstdlib>
 #include <glm/common.hpp>
 #include <glm/geometric.hpp>
 #include <limits>
+#include <tuple>
 #include <utility>
 #include <variant>
+#include <vector>
 
-#include "apps/scene/certifying.h"
-#include "apps/scene/paths.h"
+#include "apps/scene/interruption.h"
 #include "apps/scene/readers/spec_io.h"
-#include "apps/scene/source_folder.h"
 #include "core/error.h"
 #include "core/image/image_io.h"
 #include "core/io/tum_io.h"
+#include "sensors/camera/imager.h"
+#include "sensors/camera/lens/stereo.h"
+#include "sensors/lidar/pattern/scan_pattern.h"
+#include "terrain/ground_path.h"
 
 namespace groundray {
 namespace {
+
+using std::chrono::nanoseconds;
+
+nanoseconds time_of(double seconds) { return nanoseconds(std::llround(seconds * 1e9)); }
+
+// Returns the start times of a camera's images, including images that end after the run.
+std::vector<nanoseconds> begins_of(const MountedCamera& mounted, const SceneSpec& spec) {
+  std::vector<nanoseconds> begins;
+  if (const auto& trigger = mounted.trigger) {
+    const MountedLidar& lidar =
+        *std::ranges::find(spec.lidars, trigger->lidar, &MountedLidar::name);
+    const ScanPattern pattern(lidar.lidar.pattern);
+    for (std::int64_t sweep = 0; sweep < whole_sweeps(pattern, spec); ++sweep)
+      begins.push_back(pattern.stamp(sweep) + time_of(trigger->delay_s));
+    return begins;
+  }
+  const auto begin_of = [&](std::int64_t image) {
+    return time_of(mounted.camera.first_s + static_cast<double>(image) / mounted.camera.rate_hz);
+  };
+  constexpr double most = 1e6;
+  if (mounted.camera.rate_hz * spec.duration_s > most) {
+    throw Error("camera '{}': {} Hz for {} s are {:.3g} images, but a run may have at most {:.0e}",
+                mounted.name, mounted.camera.rate_hz, spec.duration_s,
+                mounted.camera.rate_hz * spec.duration_s, most);
+  }
+  for (std::int64_t image = 0; begin_of(image) <= run_time(spec); ++image)
+    begins.push_back(begin_of(image));
+  return begins;
+}
+
+// Checks conditions that depend on both the camera's file and the scene's.
+void check_work(const MountedCamera& mounted, const std::vector<nanoseconds>& begins) {
+  const CameraSpec& camera = mounted.camera;
+  const std::string& name = mounted.name;
+  const auto too_soon = std::ranges::adjacent_find(begins, [&](nanoseconds a, nanoseconds b) {
+    return b - a < time_of(camera.shutter.exposure_s);
+  });
+  if (mounted.trigger && too_soon != begins.end()) {
+    throw Error(
+        "camera '{}': it exposes for {:.6g} ms, but is triggered again after {:.6g} ms; "
+        "shorten exposure_ms",
+        name, 1e3 * camera.shutter.exposure_s,
+        1e-6 * static_cast<double>((too_soon[1] - too_soon[0]).count()));
+  }
+  if (gives(camera, CameraProduct::Picture) && camera.imager->filter != ColorFilter::Mono &&
+      std::min(camera.size_px.x, camera.size_px.y) < 3) {
+    throw Error(
+        "camera '{}': a picture of a mosaic needs at least 3 x 3 px, but size_px is [{}, {}]; "
+        "enlarge it, or remove 'picture' from the products",
+        name, camera.size_px.x, camera.size_px.y);
+  }
+}
+
+PlacedCamera place(const MountedCamera& mounted, const SceneSpec& spec, const Trajectory& X_DB) {
+  PlacedCamera placed{
+      mounted, Camera(mounted.camera), X_DB.mounted(mounted.X_BC), begins_of(mounted, spec), {},
+      {}};
+  check_work(mounted, placed.begins);
+  std::erase_if(placed.begins, [&](nanoseconds begin) {
+    return begin < nanoseconds(0) || run_time(spec) < begin + placed.camera.duration();
+  });
+  if (placed.begins.empty()) {
+    throw Error(
+        "camera '{}': no image of {:.6g} s begins and ends within the run of {} s; lengthen "
+        "duration_s, or check first_ms, trigger and shutter",
+        mounted.name, 1e-9 * static_cast<double>(placed.camera.duration().count()),
+        spec.duration_s);
+  }
+  const auto& [imager, aperture] = std::tie(mounted.camera.imager, mounted.camera.aperture);
+  if (imager && aperture) {
+    try {
+      placed.pupil_sr = pupil_sr(placed.camera.lens(), *aperture, imager->pixel_pitch_m);
+    } catch (const Error& fault) {
+      throw Error("camera '{}': {}", mounted.name, fault.what());
+    }
+  }
+  return placed;
+}
+
+// Computes the rectification of a stereo pair; for rectified images, applies it to the cameras.
+void pair_up(const StereoSpec& stereo, std::vector<MountedCamera>& cameras,
+             std::vector<std::optional<Rectification>>& rectifications) {
+  const auto find = [&](const std::string& name) {
+    return std::ranges::find(cameras, name, &MountedCamera::name) - cameras.begin();
+  };
+  const auto l = static_cast<std::size_t>(find(stereo.left));
+  const auto r = static_cast<std::size_t>(find(stereo.right));
+  for (const std::size_t camera : {l, r}) {
+    if (!rectifications[camera]) continue;
+    throw Error(
+        "stereo '{}': camera '{}' is also in an earlier pair, but can be rectified for one pair "
+        "only; add another camera with the same mount",
+        stereo.name, cameras[camera].name);
+  }
+  MountedCamera &left = cameras[l], &right = cameras[r];
+  RectifiedPair pair;
+  try {
+    pair = rectified({left.camera.lens, left.camera.size_px, left.X_BC},
+                     {right.camera.lens, right.camera.size_px, right.X_BC});
+  } catch (const Error& fault) {
+    throw Error("stereo '{}': {}", stereo.name, fault.what());
+  }
+  if (stereo.images == StereoSpec::Images::Rectified) {
+    for (MountedCamera* camera : {&left, &right}) {
+      camera->camera.lens = Pinhole{pair.scale};
+      camera->camera.size_px = pair.size_px;
+    }
+    left.X_BC = pair.X_BL;
+    right.X_BC = pair.X_BR;
+    pair.R_LC = pair.R_RC = {1, 0, 0, 0};
+  }
+  rectifications[l] = {pair.R_LC, pair.scale, 0};
+  rectifications[r] = {pair.R_RC, pair.scale, pair.baseline_m};
+}
+
+std::vector<PlacedCamera> place_cameras(const SceneSpec& spec, const Trajectory& X_DB) {
+  std::vector<MountedCamera> cameras = spec.cameras;
+  std::vector<std::optional<Rectification>> rectifications(cameras.size());
+  for (const StereoSpec& stereo : spec.stereo) pair_up(stereo, cameras, rectifications);
+  std::vector<PlacedCamera> placed;
+  for (std::size_t i = 0; i < cameras.size(); ++i) {
+    placed.push_back(place(cameras[i], spec, X_DB));
+    placed.back().rectification = rectifications[i];
+  }
+  return placed;
+}
 
 // Returns the platform's trajectory in D, from time 0 on; sets `begin` to that time on the
 // recorder's clock.
@@ -137,6 +266,53 @@ std::optional<AerialPerspective> air_of(const SceneSpec& spec) {
 
 }  // namespace
 
+std::chrono::nanoseconds run_time(const SceneSpec& spec) {
+  return std::chrono::nanoseconds(std::llround(spec.duration_s * 1e9));
+}
+
+std::int64_t whole_sweeps(const ScanPattern& pattern, const SceneSpec& spec) {
+  return static_cast<std::int64_t>(std::floor(spec.duration_s * pattern.sweep_rate_hz() + 1e-9));
+}
+
+Trajectory extended(const Trajectory& path, const SceneSpec& spec) {
+  std::chrono::nanoseconds more(1);
+  for (const MountedLidar& lidar : spec.lidars) {
+    const ScanPattern pattern(lidar.lidar.pattern);
+    const std::int64_t sweeps = whole_sweeps(pattern, spec);
+    if (sweeps > 0)
+      more = std::max(
+          more, pattern.last_firing(sweeps - 1) - run_time(spec) + std::chrono::nanoseconds(1));
+  }
+  std::vector<Trajectory::Sample> samples = path.samples();
+  const auto [time, X_DB] = samples.back();
+  Pose onwards;
+  if (samples.size() > 1) {
+    const auto& [time_before, X_DB_before] = samples[samples.size() - 2];
+    onwards =
+        Screw(inverse(X_DB_before) * X_DB).at(in_seconds(more) / in_seconds(time - time_before));
+  }
+  samples.push_back({time + more, X_DB * onwards});
+  return Trajectory(std::move(samples));
+}
+
+Trajectory recorded_path(const RecordedPath& path, const Terrain& terrain,
+                         std::chrono::nanoseconds begin) {
+  std::vector<Trajectory::Sample> samples = read_tum(path.tum).samples();
+  for (auto& [time, X_WB] : samples) {
+    time -= begin;
+    X_WB.translation_m -= terrain.header().origin_w_m;
+  }
+  return Trajectory(std::move(samples));
+}
+
+Trajectory driven_path(const DrivenPath& path, const Terrain& terrain,
+                       std::chrono::nanoseconds duration) {
+  GroundPathSpec drive{{}, path.speed_m_s, path.height_m, path.footprint_m, duration};
+  for (const glm::dvec2& p_W : path.waypoints_m)
+    drive.waypoints_m.push_back(p_W - glm::dvec2(terrain.header().origin_w_m));
+  return build_ground_path(terrain.ground(), drive);
+}
+
 Exposed exposed(const PlacedLidar& lidar, std::int64_t sweep) {
   const ScanPattern& pattern = lidar.lidar.pattern();
   return {&lidar.X_DS, pattern.stamp(sweep), pattern.last_firing(sweep)};
@@ -200,12 +376,12 @@ Simulation build_simulation(SceneSpec spec, const Terrain::Progress& progress) {
                 diagonal_m(terrain.frame()), terrain, run_time(spec));
   }
   const double reach_m = largest_reach_m(lidars, cameras);
-  SceneObjects content = build_scene_objects(spec, terrain, begin);
+  SceneObjects objects = build_scene_objects(spec, terrain, begin);
   std::optional<Sky> sky = load_sky(spec);
   const std::optional<AerialPerspective> air = air_of(spec);
   return {std::move(spec),    std::move(terrain), begin,
           std::move(lidars),  std::move(cameras), reach_m,
-          std::move(content), std::move(sky),     air};
+          std::move(objects), std::move(sky),     air};
 }
 
 }  // namespace groundray

@@ -1,4 +1,4 @@
-#include "apps/scene/source_folder.h"
+#include "apps/scene/simulation.h"
 
 namespace groundray {
 

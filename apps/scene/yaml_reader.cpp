@@ -278,6 +278,14 @@ const Node* Map::read_number(std::string_view key, Need need, double& into, Rule
   return node;
 }
 
+const Node* Map::read_number(std::string_view key, Need need, std::optional<double>& into,
+                             Rule rule) {
+  double value = 0;
+  const Node* node = read_number(key, need, value, rule);
+  if (node) into = value;
+  return node;
+}
+
 const Node* Map::read_scaled(std::string_view key, Need need, double scale, double& into,
                              Rule rule) {
   double value = 0;

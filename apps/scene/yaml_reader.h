@@ -5,12 +5,15 @@
 #include <concepts>
 #include <cstdint>
 #include <filesystem>
+#include <glm/vec2.hpp>
+#include <glm/vec3.hpp>
 #include <initializer_list>
 #include <limits>
 #include <optional>
 #include <span>
 #include <string>
 #include <string_view>
+#include <type_traits>
 #include <utility>
 #include <vector>
 
@@ -105,6 +108,8 @@ class Map {
   const Node* find(std::string_view key, Need need);
 
   const Node* read_number(std::string_view key, Need need, double& into, Rule rule = any_number);
+  const Node* read_number(std::string_view key, Need need, std::optional<double>& into,
+                          Rule rule = any_number);
   /// Reads a number whose unit is `scale` times that of `into`. The rule applies to the number in
   /// the file.
   const Node* read_scaled(std::string_view key, Need need, double scale, double& into,
@@ -112,6 +117,11 @@ class Map {
   /// Reads a list of exactly as many numbers as `into` holds.
   const Node* read_numbers(std::string_view key, Need need, std::span<double> into,
                            Rule rule = any_number);
+  template <glm::length_t n>
+  const Node* read_vector(std::string_view key, Need need, glm::vec<n, double>& into,
+                          Rule rule = any_number) {
+    return read_numbers(key, need, std::span<double>(&into.x, n), rule);
+  }
   /// Reads a text: any scalar that is not empty.
   const Node* read_text(std::string_view key, Need need, std::string& into);
   /// Reads a whole number in [0, max of T].
@@ -131,6 +141,16 @@ class Map {
     std::size_t index = 0;
     const Node* node = read_choice(key, need, index, words);
     if (node) into = (choices.begin() + index)->second;
+    return node;
+  }
+  /// Reads one of the words of an enumeration's values, which are given in the order of the values.
+  template <typename T>
+    requires std::is_enum_v<T>
+  const Node* read_choice(std::string_view key, Need need, T& into,
+                          std::initializer_list<std::string_view> words) {
+    std::size_t index = 0;
+    const Node* node = read_choice(key, need, index, {words.begin(), words.end()});
+    if (node) into = static_cast<T>(index);
     return node;
   }
   /// Returns the items of a list; none if it is missing or not a list.

@@ -10,7 +10,6 @@
 #include <string_view>
 #include <system_error>
 
-#include "apps/scene/certifying.h"
 #include "apps/scene/interruption.h"
 #include "apps/scene/readers/spec_io.h"
 #include "apps/view/layers/cloud_layer.h"

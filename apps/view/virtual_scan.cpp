@@ -99,9 +99,10 @@ Simulation simulation_of_dem(const std::filesystem::path& dem, const std::stop_t
   Terrain terrain(dem, spec.terrain.options, spec.terrain.detail, [&](double) {
     if (stop.stop_requested()) throw Interrupted{};
   });
-  SceneObjects content;
-  content.materials = Materials({bare_ground()});
-  return {.spec = std::move(spec), .terrain = std::move(terrain), .content = std::move(content)};
+  SceneObjects objects;
+  objects.materials = Materials({bare_ground()});
+  return {
+      .spec = std::move(spec), .terrain = std::move(terrain), .scene_objects = std::move(objects)};
 }
 
 Pose pose_at(const SensorPlace& place, const Ground& ground) {
@@ -130,7 +131,7 @@ PlacedScan SceneScanner::scan(const ScanRequest& request, const std::stop_token&
   tell(0, "preparing the sensor");
   PlacedScan placed;
   LidarSpec spec = request.lidar;
-  suit_to_scene(simulation_.spec, simulation_.content.materials, spec, placed.notes);
+  suit_to_scene(simulation_.spec, simulation_.scene_objects.materials, spec, placed.notes);
   const Lidar lidar(spec, simulation_.spec.air);
   const std::int64_t sweep = sweep_at(lidar.pattern(), request.time);
   placed.stamp = lidar.pattern().stamp(sweep);

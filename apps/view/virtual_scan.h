@@ -9,7 +9,7 @@
 #include <string>
 #include <vector>
 
-#include "apps/scene/frame_scene_builder.h"
+#include "apps/scene/frames.h"
 #include "apps/scene/simulation.h"
 #include "core/geometry/pose.h"
 #include "sensors/lidar/lidar.h"

@@ -4,8 +4,8 @@
     pip install mitsuba==3.9.1 pvlib==0.16.1
     python3 make.py
 
-The tables are C++ array contents, compiled into sensors/sky/hosek_wilkie.cpp and
-sensors/sky/solar_spectrum.cpp. They depend on those two packages alone.
+The tables are C++ array contents, compiled into sensors/sky/sky.cpp and
+sensors/sky/sun.cpp. They depend on those two packages alone.
 """
 
 import hashlib

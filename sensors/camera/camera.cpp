@@ -11,7 +11,6 @@
 #include <mutex>
 #include <numbers>
 #include <utility>
-#include <vector>
 
 #include "core/error.h"
 #include "core/image/luminance.h"
@@ -91,11 +90,6 @@ void check_camera(const CameraSpec& spec) {
   broken.throw_if_any();
 }
 
-CameraSpec checked_camera(CameraSpec spec) {
-  check_camera(spec);
-  return spec;
-}
-
 }  // namespace
 
 struct Camera::Directions {
@@ -104,7 +98,7 @@ struct Camera::Directions {
 };
 
 Camera::Camera(const CameraSpec& spec)
-    : spec_(checked_camera(spec)),
+    : spec_((check_camera(spec), spec)),
       lens_(spec.lens, spec.size_px),
       directions_(std::make_shared<Directions>()) {}
 
@@ -168,7 +162,7 @@ class Camera::Rows {
     for (std::size_t i = 0; i < pixels.size(); ++i)
       add_samples(pixels[i], counts[i], Paths::OfMean);
     trace(Paths::OfMean);
-    tell();
+    write_pixels();
   }
 
  private:
@@ -222,7 +216,7 @@ class Camera::Rows {
   }
   void add_samples(const glm::ivec2& pixel, int count, Paths paths);
   void trace(Paths paths);
-  void tell();
+  void write_pixels();
 
   const CameraSpec& spec_;
   const PathTracer& light_;
@@ -285,7 +279,7 @@ void Camera::Rows::trace(Paths paths) {
   pixel_of_.clear();
 }
 
-void Camera::Rows::tell() {
+void Camera::Rows::write_pixels() {
   for (int y = first_; y < end_; ++y) {
     for (int x = 0; x < width_; ++x) {
       const Sums& sums = sums_of({x, y});

@@ -11,7 +11,7 @@
 #include <vector>
 
 #include "core/error.h"
-#include "sensors/camera/sighting.h"
+#include "sensors/camera/observation.h"
 
 namespace groundray {
 namespace {
@@ -81,9 +81,9 @@ class RowTruth {
  private:
   void look(int first, int end, const Ray& from, const glm::dmat3& R_DC);
   void bound(int row, ImageF& into);
-  void tell_nothing(int x, int y, ImageTruth& into) const;
-  void tell(int y, ImageTruth& into) const;
-  void tell_surface(int x, int y, const Ray& ray, const Hit& hit, ImageTruth& into) const;
+  void write_sky(int x, int y, ImageTruth& into) const;
+  void write_pixels(int y, ImageTruth& into) const;
+  void write_surface(int x, int y, const Ray& ray, const Hit& hit, ImageTruth& into) const;
   glm::vec3 albedo_of(const Ray& ray, const Hit& hit, std::uint16_t material) const;
   void follow(int y, nanoseconds begin, Flow& flow);
 
@@ -131,29 +131,29 @@ void RowTruth::fill(int row, const TruthRequest& request, ImageTruth& into) {
   const glm::dmat3 R_DC = glm::mat3_cast(X_DC.rotation);
   for (int first = 0; first < width; first += pixels_at_once) {
     look(first, std::min(first + pixels_at_once, width), from, R_DC);
-    tell(row, into);
+    write_pixels(row, into);
     if (request.bounds) bound(row, into.bound_m);
     if (request.after) follow(row, *request.after, into.forward);
     if (request.before) follow(row, *request.before, into.backward);
   }
 }
 
-void RowTruth::tell(int y, ImageTruth& into) const {
+void RowTruth::write_pixels(int y, ImageTruth& into) const {
   int x = first_;
   for (std::size_t i = 0; i < rays_.size(); ++i) {
-    while (x < columns_[i]) tell_nothing(x++, y, into);
+    while (x < columns_[i]) write_sky(x++, y, into);
     const Hit& hit = hits_[i];
     if (hit) {
       into.range_m.at(x, y)[0] = static_cast<float>(hit.range_m);
       into.depth_m.at(x, y)[0] =
           static_cast<float>(hit.range_m * directions_[static_cast<std::size_t>(x)].z);
-      tell_surface(x, y, rays_[i], hit, into);
+      write_surface(x, y, rays_[i], hit, into);
     } else {
-      tell_nothing(x, y, into);
+      write_sky(x, y, into);
     }
     into.is_valid.at(x++, y)[0] = 1;
   }
-  while (x < end_) tell_nothing(x++, y, into);
+  while (x < end_) write_sky(x++, y, into);
 }
 
 void RowTruth::bound(int row, ImageF& into) {
@@ -164,7 +164,7 @@ void RowTruth::bound(int row, ImageF& into) {
     into.at(columns_[i], row)[0] = static_cast<float>(bounds_m_[i]);
 }
 
-void RowTruth::tell_nothing(int x, int y, ImageTruth& into) const {
+void RowTruth::write_sky(int x, int y, ImageTruth& into) const {
   into.is_valid.at(x, y)[0] = 0;
   into.range_m.at(x, y)[0] = std::numeric_limits<float>::infinity();
   into.depth_m.at(x, y)[0] = std::numeric_limits<float>::infinity();
@@ -176,7 +176,7 @@ void RowTruth::tell_nothing(int x, int y, ImageTruth& into) const {
   for (auto* image : {&into.label, &into.instance, &into.material}) image->at(x, y)[0] = 0;
 }
 
-void RowTruth::tell_surface(int x, int y, const Ray& ray, const Hit& hit, ImageTruth& into) const {
+void RowTruth::write_surface(int x, int y, const Ray& ray, const Hit& hit, ImageTruth& into) const {
   const glm::dvec3 p_DQ = ray.origin + ray.direction * hit.range_m;
   const glm::dvec3 normal = glm::normalize(glm::dvec3(hit.normal));
   put(into.p_DQ, x, y, p_DQ);
@@ -218,7 +218,7 @@ void RowTruth::follow(int y, nanoseconds begin, Flow& flow) {
   for (std::size_t i = 0; i < rays_.size(); ++i) {
     const glm::dvec2 pixel(columns_[i], y);
     const Mover point(scene_.objects, rays_[i], hits_[i]);
-    const auto seen = sighting(camera_, X_DC_, begin, point, y);
+    const auto seen = observe(camera_, X_DC_, begin, point, y);
     if (!seen) continue;
     put(flow.offset_px, columns_[i], y, seen->pixel - pixel);
     if (!is_inside(camera_.spec().size_px, seen->pixel)) continue;

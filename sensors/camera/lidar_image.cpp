@@ -10,7 +10,7 @@
 #include <optional>
 
 #include "core/io/npy_io.h"
-#include "sensors/camera/sighting.h"
+#include "sensors/camera/observation.h"
 
 namespace groundray {
 namespace {
@@ -41,7 +41,7 @@ struct Columns {
 // Its end is above the surface by more than the errors of the lidar's range and of the ray's hits,
 // however small the angle between ray and surface. Objects move by less than 0.5 um within the
 // error of `time`.
-Ray towards(const Sighting& seen, const glm::dvec3& normal, double lidar_range_m) {
+Ray towards(const Observation& seen, const glm::dvec3& normal, double lidar_range_m) {
   const double lift_m = 1e-6 + 1e-9 * (2 + lidar_range_m + glm::length(seen.towards));
   const glm::dvec3 above =
       seen.towards + normal * std::copysign(lift_m, -glm::dot(normal, seen.towards));
@@ -65,7 +65,7 @@ class Imaging {
       const glm::dvec3 p_DQ(echoes_.x[i], echoes_.y[i], echoes_.z[i]);
       const nanoseconds time = stamp_ + nanoseconds(std::llround(1e9 * double{echoes_.time_s[i]}));
       const Mover point(scene_.objects, echoes_.object[i], p_DQ, time);
-      const auto seen = sighting(camera_, X_DC_, begin_, point, row);
+      const auto seen = observe(camera_, X_DC_, begin_, point, row);
       if (!seen) continue;
       row = seen->pixel.y;
       imaged.push_back({.echo = static_cast<std::uint32_t>(i),

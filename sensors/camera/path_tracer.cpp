@@ -83,7 +83,7 @@ struct PathTracer::Vertex {
   Vertex(const Ray& ray, const Hit& hit, const glm::dvec3& shading_normal)
       : at(ray.origin + ray.direction * hit.range_m),
         facet(glm::normalize(glm::dvec3(hit.normal))),
-        above_m(lift_m(hit.range_m)),
+        offset_m(lift_m(hit.range_m)),
         far_m(ray.far_m),
         time(ray.time),
         axes(towards_eye(shading_normal, -ray.direction)),
@@ -91,7 +91,7 @@ struct PathTracer::Vertex {
 
   // Returns the origin of a ray that leaves to the side of a direction.
   glm::dvec3 start(const glm::dvec3& direction) const {
-    return at + facet * std::copysign(above_m, glm::dot(direction, facet));
+    return at + facet * std::copysign(offset_m, glm::dot(direction, facet));
   }
   // True if a direction is on the same side of the facet and of the shading normal; no other light
   // passes.
@@ -112,7 +112,7 @@ struct PathTracer::Vertex {
   }
 
   glm::dvec3 at, facet;
-  double above_m, far_m;
+  double offset_m, far_m;
   std::chrono::nanoseconds time;
   Axes axes;          // z is the shading normal
   glm::dvec3 to_eye;  // in `axes`
@@ -145,13 +145,13 @@ void PathTracer::trace(std::span<const Sample> samples, std::span<glm::vec3> rad
       labels[i] = work.hits[i] ? scene_.truth_of(work.rays[i], work.hits[i]).label : 0;
     work.next_paths.clear();
     work.next_rays.clear();
-    for (Workspace::ShadowQueue* asked : {&work.of_sun, &work.of_others}) {
-      asked->rays.clear();
-      asked->lights.clear();
+    for (Workspace::ShadowQueue* queue : {&work.of_sun, &work.of_others}) {
+      queue->rays.clear();
+      queue->lights.clear();
     }
     for (std::size_t k = 0; k < work.paths.size(); ++k) {
       Workspace::Path& path = work.paths[k];
-      radiance[path.sample] += found(work.rays[k], work.hits[k], path);
+      radiance[path.sample] += emitted(work.rays[k], work.hits[k], path);
       if (work.hits[k] && rays < depth_) scatter(work.rays[k], work.hits[k], path, work);
     }
     add_light(work.of_sun, Batch::ShadowRays, radiance, work);
@@ -162,20 +162,21 @@ void PathTracer::trace(std::span<const Sample> samples, std::span<glm::vec3> rad
 }
 
 // Adds unoccluded direct light.
-void PathTracer::add_light(const Workspace::ShadowQueue& asked, Batch batch,
+void PathTracer::add_light(const Workspace::ShadowQueue& queue, Batch batch,
                            std::span<glm::vec3> radiance, Workspace& work) const noexcept {
-  work.light_hits.resize(asked.rays.size());
-  scene_.trace(asked.rays, work.light_hits, batch);
-  for (std::size_t k = 0; k < asked.lights.size(); ++k) {
-    const auto& [sample, arrives] = asked.lights[k];
+  work.light_hits.resize(queue.rays.size());
+  scene_.trace(queue.rays, work.light_hits, batch);
+  for (std::size_t k = 0; k < queue.lights.size(); ++k) {
+    const auto& [sample, arrives] = queue.lights[k];
     if (!work.light_hits[k]) radiance[sample] += arrives;
   }
 }
 
 // Returns emission and sky light that the path's own ray hits, MIS-weighted, and light that the air
 // adds; attenuates the throughput by the air.
-glm::vec3 PathTracer::found(const Ray& ray, const Hit& hit, Workspace::Path& path) const noexcept {
-  if (!hit) return path.throughput * glm::vec3(found_sky(ray.direction, path.pdf_per_sr));
+glm::vec3 PathTracer::emitted(const Ray& ray, const Hit& hit,
+                              Workspace::Path& path) const noexcept {
+  if (!hit) return path.throughput * glm::vec3(emitted_by_sky(ray.direction, path.pdf_per_sr));
   glm::vec3 sum(0);
   if (air_) {
     const glm::dvec3 added =
@@ -190,7 +191,8 @@ glm::vec3 PathTracer::found(const Ray& ray, const Hit& hit, Workspace::Path& pat
   return sum + path.throughput * glm::vec3(shines * share);
 }
 
-glm::dvec3 PathTracer::found_sky(const glm::dvec3& direction, double pdf_per_sr) const noexcept {
+glm::dvec3 PathTracer::emitted_by_sky(const glm::dvec3& direction,
+                                      double pdf_per_sr) const noexcept {
   if (!(pdf_per_sr > 0)) return sky_.radiance(direction);
   const double other = sky_.is_constant_dome() ? 0 : sky_.dome_pdf_per_sr(direction);
   return sky_.dome_radiance(direction) * balance_heuristic(pdf_per_sr, other);
@@ -201,15 +203,15 @@ glm::dvec3 PathTracer::found_sky(const glm::dvec3& direction, double pdf_per_sr)
 // than the BSDF's.
 void PathTracer::sample_direct(const Vertex& vertex, const Bsdf& bsdf, Workspace::Path& path,
                                Workspace& work) const noexcept {
-  const auto ask = [&](Workspace::ShadowQueue& asked, const std::optional<Ray>& to_light,
-                       const glm::dvec3& radiance, const auto& density) {
+  const auto enqueue = [&](Workspace::ShadowQueue& queue, const std::optional<Ray>& to_light,
+                           const glm::dvec3& radiance, const auto& density) {
     if (!to_light) return;
     const glm::dvec3 wi = vertex.axes.into(to_light->direction);
     const glm::dvec3 weight = bsdf.eval(vertex.to_eye, wi) * (std::abs(wi.z) / density(wi));
     const glm::vec3 arrives = path.throughput * glm::vec3(weight * radiance);
     if (is_dark(arrives)) return;
-    asked.rays.push_back(*to_light);
-    asked.lights.push_back({path.sample, arrives});
+    queue.rays.push_back(*to_light);
+    queue.lights.push_back({path.sample, arrives});
   };
   const auto with_own = [&](double pdf_per_sr) {
     return [&, pdf_per_sr](const glm::dvec3& wi) {
@@ -218,14 +220,14 @@ void PathTracer::sample_direct(const Vertex& vertex, const Bsdf& bsdf, Workspace
   };
   if (const auto& sun = sky_.sun(); sun && sun->is_up()) {
     const auto drawn = sun->sample(path.numbers.next());
-    ask(work.of_sun, vertex.leave(drawn.direction), sun->radiance(drawn.direction),
-        [&](const glm::dvec3&) { return drawn.pdf_per_sr; });
+    enqueue(work.of_sun, vertex.leave(drawn.direction), sun->radiance(drawn.direction),
+            [&](const glm::dvec3&) { return drawn.pdf_per_sr; });
   }
   if (!sky_.is_constant_dome()) {
     const auto [direction, density] = sky_.sample_dome(path.numbers.next());
     if (density > 0)
-      ask(work.of_others, vertex.leave(direction), sky_.dome_radiance(direction),
-          with_own(density));
+      enqueue(work.of_others, vertex.leave(direction), sky_.dome_radiance(direction),
+              with_own(density));
   }
   if (!emitters_.any_is_drawn()) return;
   const glm::dvec2 which = path.numbers.next();
@@ -235,9 +237,9 @@ void PathTracer::sample_direct(const Vertex& vertex, const Bsdf& bsdf, Workspace
   const double distance_m = glm::distance(ray->origin, point);
   const double density = pdf_per_sr(glow.pdf_per_m2, normal, ray->direction, distance_m);
   if (!(density > 0)) return;
-  ask(work.of_others, ray,
-      air_ ? air_->through(glow.radiance, distance_m, glm::dvec3(0)) : glow.radiance,
-      with_own(density));
+  enqueue(work.of_others, ray,
+          air_ ? air_->through(glow.radiance, distance_m, glm::dvec3(0)) : glow.radiance,
+          with_own(density));
 }
 
 void PathTracer::scatter(const Ray& ray, const Hit& hit, Workspace::Path path,

@@ -10,7 +10,7 @@
 #include "core/sobol.h"
 #include "core/tracing/scene.h"
 #include "sensors/camera/emitters.h"
-#include "sensors/sky/aerial_perspective.h"
+#include "sensors/sky/atmosphere.h"
 #include "sensors/sky/sky.h"
 
 namespace groundray {
@@ -76,13 +76,13 @@ class PathTracer {
 
  private:
   struct Vertex;
-  glm::vec3 found(const Ray& ray, const Hit& hit, Workspace::Path& path) const noexcept;
-  glm::dvec3 found_sky(const glm::dvec3& direction, double pdf_per_sr) const noexcept;
+  glm::vec3 emitted(const Ray& ray, const Hit& hit, Workspace::Path& path) const noexcept;
+  glm::dvec3 emitted_by_sky(const glm::dvec3& direction, double pdf_per_sr) const noexcept;
   void scatter(const Ray& ray, const Hit& hit, Workspace::Path path,
                Workspace& work) const noexcept;
   void sample_direct(const Vertex& vertex, const Bsdf& bsdf, Workspace::Path& path,
                      Workspace& work) const noexcept;
-  void add_light(const Workspace::ShadowQueue& asked, Batch batch, std::span<glm::vec3> radiance,
+  void add_light(const Workspace::ShadowQueue& queue, Batch batch, std::span<glm::vec3> radiance,
                  Workspace& work) const noexcept;
 
   const Scene& scene_;

@@ -1,9 +1,7 @@
 #include "sensors/lidar/echo_simulator.h"
 
-#include <algorithm>
 #include <array>
 #include <cmath>
-#include <glm/geometric.hpp>
 #include <limits>
 #include <numbers>
 #include <numeric>
@@ -173,8 +171,9 @@ void EchoSimulator::sample_air(const AtmosphereSpec& air) {
   const double step_m = speed_of_light_m_per_s / air.group_index * receiver_.interval_s() / 2;
   constexpr double farthest_m = 1e4;
   std::vector<Arrival> arrivals;
-  for (const SoftReturn& stretch : atmosphere_.soft_return(
-           radar_, spec_.overlap, {step_m, std::min(gate_.far_m, farthest_m), least_air_share}))
+  for (const SoftReturn& stretch :
+       radar_.soft_return(atmosphere_, spec_.overlap,
+                          {step_m, std::min(gate_.far_m, farthest_m), least_air_share}))
     arrivals.push_back({stretch.range_m, stretch.energy_j});
   Waveform waveform;
   receiver_.sample(arrivals, waveform);

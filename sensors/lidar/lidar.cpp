@@ -4,7 +4,6 @@
 #include <cmath>
 
 #include "core/error.h"
-#include "sensors/lidar/lidar_sweep.h"
 
 namespace groundray {
 namespace {
@@ -64,15 +63,5 @@ Lidar::Lidar(const LidarSpec& spec, const AtmosphereSpec& air)
                   (with_one_level_more(spec.beam).most_sub_rays > spec.beam.most_sub_rays ? 2 : 1)),
       light_(light_of(spec.light, air, spec.gate)),
       quiet_light_(light_of(without_noise(light_), air, spec.gate)) {}
-
-LidarScan Lidar::scan(const Scene& scene, const Trajectory& X_DS, std::int64_t number, Seed seed,
-                      std::uint32_t sensor_number, const SweepWatch& watch) const {
-  const auto pointer = [](const std::optional<EchoSimulator>& light) {
-    return light ? &*light : nullptr;
-  };
-  return scan_sweep({spec_, pattern_, beam_, last_level_, pointer(light_), pointer(quiet_light_)},
-                    scene, X_DS, number, {seed, sensor_number, static_cast<std::uint32_t>(number)},
-                    watch);
-}
 
 }  // namespace groundray

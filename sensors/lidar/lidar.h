@@ -86,6 +86,8 @@ class Lidar {
                  std::uint32_t sensor_number, const SweepWatch& watch = {}) const;
 
  private:
+  class Sweep;
+
   LidarSpec spec_;
   ScanPattern pattern_;
   LaserBeam beam_;  // with one level more than pulses use, for Convergence

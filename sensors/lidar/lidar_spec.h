@@ -6,10 +6,9 @@
 
 #include "sensors/lidar/beam/beam.h"
 #include "sensors/lidar/pattern/scan_pattern.h"
-#include "sensors/lidar/receiver/pulse.h"
 #include "sensors/lidar/receiver/radar_equation.h"
-#include "sensors/lidar/receiver/range_gate.h"
 #include "sensors/lidar/receiver/receiver.h"
+#include "sensors/lidar/receiver/waveform.h"
 #include "sensors/sky/atmosphere.h"
 
 namespace groundray {

@@ -1,5 +1,3 @@
-#include "sensors/lidar/lidar_sweep.h"
-
 #include <tbb/concurrent_queue.h>
 #include <tbb/parallel_for.h>
 #include <tbb/parallel_pipeline.h>
@@ -9,12 +7,11 @@
 #include <cmath>
 #include <glm/geometric.hpp>
 #include <limits>
-#include <optional>
 #include <utility>
-#include <vector>
 
 #include "core/error.h"
 #include "sensors/lidar/beam/pulse_tracer.h"
+#include "sensors/lidar/lidar.h"
 #include "sensors/lidar/scan_columns.h"
 
 namespace groundray {
@@ -40,9 +37,9 @@ SweepPath path_of(const ScanPattern& pattern, const Trajectory& X_DS, std::int64
 }
 
 // Returns the number of pulses in a chunk: whole firing sequences if these are short.
-std::int64_t pulses_per_chunk(const ScanPattern& pattern, const LidarParts& lidar) {
-  const std::size_t first = lidar.beam.sub_rays(0).size();
-  const std::size_t last = lidar.beam.sub_rays(lidar.last_level).size();
+std::int64_t pulses_per_chunk(const ScanPattern& pattern, const LaserBeam& beam, int last_level) {
+  const std::size_t first = beam.sub_rays(0).size();
+  const std::size_t last = beam.sub_rays(last_level).size();
   const auto most = static_cast<std::int64_t>(
       std::clamp<std::size_t>(std::max<std::size_t>(chunk_rays / first, 16), 1,
                               std::max<std::size_t>(most_rays / last, 1)));
@@ -57,59 +54,57 @@ double rays_end_m(const LidarSpec& spec) {
   return on ? std::numeric_limits<double>::infinity() : spec.gate.far_m;
 }
 
-// Row of a scan with light.
-struct LightRow {
-  EchoRow row;
-  Echo echo;
-  std::uint32_t pulse;
-  std::uint16_t second_label;
-  glm::vec3 velocity_m_s;
-};
-
-// Some pulses of a sweep on their way through the pipeline. The buffers are reused.
-struct Chunk {
-  std::int64_t begin = 0, end = 0;  // pulses of the sweep
-  std::size_t rows = 0;             // number of echoes
-  std::size_t first_row = 0;
-  PulseTracer cast;
-  std::vector<double> bounds_m;  // error bounds of all hits, if requested
-  // Only with light:
-  EchoSimulator::Workspace work;
-  std::vector<LightRow> light_rows;
-  std::vector<WaveformRun> runs;
-  std::vector<float> power_w;
-  Convergence convergence;
-  std::vector<Ray> rays_again;
-  std::vector<Hit> hits_again;
-
-  struct Missed {
-    std::uint32_t pulse;  // index in the chunk
-    NoReturn reason;
-  };
-  std::vector<Missed> missed;
-};
+}  // namespace
 
 // Computation of one sweep.
-class Sweep {
+class Lidar::Sweep {
  public:
-  Sweep(const LidarParts& lidar, const Scene& scene, const Trajectory& X_DS, std::int64_t number,
+  Sweep(const Lidar& lidar, const Scene& scene, const Trajectory& X_DS, std::int64_t number,
         const RandomKey& key, const SweepWatch& watch)
       : lidar_(lidar),
         watch_(watch),
-        spec_(lidar.spec),
+        spec_(lidar.spec_),
         scene_(scene),
-        path_(path_of(lidar.pattern, X_DS, number)),
+        path_(path_of(lidar.pattern_, X_DS, number)),
         key_(key),
-        pulses_(lidar.pattern.pulses(number)),
-        settings_{lidar.beam, lidar.last_level, lidar.light ? lidar.light->resolution_m() : 0,
+        pulses_(lidar.pattern_.pulses(number)),
+        any_moves_(scene.objects.any_moves()),
+        settings_{lidar.beam_, lidar.last_level_, lidar.light_ ? lidar.light_->resolution_m() : 0,
                   spec_.angular_jitter_rad, rays_end_m(spec_)} {
-    if (lidar.light) brdfs_.emplace(scene, lidar.light->spec().wavelength_nm, lidar.beam);
+    if (lidar.light_) brdfs_.emplace(scene, lidar.light_->spec().wavelength_nm, lidar.beam_);
     if (spec_.points == LidarSpec::Points::AtStamp) X_SD_ = inverse(X_DS.pose_at(path_.stamp));
   }
 
   LidarScan run();
 
  private:
+  // Pulse without an echo.
+  struct MissedPulse {
+    std::uint32_t pulse;
+    float time_s;
+    std::uint16_t ring;
+    glm::vec3 direction;
+    NoReturn reason;
+  };
+
+  // Some pulses of a sweep on their way through the pipeline. The buffers are reused.
+  struct Chunk {
+    std::int64_t begin = 0, end = 0;  // pulses of the sweep
+    std::size_t rows = 0;             // number of echoes
+    std::size_t first_row = 0;
+    PulseTracer cast;
+    std::vector<double> bounds_m;  // error bounds of all hits, if requested
+    // Only with light:
+    EchoSimulator::Workspace work;
+    std::vector<EchoRow> light_rows;
+    std::vector<WaveformRun> runs;
+    std::vector<float> power_w;
+    Convergence convergence;
+    std::vector<Ray> rays_again;
+    std::vector<Hit> hits_again;
+    std::vector<MissedPulse> missed;  // if requested
+  };
+
   template <typename Finish>
   void stream(const Finish& finish);
   bool returns(const Hit& hit) const {
@@ -128,6 +123,7 @@ class Sweep {
   void place(Chunk& chunk);
   void write(const Chunk& chunk, const ScanColumns& columns) const;
   void add_rows(std::size_t pulse, Chunk& chunk) const;
+  void miss(std::size_t pulse, NoReturn reason, Chunk& chunk) const;
   void write_light();
   EchoRow row_of(const Echo& echo, const PulseTracer& cast, std::size_t pulse,
                  double reported_m) const;
@@ -135,21 +131,22 @@ class Sweep {
   SurfaceTruth truth_at(const PulseTracer& cast, std::size_t pulse, std::uint32_t hit) const {
     return scene_.truth_of(cast.rays(pulse)[hit], cast.hits(pulse)[hit]);
   }
-  double range_sd_m(const Echo& echo) const {
-    return lidar_.light->reported_sd_m(
-        std::hypot(echo.detection.range_sd_m, spec_.range_noise_sigma_m));
+  // Returns the velocity of the surface that a ray hits.
+  glm::vec3 velocity_m_s(const Hit& hit, const glm::dvec3& p_DQ,
+                         std::chrono::nanoseconds time) const {
+    if (!any_moves_ || hit.object == 0) return glm::vec3(0);
+    return glm::vec3(scene_.objects.velocity_m_s(hit.object, p_DQ, time));
   }
-  glm::vec3 velocity_m_s(const Ray& ray, const Hit& hit) const;
-  glm::vec3 velocity_of(const Echo& echo, const PulseTracer& cast, std::size_t pulse) const;
   PointCloud no_returns() const;
 
-  const LidarParts& lidar_;
+  const Lidar& lidar_;
   const SweepWatch& watch_;
   const LidarSpec& spec_;
   const Scene& scene_;
   SweepPath path_;
   RandomKey key_;
   std::int64_t pulses_;
+  bool any_moves_;
   PulseTracer::Settings settings_;
   std::optional<RetroBrdfs> brdfs_;  // only with light
   Pose X_SD_;
@@ -159,42 +156,35 @@ class Sweep {
   bool is_stopped_ = false;
   struct PlacedRows {
     std::size_t first_row;
-    std::vector<LightRow> rows;
+    std::vector<EchoRow> rows;
   };
   std::vector<PlacedRows> light_rows_;
   LidarScan scan_;
-  struct MissedPulse {
-    std::uint32_t pulse;
-    float time_s;
-    std::uint16_t ring;
-    glm::vec3 direction;
-    NoReturn reason;
-  };
   std::vector<MissedPulse> missed_;
 };
 
-void Sweep::measure(Chunk& chunk) const {
+void Lidar::Sweep::measure(Chunk& chunk) const {
   chunk.cast.cast(path_, chunk.begin, chunk.end, settings_, key_, scene_);
   if (spec_.error_bound == LidarSpec::ErrorBound::Report) {
     chunk.bounds_m.resize(chunk.cast.all_rays().size());
     scene_.rays.bound_errors(chunk.cast.all_rays(), chunk.cast.all_hits(), chunk.bounds_m);
   }
   chunk.missed.clear();
-  lidar_.light ? measure_light(chunk) : measure_rays(chunk);
+  lidar_.light_ ? measure_light(chunk) : measure_rays(chunk);
 }
 
-void Sweep::measure_rays(Chunk& chunk) const {
+void Lidar::Sweep::measure_rays(Chunk& chunk) const {
   const auto hits = chunk.cast.all_hits();
   chunk.rows = static_cast<std::size_t>(
       std::ranges::count_if(hits, [this](const Hit& hit) { return returns(hit); }));
   if (spec_.no_returns == LidarSpec::NoReturns::Omit) return;
   for (std::uint32_t i = 0; i < chunk.cast.size(); ++i) {
     const Hit& hit = hits[chunk.cast.range(i).first];
-    if (!returns(hit)) chunk.missed.push_back({i, hit ? NoReturn::OutOfGate : NoReturn::Sky});
+    if (!returns(hit)) miss(i, hit ? NoReturn::OutOfGate : NoReturn::Sky, chunk);
   }
 }
 
-void Sweep::measure_light(Chunk& chunk) const {
+void Lidar::Sweep::measure_light(Chunk& chunk) const {
   chunk.light_rows = {};  // Sweep::place has moved them away
   chunk.light_rows.reserve(chunk.cast.size());
   chunk.runs.clear();
@@ -207,16 +197,26 @@ void Sweep::measure_light(Chunk& chunk) const {
         chunk.bounds_m.empty()
             ? std::span<const double>()
             : std::span(chunk.bounds_m).subspan(cast.range(i).first, cast.range(i).count);
-    lidar_.light->receive(cast.rays(i), cast.hits(i), bounds_m, *brdfs_, key_of(pulse), chunk.work);
+    lidar_.light_->receive(cast.rays(i), cast.hits(i), bounds_m, *brdfs_, key_of(pulse),
+                           chunk.work);
     add_rows(i, chunk);
-    if (chunk.work.echoes.empty()) chunk.missed.push_back({i, chunk.work.reason});
+    if (chunk.work.echoes.empty()) miss(i, chunk.work.reason, chunk);
     if (spec_.waveforms == LidarSpec::WaveformOutput::Keep) keep_waveform(i, chunk);
     if (pulse % convergence_stride == 0) compare(i, chunk);
   }
   chunk.rows = chunk.light_rows.size();
 }
 
-void Sweep::keep_waveform(std::uint32_t pulse, Chunk& chunk) const {
+void Lidar::Sweep::miss(std::size_t pulse, NoReturn reason, Chunk& chunk) const {
+  if (spec_.no_returns == LidarSpec::NoReturns::Omit) return;
+  const PulseTracer& cast = chunk.cast;
+  chunk.missed.push_back(
+      {static_cast<std::uint32_t>(chunk.begin) + static_cast<std::uint32_t>(pulse),
+       cast.pose(pulse).time_s, cast.pulses().ring[pulse], glm::vec3(cast.axis(pulse).direction),
+       reason});
+}
+
+void Lidar::Sweep::keep_waveform(std::uint32_t pulse, Chunk& chunk) const {
   const Waveform& waveform = chunk.work.waveform;
   for (const Waveform::Segment& segment : waveform.segments()) {
     const auto power_w = waveform.power_w(segment);
@@ -228,16 +228,16 @@ void Sweep::keep_waveform(std::uint32_t pulse, Chunk& chunk) const {
 }
 
 // Compares the echoes with those of twice the sub-rays, both without noise.
-void Sweep::compare(std::size_t pulse, Chunk& chunk) const {
+void Lidar::Sweep::compare(std::size_t pulse, Chunk& chunk) const {
   const PulseTracer& cast = chunk.cast;
   const int finer = cast.range(pulse).level + 1;
-  if (finer >= lidar_.beam.levels()) return;
-  const EchoSimulator& light = *lidar_.quiet_light;
+  if (finer >= lidar_.beam_.levels()) return;
+  const EchoSimulator& light = *lidar_.quiet_light_;
   EchoSimulator::Workspace& work = chunk.work;
   light.receive(cast.rays(pulse), cast.hits(pulse), {}, *brdfs_, key_, work);
   const std::size_t echoes = work.echoes.size();
   const double first_m = echoes == 0 ? 0 : work.echoes[0].detection.range_m;
-  cast.cast_again(pulse, finer, lidar_.beam, key_, scene_, chunk.rays_again, chunk.hits_again);
+  cast.cast_again(pulse, finer, lidar_.beam_, key_, scene_, chunk.rays_again, chunk.hits_again);
   light.receive(chunk.rays_again, chunk.hits_again, {}, *brdfs_, key_, work);
   Convergence& seen = chunk.convergence;
   ++seen.pulses;
@@ -252,18 +252,11 @@ void Sweep::compare(std::size_t pulse, Chunk& chunk) const {
 }
 
 // Called for one chunk at a time, in firing order.
-void Sweep::place(Chunk& chunk) {
+void Lidar::Sweep::place(Chunk& chunk) {
   chunk.first_row = next_row_;
   next_row_ += chunk.rows;
-  if (lidar_.light) light_rows_.push_back({chunk.first_row, std::move(chunk.light_rows)});
-  const PulseTracer& cast = chunk.cast;
-  if (spec_.no_returns == LidarSpec::NoReturns::Report) {
-    for (const Chunk::Missed& missed : chunk.missed) {
-      missed_.push_back({static_cast<std::uint32_t>(chunk.begin) + missed.pulse,
-                         cast.pose(missed.pulse).time_s, cast.pulses().ring[missed.pulse],
-                         glm::vec3(cast.axis(missed.pulse).direction), missed.reason});
-    }
-  }
+  if (lidar_.light_) light_rows_.push_back({chunk.first_row, std::move(chunk.light_rows)});
+  missed_.insert(missed_.end(), chunk.missed.begin(), chunk.missed.end());
   Waveforms& waveforms = scan_.waveforms;
   for (WaveformRun run : chunk.runs) {
     run.first_sample += waveforms.power_w.size();
@@ -280,8 +273,8 @@ void Sweep::place(Chunk& chunk) {
 
 // Returns the point that the sensor reports, which does not account for angular jitter. Inline
 // because it is called for every row.
-inline glm::vec3 Sweep::reported_point(const PulseTracer& cast, std::size_t pulse,
-                                       double reported_m) const {
+inline glm::vec3 Lidar::Sweep::reported_point(const PulseTracer& cast, std::size_t pulse,
+                                              double reported_m) const {
   const PulseBatch& pulses = cast.pulses();
   const glm::dvec3 p_SQ = pulses.origin_m[pulse] + pulses.direction[pulse] * reported_m;
   if (spec_.points == LidarSpec::Points::AsFired) return glm::vec3(p_SQ);
@@ -289,21 +282,7 @@ inline glm::vec3 Sweep::reported_point(const PulseTracer& cast, std::size_t puls
   return glm::vec3(X_SD_ * (pose.p_DS + pose.R_DS * p_SQ));
 }
 
-// Returns the velocity of the surface that a ray hits.
-glm::vec3 Sweep::velocity_m_s(const Ray& ray, const Hit& hit) const {
-  if (hit.object == 0) return glm::vec3(0);
-  return glm::vec3(
-      scene_.objects.velocity_m_s(hit.object, ray.origin + ray.direction * hit.range_m, ray.time));
-}
-
-glm::vec3 Sweep::velocity_of(const Echo& echo, const PulseTracer& cast, std::size_t pulse) const {
-  if (echo.kind != Echo::Kind::Surface) return glm::vec3(0);
-  const Hit& hit = cast.hits(pulse)[echo.hit];
-  if (hit.object == 0) return glm::vec3(0);
-  return glm::vec3(scene_.objects.velocity_m_s(hit.object, echo.p_DQ, cast.axis(pulse).time));
-}
-
-void Sweep::write(const Chunk& chunk, const ScanColumns& columns) const {
+void Lidar::Sweep::write(const Chunk& chunk, const ScanColumns& columns) const {
   std::size_t row = chunk.first_row;
   const PulseTracer& cast = chunk.cast;
   for (std::size_t i = 0; i < cast.size(); ++i) {
@@ -318,30 +297,31 @@ void Sweep::write(const Chunk& chunk, const ScanColumns& columns) const {
     }
     const glm::vec3 direction(ray.direction);
     const float cos_incidence = -glm::dot(direction, hit.normal);
+    const glm::dvec3 p_DQ = ray.origin + ray.direction * hit.range_m;
     columns.write(row, {.point = reported_point(cast, i, reported_m),
                         .intensity = cos_incidence,
                         .time_s = cast.pose(i).time_s,
                         .ring = cast.pulses().ring[i],
                         .range_m = hit.range_m,
-                        .p_DQ = ray.origin + ray.direction * hit.range_m,
+                        .p_DQ = p_DQ,
                         .normal = hit.normal,
                         .cos_incidence = cos_incidence,
                         .sin_incidence = glm::length(glm::cross(direction, hit.normal)),
                         .surface = scene_.truth_of(ray, hit),
-                        .deviation_m = hit.deviation_m});
-    if (columns.has_range_sd()) columns.write_range_sd(row, spec_.range_noise_sigma_m);
-    if (columns.has_motion()) columns.write_velocity(row, velocity_m_s(ray, hit));
-    if (columns.has_bounds()) columns.write_bound(row, chunk.bounds_m[at]);
+                        .deviation_m = hit.deviation_m,
+                        .range_sd_m = static_cast<float>(spec_.range_noise_sigma_m),
+                        .velocity_m_s = velocity_m_s(hit, p_DQ, ray.time),
+                        .bound_m = chunk.bounds_m.empty() ? 0 : chunk.bounds_m[at]});
     ++row;
   }
 }
 
-EchoRow Sweep::row_of(const Echo& echo, const PulseTracer& cast, std::size_t pulse,
-                      double reported_m) const {
+EchoRow Lidar::Sweep::row_of(const Echo& echo, const PulseTracer& cast, std::size_t pulse,
+                             double reported_m) const {
   const Ray& axis = cast.axis(pulse);
   const glm::vec3 direction(axis.direction);
   EchoRow row{.point = reported_point(cast, pulse, reported_m),
-              .intensity = lidar_.light->intensity(echo.detection),
+              .intensity = lidar_.light_->intensity(echo.detection),
               .time_s = cast.pose(pulse).time_s,
               .ring = cast.pulses().ring[pulse],
               .range_m = echo.range_m,
@@ -350,8 +330,22 @@ EchoRow Sweep::row_of(const Echo& echo, const PulseTracer& cast, std::size_t pul
               .cos_incidence = -glm::dot(direction, echo.normal),
               .sin_incidence = glm::length(glm::cross(direction, echo.normal)),
               .surface = truth_at(cast, pulse, echo.hit),
-              .deviation_m = echo.deviation_m};
-  if (echo.kind != Echo::Kind::Surface) {  // no ground truth exists
+              .deviation_m = echo.deviation_m,
+              .power_w = static_cast<float>(echo.detection.power_w),
+              .width_s = static_cast<float>(echo.detection.width_s),
+              .snr = static_cast<float>(echo.detection.snr),
+              .kind = echo.kind,
+              .share = echo.share,
+              .second_share = echo.second_share,
+              .bound_m = echo.bound_m};
+  if (echo.second_share > 0) row.second_label = truth_at(cast, pulse, echo.second_hit).label;
+  if (reports_range_sd(spec_)) {
+    row.range_sd_m = static_cast<float>(lidar_.light_->reported_sd_m(
+        std::hypot(echo.detection.range_sd_m, spec_.range_noise_sigma_m)));
+  }
+  if (echo.kind == Echo::Kind::Surface) {
+    row.velocity_m_s = velocity_m_s(cast.hits(pulse)[echo.hit], echo.p_DQ, axis.time);
+  } else {  // no ground truth exists
     row.p_DQ = axis.origin + axis.direction * echo.detection.range_m;
     row.range_m = nan;
     row.normal = glm::vec3(static_cast<float>(nan));
@@ -361,7 +355,7 @@ EchoRow Sweep::row_of(const Echo& echo, const PulseTracer& cast, std::size_t pul
   return row;
 }
 
-void Sweep::add_rows(std::size_t pulse, Chunk& chunk) const {
+void Lidar::Sweep::add_rows(std::size_t pulse, Chunk& chunk) const {
   const std::vector<Echo>& echoes = chunk.work.echoes;
   for (std::size_t k = 0; k < echoes.size(); ++k) {
     double measured_m = echoes[k].detection.range_m;
@@ -370,37 +364,25 @@ void Sweep::add_rows(std::size_t pulse, Chunk& chunk) const {
       key.sub_ray = static_cast<std::uint32_t>(k);
       measured_m += spec_.range_noise_sigma_m * random_normal(key).x;
     }
-    const double reported_m = lidar_.light->reported_m(measured_m);
+    const double reported_m = lidar_.light_->reported_m(measured_m);
     EchoRow row = row_of(echoes[k], chunk.cast, pulse, reported_m);
     row.return_index = static_cast<std::uint8_t>(k + 1);
     row.return_count = static_cast<std::uint8_t>(echoes.size());
-    chunk.light_rows.push_back(
-        {row, echoes[k],
-         static_cast<std::uint32_t>(chunk.begin) + static_cast<std::uint32_t>(pulse),
-         echoes[k].second_share > 0 ? truth_at(chunk.cast, pulse, echoes[k].second_hit).label
-                                    : std::uint16_t{0},
-         velocity_of(echoes[k], chunk.cast, pulse)});
+    row.pulse = static_cast<std::uint32_t>(chunk.begin) + static_cast<std::uint32_t>(pulse);
+    chunk.light_rows.push_back(row);
   }
 }
 
-void Sweep::write_light() {
+void Lidar::Sweep::write_light() {
   scan_.echoes = PointCloud(next_row_);
   const ScanColumns columns(scan_.echoes, spec_, scene_);
   tbb::parallel_for(std::size_t{0}, light_rows_.size(), [&](std::size_t chunk) {
     std::size_t row = light_rows_[chunk].first_row;
-    for (const auto& [echo_row, echo, pulse, second_label, velocity_m_s] :
-         light_rows_[chunk].rows) {
-      columns.write(row, echo_row);
-      if (columns.has_motion()) columns.write_velocity(row, velocity_m_s);
-      columns.write_light(row, pulse, echo, second_label);
-      if (columns.has_range_sd()) columns.write_range_sd(row, range_sd_m(echo));
-      if (columns.has_bounds()) columns.write_bound(row, echo.bound_m);
-      ++row;
-    }
+    for (const EchoRow& echo : light_rows_[chunk].rows) columns.write(row++, echo);
   });
 }
 
-PointCloud Sweep::no_returns() const {
+PointCloud Lidar::Sweep::no_returns() const {
   PointCloud cloud(missed_.size());
   if (spec_.no_returns == LidarSpec::NoReturns::Omit) return cloud;
   const auto fill = [&](const char* name, auto value) {
@@ -420,8 +402,8 @@ PointCloud Sweep::no_returns() const {
 // Chunks are measured and written on any thread in any order; in between, each is placed in firing
 // order. Only a few exist at a time. Without light a pulse has at most one echo, so that all rows
 // are allocated in advance; with light they are collected first.
-LidarScan Sweep::run() {
-  const bool has_light = lidar_.light != nullptr;
+LidarScan Lidar::Sweep::run() {
+  const bool has_light = lidar_.light_.has_value();
   scan_.echoes = PointCloud(has_light ? 0 : static_cast<std::size_t>(pulses_));
   std::optional<ScanColumns> columns;
   if (!has_light) columns.emplace(scan_.echoes, spec_, scene_);
@@ -431,7 +413,7 @@ LidarScan Sweep::run() {
   if (is_stopped_) throw SweepStopped{};
   if (has_light) {
     write_light();
-    scan_.waveforms.interval_s = lidar_.light->interval_s();
+    scan_.waveforms.interval_s = lidar_.light_->interval_s();
   } else {
     scan_.echoes.truncate(next_row_);
   }
@@ -440,8 +422,9 @@ LidarScan Sweep::run() {
 }
 
 template <typename Finish>
-void Sweep::stream(const Finish& finish) {
-  const std::int64_t per_chunk = pulses_per_chunk(lidar_.pattern, lidar_);
+void Lidar::Sweep::stream(const Finish& finish) {
+  const std::int64_t per_chunk =
+      pulses_per_chunk(lidar_.pattern_, lidar_.beam_, lidar_.last_level_);
   const auto live = 2 * static_cast<std::size_t>(tbb::this_task_arena::max_concurrency());
   std::vector<Chunk> chunks(live);
   tbb::concurrent_bounded_queue<Chunk*> idle;
@@ -480,11 +463,11 @@ void Sweep::stream(const Finish& finish) {
                 tbb::make_filter<Chunk*, void>(filter_mode::parallel, finished));
 }
 
-}  // namespace
-
-LidarScan scan_sweep(const LidarParts& lidar, const Scene& scene, const Trajectory& X_DS,
-                     std::int64_t number, const RandomKey& key, const SweepWatch& watch) {
-  return Sweep(lidar, scene, X_DS, number, key, watch).run();
+LidarScan Lidar::scan(const Scene& scene, const Trajectory& X_DS, std::int64_t number, Seed seed,
+                      std::uint32_t sensor_number, const SweepWatch& watch) const {
+  return Sweep(*this, scene, X_DS, number,
+               {seed, sensor_number, static_cast<std::uint32_t>(number)}, watch)
+      .run();
 }
 
 }  // namespace groundray

@@ -5,7 +5,9 @@
 #include <cmath>
 #include <cstdint>
 #include <glm/vec3.hpp>
+#include <limits>
 #include <span>
+#include <type_traits>
 
 #include "core/io/point_cloud.h"
 #include "core/tracing/scene.h"
@@ -13,7 +15,7 @@
 
 namespace groundray {
 
-/// Values of a row that are common to all scans.
+/// Row of a scan. Without light only one return per pulse exists.
 struct EchoRow {
   glm::vec3 point{0};  // as reported
   float intensity = 0;
@@ -28,73 +30,118 @@ struct EchoRow {
   float sin_incidence = 0;
   SurfaceTruth surface;
   float deviation_m = 0;
+  // Only with light:
+  std::uint32_t pulse = 0;
+  float power_w = 0, width_s = 0, snr = 0;
+  Echo::Kind kind = Echo::Kind::Surface;
+  float share = 0, second_share = 0;
+  std::uint16_t second_label = 0;
+  // Only with noise, if objects move, and if requested:
+  float range_sd_m = 0;
+  glm::vec3 velocity_m_s{0};
+  double bound_m = 0;
 };
+
+/// Returns true if a lidar reports the standard deviation of its ranges.
+inline bool reports_range_sd(const LidarSpec& spec) {
+  return spec.range_noise_sigma_m > 0 || (spec.light && spec.light->receiver.noise);
+}
 
 /// Columns of a scan, to be filled row by row. Each row is written by one thread.
 class ScanColumns {
  public:
-  ScanColumns(PointCloud& cloud, const LidarSpec& spec, const Scene& scene);
+  ScanColumns(PointCloud& cloud, const LidarSpec& spec, const Scene& scene) {
+    const auto add = [&](auto& column, const char* name, const auto& /*value*/) {
+      column = cloud.add<typename std::remove_reference_t<decltype(column)>::element_type>(name);
+    };
+    for_common(*this, add);
+    if (spec.light) for_light(*this, add);
+    if (reports_range_sd(spec)) for_noise(*this, add);
+    if (scene.objects.any_moves()) for_motion(*this, add);
+    if (spec.error_bound == LidarSpec::ErrorBound::Report) for_bounds(*this, add);
+  }
 
-  void write(std::size_t row, const EchoRow& echo) const noexcept;
-  void write_light(std::size_t row, std::uint32_t pulse, const Echo& echo,
-                   std::uint16_t second_label) const noexcept;
-  void write_velocity(std::size_t row, const glm::vec3& velocity_m_s) const noexcept {
-    for (std::size_t k = 0; k < 3; ++k) velocity_[k][row] = velocity_m_s[static_cast<int>(k)];
+  /// Writes the values that have a column.
+  void write(std::size_t row, const EchoRow& echo) const noexcept {
+    const auto set = [&](const auto& column, const char* /*name*/, const auto& value) {
+      column[row] = value(echo);
+    };
+    for_common(*this, set);
+    if (!pulse_.empty()) for_light(*this, set);
+    if (!range_sd_.empty()) for_noise(*this, set);
+    if (!velocity_[0].empty()) for_motion(*this, set);
+    if (!error_bound_.empty()) for_bounds(*this, set);
   }
-  void write_bound(std::size_t row, double bound_m) const noexcept;
-  void write_range_sd(std::size_t row, double sd_m) const noexcept {
-    range_sd_[row] = static_cast<float>(sd_m);
-  }
-  bool has_bounds() const { return !error_bound_.empty(); }
-  bool has_range_sd() const { return !range_sd_.empty(); }
-  bool has_motion() const { return !velocity_[0].empty(); }
 
  private:
-  std::span<float> x_, y_, z_, intensity_, time_s_;
-  std::span<std::uint16_t> ring_;
-  std::span<std::uint8_t> return_index_, return_count_;
-  std::span<double> world_x_, world_y_, world_z_, range_true_;
-  std::span<float> nx_, ny_, nz_, incidence_;
-  std::span<std::uint16_t> label_;
-  std::span<std::uint32_t> instance_;
-  std::span<float> error_estimate_;
-  // Only with light:
-  std::span<std::uint32_t> pulse_;
-  std::span<float> amplitude_, width_, snr_, share_, second_share_;
-  std::span<std::uint8_t> kind_;
-  std::span<std::uint16_t> second_label_;
-  // Only with noise:
-  std::span<float> range_sd_;
-  // Only if objects move:
-  std::array<std::span<float>, 3> velocity_;
-  // Only if requested:
-  std::span<float> error_bound_;
-};
+  using Row = const EchoRow&;
 
-// Defined here to be inlined: it is called for every row.
-inline void ScanColumns::write(std::size_t row, const EchoRow& echo) const noexcept {
-  x_[row] = echo.point.x;
-  y_[row] = echo.point.y;
-  z_[row] = echo.point.z;
-  intensity_[row] = echo.intensity;
-  time_s_[row] = echo.time_s;
-  ring_[row] = echo.ring;
-  return_index_[row] = echo.return_index;
-  return_count_[row] = echo.return_count;
-  world_x_[row] = echo.p_DQ.x;
-  world_y_[row] = echo.p_DQ.y;
-  world_z_[row] = echo.p_DQ.z;
-  range_true_[row] = echo.range_m;
-  nx_[row] = echo.normal.x;
-  ny_[row] = echo.normal.y;
-  nz_[row] = echo.normal.z;
-  incidence_[row] = std::atan2(echo.sin_incidence, echo.cos_incidence);
-  label_[row] = echo.surface.label;
-  instance_[row] = echo.surface.instance;
-  // Converts the vertical deviation of the surface to a distance along the beam.
-  error_estimate_[row] = echo.deviation_m == 0 ? 0
-                                               : echo.deviation_m * echo.normal.z /
-                                                     std::max(echo.cos_incidence, 1e-6f);
-}
+  // Each calls act(column, name, value of a row) for some columns, in the order of the file.
+  template <typename Self, typename Act>
+  static void for_common(Self& self, const Act& act) {
+    act(self.x_, "x", [](Row row) { return row.point.x; });
+    act(self.y_, "y", [](Row row) { return row.point.y; });
+    act(self.z_, "z", [](Row row) { return row.point.z; });
+    act(self.intensity_, "intensity", [](Row row) { return row.intensity; });
+    act(self.time_s_, "time", [](Row row) { return row.time_s; });
+    act(self.ring_, "ring", [](Row row) { return row.ring; });
+    act(self.return_index_, "return_index", [](Row row) { return row.return_index; });
+    act(self.return_count_, "return_count", [](Row row) { return row.return_count; });
+    act(self.world_x_, "world_x", [](Row row) { return row.p_DQ.x; });
+    act(self.world_y_, "world_y", [](Row row) { return row.p_DQ.y; });
+    act(self.world_z_, "world_z", [](Row row) { return row.p_DQ.z; });
+    act(self.range_true_, "range_true", [](Row row) { return row.range_m; });
+    act(self.nx_, "nx", [](Row row) { return row.normal.x; });
+    act(self.ny_, "ny", [](Row row) { return row.normal.y; });
+    act(self.nz_, "nz", [](Row row) { return row.normal.z; });
+    act(self.incidence_, "incidence",
+        [](Row row) { return std::atan2(row.sin_incidence, row.cos_incidence); });
+    act(self.label_, "label", [](Row row) { return row.surface.label; });
+    act(self.instance_, "instance", [](Row row) { return row.surface.instance; });
+    // Converts the vertical deviation of the surface to a distance along the beam.
+    act(self.error_estimate_, "error_estimate", [](Row row) {
+      return row.deviation_m == 0
+                 ? 0
+                 : row.deviation_m * row.normal.z / std::max(row.cos_incidence, 1e-6f);
+    });
+  }
+  template <typename Self, typename Act>
+  static void for_light(Self& self, const Act& act) {
+    act(self.pulse_, "pulse", [](Row row) { return row.pulse; });
+    act(self.amplitude_, "amplitude", [](Row row) { return row.power_w; });
+    act(self.width_, "width", [](Row row) { return row.width_s; });
+    act(self.snr_, "snr", [](Row row) { return row.snr; });
+    act(self.kind_, "kind", [](Row row) { return static_cast<std::uint8_t>(row.kind); });
+    act(self.share_, "share", [](Row row) { return row.share; });
+    act(self.second_share_, "second_share", [](Row row) { return row.second_share; });
+    act(self.second_label_, "second_label", [](Row row) { return row.second_label; });
+  }
+  template <typename Self, typename Act>
+  static void for_noise(Self& self, const Act& act) {
+    act(self.range_sd_, "range_sd", [](Row row) { return row.range_sd_m; });
+  }
+  template <typename Self, typename Act>
+  static void for_motion(Self& self, const Act& act) {
+    act(self.velocity_[0], "vx", [](Row row) { return row.velocity_m_s.x; });
+    act(self.velocity_[1], "vy", [](Row row) { return row.velocity_m_s.y; });
+    act(self.velocity_[2], "vz", [](Row row) { return row.velocity_m_s.z; });
+  }
+  template <typename Self, typename Act>
+  static void for_bounds(Self& self, const Act& act) {
+    act(self.error_bound_, "error_bound", [](Row row) {
+      const auto nearest = static_cast<float>(row.bound_m);  // rounded up
+      return nearest < row.bound_m ? std::nextafter(nearest, std::numeric_limits<float>::infinity())
+                                   : nearest;
+    });
+  }
+
+  std::span<float> x_, y_, z_, intensity_, time_s_, nx_, ny_, nz_, incidence_, error_estimate_;
+  std::span<double> world_x_, world_y_, world_z_, range_true_;
+  std::span<std::uint8_t> return_index_, return_count_, kind_;
+  std::span<std::uint16_t> ring_, label_, second_label_;
+  std::span<std::uint32_t> instance_, pulse_;
+  std::span<float> amplitude_, width_, snr_, share_, second_share_, range_sd_, error_bound_;
+  std::array<std::span<float>, 3> velocity_;
+};
 
 }  // namespace groundray

@@ -1,17 +1,12 @@
 #include "sensors/sky/atmosphere.h"
 
-#include <algorithm>
-#include <array>
 #include <cmath>
 #include <numbers>
 
 #include "core/error.h"
-#include "sensors/normal_spread.h"
 
 namespace groundray {
 namespace {
-
-constexpr double most_steps = 1e7;
 
 void check_atmosphere(const AtmosphereSpec& spec, double wavelength_nm) {
   Violations broken("AtmosphereSpec");
@@ -33,82 +28,6 @@ void check_atmosphere(const AtmosphereSpec& spec, double wavelength_nm) {
                 "the laser's wavelength = {} nm must be in [400, 2000]", wavelength_nm);
   broken.throw_if_any();
 }
-
-void check_overlap(const Overlap& overlap, const SoftReturnGrid& grid) {
-  Violations broken("Soft return");
-  broken.unless(overlap.none_below_m > 0, "none_below_m = {} must be positive",
-                overlap.none_below_m);
-  broken.unless(overlap.none_below_m < overlap.full_from_m && std::isfinite(overlap.full_from_m),
-                "full_from_m = {} must be finite and greater than none_below_m = {}",
-                overlap.full_from_m, overlap.none_below_m);
-  broken.unless(grid.step_m > 0 && std::isfinite(grid.step_m),
-                "step_m = {} must be positive and finite", grid.step_m);
-  broken.unless(grid.max_range_m > 0 && std::isfinite(grid.max_range_m),
-                "max_range_m = {} must be positive and finite", grid.max_range_m);
-  broken.unless(!(grid.max_range_m / grid.step_m > most_steps),
-                "max_range_m = {} needs more than {} steps of {} m", grid.max_range_m, most_steps,
-                grid.step_m);
-  broken.unless(grid.least_share >= 0 && grid.least_share < 1, "least_share = {} must be in [0, 1)",
-                grid.least_share);
-  broken.throw_if_any();
-}
-
-// Abramowitz and Stegun, Handbook of Mathematical Functions (1964), table 25.4: 8 points.
-constexpr std::array gauss_legendre{QuadratureNode{0.1834346424956498, 0.3626837833783620},
-                                    QuadratureNode{0.5255324099163290, 0.3137066458778873},
-                                    QuadratureNode{0.7966664774136267, 0.2223810344533745},
-                                    QuadratureNode{0.9602898564975363, 0.1012285362903763}};
-
-// Integrals over range of the backscatter per metre, and of its product with the range.
-struct Moments {
-  double zeroth = 0;
-  double first = 0;
-};
-
-// Integrand of the soft target: exp(-2 extinction r) overlap(r) / r^2.
-class SoftTarget {
- public:
-  SoftTarget(double extinction_per_m, const Overlap& overlap)
-      : extinction_per_m_(extinction_per_m), overlap_(overlap) {}
-
-  Moments between(double near_m, double far_m) const noexcept {
-    Moments sum;
-    double from = std::max(near_m, overlap_.none_below_m);
-    while (from < far_m) {
-      // Over at most an octave of range and four e-foldings, the error of 8 points is below 1e-10.
-      double to = std::min({far_m, 2 * from, from + 2 / extinction_per_m_});
-      if (from < overlap_.full_from_m) to = std::min(to, overlap_.full_from_m);
-      if (!(to > from)) break;
-      add_piece(from, to, sum);
-      from = to;
-    }
-    return sum;
-  }
-
- private:
-  double at(double range_m) const noexcept {
-    const double seen =
-        (range_m - overlap_.none_below_m) / (overlap_.full_from_m - overlap_.none_below_m);
-    return std::exp(-2 * extinction_per_m_ * range_m) * std::min(seen, 1.) / (range_m * range_m);
-  }
-
-  void add_piece(double from, double to, Moments& sum) const noexcept {
-    const double middle = (from + to) / 2;
-    const double half = (to - from) / 2;
-    for (const QuadratureNode& node : gauss_legendre) {
-      const double near = middle - half * node.position;
-      const double far = middle + half * node.position;
-      const double weight = half * node.weight;
-      const double near_value = weight * at(near);
-      const double far_value = weight * at(far);
-      sum.zeroth += near_value + far_value;
-      sum.first += near_value * near + far_value * far;
-    }
-  }
-
-  double extinction_per_m_;
-  Overlap overlap_;
-};
 
 double haze_exponent(double visibility_km, HazeLaw law) noexcept {
   if (visibility_km > 50) return 1.6;
@@ -164,26 +83,6 @@ Atmosphere::Atmosphere(const AtmosphereSpec& spec, double wavelength_nm)
 
 double Atmosphere::transmission(double range_m) const noexcept {
   return std::exp(-extinction_per_m_ * range_m);
-}
-
-std::vector<SoftReturn> Atmosphere::soft_return(const RadarEquation& radar, const Overlap& overlap,
-                                                const SoftReturnGrid& grid) const {
-  check_overlap(overlap, grid);
-  std::vector<SoftReturn> returns;
-  const SoftTarget air(extinction_per_m_, overlap);
-  const double energy_m_j = radar.energy_area_j_m2() * backscatter_per_m_sr_;
-  const double first_step = std::floor(overlap.none_below_m / grid.step_m);
-  double strongest_j = 0;
-  for (double step = first_step; step * grid.step_m < grid.max_range_m; ++step) {
-    const double far_m = std::min((step + 1) * grid.step_m, grid.max_range_m);
-    const Moments moments = air.between(step * grid.step_m, far_m);
-    const double energy_j = energy_m_j * moments.zeroth;
-    strongest_j = std::max(strongest_j, energy_j);
-    if (energy_j < grid.least_share * strongest_j) break;
-    if (energy_j < std::numeric_limits<double>::min()) continue;
-    returns.push_back({.range_m = moments.first / moments.zeroth, .energy_j = energy_j});
-  }
-  return returns;
 }
 
 }  // namespace groundray

@@ -1,9 +1,8 @@
 #pragma once
 
+#include <glm/exponential.hpp>
+#include <glm/vec3.hpp>
 #include <limits>
-#include <vector>
-
-#include "sensors/lidar/receiver/radar_equation.h"
 
 namespace groundray {
 
@@ -22,33 +21,6 @@ struct AtmosphereSpec {
   double group_index = 1;  ///< group index of the air: c / group velocity (air_group_index)
 };
 
-/// Overlap of the emitter's beam and the receiver's field of view: 0 up to `none_below_m`, 1 from
-/// `full_from_m` on, linear between.
-struct Overlap {
-  double none_below_m = 0;
-  double full_from_m = 0;
-};
-
-/// Returns the overlap at a range: the fraction of its light that the receiver sees.
-constexpr double overlap_share(const Overlap& overlap, double range_m) noexcept {
-  if (range_m <= overlap.none_below_m) return 0;
-  if (range_m >= overlap.full_from_m) return 1;
-  return (range_m - overlap.none_below_m) / (overlap.full_from_m - overlap.none_below_m);
-}
-
-/// Range steps over which the backscatter of the air is integrated, starting at 0.
-struct SoftReturnGrid {
-  double step_m = 0;
-  double max_range_m = 0;
-  double least_share = 0;  ///< the grid ends at a step below this fraction of the strongest
-};
-
-/// Backscatter of one step of air, reduced to a single range.
-struct SoftReturn {
-  double range_m = 0;  ///< centroid of its energy
-  double energy_j = 0;
-};
-
 /// Air with haze, fog and rain at one wavelength. Immutable and therefore thread-safe.
 /// @see docs/theory/lidar_atmosphere.md: formulas, their sources and limits.
 class Atmosphere {
@@ -64,19 +36,41 @@ class Atmosphere {
   double backscatter_per_m_sr() const noexcept { return backscatter_per_m_sr_; }
   double group_index() const noexcept { return group_index_; }
 
-  /// Returns the energy that the air scatters back from each step of `grid`, nearest first, with a
-  /// relative error of at most 1e-9. Steps without energy are omitted. Surfaces are not considered:
-  /// truncate the result at the surface. It is the same for all pulses of a lidar.
-  /// @throws Error listing all values that are out of bounds in `overlap` and `grid`.
-  /// @see Rasshofer et al., Influences of weather phenomena on automotive laser radar systems, Adv.
-  ///      Radio Sci. 9 (2011): the soft target.
-  std::vector<SoftReturn> soft_return(const RadarEquation& radar, const Overlap& overlap,
-                                      const SoftReturnGrid& grid) const;
-
  private:
   double extinction_per_m_;
   double backscatter_per_m_sr_;
   double group_index_;
+};
+
+/// Aerial perspective: attenuation of radiance by the air between a camera and a surface, and the
+/// light that this air adds. The air is homogeneous; each channel has the extinction at its own
+/// wavelength.
+/// @see Koschmieder, Theorie der horizontalen Sichtweite (1924); docs/theory/sky.md.
+class AerialPerspective {
+ public:
+  /// Dominant wavelengths of the sRGB primaries, relative to D65, nm.
+  static constexpr glm::dvec3 wavelengths_nm{611.4, 549.1, 464.3};
+
+  /// @param air  spec of the air; a lidar in the same air shares it.
+  /// @throws Error as Atmosphere.
+  explicit AerialPerspective(const AtmosphereSpec& air)
+      : extinction_per_m_(Atmosphere(air, wavelengths_nm.r).extinction_per_m(),
+                          Atmosphere(air, wavelengths_nm.g).extinction_per_m(),
+                          Atmosphere(air, wavelengths_nm.b).extinction_per_m()) {}
+
+  /// Returns the radiance `from_surface` after attenuation over `distance_m` (finite, >= 0), plus
+  /// the radiance that the air adds.
+  /// @param from_horizon  radiance of infinitely deep air in the same direction.
+  glm::dvec3 through(const glm::dvec3& from_surface, double distance_m,
+                     const glm::dvec3& from_horizon) const noexcept {
+    const glm::dvec3 left = glm::exp(-extinction_per_m_ * distance_m);
+    return from_surface * left + from_horizon * (1.0 - left);
+  }
+
+  const glm::dvec3& extinction_per_m() const noexcept { return extinction_per_m_; }
+
+ private:
+  glm::dvec3 extinction_per_m_;
 };
 
 /// Returns the extinction of haze, 1/m, at a visibility V: (3.912 / V) (wavelength / 550 nm)^-q.

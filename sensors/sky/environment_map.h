@@ -6,7 +6,6 @@
 
 #include "core/image/image.h"
 #include "sensors/sky/direction_sampler.h"
-#include "sensors/sky/lat_long_grid.h"
 
 namespace groundray {
 

@@ -1,5 +1,6 @@
 #pragma once
 
+#include <array>
 #include <filesystem>
 #include <glm/vec2.hpp>
 #include <glm/vec3.hpp>
@@ -7,12 +8,70 @@
 #include <variant>
 
 #include "core/image/image.h"
-#include "sensors/sky/clear_sky.h"
 #include "sensors/sky/direction_sampler.h"
 #include "sensors/sky/environment_map.h"
 #include "sensors/sky/sun.h"
 
 namespace groundray {
+
+/// Radiance of the clear sky by Hosek and Wilkie, without the sun's disc. Immutable and therefore
+/// thread-safe.
+/// @see Hosek and Wilkie, An analytic model for full spectral sky-dome radiance, ACM Transactions
+///      on Graphics 31 (2012); its coefficients for linear sRGB.
+class HosekWilkie {
+ public:
+  /// @param turbidity  1 (pure air) to 10 (dense haze).
+  /// @param ground_albedo  linear sRGB, each 0 to 1: albedo of the surroundings, which light the
+  ///        sky from below.
+  /// @param sun  unit direction to the sun, axes of W; not below the horizon, because the model has
+  ///        no twilight.
+  /// @throws Error listing all arguments that are out of bounds.
+  HosekWilkie(double turbidity, const glm::dvec3& ground_albedo, const glm::dvec3& sun);
+
+  /// Returns the radiance from a unit direction, W/(m^2 sr); see docs/theory/sky.md for the unit. A
+  /// direction below the horizon has the zenith angle of the horizon.
+  glm::dvec3 radiance(const glm::dvec3& direction) const noexcept;
+
+ private:
+  glm::dvec3 sun_;
+  std::array<glm::dvec3, 10> coefficients_;  // A to I and the mean radiance, by channel
+};
+
+/// Clear sky above flat Lambertian ground that extends to the horizon, without the sun's disc.
+/// Immutable and therefore thread-safe.
+class ClearSky {
+ public:
+  /// @param sun  unit direction to the sun, axes of W.
+  /// @param sun_irradiance  irradiance of a plane perpendicular to the sun's rays, W/m^2; the
+  ///        ground reflects it too.
+  /// @throws Error as HosekWilkie.
+  ClearSky(double turbidity, const glm::dvec3& ground_albedo, const glm::dvec3& sun,
+           const glm::dvec3& sun_irradiance);
+
+  /// Returns the radiance from a unit direction (axes of W), linear sRGB, W/(m^2 sr).
+  glm::dvec3 radiance(const glm::dvec3& direction) const noexcept {
+    return direction.z < 0 ? ground_ : model_.radiance(direction);
+  }
+
+  /// Draws a direction approximately in proportion to its luminance. @see DirectionSampler
+  DirectionSample sample(const glm::dvec2& uniform) const noexcept {
+    return sampler_.sample(uniform);
+  }
+  double pdf_per_sr(const glm::dvec3& direction) const noexcept {
+    return sampler_.pdf_per_sr(direction);
+  }
+
+  /// Returns the irradiance of a horizontal plane by the sky, W/m^2, accurate to 5e-5 of it.
+  const glm::dvec3& horizontal_irradiance() const noexcept { return irradiance_; }
+
+ private:
+  DirectionSampler tabulated() const;
+
+  HosekWilkie model_;
+  glm::dvec3 irradiance_;
+  glm::dvec3 ground_;
+  DirectionSampler sampler_;
+};
 
 /// Dome with the same radiance in every direction, also below the horizon.
 struct ConstantSky {

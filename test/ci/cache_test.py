@@ -166,7 +166,7 @@ def tree():
     "source",
     [
         "core/tracing/ray_tracer.cpp",
-        "sensors/sky/hosek_wilkie.cpp",
+        "sensors/sky/sky.cpp",
         "terrain/lod/clipmap.cpp",
         "reconstruction/mesh/merge/mesh_merge.cpp",
         "apps/groundray/generate.cpp",
@@ -210,7 +210,7 @@ def test_changed_header_invalidates_exactly_the_stamps_of_its_includers(tree, tm
     assert {
         name: clang_tidy.SourceTree(folder).stamp(name, "settings") for name in sources
     } == before
-    changed = "sensors/lidar/receiver/range_gate.h"
+    changed = "sensors/lidar/receiver/waveform.h"
     with (folder / changed).open("a") as header:
         header.write("// changed\n")
     copy = clang_tidy.SourceTree(folder)

@@ -37,7 +37,7 @@ def test_the_tree_follows_the_rules():
         ("sensors/lidar/lidar.cpp", "<yaml-cpp/yaml.h>", "only apps/scene/yaml_reader"),
         ("core/tracing/scene.cpp", "<embree4/rtcore.h>", "only core/tracing/embree_adapter"),
         ("terrain/lod/quadtree.cpp", "<gdal_priv.h>", "only terrain/dem/"),
-        ("apps/scene/paths.cpp", "<QWidget>", "only apps/view/window"),
+        ("apps/scene/simulation.cpp", "<QWidget>", "only apps/view/window"),
         ("terrain/ground.h", "<tbb/parallel_for.h>", "a header of a library includes std"),
     ],
 )

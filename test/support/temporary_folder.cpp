@@ -6,7 +6,7 @@
 #include <stdexcept>
 #include <string>
 
-#include "apps/scene/source_folder.h"
+#include "apps/scene/simulation.h"
 
 namespace groundray::testing {
 

@@ -61,9 +61,9 @@ std::uint64_t fingerprint(const Simulation& simulation) {
     if (const auto* environment = std::get_if<EnvironmentImage>(&sky->dome))
       print.add(std::span<const char>(read_text(environment->image)));
   }
-  for (const Material& material : simulation.content.materials.all())
+  for (const Material& material : simulation.scene_objects.materials.all())
     print.add_all(fingerprint_of(material));
-  print.add(std::span<const char>(simulation.content.fingerprint));
+  print.add(std::span<const char>(simulation.scene_objects.fingerprint));
   return print.value();
 }
 
@@ -103,11 +103,11 @@ std::string run_header(const Simulation& simulation) {
   }
   if (!simulation.cameras.empty()) {
     text += "materials:  # by number in images, from 1\n";
-    for (const Material& material : simulation.content.materials.all())
+    for (const Material& material : simulation.scene_objects.materials.all())
       text += fmt::format("  - {}\n", yaml_text(material.name));
   }
-  if (!simulation.content.groups.empty()) text += "objects:\n";
-  for (const SceneObjects::Group& group : simulation.content.groups) {
+  if (!simulation.scene_objects.groups.empty()) text += "objects:\n";
+  for (const SceneObjects::Group& group : simulation.scene_objects.groups) {
     text += fmt::format("  - {{name: {}, label: {}, first_instance: {}, count: {}}}\n",
                         yaml_text(group.name), group.label, group.first, group.count);
   }

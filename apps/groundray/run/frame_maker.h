@@ -9,7 +9,6 @@
 
 #include "apps/groundray/record/dataset_writer.h"
 #include "apps/groundray/record/images.h"
-#include "apps/scene/frame_scene_builder.h"
 #include "apps/scene/frames.h"
 #include "apps/scene/simulation.h"
 #include "core/io/point_cloud.h"

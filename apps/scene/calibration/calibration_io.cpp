@@ -6,17 +6,129 @@
 #include <cmath>
 #include <glm/trigonometric.hpp>
 #include <map>
+#include <nlohmann/json.hpp>
+#include <numbers>
 #include <optional>
 #include <set>
+#include <utility>
 
-#include "apps/scene/calibration/calibration_limits.h"
 #include "core/error.h"
 #include "core/io/file_io.h"
 #include "core/io/text_lines.h"
-#include "sensors/lidar/pattern/csv_cells.h"
+#include "sensors/lidar/pattern/table_pattern.h"
 
 namespace groundray {
 namespace {
+
+using nlohmann::json;
+
+using std::numbers::pi;
+
+// Reads keys of a metadata file of either layout, and records every fault.
+class OusterReader {
+ public:
+  OusterReader(const json& root, Violations& broken) : root_(root), broken_(broken) {}
+
+  // Returns the value of a key at the top level or in one of the sections of the nested layout;
+  // null if it is missing.
+  const json* find(const char* key) const {
+    for (const char* section : {"", "beam_intrinsics", "lidar_intrinsics", "lidar_data_format",
+                                "data_format", "config_params"}) {
+      const json* place = &root_;
+      if (*section != '\0') {
+        const auto nested = root_.find(section);
+        if (nested == root_.end() || !nested->is_object()) continue;
+        place = &*nested;
+      }
+      if (const auto value = place->find(key); value != place->end()) return &*value;
+    }
+    return nullptr;
+  }
+
+  // Returns the numbers of a list; none if it is missing or invalid.
+  std::vector<double> numbers(const char* key, bool required, std::size_t count) const {
+    const json* list = find(key);
+    if (!list) {
+      broken_.unless(!required, "key '{}' is missing: is this the metadata of an Ouster?", key);
+      return {};
+    }
+    std::vector<double> values;
+    bool sound = list->is_array() && !list->empty() && (count == 0 || list->size() == count);
+    for (std::size_t i = 0; sound && i < list->size(); ++i) {
+      sound = (*list)[i].is_number() && std::isfinite((*list)[i].get<double>());
+      if (sound) values.push_back((*list)[i].get<double>());
+    }
+    broken_.unless(sound, "key '{}' must be a list of {} finite numbers", key,
+                   count == 0 ? "one or more" : std::to_string(count));
+    return sound ? values : std::vector<double>{};
+  }
+
+ private:
+  const json& root_;
+  Violations& broken_;
+};
+
+// Reads columns per turn and turns per second, such as "1024x10".
+std::pair<int, int> read_mode(const OusterReader& reader, Violations& broken) {
+  const json* mode = reader.find("lidar_mode");
+  const std::string text = mode && mode->is_string() ? mode->get<std::string>() : "";
+  const std::size_t cross = text.find('x');
+  const auto columns = number_of<int>(std::string_view(text).substr(0, cross));
+  const auto rate_hz =
+      number_of<int>(cross == std::string::npos ? "" : std::string_view(text).substr(cross + 1));
+  const bool sound =
+      columns && rate_hz && *columns >= 1 && *columns <= 65536 && *rate_hz >= 1 && *rate_hz <= 1000;
+  broken.unless(sound, "key 'lidar_mode' must be a text such as \"1024x10\": columns x rate");
+  return sound ? std::pair(*columns, *rate_hz) : std::pair(1, 1);
+}
+
+// Returns the origin of the beams in H, m, without the height of the lidar frame above S.
+glm::dvec3 read_beam_origin_m(const OusterReader& reader, Violations& broken) {
+  if (reader.find("beam_to_lidar_transform")) {
+    const auto matrix = reader.numbers("beam_to_lidar_transform", true, 16);
+    if (matrix.empty()) return glm::dvec3(0);
+    return glm::dvec3(matrix[3], matrix[7], matrix[11]) / 1000.;
+  }
+  const json* offset_mm = reader.find("lidar_origin_to_beam_origin_mm");
+  const bool sound = offset_mm && offset_mm->is_number();
+  broken.unless(sound,
+                "key 'lidar_origin_to_beam_origin_mm' must be a number, or there must be a "
+                "'beam_to_lidar_transform'");
+  return {sound ? offset_mm->get<double>() / 1000 : 0, 0, 0};
+}
+
+// Applies the pose of the lidar frame, whose x axis is the encoder's zero, in the sensor frame.
+void place_in_sensor(const std::vector<double>& matrix, SpinningPattern& pattern,
+                     Violations& broken) {
+  if (matrix.empty()) return;
+  constexpr double tolerance = 1e-6;  // files have at least six decimals
+  const bool upright = std::abs(matrix[10] - 1) < tolerance &&
+                       std::abs(matrix[0] - matrix[5]) < tolerance &&
+                       std::abs(matrix[1] + matrix[4]) < tolerance &&
+                       std::abs(std::hypot(matrix[0], matrix[4]) - 1) < tolerance;
+  broken.unless(upright && matrix[3] == 0 && matrix[7] == 0,
+                "key 'lidar_to_sensor_transform' must be a rotation about z and a translation "
+                "along z, in mm, row by row");
+  pattern.start_azimuth_rad = std::atan2(matrix[4], matrix[0]);
+  for (Beam& beam : pattern.beams) beam.origin_m.z += matrix[11] / 1000;
+}
+
+// Returns the field of view of a column window. Its ends are half a column outside the window, so
+// that rounding never decides about a column.
+std::optional<AzimuthInterval> view_of(const std::vector<double>& window, int columns,
+                                       double start_azimuth_rad, Violations& broken) {
+  if (window.empty()) return std::nullopt;
+  const double first = window[0];
+  const double last = window[1];
+  const auto column = [&](double c) { return c >= 0 && c < columns && c == std::floor(c); };
+  broken.unless(column(first) && column(last),
+                "key 'column_window' = [{}, {}] must be two columns from 0 to {}", first, last,
+                columns - 1);
+  const double count = last - first + (last < first ? columns : 0) + 1;
+  if (count >= columns) return std::nullopt;
+  const double to_rad = start_azimuth_rad - 2 * pi * (first - 0.5) / columns;
+  return AzimuthInterval{to_rad - 2 * pi * count / columns, to_rad};
+}
 
 namespace fs = std::filesystem;
 
@@ -70,6 +182,47 @@ Beam hesai_beam(const std::vector<std::string_view>& cells, const HesaiColumns& 
 
 }  // namespace
 
+SpinningPattern parse_ouster_metadata(std::string_view text, const std::filesystem::path& path) {
+  json root;
+  try {
+    root = json::parse(text);
+  } catch (const json::exception& fault) {
+    throw Error("{}: not JSON: {}", path.string(), fault.what());
+  }
+  if (!root.is_object()) throw Error("{}: must be a JSON object of keys and values", path.string());
+  Violations broken(path.string());
+  const OusterReader reader(root, broken);
+  const std::vector<double> altitudes_deg = reader.numbers("beam_altitude_angles", true, 0);
+  const std::vector<double> azimuths_deg =
+      reader.numbers("beam_azimuth_angles", true, altitudes_deg.size());
+  const auto [columns, rate_hz] = read_mode(reader, broken);
+  const glm::dvec3 origin_m = read_beam_origin_m(reader, broken);
+  broken.unless(altitudes_deg.size() <= most_beams, "key 'beam_altitude_angles' has {} beams",
+                altitudes_deg.size());
+  SpinningPattern pattern;
+  pattern.rate_hz = rate_hz;
+  pattern.firing_period_s = 1. / (columns * rate_hz);
+  for (std::size_t row = 0; row < std::min(altitudes_deg.size(), azimuths_deg.size()); ++row) {
+    broken.unless(std::abs(altitudes_deg[row]) <= 90,
+                  "key 'beam_altitude_angles': {} must be from -90 to 90", altitudes_deg[row]);
+    Beam beam;
+    beam.elevation_rad = glm::radians(altitudes_deg[row]);
+    beam.azimuth_offset_rad = -glm::radians(azimuths_deg[row]);
+    beam.origin_m = origin_m;
+    beam.ring = static_cast<std::uint16_t>(row);
+    pattern.beams.push_back(beam);
+  }
+  place_in_sensor(reader.numbers("lidar_to_sensor_transform", true, 16), pattern, broken);
+  pattern.field_of_view = view_of(reader.numbers("column_window", false, 2), columns,
+                                  pattern.start_azimuth_rad, broken);
+  broken.throw_if_any();
+  return pattern;
+}
+
+SpinningPattern load_ouster_metadata(const std::filesystem::path& path) {
+  return parse_ouster_metadata(read_text(path), path);
+}
+
 std::vector<Beam> parse_hesai_csv(std::string_view text, const fs::path& path) {
   constexpr std::size_t most_faults = 100;
   std::optional<HesaiColumns> columns;
@@ -110,10 +263,6 @@ std::vector<Beam> parse_hesai_csv(std::string_view text, const fs::path& path) {
   return beams;
 }
 
-std::vector<Beam> load_hesai_csv(const fs::path& path) {
-  return parse_hesai_csv(read_text(path), path);
-}
-
 SpinningPattern with_calibration(SpinningPattern pattern, std::span<const Beam> unit) {
   const bool loops = std::ranges::any_of(pattern.beams, [](const Beam& b) { return b.loop > 0; });
   std::set<std::uint16_t> rings;
@@ -142,8 +291,10 @@ PatternSpec calibrated(const PatternSpec& pattern, const fs::path& file) {
   const auto* spinning = std::get_if<SpinningPattern>(&pattern);
   if (!spinning)
     throw Error("{}: only spinning heads have calibrations of single units", file.string());
-  if (extension == ".xml") return with_calibration(*spinning, load_velodyne_xml(file));
-  if (extension == ".csv") return with_calibration(*spinning, load_hesai_csv(file));
+  if (extension == ".xml")
+    return with_calibration(*spinning, parse_velodyne_xml(read_text(file), file));
+  if (extension == ".csv")
+    return with_calibration(*spinning, parse_hesai_csv(read_text(file), file));
   if (extension == ".yaml" || extension == ".yml")
     return with_calibration(*spinning, load_velodyne_yaml(file));
   throw Error(

@@ -1,5 +1,6 @@
 #pragma once
 
+#include <cstddef>
 #include <filesystem>
 #include <span>
 #include <string>
@@ -11,6 +12,9 @@
 // Calibration files that vendors supply with one unit of a lidar. They are read as beams in the
 // order of their lasers, channels or rows; docs/theory/lidar_patterns.md describes their contents.
 namespace groundray {
+
+/// Largest number of beams in a calibration file: rings have 16 bits.
+inline constexpr std::size_t most_beams = 65536;
 
 /// Reads the metadata of an Ouster: JSON of the flat layout (firmware 1 and 2) or the nested one
 /// (firmware 3), with beam_altitude_angles, beam_azimuth_angles, lidar_mode,
@@ -27,23 +31,17 @@ SpinningPattern load_ouster_metadata(const std::filesystem::path& path);
 /// @throws Error with path:line:column, key and rule for every fault of the file.
 std::vector<Beam> load_velodyne_yaml(const std::filesystem::path& path);
 
-/// Reads the lasers of a Velodyne from the vendor's db.xml, in degrees and centimetres; lasers that
-/// `enabled_` switches off are omitted. Otherwise as load_velodyne_yaml.
-std::vector<Beam> load_velodyne_xml(const std::filesystem::path& path);
-
-/// Reads the channels of a Hesai from an angle correction file: CSV with a line
-/// `Channel,Elevation,Azimuth` (or `Laser id` for the channel; in any order), in degrees. Rings are
-/// channels minus one. The file contains no firing times; they are 0.
-/// @throws Error with path:line and rule for every fault of the file.
-std::vector<Beam> load_hesai_csv(const std::filesystem::path& path);
-
 /// Parses a text already in memory like load_ouster_metadata; `path` names the file in messages.
 SpinningPattern parse_ouster_metadata(std::string_view text, const std::filesystem::path& path);
 /// Parses a text like load_velodyne_yaml.
 std::vector<Beam> parse_velodyne_yaml(std::string_view text, const std::filesystem::path& path);
-/// Parses a text like load_velodyne_xml.
+/// Parses the lasers of a Velodyne from the vendor's db.xml, in degrees and centimetres; lasers
+/// that `enabled_` switches off are omitted. Otherwise as load_velodyne_yaml.
 std::vector<Beam> parse_velodyne_xml(std::string_view text, const std::filesystem::path& path);
-/// Parses a text like load_hesai_csv.
+/// Parses the channels of a Hesai from an angle correction file: CSV with a line
+/// `Channel,Elevation,Azimuth` (or `Laser id` for the channel; in any order), in degrees. Rings are
+/// channels minus one. The file contains no firing times; they are 0.
+/// @throws Error with path:line and rule for every fault of the file.
 std::vector<Beam> parse_hesai_csv(std::string_view text, const std::filesystem::path& path);
 
 /// Returns `pattern` with the angles, origins and rings of `unit`, and its own firing times and

@@ -1,20 +1,17 @@
 #include "apps/scene/calibration/calibration_reader.h"
 
+#include <fmt/format.h>
+#include <fmt/ranges.h>
+
 #include <algorithm>
-#include <array>
+#include <cmath>
 #include <cstddef>
-#include <initializer_list>
-#include <string>
+#include <span>
 
-#include "apps/scene/calibration/calibration_fields.h"
+#include "core/error.h"
 
-namespace groundray::calibration {
+namespace groundray::yaml::calibration {
 namespace {
-
-using yaml::Faults;
-using yaml::Map;
-using yaml::Need;
-using yaml::Node;
 
 constexpr const char* order_words =
     "k1 k2 p1 p2 [k3 [k4 k5 k6 [s1 s2 s3 s4 [tau_x tau_y]]]], so 4, 5, 8, 12 or 14";
@@ -81,7 +78,7 @@ LensModel ros_model(Map& map, const PixelScale& scale, Faults& faults) {
   } else {
     faults.add(*map.find("distortion_model", Need::Optional), "distortion_model",
                "is '{}', but must be one of plumb_bob, rational_polynomial, equidistant{}", model,
-               yaml::suggestion(model, {"plumb_bob", "rational_polynomial", "equidistant"}));
+               suggestion(model, {"plumb_bob", "rational_polynomial", "equidistant"}));
   }
   return Pinhole{scale};
 }
@@ -119,6 +116,81 @@ CameraCalibration opencv_camera(Map& map, std::string_view matrix_key,
 }
 
 }  // namespace
+
+const Node* required(Map& map, std::string_view key, Faults& faults) {
+  const Node* node = map.find(key, Need::Optional);
+  if (!node && map.node().kind == Node::Kind::Map) faults.add(map.node(), key, "missing");
+  return node;
+}
+
+std::string text_at(Map& map, std::string_view key, Faults& faults) {
+  const Node* node = required(map, key, faults);
+  return node && is_text(*node, key, faults) ? node->text : "";
+}
+
+std::vector<double> list_of(const Node& node, std::string_view key, Faults& faults) {
+  std::vector<double> values;
+  const std::span<const Node> items =
+      node.kind == Node::Kind::List ? std::span(node.items) : std::span(&node, 1);
+  if (node.kind == Node::Kind::Null) return values;
+  for (const Node& item : items) {
+    const auto value = number(item, key, any_number, faults);
+    if (!value) return {};
+    values.push_back(*value);
+  }
+  return values;
+}
+
+std::vector<double> numbers_at(Map& map, std::string_view key,
+                               std::initializer_list<const char*> names, Faults& faults) {
+  const Node* node = required(map, key, faults);
+  if (!node) return {};
+  const std::size_t before = faults.count();
+  std::vector<double> values = list_of(*node, key, faults);
+  if (values.size() == names.size() || faults.count() > before)
+    return values.size() == names.size() ? values : std::vector<double>();
+  faults.add(*node, key, "has {} numbers, but must have {}: {}", values.size(), names.size(),
+             fmt::join(names, " "));
+  return {};
+}
+
+int pixels_of(const Node& node, std::string_view key, Faults& faults) {
+  const auto value = number(node, key, positive, faults);
+  if (!value) return 0;
+  if (*value == std::floor(*value) && *value <= 1e6) return static_cast<int>(*value);
+  faults.add(node, key, "is {}, but must be a whole number of pixels", node.text);
+  return 0;
+}
+
+glm::ivec2 size_of(const Node& node, std::string_view key, Faults& faults) {
+  if (node.kind == Node::Kind::List && node.items.size() == 2)
+    return {pixels_of(node.items[0], key, faults), pixels_of(node.items[1], key, faults)};
+  faults.add(node, key, "is {}, but must be a list of width and height", shown(node));
+  return {};
+}
+
+std::array<double, 4> four_of(const std::vector<double>& k) {
+  std::array<double, 4> four{};
+  std::copy_n(k.begin(), std::min<std::size_t>(4, k.size()), four.begin());
+  return four;
+}
+
+void check(const LensModel& model, const Node& node, Faults& faults) {
+  Violations broken("lens");
+  check_lens(model, broken);
+  try {
+    broken.throw_if_any();
+  } catch (const Error& fault) {
+    faults.add(node, "", "{}", fault.what());
+  }
+}
+
+LensModel brown_conrady(const PixelScale& scale, const std::vector<double>& k) {
+  if (std::ranges::all_of(k, [](double value) { return value == 0; })) return Pinhole{scale};
+  BrownConrady model{.scale = scale};
+  std::ranges::copy(k, model.k.begin());
+  return model;
+}
 
 std::vector<CameraCalibration> read_ros(const Node& root, Faults& faults) {
   Map map(root, "", faults);
@@ -161,4 +233,4 @@ std::vector<CameraCalibration> read_opencv(const Node& root, Faults& faults) {
   return cameras;
 }
 
-}  // namespace groundray::calibration
+}  // namespace groundray::yaml::calibration

@@ -1,7 +1,6 @@
 #include <fmt/format.h>
 
 #include <algorithm>
-#include <array>
 #include <cmath>
 #include <cstddef>
 #include <glm/geometric.hpp>
@@ -11,30 +10,23 @@
 #include <optional>
 #include <span>
 
-#include "apps/scene/calibration/calibration_fields.h"
 #include "apps/scene/calibration/calibration_reader.h"
 
 // Readers of files with several cameras and their poses.
-namespace groundray::calibration {
+namespace groundray::yaml::calibration {
 namespace {
-
-using yaml::Faults;
-using yaml::Map;
-using yaml::Need;
-using yaml::Node;
 
 // Reads a pose from the rows of a 4 x 4 matrix.
 std::optional<Pose> pose_of(const Node& node, std::string_view key, Faults& faults) {
   glm::dmat3 turn(0);
   Pose pose;
   if (node.kind != Node::Kind::List || node.items.size() != 4) {
-    faults.add(node, key, "is {}, but must be a list of 4 rows", yaml::shown(node));
+    faults.add(node, key, "is {}, but must be a list of 4 rows", shown(node));
     return std::nullopt;
   }
   for (int row = 0; row < 4; ++row) {
     std::array<double, 4> values{};
-    if (!yaml::numbers(node.items[static_cast<std::size_t>(row)], key, values, yaml::any_number,
-                       faults))
+    if (!numbers(node.items[static_cast<std::size_t>(row)], key, values, any_number, faults))
       return std::nullopt;
     if (row == 3 && values != std::array<double, 4>{0, 0, 0, 1})
       faults.add(node.items[3], key, "must end with the row 0 0 0 1");
@@ -69,7 +61,7 @@ LensModel kalibr_pinhole(Map& map, Faults& faults) {
         scale, four_of(numbers_at(map, "distortion_coeffs", {"k1", "k2", "k3", "k4"}, faults))};
   faults.add(*map.find("distortion_model", Need::Optional), "distortion_model",
              "is '{}', but must be one of radtan, equidistant, none{}", distortion,
-             yaml::suggestion(distortion, {"radtan", "equidistant", "none"}));
+             suggestion(distortion, {"radtan", "equidistant", "none"}));
   return Pinhole{scale};
 }
 
@@ -101,7 +93,7 @@ LensModel kalibr_model(Map& map, Faults& faults) {
   }
   faults.add(*map.find("camera_model", Need::Optional), "camera_model",
              "is '{}', but must be one of pinhole, omni, eucm, ds{}", model,
-             yaml::suggestion(model, {"pinhole", "omni", "eucm", "ds"}));
+             suggestion(model, {"pinhole", "omni", "eucm", "ds"}));
   return Pinhole{};
 }
 
@@ -206,4 +198,4 @@ std::vector<CameraCalibration> read_basalt(const Node& root, Faults& faults) {
   return cameras;
 }
 
-}  // namespace groundray::calibration
+}  // namespace groundray::yaml::calibration

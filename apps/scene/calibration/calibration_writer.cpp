@@ -7,8 +7,9 @@
 #include <cstddef>
 #include <glm/gtc/quaternion.hpp>
 #include <glm/mat3x3.hpp>
-#include <iterator>
+#include <variant>
 
+#include "apps/scene/calibration/calibration_reader.h"
 #include "apps/scene/calibration/camera_calibration.h"
 #include "core/error.h"
 #include "core/io/text_lines.h"
@@ -16,6 +17,8 @@
 
 namespace groundray {
 namespace {
+
+namespace kind = yaml::calibration::kind;
 
 // Formats a number so that every reader takes it for a real number.
 std::string real(double value) {
@@ -37,164 +40,135 @@ std::string in_quotes(std::string_view text) {
   return fmt::format("'{}'", inside);
 }
 
-// Representation of a lens in a format.
-struct Spoken {
-  std::string_view model;
-  std::vector<double> intrinsics;    // in the format's order, with further parameters of the model
-  std::vector<double> coefficients;  // distortion coefficients
+// Lens model in a format: its name there, and the number of its coefficients.
+struct FormatModel {
+  std::size_t model;
+  std::size_t coefficients;
+  std::string_view name;
 };
-using SpokenLens = std::optional<Spoken>;
+// A lens has the first model whose coefficients include all of its own that are not 0.
+constexpr FormatModel ros_models[] = {{kind::pinhole, 5, "plumb_bob"},
+                                      {kind::brown_conrady, 5, "plumb_bob"},
+                                      {kind::brown_conrady, 8, "rational_polynomial"},
+                                      {kind::kannala_brandt, 4, "equidistant"}};
+constexpr FormatModel opencv_models[] = {{kind::pinhole, 5, ""},
+                                         {kind::brown_conrady, 4, ""},
+                                         {kind::brown_conrady, 5, ""},
+                                         {kind::brown_conrady, 8, ""},
+                                         {kind::brown_conrady, 12, ""},
+                                         {kind::brown_conrady, 14, ""},
+                                         {kind::kannala_brandt, 4, "fisheye_model"},
+                                         {kind::mei, 4, "xi"}};
+constexpr FormatModel kalibr_models[] = {{kind::pinhole, 0, "pinhole"},
+                                         {kind::brown_conrady, 4, "pinhole"},
+                                         {kind::kannala_brandt, 4, "pinhole"},
+                                         {kind::mei, 4, "omni"},
+                                         {kind::eucm, 0, "eucm"},
+                                         {kind::double_sphere, 0, "ds"}};
+constexpr FormatModel colmap_models_written[] = {{kind::equirectangular, 0, "EQUIRECTANGULAR"},
+                                                 {kind::pinhole, 0, "PINHOLE"},
+                                                 {kind::brown_conrady, 4, "OPENCV"},
+                                                 {kind::brown_conrady, 8, "FULL_OPENCV"},
+                                                 {kind::kannala_brandt, 4, "OPENCV_FISHEYE"},
+                                                 {kind::eucm, 0, "EUCM"}};
+constexpr FormatModel basalt_models[] = {{kind::pinhole, 0, "pinhole"},
+                                         {kind::brown_conrady, 8, "pinhole-radtan8"},
+                                         {kind::kannala_brandt, 4, "kb4"},
+                                         {kind::eucm, 0, "eucm"},
+                                         {kind::double_sphere, 0, "ds"}};
+
+struct Format {
+  const char* name;
+  std::span<const FormatModel> models;
+  const char* supported;
+  // Contents that the format can represent: several cameras, X_IC, X_FC, time shift.
+  bool many = false, poses = false, relative_poses = false, shift = false;
+};
+constexpr const char* opencv_supports =
+    "a pinhole, all of Brown and Conrady, Kannala and Brandt, Mei";
+// In the order of CalibrationFormat.
+constexpr Format formats[] = {
+    {"ROS", ros_models,
+     "a pinhole, the first 8 coefficients of Brown and Conrady, Kannala and Brandt"},
+    {"OpenCV", opencv_models, opencv_supports},
+    {"OpenCV", opencv_models, opencv_supports},
+    {"Kalibr", kalibr_models,
+     "a pinhole, k1 k2 p1 p2 of Brown and Conrady, Kannala and Brandt, Mei, EUCM, double sphere",
+     true, true, true, true},
+    {"COLMAP", colmap_models_written,
+     "a pinhole, the first 8 coefficients of Brown and Conrady, Kannala and Brandt, EUCM, "
+     "equirectangular",
+     true},
+    {"basalt", basalt_models,
+     "a pinhole, the first 8 coefficients of Brown and Conrady, Kannala and Brandt, EUCM, double "
+     "sphere",
+     true, true}};
+const Format& format_of(CalibrationFormat format) {
+  return formats[static_cast<std::size_t>(format)];
+}
+
+// Lens in a format.
+struct FormatLens {
+  std::string_view model;
+  std::vector<double> coefficients;  // distortion coefficients
+  std::vector<double> shape;         // further parameters of the model
+  std::vector<double> pinhole;       // focal lengths and centre; none without a PixelScale
+};
 
 const PixelScale* scale_of(const LensModel& model) {
   return std::visit(
-      []<typename Model>(const Model& kind) -> const PixelScale* {
-        if constexpr (requires { kind.scale; }) return &kind.scale;
+      []<typename Model>(const Model& lens) -> const PixelScale* {
+        if constexpr (requires { lens.scale; }) return &lens.scale;
         return nullptr;
       },
       model);
 }
 
-// Returns the number of leading coefficients after which all are 0, in OpenCV's order.
-std::size_t used(const BrownConrady& model) {
-  const auto last = std::find_if(model.k.rbegin(), model.k.rend(), [](double k) { return k != 0; });
-  return static_cast<std::size_t>(std::distance(last, model.k.rend()));
-}
-
-std::vector<double> first(const BrownConrady& model, std::size_t count) {
-  return {model.k.begin(), model.k.begin() + static_cast<std::ptrdiff_t>(count)};
-}
-
-std::vector<double> all(const std::array<double, 4>& k) { return {k.begin(), k.end()}; }
-
-SpokenLens in_ros(const LensModel& model) {
-  if (std::holds_alternative<Pinhole>(model)) return Spoken{"plumb_bob", {}, {0, 0, 0, 0, 0}};
-  if (const auto* brown = std::get_if<BrownConrady>(&model)) {
-    if (used(*brown) <= 5) return Spoken{"plumb_bob", {}, first(*brown, 5)};
-    if (used(*brown) <= 8) return Spoken{"rational_polynomial", {}, first(*brown, 8)};
+std::optional<FormatLens> lens_in(CalibrationFormat format, const LensModel& lens) {
+  FormatLens result;
+  std::visit(
+      [&](const auto& model) {
+        if constexpr (requires { model.xi; }) result.shape.push_back(model.xi);
+        if constexpr (requires { model.alpha; }) result.shape.push_back(model.alpha);
+        if constexpr (requires { model.beta; }) result.shape.push_back(model.beta);
+        if constexpr (requires {
+                        model.scale;
+                        model.k;
+                      })
+          result.coefficients.assign(model.k.begin(), model.k.end());
+      },
+      lens);
+  if (const PixelScale* scale = scale_of(lens))
+    result.pinhole = {scale->focal_px.x, scale->focal_px.y, scale->centre_px.x, scale->centre_px.y};
+  std::vector<double>& k = result.coefficients;
+  const auto used = static_cast<std::size_t>(
+      k.rend() - std::find_if(k.rbegin(), k.rend(), [](double value) { return value != 0; }));
+  for (const FormatModel& known : format_of(format).models) {
+    if (known.model != lens.index() || used > known.coefficients) continue;
+    k.resize(known.coefficients);
+    result.model = known.name;
+    return result;
   }
-  if (const auto* fisheye = std::get_if<KannalaBrandt>(&model))
-    return Spoken{"equidistant", {}, all(fisheye->k)};
   return std::nullopt;
 }
 
-SpokenLens in_opencv(const LensModel& model) {
-  if (std::holds_alternative<Pinhole>(model)) return Spoken{"", {}, {0, 0, 0, 0, 0}};
-  if (const auto* brown = std::get_if<BrownConrady>(&model)) {
-    for (const std::size_t count : {4u, 5u, 8u, 12u, 14u})
-      if (used(*brown) <= count) return Spoken{"", {}, first(*brown, count)};
-  }
-  if (const auto* fisheye = std::get_if<KannalaBrandt>(&model))
-    return Spoken{"fisheye_model", {1}, all(fisheye->k)};
-  if (const auto* mei = std::get_if<Mei>(&model)) return Spoken{"xi", {mei->xi}, all(mei->k)};
-  return std::nullopt;
-}
-
-SpokenLens in_kalibr(const LensModel& model) {
-  const PixelScale* scale = scale_of(model);
-  if (!scale) return std::nullopt;
-  const glm::dvec2 f = scale->focal_px, c = scale->centre_px;
-  if (std::holds_alternative<Pinhole>(model)) return Spoken{"pinhole", {f.x, f.y, c.x, c.y}, {}};
-  if (const auto* brown = std::get_if<BrownConrady>(&model); brown && used(*brown) <= 4)
-    return Spoken{"pinhole", {f.x, f.y, c.x, c.y}, first(*brown, 4)};
-  if (const auto* fisheye = std::get_if<KannalaBrandt>(&model))
-    return Spoken{"pinhole", {f.x, f.y, c.x, c.y}, all(fisheye->k)};
-  if (const auto* mei = std::get_if<Mei>(&model))
-    return Spoken{"omni", {mei->xi, f.x, f.y, c.x, c.y}, all(mei->k)};
-  if (const auto* eucm = std::get_if<Eucm>(&model))
-    return Spoken{"eucm", {eucm->alpha, eucm->beta, f.x, f.y, c.x, c.y}, {}};
-  if (const auto* sphere = std::get_if<DoubleSphere>(&model))
-    return Spoken{"ds", {sphere->xi, sphere->alpha, f.x, f.y, c.x, c.y}, {}};
-  return std::nullopt;
-}
-
-SpokenLens in_colmap(const LensModel& model) {
-  if (const auto* all_round = std::get_if<Equirectangular>(&model))
-    return Spoken{"EQUIRECTANGULAR", {all_round->size_px.x, all_round->size_px.y}, {}};
-  const PixelScale* scale = scale_of(model);
-  if (!scale) return std::nullopt;
-  const glm::dvec2 c = scale->centre_px + 0.5;
-  const std::vector<double> pinhole{scale->focal_px.x, scale->focal_px.y, c.x, c.y};
-  if (std::holds_alternative<Pinhole>(model)) return Spoken{"PINHOLE", pinhole, {}};
-  if (const auto* brown = std::get_if<BrownConrady>(&model)) {
-    if (used(*brown) <= 4) return Spoken{"OPENCV", pinhole, first(*brown, 4)};
-    if (used(*brown) <= 8) return Spoken{"FULL_OPENCV", pinhole, first(*brown, 8)};
-  }
-  if (const auto* fisheye = std::get_if<KannalaBrandt>(&model))
-    return Spoken{"OPENCV_FISHEYE", pinhole, all(fisheye->k)};
-  if (const auto* eucm = std::get_if<Eucm>(&model))
-    return Spoken{"EUCM", pinhole, {eucm->alpha, eucm->beta}};
-  return std::nullopt;
-}
-
-SpokenLens in_basalt(const LensModel& model) {
-  const PixelScale* scale = scale_of(model);
-  if (!scale) return std::nullopt;
-  const std::vector<double> pinhole{scale->focal_px.x, scale->focal_px.y, scale->centre_px.x,
-                                    scale->centre_px.y};
-  if (std::holds_alternative<Pinhole>(model)) return Spoken{"pinhole", pinhole, {}};
-  if (const auto* brown = std::get_if<BrownConrady>(&model); brown && used(*brown) <= 8)
-    return Spoken{"pinhole-radtan8", pinhole, first(*brown, 8)};
-  if (const auto* fisheye = std::get_if<KannalaBrandt>(&model))
-    return Spoken{"kb4", pinhole, all(fisheye->k)};
-  if (const auto* eucm = std::get_if<Eucm>(&model))
-    return Spoken{"eucm", pinhole, {eucm->alpha, eucm->beta}};
-  if (const auto* sphere = std::get_if<DoubleSphere>(&model))
-    return Spoken{"ds", pinhole, {sphere->xi, sphere->alpha}};
-  return std::nullopt;
-}
-
-struct Format {
-  const char* name;
-  SpokenLens (*say)(const LensModel& model);
-  const char* models;
-  // Contents that the format can represent: several cameras, X_IC, X_FC, time shift.
-  bool many = false, poses = false, relative_poses = false, shift = false;
-};
-
-Format format_of(CalibrationFormat format) {
-  constexpr const char* opencv_models =
-      "a pinhole, all of Brown and Conrady, Kannala and Brandt, Mei";
-  switch (format) {
-    case CalibrationFormat::RosYaml:
-      return {"ROS", in_ros,
-              "a pinhole, the first 8 coefficients of Brown and Conrady, Kannala and Brandt"};
-    case CalibrationFormat::OpenCvYaml:
-    case CalibrationFormat::OpenCvXml:
-      return {"OpenCV", in_opencv, opencv_models};
-    case CalibrationFormat::KalibrYaml:
-      return {"Kalibr",
-              in_kalibr,
-              "a pinhole, k1 k2 p1 p2 of Brown and Conrady, Kannala and Brandt, Mei, EUCM, double "
-              "sphere",
-              true,
-              true,
-              true,
-              true};
-    case CalibrationFormat::ColmapText:
-      return {"COLMAP", in_colmap,
-              "a pinhole, the first 8 coefficients of Brown and Conrady, Kannala and Brandt, EUCM, "
-              "equirectangular",
-              true};
-    case CalibrationFormat::BasaltJson:
-      break;
-  }
-  return {"basalt", in_basalt,
-          "a pinhole, the first 8 coefficients of Brown and Conrady, Kannala and Brandt, EUCM, "
-          "double sphere",
-          true, true};
+std::vector<double> joined(std::vector<double> values, const std::vector<double>& more) {
+  values.insert(values.end(), more.begin(), more.end());
+  return values;
 }
 
 void check_calibrations(std::span<const CameraCalibration> cameras, CalibrationFormat kind) {
-  const Format format = format_of(kind);
+  const Format& format = format_of(kind);
   Violations broken(fmt::format("cameras to write for {}", format.name));
   broken.unless(!cameras.empty(), "there must be at least one");
   broken.unless(format.many || cameras.size() <= 1, "a file contains one camera, not {}",
                 cameras.size());
   for (const CameraCalibration& camera : cameras) {
     const PixelScale* scale = scale_of(camera.model);
-    const bool keeps_skew = format.say == in_opencv && std::holds_alternative<Mei>(camera.model);
-    broken.unless(format.say(camera.model).has_value(), "{}: its lens is not supported, only {}",
-                  camera.name, format.models);
+    const bool keeps_skew =
+        format.models.data() == opencv_models && std::holds_alternative<Mei>(camera.model);
+    broken.unless(lens_in(kind, camera.model).has_value(), "{}: its lens is not supported, only {}",
+                  camera.name, format.supported);
     broken.unless(!scale || scale->skew == 0 || keeps_skew, "{}: its skew is not supported",
                   camera.name);
     broken.unless(camera.size_px.x > 0 && camera.size_px.y > 0, "{}: its size_px is missing",
@@ -233,7 +207,7 @@ std::array<double, 9> matrix_of(const PixelScale& s) {
 
 std::string ros_text(const CameraCalibration& camera) {
   const PixelScale& s = *scale_of(camera.model);
-  const Spoken lens = *in_ros(camera.model);
+  const FormatLens lens = *lens_in(CalibrationFormat::RosYaml, camera.model);
   const Rectification rectified = camera.rectification.value_or(Rectification{.scale = s});
   const glm::dvec2 f = rectified.scale.focal_px, c = rectified.scale.centre_px;
   const std::array<double, 12> projection{
@@ -250,40 +224,47 @@ std::string ros_text(const CameraCalibration& camera) {
       reals(matrix_of(glm::mat3_cast(rectified.R_RC))), reals(projection));
 }
 
-std::string opencv_yaml(const CameraCalibration& camera) {
-  const Spoken lens = *in_opencv(camera.model);
-  const auto matrix = [](const char* name, std::size_t rows, std::size_t columns,
-                         std::span<const double> data) {
-    return fmt::format("{}: !!opencv-matrix\n   rows: {}\n   cols: {}\n   dt: d\n   data: [ {} ]\n",
-                       name, rows, columns, reals(data));
-  };
-  return fmt::format("%YAML:1.0\n---\nimage_width: {}\nimage_height: {}\n", camera.size_px.x,
-                     camera.size_px.y) +
-         (lens.model.empty() ? ""
-                             : fmt::format("{}: {}\n", lens.model,
-                                           lens.model == "xi" ? real(lens.intrinsics[0]) : "1")) +
-         matrix("camera_matrix", 3, 3, matrix_of(*scale_of(camera.model))) +
+// Returns the file of a camera in OpenCV's terms.
+// @param entry  returns the text of a number with its name.
+// @param matrix  returns the text of a matrix: name, rows, columns and data.
+template <typename Entry, typename Matrix>
+std::string opencv_text(const CameraCalibration& camera, const Entry& entry, const Matrix& matrix) {
+  const FormatLens lens = *lens_in(CalibrationFormat::OpenCvYaml, camera.model);
+  std::string text = entry("image_width", fmt::format("{}", camera.size_px.x)) +
+                     entry("image_height", fmt::format("{}", camera.size_px.y));
+  if (!lens.model.empty())
+    text += entry(lens.model, lens.model == "xi" ? real(lens.shape[0]) : "1");
+  return text + matrix("camera_matrix", 3, 3, matrix_of(*scale_of(camera.model))) +
          matrix("distortion_coefficients", 1, lens.coefficients.size(), lens.coefficients);
 }
 
+std::string opencv_yaml(const CameraCalibration& camera) {
+  return "%YAML:1.0\n---\n" +
+         opencv_text(
+             camera,
+             [](std::string_view name, const std::string& value) {
+               return fmt::format("{}: {}\n", name, value);
+             },
+             [](const char* name, int rows, std::size_t columns, std::span<const double> data) {
+               return fmt::format(
+                   "{}: !!opencv-matrix\n   rows: {}\n   cols: {}\n   dt: d\n   data: [ {} ]\n",
+                   name, rows, columns, reals(data));
+             });
+}
+
 std::string opencv_xml(const CameraCalibration& camera) {
-  const Spoken lens = *in_opencv(camera.model);
-  const auto matrix = [](const char* name, std::size_t rows, std::size_t columns,
-                         std::span<const double> data) {
-    return fmt::format(
-        "<{0} type_id=\"opencv-matrix\">\n  <rows>{1}</rows>\n  <cols>{2}</cols>\n  <dt>d</dt>\n"
-        "  <data>\n    {3}</data></{0}>\n",
-        name, rows, columns, reals(data, " "));
-  };
-  return fmt::format(
-             "<?xml version=\"1.0\"?>\n<opencv_storage>\n<image_width>{}</image_width>\n"
-             "<image_height>{}</image_height>\n",
-             camera.size_px.x, camera.size_px.y) +
-         (lens.model.empty() ? ""
-                             : fmt::format("<{0}>{1}</{0}>\n", lens.model,
-                                           lens.model == "xi" ? real(lens.intrinsics[0]) : "1")) +
-         matrix("camera_matrix", 3, 3, matrix_of(*scale_of(camera.model))) +
-         matrix("distortion_coefficients", 1, lens.coefficients.size(), lens.coefficients) +
+  return "<?xml version=\"1.0\"?>\n<opencv_storage>\n" +
+         opencv_text(
+             camera,
+             [](std::string_view name, const std::string& value) {
+               return fmt::format("<{0}>{1}</{0}>\n", name, value);
+             },
+             [](const char* name, int rows, std::size_t columns, std::span<const double> data) {
+               return fmt::format(
+                   "<{0} type_id=\"opencv-matrix\">\n  <rows>{1}</rows>\n  <cols>{2}</cols>\n"
+                   "  <dt>d</dt>\n  <data>\n    {3}</data></{0}>\n",
+                   name, rows, columns, reals(data, " "));
+             }) +
          "</opencv_storage>\n";
 }
 
@@ -300,12 +281,12 @@ std::string kalibr_text(std::span<const CameraCalibration> cameras) {
   std::string text;
   for (std::size_t i = 0; i < cameras.size(); ++i) {
     const CameraCalibration& camera = cameras[i];
-    const Spoken lens = *in_kalibr(camera.model);
+    const FormatLens lens = *lens_in(CalibrationFormat::KalibrYaml, camera.model);
     const bool fisheye = std::holds_alternative<KannalaBrandt>(camera.model);
     text += fmt::format(
         "cam{}:\n  camera_model: {}\n  intrinsics: [{}]\n  distortion_model: {}\n"
         "  distortion_coeffs: [{}]\n  resolution: [{}, {}]\n",
-        i, lens.model, reals(lens.intrinsics),
+        i, lens.model, reals(joined(lens.shape, lens.pinhole)),
         lens.coefficients.empty() ? "none" : (fisheye ? "equidistant" : "radtan"),
         reals(lens.coefficients), camera.size_px.x, camera.size_px.y);
     if (camera.X_IC) text += "  T_cam_imu:\n" + rows_of(inverse(*camera.X_IC));
@@ -320,13 +301,14 @@ std::string kalibr_text(std::span<const CameraCalibration> cameras) {
 std::string colmap_text(std::span<const CameraCalibration> cameras) {
   std::string text = "# CAMERA_ID MODEL WIDTH HEIGHT PARAMS[]\n";
   for (std::size_t i = 0; i < cameras.size(); ++i) {
-    Spoken lens = *in_colmap(cameras[i].model);
+    const FormatLens lens = *lens_in(CalibrationFormat::ColmapText, cameras[i].model);
     const glm::ivec2 size_px = cameras[i].size_px;
-    if (lens.model == "EQUIRECTANGULAR") lens.intrinsics = {1.0 * size_px.x, 1.0 * size_px.y};
-    std::ranges::copy(lens.coefficients, std::back_inserter(lens.intrinsics));
+    std::vector<double> parameters = joined(joined(lens.pinhole, lens.coefficients), lens.shape);
+    if (lens.pinhole.empty()) parameters = {1.0 * size_px.x, 1.0 * size_px.y};
+    for (std::size_t k = 2; k < lens.pinhole.size(); ++k) parameters[k] += 0.5;
     const bool numbered = number_of<unsigned>(cameras[i].name).has_value();
     text += fmt::format("{} {} {} {} {}\n", numbered ? cameras[i].name : fmt::format("{}", i + 1),
-                        lens.model, size_px.x, size_px.y, reals(lens.intrinsics, " "));
+                        lens.model, size_px.x, size_px.y, reals(parameters, " "));
   }
   return text;
 }
@@ -334,13 +316,12 @@ std::string colmap_text(std::span<const CameraCalibration> cameras) {
 std::string basalt_text(std::span<const CameraCalibration> cameras) {
   std::vector<std::string> poses, lenses, sizes;
   for (const CameraCalibration& camera : cameras) {
-    const Spoken lens = *in_basalt(camera.model);
+    const FormatLens lens = *lens_in(CalibrationFormat::BasaltJson, camera.model);
     std::vector<std::string_view> keys{"fx", "fy", "cx", "cy"};
-    std::vector<double> values = lens.intrinsics;
+    std::vector<double> values = joined(joined(lens.pinhole, lens.shape), lens.coefficients);
     if (lens.model == "ds") keys.insert(keys.end(), {"xi", "alpha"});
     if (lens.model == "eucm") keys.insert(keys.end(), {"alpha", "beta"});
     if (lens.model == "kb4") keys.insert(keys.end(), {"k1", "k2", "k3", "k4"});
-    std::ranges::copy(lens.coefficients, std::back_inserter(values));
     if (lens.model == "pinhole-radtan8") {
       keys.insert(keys.end(), {"k1", "k2", "p1", "p2", "k3", "k4", "k5", "k6", "rpmax"});
       // Radius of the first fold.

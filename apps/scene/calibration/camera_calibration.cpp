@@ -5,96 +5,67 @@
 #include <tinyxml2.h>
 
 #include <algorithm>
-#include <array>
 #include <cmath>
 #include <cstddef>
-#include <functional>
+#include <iterator>
 
-#include "apps/scene/calibration/calibration_fields.h"
 #include "apps/scene/calibration/calibration_reader.h"
 #include "apps/scene/yaml_reader.h"
 #include "core/error.h"
-#include "core/io/file_io.h"
 #include "core/io/text_lines.h"
 
 namespace groundray {
 namespace {
 
 namespace fs = std::filesystem;
+namespace calibration = yaml::calibration;
+namespace kind = yaml::calibration::kind;
 using yaml::Faults;
 using yaml::Node;
 
-// Model of COLMAP: the names of its parameters, and their conversion. COLMAP's first pixel centre
-// is 0.5, so its principal point is half a pixel larger than groundray's.
+// Model of COLMAP, with the names of its parameters.
 struct ColmapModel {
   std::string_view name;
   std::string_view parameters;
-  LensModel (*read)(const std::vector<double>& p);
+  std::size_t model;
+};
+// Source: COLMAP, src/colmap/sensor/models.
+constexpr ColmapModel colmap_models[] = {
+    {"SIMPLE_PINHOLE", "f cx cy", kind::pinhole},
+    {"PINHOLE", "fx fy cx cy", kind::pinhole},
+    {"SIMPLE_RADIAL", "f cx cy k", kind::brown_conrady},
+    {"RADIAL", "f cx cy k1 k2", kind::brown_conrady},
+    {"OPENCV", "fx fy cx cy k1 k2 p1 p2", kind::brown_conrady},
+    {"FULL_OPENCV", "fx fy cx cy k1 k2 p1 p2 k3 k4 k5 k6", kind::brown_conrady},
+    {"OPENCV_FISHEYE", "fx fy cx cy k1 k2 k3 k4", kind::kannala_brandt},
+    {"SIMPLE_RADIAL_FISHEYE", "f cx cy k", kind::kannala_brandt},
+    {"RADIAL_FISHEYE", "f cx cy k1 k2", kind::kannala_brandt},
+    {"SIMPLE_FISHEYE", "f cx cy", kind::kannala_brandt},
+    {"FISHEYE", "fx fy cx cy", kind::kannala_brandt},
+    {"EUCM", "fx fy cx cy alpha beta", kind::eucm},
+    {"EQUIRECTANGULAR", "w h", kind::equirectangular},
 };
 
-PixelScale one_focal(const std::vector<double>& p) {
-  return {{p[0], p[0]}, {p[1] - 0.5, p[2] - 0.5}, 0};
+// COLMAP's first pixel centre is 0.5, so its principal point is half a pixel larger than
+// groundray's.
+LensModel colmap_lens(const ColmapModel& model, const std::vector<double>& p) {
+  if (model.model == kind::equirectangular) return Equirectangular{{p[0], p[1]}};
+  const std::size_t centre = model.parameters.starts_with("f ") ? 1 : 2;
+  const PixelScale scale{{p[0], p[centre - 1]}, {p[centre] - 0.5, p[centre + 1] - 0.5}, 0};
+  const std::vector<double> k(p.begin() + static_cast<std::ptrdiff_t>(centre) + 2, p.end());
+  if (model.model == kind::pinhole) return Pinhole{scale};
+  if (model.model == kind::eucm) return Eucm{scale, k[0], k[1]};
+  if (model.model == kind::brown_conrady) return calibration::brown_conrady(scale, k);
+  return KannalaBrandt{scale, calibration::four_of(k)};
 }
-PixelScale two_focals(const std::vector<double>& p) {
-  return {{p[0], p[1]}, {p[2] - 0.5, p[3] - 0.5}, 0};
-}
-
-// Source: COLMAP, src/colmap/sensor/models.
-using P = const std::vector<double>&;
-constexpr std::array<ColmapModel, 13> colmap_models{{
-    {"SIMPLE_PINHOLE", "f cx cy", [](P p) { return LensModel(Pinhole{one_focal(p)}); }},
-    {"PINHOLE", "fx fy cx cy", [](P p) { return LensModel(Pinhole{two_focals(p)}); }},
-    {"SIMPLE_RADIAL", "f cx cy k",
-     [](P p) { return calibration::brown_conrady(one_focal(p), {p[3]}); }},
-    {"RADIAL", "f cx cy k1 k2",
-     [](P p) {
-       return calibration::brown_conrady(one_focal(p), {p[3], p[4]});
-     }},
-    {"OPENCV", "fx fy cx cy k1 k2 p1 p2",
-     [](P p) {
-       return calibration::brown_conrady(two_focals(p), {p.begin() + 4, p.end()});
-     }},
-    {"FULL_OPENCV", "fx fy cx cy k1 k2 p1 p2 k3 k4 k5 k6",
-     [](P p) {
-       return calibration::brown_conrady(two_focals(p), {p.begin() + 4, p.end()});
-     }},
-    {"OPENCV_FISHEYE", "fx fy cx cy k1 k2 k3 k4",
-     [](P p) {
-       return LensModel(KannalaBrandt{two_focals(p), {p[4], p[5], p[6], p[7]}});
-     }},
-    {"SIMPLE_RADIAL_FISHEYE", "f cx cy k",
-     [](P p) {
-       return LensModel(KannalaBrandt{one_focal(p), {p[3]}});
-     }},
-    {"RADIAL_FISHEYE", "f cx cy k1 k2",
-     [](P p) {
-       return LensModel(KannalaBrandt{one_focal(p), {p[3], p[4]}});
-     }},
-    {"SIMPLE_FISHEYE", "f cx cy",
-     [](P p) {
-       return LensModel(KannalaBrandt{one_focal(p), {}});
-     }},
-    {"FISHEYE", "fx fy cx cy",
-     [](P p) {
-       return LensModel(KannalaBrandt{two_focals(p), {}});
-     }},
-    {"EUCM", "fx fy cx cy alpha beta",
-     [](P p) {
-       return LensModel(Eucm{two_focals(p), p[4], p[5]});
-     }},
-    {"EQUIRECTANGULAR", "w h",
-     [](P p) {
-       return LensModel(Equirectangular{{p[0], p[1]}});
-     }},
-}};
 
 // Reads a line of cameras.txt: number, model, width, height, parameters.
 void read_colmap_line(const std::vector<std::string_view>& words, const Node& at,
                       std::vector<CameraCalibration>& cameras, Faults& faults) {
-  const auto model = words.size() < 2
-                         ? colmap_models.end()
-                         : std::ranges::find(colmap_models, words[1], &ColmapModel::name);
-  if (model == colmap_models.end()) {
+  const auto* const model = words.size() < 2
+                                ? std::end(colmap_models)
+                                : std::ranges::find(colmap_models, words[1], &ColmapModel::name);
+  if (model == std::end(colmap_models)) {
     std::vector<std::string> names;
     for (const ColmapModel& known : colmap_models) names.emplace_back(known.name);
     const std::string word(words.size() < 2 ? "" : words[1]);
@@ -118,7 +89,7 @@ void read_colmap_line(const std::vector<std::string_view>& words, const Node& at
         glm::dvec2(camera.size_px) == glm::dvec2(numbers[0], numbers[1])))
     return faults.add(at, "", "the size {} x {} must be whole numbers of pixels", numbers[0],
                       numbers[1]);
-  camera.model = model->read({numbers.begin() + 2, numbers.end()});
+  camera.model = colmap_lens(*model, {numbers.begin() + 2, numbers.end()});
   calibration::check(camera.model, at, faults);
   cameras.push_back(camera);
 }
@@ -221,11 +192,6 @@ std::vector<CameraCalibration> parse_camera_calibrations(std::string_view text,
 
 std::vector<CameraCalibration> load_camera_calibrations(const fs::path& path) {
   return parse_camera_calibrations(yaml::read_file(path), path);
-}
-
-void write_camera_calibrations(const fs::path& path, std::span<const CameraCalibration> cameras,
-                               CalibrationFormat format) {
-  write_text(path, camera_calibrations_text(cameras, format));
 }
 
 }  // namespace groundray

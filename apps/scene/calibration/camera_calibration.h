@@ -61,10 +61,4 @@ std::vector<CameraCalibration> parse_camera_calibrations(std::string_view text,
 std::string camera_calibrations_text(std::span<const CameraCalibration> cameras,
                                      CalibrationFormat format);
 
-/// Writes camera_calibrations_text() as a whole file.
-/// @throws Error as camera_calibrations_text and write_text.
-void write_camera_calibrations(const std::filesystem::path& path,
-                               std::span<const CameraCalibration> cameras,
-                               CalibrationFormat format);
-
 }  // namespace groundray

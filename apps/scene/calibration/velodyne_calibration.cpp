@@ -9,7 +9,6 @@
 #include <utility>
 
 #include "apps/scene/calibration/calibration_io.h"
-#include "apps/scene/calibration/calibration_limits.h"
 #include "apps/scene/yaml_reader.h"
 #include "core/error.h"
 #include "core/io/file_io.h"
@@ -175,10 +174,6 @@ std::vector<Beam> parse_velodyne_xml(std::string_view text, const fs::path& path
 
 std::vector<Beam> load_velodyne_yaml(const fs::path& path) {
   return parse_velodyne_yaml(read_text(path), path);
-}
-
-std::vector<Beam> load_velodyne_xml(const fs::path& path) {
-  return parse_velodyne_xml(read_text(path), path);
 }
 
 }  // namespace groundray

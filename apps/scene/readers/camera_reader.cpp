@@ -1,5 +1,3 @@
-#include "apps/scene/readers/camera_reader.h"
-
 #include <fmt/ranges.h>
 
 #include <algorithm>
@@ -7,32 +5,18 @@
 #include <bit>
 #include <cmath>
 #include <cstdint>
-#include <glm/geometric.hpp>
 #include <limits>
-#include <string>
-#include <string_view>
 #include <utility>
-#include <vector>
 
-#include "apps/scene/readers/lens_reader.h"
+#include "apps/scene/readers/readers.h"
 #include "core/error.h"
 #include "core/image/image_io.h"
 #include "sensors/camera/camera.h"
 #include "sensors/camera/imager.h"
 #include "sensors/camera/lens/lens.h"
 
-namespace groundray {
+namespace groundray::yaml {
 namespace {
-
-namespace fs = std::filesystem;
-using yaml::Faults;
-using yaml::Map;
-using yaml::Need;
-using yaml::Node;
-using yaml::not_negative;
-using yaml::positive;
-using yaml::positive_share_rule;
-using yaml::Rule;
 
 constexpr Rule efficiency_rule{[](double value) { return value > 0 && value <= 4; },
                                "must be > 0 and at most 4"};
@@ -43,32 +27,12 @@ constexpr Rule exposure_rule{[](double value) { return value >= 1e-6 && value <=
 constexpr Rule row_rule{[](double value) { return value >= 0 && value <= 1e6; },
                         "must be from 0 to 1e6"};
 
-struct NamedProduct {
-  std::string_view name;
-  CameraProduct product;
-};
-constexpr std::array<NamedProduct, 12> all_products{{{"radiance", CameraProduct::Radiance},
-                                                     {"truth", CameraProduct::Truth},
-                                                     {"bound", CameraProduct::Bound},
-                                                     {"flow", CameraProduct::Flow},
-                                                     {"flow_flo", CameraProduct::FlowFlo},
-                                                     {"flow_kitti", CameraProduct::FlowKitti},
-                                                     {"coverage", CameraProduct::Coverage},
-                                                     {"irradiance", CameraProduct::Irradiance},
-                                                     {"photons", CameraProduct::Photons},
-                                                     {"electrons", CameraProduct::Electrons},
-                                                     {"raw", CameraProduct::Raw},
-                                                     {"picture", CameraProduct::Picture}}};
+// In the order of CameraProduct.
+constexpr std::array<std::string_view, 12> products{
+    "radiance", "truth",      "bound",   "flow",      "flow_flo", "flow_kitti",
+    "coverage", "irradiance", "photons", "electrons", "raw",      "picture"};
 
 constexpr bool is_of_imager(CameraProduct product) { return product >= CameraProduct::Irradiance; }
-
-// Reads three numbers; returns false and changes nothing if they are missing or invalid.
-bool read_triple(Map& map, std::string_view key, glm::dvec3& into, Rule rule) {
-  std::array<double, 3> triple{};
-  if (!map.read_numbers(key, Need::Optional, triple, rule)) return false;
-  into = {triple[0], triple[1], triple[2]};
-  return true;
-}
 
 void read_int(Map& map, std::string_view key, Need need, int& into, int low, int high,
               Faults& faults) {
@@ -93,13 +57,10 @@ void read_aperture(Map map, std::optional<ApertureSpec>& into) {
   ApertureSpec aperture = into.value_or(ApertureSpec{});
   map.read_number("f_number", need, aperture.f_number, positive);
   map.read_scaled("focal_length_mm", Need::Optional, 1e-3, aperture.focal_length_m, positive);
-  double focus_m = 0;
-  if (map.read_number("focus_m", Need::Optional, focus_m, positive)) aperture.focus_m = focus_m;
+  map.read_number("focus_m", Need::Optional, aperture.focus_m, positive);
   map.read_number("transmission", Need::Optional, aperture.transmission, positive_share_rule);
-  read_triple(map, "vignetting", aperture.vignetting, yaml::any_number);
-  using Pupil = ApertureSpec::Pupil;
-  map.read_choice<Pupil>("pupil", Need::Optional, aperture.pupil,
-                         {{"flat", Pupil::Flat}, {"turning", Pupil::Turning}});
+  map.read_vector("vignetting", Need::Optional, aperture.vignetting);
+  map.read_choice("pupil", Need::Optional, aperture.pupil, {"flat", "turning"});
   map.close();
   into = aperture;
 }
@@ -142,8 +103,8 @@ void read_efficiency(Map& map, Need need, glm::dvec3& into, Faults& faults) {
   const Node* const node = map.find(key, need);
   if (!node) return;
   if (node->kind == Node::Kind::List) {
-    read_triple(map, key, into, efficiency_rule);
-  } else if (const auto value = yaml::number(*node, key, efficiency_rule, faults)) {
+    map.read_vector(key, need, into, efficiency_rule);
+  } else if (const auto value = number(*node, key, efficiency_rule, faults)) {
     into = glm::dvec3(*value);
   }
 }
@@ -152,12 +113,7 @@ void read_imager(Map map, std::optional<ImagerSpec>& into, Faults& faults) {
   const Need need = into ? Need::Optional : Need::Required;
   ImagerSpec imager = into.value_or(ImagerSpec{});
   map.read_scaled("pixel_pitch_um", need, 1e-6, imager.pixel_pitch_m, positive);
-  map.read_choice<ColorFilter>("filter", need, imager.filter,
-                               {{"mono", ColorFilter::Mono},
-                                {"rggb", ColorFilter::Rggb},
-                                {"bggr", ColorFilter::Bggr},
-                                {"grbg", ColorFilter::Grbg},
-                                {"gbrg", ColorFilter::Gbrg}});
+  map.read_choice("filter", need, imager.filter, {"mono", "rggb", "bggr", "grbg", "gbrg"});
   read_efficiency(map, need, imager.quantum_efficiency, faults);
   map.read_number("full_well_e", need, imager.full_well_e, positive);
   map.read_number("read_noise_e", Need::Optional, imager.read_noise_e, not_negative);
@@ -176,9 +132,7 @@ void read_imager(Map map, std::optional<ImagerSpec>& into, Faults& faults) {
 }
 
 void read_picture(Map map, PictureSpec& picture, Faults& faults) {
-  using Encoding = PictureSpec::Encoding;
-  map.read_choice<Encoding>("encoding", Need::Optional, picture.encoding,
-                            {{"srgb", Encoding::Srgb}, {"linear", Encoding::Linear}});
+  map.read_choice("encoding", Need::Optional, picture.encoding, {"srgb", "linear"});
   std::uint8_t bits = 0;
   if (const Node* at = map.read_whole("bits", Need::Optional, bits)) {
     if (bits == 8 || bits == 16) {
@@ -188,7 +142,7 @@ void read_picture(Map map, PictureSpec& picture, Faults& faults) {
     }
   }
   glm::dvec3 gains(1);
-  if (read_triple(map, "gains", gains, positive)) picture.gains = gains;
+  if (map.read_vector("gains", Need::Optional, gains, positive)) picture.gains = gains;
   map.close();
 }
 
@@ -196,35 +150,34 @@ void read_products(Map& map, std::vector<CameraProduct>& into, Faults& faults) {
   constexpr std::string_view key = "products";
   const Node* const node = map.find(key, Need::Optional);
   if (!node) return;
-  std::vector<CameraProduct> products;
-  std::vector<std::string> words;
-  for (const NamedProduct& named : all_products) words.emplace_back(named.name);
+  std::vector<CameraProduct> chosen;
   for (const Node& item : map.list(key, Need::Optional)) {
-    if (!yaml::is_text(item, key, faults)) continue;
-    const auto* const named = std::ranges::find(all_products, item.text, &NamedProduct::name);
-    if (named == all_products.end()) {
-      faults.add(item, key, "has '{}', but may have {}{}", item.text, fmt::join(words, ", "),
-                 yaml::suggestion(item.text, words));
-    } else if (std::ranges::count(products, named->product) > 0) {
+    if (!is_text(item, key, faults)) continue;
+    const auto product =
+        static_cast<CameraProduct>(std::ranges::find(products, item.text) - products.begin());
+    if (static_cast<std::size_t>(product) == products.size()) {
+      faults.add(item, key, "has '{}', but may have {}{}", item.text, fmt::join(products, ", "),
+                 suggestion(item.text, {products.begin(), products.end()}));
+    } else if (std::ranges::count(chosen, product) > 0) {
       faults.add(item, key, "has '{}' twice", item.text);
     } else {
-      products.push_back(named->product);
+      chosen.push_back(product);
     }
   }
   if (node->kind == Node::Kind::List && node->items.empty())
     faults.add(*node, key, "is an empty list, but a camera needs at least one product");
-  into = std::move(products);
+  into = std::move(chosen);
 }
 
 // Reads the size of the image; by default, that of the calibration.
 glm::ivec2 read_size(Map& root, glm::ivec2 calibrated_px, Faults& faults) {
   constexpr std::string_view key = "size_px";
   const bool known = calibrated_px.x > 0 && calibrated_px.y > 0;
-  std::array<double, 2> pair{};
+  glm::dvec2 size(0);
   const Node* const at =
-      root.read_numbers(key, known ? Need::Optional : Need::Required, pair, positive);
+      root.read_vector(key, known ? Need::Optional : Need::Required, size, positive);
   if (!at) return calibrated_px;
-  const auto [width, height] = pair;
+  const double width = size.x, height = size.y;
   if (width != std::floor(width) || height != std::floor(height)) {
     faults.add(*at, key, "is [{}, {}], but must be whole numbers of pixels", width, height);
   } else if (width * height > static_cast<double>(most_image_pixels)) {
@@ -232,7 +185,7 @@ glm::ivec2 read_size(Map& root, glm::ivec2 calibrated_px, Faults& faults) {
                "is [{}, {}], but an image has at most {} pixels: the rays of this one alone would "
                "take {:.3g} GiB",
                width, height, most_image_pixels, width * height * sizeof(PixelRay) / 0x1p30);
-  } else if (known && glm::dvec2(width, height) != glm::dvec2(calibrated_px)) {
+  } else if (known && size != glm::dvec2(calibrated_px)) {
     faults.add(*at, key, "is [{}, {}], but the calibration is of images of {} x {}", width, height,
                calibrated_px.x, calibrated_px.y);
   } else {
@@ -258,15 +211,6 @@ void read_settings(Map& map, CameraSpec& camera, Faults& faults) {
   read_products(map, camera.products, faults);
 }
 
-// Returns the focal length of a pinhole whose pixel on the axis has the same solid angle; 0 if the
-// axis is not imaged.
-double focal_px(const Lens& lens) {
-  const auto centre = lens.project({0, 0, 1});
-  const auto ray = centre ? lens.ray(*centre) : std::nullopt;
-  if (!ray) return 0;
-  return 1 / std::sqrt(glm::length(glm::cross(ray->by_u, ray->by_v)));
-}
-
 }  // namespace
 
 CameraSpec read_camera(const Node& node, const fs::path& path, Faults& faults) {
@@ -276,18 +220,14 @@ CameraSpec read_camera(const Node& node, const fs::path& path, Faults& faults) {
     faults.add(*at, "groundray_lidar", "this is a lidar, not a camera: name it under 'lidars'");
     return camera;
   }
-  yaml::check_version(root, "groundray_camera", faults);
+  check_version(root, "groundray_camera", faults);
   root.read_text("model", Need::Required, camera.model);
   CameraFileLens lens;
   if (const Node* at = root.find("lens", Need::Required)) lens = read_lens(*at, path, faults);
   camera.lens = lens.model;
   camera.size_px = read_size(root, lens.size_px, faults);
   read_settings(root, camera, faults);
-  if (const Node* sources = root.find("sources", Need::Optional)) {
-    const Map texts(*sources, "sources", faults);
-    for (std::size_t i = 1; sources->kind == Node::Kind::Map && i < sources->items.size(); i += 2)
-      yaml::is_text(sources->items[i], sources->items[i - 1].text, faults);
-  }
+  check_sources(root, faults);
   root.close();
   return camera;
 }
@@ -312,9 +252,10 @@ void check_rate(const Node& node, const CameraSpec& camera, Faults& faults) {
 
 void complete_camera(const Node& node, CameraSpec& camera, Faults& faults) {
   const std::size_t before = faults.count();
-  for (const auto& [name, product] : all_products) {
+  for (std::size_t i = 0; i < products.size(); ++i) {
+    const auto product = static_cast<CameraProduct>(i);
     if (gives(camera, product) && is_of_imager(product) && !camera.imager)
-      faults.add(node, "products", "has '{}', which needs an 'imager'", name);
+      faults.add(node, "products", "has '{}', which needs an 'imager'", products[i]);
   }
   if (camera.imager && !camera.aperture)
     faults.add(node, "imager", "needs an 'aperture', which determines how much light arrives");
@@ -326,7 +267,7 @@ void complete_camera(const Node& node, CameraSpec& camera, Faults& faults) {
             "the aperture needs focal_length_mm, or an imager, whose pixel pitch determines it");
       }
       const Lens lens(camera.lens, camera.size_px);
-      camera.aperture->focal_length_m = focal_px(lens) * camera.imager->pixel_pitch_m;
+      camera.aperture->focal_length_m = lens.focal_px().value_or(0) * camera.imager->pixel_pitch_m;
     }
     const Camera works(camera);
     if (camera.imager) Imager(*camera.imager, camera.shutter.exposure_s);
@@ -335,4 +276,4 @@ void complete_camera(const Node& node, CameraSpec& camera, Faults& faults) {
   }
 }
 
-}  // namespace groundray
+}  // namespace groundray::yaml

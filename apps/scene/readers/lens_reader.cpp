@@ -1,138 +1,173 @@
-#include "apps/scene/readers/lens_reader.h"
-
 #include <fmt/ranges.h>
 
 #include <algorithm>
 #include <array>
 #include <cstddef>
 #include <initializer_list>
-#include <string>
-#include <string_view>
-#include <vector>
 
-#include "apps/scene/calibration/calibration_fields.h"
+#include "apps/scene/calibration/calibration_reader.h"
 #include "apps/scene/calibration/camera_calibration.h"
-#include "apps/scene/readers/pattern_reader.h"
+#include "apps/scene/readers/readers.h"
+#include "apps/scene/readers/spec_io.h"
 #include "core/error.h"
 
-namespace groundray {
+namespace groundray::yaml {
 namespace {
 
-namespace fs = std::filesystem;
-using yaml::Faults;
-using yaml::Map;
-using yaml::Need;
-using yaml::Node;
-using yaml::not_negative;
-using yaml::positive;
-using yaml::Rule;
-using yaml::share_rule;
+// Reads the keys of a lens model.
+class LensKeys {
+ public:
+  LensKeys(Map& map, Faults& faults) : map_(map), faults_(faults) {}
 
-glm::dvec2 read_required_pair(Map& map, std::string_view key, Rule rule) {
-  std::array<double, 2> pair{};
-  map.read_numbers(key, Need::Required, pair, rule);
-  return {pair[0], pair[1]};
-}
+  void scale(PixelScale& scale) {
+    pair("focal_px", scale.focal_px, positive);
+    pair("centre_px", scale.centre_px, any_number);
+    map_.read_number("skew", Need::Optional, scale.skew);
+  }
+  void number(std::string_view key, double& value, Rule rule) {
+    map_.read_number(key, Need::Required, value, rule);
+  }
+  void pair(std::string_view key, glm::dvec2& value, Rule rule) {
+    map_.read_vector(key, Need::Required, value, rule);
+  }
+  void linear(glm::dvec3& value) { map_.read_vector("linear", Need::Optional, value); }
+  void polynomial(FTheta::Polynomial& value) {
+    map_.read_choice("polynomial", Need::Required, value, {"angle_to_pixels", "pixels_to_angle"});
+  }
+  // Reads coefficients whose number must be among `counts`.
+  template <std::size_t n>
+  void coefficients(std::array<double, n>& k, Need need, std::initializer_list<std::size_t> counts,
+                    std::string_view order) {
+    std::ranges::copy(read_coefficients(need, counts, order), k.begin());
+  }
+  void coefficients(std::vector<double>& k, Need need, std::initializer_list<std::size_t> counts,
+                    std::string_view order) {
+    k = read_coefficients(need, counts, order);
+  }
 
-PixelScale read_scale(Map& map) {
-  PixelScale scale{read_required_pair(map, "focal_px", positive),
-                   read_required_pair(map, "centre_px", yaml::any_number)};
-  map.read_number("skew", Need::Optional, scale.skew);
-  return scale;
-}
-
-// Returns the coefficients if their number is among `counts`, or if that is empty; none at a fault.
-std::vector<double> read_coefficients(Map& map, Need need,
-                                      std::initializer_list<std::size_t> counts,
-                                      std::string_view order, Faults& faults) {
-  constexpr std::string_view key = "coefficients";
-  const Node* const node = map.find(key, need);
-  if (!node) return {};
-  if (node->kind != Node::Kind::List) {
-    faults.add(*node, key, "is {}, but must be a list: {}", yaml::shown(*node), order);
+ private:
+  // Returns none at a fault. Any number of coefficients is valid if `counts` is empty.
+  std::vector<double> read_coefficients(Need need, std::initializer_list<std::size_t> counts,
+                                        std::string_view order) {
+    constexpr std::string_view key = "coefficients";
+    const Node* const node = map_.find(key, need);
+    if (!node) return {};
+    if (node->kind != Node::Kind::List) {
+      faults_.add(*node, key, "is {}, but must be a list: {}", shown(*node), order);
+      return {};
+    }
+    std::vector<double> k = calibration::list_of(*node, key, faults_);
+    if (k.size() != node->items.size()) return {};  // one of them is not a number
+    if (counts.size() == 0 || std::ranges::count(counts, k.size()) > 0) return k;
+    faults_.add(*node, key, "has {} numbers, but its model has {}", k.size(), order);
     return {};
   }
-  std::vector<double> k = calibration::list_of(*node, key, faults);
-  if (k.size() != node->items.size()) return {};  // one of them is not a number
-  if (counts.size() == 0 || std::ranges::count(counts, k.size()) > 0) return k;
-  faults.add(*node, key, "has {} numbers, but its model has {}", k.size(), order);
-  return {};
-}
 
-LensModel read_pinhole(Map& map, Faults& /*faults*/) { return Pinhole{read_scale(map)}; }
+  Map& map_;
+  Faults& faults_;
+};
 
-LensModel read_brown_conrady(Map& map, Faults& faults) {
-  BrownConrady model{.scale = read_scale(map)};
-  const auto k = read_coefficients(
-      map, Need::Required, {4, 5, 8, 12, 14},
-      "k1 k2 p1 p2 [k3 [k4 k5 k6 [s1 s2 s3 s4 [tau_x tau_y]]]], so 4, 5, 8, 12 or 14", faults);
-  std::ranges::copy(k, model.k.begin());
+// Writes the keys of a lens model.
+class LensText {
+ public:
+  void scale(const PixelScale& scale) {
+    pair("focal_px", scale.focal_px);
+    pair("centre_px", scale.centre_px);
+    number("skew", scale.skew);
+  }
+  void number(std::string_view key, double value, Rule = any_number) {
+    keys_.push_back(fmt::format("{}: {}", key, value));
+  }
+  void pair(std::string_view key, const glm::dvec2& value, Rule = any_number) {
+    keys_.push_back(fmt::format("{}: [{}, {}]", key, value.x, value.y));
+  }
+  void linear(const glm::dvec3& value) {
+    keys_.push_back(fmt::format("linear: [{}, {}, {}]", value.x, value.y, value.z));
+  }
+  void polynomial(FTheta::Polynomial value) {
+    const bool from_angle = value == FTheta::Polynomial::AngleToPixels;
+    keys_.push_back(
+        fmt::format("polynomial: {}", from_angle ? "angle_to_pixels" : "pixels_to_angle"));
+  }
+  void coefficients(std::span<const double> k, Need, std::initializer_list<std::size_t>,
+                    std::string_view) {
+    keys_.push_back(fmt::format("coefficients: [{}]", fmt::join(k, ", ")));
+  }
+  std::string text(std::string_view name) const {
+    return fmt::format("{}: {{{}}}", name, fmt::join(keys_, ", "));
+  }
+
+ private:
+  std::vector<std::string> keys_;
+};
+
+// Lists the keys of each model, in the order in which they are written.
+template <typename Keys>
+struct ListKeys {
+  Keys& keys;
+
+  void operator()(Pinhole& lens) const { keys.scale(lens.scale); }
+  void operator()(BrownConrady& lens) const {
+    keys.scale(lens.scale);
+    keys.coefficients(
+        lens.k, Need::Required, {4, 5, 8, 12, 14},
+        "k1 k2 p1 p2 [k3 [k4 k5 k6 [s1 s2 s3 s4 [tau_x tau_y]]]], so 4, 5, 8, 12 or 14");
+  }
+  void operator()(KannalaBrandt& lens) const {
+    keys.scale(lens.scale);
+    keys.coefficients(lens.k, Need::Required, {4}, "4: k1 k2 k3 k4");
+  }
+  void operator()(FTheta& lens) const {
+    keys.pair("centre_px", lens.centre_px, any_number);
+    keys.polynomial(lens.direction);
+    keys.coefficients(lens.k, Need::Required, {}, "those of the first power, the second and so on");
+    keys.linear(lens.linear);
+  }
+  void operator()(Eucm& lens) const {
+    keys.scale(lens.scale);
+    keys.number("alpha", lens.alpha, share_rule);
+    keys.number("beta", lens.beta, positive);
+  }
+  void operator()(DoubleSphere& lens) const {
+    keys.scale(lens.scale);
+    keys.number("xi", lens.xi, any_number);
+    keys.number("alpha", lens.alpha, share_rule);
+  }
+  void operator()(Mei& lens) const {
+    keys.scale(lens.scale);
+    keys.number("xi", lens.xi, not_negative);
+    keys.coefficients(lens.k, Need::Optional, {4}, "4: k1 k2 p1 p2");
+  }
+  void operator()(Equirectangular& /*lens*/) const {}  // its size is set by Lens
+};
+
+template <typename Model>
+LensModel read_keys(LensKeys& keys) {
+  Model model;
+  ListKeys<LensKeys>{keys}(model);
   return model;
 }
 
-LensModel read_kannala_brandt(Map& map, Faults& faults) {
-  const PixelScale scale = read_scale(map);
-  return KannalaBrandt{scale, calibration::four_of(read_coefficients(map, Need::Required, {4},
-                                                                     "4: k1 k2 k3 k4", faults))};
-}
-
-LensModel read_f_theta(Map& map, Faults& faults) {
-  FTheta model{.centre_px = read_required_pair(map, "centre_px", yaml::any_number), .k = {}};
-  map.read_choice<FTheta::Polynomial>("polynomial", Need::Required, model.direction,
-                                      {{"angle_to_pixels", FTheta::Polynomial::AngleToPixels},
-                                       {"pixels_to_angle", FTheta::Polynomial::PixelsToAngle}});
-  model.k = read_coefficients(map, Need::Required, {},
-                              "those of the first power, the second and so on", faults);
-  std::array<double, 3> linear{1, 0, 0};
-  map.read_numbers("linear", Need::Optional, linear);
-  model.linear = {linear[0], linear[1], linear[2]};
+LensModel read_ucm(LensKeys& keys) {
+  Eucm model;
+  keys.scale(model.scale);
+  keys.number("alpha", model.alpha, share_rule);
   return model;
 }
-
-LensModel read_eucm(Map& map, Faults& /*faults*/) {
-  Eucm model{.scale = read_scale(map)};
-  map.read_number("alpha", Need::Required, model.alpha, share_rule);
-  map.read_number("beta", Need::Required, model.beta, positive);
-  return model;
-}
-
-LensModel read_ucm(Map& map, Faults& /*faults*/) {
-  Eucm model{.scale = read_scale(map)};
-  map.read_number("alpha", Need::Required, model.alpha, share_rule);
-  return model;
-}
-
-LensModel read_double_sphere(Map& map, Faults& /*faults*/) {
-  DoubleSphere model{.scale = read_scale(map)};
-  map.read_number("xi", Need::Required, model.xi);
-  map.read_number("alpha", Need::Required, model.alpha, share_rule);
-  return model;
-}
-
-LensModel read_mei(Map& map, Faults& faults) {
-  Mei model{.scale = read_scale(map)};
-  map.read_number("xi", Need::Required, model.xi, not_negative);
-  model.k =
-      calibration::four_of(read_coefficients(map, Need::Optional, {4}, "4: k1 k2 p1 p2", faults));
-  return model;
-}
-
-// The size is set by Lens.
-LensModel read_equirectangular(Map& /*map*/, Faults& /*faults*/) { return Equirectangular{}; }
 
 struct NamedModel {
   std::string_view name;
-  LensModel (*read)(Map& map, Faults& faults);
+  LensModel (*read)(LensKeys& keys);
 };
-constexpr std::array<NamedModel, 9> models{{{"pinhole", read_pinhole},
-                                            {"brown_conrady", read_brown_conrady},
-                                            {"kannala_brandt", read_kannala_brandt},
-                                            {"f_theta", read_f_theta},
-                                            {"eucm", read_eucm},
+constexpr std::array<NamedModel, 9> models{{{"pinhole", read_keys<Pinhole>},
+                                            {"brown_conrady", read_keys<BrownConrady>},
+                                            {"kannala_brandt", read_keys<KannalaBrandt>},
+                                            {"f_theta", read_keys<FTheta>},
+                                            {"eucm", read_keys<Eucm>},
                                             {"ucm", read_ucm},
-                                            {"double_sphere", read_double_sphere},
-                                            {"mei", read_mei},
-                                            {"equirectangular", read_equirectangular}}};
+                                            {"double_sphere", read_keys<DoubleSphere>},
+                                            {"mei", read_keys<Mei>},
+                                            {"equirectangular", read_keys<Equirectangular>}}};
 
 // Reads the one model of a map, and marks the names of all models as known keys.
 LensModel read_lens_model(Map& lens, Faults& faults) {
@@ -144,7 +179,8 @@ LensModel read_lens_model(Map& lens, Faults& faults) {
     auto map = lens.map(model.name, Need::Optional);
     if (!map) continue;
     found.push_back(model.name);
-    result = model.read(*map, faults);
+    LensKeys keys(*map, faults);
+    result = model.read(keys);
     map->close();
     Violations broken("its model");
     check_lens(result, broken);
@@ -166,7 +202,7 @@ LensModel read_lens_model(Map& lens, Faults& faults) {
 CameraFileLens read_calibrated(Map& lens, const Node& file, const fs::path& path, Faults& faults) {
   std::string name;
   const Node* const named = lens.read_text("camera", Need::Optional, name);
-  if (!yaml::is_text(file, "calibration", faults)) return {};
+  if (!is_text(file, "calibration", faults)) return {};
   try {
     const auto cameras = load_camera_calibrations(beside(path, file.text));
     std::vector<std::string> names;
@@ -177,7 +213,7 @@ CameraFileLens read_calibrated(Map& lens, const Node& file, const fs::path& path
     }
     if (named) {
       faults.add(*named, "camera", "is '{}', but the calibration has {}{}", name,
-                 fmt::join(names, ", "), yaml::suggestion(name, names));
+                 fmt::join(names, ", "), suggestion(name, names));
     } else {
       faults.add(file, "calibration", "has {} cameras: choose one with 'camera': {}",
                  cameras.size(), fmt::join(names, ", "));
@@ -201,6 +237,21 @@ CameraFileLens read_lens(const Node& node, const fs::path& path, Faults& faults)
   }
   lens.close();
   return result;
+}
+
+}  // namespace groundray::yaml
+
+namespace groundray {
+
+std::string lens_text(const LensModel& lens) {
+  return std::visit(
+      []<typename Model>(Model kind) {
+        yaml::LensText keys;
+        yaml::ListKeys<yaml::LensText>{keys}(kind);
+        LensModel (*const read)(yaml::LensKeys&) = yaml::read_keys<Model>;
+        return keys.text(std::ranges::find(yaml::models, read, &yaml::NamedModel::read)->name);
+      },
+      lens);
 }
 
 }  // namespace groundray

@@ -1,42 +1,21 @@
-#include "apps/scene/readers/lidar_reader.h"
-
 #include <algorithm>
-#include <array>
-#include <string>
 #include <utility>
 
 #include "apps/scene/calibration/calibration_io.h"
-#include "apps/scene/readers/pattern_reader.h"
+#include "apps/scene/readers/readers.h"
 #include "core/error.h"
 
-namespace groundray {
+namespace groundray::yaml {
 namespace {
 
-using yaml::at_least_one;
-using yaml::Faults;
-using yaml::Map;
-using yaml::Need;
-using yaml::Node;
-using yaml::not_negative;
-using yaml::positive;
-using yaml::positive_share_rule;
-using yaml::Rule;
-
-namespace fs = std::filesystem;
-
 void read_scaled_pair(Map& map, std::string_view key, double scale, glm::dvec2& into) {
-  std::array<double, 2> pair{};
-  if (map.read_numbers(key, Need::Optional, pair, not_negative))
-    into = glm::dvec2(pair[0], pair[1]) * scale;
+  glm::dvec2 pair(0);
+  if (map.read_vector(key, Need::Optional, pair, not_negative)) into = pair * scale;
 }
 
 void read_beam(Map beam, BeamSpec& spec) {
-  beam.read_choice<BeamSpec::Profile>(
-      "profile", Need::Optional, spec.profile,
-      {{"gaussian", BeamSpec::Profile::Gaussian}, {"top_hat", BeamSpec::Profile::TopHat}});
-  beam.read_choice<BeamSpec::Width>("width", Need::Optional, spec.width,
-                                    {{"fwhm", BeamSpec::Width::FullWidthHalfMaximum},
-                                     {"inverse_e_square", BeamSpec::Width::InverseESquare}});
+  beam.read_choice("profile", Need::Optional, spec.profile, {"gaussian", "top_hat"});
+  beam.read_choice("width", Need::Optional, spec.width, {"fwhm", "inverse_e_square"});
   read_scaled_pair(beam, "divergence_mrad", 1e-3, spec.divergence_rad);
   read_scaled_pair(beam, "aperture_mm", 1e-3, spec.aperture_m);
   std::uint32_t sub_rays = static_cast<std::uint32_t>(spec.sub_rays);
@@ -45,16 +24,14 @@ void read_beam(Map beam, BeamSpec& spec) {
   std::uint32_t most = static_cast<std::uint32_t>(spec.most_sub_rays);
   beam.read_whole("most_sub_rays", Need::Optional, most);
   spec.most_sub_rays = static_cast<int>(std::min(most, 1u << 20));
-  beam.read_choice<BeamSpec::Turn>(
-      "turn", Need::Optional, spec.turn,
-      {{"fixed", BeamSpec::Turn::Fixed}, {"each_pulse", BeamSpec::Turn::EachPulse}});
+  beam.read_choice("turn", Need::Optional, spec.turn, {"fixed", "each_pulse"});
   beam.close();
 }
 
 void read_pulse(Map& laser, PulseSpec& pulse, Faults& faults) {
   laser.read_scaled("pulse_fwhm_ns", Need::Optional, 1e-9, pulse.fwhm_s, positive);
   for (const Node& node : laser.list("pulse_shape", Need::Optional)) {
-    if (const auto value = yaml::number(node, "pulse_shape", not_negative, faults))
+    if (const auto value = number(node, "pulse_shape", not_negative, faults))
       pulse.shape.push_back(*value);
   }
   const Node* step =
@@ -81,9 +58,7 @@ void read_noise(Map map, LightSpec& light) {
                   positive_share_rule);
   map.read_number("excess_noise_factor", Need::Optional, noise.excess_noise_factor, at_least_one);
   map.read_number("false_alarm_rate_hz", Need::Optional, noise.false_alarm_rate_hz, not_negative);
-  double sun_w_m2_nm = 0;
-  if (map.read_number("sun_w_m2_nm", Need::Optional, sun_w_m2_nm, not_negative))
-    light.sun.irradiance_w_m2_nm = sun_w_m2_nm;
+  map.read_number("sun_w_m2_nm", Need::Optional, light.sun.irradiance_w_m2_nm, not_negative);
   map.read_number("filter_width_nm", Need::Optional, light.sun.filter_width_nm, not_negative);
   double field_of_view_rad = 0;
   map.read_scaled(
@@ -95,10 +70,8 @@ void read_noise(Map map, LightSpec& light) {
 }
 
 void read_intensity(Map& map, IntensitySpec& intensity) {
-  map.read_choice<IntensitySpec::Scale>("intensity", Need::Optional, intensity.scale,
-                                        {{"power", IntensitySpec::Scale::Power},
-                                         {"reflectance", IntensitySpec::Scale::Reflectance},
-                                         {"eight_bit", IntensitySpec::Scale::EightBit}});
+  map.read_choice("intensity", Need::Optional, intensity.scale,
+                  {"power", "reflectance", "eight_bit"});
   map.read_number("intensity_gain", Need::Optional, intensity.gain, positive);
   map.read_number("full_scale_reflectance", Need::Optional, intensity.full_scale_reflectance,
                   Rule{[](double value) { return value > 1; }, "must be > 1"});
@@ -111,23 +84,13 @@ void read_receiver(Map map, LightSpec& light) {
                   positive_share_rule);
   map.read_scaled("response_fwhm_ns", Need::Optional, 1e-9, receiver.response_fwhm_s);
   map.read_scaled("sample_interval_ns", Need::Optional, 1e-9, receiver.sample_interval_s);
-  using Timing = ReceiverSpec::Timing;
-  map.read_choice<Timing>("timing", Need::Optional, receiver.timing,
-                          {{"leading_edge", Timing::LeadingEdge},
-                           {"constant_fraction", Timing::ConstantFraction},
-                           {"peak", Timing::Peak},
-                           {"centre_of_gravity", Timing::CentreOfGravity}});
+  map.read_choice("timing", Need::Optional, receiver.timing,
+                  {"leading_edge", "constant_fraction", "peak", "centre_of_gravity"});
   map.read_number("threshold_w", Need::Optional, receiver.threshold_w, not_negative);
   map.read_number("fraction", Need::Optional, receiver.fraction,
                   Rule{[](double value) { return value > 0 && value < 1; }, "must be > 0 and < 1"});
-  using Returns = ReceiverSpec::Returns;
-  map.read_choice<Returns>("returns", Need::Optional, receiver.returns,
-                           {{"first", Returns::First},
-                            {"last", Returns::Last},
-                            {"strongest", Returns::Strongest},
-                            {"second", Returns::Second},
-                            {"dual", Returns::Dual},
-                            {"all", Returns::All}});
+  map.read_choice("returns", Need::Optional, receiver.returns,
+                  {"first", "last", "strongest", "second", "dual", "all"});
   auto most = static_cast<std::uint8_t>(receiver.most_returns);
   map.read_whole("most_returns", Need::Optional, most);
   receiver.most_returns = most;
@@ -135,9 +98,9 @@ void read_receiver(Map map, LightSpec& light) {
   map.read_number("saturation_w", Need::Optional, receiver.saturation_w, positive);
   map.read_number("calibrated_group_index", Need::Optional, receiver.calibrated_group_index,
                   at_least_one);
-  std::array<double, 2> overlap{};
-  if (map.read_numbers("overlap_m", Need::Optional, overlap, not_negative))
-    light.overlap = {overlap[0], overlap[1]};
+  glm::dvec2 overlap(0);
+  map.read_vector("overlap_m", Need::Optional, overlap, not_negative);
+  light.overlap = {overlap.x, overlap.y};
   map.read_scaled("range_step_mm", Need::Optional, 1e-3, light.range_step_m);
   read_intensity(map, light.intensity);
   if (auto noise = map.map("noise", Need::Optional)) read_noise(std::move(*noise), light);
@@ -167,7 +130,7 @@ void read_physics(Map& map, LidarSpec& lidar, Faults& faults) {
 LidarSpec read_lidar(const Node& node, const fs::path& path, Faults& faults) {
   LidarSpec lidar;
   Map root(node, "", faults);
-  yaml::check_version(root, "groundray_lidar", faults);
+  check_version(root, "groundray_lidar", faults);
   root.read_text("model", Need::Required, lidar.model);
   lidar.pattern = read_pattern(root, path, faults);
   if (auto gate = root.map("range_gate_m", Need::Optional)) {
@@ -179,12 +142,7 @@ LidarSpec read_lidar(const Node& node, const fs::path& path, Faults& faults) {
     gate->close();
   }
   read_physics(root, lidar, faults);
-  if (const Node* sources = root.find("sources", Need::Optional)) {
-    const Map texts(*sources, "sources", faults);
-    for (std::size_t i = 1; sources->kind == Node::Kind::Map && i < sources->items.size(); i += 2) {
-      yaml::is_text(sources->items[i], sources->items[i - 1].text, faults);
-    }
-  }
+  check_sources(root, faults);
   root.close();
   return lidar;
 }
@@ -207,27 +165,18 @@ void change_lidar(Map& entry, const fs::path& path, LidarSpec& lidar, Faults& fa
       faults.add(*at, "rate_hz", "applies to spinning heads only; edit the lidar's file instead");
     }
   }
-  std::array<double, 2> gate{};
-  if (const Node* at = entry.read_numbers("range_gate_m", Need::Optional, gate, not_negative)) {
-    if (gate[0] >= gate[1]) {
-      faults.add(*at, "range_gate_m", "[{}, {}] is empty: are near and far swapped?", gate[0],
-                 gate[1]);
-    }
-    lidar.gate = {gate[0], gate[1]};
+  glm::dvec2 gate(0);
+  if (const Node* at = entry.read_vector("range_gate_m", Need::Optional, gate, not_negative)) {
+    if (gate.x >= gate.y)
+      faults.add(*at, "range_gate_m", "[{}, {}] is empty: are near and far swapped?", gate.x,
+                 gate.y);
+    lidar.gate = {gate.x, gate.y};
   }
   read_physics(entry, lidar, faults);
-  entry.read_choice<LidarSpec::ErrorBound>(
-      "error_bound", Need::Optional, lidar.error_bound,
-      {{"omit", LidarSpec::ErrorBound::Omit}, {"report", LidarSpec::ErrorBound::Report}});
-  entry.read_choice<LidarSpec::NoReturns>(
-      "no_returns", Need::Optional, lidar.no_returns,
-      {{"omit", LidarSpec::NoReturns::Omit}, {"report", LidarSpec::NoReturns::Report}});
-  entry.read_choice<LidarSpec::WaveformOutput>(
-      "waveforms", Need::Optional, lidar.waveforms,
-      {{"omit", LidarSpec::WaveformOutput::Omit}, {"keep", LidarSpec::WaveformOutput::Keep}});
-  entry.read_choice<LidarSpec::Points>(
-      "points", Need::Optional, lidar.points,
-      {{"as_fired", LidarSpec::Points::AsFired}, {"at_stamp", LidarSpec::Points::AtStamp}});
+  entry.read_choice("error_bound", Need::Optional, lidar.error_bound, {"omit", "report"});
+  entry.read_choice("no_returns", Need::Optional, lidar.no_returns, {"omit", "report"});
+  entry.read_choice("waveforms", Need::Optional, lidar.waveforms, {"omit", "keep"});
+  entry.read_choice("points", Need::Optional, lidar.points, {"as_fired", "at_stamp"});
 }
 
-}  // namespace groundray
+}  // namespace groundray::yaml

@@ -1,41 +1,24 @@
-#include "apps/scene/readers/mount_reader.h"
-
 #include <fmt/ranges.h>
 
 #include <algorithm>
-#include <array>
 #include <glm/gtc/quaternion.hpp>
 #include <glm/trigonometric.hpp>
 #include <map>
-#include <span>
-#include <string>
-#include <string_view>
 #include <utility>
 
-#include "apps/scene/readers/camera_reader.h"
-#include "apps/scene/readers/lidar_reader.h"
-#include "apps/scene/readers/pattern_reader.h"
+#include "apps/scene/readers/readers.h"
 #include "apps/scene/readers/spec_io.h"
 #include "core/error.h"
 
-namespace groundray {
+namespace groundray::yaml {
 namespace {
-
-namespace fs = std::filesystem;
-using yaml::Faults;
-using yaml::Map;
-using yaml::Need;
-using yaml::Node;
-using yaml::not_negative;
 
 // Kinds of a scene's sensors and stereo pairs, by name.
 using SensorNames = std::map<std::string, std::string_view>;
 
 Pose read_mount(Map mount) {
   Pose X_BS;
-  std::array<double, 3> translation{};
-  mount.read_numbers("translation_m", Need::Optional, translation);
-  X_BS.translation_m = {translation[0], translation[1], translation[2]};
+  mount.read_vector("translation_m", Need::Optional, X_BS.translation_m);
   glm::dvec3 angles_deg(0);
   mount.read_number("yaw_deg", Need::Optional, angles_deg.x);
   mount.read_number("pitch_deg", Need::Optional, angles_deg.y);
@@ -61,7 +44,7 @@ std::string read_name(Map& entry, std::string_view kind, SensorNames& names, Fau
   if (!is_file_name(name)) {
     faults.add(*at, "name",
                "is {}, but is used in file names: use only letters, digits, '_' and '-'",
-               yaml::shown(*at));
+               shown(*at));
   }
   if (const auto [first, fresh] = names.emplace(name, kind); !fresh) {
     faults.add(entry.node(), "name", "'{}' is taken by an earlier {}: names must differ", name,
@@ -85,19 +68,18 @@ void read_source(Map& entry, std::string_view list, SensorKind kind, const fs::p
   const Node& node = preset ? *preset : *file;
   const std::string_view key = preset ? "preset" : "file";
   const std::string_view word = kind == SensorKind::Lidar ? "lidar" : "camera";
-  if (!yaml::is_text(node, key, faults)) return;
+  if (!is_text(node, key, faults)) return;
   mounted.source = node.text;
   try {
     const fs::path place = preset ? preset_folder / (node.text + ".yaml") : beside(path, node.text);
     // Presets of the other kind are reported by `read`.
     if (preset && (!is_file_name(node.text) || !fs::exists(place))) {
       const auto names = preset_names(preset_folder, kind);
-      faults.add(node, key, "{} is not in {}{}; it has {}", yaml::shown(node),
-                 preset_folder.string(), yaml::suggestion(node.text, names),
-                 fmt::join(names, ", "));
+      faults.add(node, key, "{} is not in {}{}; it has {}", shown(node), preset_folder.string(),
+                 suggestion(node.text, names), fmt::join(names, ", "));
       return;
     }
-    mounted.text = yaml::read_file(place);
+    mounted.text = read_file(place);
     read(place);
   } catch (const Error& fault) {
     faults.add(node, key, "the {} cannot be read:\n{}", word, fault.what());
@@ -125,17 +107,17 @@ Pose of_camera(const Pose& X_BS) {
 // Reads a text that names a sensor of the given kind.
 std::string read_reference(const Node& node, std::string_view key, std::string_view kind,
                            const SensorNames& names, Faults& faults) {
-  if (!yaml::is_text(node, key, faults)) return {};
+  if (!is_text(node, key, faults)) return {};
   const auto found = names.find(node.text);
   if (found != names.end() && found->second == kind) return node.text;
   std::vector<std::string> known;
   for (const auto& [name, its_kind] : names)
     if (its_kind == kind) known.push_back(name);
-  faults.add(node, key, "is {}, but the scene has {}{}{}", yaml::shown(node),
+  faults.add(node, key, "is {}, but the scene has {}{}{}", shown(node),
              known.empty() ? fmt::format("no {}", kind)
                            : fmt::format("the {}s {}", kind, fmt::join(known, ", ")),
              found == names.end() ? "" : fmt::format("; that is a {}", found->second),
-             yaml::suggestion(node.text, known));
+             suggestion(node.text, known));
   return {};
 }
 
@@ -165,7 +147,7 @@ MountedCamera read_mounted_camera(Map entry, const fs::path& path, const fs::pat
   const std::size_t before = faults.count();
   read_source(entry, "cameras", SensorKind::Camera, path, preset_folder, mounted, faults,
               [&](const fs::path& place) {
-                const Node node = yaml::parse(mounted.text, place);
+                const Node node = parse(mounted.text, place);
                 Faults of_file(place);
                 mounted.camera = read_camera(node, place, of_file);
                 of_file.throw_if_any();
@@ -220,9 +202,7 @@ StereoSpec read_stereo_pair(Map entry, std::span<const MountedCamera> cameras, S
                "first_ms, or the same trigger",
                pair.left, pair.right);
   }
-  using Images = StereoSpec::Images;
-  entry.read_choice<Images>("images", Need::Optional, pair.images,
-                            {{"as_mounted", Images::AsMounted}, {"rectified", Images::Rectified}});
+  entry.read_choice("images", Need::Optional, pair.images, {"as_mounted", "rectified"});
   entry.close();
   return pair;
 }
@@ -250,4 +230,4 @@ void read_sensors(Map& root, const fs::path& path, const fs::path& preset_folder
              is_list ? "is an empty list" : "missing");
 }
 
-}  // namespace groundray
+}  // namespace groundray::yaml

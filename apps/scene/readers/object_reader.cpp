@@ -1,27 +1,11 @@
-#include "apps/scene/readers/object_reader.h"
-
-#include <algorithm>
-#include <array>
-#include <cmath>
 #include <set>
 #include <utility>
 
-#include "apps/scene/readers/interval_reader.h"
-#include "apps/scene/readers/pattern_reader.h"
+#include "apps/scene/readers/readers.h"
 #include "core/error.h"
 
-namespace groundray {
+namespace groundray::yaml {
 namespace {
-
-namespace fs = std::filesystem;
-using yaml::any_number;
-using yaml::Faults;
-using yaml::Map;
-using yaml::Need;
-using yaml::Node;
-using yaml::not_negative;
-using yaml::positive;
-using yaml::Rule;
 
 // Common arguments of the readers below.
 struct Reading {
@@ -30,25 +14,20 @@ struct Reading {
   Faults& faults;
 };
 
-void read_option(Map& map, std::string_view key, std::optional<double>& into, Rule rule) {
-  double value = 0;
-  if (map.read_number(key, Need::Optional, value, rule)) into = value;
-}
-
 AssetSpec read_asset(Map& entry, const Node& name, Faults& faults) {
   AssetSpec asset;
-  if (!yaml::is_text(name, "asset", faults)) return asset;
+  if (!is_text(name, "asset", faults)) return asset;
   try {
     asset.kind = asset_kind(name.text);
   } catch (const Error& fault) {
     faults.add(name, "asset", "{}", fault.what());
   }
   const std::size_t before = faults.count();
-  read_option(entry, "size_m", asset.size_m, positive);
-  read_option(entry, "width_m", asset.width_m, positive);
-  read_option(entry, "sag_m", asset.sag_m, positive);
-  read_option(entry, "square_m", asset.square_m, positive);
-  read_option(entry, "leaf_area_index", asset.leaf_area_index, positive);
+  entry.read_number("size_m", Need::Optional, asset.size_m, positive);
+  entry.read_number("width_m", Need::Optional, asset.width_m, positive);
+  entry.read_number("sag_m", Need::Optional, asset.sag_m, positive);
+  entry.read_number("square_m", Need::Optional, asset.square_m, positive);
+  entry.read_number("leaf_area_index", Need::Optional, asset.leaf_area_index, positive);
   entry.read_whole("variant", Need::Optional, asset.seed.value);
   entry.read_number("detail", Need::Optional, asset.detail, positive);
   if (faults.count() > before) return asset;
@@ -62,8 +41,7 @@ AssetSpec read_asset(Map& entry, const Node& name, Faults& faults) {
 
 DisplacementSource read_displacement(Map map, const Reading& with) {
   DisplacementSource displacement;
-  std::string image;
-  if (map.read_text("image", Need::Required, image)) displacement.image = beside(with.path, image);
+  read_path(map, "image", Need::Required, with.path, displacement.image);
   map.read_number("amplitude_m", Need::Required, displacement.amplitude_m, positive);
   map.read_number("middle", Need::Optional, displacement.middle);
   map.read_number("cell_m", Need::Required, displacement.cell_m, positive);
@@ -73,14 +51,11 @@ DisplacementSource read_displacement(Map map, const Reading& with) {
 
 ModelSource read_file_source(Map& entry, const Node& file, const Reading& with) {
   ModelSource source;
-  if (yaml::is_text(file, "model", with.faults)) source.file = beside(with.path, file.text);
-  read_option(entry, "metres_per_unit", source.options.metres_per_unit, positive);
+  if (is_text(file, "model", with.faults)) source.file = beside(with.path, file.text);
+  entry.read_number("metres_per_unit", Need::Optional, source.options.metres_per_unit, positive);
   UpAxis up = UpAxis::Z;
-  if (entry.read_choice<UpAxis>("up", Need::Optional, up,
-                                {{"x", UpAxis::X}, {"y", UpAxis::Y}, {"z", UpAxis::Z}}))
-    source.options.up = up;
-  entry.read_choice<BrokenParts>("broken", Need::Optional, source.options.broken,
-                                 {{"refuse", BrokenParts::Refuse}, {"drop", BrokenParts::Drop}});
+  if (entry.read_choice("up", Need::Optional, up, {"x", "y", "z"})) source.options.up = up;
+  entry.read_choice("broken", Need::Optional, source.options.broken, {"refuse", "drop"});
   if (auto map = entry.map("displacement", Need::Optional))
     source.displacement = read_displacement(std::move(*map), with);
   return source;
@@ -114,21 +89,34 @@ ModelSpec read_model_spec(Map& entry, const Reading& with) {
 }
 
 void read_stance(Map& entry, Stance& stance) {
-  entry.read_choice<Stance>("stance", Need::Optional, stance,
-                            {{"upright", Stance::Upright}, {"on_slope", Stance::OnSlope}});
+  entry.read_choice("stance", Need::Optional, stance, {"upright", "on_slope"});
 }
 
 StandingObject read_standing(Map& entry) {
   StandingObject place;
-  std::array<double, 2> at_m{};
-  entry.read_numbers("at_m", Need::Required, at_m);
-  place.at_m = {at_m[0], at_m[1]};
-  read_option(entry, "height_m", place.height_m, any_number);
+  entry.read_vector("at_m", Need::Required, place.at_m);
+  entry.read_number("height_m", Need::Optional, place.height_m, any_number);
   entry.read_number("yaw_deg", Need::Optional, place.yaw_deg);
   entry.read_number("pitch_deg", Need::Optional, place.pitch_deg);
   entry.read_number("roll_deg", Need::Optional, place.roll_deg);
   read_stance(entry, place.stance);
   return place;
+}
+
+// Reads the map `drive` of a platform or object.
+DrivenPath read_drive(Map drive, Faults& faults) {
+  DrivenPath path;
+  const auto waypoints = drive.list("waypoints_m", Need::Required);
+  path.waypoints_m = read_points(waypoints, "waypoints_m", faults);
+  if (const Node* at = drive.find("waypoints_m", Need::Optional); at && waypoints.size() < 2) {
+    faults.add(*at, "waypoints_m", "has {} points, but a drive needs at least two",
+               waypoints.size());
+  }
+  drive.read_number("speed_m_s", Need::Required, path.speed_m_s, positive);
+  drive.read_number("height_m", Need::Required, path.height_m, not_negative);
+  drive.read_vector("footprint_m", Need::Optional, path.footprint_m, positive);
+  drive.close();
+  return path;
 }
 
 std::variant<StandingObject, RecordedPath, DrivenPath> read_place(Map& entry, const Reading& with) {
@@ -147,11 +135,7 @@ Clearing read_clearing(Map entry, Faults& faults) {
   const bool is_line = entry.find("line_m", Need::Optional) != nullptr;
   const std::string_view key = is_line ? "line_m" : "polygon_m";
   if (!is_line) clearing.shape = Clearing::Shape::Polygon;
-  for (const Node& point : entry.list(key, Need::Required)) {
-    std::array<double, 2> p{};
-    if (yaml::numbers(point, key, p, any_number, faults))
-      clearing.points_D.emplace_back(p[0], p[1]);
-  }
+  clearing.points_D = read_points(entry.list(key, Need::Required), key, faults);
   entry.read_number("half_width_m", is_line ? Need::Required : Need::Optional,
                     clearing.half_width_m, not_negative);
   entry.close();
@@ -179,16 +163,14 @@ ScatterLayer read_scatter_layer(Map entry, const Reading& with) {
   entry.read_whole("label", Need::Required, layer.label);
   read_models(entry, layer, with);
   entry.read_number("density_per_m2", Need::Required, layer.density_per_m2, not_negative);
-  std::string map;
-  if (entry.read_text("density_map", Need::Optional, map))
-    layer.density_map = beside(with.path, map);
-  read_option(entry, "nodata", layer.nodata, any_number);
+  read_path(entry, "density_map", Need::Optional, with.path, layer.density_map);
+  entry.read_number("nodata", Need::Optional, layer.nodata, any_number);
   ScatterSpec& scatter = layer.scatter;
   entry.read_number("min_distance_m", Need::Optional, scatter.min_distance_m, not_negative);
-  scatter.slope_deg = read_interval(entry, "slope_deg", scatter.slope_deg, slope_rule, with.faults);
-  scatter.height_m = read_interval(entry, "height_m", scatter.height_m, any_number, with.faults);
-  scatter.scale = read_interval(entry, "scale", scatter.scale, positive, with.faults);
-  scatter.yaw_deg = read_interval(entry, "yaw_deg", scatter.yaw_deg, any_number, with.faults);
+  read_interval(entry, "slope_deg", scatter.slope_deg, slope_rule, with.faults);
+  read_interval(entry, "height_m", scatter.height_m, any_number, with.faults);
+  read_interval(entry, "scale", scatter.scale, positive, with.faults);
+  read_interval(entry, "yaw_deg", scatter.yaw_deg, any_number, with.faults);
   entry.read_number("sink_m", Need::Optional, scatter.sink_m);
   read_stance(entry, scatter.stance);
   for (const Node& node : entry.list("clearings", Need::Optional))
@@ -223,26 +205,21 @@ class UniqueNames {
 
 }  // namespace
 
-DrivenPath read_drive(Map drive, Faults& faults) {
-  DrivenPath path;
-  const auto waypoints = drive.list("waypoints_m", Need::Required);
-  for (const Node& waypoint : waypoints) {
-    std::array<double, 2> p{};
-    if (yaml::numbers(waypoint, "waypoints_m", p, any_number, faults)) {
-      path.waypoints_m.emplace_back(p[0], p[1]);
-    }
+std::variant<RecordedPath, DrivenPath> read_platform(Map platform, const fs::path& path,
+                                                     Faults& faults) {
+  std::variant<RecordedPath, DrivenPath> result;
+  std::string tum;
+  if (platform.read_text("trajectory", Need::Optional, tum)) {
+    result = RecordedPath{beside(path, tum)};
   }
-  if (const Node* at = drive.find("waypoints_m", Need::Optional); at && waypoints.size() < 2) {
-    faults.add(*at, "waypoints_m", "has {} points, but a drive needs at least two",
-               waypoints.size());
+  auto drive = platform.map("drive", Need::Optional);
+  const bool recorded = platform.find("trajectory", Need::Optional) != nullptr;
+  if (recorded == drive.has_value() && platform.node().kind == Node::Kind::Map) {
+    faults.add(platform.node(), "platform", "must have exactly one of 'trajectory' and 'drive'");
   }
-  drive.read_number("speed_m_s", Need::Required, path.speed_m_s, positive);
-  drive.read_number("height_m", Need::Required, path.height_m, not_negative);
-  std::array<double, 2> footprint{path.footprint_m.x, path.footprint_m.y};
-  drive.read_numbers("footprint_m", Need::Optional, footprint, positive);
-  path.footprint_m = {footprint[0], footprint[1]};
-  drive.close();
-  return path;
+  if (drive) result = read_drive(std::move(*drive), faults);
+  platform.close();
+  return result;
 }
 
 std::vector<ObjectSpec> read_objects(Map& root, const fs::path& path, const DataFolders& folders,
@@ -285,4 +262,4 @@ std::vector<ScatterLayer> read_scatter(Map& root, const fs::path& path, const Da
   return layers;
 }
 
-}  // namespace groundray
+}  // namespace groundray::yaml

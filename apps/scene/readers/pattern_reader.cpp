@@ -1,29 +1,14 @@
-#include "apps/scene/readers/pattern_reader.h"
-
 #include <algorithm>
 #include <array>
 #include <cmath>
 #include <glm/trigonometric.hpp>
-#include <string>
 #include <utility>
-#include <vector>
 
+#include "apps/scene/readers/readers.h"
 #include "core/error.h"
 
-namespace groundray {
+namespace groundray::yaml {
 namespace {
-
-using yaml::any_number;
-using yaml::at_least_one;
-using yaml::Faults;
-using yaml::Map;
-using yaml::Need;
-using yaml::Node;
-using yaml::not_negative;
-using yaml::positive;
-using yaml::Rule;
-
-namespace fs = std::filesystem;
 
 constexpr Rule elevation_deg_rule{[](double value) { return std::abs(value) <= 90; },
                                   "must be from -90 to 90"};
@@ -66,10 +51,10 @@ std::vector<BeamColumn> read_columns(Map& root, Faults& faults) {
   for (const Node& item : root.list("beam_columns", Need::Required)) {
     const auto column = std::ranges::find(beam_columns, item.text, &BeamColumn::name);
     if (column == beam_columns.end()) {
-      faults.add(item, "beam_columns", "{} is not a column of beams{}", yaml::shown(item),
-                 yaml::suggestion(item.text, free));
+      faults.add(item, "beam_columns", "{} is not a column of beams{}", shown(item),
+                 suggestion(item.text, free));
     } else if (std::erase(free, item.text) == 0) {
-      faults.add(item, "beam_columns", "{} is repeated", yaml::shown(item));
+      faults.add(item, "beam_columns", "{} is repeated", shown(item));
     } else {
       columns.push_back(*column);
     }
@@ -93,7 +78,7 @@ std::vector<Beam> read_beams(Map& root, double period_s, Faults& faults) {
   std::vector<Beam> beams;
   std::vector<double> values(columns.size());
   for (const Node& row : rows) {
-    if (!yaml::numbers(row, "beams", values, any_number, faults)) continue;
+    if (!numbers(row, "beams", values, any_number, faults)) continue;
     Beam beam;
     for (std::size_t i = 0; i < columns.size(); ++i) {
       if (!columns[i].rule.holds(values[i])) {
@@ -111,22 +96,24 @@ std::vector<Beam> read_beams(Map& root, double period_s, Faults& faults) {
   return beams;
 }
 
+// Reads an angle in degrees.
+void read_angle(Map& map, std::string_view key, Need need, double& into_rad,
+                Rule rule = any_number) {
+  map.read_scaled(key, need, glm::radians(1.0), into_rad, rule);
+}
+
 SpinningPattern read_spinning(Map& root, Faults& faults) {
   SpinningPattern pattern;
   if (auto rotation = root.map("rotation", Need::Required)) {
     rotation->read_number("rate_hz", Need::Required, pattern.rate_hz, positive);
-    rotation->read_choice<SpinningPattern::Sense>(
-        "sense", Need::Required, pattern.sense,
-        {{"clockwise", SpinningPattern::Sense::Clockwise},
-         {"counter_clockwise", SpinningPattern::Sense::CounterClockwise}});
-    double start_azimuth_deg = 0;
-    rotation->read_number("start_azimuth_deg", Need::Required, start_azimuth_deg);
-    pattern.start_azimuth_rad = glm::radians(start_azimuth_deg);
-    std::array<double, 2> view_deg{};
-    if (const Node* at = rotation->read_numbers("field_of_view_deg", Need::Optional, view_deg)) {
-      if (view_deg[0] >= view_deg[1] || view_deg[1] > view_deg[0] + 360)
+    rotation->read_choice("sense", Need::Required, pattern.sense,
+                          {"clockwise", "counter_clockwise"});
+    read_angle(*rotation, "start_azimuth_deg", Need::Required, pattern.start_azimuth_rad);
+    glm::dvec2 view_deg(0);
+    if (const Node* at = rotation->read_vector("field_of_view_deg", Need::Optional, view_deg)) {
+      if (view_deg.x >= view_deg.y || view_deg.y > view_deg.x + 360)
         faults.add(*at, "field_of_view_deg", "must be counter-clockwise and at most one turn wide");
-      pattern.field_of_view = {glm::radians(view_deg[0]), glm::radians(view_deg[1])};
+      pattern.field_of_view = {glm::radians(view_deg.x), glm::radians(view_deg.y)};
     }
     rotation->close();
   }
@@ -140,17 +127,12 @@ SpinningPattern read_spinning(Map& root, Faults& faults) {
 
 LinePattern read_line(Map line) {
   LinePattern pattern;
-  line.read_choice<LinePattern::Mirror>("mirror", Need::Required, pattern.mirror,
-                                        {{"triangle", LinePattern::Mirror::Triangle},
-                                         {"sine", LinePattern::Mirror::Sine},
-                                         {"polygon", LinePattern::Mirror::Polygon}});
-  line.read_choice<LinePattern::Plane>(
-      "plane", Need::Required, pattern.plane,
-      {{"upright", LinePattern::Plane::Upright}, {"across", LinePattern::Plane::Across}});
-  std::array<double, 2> view_deg{};
-  line.read_numbers("field_of_view_deg", Need::Required, view_deg);
-  pattern.from_rad = glm::radians(view_deg[0]);
-  pattern.to_rad = glm::radians(view_deg[1]);
+  line.read_choice("mirror", Need::Required, pattern.mirror, {"triangle", "sine", "polygon"});
+  line.read_choice("plane", Need::Required, pattern.plane, {"upright", "across"});
+  glm::dvec2 view_deg(0);
+  line.read_vector("field_of_view_deg", Need::Required, view_deg);
+  pattern.from_rad = glm::radians(view_deg.x);
+  pattern.to_rad = glm::radians(view_deg.y);
   line.read_number("line_rate_hz", Need::Required, pattern.line_rate_hz, positive);
   line.read_number("pulse_rate_hz", Need::Required, pattern.pulse_rate_hz, positive);
   std::uint16_t facets = 0;
@@ -160,9 +142,7 @@ LinePattern read_line(Map line) {
   pattern.facets = facets;
   pattern.lines_per_sweep = static_cast<int>(std::min(lines, 1'000'000'000u));
   line.read_number("head_rate_hz", Need::Optional, pattern.head_rate_hz);
-  double start_deg = 0;
-  line.read_number("head_start_deg", Need::Optional, start_deg);
-  pattern.head_start_rad = glm::radians(start_deg);
+  read_angle(line, "head_start_deg", Need::Optional, pattern.head_start_rad);
   line.close();
   return pattern;
 }
@@ -172,16 +152,11 @@ RisleyPattern read_risley(Map risley, Map& root, Faults& faults) {
   for (const Node& node : risley.list("prisms", Need::Required)) {
     Map map(node, "prisms", faults);
     WedgePrism prism;
-    double wedge_deg = 0, base_deg = 0;
-    map.read_number("wedge_deg", Need::Required, wedge_deg, positive);
+    read_angle(map, "wedge_deg", Need::Required, prism.wedge_rad, positive);
     map.read_number("refractive_index", Need::Required, prism.refractive_index, at_least_one);
     map.read_number("rate_hz", Need::Required, prism.rate_hz);
-    map.read_number("base_deg", Need::Optional, base_deg);
-    map.read_choice<WedgePrism::Tilted>(
-        "tilted_face", Need::Optional, prism.tilted,
-        {{"exit", WedgePrism::Tilted::Exit}, {"entry", WedgePrism::Tilted::Entry}});
-    prism.wedge_rad = glm::radians(wedge_deg);
-    prism.base_rad = glm::radians(base_deg);
+    read_angle(map, "base_deg", Need::Optional, prism.base_rad);
+    map.read_choice("tilted_face", Need::Optional, prism.tilted, {"exit", "entry"});
     map.close();
     pattern.prisms.push_back(prism);
   }
@@ -201,13 +176,11 @@ TablePattern read_pixels(Map map) {
   map.read_whole("columns", Need::Required, columns);
   pixels.rows = rows;
   pixels.columns = columns;
-  std::array<double, 2> view_deg{};
-  map.read_numbers("field_of_view_deg", Need::Required, view_deg, positive);
-  pixels.horizontal_view_rad = glm::radians(view_deg[0]);
-  pixels.vertical_view_rad = glm::radians(view_deg[1]);
-  map.read_choice<PixelArray::Spacing>("spacing", Need::Optional, pixels.spacing,
-                                       {{"equal_angles", PixelArray::Spacing::EqualAngles},
-                                        {"equal_tangents", PixelArray::Spacing::EqualTangents}});
+  glm::dvec2 view_deg(0);
+  map.read_vector("field_of_view_deg", Need::Required, view_deg, positive);
+  pixels.horizontal_view_rad = glm::radians(view_deg.x);
+  pixels.vertical_view_rad = glm::radians(view_deg.y);
+  map.read_choice("spacing", Need::Optional, pixels.spacing, {"equal_angles", "equal_tangents"});
   double row_s = 0, column_s = 0, frame_rate_hz = 10;
   map.read_scaled("row_period_us", Need::Optional, 1e-6, row_s);
   map.read_scaled("column_period_us", Need::Optional, 1e-6, column_s);
@@ -217,15 +190,15 @@ TablePattern read_pixels(Map map) {
 }
 
 TablePattern read_table(Map map, const fs::path& path) {
-  std::string file;
+  fs::path file;
   double period_s = 0;
-  const bool named = map.read_text("csv", Need::Required, file);
+  const bool named = read_path(map, "csv", Need::Required, path, file);
   const bool sound = map.read_number("period_s", Need::Required, period_s, positive);
   std::uint32_t sweeps = 1;
   map.read_whole("sweeps_per_period", Need::Optional, sweeps);
   map.close();
   if (!named || !sound) return {};
-  TablePattern pattern = load_table(beside(path, file), period_s);
+  TablePattern pattern = load_table(file, period_s);
   pattern.sweeps_per_period = static_cast<int>(std::min(sweeps, 1'000'000'000u));
   return pattern;
 }
@@ -274,11 +247,4 @@ PatternSpec read_pattern(Map& root, const fs::path& path, Faults& faults) {
   return read_spinning(root, faults);
 }
 
-fs::path beside(const fs::path& file, const std::string& relative) {
-  const std::size_t colon = relative.find(':');
-  if (relative.starts_with("/vsi") || (colon != std::string::npos && colon < relative.find('/')))
-    return relative;
-  return (file.parent_path() / relative).lexically_normal();
-}
-
-}  // namespace groundray
+}  // namespace groundray::yaml

@@ -1,30 +1,17 @@
-#include "apps/scene/readers/sky_reader.h"
-
 #include <array>
 #include <chrono>
+#include <cmath>
 #include <cstddef>
 #include <glm/trigonometric.hpp>
-#include <optional>
-#include <string>
-#include <string_view>
 #include <utility>
 
-#include "apps/scene/readers/pattern_reader.h"
+#include "apps/scene/readers/readers.h"
 #include "core/error.h"
 #include "core/image/image_io.h"
 
-namespace groundray {
+namespace groundray::yaml {
 namespace {
 
-namespace fs = std::filesystem;
-using yaml::Faults;
-using yaml::Map;
-using yaml::Need;
-using yaml::Node;
-using yaml::not_negative;
-using yaml::positive;
-using yaml::Rule;
-using yaml::share_rule;
 using Time = std::chrono::sys_time<std::chrono::milliseconds>;
 
 // Reads one number for all channels, or three.
@@ -32,11 +19,10 @@ void read_rgb(Map& map, std::string_view key, Need need, Rule rule, Faults& faul
               glm::dvec3& into) {
   const Node* node = map.find(key, need);
   if (!node) return;
-  std::array<double, 3> rgb{};
   if (node->kind != Node::Kind::List) {
-    if (const auto value = yaml::number(*node, key, rule, faults)) into = glm::dvec3(*value);
-  } else if (yaml::numbers(*node, key, rgb, rule, faults)) {
-    into = {rgb[0], rgb[1], rgb[2]};
+    if (const auto value = number(*node, key, rule, faults)) into = glm::dvec3(*value);
+  } else {
+    map.read_vector(key, need, into, rule);
   }
 }
 
@@ -60,9 +46,7 @@ void check_image(const EnvironmentImage& sky, const Node& node, Faults& faults) 
 EnvironmentImage read_environment(Map map, const fs::path& path, Faults& faults) {
   EnvironmentImage sky;
   const std::size_t faults_before = faults.count();
-  std::string image;
-  const Node* const at_image = map.read_text("image", Need::Required, image);
-  if (at_image) sky.image = beside(path, image);
+  const Node* const at_image = read_path(map, "image", Need::Required, path, sky.image);
   map.read_number("center_azimuth_deg", Need::Optional, sky.center_azimuth_deg);
   double factor = 1, lux = 0;
   const bool has_factor = map.find("radiance_factor", Need::Optional) != nullptr;
@@ -125,8 +109,7 @@ SunTime read_time(Map& map, Faults& faults) {
     if (const auto utc = parse_utc(text)) {
       sun.utc = *utc;
     } else {
-      faults.add(*at, "utc", "is {}, but must be a time like 2026-06-21T10:30:00Z",
-                 yaml::shown(*at));
+      faults.add(*at, "utc", "is {}, but must be a time like 2026-06-21T10:30:00Z", shown(*at));
     }
   }
   map.read_number("latitude_deg", Need::Required, sun.latitude_deg);
@@ -153,9 +136,7 @@ SunSpec read_sun(Map map, Faults& faults) {
     map.read_number("distance_au", Need::Optional, sun.distance_au);
     spec.position = sun;
   }
-  map.read_choice<SunDisc>(
-      "disc", Need::Optional, spec.disc,
-      {{"uniform", SunDisc::Uniform}, {"limb_darkened", SunDisc::LimbDarkened}});
+  map.read_choice("disc", Need::Optional, spec.disc, {"uniform", "limb_darkened"});
   map.close();
   return spec;
 }
@@ -197,4 +178,18 @@ SkySpec read_sky(Map map, const fs::path& path, Faults& faults) {
   return spec;
 }
 
-}  // namespace groundray
+AtmosphereSpec read_air(Map map, Faults& faults) {
+  AtmosphereSpec air;
+  map.read_number("visibility_m", Need::Optional, air.visibility_m, positive);
+  map.read_choice("haze_law", Need::Optional, air.haze_law, {"kruse", "kim"});
+  map.read_number("fog_range_m", Need::Optional, air.fog_range_m, positive);
+  map.read_number("rain_mm_h", Need::Optional, air.rain_mm_h, not_negative);
+  map.read_number("backscatter_per_m_sr", Need::Optional, air.backscatter_per_m_sr, not_negative);
+  map.read_number("group_index", Need::Optional, air.group_index, at_least_one);
+  if (std::isfinite(air.visibility_m) && std::isfinite(air.fog_range_m))
+    faults.add(map.node(), "weather", "has haze and fog: give one of visibility_m and fog_range_m");
+  map.close();
+  return air;
+}
+
+}  // namespace groundray::yaml

@@ -7,18 +7,48 @@
 #include <system_error>
 #include <utility>
 
-#include "apps/scene/readers/camera_reader.h"
-#include "apps/scene/readers/cover_reader.h"
-#include "apps/scene/readers/lidar_reader.h"
-#include "apps/scene/readers/material_reader.h"
-#include "apps/scene/readers/mount_reader.h"
-#include "apps/scene/readers/object_reader.h"
-#include "apps/scene/readers/pattern_reader.h"
-#include "apps/scene/readers/relief_reader.h"
-#include "apps/scene/readers/sky_reader.h"
+#include "apps/scene/readers/readers.h"
 #include "apps/scene/yaml_reader.h"
 #include "core/appearance/bsdf.h"
 #include "sensors/lidar/lidar.h"
+
+namespace groundray::yaml {
+
+fs::path beside(const fs::path& file, const std::string& relative) {
+  const std::size_t colon = relative.find(':');
+  if (relative.starts_with("/vsi") || (colon != std::string::npos && colon < relative.find('/')))
+    return relative;
+  return (file.parent_path() / relative).lexically_normal();
+}
+
+const Node* read_path(Map& map, std::string_view key, Need need, const fs::path& path,
+                      fs::path& into) {
+  std::string name;
+  const Node* const node = map.read_text(key, need, name);
+  if (node) into = beside(path, name);
+  return node;
+}
+
+std::vector<glm::dvec2> read_points(std::span<const Node> pairs, std::string_view key,
+                                    Faults& faults) {
+  std::vector<glm::dvec2> points;
+  for (const Node& pair : pairs) {
+    glm::dvec2 point(0);
+    if (numbers(pair, key, std::span<double>(&point.x, 2), any_number, faults))
+      points.push_back(point);
+  }
+  return points;
+}
+
+void check_sources(Map& root, Faults& faults) {
+  const Node* const sources = root.find("sources", Need::Optional);
+  if (!sources) return;
+  const Map texts(*sources, "sources", faults);
+  for (std::size_t i = 1; sources->kind == Node::Kind::Map && i < sources->items.size(); i += 2)
+    is_text(sources->items[i], sources->items[i - 1].text, faults);
+}
+
+}  // namespace groundray::yaml
 
 namespace groundray {
 namespace {
@@ -28,75 +58,10 @@ using yaml::Faults;
 using yaml::Map;
 using yaml::Need;
 using yaml::Node;
-using yaml::not_negative;
-using yaml::positive;
 using yaml::Rule;
 
 constexpr Rule duration_rule{[](double value) { return value > 0 && value <= 1e6; },
                              "must be > 0 and at most 1e6"};
-
-AtmosphereSpec read_air(Map map, Faults& faults) {
-  AtmosphereSpec air;
-  map.read_number("visibility_m", Need::Optional, air.visibility_m, positive);
-  map.read_choice<HazeLaw>("haze_law", Need::Optional, air.haze_law,
-                           {{"kruse", HazeLaw::Kruse}, {"kim", HazeLaw::Kim}});
-  map.read_number("fog_range_m", Need::Optional, air.fog_range_m, positive);
-  map.read_number("rain_mm_h", Need::Optional, air.rain_mm_h, not_negative);
-  map.read_number("backscatter_per_m_sr", Need::Optional, air.backscatter_per_m_sr, not_negative);
-  map.read_number("group_index", Need::Optional, air.group_index,
-                  Rule{[](double value) { return value >= 1; }, "must be 1 or more"});
-  if (std::isfinite(air.visibility_m) && std::isfinite(air.fog_range_m))
-    faults.add(map.node(), "weather", "has haze and fog: give one of visibility_m and fog_range_m");
-  map.close();
-  return air;
-}
-
-TerrainSpec read_terrain(Map terrain, const fs::path& path, const DataFolders& folders,
-                         Faults& faults) {
-  TerrainSpec spec;
-  if (const Node* const node = terrain.find("material", Need::Optional))
-    spec.material = read_material(*node, "material", path, folders, faults);
-  if (auto relief = terrain.map("relief", Need::Optional))
-    spec.relief = read_relief(std::move(*relief), path, faults);
-  spec.texture = read_ground_texture(terrain, path, faults);
-  spec.cover = read_cover(terrain, path, folders, faults);
-  std::string orthophoto;
-  if (terrain.read_text("orthophoto", Need::Optional, orthophoto))
-    spec.orthophoto = beside(path, orthophoto);
-  std::string dem;
-  if (terrain.read_text("dem", Need::Required, dem)) spec.dem = beside(path, dem);
-  double nodata = 0;
-  if (terrain.read_number("nodata", Need::Optional, nodata)) spec.options.nodata = nodata;
-  terrain.read_text("reproject_to", Need::Optional, spec.options.reproject_to);
-  terrain.read_whole("label", Need::Optional, spec.label);
-  terrain.read_number("tolerance_m", Need::Optional, spec.detail.tolerance_m, not_negative);
-  double tolerance_mrad = 0;
-  terrain.read_number("tolerance_mrad", Need::Optional, tolerance_mrad, not_negative);
-  spec.detail.tolerance_rad = tolerance_mrad / 1000;
-  if (const Node* at = terrain.read_whole("memory_mib", Need::Optional, spec.detail.memory_mib);
-      at && spec.detail.memory_mib == 0) {
-    faults.add(*at, "memory_mib", "is 0, but must be at least 1");
-  }
-  terrain.close();
-  return spec;
-}
-
-std::variant<RecordedPath, DrivenPath> read_platform(Map platform, const fs::path& path,
-                                                     Faults& faults) {
-  std::variant<RecordedPath, DrivenPath> result;
-  std::string tum;
-  if (platform.read_text("trajectory", Need::Optional, tum)) {
-    result = RecordedPath{beside(path, tum)};
-  }
-  auto drive = platform.map("drive", Need::Optional);
-  const bool recorded = platform.find("trajectory", Need::Optional) != nullptr;
-  if (recorded == drive.has_value() && platform.node().kind == Node::Kind::Map) {
-    faults.add(platform.node(), "platform", "must have exactly one of 'trajectory' and 'drive'");
-  }
-  if (drive) result = read_drive(std::move(*drive), faults);
-  platform.close();
-  return result;
-}
 
 // Checks that lidars, air and ground are compatible.
 void check_lidars(const SceneSpec& scene, const Node& node, std::span<const Node> entries,
@@ -216,12 +181,11 @@ SceneSpec parse_scene(const std::string& text, const fs::path& path,
   SceneSpec scene;
   scene.text = text;
   Map root(node, "", faults);
-  const DataFolders folders{preset_folder};
+  const yaml::DataFolders folders{preset_folder};
   yaml::check_version(root, "groundray", faults);
   root.read_whole("seed", Need::Required, scene.seed.value);
   root.read_number("duration_s", Need::Required, scene.duration_s, duration_rule);
-  root.read_choice<Tracing>("tracing", Need::Optional, scene.tracing,
-                            {{"fast", Tracing::Fast}, {"exact", Tracing::Exact}});
+  root.read_choice("tracing", Need::Optional, scene.tracing, {"fast", "exact"});
   if (auto terrain = root.map("terrain", Need::Required)) {
     scene.terrain = read_terrain(std::move(*terrain), path, folders, faults);
   }

@@ -38,6 +38,14 @@ CameraSpec load_camera(const std::filesystem::path& path);
 /// calibrations that the text names are relative to its folder.
 CameraSpec parse_camera(const std::string& text, const std::filesystem::path& path);
 
+/// Reads a material file (docs/reference/materials.md), such as those in data/materials;
+/// preset_names lists the names of a folder.
+/// @throws Error as load_scene.
+Material load_material(const std::filesystem::path& path);
+
+/// Parses a text already in memory like load_material; `path` names the file in messages.
+Material parse_material(const std::string& text, const std::filesystem::path& path);
+
 /// Returns a lens in the form of the key `lens` of a camera file, in one line, to the last bit:
 /// "eucm: {focal_px: [460.76, 459.4], ...}".
 std::string lens_text(const LensModel& lens);

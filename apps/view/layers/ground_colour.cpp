@@ -32,10 +32,11 @@ glm::u8vec3 shown_colour(const glm::dvec3& reflected) {
 }
 
 std::optional<GroundColour> GroundColour::of(const Simulation& simulation) {
-  if (!simulation.spec.terrain.material || simulation.content.materials.all().empty())
+  if (!simulation.spec.terrain.material || simulation.scene_objects.materials.all().empty())
     return std::nullopt;
   try {
-    return GroundColour(simulation.content.cover, simulation.content.materials.in_colour());
+    return GroundColour(simulation.scene_objects.cover,
+                        simulation.scene_objects.materials.in_colour());
   } catch (const Error&) {
     return std::nullopt;  // its spectra do not cover the visible range, and colour is optional here
   }

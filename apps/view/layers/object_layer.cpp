@@ -23,8 +23,8 @@ struct Shown {
 
 std::optional<Materials::InColour> material_colours(const Simulation& simulation) {
   try {
-    if (simulation.content.materials.all().empty()) return std::nullopt;
-    return simulation.content.materials.in_colour();
+    if (simulation.scene_objects.materials.all().empty()) return std::nullopt;
+    return simulation.scene_objects.materials.in_colour();
   } catch (const Error&) {
     return std::nullopt;  // the spectra do not cover the visible range
   }
@@ -37,14 +37,15 @@ std::vector<Shown> nearest(const Simulation& simulation, const SceneObjects::Gro
                            std::size_t most_triangles) {
   std::vector<Shown> all;
   for (std::uint32_t i = 0; i < group.count; ++i)
-    all.push_back({group.first + i, simulation.content.objects.placed_at(group.first + i, time)});
+    all.push_back(
+        {group.first + i, simulation.scene_objects.objects.placed_at(group.first + i, time)});
   const auto distance = [&](const Shown& one) {
     return glm::length(glm::dvec2(one.place.p_DO - near_m));
   };
   std::ranges::stable_sort(all, {}, distance);
   std::size_t triangles = 0, kept = 0;
   for (; kept < all.size(); ++kept) {
-    const ModelScene& model = simulation.content.objects.models()[all[kept].place.model];
+    const ModelScene& model = simulation.scene_objects.objects.models()[all[kept].place.model];
     triangles += model.model().mesh.triangles.size();
     if (triangles > most_triangles && kept > 0) break;
   }
@@ -62,7 +63,7 @@ struct Cells {
 glm::dvec3 colour_of(const Simulation& simulation,
                      const std::optional<Materials::InColour>& colours, std::uint32_t model,
                      std::uint16_t surface) {
-  const ModelTruth& truth = simulation.content.models[model];
+  const ModelTruth& truth = simulation.scene_objects.models[model];
   if (colours && surface < truth.materials.size() &&
       truth.materials[surface] < colours->albedos.size())
     return glm::dvec3(colours->albedos[truth.materials[surface]]);
@@ -72,7 +73,7 @@ glm::dvec3 colour_of(const Simulation& simulation,
 void add_model(const Simulation& simulation, const Shown& shown,
                const std::optional<Materials::InColour>& colours, TriangleMesh& mesh,
                Cells& cells) {
-  const Model& model = simulation.content.objects.models()[shown.place.model].model();
+  const Model& model = simulation.scene_objects.objects.models()[shown.place.model].model();
   const auto first = static_cast<std::uint32_t>(mesh.vertices_m.size());
   for (const glm::dvec3& p : model.mesh.vertices_m)
     mesh.vertices_m.push_back(shown.place.p_DO + shown.place.R_DO * (shown.place.scale * p));
@@ -83,7 +84,8 @@ void add_model(const Simulation& simulation, const Shown& shown,
     for (glm::length_t k = 0; k < 3; ++k) cells.rgb.push_back(rgb[k]);
   }
   const std::size_t count = mesh.triangles.size();
-  cells.label.resize(count, static_cast<float>(simulation.content.models[shown.place.model].label));
+  cells.label.resize(count,
+                     static_cast<float>(simulation.scene_objects.models[shown.place.model].label));
   cells.instance.resize(count, static_cast<float>(shown.number));
 }
 
@@ -91,7 +93,7 @@ void add_model(const Simulation& simulation, const Shown& shown,
 
 Layer object_layer(const Simulation& simulation, std::size_t group, std::chrono::nanoseconds time,
                    const glm::dvec3& near_m, std::size_t most_triangles) {
-  const SceneObjects::Group& entry = simulation.content.groups.at(group);
+  const SceneObjects::Group& entry = simulation.scene_objects.groups.at(group);
   const auto colours = material_colours(simulation);
   const std::vector<Shown> shown = nearest(simulation, entry, time, near_m, most_triangles);
   TriangleMesh mesh;
@@ -115,7 +117,7 @@ Layer object_layer(const Simulation& simulation, std::size_t group, std::chrono:
 std::vector<Layer> object_layers(const Simulation& simulation, std::chrono::nanoseconds time,
                                  const glm::dvec3& near_m, std::size_t most_triangles) {
   std::vector<Layer> layers;
-  const std::size_t groups = simulation.content.groups.size();
+  const std::size_t groups = simulation.scene_objects.groups.size();
   for (std::size_t i = 0; i < groups; ++i) {
     layers.push_back(object_layer(simulation, i, time, near_m, most_triangles / (groups - i)));
     most_triangles -= std::min(most_triangles, layers.back().triangles());

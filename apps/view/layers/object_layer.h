@@ -19,7 +19,7 @@ std::vector<Layer> object_layers(const Simulation& simulation, std::chrono::nano
                                  const glm::dvec3& near_m, std::size_t most_triangles);
 
 /// Returns the layer of one entry, as object_layers().
-/// @param group  index into simulation.content.groups.
+/// @param group  index into simulation.scene_objects.groups.
 Layer object_layer(const Simulation& simulation, std::size_t group, std::chrono::nanoseconds time,
                    const glm::dvec3& near_m, std::size_t most_triangles);
 

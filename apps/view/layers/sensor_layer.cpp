@@ -9,7 +9,7 @@
 #include <limits>
 #include <optional>
 
-#include "sensors/lidar/pattern/pulse_batch.h"
+#include "sensors/lidar/pattern/firing_cycle.h"
 
 namespace groundray {
 namespace {

@@ -7,7 +7,7 @@
 #include <utility>
 
 #include "apps/dataset/recorded_calibration.h"
-#include "apps/scene/readers/lidar_reader.h"
+#include "apps/scene/readers/readers.h"
 #include "apps/scene/yaml_reader.h"
 #include "core/error.h"
 #include "core/io/file_io.h"

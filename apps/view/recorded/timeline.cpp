@@ -97,8 +97,8 @@ std::vector<MovingThing> moving_things(const Simulation& simulation) {
   for (const ObjectSpec& object : simulation.spec.objects) {
     if (std::holds_alternative<StandingObject>(object.place)) continue;
     const auto group =
-        std::ranges::find(simulation.content.groups, object.name, &SceneObjects::Group::name);
-    if (group != simulation.content.groups.end())
+        std::ranges::find(simulation.scene_objects.groups, object.name, &SceneObjects::Group::name);
+    if (group != simulation.scene_objects.groups.end())
       things.push_back({object.name, object.label, group->first});
   }
   std::ranges::sort(things, {}, &MovingThing::instance);
@@ -106,7 +106,7 @@ std::vector<MovingThing> moving_things(const Simulation& simulation) {
 }
 
 PlacedObject place_of(const Simulation& simulation, const MovingThing& thing, nanoseconds time) {
-  return simulation.content.objects.placed_at(thing.instance, time);
+  return simulation.scene_objects.objects.placed_at(thing.instance, time);
 }
 
 }  // namespace groundray

@@ -41,7 +41,7 @@ void add_sensors(std::vector<Layer>& layers, const Timeline& timeline, nanosecon
 void add_moving(std::vector<Layer>& layers, const Simulation& simulation, nanoseconds time,
                 const std::string& prefix) {
   for (const MovingThing& thing : moving_things(simulation)) {
-    const auto& groups = simulation.content.groups;
+    const auto& groups = simulation.scene_objects.groups;
     const auto group = std::ranges::find(groups, thing.name, &SceneObjects::Group::name);
     layers.push_back(object_layer(simulation, static_cast<std::size_t>(group - groups.begin()),
                                   time, place_of(simulation, thing, time).p_DO, most_triangles));

@@ -268,6 +268,12 @@ std::optional<PixelRay> Lens::ray(glm::dvec2 pixel) const noexcept {
       model_);
 }
 
+std::optional<double> Lens::focal_px() const noexcept {
+  const auto centre = project({0, 0, 1});
+  const auto on_axis = centre ? ray(*centre) : std::nullopt;
+  return on_axis ? std::optional(1 / std::sqrt(pixel_sr(*on_axis))) : std::nullopt;
+}
+
 void Lens::fill(int begin, int end, std::span<PixelRay> rays) const {
   std::visit(
       [&]<typename Model>(const Model& kind) {

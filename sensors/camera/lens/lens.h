@@ -1,5 +1,6 @@
 #pragma once
 
+#include <glm/geometric.hpp>
 #include <glm/vec2.hpp>
 #include <glm/vec3.hpp>
 #include <optional>
@@ -15,6 +16,11 @@ struct PixelRay {
   glm::dvec3 direction{0};      ///< unit
   glm::dvec3 by_u{0}, by_v{0};  ///< derivatives by the pixel's coordinates, 1/px
 };
+
+/// Returns the solid angle of a pixel, sr.
+inline double pixel_sr(const PixelRay& ray) noexcept {
+  return glm::length(glm::cross(ray.by_u, ray.by_v));
+}
 
 /// Lens model with an image size: a one-to-one mapping between the directions that it images and
 /// positions in the image.
@@ -46,6 +52,10 @@ class Lens {
   /// px, or, where the image is steep near a pole, to the shift that 1e-15 rad causes. nullopt if
   /// no imaged direction has this position.
   std::optional<PixelRay> ray(glm::dvec2 pixel) const noexcept;
+
+  /// Returns the focal length of a pinhole whose pixel on the axis has the same solid angle;
+  /// nullopt if the axis is not imaged.
+  std::optional<double> focal_px() const noexcept;
 
   /// Computes the rays of all pixel centres of rows [begin, end), row by row, with derivatives to
   /// 1e-6, relative. Pixels without a viewing direction get a direction of zero.

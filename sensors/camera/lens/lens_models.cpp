@@ -1,14 +1,8 @@
 #include "sensors/camera/lens/lens_models.h"
 
 #include <algorithm>
-#include <cmath>
 #include <cstddef>
 #include <iterator>
-#include <limits>
-#include <vector>
-
-#include "core/error.h"
-#include "sensors/camera/lens/polynomial.h"
 
 namespace groundray {
 namespace {
@@ -29,19 +23,7 @@ void check_finite(const Numbers& numbers, Violations& broken) {
                   numbers[i]);
 }
 
-void check_parameters(const Pinhole& model, Violations& broken) {
-  check_scale(model.scale, broken);
-}
-void check_parameters(const BrownConrady& model, Violations& broken) {
-  check_scale(model.scale, broken);
-  check_finite(model.k, broken);
-}
-void check_parameters(const KannalaBrandt& model, Violations& broken) {
-  check_scale(model.scale, broken);
-  check_finite(model.k, broken);
-}
-void check_parameters(const FTheta& model, Violations& broken) {
-  check_finite(model.k, broken);
+void check_f_theta(const FTheta& model, Violations& broken) {
   broken.unless(!model.k.empty() && model.k[0] > 0,
                 "its polynomial must increase at 0: the coefficient of the first power is {}",
                 model.k.empty() ? 0 : model.k[0]);
@@ -50,25 +32,81 @@ void check_parameters(const FTheta& model, Violations& broken) {
       std::isfinite(model.centre_px.x + model.centre_px.y) && area > 0 && std::isfinite(area),
       "its centre must be finite and its linear map must preserve orientation: c - d e = {}", area);
 }
-void check_parameters(const Eucm& model, Violations& broken) {
-  check_scale(model.scale, broken);
-  broken.unless(0 <= model.alpha && model.alpha <= 1, "alpha = {} must be from 0 to 1",
-                model.alpha);
-  broken.unless(model.beta > 0 && std::isfinite(model.beta), "beta = {} must be positive",
-                model.beta);
+
+template <typename Model>
+void check_parameters(const Model& model, Violations& broken) {
+  if constexpr (requires { model.scale; }) check_scale(model.scale, broken);
+  if constexpr (requires { model.k; }) check_finite(model.k, broken);
+  if constexpr (std::is_same_v<Model, FTheta>) check_f_theta(model, broken);
+  if constexpr (requires { model.alpha; }) {
+    broken.unless(0 <= model.alpha && model.alpha <= 1, "alpha = {} must be from 0 to 1",
+                  model.alpha);
+  }
+  if constexpr (requires { model.beta; }) {
+    broken.unless(model.beta > 0 && std::isfinite(model.beta), "beta = {} must be positive",
+                  model.beta);
+  }
+  if constexpr (std::is_same_v<Model, DoubleSphere>)
+    broken.unless(model.xi > -1 && std::isfinite(model.xi), "xi = {} must be more than -1",
+                  model.xi);
+  if constexpr (std::is_same_v<Model, Mei>)
+    broken.unless(model.xi >= 0 && std::isfinite(model.xi), "xi = {} must be 0 or more", model.xi);
 }
-void check_parameters(const DoubleSphere& model, Violations& broken) {
-  check_scale(model.scale, broken);
-  broken.unless(0 <= model.alpha && model.alpha <= 1, "alpha = {} must be from 0 to 1",
-                model.alpha);
-  broken.unless(model.xi > -1 && std::isfinite(model.xi), "xi = {} must be more than -1", model.xi);
+
+// Polynomial, as its coefficients: of the constant, the first power, the second...
+using Polynomial = std::vector<double>;
+
+Polynomial operator+(const Polynomial& a, const Polynomial& b) {
+  Polynomial sum(std::max(a.size(), b.size()));
+  for (std::size_t i = 0; i < a.size(); ++i) sum[i] += a[i];
+  for (std::size_t i = 0; i < b.size(); ++i) sum[i] += b[i];
+  return sum;
 }
-void check_parameters(const Mei& model, Violations& broken) {
-  check_scale(model.scale, broken);
-  check_finite(model.k, broken);
-  broken.unless(model.xi >= 0 && std::isfinite(model.xi), "xi = {} must be 0 or more", model.xi);
+
+Polynomial operator*(const Polynomial& a, const Polynomial& b) {
+  Polynomial product(a.size() + b.size());
+  for (std::size_t i = 0; i < a.size(); ++i) {
+    for (std::size_t j = 0; j < b.size(); ++j) product[i + j] += a[i] * b[j];
+  }
+  return product;
 }
-void check_parameters(const Equirectangular& /*model*/, Violations& /*broken*/) {}
+
+Polynomial derivative(const Polynomial& a) {
+  Polynomial slope;
+  for (std::size_t i = 1; i < a.size(); ++i) slope.push_back(static_cast<double>(i) * a[i]);
+  return slope;
+}
+
+double value_of(const Polynomial& a, double x) {
+  double sum = 0;
+  for (std::size_t i = a.size(); i-- > 0;) sum = sum * x + a[i];
+  return sum;
+}
+
+// Returns the positive arguments at which the polynomial changes its sign, ascending, to rounding.
+std::vector<double> positive_roots(const Polynomial& a) {
+  Polynomial trimmed = a;
+  while (!trimmed.empty() && trimmed.back() == 0) trimmed.pop_back();
+  if (trimmed.size() < 2) return {};
+  // The polynomial is monotonic between the roots of its derivative, and has no roots beyond
+  // Cauchy's bound.
+  double largest = 0;
+  for (const double coefficient : trimmed)
+    largest = std::max(largest, std::abs(coefficient / trimmed.back()));
+  std::vector<double> ends = positive_roots(derivative(trimmed));
+  ends.insert(ends.begin(), 0.0);
+  ends.push_back(1 + largest);
+  std::vector<double> roots;
+  for (std::size_t i = 0; i + 1 < ends.size(); ++i) {
+    double low = ends[i], high = ends[i + 1];
+    const bool rises = value_of(trimmed, low) < 0;
+    if (rises == (value_of(trimmed, high) < 0)) continue;
+    for (double middle = (low + high) / 2; low < middle && middle < high; middle = (low + high) / 2)
+      ((value_of(trimmed, middle) < 0) == rises ? low : high) = middle;
+    roots.push_back(high);
+  }
+  return roots;
+}
 
 // Returns the radii at which r n(r^2) / d(r^2) has a fold, a root or a pole.
 std::vector<double> radial_turns(const Polynomial& n, const Polynomial& d) {

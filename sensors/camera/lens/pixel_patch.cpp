@@ -33,7 +33,7 @@ PixelPatch::PixelPatch(const Lens& lens, glm::dvec2 pixel, const PixelRay& ray,
   const double left_out =
       (bend(left, right, &PixelRay::by_u) + bend(above, below, &PixelRay::by_v)) / 48 +
       (bend(left, right, &PixelRay::by_v) + bend(above, below, &PixelRay::by_u)) / 16;
-  const double area_sr = glm::length(glm::cross(ray.by_u, ray.by_v));
+  const double area_sr = pixel_sr(ray);
   const double steepest = std::sqrt(glm::dot(ray.by_u, ray.by_u) + glm::dot(ray.by_v, ray.by_v));
   is_smooth_ = left_out * steepest < error_px / 2 * area_sr;  // half, as a margin for higher terms
 }

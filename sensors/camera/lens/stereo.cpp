@@ -33,12 +33,6 @@ glm::dquat from_x_to(const glm::dvec3& v) {
   return glm::normalize(glm::dquat(1 + v.x, 0, -v.z, v.y));
 }
 
-// Returns the focal length of a pinhole whose pixel on the axis has the same solid angle.
-double focal_px(const Lens& lens) {
-  const PixelRay ray = lens.ray(lens.project({0, 0, 1}).value()).value();
-  return 1 / std::sqrt(glm::length(glm::cross(ray.by_u, ray.by_v)));
-}
-
 // Returns the viewing direction at the middle of a side of the image, or at the imaged position
 // nearest to it on the way to the image's middle; nullopt if there is none.
 std::optional<glm::dvec3> look_towards(const Lens& lens, const glm::dvec2& side) {
@@ -112,7 +106,7 @@ RectifiedPair rectified(const StereoCamera& left, const StereoCamera& right) {
                            mean_on_plane("right", right_lens, from(right), broken)) /
                           2.0;
   broken.throw_if_any();
-  const double f_px = (focal_px(left_lens) + focal_px(right_lens)) / 2;
+  const double f_px = (left_lens.focal_px().value() + right_lens.focal_px().value()) / 2;
   const glm::dvec2 middle = (glm::dvec2(left.size_px) - 1.0) / 2.0;
   return {{{f_px, f_px}, middle - f_px * mean, 0},
           left.size_px,

@@ -12,7 +12,7 @@
 #include "core/tracing/scene.h"
 #include "sensors/lidar/beam/beam.h"
 #include "sensors/lidar/lidar_spec.h"
-#include "sensors/lidar/pattern/pulse_batch.h"
+#include "sensors/lidar/pattern/firing_cycle.h"
 #include "sensors/lidar/pattern/scan_pattern.h"
 
 namespace groundray {

@@ -3,6 +3,7 @@
 #include <algorithm>
 #include <cassert>
 #include <cmath>
+#include <limits>
 #include <numbers>
 #include <tuple>
 
@@ -47,6 +48,10 @@ double turn_fraction(double rate_hz, double time_s) noexcept {
   return std::fma(rate_hz, time_s, -whole_turns);
 }
 
+double slack_turns(double turns) noexcept {
+  return 1e-9 + 4 * std::numeric_limits<double>::epsilon() * turns;
+}
+
 double HeadTurn::angle_rad(double time_s) const noexcept {
   return wrapped(start_rad + 2 * pi * turn_fraction(rate_hz, time_s));
 }
@@ -72,6 +77,12 @@ FiringCycle::FiringCycle(std::vector<Firing> firings, double period_s, const Hea
     horizontal_.push_back(firing.horizontal);
   }
   assert(!volleys_.empty() && volleys_.back().sequence + 1 == sequences());
+}
+
+std::int64_t FiringCycle::first_sequence(std::int64_t turn, double rate_hz) const noexcept {
+  const double turns = static_cast<double>(turn);
+  const double sequence = std::ceil((turns - slack_turns(turns)) / (rate_hz * period_s_));
+  return std::max<std::int64_t>(0, static_cast<std::int64_t>(sequence));
 }
 
 std::int64_t FiringCycle::pulses_before(std::int64_t sequence) const noexcept {

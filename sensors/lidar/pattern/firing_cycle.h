@@ -1,20 +1,58 @@
 #pragma once
 
+#include <array>
 #include <cstddef>
 #include <cstdint>
 #include <glm/vec3.hpp>
 #include <span>
 #include <vector>
 
-#include "sensors/lidar/pattern/pulse_batch.h"
-
 namespace groundray {
+
+/// Pulses in firing order, one array per quantity. Reuse a batch: it allocates nothing once it has
+/// held as many pulses.
+struct PulseBatch {
+  /// Pulses that fire at the same instant.
+  struct Volley {
+    double time_s = 0;  ///< since time 0
+    std::size_t begin = 0;
+    std::size_t end = 0;
+  };
+
+  std::vector<Volley> volleys;
+  std::vector<glm::dvec3> direction;  ///< unit, in S
+  std::vector<glm::dvec3> origin_m;   ///< origin of the beam, in S
+  /// Direction of the beam's horizontal width: a unit vector in S, perpendicular to `direction`. It
+  /// points towards increasing azimuth unless the pattern states otherwise.
+  std::vector<glm::dvec3> horizontal;
+  std::vector<std::uint16_t> ring;
+
+  std::size_t size() const { return direction.size(); }
+
+  /// Resizes the batch to `count` pulses, whose values are then unspecified, and clears the
+  /// volleys.
+  void reset(std::size_t count) {
+    volleys.clear();
+    direction.resize(count);
+    origin_m.resize(count);
+    horizontal.resize(count);
+    ring.resize(count);
+  }
+};
 
 /// Half-open range [begin, end) of numbers of pulses or sequences.
 struct NumberRange {
   std::int64_t begin = 0;
   std::int64_t end = 0;
 };
+
+/// Pulses of a sweep, numbered from time 0, as two ranges; one or both may be empty.
+using SweepPulses = std::array<NumberRange, 2>;
+
+/// Returns the fraction of a turn by which a firing sequence may be early at `turns` turns: rates
+/// and periods are decimal figures that doubles only approximate. It is 1e-9 and the rounding
+/// errors of rate, period, their product and the quotient.
+double slack_turns(double turns) noexcept;
 
 /// Rotation of a head about z: its angle is that at time 0 plus 2 pi times the number of turns. A
 /// rate of 0 represents a fixed head.
@@ -68,6 +106,9 @@ class FiringCycle {
   /// Returns the number of pulses in a whole cycle.
   std::int64_t cycle_pulses() const { return static_cast<std::int64_t>(shots_.size()); }
 
+  /// Returns the number of the first sequence that begins after `turn` turns at a rate, or early by
+  /// slack_turns() at most; at least 0.
+  std::int64_t first_sequence(std::int64_t turn, double rate_hz) const noexcept;
   /// Returns the number of pulses before a sequence.
   std::int64_t pulses_before(std::int64_t sequence) const noexcept;
   /// Returns the time at which a volley of a sequence fires, s since time 0.

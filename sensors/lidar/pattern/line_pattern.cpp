@@ -127,9 +127,4 @@ LineScan::LineScan(const LinePattern& pattern)
       cycle_(line_cycle(pattern)),
       pulses_per_line_(static_cast<std::int64_t>(pulses_of_line(pattern))) {}
 
-void LineScan::fill(std::int64_t sweep, NumberRange pulses, PulseBatch& batch) const noexcept {
-  const std::int64_t before = sweep * this->pulses(sweep);
-  cycle_.fill({before + pulses.begin, before + pulses.end}, batch, 0);
-}
-
 }  // namespace groundray

@@ -49,15 +49,14 @@ class LineScan {
   /// @throws Error listing every field of `pattern` that is out of bounds.
   explicit LineScan(const LinePattern& pattern);
 
+  const FiringCycle& cycle() const { return cycle_; }
   double sweep_rate_hz() const { return 1 / (cycle_.period_s() * lines_per_sweep_); }
-  std::int64_t pulses_per_line() const { return pulses_per_line_; }
   /// Returns the number of pulses up to the same pulse of the next line in the same direction.
   std::int64_t neighbour_stride() const { return cycle_.cycle_pulses(); }
-  std::int64_t pulses(std::int64_t) const noexcept { return pulses_per_line_ * lines_per_sweep_; }
-  double pulse_time_s(std::int64_t sweep, std::int64_t pulse) const noexcept {
-    return cycle_.pulse_time_s(sweep * pulses(sweep) + pulse);
+  SweepPulses runs(std::int64_t sweep) const noexcept {
+    const std::int64_t pulses = pulses_per_line_ * lines_per_sweep_;
+    return {{{sweep * pulses, (sweep + 1) * pulses}, {}}};
   }
-  void fill(std::int64_t sweep, NumberRange pulses, PulseBatch& batch) const noexcept;
 
  private:
   int lines_per_sweep_;

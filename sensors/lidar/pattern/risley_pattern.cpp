@@ -142,25 +142,14 @@ RisleyScan::RisleyScan(const RisleyPattern& pattern)
       sweep_rate_hz_(pattern.sweep_rate_hz),
       sequence_(sequence_of(pattern)) {}
 
-std::int64_t RisleyScan::first_sequence(std::int64_t sweep) const noexcept {
-  constexpr double epsilon = std::numeric_limits<double>::epsilon();
-  const double sweeps = static_cast<double>(sweep);
-  const double early = sequence_tolerance + 4 * epsilon * sweeps;
-  const double first = std::ceil((sweeps - early) / (sweep_rate_hz_ * sequence_.period_s()));
-  return std::max<std::int64_t>(0, static_cast<std::int64_t>(first));
+SweepPulses RisleyScan::runs(std::int64_t sweep) const noexcept {
+  const auto first = [&](std::int64_t number) {
+    return sequence_.pulses_before(sequence_.first_sequence(number, sweep_rate_hz_));
+  };
+  return {{{first(sweep), first(sweep + 1)}, {}}};
 }
 
-std::int64_t RisleyScan::pulses(std::int64_t sweep) const noexcept {
-  return (first_sequence(sweep + 1) - first_sequence(sweep)) * sequence_.cycle_pulses();
-}
-
-double RisleyScan::pulse_time_s(std::int64_t sweep, std::int64_t pulse) const noexcept {
-  return sequence_.pulse_time_s(sequence_.pulses_before(first_sequence(sweep)) + pulse);
-}
-
-void RisleyScan::fill(std::int64_t sweep, NumberRange pulses, PulseBatch& batch) const noexcept {
-  const std::int64_t before = sequence_.pulses_before(first_sequence(sweep));
-  sequence_.fill({before + pulses.begin, before + pulses.end}, batch, 0);
+void RisleyScan::refract(PulseBatch& batch) const noexcept {
   for (const PulseBatch::Volley& volley : batch.volleys) {
     std::array<Faces, most_prisms> faces;
     for (std::size_t i = 0; i < prisms_.size(); ++i) faces[i] = Faces(prisms_[i], volley.time_s);

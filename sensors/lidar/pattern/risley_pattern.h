@@ -45,15 +45,14 @@ class RisleyScan {
   ///         light might undergo total internal reflection.
   explicit RisleyScan(const RisleyPattern& pattern);
 
+  const FiringCycle& cycle() const { return sequence_; }
   double sweep_rate_hz() const { return sweep_rate_hz_; }
   std::int64_t neighbour_stride() const { return sequence_.cycle_pulses(); }
-  std::int64_t pulses(std::int64_t sweep) const noexcept;
-  double pulse_time_s(std::int64_t sweep, std::int64_t pulse) const noexcept;
-  void fill(std::int64_t sweep, NumberRange pulses, PulseBatch& batch) const noexcept;
+  SweepPulses runs(std::int64_t sweep) const noexcept;
+  /// Replaces the directions of pulses before the prisms by those behind them.
+  void refract(PulseBatch& batch) const noexcept;
 
  private:
-  std::int64_t first_sequence(std::int64_t sweep) const noexcept;
-
   std::vector<WedgePrism> prisms_;
   double sweep_rate_hz_;
   FiringCycle sequence_;  // the beams before the first prism

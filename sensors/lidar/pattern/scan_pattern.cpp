@@ -1,14 +1,11 @@
 #include "sensors/lidar/pattern/scan_pattern.h"
 
+#include <algorithm>
 #include <cassert>
 #include <cmath>
 
 namespace groundray {
 namespace {
-
-std::chrono::nanoseconds nearest_nanosecond(double time_s) {
-  return std::chrono::nanoseconds(std::llround(time_s * 1e9));
-}
 
 template <typename... Acts>
 struct Overloaded : Acts... {
@@ -31,8 +28,13 @@ double ScanPattern::sweep_rate_hz() const {
   return std::visit([](const auto& scan) { return scan.sweep_rate_hz(); }, scan_);
 }
 
+SweepPulses ScanPattern::runs(std::int64_t sweep) const noexcept {
+  return std::visit([&](const auto& scan) { return scan.runs(sweep); }, scan_);
+}
+
 std::int64_t ScanPattern::pulses(std::int64_t sweep) const noexcept {
-  return std::visit([&](const auto& scan) { return scan.pulses(sweep); }, scan_);
+  const auto [a, b] = runs(sweep);
+  return a.end - a.begin + b.end - b.begin;
 }
 
 std::int64_t ScanPattern::neighbour_stride() const noexcept {
@@ -43,18 +45,40 @@ void ScanPattern::fill(std::int64_t sweep, std::int64_t begin, std::int64_t end,
                        PulseBatch& batch) const noexcept {
   assert(0 <= begin && begin <= end && end <= pulses(sweep));
   batch.reset(static_cast<std::size_t>(end - begin));
-  std::visit([&](const auto& scan) { scan.fill(sweep, {begin, end}, batch); }, scan_);
+  std::visit(
+      [&](const auto& scan) {
+        std::int64_t before = 0;
+        std::size_t row = 0;
+        for (const NumberRange& run : scan.runs(sweep)) {
+          const NumberRange part{run.begin + std::max<std::int64_t>(begin - before, 0),
+                                 std::min(run.begin + (end - before), run.end)};
+          if (part.begin < part.end) {
+            scan.cycle().fill(part, batch, row);
+            row += static_cast<std::size_t>(part.end - part.begin);
+          }
+          before += run.end - run.begin;
+        }
+        if constexpr (requires { scan.refract(batch); }) scan.refract(batch);
+      },
+      scan_);
 }
 
 std::chrono::nanoseconds ScanPattern::stamp(std::int64_t sweep) const noexcept {
-  return nearest_nanosecond(
-      std::visit([&](const auto& scan) { return scan.pulse_time_s(sweep, 0); }, scan_));
+  return pulse_time(sweep, 0);
 }
 
 std::chrono::nanoseconds ScanPattern::last_firing(std::int64_t sweep) const noexcept {
-  const std::int64_t last = pulses(sweep) - 1;
-  return nearest_nanosecond(
-      std::visit([&](const auto& scan) { return scan.pulse_time_s(sweep, last); }, scan_));
+  return pulse_time(sweep, pulses(sweep) - 1);
+}
+
+std::chrono::nanoseconds ScanPattern::pulse_time(std::int64_t sweep,
+                                                 std::int64_t pulse) const noexcept {
+  const auto [a, b] = runs(sweep);
+  const std::int64_t count = a.end - a.begin;
+  const std::int64_t number = pulse < count ? a.begin + pulse : b.begin + pulse - count;
+  const double time_s =
+      std::visit([&](const auto& scan) { return scan.cycle().pulse_time_s(number); }, scan_);
+  return std::chrono::nanoseconds(std::llround(time_s * 1e9));
 }
 
 }  // namespace groundray

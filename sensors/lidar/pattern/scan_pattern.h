@@ -7,7 +7,6 @@
 
 #include "sensors/lidar/pattern/firing_cycle.h"
 #include "sensors/lidar/pattern/line_pattern.h"
-#include "sensors/lidar/pattern/pulse_batch.h"
 #include "sensors/lidar/pattern/risley_pattern.h"
 #include "sensors/lidar/pattern/spinning_pattern.h"
 #include "sensors/lidar/pattern/table_pattern.h"
@@ -48,6 +47,11 @@ class ScanPattern {
   std::chrono::nanoseconds last_firing(std::int64_t sweep) const noexcept;
 
  private:
+  SweepPulses runs(std::int64_t sweep) const noexcept;
+  std::chrono::nanoseconds pulse_time(std::int64_t sweep, std::int64_t pulse) const noexcept;
+
+  // Each has its cycle of firings, the pulses of a sweep as runs(), sweep_rate_hz() and
+  // neighbour_stride().
   using Scan = std::variant<SpinningScan, LineScan, RisleyScan, TableScan>;
 
   Scan scan_;

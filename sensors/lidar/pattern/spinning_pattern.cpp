@@ -2,7 +2,6 @@
 
 #include <algorithm>
 #include <cmath>
-#include <limits>
 #include <numbers>
 #include <set>
 
@@ -102,12 +101,6 @@ FiringCycle spinning_cycle(const SpinningPattern& pattern) {
           HeadTurn{signed_rate_hz(pattern), pattern.start_azimuth_rad}};
 }
 
-// Returns the tolerance of a turn's begin: rate, period, their product and the quotient are rounded
-// once each.
-double slack_turns(double turns) {
-  return tolerance_turns + 4 * std::numeric_limits<double>::epsilon() * turns;
-}
-
 }  // namespace
 
 FiringCycle::Firing firing_towards(double azimuth_rad, double elevation_rad) noexcept {
@@ -134,13 +127,7 @@ SpinningScan::SpinningScan(const SpinningPattern& pattern)
   window_ = Window{open < 1 - tolerance_turns ? open : 0, width};
 }
 
-std::int64_t SpinningScan::first_sequence(std::int64_t turn) const noexcept {
-  const double turns = static_cast<double>(turn);
-  const double sequence = std::ceil((turns - slack_turns(turns)) / (rate_hz_ * cycle_.period_s()));
-  return std::max<std::int64_t>(0, static_cast<std::int64_t>(sequence));
-}
-
-std::array<NumberRange, 2> SpinningScan::runs(std::int64_t sweep) const noexcept {
+SweepPulses SpinningScan::runs(std::int64_t sweep) const noexcept {
   const NumberRange turn{first_sequence(sweep), first_sequence(sweep + 1)};
   const auto pulses = [&](std::int64_t begin, std::int64_t end) {
     begin = std::clamp(begin, turn.begin, turn.end);
@@ -161,31 +148,6 @@ std::array<NumberRange, 2> SpinningScan::runs(std::int64_t sweep) const noexcept
   const std::int64_t tail_end = wraps ? past(turns + (open + width - 1)) : turn.begin;
   return {pulses(turn.begin, tail_end),
           pulses(std::max(from(turns + open), tail_end), past(turns + (open + width)))};
-}
-
-std::int64_t SpinningScan::pulses(std::int64_t sweep) const noexcept {
-  const auto [a, b] = runs(sweep);
-  return a.end - a.begin + b.end - b.begin;
-}
-
-double SpinningScan::pulse_time_s(std::int64_t sweep, std::int64_t pulse) const noexcept {
-  const auto [a, b] = runs(sweep);
-  const std::int64_t count = a.end - a.begin;
-  return cycle_.pulse_time_s(pulse < count ? a.begin + pulse : b.begin + pulse - count);
-}
-
-void SpinningScan::fill(std::int64_t sweep, NumberRange pulses, PulseBatch& batch) const noexcept {
-  std::int64_t before = 0;
-  std::size_t row = 0;
-  for (const NumberRange& run : runs(sweep)) {
-    const NumberRange part{run.begin + std::max<std::int64_t>(pulses.begin - before, 0),
-                           std::min(run.begin + (pulses.end - before), run.end)};
-    if (part.begin < part.end) {
-      cycle_.fill(part, batch, row);
-      row += static_cast<std::size_t>(part.end - part.begin);
-    }
-    before += run.end - run.begin;
-  }
 }
 
 }  // namespace groundray

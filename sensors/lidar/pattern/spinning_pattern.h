@@ -1,6 +1,5 @@
 #pragma once
 
-#include <array>
 #include <cstdint>
 #include <glm/vec3.hpp>
 #include <optional>
@@ -56,22 +55,17 @@ class SpinningScan {
 
   const FiringCycle& cycle() const { return cycle_; }
 
-  /// Returns the number of the first firing sequence of a turn: the smallest k >= 0 that begins
-  /// when the head has made at least `turn` turns. Rates and periods are decimal figures that
-  /// doubles only approximate, so a sequence up to 1e-9 turns early counts as on time: 1024
-  /// sequences of 97.65625 us at 10 Hz make exactly one turn.
-  std::int64_t first_sequence(std::int64_t turn) const noexcept;
+  /// Returns the number of the first firing sequence of a turn: 1024 sequences of 97.65625 us at
+  /// 10 Hz make exactly one turn.
+  std::int64_t first_sequence(std::int64_t turn) const noexcept {
+    return cycle_.first_sequence(turn, rate_hz_);
+  }
 
   double sweep_rate_hz() const { return rate_hz_; }
   std::int64_t neighbour_stride() const { return cycle_.cycle_pulses(); }
-  std::int64_t pulses(std::int64_t sweep) const noexcept;
-  double pulse_time_s(std::int64_t sweep, std::int64_t pulse) const noexcept;
-  void fill(std::int64_t sweep, NumberRange pulses, PulseBatch& batch) const noexcept;
+  SweepPulses runs(std::int64_t sweep) const noexcept;
 
  private:
-  /// Returns the pulses of a sweep, numbered from time 0, as two ranges; one or both may be empty.
-  std::array<NumberRange, 2> runs(std::int64_t sweep) const noexcept;
-
   double rate_hz_;
   FiringCycle cycle_;
   // Field of view in turns of the head since the start of the current turn: [open, open + width],

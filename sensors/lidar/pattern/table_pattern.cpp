@@ -14,7 +14,6 @@
 #include "core/error.h"
 #include "core/io/file_io.h"
 #include "core/io/text_lines.h"
-#include "sensors/lidar/pattern/csv_cells.h"
 #include "sensors/lidar/pattern/spinning_pattern.h"
 
 namespace groundray {
@@ -71,6 +70,14 @@ FiringCycle table_cycle(const TablePattern& pattern) {
     firings.back().shot.ring = shot.ring;
   }
   return {std::move(firings), pattern.period_s, {}};
+}
+
+// Returns the text without leading and trailing blanks.
+std::string_view trimmed(std::string_view text) {
+  constexpr std::string_view blanks = " \t\r";
+  const std::size_t begin = text.find_first_not_of(blanks);
+  if (begin == std::string_view::npos) return {};
+  return text.substr(begin, text.find_last_not_of(blanks) - begin + 1);
 }
 
 constexpr std::array<std::string_view, 4> column_names{"time_s", "azimuth_deg", "elevation_deg",
@@ -194,6 +201,16 @@ TablePattern::Shot pixel_shot(const PixelArray& pixels, int row, int column) {
 
 }  // namespace
 
+std::vector<std::string_view> cells_of(std::string_view line) {
+  std::vector<std::string_view> cells;
+  for (std::size_t begin = 0; begin <= line.size();) {
+    const std::size_t end = std::min(line.find(',', begin), line.size());
+    cells.push_back(trimmed(line.substr(begin, end - begin)));
+    begin = end + 1;
+  }
+  return cells;
+}
+
 TablePattern raster_pattern(const PixelArray& pixels, double row_period_s, double column_period_s,
                             double frame_period_s) {
   Violations broken("raster");
@@ -210,10 +227,6 @@ TablePattern raster_pattern(const PixelArray& pixels, double row_period_s, doubl
   }
   std::ranges::stable_sort(table.shots, {}, &TablePattern::Shot::time_s);
   return table;
-}
-
-TablePattern flash_pattern(const PixelArray& pixels, double frame_period_s) {
-  return raster_pattern(pixels, 0, 0, frame_period_s);
 }
 
 TablePattern load_table(const std::filesystem::path& path, double period_s) {
@@ -271,11 +284,6 @@ TableScan::TableScan(const TablePattern& pattern) : cycle_(table_cycle(pattern))
                   begins_.size());
     }
   }
-}
-
-void TableScan::fill(std::int64_t sweep, NumberRange pulses, PulseBatch& batch) const noexcept {
-  const std::int64_t before = first_pulse(sweep);
-  cycle_.fill({before + pulses.begin, before + pulses.end}, batch, 0);
 }
 
 }  // namespace groundray

@@ -47,10 +47,6 @@ struct PixelArray {
 TablePattern raster_pattern(const PixelArray& pixels, double row_period_s, double column_period_s,
                             double frame_period_s);
 
-/// Returns the pattern of a flash lidar, which fires all pixels at once.
-/// @throws Error as raster_pattern.
-TablePattern flash_pattern(const PixelArray& pixels, double frame_period_s);
-
 /// Reads a table in CSV: a first line `time_s,azimuth_deg,elevation_deg,channel` (columns in any
 /// order; channel is optional and defaults to 0), then one pulse per line, in order of time. Blank
 /// lines and lines that begin with # are ignored.
@@ -59,6 +55,10 @@ TablePattern load_table(const std::filesystem::path& path, double period_s);
 
 /// Parses a table like load_table, from a text in memory; `name` replaces the path in messages.
 TablePattern parse_table(std::string_view text, const std::string& name, double period_s);
+
+/// Returns the comma-separated cells of a line without blanks around them; at least one. Quotes
+/// have no special meaning.
+std::vector<std::string_view> cells_of(std::string_view line);
 
 /// Pulses of a table. Sweep n consists of the pulses that fire in part n mod sweeps_per_period of a
 /// period.
@@ -70,15 +70,12 @@ class TableScan {
   ///         without a pulse.
   explicit TableScan(const TablePattern& pattern);
 
+  const FiringCycle& cycle() const { return cycle_; }
   double sweep_rate_hz() const { return sweeps() / cycle_.period_s(); }
   std::int64_t neighbour_stride() const { return 1; }
-  std::int64_t pulses(std::int64_t sweep) const noexcept {
-    return first_pulse(sweep + 1) - first_pulse(sweep);
+  SweepPulses runs(std::int64_t sweep) const noexcept {
+    return {{{first_pulse(sweep), first_pulse(sweep + 1)}, {}}};
   }
-  double pulse_time_s(std::int64_t sweep, std::int64_t pulse) const noexcept {
-    return cycle_.pulse_time_s(first_pulse(sweep) + pulse);
-  }
-  void fill(std::int64_t sweep, NumberRange pulses, PulseBatch& batch) const noexcept;
 
  private:
   int sweeps() const { return static_cast<int>(begins_.size()); }

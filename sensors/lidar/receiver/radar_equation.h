@@ -2,6 +2,9 @@
 
 #include <glm/vec3.hpp>
 #include <optional>
+#include <vector>
+
+#include "sensors/sky/atmosphere.h"
 
 namespace groundray {
 
@@ -24,6 +27,33 @@ struct SolarBackground {
   std::optional<glm::dvec3> direction;
   double filter_width_nm = 0;   ///< equivalent width of the receiver's optical filter
   double field_of_view_sr = 0;  ///< solid angle of one detector's view
+};
+
+/// Overlap of the emitter's beam and the receiver's field of view: 0 up to `none_below_m`, 1 from
+/// `full_from_m` on, linear between.
+struct Overlap {
+  double none_below_m = 0;
+  double full_from_m = 0;
+};
+
+/// Returns the overlap at a range: the fraction of its light that the receiver sees.
+constexpr double overlap_share(const Overlap& overlap, double range_m) noexcept {
+  if (range_m <= overlap.none_below_m) return 0;
+  if (range_m >= overlap.full_from_m) return 1;
+  return (range_m - overlap.none_below_m) / (overlap.full_from_m - overlap.none_below_m);
+}
+
+/// Range steps over which the backscatter of the air is integrated, starting at 0.
+struct SoftReturnGrid {
+  double step_m = 0;
+  double max_range_m = 0;
+  double least_share = 0;  ///< the grid ends at a step below this fraction of the strongest
+};
+
+/// Backscatter of one step of air, reduced to a single range.
+struct SoftReturn {
+  double range_m = 0;  ///< centroid of its energy
+  double energy_j = 0;
 };
 
 /// Returns the solid angle, sr, of a cone of full angle `angle_rad` in [0, 2 pi].
@@ -54,6 +84,15 @@ class RadarEquation {
   /// reflectance `reflectance` that fills the field of view.
   /// @throws Error listing all values that are out of bounds.
   double solar_power_w(const SolarBackground& sun, double reflectance) const;
+
+  /// Returns the energy that the air scatters back from each step of `grid`, nearest first, with a
+  /// relative error of at most 1e-9. Steps without energy are omitted. Surfaces are not considered:
+  /// truncate the result at the surface. It is the same for all pulses of a lidar.
+  /// @throws Error listing all values that are out of bounds in `overlap` and `grid`.
+  /// @see Rasshofer et al., Influences of weather phenomena on automotive laser radar systems, Adv.
+  ///      Radio Sci. 9 (2011): the soft target.
+  std::vector<SoftReturn> soft_return(const Atmosphere& air, const Overlap& overlap,
+                                      const SoftReturnGrid& grid) const;
 
   /// Returns the energy of the pulse times the efficiencies and the area of the aperture: the
   /// constant factor of `received_energy_j`.

@@ -7,7 +7,7 @@
 
 #include "core/error.h"
 #include "sensors/lidar/receiver/echo_trace.h"
-#include "sensors/normal_spread.h"
+#include "sensors/lidar/receiver/normal_spread.h"
 
 namespace groundray {
 

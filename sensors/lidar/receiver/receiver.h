@@ -7,8 +7,6 @@
 #include <vector>
 
 #include "core/random.h"
-#include "sensors/lidar/receiver/pulse.h"
-#include "sensors/lidar/receiver/range_gate.h"
 #include "sensors/lidar/receiver/waveform.h"
 
 namespace groundray {
@@ -17,6 +15,12 @@ class EchoTrace;
 
 /// Speed of light in vacuum; exact by the definition of the metre.
 inline constexpr double speed_of_light_m_per_s = 299'792'458;
+
+/// Closed interval of slant ranges that a receiver reports, metres along the beam.
+struct RangeGate {
+  double near_m = 0;
+  double far_m = std::numeric_limits<double>::infinity();
+};
 
 /// Noise of a receiver, as power at its input.
 struct NoiseSpec {

@@ -3,9 +3,44 @@
 #include <algorithm>
 #include <cmath>
 #include <limits>
+#include <numbers>
+
+#include "core/error.h"
 
 namespace groundray {
 namespace {
+
+const double cut_off_sigmas = std::sqrt(-2 * std::log(SystemPulse::cut_off));  // 5.678
+constexpr int scan_steps = 4096;    // over a table's support, to find its peak and edges
+constexpr int halvings = 64;        // bisections of a bracket: to the last bit
+constexpr double sharp_sigmas = 9;  // beyond it a smooth ramp equals a sharp one: Phi(-9) = 1e-19
+
+void check_pulse(const PulseSpec& spec) {
+  Violations broken("pulse");
+  if (spec.shape.empty()) {
+    broken.unless(spec.fwhm_s > 0 && std::isfinite(spec.fwhm_s),
+                  "fwhm_s = {} must be positive and finite without a shape", spec.fwhm_s);
+  } else {
+    broken.unless(spec.fwhm_s == 0, "fwhm_s = {} and a shape: give one of them", spec.fwhm_s);
+    broken.unless(spec.shape_step_s > 0 && std::isfinite(spec.shape_step_s),
+                  "shape_step_s = {} must be positive and finite", spec.shape_step_s);
+    broken.unless(std::ranges::all_of(
+                      spec.shape, [](double power) { return power >= 0 && std::isfinite(power); }),
+                  "shape: every value must be finite and not negative");
+    broken.unless(std::ranges::any_of(spec.shape, [](double power) { return power > 0; }),
+                  "shape: at least one value must be positive");
+  }
+  broken.throw_if_any();
+}
+
+double normal_density(double x) { return std::exp(-0.5 * x * x) / std::sqrt(2 * std::numbers::pi); }
+
+// Returns max(x, 0) convolved with a Gaussian.
+double smooth_ramp(double x, double sigma) {
+  if (std::abs(x) >= sharp_sigmas * sigma) return std::max(x, 0.0);
+  const double z = x / sigma;
+  return x * 0.5 * std::erfc(-z / std::numbers::sqrt2) + sigma * normal_density(z);
+}
 
 // Pulses begin at multiples of a vector of floats and are shifted within the first vector. Each
 // vector of a sum is then stored and loaded at the same position; a processor stalls if they
@@ -21,6 +56,102 @@ bool arrival_precedes(const Arrival& a, const Arrival& b) {
 }
 
 }  // namespace
+
+SystemPulse::SystemPulse(const PulseSpec& spec, double response_sigma_s)
+    : sigma_s_(response_sigma_s) {
+  check_pulse(spec);
+  if (spec.shape.empty()) {
+    sigma_s_ = std::hypot(spec.fwhm_s / fwhm_per_sigma, response_sigma_s);
+    end_s_ = cut_off_sigmas * sigma_s_;
+    begin_s_ = -end_s_;
+    peak_per_s_ = (*this)(0);
+    fwhm_s_ = fwhm_per_sigma * sigma_s_;
+  } else {
+    sum_ramps(spec);
+    measure();
+  }
+}
+
+// Linear interpolation is a sum of hat functions, each of which is a sum of three ramps.
+void SystemPulse::sum_ramps(const PulseSpec& spec) {
+  double sum = 0, moment = 0;
+  for (std::size_t i = 0; i < spec.shape.size(); ++i) {
+    sum += spec.shape[i];
+    moment += spec.shape[i] * static_cast<double>(i);
+  }
+  step_s_ = spec.shape_step_s;
+  first_ramp_s_ = -(moment / sum + 1) * step_s_;
+  ramps_.assign(spec.shape.size() + 2, 0);
+  for (std::size_t i = 0; i < spec.shape.size(); ++i) {
+    const double slope = spec.shape[i] / (sum * step_s_ * step_s_);
+    ramps_[i] += slope;
+    ramps_[i + 1] -= 2 * slope;
+    ramps_[i + 2] += slope;
+  }
+}
+
+double SystemPulse::operator()(double time_s) const {
+  if (ramps_.empty()) return normal_density(time_s / sigma_s_) / sigma_s_;
+  double sum = 0;
+  for (std::size_t i = 0; i < ramps_.size(); ++i) {
+    const double since_s = time_s - (first_ramp_s_ + static_cast<double>(i) * step_s_);
+    if (since_s <= -sharp_sigmas * sigma_s_) break;
+    sum += ramps_[i] * smooth_ramp(since_s, sigma_s_);
+  }
+  return std::max(sum, 0.0);  // far behind the table the ramps cancel except for rounding
+}
+
+// Finds the begin, peak, end and width of a table's pulse by a scan with refinement.
+void SystemPulse::measure() {
+  const double margin_s = cut_off_sigmas * sigma_s_;
+  const double first_s = first_ramp_s_ - margin_s;
+  const double last_s = first_ramp_s_ + static_cast<double>(ramps_.size() - 1) * step_s_ + margin_s;
+  const double step_s = (last_s - first_s) / scan_steps;
+  std::vector<double> values(scan_steps + 1);
+  for (std::size_t i = 0; i < values.size(); ++i) {
+    values[i] = (*this)(first_s + static_cast<double>(i) * step_s);
+  }
+  const auto top = std::ranges::max_element(values);
+  const auto at = [&](auto i) {
+    return first_s + static_cast<double>(i - values.begin()) * step_s;
+  };
+  double low_s = at(top) - step_s, high_s = at(top) + step_s;
+  for (int k = 0; k < 2 * halvings; ++k) {
+    const double third_s = (high_s - low_s) / 3;
+    if ((*this)(low_s + third_s) < (*this)(high_s - third_s)) {
+      low_s += third_s;
+    } else {
+      high_s -= third_s;
+    }
+  }
+  peak_s_ = 0.5 * (low_s + high_s);
+  peak_per_s_ = (*this)(peak_s_);
+  const auto holds = [&](double value) { return value >= cut_off * peak_per_s_; };
+  begin_s_ = at(std::ranges::find_if(values, holds)) - step_s;
+  end_s_ = at(std::find_if(values.rbegin(), values.rend(), holds).base());
+  const double half_per_s = 0.5 * peak_per_s_;
+  auto last_half = values.end() - 1;
+  while (*last_half < half_per_s) --last_half;
+  fwhm_s_ = crossing_s(at(last_half) + step_s, at(last_half), half_per_s) - rise_s(0.5);
+}
+
+double SystemPulse::rise_s(double fraction) const {
+  if (ramps_.empty()) return -sigma_s_ * std::sqrt(-2 * std::log(fraction));
+  const double level_per_s = fraction * peak_per_s_;
+  const double step_s = (peak_s_ - begin_s_) / scan_steps;
+  int k = 1;
+  while (k < scan_steps && (*this)(begin_s_ + k * step_s) < level_per_s) ++k;
+  return crossing_s(begin_s_ + (k - 1) * step_s, begin_s_ + k * step_s, level_per_s);
+}
+
+// Bisects between a time at which s is below the level and one at which it is not.
+double SystemPulse::crossing_s(double low_s, double high_s, double level_per_s) const {
+  for (int k = 0; k < halvings; ++k) {
+    const double middle_s = 0.5 * (low_s + high_s);
+    ((*this)(middle_s) < level_per_s ? low_s : high_s) = middle_s;
+  }
+  return high_s;
+}
 
 void Waveform::add(std::int64_t first, std::span<const float> power_w) noexcept {
   const std::int64_t end = first + static_cast<std::int64_t>(power_w.size());

@@ -1,5 +1,3 @@
-#include "sensors/camera/irradiance.h"
-
 #include <gmock/gmock.h>
 #include <gtest/gtest.h>
 #include <tbb/task_arena.h>
@@ -11,6 +9,9 @@
 #include <vector>
 
 #include "core/error.h"
+#include "sensors/camera/camera_spec.h"
+#include "sensors/camera/imager.h"
+#include "sensors/camera/lens/lens.h"
 #include "test/support/margin.h"
 
 namespace groundray::irradiance_test {

@@ -130,7 +130,7 @@ TEST(LidarImage, EveryEchoIsVisibleToACameraAtTheLidar) {
   const glm::dvec3 p_DS(3.3, -7.1, ground.height_m_at({3.3, -7.1}).value() + 0.6);
   LidarSpec flash;
   flash.model = "test";
-  flash.pattern = flash_pattern({60, 300, 6.2, 1.2}, 0.1);
+  flash.pattern = raster_pattern({60, 300, 6.2, 1.2}, 0, 0, 0.1);
   flash.gate = {0, 1000};
   CameraSpec spec;
   spec.size_px = {720, 360};

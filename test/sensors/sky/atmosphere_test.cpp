@@ -8,6 +8,7 @@
 #include <numbers>
 
 #include "core/error.h"
+#include "sensors/lidar/receiver/radar_equation.h"
 #include "test/support/margin.h"
 
 namespace groundray::atmosphere_test {
@@ -60,7 +61,7 @@ TEST(Atmosphere, VacuumIsTheDefault) {
   const Atmosphere air({}, 905);
   EXPECT_EQ(air.transmission(1e5), 1);
   EXPECT_EQ(air.group_index(), 1);
-  EXPECT_TRUE(air.soft_return(radar(), overlap, {.step_m = 1, .max_range_m = 100}).empty());
+  EXPECT_TRUE(radar().soft_return(air, overlap, {.step_m = 1, .max_range_m = 100}).empty());
 }
 
 // Beer-Lambert as a differential equation, dT/dr = -alpha T, in thin slabs of linear loss.
@@ -151,7 +152,7 @@ class SoftReturnSteps : public ::testing::TestWithParam<std::tuple<double, doubl
 TEST_P(SoftReturnSteps, EachStepHasTheEnergyAndTheCentroidOfItsIntegral) {
   const auto [fog_range_m, step_m] = GetParam();
   const Atmosphere air({.fog_range_m = fog_range_m}, 905);
-  const auto returns = air.soft_return(radar(), overlap, {.step_m = step_m, .max_range_m = 40.25});
+  const auto returns = radar().soft_return(air, overlap, {.step_m = step_m, .max_range_m = 40.25});
   const long double alpha = std::log(20.0L) / fog_range_m;
   const long double beta = 0.046L / fog_range_m;
   auto next = returns.begin();
@@ -189,7 +190,7 @@ INSTANTIATE_TEST_SUITE_P(Atmosphere, SoftReturnSteps,
 TEST(Atmosphere, FogEchoEqualsThePublishedIntegral) {
   constexpr double c = 299'792'458, tau_s = 20e-9, peak_w = 80, step_m = 1. / 512;
   const Atmosphere air({.fog_range_m = 50}, 905);
-  const auto returns = air.soft_return(radar(), overlap, {.step_m = step_m, .max_range_m = 60});
+  const auto returns = radar().soft_return(air, overlap, {.step_m = step_m, .max_range_m = 60});
   const auto shape = [&](long double t) {
     const long double s = std::sin(std::numbers::pi_v<long double> * t / (2 * tau_s));
     return t < 0 || t > 2 * tau_s ? 0 : s * s;
@@ -226,9 +227,9 @@ TEST(Atmosphere, FogEchoEqualsThePublishedIntegral) {
 
 TEST(Atmosphere, SoftReturnEndsWhereItIsTooWeak) {
   const Atmosphere air({.fog_range_m = 50}, 905);
-  const auto all = air.soft_return(radar(), overlap, {.step_m = 0.5, .max_range_m = 100});
+  const auto all = radar().soft_return(air, overlap, {.step_m = 0.5, .max_range_m = 100});
   const auto some =
-      air.soft_return(radar(), overlap, {.step_m = 0.5, .max_range_m = 100, .least_share = 1e-3});
+      radar().soft_return(air, overlap, {.step_m = 0.5, .max_range_m = 100, .least_share = 1e-3});
   double strongest_j = 0;
   for (const SoftReturn& step : all) strongest_j = std::max(strongest_j, step.energy_j);
   ASSERT_LT(some.size(), all.size());
@@ -255,8 +256,8 @@ TEST(Atmosphere, ErrorListsEveryFault) {
               ThrowsMessage<Error>(HasSubstr("are alternatives")));
   EXPECT_THAT(
       [] {
-        Atmosphere({}, 905).soft_return(radar(), {.none_below_m = 0, .full_from_m = 0},
-                                        {.step_m = 0, .max_range_m = -1, .least_share = 1});
+        radar().soft_return(Atmosphere({}, 905), {.none_below_m = 0, .full_from_m = 0},
+                            {.step_m = 0, .max_range_m = -1, .least_share = 1});
       },
       ThrowsMessage<Error>(AllOf(HasSubstr("none_below_m = 0"), HasSubstr("full_from_m = 0"),
                                  HasSubstr("step_m = 0"), HasSubstr("max_range_m = -1"),

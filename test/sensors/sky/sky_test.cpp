@@ -13,7 +13,7 @@
 
 #include "core/error.h"
 #include "core/image/luminance.h"
-#include "sensors/sky/aerial_perspective.h"
+#include "sensors/sky/atmosphere.h"
 
 namespace groundray::sky_test {
 namespace {

@@ -47,7 +47,7 @@ RecordedSensor recorded(const SensorPreset& preset, const Pose& X_DS,
 
 RecordedNames names_of(const Simulation& simulation) {
   RecordedNames names;
-  for (const SceneObjects::Group& group : simulation.content.groups) {
+  for (const SceneObjects::Group& group : simulation.scene_objects.groups) {
     names.objects.push_back({group.name, group.label, group.first, group.count});
     std::string& name = names.labels[group.label];
     name += (name.empty() ? "" : ", ") + group.name;

@@ -13,6 +13,7 @@
 #include <set>
 
 #include "core/error.h"
+#include "core/io/file_io.h"
 #include "sensors/camera/lens/lens.h"
 #include "test/support/lens_samples.h"
 #include "test/support/margin.h"
@@ -247,7 +248,7 @@ TEST(CameraCalibration, RoundTripsThroughEveryFormatThatSupportsIt) {
 TEST(CameraCalibration, RoundTripsAChain) {
   const auto cameras = parsed(kalibr);
   const TemporaryFolder folder;
-  write_camera_calibrations(folder / "chain.yaml", cameras, KalibrYaml);
+  write_text(folder / "chain.yaml", camera_calibrations_text(cameras, KalibrYaml));
   const auto back = load_camera_calibrations(folder / "chain.yaml");
   ASSERT_THAT(back, SizeIs(2));
   EXPECT_EQ(back[1].X_FC, cameras[1].X_FC);

@@ -1,5 +1,3 @@
-#include "apps/scene/readers/material_io.h"
-
 #include <gmock/gmock.h>
 #include <gtest/gtest.h>
 
@@ -8,6 +6,7 @@
 #include <numbers>
 #include <sstream>
 
+#include "apps/scene/readers/spec_io.h"
 #include "core/appearance/bsdf.h"
 #include "core/error.h"
 #include "test/support/temporary_folder.h"

@@ -1,5 +1,3 @@
-#include "apps/scene/readers/sky_reader.h"
-
 #include <gmock/gmock.h>
 #include <gtest/gtest.h>
 
@@ -8,6 +6,7 @@
 #include <string>
 #include <string_view>
 
+#include "apps/scene/readers/readers.h"
 #include "core/error.h"
 #include "test/support/temporary_folder.h"
 

@@ -11,7 +11,7 @@
 #include <numbers>
 
 #include "core/error.h"
-#include "sensors/sky/solar_spectrum.h"
+#include "sensors/sky/sun.h"
 #include "test/support/scans/lidar_file.h"
 #include "test/support/temporary_folder.h"
 

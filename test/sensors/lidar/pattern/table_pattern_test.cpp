@@ -161,7 +161,7 @@ TEST(TablePattern, FlashFiresAllPixelsAtOnceThroughAPinhole) {
   PixelArray pixels{.rows = 5, .columns = 8, .spacing = PixelArray::Spacing::EqualTangents};
   pixels.horizontal_view_rad = 90 * degree;
   pixels.vertical_view_rad = 2 * std::atan(0.5);
-  const ScanPattern scan(flash_pattern(pixels, 0.05));
+  const ScanPattern scan(raster_pattern(pixels, 0, 0, 0.05));
   const PulseBatch batch = sweep_of(scan, 2);
   ASSERT_EQ(batch.size(), 40u);
   ASSERT_EQ(batch.volleys.size(), 1u);

@@ -1,5 +1,3 @@
-#include "sensors/lidar/receiver/pulse.h"
-
 #include <gmock/gmock.h>
 #include <gtest/gtest.h>
 
@@ -7,6 +5,7 @@
 #include <numbers>
 
 #include "core/error.h"
+#include "sensors/lidar/receiver/waveform.h"
 
 namespace groundray::pulse_test {
 namespace {

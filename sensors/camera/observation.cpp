@@ -1,4 +1,4 @@
-#include "sensors/camera/sighting.h"
+#include "sensors/camera/observation.h"
 
 #include <algorithm>
 #include <glm/gtc/quaternion.hpp>
@@ -28,8 +28,8 @@ glm::dvec3 Mover::seen_from(const glm::dvec3& p_DC, nanoseconds time) const noex
   return then.p_DO + then.R_DO * p_ - p_DC;
 }
 
-std::optional<Sighting> sighting(const Camera& camera, const Trajectory& X_DC, nanoseconds begin,
-                                 const Mover& point, double row) {
+std::optional<Observation> observe(const Camera& camera, const Trajectory& X_DC, nanoseconds begin,
+                                   const Mover& point, double row) {
   const double last_row = camera.spec().size_px.y - 1;
   const auto time_of = [&](double at) {
     return begin + camera.middle_of(std::clamp(at, 0.0, last_row));
@@ -43,7 +43,7 @@ std::optional<Sighting> sighting(const Camera& camera, const Trajectory& X_DC, n
     if (!pixel) return std::nullopt;
     const nanoseconds then = time_of(pixel->y);
     if (std::chrono::abs(then - time) <= nanoseconds(1))
-      return Sighting{*pixel, time, pose, towards};
+      return Observation{*pixel, time, pose, towards};
     time = then;
   }
   return std::nullopt;

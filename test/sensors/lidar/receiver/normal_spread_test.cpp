@@ -1,4 +1,4 @@
-#include "sensors/normal_spread.h"
+#include "sensors/lidar/receiver/normal_spread.h"
 
 #include <gtest/gtest.h>
 

@@ -38,7 +38,7 @@ class Mover {
 };
 
 /// Observation of a point by an image.
-struct Sighting {
+struct Observation {
   glm::dvec2 pixel{0};               ///< inside the image or not
   std::chrono::nanoseconds time{0};  ///< middle of its row's exposure
   Pose X_DC;                         ///< pose of the camera at that time
@@ -51,8 +51,8 @@ struct Sighting {
 /// nullopt if the point is not imaged, or moves faster than the rows.
 /// @param begin  start of the image; X_DC covers it.
 /// @param row    first guess of the row.
-std::optional<Sighting> sighting(const Camera& camera, const Trajectory& X_DC,
-                                 std::chrono::nanoseconds begin, const Mover& point, double row);
+std::optional<Observation> observe(const Camera& camera, const Trajectory& X_DC,
+                                   std::chrono::nanoseconds begin, const Mover& point, double row);
 
 /// Returns true if a position lies on one of an image's pixels.
 bool is_inside(glm::ivec2 size_px, const glm::dvec2& pixel) noexcept;
