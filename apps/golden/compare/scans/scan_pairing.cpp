@@ -14,7 +14,6 @@
 #include <tuple>
 #include <utility>
 
-#include "apps/golden/compare/scans/direction_tree.h"
 #include "apps/golden/compare/scans/pulses.h"
 #include "core/error.h"
 
