@@ -1,13 +1,53 @@
 #pragma once
 
+#include <chrono>
 #include <cstddef>
 #include <memory>
+#include <mutex>
+#include <optional>
 #include <utility>
+#include <vector>
 
-#include "apps/python/frame_scene_cache.h"
+#include "apps/scene/frame_scene_builder.h"
 #include "apps/scene/simulation.h"
 
 namespace groundray::python {
+
+/// Cache of the scenes that frames see, for any number of threads. Frames that see the same scene
+/// share it; an idle scene is reused to build the next.
+class FrameSceneCache {
+ public:
+  /// @param simulation  must outlive this object.
+  explicit FrameSceneCache(const Simulation& simulation) : simulation_(simulation) {}
+
+  /// Returns the scene that a frame sees, which must be released before this object ends. Waits
+  /// while another thread builds one.
+  /// @throws Error as FrameSceneBuilder.
+  std::shared_ptr<const Scene> of(const Exposed& frame);
+
+ private:
+  // Frames with equal keys see the same scene.
+  struct Key {
+    std::optional<glm::dvec3> p_DL;     // set if the whole terrain is in memory
+    const Trajectory* X_DS = nullptr;   // set otherwise
+    std::chrono::nanoseconds begin{0};  // set with X_DS
+    bool operator==(const Key&) const = default;
+  };
+  struct Entry {
+    explicit Entry(const Simulation& simulation) : frames(simulation) {}
+    FrameSceneBuilder frames;
+    const Scene* scene = nullptr;
+    std::optional<Key> key;
+    int users = 0;
+  };
+  Key key_of(const Exposed& frame) const;
+  Entry& entry_for(const Key& key);
+  void give_back(Entry& entry);
+
+  const Simulation& simulation_;
+  std::mutex mutex_;
+  std::vector<std::unique_ptr<Entry>> entries_;
+};
 
 /// Loaded scene and the scenes that its frames see. All Python objects of a scene share it.
 struct SceneState {

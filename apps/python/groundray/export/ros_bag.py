@@ -20,12 +20,10 @@ from groundray.export.images import (
     read_depths_m,
     read_picture,
 )
-from groundray.export.intensity import FullScale
-from groundray.export.mcap_file import Bag, Message
+from groundray.export.mcap_file import POINT_TYPES, Bag, Message
 from groundray.export.notes import Notes
 from groundray.export.ros_layouts import rows_of
-from groundray.export.ros_messages import POINT_TYPES
-from groundray.export.scan import read_scan
+from groundray.export.scan import FullScale, read_scan
 from groundray.export.sensor_path import Floats, SensorPath, quaternion_wxyz
 
 MAP, BODY = "map", "base_link"

@@ -1,4 +1,4 @@
-#include "apps/python/frame_scene_cache.h"
+#include "apps/python/scene_state.h"
 
 #include <algorithm>
 
