@@ -24,7 +24,7 @@
 #include "apps/python/binding/long_call.h"
 #include "apps/python/binding/numpy_argument.h"
 #include "apps/python/camera_image.h"
-#include "apps/python/frame_choice.h"
+#include "apps/python/scene_state.h"
 #include "apps/python/sweep.h"
 #include "apps/scene/frames.h"
 #include "core/error.h"

@@ -1,8 +1,29 @@
 #include "apps/python/scene_state.h"
 
 #include <algorithm>
+#include <cmath>
+#include <cstdlib>
+#include <ranges>
+
+#include "core/error.h"
 
 namespace groundray::python {
+namespace {
+
+using std::chrono::nanoseconds;
+
+// Requires at least one frame.
+std::int64_t nearest_frame(const FrameTimes& times, nanoseconds time) {
+  const auto frames = std::views::iota(std::int64_t{0}, times.count);
+  const auto after = std::ranges::partition_point(
+      frames, [&](std::int64_t frame) { return times.begin(frame) < time; });
+  const std::int64_t next = after == frames.end() ? times.count - 1 : *after;
+  if (next == 0) return 0;
+  return time - times.begin(next - 1) < std::chrono::abs(times.begin(next) - time) ? next - 1
+                                                                                   : next;
+}
+
+}  // namespace
 
 FrameSceneCache::Key FrameSceneCache::key_of(const Exposed& frame) const {
   if (simulation_.terrain.whole() == nullptr) return {.X_DS = frame.X_DS, .begin = frame.begin};
@@ -38,6 +59,38 @@ void FrameSceneCache::give_back(Entry& entry) {
   if (entry.users > 0) return;
   std::erase_if(entries_,
                 [&](const auto& each) { return each.get() != &entry && each->users == 0; });
+}
+
+double seconds_of(nanoseconds time) { return std::chrono::duration<double>(time).count(); }
+
+nanoseconds nanoseconds_of(double time_s) {
+  constexpr double most_s = 4.6e9;
+  if (!(std::abs(time_s) <= most_s)) throw Error("t_s = {} must be within 4.6e9 s of zero", time_s);
+  return nanoseconds(std::llround(time_s * 1e9));
+}
+
+AnyArray all_times_s(const FrameTimes& times) {
+  std::vector<double> all_s;
+  for (std::int64_t frame = 0; frame < times.count; ++frame)
+    all_s.push_back(seconds_of(times.begin(frame)));
+  return array_of(std::move(all_s));
+}
+
+std::int64_t chosen_frame(const FrameTimes& times, std::optional<double> t_s,
+                          std::optional<std::int64_t> frame) {
+  if (t_s.has_value() == frame.has_value())
+    throw Error("{}: give either t_s, when the frame begins, or frame, its number", times.sensor);
+  if (frame) {
+    if (0 <= *frame && *frame < times.count) return *frame;
+    throw Error("{}: there is no frame {}; the scene has {}, numbered from 0", times.sensor, *frame,
+                times.count);
+  }
+  constexpr nanoseconds slack = std::chrono::microseconds(1);
+  const nanoseconds time = nanoseconds_of(*t_s);
+  const std::int64_t nearest = nearest_frame(times, time);
+  if (std::chrono::abs(times.begin(nearest) - time) <= slack) return nearest;
+  throw Error("{}: no frame begins at {} s; the nearest is frame {}, at {} s", times.sensor, *t_s,
+              nearest, seconds_of(times.begin(nearest)));
 }
 
 }  // namespace groundray::python

@@ -225,6 +225,15 @@ def read_text(path: Path) -> str:
         raise Error(f"{path}: it is not UTF-8 text; is it damaged?") from None
 
 
+def read_listed(file: Path, what: str) -> bytes:
+    """Returns the bytes of a finished frame's file. Raises Error if it cannot be read."""
+    try:
+        return file.read_bytes()
+    except OSError as fault:
+        rule = f"cannot read it: {fault.strerror}, although dataset.yaml lists {what} as done"
+        raise Error(f"{file}: {rule}; was it removed?") from None
+
+
 def _read_map(path: Path) -> _Map:
     return _Map(path, _load_yaml(read_text(path), path))
 

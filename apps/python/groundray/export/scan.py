@@ -9,7 +9,7 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
-from groundray.dataset import Dataset, Error, Frame, Lidar
+from groundray.dataset import Dataset, Error, Frame, Lidar, read_listed
 from groundray.export.sensor_path import Floats, SensorPath
 
 # Units and meanings of the columns that docs/reference/formats.md defines.
@@ -140,11 +140,7 @@ class FullScale:
 def read_scan(dataset: Dataset, lidar: Lidar, frame: Frame) -> Scan:
     """Reads one scan. Raises Error if it is missing, truncated, or not a scan of groundray."""
     file = dataset.scan_file(lidar, frame)
-    try:
-        data = file.read_bytes()
-    except OSError as fault:
-        rule = f"cannot read it: {fault.strerror}, although dataset.yaml lists it as done"
-        raise Error(f"{file}: {rule}; was it removed?") from None
+    data = read_listed(file, "it")
     dtype, count, offset = _read_header(data, file)
     expected = offset + count * dtype.itemsize
     if len(data) != expected:
