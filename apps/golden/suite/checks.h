@@ -1,11 +1,12 @@
 #pragma once
 
-#include "apps/golden/report.h"
-#include "apps/golden/suite/columns.h"
-#include "apps/golden/suite/golden_case.h"
 #include <filesystem>
 #include <string>
 #include <vector>
+
+#include "apps/golden/report.h"
+#include "apps/golden/suite/columns.h"
+#include "apps/golden/suite/golden_case.h"
 
 namespace groundray::golden {
 
