@@ -1,22 +1,59 @@
 #include "apps/golden/report.h"
 
 #include <algorithm>
+#include <array>
 #include <cmath>
 #include <cstddef>
+#include <nlohmann/json.hpp>
+#include <string>
 #include <utility>
 
+#include "core/io/file_io.h"
+
 namespace groundray::golden {
+namespace {
+
+using Json = nlohmann::ordered_json;
+
+Json json_of(const Measure& measure) {
+  return {{"name", measure.name},       {"value", measure.value},
+          {"unit", measure.unit},       {"limit", measure.limit ? Json(*measure.limit) : Json()},
+          {"because", measure.because}, {"verdict", word_of(measure.verdict)}};
+}
+
+Json json_of(const Table& table) {
+  return {{"title", table.title}, {"columns", table.columns}, {"rows", table.rows}};
+}
+
+Json json_of(const Histogram& histogram) {
+  return {{"title", histogram.title}, {"unit", histogram.unit},     {"low", histogram.low},
+          {"high", histogram.high},   {"counts", histogram.counts}, {"below", histogram.below},
+          {"above", histogram.above}};
+}
+
+Json json_of(const Section& section);
+
+template <typename T>
+Json json_of(const std::vector<T>& all) {
+  Json array = Json::array();
+  for (const T& each : all) array.push_back(json_of(each));
+  return array;
+}
+
+Json json_of(const Section& section) {
+  return {{"title", section.title},
+          {"verdict", word_of(section.verdict)},
+          {"text", section.text},
+          {"measures", json_of(section.measures)},
+          {"tables", json_of(section.tables)},
+          {"histograms", json_of(section.histograms)}};
+}
+
+}  // namespace
 
 const char* word_of(Verdict verdict) {
-  switch (verdict) {
-    case Verdict::Passed:
-      return "passed";
-    case Verdict::Failed:
-      return "failed";
-    case Verdict::Told:
-      break;
-  }
-  return "told";
+  constexpr std::array words{"passed", "failed", "told"};
+  return words[static_cast<std::size_t>(verdict)];
 }
 
 Verdict verdict_of(const std::vector<Measure>& measures) {
@@ -28,31 +65,18 @@ Verdict verdict_of(const std::vector<Measure>& measures) {
 }
 
 void tell(Section& into, std::string name, double value, std::string unit) {
-  into.measures.push_back({.name = std::move(name),
-                           .value = value,
-                           .unit = std::move(unit),
-                           .limit = {},
-                           .because = {},
-                           .verdict = Verdict::Told});
+  into.measures.push_back({std::move(name), value, std::move(unit), {}, {}, Verdict::Told});
 }
 
 void hold(Section& into, std::string name, double value, std::string unit, double limit,
           std::string because) {
-  into.measures.push_back({.name = std::move(name),
-                           .value = value,
-                           .unit = std::move(unit),
-                           .limit = limit,
-                           .because = std::move(because),
-                           .verdict = value <= limit ? Verdict::Passed : Verdict::Failed});
+  into.measures.push_back({std::move(name), value, std::move(unit), limit, std::move(because),
+                           value <= limit ? Verdict::Passed : Verdict::Failed});
 }
 
 void fail(Section& into, std::string name, double value, std::string unit, std::string because) {
-  into.measures.push_back({.name = std::move(name),
-                           .value = value,
-                           .unit = std::move(unit),
-                           .limit = {},
-                           .because = std::move(because),
-                           .verdict = Verdict::Failed});
+  into.measures.push_back(
+      {std::move(name), value, std::move(unit), {}, std::move(because), Verdict::Failed});
 }
 
 Histogram histogram_of(std::string title, std::string unit, const std::vector<double>& values,
@@ -75,6 +99,16 @@ Histogram histogram_of(std::string title, std::string unit, const std::vector<do
     }
   }
   return histogram;
+}
+
+void write_json(const std::filesystem::path& path, const Report& report) {
+  Json facts = Json::array();
+  for (const auto& fact : report.facts)
+    facts.push_back({{"name", fact.first}, {"value", fact.second}});
+  const Json whole{
+      {"title", report.title}, {"facts", std::move(facts)}, {"sections", json_of(report.sections)}};
+  // File names may be invalid UTF-8.
+  write_text(path, whole.dump(2, ' ', false, Json::error_handler_t::replace) + "\n");
 }
 
 }  // namespace groundray::golden

@@ -49,27 +49,14 @@ svg { max-width: 100%; height: auto; } svg text { font-family: system-ui, sans-s
 )";
 
 std::string escaped(std::string_view text) {
+  constexpr std::string_view special = "&<>\"'";
+  constexpr std::array entities{"&amp;", "&lt;", "&gt;", "&quot;", "&#39;"};
   std::string result;
   for (const char c : text) {
-    switch (c) {
-      case '&':
-        result += "&amp;";
-        break;
-      case '<':
-        result += "&lt;";
-        break;
-      case '>':
-        result += "&gt;";
-        break;
-      case '"':
-        result += "&quot;";
-        break;
-      case '\'':
-        result += "&#39;";
-        break;
-      default:
-        // HTML permits no other control characters.
-        result += static_cast<unsigned char>(c) < ' ' && c != '\n' && c != '\t' ? ' ' : c;
+    if (const std::size_t place = special.find(c); place != std::string_view::npos) {
+      result += entities[place];
+    } else {  // HTML permits no other control characters
+      result += static_cast<unsigned char>(c) < ' ' && c != '\n' && c != '\t' ? ' ' : c;
     }
   }
   return result;
@@ -86,25 +73,10 @@ std::string number(double value) {
   return text;
 }
 
-struct Words {
-  const char *text, *of_class;
-};
-
-Words words_of(Verdict verdict) {
-  switch (verdict) {
-    case Verdict::Passed:
-      return {"passed", "passed"};
-    case Verdict::Failed:
-      return {"FAILED", "failed"};
-    case Verdict::Told:
-      break;
-  }
-  return {"for information", "told"};
-}
-
 std::string badge(Verdict verdict) {
-  const auto [text, of_class] = words_of(verdict);
-  return fmt::format("<span class=\"v {}\">{}</span>", of_class, text);
+  constexpr std::array texts{"passed", "FAILED", "for information"};
+  return fmt::format("<span class=\"v {}\">{}</span>", word_of(verdict),
+                     texts[static_cast<std::size_t>(verdict)]);
 }
 
 std::string base64(std::string_view bytes) {

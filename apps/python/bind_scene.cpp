@@ -24,7 +24,6 @@
 #include "apps/python/binding/numpy_argument.h"
 #include "apps/python/binding/points.h"
 #include "apps/python/cast.h"
-#include "apps/python/frame_choice.h"
 #include "apps/python/scene_state.h"
 #include "apps/scene/readers/spec_io.h"
 #include "apps/scene/simulation.h"

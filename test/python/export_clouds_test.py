@@ -203,9 +203,9 @@ def test_las_times_follow_the_clock_of_the_dataset():
     import dataclasses
 
     from export_runs import dataset, read_scan
-    from groundray.export.intensity import FullScale
     from groundray.export.las import LasOptions, _Form
     from groundray.export.notes import Notes
+    from groundray.export.scan import FullScale
     from groundray.export.sensor_path import SensorPath
 
     data = dataset()

@@ -6,6 +6,7 @@
 #include <array>
 #include <cmath>
 #include <cstddef>
+#include <functional>
 #include <glm/geometric.hpp>
 #include <glm/mat3x3.hpp>
 #include <glm/matrix.hpp>
@@ -17,7 +18,7 @@
 
 #include "apps/golden/compare/error_figures.h"
 #include "apps/golden/compare/images/difference_picture.h"
-#include "apps/golden/compare/images/image_layer.h"
+#include "apps/golden/compare/images/image_file.h"
 #include "core/error.h"
 #include "core/geometry/cell.h"
 
@@ -27,34 +28,25 @@ namespace {
 constexpr double no_height = std::numeric_limits<double>::quiet_NaN();
 constexpr double same_place = 1e-6;  // cells; rounding of geotransforms in text and floats
 
-/// Heights on the reference's grid, m; NaN in holes.
+/// Heights at the reference's samples, m; NaN in holes.
 struct Heights {
-  GridFrame frame;
-  std::vector<double> m;
+  Image<double> m;
 
-  double operator()(int column, int row) const {
-    return m[static_cast<std::size_t>(row) * static_cast<std::size_t>(frame.samples.x) +
-             static_cast<std::size_t>(column)];
-  }
-  Cell cell(int column, int row) const {
-    return {column,
-            row,
-            1,
-            1,
-            (*this)(column, row),
-            (*this)(column + 1, row),
-            (*this)(column, row + 1),
-            (*this)(column + 1, row + 1)};
+  double operator()(int column, int row) const { return m.at(column, row)[0]; }
+  Cell cell(int x, int y) const {
+    const Heights& z = *this;
+    return {x, y, 1, 1, z(x, y), z(x + 1, y), z(x, y + 1), z(x + 1, y + 1)};
   }
 };
 
 /// Heights of both DEMs at the reference's samples.
 struct DemPair {
+  GridFrame frame;
   Heights reference, other;
   std::size_t beyond = 0;        // samples outside the other's extent
   std::size_t interpolated = 0;  // samples that lie between samples of the other
 
-  glm::ivec2 samples() const { return reference.frame.samples; }
+  glm::ivec2 samples() const { return frame.samples; }
 };
 
 bool is_whole(glm::dvec2 at) { return at == glm::round(at); }
@@ -78,13 +70,14 @@ double height_m_at(const HeightGrid& grid, glm::dvec2 at) {
 
 DemPair paired(const Dem& reference, const Dem& other) {
   const HeightGrid& grid = reference.grid;
-  DemPair pair{{grid.frame(), {grid.heights_m().begin(), grid.heights_m().end()}},
-               {grid.frame(), std::vector<double>(grid.heights_m().size(), no_height)}};
+  const Heights none{Image<double>(grid.columns(), grid.rows(), 1)};
+  DemPair pair{grid.frame(), none, none};
+  std::ranges::copy(grid.heights_m(), pair.reference.m.values().begin());
+  std::ranges::fill(pair.other.m.values(), no_height);
   const glm::dvec2 shift_m(reference.origin_w_m - other.origin_w_m);
   const glm::ivec2 last = other.grid.frame().samples - 1;
-  std::size_t index = 0;
   for (int row = 0; row < grid.rows(); ++row) {
-    for (int column = 0; column < grid.columns(); ++column, ++index) {
+    for (int column = 0; column < grid.columns(); ++column) {
       const glm::dvec2 p = grid.frame().to_D({column, row}) + shift_m;
       const glm::dvec2 at = snapped(other.grid.frame().to_grid(p));
       if (!(0 <= at.x && at.x <= last.x && 0 <= at.y && at.y <= last.y)) {
@@ -92,29 +85,28 @@ DemPair paired(const Dem& reference, const Dem& other) {
         continue;
       }
       if (!is_whole(at)) ++pair.interpolated;
-      pair.other.m[index] = height_m_at(other.grid, at);
+      pair.other.m.at(column, row)[0] = height_m_at(other.grid, at);
     }
   }
   const double up_m = other.origin_w_m.z - reference.origin_w_m.z;
-  for (double& height_m : pair.other.m) height_m += up_m;
+  for (double& height_m : pair.other.m.values()) height_m += up_m;
   return pair;
 }
 
-/// Returns the slope along x and y of D by central differences, one-sided next to holes and edges;
-/// NaN if neither neighbour has a height.
-glm::dvec2 gradient(const Heights& heights, int column, int row) {
+/// Returns the reference's slope along x and y of D by central differences, one-sided next to holes
+/// and edges; NaN if neither neighbour has a height.
+glm::dvec2 gradient(const DemPair& pair, int column, int row) {
   const auto along = [&](int dx, int dy, double step_m) {
     const auto height_at = [&](int times) {
       const int x = column + times * dx, y = row + times * dy;
-      const bool is_in =
-          x >= 0 && y >= 0 && x < heights.frame.samples.x && y < heights.frame.samples.y;
-      return is_in ? heights(x, y) : no_height;
+      const bool is_in = x >= 0 && y >= 0 && x < pair.samples().x && y < pair.samples().y;
+      return is_in ? pair.reference(x, y) : no_height;
     };
     const double before = height_at(-1), here = height_at(0), after = height_at(1);
     if (std::isnan(before)) return (after - here) / step_m;
     return std::isnan(after) ? (here - before) / step_m : (after - before) / (2 * step_m);
   };
-  return {along(1, 0, heights.frame.step_m.x), along(0, 1, heights.frame.step_m.y)};
+  return {along(1, 0, pair.frame.step_m.x), along(0, 1, pair.frame.step_m.y)};
 }
 
 /// Sample with a height in both DEMs.
@@ -130,7 +122,7 @@ std::vector<Sample> samples_of(const DemPair& pair) {
     for (int column = 0; column < pair.samples().x; ++column) {
       const double error_m = pair.other(column, row) - pair.reference(column, row);
       if (std::isnan(error_m)) continue;
-      samples.push_back({column, row, error_m, gradient(pair.reference, column, row)});
+      samples.push_back({column, row, error_m, gradient(pair, column, row)});
     }
   }
   return samples;
@@ -151,8 +143,7 @@ void tell_vertical(const DemPair& pair, const glm::dvec3& origin_w_m,
   tell(into, "height: NMAD, 1.4826 times the median of |error - median|", figures.nmad, "m");
   if (figures.largest == 0) return;
   const Sample& worst = samples[figures.worst];
-  const glm::dvec2 p_W =
-      pair.reference.frame.to_D({worst.column, worst.row}) + glm::dvec2(origin_w_m);
+  const glm::dvec2 p_W = pair.frame.to_D({worst.column, worst.row}) + glm::dvec2(origin_w_m);
   into.text += fmt::format(
       "The largest height error is in column {}, row {} (east {:.3f} m, north {:.3f} m): {:.6g} m "
       "where the reference has {:.6g} m.\n",
@@ -189,7 +180,7 @@ void tell_by_slope(const std::vector<Sample>& samples, Section& into) {
 /// Compares the normals of both triangles of each cell that both surfaces have.
 void tell_slopes(const DemPair& pair, Section& into) {
   std::vector<double> angles_deg, slopes_deg;
-  const GridFrame& frame = pair.reference.frame;
+  const GridFrame& frame = pair.frame;
   for (int row = 0; row + 1 < pair.samples().y; ++row) {
     for (int column = 0; column + 1 < pair.samples().x; ++column) {
       const Cell of_reference = pair.reference.cell(column, row);
@@ -211,9 +202,9 @@ void tell_slopes(const DemPair& pair, Section& into) {
 
 void tell_holes(const DemPair& pair, Section& into) {
   std::size_t only_reference = 0, only_other = 0, both = 0;
-  for (std::size_t i = 0; i < pair.other.m.size(); ++i) {
-    const bool is_hole = std::isnan(pair.reference.m[i]),
-               is_hole_of_other = std::isnan(pair.other.m[i]);
+  for (std::size_t i = 0; i < pair.other.m.values().size(); ++i) {
+    const bool is_hole = std::isnan(pair.reference.m.values()[i]),
+               is_hole_of_other = std::isnan(pair.other.m.values()[i]);
     both += is_hole && is_hole_of_other ? 1 : 0;
     only_reference += is_hole && !is_hole_of_other ? 1 : 0;
     only_other += !is_hole && is_hole_of_other ? 1 : 0;
@@ -256,7 +247,7 @@ std::optional<Shift> fitted_shift(const std::vector<Sample>& samples) {
 void suspect_shift(const DemPair& pair, const std::vector<Sample>& samples, Section& into) {
   const auto fit = fitted_shift(samples);
   if (!fit || !(fit->explained > 0.5)) return;
-  const glm::dvec2 cells = glm::abs(fit->shift_m * pair.reference.frame.cells_per_m);
+  const glm::dvec2 cells = glm::abs(fit->shift_m * pair.frame.cells_per_m);
   const double most_cells = std::max(cells.x, cells.y);
   if (!(0.05 < most_cells && most_cells < 3)) return;
   into.text += fmt::format(
@@ -266,20 +257,12 @@ void suspect_shift(const DemPair& pair, const std::vector<Sample>& samples, Sect
       fit->shift_m.x, fit->shift_m.y, cells.x, cells.y, 100 * fit->explained);
 }
 
-ImageLayer layer_of(const Heights& heights) {
-  ImageLayer layer{"height",
-                   LayerKind::Number,
-                   {"height"},
-                   {heights.frame.samples.x, heights.frame.samples.y, 1}};
-  std::ranges::copy(heights.m, layer.values.values().begin());
-  return layer;
-}
-
 void draw(const DemPair& pair, Section& into) {
-  const ImageLayer reference = layer_of(pair.reference), other = layer_of(pair.other);
-  Image<double> differences = other.values;
-  for (std::size_t i = 0; i < pair.other.m.size(); ++i)
-    differences.values()[i] -= reference.values.values()[i];
+  const ImageLayer reference{"height", LayerKind::Number, {"height"}, pair.reference.m};
+  const ImageLayer other{"height", LayerKind::Number, {"height"}, pair.other.m};
+  Image<double> differences = pair.other.m;
+  std::ranges::transform(pair.other.m.values(), pair.reference.m.values(),
+                         differences.values().begin(), std::minus<>());
   draw_layers(reference, other, differences, " m", into);
 }
 

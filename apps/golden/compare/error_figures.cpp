@@ -1,14 +1,14 @@
 #include "apps/golden/compare/error_figures.h"
 
 #include <algorithm>
+#include <boost/math/distributions/normal.hpp>
+#include <boost/math/distributions/students_t.hpp>
 #include <cmath>
 #include <limits>
 #include <utility>
 
 namespace groundray::golden {
 namespace {
-
-constexpr double no_figure = std::numeric_limits<double>::quiet_NaN();
 
 std::vector<double> sizes_of(const std::vector<double>& errors) {
   std::vector<double> sizes(errors.size());
@@ -18,7 +18,7 @@ std::vector<double> sizes_of(const std::vector<double>& errors) {
 
 /// As quantile, but reorders the values.
 double take_quantile(std::vector<double>& values, double share) {
-  if (values.empty()) return no_figure;
+  if (values.empty()) return ErrorFigures::none;
   const double place = share * static_cast<double>(values.size() - 1);
   const auto rank = static_cast<std::ptrdiff_t>(place);
   const auto at = values.begin() + rank;
@@ -34,23 +34,20 @@ double reach_of(const ErrorFigures& figures) {
   return figures.p99_size > 0 ? figures.p99_size : figures.largest;
 }
 
+// Two-sided limit: each tail has half of the significance of one test.
+template <typename Distribution>
+double limit(const Distribution& distribution, double level, std::size_t tests) {
+  return boost::math::quantile(
+      boost::math::complement(distribution, significance_of_one(level, tests) / 2));
+}
+
 }  // namespace
 
 double quantile(std::vector<double> values, double share) { return take_quantile(values, share); }
 
 ErrorFigures figures_of(const std::vector<double>& errors) {
-  if (errors.empty()) {
-    return {.mean = no_figure,
-            .rms = no_figure,
-            .mean_size = no_figure,
-            .median = no_figure,
-            .median_size = no_figure,
-            .p95_size = no_figure,
-            .p99_size = no_figure,
-            .largest = no_figure,
-            .nmad = no_figure};
-  }
-  ErrorFigures figures{.count = errors.size()};
+  if (errors.empty()) return {};
+  ErrorFigures figures{.count = errors.size(), .largest = 0};
   double sum = 0, sizes = 0, squares = 0;
   for (std::size_t i = 0; i < errors.size(); ++i) {
     const double size = std::abs(errors[i]);
@@ -105,6 +102,18 @@ void tell_sizes(Section& into, const std::string& name, const std::string& unit,
   if (!(figures.largest > 0)) return;
   const double reach = reach_of(figures);
   into.histograms.push_back(histogram_of(name, unit, sizes, 0, reach));
+}
+
+double significance_of_one(double level, std::size_t tests) {
+  return -std::expm1(std::log1p(-level) / static_cast<double>(std::max<std::size_t>(tests, 1)));
+}
+
+double normal_limit(double level, std::size_t tests) {
+  return limit(boost::math::normal(), level, tests);
+}
+
+double student_limit(double level, std::size_t tests, double freedom) {
+  return limit(boost::math::students_t(freedom), level, tests);
 }
 
 }  // namespace groundray::golden

@@ -1,6 +1,7 @@
 #pragma once
 
 #include <cstddef>
+#include <limits>
 #include <string>
 #include <vector>
 
@@ -10,17 +11,19 @@ namespace groundray::golden {
 
 /// Statistics of a set of errors e. Quantiles are interpolated linearly between ranks, as in NumPy.
 struct ErrorFigures {
+  static constexpr double none = std::numeric_limits<double>::quiet_NaN();
+
   std::size_t count = 0;
-  double mean = 0;
-  double rms = 0;
-  double mean_size = 0;    ///< mean of |e|
-  double median = 0;       ///< median of e, with signs
-  double median_size = 0;  ///< median of |e|
-  double p95_size = 0;
-  double p99_size = 0;
-  double largest = 0;     ///< maximum of |e|
+  double mean = none;
+  double rms = none;
+  double mean_size = none;    ///< mean of |e|
+  double median = none;       ///< median of e, with signs
+  double median_size = none;  ///< median of |e|
+  double p95_size = none;
+  double p99_size = none;
+  double largest = none;  ///< maximum of |e|
   std::size_t worst = 0;  ///< index of the first error of that magnitude
-  double nmad = 0;  ///< 1.4826 median |e - median|: the standard deviation if errors are normal
+  double nmad = none;  ///< 1.4826 median |e - median|: the standard deviation if errors are normal
 };
 
 /// Returns the statistics of errors.
@@ -40,5 +43,22 @@ void tell_errors(Section& into, const std::string& name, const std::string& unit
 /// As tell_errors, for unsigned errors: lengths and angles.
 void tell_sizes(Section& into, const std::string& name, const std::string& unit,
                 const std::vector<double>& sizes);
+
+/// Side of the blocks of pixels whose means are tested in addition to single pixels.
+inline constexpr int block_px = 8;
+
+/// Returns the significance level of each of `tests` independent tests for which, without any
+/// error, at least one of them fails with probability `level`.
+/// @see Šidák, Rectangular confidence regions for the means of multivariate normal distributions,
+///      JASA 62 (1967).
+double significance_of_one(double level, std::size_t tests);
+
+/// Returns the magnitude that a standard normal variable exceeds in at least one of `tests`
+/// independent tests with probability `level`.
+double normal_limit(double level, std::size_t tests);
+
+/// As normal_limit, for Student's t.
+/// @param freedom  degrees of freedom, at least 1.
+double student_limit(double level, std::size_t tests, double freedom);
 
 }  // namespace groundray::golden

@@ -1,16 +1,20 @@
 #include "apps/golden/suite/columns.h"
 
+#include <muParser.h>
+
 #include <algorithm>
 #include <chrono>
 #include <cmath>
+#include <numbers>
 #include <string>
+#include <string_view>
 #include <type_traits>
 #include <utility>
 #include <variant>
 
+#include "apps/golden/compare/images/image_file.h"
 #include "core/error.h"
 #include "core/image/exr_io.h"
-#include "core/image/image_io.h"
 #include "core/io/file_io.h"
 #include "core/io/npy_io.h"
 #include "core/io/ply_io.h"
@@ -65,33 +69,17 @@ Columns read_exr_columns(const std::filesystem::path& file) {
   return columns;
 }
 
-// Reads the bit depth: the first byte after the image size in a PNG's header.
-bool has_16_bits(const std::filesystem::path& file) {
-  constexpr std::size_t place = 24;
-  const std::string bytes = read_text(file);
-  return bytes.size() > place && bytes[place] == 16;
-}
-
-template <typename T>
-void add_channels(const Image<T>& image, double scale, Columns& columns) {
+Columns read_png_columns(const std::filesystem::path& file) {
+  const Image<double> image = png_numbers(read_text(file), file.string()).values;
+  const glm::ivec2 size_px(image.width(), image.height());
+  Columns columns{.rows = pixels_of(size_px), .all = {}, .size_px = size_px};
   const auto channels = static_cast<std::size_t>(image.channels());
   for (std::size_t k = 0; k < channels; ++k) {
     std::vector<double> values(columns.rows);
-    for (std::size_t i = 0; i < columns.rows; ++i)
-      values[i] = std::round(scale * static_cast<double>(image.values()[i * channels + k]));
+    for (std::size_t i = 0; i < columns.rows; ++i) values[i] = image.values()[i * channels + k];
     columns.all.push_back({"v" + std::to_string(k), std::move(values), Stored::Whole});
   }
-}
-
-Columns read_png_columns(const std::filesystem::path& file) {
-  const auto columns_for = [](const auto& image, double scale) {
-    const glm::ivec2 size_px(image.width(), image.height());
-    Columns columns{.rows = pixels_of(size_px), .all = {}, .size_px = size_px};
-    add_channels(image, scale, columns);
-    return columns;
-  };
-  if (has_16_bits(file)) return columns_for(read_heights(file), 65535);
-  return columns_for(read_image8(file), 1);
+  return columns;
 }
 
 Columns read_pose_columns(const std::filesystem::path& file) {
@@ -114,6 +102,32 @@ Columns read_pose_columns(const std::filesystem::path& file) {
   return columns;
 }
 
+double floor_of(double value) { return std::floor(value); }
+double cbrt_of(double value) { return std::cbrt(value); }
+double erf_of(double value) { return std::erf(value); }
+double mod_of(double x, double y) { return x - y * std::floor(x / y); }
+double hypot_of(double x, double y) { return std::hypot(x, y); }
+
+// muParser takes pointers to variables that it could modify.
+void define(mu::Parser& parser, const std::string& name, const std::vector<double>& values) {
+  parser.DefineVar(name, const_cast<double*>(values.data()));
+}
+
+// muParser would read `=` as an assignment, and evaluate `a, b` to the last value.
+void check_spelling(const std::string& formula) {
+  int depth = 0;
+  for (std::size_t i = 0; i < formula.size(); ++i) {
+    const char c = formula[i];
+    if (c == '(') ++depth;
+    if (c == ')') --depth;
+    if (c == ',' && depth <= 0) throw Error("formula '{}': has a comma between values", formula);
+    if (c != '=') continue;
+    const bool ends = i > 0 && std::string_view("=<>!").find(formula[i - 1]) != std::string::npos;
+    const bool begins = i + 1 < formula.size() && formula[i + 1] == '=';
+    if (!ends && !begins) throw Error("formula '{}': has '=': equality is '=='", formula);
+  }
+}
+
 }  // namespace
 
 const Columns::Column* Columns::find(std::string_view name) const {
@@ -129,6 +143,27 @@ Columns read_columns(const std::filesystem::path& file) {
   if (kind == ".npy") return columns_of(read_npy(file).cloud);
   if (kind == ".tum") return read_pose_columns(file);
   throw Error("{}: must be .ply, .exr, .png, .npy or .tum", file.string());
+}
+
+std::vector<double> evaluate(const std::string& formula, const Columns& columns) {
+  std::vector<double> values(columns.rows);
+  check_spelling(formula);
+  if (columns.rows == 0) return values;
+  try {
+    mu::Parser parser;
+    parser.DefineFun("floor", floor_of);
+    parser.DefineFun("cbrt", cbrt_of);
+    parser.DefineFun("erf", erf_of);
+    parser.DefineFun("hypot", hypot_of);
+    parser.DefineFun("mod", mod_of);
+    parser.DefineConst("pi", std::numbers::pi);
+    for (const Columns::Column& column : columns.all) define(parser, column.name, column.values);
+    parser.SetExpr(formula);
+    parser.Eval(values.data(), static_cast<int>(values.size()));
+  } catch (const mu::Parser::exception_type& fault) {
+    throw Error("formula '{}': {}", formula, fault.GetMsg());
+  }
+  return values;
 }
 
 }  // namespace groundray::golden

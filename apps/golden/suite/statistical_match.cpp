@@ -1,13 +1,12 @@
-#include "apps/golden/suite/statistical_match.h"
-
 #include <fmt/format.h>
 
 #include <algorithm>
 #include <cmath>
 
-#include "apps/golden/compare/images/image_similarity.h"
-#include "apps/golden/false_colour.h"
-#include "apps/golden/significance.h"
+#include "apps/golden/compare/error_figures.h"
+#include "apps/golden/compare/images/difference_picture.h"
+#include "apps/golden/compare/images/image_comparison.h"
+#include "apps/golden/suite/checks.h"
 #include "core/error.h"
 
 namespace groundray::golden {

@@ -5,9 +5,8 @@
 #include <variant>
 #include <vector>
 
+#include "apps/golden/suite/checks.h"
 #include "apps/golden/suite/columns.h"
-#include "apps/golden/suite/exact_match.h"
-#include "apps/golden/suite/statistical_match.h"
 #include "core/error.h"
 #include "core/image/exr_io.h"
 #include "core/io/file_io.h"

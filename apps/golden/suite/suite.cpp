@@ -2,22 +2,31 @@
 
 #include <fcntl.h>
 #include <fmt/format.h>
+#include <spawn.h>
 #include <sys/file.h>
+#include <sys/wait.h>
 #include <tinyxml2.h>
 #include <unistd.h>
 
 #include <algorithm>
 #include <atomic>
+#include <cerrno>
 #include <chrono>
+#include <cmath>
 #include <cstdio>
 #include <exception>
+#include <fstream>
 #include <mutex>
 #include <optional>
 #include <string>
+#include <system_error>
 #include <thread>
+#include <utility>
+#include <variant>
+#include <vector>
 
-#include "apps/golden/suite/check_case.h"
-#include "apps/golden/suite/process.h"
+#include "apps/golden/suite/checks.h"
+#include "apps/golden/suite/columns.h"
 #include "apps/golden/suite/stored.h"
 #include "apps/scene/interruption.h"
 #include "core/error.h"
@@ -26,6 +35,132 @@
 
 namespace groundray::golden {
 namespace {
+
+// Runs a program and waits until it ends.
+// @param command  the program's path and its arguments.
+// @param log  file for standard output and standard error; replaced.
+// @return its exit code, or 128 plus the number of the signal that ended it.
+int run_process(const std::vector<std::string>& command, const std::filesystem::path& log) {
+  if (!std::ofstream(log)) throw Error("{}: cannot be written", log.string());
+  std::vector<char*> arguments;
+  for (const std::string& word : command) arguments.push_back(const_cast<char*>(word.c_str()));
+  arguments.push_back(nullptr);
+  posix_spawn_file_actions_t to_log{};
+  posix_spawn_file_actions_init(&to_log);
+  posix_spawn_file_actions_addopen(&to_log, STDOUT_FILENO, log.c_str(),
+                                   O_WRONLY | O_CREAT | O_TRUNC, 0644);
+  posix_spawn_file_actions_adddup2(&to_log, STDOUT_FILENO, STDERR_FILENO);
+  pid_t child = 0;
+  const int fault = posix_spawn(&child, arguments[0], &to_log, nullptr, arguments.data(), environ);
+  posix_spawn_file_actions_destroy(&to_log);
+  if (fault != 0)
+    throw Error("{}: cannot be started: {}", command[0], std::generic_category().message(fault));
+  int status = 0;
+  while (waitpid(child, &status, 0) < 0) {
+    if (errno != EINTR) throw Error("{}: waiting for the process failed", command[0]);
+  }
+  return WIFEXITED(status) ? WEXITSTATUS(status) : 128 + WTERMSIG(status);
+}
+
+// Adds the position of each row: `row` from 0 and, for images, the pixel's `u` (to the right) and
+// `v` (down).
+void name_places(Columns& columns) {
+  const auto add = [&](const char* name, const auto& place) {
+    std::vector<double> values(columns.rows);
+    for (std::size_t i = 0; i < columns.rows; ++i) values[i] = static_cast<double>(place(i));
+    columns.all.push_back({name, std::move(values), Stored::Whole});
+  };
+  add("row", [](std::size_t i) { return i; });
+  if (columns.size_px.x == 0) return;
+  const auto width = static_cast<std::size_t>(columns.size_px.x);
+  add("u", [width](std::size_t i) { return i % width; });
+  add("v", [width](std::size_t i) { return i / width; });
+}
+
+// Drops the rows where the condition is 0.
+void keep(const std::string& condition, Columns& columns) {
+  const std::vector<double> kept = evaluate(condition, columns);
+  std::size_t rows = 0;
+  for (const double is_kept : kept) {
+    if (std::isnan(is_kept)) throw Error("rows: '{}' is not a number in some row", condition);
+    rows += is_kept != 0 ? 1 : 0;
+  }
+  for (Columns::Column& column : columns.all) {
+    std::size_t to = 0;
+    for (std::size_t from = 0; from < kept.size(); ++from) {
+      if (kept[from] != 0) column.values[to++] = column.values[from];
+    }
+    column.values.resize(rows);
+  }
+  if (rows < columns.rows) columns.size_px = {0, 0};  // no longer an image
+  columns.rows = rows;
+}
+
+// Returns the columns, with those that the case defines, of the rows that it selects.
+Columns chosen(const ProductChecks& product, Columns columns) {
+  name_places(columns);
+  for (const auto& [name, formula] : product.names) {
+    if (columns.find(name) != nullptr) throw Error("let: column '{}' already exists", name);
+    columns.all.push_back({name, evaluate(formula, columns), Stored::Double});
+  }
+  if (!product.rows.empty()) keep(product.rows, columns);
+  return columns;
+}
+
+struct Checker {
+  const GoldenCase& golden;
+  const ProductChecks& product;
+  const Columns& whole;
+  const Columns& rows;
+  const std::string& because;
+  Section& into;
+
+  void operator()(const RowsCheck& check) const { check_rows(check, because, rows, into); }
+  void operator()(const FigureCheck& check) const { check_figure(check, because, rows, into); }
+  void operator()(const ExactCheck&) const {
+    const Equal equal = stored_made_with(golden) == made_with() ? Equal::Bits : Equal::Nearly;
+    check_equal(whole, read_columns(stored_file(golden, product.product)), equal, because, into);
+  }
+  void operator()(const StatisticalCheck& check) const {
+    check_statistically(check, because, whole,
+                        read_columns(stored_moments(golden, product.product)), into);
+  }
+};
+
+void fail(const std::string& what, const std::string& why, Section& into) {
+  hold(into, fmt::format("{}: {}", what, why), 1, "fault", 0, "");
+}
+
+void check_product(const GoldenCase& golden, const ProductChecks& product,
+                   const std::filesystem::path& dataset, Section& into) {
+  Columns whole, rows;
+  try {
+    whole = read_columns(dataset / product.product);
+    rows = chosen(product, whole);
+  } catch (const std::exception& fault) {
+    return fail(product.product, fault.what(), into);
+  }
+  for (const Check& check : product.checks) {
+    const std::size_t before = into.measures.size();
+    try {
+      std::visit(Checker{golden, product, whole, rows, check.because, into}, check.what);
+    } catch (const std::exception& fault) {
+      fail(fmt::format("check of line {}", check.line), fault.what(), into);
+    }
+    for (std::size_t i = before; i < into.measures.size(); ++i)
+      into.measures[i].name = product.product + ": " + into.measures[i].name;
+  }
+}
+
+// Checks a dataset against the expectations of its case. A missing or damaged file, or a formula
+// that cannot be evaluated, fails the check that needs it.
+Section check_case(const GoldenCase& golden, const std::filesystem::path& dataset) {
+  Section section{.title = golden.name, .text = golden.title};
+  for (const ProductChecks& product : golden.products)
+    check_product(golden, product, dataset, section);
+  section.verdict = verdict_of(section.measures);
+  return section;
+}
 
 using Clock = std::chrono::steady_clock;
 

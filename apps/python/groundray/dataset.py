@@ -215,14 +215,27 @@ def _load_yaml(text: str, path: Path) -> Any:
         raise Error(f"{path}{place}: {problem}; was the file cut short or edited?") from None
 
 
-def _read_map(path: Path) -> _Map:
+def read_text(path: Path) -> str:
+    """Returns the text of one of a dataset's files. Raises Error if it cannot be read."""
     try:
-        text = path.read_text(encoding="utf-8")
+        return path.read_text(encoding="utf-8")
     except OSError as fault:
         raise Error(f"{path}: cannot read it: {fault.strerror}; is the dataset complete?") from None
     except UnicodeDecodeError:
         raise Error(f"{path}: it is not UTF-8 text; is it damaged?") from None
-    return _Map(path, _load_yaml(text, path))
+
+
+def read_listed(file: Path, what: str) -> bytes:
+    """Returns the bytes of a finished frame's file. Raises Error if it cannot be read."""
+    try:
+        return file.read_bytes()
+    except OSError as fault:
+        rule = f"cannot read it: {fault.strerror}, although dataset.yaml lists {what} as done"
+        raise Error(f"{file}: {rule}; was it removed?") from None
+
+
+def _read_map(path: Path) -> _Map:
+    return _Map(path, _load_yaml(read_text(path), path))
 
 
 def _read_mount(calibration: _Map, key: str) -> Floats:

@@ -1,10 +1,9 @@
-#include "apps/golden/suite/exact_match.h"
-
 #include <gmock/gmock.h>
 #include <gtest/gtest.h>
 
 #include <cmath>
 
+#include "apps/golden/suite/checks.h"
 #include "core/error.h"
 
 namespace groundray::golden::exact_match_test {

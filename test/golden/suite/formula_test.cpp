@@ -1,11 +1,10 @@
-#include "apps/golden/suite/formula.h"
-
 #include <gmock/gmock.h>
 #include <gtest/gtest.h>
 
 #include <cmath>
 #include <numbers>
 
+#include "apps/golden/suite/columns.h"
 #include "core/error.h"
 
 namespace groundray::golden::formula_test {

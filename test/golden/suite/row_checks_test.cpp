@@ -1,5 +1,3 @@
-#include "apps/golden/suite/row_checks.h"
-
 #include <gmock/gmock.h>
 #include <gtest/gtest.h>
 
@@ -8,6 +6,7 @@
 #include <string>
 #include <vector>
 
+#include "apps/golden/suite/checks.h"
 #include "core/error.h"
 
 namespace groundray::golden::row_checks_test {

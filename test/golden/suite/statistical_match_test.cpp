@@ -1,5 +1,3 @@
-#include "apps/golden/suite/statistical_match.h"
-
 #include <gmock/gmock.h>
 #include <gtest/gtest.h>
 
@@ -7,6 +5,7 @@
 #include <cmath>
 #include <random>
 
+#include "apps/golden/suite/checks.h"
 #include "core/error.h"
 
 namespace groundray::golden::statistical_match_test {

@@ -11,7 +11,6 @@
 
 #include "apps/colour_map.h"
 #include "apps/golden/compare/error_figures.h"
-#include "apps/golden/false_colour.h"
 #include "core/image/srgb.h"
 
 namespace groundray::golden {
@@ -120,17 +119,25 @@ Colour colour_of(const ImageLayer& layer, std::span<const double> value, const S
   return std::isnan(value_shown) ? blank : range_colour(1 - scale.share(value_shown));
 }
 
-Image8 painted(const ImageLayer& layer, const Image<double>& values, const Scale& scale) {
-  Image8 picture(values.width(), values.height(), 3);
-  for (int y = 0; y < picture.height(); ++y) {
-    for (int x = 0; x < picture.width(); ++x) {
-      const auto value = values.at(x, y);
-      const bool is_there = std::ranges::all_of(value, [](double v) { return std::isfinite(v); });
-      paint(picture, x, y, is_there ? colour_of(layer, value, scale) : blank);
-    }
+/// Returns a picture of the colours `colour_at(x, y)`.
+template <typename ColourAt>
+Image8 painted(glm::ivec2 size_px, const ColourAt& colour_at) {
+  Image8 picture(size_px.x, size_px.y, 3);
+  for (int y = 0; y < size_px.y; ++y) {
+    for (int x = 0; x < size_px.x; ++x) paint(picture, x, y, colour_at(x, y));
   }
   return picture;
 }
+
+Image8 painted(const ImageLayer& layer, const Image<double>& values, const Scale& scale) {
+  return painted({values.width(), values.height()}, [&](int x, int y) {
+    const auto value = values.at(x, y);
+    const bool is_there = std::ranges::all_of(value, [](double v) { return std::isfinite(v); });
+    return is_there ? colour_of(layer, value, scale) : blank;
+  });
+}
+
+constexpr int smallest_picture_px = 240;
 
 }  // namespace
 
@@ -143,13 +150,10 @@ void draw_differences(const std::string& caption, const Image<double>& differenc
   const double p99 = quantile(sizes, 0.99);
   const double most = sizes.empty() ? 0 : *std::ranges::max_element(sizes);
   const double scale = p99 > 0 ? p99 : most > 0 ? most : 1;
-  Image8 picture(values.width(), values.height(), 3);
-  for (int y = 0; y < picture.height(); ++y) {
-    for (int x = 0; x < picture.width(); ++x) {
-      const double value = values.at(x, y)[0];
-      paint(picture, x, y, std::isfinite(value) ? signed_colour(value / scale) : blank);
-    }
-  }
+  Image8 picture = painted({values.width(), values.height()}, [&](int x, int y) {
+    const double value = values.at(x, y)[0];
+    return std::isfinite(value) ? signed_colour(value / scale) : blank;
+  });
   into.pictures.push_back(
       {fmt::format("{}, blue −{:.4g}{} to red {:.4g}{}, square-root scale; grey: no value{}",
                    caption, scale, unit, scale, unit,
@@ -180,6 +184,29 @@ void draw_layers(const ImageLayer& reference, const ImageLayer& other,
   into.pictures.push_back({reference.name + ": other, same scale" + every_caption(step),
                            painted(reference, every(other.values, step), scale)});
   draw_differences(reference.name + ": other less reference", differences, unit, into);
+}
+
+std::pair<double, double> finite_range(const std::vector<double>& values) {
+  double low = std::numeric_limits<double>::infinity(), high = -low;
+  for (const double value : values) {
+    if (!std::isfinite(value)) continue;
+    low = std::min(low, value);
+    high = std::max(high, value);
+  }
+  if (low > high) return {0, 1};
+  return {low, high > low ? high : low + 1};
+}
+
+Image8 false_colour(const std::vector<double>& values, glm::ivec2 size_px, double low,
+                    double high) {
+  const int scale = std::max(1, smallest_picture_px / std::max(size_px.x, 1));
+  return painted(size_px * scale, [&](int x, int y) {
+    const double value =
+        values[static_cast<std::size_t>(y / scale) * static_cast<std::size_t>(size_px.x) +
+               static_cast<std::size_t>(x / scale)];
+    const double share = high > low ? (value - low) / (high - low) : 0;
+    return std::isfinite(value) ? range_colour(1 - share) : Colour(1);
+  });
 }
 
 }  // namespace groundray::golden

@@ -1,9 +1,13 @@
 #pragma once
 
+#include <glm/vec2.hpp>
 #include <string>
+#include <utility>
+#include <vector>
 
-#include "apps/golden/compare/images/image_layer.h"
+#include "apps/golden/compare/images/image_file.h"
 #include "apps/golden/report.h"
+#include "core/image/image.h"
 
 namespace groundray::golden {
 
@@ -18,5 +22,13 @@ void draw_layers(const ImageLayer& reference, const ImageLayer& other,
 /// Adds a picture of `differences` alone; the scale is appended to `caption`.
 void draw_differences(const std::string& caption, const Image<double>& differences,
                       const std::string& unit, Section& into);
+
+/// Returns the smallest and the largest finite value; 0 and 1 if there are none. If both are equal,
+/// 1 is added to the upper one.
+std::pair<double, double> finite_range(const std::vector<double>& values);
+
+/// Paints values, row by row, from violet at `low` to yellow at `high`; non-finite ones are white.
+/// Small images are enlarged by a whole factor.
+Image8 false_colour(const std::vector<double>& values, glm::ivec2 size_px, double low, double high);
 
 }  // namespace groundray::golden

@@ -1,21 +1,86 @@
 #include "apps/golden/compare/images/image_comparison.h"
 
+#include <fmt/format.h>
 #include <fmt/ranges.h>
 
 #include <algorithm>
 #include <array>
 #include <cmath>
+#include <cstddef>
+#include <limits>
 #include <string_view>
 #include <tuple>
 #include <vector>
 
 #include "apps/golden/compare/error_figures.h"
-#include "apps/golden/compare/images/image_alignment.h"
-#include "apps/golden/compare/images/layer_comparison.h"
 #include "core/error.h"
 
 namespace groundray::golden {
 namespace {
+
+constexpr double much_nearer = 0.5;
+constexpr double nearly_the_same = 1e-4;
+
+/// Shift or reflection by which pixels of the other image are looked up.
+struct Reading {
+  std::string what;
+  int x_half_px = 0, y_half_px = 0;  // shift of the content
+  bool is_x_mirrored = false, is_y_mirrored = false;
+};
+
+std::vector<Reading> readings() {
+  std::vector<Reading> all{{"mirrored left to right", 0, 0, true, false},
+                           {"mirrored top to bottom", 0, 0, false, true},
+                           {"turned by 180 degrees", 0, 0, true, true}};
+  for (int y = -2; y <= 2; ++y) {
+    for (int x = -2; x <= 2; ++x) {
+      if (x != 0 || y != 0)
+        all.push_back({fmt::format("moved by ({}, {}) px", x / 2.0, y / 2.0), x, y});
+    }
+  }
+  return all;
+}
+
+/// Looks up values at whole and half pixels; NaN outside the image.
+struct Lookup {
+  const Image<double>& image;
+
+  double operator()(int x_half, int y_half, std::size_t channel) const {
+    const int x0 = (x_half - (x_half & 1)) / 2, x1 = x0 + (x_half & 1);
+    const int y0 = (y_half - (y_half & 1)) / 2, y1 = y0 + (y_half & 1);
+    if (x0 < 0 || y0 < 0 || x1 >= image.width() || y1 >= image.height())
+      return std::numeric_limits<double>::quiet_NaN();
+    return (image.at(x0, y0)[channel] + image.at(x1, y0)[channel] + image.at(x0, y1)[channel] +
+            image.at(x1, y1)[channel]) /
+           4;
+  }
+};
+
+/// Returns the mean relative difference of values that are finite in both images; infinity if these
+/// are fewer than half of all values.
+double difference(const Image<double>& reference, const Image<double>& other,
+                  const Reading& reading) {
+  const Lookup lookup{other};
+  double sum = 0;
+  std::size_t count = 0;
+  const auto channels = static_cast<std::size_t>(reference.channels());
+  for (int y = 0; y < reference.height(); ++y) {
+    const int from_y = reading.is_y_mirrored ? reference.height() - 1 - y : y;
+    for (int x = 0; x < reference.width(); ++x) {
+      const int from_x = reading.is_x_mirrored ? reference.width() - 1 - x : x;
+      for (std::size_t k = 0; k < channels; ++k) {
+        const double a = reference.at(x, y)[k];
+        const double b = lookup(2 * from_x - reading.x_half_px, 2 * from_y - reading.y_half_px, k);
+        if (!std::isfinite(a) || !std::isfinite(b)) continue;
+        if (a != b) sum += std::abs(a - b) / (std::abs(a) + std::abs(b));
+        ++count;
+      }
+    }
+  }
+  return 2 * count < reference.values().size() || count == 0
+             ? std::numeric_limits<double>::infinity()
+             : sum / static_cast<double>(count);
+}
 
 // Layers that the tests of light use; they are not compared themselves.
 constexpr std::array<std::string_view, 2> test_layers{"StdError", "Samples"};
@@ -114,7 +179,66 @@ void tell_beyond_bound(const ImageFile& reference, const ImageFile& other, Secti
        "px");
 }
 
+constexpr int reach_px = 5;
+constexpr std::size_t window_px = 2 * reach_px + 1;
+
+std::array<double, window_px> weights() {
+  constexpr double sigma_px = 1.5;
+  std::array<double, window_px> result{};
+  double sum = 0;
+  for (std::size_t i = 0; i < window_px; ++i) {
+    const double off_px = static_cast<double>(i) - reach_px;
+    sum += result[i] = std::exp(-off_px * off_px / (2 * sigma_px * sigma_px));
+  }
+  for (double& weight : result) weight /= sum;
+  return result;
+}
+
+/// Weighted means of a, b, a a, b b and a b.
+using Moments = std::array<double, 5>;
+constexpr int moments = 5;
+
+/// Returns weighted means along each row. The Gaussian is separable: means along columns follow.
+Image<double> along_rows(const Image<double>& a, const Image<double>& b) {
+  const auto weight = weights();
+  Image<double> result(a.width(), a.height(), moments);
+  for (int y = 0; y < a.height(); ++y) {
+    for (int x = reach_px; x < a.width() - reach_px; ++x) {
+      const auto to = result.at(x, y);
+      for (std::size_t i = 0; i < window_px; ++i) {
+        const int from = x + static_cast<int>(i) - reach_px;
+        const double of_a = a.at(from, y)[0], of_b = b.at(from, y)[0];
+        const Moments terms{of_a, of_b, of_a * of_a, of_b * of_b, of_a * of_b};
+        for (std::size_t k = 0; k < terms.size(); ++k) to[k] += weight[i] * terms[k];
+      }
+    }
+  }
+  return result;
+}
+
+double similarity(const Moments& mean, double range) {
+  const double c1 = 0.01 * range * 0.01 * range, c2 = 0.03 * range * 0.03 * range;
+  const double both = mean[0] * mean[1], squares = mean[0] * mean[0] + mean[1] * mean[1];
+  const double variances = mean[2] + mean[3] - squares, covariance = mean[4] - both;
+  return (2 * both + c1) * (2 * covariance + c2) / ((squares + c1) * (variances + c2));
+}
+
 }  // namespace
+
+std::optional<Misalignment> misalignment(const Image<double>& reference,
+                                         const Image<double>& other) {
+  const double as_it_is = difference(reference, other, {});
+  if (!std::isfinite(as_it_is) || as_it_is < nearly_the_same) return std::nullopt;
+  Misalignment best{.difference = std::numeric_limits<double>::infinity(), .as_it_is = as_it_is};
+  for (const Reading& reading : readings()) {
+    const double now = difference(reference, other, reading);
+    if (now >= best.difference) continue;
+    best.difference = now;
+    best.what = reading.what;
+  }
+  if (best.difference > much_nearer * as_it_is) return std::nullopt;
+  return best;
+}
 
 Section compare_images(const std::filesystem::path& reference, const std::filesystem::path& other,
                        const ImageOptions& options) {
@@ -162,6 +286,27 @@ Section compare_images(const ImageFile& reference, const ImageFile& other,
   suspect_alignment(reference, other, section);
   section.verdict = verdict_of(section.measures);
   return section;
+}
+
+double structural_similarity(const Image<double>& a, const Image<double>& b, double range) {
+  const auto weight = weights();
+  const Image<double> rows = along_rows(a, b);
+  double sum = 0;
+  std::size_t count = 0;
+  for (int y = reach_px; y < a.height() - reach_px; ++y) {
+    for (int x = reach_px; x < a.width() - reach_px; ++x) {
+      Moments mean{};
+      for (std::size_t i = 0; i < window_px; ++i) {
+        const auto row = rows.at(x, y + static_cast<int>(i) - reach_px);
+        for (std::size_t k = 0; k < mean.size(); ++k) mean[k] += weight[i] * row[k];
+      }
+      const double here = similarity(mean, range);
+      if (!std::isfinite(here)) continue;
+      sum += here;
+      ++count;
+    }
+  }
+  return count > 0 ? sum / static_cast<double>(count) : std::numeric_limits<double>::quiet_NaN();
 }
 
 }  // namespace groundray::golden

@@ -75,30 +75,6 @@ Channels read_exr_channels(std::string_view bytes, const std::string& name) {
   return channels;
 }
 
-/// Values of a PNG or JPEG as stored, with 8 or 16 bits.
-struct PngNumbers {
-  Image<double> values;
-  bool is_deep = false;
-};
-
-PngNumbers png_numbers(std::string_view bytes, const std::string& name) {
-  constexpr std::size_t depth_at = 24;  // after the signature and IHDR's length, name and size
-  PngNumbers numbers;
-  numbers.is_deep =
-      bytes.starts_with(png_magic) && bytes.size() > depth_at && bytes[depth_at] == 16;
-  const auto copy = [&](const auto& image, double scale) {
-    numbers.values = {image.width(), image.height(), image.channels()};
-    std::ranges::transform(image.values(), numbers.values.values().begin(),
-                           [scale](auto value) { return std::round(scale * value); });
-  };
-  if (numbers.is_deep) {
-    copy(parse_heights(bytes, name), 65535);
-  } else {
-    copy(parse_image8(bytes, name), 1);
-  }
-  return numbers;
-}
-
 Channels depth_of(const PngNumbers& numbers, double step_m, const std::string& name) {
   if (!numbers.is_deep || numbers.values.channels() != 1) {
     throw Error("{}: depths must be one channel of 16 bits; it has {} of {}: is it a picture?",
@@ -249,6 +225,24 @@ void rename(Channels& channels, const ImageReading& reading, const std::string& 
 }
 
 }  // namespace
+
+PngNumbers png_numbers(std::string_view bytes, const std::string& name) {
+  constexpr std::size_t depth_at = 24;  // after the signature and IHDR's length, name and size
+  PngNumbers numbers;
+  numbers.is_deep =
+      bytes.starts_with(png_magic) && bytes.size() > depth_at && bytes[depth_at] == 16;
+  const auto copy = [&](const auto& image, double scale) {
+    numbers.values = {image.width(), image.height(), image.channels()};
+    std::ranges::transform(image.values(), numbers.values.values().begin(),
+                           [scale](auto value) { return std::round(scale * value); });
+  };
+  if (numbers.is_deep) {
+    copy(parse_heights(bytes, name), 65535);
+  } else {
+    copy(parse_image8(bytes, name), 1);
+  }
+  return numbers;
+}
 
 const ImageLayer* ImageFile::find(std::string_view name) const {
   const auto found = std::ranges::find(layers, name, &ImageLayer::name);

@@ -1,5 +1,3 @@
-#include "apps/golden/compare/images/image_layer.h"
-
 #include <algorithm>
 #include <array>
 #include <cctype>
@@ -7,6 +5,8 @@
 #include <optional>
 #include <string_view>
 #include <utility>
+
+#include "apps/golden/compare/images/image_file.h"
 
 namespace groundray::golden {
 namespace {

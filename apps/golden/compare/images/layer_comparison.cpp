@@ -1,5 +1,3 @@
-#include "apps/golden/compare/images/layer_comparison.h"
-
 #include <fmt/format.h>
 
 #include <algorithm>
@@ -17,7 +15,7 @@
 
 #include "apps/golden/compare/error_figures.h"
 #include "apps/golden/compare/images/difference_picture.h"
-#include "apps/golden/compare/images/image_similarity.h"
+#include "apps/golden/compare/images/image_comparison.h"
 
 namespace groundray::golden {
 namespace {

@@ -1,5 +1,3 @@
-#include "apps/golden/compare/images/light_match.h"
-
 #include <fmt/format.h>
 
 #include <algorithm>
@@ -11,8 +9,9 @@
 #include <limits>
 #include <string>
 
+#include "apps/golden/compare/error_figures.h"
+#include "apps/golden/compare/images/image_comparison.h"
 #include "apps/golden/report.h"
-#include "apps/golden/significance.h"
 
 namespace groundray::golden {
 namespace {

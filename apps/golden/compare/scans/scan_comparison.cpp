@@ -11,7 +11,6 @@
 #include <vector>
 
 #include "apps/golden/compare/error_figures.h"
-#include "apps/golden/compare/scans/scan_doubts.h"
 #include "apps/golden/compare/scans/scan_errors.h"
 #include "core/error.h"
 

@@ -5,16 +5,15 @@
 #include <algorithm>
 #include <array>
 #include <cmath>
+#include <compare>
 #include <glm/geometric.hpp>
 #include <limits>
 #include <map>
 #include <numbers>
 #include <numeric>
 #include <span>
-#include <tuple>
 #include <utility>
 
-#include "apps/golden/compare/scans/direction_tree.h"
 #include "apps/golden/compare/scans/pulses.h"
 #include "core/error.h"
 
@@ -26,9 +25,7 @@ struct Candidate {
   double distance = 0;  ///< rad or s
   std::uint32_t reference = 0, other = 0;
 
-  friend bool operator<(const Candidate& a, const Candidate& b) {
-    return std::tie(a.distance, a.reference, a.other) < std::tie(b.distance, b.reference, b.other);
-  }
+  auto operator<=>(const Candidate&) const = default;
 };
 
 using Candidates = std::vector<Candidate>;
@@ -53,10 +50,8 @@ void add_candidate(Candidates& candidates, const Candidate& candidate, std::size
   }
 }
 
-/// Pulses of one ring in ascending order of time or azimuth.
-struct Ring {
-  std::vector<std::pair<double, std::uint32_t>> pulses;
-};
+/// Time or azimuth and index of the pulses of one ring, in ascending order.
+using Ring = std::vector<std::pair<double, std::uint32_t>>;
 
 constexpr double full_turn_rad = 2 * std::numbers::pi;
 
@@ -75,9 +70,9 @@ std::vector<double> places_of(const Pulses& pulses, PairingRule rule) {
 std::map<double, Ring> rings_of(const Pulses& pulses, const std::vector<double>& places) {
   std::map<double, Ring> rings;
   for (std::uint32_t i = 0; i < pulses.size(); ++i) {
-    rings[pulses.rings[i]].pulses.emplace_back(places[i], i);
+    rings[pulses.rings[i]].emplace_back(places[i], i);
   }
-  for (auto& [number, ring] : rings) std::ranges::sort(ring.pulses);
+  for (auto& [number, ring] : rings) std::ranges::sort(ring);
   return rings;
 }
 
@@ -85,8 +80,8 @@ std::map<double, Ring> rings_of(const Pulses& pulses, const std::vector<double>&
 double median_step(const std::map<double, Ring>& rings) {
   std::vector<double> steps;
   for (const auto& [number, ring] : rings) {
-    for (std::size_t i = 1; i < ring.pulses.size(); ++i) {
-      const double step = ring.pulses[i].first - ring.pulses[i - 1].first;
+    for (std::size_t i = 1; i < ring.size(); ++i) {
+      const double step = ring[i].first - ring[i - 1].first;
       if (step > 0) steps.push_back(step);
     }
   }
@@ -97,11 +92,10 @@ double median_step(const std::map<double, Ring>& rings) {
 /// a full turn wraps azimuths around.
 void add_from_ring(const Ring& reference, const Ring& other, double tolerance, double shift,
                    std::size_t pulses, Candidates& candidates) {
-  for (const auto& pulse : reference.pulses) {
+  for (const auto& pulse : reference) {
     const double place = pulse.first + shift;
-    auto at = std::ranges::lower_bound(other.pulses, place - tolerance, {},
-                                       &std::pair<double, std::uint32_t>::first);
-    for (; at != other.pulses.end() && at->first <= place + tolerance; ++at) {
+    auto at = std::ranges::lower_bound(other, place - tolerance, {}, &Ring::value_type::first);
+    for (; at != other.end() && at->first <= place + tolerance; ++at) {
       add_candidate(candidates, {std::abs(at->first - place), pulse.second, at->second}, pulses);
     }
   }

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Sequence
+from collections.abc import Iterator, Sequence
 from pathlib import Path
 from typing import Any
 
@@ -25,30 +25,35 @@ def write_pcd(
     `frame` is that of x, y, z: `fired`, as in the scan; `stamp`, S at the stamp; `world`, D.
     """
     count = 0
+    for scan, path, file in _scans_of(dataset, lidars, out):
+        rows, stamp_ns = scan.rows, scan.frame.stamp_ns
+        X_DS = path.pose_at(stamp_ns)
+        if frame != "fired":
+            is_world = frame == "world"
+            points_m = (
+                scan.points_in_world_m(path) if is_world else scan.points_at_m(path, stamp_ns)
+            )
+            rows = rows.copy()
+            for i, axis in enumerate("xyz"):
+                rows[axis] = points_m[:, i]
+            X_DS = np.eye(4) if is_world else X_DS
+        rows = chosen_columns(rows, columns, str(dataset.scan_file(scan.lidar, scan.frame)))
+        normals = {f"n{axis}": f"normal_{axis}" for axis in "xyz"} if frame == "world" else {}
+        data = _pcd_header(rows, X_DS, normals) + rows.tobytes()
+        file.with_suffix(".pcd").write_bytes(data)
+        count += 1
+    return f"{count} scans"
+
+
+def _scans_of(
+    dataset: Dataset, lidars: Sequence[Lidar], out: Path
+) -> Iterator[tuple[Scan, SensorPath, Path]]:
+    """Yields each scan with its sensor's path and its file, `<lidar>/000000`, in a new folder."""
     for lidar in lidars:
         path = SensorPath(dataset.path_file(lidar))
         (out / lidar.name).mkdir()
-        for each in lidar.frames:
-            scan = read_scan(dataset, lidar, each)
-            X_DS = path.pose_at(each.stamp_ns)
-            rows = scan.rows
-            if frame != "fired":
-                is_world = frame == "world"
-                points_m = (
-                    scan.points_in_world_m(path)
-                    if is_world
-                    else scan.points_at_m(path, each.stamp_ns)
-                )
-                rows = rows.copy()
-                for i, axis in enumerate("xyz"):
-                    rows[axis] = points_m[:, i]
-                X_DS = np.eye(4) if is_world else X_DS
-            rows = chosen_columns(rows, columns, str(dataset.scan_file(lidar, each)))
-            normals = {f"n{axis}": f"normal_{axis}" for axis in "xyz"} if frame == "world" else {}
-            file = out / lidar.name / f"{each.number:06}.pcd"
-            file.write_bytes(_pcd_header(rows, X_DS, normals) + rows.tobytes())
-            count += 1
-    return f"{count} scans"
+        for frame in lidar.frames:
+            yield read_scan(dataset, lidar, frame), path, out / lidar.name / f"{frame.number:06}"
 
 
 def chosen_columns(rows: NDArray[Any], columns: Sequence[str], file: str) -> NDArray[Any]:
@@ -89,21 +94,18 @@ def _pcd_header(rows: NDArray[Any], X_DS: Floats, other_names: dict[str, str]) -
 def write_npz(dataset: Dataset, lidars: Sequence[Lidar], out: Path) -> str:
     """Writes `<lidar>/000000.npz`: an array for each column, its unit in its name, and the pose."""
     count = 0
-    for lidar in lidars:
-        path = SensorPath(dataset.path_file(lidar))
-        (out / lidar.name).mkdir()
-        for frame in lidar.frames:
-            scan = read_scan(dataset, lidar, frame)
-            arrays: dict[str, Any] = {
-                "stamp_ns": np.int64(dataset.time_origin_ns + frame.stamp_ns),
-                "X_DS": path.pose_at(frame.stamp_ns),
-                "origin_w_m": dataset.origin_w_m,
-                "crs_wkt": np.str_(dataset.crs_wkt),
-            }
-            for name in scan.names:
-                arrays[name_with_unit(name)] = np.ascontiguousarray(scan.rows[name])
-            np.savez(out / lidar.name / f"{frame.number:06}.npz", **arrays)
-            count += 1
+    for scan, path, file in _scans_of(dataset, lidars, out):
+        stamp_ns = scan.frame.stamp_ns
+        arrays: dict[str, Any] = {
+            "stamp_ns": np.int64(dataset.time_origin_ns + stamp_ns),
+            "X_DS": path.pose_at(stamp_ns),
+            "origin_w_m": dataset.origin_w_m,
+            "crs_wkt": np.str_(dataset.crs_wkt),
+        }
+        for name in scan.names:
+            arrays[name_with_unit(name)] = np.ascontiguousarray(scan.rows[name])
+        np.savez(file.with_suffix(".npz"), **arrays)
+        count += 1
     return f"{count} scans"
 
 

@@ -4,21 +4,21 @@ from __future__ import annotations
 
 import argparse
 import importlib.util
+import os
+import shutil
 import signal
 import sys
 import threading
 from collections.abc import Callable, Iterator, Sequence
-from contextlib import contextmanager
+from contextlib import contextmanager, suppress
 from pathlib import Path
 from types import FrameType
 
 from groundray.dataset import Camera, Dataset, Error, Lidar
 from groundray.export import clouds, kitti, las, ros_bag, tum
-from groundray.export.folder import written_aside
-from groundray.export.intensity import FullScale
 from groundray.export.labels import LabelMap
-from groundray.export.left_out import tell_of_columns, tell_of_products
-from groundray.export.notes import Notes
+from groundray.export.notes import Notes, tell_of_columns, tell_of_products
+from groundray.export.scan import FullScale
 
 DONE, FAILED, INTERRUPTED = 0, 1, 130  # argparse exits with 2 on wrong usage
 
@@ -227,6 +227,34 @@ def _open(options: argparse.Namespace) -> Dataset:
     return dataset
 
 
+@contextmanager
+def _written_aside(out: Path, dataset: Path) -> Iterator[Path]:
+    """Yields a temporary folder that becomes `out` at the end and is removed on any failure.
+
+    Raises Error if `out` exists and is not an empty folder, or is inside the dataset.
+    """
+    out = out.resolve()
+    if out.exists() and not out.is_dir():
+        raise Error(f"{out}: a file of this name exists; choose a new folder with -o")
+    if out.exists() and any(out.iterdir()):
+        raise Error(f"{out}: the folder is not empty; choose a new one with -o or remove it")
+    if out.is_relative_to(dataset.resolve()):
+        raise Error(f"{out}: it is inside the dataset; choose another folder with -o")
+    made = [each for each in out.parents if not each.exists()]
+    out.parent.mkdir(parents=True, exist_ok=True)
+    aside = out.parent / f".{out.name}.{os.getpid()}.part"
+    shutil.rmtree(aside, ignore_errors=True)  # of a killed process with this number
+    aside.mkdir()
+    try:
+        yield aside
+        os.replace(aside, out)
+    finally:
+        shutil.rmtree(aside, ignore_errors=True)
+        for each in made:  # the innermost first; those that are not empty stay
+            with suppress(OSError):
+                each.rmdir()
+
+
 def _interrupt(_signal: int, _frame: FrameType | None) -> None:
     raise KeyboardInterrupt
 
@@ -269,7 +297,7 @@ def main(arguments: Sequence[str] | None = None) -> int:
         dataset = _open(options)
         if dataset.pending:
             notes.tell(f"{dataset.pending} frames are pending and skipped")
-        with written_aside(options.output, options.dataset) as folder:
+        with _written_aside(options.output, options.dataset) as folder:
             return _export(options, folder, dataset, notes)
 
     with _sigterm_interrupts():

@@ -14,7 +14,7 @@ from typing import Any, NamedTuple
 import numpy as np
 from numpy.typing import NDArray
 
-from groundray.dataset import Camera, Dataset, Error, Frame
+from groundray.dataset import Camera, Dataset, Error, Frame, read_listed
 
 _GREY, _COLOUR = 0, 2  # colour types of PNG
 
@@ -43,7 +43,7 @@ def has_depths(dataset: Dataset, camera: Camera) -> bool:
 def read_picture(dataset: Dataset, camera: Camera, frame: Frame) -> Picture:
     """Reads a picture. Raises Error if it is missing, truncated or of another size."""
     file = dataset.image_file(camera, frame, ".png")
-    data = _read(file)
+    data = read_listed(file, "the image")
     # Signature, then the chunk IHDR; the last one is IEND, which is empty.
     if data[:8] != b"\x89PNG\r\n\x1a\n" or data[12:16] != b"IHDR" or data[-8:-4] != b"IEND":
         raise Error(f"{file}: it is not a complete PNG file: it is damaged; generate it again")
@@ -83,14 +83,6 @@ def read_depths_m(dataset: Dataset, camera: Camera, frame: Frame) -> NDArray[np.
         rule = f"must have {camera.size_px[0]} x {camera.size_px[1]} pixels"
         raise Error(f"{file}: it {rule}, as its calibration states; is it from another camera?")
     return depths_m
-
-
-def _read(file: Path) -> bytes:
-    try:
-        return file.read_bytes()
-    except OSError as fault:
-        rule = f"cannot read it: {fault.strerror}, although dataset.yaml lists the image as done"
-        raise Error(f"{file}: {rule}; was it removed?") from None
 
 
 @contextmanager

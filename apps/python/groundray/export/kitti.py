@@ -10,11 +10,10 @@ import numpy as np
 
 from groundray.dataset import Camera, Dataset, Error, Frame, Lidar
 from groundray.export.clouds import tell_of_scan
-from groundray.export.images import Picture, has_pictures, read_picture
-from groundray.export.intensity import FullScale
+from groundray.export.images import has_pictures, read_picture
 from groundray.export.labels import Instances, LabelMap
 from groundray.export.notes import Notes
-from groundray.export.scan import Scan, read_scan
+from groundray.export.scan import FullScale, Scan, read_scan
 from groundray.export.sensor_path import Floats, SensorPath
 
 
@@ -67,7 +66,7 @@ def write_kitti(
     for i, lidar in enumerate(lidars):
         number = options.first_sequence + i
         frames = _frames_of(lidar, view, notes)
-        _write_sequence(dataset, lidar, view, frames, options, out, number, notes)
+        _Sequence(dataset, lidar, view, frames, options, out, number, notes).write()
         counts.append(f"sequence {number:02} of {lidar.name}: {len(frames)} frames")
     return "; ".join(counts)
 
@@ -146,99 +145,86 @@ def _frames_of(lidar: Lidar, view: _View, notes: Notes) -> list[_KittiFrame]:
     return frames
 
 
-def _write_sequence(
-    dataset: Dataset,
-    lidar: Lidar,
-    view: _View,
-    frames: Sequence[_KittiFrame],
-    options: KittiOptions,
-    out: Path,
-    number: int,
-    notes: Notes,
-) -> None:
-    folder = out / "sequences" / f"{number:02}"
-    (folder / "velodyne").mkdir(parents=True)
-    path = SensorPath(dataset.path_file(lidar))
-    _write_calibration(folder / "calib.txt", lidar, view)
-    times = [f"{(each.time_ns - frames[0].time_ns) * 1e-9:.9f}\n" for each in frames]
-    (folder / "times.txt").write_text("".join(times))
-    _write_poses(lidar, view, path, frames, options, out, number)
-    labels = _LabelWriter(dataset, options.labels, folder) if options.labels else None
-    for i, each in enumerate(frames):
-        scan = read_scan(dataset, lidar, each.scan)
-        _write_points(scan, path, each.time_ns, options.full_scale, folder / f"velodyne/{i:06}.bin")
+@dataclass(frozen=True)
+class _Sequence:
+    """A sequence to write: `sequences/NN`, and `poses/NN.txt` for KITTI odometry."""
+
+    dataset: Dataset
+    lidar: Lidar
+    view: _View
+    frames: Sequence[_KittiFrame]
+    options: KittiOptions
+    out: Path
+    number: int
+    notes: Notes
+
+    def write(self) -> None:
+        folder = self.out / "sequences" / f"{self.number:02}"
+        (folder / "velodyne").mkdir(parents=True)
+        path = SensorPath(self.dataset.path_file(self.lidar))
+        self._write_calibration(folder / "calib.txt")
+        begin_ns = self.frames[0].time_ns
+        times = [f"{(each.time_ns - begin_ns) * 1e-9:.9f}\n" for each in self.frames]
+        (folder / "times.txt").write_text("".join(times))
+        self._write_poses(path, folder)
+        map_ = self.options.labels
+        labels = _LabelWriter(self.dataset, map_, folder) if map_ else None
+        for i, each in enumerate(self.frames):
+            scan = read_scan(self.dataset, self.lidar, each.scan)
+            self._write_points(scan, path, each.time_ns, folder / f"velodyne/{i:06}.bin")
+            if labels:
+                labels.write(scan, i)
+            else:
+                tell_of_scan(scan, self.notes)
+            if each.image is not None:
+                self._write_pictures(each.image, folder, f"{i:06}.png")
         if labels:
-            labels.write(scan, i)
-        else:
-            tell_of_scan(scan, notes)
-        if each.image is not None:
-            _write_pictures(dataset, view, each.image, folder, i, notes)
-    if labels:
-        labels.finish(notes)
+            labels.finish(self.notes)
 
+    def _write_poses(self, path: SensorPath, folder: Path) -> None:
+        """Writes the poses of camera 0 relative to the first."""
+        X_SC = np.linalg.inv(self.lidar.X_BS) @ self.view.X_BC(self.lidar)
+        X_DC = [path.pose_at(each.time_ns) @ X_SC for each in self.frames]
+        poses = [np.linalg.inv(X_DC[0]) @ each for each in X_DC]
+        file = folder / "poses.txt"
+        if not self.options.labels:
+            file = self.out / "poses" / f"{self.number:02}.txt"
+            file.parent.mkdir(exist_ok=True)
+        file.write_text("".join(_numbers(pose[:3]) + "\n" for pose in poses))
 
-def _write_poses(
-    lidar: Lidar,
-    view: _View,
-    path: SensorPath,
-    frames: Sequence[_KittiFrame],
-    options: KittiOptions,
-    out: Path,
-    number: int,
-) -> None:
-    """Writes poses of camera 0 relative to the first: poses/NN.txt; SemanticKITTI: poses.txt."""
-    X_SC = np.linalg.inv(lidar.X_BS) @ view.X_BC(lidar)
-    X_DC = [path.pose_at(each.time_ns) @ X_SC for each in frames]
-    poses = [np.linalg.inv(X_DC[0]) @ each for each in X_DC]
-    text = "".join(_numbers(pose[:3]) + "\n" for pose in poses)
-    if options.labels:
-        (out / "sequences" / f"{number:02}" / "poses.txt").write_text(text)
-    else:
-        (out / "poses").mkdir(exist_ok=True)
-        (out / "poses" / f"{number:02}.txt").write_text(text)
+    def _write_calibration(self, file: Path) -> None:
+        P_left, P_right = self.view.matrices
+        lines = {"P0": P_left, "P1": P_right, "P2": P_left, "P3": P_right}
+        lines["Tr"] = (np.linalg.inv(self.view.X_BC(self.lidar)) @ self.lidar.X_BS)[:3]
+        file.write_text("".join(f"{name}: {_numbers(matrix)}\n" for name, matrix in lines.items()))
 
+    def _write_points(self, scan: Scan, path: SensorPath, time_ns: int, file: Path) -> None:
+        rows = np.empty((len(scan), 4), "<f4")
+        rows[:, :3] = scan.points_at_m(path, time_ns)
+        rows[:, 3] = self.options.full_scale.shares(scan.lidar, scan.rows)
+        file.write_bytes(rows.tobytes())
 
-def _write_calibration(file: Path, lidar: Lidar, view: _View) -> None:
-    P_left, P_right = view.matrices
-    lines = {"P0": P_left, "P1": P_right, "P2": P_left, "P3": P_right}
-    lines["Tr"] = (np.linalg.inv(view.X_BC(lidar)) @ lidar.X_BS)[:3]
-    file.write_text("".join(f"{name}: {_numbers(matrix)}\n" for name, matrix in lines.items()))
+    def _write_pictures(self, image: Frame, folder: Path, name: str) -> None:
+        for side, camera in enumerate((self.view.left, self.view.right)):
+            if camera is None:
+                continue
+            frame = next((each for each in camera.frames if each.number == image.number), None)
+            if frame is None:
+                rule = f"it has no image {image.number}, but the other camera of its pair has"
+                raise Error(f"camera {camera.name}: {rule}; generate it")
+            picture = read_picture(self.dataset, camera, frame)
+            if picture.bits == 16:
+                self.notes.tell(
+                    "pictures have 16 bits, but KITTI's have 8: some programs read only the upper 8"
+                )
+            # KITTI's cameras 0 and 1 are grey, 2 and 3 have colours.
+            images = folder / f"image_{side + (2 if picture.is_colour else 0)}"
+            images.mkdir(exist_ok=True)
+            (images / name).write_bytes(picture.data)
 
 
 def _numbers(matrix: Floats) -> str:
     return " ".join(f"{value:.16e}" for value in matrix.ravel())
-
-
-def _write_points(
-    scan: Scan, path: SensorPath, time_ns: int, full_scale: FullScale, file: Path
-) -> None:
-    rows = np.empty((len(scan), 4), "<f4")
-    rows[:, :3] = scan.points_at_m(path, time_ns)
-    rows[:, 3] = full_scale.shares(scan.lidar, scan.rows)
-    file.write_bytes(rows.tobytes())
-
-
-def _write_pictures(
-    dataset: Dataset, view: _View, image: Frame, folder: Path, i: int, notes: Notes
-) -> None:
-    for side, camera in enumerate((view.left, view.right)):
-        if camera is None:
-            continue
-        frame = next((each for each in camera.frames if each.number == image.number), None)
-        if frame is None:
-            rule = f"it has no image {image.number}, but the other camera of its pair has"
-            raise Error(f"camera {camera.name}: {rule}; generate it")
-        picture = read_picture(dataset, camera, frame)
-        _tell_of_bits(picture, notes)
-        # KITTI's cameras 0 and 1 are grey, 2 and 3 have colours.
-        images = folder / f"image_{side + (2 if picture.is_colour else 0)}"
-        images.mkdir(exist_ok=True)
-        (images / f"{i:06}.png").write_bytes(picture.data)
-
-
-def _tell_of_bits(picture: Picture, notes: Notes) -> None:
-    if picture.bits == 16:
-        notes.tell("pictures have 16 bits, but KITTI's have 8: some programs read only the upper 8")
 
 
 class _LabelWriter:

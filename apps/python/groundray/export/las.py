@@ -12,10 +12,9 @@ from typing import Any
 import numpy as np
 
 from groundray.dataset import Dataset, Error, Lidar
-from groundray.export.intensity import FullScale
 from groundray.export.labels import LabelMap
 from groundray.export.notes import Notes
-from groundray.export.scan import MEANINGS, UNITS, Scan, read_scan
+from groundray.export.scan import MEANINGS, UNITS, FullScale, Scan, read_scan
 from groundray.export.sensor_path import Floats, SensorPath
 
 _POINT_FORMAT = 6

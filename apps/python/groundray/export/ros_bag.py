@@ -20,12 +20,10 @@ from groundray.export.images import (
     read_depths_m,
     read_picture,
 )
-from groundray.export.intensity import FullScale
-from groundray.export.mcap_file import Bag, Message
+from groundray.export.mcap_file import POINT_TYPES, Bag, Message
 from groundray.export.notes import Notes
 from groundray.export.ros_layouts import rows_of
-from groundray.export.ros_messages import POINT_TYPES
-from groundray.export.scan import read_scan
+from groundray.export.scan import FullScale, read_scan
 from groundray.export.sensor_path import Floats, SensorPath, quaternion_wxyz
 
 MAP, BODY = "map", "base_link"
@@ -77,24 +75,19 @@ def _facts(dataset: Dataset, shift_ns: int) -> dict[str, str]:
     }
 
 
+@dataclass
 class _Source:
     """The messages of a dataset."""
 
-    def __init__(
-        self,
-        dataset: Dataset,
-        lidars: Sequence[Lidar],
-        cameras: Sequence[Camera],
-        options: BagOptions,
-        notes: Notes,
-    ) -> None:
-        self.dataset = dataset
-        self.lidars = lidars
-        self.options = options
-        self.notes = notes
-        self.topics = _topic_names([*lidars, *cameras])
-        self.infos = {camera.name: _camera_info(dataset, camera) for camera in cameras}
-        self.cameras = cameras
+    dataset: Dataset
+    lidars: Sequence[Lidar]
+    cameras: Sequence[Camera]
+    options: BagOptions
+    notes: Notes
+
+    def __post_init__(self) -> None:
+        self.topics = _topic_names([*self.lidars, *self.cameras])
+        self.infos = {each.name: _camera_info(self.dataset, each) for each in self.cameras}
         self.shift_ns = self._shift_ns()
 
     def _shift_ns(self) -> int:

@@ -7,22 +7,14 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
-from groundray.export.intensity import FullScale
 from groundray.export.notes import Notes
-from groundray.export.scan import Scan
+from groundray.export.scan import FullScale, Scan
 
 Rows = NDArray[Any]
 
 # Field offsets are those of the drivers' own structures, padding included.
 VELODYNE = np.dtype(
-    [
-        ("x", "<f4"),
-        ("y", "<f4"),
-        ("z", "<f4"),
-        ("intensity", "<f4"),
-        ("ring", "<u2"),
-        ("time", "<f4"),
-    ]
+    [*((name, "<f4") for name in ("x", "y", "z", "intensity")), ("ring", "<u2"), ("time", "<f4")]
 )
 OUSTER = np.dtype(
     {

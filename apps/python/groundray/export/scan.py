@@ -1,4 +1,4 @@
-"""Scans: their rows, and their points in other frames."""
+"""Scans: their rows, and their points and intensities in other frames and scales."""
 
 from __future__ import annotations
 
@@ -9,7 +9,7 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
-from groundray.dataset import Dataset, Error, Frame, Lidar
+from groundray.dataset import Dataset, Error, Frame, Lidar, read_listed
 from groundray.export.sensor_path import Floats, SensorPath
 
 # Units and meanings of the columns that docs/reference/formats.md defines.
@@ -62,6 +62,10 @@ _REQUIRED = (
     *("world_x", "world_y", "world_z", "range_true", "nx", "ny", "nz", "label", "instance"),
 )
 
+# Intensity that is exported as full scale: a white plane at normal incidence, or the largest 8-bit
+# value.
+_FULL_SCALES = {"cosine": 1.0, "reflectance": 1.0, "eight_bit": 255.0}
+
 
 @dataclass(frozen=True)
 class Scan:
@@ -107,14 +111,36 @@ class Scan:
         return (self.points_in_world_m(path) - X_DS[:3, 3]) @ X_DS[:3, :3]
 
 
+class FullScale:
+    """Divisor of intensities: the user's choice, or the one that the sensor's scale implies."""
+
+    def __init__(self, chosen: float | None) -> None:
+        self.chosen = chosen
+
+    def of(self, lidar: Lidar) -> float:
+        """Returns the full scale. Raises Error for powers, which have none."""
+        if self.chosen is not None:
+            return self.chosen
+        if lidar.intensity_scale not in _FULL_SCALES:
+            rule = "its intensities are powers in watts, which have no full scale"
+            raise Error(f"lidar {lidar.name}: {rule}; give one with --intensity-full-scale")
+        return _FULL_SCALES[lidar.intensity_scale]
+
+    def shares(self, lidar: Lidar, rows: NDArray[Any]) -> Floats:
+        """Returns intensities as shares of full scale, not clipped."""
+        return rows["intensity"].astype(float) / self.of(lidar)
+
+    def whole(self, lidar: Lidar, rows: NDArray[Any], most: int) -> tuple[NDArray[np.int64], int]:
+        """Returns intensities as whole numbers from 0 to `most`, and how many were clipped."""
+        scaled = np.rint(self.shares(lidar, rows) * most)
+        clipped = np.clip(np.nan_to_num(scaled, nan=0.0), 0, most)
+        return clipped.astype(np.int64), int(np.count_nonzero(clipped != scaled))
+
+
 def read_scan(dataset: Dataset, lidar: Lidar, frame: Frame) -> Scan:
     """Reads one scan. Raises Error if it is missing, truncated, or not a scan of groundray."""
     file = dataset.scan_file(lidar, frame)
-    try:
-        data = file.read_bytes()
-    except OSError as fault:
-        rule = f"cannot read it: {fault.strerror}, although dataset.yaml lists it as done"
-        raise Error(f"{file}: {rule}; was it removed?") from None
+    data = read_listed(file, "it")
     dtype, count, offset = _read_header(data, file)
     expected = offset + count * dtype.itemsize
     if len(data) != expected:

@@ -7,7 +7,7 @@ from pathlib import Path
 import numpy as np
 from numpy.typing import NDArray
 
-from groundray.dataset import Error, nanoseconds_of
+from groundray.dataset import Error, nanoseconds_of, read_text
 
 Floats = NDArray[np.float64]
 Times = NDArray[np.int64]
@@ -127,19 +127,13 @@ def quaternion_wxyz(R: Floats) -> tuple[float, float, float, float]:
 def _read_tum(file: Path) -> tuple[Times, Floats, Floats]:
     times: list[int] = []
     values: list[list[float]] = []
-    try:
-        with file.open(encoding="utf-8") as lines:
-            for number, line in enumerate(lines, 1):
-                words = line.split()
-                if not words or words[0].startswith("#"):
-                    continue
-                time_ns, pose = _read_pose(words, f"{file}:{number}")
-                times.append(time_ns)
-                values.append(pose)
-    except OSError as fault:
-        raise Error(f"{file}: cannot read it: {fault.strerror}; is the dataset complete?") from None
-    except UnicodeDecodeError:
-        raise Error(f"{file}: it is not UTF-8 text; is it damaged?") from None
+    for number, line in enumerate(read_text(file).split("\n"), 1):
+        words = line.split()
+        if not words or words[0].startswith("#"):
+            continue
+        time_ns, pose = _read_pose(words, f"{file}:{number}")
+        times.append(time_ns)
+        values.append(pose)
     if not times:
         raise Error(f"{file}: it has no pose; is the dataset complete?")
     times_ns = np.array(times, dtype=np.int64)

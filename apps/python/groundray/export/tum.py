@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import shutil
-from collections.abc import Sequence
+from collections.abc import Callable, Sequence
 from pathlib import Path
 
 import numpy as np
@@ -18,6 +18,8 @@ from groundray.export.images import (
 )
 from groundray.export.notes import Notes
 from groundray.export.sensor_path import Floats, SensorPath, quaternion_wxyz
+
+_PngOf = Callable[[Frame], bytes]
 
 
 def write_tum(
@@ -46,12 +48,21 @@ def _write_camera(
         rule = f"camera {camera.name} has neither pictures nor depths"
         raise Error(f"{dataset.folder}: {rule}; add picture and truth to its products")
     times_ns = [frame.stamp_ns + camera.middle_ns for frame in camera.frames]
+    stamps = [_stamp(dataset, time_ns) for time_ns in times_ns]
     if with_pictures:
-        _write_pictures(dataset, camera, times_ns, folder)
+
+        def picture_of(frame: Frame) -> bytes:
+            return read_picture(dataset, camera, frame).data
+
+        _write_images("rgb", "color images", camera, stamps, folder, picture_of)
     else:
         notes.tell(f"camera {camera.name} has no pictures (product picture): there is no rgb.txt")
     if with_depths:
-        _write_depths(dataset, camera, times_ns, depth_per_m, folder, notes)
+
+        def depths_of(frame: Frame) -> bytes:
+            return png_of(_depths_of(dataset, camera, frame, depth_per_m, notes))
+
+        _write_images("depth", "depth maps", camera, stamps, folder, depths_of)
     else:
         notes.tell(f"camera {camera.name} has no depths (product truth): there is no depth.txt")
     _write_path(dataset, camera, times_ns, folder / "groundtruth.txt")
@@ -73,34 +84,16 @@ def _stamp(dataset: Dataset, time_ns: int) -> str:
     return f"{sign}{total // 10**9}.{total % 10**9:09}"
 
 
-def _write_pictures(
-    dataset: Dataset, camera: Camera, times_ns: Sequence[int], folder: Path
+def _write_images(
+    name: str, title: str, camera: Camera, stamps: Sequence[str], folder: Path, png: _PngOf
 ) -> None:
-    (folder / "rgb").mkdir()
-    lines = ["# color images\n", f"# camera: {camera.name}\n", "# timestamp filename\n"]
-    for frame, time_ns in zip(camera.frames, times_ns, strict=True):
-        stamp = _stamp(dataset, time_ns)
-        (folder / f"rgb/{stamp}.png").write_bytes(read_picture(dataset, camera, frame).data)
-        lines.append(f"{stamp} rgb/{stamp}.png\n")
-    (folder / "rgb.txt").write_text("".join(lines))
-
-
-def _write_depths(
-    dataset: Dataset,
-    camera: Camera,
-    times_ns: Sequence[int],
-    depth_per_m: float,
-    folder: Path,
-    notes: Notes,
-) -> None:
-    (folder / "depth").mkdir()
-    lines = ["# depth maps\n", f"# camera: {camera.name}\n", "# timestamp filename\n"]
-    for frame, time_ns in zip(camera.frames, times_ns, strict=True):
-        stamp = _stamp(dataset, time_ns)
-        depths = _depths_of(dataset, camera, frame, depth_per_m, notes)
-        (folder / f"depth/{stamp}.png").write_bytes(png_of(depths))
-        lines.append(f"{stamp} depth/{stamp}.png\n")
-    (folder / "depth.txt").write_text("".join(lines))
+    """Writes `<name>/<stamp>.png` of all frames, and their list `<name>.txt`."""
+    (folder / name).mkdir()
+    lines = [f"# {title}\n", f"# camera: {camera.name}\n", "# timestamp filename\n"]
+    for frame, stamp in zip(camera.frames, stamps, strict=True):
+        (folder / f"{name}/{stamp}.png").write_bytes(png(frame))
+        lines.append(f"{stamp} {name}/{stamp}.png\n")
+    (folder / f"{name}.txt").write_text("".join(lines))
 
 
 def _depths_of(

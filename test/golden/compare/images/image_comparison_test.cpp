@@ -8,8 +8,6 @@
 #include <numbers>
 #include <random>
 
-#include "apps/golden/compare/images/image_alignment.h"
-#include "apps/golden/compare/images/image_similarity.h"
 #include "core/error.h"
 #include "core/image/exr_io.h"
 #include "core/io/file_io.h"

@@ -1,5 +1,3 @@
-#include "apps/golden/compare/images/light_match.h"
-
 #include <gmock/gmock.h>
 #include <gtest/gtest.h>
 

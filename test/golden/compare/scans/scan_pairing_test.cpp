@@ -11,7 +11,6 @@
 #include <random>
 #include <tuple>
 
-#include "apps/golden/compare/scans/direction_tree.h"
 #include "apps/golden/compare/scans/pulses.h"
 #include "test/support/scans/sample_scan.h"
 

@@ -1,5 +1,6 @@
 #pragma once
 
+#include <filesystem>
 #include <string>
 #include <vector>
 
@@ -8,6 +9,33 @@
 #include "apps/golden/suite/golden_case.h"
 
 namespace groundray::golden {
+
+/// Checks each row's value against its formula; adds pictures if the rows are pixels. Infinite
+/// values must be equal, and NaN never passes.
+/// @throws Error as evaluate, or if there are no rows.
+void check_rows(const RowsCheck& check, const std::string& because, const Columns& columns,
+                Section& into);
+
+/// Checks a statistic of all rows against a number.
+/// @throws Error as evaluate; if a value is NaN, the tolerance is not finite, or, except for a
+///         count, there are no rows.
+void check_figure(const FigureCheck& check, const std::string& because, const Columns& columns,
+                  Section& into);
+
+/// Returns the C library, compiler and processor of this program, with a hash of values that the
+/// library's functions return here. Files stored with the same text must match bit for bit.
+std::string made_with();
+
+/// Criterion for equality with stored values.
+enum class Equal {
+  Bits,   ///< equal values; NaN equals NaN
+  Nearly  ///< for another C library: doubles to 1e-12 relative, floats equal or adjacent
+};
+
+/// Compares a product with a stored one, column by column.
+/// @throws Error if the names of their columns or their sizes differ.
+void check_equal(const Columns& columns, const Columns& stored, Equal equal,
+                 const std::string& because, Section& into);
 
 /// Number of runs, with different seeds, behind a stored mean and variance.
 inline constexpr int statistical_runs = 64;
