@@ -172,7 +172,7 @@ bool lies_on(const glm::dvec3& point_m, const FiredPulse& pulse) {
 }
 
 // Sets origin, direction and cross-section axes of an echo's beam, in D.
-void lay_axis(const RecordedSensor& lidar, const RecordedFrame& frame, const PointCloud& scan,
+void set_axis(const RecordedSensor& lidar, const RecordedFrame& frame, const PointCloud& scan,
               std::size_t row, const glm::dvec3& point_S, EchoBeam& beam) {
   const double time_s = value_of(scan, "time", row).value_or(0);
   auto pulse = find_pulse(lidar, frame, scan, row);
@@ -244,7 +244,7 @@ EchoBeam echo_beam(const RecordedSensor& lidar, const RecordedFrame& frame, cons
   const auto point_S = vector_of(scan, {"x", "y", "z"}, row);
   if (!point_S) throw Error("row {} has no finite x, y and z", row);
   EchoBeam beam;
-  lay_axis(lidar, frame, scan, row, *point_S, beam);
+  set_axis(lidar, frame, scan, row, *point_S, beam);
   beam.true_m = vector_of(scan, {"world_x", "world_y", "world_z"}, row);
   BeamSpec spec = lidar.lidar ? lidar.lidar->spec.beam : BeamSpec{};
   spec.sub_rays = spec.most_sub_rays = 1;

@@ -15,8 +15,6 @@
 #include "apps/view/layers/cloud_layer.h"
 #include "apps/view/layers/dem_layer.h"
 #include "apps/view/layers/mesh_layer.h"
-#include "apps/view/layers/object_layer.h"
-#include "apps/view/layers/picture_layer.h"
 #include "apps/view/layers/scene_layers.h"
 #include "apps/view/rendering/picture_file.h"
 #include "core/error.h"

@@ -11,9 +11,7 @@
 
 #include "apps/view/compare/deviation.h"
 #include "apps/view/load_input.h"
-#include "apps/view/rendering/off_screen_window.h"
 #include "apps/view/rendering/offscreen_render.h"
-#include "apps/view/window/comparison.h"
 #include "apps/view/window/run_window.h"
 #include "core/error.h"
 
@@ -32,7 +30,6 @@ struct Arguments {
   double tolerance_m = 0;
   int turntable = 0;
   StillSpec still;
-  std::optional<double> point_size;
   bool no_legend = false;
 };
 
@@ -47,12 +44,13 @@ void add_options(CLI::App& app, Arguments& arguments) {
   app.add_option("--look-at", arguments.look_at, "X,Y,Z of the point at the centre of the picture");
   app.add_option("--follow", arguments.follow,
                  "X,Y,Z of the terrain's viewpoint for --screenshot, instead of the eye");
-  app.add_option("--colour-by", arguments.still.colour_by,
+  app.add_option("--colour-by", arguments.still.view.colour_by,
                  "COLUMN of all layers that have it, or LAYER=COLUMN; may be repeated");
   app.add_option("--range", arguments.range,
                  "LOW,HIGH: range of the colours of --colour-by and --compare-with");
-  app.add_option("--hide", arguments.still.hide, "LAYER, or a group of layers: objects");
-  app.add_option("--point-size", arguments.point_size, "Size of the points of clouds, px")
+  app.add_option("--hide", arguments.still.view.hide, "LAYER, or a group of layers: objects");
+  app.add_option("--point-size", arguments.still.view.point_size_px,
+                 "Size of the points of clouds, px")
       ->check(CLI::Range(1.0, 32.0));
   app.add_option("--compare-with", arguments.compare_with,
                  "Scene, DEM or mesh: colour clouds and meshes by their deviation from it, and "
@@ -61,7 +59,7 @@ void add_options(CLI::App& app, Arguments& arguments) {
          "--tolerance-m", arguments.tolerance_m,
          "With --compare-with a mesh: print precision and completeness within this distance")
       ->check(CLI::PositiveNumber);
-  app.add_flag("--wireframe", arguments.still.is_wireframe, "Draw surfaces as wireframes");
+  app.add_flag("--wireframe", arguments.still.view.is_wireframe, "Draw surfaces as wireframes");
   app.add_flag("--no-legend", arguments.no_legend, "Omit the legend");
   app.add_option(
       "--turntable", arguments.turntable,
@@ -71,14 +69,14 @@ void add_options(CLI::App& app, Arguments& arguments) {
 void read_spec(Arguments& arguments) {
   StillSpec& spec = arguments.still;
   if (!arguments.size.empty()) spec.size_px = parse_size(arguments.size);
-  if (!arguments.look_from.empty()) spec.from_w_m = parse_place(arguments.look_from, "--look-from");
-  if (!arguments.look_at.empty()) spec.at_w_m = parse_place(arguments.look_at, "--look-at");
+  if (!arguments.look_from.empty())
+    spec.view.from_w_m = parse_place(arguments.look_from, "--look-from");
+  if (!arguments.look_at.empty()) spec.view.at_w_m = parse_place(arguments.look_at, "--look-at");
   if (!arguments.follow.empty()) spec.follow_w_m = parse_place(arguments.follow, "--follow");
   if (!arguments.range.empty()) spec.range = parse_range(arguments.range);
-  if (spec.from_w_m && spec.from_w_m == spec.at_w_m)
+  if (spec.view.from_w_m && spec.view.from_w_m == spec.view.at_w_m)
     throw Error("--look-from and --look-at are the same point: they must differ");
-  spec.point_size_px = arguments.point_size;
-  spec.has_legend = !arguments.no_legend;
+  spec.view.has_legend = !arguments.no_legend;
 }
 
 Truth open_truth(const std::filesystem::path& path) {
@@ -121,7 +119,7 @@ int take_stills(const Arguments& arguments) {
     for (const std::string& note : inputs.back().notes) fmt::print(stderr, "note: {}\n", note);
   }
   if (!arguments.compare_with.empty()) compare_inputs(inputs, arguments);
-  View view(make_off_screen_window(spec.size_px));
+  View view(make_offscreen_window(spec.size_px));
   arrange(view, inputs, spec);
   if (arguments.turntable != 0) {
     write_turntable(view, arguments.screenshot, arguments.turntable, spec.size_px);
@@ -129,19 +127,6 @@ int take_stills(const Arguments& arguments) {
     write_still(view, arguments.screenshot, spec.size_px);
   }
   return done;
-}
-
-int show_window(int& argc, char** argv, const Arguments& arguments) {
-  const StillSpec& spec = arguments.still;
-  const WindowStart start{.inputs = arguments.inputs,
-                          .from_w_m = spec.from_w_m,
-                          .at_w_m = spec.at_w_m,
-                          .coloured_by = spec.colour_by,
-                          .hidden = spec.hide,
-                          .point_size_px = spec.point_size_px,
-                          .wireframe = spec.is_wireframe,
-                          .has_legend = spec.has_legend};
-  return run_window(argc, argv, start);
 }
 
 // Returns the name of an option that requires --screenshot but is given without it; empty if there
@@ -179,7 +164,8 @@ int run(int argc, char** argv) {
     return wrong_usage;
   }
   read_spec(arguments);
-  if (arguments.screenshot.empty()) return show_window(argc, argv, arguments);
+  if (arguments.screenshot.empty())
+    return run_window(argc, argv, {.inputs = arguments.inputs, .view = arguments.still.view});
   vtkObject::GlobalWarningDisplayOff();  // errors are thrown instead
   return take_stills(arguments);
 }

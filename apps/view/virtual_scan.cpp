@@ -25,35 +25,20 @@ constexpr std::chrono::seconds margin(1);
 // Minimum fraction of a sweep between two progress reports.
 constexpr double least_step = 0.01;
 
-// Returns the sweep under way at a time of the run.
-std::int64_t sweep_at(const ScanPattern& pattern, nanoseconds time) {
-  const double seconds = std::chrono::duration<double>(time).count();
-  auto sweep =
-      std::max<std::int64_t>(0, static_cast<std::int64_t>(seconds * pattern.sweep_rate_hz()));
-  while (sweep > 0 && pattern.stamp(sweep) > time) --sweep;
-  while (pattern.stamp(sweep + 1) <= time) ++sweep;
-  return sweep;
-}
-
 // Lambertian grey from 200 nm to 20 µm.
 Material bare_ground() {
   return {.name = "bare ground",
           .reflection = Lambertian{{{200, bare_reflectance}, {20'000, bare_reflectance}}}};
 }
 
-// Disables the simulation of light: only geometric rays are traced.
-void put_out(LidarSpec& lidar) {
-  lidar.light.reset();
-  lidar.beam.sub_rays = lidar.beam.most_sub_rays = 1;
-  lidar.waveforms = LidarSpec::WaveformOutput::Omit;
-}
-
 // Applies the scene's settings for its lidars: see docs/reference/scene.md.
-void suit_to_scene(const SceneSpec& scene, const Materials& materials, LidarSpec& lidar,
-                   std::vector<std::string>& notes) {
+void apply_scene_settings(const SceneSpec& scene, const Materials& materials, LidarSpec& lidar,
+                          std::vector<std::string>& notes) {
   if (!lidar.light) return;
   if (materials.all().empty()) {
-    put_out(lidar);
+    lidar.light.reset();
+    lidar.beam.sub_rays = lidar.beam.most_sub_rays = 1;
+    lidar.waveforms = LidarSpec::WaveformOutput::Omit;
     notes.emplace_back(
         "the scene's surfaces have no materials, so only rays were traced: ranges are exact, "
         "without noise of light. Give the terrain a material to simulate the laser's echoes");
@@ -122,42 +107,36 @@ Pose pose_at(const SensorPlace& place, const Ground& ground) {
   return X_DS;
 }
 
-PlacedScan SceneScanner::scan(const ScanRequest& request, const std::stop_token& stop,
+PlacedScan SceneScanner::scan(LidarSpec spec, const Pose& X_DS, const std::stop_token& stop,
                               const ScanProgress& progress) {
-  const auto tell = [&](double share, const std::string& step) {
+  const auto report = [&](double share, const std::string& step) {
     if (progress) progress(share, step);
     if (stop.stop_requested()) throw Interrupted{};
   };
-  tell(0, "preparing the sensor");
+  report(0, "preparing the sensor");
   PlacedScan placed;
-  LidarSpec spec = request.lidar;
-  suit_to_scene(simulation_.spec, simulation_.scene_objects.materials, spec, placed.notes);
+  apply_scene_settings(simulation_.spec, simulation_.scene_objects.materials, spec, placed.notes);
   const Lidar lidar(spec, simulation_.spec.air);
-  const std::int64_t sweep = sweep_at(lidar.pattern(), request.time);
+  constexpr std::int64_t sweep = 0;
   placed.stamp = lidar.pattern().stamp(sweep);
   const nanoseconds end = lidar.pattern().last_firing(sweep);
-  const Trajectory X_DS({{placed.stamp - margin, request.X_DS}, {end + margin, request.X_DS}});
-  tell(0.05, "building the terrain round the sensor");
-  const Scene& scene = scene_({&X_DS, placed.stamp, end});
+  const Trajectory at_rest({{placed.stamp - margin, X_DS}, {end + margin, X_DS}});
+  report(0.05, "building the terrain round the sensor");
+  const Scene& scene = scene_({&at_rest, placed.stamp, end});
   const std::string step = fmt::format("scanning, {} pulses", lidar.pattern().pulses(sweep));
-  double told = 0;
+  double reported = 0;
   const auto watch = [&](double share) {
-    if (progress && share - told >= least_step) progress(0.3 + 0.7 * (told = share), step);
+    if (progress && share - reported >= least_step) progress(0.3 + 0.7 * (reported = share), step);
     return !stop.stop_requested();
   };
-  tell(0.3, step);
+  report(0.3, step);
   try {
-    placed.scan = lidar.scan(scene, X_DS, sweep, simulation_.spec.seed, 0, watch);
+    placed.scan = lidar.scan(scene, at_rest, sweep, simulation_.spec.seed, 0, watch);
   } catch (const SweepStopped&) {
     throw Interrupted{};
   }
-  tell(1, "done");
+  report(1, "done");
   return placed;
-}
-
-PlacedScan virtual_scan(const Simulation& simulation, const ScanRequest& request,
-                        const std::stop_token& stop, const ScanProgress& progress) {
-  return SceneScanner(simulation).scan(request, stop, progress);
 }
 
 }  // namespace groundray

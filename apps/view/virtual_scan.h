@@ -49,14 +49,7 @@ struct SensorPlace {
 /// @throws Error if there is no ground at the position, or the height is not positive.
 Pose pose_at(const SensorPlace& place, const Ground& ground);
 
-/// Parameters of a scan.
-struct ScanRequest {
-  LidarSpec lidar;
-  Pose X_DS;                         ///< constant during the scan
-  std::chrono::nanoseconds time{0};  ///< time of the run: selects the sweep that is under way
-};
-
-/// Result of a scan.
+/// Result of a scan from one pose.
 struct PlacedScan {
   LidarScan scan;                     ///< columns as in docs/reference/formats.md
   std::chrono::nanoseconds stamp{0};  ///< stamp of the sweep
@@ -74,25 +67,22 @@ class SceneScanner {
   explicit SceneScanner(const Simulation& simulation)
       : simulation_(simulation), scene_(simulation) {}
 
-  /// Simulates one sweep of a lidar. The result equals that of `groundray generate` for a scene
-  /// whose first sensor is this lidar at this pose, with the scene's seed. If the scene's surfaces
-  /// have no materials, only rays are traced, without light, and a note reports it.
+  /// Simulates the first sweep of a lidar at a constant pose. The result equals that of `groundray
+  /// generate` for a scene whose first sensor is this lidar at this pose, with the scene's seed. If
+  /// the scene's surfaces have no materials, only rays are traced, without light, and a note
+  /// reports it.
   /// @param stop      requests a stop, from any thread: the sweep stops within milliseconds, but
   ///                  the construction of the scene before it is completed first.
   /// @param progress  called by one thread at a time, not necessarily the calling one; may be
   ///                  empty.
   /// @throws Interrupted if a stop is requested.
   /// @throws Error as Lidar, Lidar::scan and FrameSceneBuilder.
-  PlacedScan scan(const ScanRequest& request, const std::stop_token& stop = {},
+  PlacedScan scan(LidarSpec spec, const Pose& X_DS, const std::stop_token& stop = {},
                   const ScanProgress& progress = {});
 
  private:
   const Simulation& simulation_;
   FrameSceneBuilder scene_;
 };
-
-/// Scans once, as SceneScanner::scan().
-PlacedScan virtual_scan(const Simulation& simulation, const ScanRequest& request,
-                        const std::stop_token& stop = {}, const ScanProgress& progress = {});
 
 }  // namespace groundray

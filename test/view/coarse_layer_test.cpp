@@ -1,4 +1,4 @@
-#include "apps/view/layers/coarse_layer.h"
+#include "apps/view/rendering/coarse_layer.h"
 
 #include <gmock/gmock.h>
 #include <gtest/gtest.h>

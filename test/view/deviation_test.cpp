@@ -12,6 +12,7 @@
 
 #include "apps/scene/interruption.h"
 #include "core/error.h"
+#include "core/geometry/height_grid.h"
 #include "test/support/margin.h"
 #include "test/support/terrain/sample_terrain.h"
 
@@ -189,16 +190,15 @@ TEST(DeviationFromTruth, MatchesTheClosedFormForATiltedPlane) {
                        .triangles = {{0, 1, 2}, {0, 2, 3}},
                        .levels = {}});
   const double normal_z = 1 / std::sqrt(1 + 0.25 + 0.0625);
-  const glm::dvec3 shift_m(100, 200, 7);  // from the points' D to the truth's D
   std::vector<glm::dvec3> places_m;
   std::vector<double> above_m;
   for (const glm::dvec3& random : random_places(1'000, 1)) {
     const glm::dvec2 at = 4.0 + 2.0 * glm::dvec2(random);
     above_m.push_back(random.z / 2);
-    places_m.push_back(glm::dvec3(at, height_m(at.x, at.y) + above_m.back()) - shift_m);
+    places_m.push_back(glm::dvec3(at, height_m(at.x, at.y) + above_m.back()));
   }
-  const Deviation up = deviation_from_ground(places_m, grid, shift_m);
-  const Deviation across = deviation_from_mesh(places_m, mesh, shift_m);
+  const Deviation up = deviation_from_ground(places_m, grid);
+  const Deviation across = deviation_from_mesh(places_m, mesh);
   double sum_m = 0, sum2_m2 = 0, worst_m = 0;
   for (std::size_t i = 0; i < places_m.size(); ++i) {
     EXPECT_NEAR(up.signed_m[i], above_m[i], 1e-7);
@@ -217,8 +217,9 @@ TEST(DeviationFromTruth, OfADemFromItselfIsZeroExceptInHoles) {
   std::vector<float> heights_m(30, 2);
   heights_m[7] = static_cast<float>(nan);
   const HeightGrid grid({6, 5}, {10, 20}, {2, -2}, heights_m);
-  const auto places_m = sample_places_m(grid);
-  ASSERT_EQ(places_m.size(), 30U);
+  std::vector<glm::dvec3> places_m;  // of all samples, row by row
+  for (int i = 0; i < 30; ++i)
+    places_m.emplace_back(grid.frame().to_D({i % 6, i / 6}), grid.height_m(i % 6, i / 6));
   EXPECT_EQ(places_m[8], glm::dvec3(14, 18, 2));
   const Deviation deviation = deviation_from_ground(places_m, grid);
   EXPECT_TRUE(std::isnan(deviation.signed_m[7]));
@@ -278,14 +279,13 @@ TEST(DeviationFromTruth, ReportsProgressAndStops) {
   const TrueMesh truth(sphere(6));
   const auto places_m = random_places(150'000, 2);
   std::vector<double> shares;
-  deviation_from_mesh(places_m, truth, glm::dvec3(0), {},
-                      [&](double share) { shares.push_back(share); });
+  deviation_from_mesh(places_m, truth, {}, [&](double share) { shares.push_back(share); });
   EXPECT_TRUE(std::ranges::is_sorted(shares));
   EXPECT_EQ(shares.size(), 4U);
   EXPECT_EQ(shares.back(), 1);
   std::stop_source stop;
   std::size_t told = 0;
-  EXPECT_THROW(deviation_from_mesh(places_m, truth, glm::dvec3(0), stop.get_token(),
+  EXPECT_THROW(deviation_from_mesh(places_m, truth, stop.get_token(),
                                    [&](double) {
                                      if (++told == 2) stop.request_stop();
                                    }),

@@ -1,5 +1,3 @@
-#include "apps/view/layers/ground_texture.h"
-
 #include <gtest/gtest.h>
 #include <vtkDataArray.h>
 #include <vtkImageData.h>

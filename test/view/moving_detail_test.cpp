@@ -1,4 +1,4 @@
-#include "apps/view/layers/moving_detail.h"
+#include "apps/view/rendering/moving_detail.h"
 
 #include <gtest/gtest.h>
 

@@ -10,7 +10,7 @@
 #include <utility>
 #include <vector>
 
-#include "apps/view/rendering/off_screen_window.h"
+#include "apps/view/rendering/view.h"
 #include "core/error.h"
 #include "core/image/image_io.h"
 #include "test/support/temporary_folder.h"
@@ -29,7 +29,7 @@ std::vector<Opened> jacksboro() {
 }
 
 Image8 still_of(std::vector<Opened> inputs, const StillSpec& spec) {
-  View view(make_off_screen_window(spec.size_px));
+  View view(make_offscreen_window(spec.size_px));
   arrange(view, inputs, spec);
   return view.picture(spec.size_px);
 }
@@ -58,7 +58,7 @@ class Golden : public ::testing::TestWithParam<std::pair<const char*, const char
 TEST_P(Golden, TerrainMatchesTheGoldenImage) {
   const auto& [column, name] = GetParam();
   StillSpec spec{.size_px = {320, 184}};
-  if (column[0] != '\0') spec.colour_by = {column};
+  if (column[0] != '\0') spec.view.colour_by = {column};
   const Image8 now = still_of(jacksboro(), spec);
   const Image8 golden =
       read_image8(testing::data_folder().parent_path() / "test/view/golden" / name);
@@ -83,19 +83,22 @@ TEST(Still, NeedsNoDisplay) {
 
 TEST(Still, LooksAtTheGivenPoint) {
   std::vector<Opened> inputs = jacksboro();
-  View view(make_off_screen_window({64, 48}));
+  View view(make_offscreen_window({64, 48}));
   const glm::dvec3 from(740'000, 4'030'000, 9'000), at(741'000, 4'031'000, 300);
-  arrange(view, inputs, {.from_w_m = from, .at_w_m = at});
+  arrange(view, inputs, {.view = {.from_w_m = from, .at_w_m = at}});
   EXPECT_LT(glm::distance(view.current_look().from_w_m, from), 1e-6);
   EXPECT_LT(glm::distance(view.current_look().at_w_m, at), 1e-6);
-  EXPECT_THAT([&] { arrange(view, inputs, {.from_w_m = from, .at_w_m = from}); },
+  EXPECT_THAT([&] { arrange(view, inputs, {.view = {.from_w_m = from, .at_w_m = from}}); },
               ThrowsMessage<Error>(HasSubstr("the same point")));
 }
 
 TEST(Still, HidesLayersAndDrawsWireframes) {
-  const Image8 hidden = still_of(jacksboro(), {.size_px = {320, 184}, .hide = {"terrain"}});
-  const Image8 shown = still_of(jacksboro(), {.size_px = {320, 184}, .has_legend = false});
-  const Image8 wires = still_of(jacksboro(), {.size_px = {320, 184}, .is_wireframe = true});
+  const Image8 hidden =
+      still_of(jacksboro(), {.size_px = {320, 184}, .view = {.hide = {"terrain"}}});
+  const Image8 shown =
+      still_of(jacksboro(), {.size_px = {320, 184}, .view = {.has_legend = false}});
+  const Image8 wires =
+      still_of(jacksboro(), {.size_px = {320, 184}, .view = {.is_wireframe = true}});
   // Where the terrain is hidden, only the background remains, which is constant in each row.
   for (int y = 0; y < 184; ++y) {
     for (int x = 1; x < 200; ++x) ASSERT_NEAR(hidden.at(x, y)[1], hidden.at(0, y)[1], 1);
@@ -107,8 +110,8 @@ TEST(Still, HidesLayersAndDrawsWireframes) {
 TEST(Still, TurntableIsACompleteTurn) {
   TemporaryFolder folder;
   std::vector<Opened> inputs = jacksboro();
-  View view(make_off_screen_window({64, 48}));
-  arrange(view, inputs, {.has_legend = false});
+  View view(make_offscreen_window({64, 48}));
+  arrange(view, inputs, {.view = {.has_legend = false}});
   const glm::dvec3 from = view.current_look().from_w_m;
   write_turntable(view, folder / "turn", 4, {64, 48});
   EXPECT_LT(glm::distance(view.current_look().from_w_m, from), 1e-6);
@@ -140,9 +143,9 @@ TEST(Still, ParsesSizesAndPlaces) {
 }
 
 TEST(Still, ReportsMissingLayersAndColumns) {
-  EXPECT_THAT([] { still_of(jacksboro(), {.colour_by = {"depth"}}); },
+  EXPECT_THAT([] { still_of(jacksboro(), {.view = {.colour_by = {"depth"}}}); },
               ThrowsMessage<Error>(HasSubstr("terrain=height")));
-  EXPECT_THAT([] { still_of(jacksboro(), {.hide = {"sensors"}}); },
+  EXPECT_THAT([] { still_of(jacksboro(), {.view = {.hide = {"sensors"}}}); },
               ThrowsMessage<Error>(HasSubstr("there are terrain")));
 }
 

@@ -1,5 +1,3 @@
-#include "apps/view/layers/terrain_surface.h"
-
 #include <gmock/gmock.h>
 #include <gtest/gtest.h>
 #include <vtkCellData.h>
@@ -12,6 +10,7 @@
 #include <map>
 #include <set>
 
+#include "apps/view/layers/terrain_follower.h"
 #include "test/support/terrain/leaf_triangles.h"
 #include "test/support/terrain/sample_clipmap.h"
 #include "test/support/terrain/sample_terrain.h"

@@ -11,7 +11,6 @@
 #include <vector>
 
 #include "apps/view/layers/mesh_layer.h"
-#include "apps/view/rendering/off_screen_window.h"
 #include "apps/view/rendering/view.h"
 #include "test/support/terrain/sample_terrain.h"
 
@@ -75,7 +74,7 @@ double frames_per_s(View& view, double size_m, int frames) {
 // at least 15 frames per second during motion.
 TEST(ViewProof, KeepsTheFrameRateDuringMotion) {
   const int cells = static_cast<int>(testing::proof_size(250, 708));
-  View view(make_off_screen_window({1280, 720}));
+  View view(make_offscreen_window({1280, 720}));
   view.add(surface(cells));
   view.add(points(testing::proof_size(200'000, 2'000'000), cells));
   frames_per_s(view, cells, 2);

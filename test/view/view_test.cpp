@@ -13,7 +13,6 @@
 #include <string>
 
 #include "apps/view/layers/mesh_layer.h"
-#include "apps/view/rendering/off_screen_window.h"
 #include "core/error.h"
 
 namespace groundray::view_test {
@@ -78,7 +77,7 @@ const std::vector<glm::u8vec3> colours = {
 
 TEST(View, DrawsPointsAtTheirPinholeProjection) {
   constexpr glm::ivec2 size(300, 200);
-  View view(make_off_screen_window(size));
+  View view(make_offscreen_window(size));
   view.add(points_at("cloud", places, colours));
   view.look(from_above(4));
   const Image8 picture = view.picture(size);
@@ -93,7 +92,7 @@ TEST(View, DrawsPointsAtTheirPinholeProjection) {
 // 5000 px are wider than one tile.
 TEST(View, DrawsLargePicturesInTiles) {
   constexpr glm::ivec2 size(5000, 400);
-  View view(make_off_screen_window({300, 200}));
+  View view(make_offscreen_window({300, 200}));
   std::vector<glm::dvec3> row;
   std::vector<glm::u8vec3> red;
   for (int i = -12; i <= 12; ++i) {
@@ -119,7 +118,7 @@ TEST(View, DrawsLargePicturesInTiles) {
 }
 
 TEST(View, RejectsInvalidPictureSizes) {
-  View view(make_off_screen_window({30, 20}));
+  View view(make_offscreen_window({30, 20}));
   for (const glm::ivec2 size : {glm::ivec2(0, 10), {10, -1}, {70'000, 10}}) {
     EXPECT_THAT([&] { view.picture(size); }, ThrowsMessage<Error>(HasSubstr("1 x 1 to 65535")));
   }
@@ -127,7 +126,7 @@ TEST(View, RejectsInvalidPictureSizes) {
 
 TEST(View, PicksThePointUnderAPixel) {
   constexpr glm::ivec2 size(300, 200);
-  View view(make_off_screen_window(size));
+  View view(make_offscreen_window(size));
   view.add(points_at("cloud", places, colours));
   view.look(from_above(4));
   view.render();
@@ -148,7 +147,7 @@ TEST(View, PicksThePointUnderAPixel) {
 
 TEST(View, PicksNoOccludedPoints) {
   constexpr glm::ivec2 size(300, 200);
-  View view(make_off_screen_window(size));
+  View view(make_offscreen_window(size));
   view.add(points_at("cloud", {{0.2, 0.1, 0}, {0.3, 0.1, 1.5}}, {{255, 0, 0}, {0, 255, 0}}));
   view.add(square_at("roof", 1));
   view.look(from_above(4));
@@ -169,7 +168,7 @@ TEST(View, PicksNoOccludedPoints) {
 // of view.
 TEST(View, LinesOfSightMatchAPinhole) {
   constexpr glm::ivec2 size(320, 240);
-  View view(make_off_screen_window(size));
+  View view(make_offscreen_window(size));
   view.add(square_at("floor", 0));
   view.look({far_away + glm::dvec3(3, -5, 4), far_away, {0, 0, 1}});
   view.render();
@@ -193,7 +192,7 @@ TEST(View, DrawsFewerPointsWhileMoving) {
   for (std::size_t i = 0; i < many.size(); ++i)
     many[i] = {static_cast<double>(i % 1000) / 500 - 1,
                std::floor(static_cast<double>(i) / 1000) / 300 - 1, 0};
-  View view(make_off_screen_window({300, 200}));
+  View view(make_offscreen_window({300, 200}));
   view.add(points_at("cloud", many, std::vector<glm::u8vec3>(many.size())));
   view.add(points_at("few", places, colours));
   EXPECT_EQ(drawn_points(view, "cloud"), 600'000);
@@ -206,7 +205,7 @@ TEST(View, DrawsFewerPointsWhileMoving) {
 }
 
 TEST(View, KeepsTheStyleOfAReplacedLayer) {
-  View view(make_off_screen_window({30, 20}));
+  View view(make_offscreen_window({30, 20}));
   view.add(points_at("cloud", places, colours));
   view.colour_by("cloud", "number");
   view.set_opacity("cloud", 0.5);
@@ -222,7 +221,7 @@ TEST(View, KeepsTheStyleOfAReplacedLayer) {
 }
 
 TEST(View, ReportsMissingLayersAndColumns) {
-  View view(make_off_screen_window({30, 20}));
+  View view(make_offscreen_window({30, 20}));
   view.add(points_at("cloud", places, colours));
   EXPECT_THAT([&] { view.colour_by("cluod", "number"); }, ThrowsMessage<Error>(HasSubstr("cluod")));
   EXPECT_THAT([&] { view.colour_by("cloud", "depth"); }, ThrowsMessage<Error>(HasSubstr("depth")));
@@ -239,7 +238,7 @@ TEST(View, ReportsMissingLayersAndColumns) {
 
 TEST(View, LegendExplainsTheColours) {
   constexpr glm::ivec2 size(400, 300);
-  View view(make_off_screen_window(size));
+  View view(make_offscreen_window(size));
   view.add(points_at("cloud", places, colours));
   view.look(from_above(400));
   const Image8 without = view.picture(size);
@@ -272,7 +271,7 @@ TEST(View, LegendExplainsTheColours) {
 // Ranges without round subdivisions, or which doubles do not resolve.
 TEST(View, LegendAcceptsAnyRange) {
   constexpr glm::ivec2 size(200, 150);
-  View view(make_off_screen_window(size));
+  View view(make_offscreen_window(size));
   view.add(points_at("cloud", places, colours));
   view.colour_by("cloud", "number");
   constexpr double most = std::numeric_limits<double>::max();
@@ -288,7 +287,7 @@ TEST(View, LegendAcceptsAnyRange) {
 // Small layers are not thinned to nothing when a large layer is drawn as well.
 TEST(View, KeepsSmallLayersWhileMoving) {
   std::vector<glm::dvec3> many(600'000, glm::dvec3(0));
-  View view(make_off_screen_window({300, 200}));
+  View view(make_offscreen_window({300, 200}));
   view.add(points_at("cloud", many, std::vector<glm::u8vec3>(many.size())));
   view.add(points_at("few", places, colours));
   TriangleMesh field;
@@ -309,7 +308,7 @@ TEST(View, KeepsSmallLayersWhileMoving) {
 }
 
 TEST(View, FitsTheVisibleLayers) {
-  View view(make_off_screen_window({200, 200}));
+  View view(make_offscreen_window({200, 200}));
   view.add(square_at("floor", 0));
   view.fit();
   view.render();

@@ -24,7 +24,6 @@
 namespace groundray::virtual_scan_test {
 namespace {
 
-using namespace std::chrono_literals;
 using ::testing::HasSubstr;
 
 // A lidar with a laser, made up for these tests.
@@ -150,16 +149,12 @@ TEST(VirtualScan, MatchesAGeneratedScanBitForBit) {
     if (spec.light) spec.light->sun = load_lidar(folder / "lamp.yaml").light->sun;
     const Pose X_DS = pose_at(rest(), simulation.terrain.ground());
     SceneScanner scanner(simulation);
-    for (const int sweep : {0, 3}) {
-      const PlacedScan placed =
-          scanner.scan({spec, X_DS, std::chrono::milliseconds(100 * sweep + 50)});
-      EXPECT_TRUE(placed.notes.empty());
-      EXPECT_NEAR(std::chrono::duration<double>(placed.stamp).count(), 0.1 * sweep, 3e-4);
-      const auto file = folder / "out/lidar/top" / fmt::format("{:06}.ply", sweep);
-      const PointCloud generated = read_ply(file).cloud;
-      EXPECT_GT(generated.rows(), 500U);
-      EXPECT_EQ(difference(placed.scan.echoes, generated), "") << lidar << ", sweep " << sweep;
-    }
+    const PlacedScan placed = scanner.scan(spec, X_DS);
+    EXPECT_TRUE(placed.notes.empty());
+    EXPECT_NEAR(std::chrono::duration<double>(placed.stamp).count(), 0, 3e-4);
+    const PointCloud generated = read_ply(folder / "out/lidar/top/000000.ply").cloud;
+    EXPECT_GT(generated.rows(), 500U);
+    EXPECT_EQ(difference(placed.scan.echoes, generated), "") << lidar;
   }
 }
 
@@ -182,9 +177,9 @@ TEST(VirtualScan, TreatsABareDemAsGreyGround) {
     const LidarSpec spec = load_simulation(scene).lidars[0].spec.lidar;
     const Simulation simulation = simulation_of_dem(folder / "hills.asc");
     const PlacedScan placed =
-        virtual_scan(simulation, {spec, pose_at(rest(), simulation.terrain.ground()), 150ms});
+        SceneScanner(simulation).scan(spec, pose_at(rest(), simulation.terrain.ground()));
     EXPECT_EQ(placed.notes.size(), spec.light ? 1U : 0U);
-    const PointCloud generated = read_ply(folder / "out/lidar/top/000001.ply").cloud;
+    const PointCloud generated = read_ply(folder / "out/lidar/top/000000.ply").cloud;
     EXPECT_GT(generated.rows(), 500U);
     EXPECT_EQ(difference(placed.scan.echoes, generated), "") << lidar;
   }
@@ -198,9 +193,9 @@ TEST(VirtualScan, NeedsNoMaterials) {
   const Simulation simulation =
       load_simulation(groundray::testing::write_sample_scene(folder.path(), text));
   std::ofstream(folder / "lamp.yaml") << lamp;
-  const PlacedScan placed = virtual_scan(
-      simulation,
-      {load_lidar(folder / "lamp.yaml"), pose_at(rest(), simulation.terrain.ground()), 0ms});
+  const PlacedScan placed =
+      SceneScanner(simulation)
+          .scan(load_lidar(folder / "lamp.yaml"), pose_at(rest(), simulation.terrain.ground()));
   ASSERT_EQ(placed.notes.size(), 1U);
   EXPECT_THAT(placed.notes[0], HasSubstr("only rays"));
   EXPECT_FALSE(placed.scan.echoes.has("amplitude"));
@@ -210,11 +205,12 @@ TEST(VirtualScan, NeedsNoMaterials) {
 TEST(VirtualScan, ReportsProgress) {
   std::vector<double> shares;
   const Pose X_DS = pose_at(rest(), sample_world().terrain.ground());
-  virtual_scan(sample_world(), {sample_world().lidars[0].spec.lidar, X_DS, 0ms}, {},
-               [&](double share, const std::string& step) {
-                 shares.push_back(share);
-                 EXPECT_FALSE(step.empty());
-               });
+  SceneScanner(sample_world())
+      .scan(sample_world().lidars[0].spec.lidar, X_DS, {},
+            [&](double share, const std::string& step) {
+              shares.push_back(share);
+              EXPECT_FALSE(step.empty());
+            });
   EXPECT_TRUE(std::ranges::is_sorted(shares));
   EXPECT_EQ(shares.front(), 0);
   EXPECT_EQ(shares.back(), 1);
@@ -224,8 +220,8 @@ TEST(VirtualScan, StopsIfRequestedBeforehand) {
   std::stop_source stop;
   stop.request_stop();
   const Pose X_DS = pose_at(rest(), sample_world().terrain.ground());
-  EXPECT_THROW(virtual_scan(sample_world(), {sample_world().lidars[0].spec.lidar, X_DS, 0ms},
-                            stop.get_token()),
+  EXPECT_THROW(SceneScanner(sample_world())
+                   .scan(sample_world().lidars[0].spec.lidar, X_DS, stop.get_token()),
                Interrupted);
 }
 
@@ -236,17 +232,17 @@ TEST(VirtualScan, StopsDuringASweep) {
   const std::vector<SensorPreset> presets = lidar_presets();
   const auto os1 = std::ranges::find(presets, "ouster_os1_128", &SensorPreset::name);
   ASSERT_NE(os1, presets.end());
-  const ScanRequest request{os1->lidar, pose_at(rest(), sample_world().terrain.ground()), 0ms};
+  const Pose X_DS = pose_at(rest(), sample_world().terrain.ground());
   SceneScanner scanner(sample_world());
-  const PlacedScan first = scanner.scan(request);
-  const PlacedScan whole = scanner.scan(request);
+  const PlacedScan first = scanner.scan(os1->lidar, X_DS);
+  const PlacedScan whole = scanner.scan(os1->lidar, X_DS);
   EXPECT_EQ(difference(first.scan.echoes, whole.scan.echoes), "");
   constexpr int rounds = 20;
   for (int round = 0; round < rounds; ++round) {
     std::stop_source stop;
     double told = 0;
     const double stop_at = 0.95 * round / rounds;
-    EXPECT_THROW(scanner.scan(request, stop.get_token(),
+    EXPECT_THROW(scanner.scan(os1->lidar, X_DS, stop.get_token(),
                               [&](double share, const std::string&) {
                                 told = share;
                                 if (share >= stop_at) stop.request_stop();
@@ -255,7 +251,7 @@ TEST(VirtualScan, StopsDuringASweep) {
     EXPECT_GE(told, stop_at);
     EXPECT_LT(told, 1);
   }
-  EXPECT_EQ(difference(scanner.scan(request).scan.echoes, whole.scan.echoes), "");
+  EXPECT_EQ(difference(scanner.scan(os1->lidar, X_DS).scan.echoes, whole.scan.echoes), "");
 }
 
 }  // namespace

@@ -11,8 +11,7 @@
 #include <set>
 
 #include "apps/view/rendering/offscreen_render.h"
-#include "apps/view/window/panels/help.h"
-#include "apps/view/window/panels/turntable_dialog.h"
+#include "apps/view/window/panels/dialogs.h"
 #include "apps/view/window/recent_files.h"
 #include "apps/view/window/window.h"
 #include "core/image/image_io.h"

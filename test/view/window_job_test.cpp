@@ -18,7 +18,7 @@ struct JobTest : public ::testing::Test {
   JobTest() { testing::application(); }
 
   Job::Hooks hooks() {
-    return {.told = [this](double share, const std::string&) { shares.push_back(share); },
+    return {.progress = [this](double share, const std::string&) { shares.push_back(share); },
             .failed = [this](const std::string& message) { fault = message; },
             .cancelled = [this] { is_cancelled = true; },
             .ended = [this] { ++ends; }};
@@ -42,7 +42,7 @@ TEST_F(JobTest, RunsInAnotherThreadAndReturnsInThisOne) {
   const auto here = std::this_thread::get_id();
   std::thread::id worked, done;
   job.start(
-      [&](const auto&, const Told& told) {
+      [&](const auto&, const JobProgress& told) {
         worked = std::this_thread::get_id();
         told(0.5, "half");
         return 42;
@@ -122,7 +122,7 @@ TEST_F(JobTest, MayBeDestroyedWhileRunning) {
   {
     Job job;
     job.start(
-        [&](const std::stop_token& stop, const Told& told) {
+        [&](const std::stop_token& stop, const JobProgress& told) {
           while (!stop.stop_requested()) told(0, "");
           has_ended = true;
           return 1;

@@ -313,10 +313,10 @@ TEST_F(WindowTest, AppliesTheCommandLine) {
   write_ply(folder / "pyramid.ply", pyramid(), {});
   write_cloud(folder / "cloud.ply");
   Window& window = shown({.inputs = {folder / "cloud.ply", folder / "pyramid.ply"},
-                          .at_w_m = glm::dvec3(3, 2, 1),
-                          .coloured_by = {"cloud.ply=intensity"},
-                          .hidden = {"pyramid.ply", "nobody"},
-                          .point_size_px = 7});
+                          .view = {.at_w_m = glm::dvec3(3, 2, 1),
+                                   .colour_by = {"cloud.ply=intensity"},
+                                   .hide = {"pyramid.ply", "nobody"},
+                                   .point_size_px = 7}});
   settle();
   const std::string message = dismiss_fault();
   EXPECT_NE(message.find("--hide nobody"), std::string::npos) << message;

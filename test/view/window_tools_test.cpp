@@ -98,7 +98,7 @@ TEST_F(WindowToolsTest, ReportsOnlyTheLastPick) {
   std::vector<std::string> told;
   std::string failed;
   Picker picker(window.view(),
-                {.told = [&](const std::string& title, const auto&) { told.push_back(title); },
+                {.facts = [&](const std::string& title, const auto&) { told.push_back(title); },
                  .failed = [&](const std::string& message) { failed = message; }});
   ShownScan scan;  // in a missing file: an attempt to read it reports an error
   scan.frame.file = "/nowhere/000000.ply";
@@ -264,7 +264,7 @@ TEST_F(WindowToolsTest, ScansABareDem) {
   QTest::mouseClick(panel.findChild<QPushButton*>("place"), Qt::LeftButton);
   EXPECT_TRUE(wait_until([&] { return window.canvas().is_taking_place(); }));
   window.canvas().take_place(false);
-  panel.put_down({80, 80, 50}, {90, 80, 50});
+  panel.place_at({80, 80, 50}, {90, 80, 50});
   ASSERT_TRUE(panel.has_place());
   panel.scan();
   settle();
@@ -281,7 +281,7 @@ TEST_F(WindowToolsTest, ScansABareDem) {
   EXPECT_FALSE(panel.has_place());
   window.layer_panel().select("hills.asc");
   QTest::keyClick(&window, Qt::Key_Delete);
-  panel.put_down({80, 80, 50}, {90, 80, 50});
+  panel.place_at({80, 80, 50}, {90, 80, 50});
   EXPECT_TRUE(panel.has_place());
 }
 
@@ -290,7 +290,7 @@ TEST_F(WindowToolsTest, ScanCanBeCancelled) {
   open(SampleDataset::get().scene());
   ScanPanel& panel = window.scan_panel();
   panel.choose("ouster_os1_128");
-  panel.put_down({80, 80, 50}, {90, 80, 50});
+  panel.place_at({80, 80, 50}, {90, 80, 50});
   const std::size_t layers = window.view().layers().size();
   QTest::mouseClick(panel.findChild<QPushButton*>("scan"), Qt::LeftButton);
   ASSERT_TRUE(panel.is_scanning());
@@ -337,7 +337,7 @@ TEST_F(WindowToolsTest, MayBeClosedDuringAJob) {
   Window& window = shown();
   open(SampleDataset::get().scene());
   window.scan_panel().choose("ouster_os1_128");
-  window.scan_panel().put_down({80, 80, 50}, {90, 80, 50});
+  window.scan_panel().place_at({80, 80, 50}, {90, 80, 50});
   window.scan_panel().scan();
   EXPECT_TRUE(window.scan_panel().is_scanning());
   window_.reset();

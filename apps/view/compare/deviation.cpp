@@ -5,21 +5,25 @@
 #include <tbb/parallel_for.h>
 
 #include <algorithm>
-#include <atomic>
+#include <array>
 #include <cmath>
 #include <glm/common.hpp>
 #include <glm/geometric.hpp>
 #include <limits>
 
 #include "apps/scene/interruption.h"
+#include "apps/view/layers/dem_layer.h"
 #include "core/error.h"
 #include "core/quantile.h"
 #include "reconstruction/mesh/accuracy/accuracy.h"
+#include "terrain/dem/dem_io.h"
 
 namespace groundray {
 namespace {
 
 constexpr float not_measured = std::numeric_limits<float>::quiet_NaN();
+constexpr std::size_t bins = 61;
+constexpr const char* column_name = "deviation";
 constexpr std::size_t block_places = 65'536;  // points between two checks of the stop token
 
 // Computes one deviation for each point on all cores, with checks of the stop token in between.
@@ -55,15 +59,43 @@ std::string length_text(double length_m) {
   return std::isnan(length_m) ? "none" : fmt::format("{:.4g} m", length_m);
 }
 
+std::vector<glm::dvec3> places_m(const Layer& layer, const glm::dvec3& origin_w_m) {
+  std::vector<glm::dvec3> places(layer.points());
+  for (std::size_t i = 0; i < places.size(); ++i) {
+    places[i] = layer.p_w_m(static_cast<vtkIdType>(i)) - origin_w_m;
+  }
+  return places;
+}
+
+TriangleMesh mesh_of(const Layer& layer, const glm::dvec3& origin_w_m) {
+  TriangleMesh mesh;
+  mesh.vertices_m = places_m(layer, origin_w_m);
+  const std::span<const std::int32_t> numbers = corners(*layer.data);
+  for (std::size_t i = 0; i + 2 < numbers.size(); i += 3) {
+    mesh.triangles.emplace_back(numbers[i], numbers[i + 1], numbers[i + 2]);
+  }
+  if (mesh.triangles.empty()) {
+    throw Error("{}: has no triangle, so distances to it are undefined", layer.name);
+  }
+  return mesh;
+}
+
+std::vector<Agreement> agreements_of(const Layer& layer, const TriangleMesh& truth,
+                                     const glm::dvec3& origin_w_m, double tolerance_m,
+                                     const std::stop_token& stop) {
+  if (tolerance_m <= 0 || layer.triangles() == 0) return {};
+  const std::array<double, 1> tolerances_m{tolerance_m};
+  return agreement_until(mesh_of(layer, origin_w_m), truth, tolerances_m, stop);
+}
+
 }  // namespace
 
 Deviation deviation_from_ground(const std::vector<glm::dvec3>& places_m, const Ground& truth,
-                                const glm::dvec3& shift_m, const std::stop_token& stop,
-                                const ShareDone& progress) {
+                                const std::stop_token& stop, const ShareDone& progress) {
   return measured(places_m.size(), stop, progress,
                   [&](std::size_t begin, std::size_t end, std::vector<float>& into) {
                     for (std::size_t i = begin; i < end; ++i) {
-                      const glm::dvec3 p = places_m[i] + shift_m;
+                      const glm::dvec3& p = places_m[i];
                       if (!std::isfinite(p.x + p.y + p.z)) continue;
                       if (const auto ground_m = truth.height_m_at(glm::dvec2(p)))
                         into[i] = static_cast<float>(p.z - *ground_m);
@@ -72,14 +104,12 @@ Deviation deviation_from_ground(const std::vector<glm::dvec3>& places_m, const G
 }
 
 Deviation deviation_from_mesh(const std::vector<glm::dvec3>& places_m, const TrueMesh& truth,
-                              const glm::dvec3& shift_m, const std::stop_token& stop,
-                              const ShareDone& progress) {
+                              const std::stop_token& stop, const ShareDone& progress) {
   return measured(places_m.size(), stop, progress,
                   [&](std::size_t begin, std::size_t end, std::vector<float>& into) {
                     std::uint32_t near = 0;
                     for (std::size_t i = begin; i < end; ++i) {
-                      into[i] =
-                          static_cast<float>(truth.signed_distance_m(places_m[i] + shift_m, near));
+                      into[i] = static_cast<float>(truth.signed_distance_m(places_m[i], near));
                     }
                   });
 }
@@ -157,15 +187,25 @@ DeviationHistogram histogram_of(const std::vector<float>& signed_m, std::size_t 
   return histogram;
 }
 
+std::vector<std::pair<std::string, std::string>> figure_texts(const DeviationFigures& figures) {
+  return {{"points", fmt::format("{}", figures.count)},
+          {"beyond the truth", fmt::format("{}", figures.beyond)},
+          {"mean", length_text(figures.mean_m)},
+          {"RMS", length_text(figures.rms_m)},
+          {"median", length_text(figures.median_m)},
+          {"NMAD", length_text(figures.nmad_m)},
+          {"95 % within", length_text(figures.p95_m)},
+          {"largest", length_text(figures.largest_m)},
+          {"lowest", length_text(figures.low_m)},
+          {"highest", length_text(figures.high_m)}};
+}
+
 std::vector<std::string> figure_lines(const DeviationFigures& figures) {
-  std::vector<std::string> lines{fmt::format("points {}", figures.count),
-                                 fmt::format("mean {}", length_text(figures.mean_m)),
-                                 fmt::format("RMS {}", length_text(figures.rms_m)),
-                                 fmt::format("median {}", length_text(figures.median_m)),
-                                 fmt::format("NMAD {}", length_text(figures.nmad_m)),
-                                 fmt::format("95 % within {}", length_text(figures.p95_m)),
-                                 fmt::format("lowest {}", length_text(figures.low_m)),
-                                 fmt::format("highest {}", length_text(figures.high_m))};
+  std::vector<std::string> lines;
+  for (const auto& [name, value] : figure_texts(figures)) {
+    if (name != "beyond the truth" && name != "largest")
+      lines.push_back(fmt::format("{} {}", name, value));
+  }
   if (figures.beyond > 0)
     lines.push_back(fmt::format("{} points beyond the truth", figures.beyond));
   return lines;
@@ -181,14 +221,46 @@ std::vector<std::string> agreement_lines(const std::vector<Agreement>& agreement
   return lines;
 }
 
-std::vector<glm::dvec3> sample_places_m(const HeightGrid& dem) {
-  std::vector<glm::dvec3> places_m;
-  places_m.reserve(dem.heights_m().size());
-  for (int row = 0; row < dem.rows(); ++row) {
-    for (int column = 0; column < dem.columns(); ++column)
-      places_m.emplace_back(dem.frame().to_D({column, row}), dem.height_m(column, row));
+Comparison compare(const Layer& layer, const Truth& truth, double tolerance_m,
+                   const std::stop_token& stop, const ShareDone& progress) {
+  Comparison comparison;
+  comparison.layer = layer.name;
+  comparison.truth = truth.name;
+  if (const auto* simulation = std::get_if<std::shared_ptr<const Simulation>>(&truth.what)) {
+    const Terrain& terrain = (*simulation)->terrain;
+    comparison.deviation = deviation_from_ground(places_m(layer, terrain.header().origin_w_m),
+                                                 terrain.ground(), stop, progress);
+  } else if (const auto* file = std::get_if<Truth::DemFile>(&truth.what)) {
+    const Dem dem = load_dem(file->path, options_for(file->path));
+    comparison.deviation =
+        deviation_from_ground(places_m(layer, dem.origin_w_m), dem.grid, stop, progress);
+  } else {
+    const Layer& surface = std::get<Layer>(truth.what);
+    const TriangleMesh mesh = mesh_of(surface, surface.origin_w_m);
+    comparison.deviation =
+        deviation_from_mesh(places_m(layer, surface.origin_w_m), TrueMesh(mesh), stop, progress);
+    comparison.agreements = agreements_of(layer, mesh, surface.origin_w_m, tolerance_m, stop);
   }
-  return places_m;
+  if (comparison.deviation.figures.count == 0) {
+    throw Error("{} has no point near {}: are both in the same frame?", layer.name, truth.name);
+  }
+  comparison.histogram = histogram_of(comparison.deviation.signed_m, bins);
+  return comparison;
+}
+
+Layer coloured_by_deviation(Layer layer, const Comparison& comparison) {
+  const auto data = vtkSmartPointer<vtkPolyData>::New();
+  data->ShallowCopy(layer.data);  // the view draws the old data until it receives this layer
+  layer.data = data;
+  layer.actor = nullptr;
+  layer.coarse = nullptr;  // lacks the column
+  std::erase_if(layer.columns, [](const LayerColumn& each) { return each.name == column_name; });
+  add_column(layer, {.name = column_name, .unit = "m", .scale = ColourScale::Signed},
+             comparison.deviation.signed_m);
+  const DeviationFigures& figures = comparison.deviation.figures;
+  if (figures.p95_m > 0) layer.columns.back().range = {-figures.p95_m, figures.p95_m};
+  layer.coloured_by = column_name;
+  return layer;
 }
 
 }  // namespace groundray

@@ -2,16 +2,20 @@
 
 #include <cstddef>
 #include <cstdint>
+#include <filesystem>
 #include <functional>
 #include <glm/vec3.hpp>
+#include <memory>
 #include <optional>
 #include <span>
 #include <stop_token>
 #include <string>
 #include <utility>
+#include <variant>
 #include <vector>
 
-#include "core/geometry/height_grid.h"
+#include "apps/scene/simulation.h"
+#include "apps/view/rendering/layer.h"
 #include "core/geometry/mesh.h"
 #include "core/tracing/closest_point.h"
 #include "reconstruction/mesh/accuracy/agreement.h"
@@ -48,10 +52,9 @@ struct Deviation {
 using ShareDone = std::function<void(double share)>;
 
 /// Measures the vertical distances of points from the ground.
-/// @param places_m  points; adding `shift_m` gives positions in the ground's D.
+/// @param places_m  points in the ground's D.
 /// @throws Interrupted if a stop is requested.
 Deviation deviation_from_ground(const std::vector<glm::dvec3>& places_m, const Ground& truth,
-                                const glm::dvec3& shift_m = glm::dvec3(0),
                                 const std::stop_token& stop = {}, const ShareDone& progress = {});
 
 /// Mesh that serves as the truth. Vertices at the same position are merged. Immutable: any number
@@ -94,10 +97,9 @@ class TrueMesh {
 };
 
 /// Measures the signed distances of points from a mesh, as TrueMesh::signed_distance_m.
-/// @param places_m  points; adding `shift_m` gives positions in the mesh's D.
+/// @param places_m  points in the mesh's D.
 /// @throws Interrupted if a stop is requested.
 Deviation deviation_from_mesh(const std::vector<glm::dvec3>& places_m, const TrueMesh& truth,
-                              const glm::dvec3& shift_m = glm::dvec3(0),
                               const std::stop_token& stop = {}, const ShareDone& progress = {});
 
 /// Computes agreement() with its default fineness, but stops on request.
@@ -115,12 +117,40 @@ DeviationFigures figures_of(const std::vector<float>& signed_m);
 DeviationHistogram histogram_of(const std::vector<float>& signed_m, std::size_t bins,
                                 std::optional<std::pair<double, double>> range_m = std::nullopt);
 
+/// Returns the names and values of the statistics: "mean", "0.012 m".
+std::vector<std::pair<std::string, std::string>> figure_texts(const DeviationFigures& figures);
+
 /// Returns the statistics as text lines: "mean 0.012 m".
 std::vector<std::string> figure_lines(const DeviationFigures& figures);
 std::vector<std::string> agreement_lines(const std::vector<Agreement>& agreements);
 
-/// Returns the positions of all samples of a DEM in D, row by row. Samples of holes have the height
-/// NaN, and so no deviation.
-std::vector<glm::dvec3> sample_places_m(const HeightGrid& dem);
+/// Reference that a layer is compared with.
+struct Truth {
+  /// DEM file.
+  struct DemFile {
+    std::filesystem::path path;
+  };
+  std::string name;  ///< name for display, unique among the truths that are offered
+  /// Reference surface of a scene, that of a DEM file, or a displayed surface.
+  std::variant<std::shared_ptr<const Simulation>, DemFile, Layer> what;
+};
+
+/// Comparison of a layer with the truth.
+struct Comparison {
+  std::string layer, truth;
+  Deviation deviation;  ///< deviations of the layer's points
+  DeviationHistogram histogram;
+  std::vector<Agreement> agreements;  ///< agreement of two surfaces, if a tolerance is given
+};
+
+/// Measures the distances of a layer's points from the truth. Thread-safe.
+/// @param tolerance_m  tolerance for precision and completeness of two surfaces; 0 to omit them.
+/// @throws Interrupted if a stop is requested.
+/// @throws Error if a file is invalid, the truth has no triangle, or no point has a deviation.
+Comparison compare(const Layer& layer, const Truth& truth, double tolerance_m,
+                   const std::stop_token& stop, const ShareDone& progress);
+
+/// Returns the layer coloured by its deviations, as the column "deviation".
+Layer coloured_by_deviation(Layer layer, const Comparison& comparison);
 
 }  // namespace groundray

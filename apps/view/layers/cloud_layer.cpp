@@ -53,7 +53,7 @@ std::string unit_of(std::string_view name) {
     std::string_view unit;
     std::array<std::string_view, 12> names;
   };
-  constexpr std::array<Unit, 6> units = {{
+  constexpr std::array<Unit, 5> units = {{
       {"m",
        {"range", "range_true", "error_estimate", "error_bound", "range_sd", "height", "sd",
         "signed_distance", "world_x", "world_y", "world_z", "elevation"}},
@@ -61,7 +61,6 @@ std::string unit_of(std::string_view name) {
       {"s", {"time", "width"}},
       {"W", {"amplitude"}},
       {"m/s", {"vx", "vy", "vz"}},
-      {"1", {}},
   }};
   const std::string small = lower(name);
   for (const Unit& unit : units) {
@@ -135,9 +134,7 @@ void add_colour(Layer& layer, LayerColumn::Of of, const PointCloud& table,
 constexpr const char* rows_name = "groundray: rows of the table";
 
 void keep_rows(Layer& layer, std::span<const std::size_t> rows) {
-  auto array = vtkSmartPointer<vtkTypeInt64Array>::New();
-  array->SetName(rows_name);
-  array->SetNumberOfValues(static_cast<vtkIdType>(rows.size()));
+  const auto array = make_array<vtkTypeInt64Array>(rows_name, rows.size());
   for (std::size_t i = 0; i < rows.size(); ++i)
     array->SetValue(static_cast<vtkIdType>(i), static_cast<vtkTypeInt64>(rows[i]));
   layer.data->GetPointData()->AddArray(array);
@@ -150,10 +147,6 @@ std::size_t beyond_floats(const PointCloud::Column& column) {
   return static_cast<std::size_t>(std::ranges::count_if(*values, [](double value) {
     return std::isfinite(value) && std::abs(value) > std::numeric_limits<float>::max();
   }));
-}
-
-bool is_finite(const glm::dvec3& p) {
-  return std::isfinite(p.x) && std::isfinite(p.y) && std::isfinite(p.z);
 }
 
 // Returns an origin for the points' floats: the centre in whole metres if any coordinate reaches
@@ -174,7 +167,8 @@ glm::dvec3 near_origin(std::span<const glm::dvec3> points, std::span<const std::
 std::vector<std::size_t> rows_kept(const CloudContent& content, std::size_t& broken) {
   std::vector<std::size_t> rows;
   for (std::size_t i = 0; i < content.p_m.size(); ++i) {
-    if (is_finite(content.p_m[i])) rows.push_back(i);
+    const glm::dvec3& p = content.p_m[i];
+    if (std::isfinite(p.x) && std::isfinite(p.y) && std::isfinite(p.z)) rows.push_back(i);
   }
   broken = content.p_m.size() - rows.size();
   if (content.most_points == 0 || rows.size() <= content.most_points) return rows;
@@ -188,21 +182,18 @@ std::vector<std::size_t> rows_kept(const CloudContent& content, std::size_t& bro
 
 }  // namespace
 
-std::vector<double> numbers_of(const PointCloud::Column& column) {
-  return std::visit(
-      [](const auto& values) { return std::vector<double>(values.begin(), values.end()); },
-      column.values);
-}
-
 std::vector<glm::dvec3> positions_of(const PointCloud& table) {
   const std::array<const PointCloud::Column*, 3> axes = {find(table, "x"), find(table, "y"),
                                                          find(table, "z")};
   if (std::ranges::find(axes, nullptr) != axes.end()) return {};
   std::vector<glm::dvec3> points(table.rows());
   for (std::size_t k = 0; k < 3; ++k) {
-    const std::vector<double> values = numbers_of(*axes[k]);
-    for (std::size_t i = 0; i < values.size(); ++i)
-      points[i][static_cast<glm::length_t>(k)] = values[i];
+    std::visit(
+        [&](const auto& values) {
+          for (std::size_t i = 0; i < values.size(); ++i)
+            points[i][static_cast<glm::length_t>(k)] = static_cast<double>(values[i]);
+        },
+        axes[k]->values);
   }
   return points;
 }

@@ -33,9 +33,6 @@ std::size_t table_row(const Layer& cloud, vtkIdType point);
 /// it lacks them.
 std::vector<glm::dvec3> positions_of(const PointCloud& table);
 
-/// Returns a column's values as doubles.
-std::vector<double> numbers_of(const PointCloud::Column& column);
-
 /// Adds a table's columns to a layer, one value for each of `rows`, except x, y and z. Columns of
 /// kinds (label, class...) become categories; red, green and blue become "colour".
 void add_table(Layer& layer, LayerColumn::Of of, const PointCloud& table,

@@ -4,13 +4,12 @@
 
 #include <cmath>
 #include <cstdint>
-#include <glm/geometric.hpp>
-#include <glm/trigonometric.hpp>
-#include <limits>
+#include <glm/vec2.hpp>
 #include <vector>
 
 #include "apps/view/layers/cloud_layer.h"
 #include "apps/view/layers/mesh_layer.h"
+#include "apps/view/rendering/coarse_layer.h"
 #include "core/error.h"
 #include "core/io/point_cloud.h"
 #include "terrain/dem/band_file.h"
@@ -35,13 +34,12 @@ std::vector<float> thinned_heights(const DemFile& file, int step) {
 
 // Returns the triangles of a grid whose three samples have heights. Cells are split like those of
 // the reference surface: along the diagonal from the north-eastern corner.
-std::vector<glm::uvec3> grid_triangles(glm::ivec2 size, const std::vector<float>& heights,
-                                       bool is_mirrored) {
-  std::vector<glm::uvec3> triangles;
+KeptTriangles grid_triangles(glm::ivec2 size, const std::vector<float>& heights, bool is_mirrored) {
+  KeptTriangles kept(heights.size());
   const auto columns = static_cast<std::uint32_t>(size.x);
   const auto add = [&](std::uint32_t a, std::uint32_t b, std::uint32_t c) {
     if (std::isnan(heights[a]) || std::isnan(heights[b]) || std::isnan(heights[c])) return;
-    triangles.push_back(is_mirrored ? glm::uvec3(a, c, b) : glm::uvec3(a, b, c));
+    kept.add(is_mirrored ? glm::uvec3(a, c, b) : glm::uvec3(a, b, c), kept.cells.size());
   };
   for (std::uint32_t row = 0; row + 1 < static_cast<std::uint32_t>(size.y); ++row) {
     for (std::uint32_t column = 0; column + 1 < columns; ++column) {
@@ -50,31 +48,6 @@ std::vector<glm::uvec3> grid_triangles(glm::ivec2 size, const std::vector<float>
       add(sw + 1, nw + 1, sw);
     }
   }
-  return triangles;
-}
-
-// Triangles and the samples that they use; the triangles index `rows`.
-struct Kept {
-  std::vector<std::size_t> rows;
-  std::vector<glm::uvec3> triangles;
-};
-
-Kept keep_used(std::vector<glm::uvec3> triangles, std::size_t samples) {
-  constexpr auto none = std::numeric_limits<std::uint32_t>::max();
-  std::vector<std::uint32_t> number(samples, none);
-  for (const glm::uvec3& triangle : triangles) {
-    for (glm::length_t k = 0; k < 3; ++k) number[triangle[k]] = 0;
-  }
-  Kept kept;
-  for (std::size_t i = 0; i < samples; ++i) {
-    if (number[i] == none) continue;
-    number[i] = static_cast<std::uint32_t>(kept.rows.size());
-    kept.rows.push_back(i);
-  }
-  for (glm::uvec3& triangle : triangles) {
-    for (glm::length_t k = 0; k < 3; ++k) triangle[k] = number[triangle[k]];
-  }
-  kept.triangles = std::move(triangles);
   return kept;
 }
 
@@ -89,37 +62,20 @@ PointCloud table_of(const RasterBands& bands) {
   return table;
 }
 
-std::vector<float> layer_slopes_deg(const Layer& layer) {
-  const auto places = coordinates(*layer.data);
-  const auto corner = corners(*layer.data);
-  const auto at = [&](std::int32_t i) {
-    const auto first = std::size_t{3} * static_cast<std::size_t>(i);
-    return glm::dvec3(places[first], places[first + 1], places[first + 2]);
-  };
-  std::vector<float> slopes;
-  for (std::size_t i = 0; i + 2 < corner.size(); i += 3) {
-    const glm::dvec3 a = at(corner[i]);
-    const glm::dvec3 normal = glm::cross(at(corner[i + 1]) - a, at(corner[i + 2]) - a);
-    slopes.push_back(static_cast<float>(
-        glm::degrees(std::atan2(std::hypot(normal.x, normal.y), std::abs(normal.z)))));
-  }
-  return slopes;
-}
-
 // Returns the layer of the kept triangles, with the column "height".
 Layer surface_of(const std::string& name, const DemHeader& header, const RasterBands& bands,
-                 const std::vector<float>& heights, const Kept& kept) {
-  Layer layer{.name = name, .kind = LayerKind::Terrain, .data = make_points(kept.rows.size())};
+                 const std::vector<float>& heights, const KeptTriangles& kept) {
+  Layer layer{.name = name, .kind = LayerKind::Terrain, .data = make_points(kept.vertices.size())};
   layer.origin_w_m = header.origin_w_m;
   const auto places = coordinates(*layer.data);
-  std::vector<float> height(kept.rows.size());
-  for (std::size_t i = 0; i < kept.rows.size(); ++i) {
-    const auto row = static_cast<int>(kept.rows[i]);
+  std::vector<float> height(kept.vertices.size());
+  for (std::size_t i = 0; i < kept.vertices.size(); ++i) {
+    const auto row = static_cast<int>(kept.vertices[i]);
     const glm::ivec2 sample(row % bands.samples.x, row / bands.samples.x);
     const glm::dvec2 p = header.origin_m + glm::dvec2(sample * bands.step) * header.step_m;
     places[3 * i] = static_cast<float>(p.x);
     places[3 * i + 1] = static_cast<float>(p.y);
-    places[3 * i + 2] = height[i] = heights[kept.rows[i]];
+    places[3 * i + 2] = height[i] = heights[kept.vertices[i]];
   }
   set_triangles(*layer.data, kept.triangles);
   add_normals(layer);
@@ -160,16 +116,14 @@ Layer dem_layer(const std::string& name, const std::filesystem::path& path,
   const DemHeader& header = file.header();
   const RasterBands bands = read_bands(path, most_samples, most_bands);
   const std::vector<float> heights = thinned_heights(file, bands.step);
-  const Kept kept =
-      keep_used(grid_triangles(bands.samples, heights, header.step_m.x * header.step_m.y > 0),
-                heights.size());
+  const KeptTriangles kept =
+      grid_triangles(bands.samples, heights, header.step_m.x * header.step_m.y > 0);
   if (kept.triangles.empty())
     throw Error("{}: no three neighbouring samples have heights: there is nothing to show",
                 path.string());
   Layer layer = surface_of(name, header, bands, heights, kept);
-  add_bands(layer, bands, kept.rows);
-  add_column(layer, {.name = "slope", .unit = "deg", .of = LayerColumn::Of::Cells},
-             layer_slopes_deg(layer));
+  add_bands(layer, bands, {kept.vertices.begin(), kept.vertices.end()});
+  add_slopes(layer);
   layer.coloured_by = "height";
   layer.facts = raster_facts(header, inspect_raster(path).bands, bands.step);
   return layer;

@@ -8,6 +8,7 @@
 #include <cmath>
 #include <cstdint>
 #include <glm/common.hpp>
+#include <utility>
 #include <vector>
 
 #include "core/error.h"
@@ -31,15 +32,20 @@ glm::u8vec3 shown_colour(const glm::dvec3& reflected) {
   return bytes;
 }
 
-std::optional<GroundColour> GroundColour::of(const Simulation& simulation) {
-  if (!simulation.spec.terrain.material || simulation.scene_objects.materials.all().empty())
-    return std::nullopt;
+std::optional<Materials::InColour> material_colours(const Simulation& simulation) {
+  if (simulation.scene_objects.materials.all().empty()) return std::nullopt;
   try {
-    return GroundColour(simulation.scene_objects.cover,
-                        simulation.scene_objects.materials.in_colour());
+    return simulation.scene_objects.materials.in_colour();
   } catch (const Error&) {
-    return std::nullopt;  // its spectra do not cover the visible range, and colour is optional here
+    return std::nullopt;  // colour is optional here
   }
+}
+
+std::optional<GroundColour> GroundColour::of(const Simulation& simulation) {
+  if (!simulation.spec.terrain.material) return std::nullopt;
+  auto colours = material_colours(simulation);
+  if (!colours) return std::nullopt;
+  return GroundColour(simulation.scene_objects.cover, std::move(*colours));
 }
 
 glm::u8vec3 GroundColour::shown_at(const GroundCover::Point& point, double patch_m) const {
@@ -69,7 +75,7 @@ void add_ground_colour(Layer& terrain, const Simulation& simulation) {
   std::vector<std::uint8_t> rgb(3 * terrain.points());
   tbb::parallel_for(std::size_t{0}, terrain.points(), [&](std::size_t i) {
     GroundCover::Point point;
-    point.p_D = offset + glm::dvec3(places[3 * i], places[3 * i + 1], places[3 * i + 2]);
+    point.p_D = offset + point_at(places, i);
     for (int k = 0; k < 3; ++k)
       point.normal[k] = normals.GetComponent(static_cast<vtkIdType>(i), k);
     const glm::u8vec3 colour = colours->shown_at(point, point_patch_m);

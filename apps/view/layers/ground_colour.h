@@ -38,6 +38,18 @@ class GroundColour {
 /// material with colours.
 void add_ground_colour(Layer& terrain, const Simulation& simulation);
 
+/// Adds a ground texture to a terrain that has the column "colour", if the ground has images. The
+/// texture consists of nested squares round an eye that double in width and have equal numbers of
+/// texels, so it is sharpest near the eye. Each triangle is textured from the smallest square that
+/// contains it. Points between triangles of different squares are duplicated with all their values.
+/// The terrain's `coarse` gets the same texture.
+/// @param eye_m  eye, in D.
+void drape_ground(Layer& terrain, const Simulation& simulation, const glm::dvec3& eye_m);
+
+/// Returns the colours of a scene's materials; std::nullopt if there are none, or their spectra do
+/// not cover the visible range.
+std::optional<Materials::InColour> material_colours(const Simulation& simulation);
+
 /// Returns the displayed sRGB bytes of a linear sRGB reflectance, after a fixed exposure.
 glm::u8vec3 shown_colour(const glm::dvec3& reflected);
 

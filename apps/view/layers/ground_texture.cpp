@@ -1,5 +1,3 @@
-#include "apps/view/layers/ground_texture.h"
-
 #include <tbb/parallel_for.h>
 #include <vtkDataArray.h>
 #include <vtkPointData.h>
@@ -16,7 +14,7 @@
 #include <vector>
 
 #include "apps/view/layers/ground_colour.h"
-#include "apps/view/layers/picture_layer.h"
+#include "apps/view/rendering/picture_file.h"
 #include "core/image/image.h"
 
 namespace groundray {
@@ -43,8 +41,7 @@ struct Surface {
     return corner[3 * triangle + k];
   }
   glm::dvec3 place(std::size_t triangle, std::size_t k) const {
-    const auto i = std::size_t{3} * static_cast<std::size_t>(point_of(triangle, k));
-    return {at[i], at[i + 1], at[i + 2]};
+    return point_at(at, point_of(triangle, k));
   }
   glm::dvec3 normal(std::size_t triangle, std::size_t k) const {
     glm::dvec3 n;
@@ -90,8 +87,8 @@ struct Squares {
 Squares squares_for(const Surface& surface, const glm::dvec3& eye_m) {
   Squares squares{.eye_m = glm::dvec2(eye_m)};
   double farthest_m = 0, nearest_m = std::numeric_limits<double>::infinity();
-  for (std::size_t i = 0; i + 2 < surface.at.size(); i += 3) {
-    const glm::dvec3 p(surface.at[i], surface.at[i + 1], surface.at[i + 2]);
+  for (std::size_t i = 0; i < surface.at.size() / 3; ++i) {
+    const glm::dvec3 p = point_at(surface.at, i);
     const glm::dvec2 off = glm::abs(glm::dvec2(p - eye_m));
     farthest_m = std::max({farthest_m, off.x, off.y});
     nearest_m = std::min(nearest_m, glm::length(p - eye_m));
@@ -144,23 +141,19 @@ std::vector<std::uint32_t> triangles_under(const Squares& squares, int square,
 }
 
 // Paints one square of the texture.
-class SquarePainter {
- public:
-  SquarePainter(const Squares& squares, int square, const Surface& surface,
-                const glm::dvec3& offset_m, const GroundColour& ground, Image8& texture,
-                std::vector<std::uint32_t> under)
-      : squares_(squares),
-        square_(square),
-        surface_(surface),
-        offset_m_(offset_m),
-        ground_(ground),
-        texture_(texture),
-        under_(std::move(under)) {}
+struct SquarePainter {
+  const Squares& squares;
+  int square = 0;
+  const Surface& surface;
+  glm::dvec3 offset_m;
+  const GroundColour& ground;
+  Image8& texture;
+  std::vector<std::uint32_t> triangle_under;
 
   void paint() {
     tbb::parallel_for(0, side_px, [&](int y) {
       for (int x = 0; x < side_px; ++x) {
-        if (is_in_smaller(square_, {x, y})) {
+        if (is_in_smaller(square, {x, y})) {
           take_from_smaller({x, y});
         } else if (under({x, y}) != no_triangle) {
           put({x, y}, colour_at({x, y}));
@@ -174,18 +167,18 @@ class SquarePainter {
     }
   }
 
- private:
   std::uint32_t under(glm::ivec2 texel) const {
-    return under_[static_cast<std::size_t>(texel.y) * side_px + static_cast<std::size_t>(texel.x)];
+    return triangle_under[static_cast<std::size_t>(texel.y) * side_px +
+                          static_cast<std::size_t>(texel.x)];
   }
-  glm::u8vec3 get(int square, glm::ivec2 texel) const {
-    const glm::ivec2 at = Squares::first_px(square) + texel;
-    const auto pixel = texture_.at(at.x, at.y);
+  glm::u8vec3 get(int of, glm::ivec2 texel) const {
+    const glm::ivec2 at = Squares::first_px(of) + texel;
+    const auto pixel = texture.at(at.x, at.y);
     return {pixel[0], pixel[1], pixel[2]};
   }
   void put(glm::ivec2 texel, const glm::u8vec3& colour) {
-    const glm::ivec2 at = Squares::first_px(square_) + texel;
-    const auto pixel = texture_.at(at.x, at.y);
+    const glm::ivec2 at = Squares::first_px(square) + texel;
+    const auto pixel = texture.at(at.x, at.y);
     for (glm::length_t k = 0; k < 3; ++k) pixel[static_cast<std::size_t>(k)] = colour[k];
   }
 
@@ -193,23 +186,23 @@ class SquarePainter {
     const glm::ivec2 first = 2 * (texel - side_px / 4);
     glm::uvec3 sum(2);
     for (const glm::ivec2 more : {glm::ivec2(0, 0), {1, 0}, {0, 1}, {1, 1}})
-      sum += glm::uvec3(get(square_ - 1, first + more));
+      sum += glm::uvec3(get(square - 1, first + more));
     put(texel, glm::u8vec3(sum / 4U));
   }
 
   glm::u8vec3 colour_at(glm::ivec2 texel) const {
     const std::size_t triangle = under(texel);
     const glm::dvec2 from(texel.x + 0.5 - side_px / 2.0, side_px / 2.0 - texel.y - 0.5);
-    const glm::dvec2 p = squares_.eye_m + from * squares_.texel_of(square_);
-    const glm::dvec3 a = surface_.place(triangle, 0), b = surface_.place(triangle, 1),
-                     c = surface_.place(triangle, 2);
+    const glm::dvec2 p = squares.eye_m + from * squares.texel_of(square);
+    const glm::dvec3 a = surface.place(triangle, 0), b = surface.place(triangle, 1),
+                     c = surface.place(triangle, 2);
     const glm::dvec3 shares = shares_at(p, glm::dvec2(a), glm::dvec2(b), glm::dvec2(c));
     const double z = glm::dot(shares, glm::dvec3(a.z, b.z, c.z));
-    const glm::dvec3 normal = shares.x * surface_.normal(triangle, 0) +
-                              shares.y * surface_.normal(triangle, 1) +
-                              shares.z * surface_.normal(triangle, 2);
-    return ground_.shown_at({offset_m_ + glm::dvec3(p, z), glm::normalize(normal)},
-                            squares_.texel_of(square_));
+    const glm::dvec3 normal = shares.x * surface.normal(triangle, 0) +
+                              shares.y * surface.normal(triangle, 1) +
+                              shares.z * surface.normal(triangle, 2);
+    return ground.shown_at({offset_m + glm::dvec3(p, z), glm::normalize(normal)},
+                           squares.texel_of(square));
   }
 
   // Returns the colour for a texel without ground: that of a neighbour with ground, since bilinear
@@ -219,19 +212,11 @@ class SquarePainter {
       for (int dx = -1; dx <= 1; ++dx) {
         const glm::ivec2 at = texel + glm::ivec2(dx, dy);
         if (at.x < 0 || at.y < 0 || at.x >= side_px || at.y >= side_px) continue;
-        if (under(at) != no_triangle) return get(square_, at);
+        if (under(at) != no_triangle) return get(square, at);
       }
     }
     return glm::u8vec3(128);
   }
-
-  const Squares& squares_;
-  int square_;
-  const Surface& surface_;
-  glm::dvec3 offset_m_;
-  const GroundColour& ground_;
-  Image8& texture_;
-  std::vector<std::uint32_t> under_;
 };
 
 // Appends copies of points with all their values.
@@ -254,7 +239,7 @@ void append_points(vtkPolyData& data, const std::vector<std::int32_t>& of) {
 }
 
 // Assigns texture coordinates to each triangle, in the smallest square that contains it.
-void lay_on(vtkPolyData& data, const Squares& squares) {
+void assign_texture(vtkPolyData& data, const Squares& squares) {
   const Surface surface(data);
   std::vector<int> square_of(surface.at.size() / 3, -1);
   std::map<std::pair<std::int32_t, int>, std::uint32_t> copies;
@@ -286,10 +271,10 @@ void lay_on(vtkPolyData& data, const Squares& squares) {
   for (std::size_t i = 0; i < places.size(); ++i) {
     const int square = std::max(square_of[i], 0);
     const glm::dvec2 texel = glm::dvec2(Squares::first_px(square)) +
-                             squares.texel_at(square, {at[3 * i], at[3 * i + 1]});
+                             squares.texel_at(square, glm::dvec2(point_at(at, i)));
     places[i] = {texel.x / size.x, 1 - texel.y / size.y};
   }
-  set_texture_places(data, places);
+  set_texture_coordinates(data, places);
 }
 
 }  // namespace
@@ -306,12 +291,17 @@ void drape_ground(Layer& terrain, const Simulation& simulation, const glm::dvec3
     under[static_cast<std::size_t>(square)] = triangles_under(squares, square, surface);
   });
   for (int square = 0; square < squares.count; ++square) {
-    SquarePainter(squares, square, surface, offset_m, *ground, texture,
-                  std::move(under[static_cast<std::size_t>(square)]))
+    SquarePainter{squares,
+                  square,
+                  surface,
+                  offset_m,
+                  *ground,
+                  texture,
+                  std::move(under[static_cast<std::size_t>(square)])}
         .paint();
   }
-  lay_on(*terrain.data, squares);
-  if (terrain.coarse != nullptr) lay_on(*terrain.coarse, squares);
+  assign_texture(*terrain.data, squares);
+  if (terrain.coarse != nullptr) assign_texture(*terrain.coarse, squares);
   terrain.texture = make_texture(texture);
   terrain.texture->MipmapOff();  // mipmaps would blend adjacent squares
 }

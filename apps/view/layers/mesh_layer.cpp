@@ -1,16 +1,21 @@
 #include "apps/view/layers/mesh_layer.h"
 
 #include <fmt/format.h>
+#include <tbb/parallel_for.h>
 #include <vtkFloatArray.h>
 #include <vtkPointData.h>
 
+#include <cmath>
+#include <cstdint>
 #include <glm/common.hpp>
 #include <glm/geometric.hpp>
+#include <glm/trigonometric.hpp>
 #include <limits>
 #include <numeric>
+#include <span>
 
 #include "apps/view/layers/cloud_layer.h"
-#include "apps/view/layers/coarse_layer.h"
+#include "apps/view/rendering/coarse_layer.h"
 
 namespace groundray {
 namespace {
@@ -25,6 +30,15 @@ glm::dvec3 centre_of(const TriangleMesh& mesh) {
     high = glm::max(high, p);
   }
   return mesh.vertices_m.empty() ? glm::dvec3(0) : (low + high) / 2.0;
+}
+
+// Returns the normal of the triangle whose corners begin at `corner[first]`, as long as twice its
+// area.
+glm::dvec3 twice_area_at(std::span<const float> places, std::span<const std::int32_t> corner,
+                         std::size_t first) {
+  const glm::dvec3 a = point_at(places, corner[first]);
+  return glm::cross(point_at(places, corner[first + 1]) - a,
+                    point_at(places, corner[first + 2]) - a);
 }
 
 }  // namespace
@@ -60,26 +74,30 @@ Layer mesh_layer(const std::string& name, const TriangleMesh& mesh, const glm::d
 void add_normals(Layer& surface) {
   const auto places = coordinates(*surface.data);
   const auto corner = corners(*surface.data);
-  const auto at = [&](std::int32_t i) {
-    const auto first = std::size_t{3} * static_cast<std::size_t>(i);
-    return glm::dvec3(places[first], places[first + 1], places[first + 2]);
-  };
   std::vector<glm::dvec3> sum(places.size() / 3, glm::dvec3(0));
   for (std::size_t i = 0; i + 2 < corner.size(); i += 3) {
-    const glm::dvec3 a = at(corner[i]);
-    const glm::dvec3 twice_area = glm::cross(at(corner[i + 1]) - a, at(corner[i + 2]) - a);
+    const glm::dvec3 twice_area = twice_area_at(places, corner, i);
     for (std::size_t k = 0; k < 3; ++k) sum[static_cast<std::size_t>(corner[i + k])] += twice_area;
   }
-  auto normals = vtkSmartPointer<vtkFloatArray>::New();
-  normals->SetName("normals");
-  normals->SetNumberOfComponents(3);
-  normals->SetNumberOfTuples(static_cast<vtkIdType>(sum.size()));
+  const auto normals = make_array<vtkFloatArray>("normals", sum.size(), 3);
   for (std::size_t i = 0; i < sum.size(); ++i) {
     const double length = glm::length(sum[i]);
     const glm::dvec3 normal = length > 0 ? sum[i] / length : glm::dvec3(0, 0, 1);
     normals->SetTuple(static_cast<vtkIdType>(i), &normal.x);
   }
   surface.data->GetPointData()->SetNormals(normals);
+}
+
+void add_slopes(Layer& surface) {
+  const auto places = coordinates(*surface.data);
+  const auto corner = corners(*surface.data);
+  std::vector<float> slope(corner.size() / 3);
+  tbb::parallel_for(std::size_t{0}, slope.size(), [&](std::size_t i) {
+    const glm::dvec3 normal = twice_area_at(places, corner, 3 * i);
+    slope[i] = static_cast<float>(
+        glm::degrees(std::atan2(std::hypot(normal.x, normal.y), std::abs(normal.z))));
+  });
+  add_column(surface, {.name = "slope", .unit = "deg", .of = LayerColumn::Of::Cells}, slope);
 }
 
 void limit_triangles(Layer& surface, std::size_t triangles) {

@@ -22,6 +22,9 @@ Layer mesh_layer(const std::string& name, const TriangleMesh& mesh, const glm::d
 /// normals.
 void add_normals(Layer& surface);
 
+/// Adds the cell column "slope": the angle of each triangle from the horizontal, degrees.
+void add_slopes(Layer& surface);
+
 /// Reduces a surface to at most `triangles` triangles and reports that in its facts.
 void limit_triangles(Layer& surface, std::size_t triangles);
 

@@ -1,7 +1,4 @@
-#include "apps/view/layers/object_layer.h"
-
 #include <fmt/format.h>
-#include <vtkPointData.h>
 
 #include <algorithm>
 #include <cstdint>
@@ -10,8 +7,8 @@
 
 #include "apps/view/layers/ground_colour.h"
 #include "apps/view/layers/mesh_layer.h"
+#include "apps/view/layers/scene_layers.h"
 #include "apps/view/rendering/colour_table.h"
-#include "core/error.h"
 
 namespace groundray {
 namespace {
@@ -20,15 +17,6 @@ struct Shown {
   std::uint32_t number = 0;  // number of the object
   PlacedObject place;
 };
-
-std::optional<Materials::InColour> material_colours(const Simulation& simulation) {
-  try {
-    if (simulation.scene_objects.materials.all().empty()) return std::nullopt;
-    return simulation.scene_objects.materials.in_colour();
-  } catch (const Error&) {
-    return std::nullopt;  // the spectra do not cover the visible range
-  }
-}
 
 // Returns the objects nearest to a point, at least one, within a number of triangles; ordered by
 // number.

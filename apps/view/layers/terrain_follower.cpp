@@ -20,8 +20,6 @@
 #include "apps/scene/interruption.h"
 #include "apps/view/layers/dem_layer.h"
 #include "apps/view/layers/ground_colour.h"
-#include "apps/view/layers/ground_texture.h"
-#include "apps/view/layers/terrain_surface.h"
 #include "core/error.h"
 #include "terrain/lod/deviation.h"
 #include "terrain/relief/refined_tiles.h"

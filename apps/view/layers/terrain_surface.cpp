@@ -1,5 +1,3 @@
-#include "apps/view/layers/terrain_surface.h"
-
 #include <fmt/format.h>
 #include <tbb/parallel_for.h>
 #include <tbb/parallel_sort.h>
@@ -9,12 +7,12 @@
 #include <bit>
 #include <cmath>
 #include <cstdint>
-#include <glm/geometric.hpp>
-#include <glm/trigonometric.hpp>
+#include <glm/vec2.hpp>
 #include <string>
 #include <vector>
 
 #include "apps/view/layers/mesh_layer.h"
+#include "apps/view/layers/terrain_follower.h"
 
 namespace groundray {
 namespace {
@@ -155,22 +153,6 @@ std::vector<glm::uvec3> number_corners(const GatheredLeaves& all, bool is_mirror
   return numbered;
 }
 
-std::vector<float> slopes_deg(std::span<const float> places,
-                              std::span<const glm::uvec3> triangles) {
-  std::vector<float> slope(triangles.size());
-  tbb::parallel_for(std::size_t{0}, slope.size(), [&](std::size_t i) {
-    const auto at = [&](std::uint32_t vertex) {
-      const auto first = std::size_t{3} * vertex;
-      return glm::dvec3(places[first], places[first + 1], places[first + 2]);
-    };
-    const glm::dvec3 a = at(triangles[i].x);
-    const glm::dvec3 normal = glm::cross(at(triangles[i].y) - a, at(triangles[i].z) - a);
-    slope[i] = static_cast<float>(
-        glm::degrees(std::atan2(std::hypot(normal.x, normal.y), std::abs(normal.z))));
-  });
-  return slope;
-}
-
 // Returns names for cell sizes, by the power of two relative to a cell of the DEM or relief.
 std::map<int, std::string> cell_sizes(const Level& level, std::span<const float> exponents) {
   std::map<int, std::string> names;
@@ -189,29 +171,20 @@ std::map<int, std::string> level_names(const Level& level, std::span<const float
   return names;
 }
 
-void add_columns(Layer& layer, const GatheredLeaves& all, std::span<const glm::uvec3> triangles,
-                 const Level& level) {
-  constexpr auto of_cells = LayerColumn::Of::Cells;
+void add_columns(Layer& layer, const GatheredLeaves& all, const Level& level) {
   std::vector<float> height(all.points.size());
   std::ranges::transform(all.points, height.begin(), [&](const auto& p) { return p.second; });
   add_column(layer, {.name = "height", .unit = "m", .scale = ColourScale::Earth}, height);
-  add_column(layer, {.name = "slope", .unit = "deg", .of = of_cells},
-             slopes_deg(coordinates(*layer.data), triangles));
-  add_column(layer,
-             {.name = "clipmap level",
-              .unit = "",
-              .of = of_cells,
-              .categories = level_names(level, all.clipmap_level),
-              .is_ordered = true},
-             all.clipmap_level);
-  add_column(layer,
-             {.name = "cell size",
-              .unit = "",
-              .of = of_cells,
-              .categories = cell_sizes(level, all.exponent),
-              .is_ordered = true},
-             all.exponent);
-  add_column(layer, {.name = "certified deviation", .unit = "m", .of = of_cells}, all.deviation_m);
+  add_slopes(layer);
+  LayerColumn ordered{.of = LayerColumn::Of::Cells, .is_ordered = true};
+  ordered.name = "clipmap level";
+  ordered.categories = level_names(level, all.clipmap_level);
+  add_column(layer, ordered, all.clipmap_level);
+  ordered.name = "cell size";
+  ordered.categories = cell_sizes(level, all.exponent);
+  add_column(layer, ordered, all.exponent);
+  add_column(layer, {.name = "certified deviation", .unit = "m", .of = LayerColumn::Of::Cells},
+             all.deviation_m);
 }
 
 }  // namespace
@@ -246,10 +219,9 @@ Layer terrain_layer(std::span<const Level> levels, const glm::dvec3& origin_w_m,
   });
   // gather() assumes that rows run downwards: if they run from north to south, its triangles are
   // counter-clockwise from above.
-  const auto triangles = number_corners(all, frame.step_m.x * frame.step_m.y > 0);
-  set_triangles(*layer.data, triangles);
+  set_triangles(*layer.data, number_corners(all, frame.step_m.x * frame.step_m.y > 0));
   add_normals(layer);
-  add_columns(layer, all, triangles, levels.front());
+  add_columns(layer, all, levels.front());
   layer.coloured_by = "height";
   return layer;
 }

@@ -1,11 +1,9 @@
 #include "apps/view/rendering/layer.h"
 
-#include <vtkCellArray.h>
 #include <vtkCellData.h>
 #include <vtkFloatArray.h>
 #include <vtkPointData.h>
 #include <vtkPoints.h>
-#include <vtkTypeInt32Array.h>
 #include <vtkUnsignedCharArray.h>
 
 #include <algorithm>
@@ -38,19 +36,6 @@ void put(Layer& layer, LayerColumn column) {
   layer.columns.push_back(std::move(column));
 }
 
-// VTK's default of 64 bits would take twice the memory.
-vtkSmartPointer<vtkTypeInt32Array> int_array(std::size_t size) {
-  auto array = vtkSmartPointer<vtkTypeInt32Array>::New();
-  array->SetNumberOfValues(static_cast<vtkIdType>(size));
-  return array;
-}
-
-vtkSmartPointer<vtkCellArray> cells_of(vtkTypeInt32Array* offsets, vtkTypeInt32Array* points) {
-  auto cells = vtkSmartPointer<vtkCellArray>::New();
-  cells->SetData(offsets, points);
-  return cells;
-}
-
 }  // namespace
 
 std::size_t Layer::points() const { return static_cast<std::size_t>(data->GetNumberOfPoints()); }
@@ -58,8 +43,7 @@ std::size_t Layer::points() const { return static_cast<std::size_t>(data->GetNum
 std::size_t Layer::triangles() const { return static_cast<std::size_t>(data->GetNumberOfPolys()); }
 
 const LayerColumn* Layer::find(const std::string& column) const {
-  const auto found =
-      std::ranges::find_if(columns, [&](const LayerColumn& one) { return one.name == column; });
+  const auto found = std::ranges::find(columns, column, &LayerColumn::name);
   return found == columns.end() ? nullptr : &*found;
 }
 
@@ -78,9 +62,7 @@ glm::dvec3 Layer::p_w_m(vtkIdType point) const {
 
 void add_column(Layer& layer, LayerColumn column, std::span<const float> values) {
   check_length(layer, column, values.size());
-  auto array = vtkSmartPointer<vtkFloatArray>::New();
-  array->SetName(column.name.c_str());
-  array->SetNumberOfValues(static_cast<vtkIdType>(values.size()));
+  const auto array = make_array<vtkFloatArray>(column.name.c_str(), values.size());
   std::ranges::copy(values, array->GetPointer(0));
   attributes(layer, column.of)->AddArray(array);
   column.range = colour_range(values, column.scale);
@@ -89,10 +71,7 @@ void add_column(Layer& layer, LayerColumn column, std::span<const float> values)
 
 void add_colours(Layer& layer, LayerColumn column, std::span<const std::uint8_t> rgb) {
   check_length(layer, column, rgb.size() / 3);
-  auto array = vtkSmartPointer<vtkUnsignedCharArray>::New();
-  array->SetName(column.name.c_str());
-  array->SetNumberOfComponents(3);
-  array->SetNumberOfTuples(static_cast<vtkIdType>(rgb.size() / 3));
+  const auto array = make_array<vtkUnsignedCharArray>(column.name.c_str(), rgb.size() / 3, 3);
   std::ranges::copy(rgb, array->GetPointer(0));
   attributes(layer, column.of)->AddArray(array);
   column.is_rgb = true;
@@ -141,32 +120,27 @@ std::span<float> coordinates(vtkPolyData& data) {
   return {array->GetPointer(0), static_cast<std::size_t>(array->GetNumberOfValues())};
 }
 
+vtkSmartPointer<vtkCellArray> make_cells(std::size_t cells, std::size_t corners) {
+  auto made = vtkSmartPointer<vtkCellArray>::New();
+  made->Use32BitStorage();
+  made->AllocateExact(static_cast<vtkIdType>(cells), static_cast<vtkIdType>(corners));
+  return made;
+}
+
 void set_triangles(vtkPolyData& data, std::span<const glm::uvec3> triangles) {
-  const auto offsets = int_array(triangles.size() + 1);
-  const auto points = int_array(triangles.size() * 3);
-  for (std::size_t i = 0; i <= triangles.size(); ++i)
-    offsets->SetValue(static_cast<vtkIdType>(i), static_cast<vtkTypeInt32>(3 * i));
-  for (std::size_t i = 0; i < triangles.size(); ++i) {
-    for (glm::length_t k = 0; k < 3; ++k) {
-      points->SetValue(vtkIdType{3} * static_cast<vtkIdType>(i) + k,
-                       static_cast<vtkTypeInt32>(triangles[i][k]));
-    }
-  }
-  data.SetPolys(cells_of(offsets, points));
+  const auto cells = make_cells(triangles.size(), 3 * triangles.size());
+  for (const glm::uvec3& corner : triangles) cells->InsertNextCell({corner.x, corner.y, corner.z});
+  data.SetPolys(cells);
 }
 
 void set_lines(vtkPolyData& data, std::span<const std::size_t> lengths) {
-  const auto offsets = int_array(lengths.size() + 1);
-  std::size_t all = 0;
-  offsets->SetValue(0, 0);
-  for (std::size_t i = 0; i < lengths.size(); ++i) {
-    all += lengths[i];
-    offsets->SetValue(static_cast<vtkIdType>(i) + 1, static_cast<vtkTypeInt32>(all));
+  const auto cells = make_cells(lengths.size(), 0);
+  vtkIdType next = 0;
+  for (const std::size_t length : lengths) {
+    cells->InsertNextCell(static_cast<int>(length));
+    for (std::size_t i = 0; i < length; ++i) cells->InsertCellPoint(next++);
   }
-  const auto points = int_array(all);
-  for (std::size_t i = 0; i < all; ++i)
-    points->SetValue(static_cast<vtkIdType>(i), static_cast<vtkTypeInt32>(i));
-  data.SetLines(cells_of(offsets, points));
+  data.SetLines(cells);
 }
 
 std::span<const std::int32_t> corners(vtkPolyData& data) {

@@ -1,6 +1,7 @@
 #pragma once
 
 #include <vtkActor.h>
+#include <vtkCellArray.h>
 #include <vtkPolyData.h>
 #include <vtkSmartPointer.h>
 #include <vtkTexture.h>
@@ -94,10 +95,28 @@ void add_colours(Layer& layer, LayerColumn column, std::span<const std::uint8_t>
 /// is made symmetric. {0, 1} if no value is finite.
 glm::dvec2 colour_range(std::span<const float> values, ColourScale scale);
 
+/// Returns an array of VTK with a number of rows.
+template <typename Array>
+vtkSmartPointer<Array> make_array(const char* name, std::size_t rows, int components = 1) {
+  auto array = vtkSmartPointer<Array>::New();
+  array->SetName(name);
+  array->SetNumberOfComponents(components);
+  array->SetNumberOfTuples(static_cast<vtkIdType>(rows));
+  return array;
+}
+
+/// Returns empty cells with room for a number of cells and of their corners, numbered with 32 bits:
+/// VTK's default of 64 would take twice the memory.
+vtkSmartPointer<vtkCellArray> make_cells(std::size_t cells, std::size_t corners);
 /// Returns data with a number of points, all at (0, 0, 0).
 vtkSmartPointer<vtkPolyData> make_points(std::size_t points);
 /// Returns the points' coordinates, three floats each, for reading or writing.
 std::span<float> coordinates(vtkPolyData& data);
+/// Returns the position of a point among such coordinates.
+glm::dvec3 point_at(std::span<const float> coordinates, auto point) {
+  const auto first = std::size_t{3} * static_cast<std::size_t>(point);
+  return {coordinates[first], coordinates[first + 1], coordinates[first + 2]};
+}
 /// Sets the triangles of the data.
 void set_triangles(vtkPolyData& data, std::span<const glm::uvec3> triangles);
 /// Sets the lines of the data: consecutive runs of points, whose lengths are `lengths`.

@@ -42,10 +42,10 @@ std::optional<std::array<T, count>> parse_numbers(std::string_view text, char be
   return numbers;
 }
 
-void colour(View& view, const std::string& wish) {
-  const auto equals = wish.rfind('=');
+void colour(View& view, const std::string& request) {
+  const auto equals = request.rfind('=');
   if (equals != std::string::npos) {
-    view.colour_by(wish.substr(0, equals), wish.substr(equals + 1));
+    view.colour_by(request.substr(0, equals), request.substr(equals + 1));
     return;
   }
   bool is_done = false;
@@ -53,19 +53,19 @@ void colour(View& view, const std::string& wish) {
   for (const Layer* const layer : view.layers()) {
     for (const LayerColumn& column : layer->columns)
       columns += fmt::format("{}{}={}", columns.empty() ? "" : ", ", layer->name, column.name);
-    if (layer->find(wish) == nullptr) continue;
-    view.colour_by(layer->name, wish);
+    if (layer->find(request) == nullptr) continue;
+    view.colour_by(layer->name, request);
     is_done = true;
   }
   if (!is_done)
-    throw Error("--colour-by {}: no layer has that column; there are {}", wish, columns);
+    throw Error("--colour-by {}: no layer has that column; there are {}", request, columns);
 }
 
 // Sets the range of a column's colours wherever it is displayed. @return true if any layer displays
 // it.
-bool span_colours(View& view, const std::string& wish, const glm::dvec2& range) {
-  const auto equals = wish.rfind('=');
-  const std::string name = equals == std::string::npos ? wish : wish.substr(equals + 1);
+bool span_colours(View& view, const std::string& request, const glm::dvec2& range) {
+  const auto equals = request.rfind('=');
+  const std::string name = equals == std::string::npos ? request : request.substr(equals + 1);
   bool is_shown = false;
   for (const Layer* const layer : view.layers()) {
     const LayerColumn* const column = layer->find(name);
@@ -76,15 +76,15 @@ bool span_colours(View& view, const std::string& wish, const glm::dvec2& range) 
   return is_shown;
 }
 
-void hide(View& view, const std::string& wish) {
+void hide(View& view, const std::string& request) {
   bool is_done = false;
   for (const std::string& name : names_of(view)) {
-    if (name != wish && !name.starts_with(wish + "/")) continue;
+    if (name != request && !name.starts_with(request + "/")) continue;
     view.set_visible(name, false);
     is_done = true;
   }
   if (!is_done)
-    throw Error("--hide {}: no layer has that name; there are {}", wish,
+    throw Error("--hide {}: no layer has that name; there are {}", request,
                 fmt::join(names_of(view), ", "));
 }
 
@@ -102,26 +102,31 @@ void look(View& view, const std::vector<Opened>& inputs, const StillSpec& spec) 
   } else {
     view.fit();
   }
-  if (!spec.from_w_m && !spec.at_w_m) return;
-  Look look = view.current_look();
-  if (spec.at_w_m) look.at_w_m = *spec.at_w_m;
-  if (spec.from_w_m) look.from_w_m = *spec.from_w_m;
-  const glm::dvec3 ahead = look.at_w_m - look.from_w_m;
-  if (!(glm::length(ahead) > 0))
+  if (!spec.view.from_w_m && !spec.view.at_w_m) return;
+  const Look look = requested_look(view.current_look(), spec.view);
+  if (!(glm::length(look.at_w_m - look.from_w_m) > 0))
     throw Error("--look-from and --look-at are the same point: they must differ");
-  const bool is_plumb = std::hypot(ahead.x, ahead.y) < 1e-6 * std::abs(ahead.z);
-  look.up = is_plumb ? glm::dvec3(0, 1, 0) : glm::dvec3(0, 0, 1);
   view.look(look);
 }
 
 }  // namespace
+
+Look requested_look(Look look, const ViewOptions& options) {
+  if (!options.from_w_m && !options.at_w_m) return look;
+  look.from_w_m = options.from_w_m.value_or(look.from_w_m);
+  look.at_w_m = options.at_w_m.value_or(look.at_w_m);
+  const glm::dvec3 ahead = look.at_w_m - look.from_w_m;
+  const bool is_plumb = std::hypot(ahead.x, ahead.y) < 1e-6 * std::abs(ahead.z);
+  look.up = is_plumb ? glm::dvec3(0, 1, 0) : glm::dvec3(0, 0, 1);
+  return look;
+}
 
 void arrange(View& view, std::vector<Opened>& inputs, const StillSpec& spec) {
   for (Opened& opened : inputs) {
     for (const Layer& layer : opened.layers) {
       Layer shown = layer;
       shown.name = unique_name(view, layer.name);
-      if (spec.point_size_px) shown.point_size_px = *spec.point_size_px;
+      if (spec.view.point_size_px) shown.point_size_px = *spec.view.point_size_px;
       view.add(std::move(shown));
     }
   }
@@ -136,25 +141,25 @@ void arrange(View& view, std::vector<Opened>& inputs, const StillSpec& spec) {
       view.add(
           opened.follower->follow(spec.follow_w_m.value_or(view.current_look().from_w_m)).layer);
   }
-  for (const std::string& wish : spec.hide) hide(view, wish);
-  for (const std::string& wish : spec.colour_by) colour(view, wish);
+  for (const std::string& request : spec.view.hide) hide(view, request);
+  for (const std::string& request : spec.view.colour_by) colour(view, request);
   if (spec.range) {
     bool is_shown = span_colours(view, "deviation", *spec.range);
-    for (const std::string& wish : spec.colour_by)
-      is_shown = span_colours(view, wish, *spec.range) || is_shown;
+    for (const std::string& request : spec.view.colour_by)
+      is_shown = span_colours(view, request, *spec.range) || is_shown;
     if (!is_shown) {
       throw Error(
           "--range: no layer is coloured by a numeric column; give one with --colour-by, or a "
           "truth with --compare-with");
     }
   }
-  if (spec.is_wireframe) {
+  if (spec.view.is_wireframe) {
     for (const Layer* const layer : view.layers()) {
       if (layer->kind == LayerKind::Terrain || layer->kind == LayerKind::Mesh)
         view.set_wireframe(layer->name, true);
     }
   }
-  view.set_legend_visible(spec.has_legend);
+  view.set_legend_visible(spec.view.has_legend);
 }
 
 void write_still(View& view, const std::filesystem::path& file, glm::ivec2 size_px) {

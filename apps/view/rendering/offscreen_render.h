@@ -12,19 +12,28 @@
 
 namespace groundray {
 
+/// Options of what a view shows, for the window and for pictures without one.
+struct ViewOptions {
+  std::optional<glm::dvec3> from_w_m, at_w_m;  ///< default: as recommended for the inputs
+  std::vector<std::string> colour_by;  ///< COLUMN for all layers that have it, or LAYER=COLUMN
+  std::vector<std::string> hide;       ///< layers by name, or all those under a name in the tree
+  std::optional<double> point_size_px;
+  bool is_wireframe = false;  ///< true to draw surfaces as wireframes
+  bool has_legend = true;
+};
+
 /// Options of pictures that are drawn without a window.
 struct StillSpec {
   glm::ivec2 size_px{1280, 720};
-  std::optional<glm::dvec3> from_w_m, at_w_m;  ///< default: as recommended for the inputs
-  std::optional<glm::dvec3> follow_w_m;        ///< terrain's viewpoint; default: the eye
-  std::vector<std::string> colour_by;  ///< COLUMN for all layers that have it, or LAYER=COLUMN
+  ViewOptions view;
+  std::optional<glm::dvec3> follow_w_m;  ///< terrain's viewpoint; default: the eye
   /// Range of the colours, in layers that show a column of `colour_by` or "deviation".
   std::optional<glm::dvec2> range;
-  std::vector<std::string> hide;  ///< layers by name, or all those under a name in the tree
-  bool is_wireframe = false;      ///< true to draw surfaces as wireframes
-  bool has_legend = true;
-  std::optional<double> point_size_px;
 };
+
+/// Returns a viewpoint with the eye and the target of the options, if these state any; the picture
+/// is then upright or, seen from straight above or below, has north at the top.
+Look requested_look(Look look, const ViewOptions& options);
 
 /// Adds the inputs to the view, as the options state. The terrain of the first input, if it has
 /// one, is meshed for `follow_w_m` or the eye.

@@ -28,10 +28,6 @@ struct Candidate {
 
 Candidate least(const Candidate& a, const Candidate& b) { return b < a ? b : a; }
 
-glm::dvec3 at(std::span<const float> places, std::size_t i) {
-  return {places[3 * i], places[3 * i + 1], places[3 * i + 2]};
-}
-
 // Two-sided intersection after Moller and Trumbore.
 double crossing_m(const std::array<glm::dvec3, 3>& corner, const glm::dvec3& direction) {
   const glm::dvec3 u = corner[1] - corner[0], v = corner[2] - corner[0];
@@ -54,8 +50,7 @@ Candidate pick_triangle(const Layer& layer, std::size_t number, const PickRay& r
   const auto try_all = [&](const tbb::blocked_range<std::size_t>& range, Candidate best) {
     for (std::size_t i = range.begin(); i < range.end(); ++i) {
       std::array<glm::dvec3, 3> p;
-      for (std::size_t k = 0; k < 3; ++k)
-        p[k] = at(places, static_cast<std::size_t>(corner[3 * i + k])) + offset;
+      for (std::size_t k = 0; k < 3; ++k) p[k] = point_at(places, corner[3 * i + k]) + offset;
       best = least(best, {crossing_m(p, ray.direction), 0, number, i});
     }
     return best;
@@ -75,7 +70,7 @@ Candidate pick_point(const Layer& layer, std::size_t number, const PickRay& ray,
   const double half_px = std::max(layer.point_size_px / 2, 0.5);
   const auto try_all = [&](const tbb::blocked_range<std::size_t>& range, Candidate best) {
     for (std::size_t i = range.begin(); i < range.end(); ++i) {
-      const glm::dvec3 p = at(places, i) + offset;
+      const glm::dvec3 p = point_at(places, i) + offset;
       const glm::dvec3 seen = ray.to_pixels * p;
       if (!(seen.z > 0)) continue;
       const glm::dvec2 off = glm::abs(glm::dvec2(seen) / seen.z - ray.pixel);
@@ -99,8 +94,8 @@ bool can_be_hit(const Layer& layer) {
 
 }  // namespace
 
-std::optional<PickedRow> pick(std::span<const Layer* const> layers, const PickRay& ray,
-                              double near_px) {
+std::optional<Picked> pick(std::span<const Layer* const> layers, const PickRay& ray,
+                           double near_px) {
   Candidate surface, cloud;
   for (std::size_t i = 0; i < layers.size(); ++i) {
     if (layers[i]->visible && can_be_hit(*layers[i]))
@@ -112,11 +107,12 @@ std::optional<PickedRow> pick(std::span<const Layer* const> layers, const PickRa
   }
   if (cloud.first < infinity) {
     const auto row = static_cast<vtkIdType>(cloud.row);
-    return PickedRow{cloud.layer, LayerColumn::Of::Points, row, layers[cloud.layer]->p_w_m(row)};
+    const Layer& layer = *layers[cloud.layer];
+    return Picked{layer.name, LayerColumn::Of::Points, row, layer.p_w_m(row)};
   }
   if (surface.first == infinity) return std::nullopt;
-  return PickedRow{surface.layer, LayerColumn::Of::Cells, static_cast<vtkIdType>(surface.row),
-                   ray.from_w_m + surface.first * ray.direction};
+  return Picked{layers[surface.layer]->name, LayerColumn::Of::Cells,
+                static_cast<vtkIdType>(surface.row), ray.from_w_m + surface.first * ray.direction};
 }
 
 }  // namespace groundray

@@ -2,12 +2,12 @@
 
 #include <vtkType.h>
 
-#include <cstddef>
 #include <glm/mat4x4.hpp>
 #include <glm/vec2.hpp>
 #include <glm/vec3.hpp>
 #include <optional>
 #include <span>
+#include <string>
 
 #include "apps/view/rendering/layer.h"
 
@@ -24,10 +24,10 @@ struct PickRay {
 };
 
 /// Element of a layer under a pixel.
-struct PickedRow {
-  std::size_t layer = 0;
+struct Picked {
+  std::string layer;
   LayerColumn::Of of = LayerColumn::Of::Points;
-  vtkIdType row = 0;
+  vtkIdType row = 0;  ///< index of the point or cell in the layer's data
   glm::dvec3 p_w_m{0};
 };
 
@@ -35,7 +35,7 @@ struct PickedRow {
 /// the first triangle of terrain, meshes and pictures that the ray hits. Among several points, the
 /// nearest to the eye whose square covers the pixel is chosen; if none does, the nearest to the
 /// pixel within `near_px`. Ties go to the first. Invisible layers are ignored.
-std::optional<PickedRow> pick(std::span<const Layer* const> layers, const PickRay& ray,
-                              double near_px);
+std::optional<Picked> pick(std::span<const Layer* const> layers, const PickRay& ray,
+                           double near_px);
 
 }  // namespace groundray

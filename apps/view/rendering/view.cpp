@@ -3,7 +3,6 @@
 #include <vtkAutoInit.h>
 #include <vtkCamera.h>
 #include <vtkLight.h>
-#include <vtkMatrix4x4.h>
 #include <vtkNew.h>
 #include <vtkUnsignedCharArray.h>
 
@@ -16,11 +15,9 @@
 #include <glm/trigonometric.hpp>
 #include <utility>
 
-#include "apps/view/layers/moving_detail.h"
-#include "apps/view/layers/shown_layer.h"
 #include "apps/view/rendering/legend.h"
-#include "apps/view/rendering/off_screen_window.h"
-#include "apps/view/rendering/pick.h"
+#include "apps/view/rendering/moving_detail.h"
+#include "apps/view/rendering/shown_layer.h"
 #include "core/error.h"
 
 // VTK's object factories. vtk_module_autoinit would define a macro with the path of the build tree,
@@ -60,17 +57,15 @@ void add_lights(vtkRenderer& renderer) {
   renderer.AddLight(eye);
 }
 
-Image8 read_pixels(vtkRenderWindow& window, glm::ivec2 size_px) {
+// Copies the window's pixels into a rectangle of a picture.
+void read_pixels(vtkRenderWindow& window, glm::ivec2 first_px, glm::ivec2 size_px, Image8& into) {
   vtkNew<vtkUnsignedCharArray> bytes;
   window.GetPixelData(0, 0, size_px.x - 1, size_px.y - 1, 1, bytes, 0);
-  Image8 image(size_px.x, size_px.y, 3);
   const auto row = static_cast<std::size_t>(size_px.x) * 3;
   for (int y = 0; y < size_px.y; ++y) {
-    const unsigned char* const from =
-        bytes->GetPointer(0) + static_cast<std::size_t>(size_px.y - 1 - y) * row;
-    std::copy_n(from, row, image.at(0, y).data());
+    const auto from = static_cast<std::size_t>(size_px.y - 1 - y) * row;
+    std::copy_n(bytes->GetPointer(0) + from, row, into.at(first_px.x, first_px.y + y).data());
   }
-  return image;
 }
 
 }  // namespace
@@ -80,7 +75,7 @@ struct View::Impl {
   vtkSmartPointer<vtkRenderer> renderer = vtkSmartPointer<vtkRenderer>::New();
   std::vector<std::unique_ptr<ShownLayer>> layers;
   std::unique_ptr<Legend> legend;
-  std::string explained;  // layer whose legend is shown
+  std::string legend_layer;  // layer whose legend is shown
   std::optional<glm::dvec3> origin_w_m;
   bool is_moving = false, is_legend_visible = true;
   MovingDetail detail;
@@ -95,7 +90,9 @@ struct View::Impl {
     if (ShownLayer* const shown = find(name)) return *shown;
     throw Error("the view has no layer '{}'", name);
   }
-  void explain() { legend->show(find(explained) ? &find(explained)->layer() : nullptr); }
+  void update_legend() {
+    legend->show(find(legend_layer) ? &find(legend_layer)->layer() : nullptr);
+  }
   void set_detail();
   void fit(const std::array<double, 6>& bounds);
   glm::dvec2 size_px() const { return {window->GetSize()[0], window->GetSize()[1]}; }
@@ -176,12 +173,7 @@ void View::Impl::draw_part(glm::ivec2 first_px, glm::ivec2 part_px, Image8& whol
                  {first_px.x, whole.height() - first_px.y - part_px.y});
   window->SetSize(part_px.x, part_px.y);
   window->Render();
-  const Image8 part = read_pixels(*window, part_px);
-  for (int row = 0; row < part_px.y; ++row)
-    std::ranges::copy(part.values().subspan(
-                          static_cast<std::size_t>(row) * static_cast<std::size_t>(part_px.x) * 3,
-                          static_cast<std::size_t>(part_px.x) * 3),
-                      whole.at(first_px.x, first_px.y + row).begin());
+  read_pixels(*window, first_px, part_px, whole);
   camera.SetViewAngle(angle_deg);
   camera.SetWindowCenter(0, 0);
   renderer->SetBackground2(sky.x, sky.y, sky.z);
@@ -231,9 +223,9 @@ Layer& View::add(Layer layer) {
   } else {
     impl_->layers.push_back(std::move(shown));
   }
-  const bool explains_nothing = impl_->find(impl_->explained) == nullptr;
-  if (!added.layer().coloured_by.empty() && explains_nothing) impl_->explained = added.layer().name;
-  impl_->explain();
+  const bool has_no_legend = impl_->find(impl_->legend_layer) == nullptr;
+  if (!added.layer().coloured_by.empty() && has_no_legend) impl_->legend_layer = added.layer().name;
+  impl_->update_legend();
   impl_->set_detail();
   return added.layer();
 }
@@ -243,7 +235,7 @@ void View::remove(const std::string& name) {
   if (shown == nullptr) return;
   impl_->renderer->RemoveActor(shown->layer().actor);
   std::erase_if(impl_->layers, [&](const auto& one) { return one.get() == shown; });
-  impl_->explain();
+  impl_->update_legend();
 }
 
 const Layer* View::find(const std::string& name) const {
@@ -263,14 +255,13 @@ void View::colour_by(const std::string& layer, const std::string& column) {
     throw Error("layer '{}' has no column '{}' to be coloured by", layer, column);
   shown.layer().coloured_by = column;
   shown.restyle();
-  impl_->explained = layer;
-  impl_->explain();
+  impl_->legend_layer = layer;
+  impl_->update_legend();
 }
 
 void View::set_range(const std::string& layer, const std::string& column, glm::dvec2 range) {
   ShownLayer& shown = impl_->at(layer);
-  const auto found = std::ranges::find_if(
-      shown.layer().columns, [&](const LayerColumn& one) { return one.name == column; });
+  const auto found = std::ranges::find(shown.layer().columns, column, &LayerColumn::name);
   if (found == shown.layer().columns.end())
     throw Error("layer '{}' has no column '{}' to set the range of", layer, column);
   if (!(range.x <= range.y))
@@ -278,13 +269,13 @@ void View::set_range(const std::string& layer, const std::string& column, glm::d
                 range.y);
   found->range = range;
   shown.restyle();
-  impl_->explain();
+  impl_->update_legend();
 }
 
 void View::set_visible(const std::string& layer, bool visible) {
   impl_->at(layer).layer().visible = visible;
   impl_->at(layer).restyle();
-  impl_->explain();
+  impl_->update_legend();
   impl_->set_detail();
 }
 
@@ -347,10 +338,7 @@ Look View::current_look() const {
 }
 
 std::optional<Picked> View::pick(int x_px, int y_px) const {
-  const auto all = layers();
-  const auto picked = groundray::pick(all, impl_->ray(x_px, y_px), near_px);
-  if (!picked) return std::nullopt;
-  return Picked{all[picked->layer]->name, picked->of, picked->row, picked->p_w_m};
+  return groundray::pick(layers(), impl_->ray(x_px, y_px), near_px);
 }
 
 std::pair<glm::dvec3, glm::dvec3> View::line_of_sight(int x_px, int y_px) const {
@@ -373,12 +361,12 @@ Image8 View::picture(glm::ivec2 size_px) {
   if (size_px.x < 1 || size_px.y < 1 || size_px.x > 65535 || size_px.y > 65535)
     throw Error("a picture of {} x {} px: 1 x 1 to 65535 x 65535 px can be drawn", size_px.x,
                 size_px.y);
-  if (!is_off_screen(impl_->window)) {
-    View copy(make_off_screen_window(size_px));
+  if (!is_offscreen(impl_->window)) {
+    View copy(make_offscreen_window(size_px));
     copy.impl_->origin_w_m = impl_->origin_w_m;
     for (const auto& shown : impl_->layers) copy.add(shown->layer());
-    copy.impl_->explained = impl_->explained;
-    copy.impl_->explain();
+    copy.impl_->legend_layer = impl_->legend_layer;
+    copy.impl_->update_legend();
     copy.set_legend_visible(impl_->is_legend_visible);
     copy.impl_->renderer->GetActiveCamera()->DeepCopy(impl_->renderer->GetActiveCamera());
     return copy.picture(size_px);

@@ -13,6 +13,7 @@
 #include <vector>
 
 #include "apps/view/rendering/layer.h"
+#include "apps/view/rendering/pick.h"
 #include "core/image/image.h"
 
 namespace groundray {
@@ -24,13 +25,13 @@ struct Look {
   glm::dvec3 up{0, 0, 1};
 };
 
-/// Element under a click.
-struct Picked {
-  std::string layer;
-  LayerColumn::Of of = LayerColumn::Of::Points;
-  vtkIdType row = 0;  ///< index of the point or cell in the layer's data
-  glm::dvec3 p_w_m{0};
-};
+/// Returns a window that draws into memory. It needs neither display nor X server: it uses EGL
+/// without a surface, and Mesa's llvmpipe if there is no graphics card.
+/// @throws Error if the system has no such EGL, with the packages to install.
+vtkSmartPointer<vtkRenderWindow> make_offscreen_window(glm::ivec2 size_px);
+
+/// Returns true if the window was made by make_offscreen_window().
+bool is_offscreen(vtkRenderWindow* window);
 
 /// Layers in a render window, on or off screen. Not thread-safe.
 class View {

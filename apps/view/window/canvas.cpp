@@ -94,7 +94,6 @@ void Canvas::look(const Look& look) {
   view_->look(look);
   rest_.start();
   draw();
-  if (hooks_.moving) hooks_.moving();
 }
 
 void Canvas::take_place(bool on) {

@@ -23,7 +23,6 @@ class Canvas : public QVTKOpenGLNativeWidget {
     std::function<void(glm::ivec2 at_px, Qt::KeyboardModifiers)> clicked{};
     /// Called after `take_place`, with the pixels where the button was pressed and released.
     std::function<void(glm::ivec2 at_px, glm::ivec2 towards_px)> placed{};
-    std::function<void()> moving{};  ///< the eye has moved and may move on
     std::function<void()> rested{};  ///< the eye has not moved for a while
   };
 

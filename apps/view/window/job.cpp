@@ -10,12 +10,12 @@ namespace groundray {
 Job::Job() = default;
 
 Job::~Job() {
-  for (Thread& each : threads_) each.thread.request_stop();
+  cancel();
   threads_.clear();
 }
 
 void Job::run(Work work, Hooks hooks) {
-  for (Thread& each : threads_) each.thread.request_stop();
+  cancel();
   hooks_ = std::move(hooks);
   is_running_ = true;
   const std::uint64_t turn = ++turn_;
@@ -39,7 +39,7 @@ Job::Finish Job::worked(const Work& work, const std::stop_token& stop, std::uint
   };
   try {
     Finish finish = work(stop, [this, turn](double share, const std::string& step) {
-      post([this, turn, share, step] { tell(turn, share, step); });
+      post([this, turn, share, step] { show_progress(turn, share, step); });
     });
     if (!stop.stop_requested()) return finish;
     return cancelled;
@@ -56,8 +56,8 @@ void Job::post(std::function<void()> call) {
   QMetaObject::invokeMethod(&here_, std::move(call), Qt::QueuedConnection);
 }
 
-void Job::tell(std::uint64_t turn, double share, const std::string& step) {
-  if (turn == turn_ && is_running_ && hooks_.told) hooks_.told(share, step);
+void Job::show_progress(std::uint64_t turn, double share, const std::string& step) {
+  if (turn == turn_ && is_running_ && hooks_.progress) hooks_.progress(share, step);
 }
 
 void Job::end(std::uint64_t turn, const Finish& finish) {

@@ -51,13 +51,6 @@ Look orbited(const Look& look, double yaw_rad, double pitch_rad) {
   return {look.at_w_m - distance_m * ahead, look.at_w_m, up};
 }
 
-Look turned(const Look& look, double yaw_rad, double pitch_rad) {
-  const Heading sight = sight_of(look);
-  const double distance_m = glm::distance(look.from_w_m, look.at_w_m);
-  const glm::dvec3 ahead = direction_of({sight.yaw_rad + yaw_rad, sight.pitch_rad + pitch_rad});
-  return {look.from_w_m, look.from_w_m + distance_m * ahead, up};
-}
-
 Look panned(const Look& look, double right_m, double up_m) {
   const glm::dvec3 right = right_of(look);
   const glm::dvec3 upward = glm::cross(right, direction_of(sight_of(look)));

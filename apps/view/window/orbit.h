@@ -12,9 +12,6 @@ namespace groundray {
 /// @param pitch_rad  upwards; limited to 1 mrad short of the vertical.
 Look orbited(const Look& look, double yaw_rad, double pitch_rad);
 
-/// Rotates the target about the eye, with the same parameters.
-Look turned(const Look& look, double yaw_rad, double pitch_rad);
-
 /// Moves eye and target along the picture's axes.
 Look panned(const Look& look, double right_m, double up_m);
 

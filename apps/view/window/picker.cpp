@@ -2,19 +2,16 @@
 
 #include <fmt/format.h>
 
-#include <algorithm>
 #include <cmath>
 
 #include "apps/view/layers/cloud_layer.h"
-#include "apps/view/window/line_layer.h"
+#include "apps/view/layers/line_layer.h"
 #include "core/io/ply_io.h"
 
 namespace groundray {
 namespace {
 
-constexpr Pen beam_pen{{255, 77, 64}, 1.5};
-constexpr Pen footprint_pen{{255, 217, 51}, 2.5};
-constexpr Pen mark_pen{{255, 255, 255}, 2};
+constexpr glm::u8vec3 beam_rgb{255, 77, 64}, footprint_rgb{255, 217, 51}, mark_rgb{255, 255, 255};
 const std::string beam_name = "picked/beam";
 const std::string footprint_name = "picked/footprint";
 const std::string mark_name = "picked/place";
@@ -45,35 +42,32 @@ void add_beam(FactTable::Facts& facts, const EchoBeam& beam) {
                                  2 * beam.vertical_radius_m));
 }
 
-}  // namespace
-
+// Returns a beam as lines: from the sensor to the echo, its edge at both ends, and its footprint on
+// the surface.
 std::vector<Layer> beam_layers(const EchoBeam& beam, const glm::dvec3& origin_w_m) {
-  const glm::dvec3 end_m = beam.origin_m + beam.range_m * beam.direction;
-  Lines along{{beam.origin_m, end_m}};
+  LineDrawing along, rings;
+  along.add({beam.origin_m, beam.origin_m + beam.range_m * beam.direction}, beam_rgb);
   // Four lines along the edge.
   const std::size_t quarter = beam.across_m.size() / 4;
-  for (std::size_t i = 0; quarter > 0 && i < 4; ++i) {
-    along.push_back({beam.waist_m[i * quarter], beam.across_m[i * quarter]});
-  }
-  Lines rings;
+  for (std::size_t i = 0; quarter > 0 && i < 4; ++i)
+    along.add({beam.waist_m[i * quarter], beam.across_m[i * quarter]}, beam_rgb);
   for (const auto& ring : {beam.waist_m, beam.across_m, beam.surface_m}) {
-    if (ring.size() > 1) rings.push_back(ring);
+    if (ring.size() > 1) rings.add(ring, footprint_rgb);
   }
-  std::vector<Layer> layers;
-  layers.push_back(line_layer(beam_name, LayerKind::Sensors, origin_w_m, along, beam_pen));
-  if (!rings.empty()) {
-    layers.push_back(
-        line_layer(footprint_name, LayerKind::Sensors, origin_w_m, rings, footprint_pen));
-  }
+  std::vector<Layer> layers{line_layer(beam_name, LayerKind::Sensors, origin_w_m, along, 1.5)};
+  if (!rings.runs.empty())
+    layers.push_back(line_layer(footprint_name, LayerKind::Sensors, origin_w_m, rings, 2.5));
   return layers;
 }
+
+}  // namespace
 
 Picker::Picker(View& view, Hooks hooks) : view_(view), hooks_(std::move(hooks)) {}
 
 void Picker::clear() {
   job_.abandon();
   for (const std::string& name : {beam_name, footprint_name, mark_name}) view_.remove(name);
-  if (hooks_.told) hooks_.told("", {});
+  if (hooks_.facts) hooks_.facts("", {});
   if (hooks_.changed) hooks_.changed();
 }
 
@@ -94,13 +88,13 @@ void Picker::pick(const Picked& picked, const ShownScan* scan) {
 // Marks a point by a cross, whose arms are 1.2 % of the point's distance from the eye.
 void Picker::mark(const glm::dvec3& p_w_m) {
   const double half_m = 0.012 * glm::distance(view_.current_look().from_w_m, p_w_m);
-  Lines cross;
+  LineDrawing cross;
   for (glm::length_t axis = 0; axis < 3; ++axis) {
     glm::dvec3 arm(0);
     arm[axis] = half_m;
-    cross.push_back({-arm, arm});
+    cross.add({-arm, arm}, mark_rgb);
   }
-  view_.add(line_layer(mark_name, LayerKind::Sensors, p_w_m, cross, mark_pen));
+  view_.add(line_layer(mark_name, LayerKind::Sensors, p_w_m, cross));
 }
 
 void Picker::show_row(const Layer& layer, const Picked& picked) {
@@ -112,9 +106,9 @@ void Picker::show_row(const Layer& layer, const Picked& picked) {
     if (!text.empty()) facts.emplace_back(column.name, text);
   }
   const bool is_point = picked.of == LayerColumn::Of::Points;
-  if (hooks_.told) {
-    hooks_.told(fmt::format("{}: {} {}", layer.name, is_point ? "point" : "triangle", picked.row),
-                facts);
+  if (hooks_.facts) {
+    hooks_.facts(fmt::format("{}: {} {}", layer.name, is_point ? "point" : "triangle", picked.row),
+                 facts);
   }
 }
 
@@ -142,7 +136,7 @@ void Picker::show_echo(const Layer& layer, const Picked& picked, const ShownScan
     file_ = file;
     cloud_ = echo.cloud;
     for (Layer& each : beam_layers(echo.beam, origin_w_m)) view_.add(std::move(each));
-    if (hooks_.told) hooks_.told(title, echo.facts);
+    if (hooks_.facts) hooks_.facts(title, echo.facts);
     if (hooks_.beam) hooks_.beam(echo.beam, origin_w_m);
     if (hooks_.changed) hooks_.changed();
   };

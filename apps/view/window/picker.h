@@ -19,7 +19,7 @@ class Picker {
  public:
   struct Hooks {
     std::function<void()> changed{};  ///< the layers of the view have changed
-    std::function<void(const std::string& title, const FactTable::Facts&)> told{};
+    std::function<void(const std::string& title, const FactTable::Facts&)> facts{};
     std::function<void(const EchoBeam&, const glm::dvec3& origin_w_m)> beam{};
     std::function<void(const std::string&)> failed{};
   };
@@ -50,9 +50,5 @@ class Picker {
   std::shared_ptr<const PointCloud> cloud_;
   Job job_;
 };
-
-/// Returns a beam as lines: from the sensor to the echo, its edge at both ends, and its footprint
-/// on the surface.
-std::vector<Layer> beam_layers(const EchoBeam& beam, const glm::dvec3& origin_w_m);
 
 }  // namespace groundray

@@ -4,16 +4,15 @@
 
 #include <algorithm>
 
-#include "apps/view/layers/object_layer.h"
+#include "apps/view/layers/line_layer.h"
 #include "apps/view/layers/scene_layers.h"
 #include "apps/view/load_input.h"
-#include "apps/view/window/line_layer.h"
 
 namespace groundray {
 namespace {
 
 using std::chrono::nanoseconds;
-constexpr Pen trail_pen{{255, 158, 41}, 2.5};
+constexpr glm::u8vec3 trail_rgb{255, 158, 41};
 constexpr std::size_t most_triangles = 200'000;  // limit per moving object
 
 const RecordedLidar* lidar_named(const RecordedDataset& dataset, const std::string& name) {
@@ -54,12 +53,9 @@ void add_moving(std::vector<Layer>& layers, const Simulation& simulation, nanose
 Playback::Playback(View& view, Hooks hooks) : view_(view), hooks_(std::move(hooks)) {}
 
 void Playback::open(Recording recording) {
-  job_.abandon();
-  is_stale_ = false;
+  close();
   recording_ = std::move(recording);
   time_ = recording_.timeline->begin();
-  scans_.clear();
-  frames_.clear();
   camera_.clear();
 }
 
@@ -89,7 +85,7 @@ void Playback::go_to(nanoseconds time) {
 
 void Playback::set_trail(bool on) {
   has_trail_ = on;
-  if (on) kept_away_.erase(recording_.prefix + "trail");
+  if (on) excluded_.erase(recording_.prefix + "trail");
   if (is_open()) go_to(time_);
 }
 
@@ -98,10 +94,10 @@ void Playback::set_camera(const std::string& name) {
   if (is_open()) show_image();
 }
 
-void Playback::keep_away(const std::string& layer) { kept_away_.insert(layer); }
+void Playback::exclude(const std::string& layer) { excluded_.insert(layer); }
 
-void Playback::show_again(const std::string& prefix) {
-  std::erase_if(kept_away_, [&](const std::string& name) { return name.starts_with(prefix); });
+void Playback::include_again(const std::string& prefix) {
+  std::erase_if(excluded_, [&](const std::string& name) { return name.starts_with(prefix); });
 }
 
 std::optional<std::pair<std::size_t, std::size_t>> Playback::camera_frame() const {
@@ -146,45 +142,46 @@ std::optional<glm::dvec3> Playback::platform_w_m() const {
 }
 
 // Builds everything for a time, except for scans that are already shown. Thread-safe.
-Playback::Step Playback::step_to(const Request& asked) {
-  const Timeline& timeline = *asked.recording.timeline;
-  const std::string& prefix = asked.recording.prefix;
+Playback::Step Playback::step_to(const Request& request) {
+  const Timeline& timeline = *request.recording.timeline;
+  const std::string& prefix = request.recording.prefix;
   const glm::dvec3 origin_w_m = timeline.georeference().origin_w_m;
   Step step;
-  add_sensors(step.layers, timeline, asked.time, prefix);
+  add_sensors(step.layers, timeline, request.time, prefix);
   for (std::size_t i = 0; i < timeline.sensors().size(); ++i) {
     const RecordedSensor& sensor = timeline.sensors()[i];
-    const auto current = timeline.current(i, asked.time);
-    const RecordedLidar* lidar = asked.recording.dataset == nullptr
+    const auto current = timeline.current(i, request.time);
+    const RecordedLidar* lidar = request.recording.dataset == nullptr
                                      ? nullptr
-                                     : lidar_named(*asked.recording.dataset, sensor.name);
+                                     : lidar_named(*request.recording.dataset, sensor.name);
     if (!current || lidar == nullptr) continue;
-    const auto shown = asked.frames.find(i);
-    if (shown != asked.frames.end() && shown->second == *current) continue;
+    const auto shown = request.frames.find(i);
+    if (shown != request.frames.end() && shown->second == *current) continue;
     const RecordedFrame& frame = sensor.frames[*current];
     const std::string name = prefix + "lidar/" + sensor.name;
-    step.layers.push_back(scan_layer(*asked.recording.dataset, *lidar, frame, name));
+    step.layers.push_back(scan_layer(*request.recording.dataset, *lidar, frame, name));
     step.scans[name] = {std::make_shared<const RecordedSensor>(sensor), frame, nullptr,
                         timeline.names(), origin_w_m};
     step.frames[i] = *current;
   }
-  if (asked.has_trail && !timeline.sensors().empty()) {
-    step.layers.push_back(line_layer(prefix + "trail", LayerKind::Trail, origin_w_m,
-                                     {timeline.trail_m(0, asked.time)}, trail_pen));
+  if (request.has_trail && !timeline.sensors().empty()) {
+    LineDrawing trail;
+    trail.add(timeline.trail_m(0, request.time), trail_rgb);
+    step.layers.push_back(line_layer(prefix + "trail", LayerKind::Trail, origin_w_m, trail, 2.5));
   }
-  if (asked.simulation != nullptr) {
-    add_moving(step.layers, *asked.simulation, asked.time, asked.world_prefix);
+  if (request.simulation != nullptr) {
+    add_moving(step.layers, *request.simulation, request.time, request.world_prefix);
   }
   return step;
 }
 
 void Playback::begin_step() {
   is_stale_ = false;
-  const Request asked{recording_, simulation_, world_prefix_, frames_, time_, has_trail_};
+  const Request request{recording_, simulation_, world_prefix_, frames_, time_, has_trail_};
   const auto ended = [this] {
     if (is_stale_ && is_open()) begin_step();
   };
-  job_.start([asked](const auto&, const auto&) { return step_to(asked); },
+  job_.start([request](const auto&, const auto&) { return step_to(request); },
              [this](Step step) { take(std::move(step)); },
              {.failed = hooks_.failed, .ended = ended});
 }
@@ -192,7 +189,7 @@ void Playback::begin_step() {
 void Playback::take(Step step) {
   if (!is_open()) return;
   for (Layer& layer : step.layers) {
-    if (kept_away_.contains(layer.name)) continue;
+    if (excluded_.contains(layer.name)) continue;
     // The colour range is kept from scan to scan.
     const Layer* before = view_.find(layer.name);
     const LayerColumn* column = before == nullptr ? nullptr : before->find(before->coloured_by);
@@ -205,7 +202,7 @@ void Playback::take(Step step) {
   }
   if (!has_trail_) view_.remove(recording_.prefix + "trail");
   for (auto& [name, scan] : step.scans) {
-    if (!kept_away_.contains(name)) scans_[name] = std::move(scan);
+    if (!excluded_.contains(name)) scans_[name] = std::move(scan);
   }
   for (const auto& [sensor, frame] : step.frames) frames_[sensor] = frame;
   if (hooks_.changed) hooks_.changed();

@@ -65,9 +65,9 @@ class Playback {
   void set_camera(const std::string& name);
 
   /// Hides a layer permanently, whatever the time.
-  void keep_away(const std::string& layer);
-  /// Reverts keep_away() for layers whose names begin with `prefix`.
-  void show_again(const std::string& prefix);
+  void exclude(const std::string& layer);
+  /// Reverts exclude() for layers whose names begin with `prefix`.
+  void include_again(const std::string& prefix);
 
   /// Returns the scan of a layer; null if it is not a scan of the dataset.
   const ShownScan* scan(const std::string& layer) const;
@@ -93,7 +93,7 @@ class Playback {
     std::map<std::size_t, std::size_t> frames;  // index of the frame shown, by sensor
   };
 
-  static Step step_to(const Request& asked);
+  static Step step_to(const Request& request);
   void begin_step();
   void take(Step step);
   void show_image();
@@ -108,7 +108,7 @@ class Playback {
   bool has_trail_ = true;
   bool is_stale_ = false;  // the job under way is for another time than requested
   std::string camera_;
-  std::set<std::string> kept_away_;
+  std::set<std::string> excluded_;
   std::map<std::string, ShownScan> scans_;
   std::map<std::size_t, std::size_t> frames_;
   Job job_;

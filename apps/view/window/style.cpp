@@ -8,168 +8,111 @@
 #include <QProxyStyle>
 #include <QStyleFactory>
 #include <QStyleOption>
+#include <QVector>
 #include <algorithm>
-#include <functional>
 #include <map>
 
 namespace groundray {
 namespace {
 
-constexpr int sign_px = 48;  // drawn on a square of 24 units
+constexpr int icon_px = 48;  // drawn on a square of 24 units
 const QColor line_colour(214, 219, 227);
 const QColor accent_colour(255, 158, 66);
 
-void draw_folder(QPainter& painter) {
-  QPainterPath path(QPointF(3, 19));
-  path.lineTo(3, 5);
-  path.lineTo(9, 5);
-  path.lineTo(11, 8);
-  path.lineTo(20, 8);
-  path.lineTo(20, 19);
-  path.closeSubpath();
-  painter.drawPath(path);
+using Points = QVector<QPointF>;
+
+// Part of an icon.
+struct Part {
+  QPainterPath path;
+  QColor line, fill{};  // none if invalid
+  double width = 1.6;
+};
+
+Part line(const Points& points, const QColor& colour = line_colour, double width = 1.6) {
+  QPainterPath path;
+  path.addPolygon(QPolygonF(points));
+  return {path, colour, {}, width};
 }
 
-void draw_file(QPainter& painter) {
-  painter.drawPolygon(QPolygonF(QVector<QPointF>{{5, 3}, {14, 3}, {19, 8}, {19, 21}, {5, 21}}));
-  painter.drawPolyline(QPolygonF(QVector<QPointF>{{14, 3}, {14, 8}, {19, 8}}));
+Part outline(const Points& points, const QColor& fill = {}) {
+  Part part = line(points);
+  part.path.closeSubpath();
+  part.fill = fill;
+  return part;
 }
 
-void draw_camera(QPainter& painter) {
-  painter.drawRoundedRect(QRectF(3, 7, 18, 12), 2, 2);
-  painter.drawEllipse(QPointF(12, 13), 3.6, 3.6);
-  painter.drawLine(QPointF(9, 7), QPointF(10, 4.5));
-  painter.drawLine(QPointF(10, 4.5), QPointF(14, 4.5));
-  painter.drawLine(QPointF(14, 4.5), QPointF(15, 7));
+Part circle(const QPointF& centre, double radius) {
+  QPainterPath path;
+  path.addEllipse(centre, radius, radius);
+  return {path, line_colour};
 }
 
-void draw_fit(QPainter& painter) {
-  for (const double x : {4.0, 20.0}) {
-    for (const double y : {4.0, 20.0}) {
-      const double inward_x = x < 12 ? 4 : -4;
-      const double inward_y = y < 12 ? 4 : -4;
-      painter.drawLine(QPointF(x, y), QPointF(x + inward_x, y));
-      painter.drawLine(QPointF(x, y), QPointF(x, y + inward_y));
-    }
-  }
-  painter.drawEllipse(QPointF(12, 12), 3.5, 3.5);
+Part rectangle(const QRectF& place) {
+  QPainterPath path;
+  path.addRect(place);
+  return {path, line_colour};
 }
 
-// Draws a box with one side filled.
-void draw_box(QPainter& painter, const QPolygonF& side) {
-  painter.setBrush(accent_colour);
-  painter.drawPolygon(side);
-  painter.setBrush(Qt::NoBrush);
-  painter.drawPolygon(
-      QPolygonF(QVector<QPointF>{{12, 3}, {20, 7}, {20, 16}, {12, 21}, {4, 16}, {4, 7}}));
-  painter.drawPolyline(QPolygonF(QVector<QPointF>{{4, 7}, {12, 11}, {20, 7}}));
-  painter.drawLine(QPointF(12, 11), QPointF(12, 21));
+Part block(const QRectF& place, const QColor& fill) {
+  QPainterPath path;
+  path.addRect(place);
+  return {path, {}, fill};
 }
 
-void draw_wireframe(QPainter& painter) {
-  painter.drawPolygon(QPolygonF(QVector<QPointF>{{3, 19}, {8, 6}, {21, 19}}));
-  painter.drawPolyline(QPolygonF(QVector<QPointF>{{8, 6}, {11, 19}, {14.5, 12.5}, {8, 6}}));
-  painter.drawPolyline(QPolygonF(QVector<QPointF>{{5.5, 12.5}, {11, 19}}));
+Part camera_body() {
+  QPainterPath path;
+  path.addRoundedRect(QRectF(3, 7, 18, 12), 2, 2);
+  return {path, line_colour};
 }
 
-void draw_legend(QPainter& painter) {
-  painter.drawRect(QRectF(5, 3, 5, 18));
-  painter.fillRect(QRectF(6, 10, 3, 10), accent_colour);
-  for (const double y : {3.0, 9.0, 15.0, 21.0}) painter.drawLine(QPointF(13, y), QPointF(19, y));
+// Returns a box with one side filled.
+QVector<Part> box(const Points& side) {
+  return {outline(side, accent_colour),
+          outline({{12, 3}, {20, 7}, {20, 16}, {12, 21}, {4, 16}, {4, 7}}),
+          line({{4, 7}, {12, 11}, {20, 7}}), line({{12, 11}, {12, 21}})};
 }
 
-void draw_scan(QPainter& painter) {
-  painter.drawRect(QRectF(9, 3, 6, 5));
-  painter.setPen(QPen(accent_colour, 1.4));
-  for (const double x : {3.0, 7.5, 12.0, 16.5, 21.0}) {
-    painter.drawLine(QPointF(12, 9.5), QPointF(x, 20));
-  }
-  painter.setPen(QPen(line_colour, 1.6));
-  painter.drawLine(QPointF(2, 21), QPointF(22, 21));
+Part ray(double x) { return line({{12, 9.5}, {x, 20}}, accent_colour, 1.4); }
+Part bar(double x, double tall, const QColor& fill = line_colour) {
+  return block({x, 20.5 - tall, 2.4, tall}, fill);
 }
 
-void draw_compare(QPainter& painter) {
-  painter.drawLine(QPointF(3, 21), QPointF(21, 21));
-  painter.setPen(Qt::NoPen);
-  painter.setBrush(line_colour);
-  double x = 4;
-  for (const double tall : {4.0, 9.0, 16.0, 11.0, 5.0}) {
-    painter.setBrush(tall > 12 ? accent_colour : line_colour);
-    painter.drawRect(QRectF(x, 20.5 - tall, 2.4, tall));
-    x += 3.4;
-  }
-}
-
-void draw_help(QPainter& painter) {
-  painter.drawEllipse(QPointF(12, 12), 9, 9);
-  QFont font = painter.font();
-  font.setPixelSize(13);
-  font.setBold(true);
-  painter.setFont(font);
-  painter.drawText(QRectF(3, 3, 18, 18), Qt::AlignCenter, "?");
-}
-
-void draw_triangle(QPainter& painter, double from_x, double to_x) {
-  painter.drawPolygon(QPolygonF(QVector<QPointF>{{from_x, 5}, {to_x, 12}, {from_x, 19}}));
-}
-
-void draw_play(QPainter& painter) {
-  painter.setBrush(line_colour);
-  draw_triangle(painter, 7, 19);
-}
-
-void draw_pause(QPainter& painter) {
-  painter.fillRect(QRectF(6, 5, 4, 14), accent_colour);
-  painter.fillRect(QRectF(14, 5, 4, 14), accent_colour);
-}
-
-void draw_back(QPainter& painter) {
-  painter.setBrush(line_colour);
-  draw_triangle(painter, 18, 8);
-  painter.drawLine(QPointF(6, 5), QPointF(6, 19));
-}
-
-void draw_forward(QPainter& painter) {
-  painter.setBrush(line_colour);
-  draw_triangle(painter, 6, 16);
-  painter.drawLine(QPointF(18, 5), QPointF(18, 19));
-}
-
-void draw_close(QPainter& painter) {
-  painter.drawLine(QPointF(6, 6), QPointF(18, 18));
-  painter.drawLine(QPointF(6, 18), QPointF(18, 6));
-}
-
-// Draws a window that is detached from another.
-void draw_float(QPainter& painter) {
-  painter.drawRect(QRectF(5, 9, 10, 10));
-  painter.drawPolyline(QPolygonF(QVector<QPointF>{{9, 9}, {9, 5}, {19, 5}, {19, 15}, {15, 15}}));
-}
-
-const std::map<Sign, std::function<void(QPainter&)>>& drawings() {
-  const QPolygonF top(QVector<QPointF>{{12, 3}, {20, 7}, {12, 11}, {4, 7}});
-  const QPolygonF left(QVector<QPointF>{{4, 7}, {12, 11}, {12, 21}, {4, 16}});
-  const QPolygonF right(QVector<QPointF>{{20, 7}, {12, 11}, {12, 21}, {20, 16}});
-  static const std::map<Sign, std::function<void(QPainter&)>> all{
-      {Sign::Open, draw_file},
-      {Sign::OpenFolder, draw_folder},
-      {Sign::Save, draw_camera},
-      {Sign::Fit, draw_fit},
-      {Sign::Top, [top](QPainter& painter) { draw_box(painter, top); }},
-      {Sign::South, [left](QPainter& painter) { draw_box(painter, left); }},
-      {Sign::East, [right](QPainter& painter) { draw_box(painter, right); }},
-      {Sign::Oblique, [](QPainter& painter) { draw_box(painter, QPolygonF()); }},
-      {Sign::Wireframe, draw_wireframe},
-      {Sign::Legend, draw_legend},
-      {Sign::Scan, draw_scan},
-      {Sign::Compare, draw_compare},
-      {Sign::Help, draw_help},
-      {Sign::Play, draw_play},
-      {Sign::Pause, draw_pause},
-      {Sign::Back, draw_back},
-      {Sign::Forward, draw_forward},
-      {Sign::Close, draw_close},
-      {Sign::Float, draw_float}};
+const std::map<Icon, QVector<Part>>& drawings() {
+  static const std::map<Icon, QVector<Part>> all{
+      {Icon::Open,
+       {outline({{5, 3}, {14, 3}, {19, 8}, {19, 21}, {5, 21}}), line({{14, 3}, {14, 8}, {19, 8}})}},
+      {Icon::OpenFolder, {outline({{3, 19}, {3, 5}, {9, 5}, {11, 8}, {20, 8}, {20, 19}})}},
+      {Icon::Save,
+       {camera_body(), circle({12, 13}, 3.6), line({{9, 7}, {10, 4.5}, {14, 4.5}, {15, 7}})}},
+      {Icon::Fit,
+       {line({{4, 8}, {4, 4}, {8, 4}}), line({{4, 16}, {4, 20}, {8, 20}}),
+        line({{20, 8}, {20, 4}, {16, 4}}), line({{20, 16}, {20, 20}, {16, 20}}),
+        circle({12, 12}, 3.5)}},
+      {Icon::Top, box({{12, 3}, {20, 7}, {12, 11}, {4, 7}})},
+      {Icon::South, box({{4, 7}, {12, 11}, {12, 21}, {4, 16}})},
+      {Icon::East, box({{20, 7}, {12, 11}, {12, 21}, {20, 16}})},
+      {Icon::Oblique, box({})},
+      {Icon::Wireframe,
+       {outline({{3, 19}, {8, 6}, {21, 19}}), line({{8, 6}, {11, 19}, {14.5, 12.5}, {8, 6}}),
+        line({{5.5, 12.5}, {11, 19}})}},
+      {Icon::Legend,
+       {rectangle({5, 3, 5, 18}), block({6, 10, 3, 10}, accent_colour), line({{13, 3}, {19, 3}}),
+        line({{13, 9}, {19, 9}}), line({{13, 15}, {19, 15}}), line({{13, 21}, {19, 21}})}},
+      {Icon::Scan,
+       {rectangle({9, 3, 6, 5}), ray(3), ray(7.5), ray(12), ray(16.5), ray(21),
+        line({{2, 21}, {22, 21}})}},
+      {Icon::Compare,
+       {line({{3, 21}, {21, 21}}), bar(4, 4), bar(7.4, 9), bar(10.8, 16, accent_colour),
+        bar(14.2, 11), bar(17.6, 5)}},
+      {Icon::Help, {circle({12, 12}, 9)}},
+      {Icon::Play, {outline({{7, 5}, {19, 12}, {7, 19}}, line_colour)}},
+      {Icon::Pause, {block({6, 5, 4, 14}, accent_colour), block({14, 5, 4, 14}, accent_colour)}},
+      {Icon::Back, {outline({{18, 5}, {8, 12}, {18, 19}}, line_colour), line({{6, 5}, {6, 19}})}},
+      {Icon::Forward,
+       {outline({{6, 5}, {16, 12}, {6, 19}}, line_colour), line({{18, 5}, {18, 19}})}},
+      {Icon::Close, {line({{6, 6}, {18, 18}}), line({{6, 18}, {18, 6}})}},
+      {Icon::Float,
+       {rectangle({5, 9, 10, 10}), line({{9, 9}, {9, 5}, {19, 5}, {19, 15}, {15, 15}})}}};
   return all;
 }
 
@@ -228,8 +171,8 @@ class CalmStyle : public QProxyStyle {
   CalmStyle() : QProxyStyle(QStyleFactory::create("Fusion")) {}
   QIcon standardIcon(StandardPixmap which, const QStyleOption* option,
                      const QWidget* widget) const override {
-    if (which == SP_TitleBarCloseButton) return icon_of(Sign::Close);
-    if (which == SP_TitleBarNormalButton) return icon_of(Sign::Float);
+    if (which == SP_TitleBarCloseButton) return icon_of(Icon::Close);
+    if (which == SP_TitleBarNormalButton) return icon_of(Icon::Float);
     return QProxyStyle::standardIcon(which, option, widget);
   }
   void drawPrimitive(PrimitiveElement which, const QStyleOption* option, QPainter* painter,
@@ -255,14 +198,25 @@ void set_style(QApplication& application) {
       "QStatusBar::item { border: 0; }");
 }
 
-QIcon icon_of(Sign sign) {
-  QPixmap pixmap(sign_px, sign_px);
+QIcon icon_of(Icon icon) {
+  QPixmap pixmap(icon_px, icon_px);
   pixmap.fill(Qt::transparent);
   QPainter painter(&pixmap);
   painter.setRenderHint(QPainter::Antialiasing);
-  painter.scale(sign_px / 24.0, sign_px / 24.0);
-  painter.setPen(QPen(line_colour, 1.6, Qt::SolidLine, Qt::RoundCap, Qt::RoundJoin));
-  drawings().at(sign)(painter);
+  painter.scale(icon_px / 24.0, icon_px / 24.0);
+  for (const Part& part : drawings().at(icon)) {
+    const QPen pen(part.line, part.width, Qt::SolidLine, Qt::RoundCap, Qt::RoundJoin);
+    painter.setPen(part.line.isValid() ? pen : QPen(Qt::NoPen));
+    painter.setBrush(part.fill.isValid() ? QBrush(part.fill) : QBrush(Qt::NoBrush));
+    painter.drawPath(part.path);
+  }
+  if (icon == Icon::Help) {
+    QFont font = painter.font();
+    font.setPixelSize(13);
+    font.setBold(true);
+    painter.setFont(font);
+    painter.drawText(QRectF(3, 3, 18, 18), Qt::AlignCenter, "?");
+  }
   return {pixmap};
 }
 

@@ -12,9 +12,6 @@ namespace groundray {
 /// Distance from which a mouse movement with a pressed button is a drag.
 inline constexpr int drag_begins_px = 4;
 
-/// Number of steps of a progress bar.
-inline constexpr int progress_steps = 1000;
-
 /// Returns a colour for Qt; its components are clamped to [0, 1].
 inline QColor colour_of(const glm::dvec3& colour) {
   return QColor::fromRgbF(std::clamp(colour.r, 0.0, 1.0), std::clamp(colour.g, 0.0, 1.0),
@@ -25,7 +22,7 @@ inline QColor colour_of(const glm::dvec3& colour) {
 void set_style(QApplication& application);
 
 /// Icons of buttons.
-enum class Sign {
+enum class Icon {
   Open,
   OpenFolder,
   Save,
@@ -48,6 +45,6 @@ enum class Sign {
 };
 
 /// Returns an icon, drawn in lines.
-QIcon icon_of(Sign sign);
+QIcon icon_of(Icon icon);
 
 }  // namespace groundray

@@ -14,6 +14,7 @@
 #include <QStatusBar>
 #include <QVBoxLayout>
 
+#include "apps/view/window/widgets.h"
 #include "core/image/png_io.h"
 
 namespace groundray {
@@ -50,14 +51,15 @@ Window::Window(WindowStart start) : start_(std::move(start)), recent_(start_.set
   build_docks();
   build_workers();
   connect_canvas();
-  view().set_legend_visible(start_.has_legend);
+  view().set_legend_visible(start_.view.has_legend);
   build_actions();
   build_status_bar();
   status_clock_.setInterval(status_ms);
   connect(&status_clock_, &QTimer::timeout, this, [this] { show_status(); });
   status_clock_.start();
-  for (const std::string& wish : start_.coloured_by) unmet_.insert("--colour-by " + wish);
-  for (const std::string& wish : start_.hidden) unmet_.insert("--hide " + wish);
+  for (const std::string& request : start_.view.colour_by)
+    unmatched_.insert("--colour-by " + request);
+  for (const std::string& request : start_.view.hide) unmatched_.insert("--hide " + request);
   for (const std::filesystem::path& input : start_.inputs) open(input);
 }
 
@@ -84,9 +86,7 @@ void Window::build_status_bar() {
   busy_ = new QProgressBar;
   busy_->setRange(0, 0);
   busy_->setMaximumWidth(140);
-  cancel_ = new QPushButton("Cancel");
-  cancel_->setObjectName("cancel_opening");
-  cancel_->setToolTip("Cancel loading (Escape)");
+  cancel_ = named(new QPushButton("Cancel"), "cancel_opening", "Cancel loading (Escape)");
   cancel_->setFocusPolicy(Qt::NoFocus);
   connect(cancel_, &QPushButton::clicked, this, [this] { cancel_opening(); });
   statusBar()->addWidget(message_, 1);
@@ -111,11 +111,11 @@ QDockWidget* Window::dock(const QString& title, QWidget* content, Side side) {
 void Window::build_docks() {
   const auto failed = [this](const std::string& message) { fault(message); };
   layers_ = new LayerPanel(view(), {.changed = [this] { canvas_->draw(); },
-                                    .selected = [this](auto& name) { explain(name); },
+                                    .selected = [this](auto& name) { show_legend_of(name); },
                                     .failed = failed});
-  timeline_ =
-      new TimelinePanel({.went = [this](auto time) { go_to(time); },
-                         .asked = [this] { playback_->set_trail(timeline_->shows_trail()); }});
+  timeline_ = new TimelinePanel(
+      {.time_changed = [this](auto time) { go_to(time); },
+       .options_changed = [this] { playback_->set_trail(timeline_->shows_trail()); }});
   images_ = new ImagePanel({.camera_chosen = [this](auto& name) { playback_->set_camera(name); },
                             .clicked = [this](glm::ivec2 pixel) { click_pixel(pixel); },
                             .failed = failed});
@@ -125,7 +125,7 @@ void Window::build_docks() {
                                view().add(std::move(layer));
                                changed();
                              },
-                         .scanned = [this](ScanMade made) { take_scan(std::move(made)); },
+                         .scanned = [this](FinishedScan made) { take_scan(std::move(made)); },
                          .failed = failed});
   compare_ = new ComparePanel(
       {.layer = [this](auto& name) { return view().find(name); },
@@ -150,12 +150,11 @@ void Window::build_docks() {
 
 QWidget* Window::build_status() {
   auto* content = new QWidget;
-  follows_ = new QComboBox;
-  follows_->setObjectName("follows");
+  follows_ =
+      named(new QComboBox, "follows", "Viewpoint that the terrain's quadtree and clipmap follow");
   follows_->addItems({"the eye", "the platform", "a place (Ctrl + click)"});
   follows_->setSizeAdjustPolicy(QComboBox::AdjustToMinimumContentsLengthWithIcon);
   follows_->setMinimumContentsLength(10);
-  follows_->setToolTip("Viewpoint that the terrain's quadtree and clipmap follow");
   connect(follows_, qOverload<int>(&QComboBox::activated), this, [this](int index) {
     tracker_->set_follows(static_cast<TerrainTracker::Follows>(index));
   });
@@ -171,20 +170,17 @@ QWidget* Window::build_status() {
 
 QWidget* Window::build_picked() {
   auto* content = new QWidget;
-  picked_title_ = new QLabel("Click an echo, a point or a triangle.");
-  picked_title_->setWordWrap(true);
+  picked_title_ = wrapped_label("Click an echo, a point or a triangle.");
   picked_ = new FactTable;
   auto* layout = new QVBoxLayout(content);
   layout->setContentsMargins(4, 4, 4, 4);
-  layout->addWidget(picked_title_);
-  layout->addWidget(picked_);
+  add_widgets(*layout, {picked_title_, picked_});
   return content;
 }
 
 void Window::connect_canvas() {
   canvas_->set_hooks({.clicked = [this](auto at_px, auto keys) { click(at_px, keys); },
                       .placed = [this](auto at_px, auto to_px) { take_place(at_px, to_px); },
-                      .moving = {},
                       .rested =
                           [this] {
                             follow_eye();
@@ -204,12 +200,12 @@ void Window::build_workers() {
   playback_ = std::make_unique<Playback>(
       view(), Playback::Hooks{.changed = redraw,
                               .image = [this](auto& source) { images_->show_image(source); },
-                              .no_image = [this](auto first) { tell_no_image(first); },
+                              .no_image = [this](auto first) { report_no_image(first); },
                               .failed = failed});
   picker_ = std::make_unique<Picker>(
       view(),
       Picker::Hooks{.changed = redraw,
-                    .told =
+                    .facts =
                         [this](const std::string& title, const FactTable::Facts& facts) {
                           picked_title_->setText(QString::fromStdString(title));
                           picked_->show_facts(facts);

@@ -109,7 +109,7 @@ class Window : public QMainWindow {
   void build_view_actions(QMenu& menu, QToolBar& bar);
   void build_tool_actions(QMenu& menu, QToolBar& bar);
   QAction* action(QMenu& menu, QToolBar* bar, const QString& text, const QKeySequence& keys,
-                  std::optional<Sign> sign, std::function<void()> done);
+                  std::optional<Icon> icon, std::function<void()> done);
   void ask_to_open();
   void ask_to_open_folder();
   void ask_for_picture();
@@ -125,23 +125,23 @@ class Window : public QMainWindow {
   void take(Loaded loaded);
   std::string name_for(const std::filesystem::path& path) const;
   void name_layers(std::vector<Layer>& layers, const std::string& document);
-  void dress(Layer& layer, const std::string& own_name);
-  void tell_unmet();
+  void apply_options(Layer& layer, const std::string& own_name);
+  void report_unmatched();
   void first_look(const Opened& opened, const std::vector<std::string>& layers);
   void use(const Document& document);
   void play(const Document& document);
   void offer_ground();
   void hide_sensors_of_scenes();
   void show_hidden_sensors();
-  void tell_no_image(std::optional<std::chrono::nanoseconds> first);
+  void report_no_image(std::optional<std::chrono::nanoseconds> first);
   void show_images();
   void forget(const std::string& document);
   void remove_layer(const std::string& name);
   void offer_comparisons();
   void show_documents();
 
-  // window_seen.cpp
-  void explain(const std::string& layer);
+  // window_picking.cpp
+  void show_legend_of(const std::string& layer);
   void click(glm::ivec2 at_px, Qt::KeyboardModifiers keys);
   void follow_eye();
   void put_viewpoint(const glm::dvec3& p_w_m);
@@ -150,11 +150,11 @@ class Window : public QMainWindow {
   void go_to(std::chrono::nanoseconds time);
   void click_pixel(glm::ivec2 pixel);
   void mark_in_image(const EchoBeam& beam, const glm::dvec3& origin_w_m);
-  void take_scan(ScanMade made);
+  void take_scan(FinishedScan made);
   void take_comparison(const Comparison& comparison, const Layer& measured);
 
   WindowStart start_;
-  std::set<std::string> unmet_;  // options of the program that no layer has satisfied yet
+  std::set<std::string> unmatched_;  // options of the program that no layer has satisfied yet
   std::vector<Document> documents_;
   std::vector<std::string> hidden_sensors_;  // sensors of scenes, hidden while a dataset is played
   std::map<std::string, ShownScan> scans_here_;  // scans by layer

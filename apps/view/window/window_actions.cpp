@@ -1,61 +1,31 @@
 #include <QAction>
 #include <QApplication>
-#include <QDialog>
-#include <QDialogButtonBox>
 #include <QDir>
 #include <QDockWidget>
 #include <QFileDialog>
-#include <QFormLayout>
 #include <QMenuBar>
-#include <QSpinBox>
 #include <QToolBar>
 #include <glm/geometric.hpp>
 
-#include "apps/view/window/panels/help.h"
-#include "apps/view/window/panels/turntable_dialog.h"
+#include "apps/view/window/panels/dialogs.h"
 #include "apps/view/window/window.h"
 #include "core/error.h"
 
 namespace groundray {
 namespace {
 
-constexpr int largest_picture_px = 32768;
-
 const char* const open_filter =
     "All supported files (*.yaml *.ply *.pcd *.bin *.npy *.npz *.obj *.stl *.glb *.gltf *.tif "
     "*.tiff *.hgt *.asc *.vrt *.nc *.dem *.zip *.png *.jpg *.jpeg *.exr *.hdr);;Any file (*)";
 
-// Asks for a picture's size; std::nullopt if the user cancels.
-std::optional<glm::ivec2> ask_for_size(QWidget* parent, QSize at_first) {
-  QDialog dialog(parent);
-  dialog.setWindowTitle("Size of the picture");
-  auto* width = new QSpinBox;
-  auto* height = new QSpinBox;
-  for (QSpinBox* box : {width, height}) {
-    box->setRange(16, largest_picture_px);
-    box->setSuffix(" px");
-  }
-  width->setValue(at_first.width());
-  height->setValue(at_first.height());
-  auto* buttons = new QDialogButtonBox(QDialogButtonBox::Ok | QDialogButtonBox::Cancel);
-  QObject::connect(buttons, &QDialogButtonBox::accepted, &dialog, &QDialog::accept);
-  QObject::connect(buttons, &QDialogButtonBox::rejected, &dialog, &QDialog::reject);
-  auto* form = new QFormLayout(&dialog);
-  form->addRow("Width", width);
-  form->addRow("Height", height);
-  form->addRow(buttons);
-  if (dialog.exec() != QDialog::Accepted) return std::nullopt;
-  return glm::ivec2(width->value(), height->value());
-}
-
 }  // namespace
 
 QAction* Window::action(QMenu& menu, QToolBar* bar, const QString& text, const QKeySequence& keys,
-                        std::optional<Sign> sign, std::function<void()> done) {
+                        std::optional<Icon> icon, std::function<void()> done) {
   auto* made = new QAction(text, this);
   made->setShortcut(keys);
   made->setObjectName(text);
-  if (sign) made->setIcon(icon_of(*sign));
+  if (icon) made->setIcon(icon_of(*icon));
   const QString named = QString(text).remove('&').remove("...");
   made->setToolTip(keys.isEmpty() ? named : named + "  (" + keys.toString() + ")");
   connect(made, &QAction::triggered, this, [this, done = std::move(done)] {
@@ -87,18 +57,18 @@ void Window::build_actions() {
     panels.addAction(docks_.at(content)->toggleViewAction());
   }
   QMenu& help = *menuBar()->addMenu("&Help");
-  action(help, &bar, "Mouse and &keys", Qt::Key_F1, Sign::Help, [this] { show_help(this); });
+  action(help, &bar, "Mouse and &keys", Qt::Key_F1, Icon::Help, [this] { show_help(this); });
 }
 
 void Window::build_file_actions(QMenu& menu, QToolBar& bar) {
-  action(menu, &bar, "&Open...", QKeySequence::Open, Sign::Open, [this] { ask_to_open(); });
-  action(menu, &bar, "Open a dataset's &folder...", QKeySequence("Ctrl+Shift+O"), Sign::OpenFolder,
+  action(menu, &bar, "&Open...", QKeySequence::Open, Icon::Open, [this] { ask_to_open(); });
+  action(menu, &bar, "Open a dataset's &folder...", QKeySequence("Ctrl+Shift+O"), Icon::OpenFolder,
          [this] { ask_to_open_folder(); });
   recent_menu_ = menu.addMenu("Open &recent");
   recent_menu_->setObjectName("recent");
   connect(recent_menu_, &QMenu::aboutToShow, this, [this] { fill_recent(); });
   menu.addSeparator();
-  action(menu, &bar, "&Save a picture...", QKeySequence::Save, Sign::Save,
+  action(menu, &bar, "&Save a picture...", QKeySequence::Save, Icon::Save,
          [this] { ask_for_picture(); });
   action(menu, nullptr, "Save a &turntable...", QKeySequence("Ctrl+T"), {},
          [this] { ask_for_turntable(); });
@@ -115,28 +85,24 @@ void Window::build_view_actions(QMenu& menu, QToolBar& bar) {
     view().fit();
     canvas_->look(view().current_look());
   };
-  action(menu, &bar, "See &all", Qt::Key_F, Sign::Fit, fit)
+  action(menu, &bar, "See &all", Qt::Key_F, Icon::Fit, fit)
       ->setShortcuts({Qt::Key_F, Qt::Key_Home});
   action(menu, nullptr, "See the selected &layer", Qt::Key_Z, {}, [this] {
     if (view().find(layers_->selected()) == nullptr) return;
     view().fit(layers_->selected());
     canvas_->look(view().current_look());
   });
-  action(menu, &bar, "From a&bove", Qt::Key_1, Sign::Top, [this] {
-    look_along({0, 0, -1}, {0, 1, 0});
-  });
-  action(menu, &bar, "From the &south", Qt::Key_2, Sign::South, [this] {
-    look_along({0, 1, -0.05}, {0, 0, 1});
-  });
-  action(menu, &bar, "From the &east", Qt::Key_3, Sign::East, [this] {
-    look_along({-1, 0, -0.05}, {0, 0, 1});
-  });
-  action(menu, &bar, "Obli&que", Qt::Key_4, Sign::Oblique, [this] {
-    look_along({0.6, 1, -0.8}, {0, 0, 1});
-  });
+  const auto view_along = [&](const char* text, Qt::Key key, Icon icon, glm::dvec3 direction,
+                              glm::dvec3 up) {
+    action(menu, &bar, text, key, icon, [this, direction, up] { look_along(direction, up); });
+  };
+  view_along("From a&bove", Qt::Key_1, Icon::Top, {0, 0, -1}, {0, 1, 0});
+  view_along("From the &south", Qt::Key_2, Icon::South, {0, 1, -0.05}, {0, 0, 1});
+  view_along("From the &east", Qt::Key_3, Icon::East, {-1, 0, -0.05}, {0, 0, 1});
+  view_along("Obli&que", Qt::Key_4, Icon::Oblique, {0.6, 1, -0.8}, {0, 0, 1});
   menu.addSeparator();
-  action(menu, &bar, "&Wireframe", Qt::Key_T, Sign::Wireframe, [this] { toggle_wireframe(); });
-  QAction* legend = action(menu, &bar, "&Legend", Qt::Key_L, Sign::Legend, {});
+  action(menu, &bar, "&Wireframe", Qt::Key_T, Icon::Wireframe, [this] { toggle_wireframe(); });
+  QAction* legend = action(menu, &bar, "&Legend", Qt::Key_L, Icon::Legend, {});
   legend->setCheckable(true);
   legend->setChecked(true);
   connect(legend, &QAction::toggled, this, [this](bool on) {
@@ -152,8 +118,8 @@ void Window::build_tool_actions(QMenu& menu, QToolBar& bar) {
     docks_.at(panel)->show();
     docks_.at(panel)->raise();
   };
-  action(menu, &bar, "Sca&n here", Qt::Key_N, Sign::Scan, [this, show] { show(scan_); });
-  action(menu, &bar, "&Compare with the truth", Qt::Key_C, Sign::Compare,
+  action(menu, &bar, "Sca&n here", Qt::Key_N, Icon::Scan, [this, show] { show(scan_); });
+  action(menu, &bar, "&Compare with the truth", Qt::Key_C, Icon::Compare,
          [this, show] { show(compare_); });
   menu.addSeparator();
   QAction* play = action(menu, nullptr, "&Play", Qt::Key_Space, {},
@@ -250,7 +216,7 @@ void Window::close_selected() {
   const std::string layer = layers_->selected();
   if (view().find(layer) == nullptr) return;
   remove_layer(layer);
-  playback_->keep_away(layer);
+  playback_->exclude(layer);
   const std::string document = layer.substr(0, layer.find('/'));
   for (Document& each : documents_) {
     if (each.name == document && each.terrain == layer) each.follower = nullptr;

@@ -10,11 +10,11 @@
 #include <QStatusBar>
 #include <QUrl>
 #include <algorithm>
-#include <cmath>
 #include <utility>
 
 #include "apps/scene/interruption.h"
-#include "apps/view/window/scene_run.h"
+#include "apps/view/layers/scene_layers.h"
+#include "apps/view/window/widgets.h"
 #include "apps/view/window/window.h"
 
 namespace groundray {
@@ -50,7 +50,7 @@ void Window::open(const std::filesystem::path& path) {
 
 void Window::open_next() {
   show_documents();
-  if (queue_.empty()) return tell_unmet();
+  if (queue_.empty()) return report_unmatched();
   const std::filesystem::path path = queue_.front();
   queue_.pop_front();
   const auto work = [path, limits = start_.limits](const std::stop_token& stop, const auto&) {
@@ -68,7 +68,7 @@ void Window::open_next() {
                   .ended = [this] { open_next(); }});
   busy_->show();
   cancel_->show();
-  message_->setText(QString::fromStdString(fmt::format("opening {} ...", path.string())));
+  message_->setText(text_of("opening {} ...", path.string()));
 }
 
 void Window::cancel_opening() {
@@ -78,12 +78,12 @@ void Window::cancel_opening() {
 }
 
 // Reports the options of the program that no layer has satisfied.
-void Window::tell_unmet() {
-  if (unmet_.empty()) return;
+void Window::report_unmatched() {
+  if (unmatched_.empty()) return;
   const std::string message =
       fmt::format("{}: no layer has that name or column; see the layer tree and \"Colour by\"",
-                  fmt::join(unmet_, ", "));
-  unmet_.clear();
+                  fmt::join(unmatched_, ", "));
+  unmatched_.clear();
   fault(message);
 }
 
@@ -105,32 +105,32 @@ void Window::name_layers(std::vector<Layer>& layers, const std::string& document
     if (layer.kind == LayerKind::Terrain) layer.name = "terrain";
     const std::string own_name = layer.name;
     layer.name = layers.size() == 1 ? document : fmt::format("{}/{}", document, own_name);
-    dress(layer, own_name);
+    apply_options(layer, own_name);
   }
 }
 
 // Applies the program's options to a layer.
 // @param own_name  name within the document.
-void Window::dress(Layer& layer, const std::string& own_name) {
-  for (const std::string& wish : start_.coloured_by) {
-    const std::size_t equals = wish.rfind('=');
+void Window::apply_options(Layer& layer, const std::string& own_name) {
+  for (const std::string& request : start_.view.colour_by) {
+    const std::size_t equals = request.rfind('=');
     const bool is_of_all = equals == std::string::npos;
-    const std::string of = is_of_all ? "" : wish.substr(0, equals);
-    const std::string column = is_of_all ? wish : wish.substr(equals + 1);
+    const std::string of = is_of_all ? "" : request.substr(0, equals);
+    const std::string column = is_of_all ? request : request.substr(equals + 1);
     if (!is_of_all && of != layer.name && of != own_name) continue;
     if (layer.find(column) == nullptr) continue;
     layer.coloured_by = column;
-    unmet_.erase("--colour-by " + wish);
+    unmatched_.erase("--colour-by " + request);
   }
-  for (const std::string& wish : start_.hidden) {
+  for (const std::string& request : start_.view.hide) {
     for (const std::string& name : {layer.name, own_name}) {
-      if (name != wish && !name.starts_with(wish + "/")) continue;
+      if (name != request && !name.starts_with(request + "/")) continue;
       layer.visible = false;
-      unmet_.erase("--hide " + wish);
+      unmatched_.erase("--hide " + request);
     }
   }
-  if (start_.point_size_px) layer.point_size_px = *start_.point_size_px;
-  layer.wireframe = layer.wireframe || (start_.wireframe && layer.triangles() > 0);
+  layer.point_size_px = start_.view.point_size_px.value_or(layer.point_size_px);
+  layer.wireframe = layer.wireframe || (start_.view.is_wireframe && layer.triangles() > 0);
 }
 
 void Window::take(Loaded loaded) {
@@ -155,11 +155,10 @@ void Window::take(Loaded loaded) {
   }
   documents_.push_back(document);
   recent_.add(opened.path);
-  playback_->show_again(document.name + "/");
+  playback_->include_again(document.name + "/");
   hint_->hide();
   if (!opened.notes.empty()) {
-    statusBar()->showMessage(
-        QString::fromStdString(fmt::format("{}", fmt::join(opened.notes, "; "))), 15000);
+    statusBar()->showMessage(text_of("{}", fmt::join(opened.notes, "; ")), 15000);
   }
   changed();
   first_look(opened, names);
@@ -179,15 +178,8 @@ void Window::first_look(const Opened& opened, const std::vector<std::string>& la
   } else {
     view().fit();
   }
-  if (start_.from_w_m || start_.at_w_m) {
-    Look look = view().current_look();
-    look.from_w_m = start_.from_w_m.value_or(look.from_w_m);
-    look.at_w_m = start_.at_w_m.value_or(look.at_w_m);
-    const glm::dvec3 ahead = look.at_w_m - look.from_w_m;
-    const bool is_plumb = std::hypot(ahead.x, ahead.y) < 1e-6 * std::abs(ahead.z);
-    look.up = is_plumb ? glm::dvec3(0, 1, 0) : glm::dvec3(0, 0, 1);
-    if (look.from_w_m != look.at_w_m) view().look(look);
-  }
+  const Look look = requested_look(view().current_look(), start_.view);
+  if (look.from_w_m != look.at_w_m) view().look(look);
   if (!layers.empty()) layers_->select(layers.front());
   canvas_->look(view().current_look());
 }
@@ -254,10 +246,10 @@ void Window::show_hidden_sensors() {
   canvas_->draw();
 }
 
-void Window::tell_no_image(std::optional<std::chrono::nanoseconds> first) {
+void Window::report_no_image(std::optional<std::chrono::nanoseconds> first) {
   if (!first) return images_->clear("this camera has no image");
-  images_->clear(QString::fromStdString(fmt::format(
-      "no image yet: the first is at {:.3f} s", std::chrono::duration<double>(*first).count())));
+  images_->clear(text_of("no image yet: the first is at {:.3f} s",
+                         std::chrono::duration<double>(*first).count()));
 }
 
 void Window::show_images() {
@@ -318,8 +310,7 @@ void Window::forget(const std::string& document) {
 }
 
 void Window::close_all() {
-  queue_.clear();
-  opening_.abandon();
+  cancel_opening();
   picker_->clear();
   while (!documents_.empty()) forget(Document(documents_.back()).name);
   std::vector<std::string> rest;

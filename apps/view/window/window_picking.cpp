@@ -3,12 +3,12 @@
 #include <QComboBox>
 #include <QDockWidget>
 #include <QLabel>
-#include <algorithm>
 #include <glm/geometric.hpp>
 
+#include "apps/view/layers/line_layer.h"
 #include "apps/view/recorded/pixel_ray.h"
-#include "apps/view/window/line_layer.h"
 #include "apps/view/window/panels/picture_area.h"
+#include "apps/view/window/widgets.h"
 #include "apps/view/window/window.h"
 
 namespace groundray {
@@ -19,8 +19,7 @@ constexpr double eye_step = 0.05;  // fraction of the distance to the target; le
 constexpr double platform_step_m = 0.5;
 constexpr double scan_point_px = 3;  // same as for scans of datasets
 constexpr double ray_of_sky_m = 500;
-constexpr Pen viewpoint_pen{{255, 89, 217}, 2.5};
-constexpr Pen ray_pen{{89, 217, 255}, 2};
+constexpr glm::u8vec3 viewpoint_rgb{255, 89, 217}, ray_rgb{89, 217, 255};
 
 }  // namespace
 
@@ -30,7 +29,7 @@ const ShownScan* Window::scan_of(const std::string& layer) const {
 }
 
 // Shows the legend of the layer that was selected last.
-void Window::explain(const std::string& layer) {
+void Window::show_legend_of(const std::string& layer) {
   const Layer* found = view().find(layer);
   const LayerColumn* column = found == nullptr ? nullptr : found->find(found->coloured_by);
   if (column == nullptr || column->is_rgb) return;
@@ -48,7 +47,7 @@ void Window::click(glm::ivec2 at_px, Qt::KeyboardModifiers keys) {
   docks_.at(picked_->parentWidget())->show();
   docks_.at(picked_->parentWidget())->raise();
   layers_->select(picked->layer);
-  explain(picked->layer);
+  show_legend_of(picked->layer);
   picker_->pick(*picked, scan_of(picked->layer));
 }
 
@@ -62,11 +61,10 @@ void Window::follow_eye() {
 void Window::put_viewpoint(const glm::dvec3& p_w_m) {
   const glm::dvec3 eye_w_m = p_w_m + glm::dvec3(0, 0, viewpoint_above_m);
   const double tall_m = 0.05 * glm::distance(view().current_look().from_w_m, p_w_m);
-  Lines flag{{glm::dvec3(0), {0, 0, tall_m}}};
-  for (Lines::value_type& edge : box_edges({0, 0, tall_m}, glm::dvec3(0.1 * tall_m))) {
-    flag.push_back(std::move(edge));
-  }
-  view().add(line_layer("viewpoint", LayerKind::Sensors, p_w_m, flag, viewpoint_pen));
+  LineDrawing flag;
+  flag.add({glm::dvec3(0), {0, 0, tall_m}}, viewpoint_rgb);
+  add_box(flag, {0, 0, tall_m}, glm::dvec3(0.1 * tall_m), viewpoint_rgb);
+  view().add(line_layer("viewpoint", LayerKind::Sensors, p_w_m, flag, 2.5));
   follows_->setCurrentIndex(static_cast<int>(TerrainTracker::Follows::Place));
   tracker_->set_place(TerrainTracker::Follows::Place, eye_w_m, 0);
   if (tracker_->follows() != TerrainTracker::Follows::Place) {
@@ -80,7 +78,7 @@ void Window::take_place(glm::ivec2 at_px, glm::ivec2 towards_px) {
   const auto at = view().pick(at_px.x, at_px.y);
   if (!at) return fault("There is no ground at that place: press on the terrain.");
   const auto towards = at_px == towards_px ? at : view().pick(towards_px.x, towards_px.y);
-  scan_->put_down(at->p_w_m, towards ? towards->p_w_m : at->p_w_m);
+  scan_->place_at(at->p_w_m, towards ? towards->p_w_m : at->p_w_m);
 }
 
 void Window::go_to(std::chrono::nanoseconds time) {
@@ -104,8 +102,7 @@ void Window::click_pixel(glm::ivec2 pixel) {
   for (const PixelValue& value : image->values_at(pixel)) {
     facts.emplace_back(value.channel, value.text);
   }
-  picked_title_->setText(
-      QString::fromStdString(fmt::format("pixel ({}, {}) of {}", pixel.x, pixel.y, source.title)));
+  picked_title_->setText(text_of("pixel ({}, {}) of {}", pixel.x, pixel.y, source.title));
   view().remove("picked/ray");
   if (source.timeline != nullptr) {
     const Timeline& timeline = *source.timeline;
@@ -116,10 +113,10 @@ void Window::click_pixel(glm::ivec2 pixel) {
       const glm::dvec3 end_m =
           seen->p_D_m.value_or(seen->origin_m + ray_of_sky_m * seen->direction);
       const glm::dvec3 origin_w_m = timeline.georeference().origin_w_m;
-      Lines lines{{seen->origin_m, end_m}};
-      const double half_m = 0.01 * glm::distance(seen->origin_m, end_m);
-      for (auto& edge : box_edges(end_m, glm::dvec3(half_m))) lines.push_back(std::move(edge));
-      view().add(line_layer("picked/ray", LayerKind::Sensors, origin_w_m, lines, ray_pen));
+      LineDrawing lines;
+      lines.add({seen->origin_m, end_m}, ray_rgb);
+      add_box(lines, end_m, glm::dvec3(0.01 * glm::distance(seen->origin_m, end_m)), ray_rgb);
+      view().add(line_layer("picked/ray", LayerKind::Sensors, origin_w_m, lines));
       const glm::dvec3 p_w_m = origin_w_m + end_m;
       facts.emplace_back(seen->p_D_m ? "surface" : "sky",
                          fmt::format("{:.3f}, {:.3f}, {:.3f} m", p_w_m.x, p_w_m.y, p_w_m.z));
@@ -141,7 +138,7 @@ void Window::mark_in_image(const EchoBeam& beam, const glm::dvec3& origin_w_m) {
   images_->mark(pixel_of(camera, camera.frames[source->frame], p_D_m));
 }
 
-void Window::take_scan(ScanMade made) {
+void Window::take_scan(FinishedScan made) {
   const std::string name = made.layer.name;
   scans_here_[name] = std::move(made.scan);
   if (made.layer.find("intensity") != nullptr) made.layer.coloured_by = "intensity";
@@ -149,7 +146,7 @@ void Window::take_scan(ScanMade made) {
   view().add(std::move(made.layer));
   changed();
   layers_->select(name);
-  explain(name);
+  show_legend_of(name);
 }
 
 void Window::take_comparison(const Comparison& comparison, const Layer& measured) {

@@ -7,31 +7,28 @@
 #include <QFormLayout>
 #include <QHBoxLayout>
 #include <QLabel>
+#include <QPainter>
 #include <QProgressBar>
 #include <QPushButton>
 #include <QVBoxLayout>
 #include <algorithm>
+#include <glm/vec2.hpp>
+#include <glm/vec3.hpp>
+#include <optional>
 
-#include "apps/view/window/panels/histogram_plot.h"
+#include "apps/view/rendering/colour_table.h"
 #include "apps/view/window/style.h"
+#include "apps/view/window/widgets.h"
 #include "core/error.h"
 
 namespace groundray {
 namespace {
 
+constexpr int plot_margin_px = 8;
+constexpr int ticks = 5;
+
 FactTable::Facts facts_of(const Comparison& comparison) {
-  const DeviationFigures& figures = comparison.deviation.figures;
-  const auto metres = [](double value) { return fmt::format("{:.4g} m", value); };
-  FactTable::Facts facts{{"points", fmt::format("{}", figures.count)},
-                         {"beyond the truth", fmt::format("{}", figures.beyond)},
-                         {"mean", metres(figures.mean_m)},
-                         {"RMS", metres(figures.rms_m)},
-                         {"median", metres(figures.median_m)},
-                         {"NMAD", metres(figures.nmad_m)},
-                         {"95 % within", metres(figures.p95_m)},
-                         {"largest", metres(figures.largest_m)},
-                         {"lowest", metres(figures.low_m)},
-                         {"highest", metres(figures.high_m)}};
+  FactTable::Facts facts = figure_texts(comparison.deviation.figures);
   for (const std::string& line : agreement_lines(comparison.agreements)) {
     facts.emplace_back("surfaces", line);
   }
@@ -49,6 +46,73 @@ void fill(QComboBox& box, const std::vector<std::string>& names) {
 
 }  // namespace
 
+// Histogram of deviations, in the colours of the surface.
+class HistogramPlot : public QWidget {
+ public:
+  explicit HistogramPlot(QWidget* parent = nullptr);
+
+  // @param colours_m  deviations at the ends of the colours, m.
+  void show_histogram(std::optional<DeviationHistogram> histogram, glm::dvec2 colours_m);
+  QSize sizeHint() const override { return {300, 180}; }
+  QSize minimumSizeHint() const override { return {160, 120}; }
+
+ protected:
+  void paintEvent(QPaintEvent* event) override;
+
+ private:
+  std::optional<DeviationHistogram> histogram_;
+  glm::dvec2 colours_m_{-1, 1};
+};
+
+HistogramPlot::HistogramPlot(QWidget* parent) : QWidget(parent) { setObjectName("histogram"); }
+
+void HistogramPlot::show_histogram(std::optional<DeviationHistogram> histogram,
+                                   glm::dvec2 colours_m) {
+  histogram_ = std::move(histogram);
+  colours_m_ = colours_m;
+  if (histogram_) {
+    setToolTip(text_of("{} below {:.4g} m, {} above {:.4g} m", histogram_->below, histogram_->low_m,
+                       histogram_->above, histogram_->high_m));
+  }
+  update();
+}
+
+void HistogramPlot::paintEvent(QPaintEvent*) {
+  QPainter painter(this);
+  painter.fillRect(rect(), palette().base());
+  if (!histogram_ || histogram_->counts.empty()) return;
+  const QFontMetrics metrics = painter.fontMetrics();
+  const QRectF plot(plot_margin_px, plot_margin_px, width() - 2 * plot_margin_px,
+                    height() - 2 * plot_margin_px - metrics.height() - 4);
+  const std::vector<std::size_t>& counts = histogram_->counts;
+  const double most = static_cast<double>(
+      std::max<std::size_t>(1, *std::max_element(counts.begin(), counts.end())));
+  const double bar_px = plot.width() / static_cast<double>(counts.size());
+  const double span_m = histogram_->high_m - histogram_->low_m;
+  for (std::size_t i = 0; i < counts.size(); ++i) {
+    const double share = (static_cast<double>(i) + 0.5) / static_cast<double>(counts.size());
+    const double value_m = histogram_->low_m + share * span_m;
+    const double tall_px = plot.height() * static_cast<double>(counts[i]) / most;
+    const double in_range = (value_m - colours_m_.x) / (colours_m_.y - colours_m_.x);
+    painter.fillRect(QRectF(plot.left() + static_cast<double>(i) * bar_px, plot.bottom() - tall_px,
+                            std::max(1.0, bar_px - 0.5), tall_px),
+                     colour_of(colour_on(ColourScale::Signed, in_range)));
+  }
+  painter.setPen(palette().text().color());
+  painter.drawLine(plot.bottomLeft(), plot.bottomRight());
+  for (int i = 0; i < ticks; ++i) {
+    const double share = static_cast<double>(i) / (ticks - 1);
+    const QString text =
+        text_of("{:.3g}{}", histogram_->low_m + share * span_m, i + 1 == ticks ? " m" : "");
+    const double x = plot.left() + share * plot.width();
+    const double text_px = metrics.horizontalAdvance(text);
+    painter.drawLine(QPointF(x, plot.bottom()), QPointF(x, plot.bottom() + 3));
+    painter.drawText(QPointF(std::clamp(x - text_px / 2, 0.0, std::max(0.0, width() - text_px - 2)),
+                             plot.bottom() + 4 + metrics.ascent()),
+                     text);
+  }
+}
+
 ComparePanel::ComparePanel(Hooks hooks, QWidget* parent)
     : QWidget(parent), hooks_(std::move(hooks)) {
   build();
@@ -58,27 +122,22 @@ ComparePanel::ComparePanel(Hooks hooks, QWidget* parent)
 }
 
 void ComparePanel::build() {
-  layer_ = new QComboBox;
-  layer_->setObjectName("measured");
-  truth_ = new QComboBox;
-  truth_->setObjectName("truth");
+  layer_ = named(new QComboBox, "measured");
+  truth_ = named(new QComboBox, "truth");
   for (QComboBox* box : {layer_, truth_}) {
     box->setSizeAdjustPolicy(QComboBox::AdjustToMinimumContentsLengthWithIcon);
     box->setMinimumContentsLength(16);
   }
-  tolerance_ = new QDoubleSpinBox;
+  tolerance_ = named(new QDoubleSpinBox, "tolerance",
+                     "Distance for the precision and completeness of two surfaces");
   tolerance_->setRange(0, 1e6);
   tolerance_->setDecimals(4);
   tolerance_->setSuffix(" m");
   tolerance_->setSpecialValueText("none");
-  tolerance_->setToolTip("Distance for the precision and completeness of two surfaces");
-  compare_ = new QPushButton("Compare");
-  compare_->setObjectName("compare");
+  compare_ = named(new QPushButton("Compare"), "compare");
   cancel_ = new QPushButton("Cancel");
-  progress_ = new QProgressBar;
-  progress_->setRange(0, progress_steps);
-  title_ = new QLabel;
-  title_->setWordWrap(true);
+  progress_ = progress_bar();
+  title_ = wrapped_label();
   plot_ = new HistogramPlot;
   figures_ = new FactTable;
   auto* form = new QFormLayout;
@@ -86,13 +145,11 @@ void ComparePanel::build() {
   form->addRow("Truth", truth_);
   form->addRow("Tolerance", tolerance_);
   auto* buttons = new QHBoxLayout;
-  buttons->addWidget(compare_);
-  buttons->addWidget(cancel_);
+  add_widgets(*buttons, {compare_, cancel_});
   auto* layout = new QVBoxLayout(this);
   layout->addLayout(form);
   layout->addLayout(buttons);
-  layout->addWidget(progress_);
-  layout->addWidget(title_);
+  add_widgets(*layout, {progress_, title_});
   layout->addWidget(plot_, 1);
   layout->addWidget(figures_, 1);
 }
@@ -143,8 +200,8 @@ void ComparePanel::compare_chosen() {
     return;
   }
   const auto work = [measured = *layer, truth, tolerance_m = tolerance_->value()](
-                        const std::stop_token& stop, const Told& told) {
-    return compare(measured, truth, tolerance_m, stop, [&](double share) { told(share, ""); });
+                        const std::stop_token& stop, const JobProgress& report) {
+    return compare(measured, truth, tolerance_m, stop, [&](double share) { report(share, ""); });
   };
   progress_->setValue(0);
   title_->clear();
@@ -153,7 +210,7 @@ void ComparePanel::compare_chosen() {
                show_comparison(comparison);
                if (hooks_.compared) hooks_.compared(comparison, measured);
              },
-             {.told =
+             {.progress =
                   [this](double share, const std::string&) {
                     progress_->setValue(static_cast<int>(share * progress_steps));
                   },
@@ -164,8 +221,7 @@ void ComparePanel::compare_chosen() {
 }
 
 void ComparePanel::show_comparison(const Comparison& comparison) {
-  title_->setText(
-      QString::fromStdString(fmt::format("{}  against  {}", comparison.layer, comparison.truth)));
+  title_->setText(text_of("{}  against  {}", comparison.layer, comparison.truth));
   const double end_m = comparison.deviation.figures.p95_m;
   const double colours_m = end_m > 0 ? end_m : 1;
   plot_->show_histogram(comparison.histogram, {-colours_m, colours_m});

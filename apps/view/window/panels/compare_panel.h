@@ -6,7 +6,7 @@
 #include <string>
 #include <vector>
 
-#include "apps/view/window/comparison.h"
+#include "apps/view/compare/deviation.h"
 #include "apps/view/window/job.h"
 #include "apps/view/window/panels/fact_table.h"
 

@@ -5,12 +5,126 @@
 #include <QComboBox>
 #include <QHBoxLayout>
 #include <QLabel>
+#include <QPainter>
 #include <QVBoxLayout>
+#include <algorithm>
+#include <cmath>
 
-#include "apps/view/window/panels/legend_strip.h"
 #include "apps/view/window/panels/picture_area.h"
+#include "apps/view/window/style.h"
+#include "apps/view/window/widgets.h"
 
 namespace groundray {
+namespace {
+
+constexpr int legend_margin_px = 6;
+constexpr int band_px = 12;
+constexpr int band_ticks = 5;
+constexpr int few_ticks = 3;  // if there is no room for more
+
+double value_at(const ImageLegend& legend, double share) {
+  return legend.is_logarithmic && legend.low > 0
+             ? legend.low * std::pow(legend.high / legend.low, share)
+             : legend.low + share * (legend.high - legend.low);
+}
+
+}  // namespace
+
+// Legend of an image's channel: a colour bar with numbers, or categories by name.
+class LegendStrip : public QWidget {
+ public:
+  explicit LegendStrip(QWidget* parent = nullptr);
+
+  void show_legend(std::optional<ImageLegend> legend);
+  QSize sizeHint() const override;
+  QSize minimumSizeHint() const override { return {100, sizeHint().height()}; }
+
+ protected:
+  void paintEvent(QPaintEvent* event) override;
+
+ private:
+  void paint_band(QPainter& painter) const;
+  void paint_categories(QPainter& painter) const;
+
+  std::optional<ImageLegend> legend_;
+};
+
+LegendStrip::LegendStrip(QWidget* parent) : QWidget(parent) {
+  setObjectName("image_legend");
+  setSizePolicy(QSizePolicy::Expanding, QSizePolicy::Fixed);
+}
+
+void LegendStrip::show_legend(std::optional<ImageLegend> legend) {
+  legend_ = std::move(legend);
+  QStringList all;
+  if (legend_) {
+    for (const ImageLegend::Category& each : legend_->categories) {
+      all << text_of("{}: {} pixels", each.name, each.pixels);
+    }
+  }
+  setToolTip(all.join('\n'));
+  update();
+}
+
+QSize LegendStrip::sizeHint() const {
+  return {300, band_px + fontMetrics().height() + 3 * legend_margin_px / 2};
+}
+
+void LegendStrip::paintEvent(QPaintEvent*) {
+  if (!legend_) return;
+  QPainter painter(this);
+  if (legend_->categories.empty()) {
+    paint_band(painter);
+  } else {
+    paint_categories(painter);
+  }
+}
+
+void LegendStrip::paint_band(QPainter& painter) const {
+  const QRect band(legend_margin_px, legend_margin_px / 2, width() - 2 * legend_margin_px, band_px);
+  QLinearGradient colours(band.topLeft(), band.topRight());
+  if (legend_->colours.empty()) {
+    colours.setColorAt(0, Qt::black);
+    colours.setColorAt(1, Qt::white);
+  }
+  const double last = static_cast<double>(std::max<std::size_t>(legend_->colours.size(), 2) - 1);
+  for (std::size_t i = 0; i < legend_->colours.size(); ++i) {
+    colours.setColorAt(static_cast<double>(i) / last, colour_of(legend_->colours[i]));
+  }
+  painter.fillRect(band, colours);
+  painter.setPen(palette().text().color());
+  const int text_room_px = painter.fontMetrics().horizontalAdvance("000.0 mm  ");
+  const int ticks = band_ticks * text_room_px <= width() ? band_ticks : few_ticks;
+  for (int i = 0; i < ticks; ++i) {
+    const double share = static_cast<double>(i) / (ticks - 1);
+    const double x = band.left() + share * band.width();
+    const std::string unit = i + 1 == ticks && !legend_->unit.empty() ? " " + legend_->unit : "";
+    const QString text = text_of("{:.4g}{}", value_at(*legend_, share), unit);
+    const double text_px = painter.fontMetrics().horizontalAdvance(text);
+    const double left = std::clamp(x - text_px / 2, 0.0, std::max(0.0, width() - text_px - 2));
+    painter.drawLine(QPointF(x, band.bottom()), QPointF(x, band.bottom() + 3));
+    painter.drawText(QPointF(left, band.bottom() + 3 + painter.fontMetrics().ascent()), text);
+  }
+}
+
+void LegendStrip::paint_categories(QPainter& painter) const {
+  int x = legend_margin_px;
+  int y = legend_margin_px / 2;
+  const int line_px = painter.fontMetrics().height() + 1;
+  for (const ImageLegend::Category& each : legend_->categories) {
+    const QString text = QString::fromStdString(each.name);
+    const int wide_px = band_px + 4 + painter.fontMetrics().horizontalAdvance(text) + 10;
+    if (x + wide_px > width() && x > legend_margin_px) {
+      x = legend_margin_px;
+      y += line_px;
+    }
+    if (y + line_px > height() + 4) return;  // the tool tip lists all
+    painter.fillRect(QRect(x, y + 2, band_px, line_px - 4), colour_of(each.colour));
+    painter.setPen(palette().text().color());
+    painter.drawText(QPoint(x + band_px + 4, y + painter.fontMetrics().ascent()), text);
+    x += wide_px;
+  }
+}
 
 ImagePanel::ImagePanel(Hooks hooks, QWidget* parent) : QWidget(parent), hooks_(std::move(hooks)) {
   build();
@@ -25,15 +139,12 @@ ImagePanel::ImagePanel(Hooks hooks, QWidget* parent) : QWidget(parent), hooks_(s
 }
 
 void ImagePanel::build() {
-  camera_ = new QComboBox;
-  camera_->setObjectName("camera");
-  camera_->setSizeAdjustPolicy(QComboBox::AdjustToContents);
-  camera_->hide();
-  channel_ = new QComboBox;
-  channel_->setObjectName("channel");
-  channel_->setToolTip("Quantity shown for each pixel");
-  channel_->setSizeAdjustPolicy(QComboBox::AdjustToContents);
-  channel_->hide();
+  camera_ = named(new QComboBox, "camera");
+  channel_ = named(new QComboBox, "channel", "Quantity shown for each pixel");
+  for (QComboBox* box : {camera_, channel_}) {
+    box->setSizeAdjustPolicy(QComboBox::AdjustToContents);
+    box->hide();
+  }
   title_ = new QLabel;
   title_->setSizePolicy(QSizePolicy::Ignored, QSizePolicy::Preferred);
   area_ = new PictureArea({.clicked =
@@ -43,12 +154,9 @@ void ImagePanel::build() {
                            .pointed = [this](auto pixel) { point_at(pixel); }});
   area_->setObjectName("picture");
   legend_ = new LegendStrip;
-  values_ = new QLabel;
-  values_->setWordWrap(true);
-  values_->setObjectName("pixel_values");
+  values_ = named(wrapped_label(), "pixel_values");
   auto* row = new QHBoxLayout;
-  row->addWidget(camera_);
-  row->addWidget(channel_);
+  add_widgets(*row, {camera_, channel_});
   row->addStretch(1);
   auto* layout = new QVBoxLayout(this);
   layout->setContentsMargins(4, 4, 4, 4);
@@ -56,8 +164,7 @@ void ImagePanel::build() {
   layout->addLayout(row);
   layout->addWidget(title_);
   layout->addWidget(area_, 1);
-  layout->addWidget(legend_);
-  layout->addWidget(values_);
+  add_widgets(*layout, {legend_, values_});
 }
 
 void ImagePanel::set_cameras(const std::vector<std::string>& names) {
@@ -146,8 +253,7 @@ void ImagePanel::take(Shown shown) {
   const bool is_picture = image_->channels()[shown.channel].kind == ImageChannel::Kind::Picture;
   legend_->show_legend(is_picture ? std::nullopt : std::optional(shown.drawn.legend));
   const glm::ivec2 size = image_->size_px();
-  title_->setText(
-      QString::fromStdString(fmt::format("{}   {} x {} px", shown_->title, size.x, size.y)));
+  title_->setText(text_of("{}   {} x {} px", shown_->title, size.x, size.y));
 }
 
 void ImagePanel::clear(const QString& why) {

@@ -7,12 +7,14 @@
 #include <QHBoxLayout>
 #include <QHeaderView>
 #include <QLabel>
-#include <QSignalBlocker>
 #include <QSlider>
 #include <QTreeWidget>
 #include <QVBoxLayout>
+#include <array>
 #include <cmath>
 #include <exception>
+
+#include "apps/view/window/widgets.h"
 
 namespace groundray {
 namespace {
@@ -20,22 +22,13 @@ namespace {
 constexpr int name_role = Qt::UserRole;
 const QString one_colour = QStringLiteral("one colour");
 
-QString kind_text(LayerKind kind) {
-  switch (kind) {
-    case LayerKind::Terrain:
-      return QStringLiteral("terrain");
-    case LayerKind::Mesh:
-      return QStringLiteral("mesh");
-    case LayerKind::Cloud:
-      return QStringLiteral("points");
-    case LayerKind::Sensors:
-      return QStringLiteral("sensor");
-    case LayerKind::Trail:
-      return QStringLiteral("trail");
-    case LayerKind::Picture:
-      return QStringLiteral("picture");
-  }
-  return {};
+// Texts by LayerKind.
+constexpr std::array kind_texts{"terrain", "mesh", "points", "sensor", "trail", "picture"};
+
+QString facts_text(const Layer& layer) {
+  QStringList facts;
+  for (const std::string& fact : layer.facts) facts << QString::fromStdString(fact);
+  return facts.join('\n');
 }
 
 // Box for numbers of any magnitude, displayed with their significant digits.
@@ -72,26 +65,6 @@ QDoubleSpinBox* set_up_number_box(QDoubleSpinBox* box, double least, double most
   return box;
 }
 
-bool has_points_alone(const Layer& layer) { return layer.kind == LayerKind::Cloud; }
-bool has_faces(const Layer& layer) {
-  return layer.kind == LayerKind::Terrain || layer.kind == LayerKind::Mesh;
-}
-
-// Sets a branch's check state according to that of its leaves: all, some or none.
-void update_branch(QTreeWidgetItem* item) {
-  int checked = 0;
-  bool in_part = false;
-  for (int i = 0; i < item->childCount(); ++i) {
-    const Qt::CheckState state = item->child(i)->checkState(0);
-    checked += state == Qt::Checked ? 1 : 0;
-    in_part = in_part || state == Qt::PartiallyChecked;
-  }
-  const bool all = checked == item->childCount();
-  item->setCheckState(0, all                       ? Qt::Checked
-                         : in_part || checked != 0 ? Qt::PartiallyChecked
-                                                   : Qt::Unchecked);
-}
-
 }  // namespace
 
 LayerPanel::LayerPanel(View& view, Hooks hooks, QWidget* parent)
@@ -106,8 +79,7 @@ LayerPanel::LayerPanel(View& view, Hooks hooks, QWidget* parent)
 }
 
 void LayerPanel::build_tree() {
-  tree_ = new LayerTree;
-  tree_->setObjectName("layers");
+  tree_ = named(new LayerTree, "layers");
   tree_->setColumnCount(2);
   tree_->setHeaderLabels({"layer", "kind"});
   tree_->header()->setStretchLastSection(false);
@@ -129,15 +101,12 @@ QWidget* LayerPanel::build_looks() {
   auto* looks = new QWidget;
   auto* form = new QFormLayout(looks);
   form->setContentsMargins(2, 4, 2, 2);
-  column_ = new QComboBox;
-  column_->setObjectName("colour_by");
+  column_ = named(new QComboBox, "colour_by");
   form->addRow("Colour by", column_);
   constexpr double any = 1e38;
   constexpr int any_decimals = 60;
-  low_ = set_up_number_box(new EndBox, -any, any, any_decimals);
-  low_->setObjectName("range_low");
-  high_ = set_up_number_box(new EndBox, -any, any, any_decimals);
-  high_->setObjectName("range_high");
+  low_ = set_up_number_box(named(new EndBox, "range_low"), -any, any, any_decimals);
+  high_ = set_up_number_box(named(new EndBox, "range_high"), -any, any, any_decimals);
   range_ = new QWidget;
   auto* ends = new QHBoxLayout(range_);
   ends->setContentsMargins(0, 0, 0, 0);
@@ -145,18 +114,15 @@ QWidget* LayerPanel::build_looks() {
   ends->addWidget(new QLabel("to"));
   ends->addWidget(high_, 1);
   form->addRow("Range", range_);
-  opacity_ = new QSlider(Qt::Horizontal);
-  opacity_->setObjectName("opacity");
+  opacity_ = named(new QSlider(Qt::Horizontal), "opacity");
   opacity_->setRange(0, 100);
   form->addRow("Opacity", opacity_);
   point_size_ = set_up_number_box(new QDoubleSpinBox, 1, 32, 1);
   point_size_->setSuffix(" px");
   form->addRow("Point size", point_size_);
-  wireframe_ = new QCheckBox("Wireframe");
-  wireframe_->setObjectName("wireframe");
+  wireframe_ = named(new QCheckBox("Wireframe"), "wireframe");
   form->addRow("", wireframe_);
-  facts_ = new QLabel;
-  facts_->setWordWrap(true);
+  facts_ = wrapped_label();
   facts_->setTextInteractionFlags(Qt::TextSelectableByMouse);
   form->addRow(facts_);
   connect_looks();
@@ -213,7 +179,7 @@ QTreeWidgetItem* LayerPanel::branch(const QStringList& path) {
     }
     if (found == nullptr) {
       found = new QTreeWidgetItem(item, {part});
-      found->setFlags(found->flags() | Qt::ItemIsUserCheckable);
+      found->setFlags(found->flags() | Qt::ItemIsUserCheckable | Qt::ItemIsAutoTristate);
       found->setExpanded(true);
     }
     item = found;
@@ -224,29 +190,22 @@ QTreeWidgetItem* LayerPanel::branch(const QStringList& path) {
 void LayerPanel::add_leaf(const Layer& layer) {
   QStringList path = QString::fromStdString(layer.name).split('/');
   const QString last = path.takeLast();
-  auto* item = new QTreeWidgetItem(branch(path), {last, kind_text(layer.kind)});
+  auto* item = new QTreeWidgetItem(branch(path),
+                                   {last, kind_texts.at(static_cast<std::size_t>(layer.kind))});
   item->setData(0, name_role, QString::fromStdString(layer.name));
   item->setFlags(item->flags() | Qt::ItemIsUserCheckable);
   item->setCheckState(0, layer.visible ? Qt::Checked : Qt::Unchecked);
-  QStringList facts;
-  for (const std::string& fact : layer.facts) facts << QString::fromStdString(fact);
-  item->setToolTip(0, facts.join('\n'));
-  for (QTreeWidgetItem* above = item->parent(); above != nullptr; above = above->parent()) {
-    update_branch(above);
-  }
+  item->setToolTip(0, facts_text(layer));
 }
 
 void LayerPanel::refresh() {
   const std::string before = selected();
   is_filling_ = true;
-  {
-    const QSignalBlocker quiet(tree_);
-    tree_->clear();
-    names_.clear();
-    for (const Layer* layer : view_.layers()) {
-      names_.push_back(layer->name);
-      add_leaf(*layer);
-    }
+  tree_->clear();
+  names_.clear();
+  for (const Layer* layer : view_.layers()) {
+    names_.push_back(layer->name);
+    add_leaf(*layer);
   }
   is_filling_ = false;
   select(before);
@@ -270,23 +229,11 @@ void LayerPanel::select(const std::string& layer) {
   tree_->scrollToItem(tree_->currentItem());
 }
 
+// Called for each leaf below a branch, too: Qt passes the state of a branch on to its leaves.
 void LayerPanel::checked(QTreeWidgetItem* item) {
   if (is_filling_) return;
-  const QSignalBlocker quiet(tree_);
-  const QString name = item->data(0, name_role).toString();
-  const Qt::CheckState state = item->checkState(0);
-  if (!name.isEmpty()) {
-    if (view_.find(name.toStdString()) != nullptr) {
-      view_.set_visible(name.toStdString(), state == Qt::Checked);
-    }
-  }
-  for (int i = 0; i < item->childCount() && state != Qt::PartiallyChecked; ++i) {
-    item->child(i)->setCheckState(0, state);
-    checked(item->child(i));
-  }
-  for (QTreeWidgetItem* above = item->parent(); above != nullptr; above = above->parent()) {
-    update_branch(above);
-  }
+  const std::string name = item->data(0, name_role).toString().toStdString();
+  if (view_.find(name) != nullptr) view_.set_visible(name, item->checkState(0) == Qt::Checked);
   if (hooks_.changed) hooks_.changed();
 }
 
@@ -299,12 +246,10 @@ void LayerPanel::show_looks() {
   show_range(*layer);
   opacity_->setValue(static_cast<int>(std::lround(layer->opacity * 100)));
   wireframe_->setChecked(layer->wireframe);
-  wireframe_->setVisible(has_faces(*layer));
+  wireframe_->setVisible(layer->kind == LayerKind::Terrain || layer->kind == LayerKind::Mesh);
   point_size_->setValue(layer->point_size_px);
-  point_size_->setEnabled(has_points_alone(*layer));
-  QStringList facts;
-  for (const std::string& fact : layer->facts) facts << QString::fromStdString(fact);
-  facts_->setText(facts.join('\n'));
+  point_size_->setEnabled(layer->kind == LayerKind::Cloud);
+  facts_->setText(facts_text(*layer));
   is_filling_ = false;
 }
 

@@ -5,7 +5,6 @@
 #include <QWheelEvent>
 #include <algorithm>
 #include <cmath>
-#include <cstring>
 
 #include "apps/view/window/style.h"
 
@@ -37,11 +36,9 @@ void PictureArea::show_picture(const Image8& picture) {
     shift_ = {};
     mark_.reset();
   }
-  picture_ = QImage(picture.width(), picture.height(), format_of(picture));
-  for (int y = 0; y < picture.height(); ++y) {
-    std::memcpy(picture_.scanLine(y), picture.at(0, y).data(),
-                picture.at(0, y).size() * static_cast<std::size_t>(picture.width()));
-  }
+  picture_ = QImage(picture.values().data(), picture.width(), picture.height(),
+                    picture.width() * picture.channels(), format_of(picture))
+                 .copy();
   update();
 }
 

@@ -17,8 +17,8 @@
 #include <glm/trigonometric.hpp>
 
 #include "apps/view/layers/cloud_layer.h"
-#include "apps/view/window/line_layer.h"
-#include "apps/view/window/style.h"
+#include "apps/view/layers/line_layer.h"
+#include "apps/view/window/widgets.h"
 
 namespace groundray {
 namespace {
@@ -55,19 +55,19 @@ RecordedNames names_of(const Simulation& simulation) {
   return names;
 }
 
-ScanMade made_of(const Simulation& simulation, const SensorPreset& preset, const Pose& X_DS,
-                 PlacedScan placed, const std::string& name) {
+FinishedScan made_of(const Simulation& simulation, const SensorPreset& preset, const Pose& X_DS,
+                     PlacedScan placed, const std::string& name) {
   auto cloud = std::make_shared<const PointCloud>(std::move(placed.scan.echoes));
   const glm::dvec3 origin_w_m = simulation.terrain.header().origin_w_m;
   CloudContent content{.name = name, .p_m = positions_of(*cloud), .origin_w_m = origin_w_m};
   for (glm::dvec3& p : content.p_m) p = X_DS * p;
-  ScanMade made{cloud_layer(content, *cloud),
-                {std::make_shared<const RecordedSensor>(recorded(preset, X_DS, placed.stamp)),
-                 {0, placed.stamp, {}},
-                 cloud,
-                 names_of(simulation),
-                 origin_w_m},
-                std::move(placed.notes)};
+  FinishedScan made{cloud_layer(content, *cloud),
+                    {std::make_shared<const RecordedSensor>(recorded(preset, X_DS, placed.stamp)),
+                     {0, placed.stamp, {}},
+                     cloud,
+                     names_of(simulation),
+                     origin_w_m},
+                    std::move(placed.notes)};
   made.layer.facts.push_back(fmt::format("{}, {} echoes", preset.model, cloud->rows()));
   return made;
 }
@@ -81,54 +81,40 @@ ScanPanel::ScanPanel(Hooks hooks, QWidget* parent) : QWidget(parent), hooks_(std
 }
 
 void ScanPanel::build() {
-  preset_ = new QComboBox;
-  preset_->setObjectName("preset");
+  preset_ = named(new QComboBox, "preset");
   height_ = new QDoubleSpinBox;
   height_->setRange(0.05, 1000);
   height_->setValue(1.8);
   height_->setSingleStep(0.1);
   height_->setSuffix(" m");
-  heading_ = new QDoubleSpinBox;
+  heading_ =
+      named(new QDoubleSpinBox, "heading", "Direction of the sensor's x axis, from east to north");
   heading_->setRange(-360, 360);
   heading_->setSuffix(" deg");
-  heading_->setToolTip("Direction of the sensor's x axis, from east to north");
   tilt_ = new QCheckBox("Tilt with the ground");
-  place_ = new QPushButton("Place it in the view");
-  place_->setObjectName("place");
-  place_->setToolTip("Press at its position, drag in its direction");
-  where_ = new QLabel;
-  where_->setWordWrap(true);
-  scan_ = new QPushButton("Scan");
-  scan_->setObjectName("scan");
-  cancel_ = new QPushButton("Cancel");
-  cancel_->setObjectName("cancel");
-  progress_ = new QProgressBar;
-  progress_->setRange(0, progress_steps);
-  status_ = new QLabel;
-  status_->setObjectName("scan_status");
-  status_->setWordWrap(true);
-  lay_out();
-}
-
-void ScanPanel::lay_out() {
+  place_ = named(new QPushButton("Place it in the view"), "place",
+                 "Press at its position, drag in its direction");
+  where_ = wrapped_label();
+  scan_ = named(new QPushButton("Scan"), "scan");
+  cancel_ = named(new QPushButton("Cancel"), "cancel");
+  progress_ = progress_bar();
+  status_ = named(wrapped_label(), "scan_status");
   auto* form = new QFormLayout;
   form->addRow("Sensor", preset_);
   form->addRow("Above ground", height_);
   form->addRow("Heading", heading_);
   form->addRow("", tilt_);
   form->addRow("Place", where_);
+  form->setSpacing(5);
   auto* buttons = new QHBoxLayout;
-  buttons->addWidget(scan_);
-  buttons->addWidget(cancel_);
+  add_widgets(*buttons, {scan_, cancel_});
   auto* layout = new QVBoxLayout(this);
   layout->setContentsMargins(8, 6, 8, 6);
   layout->setSpacing(5);
-  form->setSpacing(5);
   layout->addLayout(form);
   layout->addWidget(place_);
   layout->addLayout(buttons);
-  layout->addWidget(progress_);
-  layout->addWidget(status_);
+  add_widgets(*layout, {progress_, status_});
   layout->addStretch(1);
 }
 
@@ -204,7 +190,7 @@ SensorPlace ScanPanel::place() const {
 void ScanPanel::with_ground(std::function<void()> then) {
   if (simulation_ != nullptr) return then();
   if (dem_.empty() || is_scanning()) return;
-  const auto work = [dem = dem_](const std::stop_token& stop, const Told&) {
+  const auto work = [dem = dem_](const std::stop_token& stop, const JobProgress&) {
     return std::make_shared<const Simulation>(simulation_of_dem(dem, stop));
   };
   const auto done = [this, then = std::move(then)](std::shared_ptr<const Simulation> simulation) {
@@ -224,7 +210,7 @@ void ScanPanel::ask_for_place() {
   });
 }
 
-void ScanPanel::put_down(const glm::dvec3& at_w_m, const glm::dvec3& towards_w_m) {
+void ScanPanel::place_at(const glm::dvec3& at_w_m, const glm::dvec3& towards_w_m) {
   with_ground([this, at_w_m, towards_w_m] { put(at_w_m, towards_w_m); });
 }
 
@@ -244,9 +230,11 @@ void ScanPanel::show_place() {
     const Pose X_DS = pose_at(place(), simulation_->terrain.ground());
     const glm::dvec3 origin_w_m = simulation_->terrain.header().origin_w_m;
     const glm::dvec3 p_w_m = origin_w_m + X_DS.translation_m;
-    where_->setText(QString::fromStdString(
-        fmt::format("{:.2f} E, {:.2f} N,\n{:.2f} m up", p_w_m.x, p_w_m.y, p_w_m.z)));
-    if (hooks_.show) hooks_.show(axes_layer("scan here/place", origin_w_m, X_DS, marker_m));
+    where_->setText(text_of("{:.2f} E, {:.2f} N,\n{:.2f} m up", p_w_m.x, p_w_m.y, p_w_m.z));
+    LineDrawing axes;
+    add_axes(axes, X_DS, marker_m);
+    if (hooks_.show)
+      hooks_.show(line_layer("scan here/place", LayerKind::Sensors, origin_w_m, axes, 3));
   } catch (const std::exception& error) {
     at_m_.reset();
     where_->setText("none yet");
@@ -262,15 +250,13 @@ void ScanPanel::scan() {
   const SensorPreset preset = presets_[static_cast<std::size_t>(index)];
   const std::string name = fmt::format("scan here/{} {}", ++scans_, preset.name);
   const auto work = [simulation = simulation_, scanner = scanner_, where = place(), preset, name](
-                        const std::stop_token& stop, const Told& told) {
+                        const std::stop_token& stop, const JobProgress& report) {
     const Pose X_DS = pose_at(where, simulation->terrain.ground());
-    PlacedScan placed =
-        scanner->scan({.lidar = preset.lidar, .X_DS = X_DS, .time = {}}, stop, told);
+    PlacedScan placed = scanner->scan(preset.lidar, X_DS, stop, report);
     return made_of(*simulation, preset, X_DS, std::move(placed), name);
   };
-  const auto done = [this](ScanMade made) {
-    status_->setText(QString::fromStdString(
-        fmt::format("{} echoes. {}", made.scan.cloud->rows(), fmt::join(made.notes, " "))));
+  const auto done = [this](FinishedScan made) {
+    status_->setText(text_of("{} echoes. {}", made.scan.cloud->rows(), fmt::join(made.notes, " ")));
     if (hooks_.scanned) hooks_.scanned(std::move(made));
   };
   progress_->setRange(0, progress_steps);
@@ -281,7 +267,7 @@ void ScanPanel::scan() {
 }
 
 Job::Hooks ScanPanel::hooks_of_job() {
-  return {.told =
+  return {.progress =
               [this](double share, const std::string& step) {
                 progress_->setValue(static_cast<int>(share * progress_steps));
                 status_->setText(QString::fromStdString(step));

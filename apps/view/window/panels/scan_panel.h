@@ -22,7 +22,7 @@ class QPushButton;
 namespace groundray {
 
 /// Result of a scan from a position on the ground.
-struct ScanMade {
+struct FinishedScan {
   Layer layer;
   ShownScan scan;
   std::vector<std::string> notes;
@@ -34,7 +34,7 @@ class ScanPanel : public QWidget {
   struct Hooks {
     std::function<void()> take_place{};  ///< requests a position by the next press in the view
     std::function<void(Layer)> show{};   ///< marker of the sensor's pose
-    std::function<void(ScanMade)> scanned{};
+    std::function<void(FinishedScan)> scanned{};
     std::function<void(const std::string&)> failed{};
   };
 
@@ -47,7 +47,7 @@ class ScanPanel : public QWidget {
   /// Requests a position in the view as soon as the ground is loaded.
   void ask_for_place();
   /// Places the sensor at a position of W, heading towards another one unless both are equal.
-  void put_down(const glm::dvec3& at_w_m, const glm::dvec3& towards_w_m);
+  void place_at(const glm::dvec3& at_w_m, const glm::dvec3& towards_w_m);
   void scan();
   void cancel();
   bool is_scanning() const noexcept { return job_.is_running(); }
@@ -57,7 +57,6 @@ class ScanPanel : public QWidget {
 
  private:
   void build();
-  void lay_out();
   void connect_widgets();
   void take_ground(std::shared_ptr<const Simulation> simulation, const std::filesystem::path& dem);
   void with_ground(std::function<void()> then);

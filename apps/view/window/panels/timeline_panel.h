@@ -8,6 +8,7 @@
 #include <memory>
 
 #include "apps/view/recorded/timeline.h"
+#include "apps/view/window/style.h"
 
 class QCheckBox;
 class QComboBox;
@@ -23,8 +24,8 @@ class EventStrip;
 class TimelinePanel : public QWidget {
  public:
   struct Hooks {
-    std::function<void(std::chrono::nanoseconds)> went{};  ///< the time has changed
-    std::function<void()> asked{};                         ///< "ride along" or "trail" has changed
+    std::function<void(std::chrono::nanoseconds)> time_changed{};  ///< the time has changed
+    std::function<void()> options_changed{};  ///< "ride along" or "trail" has changed
   };
 
   explicit TimelinePanel(Hooks hooks, QWidget* parent = nullptr);
@@ -47,7 +48,7 @@ class TimelinePanel : public QWidget {
 
  private:
   QWidget* build_buttons();
-  QToolButton* button(const QString& name, const QString& tip, std::function<void()> pressed);
+  QToolButton* button(const char* name, const char* tip, Icon icon, std::function<void()> pressed);
   void tick();
   std::optional<std::size_t> chosen_sensor() const;
   void show_time();

@@ -1,16 +1,11 @@
-#include "apps/view/layers/shown_layer.h"
+#include "apps/view/rendering/shown_layer.h"
 
-#include <vtkCellArray.h>
 #include <vtkCellData.h>
 #include <vtkLookupTable.h>
 #include <vtkPointData.h>
 #include <vtkProperty.h>
-#include <vtkTypeInt32Array.h>
 
-#include <cstdint>
-#include <numeric>
-
-#include "apps/view/layers/coarse_layer.h"
+#include "apps/view/rendering/coarse_layer.h"
 #include "apps/view/rendering/colour_table.h"
 #include "core/error.h"
 
@@ -20,14 +15,9 @@ namespace {
 // Returns points with a single VTK cell that contains all of them.
 vtkSmartPointer<vtkPolyData> with_vertices(vtkPolyData& points) {
   const vtkIdType count = points.GetNumberOfPoints();
-  auto ids = vtkSmartPointer<vtkTypeInt32Array>::New();
-  ids->SetNumberOfValues(count);
-  std::iota(ids->GetPointer(0), ids->GetPointer(0) + count, 0);
-  auto ends = vtkSmartPointer<vtkTypeInt32Array>::New();
-  ends->InsertNextValue(0);
-  if (count > 0) ends->InsertNextValue(static_cast<vtkTypeInt32>(count));
-  auto cells = vtkSmartPointer<vtkCellArray>::New();
-  cells->SetData(ends, ids);
+  const auto cells = make_cells(1, static_cast<std::size_t>(count));
+  if (count > 0) cells->InsertNextCell(static_cast<int>(count));
+  for (vtkIdType i = 0; i < count; ++i) cells->InsertCellPoint(i);
   auto drawn = vtkSmartPointer<vtkPolyData>::New();
   drawn->SetPoints(points.GetPoints());
   drawn->GetPointData()->ShallowCopy(points.GetPointData());
@@ -51,11 +41,7 @@ void check(const Layer& layer) {
 
 vtkSmartPointer<vtkPolyDataMapper> make_mapper(const Layer& layer, vtkPolyData& data) {
   auto mapper = vtkSmartPointer<vtkPolyDataMapper>::New();
-  if (layer.kind == LayerKind::Cloud) {
-    mapper->SetInputData(with_vertices(data));
-  } else {
-    mapper->SetInputData(&data);
-  }
+  mapper->SetInputData(layer.kind == LayerKind::Cloud ? with_vertices(data).Get() : &data);
   return mapper;
 }
 
@@ -85,11 +71,8 @@ void ShownLayer::paint(vtkPolyDataMapper& mapper) const {
   const bool is_coloured = column != nullptr && !is_textured(mapper);
   mapper.SetScalarVisibility(is_coloured ? 1 : 0);
   if (!is_coloured) return;
-  if (column->of == LayerColumn::Of::Points) {
-    mapper.SetScalarModeToUsePointFieldData();
-  } else {
-    mapper.SetScalarModeToUseCellFieldData();
-  }
+  mapper.SetScalarMode(column->of == LayerColumn::Of::Points ? VTK_SCALAR_MODE_USE_POINT_FIELD_DATA
+                                                             : VTK_SCALAR_MODE_USE_CELL_FIELD_DATA);
   mapper.SelectColorArray(column->name.c_str());
   if (column->is_rgb) {
     mapper.SetColorModeToDirectScalars();
@@ -118,11 +101,7 @@ void ShownLayer::restyle() {
   property.SetDiffuse(is_legend && property.GetLighting() ? 0.62 : 1.0);
   property.SetSpecular(0);
   property.SetInterpolationToPhong();
-  if (layer_.wireframe) {
-    property.SetRepresentationToWireframe();
-  } else {
-    property.SetRepresentationToSurface();
-  }
+  property.SetRepresentation(layer_.wireframe ? VTK_WIREFRAME : VTK_SURFACE);
   actor.SetVisibility(layer_.visible ? 1 : 0);
   draw(vtkPolyDataMapper::SafeDownCast(actor.GetMapper()));
 }

@@ -4,10 +4,30 @@
 #include <vtkSmartPointer.h>
 
 #include <cstddef>
+#include <cstdint>
+#include <glm/vec3.hpp>
+#include <vector>
 
 #include "apps/view/rendering/layer.h"
 
 namespace groundray {
+
+/// Some triangles of a surface, with their own numbers for the vertices that they use.
+class KeptTriangles {
+ public:
+  /// @param count  number of vertices of the surface.
+  explicit KeptTriangles(std::size_t count);
+
+  /// @param corner  vertices of the surface.
+  /// @param cell    index of the triangle in the surface.
+  void add(glm::uvec3 corner, std::size_t cell);
+
+  std::vector<std::uint32_t> vertices, cells;  ///< kept ones, as indices into the surface
+  std::vector<glm::uvec3> triangles;           ///< indices into `vertices`
+
+ private:
+  std::vector<std::uint32_t> number_;
+};
 
 /// Minimum number of points or triangles to which a layer is thinned, so that small objects remain
 /// visible.

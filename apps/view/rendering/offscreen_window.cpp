@@ -1,5 +1,3 @@
-#include "apps/view/rendering/off_screen_window.h"
-
 #include <EGL/egl.h>
 #include <EGL/eglext.h>
 #include <vtkGenericOpenGLRenderWindow.h>
@@ -8,6 +6,7 @@
 
 #include <array>
 
+#include "apps/view/rendering/view.h"
 #include "core/error.h"
 
 namespace groundray {
@@ -106,14 +105,14 @@ class OffScreenWindow final : public vtkGenericOpenGLRenderWindow {
 
 }  // namespace
 
-vtkSmartPointer<vtkRenderWindow> make_off_screen_window(glm::ivec2 size_px) {
+vtkSmartPointer<vtkRenderWindow> make_offscreen_window(glm::ivec2 size_px) {
   const auto window = vtkSmartPointer<OffScreenWindow>::Take(OffScreenWindow::New());
   window->open();
   window->SetSize(size_px.x, size_px.y);
   return window;
 }
 
-bool is_off_screen(vtkRenderWindow* window) {
+bool is_offscreen(vtkRenderWindow* window) {
   return dynamic_cast<OffScreenWindow*>(window) != nullptr;
 }
 

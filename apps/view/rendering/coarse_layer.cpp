@@ -1,8 +1,9 @@
-#include "apps/view/layers/coarse_layer.h"
+#include "apps/view/rendering/coarse_layer.h"
 
 #include <vtkCellData.h>
-#include <vtkIdList.h>
+#include <vtkDataArray.h>
 #include <vtkPointData.h>
+#include <vtkPoints.h>
 
 #include <algorithm>
 #include <array>
@@ -10,6 +11,7 @@
 #include <cstdint>
 #include <glm/common.hpp>
 #include <glm/geometric.hpp>
+#include <glm/vec2.hpp>
 #include <limits>
 #include <numeric>
 #include <span>
@@ -19,8 +21,6 @@
 
 namespace groundray {
 namespace {
-
-using Triangles = std::vector<glm::uvec3>;
 
 // Scrambles a number over all 32 bits (the finaliser of MurmurHash3).
 std::uint32_t scatter(std::uint32_t number) {
@@ -50,18 +50,12 @@ vtkSmartPointer<vtkPolyData> take_points(vtkPolyData& all, std::span<const std::
   return some;
 }
 
-glm::dvec3 point(std::span<const float> at, std::int32_t i) {
-  const auto first = std::size_t{3} * static_cast<std::size_t>(i);
-  return {at[first], at[first + 1], at[first + 2]};
-}
-
 std::vector<double> areas_m2(std::span<const float> at, std::span<const std::int32_t> corner) {
   std::vector<double> areas(corner.size() / 3);
   for (std::size_t i = 0; i < areas.size(); ++i) {
-    const glm::dvec3 a = point(at, corner[3 * i]);
-    areas[i] = glm::length(
-                   glm::cross(point(at, corner[3 * i + 1]) - a, point(at, corner[3 * i + 2]) - a)) /
-               2;
+    const glm::dvec3 a = point_at(at, corner[3 * i]), b = point_at(at, corner[3 * i + 1]),
+                     c = point_at(at, corner[3 * i + 2]);
+    areas[i] = glm::length(glm::cross(b - a, c - a)) / 2;
     if (!std::isfinite(areas[i])) areas[i] = 0;
   }
   return areas;
@@ -72,29 +66,18 @@ struct Box {
   double extent_m() const { return std::max({size.x, size.y, size.z}); }
 };
 
-Box box_of(std::span<const float> at) {
-  constexpr double none = std::numeric_limits<double>::infinity();
-  glm::dvec3 low(none), high(-none);
-  for (std::size_t i = 0; i < at.size(); ++i) {
-    if (!std::isfinite(at[i])) continue;
-    const auto k = static_cast<glm::length_t>(i % 3);
-    low[k] = std::min(low[k], static_cast<double>(at[i]));
-    high[k] = std::max(high[k], static_cast<double>(at[i]));
-  }
+// Returns the bounding box of the finite coordinates.
+Box box_of(vtkPolyData& surface) {
   Box box;
-  for (glm::length_t k = 0; k < 3; ++k) {
-    if (low[k] <= high[k]) {
-      box.low[k] = low[k];
-      box.size[k] = high[k] - low[k];
-    }
+  for (int k = 0; k < 3; ++k) {
+    glm::dvec2 range;
+    surface.GetPoints()->GetData()->GetFiniteRange(&range.x, k);
+    if (!(range.x <= range.y)) continue;
+    box.low[k] = range.x;
+    box.size[k] = range.y - range.x;
   }
   return box;
 }
-
-struct Clustered {
-  std::vector<std::uint32_t> vertices, cells;  // kept ones, as indices into the surface
-  Triangles triangles;                         // indices into `vertices`
-};
 
 // Maximum number of grid cells along a side of the bounding box.
 constexpr double most_cells = 1 << 20;
@@ -118,31 +101,6 @@ std::vector<std::uint32_t> first_of_cells(std::span<const float> at, const glm::
   return of;
 }
 
-// Gathers the kept triangles and renumbers their vertices.
-class KeptTriangles {
- public:
-  explicit KeptTriangles(std::size_t vertices)
-      : number_(vertices, std::numeric_limits<std::uint32_t>::max()) {}
-
-  void add(glm::uvec3 corner, std::size_t cell) {
-    for (glm::length_t k = 0; k < 3; ++k) {
-      std::uint32_t& number = number_[corner[k]];
-      if (number == std::numeric_limits<std::uint32_t>::max()) {
-        number = static_cast<std::uint32_t>(kept.vertices.size());
-        kept.vertices.push_back(corner[k]);
-      }
-      corner[k] = number;
-    }
-    kept.triangles.push_back(corner);
-    kept.cells.push_back(static_cast<std::uint32_t>(cell));
-  }
-
-  Clustered kept;
-
- private:
-  std::vector<std::uint32_t> number_;
-};
-
 struct Scattered {
   std::size_t operator()(const glm::uvec3& corner) const {
     return scatter(corner.x ^ scatter(corner.y ^ scatter(corner.z)));
@@ -157,8 +115,8 @@ glm::uvec3 least_first(const glm::uvec3& corner) {
   return corner;
 }
 
-Clustered cluster(std::span<const float> at, std::span<const std::int32_t> corner,
-                  const glm::dvec3& low, double cell_m) {
+KeptTriangles cluster(std::span<const float> at, std::span<const std::int32_t> corner,
+                      const glm::dvec3& low, double cell_m) {
   const std::vector<std::uint32_t> first = first_of_cells(at, low, cell_m);
   KeptTriangles gathered(first.size());
   std::unordered_set<glm::uvec3, Scattered> seen;
@@ -169,21 +127,22 @@ Clustered cluster(std::span<const float> at, std::span<const std::int32_t> corne
     if (place.x == place.y || place.y == place.z || place.z == place.x) continue;
     if (seen.insert(least_first(place)).second) gathered.add(place, i / 3);
   }
-  return std::move(gathered.kept);
+  return gathered;
 }
 
 // Clusters with about the finest grid that leaves at most `triangles` triangles.
-Clustered cluster_to(std::span<const float> at, std::span<const std::int32_t> corner,
-                     double area_m2, std::size_t triangles) {
-  const Box box = box_of(at);
+KeptTriangles cluster_to(vtkPolyData& surface, double area_m2, std::size_t triangles) {
+  const auto at = coordinates(surface);
+  const auto corner = corners(surface);
+  const Box box = box_of(surface);
   // Cells of half the box: 2 x 2 x 2 vertices have at most 112 triangles, both orientations
   // counted.
   const double coarsest_m = 0.51 * box.extent_m();
-  if (!(coarsest_m > 0)) return {};
+  if (!(coarsest_m > 0)) return KeptTriangles(0);
   // A plane of area A in squares of width s has 2 A / s^2 triangles.
   double cell_m = std::clamp(std::sqrt(2 * area_m2 / static_cast<double>(triangles)),
                              box.extent_m() / most_cells, coarsest_m);
-  Clustered kept = cluster(at, corner, box.low, cell_m);
+  KeptTriangles kept = cluster(at, corner, box.low, cell_m);
   while (kept.triangles.size() > triangles && cell_m < coarsest_m) {
     const double excess =
         static_cast<double>(kept.triangles.size()) / static_cast<double>(triangles);
@@ -193,7 +152,7 @@ Clustered cluster_to(std::span<const float> at, std::span<const std::int32_t> co
   // Rough surfaces have a large area in few cells.
   for (int round = 0; round < 6 && 4 * kept.triangles.size() < triangles; ++round) {
     cell_m /= 1.6;
-    Clustered finer = cluster(at, corner, box.low, cell_m);
+    KeptTriangles finer = cluster(at, corner, box.low, cell_m);
     if (finer.triangles.size() > triangles) break;
     kept = std::move(finer);
   }
@@ -201,8 +160,9 @@ Clustered cluster_to(std::span<const float> at, std::span<const std::int32_t> co
 }
 
 // Returns the largest triangles; among equal ones, a pseudo-random choice.
-Clustered largest_triangles(std::span<const std::int32_t> corner, std::span<const double> areas_m2,
-                            std::size_t vertices, std::size_t triangles) {
+KeptTriangles largest_triangles(std::span<const std::int32_t> corner,
+                                std::span<const double> areas_m2, std::size_t vertices,
+                                std::size_t triangles) {
   std::vector<std::uint32_t> cells(areas_m2.size());
   std::iota(cells.begin(), cells.end(), 0U);
   const auto end = cells.begin() + static_cast<std::ptrdiff_t>(triangles);
@@ -217,10 +177,26 @@ Clustered largest_triangles(std::span<const std::int32_t> corner, std::span<cons
     const std::int32_t* const c = &corner[std::size_t{3} * *cell];
     gathered.add(glm::uvec3(c[0], c[1], c[2]), *cell);
   }
-  return std::move(gathered.kept);
+  return gathered;
 }
 
 }  // namespace
+
+KeptTriangles::KeptTriangles(std::size_t count)
+    : number_(count, std::numeric_limits<std::uint32_t>::max()) {}
+
+void KeptTriangles::add(glm::uvec3 corner, std::size_t cell) {
+  for (glm::length_t k = 0; k < 3; ++k) {
+    std::uint32_t& number = number_[corner[k]];
+    if (number == std::numeric_limits<std::uint32_t>::max()) {
+      number = static_cast<std::uint32_t>(vertices.size());
+      vertices.push_back(corner[k]);
+    }
+    corner[k] = number;
+  }
+  triangles.push_back(corner);
+  cells.push_back(static_cast<std::uint32_t>(cell));
+}
 
 vtkSmartPointer<vtkPolyData> thin_points(const Layer& cloud, std::size_t points) {
   const std::size_t all = cloud.points();
@@ -242,7 +218,7 @@ vtkSmartPointer<vtkPolyData> thin_triangles(const Layer& surface, std::size_t tr
   const auto at = coordinates(*surface.data);
   const std::vector<double> areas = areas_m2(at, corner);
   const double area_m2 = std::accumulate(areas.begin(), areas.end(), 0.0);
-  Clustered kept = cluster_to(at, corner, area_m2, triangles);
+  KeptTriangles kept = cluster_to(*surface.data, area_m2, triangles);
   if (8 * kept.triangles.size() < triangles)
     kept = largest_triangles(corner, areas, at.size() / 3, triangles);
   auto thinned = take_points(*surface.data, kept.vertices);

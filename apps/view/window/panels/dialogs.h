@@ -1,10 +1,13 @@
 #pragma once
 
 #include <QDialog>
+#include <QSize>
+#include <QString>
 #include <QTimer>
 #include <filesystem>
 #include <functional>
 #include <glm/vec2.hpp>
+#include <optional>
 #include <string>
 
 #include "apps/view/rendering/view.h"
@@ -16,6 +19,15 @@ class QPushButton;
 class QSpinBox;
 
 namespace groundray {
+
+/// Returns the description of mouse and keyboard commands, as HTML.
+QString help_text();
+
+/// Shows the description in a dialog.
+void show_help(QWidget* parent);
+
+/// Asks for a picture's size, px; std::nullopt if the user cancels.
+std::optional<glm::ivec2> ask_for_size(QWidget* parent, QSize at_first);
 
 /// Dialog for a turntable: writes pictures of a full turn round the target as 0000.png, 0001.png
 /// and so on, one after the other, while the window stays responsive.
