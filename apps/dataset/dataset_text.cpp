@@ -11,7 +11,7 @@
 #include <system_error>
 #include <utility>
 
-#include "apps/dataset/owned_file.h"
+#include "apps/dataset/file_sum.h"
 #include "core/error.h"
 #include "core/io/file_io.h"
 

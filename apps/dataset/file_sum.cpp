@@ -6,18 +6,17 @@
 #include <array>
 #include <cerrno>
 #include <cstddef>
-#include <cstdio>
 #include <new>
 #include <system_error>
 #include <vector>
 
-#include "apps/dataset/owned_file.h"
 #include "core/error.h"
 
 namespace groundray {
 namespace {
 
-using Context = std::unique_ptr<EVP_MD_CTX, decltype(&EVP_MD_CTX_free)>;
+namespace fs = std::filesystem;
+using Context = std::unique_ptr<EVP_MD_CTX, void (*)(EVP_MD_CTX*)>;
 
 Context make_context() {
   Context context(EVP_MD_CTX_new(), EVP_MD_CTX_free);
@@ -25,32 +24,26 @@ Context make_context() {
   return context;
 }
 
-void check(int is_done) {
+void check_openssl(int is_done) {
   if (is_done != 1) throw Error("OpenSSL cannot compute SHA-256: check its configuration");
 }
 
 }  // namespace
 
-struct Sha256::State {
-  Context context = make_context();
-};
-
-Sha256::Sha256() : state_(std::make_unique<State>()) {
-  check(EVP_DigestInit_ex(state_->context.get(), EVP_sha256(), nullptr));
+Sha256::Sha256() : context_(make_context()) {
+  check_openssl(EVP_DigestInit_ex(context_.get(), EVP_sha256(), nullptr));
 }
 
-Sha256::~Sha256() = default;
-
 void Sha256::add(std::string_view bytes) {
-  check(EVP_DigestUpdate(state_->context.get(), bytes.data(), bytes.size()));
+  check_openssl(EVP_DigestUpdate(context_.get(), bytes.data(), bytes.size()));
 }
 
 std::string Sha256::digits() const {
   const Context copy = make_context();  // the original stays open for more bytes
-  check(EVP_MD_CTX_copy_ex(copy.get(), state_->context.get()));
+  check_openssl(EVP_MD_CTX_copy_ex(copy.get(), context_.get()));
   std::array<unsigned char, EVP_MAX_MD_SIZE> digest{};
   unsigned size = 0;
-  check(EVP_DigestFinal_ex(copy.get(), digest.data(), &size));
+  check_openssl(EVP_DigestFinal_ex(copy.get(), digest.data(), &size));
   std::string text;
   for (unsigned i = 0; i < size; ++i) text += fmt::format("{:02x}", digest[i]);
   return text;
@@ -62,7 +55,7 @@ std::string sha256_of(std::string_view bytes) {
   return sum.digits();
 }
 
-FileSum sum_file(const std::filesystem::path& path) {
+FileSum sum_file(const fs::path& path) {
   constexpr std::size_t block_bytes = 256 << 10;
   const OwnedFile file(std::fopen(path.c_str(), "rb"));
   std::vector<char> block(block_bytes);
@@ -79,6 +72,24 @@ FileSum sum_file(const std::filesystem::path& path) {
   }
   result.sha256 = sum.digits();
   return result;
+}
+
+std::optional<std::string> fault_of(const fs::path& file, const FileSum& as_written) {
+  std::error_code fault;
+  const fs::file_status status = fs::status(file, fault);
+  if (status.type() == fs::file_type::not_found) return "missing";
+  if (status.type() == fs::file_type::none) return "unreadable: " + fault.message();
+  if (!fs::is_regular_file(status)) return "not a regular file";
+  if (const auto bytes = fs::file_size(file, fault); !fault && bytes != as_written.bytes) {
+    return fmt::format("has {} bytes instead of {}: {}", bytes, as_written.bytes,
+                       bytes < as_written.bytes ? "truncated" : "data was appended");
+  }
+  try {
+    if (sum_file(file) == as_written) return std::nullopt;
+  } catch (const Error&) {
+    return "unreadable";
+  }
+  return "changed: its SHA-256 differs";
 }
 
 }  // namespace groundray

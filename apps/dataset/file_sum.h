@@ -1,12 +1,24 @@
 #pragma once
 
 #include <cstdint>
+#include <cstdio>
 #include <filesystem>
 #include <memory>
+#include <optional>
 #include <string>
 #include <string_view>
 
+struct evp_md_ctx_st;
+
 namespace groundray {
+
+/// Deleter that closes a file of the C library.
+struct CloseFile {
+  void operator()(std::FILE* file) const noexcept { std::fclose(file); }
+};
+
+/// File of the C library, closed by its owner's destructor.
+using OwnedFile = std::unique_ptr<std::FILE, CloseFile>;
 
 /// Size and checksum that identify the contents of a file.
 struct FileSum {
@@ -20,17 +32,13 @@ struct FileSum {
 class Sha256 {
  public:
   Sha256();
-  ~Sha256();
-  Sha256(const Sha256&) = delete;
-  Sha256& operator=(const Sha256&) = delete;
 
   void add(std::string_view bytes);
   /// Returns the 64 hexadecimal digits for all bytes added so far.
   std::string digits() const;
 
  private:
-  struct State;
-  std::unique_ptr<State> state_;
+  std::unique_ptr<evp_md_ctx_st, void (*)(evp_md_ctx_st*)> context_;  // of OpenSSL
 };
 
 /// Returns the SHA-256 of bytes in memory, as Sha256::digits.
@@ -39,5 +47,9 @@ std::string sha256_of(std::string_view bytes);
 /// Reads a whole file and returns its size and checksum.
 /// @throws Error if it cannot be read.
 FileSum sum_file(const std::filesystem::path& path);
+
+/// Reads a whole file and returns a description of its difference from `as_written`; nothing if
+/// there is none. Any number of threads may call this.
+std::optional<std::string> fault_of(const std::filesystem::path& file, const FileSum& as_written);
 
 }  // namespace groundray

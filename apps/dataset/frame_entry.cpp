@@ -83,13 +83,6 @@ class Scanner {
   bool fits_ = true;
 };
 
-// Formats seconds with nine decimals, exactly for any size.
-std::string stamp_text(std::chrono::nanoseconds stamp) {
-  const std::int64_t count = stamp.count();
-  return fmt::format("{}{}.{:09}", count < 0 ? "-" : "", std::abs(count / 1'000'000'000),
-                     std::abs(count % 1'000'000'000));
-}
-
 std::chrono::nanoseconds take_stamp(Scanner& scanner) {
   constexpr std::size_t digits = 9;
   constexpr std::int64_t most_seconds = 9'000'000'000;  // range of nanoseconds
@@ -113,10 +106,16 @@ std::string sum_text(const FileSum& sum) {
 
 }  // namespace
 
+std::string seconds_text(std::chrono::nanoseconds time) {
+  const std::int64_t count = time.count();
+  return fmt::format("{}{}.{:09}", count < 0 ? "-" : "", std::abs(count / 1'000'000'000),
+                     std::abs(count % 1'000'000'000));
+}
+
 std::string text_of(const FrameEntry& entry) {
   std::string text =
       fmt::format("{{sensor: \"{}\", frame: {}, stamp_s: {}, state: {}", entry.sensor, entry.frame,
-                  stamp_text(entry.stamp), entry.is_done ? "done" : "pending");
+                  seconds_text(entry.stamp), entry.is_done ? "done" : "pending");
   if (!entry.convergence.empty()) text += ", convergence: " + entry.convergence;
   for (const ProductSum& file : entry.files) {
     fmt::format_to(std::back_inserter(text), "{}\"{}\": {{{}",

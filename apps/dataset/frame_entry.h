@@ -27,6 +27,9 @@ struct FrameEntry {
   std::vector<ProductSum> files;  ///< empty unless the frame is finished
 };
 
+/// Returns a time in seconds with nine decimals, exactly.
+std::string seconds_text(std::chrono::nanoseconds time);
+
 /// Returns the entry as one line of YAML, without the marker of a list item.
 std::string text_of(const FrameEntry& entry);
 
@@ -39,7 +42,9 @@ struct NamedSum {
   std::string path;  ///< relative to the dataset, with slashes
   FileSum sum;
 };
+/// Returns the entry as one line of YAML, as for a frame.
 std::string text_of(const NamedSum& file);
+/// Parses the entry of such a file; returns nothing if it is not as text_of writes it.
 std::optional<NamedSum> parse_named_sum(std::string_view text);
 
 }  // namespace groundray

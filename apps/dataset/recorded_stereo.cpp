@@ -48,24 +48,24 @@ RecordedCamera read_camera(const fs::path& dataset, const std::string& name,
 }
 
 // Returns the pair with that name, or a pair of the two named cameras.
-DatasetListing::Pair pair_named(const std::string& word, const DatasetListing& listing,
-                                const fs::path& dataset) {
-  const auto pair = std::ranges::find(listing.pairs, word, &DatasetListing::Pair::name);
-  if (pair != listing.pairs.end()) return *pair;
+DatasetHead::Pair pair_named(const std::string& word, const DatasetHead& head,
+                             const fs::path& dataset) {
+  const auto pair = std::ranges::find(head.pairs, word, &DatasetHead::Pair::name);
+  if (pair != head.pairs.end()) return *pair;
   const std::size_t comma = word.find(',');
   std::vector<std::string> names;
-  for (const DatasetListing::Pair& each : listing.pairs) names.push_back(each.name);
+  for (const DatasetHead::Pair& each : head.pairs) names.push_back(each.name);
   if (comma == std::string::npos) {
     throw Error("{}: it has no stereo pair '{}'; it has: {}{}", dataset.string(), word,
                 names.empty() ? "none" : fmt::format("{}", fmt::join(names, ", ")),
                 yaml::suggestion(word, names));
   }
-  DatasetListing::Pair made{word, word.substr(0, comma), word.substr(comma + 1)};
+  DatasetHead::Pair made{word, word.substr(0, comma), word.substr(comma + 1)};
+  const std::vector<std::string> cameras = head.names_of("camera");
   for (const std::string* camera : {&made.left, &made.right}) {
-    if (std::ranges::find(listing.cameras, *camera) != listing.cameras.end()) continue;
+    if (std::ranges::find(cameras, *camera) != cameras.end()) continue;
     throw Error("{}: it has no camera '{}' for the stereo pair {}; it has: {}{}", dataset.string(),
-                *camera, word, fmt::join(listing.cameras, ", "),
-                yaml::suggestion(*camera, listing.cameras));
+                *camera, word, fmt::join(cameras, ", "), yaml::suggestion(*camera, cameras));
   }
   return made;
 }
@@ -79,11 +79,11 @@ nanoseconds RecordedCamera::middle(const RecordedFrame& frame) const {
 std::vector<RecordedPair> read_stereo_pairs(const fs::path& dataset,
                                             const std::vector<std::string>& names) {
   const DatasetListing listing = read_listing(dataset);
-  std::vector<DatasetListing::Pair> wanted =
-      names.empty() ? listing.pairs : std::vector<DatasetListing::Pair>{};
-  for (const std::string& name : names) wanted.push_back(pair_named(name, listing, dataset));
+  std::vector<DatasetHead::Pair> wanted =
+      names.empty() ? listing.head.pairs : std::vector<DatasetHead::Pair>{};
+  for (const std::string& name : names) wanted.push_back(pair_named(name, listing.head, dataset));
   std::vector<RecordedPair> pairs;
-  for (const DatasetListing::Pair& pair : wanted) {
+  for (const DatasetHead::Pair& pair : wanted) {
     pairs.push_back({.name = pair.name,
                      .cameras = {read_camera(dataset, pair.left, listing),
                                  read_camera(dataset, pair.right, listing)}});

@@ -7,7 +7,7 @@
 #include <string>
 #include <vector>
 
-#include "apps/dataset/dataset_listing.h"
+#include "apps/dataset/dataset_reader.h"
 #include "core/geometry/trajectory.h"
 #include "sensors/camera/lens/lens_models.h"
 

@@ -148,7 +148,8 @@ void add_scans(RecordedLidar lidar, const ScanChoice& choice, ScanFiles& files) 
 
 ScanFiles scans_of_dataset(const ScanChoice& choice) {
   const fs::path& folder = choice.inputs[0];
-  if (choice.need == ScanNeed::None) return {.georeference = read_listing(folder).georeference};
+  if (choice.need == ScanNeed::None)
+    return {.georeference = read_listing(folder).head.georeference};
   RecordedDataset dataset = read_dataset(folder);
   if (dataset.lidars.empty() && (choice.need == ScanNeed::Some || choice.poses))
     throw Error("{}: the dataset has no lidar; `reconstruct dem` can use its stereo pairs",

@@ -2,24 +2,17 @@
 
 #include <fmt/format.h>
 
-#include <atomic>
 #include <chrono>
 #include <cstddef>
 #include <cstdint>
 #include <cstdio>
-#include <ctime>
 #include <exception>
-#include <memory>
-#include <utility>
+#include <nlohmann/json.hpp>
 #include <variant>
 #include <vector>
 
-#include "apps/groundray/record/images.h"
-#include "apps/groundray/record/scans.h"
-#include "apps/groundray/run/background_writer.h"
-#include "apps/groundray/run/frame_maker.h"
-#include "apps/groundray/run/frame_plan.h"
-#include "apps/groundray/run/run_log.h"
+#include "apps/dataset/write/frame_maker.h"
+#include "apps/groundray/run_log.h"
 #include "apps/scene/interruption.h"
 #include "apps/scene/simulation.h"
 #include "core/error.h"
@@ -29,7 +22,6 @@ namespace groundray {
 namespace {
 
 namespace fs = std::filesystem;
-using Clock = std::chrono::steady_clock;
 
 struct Tally {
   std::uint64_t scans = 0;
@@ -43,89 +35,38 @@ struct Tally {
   std::chrono::duration<double> scanning{0};
 };
 
-void count_scan(const Simulation& simulation, const MadeFrame& made, Tally& tally,
-                FrameDone& done) {
-  const auto& scan = std::get<LidarScan>(made.product);
-  const PlacedLidar& lidar = simulation.lidars[made.name.sensor];
-  tally.scanning += made.tracing;
-  tally.points += scan.echoes.rows();
-  tally.pulses += static_cast<std::uint64_t>(lidar.lidar.pattern().pulses(made.name.number));
-  ++tally.scans;
-  done.sensor = lidar.spec.name;
-  done.samples = "points";
-  done.count = scan.echoes.rows();
-}
-
-void count_image(const Simulation& simulation, const MadeFrame& made, Tally& tally,
-                 FrameDone& done) {
-  const MountedCamera& camera =
-      simulation.cameras[made.name.sensor - simulation.lidars.size()].spec;
-  const glm::ivec2 size_px = camera.camera.size_px;
-  done.sensor = camera.name;
-  done.samples = "pixels";
-  done.count = static_cast<std::uint64_t>(size_px.x) * static_cast<std::uint64_t>(size_px.y);
-  tally.pixels += done.count;
-  tally.paths += std::get<MadeImage>(made.product).paths;
-  tally.exposing += made.making;
-  ++tally.images;
-}
-
-// Returns the processor time of this thread.
-std::chrono::duration<double> thread_cpu() {
-  timespec time{};
-  clock_gettime(CLOCK_THREAD_CPUTIME_ID, &time);
-  return std::chrono::seconds(time.tv_sec) + std::chrono::nanoseconds(time.tv_nsec);
-}
-
-// Writes a frame and records it in the dataset.
-FrameDone write_frame(const Simulation& simulation, DatasetWriter& dataset, const MadeFrame& made,
-                      Tally& tally) {
-  const auto begin = Clock::now();
-  const auto cpu_begin = thread_cpu();
+// Adds a frame to the tally, and returns its entry in the log.
+RunLog::Json count(const Simulation& simulation, const MadeFrame& made, const WrittenFrame& written,
+                   Tally& tally) {
   const auto [sensor, number] = made.name;
-  FrameDone done{.sensor = {}, .frame = number, .samples = {}, .tracing = made.making};
-  if (sensor < simulation.lidars.size()) {
-    write_scan(simulation, dataset, sensor, number, std::get<LidarScan>(made.product));
-    count_scan(simulation, made, tally, done);
+  RunLog::Json entry{{"sensor", ""},
+                     {"frame", number},
+                     {"tracing_s", log_seconds(made.making)},
+                     {"writing_s", log_seconds(written.writing)},
+                     {"writing_cpu_s", log_seconds(written.writing_cpu)}};
+  if (const auto* scan = std::get_if<LidarScan>(&made.product)) {
+    const PlacedLidar& lidar = simulation.lidars[sensor];
+    tally.scanning += made.tracing;
+    tally.points += scan->echoes.rows();
+    tally.pulses += static_cast<std::uint64_t>(lidar.lidar.pattern().pulses(number));
+    ++tally.scans;
+    entry["sensor"] = lidar.spec.name;
+    entry["points"] = scan->echoes.rows();
   } else {
-    tally.flows_left_out += write_image(simulation, dataset, sensor - simulation.lidars.size(),
-                                        number, std::get<MadeImage>(made.product), made.echoes);
-    count_image(simulation, made, tally, done);
+    const MountedCamera& camera = simulation.cameras[sensor - simulation.lidars.size()].spec;
+    const glm::ivec2 size_px = camera.camera.size_px;
+    const auto pixels =
+        static_cast<std::uint64_t>(size_px.x) * static_cast<std::uint64_t>(size_px.y);
+    tally.pixels += pixels;
+    tally.paths += std::get<MadeImage>(made.product).paths;
+    tally.exposing += made.making;
+    tally.flows_left_out += written.flows_left_out;
+    ++tally.images;
+    entry["sensor"] = camera.name;
+    entry["pixels"] = pixels;
   }
-  done.bytes = dataset.note(sensor, number);
-  done.writing = Clock::now() - begin;
-  done.writing_cpu = thread_cpu() - cpu_begin;
-  return done;
-}
-
-// Makes frames; each is written while the next one is made.
-void make_frames(const Simulation& simulation, DatasetWriter& dataset,
-                 const std::vector<FrameName>& frames, RunLog& log, Tally& tally) {
-  FrameMaker maker(simulation, dataset);
-  std::atomic<std::uint64_t> written = 0;
-  Progress progress(stderr, "frames", frames.size());
-  BackgroundWriter writer;
-  bool was_scan = false;
-  try {
-    for (const FrameName& name : frames) {
-      if (is_interrupted()) break;
-      const bool is_image = name.sensor >= simulation.lidars.size();
-      if (is_image && was_scan) writer.wait();  // images may show scans
-      was_scan = !is_image;
-      auto made = std::make_unique<MadeFrame>(maker.make(name));
-      writer.begin(
-          [&simulation, &dataset, &log, &tally, &written, made = std::move(made)]() mutable {
-            log.frame_done(write_frame(simulation, dataset, *made, tally));
-            made.reset();
-            ++written;
-          });
-      progress.update(written);
-    }
-    writer.wait();
-    progress.update(written);
-  } catch (...) {
-    writer.fail(std::current_exception());
-  }
+  entry["bytes"] = written.bytes;
+  return entry;
 }
 
 void say_faults(const fs::path& out, const std::vector<std::string>& faults) {
@@ -166,24 +107,38 @@ void say(const Simulation& simulation, const fs::path& out, const FramePlan& pla
   }
 }
 
+void log_begin(const fs::path& scene, const fs::path& out, Seed seed,
+               const std::optional<Shard>& shard, const FramePlan& plan, RunLog& log) {
+  RunLog::Json fields{{"version", GROUNDRAY_VERSION},
+                      {"scene", scene.string()},
+                      {"output", out.string()},
+                      {"seed", seed.value}};
+  if (shard) fields["shard"] = text_of(*shard);
+  fields["frames"] = plan.frames.size();
+  fields["there"] = plan.scans + plan.images - plan.frames.size();
+  log.begun(plan.frames.size(), fields);
+}
+
 void run(const fs::path& scene, const fs::path& out, const GenerateOptions& options, RunLog& log) {
   const Simulation simulation = load_simulation(scene, options.seed);
   if (simulation.terrain.whole() == nullptr) {
     // Reports insufficient memory before anything is written.
     simulation.terrain.clipmap(sensor_box(first_frame(simulation)), simulation.reach_m);
   }
-  DatasetWriter dataset(out, simulation, options.use, options.shard);
+  const auto warn = [](const std::string& warning) { fmt::print(stderr, "{}\n", warning); };
+  DatasetWriter dataset(out, simulation, options.use, options.shard,
+                        {.progress = stderr, .warn = warn});
   say_faults(out, dataset.faults());
   const FramePlan plan = plan_frames(simulation, dataset, options.shard);
-  log.begun({.scene = scene,
-             .output = out,
-             .seed = simulation.spec.seed.value,
-             .shard = options.shard ? text_of(*options.shard) : "",
-             .frames = plan.frames.size(),
-             .there = plan.scans + plan.images - plan.frames.size()});
+  log_begin(scene, out, simulation.spec.seed, options.shard, plan, log);
   Tally tally;
   try {
-    make_frames(simulation, dataset, plan.frames, log, tally);
+    Progress progress(stderr, "frames", plan.frames.size());
+    make_frames(simulation, dataset, plan.frames,
+                [&](const MadeFrame& made, const WrittenFrame& written) {
+                  log.frame_done(count(simulation, made, written, tally));
+                  progress.update(tally.scans + tally.images);
+                });
   } catch (...) {
     try {
       dataset.close();

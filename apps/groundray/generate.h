@@ -5,7 +5,7 @@
 #include <string>
 
 #include "apps/dataset/shard.h"
-#include "apps/groundray/record/dataset_writer.h"
+#include "apps/dataset/write/dataset_writer.h"
 #include "core/random.h"
 
 namespace groundray {
@@ -19,10 +19,10 @@ struct GenerateOptions {
 };
 
 /// Runs a scene and writes its dataset. Shows progress on standard error, and prints a summary on
-/// standard output, or on standard error if the log is on standard output. A frame is written while
-/// the next one is traced, so that at most two are in memory. If the run stops early, finished
-/// frames stay for a run with FolderUse::Resume.
-/// @throws Error as load_simulation, Dataset and RunLog; Interrupted between two frames.
+/// standard output, or on standard error if the log is on standard output. If the run stops early,
+/// finished frames stay for a run with FolderUse::Resume.
+/// @throws Error as load_simulation, DatasetWriter, make_frames and RunLog; Interrupted between two
+/// frames.
 void generate(const std::filesystem::path& scene, const std::filesystem::path& out,
               const GenerateOptions& options);
 

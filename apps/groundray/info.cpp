@@ -14,9 +14,9 @@
 #include <variant>
 #include <vector>
 
-#include "apps/dataset/dataset_summary.h"
+#include "apps/dataset/dataset_reader.h"
 #include "apps/dataset/dataset_text.h"
-#include "apps/groundray/run/journal.h"
+#include "apps/dataset/write/journal.h"
 #include "apps/scene/simulation.h"
 #include "terrain/dem/dem_file.h"
 #include "terrain/dem/dem_io.h"
@@ -211,33 +211,10 @@ void print_scene(const Simulation& simulation) {
   for (const PlacedCamera& camera : simulation.cameras) print_camera(camera);
 }
 
-// Counts frames in the journal of a run, because dataset.yaml is updated only when the run ends.
-void count_journal(const std::filesystem::path& journal, DatasetSummary& dataset) {
-  std::vector<std::vector<bool>> noted(dataset.sensors.size());  // indexed by sensor and frame
-  dataset.done = 0;
-  for (DatasetSummary::Sensor& sensor : dataset.sensors) sensor.done = sensor.bytes = 0;
-  read_journal(journal, [&](const std::string& text) {
-    const auto entry = parse_entry(text);
-    if (!entry) return;
-    const auto sensor =
-        std::ranges::find(dataset.sensors, entry->sensor, &DatasetSummary::Sensor::name);
-    if (sensor == dataset.sensors.end() || entry->frame >= sensor->frames) return;
-    auto& frames = noted[static_cast<std::size_t>(sensor - dataset.sensors.begin())];
-    const auto frame = static_cast<std::size_t>(entry->frame);
-    if (frame >= frames.size()) frames.resize(frame + 1);
-    if (frames[frame]) return;
-    frames[frame] = true;
-    ++sensor->done;
-    ++dataset.done;
-    for (const ProductSum& file : entry->files) sensor->bytes += file.sum.bytes;
-  });
-}
-
 void print_dataset(const std::filesystem::path& folder) {
   DatasetSummary dataset = read_summary(folder);
-  const std::filesystem::path journal = folder / journal_file;
-  const bool is_open = std::filesystem::exists(journal);
-  if (is_open) count_journal(journal, dataset);
+  const bool is_open = std::filesystem::exists(folder / journal_file);
+  if (is_open) count_journal(folder / journal_file, dataset);
   fmt::print("dataset   {} of {} frames are complete{}\n", dataset.done, dataset.asked_for,
              is_open ? "; a run is in progress, or was interrupted and continues with --resume"
              : dataset.done < dataset.asked_for

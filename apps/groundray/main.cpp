@@ -9,7 +9,7 @@
 #include "apps/groundray/dem/fill_command.h"
 #include "apps/groundray/info.h"
 #include "apps/groundray/reconstruct_commands.h"
-#include "apps/groundray/run/run_commands.h"
+#include "apps/groundray/run_commands.h"
 #include "apps/groundray/terrain_commands.h"
 #include "apps/scene/interruption.h"
 #include "core/error.h"

@@ -4,17 +4,15 @@
 
 #include <algorithm>
 #include <array>
-#include <sstream>
 #include <string_view>
 #include <utility>
 
 #include "core/error.h"
+#include "core/io/ply_header.h"
 #include "core/io/text_lines.h"
 
 namespace groundray {
 namespace {
-
-using LineWords = std::vector<std::string>;
 
 // Position and size of the rows in a file, with the header for a block of them.
 struct Layout {
@@ -24,13 +22,6 @@ struct Layout {
   std::uint64_t rows = 0;
   std::uint64_t row_bytes = 0;
 };
-
-LineWords words_of(std::string_view line) {
-  std::istringstream stream{std::string(line)};
-  LineWords words;
-  for (std::string word; stream >> word;) words.push_back(word);
-  return words;
-}
 
 // Returns the lines up to the one that begins with `key`; empty if there is none.
 std::vector<std::string_view> lines_up_to(std::string_view text, std::string_view key) {
@@ -50,7 +41,7 @@ std::uint64_t bytes_of(const std::vector<std::string_view>& lines) {
   return bytes;
 }
 
-std::uint64_t whole(const std::string& word) { return number_of<std::uint64_t>(word).value_or(0); }
+std::uint64_t whole(std::string_view word) { return number_of<std::uint64_t>(word).value_or(0); }
 
 Layout layout_of_floats(std::uint64_t file_bytes, std::size_t columns) {
   constexpr std::size_t kitti = 4;
@@ -74,33 +65,17 @@ Layout layout_of_npy(std::string_view head, std::uint64_t file_bytes) {
                        text.find(in_order) != std::string_view::npos;
   if (!is_told || file_bytes < layout.begin) return {};
   layout.digits = end - number;
-  layout.rows = whole(std::string(text.substr(number, layout.digits)));
+  layout.rows = whole(text.substr(number, layout.digits));
   layout.head = {std::string(text.substr(0, number)), std::string(text.substr(end))};
   if (layout.rows > 0) layout.row_bytes = (file_bytes - layout.begin) / layout.rows;
   return layout;
 }
 
 // Returns the size of a number; 0 for other types, such as lists.
-std::uint64_t bytes_of_ply(const std::string& type) {
-  static constexpr std::array<std::pair<std::string_view, std::uint64_t>, 16> types{
-      {{"char", 1},
-       {"uchar", 1},
-       {"int8", 1},
-       {"uint8", 1},
-       {"short", 2},
-       {"ushort", 2},
-       {"int16", 2},
-       {"uint16", 2},
-       {"int", 4},
-       {"uint", 4},
-       {"int32", 4},
-       {"uint32", 4},
-       {"float", 4},
-       {"float32", 4},
-       {"double", 8},
-       {"float64", 8}}};
-  for (const auto& [name, bytes] : types) {
-    if (name == type) return bytes;
+std::uint64_t bytes_of_ply(std::string_view type) {
+  static constexpr std::array<std::uint64_t, ply_type_count> bytes{4, 8, 1, 2, 4, 1, 2, 4};
+  for (std::size_t i = 0; i < ply_type_count; ++i) {
+    if (std::ranges::find(ply_type_names[i], type) != ply_type_names[i].end()) return bytes[i];
   }
   return 0;
 }
@@ -112,7 +87,7 @@ Layout layout_of_ply(std::string_view head) {
   std::string before, after;
   int elements = 0;
   for (const std::string_view line : lines) {
-    const LineWords words = words_of(line);
+    const auto words = words_of(line);
     if (words.size() < 2) continue;  // first and last line
     if (words[0] == "format" && !words[1].starts_with("binary")) return {};
     if (words[0] == "element" && ++elements == 1) {
@@ -136,9 +111,9 @@ Layout layout_of_pcd(std::string_view head) {
   const auto lines = lines_up_to(head, "DATA binary");
   Layout layout{.begin = bytes_of(lines)};
   std::string before;
-  LineWords sizes, counts;
+  std::vector<std::string_view> sizes, counts;
   for (const std::string_view line : lines) {
-    const LineWords words = words_of(line);
+    const auto words = words_of(line);
     if (words.size() < 2) continue;
     if (words[0] == "DATA" && words[1] != "binary") return {};  // compressed
     if (words[0] == "SIZE") sizes = words;

@@ -40,7 +40,7 @@ enum class Quantity {
   Column,     ///< column in a grid of rings and columns
   RangeSd     ///< m, standard deviation of the range
 };
-constexpr std::size_t quantity_count = 10;
+constexpr std::size_t quantity_count = 10;  ///< number of quantities
 
 /// Column that was recognised.
 struct ReadColumn {

@@ -54,6 +54,9 @@ if(NOT points OR NOT points EQUAL expected)
   message(FATAL_ERROR "the example of docs/guide/library.md wrote '${points}' points, groundray generate '${expected}'")
 endif()
 
+# groundray::dataset reads back what the program wrote.
+run(${SCRATCH}/build/consumer ${SCRATCH}/dataset ${expected})
+
 run(${SCRATCH}/example_2/build/example ${data}/terrain/prairie_1m.tif ${data}/sensors/velodyne_vlp16.yaml ${SCRATCH}/scan.ply)
 file(SIZE ${SCRATCH}/scan.ply bytes)
 if(bytes LESS 900000)

@@ -1,4 +1,9 @@
 // Uses a part of each library through the installed headers alone.
+#include <groundray/apps/dataset/dataset_reader.h>
+#include <groundray/apps/dataset/scan_input.h>
+#include <groundray/apps/dataset/write/frame_maker.h>
+#include <groundray/apps/dataset/write/merge.h>
+#include <groundray/apps/dataset/write/verify.h>
 #include <groundray/core/geometry/pose.h>
 #include <groundray/core/tracing/ray_tracer.h>
 #include <groundray/reconstruction/mesh/accuracy/accuracy.h>
@@ -9,10 +14,30 @@
 #include <chrono>
 #include <cmath>
 #include <cstdio>
+#include <cstdlib>
 #include <span>
+#include <string>
 
-int main() {
-  using namespace groundray;
+using namespace groundray;
+
+namespace {
+
+// Reads back the first scan of a dataset; returns true if it has `points` points, and no file of
+// the dataset has changed.
+bool reads(const char* dataset, std::size_t points) {
+  const ScanFiles files = find_scans({.inputs = {dataset}});
+  const std::size_t rows = read_points(files, files.scans.at(0), {}).rows;
+  const auto report = [](const std::string& fault) { std::printf("%s\n", fault.c_str()); };
+  return rows == points && read_dataset(dataset).lidars.at(0).pending == 0 &&
+         verify(dataset, report).faults == 0;
+}
+
+}  // namespace
+
+// Without arguments, tests the other libraries; with a dataset and the number of points of its
+// first scan, groundray::dataset.
+int main(int count, char** arguments) {
+  if (count == 3) return reads(arguments[1], std::strtoull(arguments[2], nullptr, 10)) ? 0 : 1;
   const Pose X_AB{.translation_m = {0, 0, 2}};
   const bool halfway = std::abs(Screw(X_AB).at(0.5).translation_m.z - 1) < 1e-15;
 

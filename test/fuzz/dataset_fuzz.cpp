@@ -8,11 +8,11 @@
 #include <string>
 #include <string_view>
 
-#include "apps/dataset/dataset_summary.h"
+#include "apps/dataset/dataset_reader.h"
 #include "apps/dataset/dataset_text.h"
 #include "apps/dataset/frame_entry.h"
-#include "apps/groundray/run/expected_files.h"
-#include "apps/groundray/run/journal.h"
+#include "apps/dataset/write/journal.h"
+#include "apps/dataset/write/verify.h"
 #include "core/error.h"
 
 namespace {

@@ -6,6 +6,7 @@
 #include <span>
 #include <utility>
 
+#include "apps/dataset/dataset_text.h"
 #include "apps/dataset/recorded_calibration.h"
 #include "apps/scene/readers/readers.h"
 #include "apps/scene/yaml_reader.h"
@@ -19,10 +20,6 @@ namespace {
 namespace fs = std::filesystem;
 using std::chrono::nanoseconds;
 using yaml::Need;
-
-fs::path calibration_path(const fs::path& dataset, const std::string& sensor) {
-  return dataset / "calibration" / (sensor + ".yaml");
-}
 
 // Parts of the scene file that concern a dataset. It may name files that no longer exist, so it is
 // not loaded as a scene.
@@ -130,22 +127,9 @@ RecordedSensor read_sensor(const fs::path& dataset, const std::string& name, Sen
     frame.file = dataset / (is_lidar ? "lidar" : "camera") / name /
                  fmt::format("{:06}{}", frame.number, is_lidar ? scan_suffix : "");
   }
-  const fs::path calibration = calibration_path(dataset, name);
+  const fs::path calibration = dataset / "calibration" / (name + ".yaml");
   is_lidar ? read_lidar(calibration, scene, sensor) : read_camera(calibration, sensor);
   return sensor;
-}
-
-void read_objects(yaml::Map& root, yaml::Faults& faults, RecordedNames& names) {
-  for (const yaml::Node& node : root.list("objects", Need::Optional)) {
-    yaml::Map entry(node, "objects", faults);
-    RecordedNames::Objects objects;
-    entry.read_text("name", Need::Required, objects.name);
-    entry.read_whole("label", Need::Required, objects.label);
-    entry.read_whole("first_instance", Need::Required, objects.first);
-    entry.read_whole("count", Need::Required, objects.count);
-    entry.close_partly();
-    names.objects.push_back(std::move(objects));
-  }
 }
 
 void name_label(std::uint32_t label, const std::string& name, RecordedNames& names) {
@@ -170,24 +154,16 @@ nanoseconds CameraFacts::middle_of_row(double row_px) const {
 }
 
 RecordedRun read_recorded_run(const fs::path& dataset) {
-  const DatasetListing listing = read_listing(dataset);
-  RecordedRun run{.georeference = listing.georeference, .sensors = {}, .names = {}};
-  const fs::path path = dataset / "dataset.yaml";
-  yaml::Faults faults(path);
-  const yaml::Node node = yaml::parse(read_run_text(dataset), path);
-  yaml::Map root(node, "", faults);
-  std::string text;
-  root.read_text("scene", Need::Optional, text);
-  for (const yaml::Node& material : root.list("materials", Need::Optional))
-    run.names.materials.push_back(material.text);
-  read_objects(root, faults, run.names);
-  root.close_partly();
-  faults.throw_if_any();
-  SceneText scene(text, path);
+  const DatasetListing listing = read_listing(dataset, HeadUse::Names);
+  const DatasetHead& head = listing.head;
+  RecordedRun run{.georeference = head.georeference,
+                  .sensors = {},
+                  .names = {.materials = head.materials, .objects = head.objects, .labels = {}}};
+  SceneText scene(head.scene, dataset / dataset_file);
   name_labels(scene, run.names);
-  for (const std::string& name : listing.lidars)
+  for (const std::string& name : head.names_of("lidar"))
     run.sensors.push_back(read_sensor(dataset, name, SensorKind::Lidar, listing, scene));
-  for (const std::string& name : listing.cameras)
+  for (const std::string& name : head.names_of("camera"))
     run.sensors.push_back(read_sensor(dataset, name, SensorKind::Camera, listing, scene));
   return run;
 }

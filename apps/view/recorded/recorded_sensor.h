@@ -11,7 +11,7 @@
 #include <string>
 #include <vector>
 
-#include "apps/dataset/dataset_listing.h"
+#include "apps/dataset/dataset_reader.h"
 #include "apps/scene/readers/spec_io.h"
 #include "core/geometry/pose.h"
 #include "core/geometry/trajectory.h"
@@ -57,11 +57,7 @@ inline Pose pose_at(const RecordedSensor& sensor, std::chrono::nanoseconds time)
 
 /// Names of the numbers in a dataset's columns and channels.
 struct RecordedNames {
-  struct Objects {
-    std::string name;
-    std::uint16_t label = 0;
-    std::uint32_t first = 1, count = 0;  ///< instances: first number and count
-  };
+  using Objects = DatasetHead::Objects;
   std::vector<std::string> materials;           ///< the first has number 1
   std::vector<Objects> objects;                 ///< entries of the scene file
   std::map<std::uint32_t, std::string> labels;  ///< names by label; several are comma-separated

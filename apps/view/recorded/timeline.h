@@ -9,7 +9,7 @@
 #include <string>
 #include <vector>
 
-#include "apps/dataset/dataset_listing.h"
+#include "apps/dataset/dataset_reader.h"
 #include "apps/scene/simulation.h"
 #include "apps/view/recorded/recorded_sensor.h"
 #include "core/geometry/pose.h"

@@ -1,5 +1,3 @@
-#include "apps/dataset/dataset_summary.h"
-
 #include <gmock/gmock.h>
 #include <gtest/gtest.h>
 
@@ -9,6 +7,7 @@
 #include <string>
 #include <vector>
 
+#include "apps/dataset/dataset_reader.h"
 #include "apps/dataset/dataset_text.h"
 #include "core/error.h"
 #include "test/support/temporary_folder.h"

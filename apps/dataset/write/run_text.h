@@ -1,0 +1,27 @@
+#pragma once
+
+#include <filesystem>
+#include <string>
+#include <vector>
+
+#include "apps/scene/simulation.h"
+
+namespace groundray {
+
+/// Returns the part of dataset.yaml that describes the run (docs/reference/formats.md). Runs with
+/// equal texts make equal frames.
+/// @throws Error if an image of the sky cannot be read.
+std::string run_header(const Simulation& simulation);
+
+/// Returns the text of calibration/<sensor>.yaml (docs/reference/formats.md).
+std::string calibration_text(const PlacedLidar& lidar);
+std::string calibration_text(const PlacedCamera& camera);
+
+/// Writes a camera's calibration as <stem>.ros.yaml and <stem>.kalibr.yaml, unless the format
+/// cannot describe its lens.
+/// @return suffixes of the written files.
+/// @throws Error as write_text.
+std::vector<std::string> write_exchange_calibrations(const std::filesystem::path& stem,
+                                                     const PlacedCamera& camera);
+
+}  // namespace groundray
