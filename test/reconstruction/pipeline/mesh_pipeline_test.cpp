@@ -24,7 +24,11 @@ using ::testing::SizeIs;
 using namespace groundray::testing;  // NOLINT(google-build-using-namespace)
 
 constexpr double eye_height_m = 2;
-const BeamFan fan{.rings = 24, .lowest_rad = -60 * degree, .highest_rad = -20 * degree};
+const BeamFan fan{.rings = 16,
+                  .lowest_rad = -60 * degree,
+                  .highest_rad = -20 * degree,
+                  .columns = 120,
+                  .columns_per_turn = 120};
 
 // Scan of level ground at height 0; of the azimuths in a gap, some elevations return nothing.
 ScanMesh ground_from(double x_m, bool has_gap = false) {
@@ -37,13 +41,13 @@ ScanMesh ground_from(double x_m, bool has_gap = false) {
   return link(place(scan_of(fan, ground), X_DS), ScreeningLimits::ground());
 }
 
-// Area of the mesh, if all of it is level and faces up.
+// Area of the mesh, if all of it is level and nothing faces down.
 double plan_area_m2(const TriangleMesh& mesh) {
   double area_m2 = 0;
   for (const glm::uvec3& t : mesh.triangles) {
     const glm::dvec3 a = mesh.vertices_m[t.x];
     const double up = glm::cross(mesh.vertices_m[t.y] - a, mesh.vertices_m[t.z] - a).z;
-    EXPECT_GT(up, 0);
+    EXPECT_GE(up, -1e-12);  // filled holes may have triangles without area
     area_m2 += up / 2;
   }
   return area_m2;
@@ -60,15 +64,15 @@ TEST(MeshPipeline, TwoScansOfAPlaneBecomeThePlaneInFewTriangles) {
   std::map<std::string, std::vector<double>> shares;
   const PipelineControl control{
       .progress = [&](const char* stage, double share) { shares[stage].push_back(share); }};
-  const MeshBuildOptions options{.fill_m = 3, .stop = VerticalBound{0.001, 0.001}};
+  const MeshBuildOptions options{.fill_m = 3, .stop = FaceBudget{1000}};
   const MeshResult result = build_mesh({ground_from(0), ground_from(1.5)}, options, control);
   EXPECT_EQ(result.merged_scans, 2U);
   EXPECT_GT(result.merged.redundant, 100U);  // most of the ground is seen twice
-  EXPECT_LT(largest_height_m(result.mesh), 1e-9);
+  EXPECT_LT(largest_height_m(result.mesh), 1e-6);
   EXPECT_NEAR(result.area_m2, plan_area_m2(result.mesh.shape), 1e-9 * result.area_m2);
   ASSERT_TRUE(result.simplified);
-  EXPECT_LE(result.simplified->error.largest().at_least_m, 0.001 + 1e-9);
-  EXPECT_LT(10 * result.mesh.shape.triangles.size(), 9 * result.full_triangles);
+  EXPECT_GT(result.full_triangles, 3000U);
+  EXPECT_LE(result.mesh.shape.triangles.size(), 1000U);
   std::vector<std::string> stages;
   for (const auto& [stage, seconds] : result.seconds) stages.push_back(stage);
   EXPECT_THAT(stages, ElementsAre("merge", "fill", "simplify"));

@@ -23,7 +23,11 @@ using namespace groundray::testing;  // NOLINT(google-build-using-namespace)
 // Scan of a slope with a step, from 2 m above its foot.
 ScanReturns scan_of_slope() {
   const RangeOf slope = plane_at({0.1, 0.05, -1}, 2), step = plane_at({0.1, 0.05, -1}, 1.6);
-  return seen({.rings = 20, .lowest_rad = -50 * degree, .highest_rad = -15 * degree},
+  return seen({.rings = 12,
+               .lowest_rad = -50 * degree,
+               .highest_rad = -15 * degree,
+               .columns = 90,
+               .columns_per_turn = 90},
               [&](const glm::dvec3& towards) {
                 return towards.x * slope(towards) > 3 ? step(towards) : slope(towards);
               });
@@ -66,11 +70,12 @@ TEST(Rebuild, WritesTheMeshThatTheLibraryBuilds) {
                          ScreeningLimits::ground()));
   }
   poses.close();
-  MeshRequest request{.perimeter_m = {}, .steps = {.fill_m = 2, .stop = DistanceBound{0.02, 0.1}}};
+  MeshRequest request{.perimeter_m = {}, .steps = {.fill_m = 2, .stop = FaceBudget{500}}};
   request.output.mesh = folder / "program.ply";
   rebuild_mesh(choice, {}, request);
   const MeshResult result = build_mesh(std::move(scans), request.steps);
-  EXPECT_GT(result.mesh.shape.triangles.size(), 20U);
+  EXPECT_GT(result.full_triangles, 1000U);
+  EXPECT_LE(result.mesh.shape.triangles.size(), 500U);
   write_measured_mesh(folder / "library.ply", result.mesh, {});
   EXPECT_EQ(text_of(folder / "program.ply"), text_of(folder / "library.ply"));
 }
