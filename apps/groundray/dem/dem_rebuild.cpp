@@ -74,9 +74,11 @@ void check_memory(std::size_t points, std::size_t most_bytes) {
       points, most_bytes / 1'000'000);
 }
 
-void check_ground(const DemResult& result) {
+void check_ground(const DemResult& result, const std::optional<GroundFilterOptions>& filter) {
   if (result.has_ground) return;
   const FusionCounts& counts = result.fusion;
+  if (filter && !result.ground)
+    throw Error("no point is within the DEM's extent: is it at another location? (--area, --like)");
   if (counts.outside == counts.points)
     throw Error(
         "all {} points are outside the DEM's extent: is it at another location? (--area, --like)",
@@ -128,7 +130,7 @@ DemResult build(const DemRequest& request, const GridFrame& frame, DemInput& inp
   }
   DemResult result = build_dem(sources, frame, request.dem, control);
   check_count(count);
-  check_ground(result);
+  check_ground(result, request.dem.filter);
   return result;
 }
 
