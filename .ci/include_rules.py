@@ -36,6 +36,10 @@ FOLDERS: dict[str, str] = {
     "reconstruction/mesh/scan": "reconstruction reconstruction/mesh",
     "reconstruction/mesh/simplify": "reconstruction reconstruction/mesh "
     "reconstruction/mesh/accuracy",
+    "reconstruction/pipeline": "reconstruction reconstruction/dem reconstruction/dem/fill "
+    "reconstruction/dem/fusion reconstruction/dem/ground reconstruction/dem/smooth "
+    "reconstruction/mesh reconstruction/mesh/holes reconstruction/mesh/merge "
+    "reconstruction/mesh/scan reconstruction/mesh/simplify reconstruction/stereo",
     "reconstruction/stereo": "reconstruction/dem",
     "sensors/camera": "sensors/camera/lens sensors/sky",
     "sensors/lidar": "sensors/lidar/beam sensors/lidar/pattern sensors/lidar/receiver sensors/sky",

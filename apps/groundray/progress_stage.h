@@ -1,57 +1,44 @@
 #pragma once
 
-#include <chrono>
 #include <cstddef>
 #include <cstdint>
 #include <cstdio>
+#include <optional>
 #include <string>
 #include <utility>
-#include <vector>
 
 #include "apps/scene/interruption.h"
 #include "core/progress.h"
-#include "reconstruction/run_control.h"
+#include "reconstruction/pipeline/stages.h"
 
 namespace groundray {
 
-/// Step of a reconstruction: shows its progress, and stops on interruption.
-class Stage {
+/// Shows the progress of a reconstruction, with a line for each stage, and stops it on
+/// interruption.
+class StageProgress {
  public:
-  explicit Stage(const std::string& label) : progress_(stderr, label + ", percent", steps) {}
+  explicit StageProgress(std::string unit = "percent", std::uint64_t steps = 100)
+      : unit_(std::move(unit)), steps_(steps) {}
 
-  /// Returns work options that report progress to this stage; they must not outlive it.
-  RunControl work(std::size_t most_bytes) {
-    return {.progress = [this](double share) { update(share); }, .most_bytes = most_bytes};
+  /// Returns a control that reports to this, which must outlive it.
+  PipelineControl control(std::size_t most_bytes) {
+    return {.progress = [this](const char* stage, double share) { update(stage, share); },
+            .most_bytes = most_bytes};
   }
 
-  void update(double share) {
+  /// Shows the fraction of a stage that is done, 0 to 1.
+  /// @throws Interrupted.
+  void update(const std::string& stage, double share) {
     stop_if_interrupted();
-    progress_.update(static_cast<std::uint64_t>(share * steps));
+    if (!progress_ || stage != stage_) progress_.emplace(stderr, stage + ", " + unit_, steps_);
+    stage_ = stage;
+    progress_->update(static_cast<std::uint64_t>(share * static_cast<double>(steps_)));
   }
 
  private:
-  static constexpr std::uint64_t steps = 100;
-  Progress progress_;
-};
-
-/// Appends the duration of a stage to a report's list when it ends.
-class StageTimer {
- public:
-  using Durations = std::vector<std::pair<std::string, double>>;  // name, seconds
-
-  StageTimer(Durations& durations, std::string stage)
-      : durations_(durations), stage_(std::move(stage)) {}
-  ~StageTimer() {
-    const std::chrono::duration<double> spent = std::chrono::steady_clock::now() - begin_;
-    durations_.emplace_back(std::move(stage_), spent.count());
-  }
-  StageTimer(const StageTimer&) = delete;
-  StageTimer& operator=(const StageTimer&) = delete;
-
- private:
-  Durations& durations_;
-  std::string stage_;
-  std::chrono::steady_clock::time_point begin_ = std::chrono::steady_clock::now();
+  std::string unit_, stage_;
+  std::uint64_t steps_;
+  std::optional<Progress> progress_;
 };
 
 }  // namespace groundray

@@ -1,10 +1,16 @@
-#include "apps/groundray/scan_options.h"
-
 #include <CLI/CLI.hpp>
 
+#include "apps/groundray/command.h"
 #include "apps/scan/word_option.h"
 
 namespace groundray {
+
+ReportFacts facts_of(const std::string& command, std::span<const std::filesystem::path> inputs) {
+  std::string all;
+  for (const auto& input : inputs) all += (all.empty() ? "" : " ") + input.string();
+  return {{"version", GROUNDRAY_VERSION}, {"command", command}, {"input", all}};
+}
+
 void ScanOptions::add(CLI::App* command) {
   CLI::App* scans = command->add_option_group("Scans");
   scans->add_option("--sensor", choice.sensors, "Lidars of a dataset (all)")->delimiter(',');
@@ -14,10 +20,8 @@ void ScanOptions::add(CLI::App* command) {
                                     {"strongest", ReturnChoice::Strongest},
                                     {"first", ReturnChoice::First}};
   add_words(scans, "--returns", taking.returns, "Return of each pulse to use", choices);
-  scans
-      ->add_option("--range-sd-m", taking.range_sd_m,
-                   "Standard deviation of ranges, instead of the scans'")
-      ->check(not_negative());
+  add_number(scans, "--range-sd-m", taking.range_sd_m, not_negative(),
+             "Standard deviation of ranges, instead of the scans'");
   scans->add_flag("--no-labels", leaves_labels, "Omit semantic classes");
   columns.add(scans, "");
 }

@@ -1,17 +1,22 @@
-#include "apps/groundray/terrain_commands.h"
-
 #include <fmt/format.h>
 
 #include <algorithm>
+#include <cmath>
 #include <cstddef>
 #include <cstdint>
-#include <cstdio>
+#include <filesystem>
+#include <glm/vec3.hpp>
 #include <map>
+#include <memory>
+#include <optional>
 #include <utility>
+#include <vector>
 
+#include "apps/groundray/command.h"
 #include "apps/scene/interruption.h"
 #include "core/io/mesh_io.h"
 #include "terrain/dem/dem_file.h"
+#include "terrain/dem/dem_io.h"
 #include "terrain/lod/certificate.h"
 #include "terrain/lod/clipmap.h"
 #include "terrain/terrain_mesh.h"
@@ -40,37 +45,98 @@ void print_mesh(const TriangleMesh& mesh, const HeightGrid& grid) {
              50 * static_cast<double>(mesh.triangles.size()) / cells, mesh.vertices_m.size());
 }
 
+// Options of the commands for a DEM.
+struct TerrainOptions {
+  std::filesystem::path dem, out;
+  DemOptions reading;
+  double max_error_m = 0;  // vertical error permitted everywhere
+  double angle_rad = 0;    // angle permitted as well, as seen from the viewpoint
+  std::vector<double> viewpoint_w_m;
+
+  void add_dem(CLI::App* command) {
+    command
+        ->add_option("DEM", dem, "Any raster of heights that GDAL reads (GeoTIFF, VRT, HGT, ...)")
+        ->required();
+    command->add_option("--nodata", reading.nodata,
+                        "Additional nodata value, besides the one that the file declares");
+    command->add_option("--reproject-to", reading.reproject_to,
+                        "A CRS to warp to, such as EPSG:32631, or utm for the zone that fits");
+  }
+
+  CLI::App* add_mesh(CLI::App* terrain) {
+    CLI::App* command = terrain->add_subcommand(
+        "mesh", "Write a DEM as a mesh without cracks, within an error bound");
+    add_dem(command);
+    command->add_option("-o,--output", out, "Mesh to write: .ply (doubles), .obj, .stl or .glb")
+        ->required();
+    command
+        ->add_option("--max-error-m", max_error_m,
+                     "Largest vertical distance from the DEM's surface, anywhere")
+        ->required()
+        ->check(CLI::NonNegativeNumber);
+    auto* angle =
+        add_scaled(command, "--angle-mrad", angle_rad, 1e-3,
+                   "Permitted angle in milliradians, seen from --viewpoint, where that is larger")
+            ->check(CLI::NonNegativeNumber);
+    auto* from = command->add_option("--viewpoint", viewpoint_w_m, "X,Y,Z in the DEM's CRS, metres")
+                     ->delimiter(',')
+                     ->expected(3)
+                     ->needs(angle);
+    angle->needs(from);
+    return command;
+  }
+
+  CLI::App* add_certify(CLI::App* terrain) {
+    CLI::App* command = terrain->add_subcommand(
+        "certify",
+        "Compute the deviation of each node of the DEM's quadtree, store it beside the DEM, and "
+        "print a summary; `generate` uses it for DEMs larger than memory");
+    add_dem(command);
+    return command;
+  }
+
+  // Converts the DEM to a mesh, writes it, and prints its size.
+  void mesh() const {
+    const Dem read = load_dem(dem, reading);
+    SensorBox sensors;
+    if (const auto& p = viewpoint_w_m; !p.empty())
+      sensors.low_m = sensors.high_m = glm::dvec3(p[0], p[1], p[2]) - read.origin_w_m;
+    const MeshBound bound = bound_from(sensors, read.grid.frame(), max_error_m, angle_rad);
+    const TriangleMesh mesh = place(build_terrain_mesh(read.grid, bound), read.grid);
+    stop_if_interrupted();
+    write_mesh(out, mesh, {read.origin_w_m, read.crs_name, read.crs_wkt});
+    print_mesh(mesh, read.grid);
+    fmt::print("written to {}\n", out.string());
+  }
+
+  // Certifies the DEM, unless there is a certificate, and prints the deviations of each level.
+  void certify() const {
+    const DemFile file(dem, reading);
+    Certifying progress;
+    const Certificate certificate = Certificate::open_or_make(
+        file, {.progress = [&](double share) { progress.update(share); }});
+    const double step_m = std::abs(file.header().step_m.x);
+    fmt::print("{:>5} {:>10} {:>12} {:>10} {:>10} {:>14} {:>15}\n", "level", "cell m", "nodes",
+               "holed", "empty", "max deviation m", "mean deviation m");
+    for (std::size_t level = 0; level < certificate.levels().size(); ++level) {
+      const LevelSummary& summary = certificate.levels()[level];
+      fmt::print("{:>5} {:>10.6g} {:>12} {:>10} {:>10} {:>14.6g} {:>15.6g}\n", level,
+                 step_m * static_cast<double>(std::int64_t{1} << level), summary.nodes,
+                 summary.mixed, summary.empty, summary.max_deviation_m, summary.mean_deviation_m);
+    }
+    fmt::print("certificate: {}\n", certificate.folder().string());
+  }
+};
+
 }  // namespace
 
-void mesh_terrain(const std::filesystem::path& path, const DemOptions& options,
-                  const MeshRequest& request, const std::filesystem::path& out) {
-  const Dem dem = load_dem(path, options);
-  SensorBox sensors;
-  if (request.viewpoint) sensors.low_m = sensors.high_m = *request.viewpoint - dem.origin_w_m;
-  const MeshBound bound =
-      bound_from(sensors, dem.grid.frame(), request.max_error_m, request.angle_rad);
-  const TriangleMesh mesh = place(build_terrain_mesh(dem.grid, bound), dem.grid);
-  stop_if_interrupted();
-  write_mesh(out, mesh, {dem.origin_w_m, dem.crs_name, dem.crs_wkt});
-  print_mesh(mesh, dem.grid);
-  fmt::print("written to {}\n", out.string());
-}
-
-void certify_terrain(const std::filesystem::path& path, const DemOptions& options) {
-  const DemFile dem(path, options);
-  Certifying progress;
-  const Certificate certificate =
-      Certificate::open_or_make(dem, {.progress = [&](double share) { progress.update(share); }});
-  const double step_m = std::abs(dem.header().step_m.x);
-  fmt::print("{:>5} {:>10} {:>12} {:>10} {:>10} {:>14} {:>15}\n", "level", "cell m", "nodes",
-             "holed", "empty", "max deviation m", "mean deviation m");
-  for (std::size_t level = 0; level < certificate.levels().size(); ++level) {
-    const LevelSummary& summary = certificate.levels()[level];
-    fmt::print("{:>5} {:>10.6g} {:>12} {:>10} {:>10} {:>14.6g} {:>15.6g}\n", level,
-               step_m * static_cast<double>(std::int64_t{1} << level), summary.nodes, summary.mixed,
-               summary.empty, summary.max_deviation_m, summary.mean_deviation_m);
-  }
-  fmt::print("certificate: {}\n", certificate.folder().string());
+void add_terrain_commands(CLI::App& app, std::vector<Command>& commands) {
+  auto* terrain = app.add_subcommand("terrain", "Work on a DEM");
+  terrain->require_subcommand(1);
+  const auto options = std::make_shared<TerrainOptions>();
+  commands.push_back({options->add_mesh(terrain), [options] { options->mesh(); }});
+  commands.push_back({options->add_certify(terrain), [options] { options->certify(); }});
+  commands.push_back(add_fill_command(*terrain));
 }
 
 }  // namespace groundray

@@ -7,8 +7,6 @@
 #include <array>
 #include <cmath>
 #include <glm/common.hpp>
-#include <glm/geometric.hpp>
-#include <glm/matrix.hpp>
 #include <limits>
 #include <optional>
 #include <string>
@@ -26,59 +24,43 @@
 #include "reconstruction/dem/fill/dem_fill.h"
 #include "reconstruction/dem/fusion/dem_fusion.h"
 #include "reconstruction/dem/smooth/dem_smooth.h"
+#include "reconstruction/pipeline/dem_pipeline.h"
+#include "reconstruction/pipeline/dem_points.h"
 
 namespace groundray::python {
 namespace {
 
 using nb::literals::operator""_a;
 
-double squared(double x) { return x * x; }
-
 // ----- points
 
-/// Errors of points in addition to the noise of their ranges.
-struct PoseNoise {
-  double divergence_rad = 0, position_sd_m = 0, attitude_sd_rad = 0;
-};
-
-void check(const char* call, const PoseNoise& noise) {
+PointNoise checked_noise(const char* call, double divergence_rad, double position_sd_m,
+                         double attitude_sd_rad) {
   Violations broken(call);
   const auto demand = [&](const char* name, double value) {
     broken.unless(value >= 0 && std::isfinite(value), "{} = {} must be 0 or more, and finite", name,
                   value);
   };
-  demand("divergence_rad", noise.divergence_rad);
-  demand("position_sd_m", noise.position_sd_m);
-  demand("attitude_sd_rad", noise.attitude_sd_rad);
+  demand("divergence_rad", divergence_rad);
+  demand("position_sd_m", position_sd_m);
+  demand("attitude_sd_rad", attitude_sd_rad);
   broken.throw_if_any();
+  return {.divergence_rad = divergence_rad,
+          .position_sd_m = position_sd_m,
+          .attitude_sd_rad = attitude_sd_rad};
 }
 
-// Same error model as in `groundray reconstruct dem`: docs/theory/dem.md.
-void add_point(const glm::dvec3& p_m, const glm::dvec3& origin_m, double range_sd_m,
-               std::uint32_t group, const PoseNoise& noise, MeasuredPoints& into) {
-  if (!(range_sd_m >= 0) || !std::isfinite(range_sd_m))
+void add_point(const LidarPoint& point, std::uint32_t group, const PointNoise& noise,
+               MeasuredPoints& to) {
+  if (!(point.range_sd_m >= 0) || !std::isfinite(point.range_sd_m))
     throw Error("the standard deviation of the range of point {}, {} m, must be 0 or more",
-                into.size(), range_sd_m);
-  const glm::dvec3 beam_m = p_m - origin_m;
-  const double range_m = glm::length(beam_m);
-  const glm::dvec3 along = range_m > 0 ? beam_m / range_m : glm::dvec3(0, 0, -1);
-  const double foot2_m2 = squared(range_m * noise.divergence_rad / 4);
-  const PointErrors errors = point_errors(
-      glm::dmat3(foot2_m2) + (squared(range_sd_m) - foot2_m2) * glm::outerProduct(along, along));
-  const double flat = std::sqrt(std::max(0.0, 1 - squared(along.z)));
-  into.p_m.push_back(p_m);
-  into.sd_m.push_back(errors.sd_m);
-  into.bias_sd_m.push_back(
-      static_cast<float>(std::hypot(noise.position_sd_m, range_m * noise.attitude_sd_rad * flat)));
-  into.lean.push_back(errors.lean);
-  into.across_sd_m.push_back(errors.across_sd_m);
-  into.groups.push_back(group);
-  into.origins.push_back(PointOrigin::Lidar);
+                to.size(), point.range_sd_m);
+  append(point, group, noise, to);
 }
 
 MeasuredPoints points_of(const GivenPoints& points_m, const GivenPoints& origins_m,
                          const GivenNumbers& range_sd_m, const std::optional<GivenNumbers>& groups,
-                         const PoseNoise& noise) {
+                         const PointNoise& noise) {
   const std::size_t count = points_m.rows();
   if (origins_m.rows() != count || range_sd_m.rows() != count ||
       (groups && groups->rows() != count))
@@ -93,20 +75,21 @@ MeasuredPoints points_of(const GivenPoints& points_m, const GivenPoints& origins
     if (!(0 <= group && group < std::ldexp(1, 31)) || group != std::floor(group))
       throw Error("fuse_points: the group of point {}, {}, must be a whole number from 0", i,
                   group);
-    add_point({points_m(i, 0), points_m(i, 1), points_m(i, 2)},
-              {origins_m(i, 0), origins_m(i, 1), origins_m(i, 2)}, range_sd_m(i),
+    add_point({{points_m(i, 0), points_m(i, 1), points_m(i, 2)},
+               {origins_m(i, 0), origins_m(i, 1), origins_m(i, 2)},
+               range_sd_m(i)},
               static_cast<std::uint32_t>(group), noise, points);
   }
   return points;
 }
 
 MeasuredPoints points_of(const std::vector<const Sweep*>& scans, std::optional<double> range_sd_m,
-                         const PoseNoise& noise) {
+                         const PointNoise& noise) {
   MeasuredPoints points;
   for (std::size_t k = 0; k < scans.size(); ++k) {
     const PlacedReturns returns = placed_returns(*scans[k], range_sd_m);
     for (std::size_t i = 0; i < returns.points_m.size(); ++i)
-      add_point(returns.points_m[i], returns.origins_m[i], returns.sd_m[i],
+      add_point({returns.points_m[i], returns.origins_m[i], returns.sd_m[i]},
                 static_cast<std::uint32_t>(k), noise, points);
   }
   return points;
@@ -142,13 +125,8 @@ GridFrame frame_of(const MeasuredPoints& points, double cell_m, const GivenArea&
 FusedDem fused(MeasuredPoints points, double cell_m, const GivenArea& area_m, double most_sd_m,
                double outlier_share, const StopRequest& stop) {
   const GridFrame frame = frame_of(points, cell_m, area_m);
-  bool is_left = true;
-  const auto source = [&](MeasuredPoints& block) {
-    if (!std::exchange(is_left, false)) return false;
-    block = std::move(points);
-    return true;
-  };
-  Fusion fusion = fuse(source, frame, {.outlier_share = outlier_share, .most_sd_m = most_sd_m},
+  Fusion fusion = fuse(single_block(std::move(points)), frame,
+                       {.outlier_share = outlier_share, .most_sd_m = most_sd_m},
                        {.progress = [&](double /*share*/) { stop.obey(); }});
   return {std::move(fusion.layers), fusion.counts};
 }
@@ -246,8 +224,8 @@ void bind_fusion(nb::module_& module) {
          std::optional<double> range_sd_m, double divergence_rad, double position_sd_m,
          double attitude_sd_rad, double most_sd_m, double outlier_share) {
         check_scans("fuse_dem", scans);
-        const PoseNoise noise{divergence_rad, position_sd_m, attitude_sd_rad};
-        check("fuse_dem", noise);
+        const PointNoise noise =
+            checked_noise("fuse_dem", divergence_rad, position_sd_m, attitude_sd_rad);
         return without_gil([&](const StopRequest& stop) {
           return fused(points_of(scans, range_sd_m, noise), cell_m, area_m, most_sd_m,
                        outlier_share, stop);
@@ -262,8 +240,8 @@ void bind_fusion(nb::module_& module) {
          double cell_m, const std::optional<GivenNumbers>& groups, const GivenArea& area_m,
          double divergence_rad, double position_sd_m, double attitude_sd_rad, double most_sd_m,
          double outlier_share) {
-        const PoseNoise noise{divergence_rad, position_sd_m, attitude_sd_rad};
-        check("fuse_points", noise);
+        const PointNoise noise =
+            checked_noise("fuse_points", divergence_rad, position_sd_m, attitude_sd_rad);
         return without_gil([&](const StopRequest& stop) {
           return fused(points_of(points_m, origins_m, range_sd_m, groups, noise), cell_m, area_m,
                        most_sd_m, outlier_share, stop);

@@ -19,9 +19,9 @@
 #include "apps/python/placed_returns.h"
 #include "core/error.h"
 #include "reconstruction/mesh/holes/hole_fill.h"
-#include "reconstruction/mesh/merge/mesh_merge.h"
 #include "reconstruction/mesh/scan/scan_mesh.h"
 #include "reconstruction/mesh/simplify/simplify.h"
+#include "reconstruction/pipeline/mesh_pipeline.h"
 
 namespace groundray::python {
 namespace {
@@ -44,12 +44,8 @@ ScreeningLimits screening_of(const std::string& preset) {
                                   {"object", ScreeningLimits::object()}});
 }
 
-bool knows_noise(const ScanMesh& scan) {
-  return std::ranges::any_of(scan.mesh.sd_m, [](float sd_m) { return sd_m > 0; });
-}
-
-MergedMesh merged_mesh(const std::vector<const Sweep*>& sweeps, const Linking& linking,
-                       std::optional<double> apart_m, const StopRequest& stop) {
+MeshResult built_mesh(const std::vector<const Sweep*>& sweeps, const Linking& linking,
+                      std::optional<double> apart_m, const StopRequest& stop) {
   std::vector<ScanMesh> meshes;
   for (const Sweep* sweep : sweeps) {
     stop.obey();
@@ -62,13 +58,13 @@ MergedMesh merged_mesh(const std::vector<const Sweep*>& sweeps, const Linking& l
         "reconstruct_mesh: no neighbouring returns of the {} scans were accepted as surface; "
         "preset, longest_m and range_sd_m control this",
         sweeps.size());
-  if (meshes.size() > 1 && !apart_m && std::ranges::none_of(meshes, knows_noise))
+  if (meshes.size() > 1 && !apart_m && std::ranges::none_of(meshes, knows_noise, &ScanMesh::mesh))
     throw Error(
         "reconstruct_mesh: the noise of these scans is unknown, and with it the distance up to "
         "which two scans show one surface: give the standard deviation of ranges as range_sd_m, or "
         "that distance as apart_m");
-  return merge(meshes, {.apart_m = apart_m.value_or(0)},
-               {.progress = [&](double /*share*/) { stop.obey(); }});
+  return build_mesh(std::move(meshes), {.merging = {}, .apart_m = apart_m},
+                    {.progress = [&](const char*, double) { stop.obey(); }});
 }
 
 MeshAndFigures reconstruct_mesh(const std::vector<const Sweep*>& scans, const std::string& preset,
@@ -86,18 +82,19 @@ MeshAndFigures reconstruct_mesh(const std::vector<const Sweep*>& scans, const st
   linking.screening.incidence_rad = incidence_rad.value_or(linking.screening.incidence_rad);
   linking.screening.longest_m = longest_m.value_or(linking.screening.longest_m);
   linking.screening.noise_sds = noise_sds.value_or(linking.screening.noise_sds);
-  MergedMesh merged = without_gil(
-      [&](const StopRequest& stop) { return merged_mesh(scans, linking, apart_m, stop); });
+  MeshResult result = without_gil(
+      [&](const StopRequest& stop) { return built_mesh(scans, linking, apart_m, stop); });
   const DemHeader& header = scans.front()->state->simulation.terrain.header();
+  const MergeCounts& counts = result.merged;
   nb::dict figures;
-  figures["redundant"] = merged.counts.redundant;
-  figures["seen_through"] = merged.counts.visibility_conflicts;
-  figures["clipped"] = merged.counts.clipped;
-  figures["filled"] = merged.counts.filled;
-  figures["bridged"] = merged.counts.bridged;
-  figures["moved"] = merged.counts.moved;
-  figures["left_out"] = merged.counts.left_out;
-  return {Mesh{std::move(merged.mesh), {header.origin_w_m, header.crs_name, header.crs_wkt}},
+  figures["redundant"] = counts.redundant;
+  figures["seen_through"] = counts.visibility_conflicts;
+  figures["clipped"] = counts.clipped;
+  figures["filled"] = counts.filled;
+  figures["bridged"] = counts.bridged;
+  figures["moved"] = counts.moved;
+  figures["left_out"] = counts.left_out;
+  return {Mesh{std::move(result.mesh), {header.origin_w_m, header.crs_name, header.crs_wkt}},
           std::move(figures)};
 }
 

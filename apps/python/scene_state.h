@@ -12,7 +12,7 @@
 #include <vector>
 
 #include "apps/python/binding/arrays.h"
-#include "apps/scene/frame_scene_builder.h"
+#include "apps/scene/frames.h"
 #include "apps/scene/simulation.h"
 
 namespace groundray::python {

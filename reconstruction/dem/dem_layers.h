@@ -6,7 +6,7 @@
 #include <vector>
 
 #include "core/geometry/grid_frame.h"
-#include "terrain/dem/area.h"
+#include "terrain/dem/density_map.h"
 
 namespace groundray {
 

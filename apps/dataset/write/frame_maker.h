@@ -13,7 +13,6 @@
 #include "apps/dataset/shard.h"
 #include "apps/dataset/write/dataset_writer.h"
 #include "apps/dataset/write/frame_files.h"
-#include "apps/scene/frame_scene_builder.h"
 #include "apps/scene/frames.h"
 #include "apps/scene/simulation.h"
 #include "core/io/point_cloud.h"

@@ -1,22 +1,18 @@
-#include "apps/groundray/dem/dem_command.h"
-
 #include <unistd.h>
 
 #include <CLI/CLI.hpp>
 #include <algorithm>
-#include <array>
 #include <cmath>
-#include <cstdint>
 #include <initializer_list>
 #include <limits>
-#include <numbers>
+#include <memory>
 #include <optional>
 #include <string>
-#include <string_view>
+#include <vector>
 
+#include "apps/groundray/command.h"
 #include "apps/groundray/dem/dem_request.h"
-#include "apps/groundray/dem/fill_options.h"
-#include "apps/groundray/scan_options.h"
+#include "apps/groundray/dem/filling.h"
 #include "apps/scan/number_checks.h"
 #include "apps/scan/word_option.h"
 #include "core/error.h"
@@ -34,21 +30,19 @@ std::size_t machine_bytes() {
   return static_cast<std::size_t>(pages) * static_cast<std::size_t>(page_bytes);
 }
 
-}  // namespace
+enum class FilterPreset { None, Ground, Air };
 
-struct DemCommand::Options {
-  enum class FilterPreset { None, Ground, Air };
-
+// Options of the command.
+struct DemCommandOptions {
   CLI::App* command = nullptr;
   ScanOptions scans;
   DemRequest request;
   std::vector<double> area;
   FilterPreset filter = FilterPreset::None;
   std::optional<double> filter_cell_m, filter_slope, filter_radius_m, filter_threshold_m;
-  std::optional<double> divergence_mrad, curvature_sd_per_m;
-  double attitude_sd_mrad = 0;
+  SmoothOptions smooth;
   std::string stereo_frames = ":";
-  std::optional<std::uint64_t> memory_mb;
+  std::optional<std::size_t> most_bytes;
   bool without_lidar = false, without_stereo = false, without_filling = false;
   bool is_airborne = false, is_smoothed = false;
   FillLimits limits;
@@ -68,8 +62,7 @@ struct DemCommand::Options {
     auto* truth = command->add_option("--truth", request.truth, "A DEM to compare with");
     command->add_option("--error-map", output.error_map, "GeoTIFF of the errors")->needs(truth);
     command->add_option("--report", output.report, "JSON file of all results");
-    command->add_option("--memory-mb", memory_mb, "Limit of memory (what the machine has)")
-        ->check(positive());
+    add_memory(command, most_bytes, "Limit of memory (what the machine has)");
   }
 
   void add_place() {
@@ -81,38 +74,27 @@ struct DemCommand::Options {
   }
 
   void add_noise() {
-    CLI::App* noise = command->add_option_group("Noise");
-    noise
-        ->add_option(
-            "--divergence-mrad", divergence_mrad,
-            "Beam divergence, full angle between the 1/e^2 points, instead of the dataset's")
+    CLI::App* group = command->add_option_group("Noise");
+    constexpr double per_mille = 1e-3;
+    PointNoise& noise = request.noise.points;
+    add_scaled(group, "--divergence-mrad", noise.divergence_rad, per_mille,
+               "Beam divergence, full angle between the 1/e^2 points, instead of the dataset's")
         ->check(not_negative());
-    noise
-        ->add_option("--position-sd-m", request.noise.position_sd_m,
-                     "Standard deviation of each pose along each axis")
+    add_number(group, "--position-sd-m", noise.position_sd_m, not_negative(),
+               "Standard deviation of each pose along each axis");
+    add_scaled(group, "--attitude-sd-mrad", noise.attitude_sd_rad, per_mille,
+               "Standard deviation of each pose about each axis")
         ->check(not_negative());
-    noise
-        ->add_option("--attitude-sd-mrad", attitude_sd_mrad,
-                     "Standard deviation of each pose about each axis")
-        ->check(not_negative());
-    noise
-        ->add_option("--across-sd-m", request.noise.across_sd_m,
-                     "Additional horizontal standard deviation of points, along each axis")
-        ->check(not_negative());
-    noise
-        ->add_option("--pose-gap-s", request.noise.longest_pose_gap_s,
-                     "Longest gap between poses during a scan (1)")
-        ->check(positive());
-    noise->add_flag("--airborne", is_airborne,
+    add_number(group, "--across-sd-m", noise.across_sd_m, not_negative(),
+               "Additional horizontal standard deviation of points, along each axis");
+    add_number(group, "--pose-gap-s", request.noise.longest_pose_gap_s, positive(),
+               "Longest gap between poses during a scan (1)");
+    group->add_flag("--airborne", is_airborne,
                     "Points were measured from far above and are in map coordinates");
-    noise
-        ->add_option("--most-sd-m", request.fusion.most_sd_m,
-                     "Mark samples of larger standard deviation as unmeasured")
-        ->check(positive());
-    noise
-        ->add_option("--outlier-share", request.fusion.outlier_share,
-                     "Share of outliers among all points (0.02)")
-        ->check(CLI::Range(0.0, 0.5));
+    add_number(group, "--most-sd-m", request.dem.fusion.most_sd_m, positive(),
+               "Mark samples of larger standard deviation as unmeasured");
+    add_number(group, "--outlier-share", request.dem.fusion.outlier_share, CLI::Range(0.0, 0.5),
+               "Share of outliers among all points (0.02)");
   }
 
   void add_stereo() {
@@ -123,18 +105,14 @@ struct DemCommand::Options {
     stereo->add_flag("--no-lidar", without_lidar, "Use only the stereo pairs of a dataset");
     stereo->add_option("--stereo-frames", stereo_frames, "A:B:STEP of images, as --frames");
     StereoPointOptions& points = request.stereo.points;
-    stereo->add_option("--nearest-m", points.nearest_m, "Smallest depth of matches")
-        ->check(not_negative());
-    stereo->add_option("--farthest-depth-m", points.farthest_m, "Largest depth of matches")
-        ->check(positive());
-    stereo
-        ->add_option("--match-sd-px", points.noise.match_px,
-                     "Standard deviation of each disparity, instead of the matcher's")
-        ->check(positive());
-    stereo
-        ->add_option("--bias-sd-px", points.noise.bias_px,
-                     "Standard deviation of the bias that all disparities of a pair share (0.1)")
-        ->check(not_negative());
+    add_number(stereo, "--nearest-m", points.nearest_m, not_negative(),
+               "Smallest depth of matches");
+    add_number(stereo, "--farthest-depth-m", points.farthest_m, positive(),
+               "Largest depth of matches");
+    add_number(stereo, "--match-sd-px", points.noise.match_px, positive(),
+               "Standard deviation of each disparity, instead of the matcher's");
+    add_number(stereo, "--bias-sd-px", points.noise.bias_px, not_negative(),
+               "Standard deviation of the bias that all disparities of a pair share (0.1)");
   }
 
   void add_filter() {
@@ -145,22 +123,20 @@ struct DemCommand::Options {
               "Remove objects above the ground, for scans from the ground or from the air; none "
               "(default): the lowest surface of each cell is the ground",
               presets);
-    group->add_option("--filter-cell-m", filter_cell_m, "Cell size of the filter's raster")
-        ->check(positive());
-    group->add_option("--filter-slope", filter_slope, "Largest slope of ground")->check(positive());
-    group->add_option("--filter-radius-m", filter_radius_m, "Half the width of the largest object")
-        ->check(not_negative());
-    group
-        ->add_option("--filter-threshold-m", filter_threshold_m,
-                     "Largest distance of points from the ground")
-        ->check(positive());
+    add_number(group, "--filter-cell-m", filter_cell_m, positive(),
+               "Cell size of the filter's raster");
+    add_number(group, "--filter-slope", filter_slope, positive(), "Largest slope of ground");
+    add_number(group, "--filter-radius-m", filter_radius_m, not_negative(),
+               "Half the width of the largest object");
+    add_number(group, "--filter-threshold-m", filter_threshold_m, positive(),
+               "Largest distance of points from the ground");
   }
 
   void add_filling() {
     CLI::App* group = command->add_option_group("Blank areas");
     group->add_flag("--no-fill", without_filling, "Do not fill blank areas");
     const Words<FillMethod> methods{{"tension", FillMethod::Tension}, {"cgal", FillMethod::Mesh}};
-    add_words(group, "--method", request.fill_method,
+    add_words(group, "--method", request.dem.fill_method,
               "tension: the smoothest surface (default); cgal: faired meshes", methods);
     limits.add(group);
   }
@@ -170,17 +146,13 @@ struct DemCommand::Options {
     const Words<SightUse> uses{{"none", SightUse::None}, {"beams", SightUse::Beams}};
     add_words(group, "--sight", request.sight,
               "Upper bounds of the ground: beams that passed above it (default)", uses);
-    group
-        ->add_option("--sight-margin-m", request.sight_margin_m,
-                     "Margin added to upper bounds (a quarter of a cell)")
-        ->check(not_negative());
-    auto* smooth = group->add_flag("--smooth", is_smoothed, "Smooth measured heights first");
-    group
-        ->add_option("--curvature-sd-per-m", curvature_sd_per_m,
-                     "Standard deviation of the true ground's curvature, for --smooth")
-        ->check(positive())
+    add_number(group, "--sight-margin-m", request.dem.sight_margin_m, not_negative(),
+               "Margin added to upper bounds (a quarter of a cell)");
+    auto* flag = group->add_flag("--smooth", is_smoothed, "Smooth measured heights first");
+    add_number(group, "--curvature-sd-per-m", smooth.curvature_sd_per_m, positive(),
+               "Standard deviation of the true ground's curvature, for --smooth")
         ->check(CLI::Range(least_curvature_per_m, most_curvature_per_m))
-        ->needs(smooth);
+        ->needs(flag);
   }
 
   // Rejects options that would have no effect.
@@ -202,7 +174,7 @@ struct DemCommand::Options {
     if (without_filling)
       refuse({"--method", "--reach", "--farthest-m", "--largest-share", "--most-edges"},
              "--no-fill fills nothing");
-    if (request.fill_method == FillMethod::Mesh)
+    if (request.dem.fill_method == FillMethod::Mesh)
       refuse({"--sight", "--sight-margin-m"}, "--method cgal does not support bounds");
     else
       refuse({"--most-edges"}, "only --method cgal limits the edges of boundaries");
@@ -239,66 +211,52 @@ struct DemCommand::Options {
   }
 
   void close_memory() {
-    constexpr std::size_t bytes_per_mb = 1'000'000;
-    request.most_bytes = request.taking.most_bytes = machine_bytes();
-    if (!memory_mb) return;
-    constexpr std::size_t most_mb = std::numeric_limits<std::size_t>::max() / bytes_per_mb;
-    const std::size_t asked_mb = std::min<std::size_t>(*memory_mb, most_mb);
-    request.most_bytes = request.taking.most_bytes = asked_mb * bytes_per_mb;
-    request.fusion.memory_bytes = request.most_bytes / 2;
-    request.stereo.matching.most_bytes = request.most_bytes;
+    request.most_bytes = request.taking.most_bytes = most_bytes.value_or(machine_bytes());
+    if (!most_bytes) return;
+    request.dem.fusion.memory_bytes = *most_bytes / 2;
+    request.stereo.matching.most_bytes = *most_bytes;
   }
 
   void close() {
-    constexpr double per_mille = 1e-3;
     check_use();
     scans.close();
     request.choice = scans.choice;
     request.taking = scans.taking;
-    request.stereo.frames = parse_frames(stereo_frames, "--stereo-frames");
+    request.pairs.frames = parse_frames(stereo_frames, "--stereo-frames");
     request.pairs.are_any = !without_stereo;
     if (!without_stereo) request.choice.need = without_lidar ? ScanNeed::None : ScanNeed::IfThere;
-    if (divergence_mrad) request.noise.divergence_rad = *divergence_mrad * per_mille;
-    request.noise.attitude_sd_rad = attitude_sd_mrad * per_mille;
-    if (is_airborne) request.noise.beams = BeamOrigin::Above;
+    if (is_airborne) request.noise.points.beams = BeamOrigin::Above;
     close_area();
-    request.filter = ground_filter();
-    if (without_filling)
-      request.fill = std::nullopt;
-    else
-      request.fill = limits.filling;
-    request.most_rim_edges = limits.edges();
-    if (is_smoothed) request.smooth = SmoothOptions{.curvature_sd_per_m = curvature_sd_per_m};
+    request.dem.filter = ground_filter();
+    request.dem.fill = limits.filling;
+    if (without_filling) request.dem.fill = std::nullopt;
+    request.dem.most_rim_edges = limits.edges();
+    if (is_smoothed) request.dem.smooth = smooth;
     close_memory();
     const auto folder = request.output.dem.parent_path();
-    request.fusion.folder = folder.empty() ? "." : folder;
-    std::string all;
-    for (const auto& input : scans.choice.inputs) all += (all.empty() ? "" : " ") + input.string();
-    request.output.facts = {
-        {"version", GROUNDRAY_VERSION}, {"command", "reconstruct dem"}, {"input", all}};
+    request.dem.fusion.folder = folder.empty() ? "." : folder;
+    request.output.facts = facts_of("reconstruct dem", scans.choice.inputs);
   }
 };
 
-DemCommand::DemCommand(CLI::App& reconstruct) : options_(std::make_unique<Options>()) {
-  options_->command = reconstruct.add_subcommand(
+}  // namespace
+
+Command add_dem_command(CLI::App& reconstruct) {
+  const auto options = std::make_shared<DemCommandOptions>();
+  options->command = reconstruct.add_subcommand(
       "dem", "Fuse scans and stereo pairs into a DEM with standard deviations");
-  options_->add_files();
-  options_->add_place();
-  options_->scans.add(options_->command);
-  options_->add_noise();
-  options_->add_stereo();
-  options_->add_filter();
-  options_->add_filling();
-  options_->add_sight();
-}
-
-DemCommand::~DemCommand() = default;
-
-bool DemCommand::is_asked_for() const { return options_->command->parsed(); }
-
-void DemCommand::run() const {
-  options_->close();
-  rebuild_dem(options_->request);
+  options->add_files();
+  options->add_place();
+  options->scans.add(options->command);
+  options->add_noise();
+  options->add_stereo();
+  options->add_filter();
+  options->add_filling();
+  options->add_sight();
+  return {options->command, [options] {
+            options->close();
+            rebuild_dem(options->request);
+          }};
 }
 
 }  // namespace groundray

@@ -4,13 +4,18 @@
 #include <fmt/ranges.h>
 
 #include <algorithm>
-#include <cstdint>
+#include <cmath>
 #include <glm/common.hpp>
+#include <glm/geometric.hpp>
+#include <iterator>
 #include <limits>
+#include <numbers>
 #include <span>
 #include <utility>
 
-#include "apps/groundray/progress_stage.h"
+#include "apps/scene/interruption.h"
+#include "apps/scene/readers/spec_io.h"
+#include "apps/scene/yaml_reader.h"
 #include "core/error.h"
 
 namespace groundray {
@@ -65,7 +70,78 @@ std::vector<std::string> notes_of_scans(const ScanFiles& files,
   return notes;
 }
 
+// Returns the divergence of a dataset's lidar according to its calibration, rad: full angle between
+// the 1/e^2 points, as the root mean square of both axes, widened by the jitter of the beams.
+// Without light, only the jitter counts: points lie where the axes of the beams hit. Nothing if
+// there is no calibration file.
+std::optional<double> calibrated_divergence_rad(const fs::path& dataset,
+                                                const std::string& sensor) {
+  const fs::path path = dataset / "calibration" / (sensor + ".yaml");
+  if (!fs::is_regular_file(path)) return std::nullopt;
+  yaml::Faults faults(path);
+  const yaml::Node node = yaml::parse(yaml::read_file(path), path);
+  yaml::Map root(node, "", faults);
+  std::string text;
+  root.read_text("lidar_file", yaml::Need::Required, text);
+  root.close_partly();
+  faults.throw_if_any();
+  const LidarSpec lidar = parse_lidar(text, path);
+  double width_rad = 0;
+  if (lidar.light) {
+    width_rad = glm::length(lidar.beam.divergence_rad) / std::numbers::sqrt2;
+    const bool is_half_maximum = lidar.beam.profile == BeamSpec::Profile::Gaussian &&
+                                 lidar.beam.width == BeamSpec::Width::FullWidthHalfMaximum;
+    // exp(-2 x^2) is 1/2 at x = sqrt(ln 2 / 2).
+    if (is_half_maximum) width_rad /= std::sqrt(std::numbers::ln2 / 2);
+  }
+  return std::hypot(width_rad, 4 * lidar.angular_jitter_rad);
+}
+
+// Checks the poses and the distances of a scan's points.
+void check_points(const ScanFiles& files, const ScanFile& scan, const MeasurementNoise& noise,
+                  const PointInput& input) {
+  if (scan.path)
+    check_gap(scan.name, files.paths[*scan.path], input.begin, input.end, noise.longest_pose_gap_s);
+  if (files.are_posed || noise.points.beams == BeamOrigin::Above) return;
+  constexpr double far_m = 10'000;
+  for (std::size_t i = 0; i < input.points_m.size(); ++i) {
+    const double range_m = glm::distance(input.points_m[i], input.origins_m[i]);
+    if (range_m <= far_m) continue;
+    throw Error(
+        "{}: a point is {:.4g} km from the sensor, which without poses is at the origin: are these "
+        "map coordinates? Add --airborne or --poses",
+        scan.file.string(), range_m / 1000);
+  }
+}
+
+void count(const PointInput& input, PointTally& tally) {
+  tally.rows += input.rows;
+  tally.points += input.points_m.size();
+  tally.is_noiseless =
+      tally.is_noiseless && std::ranges::all_of(input.sd_m, [](float sd_m) { return sd_m == 0; });
+  for (const std::string& note : input.notes) {
+    if (std::ranges::find(tally.notes, note) == tally.notes.end()) tally.notes.push_back(note);
+  }
+}
+
 }  // namespace
+
+void check_gap(const std::string& name, const Trajectory& path, std::chrono::nanoseconds begin,
+               std::chrono::nanoseconds end, double longest_s) {
+  const auto& samples = path.samples();
+  const auto s = [](std::chrono::nanoseconds at) { return 1e-9 * static_cast<double>(at.count()); };
+  auto after = std::ranges::upper_bound(samples, begin, {}, &Trajectory::Sample::time);
+  if (after == samples.begin() && after != samples.end()) ++after;
+  for (; after != samples.end(); ++after) {
+    const auto from = std::prev(after)->time, to = after->time;
+    if (from > begin && from >= end) return;
+    if (s(to - from) <= longest_s) continue;
+    throw Error(
+        "{}: the poses have a gap of {:.6g} s there, from {:.9g} to {:.9g} s, more than {:g} s: "
+        "exclude it (--frames, --stereo-frames), or permit longer gaps by --pose-gap-s",
+        name, s(to - from), s(from), s(to), longest_s);
+  }
+}
 
 void check_count(std::size_t points) {
   if (points == 0)
@@ -95,14 +171,14 @@ std::vector<RecordedPair> find_pairs(const DemRequest& request, const ScanFiles&
 }
 
 DemInput::DemInput(const DemRequest& request, const ScanFiles& files,
-                   const std::vector<RecordedPair>& pairs)
-    : request_(request), files_(files), scans_(files.scans.size()) {
+                   const std::vector<RecordedPair>& pairs, StageProgress& progress)
+    : request_(request), files_(files), progress_(progress), scans_(files.scans.size()) {
   for (std::size_t i = 0; i < scans_.size(); ++i) scans_[i].name = files.scans[i].name;
   match(pairs);
 }
 
 void DemInput::match(const std::vector<RecordedPair>& recorded) {
-  const auto images = image_pairs(recorded, request_.stereo.frames, notes_);
+  const auto images = image_pairs(recorded, request_.pairs.frames, notes_);
   if (images.empty()) {
     if (!request_.pairs.names.empty() || files_.scans.empty())
       throw Error(
@@ -119,53 +195,58 @@ void DemInput::match(const std::vector<RecordedPair>& recorded) {
   if (moves)
     notes_.emplace_back(
         "rolling shutters: all rows are treated as exposed at the time of the middle row");
-  Stage stage("matching");
   for (std::size_t i = 0; i < images.size(); ++i) {
-    stage.update(static_cast<double>(i) / static_cast<double>(images.size()));
+    progress_.update("matching", static_cast<double>(i) / static_cast<double>(images.size()));
     const auto group = static_cast<std::uint32_t>(files_.scans.size() + i);
     pairs_.push_back(or_lidars_alone(request_.pairs, files_, [&] {
       return add_stereo_points(images[i], request_.stereo, request_.noise, group, stereo_);
     }));
   }
-  stage.update(1);
+  progress_.update("matching", 1);
 }
 
-PointNoise DemInput::noise_of(const ScanFile& scan) {
-  PointNoise noise = request_.noise;
-  if (noise.divergence_rad || !is_dataset(request_)) return noise;
+MeasurementNoise DemInput::noise_of(const ScanFile& scan) {
+  MeasurementNoise noise = request_.noise;
+  if (noise.points.divergence_rad || !is_dataset(request_)) return noise;
   const std::string sensor = scan.name.substr(0, scan.name.rfind('/'));
-  const auto known = divergences_rad_.find(sensor);
-  noise.divergence_rad =
-      known != divergences_rad_.end()
-          ? known->second
-          : divergences_rad_
-                .emplace(sensor, calibrated_divergence_rad(request_.choice.inputs[0], scan))
-                .first->second;
+  auto known = divergences_rad_.find(sensor);
+  if (known == divergences_rad_.end())
+    known = divergences_rad_
+                .emplace(sensor, calibrated_divergence_rad(request_.choice.inputs[0], sensor))
+                .first;
+  noise.points.divergence_rad = known->second;
   return noise;
 }
 
-LidarPoints DemInput::points_of(std::size_t scan) {
-  const ScanFile& file = files_.scans.at(scan);
-  return {files_, file, request_.taking, noise_of(file), static_cast<std::uint32_t>(scan)};
-}
-
-bool DemInput::next(MeasuredPoints& block) {
+bool DemInput::next(LidarBlock& block) {
   if (next_ == 0) {
     ++next_;
-    block = stereo_;
+    block = {.points = stereo_};
     return true;
   }
   for (; next_ <= files_.scans.size(); ++next_) {
     stop_if_interrupted();
-    if (!reading_) reading_.emplace(points_of(next_ - 1));
-    LidarBlock points;
-    const bool is_more = reading_->next(points);
-    if (is_more) {
-      block = std::move(points.points);
-      return true;
+    const ScanFile& scan = files_.scans[next_ - 1];
+    PointTally& tally = scans_[next_ - 1];
+    if (!reader_) {
+      reader_.emplace(files_, scan, request_.taking);
+      noise_ = noise_of(scan);
+      tally = {.name = scan.name, .is_noiseless = true};
     }
-    scans_[next_ - 1] = reading_->tally();
-    reading_.reset();
+    PointInput input;
+    if (!reader_->next(input)) {
+      reader_.reset();
+      continue;
+    }
+    check_points(files_, scan, noise_, input);
+    count(input, tally);
+    block = {.share = static_cast<double>(next_) / static_cast<double>(files_.scans.size())};
+    const auto group = static_cast<std::uint32_t>(next_ - 1);
+    for (std::size_t i = 0; i < input.points_m.size(); ++i)
+      append({input.points_m[i], input.origins_m[i], input.sd_m[i]}, group, noise_.points,
+             block.points);
+    block.origins_m = std::move(input.origins_m);
+    return true;
   }
   return false;
 }
@@ -183,9 +264,9 @@ std::vector<std::string> DemInput::notes() const {
   return notes;
 }
 
-void DemInput::rewind() noexcept {
-  next_ = 0;
-  reading_.reset();
+void DemInput::go_to(std::size_t block) noexcept {
+  next_ = block;
+  reader_.reset();
 }
 
 Area DemInput::extent() {
@@ -193,12 +274,11 @@ Area DemInput::extent() {
   constexpr double infinity = std::numeric_limits<double>::infinity();
   Area area{glm::dvec2(infinity), glm::dvec2(-infinity)};
   std::size_t count = 0;
-  Stage stage("reading");
-  for (MeasuredPoints block; next(block);) {
-    area = around(block.p_m, area);
-    count += block.size();
-    stage.update(static_cast<double>(std::min(next_, files_.scans.size())) /
-                 static_cast<double>(files_.scans.size() + 1));
+  for (LidarBlock block; next(block);) {
+    area = around(block.points.p_m, area);
+    count += block.points.size();
+    progress_.update("reading", static_cast<double>(std::min(next_, files_.scans.size())) /
+                                    static_cast<double>(files_.scans.size() + 1));
   }
   rewind();
   check_count(count);

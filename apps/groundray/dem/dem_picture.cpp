@@ -1,5 +1,3 @@
-#include "apps/groundray/dem/dem_picture.h"
-
 #include <algorithm>
 #include <cmath>
 #include <cstddef>
@@ -10,6 +8,7 @@
 #include <utility>
 
 #include "apps/colour_map.h"
+#include "apps/groundray/dem/dem_report.h"
 #include "core/quantile.h"
 
 namespace groundray {

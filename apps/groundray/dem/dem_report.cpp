@@ -2,18 +2,33 @@
 
 #include <fmt/format.h>
 
-#include <algorithm>
-#include <cmath>
+#include <array>
+#include <filesystem>
 #include <nlohmann/json.hpp>
+#include <numbers>
+#include <string>
+#include <vector>
 
+#include "apps/groundray/dem/filling.h"
+#include "apps/groundray/result_files.h"
+#include "core/image/png_io.h"
 #include "core/io/file_io.h"
+#include "terrain/dem/layers_io.h"
 
 namespace groundray {
 namespace {
 
-using Json = nlohmann::ordered_json;
+namespace fs = std::filesystem;
+using Json = nlohmann::ordered_json;  // writes numbers that are not finite as null
 
 constexpr std::array<const char*, 5> source_words{"none", "lidar", "stereo", "fused", "filled"};
+
+// Returns the number of samples of each HeightSource.
+std::array<std::size_t, 5> sources_of(const DemLayers& layers) {
+  std::array<std::size_t, 5> counts{};
+  for (const HeightSource source : layers.source) ++counts[static_cast<std::size_t>(source)];
+  return counts;
+}
 
 void print_points(const char* what, const char* rows, const std::vector<PointTally>& tallies) {
   constexpr std::size_t most = 8;
@@ -50,9 +65,6 @@ void print_errors(const std::vector<HeightErrors>& errors) {
   }
 }
 
-// JSON cannot represent NaN.
-Json number(double value) { return std::isfinite(value) ? Json(value) : Json(nullptr); }
-
 Json json_of(const std::vector<PointTally>& tallies, const char* rows) {
   Json all = Json::array();
   for (const PointTally& tally : tallies)
@@ -63,37 +75,38 @@ Json json_of(const std::vector<PointTally>& tallies, const char* rows) {
 Json json_of(const HeightErrors& e) {
   return {{"of", e.of},
           {"samples", e.samples},
-          {"bias_m", number(e.bias_m)},
-          {"rmse_m", number(e.rmse_m)},
-          {"nmad_m", number(e.nmad_m)},
-          {"p95_m", number(e.p95_m)},
-          {"largest_m", number(e.largest_m)},
+          {"bias_m", e.bias_m},
+          {"rmse_m", e.rmse_m},
+          {"nmad_m", e.nmad_m},
+          {"p95_m", e.p95_m},
+          {"largest_m", e.largest_m},
           {"stated", e.stated},
-          {"normalised_rms", number(e.normalised_rms)},
-          {"normalised_robust", number(e.normalised_robust)},
-          {"within_1sd", number(e.within_1sd)},
-          {"within_2sd", number(e.within_2sd)}};
+          {"normalised_rms", e.normalised_rms},
+          {"normalised_robust", e.normalised_robust},
+          {"within_1sd", e.within_1sd},
+          {"within_2sd", e.within_2sd}};
 }
 
-Json json_of(const FillTally& fill) {
+Json json_of(const FilledHeights& filled) {
+  const FillTally fill = tally_of(filled);
   Json holes = Json::array(), trials = Json::array();
   for (const FateTally& tally : fill.fates) {
     holes.push_back({{"fate", word_of(tally.fate)},
                      {"holes", tally.holes},
                      {"samples", tally.samples},
-                     {"farthest_m", number(tally.farthest_m)}});
+                     {"farthest_m", tally.farthest_m}});
   }
-  for (const TrialReport& trial : fill.trials) {
+  for (const TrialReport& trial : filled.trials) {
     trials.push_back({{"shape", trial.is_long ? "long" : "compact"},
                       {"in_shadow", trial.is_shadow},
                       {"from_cells", trial.from_cells},
-                      {"to_cells", number(trial.to_cells)},
+                      {"to_cells", trial.to_cells},
                       {"tension", trial.form.tension},
                       {"smoothness", trial.form.smoothness},
                       {"samples", trial.samples},
-                      {"within_1sd", number(trial.within_1sd)},
-                      {"within_2sd", number(trial.within_2sd)},
-                      {"widened_by", number(trial.widened_by)}});
+                      {"within_1sd", trial.within_1sd},
+                      {"within_2sd", trial.within_2sd},
+                      {"widened_by", trial.widened_by}});
   }
   return {{"holes", holes},
           {"trials", trials},
@@ -117,71 +130,148 @@ Json json_of(const GridFrame& frame) {
           {"step_m", {frame.step_m.x, frame.step_m.y}}};
 }
 
-// Adds the results of the optional steps.
-void add_options(const DemReport& report, Json& json) {
-  if (const auto& ground = report.ground)
+// ----- files
+
+template <typename T>
+std::vector<float> numbers(const std::vector<T>& values) {
+  std::vector<float> all;
+  all.reserve(values.size());
+  for (const T value : values) all.push_back(static_cast<float>(value));
+  return all;
+}
+
+std::vector<float> degrees(std::vector<float> values_rad) {
+  for (float& value : values_rad) value *= static_cast<float>(180 / std::numbers::pi);
+  return values_rad;
+}
+
+void write_layers(const fs::path& path, const DemLayers& layers, const Georeference& georeference) {
+  const auto lidar = numbers(layers.lidar), stereo = numbers(layers.stereo),
+             surfaces = numbers(layers.surfaces), source = numbers(layers.source),
+             slope_deg = degrees(layers.slope_rad);
+  const std::vector<RasterLayer> bands{{"elevation", "m", layers.elevation_m},
+                                       {"variance", "m2", layers.variance_m2},
+                                       {"n_lidar", "", lidar},
+                                       {"n_stereo", "", stereo},
+                                       {"chi2", "", layers.chi2},
+                                       {"n_surfaces", "", surfaces},
+                                       {"source", "", source},
+                                       {"distance_to_data", "m", layers.to_data_m},
+                                       {"fill_sd", "m", layers.fill_sd_m},
+                                       {"upper_bound", "m", layers.upper_bound_m},
+                                       {"slope", "deg", slope_deg},
+                                       {"overhang", "m", layers.overhang_m},
+                                       {"clearance", "m", layers.clearance_m}};
+  write_layers(path, layers.frame, georeference, bands);
+}
+
+void write_json(const fs::path& path, const ReportFacts& facts, const DemReport& report) {
+  const DemResult& result = report.result;
+  Json json{{"groundray_dem", 1}, {"facts", Json::object()}};
+  for (const auto& [name, value] : facts) json["facts"][name] = value;
+  const glm::dvec3& origin_m = report.georeference.origin_w_m;
+  json["origin_w_m"] = {origin_m.x, origin_m.y, origin_m.z};
+  json["crs"] = report.georeference.crs_name;
+  json["frame"] = json_of(result.layers.frame);
+  json["scans"] = json_of(report.scans, "rows");
+  json["pairs"] = json_of(report.pairs, "matched");
+  json["fused"] = json_of(result.fusion);
+  for (const char* part : {"ground_filter", "sight", "smoothed", "filled", "truth"})
+    json[part] = nullptr;
+  if (const auto& ground = result.ground)
     json["ground_filter"] = {
         {"ground", ground->ground}, {"above", ground->above}, {"below", ground->below}};
-  if (const auto& bound = report.bound)
+  if (const auto& bound = result.bound)
     json["sight"] = {{"samples", bound->samples}, {"broken", bound->broken}};
-  if (const auto& smooth = report.smoothed)
+  if (const auto& smooth = result.smoothed)
     json["smoothed"] = {{"curvature_sd_per_m", smooth->curvature_sd_per_m},
                         {"rounds", smooth->rounds}};
-  if (report.filled) json["filled"] = json_of(*report.filled);
-  if (report.errors.empty()) return;
-  json["truth"] = Json::array();
-  for (const HeightErrors& errors : report.errors) json["truth"].push_back(json_of(errors));
+  if (result.filled) json["filled"] = json_of(*result.filled);
+  if (report.truth) {
+    json["truth"] = Json::array();
+    for (const HeightErrors& errors : report.truth->errors)
+      json["truth"].push_back(json_of(errors));
+  }
+  const auto counts = sources_of(result.layers);
+  for (std::size_t i = 0; i < source_words.size(); ++i)
+    json["samples"][source_words[i]] = counts[i];
+  json["seconds"] = Json::object();
+  for (const auto& [stage, seconds] : report.seconds) json["seconds"][stage] = seconds;
+  json["notes"] = report.notes;
+  write_text(path, json.dump(2) + "\n");
 }
 
 }  // namespace
 
 void print(const DemReport& report) {
+  const DemResult& result = report.result;
   print_points("scan", "rows", report.scans);
   print_points("stereo pair", "matched", report.pairs);
-  if (const auto& ground = report.ground)
+  if (const auto& ground = result.ground)
     fmt::print("ground filter: {} points on the ground, {} above, {} below\n", ground->ground,
                ground->above, ground->below);
-  const FusionCounts& fusion = report.fusion;
+  const FusionCounts& fusion = result.fusion;
   fmt::print("fused: {} points, {} outside, {} unusable; {} cells without credible ground\n",
              fusion.points, fusion.outside, fusion.unusable, fusion.without_ground);
   if (fusion.uncertain > 0)
     fmt::print("{} cells exceed --most-sd-m and stay unmeasured\n", fusion.uncertain);
-  if (const auto& bound = report.bound)
+  if (const auto& bound = result.bound)
     fmt::print("lines of sight bound {} samples; {} measured ones are above their bounds\n",
                bound->samples, bound->broken);
-  if (const auto& smooth = report.smoothed)
+  if (const auto& smooth = result.smoothed)
     fmt::print("smoothed in {} rounds for curvatures of {:.3g} 1/m\n", smooth->rounds,
                smooth->curvature_sd_per_m);
-  if (report.filled) print_fill(*report.filled);
+  if (result.filled) print_fill(tally_of(*result.filled));
   std::string sources;
+  const auto counts = sources_of(result.layers);
   for (std::size_t i = 0; i < source_words.size(); ++i)
-    sources += fmt::format("{}{} {}", i == 0 ? "" : ", ", report.sources[i], source_words[i]);
-  fmt::print("{} x {} samples: {}\n", report.frame.samples.x, report.frame.samples.y, sources);
-  if (!report.errors.empty()) print_errors(report.errors);
+    sources += fmt::format("{}{} {}", i == 0 ? "" : ", ", counts[i], source_words[i]);
+  const glm::ivec2 samples = result.layers.frame.samples;
+  fmt::print("{} x {} samples: {}\n", samples.x, samples.y, sources);
+  if (report.truth) print_errors(report.truth->errors);
   if (report.colour_m > 0)
     fmt::print("the picture's most saturated colour is {:.3g} m\n", report.colour_m);
   for (const std::string& note : report.notes) fmt::print("note: {}\n", note);
 }
 
-void write_json(const std::filesystem::path& path, const DemReport& report) {
-  Json json{{"groundray_dem", 1}, {"facts", Json::object()}};
-  for (const auto& [name, value] : report.facts) json["facts"][name] = value;
-  const glm::dvec3& origin_m = report.georeference.origin_w_m;
-  json["origin_w_m"] = {origin_m.x, origin_m.y, origin_m.z};
-  json["crs"] = report.georeference.crs_name;
-  json["frame"] = json_of(report.frame);
-  json["scans"] = json_of(report.scans, "rows");
-  json["pairs"] = json_of(report.pairs, "matched");
-  json["fused"] = json_of(report.fusion);
-  for (const char* part : {"ground_filter", "sight", "smoothed", "filled", "truth"})
-    json[part] = nullptr;
-  add_options(report, json);
-  for (std::size_t i = 0; i < source_words.size(); ++i)
-    json["samples"][source_words[i]] = report.sources[i];
-  json["seconds"] = Json::object();
-  for (const auto& [stage, seconds] : report.seconds) json["seconds"][stage] = seconds;
-  json["notes"] = report.notes;
-  write_text(path, json.dump(2) + "\n");
+void check_output(const DemOutput& output, std::span<const fs::path> inputs) {
+  check_ending(output.dem, {".tif", ".tiff"});
+  std::vector<fs::path> results{output.dem};
+  if (output.picture) {
+    check_ending(*output.picture, {".png"});
+    results.push_back(*output.picture);
+  }
+  if (output.error_map) {
+    check_ending(*output.error_map, {".tif", ".tiff"});
+    results.push_back(*output.error_map);
+  }
+  if (output.report) results.push_back(*output.report);
+  check_results(results, inputs);
+}
+
+void write_output(const DemOutput& output, DemReport& report) {
+  const DemLayers& layers = report.result.layers;
+  ResultFiles files;
+  if (output.picture) {
+    PictureScale scale;
+    const std::vector<float> errors_m = report.truth ? report.truth->error_m : std::vector<float>{};
+    files.write(*output.picture,
+                [&](const fs::path& path) { write_png(path, draw_dem(layers, errors_m, scale)); });
+    report.colour_m = scale.most_m;
+  }
+  if (output.error_map && report.truth) {
+    const std::vector<RasterLayer> bands{{"error", "m", report.truth->error_m},
+                                         {"normalised_error", "", report.truth->normalised}};
+    files.write(*output.error_map, [&](const fs::path& path) {
+      write_layers(path, layers.frame, report.georeference, bands);
+    });
+  }
+  if (output.report)
+    files.write(*output.report,
+                [&](const fs::path& path) { write_json(path, output.facts, report); });
+  files.write(output.dem,
+              [&](const fs::path& path) { write_layers(path, layers, report.georeference); });
+  files.appear();
 }
 
 }  // namespace groundray

@@ -1,57 +1,63 @@
 #pragma once
 
-#include <array>
 #include <cstddef>
 #include <filesystem>
 #include <optional>
+#include <span>
 #include <string>
-#include <utility>
 #include <vector>
 
-#include "apps/groundray/dem/dem_points.h"
-#include "apps/groundray/dem/dem_truth.h"
-#include "apps/groundray/dem/fill_report.h"
-#include "core/geometry/grid_frame.h"
+#include "apps/groundray/dem/dem_request.h"
+#include "core/image/image.h"
 #include "core/io/mesh_io.h"
-#include "reconstruction/dem/fusion/dem_fusion.h"
-#include "reconstruction/dem/ground/ground_filter.h"
+#include "reconstruction/dem/dem_layers.h"
+#include "reconstruction/pipeline/dem_pipeline.h"
+#include "reconstruction/pipeline/dem_truth.h"
 
 namespace groundray {
 
-/// Result of smoothing.
-struct SmoothTally {
-  double curvature_sd_per_m = 0;
-  std::size_t rounds = 0;
+/// Statistics of a scan or a stereo pair.
+struct PointTally {
+  std::string name;
+  std::size_t rows = 0;            ///< rows of the file, or matched pixels
+  std::size_t points = 0;          ///< number of points passed on to the DEM
+  bool is_noiseless = false;       ///< true if no standard deviation of ranges is known
+  std::vector<std::string> notes;  ///< messages for the user
 };
 
-/// Statistics of the upper bounds from lines of sight.
-struct BoundTally {
-  std::size_t samples = 0;
-  std::size_t broken = 0;  ///< heights that exceed their bound by three standard deviations
-};
-
-/// Report on a DEM made from scans and stereo pairs.
+/// DEM made from scans and stereo pairs, and the report on it.
 struct DemReport {
-  std::vector<std::pair<std::string, std::string>> facts;  ///< names and values about the command
   std::vector<PointTally> scans, pairs;
-  std::optional<GroundCounts> ground;
-  FusionCounts fusion;
-  std::optional<BoundTally> bound;
-  std::optional<SmoothTally> smoothed;
-  std::optional<FillTally> filled;
-  std::array<std::size_t, 5> sources{};  ///< number of samples by HeightSource
-  std::vector<HeightErrors> errors;      ///< comparison with the truth, or empty
+  DemResult result;
+  std::optional<TruthComparison> truth;
   double colour_m = 0;  ///< value of the picture's most saturated colour; 0 without one
-  GridFrame frame;
   Georeference georeference;
-  std::vector<std::pair<std::string, double>> seconds;  ///< duration of each stage
+  StageSeconds seconds;  ///< including those of `result`
   std::vector<std::string> notes;
 };
+
+/// Colour scale of a picture's third panel.
+struct PictureScale {
+  double most_m = 0;  ///< error or standard deviation of the most saturated colour, m
+};
+
+/// Draws a DEM as panels side by side, north up: a hillshade of the measured samples, with holes
+/// dark; the same with filled samples, in orange; and the error, red where the DEM is too high and
+/// blue where it is too low. Without errors, the third panel shows the stated standard deviation
+/// (yellow is small, violet large). `scale` is set so that 95 % of the values are within it.
+/// @param error_m  error of each sample, or empty.
+Image8 draw_dem(const DemLayers& layers, const std::vector<float>& error_m, PictureScale& scale);
 
 /// Prints a report as text.
 void print(const DemReport& report);
 
-/// Writes a report as JSON (docs/reference/formats.md). @throws Error as write_whole.
-void write_json(const std::filesystem::path& path, const DemReport& report);
+/// Checks, before long computations, that the results can be written.
+/// @throws Error if not.
+void check_output(const DemOutput& output, std::span<const std::filesystem::path> inputs);
+
+/// Writes all requested results, with the report as JSON (docs/reference/formats.md): either all
+/// files appear, each complete, or none. Sets the picture's scale in the report.
+/// @throws Error as the writers of the formats.
+void write_output(const DemOutput& output, DemReport& report);
 
 }  // namespace groundray

@@ -1,14 +1,12 @@
-#include "apps/groundray/dem/dem_stereo.h"
-
 #include <fmt/format.h>
 
 #include <algorithm>
 #include <array>
 #include <cmath>
-#include <glm/geometric.hpp>
 #include <memory>
 #include <utility>
 
+#include "apps/groundray/dem/dem_input.h"
 #include "core/error.h"
 #include "core/image/exr_io.h"
 #include "core/image/image_io.h"
@@ -113,49 +111,19 @@ void check_poses(const RecordedCamera& camera, const RecordedFrame& frame, doubl
   check_gap(fmt::format("poses/{}.tum", camera.name), camera.X_DC, at, at, longest_gap_s);
 }
 
-// Adds the errors of the cameras' poses to the bias of the points from `first` on.
-void add_pose_bias(const PointNoise& noise, const glm::dvec3& eye_m, std::size_t first,
-                   MeasuredPoints& points) {
-  for (std::size_t i = first; i < points.size(); ++i) {
-    const glm::dvec2 flat_m = glm::dvec2(points.p_m[i]) - glm::dvec2(eye_m);
-    const double pose_m =
-        std::hypot(noise.position_sd_m, glm::length(flat_m) * noise.attitude_sd_rad);
-    points.bias_sd_m[i] = static_cast<float>(std::hypot(points.bias_sd_m[i], pose_m));
-  }
-}
-
-// Matches two images. As their sizes are equal and the options valid, an error is about memory.
-DisparityMap match_within(const RectifiedImage& left, const RectifiedImage& right,
-                          const MatchOptions& options) {
-  try {
-    return match(left, right, options);
-  } catch (const Error& fault) {
-    throw Error("{} (--memory-mb allows more)", fault.what());
-  }
-}
-
-PointTally add_points(const ImagePair& images, const StereoTaking& taking, const PointNoise& noise,
-                      std::uint32_t group, MeasuredPoints& to) {
+PointTally add_points(const ImagePair& images, const StereoOptions& options,
+                      const MeasurementNoise& noise, std::uint32_t group, MeasuredPoints& to) {
   const auto& [left, right] = images.pair->cameras;
   const RecordedFrame& left_frame = left.frames[images.left];
   const RecordedFrame& right_frame = right.frames[images.right];
   check_poses(left, left_frame, noise.longest_pose_gap_s);
   check_poses(right, right_frame, noise.longest_pose_gap_s);
-  const StereoView left_view = view_of(left, left_frame);
-  const StereoView right_view = view_of(right, right_frame);
-  const auto greys = read_images(images);
-  const PinholePair pair = pinhole_pair(left_view, right_view);
-  const DisparityMap map =
-      match_within(resample(greys[0], pair, StereoSide::Left, left_view),
-                   resample(greys[1], pair, StereoSide::Right, right_view), taking.matching);
-  const StereoPoints points = stereo_points(pair, left_view, map, taking.points);
-  const std::size_t first = to.size();
-  append(points, group, to);
-  add_pose_bias(noise, left_view.X_DC.translation_m, first, to);
-  const auto disparities = map.disparity_px.values();
-  const auto matched = std::ranges::count_if(disparities, [](float d) { return !std::isnan(d); });
-  return {
-      .name = images.name, .rows = static_cast<std::size_t>(matched), .points = to.size() - first};
+  const std::size_t before = to.size();
+  const std::size_t matched =
+      append({.views = {view_of(left, left_frame), view_of(right, right_frame)},
+              .greys = read_images(images)},
+             options, noise.points, group, to);
+  return {.name = images.name, .rows = matched, .points = to.size() - before};
 }
 
 }  // namespace
@@ -187,12 +155,15 @@ std::vector<ImagePair> image_pairs(const std::vector<RecordedPair>& pairs, const
   return images;
 }
 
-PointTally add_stereo_points(const ImagePair& images, const StereoTaking& taking,
-                             const PointNoise& noise, std::uint32_t group, MeasuredPoints& to) {
+PointTally add_stereo_points(const ImagePair& images, const StereoOptions& options,
+                             const MeasurementNoise& noise, std::uint32_t group,
+                             MeasuredPoints& to) {
   try {
-    return add_points(images, taking, noise, group, to);
-  } catch (const Error& error) {
-    throw Error("{}: {}", images.name, error.what());
+    return add_points(images, options, noise, group, to);
+  } catch (const Error& fault) {
+    const std::string what = fault.what();
+    const bool is_memory = what.find("(most_bytes)") != std::string::npos;
+    throw Error("{}: {}{}", images.name, what, is_memory ? " (--memory-mb allows more)" : "");
   }
 }
 

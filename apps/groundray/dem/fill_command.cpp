@@ -1,24 +1,20 @@
-#include "apps/groundray/dem/fill_command.h"
-
 #include <fmt/format.h>
 
 #include <CLI/CLI.hpp>
 #include <cmath>
-#include <cstddef>
-#include <cstdint>
-#include <cstdio>
 #include <filesystem>
+#include <memory>
 #include <optional>
 #include <string>
 #include <vector>
 
-#include "apps/groundray/dem/fill_options.h"
-#include "apps/groundray/dem/fill_report.h"
+#include "apps/groundray/command.h"
+#include "apps/groundray/dem/filling.h"
+#include "apps/groundray/progress_stage.h"
 #include "apps/groundray/result_files.h"
 #include "apps/scan/word_option.h"
 #include "apps/scene/interruption.h"
 #include "core/error.h"
-#include "core/progress.h"
 #include "reconstruction/dem/fill/dem_fill.h"
 #include "terrain/dem/dem_io.h"
 #include "terrain/dem/layers_io.h"
@@ -27,16 +23,6 @@ namespace groundray {
 namespace {
 
 namespace fs = std::filesystem;
-
-// Returns work that shows its progress and stops on interruption.
-RunControl shown_work(std::optional<Progress>& progress) {
-  return {.progress = [&progress](double share) {
-    stop_if_interrupted();
-    constexpr std::uint64_t steps = 1000;
-    if (!progress) progress.emplace(stderr, "filling, per mille", steps);
-    progress->update(static_cast<std::uint64_t>(share * steps));
-  }};
-}
 
 // Loads heights from another raster, which must have the same samples.
 std::vector<float> load_bounds(const fs::path& path, const Dem& dem) {
@@ -83,20 +69,14 @@ void print_trials(const FilledHeights& filled) {
   }
 }
 
-void print_bounds(const FillTally& tally) {
-  fmt::print("{} filled samples are limited by a bound\n", tally.at_bound);
-  print_not_least(tally);
-}
+enum class RasterFill { Tension, Cgal, Gdal, Telea, NavierStokes };
 
-}  // namespace
-
-struct FillCommand::Options {
-  enum class Method { Tension, Cgal, Gdal, Telea, NavierStokes };
-
+// Options of the command.
+struct FillCommandOptions {
   CLI::App* command = nullptr;
   fs::path dem, out, sd_out, bound;
   DemOptions reading;
-  Method method = Method::Tension;
+  RasterFill method = RasterFill::Tension;
   FillLimits limits;
   std::optional<double> tension, smoothness;
 
@@ -117,11 +97,11 @@ struct FillCommand::Options {
   }
 
   void add_choices() {
-    const Words<Method> methods{{"tension", Method::Tension},
-                                {"cgal", Method::Cgal},
-                                {"gdal", Method::Gdal},
-                                {"telea", Method::Telea},
-                                {"ns", Method::NavierStokes}};
+    const Words<RasterFill> methods{{"tension", RasterFill::Tension},
+                                    {"cgal", RasterFill::Cgal},
+                                    {"gdal", RasterFill::Gdal},
+                                    {"telea", RasterFill::Telea},
+                                    {"ns", RasterFill::NavierStokes}};
     add_words(command, "--method", method,
               "tension: smoothest surface (default); cgal: triangulated, refined and faired "
               "meshes; for comparison: gdal, as gdal_fillnodata; telea and ns, OpenCV's inpainting",
@@ -137,28 +117,30 @@ struct FillCommand::Options {
     FillOptions filling = limits.filling;
     if (tension || smoothness)
       filling.form = ThinPlateEnergy{tension.value_or(0), smoothness.value_or(0)};
-    std::optional<Progress> progress;
-    if (method == Method::Cgal)
-      return fill_dem_by_mesh(frame, heights_m, filling, limits.edges(), shown_work(progress));
-    if (method == Method::Gdal) {
+    StageProgress progress("per mille", 1000);
+    const RunControl work{.progress = [&](double share) { progress.update("filling", share); }};
+    if (method == RasterFill::Cgal)
+      return fill_dem_by_mesh(frame, heights_m, filling, limits.edges(), work);
+    if (method == RasterFill::Gdal) {
       const double farthest_cells = std::hypot(frame.samples.x, frame.samples.y);
       return take_filling(frame, heights_m, fill_by_gdal(frame.samples, heights_m, farthest_cells),
                           filling);
     }
-    if (method != Method::Tension) {
-      const Inpainting by = method == Method::Telea ? Inpainting::Telea : Inpainting::NavierStokes;
+    if (method != RasterFill::Tension) {
+      const Inpainting by =
+          method == RasterFill::Telea ? Inpainting::Telea : Inpainting::NavierStokes;
       return take_filling(frame, heights_m, fill_by_inpainting(frame.samples, heights_m, by),
                           filling);
     }
     std::vector<float> most_m;
     if (!bound.empty()) most_m = load_bounds(bound, read);
-    return fill_dem(frame, heights_m, most_m, filling, shown_work(progress));
+    return fill_dem(frame, heights_m, most_m, filling, work);
   }
 
   void refuse_mixtures() const {
-    if (limits.most_edges && method != Method::Cgal)
+    if (limits.most_edges && method != RasterFill::Cgal)
       throw Error("--most-edges applies only to --method cgal; omit it, or select that method");
-    if (method == Method::Tension) return;
+    if (method == RasterFill::Tension) return;
     if (!sd_out.empty() || !bound.empty() || tension || smoothness)
       throw Error(
           "--sd-out, --bound, --tension and --smoothness apply only to --method tension; omit "
@@ -198,24 +180,25 @@ struct FillCommand::Options {
     write(read, filled);
     const FillTally tally = tally_of(filled);
     print_fates(tally);
-    if (method == Method::Tension) print_trials(filled);
-    if (!bound.empty()) print_bounds(tally);
+    if (method == RasterFill::Tension) print_trials(filled);
+    if (!bound.empty()) {
+      fmt::print("{} filled samples are limited by a bound\n", tally.at_bound);
+      print_not_least(tally);
+    }
     fmt::print("{} of {} missing samples filled; written to {}\n", filled.filled,
                read.grid.hole_count(), out.string());
   }
 };
 
-FillCommand::FillCommand(CLI::App& terrain) : options_(std::make_unique<Options>()) {
-  options_->command = terrain.add_subcommand(
+}  // namespace
+
+Command add_fill_command(CLI::App& terrain) {
+  const auto options = std::make_shared<FillCommandOptions>();
+  options->command = terrain.add_subcommand(
       "fill", "Fill blank areas of a DEM and estimate the errors of the filled heights");
-  options_->add_files();
-  options_->add_choices();
+  options->add_files();
+  options->add_choices();
+  return {options->command, [options] { options->run(); }};
 }
-
-FillCommand::~FillCommand() = default;
-
-bool FillCommand::is_asked_for() const { return options_->command->parsed(); }
-
-void FillCommand::run() const { options_->run(); }
 
 }  // namespace groundray

@@ -1,62 +1,48 @@
-#include "apps/groundray/mesh/rebuild_report.h"
-
 #include <fmt/format.h>
 
 #include <algorithm>
 #include <array>
 #include <nlohmann/json.hpp>
+#include <string_view>
+#include <utility>
 
+#include "apps/groundray/mesh/rebuild.h"
+#include "apps/groundray/result_files.h"
+#include "core/error.h"
 #include "core/io/file_io.h"
+#include "reconstruction/mesh/measured_mesh_io.h"
 
 namespace groundray {
 namespace {
 
+namespace fs = std::filesystem;
 using Json = nlohmann::ordered_json;
 
-const char* word_of(HoleLeft why) {
-  switch (why) {
-    case HoleLeft::Outline:
-      return "outline";
-    case HoleLeft::TooLong:
-      return "too_long";
-    case HoleLeft::TooManyEdges:
-      return "too_many_edges";
-    case HoleLeft::NotManifold:
-      return "not_manifold";
-    case HoleLeft::NoFilling:
-      return "no_filling";
-    case HoleLeft::Crossing:
-      break;
-  }
-  return "crossing";
-}
-
-const char* sentence_of(HaltReason reason) {
-  switch (reason) {
-    case HaltReason::Bound:
-      return "halted by the bound";
-    case HaltReason::Budget:
-      return "as few as asked for";
-    case HaltReason::Knee:
-      return "halted at the knee";
-    case HaltReason::Shape:
-      break;
-  }
-  return "no further edge can go without folds or tears";
-}
+// Words for HoleLeft in reports, and descriptions of HaltReason, in the order of the enumerators.
+constexpr std::array<const char*, 6> hole_words{"outline",      "too_long",   "too_many_edges",
+                                                "not_manifold", "no_filling", "crossing"};
+constexpr std::array<const char*, 4> halt_sentences{
+    "halted by the bound", "as few as asked for", "halted at the knee",
+    "no further edge can go without folds or tears"};
 
 double percent(std::size_t part, std::size_t of) {
   return of == 0 ? 0 : 100 * static_cast<double>(part) / static_cast<double>(of);
 }
 
+// Columns of ScanTally, with their names in files.
+constexpr std::array<std::pair<const char*, std::size_t ScanTally::*>, 7> scan_columns{
+    {{"rows", &ScanTally::rows},
+     {"no_returns", &ScanTally::no_returns},
+     {"other_returns", &ScanTally::other_returns},
+     {"crowded", &ScanTally::crowded},
+     {"used", &ScanTally::used},
+     {"accepted_faces", &ScanTally::accepted},
+     {"rejected_faces", &ScanTally::rejected}}};
+
 ScanTally sum_of(const std::vector<ScanTally>& scans) {
   ScanTally sum{.name = fmt::format("{} scans", scans.size())};
-  for (const ScanTally& scan : scans) {
-    for (std::size_t ScanTally::*count :
-         {&ScanTally::rows, &ScanTally::no_returns, &ScanTally::other_returns, &ScanTally::crowded,
-          &ScanTally::used, &ScanTally::accepted, &ScanTally::rejected})
-      sum.*count += scan.*count;
-  }
+  for (const ScanTally& scan : scans)
+    for (const auto& [name, column] : scan_columns) sum.*column += scan.*column;
   return sum;
 }
 
@@ -76,27 +62,33 @@ void print_scans(const std::vector<ScanTally>& scans) {
   if (scans.size() > 1) print_row(sum_of(scans));
 }
 
-void print_holes(const HoleTally& holes) {
-  constexpr std::size_t kinds = 6;
-  std::array<std::size_t, kinds> counts{};
+std::size_t patch_triangles(const FilledMesh& holes) {
+  std::size_t triangles = 0;
+  for (const FilledHole& hole : holes.filled) triangles += hole.triangles;
+  return triangles;
+}
+
+void print_holes(const FilledMesh& holes) {
+  std::array<std::size_t, hole_words.size()> counts{};
   for (const OpenHole& hole : holes.left) ++counts[static_cast<std::size_t>(hole.why)];
   std::string left;
-  for (std::size_t kind = 0; kind < kinds; ++kind) {
+  for (std::size_t kind = 0; kind < counts.size(); ++kind) {
     if (counts[kind] == 0) continue;
-    std::string word = word_of(static_cast<HoleLeft>(kind));
+    std::string word = hole_words[kind];
     std::ranges::replace(word, '_', ' ');
     left += fmt::format("{}{} {}", left.empty() ? ": " : ", ", counts[kind], word);
   }
-  fmt::print("holes: {} filled with {} triangles, {} left{}\n", holes.filled, holes.triangles,
-             holes.left.size(), left);
+  fmt::print("holes: {} filled with {} triangles, {} left{}\n", holes.filled.size(),
+             patch_triangles(holes), holes.left.size(), left);
 }
 
-void print_simplified(const SimplifyTally& tally) {
-  const TwoSidedError& error = tally.error;
+void print_simplified(const MeshResult& result, const Simplified& simplified) {
+  const TwoSidedError& error = simplified.error;
   const HausdorffDistance largest = error.largest();
-  fmt::print("simplified: {} to {} triangles ({:.3g} %), {}\n", tally.from, tally.to,
-             percent(tally.to, tally.from), sentence_of(tally.halted_by));
-  const MeshRepairs& repairs = tally.repairs;
+  const std::size_t from = result.full_triangles, to = result.mesh.shape.triangles.size();
+  fmt::print("simplified: {} to {} triangles ({:.3g} %), {}\n", from, to, percent(to, from),
+             halt_sentences[static_cast<std::size_t>(simplified.halted_by)]);
+  const MeshRepairs& repairs = simplified.repairs;
   if (repairs.dropped_triangles + repairs.cut_edges + repairs.parted_vertices > 0) {
     fmt::print("repaired before: {} triangles dropped, {} edges cut open, {} vertices split\n",
                repairs.dropped_triangles, repairs.cut_edges, repairs.parted_vertices);
@@ -104,7 +96,7 @@ void print_simplified(const SimplifyTally& tally) {
   fmt::print(
       "error, both ways: largest {:.4g} to {:.4g} m, mean {:.4g} m, root mean square {:.4g} m\n",
       largest.at_least_m, largest.at_most_m, error.mean_m(), error.rms_m());
-  if (const auto& heights = tally.vertical) {
+  if (const auto& heights = simplified.vertical) {
     fmt::print("error of heights: largest {:.4g} m, mean {:.4g} m, root mean square {:.4g} m",
                heights->largest_m, heights->mean_m, heights->rms_m);
     if (heights->aside_m > 0)
@@ -133,14 +125,9 @@ Json json_of(const VerticalError& error) {
 }
 
 Json json_of(const ScanTally& scan) {
-  return {{"name", scan.name},
-          {"rows", scan.rows},
-          {"no_returns", scan.no_returns},
-          {"other_returns", scan.other_returns},
-          {"crowded", scan.crowded},
-          {"used", scan.used},
-          {"accepted_faces", scan.accepted},
-          {"rejected_faces", scan.rejected}};
+  Json json{{"name", scan.name}};
+  for (const auto& [name, column] : scan_columns) json[name] = scan.*column;
+  return json;
 }
 
 Json json_of(const MergeCounts& counts) {
@@ -150,78 +137,124 @@ Json json_of(const MergeCounts& counts) {
           {"left_out", counts.left_out}};
 }
 
-Json json_of(const HoleTally& holes) {
+Json json_of(const FilledMesh& holes) {
   Json left = Json::array();
   for (const auto& [rim, why] : holes.left) {
-    left.push_back({{"why", word_of(why)},
+    left.push_back({{"why", hole_words[static_cast<std::size_t>(why)]},
                     {"rim_m", rim.length_m},
                     {"edges", rim.vertices.size()},
                     {"middle_m", {rim.middle_m.x, rim.middle_m.y, rim.middle_m.z}}});
   }
-  return {{"filled", holes.filled}, {"triangles", holes.triangles}, {"left", std::move(left)}};
+  return {{"filled", holes.filled.size()},
+          {"triangles", patch_triangles(holes)},
+          {"left", std::move(left)}};
 }
 
-Json json_of(const SimplifyTally& tally) {
-  const HausdorffDistance hausdorff = tally.error.largest();
-  return {{"from_triangles", tally.from},
-          {"to_triangles", tally.to},
-          {"halted_by", word_of(tally.halted_by)},
+Json json_of(const MeshResult& result, const Simplified& simplified) {
+  const HausdorffDistance hausdorff = simplified.error.largest();
+  const MeshRepairs& repairs = simplified.repairs;
+  return {{"from_triangles", result.full_triangles},
+          {"to_triangles", result.mesh.shape.triangles.size()},
+          {"halted_by", word_of(simplified.halted_by)},
           {"repairs",
-           {{"dropped_triangles", tally.repairs.dropped_triangles},
-            {"unused_vertices", tally.repairs.unused_vertices},
-            {"cut_edges", tally.repairs.cut_edges},
-            {"parted_vertices", tally.repairs.parted_vertices}}},
+           {{"dropped_triangles", repairs.dropped_triangles},
+            {"unused_vertices", repairs.unused_vertices},
+            {"cut_edges", repairs.cut_edges},
+            {"parted_vertices", repairs.parted_vertices}}},
           {"hausdorff", {{"at_least_m", hausdorff.at_least_m}, {"at_most_m", hausdorff.at_most_m}}},
-          {"to_simplified", json_of(tally.error.forth)},
-          {"to_original", json_of(tally.error.back)},
-          {"vertical", tally.vertical ? json_of(*tally.vertical) : Json()}};
+          {"to_simplified", json_of(simplified.error.forth)},
+          {"to_original", json_of(simplified.error.back)},
+          {"vertical", simplified.vertical ? json_of(*simplified.vertical) : Json()}};
 }
 
-template <typename T>
-Json json_of(const std::optional<T>& part) {
-  return part ? json_of(*part) : Json();
+void write_json(const fs::path& path, const ReportFacts& facts, const RebuildReport& report) {
+  const MeshResult& result = report.result;
+  Json named = Json::object(), seconds = Json::object(), scans = Json::array();
+  for (const auto& [name, value] : facts) named[name] = value;
+  for (const StageSeconds& stages : {report.seconds, result.seconds})
+    for (const auto& [stage, spent_s] : stages) seconds[stage] = spent_s;
+  for (const ScanTally& scan : report.scans) scans.push_back(json_of(scan));
+  const glm::dvec3 origin_m = report.georeference.origin_w_m;
+  const Json whole{{"groundray_reconstruction", 1},
+                   {"facts", std::move(named)},
+                   {"origin_w_m", {origin_m.x, origin_m.y, origin_m.z}},
+                   {"crs", report.georeference.crs_name},
+                   {"scans", std::move(scans)},
+                   {"merged", result.merged_scans > 1 ? json_of(result.merged) : Json()},
+                   {"holes", result.holes ? json_of(*result.holes) : Json()},
+                   {"simplified", result.simplified ? json_of(result, *result.simplified) : Json()},
+                   {"mesh",
+                    {{"triangles", result.mesh.shape.triangles.size()},
+                     {"vertices", result.mesh.shape.vertices_m.size()},
+                     {"area_m2", result.area_m2}}},
+                   {"seconds", std::move(seconds)},
+                   {"notes", report.notes}};
+  // Names of files may be invalid UTF-8.
+  write_text(path, whole.dump(2, ' ', false, Json::error_handler_t::replace) + "\n");
+}
+
+void check_mesh_name(const fs::path& path) {
+  static constexpr std::array<std::string_view, 4> endings{".ply", ".obj", ".stl", ".glb"};
+  if (std::ranges::find(endings, file_ending(path)) == endings.end())
+    throw Error("{}: the name of a mesh must end in .ply, .obj, .stl or .glb", path.string());
+}
+
+// Writes occlusion faces; a .ply has the origin of the beam at each vertex.
+void write_occlusion(const fs::path& path, const OcclusionFaces& faces,
+                     const Georeference& georeference) {
+  if (file_ending(path) != ".ply")
+    return write_measured_mesh(path, {.shape = faces.shape}, georeference);
+  MeshColumns columns{.vertices = PointCloud(faces.origins_m.size())};
+  for (int axis = 0; axis < 3; ++axis) {
+    const auto values = columns.vertices.add<double>(fmt::format("origin_{}", "xyz"[axis]));
+    for (std::size_t i = 0; i < values.size(); ++i) values[i] = faces.origins_m[i][axis];
+  }
+  write_ply(path, faces.shape, georeference, columns);
 }
 
 }  // namespace
 
 void print(const RebuildReport& report) {
+  const MeshResult& result = report.result;
   if (!report.scans.empty()) print_scans(report.scans);
-  if (const auto& merged = report.merged; merged && report.scans.size() > 1) {
+  if (result.merged_scans > 1) {
+    const MergeCounts& merged = result.merged;
     fmt::print(
         "merged: {} redundant triangles and {} in visibility conflicts removed, {} clipped, {} "
         "left out; {} slits filled, {} gaps bridged, {} vertices moved\n",
-        merged->redundant, merged->visibility_conflicts, merged->clipped, merged->left_out,
-        merged->filled, merged->bridged, merged->moved);
+        merged.redundant, merged.visibility_conflicts, merged.clipped, merged.left_out,
+        merged.filled, merged.bridged, merged.moved);
   }
-  if (report.holes) print_holes(*report.holes);
-  if (report.simplified) print_simplified(*report.simplified);
-  fmt::print("mesh: {} triangles, {} vertices, {:.6g} m²\n", report.triangles, report.vertices,
-             report.area_m2);
+  if (result.holes) print_holes(*result.holes);
+  if (result.simplified) print_simplified(result, *result.simplified);
+  fmt::print("mesh: {} triangles, {} vertices, {:.6g} m²\n", result.mesh.shape.triangles.size(),
+             result.mesh.shape.vertices_m.size(), result.area_m2);
   for (const std::string& note : report.notes) fmt::print("note: {}\n", note);
 }
 
-void write_json(const std::filesystem::path& path, const RebuildReport& report) {
-  Json facts = Json::object(), seconds = Json::object(), scans = Json::array();
-  for (const auto& [name, value] : report.facts) facts[name] = value;
-  for (const auto& [stage, spent_s] : report.seconds) seconds[stage] = spent_s;
-  for (const ScanTally& scan : report.scans) scans.push_back(json_of(scan));
-  const glm::dvec3 origin_m = report.georeference.origin_w_m;
-  const Json whole{{"groundray_reconstruction", 1},
-                   {"facts", std::move(facts)},
-                   {"origin_w_m", {origin_m.x, origin_m.y, origin_m.z}},
-                   {"crs", report.georeference.crs_name},
-                   {"scans", std::move(scans)},
-                   {"merged", json_of(report.merged)},
-                   {"holes", json_of(report.holes)},
-                   {"simplified", json_of(report.simplified)},
-                   {"mesh",
-                    {{"triangles", report.triangles},
-                     {"vertices", report.vertices},
-                     {"area_m2", report.area_m2}}},
-                   {"seconds", std::move(seconds)},
-                   {"notes", report.notes}};
-  // Names of files may be invalid UTF-8.
-  write_text(path, whole.dump(2, ' ', false, Json::error_handler_t::replace) + "\n");
+void check_output(const MeshOutput& output, std::span<const fs::path> inputs) {
+  check_mesh_name(output.mesh);
+  if (output.occlusion) check_mesh_name(*output.occlusion);
+  std::vector<fs::path> results{output.mesh};
+  if (output.occlusion) results.push_back(*output.occlusion);
+  if (output.report) results.push_back(*output.report);
+  check_results(results, inputs);
+}
+
+void write_output(const MeshOutput& output, const RebuildReport& report) {
+  ResultFiles files;
+  if (output.occlusion) {
+    files.write(*output.occlusion, [&](const fs::path& path) {
+      write_occlusion(path, report.occlusion, report.georeference);
+    });
+  }
+  if (output.report)
+    files.write(*output.report,
+                [&](const fs::path& path) { write_json(path, output.facts, report); });
+  files.write(output.mesh, [&](const fs::path& path) {
+    write_measured_mesh(path, report.result.mesh, report.georeference);
+  });
+  files.appear();
 }
 
 }  // namespace groundray

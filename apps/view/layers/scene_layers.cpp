@@ -14,7 +14,7 @@
 
 #include "apps/view/layers/line_layer.h"
 #include "sensors/camera/lens/lens.h"
-#include "sensors/lidar/pattern/pulse_batch.h"
+#include "sensors/lidar/pattern/firing_cycle.h"
 #include "sensors/lidar/pattern/scan_pattern.h"
 
 namespace groundray {

@@ -7,7 +7,7 @@
 #include <utility>
 
 #include "core/error.h"
-#include "core/geometry/mesh_check.h"
+#include "core/geometry/mesh.h"
 #include "core/model/model.h"
 
 namespace groundray {

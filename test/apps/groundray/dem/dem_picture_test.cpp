@@ -1,5 +1,3 @@
-#include "apps/groundray/dem/dem_picture.h"
-
 #include <gmock/gmock.h>
 #include <gtest/gtest.h>
 
@@ -7,6 +5,8 @@
 #include <array>
 #include <cmath>
 #include <limits>
+
+#include "apps/groundray/dem/dem_report.h"
 
 namespace groundray::dem_picture_test {
 namespace {

@@ -1,5 +1,3 @@
-#include "apps/groundray/dem/dem_stereo.h"
-
 #include <gmock/gmock.h>
 #include <gtest/gtest.h>
 
@@ -11,6 +9,7 @@
 #include <string>
 #include <vector>
 
+#include "apps/groundray/dem/dem_input.h"
 #include "core/error.h"
 #include "core/image/png_io.h"
 #include "test/support/temporary_folder.h"
@@ -148,7 +147,7 @@ TEST(DemStereo, PoseErrorsAddToTheBias) {
   MeasuredPoints exact, off;
   add_stereo_points(pictures.images(), {}, {}, 0, exact);
   const PointNoise noise{.position_sd_m = 0.03, .attitude_sd_rad = 0.01};
-  add_stereo_points(pictures.images(), {}, noise, 0, off);
+  add_stereo_points(pictures.images(), {}, {.points = noise}, 0, off);
   ASSERT_EQ(off.p_m, exact.p_m);
   EXPECT_EQ(off.sd_m, exact.sd_m);
   for (std::size_t i = 0; i < off.size(); ++i) {
@@ -158,7 +157,7 @@ TEST(DemStereo, PoseErrorsAddToTheBias) {
   }
 }
 
-std::string fault_of(const Pictures& pictures, const StereoTaking& taking = {}) {
+std::string fault_of(const Pictures& pictures, const StereoOptions& taking = {}) {
   MeasuredPoints points;
   try {
     add_stereo_points(pictures.images(), taking, {}, 0, points);
@@ -172,7 +171,7 @@ std::string fault_of(const Pictures& pictures, const StereoTaking& taking = {}) 
 TEST(DemStereo, ErrorsNameFileAndCause) {
   Pictures pictures;
   EXPECT_EQ(fault_of(pictures), "none");
-  StereoTaking small;
+  StereoOptions small;
   small.matching.most_bytes = 1000;
   EXPECT_THAT(fault_of(pictures, small),
               AllOf(HasSubstr("pair/000000: matching"), HasSubstr("--memory-mb")));

@@ -1,4 +1,4 @@
-#include "apps/groundray/dem/dem_truth.h"
+#include "reconstruction/pipeline/dem_truth.h"
 
 #include <gtest/gtest.h>
 

@@ -1,11 +1,28 @@
 #pragma once
 
 #include <cstddef>
+#include <optional>
 #include <vector>
 
 #include "reconstruction/dem/fill/dem_fill.h"
 
+namespace CLI {
+class App;
+}
+
 namespace groundray {
+
+/// Options that select the blank areas of a DEM to be filled.
+struct FillLimits {
+  FillOptions filling;
+  std::optional<std::size_t> most_edges;
+
+  /// Adds the options to a command or option group.
+  void add(CLI::App* command);
+
+  /// Largest number of edges of a hole's boundary, for fill_dem_by_mesh.
+  std::size_t edges() const { return most_edges.value_or(1000); }
+};
 
 /// Statistics of the blank areas with one fate.
 struct FateTally {
@@ -17,9 +34,8 @@ struct FateTally {
 /// Statistics of a DEM's blank areas.
 struct FillTally {
   std::vector<FateTally> fates;  ///< fates that occur
-  std::vector<TrialReport> trials;
-  std::size_t at_bound = 0;   ///< number of filled samples limited by their bounds
-  std::size_t not_least = 0;  ///< number of holes with bounds whose filling may not be optimal
+  std::size_t at_bound = 0;      ///< number of filled samples limited by their bounds
+  std::size_t not_least = 0;     ///< number of holes with bounds whose filling may not be optimal
 };
 
 /// Counts blank areas by fate.

@@ -1,4 +1,4 @@
-#include "apps/groundray/dem/dem_points.h"
+#include "apps/groundray/dem/dem_input.h"
 
 #include <gmock/gmock.h>
 #include <gtest/gtest.h>
@@ -13,13 +13,12 @@
 #include <utility>
 #include <vector>
 
-#include "apps/groundray/dem/dem_sight.h"
 #include "core/error.h"
 #include "core/io/ply_io.h"
 #include "reconstruction/dem/fill/sight_bound.h"
 #include "test/support/temporary_folder.h"
 
-namespace groundray::dem_points_test {
+namespace groundray::dem_input_test {
 namespace {
 
 using ::testing::ElementsAre;
@@ -52,12 +51,24 @@ ScanFiles files_of(const std::filesystem::path& path) {
           .georeference = {}};
 }
 
-MeasuredPoints all_of(LidarPoints points) {
-  LidarBlock block;
-  EXPECT_TRUE(points.next(block));
-  LidarBlock rest;
-  EXPECT_FALSE(points.next(rest));
-  return block.points;
+// Returns the blocks of all scans.
+std::vector<LidarBlock> blocks_of(const ScanFiles& files, const ScanTaking& taking,
+                                  const MeasurementNoise& noise) {
+  DemRequest request{.choice = {}, .taking = taking, .noise = noise};
+  for (const ScanFile& scan : files.scans) request.choice.inputs.push_back(scan.file);
+  StageProgress progress;
+  DemInput input(request, files, {}, progress);
+  std::vector<LidarBlock> blocks;
+  input.rewind_to_scans();
+  for (LidarBlock block; input.next(block);) blocks.push_back(block);
+  return blocks;
+}
+
+MeasuredPoints all_of(const ScanFiles& files, const ScanTaking& taking,
+                      const MeasurementNoise& noise) {
+  const std::vector<LidarBlock> blocks = blocks_of(files, taking, noise);
+  EXPECT_THAT(blocks, SizeIs(1));
+  return blocks.front().points;
 }
 
 std::vector<glm::dvec3> ends_of_beams() {
@@ -93,15 +104,14 @@ Spread drawn(const std::function<glm::dvec3(std::function<double()>)>& error_m) 
 constexpr double share = 5 * 0.0036;
 
 // The oracle draws errors along and across the beam and does not use the formulas under test.
-TEST(DemPoints, PropagatesRangeAndBeamNoiseToHeightsAndPositions) {
+TEST(DemInput, PropagatesRangeAndBeamNoiseToHeightsAndPositions) {
   const TemporaryFolder folder;
   constexpr double range_sd_m = 0.03, divergence_rad = 0.012;
   const auto ends_m = ends_of_beams();
   write_scan(folder / "a.ply", ends_m);
   const ScanFiles files = files_of(folder / "a.ply");
   const ScanTaking taking{.range_sd_m = range_sd_m};
-  const auto points =
-      all_of({files, files.scans[0], taking, {.divergence_rad = divergence_rad}, 0});
+  const auto points = all_of(files, taking, {.points = {.divergence_rad = divergence_rad}});
   ASSERT_THAT(points.p_m, SizeIs(ends_m.size()));
   for (std::size_t i = 0; i < ends_m.size(); ++i) {
     const double range_m = glm::length(ends_m[i]);
@@ -140,13 +150,14 @@ TEST(DemPoints, PropagatesRangeAndBeamNoiseToHeightsAndPositions) {
   }
 }
 
-TEST(DemPoints, PoseErrorsBecomeACommonBias) {
+TEST(DemInput, PoseErrorsBecomeACommonBias) {
   const TemporaryFolder folder;
   const auto ends_m = ends_of_beams();
   write_scan(folder / "a.ply", ends_m);
-  const ScanFiles files = files_of(folder / "a.ply");
+  ScanFiles files = files_of(folder / "a.ply");
+  files.scans.resize(8, files.scans[0]);
   const PointNoise noise{.position_sd_m = 0.05, .attitude_sd_rad = 0.004};
-  const auto points = all_of({files, files.scans[0], {}, noise, 7});
+  const MeasuredPoints points = blocks_of(files, {}, {.points = noise})[7].points;
   for (std::size_t i = 0; i < ends_m.size(); ++i) {
     const Spread spread = drawn([&](const auto& normal) {
       const glm::dvec3 turn = noise.attitude_sd_rad * glm::dvec3(normal(), normal(), normal());
@@ -159,7 +170,7 @@ TEST(DemPoints, PoseErrorsBecomeACommonBias) {
   }
 }
 
-TEST(DemPoints, AirborneRangeNoiseIsHeightNoise) {
+TEST(DemInput, AirborneRangeNoiseIsHeightNoise) {
   const TemporaryFolder folder;
   write_scan(folder / "a.ply", {{600'000, 5'000'000, 240}});
   ScanFiles files = files_of(folder / "a.ply");
@@ -167,15 +178,13 @@ TEST(DemPoints, AirborneRangeNoiseIsHeightNoise) {
   files.are_posed = false;
   const ScanTaking taking{.range_sd_m = 0.04};
   PointNoise noise{.beams = BeamOrigin::Above, .position_sd_m = 0.2, .across_sd_m = 0.3};
-  const auto points = all_of({files, files.scans[0], taking, noise, 0});
+  const auto points = all_of(files, taking, {.points = noise});
   EXPECT_THAT(points.sd_m, ElementsAre(0.04f));
   EXPECT_THAT(points.bias_sd_m, ElementsAre(0.2f));
   EXPECT_THAT(points.across_sd_m, ElementsAre(0.3f));
   // Beams would have to start at a sensor at the origin of the map.
   noise.beams = BeamOrigin::Sensor;
-  LidarPoints wrong(files, files.scans[0], taking, noise, 0);
-  LidarBlock block;
-  EXPECT_THAT([&] { wrong.next(block); },
+  EXPECT_THAT(([&] { blocks_of(files, taking, {.points = noise}); }),
               ::testing::ThrowsMessage<Error>(HasSubstr("Add --airborne or --poses")));
 }
 
@@ -195,15 +204,12 @@ ScanFiles with_gap(const std::filesystem::path& file, int from_ms, int to_ms) {
 
 // The scan lasts from 100 to 200 ms; checking only the interval that contains the stamp would miss
 // most gaps.
-TEST(DemPoints, RejectsPoseGapsAnywhereInAScan) {
+TEST(DemInput, RejectsPoseGapsAnywhereInAScan) {
   const TemporaryFolder folder;
   write_scan(folder / "a.ply", {{4, 0, -3}, {0, 4, -3}, {4, 4, -3}}, {{"time", {0, 0.05, 0.1}}});
-  const PointNoise noise{.longest_pose_gap_s = 0.025};
+  const MeasurementNoise noise{.points = {}, .longest_pose_gap_s = 0.025};
   const auto read = [&](int from_ms, int to_ms) {
-    const ScanFiles files = with_gap(folder / "a.ply", from_ms, to_ms);
-    LidarBlock block;
-    LidarPoints(files, files.scans[0], {}, noise, 0).next(block);
-    return block.points.size();
+    return all_of(with_gap(folder / "a.ply", from_ms, to_ms), {}, noise).size();
   };
   for (const auto& [from_ms, to_ms] : {std::pair(110, 140), {170, 210}, {50, 250}, {80, 120}}) {
     EXPECT_THAT(([&, from = from_ms, to = to_ms] { read(from, to); }),
@@ -214,7 +220,7 @@ TEST(DemPoints, RejectsPoseGapsAnywhereInAScan) {
     EXPECT_EQ(read(from_ms, to_ms), 3U) << from_ms;
 }
 
-TEST(DemPoints, TakesOneReturnPerPulse) {
+TEST(DemInput, TakesOneReturnPerPulse) {
   const TemporaryFolder folder;
   const std::vector<glm::dvec3> points_m{
       {1, 0, -1}, {2, 0, -2}, {3, 0, -3}, {0, 1, -1}, {0, 2, -2}};
@@ -230,8 +236,7 @@ TEST(DemPoints, TakesOneReturnPerPulse) {
     files.scans[0].X_DS = {};
     std::vector<double> z_m;
     const ScanTaking taking{.returns = choice};
-    for (const glm::dvec3& p : all_of({files, files.scans[0], taking, {}, 0}).p_m)
-      z_m.push_back(p.z);
+    for (const glm::dvec3& p : all_of(files, taking, {}).p_m) z_m.push_back(p.z);
     return z_m;
   };
   for (const Columns& keys : {pulses, firings}) {
@@ -242,7 +247,7 @@ TEST(DemPoints, TakesOneReturnPerPulse) {
   EXPECT_THAT(heights_m({}, ReturnChoice::First), SizeIs(5));  // pulses unknown: all are kept
 }
 
-TEST(DemPoints, BlocksContainAllPointsOfTheFile) {
+TEST(DemInput, BlocksContainAllPointsOfTheFile) {
   const TemporaryFolder folder;
   std::mt19937 random(2);
   std::uniform_real_distribution<double> anywhere(-50, 50);
@@ -271,16 +276,14 @@ TEST(DemPoints, BlocksContainAllPointsOfTheFile) {
   EXPECT_EQ(all.sd_m, whole.sd_m);
 }
 
-TEST(DemPoints, ChecksMemoryForFilesThatCannotBeReadInBlocks) {
+TEST(DemInput, ChecksMemoryForFilesThatCannotBeReadInBlocks) {
   const TemporaryFolder folder;
   std::ofstream(folder / "a.ply")
       << "ply\nformat ascii 1.0\nelement vertex 2\nproperty float x\n"
          "property float y\nproperty float z\nend_header\n1 2 3\n4 5 6\n";
   const ScanFiles files = files_of(folder / "a.ply");
   const ScanTaking taking{.most_bytes = 100};
-  LidarPoints points(files, files.scans[0], taking, {}, 0);
-  LidarBlock block;
-  EXPECT_THAT([&] { points.next(block); },
+  EXPECT_THAT(([&] { blocks_of(files, taking, {}); }),
               ::testing::ThrowsMessage<Error>(HasSubstr("cannot be read in blocks")));
 }
 
@@ -301,7 +304,8 @@ TEST(DemSight, RaisesLinesByTheErrorsOfTheirPoints) {
   const PointNoise noise{.position_sd_m = 0.3, .attitude_sd_rad = 0.01};
   constexpr double margin_m = 0.25;
   DemLayers layers = flat_layers();
-  const auto points = all_of({files, files.scans[0], taking, noise, 0});
+  const LidarBlock block = blocks_of(files, taking, {.points = noise}).front();
+  const MeasuredPoints& points = block.points;
   std::vector<SightLine> lines;
   for (std::size_t i = 0; i < points.size(); ++i) {
     const glm::dvec3 up_m(0, 0, 2 * std::hypot(points.sd_m[i], points.bias_sd_m[i]));
@@ -309,8 +313,7 @@ TEST(DemSight, RaisesLinesByTheErrorsOfTheirPoints) {
     lines.push_back({glm::dvec3(0, 0, eye_height_m) + up_m, points.p_m[i] + up_m});
   }
   const auto expected_m = sight_bound(layers.frame, {}, lines, margin_m);
-  LidarPoints again(files, files.scans[0], taking, noise, 0);
-  bound_by_sight(again, margin_m, layers);
+  bound_by_sight(block, margin_m, layers);
   std::size_t bound = 0;
   for (std::size_t i = 0; i < expected_m.size(); ++i) {
     ASSERT_EQ(std::isnan(layers.upper_bound_m[i]), std::isnan(expected_m[i])) << i;
@@ -322,4 +325,4 @@ TEST(DemSight, RaisesLinesByTheErrorsOfTheirPoints) {
 }
 
 }  // namespace
-}  // namespace groundray::dem_points_test
+}  // namespace groundray::dem_input_test
