@@ -25,6 +25,8 @@ struct Command {
   std::function<void()> run;
 };
 
+/// Adds `generate`, `verify` and `merge` to the program, which make, check and join datasets.
+void add_run_commands(CLI::App& app, std::vector<Command>& commands);
 /// Adds `terrain` to the program: meshes, certificates and fills of DEMs.
 void add_terrain_commands(CLI::App& app, std::vector<Command>& commands);
 /// Adds `terrain fill`, which fills the blank areas of a DEM.

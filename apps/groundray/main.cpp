@@ -9,7 +9,6 @@
 
 #include "apps/groundray/command.h"
 #include "apps/groundray/info.h"
-#include "apps/groundray/run_commands.h"
 #include "apps/scene/interruption.h"
 #include "core/error.h"
 
@@ -31,7 +30,8 @@ int run(int argc, char** argv) {
   app.set_version_flag("--version", "groundray " GROUNDRAY_VERSION);
   app.require_subcommand(1);
 
-  const groundray::RunCommands runs(app);
+  std::vector<groundray::Command> commands;
+  groundray::add_run_commands(app, commands);
 
   std::filesystem::path file;
   auto* info = app.add_subcommand("info", "Describe a file and the resources that it needs");
@@ -40,7 +40,7 @@ int run(int argc, char** argv) {
                    "memory; a scene (.yaml): its expected output; or a dataset: its contents")
       ->required();
 
-  std::vector<groundray::Command> commands{{info, [&] { groundray::print_info(file); }}};
+  commands.push_back({info, [&] { groundray::print_info(file); }});
   groundray::add_terrain_commands(app, commands);
   groundray::add_reconstruct_commands(app, commands);
 
@@ -49,12 +49,8 @@ int run(int argc, char** argv) {
   } catch (const CLI::ParseError& error) {
     return app.exit(error) == 0 ? done : wrong_usage;
   }
-  for (const groundray::Command& command : commands) {
-    if (!command.app->parsed()) continue;
-    command.run();
-    return done;
-  }
-  runs.run();
+  for (const groundray::Command& command : commands)
+    if (command.app->parsed()) command.run();
   return done;
 }
 

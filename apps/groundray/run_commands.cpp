@@ -1,5 +1,3 @@
-#include "apps/groundray/run_commands.h"
-
 #include <fmt/format.h>
 
 #include <CLI/CLI.hpp>
@@ -7,6 +5,7 @@
 #include <cstdint>
 #include <cstdio>
 #include <filesystem>
+#include <memory>
 #include <optional>
 #include <string>
 #include <system_error>
@@ -14,6 +13,7 @@
 
 #include "apps/dataset/write/merge.h"
 #include "apps/dataset/write/verify.h"
+#include "apps/groundray/command.h"
 #include "apps/groundray/generate.h"
 #include "core/error.h"
 
@@ -70,76 +70,75 @@ void merge_shards(const std::vector<fs::path>& shards, const fs::path& out, Fold
              mebibytes(bytes), out.string());
 }
 
-}  // namespace
-
-struct RunCommands::Options {
-  CLI::App *generate = nullptr, *verify = nullptr, *merge = nullptr;
+// Options of the commands for runs.
+struct RunOptions {
   fs::path scene, out;
   bool resume = false;
   std::optional<std::uint64_t> seed;
   std::string shard, log;
   std::vector<fs::path> datasets;
 
-  void add_generate(CLI::App& app) {
-    generate = app.add_subcommand(
+  FolderUse use() const { return resume ? FolderUse::Resume : FolderUse::New; }
+
+  CLI::App* add_generate(CLI::App& app) {
+    CLI::App* command = app.add_subcommand(
         "generate",
         "Run a scene and write its dataset: scans, images, poses, calibration, pictures");
-    generate->add_option("SCENE", scene, "Scene file (YAML, see docs/reference/scene.md)")
+    command->add_option("SCENE", scene, "Scene file (YAML, see docs/reference/scene.md)")
         ->required();
-    generate->add_option("-o,--output", out, "Folder for the dataset; created if missing")
+    command->add_option("-o,--output", out, "Folder for the dataset; created if missing")
         ->required();
-    generate->add_option("--seed", seed,
-                         "Seed of noise and scattered objects, instead of the scene's");
-    generate->add_flag("--resume", resume,
-                       "Continue an interrupted run in its folder: check all existing files and "
-                       "create those that are missing or changed");
-    generate
+    command->add_option("--seed", seed,
+                        "Seed of noise and scattered objects, instead of the scene's");
+    command->add_flag("--resume", resume,
+                      "Continue an interrupted run in its folder: check all existing files and "
+                      "create those that are missing or changed");
+    command
         ->add_option("--shard", shard,
                      "I/N, I from 1 to N: make shard I of N of the frames, in a separate folder; "
                      "`groundray merge` joins them")
         ->check(check_shard);
-    generate->add_option("--log-json", log,
-                         "File that receives a line of JSON for each frame, or - for standard "
-                         "output (docs/reference/runs.md)");
+    command->add_option("--log-json", log,
+                        "File that receives a line of JSON for each frame, or - for standard "
+                        "output (docs/reference/runs.md)");
+    return command;
   }
 
-  void add_verify(CLI::App& app) {
-    verify = app.add_subcommand(
+  CLI::App* add_verify(CLI::App& app) {
+    CLI::App* command = app.add_subcommand(
         "verify", "Check every file of datasets against the checksums in their dataset.yaml");
-    verify->add_option("DATASET", datasets, "Folders that `generate` or `merge` wrote")->required();
+    command->add_option("DATASET", datasets, "Folders that `generate` or `merge` wrote")
+        ->required();
+    return command;
   }
 
-  void add_merge(CLI::App& app) {
-    merge =
+  CLI::App* add_merge(CLI::App& app) {
+    CLI::App* command =
         app.add_subcommand("merge", "Join the shards of a run into the dataset of a single run");
-    merge->add_option("SHARD", datasets, "Folders of all shards")->required();
-    merge->add_option("-o,--output", out, "Folder for the dataset; created if missing")->required();
-    merge->add_flag("--resume", resume, "Continue an interrupted merge in its folder");
+    command->add_option("SHARD", datasets, "Folders of all shards")->required();
+    command->add_option("-o,--output", out, "Folder for the dataset; created if missing")
+        ->required();
+    command->add_flag("--resume", resume, "Continue an interrupted merge in its folder");
+    return command;
   }
 };
 
-RunCommands::RunCommands(CLI::App& app) : options_(std::make_unique<Options>()) {
-  options_->add_generate(app);
-  options_->add_verify(app);
-  options_->add_merge(app);
-}
+}  // namespace
 
-RunCommands::~RunCommands() = default;
-
-bool RunCommands::is_asked_for() const {
-  return options_->generate->parsed() || options_->verify->parsed() || options_->merge->parsed();
-}
-
-void RunCommands::run() const {
-  const Options& asked = *options_;
-  const FolderUse use = asked.resume ? FolderUse::Resume : FolderUse::New;
-  if (asked.verify->parsed()) return verify_all(asked.datasets);
-  if (asked.merge->parsed()) return merge_shards(asked.datasets, asked.out, use);
-  generate(asked.scene, asked.out,
-           {.seed = asked.seed ? std::optional(Seed{*asked.seed}) : std::nullopt,
-            .use = use,
-            .shard = parse_shard(asked.shard),
-            .log = asked.log});
+void add_run_commands(CLI::App& app, std::vector<Command>& commands) {
+  const auto options = std::make_shared<RunOptions>();
+  commands.push_back(
+      {options->add_generate(app), [options] {
+         generate(options->scene, options->out,
+                  {.seed = options->seed ? std::optional(Seed{*options->seed}) : std::nullopt,
+                   .use = options->use(),
+                   .shard = parse_shard(options->shard),
+                   .log = options->log});
+       }});
+  commands.push_back({options->add_verify(app), [options] { verify_all(options->datasets); }});
+  commands.push_back({options->add_merge(app), [options] {
+                        merge_shards(options->datasets, options->out, options->use());
+                      }});
 }
 
 }  // namespace groundray

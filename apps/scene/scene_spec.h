@@ -15,7 +15,7 @@
 #include "core/geometry/pose.h"
 #include "core/model/model_io.h"
 #include "core/random.h"
-#include "core/tracing/ray_tracer.h"
+#include "core/tracing/ray.h"
 #include "sensors/camera/camera_spec.h"
 #include "sensors/lidar/lidar_spec.h"
 #include "sensors/sky/atmosphere.h"

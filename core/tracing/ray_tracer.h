@@ -1,71 +1,16 @@
 #pragma once
 
-#include <chrono>
 #include <cstddef>
-#include <cstdint>
-#include <glm/vec2.hpp>
 #include <glm/vec3.hpp>
-#include <limits>
 #include <memory>
 #include <span>
 #include <string>
 #include <vector>
 
-#include "core/geometry/height_grid.h"
-#include "core/tracing/leaf.h"
+#include "core/tracing/level.h"
+#include "core/tracing/ray.h"
 
 namespace groundray {
-
-/// Tracing mode. Ranges are the same in both: within 1e-9 * range + 1e-9 m of the surface that the
-/// levels define.
-enum class Tracing {
-  Fast,   ///< Embree selects the facet; it may differ for at most 5e-6 of the rays, those that
-          ///< graze a silhouette
-  Exact,  ///< every facet is tested in double
-};
-
-/// A ray in D: a point (m) and a unit vector.
-struct Ray {
-  glm::dvec3 origin{0};
-  glm::dvec3 direction{0, 0, -1};
-  double far_m = std::numeric_limits<double>::infinity();  ///< hits beyond it are ignored
-  std::chrono::nanoseconds time{0};                        ///< time at which moving objects are hit
-};
-
-/// Similarity of neighbouring rays in a batch; neighbours are traced in packets.
-enum class Batch {
-  Alike,       ///< neighbours begin near each other and are nearly parallel
-  ShadowRays,  ///< they are nearly parallel and begin at hits of earlier rays
-  Scattered,   ///< they begin at hits of earlier rays and have any direction
-};
-
-/// First hit of a ray.
-struct Hit {
-  double range_m =
-      std::numeric_limits<double>::infinity();  ///< along the ray; infinite without a hit
-  glm::vec3 normal{0};       ///< of the facet, unit, in D: up (ground) or towards the ray (object)
-  float deviation_m = 0;     ///< of the leaf: largest vertical distance from the reference surface
-  std::uint32_t part = 0;    ///< index of the level that was hit; on an object, of the triangle
-  std::uint32_t object = 0;  ///< number of the object that was hit; 0 for the ground
-  explicit operator bool() const noexcept {
-    return range_m < std::numeric_limits<double>::infinity();
-  }
-};
-
-/// Part of a terrain that one level scene holds: leaves of its quadtree, and their samples. Its
-/// window is the rectangle of those samples.
-struct Level {
-  GridFrame frame;      ///< of the DEM; the same for all levels of a tracer
-  HeightArray heights;  ///< every step-th sample of the DEM from `first` on, and the DEM's last
-                        ///< column or row where the window reaches it
-  glm::ivec2 first{0};  ///< the DEM's sample at heights(0, 0); multiples of step
-  int step = 1;         ///< of the finest leaves, in cells of the DEM; a power of two
-  int leaf_cells = 8;   ///< side of a leaf in its own cells; a power of two
-  /// Side, in cells of `step`, of the parts that are built and reused one by one; a power of two,
-  /// or 0 for a single part.
-  int part_cells = 0;
-  std::vector<Leaf> leaves;  ///< they tile the window except for that of the next finer level
-};
 
 /// Embree device, created once and shared by the scenes made with it.
 class RayDevice {

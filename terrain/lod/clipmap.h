@@ -9,7 +9,7 @@
 #include <vector>
 
 #include "core/geometry/grid_frame.h"
-#include "core/tracing/ray_tracer.h"
+#include "core/tracing/level.h"
 #include "terrain/lod/quadtree.h"
 #include "terrain/lod/tile_source.h"
 

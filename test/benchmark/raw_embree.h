@@ -6,7 +6,7 @@
 #include <vector>
 
 #include "core/geometry/height_grid.h"
-#include "core/tracing/ray_tracer.h"
+#include "core/tracing/ray.h"
 
 namespace groundray::benchmark {
 

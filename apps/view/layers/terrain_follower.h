@@ -9,7 +9,7 @@
 
 #include "apps/scene/simulation.h"
 #include "apps/view/rendering/layer.h"
-#include "core/tracing/ray_tracer.h"
+#include "core/tracing/level.h"
 
 namespace groundray {
 

@@ -8,7 +8,7 @@
 
 #include "core/geometry/height_grid.h"
 #include "core/tracing/leaf.h"
-#include "core/tracing/ray_tracer.h"
+#include "core/tracing/ray.h"
 
 namespace groundray::testing {
 

@@ -3,7 +3,7 @@
 #include <optional>
 
 #include "core/geometry/height_grid.h"
-#include "core/tracing/ray_tracer.h"
+#include "core/tracing/ray.h"
 
 namespace groundray::testing {
 

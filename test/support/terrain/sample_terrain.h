@@ -5,7 +5,7 @@
 
 #include "core/geometry/height_grid.h"
 #include "core/random.h"
-#include "core/tracing/ray_tracer.h"
+#include "core/tracing/ray.h"
 
 namespace groundray::testing {
 
