@@ -71,8 +71,8 @@ SEES = {
 LIBRARIES = {
     r"assimp/": r"core/model/assimp_import\.cpp",
     r"embree": r"core/tracing/embree_adapter\.h",
-    r"((gdal|ogr|cpl)_|tiffio\.h)": r"terrain/dem/(dem_raster\.h|(band_file|dem_file|dem_io|dem_raster"
-    r"|dem_warp|drape_io|layers_io|tiled_tiff)\.cpp)",
+    r"((gdal|ogr|cpl)_|tiffio\.h)": r"terrain/dem/(dem_raster\.h|(band_file|dem_file|dem_io"
+    r"|dem_raster|dem_warp|drape_io|layers_io|tiled_tiff)\.cpp)",
     r"opencv2/": r"(sensors/camera/picture|reconstruction/dem/fill/inpaint_fill"
     r"|reconstruction/stereo/semi_global)\.cpp",
     r"(CGAL|Eigen)/": r"reconstruction/.*\.cpp",

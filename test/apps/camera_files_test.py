@@ -309,8 +309,8 @@ def test_attributes_describe_light_and_pose(out):
         assert ("aperture" in header) == (name == "left")
         # Floats, the largest of them 400 m.
         X_CD = np.linalg.inv(camera.path.at(camera.time_of(1, (camera.size[1] - 1) / 2)))
-        told = np.reshape(header["worldToCamera"], (4, 4)).T
-        assert told == pytest.approx(X_CD, abs=4e-5)
+        reported = np.reshape(header["worldToCamera"], (4, 4)).T
+        assert reported == pytest.approx(X_CD, abs=4e-5)
 
 
 @pytest.mark.parametrize("name", CAMERAS)
@@ -374,15 +374,15 @@ def test_sky_pixels_have_the_documented_values(out):
 
 @pytest.mark.parametrize("name", CAMERAS)
 def test_ids_match_the_dataset_record(out, name):
-    told, exr = record(out), image(out, name, 1)
+    reported, exr = record(out), image(out, name, 1)
     hit = np.isfinite(exr["Z"])
     label = np.where(hit, 1, 0)
-    for thing in told["objects"]:
+    for thing in reported["objects"]:
         first, count = thing["first_instance"], thing["count"]
         label[(exr["Instance"] >= first) & (exr["Instance"] < first + count)] = thing["label"]
     assert (exr["Label"] == label).all()
     assert set(np.unique(label)) >= {0, 1, 10}
-    materials = np.array(["", *told["materials"]])[exr["Material"]]
+    materials = np.array(["", *reported["materials"]])[exr["Material"]]
     assert (materials[label == 1] == "dry_soil").all()
     assert set(materials[label == 2]) <= {"dry_grass"}
     assert set(materials[label == 10]) <= {"metal", "asphalt", "retro_reflector"}

@@ -161,11 +161,11 @@ def test_stereo_pairs_have_equal_rows_and_the_disparity_of_their_baseline(pair):
     assert (np.abs(disparity - P["left"][0, 0] * baseline_m / near_m) < allowed_px).all()
     assert disparity.max() > 3
     for name in read:
-        told = yaml.safe_load((out / f"calibration/{name}.yaml").read_text())["rectification"]
-        assert told["state"] == ("done" if images == "rectified" else "to_do")
-        turn = rotation_of(*told["rotation_xyzw"])
+        reported = yaml.safe_load((out / f"calibration/{name}.yaml").read_text())["rectification"]
+        assert reported["state"] == ("done" if images == "rectified" else "to_do")
+        turn = rotation_of(*reported["rotation_xyzw"])
         assert np.abs(turn - R[name]).max() < 1e-14
-        assert told["right_of_left_m"] == pytest.approx(0 if name == "left" else baseline_m)
+        assert reported["right_of_left_m"] == pytest.approx(0 if name == "left" else baseline_m)
     if images == "rectified":  # then the left pixels are the image's own
         v, u = np.nonzero(hit)
         away_px = np.abs(left - np.stack([u, v], axis=1)).max(axis=1)

@@ -42,7 +42,7 @@ def lowest_of(points, side):
 def record_held_out(layers, held, name, record_property):
     """The DEM's errors at points that were not shown, and where they are numbers; records those of
     what is measured and of the rest. How precise the points are themselves nobody says, so that
-    normalised errors are told, but not judged."""
+    normalised errors are reported, but not judged."""
     x, y = held[:, 0], held[:, 1]
     error = bilinear(layers, layers["elevation"], x, y) - held[:, 2]
     variance = bilinear(layers, layers["variance"], x, y)

@@ -89,9 +89,9 @@ def test_heights_and_their_stated_errors_are_correct(prairie, tmp_path, record_p
     is_measured = np.isin(dem["source"], (1, 2, 3))
     e = error[is_measured & ~np.isnan(error)]
     z = (error / np.sqrt(dem["variance"]))[is_measured & ~np.isnan(error)]
-    told = figures(json.loads((prairie / "out/dem.json").read_text()), "measured")
+    reported = figures(json.loads((prairie / "out/dem.json").read_text()), "measured")
     rounding = 1e-4  # floats of 400 m
-    assert told["samples"] == len(e)
+    assert reported["samples"] == len(e)
     for key, value in (
         ("bias_m", e.mean()),
         ("rmse_m", np.sqrt(np.mean(e**2))),
@@ -99,10 +99,10 @@ def test_heights_and_their_stated_errors_are_correct(prairie, tmp_path, record_p
         ("p95_m", np.quantile(np.abs(e), 0.95, method="inverted_cdf")),
         ("largest_m", np.abs(e).max()),
     ):
-        assert told[key] == pytest.approx(value, abs=rounding), key
-    assert told["normalised_rms"] == pytest.approx(np.sqrt(np.mean(z**2)), rel=0.01)
-    assert told["within_1sd"] == pytest.approx(np.mean(np.abs(z) <= 1), abs=0.01)
-    assert told["within_2sd"] == pytest.approx(np.mean(np.abs(z) <= 2), abs=0.01)
+        assert reported[key] == pytest.approx(value, abs=rounding), key
+    assert reported["normalised_rms"] == pytest.approx(np.sqrt(np.mean(z**2)), rel=0.01)
+    assert reported["within_1sd"] == pytest.approx(np.mean(np.abs(z) <= 1), abs=0.01)
+    assert reported["within_2sd"] == pytest.approx(np.mean(np.abs(z) <= 2), abs=0.01)
     error_map = Raster(prairie / "out/error.tif", tmp_path)
     assert np.nanmax(np.abs(error_map["error"] - error)) < rounding
     judge(e, e / z, "prairie by lidar", record_property)
@@ -303,10 +303,12 @@ def test_scans_and_stereo_reproduce_the_ground(tmp_path, record_property, ground
     error = layers["elevation"] - triangle_heights(truth, *layers.places())
     is_judged = np.isin(layers["source"], (1, 2, 3)) & ~np.isnan(error)
     e, stated_m = error[is_judged], np.sqrt(layers["variance"][is_judged])
-    told = figures(report, "measured")
-    assert told["samples"] == pytest.approx(len(e), abs=2)  # that may be on the border
-    assert told["nmad_m"] == pytest.approx(nmad_of(e), abs=1e-4)
-    assert told["normalised_rms"] == pytest.approx(np.sqrt(np.mean((e / stated_m) ** 2)), rel=0.01)
+    reported = figures(report, "measured")
+    assert reported["samples"] == pytest.approx(len(e), abs=2)  # that may be on the border
+    assert reported["nmad_m"] == pytest.approx(nmad_of(e), abs=1e-4)
+    assert reported["normalised_rms"] == pytest.approx(
+        np.sqrt(np.mean((e / stated_m) ** 2)), rel=0.01
+    )
     for of in ("lidar", "stereo", "fused", "filled"):
         part = figures(report, of)
         if part["stated"]:

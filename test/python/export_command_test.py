@@ -107,8 +107,8 @@ def test_pending_frames_are_rejected_or_reported(run, capsys):
     text = (run / "dataset.yaml").read_text()
     line = next(each for each in text.splitlines() if 'sensor: "bare-16", frame: 1' in each)
     edit(run / "dataset.yaml", line, line.replace("done", "pending"))
-    told = fails(capsys, run, "npz")
-    assert "1 of its frames are pending; finish it with groundray generate" in told
+    reported = fails(capsys, run, "npz")
+    assert "1 of its frames are pending; finish it with groundray generate" in reported
     assert export("npz", run.parent / "out", "--skip-pending", source=run) == 0
     assert "note: 1 frames are pending and skipped" in capsys.readouterr().out
     assert names_in(run.parent / "out/bare-16") == ["000000.npz", "000002.npz"]
@@ -174,12 +174,12 @@ def test_echoes_of_air_and_false_alarms_are_counted(run, capsys):
     rows["label"][:7] = 0
     file.write_bytes(data[:begin] + rows.tobytes())
     assert export("kitti", run.parent / "out", "--lidar", "top", source=run) == 0
-    told = capsys.readouterr().out
-    assert "note: 7 points are unmarked echoes of air or false alarms" in told
+    reported = capsys.readouterr().out
+    assert "note: 7 points are unmarked echoes of air or false alarms" in reported
 
 
 @pytest.mark.parametrize(
-    ("form", "told"),
+    ("form", "reported"),
     [
         (
             "kitti",
@@ -196,7 +196,7 @@ def test_echoes_of_air_and_false_alarms_are_counted(run, capsys):
         ("mcap", ["points have only the fields of the velodyne layout, and no truth"]),
     ],
 )
-def test_data_that_a_format_omits_is_reported_once(run, capsys, form, told):
+def test_data_that_a_format_omits_is_reported_once(run, capsys, form, reported):
     for frame in range(3):
         (run / f"lidar/top/{frame:06}_no_returns.ply").write_bytes(b"")
         (run / f"lidar/top/{frame:06}_wave.npy").write_bytes(b"")
@@ -204,7 +204,7 @@ def test_data_that_a_format_omits_is_reported_once(run, capsys, form, told):
     assert export(form, run.parent / "out", *options, source=run) == 0
     notes = [line for line in capsys.readouterr().out.splitlines() if line.startswith("note: ")]
     assert len(set(notes)) == len(notes)
-    for each in told:
+    for each in reported:
         assert sum(each in note for note in notes) == 1, each
 
 
@@ -230,9 +230,9 @@ def test_an_interrupted_export_leaves_no_files(long_run, stop):
             assert process.poll() is None
             time.sleep(0.01)
         process.send_signal(stop)
-        _, told = process.communicate(timeout=60)
+        _, reported = process.communicate(timeout=60)
     assert process.returncode == 130
-    assert told == "groundray-export: interrupted; nothing was written\n"
+    assert reported == "groundray-export: interrupted; nothing was written\n"
     assert names_in(long_run.parent) == ["run"]
 
 

@@ -124,7 +124,7 @@ ABSURD = ["inf", "-inf", "nan", "1e30", "-1e30", "1e999999999", "5000000000", "s
 def test_times_out_of_range_are_reported(run, capsys, form, time):
     """Stamps, the origin, lines of paths, and exposures."""
     sensor = "left" if form == "tum" else "top"
-    for name, place, told in (
+    for name, place, reported in (
         ("dataset.yaml", rf'(sensor: "{sensor}", frame: 1, stamp_s: )[^,]+', "stamp_s = "),
         ("dataset.yaml", r"(time_origin_s: ).*", "time_origin_s = "),
         (f"poses/{sensor}.tum", r"(?m)^()[^ #]+", f"poses/{sensor}.tum:"),
@@ -135,7 +135,7 @@ def test_times_out_of_range_are_reported(run, capsys, form, time):
         assert count == 1, place
         (run / name).write_text(spoiled)
         line = fails(capsys, run, form)
-        assert told in line
+        assert reported in line
         assert "must be" in line
         (run / name).write_text(whole)
 
@@ -171,9 +171,11 @@ def test_random_damage_causes_one_error_or_none(run, capsys):
             (run / name).write_bytes(spoiled)
             for form in ("mcap", "kitti"):
                 code = export(form, run.parent / "out", "--lidar", "front", source=run)
-                told = capsys.readouterr().err
-                assert (code == 0 and not told) or (code == 1 and told.count("\n") >= 1), name
-                assert "Traceback" not in told
+                reported = capsys.readouterr().err
+                assert (code == 0 and not reported) or (code == 1 and reported.count("\n") >= 1), (
+                    name
+                )
+                assert "Traceback" not in reported
                 shutil.rmtree(run.parent / "out", ignore_errors=True)
                 assert names_in(run.parent) == ["run"]
         (run / name).write_bytes(data)

@@ -276,8 +276,8 @@ def test_a_lens_without_an_equivalent_in_ros_is_rejected(tmp_path, capsys):
     lens = "lens: {eucm: {focal_px: [24, 24], centre_px: [31, 30], alpha: 0.6, beta: 1.1}}"
     calibration.write_text(text[:begin] + lens + text[text.index("\n", begin) :])
     assert export("mcap", tmp_path / "out", source=tmp_path / "run") == 1
-    told = capsys.readouterr().err
-    assert "camera eye has the lens eucm, unknown to CameraInfo" in told
-    assert "exclude it" in told
+    reported = capsys.readouterr().err
+    assert "camera eye has the lens eucm, unknown to CameraInfo" in reported
+    assert "exclude it" in reported
     options = ["--camera", "left", "--camera", "right"]
     assert export("mcap", tmp_path / "out", *options, source=tmp_path / "run") == 0

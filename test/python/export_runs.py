@@ -156,10 +156,10 @@ def fails(capsys, run, form, *options, code=1):
     """Returns the command's only line; nothing is written, not even a parent folder."""
     before = names_in(run.parent)
     assert export(form, run.parent / "a/b/out", *options, source=run) == code
-    told = capsys.readouterr()
-    assert told.out == ""
+    reported = capsys.readouterr()
+    assert reported.out == ""
     assert names_in(run.parent) == before
-    (line,) = told.err.splitlines()
+    (line,) = reported.err.splitlines()
     assert line.startswith("groundray-export: ")
     return line
 

@@ -97,10 +97,10 @@ def test_evo_reads_the_trajectory_of_the_run(tum):
 
 def test_a_single_camera_has_no_subfolder_and_the_depth_scale_is_selectable(tmp_path, capsys):
     assert export("tum", tmp_path / "out", "--camera", "eye", "--depth-per-m", "500") == 0
-    told = capsys.readouterr().out
-    assert "note: camera eye has no pictures (product picture): there is no rgb.txt" in told
-    assert "a metre of depth is 500, not TUM's 5000" in told
-    assert "camera eye has a rolling shutter" in told
+    reported = capsys.readouterr().out
+    assert "note: camera eye has no pictures (product picture): there is no rgb.txt" in reported
+    assert "a metre of depth is 500, not TUM's 5000" in reported
+    assert "camera eye has a rolling shutter" in reported
     assert not (tmp_path / "out/rgb.txt").exists()
     ((_, (name,)), *_) = sorted(read_list(tmp_path / "out/depth.txt").items())
     depth = cv2.imread(str(tmp_path / "out" / name), cv2.IMREAD_UNCHANGED)

@@ -182,13 +182,13 @@ def test_errors_in_a_scene_are_those_of_the_program(made, tmp_path):
     (folder / "wrong.yaml").write_text(text)
     with pytest.raises(groundray.Error) as raised:
         groundray.load_scene(folder / "wrong.yaml")
-    told = subprocess.run(
+    reported = subprocess.run(
         [small_scene.BIN / "groundray", "generate", folder / "wrong.yaml", "-o", tmp_path / "out"],
         capture_output=True,
         text=True,
         check=False,
     )
-    assert str(raised.value) in told.stderr
+    assert str(raised.value) in reported.stderr
     assert "key 'speed_km_h': unknown" in str(raised.value)
     assert isinstance(raised.value, RuntimeError)
     with pytest.raises(

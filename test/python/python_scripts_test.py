@@ -27,15 +27,15 @@ def number(pattern, text):
 
 
 def test_first_scan_script_recovers_noise_and_truth():
-    told = run("python_first_scan.py")
-    assert number(r"off by ([0-9.]+) mm RMS", told) == pytest.approx(20, abs=0.5)
-    assert number(r"(\d+) on the rock", told) > 10
-    assert number(r"rays agree to ([0-9.e-]+) m", told) < 5e-6  # a float of 30 m
+    reported = run("python_first_scan.py")
+    assert number(r"off by ([0-9.]+) mm RMS", reported) == pytest.approx(20, abs=0.5)
+    assert number(r"(\d+) on the rock", reported) > 10
+    assert number(r"rays agree to ([0-9.e-]+) m", reported) < 5e-6  # a float of 30 m
 
 
 def test_reconstruction_script_recovers_the_ground(tmp_path):
-    told = run("python_reconstruct.py", tmp_path)
-    assert number(r"it lies (\d+) mm RMS", told) < 30
-    assert number(r"(\d+) % within two standard deviations", told) > 90
+    reported = run("python_reconstruct.py", tmp_path)
+    assert number(r"it lies (\d+) mm RMS", reported) < 30
+    assert number(r"(\d+) % within two standard deviations", reported) > 90
     assert len(groundray.load_mesh(tmp_path / "ground.ply").triangles) > 100
     assert groundray.load_terrain(tmp_path / "ground.tif").heights_m.size > 1000

@@ -347,9 +347,9 @@ def test_invalid_scans_are_reported():
 # ----- comparison
 
 
-def told(tmp_path, *arguments):
-    small_scene.run("groundray-golden", "compare", *arguments, "-o", tmp_path / "told")
-    section = json.loads((tmp_path / "told/report.json").read_text())["sections"][0]
+def reported(tmp_path, *arguments):
+    small_scene.run("groundray-golden", "compare", *arguments, "-o", tmp_path / "reported")
+    section = json.loads((tmp_path / "reported/report.json").read_text())["sections"][0]
     return {measure["name"]: measure["value"] for measure in section["measures"]}
 
 
@@ -358,7 +358,7 @@ def test_comparison_from_python_matches_the_program(made, tmp_path):
     files = [folder / f"out/lidar/roof/{frame:06}.ply" for frame in range(2)]
     in_memory = groundray.compare(*(scene.lidar("roof").scan(frame=frame) for frame in range(2)))
     of_files = groundray.compare(*files)
-    assert in_memory["figures"] == of_files["figures"] == told(tmp_path, *files)
+    assert in_memory["figures"] == of_files["figures"] == reported(tmp_path, *files)
     assert of_files["units"].keys() == of_files["figures"].keys()
     terrain = groundray.Terrain(small_scene.heights_m(), small_scene.CELL_M)
     coarse, fine = terrain.mesh(0.5), terrain.mesh(0.05)
@@ -366,7 +366,7 @@ def test_comparison_from_python_matches_the_program(made, tmp_path):
     fine.save(tmp_path / "fine.ply")
     figures = groundray.compare(fine, coarse, within_m=[0.1])["figures"]
     assert figures["precision within 0.1 m"] > 10
-    assert figures == told(
+    assert figures == reported(
         tmp_path, tmp_path / "fine.ply", tmp_path / "coarse.ply", "--within-m", "0.1"
     )
     shifted = groundray.Terrain(small_scene.heights_m() + np.float32(0.25), small_scene.CELL_M)

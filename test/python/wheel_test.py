@@ -152,26 +152,26 @@ def test_the_installed_package_scans_with_its_own_presets(installed, tmp_path):
     try:
         (tmp_path / "scan.py").write_text(SCAN)
         dem = installed / "groundray/data/terrain/prairie_1m.tif"
-        told = run(
+        reported = run(
             *(sys.executable, "-P", tmp_path / "scan.py", dem, "only_here"),
             PYTHONPATH=str(installed),
         )
     finally:
         (sensors / "only_here.yaml").unlink()
-    version, points, package = told.split()
+    version, points, package = reported.split()
     assert f"VERSION {version}" in (ROOT / "CMakeLists.txt").read_text()
     assert int(points) > 10_000
     assert package == str(installed / "groundray")
 
 
 def test_the_installed_program_runs(installed):
-    told = run(installed / "bin/groundray-export", "--help", PYTHONPATH=str(installed))
-    assert told.startswith("usage: groundray-export ")
+    reported = run(installed / "bin/groundray-export", "--help", PYTHONPATH=str(installed))
+    assert reported.startswith("usage: groundray-export ")
     module = run(
         *(sys.executable, "-P", "-m", "groundray.export.command", "--help"),
         PYTHONPATH=str(installed),
     )
-    assert module == told
+    assert module == reported
 
 
 def test_pip_and_the_tests_use_the_same_build_tools():

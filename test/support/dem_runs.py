@@ -108,10 +108,10 @@ def refused(folder, *arguments, words, **options):
     before = {path: path.lstat().st_mtime_ns for path in folder.rglob("*") if path.is_file()}
     result = groundray("reconstruct", "dem", *arguments, **options)
     assert result.returncode == 1, result
-    _, *told = re.split(r"^groundray: ", result.stderr, flags=re.MULTILINE)
-    assert len(told) == 1, result.stderr
+    _, *reported = re.split(r"^groundray: ", result.stderr, flags=re.MULTILINE)
+    assert len(reported) == 1, result.stderr
     for word in words:
-        assert word in told[0], result.stderr
+        assert word in reported[0], result.stderr
     after = {path: path.lstat().st_mtime_ns for path in folder.rglob("*") if path.is_file()}
     assert before == after
 

@@ -284,13 +284,13 @@ TEST(DeviationFromTruth, ReportsProgressAndStops) {
   EXPECT_EQ(shares.size(), 4U);
   EXPECT_EQ(shares.back(), 1);
   std::stop_source stop;
-  std::size_t told = 0;
+  std::size_t reported = 0;
   EXPECT_THROW(deviation_from_mesh(places_m, truth, stop.get_token(),
                                    [&](double) {
-                                     if (++told == 2) stop.request_stop();
+                                     if (++reported == 2) stop.request_stop();
                                    }),
                Interrupted);
-  EXPECT_EQ(told, 2U);
+  EXPECT_EQ(reported, 2U);
 }
 
 TEST(DeviationFromTruth, RejectsOrToleratesBadMeshes) {

@@ -240,16 +240,16 @@ TEST(VirtualScan, StopsDuringASweep) {
   constexpr int rounds = 20;
   for (int round = 0; round < rounds; ++round) {
     std::stop_source stop;
-    double told = 0;
+    double reported = 0;
     const double stop_at = 0.95 * round / rounds;
     EXPECT_THROW(scanner.scan(os1->lidar, X_DS, stop.get_token(),
                               [&](double share, const std::string&) {
-                                told = share;
+                                reported = share;
                                 if (share >= stop_at) stop.request_stop();
                               }),
                  Interrupted);
-    EXPECT_GE(told, stop_at);
-    EXPECT_LT(told, 1);
+    EXPECT_GE(reported, stop_at);
+    EXPECT_LT(reported, 1);
   }
   EXPECT_EQ(difference(scanner.scan(os1->lidar, X_DS).scan.echoes, whole.scan.echoes), "");
 }

@@ -285,13 +285,13 @@ TEST_F(WindowFilesTest, HelpListsAllKeys) {
   const Window& window = shown();
   const QString help = help_text();
   const QString table = help.mid(help.indexOf("<h3>Keys</h3>"));
-  std::set<std::string> told;
+  std::set<std::string> reported;
   QRegularExpressionMatchIterator cells =
       QRegularExpression("<td>([^<]*)</td><td>[^<]*</td>").globalMatch(table);
   while (cells.hasNext()) {
     for (QString key : cells.next().captured(1).split(' ', Qt::SkipEmptyParts)) {
       if (key.size() > 1 && key.endsWith(',')) key.chop(1);
-      told.insert(key.toStdString());
+      reported.insert(key.toStdString());
     }
   }
   std::size_t keys = 0;
@@ -301,7 +301,7 @@ TEST_F(WindowFilesTest, HelpListsAllKeys) {
       if (key == "Del") key = "Delete";
       if (key == "Esc") key = "Escape";
       ++keys;
-      EXPECT_TRUE(told.contains(key)) << key << ": " << action->text().toStdString();
+      EXPECT_TRUE(reported.contains(key)) << key << ": " << action->text().toStdString();
     }
   }
   EXPECT_GT(keys, 20U);

@@ -42,9 +42,9 @@ TEST_F(JobTest, RunsInAnotherThreadAndReturnsInThisOne) {
   const auto here = std::this_thread::get_id();
   std::thread::id worked, done;
   job.start(
-      [&](const auto&, const JobProgress& told) {
+      [&](const auto&, const JobProgress& reported) {
         worked = std::this_thread::get_id();
-        told(0.5, "half");
+        reported(0.5, "half");
         return 42;
       },
       [&](int value) {
@@ -122,8 +122,8 @@ TEST_F(JobTest, MayBeDestroyedWhileRunning) {
   {
     Job job;
     job.start(
-        [&](const std::stop_token& stop, const JobProgress& told) {
-          while (!stop.stop_requested()) told(0, "");
+        [&](const std::stop_token& stop, const JobProgress& reported) {
+          while (!stop.stop_requested()) reported(0, "");
           has_ended = true;
           return 1;
         },

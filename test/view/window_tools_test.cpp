@@ -95,10 +95,10 @@ TEST_F(WindowToolsTest, PickingAnEchoShowsItsColumnsBeamAndFootprint) {
 TEST_F(WindowToolsTest, ReportsOnlyTheLastPick) {
   Window& window = shown();
   open(SampleDataset::get().path());
-  std::vector<std::string> told;
+  std::vector<std::string> reported;
   std::string failed;
   Picker picker(window.view(),
-                {.facts = [&](const std::string& title, const auto&) { told.push_back(title); },
+                {.facts = [&](const std::string& title, const auto&) { reported.push_back(title); },
                  .failed = [&](const std::string& message) { failed = message; }});
   ShownScan scan;  // in a missing file: an attempt to read it reports an error
   scan.frame.file = "/nowhere/000000.ply";
@@ -109,7 +109,7 @@ TEST_F(WindowToolsTest, ReportsOnlyTheLastPick) {
   EXPECT_FALSE(picker.is_busy());
   QTest::qWait(200);
   EXPECT_EQ(failed, "");
-  EXPECT_EQ(told, std::vector<std::string>{"dataset/lidar/top: point 1"});
+  EXPECT_EQ(reported, std::vector<std::string>{"dataset/lidar/top: point 1"});
 }
 
 TEST_F(WindowToolsTest, PickingASurfaceShowsItsValues) {

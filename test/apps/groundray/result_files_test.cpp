@@ -100,7 +100,7 @@ TEST(ResultFiles, KeepBackupsIfRollbackFails) {
   fs::create_directory(real);
   fs::create_directory_symlink(real, link);
   put(old, "old");
-  std::string told;
+  std::string reported;
   {
     ResultFiles files;
     for (const fs::path& path : {old, link, full})
@@ -111,16 +111,16 @@ TEST(ResultFiles, KeepBackupsIfRollbackFails) {
       files.appear();
       FAIL();
     } catch (const Error& error) {
-      told = error.what();
+      reported = error.what();
     }
   }
   EXPECT_THAT(names_in(folder.path()), ElementsAre("full.tif", "link.tif", "real"));
   EXPECT_EQ(text_of(real / "b.tif"), "new");
-  EXPECT_THAT(told, AllOf(HasSubstr("full.tif: cannot be written"),
-                          HasSubstr("b.tif is written nevertheless")));
+  EXPECT_THAT(reported, AllOf(HasSubstr("full.tif: cannot be written"),
+                              HasSubstr("b.tif is written nevertheless")));
   const std::string words = "its previous version is kept as ";
-  ASSERT_THAT(told, HasSubstr(words));
-  EXPECT_EQ(text_of(told.substr(told.find(words) + words.size())), "old");
+  ASSERT_THAT(reported, HasSubstr(words));
+  EXPECT_EQ(text_of(reported.substr(reported.find(words) + words.size())), "old");
   EXPECT_EQ(names_in(real).size(), 2u);
 }
 

@@ -83,9 +83,9 @@ TEST(MeshPipeline, TwoScansOfAPlaneBecomeThePlaneInFewTriangles) {
   for (const auto& [stage, seconds] : result.seconds) stages.push_back(stage);
   EXPECT_THAT(stages, ElementsAre("merge", "fill", "simplify"));
   ASSERT_THAT(shares, SizeIs(3));
-  for (const auto& [stage, told] : shares) {
-    EXPECT_EQ(told.front(), 0) << stage;
-    EXPECT_EQ(told.back(), 1) << stage;
+  for (const auto& [stage, reported] : shares) {
+    EXPECT_EQ(reported.front(), 0) << stage;
+    EXPECT_EQ(reported.back(), 1) << stage;
   }
 }
 

@@ -456,10 +456,10 @@ TEST(ImageTruthFlow, FollowsMovingObjects) {
     ++on;
     const glm::dvec3 velocity =
         going + turning_rad_s * glm::cross(glm::dvec3(1, 0, 0), p - glm::dvec3(10, 0, 0));
-    const auto told = truth.velocity_m_s.at(x, y);
+    const auto reported = truth.velocity_m_s.at(x, y);
     // Between poses 0.1 s apart the path is an arc of 0.04 rad; at its start the direction differs
     // from the chord by half of that.
-    EXPECT_LT(glm::distance(glm::dvec3(told[0], told[1], told[2]), velocity),
+    EXPECT_LT(glm::distance(glm::dvec3(reported[0], reported[1], reported[2]), velocity),
               0.021 * glm::length(going));
     for (const auto& [of, t] : {std::pair(&truth.forward, 0.5), {&truth.backward, -0.5}}) {
       const glm::dvec3 then =

@@ -161,12 +161,12 @@ TEST(DemFill, MinimisesTheEnergyUnderBounds) {
       }
     }
     EXPECT_GT(at_bound, 10u);
-    std::size_t told = 0;
+    std::size_t reported = 0;
     for (const RasterHole& hole : held.holes) {
-      told += hole.at_bound;
+      reported += hole.at_bound;
       EXPECT_TRUE(hole.is_least);
     }
-    EXPECT_EQ(told, at_bound);
+    EXPECT_EQ(reported, at_bound);
   }
 }
 

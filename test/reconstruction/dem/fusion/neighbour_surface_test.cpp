@@ -95,7 +95,7 @@ TEST(NeighbourSurface, RoughnessUnderNoiseIsUnbiased) {
   constexpr std::uint32_t windows = 4000;
   for (const std::array<double, 3>& noise_m :
        {std::array{0.03, 0.012, 0.005}, std::array{0.01, 0.01, 0.01}, std::array{0.0, 0.0, 0.0}}) {
-    double sum = 0, squares = 0, told = 0;
+    double sum = 0, squares = 0, reported = 0;
     for (std::uint32_t trial = 0; trial < windows; ++trial) {
       Window window = window_of([](double u, double v) { return 0.02 * u + 0.01 * v; }, 0);
       for (std::size_t i = 0; i < window.size(); ++i) {
@@ -107,13 +107,13 @@ TEST(NeighbourSurface, RoughnessUnderNoiseIsUnbiased) {
       const NeighbourSketch got = sketch_neighbours(&window[middle], stride, step_m, 1);
       sum += double{got.rough_m2};
       squares += double{got.rough_m2} * double{got.rough_m2};
-      told += double{got.rough_m4};
+      reported += double{got.rough_m4};
     }
     const double mean_m2 = sum / windows;
     const bool is_even = noise_m[0] == noise_m[1];
     EXPECT_GT(mean_m2 / (rough_m * rough_m), is_even ? 0.8 : 0.5) << noise_m[0];
     EXPECT_LT(mean_m2 / (rough_m * rough_m), 1.2) << noise_m[0];
-    EXPECT_NEAR(std::sqrt((squares / windows - mean_m2 * mean_m2) / (told / windows)), 1, 0.3)
+    EXPECT_NEAR(std::sqrt((squares / windows - mean_m2 * mean_m2) / (reported / windows)), 1, 0.3)
         << noise_m[0];
   }
 }

@@ -682,7 +682,7 @@ TEST(MeshMerge, ReportsProgressAndStopsOnRequest) {
   merge(std::vector(10, scans[0]), {},
         {.progress = [&](double share) { shares.push_back(share); }});
   EXPECT_TRUE(std::ranges::is_sorted(shares));
-  EXPECT_GT(shares.size(), 200u) << "each pair is told of, twice";
+  EXPECT_GT(shares.size(), 200u) << "each pair is reported twice";
 }
 
 }  // namespace

@@ -259,9 +259,9 @@ TEST(LindstromTurk, ReducesAFanInQuadraticTime) {
 }
 
 TEST(LindstromTurk, ReportsProgressWithinAFan) {
-  std::size_t told = 0;
-  reduce(fan_of(2000), 1000, {.progress = [&](double) { ++told; }});
-  EXPECT_GT(told, 50u);
+  std::size_t reported = 0;
+  reduce(fan_of(2000), 1000, {.progress = [&](double) { ++reported; }});
+  EXPECT_GT(reported, 50u);
 }
 
 TEST(LindstromTurk, KeepsOneTriangle) {
