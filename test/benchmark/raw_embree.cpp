@@ -12,7 +12,7 @@ namespace groundray::benchmark {
 
 template <int W>
 struct Packets {
-  using RayHit = typename PacketOf<W>::Type;
+  using RayHit = PacketOf<W>;
 
   std::vector<RayHit> filled;
 
