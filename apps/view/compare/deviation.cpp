@@ -22,7 +22,7 @@ namespace groundray {
 namespace {
 
 constexpr float not_measured = std::numeric_limits<float>::quiet_NaN();
-constexpr std::size_t bins = 61;
+constexpr std::size_t histogram_bins = 61;
 constexpr const char* column_name = "deviation";
 constexpr std::size_t block_places = 65'536;  // points between two checks of the stop token
 
@@ -244,7 +244,7 @@ Comparison compare(const Layer& layer, const Truth& truth, double tolerance_m,
   if (comparison.deviation.figures.count == 0) {
     throw Error("{} has no point near {}: are both in the same frame?", layer.name, truth.name);
   }
-  comparison.histogram = histogram_of(comparison.deviation.signed_m, bins);
+  comparison.histogram = histogram_of(comparison.deviation.signed_m, histogram_bins);
   return comparison;
 }
 

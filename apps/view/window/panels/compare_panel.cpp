@@ -25,7 +25,7 @@ namespace groundray {
 namespace {
 
 constexpr int plot_margin_px = 8;
-constexpr int ticks = 5;
+constexpr int axis_ticks = 5;
 
 FactTable::Facts facts_of(const Comparison& comparison) {
   FactTable::Facts facts = figure_texts(comparison.deviation.figures);
@@ -100,10 +100,10 @@ void HistogramPlot::paintEvent(QPaintEvent*) {
   }
   painter.setPen(palette().text().color());
   painter.drawLine(plot.bottomLeft(), plot.bottomRight());
-  for (int i = 0; i < ticks; ++i) {
-    const double share = static_cast<double>(i) / (ticks - 1);
+  for (int i = 0; i < axis_ticks; ++i) {
+    const double share = static_cast<double>(i) / (axis_ticks - 1);
     const QString text =
-        text_of("{:.3g}{}", histogram_->low_m + share * span_m, i + 1 == ticks ? " m" : "");
+        text_of("{:.3g}{}", histogram_->low_m + share * span_m, i + 1 == axis_ticks ? " m" : "");
     const double x = plot.left() + share * plot.width();
     const double text_px = metrics.horizontalAdvance(text);
     painter.drawLine(QPointF(x, plot.bottom()), QPointF(x, plot.bottom() + 3));
