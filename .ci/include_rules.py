@@ -71,8 +71,8 @@ SEES = {
 LIBRARIES = {
     r"assimp/": r"core/model/assimp_import\.cpp",
     r"embree": r"core/tracing/embree_adapter\.h",
-    r"((gdal|ogr|cpl)_|tiffio\.h)": r"terrain/dem/(dem_raster\.h|(band_file|dem_file|dem_io"
-    r"|dem_raster|dem_warp|drape_io|layers_io|tiled_tiff)\.cpp)",
+    r"((gdal|ogr|cpl)_|tiffio\.h)": r"terrain/dem/(gdal_raster\.h|(band_file|dem_file|dem_io"
+    r"|dem_warp|drape_io|gdal_raster|layers_io|tiled_tiff)\.cpp)",
     r"opencv2/": r"(sensors/camera/picture|reconstruction/dem/fill/inpaint_fill"
     r"|reconstruction/stereo/semi_global)\.cpp",
     r"(CGAL|Eigen)/": r"reconstruction/.*\.cpp",
@@ -87,7 +87,7 @@ IN_HEADERS = re.compile(r"glm/.*|fmt/.*|[a-z0-9_]+")
 PRIVATE = (
     "apps/scan/word_option.h",
     "core/tracing/embree_adapter.h",
-    "terrain/dem/dem_raster.h",
+    "terrain/dem/gdal_raster.h",
 )
 INSTALLED = ("dataset", "scan", "scene")  # folders of apps/
 

@@ -10,8 +10,8 @@
 #include <span>
 #include <vector>
 
-#include "core/appearance/footprint.h"
 #include "core/appearance/texture.h"
+#include "core/geometry/footprint.h"
 
 namespace groundray {
 

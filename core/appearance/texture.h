@@ -8,7 +8,7 @@
 #include <glm/vec4.hpp>
 #include <vector>
 
-#include "core/appearance/footprint.h"
+#include "core/geometry/footprint.h"
 #include "core/image/image.h"
 #include "core/image/luminance.h"
 

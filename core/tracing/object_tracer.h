@@ -8,8 +8,8 @@
 #include <span>
 #include <vector>
 
-#include "core/appearance/footprint.h"
 #include "core/appearance/texture.h"
+#include "core/geometry/footprint.h"
 #include "core/geometry/trajectory.h"
 #include "core/model/model.h"
 #include "core/tracing/ray_tracer.h"

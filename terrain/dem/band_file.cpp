@@ -4,7 +4,7 @@
 #include <cstdint>
 #include <limits>
 
-#include "terrain/dem/dem_raster.h"
+#include "terrain/dem/gdal_raster.h"
 
 namespace groundray {
 namespace {

@@ -17,8 +17,8 @@
 
 #include "core/random.h"
 #include "terrain/dem/byte_hash.h"
-#include "terrain/dem/dem_raster.h"
 #include "terrain/dem/dem_warp.h"
+#include "terrain/dem/gdal_raster.h"
 
 namespace groundray {
 

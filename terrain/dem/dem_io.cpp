@@ -9,7 +9,7 @@
 
 #include "core/error.h"
 #include "terrain/dem/dem_file.h"
-#include "terrain/dem/dem_raster.h"
+#include "terrain/dem/gdal_raster.h"
 
 namespace groundray {
 namespace {

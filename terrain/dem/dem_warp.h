@@ -8,7 +8,7 @@
 #include <string>
 #include <vector>
 
-#include "terrain/dem/dem_raster.h"
+#include "terrain/dem/gdal_raster.h"
 
 namespace groundray {
 

@@ -15,7 +15,7 @@
 #include <vector>
 
 #include "core/io/file_io.h"
-#include "terrain/dem/dem_raster.h"
+#include "terrain/dem/gdal_raster.h"
 
 namespace groundray {
 namespace {

@@ -11,7 +11,7 @@
 #include <tuple>
 #include <vector>
 
-#include "terrain/dem/dem_raster.h"
+#include "terrain/dem/gdal_raster.h"
 
 namespace groundray {
 

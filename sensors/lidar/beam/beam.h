@@ -84,7 +84,8 @@ class LaserBeam {
   /// If the ranges of a pair differ much, the level is too coarse.
   std::span<const glm::ivec2> neighbours(int level) const { return at(level).neighbours; }
 
-  /// Returns the radii w (1/e^2 or edge) at a distance along the axis.
+  /// Returns the radii w (1/e^2 or edge) at a distance along the axis. surface_patch()
+  /// (core/geometry/footprint.h) projects a width onto a surface.
   glm::dvec2 radius_m(double range_m) const noexcept {
     return {std::hypot(waist_m_.x, range_m * tangent_.x),
             std::hypot(waist_m_.y, range_m * tangent_.y)};

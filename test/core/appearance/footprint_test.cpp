@@ -1,4 +1,4 @@
-#include "core/appearance/footprint.h"
+#include "core/geometry/footprint.h"
 
 #include <gtest/gtest.h>
 

@@ -1,4 +1,4 @@
-#include "terrain/dem/dem_raster.h"
+#include "terrain/dem/gdal_raster.h"
 
 #include <cpl_conv.h>
 #include <cpl_string.h>
