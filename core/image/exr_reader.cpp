@@ -204,7 +204,8 @@ void check_attribute_sizes(std::string_view bytes) {
   const auto read_text = [&] {
     const std::size_t end = bytes.find('\0', position);
     if (end == std::string_view::npos) throw ends_too_soon();
-    return bytes.substr(std::exchange(position, end + 1), end - position);
+    const std::size_t start = std::exchange(position, end + 1);
+    return bytes.substr(start, end - start);
   };
   const bool has_parts = (read_whole_number(version_at) & multipart_flag) != 0;
   bool is_header_empty = true;

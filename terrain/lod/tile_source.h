@@ -56,7 +56,7 @@ void for_each_point(const Lattice& lattice, const TileName& name, const Act& act
   const glm::ivec2 size = glm::min(glm::ivec2(Tile::points), lattice.points(name.level) - first);
   for (int y = 0; y < size.y; ++y) {
     for (int x = 0; x < size.x; ++x) {
-      act(static_cast<std::size_t>(y * Tile::points + x),
+      act(static_cast<std::size_t>(y) * Tile::points + static_cast<std::size_t>(x),
           lattice.sample(name.level, first + glm::ivec2(x, y)));
     }
   }
