@@ -290,7 +290,7 @@ double PlyValues::next(std::size_t type) {
   if (format_ == PlyFormat::Ascii) return next_word();
   return with_type(type, [this](auto value) {
     if (bytes_.size() < sizeof value) throw Error("the last row is incomplete: is it truncated?");
-    value = load_property<decltype(value)>(bytes_.data(), format_);
+    value = load_property<decltype(value)>(&bytes_.front(), format_);
     bytes_.remove_prefix(sizeof value);
     return static_cast<double>(value);
   });
