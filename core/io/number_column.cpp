@@ -93,6 +93,7 @@ std::size_t size_of(NumberType type) {
 
 std::optional<NumberType> number_type_of(char kind, std::size_t bytes) {
   constexpr std::string_view kinds = "fffiiiiuuuub";  // of the NumberTypes, in their order
+  static_assert(kinds.size() == std::tuple_size_v<NumberTypes>);
   for (std::size_t i = 0; i < kinds.size(); ++i) {
     const auto type = static_cast<NumberType>(i);
     if (kinds[i] == kind && size_of(type) == bytes) return type;

@@ -23,7 +23,12 @@ namespace groundray::yaml::calibration {
 namespace kind {
 inline constexpr std::size_t pinhole = 0, brown_conrady = 1, kannala_brandt = 2, eucm = 4,
                              double_sphere = 5, mei = 6, equirectangular = 7;
-static_assert(std::is_same_v<std::variant_alternative_t<7, LensModel>, Equirectangular>);
+template <std::size_t index, typename Model>
+inline constexpr bool is = std::is_same_v<std::variant_alternative_t<index, LensModel>, Model>;
+static_assert(is<pinhole, Pinhole> && is<brown_conrady, BrownConrady> &&
+              is<kannala_brandt, KannalaBrandt> && is<eucm, Eucm> &&
+              is<double_sphere, DoubleSphere> && is<mei, Mei> &&
+              is<equirectangular, Equirectangular>);
 }  // namespace kind
 
 /// Returns the value of a required key; null, with a fault, if it is missing.

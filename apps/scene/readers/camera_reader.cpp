@@ -31,6 +31,7 @@ constexpr Rule row_rule{[](double value) { return value >= 0 && value <= 1e6; },
 constexpr std::array<std::string_view, 12> products{
     "radiance", "truth",      "bound",   "flow",      "flow_flo", "flow_kitti",
     "coverage", "irradiance", "photons", "electrons", "raw",      "picture"};
+static_assert(products.size() == static_cast<std::size_t>(CameraProduct::Picture) + 1);
 
 constexpr bool is_of_imager(CameraProduct product) { return product >= CameraProduct::Irradiance; }
 

@@ -61,7 +61,8 @@ bool BorderGrid::has_any(const CollapsibleMesh& mesh, const std::array<Entry, 3>
   };
   for (int y = low.y; y <= high.y; ++y) {
     for (int x = low.x; x <= high.x; ++x) {
-      const auto cell = static_cast<std::size_t>(y * cells_.x + x);
+      const auto cell = static_cast<std::size_t>(y) * static_cast<std::size_t>(cells_.x) +
+                        static_cast<std::size_t>(x);
       if (std::ranges::any_of(by_cell_.at(cell), is_within)) return true;
     }
   }
