@@ -139,6 +139,7 @@ void run(const fs::path& scene, const fs::path& out, const GenerateOptions& opti
                   log.frame_done(count(simulation, made, written, tally));
                   progress.update(tally.scans + tally.images);
                 });
+    progress.update(tally.scans + tally.images);  // also if there was nothing left to make
   } catch (...) {
     try {
       dataset.close();

@@ -50,7 +50,7 @@ struct TerrainOptions {
   std::filesystem::path dem, out;
   DemOptions reading;
   double max_error_m = 0;  // vertical error permitted everywhere
-  double angle_rad = 0;    // angle permitted as well, as seen from the viewpoint
+  double angle_mrad = 0;   // angle permitted as well, as seen from the viewpoint
   std::vector<double> viewpoint_w_m;
 
   void add_dem(CLI::App* command) {
@@ -75,9 +75,8 @@ struct TerrainOptions {
         ->required()
         ->check(CLI::NonNegativeNumber);
     auto* angle =
-        add_scaled(command, "--angle-mrad", angle_rad, 1e-3,
-                   "Permitted angle in milliradians, seen from --viewpoint, where that is larger")
-            ->check(CLI::NonNegativeNumber);
+        add_number(command, "--angle-mrad", angle_mrad, CLI::NonNegativeNumber,
+                   "Permitted angle in milliradians, seen from --viewpoint, where that is larger");
     auto* from = command->add_option("--viewpoint", viewpoint_w_m, "X,Y,Z in the DEM's CRS, metres")
                      ->delimiter(',')
                      ->expected(3)
@@ -101,7 +100,7 @@ struct TerrainOptions {
     SensorBox sensors;
     if (const auto& p = viewpoint_w_m; !p.empty())
       sensors.low_m = sensors.high_m = glm::dvec3(p[0], p[1], p[2]) - read.origin_w_m;
-    const MeshBound bound = bound_from(sensors, read.grid.frame(), max_error_m, angle_rad);
+    const MeshBound bound = bound_from(sensors, read.grid.frame(), max_error_m, angle_mrad / 1000);
     const TriangleMesh mesh = place(build_terrain_mesh(read.grid, bound), read.grid);
     stop_if_interrupted();
     write_mesh(out, mesh, {read.origin_w_m, read.crs_name, read.crs_wkt});

@@ -21,20 +21,17 @@ constexpr std::array<Synonyms, 13> synonyms{
      {"intensity", "intensity intensities reflectivity reflectance remission remissions refl i"},
      {"ring",
       "ring rings ringid ringindex channel channelid laserid laser laserindex beam beamid "
-      "beamindex "
-      "scanline line"},
+      "beamindex scanline line"},
      {"time",
       "time t times timestamp timestamps timeoffset offsettime reltime gpstime relativetime "
       "pointtime offset"},
      {"return_index",
       "returnindex returnnumber returnno returnid returnnum return echoindex echonumber echoid "
-      "echo "
-      "retnum"},
+      "echo retnum"},
      {"pulse", "pulse pulseid pulseindex"},
      {"label",
       "label labels classification class classid semantic semantics semanticid semanticlabel "
-      "objtag "
-      "objecttag category sem segmentation"},
+      "objtag objecttag category sem segmentation"},
      {"incidence", "incidence incidencerad incidenceanglerad"},
      {"range", "range ranges distance distances dist r"},
      {"column", "column col columnid columnindex measurementid azimuthindex azimuthid"},

@@ -1,10 +1,12 @@
 #include "reconstruction/pipeline/mesh_pipeline.h"
 
 #include <algorithm>
+#include <cstddef>
 #include <glm/geometric.hpp>
 #include <span>
 #include <utility>
 
+#include "core/error.h"
 #include "reconstruction/mesh/scan/advancing_front.h"
 
 namespace groundray {
@@ -86,6 +88,15 @@ MeshResult build_mesh(std::vector<ScanMesh> scans, const MeshBuildOptions& optio
 
 MeshResult build_mesh(const UnorderedPoints& points, double perimeter_m,
                       const MeshBuildOptions& options, const PipelineControl& control) {
+  const std::size_t count = points.points_m.size();
+  Violations broken("UnorderedPoints");
+  broken.unless(points.origins_m.size() == count && points.sd_m.size() == count,
+                "there are {} points, {} origins_m and {} sd_m: give one for each point", count,
+                points.origins_m.size(), points.sd_m.size());
+  broken.unless(points.labels.empty() || points.labels.size() == count,
+                "there are {} points and {} labels: give one for each point, or none", count,
+                points.labels.size());
+  broken.throw_if_any();
   MeshResult result;
   FrontMesh joined =
       run_stage({"join", "joining"}, control, result.seconds, [&](const RunControl& work) {

@@ -59,7 +59,8 @@ MeshResult build_mesh(std::vector<ScanMesh> scans, const MeshBuildOptions& optio
 
 /// Meshes points by advance_front(), with triangles of perimeters up to `perimeter_m`, fills holes
 /// and simplifies. Without triangles the mesh is empty, and the later steps are omitted.
-/// @throws Error as advance_front, fill_holes and simplify.
+/// @throws Error as advance_front, fill_holes and simplify, or if properties are not one for each
+/// point.
 MeshResult build_mesh(const UnorderedPoints& points, double perimeter_m,
                       const MeshBuildOptions& options, const PipelineControl& control = {});
 

@@ -195,7 +195,7 @@ TEST(DeviationFromTruth, MatchesTheClosedFormForATiltedPlane) {
   for (const glm::dvec3& random : random_places(1'000, 1)) {
     const glm::dvec2 at = 4.0 + 2.0 * glm::dvec2(random);
     above_m.push_back(random.z / 2);
-    places_m.push_back(glm::dvec3(at, height_m(at.x, at.y) + above_m.back()));
+    places_m.emplace_back(at, height_m(at.x, at.y) + above_m.back());
   }
   const Deviation up = deviation_from_ground(places_m, grid);
   const Deviation across = deviation_from_mesh(places_m, mesh);

@@ -7,9 +7,9 @@
 #include <array>
 #include <cerrno>
 #include <fstream>
-#include <set>
 #include <system_error>
 #include <utility>
+#include <vector>
 
 #include "apps/dataset/file_sum.h"
 #include "core/error.h"
@@ -95,14 +95,18 @@ std::size_t read_journal(const std::filesystem::path& path,
 }
 
 void count_journal(const std::filesystem::path& path, DatasetSummary& dataset) {
-  std::set<std::pair<std::size_t, std::int64_t>> noted;  // sensors and frames
+  std::vector<std::vector<bool>> noted(dataset.sensors.size());  // by sensor and frame
   dataset.done = 0;
   for (DatasetSummary::Sensor& sensor : dataset.sensors) sensor.done = sensor.bytes = 0;
   read_journal(path, [&](const std::string& text) {
     const auto entry = parse_entry(text);
     const auto sensor = entry ? dataset.number_of(entry->sensor) : std::nullopt;
-    if (!sensor || entry->frame >= dataset.sensors[*sensor].frames) return;
-    if (noted.emplace(*sensor, entry->frame).second) dataset.add(*entry);
+    if (!sensor || entry->frame < 0 || entry->frame >= dataset.sensors[*sensor].frames) return;
+    std::vector<bool>& frames = noted[*sensor];
+    const auto frame = static_cast<std::size_t>(entry->frame);
+    if (frames.size() <= frame) frames.resize(frame + 1);
+    if (!frames[frame]) dataset.add(*entry);
+    frames[frame] = true;
   });
 }
 

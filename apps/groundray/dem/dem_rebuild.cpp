@@ -115,7 +115,10 @@ DemResult build(const DemRequest& request, const GridFrame& frame, DemInput& inp
   std::size_t count = 0;
   DemSources sources{.points = [&](MeasuredPoints& points) {
     LidarBlock block;
-    if (!input.next(block)) return false;
+    if (!input.next(block)) {
+      check_count(count);
+      return false;
+    }
     points = std::move(block.points);
     count += points.size();
     if (request.dem.filter) check_memory(count, request.most_bytes);
@@ -129,7 +132,6 @@ DemResult build(const DemRequest& request, const GridFrame& frame, DemInput& inp
     };
   }
   DemResult result = build_dem(sources, frame, request.dem, control);
-  check_count(count);
   check_ground(result, request.dem.filter);
   return result;
 }

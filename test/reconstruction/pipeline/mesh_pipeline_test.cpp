@@ -135,7 +135,8 @@ TEST(MeshPipeline, DerivesTheDistanceOfSurfacesFromTheSpacing) {
 TEST(MeshPipeline, MeshesPointsWithoutOrder) {
   UnorderedPoints points;
   for (int i = 0; i < 80; ++i) {
-    points.points_m.emplace_back(0.5 * (i % 10), 0.5 * (i / 10), 3);
+    const int column = i % 10, row = i / 10;
+    points.points_m.emplace_back(0.5 * column, 0.5 * row, 3);
     points.origins_m.emplace_back(2, 2, 9);
     points.sd_m.push_back(0.01F * static_cast<float>(i));
     points.labels.push_back(static_cast<std::uint16_t>(i));
