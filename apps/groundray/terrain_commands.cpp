@@ -73,9 +73,9 @@ struct TerrainOptions {
         ->add_option("--max-error-m", max_error_m,
                      "Largest vertical distance from the DEM's surface, anywhere")
         ->required()
-        ->check(CLI::NonNegativeNumber);
+        ->check(not_negative());
     auto* angle =
-        add_number(command, "--angle-mrad", angle_mrad, CLI::NonNegativeNumber,
+        add_number(command, "--angle-mrad", angle_mrad, not_negative(),
                    "Permitted angle in milliradians, seen from --viewpoint, where that is larger");
     auto* from = command->add_option("--viewpoint", viewpoint_w_m, "X,Y,Z in the DEM's CRS, metres")
                      ->delimiter(',')
