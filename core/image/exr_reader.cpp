@@ -13,6 +13,7 @@
 #include <OpenEXR/ImfStringAttribute.h>
 #include <OpenEXR/ImfTileDescription.h>
 #include <OpenEXR/ImfVecAttribute.h>
+#include <OpenEXR/openexr.h>
 #include <fmt/ranges.h>
 
 #include <algorithm>
@@ -186,50 +187,40 @@ void check_parts(const Imf::MultiPartInputFile& file, const std::string& name) {
   }
 }
 
-/// Checks the size that each attribute declares: OpenEXR allocates it before it reads the
-/// attribute.
-/// @see OpenEXR File Layout, "Headers".
-void check_attribute_sizes(std::string_view bytes) {
-  constexpr std::size_t version_at = 4, headers_at = 8;
-  constexpr std::uint32_t multipart_flag = 0x1000;
-  std::size_t position = headers_at;
-  const auto ends_too_soon = [] { return std::runtime_error("unexpected end of file"); };
-  const auto read_whole_number = [&](std::size_t at) {  // little-endian
-    if (at > bytes.size() || bytes.size() - at < 4) throw ends_too_soon();
-    std::uint32_t value = 0;
-    for (std::size_t i = 4; i-- > 0;)
-      value = value << 8 | static_cast<unsigned char>(bytes[at + i]);
-    return value;
+/// Throws what is wrong with the headers. OpenEXR's C++ reader allocates the size that an attribute
+/// declares before it reads the attribute, and accepts a size that contradicts the type; its C
+/// library checks both first.
+void check_headers(std::string_view bytes, const std::string& name) {
+  struct File {
+    std::string_view bytes;
+    std::string fault;
+  } file{bytes, {}};
+  exr_context_initializer_t options = EXR_DEFAULT_CONTEXT_INITIALIZER;
+  options.user_data = &file;
+  options.error_handler_fn = [](exr_const_context_t context, exr_result_t, const char* message) {
+    void* user_data = nullptr;
+    exr_get_user_data(context, &user_data);
+    if (auto* const file = static_cast<File*>(user_data); file && file->fault.empty())
+      file->fault = message;  // the first is the cause of the others
   };
-  const auto read_text = [&] {
-    const std::size_t end = bytes.find('\0', position);
-    if (end == std::string_view::npos) throw ends_too_soon();
-    const std::size_t start = std::exchange(position, end + 1);
-    return bytes.substr(start, end - start);
+  options.size_fn = [](exr_const_context_t, void* user_data) {
+    return static_cast<std::int64_t>(static_cast<File*>(user_data)->bytes.size());
   };
-  const bool has_parts = (read_whole_number(version_at) & multipart_flag) != 0;
-  bool is_header_empty = true;
-  while (true) {
-    const std::string_view name = read_text();
-    if (name.empty()) {  // ends a header; an empty header ends those of a file with several parts
-      if (!has_parts || is_header_empty) return;
-      is_header_empty = true;
-      continue;
-    }
-    is_header_empty = false;
-    read_text();  // type
-    const std::uint32_t size = read_whole_number(position);
-    position += 4;
-    if (size > bytes.size() - position) {
-      throw std::runtime_error(fmt::format(
-          "its attribute {} of {} bytes extends beyond the end of the file", name, size));
-    }
-    position += size;
-  }
+  options.read_fn = [](exr_const_context_t, void* user_data, void* to, std::uint64_t size,
+                       std::uint64_t offset, exr_stream_error_func_ptr_t) {
+    const std::string_view whole = static_cast<File*>(user_data)->bytes;
+    const std::string_view part = whole.substr(std::min<std::size_t>(offset, whole.size()), size);
+    std::memcpy(to, part.data(), part.size());
+    return static_cast<std::int64_t>(part.size());
+  };
+  exr_context_t context = nullptr;
+  const exr_result_t result = exr_start_read(&context, name.c_str(), &options);
+  exr_finish(&context);
+  if (!file.fault.empty()) throw std::runtime_error(file.fault);  // with success, too
+  if (result != EXR_ERR_SUCCESS) throw std::runtime_error(exr_get_default_error_message(result));
 }
 
 ExrFile decode(std::string_view bytes, const std::string& name) {
-  check_attribute_sizes(bytes);
   BytesStream stream(bytes, name);
   Imf::MultiPartInputFile file(stream);
   check_parts(file, name);
@@ -302,10 +293,11 @@ ImageF decode_picture(std::string_view bytes, const std::string& name) {
   return image;
 }
 
-/// Returns decode(), whose exceptions are reported as damage.
-auto decoded(const std::string& name, const auto& decode) {
+/// Returns decode(bytes, name), whose exceptions are reported as damage.
+auto decoded(std::string_view bytes, const std::string& name, const auto& decode) {
   try {
-    return decode();
+    check_headers(bytes, name);
+    return decode(bytes, name);
   } catch (const Error&) {
     throw;
   } catch (const std::exception& fault) {
@@ -329,11 +321,11 @@ ExrFile parse_exr(std::string_view bytes, const std::string& name) {
     throw Error("{}: it is not an OpenEXR (.exr) image{}", name,
                 bytes.empty() ? ": it is empty" : ", despite its name: convert it");
   }
-  return decoded(name, [&] { return decode(bytes, name); });
+  return decoded(bytes, name, decode);
 }
 
 ImageF parse_exr_picture(std::string_view bytes, const std::string& name) {
-  return decoded(name, [&] { return decode_picture(bytes, name); });
+  return decoded(bytes, name, decode_picture);
 }
 
 }  // namespace groundray

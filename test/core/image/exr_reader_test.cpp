@@ -22,6 +22,7 @@
 
 #include "core/error.h"
 #include "core/image/exr_io.h"
+#include "core/image/image_io.h"
 #include "core/io/file_io.h"
 #include "test/support/temporary_folder.h"
 
@@ -280,11 +281,27 @@ TEST(ReadExr, RejectsAttributesLargerThanTheFile) {
     for (const auto size : {"urin"sv, "\xff\xff\xff\xff"sv}) {
       std::string bytes = whole;
       bytes.replace(at + name.size(), 4, size);
-      EXPECT_THAT(message_of(bytes),
-                  AllOf(HasSubstr("a.exr: it is truncated or damaged: its attribute name of "),
-                        HasSubstr(size == "urin" ? "1852404341 bytes" : "4294967295 bytes")));
+      const auto is_rejected =
+          AllOf(HasSubstr("a.exr: it is truncated or damaged: Attribute 'name', type 'string': "),
+                HasSubstr(size == "urin" ? "1852404341" : "-1"));
+      EXPECT_THAT(message_of(bytes), is_rejected);
+      EXPECT_THAT([&] { parse_heights(bytes, "a.exr"); }, ThrowsMessage<Error>(is_rejected));
     }
   }
+}
+
+// OpenEXR's C++ reader reads a list of channels up to its end, wherever the declared size puts it.
+TEST(ReadExr, RejectsAttributesWhoseSizeContradictsTheirType) {
+  const TemporaryFolder folder;
+  const ImageF light = random_image<float>(9, 5, 3);
+  write_exr(folder / "a.exr", {{{"R", "G", "B"}, &light}});
+  std::string bytes = read_text(folder / "a.exr");
+  using namespace std::string_view_literals;
+  constexpr std::string_view name = "channels\0chlist\0"sv;
+  const std::size_t at = bytes.find(name);
+  ASSERT_NE(at, std::string::npos);
+  bytes[at + name.size()] = static_cast<char>(bytes[at + name.size()] - 2);
+  EXPECT_THAT(message_of(bytes), HasSubstr("a.exr: it is truncated or damaged: "));
 }
 
 // Every prefix of a file is rejected, and damaged files cause at most an Error.
