@@ -200,8 +200,9 @@ void check_headers(std::string_view bytes, const std::string& name) {
   options.error_handler_fn = [](exr_const_context_t context, exr_result_t, const char* message) {
     void* user_data = nullptr;
     exr_get_user_data(context, &user_data);
-    if (auto* const file = static_cast<File*>(user_data); file && file->fault.empty())
-      file->fault = message;  // the first is the cause of the others
+    auto* const read = static_cast<File*>(user_data);
+    if (read != nullptr && read->fault.empty())
+      read->fault = message;  // the first is the cause of the others
   };
   options.size_fn = [](exr_const_context_t, void* user_data) {
     return static_cast<std::int64_t>(static_cast<File*>(user_data)->bytes.size());
