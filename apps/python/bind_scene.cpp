@@ -25,7 +25,7 @@
 #include "apps/python/binding/points.h"
 #include "apps/python/cast.h"
 #include "apps/python/scene_state.h"
-#include "apps/scene/readers/spec_io.h"
+#include "apps/scene/readers/scene_reader.h"
 #include "apps/scene/simulation.h"
 #include "core/error.h"
 #include "terrain/terrain_scene.h"

@@ -10,7 +10,7 @@
 #include <tuple>
 #include <utility>
 
-#include "apps/scene/readers/spec_io.h"
+#include "apps/scene/readers/scene_reader.h"
 #include "apps/scene/simulation.h"
 #include "core/appearance/bsdf.h"
 #include "core/error.h"

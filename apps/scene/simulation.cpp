@@ -15,7 +15,7 @@
 #include <vector>
 
 #include "apps/scene/interruption.h"
-#include "apps/scene/readers/spec_io.h"
+#include "apps/scene/readers/scene_reader.h"
 #include "core/error.h"
 #include "core/image/image_io.h"
 #include "core/io/tum_io.h"

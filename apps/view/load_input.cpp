@@ -11,7 +11,7 @@
 #include <system_error>
 
 #include "apps/scene/interruption.h"
-#include "apps/scene/readers/spec_io.h"
+#include "apps/scene/readers/scene_reader.h"
 #include "apps/view/layers/cloud_layer.h"
 #include "apps/view/layers/dem_layer.h"
 #include "apps/view/layers/mesh_layer.h"

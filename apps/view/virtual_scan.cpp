@@ -8,7 +8,7 @@
 #include <utility>
 
 #include "apps/scene/interruption.h"
-#include "apps/scene/readers/spec_io.h"
+#include "apps/scene/readers/scene_reader.h"
 #include "apps/view/layers/dem_layer.h"
 #include "core/appearance/material.h"
 #include "core/error.h"

@@ -7,7 +7,7 @@
 #include <cmath>
 #include <glm/geometric.hpp>
 
-#include "apps/scene/readers/spec_io.h"
+#include "apps/scene/readers/scene_reader.h"
 #include "sensors/lidar/beam/pulse_tracer.h"
 #include "sensors/lidar/lidar.h"
 #include "terrain/terrain_scene.h"

@@ -7,7 +7,7 @@
 #include <chrono>
 #include <cmath>
 
-#include "apps/scene/readers/spec_io.h"
+#include "apps/scene/readers/scene_reader.h"
 #include "core/tracing/scene.h"
 #include "sensors/lidar/beam/pulse_tracer.h"
 #include "sensors/lidar/lidar.h"

@@ -1,8 +1,9 @@
 #include <benchmark/benchmark.h>
 
+#include <algorithm>
 #include <filesystem>
 
-#include "apps/scene/readers/spec_io.h"
+#include "apps/scene/readers/scene_reader.h"
 #include "core/io/ply_io.h"
 #include "sensors/lidar/lidar.h"
 #include "terrain/terrain_scene.h"
@@ -23,8 +24,8 @@ void write_scan(::benchmark::State& state) {
   const testing::TemporaryFolder folder;
   const auto path = folder / "scan.ply";
   write_ply(path, scan, {});
-  const auto read = read_ply(path).cloud.column<double>("range_true");
-  if (!std::ranges::equal(read, scan.column<double>("range_true")))
+  const PointCloud read = read_ply(path).cloud;
+  if (!std::ranges::equal(read.column<double>("range_true"), scan.column<double>("range_true")))
     return state.SkipWithError("the file differs");
   for (auto _ : state) write_ply(path, scan, {});
   state.SetBytesProcessed(static_cast<std::int64_t>(std::filesystem::file_size(path)) *

@@ -10,7 +10,7 @@
 #include <glm/geometric.hpp>
 #include <glm/gtc/quaternion.hpp>
 
-#include "apps/scene/readers/spec_io.h"
+#include "apps/scene/readers/scene_reader.h"
 #include "sensors/lidar/lidar.h"
 #include "terrain/terrain_scene.h"
 #include "test/benchmark/landscape.h"

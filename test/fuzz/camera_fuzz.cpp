@@ -3,7 +3,7 @@
 #include <string>
 
 #include "apps/scene/calibration/camera_calibration.h"
-#include "apps/scene/readers/spec_io.h"
+#include "apps/scene/readers/scene_reader.h"
 #include "core/error.h"
 #include "sensors/camera/lens/lens.h"
 

@@ -2,7 +2,7 @@
 #include <cstdint>
 #include <string>
 
-#include "apps/scene/readers/spec_io.h"
+#include "apps/scene/readers/scene_reader.h"
 #include "core/error.h"
 
 // For any bytes, reading them as a scene or a lidar yields a spec or an Error: no crash, no hang.

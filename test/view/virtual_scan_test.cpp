@@ -14,7 +14,7 @@
 
 #include "apps/groundray/generate.h"
 #include "apps/scene/interruption.h"
-#include "apps/scene/readers/spec_io.h"
+#include "apps/scene/readers/scene_reader.h"
 #include "apps/scene/simulation.h"
 #include "core/error.h"
 #include "core/io/ply_io.h"

@@ -14,7 +14,7 @@
 #include "apps/dataset/frame_entry.h"
 #include "apps/scene/calibration/camera_calibration.h"
 #include "apps/scene/fingerprint.h"
-#include "apps/scene/readers/spec_io.h"
+#include "apps/scene/readers/scene_reader.h"
 #include "core/error.h"
 #include "core/io/file_io.h"
 

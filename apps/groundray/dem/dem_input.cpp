@@ -14,7 +14,7 @@
 #include <utility>
 
 #include "apps/scene/interruption.h"
-#include "apps/scene/readers/spec_io.h"
+#include "apps/scene/readers/scene_reader.h"
 #include "apps/scene/yaml_reader.h"
 #include "core/error.h"
 

@@ -8,7 +8,7 @@
 #include "apps/scene/calibration/calibration_reader.h"
 #include "apps/scene/calibration/camera_calibration.h"
 #include "apps/scene/readers/readers.h"
-#include "apps/scene/readers/spec_io.h"
+#include "apps/scene/readers/scene_reader.h"
 #include "core/error.h"
 
 namespace groundray::yaml {

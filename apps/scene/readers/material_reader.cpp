@@ -4,7 +4,7 @@
 #include <utility>
 
 #include "apps/scene/readers/readers.h"
-#include "apps/scene/readers/spec_io.h"
+#include "apps/scene/readers/scene_reader.h"
 #include "core/error.h"
 
 namespace groundray::yaml {

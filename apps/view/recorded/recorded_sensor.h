@@ -12,7 +12,7 @@
 #include <vector>
 
 #include "apps/dataset/dataset_reader.h"
-#include "apps/scene/readers/spec_io.h"
+#include "apps/scene/readers/scene_reader.h"
 #include "core/geometry/pose.h"
 #include "core/geometry/trajectory.h"
 #include "sensors/camera/lens/lens.h"

@@ -5,7 +5,7 @@
 #include <memory>
 #include <string>
 
-#include "apps/view/beam.h"
+#include "apps/view/echo_beam.h"
 #include "apps/view/rendering/view.h"
 #include "apps/view/window/job.h"
 #include "apps/view/window/panels/fact_table.h"

@@ -10,7 +10,7 @@
 #include <vector>
 
 #include "apps/scene/calibration/camera_calibration.h"
-#include "apps/scene/readers/spec_io.h"
+#include "apps/scene/readers/scene_reader.h"
 #include "sensors/camera/lens/lens.h"
 #include "test/support/temporary_folder.h"
 

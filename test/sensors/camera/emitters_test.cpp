@@ -9,7 +9,7 @@
 #include <limits>
 #include <utility>
 
-#include "apps/scene/readers/spec_io.h"
+#include "apps/scene/readers/scene_reader.h"
 #include "core/error.h"
 #include "core/image/luminance.h"
 #include "core/random.h"

@@ -11,7 +11,7 @@
 #include <glm/geometric.hpp>
 #include <iterator>
 
-#include "apps/scene/readers/spec_io.h"
+#include "apps/scene/readers/scene_reader.h"
 #include "core/error.h"
 #include "sensors/lidar/lidar.h"
 #include "terrain/terrain_scene.h"

@@ -6,7 +6,7 @@
 #include <glm/geometric.hpp>
 #include <numbers>
 
-#include "apps/scene/readers/spec_io.h"
+#include "apps/scene/readers/scene_reader.h"
 #include "core/tracing/scene.h"
 #include "sensors/lidar/lidar.h"
 #include "terrain/terrain_scene.h"

@@ -9,7 +9,7 @@
 #include <glm/geometric.hpp>
 #include <string_view>
 
-#include "apps/scene/readers/spec_io.h"
+#include "apps/scene/readers/scene_reader.h"
 #include "sensors/lidar/lidar.h"
 #include "terrain/terrain_scene.h"
 #include "test/support/temporary_folder.h"

@@ -10,7 +10,7 @@
 #include <numbers>
 #include <set>
 
-#include "apps/scene/readers/spec_io.h"
+#include "apps/scene/readers/scene_reader.h"
 #include "core/error.h"
 #include "terrain/terrain_scene.h"
 #include "test/support/margin.h"

@@ -9,7 +9,7 @@
 #include <set>
 #include <sstream>
 
-#include "apps/scene/readers/spec_io.h"
+#include "apps/scene/readers/scene_reader.h"
 #include "apps/scene/yaml_reader.h"
 #include "test/support/temporary_folder.h"
 

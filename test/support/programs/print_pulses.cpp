@@ -6,7 +6,7 @@
 #include <string>
 
 #include "apps/scene/calibration/calibration_io.h"
-#include "apps/scene/readers/spec_io.h"
+#include "apps/scene/readers/scene_reader.h"
 #include "sensors/lidar/pattern/scan_pattern.h"
 
 namespace {

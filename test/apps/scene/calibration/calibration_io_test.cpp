@@ -11,7 +11,7 @@
 #include <limits>
 #include <numbers>
 
-#include "apps/scene/readers/spec_io.h"
+#include "apps/scene/readers/scene_reader.h"
 #include "core/error.h"
 #include "sensors/lidar/pattern/scan_pattern.h"
 #include "test/support/temporary_folder.h"

@@ -6,7 +6,7 @@
 #include <string>
 #include <string_view>
 
-#include "apps/scene/readers/spec_io.h"
+#include "apps/scene/readers/scene_reader.h"
 #include "core/error.h"
 #include "sensors/camera/lens/lens.h"
 #include "test/support/lens_samples.h"

@@ -5,7 +5,7 @@
 #include <glm/trigonometric.hpp>
 #include <limits>
 
-#include "apps/scene/readers/spec_io.h"
+#include "apps/scene/readers/scene_reader.h"
 #include "core/error.h"
 #include "sensors/lidar/lidar.h"
 #include "test/support/scans/lidar_file.h"

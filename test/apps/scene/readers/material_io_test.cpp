@@ -6,7 +6,7 @@
 #include <numbers>
 #include <sstream>
 
-#include "apps/scene/readers/spec_io.h"
+#include "apps/scene/readers/scene_reader.h"
 #include "core/appearance/bsdf.h"
 #include "core/error.h"
 #include "test/support/temporary_folder.h"

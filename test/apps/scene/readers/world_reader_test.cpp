@@ -5,7 +5,7 @@
 #include <string>
 #include <variant>
 
-#include "apps/scene/readers/spec_io.h"
+#include "apps/scene/readers/scene_reader.h"
 #include "core/error.h"
 #include "test/support/temporary_folder.h"
 

@@ -8,7 +8,7 @@
 #include <utility>
 #include <variant>
 
-#include "apps/scene/readers/spec_io.h"
+#include "apps/scene/readers/scene_reader.h"
 #include "core/error.h"
 #include "reconstruction/mesh/scan/beam_columns.h"
 #include "sensors/lidar/pattern/scan_pattern.h"

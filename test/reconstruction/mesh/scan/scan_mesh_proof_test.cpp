@@ -12,7 +12,7 @@
 #include <utility>
 #include <vector>
 
-#include "apps/scene/readers/spec_io.h"
+#include "apps/scene/readers/scene_reader.h"
 #include "core/error.h"
 #include "core/io/pcd_reader.h"
 #include "core/model/mesh_reader.h"

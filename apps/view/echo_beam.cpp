@@ -1,4 +1,4 @@
-#include "apps/view/beam.h"
+#include "apps/view/echo_beam.h"
 
 #include <fmt/format.h>
 

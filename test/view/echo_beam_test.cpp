@@ -1,4 +1,4 @@
-#include "apps/view/beam.h"
+#include "apps/view/echo_beam.h"
 
 #include <gmock/gmock.h>
 #include <gtest/gtest.h>
@@ -19,7 +19,7 @@
 #include "test/support/temporary_folder.h"
 #include "test/view/sample_dataset.h"
 
-namespace groundray::beam_test {
+namespace groundray::echo_beam_test {
 namespace {
 
 using groundray::testing::SampleDataset;
@@ -173,4 +173,4 @@ TEST(Beam, ListsAllColumnsOfAnEcho) {
 }
 
 }  // namespace
-}  // namespace groundray::beam_test
+}  // namespace groundray::echo_beam_test

@@ -1,4 +1,4 @@
-#include "apps/scene/readers/spec_io.h"
+#include "apps/scene/readers/scene_reader.h"
 
 #include <algorithm>
 #include <cmath>

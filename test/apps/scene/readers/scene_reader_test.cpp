@@ -1,4 +1,4 @@
-#include "apps/scene/readers/spec_io.h"
+#include "apps/scene/readers/scene_reader.h"
 
 #include <gmock/gmock.h>
 #include <gtest/gtest.h>
@@ -15,7 +15,7 @@
 #include "test/support/scans/lidar_file.h"
 #include "test/support/temporary_folder.h"
 
-namespace groundray::spec_io_test {
+namespace groundray::scene_reader_test {
 namespace {
 
 using groundray::testing::data_folder;
@@ -642,4 +642,4 @@ TEST(PresetNames, AreOfTheRequestedKind) {
 }
 
 }  // namespace
-}  // namespace groundray::spec_io_test
+}  // namespace groundray::scene_reader_test
