@@ -696,8 +696,8 @@ def test_known_scene_is_reconstructed_better_than_by_others(scans):
     for peer in ("advancing_front", "ball_pivoting"):
         assert total("groundray", "f1") >= total(peer, "f1"), runs
 
-    # In the mean of ten scenes, machines measured 0.10 and 0.13 of advancing front's time; one small
-    # scene has an eighth at worst, and processors that do other work give up to half as much again.
+    # Machines measured 0.10 and 0.13 in the mean of ten scenes. One small scene has an eighth at
+    # worst, and processors that do other work give up to half as much again.
     most = 0.15 if is_full else 0.2
 
     def is_fast() -> bool:
