@@ -75,7 +75,8 @@ LIBRARIES = {
     r"|dem_warp|drape_io|gdal_raster|layers_io|tiled_tiff)\.cpp)",
     r"opencv2/": r"(sensors/camera/picture|reconstruction/dem/fill/inpaint_fill"
     r"|reconstruction/stereo/semi_global)\.cpp",
-    r"(CGAL|Eigen)/": r"reconstruction/.*\.cpp",
+    r"(CGAL|Eigen)/": r"reconstruction/(.*\.cpp|mesh/surface_cgal\.h)",
+    r"OpenMesh/": r"reconstruction/mesh/(surface_mesh\.h|simplify/edge_collapse\.h)",
     r"openssl/": r"apps/dataset/file_sum\.cpp",
     r"yaml-cpp/": r"apps/scene/yaml_reader\.cpp",
     r"(vtk|EGL/)": r"apps/view/.*",
@@ -87,6 +88,9 @@ IN_HEADERS = re.compile(r"glm/.*|fmt/.*|[a-z0-9_]+")
 PRIVATE = (
     "apps/scan/word_option.h",
     "core/tracing/embree_adapter.h",
+    "reconstruction/mesh/simplify/edge_collapse.h",
+    "reconstruction/mesh/surface_cgal.h",
+    "reconstruction/mesh/surface_mesh.h",
     "terrain/dem/gdal_raster.h",
 )
 INSTALLED = ("dataset", "scan", "scene")  # folders of apps/

@@ -1,3 +1,8 @@
+// By hand, because the simplicial factorisations of libraries take 3 to 8 times as long. Plates of
+// 120 x 120, 200 x 200 and 400 x 400 samples are factorised here in 0.04, 0.14 and 0.84 s, by
+// Eigen's SimplicialLDLT in 0.13, 0.53 and 6.8 s, by CHOLMOD's in 0.16, 0.58 and 6.8 s (both with
+// AMD ordering), in as much memory. Supernodal factorisations call the system's BLAS, whose
+// rounding depends on threads and processor.
 #include "reconstruction/dem/thin_plate/ldlt.h"
 
 #include <Eigen/Core>

@@ -5,7 +5,6 @@
 #include <CGAL/Polygon_mesh_processing/fair.h>
 #include <CGAL/Polygon_mesh_processing/refine.h>
 #include <CGAL/Polygon_mesh_processing/triangulate_hole.h>
-#include <CGAL/Surface_mesh.h>
 #include <CGAL/box_intersection_d.h>
 #include <CGAL/version.h>
 
@@ -17,6 +16,7 @@
 #include <unordered_map>
 
 #include "reconstruction/mesh/manifold_mesh.h"
+#include "reconstruction/mesh/surface_cgal.h"
 
 namespace groundray {
 namespace {
@@ -24,9 +24,8 @@ namespace {
 namespace pmp = CGAL::Polygon_mesh_processing;
 using Kernel = CGAL::Exact_predicates_inexact_constructions_kernel;
 using Point = Kernel::Point_3;
-using Mesh = CGAL::Surface_mesh<Point>;
-using Faces = std::vector<Mesh::Face_index>;
-using Vertices = std::vector<Mesh::Vertex_index>;
+using Faces = std::vector<SurfaceMesh::FaceHandle>;
+using Vertices = std::vector<SurfaceMesh::VertexHandle>;
 using Corners = std::array<glm::dvec3, 3>;
 
 // Bounding box of a triangle, as CGAL requires.
@@ -88,56 +87,6 @@ bool do_cross(Corners a, Corners b) {
   }
 }
 
-// Triangles in CGAL's half-edge structure.
-struct HalfEdgeMesh {
-  Mesh mesh;                                     // vertices and faces in the input order
-  std::vector<Mesh::Halfedge_index> half_edges;  // of each input half-edge
-};
-
-// Builds a half-edge structure from paired edges. Adding face by face would reject boundaries that
-// touch at a vertex.
-// @param next_border  returns, for a boundary half-edge, the one that ends where it begins, as
-//                     groundray::next_border.
-template <typename NextBorder>
-HalfEdgeMesh half_edge_mesh(std::span<const glm::dvec3> points_m,
-                            std::span<const glm::uvec3> triangles, const EdgePairs& pairs,
-                            const NextBorder& next_border) {
-  HalfEdgeMesh out;
-  Mesh& mesh = out.mesh;
-  const auto vertices = static_cast<std::uint32_t>(points_m.size());
-  const auto faces = static_cast<std::uint32_t>(triangles.size());
-  mesh.reserve(vertices, 3 * faces / 2 + vertices, faces);
-  for (const glm::dvec3& p : points_m) mesh.add_vertex({p.x, p.y, p.z});
-  out.half_edges.resize(3 * triangles.size());
-  const auto corner = [&](HalfEdge h) {
-    return Mesh::Vertex_index(triangles[h / 3][static_cast<int>(h % 3)]);
-  };
-  for (HalfEdge h = 0; h < out.half_edges.size(); ++h) {
-    const HalfEdge twin = pairs.twins[h];
-    const bool is_new = twin == none || h < twin;
-    out.half_edges[h] =
-        is_new ? mesh.add_edge(corner(h), corner(next_of(h))) : mesh.opposite(out.half_edges[twin]);
-  }
-  for (std::uint32_t t = 0; t < faces; ++t) {
-    const auto face = mesh.add_face();
-    mesh.set_halfedge(face, out.half_edges[3 * t + 2]);  // ends at the first corner
-  }
-  for (HalfEdge h = 0; h < out.half_edges.size(); ++h) {
-    const auto half_edge = out.half_edges[h];
-    mesh.set_next(half_edge, out.half_edges[next_of(h)]);
-    mesh.set_face(half_edge, Mesh::Face_index(h / 3));
-    if (!mesh.halfedge(corner(next_of(h))).is_valid())
-      mesh.set_halfedge(corner(next_of(h)), half_edge);
-  }
-  for (HalfEdge h = 0; h < out.half_edges.size(); ++h) {
-    if (pairs.twins[h] != none) continue;
-    const auto border = mesh.opposite(out.half_edges[h]);
-    mesh.set_next(border, mesh.opposite(out.half_edges[next_border(h)]));
-    mesh.set_halfedge(corner(h), border);  // as CGAL requires of boundary vertices
-  }
-  return out;
-}
-
 // Triangles around a hole. The vertices of the boundary come first.
 class Surroundings {
  public:
@@ -156,7 +105,7 @@ class Surroundings {
   const glm::dvec3& origin_m() const { return origin_m_; }
   std::uint32_t vertices() const { return static_cast<std::uint32_t>(vertices_.size()); }
 
-  HalfEdgeMesh half_edges() const {
+  SurfaceMesh surface() const {
     std::vector<glm::dvec3> points_m;
     for (const std::uint32_t vertex : vertices_)
       points_m.push_back(at_.mesh.vertices_m[vertex] - origin_m_);
@@ -169,7 +118,7 @@ class Surroundings {
       for (const HalfEdge h : {3 * t, 3 * t + 1, 3 * t + 2})
         pairs.twins.push_back(local(at_.pairs.twins[h]));
     }
-    return half_edge_mesh(points_m, triangles, pairs, [&](HalfEdge h) {
+    return to_surface(points_m, triangles, pairs, [&](HalfEdge h) {
       const HalfEdge global = 3 * triangles_[h / 3] + h % 3;
       const bool is_at_boundary =
           numbers_.at(corner_of(at_.mesh.triangles, global)) < boundary_.size();
@@ -204,59 +153,58 @@ class Surroundings {
   std::unordered_map<std::uint32_t, std::uint32_t> numbers_, triangle_numbers_;
 };
 
-Faces triangulate(Mesh& mesh, Mesh::Halfedge_index hole) {
+Faces triangulate(SurfaceMesh& mesh, SurfaceMesh::HalfedgeHandle hole) {
   Faces faces;
+  const auto points = CGAL::parameters::vertex_point_map(SurfacePoints<Kernel>{&mesh});
 #if CGAL_VERSION_NR < 1050600000
-  pmp::triangulate_hole(mesh, hole, std::back_inserter(faces));
+  pmp::triangulate_hole(mesh, hole, std::back_inserter(faces), points);
 #else
-  pmp::triangulate_hole(mesh, hole,
-                        CGAL::parameters::face_output_iterator(std::back_inserter(faces)));
+  pmp::triangulate_hole(mesh, hole, points.face_output_iterator(std::back_inserter(faces)));
 #endif
   return faces;
 }
 
 // Returns true if all points are near the boundary, whose vertices come first; false for NaN.
-bool are_near(const Mesh& mesh, std::uint32_t boundary, const Vertices& points) {
-  const auto position = [&](auto vertex) {
-    const auto& p = mesh.point(vertex);
-    return glm::dvec3(p.x(), p.y(), p.z());
-  };
+bool are_near(const SurfaceMesh& mesh, std::uint32_t boundary, const Vertices& points) {
+  const std::span at_m(mesh.points(), boundary);
   glm::dvec3 middle(0);
-  for (std::uint32_t i = 0; i < boundary; ++i)
-    middle += position(Mesh::Vertex_index(i)) / double(boundary);
+  for (const glm::dvec3& p_m : at_m) middle += p_m / double(boundary);
   double reach_m = 0;
-  for (std::uint32_t i = 0; i < boundary; ++i)
-    reach_m = std::max(reach_m, glm::distance(position(Mesh::Vertex_index(i)), middle));
-  return std::ranges::all_of(
-      points, [&](auto vertex) { return glm::distance(position(vertex), middle) <= 3 * reach_m; });
+  for (const glm::dvec3& p_m : at_m) reach_m = std::max(reach_m, glm::distance(p_m, middle));
+  return std::ranges::all_of(points, [&](auto vertex) {
+    return glm::distance(mesh.point(vertex), middle) <= 3 * reach_m;
+  });
 }
 
 // Moves the points to a thin plate that continues the slope at the boundary. Its stiffness is
 // computed from the current triangles: in the first run those of a nearly flat patch, in the second
 // those of the plate itself, which reduces the deviation from a ball by three tenths. Further runs
 // change little.
-bool fair(Mesh& mesh, const Vertices& points, std::uint32_t boundary) {
-  const auto try_once = [&] { return pmp::fair(mesh, points) && are_near(mesh, boundary, points); };
+bool fair(SurfaceMesh& mesh, const Vertices& points, std::uint32_t boundary) {
+  const auto try_once = [&] {
+    return pmp::fair(mesh, points,
+                     CGAL::parameters::vertex_point_map(SurfacePoints<Kernel>{&mesh})) &&
+           are_near(mesh, boundary, points);
+  };
   if (!try_once()) return false;
-  std::vector<Mesh::Point> once;
+  std::vector<glm::dvec3> once;
   for (const auto vertex : points) once.push_back(mesh.point(vertex));
   if (try_once()) return true;
   for (std::size_t i = 0; i < points.size(); ++i) mesh.point(points[i]) = once[i];
   return true;
 }
 
-HolePatch patch_of(const Mesh& mesh, const Faces& faces, const Surroundings& around,
+HolePatch patch_of(const SurfaceMesh& mesh, const Faces& faces, const Surroundings& around,
                    std::uint32_t boundary) {
   HolePatch patch;
-  for (std::uint32_t i = around.vertices(); i < mesh.number_of_vertices(); ++i) {
-    const auto& p = mesh.point(Mesh::Vertex_index(i));
-    patch.points_m.push_back(around.origin_m() + glm::dvec3(p.x(), p.y(), p.z()));
-  }
+  const std::span at_m(mesh.points(), mesh.n_vertices());
+  for (const glm::dvec3& p_m : at_m.subspan(around.vertices()))
+    patch.points_m.push_back(around.origin_m() + p_m);
   for (const auto face : faces) {
     glm::uvec3 t;
     int k = 0;
-    for (const auto vertex : vertices_around_face(mesh.halfedge(face), mesh)) {
-      const std::uint32_t number = vertex;
+    for (const auto vertex : mesh.fv_range(face)) {
+      const auto number = static_cast<std::uint32_t>(vertex.idx());
       t[k++] = number < boundary ? number : boundary + (number - around.vertices());
     }
     patch.triangles.push_back(t);
@@ -295,14 +243,14 @@ std::vector<std::pair<std::uint32_t, std::uint32_t>> crossings(const TriangleMes
 std::optional<HolePatch> patch_hole(const MeshAdjacency& at, std::span<const HalfEdge> chain,
                                     PatchShape shape) {
   const Surroundings around(at, chain);
-  HalfEdgeMesh half_edges = around.half_edges();
-  Mesh& mesh = half_edges.mesh;
-  const auto hole = mesh.opposite(half_edges.half_edges[around.local(chain.front())]);
+  SurfaceMesh mesh = around.surface();
+  const auto hole = mesh.opposite_halfedge_handle(handle_of(mesh, around.local(chain.front())));
   Faces faces = triangulate(mesh, hole);
   if (faces.empty()) return std::nullopt;
   Faces more;
   Vertices points;
-  pmp::refine(mesh, faces, std::back_inserter(more), std::back_inserter(points));
+  pmp::refine(mesh, faces, std::back_inserter(more), std::back_inserter(points),
+              CGAL::parameters::vertex_point_map(SurfacePoints<Kernel>{&mesh}));
   faces.insert(faces.end(), more.begin(), more.end());
   const auto boundary = static_cast<std::uint32_t>(chain.size());
   if (shape == PatchShape::Smooth && !points.empty()) {

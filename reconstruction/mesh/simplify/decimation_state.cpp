@@ -38,34 +38,39 @@ struct Facing {
 
 }  // namespace
 
-FeatureLines::FeatureLines(const CollapsibleMesh& mesh, const std::vector<glm::dvec3>& places_m,
-                           const std::vector<std::uint16_t>& labels, double angle_rad,
-                           const std::vector<float>& deep_m)
-    : edges_(3 * mesh.numbers(), none),
-      next_(mesh.vertices(), none),
-      is_on_(mesh.vertices()),
-      is_left_(mesh.vertices()),
+FeatureLines::FeatureLines(const SurfaceMesh& mesh, const std::vector<std::uint16_t>& labels,
+                           double angle_rad, const std::vector<float>& deep_m)
+    : edges_(mesh.n_edges(), none),
+      next_(mesh.n_vertices(), none),
+      is_on_(mesh.n_vertices()),
+      is_left_(mesh.n_vertices()),
       labels_(labels) {
-  const auto half_edges = static_cast<HalfEdge>(edges_.size());
-  for (HalfEdge h = 0; h < half_edges; ++h) {
-    const HalfEdge twin = mesh.twin(h);
-    const std::uint32_t a = mesh.from(h), b = mesh.to(h);
-    if (twin == none) mark(mesh, h, LineKind::Border);
-    if (!labels.empty() && labels[a] == labels[b] && labels[mesh.to(next_of(h))] != labels[a])
+  const auto apex_of = [&](auto h) { return mesh.to_vertex_handle(mesh.next_halfedge_handle(h)); };
+  for (std::size_t i = 0; i < edges_.size(); ++i) {
+    const auto edge = mesh.edge_handle(static_cast<unsigned>(i));
+    const auto h = mesh.halfedge_handle(edge, 0), twin = mesh.halfedge_handle(edge, 1);
+    const auto a = mesh.from_vertex_handle(h), b = mesh.to_vertex_handle(h);
+    const bool is_border = mesh.is_boundary(edge);
+    if (is_border) mark(mesh, h, LineKind::Border);
+    const auto is_beside_other = [&](auto side) {
+      return !mesh.is_boundary(side) && labels[number_of(apex_of(side))] != labels[number_of(a)];
+    };
+    if (!labels.empty() && labels[number_of(a)] == labels[number_of(b)] &&
+        (is_beside_other(h) || is_beside_other(twin)))
       mark(mesh, h, LineKind::Labels);
-    if (twin == none || twin < h || !(angle_rad < std::numbers::pi)) continue;
-    const std::uint32_t left = mesh.to(next_of(h)), right = mesh.to(next_of(twin));
-    const Fold fold(places_m[a], places_m[b], places_m[left], places_m[right]);
-    const double deep = deep_m.empty() ? 0 : std::max(deep_m[left], deep_m[right]);
+    if (is_border || !(angle_rad < std::numbers::pi)) continue;
+    const auto left = apex_of(h), right = apex_of(twin);
+    const Fold fold(mesh.point(a), mesh.point(b), mesh.point(left), mesh.point(right));
+    const double deep =
+        deep_m.empty() ? 0 : std::max(deep_m[number_of(left)], deep_m[number_of(right)]);
     if (fold.angle_rad > angle_rad && fold.depth_m > deep) mark(mesh, h, LineKind::Crease);
   }
 }
 
-void FeatureLines::mark(const CollapsibleMesh& mesh, HalfEdge h, LineKind kind) {
-  if (edges_[h] != none) return;
-  edges_[h] = static_cast<std::uint32_t>(lines_.size());
-  if (mesh.twin(h) != none) edges_[mesh.twin(h)] = edges_[h];
-  is_on_[mesh.from(h)] = is_on_[mesh.to(h)] = 1;
+void FeatureLines::mark(const SurfaceMesh& mesh, SurfaceMesh::HalfedgeHandle h, LineKind kind) {
+  if (has(h)) return;
+  edges_[number_of(h) / 2] = static_cast<std::uint32_t>(lines_.size());
+  is_on_[number_of(mesh.from_vertex_handle(h))] = is_on_[number_of(mesh.to_vertex_handle(h))] = 1;
   lines_.push_back({.kind = kind});
 }
 
@@ -73,25 +78,26 @@ FeatureLines::Crossing FeatureLines::crossing(const Star& star) const noexcept {
   Crossing crossing;
   if (is_on_[star.centre] == 0) return crossing;
   for (std::size_t i = 0; i < star.ring.size(); ++i) {
-    if (edges_[spoke(star, i)] == none) continue;
+    if (!has(star.spokes[i])) continue;
     if (crossing.edges < 2) crossing.spokes[crossing.edges] = i;
     ++crossing.edges;
   }
   return crossing;
 }
 
-bool FeatureLines::may_leave_along(const Star& star, const Crossing& crossing,
-                                   std::size_t to) const noexcept {
+bool FeatureLines::may_leave_along(const SurfaceMesh& mesh, const Star& star,
+                                   const Crossing& crossing, std::size_t to) const {
   const auto& [a, b] = crossing.spokes;
   if (to != a && to != b) return false;
   // The two edges become one, which must not coincide with an existing edge.
   const std::size_t other = to == a ? b : a, ring = star.ring.size();
-  if (other == (to + 1) % ring && to < star.spokes.size() && has(next_of(star.spokes[to])))
-    return false;
-  if (to == (other + 1) % ring && other < star.spokes.size() && has(next_of(star.spokes[other])))
-    return false;
+  const auto is_closed_by_line = [&](std::size_t first, std::size_t second) {
+    return second == (first + 1) % ring && first < star.triangles() &&
+           has(mesh.next_halfedge_handle(star.spokes[first]));
+  };
+  if (is_closed_by_line(to, other) || is_closed_by_line(other, to)) return false;
   // A line ends where its kind changes.
-  return lines_[edges_[spoke(star, a)]].kind == lines_[edges_[spoke(star, b)]].kind;
+  return lines_[line(star.spokes[a])].kind == lines_[line(star.spokes[b])].kind;
 }
 
 void FeatureLines::gather(const Star& star, const Crossing& crossing, std::size_t to,
@@ -99,10 +105,10 @@ void FeatureLines::gather(const Star& star, const Crossing& crossing, std::size_
   const auto& [a, b] = crossing.spokes;
   merged.onto = star.ring[to];
   merged.other_end = star.ring[to == a ? b : a];
-  merged.kind = lines_[edges_[spoke(star, a)]].kind;
+  merged.kind = lines_[line(star.spokes[a])].kind;
   merged.vertices.clear();
   for (const std::size_t i : {a, b}) {
-    for (std::uint32_t v = lines_[edges_[spoke(star, i)]].first; v != none; v = next_[v])
+    for (std::uint32_t v = lines_[line(star.spokes[i])].first; v != none; v = next_[v])
       merged.vertices.push_back(v);
   }
   merged.vertices.push_back(star.centre);
@@ -114,37 +120,42 @@ void FeatureLines::append(Edge& edge, std::uint32_t first, std::uint32_t last) n
   edge.last = last;
 }
 
-void FeatureLines::add(HalfEdge edge, std::uint32_t vertex) {
+void FeatureLines::add(SurfaceMesh::HalfedgeHandle edge, std::uint32_t vertex) {
   next_[vertex] = none;
   is_left_[vertex] = true;
-  append(lines_[edges_[edge]], vertex, vertex);
+  append(lines_[line(edge)], vertex, vertex);
 }
 
-void FeatureLines::collapse(const CollapsibleMesh& mesh, const Star& star, const Crossing& crossing,
+void FeatureLines::collapse(const SurfaceMesh& mesh, const Star& star, const Crossing& crossing,
                             std::size_t to) {
+  const auto along = star.spokes[to];
   if (crossing.edges == 2) {
-    const auto& [a, b] = crossing.spokes;
-    const HalfEdge along = spoke(star, to), stays = spoke(star, to == a ? b : a);
-    const Edge gone = std::exchange(lines_[edges_[along]], {});
-    append(lines_[edges_[stays]], gone.first, gone.last);
+    const auto stays =
+        star.spokes[to == crossing.spokes[0] ? crossing.spokes[1] : crossing.spokes[0]];
+    const Edge gone = std::exchange(lines_[line(along)], {});
+    append(lines_[line(stays)], gone.first, gone.last);
     add(stays, star.centre);
   }
-  // In each vanishing triangle, two edges become one.
-  const auto merge = [&](HalfEdge one, HalfEdge other) {
-    const std::uint32_t edge = edges_[one] != none ? edges_[one] : edges_[other];
-    for (const HalfEdge h : {mesh.twin(one), mesh.twin(other)}) {
-      if (h != none) edges_[h] = edge;
-    }
+  // In each vanishing triangle, the edge at the centre gives way to the one at the target.
+  const auto merge = [&](SurfaceMesh::HalfedgeHandle goes, SurfaceMesh::HalfedgeHandle stays) {
+    std::uint32_t& line_that_stays = edges_[number_of(stays) / 2];
+    if (line_that_stays == none) line_that_stays = line(goes);
   };
-  const std::size_t count = star.spokes.size();
-  if (to < count) {
-    const HalfEdge h = star.spokes[to];
-    merge(before(h), next_of(h));
-  }
-  if (to > 0 || !star.is_open()) {
-    const HalfEdge h = star.spokes[to == 0 ? count - 1 : to - 1];
-    merge(h, next_of(h));
-  }
+  if (!mesh.is_boundary(along))
+    merge(mesh.prev_halfedge_handle(along), mesh.next_halfedge_handle(along));
+  if (const auto back = mesh.opposite_halfedge_handle(along); !mesh.is_boundary(back))
+    merge(mesh.next_halfedge_handle(back), mesh.prev_halfedge_handle(back));
+}
+
+DecimationState::DecimationState(const TriangleMesh& shape, const EdgePairs& pairs,
+                                 const std::vector<std::uint16_t>& labels, double crease_rad,
+                                 const std::vector<float>& tolerances_m, bool are_noise)
+    : mesh(to_surface(shape, pairs)),
+      lines(mesh, labels, crease_rad, are_noise ? tolerances_m : std::vector<float>()),
+      triangles(shape.triangles.size()) {
+  samples.reserve(tolerances_m.size());
+  for (std::size_t i = 0; i < tolerances_m.size(); ++i)
+    samples.push_back({.p_m = shape.vertices_m[i], .tolerance_m = tolerances_m[i]});
 }
 
 // Returns true if a triangle is neither flipped nor a sliver; slivers are allowed where they
@@ -169,7 +180,7 @@ bool ShapeRules::allow(const Star& star, const FeatureLines::Crossing&, std::siz
     rim_m_.push_back(piece_.samples[star.ring[(fan_.first + i) % star.ring.size()]].p_m);
     if (i > 0 && !is_sound(star, i - 1)) return false;
   }
-  return piece_.mesh.may_collapse(star, to);
+  return may_collapse(piece_.mesh, star, to);
 }
 
 }  // namespace groundray

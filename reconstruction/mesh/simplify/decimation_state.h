@@ -8,7 +8,9 @@
 #include <glm/vec3.hpp>
 #include <vector>
 
-#include "reconstruction/mesh/simplify/collapsible_mesh.h"
+#include "reconstruction/mesh/manifold_mesh.h"
+#include "reconstruction/mesh/simplify/star.h"
+#include "reconstruction/mesh/surface_mesh.h"
 
 namespace groundray {
 
@@ -25,8 +27,7 @@ class FeatureLines {
   ///                   crease.
   /// @param deep_m     of each vertex: smallest depth of a crease, i.e. distance from the
   ///                   neighbouring triangle's plane. Empty for 0.
-  FeatureLines(const CollapsibleMesh& mesh, const std::vector<glm::dvec3>& places_m,
-               const std::vector<std::uint16_t>& labels, double angle_rad,
+  FeatureLines(const SurfaceMesh& mesh, const std::vector<std::uint16_t>& labels, double angle_rad,
                const std::vector<float>& deep_m);
 
   /// Edges of lines at a vertex.
@@ -38,9 +39,11 @@ class FeatureLines {
 
   /// Returns true if lines and labels permit the centre to move onto ring[to]. If it is inside a
   /// line, the caller must still check that the line stays in place.
-  bool may_leave(const Star& star, const Crossing& crossing, std::size_t to) const noexcept {
+  bool may_leave(const SurfaceMesh& mesh, const Star& star, const Crossing& crossing,
+                 std::size_t to) const {
     if (!labels_.empty() && labels_[star.centre] != labels_[star.ring[to]]) return false;
-    return crossing.edges == 0 || (crossing.edges == 2 && may_leave_along(star, crossing, to));
+    return crossing.edges == 0 ||
+           (crossing.edges == 2 && may_leave_along(mesh, star, crossing, to));
   }
 
   /// Edge that two edges of a line become, and the vertices that it will represent.
@@ -52,20 +55,15 @@ class FeatureLines {
   void gather(const Star& star, const Crossing& crossing, std::size_t to, Merged& merged) const;
 
   /// Records that the centre moves onto ring[to]; to be called right before the mesh does so.
-  void collapse(const CollapsibleMesh& mesh, const Star& star, const Crossing& crossing,
+  void collapse(const SurfaceMesh& mesh, const Star& star, const Crossing& crossing,
                 std::size_t to);
 
   /// Adds a vertex to those collapsed into the edge of a line.
-  void add(HalfEdge edge, std::uint32_t vertex);
+  void add(SurfaceMesh::HalfedgeHandle edge, std::uint32_t vertex);
   /// Returns true if a vertex was collapsed into an edge of a line.
   bool is_left(std::uint32_t vertex) const noexcept { return is_left_[vertex]; }
   /// Returns true if the edge belongs to a line.
-  bool has(HalfEdge edge) const noexcept { return edges_[edge] != none; }
-
-  /// Returns the edge from a star's centre to ring[i].
-  static HalfEdge spoke(const Star& star, std::size_t i) noexcept {
-    return i < star.spokes.size() ? star.spokes[i] : before(star.spokes.back());
-  }
+  bool has(SurfaceMesh::HalfedgeHandle edge) const noexcept { return line(edge) != none; }
 
  private:
   struct Edge {
@@ -73,11 +71,16 @@ class FeatureLines {
     std::uint32_t first = none, last = none;  // of the vertices collapsed into it
   };
 
-  bool may_leave_along(const Star& star, const Crossing& crossing, std::size_t to) const noexcept;
-  void mark(const CollapsibleMesh& mesh, HalfEdge h, LineKind kind);
+  // Returns the index in `lines_` of the edge of a half-edge, or none.
+  std::uint32_t line(SurfaceMesh::HalfedgeHandle h) const noexcept {
+    return edges_[number_of(h) / 2];
+  }
+  bool may_leave_along(const SurfaceMesh& mesh, const Star& star, const Crossing& crossing,
+                       std::size_t to) const;
+  void mark(const SurfaceMesh& mesh, SurfaceMesh::HalfedgeHandle h, LineKind kind);
   void append(Edge& edge, std::uint32_t first, std::uint32_t last) noexcept;
 
-  std::vector<std::uint32_t> edges_;  // of each half-edge: index in `lines_`, or none
+  std::vector<std::uint32_t> edges_;  // of each edge: index in `lines_`, or none
   std::vector<Edge> lines_;
   std::vector<std::uint32_t> next_;  // of each collapsed vertex
   std::vector<std::uint8_t> is_on_;  // of each vertex: initially on a line; others never will be
@@ -110,9 +113,17 @@ struct Sample {
 /// Mesh that is being simplified. Its vertices do not move: one is removed when an edge collapses
 /// onto its other end.
 struct DecimationState {
-  CollapsibleMesh mesh;
+  /// @param tolerances_m  permitted distance of the surface from each vertex.
+  /// @param are_noise     true if creases that are no deeper than that are ignored.
+  /// @param labels, crease_rad  as for FeatureLines.
+  DecimationState(const TriangleMesh& shape, const EdgePairs& pairs,
+                  const std::vector<std::uint16_t>& labels, double crease_rad,
+                  const std::vector<float>& tolerances_m, bool are_noise);
+
+  SurfaceMesh mesh;
   FeatureLines lines;
   std::vector<Sample> samples;  ///< of each vertex
+  std::size_t triangles = 0;    ///< number of triangles left
 };
 
 /// Rules that decide which collapses are permitted. Collapses are tested and made one at a time.

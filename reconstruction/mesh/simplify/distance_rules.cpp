@@ -12,8 +12,9 @@ namespace {
 constexpr std::size_t few_parts = 16, most_parts = 128;  // per triangle
 
 bool has(const Star& star, std::uint32_t triangle) {
-  return std::any_of(star.spokes.begin(), star.spokes.end(),
-                     [&](HalfEdge h) { return h / 3 == triangle; });
+  return std::ranges::any_of(star.spokes, [&](SurfaceMesh::HalfedgeHandle spoke) {
+    return number_of(star.mesh->face_handle(spoke)) == triangle;
+  });
 }
 
 }  // namespace
@@ -131,7 +132,7 @@ bool FaceCorrespondence::stands(const Star& star, std::uint32_t original) {
   candidates_.resize(fan_size_);
   for (std::uint32_t e = firsts_of_[original]; e != none; e = entries_[e].next_of_same) {
     const std::uint32_t triangle = entries_[e].triangle;
-    if (!has(star, triangle)) add_candidate({triangle, piece_.mesh.corners(triangle)});
+    if (!has(star, triangle)) add_candidate({triangle, corners_of(piece_.mesh, triangle)});
   }
   const glm::uvec3& t = triangles_[original];
   const std::array<ProofCorner, 3> corners{corner_at(t.x), corner_at(t.y), corner_at(t.z)};
@@ -165,7 +166,7 @@ bool FaceCorrespondence::allow(const Star& star, const std::vector<PlacedTriangl
   for (const PlacedTriangle& triangle : fan) add_candidate(triangle);
   fan_size_ = fan.size();
   proved_.clear();
-  for (std::size_t i = 0; i < star.spokes.size(); ++i) {
+  for (std::size_t i = 0; i < star.triangles(); ++i) {
     const std::uint32_t first = clean(firsts_[star.triangle(i)]);
     if (first == none) continue;
     const std::uint32_t original = entries_[first].original;
@@ -173,7 +174,7 @@ bool FaceCorrespondence::allow(const Star& star, const std::vector<PlacedTriangl
     asked_of_[original] = asked_;
     if (!stands(star, original)) return false;
   }
-  for (std::size_t i = 0; i < star.spokes.size(); ++i) {
+  for (std::size_t i = 0; i < star.triangles(); ++i) {
     std::uint32_t& head = firsts_[star.triangle(i)];
     for (std::uint32_t* link = &head; clean(*link) != none; link = &entries_[*link].next) {
       const std::uint32_t entry = *link, original = entries_[entry].original;
@@ -212,7 +213,7 @@ void FaceCorrespondence::collapse(const Star& star) {
       entries_[e].original = none;
     firsts_of_[original] = none;
   }
-  for (std::size_t i = 0; i < star.spokes.size(); ++i) clean(firsts_[star.triangle(i)]);
+  for (std::size_t i = 0; i < star.triangles(); ++i) clean(firsts_[star.triangle(i)]);
   for (const auto& [original, triangle] : proved_) add(original, triangle);
 }
 
@@ -238,12 +239,13 @@ void DistanceRules::set_fan(const Star& star, std::size_t to) {
   fan_.clear();
   for (std::size_t i = fan.first; i < fan.first + fan.triangles; ++i) {
     fan_.push_back(
-        {star.triangle(i % star.spokes.size()),
+        {star.triangle(i % star.triangles()),
          {star.ring[to], star.ring[i % star.ring.size()], star.ring[(i + 1) % star.ring.size()]}});
   }
   if (!fan_.empty()) return;
-  const std::uint32_t beyond = piece_.mesh.twin(next_of(star.spokes[0])) / 3;
-  fan_.push_back({beyond, piece_.mesh.corners(beyond)});
+  const auto outer = piece_.mesh.next_halfedge_handle(star.spokes[0]);
+  const std::uint32_t beyond = number_of(piece_.mesh.opposite_face_handle(outer));
+  fan_.push_back({beyond, corners_of(piece_.mesh, beyond)});
 }
 
 // Returns true if a line's new edge is near enough to all vertices that it represents.

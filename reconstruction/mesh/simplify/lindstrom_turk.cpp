@@ -1,4 +1,10 @@
+// This file uses parts of CGAL that are under GPL-3.0-or-later: see the licence section of README.
 #include "reconstruction/mesh/simplify/lindstrom_turk.h"
+
+#include <CGAL/Simple_cartesian.h>
+#include <CGAL/Surface_mesh_simplification/Policies/Edge_collapse/LindstromTurk_cost.h>
+#include <CGAL/Surface_mesh_simplification/Policies/Edge_collapse/LindstromTurk_placement.h>
+#include <CGAL/Surface_mesh_simplification/edge_collapse.h>
 
 #include <algorithm>
 #include <glm/common.hpp>
@@ -10,10 +16,13 @@
 #include "core/geometry/mesh.h"
 #include "core/model/model.h"
 #include "reconstruction/mesh/manifold_mesh.h"
-#include "reconstruction/mesh/simplify/volume_collapse.h"
+#include "reconstruction/mesh/surface_cgal.h"
 
 namespace groundray {
 namespace {
+
+namespace sms = CGAL::Surface_mesh_simplification;
+using Kernel = CGAL::Simple_cartesian<double>;
 
 bool is_height_field(const TriangleMesh& mesh) {
   return std::ranges::all_of(mesh.triangles, [&](const glm::uvec3& t) {
@@ -22,16 +31,6 @@ bool is_height_field(const TriangleMesh& mesh) {
     return ab.x * ac.y - ab.y * ac.x > 0;
   });
 }
-
-// Merged vertices, as links from each to the one that absorbed it.
-struct Merges {
-  std::vector<std::uint32_t> into;
-
-  std::uint32_t last(std::uint32_t vertex) {
-    while (into[vertex] != vertex) vertex = into[vertex] = into[into[vertex]];
-    return vertex;
-  }
-};
 
 // Returns the centre, rounded to metres so that differences from it are mostly exact.
 glm::dvec3 origin_amid(const TriangleMesh& mesh) {
@@ -46,27 +45,122 @@ double farthest_m(const TriangleMesh& mesh) {
   return std::max({away.x, away.y, away.z});
 }
 
-// Renumbers the remainder of `mesh`.
-void take_triangles(const CollapsibleMesh& mesh, const std::vector<glm::dvec3>& places_m,
-                    std::vector<std::uint32_t>& numbers, TriangleMesh& out) {
-  for (std::uint32_t v = 0; v < numbers.size(); ++v) {
-    if (!mesh.has_vertex(v)) continue;
-    numbers[v] = static_cast<std::uint32_t>(out.vertices_m.size());
-    out.vertices_m.push_back(places_m[v]);
-  }
-  for (std::uint32_t i = 0; i < mesh.numbers(); ++i) {
-    if (!mesh.has_triangle(i)) continue;
-    const glm::uvec3 t = mesh.corners(i);
-    out.triangles.emplace_back(numbers[t.x], numbers[t.y], numbers[t.z]);
-  }
+glm::dvec3 to_glm(const Kernel::Point_3& p) { return {p.x(), p.y(), p.z()}; }
+
+// Returns true if a triangle is counter-clockwise from above by more than the rounding of its final
+// position, `away_m` from the world's origin: half an ulp of each coordinate.
+bool lies_flat(const glm::dvec3& a, const glm::dvec3& b, const glm::dvec3& c, double away_m) {
+  const glm::dvec3 ab = b - a, ac = c - a, bc = c - b;
+  const double longest2 = std::max({glm::dot(ab, ab), glm::dot(ac, ac), glm::dot(bc, bc)});
+  const double rounding_m = 8 * std::numeric_limits<double>::epsilon() * away_m;
+  return ab.x * ac.y - ab.y * ac.x > std::max(1e-6 * longest2, rounding_m * std::sqrt(longest2));
 }
 
-ReducedMesh make_reduced_mesh(const CollapsibleMesh& mesh, const std::vector<glm::dvec3>& places_m,
-                              const ManifoldMesh& manifold, Merges& merges,
-                              const TriangleMesh& original, const glm::dvec3& origin_m) {
-  ReducedMesh out;
-  std::vector<std::uint32_t> numbers(manifold.sources.size(), none);
-  take_triangles(mesh, places_m, numbers, out.mesh);
+// Collapses of a run, and the number of triangles left.
+struct Collapses {
+  std::vector<std::uint32_t> into;  // of each vertex: the one that absorbed it, or itself
+  std::size_t first = 0, last = 0;  // number of triangles at the beginning and at the end
+  std::size_t triangles = 0;
+  bool is_flat = false;
+  double away_m = 0;
+  const RunControl& work;
+  double visited = 0, next = 0;  // triangles that CGAL visited, and when to report again
+
+  std::uint32_t survivor(std::uint32_t vertex) {
+    while (into[vertex] != vertex) vertex = into[vertex] = into[into[vertex]];
+    return vertex;
+  }
+
+  void report() {
+    if (visited < next) return;
+    next = visited + 1e5;
+    constexpr double looking = 0.1;  // fraction of progress for first evaluating all edges
+    const double all = 15 * static_cast<double>(first);  // 1.5 edges per triangle, 10 at each
+    work.report(triangles == first
+                    ? looking * std::min(1.0, visited / all)
+                    : looking + (1 - looking) * static_cast<double>(first - triangles) /
+                                    static_cast<double>(first - last));
+  }
+};
+
+// Stops CGAL at a number of triangles.
+struct EnoughCollapses {
+  const Collapses* run;
+  template <typename Cost, typename Profile>
+  bool operator()(const Cost&, const Profile&, std::size_t, std::size_t) const {
+    return run->triangles <= run->last;
+  }
+};
+
+// Rejects positions that make a triangle of a height field overhang.
+struct StaysFlat {
+  const Collapses* run;
+  template <typename Profile, typename Place>
+  Place operator()(const Profile& profile, const Place& place) const {
+    if (!place || !run->is_flat) return place;
+    const SurfaceMesh& mesh = profile.surface_mesh();
+    const auto moved = [&](auto vertex) {
+      return vertex == profile.v0() || vertex == profile.v1() ? to_glm(*place) : mesh.point(vertex);
+    };
+    for (const auto& t : profile.triangles()) {
+      const auto vanishes = [&](auto vertex) {
+        return vertex == t.v0 || vertex == t.v1 || vertex == t.v2;
+      };
+      if (vanishes(profile.v0()) && vanishes(profile.v1())) continue;
+      if (!lies_flat(moved(t.v0), moved(t.v1), moved(t.v2), run->away_m)) return Place();
+    }
+    return place;
+  }
+};
+
+// Notes what CGAL does.
+struct Observer {
+  Collapses* run;
+
+  void OnStarted(SurfaceMesh&) const {}
+  void OnFinished(SurfaceMesh&) const {}
+  template <typename Profile>
+  void OnStopConditionReached(const Profile&) const {}
+  template <typename Profile, typename Cost>
+  void OnCollected(const Profile& profile, const Cost&) const {
+    run->visited += static_cast<double>(profile.triangles().size());
+    run->report();
+  }
+  template <typename Profile, typename Cost>
+  void OnSelected(const Profile&, const Cost&, std::size_t, std::size_t) const {}
+  template <typename Profile, typename Place>
+  void OnCollapsing(const Profile& profile, const Place& place) const {
+    if (!place) return;
+    run->triangles -= std::size_t{profile.left_face_exists()} + profile.right_face_exists();
+    for (const auto vertex : profile.link()) {  // each of its edges is evaluated again
+      const double edges = profile.surface_mesh().valence(vertex);
+      run->visited += edges * edges;
+    }
+    run->report();
+  }
+  template <typename Profile, typename Vertex>
+  void OnCollapsed(const Profile& profile, Vertex kept) const {
+    for (const auto end : {profile.v0(), profile.v1()})
+      run->into[static_cast<std::size_t>(end.idx())] = static_cast<std::uint32_t>(kept.idx());
+  }
+  template <typename Profile>
+  void OnNonCollapsable(const Profile&) const {}
+};
+
+void collapse_edges(SurfaceMesh& surface, Collapses& run) {
+  sms::edge_collapse(surface, EnoughCollapses{&run},
+                     CGAL::parameters::vertex_point_map(SurfacePoints<Kernel>{&surface})
+                         .get_cost(sms::LindstromTurk_cost<SurfaceMesh>())
+                         .get_placement(sms::LindstromTurk_placement<SurfaceMesh>())
+                         .filter(StaysFlat{&run})
+                         .visitor(Observer{&run}));
+}
+
+ReducedMesh make_reduced_mesh(const SurfaceMesh& surface, const ManifoldMesh& manifold,
+                              Collapses& run, const TriangleMesh& original,
+                              const glm::dvec3& origin_m) {
+  RemainingMesh remaining = remaining_mesh(surface);
+  ReducedMesh out{.mesh = std::move(remaining.mesh)};
   const std::size_t vertices = out.mesh.vertices_m.size();
   for (glm::dvec3& p : out.mesh.vertices_m) p += origin_m;
   out.sources.resize(vertices);
@@ -74,7 +168,7 @@ ReducedMesh make_reduced_mesh(const CollapsibleMesh& mesh, const std::vector<glm
   std::vector<double> nearest_m(vertices, std::numeric_limits<double>::infinity());
   std::vector<std::uint32_t> taken(vertices, 0);
   for (std::uint32_t i = 0; i < manifold.sources.size(); ++i) {
-    const std::uint32_t source = manifold.sources[i], to = numbers[merges.last(i)];
+    const std::uint32_t source = manifold.sources[i], to = remaining.numbers[run.survivor(i)];
     if (out.became[source] == none) out.became[source] = to;
     ++taken[to];
     const double apart_m = glm::distance(original.vertices_m[source], out.mesh.vertices_m[to]);
@@ -89,28 +183,8 @@ ReducedMesh make_reduced_mesh(const CollapsibleMesh& mesh, const std::vector<glm
   return out;
 }
 
-void collapse_edges(std::size_t triangles, bool is_flat, double away_m, const RunControl& work,
-                    CollapsibleMesh& mesh, std::vector<glm::dvec3>& places_m, Merges& merges) {
-  constexpr double looking = 0.1;  // fraction of progress for first evaluating all edges
-  const auto tell = [&](double share) { work.report(share); };
-  constexpr std::uint64_t edges_each = 16384;  // edges evaluated per call of progress
-  const std::size_t first = mesh.triangles();
-  VolumeCollapse collapse(mesh, places_m, {is_flat ? Overhang::Refuse : Overhang::Allow, away_m},
-                          [&](double share) { tell(looking * share); });
-  for (std::uint64_t next = 0; mesh.triangles() > triangles;) {
-    if (collapse.looked_at() >= next) {
-      next = collapse.looked_at() + edges_each;
-      tell(looking + (1 - looking) * static_cast<double>(first - mesh.triangles()) /
-                         static_cast<double>(first - triangles));
-    }
-    const auto merge = collapse.step();
-    if (!merge) break;
-    merges.into[merge->gone] = merge->kept;
-  }
-}
-
 void check_triangle_count(const TriangleMesh& mesh, const RunControl& work) {
-  constexpr std::size_t most_triangles = 1'400'000'000;  // limit of 32-bit numbers of half-edges
+  constexpr std::size_t most_triangles = 700'000'000;  // limit of 31-bit numbers of half-edges
   if (mesh.triangles.size() >= most_triangles) {
     throw Error("reducing a mesh: {} triangles must be fewer than {}; split the mesh",
                 mesh.triangles.size(), most_triangles);
@@ -131,21 +205,23 @@ ReducedMesh reduce(const TriangleMesh& mesh, std::size_t triangles, const RunCon
   check_mesh(mesh, "mesh to reduce", EmptyMesh::Refuse);
   if (triangles == 0) throw Error("reducing a mesh: triangles = 0 must be at least 1");
   check_triangle_count(mesh, work);
-  const ManifoldMesh manifold = cut_to_manifold(mesh);
-  const bool is_flat = is_height_field(manifold.shape);
+  ManifoldMesh manifold = cut_to_manifold(mesh);
   const glm::dvec3 origin_m = origin_amid(mesh);
-  std::vector<glm::dvec3> places_m = manifold.shape.vertices_m;
-  for (glm::dvec3& p : places_m) p -= origin_m;
-  CollapsibleMesh rest(manifold);
-  Merges merges;
-  merges.into.resize(manifold.sources.size());
-  std::iota(merges.into.begin(), merges.into.end(), 0u);
-  if (rest.triangles() > triangles)
-    collapse_edges(triangles, is_flat, farthest_m(mesh), work, rest, places_m, merges);
-  ReducedMesh out = make_reduced_mesh(rest, places_m, manifold, merges, mesh, origin_m);
+  Collapses run{.into = std::vector<std::uint32_t>(manifold.sources.size()),
+                .first = manifold.shape.triangles.size(),
+                .last = triangles,
+                .triangles = manifold.shape.triangles.size(),
+                .is_flat = is_height_field(manifold.shape),
+                .away_m = farthest_m(mesh),
+                .work = work};
+  std::iota(run.into.begin(), run.into.end(), 0u);
+  for (glm::dvec3& p : manifold.shape.vertices_m) p -= origin_m;
+  SurfaceMesh surface = to_surface(manifold.shape, manifold.pairs);
+  if (run.triangles > triangles) collapse_edges(surface, run);
+  ReducedMesh out = make_reduced_mesh(surface, manifold, run, mesh, origin_m);
   out.tangled_edges = manifold.tangled_edges;
   out.dropped = manifold.dropped;
-  out.is_height_field = is_flat;
+  out.is_height_field = run.is_flat;
   work.report(1);
   return out;
 }

@@ -24,9 +24,9 @@ struct ReducedMesh {
 };
 
 /// Reduces a mesh to a number of triangles. Collapses the edge that changes volume and boundary
-/// least, to the position that changes them least. The error is not bounded; measure it. Cost and
-/// position are those of CGAL's implementation; the error agrees to a tenth of a percent, in less
-/// than half the time.
+/// least, to the position that changes them least, by CGAL. The error is not bounded; measure it.
+/// The time grows with the cube of the number of triangles at a vertex: 0.4 s where there are 400,
+/// 45 s where there are 2000.
 ///
 /// The result has `triangles` triangles or one fewer, because an interior collapse removes two. It
 /// has more if no permitted collapse is left: no collapse changes the topology or flips a triangle.

@@ -14,6 +14,7 @@
 #include "reconstruction/mesh/simplify/lindstrom_turk.h"
 #include "reconstruction/mesh/simplify/simplify_original.h"
 #include "reconstruction/mesh/simplify/vertical_rules.h"
+#include "reconstruction/mesh/surface_mesh.h"
 
 namespace groundray {
 namespace {
@@ -31,28 +32,6 @@ struct Stage {
   void tell(double share) const { work.report(begin + share * (end - begin)); }
 };
 
-/// Remainder of a state, renumbered in the same order.
-struct Remainder {
-  TriangleMesh local;                  // in the state's frame
-  std::vector<std::uint32_t> sources;  // of each vertex, in the state
-
-  explicit Remainder(const DecimationState& piece) {
-    std::vector<std::uint32_t> numbers(piece.samples.size(), none);
-    for (std::uint32_t v = 0; v < numbers.size(); ++v) {
-      if (!piece.mesh.has_vertex(v)) continue;
-      numbers[v] = static_cast<std::uint32_t>(sources.size());
-      sources.push_back(v);
-      local.vertices_m.push_back(piece.samples[v].p_m);
-    }
-    local.triangles.reserve(piece.mesh.triangles());
-    for (std::uint32_t i = 0; i < piece.mesh.numbers(); ++i) {
-      if (!piece.mesh.has_triangle(i)) continue;
-      const glm::uvec3 t = piece.mesh.corners(i);
-      local.triangles.emplace_back(numbers[t.x], numbers[t.y], numbers[t.z]);
-    }
-  }
-};
-
 /// Simplifies one mesh, with a method for each stopping criterion.
 class Simplifier {
  public:
@@ -67,7 +46,7 @@ class Simplifier {
   Simplified operator()(const NoiseBound& stop) const {
     const Tolerances tolerances = original_.noise(stop.sds);
     if (!original_.hangs_over()) return bounded_above(tolerances);
-    return result_of(Remainder(bounded_around(tolerances, {work_})), HaltReason::Bound);
+    return result_of(remaining_mesh(bounded_around(tolerances, {work_}).mesh), HaltReason::Bound);
   }
   Simplified operator()(const CostKnee& stop) const;
 
@@ -81,7 +60,7 @@ class Simplifier {
                Tolerances& tolerances) const;
   bool keep_covered(const std::vector<VerticalDistance>& distances, const Tolerances& tolerances,
                     std::vector<bool>& stay_covered) const;
-  Simplified result_of(const Remainder& remainder, HaltReason reason,
+  Simplified result_of(const RemainingMesh& remainder, HaltReason reason,
                        std::optional<VerticalError> vertical = {}) const;
   Simplified measured(Simplified result, TriangleMesh local) const;
 
@@ -123,8 +102,8 @@ Simplified Simplifier::bounded_above(const Tolerances& tolerances) const {
     VerticalRules rules(piece, tolerances.border_m, stay_covered, original_.rounding_m());
     EdgeCollapse collapse(piece, rules, 0);
     run(collapse, {work_, begin, end});
-    const Remainder remainder(piece);
-    const auto distances = vertical_distances(places_m, remainder.local);
+    const RemainingMesh remainder = remaining_mesh(piece.mesh);
+    const auto distances = vertical_distances(places_m, remainder.mesh);
     if (keep_covered(distances, tolerances, stay_covered)) {
       Simplified result = result_of(remainder, HaltReason::Bound, sum_up(distances));
       result.rounds = round;
@@ -133,7 +112,7 @@ Simplified Simplifier::bounded_above(const Tolerances& tolerances) const {
     if (round + 2 == most_rounds) stay_covered.assign(places_m.size(), true);
     begin = end;
   }
-  Simplified result = result_of(Remainder(free_piece()), HaltReason::Bound);
+  Simplified result = result_of(remaining_mesh(free_piece().mesh), HaltReason::Bound);
   result.rounds = most_rounds;
   return result;
 }
@@ -176,8 +155,9 @@ Simplified Simplifier::operator()(const DistanceBound& stop) const {
   double begin = 0;
   for (std::size_t round = 1; round <= most_rounds; ++round) {
     const double end = 0.5 * (1 + begin);
-    const Remainder remainder(bounded_around(tolerances, {work_, begin, end}));
-    if (tighten(remainder.local, stop.error_m, 0.03 * static_cast<double>(round), tolerances)) {
+    const RemainingMesh remainder =
+        remaining_mesh(bounded_around(tolerances, {work_, begin, end}).mesh);
+    if (tighten(remainder.mesh, stop.error_m, 0.03 * static_cast<double>(round), tolerances)) {
       Simplified result = result_of(remainder, HaltReason::Bound);
       result.rounds = round;
       for (OneSidedError* way : {&result.error.forth, &result.error.back})
@@ -189,7 +169,7 @@ Simplified Simplifier::operator()(const DistanceBound& stop) const {
     }
     begin = end;
   }
-  Simplified result = result_of(Remainder(free_piece()), HaltReason::Bound);
+  Simplified result = result_of(remaining_mesh(free_piece().mesh), HaltReason::Bound);
   result.rounds = most_rounds;
   return result;
 }
@@ -200,13 +180,13 @@ std::vector<CostStep> Simplifier::collapse_to(DecimationState& piece, std::size_
   ShapeRules rules(piece, original_.hangs_over() ? Overhang::Allow : Overhang::Refuse);
   EdgeCollapse collapse(piece, rules, line_weight);
   const double rounding_m2 = 1e-15 * original_.size_m() * original_.size_m();
-  std::vector<CostStep> steps{{0, piece.mesh.triangles()}};
-  while (piece.mesh.triangles() > triangles && collapse.step()) {
+  std::vector<CostStep> steps{{0, piece.triangles}};
+  while (piece.triangles > triangles && collapse.step()) {
     const double cost = collapse.mean_square_m2();
-    steps.push_back({cost > rounding_m2 ? cost : 0, piece.mesh.triangles()});
+    steps.push_back({cost > rounding_m2 ? cost : 0, piece.triangles});
     if (steps.size() % steps_each == 0) {
       const double all = static_cast<double>(steps.front().triangles - triangles);
-      stage.tell(static_cast<double>(steps.front().triangles - piece.mesh.triangles()) / all);
+      stage.tell(static_cast<double>(steps.front().triangles - piece.triangles) / all);
     }
   }
   return steps;
@@ -222,7 +202,7 @@ Simplified Simplifier::operator()(const CostKnee&) const {
   DecimationState piece = free_piece();
   collapse_to(piece, knee, {work_, 0.5, 1});
   const bool is_end = knee == steps.back().triangles;
-  return result_of(Remainder(piece), is_end ? HaltReason::Shape : HaltReason::Knee);
+  return result_of(remaining_mesh(piece.mesh), is_end ? HaltReason::Shape : HaltReason::Knee);
 }
 
 Simplified Simplifier::operator()(const FaceBudget& stop) const {
@@ -235,7 +215,7 @@ Simplified Simplifier::operator()(const FaceBudget& stop) const {
   if (has_labels && options_.labels == LabelBorders::Keep) {
     DecimationState piece = free_piece();
     collapse_to(piece, stop.triangles, {work_});
-    return result_of(Remainder(piece), reason(piece.mesh.triangles()));
+    return result_of(remaining_mesh(piece.mesh), reason(piece.triangles));
   }
   ReducedMesh reduced = reduce(original_.mesh().shape, stop.triangles, work_);
   Simplified result{.sources = std::move(reduced.sources),
@@ -246,7 +226,7 @@ Simplified Simplifier::operator()(const FaceBudget& stop) const {
   return measured(std::move(result), std::move(local));
 }
 
-Simplified Simplifier::result_of(const Remainder& remainder, HaltReason reason,
+Simplified Simplifier::result_of(const RemainingMesh& remainder, HaltReason reason,
                                  std::optional<VerticalError> vertical) const {
   Simplified result{.sources = picked(original_.sources(), remainder.sources),
                     .halted_by = reason,
@@ -254,8 +234,8 @@ Simplified Simplifier::result_of(const Remainder& remainder, HaltReason reason,
                     .vertical = vertical};
   // Exact original positions.
   result.mesh.shape = {
-      picked(original_.mesh().shape.vertices_m, result.sources), remainder.local.triangles, {}};
-  return measured(std::move(result), remainder.local);
+      picked(original_.mesh().shape.vertices_m, result.sources), remainder.mesh.triangles, {}};
+  return measured(std::move(result), remainder.mesh);
 }
 
 Simplified Simplifier::measured(Simplified result, TriangleMesh local) const {

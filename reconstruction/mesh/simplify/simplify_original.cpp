@@ -68,7 +68,7 @@ void check_simplify(const MeasuredMesh& mesh, const StopCriterion& stop,
                 "fineness.samples = {} must be positive", fineness.samples);
   broken.unless(fineness.largest_share > 0 && fineness.largest_share < 1,
                 "fineness.largest_share = {} must be between 0 and 1", fineness.largest_share);
-  constexpr std::size_t most_triangles = 1'400'000'000;
+  constexpr std::size_t most_triangles = 700'000'000;  // 31-bit numbers of half-edges
   broken.unless(mesh.shape.triangles.size() < most_triangles,
                 "{} triangles must be fewer than {}: split the mesh", mesh.shape.triangles.size(),
                 most_triangles);
@@ -143,14 +143,8 @@ DecimationState SimplifyOriginal::state(const SimplifyOptions& options,
     labels.reserve(sources().size());
     for (const std::uint32_t source : sources()) labels.push_back(mesh_.labels[source]);
   }
-  const std::vector<glm::dvec3>& places_m = surface_->mesh().vertices_m;
-  CollapsibleMesh mesh(manifold_);
-  FeatureLines lines(mesh, places_m, labels, options.crease_rad,
-                     tolerances.are_noise ? tolerances.each_m : std::vector<float>());
-  std::vector<Sample> samples(places_m.size());
-  for (std::size_t i = 0; i < samples.size(); ++i)
-    samples[i] = {.p_m = places_m[i], .tolerance_m = tolerances.each_m[i]};
-  return {std::move(mesh), std::move(lines), std::move(samples)};
+  return {surface_->mesh(),   manifold_.pairs,   labels,
+          options.crease_rad, tolerances.each_m, tolerances.are_noise};
 }
 
 }  // namespace groundray

@@ -6,22 +6,11 @@
 #include <glm/geometric.hpp>
 
 namespace groundray {
-namespace {
 
-std::vector<glm::dvec3> places_of(const std::vector<Sample>& samples) {
-  std::vector<glm::dvec3> places_m;
-  places_m.reserve(samples.size());
-  for (const Sample& sample : samples) places_m.push_back(sample.p_m);
-  return places_m;
-}
-
-}  // namespace
-
-BorderGrid::BorderGrid(const CollapsibleMesh& mesh, const std::vector<glm::dvec3>& places_m) {
-  const auto half_edges = static_cast<HalfEdge>(3 * mesh.numbers());
-  for (HalfEdge h = 0; h < half_edges; ++h) {
-    if (mesh.twin(h) == none)
-      entries_.push_back({mesh.from(h), glm::dvec2(places_m[mesh.from(h)])});
+BorderGrid::BorderGrid(const SurfaceMesh& mesh) {
+  for (const auto vertex : mesh.vertices()) {
+    if (mesh.is_boundary(vertex))
+      entries_.push_back({number_of(vertex), glm::dvec2(mesh.point(vertex))});
   }
   if (!entries_.empty()) {
     glm::dvec2 high_m = low_m_ = entries_[0].p_m;
@@ -47,7 +36,7 @@ glm::ivec2 BorderGrid::cell_of(const glm::dvec2& p_m) const noexcept {
   return glm::ivec2(glm::clamp(cell, glm::dvec2(0), glm::dvec2(cells_ - 1)));
 }
 
-bool BorderGrid::has_any(const CollapsibleMesh& mesh, const std::array<Entry, 3>& corners) const {
+bool BorderGrid::has_any(const SurfaceMesh& mesh, const std::array<Entry, 3>& corners) const {
   const Entry &a = corners[0], &b = corners[1], &c = corners[2];
   const glm::ivec2 low = cell_of(glm::min(a.p_m, glm::min(b.p_m, c.p_m)));
   const glm::ivec2 high = cell_of(glm::max(a.p_m, glm::max(b.p_m, c.p_m)));
@@ -55,7 +44,8 @@ bool BorderGrid::has_any(const CollapsibleMesh& mesh, const std::array<Entry, 3>
     const Entry& entry = entries_[number];
     if (entry.vertex == a.vertex || entry.vertex == b.vertex || entry.vertex == c.vertex)
       return false;
-    return mesh.has_vertex(entry.vertex) && twice_plan_area_m2(a.p_m, b.p_m, entry.p_m) >= 0 &&
+    const bool is_there = !mesh.status(mesh.vertex_handle(entry.vertex)).deleted();
+    return is_there && twice_plan_area_m2(a.p_m, b.p_m, entry.p_m) >= 0 &&
            twice_plan_area_m2(b.p_m, c.p_m, entry.p_m) >= 0 &&
            twice_plan_area_m2(c.p_m, a.p_m, entry.p_m) >= 0;
   };
@@ -75,18 +65,18 @@ VerticalRules::VerticalRules(DecimationState& piece, std::optional<double> borde
       border_m_(border_m),
       stay_covered_(std::move(stay_covered)),
       rounding_m_(rounding_m),
-      lists_(piece.mesh.numbers()),
-      borders_(piece.mesh, places_of(piece.samples)),
+      lists_(piece.triangles),
+      borders_(piece.mesh),
       is_covered_(piece.samples.size()) {
   stay_covered_.resize(piece.samples.size());
   double sum_m2 = 0;
-  for (std::uint32_t i = 0; i < piece.mesh.numbers(); ++i) sum_m2 += twice_plan_area_m2(i);
+  for (std::uint32_t i = 0; i < piece.triangles; ++i) sum_m2 += twice_plan_area_m2(i);
   // A tenth of the area of a cell, which has two triangles.
-  least_m2_ = 0.2 * sum_m2 / static_cast<double>(piece.mesh.numbers());
+  least_m2_ = 0.2 * sum_m2 / static_cast<double>(piece.triangles);
 }
 
 double VerticalRules::twice_plan_area_m2(std::uint32_t triangle) const noexcept {
-  const glm::uvec3 t = piece_.mesh.corners(triangle);
+  const glm::uvec3 t = corners_of(piece_.mesh, triangle);
   return groundray::twice_plan_area_m2(piece_.samples[t.x].p_m, piece_.samples[t.y].p_m,
                                        piece_.samples[t.z].p_m);
 }
@@ -130,7 +120,7 @@ bool VerticalRules::is_narrow(double twice_m2, std::size_t i) const noexcept {
 // Small triangles are allowed where there are smaller ones.
 double VerticalRules::smallest_of(const Star& star) const noexcept {
   double smallest_m2 = least_m2_;
-  for (std::size_t k = 0; k < star.spokes.size(); ++k)
+  for (std::size_t k = 0; k < star.triangles(); ++k)
     smallest_m2 = std::min(smallest_m2, twice_plan_area_m2(star.triangle(k)));
   return smallest_m2;
 }
@@ -236,11 +226,11 @@ bool VerticalRules::keeps_border(const Star& star, std::size_t to) {
 // again, so it is tested first.
 bool VerticalRules::keeps_samples(const Star& star) {
   std::size_t sector = 0;
-  for (std::size_t i = 0; i < star.spokes.size(); ++i) {
+  for (std::size_t i = 0; i < star.triangles(); ++i) {
     const std::uint32_t first = lists_.first(star.triangle(i));
     if (first != none && !is_near(first, sector)) return false;
   }
-  for (std::size_t i = 0; i < star.spokes.size(); ++i) {
+  for (std::size_t i = 0; i < star.triangles(); ++i) {
     std::uint32_t prior = none;
     const std::uint32_t triangle = star.triangle(i);
     for (std::uint32_t vertex = lists_.first(triangle); vertex != none;) {
@@ -267,21 +257,21 @@ bool VerticalRules::allow(const Star& star, const FeatureLines::Crossing& crossi
   std::size_t sector = 0;
   if (!is_near(star.centre, sector)) return false;
   placed_.emplace_back(star.centre, sector);
-  if (!piece_.mesh.may_collapse(star, to)) return false;
+  if (!may_collapse(piece_.mesh, star, to)) return false;
   if (is_open_ && !keeps_border(star, to)) return false;
   return keeps_samples(star);
 }
 
 void VerticalRules::collapse(const Star& star, const FeatureLines::Crossing& crossing,
                              std::size_t) {
-  for (std::size_t i = 0; i < star.spokes.size(); ++i) lists_.clear(star.triangle(i));
+  for (std::size_t i = 0; i < star.triangles(); ++i) lists_.clear(star.triangle(i));
   for (const auto& [vertex, sector] : placed_) {
     is_covered_[vertex] = sector != nowhere;
     if (sector != nowhere) {
-      const std::size_t triangle = (fan_.first + sector) % star.spokes.size();
+      const std::size_t triangle = (fan_.first + sector) % star.triangles();
       lists_.add(piece_.samples, star.triangle(triangle), vertex);
     } else if (vertex != star.centre && !piece_.lines.is_left(vertex)) {
-      piece_.lines.add(piece_.lines.spoke(star, crossing.spokes[0]), vertex);
+      piece_.lines.add(star.spokes[crossing.spokes[0]], vertex);
     }
   }
 }

@@ -9,7 +9,6 @@
 #include <utility>
 #include <vector>
 
-#include "reconstruction/mesh/simplify/collapsible_mesh.h"
 #include "reconstruction/mesh/simplify/decimation_state.h"
 
 namespace groundray {
@@ -18,8 +17,7 @@ namespace groundray {
 /// others.
 class BorderGrid {
  public:
-  /// @param places_m  of each vertex of the mesh; z is ignored.
-  BorderGrid(const CollapsibleMesh& mesh, const std::vector<glm::dvec3>& places_m);
+  explicit BorderGrid(const SurfaceMesh& mesh);
 
   /// Vertex and its position in plan view.
   struct Entry {
@@ -29,7 +27,7 @@ class BorderGrid {
 
   /// Returns true if a triangle with counter-clockwise corners contains, inside or on its sides, a
   /// boundary vertex other than its corners that the mesh still has.
-  bool has_any(const CollapsibleMesh& mesh, const std::array<Entry, 3>& corners) const;
+  bool has_any(const SurfaceMesh& mesh, const std::array<Entry, 3>& corners) const;
 
  private:
   glm::ivec2 cell_of(const glm::dvec2& p_m) const noexcept;

@@ -1,4 +1,4 @@
-#include "reconstruction/mesh/simplify/collapsible_mesh.h"
+#include "reconstruction/mesh/simplify/star.h"
 
 #include <gtest/gtest.h>
 
@@ -9,7 +9,7 @@
 #include "test/support/scans/solid.h"
 #include "test/support/terrain/plan_check.h"
 
-namespace groundray::collapsible_mesh_test {
+namespace groundray::star_test {
 namespace {
 
 using Random = std::mt19937_64;
@@ -30,25 +30,6 @@ TriangleMesh torn_sheet(unsigned side, Random& random) {
   return mesh;
 }
 
-TriangleMesh triangles_of(const CollapsibleMesh& mesh) {
-  TriangleMesh out;
-  std::vector<std::uint32_t> numbers(mesh.vertices(), none);
-  for (std::uint32_t i = 0; i < mesh.numbers(); ++i) {
-    if (!mesh.has_triangle(i)) continue;
-    glm::uvec3 t = mesh.corners(i);
-    for (int k = 0; k < 3; ++k) {
-      std::uint32_t& number = numbers[t[k]];
-      if (number == none) {
-        number = static_cast<std::uint32_t>(out.vertices_m.size());
-        out.vertices_m.emplace_back(0);
-      }
-      t[k] = number;
-    }
-    out.triangles.push_back(t);
-  }
-  return out;
-}
-
 // Euler characteristic (vertices - edges + triangles), which collapses do not change.
 long characteristic(const TriangleMesh& mesh) {
   std::set<std::pair<std::uint32_t, std::uint32_t>> edges;
@@ -60,46 +41,50 @@ long characteristic(const TriangleMesh& mesh) {
 }
 
 // Oracle: the star as the corners of the triangles define it.
-void expect_star(const CollapsibleMesh& mesh, std::uint32_t vertex) {
+void expect_star(const SurfaceMesh& mesh, std::uint32_t vertex) {
   Star star;
-  mesh.gather(vertex, star);
+  gather(mesh, vertex, star);
   ASSERT_EQ(star.centre, vertex);
-  std::size_t count = 0;
-  for (std::uint32_t i = 0; i < mesh.numbers(); ++i) {
-    if (!mesh.has_triangle(i)) continue;
-    const glm::uvec3 t = mesh.corners(i);
-    count += t.x == vertex || t.y == vertex || t.z == vertex;
+  std::set<std::uint32_t> around;
+  for (const auto face : mesh.faces()) {
+    const glm::uvec3 t = corners_of(mesh, number_of(face));
+    if (t.x == vertex || t.y == vertex || t.z == vertex) around.insert(number_of(face));
   }
-  ASSERT_EQ(star.spokes.size(), count);
-  for (std::size_t i = 0; i < count; ++i) {
-    EXPECT_EQ(mesh.from(star.spokes[i]), vertex);
-    EXPECT_EQ(mesh.to(star.spokes[i]), star.ring[i]);
-    EXPECT_EQ(mesh.to(next_of(star.spokes[i])), star.ring[(i + 1) % star.ring.size()]);
+  ASSERT_EQ(star.triangles(), around.size());
+  ASSERT_EQ(star.spokes.size(), star.ring.size());
+  for (std::size_t i = 0; i < star.triangles(); ++i) {
+    EXPECT_EQ(around.erase(star.triangle(i)), 1u);
+    const glm::uvec3 t = corners_of(mesh, star.triangle(i));
+    const int centre = t.x == vertex ? 0 : t.y == vertex ? 1 : 2;
+    EXPECT_EQ(t[(centre + 1) % 3], star.ring[i]);
+    EXPECT_EQ(t[(centre + 2) % 3], star.ring[(i + 1) % star.ring.size()]);
+    EXPECT_EQ(number_of(mesh.to_vertex_handle(star.spokes[i])), star.ring[i]);
   }
 }
 
-TEST(CollapsibleMesh, StaysManifold) {
+TEST(Star, CollapsesKeepSurfaceManifold) {
   Random random(5);
   for (int i = 0; i < 12; ++i) {
     const TriangleMesh begun = i % 3 == 0 ? testing::icosphere(1, 2).mesh : torn_sheet(9, random);
     const ManifoldMesh manifold = cut_to_manifold(begun);
-    CollapsibleMesh mesh(manifold);
+    SurfaceMesh mesh = to_surface(manifold.shape, manifold.pairs);
     const long before = characteristic(manifold.shape);
+    std::size_t triangles = manifold.shape.triangles.size();
     Star star;
     std::size_t collapses = 0;
     for (int k = 0; k < 4000; ++k) {
-      const auto vertex = static_cast<std::uint32_t>(random() % mesh.vertices());
-      if (!mesh.has_vertex(vertex)) continue;
-      mesh.gather(vertex, star);
+      const auto vertex = static_cast<std::uint32_t>(random() % mesh.n_vertices());
+      if (mesh.status(mesh.vertex_handle(vertex)).deleted()) continue;
+      gather(mesh, vertex, star);
       const std::size_t to = star.is_open() ? (random() % 2 == 0 ? 0 : star.ring.size() - 1)
                                             : random() % star.ring.size();
-      if (!mesh.may_collapse(star, to)) continue;
-      const std::size_t vanishing = star.is_open() ? 1 : 2, triangles = mesh.triangles();
-      mesh.collapse(star, to);
-      EXPECT_EQ(mesh.triangles() + vanishing, triangles);
-      EXPECT_FALSE(mesh.has_vertex(vertex));
+      if (!may_collapse(mesh, star, to)) continue;
+      triangles -= star.is_open() ? 1 : 2;
+      collapse(mesh, star, to);
+      EXPECT_TRUE(mesh.status(mesh.vertex_handle(vertex)).deleted());
       if (++collapses % 7 != 0) continue;
-      const TriangleMesh now = triangles_of(mesh);
+      const TriangleMesh now = remaining_mesh(mesh).mesh;
+      ASSERT_EQ(now.triangles.size(), triangles);
       ASSERT_EQ(testing::manifold_faults(now), 0u);
       ASSERT_EQ(characteristic(now), before);
       for (const std::uint32_t neighbour : star.ring) expect_star(mesh, neighbour);
@@ -107,10 +92,10 @@ TEST(CollapsibleMesh, StaysManifold) {
     EXPECT_GT(collapses, 20u);
     // A ball is reduced to a tetrahedron, a sheet to few triangles for each piece and hole.
     if (i % 3 == 0) {
-      EXPECT_EQ(mesh.triangles(), 4u);
+      EXPECT_EQ(triangles, 4u);
     }
   }
 }
 
 }  // namespace
-}  // namespace groundray::collapsible_mesh_test
+}  // namespace groundray::star_test

@@ -1,0 +1,36 @@
+#pragma once
+
+#include <CGAL/boost/graph/graph_traits_TriMesh_ArrayKernelT.h>
+#include <CGAL/boost/graph/helpers.h>
+#include <CGAL/boost/graph/properties_TriMesh_ArrayKernelT.h>
+
+#include <boost/property_map/property_map.hpp>
+
+#include "reconstruction/mesh/surface_mesh.h"
+
+namespace groundray {
+
+/// Where CGAL's algorithms find it through SurfaceTraits: some do not include it.
+using CGAL::is_border;
+
+/// Positions of a surface as points of a CGAL kernel, for `vertex_point_map`. CGAL's own map
+/// rounds what it writes to single precision.
+template <typename Kernel>
+struct SurfacePoints {
+  using key_type = SurfaceMesh::VertexHandle;
+  using value_type = typename Kernel::Point_3;
+  using reference = value_type;
+  using category = boost::read_write_property_map_tag;
+
+  SurfaceMesh* mesh = nullptr;
+
+  friend value_type get(const SurfacePoints& points, key_type vertex) {
+    const glm::dvec3& p_m = points.mesh->point(vertex);
+    return {p_m.x, p_m.y, p_m.z};
+  }
+  friend void put(const SurfacePoints& points, key_type vertex, const value_type& p) {
+    points.mesh->set_point(vertex, {p.x(), p.y(), p.z()});
+  }
+};
+
+}  // namespace groundray
