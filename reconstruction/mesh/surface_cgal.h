@@ -10,7 +10,8 @@
 
 namespace groundray {
 
-/// Where CGAL's algorithms find it through SurfaceTraits: some do not include it.
+/// Lets those of CGAL's algorithms find `is_border` that do not include it: they look here, because
+/// SurfaceTraits is declared here.
 using CGAL::is_border;
 
 /// Positions of a surface as points of a CGAL kernel, for `vertex_point_map`. CGAL's own map

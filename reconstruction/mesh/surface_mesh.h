@@ -28,7 +28,7 @@ struct OpenMesh::vector_traits<glm::dvec3> {
 
 namespace groundray {
 
-/// Kernel of SurfaceMesh: positions in double precision, and marks of what was deleted.
+/// Traits of SurfaceMesh: positions in double precision, and marks of what was deleted.
 struct SurfaceTraits : OpenMesh::DefaultTraits {
   using Point = glm::dvec3;
   using Normal = glm::dvec3;
@@ -79,6 +79,7 @@ struct RemainingMesh {
   std::vector<std::uint32_t> numbers;  ///< of each vertex of the surface; `none` if it was deleted
 };
 
+/// Returns what was not deleted from a surface.
 RemainingMesh remaining_mesh(const SurfaceMesh& surface);
 
 }  // namespace groundray

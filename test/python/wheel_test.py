@@ -121,6 +121,7 @@ def test_the_wheel_states_its_licences_and_contains_their_texts(wheel):
     for name, holder in (
         ("cgal_gpl_3", "GNU GENERAL PUBLIC LICENSE"),
         ("nanobind", "Wenzel Jakob"),
+        ("openmesh", "RWTH-Aachen University"),
         ("robin_map", "Goetghebuer-Planchon"),
     ):
         assert holder in (ROOT / f"data/LICENSES/{name}.txt").read_text()

@@ -149,9 +149,10 @@ void FeatureLines::collapse(const SurfaceMesh& mesh, const Star& star, const Cro
 
 DecimationState::DecimationState(const TriangleMesh& shape, const EdgePairs& pairs,
                                  const std::vector<std::uint16_t>& labels, double crease_rad,
-                                 const std::vector<float>& tolerances_m, bool are_noise)
+                                 const std::vector<float>& tolerances_m,
+                                 const std::vector<float>& deep_m)
     : mesh(to_surface(shape, pairs)),
-      lines(mesh, labels, crease_rad, are_noise ? tolerances_m : std::vector<float>()),
+      lines(mesh, labels, crease_rad, deep_m),
       triangles(shape.triangles.size()) {
   samples.reserve(tolerances_m.size());
   for (std::size_t i = 0; i < tolerances_m.size(); ++i)

@@ -113,12 +113,12 @@ struct Sample {
 /// Mesh that is being simplified. Its vertices do not move: one is removed when an edge collapses
 /// onto its other end.
 struct DecimationState {
+  /// @param shape, pairs  a manifold and the pairs of its edges.
+  /// @param labels, crease_rad, deep_m  as for FeatureLines.
   /// @param tolerances_m  permitted distance of the surface from each vertex.
-  /// @param are_noise     true if creases that are no deeper than that are ignored.
-  /// @param labels, crease_rad  as for FeatureLines.
   DecimationState(const TriangleMesh& shape, const EdgePairs& pairs,
                   const std::vector<std::uint16_t>& labels, double crease_rad,
-                  const std::vector<float>& tolerances_m, bool are_noise);
+                  const std::vector<float>& tolerances_m, const std::vector<float>& deep_m);
 
   SurfaceMesh mesh;
   FeatureLines lines;

@@ -7,15 +7,18 @@
 #include <CGAL/Surface_mesh_simplification/edge_collapse.h>
 
 #include <algorithm>
+#include <cmath>
 #include <glm/common.hpp>
 #include <glm/geometric.hpp>
 #include <limits>
 #include <numeric>
+#include <utility>
 
 #include "core/error.h"
 #include "core/geometry/mesh.h"
 #include "core/model/model.h"
 #include "reconstruction/mesh/manifold_mesh.h"
+#include "reconstruction/mesh/simplify/star.h"
 #include "reconstruction/mesh/surface_cgal.h"
 
 namespace groundray {
@@ -76,10 +79,11 @@ struct Collapses {
     next = visited + 1e5;
     constexpr double looking = 0.1;  // fraction of progress for first evaluating all edges
     const double all = 15 * static_cast<double>(first);  // 1.5 edges per triangle, 10 at each
-    work.report(triangles == first
-                    ? looking * std::min(1.0, visited / all)
-                    : looking + (1 - looking) * static_cast<double>(first - triangles) /
-                                    static_cast<double>(first - last));
+    const double share = triangles == first
+                             ? looking * std::min(1.0, visited / all)
+                             : looking + (1 - looking) * static_cast<double>(first - triangles) /
+                                             static_cast<double>(first - last);
+    work.report(std::min(share, 1.0));
   }
 };
 
@@ -92,28 +96,35 @@ struct EnoughCollapses {
   }
 };
 
-// Rejects positions that make a triangle of a height field overhang.
-struct StaysFlat {
+// Rejects positions that turn a triangle over by more than a right angle, or make one of a height
+// field overhang.
+struct KeepsSides {
   const Collapses* run;
   template <typename Profile, typename Place>
   Place operator()(const Profile& profile, const Place& place) const {
-    if (!place || !run->is_flat) return place;
-    const SurfaceMesh& mesh = profile.surface_mesh();
-    const auto moved = [&](auto vertex) {
-      return vertex == profile.v0() || vertex == profile.v1() ? to_glm(*place) : mesh.point(vertex);
+    if (!place) return place;
+    const auto before = [&](auto vertex) { return profile.surface_mesh().point(vertex); };
+    const auto after = [&](auto vertex) {
+      return vertex == profile.v0() || vertex == profile.v1() ? to_glm(*place) : before(vertex);
     };
     for (const auto& t : profile.triangles()) {
       const auto vanishes = [&](auto vertex) {
         return vertex == t.v0 || vertex == t.v1 || vertex == t.v2;
       };
       if (vanishes(profile.v0()) && vanishes(profile.v1())) continue;
-      if (!lies_flat(moved(t.v0), moved(t.v1), moved(t.v2), run->away_m)) return Place();
+      const auto area = [&](const auto& at) {
+        return glm::cross(at(t.v1) - at(t.v0), at(t.v2) - at(t.v0));
+      };
+      const bool is_kept = run->is_flat
+                               ? lies_flat(after(t.v0), after(t.v1), after(t.v2), run->away_m)
+                               : !(glm::dot(area(before), area(after)) < 0);
+      if (!is_kept) return Place();
     }
     return place;
   }
 };
 
-// Notes what CGAL does.
+// Counts triangles, records merges and reports progress.
 struct Observer {
   Collapses* run;
 
@@ -129,9 +140,7 @@ struct Observer {
   template <typename Profile, typename Cost>
   void OnSelected(const Profile&, const Cost&, std::size_t, std::size_t) const {}
   template <typename Profile, typename Place>
-  void OnCollapsing(const Profile& profile, const Place& place) const {
-    if (!place) return;
-    run->triangles -= std::size_t{profile.left_face_exists()} + profile.right_face_exists();
+  void OnCollapsing(const Profile& profile, const Place&) const {
     for (const auto vertex : profile.link()) {  // each of its edges is evaluated again
       const double edges = profile.surface_mesh().valence(vertex);
       run->visited += edges * edges;
@@ -140,6 +149,7 @@ struct Observer {
   }
   template <typename Profile, typename Vertex>
   void OnCollapsed(const Profile& profile, Vertex kept) const {
+    run->triangles -= std::size_t{profile.left_face_exists()} + profile.right_face_exists();
     for (const auto end : {profile.v0(), profile.v1()})
       run->into[static_cast<std::size_t>(end.idx())] = static_cast<std::uint32_t>(kept.idx());
   }
@@ -147,12 +157,38 @@ struct Observer {
   void OnNonCollapsable(const Profile&) const {}
 };
 
+// Collapses edges without length. CGAL would collapse all of them, without asking for the number of
+// triangles.
+void collapse_zero_edges(SurfaceMesh& surface, Collapses& run) {
+  Star star;
+  const auto try_onto = [&](SurfaceMesh::HalfedgeHandle along) {
+    const std::uint32_t from = number_of(surface.from_vertex_handle(along));
+    gather(surface, from, star);
+    const auto to =
+        static_cast<std::size_t>(std::ranges::find(star.spokes, along) - star.spokes.begin());
+    const bool is_along_border = to == 0 || to + 1 == star.spokes.size();
+    if ((star.is_open() && !is_along_border) || !may_collapse(surface, star, to)) return false;
+    run.triangles -= star.is_open() ? 1 : 2;
+    run.into[from] = star.ring[to];
+    collapse(surface, star, to);
+    return true;
+  };
+  for (unsigned i = 0; i < surface.n_edges() && run.triangles > run.last; ++i) {
+    const auto edge = surface.edge_handle(i);
+    const auto h = surface.halfedge_handle(edge, 0), twin = surface.halfedge_handle(edge, 1);
+    if (surface.status(edge).deleted() ||
+        surface.point(surface.from_vertex_handle(h)) != surface.point(surface.to_vertex_handle(h)))
+      continue;
+    if (!try_onto(h)) try_onto(twin);
+  }
+}
+
 void collapse_edges(SurfaceMesh& surface, Collapses& run) {
   sms::edge_collapse(surface, EnoughCollapses{&run},
                      CGAL::parameters::vertex_point_map(SurfacePoints<Kernel>{&surface})
                          .get_cost(sms::LindstromTurk_cost<SurfaceMesh>())
                          .get_placement(sms::LindstromTurk_placement<SurfaceMesh>())
-                         .filter(StaysFlat{&run})
+                         .filter(KeepsSides{&run})
                          .visitor(Observer{&run}));
 }
 
@@ -184,18 +220,18 @@ ReducedMesh make_reduced_mesh(const SurfaceMesh& surface, const ManifoldMesh& ma
 }
 
 void check_triangle_count(const TriangleMesh& mesh, const RunControl& work) {
-  constexpr std::size_t most_triangles = 700'000'000;  // limit of 31-bit numbers of half-edges
+  constexpr std::size_t most_triangles = 350'000'000;  // 2^31 half-edges if none are joined
   if (mesh.triangles.size() >= most_triangles) {
     throw Error("reducing a mesh: {} triangles must be fewer than {}; split the mesh",
                 mesh.triangles.size(), most_triangles);
   }
-  constexpr std::size_t bytes_each = 500;  // per triangle, measured
-  if (mesh.triangles.size() > work.most_bytes / bytes_each) {
+  // Measured: 182 per triangle of a grid, 521 of separate triangles.
+  const std::size_t bytes = 120 * mesh.triangles.size() + 140 * mesh.vertices_m.size();
+  if (bytes > work.most_bytes) {
     throw Error(
         "reducing a mesh: {} triangles take about {} MB, more than the {} MB allowed; allow more "
         "memory or split the mesh",
-        mesh.triangles.size(), mesh.triangles.size() * bytes_each / 1'000'000,
-        work.most_bytes / 1'000'000);
+        mesh.triangles.size(), bytes / 1'000'000, work.most_bytes / 1'000'000);
   }
 }
 
@@ -217,6 +253,7 @@ ReducedMesh reduce(const TriangleMesh& mesh, std::size_t triangles, const RunCon
   std::iota(run.into.begin(), run.into.end(), 0u);
   for (glm::dvec3& p : manifold.shape.vertices_m) p -= origin_m;
   SurfaceMesh surface = to_surface(manifold.shape, manifold.pairs);
+  collapse_zero_edges(surface, run);
   if (run.triangles > triangles) collapse_edges(surface, run);
   ReducedMesh out = make_reduced_mesh(surface, manifold, run, mesh, origin_m);
   out.tangled_edges = manifold.tangled_edges;

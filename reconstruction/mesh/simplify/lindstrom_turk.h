@@ -29,7 +29,8 @@ struct ReducedMesh {
 /// 45 s where there are 2000.
 ///
 /// The result has `triangles` triangles or one fewer, because an interior collapse removes two. It
-/// has more if no permitted collapse is left: no collapse changes the topology or flips a triangle.
+/// has more if no permitted collapse is left: no collapse changes the topology, or turns a triangle
+/// by more than a right angle.
 /// If all triangles are counter-clockwise as seen from above, all stay so. A vertex into which none
 /// was merged keeps its exact position. Equal meshes give equal results.
 /// @param triangles  at least 1.

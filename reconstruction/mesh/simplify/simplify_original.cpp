@@ -68,7 +68,7 @@ void check_simplify(const MeasuredMesh& mesh, const StopCriterion& stop,
                 "fineness.samples = {} must be positive", fineness.samples);
   broken.unless(fineness.largest_share > 0 && fineness.largest_share < 1,
                 "fineness.largest_share = {} must be between 0 and 1", fineness.largest_share);
-  constexpr std::size_t most_triangles = 700'000'000;  // 31-bit numbers of half-edges
+  constexpr std::size_t most_triangles = 350'000'000;  // 2^31 half-edges if none are joined
   broken.unless(mesh.shape.triangles.size() < most_triangles,
                 "{} triangles must be fewer than {}: split the mesh", mesh.shape.triangles.size(),
                 most_triangles);
@@ -143,8 +143,12 @@ DecimationState SimplifyOriginal::state(const SimplifyOptions& options,
     labels.reserve(sources().size());
     for (const std::uint32_t source : sources()) labels.push_back(mesh_.labels[source]);
   }
-  return {surface_->mesh(),   manifold_.pairs,   labels,
-          options.crease_rad, tolerances.each_m, tolerances.are_noise};
+  return {surface_->mesh(),
+          manifold_.pairs,
+          labels,
+          options.crease_rad,
+          tolerances.each_m,
+          tolerances.are_noise ? tolerances.each_m : std::vector<float>()};
 }
 
 }  // namespace groundray

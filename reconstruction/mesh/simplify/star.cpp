@@ -1,3 +1,6 @@
+// may_collapse and collapse are by hand: in Debian's library, OpenMesh's own are compiled with
+// their assertions, and simplifying a fractal of 513 x 513 vertices takes 2.0 s with them, not 1.35
+// s.
 #include "reconstruction/mesh/simplify/star.h"
 
 #include <algorithm>
@@ -59,12 +62,17 @@ void collapse(SurfaceMesh& mesh, const Star& star, std::size_t to) {
   const auto centre = mesh.from_vertex_handle(along), target = mesh.to_vertex_handle(along);
   for (const auto spoke : star.spokes)
     mesh.set_vertex_handle(mesh.opposite_halfedge_handle(spoke), target);
+  const auto remove = [&](auto h) {
+    mesh.status(mesh.edge_handle(h)).set_deleted(true);
+    mesh.status(h).set_deleted(true);
+    mesh.status(mesh.opposite_halfedge_handle(h)).set_deleted(true);
+  };
   // In a vanishing triangle, `stays` takes the place of the half-edge beyond `goes`.
   const auto close = [&](auto goes, auto stays) {
     const auto beyond = mesh.opposite_halfedge_handle(goes);
     const auto face = mesh.face_handle(beyond);
     mesh.status(mesh.face_handle(goes)).set_deleted(true);
-    mesh.status(mesh.edge_handle(goes)).set_deleted(true);
+    remove(goes);
     mesh.set_next_halfedge_handle(stays, mesh.next_halfedge_handle(beyond));
     mesh.set_next_halfedge_handle(mesh.prev_halfedge_handle(beyond), stays);
     mesh.set_face_handle(stays, face);
@@ -91,7 +99,7 @@ void collapse(SurfaceMesh& mesh, const Star& star, std::size_t to) {
     mesh.set_halfedge_handle(target, is_right ? left : mesh.next_halfedge_handle(back));
   mesh.set_isolated(centre);
   mesh.status(centre).set_deleted(true);
-  mesh.status(mesh.edge_handle(along)).set_deleted(true);
+  remove(along);
 }
 
 }  // namespace groundray

@@ -167,6 +167,62 @@ TEST(LindstromTurk, MakesNoOverhangsByRounding) {
 }
 
 // Heights and the shift are multiples of 2^-10 m: positions about the origin are the same.
+// Quantised files and seams hold vertices at one place. Every fourth column lies on the next.
+TEST(LindstromTurk, CollapsesEdgesWithoutLengthDownToTheRequestedTriangles) {
+  TriangleMesh mesh = mesh_of(hills(41));
+  for (std::size_t i = 0; i < mesh.vertices_m.size(); ++i) {
+    if (i % 41 % 4 == 1) mesh.vertices_m[i] = mesh.vertices_m[i + 1];
+  }
+  ASSERT_EQ(mesh.triangles.size(), 3200u);
+  for (const std::size_t triangles : {3199u, 3000u, 2500u, 1500u}) {
+    const ReducedMesh reduced = reduce(mesh, triangles);
+    EXPECT_LE(reduced.mesh.triangles.size(), triangles);
+    EXPECT_GE(reduced.mesh.triangles.size() + 1, triangles);
+    expect_accounted(reduced, mesh);
+  }
+}
+
+// Ring of radius 3 and thickness 1, displaced by up to a fifth of the length of its edges.
+TriangleMesh rough_ring(unsigned around, unsigned across) {
+  std::mt19937_64 random(5);
+  std::uniform_real_distribution<double> offset_m(-0.016, 0.016);
+  TriangleMesh ring;
+  for (unsigned i = 0; i < around; ++i) {
+    for (unsigned k = 0; k < across; ++k) {
+      const double u = 2 * std::numbers::pi * i / around, v = 2 * std::numbers::pi * k / across;
+      const glm::dvec3 away(std::cos(u) * std::cos(v), std::sin(u) * std::cos(v), std::sin(v));
+      ring.vertices_m.push_back(glm::dvec3(3 * std::cos(u), 3 * std::sin(u), 0) + away +
+                                glm::dvec3(offset_m(random), offset_m(random), offset_m(random)));
+      const unsigned a = i * across + k, b = (i + 1) % around * across + k;
+      const unsigned c = i * across + (k + 1) % across,
+                     d = (i + 1) % around * across + (k + 1) % across;
+      ring.triangles.emplace_back(a, b, d);
+      ring.triangles.emplace_back(a, d, c);
+    }
+  }
+  return ring;
+}
+
+std::size_t facing_inwards(const TriangleMesh& ring) {
+  return static_cast<std::size_t>(std::ranges::count_if(ring.triangles, [&](const glm::uvec3& t) {
+    const glm::dvec3 &a = ring.vertices_m[t.x], &b = ring.vertices_m[t.y],
+                     &c = ring.vertices_m[t.z];
+    const glm::dvec3 middle = (a + b + c) / 3.0;
+    const glm::dvec3 core = 3.0 * glm::normalize(glm::dvec3(middle.x, middle.y, 0));
+    return glm::dot(glm::cross(b - a, c - a), middle - core) < 0;
+  }));
+}
+
+TEST(LindstromTurk, TurnsNoTriangleOver) {
+  const TriangleMesh ring = rough_ring(200, 80);
+  ASSERT_EQ(facing_inwards(ring), 0u);
+  for (const std::size_t triangles : {8000u, 3200u}) {
+    const ReducedMesh reduced = reduce(ring, triangles);
+    EXPECT_LE(reduced.mesh.triangles.size(), triangles);
+    EXPECT_EQ(facing_inwards(reduced.mesh), 0u) << triangles;
+  }
+}
+
 TEST(LindstromTurk, DoesNotDependOnTheOrigin) {
   TriangleMesh near = mesh_of(hills(33));
   for (glm::dvec3& p : near.vertices_m) p.z = std::round(1024 * p.z) / 1024;
