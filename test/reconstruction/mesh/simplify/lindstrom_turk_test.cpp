@@ -216,11 +216,9 @@ std::size_t facing_inwards(const TriangleMesh& ring) {
 TEST(LindstromTurk, TurnsNoTriangleOver) {
   const TriangleMesh ring = rough_ring(200, 80);
   ASSERT_EQ(facing_inwards(ring), 0u);
-  for (const std::size_t triangles : {8000u, 3200u}) {
-    const ReducedMesh reduced = reduce(ring, triangles);
-    EXPECT_LE(reduced.mesh.triangles.size(), triangles);
-    EXPECT_EQ(facing_inwards(reduced.mesh), 0u) << triangles;
-  }
+  const ReducedMesh reduced = reduce(ring, 8000);
+  EXPECT_LE(reduced.mesh.triangles.size(), 8000u);
+  EXPECT_EQ(facing_inwards(reduced.mesh), 0u);
 }
 
 TEST(LindstromTurk, DoesNotDependOnTheOrigin) {
