@@ -23,9 +23,11 @@ target_compile_options(groundray_build_flags INTERFACE
   -march=x86-64-v3 -fopenmp-simd -fno-math-errno -fno-trapping-math -fPIC -ffile-prefix-map=${PROJECT_SOURCE_DIR}=.
   -Wall -Wextra -Wpedantic -Wno-missing-field-initializers -Wconversion -Wno-sign-conversion -Wshadow)
 # Debian 13's tinyxml2 asks for this, and targets that share a precompiled header must agree.
-get_target_property(definitions tinyxml2::tinyxml2 INTERFACE_COMPILE_DEFINITIONS)
-if("_FILE_OFFSET_BITS=64" IN_LIST definitions)
-  target_compile_definitions(groundray_build_flags INTERFACE _FILE_OFFSET_BITS=64)
+if(TARGET tinyxml2::tinyxml2)
+  get_target_property(definitions tinyxml2::tinyxml2 INTERFACE_COMPILE_DEFINITIONS)
+  if("_FILE_OFFSET_BITS=64" IN_LIST definitions)
+    target_compile_definitions(groundray_build_flags INTERFACE _FILE_OFFSET_BITS=64)
+  endif()
 endif()
 if(CMAKE_CXX_COMPILER_ID STREQUAL GNU AND CMAKE_CXX_COMPILER_VERSION VERSION_LESS 15)
   # At -O3 GCC 12 to 14 see overflows that are not there in inlined code of std::string, std::vector and {fmt}.
