@@ -85,15 +85,15 @@ FeatureLines::Crossing FeatureLines::crossing(const Star& star) const noexcept {
   return crossing;
 }
 
-bool FeatureLines::may_leave_along(const SurfaceMesh& mesh, const Star& star,
-                                   const Crossing& crossing, std::size_t to) const {
+bool FeatureLines::may_leave_along(const Star& star, const Crossing& crossing,
+                                   std::size_t to) const {
   const auto& [a, b] = crossing.spokes;
   if (to != a && to != b) return false;
   // The two edges become one, which must not coincide with an existing edge.
   const std::size_t other = to == a ? b : a, ring = star.ring.size();
   const auto is_closed_by_line = [&](std::size_t first, std::size_t second) {
     return second == (first + 1) % ring && first < star.triangles() &&
-           has(mesh.next_halfedge_handle(star.spokes[first]));
+           has(star.mesh->next_halfedge_handle(star.spokes[first]));
   };
   if (is_closed_by_line(to, other) || is_closed_by_line(other, to)) return false;
   // A line ends where its kind changes.
@@ -126,8 +126,8 @@ void FeatureLines::add(SurfaceMesh::HalfedgeHandle edge, std::uint32_t vertex) {
   append(lines_[line(edge)], vertex, vertex);
 }
 
-void FeatureLines::collapse(const SurfaceMesh& mesh, const Star& star, const Crossing& crossing,
-                            std::size_t to) {
+void FeatureLines::collapse(const Star& star, const Crossing& crossing, std::size_t to) {
+  const SurfaceMesh& mesh = *star.mesh;
   const auto along = star.spokes[to];
   if (crossing.edges == 2) {
     const auto stays =
@@ -181,7 +181,7 @@ bool ShapeRules::allow(const Star& star, const FeatureLines::Crossing&, std::siz
     rim_m_.push_back(piece_.samples[star.ring[(fan_.first + i) % star.ring.size()]].p_m);
     if (i > 0 && !is_sound(star, i - 1)) return false;
   }
-  return may_collapse(piece_.mesh, star, to);
+  return may_collapse(star, to);
 }
 
 }  // namespace groundray

@@ -39,11 +39,9 @@ class FeatureLines {
 
   /// Returns true if lines and labels permit the centre to move onto ring[to]. If it is inside a
   /// line, the caller must still check that the line stays in place.
-  bool may_leave(const SurfaceMesh& mesh, const Star& star, const Crossing& crossing,
-                 std::size_t to) const {
+  bool may_leave(const Star& star, const Crossing& crossing, std::size_t to) const {
     if (!labels_.empty() && labels_[star.centre] != labels_[star.ring[to]]) return false;
-    return crossing.edges == 0 ||
-           (crossing.edges == 2 && may_leave_along(mesh, star, crossing, to));
+    return crossing.edges == 0 || (crossing.edges == 2 && may_leave_along(star, crossing, to));
   }
 
   /// Edge that two edges of a line become, and the vertices that it will represent.
@@ -55,8 +53,7 @@ class FeatureLines {
   void gather(const Star& star, const Crossing& crossing, std::size_t to, Merged& merged) const;
 
   /// Records that the centre moves onto ring[to]; to be called right before the mesh does so.
-  void collapse(const SurfaceMesh& mesh, const Star& star, const Crossing& crossing,
-                std::size_t to);
+  void collapse(const Star& star, const Crossing& crossing, std::size_t to);
 
   /// Adds a vertex to those collapsed into the edge of a line.
   void add(SurfaceMesh::HalfedgeHandle edge, std::uint32_t vertex);
@@ -75,8 +72,7 @@ class FeatureLines {
   std::uint32_t line(SurfaceMesh::HalfedgeHandle h) const noexcept {
     return edges_[number_of(h) / 2];
   }
-  bool may_leave_along(const SurfaceMesh& mesh, const Star& star, const Crossing& crossing,
-                       std::size_t to) const;
+  bool may_leave_along(const Star& star, const Crossing& crossing, std::size_t to) const;
   void mark(const SurfaceMesh& mesh, SurfaceMesh::HalfedgeHandle h, LineKind kind);
   void append(Edge& edge, std::uint32_t first, std::uint32_t last) noexcept;
 

@@ -96,9 +96,7 @@ void EdgeCollapse::enter(const Star& star, const FeatureLines::Crossing& crossin
   if (crossing.edges == 0 || crossing.edges == 2) {
     const std::size_t count = std::min(star.ring.size(), most_targets);
     for (std::size_t i = 0; i < count; ++i) {
-      if ((refused_[vertex] >> i & 1) != 0 ||
-          !piece_.lines.may_leave(piece_.mesh, star, crossing, i))
-        continue;
+      if ((refused_[vertex] >> i & 1) != 0 || !piece_.lines.may_leave(star, crossing, i)) continue;
       const Own& other = own_[star.ring[i]];
       const double squares = std::max(0.0, quadric(other.p_m - own.p_m)) + other.squares;
       const double cost = squares * (own.weight + other.weight);
@@ -157,7 +155,7 @@ bool EdgeCollapse::step() {
     weight_ = own_[vertex].weight + own_[star_.ring[to]].weight;
     queue_.pop_front();
     rules_.collapse(star_, crossing, to);
-    piece_.lines.collapse(piece_.mesh, star_, crossing, to);
+    piece_.lines.collapse(star_, crossing, to);
     piece_.triangles -= star_.is_open() ? 1 : 2;
     collapse(piece_.mesh, star_, to);
     inherit(star_.ring[to], vertex);

@@ -96,8 +96,8 @@ struct EnoughCollapses {
   }
 };
 
-// Rejects positions that turn a triangle over by more than a right angle, or make one of a height
-// field overhang.
+// Rejects positions that turn a triangle by more than a right angle, or make one of a height field
+// overhang.
 struct KeepsSides {
   const Collapses* run;
   template <typename Profile, typename Place>
@@ -167,7 +167,7 @@ void collapse_zero_edges(SurfaceMesh& surface, Collapses& run) {
     const auto to =
         static_cast<std::size_t>(std::ranges::find(star.spokes, along) - star.spokes.begin());
     const bool is_along_border = to == 0 || to + 1 == star.spokes.size();
-    if ((star.is_open() && !is_along_border) || !may_collapse(surface, star, to)) return false;
+    if ((star.is_open() && !is_along_border) || !may_collapse(star, to)) return false;
     run.triangles -= star.is_open() ? 1 : 2;
     run.into[from] = star.ring[to];
     collapse(surface, star, to);

@@ -23,7 +23,8 @@ void gather(const SurfaceMesh& mesh, std::uint32_t vertex, Star& star) {
   } while (spoke != first);
 }
 
-bool may_collapse(const SurfaceMesh& mesh, const Star& star, std::size_t to) {
+bool may_collapse(const Star& star, std::size_t to) {
+  const SurfaceMesh& mesh = *star.mesh;
   const auto along = star.spokes[to], back = mesh.opposite_halfedge_handle(along);
   const auto is_border = [&](auto h) { return mesh.is_boundary(mesh.opposite_halfedge_handle(h)); };
   std::uint32_t left = none, right = none;  // the corners opposite the edge

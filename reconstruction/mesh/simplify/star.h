@@ -46,7 +46,7 @@ struct Fan {
 /// ring[to]: the link condition holds, and no triangle vanishes whose two other edges are both on
 /// the boundary. For a star at the boundary, `to` must be the first or the last.
 /// @see Dey, Edelsbrunner, Guha, Nekhayev, Topology preserving edge contraction (1999).
-bool may_collapse(const SurfaceMesh& mesh, const Star& star, std::size_t to);
+bool may_collapse(const Star& star, std::size_t to);
 
 /// Moves the centre onto ring[to]: one triangle vanishes at the boundary, otherwise two.
 void collapse(SurfaceMesh& mesh, const Star& star, std::size_t to);

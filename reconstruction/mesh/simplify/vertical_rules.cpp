@@ -257,7 +257,7 @@ bool VerticalRules::allow(const Star& star, const FeatureLines::Crossing& crossi
   std::size_t sector = 0;
   if (!is_near(star.centre, sector)) return false;
   placed_.emplace_back(star.centre, sector);
-  if (!may_collapse(piece_.mesh, star, to)) return false;
+  if (!may_collapse(star, to)) return false;
   if (is_open_ && !keeps_border(star, to)) return false;
   return keeps_samples(star);
 }
