@@ -3,14 +3,13 @@
 #include <OpenMesh/Core/Mesh/TriMesh_ArrayKernelT.hh>
 #include <cstddef>
 #include <cstdint>
-#include <functional>
 #include <glm/geometric.hpp>
 #include <glm/vec3.hpp>
 #include <span>
 #include <vector>
 
 #include "core/geometry/mesh.h"
-#include "reconstruction/mesh/manifold_mesh.h"
+#include "reconstruction/mesh/mesh_arrays.h"
 
 // Let OpenMesh store positions as the rest of the library does: it takes any type of vector with
 // these traits, and functions found by their argument.
@@ -28,7 +27,8 @@ struct OpenMesh::vector_traits<glm::dvec3> {
 
 namespace groundray {
 
-/// Traits of SurfaceMesh: positions in double precision, and marks of what was deleted.
+/// Traits of SurfaceMesh: positions in double precision, the vertices' sources, and marks of what was
+/// deleted.
 struct SurfaceTraits : OpenMesh::DefaultTraits {
   using Point = glm::dvec3;
   using Normal = glm::dvec3;
@@ -36,6 +36,11 @@ struct SurfaceTraits : OpenMesh::DefaultTraits {
   HalfedgeAttributes(OpenMesh::Attributes::Status);
   EdgeAttributes(OpenMesh::Attributes::Status);
   FaceAttributes(OpenMesh::Attributes::Status);
+  VertexTraits {
+    /// Number of the vertex in the mesh that the surface was made of; `none` if it was added since.
+    /// What was measured there (standard deviation, label, confidence) is found by it.
+    std::uint32_t source = none;
+  };
 };
 
 /// Surface whose edges know their triangles, and whose triangles can change. CGAL's algorithms use
@@ -49,33 +54,60 @@ inline std::uint32_t number_of(const OpenMesh::BaseHandle& handle) noexcept {
   return static_cast<std::uint32_t>(handle.idx());
 }
 
+/// Returns the number of a vertex in the mesh that the surface was made of.
+inline std::uint32_t source_of(const SurfaceMesh& surface, SurfaceMesh::VertexHandle vertex) {
+  return surface.data(vertex).source;
+}
+
+/// Returns the half-edge of a triangle from its corner `k` to the next.
+inline SurfaceMesh::HalfedgeHandle half_edge_of(const SurfaceMesh& surface, std::uint32_t triangle,
+                                                int k) {
+  auto h = surface.next_halfedge_handle(
+      surface.halfedge_handle(SurfaceMesh::FaceHandle(static_cast<int>(triangle))));
+  for (; k > 0; --k) h = surface.next_halfedge_handle(h);
+  return h;
+}
+
+/// Returns the triangle on the other side of a half-edge; `none` at a boundary.
+inline std::uint32_t triangle_across(const SurfaceMesh& surface, SurfaceMesh::HalfedgeHandle h) {
+  return number_of(surface.opposite_face_handle(h));  // the invalid handle is -1
+}
+
 /// Returns the vertices of a triangle.
 inline glm::uvec3 corners_of(const SurfaceMesh& surface, std::uint32_t triangle) {
   glm::uvec3 corners;
-  auto h = surface.halfedge_handle(surface.face_handle(triangle));
+  auto h = surface.halfedge_handle(SurfaceMesh::FaceHandle(static_cast<int>(triangle)));
   for (int k = 0; k < 3; ++k, h = surface.next_halfedge_handle(h))
     corners[k] = number_of(surface.to_vertex_handle(h));
   return corners;
 }
 
-/// Makes a surface of triangles; vertices and triangles keep their numbers. Adding triangle by
-/// triangle would reject boundaries that touch at a vertex.
-/// @param pairs        of the triangles; none is dropped.
-/// @param next_border  returns the boundary half-edge that ends where another begins.
-SurfaceMesh to_surface(std::span<const glm::dvec3> points_m, std::span<const glm::uvec3> triangles,
-                       const EdgePairs& pairs,
-                       const std::function<HalfEdge(HalfEdge)>& next_border);
+/// Returns true if a triangle has a vertex twice.
+inline bool repeats_vertex(const glm::uvec3& t) noexcept {
+  return t.x == t.y || t.y == t.z || t.z == t.x;
+}
 
-/// Makes a surface of a manifold's triangles.
-SurfaceMesh to_surface(const TriangleMesh& shape, const EdgePairs& pairs);
+/// Returns for each triangle whether it repeats a vertex, or an earlier triangle with the same
+/// winding.
+/// @param vertices  number of vertices.
+std::vector<bool> find_repeats(std::span<const glm::uvec3> triangles, std::size_t vertices);
 
-/// Returns the half-edge of a surface made by to_surface, before it is changed.
-SurfaceMesh::HalfedgeHandle handle_of(const SurfaceMesh& surface, HalfEdge h);
+/// Makes a surface of any triangles; vertices and triangles keep their numbers. An edge of two
+/// triangles that traverse it in opposite directions joins them. An edge of more, or of two in the
+/// same direction, is a boundary of each; its half-edges in triangles are tagged. Triangles found by
+/// find_repeats are tagged and joined to nothing. Each of several fans at a vertex has boundaries of
+/// its own.
+/// @param triangles  fewer than 3.5e8.
+SurfaceMesh to_surface(std::span<const glm::dvec3> points_m,
+                       std::span<const glm::uvec3> triangles);
+inline SurfaceMesh to_surface(const TriangleMesh& mesh) {
+  return to_surface(mesh.vertices_m, mesh.triangles);
+}
 
 /// Vertices and triangles of a surface that were not deleted, in the same order.
 struct RemainingMesh {
   TriangleMesh mesh;                   ///< without levels
-  std::vector<std::uint32_t> sources;  ///< of each vertex: its number in the surface
+  std::vector<std::uint32_t> sources;  ///< of each vertex, as source_of
   std::vector<std::uint32_t> numbers;  ///< of each vertex of the surface; `none` if it was deleted
 };
 

@@ -47,9 +47,7 @@ struct Outline {
 }  // namespace
 
 CoverBound::CoverBound(const TriangleMesh& mesh)
-    : mesh_(mesh),
-      around_(sorted_in(mesh.vertices_m.size(), 3 * mesh.triangles.size(),
-                        [&](HalfEdge h) { return corner_of(mesh.triangles, h); })) {
+    : mesh_(mesh), around_(triangles_at_vertices(mesh)) {
   for (const glm::dvec3& p : mesh.vertices_m) {
     const glm::dvec3 away = glm::abs(p);
     size_m_ = std::max({size_m_, away.x, away.y, away.z});
@@ -194,8 +192,7 @@ class CoverBound::Walk {
                                       double inner) const {
     const auto& at = cover_.mesh_.vertices_m;
     const glm::dvec3 begin = seen(at[a]), end = seen(at[b]);
-    for (const HalfEdge h : cover_.around_.at(a)) {
-      const std::uint32_t other = h / 3;
+    for (const std::uint32_t other : cover_.around_.at(a)) {
       const glm::uvec3& t = cover_.mesh_.triangles[other];
       if (other == triangle || (t.x != b && t.y != b && t.z != b)) continue;
       for (int k = 0; k < 3; ++k) {

@@ -6,7 +6,7 @@
 #include <glm/vec3.hpp>
 
 #include "core/geometry/mesh.h"
-#include "reconstruction/mesh/manifold_mesh.h"
+#include "reconstruction/mesh/mesh_arrays.h"
 
 namespace groundray {
 
@@ -36,7 +36,7 @@ class CoverBound {
 
   const TriangleMesh& mesh_;
   double size_m_ = 0;  // largest coordinate of the mesh
-  Buckets around_;     // half-edges that begin at each vertex
+  Buckets around_;     // triangles at each vertex
 };
 
 }  // namespace groundray

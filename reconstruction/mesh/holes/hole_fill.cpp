@@ -16,13 +16,14 @@
 #include "reconstruction/mesh/holes/hole_patch.h"
 #include "reconstruction/mesh/holes/mesh_boundary.h"
 #include "reconstruction/mesh/holes/placed_patch.h"
+#include "reconstruction/mesh/manifold_mesh.h"
 
 namespace groundray {
 namespace {
 
 // Boundary within the limits, and the patch that closes it.
 struct Candidate {
-  std::size_t chain = 0;             // number of the boundary chain
+  std::size_t loop = 0;              // number of the boundary
   BridgedBoundary bridged;           // the boundary, joined with pieces of surface inside it
   std::vector<std::size_t> islands;  // numbers of these pieces' outlines
   std::optional<HolePatch> patch;
@@ -33,34 +34,32 @@ struct Candidate {
   HoleLeft why = HoleLeft::NoFilling;  // valid unless is_done
 };
 
-std::vector<std::uint32_t> vertices_of(const TriangleMesh& mesh, std::span<const HalfEdge> chain) {
-  std::vector<std::uint32_t> vertices;
-  for (const HalfEdge h : chain) vertices.push_back(corner_of(mesh.triangles, next_of(h)));
-  return vertices;
-}
-
-HoleBoundary boundary_of(const TriangleMesh& mesh, std::span<const HalfEdge> chain) {
-  HoleBoundary boundary{.vertices = vertices_of(mesh, chain)};
-  for (const HalfEdge h : chain) {
-    const glm::dvec3 &a = mesh.vertices_m[corner_of(mesh.triangles, h)],
-                     &b = mesh.vertices_m[corner_of(mesh.triangles, next_of(h))];
+HoleBoundary boundary_of(const SurfaceMesh& surface, const BoundaryLoop& loop) {
+  HoleBoundary boundary{.vertices = vertices_of(surface, loop)};
+  for (const auto h : loop) {
+    const glm::dvec3 &a = surface.point(surface.from_vertex_handle(h)),
+                     &b = surface.point(surface.to_vertex_handle(h));
     const double length_m = glm::distance(a, b);
     boundary.length_m += length_m;
     boundary.middle_m += length_m * 0.5 * (a + b);
   }
-  boundary.middle_m = boundary.length_m > 0 ? boundary.middle_m / boundary.length_m
-                                            : mesh.vertices_m[boundary.vertices.front()];
+  boundary.middle_m = boundary.length_m > 0
+                          ? boundary.middle_m / boundary.length_m
+                          : surface.point(surface.from_vertex_handle(loop.front()));
   return boundary;
 }
 
 // Returns true if the surface along the boundary is oriented like a sheet inside it.
-bool is_outline(const TriangleMesh& mesh, std::span<const HalfEdge> chain,
+bool is_outline(const SurfaceMesh& surface, const BoundaryLoop& loop,
                 const HoleBoundary& boundary) {
   glm::dvec3 area(0), facing(0);
-  for (const HalfEdge h : chain) {
-    const glm::dvec3 a = mesh.vertices_m[corner_of(mesh.triangles, h)] - boundary.middle_m;
-    const glm::dvec3 b = mesh.vertices_m[corner_of(mesh.triangles, next_of(h))] - boundary.middle_m;
-    const glm::dvec3 c = mesh.vertices_m[corner_of(mesh.triangles, before(h))] - boundary.middle_m;
+  for (const auto h : loop) {
+    const auto inner = surface.opposite_halfedge_handle(h);
+    const auto from_middle = [&](auto vertex) { return surface.point(vertex) - boundary.middle_m; };
+    const glm::dvec3 a = from_middle(surface.from_vertex_handle(inner));
+    const glm::dvec3 b = from_middle(surface.to_vertex_handle(inner));
+    const glm::dvec3 c =
+        from_middle(surface.to_vertex_handle(surface.next_halfedge_handle(inner)));
     area += glm::cross(a, b);
     const glm::dvec3 normal = glm::cross(b - a, c - a);
     const double size = glm::length(normal);
@@ -70,14 +69,15 @@ bool is_outline(const TriangleMesh& mesh, std::span<const HalfEdge> chain,
   return glm::dot(area, facing) > cosine * glm::length(area) * boundary.length_m;
 }
 
-std::optional<HoleLeft> why_left(const TriangleMesh& mesh, const EdgePairs& pairs,
-                                 std::span<const HalfEdge> chain, const HoleBoundary& boundary,
-                                 const HoleLimits& limits) {
-  const auto is_tangled = [&](HalfEdge h) { return pairs.is_tangled[h]; };
-  if (chain.size() < 3 || std::ranges::any_of(chain, is_tangled)) return HoleLeft::NotManifold;
-  if (is_outline(mesh, chain, boundary)) return HoleLeft::Outline;
+std::optional<HoleLeft> why_left(const SurfaceMesh& surface, const BoundaryLoop& loop,
+                                 const HoleBoundary& boundary, const HoleLimits& limits) {
+  const auto is_tangled = [&](auto h) {
+    return surface.status(surface.opposite_halfedge_handle(h)).tagged();
+  };
+  if (loop.size() < 3 || std::ranges::any_of(loop, is_tangled)) return HoleLeft::NotManifold;
+  if (is_outline(surface, loop, boundary)) return HoleLeft::Outline;
   if (boundary.length_m > limits.longest_m) return HoleLeft::TooLong;
-  if (chain.size() > limits.most_edges) return HoleLeft::TooManyEdges;
+  if (loop.size() > limits.most_edges) return HoleLeft::TooManyEdges;
   return std::nullopt;
 }
 
@@ -105,16 +105,16 @@ class Filler {
       : mesh_(mesh),
         limits_(limits),
         work_(work),
-        pairs_(pair_edges(mesh.shape.triangles, mesh.shape.vertices_m.size())),
-        boundary_(find_boundary(mesh.shape, pairs_)),
-        stars_(mesh.shape, pairs_) {}
+        surface_(to_surface(mesh.shape)),
+        loops_(find_boundary(surface_)),
+        stars_(triangles_at_vertices(mesh.shape)) {}
 
   void fill(FilledMesh& out) {
     std::vector<Candidate> candidates = sort_out();
     std::vector<Task> tasks;
     for (Candidate& candidate : candidates)
-      tasks.push_back({&candidate, boundary_.chains[candidate.chain]});
-    close(candidates, tasks, {mesh_.shape, pairs_, boundary_, stars_});
+      tasks.push_back({&candidate, &loops_[candidate.loop]});
+    close(candidates, tasks, {mesh_.shape, surface_, stars_});
     constexpr int rounds = 3;  // a patch that avoids one piece may intersect another
     for (int round = 0; round < rounds && join_islands(candidates); ++round) {
     }
@@ -122,30 +122,30 @@ class Filler {
   }
 
  private:
-  // Candidate and the chain to close.
+  // Candidate and the boundary to close.
   struct Task {
     Candidate* candidate;
-    std::span<const HalfEdge> chain;
+    const BoundaryLoop* loop;
   };
 
   // Returns the candidates, shortest boundary first: of patches in conflict, the one with the
   // shorter boundary stays.
   std::vector<Candidate> sort_out() {
-    std::vector<std::size_t> chains;
-    for (std::size_t i = 0; i < boundary_.chains.size(); ++i) {
-      boundaries_.push_back(boundary_of(mesh_.shape, boundary_.chains[i]));
-      why_.push_back(why_left(mesh_.shape, pairs_, boundary_.chains[i], boundaries_[i], limits_));
-      if (!why_[i]) chains.push_back(i);
+    std::vector<std::size_t> holes;
+    for (std::size_t i = 0; i < loops_.size(); ++i) {
+      boundaries_.push_back(boundary_of(surface_, loops_[i]));
+      why_.push_back(why_left(surface_, loops_[i], boundaries_[i], limits_));
+      if (!why_[i]) holes.push_back(i);
     }
-    std::ranges::stable_sort(chains, {}, [&](std::size_t i) { return boundaries_[i].length_m; });
+    std::ranges::stable_sort(holes, {}, [&](std::size_t i) { return boundaries_[i].length_m; });
     std::vector<Candidate> candidates;
-    for (const std::size_t i : chains)
-      candidates.push_back({.chain = i, .bridged = {boundaries_[i].vertices, {}}});
+    for (const std::size_t i : holes)
+      candidates.push_back({.loop = i, .bridged = {boundaries_[i].vertices, {}}});
     return candidates;
   }
 
   void close(std::vector<Candidate>& candidates, std::span<const Task> tasks,
-             const MeshAdjacency& at) {
+             const AdjacentMesh& at) {
     for (const PatchShape shape : {PatchShape::Smooth, PatchShape::Flat}) {
       Progress progress(is_begun_ ? nullptr : &work_, tasks.size());
       is_begun_ = true;
@@ -157,11 +157,11 @@ class Filler {
     }
   }
 
-  static void make_patch(const Task& task, const MeshAdjacency& at, PatchShape shape) {
+  static void make_patch(const Task& task, const AdjacentMesh& at, PatchShape shape) {
     Candidate& candidate = *task.candidate;
-    candidate.boundary = vertices_of(at.mesh, task.chain);
+    candidate.boundary = vertices_of(at.surface, *task.loop);
     candidate.shape = shape;
-    candidate.patch = patch_hole(at, task.chain, shape);
+    candidate.patch = patch_hole(at, *task.loop, shape);
     if (!candidate.patch) return;
     const auto number = [&](std::uint32_t vertex) {
       return static_cast<std::uint32_t>(std::ranges::find(candidate.boundary, vertex) -
@@ -205,27 +205,28 @@ class Filler {
       mesh.triangles.insert(mesh.triangles.end(), bridges.begin(), bridges.end());
       owners.resize(owners.size() + bridges.size(), candidate);
     }
-    const EdgePairs pairs = pair_edges(mesh.triangles, mesh.vertices_m.size());
-    const MeshBoundary boundary = find_boundary(mesh, pairs);
+    SurfaceMesh surface = to_surface(mesh);
+    const std::vector<BoundaryLoop> loops = find_boundary(surface);
+    const std::size_t first = mesh_.shape.triangles.size();  // of the bridges
     std::vector<Task> tasks;
-    for (const std::vector<HalfEdge>& chain : boundary.chains) {
-      const auto is_bridge = [&](HalfEdge h) { return h / 3 >= mesh_.shape.triangles.size(); };
-      const auto found = std::ranges::find_if(chain, is_bridge);
-      if (found == chain.end()) continue;
-      Candidate* candidate = owners[*found / 3 - mesh_.shape.triangles.size()];
-      if (chain.size() == candidate->bridged.vertices.size()) tasks.push_back({candidate, chain});
+    for (const BoundaryLoop& loop : loops) {
+      const auto found = std::ranges::find_if(
+          loop, [&](auto h) { return triangle_across(surface, h) >= first; });
+      if (found == loop.end()) continue;
+      Candidate* candidate = owners[triangle_across(surface, *found) - first];
+      if (loop.size() == candidate->bridged.vertices.size()) tasks.push_back({candidate, &loop});
     }
-    close(candidates, tasks, {mesh, pairs, boundary, VertexStars(mesh, pairs)});
+    close(candidates, tasks, {mesh, surface, triangles_at_vertices(mesh)});
     return true;
   }
 
   // Joins the pieces that a patch intersected to its boundary. Returns false if none can be joined.
   bool take_islands(Candidate& candidate) {
     if (pieces_.empty()) number_outlines();
-    const std::uint32_t own = pieces_[boundary_.chains[candidate.chain].front() / 3];
+    const std::uint32_t own = piece_at(candidate.loop);
     std::set<std::uint32_t> met;
     for (const std::uint32_t t : candidate.crossed) {
-      if (pieces_[t] != none && pieces_[t] != own) met.insert(pieces_[t]);
+      if (pieces_[t] != own) met.insert(pieces_[t]);
     }
     bool is_joined = false;
     for (const std::uint32_t piece : met) {
@@ -241,16 +242,19 @@ class Filler {
     return is_joined;
   }
 
+  // Returns the piece that ends at a boundary.
+  std::uint32_t piece_at(std::size_t loop) const {
+    return pieces_[triangle_across(surface_, loops_[loop].front())];
+  }
+
   // Finds the outline of each piece that has exactly one.
   void number_outlines() {
-    pieces_ = number_pieces(pairs_);
-    std::uint32_t count = 0;
-    for (const std::uint32_t piece : pieces_)
-      count = std::max(count, piece == none ? 0 : piece + 1);
+    pieces_ = number_pieces(surface_);
+    const std::uint32_t count = *std::ranges::max_element(pieces_) + 1;
     outlines_.assign(count, no_outline);
     std::vector<int> found(count, 0);
     for (std::size_t i = 0; i < why_.size(); ++i) {
-      const std::uint32_t piece = pieces_[boundary_.chains[i].front() / 3];
+      const std::uint32_t piece = piece_at(i);
       if (why_[i] == HoleLeft::Outline) outlines_[piece] = ++found[piece] == 1 ? i : no_outline;
     }
   }
@@ -274,7 +278,7 @@ class Filler {
     const auto first_triangle = static_cast<std::uint32_t>(mesh_.shape.triangles.size());
     append(mesh_.shape, {&*candidate.patch, candidate.boundary});
     append_measures(candidate);
-    return {.boundary = boundaries_[candidate.chain],
+    return {.boundary = boundaries_[candidate.loop],
             .first_vertex = first_vertex,
             .vertices = static_cast<std::uint32_t>(candidate.patch->points_m.size()),
             .first_triangle = first_triangle,
@@ -286,15 +290,15 @@ class Filler {
   void report(const std::vector<Candidate>& candidates, FilledMesh& out) {
     out.measured_vertices = mesh_.shape.vertices_m.size();
     out.measured_triangles = mesh_.shape.triangles.size();
-    std::vector<const Candidate*> by_chain;
-    for (const Candidate& candidate : candidates) by_chain.push_back(&candidate);
-    std::ranges::sort(by_chain, {}, &Candidate::chain);
-    for (const Candidate* const candidate : by_chain) {
+    std::vector<const Candidate*> by_loop;
+    for (const Candidate& candidate : candidates) by_loop.push_back(&candidate);
+    std::ranges::sort(by_loop, {}, &Candidate::loop);
+    for (const Candidate* const candidate : by_loop) {
       if (candidate->is_done) {
         out.filled.push_back(added(*candidate));
         for (const std::size_t outline : candidate->islands) why_[outline].reset();
       } else {
-        why_[candidate->chain] = candidate->why;
+        why_[candidate->loop] = candidate->why;
       }
     }
     for (std::size_t i = 0; i < why_.size(); ++i) {
@@ -305,11 +309,11 @@ class Filler {
   MeasuredMesh& mesh_;
   const HoleLimits& limits_;
   const RunControl& work_;
-  EdgePairs pairs_;
-  MeshBoundary boundary_;
-  VertexStars stars_;
-  std::vector<HoleBoundary> boundaries_;      // of each chain
-  std::vector<std::optional<HoleLeft>> why_;  // of each chain
+  SurfaceMesh surface_;
+  std::vector<BoundaryLoop> loops_;
+  Buckets stars_;                             // triangles at each vertex
+  std::vector<HoleBoundary> boundaries_;      // of each loop
+  std::vector<std::optional<HoleLeft>> why_;  // of each loop
   static constexpr std::size_t no_outline = std::numeric_limits<std::size_t>::max();
   std::vector<std::uint32_t> pieces_;  // piece of each triangle
   std::vector<std::size_t> outlines_;  // of each piece: its only outline, or no_outline

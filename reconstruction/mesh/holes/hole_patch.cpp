@@ -15,7 +15,6 @@
 #include <iterator>
 #include <unordered_map>
 
-#include "reconstruction/mesh/manifold_mesh.h"
 #include "reconstruction/mesh/surface_cgal.h"
 
 namespace groundray {
@@ -90,9 +89,8 @@ bool do_cross(Corners a, Corners b) {
 // Triangles around a hole. The vertices of the boundary come first.
 class Surroundings {
  public:
-  Surroundings(const MeshAdjacency& at, std::span<const HalfEdge> chain)
-      : at_(at), boundary_(chain) {
-    for (const HalfEdge h : chain) number(corner_of(at.mesh.triangles, next_of(h)));
+  Surroundings(const AdjacentMesh& at, const BoundaryLoop& loop) : at_(at), loop_(loop) {
+    for (const std::uint32_t vertex : vertices_of(at.surface, loop)) number(vertex);
     origin_m_ = at.mesh.vertices_m[vertices_.front()];
     constexpr int rings = 3;  // fairing uses two
     std::size_t begin = 0;
@@ -110,27 +108,24 @@ class Surroundings {
     for (const std::uint32_t vertex : vertices_)
       points_m.push_back(at_.mesh.vertices_m[vertex] - origin_m_);
     std::vector<glm::uvec3> triangles;
-    EdgePairs pairs;
-    for (const std::uint32_t t : triangles_) {
-      const glm::uvec3& corners = at_.mesh.triangles[t];
-      triangles.emplace_back(numbers_.at(corners.x), numbers_.at(corners.y),
-                             numbers_.at(corners.z));
-      for (const HalfEdge h : {3 * t, 3 * t + 1, 3 * t + 2})
-        pairs.twins.push_back(local(at_.pairs.twins[h]));
+    for (const std::uint32_t triangle : triangles_) {
+      const glm::uvec3& t = at_.mesh.triangles[triangle];
+      triangles.emplace_back(numbers_.at(t.x), numbers_.at(t.y), numbers_.at(t.z));
     }
-    return to_surface(points_m, triangles, pairs, [&](HalfEdge h) {
-      const HalfEdge global = 3 * triangles_[h / 3] + h % 3;
-      const bool is_at_boundary =
-          numbers_.at(corner_of(at_.mesh.triangles, global)) < boundary_.size();
-      return is_at_boundary ? local(at_.boundary.next[global]) : next_border(pairs, h);
-    });
+    SurfaceMesh surface = to_surface(points_m, triangles);
+    for (std::size_t i = 0; i < loop_.size(); ++i)
+      link(surface, local(surface, i), local(surface, (i + 1) % loop_.size()));
+    return surface;
   }
 
-  // Returns the local number of a half-edge of the mesh; `none` outside the surroundings.
-  HalfEdge local(HalfEdge h) const {
-    if (h == none) return none;
-    const auto found = triangle_numbers_.find(h / 3);
-    return found == triangle_numbers_.end() ? none : 3 * found->second + h % 3;
+  // Returns the half-edge of the surface that is number i of the loop.
+  SurfaceMesh::HalfedgeHandle local(const SurfaceMesh& surface, std::size_t i) const {
+    const std::uint32_t outside = triangle_across(at_.surface, loop_[i]);
+    int k = 0;
+    while (at_.surface.opposite_halfedge_handle(half_edge_of(at_.surface, outside, k)) != loop_[i])
+      ++k;
+    return surface.opposite_halfedge_handle(
+        half_edge_of(surface, triangle_numbers_.at(outside), k));
   }
 
  private:
@@ -139,15 +134,15 @@ class Surroundings {
   }
 
   void add_star(std::uint32_t vertex) {
-    for (const HalfEdge h : at_.stars.at(vertex)) {
-      if (!triangle_numbers_.emplace(h / 3, triangles_.size()).second) continue;
-      triangles_.push_back(h / 3);
-      for (const HalfEdge to : {next_of(h), before(h)}) number(corner_of(at_.mesh.triangles, to));
+    for (const std::uint32_t triangle : at_.stars.at(vertex)) {
+      if (!triangle_numbers_.emplace(triangle, triangles_.size()).second) continue;
+      triangles_.push_back(triangle);
+      for (int k = 0; k < 3; ++k) number(at_.mesh.triangles[triangle][k]);
     }
   }
 
-  const MeshAdjacency& at_;
-  std::span<const HalfEdge> boundary_;
+  const AdjacentMesh& at_;
+  const BoundaryLoop& loop_;
   glm::dvec3 origin_m_{0};
   std::vector<std::uint32_t> vertices_, triangles_;  // numbers in the mesh
   std::unordered_map<std::uint32_t, std::uint32_t> numbers_, triangle_numbers_;
@@ -240,19 +235,18 @@ std::vector<std::pair<std::uint32_t, std::uint32_t>> crossings(const TriangleMes
   return found;
 }
 
-std::optional<HolePatch> patch_hole(const MeshAdjacency& at, std::span<const HalfEdge> chain,
+std::optional<HolePatch> patch_hole(const AdjacentMesh& at, const BoundaryLoop& loop,
                                     PatchShape shape) {
-  const Surroundings around(at, chain);
+  const Surroundings around(at, loop);
   SurfaceMesh mesh = around.surface();
-  const auto hole = mesh.opposite_halfedge_handle(handle_of(mesh, around.local(chain.front())));
-  Faces faces = triangulate(mesh, hole);
+  Faces faces = triangulate(mesh, around.local(mesh, 0));
   if (faces.empty()) return std::nullopt;
   Faces more;
   Vertices points;
   pmp::refine(mesh, faces, std::back_inserter(more), std::back_inserter(points),
               CGAL::parameters::vertex_point_map(SurfacePoints<Kernel>{&mesh}));
   faces.insert(faces.end(), more.begin(), more.end());
-  const auto boundary = static_cast<std::uint32_t>(chain.size());
+  const auto boundary = static_cast<std::uint32_t>(loop.size());
   if (shape == PatchShape::Smooth && !points.empty()) {
     if (!fair(mesh, points, boundary)) return std::nullopt;
   }

@@ -20,12 +20,11 @@ namespace groundray {
 std::vector<std::pair<std::uint32_t, std::uint32_t>> crossings(const TriangleMesh& mesh,
                                                                std::uint32_t first);
 
-/// Mesh with its adjacency: edge pairs, boundary chains and vertex stars.
-struct MeshAdjacency {
+/// Mesh with its adjacency.
+struct AdjacentMesh {
   const TriangleMesh& mesh;
-  const EdgePairs& pairs;
-  const MeshBoundary& boundary;
-  const VertexStars& stars;
+  const SurfaceMesh& surface;  ///< of the mesh, linked by find_boundary
+  const Buckets& stars;        ///< triangles at each vertex
 };
 
 /// Shape of a patch: continued smoothly from the boundary, or flat between its vertices.
@@ -34,16 +33,16 @@ enum class PatchShape { Smooth, Flat };
 /// Triangles that close a hole.
 struct HolePatch {
   std::vector<glm::dvec3> points_m;  ///< added points
-  /// Corners: the n vertices of the boundary are numbered 0 to n - 1 in the order of the chain,
-  /// each at the end of its half-edge; the points follow.
+  /// Corners: the n vertices of the boundary are numbered 0 to n - 1 in the order of the loop, each
+  /// at the beginning of its half-edge; the points follow.
   std::vector<glm::uvec3> triangles;
 };
 
 /// Closes a hole with triangles as small as the surrounding ones.
-/// @param chain  one of the mesh's boundary chains, of at least 3 edges.
+/// @param loop  one of the mesh's boundaries, of at least 3 edges.
 /// @return nothing if no triangulation of the boundary's vertices is manifold, or if the smooth
 ///         patch would lead far away.
-std::optional<HolePatch> patch_hole(const MeshAdjacency& at, std::span<const HalfEdge> chain,
+std::optional<HolePatch> patch_hole(const AdjacentMesh& at, const BoundaryLoop& loop,
                                     PatchShape shape);
 
 }  // namespace groundray

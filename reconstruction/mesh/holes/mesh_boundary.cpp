@@ -12,40 +12,6 @@
 namespace groundray {
 namespace {
 
-// Cuts a walk along the boundary, which may pass a vertex several times, into chains that do not.
-class ChainCutter {
- public:
-  ChainCutter(const TriangleMesh& mesh, MeshBoundary& boundary)
-      : mesh_(mesh), boundary_(boundary), places_(mesh.vertices_m.size(), none) {}
-
-  void cut(std::span<const HalfEdge> walk) {
-    for (const HalfEdge h : walk) {
-      const std::uint32_t vertex = corner_of(mesh_.triangles, next_of(h));
-      if (places_[vertex] != none) take_from(places_[vertex]);
-      places_[vertex] = static_cast<std::uint32_t>(open_.size());
-      open_.push_back(h);
-    }
-    take_from(0);
-  }
-
- private:
-  void take_from(std::size_t place) {
-    const std::vector<HalfEdge> chain(open_.begin() + static_cast<std::ptrdiff_t>(place),
-                                      open_.end());
-    open_.resize(place);
-    for (std::size_t i = 0; i < chain.size(); ++i) {
-      boundary_.next[chain[i]] = chain[(i + 1) % chain.size()];
-      places_[corner_of(mesh_.triangles, next_of(chain[i]))] = none;
-    }
-    boundary_.chains.push_back(chain);
-  }
-
-  const TriangleMesh& mesh_;
-  MeshBoundary& boundary_;
-  std::vector<std::uint32_t> places_;  // by end vertex: index of a half-edge in `open_`
-  std::vector<HalfEdge> open_;
-};
-
 std::uint32_t after(std::span<const std::uint32_t> chain, std::size_t i) {
   return chain[(i + 1) % chain.size()];
 }
@@ -80,7 +46,7 @@ std::vector<Place> near_places(const TriangleMesh& mesh, std::span<const std::ui
 }
 
 // Returns the triangles between two edges if they face alike and intersect none at their corners.
-std::vector<glm::uvec3> triangles_at(const TriangleMesh& mesh, const VertexStars& stars,
+std::vector<glm::uvec3> triangles_at(const TriangleMesh& mesh, const Buckets& stars,
                                      const std::array<std::uint32_t, 4>& corners) {
   const std::uint32_t a = corners[0], b = corners[1], c = corners[2], d = corners[3];
   TriangleMesh beside;
@@ -91,8 +57,8 @@ std::vector<glm::uvec3> triangles_at(const TriangleMesh& mesh, const VertexStars
   };
   std::set<std::uint32_t> taken;
   for (const std::uint32_t corner : corners) {
-    for (const HalfEdge h : stars.at(corner)) {
-      if (taken.insert(h / 3).second) add(mesh.triangles[h / 3]);
+    for (const std::uint32_t triangle : stars.at(corner)) {
+      if (taken.insert(triangle).second) add(mesh.triangles[triangle]);
     }
   }
   const auto first = static_cast<std::uint32_t>(beside.triangles.size());
@@ -109,39 +75,54 @@ std::vector<glm::uvec3> triangles_at(const TriangleMesh& mesh, const VertexStars
 
 }  // namespace
 
-MeshBoundary find_boundary(const TriangleMesh& mesh, const EdgePairs& pairs) {
-  MeshBoundary boundary;
-  boundary.next.assign(pairs.twins.size(), none);
-  ChainCutter cutter(mesh, boundary);
-  std::vector<bool> is_seen(pairs.twins.size(), false);
-  std::vector<HalfEdge> walk;
-  for (HalfEdge first = 0; first < pairs.twins.size(); ++first) {
-    if (pairs.twins[first] != none || pairs.is_dropped[first / 3] || is_seen[first]) continue;
-    walk.clear();
-    for (HalfEdge h = first; !is_seen[h]; h = next_border(pairs, h)) {
-      is_seen[h] = true;
+std::vector<std::uint32_t> vertices_of(const SurfaceMesh& surface, const BoundaryLoop& loop) {
+  std::vector<std::uint32_t> vertices;
+  for (const auto h : loop) vertices.push_back(number_of(surface.from_vertex_handle(h)));
+  return vertices;
+}
+
+void link(SurfaceMesh& surface, SurfaceMesh::HalfedgeHandle half_edge,
+          SurfaceMesh::HalfedgeHandle next) {
+  const auto after = surface.next_halfedge_handle(half_edge);
+  const auto before = surface.prev_halfedge_handle(next);
+  surface.set_next_halfedge_handle(half_edge, next);
+  surface.set_next_halfedge_handle(before, after);
+}
+
+std::vector<BoundaryLoop> find_boundary(SurfaceMesh& surface) {
+  std::vector<BoundaryLoop> loops;
+  std::vector<std::uint32_t> places(surface.n_vertices(), none);  // in `walk`, by first vertex
+  std::vector<bool> is_seen(surface.n_halfedges());
+  BoundaryLoop whole, walk;
+  const auto close = [&](std::size_t place) {  // the part of the walk from there on
+    BoundaryLoop loop(walk.begin() + static_cast<std::ptrdiff_t>(place), walk.end());
+    walk.resize(place);
+    for (const std::uint32_t vertex : vertices_of(surface, loop)) places[vertex] = none;
+    link(surface, loop.back(), loop.front());
+    loops.push_back(std::move(loop));
+  };
+  for (const auto first : surface.halfedges()) {
+    if (!surface.is_boundary(first) || is_seen[number_of(first)] ||
+        surface.status(surface.opposite_face_handle(first)).tagged())
+      continue;
+    whole.clear();
+    for (SurfaceMesh::HalfedgeHandle h = first; !is_seen[number_of(h)];
+         h = surface.next_halfedge_handle(h)) {
+      is_seen[number_of(h)] = true;
+      whole.push_back(h);
+    }
+    for (const auto h : whole) {
+      std::uint32_t& place = places[number_of(surface.from_vertex_handle(h))];
+      if (place != none) close(place);
+      place = static_cast<std::uint32_t>(walk.size());
       walk.push_back(h);
     }
-    cutter.cut(walk);
+    close(0);
   }
-  return boundary;
+  return loops;
 }
 
-VertexStars::VertexStars(const TriangleMesh& mesh, const EdgePairs& pairs)
-    : half_edges_(sorted_in(mesh.vertices_m.size(), pairs.twins.size(), [&](HalfEdge h) {
-        return pairs.is_dropped[h / 3] ? none : corner_of(mesh.triangles, h);
-      })) {}
-
-bool VertexStars::has_edge(const TriangleMesh& mesh, std::uint32_t a,
-                           std::uint32_t b) const noexcept {
-  for (const HalfEdge h : at(a)) {
-    if (corner_of(mesh.triangles, next_of(h)) == b || corner_of(mesh.triangles, before(h)) == b)
-      return true;
-  }
-  return false;
-}
-
-std::optional<BridgedBoundary> bridge(const TriangleMesh& mesh, const VertexStars& stars,
+std::optional<BridgedBoundary> bridge(const TriangleMesh& mesh, const Buckets& stars,
                                       BridgedBoundary boundary,
                                       std::span<const std::uint32_t> outline) {
   for (const Place& place : near_places(mesh, boundary.vertices, outline)) {
@@ -159,27 +140,6 @@ std::optional<BridgedBoundary> bridge(const TriangleMesh& mesh, const VertexStar
     return boundary;
   }
   return std::nullopt;
-}
-
-std::vector<std::uint32_t> number_pieces(const EdgePairs& pairs) {
-  std::vector<std::uint32_t> numbers(pairs.is_dropped.size(), none), open;
-  std::uint32_t count = 0;
-  for (std::uint32_t first = 0; first < numbers.size(); ++first) {
-    if (numbers[first] != none || pairs.is_dropped[first]) continue;
-    numbers[first] = count;
-    open.assign(1, first);
-    while (!open.empty()) {
-      const HalfEdge h = 3 * open.back();
-      open.pop_back();
-      for (const HalfEdge twin : {pairs.twins[h], pairs.twins[h + 1], pairs.twins[h + 2]}) {
-        if (twin == none || numbers[twin / 3] != none) continue;
-        numbers[twin / 3] = count;
-        open.push_back(twin / 3);
-      }
-    }
-    ++count;
-  }
-  return numbers;
 }
 
 }  // namespace groundray

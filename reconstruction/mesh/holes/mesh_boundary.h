@@ -7,38 +7,26 @@
 #include <vector>
 
 #include "core/geometry/mesh.h"
-#include "reconstruction/mesh/manifold_mesh.h"
+#include "reconstruction/mesh/surface_mesh.h"
 
 namespace groundray {
 
-/// Boundary of a mesh as closed chains. The successor of an edge is the one that ends where it
-/// begins, which is the direction of triangles on the empty side.
-struct MeshBoundary {
-  std::vector<std::vector<HalfEdge>> chains;  ///< none passes a vertex twice
-  std::vector<HalfEdge> next;                 ///< of each boundary half-edge: its successor
-};
+/// Boundary half-edges that follow one another; none passes a vertex twice.
+using BoundaryLoop = std::vector<SurfaceMesh::HalfedgeHandle>;
 
-/// Finds the boundary chains of a mesh. Where several touch at a vertex, each is a chain of its
-/// own.
-MeshBoundary find_boundary(const TriangleMesh& mesh, const EdgePairs& pairs);
+/// Returns the vertices at which the half-edges of a loop begin.
+std::vector<std::uint32_t> vertices_of(const SurfaceMesh& surface, const BoundaryLoop& loop);
 
-/// Half-edges that begin at each vertex.
-class VertexStars {
- public:
-  VertexStars(const TriangleMesh& mesh, const EdgePairs& pairs);
+/// Makes one boundary half-edge follow another, which begins where it ends, and joins those that
+/// were next to them.
+void link(SurfaceMesh& surface, SurfaceMesh::HalfedgeHandle half_edge,
+          SurfaceMesh::HalfedgeHandle next);
 
-  std::span<const HalfEdge> at(std::uint32_t vertex) const noexcept {
-    return half_edges_.at(vertex);
-  }
+/// Links the boundaries of a surface so that none passes a vertex twice, and returns them, without
+/// those of tagged triangles. Where several touch at a vertex, each is a loop of its own.
+std::vector<BoundaryLoop> find_boundary(SurfaceMesh& surface);
 
-  /// Returns true if a triangle has both vertices.
-  bool has_edge(const TriangleMesh& mesh, std::uint32_t a, std::uint32_t b) const noexcept;
-
- private:
-  Buckets half_edges_;
-};
-
-/// Boundary of a hole, joined with the outlines of pieces of surface inside it to a single chain.
+/// Boundary of a hole, joined with the outlines of pieces of surface inside it to a single loop.
 struct BridgedBoundary {
   std::vector<std::uint32_t> vertices;
   std::vector<glm::uvec3> bridges;  ///< two triangles per piece, by the mesh's vertices
@@ -46,14 +34,11 @@ struct BridgedBoundary {
 
 /// Joins an outline to a boundary by two triangles at a position where both are close and the
 /// triangles intersect none of their neighbours.
+/// @param stars              triangles at each vertex of the mesh.
 /// @param boundary, outline  vertices, in the winding order of triangles that fill them.
 /// @return nothing if they share a vertex or there is no such position.
-std::optional<BridgedBoundary> bridge(const TriangleMesh& mesh, const VertexStars& stars,
+std::optional<BridgedBoundary> bridge(const TriangleMesh& mesh, const Buckets& stars,
                                       BridgedBoundary boundary,
                                       std::span<const std::uint32_t> outline);
-
-/// Numbers the connected pieces of a mesh.
-/// @return for each triangle, the number of its piece; `none` for dropped triangles.
-std::vector<std::uint32_t> number_pieces(const EdgePairs& pairs);
 
 }  // namespace groundray

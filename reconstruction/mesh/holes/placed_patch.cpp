@@ -25,8 +25,15 @@ std::set<Edge> chords_of(const PlacedPatch& placed) {
   return chords;
 }
 
+bool has_edge(const TriangleMesh& mesh, const Buckets& stars, const Edge& edge) {
+  return std::ranges::any_of(stars.at(edge.first), [&](std::uint32_t triangle) {
+    const glm::uvec3& t = mesh.triangles[triangle];
+    return t.x == edge.second || t.y == edge.second || t.z == edge.second;
+  });
+}
+
 // Returns for each of `tried` whether it would put a third triangle at an edge.
-std::vector<bool> find_tangled(const TriangleMesh& mesh, const VertexStars& stars,
+std::vector<bool> find_tangled(const TriangleMesh& mesh, const Buckets& stars,
                                std::span<const PlacedPatch> kept,
                                std::span<const PlacedPatch> tried) {
   std::set<Edge> joined;
@@ -35,7 +42,7 @@ std::vector<bool> find_tangled(const TriangleMesh& mesh, const VertexStars& star
   for (std::size_t i = 0; i < tried.size(); ++i) {
     std::set<Edge> chords = chords_of(tried[i]);
     is_tangled[i] = std::ranges::any_of(chords, [&](const Edge& chord) {
-      return joined.contains(chord) || stars.has_edge(mesh, chord.first, chord.second);
+      return joined.contains(chord) || has_edge(mesh, stars, chord);
     });
     if (!is_tangled[i]) joined.merge(chords);
   }
@@ -56,7 +63,7 @@ void append(TriangleMesh& mesh, const PlacedPatch& placed) {
     mesh.triangles.emplace_back(number(t.x), number(t.y), number(t.z));
 }
 
-std::vector<Fit> find_fitting(TriangleMesh& mesh, const VertexStars& stars,
+std::vector<Fit> find_fitting(TriangleMesh& mesh, const Buckets& stars,
                               std::span<const PlacedPatch> kept,
                               std::span<const PlacedPatch> tried) {
   const std::vector<bool> is_tangled = find_tangled(mesh, stars, kept, tried);

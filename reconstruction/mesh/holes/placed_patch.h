@@ -29,10 +29,10 @@ struct Fit {
 /// the mesh, except for the boundary, and none intersects itself, another or the mesh. Of two in
 /// conflict, the first stays.
 /// @param mesh   changed temporarily; restored on return.
-/// @param stars  of the mesh.
+/// @param stars  triangles at each vertex of the mesh.
 /// @param kept   patches that stay in any case.
 /// @return one for each of `tried`.
-std::vector<Fit> find_fitting(TriangleMesh& mesh, const VertexStars& stars,
+std::vector<Fit> find_fitting(TriangleMesh& mesh, const Buckets& stars,
                               std::span<const PlacedPatch> kept,
                               std::span<const PlacedPatch> tried);
 

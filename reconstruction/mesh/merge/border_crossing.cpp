@@ -121,8 +121,7 @@ class BorderSearch {
     double least = 1e-6;  // barycentric coordinate of a point on the edge, at most
     for (int k = 0; k < 3; ++k) {
       const double opposite = shares[(k + 2) % 3];
-      const std::uint32_t e = 3 * nearest.triangle + static_cast<std::uint32_t>(k);
-      if (surface_.twins()[e] != none || !(opposite < least)) continue;
+      if (!(opposite < least) || !surface_.is_border(nearest.triangle, k)) continue;
       least = opposite;
       crossing.from = t[k];
       crossing.to = t[(k + 1) % 3];

@@ -70,13 +70,13 @@ CoverSurface::CoverSurface(TriangleMesh mesh, std::vector<float> sd_m, const Cov
     : nearest_(std::move(mesh)),
       sd_m_(std::move(sd_m)),
       limits_(limits),
-      twins_(pair_edges(this->mesh().triangles, this->mesh().vertices_m.size()).twins),
+      surface_(to_surface(this->mesh())),
       is_at_border_(this->mesh().vertices_m.size()),
       normals_(smooth_normals(this->mesh())) {
-  for (std::uint32_t e = 0; e < twins_.size(); ++e) {
-    if (twins_[e] != none) continue;
-    is_at_border_[corner_of(this->mesh().triangles, e)] = 1;
-    is_at_border_[corner_of(this->mesh().triangles, next_of(e))] = 1;
+  for (const auto h : surface_.halfedges()) {
+    if (!surface_.is_boundary(h)) continue;
+    is_at_border_[number_of(surface_.from_vertex_handle(h))] = 1;
+    is_at_border_[number_of(surface_.to_vertex_handle(h))] = 1;
   }
 }
 
@@ -108,7 +108,7 @@ bool CoverSurface::is_on_border(std::uint32_t triangle, const glm::dvec3& shares
   const glm::uvec3& t = mesh().triangles[triangle];
   for (int k = 0; k < 3; ++k) {
     const bool is_on_edge = shares[(k + 2) % 3] < edge_share;
-    if (is_on_edge && twins_[3 * triangle + static_cast<std::uint32_t>(k)] == none) return true;
+    if (is_on_edge && is_border(triangle, k)) return true;
     if (shares[k] > 1 - 2 * edge_share && is_at_border(t[k])) return true;
   }
   return false;

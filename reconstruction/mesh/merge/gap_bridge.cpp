@@ -1,5 +1,12 @@
+#define BOOST_ALLOW_DEPRECATED_HEADERS  // by Boost.Geometry itself
+
 #include <algorithm>
 #include <array>
+#include <boost/geometry/geometries/box.hpp>
+#include <boost/geometry/geometries/point.hpp>
+#include <boost/geometry/index/rtree.hpp>
+#include <boost/geometry/strategies/strategies.hpp>
+#include <boost/iterator/function_output_iterator.hpp>
 #include <cmath>
 #include <functional>
 #include <glm/geometric.hpp>
@@ -15,6 +22,8 @@
 
 namespace groundray {
 namespace {
+
+namespace geometry = boost::geometry;
 
 constexpr double least_cosine = 0.8660254;  // cos 30 degrees, between normals
 constexpr double least_height = 1e-3;       // of a triangle, relative to its longest edge
@@ -35,6 +44,44 @@ std::vector<double> sizes_at_vertices(const StitchedMesh& stitched) {
   }
   return sizes_m;
 }
+
+/// Search tree for the vertices near a position.
+class VertexTree {
+ public:
+  VertexTree(const StitchedMesh& stitched, const std::vector<std::uint32_t>& vertices)
+      : tree_(entries(stitched, vertices)) {}
+
+  /// Returns the vertices that are at most `within_m` away, in the tree's order.
+  std::vector<std::uint32_t> near(const glm::dvec3& place_m, double within_m) const {
+    std::vector<std::uint32_t> found;
+    const glm::dvec3 low = place_m - within_m, high = place_m + within_m;
+    const auto look_at = [&](const Entry& entry) {
+      const glm::dvec3 p_m(entry.first.get<0>(), entry.first.get<1>(), entry.first.get<2>());
+      if (glm::distance(p_m, place_m) <= within_m) found.push_back(entry.second);
+    };
+    tree_.query(geometry::index::intersects(geometry::model::box<Point>(
+                    {low.x, low.y, low.z}, {high.x, high.y, high.z})),
+                boost::make_function_output_iterator(look_at));
+    return found;
+  }
+
+ private:
+  using Point = geometry::model::point<double, 3, geometry::cs::cartesian>;
+  using Entry = std::pair<Point, std::uint32_t>;
+
+  static std::vector<Entry> entries(const StitchedMesh& stitched,
+                                    const std::vector<std::uint32_t>& vertices) {
+    std::vector<Entry> entries;
+    entries.reserve(vertices.size());
+    for (const std::uint32_t vertex : vertices) {
+      const glm::dvec3& p_m = stitched.vertices[vertex].p;
+      entries.emplace_back(Point(p_m.x, p_m.y, p_m.z), vertex);
+    }
+    return entries;
+  }
+
+  geometry::index::rtree<Entry, geometry::index::rstar<8>> tree_;
+};
 
 /// Projection of nearby positions onto a plane.
 class View {
@@ -87,7 +134,7 @@ class Bridging {
         work_(work),
         border_(stitched),
         sizes_m_(sizes_at_vertices(stitched)),
-        tree_(places()) {}
+        tree_(stitched, border_.vertices()) {}
 
   /// Returns the triangles to add.
   std::vector<glm::uvec3> run() {
@@ -119,12 +166,6 @@ class Bridging {
  private:
   const glm::dvec3& p(std::uint32_t vertex) const { return quilt_.vertices[vertex].p; }
 
-  std::vector<glm::dvec3> places() const {
-    std::vector<glm::dvec3> places_m;
-    for (const std::uint32_t vertex : border_.vertices()) places_m.push_back(p(vertex));
-    return places_m;
-  }
-
   bool are_near(std::uint32_t a, std::uint32_t b) const {
     return glm::distance(p(a), p(b)) <= std::min(sizes_m_[a], sizes_m_[b]);
   }
@@ -152,8 +193,7 @@ class Bridging {
     const glm::dvec3 along = p(to) - p(from);
     const glm::dvec3 aside = glm::cross(along, glm::dvec3(quilt_.vertices[from].normal));
     std::vector<std::pair<double, std::uint32_t>> found;  // cosine of the angle, and corner
-    for (const std::uint32_t i : tree_.near(p(from), within_m)) {
-      const std::uint32_t corner = border_.vertices()[i];
+    for (const std::uint32_t corner : tree_.near(p(from), within_m)) {
       const glm::dvec3 a = p(from) - p(corner), b = p(to) - p(corner);
       if (!(glm::dot(a, aside) < 0) || !border_.has(corner)) continue;
       const double lengths_m2 = glm::length(a) * glm::length(b);
@@ -183,8 +223,7 @@ class Bridging {
     const double longest_m = std::max({glm::distance(p(t.x), p(t.y)), glm::distance(p(t.y), p(t.z)),
                                        glm::distance(p(t.z), p(t.x))});
     const glm::dvec3 middle = (p(t.x) + p(t.y) + p(t.z)) / 3.0;
-    for (const std::uint32_t i : tree_.near(middle, 1.5 * longest_m)) {
-      const std::uint32_t from = border_.vertices()[i];
+    for (const std::uint32_t from : tree_.near(middle, 1.5 * longest_m)) {
       if (!border_.has(from) || std::abs(view.height_m(p(from))) > longest_m) continue;
       const glm::dvec2 begin = view.of(p(from));
       const bool is_corner = from == t.x || from == t.y || from == t.z;
@@ -249,7 +288,7 @@ class Bridging {
   const RunControl& work_;
   OpenBorder border_;
   std::vector<double> sizes_m_;
-  PointTree tree_;
+  VertexTree tree_;
   std::priority_queue<Bridge> queue_;
 };
 

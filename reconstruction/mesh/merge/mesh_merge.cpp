@@ -314,28 +314,11 @@ class Merging {
 
 /// Converts a single scan to a manifold surface; no vertex moves.
 MergedMesh alone(const MeasuredMesh& mesh) {
-  const std::size_t vertices = mesh.shape.vertices_m.size();
-  MergedMesh out;
-  std::vector<glm::uvec3>& triangles = out.mesh.shape.triangles;
-  triangles = mesh.shape.triangles;
-  out.counts.left_out = drop_conflicts(triangles, vertices);
-  const std::vector<std::uint32_t> copies =
-      part_fans(triangles, vertices, pair_edges(triangles, vertices));
-  std::vector<std::uint32_t> numbers(vertices + copies.size(), no_vertex), sources;
-  for (glm::uvec3& t : triangles) {
-    for (int k = 0; k < 3; ++k) {
-      const std::uint32_t v = t[k];
-      if (numbers[v] == no_vertex) {
-        numbers[v] = static_cast<std::uint32_t>(sources.size());
-        sources.push_back(v < vertices ? v : copies[v - vertices]);
-      }
-      t[k] = numbers[v];
-    }
-  }
-  out.mesh.shape.vertices_m = picked(mesh.shape.vertices_m, sources);
-  out.mesh.sd_m = picked(mesh.sd_m, sources);
-  out.mesh.labels = picked(mesh.labels, sources);
-  out.mesh.confidence = picked(mesh.confidence, sources);
+  TriangleMesh shape{mesh.shape.vertices_m, mesh.shape.triangles, {}};
+  const std::size_t left_out = drop_conflicts(shape.triangles, shape.vertices_m.size());
+  ManifoldMesh manifold = cut_to_manifold(shape);
+  MergedMesh out{.mesh = picked_columns(mesh, manifold.sources), .counts = {.left_out = left_out}};
+  out.mesh.shape = std::move(manifold.shape);
   return out;
 }
 

@@ -8,6 +8,8 @@
 #include <limits>
 #include <tuple>
 
+#include "reconstruction/mesh/manifold_mesh.h"
+
 namespace groundray {
 namespace {
 
@@ -164,25 +166,19 @@ bool any_is_kept(std::span<const std::uint32_t> covers,
 /// Calls `visit(part, is_on_border)` for each edge-connected part of a surface that has at most
 /// `in_island` triangles, all with the state `is_kept`.
 template <typename Visit>
-void for_islands(const CoverSurface& surface, const std::vector<char>& kept, char is_kept,
+void for_islands(const CoverSurface& cover, const std::vector<char>& kept, char is_kept,
                  const Visit& visit) {
-  std::vector<char> is_seen(kept.size());
-  std::vector<std::uint32_t> part;
-  for (std::uint32_t begin = 0; begin < kept.size(); ++begin) {
-    if (is_seen[begin] != 0 || kept[begin] != is_kept) continue;
-    part.assign(1, begin);
-    is_seen[begin] = 1;
-    bool is_on_border = false;
-    for (std::size_t i = 0; i < part.size(); ++i) {
-      for (std::uint32_t e = 3 * part[i]; e < 3 * part[i] + 3; ++e) {
-        const std::uint32_t twin = surface.twins()[e];
-        is_on_border = is_on_border || twin == none;
-        if (twin == none || is_seen[twin / 3] != 0 || kept[twin / 3] != is_kept) continue;
-        is_seen[twin / 3] = 1;
-        part.push_back(twin / 3);
-      }
-    }
-    if (part.size() <= in_island) visit(part, is_on_border);
+  const SurfaceMesh& surface = cover.surface();
+  const Buckets parts = pieces_of(surface, [&](SurfaceMesh::HalfedgeHandle h) {
+    const std::uint32_t one = number_of(surface.face_handle(h)), other = triangle_across(surface, h);
+    return one != none && other != none && kept[one] != kept[other];
+  });
+  for (std::size_t i = 0; i < parts.size(); ++i) {
+    const std::span<const std::uint32_t> part = parts.at(i);
+    if (part.size() > in_island || kept[part.front()] != is_kept) continue;
+    visit(part, std::ranges::any_of(part, [&](std::uint32_t triangle) {
+      return surface.is_boundary(surface.face_handle(triangle));
+    }));
   }
 }
 
@@ -222,7 +218,7 @@ class Selection {
 
   void close_holes(std::size_t scan) {
     for_islands(scans_[scan].surface, kept_[scan], 0,
-                [&](const std::vector<std::uint32_t>& part, bool is_on_border) {
+                [&](std::span<const std::uint32_t> part, bool is_on_border) {
                   if (is_on_border) return;
                   for (const std::uint32_t triangle : part)
                     kept_[scan][triangle] = scans_[scan].refutes(triangle) ? 0 : 1;
@@ -231,7 +227,7 @@ class Selection {
 
   void remove_islands(std::size_t scan) {
     for_islands(scans_[scan].surface, kept_[scan], 1,
-                [&](const std::vector<std::uint32_t>& part, bool) {
+                [&](std::span<const std::uint32_t> part, bool) {
                   for (const std::uint32_t triangle : part)
                     if (is_covered(scan, triangle)) kept_[scan][triangle] = 0;
                 });
@@ -269,12 +265,13 @@ std::vector<float> rate_faces(const CoverSurface& surface, std::span<const float
   std::vector<float> before(worth.size());
   for (int round = 0; round < worth_smoothing_rounds; ++round) {
     before = worth;
-    for (std::size_t i = 0; i < worth.size(); ++i) {
+    for (std::uint32_t i = 0; i < worth.size(); ++i) {
       float sum = before[i], count = 1;
-      for (std::size_t k = 0; k < 3; ++k) {
-        const std::uint32_t twin = surface.twins()[3 * i + k];
-        if (twin == none) continue;
-        sum += before[twin / 3];
+      for (int k = 0; k < 3; ++k) {
+        const std::uint32_t other =
+            triangle_across(surface.surface(), half_edge_of(surface.surface(), i, k));
+        if (other == none) continue;
+        sum += before[other];
         ++count;
       }
       worth[i] = sum / count;

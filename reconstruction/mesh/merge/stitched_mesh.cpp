@@ -177,6 +177,8 @@ TriangleMesh mesh_of(const StitchedMesh& stitched) {
   return mesh;
 }
 
+SurfaceMesh surface_of(const StitchedMesh& stitched) { return to_surface(mesh_of(stitched)); }
+
 std::vector<float> sds_of(const StitchedMesh& stitched) {
   std::vector<float> sds_m;
   sds_m.reserve(stitched.vertices.size());
@@ -187,11 +189,15 @@ std::vector<float> sds_of(const StitchedMesh& stitched) {
 std::size_t make_manifold(StitchedMesh& stitched) {
   const std::size_t vertices = stitched.vertices.size();
   const std::size_t dropped = drop_conflicts(stitched.triangles, vertices);
-  for (const std::uint32_t vertex :
-       part_fans(stitched.triangles, vertices, pair_edges(stitched.triangles, vertices))) {
-    const StitchedVertex copy = stitched.vertices[vertex];
+  SurfaceMesh surface = surface_of(stitched);
+  const std::size_t copies = separate_fans(surface);
+  for (std::size_t i = vertices; i < vertices + copies; ++i) {
+    const auto added = surface.vertex_handle(static_cast<unsigned>(i));
+    const StitchedVertex copy = stitched.vertices[source_of(surface, added)];
     stitched.vertices.push_back(copy);
   }
+  for (std::uint32_t i = 0; i < stitched.triangles.size(); ++i)
+    stitched.triangles[i] = corners_of(surface, i);
   return dropped;
 }
 

@@ -7,6 +7,7 @@
 #include <vector>
 
 #include "core/geometry/mesh.h"
+#include "reconstruction/mesh/surface_mesh.h"
 
 namespace groundray {
 
@@ -35,6 +36,7 @@ struct StitchedMesh {
 StitchedVertex between(const StitchedVertex& from, const StitchedVertex& to, double share);
 
 TriangleMesh mesh_of(const StitchedMesh& stitched);
+SurfaceMesh surface_of(const StitchedMesh& stitched);
 std::vector<float> sds_of(const StitchedMesh& stitched);
 
 /// Makes a manifold surface with boundaries: each edge has at most two triangles, which traverse it

@@ -7,6 +7,8 @@
 #include <unordered_map>
 #include <utility>
 
+#include "reconstruction/mesh/manifold_mesh.h"
+
 namespace groundray {
 namespace {
 
@@ -64,16 +66,11 @@ std::vector<std::uint32_t> put_on_border(StitchedMesh& stitched, const StitchedM
   return vertices;
 }
 
-/// Returns for each boundary vertex the one before it, with triangles on the left.
-std::vector<std::uint32_t> border_before(const StitchedMesh& stitched) {
-  const std::vector<std::uint32_t> twins =
-      pair_edges(stitched.triangles, stitched.vertices.size()).twins;
-  std::vector<std::uint32_t> before(stitched.vertices.size(), no_vertex);
-  for (std::uint32_t e = 0; e < twins.size(); ++e) {
-    if (twins[e] == none)
-      before[corner_of(stitched.triangles, next_of(e))] = corner_of(stitched.triangles, e);
-  }
-  return before;
+/// Returns the half-edge of the boundary that begins at a vertex of a manifold; invalid if the vertex
+/// is not on a boundary. The triangles are to its right.
+SurfaceMesh::HalfedgeHandle border_at(const SurfaceMesh& surface, std::uint32_t vertex) {
+  const auto h = surface.halfedge_handle(surface.vertex_handle(vertex));
+  return h.is_valid() && surface.is_boundary(h) ? h : SurfaceMesh::InvalidHalfedgeHandle;
 }
 
 /// State of the corner of a triangle that differs from the other two.
@@ -90,7 +87,7 @@ class Zippering {
     const std::vector<std::uint32_t> at = put_on_border(stitched, patch, found.crossings);
     for (std::size_t i = 0; i < at.size(); ++i)
       crossings_[key_of(found.crossings[i].inside, found.crossings[i].outside)] = at[i];
-    before_ = border_before(stitched);
+    border_ = surface_of(stitched);
   }
 
   ZipperingCounts run() {
@@ -155,7 +152,9 @@ class Zippering {
     double length_m = 0;
     loop.push_back(from);
     for (std::uint32_t v = from; v != to;) {
-      const std::uint32_t next = before_[v];
+      const auto border = border_at(border_, v);
+      const std::uint32_t next =
+          border.is_valid() ? number_of(border_.to_vertex_handle(border)) : no_vertex;
       if (next != no_vertex)
         length_m += glm::distance(quilt_.vertices[v].p, quilt_.vertices[next].p);
       if (next == no_vertex || length_m > most_m || loop.size() - first > most_steps) {
@@ -194,7 +193,7 @@ class Zippering {
   const std::vector<Cover>& covers_;
   std::vector<std::uint32_t> numbers_;
   std::unordered_map<std::uint64_t, std::uint32_t> crossings_;
-  std::vector<std::uint32_t> before_;
+  SurfaceMesh border_;  // of the merged mesh, before triangles are added
   ZipperingCounts counts_;
 };
 
@@ -243,32 +242,15 @@ std::vector<glm::uvec3> filling(const StitchedMesh& stitched, const Rim& rim,
   return triangles;
 }
 
-/// Returns for each vertex the area of its connected surface.
-std::vector<double> areas_round(const StitchedMesh& stitched) {
-  const std::vector<std::uint32_t> twins =
-      pair_edges(stitched.triangles, stitched.vertices.size()).twins;
-  std::vector<double> areas_m2(stitched.vertices.size());
-  std::vector<char> is_seen(stitched.triangles.size());
-  std::vector<std::uint32_t> part;
-  for (std::uint32_t begin = 0; begin < is_seen.size(); ++begin) {
-    if (is_seen[begin] != 0) continue;
-    part.assign(1, begin);
-    is_seen[begin] = 1;
+/// Returns for each triangle the area of its connected surface.
+std::vector<double> areas_of_pieces(const SurfaceMesh& surface) {
+  std::vector<double> areas_m2(surface.n_faces());
+  const Buckets pieces = pieces_of(surface);
+  for (std::size_t i = 0; i < pieces.size(); ++i) {
     double area_m2 = 0;
-    for (std::size_t i = 0; i < part.size(); ++i) {
-      const glm::uvec3& t = stitched.triangles[part[i]];
-      const glm::dvec3& x = stitched.vertices[t.x].p;
-      area_m2 +=
-          0.5 * glm::length(glm::cross(stitched.vertices[t.y].p - x, stitched.vertices[t.z].p - x));
-      for (std::uint32_t e = 3 * part[i]; e < 3 * part[i] + 3; ++e) {
-        if (twins[e] == none || is_seen[twins[e] / 3] != 0) continue;
-        is_seen[twins[e] / 3] = 1;
-        part.push_back(twins[e] / 3);
-      }
-    }
-    for (const std::uint32_t triangle : part) {
-      for (int k = 0; k < 3; ++k) areas_m2[stitched.triangles[triangle][k]] = area_m2;
-    }
+    for (const std::uint32_t triangle : pieces.at(i))
+      area_m2 += surface.calc_sector_area(half_edge_of(surface, triangle, 0));
+    for (const std::uint32_t triangle : pieces.at(i)) areas_m2[triangle] = area_m2;
   }
   return areas_m2;
 }
@@ -294,24 +276,27 @@ ZipperingCounts zipper(StitchedMesh& stitched, StitchedMesh patch, const CoverTo
 
 std::size_t fill_slits(StitchedMesh& stitched, std::span<const RatedSurface> seen,
                        const RunControl& work) {
-  const std::vector<std::uint32_t> before = border_before(stitched);
-  const std::vector<double> round_m2 = areas_round(stitched);
-  std::vector<char> is_done(before.size());
+  const SurfaceMesh surface = surface_of(stitched);
+  const std::vector<double> areas_m2 = areas_of_pieces(surface);
+  const auto vertices = static_cast<std::uint32_t>(surface.n_vertices());
+  std::vector<char> is_done(vertices);
   std::size_t added = 0;
-  for (std::uint32_t begin = 0; begin < before.size(); ++begin) {
-    if (begin % 4096 == 0)
-      work.report(static_cast<double>(begin) / static_cast<double>(before.size()));
-    if (before[begin] == no_vertex || is_done[begin] != 0) continue;
+  for (std::uint32_t begin = 0; begin < vertices; ++begin) {
+    if (begin % 4096 == 0) work.report(static_cast<double>(begin) / vertices);
+    const auto first = border_at(surface, begin);
+    if (!first.is_valid() || is_done[begin] != 0) continue;
     std::vector<std::uint32_t> loop;
-    for (std::uint32_t v = begin; v != no_vertex && is_done[v] == 0; v = before[v]) {
-      is_done[v] = 1;
-      loop.push_back(v);
-    }
-    if (loop.size() < 3 || loop.size() > most_in_slit || before[loop.back()] != begin) continue;
+    auto border = first;
+    do {
+      loop.push_back(number_of(surface.from_vertex_handle(border)));
+      is_done[loop.back()] = 1;
+      border = surface.next_halfedge_handle(border);
+    } while (border != first);
+    if (loop.size() < 3 || loop.size() > most_in_slit) continue;
     const Rim rim(stitched, std::move(loop));
     const double most_m2 = narrow * rim.length_m * rim.length_m;
-    if (rim.area_m2 > most_m2 || rim.area_m2 < -std::min(most_m2, fold_share * round_m2[begin]))
-      continue;
+    const double around_m2 = areas_m2[triangle_across(surface, first)];
+    if (rim.area_m2 > most_m2 || rim.area_m2 < -std::min(most_m2, fold_share * around_m2)) continue;
     const std::vector<glm::uvec3> triangles = filling(stitched, rim, seen);
     stitched.triangles.insert(stitched.triangles.end(), triangles.begin(), triangles.end());
     added += triangles.size();

@@ -189,38 +189,18 @@ std::vector<Triple> triangles_between(const std::vector<Point>& points, double l
   return triangles;
 }
 
-// Triangles connected by edges.
-struct Piece {
-  std::vector<std::uint32_t> triangles;
-  bool is_closed = true;
-};
-
-Piece piece_round(std::uint32_t first, const EdgePairs& pairs, std::vector<bool>& is_seen) {
-  Piece piece{{first}};
-  is_seen[first] = true;
-  for (std::size_t i = 0; i < piece.triangles.size(); ++i) {
-    const HalfEdge h = 3 * piece.triangles[i];
-    for (const HalfEdge twin : {pairs.twins[h], pairs.twins[h + 1], pairs.twins[h + 2]}) {
-      piece.is_closed = piece.is_closed && twin != none;
-      if (twin == none || is_seen[twin / 3]) continue;
-      is_seen[twin / 3] = true;
-      piece.triangles.push_back(twin / 3);
-    }
-  }
-  return piece;
-}
-
 // Returns a positive value if a piece is wound correctly: facing the origins or, without them,
 // outwards if it is closed and upwards if it is open.
-double facing(const FrontMesh& front, const Piece& piece, std::span<const glm::dvec3> origins_m) {
+double facing(const FrontMesh& front, std::span<const std::uint32_t> piece, bool is_closed,
+              std::span<const glm::dvec3> origins_m) {
   const TriangleMesh& mesh = front.mesh;
-  const glm::dvec3 amid_m = mesh.vertices_m[mesh.triangles[piece.triangles.front()].x];
+  const glm::dvec3 amid_m = mesh.vertices_m[mesh.triangles[piece.front()].x];
   double sum = 0;
-  for (const std::uint32_t triangle : piece.triangles) {
+  for (const std::uint32_t triangle : piece) {
     const glm::uvec3& t = mesh.triangles[triangle];
     const glm::dvec3 normal = area_vector_m2(mesh, t);
     if (origins_m.empty()) {
-      sum += piece.is_closed ? glm::dot(normal, mesh.vertices_m[t.x] - amid_m) : normal.z;
+      sum += is_closed ? glm::dot(normal, mesh.vertices_m[t.x] - amid_m) : normal.z;
       continue;
     }
     for (int k = 0; k < 3; ++k) {
@@ -233,17 +213,19 @@ double facing(const FrontMesh& front, const Piece& piece, std::span<const glm::d
 }
 
 void wind(FrontMesh& front, std::span<const glm::dvec3> origins_m) {
-  TriangleMesh& mesh = front.mesh;
-  const EdgePairs pairs = pair_edges(mesh.triangles, mesh.vertices_m.size());
-  std::vector<bool> is_seen(mesh.triangles.size(), false);
-  for (std::uint32_t first = 0; first < mesh.triangles.size(); ++first) {
-    if (is_seen[first]) continue;
-    const Piece piece = piece_round(first, pairs, is_seen);
-    const double sum = facing(front, piece, origins_m);
-    const bool is_right = sum != 0 ? sum > 0 : mesh.triangles[first].y < mesh.triangles[first].z;
+  std::vector<glm::uvec3>& triangles = front.mesh.triangles;
+  const SurfaceMesh surface = to_surface(front.mesh);
+  const Buckets pieces = pieces_of(surface);
+  for (std::size_t i = 0; i < pieces.size(); ++i) {
+    const std::span<const std::uint32_t> piece = pieces.at(i);
+    const bool is_closed = std::ranges::none_of(piece, [&](std::uint32_t triangle) {
+      return surface.is_boundary(surface.face_handle(triangle));
+    });
+    const double sum = facing(front, piece, is_closed, origins_m);
+    const glm::uvec3& first = triangles[piece.front()];
+    const bool is_right = sum != 0 ? sum > 0 : first.y < first.z;
     if (is_right) continue;
-    for (const std::uint32_t t : piece.triangles)
-      std::swap(mesh.triangles[t].y, mesh.triangles[t].z);
+    for (const std::uint32_t t : piece) std::swap(triangles[t].y, triangles[t].z);
   }
 }
 

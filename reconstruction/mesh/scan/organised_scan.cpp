@@ -8,7 +8,7 @@
 #include <utility>
 
 #include "core/error.h"
-#include "reconstruction/mesh/manifold_mesh.h"
+#include "reconstruction/mesh/mesh_arrays.h"
 #include "reconstruction/mesh/scan/beam_columns.h"
 #include "reconstruction/mesh/scan/beam_rows.h"
 

@@ -8,7 +8,7 @@
 #include <numbers>
 
 #include "core/error.h"
-#include "reconstruction/mesh/manifold_mesh.h"
+#include "reconstruction/mesh/mesh_arrays.h"
 
 namespace groundray {
 namespace {

@@ -147,11 +147,11 @@ void FeatureLines::collapse(const Star& star, const Crossing& crossing, std::siz
     merge(mesh.next_halfedge_handle(back), mesh.prev_halfedge_handle(back));
 }
 
-DecimationState::DecimationState(const TriangleMesh& shape, const EdgePairs& pairs,
+DecimationState::DecimationState(const TriangleMesh& shape,
                                  const std::vector<std::uint16_t>& labels, double crease_rad,
                                  const std::vector<float>& tolerances_m,
                                  const std::vector<float>& deep_m)
-    : mesh(to_surface(shape, pairs)),
+    : mesh(to_surface(shape)),
       lines(mesh, labels, crease_rad, deep_m),
       triangles(shape.triangles.size()) {
   samples.reserve(tolerances_m.size());

@@ -8,7 +8,6 @@
 #include <glm/vec3.hpp>
 #include <vector>
 
-#include "reconstruction/mesh/manifold_mesh.h"
 #include "reconstruction/mesh/simplify/star.h"
 #include "reconstruction/mesh/surface_mesh.h"
 
@@ -109,11 +108,11 @@ struct Sample {
 /// Mesh that is being simplified. Its vertices do not move: one is removed when an edge collapses
 /// onto its other end.
 struct DecimationState {
-  /// @param shape, pairs  a manifold and the pairs of its edges.
+  /// @param shape  a manifold.
   /// @param labels, crease_rad, deep_m  as for FeatureLines.
   /// @param tolerances_m  permitted distance of the surface from each vertex.
-  DecimationState(const TriangleMesh& shape, const EdgePairs& pairs,
-                  const std::vector<std::uint16_t>& labels, double crease_rad,
+  DecimationState(const TriangleMesh& shape, const std::vector<std::uint16_t>& labels,
+                  double crease_rad,
                   const std::vector<float>& tolerances_m, const std::vector<float>& deep_m);
 
   SurfaceMesh mesh;

@@ -252,7 +252,7 @@ ReducedMesh reduce(const TriangleMesh& mesh, std::size_t triangles, const RunCon
                 .work = work};
   std::iota(run.into.begin(), run.into.end(), 0u);
   for (glm::dvec3& p : manifold.shape.vertices_m) p -= origin_m;
-  SurfaceMesh surface = to_surface(manifold.shape, manifold.pairs);
+  SurfaceMesh surface = to_surface(manifold.shape);
   collapse_zero_edges(surface, run);
   if (run.triangles > triangles) collapse_edges(surface, run);
   ReducedMesh out = make_reduced_mesh(surface, manifold, run, mesh, origin_m);

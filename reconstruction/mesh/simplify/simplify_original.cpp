@@ -144,7 +144,6 @@ DecimationState SimplifyOriginal::state(const SimplifyOptions& options,
     for (const std::uint32_t source : sources()) labels.push_back(mesh_.labels[source]);
   }
   return {surface_->mesh(),
-          manifold_.pairs,
           labels,
           options.crease_rad,
           tolerances.each_m,

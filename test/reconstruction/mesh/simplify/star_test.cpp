@@ -67,7 +67,7 @@ TEST(Star, CollapsesKeepSurfaceManifold) {
   for (int i = 0; i < 12; ++i) {
     const TriangleMesh begun = i % 3 == 0 ? testing::icosphere(1, 2).mesh : torn_sheet(9, random);
     const ManifoldMesh manifold = cut_to_manifold(begun);
-    SurfaceMesh mesh = to_surface(manifold.shape, manifold.pairs);
+    SurfaceMesh mesh = to_surface(manifold.shape);
     const long before = characteristic(manifold.shape);
     std::size_t triangles = manifold.shape.triangles.size();
     Star star;

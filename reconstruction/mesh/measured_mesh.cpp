@@ -1,0 +1,27 @@
+#include "reconstruction/mesh/measured_mesh.h"
+
+#include <cstddef>
+
+#include "reconstruction/mesh/mesh_arrays.h"
+
+namespace groundray {
+
+void check_columns(const MeasuredMesh& mesh, Violations& broken) {
+  const std::size_t vertices = mesh.shape.vertices_m.size();
+  const auto check = [&](const char* name, std::size_t count) {
+    broken.unless(count == 0 || count == vertices,
+                  "{} has {} values for {} vertices: it must have one per vertex or none", name,
+                  count, vertices);
+  };
+  check("sd_m", mesh.sd_m.size());
+  check("labels", mesh.labels.size());
+  check("confidence", mesh.confidence.size());
+}
+
+MeasuredMesh picked_columns(const MeasuredMesh& mesh, const std::vector<std::uint32_t>& numbers) {
+  return {.sd_m = picked(mesh.sd_m, numbers),
+          .labels = picked(mesh.labels, numbers),
+          .confidence = picked(mesh.confidence, numbers)};
+}
+
+}  // namespace groundray
