@@ -7,6 +7,8 @@
 #include <glm/geometric.hpp>
 #include <utility>
 
+#include "reconstruction/mesh/surface_mesh.h"
+
 namespace groundray {
 namespace {
 
@@ -70,13 +72,17 @@ CoverSurface::CoverSurface(TriangleMesh mesh, std::vector<float> sd_m, const Cov
     : nearest_(std::move(mesh)),
       sd_m_(std::move(sd_m)),
       limits_(limits),
-      surface_(to_surface(this->mesh())),
+      borders_(this->mesh().triangles.size()),
       is_at_border_(this->mesh().vertices_m.size()),
       normals_(smooth_normals(this->mesh())) {
-  for (const auto h : surface_.halfedges()) {
-    if (!surface_.is_boundary(h)) continue;
-    is_at_border_[number_of(surface_.from_vertex_handle(h))] = 1;
-    is_at_border_[number_of(surface_.to_vertex_handle(h))] = 1;
+  const SurfaceMesh surface = to_surface(this->mesh());
+  for (std::uint32_t i = 0; i < borders_.size(); ++i) {
+    for (int k = 0; k < 3; ++k) {
+      if (triangle_across(surface, half_edge_of(surface, i, k)) != none) continue;
+      borders_[i] = static_cast<std::uint8_t>(borders_[i] | 1 << k);
+      const glm::uvec3& t = this->mesh().triangles[i];
+      is_at_border_[t[k]] = is_at_border_[t[(k + 1) % 3]] = 1;
+    }
   }
 }
 

@@ -9,7 +9,6 @@
 
 #include "core/geometry/mesh.h"
 #include "core/tracing/closest_point.h"
-#include "reconstruction/mesh/surface_mesh.h"
 
 namespace groundray {
 
@@ -58,15 +57,13 @@ class CoverSurface {
   CoverAnswer at(const MeasuredPlace& place, double slack_m, std::uint32_t near) const noexcept;
 
   const TriangleMesh& mesh() const noexcept { return nearest_.mesh(); }
-  /// Returns the mesh's adjacency.
-  const SurfaceMesh& surface() const noexcept { return surface_; }
   /// Returns the smoothed unit normals of the vertices.
   const std::vector<glm::vec3>& normals() const noexcept { return normals_; }
   double sd_m(std::uint32_t vertex) const noexcept { return sd_m_.empty() ? 0 : sd_m_[vertex]; }
   std::span<const float> sds_m() const noexcept { return sd_m_; }  ///< as given
   /// Returns true if nothing lies beyond the edge of a triangle from its corner `k` to the next.
   bool is_border(std::uint32_t triangle, int k) const noexcept {
-    return triangle_across(surface_, half_edge_of(surface_, triangle, k)) == none;
+    return (borders_[triangle] >> k & 1) != 0;
   }
   bool is_at_border(std::uint32_t vertex) const noexcept { return is_at_border_[vertex] != 0; }
   double area_m2(std::uint32_t triangle) const noexcept;
@@ -77,7 +74,7 @@ class CoverSurface {
   ClosestPoint nearest_;
   std::vector<float> sd_m_;
   CoverTolerance limits_;
-  SurfaceMesh surface_;
+  std::vector<std::uint8_t> borders_;  // of each triangle: bit k is set if is_border(triangle, k)
   std::vector<char> is_at_border_;
   std::vector<glm::vec3> normals_;
 };

@@ -1,3 +1,5 @@
+// Triangles are added here rather than to a SurfaceMesh, because OpenMesh's add_face rejects those
+// that close one of several fans at a vertex; make_manifold parts these fans later.
 #include "reconstruction/mesh/merge/open_border.h"
 
 #include <algorithm>

@@ -168,17 +168,18 @@ bool any_is_kept(std::span<const std::uint32_t> covers,
 template <typename Visit>
 void for_islands(const CoverSurface& cover, const std::vector<char>& kept, char is_kept,
                  const Visit& visit) {
-  const SurfaceMesh& surface = cover.surface();
+  const SurfaceMesh surface = to_surface(cover.mesh());
   const Buckets parts = pieces_of(surface, [&](SurfaceMesh::HalfedgeHandle h) {
-    const std::uint32_t one = number_of(surface.face_handle(h)), other = triangle_across(surface, h);
+    const std::uint32_t one = number_of(surface.face_handle(h)),
+                        other = triangle_across(surface, h);
     return one != none && other != none && kept[one] != kept[other];
   });
   for (std::size_t i = 0; i < parts.size(); ++i) {
     const std::span<const std::uint32_t> part = parts.at(i);
     if (part.size() > in_island || kept[part.front()] != is_kept) continue;
     visit(part, std::ranges::any_of(part, [&](std::uint32_t triangle) {
-      return surface.is_boundary(surface.face_handle(triangle));
-    }));
+            return surface.is_boundary(surface.face_handle(triangle));
+          }));
   }
 }
 
@@ -262,14 +263,14 @@ std::vector<float> rate_faces(const CoverSurface& surface, std::span<const float
   std::vector<float> worth(surface.mesh().triangles.size(), 1);
   std::ranges::copy(confidence, worth.begin());
   const std::vector<int> rings = rings_to_border(surface);
+  const SurfaceMesh half_edges = to_surface(surface.mesh());
   std::vector<float> before(worth.size());
   for (int round = 0; round < worth_smoothing_rounds; ++round) {
     before = worth;
     for (std::uint32_t i = 0; i < worth.size(); ++i) {
       float sum = before[i], count = 1;
       for (int k = 0; k < 3; ++k) {
-        const std::uint32_t other =
-            triangle_across(surface.surface(), half_edge_of(surface.surface(), i, k));
+        const std::uint32_t other = triangle_across(half_edges, half_edge_of(half_edges, i, k));
         if (other == none) continue;
         sum += before[other];
         ++count;

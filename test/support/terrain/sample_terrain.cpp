@@ -87,6 +87,27 @@ HeightGrid with_missing_samples(const HeightGrid& grid, double share, Seed seed)
   return {{grid.columns(), grid.rows()}, grid.origin_m(), grid.step_m(), std::move(heights)};
 }
 
+TriangleMesh mesh_of(const HeightGrid& grid) {
+  TriangleMesh mesh;
+  for (int row = 0; row < grid.rows(); ++row) {
+    for (int column = 0; column < grid.columns(); ++column)
+      mesh.vertices_m.emplace_back(grid.frame().to_D({column, row}), grid.height_m(column, row));
+  }
+  const auto side = static_cast<unsigned>(grid.columns());
+  const bool is_southwards = grid.step_m().x * grid.step_m().y < 0;
+  for (unsigned row = 0; row + 1 < static_cast<unsigned>(grid.rows()); ++row) {
+    for (unsigned column = 0; column + 1 < side; ++column) {
+      const unsigned a = row * side + column, b = a + 1, c = a + side, d = c + 1;
+      if (is_southwards) {
+        mesh.triangles.insert(mesh.triangles.end(), {{a, c, b}, {b, c, d}});
+      } else {
+        mesh.triangles.insert(mesh.triangles.end(), {{a, b, c}, {b, d, c}});
+      }
+    }
+  }
+  return mesh;
+}
+
 std::vector<Ray> random_rays(const HeightGrid& grid, std::size_t count, Seed seed) {
   const glm::dvec2 extent_m = glm::dvec2(grid.columns() - 1, grid.rows() - 1) * grid.step_m();
   std::vector<Ray> rays(count);

@@ -4,6 +4,7 @@
 #include <vector>
 
 #include "core/geometry/height_grid.h"
+#include "core/geometry/mesh.h"
 #include "core/random.h"
 #include "core/tracing/ray.h"
 
@@ -20,6 +21,10 @@ HeightGrid with_holes(const HeightGrid& grid, int count, int radius, Seed seed);
 
 /// The same heights, each missing independently with probability `share`.
 HeightGrid with_missing_samples(const HeightGrid& grid, double share, Seed seed);
+
+/// Two triangles for each cell of a grid without holes, counter-clockwise from above and split as
+/// in docs/theory/surface.md: between the second corner of a row and the first of the next.
+TriangleMesh mesh_of(const HeightGrid& grid);
 
 /// Random rays that start up to 300 m above the surface, a few outside the grid, in all directions,
 /// most of them downwards.

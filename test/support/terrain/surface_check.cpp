@@ -88,6 +88,14 @@ std::size_t border_edges(const TriangleMesh& mesh) {
   }));
 }
 
+std::size_t folds_in_plan(const TriangleMesh& mesh) {
+  return static_cast<std::size_t>(std::ranges::count_if(mesh.triangles, [&](const glm::uvec3& t) {
+    const glm::dvec3 &a = mesh.vertices_m[t.x], &b = mesh.vertices_m[t.y],
+                     &c = mesh.vertices_m[t.z];
+    return (b.x - a.x) * (c.y - a.y) - (b.y - a.y) * (c.x - a.x) <= 0;
+  }));
+}
+
 double area_m2(const TriangleMesh& mesh) {
   double sum_m2 = 0;
   for (const glm::uvec3& t : mesh.triangles) {

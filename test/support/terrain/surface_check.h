@@ -19,6 +19,9 @@ std::ptrdiff_t euler_number(const TriangleMesh& mesh);
 /// Number of edges with a single triangle.
 std::size_t border_edges(const TriangleMesh& mesh);
 
+/// Number of triangles without area in plan view, or clockwise from above.
+std::size_t folds_in_plan(const TriangleMesh& mesh);
+
 /// Sum of the triangles' areas.
 double area_m2(const TriangleMesh& mesh);
 

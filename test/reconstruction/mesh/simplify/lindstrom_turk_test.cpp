@@ -1,15 +1,11 @@
 #include "reconstruction/mesh/simplify/lindstrom_turk.h"
 
-#include <fmt/format.h>
 #include <gmock/gmock.h>
 #include <gtest/gtest.h>
 
 #include <algorithm>
-#include <array>
 #include <cmath>
-#include <cstdlib>
 #include <ctime>
-#include <filesystem>
 #include <glm/geometric.hpp>
 #include <limits>
 #include <numbers>
@@ -20,13 +16,10 @@
 
 #include "core/error.h"
 #include "core/geometry/height_grid.h"
-#include "core/model/mesh_reader.h"
 #include "reconstruction/mesh/accuracy/accuracy.h"
-#include "reconstruction/mesh/manifold_mesh.h"
-#include "terrain/dem/dem_io.h"
+#include "reconstruction/mesh/mesh_arrays.h"
 #include "test/support/margin.h"
 #include "test/support/scans/solid.h"
-#include "test/support/temporary_folder.h"
 #include "test/support/terrain/sample_terrain.h"
 #include "test/support/terrain/surface_check.h"
 
@@ -35,29 +28,6 @@ namespace {
 
 using ::testing::HasSubstr;
 using ::testing::IsEmpty;
-
-// Two triangles per cell of the grid, counter-clockwise from above.
-TriangleMesh mesh_of(const HeightGrid& grid) {
-  TriangleMesh mesh;
-  const auto columns = static_cast<unsigned>(grid.columns()),
-             rows = static_cast<unsigned>(grid.rows());
-  for (int row = 0; row < grid.rows(); ++row) {
-    for (int column = 0; column < grid.columns(); ++column)
-      mesh.vertices_m.emplace_back(grid.origin_m() + glm::dvec2(column, row) * grid.step_m(),
-                                   grid.height_m(column, row));
-  }
-  for (unsigned row = 0; row + 1 < rows; ++row) {
-    for (unsigned column = 0; column + 1 < columns; ++column) {
-      const unsigned a = row * columns + column, b = a + 1, c = a + columns, d = c + 1;
-      if (grid.step_m().x * grid.step_m().y > 0) {
-        mesh.triangles.insert(mesh.triangles.end(), {{a, b, c}, {b, d, c}});
-      } else {
-        mesh.triangles.insert(mesh.triangles.end(), {{a, c, b}, {b, c, d}});
-      }
-    }
-  }
-  return mesh;
-}
 
 HeightGrid hills(int samples) {
   std::vector<float> heights_m;
@@ -71,14 +41,6 @@ HeightGrid hills(int samples) {
 HeightGrid plane(int samples) {
   std::vector<float> heights_m(static_cast<std::size_t>(samples * samples), 2.f);
   return {{samples, samples}, {0, 0}, {1, 1}, std::move(heights_m)};
-}
-
-std::size_t folds_in(const TriangleMesh& mesh) {
-  return static_cast<std::size_t>(std::ranges::count_if(mesh.triangles, [&](const glm::uvec3& t) {
-    const glm::dvec3 &a = mesh.vertices_m[t.x], &b = mesh.vertices_m[t.y],
-                     &c = mesh.vertices_m[t.z];
-    return (b.x - a.x) * (c.y - a.y) - (b.y - a.y) * (c.x - a.x) <= 0;
-  }));
 }
 
 void expect_accounted(const ReducedMesh& reduced, const TriangleMesh& original) {
@@ -103,7 +65,7 @@ void expect_accounted(const ReducedMesh& reduced, const TriangleMesh& original) 
 }
 
 TEST(LindstromTurk, ReducesToTheRequestedTrianglesOrOneLess) {
-  const TriangleMesh ball = testing::icosphere(3, 4).mesh, hill = mesh_of(hills(41));
+  const TriangleMesh ball = testing::icosphere(3, 4).mesh, hill = testing::mesh_of(hills(41));
   for (const TriangleMesh& mesh : {ball, hill}) {
     for (const std::size_t triangles : {2000u, 777u, 100u, 30u}) {
       const ReducedMesh reduced = reduce(mesh, triangles);
@@ -117,7 +79,7 @@ TEST(LindstromTurk, ReducesToTheRequestedTrianglesOrOneLess) {
 }
 
 TEST(LindstromTurk, KeepsMeshesThatAreSmallEnough) {
-  TriangleMesh mesh = mesh_of(hills(9));
+  TriangleMesh mesh = testing::mesh_of(hills(9));
   for (glm::dvec3& p : mesh.vertices_m) p += glm::dvec3(412345.678, 5312345.123, 0.1);
   for (const std::size_t triangles : {128u, 129u, 1000u}) {
     const ReducedMesh reduced = reduce(mesh, triangles);
@@ -137,7 +99,7 @@ TEST(LindstromTurk, KeepsTheVolume) {
 }
 
 TEST(LindstromTurk, KeepsAPlaneAndItsBorder) {
-  const TriangleMesh flat = mesh_of(plane(21));
+  const TriangleMesh flat = testing::mesh_of(plane(21));
   const ReducedMesh reduced = reduce(flat, 40);
   EXPECT_LE(reduced.mesh.triangles.size(), 40u);
   for (const glm::dvec3& p : reduced.mesh.vertices_m) EXPECT_NEAR(p.z, 2, 1e-12);
@@ -147,12 +109,12 @@ TEST(LindstromTurk, KeepsAPlaneAndItsBorder) {
 
 TEST(LindstromTurk, MakesNoOverhangs) {
   const HeightGrid rough = testing::fractal(65, 1, 30, Seed{5});
-  const TriangleMesh mesh = mesh_of(rough);
-  ASSERT_EQ(folds_in(mesh), 0u);
+  const TriangleMesh mesh = testing::mesh_of(rough);
+  ASSERT_EQ(testing::folds_in_plan(mesh), 0u);
   for (const std::size_t triangles : {2000u, 300u, 40u}) {
     const ReducedMesh reduced = reduce(mesh, triangles);
     EXPECT_TRUE(reduced.is_height_field);
-    EXPECT_EQ(folds_in(reduced.mesh), 0u);
+    EXPECT_EQ(testing::folds_in_plan(reduced.mesh), 0u);
     EXPECT_THAT(testing::surface_faults(reduced.mesh), IsEmpty());
   }
   EXPECT_FALSE(reduce(testing::icosphere(3, 2).mesh, 100).is_height_field);
@@ -160,17 +122,17 @@ TEST(LindstromTurk, MakesNoOverhangs) {
 
 // Cells of 10 nm, at positions rounded to about 1 nm.
 TEST(LindstromTurk, MakesNoOverhangsByRounding) {
-  TriangleMesh mesh = mesh_of(testing::fractal(65, 1, 30, Seed{5}));
+  TriangleMesh mesh = testing::mesh_of(testing::fractal(65, 1, 30, Seed{5}));
   for (glm::dvec3& p : mesh.vertices_m) p = 1e-8 * p + glm::dvec3(5e5, 5e6, 300);
-  ASSERT_EQ(folds_in(mesh), 0u);
+  ASSERT_EQ(testing::folds_in_plan(mesh), 0u);
   for (const std::size_t triangles : {4000u, 2000u, 300u, 40u})
-    EXPECT_EQ(folds_in(reduce(mesh, triangles).mesh), 0u) << triangles;
+    EXPECT_EQ(testing::folds_in_plan(reduce(mesh, triangles).mesh), 0u) << triangles;
 }
 
 // Heights and the shift are multiples of 2^-10 m: positions about the origin are the same.
 // Quantised files and seams hold vertices at one place. Every fourth column lies on the next.
 TEST(LindstromTurk, CollapsesEdgesWithoutLengthDownToTheRequestedTriangles) {
-  TriangleMesh mesh = mesh_of(hills(41));
+  TriangleMesh mesh = testing::mesh_of(hills(41));
   for (std::size_t i = 0; i < mesh.vertices_m.size(); ++i) {
     if (i % 41 % 4 == 1) mesh.vertices_m[i] = mesh.vertices_m[i + 1];
   }
@@ -225,7 +187,7 @@ TEST(LindstromTurk, TurnsNoTriangleOver) {
 }
 
 TEST(LindstromTurk, DoesNotDependOnTheOrigin) {
-  TriangleMesh near = mesh_of(hills(33));
+  TriangleMesh near = testing::mesh_of(hills(33));
   for (glm::dvec3& p : near.vertices_m) p.z = std::round(1024 * p.z) / 1024;
   TriangleMesh far = near;
   const glm::dvec3 shift_m(524288, 5242880, 512);
@@ -239,7 +201,7 @@ TEST(LindstromTurk, DoesNotDependOnTheOrigin) {
 }
 
 TEST(LindstromTurk, IsReproducible) {
-  const TriangleMesh mesh = mesh_of(testing::fractal(65, 1, 20, Seed{1}));
+  const TriangleMesh mesh = testing::mesh_of(testing::fractal(65, 1, 20, Seed{1}));
   const ReducedMesh once = reduce(mesh, 500), again = reduce(mesh, 500);
   EXPECT_EQ(once.mesh.vertices_m, again.mesh.vertices_m);
   EXPECT_EQ(once.mesh.triangles, again.mesh.triangles);
@@ -247,7 +209,7 @@ TEST(LindstromTurk, IsReproducible) {
 }
 
 TEST(LindstromTurk, CutsAndCountsNonManifoldParts) {
-  TriangleMesh mesh = mesh_of(hills(21));
+  TriangleMesh mesh = testing::mesh_of(hills(21));
   mesh.vertices_m.insert(mesh.vertices_m.end(), {{3.2, 3.2, 9}, {3.2, 4, -9}, {50, 50, 0}});
   mesh.triangles.emplace_back(66, 67, 441);     // fin on an edge
   mesh.triangles.push_back(mesh.triangles[7]);  // duplicate
@@ -336,7 +298,7 @@ TEST(LindstromTurk, RejectsInvalidInput) {
     }
     return std::string("nothing");
   };
-  TriangleMesh mesh = mesh_of(hills(5));
+  TriangleMesh mesh = testing::mesh_of(hills(5));
   EXPECT_THAT(message(mesh, 0, {}), HasSubstr("triangles = 0 must be at least 1"));
   EXPECT_THAT(message({}, 5, {}), HasSubstr("there is no triangle"));
   EXPECT_THAT(message(mesh, 5, {.most_bytes = 1000}), HasSubstr("32 triangles take about"));
@@ -345,7 +307,7 @@ TEST(LindstromTurk, RejectsInvalidInput) {
 }
 
 TEST(LindstromTurk, ReportsProgressAndStopsOnRequest) {
-  const TriangleMesh mesh = mesh_of(hills(81));
+  const TriangleMesh mesh = testing::mesh_of(hills(81));
   std::vector<double> shares;
   reduce(mesh, 100, {.progress = [&](double share) { shares.push_back(share); }});
   ASSERT_GT(shares.size(), 3u);
@@ -353,102 +315,6 @@ TEST(LindstromTurk, ReportsProgressAndStopsOnRequest) {
   EXPECT_EQ(shares.back(), 1);
   const RunControl work{.progress = [](double) { throw std::runtime_error("enough"); }};
   EXPECT_THROW(reduce(mesh, 100, work), std::runtime_error);
-}
-
-// Root mean square of the vertical distances between the mesh and the grid's samples.
-double vertical_rms_m(const HeightGrid& grid, const TriangleMesh& mesh) {
-  std::vector<double> error_m(grid.heights_m().size(), std::nan(""));
-  const auto columns = static_cast<std::size_t>(grid.columns());
-  for (const glm::uvec3& t : mesh.triangles) {
-    std::array<glm::dvec3, 3> p;  // column, row, height
-    for (int k = 0; k < 3; ++k) {
-      const glm::dvec3& v = mesh.vertices_m[t[k]];
-      p[static_cast<std::size_t>(k)] = {(glm::dvec2(v) - grid.origin_m()) / grid.step_m(), v.z};
-    }
-    const auto across = [](const glm::dvec3& a, const glm::dvec3& b, glm::dvec2 c) {
-      return (b.x - a.x) * (c.y - a.y) - (b.y - a.y) * (c.x - a.x);
-    };
-    const double area = across(p[0], p[1], p[2]);
-    const auto [left, right] = std::minmax({p[0].x, p[1].x, p[2].x});
-    const auto [low, high] = std::minmax({p[0].y, p[1].y, p[2].y});
-    for (int row = std::max(0, static_cast<int>(std::ceil(low)));
-         row <= std::min<double>(high, grid.rows() - 1); ++row) {
-      for (int column = std::max(0, static_cast<int>(std::ceil(left)));
-           column <= std::min<double>(right, grid.columns() - 1); ++column) {
-        const glm::dvec2 at(column, row);
-        const double a = across(p[1], p[2], at) / area, b = across(p[2], p[0], at) / area;
-        if (std::min({a, b, 1 - a - b}) < -1e-9) continue;
-        const double height_m = a * p[0].z + b * p[1].z + (1 - a - b) * p[2].z;
-        error_m[static_cast<std::size_t>(row) * columns + static_cast<std::size_t>(column)] =
-            height_m - grid.height_m(column, row);
-      }
-    }
-  }
-  double sum = 0;
-  std::size_t count = 0;
-  for (const double e : error_m) {
-    if (std::isnan(e)) continue;
-    sum += e * e;
-    ++count;
-  }
-  // The border keeps its area, not its place: some samples of a rough border lie beyond it.
-  EXPECT_GT(static_cast<double>(count), 0.995 * static_cast<double>(error_m.size()));
-  return std::sqrt(sum / static_cast<double>(count));
-}
-
-// Results of CGAL's own edge_collapse with this cost and placement, measured with other programs.
-TEST(LindstromTurkProof, IsAsAccurateAsCgalOnADem) {
-  const HeightGrid grid = load_dem(testing::data_folder() / "terrain/jacksboro.tif").grid;
-  const TriangleMesh mesh = mesh_of(grid);
-  struct Case {
-    double share, rms_m;
-  };
-  for (const auto& [share, rms_m] : {Case{0.02, 10.9}, Case{0.1, 3.55}}) {
-    const auto triangles =
-        static_cast<std::size_t>(share * static_cast<double>(mesh.triangles.size()));
-    const ReducedMesh reduced = reduce(mesh, triangles);
-    EXPECT_LE(reduced.mesh.triangles.size(), triangles);
-    EXPECT_EQ(folds_in(reduced.mesh), 0u);
-    const double found_m = vertical_rms_m(grid, reduced.mesh);
-    EXPECT_LE(found_m, 1.02 * rms_m);
-    testing::record_margin(fmt::format("RMS height error of a DEM at {} of its triangles", share),
-                           found_m, 1.02 * rms_m, "m");
-  }
-}
-
-// Results of CGAL 5.5's edge_collapse on the same fractals.
-TEST(LindstromTurkProof, IsAsAccurateAsCgalOnAFractal) {
-  const bool is_full = testing::proof_size(0, 1) == 1;
-  const HeightGrid grid = testing::fractal(is_full ? 1025 : 257, 0.5, 40, Seed{7});
-  const TriangleMesh mesh = mesh_of(grid);
-  const ReducedMesh reduced = reduce(mesh, mesh.triangles.size() / 50);
-  EXPECT_EQ(folds_in(reduced.mesh), 0u);
-  const double found_m = vertical_rms_m(grid, reduced.mesh), cgal_m = is_full ? 0.043218 : 0.16119;
-  EXPECT_LE(found_m, 1.05 * cgal_m);
-  testing::record_margin("RMS height error of a fractal at a fiftieth of its triangles", found_m,
-                         1.05 * cgal_m, "m");
-}
-
-TEST(LindstromTurkProof, IsAsAccurateAsCgalOnTheBunny) {
-  const auto packed = testing::shared_data_folder() / "mesh/stanford_bunny_scans/bun_zipper.ply.gz";
-  if (!std::filesystem::exists(packed))
-    GTEST_SKIP() << "there is no " << packed << "; set GROUNDRAY_SHARED_DATA";
-  const testing::TemporaryFolder folder;
-  const std::string gunzip =
-      fmt::format("gunzip -c '{}' > '{}'", packed.string(), (folder / "bunny.ply").string());
-  ASSERT_EQ(std::system(gunzip.c_str()), 0);
-  const TriangleMesh mesh = read_mesh(folder / "bunny.ply").mesh;
-  const ReducedMesh reduced = reduce(mesh, mesh.triangles.size() / 50);
-  EXPECT_EQ(testing::euler_number(reduced.mesh), testing::euler_number(mesh));
-  constexpr double diagonal_m = 0.2502;  // of the bounding box
-  const double limit_m = 1.02 * 0.00075 * diagonal_m;
-  for (const auto& distance :
-       {MeshDistance(mesh, reduced.mesh), MeshDistance(reduced.mesh, mesh)}) {
-    const double found_m = distance.mean(distance.step_for_m(3e5)).rms.value_m;
-    EXPECT_LE(found_m, limit_m);
-    testing::record_margin("RMS distance of the bunny at a fiftieth of its triangles", found_m,
-                           limit_m, "m");
-  }
 }
 
 }  // namespace

@@ -29,25 +29,6 @@ std::size_t peak_bytes() {
   return 1024 * static_cast<std::size_t>(usage.ru_maxrss);
 }
 
-// Reference surface of a grid without holes.
-TriangleMesh mesh_of(const HeightGrid& grid) {
-  TriangleMesh mesh;
-  for (int row = 0; row < grid.rows(); ++row) {
-    for (int column = 0; column < grid.columns(); ++column) {
-      const glm::dvec2 place = grid.origin_m() + glm::dvec2(column, row) * grid.step_m();
-      mesh.vertices_m.emplace_back(place, grid.height_m(column, row));
-    }
-  }
-  const auto side = static_cast<unsigned>(grid.columns());
-  for (unsigned row = 0; row + 1 < static_cast<unsigned>(grid.rows()); ++row) {
-    for (unsigned column = 0; column + 1 < side; ++column) {
-      const unsigned a = row * side + column, b = a + 1, c = a + side, d = c + 1;
-      mesh.triangles.insert(mesh.triangles.end(), {{a, c, b}, {b, c, d}});
-    }
-  }
-  return mesh;
-}
-
 struct TerrainCase {
   const char* name;
   TriangleMesh mesh;
@@ -99,15 +80,17 @@ void expect_proved(const TerrainCase& of) {
 // A greedy TIN (Delatin) of jacksboro needs 20.5 % and 4.9 % of the triangles.
 TEST(SimplifyProof, RealTerrainNeedsFewTriangles) {
   const HeightGrid grid = load_dem(testing::data_folder() / "terrain/jacksboro.tif").grid;
-  expect_proved({"jacksboro", mesh_of(grid), 10, 0.123});
-  expect_proved({"jacksboro", mesh_of(grid), 30, 0.029});
+  expect_proved({"jacksboro", testing::mesh_of(grid), 10, 0.123});
+  expect_proved({"jacksboro", testing::mesh_of(grid), 30, 0.029});
 }
 
 // Reliefs are chosen so that a greedy TIN (Delatin) needs 12.7 % of the triangles at 0.1 m, and
 // 1.93 % at 0.3 m.
 TEST(SimplifyProof, FractalTerrainNeedsFewTriangles) {
-  expect_proved({"fractal", mesh_of(testing::fractal(513, 0.5, 29.2, Seed{7})), 0.1, 0.08});
-  expect_proved({"fractal", mesh_of(testing::fractal(513, 0.5, 33.2, Seed{7})), 0.3, 0.011});
+  expect_proved(
+      {"fractal", testing::mesh_of(testing::fractal(513, 0.5, 29.2, Seed{7})), 0.1, 0.08});
+  expect_proved(
+      {"fractal", testing::mesh_of(testing::fractal(513, 0.5, 33.2, Seed{7})), 0.3, 0.011});
 }
 
 TEST(SimplifyProof, ARealScanIsWithinTheBoundInBothDirections) {
@@ -154,7 +137,7 @@ TriangleMesh noisy_hills(int samples) {
       heights.push_back(static_cast<float>(5 * std::sin(0.03 * column) * std::cos(0.02 * row)) +
                         noise(random));
   }
-  return mesh_of({{samples, samples}, {0, 0}, {1, -1}, std::move(heights)});
+  return testing::mesh_of({{samples, samples}, {0, 0}, {1, -1}, std::move(heights)});
 }
 
 // Total memory: for the runs and for measuring the error.

@@ -6,6 +6,7 @@
 #include <random>
 #include <set>
 
+#include "reconstruction/mesh/manifold_mesh.h"
 #include "test/support/scans/solid.h"
 #include "test/support/terrain/plan_check.h"
 
