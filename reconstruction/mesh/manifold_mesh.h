@@ -40,8 +40,7 @@ using EdgeCut = std::function<bool(SurfaceMesh::HalfedgeHandle)>;
 /// Numbers the pieces of a surface, whose triangles are connected by edges, from 0 in the order of
 /// their first triangles.
 /// @return the number of each triangle's piece.
-std::vector<std::uint32_t> number_pieces(const SurfaceMesh& surface,
-                                         const EdgeCut& is_cut = {});
+std::vector<std::uint32_t> number_pieces(const SurfaceMesh& surface, const EdgeCut& is_cut = {});
 
 /// Groups the triangles of a surface by piece; see number_pieces.
 Buckets pieces_of(const SurfaceMesh& surface, const EdgeCut& is_cut = {});

@@ -95,8 +95,8 @@ std::vector<bool> find_repeats(std::span<const glm::uvec3> triangles, std::size_
     std::ranges::sort(alike);
     for (std::size_t k = 0; k < alike.size(); ++k) {
       const auto& [corners, triangle] = alike[k];
-      is_repeat[triangle] = repeats_vertex(triangles[triangle]) ||
-                            (k > 0 && alike[k - 1].first == corners);
+      is_repeat[triangle] =
+          repeats_vertex(triangles[triangle]) || (k > 0 && alike[k - 1].first == corners);
     }
   }
   return is_repeat;

@@ -27,8 +27,8 @@ struct OpenMesh::vector_traits<glm::dvec3> {
 
 namespace groundray {
 
-/// Traits of SurfaceMesh: positions in double precision, the vertices' sources, and marks of what was
-/// deleted.
+/// Traits of SurfaceMesh: positions in double precision, the vertices' sources, and marks of what
+/// was deleted.
 struct SurfaceTraits : OpenMesh::DefaultTraits {
   using Point = glm::dvec3;
   using Normal = glm::dvec3;
@@ -94,12 +94,11 @@ std::vector<bool> find_repeats(std::span<const glm::uvec3> triangles, std::size_
 
 /// Makes a surface of any triangles; vertices and triangles keep their numbers. An edge of two
 /// triangles that traverse it in opposite directions joins them. An edge of more, or of two in the
-/// same direction, is a boundary of each; its half-edges in triangles are tagged. Triangles found by
-/// find_repeats are tagged and joined to nothing. Each of several fans at a vertex has boundaries of
-/// its own.
+/// same direction, is a boundary of each; its half-edges in triangles are tagged. Triangles found
+/// by find_repeats are tagged and joined to nothing. Each of several fans at a vertex has
+/// boundaries of its own.
 /// @param triangles  fewer than 3.5e8.
-SurfaceMesh to_surface(std::span<const glm::dvec3> points_m,
-                       std::span<const glm::uvec3> triangles);
+SurfaceMesh to_surface(std::span<const glm::dvec3> points_m, std::span<const glm::uvec3> triangles);
 inline SurfaceMesh to_surface(const TriangleMesh& mesh) {
   return to_surface(mesh.vertices_m, mesh.triangles);
 }

@@ -58,8 +58,7 @@ bool is_outline(const SurfaceMesh& surface, const BoundaryLoop& loop,
     const auto from_middle = [&](auto vertex) { return surface.point(vertex) - boundary.middle_m; };
     const glm::dvec3 a = from_middle(surface.from_vertex_handle(inner));
     const glm::dvec3 b = from_middle(surface.to_vertex_handle(inner));
-    const glm::dvec3 c =
-        from_middle(surface.to_vertex_handle(surface.next_halfedge_handle(inner)));
+    const glm::dvec3 c = from_middle(surface.to_vertex_handle(surface.next_halfedge_handle(inner)));
     area += glm::cross(a, b);
     const glm::dvec3 normal = glm::cross(b - a, c - a);
     const double size = glm::length(normal);
@@ -112,8 +111,7 @@ class Filler {
   void fill(FilledMesh& out) {
     std::vector<Candidate> candidates = sort_out();
     std::vector<Task> tasks;
-    for (Candidate& candidate : candidates)
-      tasks.push_back({&candidate, &loops_[candidate.loop]});
+    for (Candidate& candidate : candidates) tasks.push_back({&candidate, &loops_[candidate.loop]});
     close(candidates, tasks, {mesh_.shape, surface_, stars_});
     constexpr int rounds = 3;  // a patch that avoids one piece may intersect another
     for (int round = 0; round < rounds && join_islands(candidates); ++round) {
@@ -210,8 +208,8 @@ class Filler {
     const std::size_t first = mesh_.shape.triangles.size();  // of the bridges
     std::vector<Task> tasks;
     for (const BoundaryLoop& loop : loops) {
-      const auto found = std::ranges::find_if(
-          loop, [&](auto h) { return triangle_across(surface, h) >= first; });
+      const auto found =
+          std::ranges::find_if(loop, [&](auto h) { return triangle_across(surface, h) >= first; });
       if (found == loop.end()) continue;
       Candidate* candidate = owners[triangle_across(surface, *found) - first];
       if (loop.size() == candidate->bridged.vertices.size()) tasks.push_back({candidate, &loop});

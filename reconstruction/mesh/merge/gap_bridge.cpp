@@ -59,8 +59,8 @@ class VertexTree {
       const glm::dvec3 p_m(entry.first.get<0>(), entry.first.get<1>(), entry.first.get<2>());
       if (glm::distance(p_m, place_m) <= within_m) found.push_back(entry.second);
     };
-    tree_.query(geometry::index::intersects(geometry::model::box<Point>(
-                    {low.x, low.y, low.z}, {high.x, high.y, high.z})),
+    tree_.query(geometry::index::intersects(
+                    geometry::model::box<Point>({low.x, low.y, low.z}, {high.x, high.y, high.z})),
                 boost::make_function_output_iterator(look_at));
     return found;
   }

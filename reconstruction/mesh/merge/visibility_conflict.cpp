@@ -10,6 +10,7 @@
 #include "core/model/model.h"
 #include "core/tracing/object_tracer.h"
 #include "core/tracing/ray_tracer.h"
+#include "reconstruction/mesh/mesh_arrays.h"
 
 namespace groundray {
 namespace {

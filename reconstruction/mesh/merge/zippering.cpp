@@ -66,8 +66,8 @@ std::vector<std::uint32_t> put_on_border(StitchedMesh& stitched, const StitchedM
   return vertices;
 }
 
-/// Returns the half-edge of the boundary that begins at a vertex of a manifold; invalid if the vertex
-/// is not on a boundary. The triangles are to its right.
+/// Returns the half-edge of the boundary that begins at a vertex of a manifold; invalid if the
+/// vertex is not on a boundary. The triangles are to its right.
 SurfaceMesh::HalfedgeHandle border_at(const SurfaceMesh& surface, std::uint32_t vertex) {
   const auto h = surface.halfedge_handle(surface.vertex_handle(vertex));
   return h.is_valid() && surface.is_boundary(h) ? h : SurfaceMesh::InvalidHalfedgeHandle;

@@ -112,8 +112,8 @@ struct DecimationState {
   /// @param labels, crease_rad, deep_m  as for FeatureLines.
   /// @param tolerances_m  permitted distance of the surface from each vertex.
   DecimationState(const TriangleMesh& shape, const std::vector<std::uint16_t>& labels,
-                  double crease_rad,
-                  const std::vector<float>& tolerances_m, const std::vector<float>& deep_m);
+                  double crease_rad, const std::vector<float>& tolerances_m,
+                  const std::vector<float>& deep_m);
 
   SurfaceMesh mesh;
   FeatureLines lines;

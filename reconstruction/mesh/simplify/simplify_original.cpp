@@ -143,10 +143,7 @@ DecimationState SimplifyOriginal::state(const SimplifyOptions& options,
     labels.reserve(sources().size());
     for (const std::uint32_t source : sources()) labels.push_back(mesh_.labels[source]);
   }
-  return {surface_->mesh(),
-          labels,
-          options.crease_rad,
-          tolerances.each_m,
+  return {surface_->mesh(), labels, options.crease_rad, tolerances.each_m,
           tolerances.are_noise ? tolerances.each_m : std::vector<float>()};
 }
 

@@ -151,10 +151,11 @@ TEST(ToSurface, TagsWhatIsNotManifold) {
   EXPECT_THAT(tagged({{0, 1, 2}, {1, 0, 3}, {1, 0, 4}}), ElementsAre(0, 1, 1));
   EXPECT_THAT(tagged({{0, 1, 2}, {0, 1, 3}}), ElementsAre(0, 0));
   EXPECT_THAT(tagged({{0, 1, 2}, {3, 3, 4}}), IsEmpty());
-  const SurfaceMesh surface =
-      to_surface(some_points(5).vertices_m, std::vector<glm::uvec3>{{0, 1, 2}, {3, 3, 4}, {1, 2, 0}});
+  const SurfaceMesh surface = to_surface(some_points(5).vertices_m,
+                                         std::vector<glm::uvec3>{{0, 1, 2}, {3, 3, 4}, {1, 2, 0}});
   std::vector<bool> is_tagged;
-  for (const auto triangle : surface.faces()) is_tagged.push_back(surface.status(triangle).tagged());
+  for (const auto triangle : surface.faces())
+    is_tagged.push_back(surface.status(triangle).tagged());
   EXPECT_THAT(is_tagged, ElementsAre(false, true, true));
 }
 
@@ -181,9 +182,9 @@ TEST(DropConflicts, DropsLaterTrianglesAlongAnEdge) {
 }
 
 TEST(SeparateFans, GivesEachFanAVertex) {
-  SurfaceMesh surface = to_surface(
-      some_points(8).vertices_m,
-      std::vector<glm::uvec3>{{0, 1, 2}, {0, 3, 4}, {0, 5, 6}, {0, 2, 7}});
+  SurfaceMesh surface =
+      to_surface(some_points(8).vertices_m,
+                 std::vector<glm::uvec3>{{0, 1, 2}, {0, 3, 4}, {0, 5, 6}, {0, 2, 7}});
   EXPECT_EQ(separate_fans(surface), 2u);
   const std::vector<std::uint32_t> first{corners_of(surface, 0).x, corners_of(surface, 1).x,
                                          corners_of(surface, 2).x};

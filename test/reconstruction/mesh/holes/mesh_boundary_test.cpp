@@ -62,7 +62,8 @@ TEST(MeshBoundary, ContainsEachBorderEdgeOnceInClosedLoops) {
     SurfaceMesh surface = to_surface(mesh);
     std::size_t borders = 0, in_loops = 0;
     for (const auto h : surface.halfedges())
-      borders += surface.is_boundary(h) && !surface.status(surface.opposite_face_handle(h)).tagged();
+      borders +=
+          surface.is_boundary(h) && !surface.status(surface.opposite_face_handle(h)).tagged();
     for (const BoundaryLoop& loop : find_boundary(surface)) {
       std::set<std::uint32_t> passed;
       for (std::size_t i = 0; i < loop.size(); ++i) {
