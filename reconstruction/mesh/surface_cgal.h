@@ -14,6 +14,21 @@ namespace groundray {
 /// SurfaceTraits is declared here.
 using CGAL::is_border;
 
+/// Temporary properties of CGAL's algorithms, with an initial value: CGAL 6 asks for them, and its
+/// adaptor to OpenMesh does not have them.
+template <typename Value>
+typename boost::property_map<SurfaceMesh, CGAL::dynamic_vertex_property_t<Value>>::const_type get(
+    const CGAL::dynamic_vertex_property_t<Value>&, const SurfaceMesh& surface,
+    const Value& initial) {
+  return {surface.n_vertices(), initial};
+}
+template <typename Value>
+typename boost::property_map<SurfaceMesh, CGAL::dynamic_halfedge_property_t<Value>>::const_type get(
+    const CGAL::dynamic_halfedge_property_t<Value>&, const SurfaceMesh& surface,
+    const Value& initial) {
+  return {surface.n_halfedges(), initial};
+}
+
 /// Positions of a surface as points of a CGAL kernel, for `vertex_point_map`. CGAL's own map
 /// rounds what it writes to single precision.
 template <typename Kernel>
