@@ -15,18 +15,24 @@ namespace groundray {
 struct ManifoldMesh {
   TriangleMesh shape;                  ///< without levels, unused vertices and dropped triangles
   std::vector<std::uint32_t> sources;  ///< of each vertex: its number in the original
-  /// Edges that were cut open: with more than two triangles, or two in the same direction.
+  /// Edges with more than two triangles, or two in the same direction. The fans beside them got
+  /// vertices of their own; at most two triangles still share both ends, and they are joined.
   std::size_t tangled_edges = 0;
   std::size_t dropped = 0;  ///< triangles that repeated a vertex or another triangle
   std::size_t copies = 0;   ///< vertices added because the original joined several fans
 };
 
 /// Cuts a mesh open where it is not manifold. The mesh must satisfy check_mesh. No vertex moves,
-/// and manifold parts stay as they are, except that unused vertices are removed.
+/// and manifold parts stay as they are, except that unused vertices are removed. The result is a
+/// manifold although two triangles that were cut apart may share both ends of an edge again: a fan
+/// that ends at the edge enters it on one side and leaves it on the other, so there are no more
+/// than two, in opposite directions.
 ManifoldMesh cut_to_manifold(const TriangleMesh& mesh);
 
-/// Gives each fan of triangles at a vertex a vertex of its own, with the same source; one fan keeps
-/// the original. Added vertices follow the others. Returns their number.
+/// Gives each fan of triangles at a vertex a vertex of its own, with the same source; the fan of
+/// the half-edge with the lowest number keeps the original. Added vertices follow the others.
+/// Returns their number.
+/// @param surface  without tagged triangles, which would count as fans.
 std::size_t separate_fans(SurfaceMesh& surface);
 
 /// Removes triangles that repeat a vertex, and those that traverse an edge in the same direction as

@@ -3,7 +3,6 @@
 #include <cstdint>
 #include <vector>
 
-#include "core/error.h"
 #include "core/geometry/mesh.h"
 
 namespace groundray {
@@ -15,11 +14,5 @@ struct MeasuredMesh {
   std::vector<std::uint16_t> labels;  ///< semantic class of each vertex; 0 is "none"
   std::vector<float> confidence;  ///< per vertex, 0 to 1: highest at normal incidence, see link()
 };
-
-/// Adds a violation for each attribute that does not have one value per vertex or none.
-void check_columns(const MeasuredMesh& mesh, Violations& broken);
-
-/// Returns some of the vertices' attributes, in the order of their numbers; without shape.
-MeasuredMesh picked_columns(const MeasuredMesh& mesh, const std::vector<std::uint32_t>& numbers);
 
 }  // namespace groundray

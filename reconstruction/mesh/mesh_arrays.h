@@ -9,7 +9,9 @@
 #include <span>
 #include <vector>
 
+#include "core/error.h"
 #include "core/geometry/mesh.h"
+#include "reconstruction/mesh/measured_mesh.h"
 
 namespace groundray {
 
@@ -32,6 +34,12 @@ std::vector<Value> picked(const std::vector<Value>& values,
   for (const std::uint32_t i : numbers) some.push_back(values[i]);
   return some;
 }
+
+/// Adds a violation for each attribute that does not have one value per vertex or none.
+void check_columns(const MeasuredMesh& mesh, Violations& broken);
+
+/// Returns some of the vertices' attributes, in the order of their numbers; without shape.
+MeasuredMesh picked_columns(const MeasuredMesh& mesh, const std::vector<std::uint32_t>& numbers);
 
 /// Numbers of items, grouped by bucket; ascending in each.
 struct Buckets {

@@ -7,6 +7,8 @@
 #include <array>
 #include <utility>
 
+#include "core/error.h"
+
 namespace groundray {
 namespace {
 
@@ -104,6 +106,10 @@ std::vector<bool> find_repeats(std::span<const glm::uvec3> triangles, std::size_
 
 SurfaceMesh to_surface(std::span<const glm::dvec3> points_m,
                        std::span<const glm::uvec3> triangles) {
+  if (triangles.size() >= most_triangles) {
+    throw Error("mesh: {} triangles must be fewer than {}; split the mesh", triangles.size(),
+                most_triangles);
+  }
   const Joints joints = find_joints(triangles, points_m.size());
   const std::vector<Side>& twins = joints.twins;
   const auto borders = static_cast<std::size_t>(std::count(twins.begin(), twins.end(), none));

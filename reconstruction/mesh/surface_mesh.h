@@ -82,6 +82,9 @@ inline glm::uvec3 corners_of(const SurfaceMesh& surface, std::uint32_t triangle)
   return corners;
 }
 
+/// Limit of the number of triangles: 2^31 half-edges if none are joined.
+inline constexpr std::size_t most_triangles = 350'000'000;
+
 /// Returns true if a triangle has a vertex twice.
 inline bool repeats_vertex(const glm::uvec3& t) noexcept {
   return t.x == t.y || t.y == t.z || t.z == t.x;
@@ -97,7 +100,7 @@ std::vector<bool> find_repeats(std::span<const glm::uvec3> triangles, std::size_
 /// same direction, is a boundary of each; its half-edges in triangles are tagged. Triangles found
 /// by find_repeats are tagged and joined to nothing. Each of several fans at a vertex has
 /// boundaries of its own.
-/// @param triangles  fewer than 3.5e8.
+/// @throws Error if there are `most_triangles` or more.
 SurfaceMesh to_surface(std::span<const glm::dvec3> points_m, std::span<const glm::uvec3> triangles);
 inline SurfaceMesh to_surface(const TriangleMesh& mesh) {
   return to_surface(mesh.vertices_m, mesh.triangles);

@@ -29,7 +29,7 @@ enum class HoleLeft {
   Outline,  ///< the chain is the outline of the surface, which lies inside it rather than around it
   TooLong,  ///< boundary longer than HoleLimits::longest_m
   TooManyEdges,
-  NotManifold,  ///< an edge of the boundary has more than one triangle
+  NotManifold,  ///< an edge of the boundary has more than one triangle, or there are only two edges
   NoFilling,    ///< no triangulation of the boundary's vertices is manifold
   Crossing,     ///< the patch would intersect other triangles
 };

@@ -24,7 +24,7 @@ std::vector<std::pair<std::uint32_t, std::uint32_t>> crossings(const TriangleMes
 struct AdjacentMesh {
   const TriangleMesh& mesh;
   const SurfaceMesh& surface;  ///< of the mesh, linked by find_boundary
-  const Buckets& stars;        ///< triangles at each vertex
+  const Buckets& stars;        ///< of the surface, as from stars_of
 };
 
 /// Shape of a patch: continued smoothly from the boundary, or flat between its vertices.

@@ -122,6 +122,17 @@ std::vector<BoundaryLoop> find_boundary(SurfaceMesh& surface) {
   return loops;
 }
 
+Buckets stars_of(const SurfaceMesh& surface) {
+  Buckets corners = sorted_in(surface.n_vertices(), 3 * surface.n_faces(), [&](auto corner) {
+    const auto triangle = surface.face_handle(corner / 3);
+    if (surface.status(triangle).tagged()) return none;
+    const auto h = half_edge_of(surface, corner / 3, static_cast<int>(corner % 3));
+    return number_of(surface.from_vertex_handle(h));
+  });
+  for (std::uint32_t& item : corners.items) item /= 3;
+  return corners;
+}
+
 std::optional<BridgedBoundary> bridge(const TriangleMesh& mesh, const Buckets& stars,
                                       BridgedBoundary boundary,
                                       std::span<const std::uint32_t> outline) {

@@ -7,6 +7,7 @@
 #include <vector>
 
 #include "core/geometry/mesh.h"
+#include "reconstruction/mesh/mesh_arrays.h"
 #include "reconstruction/mesh/surface_mesh.h"
 
 namespace groundray {
@@ -26,6 +27,9 @@ void link(SurfaceMesh& surface, SurfaceMesh::HalfedgeHandle half_edge,
 /// those of tagged triangles. Where several touch at a vertex, each is a loop of its own.
 std::vector<BoundaryLoop> find_boundary(SurfaceMesh& surface);
 
+/// Groups the triangles of a surface by vertex, without tagged ones.
+Buckets stars_of(const SurfaceMesh& surface);
+
 /// Boundary of a hole, joined with the outlines of pieces of surface inside it to a single loop.
 struct BridgedBoundary {
   std::vector<std::uint32_t> vertices;
@@ -34,7 +38,7 @@ struct BridgedBoundary {
 
 /// Joins an outline to a boundary by two triangles at a position where both are close and the
 /// triangles intersect none of their neighbours.
-/// @param stars              triangles at each vertex of the mesh.
+/// @param stars              as from stars_of.
 /// @param boundary, outline  vertices, in the winding order of triangles that fill them.
 /// @return nothing if they share a vertex or there is no such position.
 std::optional<BridgedBoundary> bridge(const TriangleMesh& mesh, const Buckets& stars,

@@ -29,7 +29,7 @@ struct Fit {
 /// the mesh, except for the boundary, and none intersects itself, another or the mesh. Of two in
 /// conflict, the first stays.
 /// @param mesh   changed temporarily; restored on return.
-/// @param stars  triangles at each vertex of the mesh.
+/// @param stars  of the mesh, as from stars_of.
 /// @param kept   patches that stay in any case.
 /// @return one for each of `tried`.
 std::vector<Fit> find_fitting(TriangleMesh& mesh, const Buckets& stars,

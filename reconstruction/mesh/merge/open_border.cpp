@@ -7,6 +7,7 @@
 #include "reconstruction/mesh/surface_mesh.h"
 
 namespace groundray {
+
 OpenBorder::OpenBorder(const StitchedMesh& stitched)
     : number_of_(stitched.vertices.size(), no_vertex) {
   const SurfaceMesh surface = surface_of(stitched);

@@ -220,7 +220,6 @@ ReducedMesh make_reduced_mesh(const SurfaceMesh& surface, const ManifoldMesh& ma
 }
 
 void check_triangle_count(const TriangleMesh& mesh, const RunControl& work) {
-  constexpr std::size_t most_triangles = 350'000'000;  // 2^31 half-edges if none are joined
   if (mesh.triangles.size() >= most_triangles) {
     throw Error("reducing a mesh: {} triangles must be fewer than {}; split the mesh",
                 mesh.triangles.size(), most_triangles);

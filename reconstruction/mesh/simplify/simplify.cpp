@@ -6,7 +6,7 @@
 #include <utility>
 
 #include "core/error.h"
-#include "reconstruction/mesh/manifold_mesh.h"
+#include "reconstruction/mesh/mesh_arrays.h"
 #include "reconstruction/mesh/simplify/decimation_state.h"
 #include "reconstruction/mesh/simplify/distance_proof.h"
 #include "reconstruction/mesh/simplify/distance_rules.h"

@@ -68,7 +68,6 @@ void check_simplify(const MeasuredMesh& mesh, const StopCriterion& stop,
                 "fineness.samples = {} must be positive", fineness.samples);
   broken.unless(fineness.largest_share > 0 && fineness.largest_share < 1,
                 "fineness.largest_share = {} must be between 0 and 1", fineness.largest_share);
-  constexpr std::size_t most_triangles = 350'000'000;  // 2^31 half-edges if none are joined
   broken.unless(mesh.shape.triangles.size() < most_triangles,
                 "{} triangles must be fewer than {}: split the mesh", mesh.shape.triangles.size(),
                 most_triangles);

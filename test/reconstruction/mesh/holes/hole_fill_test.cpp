@@ -261,6 +261,16 @@ TEST(HoleFill, KeepsNonManifoldBoundariesOpen) {
   EXPECT_EQ(std::ranges::count(reasons(out), HoleLeft::NotManifold), 3) << "hole and two fins";
 }
 
+TEST(HoleFill, IgnoresTrianglesThatRepeatAVertex) {
+  TriangleMesh open = without(sheet(5), [](const glm::dvec3& p) {
+    return std::abs(p.x - 2.5) < 0.5 && std::abs(p.y - 2.5) < 0.5;
+  });
+  open.vertices_m[14].z = open.vertices_m[21].z = 0.1;  // opposite corners of the hole
+  ASSERT_EQ(filled(open, 10).filled.size(), 1u);
+  open.triangles.emplace_back(14, 21, 21);
+  EXPECT_EQ(filled(open, 10).filled.size(), 1u);
+}
+
 TEST(HoleFill, ClosesHolesThatTouchAtAVertex) {
   const TriangleMesh open = without(sheet(12), [](const glm::dvec3& p) {
     const auto is_in = [&](double x, double y) {

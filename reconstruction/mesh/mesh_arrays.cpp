@@ -1,7 +1,3 @@
-#include "reconstruction/mesh/measured_mesh.h"
-
-#include <cstddef>
-
 #include "reconstruction/mesh/mesh_arrays.h"
 
 namespace groundray {
