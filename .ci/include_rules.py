@@ -4,7 +4,7 @@
 
 FOLDERS lists, for each folder of a library, the folders whose headers it may include besides its
 own; an entry that nothing uses is an error. LIBRARIES lists where the headers of other libraries
-may be included. Public headers include only the standard library, GLM and {fmt}; PRIVATE lists the
+may be included. IN_PASSES lists what passes, which run on devices, may include. Public headers include only the standard library, GLM and {fmt}; PRIVATE lists the
 headers that may include more. Run at the root of the tree.
 """
 
@@ -84,6 +84,10 @@ LIBRARIES = {
     r"(nanobind/|Python\.h)": r"apps/python/.*",
 }
 
+# The passes also run on devices, for which only these headers exist.
+PASSES = "terrain/lod/passes"
+IN_PASSES = re.compile(r"core/tracing/leaf\.h|terrain/lod/(lattice|passes/\w+)\.h")
+
 IN_HEADERS = re.compile(r"glm/.*|fmt/.*|[a-z0-9_]+")
 PRIVATE = (
     "apps/scan/word_option.h",
@@ -125,6 +129,8 @@ def faults_of(path: Path, used: set[tuple[str, str]]) -> list[str]:
             other = str(Path(name).parent)
             if other.split("/")[0] in ROOTS and not may_include(str(path.parent), other, used):
                 faults.append(f"{where}: {path.parent} may not include {other}")
+            if str(path.parent) == PASSES and not IN_PASSES.fullmatch(name):
+                faults.append(f"{where}: passes include leaf.h, lattice.h and each other alone")
             continue
         for pattern, places in LIBRARIES.items():
             if re.match(pattern, name) and not re.fullmatch(places, str(path)):

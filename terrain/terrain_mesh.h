@@ -28,6 +28,6 @@ struct TerrainMesh {
 /// @throws Error if block_cells is invalid, if the bound is negative or not a number, or if the
 ///         mesh has more vertices or triangles than 32 bits can number.
 TerrainMesh build_terrain_mesh(const HeightGrid& grid, const MeshBound& bound, int block_cells = 2,
-                               const PassRunner& runner = run_in_parallel);
+                               const PassRunner& runner = {});
 
 }  // namespace groundray

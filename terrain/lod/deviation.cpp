@@ -55,15 +55,14 @@ NodeArrays arrays_of(NodeLevel& level, glm::ivec2 first) {
 
 // Large enough to be worth a task, small enough to keep all threads busy.
 constexpr std::int64_t samples_of_a_part = 1 << 16;
-constexpr int samples_of_a_run = 256;
 
 // Divides the nodes into runs, or each node into bands.
-void cut(DeviationPass& pass) {
+void cut(DeviationPass& pass, int run_samples) {
   const std::int64_t side = std::int64_t{pass.grid.block_cells} << pass.grid.level;
   const std::int64_t width = std::min<std::int64_t>(side, pass.samples.size.x);
   const std::int64_t height = std::min<std::int64_t>(side + 1, pass.samples.size.y);
   if (pass.grid.level == 0 || width * height <= 2 * samples_of_a_part) {
-    pass.run = static_cast<int>(std::max<std::int64_t>(1, samples_of_a_run / side));
+    pass.run = static_cast<int>(std::max<std::int64_t>(1, run_samples / side));
     return;
   }
   pass.part_rows = static_cast<int>(std::max<std::int64_t>(1, samples_of_a_part / width));
@@ -71,7 +70,7 @@ void cut(DeviationPass& pass) {
 }
 
 void run(DeviationPass& pass, const PassRunner& runner) {
-  cut(pass);
+  cut(pass, runner.run_samples);
   if (pass.parts == 1) return run_pass(runner, pass.count(), pass);
   const NodeArrays nodes = pass.nodes;
   std::vector<float> full(pass.count(), 0);
@@ -121,7 +120,7 @@ void saturate_keys(NodeLevel& nodes, glm::ivec2 first_node, const NodeLevel& chi
                    glm::ivec2 first_child, const PassRunner& runner) {
   // The pass only reads the children.
   auto& readable = const_cast<NodeLevel&>(children);
-  const passes::NodeRuns runs{nodes.size};
+  const passes::NodeRuns runs{nodes.size, runner.run_nodes};
   run_pass(
       runner, runs.count(),
       passes::SaturatePass{runs, arrays_of(nodes, first_node), arrays_of(readable, first_child)});

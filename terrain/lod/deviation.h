@@ -19,7 +19,7 @@ enum class NodeDetail { KeysOnly, Full };
 /// @return levels 0 to Lattice::top_level(), each complete; the same bits for any runner.
 /// @throws Error if block_cells is invalid.
 std::vector<NodeLevel> certify(const HeightGrid& grid, int block_cells, NodeDetail detail,
-                               const PassRunner& runner = run_in_parallel);
+                               const PassRunner& runner = {});
 
 /// Returns nodes about which nothing is known yet; see accumulate_deviations.
 NodeLevel unknown_nodes(glm::ivec2 size, NodeDetail detail);
@@ -38,13 +38,13 @@ NodeLevel unknown_nodes(glm::ivec2 size, NodeDetail detail);
 ///                    Empty arrays (NodeDetail::KeysOnly) stay empty.
 void accumulate_deviations(const Lattice& lattice, int level, const HeightWindow& samples,
                            const HeightWindow& points, glm::ivec2 first_node, NodeLevel& nodes,
-                           const PassRunner& runner = run_in_parallel);
+                           const PassRunner& runner = {});
 
 /// Completes nodes of level 1 and above from their children: saturates the keys, marks holes, and
 /// determines the lowest and highest samples.
 /// @param children  complete nodes of the level below: all children of the nodes, and any others;
 ///                  `first_child` is the node that they begin with.
 void saturate_keys(NodeLevel& nodes, glm::ivec2 first_node, const NodeLevel& children,
-                   glm::ivec2 first_child, const PassRunner& runner = run_in_parallel);
+                   glm::ivec2 first_child, const PassRunner& runner = {});
 
 }  // namespace groundray

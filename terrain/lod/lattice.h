@@ -2,6 +2,7 @@
 
 #include <algorithm>
 #include <cstddef>
+#include <cstdint>
 #include <glm/common.hpp>
 #include <glm/vec2.hpp>
 #include <vector>
@@ -55,6 +56,30 @@ struct NodeLevel {
   std::vector<float> full_m;
   /// Lowest and highest sample of the DEM in the node, metres; +inf and -inf if there is none.
   std::vector<float> low_m, high_m;
+};
+
+/// Rectangle of a level's nodes that may be used, with their certified values (see NodeLevel), row
+/// by row.
+struct NodeWindow {
+  glm::ivec2 first{0};  ///< even, as is the end unless it is the lattice's
+  glm::ivec2 size{0};
+  const float* key_m = nullptr;
+  const float* low_m = nullptr;  ///< low_m and high_m: required if the bound has an angle
+  const float* high_m = nullptr;
+  const float* deviation_m = nullptr;  ///< deviation_m and full_m: for list_leaves
+  const float* full_m = nullptr;
+};
+
+/// State of a node of the quadtree, as bits. The lowest four are the sides of a leaf that are
+/// thinned for a coarser neighbour (Leaf::Side).
+struct NodeState {
+  enum Bits : std::uint8_t {
+    AllSides = 15,
+    Split = 16,   ///< replaced by its children
+    Tight = 32,   ///< exceeds its bound but cannot be split; not thinned if avoidable
+    IsLeaf = 64,  ///< is part of the mesh
+    Holed = 128,  ///< some or all samples of the DEM in it are missing
+  };
 };
 
 /// Rectangle of heights in metres: samples of the DEM, or points of a level of its lattice. Holes

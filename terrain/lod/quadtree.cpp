@@ -92,7 +92,7 @@ struct Splitter {
 
   void split(Selection& selection, int level) const {
     const auto at = static_cast<std::size_t>(level);
-    const NodeRuns runs{windows[at].size};
+    const NodeRuns runs{windows[at].size, runner.run_nodes};
     const auto [low_m, high_m] = sensor_box(level);
     BoundTest test{bound.tolerance_m,
                    bound.angle_rad * bound.angle_rad,
@@ -163,7 +163,7 @@ Selection select_nodes(const Lattice& lattice, std::span<const NodeWindow> windo
   for (int level = 0; level <= top; ++level) splitter.split(selection, level);
   for (int level = 0; level <= top; ++level) {
     const auto at = static_cast<std::size_t>(level);
-    const NodeRuns runs{windows[at].size};
+    const NodeRuns runs{windows[at].size, runner.run_nodes};
     passes::LeafPass pass{runs, state_window(selection.levels[at]), {}, lattice.nodes(level)};
     if (level < top) pass.parents = state_window(selection.levels[at + 1]);
     run_pass(runner, runs.count(), pass);
@@ -177,7 +177,7 @@ std::vector<Leaf> list_leaves(const Selection& selection, std::span<const NodeWi
   std::uint32_t total = 0;
   for (int level = first_level; level <= last_level; ++level) {
     const auto at = static_cast<std::size_t>(level);
-    const NodeRuns runs{windows[at].size};
+    const NodeRuns runs{windows[at].size, runner.run_nodes};
     auto& counts = offsets.emplace_back(runs.count());
     run_pass(runner, runs.count(),
              passes::CountLeavesPass{runs, selection.levels[at].state.data(), windows[at].key_m,
@@ -187,7 +187,7 @@ std::vector<Leaf> list_leaves(const Selection& selection, std::span<const NodeWi
   std::vector<Leaf> leaves(total);
   for (int level = first_level; level <= last_level; ++level) {
     const auto at = static_cast<std::size_t>(level);
-    const NodeRuns runs{windows[at].size};
+    const NodeRuns runs{windows[at].size, runner.run_nodes};
     run_pass(runner, runs.count(),
              passes::ListLeavesPass{runs, windows[at], selection.levels[at].state.data(),
                                     offsets[static_cast<std::size_t>(level - first_level)].data(),

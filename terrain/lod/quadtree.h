@@ -12,18 +12,6 @@
 
 namespace groundray {
 
-/// Rectangle of a level's nodes that may be used, with their certified values (see NodeLevel), row
-/// by row.
-struct NodeWindow {
-  glm::ivec2 first{0};  ///< even, as is the end unless it is the lattice's
-  glm::ivec2 size{0};
-  const float* key_m = nullptr;
-  const float* low_m = nullptr;  ///< low_m and high_m: required if the bound has an angle
-  const float* high_m = nullptr;
-  const float* deviation_m = nullptr;  ///< deviation_m and full_m: for list_leaves
-  const float* full_m = nullptr;
-};
-
 /// Returns the window of all nodes of a level; it points into `level`.
 NodeWindow whole_window(const NodeLevel& level);
 
@@ -40,17 +28,8 @@ struct MeshBound {
   int widened_to_nodes = 0;
 };
 
-/// Restricted quadtree: the state of each node of each level's window, row by row.
+/// Restricted quadtree: the state (NodeState) of each node of each level's window, row by row.
 struct Selection {
-  /// State of a node, as bits. The lowest four are the sides of a leaf that are thinned for a
-  /// coarser neighbour (Leaf::Side).
-  enum State : std::uint8_t {
-    AllSides = 15,
-    Split = 16,   ///< replaced by its children
-    Tight = 32,   ///< exceeds its bound but cannot be split; not thinned if avoidable
-    IsLeaf = 64,  ///< is part of the mesh
-    Holed = 128,  ///< some or all samples of the DEM in it are missing
-  };
   /// Window of one level.
   struct Level {
     glm::ivec2 first{0};
@@ -76,14 +55,13 @@ struct Selection {
 ///                 (except at the lattice's boundary). Those of the finest levels may be empty.
 /// @throws Error if the bound is negative or not a number, or if its angle or box is not finite.
 Selection select_nodes(const Lattice& lattice, std::span<const NodeWindow> windows,
-                       const MeshBound& bound, const PassRunner& runner = run_in_parallel);
+                       const MeshBound& bound, const PassRunner& runner = {});
 
 /// Lists the leaves of levels first_level to last_level, finer levels first, each row by row.
 /// Leaves without any height are omitted; deviations and highest samples that `windows` do not
 /// contain are 0.
 /// @param windows  as passed to select_nodes.
 std::vector<Leaf> list_leaves(const Selection& selection, std::span<const NodeWindow> windows,
-                              int first_level, int last_level,
-                              const PassRunner& runner = run_in_parallel);
+                              int first_level, int last_level, const PassRunner& runner = {});
 
 }  // namespace groundray

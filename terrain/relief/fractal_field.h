@@ -26,6 +26,6 @@ struct FractalSpec {
 /// @see Saupe, Algorithms for random fractals, in: Peitgen, Saupe (eds.), The Science of Fractal
 ///      Images (1988): the spectral exponent of a surface is 2 H + 2.
 std::vector<double> fractal_field(const FractalSpec& spec, glm::ivec2 size, glm::dvec2 cell_m,
-                                  const PassRunner& runner = run_in_parallel);
+                                  const PassRunner& runner = {});
 
 }  // namespace groundray

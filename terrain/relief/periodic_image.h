@@ -13,6 +13,6 @@ namespace groundray {
 /// row; pixel (0, 0) is centred on sample (0, 0). The filter is a tent as wide as two pixels or two
 /// samples, whichever is more: linear interpolation, or a mean where pixels are finer.
 std::vector<double> sample_periodic(const ImageF& image, glm::ivec2 size, glm::ivec2 copies,
-                                    const PassRunner& runner = run_in_parallel);
+                                    const PassRunner& runner = {});
 
 }  // namespace groundray

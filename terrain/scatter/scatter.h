@@ -77,8 +77,7 @@ class Scatter {
   /// error of at most 2e-4.
   /// @throws Error for more than max_placements plants or 1e9 darts, or if samples of the ground
   ///         cannot be read.
-  std::vector<Placement> placements(const Area& area = {},
-                                    const PassRunner& runner = run_in_parallel) const;
+  std::vector<Placement> placements(const Area& area = {}, const PassRunner& runner = {}) const;
 
  private:
   struct Impl;

@@ -103,7 +103,7 @@ struct PassClock {
   double begin_s = 0;
 
   PassRunner runner() {
-    return [this](std::size_t count, const auto& work) {
+    return [this](std::size_t count, const PassRunner::Work& work) {
       if (passes++ == skipped) begin_s = processor_s();
       run_in_parallel(count, work);
     };

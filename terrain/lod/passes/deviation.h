@@ -18,6 +18,8 @@ namespace groundray::passes {
 /// Deviations of the nodes of one level, as far as a window of samples shows them. An index is a
 /// run of nodes in a row, or one of several bands of rows of one node.
 struct DeviationPass {
+  static constexpr char name[] = "DeviationPass";
+
   HeightWindow samples;
   Points points;
   LevelGrid grid;

@@ -13,38 +13,45 @@
 
 namespace groundray::passes {
 
-/// Calls `act` with the three points of each triangle of a block, counter-clockwise as seen from
-/// above with columns to the east and rows to the south.
+/// Calls `act` with the three points of each triangle of a row of cells, counter-clockwise as seen
+/// from above with columns to the east and rows to the south. Points lie in rows `row` to `row`
+/// + 2.
 template <typename Act>
-void for_each_triangle(const ThinnedBlock& block, const Act& act) noexcept {
-  for (int row = 0; row < block.cells.y; ++row) {
-    for (int column = 0; column < block.cells.x; ++column) {
-      glm::ivec2 north_west{column, row};
-      glm::ivec2 north_east{column + 1, row};
-      glm::ivec2 south_west{column, row + 1};
-      glm::ivec2 south_east{column + 1, row + 1};
-      // Two halves that share an omitted point along the boundary are one triangle, emitted with
-      // the first of them.
-      if (!block.splits_along_main(column, row)) {
-        if (!block.drops(column, row)) act(north_west, south_west, north_east);
-        if (block.drops(column + 1, row + 1)) {
-          (row + 1 == block.cells.y ? south_east.x : south_east.y) += 1;
-        }
-        act(south_east, north_east, south_west);
-      } else {
-        const bool drops_south_west = block.drops(column, row + 1);
-        if (drops_south_west && column == 0) south_west.y += 1;
-        if (!drops_south_west || column == 0) act(north_west, south_west, south_east);
-        const bool drops_north_east = block.drops(column + 1, row);
-        if (drops_north_east && row == 0) north_east.x += 1;
-        if (!drops_north_east || row == 0) act(north_east, north_west, south_east);
+void for_each_triangle_of_row(const ThinnedBlock& block, int row, const Act& act) noexcept {
+  for (int column = 0; column < block.cells.x; ++column) {
+    glm::ivec2 north_west{column, row};
+    glm::ivec2 north_east{column + 1, row};
+    glm::ivec2 south_west{column, row + 1};
+    glm::ivec2 south_east{column + 1, row + 1};
+    // Two halves that share an omitted point along the boundary are one triangle, emitted with
+    // the first of them.
+    if (!block.splits_along_main(column, row)) {
+      if (!block.drops(column, row)) act(north_west, south_west, north_east);
+      if (block.drops(column + 1, row + 1)) {
+        (row + 1 == block.cells.y ? south_east.x : south_east.y) += 1;
       }
+      act(south_east, north_east, south_west);
+    } else {
+      const bool drops_south_west = block.drops(column, row + 1);
+      if (drops_south_west && column == 0) south_west.y += 1;
+      if (!drops_south_west || column == 0) act(north_west, south_west, south_east);
+      const bool drops_north_east = block.drops(column + 1, row);
+      if (drops_north_east && row == 0) north_east.x += 1;
+      if (!drops_north_east || row == 0) act(north_east, north_west, south_east);
     }
   }
 }
 
+/// Calls `act` with the three points of each triangle of a block.
+template <typename Act>
+void for_each_triangle(const ThinnedBlock& block, const Act& act) noexcept {
+  for (int row = 0; row < block.cells.y; ++row) for_each_triangle_of_row(block, row, act);
+}
+
 /// Writes the index of each leaf in the list to its node.
 struct NumberLeavesPass {
+  static constexpr char name[] = "NumberLeavesPass";
+
   LeafTree tree;
 
   void operator()(std::size_t index) const noexcept {
@@ -59,6 +66,8 @@ struct NumberLeavesPass {
 /// Marks the points of each leaf with holes that are vertices of triangles, its own or its
 /// neighbours': one bit per point.
 struct MarkVerticesPass {
+  static constexpr char name[] = "MarkVerticesPass";
+
   LeafTree tree;
   const std::uint32_t* holed;  ///< indices in the list of the leaves with holes
   std::uint64_t* marks;
@@ -103,6 +112,8 @@ struct MarkVerticesPass {
 
 /// Counts the vertices that each leaf owns, and its triangles.
 struct CountMeshPass {
+  static constexpr char name[] = "CountMeshPass";
+
   LeafTree tree;
   const std::uint64_t* marks;    ///< of the leaves with holes
   const std::uint32_t* mark_of;  ///< index of each leaf among the leaves with holes
@@ -127,6 +138,8 @@ struct CountMeshPass {
 
 /// Writes the vertices that each leaf owns.
 struct EmitVerticesPass {
+  static constexpr char name[] = "EmitVerticesPass";
+
   VertexNumbers numbers;
   glm::ivec2* vertices;
 
@@ -142,8 +155,11 @@ struct EmitVerticesPass {
   }
 };
 
-/// Writes the triangles of each leaf.
+/// Writes the triangles of each leaf. Keeps the vertex numbers of three rows of points, so that an
+/// index needs less than 2 kB of private memory.
 struct EmitTrianglesPass {
+  static constexpr char name[] = "EmitTrianglesPass";
+
   VertexNumbers numbers;
   const std::uint32_t* first;  ///< index of each leaf's first triangle
   bool is_mirrored = false;    ///< true if columns and rows run clockwise as seen from above
@@ -154,32 +170,31 @@ struct EmitTrianglesPass {
     const LeafTree& tree = numbers.tree;
     const LeafBlock leaf = tree.block_of(tree.leaves[index]);
     const bool has_holes = tree.leaves[index].has_holes;
-    std::uint32_t number[max_points];
-    for (int row = 0; row <= leaf.block.cells.y; ++row) {
-      for (int column = 0; column <= leaf.block.cells.x; ++column) {
-        if (leaf.block.drops(column, row)) continue;
-        if (has_holes && tree.is_missing(tree.sample(leaf, column, row))) continue;
-        number[place({column, row})] = numbers.of(index, leaf, {column, row});
-      }
-    }
+    std::uint32_t number[rows][Lattice::max_block_cells + 1];  // of row r: number[r % rows]
+    int next = 0;                                              // row whose points are numbered next
     std::size_t out = first[index];
-    for_each_triangle(leaf.block, [&](glm::ivec2 a, glm::ivec2 b, glm::ivec2 c) {
-      if (has_holes && !tree.has_all(leaf, a, b, c)) return;
-      const std::uint32_t i = number[place(a)];
-      const std::uint32_t j = number[place(b)];
-      const std::uint32_t k = number[place(c)];
-      triangles[out] = is_mirrored ? glm::uvec3{i, k, j} : glm::uvec3{i, j, k};
-      levels[out] = static_cast<std::uint8_t>(leaf.level);
-      ++out;
-    });
+    for (int row = 0; row < leaf.block.cells.y; ++row) {
+      for (; next <= leaf.block.cells.y && next < row + rows; ++next) {
+        for (int column = 0; column <= leaf.block.cells.x; ++column) {
+          if (leaf.block.drops(column, next)) continue;
+          if (has_holes && tree.is_missing(tree.sample(leaf, column, next))) continue;
+          number[next % rows][column] = numbers.of(index, leaf, {column, next});
+        }
+      }
+      for_each_triangle_of_row(leaf.block, row, [&](glm::ivec2 a, glm::ivec2 b, glm::ivec2 c) {
+        if (has_holes && !tree.has_all(leaf, a, b, c)) return;
+        const std::uint32_t i = number[a.y % rows][a.x];
+        const std::uint32_t j = number[b.y % rows][b.x];
+        const std::uint32_t k = number[c.y % rows][c.x];
+        triangles[out] = is_mirrored ? glm::uvec3{i, k, j} : glm::uvec3{i, j, k};
+        levels[out] = static_cast<std::uint8_t>(leaf.level);
+        ++out;
+      });
+    }
   }
 
  private:
-  static constexpr int max_points = (Lattice::max_block_cells + 1) * (Lattice::max_block_cells + 1);
-
-  int place(glm::ivec2 point) const noexcept {
-    return point.y * (numbers.tree.block_cells + 1) + point.x;
-  }
+  static constexpr int rows = 3;  // that a row of cells may refer to
 };
 
 }  // namespace groundray::passes

@@ -11,7 +11,6 @@
 #include "core/tracing/leaf.h"
 #include "terrain/lod/lattice.h"
 #include "terrain/lod/passes/border_thinning.h"
-#include "terrain/lod/quadtree.h"
 
 namespace groundray::passes {
 
@@ -105,8 +104,8 @@ struct LeafTree {
       const glm::ivec2 node{(cell.x >> level) / block_cells, (cell.y >> level) / block_cells};
       const std::size_t index = node_index(level, node);
       const std::uint8_t state = levels[level].state[index];
-      if ((state & Selection::IsLeaf) != 0) return levels[level].leaf[index];
-      level += (state & Selection::Split) != 0 ? -1 : 1;
+      if ((state & NodeState::IsLeaf) != 0) return levels[level].leaf[index];
+      level += (state & NodeState::Split) != 0 ? -1 : 1;
     }
   }
   /// Returns the leaf whose half-open square contains a sample.

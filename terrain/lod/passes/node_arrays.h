@@ -11,8 +11,8 @@ namespace groundray::passes {
 
 /// Window of nodes, divided into runs within rows; each run is one index of a pass.
 struct NodeRuns {
-  static constexpr int length = 64;
   glm::ivec2 size{0};
+  int length = 1;  ///< nodes in a run, at most
 
   struct Run {
     int row, begin, end;  ///< relative to the window's first node
@@ -91,6 +91,8 @@ struct NodeArrays {
 
 /// Joins the parts of each node.
 struct JoinPartsPass {
+  static constexpr char name[] = "JoinPartsPass";
+
   NodeArrays parts;
   NodeArrays nodes;
 
@@ -113,6 +115,8 @@ struct JoinPartsPass {
 /// Raises keys to those of the children, and extends the height ranges to theirs. An index is a run
 /// of nodes.
 struct SaturatePass {
+  static constexpr char name[] = "SaturatePass";
+
   NodeRuns runs;
   NodeArrays nodes;
   NodeArrays children;  ///< all children of the nodes

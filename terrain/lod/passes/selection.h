@@ -8,8 +8,8 @@
 #include <limits>
 
 #include "core/tracing/leaf.h"
+#include "terrain/lod/lattice.h"
 #include "terrain/lod/passes/node_arrays.h"
-#include "terrain/lod/quadtree.h"
 
 namespace groundray::passes {
 
@@ -89,6 +89,8 @@ struct WindowSpan {
 
 /// Determines which nodes of one level are split; requires the level below to be done.
 struct SplitPass {
+  static constexpr char name[] = "SplitPass";
+
   NodeRuns runs;
   NodeWindow nodes;
   StateWindow states;
@@ -109,10 +111,10 @@ struct SplitPass {
       const bool exceeds = bound.exceeds(nodes, at, node);
       const bool splits =
           can_split(node) && (exceeds || straddles(x, run.row) || children_ask_for_it(node));
-      out[x] = static_cast<std::uint8_t>((splits    ? Selection::Split
-                                          : exceeds ? Selection::Tight
+      out[x] = static_cast<std::uint8_t>((splits    ? NodeState::Split
+                                          : exceeds ? NodeState::Tight
                                                     : 0) |
-                                         (is_holed ? Selection::Holed : 0));
+                                         (is_holed ? NodeState::Holed : 0));
     }
   }
 
@@ -130,7 +132,7 @@ struct SplitPass {
     const int last = nodes.first.x + run.end;
     const int row = nodes.first.y + run.row;
     return !children.any_has(2 * first - 1, 2 * last + 1, 2 * row - 1, 2 * row + 2,
-                             Selection::Split | Selection::Tight);
+                             NodeState::Split | NodeState::Tight);
   }
 
   bool can_split(glm::ivec2 node) const noexcept {
@@ -154,7 +156,7 @@ struct SplitPass {
     const int own = get(x, y) | get(x + 1, y) | get(x, y + 1) | get(x + 1, y + 1);
     const int others = get(x, y - 1) | get(x + 1, y - 1) | get(x, y + 2) | get(x + 1, y + 2) |
                        get(x - 1, y) | get(x - 1, y + 1) | get(x + 2, y) | get(x + 2, y + 1);
-    return ((own & Selection::Split) | (others & (Selection::Split | Selection::Tight))) != 0;
+    return ((own & NodeState::Split) | (others & (NodeState::Split | NodeState::Tight))) != 0;
   }
   int get(int x, int y) const noexcept {
     return x < 0 || y < 0 || x >= children.size.x || y >= children.size.y ? 0 : children.row(y)[x];
@@ -163,6 +165,8 @@ struct SplitPass {
 
 /// Determines the leaves of one level and their thinned sides; requires the splits of all levels.
 struct LeafPass {
+  static constexpr char name[] = "LeafPass";
+
   NodeRuns runs;
   StateWindow states;
   StateWindow parents;   ///< empty at the top level
@@ -175,12 +179,12 @@ struct LeafPass {
     if (!any_exists(states.first.x + run.begin, states.first.x + run.end, row)) return;
     for (int x = run.begin; x < run.end; ++x) {
       const int column = states.first.x + x;
-      if ((out[x] & Selection::Split) != 0 || !exists(column, row)) continue;
+      if ((out[x] & NodeState::Split) != 0 || !exists(column, row)) continue;
       const bool north = row > 0 && !exists(column, row - 1);
       const bool south = row + 1 < all_nodes.y && !exists(column, row + 1);
       const bool west = column > 0 && !exists(column - 1, row);
       const bool east = column + 1 < all_nodes.x && !exists(column + 1, row);
-      out[x] = static_cast<std::uint8_t>(out[x] | Selection::IsLeaf | (north ? Leaf::North : 0) |
+      out[x] = static_cast<std::uint8_t>(out[x] | NodeState::IsLeaf | (north ? Leaf::North : 0) |
                                          (east ? Leaf::East : 0) | (south ? Leaf::South : 0) |
                                          (west ? Leaf::West : 0));
     }
@@ -188,11 +192,11 @@ struct LeafPass {
 
  private:
   bool exists(int column, int row) const noexcept {
-    return parents.state == nullptr || (parents.at(column / 2, row / 2) & Selection::Split) != 0;
+    return parents.state == nullptr || (parents.at(column / 2, row / 2) & NodeState::Split) != 0;
   }
   bool any_exists(int begin, int end, int row) const noexcept {
     return parents.state == nullptr ||
-           parents.any_has(begin / 2, (end + 1) / 2, row / 2, row / 2, Selection::Split);
+           parents.any_has(begin / 2, (end + 1) / 2, row / 2, row / 2, NodeState::Split);
   }
 };
 

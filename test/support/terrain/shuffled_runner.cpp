@@ -11,7 +11,7 @@
 namespace groundray::testing {
 
 PassRunner shuffled_runner(Seed seed) {
-  return [seed](std::size_t count, const auto& work) {
+  return [seed](std::size_t count, const PassRunner::Work& work) {
     std::vector<std::size_t> order(count);
     std::iota(order.begin(), order.end(), std::size_t{0});
     // Fisher-Yates.
@@ -25,7 +25,7 @@ PassRunner shuffled_runner(Seed seed) {
 }
 
 PassRunner threaded_runner(int count) {
-  return [count](std::size_t size, const auto& work) {
+  return [count](std::size_t size, const PassRunner::Work& work) {
     const tbb::global_control limit(tbb::global_control::max_allowed_parallelism,
                                     static_cast<std::size_t>(count));
     tbb::task_arena arena(count);  // `count` threads, for any number of processors

@@ -69,7 +69,7 @@ void for_each_state(const Selection& selection, const Act& act) {
 std::set<Node> leaves_of(const Selection& selection) {
   std::set<Node> leaves;
   for_each_state(selection, [&](const Node& node, unsigned state) {
-    if ((state & Selection::IsLeaf) != 0) leaves.insert(node);
+    if ((state & NodeState::IsLeaf) != 0) leaves.insert(node);
   });
   return leaves;
 }
@@ -117,10 +117,10 @@ void expect_as_slow(const Known& known, const MeshBound& bound) {
   const Selection selection = select_nodes(known.lattice, known.windows, bound);
   EXPECT_EQ(leaves_of(selection), expected.leaves());
   for_each_state(selection, [&](const Node& node, unsigned state) {
-    if ((state & Selection::IsLeaf) == 0) return;
-    EXPECT_EQ(state & Selection::AllSides, coarser_sides(expected, known.lattice, node));
+    if ((state & NodeState::IsLeaf) == 0) return;
+    EXPECT_EQ(state & NodeState::AllSides, coarser_sides(expected, known.lattice, node));
     const float key = known.of(node).key_m[known.index(node)];
-    EXPECT_EQ((state & Selection::Holed) != 0, key == infinity || key < 0);
+    EXPECT_EQ((state & NodeState::Holed) != 0, key == infinity || key < 0);
   });
 }
 
@@ -165,9 +165,9 @@ TEST(Quadtree, WithCompleteWindowsEveryLeafKeepsItsBound) {
     for (const MeshBound& bound : some_bounds()) {
       const Selection selection = select_nodes(known.lattice, known.windows, bound);
       for_each_state(selection, [&](const Node& node, unsigned state) {
-        if ((state & Selection::IsLeaf) == 0) return;
-        const bool is_thinned = (state & Selection::AllSides) != 0;
-        if ((state & Selection::Tight) != 0) {
+        if ((state & NodeState::IsLeaf) == 0) return;
+        const bool is_thinned = (state & NodeState::AllSides) != 0;
+        if ((state & NodeState::Tight) != 0) {
           EXPECT_EQ(node.level, 0);
           EXPECT_FALSE(is_thinned);
         }
@@ -187,8 +187,8 @@ TEST(Quadtree, SmallerBoundSplitsEveryNodeThatALargerOneSplits) {
     int more = 0;
     for_each_state(coarse, [&](const Node& node, unsigned state) {
       const unsigned other = fine.levels[std::size_t(node.level)].at({node.column, node.row});
-      EXPECT_LE(state & Selection::Split, other & Selection::Split);
-      more += (other & Selection::Split) != (state & Selection::Split) ? 1 : 0;
+      EXPECT_LE(state & NodeState::Split, other & NodeState::Split);
+      more += (other & NodeState::Split) != (state & NodeState::Split) ? 1 : 0;
     });
     EXPECT_GT(more, 0);
   };
@@ -205,9 +205,9 @@ TEST(Quadtree, LeavesAreListedFineToCoarseRowByRowWithTheirDeviations) {
   std::vector<Leaf> expected;
   for_each_state(selection, [&](const Node& node, unsigned state) {
     const std::size_t at = known.index(node);
-    if ((state & Selection::IsLeaf) == 0 || known.of(node).low_m[at] == infinity) return;
+    if ((state & NodeState::IsLeaf) == 0 || known.of(node).low_m[at] == infinity) return;
     const int side = 2 << node.level;
-    const auto sides = static_cast<std::uint8_t>(state & Selection::AllSides);
+    const auto sides = static_cast<std::uint8_t>(state & NodeState::AllSides);
     expected.push_back({node.column * side, node.row * side, 1 << node.level, sides,
                         known.of(node).key_m[at] == infinity,
                         sides == 0 ? known.of(node).full_m[at] : known.of(node).deviation_m[at],

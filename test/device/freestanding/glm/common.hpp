@@ -1,0 +1,3 @@
+#pragma once
+
+#include <glm/vec2.hpp>
