@@ -1,3 +1,5 @@
+// find_boundary is by hand, in 40 lines: CGAL's extract_boundary_cycles returns holes that touch at
+// a vertex as a single cycle.
 #include "reconstruction/mesh/holes/mesh_boundary.h"
 
 #include <algorithm>
