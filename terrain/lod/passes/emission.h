@@ -170,26 +170,31 @@ struct EmitTrianglesPass {
     const LeafTree& tree = numbers.tree;
     const LeafBlock leaf = tree.block_of(tree.leaves[index]);
     const bool has_holes = tree.leaves[index].has_holes;
-    std::uint32_t number[rows][Lattice::max_block_cells + 1];  // of row r: number[r % rows]
-    int next = 0;                                              // row whose points are numbered next
+    std::uint32_t row_numbers[rows][Lattice::max_block_cells + 1];
+    std::uint32_t* at[rows] = {row_numbers[0], row_numbers[1], row_numbers[2]};  // from `row` on
+    int next = 0;  // row whose points are numbered next
     std::size_t out = first[index];
     for (int row = 0; row < leaf.block.cells.y; ++row) {
       for (; next <= leaf.block.cells.y && next < row + rows; ++next) {
         for (int column = 0; column <= leaf.block.cells.x; ++column) {
           if (leaf.block.drops(column, next)) continue;
           if (has_holes && tree.is_missing(tree.sample(leaf, column, next))) continue;
-          number[next % rows][column] = numbers.of(index, leaf, {column, next});
+          at[next - row][column] = numbers.of(index, leaf, {column, next});
         }
       }
       for_each_triangle_of_row(leaf.block, row, [&](glm::ivec2 a, glm::ivec2 b, glm::ivec2 c) {
         if (has_holes && !tree.has_all(leaf, a, b, c)) return;
-        const std::uint32_t i = number[a.y % rows][a.x];
-        const std::uint32_t j = number[b.y % rows][b.x];
-        const std::uint32_t k = number[c.y % rows][c.x];
+        const std::uint32_t i = at[a.y - row][a.x];
+        const std::uint32_t j = at[b.y - row][b.x];
+        const std::uint32_t k = at[c.y - row][c.x];
         triangles[out] = is_mirrored ? glm::uvec3{i, k, j} : glm::uvec3{i, j, k};
         levels[out] = static_cast<std::uint8_t>(leaf.level);
         ++out;
       });
+      std::uint32_t* const first_row = at[0];
+      at[0] = at[1];
+      at[1] = at[2];
+      at[2] = first_row;
     }
   }
 
