@@ -4,8 +4,9 @@
 
 FOLDERS lists, for each folder of a library, the folders whose headers it may include besides its
 own; an entry that nothing uses is an error. LIBRARIES lists where the headers of other libraries
-may be included. IN_PASSES lists what passes, which run on devices, may include. Public headers include only the standard library, GLM and {fmt}; PRIVATE lists the
-headers that may include more. Run at the root of the tree.
+may be included. IN_PASSES lists what passes, which run on devices, may include. Public headers
+include only the standard library, GLM and {fmt}; PRIVATE lists the headers that may include more.
+Run at the root of the tree.
 """
 
 import re

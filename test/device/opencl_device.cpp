@@ -151,11 +151,17 @@ void OpenClDevice::run(std::string_view name, std::span<const std::byte> bytes, 
   words.resize((words.size() + 7) / 8 * 8);
   const cl_ulong indices = count, host = reinterpret_cast<std::uintptr_t>(s.arrays.begin()),
                  size = s.arrays.size();
-  check(clSetKernelArg(kernel, 0, sizeof s.pass, &s.pass), "argument 0");
-  check(clSetKernelArg(kernel, 1, sizeof indices, &indices), "argument 1");
-  check(clSetKernelArg(kernel, 2, sizeof s.copy, &s.copy), "argument 2");
-  check(clSetKernelArg(kernel, 3, sizeof host, &host), "argument 3");
-  check(clSetKernelArg(kernel, 4, sizeof size, &size), "argument 4");
+  cl_uint argument = 0;
+  const auto set = [&]<typename Value>(const Value& value) {
+    check(clSetKernelArg(kernel, argument, sizeof(Value), static_cast<const void*>(&value)),
+          fmt::format("argument {}", argument));
+    ++argument;
+  };
+  set(s.pass);
+  set(indices);
+  set(s.copy);
+  set(host);
+  set(size);
   const std::size_t used = s.arrays.used();
   check(clEnqueueWriteBuffer(s.queue, s.pass, CL_TRUE, 0, words.size(), words.data(), 0, nullptr,
                              nullptr),

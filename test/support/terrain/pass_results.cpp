@@ -16,6 +16,7 @@ std::string difference(const std::vector<T>& found, const std::vector<T>& expect
   if (found.size() != expected.size())
     return fmt::format("{}: {} elements, not {}", what, found.size(), expected.size());
   for (std::size_t i = 0; i < found.size(); ++i) {
+    // NOLINTNEXTLINE(bugprone-suspicious-memory-comparison): tells 0 from -0, and NaNs apart
     if (std::memcmp(&found[i], &expected[i], sizeof(T)) != 0)
       return fmt::format("{}: element {}", what, i);
   }
