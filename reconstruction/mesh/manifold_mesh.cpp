@@ -49,30 +49,19 @@ std::size_t count_tangled_edges(const SurfaceMesh& surface) {
 
 ManifoldMesh cut_to_manifold(const TriangleMesh& mesh) {
   const std::vector<bool> is_dropped = find_repeats(mesh.triangles, mesh.vertices_m.size());
-  ManifoldMesh out;
-  std::vector<std::uint32_t> numbers(mesh.vertices_m.size(), none);
+  std::vector<glm::uvec3> triangles;
   for (std::size_t i = 0; i < mesh.triangles.size(); ++i) {
-    if (is_dropped[i]) continue;
-    out.shape.triangles.push_back(mesh.triangles[i]);
-    for (int k = 0; k < 3; ++k) numbers[mesh.triangles[i][k]] = 0;  // mark as used
+    if (!is_dropped[i]) triangles.push_back(mesh.triangles[i]);
   }
-  out.dropped = mesh.triangles.size() - out.shape.triangles.size();
-  for (std::uint32_t i = 0; i < numbers.size(); ++i) {
-    if (numbers[i] == none) continue;
-    numbers[i] = static_cast<std::uint32_t>(out.sources.size());
-    out.sources.push_back(i);
-  }
-  out.shape.vertices_m = picked(mesh.vertices_m, out.sources);
-  for (glm::uvec3& t : out.shape.triangles) t = {numbers[t.x], numbers[t.y], numbers[t.z]};
-  SurfaceMesh surface = to_surface(out.shape);
-  out.tangled_edges = count_tangled_edges(surface);
-  out.copies = separate_fans(surface);
-  if (out.copies > 0) {
-    RemainingMesh parted = remaining_mesh(surface);
-    out.shape = std::move(parted.mesh);
-    out.sources = picked(out.sources, parted.sources);
-  }
-  return out;
+  SurfaceMesh surface = to_surface(mesh.vertices_m, triangles);
+  const std::size_t tangled_edges = count_tangled_edges(surface), copies = separate_fans(surface);
+  surface.delete_isolated_vertices();
+  RemainingMesh remaining = remaining_mesh(surface);
+  return {.shape = std::move(remaining.mesh),
+          .sources = std::move(remaining.sources),
+          .tangled_edges = tangled_edges,
+          .dropped = mesh.triangles.size() - triangles.size(),
+          .copies = copies};
 }
 
 std::size_t separate_fans(SurfaceMesh& surface) {
@@ -84,7 +73,9 @@ std::size_t separate_fans(SurfaceMesh& surface) {
   for (const std::vector<SurfaceMesh::VertexHandle>& same : fans) {
     for (const SurfaceMesh::VertexHandle vertex : same) {
       surface.adjust_outgoing_halfedge(vertex);  // to the one that OpenMesh asks for
+      if (vertex == same.front()) continue;
       surface.data(vertex) = surface.data(same.front());
+      surface.copy_all_properties(same.front(), vertex);
     }
   }
   return surface.n_vertices() - vertices;

@@ -29,9 +29,9 @@ struct ManifoldMesh {
 /// than two, in opposite directions.
 ManifoldMesh cut_to_manifold(const TriangleMesh& mesh);
 
-/// Gives each fan of triangles at a vertex a vertex of its own, with the same source; the fan of
-/// the half-edge with the lowest number keeps the original. Added vertices follow the others.
-/// Returns their number.
+/// Gives each fan of triangles at a vertex a vertex of its own, with the same source and
+/// properties; the fan of the half-edge with the lowest number keeps the original. Added vertices
+/// follow the others. Returns their number.
 /// @param surface  without tagged triangles, which would count as fans.
 std::size_t separate_fans(SurfaceMesh& surface);
 

@@ -14,10 +14,4 @@ void check_columns(const MeasuredMesh& mesh, Violations& broken) {
   check("confidence", mesh.confidence.size());
 }
 
-MeasuredMesh picked_columns(const MeasuredMesh& mesh, const std::vector<std::uint32_t>& numbers) {
-  return {.sd_m = picked(mesh.sd_m, numbers),
-          .labels = picked(mesh.labels, numbers),
-          .confidence = picked(mesh.confidence, numbers)};
-}
-
 }  // namespace groundray

@@ -38,9 +38,6 @@ std::vector<Value> picked(const std::vector<Value>& values,
 /// Adds a violation for each attribute that does not have one value per vertex or none.
 void check_columns(const MeasuredMesh& mesh, Violations& broken);
 
-/// Returns some of the vertices' attributes, in the order of their numbers; without shape.
-MeasuredMesh picked_columns(const MeasuredMesh& mesh, const std::vector<std::uint32_t>& numbers);
-
 /// Numbers of items, grouped by bucket; ascending in each.
 struct Buckets {
   std::vector<std::uint32_t> begins;  ///< of each bucket, and the end of the last

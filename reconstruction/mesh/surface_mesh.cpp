@@ -84,6 +84,29 @@ void link_boundaries(SurfaceMesh& surface) {
   }
 }
 
+// Names of the vertices' properties.
+constexpr const char *sd_name = "sd_m", *label_name = "label", *confidence_name = "confidence";
+
+template <typename Value>
+void put_property(SurfaceMesh& surface, const char* name, const std::vector<Value>& values) {
+  if (values.empty()) return;
+  OpenMesh::VPropHandleT<Value> property;
+  surface.add_property(property, name);
+  for (const auto vertex : surface.vertices())
+    surface.property(property, vertex) = values[number_of(vertex)];
+}
+
+// Returns the values of a property at the vertices that were not deleted; none if it does not
+// exist.
+template <typename Value>
+std::vector<Value> property_of(const SurfaceMesh& surface, const char* name) {
+  std::vector<Value> values;
+  OpenMesh::VPropHandleT<Value> property;
+  if (!surface.get_property_handle(property, name)) return values;
+  for (const auto vertex : surface.vertices()) values.push_back(surface.property(property, vertex));
+  return values;
+}
+
 }  // namespace
 
 std::vector<bool> find_repeats(std::span<const glm::uvec3> triangles, std::size_t vertices) {
@@ -164,6 +187,21 @@ RemainingMesh remaining_mesh(const SurfaceMesh& surface) {
     out.mesh.triangles.emplace_back(out.numbers[t.x], out.numbers[t.y], out.numbers[t.z]);
   }
   return out;
+}
+
+SurfaceMesh to_surface(const MeasuredMesh& mesh) {
+  SurfaceMesh surface = to_surface(mesh.shape);
+  put_property(surface, sd_name, mesh.sd_m);
+  put_property(surface, label_name, mesh.labels);
+  put_property(surface, confidence_name, mesh.confidence);
+  return surface;
+}
+
+MeasuredMesh remaining_measured_mesh(const SurfaceMesh& surface) {
+  return {.shape = remaining_mesh(surface).mesh,
+          .sd_m = property_of<float>(surface, sd_name),
+          .labels = property_of<std::uint16_t>(surface, label_name),
+          .confidence = property_of<float>(surface, confidence_name)};
 }
 
 }  // namespace groundray

@@ -9,6 +9,7 @@
 #include <vector>
 
 #include "core/geometry/mesh.h"
+#include "reconstruction/mesh/measured_mesh.h"
 #include "reconstruction/mesh/mesh_arrays.h"
 
 // Let OpenMesh store positions as the rest of the library does: it takes any type of vector with
@@ -38,7 +39,6 @@ struct SurfaceTraits : OpenMesh::DefaultTraits {
   FaceAttributes(OpenMesh::Attributes::Status);
   VertexTraits {
     /// Number of the vertex in the mesh that the surface was made of; `none` if it was added since.
-    /// What was measured there (standard deviation, label, confidence) is found by it.
     std::uint32_t source = none;
   };
 };
@@ -106,6 +106,10 @@ inline SurfaceMesh to_surface(const TriangleMesh& mesh) {
   return to_surface(mesh.vertices_m, mesh.triangles);
 }
 
+/// Makes a surface of a measured mesh. The standard deviations, labels and confidences that the
+/// mesh has become properties of the vertices.
+SurfaceMesh to_surface(const MeasuredMesh& mesh);
+
 /// Vertices and triangles of a surface that were not deleted, in the same order.
 struct RemainingMesh {
   TriangleMesh mesh;                   ///< without levels
@@ -115,5 +119,8 @@ struct RemainingMesh {
 
 /// Returns what was not deleted from a surface.
 RemainingMesh remaining_mesh(const SurfaceMesh& surface);
+
+/// Returns what was not deleted from a surface made of a measured mesh, with its attributes.
+MeasuredMesh remaining_measured_mesh(const SurfaceMesh& surface);
 
 }  // namespace groundray

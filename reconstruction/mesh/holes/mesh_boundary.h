@@ -18,8 +18,8 @@ using BoundaryLoop = std::vector<SurfaceMesh::HalfedgeHandle>;
 /// Returns the vertices at which the half-edges of a loop begin.
 std::vector<std::uint32_t> vertices_of(const SurfaceMesh& surface, const BoundaryLoop& loop);
 
-/// Makes one boundary half-edge follow another, which begins where it ends, and joins those that
-/// were next to them.
+/// Sets the successor of a boundary half-edge: another that begins where it ends. Their former
+/// neighbours become neighbours of each other, so that all boundaries stay closed.
 void link(SurfaceMesh& surface, SurfaceMesh::HalfedgeHandle half_edge,
           SurfaceMesh::HalfedgeHandle next);
 

@@ -315,13 +315,12 @@ class Merging {
 };
 
 /// Converts a single scan to a manifold surface; no vertex moves.
-MergedMesh alone(const MeasuredMesh& mesh) {
-  TriangleMesh shape{mesh.shape.vertices_m, mesh.shape.triangles, {}};
-  const std::size_t left_out = drop_conflicts(shape.triangles, shape.vertices_m.size());
-  ManifoldMesh manifold = cut_to_manifold(shape);
-  MergedMesh out{.mesh = picked_columns(mesh, manifold.sources), .counts = {.left_out = left_out}};
-  out.mesh.shape = std::move(manifold.shape);
-  return out;
+MergedMesh alone(MeasuredMesh mesh) {
+  const std::size_t left_out = drop_conflicts(mesh.shape.triangles, mesh.shape.vertices_m.size());
+  SurfaceMesh surface = to_surface(mesh);
+  separate_fans(surface);
+  surface.delete_isolated_vertices();
+  return {.mesh = remaining_measured_mesh(surface), .counts = {.left_out = left_out}};
 }
 
 }  // namespace

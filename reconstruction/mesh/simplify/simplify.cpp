@@ -239,9 +239,9 @@ Simplified Simplifier::result_of(const RemainingMesh& remainder, HaltReason reas
 
 Simplified Simplifier::measured(Simplified result, TriangleMesh local) const {
   const MeasuredMesh& mesh = original_.mesh();
-  TriangleMesh shape = std::move(result.mesh.shape);
-  result.mesh = picked_columns(mesh, result.sources);
-  result.mesh.shape = std::move(shape);
+  result.mesh.sd_m = picked(mesh.sd_m, result.sources);
+  result.mesh.labels = picked(mesh.labels, result.sources);
+  result.mesh.confidence = picked(mesh.confidence, result.sources);
   if (!result.vertical && !original_.hangs_over() && overhanging_triangle(local) == none)
     result.vertical = vertical_error(original_.surface().mesh().vertices_m, local);
   result.error =

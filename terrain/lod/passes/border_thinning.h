@@ -43,4 +43,39 @@ constexpr ThinnedPair thinned_pair(Leaf::Side side) noexcept {
   }
 }
 
+/// Calls `act` with the three points of each triangle of a row of cells, counter-clockwise as seen
+/// from above with columns to the east and rows to the south. Points lie in rows `row` to `row`
+/// + 2.
+template <typename Act>
+void for_each_triangle_of_row(const ThinnedBlock& block, int row, const Act& act) noexcept {
+  for (int column = 0; column < block.cells.x; ++column) {
+    glm::ivec2 north_west{column, row};
+    glm::ivec2 north_east{column + 1, row};
+    glm::ivec2 south_west{column, row + 1};
+    glm::ivec2 south_east{column + 1, row + 1};
+    // Two halves that share an omitted point along the boundary are one triangle, emitted with
+    // the first of them.
+    if (!block.splits_along_main(column, row)) {
+      if (!block.drops(column, row)) act(north_west, south_west, north_east);
+      if (block.drops(column + 1, row + 1)) {
+        (row + 1 == block.cells.y ? south_east.x : south_east.y) += 1;
+      }
+      act(south_east, north_east, south_west);
+    } else {
+      const bool drops_south_west = block.drops(column, row + 1);
+      if (drops_south_west && column == 0) south_west.y += 1;
+      if (!drops_south_west || column == 0) act(north_west, south_west, south_east);
+      const bool drops_north_east = block.drops(column + 1, row);
+      if (drops_north_east && row == 0) north_east.x += 1;
+      if (!drops_north_east || row == 0) act(north_east, north_west, south_east);
+    }
+  }
+}
+
+/// Calls `act` with the three points of each triangle of a block.
+template <typename Act>
+void for_each_triangle(const ThinnedBlock& block, const Act& act) noexcept {
+  for (int row = 0; row < block.cells.y; ++row) for_each_triangle_of_row(block, row, act);
+}
+
 }  // namespace groundray::passes

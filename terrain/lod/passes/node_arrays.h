@@ -34,6 +34,34 @@ inline bool any_has(const std::uint8_t* states, int count, std::uint8_t bits) no
   return (all & bits) != 0;
 }
 
+/// States of the nodes of a window.
+struct StateWindow {
+  glm::ivec2 first{0};
+  glm::ivec2 size{0};
+  std::uint8_t* state = nullptr;
+
+  std::uint8_t* row(int row) const noexcept {
+    return state + static_cast<std::ptrdiff_t>(row) * size.x;
+  }
+  /// Returns the state of a node; 0 outside the window.
+  std::uint8_t at(int column, int row) const noexcept {
+    const int x = column - first.x;
+    const int y = row - first.y;
+    return x < 0 || y < 0 || x >= size.x || y >= size.y ? 0 : this->row(y)[x];
+  }
+  /// Returns whether any node in columns [begin, end) and rows first_row to last_row has any of
+  /// `bits`.
+  bool any_has(int begin, int end, int first_row, int last_row, std::uint8_t bits) const noexcept {
+    const int x = std::max(begin - first.x, 0);
+    const int count = std::min(end - first.x, size.x) - x;
+    for (int y = std::max(first_row - first.y, 0); y <= std::min(last_row - first.y, size.y - 1);
+         ++y) {
+      if (passes::any_has(row(y) + x, count, bits)) return true;
+    }
+    return false;
+  }
+};
+
 /// Keys of nodes before saturation that are not deviations. Unknown: no window has been added yet.
 inline constexpr float unknown_key = -std::numeric_limits<float>::infinity();
 inline constexpr float empty_key = -1;  ///< no sample has a height

@@ -197,6 +197,22 @@ TEST(SeparateFans, GivesEachFanAVertex) {
   expect_sound(surface);
 }
 
+TEST(SeparateFans, CopiesWhatWasMeasured) {
+  MeasuredMesh mesh{
+      .shape = some_points(6), .sd_m = {0, 1, 2, 3, 4, 5}, .labels = {0, 1, 2, 3, 4, 5}};
+  mesh.shape.triangles = {{1, 2, 3}, {3, 4, 5}};  // they touch at 3; nothing uses 0
+  SurfaceMesh surface = to_surface(mesh);
+  EXPECT_EQ(separate_fans(surface), 1u);
+  surface.delete_isolated_vertices();
+  const MeasuredMesh parted = remaining_measured_mesh(surface);
+  EXPECT_THAT(parted.sd_m, ElementsAre(1, 2, 3, 4, 5, 3));
+  EXPECT_THAT(parted.labels, ElementsAre(1, 2, 3, 4, 5, 3));
+  EXPECT_TRUE(parted.confidence.empty());
+  for (std::size_t i = 0; i < parted.sd_m.size(); ++i)
+    EXPECT_EQ(parted.shape.vertices_m[i], mesh.shape.vertices_m[parted.labels[i]]);
+  EXPECT_EQ(parted.shape.triangles.size(), 2u);
+}
+
 TEST(DropConflicts, AndSeparateFansMakeASurfaceOfAnyTriangles) {
   std::mt19937_64 random(1);
   for (int i = 0; i < 200; ++i) {

@@ -8,21 +8,20 @@
 #include <algorithm>
 #include <cmath>
 #include <cstdlib>
-#include <filesystem>
 #include <functional>
 #include <glm/geometric.hpp>
 #include <numbers>
+#include <optional>
 #include <random>
 #include <stdexcept>
 #include <string>
 #include <vector>
 
 #include "core/error.h"
-#include "core/model/mesh_reader.h"
 #include "reconstruction/mesh/holes/hole_patch.h"
 #include "test/support/margin.h"
 #include "test/support/scans/solid.h"
-#include "test/support/temporary_folder.h"
+#include "test/support/scans/stanford_bunny.h"
 #include "test/support/terrain/surface_check.h"
 
 namespace groundray::hole_fill_test {
@@ -425,14 +424,9 @@ TEST(HoleFill, ReportsProgressAndStopsOnRequest) {
 }
 
 TEST(HoleFill, ClosesTheBunny) {
-  const auto packed = testing::shared_data_folder() / "mesh/stanford_bunny_scans/bun_zipper.ply.gz";
-  if (!std::filesystem::exists(packed))
-    GTEST_SKIP() << "there is no " << packed << "; set GROUNDRAY_SHARED_DATA";
-  const testing::TemporaryFolder folder;
-  const std::string gunzip =
-      fmt::format("gunzip -c '{}' > '{}'", packed.string(), (folder / "bunny.ply").string());
-  ASSERT_EQ(std::system(gunzip.c_str()), 0);
-  const TriangleMesh open = read_mesh(folder / "bunny.ply").mesh;
+  const std::optional<TriangleMesh> bunny = testing::stanford_bunny();
+  if (!bunny) GTEST_SKIP() << testing::no_bunny;
+  const TriangleMesh& open = *bunny;
   const FilledMesh out = filled(open, 1);
   expect_sound(out, open);
   EXPECT_EQ(out.filled.size(), 5u) << "three where it stood, two larger ones beneath";

@@ -4,18 +4,17 @@
 #include <algorithm>
 #include <array>
 #include <cmath>
-#include <cstdlib>
-#include <filesystem>
 #include <glm/geometric.hpp>
+#include <optional>
 #include <string>
 #include <vector>
 
 #include "core/geometry/height_grid.h"
-#include "core/model/mesh_reader.h"
 #include "reconstruction/mesh/accuracy/accuracy.h"
 #include "reconstruction/mesh/simplify/lindstrom_turk.h"
 #include "terrain/dem/dem_io.h"
 #include "test/support/margin.h"
+#include "test/support/scans/stanford_bunny.h"
 #include "test/support/temporary_folder.h"
 #include "test/support/terrain/sample_terrain.h"
 #include "test/support/terrain/surface_check.h"
@@ -98,14 +97,9 @@ TEST(LindstromTurkProof, IsAsAccurateAsCgalOnAFractal) {
 }
 
 TEST(LindstromTurkProof, IsAsAccurateAsCgalOnTheBunny) {
-  const auto packed = testing::shared_data_folder() / "mesh/stanford_bunny_scans/bun_zipper.ply.gz";
-  if (!std::filesystem::exists(packed))
-    GTEST_SKIP() << "there is no " << packed << "; set GROUNDRAY_SHARED_DATA";
-  const testing::TemporaryFolder folder;
-  const std::string gunzip =
-      fmt::format("gunzip -c '{}' > '{}'", packed.string(), (folder / "bunny.ply").string());
-  ASSERT_EQ(std::system(gunzip.c_str()), 0);
-  const TriangleMesh mesh = read_mesh(folder / "bunny.ply").mesh;
+  const std::optional<TriangleMesh> bunny = testing::stanford_bunny();
+  if (!bunny) GTEST_SKIP() << testing::no_bunny;
+  const TriangleMesh& mesh = *bunny;
   const ReducedMesh reduced = reduce(mesh, mesh.triangles.size() / 50);
   EXPECT_EQ(testing::euler_number(reduced.mesh), testing::euler_number(mesh));
   constexpr double diagonal_m = 0.2502;  // of the bounding box

@@ -3,17 +3,16 @@
 
 #include <cmath>
 #include <ctime>
-#include <fstream>
 #include <glm/geometric.hpp>
+#include <optional>
 #include <random>
 #include <utility>
 
-#include "core/model/mesh_reader.h"
 #include "core/model/model.h"
 #include "reconstruction/mesh/simplify/simplify.h"
 #include "terrain/dem/dem_io.h"
-#include "test/support/gzip_file.h"
 #include "test/support/margin.h"
+#include "test/support/scans/stanford_bunny.h"
 #include "test/support/temporary_folder.h"
 #include "test/support/terrain/plan_check.h"
 #include "test/support/terrain/sample_terrain.h"
@@ -94,12 +93,9 @@ TEST(SimplifyProof, FractalTerrainNeedsFewTriangles) {
 }
 
 TEST(SimplifyProof, ARealScanIsWithinTheBoundInBothDirections) {
-  const auto packed = testing::shared_data_folder() / "mesh/stanford_bunny_scans/bun_zipper.ply.gz";
-  if (!std::filesystem::exists(packed))
-    GTEST_SKIP() << "there is no " << packed << "; set GROUNDRAY_SHARED_DATA";
-  const testing::TemporaryFolder folder;
-  std::ofstream(folder / "bunny.ply", std::ios::binary) << testing::read_gzip(packed);
-  const TriangleMesh bunny = read_mesh(folder / "bunny.ply").mesh;
+  const std::optional<TriangleMesh> found = testing::stanford_bunny();
+  if (!found) GTEST_SKIP() << testing::no_bunny;
+  const TriangleMesh& bunny = *found;
   const ModelBounds bounds = bounds_of(bunny);
   const double diagonal_m = glm::length(bounds.high_m - bounds.low_m);
   struct Case {
