@@ -11,6 +11,7 @@ from concurrent.futures import ThreadPoolExecutor
 import pytest
 import yaml
 from export_runs import PACKAGE, export, fails, names_in, run_folder
+from groundray.export import clouds
 
 FORMS = ["kitti", "semantic-kitti", "tum", "pcd", "las", "laz", "npz", "mcap"]
 COMMAND = [sys.executable, "-m", "groundray.export.command"]
@@ -231,9 +232,28 @@ def test_an_interrupted_export_leaves_no_files(long_run, stop):
             time.sleep(0.01)
         process.send_signal(stop)
         _, reported = process.communicate(timeout=60)
-    assert process.returncode == 130
     assert reported == "groundray-export: interrupted; nothing was written\n"
+    assert process.returncode == 130
     assert names_in(long_run.parent) == ["run"]
+
+
+@pytest.mark.parametrize("stop", [signal.SIGINT, signal.SIGTERM])
+def test_an_interrupt_that_a_library_turns_into_its_own_error_is_one(
+    tmp_path, capsys, monkeypatch, stop
+):
+    class LibraryError(Exception):
+        pass
+
+    def write(*_):
+        try:
+            os.kill(os.getpid(), stop)
+        except KeyboardInterrupt as raised:
+            raise LibraryError from raised
+
+    monkeypatch.setattr(clouds, "write_npz", write)
+    assert export("npz", tmp_path / "out") == 130
+    assert capsys.readouterr().err == "groundray-export: interrupted; nothing was written\n"
+    assert names_in(tmp_path) == []
 
 
 def test_the_sigterm_handler_of_the_caller_is_restored(tmp_path, capsys):

@@ -255,34 +255,53 @@ def _written_aside(out: Path, dataset: Path) -> Iterator[Path]:
                 each.rmdir()
 
 
-def _interrupt(_signal: int, _frame: FrameType | None) -> None:
-    raise KeyboardInterrupt
+class _Interrupts:
+    """Raises KeyboardInterrupt on SIGINT and SIGTERM, and notes that one came.
 
+    The note matters because compiled libraries (lazrs, for one) turn the exceptions of the Python
+    code that they call into exceptions of their own.
+    """
 
-@contextmanager
-def _sigterm_interrupts() -> Iterator[None]:
-    """Handles SIGTERM as Ctrl-C, if called in the main thread; restores the handler at the end."""
-    if threading.current_thread() is not threading.main_thread():
-        yield
-        return
-    before = signal.signal(signal.SIGTERM, _interrupt)
-    try:
-        yield
-    finally:
-        signal.signal(signal.SIGTERM, before)
+    def __init__(self) -> None:
+        self.came = False
+
+    def _interrupt(self, _signal: int, _frame: FrameType | None) -> None:
+        self.came = True
+        raise KeyboardInterrupt
+
+    @contextmanager
+    def raised(self) -> Iterator[None]:
+        """Handles both signals within, if in the main thread; restores the handlers at the end."""
+        if threading.current_thread() is not threading.main_thread():
+            yield
+            return
+        numbers = (signal.SIGINT, signal.SIGTERM)
+        before = [signal.signal(number, self._interrupt) for number in numbers]
+        try:
+            yield
+        finally:
+            for number, handler in zip(numbers, before, strict=True):
+                signal.signal(number, handler)
 
 
 def _guarded(work: Callable[[], str]) -> tuple[int, str]:
     """Runs work; returns the exit code and a message."""
+    interrupts = _Interrupts()
+    interrupted = INTERRUPTED, "interrupted; nothing was written"
     try:
-        return DONE, work()
+        with interrupts.raised():
+            return DONE, work()
     except KeyboardInterrupt:
-        return INTERRUPTED, "interrupted; nothing was written"
-    except Error as fault:
-        return FAILED, str(fault)
-    except OSError as fault:
-        place = f"{fault.filename}: " if fault.filename else ""
-        return FAILED, f"{place}{fault.strerror or fault}; nothing was written"
+        return interrupted
+    except Exception as fault:
+        if interrupts.came:
+            return interrupted
+        if isinstance(fault, Error):
+            return FAILED, str(fault)
+        if isinstance(fault, OSError):
+            place = f"{fault.filename}: " if fault.filename else ""
+            return FAILED, f"{place}{fault.strerror or fault}; nothing was written"
+        raise
 
 
 def main(arguments: Sequence[str] | None = None) -> int:
@@ -300,8 +319,7 @@ def main(arguments: Sequence[str] | None = None) -> int:
         with _written_aside(options.output, options.dataset) as folder:
             return _export(options, folder, dataset, notes)
 
-    with _sigterm_interrupts():
-        code, told = _guarded(work)
+    code, told = _guarded(work)
     if code != DONE:
         print(f"groundray-export: {told}", file=sys.stderr)
         return code
