@@ -2,6 +2,8 @@
 
 #include <utility>
 
+#include "core/geometry/surface_height.h"
+
 namespace groundray {
 
 Ground::Ground(const HeightGrid& grid)

@@ -1,9 +1,6 @@
 #pragma once
 
-#include <algorithm>
-#include <cmath>
 #include <cstdint>
-#include <optional>
 
 #include "core/geometry/grid_frame.h"
 
@@ -52,21 +49,5 @@ struct Cell {
     return {corner_m - (u_slope_m * column + v_slope_m * row), u_slope_m, v_slope_m};
   }
 };
-
-/// Returns the height at `p` (D, metres) of a surface whose cells are those of the DEM; nothing
-/// outside the DEM or in a hole.
-/// @param cell_at  returns the cell whose first sample is (column, row).
-template <typename CellAt>
-std::optional<double> surface_height_m(const GridFrame& frame, glm::dvec2 p,
-                                       const CellAt& cell_at) {
-  const glm::dvec2 at = frame.to_grid(p);
-  const glm::ivec2 last = frame.samples - 1;
-  if (!(0 <= at.x && at.x <= last.x && 0 <= at.y && at.y <= last.y)) return std::nullopt;
-  const Cell cell = cell_at(std::min(static_cast<int>(at.x), last.x - 1),
-                            std::min(static_cast<int>(at.y), last.y - 1));
-  const FacetPlane plane = cell.plane(cell.half_at(at.x, at.y));
-  const double height_m = plane.height_m + plane.u_slope_m * at.x + plane.v_slope_m * at.y;
-  return std::isnan(height_m) ? std::nullopt : std::optional(height_m);
-}
 
 }  // namespace groundray

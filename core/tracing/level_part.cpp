@@ -9,7 +9,6 @@
 
 #include "core/error.h"
 #include "core/tracing/device.h"
-#include "core/tracing/leaf_cells.h"
 #include "core/tracing/level_scene.h"
 #include "core/tracing/level_surface.h"
 
@@ -60,16 +59,31 @@ void write_points(const LeafCells& cells, const LevelScene::Impl& level, glm::ve
     for (int i = 0; i <= cells.columns; ++i) {
       const float height_m = cells.height_m({i, j});
       *out++ = glm::vec3(
-          point_L(level, cells.column(i), cells.row(j), std::isnan(height_m) ? 0 : height_m));
+          level.point_L(cells.column(i), cells.row(j), std::isnan(height_m) ? 0 : height_m));
     }
   }
+}
+
+// Returns the cells [low, high) that are neither narrower nor adjacent to a thinned side; none if
+// the leaf has holes.
+std::pair<glm::ivec2, glm::ivec2> ordinary_cells(const LeafCells& cells) {
+  const Leaf& leaf = cells.leaf;
+  if (leaf.has_holes) return {glm::ivec2(0), glm::ivec2(0)};
+  const auto [columns, rows] = std::pair(cells.columns, cells.rows);
+  const bool narrow_x = cells.column(columns) - cells.column(columns - 1) < leaf.step;
+  const bool narrow_y = cells.row(rows) - cells.row(rows - 1) < leaf.step;
+  const auto inset = [&](Leaf::Side side, bool narrow) {
+    return cells.block.thins(side) || narrow ? 1 : 0;
+  };
+  return {{inset(Leaf::West, false), inset(Leaf::North, false)},
+          {columns - inset(Leaf::East, narrow_x), rows - inset(Leaf::South, narrow_y)}};
 }
 
 void add_leaf(const LeafCells& cells, unsigned first_point, LevelPart& out,
               Primitives& primitives) {
   const Leaf& leaf = cells.leaf;
   const auto stride = static_cast<unsigned>(cells.columns + 1);
-  const auto [low, high] = cells.ordinary();
+  const auto [low, high] = ordinary_cells(cells);
   const glm::ivec2 size = glm::max(high - low, 0);
   const bool has_grid = size.x > 0 && size.y > 0;
   if (has_grid) {
@@ -87,7 +101,7 @@ void add_leaf(const LeafCells& cells, unsigned first_point, LevelPart& out,
         i = high.x - 1;  // covered by the grid
         continue;
       }
-      const Cell cell = cells.level.cell_at(leaf, cells.exponent, cells.column(i), cells.row(j));
+      const Cell cell = cells.cell(i, j);
       const bool other_split = cell.split != Cell::Split::NorthEastToSouthWest;
       add_triangle(cells, first_point, {i, j}, Half::Near, other_split, out, primitives);
       add_triangle(cells, first_point, {i, j}, Half::Far, other_split, out, primitives);
@@ -159,8 +173,8 @@ void leaf_bounds(const RTCBoundsFunctionArguments* arguments) {
       high_m = std::max(high_m, cells.height_m({i, j}));
     }
   }
-  const glm::dvec3 a = point_L(level, cells.column(0), cells.row(0), low_m);
-  const glm::dvec3 b = point_L(level, cells.column(cells.columns), cells.row(cells.rows), high_m);
+  const glm::dvec3 a = level.point_L(cells.column(0), cells.row(0), low_m);
+  const glm::dvec3 b = level.point_L(cells.column(cells.columns), cells.row(cells.rows), high_m);
   const glm::vec3 low = glm::vec3(glm::min(a, b)) - part.slack_m;
   const glm::vec3 high = glm::vec3(glm::max(a, b)) + part.slack_m;
   RTCBounds& bounds = *arguments->bounds_o;
@@ -176,10 +190,7 @@ void leaf_bounds(const RTCBoundsFunctionArguments* arguments) {
 void intersect_leaf(const RTCIntersectFunctionNArguments* arguments) {
   const auto& part = *static_cast<const LevelPart*>(arguments->geometryUserPtr);
   const auto& query = *reinterpret_cast<const ExactQuery*>(arguments->context);
-  const LevelPart::Area& area = part.areas[arguments->primID];
-  constexpr double rim = 0.5;  // margin, in cells of the DEM
-  const glm::dvec2 low = glm::dvec2(area.first) - rim;
-  const glm::dvec2 high = glm::dvec2(area.last) + rim;
+  const Leaf& leaf = part.leaves[arguments->primID];
   RTCRayN* const rays = RTCRayHitN_RayN(arguments->rayhit, arguments->N);
   RTCHitN* const hits = RTCRayHitN_HitN(arguments->rayhit, arguments->N);
   for (unsigned i = 0; i < arguments->N; ++i) {
@@ -187,14 +198,9 @@ void intersect_leaf(const RTCIntersectFunctionNArguments* arguments) {
     const unsigned lane = RTCRayN_id(rays, arguments->N, i);
     const LevelRay& ray = query.rays[lane];
     Crossing& best = query.crossings[lane];
-    double begin_m = ray.enter_m;
-    double end_m = std::min(ray.leave_m, best.range_m);
-    clip_range(ray.grid.u0, ray.grid.du, low.x, high.x, begin_m, end_m);
-    clip_range(ray.grid.v0, ray.grid.dv, low.y, high.y, begin_m, end_m);
-    if (!(begin_m <= end_m)) continue;
-    const auto crossing = query.surface->first_crossing(ray.grid, begin_m, end_m);
-    if (!crossing || !(crossing->range_m < best.range_m)) continue;
-    best = *crossing;
+    const double before_m = best.range_m;
+    query.surface->hit(ray.facet, leaf, best);
+    if (!(best.range_m < before_m)) continue;
     // tfar only prunes: it may exceed the true range slightly, but is never less.
     float& far_m = RTCRayN_tfar(rays, arguments->N, i);
     far_m = std::min(far_m, far_float(best.range_m - ray.enter_m, part.slack_m));
@@ -205,11 +211,6 @@ void intersect_leaf(const RTCIntersectFunctionNArguments* arguments) {
 
 void build_exact_part(const LevelScene::Impl& level, LevelPart& part) {
   part.built_for = &level;
-  for (const Leaf& leaf : part.leaves) {
-    const LeafCells cells{level, leaf};
-    part.areas.push_back(
-        {{cells.column(0), cells.row(0)}, {cells.column(cells.columns), cells.row(cells.rows)}});
-  }
   attach_primitives(level.device, part.scene, block_geometry, part.leaves.size(), &part,
                     leaf_bounds, intersect_leaf);
 }

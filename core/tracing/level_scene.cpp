@@ -11,7 +11,6 @@
 #include <utility>
 
 #include "core/tracing/device.h"
-#include "core/tracing/leaf_cells.h"
 
 namespace groundray {
 namespace {
@@ -24,8 +23,7 @@ std::size_t count_triangles(const LeafCells& cells) {
     for (int i = 0; i <= cells.columns; ++i) {
       count -= cells.drops({i, j}) ? 1 : 0;
       if (!cells.leaf.has_holes || i == cells.columns || j == cells.rows) continue;
-      const Cell cell =
-          cells.level.cell_at(cells.leaf, cells.exponent, cells.column(i), cells.row(j));
+      const Cell cell = cells.cell(i, j);
       for (const Half half : {Half::Near, Half::Far})
         count -= std::isnan(cell.plane(half).height_m) ? 1 : 0;
     }
@@ -35,22 +33,28 @@ std::size_t count_triangles(const LeafCells& cells) {
 
 void map_leaves(LevelScene::Impl& level) {
   const Level& in = level.level;
+  level.first = in.first;
   level.last = glm::min(in.first + (in.heights.size() - 1) * in.step, in.frame.samples - 1);
+  level.points = in.heights.size();
+  level.heights_m = in.heights.heights_m().data();
+  level.leaf_cells = in.leaf_cells;
+  level.leaves = in.leaves.data();
   level.step_exponent = std::countr_zero(static_cast<unsigned>(in.step));
   level.block_exponent =
       level.step_exponent + std::countr_zero(static_cast<unsigned>(in.leaf_cells));
   const int side = 1 << level.block_exponent;
   level.blocks = (level.last - in.first - 1) / side + 1;
-  level.leaf_of_block.assign(
+  level.block_leaves.assign(
       static_cast<std::size_t>(level.blocks.x) * static_cast<std::size_t>(level.blocks.y), -1);
+  level.leaf_of_block = level.block_leaves.data();
   for (std::size_t n = 0; n < in.leaves.size(); ++n) {
     const Leaf& leaf = in.leaves[n];
     const glm::ivec2 low = (glm::ivec2(leaf.column, leaf.row) - in.first) / side;
     const glm::ivec2 high = glm::min(low + leaf.step / in.step, level.blocks);
     for (int y = low.y; y < high.y; ++y) {
       for (int x = low.x; x < high.x; ++x) {
-        level.leaf_of_block[static_cast<std::size_t>(y) * static_cast<std::size_t>(level.blocks.x) +
-                            static_cast<std::size_t>(x)] = static_cast<std::int32_t>(n);
+        level.block_leaves[static_cast<std::size_t>(y) * static_cast<std::size_t>(level.blocks.x) +
+                           static_cast<std::size_t>(x)] = static_cast<std::int32_t>(n);
       }
     }
     level.deviation_m = std::max(level.deviation_m, leaf.deviation_m);
@@ -103,9 +107,8 @@ LevelScene::Impl::Impl(const RayDevice& with, Level content, const glm::dvec3& o
   map_leaves(*this);
   max_heights = MaxHeights(level.heights);
   const bool empty = std::isnan(level.heights.min_m());
-  const glm::dvec3 a =
-      point_L(*this, level.first.x, level.first.y, empty ? 0 : level.heights.min_m());
-  const glm::dvec3 b = point_L(*this, last.x, last.y, empty ? 0 : level.heights.max_m());
+  const glm::dvec3 a = point_L(level.first.x, level.first.y, empty ? 0 : level.heights.min_m());
+  const glm::dvec3 b = point_L(last.x, last.y, empty ? 0 : level.heights.max_m());
   slack_m = static_cast<float>(16 * 0x1p-24 * glm::length(glm::max(glm::abs(a), glm::abs(b))));
   make_parts(previous);
   if (parts.size() == 1) {
@@ -127,9 +130,9 @@ void LevelScene::Impl::make_parts(const Impl* previous) {
       previous->level.step == level.step && previous->level.part_cells == level.part_cells) {
     for (const auto& part : previous->parts) known[part->place] = part;
   }
-  auto leaves = by_part(level);
+  auto leaves_of = by_part(level);
   std::vector<std::pair<std::size_t, glm::ivec2>> missing;
-  for (const auto& [place, list] : leaves) {
+  for (const auto& [place, list] : leaves_of) {
     const auto part = known.find(place);
     const bool serves =
         part != known.end() && part->second->leaves == list && slack_m <= part->second->slack_m;
@@ -138,40 +141,23 @@ void LevelScene::Impl::make_parts(const Impl* previous) {
   }
   tbb::parallel_for(std::size_t{0}, missing.size(), [&](std::size_t n) {
     const auto& [index, place] = missing[n];
-    parts[index] = build_part(*this, place, std::move(leaves.find(place)->second));
+    parts[index] = build_part(*this, place, std::move(leaves_of.find(place)->second));
   });
 }
 
-Cell LevelScene::Impl::cell_at(const Leaf& leaf, int exponent, int column, int row) const noexcept {
-  const int size = 1 << exponent;
-  const glm::ivec2 low(column & -size, row & -size);  // leaves are aligned to their step
-  if (leaf.coarser == 0 && low.x + size <= last.x && low.y + size <= last.y) {
-    const int points = size >> step_exponent;
-    const int x = (low.x - level.first.x) >> step_exponent;
-    const int y = (low.y - level.first.y) >> step_exponent;
-    const HeightArray& heights = level.heights;
-    return {low.x,
-            low.y,
-            size,
-            size,
-            heights(x, y),
-            heights(x + points, y),
-            heights(x, y + points),
-            heights(x + points, y + points)};
+GroundExtent extent_of(const std::vector<const LevelScene::Impl*>& levels) {
+  GroundExtent extent{levels.back()->first, levels.back()->last};
+  for (const LevelScene::Impl* level : levels) {
+    const HeightArray& heights = level->level.heights;
+    // The last cells may be narrower than the others.
+    const glm::ivec2 cells = level->last - level->first;
+    const int step = level->level.step;
+    const int narrowest = cells.x % step == 0 && cells.y % step == 0 ? step : 1;
+    extent.steepest_m = std::max(extent.steepest_m, heights.steepest_m() / narrowest);
+    if (heights.hole_count() == heights.heights_m().size()) continue;
+    extent.high_m = std::max({extent.high_m, std::abs(heights.min_m()), std::abs(heights.max_m())});
   }
-  const LeafCells cells{*this, leaf, exponent};
-  const int i = (column - leaf.column) >> exponent;
-  const int j = (row - leaf.row) >> exponent;
-  return {.column = cells.column(i),
-          .row = cells.row(j),
-          .width = cells.column(i + 1) - cells.column(i),
-          .height = cells.row(j + 1) - cells.row(j),
-          .nw = cells.surface_m({i, j}),
-          .ne = cells.surface_m({i + 1, j}),
-          .sw = cells.surface_m({i, j + 1}),
-          .se = cells.surface_m({i + 1, j + 1}),
-          .split = cells.block.splits_along_main(i, j) ? Cell::Split::NorthWestToSouthEast
-                                                       : Cell::Split::NorthEastToSouthWest};
+  return extent;
 }
 
 LevelScene::Impl::~Impl() {

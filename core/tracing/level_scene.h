@@ -11,6 +11,8 @@
 #include <vector>
 
 #include "core/tracing/embree_adapter.h"
+#include "core/tracing/passes/leaf_hit.h"
+#include "core/tracing/passes/level_view.h"
 #include "core/tracing/ray_tracer.h"
 
 namespace groundray {
@@ -75,12 +77,7 @@ struct LevelPart {
   std::vector<GridBlock> grids;  // by primitive
   std::vector<TriangleFacet> triangles;
 
-  // Exact tracing only:
-  struct Area {
-    glm::ivec2 first{0}, last{0};  // samples of the DEM
-  };
-  std::vector<Area> areas;                      // of the leaves
-  float slack_m = 0;                            // padding of their bounding boxes
+  float slack_m = 0;  // exact tracing only: padding of the leaves' bounding boxes
   const LevelScene::Impl* built_for = nullptr;  // only while it is being built
 };
 
@@ -89,7 +86,7 @@ std::shared_ptr<const LevelPart> build_part(const LevelScene::Impl& level, glm::
                                             std::vector<Leaf> leaves);
 
 /// Data of a level for queries in double precision, and its parts in Embree.
-struct LevelScene::Impl {
+struct LevelScene::Impl : LevelView {
   Impl(const RayDevice& with, Level content, const glm::dvec3& origin, Tracing how,
        const Impl* previous);
   ~Impl();
@@ -103,11 +100,7 @@ struct LevelScene::Impl {
   RTCScene scene = nullptr;  // that of the only part, or instances of all parts
   std::vector<std::shared_ptr<const LevelPart>> parts;
 
-  glm::ivec2 last{0};  // the DEM's sample at the window's last point
-  int step_exponent = 0;
-  int block_exponent = 0;  // a block is the finest leaf, 2^this cells of the DEM wide
-  glm::ivec2 blocks{0};
-  std::vector<std::int32_t> leaf_of_block;  // index in the level's leaves; -1 outside them
+  std::vector<std::int32_t> block_leaves;  // leaf_of_block
   float deviation_m = 0;
   std::size_t triangle_count = 0;
   std::size_t bridging_leaves = 0;
@@ -115,53 +108,24 @@ struct LevelScene::Impl {
   float slack_m = 0;  // 16 * 2^-24 * max|p_L|: bound of rounding to float
 
   void make_parts(const Impl* previous);
-  bool contains(int column, int row) const noexcept {  // takes a cell of the DEM
-    return level.first.x <= column && column < last.x && level.first.y <= row && row < last.y;
+  /// Returns the position of a sample in L.
+  glm::dvec3 point_L(int column, int row, double height_m) const noexcept {
+    return glm::dvec3(level.frame.to_D({column, row}), height_m) - p_DL;
   }
-  /// Returns the height of a sample of the DEM that is a point of the level.
-  float height_m(int column, int row) const noexcept {
-    return level.heights(
-        column == last.x ? level.heights.size().x - 1 : (column - level.first.x) >> step_exponent,
-        row == last.y ? level.heights.size().y - 1 : (row - level.first.y) >> step_exponent);
-  }
-  const Leaf* leaf_at(int column, int row) const noexcept {
-    const int x = (column - level.first.x) >> block_exponent;
-    const int y = (row - level.first.y) >> block_exponent;
-    const std::int32_t leaf =
-        leaf_of_block[static_cast<std::size_t>(y) * static_cast<std::size_t>(blocks.x) +
-                      static_cast<std::size_t>(x)];
-    return leaf < 0 ? nullptr : &level.leaves[static_cast<std::size_t>(leaf)];
-  }
-  /// Returns the exponent of the cells that are used in double precision in a leaf. If the leaf has
-  /// no deviation, this is the level's own, so that ranges equal those at full resolution to the
-  /// last bit.
-  int deciding_exponent(const Leaf& leaf) const noexcept {
-    return leaf.deviation_m == 0 && !leaf.has_holes
-               ? step_exponent
-               : std::countr_zero(static_cast<unsigned>(leaf.step));
-  }
-  /// Returns the cell of a leaf, 2^exponent cells of the DEM wide, that contains the given cell of
-  /// the DEM. Thinned sides are respected if the leaf's own cells have that size.
-  Cell cell_at(const Leaf& leaf, int exponent, int column, int row) const noexcept;
 };
+
+/// Returns the extent of nested levels, the outermost last.
+GroundExtent extent_of(const std::vector<const LevelScene::Impl*>& levels);
 
 /// A ray as used for one level: in double, and in float from where it enters the level's bounding
 /// box.
 struct LevelRay {
-  GridRay grid;
+  FacetRay facet;
   double enter_m = 0;
   double leave_m = 0;
   glm::vec3 origin{0};  ///< in L
   glm::vec3 direction{0};
   float far_m = 0;  ///< from the float origin
-};
-
-/// Intersection of a ray with the surface from above.
-struct Crossing {
-  double range_m = std::numeric_limits<double>::infinity();
-  FacetPlane plane;
-  float deviation_m = 0;
-  std::uint32_t level = 0;
 };
 
 /// Returns a component of a direction in float, with tiny components set to 0. Embree computes the

@@ -20,20 +20,33 @@ FacetPlane plane_at(const Cell& cell, const GridRay& ray, double t_m) {
   return cell.plane(cell.half_at(ray.u0 + t_m * ray.du, ray.v0 + t_m * ray.dv));
 }
 
+// Returns the index in [low, high) of the cell that a ray is in at t.
+int index_at(double start, double slope, double t_m, int low, int high) {
+  AxisWalk axis{start, slope, 1 / slope, low, high, 0, high - low};
+  axis.begin(t_m, static_cast<int>(std::clamp<double>(start, low, high - 1)));
+  return low + axis.at;
+}
+
 int next_index(double slope, int low, int high) { return slope > 0 ? high : low - 1; }
 
 }  // namespace
 
 LevelSurface::LevelSurface(std::vector<const LevelScene::Impl*> levels)
-    : levels_(std::move(levels)) {}
+    : levels_(std::move(levels)), extent_(extent_of(levels_)) {}
 
-LevelSurface::Place LevelSurface::place_at(int column, int row) const noexcept {
+// Returns the finest level whose window contains a cell of the DEM, or the outermost.
+std::uint32_t LevelSurface::level_at(int column, int row) const noexcept {
   std::uint32_t number = 0;
   while (number + 1 < levels_.size() && !levels_[number]->contains(column, row)) ++number;
+  return number;
+}
+
+LevelSurface::Place LevelSurface::place_at(int column, int row) const noexcept {
+  const std::uint32_t number = level_at(column, row);
   const LevelScene::Impl& level = *levels_[number];
   if (const Leaf* leaf = level.leaf_at(column, row)) {
     const int exponent = level.deciding_exponent(*leaf);
-    return {leaf, number, exponent, level.cell_at(*leaf, exponent, column, row)};
+    return {leaf, number, exponent, LeafCells{level, *leaf, exponent}.cell_at(column, row)};
   }
   const glm::ivec2 first = level.level.first;
   const int mask = (1 << level.block_exponent) - 1;
@@ -50,7 +63,7 @@ void LevelSurface::move(Place& place, int column, int row) const noexcept {
     const auto size = static_cast<unsigned>(level.level.leaf_cells * place.leaf->step);
     if (static_cast<unsigned>(column - place.leaf->column) < size &&
         static_cast<unsigned>(row - place.leaf->row) < size) {
-      place.cell = level.cell_at(*place.leaf, place.exponent, column, row);
+      place.cell = LeafCells{level, *place.leaf, place.exponent}.cell_at(column, row);
       return;
     }
   }
@@ -58,12 +71,9 @@ void LevelSurface::move(Place& place, int column, int row) const noexcept {
 }
 
 LevelSurface::Place LevelSurface::start(const GridRay& ray, double t_m) const noexcept {
-  const LevelScene::Impl& all = *levels_.back();
-  const auto index = [&](double coordinate, int low, int high) {
-    return std::clamp(static_cast<int>(std::floor(coordinate)), low, high - 1);
-  };
-  return place_at(index(ray.u0 + t_m * ray.du, all.level.first.x, all.last.x),
-                  index(ray.v0 + t_m * ray.dv, all.level.first.y, all.last.y));
+  const LevelView& all = *levels_.back();
+  return place_at(index_at(ray.u0, ray.du, t_m, all.first.x, all.last.x),
+                  index_at(ray.v0, ray.dv, t_m, all.first.y, all.last.y));
 }
 
 LevelSurface::Extent LevelSurface::cell_extent(const Place& place) noexcept {
@@ -100,13 +110,11 @@ void LevelSurface::walk(const GridRay& ray, double t_begin_m, double t_end_m,
     int column, row;
     if (column_exit_m <= row_exit_m) {
       column = next_index(ray.du, at.column, at.column + at.width);
-      row = std::clamp(static_cast<int>(std::floor(ray.v0 + leave_m * ray.dv)), at.row,
-                       at.row + at.height - 1);
+      row = index_at(ray.v0, ray.dv, leave_m, at.row, at.row + at.height);
       if (column < first.x || column >= all.last.x) return;
     } else {
       row = next_index(ray.dv, at.row, at.row + at.height);
-      column = std::clamp(static_cast<int>(std::floor(ray.u0 + leave_m * ray.du)), at.column,
-                          at.column + at.width - 1);
+      column = index_at(ray.u0, ray.du, leave_m, at.column, at.column + at.width);
       if (row < first.y || row >= all.last.y) return;
     }
     t_m = leave_m;
@@ -122,15 +130,6 @@ double LevelSurface::clearance_m(const GridRay& ray, double t_m) const noexcept 
 }
 
 namespace {
-
-// Returns the t at which a ray passes from one triangle of a cell to the other.
-double diagonal_m(const Cell& cell, const GridRay& ray) {
-  const double sign = cell.split == Cell::Split::NorthEastToSouthWest ? 1 : -1;
-  const double offset = sign > 0 ? 1 : 0;
-  const double across = (ray.u0 - cell.column) / cell.width;
-  const double down = (ray.v0 - cell.row) / cell.height;
-  return (offset - (across + sign * down)) / (ray.du / cell.width + sign * (ray.dv / cell.height));
-}
 
 // Returns the first t from t_in on at which a ray is `above_m` above both planes of a cell;
 // infinite if never.
@@ -163,80 +162,42 @@ double rises_over_one(const Cell& cell, const GridRay& ray, double above_m) {
   return stays ? rise_m : nan;
 }
 
-// Follows a ray through the triangles of successive cells. The clearance at the border of two
-// triangles is computed once, so that no crossing is lost between them.
-class Descent {
- public:
-  explicit Descent(const GridRay& ray) : ray_(ray) {}
-
-  // Returns whether the ray crosses the cell from above in [t_in, t_out]; range_m() and plane()
-  // then describe the crossing.
-  bool meets(const Cell& cell, double t_in, double t_out) {
-    if (passes_clear(cell, t_in, t_out)) return false;
-    const double turn_m = diagonal_m(cell, ray_);
-    if (t_in < turn_m && turn_m < t_out)
-      return meets_half(cell, t_in, turn_m) || meets_half(cell, turn_m, t_out);
-    return meets_half(cell, t_in, t_out);
-  }
-  double range_m() const { return range_m_; }
-  const FacetPlane& plane() const { return plane_; }
-
- private:
-  // Handles the most common case: the cell is far below the ray.
-  bool passes_clear(const Cell& cell, double t_in, double t_out) {
-    const double low_m = std::min(ray_.z0 + t_in * ray_.dz, ray_.z0 + t_out * ray_.dz);
-    if (!(low_m > cell.nw && low_m > cell.ne && low_m > cell.sw && low_m > cell.se)) return false;
-    above_m_ = 1;  // any positive value
-    return true;
-  }
-  bool meets_half(const Cell& cell, double t_in, double t_out) {
-    const double middle_m = std::isinf(t_out) ? t_in : (t_in + t_out) / 2;
-    const FacetPlane plane = plane_at(cell, ray_, middle_m);
-    const double in_m = std::isnan(above_m_) ? clearance_m(ray_, plane, t_in) : above_m_;
-    // A ray without an end is vertical, over one triangle.
-    const double out_m = std::isinf(t_out) ? ray_.dz : clearance_m(ray_, plane, t_out);
-    above_m_ = out_m;
-    if (!(in_m >= 0 && out_m < 0)) return false;
-    const double range_m = intersect(ray_, plane);
-    if (std::isnan(range_m)) return false;
-    range_m_ = std::clamp(range_m, t_in, t_out);
-    plane_ = plane;
-    return true;
-  }
-
-  const GridRay& ray_;
-  double above_m_ = nan;  // clearance at the last border that the ray passed
-  double range_m_ = 0;
-  FacetPlane plane_;
-};
-
 }  // namespace
 
-std::optional<Crossing> LevelSurface::first_crossing(const GridRay& ray, double t_begin_m,
+std::optional<Crossing> LevelSurface::first_crossing(const FacetRay& ray, double t_begin_m,
                                                      double t_end_m) const noexcept {
-  Descent descent(ray);
-  std::optional<Crossing> crossing;
-  walk(ray, t_begin_m, t_end_m, cell_extent, [&](const Place& place, double t_in, double t_out) {
-    if (!descent.meets(place.cell, t_in, t_out)) return false;
-    crossing = {descent.range_m(), descent.plane(), place.leaf->deviation_m, place.level};
-    return true;
+  Crossing best;
+  walk(ray.grid, t_begin_m, t_end_m, cell_extent, [&](const Place& place, double t_in, double) {
+    if (t_in > best.range_m) return true;
+    if (place.leaf != nullptr) hit_cell(ray, place.cell, *place.leaf, place.level, best);
+    return false;
   });
-  return crossing;
+  return std::isinf(best.range_m) ? std::nullopt : std::optional(best);
 }
 
-LevelSurface::Escape LevelSurface::escape_surface(const GridRay& ray, double above_m,
-                                                  double t_end_m) const noexcept {
-  const Place first = start(ray, 0);
-  const double alone_m = rises_over_one(first.cell, ray, above_m);
-  if (alone_m <= t_end_m) return {alone_m, {}};
-  Descent descent(ray);
+void LevelSurface::hit(const FacetRay& ray, const Leaf& leaf, Crossing& best) const noexcept {
+  const std::uint32_t number = level_at(leaf.column, leaf.row);
+  const LevelView& level = *levels_[number];
+  const LeafCells cells{level, leaf, level.deciding_exponent(leaf)};
+  const glm::ivec2 first(leaf.column, leaf.row);
+  const glm::ivec2 last(cells.column(cells.columns), cells.row(cells.rows));
+  hit_leaf(ray, part_over(ray, first, last - first), cells, number, best);
+}
+
+LevelSurface::Escape LevelSurface::escape_surface(const FacetRay& ray,
+                                                  double above_m) const noexcept {
+  const double end_m = ray.far_m;
+  const double alone_m = rises_over_one(start(ray.grid, 0).cell, ray.grid, above_m);
+  if (alone_m <= end_m) return {alone_m, {}};
   Escape escape;
-  walk(ray, 0, t_end_m, cell_extent, [&](const Place& place, double t_in, double t_out) {
-    const double rise_m = place.leaf == nullptr ? t_in : rises_to(place.cell, ray, above_m, t_in);
+  Crossing best;
+  walk(ray.grid, 0, end_m, cell_extent, [&](const Place& place, double t_in, double t_out) {
+    const double rise_m =
+        place.leaf == nullptr ? t_in : rises_to(place.cell, ray.grid, above_m, t_in);
     escape.begin_m = std::min(rise_m, t_out);
-    if (place.leaf != nullptr && descent.meets(place.cell, t_in, escape.begin_m)) {
-      escape.begin_m = descent.range_m();
-      escape.crossing = {descent.range_m(), descent.plane(), place.leaf->deviation_m, place.level};
+    if (place.leaf != nullptr) hit_cell(ray, place.cell, *place.leaf, place.level, best);
+    if (best.range_m <= escape.begin_m) {
+      escape = {best.range_m, best};
       return true;
     }
     return rise_m <= t_out;
@@ -245,6 +206,15 @@ LevelSurface::Escape LevelSurface::escape_surface(const GridRay& ray, double abo
 }
 
 namespace {
+
+// Returns the t at which a ray passes from one triangle of a cell to the other.
+double diagonal_m(const Cell& cell, const GridRay& ray) {
+  const double sign = cell.split == Cell::Split::NorthEastToSouthWest ? 1 : -1;
+  const double offset = sign > 0 ? 1 : 0;
+  const double across = (ray.u0 - cell.column) / cell.width;
+  const double down = (ray.v0 - cell.row) / cell.height;
+  return (offset - (across + sign * down)) / (ray.du / cell.width + sign * (ray.dv / cell.height));
+}
 
 // Follows a ray down through the band round the surface that contains the reference surface.
 class BandDescent {

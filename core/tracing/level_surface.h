@@ -14,15 +14,19 @@ class LevelSurface {
   /// @param levels  finest first, each window inside the next.
   explicit LevelSurface(std::vector<const LevelScene::Impl*> levels);
 
+  const GroundExtent& extent() const noexcept { return extent_; }
+
   /// Returns the height of the ray above the surface at t metres along it, metres; NaN over holes.
   /// Beyond the boundary, the outermost facets are continued.
   double clearance_m(const GridRay& ray, double t_m) const noexcept;
 
-  /// Returns the first crossing from above in [t_begin_m, t_end_m], decided cell by cell: along the
-  /// ray, the surface is linear between the sides and diagonals of cells. Crossings from below are
-  /// ignored.
-  std::optional<Crossing> first_crossing(const GridRay& ray, double t_begin_m,
+  /// Returns the first crossing from above on the cells that the ray passes in [t_begin_m,
+  /// t_end_m].
+  std::optional<Crossing> first_crossing(const FacetRay& ray, double t_begin_m,
                                          double t_end_m) const noexcept;
+
+  /// Replaces `best` by the first crossing from above on a leaf, if that is nearer.
+  void hit(const FacetRay& ray, const Leaf& leaf, Crossing& best) const noexcept;
 
   /// Continuation of a ray that begins on the surface or slightly above it.
   struct Escape {
@@ -31,7 +35,7 @@ class LevelSurface {
   };
   /// Follows a ray, cell by cell, until it is `above_m` above the surface: from there on, rounding
   /// to float keeps it on the correct side.
-  Escape escape_surface(const GridRay& ray, double above_m, double t_end_m) const noexcept;
+  Escape escape_surface(const FacetRay& ray, double above_m) const noexcept;
 
   /// Bounds of the range at which a ray hits the reference surface, which is nowhere farther from a
   /// leaf than the leaf's deviation.
@@ -52,6 +56,7 @@ class LevelSurface {
     int exponent = 0;  // cells of 2^exponent cells of the DEM decide in the leaf
     Cell cell;
   };
+  std::uint32_t level_at(int column, int row) const noexcept;
   Place place_at(int column, int row) const noexcept;
   void move(Place& place, int column, int row) const noexcept;
   Place start(const GridRay& ray, double t_m) const noexcept;
@@ -67,6 +72,7 @@ class LevelSurface {
             const Act& act) const noexcept;
 
   std::vector<const LevelScene::Impl*> levels_;
+  GroundExtent extent_;
 };
 
 /// Double-precision data of a packet in exact tracing, by lane: read and written by callbacks.

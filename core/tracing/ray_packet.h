@@ -44,6 +44,7 @@ struct Packet {
   alignas(64) std::array<int, W> valid;
   alignas(64) Doubles x_m, y_m, z_m, dx, dy, dz, far_m;  // the rays as given, in D
   Doubles u0, v0, du, dv;                                // in grid coordinates
+  Doubles begin_m;                                       // hits before it are ignored
   Doubles inner_m;  // range at which they leave the window of the previous level
   Doubles enter_m, leave_m;
   Doubles column, row, side;  // facet of the hit; side is 1 for the near half, -1 for the far half
@@ -55,14 +56,20 @@ struct Packet {
   std::array<std::uint32_t, W> level;
   std::array<LevelRay, W> exact_rays;  // exact tracing only
   std::array<Crossing, W> crossings;
+  std::array<GroundFacet, W> facets;  // of the hits
 
   GridRay grid_ray(int lane) const noexcept {
     const auto i = static_cast<std::size_t>(lane);
     return {u0[i], v0[i], z_m[i], du[i], dv[i], dz[i]};
   }
-  LevelRay level_ray(int lane) const noexcept {
+  // Returns a ray for decisions in double.
+  FacetRay facet_ray(int lane, const GroundExtent& ground) const noexcept {
     const auto i = static_cast<std::size_t>(lane);
-    return {grid_ray(lane),
+    return {grid_ray(lane), ground, begin_m[i], far_m[i]};
+  }
+  LevelRay level_ray(int lane, const GroundExtent& ground) const noexcept {
+    const auto i = static_cast<std::size_t>(lane);
+    return {facet_ray(lane, ground),
             enter_m[i],
             leave_m[i],
             {floats.ray.org_x[i], floats.ray.org_y[i], floats.ray.org_z[i]},
@@ -92,7 +99,7 @@ struct Packet {
     u_slope_m[i] = crossing.plane.u_slope_m;
     v_slope_m[i] = crossing.plane.v_slope_m;
     deviation_m[i] = crossing.deviation_m;
-    level[i] = crossing.level;
+    level[i] = crossing.facet.level;
   }
   // Repeats Cell::plane operation by operation: ranges must not depend on which function computes
   // them.
@@ -127,7 +134,7 @@ void take_rays(const GridFrame& frame, std::span<const Ray> rays, Packet<W>& pac
     packet.v0[i] = (packet.y_m[i] - frame.origin_m.y) * frame.cells_per_m.y;
     packet.du[i] = packet.dx[i] * frame.cells_per_m.x;
     packet.dv[i] = packet.dy[i] * frame.cells_per_m.y;
-    packet.inner_m[i] = 0;
+    packet.begin_m[i] = packet.inner_m[i] = 0;
   }
 }
 

@@ -67,7 +67,8 @@ struct RayTracer::Impl {
   template <int W>
   void trace_packet(Coherence coherence, Packet<W>& packet, std::span<Hit> hits) const noexcept;
   template <int W>
-  void trace(std::span<const Ray> rays, std::span<Hit> hits, Batch batch) const noexcept;
+  void trace(std::span<const Ray> rays, std::span<Hit> hits, Batch batch,
+             std::span<GroundFacet> facets) const noexcept;
 };
 
 namespace {
@@ -119,7 +120,7 @@ glm::vec3 one_ulp_off(const glm::vec3& direction) noexcept {
 
 Hit hit_of(const GridFrame& frame, const Crossing& crossing) noexcept {
   return {crossing.range_m, glm::vec3(frame.normal(crossing.plane)), crossing.deviation_m,
-          crossing.level};
+          crossing.facet.level};
 }
 
 Target target_of(const LevelScene& scene, std::uint32_t number) {
@@ -183,9 +184,10 @@ bool RayTracer::Impl::from_behind(const Target& target, const LevelRay& ray,
   const LevelScene::Impl& on = level(place.level);
   const Leaf* leaf = on.leaf_at(facet.column, facet.row);
   if (leaf == nullptr) return false;
-  const Cell cell = on.cell_at(*leaf, facet.step_exponent, facet.column, facet.row);
-  const FacetPlane plane = cell.plane(facet.half);
-  return ray.grid.dz > plane.u_slope_m * ray.grid.du + plane.v_slope_m * ray.grid.dv;
+  const LeafCells cells{on, *leaf, facet.step_exponent};
+  const FacetPlane plane = cells.cell_at(facet.column, facet.row).plane(facet.half);
+  const GridRay& grid = ray.facet.grid;
+  return grid.dz > plane.u_slope_m * grid.du + plane.v_slope_m * grid.dv;
 }
 
 // Decides a ray that the facet reported by Embree does not settle: a hit at an edge, a hit from
@@ -195,13 +197,14 @@ bool RayTracer::Impl::from_behind(const Target& target, const LevelRay& ray,
 // one.
 std::optional<Crossing> RayTracer::Impl::search(const Target& target, const LevelRay& ray,
                                                 FloatHit hit) const noexcept {
-  const double cells_per_m = std::max(std::abs(ray.grid.du), std::abs(ray.grid.dv));
+  const GridRay& grid = ray.facet.grid;
+  const double cells_per_m = std::max(std::abs(grid.du), std::abs(grid.dv));
   double from_m = ray.enter_m;
   for (bool retried = false;;) {
     const bool miss = hit.geometry == RTC_INVALID_GEOMETRY_ID;
-    if (miss && !ends_below(target, ray.grid, ray.leave_m)) return std::nullopt;
+    if (miss && !ends_below(target, grid, ray.leave_m)) return std::nullopt;
     if (miss || from_behind(target, ray, hit)) {
-      if (retried) return surface.first_crossing(ray.grid, from_m, ray.leave_m);
+      if (retried) return surface.first_crossing(ray.facet, from_m, ray.leave_m);
       retried = true;
       hit = intersect_one(target, ray, from_m, one_ulp_off(ray.direction));
       continue;
@@ -210,7 +213,7 @@ std::optional<Crossing> RayTracer::Impl::search(const Target& target, const Leve
     const double reach_m = walk_cells * step / cells_per_m;
     const double at_m = ray.enter_m + hit.range_m;
     const double end_m = std::min(at_m + reach_m, ray.leave_m);
-    if (auto crossing = surface.first_crossing(ray.grid, std::max(from_m, at_m - reach_m), end_m))
+    if (auto crossing = surface.first_crossing(ray.facet, std::max(from_m, at_m - reach_m), end_m))
       return crossing;
     if (!(from_m < end_m && end_m < ray.leave_m)) return std::nullopt;
     from_m = end_m;
@@ -246,7 +249,9 @@ void RayTracer::Impl::decide_fast(const Target& target, Packet<W>& packet) const
     const bool open = hit.geometry != RTC_INVALID_GEOMETRY_ID ||
                       ends_below(target, packet.grid_ray(lane), packet.leave_m[i]);
     packet.take(
-        lane, open ? search(target, packet.level_ray(lane), hit).value_or(Crossing{}) : Crossing{});
+        lane,
+        open ? search(target, packet.level_ray(lane, surface.extent()), hit).value_or(Crossing{})
+             : Crossing{});
   }
 }
 
@@ -258,14 +263,17 @@ void RayTracer::Impl::trace_target(const Target& target, Coherence coherence, st
   const bool exact = target.level->tracing == Tracing::Exact;
   if (exact) {
     for (int lane = 0; lane < W; ++lane)
-      packet.exact_rays[static_cast<std::size_t>(lane)] = packet.level_ray(lane);
+      packet.exact_rays[static_cast<std::size_t>(lane)] = packet.level_ray(lane, surface.extent());
     packet.crossings.fill({});
   }
   ExactQuery query{{}, &surface, packet.exact_rays.data(), packet.crossings.data()};
   intersect<W>(target.scene, packet.valid.data(), packet.floats, query.context, coherence);
   if (exact) {
-    for (int lane = 0; lane < W; ++lane)
-      packet.take(lane, packet.crossings[static_cast<std::size_t>(lane)]);
+    for (int lane = 0; lane < W; ++lane) {
+      const auto i = static_cast<std::size_t>(lane);
+      packet.take(lane, packet.crossings[i]);
+      if (packet.valid[i] != 0) packet.facets[i] = packet.crossings[i].facet;
+    }
   } else {
     decide_fast(target, packet);
   }
@@ -292,10 +300,12 @@ template <int W>
 void RayTracer::Impl::escape_surface(std::span<Hit> hits, Packet<W>& packet) const noexcept {
   const double above_m = 2.0 * everything.slack_m;
   for (std::size_t i = 0; i < W; ++i) {
-    const GridRay ray = packet.grid_ray(static_cast<int>(i));
-    const auto [begin_m, crossing] = surface.escape_surface(ray, above_m, packet.far_m[i]);
-    packet.inner_m[i] = begin_m;
-    if (crossing && i < hits.size()) hits[i] = hit_of(level(0).level.frame, *crossing);
+    const FacetRay ray = packet.facet_ray(static_cast<int>(i), surface.extent());
+    const auto [begin_m, crossing] = surface.escape_surface(ray, above_m);
+    packet.begin_m[i] = packet.inner_m[i] = begin_m;
+    if (!crossing || i >= hits.size()) continue;
+    hits[i] = hit_of(level(0).level.frame, *crossing);
+    packet.facets[i] = crossing->facet;
   }
 }
 
@@ -310,8 +320,8 @@ void RayTracer::Impl::trace_packet(Coherence coherence, Packet<W>& packet,
 }
 
 template <int W>
-void RayTracer::Impl::trace(std::span<const Ray> rays, std::span<Hit> hits,
-                            Batch batch) const noexcept {
+void RayTracer::Impl::trace(std::span<const Ray> rays, std::span<Hit> hits, Batch batch,
+                            std::span<GroundFacet> facets) const noexcept {
   const Coherence coherence =
       batch == Batch::Scattered ? Coherence::Incoherent : Coherence::Coherent;
   Packet<W> packet;
@@ -321,6 +331,9 @@ void RayTracer::Impl::trace(std::span<const Ray> rays, std::span<Hit> hits,
     take_rays(level(0).level.frame, rays.subspan(begin, count), packet);
     if (batch != Batch::Alike) escape_surface(hits.subspan(begin, count), packet);
     trace_packet(coherence, packet, hits.subspan(begin, count));
+    if (!facets.empty())
+      std::ranges::copy_n(packet.facets.begin(), static_cast<std::ptrdiff_t>(count),
+                          facets.begin() + static_cast<std::ptrdiff_t>(begin));
   }
 }
 
@@ -339,9 +352,11 @@ RayTracer::~RayTracer() = default;
 RayTracer::RayTracer(RayTracer&&) noexcept = default;
 RayTracer& RayTracer::operator=(RayTracer&&) noexcept = default;
 
-void RayTracer::trace(std::span<const Ray> rays, std::span<Hit> hits, Batch batch) const noexcept {
+void RayTracer::trace(std::span<const Ray> rays, std::span<Hit> hits, Batch batch,
+                      std::span<GroundFacet> facets) const noexcept {
   const FlushDenormals flush;
-  with_packet_width(impl_->device, [&](auto width) { impl_->trace<width>(rays, hits, batch); });
+  with_packet_width(impl_->device,
+                    [&](auto width) { impl_->trace<width>(rays, hits, batch, facets); });
 }
 
 void RayTracer::bound_errors(std::span<const Ray> rays, std::span<const Hit> hits,

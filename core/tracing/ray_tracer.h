@@ -7,6 +7,7 @@
 #include <string>
 #include <vector>
 
+#include "core/tracing/ground_facet.h"
 #include "core/tracing/level.h"
 #include "core/tracing/ray.h"
 
@@ -75,9 +76,10 @@ class RayTracer {
   /// Finds the first hit of each ray from above. Rays that start over the finest window traverse
   /// the levels one after the other; other rays are traced through all levels at once.
   /// @param hits  one for each ray.
-  /// @param batch  affects only the speed, not the hits.
-  void trace(std::span<const Ray> rays, std::span<Hit> hits,
-             Batch batch = Batch::Alike) const noexcept;
+  /// @param batch   affects only the speed, not the hits.
+  /// @param facets  empty or, in exact tracing, one for each ray: the facet of its hit.
+  void trace(std::span<const Ray> rays, std::span<Hit> hits, Batch batch = Batch::Alike,
+             std::span<GroundFacet> facets = {}) const noexcept;
 
   /// Bounds the difference between each range and that on the reference surface, metres along the
   /// ray, for any mode of tracing. The bound is infinite where the reference may be hit much

@@ -16,16 +16,19 @@
 #include "terrain/terrain_scene.h"
 #include "test/support/margin.h"
 #include "test/support/temporary_folder.h"
+#include "test/support/terrain/hard_rays.h"
 #include "test/support/terrain/reference_tracer.h"
 #include "test/support/terrain/sample_terrain.h"
 
 namespace groundray::ray_tracer_test {
 namespace {
 
+using testing::aimed_rays;
 using testing::fractal;
 using testing::proof_size;
 using testing::random_rays;
 using testing::ReferenceHit;
+using testing::seam_points;
 using testing::trace_reference;
 using testing::with_holes;
 
@@ -208,27 +211,6 @@ TEST(RayTracerProof, FastTracingDiffersOnlyAtSilhouettes) {
   }
 }
 
-// Points where facets adjoin: samples, and points on column lines, row lines and diagonals.
-std::vector<glm::dvec3> seam_points(const HeightGrid& grid, std::size_t count, Seed seed) {
-  std::vector<glm::dvec3> points(count);
-  for (std::size_t i = 0; i < count; ++i) {
-    const auto bits = random_bits({seed, 0, 0, static_cast<std::uint32_t>(i)});
-    const int column = 1 + static_cast<int>(bits[0] % static_cast<unsigned>(grid.columns() - 3));
-    const int row = 1 + static_cast<int>(bits[1] % static_cast<unsigned>(grid.rows() - 3));
-    const glm::ivec2 ends[4][2] = {
-        {{0, 0}, {0, 0}}, {{0, 0}, {1, 0}}, {{0, 0}, {0, 1}}, {{1, 0}, {0, 1}}};
-    const auto& [from, to] = ends[bits[2] % 4];
-    const double share = bits[3] * 0x1p-32;
-    const auto sample = [&](const glm::ivec2& step) {
-      const glm::ivec2 at = glm::ivec2(column, row) + step;
-      return glm::dvec3(grid.origin_m() + glm::dvec2(at) * grid.step_m(),
-                        grid.height_m(at.x, at.y));
-    };
-    points[i] = glm::mix(sample(from), sample(to), share);
-  }
-  return points;
-}
-
 TEST(RayTracerProof, RaysAimedAtVerticesEdgesAndDiagonalsDoNotLeak) {
   const HeightGrid grid = fractal(513, 5, 400, Seed{3});
   const auto targets = seam_points(grid, proof_size(100'000, 1'000'000), Seed{21});
@@ -337,6 +319,44 @@ TEST(RayTracer, RaysFromBelowTheSurfaceMatchTheReference) {
           << i;
     }
     EXPECT_GT(met, 500u) << "some come up into the open and meet the next slope";
+  }
+}
+
+// Rays that leave the ground at a sample, an edge or a diagonal do not hit the back of a facet.
+TEST(RayTracerProof, RaysHitFacetsOnlyFromAbove) {
+  for (const int holes : {0, 100}) {
+    const HeightGrid grid = with_holes(fractal(257, 5, 300, Seed{7}), holes, 5, Seed{8});
+    const auto rays = aimed_rays(grid, proof_size(200'000, 2'000'000), Seed{31});
+    for (const Tracing tracing : {Tracing::Exact, Tracing::Fast}) {
+      const auto hits = trace(tracer(grid, tracing), rays);
+      std::size_t met = 0, left = 0;
+      for (std::size_t i = 0; i < rays.size(); ++i) {
+        const double height_m =
+            grid.height_m_at(glm::dvec2(rays[i].origin)).value_or(rays[i].origin.z);
+        left += rays[i].origin.z < height_m && !hits[i] ? 1 : 0;
+        if (!hits[i]) continue;
+        ++met;
+        ASSERT_LT(glm::dot(glm::dvec3(hits[i].normal), rays[i].direction), 0) << i;
+      }
+      EXPECT_GT(met, rays.size() / 4);
+      EXPECT_GT(left, rays.size() / 20);
+    }
+  }
+}
+
+TEST(RayTracer, RayThatLeavesTheGroundAtASampleHitsNothing) {
+  const float a = 8 / 3.0F, b = 2 / 3.0F, c = 11 / 3.0F, d = 4 / 3.0F, e = 5 / 3.0F;
+  const HeightGrid grid({3, 3}, {-1, 1}, {1, -1}, {0, a, b, 0, c, d, 1, 0, e});
+  for (const Tracing tracing : {Tracing::Exact, Tracing::Fast}) {
+    std::vector<Ray> rays;
+    for (int i = 0; i < 4000; ++i) {
+      const glm::dvec2 turn = random_uniform({Seed{32}, 0, 0, static_cast<std::uint32_t>(i)});
+      // Steeper than any facet.
+      const glm::dvec3 way(std::cos(6.2832 * turn.x), std::sin(6.2832 * turn.x), 6 + 4 * turn.y);
+      rays.push_back({glm::dvec3(0, 0, c) - 0.5 * way, glm::normalize(way)});
+    }
+    const auto hits = trace(tracer(grid, tracing), rays);
+    for (std::size_t i = 0; i < hits.size(); ++i) ASSERT_FALSE(hits[i]) << i;
   }
 }
 
