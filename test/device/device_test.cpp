@@ -1,20 +1,28 @@
 #include <fmt/format.h>
+#include <gmock/gmock.h>
 #include <gtest/gtest.h>
 #include <stdlib.h>
 
 #include <cmath>
 #include <filesystem>
 #include <fstream>
+#include <map>
 #include <regex>
 #include <string>
 #include <vector>
 
 #include "core/geometry/height_grid.h"
+#include "core/tracing/ray_tracer.h"
+#include "terrain/lod/clipmap.h"
 #include "terrain/lod/quadtree.h"
+#include "terrain/terrain_scene.h"
 #include "test/device/host_arrays.h"
 #include "test/device/opencl_device.h"
 #include "test/support/terrain/adversarial_terrain.h"
+#include "test/support/terrain/hard_rays.h"
+#include "test/support/terrain/pass_rays.h"
 #include "test/support/terrain/pass_results.h"
+#include "test/support/terrain/sample_clipmap.h"
 #include "test/support/terrain/sample_terrain.h"
 
 namespace groundray::device_test {
@@ -22,9 +30,14 @@ namespace {
 
 constexpr std::size_t most_bytes = std::size_t{64} << 20;  // of all arrays of a run
 
+using ::testing::ElementsAre;
+using ::testing::Gt;
 using testing::HostArrays;
+using ::testing::IsEmpty;
 using testing::NamedTerrain;
+using ::testing::Not;
 using testing::OpenClDevice;
+using ::testing::Pair;
 using testing::PassResults;
 
 std::filesystem::path kernels() {
@@ -99,6 +112,43 @@ std::string difference_on(OpenClDevice& device, HostArrays& arrays, const Height
   return difference;
 }
 
+// Rays, and levels that they are traced through.
+struct Shots {
+  RayTracer tracer;
+  std::vector<Ray> rays;
+};
+
+std::vector<Shots> all_shots(std::size_t rays) {
+  const HeightGrid dem =
+      testing::with_holes(testing::fractal(513, 5, 300, Seed{11}), 60, 5, Seed{12});
+  const glm::dvec3 p_DL = float_frame_origin({0, 0, dem.max_height_m()});
+  // The memory limit makes the windows small.
+  const Clipmap clipmap(testing::certified_tiles(dem), dem.frame(),
+                        {.tolerance_m = 0.01, .angle_rad = 0.002, .memory_bytes = 5'000'000},
+                        testing::sensor_at({100, 50, 200}));
+  std::vector<Shots> all;
+  all.push_back({RayTracer({full_resolution_level(dem)}, p_DL, Tracing::Exact),
+                 testing::hard_rays(dem, rays, Seed{13})});
+  all.push_back(
+      {RayTracer(clipmap.levels(), p_DL, Tracing::Exact), testing::hard_rays(dem, rays, Seed{14})});
+  return all;
+}
+
+// Returns where hits differ from those of exact tracing; empty if nowhere.
+std::string difference_on(OpenClDevice& device, HostArrays& arrays, const Shots& shots) {
+  std::string difference;
+  {
+    const HostArrays::Use use(&arrays);
+    const auto found = testing::trace_by_passes(shots.tracer, shots.rays, PassRunner(device));
+    const HostArrays::Use elsewhere(nullptr);
+    std::size_t met = 0;
+    difference = testing::difference_from_exact(found, shots.tracer, shots.rays, met);
+    EXPECT_GT(met, shots.rays.size() / 4);
+  }
+  arrays.clear();
+  return difference;
+}
+
 // A DEM of steps, and a bound for each of its levels that is exactly the key of a node, which tells
 // > from >=.
 struct Ties {
@@ -136,10 +186,18 @@ TEST_F(OnDevice, PassesWriteTheSameBytesForTies) {
     EXPECT_EQ(difference_on(device, arrays, ties.grid, bound, 2), "") << bound.tolerance_m;
 }
 
+TEST_F(OnDevice, RaysHitWhatExactTracingHits) {
+  HostArrays arrays(std::size_t{512} << 20);
+  OpenClDevice device(kernels() / "sound", arrays);
+  for (const Shots& shots : all_shots(testing::proof_size(100'000, 1'000'000)))
+    EXPECT_EQ(difference_on(device, arrays, shots), "") << shots.tracer.levels().size();
+}
+
 // The faults are listed in CMakeLists.txt.
 TEST_F(OnDevice, FindsFaultsOfKernels) {
   const Ties ties;
   const HeightGrid floats = testing::fractal(129, 2, 40, Seed{3});
+  const std::vector<Shots> shots = all_shots(20'000);
   std::size_t faults = 0;
   for (const auto& folder : std::filesystem::directory_iterator(kernels() / "faults")) {
     HostArrays arrays(most_bytes);
@@ -147,32 +205,58 @@ TEST_F(OnDevice, FindsFaultsOfKernels) {
     std::string found = difference_on(device, arrays, floats, bounds_of(floats).back(), 2);
     for (std::size_t i = 0; i < ties.bounds.size() && found.empty(); ++i)
       found = difference_on(device, arrays, ties.grid, ties.bounds[i], 2);
+    if (found.empty()) found = difference_on(device, arrays, shots.back());
     EXPECT_NE(found, "") << folder.path().filename();
     fmt::print("{}: {}\n", folder.path().filename().string(), found);
     ++faults;
   }
-  EXPECT_EQ(faults, 4u);
+  EXPECT_EQ(faults, 6u);
 }
 
-std::size_t count_in(const std::filesystem::path& file, const std::string& pattern) {
+// Number of lines of each kernel that match a pattern; kernels without any are left out.
+using Counts = std::map<std::string, std::size_t>;
+
+// @param begins  matches the line at which a kernel begins, with its name.
+Counts count_in(const std::filesystem::path& file, const std::string& begins,
+                const std::string& pattern) {
   std::ifstream in(file);
   EXPECT_TRUE(in) << file;
-  const std::regex wanted(pattern);
-  std::size_t count = 0;
-  for (std::string line; std::getline(in, line);) count += std::regex_search(line, wanted);
-  return count;
+  const std::regex kernel(begins), wanted(pattern);
+  Counts counts;
+  std::string name;
+  std::smatch match;
+  for (std::string line; std::getline(in, line);) {
+    if (std::regex_search(line, match, kernel)) name = match[1];
+    if (std::regex_search(line, wanted)) ++counts[name];
+  }
+  return counts;
 }
 
-// Multiplication and addition are rounded separately, as on the CPU, and nothing is divided, which
-// not all devices round correctly.
+constexpr std::size_t passes = 14;
+constexpr const char* in_ptx = R"(\.entry (\w+))";
+constexpr const char* in_gcn = R"(^(\w+Pass):)";
+
+// Multiplication and addition are rounded separately, as on the CPU. Meshing divides nothing, which
+// not all devices round correctly; tracing does.
 TEST(Kernels, FuseNoOperations) {
-  constexpr std::size_t passes = 12;
-  EXPECT_EQ(count_in(kernels() / "passes.ptx", R"(^\s*(fma|div)\.[a-z]*\.f64)"), 0u);
-  EXPECT_GT(count_in(kernels() / "passes.fused.ptx", R"(^\s*fma\.rn\.f64)"), 0u);
-  EXPECT_EQ(count_in(kernels() / "passes.ptx", R"(\.entry )"), passes);
-  EXPECT_EQ(count_in(kernels() / "passes.gcn", R"(^\s*v_(fma|fmac|mad|mac|div\w*)_f64)"), 0u);
-  constexpr const char* contraction_off = R"(ExecutionMode \d+ 31 *$)";
-  EXPECT_EQ(count_in(kernels() / "sound/passes.spt", contraction_off), passes);
+  EXPECT_EQ(count_in(kernels() / "passes.ptx", in_ptx, in_ptx).size(), passes);
+  EXPECT_THAT(count_in(kernels() / "passes.ptx", in_ptx, R"(^\s*fma\.[a-z]*\.f64)"), IsEmpty());
+  EXPECT_THAT(count_in(kernels() / "passes.ptx", in_ptx, R"(^\s*div\.[a-z]*\.f64)"),
+              ElementsAre(Pair("TraceLevelPass", Gt(0u))));
+  EXPECT_THAT(count_in(kernels() / "passes.fused.ptx", in_ptx, R"(^\s*fma\.rn\.f64)"),
+              Not(IsEmpty()));
+  const auto in_passes_gcn = [](const char* pattern) {
+    return count_in(kernels() / "passes.gcn", in_gcn, pattern);
+  };
+  const Counts divisions = in_passes_gcn(R"(^\s*v_div_fixup_f64)");
+  EXPECT_THAT(divisions, ElementsAre(Pair("TraceLevelPass", Gt(0u))));
+  // A division is five fused operations, of which the last is v_div_fmas.
+  EXPECT_EQ(in_passes_gcn(R"(^\s*v_div_fmas_f64)"), divisions);
+  EXPECT_THAT(in_passes_gcn(R"(^\s*v_(fma|fmac|mad|mac)_f64)"),
+              ElementsAre(Pair("TraceLevelPass", 5 * divisions.at("TraceLevelPass"))));
+  const Counts contraction_off =
+      count_in(kernels() / "sound/passes.spt", "()^", R"(ExecutionMode \d+ 31 *$)");
+  EXPECT_THAT(contraction_off, ElementsAre(Pair("", passes)));
 }
 
 TEST(Kernels, NeedLittlePrivateMemory) {
@@ -185,7 +269,7 @@ TEST(Kernels, NeedLittlePrivateMemory) {
     EXPECT_LE(std::stoul(match[1]), 2048u) << line;
     ++kernels_found;
   }
-  EXPECT_EQ(kernels_found, 12u);
+  EXPECT_EQ(kernels_found, passes);
 }
 
 }  // namespace

@@ -1,8 +1,9 @@
-// Kernels of the terrain's passes: the same headers that the CPU runs, compiled for a device.
+// Kernels of the passes of meshing and tracing: the same headers that the CPU runs, compiled for a device.
 #define __device__ __attribute__((device))
 #define __global__ __attribute__((global))
 #define __host__ __attribute__((host))
 #pragma clang force_cuda_host_device begin
+#include "core/tracing/passes/trace_level.h"
 #include "terrain/lod/passes/deviation.h"
 #include "terrain/lod/passes/emission.h"
 #include "terrain/lod/passes/leaf_list.h"
@@ -60,3 +61,5 @@ KERNEL(MarkVerticesPass)
 KERNEL(CountMeshPass)
 KERNEL(EmitVerticesPass)
 KERNEL(EmitTrianglesPass)
+KERNEL(HighPointPass)
+KERNEL(TraceLevelPass)

@@ -1,7 +1,7 @@
-# Copies the headers of PASSES to ROOT/terrain/lod/passes; in FILES (a,b) each FROM is replaced by TO.
+# Copies the headers of SOURCE/FOLDER to ROOT/FOLDER; in FILES (a,b) each FROM is replaced by TO.
 cmake_minimum_required(VERSION 3.25)
 string(REPLACE "," ";" faulty "${FILES}")
-file(GLOB headers ${PASSES}/*.h)
+file(GLOB headers ${SOURCE}/${FOLDER}/*.h)
 foreach(header ${headers})
   file(READ ${header} text)
   get_filename_component(name ${header} NAME)
@@ -12,5 +12,5 @@ foreach(header ${headers})
     endif()
     set(text "${changed}")
   endif()
-  file(WRITE ${ROOT}/terrain/lod/passes/${name} "${text}")
+  file(WRITE ${ROOT}/${FOLDER}/${name} "${text}")
 endforeach()

@@ -2,6 +2,7 @@
 
 #include <fmt/format.h>
 
+#include <algorithm>
 #include <bit>
 #include <cstddef>
 #include <cstdint>
@@ -62,9 +63,9 @@ std::string difference_from_exact(std::span<const Crossing> found, const RayTrac
   std::vector<Hit> hits(rays.size());
   std::vector<GroundFacet> facets(rays.size());
   tracer.trace(rays, hits, Batch::Alike, facets);
-  met = 0;
+  met = static_cast<std::size_t>(
+      std::ranges::count_if(hits, [](const Hit& hit) { return static_cast<bool>(hit); }));
   for (std::size_t i = 0; i < rays.size(); ++i) {
-    met += hits[i] ? 1 : 0;
     const auto bits = std::bit_cast<std::uint64_t>(found[i].range_m);
     const bool same =
         bits == std::bit_cast<std::uint64_t>(hits[i].range_m) &&

@@ -1,5 +1,7 @@
 #pragma once
 
+#include <glm/vec2.hpp>
+
 namespace glm {
 
 template <typename T>
@@ -9,6 +11,7 @@ struct vec3_of {
   vec3_of() = default;
   constexpr explicit vec3_of(T all) : x(all), y(all), z(all) {}
   constexpr vec3_of(T a, T b, T c) : x(a), y(b), z(c) {}
+  constexpr explicit operator vec2_of<T>() const { return {x, y}; }
 };
 
 using dvec3 = vec3_of<double>;
