@@ -1,4 +1,4 @@
-// groundray_mesh_error FOLDER NAME...: prints the measures of test/support/terrain/mesh_oracle.h,
+// groundray_mesh_error FOLDER NAME...: prints the measures of terrain/judge/mesh_deviation.h,
 // one line of JSON each, for meshes that other programs left in FOLDER. A number of metres instead
 // of a name selects groundray's own mesh of that tolerance.
 //
@@ -18,8 +18,8 @@
 #include <vector>
 
 #include "terrain/terrain_mesh.h"
-#include "test/support/scans/mesh_topology.h"
-#include "test/support/terrain/mesh_oracle.h"
+#include "terrain/judge/mesh_topology.h"
+#include "terrain/judge/mesh_deviation.h"
 
 namespace groundray::benchmark {
 namespace {
@@ -51,8 +51,8 @@ TerrainMesh mesh_of(const HeightGrid& grid, const std::filesystem::path& folder,
 }
 
 void report(const HeightGrid& grid, const std::string& name, const TerrainMesh& mesh) {
-  const auto faults = testing::topology_faults(grid, mesh.vertices, mesh.triangles);
-  const auto found = testing::largest_deviation(grid, mesh.vertices, mesh.triangles);
+  const auto faults = judge::topology_faults(grid, mesh.vertices, mesh.triangles);
+  const auto found = judge::largest_deviation(grid, mesh.vertices, mesh.triangles);
   fmt::print(R"({{"name": "{}", "triangles": {}, "largest_m": {}, "place": [{}, {}], "rms_m": {}, )"
              R"("conforming": {}}})"
              "\n",

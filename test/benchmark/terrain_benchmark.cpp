@@ -16,8 +16,8 @@
 #include "test/benchmark/landscape.h"
 #include "test/benchmark/pointer_quadtree.h"
 #include "test/benchmark/timing.h"
-#include "test/support/scans/mesh_topology.h"
-#include "test/support/terrain/mesh_oracle.h"
+#include "terrain/judge/mesh_topology.h"
+#include "terrain/judge/mesh_deviation.h"
 
 namespace groundray::benchmark {
 namespace {
@@ -53,10 +53,10 @@ void terrain_mesh(::benchmark::State& state) {
   const MeshBound bound{.tolerance_m = static_cast<double>(state.range(0))};
   {
     const TerrainMesh mesh = build_terrain_mesh(mountains(), bound, block_cells);
-    const auto found = testing::largest_deviation(mountains(), mesh.vertices, mesh.triangles);
+    const auto found = judge::largest_deviation(mountains(), mesh.vertices, mesh.triangles);
     if (found.largest_m > bound.tolerance_m * (1 + 1e-15))
       return state.SkipWithError("the mesh is too far off");
-    if (!testing::topology_faults(mountains(), mesh.vertices, mesh.triangles).empty()) {
+    if (!judge::topology_faults(mountains(), mesh.vertices, mesh.triangles).empty()) {
       return state.SkipWithError("the mesh does not conform");
     }
     state.counters["largest_m"] = found.largest_m;

@@ -14,18 +14,16 @@
 #include "terrain/dem/dem_io.h"
 #include "terrain/terrain_mesh.h"
 #include "test/support/margin.h"
-#include "test/support/scans/mesh_topology.h"
+#include "terrain/judge/mesh_topology.h"
 #include "test/support/temporary_folder.h"
 #include "test/support/terrain/adversarial_terrain.h"
-#include "test/support/terrain/mesh_oracle.h"
+#include "terrain/judge/mesh_deviation.h"
 #include "test/support/terrain/sample_terrain.h"
 
 namespace groundray::terrain_mesh_proof_test {
 namespace {
 
 using ::testing::IsEmpty;
-using testing::largest_deviation;
-using testing::MeshDeviation;
 using testing::proof_size;
 
 constexpr std::array tolerances_m{0.1, 0.3, 1.0, 3.0, 10.0, 50.0};
@@ -55,7 +53,7 @@ double allowed_m(const HeightGrid& grid, const MeshBound& bound, const glm::dvec
 // Checks a mesh against all guarantees that hold for any mesh.
 void expect_keeps_its_promises(const HeightGrid& grid, const MeshBound& bound,
                                const TerrainMesh& mesh) {
-  const auto faults = testing::topology_faults(grid, mesh.vertices, mesh.triangles);
+  const auto faults = judge::topology_faults(grid, mesh.vertices, mesh.triangles);
   ASSERT_THAT(faults, IsEmpty());
   ASSERT_EQ(mesh.levels.size(), mesh.triangles.size());
   ASSERT_TRUE(std::ranges::is_sorted(mesh.levels));
@@ -68,7 +66,7 @@ void expect_keeps_its_promises(const HeightGrid& grid, const MeshBound& bound,
   EXPECT_GT(a.x * b.y - a.y * b.x, 0) << "triangles must be counter-clockwise from above";
 
   const auto allowed = [&](const glm::dvec3& point) { return allowed_m(grid, bound, point); };
-  const MeshDeviation found = largest_deviation(grid, mesh.vertices, mesh.triangles, allowed);
+  const judge::MeshDeviation found = judge::largest_deviation(grid, mesh.vertices, mesh.triangles, allowed);
   const double heights_m = std::max(std::abs(grid.min_height_m()), std::abs(grid.max_height_m()));
   EXPECT_LE(found.largest_excess_m, rounding * heights_m)
       << found.largest_m << " m at (" << found.place.x << ", " << found.place.y << ")";
@@ -210,7 +208,7 @@ TEST(TerrainMeshProof, ZeroToleranceKeepsEveryFacetOfNoise) {
       const TerrainMesh mesh = build_terrain_mesh(noise, {}, block_cells);
       // There are as many triangles as facets and none deviates: they are the facets.
       EXPECT_EQ(std::ssize(mesh.triangles), 2 * (size.x - 1) * (size.y - 1));
-      EXPECT_LT(largest_deviation(noise, mesh.vertices, mesh.triangles).largest_m,
+      EXPECT_LT(judge::largest_deviation(noise, mesh.vertices, mesh.triangles).largest_m,
                 oracle_rounding_m);
       expect_keeps_its_promises(noise, {}, mesh);
     }
@@ -221,7 +219,7 @@ TEST(TerrainMeshProof, ZeroToleranceHasNoDeviation) {
   for (const auto& [name, grid] : testing::adversarial_terrain()) {
     SCOPED_TRACE(name);
     const TerrainMesh mesh = build_terrain_mesh(grid, {});
-    EXPECT_LT(largest_deviation(grid, mesh.vertices, mesh.triangles).largest_m, oracle_rounding_m);
+    EXPECT_LT(judge::largest_deviation(grid, mesh.vertices, mesh.triangles).largest_m, oracle_rounding_m);
   }
 }
 

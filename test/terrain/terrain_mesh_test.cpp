@@ -15,7 +15,7 @@
 #include "core/error.h"
 #include "core/random.h"
 #include "terrain/lod/deviation.h"
-#include "test/support/scans/mesh_topology.h"
+#include "terrain/judge/mesh_topology.h"
 #include "test/support/terrain/leaf_triangles.h"
 #include "test/support/terrain/sample_terrain.h"
 #include "test/support/terrain/shuffled_runner.h"
@@ -102,7 +102,7 @@ TEST(TerrainMesh, TrianglesMatchTheLeaves) {
                                    bound.angle_rad));
           const TerrainMesh mesh = build_terrain_mesh(grid, bound, block_cells);
           EXPECT_TRUE(pieces_of(mesh) == pieces_of_leaves(grid, bound, block_cells));
-          EXPECT_THAT(groundray::testing::topology_faults(grid, mesh.vertices, mesh.triangles),
+          EXPECT_THAT(judge::topology_faults(grid, mesh.vertices, mesh.triangles),
                       IsEmpty());
         }
       }

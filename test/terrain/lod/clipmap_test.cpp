@@ -13,9 +13,9 @@
 #include <tuple>
 #include <utility>
 
-#include "test/support/scans/mesh_topology.h"
+#include "terrain/judge/mesh_topology.h"
 #include "test/support/terrain/leaf_triangles.h"
-#include "test/support/terrain/mesh_oracle.h"
+#include "terrain/judge/mesh_deviation.h"
 #include "test/support/terrain/sample_clipmap.h"
 #include "test/support/terrain/sample_terrain.h"
 
@@ -156,7 +156,7 @@ TEST(ClipmapProof, LeavesOfAllWindowsFormOneConformingSurface) {
                             sensor_at(random_place(grid, Seed{36}, i)));
       const Mesh mesh = mesh_of(grid, all_leaves(clipmap));
       if (holes == 0) {
-        ASSERT_THAT(testing::topology_faults(grid, mesh.vertices, mesh.triangles),
+        ASSERT_THAT(judge::topology_faults(grid, mesh.vertices, mesh.triangles),
                     ::testing::IsEmpty());
       } else {
         EXPECT_TRUE(uses_no_edge_twice_the_same_way(mesh));
@@ -166,7 +166,7 @@ TEST(ClipmapProof, LeavesOfAllWindowsFormOneConformingSurface) {
         float most_m = 0;
         for (const Leaf& leaf : level.leaves) most_m = std::max(most_m, leaf.deviation_m);
         const Mesh own = mesh_of(grid, level.leaves);
-        const auto found = testing::largest_deviation(grid, own.vertices, own.triangles);
+        const auto found = judge::largest_deviation(grid, own.vertices, own.triangles);
         ASSERT_LE(found.largest_m, most_m) << "cells of " << level.step << " at " << i;
       }
     }
@@ -182,13 +182,13 @@ TEST(Clipmap, AngularToleranceHoldsEverywhere) {
     const Clipmap clipmap(tiles, grid.frame(), settings, sensor_at(p));
     const Mesh mesh = mesh_of(grid, all_leaves(clipmap));
     const auto found =
-        testing::largest_deviation(grid, mesh.vertices, mesh.triangles, [&](const glm::dvec3& at) {
+        judge::largest_deviation(grid, mesh.vertices, mesh.triangles, [&](const glm::dvec3& at) {
           const glm::dvec3 q(grid.origin_m() + glm::dvec2(at) * grid.step_m(), at.z);
           // A leaf's bound applies at its nearest point; this point is at least as far away.
           return std::max(settings.tolerance_m, settings.angle_rad * glm::length(q - p));
         });
     EXPECT_LE(found.largest_excess_m, 1e-12) << i;
-    EXPECT_THAT(testing::topology_faults(grid, mesh.vertices, mesh.triangles),
+    EXPECT_THAT(judge::topology_faults(grid, mesh.vertices, mesh.triangles),
                 ::testing::IsEmpty());
     EXPECT_LT(mesh.triangles.size(), 2u * 512 * 512);
   }

@@ -15,11 +15,11 @@
 #include "terrain/relief/refined_tiles.h"
 #include "terrain/terrain.h"
 #include "terrain/terrain_scene.h"
-#include "test/support/scans/mesh_topology.h"
+#include "terrain/judge/mesh_topology.h"
 #include "test/support/temporary_folder.h"
 #include "test/support/terrain/geotiff.h"
 #include "test/support/terrain/leaf_triangles.h"
-#include "test/support/terrain/mesh_oracle.h"
+#include "terrain/judge/mesh_deviation.h"
 #include "test/support/terrain/reference_tracer.h"
 #include "test/support/terrain/sample_clipmap.h"
 #include "test/support/terrain/sample_terrain.h"
@@ -247,9 +247,9 @@ TEST(ReliefProof, LeavesOfAllLevelsFormOneSurfaceWithinTheirBound) {
     }
     EXPECT_GT(largest_step, 1 << of.relief->exponent());
     const Mesh mesh = mesh_of(of.grid, clipmap);
-    EXPECT_THAT(testing::topology_faults(of.grid, mesh.vertices, mesh.triangles),
+    EXPECT_THAT(judge::topology_faults(of.grid, mesh.vertices, mesh.triangles),
                 ::testing::IsEmpty());
-    const auto found = testing::largest_deviation(
+    const auto found = judge::largest_deviation(
         of.grid, mesh.vertices, mesh.triangles, [&](const glm::dvec3& point) {
           const glm::dvec3 q(of.grid.origin_m() + glm::dvec2(point) * of.grid.step_m(), point.z);
           // A leaf's bound applies at its nearest point; this point is at least as far away.

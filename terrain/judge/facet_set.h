@@ -8,7 +8,10 @@
 
 #include "core/geometry/height_grid.h"
 
-namespace groundray::testing {
+namespace groundray::judge {
+
+/// Number type of heights: 64 bits of mantissa on x86.
+using Real = long double;
 
 /// Columns and rows of a triangle's corners.
 using Corners = std::array<glm::ivec2, 3>;
@@ -80,4 +83,4 @@ class FacetSet {
   glm::ivec2 last_;
 };
 
-}  // namespace groundray::testing
+}  // namespace groundray::judge

@@ -1,4 +1,4 @@
-#include "test/support/terrain/mesh_oracle.h"
+#include "terrain/judge/mesh_deviation.h"
 
 #include <gmock/gmock.h>
 #include <gtest/gtest.h>
@@ -11,12 +11,12 @@
 #include <limits>
 #include <random>
 
-#include "test/support/scans/mesh_topology.h"
+#include "terrain/judge/mesh_topology.h"
 #include "test/support/terrain/adversarial_terrain.h"
 #include "test/support/terrain/reference_tracer.h"
 #include "test/support/terrain/sample_terrain.h"
 
-namespace groundray::testing::mesh_oracle_test {
+namespace groundray::testing::mesh_deviation_test {
 namespace {
 
 using ::testing::ElementsAre;
@@ -58,7 +58,7 @@ SampleMesh facets_of(const HeightGrid& grid) {
 }
 
 std::vector<std::string> faults_of(const HeightGrid& grid, const SampleMesh& mesh) {
-  return topology_faults(grid, mesh.vertices, mesh.triangles);
+  return judge::topology_faults(grid, mesh.vertices, mesh.triangles);
 }
 
 TEST(MeshOracle, ReferenceSurfaceHasNoFaultsAndNoDeviation) {
@@ -66,7 +66,7 @@ TEST(MeshOracle, ReferenceSurfaceHasNoFaultsAndNoDeviation) {
     SCOPED_TRACE(name);
     const SampleMesh mesh = facets_of(grid);
     EXPECT_THAT(faults_of(grid, mesh), IsEmpty());
-    const MeshDeviation found = largest_deviation(grid, mesh.vertices, mesh.triangles);
+    const judge::MeshDeviation found = judge::largest_deviation(grid, mesh.vertices, mesh.triangles);
     EXPECT_EQ(found.largest_m, 0);
     EXPECT_EQ(found.rms_m, 0);
     EXPECT_EQ(found.over_missing, 0u);
@@ -78,12 +78,12 @@ TEST(MeshOracle, CellSplitAlongTheOtherDiagonalDeviatesMostAtItsCentre) {
   const HeightGrid grid({2, 2}, {0, 0}, {1, 1}, {1, 2, 4, 16});
   const std::vector<glm::ivec2> vertices{{0, 0}, {1, 0}, {0, 1}, {1, 1}};
   const std::vector<glm::uvec3> triangles{{0, 1, 3}, {0, 3, 2}};
-  const MeshDeviation found = largest_deviation(grid, vertices, triangles);
+  const judge::MeshDeviation found = judge::largest_deviation(grid, vertices, triangles);
   EXPECT_EQ(found.largest_m, (1 + 16) / 2.0 - (2 + 4) / 2.0);
   EXPECT_EQ(found.place, glm::dvec2(0.5, 0.5));
   EXPECT_EQ(found.samples, 4u);
   EXPECT_EQ(found.rms_m, 0);
-  EXPECT_THAT(topology_faults(grid, vertices, triangles), IsEmpty());
+  EXPECT_THAT(judge::topology_faults(grid, vertices, triangles), IsEmpty());
 }
 
 TEST(MeshOracle, AllowedDeviationIsEvaluatedOnTheReferenceSurface) {
@@ -91,7 +91,7 @@ TEST(MeshOracle, AllowedDeviationIsEvaluatedOnTheReferenceSurface) {
   const std::vector<glm::ivec2> vertices{{0, 0}, {1, 0}, {0, 1}, {1, 1}};
   const std::vector<glm::uvec3> triangles{{0, 1, 3}};
   const auto allowed_m = [](const glm::dvec3& p) { return 10 * p.x * p.y + p.z; };
-  const MeshDeviation found = largest_deviation(grid, vertices, triangles, allowed_m);
+  const judge::MeshDeviation found = judge::largest_deviation(grid, vertices, triangles, allowed_m);
   EXPECT_EQ(found.largest_excess_m, std::max({5.5 - (2.5 + 3), 0 - 1.0, 0 - 2.0, 0 - 26.0}));
 }
 
@@ -125,7 +125,7 @@ TEST(MeshOracle, NoPointOfATriangleExceedsTheLargestDeviation) {
       return std::abs(height_m - reference_height_m(noise, point_m.x, point_m.y));
     };
     const std::vector<glm::uvec3> one{{0, 1, 2}};
-    const MeshDeviation found = largest_deviation(noise, t, one);
+    const judge::MeshDeviation found = judge::largest_deviation(noise, t, one);
     double most_m = 0;
     for (int i = 0; i < 2000; ++i) {
       const double a = std::sqrt(share(random));
@@ -151,7 +151,7 @@ TEST(MeshOracle, TrianglesOverMissingFacetsAreCounted) {
   const HeightGrid grid({5, 5}, {0, 0}, {1, 1}, heights);
   const std::vector<glm::ivec2> vertices{{0, 0}, {4, 0}, {0, 4}, {4, 4}, {2, 2}, {2, 1}, {2, 3}};
   const auto over_missing = [&](const std::vector<glm::uvec3>& triangles) {
-    return largest_deviation(grid, vertices, triangles).over_missing;
+    return judge::largest_deviation(grid, vertices, triangles).over_missing;
   };
   EXPECT_EQ(over_missing({{1, 3, 2}}), 1u);
   // The facet (2, 2) (3, 1) (3, 2) is missing; its neighbour across the edge from (2, 2) to (3, 1)
@@ -222,4 +222,4 @@ TEST(MeshOracle, MeshMustEndAtTheBoundaryOfAHole) {
 }
 
 }  // namespace
-}  // namespace groundray::testing::mesh_oracle_test
+}  // namespace groundray::testing::mesh_deviation_test

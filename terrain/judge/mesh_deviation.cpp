@@ -1,13 +1,12 @@
-#include "test/support/terrain/mesh_oracle.h"
+#include "terrain/judge/mesh_deviation.h"
 
 #include <algorithm>
 #include <cmath>
 #include <cstdint>
 
-#include "test/support/real.h"
-#include "test/support/terrain/facet_set.h"
+#include "terrain/judge/facet_set.h"
 
-namespace groundray::testing {
+namespace groundray::judge {
 namespace {
 
 std::int64_t floor_of(std::int64_t numerator, std::int64_t denominator) {
@@ -220,4 +219,4 @@ MeshDeviation largest_deviation(const HeightGrid& grid, std::span<const glm::ive
   return search.found();
 }
 
-}  // namespace groundray::testing
+}  // namespace groundray::judge

@@ -8,7 +8,7 @@
 
 #include "core/geometry/height_grid.h"
 
-namespace groundray::testing {
+namespace groundray::judge {
 
 /// Returns the reasons why the triangles do not cover the facets of `grid` exactly once without
 /// T-junctions; empty if they do. All tests are in integers. The rules:
@@ -21,4 +21,4 @@ std::vector<std::string> topology_faults(const HeightGrid& grid,
                                          std::span<const glm::ivec2> vertices,
                                          std::span<const glm::uvec3> triangles);
 
-}  // namespace groundray::testing
+}  // namespace groundray::judge

@@ -1,13 +1,13 @@
-#include "test/support/scans/mesh_topology.h"
+#include "terrain/judge/mesh_topology.h"
 
 #include <fmt/format.h>
 
 #include <algorithm>
 #include <cstdint>
 
-#include "test/support/terrain/facet_set.h"
+#include "terrain/judge/facet_set.h"
 
-namespace groundray::testing {
+namespace groundray::judge {
 namespace {
 
 // V, E and F of the existing facets.
@@ -165,4 +165,4 @@ std::vector<std::string> topology_faults(const HeightGrid& grid,
   return TopologyCheck(grid, vertices, triangles).faults();
 }
 
-}  // namespace groundray::testing
+}  // namespace groundray::judge

@@ -9,7 +9,7 @@
 
 #include "core/geometry/height_grid.h"
 
-namespace groundray::testing {
+namespace groundray::judge {
 
 /// Deviation of a mesh from the reference surface, and the part of the surface that it covers.
 struct MeshDeviation {
@@ -44,4 +44,4 @@ MeshDeviation largest_deviation(const HeightGrid& grid, std::span<const glm::ive
                                 std::span<const glm::uvec3> triangles,
                                 const AllowedDeviation& allowed_m = {});
 
-}  // namespace groundray::testing
+}  // namespace groundray::judge
