@@ -17,6 +17,7 @@
 #include "apps/golden/compare/mesh_comparison.h"
 #include "apps/golden/compare/scans/scan_comparison.h"
 #include "apps/golden/compare/subject.h"
+#include "apps/golden/conform/conform_commands.h"
 #include "apps/golden/report.h"
 #include "apps/golden/suite/checks.h"
 #include "apps/golden/suite/golden_case.h"
@@ -185,18 +186,8 @@ struct CompareCommand {
                             {"other", other.string()}},
                   .sections = {}};
     report.sections.push_back(compare());
-    const Section& section = report.sections.front();
-    if (!section.text.empty()) fmt::print("{}\n", section.text);
-    for (const Measure& measure : section.measures) {
-      fmt::print("{}{}: {:.6g}{}{}{}\n", measure.verdict == Verdict::Failed ? "FAILED " : "",
-                 measure.name, measure.value, measure.unit.empty() ? "" : " ", measure.unit,
-                 measure.limit ? fmt::format(", at most {:.6g}", *measure.limit) : "");
-    }
-    fs::create_directories(out);
-    write_html(out / "report.html", report);
-    write_json(out / "report.json", report);
-    fmt::print("see {}\n", (out / "report.html").string());
-    return section.verdict;
+    publish(report, out);
+    return report.sections.front().verdict;
   }
 };
 
@@ -281,12 +272,26 @@ int run(int argc, char** argv) {
       "compare", "Compare a scan, image, DEM or mesh from any source with a reference");
   compare.add_to(compare_command);
 
+  PassesCommand passes;
+  auto* passes_command = app.add_subcommand(
+      "passes", "Write what each pass of the mesher and each ray yields for a DEM, as NPY");
+  passes.add_to(passes_command);
+  ConformCommand conform;
+  auto* conform_command = app.add_subcommand(
+      "conform", "Judge another mesher or tracer, such as a GPU's, by the arrays of `passes`");
+  conform.add_to(conform_command);
+
   try {
     app.parse(argc, argv);
   } catch (const CLI::ParseError& error) {
     return app.exit(error) == 0 ? done : wrong_usage;
   }
   if (compare_command->parsed()) return compare.run() == Verdict::Failed ? failed : done;
+  if (conform_command->parsed()) return conform.run() == Verdict::Failed ? failed : done;
+  if (passes_command->parsed()) {
+    passes.run();
+    return done;
+  }
   catch_interruptions();  // finished files remain complete
   return run_command->parsed() ? run_suite(folder, filters, options)
                                : accept(folder, names, options);

@@ -194,6 +194,16 @@ std::optional<std::string> fault_of(const NpyHeader& header) {
   return std::nullopt;
 }
 
+// Checks that as many bytes follow the header as it declares.
+void check_size(std::size_t rows, std::size_t item_bytes, std::size_t bytes) {
+  if (rows > std::numeric_limits<std::size_t>::max() / std::max<std::size_t>(item_bytes, 1) ||
+      rows * item_bytes != bytes) {
+    throw Error(
+        "the header declares {} numbers or rows of {} bytes, but {} bytes follow: is it truncated?",
+        rows, item_bytes, bytes);
+  }
+}
+
 void check_columns(std::size_t columns) {
   constexpr const char* fix = "transpose it, or save it in parts";
   if (columns > most_columns) throw Error("a row has more than {} numbers: {}", most_columns, fix);
@@ -210,12 +220,7 @@ NpyArray parse_numbers(std::string_view bytes, NpyHeader header) {
     item_bytes += field.bytes();
   }
   if (item_bytes > (std::size_t{1} << 32)) throw Error("a row is longer than 4 GiB");
-  if (rows > std::numeric_limits<std::size_t>::max() / std::max<std::size_t>(item_bytes, 1) ||
-      rows * item_bytes != bytes.size()) {
-    throw Error(
-        "the header declares {} numbers or rows of {} bytes, but {} bytes follow: is it truncated?",
-        rows, item_bytes, bytes.size());
-  }
+  check_size(rows, item_bytes, bytes.size());
   std::string reordered;
   if (header.is_fortran && header.shape.size() > 1) {
     reordered = in_c_order(bytes, header.shape, item_bytes);
@@ -293,11 +298,30 @@ NpzFile parse_npz(std::string_view bytes, const std::string& name) {
   return file;
 }
 
-void write_npy(const std::filesystem::path& path, const std::vector<NpyField>& fields,
-               std::size_t rows, std::span<const std::byte> bytes) {
+RawNpy read_raw_npy(const std::filesystem::path& path) {
+  try {
+    const std::string text = read_text(path);
+    std::string_view bytes = text;
+    const NpyHeader header = take_npy_header(bytes);
+    if (const auto fault = fault_of(header)) throw Error("{}", *fault);
+    if (header.is_structured) throw Error("it is structured; save a plain array");
+    const RowField& item = header.fields.front();
+    check_size(product_of(header.shape), item.item_bytes, bytes.size());
+    return {
+        *item.type, item.order, header.shape,
+        header.is_fortran ? in_c_order(bytes, header.shape, item.item_bytes) : std::string(bytes)};
+  } catch (const Error& rule) {
+    throw Error("{}: {}", path.string(), rule.what());
+  }
+}
+
+namespace {
+
+void write_file(const std::filesystem::path& path, std::string_view descr, std::string_view shape,
+                std::span<const std::byte> bytes) {
   constexpr std::size_t alignment = 64;  // of the data in the file, as in files by NumPy
-  std::string text = fmt::format("{{'descr': {}, 'fortran_order': False, 'shape': ({},), }}",
-                                 descr_of(fields), rows);
+  std::string text =
+      fmt::format("{{'descr': {}, 'fortran_order': False, 'shape': ({}), }}", descr, shape);
   const std::size_t preamble = 10;
   text.append(alignment - 1 - (preamble + text.size()) % alignment, ' ');
   text += '\n';
@@ -317,6 +341,19 @@ void write_npy(const std::filesystem::path& path, const std::vector<NpyField>& f
         return {};
     }
   });
+}
+
+}  // namespace
+
+void write_npy(const std::filesystem::path& path, const std::vector<NpyField>& fields,
+               std::size_t rows, std::span<const std::byte> bytes) {
+  write_file(path, descr_of(fields), fmt::format("{},", rows), bytes);
+}
+
+void write_npy(const std::filesystem::path& path, std::string_view type,
+               std::span<const std::uint64_t> shape, std::span<const std::byte> bytes) {
+  write_file(path, fmt::format("'{}'", type),
+             fmt::format("{}{}", fmt::join(shape, ", "), shape.size() == 1 ? "," : ""), bytes);
 }
 
 }  // namespace groundray

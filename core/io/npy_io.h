@@ -29,6 +29,23 @@ struct NpyField {
 void write_npy(const std::filesystem::path& path, const std::vector<NpyField>& fields,
                std::size_t rows, std::span<const std::byte> bytes);
 
+/// Writes an array of any shape in C order, as write_npy.
+/// @param type  of its numbers, in NumPy's notation.
+void write_npy(const std::filesystem::path& path, std::string_view type,
+               std::span<const std::uint64_t> shape, std::span<const std::byte> bytes);
+
+/// Plain array as stored, in C order.
+struct RawNpy {
+  NumberType type = NumberType::Float32;
+  ByteOrder order = ByteOrder::Little;
+  std::vector<std::uint64_t> shape;
+  std::string bytes;
+};
+
+/// Reads an array of numbers of any shape, but not a structured one.
+/// @throws Error as read_npy, or if the array is structured.
+RawNpy read_raw_npy(const std::filesystem::path& path);
+
 /// NumPy array as a table. A structured array has one column for each field, with the field's name;
 /// a field of several numbers becomes columns with the suffixes `_0`, `_1`, .... A plain array of
 /// shape (n,) or () has one column with an empty name, and one of shape (..., k) has k columns
