@@ -5,12 +5,14 @@
 #include <cmath>
 #include <filesystem>
 #include <fstream>
+#include <memory>
 #include <regex>
 #include <string>
 #include <vector>
 
 #include "core/geometry/height_grid.h"
 #include "terrain/lod/quadtree.h"
+#include "test/device/driver_device.h"
 #include "test/device/host_arrays.h"
 #include "test/device/opencl_device.h"
 #include "test/support/terrain/adversarial_terrain.h"
@@ -22,7 +24,10 @@ namespace {
 
 constexpr std::size_t most_bytes = std::size_t{64} << 20;  // of all arrays of a run
 
+using testing::DriverDevice;
 using testing::HostArrays;
+using testing::KernelCode;
+using testing::KernelDevice;
 using testing::NamedTerrain;
 using testing::OpenClDevice;
 using testing::PassResults;
@@ -71,19 +76,52 @@ std::vector<MeshBound> bounds_of(const HeightGrid& grid) {
            .cell_m = cell_m}};
 }
 
-class OnDevice : public ::testing::Test {
+// The fakes are fake_driver.cpp: they show that the runners give a driver what it expects, no more.
+enum class Backend { OpenCl, Cuda, Hip, FakeCuda, FakeHip };
+
+std::unique_ptr<KernelDevice> open_device(Backend backend, const KernelCode& code,
+                                          HostArrays& arrays) {
+  using enum DriverDevice::Api;
+  const std::string fake = (kernels() / "libfake_driver.so").string();
+  switch (backend) {
+    case Backend::OpenCl:
+      break;
+    case Backend::Cuda:
+      return std::make_unique<DriverDevice>(Cuda, code, arrays);
+    case Backend::Hip:
+      return std::make_unique<DriverDevice>(Hip, code, arrays);
+    case Backend::FakeCuda:
+      return std::make_unique<DriverDevice>(Cuda, code, arrays, fake);
+    case Backend::FakeHip:
+      return std::make_unique<DriverDevice>(Hip, code, arrays, fake);
+  }
+  // Where PoCL keeps what it compiled.
+  ::setenv("POCL_CACHE_DIR", (kernels() / "cache").c_str(), 0);
+  return std::make_unique<OpenClDevice>(code, arrays);
+}
+
+class OnDevice : public ::testing::TestWithParam<Backend> {
  protected:
   void SetUp() override {
-    const auto name = OpenClDevice::name();
-    if (!name) GTEST_SKIP() << "there is no OpenCL device with double precision";
-    fmt::print("device: {}\n", *name);
-    // Where PoCL keeps what it compiled.
-    ::setenv("POCL_CACHE_DIR", (kernels() / "cache").c_str(), 0);
+    try {
+      device_ = open_device(GetParam(), testing::read_kernels(kernels() / "sound"), arrays_);
+    } catch (const testing::NoDevice& reason) {
+      GTEST_SKIP() << reason.what();
+    }
+    fmt::print("device: {}\n", device_->name());
   }
+
+  HostArrays arrays_{most_bytes};
+  std::unique_ptr<KernelDevice> device_;
 };
 
+INSTANTIATE_TEST_SUITE_P(OpenCl, OnDevice, ::testing::Values(Backend::OpenCl));
+INSTANTIATE_TEST_SUITE_P(Cuda, OnDevice, ::testing::Values(Backend::Cuda));
+INSTANTIATE_TEST_SUITE_P(Hip, OnDevice, ::testing::Values(Backend::Hip));
+INSTANTIATE_TEST_SUITE_P(Fake, OnDevice, ::testing::Values(Backend::FakeCuda, Backend::FakeHip));
+
 // Returns where the device's arrays differ from the CPU's; empty if nowhere.
-std::string difference_on(OpenClDevice& device, HostArrays& arrays, const HeightGrid& dem,
+std::string difference_on(KernelDevice& device, HostArrays& arrays, const HeightGrid& dem,
                           const MeshBound& bound, int block_cells) {
   const PassResults expected = testing::results_of(dem, bound, block_cells, {});
   std::string difference;
@@ -115,43 +153,63 @@ struct Ties {
   }
 };
 
-TEST_F(OnDevice, PassesWriteTheSameBytesForTheWholeDem) {
-  HostArrays arrays(most_bytes);
-  OpenClDevice device(kernels() / "sound", arrays);
+TEST_P(OnDevice, PassesWriteTheSameBytesForTheWholeDem) {
   for (const NamedTerrain& terrain : terrains()) {
     for (const int block_cells : {2, 4, 8, 64}) {
       for (const MeshBound& bound : bounds_of(terrain.grid)) {
-        EXPECT_EQ(difference_on(device, arrays, terrain.grid, bound, block_cells), "")
+        EXPECT_EQ(difference_on(*device_, arrays_, terrain.grid, bound, block_cells), "")
             << terrain.name << ", " << block_cells << " cells, angle " << bound.angle_rad;
       }
     }
   }
 }
 
-TEST_F(OnDevice, PassesWriteTheSameBytesForTies) {
-  HostArrays arrays(most_bytes);
-  OpenClDevice device(kernels() / "sound", arrays);
+TEST_P(OnDevice, PassesWriteTheSameBytesForTies) {
   const Ties ties;
   for (const MeshBound& bound : ties.bounds)
-    EXPECT_EQ(difference_on(device, arrays, ties.grid, bound, 2), "") << bound.tolerance_m;
+    EXPECT_EQ(difference_on(*device_, arrays_, ties.grid, bound, 2), "") << bound.tolerance_m;
 }
 
-// The faults are listed in CMakeLists.txt.
-TEST_F(OnDevice, FindsFaultsOfKernels) {
+// The faults are listed in CMakeLists.txt. They show that the comparison finds them, so one device
+// is enough.
+TEST(OpenCl, FindsFaultsOfKernels) {
   const Ties ties;
   const HeightGrid floats = testing::fractal(129, 2, 40, Seed{3});
   std::size_t faults = 0;
   for (const auto& folder : std::filesystem::directory_iterator(kernels() / "faults")) {
     HostArrays arrays(most_bytes);
-    OpenClDevice device(folder.path(), arrays);
-    std::string found = difference_on(device, arrays, floats, bounds_of(floats).back(), 2);
+    std::unique_ptr<KernelDevice> device;
+    try {
+      device = open_device(Backend::OpenCl, testing::read_kernels(folder.path()), arrays);
+    } catch (const testing::NoDevice& reason) {
+      GTEST_SKIP() << reason.what();
+    }
+    std::string found = difference_on(*device, arrays, floats, bounds_of(floats).back(), 2);
     for (std::size_t i = 0; i < ties.bounds.size() && found.empty(); ++i)
-      found = difference_on(device, arrays, ties.grid, ties.bounds[i], 2);
+      found = difference_on(*device, arrays, ties.grid, ties.bounds[i], 2);
     EXPECT_NE(found, "") << folder.path().filename();
     fmt::print("{}: {}\n", folder.path().filename().string(), found);
     ++faults;
   }
   EXPECT_EQ(faults, 4u);
+}
+
+// Returns the message of opening CUDA's driver with a module.
+std::string fault_of_cuda(const std::string& ptx, const std::string& library) {
+  HostArrays arrays(most_bytes);
+  try {
+    const DriverDevice device(DriverDevice::Api::Cuda, {.ptx = ptx}, arrays, library);
+  } catch (const std::runtime_error& fault) {
+    return fault.what();
+  }
+  return "";
+}
+
+TEST(Driver, FaultsHaveItsLogAndFile) {
+  EXPECT_EQ(fault_of_cuda("no PTX", (kernels() / "libfake_driver.so").string()),
+            "CUDA rejects the kernels: error 200 no entry of a kernel");
+  EXPECT_EQ(fault_of_cuda("", "/no/driver.so"),
+            "there is no driver: /no/driver.so cannot be opened");
 }
 
 std::size_t count_in(const std::filesystem::path& file, const std::string& pattern) {
@@ -167,9 +225,9 @@ std::size_t count_in(const std::filesystem::path& file, const std::string& patte
 // not all devices round correctly.
 TEST(Kernels, FuseNoOperations) {
   constexpr std::size_t passes = 12;
-  EXPECT_EQ(count_in(kernels() / "passes.ptx", R"(^\s*(fma|div)\.[a-z]*\.f64)"), 0u);
+  EXPECT_EQ(count_in(kernels() / "sound/passes.ptx", R"(^\s*(fma|div)\.[a-z]*\.f64)"), 0u);
   EXPECT_GT(count_in(kernels() / "passes.fused.ptx", R"(^\s*fma\.rn\.f64)"), 0u);
-  EXPECT_EQ(count_in(kernels() / "passes.ptx", R"(\.entry )"), passes);
+  EXPECT_EQ(count_in(kernels() / "sound/passes.ptx", R"(\.entry )"), passes);
   EXPECT_EQ(count_in(kernels() / "passes.gcn", R"(^\s*v_(fma|fmac|mad|mac|div\w*)_f64)"), 0u);
   constexpr const char* contraction_off = R"(ExecutionMode \d+ 31 *$)";
   EXPECT_EQ(count_in(kernels() / "sound/passes.spt", contraction_off), passes);
