@@ -20,6 +20,7 @@ HostArrays::HostArrays(std::size_t bytes) : size_(bytes) {
   void* const memory = mmap(nullptr, bytes, PROT_READ | PROT_WRITE,
                             MAP_PRIVATE | MAP_ANONYMOUS | MAP_NORESERVE, -1, 0);
   if (memory == MAP_FAILED) throw std::bad_alloc();
+  madvise(memory, bytes, MADV_HUGEPAGE);  // fewer pages change when arrays become unreachable
   begin_ = static_cast<std::byte*>(memory);
   first = begin_;
   last = begin_ + bytes;
