@@ -3,8 +3,8 @@
 #include <fmt/format.h>
 
 #include <algorithm>
-#include <atomic>
 #include <chrono>
+#include <cmath>
 #include <cstdlib>
 #include <fstream>
 #include <limits>
@@ -16,26 +16,6 @@
 #include "test/device/embedded_kernels.h"
 #include "test/device/opencl_device.h"
 #include "test/support/terrain/pass_results.h"
-
-namespace groundray {
-
-// In place of terrain/lod/pass.cpp, which needs oneTBB.
-void run_in_parallel(std::size_t count,
-                     const std::function<void(std::size_t begin, std::size_t end)>& work) {
-  constexpr std::size_t parts_of_a_thread = 8;
-  const std::size_t threads = std::thread::hardware_concurrency();
-  const std::size_t part = std::max<std::size_t>(1, count / (threads * parts_of_a_thread));
-  std::atomic<std::size_t> next = 0;
-  const auto run_parts = [&] {
-    for (std::size_t begin; (begin = next.fetch_add(part)) < count;)
-      work(begin, std::min(begin + part, count));
-  };
-  std::vector<std::jthread> others;
-  for (std::size_t i = 1; i < std::min(threads, count / part); ++i) others.emplace_back(run_parts);
-  run_parts();
-}
-
-}  // namespace groundray
 
 namespace groundray::device_bench {
 namespace {

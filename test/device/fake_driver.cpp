@@ -19,10 +19,10 @@ enum Status { success = 0, invalid_value = 1, invalid_image = 200, not_found = 5
 using Kernel = void(const Word* bytes, Word count, char* arrays, Word host, Word size);
 
 int context = 0, code = 0;  // their addresses are handles
-std::map<Word, std::pair<std::unique_ptr<char[]>, std::size_t>> memory;  // by its address
+std::map<std::uintptr_t, std::pair<std::unique_ptr<char[]>, std::size_t>> memory;  // by its address
 Word index_of_kernel = 0;
 
-bool is_allocated(Word address, std::size_t bytes) {
+bool is_allocated(std::uintptr_t address, std::size_t bytes) {
   auto above = memory.upper_bound(address);
   if (above == memory.begin()) return false;
   const auto& [begin, block] = *--above;

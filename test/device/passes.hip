@@ -9,7 +9,7 @@
 #include "terrain/lod/passes/selection.h"
 #pragma clang force_cuda_host_device end
 
-using Word = unsigned long;
+using Word [[gnu::may_alias]] = unsigned long;  // of any type's bytes
 
 #if defined(__NVPTX__)
 static __device__ Word global_index() {
