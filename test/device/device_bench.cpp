@@ -170,7 +170,7 @@ void measure(std::string_view backend, const char* file) {
     constexpr std::size_t address_space = std::size_t{1} << 36;
     HostArrays arrays(address_space);
     const HostArrays::Use use(&arrays);
-    const HeightGrid grid(dem);
+    const HeightGrid grid = testing::deep_copy(dem);
     const testing::PassResults found = testing::results_of(grid, bound, block_cells, {});
     used = arrays.used();
     const HostArrays::Use elsewhere(nullptr);
@@ -185,7 +185,7 @@ void measure(std::string_view backend, const char* file) {
   const auto on_device = [&](const PassRunner& runner, const auto& act) {
     {
       const HostArrays::Use use(&arrays);
-      const HeightGrid grid(dem);
+      const HeightGrid grid = testing::deep_copy(dem);
       act(grid, runner);
     }
     arrays.clear();

@@ -6,9 +6,9 @@
 #include <cstddef>
 #include <cstdint>
 #include <cstdio>
+#include <cstdlib>
 #include <cstring>
 #include <map>
-#include <memory>
 #include <string_view>
 
 #include "test/device/passes.hip"
@@ -18,15 +18,15 @@ namespace {
 enum Status { success = 0, invalid_value = 1, invalid_image = 200, not_found = 500 };
 using Kernel = void(const Word* bytes, Word count, char* arrays, Word host, Word size);
 
-int context = 0, code = 0;  // their addresses are handles
-std::map<std::uintptr_t, std::pair<std::unique_ptr<char[]>, std::size_t>> memory;  // by its address
+int context = 0, code = 0;                     // their addresses are handles
+std::map<std::uintptr_t, std::size_t> memory;  // bytes of each block, by its address
 Word index_of_kernel = 0;
 
 bool is_allocated(std::uintptr_t address, std::size_t bytes) {
   auto above = memory.upper_bound(address);
   if (above == memory.begin()) return false;
-  const auto& [begin, block] = *--above;
-  return address - begin + bytes <= block.second;
+  const auto [begin, size] = *--above;
+  return address - begin + bytes <= size;
 }
 
 }  // namespace
@@ -82,13 +82,16 @@ int cuModuleGetFunction(void** function, void* module, const char* name) {
 }
 
 int cuMemAlloc_v2(Word* address, std::size_t bytes) {
-  std::unique_ptr<char[]> block(new char[bytes]);
-  *address = reinterpret_cast<Word>(block.get());
-  memory[*address] = {std::move(block), bytes};
+  constexpr std::size_t alignment = 256;  // as CUDA promises
+  *address = reinterpret_cast<Word>(std::aligned_alloc(alignment, bytes));
+  memory[*address] = bytes;
   return success;
 }
 
-int cuMemFree_v2(Word address) { return memory.erase(address) == 1 ? success : invalid_value; }
+int cuMemFree_v2(Word address) {
+  std::free(reinterpret_cast<void*>(address));
+  return memory.erase(address) == 1 ? success : invalid_value;
+}
 
 int cuMemcpyHtoD_v2(Word to, const void* from, std::size_t bytes) {
   if (!is_allocated(to, bytes)) return invalid_value;
