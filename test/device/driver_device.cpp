@@ -121,6 +121,7 @@ struct DriverDevice::State {
     constexpr int error_log_buffer = 5, error_log_buffer_size_bytes = 6;  // CUjit_option
     std::string log(16384, '\0');
     std::array options{error_log_buffer, error_log_buffer_size_bytes};
+    // NOLINTNEXTLINE(performance-no-int-to-ptr): the driver takes numbers as pointers
     std::array<void*, 2> values{log.data(), reinterpret_cast<void*>(log.size())};
     const unsigned count = driver.is_cuda() ? 2 : 0;
     const int status =

@@ -15,7 +15,7 @@
 
 namespace {
 
-enum Status { success = 0, invalid_value = 1, invalid_image = 200, not_found = 500 };
+constexpr int success = 0, invalid_value = 1, invalid_image = 200, not_found = 500;
 using Kernel = void(const Word* bytes, Word count, char* arrays, Word host, Word size);
 
 int context = 0, code = 0;                     // their addresses are handles
@@ -31,6 +31,7 @@ bool is_allocated(std::uintptr_t address, std::size_t bytes) {
 
 }  // namespace
 
+// NOLINTBEGIN(readability-identifier-naming,bugprone-*,performance-no-int-to-ptr): CUDA's names
 extern "C" {
 
 Word _Z13get_global_idj(unsigned) { return index_of_kernel; }
@@ -157,3 +158,4 @@ ALIAS(hipEventElapsedTime, cuEventElapsedTime);
 ALIAS(hipEventDestroy, cuEventDestroy_v2);
 
 }  // extern "C"
+// NOLINTEND(readability-identifier-naming,bugprone-*,performance-no-int-to-ptr)

@@ -45,6 +45,7 @@ void check(cl_int status, std::string_view what) {
 
 // The system's loader of OpenCL drivers.
 struct OpenCl {
+  // NOLINTBEGIN(bugprone-macro-parentheses,readability-identifier-naming): OpenCL's names
 #define DECLARE(function) decltype(&::function) function = nullptr
   GROUNDRAY_OPENCL(DECLARE);
 #undef DECLARE
@@ -55,6 +56,7 @@ struct OpenCl {
     GROUNDRAY_OPENCL(FIND);
 #undef FIND
   }
+  // NOLINTEND(bugprone-macro-parentheses,readability-identifier-naming)
 
   // Returns the devices of a platform, or the platforms, by the function that lists them.
   template <typename Handle, typename List>

@@ -8,7 +8,7 @@
 
 namespace groundray::testing {
 
-SharedLibrary::SharedLibrary(std::initializer_list<std::string> names) {
+SharedLibrary::SharedLibrary(const std::vector<std::string>& names) {
   for (const std::string& name : names) {
     handle_ = dlopen(name.c_str(), RTLD_NOW | RTLD_LOCAL);
     name_ = name;

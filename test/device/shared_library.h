@@ -1,7 +1,7 @@
 #pragma once
 
-#include <initializer_list>
 #include <string>
+#include <vector>
 
 namespace groundray::testing {
 
@@ -10,7 +10,7 @@ class SharedLibrary {
  public:
   /// Opens the first of `names` that can be opened.
   /// @throws NoDevice if none can.
-  explicit SharedLibrary(std::initializer_list<std::string> names);
+  explicit SharedLibrary(const std::vector<std::string>& names);
 
   /// Sets `function` to the library's function of that name.
   /// @throws NoDevice if it has none.
