@@ -81,11 +81,11 @@ struct Driver {
   }
 
   bool is_cuda() const { return api == DriverDevice::Api::Cuda; }
+  const char* name() const { return is_cuda() ? "CUDA" : "HIP"; }
 
   void check(int status, std::string_view what) const {
     if (status != 0)
-      throw std::runtime_error(
-          fmt::format("{}: {}: error {}", is_cuda() ? "CUDA" : "HIP", what, status));
+      throw std::runtime_error(fmt::format("{}: {}: error {}", name(), what, status));
   }
 };
 
@@ -98,8 +98,10 @@ struct DriverDevice::State {
 
   State(Api api, const std::string& library) : driver(api, library) {
     int count = 0;
-    if (driver.init(0) != 0 || driver.device_count(&count) != 0 || count == 0)
-      throw NoDevice(fmt::format("{} finds no device", driver.is_cuda() ? "CUDA" : "HIP"));
+    int status = driver.init(0);
+    if (status == 0) status = driver.device_count(&count);
+    if (count == 0)
+      throw NoDevice(fmt::format("{} finds no device: error {}", driver.name(), status));
     driver.check(driver.device_get(&device, 0), "the device");
     if (!driver.is_cuda()) return;  // HIP uses the first device unless it is told otherwise
     driver.check(driver.context_retain(&context, device), "context");
@@ -137,8 +139,8 @@ struct DriverDevice::State {
       faults.push_back(load(image));
       if (module != nullptr) return;
     }
-    throw std::runtime_error(fmt::format(
-        "{} rejects the kernels: {}", driver.is_cuda() ? "CUDA" : "HIP", fmt::join(faults, "; ")));
+    throw std::runtime_error(
+        fmt::format("{} rejects the kernels: {}", driver.name(), fmt::join(faults, "; ")));
   }
 
   Handle kernel(std::string_view name) {
