@@ -6,6 +6,7 @@
 #include <cmath>
 #include <filesystem>
 #include <fstream>
+#include <memory>
 #include <map>
 #include <regex>
 #include <string>
@@ -15,6 +16,7 @@
 #include "core/tracing/ray_tracer.h"
 #include "terrain/lod/clipmap.h"
 #include "terrain/lod/quadtree.h"
+#include "test/device/driver_device.h"
 #include "terrain/terrain_scene.h"
 #include "test/device/host_arrays.h"
 #include "test/device/opencl_device.h"
@@ -28,11 +30,14 @@
 namespace groundray::device_test {
 namespace {
 
-constexpr std::size_t most_bytes = std::size_t{64} << 20;  // of all arrays of a run
+constexpr std::size_t most_bytes = std::size_t{512} << 20;  // of all arrays of a run
 
+using testing::DriverDevice;
+using testing::HostArrays;
+using testing::KernelCode;
+using testing::KernelDevice;
 using ::testing::ElementsAre;
 using ::testing::Gt;
-using testing::HostArrays;
 using ::testing::IsEmpty;
 using testing::NamedTerrain;
 using ::testing::Not;
@@ -84,26 +89,60 @@ std::vector<MeshBound> bounds_of(const HeightGrid& grid) {
            .cell_m = cell_m}};
 }
 
-class OnDevice : public ::testing::Test {
+// The fakes are fake_driver.cpp: they show that the runners give a driver what it expects, no more.
+enum class Backend { OpenCl, Cuda, Hip, FakeCuda, FakeHip };
+
+std::unique_ptr<KernelDevice> open_device(Backend backend, const KernelCode& code,
+                                          HostArrays& arrays) {
+  using enum DriverDevice::Api;
+  const std::string fake = (kernels() / "libfake_driver.so").string();
+  switch (backend) {
+    case Backend::OpenCl:
+      break;
+    case Backend::Cuda:
+      return std::make_unique<DriverDevice>(Cuda, code, arrays);
+    case Backend::Hip:
+      return std::make_unique<DriverDevice>(Hip, code, arrays);
+    case Backend::FakeCuda:
+      return std::make_unique<DriverDevice>(Cuda, code, arrays, fake);
+    case Backend::FakeHip:
+      return std::make_unique<DriverDevice>(Hip, code, arrays, fake);
+  }
+  // Where PoCL keeps what it compiled.
+  ::setenv("POCL_CACHE_DIR", (kernels() / "cache").c_str(), 0);
+  return std::make_unique<OpenClDevice>(code, arrays);
+}
+
+class OnDevice : public ::testing::TestWithParam<Backend> {
  protected:
   void SetUp() override {
-    const auto name = OpenClDevice::name();
-    if (!name) GTEST_SKIP() << "there is no OpenCL device with double precision";
-    fmt::print("device: {}\n", *name);
-    // Where PoCL keeps what it compiled.
-    ::setenv("POCL_CACHE_DIR", (kernels() / "cache").c_str(), 0);
+    try {
+      device_ = open_device(GetParam(), testing::read_kernels(kernels() / "sound"), arrays_);
+    } catch (const testing::NoDevice& reason) {
+      GTEST_SKIP() << reason.what();
+    }
+    fmt::print("device: {}\n", device_->name());
   }
+
+  HostArrays arrays_{most_bytes};
+  std::unique_ptr<KernelDevice> device_;
 };
 
+INSTANTIATE_TEST_SUITE_P(OpenCl, OnDevice, ::testing::Values(Backend::OpenCl));
+INSTANTIATE_TEST_SUITE_P(Cuda, OnDevice, ::testing::Values(Backend::Cuda));
+INSTANTIATE_TEST_SUITE_P(Hip, OnDevice, ::testing::Values(Backend::Hip));
+INSTANTIATE_TEST_SUITE_P(Fake, OnDevice, ::testing::Values(Backend::FakeCuda, Backend::FakeHip));
+
 // Returns where the device's arrays differ from the CPU's; empty if nowhere.
-std::string difference_on(OpenClDevice& device, HostArrays& arrays, const HeightGrid& dem,
+std::string difference_on(KernelDevice& device, HostArrays& arrays, const HeightGrid& dem,
                           const MeshBound& bound, int block_cells) {
   const PassResults expected = testing::results_of(dem, bound, block_cells, {});
   std::string difference;
   {
     const HostArrays::Use use(&arrays);
-    // A copy in `arrays`. NOLINTNEXTLINE(performance-unnecessary-copy-initialization)
-    const HeightGrid grid(dem);
+    const HeightGrid grid = testing::deep_copy(dem);
+    // A device of the CPU's would read others too.
+    EXPECT_TRUE(arrays.holds(grid.heights_m().data()));
     const PassResults found = testing::results_of(grid, bound, block_cells, PassRunner(device));
     const HostArrays::Use elsewhere(nullptr);
     difference = testing::difference(found, expected);
@@ -135,7 +174,7 @@ std::vector<Shots> all_shots(std::size_t rays) {
 }
 
 // Returns where hits differ from those of exact tracing; empty if nowhere.
-std::string difference_on(OpenClDevice& device, HostArrays& arrays, const Shots& shots) {
+std::string difference_on(KernelDevice& device, HostArrays& arrays, const Shots& shots) {
   std::string difference;
   {
     const HostArrays::Use use(&arrays);
@@ -165,52 +204,70 @@ struct Ties {
   }
 };
 
-TEST_F(OnDevice, PassesWriteTheSameBytesForTheWholeDem) {
-  HostArrays arrays(most_bytes);
-  OpenClDevice device(kernels() / "sound", arrays);
+TEST_P(OnDevice, PassesWriteTheSameBytesForTheWholeDem) {
   for (const NamedTerrain& terrain : terrains()) {
     for (const int block_cells : {2, 4, 8, 64}) {
       for (const MeshBound& bound : bounds_of(terrain.grid)) {
-        EXPECT_EQ(difference_on(device, arrays, terrain.grid, bound, block_cells), "")
+        EXPECT_EQ(difference_on(*device_, arrays_, terrain.grid, bound, block_cells), "")
             << terrain.name << ", " << block_cells << " cells, angle " << bound.angle_rad;
       }
     }
   }
 }
 
-TEST_F(OnDevice, PassesWriteTheSameBytesForTies) {
-  HostArrays arrays(most_bytes);
-  OpenClDevice device(kernels() / "sound", arrays);
+TEST_P(OnDevice, PassesWriteTheSameBytesForTies) {
   const Ties ties;
   for (const MeshBound& bound : ties.bounds)
-    EXPECT_EQ(difference_on(device, arrays, ties.grid, bound, 2), "") << bound.tolerance_m;
+    EXPECT_EQ(difference_on(*device_, arrays_, ties.grid, bound, 2), "") << bound.tolerance_m;
 }
 
-TEST_F(OnDevice, RaysHitWhatExactTracingHits) {
-  HostArrays arrays(std::size_t{512} << 20);
-  OpenClDevice device(kernels() / "sound", arrays);
+TEST_P(OnDevice, RaysHitWhatExactTracingHits) {
   for (const Shots& shots : all_shots(testing::proof_size(100'000, 1'000'000)))
-    EXPECT_EQ(difference_on(device, arrays, shots), "") << shots.tracer.levels().size();
+    EXPECT_EQ(difference_on(*device_, arrays_, shots), "") << shots.tracer.levels().size();
 }
 
-// The faults are listed in CMakeLists.txt.
-TEST_F(OnDevice, FindsFaultsOfKernels) {
+// The faults are listed in CMakeLists.txt. They show that the comparison finds them, so one device
+// is enough.
+TEST(OpenCl, FindsFaultsOfKernels) {
   const Ties ties;
   const HeightGrid floats = testing::fractal(129, 2, 40, Seed{3});
   const std::vector<Shots> shots = all_shots(20'000);
   std::size_t faults = 0;
   for (const auto& folder : std::filesystem::directory_iterator(kernels() / "faults")) {
     HostArrays arrays(most_bytes);
-    OpenClDevice device(folder.path(), arrays);
-    std::string found = difference_on(device, arrays, floats, bounds_of(floats).back(), 2);
+    std::unique_ptr<KernelDevice> device;
+    try {
+      device = open_device(Backend::OpenCl, testing::read_kernels(folder.path()), arrays);
+    } catch (const testing::NoDevice& reason) {
+      GTEST_SKIP() << reason.what();
+    }
+    std::string found = difference_on(*device, arrays, floats, bounds_of(floats).back(), 2);
     for (std::size_t i = 0; i < ties.bounds.size() && found.empty(); ++i)
-      found = difference_on(device, arrays, ties.grid, ties.bounds[i], 2);
-    if (found.empty()) found = difference_on(device, arrays, shots.back());
+      found = difference_on(*device, arrays, ties.grid, ties.bounds[i], 2);
+    if (found.empty()) found = difference_on(*device, arrays, shots.back());
     EXPECT_NE(found, "") << folder.path().filename();
     fmt::print("{}: {}\n", folder.path().filename().string(), found);
     ++faults;
   }
   EXPECT_EQ(faults, 6u);
+}
+
+// Returns the message of opening CUDA's driver with a module.
+std::string fault_of_cuda(const std::string& ptx, const std::string& library) {
+  HostArrays arrays(most_bytes);
+  try {
+    const DriverDevice device(DriverDevice::Api::Cuda, {.ptx = ptx}, arrays, library);
+  } catch (const std::runtime_error& fault) {
+    return fault.what();
+  }
+  return "";
+}
+
+TEST(Driver, FaultsHaveItsLogAndFile) {
+  EXPECT_EQ(fault_of_cuda("no PTX", (kernels() / "libfake_driver.so").string()),
+            "CUDA rejects the kernels: error 200 no entry of a kernel");
+  EXPECT_EQ(fault_of_cuda("", "/no/driver.so"),
+            "there is no driver: /no/driver.so cannot be opened");
 }
 
 // Number of lines of each kernel that match a pattern; kernels without any are left out.
@@ -239,9 +296,9 @@ constexpr const char* in_gcn = R"(^(\w+Pass):)";
 // Multiplication and addition are rounded separately, as on the CPU. Meshing divides nothing, which
 // not all devices round correctly; tracing does.
 TEST(Kernels, FuseNoOperations) {
-  EXPECT_EQ(count_in(kernels() / "passes.ptx", in_ptx, in_ptx).size(), passes);
-  EXPECT_THAT(count_in(kernels() / "passes.ptx", in_ptx, R"(^\s*fma\.[a-z]*\.f64)"), IsEmpty());
-  EXPECT_THAT(count_in(kernels() / "passes.ptx", in_ptx, R"(^\s*div\.[a-z]*\.f64)"),
+  EXPECT_EQ(count_in(kernels() / "sound/passes.ptx", in_ptx, in_ptx).size(), passes);
+  EXPECT_THAT(count_in(kernels() / "sound/passes.ptx", in_ptx, R"(^\s*fma\.[a-z]*\.f64)"), IsEmpty());
+  EXPECT_THAT(count_in(kernels() / "sound/passes.ptx", in_ptx, R"(^\s*div\.[a-z]*\.f64)"),
               ElementsAre(Pair("TraceLevelPass", Gt(0u))));
   EXPECT_THAT(count_in(kernels() / "passes.fused.ptx", in_ptx, R"(^\s*fma\.rn\.f64)"),
               Not(IsEmpty()));

@@ -3,6 +3,7 @@
 #include <sys/mman.h>
 
 #include <cerrno>
+#include <cstdint>
 #include <cstdlib>
 #include <new>
 #include <system_error>
@@ -17,9 +18,14 @@ std::byte *first = nullptr, *last = nullptr;
 }  // namespace
 
 HostArrays::HostArrays(std::size_t bytes) : size_(bytes) {
-  void* const memory = mmap(nullptr, bytes, PROT_READ | PROT_WRITE,
+  // Kernels take any word of a pass that lies in the arrays for an address, also one of padding and
+  // an `int`. Up to 2 GiB from here, no such word has the lower half of a positive `int`.
+  constexpr std::uintptr_t place = 0x4000'8000'0000;
+  // NOLINTNEXTLINE(performance-no-int-to-ptr)
+  void* const memory = mmap(reinterpret_cast<void*>(place), bytes, PROT_READ | PROT_WRITE,
                             MAP_PRIVATE | MAP_ANONYMOUS | MAP_NORESERVE, -1, 0);
   if (memory == MAP_FAILED) throw std::bad_alloc();
+  madvise(memory, bytes, MADV_HUGEPAGE);  // fewer pages change when arrays become unreachable
   begin_ = static_cast<std::byte*>(memory);
   first = begin_;
   last = begin_ + bytes;

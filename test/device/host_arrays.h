@@ -20,6 +20,11 @@ class HostArrays {
   /// Returns the number of bytes used, from the beginning.
   std::size_t used() const noexcept { return used_; }
 
+  bool holds(const void* address) const noexcept {
+    const auto* const at = static_cast<const std::byte*>(address);
+    return at >= begin_ && at < begin_ + used_;
+  }
+
   /// Makes all arrays unreachable, or reachable again.
   void set_reachable(bool is_reachable) const;
 

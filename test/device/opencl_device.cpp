@@ -4,12 +4,9 @@
 #include <CL/cl.h>
 #include <fmt/format.h>
 
-#include <cstdint>
-#include <fstream>
-#include <iterator>
 #include <map>
-#include <stdexcept>
-#include <vector>
+
+#include "test/device/shared_library.h"
 
 namespace groundray::testing {
 namespace {
@@ -18,89 +15,129 @@ void check(cl_int status, std::string_view what) {
   if (status != CL_SUCCESS) throw std::runtime_error(fmt::format("OpenCL: {}: {}", what, status));
 }
 
-// Returns a text that OpenCL's function `get` has about a device or program.
-template <typename Get>
-std::string text_of(const Get& get) {
-  std::size_t size = 0;
-  if (get(0, nullptr, &size) != CL_SUCCESS || size == 0) return "";
-  std::string text(size, '\0');
-  get(size, text.data(), nullptr);
-  text.resize(text.find('\0'));
-  return text;
-}
-
-std::string text_of(cl_device_id device, cl_device_info what) {
-  return text_of([&](std::size_t size, void* text, std::size_t* needed) {
-    return clGetDeviceInfo(device, what, size, text, needed);
-  });
-}
-
-// Returns the first device with double precision, or nullptr.
-cl_device_id find_device() {
-  cl_uint count = 0;
-  if (clGetPlatformIDs(0, nullptr, &count) != CL_SUCCESS) return nullptr;
-  std::vector<cl_platform_id> platforms(count);
-  if (count > 0) check(clGetPlatformIDs(count, platforms.data(), nullptr), "platforms");
-  for (const cl_platform_id platform : platforms) {
-    cl_uint found = 0;
-    if (clGetDeviceIDs(platform, CL_DEVICE_TYPE_ALL, 0, nullptr, &found) != CL_SUCCESS) continue;
-    std::vector<cl_device_id> devices(found);
-    check(clGetDeviceIDs(platform, CL_DEVICE_TYPE_ALL, found, devices.data(), nullptr), "devices");
-    for (const cl_device_id device : devices) {
-      cl_device_fp_config doubles = 0;
-      clGetDeviceInfo(device, CL_DEVICE_DOUBLE_FP_CONFIG, sizeof doubles, &doubles, nullptr);
-      if (doubles != 0) return device;
-    }
-  }
-  return nullptr;
-}
-
-std::string read(const std::filesystem::path& file) {
-  std::ifstream in(file, std::ios::binary);
-  if (!in) throw std::runtime_error(fmt::format("{}: it cannot be read", file.string()));
-  return {std::istreambuf_iterator<char>(in), {}};
-}
-
 }  // namespace
 
-struct OpenClDevice::State {
-  HostArrays& arrays;
-  cl_device_id device = nullptr;
+// OpenCL's functions that are used here.
+#define GROUNDRAY_OPENCL(function)              \
+  function(clBuildProgram);                     \
+  function(clCreateBuffer);                     \
+  function(clCreateCommandQueueWithProperties); \
+  function(clCreateContext);                    \
+  function(clCreateKernel);                     \
+  function(clCreateProgramWithBinary);          \
+  function(clCreateProgramWithIL);              \
+  function(clEnqueueNDRangeKernel);             \
+  function(clEnqueueReadBuffer);                \
+  function(clEnqueueWriteBuffer);               \
+  function(clGetDeviceIDs);                     \
+  function(clGetDeviceInfo);                    \
+  function(clGetEventProfilingInfo);            \
+  function(clGetPlatformIDs);                   \
+  function(clGetProgramBuildInfo);              \
+  function(clReleaseCommandQueue);              \
+  function(clReleaseContext);                   \
+  function(clReleaseEvent);                     \
+  function(clReleaseKernel);                    \
+  function(clReleaseMemObject);                 \
+  function(clReleaseProgram);                   \
+  function(clSetKernelArg);                     \
+  function(clWaitForEvents)
+
+// The system's loader of OpenCL drivers.
+struct OpenCl {
+  // NOLINTBEGIN(bugprone-macro-parentheses,readability-identifier-naming): OpenCL's names
+#define DECLARE(function) decltype(&::function) function = nullptr
+  GROUNDRAY_OPENCL(DECLARE);
+#undef DECLARE
+
+  OpenCl() {
+    const SharedLibrary library({"libOpenCL.so.1"});
+#define FIND(function) library.find(function, #function)
+    GROUNDRAY_OPENCL(FIND);
+#undef FIND
+  }
+  // NOLINTEND(bugprone-macro-parentheses,readability-identifier-naming)
+
+  // Returns the devices of a platform, or the platforms, by the function that lists them.
+  template <typename Handle, typename List>
+  static std::vector<Handle> all(const List& list) {
+    cl_uint count = 0;
+    if (list(0, nullptr, &count) != CL_SUCCESS) return {};
+    std::vector<Handle> found(count);
+    if (count > 0) check(list(count, found.data(), nullptr), "devices");
+    return found;
+  }
+
+  // Returns a text that the function `get` has about a device or program.
+  template <typename Get>
+  static std::string text_of(const Get& get) {
+    std::size_t size = 0;
+    if (get(0, nullptr, &size) != CL_SUCCESS || size == 0) return "";
+    std::string text(size, '\0');
+    get(size, text.data(), nullptr);
+    text.resize(text.find('\0'));
+    return text;
+  }
+
+  std::string text_of(cl_device_id device, cl_device_info what) const {
+    return text_of([&](std::size_t size, void* text, std::size_t* needed) {
+      return clGetDeviceInfo(device, what, size, text, needed);
+    });
+  }
+
+  // Returns the first device with double precision.
+  cl_device_id find_device() const {
+    for (const auto platform : all<cl_platform_id>(clGetPlatformIDs)) {
+      const auto list = [&](cl_uint count, cl_device_id* devices, cl_uint* found) {
+        return clGetDeviceIDs(platform, CL_DEVICE_TYPE_ALL, count, devices, found);
+      };
+      for (const auto device : all<cl_device_id>(list)) {
+        cl_device_fp_config doubles = 0;
+        clGetDeviceInfo(device, CL_DEVICE_DOUBLE_FP_CONFIG, sizeof doubles, &doubles, nullptr);
+        if (doubles != 0) return device;
+      }
+    }
+    throw NoDevice("OpenCL finds no device with double precision");
+  }
+};
+
+struct OpenClDevice::State : OpenCl {
+  cl_device_id device = find_device();
   cl_context context = nullptr;
   cl_command_queue queue = nullptr;
   cl_program program = nullptr;
-  cl_mem pass = nullptr;  // bytes of a pass
-  cl_mem copy = nullptr;  // of the host's arrays
+  cl_mem pass = nullptr, arrays = nullptr;
   std::map<std::string, cl_kernel, std::less<>> kernels;
 
-  explicit State(HostArrays& of) : arrays(of) {}
+  State() = default;
   State(const State&) = delete;
   State& operator=(const State&) = delete;
   ~State() {
     for (const auto& [name, kernel] : kernels) clReleaseKernel(kernel);
-    if (copy != nullptr) clReleaseMemObject(copy);
+    if (arrays != nullptr) clReleaseMemObject(arrays);
     if (pass != nullptr) clReleaseMemObject(pass);
     if (program != nullptr) clReleaseProgram(program);
     if (queue != nullptr) clReleaseCommandQueue(queue);
     if (context != nullptr) clReleaseContext(context);
   }
 
-  void build(const std::filesystem::path& folder) {
+  void build(const KernelCode& code) {
     cl_int status = CL_SUCCESS;
     const bool takes_spirv = text_of(device, CL_DEVICE_IL_VERSION).find("SPIR-V") == 0;
-    const std::string code = read(folder / (takes_spirv ? "passes.spv" : "passes.spir"));
-    const std::size_t size = code.size();
+    const std::string& form = takes_spirv ? code.spirv : code.spir;
+    const std::size_t size = form.size();
     if (takes_spirv) {
-      program = clCreateProgramWithIL(context, code.data(), size, &status);
+      program = clCreateProgramWithIL(context, form.data(), size, &status);
     } else {
-      const auto* bytes = reinterpret_cast<const unsigned char*>(code.data());
+      const auto* bytes = reinterpret_cast<const unsigned char*>(form.data());
       program = clCreateProgramWithBinary(context, 1, &device, &size, &bytes, nullptr, &status);
     }
     check(status, "the kernels");
     const char* const options = takes_spirv ? "" : "-x spir -spir-std=1.2";
     if (clBuildProgram(program, 1, &device, options, nullptr, nullptr) == CL_SUCCESS) return;
     throw std::runtime_error(
-        "OpenCL: the kernels: " + text_of([&](std::size_t room, void* text, std::size_t* needed) {
+        "OpenCL rejects the kernels: " +
+        OpenCl::text_of([&](std::size_t room, void* text, std::size_t* needed) {
           return clGetProgramBuildInfo(program, device, CL_PROGRAM_BUILD_LOG, room, text, needed);
         }));
   }
@@ -116,71 +153,69 @@ struct OpenClDevice::State {
   }
 };
 
-std::optional<std::string> OpenClDevice::name() {
-  const cl_device_id device = find_device();
-  if (device == nullptr) return std::nullopt;
-  return text_of(device, CL_DEVICE_NAME) + ", " + text_of(device, CL_DEVICE_VERSION);
-}
-
-OpenClDevice::OpenClDevice(const std::filesystem::path& kernels, HostArrays& arrays)
-    : state_(std::make_unique<State>(arrays)) {
-  constexpr std::size_t most_of_a_pass = 4096;
+OpenClDevice::OpenClDevice(const KernelCode& code, HostArrays& arrays)
+    : KernelDevice(arrays), state_(std::make_unique<State>()) {
   State& s = *state_;
   cl_int status = CL_SUCCESS;
-  s.device = find_device();
-  s.context = clCreateContext(nullptr, 1, &s.device, nullptr, nullptr, &status);
+  s.context = s.clCreateContext(nullptr, 1, &s.device, nullptr, nullptr, &status);
   check(status, "context");
-  s.queue = clCreateCommandQueueWithProperties(s.context, s.device, nullptr, &status);
+  const cl_queue_properties timed[] = {CL_QUEUE_PROPERTIES, CL_QUEUE_PROFILING_ENABLE, 0};
+  s.queue = s.clCreateCommandQueueWithProperties(s.context, s.device, timed, &status);
   check(status, "queue");
-  s.build(kernels);
-  s.pass = clCreateBuffer(s.context, CL_MEM_READ_ONLY, most_of_a_pass, nullptr, &status);
+  s.build(code);
+  s.pass = s.clCreateBuffer(s.context, CL_MEM_READ_ONLY, most_of_a_pass, nullptr, &status);
   check(status, "memory of a pass");
-  s.copy = clCreateBuffer(s.context, CL_MEM_READ_WRITE, arrays.size(), nullptr, &status);
+  s.arrays = s.clCreateBuffer(s.context, CL_MEM_READ_WRITE, arrays.size(), nullptr, &status);
   check(status, "memory of the arrays");
 }
 
 OpenClDevice::~OpenClDevice() = default;
 
-void OpenClDevice::run(std::string_view name, std::span<const std::byte> bytes, std::size_t count) {
-  if (count == 0) return;
-  const HostArrays::Use elsewhere(nullptr);
+std::string OpenClDevice::name() const {
+  const State& s = *state_;
+  return s.text_of(s.device, CL_DEVICE_NAME) + ", " + s.text_of(s.device, CL_DEVICE_VERSION);
+}
+
+void OpenClDevice::write(Memory to, std::span<const std::byte> bytes) {
   State& s = *state_;
-  const cl_kernel kernel = s.kernel(name);
-  // Whole words, as the kernel reads them.
-  std::vector<std::byte> words(bytes.begin(), bytes.end());
-  words.resize((words.size() + 7) / 8 * 8);
-  const cl_ulong indices = count, host = reinterpret_cast<std::uintptr_t>(s.arrays.begin()),
-                 size = s.arrays.size();
+  check(s.clEnqueueWriteBuffer(s.queue, to == Memory::Pass ? s.pass : s.arrays, CL_TRUE, 0,
+                               bytes.size(), bytes.data(), 0, nullptr, nullptr),
+        "copy to the device");
+}
+
+void OpenClDevice::read(std::span<std::byte> bytes) {
+  State& s = *state_;
+  check(s.clEnqueueReadBuffer(s.queue, s.arrays, CL_TRUE, 0, bytes.size(), bytes.data(), 0, nullptr,
+                              nullptr),
+        "copy from the device");
+}
+
+double OpenClDevice::launch(const Launch& launch) {
+  State& s = *state_;
+  const cl_kernel kernel = s.kernel(launch.kernel);
   cl_uint argument = 0;
   const auto set = [&]<typename Value>(const Value& value) {
-    check(clSetKernelArg(kernel, argument, sizeof(Value), static_cast<const void*>(&value)),
+    check(s.clSetKernelArg(kernel, argument, sizeof(Value), static_cast<const void*>(&value)),
           fmt::format("argument {}", argument));
     ++argument;
   };
   set(s.pass);
-  set(indices);
-  set(s.copy);
-  set(host);
-  set(size);
-  const std::size_t used = s.arrays.used();
-  check(clEnqueueWriteBuffer(s.queue, s.pass, CL_TRUE, 0, words.size(), words.data(), 0, nullptr,
-                             nullptr),
-        "copy to the device");
-  check(clEnqueueWriteBuffer(s.queue, s.copy, CL_TRUE, 0, used, s.arrays.begin(), 0, nullptr,
-                             nullptr),
-        "copy to the device");
-  constexpr std::size_t group = 64;
-  const std::size_t all = (count + group - 1) / group * group;
-  s.arrays.set_reachable(false);
-  const cl_int status =
-      clEnqueueNDRangeKernel(s.queue, kernel, 1, nullptr, &all, &group, 0, nullptr, nullptr);
-  const cl_int finished = clFinish(s.queue);
-  s.arrays.set_reachable(true);
-  check(status, name);
-  check(finished, name);
-  check(
-      clEnqueueReadBuffer(s.queue, s.copy, CL_TRUE, 0, used, s.arrays.begin(), 0, nullptr, nullptr),
-      "copy from the device");
+  set(launch.indices);
+  set(s.arrays);
+  set(launch.host);
+  set(launch.size);
+  constexpr std::size_t in_group = group;
+  const std::size_t all = launch.groups * group;
+  cl_event run = nullptr;
+  check(s.clEnqueueNDRangeKernel(s.queue, kernel, 1, nullptr, &all, &in_group, 0, nullptr, &run),
+        launch.kernel);
+  const cl_int finished = s.clWaitForEvents(1, &run);
+  cl_ulong begin_ns = 0, end_ns = 0;
+  s.clGetEventProfilingInfo(run, CL_PROFILING_COMMAND_START, sizeof begin_ns, &begin_ns, nullptr);
+  s.clGetEventProfilingInfo(run, CL_PROFILING_COMMAND_END, sizeof end_ns, &end_ns, nullptr);
+  s.clReleaseEvent(run);
+  check(finished, launch.kernel);
+  return 1e-6 * static_cast<double>(end_ns - begin_ns);
 }
 
 }  // namespace groundray::testing

@@ -1,34 +1,28 @@
 #pragma once
 
-#include <cstddef>
-#include <filesystem>
 #include <memory>
-#include <optional>
-#include <span>
 #include <string>
-#include <string_view>
 
-#include "terrain/lod/pass.h"
-#include "test/device/host_arrays.h"
+#include "test/device/kernel_device.h"
 
 namespace groundray::testing {
 
-/// Runs passes as kernels of the first OpenCL device with double precision. Its memory is its own:
-/// before each pass it gets a copy of the host's arrays, and afterwards the host gets one of its.
-class OpenClDevice final : public PassDevice {
+/// Runs passes as kernels of the first OpenCL device with double precision.
+class OpenClDevice final : public KernelDevice {
  public:
-  /// Returns the name of the device that would be used; nothing if there is none.
-  static std::optional<std::string> name();
-
-  /// @param kernels  folder of passes.spv (SPIR-V) and passes.spir (SPIR, for drivers that take no
-  ///                 SPIR-V).
-  /// @throws std::runtime_error if the driver rejects the kernels.
-  OpenClDevice(const std::filesystem::path& kernels, HostArrays& arrays);
+  /// @param code  SPIR-V, and SPIR for drivers that take no SPIR-V.
+  /// @throws NoDevice if there is no such device.
+  /// @throws std::runtime_error if the driver rejects the kernels, with its log.
+  OpenClDevice(const KernelCode& code, HostArrays& arrays);
   ~OpenClDevice() override;
 
-  void run(std::string_view name, std::span<const std::byte> bytes, std::size_t count) override;
+  std::string name() const override;
 
  private:
+  void write(Memory to, std::span<const std::byte> bytes) override;
+  void read(std::span<std::byte> bytes) override;
+  double launch(const Launch& launch) override;
+
   struct State;
   std::unique_ptr<State> state_;
 };

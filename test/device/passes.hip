@@ -10,7 +10,7 @@
 #include "terrain/lod/passes/selection.h"
 #pragma clang force_cuda_host_device end
 
-using Word = unsigned long;
+using Word [[gnu::may_alias]] = unsigned long;  // of any type's bytes
 
 #if defined(__NVPTX__)
 static __device__ Word global_index() {
@@ -28,7 +28,8 @@ static __device__ Word global_index() { return _Z13get_global_idj(0); }
 #endif
 
 // Runs one index of a pass. Its bytes hold addresses of the host: those in [host, host + size) are replaced by addresses in
-// `arrays`, the device's copy of that memory.
+// `arrays`, the device's copy of that memory. Both are aligned to 256 bytes: so a `bool` beside padding, which may look like
+// an address, stays as it is.
 template <typename Pass>
 static __device__ void run(const Word* bytes, Word count, char* arrays, Word host, Word size) {
   constexpr unsigned words = (sizeof(Pass) + sizeof(Word) - 1) / sizeof(Word);

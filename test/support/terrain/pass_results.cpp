@@ -25,6 +25,14 @@ std::string difference(const std::vector<T>& found, const std::vector<T>& expect
 
 }  // namespace
 
+HeightGrid deep_copy(const HeightGrid& grid) {
+  const auto heights_m = grid.heights_m();
+  return {{grid.columns(), grid.rows()},
+          grid.origin_m(),
+          grid.step_m(),
+          {heights_m.begin(), heights_m.end()}};
+}
+
 PassResults results_of(const HeightGrid& grid, const MeshBound& bound, int block_cells,
                        const PassRunner& runner) {
   PassResults out;

@@ -21,6 +21,9 @@ struct PassResults {
   TerrainMesh mesh;
 };
 
+/// Returns the grid with samples of its own, which other copies share.
+HeightGrid deep_copy(const HeightGrid& grid);
+
 PassResults results_of(const HeightGrid& grid, const MeshBound& bound, int block_cells,
                        const PassRunner& runner);
 
