@@ -80,11 +80,10 @@ std::vector<Piece> pieces_of_leaves(const HeightGrid& grid, MeshBound bound, int
   for (const NodeLevel& level : levels) windows.push_back(whole_window(level));
   const Selection selection = select_nodes(lattice, windows, bound);
   std::vector<Piece> pieces;
-  for (int level = 0; level <= lattice.top_level(); ++level) {
-    const auto leaves = list_leaves(selection, windows, level, level);
-    for (const auto& [a, b, c] : groundray::testing::leaf_triangles(grid, leaves, block_cells)) {
+  for (const Leaf& leaf : list_leaves(selection, windows, 0)) {
+    const int level = std::countr_zero(static_cast<unsigned>(leaf.step));
+    for (const auto& [a, b, c] : groundray::testing::leaf_triangles(grid, {&leaf, 1}, block_cells))
       pieces.push_back(piece(a, b, c, level));
-    }
   }
   std::ranges::sort(pieces);
   return pieces;

@@ -34,7 +34,7 @@ PassResults results_of(const HeightGrid& grid, const MeshBound& bound, int block
   const Lattice lattice{{grid.columns(), grid.rows()}, block_cells};
   const Selection selection = select_nodes(lattice, windows, bound, runner);
   for (const Selection::Level& level : selection.levels) out.states.push_back(level.state);
-  out.leaves = list_leaves(selection, windows, 0, lattice.top_level(), runner);
+  out.leaves = list_leaves(selection, windows, 0, runner);
   out.mesh = build_terrain_mesh(grid, bound, block_cells, runner);
   return out;
 }

@@ -213,14 +213,7 @@ TEST(Quadtree, LeavesAreListedFineToCoarseRowByRowWithTheirDeviations) {
                         sides == 0 ? known.of(node).full_m[at] : known.of(node).deviation_m[at],
                         known.of(node).high_m[at]});
   });
-  const int top = known.lattice.top_level();
-  EXPECT_TRUE(list_leaves(selection, known.windows, 0, top) == expected);
-  std::vector<Leaf> joined;
-  for (int level = 0; level <= top; ++level) {
-    const auto some = list_leaves(selection, known.windows, level, level);
-    joined.insert(joined.end(), some.begin(), some.end());
-  }
-  EXPECT_TRUE(joined == expected);
+  EXPECT_TRUE(list_leaves(selection, known.windows, 0) == expected);
 }
 
 TEST(Quadtree, NodesWithoutHeightsAreNeitherSplitNorListed) {
@@ -229,7 +222,7 @@ TEST(Quadtree, NodesWithoutHeightsAreNeitherSplitNorListed) {
   const Known known(nothing, 2);
   const Selection selection = select_nodes(known.lattice, known.windows, {});
   EXPECT_EQ(leaves_of(selection), (std::set<Node>{{known.lattice.top_level(), 0, 0}}));
-  EXPECT_TRUE(list_leaves(selection, known.windows, 0, known.lattice.top_level()).empty());
+  EXPECT_TRUE(list_leaves(selection, known.windows, 0).empty());
 }
 
 TEST(Quadtree, DoesNotDependOnExecutionOrderOrThreads) {
@@ -237,14 +230,14 @@ TEST(Quadtree, DoesNotDependOnExecutionOrderOrThreads) {
   known.show_windows_round({400, 222}, 100);
   const MeshBound bound{0.05, 0.01, {20, 30, 5}, {60, 33, 9}, {2, 3}};
   const Selection expected = select_nodes(known.lattice, known.windows, bound);
-  const auto leaves = list_leaves(expected, known.windows, 0, known.lattice.top_level());
+  const auto leaves = list_leaves(expected, known.windows, 0);
   EXPECT_GT(leaves.size(), 1000u);
   const auto expect_same = [&](const PassRunner& runner) {
     const Selection found = select_nodes(known.lattice, known.windows, bound, runner);
     for (std::size_t level = 0; level < expected.levels.size(); ++level) {
       EXPECT_EQ(found.levels[level].state, expected.levels[level].state);
     }
-    EXPECT_TRUE(list_leaves(found, known.windows, 0, known.lattice.top_level(), runner) == leaves);
+    EXPECT_TRUE(list_leaves(found, known.windows, 0, runner) == leaves);
   };
   for (const std::uint64_t seed : {1, 2, 3}) {
     expect_same(groundray::testing::shuffled_runner(Seed{seed}));
