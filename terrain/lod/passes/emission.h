@@ -98,15 +98,15 @@ struct EmitTrianglesPass {
       for (; next <= leaf.block.cells.y && next < row + rows; ++next) {
         for (int column = 0; column <= leaf.block.cells.x; ++column) {
           if (leaf.block.drops(column, next)) continue;
-          if (has_holes && tree.is_missing(tree.sample(leaf, column, next))) continue;
-          at[next - row][column] = numbers.of(index, leaf, {column, next});
+          const bool is_missing = has_holes && tree.is_missing(tree.sample(leaf, column, next));
+          at[next - row][column] = is_missing ? missing : numbers.of(index, leaf, {column, next});
         }
       }
       for_each_triangle_of_row(leaf.block, row, [&](glm::ivec2 a, glm::ivec2 b, glm::ivec2 c) {
-        if (has_holes && !tree.has_all(leaf, a, b, c)) return;
         const std::uint32_t i = at[a.y - row][a.x];
         const std::uint32_t j = at[b.y - row][b.x];
         const std::uint32_t k = at[c.y - row][c.x];
+        if (has_holes && (i == missing || j == missing || k == missing)) return;
         triangles[out] = is_mirrored ? glm::uvec3{i, k, j} : glm::uvec3{i, j, k};
         levels[out] = static_cast<std::uint8_t>(leaf.level);
         ++out;
@@ -120,6 +120,7 @@ struct EmitTrianglesPass {
 
  private:
   static constexpr int rows = 3;  // that a row of cells may refer to
+  static constexpr std::uint32_t missing = ~std::uint32_t{0};
 };
 
 }  // namespace groundray::passes

@@ -77,10 +77,10 @@ struct LeafTree {
            static_cast<std::size_t>(node.x - at.first.x);
   }
   bool is_missing(glm::ivec2 sample) const noexcept {
-    const glm::ivec2 last = last_sample();
-    const glm::ivec2 points = cells(heights_level);
-    return std::isnan(*heights.at(sample.x == last.x ? points.x : sample.x >> heights_level,
-                                  sample.y == last.y ? points.y : sample.y >> heights_level));
+    const int rounding =
+        (1 << heights_level) - 1;  // the DEM's last sample is any level's last point
+    return std::isnan(*heights.at((sample.x + rounding) >> heights_level,
+                                  (sample.y + rounding) >> heights_level));
   }
 
   LeafBlock block_of(const Leaf& leaf) const noexcept {
