@@ -20,12 +20,12 @@
 namespace groundray::device_test {
 namespace {
 
+constexpr std::size_t passes = 18;
 constexpr std::size_t most_bytes = std::size_t{64} << 20;  // of all arrays of a run
 
 using testing::HostArrays;
 using testing::NamedTerrain;
 using testing::OpenClDevice;
-using testing::PassResults;
 
 std::filesystem::path kernels() {
   return std::filesystem::read_symlink("/proc/self/exe").parent_path() / "kernels";
@@ -71,6 +71,9 @@ std::vector<MeshBound> bounds_of(const HeightGrid& grid) {
            .cell_m = cell_m}};
 }
 
+// Returns a copy of a grid and its samples.
+HeightGrid copy_of(const HeightGrid& grid) { return part_of(grid, {grid.columns(), grid.rows()}); }
+
 class OnDevice : public ::testing::Test {
  protected:
   void SetUp() override {
@@ -82,21 +85,43 @@ class OnDevice : public ::testing::Test {
   }
 };
 
-// Returns where the device's arrays differ from the CPU's; empty if nowhere.
+// Returns where the device's results for a DEM differ from the CPU's; empty if nowhere.
+// `results(grid, runner)` computes them.
 std::string difference_on(OpenClDevice& device, HostArrays& arrays, const HeightGrid& dem,
-                          const MeshBound& bound, int block_cells) {
-  const PassResults expected = testing::results_of(dem, bound, block_cells, {});
+                          const auto& results) {
+  const auto expected = results(dem, PassRunner());
   std::string difference;
   {
     const HostArrays::Use use(&arrays);
-    // A copy in `arrays`. NOLINTNEXTLINE(performance-unnecessary-copy-initialization)
-    const HeightGrid grid(dem);
-    const PassResults found = testing::results_of(grid, bound, block_cells, PassRunner(device));
+    const auto found = results(copy_of(dem), PassRunner(device));
     const HostArrays::Use elsewhere(nullptr);
     difference = testing::difference(found, expected);
   }
   arrays.clear();
   return difference;
+}
+
+// Results for a whole DEM.
+auto results_for(const MeshBound& bound, int block_cells) {
+  return [=](const HeightGrid& grid, const PassRunner& runner) {
+    return testing::results_of(grid, bound, block_cells, runner);
+  };
+}
+
+// Results for windows of 8 x 8 nodes round a place.
+auto results_for_windows(const MeshBound& bound, int block_cells) {
+  return [=](const HeightGrid& grid, const PassRunner& runner) {
+    const glm::dvec2 place = glm::dvec2(grid.columns(), grid.rows()) * glm::dvec2(0.4, 0.7);
+    return testing::window_results(grid, place, 8, bound, block_cells, runner);
+  };
+}
+
+// Results for a clipmap that is built, moved and moved far.
+auto results_for_clipmap(const MeshBound& bound) {
+  return [=](const HeightGrid& grid, const PassRunner& runner) {
+    return testing::clipmap_results(grid, bound.tolerance_m, bound.angle_rad,
+                                    testing::places_on(grid), runner);
+  };
 }
 
 // A DEM of steps, and a bound for each of its levels that is exactly the key of a node, which tells
@@ -121,9 +146,41 @@ TEST_F(OnDevice, PassesWriteTheSameBytesForTheWholeDem) {
   for (const NamedTerrain& terrain : terrains()) {
     for (const int block_cells : {2, 4, 8, 64}) {
       for (const MeshBound& bound : bounds_of(terrain.grid)) {
-        EXPECT_EQ(difference_on(device, arrays, terrain.grid, bound, block_cells), "")
+        EXPECT_EQ(difference_on(device, arrays, terrain.grid, results_for(bound, block_cells)), "")
             << terrain.name << ", " << block_cells << " cells, angle " << bound.angle_rad;
       }
+    }
+  }
+}
+
+TEST_F(OnDevice, PassesWriteTheSameBytesForWindows) {
+  HostArrays arrays(most_bytes);
+  OpenClDevice device(kernels() / "sound", arrays);
+  const auto expect_same = [&](const NamedTerrain& terrain, int block_cells) {
+    for (const MeshBound& bound : bounds_of(terrain.grid)) {
+      EXPECT_EQ(
+          difference_on(device, arrays, terrain.grid, results_for_windows(bound, block_cells)), "")
+          << terrain.name << ", " << block_cells << " cells, angle " << bound.angle_rad;
+    }
+  };
+  for (const NamedTerrain& terrain : terrains()) {
+    for (const int block_cells : {2, 4, 8}) expect_same(terrain, block_cells);
+  }
+  // Smaller DEMs have no window of 8 such nodes.
+  const HeightGrid large =
+      testing::with_holes(testing::fractal(1025, 2, 40, Seed{3}), 9, 4, Seed{8});
+  expect_same({"large", part_of(large, {641, 577})}, 64);
+}
+
+TEST_F(OnDevice, PassesWriteTheSameBytesForClipmaps) {
+  HostArrays arrays(most_bytes);
+  OpenClDevice device(kernels() / "sound", arrays);
+  std::vector<NamedTerrain> all = terrains();
+  all.push_back({"three levels", testing::fractal(257, 2, 40, Seed{4})});
+  for (const NamedTerrain& terrain : all) {
+    for (const MeshBound& bound : bounds_of(terrain.grid)) {
+      EXPECT_EQ(difference_on(device, arrays, terrain.grid, results_for_clipmap(bound)), "")
+          << terrain.name << ", angle " << bound.angle_rad;
     }
   }
 }
@@ -132,8 +189,14 @@ TEST_F(OnDevice, PassesWriteTheSameBytesForTies) {
   HostArrays arrays(most_bytes);
   OpenClDevice device(kernels() / "sound", arrays);
   const Ties ties;
-  for (const MeshBound& bound : ties.bounds)
-    EXPECT_EQ(difference_on(device, arrays, ties.grid, bound, 2), "") << bound.tolerance_m;
+  for (const MeshBound& bound : ties.bounds) {
+    EXPECT_EQ(difference_on(device, arrays, ties.grid, results_for(bound, 2)), "")
+        << bound.tolerance_m;
+    EXPECT_EQ(difference_on(device, arrays, ties.grid, results_for_windows(bound, 2)), "")
+        << bound.tolerance_m;
+    EXPECT_EQ(difference_on(device, arrays, ties.grid, results_for_clipmap(bound)), "")
+        << bound.tolerance_m;
+  }
 }
 
 // The faults are listed in CMakeLists.txt.
@@ -144,9 +207,10 @@ TEST_F(OnDevice, FindsFaultsOfKernels) {
   for (const auto& folder : std::filesystem::directory_iterator(kernels() / "faults")) {
     HostArrays arrays(most_bytes);
     OpenClDevice device(folder.path(), arrays);
-    std::string found = difference_on(device, arrays, floats, bounds_of(floats).back(), 2);
+    std::string found =
+        difference_on(device, arrays, floats, results_for(bounds_of(floats).back(), 2));
     for (std::size_t i = 0; i < ties.bounds.size() && found.empty(); ++i)
-      found = difference_on(device, arrays, ties.grid, ties.bounds[i], 2);
+      found = difference_on(device, arrays, ties.grid, results_for(ties.bounds[i], 2));
     EXPECT_NE(found, "") << folder.path().filename();
     fmt::print("{}: {}\n", folder.path().filename().string(), found);
     ++faults;
@@ -166,7 +230,6 @@ std::size_t count_in(const std::filesystem::path& file, const std::string& patte
 // Multiplication and addition are rounded separately, as on the CPU, and nothing is divided, which
 // not all devices round correctly.
 TEST(Kernels, FuseNoOperations) {
-  constexpr std::size_t passes = 12;
   EXPECT_EQ(count_in(kernels() / "passes.ptx", R"(^\s*(fma|div)\.[a-z]*\.f64)"), 0u);
   EXPECT_GT(count_in(kernels() / "passes.fused.ptx", R"(^\s*fma\.rn\.f64)"), 0u);
   EXPECT_EQ(count_in(kernels() / "passes.ptx", R"(\.entry )"), passes);
@@ -185,7 +248,7 @@ TEST(Kernels, NeedLittlePrivateMemory) {
     EXPECT_LE(std::stoul(match[1]), 2048u) << line;
     ++kernels_found;
   }
-  EXPECT_EQ(kernels_found, 12u);
+  EXPECT_EQ(kernels_found, passes);
 }
 
 }  // namespace
