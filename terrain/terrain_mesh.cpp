@@ -26,9 +26,9 @@ std::unique_ptr<T[]> uncleared(std::size_t count) {
 }
 
 // Replaces counts by the sums of those before; returns the total.
-std::uint32_t sum_up(std::uint32_t* counts, std::size_t size, const char* what,
-                     const PassRunner& runner) {
-  const std::uint64_t total = groundray::sum_up(counts, size, runner);
+std::uint32_t first_indices(std::uint32_t* counts, std::size_t size, const char* what,
+                            const PassRunner& runner) {
+  const std::uint64_t total = sum_up(counts, size, runner);
   if (total > std::numeric_limits<std::uint32_t>::max()) {
     throw Error(
         "terrain mesh: {} {} exceed the range of 32-bit indices; raise the tolerance, or mesh the "
@@ -61,7 +61,7 @@ LeafList find_leaves(const HeightGrid& grid, MeshBound bound, int block_cells,
 struct MeshWindow {
   HeightWindow heights;  // points of `level`
   int level = 0;
-  Rectangle cells, hole;  // of the DEM
+  Rectangle cells, finer;  // of the DEM
   bool has_holes = false;
   std::span<const Leaf> leaves;
 };
@@ -87,12 +87,12 @@ class MeshBuilder {
     tree.heights = window.heights;
     tree.heights_level = window.level;
     tree.window = window.cells;
-    tree.hole = window.hole;
+    tree.finer = window.finer;
     tree.leaves = window.leaves.data();
     run_pass(runner_, count, passes::NumberLeavesPass{tree});
     VertexNumbers numbers{tree};
     const bool is_whole =
-        window.hole == Rectangle() && window.cells == Rectangle{{0, 0}, tree.last_sample()};
+        window.finer == Rectangle() && window.cells == Rectangle{{0, 0}, tree.last_sample()};
     const Marks marks = is_whole && !window.has_holes ? Marks() : mark_vertices(tree, count);
     numbers.marks = marks.bits.data();
     numbers.mark_of = marks.of_leaf.get();
@@ -109,7 +109,7 @@ class MeshBuilder {
   Marks mark_vertices(const LeafTree& tree, std::size_t count) const {
     Marks marks{uncleared<std::uint32_t>(count), {}};
     run_pass(runner_, count, passes::CountMarkedPass{tree, marks.of_leaf.get()});
-    const std::uint32_t marked_count = sum_up(marks.of_leaf.get(), count, "leaves", runner_);
+    const std::uint32_t marked_count = first_indices(marks.of_leaf.get(), count, "leaves", runner_);
     const auto marked = uncleared<std::uint32_t>(marked_count);
     run_pass(runner_, count, passes::ListMarkedPass{tree, marks.of_leaf.get(), marked.get()});
     marks.bits.resize(marked_count * tree.mark_words());
@@ -124,8 +124,9 @@ class MeshBuilder {
     run_pass(runner_, count,
              passes::CountMeshPass{numbers, first_vertex.get(), first_triangle.get()});
     TerrainMesh mesh;
-    const std::uint32_t vertices = sum_up(first_vertex.get(), count, "vertices", runner_);
-    const std::uint32_t triangles = sum_up(first_triangle.get(), count, "triangles", runner_);
+    const std::uint32_t vertices = first_indices(first_vertex.get(), count, "vertices", runner_);
+    const std::uint32_t triangles =
+        first_indices(first_triangle.get(), count, "triangles", runner_);
     numbers.first = first_vertex.get();
     mesh.vertices.resize(vertices);
     run_pass(runner_, count, passes::EmitVerticesPass{numbers, mesh.vertices.data()});
@@ -160,7 +161,7 @@ std::vector<TerrainMesh> build_level_meshes(const Selection& selection,
   std::vector<TerrainMesh> meshes;
   if (levels.empty()) return meshes;
   const MeshBuilder builder(selection, levels.front().frame.step_m, runner);
-  Rectangle hole;
+  Rectangle finer;
   for (const Level& level : levels) {
     const int number = std::countr_zero(static_cast<std::uint32_t>(level.step));
     const glm::ivec2 size = level.heights.size();
@@ -169,8 +170,8 @@ std::vector<TerrainMesh> build_level_meshes(const Selection& selection,
     const HeightWindow heights{level.first >> number, size, level.heights.heights_m().data(),
                                size.x};
     meshes.push_back(builder.build(
-        {heights, number, cells, hole, level.heights.hole_count() > 0, level.leaves}));
-    hole = cells;
+        {heights, number, cells, finer, level.heights.hole_count() > 0, level.leaves}));
+    finer = cells;
   }
   return meshes;
 }

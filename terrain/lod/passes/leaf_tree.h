@@ -60,7 +60,7 @@ struct LeafTree {
   HeightWindow heights;   ///< points of a level that contain those of the leaves
   int heights_level = 0;
   Rectangle window;  ///< cells of the DEM
-  Rectangle hole;    ///< those of the next finer window
+  Rectangle finer;   ///< those of the next finer window
   int block_cells = 2;
   Level levels[Lattice::max_levels];
   const Leaf* leaves = nullptr;
@@ -70,15 +70,15 @@ struct LeafTree {
     return {((samples.x - 2) >> level) + 1, ((samples.y - 2) >> level) + 1};
   }
   /// Returns whether a cell of the DEM belongs to a leaf in the list.
-  bool holds(glm::ivec2 cell) const noexcept { return window.holds(cell) && !hole.holds(cell); }
+  bool holds(glm::ivec2 cell) const noexcept { return window.holds(cell) && !finer.holds(cell); }
   std::size_t node_index(int level, glm::ivec2 node) const noexcept {
     const Level& at = levels[level];
     return static_cast<std::size_t>(node.y - at.first.y) * static_cast<std::size_t>(at.columns) +
            static_cast<std::size_t>(node.x - at.first.x);
   }
   bool is_missing(glm::ivec2 sample) const noexcept {
-    const int rounding =
-        (1 << heights_level) - 1;  // the DEM's last sample is any level's last point
+    // Rounded up, because the DEM's last sample is the last point of any level.
+    const int rounding = (1 << heights_level) - 1;
     return std::isnan(*heights.at((sample.x + rounding) >> heights_level,
                                   (sample.y + rounding) >> heights_level));
   }
@@ -133,9 +133,9 @@ struct LeafTree {
     const glm::ivec2 end = sample(at, at.block.cells.x, at.block.cells.y);
     const bool ends_window = (end.x == window.end.x && end.x != last_sample().x) ||
                              (end.y == window.end.y && end.y != last_sample().y);
-    const bool meets_hole = hole.first.x <= end.x && hole.first.y <= end.y &&
-                            leaf.column < hole.end.x && leaf.row < hole.end.y;
-    return leaf.has_holes || ends_window || meets_hole;
+    const bool meets_finer = finer.first.x <= end.x && finer.first.y <= end.y &&
+                             leaf.column < finer.end.x && leaf.row < finer.end.y;
+    return leaf.has_holes || ends_window || meets_finer;
   }
 
   /// Returns whether the three samples of one half of a leaf's cell exist. An omitted point exists
