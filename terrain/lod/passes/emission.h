@@ -1,5 +1,6 @@
 #pragma once
 
+#include <algorithm>
 #include <cstddef>
 #include <cstdint>
 #include <glm/vec2.hpp>
@@ -106,7 +107,7 @@ struct EmitTrianglesPass {
         const std::uint32_t i = at[a.y - row][a.x];
         const std::uint32_t j = at[b.y - row][b.x];
         const std::uint32_t k = at[c.y - row][c.x];
-        if (has_holes && (i == missing || j == missing || k == missing)) return;
+        if (has_holes && std::max({i, j, k}) == missing) return;
         triangles[out] = is_mirrored ? glm::uvec3{i, k, j} : glm::uvec3{i, j, k};
         levels[out] = static_cast<std::uint8_t>(leaf.level);
         ++out;
