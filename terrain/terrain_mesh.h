@@ -33,9 +33,9 @@ struct TerrainMesh {
 TerrainMesh build_terrain_mesh(const HeightGrid& grid, const MeshBound& bound, int block_cells = 2,
                                const PassRunner& runner = {});
 
-/// Returns the mesh of each level of a clipmap, which has the vertices that it needs: those on the
-/// border of two windows belong to both meshes. Together the meshes are one surface without cracks
-/// or T-junctions. A triangle exists if and only if its samples exist.
+/// Returns the mesh of each level of a clipmap, with all of its vertices: those on the border of
+/// two windows belong to both meshes. Together the meshes are one surface without cracks or
+/// T-junctions. A triangle exists if and only if its samples exist.
 /// @param levels  finest first, with all leaves of `selection`: Clipmap::levels, and
 ///                Clipmap::selection.
 /// @throws Error if a mesh has more vertices or triangles than 32 bits can number.

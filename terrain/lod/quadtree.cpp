@@ -113,6 +113,25 @@ struct Splitter {
   }
 };
 
+// Returns the nodes of a level that lie in a window but not in that of the next finer level.
+ListedNodes listed_nodes(const Selection& selection, std::span<const NodeWindow> windows,
+                         int window_level, int level, int run_nodes) {
+  const auto at = static_cast<std::size_t>(level);
+  const glm::ivec2 first = windows[at].first;
+  const auto inside = [&](int finer) -> Rectangle {
+    if (finer < 0 || is_empty(windows[static_cast<std::size_t>(finer)])) return {};
+    const Rectangle nodes =
+        overlap(selection.lattice, windows[static_cast<std::size_t>(finer)], finer, level).inside;
+    return {nodes.first - first, nodes.end - first};
+  };
+  const Rectangle listed = inside(window_level);
+  return {{glm::max(listed.end - listed.first, 0), run_nodes},
+          listed.first,
+          inside(window_level - 1),
+          windows[at],
+          selection.levels[at].state.data()};
+}
+
 }  // namespace
 
 NodeWindow whole_window(const NodeLevel& level) {
@@ -154,29 +173,11 @@ Selection select_nodes(const Lattice& lattice, std::span<const NodeWindow> windo
 
 std::vector<Leaf> list_leaves(const Selection& selection, std::span<const NodeWindow> windows,
                               int window_level, const PassRunner& runner) {
-  const Lattice& lattice = selection.lattice;
-  const NodeWindow& within = windows[static_cast<std::size_t>(window_level)];
   std::vector<ListedNodes> levels;
   std::vector<std::size_t> first_run{0};
-  for (int level = window_level; level <= lattice.top_level(); ++level) {
-    const auto at = static_cast<std::size_t>(level);
-    const NodeWindow& nodes = windows[at];
-    const Rectangle inside = overlap(lattice, within, window_level, level).inside;
-    ListedNodes& listed =
-        levels.emplace_back(ListedNodes{{glm::max(inside.end - inside.first, 0), runner.run_nodes},
-                                        inside.first - nodes.first,
-                                        {},
-                                        nodes,
-                                        selection.levels[at].state.data()});
-    if (window_level > 0) {
-      const NodeWindow& omitted = windows[static_cast<std::size_t>(window_level) - 1];
-      if (!is_empty(omitted)) {
-        listed.omitted = overlap(lattice, omitted, window_level - 1, level).inside;
-        listed.omitted.first -= nodes.first;
-        listed.omitted.end -= nodes.first;
-      }
-    }
-    first_run.push_back(first_run.back() + listed.runs.count());
+  for (int level = window_level; level <= selection.lattice.top_level(); ++level) {
+    levels.push_back(listed_nodes(selection, windows, window_level, level, runner.run_nodes));
+    first_run.push_back(first_run.back() + levels.back().runs.count());
   }
   const auto offsets = std::make_unique_for_overwrite<std::uint32_t[]>(first_run.back());
   for (std::size_t i = 0; i < levels.size(); ++i) {
@@ -187,8 +188,8 @@ std::vector<Leaf> list_leaves(const Selection& selection, std::span<const NodeWi
   for (std::size_t i = 0; i < levels.size(); ++i) {
     run_pass(runner, levels[i].runs.count(),
              passes::ListLeavesPass{levels[i], offsets.get() + first_run[i],
-                                    window_level + static_cast<int>(i), lattice.block_cells,
-                                    leaves.data()});
+                                    window_level + static_cast<int>(i),
+                                    selection.lattice.block_cells, leaves.data()});
   }
   return leaves;
 }

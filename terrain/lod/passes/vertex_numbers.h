@@ -107,8 +107,10 @@ struct MarkVerticesPass {
 
  private:
   bool is_own(std::uint32_t which, const LeafBlock& leaf, int column, int row) const noexcept {
-    return (column < leaf.own_points.x && row < leaf.own_points.y) ||
-           tree.owner_of(tree.sample(leaf, column, row), leaf.level) == which;
+    if (column < leaf.own_points.x && row < leaf.own_points.y) return true;
+    const glm::ivec2 at = tree.sample(leaf, column, row);
+    // A missing sample may be that of a leaf without any height, which is not in the list.
+    return !tree.is_missing(at) && tree.owner_of(at, leaf.level) == which;
   }
   bool is_used(const LeafBlock& leaf, int column, int row) const noexcept {
     const glm::ivec2 at = tree.sample(leaf, column, row);

@@ -40,7 +40,7 @@ std::size_t memory_of_small_windows(const Lattice& lattice) {
   std::size_t levels = 1;
   for (int level = 0; std::max(lattice.cells(level).x, lattice.cells(level).y) > 64; ++level)
     ++levels;
-  return 40 * std::size_t{96 * 96} * levels;
+  return std::size_t{40} * 96 * 96 * levels;
 }
 
 }  // namespace
