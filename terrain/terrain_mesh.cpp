@@ -1,15 +1,17 @@
 #include "terrain/terrain_mesh.h"
 
+#include <bit>
 #include <cmath>
 #include <cstddef>
+#include <glm/common.hpp>
 #include <limits>
 #include <memory>
-#include <utility>
 
 #include "core/error.h"
 #include "terrain/lod/deviation.h"
 #include "terrain/lod/lattice.h"
 #include "terrain/lod/passes/emission.h"
+#include "terrain/lod/prefix_sum.h"
 
 namespace groundray {
 namespace {
@@ -24,11 +26,9 @@ std::unique_ptr<T[]> uncleared(std::size_t count) {
 }
 
 // Replaces counts by the sums of those before; returns the total.
-std::uint32_t sum_up(std::uint32_t* counts, std::size_t size, const char* what) {
-  std::uint64_t total = 0;
-  for (std::size_t i = 0; i < size; ++i) {
-    total += std::exchange(counts[i], static_cast<std::uint32_t>(total));
-  }
+std::uint32_t first_indices(std::uint32_t* counts, std::size_t size, const char* what,
+                            const PassRunner& runner) {
+  const std::uint64_t total = sum_up(counts, size, runner);
   if (total > std::numeric_limits<std::uint32_t>::max()) {
     throw Error(
         "terrain mesh: {} {} exceed the range of 32-bit indices; raise the tolerance, or mesh the "
@@ -53,73 +53,95 @@ LeafList find_leaves(const HeightGrid& grid, MeshBound bound, int block_cells,
   std::vector<NodeWindow> windows;
   for (const NodeLevel& level : levels) windows.push_back(whole_window(level));
   LeafList list{select_nodes(lattice, windows, bound, runner), {}};
-  list.leaves = list_leaves(list.selection, windows, 0, lattice.top_level(), runner);
+  list.leaves = list_leaves(list.selection, windows, 0, runner);
   return list;
 }
 
+// Part of the DEM that has a mesh of its own: a window, except for that of the next finer level.
+struct MeshWindow {
+  HeightWindow heights;  // points of `level`
+  int level = 0;
+  Rectangle cells, finer;  // of the DEM
+  bool has_holes = false;
+  std::span<const Leaf> leaves;
+};
+
+// Builds meshes of leaves of a selection.
 class MeshBuilder {
  public:
-  MeshBuilder(const HeightGrid& grid, const LeafList& list, const PassRunner& runner)
-      : runner_(runner), count_(list.leaves.size()) {
-    const Lattice& lattice = list.selection.lattice;
-    LeafTree& tree = numbers_.tree;
-    tree.samples = {{0, 0}, lattice.samples, grid.heights_m().data(), grid.columns()};
-    tree.block_cells = lattice.block_cells;
-    tree.level_count = static_cast<int>(list.selection.levels.size());
-    tree.leaves = list.leaves.data();
-    for (std::size_t level = 0; level < list.selection.levels.size(); ++level) {
-      const Selection::Level& from = list.selection.levels[level];
+  MeshBuilder(const Selection& selection, const glm::dvec2& step_m, const PassRunner& runner)
+      : runner_(runner), is_mirrored_(step_m.x * step_m.y > 0) {
+    tree_.samples = selection.lattice.samples;
+    tree_.block_cells = selection.lattice.block_cells;
+    for (std::size_t level = 0; level < selection.levels.size(); ++level) {
+      const Selection::Level& from = selection.levels[level];
       leaf_of_node_.push_back(uncleared<std::uint32_t>(from.state.size()));
-      tree.levels[level] = {from.state.data(), leaf_of_node_.back().get(), from.size};
+      tree_.levels[level] = {from.state.data(), leaf_of_node_.back().get(), from.first,
+                             from.size.x};
     }
-    run_pass(runner_, count_, passes::NumberLeavesPass{tree});
-    if (grid.hole_count() > 0) mark_vertices();
-    is_mirrored_ = grid.step_m().x * grid.step_m().y > 0;
   }
 
-  TerrainMesh build() {
-    std::vector<std::uint32_t> first_vertex(count_);
-    std::vector<std::uint32_t> first_triangle(count_);
-    run_pass(runner_, count_,
-             passes::CountMeshPass{numbers_.tree, numbers_.marks, numbers_.mark_of,
-                                   first_vertex.data(), first_triangle.data()});
+  TerrainMesh build(const MeshWindow& window) const {
+    const std::size_t count = window.leaves.size();
+    LeafTree tree = tree_;
+    tree.heights = window.heights;
+    tree.heights_level = window.level;
+    tree.window = window.cells;
+    tree.finer = window.finer;
+    tree.leaves = window.leaves.data();
+    run_pass(runner_, count, passes::NumberLeavesPass{tree});
+    VertexNumbers numbers{tree};
+    const bool is_whole =
+        window.finer == Rectangle() && window.cells == Rectangle{{0, 0}, tree.last_sample()};
+    const Marks marks = is_whole && !window.has_holes ? Marks() : mark_vertices(tree, count);
+    numbers.marks = marks.bits.data();
+    numbers.mark_of = marks.of_leaf.get();
+    return emit(numbers, count);
+  }
+
+ private:
+  // Vertices of the leaves that need marks.
+  struct Marks {
+    std::unique_ptr<std::uint32_t[]> of_leaf;
+    std::vector<std::uint64_t> bits;
+  };
+
+  Marks mark_vertices(const LeafTree& tree, std::size_t count) const {
+    Marks marks{uncleared<std::uint32_t>(count), {}};
+    run_pass(runner_, count, passes::CountMarkedPass{tree, marks.of_leaf.get()});
+    const std::uint32_t marked_count = first_indices(marks.of_leaf.get(), count, "leaves", runner_);
+    const auto marked = uncleared<std::uint32_t>(marked_count);
+    run_pass(runner_, count, passes::ListMarkedPass{tree, marks.of_leaf.get(), marked.get()});
+    marks.bits.resize(marked_count * tree.mark_words());
+    run_pass(runner_, marked_count,
+             passes::MarkVerticesPass{tree, marked.get(), marks.bits.data()});
+    return marks;
+  }
+
+  TerrainMesh emit(VertexNumbers& numbers, std::size_t count) const {
+    const auto first_vertex = uncleared<std::uint32_t>(count);
+    const auto first_triangle = uncleared<std::uint32_t>(count);
+    run_pass(runner_, count,
+             passes::CountMeshPass{numbers, first_vertex.get(), first_triangle.get()});
     TerrainMesh mesh;
-    const std::uint32_t vertices = sum_up(first_vertex.data(), count_, "vertices");
-    const std::uint32_t triangles = sum_up(first_triangle.data(), count_, "triangles");
-    numbers_.first = first_vertex.data();
+    const std::uint32_t vertices = first_indices(first_vertex.get(), count, "vertices", runner_);
+    const std::uint32_t triangles =
+        first_indices(first_triangle.get(), count, "triangles", runner_);
+    numbers.first = first_vertex.get();
     mesh.vertices.resize(vertices);
-    run_pass(runner_, count_, passes::EmitVerticesPass{numbers_, mesh.vertices.data()});
+    run_pass(runner_, count, passes::EmitVerticesPass{numbers, mesh.vertices.data()});
     mesh.triangles.resize(triangles);
     mesh.levels.resize(triangles);
-    run_pass(runner_, count_,
-             passes::EmitTrianglesPass{numbers_, first_triangle.data(), is_mirrored_,
+    run_pass(runner_, count,
+             passes::EmitTrianglesPass{numbers, first_triangle.get(), is_mirrored_,
                                        mesh.triangles.data(), mesh.levels.data()});
     return mesh;
   }
 
- private:
-  void mark_vertices() {
-    const LeafTree& tree = numbers_.tree;
-    mark_of_.resize(count_);
-    std::vector<std::uint32_t> holed;
-    for (std::size_t leaf = 0; leaf < count_; ++leaf) {
-      if (!tree.leaves[leaf].has_holes) continue;
-      mark_of_[leaf] = static_cast<std::uint32_t>(holed.size());
-      holed.push_back(static_cast<std::uint32_t>(leaf));
-    }
-    marks_.resize(holed.size() * tree.mark_words());
-    run_pass(runner_, holed.size(), passes::MarkVerticesPass{tree, holed.data(), marks_.data()});
-    numbers_.marks = marks_.data();
-    numbers_.mark_of = mark_of_.data();
-  }
-
   const PassRunner& runner_;
-  std::size_t count_;  // number of leaves
-  VertexNumbers numbers_;
-  std::vector<std::unique_ptr<std::uint32_t[]>> leaf_of_node_;
-  std::vector<std::uint32_t> mark_of_;
-  std::vector<std::uint64_t> marks_;
-  bool is_mirrored_ = false;
+  bool is_mirrored_;
+  LeafTree tree_;
+  std::vector<std::unique_ptr<std::uint32_t[]>> leaf_of_node_;  // by level
 };
 
 }  // namespace
@@ -127,7 +149,31 @@ class MeshBuilder {
 TerrainMesh build_terrain_mesh(const HeightGrid& grid, const MeshBound& bound, int block_cells,
                                const PassRunner& runner) {
   const LeafList list = find_leaves(grid, bound, block_cells, runner);
-  return MeshBuilder(grid, list, runner).build();
+  const glm::ivec2 samples = list.selection.lattice.samples;
+  const HeightWindow heights{{0, 0}, samples, grid.heights_m().data(), grid.columns()};
+  return MeshBuilder(list.selection, grid.step_m(), runner)
+      .build({heights, 0, {{0, 0}, samples - 1}, {}, grid.hole_count() > 0, list.leaves});
+}
+
+std::vector<TerrainMesh> build_level_meshes(const Selection& selection,
+                                            std::span<const Level> levels,
+                                            const PassRunner& runner) {
+  std::vector<TerrainMesh> meshes;
+  if (levels.empty()) return meshes;
+  const MeshBuilder builder(selection, levels.front().frame.step_m, runner);
+  Rectangle finer;
+  for (const Level& level : levels) {
+    const int number = std::countr_zero(static_cast<std::uint32_t>(level.step));
+    const glm::ivec2 size = level.heights.size();
+    const Rectangle cells{level.first, glm::min(level.first + (size - 1) * level.step,
+                                                selection.lattice.samples - 1)};
+    const HeightWindow heights{level.first >> number, size, level.heights.heights_m().data(),
+                               size.x};
+    meshes.push_back(builder.build(
+        {heights, number, cells, finer, level.heights.hole_count() > 0, level.leaves}));
+    finer = cells;
+  }
+  return meshes;
 }
 
 }  // namespace groundray

@@ -3,9 +3,12 @@
 #include <cstdint>
 #include <glm/vec2.hpp>
 #include <glm/vec3.hpp>
+#include <span>
 #include <vector>
 
 #include "core/geometry/height_grid.h"
+#include "core/tracing/level.h"
+#include "terrain/lod/clipmap.h"
 #include "terrain/lod/pass.h"
 #include "terrain/lod/quadtree.h"
 
@@ -29,5 +32,21 @@ struct TerrainMesh {
 ///         mesh has more vertices or triangles than 32 bits can number.
 TerrainMesh build_terrain_mesh(const HeightGrid& grid, const MeshBound& bound, int block_cells = 2,
                                const PassRunner& runner = {});
+
+/// Returns the mesh of each level of a clipmap, with all of its vertices: those on the border of
+/// two windows belong to both meshes. Together the meshes are one surface without cracks or
+/// T-junctions. A triangle exists if and only if its samples exist.
+/// @param levels  finest first, with all leaves of `selection`: Clipmap::levels, and
+///                Clipmap::selection.
+/// @throws Error if a mesh has more vertices or triangles than 32 bits can number.
+std::vector<TerrainMesh> build_level_meshes(const Selection& selection,
+                                            std::span<const Level> levels,
+                                            const PassRunner& runner = {});
+
+/// Returns the mesh of each level of a clipmap.
+inline std::vector<TerrainMesh> build_level_meshes(const Clipmap& clipmap,
+                                                   const PassRunner& runner = {}) {
+  return build_level_meshes(clipmap.selection(), clipmap.levels(), runner);
+}
 
 }  // namespace groundray

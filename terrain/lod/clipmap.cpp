@@ -12,12 +12,6 @@
 
 namespace groundray {
 
-// Rectangle of nodes [first, end).
-struct NodeRectangle {
-  glm::ivec2 first{0}, end{0};
-  friend bool operator==(const NodeRectangle&, const NodeRectangle&) = default;
-};
-
 namespace {
 
 constexpr int unit_nodes = 2;  // windows are aligned to nodes of the next coarser level
@@ -62,7 +56,7 @@ struct Clipmap::Plan {
   glm::ivec2 wanted_half(int level) const;
   void size_windows(int most_units);
   double bytes() const;
-  NodeRectangle window(int level, const glm::dvec2& centre) const;
+  Rectangle window(int level, const glm::dvec2& centre) const;
   glm::dvec2 centre(const SensorBox& sensors) const;
   MeshBound bound(const SensorBox& sensors) const;
 };
@@ -70,7 +64,7 @@ struct Clipmap::Plan {
 namespace {
 
 // Assembles the nodes of a rectangle from the tiles that `tile_at` returns.
-NodeLevel assemble_nodes(const NodeRectangle& where, const auto& tile_at) {
+NodeLevel assemble_nodes(const Rectangle& where, const auto& tile_at) {
   NodeLevel nodes;
   nodes.size = where.end - where.first;
   const auto copy = [&](const Tile::NodeValues& from, glm::ivec2 tile, std::vector<float>& to) {
@@ -187,7 +181,7 @@ glm::dvec2 Clipmap::Plan::centre(const SensorBox& sensors) const {
   return glm::clamp(middle, glm::dvec2(0), glm::dvec2(frame.samples - 1));
 }
 
-NodeRectangle Clipmap::Plan::window(int level, const glm::dvec2& centre) const {
+Rectangle Clipmap::Plan::window(int level, const glm::dvec2& centre) const {
   const glm::ivec2 nodes = lattice.nodes(level);
   if (level == outermost) return {{0, 0}, nodes};
   const glm::ivec2 middle(glm::round(centre / static_cast<double>(unit_cells << level)));
@@ -212,15 +206,15 @@ struct Clipmap::Window {
     std::shared_ptr<const Tile> content;
   };
   int level = 0;
-  NodeRectangle nodes_in;
+  Rectangle nodes_in;
   glm::ivec2 slots{0};
   std::vector<Slot> tiles;
   NodeLevel nodes;
   HeightArray heights;
 
-  Window(const Plan& plan, int level, const NodeRectangle& where, const Window* before);
-  static glm::ivec2 first_tile(const NodeRectangle& where) { return where.first / Tile::nodes; }
-  static glm::ivec2 last_tile(const NodeRectangle& where) { return (where.end - 1) / Tile::nodes; }
+  Window(const Plan& plan, int level, const Rectangle& where, const Window* before);
+  static glm::ivec2 first_tile(const Rectangle& where) { return where.first / Tile::nodes; }
+  static glm::ivec2 last_tile(const Rectangle& where) { return (where.end - 1) / Tile::nodes; }
   Slot& slot(glm::ivec2 tile) {
     return tiles[static_cast<std::size_t>(tile.y % slots.y) * static_cast<std::size_t>(slots.x) +
                  static_cast<std::size_t>(tile.x % slots.x)];
@@ -236,7 +230,7 @@ struct Clipmap::Window {
   HeightArray fill(const Plan& plan, const Window* before);
 };
 
-Clipmap::Window::Window(const Plan& plan, int of, const NodeRectangle& where, const Window* before)
+Clipmap::Window::Window(const Plan& plan, int of, const Rectangle& where, const Window* before)
     : level(of), nodes_in(where), heights(fill(plan, before)) {
   nodes =
       assemble_nodes(nodes_in, [&](glm::ivec2 tile) -> const Tile& { return *slot(tile).content; });
@@ -273,18 +267,20 @@ std::vector<float> Clipmap::Window::assemble_heights(const Plan& plan) {
 }
 
 Clipmap::Clipmap(std::shared_ptr<const TileSource> source, const GridFrame& frame,
-                 const ClipmapSettings& settings, const SensorBox& sensors)
-    : Clipmap(std::make_shared<const Plan>(std::move(source), frame, settings), sensors, nullptr) {}
+                 const ClipmapSettings& settings, const SensorBox& sensors,
+                 const PassRunner& runner)
+    : Clipmap(std::make_shared<const Plan>(std::move(source), frame, settings), sensors, nullptr,
+              runner) {}
 
-Clipmap Clipmap::moved_to(const SensorBox& sensors) const {
-  Clipmap next(plan_, sensors, this);
+Clipmap Clipmap::moved_to(const SensorBox& sensors, const PassRunner& runner) const {
+  Clipmap next(plan_, sensors, this, runner);
   const glm::dvec2 here = plan_->centre(sensors);
   const glm::dvec2 ahead = glm::clamp(2.0 * here - plan_->centre(sensors_), glm::dvec2(0),
                                       glm::dvec2(plan_->frame.samples - 1));
   std::vector<TileName> coming;
   for (int level = plan_->finest; level < plan_->outermost; ++level) {
-    const NodeRectangle now = plan_->window(level, here);
-    const NodeRectangle then = plan_->window(level, ahead);
+    const Rectangle now = plan_->window(level, here);
+    const Rectangle then = plan_->window(level, ahead);
     const glm::ivec2 first = Window::first_tile(now), last = Window::last_tile(now);
     for (int y = Window::first_tile(then).y; y <= Window::last_tile(then).y; ++y) {
       for (int x = Window::first_tile(then).x; x <= Window::last_tile(then).x; ++x) {
@@ -297,23 +293,24 @@ Clipmap Clipmap::moved_to(const SensorBox& sensors) const {
   return next;
 }
 
-Clipmap::Clipmap(std::shared_ptr<const Plan> plan, const SensorBox& sensors, const Clipmap* before)
+Clipmap::Clipmap(std::shared_ptr<const Plan> plan, const SensorBox& sensors, const Clipmap* before,
+                 const PassRunner& runner)
     : plan_(std::move(plan)), sensors_(sensors) {
   const glm::dvec2 centre = plan_->centre(sensors);
   windows_.resize(static_cast<std::size_t>(plan_->outermost) + 1);
   for (int level = plan_->finest; level <= plan_->outermost; ++level) {
     const auto i = static_cast<std::size_t>(level);
-    const NodeRectangle where = plan_->window(level, centre);
+    const Rectangle where = plan_->window(level, centre);
     const Window* old = before != nullptr ? before->windows_[i].get() : nullptr;
     windows_[i] = old != nullptr && old->nodes_in == where
                       ? before->windows_[i]
                       : std::make_shared<const Window>(*plan_, level, where, old);
   }
-  select_leaves(sensors);
+  select_leaves(runner);
 }
 
-// Selects the leaves and assigns each to the finest window that contains it.
-void Clipmap::select_leaves(const SensorBox& sensors) {
+// Selects the leaves and lists each in the finest window that contains it.
+void Clipmap::select_leaves(const PassRunner& runner) {
   const Lattice& lattice = plan_->lattice;
   const int top = lattice.top_level();
   std::vector<NodeWindow> nodes(static_cast<std::size_t>(top) + 1);
@@ -327,7 +324,7 @@ void Clipmap::select_leaves(const SensorBox& sensors) {
     nodes[i] = level <= plan_->outermost ? view(windows_[i]->nodes, windows_[i]->nodes_in.first)
                                          : view(plan_->coarser[i - windows_.size()], {0, 0});
   }
-  const Selection selection = select_nodes(lattice, nodes, plan_->bound(sensors));
+  selection_ = select_nodes(lattice, nodes, plan_->bound(sensors_), runner);
   for (int level = plan_->finest; level <= plan_->outermost; ++level) {
     const Window& window = *windows_[static_cast<std::size_t>(level)];
     levels_.push_back({.frame = plan_->frame,
@@ -336,15 +333,7 @@ void Clipmap::select_leaves(const SensorBox& sensors) {
                        .step = 1 << level,
                        .leaf_cells = Certificate::block_cells,
                        .part_cells = part_cells,
-                       .leaves = {}});
-  }
-  for (const Leaf& leaf : list_leaves(selection, nodes, plan_->finest, top)) {
-    const auto holds = [&](const Level& level) {
-      const glm::ivec2 end = level.first + (level.heights.size() - 1) * level.step;
-      return leaf.step >= level.step && level.first.x <= leaf.column && leaf.column < end.x &&
-             level.first.y <= leaf.row && leaf.row < end.y;
-    };
-    std::ranges::find_if(levels_, holds)->leaves.push_back(leaf);
+                       .leaves = list_leaves(selection_, nodes, level, runner)});
   }
 }
 

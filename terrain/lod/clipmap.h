@@ -58,27 +58,31 @@ class Clipmap {
   /// @throws Error if a setting is negative or not finite, if the memory is too small for any
   ///         window, or if a tile cannot be read.
   Clipmap(std::shared_ptr<const TileSource> source, const GridFrame& frame,
-          const ClipmapSettings& settings, const SensorBox& sensors);
+          const ClipmapSettings& settings, const SensorBox& sensors, const PassRunner& runner = {});
 
   /// Returns the clipmap for other sensor positions. Data that stay in view are shared with this
   /// clipmap. Only tiles that come into view are read; those that the same motion would need next
   /// are prefetched.
   /// @throws Error if a tile cannot be read.
-  Clipmap moved_to(const SensorBox& sensors) const;
+  Clipmap moved_to(const SensorBox& sensors, const PassRunner& runner = {}) const;
 
   /// Returns the levels to trace, the surface around the sensors, finest first.
   const std::vector<Level>& levels() const noexcept { return levels_; }
+  /// Returns the quadtree whose leaves the levels have.
+  const Selection& selection() const noexcept { return selection_; }
 
  private:
   struct Plan;    // everything that follows from the settings alone
   struct Window;  // tiles of a level and the arrays assembled from them
 
-  Clipmap(std::shared_ptr<const Plan> plan, const SensorBox& sensors, const Clipmap* before);
-  void select_leaves(const SensorBox& sensors);
+  Clipmap(std::shared_ptr<const Plan> plan, const SensorBox& sensors, const Clipmap* before,
+          const PassRunner& runner);
+  void select_leaves(const PassRunner& runner);
 
   std::shared_ptr<const Plan> plan_;
   SensorBox sensors_;
   std::vector<std::shared_ptr<const Window>> windows_;  // by level; null below the finest
+  Selection selection_;
   std::vector<Level> levels_;
 };
 

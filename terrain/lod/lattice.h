@@ -9,12 +9,23 @@
 
 namespace groundray {
 
+/// Rectangle of samples, cells or nodes: columns and rows [first, end).
+struct Rectangle {
+  glm::ivec2 first{0}, end{0};
+
+  bool holds(glm::ivec2 at) const noexcept {
+    return first.x <= at.x && first.y <= at.y && at.x < end.x && at.y < end.y;
+  }
+  friend bool operator==(const Rectangle&, const Rectangle&) = default;
+};
+
 /// Levels of a DEM: level k consists of every 2^k-th sample, so its column i is sample min(i 2^k,
 /// last). The last column and row therefore belong to every level, and the last cells of a level
 /// may be narrower than the others. A node of level k is a block of block_cells x block_cells cells
 /// of that level; node (i, j) of level k has the children (2i..2i+1, 2j..2j+1) of level k-1.
 struct Lattice {
   static constexpr int max_block_cells = 64;
+  static constexpr int max_levels = 31;
 
   glm::ivec2 samples{2};  ///< columns and rows of the DEM, each 2 to 2^30
   int block_cells = 8;    ///< even, at most max_block_cells

@@ -38,7 +38,7 @@ struct PassRunner {
   std::function<void(std::size_t count, const Work& work)> on_host = run_in_parallel;
   PassDevice* device = nullptr;  ///< runs the passes that have a name, if there is one
   int run_nodes = 64;            ///< nodes in a row that are one index of a pass over nodes
-  int run_samples = 256;         ///< about as many samples are one index of a pass over samples
+  int run_samples = 256;         ///< about as many samples or counts are one index of other passes
 
   PassRunner() = default;
   /// @param host  calls `work(begin, end)` for ranges that cover [0, count) once.

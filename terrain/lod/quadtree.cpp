@@ -5,20 +5,23 @@
 #include <cmath>
 #include <cstddef>
 #include <glm/common.hpp>
+#include <memory>
 #include <utility>
 
 #include "core/error.h"
 #include "terrain/dem/row_major.h"
 #include "terrain/lod/passes/leaf_list.h"
 #include "terrain/lod/passes/selection.h"
+#include "terrain/lod/prefix_sum.h"
 
 namespace groundray {
 namespace {
 
 using passes::BoundTest;
+using passes::ListedNodes;
 using passes::NodeRuns;
 using passes::StateWindow;
-using passes::WindowSpan;
+using passes::WindowOverlap;
 
 void check_mesh_bound(const MeshBound& bound) {
   Violations broken("mesh bound");
@@ -33,10 +36,12 @@ void check_mesh_bound(const MeshBound& bound) {
   broken.throw_if_any();
 }
 
+bool is_empty(const NodeWindow& window) { return window.size.x <= 0 || window.size.y <= 0; }
+
 [[maybe_unused]] bool is_well_placed(const Lattice& lattice, std::span<const NodeWindow> windows,
                                      std::size_t level) {
   const NodeWindow& window = windows[level];
-  if (window.size.x <= 0 || window.size.y <= 0) return level == 0 || windows[level - 1].size.x <= 0;
+  if (is_empty(window)) return level == 0 || is_empty(windows[level - 1]);
   const glm::ivec2 all = lattice.nodes(static_cast<int>(level));
   const glm::ivec2 end = window.first + window.size;
   if (level + 1 == windows.size()) return window.first == glm::ivec2(0) && window.size == all;
@@ -52,32 +57,17 @@ void check_mesh_bound(const MeshBound& bound) {
   return is_well_placed_along(0) && is_well_placed_along(1);
 }
 
-// Returns how the columns (axis 0) or rows (axis 1) of a level's window overlap the windows of
-// finer levels.
-std::vector<WindowSpan> spans(const Lattice& lattice, std::span<const NodeWindow> windows,
-                              int level, int axis) {
-  const NodeWindow& window = windows[static_cast<std::size_t>(level)];
-  std::vector<WindowSpan> spans(static_cast<std::size_t>(window.size[axis]));
-  for (int finer = 0; finer + 1 < level; ++finer) {
-    const NodeWindow& other = windows[static_cast<std::size_t>(finer)];
-    if (other.size.x <= 0 || other.size.y <= 0) continue;
-    const int begin = other.first[axis];
-    const int end = begin + other.size[axis];
-    const int all = lattice.nodes(finer)[axis];
-    for (std::size_t i = 0; i < spans.size(); ++i) {
-      const int node = window.first[axis] + static_cast<int>(i);
-      const int first = node << (level - finer);
-      const int last = std::min((node + 1) << (level - finer), all);
-      const std::uint32_t bit = 1U << finer;
-      if (first < end && last > begin) spans[i].meets |= bit;
-      if (first >= begin && last <= end) spans[i].inside |= bit;
-    }
-  }
-  return spans;
-}
-
-bool is_whole(const Lattice& lattice, const NodeWindow& window, int level) {
-  return window.size == lattice.nodes(level);
+// Returns how the nodes of a level overlap the window of a finer one.
+WindowOverlap overlap(const Lattice& lattice, const NodeWindow& window, int finer, int level) {
+  const int shift = level - finer;
+  const glm::ivec2 rounding((1 << shift) - 1);
+  const glm::ivec2 end = window.first + window.size;
+  const glm::ivec2 meets_end = (end + rounding) >> shift;
+  const glm::ivec2 all = lattice.nodes(finer);
+  return {{window.first >> shift, meets_end},
+          {(window.first + rounding) >> shift,
+           {end.x == all.x ? meets_end.x : end.x >> shift,
+            end.y == all.y ? meets_end.y : end.y >> shift}}};
 }
 
 StateWindow state_window(Selection::Level& level) {
@@ -104,13 +94,11 @@ struct Splitter {
                    lattice.samples - 1};
     passes::SplitPass pass{runs, windows[at], state_window(selection.levels[at]), {}, test};
     if (level > 0) pass.children = state_window(selection.levels[at - 1]);
-    std::vector<WindowSpan> columns;
-    std::vector<WindowSpan> rows;
-    if (!finer_are_whole(level)) {
-      columns = spans(lattice, windows, level, 0);
-      rows = spans(lattice, windows, level, 1);
-      pass.columns = columns.data();
-      pass.rows = rows.data();
+    for (int finer = level - 2; finer >= 0; --finer) {
+      const NodeWindow& window = windows[static_cast<std::size_t>(finer)];
+      if (is_empty(window)) break;
+      if (window.size != lattice.nodes(finer))
+        pass.finer[pass.finer_count++] = overlap(lattice, window, finer, level);
     }
     run_pass(runner, runs.count(), pass);
   }
@@ -123,14 +111,26 @@ struct Splitter {
     const glm::dvec3 unit_m(bound.cell_m * cells, std::min(bound.cell_m.x, bound.cell_m.y) * cells);
     return {glm::floor(bound.low_m / unit_m) * unit_m, glm::ceil(bound.high_m / unit_m) * unit_m};
   }
-
-  bool finer_are_whole(int level) const {
-    for (int finer = 0; finer + 1 < level; ++finer) {
-      if (!is_whole(lattice, windows[static_cast<std::size_t>(finer)], finer)) return false;
-    }
-    return true;
-  }
 };
+
+// Returns the nodes of a level that lie in a window but not in that of the next finer level.
+ListedNodes listed_nodes(const Selection& selection, std::span<const NodeWindow> windows,
+                         int window_level, int level, int run_nodes) {
+  const auto at = static_cast<std::size_t>(level);
+  const glm::ivec2 first = windows[at].first;
+  const auto inside = [&](int finer) -> Rectangle {
+    if (finer < 0 || is_empty(windows[static_cast<std::size_t>(finer)])) return {};
+    const Rectangle nodes =
+        overlap(selection.lattice, windows[static_cast<std::size_t>(finer)], finer, level).inside;
+    return {nodes.first - first, nodes.end - first};
+  };
+  const Rectangle listed = inside(window_level);
+  return {{glm::max(listed.end - listed.first, 0), run_nodes},
+          listed.first,
+          inside(window_level - 1),
+          windows[at],
+          selection.levels[at].state.data()};
+}
 
 }  // namespace
 
@@ -172,26 +172,24 @@ Selection select_nodes(const Lattice& lattice, std::span<const NodeWindow> windo
 }
 
 std::vector<Leaf> list_leaves(const Selection& selection, std::span<const NodeWindow> windows,
-                              int first_level, int last_level, const PassRunner& runner) {
-  std::vector<std::vector<std::uint32_t>> offsets;
-  std::uint32_t total = 0;
-  for (int level = first_level; level <= last_level; ++level) {
-    const auto at = static_cast<std::size_t>(level);
-    const NodeRuns runs{windows[at].size, runner.run_nodes};
-    auto& counts = offsets.emplace_back(runs.count());
-    run_pass(runner, runs.count(),
-             passes::CountLeavesPass{runs, selection.levels[at].state.data(), windows[at].key_m,
-                                     counts.data()});
-    for (std::uint32_t& count : counts) total += std::exchange(count, total);
+                              int window_level, const PassRunner& runner) {
+  std::vector<ListedNodes> levels;
+  std::vector<std::size_t> first_run{0};
+  for (int level = window_level; level <= selection.lattice.top_level(); ++level) {
+    levels.push_back(listed_nodes(selection, windows, window_level, level, runner.run_nodes));
+    first_run.push_back(first_run.back() + levels.back().runs.count());
   }
-  std::vector<Leaf> leaves(total);
-  for (int level = first_level; level <= last_level; ++level) {
-    const auto at = static_cast<std::size_t>(level);
-    const NodeRuns runs{windows[at].size, runner.run_nodes};
-    run_pass(runner, runs.count(),
-             passes::ListLeavesPass{runs, windows[at], selection.levels[at].state.data(),
-                                    offsets[static_cast<std::size_t>(level - first_level)].data(),
-                                    level, selection.lattice.block_cells, leaves.data()});
+  const auto offsets = std::make_unique_for_overwrite<std::uint32_t[]>(first_run.back());
+  for (std::size_t i = 0; i < levels.size(); ++i) {
+    run_pass(runner, levels[i].runs.count(),
+             passes::CountLeavesPass{levels[i], offsets.get() + first_run[i]});
+  }
+  std::vector<Leaf> leaves(sum_up(offsets.get(), first_run.back(), runner));
+  for (std::size_t i = 0; i < levels.size(); ++i) {
+    run_pass(runner, levels[i].runs.count(),
+             passes::ListLeavesPass{levels[i], offsets.get() + first_run[i],
+                                    window_level + static_cast<int>(i),
+                                    selection.lattice.block_cells, leaves.data()});
   }
   return leaves;
 }

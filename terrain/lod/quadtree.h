@@ -57,11 +57,11 @@ struct Selection {
 Selection select_nodes(const Lattice& lattice, std::span<const NodeWindow> windows,
                        const MeshBound& bound, const PassRunner& runner = {});
 
-/// Lists the leaves of levels first_level to last_level, finer levels first, each row by row.
-/// Leaves without any height are omitted; deviations and highest samples that `windows` do not
-/// contain are 0.
+/// Lists the leaves in the window of a level, except those in the window of the next finer level:
+/// finer leaves first, each level row by row. Leaves without any height are omitted; deviations and
+/// highest samples that `windows` do not contain are 0.
 /// @param windows  as passed to select_nodes.
 std::vector<Leaf> list_leaves(const Selection& selection, std::span<const NodeWindow> windows,
-                              int first_level, int last_level, const PassRunner& runner = {});
+                              int window_level, const PassRunner& runner = {});
 
 }  // namespace groundray

@@ -6,8 +6,8 @@
 #include <cmath>
 #include <filesystem>
 #include <fstream>
-#include <memory>
 #include <map>
+#include <memory>
 #include <regex>
 #include <string>
 #include <vector>
@@ -16,8 +16,8 @@
 #include "core/tracing/ray_tracer.h"
 #include "terrain/lod/clipmap.h"
 #include "terrain/lod/quadtree.h"
-#include "test/device/driver_device.h"
 #include "terrain/terrain_scene.h"
+#include "test/device/driver_device.h"
 #include "test/device/host_arrays.h"
 #include "test/device/opencl_device.h"
 #include "test/support/terrain/adversarial_terrain.h"
@@ -30,20 +30,20 @@
 namespace groundray::device_test {
 namespace {
 
+constexpr std::size_t passes = 20;
 constexpr std::size_t most_bytes = std::size_t{512} << 20;  // of all arrays of a run
 
 using testing::DriverDevice;
-using testing::HostArrays;
-using testing::KernelCode;
-using testing::KernelDevice;
 using ::testing::ElementsAre;
 using ::testing::Gt;
+using testing::HostArrays;
 using ::testing::IsEmpty;
+using testing::KernelCode;
+using testing::KernelDevice;
 using testing::NamedTerrain;
 using ::testing::Not;
 using testing::OpenClDevice;
 using ::testing::Pair;
-using testing::PassResults;
 
 std::filesystem::path kernels() {
   return std::filesystem::read_symlink("/proc/self/exe").parent_path() / "kernels";
@@ -133,17 +133,18 @@ INSTANTIATE_TEST_SUITE_P(Cuda, OnDevice, ::testing::Values(Backend::Cuda));
 INSTANTIATE_TEST_SUITE_P(Hip, OnDevice, ::testing::Values(Backend::Hip));
 INSTANTIATE_TEST_SUITE_P(Fake, OnDevice, ::testing::Values(Backend::FakeCuda, Backend::FakeHip));
 
-// Returns where the device's arrays differ from the CPU's; empty if nowhere.
+// Returns where the device's results for a DEM differ from the CPU's; empty if nowhere.
+// `results(grid, runner)` computes them.
 std::string difference_on(KernelDevice& device, HostArrays& arrays, const HeightGrid& dem,
-                          const MeshBound& bound, int block_cells) {
-  const PassResults expected = testing::results_of(dem, bound, block_cells, {});
+                          const auto& results) {
+  const auto expected = results(dem, PassRunner());
   std::string difference;
   {
     const HostArrays::Use use(&arrays);
     const HeightGrid grid = testing::deep_copy(dem);
     // A device of the CPU's would read others too.
     EXPECT_TRUE(arrays.holds(grid.heights_m().data()));
-    const PassResults found = testing::results_of(grid, bound, block_cells, PassRunner(device));
+    const auto found = results(grid, PassRunner(device));
     const HostArrays::Use elsewhere(nullptr);
     difference = testing::difference(found, expected);
   }
@@ -188,6 +189,29 @@ std::string difference_on(KernelDevice& device, HostArrays& arrays, const Shots&
   return difference;
 }
 
+// Results for a whole DEM.
+auto results_for(const MeshBound& bound, int block_cells) {
+  return [=](const HeightGrid& grid, const PassRunner& runner) {
+    return testing::results_of(grid, bound, block_cells, runner);
+  };
+}
+
+// Results for windows of 8 x 8 nodes round a place.
+auto results_for_windows(const MeshBound& bound, int block_cells) {
+  return [=](const HeightGrid& grid, const PassRunner& runner) {
+    const glm::dvec2 place = glm::dvec2(grid.columns(), grid.rows()) * glm::dvec2(0.4, 0.7);
+    return testing::window_results(grid, place, 8, bound, block_cells, runner);
+  };
+}
+
+// Results for a clipmap that is built, moved and moved far.
+auto results_for_clipmap(const MeshBound& bound) {
+  return [=](const HeightGrid& grid, const PassRunner& runner) {
+    return testing::clipmap_results(grid, bound.tolerance_m, bound.angle_rad,
+                                    testing::places_on(grid), runner);
+  };
+}
+
 // A DEM of steps, and a bound for each of its levels that is exactly the key of a node, which tells
 // > from >=.
 struct Ties {
@@ -208,17 +232,53 @@ TEST_P(OnDevice, PassesWriteTheSameBytesForTheWholeDem) {
   for (const NamedTerrain& terrain : terrains()) {
     for (const int block_cells : {2, 4, 8, 64}) {
       for (const MeshBound& bound : bounds_of(terrain.grid)) {
-        EXPECT_EQ(difference_on(*device_, arrays_, terrain.grid, bound, block_cells), "")
+        EXPECT_EQ(difference_on(*device_, arrays_, terrain.grid, results_for(bound, block_cells)),
+                  "")
             << terrain.name << ", " << block_cells << " cells, angle " << bound.angle_rad;
       }
     }
   }
 }
 
+TEST_P(OnDevice, PassesWriteTheSameBytesForWindows) {
+  const auto expect_same = [&](const NamedTerrain& terrain, int block_cells) {
+    for (const MeshBound& bound : bounds_of(terrain.grid)) {
+      EXPECT_EQ(
+          difference_on(*device_, arrays_, terrain.grid, results_for_windows(bound, block_cells)),
+          "")
+          << terrain.name << ", " << block_cells << " cells, angle " << bound.angle_rad;
+    }
+  };
+  for (const NamedTerrain& terrain : terrains()) {
+    for (const int block_cells : {2, 4, 8, 64}) expect_same(terrain, block_cells);
+  }
+  // Smaller DEMs have no window of 8 such nodes.
+  const HeightGrid large =
+      testing::with_holes(testing::fractal(1025, 2, 40, Seed{3}), 9, 4, Seed{8});
+  expect_same({"large", part_of(large, {641, 577})}, 64);
+}
+
+TEST_P(OnDevice, PassesWriteTheSameBytesForClipmaps) {
+  std::vector<NamedTerrain> all = terrains();
+  all.push_back({"three levels", testing::fractal(257, 2, 40, Seed{4})});
+  for (const NamedTerrain& terrain : all) {
+    for (const MeshBound& bound : bounds_of(terrain.grid)) {
+      EXPECT_EQ(difference_on(*device_, arrays_, terrain.grid, results_for_clipmap(bound)), "")
+          << terrain.name << ", angle " << bound.angle_rad;
+    }
+  }
+}
+
 TEST_P(OnDevice, PassesWriteTheSameBytesForTies) {
   const Ties ties;
-  for (const MeshBound& bound : ties.bounds)
-    EXPECT_EQ(difference_on(*device_, arrays_, ties.grid, bound, 2), "") << bound.tolerance_m;
+  for (const MeshBound& bound : ties.bounds) {
+    EXPECT_EQ(difference_on(*device_, arrays_, ties.grid, results_for(bound, 2)), "")
+        << bound.tolerance_m;
+    EXPECT_EQ(difference_on(*device_, arrays_, ties.grid, results_for_windows(bound, 2)), "")
+        << bound.tolerance_m;
+    EXPECT_EQ(difference_on(*device_, arrays_, ties.grid, results_for_clipmap(bound)), "")
+        << bound.tolerance_m;
+  }
 }
 
 TEST_P(OnDevice, RaysHitWhatExactTracingHits) {
@@ -241,15 +301,18 @@ TEST(OpenCl, FindsFaultsOfKernels) {
     } catch (const testing::NoDevice& reason) {
       GTEST_SKIP() << reason.what();
     }
-    std::string found = difference_on(*device, arrays, floats, bounds_of(floats).back(), 2);
+    const MeshBound bound = bounds_of(floats).back();
+    std::string found = difference_on(*device, arrays, floats, results_for(bound, 2));
     for (std::size_t i = 0; i < ties.bounds.size() && found.empty(); ++i)
-      found = difference_on(*device, arrays, ties.grid, ties.bounds[i], 2);
+      found = difference_on(*device, arrays, ties.grid, results_for(ties.bounds[i], 2));
+    if (found.empty())
+      found = difference_on(*device, arrays, floats, results_for_windows(bound, 2));
     if (found.empty()) found = difference_on(*device, arrays, shots.back());
     EXPECT_NE(found, "") << folder.path().filename();
     fmt::print("{}: {}\n", folder.path().filename().string(), found);
     ++faults;
   }
-  EXPECT_EQ(faults, 6u);
+  EXPECT_EQ(faults, 7u);
 }
 
 // Returns the message of opening CUDA's driver with a module.
@@ -289,7 +352,6 @@ Counts count_in(const std::filesystem::path& file, const std::string& begins,
   return counts;
 }
 
-constexpr std::size_t passes = 14;
 constexpr const char* in_ptx = R"(\.entry (\w+))";
 constexpr const char* in_gcn = R"(^(\w+Pass):)";
 
@@ -297,7 +359,8 @@ constexpr const char* in_gcn = R"(^(\w+Pass):)";
 // not all devices round correctly; tracing does.
 TEST(Kernels, FuseNoOperations) {
   EXPECT_EQ(count_in(kernels() / "sound/passes.ptx", in_ptx, in_ptx).size(), passes);
-  EXPECT_THAT(count_in(kernels() / "sound/passes.ptx", in_ptx, R"(^\s*fma\.[a-z]*\.f64)"), IsEmpty());
+  EXPECT_THAT(count_in(kernels() / "sound/passes.ptx", in_ptx, R"(^\s*fma\.[a-z]*\.f64)"),
+              IsEmpty());
   EXPECT_THAT(count_in(kernels() / "sound/passes.ptx", in_ptx, R"(^\s*div\.[a-z]*\.f64)"),
               ElementsAre(Pair("TraceLevelPass", Gt(0u))));
   EXPECT_THAT(count_in(kernels() / "passes.fused.ptx", in_ptx, R"(^\s*fma\.rn\.f64)"),

@@ -37,7 +37,7 @@ HostArrays::~HostArrays() {
 }
 
 void HostArrays::set_reachable(bool is_reachable) const {
-  if (mprotect(begin_, size_, is_reachable ? PROT_READ | PROT_WRITE : PROT_NONE) != 0)
+  if (mprotect(begin_, used_, is_reachable ? PROT_READ | PROT_WRITE : PROT_NONE) != 0)
     throw std::system_error(errno, std::generic_category(), "mprotect");
 }
 

@@ -7,6 +7,7 @@
 #include "terrain/lod/passes/deviation.h"
 #include "terrain/lod/passes/emission.h"
 #include "terrain/lod/passes/leaf_list.h"
+#include "terrain/lod/passes/prefix_sum.h"
 #include "terrain/lod/passes/selection.h"
 #pragma clang force_cuda_host_device end
 
@@ -57,7 +58,13 @@ KERNEL(SplitPass)
 KERNEL(LeafPass)
 KERNEL(CountLeavesPass)
 KERNEL(ListLeavesPass)
+KERNEL(SumCountsPass)
+KERNEL(ReplaceCountsPass)
+KERNEL(SumSumsPass)
+KERNEL(ReplaceSumsPass)
 KERNEL(NumberLeavesPass)
+KERNEL(CountMarkedPass)
+KERNEL(ListMarkedPass)
 KERNEL(MarkVerticesPass)
 KERNEL(CountMeshPass)
 KERNEL(EmitVerticesPass)

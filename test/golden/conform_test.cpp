@@ -362,8 +362,7 @@ TEST(ReferenceRaysProof, RaysMovedByLessThanTheirDistancesHitTheSameTriangle) {
   const auto levels = certify(grid, block_cells, NodeDetail::Full);
   std::vector<NodeWindow> windows;
   for (const NodeLevel& level : levels) windows.push_back(whole_window(level));
-  const auto leaves =
-      list_leaves(select_nodes(lattice, windows, bound), windows, 0, lattice.top_level());
+  const auto leaves = list_leaves(select_nodes(lattice, windows, bound), windows, 0);
   const TerrainMesh mesh = build_terrain_mesh(grid, bound, block_cells);
   const auto trace = [&](const std::vector<Ray>& rays) {
     return trace_reference_rays(grid, leaves, block_cells, mesh, rays);

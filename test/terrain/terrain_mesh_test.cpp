@@ -6,8 +6,13 @@
 
 #include <algorithm>
 #include <array>
+#include <bit>
 #include <cmath>
+#include <glm/common.hpp>
 #include <limits>
+#include <map>
+#include <set>
+#include <span>
 #include <tuple>
 #include <utility>
 #include <vector>
@@ -17,8 +22,11 @@
 #include "terrain/lod/deviation.h"
 #include "terrain/judge/mesh_topology.h"
 #include "test/support/terrain/leaf_triangles.h"
+#include "test/support/terrain/pass_results.h"
+#include "test/support/terrain/sample_clipmap.h"
 #include "test/support/terrain/sample_terrain.h"
 #include "test/support/terrain/shuffled_runner.h"
+#include "test/support/terrain/slow_quadtree.h"
 
 namespace groundray::terrain_mesh_test {
 namespace {
@@ -71,7 +79,20 @@ std::vector<Piece> pieces_of(const TerrainMesh& mesh) {
   return pieces;
 }
 
-// The triangles that the leaves of the certificate represent, made by test/support.
+// The triangles that leaves represent, made by test/support.
+std::vector<Piece> pieces_of(const HeightGrid& grid, std::span<const Leaf> leaves,
+                             int block_cells) {
+  std::vector<Piece> pieces;
+  for (const Leaf& leaf : leaves) {
+    const int level = std::countr_zero(static_cast<unsigned>(leaf.step));
+    for (const auto& [a, b, c] : groundray::testing::leaf_triangles(grid, {&leaf, 1}, block_cells))
+      pieces.push_back(piece(a, b, c, level));
+  }
+  std::ranges::sort(pieces);
+  return pieces;
+}
+
+// The triangles that the leaves of the certificate represent.
 std::vector<Piece> pieces_of_leaves(const HeightGrid& grid, MeshBound bound, int block_cells) {
   bound.cell_m = {std::abs(grid.step_m().x), std::abs(grid.step_m().y)};
   const Lattice lattice{{grid.columns(), grid.rows()}, block_cells};
@@ -79,15 +100,43 @@ std::vector<Piece> pieces_of_leaves(const HeightGrid& grid, MeshBound bound, int
   std::vector<NodeWindow> windows;
   for (const NodeLevel& level : levels) windows.push_back(whole_window(level));
   const Selection selection = select_nodes(lattice, windows, bound);
-  std::vector<Piece> pieces;
-  for (int level = 0; level <= lattice.top_level(); ++level) {
-    const auto leaves = list_leaves(selection, windows, level, level);
-    for (const auto& [a, b, c] : groundray::testing::leaf_triangles(grid, leaves, block_cells)) {
-      pieces.push_back(piece(a, b, c, level));
+  return pieces_of(grid, list_leaves(selection, windows, 0), block_cells);
+}
+
+// Joins meshes at vertices in the same place, and expects each mesh to have no more vertices than
+// its triangles use, each once.
+TerrainMesh joined(std::span<const TerrainMesh> meshes) {
+  TerrainMesh all;
+  std::map<std::pair<int, int>, unsigned> known;
+  for (const TerrainMesh& mesh : meshes) {
+    std::set<std::pair<int, int>> own;
+    std::vector<unsigned> number;
+    for (const glm::ivec2 p : mesh.vertices) {
+      EXPECT_TRUE(own.emplace(p.x, p.y).second);
+      const auto [at, is_new] =
+          known.try_emplace({p.x, p.y}, static_cast<unsigned>(all.vertices.size()));
+      if (is_new) all.vertices.push_back(p);
+      number.push_back(at->second);
     }
+    std::set<unsigned> used;
+    for (const glm::uvec3 t : mesh.triangles) {
+      used.insert({t.x, t.y, t.z});
+      all.triangles.emplace_back(number.at(t.x), number.at(t.y), number.at(t.z));
+    }
+    EXPECT_EQ(used.size(), mesh.vertices.size());
+    all.levels.insert(all.levels.end(), mesh.levels.begin(), mesh.levels.end());
   }
-  std::ranges::sort(pieces);
-  return pieces;
+  return all;
+}
+
+// Returns the number of edges that two triangles have in the same direction.
+std::size_t repeated_edges(const TerrainMesh& mesh) {
+  std::set<std::pair<unsigned, unsigned>> edges;
+  std::size_t repeated = 0;
+  for (const glm::uvec3& t : mesh.triangles) {
+    for (int k = 0; k < 3; ++k) repeated += edges.emplace(t[k], t[(k + 1) % 3]).second ? 0 : 1;
+  }
+  return repeated;
 }
 
 TEST(TerrainMesh, TrianglesMatchTheLeaves) {
@@ -106,6 +155,87 @@ TEST(TerrainMesh, TrianglesMatchTheLeaves) {
                       IsEmpty());
         }
       }
+    }
+  }
+}
+
+TEST(TerrainMesh, MeshesOfWindowsMatchTheirLeavesAndMeetWithoutCracks) {
+  std::size_t most_levels = 0;
+  for (const glm::ivec2 size : {glm::ivec2{129, 129}, {101, 74}, {118, 93}, {30, 129}}) {
+    const HeightGrid whole = landscape(size, Seed{8});
+    for (const HeightGrid& grid : {whole, with_holes(whole)}) {
+      for (const int block_cells : {2, 4, 6, 8}) {
+        for (MeshBound bound : some_bounds()) {
+          bound.cell_m = glm::abs(grid.step_m());
+          for (const glm::dvec2 share : {glm::dvec2{0.5, 0.4}, {0.02, 0.9}, {1, 1}}) {
+            SCOPED_TRACE(fmt::format("{} x {}, {} holes, B = {}, {} m, {} rad, at {} {}", size.x,
+                                     size.y, grid.hole_count(), block_cells, bound.tolerance_m,
+                                     bound.angle_rad, share.x, share.y));
+            groundray::testing::Known known(grid, block_cells);
+            known.show_windows_round(share * glm::dvec2(size - 1), 8);
+            const Selection selection = select_nodes(known.lattice, known.windows, bound);
+            const auto levels = groundray::testing::levels_of(grid, known, selection);
+            const auto meshes = build_level_meshes(selection, levels);
+            ASSERT_EQ(meshes.size(), levels.size());
+            for (std::size_t i = 0; i < levels.size(); ++i)
+              EXPECT_TRUE(pieces_of(meshes[i]) == pieces_of(grid, levels[i].leaves, block_cells));
+            const TerrainMesh mesh = joined(meshes);
+            EXPECT_EQ(repeated_edges(mesh), 0u);
+            // Leaves that bridge holes have triangles where the DEM has none.
+            if (grid.hole_count() == 0) {
+              EXPECT_THAT(groundray::judge::topology_faults(grid, mesh.vertices, mesh.triangles),
+                          IsEmpty());
+            }
+            most_levels = std::max(most_levels, levels.size());
+          }
+        }
+      }
+    }
+  }
+  EXPECT_GE(most_levels, 4u);
+}
+
+// Returns the mesh of all leaves of a clipmap as those of one window, the whole DEM.
+TerrainMesh mesh_as_a_whole(const HeightGrid& grid, const Clipmap& clipmap) {
+  Selection whole{clipmap.selection().lattice, {}};
+  for (std::size_t level = 0; level < clipmap.selection().levels.size(); ++level) {
+    const Selection::Level& from = clipmap.selection().levels[level];
+    const glm::ivec2 size = whole.lattice.nodes(static_cast<int>(level));
+    auto& to = whole.levels.emplace_back(Selection::Level{{0, 0}, size, {}});
+    for (int row = 0; row < size.y; ++row) {
+      for (int column = 0; column < size.x; ++column) {
+        const glm::ivec2 node{column, row};
+        const bool is_in = Rectangle{from.first, from.first + from.size}.holds(node);
+        to.state.push_back(is_in ? from.at(node) : std::uint8_t{0});
+      }
+    }
+  }
+  Level all{.frame = grid.frame(), .heights = grid.samples()};
+  for (const Level& level : clipmap.levels())
+    all.leaves.insert(all.leaves.end(), level.leaves.begin(), level.leaves.end());
+  return build_level_meshes(whole, {&all, 1}).front();
+}
+
+TEST(TerrainMesh, MeshesOfAMovedClipmapAreTogetherThatOfTheWholeDem) {
+  const HeightGrid ground = groundray::testing::fractal(513, 5, 500, Seed{34});
+  for (const HeightGrid& grid : {ground, with_holes(ground)}) {
+    const auto places = groundray::testing::places_on(grid);
+    Clipmap clipmap(groundray::testing::certified_tiles(grid), grid.frame(),
+                    {.tolerance_m = 0.2, .angle_rad = 0.5, .memory_bytes = 4'000'000},
+                    groundray::testing::sensor_at(places[0]));
+    EXPECT_GE(clipmap.levels().size(), 3u);
+    for (const glm::dvec3& place : places) {
+      clipmap = clipmap.moved_to(groundray::testing::sensor_at(place));
+      const auto meshes = build_level_meshes(clipmap);
+      for (std::size_t i = 0; i < meshes.size(); ++i) {
+        EXPECT_TRUE(pieces_of(meshes[i]) ==
+                    pieces_of(grid, clipmap.levels()[i].leaves, Certificate::block_cells));
+      }
+      const TerrainMesh mesh = joined(meshes);
+      EXPECT_EQ(repeated_edges(mesh), 0u);
+      const TerrainMesh expected = mesh_as_a_whole(grid, clipmap);
+      EXPECT_TRUE(pieces_of(mesh) == pieces_of(expected));
+      EXPECT_EQ(mesh.vertices.size(), expected.vertices.size());
     }
   }
 }

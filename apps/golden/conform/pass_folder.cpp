@@ -156,7 +156,7 @@ void write_pass_folder(const fs::path& dem_path, const PassSettings& settings,
   std::vector<NodeWindow> windows;
   for (const NodeLevel& level : levels) windows.push_back(whole_window(level));
   const Selection selection = select_nodes(lattice, windows, bound);
-  const auto leaves = list_leaves(selection, windows, 0, lattice.top_level());
+  const auto leaves = list_leaves(selection, windows, 0);
   const TerrainMesh mesh = build_terrain_mesh(grid, bound, settings.block_cells);
   const ReferenceRays rays = trace_reference_rays(grid, leaves, settings.block_cells, mesh,
                                                   sample_rays(grid, settings.rays, settings.seed));

@@ -1,6 +1,6 @@
 #pragma once
 
-#include <bit>
+#include <algorithm>
 #include <cstddef>
 #include <cstdint>
 #include <glm/vec2.hpp>
@@ -10,6 +10,7 @@
 #include "terrain/lod/lattice.h"
 #include "terrain/lod/passes/border_thinning.h"
 #include "terrain/lod/passes/leaf_tree.h"
+#include "terrain/lod/passes/vertex_numbers.h"
 
 namespace groundray::passes {
 
@@ -28,76 +29,30 @@ struct NumberLeavesPass {
   }
 };
 
-/// Marks the points of each leaf with holes that are vertices of triangles, its own or its
-/// neighbours': one bit per point.
-struct MarkVerticesPass {
-  static constexpr char name[] = "MarkVerticesPass";
-
-  LeafTree tree;
-  const std::uint32_t* holed;  ///< indices in the list of the leaves with holes
-  std::uint64_t* marks;
-
-  void operator()(std::size_t index) const noexcept {
-    const LeafBlock leaf = tree.block_of(tree.leaves[holed[index]]);
-    std::uint64_t* const out = marks + index * tree.mark_words();
-    for (int row = 0; row < leaf.own_points.y; ++row) {
-      for (int column = 0; column < leaf.own_points.x; ++column) {
-        if (!leaf.block.drops(column, row) && is_used(leaf, column, row)) {
-          const std::size_t bit = tree.mark_bit(column, row);
-          out[bit / 64] |= std::uint64_t{1} << (bit % 64);
-        }
-      }
-    }
-  }
-
- private:
-  bool is_used(const LeafBlock& leaf, int column, int row) const noexcept {
-    const glm::ivec2 at = tree.sample(leaf, column, row);
-    if (tree.is_missing(at)) return false;
-    const glm::ivec2 last = tree.last_sample();
-    for (const Corner corner : {NorthWest, NorthEast, SouthWest, SouthEast}) {
-      // The cell of the DEM that has the sample at this corner.
-      const glm::ivec2 cell{at.x - corner % 2, at.y - corner / 2};
-      if (cell.x < 0 || cell.y < 0 || cell.x >= last.x || cell.y >= last.y) continue;
-      const LeafBlock around = tree.block_of(tree.leaves[tree.leaf_at(cell, leaf.level)]);
-      const glm::ivec2 point = tree.point(around, at);
-      const glm::ivec2 large_cell{point.x - corner % 2, point.y - corner / 2};
-      const bool is_main = around.block.splits_along_main(large_cell.x, large_cell.y);
-      // A half without this corner contains the diagonal, whose points form another half with this
-      // corner.
-      for (const Corner half : {NorthWest, NorthEast, SouthWest, SouthEast}) {
-        if (is_main != is_of_anti_diagonal(half) && tree.half_exists(around, large_cell, half)) {
-          return true;
-        }
-      }
-    }
-    return false;
-  }
-};
-
 /// Counts the vertices that each leaf owns, and its triangles.
 struct CountMeshPass {
   static constexpr char name[] = "CountMeshPass";
 
-  LeafTree tree;
-  const std::uint64_t* marks;    ///< of the leaves with holes
-  const std::uint32_t* mark_of;  ///< index of each leaf among the leaves with holes
+  VertexNumbers numbers;  ///< without `first`
   std::uint32_t* vertices;
   std::uint32_t* triangles;
 
   void operator()(std::size_t index) const noexcept {
+    const LeafTree& tree = numbers.tree;
     const LeafBlock leaf = tree.block_of(tree.leaves[index]);
-    if (tree.leaves[index].has_holes) {
-      vertices[index] = tree.marked_before(marks, mark_of[index], tree.mark_words() * 64);
-      std::uint32_t count = 0;
-      for_each_triangle(leaf.block, [&](glm::ivec2 a, glm::ivec2 b, glm::ivec2 c) {
-        count += tree.has_all(leaf, a, b, c) ? 1 : 0;
-      });
-      triangles[index] = count;
-    } else {
-      vertices[index] = leaf.own_points_before({0, leaf.own_points.y});
+    vertices[index] =
+        numbers.is_marked(index)
+            ? tree.marked_before(numbers.marks, numbers.mark_of[index], tree.mark_words() * 64)
+            : leaf.own_points_before({0, leaf.own_points.y});
+    if (!tree.leaves[index].has_holes) {
       triangles[index] = leaf.triangle_count();
+      return;
     }
+    std::uint32_t count = 0;
+    for_each_triangle(leaf.block, [&](glm::ivec2 a, glm::ivec2 b, glm::ivec2 c) {
+      count += tree.has_all(leaf, a, b, c) ? 1 : 0;
+    });
+    triangles[index] = count;
   }
 };
 
@@ -111,8 +66,9 @@ struct EmitVerticesPass {
   void operator()(std::size_t index) const noexcept {
     const LeafTree& tree = numbers.tree;
     const LeafBlock leaf = tree.block_of(tree.leaves[index]);
-    for (int row = 0; row < leaf.own_points.y; ++row) {
-      for (int column = 0; column < leaf.own_points.x; ++column) {
+    const glm::ivec2 points = numbers.points(index, leaf);
+    for (int row = 0; row < points.y; ++row) {
+      for (int column = 0; column < points.x; ++column) {
         if (!numbers.has(index, leaf, column, row)) continue;
         vertices[numbers.of_own(index, leaf, column, row)] = tree.sample(leaf, column, row);
       }
@@ -143,15 +99,15 @@ struct EmitTrianglesPass {
       for (; next <= leaf.block.cells.y && next < row + rows; ++next) {
         for (int column = 0; column <= leaf.block.cells.x; ++column) {
           if (leaf.block.drops(column, next)) continue;
-          if (has_holes && tree.is_missing(tree.sample(leaf, column, next))) continue;
-          at[next - row][column] = numbers.of(index, leaf, {column, next});
+          const bool is_missing = has_holes && tree.is_missing(tree.sample(leaf, column, next));
+          at[next - row][column] = is_missing ? missing : numbers.of(index, leaf, {column, next});
         }
       }
       for_each_triangle_of_row(leaf.block, row, [&](glm::ivec2 a, glm::ivec2 b, glm::ivec2 c) {
-        if (has_holes && !tree.has_all(leaf, a, b, c)) return;
         const std::uint32_t i = at[a.y - row][a.x];
         const std::uint32_t j = at[b.y - row][b.x];
         const std::uint32_t k = at[c.y - row][c.x];
+        if (has_holes && std::max({i, j, k}) == missing) return;
         triangles[out] = is_mirrored ? glm::uvec3{i, k, j} : glm::uvec3{i, j, k};
         levels[out] = static_cast<std::uint8_t>(leaf.level);
         ++out;
@@ -165,6 +121,7 @@ struct EmitTrianglesPass {
 
  private:
   static constexpr int rows = 3;  // that a row of cells may refer to
+  static constexpr std::uint32_t missing = ~std::uint32_t{0};
 };
 
 }  // namespace groundray::passes

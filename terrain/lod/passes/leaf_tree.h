@@ -46,31 +46,41 @@ struct LeafBlock {
   }
 };
 
-/// Complete quadtree with a list of its leaves.
+/// Quadtree with a list of its leaves in a part of the DEM: a window, except for that of the next
+/// finer level. No leaf lies partly inside either.
 struct LeafTree {
   struct Level {
     const std::uint8_t* state = nullptr;
     std::uint32_t* leaf = nullptr;  ///< index of a leaf in the list; undefined for other nodes
-    glm::ivec2 nodes{0};
+    glm::ivec2 first{0};
+    int columns = 0;
   };
-  static constexpr int max_levels = 31;
 
-  HeightWindow samples;
+  glm::ivec2 samples{2};  ///< columns and rows of the DEM
+  HeightWindow heights;   ///< points of a level that contain those of the leaves
+  int heights_level = 0;
+  Rectangle window;  ///< cells of the DEM
+  Rectangle finer;   ///< those of the next finer window
   int block_cells = 2;
-  int level_count = 0;
-  Level levels[max_levels];
+  Level levels[Lattice::max_levels];
   const Leaf* leaves = nullptr;
 
-  glm::ivec2 last_sample() const noexcept { return samples.size - 1; }
+  glm::ivec2 last_sample() const noexcept { return samples - 1; }
   glm::ivec2 cells(int level) const noexcept {
-    return {((samples.size.x - 2) >> level) + 1, ((samples.size.y - 2) >> level) + 1};
+    return {((samples.x - 2) >> level) + 1, ((samples.y - 2) >> level) + 1};
   }
+  /// Returns whether a cell of the DEM belongs to a leaf in the list.
+  bool holds(glm::ivec2 cell) const noexcept { return window.holds(cell) && !finer.holds(cell); }
   std::size_t node_index(int level, glm::ivec2 node) const noexcept {
-    return static_cast<std::size_t>(node.y) * static_cast<std::size_t>(levels[level].nodes.x) +
-           static_cast<std::size_t>(node.x);
+    const Level& at = levels[level];
+    return static_cast<std::size_t>(node.y - at.first.y) * static_cast<std::size_t>(at.columns) +
+           static_cast<std::size_t>(node.x - at.first.x);
   }
   bool is_missing(glm::ivec2 sample) const noexcept {
-    return std::isnan(*samples.at(sample.x, sample.y));
+    // Rounded up, because the DEM's last sample is the last point of any level.
+    const int rounding = (1 << heights_level) - 1;
+    return std::isnan(*heights.at((sample.x + rounding) >> heights_level,
+                                  (sample.y + rounding) >> heights_level));
   }
 
   LeafBlock block_of(const Leaf& leaf) const noexcept {
@@ -108,10 +118,24 @@ struct LeafTree {
       level += (state & NodeState::Split) != 0 ? -1 : 1;
     }
   }
-  /// Returns the leaf whose half-open square contains a sample.
+  /// Returns the leaf in the list that owns a sample on one of them: the leaf of its south-eastern
+  /// cell or, if that is not in the list, of the first other one that is.
   std::uint32_t owner_of(glm::ivec2 sample, int level) const noexcept {
-    return leaf_at(
-        {std::min(sample.x, last_sample().x - 1), std::min(sample.y, last_sample().y - 1)}, level);
+    glm::ivec2 cell = sample;
+    for (int i = 0; i < 3 && !holds(cell); ++i)
+      cell = sample - glm::ivec2{(i + 1) % 2, (i + 1) / 2};
+    return leaf_at(cell, level);
+  }
+  /// Returns whether a leaf may own points that are not in its half-open square, or may own points
+  /// without vertices.
+  bool needs_marks(const Leaf& leaf) const noexcept {
+    const LeafBlock at = block_of(leaf);
+    const glm::ivec2 end = sample(at, at.block.cells.x, at.block.cells.y);
+    const bool ends_window = (end.x == window.end.x && end.x != last_sample().x) ||
+                             (end.y == window.end.y && end.y != last_sample().y);
+    const bool meets_finer = finer.first.x <= end.x && finer.first.y <= end.y &&
+                             leaf.column < finer.end.x && leaf.row < finer.end.y;
+    return leaf.has_holes || ends_window || meets_finer;
   }
 
   /// Returns whether the three samples of one half of a leaf's cell exist. An omitted point exists
@@ -155,39 +179,6 @@ struct LeafTree {
       count += std::popcount(words[bit / 64] & ((std::uint64_t{1} << (bit % 64)) - 1));
     }
     return static_cast<std::uint32_t>(count);
-  }
-};
-
-/// Numbers of vertices: leaf by leaf, and row by row among each leaf's own points.
-struct VertexNumbers {
-  LeafTree tree;
-  const std::uint32_t* first = nullptr;    ///< number of each leaf's first own vertex
-  const std::uint64_t* marks = nullptr;    ///< see MarkVerticesPass
-  const std::uint32_t* mark_of = nullptr;  ///< index of each leaf among the leaves with holes
-
-  /// Returns whether one of the leaf's own points is a vertex.
-  bool has(std::size_t index, const LeafBlock& leaf, int column, int row) const noexcept {
-    if (!tree.leaves[index].has_holes) return !leaf.block.drops(column, row);
-    const std::size_t bit = tree.mark_bit(column, row);
-    return (marks[mark_of[index] * tree.mark_words() + bit / 64] >> (bit % 64) & 1) != 0;
-  }
-  std::uint32_t of_own(std::size_t index, const LeafBlock& leaf, int column,
-                       int row) const noexcept {
-    return first[index] +
-           (tree.leaves[index].has_holes
-                ? tree.marked_before(marks, mark_of[index], tree.mark_bit(column, row))
-                : leaf.own_points_before({column, row}));
-  }
-  /// Returns the number of a vertex of leaf `index`, whichever leaf owns it.
-  std::uint32_t of(std::size_t index, const LeafBlock& leaf, glm::ivec2 point) const noexcept {
-    if (point.x < leaf.own_points.x && point.y < leaf.own_points.y) {
-      return of_own(index, leaf, point.x, point.y);
-    }
-    const glm::ivec2 sample = tree.sample(leaf, point.x, point.y);
-    const std::uint32_t owner = tree.owner_of(sample, leaf.level);
-    const LeafBlock own = tree.block_of(tree.leaves[owner]);
-    const glm::ivec2 at = tree.point(own, sample);
-    return of_own(owner, own, at.x, at.y);
   }
 };
 

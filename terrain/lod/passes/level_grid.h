@@ -20,11 +20,6 @@ struct CellShape {
   double per_difference = 0;  ///< 1 / |width - height|
 };
 
-/// Rectangle of samples or nodes: columns and rows [first, end).
-struct Rectangle {
-  glm::ivec2 first{0}, end{0};
-};
-
 /// Cells and nodes of one level.
 struct LevelGrid {
   int level = 0;

@@ -51,12 +51,10 @@ struct BoundTest {
   }
 };
 
-/// Windows of finer levels that a column or row of nodes overlaps, and those that contain it: one
-/// bit per level. A node straddles a window if its column and its row both overlap it and at least
-/// one of them is not inside.
-struct WindowSpan {
-  std::uint32_t meets = 0;
-  std::uint32_t inside = 0;
+/// Nodes of a level that overlap the window of a finer level, and those of them that lie in it. The
+/// others straddle it.
+struct WindowOverlap {
+  Rectangle meets, inside;
 };
 
 /// Determines which nodes of one level are split; requires the level below to be done.
@@ -68,8 +66,8 @@ struct SplitPass {
   StateWindow states;
   StateWindow children;  ///< empty if no node of the level can be split
   BoundTest bound;
-  const WindowSpan* columns = nullptr;  ///< of the window's columns; null if no node straddles any
-  const WindowSpan* rows = nullptr;
+  int finer_count = 0;                       ///< windows that nodes may straddle
+  WindowOverlap finer[Lattice::max_levels];  ///< each lies in the one before
 
   void operator()(std::size_t index) const noexcept {
     const NodeRuns::Run run = runs.at(index);
@@ -82,7 +80,7 @@ struct SplitPass {
       const bool is_holed = !(key_m >= 0 && key_m < std::numeric_limits<float>::infinity());
       const bool exceeds = bound.exceeds(nodes, at, node);
       const bool splits =
-          can_split(node) && (exceeds || straddles(x, run.row) || children_ask_for_it(node));
+          can_split(node) && (exceeds || straddles(node) || children_ask_for_it(node));
       out[x] = static_cast<std::uint8_t>((splits    ? NodeState::Split
                                           : exceeds ? NodeState::Tight
                                                     : 0) |
@@ -99,7 +97,7 @@ struct SplitPass {
     for (int x = run.begin; x < run.end; ++x) {
       is_reason |= !(key_m[x] >= 0 && key_m[x] < tolerance_m);
     }
-    if (is_reason || columns != nullptr) return false;
+    if (is_reason || finer_count > 0) return false;
     const int first = nodes.first.x + run.begin;
     const int last = nodes.first.x + run.end;
     const int row = nodes.first.y + run.row;
@@ -113,11 +111,11 @@ struct SplitPass {
     return x >= 0 && y >= 0 && x < children.size.x && y < children.size.y;
   }
 
-  bool straddles(int column, int row) const noexcept {
-    if (columns == nullptr) return false;
-    const WindowSpan& x = columns[column];
-    const WindowSpan& y = rows[row];
-    return (x.meets & y.meets & ~(x.inside & y.inside)) != 0;
+  bool straddles(glm::ivec2 node) const noexcept {
+    for (int i = 0; i < finer_count && finer[i].meets.holds(node); ++i) {
+      if (!finer[i].inside.holds(node)) return true;
+    }
+    return false;
   }
 
   /// Returns whether a child is split, or a neighbour's child at the node's side is split or must

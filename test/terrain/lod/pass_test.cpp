@@ -20,6 +20,7 @@
 #include "terrain/lod/passes/deviation.h"
 #include "terrain/lod/passes/emission.h"
 #include "terrain/lod/passes/leaf_list.h"
+#include "terrain/lod/passes/prefix_sum.h"
 #include "terrain/lod/passes/selection.h"
 #include "terrain/lod/quadtree.h"
 #include "terrain/terrain_mesh.h"
@@ -36,9 +37,11 @@ class CopyingDevice final : public PassDevice {
  public:
   CopyingDevice() {
     know<passes::DeviationPass, passes::JoinPartsPass, passes::SaturatePass, passes::SplitPass,
-         passes::LeafPass, passes::CountLeavesPass, passes::ListLeavesPass,
-         passes::NumberLeavesPass, passes::MarkVerticesPass, passes::CountMeshPass,
-         passes::EmitVerticesPass, passes::EmitTrianglesPass>();
+         passes::LeafPass, passes::CountLeavesPass, passes::ListLeavesPass, passes::SumCountsPass,
+         passes::ReplaceCountsPass, passes::SumSumsPass, passes::ReplaceSumsPass,
+         passes::NumberLeavesPass, passes::CountMarkedPass, passes::ListMarkedPass,
+         passes::MarkVerticesPass, passes::CountMeshPass, passes::EmitVerticesPass,
+         passes::EmitTrianglesPass>();
   }
 
   void run(std::string_view name, std::span<const std::byte> bytes, std::size_t count) override {
@@ -101,6 +104,24 @@ TEST(Pass, RunsOnADeviceByNameAndBytes) {
   EXPECT_THAT(device.unused(), IsEmpty());
 }
 
+TEST(Pass, SelectsAndMeshesWindowsOnADevice) {
+  CopyingDevice device;
+  const HeightGrid grid = holed_ground();
+  const auto places = testing::places_on(grid);
+  for (const MeshBound& bound : bounds) {
+    for (const int block_cells : {2, 4, 8}) {
+      const auto results = [&](const PassRunner& runner) {
+        return testing::window_results(grid, {50, 90}, 8, bound, block_cells, runner);
+      };
+      EXPECT_EQ(testing::difference(results(PassRunner(device)), results({})), "");
+    }
+    const auto results = [&](const PassRunner& runner) {
+      return testing::clipmap_results(grid, bound.tolerance_m, bound.angle_rad, places, runner);
+    };
+    EXPECT_EQ(testing::difference(results(PassRunner(device)), results({})), "");
+  }
+}
+
 TEST(Pass, ResultsDoNotDependOnTheLengthsOfRuns) {
   const HeightGrid grid = holed_ground();
   for (const int block_cells : {2, 8}) {
@@ -112,6 +133,17 @@ TEST(Pass, ResultsDoNotDependOnTheLengthsOfRuns) {
         runner.run_samples = 4 * length;
         EXPECT_EQ(
             testing::difference(testing::results_of(grid, bound, block_cells, runner), expected),
+            "");
+        EXPECT_EQ(testing::difference(
+                      testing::window_results(grid, {50, 90}, 8, bound, block_cells, runner),
+                      testing::window_results(grid, {50, 90}, 8, bound, block_cells, {})),
+                  "");
+        if (block_cells != Certificate::block_cells) continue;
+        const auto places = testing::places_on(grid);
+        EXPECT_EQ(
+            testing::difference(
+                testing::clipmap_results(grid, bound.tolerance_m, bound.angle_rad, places, runner),
+                testing::clipmap_results(grid, bound.tolerance_m, bound.angle_rad, places, {})),
             "");
       }
     }

@@ -213,14 +213,39 @@ TEST(Quadtree, LeavesAreListedFineToCoarseRowByRowWithTheirDeviations) {
                         sides == 0 ? known.of(node).full_m[at] : known.of(node).deviation_m[at],
                         known.of(node).high_m[at]});
   });
-  const int top = known.lattice.top_level();
-  EXPECT_TRUE(list_leaves(selection, known.windows, 0, top) == expected);
-  std::vector<Leaf> joined;
-  for (int level = 0; level <= top; ++level) {
-    const auto some = list_leaves(selection, known.windows, level, level);
-    joined.insert(joined.end(), some.begin(), some.end());
+  EXPECT_TRUE(list_leaves(selection, known.windows, 0) == expected);
+}
+
+TEST(Quadtree, LeavesAreListedInTheFinestWindowThatContainsThem) {
+  for (const int block_cells : {2, 4}) {
+    Known known(hills({300, 231}, Seed{5}, 10), block_cells);
+    known.show_windows_round({90, 170}, 12);
+    for (const MeshBound& bound : some_bounds()) {
+      const Selection selection = select_nodes(known.lattice, known.windows, bound);
+      std::map<int, std::vector<std::array<int, 3>>> expected;
+      for_each_state(selection, [&](const Node& node, unsigned state) {
+        if ((state & NodeState::IsLeaf) == 0) return;
+        const int side = block_cells << node.level;
+        int window = 0;
+        while (true) {
+          const NodeWindow& at = known.windows[std::size_t(window)];
+          const int width = block_cells << window;
+          if (Rectangle{at.first * width, (at.first + at.size) * width}.holds(
+                  {node.column * side, node.row * side}))
+            break;
+          ++window;
+        }
+        expected[window].push_back({node.column * side, node.row * side, 1 << node.level});
+      });
+      std::map<int, std::vector<std::array<int, 3>>> found;
+      for (int window = 0; window <= known.lattice.top_level(); ++window) {
+        for (const Leaf& leaf : list_leaves(selection, known.windows, window))
+          found[window].push_back({leaf.column, leaf.row, leaf.step});
+      }
+      EXPECT_EQ(found, expected);
+      EXPECT_GE(found.size(), 1u);
+    }
   }
-  EXPECT_TRUE(joined == expected);
 }
 
 TEST(Quadtree, NodesWithoutHeightsAreNeitherSplitNorListed) {
@@ -229,7 +254,7 @@ TEST(Quadtree, NodesWithoutHeightsAreNeitherSplitNorListed) {
   const Known known(nothing, 2);
   const Selection selection = select_nodes(known.lattice, known.windows, {});
   EXPECT_EQ(leaves_of(selection), (std::set<Node>{{known.lattice.top_level(), 0, 0}}));
-  EXPECT_TRUE(list_leaves(selection, known.windows, 0, known.lattice.top_level()).empty());
+  EXPECT_TRUE(list_leaves(selection, known.windows, 0).empty());
 }
 
 TEST(Quadtree, DoesNotDependOnExecutionOrderOrThreads) {
@@ -237,14 +262,20 @@ TEST(Quadtree, DoesNotDependOnExecutionOrderOrThreads) {
   known.show_windows_round({400, 222}, 100);
   const MeshBound bound{0.05, 0.01, {20, 30, 5}, {60, 33, 9}, {2, 3}};
   const Selection expected = select_nodes(known.lattice, known.windows, bound);
-  const auto leaves = list_leaves(expected, known.windows, 0, known.lattice.top_level());
-  EXPECT_GT(leaves.size(), 1000u);
+  const auto lists = [&](const Selection& selection, const PassRunner& runner) {
+    std::vector<std::vector<Leaf>> all;
+    for (int window = 0; window <= known.lattice.top_level(); ++window)
+      all.push_back(list_leaves(selection, known.windows, window, runner));
+    return all;
+  };
+  const auto leaves = lists(expected, {});
+  EXPECT_GT(leaves.front().size(), 1000u);
   const auto expect_same = [&](const PassRunner& runner) {
     const Selection found = select_nodes(known.lattice, known.windows, bound, runner);
     for (std::size_t level = 0; level < expected.levels.size(); ++level) {
       EXPECT_EQ(found.levels[level].state, expected.levels[level].state);
     }
-    EXPECT_TRUE(list_leaves(found, known.windows, 0, known.lattice.top_level(), runner) == leaves);
+    EXPECT_TRUE(lists(found, runner) == leaves);
   };
   for (const std::uint64_t seed : {1, 2, 3}) {
     expect_same(groundray::testing::shuffled_runner(Seed{seed}));
