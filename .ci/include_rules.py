@@ -25,8 +25,7 @@ FOLDERS: dict[str, str] = {
     "core/image": "core core/io",
     "core/io": "core core/geometry",
     "core/model": "core core/appearance core/geometry core/image core/io",
-    "core/tracing": "core core/appearance core/geometry core/image core/model "
-    "core/tracing/passes",
+    "core/tracing": "core core/appearance core/geometry core/image core/model core/tracing/passes",
     "core/tracing/passes": "core/geometry core/tracing",
     "reconstruction/dem/fill": "reconstruction reconstruction/dem reconstruction/dem/thin_plate "
     "reconstruction/mesh/holes reconstruction/mesh/scan",

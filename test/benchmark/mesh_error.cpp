@@ -17,9 +17,9 @@
 #include <string>
 #include <vector>
 
-#include "terrain/terrain_mesh.h"
-#include "terrain/judge/mesh_topology.h"
 #include "terrain/judge/mesh_deviation.h"
+#include "terrain/judge/mesh_topology.h"
+#include "terrain/terrain_mesh.h"
 
 namespace groundray::benchmark {
 namespace {

@@ -11,13 +11,13 @@
 #include <string>
 #include <vector>
 
+#include "terrain/judge/mesh_deviation.h"
+#include "terrain/judge/mesh_topology.h"
 #include "terrain/lod/deviation.h"
 #include "terrain/terrain_mesh.h"
 #include "test/benchmark/landscape.h"
 #include "test/benchmark/pointer_quadtree.h"
 #include "test/benchmark/timing.h"
-#include "terrain/judge/mesh_topology.h"
-#include "terrain/judge/mesh_deviation.h"
 
 namespace groundray::benchmark {
 namespace {

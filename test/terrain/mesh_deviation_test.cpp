@@ -66,7 +66,8 @@ TEST(MeshOracle, ReferenceSurfaceHasNoFaultsAndNoDeviation) {
     SCOPED_TRACE(name);
     const SampleMesh mesh = facets_of(grid);
     EXPECT_THAT(faults_of(grid, mesh), IsEmpty());
-    const judge::MeshDeviation found = judge::largest_deviation(grid, mesh.vertices, mesh.triangles);
+    const judge::MeshDeviation found =
+        judge::largest_deviation(grid, mesh.vertices, mesh.triangles);
     EXPECT_EQ(found.largest_m, 0);
     EXPECT_EQ(found.rms_m, 0);
     EXPECT_EQ(found.over_missing, 0u);

@@ -12,12 +12,12 @@
 #include <vector>
 
 #include "terrain/dem/dem_io.h"
+#include "terrain/judge/mesh_deviation.h"
+#include "terrain/judge/mesh_topology.h"
 #include "terrain/terrain_mesh.h"
 #include "test/support/margin.h"
-#include "terrain/judge/mesh_topology.h"
 #include "test/support/temporary_folder.h"
 #include "test/support/terrain/adversarial_terrain.h"
-#include "terrain/judge/mesh_deviation.h"
 #include "test/support/terrain/sample_terrain.h"
 
 namespace groundray::terrain_mesh_proof_test {
@@ -66,7 +66,8 @@ void expect_keeps_its_promises(const HeightGrid& grid, const MeshBound& bound,
   EXPECT_GT(a.x * b.y - a.y * b.x, 0) << "triangles must be counter-clockwise from above";
 
   const auto allowed = [&](const glm::dvec3& point) { return allowed_m(grid, bound, point); };
-  const judge::MeshDeviation found = judge::largest_deviation(grid, mesh.vertices, mesh.triangles, allowed);
+  const judge::MeshDeviation found =
+      judge::largest_deviation(grid, mesh.vertices, mesh.triangles, allowed);
   const double heights_m = std::max(std::abs(grid.min_height_m()), std::abs(grid.max_height_m()));
   EXPECT_LE(found.largest_excess_m, rounding * heights_m)
       << found.largest_m << " m at (" << found.place.x << ", " << found.place.y << ")";
@@ -219,7 +220,8 @@ TEST(TerrainMeshProof, ZeroToleranceHasNoDeviation) {
   for (const auto& [name, grid] : testing::adversarial_terrain()) {
     SCOPED_TRACE(name);
     const TerrainMesh mesh = build_terrain_mesh(grid, {});
-    EXPECT_LT(judge::largest_deviation(grid, mesh.vertices, mesh.triangles).largest_m, oracle_rounding_m);
+    EXPECT_LT(judge::largest_deviation(grid, mesh.vertices, mesh.triangles).largest_m,
+              oracle_rounding_m);
   }
 }
 

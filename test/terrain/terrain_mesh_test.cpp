@@ -19,8 +19,8 @@
 
 #include "core/error.h"
 #include "core/random.h"
-#include "terrain/lod/deviation.h"
 #include "terrain/judge/mesh_topology.h"
+#include "terrain/lod/deviation.h"
 #include "test/support/terrain/leaf_triangles.h"
 #include "test/support/terrain/pass_results.h"
 #include "test/support/terrain/sample_clipmap.h"
@@ -151,8 +151,7 @@ TEST(TerrainMesh, TrianglesMatchTheLeaves) {
                                    bound.angle_rad));
           const TerrainMesh mesh = build_terrain_mesh(grid, bound, block_cells);
           EXPECT_TRUE(pieces_of(mesh) == pieces_of_leaves(grid, bound, block_cells));
-          EXPECT_THAT(judge::topology_faults(grid, mesh.vertices, mesh.triangles),
-                      IsEmpty());
+          EXPECT_THAT(judge::topology_faults(grid, mesh.vertices, mesh.triangles), IsEmpty());
         }
       }
     }

@@ -77,7 +77,7 @@ Silhouettes::Silhouettes(const HeightGrid& grid, const TerrainMesh& mesh)
     const glm::ivec2 p = tile_of(edge.a_m), q = tile_of(edge.b_m);
     for (int y = std::min(p.y, q.y); y <= std::max(p.y, q.y); ++y) {
       for (int x = std::min(p.x, q.x); x <= std::max(p.x, q.x); ++x) {
-        const auto tile = static_cast<std::size_t>(y * tiles_.x + x);
+        const std::size_t tile = index_of(x, y);
         edges_of_tile_[tile].push_back(static_cast<std::uint32_t>(i));
         high_m_[tile] = std::max({high_m_[tile], edge.a_m.z, edge.b_m.z});
       }
@@ -99,7 +99,7 @@ bool Silhouettes::is_silhouette(const Edge& edge, const glm::dvec3& direction) c
 // Goes along the ray in steps of half a tile, so that the tiles round each step contain all edges
 // within the limit.
 double Silhouettes::silhouette_m(const Ray& ray, double end_m,
-                                 std::vector<std::uint32_t>& seen) const {
+                                 std::vector<std::size_t>& seen) const {
   const glm::dvec2 way(ray.direction);
   const double speed = glm::length(way);
   const double step_m = speed > 0 ? 0.5 * tile_m_ / speed : infinity;
@@ -116,7 +116,7 @@ double Silhouettes::silhouette_m(const Ray& ray, double end_m,
     const glm::ivec2 p = tile_of(middle_m - reach_m), q = tile_of(middle_m + reach_m);
     for (int y = p.y; y <= q.y; ++y) {
       for (int x = p.x; x <= q.x; ++x) {
-        const auto tile = static_cast<std::uint32_t>(y * tiles_.x + x);
+        const std::size_t tile = index_of(x, y);
         if (low_m > high_m_[tile]) continue;
         if (std::ranges::find(seen, tile) != seen.end()) continue;
         seen.push_back(tile);
@@ -137,7 +137,7 @@ void Silhouettes::measure(std::span<const Ray> rays, std::span<const double> ran
   const glm::dvec2 middle_m = low_m_ + 0.5 * tile_m_ * glm::dvec2(tiles_);
   const double across_m = tile_m_ * glm::length(glm::dvec2(tiles_));
   run_in_parallel(rays.size(), [&](std::size_t begin, std::size_t end) {
-    std::vector<std::uint32_t> seen;
+    std::vector<std::size_t> seen;
     for (std::size_t i = begin; i < end; ++i) {
       const Ray& ray = rays[i];
       // A ray that misses ends where it has surely left the DEM.

@@ -34,11 +34,13 @@ class Silhouettes {
     glm::dvec3 a_m{0}, b_m{0};
     std::int32_t one = -1, other = -1;  // triangles; -1 beyond the boundary
   };
-  // Part of a ray over a tile.
-  struct Stretch;
   glm::ivec2 tile_of(glm::dvec2 p_m) const;
+  std::size_t index_of(int x, int y) const {
+    return static_cast<std::size_t>(y) * static_cast<std::size_t>(tiles_.x) +
+           static_cast<std::size_t>(x);
+  }
   bool is_silhouette(const Edge& edge, const glm::dvec3& direction) const;
-  double silhouette_m(const Ray& ray, double end_m, std::vector<std::uint32_t>& seen) const;
+  double silhouette_m(const Ray& ray, double end_m, std::vector<std::size_t>& seen) const;
 
   glm::dvec2 low_m_{0};
   double tile_m_ = 1;

@@ -13,9 +13,9 @@
 #include <tuple>
 #include <utility>
 
+#include "terrain/judge/mesh_deviation.h"
 #include "terrain/judge/mesh_topology.h"
 #include "test/support/terrain/leaf_triangles.h"
-#include "terrain/judge/mesh_deviation.h"
 #include "test/support/terrain/sample_clipmap.h"
 #include "test/support/terrain/sample_terrain.h"
 
@@ -188,8 +188,7 @@ TEST(Clipmap, AngularToleranceHoldsEverywhere) {
           return std::max(settings.tolerance_m, settings.angle_rad * glm::length(q - p));
         });
     EXPECT_LE(found.largest_excess_m, 1e-12) << i;
-    EXPECT_THAT(judge::topology_faults(grid, mesh.vertices, mesh.triangles),
-                ::testing::IsEmpty());
+    EXPECT_THAT(judge::topology_faults(grid, mesh.vertices, mesh.triangles), ::testing::IsEmpty());
     EXPECT_LT(mesh.triangles.size(), 2u * 512 * 512);
   }
 }

@@ -12,14 +12,14 @@
 #include <map>
 #include <span>
 
+#include "terrain/judge/mesh_deviation.h"
+#include "terrain/judge/mesh_topology.h"
 #include "terrain/relief/refined_tiles.h"
 #include "terrain/terrain.h"
 #include "terrain/terrain_scene.h"
-#include "terrain/judge/mesh_topology.h"
 #include "test/support/temporary_folder.h"
 #include "test/support/terrain/geotiff.h"
 #include "test/support/terrain/leaf_triangles.h"
-#include "terrain/judge/mesh_deviation.h"
 #include "test/support/terrain/reference_tracer.h"
 #include "test/support/terrain/sample_clipmap.h"
 #include "test/support/terrain/sample_terrain.h"
