@@ -164,7 +164,9 @@ def suite_of(name: str) -> str:
 
 def listed_results(build: Path) -> list[Path]:
     """Returns the result files that CTest passes to the tests."""
-    lists = [*sorted((build / "test").glob("*_tests.cmake")), build / "test/CTestTestfile.cmake"]
+    folders = (build / "test", build / "test/device")
+    lists = [file for folder in folders for file in sorted(folder.glob("*_tests.cmake"))]
+    lists += [file for folder in folders for file in folder.glob("CTestTestfile.cmake")]
     text = "".join(file.read_text() for file in lists)
     return [Path(file) for file in re.findall(r"--gtest_output=xml:(.*?\.xml)[\]\"]", text)]
 

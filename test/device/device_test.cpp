@@ -8,6 +8,7 @@
 #include <fstream>
 #include <map>
 #include <memory>
+#include <ostream>
 #include <regex>
 #include <string>
 #include <vector>
@@ -113,6 +114,8 @@ std::unique_ptr<KernelDevice> open_device(Backend backend, const KernelCode& cod
   return std::make_unique<OpenClDevice>(code, arrays);
 }
 
+void PrintTo(Backend backend, std::ostream* out) { *out << static_cast<int>(backend); }
+
 class OnDevice : public ::testing::TestWithParam<Backend> {
  protected:
   void SetUp() override {
@@ -128,10 +131,15 @@ class OnDevice : public ::testing::TestWithParam<Backend> {
   std::unique_ptr<KernelDevice> device_;
 };
 
+using OnDeviceProof = OnDevice;
+
 INSTANTIATE_TEST_SUITE_P(OpenCl, OnDevice, ::testing::Values(Backend::OpenCl));
 INSTANTIATE_TEST_SUITE_P(Cuda, OnDevice, ::testing::Values(Backend::Cuda));
 INSTANTIATE_TEST_SUITE_P(Hip, OnDevice, ::testing::Values(Backend::Hip));
 INSTANTIATE_TEST_SUITE_P(Fake, OnDevice, ::testing::Values(Backend::FakeCuda, Backend::FakeHip));
+INSTANTIATE_TEST_SUITE_P(OpenCl, OnDeviceProof, ::testing::Values(Backend::OpenCl));
+INSTANTIATE_TEST_SUITE_P(Cuda, OnDeviceProof, ::testing::Values(Backend::Cuda));
+INSTANTIATE_TEST_SUITE_P(Hip, OnDeviceProof, ::testing::Values(Backend::Hip));
 
 // Returns where the device's results for a DEM differ from the CPU's; empty if nowhere.
 // `results(grid, runner)` computes them.
@@ -281,7 +289,7 @@ TEST_P(OnDevice, PassesWriteTheSameBytesForTies) {
   }
 }
 
-TEST_P(OnDevice, RaysHitWhatExactTracingHits) {
+TEST_P(OnDeviceProof, RaysHitWhatExactTracingHits) {
   for (const Shots& shots : all_shots(testing::proof_size(100'000, 1'000'000)))
     EXPECT_EQ(difference_on(*device_, arrays_, shots), "") << shots.tracer.levels().size();
 }
