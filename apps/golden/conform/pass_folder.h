@@ -32,7 +32,6 @@ struct PassFolder {
   ArrayFolder arrays;
   HeightGrid grid;
   MeshBound bound;
-  int block_cells = 8;
   double silhouette_limit_m = 0;  ///< distances to silhouettes are known up to this one
   std::vector<ArrayEntry> entries;
 };
@@ -42,7 +41,8 @@ struct PassFolder {
 void write_pass_folder(const std::filesystem::path& dem, const PassSettings& settings,
                        const std::filesystem::path& out);
 
-/// Reads the manifest and the DEM of a folder that write_pass_folder has written.
+/// Reads the manifest and the DEM of a folder that write_pass_folder has written, and checks that
+/// all arrays are there and as they were written.
 /// @throws Error naming the file and the rule that it breaks.
 PassFolder read_pass_folder(const std::filesystem::path& folder);
 
