@@ -114,7 +114,9 @@ std::unique_ptr<KernelDevice> open_device(Backend backend, const KernelCode& cod
   return std::make_unique<OpenClDevice>(code, arrays);
 }
 
-void PrintTo(Backend backend, std::ostream* out) { *out << static_cast<int>(backend); }
+std::ostream& operator<<(std::ostream& out, Backend backend) {
+  return out << static_cast<int>(backend);
+}
 
 class OnDevice : public ::testing::TestWithParam<Backend> {
  protected:
