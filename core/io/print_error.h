@@ -2,6 +2,7 @@
 
 #include <fmt/format.h>
 
+#include <cerrno>
 #include <cstdio>
 #include <string>
 #include <utility>
@@ -20,7 +21,11 @@ void print_error(fmt::format_string<Args...> form, Args&&... args) noexcept {
 }
 
 /// Writes what standard output still holds.
-/// @return false if that, or something before, could not be written.
-inline bool flush_output() noexcept { return std::fflush(stdout) == 0 && std::ferror(stdout) == 0; }
+/// @return false if that, or something before, could not be written; true if its reader has closed
+///         it.
+inline bool flush_output() noexcept {
+  const bool has_failed = std::ferror(stdout) != 0;
+  return std::fflush(stdout) == 0 ? !has_failed : errno == EPIPE;
+}
 
 }  // namespace groundray
