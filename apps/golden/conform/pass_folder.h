@@ -15,7 +15,7 @@
 
 namespace groundray::golden {
 
-/// What a folder of passes holds the results of.
+/// Settings of the mesh and the rays of a folder of passes.
 struct PassSettings {
   double tolerance_m = 0.1;
   double angle_rad = 0;
