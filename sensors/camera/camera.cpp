@@ -234,8 +234,8 @@ void Rows::write_pixels() {
       const PathSums& sums = sums_of({x, y});
       const double count = sums.count();
       if (count == 0) continue;
-      const glm::dvec3 mean = sums.mean(), between = count * sums.between_nets(),
-                       within = count * sums.within_nets();
+      const glm::dvec3 mean = sums.mean(), between = sums.between_nets(),
+                       within = sums.within_nets();
       for (glm::length_t k = 0; k < 3; ++k) {
         const auto channel = static_cast<std::size_t>(k);
         into_.radiance.at(x, y)[channel] = static_cast<float>(mean[k]);

@@ -19,7 +19,7 @@ std::uint32_t parts_of(std::uint32_t count) {
   return std::clamp<std::uint32_t>(count / PathSums::nets, 1, PathSums::most_parts);
 }
 
-// Sums of numbers per path over pixels with an estimate.
+// Sums over the pixels with an estimate.
 struct Surroundings {
   double between[colours] = {}, within[colours] = {};
   double pixels = 0;
@@ -41,7 +41,7 @@ struct Surroundings {
   }
 };
 
-// Returns the variance per path from a pixel's own spreads and those around.
+// Returns the variance of a pixel's mean from its own spreads and those around.
 double variance(double between, double within, double freedom_within, const Surroundings& around,
                 std::size_t k) {
   const double expected = around.between[k] / around.pixels;
@@ -124,10 +124,10 @@ ImageF standard_errors(const PathSpreads& spreads) {
       const double freedom_within =
           PathSums::nets * (parts_of(static_cast<std::uint32_t>(paths)) - 1.0);
       for (std::size_t k = 0; k < colours; ++k) {
-        const double per_path =
+        const double of_mean =
             variance(static_cast<double>(spreads.between.at(x, y)[k]),
                      static_cast<double>(spreads.within.at(x, y)[k]), freedom_within, around, k);
-        errors.at(x, y)[k] = static_cast<float>(std::sqrt(per_path / static_cast<double>(paths)));
+        errors.at(x, y)[k] = static_cast<float>(std::sqrt(of_mean));
       }
     }
   });

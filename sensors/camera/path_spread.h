@@ -56,7 +56,7 @@ class PathSums {
 /// Spreads of the paths of each pixel.
 struct PathSpreads {
   ImageF paths;    ///< number of paths, 0 for pixels without any
-  ImageF between;  ///< PathSums::between_nets times the number of paths, three channels
+  ImageF between;  ///< PathSums::between_nets, three channels
   ImageF within;   ///< PathSums::within_nets, likewise
 };
 

@@ -12,6 +12,7 @@
 #include "apps/golden/compare/error_figures.h"
 #include "apps/golden/compare/images/image_comparison.h"
 #include "apps/golden/report.h"
+#include "sensors/camera/camera.h"
 
 namespace groundray::golden {
 namespace {
@@ -38,8 +39,9 @@ struct Light {
     return std::isfinite(light->values.at(x, y)[k]) && std::isfinite(variance(x, y, k));
   }
   double freedom(int x, int y) const {
-    return samples == nullptr ? std::numeric_limits<double>::infinity()
-                              : samples->values.at(x, y)[0] - 1;
+    return samples == nullptr
+               ? std::numeric_limits<double>::infinity()
+               : std::min<double>(samples->values.at(x, y)[0] - 1, standard_error_freedom);
   }
 };
 
