@@ -10,6 +10,7 @@
 #include <algorithm>
 #include <array>
 #include <cstdlib>
+#include <exception>
 #include <fstream>
 #include <limits>
 #include <memory>
@@ -57,9 +58,12 @@ void close_file_systems() {
   }
 }
 
-GDALDataset* (*open_any_vrt)(GDALOpenInfo*) = nullptr;  // set once, by register_drivers
+// The VRT driver's own functions, set once, by register_drivers.
+int (*is_vrt)(GDALOpenInfo*) = nullptr;
+GDALDataset* (*open_any_vrt)(GDALOpenInfo*) = nullptr;
 
 GDALDataset* open_checked_vrt(GDALOpenInfo* info) {
+  if (is_vrt(info) == 0) return nullptr;
   try {
     check_vrt(info->pszFilename);
   } catch (const std::exception& error) {
@@ -83,6 +87,7 @@ void remove_drivers(GDALDriverManager& drivers) {
   }
   drivers.GetDriverByName("MEM")->pfnOpen = nullptr;  // it opens names that are addresses
   GDALDriver& vrt = *drivers.GetDriverByName("VRT");
+  is_vrt = vrt.pfnIdentify;
   open_any_vrt = vrt.pfnOpen;
   vrt.pfnOpen = open_checked_vrt;
 }
@@ -103,9 +108,9 @@ void check_blocks(GDALDataset& dataset) {
 // Returns the memory that the machine can still give, and the process may still take.
 double available_bytes() {
   double bytes = std::numeric_limits<double>::infinity();
-  std::string line;
-  for (std::ifstream machine("/proc/meminfo"); std::getline(machine, line);) {
-    if (line.starts_with("MemAvailable:")) bytes = 1024 * std::atof(line.c_str() + 13);
+  std::ifstream machine("/proc/meminfo");
+  for (std::string word; machine >> word;) {
+    if (word == "MemAvailable:" && machine >> bytes) bytes *= 1024;
   }
   rlimit limit{};
   double pages = 0;

@@ -44,7 +44,7 @@ Xml parse(const std::string& path) {
 // the VRT, after following links.
 std::string source_name(const CPLXMLNode& node, const std::string& vrt) {
   std::string name = CPLGetXMLValue(&node, nullptr, "");
-  if (std::atoi(CPLGetXMLValue(&node, "relativeToVRT", "0")) == 0) return name;
+  if (std::strtol(CPLGetXMLValue(&node, "relativeToVRT", "0"), nullptr, 10) == 0) return name;
   std::filesystem::path folder = std::filesystem::path(vrt).parent_path();
   std::error_code is_in_archive;
   const auto real = std::filesystem::canonical(vrt, is_in_archive);
@@ -108,14 +108,14 @@ class VrtCheck {
   }
 
   void add(const std::string& source, const std::string& vrt, int level, Extent& extent) {
-    bool is_vrt = false;
+    std::string driver;
     try {
       checked_file(source);
-      is_vrt = checked_driver(source) == "VRT";
+      driver = checked_driver(source);
     } catch (const Error& error) {
       throw Error("the VRT {} has the source {}: {}", vrt, source, error.what());
     }
-    const Extent inner = is_vrt ? extent_of(source, level + 1) : Extent{0, 1};
+    const Extent inner = driver == "VRT" ? extent_of(source, level + 1) : Extent{0, 1};
     extent.levels = std::max(extent.levels, inner.levels + 1);
     extent.sources += inner.sources;
     if (extent.sources <= most_sources) return;

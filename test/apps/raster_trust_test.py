@@ -24,7 +24,7 @@ class Listener:
     def __init__(self) -> None:
         self.count = 0
         self.socket = socket.create_server(("127.0.0.1", 0))
-        self.address = "127.0.0.1:{}".format(self.socket.getsockname()[1])
+        self.address = f"127.0.0.1:{self.socket.getsockname()[1]}"
         threading.Thread(target=self._serve, daemon=True).start()
 
     def _serve(self) -> None:
@@ -205,9 +205,7 @@ def test_no_raster_reaches_the_network(form: str, tmp_path: Path, listener: List
 
 
 @pytest.mark.parametrize("form", ["curl", "VRT", "VRT of map", "overviews", "overview file"])
-def test_a_permitted_driver_opens_no_network(
-    form: str, tmp_path: Path, listener: Listener
-) -> None:
+def test_a_permitted_driver_opens_no_network(form: str, tmp_path: Path, listener: Listener) -> None:
     """Naming further drivers does not open the file systems of networks."""
     name = FORMS[form](tmp_path, listener.address)
     environment = {"PATH": "/usr/bin:/bin", "GROUNDRAY_RASTER_DRIVERS": "netCDF"}
@@ -232,7 +230,9 @@ subClass="VRTRawRasterBand"><SourceFilename relativeToVRT="1">secret.txt</Source
 <ImageOffset>0</ImageOffset><PixelOffset>1</PixelOffset><LineOffset>8</LineOffset>
 </VRTRasterBand></VRTDataset>"""
     (tmp_path / "dem.tif").write_text(raw)
-    refused(tmp_path / "dem.tif", "has a VRTRawRasterBand; only mosaics and warps of files are read")
+    refused(
+        tmp_path / "dem.tif", "has a VRTRawRasterBand; only mosaics and warps of files are read"
+    )
     dem = tmp_path / "masked.tif"
     subprocess.run(["gdal_translate", "-q", "-outsize", "8", "8", PRAIRIE, dem], check=True)
     (tmp_path / "masked.tif.msk").write_text(raw)
