@@ -3,6 +3,7 @@
 #include <cpl_conv.h>
 #include <cpl_string.h>
 #include <cpl_vsi.h>
+#include <cpl_vsi_virtual.h>
 #include <fmt/ranges.h>
 #include <sys/resource.h>
 #include <unistd.h>
@@ -16,6 +17,7 @@
 #include <memory>
 #include <regex>
 #include <string_view>
+#include <vector>
 
 namespace groundray {
 namespace {
@@ -53,8 +55,12 @@ void close_file_systems() {
   refusal->open = refuse_file;
   CPLStringList prefixes(VSIGetFileSystemsPrefixes(), TRUE);
   prefixes.AddString("/vsicurl?");  // the list omits it
+  // GDAL forgets the handlers that it replaces. They may be in use, so they are kept until the end.
+  static auto& replaced = *new std::vector<VSIFilesystemHandler*>;
   for (int i = 0; i < prefixes.size(); ++i) {
-    if (!is_local_system(prefixes[i])) VSIInstallPluginHandler(prefixes[i], refusal.get());
+    if (is_local_system(prefixes[i])) continue;
+    replaced.push_back(VSIFileManager::GetHandler(prefixes[i]));
+    VSIInstallPluginHandler(prefixes[i], refusal.get());
   }
 }
 
