@@ -1,12 +1,12 @@
-"""Checks the direction of includes, and that each of the big libraries is included in one place.
+"""Checks the direction of includes, and that libraries are included and files opened in one place.
 
     include_rules.py
 
 FOLDERS lists, for each folder of a library, the folders whose headers it may include besides its
 own; an entry that nothing uses is an error. LIBRARIES lists where the headers of other libraries
-may be included. IN_PASSES lists what passes, which run on devices, may include. Public headers
-include only the standard library, GLM and {fmt}; PRIVATE lists the headers that may include more.
-Run at the root of the tree.
+may be included, CALLS where files may be opened. IN_PASSES lists what passes, which run on devices,
+may include. Public headers include only the standard library, GLM and {fmt}; PRIVATE lists the
+headers that may include more. Run at the root of the tree.
 """
 
 import re
@@ -86,6 +86,14 @@ LIBRARIES = {
     r"(nanobind/|Python\.h)": r"apps/python/.*",
 }
 
+# Files are opened by core/io/open_file.h: regular ones alone, and not through links to be written.
+CALLS = {
+    r"\bf(re)?open\(|\bcreat\(": r"core/io/open_file\.cpp|apps/groundray/run_log\.cpp",
+    r"std::[io]?fstream \w+[({]|\.open\([^)]*std::ios": r"core/io/open_file\.(h|cpp)",
+    r"\bO_CREAT\b": r"core/io/open_file\.cpp|apps/groundray/result_files\.cpp"
+    r"|apps/golden/suite/suite\.cpp",
+}
+
 # The passes also run on devices, for which only these headers exist.
 PASSES = ("core/tracing/passes", "terrain/lod/passes")
 IN_PASSES = re.compile(
@@ -144,6 +152,11 @@ def faults_of(path: Path, used: set[tuple[str, str]]) -> list[str]:
         public = path.suffix == ".h" and installed and str(path) not in PRIVATE
         if public and not IN_HEADERS.fullmatch(name):
             faults.append(f"{where}: a header of a library includes std, GLM and {{fmt}} alone")
+    for pattern, places in CALLS.items():
+        for call in re.finditer(pattern, text):
+            if not re.fullmatch(places, str(path)):
+                line = text.count("\n", 0, call.start()) + 1
+                faults.append(f"{path}:{line}: {call[0]}: open files by core/io/open_file.h")
     return faults
 
 

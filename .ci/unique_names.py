@@ -20,7 +20,7 @@ DEFINITIONS = (
     ALIAS,
     re.compile(r"(?:struct|class|union|enum class|enum) (\w+)"),
     re.compile(r"(?:static |thread_local )?const(?:expr|init)?\b[^(={]*?\b(\w+) *[={;[]"),
-    re.compile(r"(?!using |namespace |template|TEST|BENCHMARK|[A-Z_]+\()[^=]*?(\w+)\("),
+    re.compile(r"(?!using |namespace |template|TEST|BENCHMARK|[A-Z_]+\()[^=]*?((?:\w+::)*\w+)\("),
 )
 
 

@@ -14,6 +14,7 @@
 #include "apps/dataset/file_sum.h"
 #include "core/error.h"
 #include "core/io/file_io.h"
+#include "core/io/open_file.h"
 
 namespace groundray {
 namespace {
@@ -28,9 +29,7 @@ constexpr std::string_view shard_begin = "shard: \"",
 // Writes lines to a file and computes their checksum.
 class LineSink {
  public:
-  explicit LineSink(const fs::path& path) : file_(std::fopen(path.c_str(), "wb")) {
-    if (!file_) fail();
-  }
+  explicit LineSink(const fs::path& path) : file_(fdopen(create_file(path), "wb")) {}
 
   void write(std::string_view text) {
     sum_.add(text);
@@ -73,7 +72,7 @@ std::optional<std::string_view> between(std::string_view text, std::string_view 
 }  // namespace
 
 DatasetText::DatasetText(const fs::path& folder)
-    : path_(folder / dataset_file), file_(path_, std::ios::binary) {
+    : path_(folder / dataset_file), file_(open_stream(path_)) {
   if (!file_) {
     throw Error(
         "{}: the folder contains no readable {} ({}): was it written by `groundray generate`?",

@@ -11,6 +11,7 @@
 #include <vector>
 
 #include "core/error.h"
+#include "core/io/open_file.h"
 
 namespace groundray {
 namespace {
@@ -57,16 +58,16 @@ std::string sha256_of(std::string_view bytes) {
 
 FileSum sum_file(const fs::path& path) {
   constexpr std::size_t block_bytes = 256 << 10;
-  const OwnedFile file(std::fopen(path.c_str(), "rb"));
+  const OwnedFile file = open_file(path);
   std::vector<char> block(block_bytes);
   Sha256 sum;
   FileSum result;
-  while (file && std::feof(file.get()) == 0 && std::ferror(file.get()) == 0) {
+  while (std::feof(file.get()) == 0 && std::ferror(file.get()) == 0) {
     const std::size_t read = std::fread(block.data(), 1, block.size(), file.get());
     sum.add({block.data(), read});
     result.bytes += read;
   }
-  if (!file || std::ferror(file.get()) != 0) {
+  if (std::ferror(file.get()) != 0) {
     throw Error("{}: cannot be read: {}; check the disk and the file's permissions", path.string(),
                 std::generic_category().message(errno));
   }

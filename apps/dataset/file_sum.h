@@ -1,7 +1,6 @@
 #pragma once
 
 #include <cstdint>
-#include <cstdio>
 #include <filesystem>
 #include <memory>
 #include <optional>
@@ -11,14 +10,6 @@
 struct evp_md_ctx_st;
 
 namespace groundray {
-
-/// Deleter that closes a file of the C library.
-struct CloseFile {
-  void operator()(std::FILE* file) const noexcept { std::fclose(file); }
-};
-
-/// File of the C library, closed by its owner's destructor.
-using OwnedFile = std::unique_ptr<std::FILE, CloseFile>;
 
 /// Size and checksum that identify the contents of a file.
 struct FileSum {

@@ -14,6 +14,7 @@
 #include "apps/scene/yaml_reader.h"
 #include "core/error.h"
 #include "core/io/file_io.h"
+#include "core/io/open_file.h"
 #include "core/io/text_lines.h"
 #include "core/io/tum_io.h"
 
@@ -27,7 +28,7 @@ bool is_range_grid(const fs::path& path) {
   const std::string ending = file_ending(path);
   if (ending == ".gz") return true;  // as distributed by Stanford
   if (ending != ".ply") return false;
-  std::ifstream file(path, std::ios::binary);
+  std::ifstream file = open_stream(path);
   for (std::string line; std::getline(file, line) && !line.starts_with("end_header");) {
     if (line.starts_with("element range_grid")) return true;
   }

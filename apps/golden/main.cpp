@@ -27,6 +27,7 @@
 #include "apps/scene/interruption.h"
 #include "apps/scene/simulation.h"
 #include "core/error.h"
+#include "core/io/print_error.h"
 
 namespace groundray::golden {
 namespace {
@@ -302,12 +303,14 @@ int run(int argc, char** argv) {
 
 int main(int argc, char** argv) {
   try {
-    return groundray::golden::run(argc, argv);
+    const int code = groundray::golden::run(argc, argv);
+    if (groundray::flush_output()) return code;
+    groundray::print_error("groundray-golden: standard output cannot be written\n");
   } catch (const groundray::Interrupted&) {
-    fmt::print(stderr, "\ngroundray-golden: interrupted\n");
+    groundray::print_error("\ngroundray-golden: interrupted\n");
     return groundray::golden::interrupted;
   } catch (const std::exception& error) {
-    fmt::print(stderr, "groundray-golden: {}\n", error.what());
+    groundray::print_error("groundray-golden: {}\n", error.what());
   }
   return groundray::golden::failed;
 }

@@ -16,6 +16,7 @@
 #include "apps/scene/interruption.h"
 #include "apps/scene/simulation.h"
 #include "core/error.h"
+#include "core/io/print_error.h"
 #include "core/progress.h"
 
 namespace groundray {
@@ -72,8 +73,8 @@ RunLog::Json count(const Simulation& simulation, const MadeFrame& made, const Wr
 void say_faults(const fs::path& out, const std::vector<std::string>& faults) {
   constexpr std::size_t most = 20;
   for (std::size_t i = 0; i < faults.size() && i < most; ++i)
-    fmt::print(stderr, "{}: {}\n", out.string(), faults[i]);
-  if (faults.size() > most) fmt::print(stderr, "and {} more\n", faults.size() - most);
+    print_error("{}: {}\n", out.string(), faults[i]);
+  if (faults.size() > most) print_error("and {} more\n", faults.size() - most);
 }
 
 void say(const Simulation& simulation, const fs::path& out, const FramePlan& plan,
@@ -125,7 +126,7 @@ void run(const fs::path& scene, const fs::path& out, const GenerateOptions& opti
     // Reports insufficient memory before anything is written.
     simulation.terrain.clipmap(sensor_box(first_frame(simulation)), simulation.reach_m);
   }
-  const auto warn = [](const std::string& warning) { fmt::print(stderr, "{}\n", warning); };
+  const auto warn = [](const std::string& warning) { print_error("{}\n", warning); };
   DatasetWriter dataset(out, simulation, options.use, options.shard,
                         {.progress = stderr, .warn = warn});
   say_faults(out, dataset.faults());

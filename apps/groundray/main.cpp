@@ -11,6 +11,7 @@
 #include "apps/groundray/info.h"
 #include "apps/scene/interruption.h"
 #include "core/error.h"
+#include "core/io/print_error.h"
 
 namespace {
 
@@ -61,18 +62,20 @@ int main(int argc, char** argv) {
               SIG_IGN);  // a write beyond the limit of file size then fails with a message
   groundray::catch_interruptions();
   try {
-    return run(argc, argv);
+    const int code = run(argc, argv);
+    if (groundray::flush_output()) return code;
+    groundray::print_error("groundray: standard output cannot be written\n");
   } catch (const groundray::Interrupted&) {
-    fmt::print(stderr,
-               "\ngroundray: interrupted; a run or a merge continues with --resume, other commands "
-               "start again\n");
+    groundray::print_error(
+        "\ngroundray: interrupted; a run or a merge continues with --resume, other commands "
+        "start again\n");
     return interrupted;
   } catch (const std::bad_alloc&) {
-    fmt::print(stderr,
-               "groundray: there is not enough memory; `groundray info` reports how much a DEM or "
-               "scene needs\n");
+    groundray::print_error(
+        "groundray: there is not enough memory; `groundray info` reports how much a DEM or "
+        "scene needs\n");
   } catch (const std::exception& error) {
-    fmt::print(stderr, "groundray: {}\n", error.what());
+    groundray::print_error("groundray: {}\n", error.what());
   }
   return failed;
 }

@@ -16,6 +16,7 @@
 #include "apps/groundray/command.h"
 #include "apps/groundray/generate.h"
 #include "core/error.h"
+#include "core/io/print_error.h"
 
 namespace groundray {
 namespace {
@@ -64,7 +65,7 @@ void verify_all(const std::vector<fs::path>& datasets) {
 }
 
 void merge_shards(const std::vector<fs::path>& shards, const fs::path& out, FolderUse use) {
-  const auto warn = [](const std::string& warning) { fmt::print(stderr, "{}\n", warning); };
+  const auto warn = [](const std::string& warning) { print_error("{}\n", warning); };
   const auto [frames, bytes] = merge(shards, out, use, {.progress = stderr, .warn = warn});
   fmt::print("{} frames of {} shards, {:.1f} MiB\ndataset: {}\n", frames, shards.size(),
              mebibytes(bytes), out.string());

@@ -64,6 +64,7 @@ void RunLog::write(std::string_view event, const Json& fields) {
   const std::string line = object.dump(-1, ' ', false, Json::error_handler_t::replace) + "\n";
   std::fwrite(line.data(), 1, line.size(), out_);
   std::fflush(out_);
+  std::clearerr(out_);  // a log that cannot be written does not make the run fail
 }
 
 double log_seconds(std::chrono::duration<double> time) {

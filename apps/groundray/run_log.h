@@ -8,7 +8,7 @@
 #include <string>
 #include <string_view>
 
-#include "apps/dataset/file_sum.h"
+#include "core/io/open_file.h"
 
 namespace groundray {
 

@@ -8,6 +8,7 @@
 #include <utility>
 
 #include "core/error.h"
+#include "core/io/open_file.h"
 #include "core/io/ply_header.h"
 #include "core/io/text_lines.h"
 
@@ -147,7 +148,7 @@ std::optional<CloudBlocks> CloudBlocks::open(const std::filesystem::path& path,
   std::error_code fault;
   const std::uint64_t file_bytes = std::filesystem::file_size(path, fault);
   CloudBlocks blocks;
-  blocks.file_.open(path, std::ios::binary);
+  blocks.file_ = open_stream(path);
   if (fault || !blocks.file_) return std::nullopt;
   std::string head(head_bytes, '\0');
   blocks.file_.read(head.data(), static_cast<std::streamsize>(head.size()));

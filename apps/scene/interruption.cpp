@@ -17,6 +17,7 @@ void request(int signal) {
 void catch_interruptions() {
   std::signal(SIGINT, request);
   std::signal(SIGTERM, request);
+  if (std::signal(SIGHUP, request) == SIG_IGN) std::signal(SIGHUP, SIG_IGN);  // by nohup
 }
 
 bool is_interrupted() noexcept { return requested != 0; }

@@ -11,8 +11,8 @@ namespace groundray {
 /// Exception that stops work on request.
 struct Interrupted {};
 
-/// Installs signal handlers: the first SIGINT or SIGTERM only requests an orderly end; the second
-/// ends the process as usual.
+/// Installs signal handlers: the first SIGINT, SIGTERM or SIGHUP only requests an orderly end; the
+/// second ends the process as usual.
 void catch_interruptions();
 
 /// Returns true if an end has been requested.

@@ -16,6 +16,8 @@
 #include <ranges>
 #include <sstream>
 
+#include "core/io/open_file.h"
+
 namespace groundray::yaml {
 namespace {
 
@@ -155,7 +157,7 @@ std::string read_file(const std::filesystem::path& path) {
   if (fs::file_size(path, fault) > largest_file_bytes) {
     throw Error("{}: larger than the limit of 16 MiB", path.string());
   }
-  std::ifstream file(path, std::ios::binary);
+  std::ifstream file = open_stream(path);
   std::string text{std::istreambuf_iterator<char>(file), {}};
   if (!file) throw Error("{}: cannot be read", path.string());
   return text;

@@ -19,6 +19,7 @@
 #include "apps/view/rendering/picture_file.h"
 #include "core/error.h"
 #include "core/io/file_io.h"
+#include "core/io/open_file.h"
 #include "core/model/mesh_reader.h"
 #include "terrain/dem/band_file.h"
 
@@ -33,7 +34,7 @@ bool is_one_of(const std::string& text, std::initializer_list<std::string_view> 
 
 // Returns true if the header of a PLY file declares faces.
 bool has_faces(const fs::path& path) {
-  std::ifstream file(path, std::ios::binary);
+  std::ifstream file = open_stream(path);
   std::string line;
   for (int i = 0; i < 1000 && std::getline(file, line); ++i) {
     if (line.starts_with("end_header")) break;

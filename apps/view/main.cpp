@@ -14,6 +14,7 @@
 #include "apps/view/rendering/offscreen_render.h"
 #include "apps/view/window/run_window.h"
 #include "core/error.h"
+#include "core/io/print_error.h"
 
 namespace groundray {
 namespace {
@@ -116,7 +117,7 @@ int take_stills(const Arguments& arguments) {
   std::vector<Opened> inputs;
   for (const std::filesystem::path& input : arguments.inputs) {
     inputs.push_back(open_any(input));
-    for (const std::string& note : inputs.back().notes) fmt::print(stderr, "note: {}\n", note);
+    for (const std::string& note : inputs.back().notes) print_error("note: {}\n", note);
   }
   if (!arguments.compare_with.empty()) compare_inputs(inputs, arguments);
   View view(make_offscreen_window(spec.size_px));
@@ -156,11 +157,11 @@ int run(int argc, char** argv) {
   }
   const std::string lonely = without_screenshot(arguments);
   if (!lonely.empty()) {
-    fmt::print(stderr, "groundray-view: {} needs --screenshot\n", lonely);
+    print_error("groundray-view: {} needs --screenshot\n", lonely);
     return wrong_usage;
   }
   if (arguments.tolerance_m > 0 && arguments.compare_with.empty()) {
-    fmt::print(stderr, "groundray-view: --tolerance-m needs --compare-with\n");
+    print_error("groundray-view: --tolerance-m needs --compare-with\n");
     return wrong_usage;
   }
   read_spec(arguments);
@@ -177,9 +178,9 @@ int main(int argc, char** argv) {
   try {
     return groundray::run(argc, argv);
   } catch (const std::bad_alloc&) {
-    fmt::print(stderr, "groundray-view: there is not enough memory\n");
+    groundray::print_error("groundray-view: there is not enough memory\n");
   } catch (const std::exception& fault) {
-    fmt::print(stderr, "groundray-view: {}\n", fault.what());
+    groundray::print_error("groundray-view: {}\n", fault.what());
   }
   return groundray::failed;
 }

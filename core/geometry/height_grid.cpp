@@ -26,25 +26,6 @@ HeightRange range_of(std::span<const float> heights_m) {
   return range;
 }
 
-// Returns the largest difference of `count` heights and those `offset` later.
-float largest_step(const float* heights_m, std::size_t count, std::size_t offset) {
-  float largest = 0;
-#pragma omp simd reduction(max : largest)
-  for (std::size_t i = 0; i < count; ++i) {
-    const float step = std::abs(heights_m[i + offset] - heights_m[i]);
-    largest = step > largest ? step : largest;  // not if it is NaN
-  }
-  return largest;
-}
-
-float steepest_of(glm::ivec2 size, const std::vector<float>& heights_m) {
-  const auto columns = static_cast<std::size_t>(size.x), rows = static_cast<std::size_t>(size.y);
-  float steepest = largest_step(heights_m.data(), columns * (rows - 1), columns);
-  for (std::size_t row = 0; row < rows; ++row)
-    steepest = std::max(steepest, largest_step(heights_m.data() + row * columns, columns - 1, 1));
-  return steepest;
-}
-
 void check_samples(Violations& broken, glm::ivec2 size, std::span<const float> heights_m,
                    const HeightRange& range) {
   broken.unless(size.x >= 2 && size.y >= 2, "{} x {} samples; a surface needs at least 2 x 2",
@@ -83,7 +64,6 @@ HeightArray::HeightArray(glm::ivec2 size, std::vector<float> heights_m) : size_(
     min_m_ = range.low_m;
     max_m_ = range.high_m;
   }
-  steepest_m_ = steepest_of(size, heights_m);
   heights_m_ = std::make_shared<const std::vector<float>>(std::move(heights_m));
   samples_ = heights_m_->data();
 }

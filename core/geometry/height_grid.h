@@ -33,8 +33,6 @@ class HeightArray {
   double max_m() const noexcept { return max_m_; }
   /// Number of samples without a height.
   std::size_t hole_count() const noexcept { return hole_count_; }
-  /// Largest difference of neighbours in a row or column, metres.
-  double steepest_m() const noexcept { return steepest_m_; }
 
  private:
   glm::ivec2 size_;
@@ -43,7 +41,6 @@ class HeightArray {
   double min_m_ = std::numeric_limits<double>::quiet_NaN();
   double max_m_ = std::numeric_limits<double>::quiet_NaN();
   std::size_t hole_count_ = 0;
-  double steepest_m_ = 0;
 };
 
 /// The reference surface: heights on a regular grid, connected by two triangles in each cell (see

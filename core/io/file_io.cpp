@@ -1,22 +1,19 @@
 #include "core/io/file_io.h"
 
+#include <unistd.h>
+
 #include <algorithm>
 #include <cctype>
 #include <cerrno>
 #include <cstdio>
-#include <memory>
 #include <system_error>
 #include <utility>
 
 #include "core/error.h"
+#include "core/io/open_file.h"
 
 namespace groundray {
 namespace {
-
-struct CloseFile {
-  void operator()(std::FILE* file) const noexcept { std::fclose(file); }
-};
-using File = std::unique_ptr<std::FILE, CloseFile>;
 
 [[noreturn]] void throw_system_error() { throw std::system_error(errno, std::generic_category()); }
 
@@ -47,6 +44,7 @@ void write_whole(const std::filesystem::path& path,
   std::filesystem::path aside = path;
   aside += ".part";
   try {
+    close(create_file(aside));
     write(aside);
     std::filesystem::rename(aside, path);
   } catch (const std::system_error& fault) {
@@ -62,8 +60,7 @@ void write_whole(const std::filesystem::path& path,
 void write_blocks(const std::filesystem::path& path,
                   const std::function<std::string_view()>& next_block) {
   write_whole(path, [&](const std::filesystem::path& aside) {
-    File file(std::fopen(aside.c_str(), "wb"));
-    if (!file) throw_system_error();
+    OwnedFile file(fdopen(create_file(aside), "wb"));
     std::setvbuf(file.get(), nullptr, _IONBF, 0);
     for (std::string_view block = next_block(); !block.empty(); block = next_block()) {
       if (std::fwrite(block.data(), 1, block.size(), file.get()) != block.size())
@@ -78,14 +75,14 @@ void write_text(const std::filesystem::path& path, std::string_view text) {
 }
 
 std::string read_text(const std::filesystem::path& path) {
-  const File file(std::fopen(path.c_str(), "rb"));
+  const OwnedFile file = open_file(path);
   std::string text;
   std::size_t size = 0;
-  while (file && std::feof(file.get()) == 0 && std::ferror(file.get()) == 0) {
+  while (std::feof(file.get()) == 0 && std::ferror(file.get()) == 0) {
     text.resize(std::max<std::size_t>(2 * size, 1 << 16));
     size += std::fread(text.data() + size, 1, text.size() - size, file.get());
   }
-  if (!file || std::ferror(file.get()) != 0) {
+  if (std::ferror(file.get()) != 0) {
     throw Error("{}: cannot be read: {}; check its name and permissions", path.string(),
                 std::generic_category().message(errno));
   }

@@ -13,6 +13,7 @@
 #include "core/geometry/mesh.h"
 #include "core/io/file_io.h"
 #include "core/io/mesh_io.h"
+#include "core/io/open_file.h"
 #include "core/io/ply_io.h"
 #include "core/io/text_lines.h"
 #include "core/model/polygon_soup.h"
@@ -75,7 +76,7 @@ Georeference georeference_of(std::string_view text, std::string_view mark,
 /// there.
 Georeference stl_georeference(const fs::path& path) {
   std::string header(80, ' ');
-  std::ifstream file(path, std::ios::binary);
+  std::ifstream file = open_stream(path);
   file.read(header.data(), static_cast<std::streamsize>(header.size()));
   header.resize(std::min(header.find('\0'), header.size()));
   Georeference georeference;

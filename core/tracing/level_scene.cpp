@@ -145,21 +145,6 @@ void LevelScene::Impl::make_parts(const Impl* previous) {
   });
 }
 
-GroundExtent extent_of(const std::vector<const LevelScene::Impl*>& levels) {
-  GroundExtent extent{levels.back()->first, levels.back()->last};
-  for (const LevelScene::Impl* level : levels) {
-    const HeightArray& heights = level->level.heights;
-    // The last cells may be narrower than the others.
-    const glm::ivec2 cells = level->last - level->first;
-    const int step = level->level.step;
-    const int narrowest = cells.x % step == 0 && cells.y % step == 0 ? step : 1;
-    extent.steepest_m = std::max(extent.steepest_m, heights.steepest_m() / narrowest);
-    if (heights.hole_count() == heights.heights_m().size()) continue;
-    extent.high_m = std::max({extent.high_m, std::abs(heights.min_m()), std::abs(heights.max_m())});
-  }
-  return extent;
-}
-
 LevelScene::Impl::~Impl() {
   if (scene != nullptr) rtcReleaseScene(scene);
 }

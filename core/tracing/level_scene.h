@@ -114,9 +114,6 @@ struct LevelScene::Impl : LevelView {
   }
 };
 
-/// Returns the extent of nested levels, the outermost last.
-GroundExtent extent_of(const std::vector<const LevelScene::Impl*>& levels);
-
 /// A ray as used for one level: in double, and in float from where it enters the level's bounding
 /// box.
 struct LevelRay {

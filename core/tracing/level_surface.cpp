@@ -32,7 +32,8 @@ int next_index(double slope, int low, int high) { return slope > 0 ? high : low 
 }  // namespace
 
 LevelSurface::LevelSurface(std::vector<const LevelScene::Impl*> levels)
-    : levels_(std::move(levels)), extent_(extent_of(levels_)) {}
+    : levels_(std::move(levels)),
+      extent_(levels_.back()->level.frame, levels_.back()->first, levels_.back()->last) {}
 
 // Returns the finest level whose window contains a cell of the DEM, or the outermost.
 std::uint32_t LevelSurface::level_at(int column, int row) const noexcept {

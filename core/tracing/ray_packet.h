@@ -11,28 +11,10 @@
 #include <limits>
 #include <span>
 
+#include "core/tracing/float_hit.h"
 #include "core/tracing/level_surface.h"
 
 namespace groundray {
-
-// Hit that Embree reports for a ray.
-struct FloatHit {
-  unsigned geometry = RTC_INVALID_GEOMETRY_ID;
-  unsigned primitive = 0;
-  unsigned instance = RTC_INVALID_GEOMETRY_ID;
-  float u = 0, v = 0;
-  float range_m = 0;  // from the origin of the float ray
-};
-
-// Scene that a packet is traced through: one level, or all levels at once.
-struct Target {
-  RTCScene scene = nullptr;
-  const LevelScene::Impl* level = nullptr;  // the outermost level if is_all
-  std::uint32_t number = 0;
-  bool is_all = false;
-  double min_m = 0, max_m = 0;  // lowest and highest height
-  float slack_m = 0;
-};
 
 // A packet of rays, with one array over the lanes for each number, so that the loops below are
 // vectorised. Lanes beyond the last ray repeat it and are not valid.

@@ -15,6 +15,7 @@ namespace groundray {
 namespace {
 
 constexpr double walk_cells = 1.5;  // distance from Embree's hit within which the facet is searched
+constexpr double along_cells = 1e-3;    // distance from a line within which a ray runs along it
 constexpr double inside_margin = 1e-9;  // cells; far above rounding, far below any facet
 
 }  // namespace
@@ -56,6 +57,9 @@ struct RayTracer::Impl {
   std::optional<Crossing> search(const Target& target, const LevelRay& ray,
                                  FloatHit hit) const noexcept;
   template <int W>
+  bool runs_between_parts(const Target& target, const Packet<W>& packet,
+                          std::size_t i) const noexcept;
+  template <int W>
   void decide_fast(const Target& target, Packet<W>& packet) const noexcept;
   template <int W>
   void trace_target(const Target& target, Coherence coherence, std::span<Hit> hits,
@@ -72,51 +76,6 @@ struct RayTracer::Impl {
 };
 
 namespace {
-
-FloatHit intersect_one(const Target& target, const LevelRay& ray, double from_m,
-                       const glm::vec3& direction) noexcept {
-  RTCRayHit one{};
-  one.ray = {ray.origin.x,
-             ray.origin.y,
-             ray.origin.z,
-             static_cast<float>(from_m - ray.enter_m),
-             direction.x,
-             direction.y,
-             direction.z,
-             0,
-             ray.far_m,
-             ~0u,
-             0,
-             0};
-  one.hit.geomID = RTC_INVALID_GEOMETRY_ID;
-  one.hit.instID[0] = RTC_INVALID_GEOMETRY_ID;
-  QueryContext context;
-  intersect<1>(target.scene, nullptr, one, context, Coherence::Incoherent);
-  return {one.hit.geomID, one.hit.primID, one.hit.instID[0], one.hit.u, one.hit.v, one.ray.tfar};
-}
-
-inline Facet facet_of(const LevelPart& part, const FloatHit& hit) noexcept {
-  if (hit.geometry == facet_geometry) return part.triangles[hit.primitive].facet;
-  const GridBlock& grid = part.grids[hit.primitive];
-  const float u = hit.u * static_cast<float>(grid.columns);
-  const float v = hit.v * static_cast<float>(grid.rows);
-  const int column = std::clamp(static_cast<int>(u), 0, grid.columns - 1);
-  const int row = std::clamp(static_cast<int>(v), 0, grid.rows - 1);
-  const bool far_half = u - static_cast<float>(column) + (v - static_cast<float>(row)) > 1;
-  return {grid.column + (column << grid.step_exponent), grid.row + (row << grid.step_exponent),
-          grid.step_exponent, far_half ? Half::Far : Half::Near, grid.deviation_m};
-}
-
-// Returns whether the plane of Embree's facet can be intersected directly.
-inline bool is_whole(const LevelPart& part, const FloatHit& hit) noexcept {
-  return hit.geometry == block_geometry || part.triangles[hit.primitive].whole;
-}
-
-glm::vec3 one_ulp_off(const glm::vec3& direction) noexcept {
-  constexpr float up = std::numeric_limits<float>::infinity();
-  return {std::nextafter(direction.x, up), std::nextafter(direction.y, up),
-          std::nextafter(direction.z, up)};
-}
 
 Hit hit_of(const GridFrame& frame, const Crossing& crossing) noexcept {
   return {crossing.range_m, glm::vec3(frame.normal(crossing.plane)), crossing.deviation_m,
@@ -221,6 +180,22 @@ std::optional<Crossing> RayTracer::Impl::search(const Target& target, const Leve
   }
 }
 
+// Returns whether a ray runs along a line where parts may meet. Embree may miss both parts there:
+// its packets and its single rays round the distances to the sides of boxes differently.
+template <int W>
+bool RayTracer::Impl::runs_between_parts(const Target& target, const Packet<W>& packet,
+                                         std::size_t i) const noexcept {
+  if (places.size() == 1 || (!target.is_all && target.level->parts.size() == 1)) return false;
+  const Level& finest = level(0).level;
+  const double block = finest.leaf_cells * finest.step;
+  const double length_m = packet.leave_m[i] - packet.enter_m[i];
+  const auto runs_along = [&](double start, double slope) {
+    return std::abs(slope) * length_m < along_cells &&
+           std::abs(std::remainder(start + packet.enter_m[i] * slope, block)) < 2 * along_cells;
+  };
+  return runs_along(packet.u0[i], packet.du[i]) || runs_along(packet.v0[i], packet.dv[i]);
+}
+
 template <int W>
 void RayTracer::Impl::decide_fast(const Target& target, Packet<W>& packet) const noexcept {
   std::array<bool, W> whole{};
@@ -244,7 +219,15 @@ void RayTracer::Impl::decide_fast(const Target& target, Packet<W>& packet) const
   }
   for (int lane = 0; lane < W; ++lane) {
     const auto i = static_cast<std::size_t>(lane);
-    if (packet.valid[i] == 0 || (whole[i] && packet.inside[i] > inside_margin)) continue;
+    if (packet.valid[i] == 0) continue;
+    if (runs_between_parts(target, packet, i)) {
+      const FacetRay ray = packet.facet_ray(lane, surface.extent());
+      packet.take(
+          lane,
+          surface.first_crossing(ray, packet.enter_m[i], packet.leave_m[i]).value_or(Crossing{}));
+      continue;
+    }
+    if (whole[i] && packet.inside[i] > inside_margin) continue;
     const FloatHit hit = packet.hit(lane);
     const bool open = hit.geometry != RTC_INVALID_GEOMETRY_ID ||
                       ends_below(target, packet.grid_ray(lane), packet.leave_m[i]);

@@ -12,12 +12,13 @@
 #include <array>
 #include <cstdlib>
 #include <exception>
-#include <fstream>
 #include <limits>
 #include <memory>
 #include <regex>
 #include <string_view>
 #include <vector>
+
+#include "core/io/open_file.h"
 
 namespace groundray {
 namespace {
@@ -114,14 +115,14 @@ void check_blocks(GDALDataset& dataset) {
 // Returns the memory that the machine can still give, and the process may still take.
 double available_bytes() {
   double bytes = std::numeric_limits<double>::infinity();
-  std::ifstream machine("/proc/meminfo");
+  std::ifstream machine = open_stream("/proc/meminfo");
   for (std::string word; machine >> word;) {
     if (word == "MemAvailable:" && machine >> bytes) bytes *= 1024;
   }
   rlimit limit{};
   double pages = 0;
   if (getrlimit(RLIMIT_AS, &limit) == 0 && limit.rlim_cur != RLIM_INFINITY &&
-      std::ifstream("/proc/self/statm") >> pages) {
+      open_stream("/proc/self/statm") >> pages) {
     const double used = pages * static_cast<double>(sysconf(_SC_PAGESIZE));
     bytes = std::min(bytes, std::max(0.0, static_cast<double>(limit.rlim_cur) - used));
   }

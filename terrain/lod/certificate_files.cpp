@@ -15,6 +15,7 @@
 
 #include "core/error.h"
 #include "core/io/file_io.h"
+#include "core/io/open_file.h"
 #include "core/io/text_lines.h"
 #include "terrain/dem/byte_hash.h"
 
@@ -37,7 +38,8 @@ std::string raster_text(const std::filesystem::path& folder, const std::string& 
   constexpr std::int64_t end_bytes = 1 << 16;
   constexpr std::int64_t piece_bytes = 1 << 12;
   constexpr std::int64_t pieces = 64;
-  std::ifstream file(folder / name, std::ios::binary | std::ios::ate);
+  std::ifstream file = open_stream(folder / name);
+  file.seekg(0, std::ios::end);
   const std::int64_t size = file.tellg();
   std::string bytes;
   const auto add = [&](std::int64_t from, std::int64_t count) {
@@ -236,9 +238,10 @@ std::vector<std::filesystem::path> certificate_folders(const DemFile& dem) {
 std::optional<FolderInMaking> FolderInMaking::begin(const std::filesystem::path& place) {
   std::error_code ignored;
   std::filesystem::create_directories(place.parent_path(), ignored);
-  if (std::filesystem::exists(place, ignored) && !std::filesystem::is_directory(place, ignored)) {
+  // A link is not followed: nothing elsewhere is deleted.
+  const std::filesystem::file_status before = std::filesystem::symlink_status(place, ignored);
+  if (std::filesystem::exists(before) && !std::filesystem::is_directory(before))
     return std::nullopt;
-  }
   if (has_alien_files(place)) return std::nullopt;
   const std::filesystem::path aside = place.string() + ".part";
   while (true) {
@@ -247,7 +250,7 @@ std::optional<FolderInMaking> FolderInMaking::begin(const std::filesystem::path&
       throw Error("{}: cannot be created: {}; free some space", aside.string(),
                   std::generic_category().message(errno));
     }
-    const int lock = ::open(aside.c_str(), O_RDONLY | O_DIRECTORY | O_CLOEXEC);
+    const int lock = ::open(aside.c_str(), O_RDONLY | O_DIRECTORY | O_NOFOLLOW | O_CLOEXEC);
     if (lock < 0 && errno == ENOENT) continue;  // another process has just published it
     if (lock < 0) return std::nullopt;
     // Where folders cannot be locked, as on some network drives, processes do not wait for each

@@ -17,11 +17,11 @@ COMMANDS = {
         *(f"terrain {what}" for what in ("mesh", "certify", "fill")),
         *(f"reconstruct {what}" for what in ("mesh", "simplify", "fill", "dem")),
     ],
-    "groundray-golden": ["run", "accept", "compare"],
+    "groundray-golden": ["run", "accept", "compare", "passes", "conform"],
     "groundray-view": [],
     "groundray-export": [],
 }
-OTHERS = {"--array"}  # Slurm's
+OTHERS = {"--array", "--cuda", "--hip", "--opencl"}  # Slurm's, and those of ./dev bench device
 # A command, up to where a shell or a sentence would end it.
 CALL = re.compile(r"(?<![\w/.-])(groundray(?:-golden|-view|-export)?)(?= )([^|;&`#\n]*)")
 

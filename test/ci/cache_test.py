@@ -200,7 +200,7 @@ def clang_tidy_command(source: str) -> list[str]:
 
 def test_changed_header_invalidates_exactly_the_stamps_of_its_includers(tree, tmp_path):
     folder = tmp_path / "clone"
-    files = [path for path in known_files() if path.suffix in (".cpp", ".h", ".inc")]
+    files = [path for path in known_files() if path.suffix in (".cpp", ".h", ".hip", ".inc")]
     names = [str(path.relative_to(ROOT)) for path in files]
     for name in names:
         (folder / name).parent.mkdir(parents=True, exist_ok=True)

@@ -50,6 +50,25 @@ def test_an_include_against_a_rule_is_reported(tmp_path, source, include, rule):
     assert f"{source}:2: #include {include}: {rule}" in outcome.stdout
 
 
+@pytest.mark.parametrize(
+    "call",
+    [
+        'std::FILE* file = std::fopen("a", "wb");',
+        'std::ifstream file("a");',
+        "file.open(path, std::ios::binary);",
+        "open(path, O_CREAT | O_TRUNC);",
+    ],
+)
+def test_a_file_opened_elsewhere_is_reported(tmp_path, call):
+    file = tmp_path / "core/io/ply_io.cpp"
+    file.parent.mkdir(parents=True)
+    file.write_text(f"// A source.\n{call}\n")
+    outcome = check(tmp_path)
+    assert outcome.returncode == 1
+    assert "core/io/ply_io.cpp:2: " in outcome.stdout
+    assert "open files by core/io/open_file.h" in outcome.stdout
+
+
 def test_a_rule_that_nothing_uses_is_reported(tmp_path):
     outcome = check(tmp_path)
     assert outcome.returncode == 1

@@ -12,15 +12,12 @@
 #include <memory>
 #include <thread>
 
-#include "test/device/driver_device.h"
 #include "test/device/embedded_kernels.h"
-#include "test/device/opencl_device.h"
 #include "test/support/terrain/pass_results.h"
 
 namespace groundray::device_bench {
 namespace {
 
-using testing::DriverDevice;
 using testing::HostArrays;
 using testing::KernelDevice;
 using Times = KernelDevice::Times;
@@ -154,11 +151,9 @@ std::vector<Row> rows_of(const std::vector<Call>& one_thread, const std::vector<
 
 std::unique_ptr<KernelDevice> open_device(std::string_view backend, HostArrays& arrays) {
   const testing::KernelCode code = testing::embedded_kernels();
-  if (backend == "--cuda")
-    return std::make_unique<DriverDevice>(DriverDevice::Api::Cuda, code, arrays);
-  if (backend == "--hip")
-    return std::make_unique<DriverDevice>(DriverDevice::Api::Hip, code, arrays);
-  return std::make_unique<testing::OpenClDevice>(code, arrays);
+  if (backend == "--cuda") return testing::open_gpu(testing::Gpu::Cuda, code, arrays);
+  if (backend == "--hip") return testing::open_gpu(testing::Gpu::Hip, code, arrays);
+  return testing::open_opencl(code, arrays);
 }
 
 void measure(std::string_view backend, const char* file) {

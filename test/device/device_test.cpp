@@ -18,9 +18,8 @@
 #include "terrain/lod/clipmap.h"
 #include "terrain/lod/quadtree.h"
 #include "terrain/terrain_scene.h"
-#include "test/device/driver_device.h"
 #include "test/device/host_arrays.h"
-#include "test/device/opencl_device.h"
+#include "test/device/kernel_device.h"
 #include "test/support/terrain/adversarial_terrain.h"
 #include "test/support/terrain/hard_rays.h"
 #include "test/support/terrain/pass_rays.h"
@@ -34,8 +33,8 @@ namespace {
 constexpr std::size_t passes = 20;
 constexpr std::size_t most_bytes = std::size_t{512} << 20;  // of all arrays of a run
 
-using testing::DriverDevice;
 using ::testing::ElementsAre;
+using testing::Gpu;
 using ::testing::Gt;
 using testing::HostArrays;
 using ::testing::IsEmpty;
@@ -43,7 +42,7 @@ using testing::KernelCode;
 using testing::KernelDevice;
 using testing::NamedTerrain;
 using ::testing::Not;
-using testing::OpenClDevice;
+using testing::open_gpu;
 using ::testing::Pair;
 
 std::filesystem::path kernels() {
@@ -95,26 +94,27 @@ enum class Backend { OpenCl, Cuda, Hip, FakeCuda, FakeHip };
 
 std::unique_ptr<KernelDevice> open_device(Backend backend, const KernelCode& code,
                                           HostArrays& arrays) {
-  using enum DriverDevice::Api;
   const std::string fake = (kernels() / "libfake_driver.so").string();
   switch (backend) {
     case Backend::OpenCl:
       break;
     case Backend::Cuda:
-      return std::make_unique<DriverDevice>(Cuda, code, arrays);
+      return open_gpu(Gpu::Cuda, code, arrays);
     case Backend::Hip:
-      return std::make_unique<DriverDevice>(Hip, code, arrays);
+      return open_gpu(Gpu::Hip, code, arrays);
     case Backend::FakeCuda:
-      return std::make_unique<DriverDevice>(Cuda, code, arrays, fake);
+      return open_gpu(Gpu::Cuda, code, arrays, fake);
     case Backend::FakeHip:
-      return std::make_unique<DriverDevice>(Hip, code, arrays, fake);
+      return open_gpu(Gpu::Hip, code, arrays, fake);
   }
   // Where PoCL keeps what it compiled.
   ::setenv("POCL_CACHE_DIR", (kernels() / "cache").c_str(), 0);
-  return std::make_unique<OpenClDevice>(code, arrays);
+  return testing::open_opencl(code, arrays);
 }
 
-void PrintTo(Backend backend, std::ostream* out) { *out << static_cast<int>(backend); }
+std::ostream& operator<<(std::ostream& out, Backend backend) {
+  return out << static_cast<int>(backend);
+}
 
 class OnDevice : public ::testing::TestWithParam<Backend> {
  protected:
@@ -327,7 +327,7 @@ TEST(OpenCl, FindsFaultsOfKernels) {
 std::string fault_of_cuda(const std::string& ptx, const std::string& library) {
   HostArrays arrays(most_bytes);
   try {
-    const DriverDevice device(DriverDevice::Api::Cuda, {.ptx = ptx}, arrays, library);
+    open_gpu(Gpu::Cuda, {.ptx = ptx}, arrays, library);
   } catch (const std::runtime_error& fault) {
     return fault.what();
   }

@@ -1,6 +1,6 @@
 // Types are those of cuda.h and hip_runtime_api.h: handles are pointers, addresses of the device
-// are 64 bits wide (CUdeviceptr, hipDeviceptr_t), and results are int, 0 for success.
-#include "test/device/driver_device.h"
+// are 64 bits wide (CUdeviceptr, hipDeviceptr_t), and results are int, 0 for success. HIP's
+// functions for modules have the parameters of CUDA's driver.
 
 #include <fmt/format.h>
 #include <fmt/ranges.h>
@@ -8,6 +8,7 @@
 #include <array>
 #include <map>
 
+#include "test/device/kernel_device.h"
 #include "test/device/shared_library.h"
 
 namespace groundray::testing {
@@ -16,18 +17,16 @@ namespace {
 using Address = std::uint64_t;
 using Handle = void*;
 
-SharedLibrary open_driver(DriverDevice::Api api, const std::string& library) {
+SharedLibrary open_driver(Gpu api, const std::string& library) {
   if (!library.empty()) return SharedLibrary({library});
-  if (api == DriverDevice::Api::Cuda) return SharedLibrary({"libcuda.so.1"});
+  if (api == Gpu::Cuda) return SharedLibrary({"libcuda.so.1"});
   return SharedLibrary(
       {"libamdhip64.so.7", "libamdhip64.so.6", "libamdhip64.so.5", "libamdhip64.so"});
 }
 
-}  // namespace
-
 // Functions of a driver, under CUDA's names; those of contexts are CUDA's alone.
 struct Driver {
-  DriverDevice::Api api;
+  Gpu api;
   int (*init)(unsigned flags) = nullptr;
   int (*device_count)(int* count) = nullptr;
   int (*device_get)(int* device, int ordinal) = nullptr;
@@ -52,7 +51,7 @@ struct Driver {
   int (*event_elapsed)(float* ms, Handle begin, Handle end) = nullptr;
   int (*event_destroy)(Handle event) = nullptr;
 
-  Driver(DriverDevice::Api of, const std::string& file) : api(of) {
+  Driver(Gpu of, const std::string& file) : api(of) {
     const SharedLibrary library = open_driver(of, file);
     const auto find = [&](auto*& function, const char* of_cuda, const char* of_hip) {
       library.find(function, is_cuda() ? of_cuda : of_hip);
@@ -80,7 +79,7 @@ struct Driver {
     library.find(context_set, "cuCtxSetCurrent");
   }
 
-  bool is_cuda() const { return api == DriverDevice::Api::Cuda; }
+  bool is_cuda() const { return api == Gpu::Cuda; }
   const char* name() const { return is_cuda() ? "CUDA" : "HIP"; }
 
   void check(int status, std::string_view what) const {
@@ -89,27 +88,28 @@ struct Driver {
   }
 };
 
-struct DriverDevice::State {
+// The GPU and what it holds.
+struct DriverState {
   Driver driver;
   int device = 0;
   Handle context = nullptr, module = nullptr, begin = nullptr, end = nullptr;
   Address pass = 0, arrays = 0;
   std::map<std::string, Handle, std::less<>> kernels;
 
-  State(Api api, const std::string& library) : driver(api, library) {
+  DriverState(Gpu api, const std::string& library) : driver(api, library) {
     int count = 0;
     int status = driver.init(0);
     if (status == 0) status = driver.device_count(&count);
     if (count == 0)
       throw NoDevice(fmt::format("{} finds no device: error {}", driver.name(), status));
     driver.check(driver.device_get(&device, 0), "the device");
-    if (!driver.is_cuda()) return;  // HIP uses the first device unless it is told otherwise
+    if (!driver.is_cuda()) return;  // HIP uses the first device by itself
     driver.check(driver.context_retain(&context, device), "context");
     driver.check(driver.context_set(context), "context");
   }
-  State(const State&) = delete;
-  State& operator=(const State&) = delete;
-  ~State() {
+  DriverState(const DriverState&) = delete;
+  DriverState& operator=(const DriverState&) = delete;
+  ~DriverState() {
     if (begin != nullptr) driver.event_destroy(begin);
     if (end != nullptr) driver.event_destroy(end);
     if (arrays != 0) driver.free(arrays);
@@ -152,11 +152,25 @@ struct DriverDevice::State {
   }
 };
 
-DriverDevice::DriverDevice(Api api, const KernelCode& code, HostArrays& arrays,
+class DriverDevice final : public KernelDevice {
+ public:
+  DriverDevice(Gpu api, const KernelCode& code, HostArrays& arrays, const std::string& library);
+
+  std::string name() const override;
+
+ private:
+  void write(Memory to, std::span<const std::byte> bytes) override;
+  void read(std::span<std::byte> bytes) override;
+  double launch(const Launch& launch) override;
+
+  DriverState state_;
+};
+
+DriverDevice::DriverDevice(Gpu api, const KernelCode& code, HostArrays& arrays,
                            const std::string& library)
-    : KernelDevice(arrays), state_(std::make_unique<State>(api, library)) {
-  State& s = *state_;
-  if (api == Api::Cuda)
+    : KernelDevice(arrays), state_(api, library) {
+  DriverState& s = state_;
+  if (api == Gpu::Cuda)
     s.load_first(std::span(&code.ptx, 1));
   else
     s.load_first(code.code_objects);
@@ -166,29 +180,27 @@ DriverDevice::DriverDevice(Api api, const KernelCode& code, HostArrays& arrays,
   s.driver.check(s.driver.event_create(&s.end, 0), "event");
 }
 
-DriverDevice::~DriverDevice() = default;
-
 std::string DriverDevice::name() const {
   std::array<char, 256> text{};
-  const Driver& driver = state_->driver;
-  driver.check(driver.device_name(text.data(), static_cast<int>(text.size()), state_->device),
+  const Driver& driver = state_.driver;
+  driver.check(driver.device_name(text.data(), static_cast<int>(text.size()), state_.device),
                "name");
   return text.data();
 }
 
 void DriverDevice::write(Memory to, std::span<const std::byte> bytes) {
-  const Address address = to == Memory::Pass ? state_->pass : state_->arrays;
-  state_->driver.check(state_->driver.copy_to(address, bytes.data(), bytes.size()),
-                       "copy to the device");
+  const Address address = to == Memory::Pass ? state_.pass : state_.arrays;
+  state_.driver.check(state_.driver.copy_to(address, bytes.data(), bytes.size()),
+                      "copy to the device");
 }
 
 void DriverDevice::read(std::span<std::byte> bytes) {
-  state_->driver.check(state_->driver.copy_from(bytes.data(), state_->arrays, bytes.size()),
-                       "copy from the device");
+  state_.driver.check(state_.driver.copy_from(bytes.data(), state_.arrays, bytes.size()),
+                      "copy from the device");
 }
 
 double DriverDevice::launch(const Launch& launch) {
-  State& s = *state_;
+  DriverState& s = state_;
   const Driver& driver = s.driver;
   Launch own = launch;
   std::array<void*, 5> parameters{&s.pass, &own.indices, &s.arrays, &own.host, &own.size};
@@ -202,6 +214,13 @@ double DriverDevice::launch(const Launch& launch) {
   float ms = 0;
   driver.check(driver.event_elapsed(&ms, s.begin, s.end), "event");
   return ms;
+}
+
+}  // namespace
+
+std::unique_ptr<KernelDevice> open_gpu(Gpu gpu, const KernelCode& code, HostArrays& arrays,
+                                       const std::string& library) {
+  return std::make_unique<DriverDevice>(gpu, code, arrays, library);
 }
 
 }  // namespace groundray::testing

@@ -1,6 +1,6 @@
-// Driver of a GPU that is not there, with the functions of CUDA and HIP that DriverDevice calls:
-// kernels are passes.hip compiled for the CPU, memory is apart from the host's, and every address,
-// size and handle is checked.
+// Driver of a GPU that is not there, with the functions of CUDA and HIP that driver_device.cpp
+// calls: kernels are passes.hip compiled for the CPU, memory is apart from the host's, and every
+// address, size and handle is checked.
 #include <dlfcn.h>
 
 #include <cstddef>

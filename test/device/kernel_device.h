@@ -3,6 +3,7 @@
 #include <cstddef>
 #include <cstdint>
 #include <filesystem>
+#include <memory>
 #include <span>
 #include <stdexcept>
 #include <string>
@@ -69,5 +70,22 @@ class KernelDevice : public PassDevice {
   HostArrays& arrays_;
   Times last_;
 };
+
+/// Opens the first OpenCL device with double precision; it runs SPIR-V, or SPIR if its driver takes
+/// no SPIR-V.
+/// @throws NoDevice if there is no such device.
+/// @throws std::runtime_error if the driver rejects the kernels, with its log.
+std::unique_ptr<KernelDevice> open_opencl(const KernelCode& code, HostArrays& arrays);
+
+/// Driver of NVIDIA's or AMD's GPUs.
+enum class Gpu { Cuda, Hip };
+
+/// Opens the first GPU of a driver, which is opened at run time. CUDA runs the PTX, HIP the first
+/// of the code objects that it accepts.
+/// @param library  file of the driver; empty for that of the system.
+/// @throws NoDevice if there is no driver or GPU.
+/// @throws std::runtime_error if the driver rejects the kernels, with its log.
+std::unique_ptr<KernelDevice> open_gpu(Gpu gpu, const KernelCode& code, HostArrays& arrays,
+                                       const std::string& library = "");
 
 }  // namespace groundray::testing

@@ -1,11 +1,10 @@
-#include "test/device/opencl_device.h"
-
 #define CL_TARGET_OPENCL_VERSION 300
 #include <CL/cl.h>
 #include <fmt/format.h>
 
 #include <map>
 
+#include "test/device/kernel_device.h"
 #include "test/device/shared_library.h"
 
 namespace groundray::testing {
@@ -14,8 +13,6 @@ namespace {
 void check(cl_int status, std::string_view what) {
   if (status != CL_SUCCESS) throw std::runtime_error(fmt::format("OpenCL: {}: {}", what, status));
 }
-
-}  // namespace
 
 // OpenCL's functions that are used here.
 #define GROUNDRAY_OPENCL(function)              \
@@ -101,7 +98,8 @@ struct OpenCl {
   }
 };
 
-struct OpenClDevice::State : OpenCl {
+// The device and what it holds.
+struct OpenClState : OpenCl {
   cl_device_id device = find_device();
   cl_context context = nullptr;
   cl_command_queue queue = nullptr;
@@ -109,10 +107,10 @@ struct OpenClDevice::State : OpenCl {
   cl_mem pass = nullptr, arrays = nullptr;
   std::map<std::string, cl_kernel, std::less<>> kernels;
 
-  State() = default;
-  State(const State&) = delete;
-  State& operator=(const State&) = delete;
-  ~State() {
+  OpenClState() = default;
+  OpenClState(const OpenClState&) = delete;
+  OpenClState& operator=(const OpenClState&) = delete;
+  ~OpenClState() {
     for (const auto& [name, kernel] : kernels) clReleaseKernel(kernel);
     if (arrays != nullptr) clReleaseMemObject(arrays);
     if (pass != nullptr) clReleaseMemObject(pass);
@@ -153,9 +151,22 @@ struct OpenClDevice::State : OpenCl {
   }
 };
 
-OpenClDevice::OpenClDevice(const KernelCode& code, HostArrays& arrays)
-    : KernelDevice(arrays), state_(std::make_unique<State>()) {
-  State& s = *state_;
+class OpenClDevice final : public KernelDevice {
+ public:
+  OpenClDevice(const KernelCode& code, HostArrays& arrays);
+
+  std::string name() const override;
+
+ private:
+  void write(Memory to, std::span<const std::byte> bytes) override;
+  void read(std::span<std::byte> bytes) override;
+  double launch(const Launch& launch) override;
+
+  OpenClState state_;
+};
+
+OpenClDevice::OpenClDevice(const KernelCode& code, HostArrays& arrays) : KernelDevice(arrays) {
+  OpenClState& s = state_;
   cl_int status = CL_SUCCESS;
   s.context = s.clCreateContext(nullptr, 1, &s.device, nullptr, nullptr, &status);
   check(status, "context");
@@ -169,29 +180,27 @@ OpenClDevice::OpenClDevice(const KernelCode& code, HostArrays& arrays)
   check(status, "memory of the arrays");
 }
 
-OpenClDevice::~OpenClDevice() = default;
-
 std::string OpenClDevice::name() const {
-  const State& s = *state_;
+  const OpenClState& s = state_;
   return s.text_of(s.device, CL_DEVICE_NAME) + ", " + s.text_of(s.device, CL_DEVICE_VERSION);
 }
 
 void OpenClDevice::write(Memory to, std::span<const std::byte> bytes) {
-  State& s = *state_;
+  OpenClState& s = state_;
   check(s.clEnqueueWriteBuffer(s.queue, to == Memory::Pass ? s.pass : s.arrays, CL_TRUE, 0,
                                bytes.size(), bytes.data(), 0, nullptr, nullptr),
         "copy to the device");
 }
 
 void OpenClDevice::read(std::span<std::byte> bytes) {
-  State& s = *state_;
+  OpenClState& s = state_;
   check(s.clEnqueueReadBuffer(s.queue, s.arrays, CL_TRUE, 0, bytes.size(), bytes.data(), 0, nullptr,
                               nullptr),
         "copy from the device");
 }
 
 double OpenClDevice::launch(const Launch& launch) {
-  State& s = *state_;
+  OpenClState& s = state_;
   const cl_kernel kernel = s.kernel(launch.kernel);
   cl_uint argument = 0;
   const auto set = [&]<typename Value>(const Value& value) {
@@ -216,6 +225,12 @@ double OpenClDevice::launch(const Launch& launch) {
   s.clReleaseEvent(run);
   check(finished, launch.kernel);
   return 1e-6 * static_cast<double>(end_ns - begin_ns);
+}
+
+}  // namespace
+
+std::unique_ptr<KernelDevice> open_opencl(const KernelCode& code, HostArrays& arrays) {
+  return std::make_unique<OpenClDevice>(code, arrays);
 }
 
 }  // namespace groundray::testing

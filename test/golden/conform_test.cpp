@@ -208,6 +208,17 @@ TEST_F(Conform, RaysInDoubleHitTheSameTriangleAtTheSameRange) {
   EXPECT_FALSE(passes("rays"));
 }
 
+TEST_F(Conform, LargeBudgetsDoNotExcuseOtherRays) {
+  claim(R"({"implementation": "test", "classes": ["rays"], "rays": {"precision": "float",
+    "delta_m": 2, "range_relative": 1e-3, "range_absolute_m": 2}})");
+  const std::vector<float> ranges(2000, std::numeric_limits<float>::infinity());
+  write_npy(theirs() / "rays/range_m.npy", "<f4", Shape{2000}, std::as_bytes(std::span(ranges)));
+  const std::vector<std::int32_t> none(2000, -1);
+  write_npy(theirs() / "rays/triangle.npy", "<i4", Shape{2000}, std::as_bytes(std::span(none)));
+  const Section section = judge_conformity(ours(), theirs()).sections.front();
+  EXPECT_EQ(section.verdict, Verdict::Failed);
+}
+
 TEST_F(Conform, RaysInFloatMayDifferByWhatTheirManifestStates) {
   change<double>("rays/range_m", [](auto&, auto&) {});
   const auto exact = ArrayFolder(ours()).read<double>("rays/range_m", {2000});
@@ -258,10 +269,13 @@ TEST_F(Conform, EachMistakeHasOneMessage) {
        R"(rays.precision = "half" must be "double" or "float")"},
       {"negative delta", manifest(R"({"implementation": "x", "classes": ["rays"],
          "rays": {"precision": "double", "delta_m": -1}})"),
-       "rays.delta_m must be a number from 0 to 1e6"},
+       "rays.delta_m must be a number from 0 to 2"},
       {"delta above what is known", manifest(R"({"implementation": "x", "classes": ["rays"],
          "rays": {"precision": "double", "delta_m": 3}})"),
-       "rays.delta_m = 3 m must be at most 2 m, a cell"},
+       "rays.delta_m must be a number from 0 to 2"},
+      {"budget of anything", manifest(R"({"implementation": "x", "classes": ["rays"],
+         "rays": {"precision": "float", "delta_m": 0, "range_relative": 1, "range_absolute_m": 0}})"),
+       "rays.range_relative must be a number from 0 to 0.001"},
       {"missing array", [](auto& t) { fs::remove(t / "level_00/key_m.npy"); },
        "level_00/key_m.npy: it is missing"},
       {"folder for an array",
@@ -343,6 +357,34 @@ TEST_F(Conform, EachMistakeHasOneMessage) {
     }
     EXPECT_THAT(message(), HasSubstr(mistake.message)) << mistake.name;
   }
+}
+
+// What happens if the reference is damaged: the judge does not pass anything by it.
+TEST_F(Conform, DamagedReferencesAreRejected) {
+  const auto rejected = [&](const std::function<void(nlohmann::json&)>& damage) {
+    const std::string sound = read_text(ours() / "manifest.json");
+    auto json = nlohmann::json::parse(sound);
+    damage(json);
+    write_text(ours() / "manifest.json", json.dump());
+    const std::string said = message();
+    write_text(ours() / "manifest.json", sound);
+    return said;
+  };
+  EXPECT_EQ(message(), "");
+  EXPECT_THAT(rejected([](auto& json) { json["arrays"].clear(); }),
+              HasSubstr("manifest.json: arrays: heights_m is missing"));
+  EXPECT_THAT(rejected([](auto& json) { json["arrays"].erase(1); }),
+              HasSubstr("arrays: level_00/key_m is missing"));
+  EXPECT_THAT(rejected([](auto& json) { json["arrays"][1]["shape"].clear(); }),
+              HasSubstr("arrays: level_00/key_m must have at least one row"));
+  EXPECT_THAT(rejected([](auto& json) { json["settings"]["tolerance_m"] = -1; }),
+              HasSubstr("tolerance_m = -1 must be finite and not negative"));
+  EXPECT_THAT(rejected([](auto& json) { json["settings"]["block_cells"] = 7.5; }),
+              HasSubstr("block_cells must be a whole number from 2 to 64"));
+  EXPECT_THAT(rejected([](auto& json) { json["dem"]["columns"] = 1LL << 31; }),
+              HasSubstr("manifest.json: columns must be a whole number from 2 to"));
+  zeros(ours() / "level_00/low_m.npy", "<f4", 4, {8, 8});
+  EXPECT_THAT(message(), HasSubstr("level_00/low_m has changed since it was written"));
 }
 
 TEST_F(Conform, FoldersOfPassesAreNew) {

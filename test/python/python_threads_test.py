@@ -126,8 +126,11 @@ def test_other_threads_run_during_a_long_call(made, work):
 def test_ctrl_c_ends_a_long_call(tmp_path):
     script = BEGIN + (
         "camera, whole_s = lasting(120)\n"
-        "print(whole_s, flush=True)\n"
-        "try:\n    camera.expose(frame=0)\nexcept KeyboardInterrupt:\n    print('interrupted')\n"
+        "try:\n"
+        "    print(whole_s, flush=True)\n"  # within: a signal may come before the next line
+        "    camera.expose(frame=0)\n"
+        "except KeyboardInterrupt:\n"
+        "    print('interrupted')\n"
     )
     with python(tmp_path, script) as process:
         whole_s = float(process.stdout.readline())

@@ -61,7 +61,7 @@ std::vector<std::string> faults_of(const HeightGrid& grid, const SampleMesh& mes
   return judge::topology_faults(grid, mesh.vertices, mesh.triangles);
 }
 
-TEST(MeshOracle, ReferenceSurfaceHasNoFaultsAndNoDeviation) {
+TEST(MeshDeviation, ReferenceSurfaceHasNoFaultsAndNoDeviation) {
   for (const auto& [name, grid] : adversarial_terrain()) {
     SCOPED_TRACE(name);
     const SampleMesh mesh = facets_of(grid);
@@ -75,7 +75,7 @@ TEST(MeshOracle, ReferenceSurfaceHasNoFaultsAndNoDeviation) {
   }
 }
 
-TEST(MeshOracle, CellSplitAlongTheOtherDiagonalDeviatesMostAtItsCentre) {
+TEST(MeshDeviation, CellSplitAlongTheOtherDiagonalDeviatesMostAtItsCentre) {
   const HeightGrid grid({2, 2}, {0, 0}, {1, 1}, {1, 2, 4, 16});
   const std::vector<glm::ivec2> vertices{{0, 0}, {1, 0}, {0, 1}, {1, 1}};
   const std::vector<glm::uvec3> triangles{{0, 1, 3}, {0, 3, 2}};
@@ -87,7 +87,7 @@ TEST(MeshOracle, CellSplitAlongTheOtherDiagonalDeviatesMostAtItsCentre) {
   EXPECT_THAT(judge::topology_faults(grid, vertices, triangles), IsEmpty());
 }
 
-TEST(MeshOracle, AllowedDeviationIsEvaluatedOnTheReferenceSurface) {
+TEST(MeshDeviation, AllowedDeviationIsEvaluatedOnTheReferenceSurface) {
   const HeightGrid grid({2, 2}, {0, 0}, {1, 1}, {1, 2, 4, 16});
   const std::vector<glm::ivec2> vertices{{0, 0}, {1, 0}, {0, 1}, {1, 1}};
   const std::vector<glm::uvec3> triangles{{0, 1, 3}};
@@ -98,7 +98,7 @@ TEST(MeshOracle, AllowedDeviationIsEvaluatedOnTheReferenceSurface) {
 
 // Random points of random triangles, including slivers, over noise: none deviates by more than the
 // reported maximum, and the mesh reaches that maximum at the reported position.
-TEST(MeshOracle, NoPointOfATriangleExceedsTheLargestDeviation) {
+TEST(MeshDeviation, NoPointOfATriangleExceedsTheLargestDeviation) {
   constexpr double tolerance_m = 1e-12;  // roundings of the points' coordinates, slopes below 100
   const HeightGrid noise = white_noise({40, 30}, 50, Seed{9});
   const glm::dvec2 step_m = noise.step_m();
@@ -146,7 +146,7 @@ TEST(MeshOracle, NoPointOfATriangleExceedsTheLargestDeviation) {
             0.8);  // the points come close to the maximum, so it is not much too large
 }
 
-TEST(MeshOracle, TrianglesOverMissingFacetsAreCounted) {
+TEST(MeshDeviation, TrianglesOverMissingFacetsAreCounted) {
   std::vector<float> heights(25, 1);
   heights[2 * 5 + 3] = std::numeric_limits<float>::quiet_NaN();  // (3, 2): six facets are missing
   const HeightGrid grid({5, 5}, {0, 0}, {1, 1}, heights);
@@ -161,7 +161,7 @@ TEST(MeshOracle, TrianglesOverMissingFacetsAreCounted) {
   EXPECT_EQ(over_missing({{0, 4, 6}, {0, 5, 4}, {2, 6, 3}, {1, 3, 0}, {6, 3, 4}}), 2u);
 }
 
-TEST(MeshOracle, ReportsEveryTopologyFault) {
+TEST(MeshDeviation, ReportsEveryTopologyFault) {
   const HeightGrid grid = white_noise({4, 4}, 1, Seed{1});
   const SampleMesh whole = facets_of(grid);
 
@@ -211,7 +211,7 @@ TEST(MeshOracle, ReportsEveryTopologyFault) {
                           "the doubled areas add up to 4, those of the facets to 8"));
 }
 
-TEST(MeshOracle, MeshMustEndAtTheBoundaryOfAHole) {
+TEST(MeshDeviation, MeshMustEndAtTheBoundaryOfAHole) {
   const HeightGrid holed({3, 3}, {0, 0}, {1, 1},
                          {1, 1, std::numeric_limits<float>::quiet_NaN(), 1, 1, 1, 1, 1, 1});
   EXPECT_THAT(faults_of(holed, facets_of(holed)), IsEmpty());

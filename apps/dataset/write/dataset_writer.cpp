@@ -16,6 +16,7 @@
 #include "apps/scene/interruption.h"
 #include "core/error.h"
 #include "core/io/file_io.h"
+#include "core/io/open_file.h"
 #include "core/io/tum_io.h"
 #include "core/progress.h"
 
@@ -28,7 +29,7 @@ constexpr std::string_view aside = ".part";  // suffix of temporary files
 
 // Returns the convergence that a scan's header states; empty if there is none.
 std::string convergence_of(const fs::path& scan) {
-  std::ifstream file(scan);
+  std::ifstream file = open_stream(scan);
   const std::string begin = fmt::format("comment {}", convergence_comment);
   for (std::string line; std::getline(file, line) && line != "end_header";) {
     if (line.starts_with(begin)) return line.substr(begin.size());

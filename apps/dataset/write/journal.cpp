@@ -13,6 +13,7 @@
 
 #include "apps/dataset/file_sum.h"
 #include "core/error.h"
+#include "core/io/open_file.h"
 
 namespace groundray {
 namespace {
@@ -30,10 +31,13 @@ std::string mark_of(std::string_view entry) { return sha256_of(entry).substr(0, 
 }  // namespace
 
 Journal::Journal(std::filesystem::path path)
-    : path_(std::move(path)),
-      descriptor_(open(path_.c_str(), O_RDWR | O_CREAT | O_TRUNC | O_CLOEXEC, 0666)),
-      synced_(std::chrono::steady_clock::now()) {
-  if (descriptor_ < 0) fail_to("written", path_);
+    : path_(std::move(path)), synced_(std::chrono::steady_clock::now()) {
+  try {
+    descriptor_ = create_file(path_);
+  } catch (const std::system_error& fault) {
+    errno = fault.code().value();
+    fail_to("written", path_);
+  }
 }
 
 Journal::~Journal() { close(descriptor_); }
@@ -79,7 +83,7 @@ void Journal::remove() noexcept {
 
 std::size_t read_journal(const std::filesystem::path& path,
                          const std::function<void(const std::string& entry)>& take) {
-  std::ifstream file(path, std::ios::binary);
+  std::ifstream file = open_stream(path);
   if (!file) fail_to("read", path);
   std::size_t unreadable = 0;
   for (std::string line; std::getline(file, line);) {

@@ -42,7 +42,7 @@ class Journal {
 
  private:
   std::filesystem::path path_;
-  int descriptor_;
+  int descriptor_ = -1;
   std::uint64_t size_bytes_ = 0;
   std::chrono::steady_clock::time_point synced_;
 };

@@ -27,6 +27,7 @@
 #include "apps/scene/interruption.h"
 #include "core/error.h"
 #include "core/io/file_io.h"
+#include "core/io/open_file.h"
 #include "core/progress.h"
 
 namespace groundray {
@@ -208,7 +209,7 @@ struct Copy {
 
 // @throws Error if the file is not as its shard states.
 void copy_file(const Copy& copy) {
-  std::ifstream file(copy.from, std::ios::binary);
+  std::ifstream file = open_stream(copy.from);
   if (const int fault = errno; !file && fault != ENOENT) {
     throw Error("{}: cannot be read: {}; `groundray verify` lists all such files",
                 copy.from.string(), std::generic_category().message(fault));

@@ -10,6 +10,7 @@
 
 #include "core/error.h"
 #include "core/io/file_io.h"
+#include "core/io/open_file.h"
 
 namespace groundray::golden {
 namespace {
@@ -17,7 +18,7 @@ namespace {
 namespace fs = std::filesystem;
 
 bool has_faces(const fs::path& ply) {
-  std::ifstream file(ply, std::ios::binary);
+  std::ifstream file = open_stream(ply);
   for (std::string line; std::getline(file, line) && !line.starts_with("end_header");) {
     if (line.starts_with("element face") && !line.starts_with("element face 0")) return true;
   }

@@ -4,7 +4,6 @@
 #include <fmt/ranges.h>
 
 #include <algorithm>
-#include <bit>
 #include <cmath>
 
 #include "apps/dataset/file_sum.h"
@@ -48,11 +47,6 @@ void check_no_nan(const std::string& bytes) {
 }
 
 }  // namespace
-
-bool ArrayFolder::has(const std::string& name) const {
-  std::error_code ignored;
-  return fs::exists(folder_ / name, ignored);
-}
 
 fs::path ArrayFolder::file(const std::string& name) const {
   const fs::path path = folder_ / name;

@@ -58,7 +58,6 @@ class ArrayFolder {
   /// Returns the path of a file in the folder.
   /// @throws Error if it is missing, is no regular file, or leads out of the folder.
   std::filesystem::path file(const std::string& name) const;
-  bool has(const std::string& name) const;
 
   /// Reads an array.
   /// @param shape  that it must have.

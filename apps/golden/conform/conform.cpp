@@ -32,27 +32,29 @@ struct Claims {
   RayBudget budget;
 };
 
-double positive(const Json& json, const char* key) {
+double budget_of(const Json& json, const char* key, double most) {
   const Json& value = json.at(key);
-  if (!value.is_number() || !(value.get<double>() >= 0) || !(value.get<double>() < 1e6))
-    throw Error("rays.{} must be a number from 0 to 1e6", key);
+  if (!value.is_number() || !(value.get<double>() >= 0 && value.get<double>() <= most))
+    throw Error("rays.{} must be a number from 0 to {:g}", key, most);
   return value.get<double>();
 }
 
-RayBudget budget_of(const Json& json) {
+// @param limit_m  up to which silhouettes are known.
+RayBudget budget_of(const Json& json, double limit_m) {
+  constexpr double most_relative = 1e-3;
   const auto precision = json.at("precision").get<std::string>();
   if (precision != "double" && precision != "float")
     throw Error("rays.precision = {:?} must be \"double\" or \"float\"", precision);
   RayBudget budget;
-  budget.delta_m = positive(json, "delta_m");
+  budget.delta_m = budget_of(json, "delta_m", limit_m);
   if (precision == "double") return budget;
-  budget.relative = positive(json, "range_relative");
-  budget.absolute_m = positive(json, "range_absolute_m");
+  budget.relative = budget_of(json, "range_relative", most_relative);
+  budget.absolute_m = budget_of(json, "range_absolute_m", limit_m);
   budget.moves_rays = true;
   return budget;
 }
 
-Claims read_claims(const ArrayFolder& theirs) {
+Claims read_claims(const ArrayFolder& theirs, double limit_m) {
   const fs::path path = theirs.file("manifest.json");
   try {
     if (fs::file_size(path) > most_manifest_bytes)
@@ -66,7 +68,7 @@ Claims read_claims(const ArrayFolder& theirs) {
       if (std::ranges::find(known_classes, each) == known_classes.end())
         throw Error("class {:?} is unknown; the classes are {}", each.substr(0, 40),
                     fmt::join(known_classes, ", "));
-      if (each == "rays") claims.budget = budget_of(json.at("rays"));
+      if (each == "rays") claims.budget = budget_of(json.at("rays"), limit_m);
     }
     return claims;
   } catch (const nlohmann::json::exception& fault) {
@@ -90,7 +92,7 @@ Section judge(std::string_view name, const PassFolder& ours, const ArrayFolder& 
 Report judge_conformity(const fs::path& passes, const fs::path& theirs_path) {
   const PassFolder ours = read_pass_folder(passes);
   const ArrayFolder theirs(theirs_path);
-  const Claims claims = read_claims(theirs);
+  const Claims claims = read_claims(theirs, ours.silhouette_limit_m);
   Report report{.title = "Conformity of a mesher and tracer, judged by groundray",
                 .facts = {{"version", GROUNDRAY_VERSION},
                           {"passes", passes.string()},

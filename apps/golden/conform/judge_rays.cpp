@@ -13,6 +13,8 @@
 namespace groundray::golden {
 namespace {
 
+constexpr double most_excused = 0.05;  // share of the rays that differ at silhouettes
+
 // Reads ranges of either precision.
 std::vector<double> read_ranges(const ArrayFolder& folder, std::uint64_t count, bool is_float) {
   if (!is_float) return folder.read<double>("rays/range_m", {count}).values;
@@ -33,6 +35,17 @@ double cosine_of(const HeightGrid& grid, const TerrainMesh& mesh, std::int32_t t
   return std::abs(glm::dot(glm::normalize(normal), direction));
 }
 
+// Returns whether two triangles share a vertex.
+bool meet(const TerrainMesh& mesh, std::int32_t one, std::int32_t other) {
+  if (one < 0 || other < 0) return false;
+  const glm::uvec3& a = mesh.triangles[static_cast<std::size_t>(one)];
+  const glm::uvec3& b = mesh.triangles[static_cast<std::size_t>(other)];
+  for (int k = 0; k < 3; ++k) {
+    if (a[k] == b.x || a[k] == b.y || a[k] == b.z) return true;
+  }
+  return false;
+}
+
 // Reads the triangles that rays hit.
 std::vector<std::int32_t> read_triangles(const ArrayFolder& folder, std::uint64_t count,
                                          const TerrainMesh& mesh) {
@@ -50,11 +63,6 @@ std::vector<std::int32_t> read_triangles(const ArrayFolder& folder, std::uint64_
 
 Section judge_rays(const PassFolder& ours, const ArrayFolder& theirs, const RayBudget& budget) {
   Section section{.title = "rays: ranges within the budget, on the same triangles"};
-  if (budget.delta_m > ours.silhouette_limit_m) {
-    throw Error(
-        "{}: rays.delta_m = {} m must be at most {} m, a cell: silhouettes are measured so far",
-        (theirs.path() / "manifest.json").string(), budget.delta_m, ours.silhouette_limit_m);
-  }
   const TerrainMesh mesh = read_sample_mesh(ours.grid, ours.arrays);
   const auto a_m = ours.arrays.read<double>("rays/range_m", {any}, std::uint64_t{1} << 32);
   const std::uint64_t count = a_m.rows();
@@ -78,7 +86,7 @@ Section judge_rays(const PassFolder& ours, const ArrayFolder& theirs, const RayB
       ++at_silhouettes;
       continue;
     }
-    if (a != b && (a < 0 || b < 0 || !(edge_m.values[i] < budget.delta_m))) {
+    if (a != b && (!(edge_m.values[i] < budget.delta_m) || !meet(mesh, a, b))) {
       ++unexplained;
       continue;
     }
@@ -106,7 +114,9 @@ Section judge_rays(const PassFolder& ours, const ArrayFolder& theirs, const RayB
                    budget.moves_rays ? ", and delta_m over the cosine of incidence" : ""));
   tell(section, "largest error as a fraction of its budget", worst);
   tell(section, "largest error", worst_m, "m");
-  tell(section, "other triangles at a silhouette", at_silhouettes, "rays");
+  hold(section, "other triangles at a silhouette", at_silhouettes, "rays",
+       most_excused * static_cast<double>(count),
+       "with more, delta_m is too large for a verdict: 5 % of the rays");
   tell(section, "other triangles at an edge", beside, "rays");
   tell(section, "rays", static_cast<double>(count), "rays");
   tell(section, "hits", hits, "rays");

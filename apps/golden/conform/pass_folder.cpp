@@ -2,8 +2,10 @@
 
 #include <fmt/format.h>
 
+#include <algorithm>
 #include <bit>
 #include <cmath>
+#include <initializer_list>
 #include <nlohmann/json.hpp>
 #include <utility>
 
@@ -175,43 +177,91 @@ void write_pass_folder(const fs::path& dem_path, const PassSettings& settings,
   write_text(out / "manifest.json", manifest.dump(2) + "\n");
 }
 
+namespace {
+
+glm::dvec2 pair_of(const Json& json) {
+  return {json.at(0).get<double>(), json.at(1).get<double>()};
+}
+
+int whole_number(const Json& json, const char* key, int least, int most) {
+  const Json& value = json.at(key);
+  if (!value.is_number_integer() || value < least || value > most)
+    throw Error("{} must be a whole number from {} to {}", key, least, most);
+  return value.get<int>();
+}
+
+double tolerance(const Json& json, const char* key) {
+  const double value = json.at(key).get<double>();
+  if (!(value >= 0) || !std::isfinite(value))
+    throw Error("{} = {} must be finite and not negative", key, value);
+  return value;
+}
+
+// Returns the names of the arrays that a folder must have.
+std::vector<std::string> required_names(const Lattice& lattice) {
+  std::vector<std::string> names = {"heights_m"};
+  const auto add = [&](const std::string& folder, std::initializer_list<const char*> all) {
+    for (const char* name : all) names.push_back(folder + name);
+  };
+  for (int level = 0; level <= lattice.top_level(); ++level) {
+    add(level_folder(static_cast<std::size_t>(level)),
+        {"key_m", "deviation_m", "full_m", "low_m", "high_m", "state"});
+  }
+  add("leaves/", {"column", "row", "step", "coarser", "has_holes", "deviation_m", "high_m"});
+  add("mesh/", {"vertices", "triangles", "level"});
+  add("rays/", {"origin_m", "direction", "range_m", "triangle", "silhouette_m", "edge_m"});
+  return names;
+}
+
+std::vector<ArrayEntry> read_entries(const Json& list, const Lattice& lattice,
+                                     const ArrayFolder& arrays) {
+  std::vector<ArrayEntry> entries;
+  for (const Json& entry : list) {
+    entries.push_back({entry.at("name").get<std::string>(), entry.at("pass").get<std::string>(),
+                       entry.value("level", -1), entry.value("unit", std::string()),
+                       entry.at("dtype").get<std::string>(), entry.at("shape").get<Shape>(),
+                       entry.at("sha256").get<std::string>()});
+  }
+  for (const std::string& name : required_names(lattice)) {
+    const auto found = std::ranges::find(entries, name, &ArrayEntry::name);
+    if (found == entries.end()) throw Error("arrays: {} is missing", name);
+    if (found->shape.empty() || found->shape[0] == 0)
+      throw Error("arrays: {} must have at least one row", name);
+    const RawNpy raw = arrays.read_raw(name, found->type, found->shape, 0, name == "heights_m");
+    if (sha256_of(raw.bytes) != found->sha256)
+      throw Error("arrays: {} has changed since it was written: its SHA-256 differs", name);
+  }
+  return entries;
+}
+
+}  // namespace
+
 PassFolder read_pass_folder(const fs::path& folder) {
   const ArrayFolder arrays(folder);
   const fs::path path = arrays.file("manifest.json");
-  if (fs::file_size(path) > most_list_bytes)
-    throw Error("{}: it is larger than {} bytes", path.string(), most_list_bytes);
   try {
+    if (fs::file_size(path) > most_list_bytes)
+      throw Error("it is larger than {} bytes", most_list_bytes);
     const Json json = Json::parse(read_text(path));
     if (json.at("groundray_passes") != 1) throw Error("groundray_passes must be 1");
     const Json &dem = json.at("dem"), &settings = json.at("settings");
-    const glm::ivec2 size(dem.at("columns").get<int>(), dem.at("rows").get<int>());
-    const auto pair = [](const Json& of) {
-      return glm::dvec2(of.at(0).get<double>(), of.at(1).get<double>());
-    };
-    if (size.x < 2 || size.y < 2) throw Error("dem: columns and rows must be at least 2");
-    const HeightGrid grid(size, pair(dem.at("origin_m")), pair(dem.at("step_m")),
+    const glm::ivec2 size(whole_number(dem, "columns", 2, 1 << 30),
+                          whole_number(dem, "rows", 2, 1 << 30));
+    const Lattice lattice{size, whole_number(settings, "block_cells", 2, Lattice::max_block_cells)};
+    auto entries = read_entries(json.at("arrays"), lattice, arrays);
+    const HeightGrid grid(size, pair_of(dem.at("origin_m")), pair_of(dem.at("step_m")),
                           arrays.read<float>("heights_m", rows_by_columns(size), 0, true).values);
     const Json& at = settings.at("viewpoint_m");
-    const glm::dvec3 viewpoint_m(pair(at), at.at(2).get<double>());
-    PassFolder out{arrays,
-                   grid,
-                   bound_from({viewpoint_m, viewpoint_m}, grid.frame(),
-                              settings.at("tolerance_m").get<double>(),
-                              settings.at("angle_rad").get<double>()),
-                   settings.at("block_cells").get<int>(),
-                   json.at("silhouette_limit_m").get<double>(),
-                   {}};
-    for (const Json& entry : json.at("arrays")) {
-      out.entries.push_back({entry.at("name").get<std::string>(),
-                             entry.at("pass").get<std::string>(), entry.value("level", -1),
-                             entry.value("unit", std::string()),
-                             entry.at("dtype").get<std::string>(), entry.at("shape").get<Shape>(),
-                             entry.at("sha256").get<std::string>()});
-    }
-    return out;
+    const glm::dvec3 viewpoint_m(pair_of(at), at.at(2).get<double>());
+    return {arrays, grid,
+            bound_from({viewpoint_m, viewpoint_m}, grid.frame(), tolerance(settings, "tolerance_m"),
+                       tolerance(settings, "angle_rad")),
+            tolerance(json, "silhouette_limit_m"), std::move(entries)};
   } catch (const nlohmann::json::exception& fault) {
     throw Error("{}: {}; is it a folder that groundray-golden passes has written?", path.string(),
                 fault.what());
+  } catch (const Error& rule) {
+    throw Error("{}: {}", path.string(), rule.what());
   }
 }
 

@@ -15,7 +15,7 @@
 
 namespace groundray::golden {
 
-/// What a folder of passes holds the results of.
+/// Settings of the mesh and the rays of a folder of passes.
 struct PassSettings {
   double tolerance_m = 0.1;
   double angle_rad = 0;
@@ -32,7 +32,6 @@ struct PassFolder {
   ArrayFolder arrays;
   HeightGrid grid;
   MeshBound bound;
-  int block_cells = 8;
   double silhouette_limit_m = 0;  ///< distances to silhouettes are known up to this one
   std::vector<ArrayEntry> entries;
 };
@@ -42,7 +41,8 @@ struct PassFolder {
 void write_pass_folder(const std::filesystem::path& dem, const PassSettings& settings,
                        const std::filesystem::path& out);
 
-/// Reads the manifest and the DEM of a folder that write_pass_folder has written.
+/// Reads the manifest and the DEM of a folder that write_pass_folder has written, and checks that
+/// all arrays are there and as they were written.
 /// @throws Error naming the file and the rule that it breaks.
 PassFolder read_pass_folder(const std::filesystem::path& folder);
 

@@ -26,9 +26,6 @@ class Silhouettes {
                std::span<const std::int32_t> triangle, std::span<double> silhouette_m,
                std::span<double> edge_m) const;
 
-  /// Returns the unit normal of a triangle, upwards, in D.
-  const glm::dvec3& normal(std::size_t triangle) const { return normals_[triangle]; }
-
  private:
   struct Edge {
     glm::dvec3 a_m{0}, b_m{0};

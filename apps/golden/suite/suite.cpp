@@ -31,6 +31,7 @@
 #include "apps/scene/interruption.h"
 #include "core/error.h"
 #include "core/io/file_io.h"
+#include "core/io/open_file.h"
 #include "core/progress.h"
 
 namespace groundray::golden {
@@ -41,7 +42,11 @@ namespace {
 // @param log  file for standard output and standard error; replaced.
 // @return its exit code, or 128 plus the number of the signal that ended it.
 int run_process(const std::vector<std::string>& command, const std::filesystem::path& log) {
-  if (!std::ofstream(log)) throw Error("{}: cannot be written", log.string());
+  try {
+    close(create_file(log));
+  } catch (const std::system_error& fault) {
+    throw Error("{}: cannot be written: {}", log.string(), fault.code().message());
+  }
   std::vector<char*> arguments;
   for (const std::string& word : command) arguments.push_back(const_cast<char*>(word.c_str()));
   arguments.push_back(nullptr);
@@ -206,7 +211,7 @@ class FolderLock {
   explicit FolderLock(const std::filesystem::path& folder) {
     std::filesystem::create_directories(folder);
     const std::filesystem::path file = folder / ".lock";
-    descriptor_ = open(file.c_str(), O_RDWR | O_CREAT | O_CLOEXEC, 0644);
+    descriptor_ = open(file.c_str(), O_RDWR | O_CREAT | O_NOFOLLOW | O_CLOEXEC, 0644);
     if (descriptor_ < 0)
       throw Error("{}: cannot be written: choose another folder with -o", file.string());
     if (flock(descriptor_, LOCK_EX | LOCK_NB) == 0) return;

@@ -14,47 +14,61 @@
 
 namespace groundray {
 
-/// Extent of the ground, which bounds rays and rounding.
+/// Window of the outermost level, and what counts as steep in its grid.
 struct GroundExtent {
-  glm::ivec2 first{0}, last{0};  ///< samples of the DEM at the corners of the outermost window
-  double high_m = 0;             ///< largest magnitude of a height
-  double steepest_m = 0;         ///< largest slope along a column or row, metres per cell
+  glm::ivec2 first{0}, last{0};  ///< samples of the DEM at its corners
+  double steep_m = 0;            ///< rise by 8 times the width of a cell, metres per cell
+
+  GroundExtent() = default;
+  GroundExtent(const GridFrame& frame, glm::ivec2 from, glm::ivec2 to) noexcept
+      : first(from),
+        last(to),
+        steep_m(8 * std::max(std::abs(frame.step_m.x), std::abs(frame.step_m.y))) {}
 };
 
 /// A ray in grid coordinates, prepared for decisions.
 struct FacetRay {
-  GridRay grid;
+  GridRay grid;  ///< components below 1e-290 are 0, as on processors that flush small numbers
   double begin_m = 0, far_m = 0;  ///< hits before and beyond them are ignored
   double per_column_m = 0;        ///< metres along the ray from one column to the next: 1 / du;
                                   ///< infinite if the ray runs along a column
   double per_row_m = 0;
   glm::ivec2 cell{0};  ///< column and row of the cells that the ray runs along; -1 outside
-  double slack_m = 0, slack_per_m = 0;
+  double steep_m = 0;  ///< GroundExtent::steep_m
 
   FacetRay() = default;
   FacetRay(const GridRay& ray, const GroundExtent& ground, double begin, double far) noexcept
-      : grid(ray),
+      : grid{ray.u0, ray.v0, ray.z0, flushed(ray.du), flushed(ray.dv), flushed(ray.dz)},
         begin_m(begin),
         far_m(far),
-        per_column_m(1 / ray.du),
-        per_row_m(1 / ray.dv),
+        per_column_m(1 / grid.du),
+        per_row_m(1 / grid.dv),
         cell(cell_along(ray.u0, ground.first.x, ground.last.x),
              cell_along(ray.v0, ground.first.y, ground.last.y)),
-        slack_m(rounding * (std::abs(ray.z0) + ground.high_m +
-                            ground.steepest_m * (std::abs(ray.u0) + std::abs(ray.v0)))),
-        slack_per_m(rounding * (std::abs(ray.dz) +
-                                ground.steepest_m * (std::abs(ray.du) + std::abs(ray.dv)))) {
+        steep_m(ground.steep_m) {
     if (std::isnan(ray.u0 + ray.v0 + ray.du + ray.dv))
       far_m = -std::numeric_limits<double>::infinity();  // it hits nothing
   }
 
-  /// Returns four times a bound of the error of clearance_m for any facet at a side of it, which
-  /// includes the rounding of the range at which the ray passes it.
-  double clearance_slack_m(double t_m) const noexcept { return slack_m + t_m * slack_per_m; }
+  /// Returns what rounding may add to a clearance at t over a facet of this slope, metres per cell,
+  /// several times over. The range of a grid line is rounded, too; so the ray may be beside it.
+  double slack_m(double t_m, double slope_m) const noexcept {
+    constexpr double rounding = 0x1p-48;  // 32 roundings of the largest term
+    return rounding * (std::abs(grid.z0) + std::abs(t_m * grid.dz) +
+                       slope_m * (std::abs(grid.u0) + std::abs(grid.v0) +
+                                  std::abs(t_m) * (std::abs(grid.du) + std::abs(grid.dv))));
+  }
+  /// Slack that facets which are not steep have in common.
+  double slack_m(double t_m) const noexcept { return slack_m(t_m, steep_m); }
+  /// Largest slack of any facet: those yet steeper have no more.
+  double largest_slack_m(double t_m) const noexcept { return slack_m(t_m, steepest * steep_m); }
+
+  static constexpr double steepest = 64;
 
  private:
-  static constexpr double rounding = 0x1p-48;  // a clearance is the sum of 8 roundings at most
-
+  static double flushed(double component) noexcept {
+    return std::abs(component) < 1e-290 ? 0 : component;
+  }
   // A ray that runs exactly along a line belongs to the cell after it, and to the last cell at the
   // end.
   static int cell_along(double start, int first, int last) noexcept {
@@ -104,7 +118,7 @@ inline constexpr double never_m = std::numeric_limits<double>::infinity();
 ///
 /// A facet counts only if the ray falls towards its plane. Where the ray passes from one facet to
 /// the next, rounding makes the clearances over both differ. The ray therefore hits a facet unless
-/// it leaves it surely above, so that it never passes between two. At a vertex it may pass facets
+/// it leaves it surely above, so that it does not pass between two. At a vertex it may pass facets
 /// so briefly that they only show rounding: these count if the ray was surely above before, so that
 /// one that leaves the ground there hits none of them.
 /// @param part  of the ray over the facet.
@@ -112,14 +126,18 @@ inline double hit_m(const FacetRay& ray, const FacetPlane& plane, const RayPart&
   const GridRay& grid = ray.grid;
   const double rate = grid.dz - (plane.u_slope_m * grid.du + plane.v_slope_m * grid.dv);
   if (part.is_empty() || !(rate < 0)) return never_m;
-  const double in_slack_m = part.in_m == ray.begin_m ? 0 : ray.clearance_slack_m(part.in_m);
+  const double slope_m =
+      std::min(std::max(ray.steep_m, std::abs(plane.u_slope_m) + std::abs(plane.v_slope_m)),
+               FacetRay::steepest * ray.steep_m);
+  const bool begins_over = part.in_m == ray.begin_m, ends_over = part.out_m == ray.far_m;
   const double in_m = clearance_m(grid, plane, part.in_m);
-  if (!(in_m >= -in_slack_m)) return never_m;
+  if (!(in_m >= (begins_over ? 0 : -ray.slack_m(part.in_m, slope_m)))) return never_m;
   if (!std::isinf(part.out_m)) {
-    const double out_slack_m = part.out_m == ray.far_m ? 0 : ray.clearance_slack_m(part.out_m);
     const double out_m = clearance_m(grid, plane, part.out_m);
-    const double rounding_m = 0.25 * in_slack_m;
-    if (!(out_m < out_slack_m && (in_m >= rounding_m || in_m - out_m > rounding_m))) return never_m;
+    const double rounding_m = begins_over ? 0 : 0.25 * ray.slack_m(part.in_m);
+    const double falls_m = -rate * (part.out_m - part.in_m);
+    if (!(out_m < (ends_over ? 0 : ray.slack_m(part.out_m, slope_m)))) return never_m;
+    if (!(in_m >= rounding_m || falls_m > rounding_m)) return never_m;
   }
   return std::min(std::max(intersect(grid, plane), part.in_m), part.out_m);
 }
@@ -132,7 +150,7 @@ inline FacetHit hit_cell(const FacetRay& ray, const Cell& cell) noexcept {
   const RayPart part = part_over(ray, {cell.column, cell.row}, {cell.width, cell.height});
   if (part.is_empty()) return {};
   const double low_m = std::min(grid.z0 + part.in_m * grid.dz, grid.z0 + part.out_m * grid.dz) -
-                       ray.clearance_slack_m(part.out_m);
+                       ray.slack_m(part.out_m);
   if (low_m > cell.nw && low_m > cell.ne && low_m > cell.sw && low_m > cell.se) return {};
   // The diagonal is where across + sign * down = offset.
   const bool is_anti = cell.split == Cell::Split::NorthEastToSouthWest;

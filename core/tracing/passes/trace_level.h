@@ -74,7 +74,7 @@ struct TraceLevelPass {
 
  private:
   static bool passes_above(const FacetRay& ray, const RayPart& part, double high_m) noexcept {
-    const double least_m = high_m + 2 * ray.clearance_slack_m(part.out_m);
+    const double least_m = high_m + 2 * ray.largest_slack_m(part.out_m);
     return ray.grid.z0 + part.in_m * ray.grid.dz > least_m &&
            ray.grid.z0 + part.out_m * ray.grid.dz > least_m;
   }

@@ -337,10 +337,40 @@ TEST(RayTracerProof, RaysHitFacetsOnlyFromAbove) {
         if (!hits[i]) continue;
         ++met;
         ASSERT_LT(glm::dot(glm::dvec3(hits[i].normal), rays[i].direction), 0) << i;
+        // Not only the facet, but the ray is above it, as far as rounding tells.
+        ASSERT_TRUE(tracing == Tracing::Fast || i % 8 != 0 ||
+                    agrees(trace_reference(grid, rays[i]), hits[i]) ||
+                    passes_silhouette(grid, rays[i], hits[i], 1e-9))
+            << i;
       }
       EXPECT_GT(met, rays.size() / 4);
       EXPECT_GT(left, rays.size() / 20);
     }
+  }
+}
+
+// Samples that are no heights, such as a fill value that is not declared, change only the facets
+// that they belong to.
+TEST(RayTracer, HitsDependOnNoOtherFacets) {
+  const HeightGrid grid = fractal(65, 5, 100, Seed{33});
+  for (const float fill_m : {-32768.0F, -1e12F, -1e20F}) {
+    std::vector<float> heights(grid.heights_m().begin(), grid.heights_m().end());
+    heights.front() = fill_m;
+    const HeightGrid other({65, 65}, grid.origin_m(), grid.step_m(), heights);
+    std::vector<Ray> rays = testing::hard_rays(grid, 20'000, Seed{34});
+    // Away from the sample's cells.
+    std::erase_if(rays, [&](const Ray& ray) {
+      return glm::length(glm::dvec2(ray.origin) - grid.origin_m()) < 200 || ray.direction.z > -0.5;
+    });
+    const glm::dvec3 p_DL = float_frame_origin({0, 0, grid.max_height_m()});
+    const auto trace_on = [&](const HeightGrid& on) {
+      const RayTracer with({full_resolution_level(on)}, p_DL, Tracing::Exact);
+      return trace(with, rays);
+    };
+    const auto expected = trace_on(grid), found = trace_on(other);
+    EXPECT_GT(rays.size(), 3000u);
+    for (std::size_t i = 0; i < rays.size(); ++i)
+      ASSERT_EQ(found[i].range_m, expected[i].range_m) << i << " beside " << fill_m;
   }
 }
 

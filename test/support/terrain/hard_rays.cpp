@@ -54,7 +54,7 @@ std::vector<Ray> hard_rays(const HeightGrid& grid, std::size_t count, Seed seed)
     const auto bits = random_bits({seed, 3, 0, static_cast<std::uint32_t>(i)});
     const auto tiny = [](std::uint32_t some) {
       if (some % 4 == 0) return 0.0;
-      return ((some & 8) != 0 ? 1 : -1) * std::pow(10.0, -10 - static_cast<double>(some % 29));
+      return ((some & 8) != 0 ? 1 : -1) * std::pow(10.0, -10 - static_cast<double>(some % 311));
     };
     const double x = tiny(bits[0]), y = tiny(bits[1]), way = (bits[3] & 1) != 0 ? 1 : -1;
     const glm::dvec3 directions[3] = {{x, y, -1}, {way, x, -0.2}, {x, way, -0.2}};

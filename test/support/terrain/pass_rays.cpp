@@ -43,10 +43,9 @@ std::vector<Crossing> trace_by_passes(const RayTracer& tracer, std::span<const R
   traced.reserve(rays.size());
   for (const Ray& ray : rays) traced.push_back({ray.origin, ray.direction, ray.far_m});
   std::vector<Crossing> hits(rays.size());
-  std::vector<const LevelScene::Impl*> levels;
-  for (const LevelScene& scene : tracer.levels()) levels.push_back(&scene.impl());
-  const GroundExtent ground = extent_of(levels);
-  const GridFrame frame = levels.front()->level.frame;
+  const LevelScene::Impl& outermost = tracer.levels().back().impl();
+  const GridFrame frame = outermost.level.frame;
+  const GroundExtent ground(frame, outermost.first, outermost.last);
   std::uint32_t number = 0;
   for (const LevelScene& scene : tracer.levels()) {
     CopiedLevel level(scene);

@@ -12,6 +12,7 @@
 
 #include "core/error.h"
 #include "core/io/file_io.h"
+#include "test/support/file_size_limit.h"
 #include "test/support/temporary_folder.h"
 
 namespace groundray::journal_test {
@@ -108,9 +109,11 @@ TEST(Journal, RejectsUnusableFiles) {
               ThrowsMessage<Error>(HasSubstr("cannot be written")));
   EXPECT_THAT([&] { read_journal(folder / "none", [](const std::string&) {}); },
               ThrowsMessage<Error>(HasSubstr("cannot be read")));
-  if (!std::filesystem::exists("/dev/full")) return;
-  EXPECT_THAT([&] { Journal("/dev/full").add("entry"); },
-              ThrowsMessage<Error>(HasSubstr("No space left")));
+  EXPECT_THAT([&] { Journal journal("/dev/full"); },
+              ThrowsMessage<Error>(HasSubstr("/dev/full: cannot be written")));
+  Journal journal(folder / "journal");
+  const testing::FileSizeLimit limit(4);
+  EXPECT_THAT([&] { journal.add("entry"); }, ThrowsMessage<Error>(HasSubstr("cannot be written")));
 }
 
 }  // namespace

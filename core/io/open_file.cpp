@@ -1,0 +1,64 @@
+#include "core/io/open_file.h"
+
+#include <fcntl.h>
+#include <fmt/format.h>
+#include <sys/stat.h>
+#include <unistd.h>
+
+#include <cerrno>
+#include <system_error>
+
+#include "core/error.h"
+
+namespace groundray {
+namespace {
+
+// Opens a regular file, or returns nothing and sets errno: EISDIR for a folder, ESPIPE for a pipe,
+// socket or device.
+OwnedFile try_to_open(const std::filesystem::path& path) {
+  // A pipe is opened without waiting for a writer.
+  const int descriptor = open(path.c_str(), O_RDONLY | O_NONBLOCK | O_NOCTTY | O_CLOEXEC);
+  if (descriptor < 0) return {};
+  struct stat status {};
+  if (fstat(descriptor, &status) == 0 && S_ISREG(status.st_mode))
+    return OwnedFile(fdopen(descriptor, "rb"));
+  close(descriptor);
+  errno = S_ISDIR(status.st_mode) ? EISDIR : ESPIPE;
+  return {};
+}
+
+}  // namespace
+
+int create_file(const std::filesystem::path& path) {
+  struct stat before {};
+  const bool exists = lstat(path.c_str(), &before) == 0;
+  if (exists && !S_ISREG(before.st_mode) && !S_ISLNK(before.st_mode))
+    throw std::system_error(EEXIST, std::generic_category());
+  if (exists && unlink(path.c_str()) != 0) throw std::system_error(errno, std::generic_category());
+  const int descriptor =
+      open(path.c_str(), O_RDWR | O_CREAT | O_EXCL | O_NOFOLLOW | O_CLOEXEC, 0666);
+  if (descriptor < 0) throw std::system_error(errno, std::generic_category());
+  return descriptor;
+}
+
+OwnedFile open_file(const std::filesystem::path& path) {
+  OwnedFile file = try_to_open(path);
+  if (file) return file;
+  const int fault = errno;
+  throw Error("{}: cannot be read: {}; check its name and permissions", path.string(),
+              fault == ESPIPE ? "it is a pipe or device, not a file"
+                              : std::generic_category().message(fault));
+}
+
+std::ifstream open_stream(const std::filesystem::path& path) {
+  std::ifstream stream;
+  const OwnedFile file = try_to_open(path);
+  const int fault = errno;
+  // By its descriptor, so that the file is the one that was checked.
+  if (file) stream.open(fmt::format("/proc/self/fd/{}", fileno(file.get())), std::ios::binary);
+  if (!file) stream.setstate(std::ios::failbit);
+  errno = file ? 0 : fault;
+  return stream;
+}
+
+}  // namespace groundray

@@ -1,0 +1,33 @@
+#pragma once
+
+#include <cstdio>
+#include <filesystem>
+#include <fstream>
+#include <memory>
+
+namespace groundray {
+
+/// Deleter that closes a file of the C library.
+struct CloseFile {
+  void operator()(std::FILE* file) const noexcept { std::fclose(file); }
+};
+
+/// File of the C library, closed by its owner's destructor.
+using OwnedFile = std::unique_ptr<std::FILE, CloseFile>;
+
+/// Creates an empty file for reading and writing. A file or link of its name is removed before;
+/// links are not followed, so that no other file changes.
+/// @return its descriptor, which the caller closes.
+/// @throws std::system_error if it cannot be created: EEXIST in place of a folder, pipe or device.
+int create_file(const std::filesystem::path& path);
+
+/// Opens a regular file for reading: not a folder, pipe, socket or device, which may not end or
+/// never begin.
+/// @throws Error naming the file and the fault.
+OwnedFile open_file(const std::filesystem::path& path);
+
+/// Opens a regular file as a binary stream. For anything else, the stream has failed, and errno
+/// says why.
+std::ifstream open_stream(const std::filesystem::path& path);
+
+}  // namespace groundray
