@@ -58,10 +58,10 @@ PathSums::Place PathSums::place(std::uint32_t i, std::uint32_t count) noexcept {
   return {net, index, net * most_parts + index * parts_of(count) / size};
 }
 
-PathSums::Sum PathSums::of_net(int net) const noexcept {
+PathSums::Sum PathSums::of_net(std::uint32_t net) const noexcept {
   Sum sum;
-  for (int part = 0; part < most_parts; ++part) {
-    const Sum& each = sums_[static_cast<std::size_t>(net * most_parts + part)];
+  for (std::uint32_t part = 0; part < most_parts; ++part) {
+    const Sum& each = sums_[net * most_parts + part];
     sum.radiance += each.radiance;
     sum.count += each.count;
   }
@@ -86,12 +86,12 @@ glm::dvec3 PathSums::between_nets() const noexcept {
 glm::dvec3 PathSums::within_nets() const noexcept {
   glm::dvec3 squares(0);
   double count = 0;
-  for (int net = 0; net < nets; ++net) {
+  for (std::uint32_t net = 0; net < nets; ++net) {
     const Sum all = of_net(net);
     double parts = 0;
     glm::dvec3 of_parts(0);
-    for (int part = 0; part < most_parts; ++part) {
-      const Sum& each = sums_[static_cast<std::size_t>(net * most_parts + part)];
+    for (std::uint32_t part = 0; part < most_parts; ++part) {
+      const Sum& each = sums_[net * most_parts + part];
       if (each.count == 0) continue;
       of_parts += each.square_off(all.mean());
       parts += 1;

@@ -1,6 +1,7 @@
 #pragma once
 
 #include <array>
+#include <cstddef>
 #include <cstdint>
 #include <glm/vec3.hpp>
 
@@ -12,7 +13,7 @@ namespace groundray {
 /// split into up to four consecutive parts, which are nets too.
 class PathSums {
  public:
-  static constexpr int nets = 2, most_parts = 4;
+  static constexpr std::uint32_t nets = 2, most_parts = 4;
 
   /// Position of a path among those of its pixel.
   struct Place {
@@ -47,10 +48,10 @@ class PathSums {
       return off * off;
     }
   };
-  Sum of_net(int net) const noexcept;
+  Sum of_net(std::uint32_t net) const noexcept;
   Sum total() const noexcept;
 
-  std::array<Sum, nets * most_parts> sums_;
+  std::array<Sum, std::size_t{nets} * most_parts> sums_;
 };
 
 /// Spreads of the paths of each pixel.

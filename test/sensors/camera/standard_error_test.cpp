@@ -47,7 +47,7 @@ Model crown(std::uint32_t leaves, double radius_m, double size_m) {
     const std::uint32_t first = 3 * leaf;
     for (std::uint32_t corner = 1; corner <= 3; ++corner)
       model.mesh.vertices_m.emplace_back(centre_m + size_m * vector(leaf, corner));
-    model.mesh.triangles.push_back({first, first + 1, first + 2});
+    model.mesh.triangles.emplace_back(first, first + 1, first + 2);
     model.surface_of.push_back(0);
   }
   model.surfaces.resize(1);
@@ -95,7 +95,7 @@ Scatter scatter_of(const Sight& sight, const SamplingSpec& sampling, std::uint32
   const Camera camera(
       {.lens = Pinhole{centred(25.6, size_px)}, .size_px = size_px, .sampling = sampling});
   std::vector<Exposure> all;
-  std::vector<double> mean(size_px.x * size_px.y * 3);
+  std::vector<double> mean(std::size_t{3} * size_px.x * size_px.y);
   for (std::uint32_t frame = 0; frame < images; ++frame) {
     all.push_back(camera.expose(light, gliding(sight.X_DC, {}), 0ns, {.frame = frame}));
     const auto values = all.back().radiance.values();
