@@ -355,12 +355,11 @@ void RayTracer::bound_errors(std::span<const Ray> rays, std::span<const Hit> hit
     if (!band.is_certain) {
       bounds_m[i] = infinity;
     } else if (hits[i].object != 0) {
-      bounds_m[i] = band.near_m < range_m ? range_m - band.near_m + rounding_m : 0;
+      bounds_m[i] = std::max(range_m - band.near_m, 0.0) + rounding_m;
     } else if (!hits[i]) {
       bounds_m[i] = band.near_m < infinity ? infinity : 0;
     } else {
-      const double error_m = std::max(range_m - band.near_m, band.far_m - range_m);
-      bounds_m[i] = band.is_exact && error_m <= rounding_m ? 0 : error_m + rounding_m;
+      bounds_m[i] = std::max(range_m - band.near_m, band.far_m - range_m) + rounding_m;
     }
   }
 }
