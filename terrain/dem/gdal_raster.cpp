@@ -15,6 +15,8 @@
 #include <mutex>
 #include <string_view>
 
+#include "terrain/dem/raster_input.h"
+
 namespace groundray {
 namespace {
 
@@ -125,7 +127,7 @@ void start_gdal() {
   // GDAL's registration is not thread-safe.
   static std::once_flag once;
   std::call_once(once, [] {
-    GDALAllRegister();
+    register_drivers();
     // The handlers that GDAL up to 3.6 sets. Later versions keep libtiff's own, which only print,
     // so that an error on closing a file, such as a full disk, would go unnoticed.
     TIFFSetErrorHandler(tell_gdal<CE_Failure>);
@@ -143,18 +145,7 @@ glm::dvec2 RasterHeader::centre() const {
 
 GDALDatasetUniquePtr open_raster(const std::filesystem::path& path) {
   start_gdal();
-  GDALDatasetUniquePtr dataset(
-      GDALDataset::Open(path.c_str(), GDAL_OF_RASTER | GDAL_OF_VERBOSE_ERROR));
-  if (dataset == nullptr) {
-    std::string why = CPLGetLastErrorMsg();
-    if (why.ends_with('.')) why.pop_back();
-    for (const char* missing : {"No such file", "does not exist"}) {
-      if (why.find(missing) != std::string::npos) throw Error("there is no such file");
-    }
-    throw Error(
-        "it cannot be opened as a raster: {}; is it complete, and in a format that GDAL reads?",
-        why);
-  }
+  GDALDatasetUniquePtr dataset = open_input(path);
   if (dataset->GetRasterCount() == 0) {
     const char* name = CSLFetchNameValue(dataset->GetMetadata("SUBDATASETS"), "SUBDATASET_1_NAME");
     if (name == nullptr) throw Error("it contains no raster");
