@@ -39,6 +39,7 @@ glm::dvec3 origin_for(const Pair& south_west_w_m) {
 
 Dem dem_of(const GivenRaster& heights_m, double cell_m, const Pair& south_west_w_m,
            const std::string& crs_wkt) {
+  heights_m.check("Terrain: heights_m");
   constexpr std::size_t most = std::numeric_limits<int>::max();
   Violations broken("Terrain");
   broken.unless(heights_m.rows() <= most && heights_m.columns() <= most,
@@ -87,6 +88,7 @@ Points cast_on_terrain(const TerrainModel& terrain, const GivenPoints& origins_m
 }
 
 AnyArray dem_heights(const TerrainModel& terrain, const GivenPlaces& places_m) {
+  places_m.check("heights_at: places_m");
   return array_of(without_gil([&](const StopRequest&) {
     const HeightGrid& grid = terrain.dem().grid;
     std::vector<double> heights_m(places_m.rows());

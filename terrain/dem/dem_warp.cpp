@@ -232,9 +232,9 @@ std::unique_ptr<WarpedHeights> reprojected(const HeightReader& raster, const Ras
   OGRSpatialReference crs;
   if (crs.SetFromUserInput(target.c_str()) != OGRERR_NONE) {
     throw Error(
-        "reproject_to = '{}' is not a CRS known to GDAL ({}); use utm, a code such as "
-        "EPSG:32631, or a PROJ string",
-        reproject_to, CPLGetLastErrorMsg());
+        "reproject_to = '{}' is not a CRS known to GDAL; use utm, a code such as EPSG:32631, or a "
+        "PROJ string",
+        reproject_to);
   }
   if (const std::string why = why_not_metric(crs); !why.empty()) {
     throw Error(

@@ -14,6 +14,9 @@
 #include <memory>
 #include <mutex>
 #include <string_view>
+#include <system_error>
+
+#include "core/near_names.h"
 
 namespace groundray {
 namespace {
@@ -147,9 +150,11 @@ GDALDatasetUniquePtr open_raster(const std::filesystem::path& path) {
       GDALDataset::Open(path.c_str(), GDAL_OF_RASTER | GDAL_OF_VERBOSE_ERROR));
   if (dataset == nullptr) {
     std::string why = CPLGetLastErrorMsg();
+    std::error_code ignored;
+    if (std::filesystem::is_directory(path, ignored)) throw Error(why_no_file(path));
     if (why.ends_with('.')) why.pop_back();
     for (const char* missing : {"No such file", "does not exist"}) {
-      if (why.find(missing) != std::string::npos) throw Error("there is no such file");
+      if (why.find(missing) != std::string::npos) throw Error(why_no_file(path));
     }
     throw Error(
         "it cannot be opened as a raster: {}; is it complete, and in a format that GDAL reads?",
