@@ -77,8 +77,9 @@ DatasetText::DatasetText(const fs::path& folder)
   if (!file_) {
     const int why = errno;
     std::error_code ignored;
-    if (!fs::exists(folder, ignored)) throw Error("{}: {}", folder.string(), why_no_file(folder));
-    if (!fs::is_directory(folder, ignored))
+    if (fs::status(folder, ignored).type() == fs::file_type::not_found)
+      throw Error("{}: {}", folder.string(), why_no_file(folder));
+    if (fs::is_regular_file(folder, ignored))
       throw Error(
           "{}: a file, but a dataset is a folder: give the folder that `groundray generate` "
           "wrote",

@@ -155,9 +155,9 @@ Trajectory lay_platform_path(const RecordedPath& path, const SceneSpec& spec,
   Trajectory X_DB = recorded_path(path, terrain, begin);
   if (X_DB.end_time() < run_time(spec)) {
     throw Error(
-        "{}: the trajectory lasts {:.3f} s but the scene's duration_s is {} s; record longer or "
-        "run shorter",
-        path.tum.string(), in_seconds(X_DB.end_time()), spec.duration_s);
+        "{}: key 'trajectory': {}: the trajectory lasts {:.3f} s but the scene's duration_s is {} "
+        "s; record longer or run shorter",
+        path.where, path.tum.string(), in_seconds(X_DB.end_time()), spec.duration_s);
   }
   return X_DB;
 }

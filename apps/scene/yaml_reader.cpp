@@ -32,7 +32,12 @@ class TreeBuilder : public YAML::EventHandler {
  public:
   explicit TreeBuilder(const std::filesystem::path& path) : path_(path) {}
 
-  Node take_root() { return std::move(root_); }
+  /// @throws Error if the last quote of `text` is not closed.
+  Node take_root(std::string_view text) {
+    if (is_open_quote(text, last_scalar_.line + 1, last_scalar_.column + 1))
+      refuse(last_scalar_, "this quote is not closed");
+    return std::move(root_);
+  }
 
   void OnDocumentStart(const YAML::Mark&) override {}
   void OnDocumentEnd() override {}
@@ -52,6 +57,7 @@ class TreeBuilder : public YAML::EventHandler {
                 const std::string& value) override {
     Node node = make(tag == "?" ? Node::Kind::Plain : Node::Kind::Quoted, mark);
     node.text = value;
+    last_scalar_ = mark;
     append(std::move(node));
   }
   void OnSequenceStart(const YAML::Mark& mark, const std::string&, YAML::anchor_t,
@@ -88,6 +94,7 @@ class TreeBuilder : public YAML::EventHandler {
 
   const std::filesystem::path& path_;
   Node root_;
+  YAML::Mark last_scalar_;
   std::vector<Node*> open_;
 };
 
@@ -157,11 +164,11 @@ Node parse(const std::string& text, const std::filesystem::path& path) {
     std::istringstream stream(text);
     YAML::Parser parser(stream);
     if (!parser.HandleNextDocument(tree)) throw Error("{}:1:1: the file is empty", path.string());
-    Node root = tree.take_root();
+    Node root = tree.take_root(text);
     TreeBuilder second(path);
     if (parser.HandleNextDocument(second)) {
       throw Error("{}:{}:1: a second document begins here: a file must contain one", path.string(),
-                  second.take_root().line);
+                  second.take_root(text).line);
     }
     return root;
   } catch (const YAML::Exception& fault) {

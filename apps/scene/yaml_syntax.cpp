@@ -147,11 +147,42 @@ SyntaxFault explain(std::string_view text, const SyntaxFault& reported) {
     return {reported.line, reported.column,
             "this does not continue the map or list around it: is it indented as the lines above, "
             "and is there no bracket or quote too many?"};
+  } else if (words == "illegal flow end") {
+    return {reported.line, reported.column,
+            "a closing bracket too many, or a quote that is missing"};
+  } else if (words == "unknown token") {
+    return {reported.line, reported.column, "a value that begins with @, % or ` must be in quotes"};
+  } else if (words.starts_with("unknown escape character")) {
+    return {reported.line, reported.column,
+            "'\\' begins an escape in double quotes: write '\\\\', or use single quotes"};
   } else if (words == "the referenced anchor is not defined") {
     return {reported.line, reported.column,
             "aliases (*name) are not allowed here: write the value out"};
   }
   return {reported.line, reported.column, fmt::format("not YAML: {}", words)};
+}
+
+bool is_open_quote(std::string_view text, int line, int column) {
+  TextLines lines(text);
+  for (int i = 1; i < line; ++i) lines.next();
+  text = lines.rest();
+  const auto begins_character = [](char c) {
+    return (static_cast<unsigned char>(c) & 0xc0) != 0x80;
+  };
+  std::size_t place = 0;
+  for (int left = column; place < text.size(); ++place)
+    if (begins_character(text[place]) && --left == 0) break;
+  if (place >= text.size() || (text[place] != '"' && text[place] != '\'')) return false;
+  const char quote = text[place];
+  for (std::size_t i = place + 1; i < text.size(); ++i) {
+    if (quote == '"' && text[i] == '\\') {
+      ++i;  // the next character is escaped
+    } else if (text[i] == quote) {
+      if (quote == '"' || i + 1 == text.size() || text[i + 1] != quote) return false;
+      ++i;  // two single quotes stand for one
+    }
+  }
+  return true;
 }
 
 void refuse_binary(std::string_view text, const std::filesystem::path& path) {

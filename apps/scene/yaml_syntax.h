@@ -17,6 +17,10 @@ struct SyntaxFault {
 /// Returns the likely mistake behind a fault that yaml-cpp reports, and its place.
 SyntaxFault explain(std::string_view text, const SyntaxFault& reported);
 
+/// Returns true if the quote at a place is not closed: yaml-cpp takes the rest of the text for its
+/// content. The column counts characters.
+bool is_open_quote(std::string_view text, int line, int column);
+
 /// Rejects files that are not text, such as rasters.
 /// @throws Error that names the file.
 void refuse_binary(std::string_view text, const std::filesystem::path& path);

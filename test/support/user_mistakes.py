@@ -1,4 +1,4 @@
-"""Mistakes that users make, as rows of tables, and the folder of sound files in which they are made."""
+"""Mistakes that users make, as rows of tables, and the folder in which they are made."""
 
 import os
 import shutil
@@ -105,7 +105,11 @@ def make_workshop(folder: Path) -> Path:
         (folder / name).write_text(text)
     (folder / "mine").mkdir()
     (folder / "mine/notes.txt").write_text("keep")
-    for out, more in {"run": [], "half_1": ["--shard", "1/2"], "half_2": ["--shard", "2/2"]}.items():
+    for out, more in {
+        "run": [],
+        "half_1": ["--shard", "1/2"],
+        "half_2": ["--shard", "2/2"],
+    }.items():
         made = run("groundray", "generate", "scene.yaml", "-o", out, *more, cwd=folder)
         assert made.returncode == 0, made.stderr
     return folder
@@ -163,7 +167,7 @@ INTERNALS = (
 
 
 def check_words(said: str, says: tuple[str, ...]) -> None:
-    """Checks that a message contains all words, is short, and shows nothing of the program's inside."""
+    """Checks that a message contains all words, is short, and shows no internals."""
     for word in says:
         assert word in said, f"{word!r} is missing in:\n{said}"
     for word in INTERNALS:

@@ -95,10 +95,11 @@ struct type_caster<groundray::python::NumpyArgument<Array>> {
       if ((is_whole && !holds_whole(made)) || !take(made, flags, cleanup))
         value = Argument(misfit(form_of(made)));
     } catch (python_error& error) {
-      if (error.matches(PyExc_TypeError) || error.matches(PyExc_ValueError))
-        value = Argument(misfit(str(source.type().attr("__name__")).c_str()));
-      else
-        value = Argument(std::current_exception());
+      value = error.matches(PyExc_TypeError) || error.matches(PyExc_ValueError)
+                  ? Argument(misfit(fmt::format("a {}", Py_TYPE(source.ptr())->tp_name)))
+                  : Argument(std::current_exception());
+    } catch (...) {
+      value = Argument(std::current_exception());
     }
     return true;
   }
@@ -120,8 +121,10 @@ struct type_caster<groundray::python::NumpyArgument<Array>> {
   }
 
   static std::string form_of(const object& array) {
-    return fmt::format("shape {} and type {}", str(array.attr("shape")).c_str(),
-                       str(array.attr("dtype")).c_str());
+    // Of objects: an accessor would be taken for a string, not converted to one.
+    const object shape = array.attr("shape"), type = array.attr("dtype");
+    return fmt::format("shape {} and type {}", str(handle(shape)).c_str(),
+                       str(handle(type)).c_str());
   }
 
   static std::string misfit(std::string_view given) {
