@@ -22,6 +22,7 @@
 #include "apps/python/cast.h"
 #include "apps/python/terrain_model.h"
 #include "core/error.h"
+#include "core/io/file_io.h"
 #include "terrain/dem/dem_io.h"
 #include "terrain/dem/layers_io.h"
 #include "terrain/terrain_mesh.h"
@@ -70,6 +71,7 @@ SharedTerrain open_terrain(const std::filesystem::path& path, std::optional<doub
 }
 
 void save(const TerrainModel& terrain, const std::filesystem::path& path) {
+  check_ending(path, {".tif", ".tiff"});
   without_gil([&](const StopRequest&) {
     const Dem& dem = terrain.dem();
     const RasterLayer layer{"elevation", "m", dem.grid.heights_m()};

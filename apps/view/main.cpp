@@ -115,8 +115,7 @@ void compare_inputs(std::vector<Opened>& inputs, const Arguments& arguments) {
 int take_stills(const Arguments& arguments) {
   if (arguments.inputs.empty())
     throw Error("--screenshot: there is nothing to show; give a file or a folder");
-  if (arguments.turntable == 0 && file_ending(arguments.screenshot) != ".png")
-    throw Error("--screenshot {}: its name must end in .png", arguments.screenshot.string());
+  if (arguments.turntable == 0) check_ending(arguments.screenshot, {".png"});
   const StillSpec& spec = arguments.still;
   std::vector<Opened> inputs;
   for (const std::filesystem::path& input : arguments.inputs) {

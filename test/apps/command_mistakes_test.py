@@ -1,30 +1,19 @@
 """Mistakes in commands and their inputs: datasets, DEMs, meshes, scans and options."""
 
-import hashlib
-import re
+import shutil
 
 import pytest
-from user_mistakes import GENERATE, Mistake, check, make_workshop, run
+from dataset_runs import as_cut_off
+from user_mistakes import GENERATE, Mistake, check, make_workshop, run, truncate
 
 SCAN = "run/lidar/top/000000.ply"
 
 
-def truncate(file, size):
-    return lambda folder: (folder / file).write_bytes((folder / file).read_bytes()[:size])
-
-
-def unfinish(folder):
-    """Makes the dataset that of a run killed before its first frame was complete."""
-    record = folder / "run/dataset.yaml"
-    head, rest = record.read_text().split("frames:\n")
-    entries = [line[4:] for line in rest.split("files:\n")[0].splitlines()]
-    pending = [re.sub(r"state: done.*", "state: pending}", entry) for entry in entries]
-    text = head + "frames:\n" + "".join(f"  - {entry}\n" for entry in pending)
-    digits = hashlib.sha256(text.encode()).hexdigest()
-    record.write_text(f'{text}sha256_above: "{digits}"\n')
-    (folder / "run/dataset.journal").write_text("")
-    for frame in folder.glob("run/*/*/0*"):
-        frame.unlink()
+def unfinish(folder, run="run"):
+    """Makes a dataset that of a run killed before its first frame was complete."""
+    whole = (folder / run).rename(folder / "whole")
+    as_cut_off(whole, folder / run, 0)
+    shutil.rmtree(whole)
 
 
 def make_other_shard(folder):
@@ -233,7 +222,7 @@ OUTPUTS = [
     Mistake(
         "a screenshot in another format",
         "groundray-view ramp.obj --screenshot out.jpg",
-        ("--screenshot out.jpg: its name must end in .png",),
+        ("out.jpg: its name must end in .png",),
     ),
     Mistake(
         "a screenshot without pixels",
@@ -341,12 +330,7 @@ INPUTS = [
         "an unfinished shard",
         "groundray merge half_1 half_2 -o out",
         ("half_2: shard 2/2 is not complete; continue it with `groundray generate --resume`",),
-        prepare=lambda folder: (
-            (folder / "run").rename(folder / "whole"),
-            (folder / "half_2").rename(folder / "run"),
-            unfinish(folder),
-            (folder / "run").rename(folder / "half_2"),
-        ),
+        prepare=lambda folder: unfinish(folder, "half_2"),
     ),
     Mistake(
         "certifying a misspelled DEM",

@@ -5,7 +5,7 @@ import shutil
 import subprocess
 
 import pytest
-from user_mistakes import GENERATE, Mistake, check, in_file, in_scene, make_workshop
+from user_mistakes import GENERATE, Mistake, check, in_file, in_scene, make_workshop, truncate
 
 DRIVE = """\
   drive:
@@ -52,10 +52,6 @@ def rotate(folder):
     subprocess.run(command, check=True, timeout=60)
     turned = "<GeoTransform>429402, 1, 0.3, 5150705, 0.3, -1</GeoTransform>"
     made.write_text(re.sub("<GeoTransform>.*</GeoTransform>", turned, made.read_text()))
-
-
-def truncate(file, size):
-    return lambda folder: (folder / file).write_bytes((folder / file).read_bytes()[:size])
 
 
 def copy(source, name):
@@ -377,6 +373,18 @@ VALUES = [
         "  []\nunused:",
         "scene.yaml:",
         "'lidars': is an empty list, but a scene needs at least one lidar or camera",
+    ),
+    in_scene(
+        "a platform below ground",
+        "height_m: 0.5",
+        "height_m: -0.5",
+        "scene.yaml:12:15: key 'height_m': is -0.5, but must be >= 0",
+    ),
+    in_scene(
+        "a negative range",
+        "file: head.yaml, ",
+        "file: head.yaml, range_gate_m: [-1, 50], ",
+        "scene.yaml:16:49: key 'range_gate_m': is -1, but must be >= 0",
     ),
     in_scene(
         "a name that is taken",

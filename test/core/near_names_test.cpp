@@ -10,11 +10,11 @@
 
 #include "test/support/temporary_folder.h"
 
-namespace groundray {
+namespace groundray::near_names_test {
 namespace {
 
-using testing::ElementsAre;
-using testing::IsEmpty;
+using ::testing::ElementsAre;
+using ::testing::IsEmpty;
 
 const std::vector<std::string> keys{"duration_s", "dem",       "yaw_deg", "pitch_deg",
                                     "rate_hz",    "speed_m_s", "seed",    "velodyne_vlp16"};
@@ -49,12 +49,12 @@ TEST(NearNames, PartsOfNamesAreFoundIfNothingIsNearer) {
   EXPECT_THAT(near_names("pe", keys), IsEmpty());  // two letters say little
 }
 
-class WhyNoFile : public testing::Test {
+class WhyNoFile : public ::testing::Test {
  protected:
   void add(const std::string& name) { std::ofstream(folder_ / name) << ""; }
   std::string why(const std::string& name) { return why_no_file(folder_ / name); }
 
-  TemporaryFolder folder_;
+  testing::TemporaryFolder folder_;
 };
 
 TEST_F(WhyNoFile, NamesSimilarFiles) {
@@ -84,4 +84,4 @@ TEST_F(WhyNoFile, LeavesOutNamesThatControlTheTerminal) {
 }
 
 }  // namespace
-}  // namespace groundray
+}  // namespace groundray::near_names_test

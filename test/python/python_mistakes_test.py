@@ -118,12 +118,6 @@ MISTAKES = [
         ["2"],
     ),
     (
-        "a terrain of holes",
-        "groundray.Terrain(FLAT * np.nan)",
-        groundray.Error,
-        ["height"],
-    ),
-    (
         "a CRS that is none",
         "groundray.Terrain(FLAT, 1, crs_wkt='UTM 15')",
         groundray.Error,
@@ -257,9 +251,9 @@ MISTAKES = [
     ),
     (
         "a mistake in a scene of dicts",
-        "groundray.scene({**spec, 'sed': 8}, folder='.', terrain=terrain)",
+        "groundray.scene({**spec, 'frobnicate': 8}, folder='.', terrain=terrain)",
         groundray.Error,
-        ["key 'sed': unknown; did you mean"],
+        ["scene:65:1: key 'frobnicate': unknown; the keys here are cameras, duration_s"],
     ),
     (
         "a mesh in an unknown format",
@@ -272,6 +266,12 @@ MISTAKES = [
         "terrain.save('terrain.png')",
         groundray.Error,
         ["terrain.png", ".tif"],
+    ),
+    (
+        "a scan in another format",
+        "scene.lidar('roof').scan(frame=0).save('scan.xyz')",
+        groundray.Error,
+        ["scan.xyz: its name must end in .ply"],
     ),
     (
         "no stop criterion",

@@ -141,6 +141,15 @@ def in_file(name: str, file: str, content: str | bytes, command: str, *says: str
     return Mistake(name, command, says, files={file: content})
 
 
+def truncate(file: str, size: int) -> Callable[[Path], None]:
+    """Returns a change that cuts a file short."""
+
+    def change(folder: Path) -> None:
+        (folder / file).write_bytes((folder / file).read_bytes()[:size])
+
+    return change
+
+
 def state_of(folder: Path) -> dict[str, tuple[int, bytes]]:
     return {
         path.relative_to(folder).as_posix(): (

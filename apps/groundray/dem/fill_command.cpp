@@ -15,6 +15,7 @@
 #include "apps/scan/word_option.h"
 #include "apps/scene/interruption.h"
 #include "core/error.h"
+#include "core/io/file_io.h"
 #include "reconstruction/dem/fill/dem_fill.h"
 #include "terrain/dem/dem_io.h"
 #include "terrain/dem/layers_io.h"

@@ -170,5 +170,13 @@ TEST(ReadText, ReportsWhyAFileCannotBeRead) {
               HasSubstr("it is a folder, but must be a file"));
 }
 
+TEST(CheckEnding, ComparesWithoutCaseAndNamesTheFirstEnding) {
+  EXPECT_NO_THROW(check_ending("x.TIF", {".tif", ".tiff"}));
+  EXPECT_EQ(message_of([] {
+              check_ending("x.png", {".tif", ".tiff"});
+            }),
+            "x.png: its name must end in .tif");
+}
+
 }  // namespace
 }  // namespace groundray::file_io_test
