@@ -74,7 +74,7 @@ LIBRARIES = {
     r"assimp/": r"core/model/assimp_import\.cpp",
     r"embree": r"core/tracing/embree_adapter\.h",
     r"((gdal|ogr|cpl)_|tiffio\.h)": r"terrain/dem/(gdal_raster\.h|(band_file|dem_file|dem_io"
-    r"|dem_warp|drape_io|gdal_raster|layers_io|tiled_tiff)\.cpp)",
+    r"|dem_warp|drape_io|gdal_raster|layers_io|raster_input|tiled_tiff|vrt_check)\.cpp)",
     r"opencv2/": r"(sensors/camera/picture|reconstruction/dem/fill/inpaint_fill"
     r"|reconstruction/stereo/semi_global)\.cpp",
     r"(CGAL|Eigen)/": r"reconstruction/(.*\.cpp|mesh/surface_cgal\.h)",

@@ -55,7 +55,7 @@ struct TerrainOptions {
 
   void add_dem(CLI::App* command) {
     command
-        ->add_option("DEM", dem, "Any raster of heights that GDAL reads (GeoTIFF, VRT, HGT, ...)")
+        ->add_option("DEM", dem, "Raster of heights (GeoTIFF, VRT, HGT, ...)")
         ->required();
     command->add_option("--nodata", reading.nodata,
                         "Additional nodata value, besides the one that the file declares");

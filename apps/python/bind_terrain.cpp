@@ -202,7 +202,7 @@ flat areas.)")
       });
   module.def("load_terrain", &open_terrain, "path"_a, "nodata"_a = nb::none(),
              "reproject_to"_a = "",
-             R"(Loads a complete DEM: GeoTIFF, HGT, ESRI ASCII and any other format that GDAL reads.
+             R"(Loads a complete DEM: GeoTIFF, HGT, ESRI ASCII and others (docs/reference/trust.md).
 
   nodata        a stored value that means "no height", in addition to the file's own
   reproject_to  a projected CRS in metres to warp to, such as "EPSG:32631", or "utm"

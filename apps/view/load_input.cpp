@@ -52,7 +52,7 @@ InputKind kind_of_raster(const fs::path& path) {
     throw Error(
         "{}: it cannot be shown: it is not a scene (.yaml), a dataset's folder, a mesh (.ply, "
         ".obj, .stl, .gltf, .glb), a cloud (.ply, .pcd, .npy, .npz, .bin), a picture (.png, .jpg, "
-        ".exr, .hdr), or a DEM that GDAL reads ({})",
+        ".exr, .hdr), or a DEM ({})",
         path.string(), fault.what());
   }
 }

@@ -5,6 +5,7 @@
 #include <limits>
 
 #include "terrain/dem/gdal_raster.h"
+#include "terrain/dem/raster_input.h"
 
 namespace groundray {
 namespace {
@@ -73,6 +74,7 @@ RasterBands read_bands(const std::filesystem::path& path, std::size_t most_sampl
     const int all = dataset->GetRasterCount();
     const int count = most_bands > 0 ? std::min(all, most_bands) : all;
     check_size(bands.samples, count);
+    check_memory(path, samples, 4.0 * bands.samples.x * bands.samples.y * count + 9.0 * samples.x);
     for (int i = 1; i <= count; ++i)
       bands.bands.push_back(read_band(*dataset->GetRasterBand(i), samples, bands.step));
     return bands;

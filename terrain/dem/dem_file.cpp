@@ -19,6 +19,7 @@
 #include "terrain/dem/byte_hash.h"
 #include "terrain/dem/dem_warp.h"
 #include "terrain/dem/gdal_raster.h"
+#include "terrain/dem/raster_input.h"
 
 namespace groundray {
 
@@ -74,8 +75,7 @@ void add_files(GDALDataset& dataset, std::set<std::string>& names) {
     const std::string_view name = files[i];
     if (name.ends_with(".aux.xml") || name.ends_with(".ovr")) continue;
     if (!names.insert(files[i]).second || !name.ends_with(".vrt")) continue;
-    const GDALDatasetUniquePtr inner(GDALDataset::Open(files[i], GDAL_OF_RASTER));
-    if (inner) add_files(*inner, names);
+    add_files(*open_input(files[i]), names);
   }
 }
 
@@ -158,6 +158,7 @@ Dem DemFile::load() const {
                 samples.x, samples.y, max_samples,
                 command(path, "gdal_translate -srcwin 0 0 32768 32768", "_part.tif"));
   }
+  about(path, [&] { check_memory(path, samples, 4.0 * samples.x * samples.y); });
   std::vector<float> heights_m = read({0, 0}, samples);
   if (std::ranges::all_of(heights_m, [](float z) { return std::isnan(z); })) {
     throw Error(

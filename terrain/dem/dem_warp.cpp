@@ -13,6 +13,8 @@
 #include <limits>
 #include <utility>
 
+#include "terrain/dem/raster_input.h"
+
 namespace groundray {
 
 std::string why_not_metric(const OGRSpatialReference& crs) {
@@ -230,7 +232,8 @@ std::unique_ptr<WarpedHeights> reprojected(const HeightReader& raster, const Ras
   }
   const std::string target = reproject_to == "utm" ? fitting_crs(header) : reproject_to;
   OGRSpatialReference crs;
-  if (crs.SetFromUserInput(target.c_str()) != OGRERR_NONE) {
+  const char* const no_network[] = {"ALLOW_NETWORK_ACCESS=NO", nullptr};
+  if (crs.SetFromUserInput(target.c_str(), no_network) != OGRERR_NONE) {
     throw Error(
         "reproject_to = '{}' is not a CRS known to GDAL; use utm, a code such as EPSG:32631, or a "
         "PROJ string",
@@ -301,6 +304,7 @@ PlacedRaster load_placed_raster(const std::filesystem::path& path, std::optional
   if (warped) header = warped->header();
   const glm::ivec2 size = header.samples;
   check_pixels(path, source, size, most_pixels);
+  check_memory(path, size, 4.0 * size.x * size.y);
   const auto& gt = header.geotransform;
   PlacedRaster raster{size, {gt[0], gt[3]}, {gt[1], gt[5]}, warped != nullptr, {}};
   raster.values.resize(static_cast<std::size_t>(size.x) * static_cast<std::size_t>(size.y));

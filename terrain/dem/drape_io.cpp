@@ -16,6 +16,7 @@
 
 #include "core/image/image_io.h"
 #include "terrain/dem/dem_warp.h"
+#include "terrain/dem/raster_input.h"
 
 namespace groundray {
 namespace {
@@ -346,6 +347,7 @@ Drape load_orthophoto(const std::filesystem::path& path, const OrthophotoOptions
     const auto world = crs_to_reach(header.crs, options.crs_wkt);
     if (!world) check_metric(header, *dataset);
     check_pixels(path, header.samples, header.samples, most_image_pixels);
+    check_memory(path, header.samples, 4.0 * header.samples.x * header.samples.y);
     Image8 photo = read_photo(*dataset);
     const bool is_elsewhere = world && header.crs.IsSame(&*world) == 0;
     if (is_elsewhere || header.is_rotated()) {

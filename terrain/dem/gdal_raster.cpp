@@ -14,9 +14,8 @@
 #include <memory>
 #include <mutex>
 #include <string_view>
-#include <system_error>
 
-#include "core/near_names.h"
+#include "terrain/dem/raster_input.h"
 
 namespace groundray {
 namespace {
@@ -128,7 +127,7 @@ void start_gdal() {
   // GDAL's registration is not thread-safe.
   static std::once_flag once;
   std::call_once(once, [] {
-    GDALAllRegister();
+    register_drivers();
     // The handlers that GDAL up to 3.6 sets. Later versions keep libtiff's own, which only print,
     // so that an error on closing a file, such as a full disk, would go unnoticed.
     TIFFSetErrorHandler(tell_gdal<CE_Failure>);
@@ -146,20 +145,7 @@ glm::dvec2 RasterHeader::centre() const {
 
 GDALDatasetUniquePtr open_raster(const std::filesystem::path& path) {
   start_gdal();
-  GDALDatasetUniquePtr dataset(
-      GDALDataset::Open(path.c_str(), GDAL_OF_RASTER | GDAL_OF_VERBOSE_ERROR));
-  if (dataset == nullptr) {
-    std::string why = CPLGetLastErrorMsg();
-    std::error_code ignored;
-    if (std::filesystem::is_directory(path, ignored)) throw Error(why_no_file(path));
-    if (why.ends_with('.')) why.pop_back();
-    for (const char* missing : {"No such file", "does not exist"}) {
-      if (why.find(missing) != std::string::npos) throw Error(why_no_file(path));
-    }
-    throw Error(
-        "it cannot be opened as a raster: {}; is it complete, and in a format that GDAL reads?",
-        why);
-  }
+  GDALDatasetUniquePtr dataset = open_input(path);
   if (dataset->GetRasterCount() == 0) {
     const char* name = CSLFetchNameValue(dataset->GetMetadata("SUBDATASETS"), "SUBDATASET_1_NAME");
     if (name == nullptr) throw Error("it contains no raster");

@@ -28,12 +28,13 @@ struct RasterHeader {
   glm::dvec2 centre() const;
 };
 
-/// Registers GDAL's drivers, once. Limits GDAL's block cache, by default a fraction of the
-/// machine's memory, to 64 MiB unless GDAL_CACHEMAX is set. Call it before any other use of GDAL.
+/// Registers the permitted drivers of GDAL, once. Limits GDAL's block cache, by default a fraction
+/// of the machine's memory, to 64 MiB unless GDAL_CACHEMAX is set. Call it before any other use of
+/// GDAL.
 void start_gdal();
 
-/// Opens a dataset of at least one band.
-/// @throws Error if there is none.
+/// Opens a dataset of at least one band, by the rules of docs/reference/trust.md.
+/// @throws Error if there is none, or a rule is broken.
 GDALDatasetUniquePtr open_raster(const std::filesystem::path& path);
 
 /// Returns the grid and CRS of a dataset.

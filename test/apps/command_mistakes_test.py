@@ -245,7 +245,7 @@ INPUTS = [
     Mistake(
         "info about a text",
         "groundray info notes.txt",
-        ("notes.txt: it cannot be opened as a raster", "in a format that GDAL reads?"),
+        ("notes.txt: it cannot be opened as a raster", "in none of the formats GTiff"),
     ),
     Mistake(
         "info about a folder",

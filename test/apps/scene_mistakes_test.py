@@ -676,14 +676,14 @@ FILES = [
         "a folder as the DEM",
         "hills.tif",
         "mine",
-        "scene.yaml:5:8: key 'dem': mine: it is a folder, but must be a file",
+        "scene.yaml:5:8: key 'dem': mine: it cannot be opened as a raster: it is a folder",
     ),
     in_scene(
         "a text as the DEM",
         "hills.tif",
         "notes.txt",
         "scene.yaml:5:8: key 'dem': notes.txt: it cannot be opened as a raster",
-        "in a format that GDAL reads?",
+        "in none of the formats GTiff",
     ),
     in_scene(
         "a picture as the DEM",

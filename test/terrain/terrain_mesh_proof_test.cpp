@@ -15,6 +15,7 @@
 #include "terrain/judge/mesh_deviation.h"
 #include "terrain/judge/mesh_topology.h"
 #include "terrain/terrain_mesh.h"
+#include "test/support/environment.h"
 #include "test/support/margin.h"
 #include "test/support/temporary_folder.h"
 #include "test/support/terrain/adversarial_terrain.h"
@@ -171,6 +172,7 @@ TEST(TerrainMeshProof, PublicDemsStayWithinTheBoundWithoutCracks) {
                          {.reproject_to = "utm"}});
     }
   }
+  const testing::Environment permission("GROUNDRAY_RASTER_DRIVERS", "netCDF");
   for (const auto& [path, options] : sources) {
     SCOPED_TRACE(path);
     const Dem dem = load_dem(dems / path, options);  // an absolute path remains unchanged

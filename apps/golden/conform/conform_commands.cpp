@@ -31,7 +31,7 @@ void publish(const Report& report, const fs::path& out) {
 }
 
 void PassesCommand::add_to(CLI::App* command) {
-  command->add_option("DEM", dem, "DEM of any format that GDAL reads")->required();
+  command->add_option("DEM", dem, "DEM (GeoTIFF, VRT, HGT, ...)")->required();
   command->add_option("-o,--output", out, "A new or empty folder")->required();
   command
       ->add_option("--tolerance-m", settings.tolerance_m, "Vertical deviation permitted everywhere")

@@ -83,7 +83,7 @@ struct FillCommandOptions {
 
   void add_files() {
     command
-        ->add_option("DEM", dem, "Any raster of heights that GDAL reads (GeoTIFF, VRT, HGT, ...)")
+        ->add_option("DEM", dem, "Raster of heights (GeoTIFF, VRT, HGT, ...)")
         ->required();
     command->add_option("-o,--output", out, "GeoTIFF to write: heights in metres, CRS as the DEM's")
         ->required();

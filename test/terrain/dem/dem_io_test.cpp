@@ -18,12 +18,14 @@
 #include <vector>
 
 #include "core/error.h"
+#include "test/support/environment.h"
 #include "test/support/temporary_folder.h"
 
 namespace groundray::dem_io_test {
 namespace {
 
 using ::testing::ElementsAre;
+using testing::Environment;
 using ::testing::HasSubstr;
 using ::testing::IsNan;
 using ::testing::Not;
@@ -262,9 +264,14 @@ TEST_F(DemIo, ReadsAVirtualMosaic) {
   EXPECT_EQ(p_W(dem, 0, 0), glm::dvec2(5, 15));
 }
 
-TEST_F(DemIo, ReadsNetCdf) {
+TEST_F(DemIo, ReadsNetCdfIfPermitted) {
   Picture{.values = {1, 2, missing, 4, 5, 6}, .nodata = missing}.save_as("netCDF",
                                                                          folder_ / "dem.nc");
+  EXPECT_THAT(error_of(folder_ / "dem.nc"), HasSubstr("it is in none of the formats GTiff, VRT, "));
+  EXPECT_THAT(error_of(folder_ / "dem.nc"),
+              HasSubstr(fmt::format("gdal_translate {0}.nc {0}_converted.tif",
+                                    (folder_ / "dem").string())));
+  const Environment permission("GROUNDRAY_RASTER_DRIVERS", "GRIB, netCDF");
   const Dem dem = load_dem(folder_ / "dem.nc");
   EXPECT_THAT(heights(dem), ElementsAre(1, 2, IsNan(), 4, 5, 6));
   EXPECT_EQ(p_W(dem, 0, 0), glm::dvec2(500001.25, 5149999.25));
@@ -479,10 +486,9 @@ TEST_F(DemIo, RejectsATruncatedFile) {
   picture.save_tiff(tiff_);
   picture.save_as("AAIGrid", folder_ / "dem.asc");
   picture.save_as("USGSDEM", folder_ / "usgs.dem");
-  picture.save_as("netCDF", folder_ / "dem.nc", {"FORMAT=NC4"});
   picture.type = GDT_UInt16;
   picture.save_as("PNG", folder_ / "dem.png");
-  for (const char* name : {"dem.tif", "dem.asc", "usgs.dem", "dem.nc", "dem.png"}) {
+  for (const char* name : {"dem.tif", "dem.asc", "usgs.dem", "dem.png"}) {
     ASSERT_NO_THROW(load_dem(folder_ / name)) << name;
     const auto size = std::filesystem::file_size(folder_ / name);
     for (const double part : {0.95, 0.6, 0.2}) {
@@ -624,6 +630,7 @@ TEST_F(SharedDem, EdgeCasesOfGazebo) {
   EXPECT_EQ(moon.origin_w_m, glm::dvec3(-53710, -51090, 0));
   expect_values(moon, folder / "dem_moon.tif", hole);
   expect_values(load_dem(folder / "dem_nodata.dem"), folder / "dem_nodata.dem", -32767);
+  const Environment permission("GROUNDRAY_RASTER_DRIVERS", "netCDF");
   const Dem holed = load_dem(folder / "dem_nodata_nan.nc");
   EXPECT_GT(holed.grid.hole_count(), 0u);
   expect_values(holed, folder / "dem_nodata_nan.nc", hole);

@@ -24,6 +24,7 @@
 #include "core/io/file_io.h"
 #include "core/random.h"
 #include "terrain/lod/deviation.h"
+#include "test/support/environment.h"
 #include "test/support/file_size_limit.h"
 #include "test/support/temporary_folder.h"
 #include "test/support/terrain/adversarial_terrain.h"
@@ -34,6 +35,7 @@ namespace groundray::certificate_test {
 namespace {
 
 using ::testing::AllOf;
+using testing::Environment;
 using testing::FileSizeLimit;
 using ::testing::HasSubstr;
 using testing::TemporaryFolder;
@@ -99,22 +101,6 @@ std::vector<std::filesystem::path> files_in(const std::filesystem::path& folder)
   std::ranges::sort(files);
   return files;
 }
-
-// Sets an environment variable and restores it in the destructor.
-class Environment {
- public:
-  Environment(const char* name, const std::filesystem::path& value) : name_(name) {
-    if (const char* before = std::getenv(name)) before_ = before;
-    setenv(name, value.c_str(), 1);
-  }
-  ~Environment() { before_ ? setenv(name_, before_->c_str(), 1) : unsetenv(name_); }
-  Environment(const Environment&) = delete;
-  Environment& operator=(const Environment&) = delete;
-
- private:
-  const char* name_;
-  std::optional<std::string> before_;
-};
 
 // Drops root privileges for the object's lifetime, so that read-only folders are effective even for
 // root.

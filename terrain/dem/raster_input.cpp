@@ -1,0 +1,207 @@
+#include "terrain/dem/raster_input.h"
+
+#include <cpl_conv.h>
+#include <cpl_string.h>
+#include <cpl_vsi.h>
+#include <cpl_vsi_virtual.h>
+#include <fmt/ranges.h>
+#include <sys/resource.h>
+#include <unistd.h>
+
+#include <algorithm>
+#include <array>
+#include <cstdlib>
+#include <exception>
+#include <limits>
+#include <memory>
+#include <regex>
+#include <string_view>
+#include <vector>
+
+#include "core/io/open_file.h"
+#include "core/near_names.h"
+
+namespace groundray {
+namespace {
+
+// Formats of DEMs and photos that refer to no other file, besides VRT, which check_vrt reads first.
+constexpr std::array input_drivers{"GTiff",   "VRT",     "HFA",  "AAIGrid", "DTED", "PNG",
+                                   "SRTMHGT", "USGSDEM", "EHdr", "ENVI",    "JPEG", "XYZ"};
+constexpr std::array local_systems{"/vsimem/", "/vsizip/", "/vsigzip/", "/vsitar/", "/vsisubfile/"};
+constexpr const char* more_drivers = "GROUNDRAY_RASTER_DRIVERS";
+constexpr std::size_t most_name_bytes = 4096;
+constexpr double most_block_bytes = 1 << 30;
+
+// Returns the permitted drivers: input_drivers and those that the environment adds.
+CPLStringList permitted_drivers() {
+  const char* more = std::getenv(more_drivers);
+  CPLStringList names(CSLTokenizeString2(more == nullptr ? "" : more, ", ", 0), TRUE);
+  for (const char* name : input_drivers) names.AddString(name);
+  return names;
+}
+
+bool is_local_system(std::string_view path) {
+  return std::ranges::any_of(local_systems,
+                             [&](const char* prefix) { return path.starts_with(prefix); });
+}
+
+void* refuse_file(void* /*user*/, const char* name, const char* /*access*/) {
+  CPLError(CE_Failure, CPLE_OpenFailed, "%s is not a local file", name);
+  return nullptr;
+}
+
+void close_file_systems() {
+  const std::unique_ptr<VSIFilesystemPluginCallbacksStruct,
+                        decltype(&VSIFreeFilesystemPluginCallbacksStruct)>
+      refusal(VSIAllocFilesystemPluginCallbacksStruct(), &VSIFreeFilesystemPluginCallbacksStruct);
+  refusal->open = refuse_file;
+  CPLStringList prefixes(VSIGetFileSystemsPrefixes(), TRUE);
+  prefixes.AddString("/vsicurl?");  // the list omits it
+  // GDAL forgets the handlers that it replaces. They may be in use, so they are kept until the end.
+  static auto& replaced = *new std::vector<VSIFilesystemHandler*>;
+  for (int i = 0; i < prefixes.size(); ++i) {
+    if (is_local_system(prefixes[i])) continue;
+    replaced.push_back(VSIFileManager::GetHandler(prefixes[i]));
+    VSIInstallPluginHandler(prefixes[i], refusal.get());
+  }
+}
+
+// The VRT driver's own functions, set once, by register_drivers.
+int (*is_vrt)(GDALOpenInfo*) = nullptr;
+GDALDataset* (*open_any_vrt)(GDALOpenInfo*) = nullptr;
+
+GDALDataset* open_checked_vrt(GDALOpenInfo* info) {
+  if (is_vrt(info) == 0) return nullptr;
+  try {
+    check_vrt(info->pszFilename);
+  } catch (const std::exception& error) {
+    CPLError(CE_Failure, CPLE_AppDefined, "%s", error.what());
+    return nullptr;
+  }
+  return open_any_vrt(info);
+}
+
+// Removes all drivers but those that are permitted or write groundray's files.
+void remove_drivers(GDALDriverManager& drivers) {
+  const CPLStringList permitted = permitted_drivers();
+  for (int i = drivers.GetDriverCount() - 1; i >= 0; --i) {
+    GDALDriver* const driver = drivers.GetDriver(i);
+    const std::string_view name = driver->GetDescription();
+    if (permitted.FindString(driver->GetDescription()) >= 0 || name == "MEM" || name == "COG") {
+      continue;
+    }
+    drivers.DeregisterDriver(driver);
+    delete driver;
+  }
+  drivers.GetDriverByName("MEM")->pfnOpen = nullptr;  // it opens names that are addresses
+  GDALDriver& vrt = *drivers.GetDriverByName("VRT");
+  is_vrt = vrt.pfnIdentify;
+  open_any_vrt = vrt.pfnOpen;
+  vrt.pfnOpen = open_checked_vrt;
+}
+
+void check_blocks(GDALDataset& dataset) {
+  GDALRasterBand& band = *dataset.GetRasterBand(1);
+  glm::ivec2 block;
+  band.GetBlockSize(&block.x, &block.y);
+  const double bytes = 1.0 * block.x * block.y * GDALGetDataTypeSizeBytes(band.GetRasterDataType());
+  if (bytes <= most_block_bytes) return;
+  throw Error(
+      "its blocks of {} x {} samples take {:.1f} GiB each, more than the limit of {:.0f} GiB; "
+      "store it in tiles:{}",
+      block.x, block.y, bytes / 0x1p30, most_block_bytes / 0x1p30,
+      command(dataset.GetDescription(), "gdal_translate -co TILED=YES", "_tiled.tif"));
+}
+
+// Returns the memory that the machine can still give, and the process may still take.
+double available_bytes() {
+  double bytes = std::numeric_limits<double>::infinity();
+  std::ifstream machine = open_stream("/proc/meminfo");
+  for (std::string word; machine >> word;) {
+    if (word == "MemAvailable:" && machine >> bytes) bytes *= 1024;
+  }
+  rlimit limit{};
+  double pages = 0;
+  if (getrlimit(RLIMIT_AS, &limit) == 0 && limit.rlim_cur != RLIM_INFINITY &&
+      open_stream("/proc/self/statm") >> pages) {
+    const double used = pages * static_cast<double>(sysconf(_SC_PAGESIZE));
+    bytes = std::min(bytes, std::max(0.0, static_cast<double>(limit.rlim_cur) - used));
+  }
+  return bytes;
+}
+
+}  // namespace
+
+void register_drivers() {
+  GDALDriverManager& drivers = *GetGDALDriverManager();
+  const bool is_first = drivers.GetDriverCount() == 0;
+  GDALAllRegister();
+  CPLSetConfigOption("GDAL_VRT_ENABLE_PYTHON", "NO");
+  if (!is_first) return;
+  remove_drivers(drivers);
+  close_file_systems();
+}
+
+std::string checked_file(const std::string& name) {
+  static const std::regex subdataset(
+      R"re(GTIFF_DIR:(?:off:)?\d+:(.+)|[A-Za-z0-9_]+:"([^"]+)".*)re");
+  static const std::regex system(R"re(/vsi[a-z][a-z0-9_]*(?=[/\\?]))re");
+  // Regular expressions recurse once for each character.
+  if (name.size() > most_name_bytes) {
+    throw Error("its name has {} characters, more than the limit of {}", name.size(),
+                most_name_bytes);
+  }
+  std::smatch parts;
+  std::string file = name;
+  if (std::regex_match(name, parts, subdataset)) file = parts[1].matched ? parts[1] : parts[2];
+  for (std::sregex_iterator at(file.begin(), file.end(), system), end; at != end; ++at) {
+    if (is_local_system(at->str() + "/")) continue;
+    throw Error("{} is not read: rasters must be local files; download it first", at->str());
+  }
+  VSIStatBufL state;
+  if (VSIStatExL(file.c_str(), &state, VSI_STAT_EXISTS_FLAG | VSI_STAT_NATURE_FLAG) != 0) {
+    throw Error(why_no_file(file));
+  }
+  if (!VSI_ISREG(state.st_mode)) {
+    throw Error("it cannot be opened as a raster: {}",
+                VSI_ISDIR(state.st_mode) ? why_no_file(file) : "it is not a regular file");
+  }
+  return file;
+}
+
+std::string checked_driver(const std::string& name) {
+  const CPLStringList drivers = permitted_drivers();
+  GDALDriverH driver = GDALIdentifyDriverEx(name.c_str(), GDAL_OF_RASTER, drivers.List(), nullptr);
+  if (driver != nullptr) return GDALGetDriverShortName(driver);
+  throw Error(
+      "it cannot be opened as a raster: it is in none of the formats {}; is it complete? Convert "
+      "other formats, or name their GDAL driver in {} if you trust the file:{}",
+      fmt::join(input_drivers, ", "), more_drivers,
+      command(name, "gdal_translate", "_converted.tif"));
+}
+
+GDALDatasetUniquePtr open_input(const std::string& name) {
+  checked_file(name);
+  if (checked_driver(name) == "VRT") check_vrt(name);
+  CPLErrorReset();
+  GDALDatasetUniquePtr dataset(GDALDataset::Open(
+      name.c_str(), GDAL_OF_RASTER | GDAL_OF_VERBOSE_ERROR, permitted_drivers().List()));
+  if (dataset == nullptr) {
+    std::string why = CPLGetLastErrorMsg();
+    if (why.ends_with('.')) why.pop_back();
+    throw Error("it cannot be opened as a raster: {}; is it complete?", why);
+  }
+  if (dataset->GetRasterCount() > 0) check_blocks(*dataset);
+  return dataset;
+}
+
+void check_memory(const std::filesystem::path& path, glm::ivec2 size, double bytes) {
+  const double available = available_bytes();
+  if (bytes <= available) return;
+  throw Error(
+      "its {} x {} samples take {:.1f} GiB of memory, but {:.1f} GiB are available; crop it:{}",
+      size.x, size.y, bytes / 0x1p30, available / 0x1p30,
+      command(path, "gdal_translate -srcwin 0 0 8192 8192", "_part.tif"));
+}
+
+}  // namespace groundray

@@ -1,0 +1,136 @@
+#include <cpl_minixml.h>
+#include <cpl_string.h>
+#include <cpl_vsi.h>
+
+#include <algorithm>
+#include <array>
+#include <cstdlib>
+#include <filesystem>
+#include <map>
+#include <memory>
+#include <string>
+#include <string_view>
+#include <vector>
+
+#include "terrain/dem/raster_input.h"
+
+namespace groundray {
+namespace {
+
+constexpr int most_levels = 4;
+constexpr double most_sources = 1 << 20;
+constexpr vsi_l_offset most_bytes = vsi_l_offset{64} << 20;
+
+// Bands that are mosaics or warps of files. Others are made by expressions, Python code, raw bytes
+// of any file or a decomposition of colours.
+constexpr std::array permitted_classes{"VRTRasterBand", "VRTSourcedRasterBand", "VRTWarpedDataset",
+                                       "VRTWarpedRasterBand"};
+
+using Xml = std::unique_ptr<CPLXMLNode, decltype(&CPLDestroyXMLNode)>;
+
+Xml parse(const std::string& path) {
+  VSIStatBufL state;
+  if (VSIStatL(path.c_str(), &state) != 0) throw Error("the VRT {} cannot be read", path);
+  if (static_cast<vsi_l_offset>(state.st_size) > most_bytes) {
+    throw Error("the VRT {} has {} bytes, more than the limit of {}", path, state.st_size,
+                most_bytes);
+  }
+  Xml xml(CPLParseXMLFile(path.c_str()), &CPLDestroyXMLNode);
+  if (xml == nullptr) throw Error("the VRT {} cannot be read: {}", path, CPLGetLastErrorMsg());
+  return xml;
+}
+
+// Returns the name of the source in a node of a VRT. GDAL resolves relative names by the folder of
+// the VRT, after following links.
+std::string source_name(const CPLXMLNode& node, const std::string& vrt) {
+  std::string name = CPLGetXMLValue(&node, nullptr, "");
+  if (std::strtol(CPLGetXMLValue(&node, "relativeToVRT", "0"), nullptr, 10) == 0) return name;
+  std::filesystem::path folder = std::filesystem::path(vrt).parent_path();
+  std::error_code is_in_archive;
+  const auto real = std::filesystem::canonical(vrt, is_in_archive);
+  if (!is_in_archive) folder = real.parent_path();
+  return folder / name;
+}
+
+// Calls `take` with each node of the tree.
+void for_each_node(const CPLXMLNode& root, const auto& take) {
+  std::vector<const CPLXMLNode*> open{&root};
+  while (!open.empty()) {
+    const CPLXMLNode* node = open.back();
+    open.pop_back();
+    take(*node);
+    if (node->psNext != nullptr) open.push_back(node->psNext);
+    if (node->psChild != nullptr) open.push_back(node->psChild);
+  }
+}
+
+void check_class(const CPLXMLNode& node, const std::string& vrt) {
+  const std::string_view value = CPLGetXMLValue(&node, nullptr, "");
+  if (std::ranges::find(permitted_classes, value) != permitted_classes.end()) return;
+  throw Error(
+      "the VRT {} has a {}; only mosaics and warps of files are read; if you trust it, convert "
+      "it:{}",
+      vrt, value, command(vrt, "gdal_translate", "_converted.tif"));
+}
+
+// VRTs inside each other, and files that they refer to, each as often as it is referred to.
+struct Extent {
+  int levels = 1;
+  double sources = 0;
+};
+
+class VrtCheck {
+ public:
+  Extent extent_of(const std::string& path, int level) {
+    refuse_depth(path, level);
+    const auto known = known_.find(path);
+    if (known != known_.end()) {
+      refuse_depth(path, level + known->second.levels - 1);
+      return known->second;
+    }
+    const Xml xml = parse(path);
+    Extent extent;
+    for_each_node(*xml, [&](const CPLXMLNode& node) {
+      if (node.eType != CXT_Element && node.eType != CXT_Attribute) return;
+      if (EQUAL(node.pszValue, "subClass")) check_class(node, path);
+      if (EQUAL(node.pszValue, "SourceFilename") || EQUAL(node.pszValue, "SourceDataset")) {
+        add(source_name(node, path), path, level, extent);
+      }
+    });
+    return known_[path] = extent;
+  }
+
+ private:
+  static void refuse_depth(const std::string& path, int level) {
+    if (level <= most_levels) return;
+    throw Error("the VRT {} lies {} levels deep in others, more than the limit of {}", path, level,
+                most_levels);
+  }
+
+  void add(const std::string& source, const std::string& vrt, int level, Extent& extent) {
+    std::string driver;
+    try {
+      checked_file(source);
+      driver = checked_driver(source);
+    } catch (const Error& error) {
+      throw Error("the VRT {} has the source {}: {}", vrt, source, error.what());
+    }
+    const Extent inner = driver == "VRT" ? extent_of(source, level + 1) : Extent{0, 1};
+    extent.levels = std::max(extent.levels, inner.levels + 1);
+    extent.sources += inner.sources;
+    if (extent.sources <= most_sources) return;
+    throw Error("the VRT {} has more than {} sources, with those of its sources", vrt,
+                most_sources);
+  }
+
+  std::map<std::string, Extent> known_;
+};
+
+}  // namespace
+
+void check_vrt(const std::string& path) {
+  checked_file(path);
+  VrtCheck().extent_of(path, 1);
+}
+
+}  // namespace groundray
