@@ -160,7 +160,7 @@ std::string checked_file(const std::string& name) {
   }
   VSIStatBufL state;
   if (VSIStatExL(file.c_str(), &state, VSI_STAT_EXISTS_FLAG | VSI_STAT_NATURE_FLAG) != 0) {
-    throw Error(why_no_file(file));
+    throw Error("{}", file.starts_with("/vsi") ? "there is no such file" : why_no_file(file));
   }
   if (!VSI_ISREG(state.st_mode)) {
     throw Error("it cannot be opened as a raster: {}",
