@@ -225,9 +225,9 @@ OUTPUTS = [
         ("out.jpg: its name must end in .png",),
     ),
     Mistake(
-        "a screenshot without pixels",
-        "groundray-view ramp.obj --screenshot out.png --size 640x0",
-        ("--size 640x0: it must be WIDTHxHEIGHT in pixels, such as 1280x720",),
+        "a screenshot with one size",
+        "groundray-view ramp.obj --screenshot out.png --size 1280",
+        ("--size 1280: it must be WIDTHxHEIGHT in pixels, such as 1280x720",),
     ),
     Mistake(
         "exporting into a folder of something else",
