@@ -61,14 +61,16 @@ std::vector<std::string> names_in(const fs::path& folder) {
   return names;
 }
 
-// Names a folder's files of one extension, if there are few.
-std::string files_like(const fs::path& path, std::vector<std::string> names) {
+// Lists the names of one extension, if they are few.
+std::string files_like(const fs::path& path, const std::vector<std::string>& names) {
   constexpr std::size_t most = 5;
-  std::erase_if(names, [&](const std::string& name) {
-    return !path.has_extension() || fs::path(name).extension() != path.extension();
-  });
-  if (names.empty() || names.size() > most) return "";
-  return fmt::format("; the {} files there: {}", path.extension().string(), fmt::join(names, ", "));
+  std::vector<std::string_view> alike;
+  for (const std::string& name : names) {
+    if (path.has_extension() && fs::path(name).extension() == path.extension())
+      alike.push_back(name);
+  }
+  if (alike.empty() || alike.size() > most) return "";
+  return fmt::format("; the {} files there: {}", path.extension().string(), fmt::join(alike, ", "));
 }
 
 }  // namespace
@@ -112,10 +114,9 @@ std::string why_no_file(const fs::path& path) {
   const fs::path folder = path.has_parent_path() ? path.parent_path() : ".";
   if (!fs::is_directory(folder, ignored))
     return fmt::format("there is no such file or folder, nor the folder {}", folder.string());
-  std::vector<std::string> names = names_in(folder);
+  const std::vector<std::string> names = names_in(folder);
   const std::string near = suggestion(path.filename().string(), names);
-  return "there is no such file or folder" +
-         (near.empty() ? files_like(path, std::move(names)) : near);
+  return "there is no such file or folder" + (near.empty() ? files_like(path, names) : near);
 }
 
 }  // namespace groundray
