@@ -171,7 +171,7 @@ INTERNALS = (
     "basic_",
     "bad_alloc",
     "what()",
-    "0x",
+    " 0x",
 )
 
 
