@@ -15,6 +15,7 @@
 #include "core/error.h"
 #include "core/io/file_io.h"
 #include "core/io/open_file.h"
+#include "core/near_names.h"
 
 namespace groundray {
 namespace {
@@ -74,9 +75,18 @@ std::optional<std::string_view> between(std::string_view text, std::string_view 
 DatasetText::DatasetText(const fs::path& folder)
     : path_(folder / dataset_file), file_(open_stream(path_)) {
   if (!file_) {
+    const int why = errno;
+    std::error_code ignored;
+    if (fs::status(folder, ignored).type() == fs::file_type::not_found)
+      throw Error("{}: {}", folder.string(), why_no_file(folder));
+    if (fs::is_regular_file(folder, ignored))
+      throw Error(
+          "{}: a file, but a dataset is a folder: give the folder that `groundray generate` "
+          "wrote",
+          folder.string());
     throw Error(
         "{}: the folder contains no readable {} ({}): was it written by `groundray generate`?",
-        folder.string(), dataset_file, std::generic_category().message(errno));
+        folder.string(), dataset_file, std::generic_category().message(why));
   }
   while (const auto line = next_line()) {
     sum_.add(*line + "\n");

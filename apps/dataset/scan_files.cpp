@@ -17,6 +17,7 @@
 #include "core/io/open_file.h"
 #include "core/io/text_lines.h"
 #include "core/io/tum_io.h"
+#include "core/near_names.h"
 
 namespace groundray {
 namespace {
@@ -125,7 +126,7 @@ void check_sensors(const ScanChoice& choice, const RecordedDataset& dataset) {
     if (std::ranges::find(names, sensor) != names.end()) continue;
     throw Error("{}: it has no lidar '{}'; it has: {}{}", choice.inputs[0].string(), sensor,
                 names.empty() ? "none" : fmt::format("{}", fmt::join(names, ", ")),
-                yaml::suggestion(sensor, names));
+                suggestion(sensor, names));
   }
 }
 
@@ -237,7 +238,7 @@ InputKind kind_of(const std::vector<fs::path>& inputs) {
   const fs::path& first = inputs.at(0);
   std::error_code ignored;
   for (const fs::path& path : inputs) {
-    if (!is_there(path)) throw Error("{}: there is no such file or folder", path.string());
+    if (!is_there(path)) throw Error("{}: {}", path.string(), why_no_file(path));
     const bool is_alone = fs::is_directory(path, ignored) || path.extension() == ".conf";
     if (is_alone && inputs.size() > 1) {
       throw Error("{}: a dataset folder or a .conf must be the only input; there are {}",

@@ -23,11 +23,13 @@
 #include "apps/golden/suite/golden_case.h"
 #include "apps/golden/suite/suite.h"
 #include "apps/scan/scan_flags.h"
+#include "apps/scan/usage_fault.h"
 #include "apps/scan/word_option.h"
 #include "apps/scene/interruption.h"
 #include "apps/scene/simulation.h"
 #include "core/error.h"
 #include "core/io/print_error.h"
+#include "core/near_names.h"
 
 namespace groundray::golden {
 namespace {
@@ -229,6 +231,7 @@ int accept(const fs::path& folder, const std::vector<std::string>& names,
            const SuiteOptions& options) {
   for (const std::string& name : names) {
     const fs::path place = (folder / name / "").parent_path();  // drops a trailing slash
+    if (!fs::is_directory(place)) throw Error("{}: {}", place.string(), why_no_file(place));
     accept_case(read_case(place), options);
     fmt::print("stored: {}\n", (place / "expected").string());
   }
@@ -285,7 +288,7 @@ int run(int argc, char** argv) {
   try {
     app.parse(argc, argv);
   } catch (const CLI::ParseError& error) {
-    return app.exit(error) == 0 ? done : wrong_usage;
+    return report_usage(app, error) ? done : wrong_usage;
   }
   if (compare_command->parsed()) return compare.run() == Verdict::Failed ? failed : done;
   if (conform_command->parsed()) return conform.run() == Verdict::Failed ? failed : done;

@@ -4,10 +4,12 @@
 #include <fmt/ranges.h>
 
 #include <algorithm>
+#include <chrono>
 #include <cmath>
 #include <cstddef>
 #include <cstdio>
 #include <glm/trigonometric.hpp>
+#include <limits>
 #include <optional>
 #include <string>
 #include <string_view>
@@ -18,6 +20,8 @@
 #include "apps/dataset/dataset_text.h"
 #include "apps/dataset/write/journal.h"
 #include "apps/scene/simulation.h"
+#include "core/error.h"
+#include "core/io/file_io.h"
 #include "terrain/dem/dem_file.h"
 #include "terrain/dem/dem_io.h"
 #include "terrain/lod/certificate.h"
@@ -102,6 +106,38 @@ void print_levels(const Simulation& simulation) {
     bytes += 4.0 * static_cast<double>(level.heights.heights_m().size());
   }
   fmt::print("triangles {} in {:.0f} MiB\n", triangles, bytes / mib);
+}
+
+// Returns the least height of a sensor above the ground below it, at times 10 ms apart; infinite if
+// it is never above the DEM.
+double least_height_m(const Trajectory& X_DS, const Simulation& simulation) {
+  const Ground& ground = simulation.terrain.ground();
+  double least_m = std::numeric_limits<double>::infinity();
+  for (std::chrono::nanoseconds time{0}; time <= run_time(simulation.spec);
+       time += std::chrono::milliseconds(10)) {
+    const glm::dvec3 p_DS = X_DS.pose_at(time).translation_m;
+    if (const auto ground_m = ground.height_m_at(glm::dvec2(p_DS)))
+      least_m = std::min(least_m, p_DS.z - *ground_m);
+  }
+  return least_m;
+}
+
+// Warns of sensors that may be as near to the reference surface as that is to the traced one.
+void print_tolerance(const Simulation& simulation) {
+  const double tolerance_m = simulation.spec.terrain.detail.tolerance_m;
+  if (tolerance_m == 0) return;
+  const auto look = [&](const char* kind, const std::string& name, const Trajectory& X_DS) {
+    const double height_m = least_height_m(X_DS, simulation);
+    if (tolerance_m < height_m) return;
+    fmt::print(
+        "note      tolerance_m = {} is not less than the height of {} '{}' above the ground, "
+        "{:.3g} "
+        "m: its error bounds can be infinite; choose a smaller one\n",
+        tolerance_m, kind, name, height_m);
+  };
+  for (const PlacedLidar& lidar : simulation.lidars) look("lidar", lidar.spec.name, lidar.X_DS);
+  for (const PlacedCamera& camera : simulation.cameras)
+    look("camera", camera.spec.name, camera.X_DC);
 }
 
 // The lowest layer is the terrain itself.
@@ -203,6 +239,7 @@ void print_scene(const Simulation& simulation) {
   print_frame(simulation.terrain.frame(), simulation.terrain.header().origin_w_m);
   if (simulation.terrain.whole() != nullptr) print_heights(*simulation.terrain.whole());
   print_levels(simulation);
+  print_tolerance(simulation);
   print_cover(simulation.spec.terrain, simulation.scene_objects.cover);
   print_content(simulation.scene_objects);
   print_materials(simulation);
@@ -234,9 +271,21 @@ void print_dataset(const std::filesystem::path& folder) {
 
 void print_info(const std::filesystem::path& file) {
   if (std::filesystem::exists(file / dataset_file)) return print_dataset(file);
-  if (file.extension() == ".yaml" || file.extension() == ".yml")
-    return print_scene(load_simulation(file));
-  print_dem(file);
+  const std::string ending = file_ending(file);
+  if (ending == ".yaml" || ending == ".yml") return print_scene(load_simulation(file));
+  for (const char* other : {".ply", ".obj", ".stl", ".glb", ".gltf", ".pcd", ".npy", ".npz"}) {
+    if (ending == other && std::filesystem::exists(file))
+      throw Error(
+          "{}: a mesh or cloud by its name: `groundray-view` shows it; info describes DEMs, "
+          "scenes (.yaml) and datasets' folders",
+          file.string());
+  }
+  try {
+    print_dem(file);
+  } catch (const Error&) {
+    if (!std::filesystem::is_directory(file)) throw;
+    throw Error("{}: it is neither the folder of a dataset nor a raster", file.string());
+  }
 }
 
 }  // namespace groundray

@@ -113,6 +113,7 @@ Points cast_in_scene(SceneState& state, const GivenPoints& origins_m, const Give
 }
 
 AnyArray ground_heights(const SceneState& state, const GivenPlaces& places_m) {
+  places_m.check("heights_at: places_m");
   return array_of(without_gil([&](const StopRequest&) {
     const Ground& ground = state.simulation.terrain.ground();
     std::vector<double> heights_m(places_m.rows());

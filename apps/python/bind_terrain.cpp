@@ -22,6 +22,7 @@
 #include "apps/python/cast.h"
 #include "apps/python/terrain_model.h"
 #include "core/error.h"
+#include "core/io/file_io.h"
 #include "reconstruction/pipeline/terrain_decimation.h"
 #include "terrain/dem/dem_io.h"
 #include "terrain/dem/layers_io.h"
@@ -40,6 +41,7 @@ glm::dvec3 origin_for(const Pair& south_west_w_m) {
 
 Dem dem_of(const GivenRaster& heights_m, double cell_m, const Pair& south_west_w_m,
            const std::string& crs_wkt) {
+  heights_m.check("Terrain: heights_m");
   constexpr std::size_t most = std::numeric_limits<int>::max();
   Violations broken("Terrain");
   broken.unless(heights_m.rows() <= most && heights_m.columns() <= most,
@@ -70,6 +72,7 @@ SharedTerrain open_terrain(const std::filesystem::path& path, std::optional<doub
 }
 
 void save(const TerrainModel& terrain, const std::filesystem::path& path) {
+  check_ending(path, {".tif", ".tiff"});
   without_gil([&](const StopRequest&) {
     const Dem& dem = terrain.dem();
     const RasterLayer layer{"elevation", "m", dem.grid.heights_m()};
@@ -90,6 +93,7 @@ Points cast_on_terrain(const TerrainModel& terrain, const GivenPoints& origins_m
 }
 
 AnyArray dem_heights(const TerrainModel& terrain, const GivenPlaces& places_m) {
+  places_m.check("heights_at: places_m");
   return array_of(without_gil([&](const StopRequest&) {
     const HeightGrid& grid = terrain.dem().grid;
     std::vector<double> heights_m(places_m.rows());

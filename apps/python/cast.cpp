@@ -92,8 +92,10 @@ struct Columns {
 
 GivenRays::GivenRays(GivenPoints origins_m, GivenPoints directions, std::chrono::nanoseconds time)
     : origins_m_(std::move(origins_m)), directions_(std::move(directions)), time_(time) {
+  origins_m_.check("cast_rays: origins_m");
+  directions_.check("cast_rays: directions");
   if (origins_m_.rows() != directions_.rows())
-    throw Error("rays: there are {} origins but {} directions; the numbers must be equal",
+    throw Error("cast_rays: there are {} origins but {} directions; the numbers must be equal",
                 origins_m_.rows(), directions_.rows());
 }
 

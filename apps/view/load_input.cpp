@@ -21,6 +21,7 @@
 #include "core/io/file_io.h"
 #include "core/io/open_file.h"
 #include "core/model/mesh_reader.h"
+#include "core/near_names.h"
 #include "terrain/dem/band_file.h"
 
 namespace groundray {
@@ -218,7 +219,7 @@ InputKind kind_of(const fs::path& path) {
   const fs::file_status status = fs::status(path, fault);
   // GDAL's virtual paths, e.g. into archives, do not exist as files.
   if (!fs::exists(status) && !path.string().starts_with("/vsi"))
-    throw Error("{}: there is no such file or folder", path.string());
+    throw Error("{}: {}", path.string(), why_no_file(path));
   if (fs::is_directory(status)) {
     if (fs::exists(path / "dataset.yaml")) return InputKind::Dataset;
     throw Error("{}: the folder is not a dataset: it has no dataset.yaml", path.string());

@@ -97,4 +97,9 @@ std::string file_ending(const std::filesystem::path& path) {
   return ending;
 }
 
+void check_ending(const std::filesystem::path& path, std::initializer_list<const char*> endings) {
+  if (std::ranges::find(endings, file_ending(path)) == endings.end())
+    throw Error("{}: its name must end in {}", path.string(), *endings.begin());
+}
+
 }  // namespace groundray

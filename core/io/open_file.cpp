@@ -9,6 +9,7 @@
 #include <system_error>
 
 #include "core/error.h"
+#include "core/near_names.h"
 
 namespace groundray {
 namespace {
@@ -45,7 +46,9 @@ OwnedFile open_file(const std::filesystem::path& path) {
   OwnedFile file = try_to_open(path);
   if (file) return file;
   const int fault = errno;
-  throw Error("{}: cannot be read: {}; check its name and permissions", path.string(),
+  if (fault == ENOENT || fault == ENOTDIR || fault == EISDIR)
+    throw Error("{}: {}", path.string(), why_no_file(path));
+  throw Error("{}: cannot be read: {}; check its permissions", path.string(),
               fault == ESPIPE ? "it is a pipe or device, not a file"
                               : std::generic_category().message(fault));
 }

@@ -148,10 +148,7 @@ MeshReading read_mesh_file(const fs::path& path) {
 
 void check_some(const MeshFile& file, const std::string& name) {
   if (!file.mesh.triangles.empty()) return;
-  throw Error(
-      "{}: there is no triangle; {} broken polygons were dropped, and {} points, lines or curved "
-      "patches skipped",
-      name, file.dropped, file.skipped);
+  throw Error("{}: there is no triangle{}", name, why_empty(file.dropped, file.skipped));
 }
 
 }  // namespace

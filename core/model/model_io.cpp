@@ -181,10 +181,8 @@ ModelFile read_model(const fs::path& path, const ModelOptions& options) {
   file.model = model_of(soup, file.dropped);
   if (options.broken == BrokenParts::Refuse) refuse_faults(path, file);
   if (file.model.mesh.triangles.empty()) {
-    throw Error(
-        "{}: there is no triangle; {} broken polygons were dropped, and {} points, lines or "
-        "curved patches skipped",
-        path.string(), file.dropped.total(), file.skipped);
+    throw Error("{}: there is no triangle{}", path.string(),
+                why_empty(file.dropped.total(), file.skipped));
   }
   take_surfaces(path, std::move(soup.surfaces), file.model);
   check_model(file.model, path.string());

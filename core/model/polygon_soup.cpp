@@ -1,5 +1,7 @@
 #include "core/model/polygon_soup.h"
 
+#include <fmt/format.h>
+
 #include <algorithm>
 #include <array>
 #include <cmath>
@@ -255,6 +257,13 @@ TriangleMesh stored_mesh_of(const PolygonSoup& soup, ModelFaults& faults) {
     mesh.triangles.emplace_back(a.position, b.position, c.position);
   });
   return mesh;
+}
+
+std::string why_empty(std::size_t dropped, std::size_t skipped) {
+  if (dropped + skipped == 0) return ", as the file has no face: is it a mesh?";
+  return fmt::format(
+      "; {} broken polygons were dropped, and {} points, lines or curved patches skipped", dropped,
+      skipped);
 }
 
 }  // namespace groundray

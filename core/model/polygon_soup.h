@@ -112,4 +112,8 @@ struct ColladaAsset {
 ///         than 1000 deep, or more than 10^6 of them.
 ColladaAsset check_collada(std::string_view text, const std::string& name);
 
+/// Returns the end of a message about a file without triangles.
+/// @param dropped, skipped  numbers of broken polygons, and of points, lines and curved patches.
+std::string why_empty(std::size_t dropped, std::size_t skipped);
+
 }  // namespace groundray

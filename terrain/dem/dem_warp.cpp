@@ -235,9 +235,9 @@ std::unique_ptr<WarpedHeights> reprojected(const HeightReader& raster, const Ras
   const char* const no_network[] = {"ALLOW_NETWORK_ACCESS=NO", nullptr};
   if (crs.SetFromUserInput(target.c_str(), no_network) != OGRERR_NONE) {
     throw Error(
-        "reproject_to = '{}' is not a CRS known to GDAL ({}); use utm, a code such as "
-        "EPSG:32631, or a PROJ string",
-        reproject_to, CPLGetLastErrorMsg());
+        "reproject_to = '{}' is not a CRS known to GDAL; use utm, a code such as EPSG:32631, or a "
+        "PROJ string",
+        reproject_to);
   }
   if (const std::string why = why_not_metric(crs); !why.empty()) {
     throw Error(

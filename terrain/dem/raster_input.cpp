@@ -19,6 +19,7 @@
 #include <vector>
 
 #include "core/io/open_file.h"
+#include "core/near_names.h"
 
 namespace groundray {
 namespace {
@@ -159,10 +160,11 @@ std::string checked_file(const std::string& name) {
   }
   VSIStatBufL state;
   if (VSIStatExL(file.c_str(), &state, VSI_STAT_EXISTS_FLAG | VSI_STAT_NATURE_FLAG) != 0) {
-    throw Error("there is no such file");
+    throw Error("{}", file.starts_with("/vsi") ? "there is no such file" : why_no_file(file));
   }
   if (!VSI_ISREG(state.st_mode)) {
-    throw Error("it cannot be opened as a raster: it is not a regular file");
+    throw Error("it cannot be opened as a raster: {}",
+                VSI_ISDIR(state.st_mode) ? why_no_file(file) : "it is not a regular file");
   }
   return file;
 }

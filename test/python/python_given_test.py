@@ -58,7 +58,7 @@ def test_vertex_indices_may_be_integers_of_any_width(dtype):
     ],
 )
 def test_vertex_indices_must_be_integers(triangles):
-    with pytest.raises(TypeError, match=r"triangles: numpy\.typing\.NDArray\[numpy\.integer"):
+    with pytest.raises(TypeError, match="Mesh: triangles must be integers of shape"):
         groundray.Mesh(CORNERS, triangles)
 
 
@@ -97,8 +97,8 @@ def test_exceptions_during_array_conversion_propagate(error):
 
 
 @pytest.mark.parametrize("error", [TypeError, ValueError])
-def test_arguments_that_are_not_arrays_report_the_signature(error):
-    with pytest.raises(TypeError, match=r"heights_at\(self, places_m: numpy\.typing\.ArrayLike"):
+def test_arguments_that_are_not_arrays_are_reported(error):
+    with pytest.raises(TypeError, match=r"heights_at: places_m must be .*, but is a Failing"):
         groundray.Terrain(np.zeros((5, 5))).heights_at(Failing(error("of its own")))
 
 

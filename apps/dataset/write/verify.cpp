@@ -38,9 +38,14 @@ class DatasetCheck {
     check_record();
     std::error_code fault;
     const bool is_open = fs::exists(folder_ / journal_file, fault);
+    DatasetSummary now = summary_;
+    if (is_open) count_journal(folder_ / journal_file, now);
+    result_.done = now.done;
+    result_.asked_for = now.asked_for;
     if (is_open || fault) {
-      tell(journal_file,
-           "a run was interrupted; `groundray generate --resume` checks its frames and continues");
+      tell(journal_file, fmt::format("a run was interrupted, with {} of {} frames complete; "
+                                     "`groundray generate --resume` checks them and continues",
+                                     now.done, now.asked_for));
     } else if (summary_.done < summary_.asked_for) {
       tell("", fmt::format(
                    "incomplete: {} of {} frames are complete; `groundray generate --resume` adds "

@@ -5,6 +5,7 @@
 #include <algorithm>
 
 #include "apps/golden/conform/conform.h"
+#include "apps/scan/number_checks.h"
 
 namespace groundray::golden {
 
@@ -53,7 +54,9 @@ void PassesCommand::add_to(CLI::App* command) {
   command->add_option("--rays", settings.rays, "Number of rays")
       ->check(CLI::Range(std::size_t{1}, std::size_t{100'000'000}))
       ->capture_default_str();
-  command->add_option("--seed", settings.seed.value, "Seed of the rays")->capture_default_str();
+  command->add_option("--seed", settings.seed.value, "Seed of the rays")
+      ->check(whole())
+      ->capture_default_str();
 }
 
 void PassesCommand::run() {

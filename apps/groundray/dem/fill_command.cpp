@@ -15,6 +15,7 @@
 #include "apps/scan/word_option.h"
 #include "apps/scene/interruption.h"
 #include "core/error.h"
+#include "core/io/file_io.h"
 #include "reconstruction/dem/fill/dem_fill.h"
 #include "terrain/dem/dem_io.h"
 #include "terrain/dem/layers_io.h"
@@ -81,9 +82,7 @@ struct FillCommandOptions {
   std::optional<double> tension, smoothness;
 
   void add_files() {
-    command
-        ->add_option("DEM", dem, "Raster of heights (GeoTIFF, VRT, HGT, ...)")
-        ->required();
+    command->add_option("DEM", dem, "Raster of heights (GeoTIFF, VRT, HGT, ...)")->required();
     command->add_option("-o,--output", out, "GeoTIFF to write: heights in metres, CRS as the DEM's")
         ->required();
     command->add_option("--sd-out", sd_out,

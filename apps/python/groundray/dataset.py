@@ -7,6 +7,7 @@ dataset frame (east, north, up; W minus `origin_w_m`), B the body, S a lidar, C 
 
 from __future__ import annotations
 
+import difflib
 import re
 from collections.abc import Sequence
 from dataclasses import dataclass
@@ -248,6 +249,16 @@ def _read_mount(calibration: _Map, key: str) -> Floats:
     return matrix_of(rotation_xyzw, mount.numbers("translation_m", 3))
 
 
+def _why_no_dataset(folder: Path) -> str:
+    if folder.is_file():
+        return "it is a file; give the folder that groundray generate wrote"
+    if folder.exists():
+        return "it contains no dataset.yaml; give an output of groundray generate"
+    names = [each.name for each in folder.parent.iterdir()] if folder.parent.is_dir() else []
+    near = difflib.get_close_matches(folder.name, sorted(names), n=1)
+    return "there is no such folder" + "".join(f"; did you mean '{name}'?" for name in near)
+
+
 class Dataset:
     """Contents of the `dataset.yaml` and the calibrations of a folder."""
 
@@ -259,9 +270,7 @@ class Dataset:
         self.folder = Path(folder)
         record = self.folder / "dataset.yaml"
         if not record.is_file():
-            raise Error(
-                f"{self.folder}: it contains no dataset.yaml; give an output of groundray generate"
-            )
+            raise Error(f"{self.folder}: {_why_no_dataset(self.folder)}")
         root = _read_map(record)
         if root.text("groundray_dataset") != "1":
             raise root.fault(

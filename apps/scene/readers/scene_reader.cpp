@@ -160,6 +160,24 @@ void refuse_camera(const Node& node, const fs::path& path) {
   faults.throw_if_any();
 }
 
+// Rejects at once a file that is not a scene, because most of its keys would be unknown.
+void refuse_others(const Node& node, const fs::path& path) {
+  Faults faults(path);
+  Map root(node, "", faults);
+  if (root.find("groundray", Need::Optional) != nullptr) return;
+  for (const auto& [key, kind] :
+       {std::pair("groundray_lidar",
+                  "a lidar, which a scene names under "
+                  "'lidars'"),
+        {"groundray_camera", "a camera, which a scene names under 'cameras'"},
+        {"groundray_material", "a material"},
+        {"groundray_dataset", "the record of a dataset: give its folder"}}) {
+    if (const Node* const at = root.find(key, Need::Optional))
+      faults.add(*at, key, "this is no scene, but {}", kind);
+  }
+  faults.throw_if_any();
+}
+
 SensorKind kind_of(const fs::path& preset) {
   constexpr std::string_view key = "groundray_camera:";
   const std::string text = yaml::read_file(preset);
@@ -177,6 +195,7 @@ SceneSpec load_scene(const fs::path& path, const fs::path& preset_folder) {
 SceneSpec parse_scene(const std::string& text, const fs::path& path,
                       const fs::path& preset_folder) {
   const Node node = yaml::parse(text, path);
+  refuse_others(node, path);
   Faults faults(path);
   SceneSpec scene;
   scene.text = text;

@@ -74,9 +74,9 @@ TEST(OpenFile, TakesRegularFilesAlone) {
   EXPECT_THAT([&] { read_text(folder / "zeros"); },
               ThrowsMessage<Error>(HasSubstr("zeros: cannot be read: it is a pipe or device")));
   EXPECT_THAT([&] { read_text(folder / "folder"); },
-              ThrowsMessage<Error>(HasSubstr("folder: cannot be read: Is a directory")));
+              ThrowsMessage<Error>(HasSubstr("folder: it is a folder, but must be a file")));
   EXPECT_THAT([&] { read_text(folder / "none"); },
-              ThrowsMessage<Error>(HasSubstr("none: cannot be read: No such file or directory")));
+              ThrowsMessage<Error>(HasSubstr("none: there is no such file or folder")));
   for (const char* name : {"pipe", "zeros", "folder", "none"})
     EXPECT_FALSE(open_stream(folder / name)) << name;
 }
