@@ -266,8 +266,8 @@ std::vector<fs::path> files_read(const ScanChoice& choice, const ScanFiles& file
   read.push_back(choice.inputs[0] / "dataset.yaml");
   for (const char* folder : {"poses", "calibration"}) {
     std::error_code ignored;
-    for (const auto& entry : fs::directory_iterator(choice.inputs[0] / folder, ignored))
-      read.push_back(entry.path());
+    for (const std::string& name : names_in(choice.inputs[0] / folder, ignored))
+      read.push_back(choice.inputs[0] / folder / name);
   }
   return read;
 }

@@ -33,12 +33,12 @@ double mebibytes(std::uint64_t bytes) { return static_cast<double>(bytes) / (1 <
 // Prints the faults of a dataset and their number; returns true if there are none.
 bool verify_one(const fs::path& folder) {
   const auto report = [](const std::string& fault) {
-    fmt::print("{}\n", fault);
+    print_text(stdout, "{}\n", fault);
     std::fflush(stdout);
   };
   const auto [files, faults, bytes] = verify(folder, report, stderr);
-  fmt::print(
-      "{}: {} files of {:.1f} MiB checked, {}\n", folder.string(), files, mebibytes(bytes),
+  print_text(
+      stdout, "{}: {} files of {:.1f} MiB checked, {}\n", folder.string(), files, mebibytes(bytes),
       faults == 0 ? "all unchanged" : fmt::format("{} fault{}", faults, faults == 1 ? "" : "s"));
   return faults == 0;
 }
@@ -50,9 +50,9 @@ void verify_all(const std::vector<fs::path>& datasets) {
     try {
       is_sound = verify_one(dataset);
     } catch (const Error& error) {
-      fmt::print("{}\n", error.what());
+      print_text(stdout, "{}\n", error.what());
     } catch (const std::system_error& error) {
-      fmt::print("{}: {}\n", dataset.string(), error.what());
+      print_text(stdout, "{}: {}\n", dataset.string(), error.what());
     }
     if (!is_sound) ++at_fault;
   }
@@ -67,7 +67,7 @@ void verify_all(const std::vector<fs::path>& datasets) {
 void merge_shards(const std::vector<fs::path>& shards, const fs::path& out, FolderUse use) {
   const auto warn = [](const std::string& warning) { print_error("{}\n", warning); };
   const auto [frames, bytes] = merge(shards, out, use, {.progress = stderr, .warn = warn});
-  fmt::print("{} frames of {} shards, {:.1f} MiB\ndataset: {}\n", frames, shards.size(),
+  print_text(stdout, "{} frames of {} shards, {:.1f} MiB\ndataset: {}\n", frames, shards.size(),
              mebibytes(bytes), out.string());
 }
 

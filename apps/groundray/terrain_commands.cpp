@@ -15,6 +15,7 @@
 #include "apps/groundray/command.h"
 #include "apps/scene/interruption.h"
 #include "core/io/mesh_io.h"
+#include "core/io/print_error.h"
 #include "terrain/dem/dem_file.h"
 #include "terrain/dem/dem_io.h"
 #include "terrain/lod/certificate.h"
@@ -35,14 +36,15 @@ TriangleMesh place(TerrainMesh mesh, const HeightGrid& grid) {
 void print_mesh(const TriangleMesh& mesh, const HeightGrid& grid) {
   std::map<int, std::size_t> triangles;
   for (const std::uint8_t level : mesh.levels) ++triangles[level];
-  fmt::print("{:>5} {:>10} {:>12}\n", "level", "cell m", "triangles");
+  print_text(stdout, "{:>5} {:>10} {:>12}\n", "level", "cell m", "triangles");
   for (const auto& [level, count] : triangles) {
-    fmt::print("{:>5} {:>10.6g} {:>12}\n", level,
+    print_text(stdout, "{:>5} {:>10.6g} {:>12}\n", level,
                std::abs(grid.step_m().x) * static_cast<double>(std::int64_t{1} << level), count);
   }
   const double cells = static_cast<double>(grid.columns() - 1) * (grid.rows() - 1);
-  fmt::print("{} triangles ({:.3g} % of full resolution), {} vertices\n", mesh.triangles.size(),
-             50 * static_cast<double>(mesh.triangles.size()) / cells, mesh.vertices_m.size());
+  print_text(stdout, "{} triangles ({:.3g} % of full resolution), {} vertices\n",
+             mesh.triangles.size(), 50 * static_cast<double>(mesh.triangles.size()) / cells,
+             mesh.vertices_m.size());
 }
 
 // Options of the commands for a DEM.
@@ -54,9 +56,7 @@ struct TerrainOptions {
   std::vector<double> viewpoint_w_m;
 
   void add_dem(CLI::App* command) {
-    command
-        ->add_option("DEM", dem, "Raster of heights (GeoTIFF, VRT, HGT, ...)")
-        ->required();
+    command->add_option("DEM", dem, "Raster of heights (GeoTIFF, VRT, HGT, ...)")->required();
     command->add_option("--nodata", reading.nodata,
                         "Additional nodata value, besides the one that the file declares");
     command->add_option("--reproject-to", reading.reproject_to,
@@ -105,7 +105,7 @@ struct TerrainOptions {
     stop_if_interrupted();
     write_mesh(out, mesh, {read.origin_w_m, read.crs_name, read.crs_wkt});
     print_mesh(mesh, read.grid);
-    fmt::print("written to {}\n", out.string());
+    print_text(stdout, "written to {}\n", out.string());
   }
 
   // Certifies the DEM, unless there is a certificate, and prints the deviations of each level.
@@ -115,15 +115,15 @@ struct TerrainOptions {
     const Certificate certificate = Certificate::open_or_make(
         file, {.progress = [&](double share) { progress.update(share); }});
     const double step_m = std::abs(file.header().step_m.x);
-    fmt::print("{:>5} {:>10} {:>12} {:>10} {:>10} {:>14} {:>15}\n", "level", "cell m", "nodes",
-               "holed", "empty", "max deviation m", "mean deviation m");
+    print_text(stdout, "{:>5} {:>10} {:>12} {:>10} {:>10} {:>14} {:>15}\n", "level", "cell m",
+               "nodes", "holed", "empty", "max deviation m", "mean deviation m");
     for (std::size_t level = 0; level < certificate.levels().size(); ++level) {
       const LevelSummary& summary = certificate.levels()[level];
-      fmt::print("{:>5} {:>10.6g} {:>12} {:>10} {:>10} {:>14.6g} {:>15.6g}\n", level,
+      print_text(stdout, "{:>5} {:>10.6g} {:>12} {:>10} {:>10} {:>14.6g} {:>15.6g}\n", level,
                  step_m * static_cast<double>(std::int64_t{1} << level), summary.nodes,
                  summary.mixed, summary.empty, summary.max_deviation_m, summary.mean_deviation_m);
     }
-    fmt::print("certificate: {}\n", certificate.folder().string());
+    print_text(stdout, "certificate: {}\n", certificate.folder().string());
   }
 };
 

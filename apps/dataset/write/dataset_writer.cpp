@@ -47,8 +47,8 @@ bool is_aside(const std::string& name, const std::vector<std::string>& suffixes)
 
 void remove_asides(const fs::path& folder, const std::vector<std::string>& suffixes) {
   std::error_code ignored;
-  for (const fs::directory_entry& entry : fs::directory_iterator(folder, ignored))
-    if (is_aside(entry.path().filename().string(), suffixes)) fs::remove(entry.path(), ignored);
+  for (const std::string& name : names_in(folder, ignored))
+    if (is_aside(name, suffixes)) fs::remove(folder / name, ignored);
 }
 
 std::string shard_words(const std::optional<Shard>& shard) {

@@ -8,6 +8,8 @@
 #include <type_traits>
 #include <utility>
 
+#include "core/error.h"
+
 /// Numbers given by Python: arrays, or lists and other values that NumPy converts to arrays.
 namespace groundray::python {
 
@@ -53,6 +55,7 @@ using GivenRaster = GivenArray<float, nanobind::ndim<2>>;
 namespace nanobind::detail {
 
 /// Accepts all values that the array's own caster accepts, and otherwise converts by numpy.asarray.
+/// Masked values of a masked array are holes (NaN) in rasters; elsewhere they are rejected.
 template <typename Array>
 struct type_caster<groundray::python::NumpyArgument<Array>> {
   using ArrayCaster = make_caster<Array>;
@@ -63,6 +66,32 @@ struct type_caster<groundray::python::NumpyArgument<Array>> {
                                       "numpy.typing.ArrayLike"))
 
   bool from_python(handle source, std::uint8_t flags, cleanup_list* cleanup) noexcept {
+    try {
+      if (!hasattr(source, "mask") || !hasattr(source, "filled"))
+        return read(source, flags, cleanup);
+      const object given = borrow(source);
+      const bool has_masked = cast<bool>(module_::import_("numpy").attr("any")(given.attr("mask")));
+      if (!has_masked) return read(given.attr("data"), flags, cleanup);
+      if (is_raster) return read(holes_of(given), flags, cleanup);
+      throw groundray::Error(
+          "an array has masked values, which have no meaning here: remove them, or fill them by "
+          "numpy.ma.filled");
+    } catch (...) {
+      value = groundray::python::NumpyArgument<Array>(std::current_exception());
+      return true;
+    }
+  }
+
+ private:
+  static constexpr bool is_raster =
+      std::is_same_v<std::remove_const_t<typename Array::Scalar>, float>;
+
+  static object holes_of(const object& masked) {
+    const object numpy = module_::import_("numpy");
+    return masked.attr("astype")(numpy.attr("float32")).attr("filled")(numpy.attr("nan"));
+  }
+
+  bool read(handle source, std::uint8_t flags, cleanup_list* cleanup) {
     constexpr auto convert = static_cast<std::uint8_t>(cast_flags::convert);
     const auto as_it_is = static_cast<std::uint8_t>(flags & ~convert);
     if (take(source, is_whole ? as_it_is : flags, cleanup)) return true;
@@ -73,12 +102,10 @@ struct type_caster<groundray::python::NumpyArgument<Array>> {
     } catch (python_error& error) {
       // Not an array: nanobind reports the signature instead.
       if (error.matches(PyExc_TypeError) || error.matches(PyExc_ValueError)) return false;
-      value = groundray::python::NumpyArgument<Array>(std::current_exception());
-      return true;
+      throw;
     }
   }
 
- private:
   bool take(handle source, std::uint8_t flags, cleanup_list* cleanup) noexcept {
     ArrayCaster caster;
     if (!caster.from_python(source, flags, cleanup)) return false;

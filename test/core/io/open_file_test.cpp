@@ -91,5 +91,19 @@ TEST(OpenFile, FollowsLinksToRegularFiles) {
   EXPECT_EQ(word, "text");
 }
 
+TEST(NamesIn, AreSortedAndFaultsAreReported) {
+  const TemporaryFolder folder;
+  for (const char* name : {"b", "a", ".hidden"}) write_text(folder / name, "");
+  fs::create_directory(folder / "c");
+  fs::create_symlink("nowhere", folder / "d");
+  std::error_code fault;
+  EXPECT_THAT(names_in(folder / "", fault), ::testing::ElementsAre(".hidden", "a", "b", "c", "d"));
+  EXPECT_FALSE(fault);
+  EXPECT_TRUE(names_in(folder / "a", fault).empty());
+  EXPECT_EQ(fault, std::errc::not_a_directory);
+  EXPECT_TRUE(names_in(folder / "e", fault).empty());
+  EXPECT_EQ(fault, std::errc::no_such_file_or_directory);
+}
+
 }  // namespace
 }  // namespace groundray::open_file_test
