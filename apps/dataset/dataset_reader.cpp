@@ -104,8 +104,8 @@ void read_sensor(const yaml::Node& node, HeadUse use, const FrameLists& lists,
   } else if (!is_of_run) {
     DatasetHead::Pair& pair = head.pairs.emplace_back(DatasetHead::Pair{sensor.name, {}, {}});
     for (const auto& [key, camera] : {std::pair("left", &pair.left), {"right", &pair.right}}) {
-      const yaml::Node* const node = map.read_text(key, Need::Required, *camera);
-      if (node != nullptr) check_letters(*node, key, *camera, faults);
+      const yaml::Node* const given = map.read_text(key, Need::Required, *camera);
+      if (given != nullptr) check_letters(*given, key, *camera, faults);
     }
   }
   map.close_partly();

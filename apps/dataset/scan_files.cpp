@@ -29,7 +29,7 @@ bool is_range_grid(const fs::path& path) {
   if (ending == ".gz") return true;  // as distributed by Stanford
   if (ending != ".ply") return false;
   std::ifstream file = open_stream(path);
-  for (std::string line; std::getline(file, line) && !line.starts_with("end_header");) {
+  for (std::string line; next_line(file, line) && !line.starts_with("end_header");) {
     if (line.starts_with("element range_grid")) return true;
   }
   return false;

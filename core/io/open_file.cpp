@@ -63,6 +63,21 @@ std::ifstream open_stream(const std::filesystem::path& path) {
   return stream;
 }
 
+bool next_line(std::istream& file, std::string& line) {
+  constexpr std::size_t most_bytes = 1 << 26;
+  line.clear();
+  if (!file) return false;
+  for (int c = file.rdbuf()->sbumpc(); c != '\n'; c = file.rdbuf()->sbumpc()) {
+    if (c == std::char_traits<char>::eof() || line.size() == most_bytes) {
+      const bool is_last = c == std::char_traits<char>::eof() && !line.empty();
+      file.setstate(is_last ? std::ios::eofbit : std::ios::eofbit | std::ios::failbit);
+      return is_last;
+    }
+    line += static_cast<char>(c);
+  }
+  return true;
+}
+
 std::vector<std::string> names_in(const std::filesystem::path& folder, std::error_code& fault) {
   const auto close_folder = [](DIR* open) { closedir(open); };
   const std::unique_ptr<DIR, decltype(close_folder)> open(opendir(folder.c_str()), close_folder);

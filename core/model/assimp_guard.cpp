@@ -235,7 +235,14 @@ double check_nodes(const json& gltf) {
   std::vector<Node> nodes;
   for (const json& from : list) {
     Node& node = nodes.emplace_back();
-    if (from.contains("mesh")) node.elements = meshes.at(from["mesh"].get<std::size_t>());
+    if (from.contains("mesh")) {
+      const auto mesh = from["mesh"].get<std::size_t>();
+      if (mesh >= meshes.size()) {
+        throw Error("node {} has the mesh {}, but there are {}", nodes.size() - 1, mesh,
+                    meshes.size());
+      }
+      node.elements = meshes[mesh];
+    }
     for (const json& child : from.value("children", none)) {
       node.children.push_back(child.get<std::size_t>());
       if (node.children.back() < list.size()) continue;
@@ -274,6 +281,10 @@ void strip(json& gltf) {
   if (gltf.contains("nodes")) {
     for (json& node : gltf["nodes"])
       for (const char* key : {"skin", "camera", "weights", "extensions", "extras"}) node.erase(key);
+  }
+  if (gltf.contains("images")) {
+    for (json& image : gltf["images"])  // without a slash in it, assimp crashes
+      if (image.value("mimeType", "").find('/') == std::string::npos) image.erase("mimeType");
   }
   if (!gltf.contains("meshes")) return;
   for (json& mesh : gltf["meshes"]) {

@@ -48,11 +48,11 @@ def decimal_comma(tmp_path_factory):
     return folder
 
 
-def outputs(folder, locale, locales):
+def outputs(folder, locale, locales, dem):
     folder.mkdir()
     path = os.pathsep.join([str(Path(__file__).parent), *sys.path])
     done = subprocess.run(
-        [sys.executable, "-c", SCRIPT, locale, folder, DEM],
+        [sys.executable, "-c", SCRIPT, locale, folder, dem],
         env={**os.environ, "LOCPATH": str(locales), "PYTHONPATH": path},
         capture_output=True,
         text=True,
@@ -64,8 +64,10 @@ def outputs(folder, locale, locales):
 
 
 def test_a_decimal_comma_changes_no_byte(tmp_path, decimal_comma):
-    plain = outputs(tmp_path / "a", "C", decimal_comma)
-    comma = outputs(tmp_path / "b", "de_DE.UTF-8", decimal_comma)
+    coarse = tmp_path / "coarse.tif"  # of 10 m, written 1.0e+01 on the way to GDAL
+    subprocess.run(["gdal_translate", "-q", "-outsize", "10%", "10%", DEM, coarse], check=True)
+    plain = outputs(tmp_path / "a", "C", decimal_comma, coarse)
+    comma = outputs(tmp_path / "b", "de_DE.UTF-8", decimal_comma, coarse)
     assert plain[0].startswith("1.5 ")
     assert comma[0] == "1,5 " + plain[0].removeprefix("1.5 ")
     assert comma[1:] == plain[1:]

@@ -31,7 +31,7 @@ constexpr std::string_view aside = ".part";  // suffix of temporary files
 std::string convergence_of(const fs::path& scan) {
   std::ifstream file = open_stream(scan);
   const std::string begin = fmt::format("comment {}", convergence_comment);
-  for (std::string line; std::getline(file, line) && line != "end_header";) {
+  for (std::string line; next_line(file, line) && line != "end_header";) {
     if (line.starts_with(begin)) return line.substr(begin.size());
   }
   return {};

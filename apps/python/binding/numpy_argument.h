@@ -70,8 +70,8 @@ struct type_caster<groundray::python::NumpyArgument<Array>> {
       if (!hasattr(source, "mask") || !hasattr(source, "filled"))
         return read(source, flags, cleanup);
       const object given = borrow(source);
-      const bool has_masked = cast<bool>(module_::import_("numpy").attr("any")(given.attr("mask")));
-      if (!has_masked) return read(given.attr("data"), flags, cleanup);
+      const object any = module_::import_("numpy").attr("any")(given.attr("mask"));
+      if (PyObject_IsTrue(any.ptr()) == 0) return read(given.attr("data"), flags, cleanup);
       if (is_raster) return read(holes_of(given), flags, cleanup);
       throw groundray::Error(
           "an array has masked values, which have no meaning here: remove them, or fill them by "

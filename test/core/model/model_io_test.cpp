@@ -549,6 +549,9 @@ TEST_F(ModelIo, RejectsFilesThatWouldCrashAssimp) {
   json.replace(json.find(R"("count":4)"), 9, R"("sparse":{"count":1},"count":4)");
   EXPECT_THAT(error_of("a.glb", glb(json, wedge_binary())),
               HasSubstr("sparse accessors are not supported"));
+  json = wedge_gltf(R"({"mesh":1})", buffer);
+  EXPECT_THAT(error_of("a.glb", glb(json, wedge_binary())),
+              HasSubstr("node 0 has the mesh 1, but there are 1"));
 }
 
 // Animations and skins have accessors of their own, which assimp would read.

@@ -1,5 +1,5 @@
-// Library for LD_PRELOAD in which the time of day jumps by ten years, back and forth, at each query,
-// as when a clock is set.
+// Library for LD_PRELOAD in which the time of day jumps by ten years, back and forth, at each
+// query, as when a clock is set.
 #include <dlfcn.h>
 
 #include <atomic>

@@ -250,7 +250,9 @@ PngNumbers png_numbers(std::string_view bytes, const std::string& name) {
   numbers.is_deep =
       bytes.starts_with(png_magic) && bytes.size() > depth_at && bytes[depth_at] == 16;
   const auto copy = [&](const auto& image, double scale) {
-    check_values(name, image.width(), image.height(), static_cast<std::size_t>(image.channels()));
+    // Grey becomes three equal channels.
+    check_values(name, image.width(), image.height(),
+                 static_cast<std::size_t>(std::max(image.channels(), 3)));
     numbers.values = {image.width(), image.height(), image.channels()};
     std::ranges::transform(image.values(), numbers.values.values().begin(),
                            [scale](auto value) { return std::round(scale * value); });
