@@ -128,7 +128,7 @@ class JpegReader {
     attempt([this] { jpeg_read_header(&jpeg_, TRUE); });
     check_size(name_, jpeg_.image_width, jpeg_.image_height, most_pixels);
     // Progressive images are kept whole as coefficients of 2 bytes.
-    require_image_memory(name_, jpeg_.image_width, jpeg_.image_height, 3 * 3);
+    require_image_memory(name_, jpeg_.image_width, jpeg_.image_height, 9);
     if (jpeg_.jpeg_color_space == JCS_CMYK || jpeg_.jpeg_color_space == JCS_YCCK) {
       throw Error("{}: its colours are CMYK; they must be grey or RGB: convert the image", name_);
     }

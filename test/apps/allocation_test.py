@@ -95,7 +95,7 @@ def test_a_failing_allocation_at_any_place_ends_with_one_message(inputs, tmp_pat
     whole = files(out)
     assert any(file == "groundray" or file == "" for _, file in found)
     safe = [name for name, file in found if not UNSAFE.match(file)]
-    for name in random.Random(5).sample(safe, min(len(safe), 1500 if IS_FULL else 24)):
+    for name in random.Random(5).sample(safe, min(len(safe), 600 if IS_FULL else 24)):
         check(what, inputs, out, name, whole)
 
 

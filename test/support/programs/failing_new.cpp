@@ -46,6 +46,7 @@ bool can_call(const char* file) { return std::strstr(file, "libstdc++") == nullp
 _Unwind_Reason_Code add_frame(_Unwind_Context* context, void* to) {
   auto& stack = *static_cast<Stack*>(to);
   if (++stack.frames <= 0) return _URC_NO_REASON;
+  // NOLINTNEXTLINE(performance-no-int-to-ptr): the unwinder gives integers
   auto* const place = reinterpret_cast<char*>(_Unwind_GetIP(context));
   dl_find_object object{};
   const bool is_known = _dl_find_object(place, &object) == 0;
