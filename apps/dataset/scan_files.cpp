@@ -30,7 +30,7 @@ bool is_range_grid(const fs::path& path) {
   if (ending == ".gz") return true;  // as distributed by Stanford
   if (ending != ".ply") return false;
   std::ifstream file = open_stream(path);
-  for (std::string line; std::getline(file, line) && !line.starts_with("end_header");) {
+  for (std::string line; next_line(file, line) && !line.starts_with("end_header");) {
     if (line.starts_with("element range_grid")) return true;
   }
   return false;
@@ -267,8 +267,8 @@ std::vector<fs::path> files_read(const ScanChoice& choice, const ScanFiles& file
   read.push_back(choice.inputs[0] / "dataset.yaml");
   for (const char* folder : {"poses", "calibration"}) {
     std::error_code ignored;
-    for (const auto& entry : fs::directory_iterator(choice.inputs[0] / folder, ignored))
-      read.push_back(entry.path());
+    for (const std::string& name : names_in(choice.inputs[0] / folder, ignored))
+      read.push_back(choice.inputs[0] / folder / name);
   }
   return read;
 }

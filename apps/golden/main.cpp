@@ -6,6 +6,7 @@
 #include <cstdlib>
 #include <exception>
 #include <filesystem>
+#include <new>
 #include <optional>
 #include <string>
 #include <thread>
@@ -200,10 +201,11 @@ fs::path own_folder() {
 }
 
 void print(const Section& section) {
-  fmt::print("{} {}\n", section.verdict == Verdict::Passed ? "passed" : "FAILED", section.title);
+  print_text(stdout, "{} {}\n", section.verdict == Verdict::Passed ? "passed" : "FAILED",
+             section.title);
   for (const Measure& measure : section.measures) {
     if (measure.verdict != Verdict::Failed) continue;
-    fmt::print("       {}: {:.6g} {}, but at most {:.6g} because: {}\n", measure.name,
+    print_text(stdout, "       {}: {:.6g} {}, but at most {:.6g} because: {}\n", measure.name,
                measure.value, measure.unit, measure.limit.value_or(0), measure.because);
   }
 }
@@ -222,7 +224,7 @@ int run_suite(const fs::path& folder, const std::vector<std::string>& filters,
   write_json(options.out / "report.json", report);
   write_junit(options.out / "junit.xml", report);
   const auto good = std::ranges::count(report.sections, Verdict::Passed, &Section::verdict);
-  fmt::print("{} of {} cases passed; see {}\n", good, report.sections.size(),
+  print_text(stdout, "{} of {} cases passed; see {}\n", good, report.sections.size(),
              (options.out / "report.html").string());
   return good == std::ssize(report.sections) ? done : failed;
 }
@@ -233,7 +235,7 @@ int accept(const fs::path& folder, const std::vector<std::string>& names,
     const fs::path place = (folder / name / "").parent_path();  // drops a trailing slash
     if (!fs::is_directory(place)) throw Error("{}: {}", place.string(), why_no_file(place));
     accept_case(read_case(place), options);
-    fmt::print("stored: {}\n", (place / "expected").string());
+    print_text(stdout, "stored: {}\n", (place / "expected").string());
   }
   return done;
 }
@@ -312,6 +314,8 @@ int main(int argc, char** argv) {
   } catch (const groundray::Interrupted&) {
     groundray::print_error("\ngroundray-golden: interrupted\n");
     return groundray::golden::interrupted;
+  } catch (const std::bad_alloc&) {
+    groundray::print_error("groundray-golden: there is not enough memory\n");
   } catch (const std::exception& error) {
     groundray::print_error("groundray-golden: {}\n", error.what());
   }

@@ -34,11 +34,11 @@ double mebibytes(std::uint64_t bytes) { return static_cast<double>(bytes) / (1 <
 // Prints the faults of a dataset and their number.
 Verification verify_one(const fs::path& folder) {
   const auto report = [](const std::string& fault) {
-    fmt::print("{}\n", fault);
+    print_text(stdout, "{}\n", fault);
     std::fflush(stdout);
   };
   const Verification found = verify(folder, report, stderr);
-  fmt::print("{}: {} files of {:.1f} MiB checked, {}\n", folder.string(), found.files,
+  print_text(stdout, "{}: {} files of {:.1f} MiB checked, {}\n", folder.string(), found.files,
              mebibytes(found.bytes),
              found.faults == 0
                  ? "all unchanged"
@@ -61,9 +61,9 @@ void verify_all(const std::vector<fs::path>& datasets) {
             dataset.string(), found.done, found.asked_for);
     } catch (const Error& error) {
       if (is_alone) throw;
-      fmt::print("{}\n", error.what());
+      print_text(stdout, "{}\n", error.what());
     } catch (const std::system_error& error) {
-      fmt::print("{}: {}\n", dataset.string(), error.what());
+      print_text(stdout, "{}: {}\n", dataset.string(), error.what());
     }
     if (!is_sound) ++at_fault;
   }
@@ -78,7 +78,7 @@ void verify_all(const std::vector<fs::path>& datasets) {
 void merge_shards(const std::vector<fs::path>& shards, const fs::path& out, FolderUse use) {
   const auto warn = [](const std::string& warning) { print_error("{}\n", warning); };
   const auto [frames, bytes] = merge(shards, out, use, {.progress = stderr, .warn = warn});
-  fmt::print("{} frames of {} shards, {:.1f} MiB\ndataset: {}\n", frames, shards.size(),
+  print_text(stdout, "{} frames of {} shards, {:.1f} MiB\ndataset: {}\n", frames, shards.size(),
              mebibytes(bytes), out.string());
 }
 

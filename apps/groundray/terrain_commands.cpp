@@ -16,6 +16,7 @@
 #include "apps/groundray/progress_stage.h"
 #include "apps/scene/interruption.h"
 #include "core/io/mesh_io.h"
+#include "core/io/print_error.h"
 #include "reconstruction/pipeline/terrain_decimation.h"
 #include "terrain/dem/dem_file.h"
 #include "terrain/dem/dem_io.h"
@@ -37,15 +38,16 @@ TriangleMesh place(TerrainMesh mesh, const HeightGrid& grid) {
 void print_mesh(const TriangleMesh& mesh, const HeightGrid& grid) {
   const double cells = static_cast<double>(grid.columns() - 1) * (grid.rows() - 1);
   const auto print_sum = [&] {
-    fmt::print("{} triangles ({:.3g} % of full resolution), {} vertices\n", mesh.triangles.size(),
-               50 * static_cast<double>(mesh.triangles.size()) / cells, mesh.vertices_m.size());
+    print_text(stdout, "{} triangles ({:.3g} % of full resolution), {} vertices\n",
+               mesh.triangles.size(), 50 * static_cast<double>(mesh.triangles.size()) / cells,
+               mesh.vertices_m.size());
   };
   if (mesh.levels.empty()) return print_sum();
   std::map<int, std::size_t> triangles;
   for (const std::uint8_t level : mesh.levels) ++triangles[level];
-  fmt::print("{:>5} {:>10} {:>12}\n", "level", "cell m", "triangles");
+  print_text(stdout, "{:>5} {:>10} {:>12}\n", "level", "cell m", "triangles");
   for (const auto& [level, count] : triangles) {
-    fmt::print("{:>5} {:>10.6g} {:>12}\n", level,
+    print_text(stdout, "{:>5} {:>10.6g} {:>12}\n", level,
                std::abs(grid.step_m().x) * static_cast<double>(std::int64_t{1} << level), count);
   }
   print_sum();
@@ -113,7 +115,7 @@ struct TerrainOptions {
     stop_if_interrupted();
     write_mesh(out, mesh, {read.origin_w_m, read.crs_name, read.crs_wkt});
     print_mesh(mesh, read.grid);
-    fmt::print("written to {}\n", out.string());
+    print_text(stdout, "written to {}\n", out.string());
   }
 
   TerrainMesh nodes(const Dem& read) const {
@@ -131,8 +133,8 @@ struct TerrainOptions {
         .most_bytes = most_bytes};
     DecimatedTerrain result = decimate_terrain(grid, max_error_m, control);
     const judge::MeshDeviation& deviation = result.deviation;
-    fmt::print("largest deviation {:.6g} m, at column {:.6g}, row {:.6g}\n", deviation.largest_m,
-               deviation.place.x, deviation.place.y);
+    print_text(stdout, "largest deviation {:.6g} m, at column {:.6g}, row {:.6g}\n",
+               deviation.largest_m, deviation.place.x, deviation.place.y);
     return std::move(result.mesh);
   }
 
@@ -143,15 +145,15 @@ struct TerrainOptions {
     const Certificate certificate = Certificate::open_or_make(
         file, {.progress = [&](double share) { progress.update(share); }});
     const double step_m = std::abs(file.header().step_m.x);
-    fmt::print("{:>5} {:>10} {:>12} {:>10} {:>10} {:>14} {:>15}\n", "level", "cell m", "nodes",
-               "holed", "empty", "max deviation m", "mean deviation m");
+    print_text(stdout, "{:>5} {:>10} {:>12} {:>10} {:>10} {:>14} {:>15}\n", "level", "cell m",
+               "nodes", "holed", "empty", "max deviation m", "mean deviation m");
     for (std::size_t level = 0; level < certificate.levels().size(); ++level) {
       const LevelSummary& summary = certificate.levels()[level];
-      fmt::print("{:>5} {:>10.6g} {:>12} {:>10} {:>10} {:>14.6g} {:>15.6g}\n", level,
+      print_text(stdout, "{:>5} {:>10.6g} {:>12} {:>10} {:>10} {:>14.6g} {:>15.6g}\n", level,
                  step_m * static_cast<double>(std::int64_t{1} << level), summary.nodes,
                  summary.mixed, summary.empty, summary.max_deviation_m, summary.mean_deviation_m);
     }
-    fmt::print("certificate: {}\n", certificate.folder().string());
+    print_text(stdout, "certificate: {}\n", certificate.folder().string());
   }
 };
 

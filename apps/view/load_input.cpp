@@ -37,7 +37,7 @@ bool is_one_of(const std::string& text, std::initializer_list<std::string_view> 
 bool has_faces(const fs::path& path) {
   std::ifstream file = open_stream(path);
   std::string line;
-  for (int i = 0; i < 1000 && std::getline(file, line); ++i) {
+  for (int i = 0; i < 1000 && next_line(file, line); ++i) {
     if (line.starts_with("end_header")) break;
     if (line.starts_with("element face") || line.starts_with("element tristrips"))
       return line.find_first_of("123456789", 12) != std::string::npos;

@@ -130,8 +130,7 @@ MeshReading read_gltf_mesh(const fs::path& path) {
 MeshReading read_mesh_file(const fs::path& path) {
   const std::string form = file_ending(path);
   if (form == ".gltf" || form == ".glb") return read_gltf_mesh(path);
-  if (form == ".stl")
-    return {.soup = read_scene_file(path, SceneForm::Stl), .georeference = stl_georeference(path)};
+  if (form == ".stl") return {.soup = read_stl(path), .georeference = stl_georeference(path)};
   if (form == ".ply") {
     const std::string bytes = read_text(path);
     return {parse_ply_faces(bytes, path.string()),

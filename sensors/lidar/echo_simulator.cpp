@@ -189,7 +189,7 @@ void EchoSimulator::sample_air(const AtmosphereSpec& air) {
 
 void EchoSimulator::collect(std::span<const Ray> rays, std::span<const Hit> hits,
                             const RetroBrdfs& brdfs, double extinction_per_m,
-                            Workspace& work) const noexcept {
+                            Workspace& work) const {
   sort_hits(hits, work.order);
   const std::size_t count = work.order.size();
   work.arrivals.resize(count);
@@ -225,7 +225,7 @@ void EchoSimulator::collect(std::span<const Ray> rays, std::span<const Hit> hits
 
 // Removes the return of the air behind each surface, which is not lit. It ends there abruptly,
 // which is exact except within the length of a pulse.
-void EchoSimulator::add_air(std::span<const Hit> hits, Workspace& work) const noexcept {
+void EchoSimulator::add_air(std::span<const Hit> hits, Workspace& work) const {
   work.air_w = air_w_;
   const float share = 1.0f / static_cast<float>(hits.size());
   for (const Arrival& arrival : work.arrivals) {
@@ -253,7 +253,7 @@ double EchoSimulator::air_energy_j(const Detection& detection,
 
 void EchoSimulator::receive(std::span<const Ray> rays, std::span<const Hit> hits,
                             std::span<const double> bounds_m, const RetroBrdfs& brdfs,
-                            const RandomKey& key, Workspace& work) const noexcept {
+                            const RandomKey& key, Workspace& work) const {
   collect(rays, hits, brdfs, atmosphere_.extinction_per_m(), work);
   if (air_w_.empty()) {
     receiver_.sample(work.arrivals, work.waveform);
@@ -271,7 +271,7 @@ void EchoSimulator::receive(std::span<const Ray> rays, std::span<const Hit> hits
 
 void EchoSimulator::attribute_echo(std::span<const Ray> rays, std::span<const Hit> hits,
                                    std::span<const double> bounds_m, const Detection& detection,
-                                   Workspace& work) const noexcept {
+                                   Workspace& work) const {
   Echo& echo = work.echoes.emplace_back();
   echo.detection = detection;
   const auto arrival_s = [&](const Arrival& a) { return receiver_.arrival_s(a.range_m); };
@@ -308,7 +308,7 @@ void EchoSimulator::attribute_echo(std::span<const Ray> rays, std::span<const Hi
 
 // Overwrites the arrivals, which are no longer needed.
 NoReturn EchoSimulator::reason_for_none(std::span<const Ray> rays, std::span<const Hit> hits,
-                                        const RetroBrdfs& brdfs, Workspace& work) const noexcept {
+                                        const RetroBrdfs& brdfs, Workspace& work) const {
   if (work.order.empty()) return NoReturn::Sky;
   const auto outside = [&](const Arrival& arrival) {
     return arrival.range_m < gate_.near_m || gate_.far_m < arrival.range_m;

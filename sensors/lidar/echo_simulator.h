@@ -125,7 +125,7 @@ class EchoSimulator {
   /// @param brdfs  reflection of the surfaces.
   void receive(std::span<const Ray> rays, std::span<const Hit> hits,
                std::span<const double> bounds_m, const RetroBrdfs& brdfs, const RandomKey& key,
-               Workspace& work) const noexcept;
+               Workspace& work) const;
 
   /// Returns the intensity that the sensor reports for an echo.
   float intensity(const Detection& detection) const noexcept;
@@ -138,17 +138,17 @@ class EchoSimulator {
 
  private:
   void collect(std::span<const Ray> rays, std::span<const Hit> hits, const RetroBrdfs& brdfs,
-               double extinction_per_m, Workspace& work) const noexcept;
+               double extinction_per_m, Workspace& work) const;
   double sun_cosine(const glm::vec3& normal) const noexcept {
     if (!spec_.sun.direction) return 1;
     return std::max(glm::dot(glm::dvec3(normal), *spec_.sun.direction), 0.0);
   }
-  void add_air(std::span<const Hit> hits, Workspace& work) const noexcept;
+  void add_air(std::span<const Hit> hits, Workspace& work) const;
   void attribute_echo(std::span<const Ray> rays, std::span<const Hit> hits,
                       std::span<const double> bounds_m, const Detection& detection,
-                      Workspace& work) const noexcept;
+                      Workspace& work) const;
   NoReturn reason_for_none(std::span<const Ray> rays, std::span<const Hit> hits,
-                           const RetroBrdfs& brdfs, Workspace& work) const noexcept;
+                           const RetroBrdfs& brdfs, Workspace& work) const;
   double air_energy_j(const Detection& detection, const Workspace& work) const noexcept;
   void sample_air(const AtmosphereSpec& air);
 

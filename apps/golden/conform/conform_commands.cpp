@@ -6,6 +6,7 @@
 
 #include "apps/golden/conform/conform.h"
 #include "apps/scan/number_checks.h"
+#include "core/io/print_error.h"
 
 namespace groundray::golden {
 
@@ -14,20 +15,21 @@ namespace fs = std::filesystem;
 void publish(const Report& report, const fs::path& out) {
   for (const Section& section : report.sections) {
     if (report.sections.size() > 1) {
-      fmt::print("{} {}\n", section.verdict == Verdict::Passed ? "passed" : "FAILED",
+      print_text(stdout, "{} {}\n", section.verdict == Verdict::Passed ? "passed" : "FAILED",
                  section.title);
     }
-    if (!section.text.empty()) fmt::print("{}\n", section.text);
+    if (!section.text.empty()) print_text(stdout, "{}\n", section.text);
     for (const Measure& measure : section.measures) {
-      fmt::print("{}{}: {:.6g}{}{}{}\n", measure.verdict == Verdict::Failed ? "FAILED " : "",
-                 measure.name, measure.value, measure.unit.empty() ? "" : " ", measure.unit,
+      print_text(stdout, "{}{}: {:.6g}{}{}{}\n",
+                 measure.verdict == Verdict::Failed ? "FAILED " : "", measure.name, measure.value,
+                 measure.unit.empty() ? "" : " ", measure.unit,
                  measure.limit ? fmt::format(", at most {:.6g}", *measure.limit) : "");
     }
   }
   fs::create_directories(out);
   write_html(out / "report.html", report);
   write_json(out / "report.json", report);
-  fmt::print("see {}\n", (out / "report.html").string());
+  print_text(stdout, "see {}\n", (out / "report.html").string());
 }
 
 void PassesCommand::add_to(CLI::App* command) {
@@ -63,7 +65,7 @@ void PassesCommand::run() {
   if (!viewpoint_m.empty()) settings.viewpoint_m = {viewpoint_m[0], viewpoint_m[1], viewpoint_m[2]};
   settings.commit = GROUNDRAY_COMMIT;
   write_pass_folder(dem, settings, out);
-  fmt::print("{}: judge another mesher or tracer with groundray-golden conform {} THEIRS\n",
+  print_text(stdout, "{}: judge another mesher or tracer with groundray-golden conform {} THEIRS\n",
              (out / "manifest.json").string(), out.string());
 }
 

@@ -12,6 +12,8 @@
 #include <type_traits>
 #include <utility>
 
+#include "core/error.h"
+
 /// Numbers given by Python: arrays, or lists and other values that NumPy converts to arrays.
 namespace groundray::python {
 
@@ -74,7 +76,8 @@ std::string words_of(nanobind::shape<-1, columns> /*shape*/) {
 namespace nanobind::detail {
 
 /// Accepts all values; those that neither the array's own caster nor numpy.asarray converts are
-/// reported by NumpyArgument::check, which knows the argument's name.
+/// reported by NumpyArgument::check, which knows the argument's name. Masked values of a masked
+/// array are holes (NaN) in rasters; elsewhere they are rejected.
 template <typename Array>
 struct type_caster<groundray::python::NumpyArgument<Array>> {
   using Argument = groundray::python::NumpyArgument<Array>;
@@ -86,6 +89,32 @@ struct type_caster<groundray::python::NumpyArgument<Array>> {
                                       "numpy.typing.ArrayLike"))
 
   bool from_python(handle source, std::uint8_t flags, cleanup_list* cleanup) noexcept {
+    try {
+      if (!hasattr(source, "mask") || !hasattr(source, "filled"))
+        return read(source, flags, cleanup);
+      const object given = borrow(source);
+      const object any = module_::import_("numpy").attr("any")(given.attr("mask"));
+      if (PyObject_IsTrue(any.ptr()) == 0) return read(given.attr("data"), flags, cleanup);
+      if (is_raster) return read(holes_of(given), flags, cleanup);
+      throw groundray::Error(
+          "an array has masked values, which have no meaning here: remove them, or fill them by "
+          "numpy.ma.filled");
+    } catch (...) {
+      value = Argument(std::current_exception());
+      return true;
+    }
+  }
+
+ private:
+  static constexpr bool is_raster =
+      std::is_same_v<std::remove_const_t<typename Array::Scalar>, float>;
+
+  static object holes_of(const object& masked) {
+    const object numpy = module_::import_("numpy");
+    return masked.attr("astype")(numpy.attr("float32")).attr("filled")(numpy.attr("nan"));
+  }
+
+  bool read(handle source, std::uint8_t flags, cleanup_list* cleanup) {
     constexpr auto convert = static_cast<std::uint8_t>(cast_flags::convert);
     const auto as_it_is = static_cast<std::uint8_t>(flags & ~convert);
     if (take(source, is_whole ? as_it_is : flags, cleanup)) return true;
@@ -95,16 +124,12 @@ struct type_caster<groundray::python::NumpyArgument<Array>> {
       if ((is_whole && !holds_whole(made)) || !take(made, flags, cleanup))
         value = Argument(misfit(form_of(made)));
     } catch (python_error& error) {
-      value = error.matches(PyExc_TypeError) || error.matches(PyExc_ValueError)
-                  ? Argument(misfit(fmt::format("a {}", Py_TYPE(source.ptr())->tp_name)))
-                  : Argument(std::current_exception());
-    } catch (...) {
-      value = Argument(std::current_exception());
+      if (!error.matches(PyExc_TypeError) && !error.matches(PyExc_ValueError)) throw;
+      value = Argument(misfit(fmt::format("a {}", Py_TYPE(source.ptr())->tp_name)));
     }
     return true;
   }
 
- private:
   bool take(handle source, std::uint8_t flags, cleanup_list* cleanup) noexcept {
     ArrayCaster caster;
     if (!caster.from_python(source, flags, cleanup)) return false;

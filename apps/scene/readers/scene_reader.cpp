@@ -10,6 +10,7 @@
 #include "apps/scene/readers/readers.h"
 #include "apps/scene/yaml_reader.h"
 #include "core/appearance/bsdf.h"
+#include "core/io/open_file.h"
 #include "sensors/lidar/lidar.h"
 
 namespace groundray::yaml {
@@ -253,9 +254,8 @@ CameraSpec parse_camera(const std::string& text, const fs::path& path) {
 std::vector<std::string> preset_names(const fs::path& preset_folder) {
   std::vector<std::string> names;
   std::error_code fault;
-  for (const fs::directory_entry& entry : fs::directory_iterator(preset_folder, fault)) {
-    if (entry.path().extension() == ".yaml") names.push_back(entry.path().stem().string());
-  }
+  for (const fs::path name : names_in(preset_folder, fault))
+    if (name.extension() == ".yaml") names.push_back(name.stem().string());
   if (fault) {
     throw Error("{}: the folder of presets cannot be read: {}", preset_folder.string(),
                 fault.message());
