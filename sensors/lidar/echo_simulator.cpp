@@ -22,6 +22,13 @@ ReceiverSpec receiver_in(const LightSpec& spec, const AtmosphereSpec& air) {
   return receiver;
 }
 
+// Returns a function that returns the share of a pulse's energy that a sub-ray has.
+auto shares_of(const LitPulse& pulse) {
+  const double equal = 1.0 / static_cast<double>(pulse.hits.size());
+  return
+      [shares = pulse.shares, equal](std::size_t i) { return shares.empty() ? equal : shares[i]; };
+}
+
 // Facets of one plane and those of parallel planes: their normals differ by less than 1e-3 rad.
 constexpr double parallel_cosine = 1 - 5e-7;
 
@@ -79,7 +86,7 @@ struct EnergyShares {
   std::size_t best_number = 0;
   double energy_j = 0;
 };
-EnergyShares shares_of(std::span<const LitSurface> surfaces) {
+EnergyShares strongest_of(std::span<const LitSurface> surfaces) {
   EnergyShares shares;
   for (std::size_t n = 0; n < surfaces.size(); ++n) {
     shares.energy_j += surfaces[n].energy_j;
@@ -121,6 +128,11 @@ bool sort_by_counting(std::span<const Hit> hits, std::vector<std::uint32_t>& ord
 
 // Lists the hits by range; hits of equal range keep their order.
 void sort_hits(std::span<const Hit> hits, std::vector<std::uint32_t>& order) {
+  if (hits.back() && std::ranges::is_sorted(hits, {}, &Hit::range_m)) {
+    order.resize(hits.size());
+    std::iota(order.begin(), order.end(), 0);
+    return;
+  }
   if (hits.size() <= 16 && sort_by_counting<16>(hits, order)) return;
   if (hits.size() <= 32 && sort_by_counting<32>(hits, order)) return;
   order.clear();
@@ -214,26 +226,25 @@ double EchoSimulator::even_spacing_m() const {
   return receiver_.pulse().even_spacing_s(receiver_.interval_s()) / receiver_.arrival_s(1);
 }
 
-void EchoSimulator::collect(const LitPulse& pulse, const RetroBrdfs& brdfs,
-                            double extinction_per_m, Workspace& work) const noexcept {
+void EchoSimulator::collect(const LitPulse& pulse, const RetroBrdfs& brdfs, double extinction_per_m,
+                            Workspace& work) const noexcept {
   sort_hits(pulse.hits, work.order);
   const std::size_t count = work.order.size();
   work.arrivals.resize(count);
   work.sunlit = 0;
   if (count == 0) return;
   Arrival* const arrivals = work.arrivals.data();
+  const auto share = shares_of(pulse);
   for (std::size_t k = 0; k < count; ++k) {
     const std::uint32_t i = work.order[k];
     const Hit& hit = pulse.hits[i];
-    const auto [retro_cos_per_sr, albedo] =
-        brdfs.reflection_of(pulse.rays[i], hit, pulse.traced);
+    const auto [retro_cos_per_sr, albedo] = brdfs.reflection_of(pulse.rays[i], hit, pulse.traced);
     arrivals[k] = {hit.range_m, retro_cos_per_sr};
-    work.sunlit += pulse.share(i) * albedo * sun_cosine(hit.normal);
+    work.sunlit += share(i) * albedo * sun_cosine(hit.normal);
   }
   const auto receive = [&](std::size_t k, double transmission) {
     Arrival& arrival = arrivals[k];
-    const double seen =
-        pulse.share(work.order[k]) * overlap_share(spec_.overlap, arrival.range_m);
+    const double seen = share(work.order[k]) * overlap_share(spec_.overlap, arrival.range_m);
     arrival.energy_j =
         seen > 0 ? radar_.received_energy_j(seen, arrival.energy_j, arrival.range_m, transmission)
                  : 0;
@@ -256,6 +267,7 @@ void EchoSimulator::collect(const LitPulse& pulse, const RetroBrdfs& brdfs,
 void EchoSimulator::add_air(const LitPulse& pulse, Workspace& work) const noexcept {
   constexpr double rounding = 1e-12;  // of the sum of all shares
   work.air_w.resize(air_w_.size());
+  const auto share = shares_of(pulse);
   double lit = 1;
   std::size_t bin = 0;
   const auto fill = [&](std::size_t end) {
@@ -266,7 +278,7 @@ void EchoSimulator::add_air(const LitPulse& pulse, Workspace& work) const noexce
     const double end = std::ceil(receiver_.arrival_s(work.arrivals[k].range_m) / interval_s()) -
                        static_cast<double>(first_air_bin_);
     fill(static_cast<std::size_t>(std::clamp(end, 0.0, static_cast<double>(air_w_.size()))));
-    lit -= pulse.share(work.order[k]);
+    lit -= share(work.order[k]);
   }
   fill(air_w_.size());
   work.waveform.add(first_air_bin_, work.air_w);
@@ -297,8 +309,7 @@ void EchoSimulator::receive(const LitPulse& pulse, const RetroBrdfs& brdfs, cons
   }
   receiver_.detect(work.waveform, gate_, {key, sun_w_ * work.sunlit}, work.detections);
   work.echoes.clear();
-  for (const Detection& detection : work.detections)
-    attribute_echo(pulse, detection, work);
+  for (const Detection& detection : work.detections) attribute_echo(pulse, detection, work);
   if (work.echoes.empty()) work.reason = reason_for_none(pulse, brdfs, work);
 }
 
@@ -312,7 +323,7 @@ void EchoSimulator::attribute_echo(const LitPulse& pulse, const Detection& detec
   const auto end = std::ranges::lower_bound(begin, all_end, detection.end_s, {}, arrival_s);
   const auto first = static_cast<std::size_t>(begin - all_begin);
   part_surfaces(pulse, first, static_cast<std::size_t>(end - all_begin), resolution_m_, work);
-  const auto [best, second, best_number, energy_j] = shares_of(work.surfaces);
+  const auto [best, second, best_number, energy_j] = strongest_of(work.surfaces);
   const double air_j = air_energy_j(detection, work);
   if (detection.kind == Detection::Kind::FalseAlarm || best.energy_j <= air_j) {
     echo.kind =

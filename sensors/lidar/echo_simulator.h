@@ -60,11 +60,7 @@ struct LitPulse {
   std::span<const Hit> hits;         ///< one for each of `rays`
   std::span<const double> shares;    ///< of the pulse's energy, one for each; empty if equal
   std::span<const double> bounds_m;  ///< error bounds of the hits' ranges; may be empty
-  std::size_t traced = 0;            ///< number of sub-rays that share the beam's area, for textures
-
-  double share(std::size_t i) const {
-    return shares.empty() ? 1.0 / static_cast<double>(hits.size()) : shares[i];
-  }
+  std::size_t traced = 0;  ///< number of sub-rays that share the beam's area, for textures
 };
 
 /// Echo of a pulse and the ground truth about it.

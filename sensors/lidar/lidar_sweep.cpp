@@ -69,8 +69,11 @@ class Lidar::Sweep {
         key_(key),
         pulses_(lidar.pattern_.pulses(number)),
         any_moves_(scene.objects.any_moves()),
-        settings_{lidar.beam_, lidar.last_level_, lidar.light_ ? lidar.light_->resolution_m() : 0,
-                  spec_.angular_jitter_rad, rays_end_m(spec_),
+        settings_{lidar.beam_,
+                  lidar.last_level_,
+                  lidar.light_ ? lidar.light_->resolution_m() : 0,
+                  spec_.angular_jitter_rad,
+                  rays_end_m(spec_),
                   lidar.planes_ ? &*lidar.planes_ : nullptr} {
     if (lidar.light_) brdfs_.emplace(scene, lidar.light_->spec().wavelength_nm, lidar.beam_);
     if (spec_.points == LidarSpec::Points::AtStamp) X_SD_ = inverse(X_DS.pose_at(path_.stamp));
@@ -222,7 +225,7 @@ void Lidar::Sweep::receive(const EchoSimulator& light, std::size_t pulse, const 
   const auto plane = lidar_.planes_->plane_of(lidar_.beam_, axis, lit.rays, lit.hits);
   if (!plane) return light.receive(lit, *brdfs_, key, work);
   FootprintSamples& samples = chunk.samples;
-  lidar_.planes_->sample(lidar_.beam_, axis, *plane, lit.rays, lit.hits, samples);
+  lidar_.planes_->sample(axis, *plane, lit.rays, lit.hits, samples);
   light.receive({samples.rays, samples.hits, samples.shares, {}, lit.traced}, *brdfs_, key, work);
   for (Echo& echo : work.echoes) {
     echo.hit = samples.traced[echo.hit];
@@ -261,8 +264,8 @@ void Lidar::Sweep::compare(std::size_t pulse, Chunk& chunk) const {
           chunk);
   const std::vector<Echo> coarse = chunk.work.echoes;
   cast.cast_again(pulse, finer, lidar_.beam_, key_, scene_, chunk.rays_again, chunk.hits_again);
-  receive(light, pulse,
-          {chunk.rays_again, chunk.hits_again, {}, {}, chunk.rays_again.size()}, chunk);
+  receive(light, pulse, {chunk.rays_again, chunk.hits_again, {}, {}, chunk.rays_again.size()},
+          chunk);
   const std::vector<Echo>& fine = chunk.work.echoes;
   Convergence& seen = chunk.convergence;
   ++seen.pulses;

@@ -268,18 +268,15 @@ LaserBeam::LaserBeam(const BeamSpec& spec)
 // Positions w(0) a and slopes t c have standard deviations of half these radii. The regression of
 // the slope on x = w(0) a + R t c has the coefficient R t^2 / w(R)^2, and the residual the standard
 // deviation t w(0) / (2 w(R)).
-LaserBeam::SubRay LaserBeam::through(const glm::dvec2& p, double range_m,
-                                     const glm::dvec2& deviation) const noexcept {
-  const glm::dvec2 radius = radius_m(range_m);
-  SubRay to;
+LaserBeam::Section LaserBeam::section(double range_m) const noexcept {
+  Section section{.radius_m = radius_m(range_m), .range_m = range_m};
   for (int i = 0; i < 2; ++i) {
-    if (radius[i] == 0) continue;
-    to.slope[i] = tangent_[i] / radius[i] *
-                  (p[i] * range_m * tangent_[i] + 0.5 * deviation[i] * waist_m_[i]);
-    to.offset_m[i] = p[i] * radius[i] - range_m * to.slope[i];
+    if (section.radius_m[i] == 0) continue;
+    const double ratio = tangent_[i] / section.radius_m[i];
+    section.slope[i] = ratio * range_m * tangent_[i];
+    section.deviation[i] = 0.5 * ratio * waist_m_[i];
   }
-  to.per_length = 1 / std::sqrt(1 + glm::dot(to.slope, to.slope));
-  return to;
+  return section;
 }
 
 }  // namespace groundray

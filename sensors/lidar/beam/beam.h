@@ -88,11 +88,22 @@ class LaserBeam {
   /// If the ranges of a pair differ much, the level is too coarse.
   std::span<const glm::ivec2> neighbours(int level) const { return at(level).neighbours; }
 
-  /// Returns a sub-ray through a point of the cross-section at a distance along the axis.
-  /// @param p  (h, v) in units of the radii there.
-  /// @param deviation  (h, v) of its slope from the mean of the sub-rays through that point, over
-  ///        their standard deviation.
-  SubRay through(const glm::dvec2& p, double range_m, const glm::dvec2& deviation) const noexcept;
+  /// Cross-section at a distance along the axis.
+  struct Section {
+    glm::dvec2 radius_m{0};
+    glm::dvec2 slope{0};      ///< mean of the sub-rays through the point (radius, radius)
+    glm::dvec2 deviation{0};  ///< standard deviation of the slopes at a point
+    double range_m = 0;
+
+    /// Returns a sub-ray through a point.
+    /// @param p  (h, v) in units of the radii.
+    /// @param deviations  (h, v) of its slope from the mean at the point, standard deviations.
+    SubRay through(const glm::dvec2& p, const glm::dvec2& deviations) const noexcept {
+      const glm::dvec2 to = p * slope + deviations * deviation;
+      return {p * radius_m - range_m * to, to, 1 / std::sqrt(1 + to.x * to.x + to.y * to.y)};
+    }
+  };
+  Section section(double range_m) const noexcept;
 
   /// Returns the radii w (1/e^2 or edge) at a distance along the axis. surface_patch()
   /// (core/geometry/footprint.h) projects a width onto a surface.

@@ -23,9 +23,11 @@ struct PulseAxis {
 struct FootprintPlane {
   glm::dvec3 normal{0};
   double offset_m = 0;
-  double axis_m = 0;         ///< distance along the axis
-  glm::dvec2 gradient_m{0};  ///< by (h, v): decrease of the range from the axis to the beam's radius
-  std::size_t table = 0;     ///< of the quadrature
+  double axis_m = 0;           ///< distance along the axis
+  LaserBeam::Section section;  ///< of the beam there
+  glm::dvec3 vertical{0};      ///< unit vector v across the axis, in D
+  glm::dvec2 along{0};         ///< (h, v) in units of the radii: where the range decreases; unit
+  std::size_t table = 0;       ///< of the quadrature
 };
 
 /// Sub-rays of unequal energy that sample a footprint, their hits, their shares of the pulse's
@@ -58,20 +60,19 @@ class PlaneQuadrature {
 
   /// Sets `samples` to the quadrature of a beam over a plane, nearly in order of range.
   /// @param traced  hits from which the plane was found.
-  void sample(const LaserBeam& beam, const PulseAxis& axis, const FootprintPlane& plane,
-              std::span<const Ray> rays, std::span<const Hit> traced,
-              FootprintSamples& samples) const;
+  void sample(const PulseAxis& axis, const FootprintPlane& plane, std::span<const Ray> rays,
+              std::span<const Hit> traced, FootprintSamples& samples) const;
 
  private:
-  // Position along the gradient in units of the beam's radius, half of the distance between the two
-  // nodes there, and the share of each.
+  // Position in units of the beam's radius, and share of the energy.
   struct Node {
-    double along = 0, across = 0, share = 0;
+    double along = 0, across = 0;  // the gradient
+    double share = 0;
   };
 
   double spacing_m_, resolution_m_;
   double reach_;                           // of the nodes, in units of the beam's radius
-  std::vector<std::vector<Node>> tables_;  // each next one has twice the nodes
+  std::vector<std::vector<Node>> tables_;  // each next one has more nodes
 };
 
 }  // namespace groundray

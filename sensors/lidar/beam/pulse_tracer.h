@@ -41,7 +41,7 @@ class PulseTracer {
     int last_level = 0;       ///< last level of refinement
     double resolution_m = 0;  ///< pulses are refined if ranges of neighbours differ by more
     double angular_jitter_rad = 0;
-    double far_m = 0;  ///< end of the rays
+    double far_m = 0;                         ///< end of the rays
     const PlaneQuadrature* planes = nullptr;  ///< pulses on a plane need no refinement
   };
 

@@ -83,8 +83,8 @@ class Centroid {
   // Adds a sub-ray from an offset and with a slope across the axis.
   void add(double weight, const glm::dvec2& offset_m, const glm::dvec2& slope) {
     const glm::dvec3 d = glm::normalize(axis_ + slope.x * h_ + slope.y * v_);
-    const double height_m = aim_.range_m * std::cos(aim_.incidence_rad) + offset_m.x * h_.z +
-                            offset_m.y * v_.z;
+    const double height_m =
+        aim_.range_m * std::cos(aim_.incidence_rad) + offset_m.x * h_.z + offset_m.y * v_.z;
     if (d.z >= 0) return;
     const double range_m = height_m / -d.z;
     const double energy = weight * retro_cos_(-d.z) / (range_m * range_m);
