@@ -223,7 +223,9 @@ void EchoSimulator::sample_air(const AtmosphereSpec& air) {
 }
 
 double EchoSimulator::even_spacing_m() const {
-  return receiver_.pulse().even_spacing_s(receiver_.interval_s()) / receiver_.arrival_s(1);
+  constexpr double least_intervals = 1.0 / 16;
+  const double least_s = least_intervals * receiver_.interval_s();
+  return receiver_.pulse().even_spacing_s(least_s) / receiver_.arrival_s(1);
 }
 
 void EchoSimulator::collect(const LitPulse& pulse, const RetroBrdfs& brdfs, double extinction_per_m,

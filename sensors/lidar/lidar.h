@@ -78,6 +78,8 @@ class Lidar {
   explicit Lidar(const LidarSpec& spec, const AtmosphereSpec& air = {});
 
   const ScanPattern& pattern() const { return pattern_; }
+  /// Returns the limit of the refinement of a pulse.
+  std::size_t most_sub_rays() const { return beam_.sub_rays(last_level_).size(); }
 
   /// Returns one sweep. Each echo has a row, in firing order and by range, with the columns of
   /// docs/reference/formats.md: x y z (float, m, in S as the pulse fired or at the stamp),

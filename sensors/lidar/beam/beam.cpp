@@ -265,16 +265,13 @@ LaserBeam::LaserBeam(const BeamSpec& spec)
   }
 }
 
-// Positions w(0) a and slopes t c have standard deviations of half these radii. The regression of
-// the slope on x = w(0) a + R t c has the coefficient R t^2 / w(R)^2, and the residual the standard
-// deviation t w(0) / (2 w(R)).
+// The regression of a sub-ray's slope t c on its position w(0) a + R t c has the coefficient
+// R t^2 / w(R)^2.
 LaserBeam::Section LaserBeam::section(double range_m) const noexcept {
   Section section{.radius_m = radius_m(range_m), .range_m = range_m};
   for (int i = 0; i < 2; ++i) {
-    if (section.radius_m[i] == 0) continue;
-    const double ratio = tangent_[i] / section.radius_m[i];
-    section.slope[i] = ratio * range_m * tangent_[i];
-    section.deviation[i] = 0.5 * ratio * waist_m_[i];
+    if (section.radius_m[i] > 0)
+      section.slope[i] = range_m * tangent_[i] * tangent_[i] / section.radius_m[i];
   }
   return section;
 }

@@ -91,15 +91,12 @@ class LaserBeam {
   /// Cross-section at a distance along the axis.
   struct Section {
     glm::dvec2 radius_m{0};
-    glm::dvec2 slope{0};      ///< mean of the sub-rays through the point (radius, radius)
-    glm::dvec2 deviation{0};  ///< standard deviation of the slopes at a point
+    glm::dvec2 slope{0};  ///< mean of the sub-rays through the point (radius, radius)
     double range_m = 0;
 
-    /// Returns a sub-ray through a point.
-    /// @param p  (h, v) in units of the radii.
-    /// @param deviations  (h, v) of its slope from the mean at the point, standard deviations.
-    SubRay through(const glm::dvec2& p, const glm::dvec2& deviations) const noexcept {
-      const glm::dvec2 to = p * slope + deviations * deviation;
+    /// Returns the mean of the sub-rays through a point, (h, v) in units of the radii.
+    SubRay through(const glm::dvec2& p) const noexcept {
+      const glm::dvec2 to = p * slope;
       return {p * radius_m - range_m * to, to, 1 / std::sqrt(1 + to.x * to.x + to.y * to.y)};
     }
   };

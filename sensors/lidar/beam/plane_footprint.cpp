@@ -133,12 +133,10 @@ void PlaneQuadrature::sample(const PulseAxis& axis, const FootprintPlane& plane,
   Hit hit = traced[samples.traced[0]];
   hit.normal = glm::vec3(plane.normal);
   for (const Hit& other : traced) hit.deviation_m = std::max(hit.deviation_m, other.deviation_m);
-  // The position across the gradient and the deviations of the slope alternate independently.
-  constexpr glm::dvec2 deviations[] = {{1, 1}, {1, -1}, {-1, -1}, {-1, 1}};
   for (std::size_t k = 0; k < table.size(); ++k) {
     const Node& node = table[k];
     const LaserBeam::SubRay to =
-        plane.section.through(node.along * plane.along + node.across * across, deviations[k % 4]);
+        plane.section.through(node.along * plane.along + node.across * across);
     const glm::dvec3 origin =
         axis.ray.origin + to.offset_m.x * axis.horizontal + to.offset_m.y * plane.vertical;
     const glm::dvec3 direction =
