@@ -19,11 +19,13 @@ void read_beam(Map beam, BeamSpec& spec) {
   read_scaled_pair(beam, "divergence_mrad", 1e-3, spec.divergence_rad);
   read_scaled_pair(beam, "aperture_mm", 1e-3, spec.aperture_m);
   std::uint32_t sub_rays = static_cast<std::uint32_t>(spec.sub_rays);
-  if (beam.read_whole("sub_rays", Need::Optional, sub_rays))
-    spec.sub_rays = spec.most_sub_rays = static_cast<int>(std::min(sub_rays, 1u << 20));
-  std::uint32_t most = static_cast<std::uint32_t>(spec.most_sub_rays);
-  beam.read_whole("most_sub_rays", Need::Optional, most);
-  spec.most_sub_rays = static_cast<int>(std::min(most, 1u << 20));
+  if (beam.read_whole("sub_rays", Need::Optional, sub_rays)) {
+    spec.sub_rays = static_cast<int>(std::min(sub_rays, 1u << 20));
+    spec.most_sub_rays.reset();
+  }
+  std::uint32_t most = 0;
+  if (beam.read_whole("most_sub_rays", Need::Optional, most))
+    spec.most_sub_rays = static_cast<int>(std::min(most, 1u << 20));
   beam.read_choice("turn", Need::Optional, spec.turn, {"fixed", "each_pulse"});
   beam.close();
 }

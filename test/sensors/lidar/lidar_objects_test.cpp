@@ -114,7 +114,8 @@ LidarSpec down(double divergence_rad, int sub_rays) {
   spec.pattern = TablePattern{.period_s = 1, .shots = {{.elevation_rad = -pi / 2}}};
   spec.gate = {0.1, 2000};
   spec.beam.divergence_rad = glm::dvec2(divergence_rad);
-  spec.beam.sub_rays = spec.beam.most_sub_rays = sub_rays;
+  spec.beam.sub_rays = sub_rays;
+  spec.beam.most_sub_rays = sub_rays;
   spec.light.emplace();
   spec.light->wavelength_nm = 905;
   spec.light->optics = {.pulse_energy_j = 1e-7, .aperture_diameter_m = 0.025};
