@@ -148,9 +148,12 @@ nb::object convergence_of(const Sweep& sweep) {
   nb::dict all;
   all["pulses"] = seen.pulses;
   all["other_echoes"] = seen.changed;
-  all["range_rms_m"] = std::sqrt(seen.sum_squares_m2 /
-                                 static_cast<double>(std::max<std::uint64_t>(1, seen.compared)));
-  all["range_max_m"] = seen.largest_m;
+  all["range_rms_m"] = seen.range_m.rms();
+  all["range_max_m"] = seen.range_m.largest;
+  all["true_rms_m"] = seen.true_m.rms();
+  all["true_max_m"] = seen.true_m.largest;
+  all["share_rms"] = seen.share.rms();
+  all["share_max"] = seen.share.largest;
   return all;
 }
 
@@ -186,7 +189,8 @@ count, first_sample (index in power_w) and start_s, its time since the emission 
           R"(Convergence of the footprint: the change by twice the sub-rays; None for single rays.
 
 Of every 64th pulse: pulses compared, other_echoes (pulses whose number of echoes would change),
-range_rms_m and range_max_m, the differences in range of the other pulses' first echoes.)")
+and the differences between the echoes of the other pulses: range_rms_m and range_max_m of the range,
+true_rms_m and true_max_m of range_true, share_rms and share_max of the share.)")
       .def("__repr__", [](const Sweep& sweep) {
         return fmt::format("<Scan {} of lidar '{}', {} s: {} echoes of {}>", sweep.frame,
                            sweep.placed().spec.name, seconds_of(sweep.stamp()), sweep.cloud.rows(),
@@ -235,6 +239,7 @@ AnyArray directions_of(nb::handle_t<SceneCamera> self) {
 }
 
 AnyArray project(const SceneCamera& camera, const GivenPoints& points_m) {
+  points_m.check("project: points_m");
   constexpr double none = std::numeric_limits<double>::quiet_NaN();
   std::vector<double> pixels = without_gil([&](const StopRequest&) {
     const Lens& lens = camera.placed().camera.lens();

@@ -247,7 +247,8 @@ EchoBeam echo_beam(const RecordedSensor& lidar, const RecordedFrame& frame, cons
   set_axis(lidar, frame, scan, row, *point_S, beam);
   beam.true_m = vector_of(scan, {"world_x", "world_y", "world_z"}, row);
   BeamSpec spec = lidar.lidar ? lidar.lidar->spec.beam : BeamSpec{};
-  spec.sub_rays = spec.most_sub_rays = 1;
+  spec.sub_rays = 1;
+  spec.most_sub_rays.reset();
   const LaserBeam laser(spec);
   const glm::dvec2 radius_m = laser.radius_m(beam.range_m);
   beam.horizontal_radius_m = radius_m.x;

@@ -37,7 +37,8 @@ void apply_scene_settings(const SceneSpec& scene, const Materials& materials, Li
   if (!lidar.light) return;
   if (materials.all().empty()) {
     lidar.light.reset();
-    lidar.beam.sub_rays = lidar.beam.most_sub_rays = 1;
+    lidar.beam.sub_rays = 1;
+    lidar.beam.most_sub_rays.reset();
     lidar.waveforms = LidarSpec::WaveformOutput::Omit;
     notes.emplace_back(
         "the scene's surfaces have no materials, so only rays were traced: ranges are exact, "

@@ -22,25 +22,55 @@ ReceiverSpec receiver_in(const LightSpec& spec, const AtmosphereSpec& air) {
   return receiver;
 }
 
-// Divides arrivals [begin, end), sorted by range, into surfaces: hits of one object whose
-// consecutive ranges differ by at most `resolution_m`.
-void part_surfaces(std::span<const Hit> hits, std::size_t begin, std::size_t end,
-                   double resolution_m, EchoSimulator::Workspace& work) {
+// Returns a function that returns the share of a pulse's energy that a sub-ray has.
+auto shares_of(const LitPulse& pulse) {
+  const double equal = 1.0 / static_cast<double>(pulse.hits.size());
+  return
+      [shares = pulse.shares, equal](std::size_t i) { return shares.empty() ? equal : shares[i]; };
+}
+
+// Facets of one plane and those of parallel planes: their normals differ by less than 1e-3 rad.
+constexpr double parallel_cosine = 1 - 5e-7;
+
+// Returns whether two hits of one object, the nearer one first, belong to one surface. The plane of
+// a hit predicts the range of the other; where it does not, their ranges count.
+bool are_joined(const LitPulse& pulse, std::uint32_t near, std::uint32_t far, double resolution_m) {
+  const auto point = [&](std::uint32_t i) {
+    return pulse.rays[i].origin + pulse.rays[i].direction * pulse.hits[i].range_m;
+  };
+  const glm::dvec3 apart = point(far) - point(near);
+  const auto predicts = [&](const glm::dvec3& normal, std::uint32_t other) {
+    return std::abs(glm::dot(normal, apart)) <=
+           resolution_m * std::abs(glm::dot(normal, pulse.rays[other].direction));
+  };
+  const glm::dvec3 near_normal(pulse.hits[near].normal), far_normal(pulse.hits[far].normal);
+  if (glm::dot(near_normal, far_normal) > parallel_cosine) return predicts(near_normal, far);
+  return pulse.hits[far].range_m - pulse.hits[near].range_m <= resolution_m ||
+         (predicts(near_normal, far) && predicts(far_normal, near));
+}
+
+// Divides arrivals [begin, end), sorted by range, into surfaces.
+void part_surfaces(const LitPulse& pulse, std::size_t begin, std::size_t end, double resolution_m,
+                   EchoSimulator::Workspace& work) {
   work.surfaces.clear();
   work.surface_of.resize(end - begin);
+  const bool unresolved =
+      begin < end && work.arrivals[end - 1].range_m - work.arrivals[begin].range_m <= resolution_m;
   for (std::size_t k = begin; k < end; ++k) {
-    const auto [range_m, energy_j] = work.arrivals[k];
-    const std::uint32_t object = hits[work.order[k]].object;
+    const double energy_j = work.arrivals[k].energy_j;
+    const std::uint32_t hit = work.order[k], object = pulse.hits[hit].object;
+    const auto continues = [&](const LitSurface& surface) {
+      return surface.object == object &&
+             (unresolved || are_joined(pulse, work.order[surface.last], hit, resolution_m));
+    };
     std::size_t at = work.surfaces.size();
-    while (at > 0 && !(work.surfaces[at - 1].object == object &&
-                       range_m - work.surfaces[at - 1].last_m <= resolution_m))
-      --at;
+    while (at > 0 && !continues(work.surfaces[at - 1])) --at;
     if (at == 0) {
       work.surfaces.push_back({.object = object});
       at = work.surfaces.size();
     }
     LitSurface& surface = work.surfaces[at - 1];
-    surface.last_m = range_m;
+    surface.last = k;
     surface.energy_j += energy_j;
     if (energy_j > surface.strongest_j) {
       surface.strongest_j = energy_j;
@@ -56,7 +86,7 @@ struct EnergyShares {
   std::size_t best_number = 0;
   double energy_j = 0;
 };
-EnergyShares shares_of(std::span<const LitSurface> surfaces) {
+EnergyShares strongest_of(std::span<const LitSurface> surfaces) {
   EnergyShares shares;
   for (std::size_t n = 0; n < surfaces.size(); ++n) {
     shares.energy_j += surfaces[n].energy_j;
@@ -98,6 +128,11 @@ bool sort_by_counting(std::span<const Hit> hits, std::vector<std::uint32_t>& ord
 
 // Lists the hits by range; hits of equal range keep their order.
 void sort_hits(std::span<const Hit> hits, std::vector<std::uint32_t>& order) {
+  if (hits.back() && std::ranges::is_sorted(hits, {}, &Hit::range_m)) {
+    order.resize(hits.size());
+    std::iota(order.begin(), order.end(), 0);
+    return;
+  }
   if (hits.size() <= 16 && sort_by_counting<16>(hits, order)) return;
   if (hits.size() <= 32 && sort_by_counting<32>(hits, order)) return;
   order.clear();
@@ -187,25 +222,31 @@ void EchoSimulator::sample_air(const AtmosphereSpec& air) {
   }
 }
 
-void EchoSimulator::collect(std::span<const Ray> rays, std::span<const Hit> hits,
-                            const RetroBrdfs& brdfs, double extinction_per_m,
-                            Workspace& work) const noexcept {
-  sort_hits(hits, work.order);
+double EchoSimulator::even_spacing_m() const {
+  constexpr double least_intervals = 1.0 / 16;
+  const double least_s = least_intervals * receiver_.interval_s();
+  return receiver_.pulse().even_spacing_s(least_s) / receiver_.arrival_s(1);
+}
+
+void EchoSimulator::collect(const LitPulse& pulse, const RetroBrdfs& brdfs, double extinction_per_m,
+                            Workspace& work) const {
+  sort_hits(pulse.hits, work.order);
   const std::size_t count = work.order.size();
   work.arrivals.resize(count);
   work.sunlit = 0;
   if (count == 0) return;
   Arrival* const arrivals = work.arrivals.data();
+  const auto share = shares_of(pulse);
   for (std::size_t k = 0; k < count; ++k) {
     const std::uint32_t i = work.order[k];
-    const auto [retro_cos_per_sr, albedo] = brdfs.reflection_of(rays[i], hits[i], hits.size());
-    arrivals[k] = {hits[i].range_m, retro_cos_per_sr};
-    work.sunlit += albedo * sun_cosine(hits[i].normal);
+    const Hit& hit = pulse.hits[i];
+    const auto [retro_cos_per_sr, albedo] = brdfs.reflection_of(pulse.rays[i], hit, pulse.traced);
+    arrivals[k] = {hit.range_m, retro_cos_per_sr};
+    work.sunlit += share(i) * albedo * sun_cosine(hit.normal);
   }
-  const double share = 1.0 / static_cast<double>(hits.size());
-  work.sunlit *= share;
-  const auto receive = [&](Arrival& arrival, double transmission) {
-    const double seen = share * overlap_share(spec_.overlap, arrival.range_m);
+  const auto receive = [&](std::size_t k, double transmission) {
+    Arrival& arrival = arrivals[k];
+    const double seen = share(work.order[k]) * overlap_share(spec_.overlap, arrival.range_m);
     arrival.energy_j =
         seen > 0 ? radar_.received_energy_j(seen, arrival.energy_j, arrival.range_m, transmission)
                  : 0;
@@ -215,26 +256,33 @@ void EchoSimulator::collect(std::span<const Ray> rays, std::span<const Hit> hits
     const double to_nearest = std::exp(-extinction_per_m * nearest_m);  // one exponential for all
     for (std::size_t k = 0; k < count; ++k) {
       const double exponent = extinction_per_m * (nearest_m - arrivals[k].range_m);
-      receive(arrivals[k], to_nearest * exp_of_small(exponent));
+      receive(k, to_nearest * exp_of_small(exponent));
     }
   } else {
     for (std::size_t k = 0; k < count; ++k)
-      receive(arrivals[k], std::exp(-extinction_per_m * arrivals[k].range_m));
+      receive(k, std::exp(-extinction_per_m * arrivals[k].range_m));
   }
 }
 
 // Removes the return of the air behind each surface, which is not lit. It ends there abruptly,
 // which is exact except within the length of a pulse.
-void EchoSimulator::add_air(std::span<const Hit> hits, Workspace& work) const noexcept {
-  work.air_w = air_w_;
-  const float share = 1.0f / static_cast<float>(hits.size());
-  for (const Arrival& arrival : work.arrivals) {
-    const auto end = static_cast<std::int64_t>(
-        std::ceil(receiver_.arrival_s(arrival.range_m) / receiver_.interval_s()));
-    for (auto bin = static_cast<std::size_t>(std::max<std::int64_t>(end - first_air_bin_, 0));
-         bin < work.air_w.size(); ++bin)
-      work.air_w[bin] -= share * air_w_[bin];
+void EchoSimulator::add_air(const LitPulse& pulse, Workspace& work) const {
+  constexpr double rounding = 1e-12;  // of the sum of all shares
+  work.air_w.resize(air_w_.size());
+  const auto share = shares_of(pulse);
+  double lit = 1;
+  std::size_t bin = 0;
+  const auto fill = [&](std::size_t end) {
+    const float factor = lit > rounding ? static_cast<float>(lit) : 0.0f;
+    for (; bin < end; ++bin) work.air_w[bin] = factor * air_w_[bin];
+  };
+  for (std::size_t k = 0; k < work.arrivals.size(); ++k) {
+    const double end = std::ceil(receiver_.arrival_s(work.arrivals[k].range_m) / interval_s()) -
+                       static_cast<double>(first_air_bin_);
+    fill(static_cast<std::size_t>(std::clamp(end, 0.0, static_cast<double>(air_w_.size()))));
+    lit -= share(work.order[k]);
   }
+  fill(air_w_.size());
   work.waveform.add(first_air_bin_, work.air_w);
 }
 
@@ -251,27 +299,24 @@ double EchoSimulator::air_energy_j(const Detection& detection,
          std::accumulate(first + bin_of(detection.begin_s), first + bin_of(detection.end_s), 0.0);
 }
 
-void EchoSimulator::receive(std::span<const Ray> rays, std::span<const Hit> hits,
-                            std::span<const double> bounds_m, const RetroBrdfs& brdfs,
-                            const RandomKey& key, Workspace& work) const noexcept {
-  collect(rays, hits, brdfs, atmosphere_.extinction_per_m(), work);
+void EchoSimulator::receive(const LitPulse& pulse, const RetroBrdfs& brdfs, const RandomKey& key,
+                            Workspace& work) const {
+  collect(pulse, brdfs, atmosphere_.extinction_per_m(), work);
   if (air_w_.empty()) {
     receiver_.sample(work.arrivals, work.waveform);
   } else {
     receiver_.sample(work.arrivals, work.waveform,
                      {first_air_bin_, first_air_bin_ + static_cast<std::int64_t>(air_w_.size())});
-    add_air(hits, work);
+    add_air(pulse, work);
   }
   receiver_.detect(work.waveform, gate_, {key, sun_w_ * work.sunlit}, work.detections);
   work.echoes.clear();
-  for (const Detection& detection : work.detections)
-    attribute_echo(rays, hits, bounds_m, detection, work);
-  if (work.echoes.empty()) work.reason = reason_for_none(rays, hits, brdfs, work);
+  for (const Detection& detection : work.detections) attribute_echo(pulse, detection, work);
+  if (work.echoes.empty()) work.reason = reason_for_none(pulse, brdfs, work);
 }
 
-void EchoSimulator::attribute_echo(std::span<const Ray> rays, std::span<const Hit> hits,
-                                   std::span<const double> bounds_m, const Detection& detection,
-                                   Workspace& work) const noexcept {
+void EchoSimulator::attribute_echo(const LitPulse& pulse, const Detection& detection,
+                                   Workspace& work) const {
   Echo& echo = work.echoes.emplace_back();
   echo.detection = detection;
   const auto arrival_s = [&](const Arrival& a) { return receiver_.arrival_s(a.range_m); };
@@ -279,8 +324,8 @@ void EchoSimulator::attribute_echo(std::span<const Ray> rays, std::span<const Hi
   const auto begin = std::ranges::lower_bound(all_begin, all_end, detection.begin_s, {}, arrival_s);
   const auto end = std::ranges::lower_bound(begin, all_end, detection.end_s, {}, arrival_s);
   const auto first = static_cast<std::size_t>(begin - all_begin);
-  part_surfaces(hits, first, static_cast<std::size_t>(end - all_begin), resolution_m_, work);
-  const auto [best, second, best_number, energy_j] = shares_of(work.surfaces);
+  part_surfaces(pulse, first, static_cast<std::size_t>(end - all_begin), resolution_m_, work);
+  const auto [best, second, best_number, energy_j] = strongest_of(work.surfaces);
   const double air_j = air_energy_j(detection, work);
   if (detection.kind == Detection::Kind::FalseAlarm || best.energy_j <= air_j) {
     echo.kind =
@@ -293,11 +338,13 @@ void EchoSimulator::attribute_echo(std::span<const Ray> rays, std::span<const Hi
     if (work.surface_of[k] != best_number) continue;
     const std::uint32_t i = work.order[first + k];
     const double weight = work.arrivals[first + k].energy_j * per_energy;
-    echo.range_m += weight * hits[i].range_m;
-    echo.p_DQ += weight * (rays[i].origin + rays[i].direction * hits[i].range_m);
-    normal += weight * glm::dvec3(hits[i].normal);
-    echo.deviation_m = std::max(echo.deviation_m, hits[i].deviation_m);
-    if (!bounds_m.empty()) echo.bound_m = std::max(echo.bound_m, bounds_m[i]);
+    const Ray& ray = pulse.rays[i];
+    const Hit& hit = pulse.hits[i];
+    echo.range_m += weight * hit.range_m;
+    echo.p_DQ += weight * (ray.origin + ray.direction * hit.range_m);
+    normal += weight * glm::dvec3(hit.normal);
+    echo.deviation_m = std::max(echo.deviation_m, hit.deviation_m);
+    if (!pulse.bounds_m.empty()) echo.bound_m = std::max(echo.bound_m, pulse.bounds_m[i]);
   }
   echo.normal = glm::vec3(glm::normalize(normal));
   echo.share = static_cast<float>(best.energy_j / (energy_j + air_j));
@@ -307,8 +354,8 @@ void EchoSimulator::attribute_echo(std::span<const Ray> rays, std::span<const Hi
 }
 
 // Overwrites the arrivals, which are no longer needed.
-NoReturn EchoSimulator::reason_for_none(std::span<const Ray> rays, std::span<const Hit> hits,
-                                        const RetroBrdfs& brdfs, Workspace& work) const noexcept {
+NoReturn EchoSimulator::reason_for_none(const LitPulse& pulse, const RetroBrdfs& brdfs,
+                                        Workspace& work) const {
   if (work.order.empty()) return NoReturn::Sky;
   const auto outside = [&](const Arrival& arrival) {
     return arrival.range_m < gate_.near_m || gate_.far_m < arrival.range_m;
@@ -323,7 +370,7 @@ NoReturn EchoSimulator::reason_for_none(std::span<const Ray> rays, std::span<con
   const bool second_alone = spec_.receiver.returns == ReceiverSpec::Returns::Second;
   if (second_alone && above_threshold(work.waveform)) return NoReturn::Blanked;
   if (atmosphere_.extinction_per_m() == 0) return NoReturn::BelowThreshold;
-  collect(rays, hits, brdfs, 0, work);
+  collect(pulse, brdfs, 0, work);
   std::erase_if(work.arrivals, outside);
   receiver_.sample(work.arrivals, work.clear_waveform);
   return above_threshold(work.clear_waveform) ? NoReturn::Absorbed : NoReturn::BelowThreshold;

@@ -54,6 +54,15 @@ class RetroBrdfs {
   const LaserBeam& beam_;
 };
 
+/// Sub-rays of a pulse.
+struct LitPulse {
+  std::span<const Ray> rays;
+  std::span<const Hit> hits;         ///< one for each of `rays`
+  std::span<const double> shares;    ///< of the pulse's energy, one for each; empty if equal
+  std::span<const double> bounds_m;  ///< error bounds of the hits' ranges; may be empty
+  std::size_t traced = 0;  ///< number of sub-rays that share the beam's area, for textures
+};
+
 /// Echo of a pulse and the ground truth about it.
 struct Echo {
   /// Origin of an echo.
@@ -81,10 +90,10 @@ enum class NoReturn : std::uint8_t {
   Blanked,         ///< there is an echo, but Returns omits it
 };
 
-/// Hits of one object at closely spaced ranges.
+/// Hits of one object that lie in one plane, or whose ranges the pulse does not resolve.
 struct LitSurface {
   std::uint32_t object = 0;
-  double last_m = 0;
+  std::size_t last = 0;  ///< index of the farthest arrival
   double energy_j = 0;
   double strongest_j = 0;
   std::size_t strongest = 0;  ///< index of the strongest arrival
@@ -118,14 +127,13 @@ class EchoSimulator {
   /// Returns the largest difference between the ranges of neighbouring sub-rays that needs no
   /// refinement: c FWHM / 4.
   double resolution_m() const { return resolution_m_; }
+  /// Returns the spacing in range at which equal returns add up to a smooth waveform.
+  double even_spacing_m() const;
 
   /// Finds the echoes of one pulse and stores them in `work`.
-  /// @param hits  one for each of `rays`, which carry equal fractions of the pulse's energy.
-  /// @param bounds_m  error bounds of the hits' ranges; may be empty.
   /// @param brdfs  reflection of the surfaces.
-  void receive(std::span<const Ray> rays, std::span<const Hit> hits,
-               std::span<const double> bounds_m, const RetroBrdfs& brdfs, const RandomKey& key,
-               Workspace& work) const noexcept;
+  void receive(const LitPulse& pulse, const RetroBrdfs& brdfs, const RandomKey& key,
+               Workspace& work) const;
 
   /// Returns the intensity that the sensor reports for an echo.
   float intensity(const Detection& detection) const noexcept;
@@ -137,18 +145,15 @@ class EchoSimulator {
   double reported_sd_m(double sd_m) const noexcept;
 
  private:
-  void collect(std::span<const Ray> rays, std::span<const Hit> hits, const RetroBrdfs& brdfs,
-               double extinction_per_m, Workspace& work) const noexcept;
+  void collect(const LitPulse& pulse, const RetroBrdfs& brdfs, double extinction_per_m,
+               Workspace& work) const;
   double sun_cosine(const glm::vec3& normal) const noexcept {
     if (!spec_.sun.direction) return 1;
     return std::max(glm::dot(glm::dvec3(normal), *spec_.sun.direction), 0.0);
   }
-  void add_air(std::span<const Hit> hits, Workspace& work) const noexcept;
-  void attribute_echo(std::span<const Ray> rays, std::span<const Hit> hits,
-                      std::span<const double> bounds_m, const Detection& detection,
-                      Workspace& work) const noexcept;
-  NoReturn reason_for_none(std::span<const Ray> rays, std::span<const Hit> hits,
-                           const RetroBrdfs& brdfs, Workspace& work) const noexcept;
+  void add_air(const LitPulse& pulse, Workspace& work) const;
+  void attribute_echo(const LitPulse& pulse, const Detection& detection, Workspace& work) const;
+  NoReturn reason_for_none(const LitPulse& pulse, const RetroBrdfs& brdfs, Workspace& work) const;
   double air_energy_j(const Detection& detection, const Workspace& work) const noexcept;
   void sample_air(const AtmosphereSpec& air);
 

@@ -10,6 +10,7 @@
 #include "core/random.h"
 #include "core/tracing/scene.h"
 #include "sensors/lidar/beam/beam.h"
+#include "sensors/lidar/beam/plane_footprint.h"
 #include "sensors/lidar/echo_simulator.h"
 #include "sensors/lidar/lidar_spec.h"
 #include "sensors/lidar/pattern/scan_pattern.h"
@@ -34,11 +35,24 @@ struct Waveforms {
 /// Convergence of the footprint: every 64th pulse is traced again with twice the sub-rays, noise
 /// off.
 struct Convergence {
-  std::uint64_t pulses = 0;    ///< traced again
-  std::uint64_t changed = 0;   ///< pulses whose number of echoes changed
-  double sum_squares_m2 = 0;   ///< sum of squared range changes of first echoes (`compared`)
-  double largest_m = 0;        ///< largest such change
-  std::uint64_t compared = 0;  ///< pulses with an unchanged number of echoes, at least one
+  /// Absolute changes of a value of the echoes.
+  struct Changes {
+    double sum_squares = 0, largest = 0;
+    std::uint64_t count = 0;
+
+    void add(double change);
+    void add(const Changes& other);
+    double rms() const;  ///< 0 without any
+  };
+
+  std::uint64_t pulses = 0;   ///< traced again
+  std::uint64_t changed = 0;  ///< pulses whose number of echoes changed
+  // Of all echoes of the other pulses:
+  Changes range_m;  ///< reported range
+  Changes true_m;   ///< range_true, where surfaces made both echoes
+  Changes share;
+
+  void add(const Convergence& other);
 };
 
 /// Result of one sweep of a lidar.
@@ -64,6 +78,8 @@ class Lidar {
   explicit Lidar(const LidarSpec& spec, const AtmosphereSpec& air = {});
 
   const ScanPattern& pattern() const { return pattern_; }
+  /// Returns the limit of the refinement of a pulse.
+  std::size_t most_sub_rays() const { return beam_.sub_rays(last_level_).size(); }
 
   /// Returns one sweep. Each echo has a row, in firing order and by range, with the columns of
   /// docs/reference/formats.md: x y z (float, m, in S as the pulse fired or at the stamp),
@@ -90,10 +106,11 @@ class Lidar {
 
   LidarSpec spec_;
   ScanPattern pattern_;
-  LaserBeam beam_;  // with one level more than pulses use, for Convergence
-  int last_level_;
   std::optional<EchoSimulator> light_;
   std::optional<EchoSimulator> quiet_light_;  // light_ without noise
+  LaserBeam beam_;  // with one level more than pulses use, for Convergence
+  int last_level_;
+  std::optional<PlaneQuadrature> planes_;  // if there are sub-rays
 };
 
 }  // namespace groundray

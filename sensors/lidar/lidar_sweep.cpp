@@ -69,8 +69,12 @@ class Lidar::Sweep {
         key_(key),
         pulses_(lidar.pattern_.pulses(number)),
         any_moves_(scene.objects.any_moves()),
-        settings_{lidar.beam_, lidar.last_level_, lidar.light_ ? lidar.light_->resolution_m() : 0,
-                  spec_.angular_jitter_rad, rays_end_m(spec_)} {
+        settings_{lidar.beam_,
+                  lidar.last_level_,
+                  lidar.light_ ? lidar.light_->resolution_m() : 0,
+                  spec_.angular_jitter_rad,
+                  rays_end_m(spec_),
+                  lidar.planes_ ? &*lidar.planes_ : nullptr} {
     if (lidar.light_) brdfs_.emplace(scene, lidar.light_->spec().wavelength_nm, lidar.beam_);
     if (spec_.points == LidarSpec::Points::AtStamp) X_SD_ = inverse(X_DS.pose_at(path_.stamp));
   }
@@ -100,6 +104,7 @@ class Lidar::Sweep {
     std::vector<WaveformRun> runs;
     std::vector<float> power_w;
     Convergence convergence;
+    FootprintSamples samples;  // of a pulse on a plane
     std::vector<Ray> rays_again;
     std::vector<Hit> hits_again;
     std::vector<MissedPulse> missed;  // if requested
@@ -118,6 +123,8 @@ class Lidar::Sweep {
   void measure(Chunk& chunk) const;
   void measure_rays(Chunk& chunk) const;
   void measure_light(Chunk& chunk) const;
+  void receive(const EchoSimulator& light, std::size_t pulse, const LitPulse& lit,
+               Chunk& chunk) const;
   void keep_waveform(std::uint32_t pulse, Chunk& chunk) const;
   void compare(std::size_t pulse, Chunk& chunk) const;
   void place(Chunk& chunk);
@@ -197,14 +204,34 @@ void Lidar::Sweep::measure_light(Chunk& chunk) const {
         chunk.bounds_m.empty()
             ? std::span<const double>()
             : std::span(chunk.bounds_m).subspan(cast.range(i).first, cast.range(i).count);
-    lidar_.light_->receive(cast.rays(i), cast.hits(i), bounds_m, *brdfs_, key_of(pulse),
-                           chunk.work);
+    receive(*lidar_.light_, i, {cast.rays(i), cast.hits(i), {}, bounds_m, cast.range(i).count},
+            chunk);
     add_rows(i, chunk);
     if (chunk.work.echoes.empty()) miss(i, chunk.work.reason, chunk);
     if (spec_.waveforms == LidarSpec::WaveformOutput::Keep) keep_waveform(i, chunk);
     if (pulse % convergence_stride == 0) compare(i, chunk);
   }
   chunk.rows = chunk.light_rows.size();
+}
+
+// Finds the echoes of a pulse: by a quadrature if its footprint lies on a plane, otherwise from the
+// traced sub-rays.
+void Lidar::Sweep::receive(const EchoSimulator& light, std::size_t pulse, const LitPulse& lit,
+                           Chunk& chunk) const {
+  const RandomKey key = key_of(chunk.begin + static_cast<std::int64_t>(pulse));
+  EchoSimulator::Workspace& work = chunk.work;
+  if (!lidar_.planes_) return light.receive(lit, *brdfs_, key, work);
+  const PulseAxis axis = chunk.cast.pulse_axis(pulse);
+  const auto plane = lidar_.planes_->plane_of(lidar_.beam_, axis, lit.rays, lit.hits);
+  if (!plane) return light.receive(lit, *brdfs_, key, work);
+  FootprintSamples& samples = chunk.samples;
+  lidar_.planes_->sample(axis, *plane, lit.rays, lit.hits, samples);
+  light.receive({samples.rays, samples.hits, samples.shares, {}, lit.traced}, *brdfs_, key, work);
+  for (Echo& echo : work.echoes) {
+    echo.hit = samples.traced[echo.hit];
+    echo.second_hit = samples.traced[echo.second_hit];
+    if (!lit.bounds_m.empty()) echo.bound_m = std::ranges::max(lit.bounds_m);
+  }
 }
 
 void Lidar::Sweep::miss(std::size_t pulse, NoReturn reason, Chunk& chunk) const {
@@ -233,21 +260,24 @@ void Lidar::Sweep::compare(std::size_t pulse, Chunk& chunk) const {
   const int finer = cast.range(pulse).level + 1;
   if (finer >= lidar_.beam_.levels()) return;
   const EchoSimulator& light = *lidar_.quiet_light_;
-  EchoSimulator::Workspace& work = chunk.work;
-  light.receive(cast.rays(pulse), cast.hits(pulse), {}, *brdfs_, key_, work);
-  const std::size_t echoes = work.echoes.size();
-  const double first_m = echoes == 0 ? 0 : work.echoes[0].detection.range_m;
+  receive(light, pulse, {cast.rays(pulse), cast.hits(pulse), {}, {}, cast.range(pulse).count},
+          chunk);
+  const std::vector<Echo> coarse = chunk.work.echoes;
   cast.cast_again(pulse, finer, lidar_.beam_, key_, scene_, chunk.rays_again, chunk.hits_again);
-  light.receive(chunk.rays_again, chunk.hits_again, {}, *brdfs_, key_, work);
+  receive(light, pulse, {chunk.rays_again, chunk.hits_again, {}, {}, chunk.rays_again.size()},
+          chunk);
+  const std::vector<Echo>& fine = chunk.work.echoes;
   Convergence& seen = chunk.convergence;
   ++seen.pulses;
-  if (work.echoes.size() != echoes) {
+  if (fine.size() != coarse.size()) {
     ++seen.changed;
-  } else if (echoes > 0) {
-    const double difference_m = std::abs(work.echoes[0].detection.range_m - first_m);
-    ++seen.compared;
-    seen.sum_squares_m2 += difference_m * difference_m;
-    seen.largest_m = std::max(seen.largest_m, difference_m);
+    return;
+  }
+  for (std::size_t k = 0; k < fine.size(); ++k) {
+    seen.range_m.add(fine[k].detection.range_m - coarse[k].detection.range_m);
+    seen.share.add(fine[k].share - coarse[k].share);
+    if (fine[k].kind == Echo::Kind::Surface && coarse[k].kind == Echo::Kind::Surface)
+      seen.true_m.add(fine[k].range_m - coarse[k].range_m);
   }
 }
 
@@ -263,12 +293,7 @@ void Lidar::Sweep::place(Chunk& chunk) {
     waveforms.runs.push_back(run);
   }
   waveforms.power_w.insert(waveforms.power_w.end(), chunk.power_w.begin(), chunk.power_w.end());
-  Convergence& all = scan_.convergence;
-  all.pulses += chunk.convergence.pulses;
-  all.changed += chunk.convergence.changed;
-  all.compared += chunk.convergence.compared;
-  all.sum_squares_m2 += chunk.convergence.sum_squares_m2;
-  all.largest_m = std::max(all.largest_m, chunk.convergence.largest_m);
+  scan_.convergence.add(chunk.convergence);
 }
 
 // Returns the point that the sensor reports, which does not account for angular jitter. Inline

@@ -108,7 +108,9 @@ def test_convergence_is_reported(exact):
     reported = yaml.safe_load(exact.comment(r"convergence (.*)")[1])
     assert reported["pulses"] == 1809 * 16 // 64 + 1
     assert 0 <= reported["other_echoes"] <= reported["pulses"]
-    assert reported["range_rms_m"] <= reported["range_max_m"] < 0.1
+    for name, limit in [("range", 0.1), ("true", 0.1)]:
+        assert reported[f"{name}_rms_m"] <= reported[f"{name}_max_m"] < limit
+    assert reported["share_rms"] <= reported["share_max"] <= 1
     assert exact.record["frames"][0]["convergence"] == reported
 
 

@@ -33,11 +33,11 @@ std::vector<std::string> comments_of(const Simulation& simulation, const LidarSc
       fmt::format("origin_w {} {} {}", origin_m.x, origin_m.y, origin_m.z)};
   const Convergence& seen = scan.convergence;
   if (seen.pulses > 0) {
-    const double rms_m = std::sqrt(seen.sum_squares_m2 /
-                                   static_cast<double>(std::max<std::uint64_t>(seen.compared, 1)));
-    comments.push_back(
-        fmt::format("{}{{pulses: {}, other_echoes: {}, range_rms_m: {:.3g}, range_max_m: {:.3g}}}",
-                    convergence_comment, seen.pulses, seen.changed, rms_m, seen.largest_m));
+    comments.push_back(fmt::format(
+        "{}{{pulses: {}, other_echoes: {}, range_rms_m: {:.3g}, range_max_m: {:.3g}, "
+        "true_rms_m: {:.3g}, true_max_m: {:.3g}, share_rms: {:.3g}, share_max: {:.3g}}}",
+        convergence_comment, seen.pulses, seen.changed, seen.range_m.rms(), seen.range_m.largest,
+        seen.true_m.rms(), seen.true_m.largest, seen.share.rms(), seen.share.largest));
   }
   if (scan.waveforms.interval_s > 0)
     comments.push_back(fmt::format("waveform_interval_s {}", scan.waveforms.interval_s));

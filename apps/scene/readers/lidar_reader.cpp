@@ -19,11 +19,13 @@ void read_beam(Map beam, BeamSpec& spec) {
   read_scaled_pair(beam, "divergence_mrad", 1e-3, spec.divergence_rad);
   read_scaled_pair(beam, "aperture_mm", 1e-3, spec.aperture_m);
   std::uint32_t sub_rays = static_cast<std::uint32_t>(spec.sub_rays);
-  if (beam.read_whole("sub_rays", Need::Optional, sub_rays))
-    spec.sub_rays = spec.most_sub_rays = static_cast<int>(std::min(sub_rays, 1u << 20));
-  std::uint32_t most = static_cast<std::uint32_t>(spec.most_sub_rays);
-  beam.read_whole("most_sub_rays", Need::Optional, most);
-  spec.most_sub_rays = static_cast<int>(std::min(most, 1u << 20));
+  if (beam.read_whole("sub_rays", Need::Optional, sub_rays)) {
+    spec.sub_rays = static_cast<int>(std::min(sub_rays, 1u << 20));
+    spec.most_sub_rays.reset();
+  }
+  std::uint32_t most = 0;
+  if (beam.read_whole("most_sub_rays", Need::Optional, most))
+    spec.most_sub_rays = static_cast<int>(std::min(most, 1u << 20));
   beam.read_choice("turn", Need::Optional, spec.turn, {"fixed", "each_pulse"});
   beam.close();
 }
@@ -43,7 +45,13 @@ void read_pulse(Map& laser, PulseSpec& pulse, Faults& faults) {
 }
 
 void read_laser(Map laser, LightSpec& light, Faults& faults) {
-  laser.read_number("wavelength_nm", Need::Required, light.wavelength_nm, positive);
+  if (const Node* const at =
+          laser.read_number("wavelength_nm", Need::Required, light.wavelength_nm, positive)) {
+    const double given = light.wavelength_nm;
+    if (given < 400 || given > 2000)
+      faults.add(*at, "wavelength_nm", "is {}, but must be from 400 to 2000{}", at->text,
+                 given < 10 ? fmt::format(": {} um are {:.6g} nm", at->text, 1000 * given) : "");
+  }
   laser.read_scaled("pulse_energy_nj", Need::Required, 1e-9, light.optics.pulse_energy_j, positive);
   read_pulse(laser, light.pulse, faults);
   laser.read_number("efficiency", Need::Optional, light.optics.emitter_efficiency,

@@ -47,7 +47,7 @@ void check_beam_spec(const BeamSpec& spec) {
                      (spec.sub_rays == 1 || spec.sub_rays >= 2 * octet);
   broken.unless(whole, "sub_rays = {} must be 1, or a power of 2 from {} to {}", spec.sub_rays,
                 2 * octet, LaserBeam::sub_ray_limit);
-  const int most = spec.most_sub_rays;
+  const int most = spec.most_sub_rays.value_or(spec.sub_rays);
   broken.unless(!whole || most == spec.sub_rays ||
                     (spec.sub_rays > 1 && power_of_2(most) && most > spec.sub_rays &&
                      most <= LaserBeam::sub_ray_limit),
@@ -231,11 +231,12 @@ std::vector<glm::ivec2> nearest_pairs(std::span<const Point> points) {
 LaserBeam::LaserBeam(const BeamSpec& spec)
     : waist_m_(half(spec.aperture_m, spec)),
       tangent_(half(2. * glm::tan(0.5 * spec.divergence_rad), spec)),
-      turn_(spec.turn) {
+      turn_(spec.turn),
+      profile_(spec.profile) {
   check_beam_spec(spec);
   const Layout layout = layout_of(waist_m_, tangent_);
   const bool gaussian = spec.profile == BeamSpec::Profile::Gaussian;
-  for (int n = spec.sub_rays; n <= spec.most_sub_rays; n *= 2) {
+  for (int n = spec.sub_rays; n <= spec.most_sub_rays.value_or(spec.sub_rays); n *= 2) {
     Level& level = levels_.emplace_back();
     if (n == 1) {
       level.nodes.resize(1);
@@ -262,6 +263,17 @@ LaserBeam::LaserBeam(const BeamSpec& spec)
     // apart.
     level.neighbours = nearest_pairs(sorted(points_of(layout, shells, even), order));
   }
+}
+
+// The regression of a sub-ray's slope t c on its position w(0) a + R t c has the coefficient
+// R t^2 / w(R)^2.
+LaserBeam::Section LaserBeam::section(double range_m) const noexcept {
+  Section section{.radius_m = radius_m(range_m), .range_m = range_m};
+  for (int i = 0; i < 2; ++i) {
+    if (section.radius_m[i] > 0)
+      section.slope[i] = range_m * tangent_[i] * tangent_[i] / section.radius_m[i];
+  }
+  return section;
 }
 
 }  // namespace groundray

@@ -3,6 +3,7 @@
 #include <cmath>
 #include <cstddef>
 #include <glm/vec2.hpp>
+#include <optional>
 #include <span>
 #include <vector>
 
@@ -24,7 +25,9 @@ struct BeamSpec {
   glm::dvec2 divergence_rad{0};  ///< full angle in the far field; 0 for a parallel beam
   glm::dvec2 aperture_m{0};      ///< full width at the aperture; 0 for a point
   int sub_rays = 1;              ///< number per pulse: 1, or 16, 32, 64, ...
-  int most_sub_rays = 1;  ///< limit of the refinement of a pulse: `sub_rays` times a power of 2
+  /// Limit of the refinement of a pulse: `sub_rays` times a power of 2. If absent, a Lidar derives
+  /// it from pulse and footprint, and a LaserBeam has `sub_rays`.
+  std::optional<int> most_sub_rays;
   Turn turn = Turn::Fixed;
 };
 
@@ -53,15 +56,16 @@ class LaserBeam {
     double sine = 0;
   };
 
-  /// Constructs all levels in about n^(7/4) operations for n = spec.most_sub_rays: 3 ms for 1024, a
+  /// Constructs all levels in about n^(7/4) operations for n = the last: 3 ms for 1024, a
   /// few seconds for 65536.
   /// @throws Error listing every field of `spec` that is out of bounds.
   explicit LaserBeam(const BeamSpec& spec);
 
   BeamSpec::Turn turn() const { return turn_; }
+  BeamSpec::Profile profile() const { return profile_; }
 
   /// Returns the number of levels. Level 0 has spec.sub_rays, each next level twice as many as the
-  /// one before, and the last one spec.most_sub_rays.
+  /// one before, up to spec.most_sub_rays.
   int levels() const { return static_cast<int>(levels_.size()); }
 
   /// Returns the sub-rays of a level in [0, levels()), all of equal energy.
@@ -83,6 +87,20 @@ class LaserBeam {
   /// with about its six nearest. Pairs are unique and in ascending order, the smaller index first.
   /// If the ranges of a pair differ much, the level is too coarse.
   std::span<const glm::ivec2> neighbours(int level) const { return at(level).neighbours; }
+
+  /// Cross-section at a distance along the axis.
+  struct Section {
+    glm::dvec2 radius_m{0};
+    glm::dvec2 slope{0};  ///< mean of the sub-rays through the point (radius, radius)
+    double range_m = 0;
+
+    /// Returns the mean of the sub-rays through a point, (h, v) in units of the radii.
+    SubRay through(const glm::dvec2& p) const noexcept {
+      const glm::dvec2 to = p * slope;
+      return {p * radius_m - range_m * to, to, 1 / std::sqrt(1 + to.x * to.x + to.y * to.y)};
+    }
+  };
+  Section section(double range_m) const noexcept;
 
   /// Returns the radii w (1/e^2 or edge) at a distance along the axis. surface_patch()
   /// (core/geometry/footprint.h) projects a width onto a surface.
@@ -108,6 +126,7 @@ class LaserBeam {
   glm::dvec2 waist_m_;  // radii at the aperture
   glm::dvec2 tangent_;  // tangents of the half angles
   BeamSpec::Turn turn_;
+  BeamSpec::Profile profile_;
   std::vector<Level> levels_;
 };
 

@@ -106,13 +106,15 @@ void PulseTracer::cast(const SweepPath& sweep, std::int64_t begin, std::int64_t 
 
 bool PulseTracer::is_coarse(std::size_t pulse, const Settings& settings) const {
   const auto met = hits(pulse);
-  return std::ranges::any_of(settings.beam.neighbours(ranges_[pulse].level),
-                             [&](const glm::ivec2& pair) {
-                               const Hit& a = met[static_cast<std::size_t>(pair.x)];
-                               const Hit& b = met[static_cast<std::size_t>(pair.y)];
-                               if (!a || !b) return static_cast<bool>(a) != static_cast<bool>(b);
-                               return std::abs(a.range_m - b.range_m) > settings.resolution_m;
-                             });
+  const auto differ = [&](const glm::ivec2& pair) {
+    const Hit& a = met[static_cast<std::size_t>(pair.x)];
+    const Hit& b = met[static_cast<std::size_t>(pair.y)];
+    if (!a || !b) return static_cast<bool>(a) != static_cast<bool>(b);
+    return std::abs(a.range_m - b.range_m) > settings.resolution_m;
+  };
+  return std::ranges::any_of(settings.beam.neighbours(ranges_[pulse].level), differ) &&
+         !(settings.planes &&
+           settings.planes->plane_of(settings.beam, pulse_axis(pulse), rays(pulse), met));
 }
 
 void PulseTracer::refine(const Settings& settings, const RandomKey& key, const Scene& scene) {

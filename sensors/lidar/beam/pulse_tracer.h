@@ -11,6 +11,7 @@
 #include "core/random.h"
 #include "core/tracing/scene.h"
 #include "sensors/lidar/beam/beam.h"
+#include "sensors/lidar/beam/plane_footprint.h"
 #include "sensors/lidar/lidar_spec.h"
 #include "sensors/lidar/pattern/firing_cycle.h"
 #include "sensors/lidar/pattern/scan_pattern.h"
@@ -40,7 +41,8 @@ class PulseTracer {
     int last_level = 0;       ///< last level of refinement
     double resolution_m = 0;  ///< pulses are refined if ranges of neighbours differ by more
     double angular_jitter_rad = 0;
-    double far_m = 0;  ///< end of the rays
+    double far_m = 0;                         ///< end of the rays
+    const PlaneQuadrature* planes = nullptr;  ///< pulses on a plane need no refinement
   };
 
   /// Casts pulses [begin, end) of a sweep.
@@ -71,6 +73,8 @@ class PulseTracer {
   const Ray& axis(std::size_t pulse) const {
     return alone_ ? rays_[ranges_[pulse].first] : axes_[pulse];
   }
+
+  PulseAxis pulse_axis(std::size_t pulse) const { return {axis(pulse), horizontals_[pulse]}; }
 
   /// Casts a pulse again with the sub-rays of a level, and stores their rays and hits in `rays` and
   /// `hits`.

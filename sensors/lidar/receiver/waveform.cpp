@@ -144,6 +144,23 @@ double SystemPulse::rise_s(double fraction) const {
   return crossing_s(begin_s_ + (k - 1) * step_s, begin_s_ + k * step_s, level_per_s);
 }
 
+double SystemPulse::even_spacing_s(double least_s) const {
+  constexpr int shifts = 16;
+  constexpr double ripple = 1e-4;
+  for (double spacing_s = fwhm_s_ / fwhm_per_sigma; spacing_s > least_s; spacing_s /= 2) {
+    double low_per_s = std::numeric_limits<double>::infinity(), high_per_s = 0;
+    for (int i = 0; i < shifts; ++i) {
+      double sum_per_s = 0;
+      for (double time_s = begin_s_ + i * spacing_s / shifts; time_s < end_s_; time_s += spacing_s)
+        sum_per_s += (*this)(time_s);
+      low_per_s = std::min(low_per_s, sum_per_s);
+      high_per_s = std::max(high_per_s, sum_per_s);
+    }
+    if (high_per_s - low_per_s <= ripple * high_per_s) return spacing_s;
+  }
+  return least_s;
+}
+
 // Bisects between a time at which s is below the level and one at which it is not.
 double SystemPulse::crossing_s(double low_s, double high_s, double level_per_s) const {
   for (int k = 0; k < halvings; ++k) {
@@ -213,7 +230,7 @@ void Waveform::lay_out(Bins kept, std::int64_t width) {
 }
 
 void PulseSampler::sample(std::span<const Arrival> arrivals, double s_per_m, Bins kept,
-                          Waveform& waveform) const noexcept {
+                          Waveform& waveform) const {
   waveform.interval_s_ = interval_s_;
   if (!std::ranges::is_sorted(arrivals, arrival_precedes)) {
     waveform.arrivals_.assign(arrivals.begin(), arrivals.end());

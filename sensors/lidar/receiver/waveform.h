@@ -42,6 +42,9 @@ class SystemPulse {
   double fwhm_s() const { return fwhm_s_; }
   /// Returns the time at which s first reaches `fraction`, in (0, 1), of its peak.
   double rise_s(double fraction) const;
+  /// Returns a spacing at which equal pulses add up to a constant, to 1e-4 of it: a fraction 2^-k
+  /// of fwhm_s() / fwhm_per_sigma, or `least_s` if none above that is short enough.
+  double even_spacing_s(double least_s) const;
 
  private:
   void sum_ramps(const PulseSpec& spec);
@@ -127,7 +130,7 @@ class PulseSampler {
   /// @param s_per_m  two-way time per metre of range.
   /// @param kept  bins to keep even without a pulse; rounded outwards.
   void sample(std::span<const Arrival> arrivals, double s_per_m, Bins kept,
-              Waveform& waveform) const noexcept;
+              Waveform& waveform) const;
 
  private:
   double interval_s_;

@@ -98,7 +98,8 @@ TEST(LidarSweep, SameBytesForAnyNumberOfThreadsWithAllNoiseOn) {
     expect_same_bytes(scans[0].echoes, other->echoes);
     expect_same_bytes(scans[0].no_returns, other->no_returns);
     EXPECT_EQ(scans[0].waveforms.power_w, other->waveforms.power_w);
-    EXPECT_EQ(scans[0].convergence.sum_squares_m2, other->convergence.sum_squares_m2);
+    EXPECT_EQ(scans[0].convergence.range_m.sum_squares, other->convergence.range_m.sum_squares);
+    EXPECT_EQ(scans[0].convergence.share.sum_squares, other->convergence.share.sum_squares);
   }
 }
 
@@ -244,7 +245,8 @@ TEST(LidarSweep, ConvergenceComparesEvery64thPulseWithTwiceItsSubRays) {
   LidarSpec spec = noisy();
   spec.beam.turn = BeamSpec::Turn::Fixed;
   const auto of = [&](int sub_rays, const HeightGrid& ground, const Trajectory& X_DS) {
-    spec.beam.sub_rays = spec.beam.most_sub_rays = sub_rays;
+    spec.beam.sub_rays = sub_rays;
+    spec.beam.most_sub_rays = sub_rays;
     return Lidar(spec).scan(scene_of(ground), X_DS, 0, Seed{7}, 0).convergence;
   };
   const HeightGrid rough = testing::fractal(513, 1, 60, Seed{1});
@@ -252,9 +254,14 @@ TEST(LidarSweep, ConvergenceComparesEvery64thPulseWithTwiceItsSubRays) {
   const Convergence many = of(256, rough, ride_over(rough));
   EXPECT_EQ(few.pulses, (16u * 1809 + 63) / 64);
   EXPECT_EQ(many.pulses, few.pulses);
-  EXPECT_LE(few.compared + few.changed, few.pulses);  // the others have no echo in either case
-  EXPECT_GT(few.changed, 0u);                         // edges
-  EXPECT_GT(few.largest_m, 1e-3);
+  EXPECT_GT(few.changed, 0u);  // edges
+  EXPECT_EQ(few.true_m.count, few.range_m.count);
+  EXPECT_EQ(few.share.count, few.range_m.count);
+  for (const auto changes : {&Convergence::range_m, &Convergence::true_m, &Convergence::share}) {
+    EXPECT_GT((few.*changes).largest, 1e-3);
+    EXPECT_LT((many.*changes).rms(), (few.*changes).rms());
+    EXPECT_LE((few.*changes).rms(), (few.*changes).largest);
+  }
   // A plane's echo depends on the fourth moments of the beam alone; the remaining difference is
   // sampling.
   const HeightGrid plane({2, 2}, {-2000, -2000}, {4000, 4000}, std::vector<float>(4, 0.0f));
@@ -262,8 +269,10 @@ TEST(LidarSweep, ConvergenceComparesEvery64thPulseWithTwiceItsSubRays) {
   const Trajectory still({{0s, above}, {2s, above}});
   const Convergence flat = of(16, plane, still);
   EXPECT_EQ(flat.changed, 0u);
-  EXPECT_GT(flat.compared, 200u);
-  EXPECT_LT(flat.largest_m, 1e-6);
+  EXPECT_GT(flat.range_m.count, 200u);
+  EXPECT_LT(flat.range_m.largest, 1e-6);
+  EXPECT_LT(flat.true_m.largest, 1e-6);
+  EXPECT_EQ(flat.share.largest, 0);
 }
 
 }  // namespace
