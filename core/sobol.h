@@ -9,7 +9,7 @@ namespace groundray {
 /// Points that fill the unit square evenly, one pair of dimensions after the other: Sobol's first
 /// two dimensions, with hash-based Owen scrambling and in an order that is shuffled anew for each
 /// pair. The first 2^k points form a net for every k: all elementary intervals contain equal
-/// numbers of them.
+/// numbers of them. So do the next 2^k points, and every further 2^k.
 /// @see Burley, Practical hash-based Owen scrambling, JCGT 9(4) (2020); Laine and Karras,
 ///      Stratified sampling for stochastic transparency, EGSR (2011); constants of the hash:
 ///      Vegdahl, Building a better LK hash (2021).

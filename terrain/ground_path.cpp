@@ -109,14 +109,13 @@ class Curve {
 // Vehicle on the ground: poses from the heights below its centre and its wheels.
 class Vehicle {
  public:
-  Vehicle(const Ground& ground, double height_m, glm::dvec2 footprint_m)
-      : ground_(ground), height_m_(height_m), footprint_m_(footprint_m) {}
+  Vehicle(const Ground& ground, const GroundPathSpec& spec) : ground_(ground), spec_(spec) {}
 
   Pose stand_at(const Curve::Point& point, std::chrono::nanoseconds time) const {
-    const glm::dvec2 ahead =
-        glm::dvec2(std::cos(point.heading_rad), std::sin(point.heading_rad)) * (footprint_m_.x / 2);
+    const glm::dvec2 ahead = glm::dvec2(std::cos(point.heading_rad), std::sin(point.heading_rad)) *
+                             (spec_.footprint_m.x / 2);
     const glm::dvec2 left = glm::dvec2(-std::sin(point.heading_rad), std::cos(point.heading_rad)) *
-                            (footprint_m_.y / 2);
+                            (spec_.footprint_m.y / 2);
     const double front_left = ground_m(point.p_m + ahead + left, "front left wheel", time);
     const double front_right = ground_m(point.p_m + ahead - left, "front right wheel", time);
     const double rear_left = ground_m(point.p_m - ahead + left, "rear left wheel", time);
@@ -124,12 +123,12 @@ class Vehicle {
     // Slopes of the plane forward and to the left: least squares over the four corners of a
     // rectangle.
     const double forward =
-        (front_left + front_right - rear_left - rear_right) / (2 * footprint_m_.x);
+        (front_left + front_right - rear_left - rear_right) / (2 * spec_.footprint_m.x);
     const double leftward =
-        (front_left + rear_left - front_right - rear_right) / (2 * footprint_m_.y);
+        (front_left + rear_left - front_right - rear_right) / (2 * spec_.footprint_m.y);
     const double pitch_rad = -std::atan(forward);
     const double roll_rad = std::atan(leftward * std::cos(pitch_rad));
-    const double z_m = ground_m(point.p_m, "centre", time) + height_m_;
+    const double z_m = ground_m(point.p_m, "centre", time) + spec_.height_m;
     return {rotation_from_yaw_pitch_roll(point.heading_rad, pitch_rad, roll_rad), {point.p_m, z_m}};
   }
 
@@ -140,14 +139,14 @@ class Vehicle {
     const glm::dvec2 last(ground_.frame().samples - 1);
     const bool inside = 0 <= uv.x && uv.x <= last.x && 0 <= uv.y && uv.y <= last.y;
     throw Error(
-        "ground path: at {:.2f} s the vehicle's {} would stand {} at ({:.3f}, {:.3f}) m in D; move "
+        "ground path: at {:.2f} s the vehicle's {} would stand {} at ({:.3f}, {:.3f}) m in W; move "
         "the waypoints",
-        Seconds(time).count(), part, inside ? "in a hole of the DEM" : "outside the DEM", p.x, p.y);
+        Seconds(time).count(), part, inside ? "in a hole of the DEM" : "outside the DEM",
+        spec_.origin_w_m.x + p.x, spec_.origin_w_m.y + p.y);
   }
 
   const Ground& ground_;
-  double height_m_;
-  glm::dvec2 footprint_m_;
+  const GroundPathSpec& spec_;
 };
 
 void check_waypoints(std::span<const glm::dvec2> p, Violations& broken) {
@@ -195,7 +194,7 @@ Trajectory build_ground_path(const Ground& ground, const GroundPathSpec& spec) {
                 curve.length_m(), duration_s, spec.speed_m_s, drive_m);
   broken.throw_if_any();
 
-  const Vehicle vehicle(ground, spec.height_m, spec.footprint_m);
+  const Vehicle vehicle(ground, spec);
   std::vector<Trajectory::Sample> samples;
   for (std::chrono::nanoseconds time = 0ns;; time += pose_spacing) {
     time = std::min(time, spec.duration);

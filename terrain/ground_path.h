@@ -16,6 +16,7 @@ struct GroundPathSpec {
   double height_m = 0;             ///< of body frame B's origin above the ground directly below it
   glm::dvec2 footprint_m{2, 1.5};  ///< wheel base and track, in plan
   std::chrono::nanoseconds duration{0};  ///< duration of the drive
+  glm::dvec2 origin_w_m{0};              ///< position of D in W, for messages
 };
 
 /// Returns the trajectory X_DB of a vehicle that follows the ground for [0, duration]: a pose every

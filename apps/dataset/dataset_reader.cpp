@@ -49,16 +49,21 @@ void read_names(yaml::Map& root, yaml::Faults& faults, DatasetHead& head) {
   }
 }
 
-// Reports a fault unless the name is unique and valid as the name of a file.
-void check_name(const yaml::Node& node, const std::string& name, std::set<std::string>& names,
-                yaml::Faults& faults) {
+// Reports a fault unless a sensor's name is valid as the name of a file.
+void check_letters(const yaml::Node& node, std::string_view key, const std::string& name,
+                   yaml::Faults& faults) {
   constexpr std::string_view letters =
       "abcdefghijklmnopqrstuvwxyzABCDEFGHIJKLMNOPQRSTUVWXYZ0123456789_-";
   if (name.find_first_not_of(letters) != std::string::npos) {
-    faults.add(node, "name",
+    faults.add(node, key,
                "is {}, but is part of file names: only letters, digits, '_' and '-' are permitted",
                yaml::shown(node));
   }
+}
+
+void check_name(const yaml::Node& node, const std::string& name, std::set<std::string>& names,
+                yaml::Faults& faults) {
+  check_letters(node, "name", name, faults);
   if (!names.insert(name).second)
     faults.add(node, "name", "'{}' is taken by an earlier sensor: names must differ", name);
 }
@@ -80,8 +85,8 @@ void read_sensor(const yaml::Node& node, HeadUse use, const FrameLists& lists,
   DatasetHead::Sensor sensor;
   const bool is_of_run = use == HeadUse::Run;
   const yaml::Node* const name = map.read_text("name", Need::Required, sensor.name);
+  if (name != nullptr) check_name(*name, sensor.name, names, faults);
   if (is_of_run) {
-    if (name != nullptr) check_name(*name, sensor.name, names, faults);
     sensor.kind = "stereo";  // needs no more keys, if the kind is invalid
     map.read_choice<std::string>("kind", Need::Required, sensor.kind,
                                  {{"lidar", "lidar"}, {"camera", "camera"}, {"stereo", "stereo"}});
@@ -98,8 +103,10 @@ void read_sensor(const yaml::Node& node, HeadUse use, const FrameLists& lists,
     head.sensors.push_back(std::move(sensor));
   } else if (!is_of_run) {
     DatasetHead::Pair& pair = head.pairs.emplace_back(DatasetHead::Pair{sensor.name, {}, {}});
-    map.read_text("left", Need::Required, pair.left);
-    map.read_text("right", Need::Required, pair.right);
+    for (const auto& [key, camera] : {std::pair("left", &pair.left), {"right", &pair.right}}) {
+      const yaml::Node* const given = map.read_text(key, Need::Required, *camera);
+      if (given != nullptr) check_letters(*given, key, *camera, faults);
+    }
   }
   map.close_partly();
 }

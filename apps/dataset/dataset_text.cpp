@@ -15,6 +15,7 @@
 #include "core/error.h"
 #include "core/io/file_io.h"
 #include "core/io/open_file.h"
+#include "core/near_names.h"
 
 namespace groundray {
 namespace {
@@ -69,14 +70,25 @@ std::optional<std::string_view> between(std::string_view text, std::string_view 
   return text.substr(begin.size(), text.size() - begin.size() - end.size());
 }
 
+constexpr std::size_t most_header_bytes = 1 << 26;
+
 }  // namespace
 
 DatasetText::DatasetText(const fs::path& folder)
     : path_(folder / dataset_file), file_(open_stream(path_)) {
   if (!file_) {
+    const int why = errno;
+    std::error_code ignored;
+    if (fs::status(folder, ignored).type() == fs::file_type::not_found)
+      throw Error("{}: {}", folder.string(), why_no_file(folder));
+    if (fs::is_regular_file(folder, ignored))
+      throw Error(
+          "{}: a file, but a dataset is a folder: give the folder that `groundray generate` "
+          "wrote",
+          folder.string());
     throw Error(
         "{}: the folder contains no readable {} ({}): was it written by `groundray generate`?",
-        folder.string(), dataset_file, std::generic_category().message(errno));
+        folder.string(), dataset_file, std::generic_category().message(why));
   }
   while (const auto line = next_line()) {
     sum_.add(*line + "\n");
@@ -84,6 +96,10 @@ DatasetText::DatasetText(const fs::path& folder)
     const auto shard = between(*line, shard_begin, quote);
     if (shard) shard_ = parse_shard(*shard);
     if (!shard || !shard_) header_ += *line + "\n";
+    if (header_.size() > most_header_bytes) {
+      throw Error("{}: more than {} bytes precede the frames: is it a dataset's?", path_.string(),
+                  most_header_bytes);
+    }
   }
   throw Error("{}: no frames are listed: it was truncated, or groundray did not write it",
               path_.string());
@@ -91,7 +107,7 @@ DatasetText::DatasetText(const fs::path& folder)
 
 std::optional<std::string> DatasetText::next_line() {
   std::string line;
-  if (!std::getline(file_, line)) {
+  if (!groundray::next_line(file_, line)) {
     if (file_.bad()) throw Error("{}: cannot be read: check the disk", path_.string());
     return std::nullopt;
   }
@@ -122,7 +138,7 @@ void DatasetText::read_end(std::string line) {
     if (!line.starts_with(item)) continue;
     if (auto file = parse_named_sum(std::string_view(line).substr(item.size())))
       files_.push_back(std::move(*file));
-  } while (std::getline(file_, line));
+  } while (groundray::next_line(file_, line));
 }
 
 std::string first_difference(std::string_view text, std::string_view other) {

@@ -8,6 +8,7 @@
 
 #include "core/error.h"
 #include "core/io/file_io.h"
+#include "core/io/memory.h"
 
 namespace groundray {
 namespace {
@@ -40,6 +41,8 @@ std::string unpack(std::string_view packed, const std::string& name) {
     stream.avail_out = static_cast<uInt>(block.size());
     const int state = inflate(&stream, Z_NO_FLUSH);
     if (state != Z_OK && state != Z_STREAM_END) fail("it is damaged");
+    if (bytes.size() + block.size() > bytes.capacity())  // it doubles
+      require_memory(name, "its unpacked bytes", 2.0 * static_cast<double>(bytes.capacity()));
     bytes.append(block.data(), block.size() - stream.avail_out);
     if (bytes.size() > most_bytes) fail("it contains more than 4 GB");
     if (state != Z_STREAM_END) continue;

@@ -11,6 +11,7 @@
 #include "apps/scene/yaml_reader.h"
 #include "core/error.h"
 #include "core/io/tum_io.h"
+#include "core/near_names.h"
 
 namespace groundray {
 namespace {
@@ -58,14 +59,14 @@ DatasetHead::Pair pair_named(const std::string& word, const DatasetHead& head,
   if (comma == std::string::npos) {
     throw Error("{}: it has no stereo pair '{}'; it has: {}{}", dataset.string(), word,
                 names.empty() ? "none" : fmt::format("{}", fmt::join(names, ", ")),
-                yaml::suggestion(word, names));
+                suggestion(word, names));
   }
   DatasetHead::Pair made{word, word.substr(0, comma), word.substr(comma + 1)};
   const std::vector<std::string> cameras = head.names_of("camera");
   for (const std::string* camera : {&made.left, &made.right}) {
     if (std::ranges::find(cameras, *camera) != cameras.end()) continue;
     throw Error("{}: it has no camera '{}' for the stereo pair {}; it has: {}{}", dataset.string(),
-                *camera, word, fmt::join(cameras, ", "), yaml::suggestion(*camera, cameras));
+                *camera, word, fmt::join(cameras, ", "), suggestion(*camera, cameras));
   }
   return made;
 }

@@ -17,6 +17,7 @@
 #include "core/io/open_file.h"
 #include "core/io/text_lines.h"
 #include "core/io/tum_io.h"
+#include "core/near_names.h"
 
 namespace groundray {
 namespace {
@@ -29,7 +30,7 @@ bool is_range_grid(const fs::path& path) {
   if (ending == ".gz") return true;  // as distributed by Stanford
   if (ending != ".ply") return false;
   std::ifstream file = open_stream(path);
-  for (std::string line; std::getline(file, line) && !line.starts_with("end_header");) {
+  for (std::string line; next_line(file, line) && !line.starts_with("end_header");) {
     if (line.starts_with("element range_grid")) return true;
   }
   return false;
@@ -125,7 +126,7 @@ void check_sensors(const ScanChoice& choice, const RecordedDataset& dataset) {
     if (std::ranges::find(names, sensor) != names.end()) continue;
     throw Error("{}: it has no lidar '{}'; it has: {}{}", choice.inputs[0].string(), sensor,
                 names.empty() ? "none" : fmt::format("{}", fmt::join(names, ", ")),
-                yaml::suggestion(sensor, names));
+                suggestion(sensor, names));
   }
 }
 
@@ -237,7 +238,7 @@ InputKind kind_of(const std::vector<fs::path>& inputs) {
   const fs::path& first = inputs.at(0);
   std::error_code ignored;
   for (const fs::path& path : inputs) {
-    if (!is_there(path)) throw Error("{}: there is no such file or folder", path.string());
+    if (!is_there(path)) throw Error("{}: {}", path.string(), why_no_file(path));
     const bool is_alone = fs::is_directory(path, ignored) || path.extension() == ".conf";
     if (is_alone && inputs.size() > 1) {
       throw Error("{}: a dataset folder or a .conf must be the only input; there are {}",
@@ -266,8 +267,8 @@ std::vector<fs::path> files_read(const ScanChoice& choice, const ScanFiles& file
   read.push_back(choice.inputs[0] / "dataset.yaml");
   for (const char* folder : {"poses", "calibration"}) {
     std::error_code ignored;
-    for (const auto& entry : fs::directory_iterator(choice.inputs[0] / folder, ignored))
-      read.push_back(entry.path());
+    for (const std::string& name : names_in(choice.inputs[0] / folder, ignored))
+      read.push_back(choice.inputs[0] / folder / name);
   }
   return read;
 }

@@ -6,6 +6,7 @@
 #include <cstdlib>
 #include <exception>
 #include <filesystem>
+#include <new>
 #include <optional>
 #include <string>
 #include <thread>
@@ -23,11 +24,13 @@
 #include "apps/golden/suite/golden_case.h"
 #include "apps/golden/suite/suite.h"
 #include "apps/scan/scan_flags.h"
+#include "apps/scan/usage_fault.h"
 #include "apps/scan/word_option.h"
 #include "apps/scene/interruption.h"
 #include "apps/scene/simulation.h"
 #include "core/error.h"
 #include "core/io/print_error.h"
+#include "core/near_names.h"
 
 namespace groundray::golden {
 namespace {
@@ -198,10 +201,11 @@ fs::path own_folder() {
 }
 
 void print(const Section& section) {
-  fmt::print("{} {}\n", section.verdict == Verdict::Passed ? "passed" : "FAILED", section.title);
+  print_text(stdout, "{} {}\n", section.verdict == Verdict::Passed ? "passed" : "FAILED",
+             section.title);
   for (const Measure& measure : section.measures) {
     if (measure.verdict != Verdict::Failed) continue;
-    fmt::print("       {}: {:.6g} {}, but at most {:.6g} because: {}\n", measure.name,
+    print_text(stdout, "       {}: {:.6g} {}, but at most {:.6g} because: {}\n", measure.name,
                measure.value, measure.unit, measure.limit.value_or(0), measure.because);
   }
 }
@@ -220,7 +224,7 @@ int run_suite(const fs::path& folder, const std::vector<std::string>& filters,
   write_json(options.out / "report.json", report);
   write_junit(options.out / "junit.xml", report);
   const auto good = std::ranges::count(report.sections, Verdict::Passed, &Section::verdict);
-  fmt::print("{} of {} cases passed; see {}\n", good, report.sections.size(),
+  print_text(stdout, "{} of {} cases passed; see {}\n", good, report.sections.size(),
              (options.out / "report.html").string());
   return good == std::ssize(report.sections) ? done : failed;
 }
@@ -229,8 +233,9 @@ int accept(const fs::path& folder, const std::vector<std::string>& names,
            const SuiteOptions& options) {
   for (const std::string& name : names) {
     const fs::path place = (folder / name / "").parent_path();  // drops a trailing slash
+    if (!fs::is_directory(place)) throw Error("{}: {}", place.string(), why_no_file(place));
     accept_case(read_case(place), options);
-    fmt::print("stored: {}\n", (place / "expected").string());
+    print_text(stdout, "stored: {}\n", (place / "expected").string());
   }
   return done;
 }
@@ -285,7 +290,7 @@ int run(int argc, char** argv) {
   try {
     app.parse(argc, argv);
   } catch (const CLI::ParseError& error) {
-    return app.exit(error) == 0 ? done : wrong_usage;
+    return report_usage(app, error) ? done : wrong_usage;
   }
   if (compare_command->parsed()) return compare.run() == Verdict::Failed ? failed : done;
   if (conform_command->parsed()) return conform.run() == Verdict::Failed ? failed : done;
@@ -309,6 +314,8 @@ int main(int argc, char** argv) {
   } catch (const groundray::Interrupted&) {
     groundray::print_error("\ngroundray-golden: interrupted\n");
     return groundray::golden::interrupted;
+  } catch (const std::bad_alloc&) {
+    groundray::print_error("groundray-golden: there is not enough memory\n");
   } catch (const std::exception& error) {
     groundray::print_error("groundray-golden: {}\n", error.what());
   }

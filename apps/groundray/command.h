@@ -51,6 +51,9 @@ CLI::Option* add_scaled(CLI::App* app, const std::string& name, Held& held, doub
       name, [&held, unit](const double& value) { held = value * unit; }, meaning);
 }
 
+/// Returns the machine's memory: the system may end a process that takes more, without a message.
+std::size_t machine_bytes();
+
 /// Adds the option of the memory limit.
 template <typename Held>
 void add_memory(CLI::App* command, Held& most_bytes, const std::string& meaning) {

@@ -80,30 +80,30 @@ void say_faults(const fs::path& out, const std::vector<std::string>& faults) {
 void say(const Simulation& simulation, const fs::path& out, const FramePlan& plan,
          const Tally& tally, std::FILE* to) {
   if (tally.scans < plan.scans)
-    fmt::print(to, "{} scans already existed\n", plan.scans - tally.scans);
+    print_text(to, "{} scans already existed\n", plan.scans - tally.scans);
   if (tally.images < plan.images)
-    fmt::print(to, "{} images already existed\n", plan.images - tally.images);
+    print_text(to, "{} images already existed\n", plan.images - tally.images);
   if (tally.scans > 0) {
-    fmt::print(to, "{} scans, {} points of {} pulses, {:.2f} M pulses/s\n", tally.scans,
+    print_text(to, "{} scans, {} points of {} pulses, {:.2f} M pulses/s\n", tally.scans,
                tally.points, tally.pulses,
                1e-6 * static_cast<double>(tally.pulses) / tally.scanning.count());
   }
   if (tally.images > 0) {
-    fmt::print(to, "{} images, {:.1f} M pixels, {:.1f} M paths in {:.1f} s\n", tally.images,
+    print_text(to, "{} images, {:.1f} M pixels, {:.1f} M paths in {:.1f} s\n", tally.images,
                1e-6 * static_cast<double>(tally.pixels), 1e-6 * static_cast<double>(tally.paths),
                tally.exposing.count());
   }
   if (tally.flows_left_out > 0) {
-    fmt::print(to, "{} flows beyond 512 px are marked as unknown in KITTI's files\n",
+    print_text(to, "{} flows beyond 512 px are marked as unknown in KITTI's files\n",
                tally.flows_left_out);
   }
-  fmt::print(to, "dataset: {}\n", out.string());
+  print_text(to, "dataset: {}\n", out.string());
   for (const PlacedLidar& lidar : simulation.lidars) {
-    fmt::print(to, "  {}: scans and pictures (*_preview.png) in {}\n", lidar.spec.name,
+    print_text(to, "  {}: scans and pictures (*_preview.png) in {}\n", lidar.spec.name,
                (out / "lidar" / lidar.spec.name).string());
   }
   for (const PlacedCamera& camera : simulation.cameras) {
-    fmt::print(to, "  {}: images and pictures (*_preview.png) in {}\n", camera.spec.name,
+    print_text(to, "  {}: images and pictures (*_preview.png) in {}\n", camera.spec.name,
                (out / "camera" / camera.spec.name).string());
   }
 }

@@ -4,10 +4,12 @@
 #include <fmt/ranges.h>
 
 #include <algorithm>
+#include <chrono>
 #include <cmath>
 #include <cstddef>
 #include <cstdio>
 #include <glm/trigonometric.hpp>
+#include <limits>
 #include <optional>
 #include <string>
 #include <string_view>
@@ -18,6 +20,9 @@
 #include "apps/dataset/dataset_text.h"
 #include "apps/dataset/write/journal.h"
 #include "apps/scene/simulation.h"
+#include "core/error.h"
+#include "core/io/file_io.h"
+#include "core/io/print_error.h"
 #include "terrain/dem/dem_file.h"
 #include "terrain/dem/dem_io.h"
 #include "terrain/lod/certificate.h"
@@ -32,38 +37,38 @@ void print_frame(const GridFrame& frame, const glm::dvec3& origin_w_m) {
   const glm::dvec2 step_m = glm::abs(frame.step_m);
   const glm::dvec2 cells(frame.samples - 1);
   const glm::dvec2 centre_m = glm::dvec2(origin_w_m) + frame.origin_m + cells * frame.step_m / 2.0;
-  fmt::print("centre    {:.3f}, {:.3f} m\n", centre_m.x, centre_m.y);
-  fmt::print("extent    {:.1f} x {:.1f} m\n", step_m.x * cells.x, step_m.y * cells.y);
-  fmt::print("cell      {:.6g} x {:.6g} m\n", step_m.x, step_m.y);
+  print_text(stdout, "centre    {:.3f}, {:.3f} m\n", centre_m.x, centre_m.y);
+  print_text(stdout, "extent    {:.1f} x {:.1f} m\n", step_m.x * cells.x, step_m.y * cells.y);
+  print_text(stdout, "cell      {:.6g} x {:.6g} m\n", step_m.x, step_m.y);
 }
 
 void print_heights(const HeightGrid& grid) {
   const double samples = static_cast<double>(grid.heights_m().size());
-  fmt::print("heights   {:.3f} to {:.3f} m\n", grid.min_height_m(), grid.max_height_m());
-  fmt::print("holes     {} samples ({:.2f} %)\n", grid.hole_count(),
+  print_text(stdout, "heights   {:.3f} to {:.3f} m\n", grid.min_height_m(), grid.max_height_m());
+  print_text(stdout, "holes     {} samples ({:.2f} %)\n", grid.hole_count(),
              100 * static_cast<double>(grid.hole_count()) / samples);
 }
 
 void print_certificate(const DemFile& dem) {
   const std::optional<Certificate> certificate = Certificate::open(dem);
   if (!certificate) {
-    fmt::print("certified no; use `groundray terrain certify`\n");
+    print_text(stdout, "certified no; use `groundray terrain certify`\n");
     return;
   }
   const LevelSummary& root = certificate->levels().back();
-  fmt::print("certified yes, in {}: ", certificate->folder().string());
+  print_text(stdout, "certified yes, in {}: ", certificate->folder().string());
   if (root.mixed > 0) {
-    fmt::print("it has holes; {} of {} blocks of 8 x 8 cells touch one\n",
+    print_text(stdout, "it has holes; {} of {} blocks of 8 x 8 cells touch one\n",
                certificate->levels().front().mixed, certificate->levels().front().nodes);
   } else {
-    fmt::print("a single cell deviates by at most {:.6g} m\n", root.max_deviation_m);
+    print_text(stdout, "a single cell deviates by at most {:.6g} m\n", root.max_deviation_m);
   }
 }
 
 // Prints the header first: there may be nothing else to print for a DEM that cannot be traced.
 void print_dem(const std::filesystem::path& path) {
   const DemInfo info = inspect_dem(path);
-  fmt::print("format    {}, {}\nsize      {} x {} samples\nCRS       {}\n", info.driver,
+  print_text(stdout, "format    {}, {}\nsize      {} x {} samples\nCRS       {}\n", info.driver,
              info.sample_type, info.columns, info.rows, info.crs_name);
   std::fflush(stdout);
   const DemFile dem(path);
@@ -72,7 +77,7 @@ void print_dem(const std::filesystem::path& path) {
               header.origin_w_m);
   const double traced_mib = Terrain::whole_bytes(header.samples) / mib;
   if (traced_mib < TerrainDetail{}.memory_mib) print_heights(load_dem(path).grid);
-  fmt::print("memory    about {:.0f} MiB to trace as a whole\n", traced_mib);
+  print_text(stdout, "memory    about {:.0f} MiB to trace as a whole\n", traced_mib);
   print_certificate(dem);
 }
 
@@ -89,19 +94,54 @@ void print_levels(const Simulation& simulation) {
                          simulation.spec.tracing);
   std::size_t triangles = 0;
   double bytes = static_cast<double>(rays.device().memory_bytes());
-  fmt::print("levels    round the first frame; deviation is the certified bound, in height\n");
-  fmt::print("  {:>10} {:>21} {:>12} {:>12} {:>9}\n", "cell m", "window m", "triangles",
+  print_text(stdout,
+             "levels    round the first frame; deviation is the certified bound, in height\n");
+  print_text(stdout, "  {:>10} {:>21} {:>12} {:>12} {:>9}\n", "cell m", "window m", "triangles",
              "deviation m", "bridging");
   for (const LevelScene& scene : rays.levels()) {
     const Level& level = scene.level();
     const glm::dvec2 cell_m = glm::abs(terrain.frame().step_m) * static_cast<double>(level.step);
     const glm::dvec2 window_m = glm::dvec2(level.heights.size() - 1) * cell_m;
-    fmt::print("  {:>10.6g} {:>10.0f} x {:>8.0f} {:>12} {:>12.4g} {:>9}\n", cell_m.x, window_m.x,
-               window_m.y, scene.triangle_count(), scene.deviation_m(), scene.bridging_leaves());
+    print_text(stdout, "  {:>10.6g} {:>10.0f} x {:>8.0f} {:>12} {:>12.4g} {:>9}\n", cell_m.x,
+               window_m.x, window_m.y, scene.triangle_count(), scene.deviation_m(),
+               scene.bridging_leaves());
     triangles += scene.triangle_count();
     bytes += 4.0 * static_cast<double>(level.heights.heights_m().size());
   }
-  fmt::print("triangles {} in {:.0f} MiB\n", triangles, bytes / mib);
+  print_text(stdout, "triangles {} in {:.0f} MiB\n", triangles, bytes / mib);
+}
+
+// Returns the least height of a sensor above the ground below it, at times 10 ms apart; infinite if
+// it is never above the DEM.
+double least_height_m(const Trajectory& X_DS, const Simulation& simulation) {
+  const Ground& ground = simulation.terrain.ground();
+  double least_m = std::numeric_limits<double>::infinity();
+  for (std::chrono::nanoseconds time{0}; time <= run_time(simulation.spec);
+       time += std::chrono::milliseconds(10)) {
+    const glm::dvec3 p_DS = X_DS.pose_at(time).translation_m;
+    if (const auto ground_m = ground.height_m_at(glm::dvec2(p_DS)))
+      least_m = std::min(least_m, p_DS.z - *ground_m);
+  }
+  return least_m;
+}
+
+// Warns of sensors that may be as near to the reference surface as that is to the traced one.
+void print_tolerance(const Simulation& simulation) {
+  const double tolerance_m = simulation.spec.terrain.detail.tolerance_m;
+  if (tolerance_m == 0) return;
+  const auto look = [&](const char* kind, const std::string& name, const Trajectory& X_DS) {
+    const double height_m = least_height_m(X_DS, simulation);
+    if (tolerance_m < height_m) return;
+    print_text(
+        stdout,
+        "note      tolerance_m = {} is not less than the height of {} '{}' above the ground, "
+        "{:.3g} "
+        "m: its error bounds can be infinite; choose a smaller one\n",
+        tolerance_m, kind, name, height_m);
+  };
+  for (const PlacedLidar& lidar : simulation.lidars) look("lidar", lidar.spec.name, lidar.X_DS);
+  for (const PlacedCamera& camera : simulation.cameras)
+    look("camera", camera.spec.name, camera.X_DC);
 }
 
 // The lowest layer is the terrain itself.
@@ -109,7 +149,7 @@ void print_cover(const TerrainSpec& terrain, const GroundCover& cover) {
   for (std::size_t i = 0; i < cover.layers().size(); ++i) {
     const CoverLayer& layer = cover.layers()[i];
     const auto& material = i == 0 ? terrain.material : terrain.cover[i - 1].material;
-    fmt::print("cover     {} of label {}{}{}\n", material ? material->name : "no material",
+    print_text(stdout, "cover     {} of label {}{}{}\n", material ? material->name : "no material",
                layer.label,
                layer.texture ? fmt::format(", with images of {} m", layer.texture->size_m) : "",
                layer.mask != nullptr ? ", by a mask" : "");
@@ -125,22 +165,22 @@ void print_materials(const Simulation& simulation) {
   std::vector<std::string_view> names;
   for (const Material& material : simulation.scene_objects.materials.all())
     names.push_back(material.name);
-  fmt::print("materials {}\n", fmt::join(names, ", "));
+  print_text(stdout, "materials {}\n", fmt::join(names, ", "));
 }
 
 void print_content(const SceneObjects& content) {
   for (const SceneObjects::Group& group : content.groups) {
-    fmt::print("objects   {}: {} of label {}, instances from {}\n", group.name, group.count,
+    print_text(stdout, "objects   {}: {} of label {}, instances from {}\n", group.name, group.count,
                group.label, group.first);
   }
   if (!content.shapes.empty()) {
     std::size_t triangles = 0;
     for (const ModelScene& shape : content.shapes) triangles += shape.model().mesh.triangles.size();
-    fmt::print("models    {} of {} triangles for {} objects\n", content.shapes.size(), triangles,
-               content.objects.size());
+    print_text(stdout, "models    {} of {} triangles for {} objects\n", content.shapes.size(),
+               triangles, content.objects.size());
   }
   if (content.memory_bytes > 0) {
-    fmt::print("memory    {:.1f} MiB of objects, textures and cover\n",
+    print_text(stdout, "memory    {:.1f} MiB of objects, textures and cover\n",
                static_cast<double>(content.memory_bytes) / mib);
   }
 }
@@ -157,12 +197,12 @@ std::string words_for(const AnalyticSky& /*sky*/, const ClearAir& air) {
 }
 
 void print_sky(const SkySpec& spec) {
-  fmt::print("sky       {}\n",
+  print_text(stdout, "sky       {}\n",
              std::visit([&](const auto& dome) { return words_for(dome, spec.air); }, spec.dome));
   if (!spec.sun) return;
   const Sun sun(*spec.sun, spec.air);
   const double azimuth_deg = glm::degrees(std::atan2(sun.direction().x, sun.direction().y));
-  fmt::print("sun       elevation {:.2f}, azimuth {:.2f} degrees in W\n",
+  print_text(stdout, "sun       elevation {:.2f}, azimuth {:.2f} degrees in W\n",
              glm::degrees(sun.elevation_rad()), azimuth_deg < 0 ? azimuth_deg + 360 : azimuth_deg);
 }
 
@@ -170,24 +210,25 @@ void print_lidar(const PlacedLidar& lidar) {
   const ScanPattern& pattern = lidar.lidar.pattern();
   const auto& light = lidar.spec.lidar.light;
   const double pulses = static_cast<double>(pattern.pulses(0)) * static_cast<double>(lidar.sweeps);
-  fmt::print("lidar     {}: {}, {} scans of about {:.0f} pulses, {} {:.1f} MiB of PLY\n",
+  print_text(stdout, "lidar     {}: {}, {} scans of about {:.0f} pulses, {} {:.1f} MiB of PLY\n",
              lidar.spec.name, lidar.spec.lidar.model, lidar.sweeps,
              pulses / static_cast<double>(lidar.sweeps), light ? "for one echo each" : "at most",
              pulses * (light ? 113 : 88) / (1 << 20));
   if (!light || !light->sun.irradiance_w_m2_nm) return;
-  fmt::print("          sunlight {:.4g} W/(m2 nm) at {} nm, {}\n", *light->sun.irradiance_w_m2_nm,
-             light->wavelength_nm,
+  print_text(stdout, "          sunlight {:.4g} W/(m2 nm) at {} nm, {}\n",
+             *light->sun.irradiance_w_m2_nm, light->wavelength_nm,
              light->sun.direction ? "across its rays" : "on all surfaces alike");
 }
 
 void print_camera(const PlacedCamera& placed) {
   const CameraSpec& camera = placed.spec.camera;
   const double pixels = static_cast<double>(camera.size_px.x) * camera.size_px.y;
-  fmt::print("camera    {}: {}, {} images of {} x {} px in {:.4g} ms\n", placed.spec.name,
+  print_text(stdout, "camera    {}: {}, {} images of {} x {} px in {:.4g} ms\n", placed.spec.name,
              camera.model, placed.begins.size(), camera.size_px.x, camera.size_px.y,
              1e-6 * static_cast<double>(placed.camera.duration().count()));
   if (needs_light(camera)) {
-    fmt::print(
+    print_text(
+        stdout,
         "          {} to {} paths a pixel of up to {} rays: {:.3g} M paths an image or more\n",
         camera.sampling.samples, camera.sampling.most_samples, camera.sampling.depth,
         1e-6 * pixels * camera.sampling.samples);
@@ -195,14 +236,15 @@ void print_camera(const PlacedCamera& placed) {
 }
 
 void print_scene(const Simulation& simulation) {
-  fmt::print("seed      {}\n", simulation.spec.seed.value);
-  fmt::print("duration  {} s, {} tracing\n", simulation.spec.duration_s,
+  print_text(stdout, "seed      {}\n", simulation.spec.seed.value);
+  print_text(stdout, "duration  {} s, {} tracing\n", simulation.spec.duration_s,
              simulation.spec.tracing == Tracing::Fast ? "fast" : "exact");
-  fmt::print("terrain   {}\n", simulation.spec.terrain.dem.string());
-  fmt::print("CRS       {}\n", simulation.terrain.header().crs_name);
+  print_text(stdout, "terrain   {}\n", simulation.spec.terrain.dem.string());
+  print_text(stdout, "CRS       {}\n", simulation.terrain.header().crs_name);
   print_frame(simulation.terrain.frame(), simulation.terrain.header().origin_w_m);
   if (simulation.terrain.whole() != nullptr) print_heights(*simulation.terrain.whole());
   print_levels(simulation);
+  print_tolerance(simulation);
   print_cover(simulation.spec.terrain, simulation.scene_objects.cover);
   print_content(simulation.scene_objects);
   print_materials(simulation);
@@ -215,16 +257,16 @@ void print_dataset(const std::filesystem::path& folder) {
   DatasetSummary dataset = read_summary(folder);
   const bool is_open = std::filesystem::exists(folder / journal_file);
   if (is_open) count_journal(folder / journal_file, dataset);
-  fmt::print("dataset   {} of {} frames are complete{}\n", dataset.done, dataset.asked_for,
+  print_text(stdout, "dataset   {} of {} frames are complete{}\n", dataset.done, dataset.asked_for,
              is_open ? "; a run is in progress, or was interrupted and continues with --resume"
              : dataset.done < dataset.asked_for
                  ? "; --resume of `groundray generate`, or of `groundray merge` if that was "
                    "interrupted, adds the rest"
                  : "");
-  if (dataset.shard) fmt::print("shard     {}\n", text_of(*dataset.shard));
-  fmt::print("version   {}\nseed      {}\n", dataset.version, dataset.seed);
+  if (dataset.shard) print_text(stdout, "shard     {}\n", text_of(*dataset.shard));
+  print_text(stdout, "version   {}\nseed      {}\n", dataset.version, dataset.seed);
   for (const DatasetSummary::Sensor& sensor : dataset.sensors) {
-    fmt::print("{:<9} {}: {}, {} of {} frames, {:.1f} MiB\n", sensor.kind, sensor.name,
+    print_text(stdout, "{:<9} {}: {}, {} of {} frames, {:.1f} MiB\n", sensor.kind, sensor.name,
                sensor.model, sensor.done, sensor.asked_for,
                static_cast<double>(sensor.bytes) / mib);
   }
@@ -234,9 +276,21 @@ void print_dataset(const std::filesystem::path& folder) {
 
 void print_info(const std::filesystem::path& file) {
   if (std::filesystem::exists(file / dataset_file)) return print_dataset(file);
-  if (file.extension() == ".yaml" || file.extension() == ".yml")
-    return print_scene(load_simulation(file));
-  print_dem(file);
+  const std::string ending = file_ending(file);
+  if (ending == ".yaml" || ending == ".yml") return print_scene(load_simulation(file));
+  for (const char* other : {".ply", ".obj", ".stl", ".glb", ".gltf", ".pcd", ".npy", ".npz"}) {
+    if (ending == other && std::filesystem::exists(file))
+      throw Error(
+          "{}: a mesh or cloud by its name: `groundray-view` shows it; info describes DEMs, "
+          "scenes (.yaml) and datasets' folders",
+          file.string());
+  }
+  try {
+    print_dem(file);
+  } catch (const Error&) {
+    if (!std::filesystem::is_directory(file)) throw;
+    throw Error("{}: it is neither the folder of a dataset nor a raster", file.string());
+  }
 }
 
 }  // namespace groundray

@@ -9,6 +9,7 @@
 
 #include "apps/groundray/command.h"
 #include "apps/groundray/info.h"
+#include "apps/scan/usage_fault.h"
 #include "apps/scene/interruption.h"
 #include "core/error.h"
 #include "core/io/print_error.h"
@@ -48,7 +49,7 @@ int run(int argc, char** argv) {
   try {
     app.parse(argc, argv);
   } catch (const CLI::ParseError& error) {
-    return app.exit(error) == 0 ? done : wrong_usage;
+    return groundray::report_usage(app, error) ? done : wrong_usage;
   }
   for (const groundray::Command& command : commands)
     if (command.app->parsed()) command.run();

@@ -55,12 +55,6 @@ fs::path new_file_beside(const fs::path& path) {
 
 }  // namespace
 
-void check_ending(const fs::path& path, std::initializer_list<const char*> endings) {
-  const std::string ending = file_ending(path);
-  if (std::ranges::find(endings, ending) == endings.end())
-    throw Error("{}: its name must end in {}", path.string(), *endings.begin());
-}
-
 void check_results(std::span<const fs::path> results, std::span<const fs::path> inputs) {
   std::vector<fs::path> places;
   for (const fs::path& result : results) {

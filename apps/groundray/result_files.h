@@ -3,16 +3,11 @@
 #include <cstddef>
 #include <filesystem>
 #include <functional>
-#include <initializer_list>
 #include <span>
 #include <string>
 #include <vector>
 
 namespace groundray {
-
-/// Checks the extension of a name.
-/// @throws Error unless the name ends in one of `endings`, in upper or lower case.
-void check_ending(const std::filesystem::path& path, std::initializer_list<const char*> endings);
 
 /// Checks, before long computations, that the results can be written, each to its own file.
 /// @param inputs  input files, which must not be overwritten.

@@ -15,6 +15,7 @@
 #include "apps/dataset/write/verify.h"
 #include "apps/groundray/command.h"
 #include "apps/groundray/generate.h"
+#include "apps/scan/number_checks.h"
 #include "core/error.h"
 #include "core/io/print_error.h"
 
@@ -30,29 +31,39 @@ std::string check_shard(const std::string& text) {
 
 double mebibytes(std::uint64_t bytes) { return static_cast<double>(bytes) / (1 << 20); }
 
-// Prints the faults of a dataset and their number; returns true if there are none.
-bool verify_one(const fs::path& folder) {
+// Prints the faults of a dataset and their number.
+Verification verify_one(const fs::path& folder) {
   const auto report = [](const std::string& fault) {
-    fmt::print("{}\n", fault);
+    print_text(stdout, "{}\n", fault);
     std::fflush(stdout);
   };
-  const auto [files, faults, bytes] = verify(folder, report, stderr);
-  fmt::print(
-      "{}: {} files of {:.1f} MiB checked, {}\n", folder.string(), files, mebibytes(bytes),
-      faults == 0 ? "all unchanged" : fmt::format("{} fault{}", faults, faults == 1 ? "" : "s"));
-  return faults == 0;
+  const Verification found = verify(folder, report, stderr);
+  print_text(stdout, "{}: {} files of {:.1f} MiB checked, {}\n", folder.string(), found.files,
+             mebibytes(found.bytes),
+             found.faults == 0
+                 ? "all unchanged"
+                 : fmt::format("{} fault{}", found.faults, found.faults == 1 ? "" : "s"));
+  return found;
 }
 
 void verify_all(const std::vector<fs::path>& datasets) {
+  const bool is_alone = datasets.size() == 1;
   std::size_t at_fault = 0;
   for (const fs::path& dataset : datasets) {
     bool is_sound = false;
     try {
-      is_sound = verify_one(dataset);
+      const Verification found = verify_one(dataset);
+      is_sound = found.faults == 0;
+      if (is_alone && found.is_unfinished())
+        throw Error(
+            "{}: unfinished: {} of {} frames are complete; --resume of `groundray "
+            "generate`, or of `groundray merge` if that was interrupted, adds the rest",
+            dataset.string(), found.done, found.asked_for);
     } catch (const Error& error) {
-      fmt::print("{}\n", error.what());
+      if (is_alone) throw;
+      print_text(stdout, "{}\n", error.what());
     } catch (const std::system_error& error) {
-      fmt::print("{}: {}\n", dataset.string(), error.what());
+      print_text(stdout, "{}: {}\n", dataset.string(), error.what());
     }
     if (!is_sound) ++at_fault;
   }
@@ -67,7 +78,7 @@ void verify_all(const std::vector<fs::path>& datasets) {
 void merge_shards(const std::vector<fs::path>& shards, const fs::path& out, FolderUse use) {
   const auto warn = [](const std::string& warning) { print_error("{}\n", warning); };
   const auto [frames, bytes] = merge(shards, out, use, {.progress = stderr, .warn = warn});
-  fmt::print("{} frames of {} shards, {:.1f} MiB\ndataset: {}\n", frames, shards.size(),
+  print_text(stdout, "{} frames of {} shards, {:.1f} MiB\ndataset: {}\n", frames, shards.size(),
              mebibytes(bytes), out.string());
 }
 
@@ -89,8 +100,9 @@ struct RunOptions {
         ->required();
     command->add_option("-o,--output", out, "Folder for the dataset; created if missing")
         ->required();
-    command->add_option("--seed", seed,
-                        "Seed of noise and scattered objects, instead of the scene's");
+    command
+        ->add_option("--seed", seed, "Seed of noise and scattered objects, instead of the scene's")
+        ->check(whole());
     command->add_flag("--resume", resume,
                       "Continue an interrupted run in its folder: check all existing files and "
                       "create those that are missing or changed");

@@ -1,9 +1,17 @@
+#include <unistd.h>
+
 #include <CLI/CLI.hpp>
 
 #include "apps/groundray/command.h"
 #include "apps/scan/word_option.h"
 
 namespace groundray {
+
+std::size_t machine_bytes() {
+  const auto pages = sysconf(_SC_PHYS_PAGES), page_bytes = sysconf(_SC_PAGESIZE);
+  if (pages <= 0 || page_bytes <= 0) return std::numeric_limits<std::size_t>::max();
+  return static_cast<std::size_t>(pages) * static_cast<std::size_t>(page_bytes);
+}
 
 ReportFacts facts_of(const std::string& command, std::span<const std::filesystem::path> inputs) {
   std::string all;

@@ -11,6 +11,7 @@
 #include "apps/python/binding/long_call.h"
 #include "apps/python/binding/points.h"
 #include "core/error.h"
+#include "core/io/file_io.h"
 #include "core/io/ply_io.h"
 
 namespace groundray::python {
@@ -46,6 +47,7 @@ docs/guide/python.md lists them. dict(points) is a dict of all columns; len(poin
           "save",
           [](const Points& points, const std::filesystem::path& path,
              const std::vector<std::string>& comments) {
+            check_ending(path, {".ply"});
             without_gil([&](const StopRequest&) {
               write_ply(path, points.cloud, comments);
               return true;

@@ -61,6 +61,10 @@ void add_point(const LidarPoint& point, std::uint32_t group, const PointNoise& n
 MeasuredPoints points_of(const GivenPoints& points_m, const GivenPoints& origins_m,
                          const GivenNumbers& range_sd_m, const std::optional<GivenNumbers>& groups,
                          const PointNoise& noise) {
+  points_m.check("fuse_points: points_m");
+  origins_m.check("fuse_points: origins_m");
+  range_sd_m.check("fuse_points: range_sd_m");
+  if (groups) groups->check("fuse_points: groups");
   const std::size_t count = points_m.rows();
   if (origins_m.rows() != count || range_sd_m.rows() != count ||
       (groups && groups->rows() != count))
@@ -277,6 +281,8 @@ std::span<const float> values_of(const GivenRaster& raster) {
 
 void check_alike(const char* call, const GivenRaster& heights_m, const char* name,
                  const GivenRaster& other) {
+  heights_m.check(fmt::format("{}: heights_m", call));
+  other.check(fmt::format("{}: {}", call, name));
   if (other.rows() != heights_m.rows() || other.columns() != heights_m.columns())
     throw Error("{}: {} has {} x {} samples, but heights_m has {} x {}; they must be equal", call,
                 name, other.rows(), other.columns(), heights_m.rows(), heights_m.columns());
@@ -296,7 +302,7 @@ AnyArray smoothed(const GivenRaster& heights_m, const GivenRaster& variance_m2, 
 nb::dict filled_dem(const GivenRaster& heights_m, double cell_m, const std::string& reach,
                     std::optional<double> farthest_m, double largest_share,
                     const std::optional<GivenRaster>& most_m) {
-  if (most_m) check_alike("fill_dem", heights_m, "most_m", *most_m);
+  check_alike("fill_dem", heights_m, "most_m", most_m ? *most_m : heights_m);
   const FillOptions options{.reach = chosen<FillReach>("reach", reach,
                                                        {{"enclosed", FillReach::Enclosed},
                                                         {"hull", FillReach::Hull},

@@ -47,6 +47,7 @@ std::vector<T> column_values(const ColumnRule& rule, const std::optional<GivenNu
                              std::size_t vertices, Violations& broken) {
   std::vector<T> values;
   if (!given) return values;
+  given->check(fmt::format("Mesh: {}", rule.name));
   broken.unless(given->rows() == vertices,
                 "there are {} vertices, but {} values of {}; there must be one for each", vertices,
                 given->rows(), rule.name);
@@ -82,6 +83,8 @@ Mesh given_mesh(const GivenPoints& vertices_m, const GivenIndices& triangles,
                 const std::optional<GivenNumbers>& sd_m, const std::optional<GivenNumbers>& labels,
                 const std::optional<GivenNumbers>& confidence,
                 const std::array<double, 3>& origin_w_m) {
+  vertices_m.check("Mesh: vertices_m");
+  triangles.check("Mesh: triangles");
   const std::size_t count = vertices_m.rows();
   Violations broken("mesh");
   Mesh mesh;

@@ -113,6 +113,7 @@ Points cast_in_scene(SceneState& state, const GivenPoints& origins_m, const Give
 }
 
 AnyArray ground_heights(const SceneState& state, const GivenPlaces& places_m) {
+  places_m.check("heights_at: places_m");
   return array_of(without_gil([&](const StopRequest&) {
     const Ground& ground = state.simulation.terrain.ground();
     std::vector<double> heights_m(places_m.rows());
@@ -146,8 +147,8 @@ constexpr const char* cast_doc =
   error_bound  adds a bound of each range's difference from that on the reference surface
 
 The result has a row for each ray: range_true_m along it (infinite without a hit), world_x_m,
-world_y_m, world_z_m (in D), nx, ny, nz, incidence_rad (NaN without a hit), label, instance (0 for
-the ground) and error_bound_m if requested. The ground is hit from above only.
+world_y_m, world_z_m (in D), nx, ny, nz, incidence_rad, error_estimate_m (NaN without a hit), label,
+instance (0 for the ground) and error_bound_m if requested. The ground is hit from above only.
 Raises groundray.Error for invalid rays.)";
 
 }  // namespace

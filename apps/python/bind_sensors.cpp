@@ -239,6 +239,7 @@ AnyArray directions_of(nb::handle_t<SceneCamera> self) {
 }
 
 AnyArray project(const SceneCamera& camera, const GivenPoints& points_m) {
+  points_m.check("project: points_m");
   constexpr double none = std::numeric_limits<double>::quiet_NaN();
   std::vector<double> pixels = without_gil([&](const StopRequest&) {
     const Lens& lens = camera.placed().camera.lens();

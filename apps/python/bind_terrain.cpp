@@ -22,6 +22,8 @@
 #include "apps/python/cast.h"
 #include "apps/python/terrain_model.h"
 #include "core/error.h"
+#include "core/io/file_io.h"
+#include "reconstruction/pipeline/terrain_decimation.h"
 #include "terrain/dem/dem_io.h"
 #include "terrain/dem/layers_io.h"
 #include "terrain/terrain_mesh.h"
@@ -39,6 +41,7 @@ glm::dvec3 origin_for(const Pair& south_west_w_m) {
 
 Dem dem_of(const GivenRaster& heights_m, double cell_m, const Pair& south_west_w_m,
            const std::string& crs_wkt) {
+  heights_m.check("Terrain: heights_m");
   constexpr std::size_t most = std::numeric_limits<int>::max();
   Violations broken("Terrain");
   broken.unless(heights_m.rows() <= most && heights_m.columns() <= most,
@@ -69,6 +72,7 @@ SharedTerrain open_terrain(const std::filesystem::path& path, std::optional<doub
 }
 
 void save(const TerrainModel& terrain, const std::filesystem::path& path) {
+  check_ending(path, {".tif", ".tiff"});
   without_gil([&](const StopRequest&) {
     const Dem& dem = terrain.dem();
     const RasterLayer layer{"elevation", "m", dem.grid.heights_m()};
@@ -78,15 +82,18 @@ void save(const TerrainModel& terrain, const std::filesystem::path& path) {
 }
 
 Points cast_on_terrain(const TerrainModel& terrain, const GivenPoints& origins_m,
-                       const GivenPoints& directions) {
+                       const GivenPoints& directions, bool error_bound) {
   const GivenRays rays(origins_m, directions, {});
   return without_gil([&](const StopRequest& stop) {
     rays.check();
-    return Points{cast_rays(terrain.scene(), rays, ErrorBounds::Omit, [&] { stop.obey(); })};
+    return Points{cast_rays(terrain.scene(), rays,
+                            error_bound ? ErrorBounds::Report : ErrorBounds::Omit,
+                            [&] { stop.obey(); })};
   });
 }
 
 AnyArray dem_heights(const TerrainModel& terrain, const GivenPlaces& places_m) {
+  places_m.check("heights_at: places_m");
   return array_of(without_gil([&](const StopRequest&) {
     const HeightGrid& grid = terrain.dem().grid;
     std::vector<double> heights_m(places_m.rows());
@@ -98,10 +105,12 @@ AnyArray dem_heights(const TerrainModel& terrain, const GivenPlaces& places_m) {
   }));
 }
 
-Mesh terrain_mesh(const TerrainModel& terrain, double max_error_m) {
-  return without_gil([&](const StopRequest&) {
+Mesh terrain_mesh(const TerrainModel& terrain, double max_error_m, bool fewest) {
+  return without_gil([&](const StopRequest& stop) {
     const Dem& dem = terrain.dem();
-    TerrainMesh built = build_terrain_mesh(dem.grid, {.tolerance_m = max_error_m});
+    const RunControl control{.progress = [&](double) { stop.obey(); }};
+    TerrainMesh built = fewest ? decimate_terrain(dem.grid, max_error_m, control).mesh
+                               : build_terrain_mesh(dem.grid, {.tolerance_m = max_error_m});
     Mesh mesh{.georeference = {dem.origin_w_m, dem.crs_name, dem.crs_wkt}};
     for (const glm::ivec2& sample : built.vertices)
       mesh.measured.shape.vertices_m.emplace_back(dem.grid.frame().to_D(sample),
@@ -121,7 +130,8 @@ constexpr const char* terrain_doc = R"(A DEM in memory: the reference surface th
   crs_wkt         W's coordinate reference system as WKT, or empty for local metres
 
 Each cell is two triangles, split from sample (column + 1, row) to (column, row + 1). Positions
-are in the frame D: W minus `origin_w_m`, which is south_west_w_m rounded down to whole metres.
+are in the frame D: W minus `origin_w_m`, which is south_west_w_m rounded down to whole metres (a
+scene of the same DEM has another origin, near its centre).
 Immutable: any number of threads may use one. Raises groundray.Error naming every fault.)";
 
 }  // namespace
@@ -177,18 +187,21 @@ void bind_terrain(nb::module_& module) {
   places_m  n x 2, x and y in the frame D
 
 NaN outside of the DEM and in its holes.)")
-      .def("cast_rays", &cast_on_terrain, "origins_m"_a, "directions"_a,
+      .def("cast_rays", &cast_on_terrain, "origins_m"_a, "directions"_a, "error_bound"_a = false,
            R"(Casts rays at the surface on all cores, with intersections in double precision.
 
   origins_m   n x 3, metres in the frame D
   directions  n x 3, axes of D, of any length except zero
 
-Like Scene.cast_rays, but without objects; the label is 1.)")
-      .def("mesh", &terrain_mesh, "max_error_m"_a,
+Like Scene.cast_rays, but without objects; the label is 1. The surface is the DEM itself:
+error_estimate_m is 0, and error_bound_m, if requested, the accuracy of ranges.)")
+      .def("mesh", &terrain_mesh, "max_error_m"_a, "fewest"_a = false,
            R"(Returns a triangle mesh within max_error_m of the surface, vertically.
 
 The bound is certified at samples and between them. There are no T-junctions. 0 simplifies only
-flat areas.)")
+flat areas, unless fewest is true: then it must be positive, edges of the full resolution are
+collapsed, and far fewer triangles remain where the ground is rough, in some twenty times the
+time.)")
       .def("save", &save, "path"_a,
            "Writes a GeoTIFF of float32 heights. It appears only when complete.")
       .def("__repr__", [](const TerrainModel& terrain) {

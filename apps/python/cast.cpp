@@ -53,7 +53,8 @@ struct Columns {
         nz(cloud.add<float>("nz")),
         incidence_rad(cloud.add<float>("incidence")),
         label(cloud.add<std::uint16_t>("label")),
-        instance(cloud.add<std::uint32_t>("instance")) {
+        instance(cloud.add<std::uint32_t>("instance")),
+        estimate_m(cloud.add<float>("error_estimate")) {
     if (bounds == ErrorBounds::Report) bound_m = cloud.add<double>("error_bound");
   }
 
@@ -73,12 +74,17 @@ struct Columns {
         glm::length(glm::cross(ray.direction, normal)), std::abs(glm::dot(ray.direction, normal))));
     label[row] = truth.label;
     instance[row] = truth.instance;
+    estimate_m[row] =
+        is_hit ? error_estimate_m(hit.deviation_m, hit.normal.z,
+                                  static_cast<float>(std::abs(glm::dot(ray.direction, normal))))
+               : std::numeric_limits<float>::quiet_NaN();
   }
 
   std::span<double> range_m, x_m, y_m, z_m;
   std::span<float> nx, ny, nz, incidence_rad;
   std::span<std::uint16_t> label;
   std::span<std::uint32_t> instance;
+  std::span<float> estimate_m;
   std::span<double> bound_m;
 };
 
@@ -86,8 +92,10 @@ struct Columns {
 
 GivenRays::GivenRays(GivenPoints origins_m, GivenPoints directions, std::chrono::nanoseconds time)
     : origins_m_(std::move(origins_m)), directions_(std::move(directions)), time_(time) {
+  origins_m_.check("cast_rays: origins_m");
+  directions_.check("cast_rays: directions");
   if (origins_m_.rows() != directions_.rows())
-    throw Error("rays: there are {} origins but {} directions; the numbers must be equal",
+    throw Error("cast_rays: there are {} origins but {} directions; the numbers must be equal",
                 origins_m_.rows(), directions_.rows());
 }
 

@@ -38,9 +38,10 @@ class GivenRays {
 /// Casts rays on all cores.
 /// @param rays  rays that have been checked.
 /// @param check  called repeatedly, on any thread; an exception from it ends the work.
-/// @return one row per ray: range_true, world_x world_y world_z, nx ny nz, incidence, label and
-///         instance, as in a scan, and error_bound if requested. For a ray without a hit the range
-///         is infinite, and position, normal and incidence are NaN.
+/// @return one row per ray: range_true, world_x world_y world_z, nx ny nz, incidence, label,
+///         instance and error_estimate, as in a scan, and error_bound if requested. For a ray
+///         without a hit the range is infinite; position, normal, incidence and error_estimate are
+///         NaN.
 PointCloud cast_rays(const Scene& scene, const GivenRays& rays, ErrorBounds bounds,
                      const std::function<void()>& check);
 

@@ -2,8 +2,11 @@
 
 #include <CLI/CLI.hpp>
 #include <cmath>
+#include <cstdint>
 #include <optional>
 #include <string>
+
+#include "core/io/text_lines.h"
 
 namespace groundray {
 namespace {
@@ -30,6 +33,15 @@ CLI::Validator not_negative() {
     return value && *value >= 0 ? std::string() : "'" + text + "' must be a number, 0 or more";
   };
   return {check, "NONNEGATIVE"};
+}
+
+CLI::Validator whole() {
+  const auto check = [](const std::string& text) {
+    return number_of<std::uint64_t>(text)
+               ? std::string()
+               : "'" + text + "' must be a whole number from 0 to 2^64 - 1";
+  };
+  return {check, ""};
 }
 
 }  // namespace groundray

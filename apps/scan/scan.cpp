@@ -15,6 +15,7 @@
 #include "apps/scan/column_names.h"
 #include "apps/scene/yaml_reader.h"
 #include "core/error.h"
+#include "core/near_names.h"
 
 namespace groundray {
 namespace {
@@ -95,7 +96,7 @@ class Reader {
     for (const std::string& name : names_) {
       if (std::ranges::find(used_, name) == used_.end()) others.push_back(name);
     }
-    for (std::string& name : missing) name += yaml::suggestion(name, others);
+    for (std::string& name : missing) name += suggestion(name, others);
     if (!missing.empty()) {
       throw Error("{}: it has no column for {}; it has: {}", scan_.name, fmt::join(missing, ", "),
                   fmt::join(names_, ", "));

@@ -17,6 +17,7 @@
 
 #include "apps/scene/fingerprint.h"
 #include "apps/scene/model_library.h"
+#include "apps/scene/scene_place.h"
 #include "apps/scene/simulation.h"
 #include "core/appearance/ground_cover.h"
 #include "core/error.h"
@@ -160,8 +161,10 @@ glm::dvec3 to_D(const StandingObject& place, const Terrain& terrain) {
   if (place.height_m) return {p_D, *place.height_m - origin_w_m.z};
   const auto ground_m = terrain.ground().height_m_at(p_D);
   if (!ground_m) {
-    throw Error("there is no ground at ({}, {}) m in W: move at_m, or give height_m", place.at_m.x,
-                place.at_m.y);
+    throw Error("there is no ground at ({}, {}) m in W: move at_m, or give height_m; {}",
+                place.at_m.x, place.at_m.y,
+                is_on_dem(terrain, place.at_m) ? "the DEM has a hole there"
+                                               : dem_extent(terrain, place.at_m));
   }
   return {p_D, *ground_m};
 }
@@ -247,27 +250,17 @@ void add_layer(const ScatterLayer& layer, const SceneSpec& spec, const Terrain& 
       {layer.name, layer.label, first, static_cast<std::uint32_t>(placements.size())});
 }
 
-// Calls `make`, and prepends the name of the entry to its errors.
-template <typename Make>
-void for_entry(std::string_view kind, const std::string& name, const Make& make) {
-  try {
-    make();
-  } catch (const Error& fault) {
-    throw Error("{} '{}': {}", kind, name, fault.what());
-  }
-}
-
 void gather(const SceneSpec& spec, const Terrain& terrain, std::chrono::nanoseconds begin,
             Palette& palette, SceneAssembly& into) {
   ModelLibrary& library = into.library;
   for (const ObjectSpec& object : spec.objects) {
-    for_entry("object", object.name, [&] {
+    located(object.where, fmt::format("object '{}'", object.name), [&] {
       add_object(object, spec, terrain, begin, library.add(object.model, object.label, palette),
                  into);
     });
   }
   for (const ScatterLayer& layer : spec.scatter) {
-    for_entry("layer", layer.name, [&] {
+    located(layer.where, fmt::format("layer '{}'", layer.name), [&] {
       const std::uint32_t first = library.size();
       for (const ModelSpec& model : layer.models) library.add(model, layer.label, palette);
       add_layer(layer, spec, terrain, first, into);

@@ -29,9 +29,12 @@
 
 namespace groundray {
 
+// Members named `where` are places in the scene file, path:line:column, for messages.
+
 /// Recorded path of a platform or object: poses of body B in W, in TUM format.
 struct RecordedPath {
   std::filesystem::path tum;
+  std::string where;
 };
 
 /// Path driven over the ground (see GroundPathSpec); waypoints in W, the CRS of the DEM.
@@ -40,6 +43,7 @@ struct DrivenPath {
   double speed_m_s = 1;
   double height_m = 0;
   glm::dvec2 footprint_m{2, 1.5};
+  std::string where;  ///< of the waypoints
 };
 
 /// Image that displaces a model's surface; see Displacement.
@@ -97,6 +101,7 @@ struct ObjectSpec {
   ModelSpec model;
   double scale = 1;
   std::variant<StandingObject, RecordedPath, DrivenPath> place;
+  std::string where;
 };
 
 /// Layer of scattered objects.
@@ -108,6 +113,7 @@ struct ScatterLayer {
   std::filesystem::path density_map;  ///< empty for the same density everywhere
   std::optional<double> nodata;       ///< nodata value of the map
   ScatterSpec scatter;                ///< clearings in W; its `layer` is a hash of the name
+  std::string where;
 };
 
 /// Ground of a scene.
@@ -121,6 +127,7 @@ struct TerrainSpec {
   std::optional<GroundTextureSpec> texture;  ///< texture of `material`
   std::vector<CoverSpec> cover;      ///< layers over `material`, from the lowest to the uppermost
   std::filesystem::path orthophoto;  ///< empty for none
+  std::string where;                 ///< of the DEM's name
 };
 
 /// Lidar and its mount.
@@ -130,6 +137,7 @@ struct MountedLidar {
   std::string text;    ///< content of the file
   LidarSpec lidar;
   Pose X_BS;
+  std::string where;
 };
 
 /// Camera and its mount.
@@ -147,6 +155,7 @@ struct MountedCamera {
   Pose X_BC;
   std::optional<Trigger> trigger;   ///< replaces the camera's own rate and first image
   std::vector<std::string> lidars;  ///< lidars whose echoes are projected into its images
+  std::string where;
 };
 
 /// Stereo pair.
@@ -158,6 +167,7 @@ struct StereoSpec {
   std::string name;
   std::string left, right;  ///< names of cameras
   Images images = Images::AsMounted;
+  std::string where;
 };
 
 /// Content of a scene file.

@@ -16,18 +16,21 @@
 
 #include "apps/scene/interruption.h"
 #include "apps/scene/readers/scene_reader.h"
+#include "apps/scene/scene_place.h"
 #include "core/error.h"
 #include "core/image/image_io.h"
-#include "core/io/tum_io.h"
 #include "sensors/camera/imager.h"
 #include "sensors/camera/lens/stereo.h"
 #include "sensors/lidar/pattern/scan_pattern.h"
-#include "terrain/ground_path.h"
 
 namespace groundray {
 namespace {
 
 using std::chrono::nanoseconds;
+
+std::string title(std::string_view kind, const std::string& name) {
+  return fmt::format("{} '{}'", kind, name);
+}
 
 nanoseconds time_of(double seconds) { return nanoseconds(std::llround(seconds * 1e9)); }
 
@@ -47,9 +50,9 @@ std::vector<nanoseconds> begins_of(const MountedCamera& mounted, const SceneSpec
   };
   constexpr double most = 1e6;
   if (mounted.camera.rate_hz * spec.duration_s > most) {
-    throw Error("camera '{}': {} Hz for {} s are {:.3g} images, but a run may have at most {:.0e}",
-                mounted.name, mounted.camera.rate_hz, spec.duration_s,
-                mounted.camera.rate_hz * spec.duration_s, most);
+    throw Error("{} Hz for {} s are {:.3g} images, but a run may have at most {:.0e}",
+                mounted.camera.rate_hz, spec.duration_s, mounted.camera.rate_hz * spec.duration_s,
+                most);
   }
   for (std::int64_t image = 0; begin_of(image) <= run_time(spec); ++image)
     begins.push_back(begin_of(image));
@@ -59,23 +62,21 @@ std::vector<nanoseconds> begins_of(const MountedCamera& mounted, const SceneSpec
 // Checks conditions that depend on both the camera's file and the scene's.
 void check_work(const MountedCamera& mounted, const std::vector<nanoseconds>& begins) {
   const CameraSpec& camera = mounted.camera;
-  const std::string& name = mounted.name;
   const auto too_soon = std::ranges::adjacent_find(begins, [&](nanoseconds a, nanoseconds b) {
     return b - a < time_of(camera.shutter.exposure_s);
   });
   if (mounted.trigger && too_soon != begins.end()) {
     throw Error(
-        "camera '{}': it exposes for {:.6g} ms, but is triggered again after {:.6g} ms; "
-        "shorten exposure_ms",
-        name, 1e3 * camera.shutter.exposure_s,
+        "it exposes for {:.6g} ms, but is triggered again after {:.6g} ms; shorten exposure_ms",
+        1e3 * camera.shutter.exposure_s,
         1e-6 * static_cast<double>((too_soon[1] - too_soon[0]).count()));
   }
   if (gives(camera, CameraProduct::Picture) && camera.imager->filter != ColorFilter::Mono &&
       std::min(camera.size_px.x, camera.size_px.y) < 3) {
     throw Error(
-        "camera '{}': a picture of a mosaic needs at least 3 x 3 px, but size_px is [{}, {}]; "
-        "enlarge it, or remove 'picture' from the products",
-        name, camera.size_px.x, camera.size_px.y);
+        "a picture of a mosaic needs at least 3 x 3 px, but size_px is [{}, {}]; enlarge it, or "
+        "remove 'picture' from the products",
+        camera.size_px.x, camera.size_px.y);
   }
 }
 
@@ -89,19 +90,13 @@ PlacedCamera place(const MountedCamera& mounted, const SceneSpec& spec, const Tr
   });
   if (placed.begins.empty()) {
     throw Error(
-        "camera '{}': no image of {:.6g} s begins and ends within the run of {} s; lengthen "
-        "duration_s, or check first_ms, trigger and shutter",
-        mounted.name, 1e-9 * static_cast<double>(placed.camera.duration().count()),
-        spec.duration_s);
+        "no image of {:.6g} s begins and ends within the run of {} s; lengthen duration_s, or "
+        "check first_ms, trigger and shutter",
+        1e-9 * static_cast<double>(placed.camera.duration().count()), spec.duration_s);
   }
   const auto& [imager, aperture] = std::tie(mounted.camera.imager, mounted.camera.aperture);
-  if (imager && aperture) {
-    try {
-      placed.pupil_sr = pupil_sr(placed.camera.lens(), *aperture, imager->pixel_pitch_m);
-    } catch (const Error& fault) {
-      throw Error("camera '{}': {}", mounted.name, fault.what());
-    }
-  }
+  if (imager && aperture)
+    placed.pupil_sr = pupil_sr(placed.camera.lens(), *aperture, imager->pixel_pitch_m);
   return placed;
 }
 
@@ -116,18 +111,13 @@ void pair_up(const StereoSpec& stereo, std::vector<MountedCamera>& cameras,
   for (const std::size_t camera : {l, r}) {
     if (!rectifications[camera]) continue;
     throw Error(
-        "stereo '{}': camera '{}' is also in an earlier pair, but can be rectified for one pair "
-        "only; add another camera with the same mount",
-        stereo.name, cameras[camera].name);
+        "camera '{}' is also in an earlier pair, but can be rectified for one pair only; add "
+        "another camera with the same mount",
+        cameras[camera].name);
   }
   MountedCamera &left = cameras[l], &right = cameras[r];
-  RectifiedPair pair;
-  try {
-    pair = rectified({left.camera.lens, left.camera.size_px, left.X_BC},
-                     {right.camera.lens, right.camera.size_px, right.X_BC});
-  } catch (const Error& fault) {
-    throw Error("stereo '{}': {}", stereo.name, fault.what());
-  }
+  RectifiedPair pair = rectified({left.camera.lens, left.camera.size_px, left.X_BC},
+                                 {right.camera.lens, right.camera.size_px, right.X_BC});
   if (stereo.images == StereoSpec::Images::Rectified) {
     for (MountedCamera* camera : {&left, &right}) {
       camera->camera.lens = Pinhole{pair.scale};
@@ -144,10 +134,14 @@ void pair_up(const StereoSpec& stereo, std::vector<MountedCamera>& cameras,
 std::vector<PlacedCamera> place_cameras(const SceneSpec& spec, const Trajectory& X_DB) {
   std::vector<MountedCamera> cameras = spec.cameras;
   std::vector<std::optional<Rectification>> rectifications(cameras.size());
-  for (const StereoSpec& stereo : spec.stereo) pair_up(stereo, cameras, rectifications);
+  for (const StereoSpec& stereo : spec.stereo) {
+    located(stereo.where, title("stereo", stereo.name),
+            [&] { pair_up(stereo, cameras, rectifications); });
+  }
   std::vector<PlacedCamera> placed;
   for (std::size_t i = 0; i < cameras.size(); ++i) {
-    placed.push_back(place(cameras[i], spec, X_DB));
+    placed.push_back(located(cameras[i].where, title("camera", cameras[i].name),
+                             [&] { return place(cameras[i], spec, X_DB); }));
     placed.back().rectification = rectifications[i];
   }
   return placed;
@@ -157,13 +151,13 @@ std::vector<PlacedCamera> place_cameras(const SceneSpec& spec, const Trajectory&
 // recorder's clock.
 Trajectory lay_platform_path(const RecordedPath& path, const SceneSpec& spec,
                              const Terrain& terrain, std::chrono::nanoseconds& begin) {
-  begin = read_tum(path.tum).begin_time();
+  begin = begin_time(path);
   Trajectory X_DB = recorded_path(path, terrain, begin);
   if (X_DB.end_time() < run_time(spec)) {
     throw Error(
-        "{}: the trajectory lasts {:.3f} s but the scene's duration_s is {} s; record longer or "
-        "run shorter",
-        path.tum.string(), in_seconds(X_DB.end_time()), spec.duration_s);
+        "{}: key 'trajectory': {}: the trajectory lasts {:.3f} s but the scene's duration_s is {} "
+        "s; record longer or run shorter",
+        path.where, path.tum.string(), in_seconds(X_DB.end_time()), spec.duration_s);
   }
   return X_DB;
 }
@@ -182,8 +176,8 @@ double distance_m(const GridFrame& frame, const glm::dvec3& p) {
 
 // Checks a sensor every 10 ms of the run: it must be above ground, and at least once within reach
 // of the DEM.
-void check_place(const std::string& sensor, const Trajectory& X_DS, double reach_m,
-                 const Terrain& terrain, std::chrono::nanoseconds run) {
+void check_place(const Trajectory& X_DS, double reach_m, const Terrain& terrain,
+                 std::chrono::nanoseconds run) {
   bool in_reach = false;
   for (std::chrono::nanoseconds time{0}; time <= run; time += std::chrono::milliseconds(10)) {
     const glm::dvec3 p_DS = X_DS.pose_at(time).translation_m;
@@ -192,19 +186,19 @@ void check_place(const std::string& sensor, const Trajectory& X_DS, double reach
     if (!ground_m || p_DS.z > *ground_m) continue;
     const glm::dvec3 p_WS = p_DS + terrain.header().origin_w_m;
     throw Error(
-        "{}: at {:.3f} s it is {:.3f} m below the ground, at ({:.3f}, {:.3f}, {:.3f}) m in W; "
+        "at {:.3f} s it is {:.3f} m below the ground, at ({:.3f}, {:.3f}, {:.3f}) m in W; "
         "raise its mount or the platform's height, or check that the trajectory and the DEM share "
         "a vertical datum",
-        sensor, in_seconds(time), *ground_m - p_DS.z, p_WS.x, p_WS.y, p_WS.z);
+        in_seconds(time), *ground_m - p_DS.z, p_WS.x, p_WS.y, p_WS.z);
   }
   if (in_reach) return;
   const glm::dvec3 p_DS = X_DS.samples().front().pose.translation_m;
   const glm::dvec3 p_WS = p_DS + terrain.header().origin_w_m;
   throw Error(
-      "{}: it starts at ({:.3f}, {:.3f}) m in W, {:.0f} m from the DEM, and never comes within "
-      "{:.0f} m of it; is the trajectory in the DEM's CRS, {}?",
-      sensor, p_WS.x, p_WS.y, distance_m(terrain.frame(), p_DS), reach_m,
-      terrain.header().crs_name);
+      "it starts at ({:.3f}, {:.3f}) m in W, {:.0f} m from the DEM, and never comes within {:.0f} "
+      "m of it; is the trajectory in the DEM's CRS, {}? {}",
+      p_WS.x, p_WS.y, distance_m(terrain.frame(), p_DS), reach_m, terrain.header().crs_name,
+      dem_extent(terrain, glm::dvec2(p_WS)));
 }
 
 // Returns the length of the DEM's diagonal. A camera has no range; if it is farther from the DEM
@@ -230,17 +224,21 @@ double largest_reach_m(const std::vector<PlacedLidar>& lidars,
   return reach_m;
 }
 
+PlacedLidar place(const MountedLidar& mounted, const SceneSpec& spec, const Trajectory& X_DB) {
+  Lidar lidar(mounted.lidar, spec.air);
+  const std::int64_t sweeps = whole_sweeps(lidar.pattern(), spec);
+  if (sweeps == 0) {
+    throw Error("a run of {} s is shorter than one sweep at {} Hz; lengthen duration_s",
+                spec.duration_s, lidar.pattern().sweep_rate_hz());
+  }
+  return {mounted, std::move(lidar), X_DB.mounted(mounted.X_BS), sweeps};
+}
+
 std::vector<PlacedLidar> place_lidars(const SceneSpec& spec, const Trajectory& X_DB) {
   std::vector<PlacedLidar> lidars;
   for (const MountedLidar& mounted : spec.lidars) {
-    Lidar lidar(mounted.lidar, spec.air);
-    const std::int64_t sweeps = whole_sweeps(lidar.pattern(), spec);
-    if (sweeps == 0) {
-      throw Error(
-          "lidar '{}': a run of {} s is shorter than one sweep at {} Hz; lengthen duration_s",
-          mounted.name, spec.duration_s, lidar.pattern().sweep_rate_hz());
-    }
-    lidars.push_back({mounted, std::move(lidar), X_DB.mounted(mounted.X_BS), sweeps});
+    lidars.push_back(located(mounted.where, title("lidar", mounted.name),
+                             [&] { return place(mounted, spec, X_DB); }));
   }
   return lidars;
 }
@@ -272,45 +270,6 @@ std::chrono::nanoseconds run_time(const SceneSpec& spec) {
 
 std::int64_t whole_sweeps(const ScanPattern& pattern, const SceneSpec& spec) {
   return static_cast<std::int64_t>(std::floor(spec.duration_s * pattern.sweep_rate_hz() + 1e-9));
-}
-
-Trajectory extended(const Trajectory& path, const SceneSpec& spec) {
-  std::chrono::nanoseconds more(1);
-  for (const MountedLidar& lidar : spec.lidars) {
-    const ScanPattern pattern(lidar.lidar.pattern);
-    const std::int64_t sweeps = whole_sweeps(pattern, spec);
-    if (sweeps > 0)
-      more = std::max(
-          more, pattern.last_firing(sweeps - 1) - run_time(spec) + std::chrono::nanoseconds(1));
-  }
-  std::vector<Trajectory::Sample> samples = path.samples();
-  const auto [time, X_DB] = samples.back();
-  Pose onwards;
-  if (samples.size() > 1) {
-    const auto& [time_before, X_DB_before] = samples[samples.size() - 2];
-    onwards =
-        Screw(inverse(X_DB_before) * X_DB).at(in_seconds(more) / in_seconds(time - time_before));
-  }
-  samples.push_back({time + more, X_DB * onwards});
-  return Trajectory(std::move(samples));
-}
-
-Trajectory recorded_path(const RecordedPath& path, const Terrain& terrain,
-                         std::chrono::nanoseconds begin) {
-  std::vector<Trajectory::Sample> samples = read_tum(path.tum).samples();
-  for (auto& [time, X_WB] : samples) {
-    time -= begin;
-    X_WB.translation_m -= terrain.header().origin_w_m;
-  }
-  return Trajectory(std::move(samples));
-}
-
-Trajectory driven_path(const DrivenPath& path, const Terrain& terrain,
-                       std::chrono::nanoseconds duration) {
-  GroundPathSpec drive{{}, path.speed_m_s, path.height_m, path.footprint_m, duration};
-  for (const glm::dvec2& p_W : path.waypoints_m)
-    drive.waypoints_m.push_back(p_W - glm::dvec2(terrain.header().origin_w_m));
-  return build_ground_path(terrain.ground(), drive);
 }
 
 Exposed exposed(const PlacedLidar& lidar, std::int64_t sweep) {
@@ -358,8 +317,10 @@ Simulation load_simulation(const std::filesystem::path& scene, std::optional<See
 }
 
 Simulation build_simulation(SceneSpec spec, const Terrain::Progress& progress) {
-  Terrain terrain(spec.terrain.dem, spec.terrain.options, spec.terrain.detail, progress,
-                  spec.terrain.relief);
+  Terrain terrain = located(spec.terrain.where, "key 'dem'", [&] {
+    return Terrain(spec.terrain.dem, spec.terrain.options, spec.terrain.detail, progress,
+                   spec.terrain.relief);
+  });
   std::chrono::nanoseconds begin{0};
   const Trajectory X_DB = extended(
       std::visit([&](const auto& path) { return lay_platform_path(path, spec, terrain, begin); },
@@ -368,12 +329,13 @@ Simulation build_simulation(SceneSpec spec, const Terrain::Progress& progress) {
   std::vector<PlacedLidar> lidars = place_lidars(spec, X_DB);
   std::vector<PlacedCamera> cameras = place_cameras(spec, X_DB);
   for (const auto& [mounted, lidar, X_DS, sweeps] : lidars) {
-    check_place(fmt::format("lidar '{}'", mounted.name), X_DS, mounted.lidar.gate.far_m, terrain,
-                run_time(spec));
+    located(mounted.where, title("lidar", mounted.name),
+            [&] { check_place(X_DS, mounted.lidar.gate.far_m, terrain, run_time(spec)); });
   }
   for (const PlacedCamera& camera : cameras) {
-    check_place(fmt::format("camera '{}'", camera.spec.name), camera.X_DC,
-                diagonal_m(terrain.frame()), terrain, run_time(spec));
+    located(camera.spec.where, title("camera", camera.spec.name), [&] {
+      check_place(camera.X_DC, diagonal_m(terrain.frame()), terrain, run_time(spec));
+    });
   }
   const double reach_m = largest_reach_m(lidars, cameras);
   SceneObjects objects = build_scene_objects(spec, terrain, begin);

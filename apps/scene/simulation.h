@@ -37,6 +37,10 @@ std::int64_t whole_sweeps(const ScanPattern& pattern, const SceneSpec& spec);
 /// may be after the run, because the times of firing sequences do not depend on it.
 Trajectory extended(const Trajectory& path, const SceneSpec& spec);
 
+/// Returns the first time of a recorded trajectory, on the recorder's clock.
+/// @throws Error as read_tum.
+std::chrono::nanoseconds begin_time(const RecordedPath& path);
+
 /// Returns a recorded trajectory in D.
 /// @param begin  time 0 of the run, on the recorder's clock.
 /// @throws Error as read_tum.

@@ -16,7 +16,9 @@
 #include <ranges>
 #include <sstream>
 
+#include "apps/scene/yaml_syntax.h"
 #include "core/io/open_file.h"
+#include "core/near_names.h"
 
 namespace groundray::yaml {
 namespace {
@@ -30,7 +32,12 @@ class TreeBuilder : public YAML::EventHandler {
  public:
   explicit TreeBuilder(const std::filesystem::path& path) : path_(path) {}
 
-  Node take_root() { return std::move(root_); }
+  /// @throws Error if the last quote of `text` is not closed.
+  Node take_root(std::string_view text) {
+    if (is_open_quote(text, last_scalar_.line + 1, last_scalar_.column + 1))
+      refuse(last_scalar_, "this quote is not closed");
+    return std::move(root_);
+  }
 
   void OnDocumentStart(const YAML::Mark&) override {}
   void OnDocumentEnd() override {}
@@ -50,6 +57,7 @@ class TreeBuilder : public YAML::EventHandler {
                 const std::string& value) override {
     Node node = make(tag == "?" ? Node::Kind::Plain : Node::Kind::Quoted, mark);
     node.text = value;
+    last_scalar_ = mark;
     append(std::move(node));
   }
   void OnSequenceStart(const YAML::Mark& mark, const std::string&, YAML::anchor_t,
@@ -86,6 +94,7 @@ class TreeBuilder : public YAML::EventHandler {
 
   const std::filesystem::path& path_;
   Node root_;
+  YAML::Mark last_scalar_;
   std::vector<Node*> open_;
 };
 
@@ -120,31 +129,15 @@ std::optional<double> spelled_number(std::string_view text) {
   return value;
 }
 
-// Returns a key without the units at its end.
-std::string_view without_unit(std::string_view key) {
-  constexpr std::array<std::string_view, 25> units{
-      "m",  "km",  "cm",  "mm",  "um",   "nm",  "ft",  "s",   "ms",  "us", "ns", "min", "h",
-      "hz", "khz", "rpm", "rad", "mrad", "deg", "kmh", "kph", "mph", "px", "w",  "kt"};
-  for (auto cut = key.rfind('_'); cut != std::string_view::npos && cut > 0; cut = key.rfind('_')) {
-    if (std::ranges::count(units, key.substr(cut + 1)) == 0) break;
-    key = key.substr(0, cut);
-  }
-  return key;
-}
-
-// Returns the Levenshtein distance.
-std::size_t edit_distance(std::string_view a, std::string_view b) {
-  std::vector<std::size_t> row(b.size() + 1);
-  std::iota(row.begin(), row.end(), std::size_t{0});
-  for (std::size_t i = 0; i < a.size(); ++i) {
-    std::size_t diagonal = std::exchange(row[0], i + 1);
-    for (std::size_t j = 0; j < b.size(); ++j) {
-      const std::size_t replaced = diagonal + (a[i] == b[j] ? 0 : 1);
-      diagonal = row[j + 1];
-      row[j + 1] = std::min({replaced, diagonal + 1, row[j] + 1});
-    }
-  }
-  return row.back();
+// Returns the likely fix of a value that must be a number, but is none.
+std::string number_fix(const Node& node) {
+  if (node.kind == Node::Kind::Quoted && spelled_number(node.text))
+    return fmt::format("it is quoted; write {} without quotes", node.text);
+  std::string point = node.text;
+  std::ranges::replace(point, ',', '.');
+  if (node.kind == Node::Kind::Plain && spelled_number(point))
+    return fmt::format("write {}, with a decimal point", point);
+  return "write it without quotes or unit, in the unit of the key";
 }
 
 }  // namespace
@@ -153,32 +146,35 @@ std::string read_file(const std::filesystem::path& path) {
   namespace fs = std::filesystem;
   constexpr std::uintmax_t largest_file_bytes = 16u << 20;
   std::error_code fault;
-  if (!fs::is_regular_file(path, fault)) throw Error("{}: there is no such file", path.string());
-  if (fs::file_size(path, fault) > largest_file_bytes) {
-    throw Error("{}: larger than the limit of 16 MiB", path.string());
+  if (!fs::exists(path, fault) || fs::is_directory(path, fault))
+    throw Error("{}: {}", path.string(), why_no_file(path));
+  if (fs::file_size(path, fault) > largest_file_bytes && !fault) {
+    throw Error("{}: larger than the limit of 16 MiB for a YAML file", path.string());
   }
   std::ifstream file = open_stream(path);
   std::string text{std::istreambuf_iterator<char>(file), {}};
-  if (!file) throw Error("{}: cannot be read", path.string());
+  if (!file) throw Error("{}: cannot be read; check its permissions", path.string());
   return text;
 }
 
 Node parse(const std::string& text, const std::filesystem::path& path) {
+  refuse_binary(text, path);
   TreeBuilder tree(path);
   try {
     std::istringstream stream(text);
     YAML::Parser parser(stream);
     if (!parser.HandleNextDocument(tree)) throw Error("{}:1:1: the file is empty", path.string());
-    Node root = tree.take_root();
+    Node root = tree.take_root(text);
     TreeBuilder second(path);
     if (parser.HandleNextDocument(second)) {
       throw Error("{}:{}:1: a second document begins here: a file must contain one", path.string(),
-                  second.take_root().line);
+                  second.take_root(text).line);
     }
     return root;
   } catch (const YAML::Exception& fault) {
-    throw Error("{}:{}:{}: not YAML: {}", path.string(), fault.mark.line + 1, fault.mark.column + 1,
-                fault.msg);
+    const auto [line, column, words] =
+        explain(text, {fault.mark.line + 1, fault.mark.column + 1, fault.msg});
+    throw Error("{}:{}:{}: {}", path.string(), line, column, words);
   }
 }
 
@@ -189,10 +185,14 @@ std::string shown(const Node& node) {
   return fmt::format("'{}'", excerpt(node.text));
 }
 
+std::string Faults::place(const Node& node) const {
+  return fmt::format("{}:{}:{}", path_.string(), node.line, node.column);
+}
+
 void Faults::note(const Node& node, std::string_view key, const std::string& message) {
   faults_.push_back(
       {node.line, node.column,
-       fmt::format("{}:{}:{}: {}{}", path_.string(), node.line, node.column,
+       fmt::format("{}: {}{}", place(node),
                    key.empty() ? "" : fmt::format("key '{}': ", excerpt(key)), message)});
 }
 
@@ -210,10 +210,7 @@ void Faults::throw_if_any() {
 std::optional<double> number(const Node& node, std::string_view key, Rule rule, Faults& faults) {
   const auto value = node.kind == Node::Kind::Plain ? spelled_number(node.text) : std::nullopt;
   if (!value) {
-    faults.add(
-        node, key,
-        "is {}, but must be a number: write it without quotes or unit, in the unit of the key",
-        shown(node));
+    faults.add(node, key, "is {}, but must be a number: {}", shown(node), number_fix(node));
   } else if (!std::isfinite(*value)) {
     faults.add(node, key, "is {}, but must be a finite number", shown(node));
   } else if (!rule.holds(*value)) {
@@ -319,7 +316,9 @@ const Node* Map::read_whole(std::string_view key, Need need, std::uint64_t& into
     into = value;
     return node;
   }
-  faults_.add(*node, key, "is {}, but must be a whole number from 0 to {}", shown(*node), max);
+  const bool is_quoted = node->kind == Node::Kind::Quoted && spelled_number(node->text);
+  faults_.add(*node, key, "is {}, but must be a whole number from 0 to {}{}", shown(*node), max,
+              is_quoted ? ": " + number_fix(*node) : "");
   return nullptr;
 }
 
@@ -353,11 +352,18 @@ std::optional<Map> Map::map(std::string_view key, Need need) {
 
 void Map::close() {
   if (node_.kind != Node::Kind::Map) return;
+  std::ranges::sort(known_);
+  known_.erase(std::unique(known_.begin(), known_.end()), known_.end());
+  bool are_listed = false;  // in one message only
   for (std::size_t i = 0; i < node_.items.size(); i += 2) {
     const Node& name = node_.items[i];
     if (!is_scalar(name) || std::ranges::count(known_, name.text) > 0) continue;
-    faults_.add(name, name.text, "unknown{}", suggestion(name.text, absent_));
-    if (const auto meant = nearest(name.text, absent_)) std::erase(missing_, *meant);
+    const std::vector<std::string> meant = near_names(name.text, absent_);
+    const bool is_list_due =
+        meant.empty() && !std::exchange(are_listed, are_listed || meant.empty());
+    faults_.add(name, name.text, "unknown{}{}", suggestion(name.text, absent_),
+                is_list_due ? fmt::format("; the keys here are {}", fmt::join(known_, ", ")) : "");
+    if (!meant.empty()) std::erase(missing_, meant.front());
   }
   close_partly();
 }
@@ -367,33 +373,11 @@ void Map::close_partly() {
   for (const std::string& key : missing_) faults_.add(node_, key, "missing");
 }
 
-std::optional<std::string> nearest(std::string_view word,
-                                   const std::vector<std::string>& candidates) {
-  std::optional<std::string> best;
-  std::size_t best_distance = 1 + word.size() / 3;  // farther apart, it is a different word
-  for (const std::string& candidate : candidates) {
-    if (without_unit(candidate) == without_unit(word)) return candidate;
-    if (candidate.size() > word.size() + best_distance) continue;
-    if (word.size() > candidate.size() + best_distance) continue;
-    const std::size_t distance = edit_distance(word, candidate);
-    if (distance <= best_distance && (!best || distance < best_distance)) {
-      best = candidate;
-      best_distance = distance;
-    }
-  }
-  return best;
-}
-
 void check_version(Map& root, std::string_view key, Faults& faults) {
   std::uint64_t version = 1;
   if (const Node* at = root.read_whole(key, Need::Required, version); at && version != 1) {
     faults.add(*at, key, "is {}, but this version of groundray reads only format 1", version);
   }
-}
-
-std::string suggestion(std::string_view word, const std::vector<std::string>& candidates) {
-  const auto meant = nearest(word, candidates);
-  return meant ? fmt::format("; did you mean '{}'?", *meant) : "";
 }
 
 }  // namespace groundray::yaml

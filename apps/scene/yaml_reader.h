@@ -66,6 +66,9 @@ class Faults {
 
   std::size_t count() const { return faults_.size(); }
 
+  /// Returns a value's position for later messages: path:line:column.
+  std::string place(const Node& node) const;
+
  private:
   struct Fault {
     int line;
@@ -189,12 +192,5 @@ bool is_text(const Node& node, std::string_view key, Faults& faults);
 
 /// Reads the version of a format at `key`; records a fault unless it is 1.
 void check_version(Map& root, std::string_view key, Faults& faults);
-
-/// Returns the candidate that `word` probably means: equal except for the unit, or a few letters
-/// different.
-std::optional<std::string> nearest(std::string_view word,
-                                   const std::vector<std::string>& candidates);
-/// Returns "; did you mean 'x'?" for the nearest candidate, or "".
-std::string suggestion(std::string_view word, const std::vector<std::string>& candidates);
 
 }  // namespace groundray::yaml

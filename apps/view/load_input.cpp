@@ -21,6 +21,7 @@
 #include "core/io/file_io.h"
 #include "core/io/open_file.h"
 #include "core/model/mesh_reader.h"
+#include "core/near_names.h"
 #include "terrain/dem/band_file.h"
 
 namespace groundray {
@@ -36,7 +37,7 @@ bool is_one_of(const std::string& text, std::initializer_list<std::string_view> 
 bool has_faces(const fs::path& path) {
   std::ifstream file = open_stream(path);
   std::string line;
-  for (int i = 0; i < 1000 && std::getline(file, line); ++i) {
+  for (int i = 0; i < 1000 && next_line(file, line); ++i) {
     if (line.starts_with("end_header")) break;
     if (line.starts_with("element face") || line.starts_with("element tristrips"))
       return line.find_first_of("123456789", 12) != std::string::npos;
@@ -218,7 +219,7 @@ InputKind kind_of(const fs::path& path) {
   const fs::file_status status = fs::status(path, fault);
   // GDAL's virtual paths, e.g. into archives, do not exist as files.
   if (!fs::exists(status) && !path.string().starts_with("/vsi"))
-    throw Error("{}: there is no such file or folder", path.string());
+    throw Error("{}: {}", path.string(), why_no_file(path));
   if (fs::is_directory(status)) {
     if (fs::exists(path / "dataset.yaml")) return InputKind::Dataset;
     throw Error("{}: the folder is not a dataset: it has no dataset.yaml", path.string());

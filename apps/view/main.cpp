@@ -9,11 +9,13 @@
 #include <string>
 #include <vector>
 
+#include "apps/scan/usage_fault.h"
 #include "apps/view/compare/deviation.h"
 #include "apps/view/load_input.h"
 #include "apps/view/rendering/offscreen_render.h"
 #include "apps/view/window/run_window.h"
 #include "core/error.h"
+#include "core/io/file_io.h"
 #include "core/io/print_error.h"
 
 namespace groundray {
@@ -113,6 +115,7 @@ void compare_inputs(std::vector<Opened>& inputs, const Arguments& arguments) {
 int take_stills(const Arguments& arguments) {
   if (arguments.inputs.empty())
     throw Error("--screenshot: there is nothing to show; give a file or a folder");
+  if (arguments.turntable == 0) check_ending(arguments.screenshot, {".png"});
   const StillSpec& spec = arguments.still;
   std::vector<Opened> inputs;
   for (const std::filesystem::path& input : arguments.inputs) {
@@ -153,7 +156,7 @@ int run(int argc, char** argv) {
   try {
     app.parse(argc, argv);
   } catch (const CLI::ParseError& fault) {
-    return app.exit(fault) == 0 ? done : wrong_usage;
+    return report_usage(app, fault) ? done : wrong_usage;
   }
   const std::string lonely = without_screenshot(arguments);
   if (!lonely.empty()) {
@@ -177,6 +180,8 @@ int run(int argc, char** argv) {
 int main(int argc, char** argv) {
   try {
     return groundray::run(argc, argv);
+  } catch (const std::bad_alloc&) {
+    groundray::print_error("groundray-view: there is not enough memory\n");
   } catch (const std::bad_alloc&) {
     groundray::print_error("groundray-view: there is not enough memory\n");
   } catch (const std::exception& fault) {

@@ -17,10 +17,13 @@
 #include <fmt/ranges.h>
 
 #include <algorithm>
+#include <array>
 #include <cstddef>
 #include <cstdint>
+#include <cstdio>
 #include <cstring>
 #include <iterator>
+#include <new>
 #include <optional>
 #include <set>
 #include <span>
@@ -33,6 +36,7 @@
 #include "core/image/exr_io.h"
 #include "core/image/image_errors.h"
 #include "core/io/file_io.h"
+#include "core/io/memory.h"
 
 namespace groundray {
 namespace {
@@ -185,6 +189,7 @@ void check_parts(const Imf::MultiPartInputFile& file, const std::string& name) {
       }
     }
   }
+  require_memory(name, "its pixels", static_cast<double>(values) * sizeof(float));
 }
 
 /// Throws what is wrong with the headers. OpenEXR's C++ reader allocates the size that an attribute
@@ -193,7 +198,7 @@ void check_parts(const Imf::MultiPartInputFile& file, const std::string& name) {
 void check_headers(std::string_view bytes, const std::string& name) {
   struct File {
     std::string_view bytes;
-    std::string fault;
+    std::array<char, 256> fault;  // no string: exceptions must not pass through C
   } file{bytes, {}};
   exr_context_initializer_t options = EXR_DEFAULT_CONTEXT_INITIALIZER;
   options.user_data = &file;
@@ -201,8 +206,8 @@ void check_headers(std::string_view bytes, const std::string& name) {
     void* user_data = nullptr;
     exr_get_user_data(context, &user_data);
     auto* const read = static_cast<File*>(user_data);
-    if (read != nullptr && read->fault.empty())
-      read->fault = message;  // the first is the cause of the others
+    if (read != nullptr && read->fault[0] == '\0')  // the first is the cause of the others
+      std::snprintf(read->fault.data(), read->fault.size(), "%s", message);
   };
   options.size_fn = [](exr_const_context_t, void* user_data) {
     return static_cast<std::int64_t>(static_cast<File*>(user_data)->bytes.size());
@@ -217,7 +222,7 @@ void check_headers(std::string_view bytes, const std::string& name) {
   exr_context_t context = nullptr;
   const exr_result_t result = exr_start_read(&context, name.c_str(), &options);
   exr_finish(&context);
-  if (!file.fault.empty()) throw std::runtime_error(file.fault);  // with success, too
+  if (file.fault[0] != '\0') throw std::runtime_error(file.fault.data());  // with success, too
   if (result != EXR_ERR_SUCCESS) throw std::runtime_error(exr_get_default_error_message(result));
 }
 
@@ -269,7 +274,7 @@ std::vector<std::string> color_channels(const Imf::ChannelList& channels, const 
   return wanted;
 }
 
-ImageF decode_picture(std::string_view bytes, const std::string& name) {
+ImageF decode_picture(std::string_view bytes, const std::string& name, std::int64_t most_pixels) {
   BytesStream stream(bytes, name);
   Imf::InputFile file(stream);
   const Imath::Box2i data = file.header().dataWindow();
@@ -278,8 +283,9 @@ ImageF decode_picture(std::string_view bytes, const std::string& name) {
   }
   const std::int64_t width = std::int64_t{data.max.x} - data.min.x + 1;
   const std::int64_t height = std::int64_t{data.max.y} - data.min.y + 1;
-  check_size(name, width, height);
+  check_size(name, width, height, most_pixels);
   const std::vector<std::string> channels = color_channels(file.header().channels(), name);
+  require_image_memory(name, width, height, sizeof(float) * channels.size());
   ImageF image(static_cast<int>(width), static_cast<int>(height),
                static_cast<int>(channels.size()));
   Imf::FrameBuffer pixels;
@@ -300,6 +306,8 @@ auto decoded(std::string_view bytes, const std::string& name, const auto& decode
     check_headers(bytes, name);
     return decode(bytes, name);
   } catch (const Error&) {
+    throw;
+  } catch (const std::bad_alloc&) {
     throw;
   } catch (const std::exception& fault) {
     throw_damaged(name, "OpenEXR", fault.what());
@@ -325,8 +333,11 @@ ExrFile parse_exr(std::string_view bytes, const std::string& name) {
   return decoded(bytes, name, decode);
 }
 
-ImageF parse_exr_picture(std::string_view bytes, const std::string& name) {
-  return decoded(bytes, name, decode_picture);
+ImageF parse_exr_picture(std::string_view bytes, const std::string& name,
+                         std::int64_t most_pixels) {
+  return decoded(bytes, name, [=](std::string_view all, const std::string& file) {
+    return decode_picture(all, file, most_pixels);
+  });
 }
 
 }  // namespace groundray

@@ -48,14 +48,14 @@ class PngReader {
 
   /// Returns the image with 8 or 16 bits per value, whatever the file has.
   template <typename T>
-  Image<T> read() {
+  Image<T> read(std::int64_t most_pixels) {
     attempt([this] {
       png_set_user_limits(png_, PNG_UINT_31_MAX, PNG_UINT_31_MAX);
       png_set_read_fn(png_, this, next);
       png_read_info(png_, info_);
     });
     const png_uint_32 height = png_get_image_height(png_, info_);
-    check_size(name_, png_get_image_width(png_, info_), height);
+    check_size(name_, png_get_image_width(png_, info_), height, most_pixels);
     attempt([this] {
       png_set_expand(png_);
       if constexpr (sizeof(T) == 1) {
@@ -67,6 +67,8 @@ class PngReader {
       png_set_interlace_handling(png_);
       png_read_update_info(png_, info_);
     });
+    require_image_memory(name_, png_get_image_width(png_, info_), height,
+                         sizeof(T) * png_get_channels(png_, info_));
     Image<T> image(static_cast<int>(png_get_image_width(png_, info_)), static_cast<int>(height),
                    png_get_channels(png_, info_));
     std::vector<png_bytep> rows;
@@ -122,9 +124,11 @@ class JpegReader {
   JpegReader(const JpegReader&) = delete;
   JpegReader& operator=(const JpegReader&) = delete;
 
-  Image8 read() {
+  Image8 read(std::int64_t most_pixels) {
     attempt([this] { jpeg_read_header(&jpeg_, TRUE); });
-    check_size(name_, jpeg_.image_width, jpeg_.image_height);
+    check_size(name_, jpeg_.image_width, jpeg_.image_height, most_pixels);
+    // Progressive images are kept whole as coefficients of 2 bytes.
+    require_image_memory(name_, jpeg_.image_width, jpeg_.image_height, 9);
     if (jpeg_.jpeg_color_space == JCS_CMYK || jpeg_.jpeg_color_space == JCS_YCCK) {
       throw Error("{}: its colours are CMYK; they must be grey or RGB: convert the image", name_);
     }
@@ -172,7 +176,9 @@ class JpegReader {
 /// Returns values as fractions of the maximum of T. Only the quotient is rounded: the integers are
 /// exact in float.
 template <typename T>
-ImageF fractions(const Image<T>& image) {
+ImageF fractions(const Image<T>& image, const std::string& name) {
+  require_image_memory(name, image.width(), image.height(),
+                       sizeof(float) * static_cast<std::size_t>(image.channels()));
   ImageF result(image.width(), image.height(), image.channels());
   std::ranges::transform(image.values(), result.values().begin(), [](T value) {
     return static_cast<float>(value) / static_cast<float>(std::numeric_limits<T>::max());
@@ -187,7 +193,8 @@ struct HdrHeader {
 };
 
 /// Parses the header and removes it from the front of `bytes`.
-HdrHeader take_hdr_header(std::string_view& bytes, const std::string& name) {
+HdrHeader take_hdr_header(std::string_view& bytes, const std::string& name,
+                          std::int64_t most_pixels) {
   HdrHeader header;
   TextLines lines(bytes);
   for (auto line = lines.next(); line && !line->empty(); line = lines.next()) {
@@ -219,7 +226,8 @@ HdrHeader take_hdr_header(std::string_view& bytes, const std::string& name) {
     throw Error("{}: its size line {:?} must be -Y HEIGHT +X WIDTH, rows from the top", name,
                 line.substr(0, 40));
   }
-  check_size(name, *width, *height);
+  check_size(name, *width, *height, most_pixels);
+  require_image_memory(name, *width, *height, 3 * sizeof(float));
   header.width = *width;
   header.height = *height;
   bytes = lines.rest();
@@ -292,8 +300,9 @@ class HdrRows {
   const std::string& name_;
 };
 
-ImageF parse_hdr_picture(std::string_view bytes, const std::string& name) {
-  const HdrHeader header = take_hdr_header(bytes, name);
+ImageF parse_hdr_picture(std::string_view bytes, const std::string& name,
+                         std::int64_t most_pixels) {
+  const HdrHeader header = take_hdr_header(bytes, name, most_pixels);
   ImageF image(header.width, header.height, 3);
   std::vector<Rgbe> row(static_cast<std::size_t>(header.width));
   HdrRows rows(bytes, name);
@@ -335,9 +344,9 @@ Image8 read_image8(const std::filesystem::path& path) {
   return parse_image8(read_text(path), path.string());
 }
 
-Image8 parse_image8(std::string_view bytes, const std::string& name) {
-  if (bytes.starts_with(png_magic)) return PngReader(bytes, name).read<std::uint8_t>();
-  if (bytes.starts_with(jpeg_magic)) return JpegReader(bytes, name).read();
+Image8 parse_image8(std::string_view bytes, const std::string& name, std::int64_t most_pixels) {
+  if (bytes.starts_with(png_magic)) return PngReader(bytes, name).read<std::uint8_t>(most_pixels);
+  if (bytes.starts_with(jpeg_magic)) return JpegReader(bytes, name).read(most_pixels);
   throw Error("{}: it is neither a PNG nor a JPEG image{}", name,
               bytes.empty() ? ": it is empty" : ", despite its name: convert it");
 }
@@ -346,12 +355,13 @@ ImageF read_heights(const std::filesystem::path& path) {
   return parse_heights(read_text(path), path.string());
 }
 
-ImageF parse_heights(std::string_view bytes, const std::string& name) {
+ImageF parse_heights(std::string_view bytes, const std::string& name, std::int64_t most_pixels) {
   if (bytes.starts_with(png_magic)) {
-    return fractions(PngReader(bytes, name).read<std::uint16_t>());
+    return fractions(PngReader(bytes, name).read<std::uint16_t>(most_pixels), name);
   }
-  if (bytes.starts_with(jpeg_magic)) return fractions(JpegReader(bytes, name).read());
-  if (is_image_f(bytes)) return parse_image_f(bytes, name, PictureOf::Heights);
+  if (bytes.starts_with(jpeg_magic))
+    return fractions(JpegReader(bytes, name).read(most_pixels), name);
+  if (is_image_f(bytes)) return parse_image_f(bytes, name, PictureOf::Heights, most_pixels);
   throw Error("{}: it is not a PNG, JPEG, OpenEXR (.exr) or Radiance (.hdr) image{}", name,
               bytes.empty() ? ": it is empty" : ", despite its name: convert it");
 }
@@ -360,10 +370,11 @@ ImageF read_image_f(const std::filesystem::path& path, PictureOf what) {
   return parse_image_f(read_text(path), path.string(), what);
 }
 
-ImageF parse_image_f(std::string_view bytes, const std::string& name, PictureOf what) {
+ImageF parse_image_f(std::string_view bytes, const std::string& name, PictureOf what,
+                     std::int64_t most_pixels) {
   std::optional<ImageF> image;
-  if (bytes.starts_with(hdr_magic)) image = parse_hdr_picture(bytes, name);
-  if (bytes.starts_with(exr_magic)) image = parse_exr_picture(bytes, name);
+  if (bytes.starts_with(hdr_magic)) image = parse_hdr_picture(bytes, name, most_pixels);
+  if (bytes.starts_with(exr_magic)) image = parse_exr_picture(bytes, name, most_pixels);
   if (!image) {
     throw Error("{}: it is neither a Radiance (.hdr) nor an OpenEXR (.exr) image{}", name,
                 bytes.empty() ? ": it is empty" : ", despite its name: convert it");

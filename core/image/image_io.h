@@ -18,11 +18,12 @@ inline constexpr std::int64_t most_image_pixels = std::int64_t{1} << 28;
 /// @return 1 (grey), 2 (grey, alpha), 3 (RGB) or 4 channels (RGB, alpha). Palettes are expanded,
 ///         fewer bits scaled up, 16 bits rounded to 8.
 /// @throws Error if the file is missing, not such an image, truncated, damaged, CMYK, or has more
-///         than most_image_pixels.
+///         pixels than most_image_pixels or the available memory allows.
 Image8 read_image8(const std::filesystem::path& path);
 
 /// Decodes a file in memory as read_image8 does; `name` identifies it in messages.
-Image8 parse_image8(std::string_view bytes, const std::string& name);
+Image8 parse_image8(std::string_view bytes, const std::string& name,
+                    std::int64_t most_pixels = most_image_pixels);
 
 /// Quantity in a float image; light must not be negative.
 enum class PictureOf { Light, Heights };
@@ -39,7 +40,8 @@ ImageF read_image_f(const std::filesystem::path& path, PictureOf what = PictureO
 
 /// Decodes a file in memory as read_image_f does; `name` identifies it in messages.
 ImageF parse_image_f(std::string_view bytes, const std::string& name,
-                     PictureOf what = PictureOf::Light);
+                     PictureOf what = PictureOf::Light,
+                     std::int64_t most_pixels = most_image_pixels);
 
 /// Reads heights from an image of any of these formats, detected by its content. Radiance and
 /// OpenEXR are read as by read_image_f. PNG and JPEG give values from 0 to 1: PNG of 16 bits in
@@ -48,6 +50,7 @@ ImageF parse_image_f(std::string_view bytes, const std::string& name,
 ImageF read_heights(const std::filesystem::path& path);
 
 /// Decodes a file in memory as read_heights does; `name` identifies it in messages.
-ImageF parse_heights(std::string_view bytes, const std::string& name);
+ImageF parse_heights(std::string_view bytes, const std::string& name,
+                     std::int64_t most_pixels = most_image_pixels);
 
 }  // namespace groundray

@@ -1,5 +1,6 @@
 #include "core/io/file_io.h"
 
+#include <sys/stat.h>
 #include <unistd.h>
 
 #include <algorithm>
@@ -10,6 +11,7 @@
 #include <utility>
 
 #include "core/error.h"
+#include "core/io/memory.h"
 #include "core/io/open_file.h"
 
 namespace groundray {
@@ -76,10 +78,16 @@ void write_text(const std::filesystem::path& path, std::string_view text) {
 
 std::string read_text(const std::filesystem::path& path) {
   const OwnedFile file = open_file(path);
+  struct stat status {};
+  fstat(fileno(file.get()), &status);
+  const auto bytes = static_cast<std::size_t>(status.st_size);
+  require_memory(path.string(), "its bytes", static_cast<double>(bytes));
   std::string text;
   std::size_t size = 0;
-  while (std::feof(file.get()) == 0 && std::ferror(file.get()) == 0) {
-    text.resize(std::max<std::size_t>(2 * size, 1 << 16));
+  // One byte more than the file has shows its end. Some files of the system declare no size.
+  for (std::size_t room = bytes + 1; std::feof(file.get()) == 0 && std::ferror(file.get()) == 0;
+       room = std::max<std::size_t>(2 * size, 1 << 16)) {
+    text.resize(room);
     size += std::fread(text.data() + size, 1, text.size() - size, file.get());
   }
   if (std::ferror(file.get()) != 0) {
@@ -95,6 +103,11 @@ std::string file_ending(const std::filesystem::path& path) {
   std::ranges::transform(ending, ending.begin(),
                          [](unsigned char c) { return static_cast<char>(std::tolower(c)); });
   return ending;
+}
+
+void check_ending(const std::filesystem::path& path, std::initializer_list<const char*> endings) {
+  if (std::ranges::find(endings, file_ending(path)) == endings.end())
+    throw Error("{}: its name must end in {}", path.string(), *endings.begin());
 }
 
 }  // namespace groundray

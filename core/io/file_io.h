@@ -2,6 +2,7 @@
 
 #include <filesystem>
 #include <functional>
+#include <initializer_list>
 #include <string>
 #include <string_view>
 
@@ -33,5 +34,8 @@ std::string read_text(const std::filesystem::path& path);
 /// Returns the extension of a file's name in lower case, with its dot: ".ply" for "scan.PLY". Empty
 /// if there is none.
 std::string file_ending(const std::filesystem::path& path);
+
+/// @throws Error unless the name ends in one of `endings`, in upper or lower case.
+void check_ending(const std::filesystem::path& path, std::initializer_list<const char*> endings);
 
 }  // namespace groundray

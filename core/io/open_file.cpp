@@ -1,14 +1,17 @@
 #include "core/io/open_file.h"
 
+#include <dirent.h>
 #include <fcntl.h>
 #include <fmt/format.h>
 #include <sys/stat.h>
 #include <unistd.h>
 
+#include <algorithm>
 #include <cerrno>
-#include <system_error>
+#include <string_view>
 
 #include "core/error.h"
+#include "core/near_names.h"
 
 namespace groundray {
 namespace {
@@ -45,7 +48,9 @@ OwnedFile open_file(const std::filesystem::path& path) {
   OwnedFile file = try_to_open(path);
   if (file) return file;
   const int fault = errno;
-  throw Error("{}: cannot be read: {}; check its name and permissions", path.string(),
+  if (fault == ENOENT || fault == ENOTDIR || fault == EISDIR)
+    throw Error("{}: {}", path.string(), why_no_file(path));
+  throw Error("{}: cannot be read: {}; check its permissions", path.string(),
               fault == ESPIPE ? "it is a pipe or device, not a file"
                               : std::generic_category().message(fault));
 }
@@ -59,6 +64,38 @@ std::ifstream open_stream(const std::filesystem::path& path) {
   if (!file) stream.setstate(std::ios::failbit);
   errno = file ? 0 : fault;
   return stream;
+}
+
+bool next_line(std::istream& file, std::string& line) {
+  constexpr std::size_t most_bytes = 1 << 26;
+  line.clear();
+  if (!file) return false;
+  for (int c = file.rdbuf()->sbumpc(); c != '\n'; c = file.rdbuf()->sbumpc()) {
+    if (c == std::char_traits<char>::eof() || line.size() == most_bytes) {
+      const bool is_last = c == std::char_traits<char>::eof() && !line.empty();
+      file.setstate(is_last ? std::ios::eofbit : std::ios::eofbit | std::ios::failbit);
+      return is_last;
+    }
+    line += static_cast<char>(c);
+  }
+  return true;
+}
+
+std::vector<std::string> names_in(const std::filesystem::path& folder, std::error_code& fault) {
+  const auto close_folder = [](DIR* open) { closedir(open); };
+  const std::unique_ptr<DIR, decltype(close_folder)> open(opendir(folder.c_str()), close_folder);
+  std::vector<std::string> names;
+  if (open != nullptr) {
+    errno = 0;
+    while (const dirent* const entry = readdir(open.get())) {
+      const std::string_view name = entry->d_name;
+      if (name != "." && name != "..") names.emplace_back(name);
+      errno = 0;
+    }
+  }
+  fault = {errno, std::generic_category()};
+  std::ranges::sort(names);
+  return names;
 }
 
 }  // namespace groundray

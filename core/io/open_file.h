@@ -4,6 +4,9 @@
 #include <filesystem>
 #include <fstream>
 #include <memory>
+#include <string>
+#include <system_error>
+#include <vector>
 
 namespace groundray {
 
@@ -29,5 +32,14 @@ OwnedFile open_file(const std::filesystem::path& path);
 /// Opens a regular file as a binary stream. For anything else, the stream has failed, and errno
 /// says why.
 std::ifstream open_stream(const std::filesystem::path& path);
+
+/// Reads a line, without its end, as std::getline does; but a line of more than 64 MiB, as in a
+/// file without line ends, ends the reading.
+/// @return false at the end, or if reading fails.
+bool next_line(std::istream& file, std::string& line);
+
+/// Returns the names in a folder, sorted; as many as could be read if `fault` is set. (Iterators of
+/// libstdc++ end the program if there is not enough memory.)
+std::vector<std::string> names_in(const std::filesystem::path& folder, std::error_code& fault);
 
 }  // namespace groundray

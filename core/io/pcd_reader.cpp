@@ -9,6 +9,7 @@
 
 #include "core/error.h"
 #include "core/io/file_io.h"
+#include "core/io/memory.h"
 #include "core/io/text_lines.h"
 
 namespace groundray {
@@ -319,6 +320,7 @@ std::string unpack_lzf(std::string_view packed, std::size_t size) {
   // 3 bytes encode at most 264: a larger size is rejected before memory is allocated.
   constexpr std::size_t most_ratio = 88;
   if (size / most_ratio > packed.size()) throw Error(damaged, "they are too few");
+  require_memory("the compressed points", "their unpacked bytes", static_cast<double>(size));
   std::string out;
   out.reserve(size);
   for (LzfSource source(packed); !source.is_empty();) {

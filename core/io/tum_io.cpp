@@ -2,7 +2,9 @@
 
 #include <fmt/format.h>
 
+#include <algorithm>
 #include <array>
+#include <cctype>
 #include <chrono>
 #include <cmath>
 #include <optional>
@@ -67,10 +69,16 @@ std::string seconds_text(nanoseconds time) {
 Trajectory::Sample parse_tum_line(const std::vector<std::string_view>& words) {
   constexpr std::array names{"t", "x", "y", "z", "qx", "qy", "qz", "qw"};
   if (words.size() != names.size()) {
-    throw Error("the line has {} values; it must have 8: t x y z qx qy qz qw", words.size());
+    const bool has_commas = words[0].find_first_of(",;") != std::string_view::npos;
+    throw Error("the line has {} value{}; it must have 8: t x y z qx qy qz qw{}", words.size(),
+                words.size() == 1 ? "" : "s",
+                has_commas ? ", separated by spaces instead of commas" : "");
   }
   const auto time = parse_seconds(words[0]);
   if (!time) {
+    if (std::ranges::any_of(words[0], [](unsigned char c) { return std::isalpha(c) != 0; }))
+      throw Error("t = {:?} must be a number of seconds; a line of titles must begin with #",
+                  words[0].substr(0, 40));
     throw Error("t = {:?} must be a number of seconds, less than 4.6e9: is it in nanoseconds?",
                 words[0].substr(0, 40));
   }

@@ -7,6 +7,7 @@
 #include <bit>
 
 #include "core/error.h"
+#include "core/io/memory.h"
 
 namespace groundray {
 namespace {
@@ -164,6 +165,7 @@ std::string unpack_member(std::string_view bytes, const ZipMember& member) {
   if (member.method == Z_DEFLATED) {
     constexpr std::uint64_t most_ratio = 1032;  // limit of deflate
     if (member.size / most_ratio > packed.size()) throw Error("{} is damaged", member.name);
+    require_memory(member.name, "its unpacked bytes", static_cast<double>(member.size));
     out.resize(member.size);
     if (!inflate_raw(packed, out)) throw Error("{} is damaged: it cannot be unpacked", member.name);
   } else if (member.method == 0) {

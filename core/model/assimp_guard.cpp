@@ -1,16 +1,17 @@
-#include <tinyxml2.h>
+#include <fmt/format.h>
 
 #include <algorithm>
 #include <cstdint>
 #include <cstring>
-#include <functional>
-#include <map>
 #include <nlohmann/json.hpp>
+#include <numeric>
+#include <set>
+#include <string>
 #include <utility>
 #include <vector>
 
 #include "core/error.h"
-#include "core/io/text_lines.h"
+#include "core/io/memory.h"
 #include "core/model/polygon_soup.h"
 
 namespace groundray {
@@ -18,57 +19,53 @@ namespace {
 
 using nlohmann::json;
 
-/// Parts of each node: its children, and the nodes that it instances.
-using NodeParts = std::vector<std::vector<std::size_t>>;
+/// A node: its children, and the number of elements of its mesh.
+struct Node {
+  std::vector<std::size_t> children;
+  double elements = 0;
+};
 
-/// Checks that the traversal of all parts of a node ends, as assimp assumes.
+/// Checks that the traversal of all nodes ends, as assimp assumes, and counts what it yields.
 class NodeWalk {
  public:
-  NodeWalk(const NodeParts& parts, std::function<std::string(std::size_t)> name_of)
-      : parts_(parts), name_of_(std::move(name_of)), trees_(parts.size()) {}
+  explicit NodeWalk(const std::vector<Node>& nodes) : nodes_(nodes), trees_(nodes.size()) {}
 
-  void check() {
-    for (std::size_t node = 0; node < parts_.size(); ++node) walk(node, 0);
-  }
+  /// Returns the number of elements of a node and its descendants, each counted as often as it is a
+  /// child.
+  double elements(std::size_t node) { return walk(node, 0).elements; }
 
  private:
   static constexpr int most_levels = 1000;
   static constexpr double most_nodes = 1e6;
 
-  /// Size of the tree of a node's parts.
   struct Tree {
     enum class State { New, Open, Known } state = State::New;
     int levels = 1;
-    double nodes = 1;  // each counted as often as it is a part
+    double nodes = 1, elements = 0;
   };
 
   const Tree& walk(std::size_t node, int levels_above) {
     Tree& tree = trees_[node];
-    if (tree.state == Tree::State::Open) {
-      throw Error("{} contains itself: remove the child or instance that leads back to it",
-                  name_of_(node));
-    }
-    if (levels_above + tree.levels > most_levels) {
-      throw Error("{} and its descendants are nested more than {} deep", name_of_(node),
-                  most_levels);
-    }
+    if (tree.state == Tree::State::Open)
+      throw Error("node {} contains itself: remove the child that leads back to it", node);
+    if (levels_above + tree.levels > most_levels)
+      throw Error("node {} and its descendants are nested more than {} deep", node, most_levels);
     if (tree.state == Tree::State::Known) return tree;
     tree.state = Tree::State::Open;
-    for (const std::size_t part : parts_[node]) {
-      const Tree& below = walk(part, levels_above + 1);
+    tree.elements = nodes_[node].elements;
+    for (const std::size_t child : nodes_[node].children) {
+      const Tree& below = walk(child, levels_above + 1);
       tree.levels = std::max(tree.levels, below.levels + 1);
       tree.nodes += below.nodes;
+      tree.elements += below.elements;
     }
-    if (tree.nodes > most_nodes) {
-      throw Error("{} has more than {:g} descendants, including those of its instances",
-                  name_of_(node), most_nodes);
-    }
+    if (tree.nodes > most_nodes)
+      throw Error("node {} has more than {:g} descendants", node, most_nodes);
     tree.state = Tree::State::Known;
     return tree;
   }
 
-  const NodeParts& parts_;
-  const std::function<std::string(std::size_t)> name_of_;
+  const std::vector<Node>& nodes_;
   std::vector<Tree> trees_;
 };
 
@@ -96,6 +93,17 @@ std::string_view json_of(std::string_view bytes) {
     at += chunk_header + length;
   }
   return bytes.substr(header + chunk_header, word(header));
+}
+
+/// Returns the data of the chunk after the JSON in a .glb that json_of accepts; empty if there is
+/// none.
+std::string_view second_chunk(std::string_view bytes, std::string_view text) {
+  constexpr std::size_t json_at = 20, chunk_header = 8;
+  const std::size_t at = json_at + text.size() + chunk_header;
+  if (!bytes.starts_with("glTF") || at > bytes.size()) return {};
+  std::uint32_t length = 0;
+  std::memcpy(&length, bytes.data() + at - chunk_header, sizeof length);
+  return bytes.substr(at, length);
 }
 
 /// Rejects deep nesting, on which recursive readers run out of stack; glTF itself needs about ten
@@ -141,6 +149,8 @@ void check_views(const json& gltf) {
     }
   }
   for (const json& accessor : gltf.value("accessors", none)) {
+    if (accessor.contains("sparse"))
+      throw Error("sparse accessors are not supported: export the model without them");
     if (!accessor.contains("bufferView")) continue;
     const json& view = views.at(accessor.at("bufferView").get<std::size_t>());
     const auto element = static_cast<double>(components_of(accessor.at("type").get<std::string>()) *
@@ -172,157 +182,161 @@ std::size_t triangles_of(const json& gltf) {
   return sum;
 }
 
-void check_nodes(const json& gltf) {
-  const auto nodes = gltf.value("nodes", json::array());
-  NodeParts parts;
-  for (const json& node : nodes) {
-    auto& children = parts.emplace_back();
-    for (const json& child : node.value("children", json::array())) {
-      children.push_back(child.get<std::size_t>());
-      if (children.back() < nodes.size()) continue;
-      throw Error("node {} has the child {}, but there are {} nodes", parts.size() - 1,
-                  child.dump(), nodes.size());
+/// Checks that all buffers and images are in the file or named files of its folder, and that files
+/// hold what buffers declare.
+void check_uris(const json& gltf, std::size_t chunk_bytes, const std::filesystem::path& path) {
+  const json none = json::array();
+  const auto is_embedded = [](const std::string& uri) { return uri.starts_with("data:"); };
+  for (const json& buffer : gltf.value("buffers", none)) {
+    const std::string uri = buffer.value("uri", "");
+    const auto declared = buffer.at("byteLength").get<double>();
+    double bytes = static_cast<double>(chunk_bytes);
+    if (is_embedded(uri)) {
+      bytes = 0.75 * static_cast<double>(uri.size());  // base64; the rest is checked by assimp
+    } else if (!uri.empty()) {
+      std::error_code fault;
+      bytes = static_cast<double>(
+          std::filesystem::file_size(path.parent_path() / name_beside(uri), fault));
+      if (fault) throw Error("its buffer {:?} cannot be read: {}", uri, fault.message());
     }
+    if (!(declared <= bytes))
+      throw Error("a buffer of {} bytes has {} in its file: is it truncated?", declared, bytes);
   }
-  NodeWalk(parts, [](std::size_t node) { return fmt::format("node {}", node); }).check();
+  for (const json& image : gltf.value("images", none)) {
+    const std::string uri = image.value("uri", "");
+    if (!uri.empty() && !is_embedded(uri)) static_cast<void>(name_beside(uri));
+  }
 }
 
-/// Nodes of a Collada file and their instances.
-class ColladaNodes {
- public:
-  void enter(const tinyxml2::XMLElement& element) {
-    const std::size_t node = elements_.size();
-    const std::string id = text_of(element, "id");
-    if (!open_.empty()) {
-      parts_[open_.back()].push_back(node);
-    } else if (element.Name() == std::string_view("node")) {
-      library_.emplace(id, node);
+/// Numbers of vertices and indices of each mesh, each counted as often as a primitive refers to it.
+std::vector<double> elements_of_meshes(const json& gltf) {
+  const json none = json::array();
+  const json accessors = gltf.value("accessors", none);
+  const auto count = [&](const json& accessor) {
+    return accessors.at(accessor.get<std::size_t>()).at("count").get<double>();
+  };
+  std::vector<double> sums;
+  for (const json& mesh : gltf.value("meshes", none)) {
+    double& sum = sums.emplace_back(0);
+    for (const json& primitive : mesh.at("primitives")) {
+      sum += 1;
+      for (const json& accessor : primitive.at("attributes")) sum += count(accessor);
+      if (primitive.contains("indices")) sum += count(primitive["indices"]);
     }
-    named_.emplace(id, node);
-    if (text_of(element, "name") != id) named_.emplace(text_of(element, "name"), node);
-    elements_.push_back(&element);
-    parts_.emplace_back();
-    open_.push_back(node);
   }
+  return sums;
+}
 
-  void leave() { open_.pop_back(); }
-
-  void add_instance(const tinyxml2::XMLElement& element) {
-    const std::string url = text_of(element, "url");
-    if (open_.empty() || !url.starts_with('#')) return;
-    instances_.emplace_back(open_.back(), url.substr(1));
-  }
-
-  void check() {
-    for (const auto& [node, name] : instances_) {
-      // assimp searches the library by id, then the scene by id or name.
-      const auto [first, last] = (library_.contains(name) ? library_ : named_).equal_range(name);
-      for (auto it = first; it != last; ++it) parts_[node].push_back(it->second);
-    }
-    const auto name_of = [&](std::size_t node) {
-      return fmt::format("line {}: {} {:?}", elements_[node]->GetLineNum(), elements_[node]->Name(),
-                         text_of(*elements_[node], "id"));
-    };
-    NodeWalk(parts_, name_of).check();
-  }
-
- private:
-  static std::string text_of(const tinyxml2::XMLElement& element, const char* attribute) {
-    const char* const text = element.Attribute(attribute);
-    return text != nullptr ? text : "";
-  }
-
-  std::vector<const tinyxml2::XMLElement*> elements_;
-  NodeParts parts_;
-  std::vector<std::size_t> open_;
-  std::multimap<std::string, std::size_t> library_, named_;
-  std::vector<std::pair<std::size_t, std::string>> instances_;
-};
-
-/// Collects unit, up axis and nodes, and rejects malformed numbers.
-class ColladaCheck : public tinyxml2::XMLVisitor {
- public:
-  ColladaAsset asset;
-  ColladaNodes nodes;
-
-  bool VisitEnter(const tinyxml2::XMLElement& element,  // NOLINT(readability-identifier-naming)
-                  const tinyxml2::XMLAttribute* /*first*/) override {
-    const std::string_view name = element.Name();
-    const std::string_view text = element.GetText() != nullptr ? element.GetText() : "";
-    if (name == "unit") {
-      const char* const meter = element.Attribute("meter");
-      const auto value = number_of<double>(meter != nullptr ? meter : "1");
-      if (!value || !(*value > 0)) throw Error("unit: meter must be a positive number");
-      asset.metres_per_unit = *value;
-    } else if (name == "up_axis") {
-      if (text.find("X_UP") != std::string_view::npos) asset.up = UpAxis::X;
-      if (text.find("Z_UP") != std::string_view::npos) asset.up = UpAxis::Z;
-    } else if (is_node(name)) {
-      nodes.enter(element);
-    } else if (name == "instance_node") {
-      nodes.add_instance(element);
-    } else if (name == "p" || name == "vcount" || name == "h") {
-      check_characters(element, text, "0123456789- \t\r\n");
-    } else if (name == "float_array") {
-      check_characters(element, text, "0123456789+-.eEnNaAiIfFtTyY \t\r\n");  // also NaN, Infinity
-      if (element.Int64Attribute("count", -1) < 0) {
-        throw Error("line {}: float_array must have a count", element.GetLineNum());
+/// Checks the nodes, and returns the number of elements of all meshes and their instances.
+double check_nodes(const json& gltf) {
+  const json none = json::array();
+  const json list = gltf.value("nodes", none);
+  const std::vector<double> meshes = elements_of_meshes(gltf);
+  std::vector<Node> nodes;
+  for (const json& from : list) {
+    Node& node = nodes.emplace_back();
+    if (from.contains("mesh")) {
+      const auto mesh = from["mesh"].get<std::size_t>();
+      if (mesh >= meshes.size()) {
+        throw Error("node {} has the mesh {}, but there are {}", nodes.size() - 1, mesh,
+                    meshes.size());
       }
+      node.elements = meshes[mesh];
     }
-    return true;
+    for (const json& child : from.value("children", none)) {
+      node.children.push_back(child.get<std::size_t>());
+      if (node.children.back() < list.size()) continue;
+      throw Error("node {} has the child {}, but there are {} nodes", nodes.size() - 1,
+                  child.dump(), list.size());
+    }
   }
+  NodeWalk walk(nodes);
+  for (std::size_t i = 0; i < nodes.size(); ++i) walk.elements(i);
+  double elements = std::accumulate(meshes.begin(), meshes.end(), 0.0);
+  for (const json& scene : gltf.value("scenes", none)) {
+    for (const json& root : scene.value("nodes", none)) {
+      const auto number = root.get<std::size_t>();
+      if (number >= nodes.size())
+        throw Error("a scene has the node {}, but there are {}", number, nodes.size());
+      elements += walk.elements(number);
+    }
+  }
+  return elements;
+}
 
-  bool VisitExit(
-      const tinyxml2::XMLElement& element) override {  // NOLINT(readability-identifier-naming)
-    if (is_node(element.Name())) nodes.leave();
-    return true;
+/// Removes what groundray does not use, so that assimp does not read it: animations, skins, cameras
+/// and others.
+void strip(json& gltf) {
+  static const std::set<std::string> used{"asset",       "scene",
+                                          "scenes",      "nodes",
+                                          "meshes",      "accessors",
+                                          "bufferViews", "buffers",
+                                          "textures",    "images",
+                                          "samplers",    "extensionsUsed",
+                                          "materials",   "extensionsRequired"};
+  json kept = json::object();
+  for (const auto& [key, value] : gltf.items())
+    if (used.contains(key)) kept[key] = value;
+  gltf = std::move(kept);
+  if (gltf.contains("nodes")) {
+    for (json& node : gltf["nodes"])
+      for (const char* key : {"skin", "camera", "weights", "extensions", "extras"}) node.erase(key);
   }
+  if (gltf.contains("images")) {
+    for (json& image : gltf["images"])  // without a slash in it, assimp crashes
+      if (image.value("mimeType", "").find('/') == std::string::npos) image.erase("mimeType");
+  }
+  if (!gltf.contains("meshes")) return;
+  for (json& mesh : gltf["meshes"]) {
+    mesh.erase("weights");
+    for (json& primitive : mesh.at("primitives")) primitive.erase("targets");
+  }
+}
 
- private:
-  static bool is_node(std::string_view element) {
-    return element == "node" || element == "visual_scene";
-  }
-
-  static void check_characters(const tinyxml2::XMLElement& element, std::string_view text,
-                               std::string_view all) {
-    const std::size_t at = text.find_first_not_of(all);
-    if (at == std::string_view::npos) return;
-    throw Error("line {}: {:?} in {} is not a number", element.GetLineNum(), text.substr(at, 20),
-                element.Name());
-  }
-};
+/// Returns the file for assimp: JSON, or a .glb if there is a second chunk.
+std::string file_of(const json& gltf, std::string_view chunk) {
+  std::string text = gltf.dump();
+  if (chunk.empty()) return text;
+  text.resize((text.size() + 3) / 4 * 4, ' ');
+  std::string bytes = "glTF";
+  const auto append = [&](std::size_t word) {
+    const auto value = static_cast<std::uint32_t>(word);
+    bytes.append(reinterpret_cast<const char*>(&value), sizeof value);
+  };
+  append(2);
+  append(12 + 8 + text.size() + 8 + chunk.size());
+  append(text.size());
+  bytes += "JSON" + text;
+  append(chunk.size());
+  bytes.append("BIN\0", 4) += chunk;
+  return bytes;
+}
 
 }  // namespace
 
-std::size_t check_gltf(std::string_view bytes, const std::string& name) {
+CheckedGltf check_gltf(std::string_view bytes, const std::filesystem::path& path) {
+  constexpr double bytes_per_element = 100;  // in assimp's structures and in those of the model
+  double elements = 0;
+  CheckedGltf checked;
   try {
     const std::string_view text = json_of(bytes);
     check_nesting(text);
-    const json gltf = json::parse(text);
+    json gltf = json::parse(text);
+    const std::string_view chunk = second_chunk(bytes, text);
+    check_uris(gltf, chunk.size(), path);
     check_views(gltf);
-    check_nodes(gltf);
-    return triangles_of(gltf);
+    elements = check_nodes(gltf);
+    checked.triangles = triangles_of(gltf);
+    strip(gltf);
+    checked.is_binary = !chunk.empty();
+    checked.bytes = file_of(gltf, chunk);
   } catch (const json::exception& fault) {
-    throw Error("{}: {}", name, fault.what());
+    throw Error("{}: {}", path.string(), fault.what());
   } catch (const Error& fault) {
-    throw Error("{}: {}", name, fault.what());
+    throw Error("{}: {}", path.string(), fault.what());
   }
-}
-
-ColladaAsset check_collada(std::string_view text, const std::string& name) {
-  tinyxml2::XMLDocument document;
-  if (document.Parse(text.data(), text.size()) != tinyxml2::XML_SUCCESS) {
-    throw Error("{}:{}: it is not valid XML: {}", name, document.ErrorLineNum(),
-                document.ErrorStr());
-  }
-  ColladaCheck check;
-  try {
-    document.Accept(&check);
-    check.nodes.check();
-  } catch (const Error& fault) {
-    throw Error("{}: {}", name, fault.what());
-  }
-  return check.asset;
+  require_memory(path.string(), "its meshes and their instances", bytes_per_element * elements);
+  return checked;
 }
 
 }  // namespace groundray

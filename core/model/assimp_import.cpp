@@ -1,11 +1,13 @@
 #include <assimp/BaseImporter.h>
 #include <assimp/GltfMaterial.h>
-#include <assimp/config.h>
+#include <assimp/MemoryIOWrapper.h>
 #include <assimp/importerdesc.h>
 #include <assimp/material.h>
 #include <assimp/scene.h>
+#include <fmt/format.h>
 
 #include <algorithm>
+#include <assimp/IOSystem.hpp>
 #include <assimp/Importer.hpp>
 #include <cmath>
 #include <cstdint>
@@ -17,6 +19,7 @@
 #include <initializer_list>
 #include <limits>
 #include <memory>
+#include <new>
 #include <string>
 #include <string_view>
 #include <utility>
@@ -32,11 +35,13 @@ namespace {
 
 using SoupSurface = PolygonSoup::Surface;
 
+enum class Form { Stl, Gltf };
+
 /// Adds to a soup what assimp read. Arrays are never accessed out of bounds, whatever assimp's
 /// indices.
 class SceneReader {
  public:
-  SceneReader(const aiScene& scene, SceneForm form, const std::string& name)
+  SceneReader(const aiScene& scene, Form form, const std::string& name)
       : scene_(scene),
         form_(form),
         name_(name),
@@ -91,7 +96,7 @@ class SceneReader {
                                                 glm::cross(linear[2], linear[0]),
                                                 glm::cross(linear[0], linear[1]));
     // The normals of STL are those of the facets.
-    const aiVector3D* const normals = form_ == SceneForm::Stl ? nullptr : mesh.mNormals;
+    const aiVector3D* const normals = form_ == Form::Stl ? nullptr : mesh.mNormals;
     const PolygonSoup::Corner none;
     const PolygonSoup::Corner first{
         static_cast<std::uint32_t>(soup_.positions.size()),
@@ -155,22 +160,13 @@ class SceneReader {
     surface.opacity = image({aiTextureType_OPACITY}, surface.looks.opacity);
     // Read last, because its uv become the surface's.
     surface.albedo = image({aiTextureType_BASE_COLOR, aiTextureType_DIFFUSE}, surface.looks.albedo);
-    // For formats without materials, assimp invents names and colours.
-    if (form_ != SceneForm::Gltf && form_ != SceneForm::Collada) return;
+    if (form_ == Form::Stl) return;  // it has no materials: assimp invents names and colours
     surface.looks.name = material.GetName().C_Str();
     aiColor4D color(1, 1, 1, 1);
-    if (form_ == SceneForm::Gltf) {
-      if (material.Get(AI_MATKEY_BASE_COLOR, color) != AI_SUCCESS) {
-        material.Get(AI_MATKEY_COLOR_DIFFUSE, color);
-      }
-      surface.looks.color = {color.r, color.g, color.b};
-      surface.looks.least_alpha = least_alpha(material, color.a);
-      return;
-    }
-    // In Collada, a map replaces the colour.
-    if (surface.albedo.empty() && material.Get(AI_MATKEY_COLOR_DIFFUSE, color) == AI_SUCCESS) {
-      surface.looks.color = linear_color({color.r, color.g, color.b});
-    }
+    if (material.Get(AI_MATKEY_BASE_COLOR, color) != AI_SUCCESS)
+      material.Get(AI_MATKEY_COLOR_DIFFUSE, color);
+    surface.looks.color = {color.r, color.g, color.b};
+    surface.looks.least_alpha = least_alpha(material, color.a);
   }
 
   /// Returns the alpha of the map below which the surface is cut out. In glTF, alpha is the map's
@@ -202,15 +198,21 @@ class SceneReader {
       pixels.pixels =
           parse_image8({reinterpret_cast<const char*>(embedded->pcData), embedded->mWidth},
                        name_ + ", image " + name.C_Str());
+      decoded_ += std::int64_t{pixels.pixels.width()} * pixels.pixels.height();
+      if (decoded_ > most_image_pixels) {
+        throw Error("{}: the images of its surfaces have more than {} pixels; scale them down",
+                    name_, most_image_pixels);
+      }
       return {};
     }
     return {};
   }
 
   const aiScene& scene_;
-  const SceneForm form_;
+  const Form form_;
   const std::string& name_;
   PolygonSoup soup_;
+  std::int64_t decoded_ = 0;             // pixels
   std::vector<std::uint32_t> surfaces_;  // by material; the last is for meshes without one
   std::vector<unsigned> uv_channels_;    // by surface
 };
@@ -225,69 +227,70 @@ void keep_only(Assimp::Importer& importer, std::string_view reader) {
   }
 }
 
-std::string_view reader_of(SceneForm form) {
-  switch (form) {
-    case SceneForm::Stl:
-      return "Stereolithography (STL) Importer";
-    case SceneForm::Gltf:
-      return "glTF2 Importer";
-    default:
-      return "Collada Importer";
+/// A file in memory, for assimp.
+class FileInMemory : private std::string, public Assimp::MemoryIOStream {
+ public:
+  explicit FileInMemory(std::string bytes)
+      : std::string(std::move(bytes)),
+        MemoryIOStream(reinterpret_cast<const std::uint8_t*>(data()), size()) {}
+};
+
+/// Files as assimp sees them: one in memory, and those in its folder or below.
+class FilesBeside : public Assimp::IOSystem {
+ public:
+  FilesBeside(const std::filesystem::path& folder, std::string name, std::string bytes)
+      : folder_(folder), name_(std::move(name)), bytes_(std::move(bytes)) {}
+
+  // NOLINTBEGIN(readability-identifier-naming): assimp's names
+  bool Exists(const char* file) const override {
+    std::error_code ignored;
+    return file == name_ || std::filesystem::is_regular_file(folder_ / name_beside(file), ignored);
   }
-}
-
-/// Returns whether every URI of a glTF contains its data instead of the name of a file.
-bool holds_all_data(std::string_view text) {
-  constexpr std::string_view key = "\"uri\"", blank = " \t\r\n";
-  for (std::size_t at = text.find(key); at != std::string_view::npos; at = text.find(key, at)) {
-    at = text.find_first_not_of(blank, at + key.size());
-    if (at == std::string_view::npos || text[at] != ':') continue;  // not a key
-    at = text.find_first_not_of(blank, at + 1);
-    if (at == std::string_view::npos || !text.substr(at).starts_with("\"data:")) return false;
+  char getOsSeparator() const override { return '/'; }
+  Assimp::IOStream* Open(const char* file, const char* mode) override {
+    if (*mode != 'r') return nullptr;
+    return new FileInMemory(file == name_ ? bytes_ : read_text(folder_ / name_beside(file)));
   }
-  return true;
-}
+  void Close(Assimp::IOStream* file) override { delete file; }
+  // NOLINTEND(readability-identifier-naming)
 
-/// Returns the JSON of a .glb that consists of nothing else and embeds all its buffers; an empty
-/// string for other files. assimp reads the first buffer of a .glb from the chunk after the JSON,
-/// whatever the JSON states.
-/// @see Khronos Group, glTF 2.0 Specification (2021): section 4.4.3.3.
-std::string json_alone(const std::filesystem::path& path) {
-  const std::string bytes = read_text(path);
-  constexpr std::size_t header_bytes = 20;
-  if (!bytes.starts_with("glTF") || bytes.size() < header_bytes) return {};
-  std::uint32_t length = 0;
-  bytes.copy(reinterpret_cast<char*>(&length), sizeof length, 12);
-  if (bytes.size() != header_bytes + length) return {};
-  std::string text = bytes.substr(header_bytes);
-  return holds_all_data(text) ? text : std::string();
-}
+ private:
+  std::filesystem::path folder_;
+  std::string name_, bytes_;
+};
 
-}  // namespace
-
-PolygonSoup read_scene_file(const std::filesystem::path& path, SceneForm form) {
+/// Reads a file of which assimp gets `bytes`.
+PolygonSoup read_scene(const std::filesystem::path& path, Form form, std::string_view ending,
+                       std::string bytes) {
   const std::string name = path.string();
   try {
     Assimp::Importer importer;
-    keep_only(importer, reader_of(form));
-    importer.SetPropertyInteger(AI_CONFIG_IMPORT_COLLADA_IGNORE_UP_DIRECTION, 1);
-    const std::string json = form == SceneForm::Gltf ? json_alone(path) : std::string();
-    const aiScene* const scene =
-        json.empty() ? importer.ReadFile(name, 0)
-                     : importer.ReadFileFromMemory(json.data(), json.size(), 0, "gltf");
+    keep_only(importer, form == Form::Stl ? "Stereolithography (STL) Importer" : "glTF2 Importer");
+    const std::string inner = fmt::format("model{}", ending);
+    importer.SetIOHandler(new FilesBeside(path.parent_path(), inner, std::move(bytes)));
+    const aiScene* const scene = importer.ReadFile(inner, 0);
     if (scene == nullptr) throw Error("{}: {}", name, importer.GetErrorString());
     return SceneReader(*scene, form, name).read();
   } catch (const Error&) {
+    throw;
+  } catch (const std::bad_alloc&) {
     throw;
   } catch (const std::exception& fault) {
     throw Error("{}: assimp cannot read it: {}", name, fault.what());
   }
 }
 
+}  // namespace
+
+PolygonSoup read_stl(const std::filesystem::path& path) {
+  return read_scene(path, Form::Stl, ".stl", read_text(path));
+}
+
 PolygonSoup read_gltf(const std::filesystem::path& path, std::string_view bytes) {
-  const std::size_t named = check_gltf(bytes, path.string());
-  PolygonSoup soup = read_scene_file(path, SceneForm::Gltf);
-  soup.omitted = named - std::min(named, soup.faces);
+  CheckedGltf checked = check_gltf(bytes, path);
+  PolygonSoup soup =
+      read_scene(path, Form::Gltf, checked.is_binary ? ".glb" : ".gltf", std::move(checked.bytes));
+  soup.omitted = checked.triangles - std::min(checked.triangles, soup.faces);
   return soup;
 }
 

@@ -130,8 +130,7 @@ MeshReading read_gltf_mesh(const fs::path& path) {
 MeshReading read_mesh_file(const fs::path& path) {
   const std::string form = file_ending(path);
   if (form == ".gltf" || form == ".glb") return read_gltf_mesh(path);
-  if (form == ".stl")
-    return {.soup = read_scene_file(path, SceneForm::Stl), .georeference = stl_georeference(path)};
+  if (form == ".stl") return {.soup = read_stl(path), .georeference = stl_georeference(path)};
   if (form == ".ply") {
     const std::string bytes = read_text(path);
     return {parse_ply_faces(bytes, path.string()),
@@ -148,10 +147,7 @@ MeshReading read_mesh_file(const fs::path& path) {
 
 void check_some(const MeshFile& file, const std::string& name) {
   if (!file.mesh.triangles.empty()) return;
-  throw Error(
-      "{}: there is no triangle; {} broken polygons were dropped, and {} points, lines or curved "
-      "patches skipped",
-      name, file.dropped, file.skipped);
+  throw Error("{}: there is no triangle{}", name, why_empty(file.dropped, file.skipped));
 }
 
 }  // namespace

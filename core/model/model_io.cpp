@@ -39,15 +39,25 @@ std::string without_percents(std::string_view text) {
   return out;
 }
 
-/// Finds a file that the model refers to, relative to the model's folder: first by its path, then
+/// Returns a name with `/` between folders, and without the scheme of local files.
+std::string local_name(std::string name) {
+  if (name.starts_with("file://")) name.erase(0, 7);
+  std::ranges::replace(name, '\\', '/');
+  return name;
+}
+
+bool leads_out(const fs::path& name) {
+  return name.is_absolute() || std::ranges::find(name, fs::path("..")) != name.end();
+}
+
+/// Finds a file that the model refers to, in the model's folder or below: first by its path, then
 /// by its last component, because files often contain the folders of their author's machine.
 /// @throws Error listing the paths that were tried.
 fs::path find_beside(const fs::path& model, const std::string& written) {
   std::string tried;
-  for (std::string name : {written, without_percents(written)}) {
-    if (name.starts_with("file://")) name.erase(0, 7);
-    std::ranges::replace(name, '\\', '/');
+  for (const std::string& name : {local_name(written), local_name(without_percents(written))}) {
     for (const fs::path& relative : {fs::path(name), fs::path(name).filename()}) {
+      if (leads_out(relative)) continue;
       const fs::path path = model.parent_path() / relative;
       std::error_code ignored;
       if (fs::is_regular_file(path, ignored)) return path;
@@ -56,7 +66,10 @@ fs::path find_beside(const fs::path& model, const std::string& written) {
         tried += (tried.empty() ? "" : " and no ") + words;
     }
   }
-  throw Error("{:?} is missing: there is no {}", written, tried);
+  throw Error("{:?} is missing: there is no {}{}", written, tried,
+              leads_out(local_name(written))
+                  ? "; only files in the model's folder are read: copy it there"
+                  : "");
 }
 
 void find_images(const fs::path& model, std::vector<SoupSurface>& surfaces) {
@@ -81,8 +94,6 @@ void find_images(const fs::path& model, std::vector<SoupSurface>& surfaces) {
 
 struct ModelReading {
   PolygonSoup soup;
-  double metres_per_unit = 1;  // as the file states
-  double unit_of_soup_m = 1;
   UpAxis up = UpAxis::Z;
 };
 
@@ -91,24 +102,20 @@ ModelReading read_obj(const fs::path& path) {
   return {.soup = parse_obj(read_text(path), path.string(), read_mtl)};
 }
 
-ModelReading read_collada(const fs::path& path) {
-  const ColladaAsset asset = check_collada(read_text(path), path.string());
-  return {.soup = read_scene_file(path, SceneForm::Collada),
-          .metres_per_unit = asset.metres_per_unit,
-          .unit_of_soup_m = static_cast<float>(asset.metres_per_unit),
-          .up = asset.up};
-}
-
 ModelReading read_model_file(const fs::path& path) {
   const std::string ending = file_ending(path);
   if (ending == ".obj") return read_obj(path);
   if (ending == ".ply") return {.soup = parse_ply_faces(read_text(path), path.string())};
-  if (ending == ".stl") return {.soup = read_scene_file(path, SceneForm::Stl)};
+  if (ending == ".stl") return {.soup = read_stl(path)};
   if (ending == ".gltf" || ending == ".glb")
     return {.soup = read_gltf(path, read_text(path)), .up = UpAxis::Y};
-  if (ending == ".dae") return read_collada(path);
-  throw Error("{}: the name of a model must end in .obj, .ply, .stl, .gltf, .glb or .dae",
-              path.string());
+  if (ending == ".dae") {
+    throw Error(
+        "{}: Collada is not read; convert it to glTF, for instance by assimp's own tool:\n  assimp "
+        "export '{}' '{}'",
+        path.string(), path.string(), fs::path(path).replace_extension(".glb").string());
+  }
+  throw Error("{}: the name of a model must end in .obj, .ply, .stl, .gltf or .glb", path.string());
 }
 
 template <typename V>
@@ -120,8 +127,7 @@ V turned_up(const V& v, UpAxis up) {
 
 void turn_and_scale(ModelReading& reading, const ModelOptions& options) {
   const UpAxis up = options.up.value_or(reading.up);
-  const double scale =
-      options.metres_per_unit.value_or(reading.metres_per_unit) / reading.unit_of_soup_m;
+  const double scale = options.metres_per_unit.value_or(1);
   for (glm::dvec3& p : reading.soup.positions) p = scale * turned_up(p, up);
   for (glm::vec3& n : reading.soup.normals) n = turned_up(n, up);
   reading.soup.rounding *= scale;
@@ -151,7 +157,7 @@ void refuse_faults(const fs::path& path, const ModelFile& file) {
   none(faults.out_of_range, "polygons refer to a missing vertex or uv");
   none(faults.not_finite, "polygons have a position or uv that is not finite");
   none(faults.degenerate, "polygons or triangles have no area");
-  none(faults.entangled, "polygons intersect themselves");
+  none(faults.entangled, "polygons intersect themselves or are too complex");
   const ModelBounds bounds = bounds_of(file.model.mesh);
   const double size_m = glm::length(bounds.high_m - bounds.low_m);
   broken.unless(
@@ -163,6 +169,14 @@ void refuse_faults(const fs::path& path, const ModelFile& file) {
 }
 
 }  // namespace
+
+std::string name_beside(const std::string& written) {
+  const std::string name = local_name(without_percents(written));
+  if (leads_out(name)) {
+    throw Error("it refers to {:?}; only files in its own folder are read: copy it there", written);
+  }
+  return name;
+}
 
 ModelFile read_model(const fs::path& path, const ModelOptions& options) {
   const double scale = options.metres_per_unit.value_or(1);
@@ -181,10 +195,8 @@ ModelFile read_model(const fs::path& path, const ModelOptions& options) {
   file.model = model_of(soup, file.dropped);
   if (options.broken == BrokenParts::Refuse) refuse_faults(path, file);
   if (file.model.mesh.triangles.empty()) {
-    throw Error(
-        "{}: there is no triangle; {} broken polygons were dropped, and {} points, lines or "
-        "curved patches skipped",
-        path.string(), file.dropped.total(), file.skipped);
+    throw Error("{}: there is no triangle{}", path.string(),
+                why_empty(file.dropped.total(), file.skipped));
   }
   take_surfaces(path, std::move(soup.surfaces), file.model);
   check_model(file.model, path.string());

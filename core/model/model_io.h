@@ -17,8 +17,8 @@ enum class BrokenParts { Refuse, Drop };
 
 /// Options that override or complete a model's file.
 struct ModelOptions {
-  std::optional<double> metres_per_unit;  ///< default: the file's, or 1 if it states none
-  std::optional<UpAxis> up;  ///< default: the file's, or Y for glTF and Collada, Z for others
+  std::optional<double> metres_per_unit;  ///< default: 1
+  std::optional<UpAxis> up;               ///< default: the file's, or Y for glTF, Z for others
   BrokenParts broken = BrokenParts::Refuse;
 };
 
@@ -41,8 +41,8 @@ struct ModelFile {
   double rounding_m = 0;
 };
 
-/// Reads a model in the format of the file extension: .obj (with .mtl), .ply, .stl, .gltf, .glb or
-/// .dae. Nodes' transforms are applied and polygons triangulated. Vertices that are equal in
+/// Reads a model in the format of the file extension: .obj (with .mtl), .ply, .stl, .gltf or .glb.
+/// Nodes' transforms are applied and polygons triangulated. Vertices that are equal in
 /// position, uv and normal are merged, in the order in which triangles first refer to them. Unused
 /// surfaces are omitted. Image files are located but not read; embedded images are decoded.
 /// @throws Error if the file cannot be read or has no triangle; if an image or .mtl that it refers

@@ -4,6 +4,7 @@
 #include <limits>
 #include <map>
 #include <optional>
+#include <set>
 #include <utility>
 #include <vector>
 
@@ -239,14 +240,21 @@ class ObjReader {
   }
 
   void add(const std::string& name, const std::string& mtl) {
+    read_.insert(name);
     for (SoupSurface& surface : parse_mtl(mtl, name)) {
       library_.try_emplace(surface.looks.name, surface);
     }
   }
 
+  /// Adds a library, unless that has been done: only its first definitions count.
+  void add_once(const std::string& name) {
+    if (!read_.contains(name)) add(name, read_mtl_(name));
+  }
+
   /// Adds one library, whose name may contain blanks, or several whose names do not.
   void add_library(const std::string& all, const Words& words) {
     const std::string name = without_comment(all);
+    if (read_.contains(all)) return;
     if (name != all) {
       std::optional<std::string> mtl;
       try {
@@ -257,17 +265,16 @@ class ObjReader {
       if (mtl) return add(all, *mtl);
     }
     if (words.size() == 2 || name.find(".mtl ") == std::string::npos) {
-      return add(name, read_mtl_(name));
+      return add_once(name);
     }
-    for (auto word = words.begin() + 1; word != words.end(); ++word) {
-      add(std::string(*word), read_mtl_(std::string(*word)));
-    }
+    for (auto word = words.begin() + 1; word != words.end(); ++word) add_once(std::string(*word));
   }
 
   const std::function<std::string(const std::string&)>& read_mtl_;
   PolygonSoup soup_;
   std::map<std::string, std::uint32_t, std::less<>> numbers_;  // surface numbers by name
   std::map<std::string, SoupSurface, std::less<>> library_;
+  std::set<std::string> read_;  // names of libraries
   std::uint32_t surface_ = 0;
 };
 

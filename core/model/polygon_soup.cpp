@@ -1,5 +1,7 @@
 #include "core/model/polygon_soup.h"
 
+#include <fmt/format.h>
+
 #include <algorithm>
 #include <array>
 #include <cmath>
@@ -47,7 +49,9 @@ class EarCutter {
  public:
   using Triangle = std::array<std::size_t, 3>;
 
-  explicit EarCutter(std::span<const glm::dvec3> outline) : p_(outline) {
+  /// @param most_tests  of a corner against an ear; 10^8 take about a second.
+  EarCutter(std::span<const glm::dvec3> outline, std::size_t most_tests)
+      : p_(outline), most_tests_(most_tests) {
     for (std::size_t i = 1; i + 1 < p_.size(); ++i) {
       normal_ += glm::cross(p_[i] - p_[0], p_[i + 1] - p_[0]);
     }
@@ -55,39 +59,45 @@ class EarCutter {
       if (i == 0 || p_[i] != p_[i - 1]) rest_.push_back(i);
     }
     while (rest_.size() > 1 && p_[rest_.back()] == p_[rest_[0]]) rest_.pop_back();
+    left_ = rest_.size();
+    for (std::size_t i = 0; i < left_; ++i) {
+      next_.push_back((i + 1) % left_);
+      previous_.push_back((i + left_ - 1) % left_);
+    }
   }
 
   /// Returns triangles as indices of corners, the first one at corner 1 if possible; nothing if no
   /// ear is left or the polygon is too complex. Only the last triangle may have no area.
   std::optional<std::vector<Triangle>> cut() {
     std::vector<Triangle> triangles;
-    if (rest_.size() < 3) return triangles;
-    for (std::size_t i = 0; rest_.size() > 3 && i < rest_.size(); ++i) {
+    if (left_ < 3) return triangles;
+    for (std::size_t i = 0; left_ > 3 && i < left_; ++i) {
       const auto [a, b, c] = ear_at(i);
       if (!(turn(a, b, c) > 0)) blunt_.push_back(b);
     }
-    for (std::size_t at = 1, tried = 0; rest_.size() > 3;) {
-      at %= rest_.size();
+    std::size_t first = 0;  // of those left
+    for (std::size_t at = 1, tried = 0; left_ > 3; at = next_[at]) {
       const Triangle ear = ear_at(at);
+      if (tests_ > most_tests_) return std::nullopt;
       if (is_ear(ear)) {
         triangles.push_back(ear);
-        rest_.erase(rest_.begin() + static_cast<std::ptrdiff_t>(at));
+        next_[previous_[at]] = next_[at];
+        previous_[next_[at]] = previous_[at];
+        if (at == first) first = next_[at];
+        --left_;
         tried = 0;
-      } else if (++at; ++tried == rest_.size() || tests_ > most_tests) {
+      } else if (++tried == left_) {
         return std::nullopt;
       }
     }
-    triangles.push_back({rest_[0], rest_[1], rest_[2]});
+    triangles.push_back(ear_at(next_[first]));
     return triangles;
   }
 
- private:
-  static constexpr std::size_t most_tests = 10'000'000;  // about a second of work
+  std::size_t tests() const { return tests_; }
 
-  Triangle ear_at(std::size_t i) const {
-    const std::size_t n = rest_.size();
-    return {rest_[(i + n - 1) % n], rest_[i], rest_[(i + 1) % n]};
-  }
+ private:
+  Triangle ear_at(std::size_t i) const { return {rest_[previous_[i]], rest_[i], rest_[next_[i]]}; }
 
   /// Returns a positive number if a, b, c turn in the same sense as the polygon.
   double turn(std::size_t a, std::size_t b, std::size_t c) const {
@@ -108,7 +118,10 @@ class EarCutter {
 
   std::span<const glm::dvec3> p_;
   glm::dvec3 normal_{0};
-  std::vector<std::size_t> rest_;   // remaining corners, without repetitions
+  std::size_t most_tests_;
+  std::vector<std::size_t> rest_;             // corners, without repetitions
+  std::vector<std::size_t> next_, previous_;  // of each of them, among those left
+  std::size_t left_ = 0;
   std::vector<std::size_t> blunt_;  // corners that are not convex
   std::size_t tests_ = 0;
 };
@@ -201,13 +214,17 @@ struct Triangle {
 /// ones.
 template <typename Take>
 void for_each_triangle(const PolygonSoup& soup, ModelFaults& faults, const Take& take) {
+  constexpr std::size_t most_tests = 100'000'000, tests_per_corner = 200;
   std::vector<glm::dvec3> outline;
+  std::size_t tests_left = most_tests + tests_per_corner * soup.corners.size();
   for (const Polygon& polygon : soup.polygons) {
     const auto corners = std::span(soup.corners).subspan(polygon.first, polygon.count);
     if (!is_sound(soup, corners, faults)) continue;
     outline.clear();
     for (const Corner& corner : corners) outline.push_back(soup.positions[corner.position]);
-    const auto triangles = EarCutter(outline).cut();
+    EarCutter cutter(outline, std::min(most_tests, tests_left));
+    const auto triangles = cutter.cut();
+    tests_left -= std::min(tests_left, cutter.tests());
     if (!triangles || triangles->empty()) {
       ++(has_area(outline) ? faults.entangled : faults.degenerate);
       continue;
@@ -255,6 +272,13 @@ TriangleMesh stored_mesh_of(const PolygonSoup& soup, ModelFaults& faults) {
     mesh.triangles.emplace_back(a.position, b.position, c.position);
   });
   return mesh;
+}
+
+std::string why_empty(std::size_t dropped, std::size_t skipped) {
+  if (dropped + skipped == 0) return ", as the file has no face: is it a mesh?";
+  return fmt::format(
+      "; {} broken polygons were dropped, and {} points, lines or curved patches skipped", dropped,
+      skipped);
 }
 
 }  // namespace groundray

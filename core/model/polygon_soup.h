@@ -77,39 +77,41 @@ PolygonSoup parse_obj(std::string_view text, const std::string& name,
 /// @see Turk, The PLY polygon file format (1994).
 PolygonSoup parse_ply_faces(std::string_view bytes, const std::string& name);
 
-/// Formats that are read by assimp.
-enum class SceneForm { Stl, Gltf, Collada };
+/// Reads the triangles of a .stl through assimp.
+/// @throws Error if assimp cannot read the file.
+PolygonSoup read_stl(const std::filesystem::path& path);
 
-/// Reads the polygons of a scene file, in its own axes and, except for Collada, its own units:
-/// assimp converts Collada to metres, with the unit as a float. Transforms of nodes are applied in
-/// double.
-/// @throws Error if assimp cannot read the file, or an image inside it cannot be decoded.
-PolygonSoup read_scene_file(const std::filesystem::path& path, SceneForm form);
-
-/// Reads the polygons of a .gltf or .glb as read_scene_file does, after check_gltf. assimp omits
-/// triangles whose indices are out of range and only logs this, so they are counted by comparison
-/// with the number in the file.
+/// Reads the polygons of a .gltf or .glb through assimp, in the file's axes, after check_gltf.
+/// Transforms of nodes are applied in double. assimp omits triangles whose indices are out of range
+/// and only logs this, so they are counted by comparison with the number in the file.
 /// @param bytes  of the file.
+/// @throws Error as check_gltf, or if an image inside the file cannot be decoded.
 PolygonSoup read_gltf(const std::filesystem::path& path, std::string_view bytes);
 
-// Checks for faults on which assimp would crash or never return, or that it would silently ignore.
-
-/// Checks a .gltf or .glb and returns the number of triangles that it declares.
-/// @param name  file name in error messages.
-/// @throws Error if it is not JSON or is nested more than 100 deep, a chunk of the .glb exceeds the
-///         file, a view exceeds its buffer or an accessor its view, an item that is referred to
-///         does not exist, or nodes are nested as for check_collada.
-std::size_t check_gltf(std::string_view bytes, const std::string& name);
-
-struct ColladaAsset {
-  double metres_per_unit = 1;
-  UpAxis up = UpAxis::Y;
+/// A file that assimp reads without a crash.
+struct CheckedGltf {
+  std::string bytes;
+  bool is_binary = false;     ///< a .glb
+  std::size_t triangles = 0;  ///< declared
 };
 
-/// Checks a .dae and returns its unit and up axis.
-/// @throws Error if it is not XML, the unit is not positive, numbers are malformed or have no
-///         count, or a node has itself as a part, directly or by `instance_node`, parts nested more
-///         than 1000 deep, or more than 10^6 of them.
-ColladaAsset check_collada(std::string_view text, const std::string& name);
+/// Checks a .gltf or .glb for faults on which assimp would crash or never return, or that it would
+/// silently ignore, and removes what groundray does not use (animations, skins, cameras).
+/// @param path  for messages, and to find files of buffers.
+/// @throws Error if it is not JSON or is nested more than 100 deep; a chunk of the .glb exceeds the
+///         file, a view exceeds its buffer, an accessor its view, or a buffer its file; an item
+///         that is referred to does not exist; a name leads out of the folder; a node has itself as
+///         a descendant, descendants nested more than 1000 deep, or more than 10^6 of them; an
+///         accessor is sparse; or the meshes and their instances need more memory than there is.
+CheckedGltf check_gltf(std::string_view bytes, const std::filesystem::path& path);
+
+/// Returns the name of a file as a model writes it, with `/` and without percent codes, if it is in
+/// the model's folder or below.
+/// @throws Error if it leads out of the folder.
+std::string name_beside(const std::string& written);
+
+/// Returns the end of a message about a file without triangles.
+/// @param dropped, skipped  numbers of broken polygons, and of points, lines and curved patches.
+std::string why_empty(std::size_t dropped, std::size_t skipped);
 
 }  // namespace groundray

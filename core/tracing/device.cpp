@@ -44,10 +44,10 @@ std::string RayDevice::description() const {
                      version % 100, impl_->width);
 }
 
-RTCScene new_scene(const RayDevice& device) {
-  RTCScene scene = rtcNewScene(handle(device));
-  rtcSetSceneFlags(scene, RTC_SCENE_FLAG_ROBUST);
-  rtcSetSceneBuildQuality(scene, RTC_BUILD_QUALITY_MEDIUM);
+Owned<RTCScene> new_scene(const RayDevice& device) {
+  Owned<RTCScene> scene(rtcNewScene(handle(device)));
+  rtcSetSceneFlags(scene.get(), RTC_SCENE_FLAG_ROBUST);
+  rtcSetSceneBuildQuality(scene.get(), RTC_BUILD_QUALITY_MEDIUM);
   return scene;
 }
 
@@ -77,14 +77,14 @@ void attach_primitives(const RayDevice& device, RTCScene scene, unsigned id, std
   attach(scene, geometry, id);
 }
 
-RTCScene instance_all(const RayDevice& device, std::span<const RTCScene> scenes) {
-  RTCScene all = new_scene(device);
+Owned<RTCScene> instance_all(const RayDevice& device, std::span<const RTCScene> scenes) {
+  Owned<RTCScene> all = new_scene(device);
   for (unsigned i = 0; i < scenes.size(); ++i) {
     const Owned<RTCGeometry> instance(rtcNewGeometry(handle(device), RTC_GEOMETRY_TYPE_INSTANCE));
     rtcSetGeometryInstancedScene(instance.get(), scenes[i]);
-    attach(all, instance, i);
+    attach(all.get(), instance, i);
   }
-  commit(all);
+  commit(all.get());
   return all;
 }
 

@@ -31,7 +31,7 @@ auto with_packet_width(const RayDevice& device, const F& f) {
 }
 
 /// Returns an empty scene with RTC_SCENE_FLAG_ROBUST, which all scenes must have.
-RTCScene new_scene(const RayDevice& device);
+Owned<RTCScene> new_scene(const RayDevice& device);
 
 /// Builds a scene from the attached geometries. May be called from a parallel task, even if the
 /// task's context ends before the scene is released.
@@ -50,7 +50,7 @@ void attach_primitives(const RayDevice& device, RTCScene scene, unsigned id, std
 
 /// Returns a scene with `scenes` as instances, numbered in their order. Their transforms are the
 /// identity: any other would round the rays differently in each instance.
-RTCScene instance_all(const RayDevice& device, std::span<const RTCScene> scenes);
+Owned<RTCScene> instance_all(const RayDevice& device, std::span<const RTCScene> scenes);
 
 /// @throws Error if Embree has failed since the last check.
 void check(const RayDevice& device, std::string_view doing);

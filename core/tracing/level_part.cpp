@@ -136,9 +136,10 @@ void build_fast_part(const LevelScene::Impl& level, LevelPart& part) {
   }
   if (point_count > std::numeric_limits<unsigned>::max())
     throw Error("ray tracer: a level has {} points, more than Embree supports", point_count);
-  RTCBuffer buffer = rtcNewBuffer(
-      device, point_count * sizeof(glm::vec3) + 16);  // Embree reads 16 bytes at a time
-  auto* points = checked_memory<glm::vec3>(buffer == nullptr ? nullptr : rtcGetBufferData(buffer));
+  const Owned<RTCBuffer> buffer(rtcNewBuffer(
+      device, point_count * sizeof(glm::vec3) + 16));  // Embree reads 16 bytes at a time
+  auto* points =
+      checked_memory<glm::vec3>(buffer == nullptr ? nullptr : rtcGetBufferData(buffer.get()));
   tbb::parallel_for(std::size_t{0}, leaves.size(), [&](std::size_t n) {
     write_points({level, leaves[n]}, level, points + first_points[n]);
   });
@@ -149,16 +150,15 @@ void build_fast_part(const LevelScene::Impl& level, LevelPart& part) {
                        const auto& list) {
     if (list.empty()) return;
     const Owned<RTCGeometry> geometry(rtcNewGeometry(device, type));
-    rtcSetGeometryBuffer(geometry.get(), RTC_BUFFER_TYPE_VERTEX, 0, RTC_FORMAT_FLOAT3, buffer, 0,
-                         sizeof(glm::vec3), point_count);
+    rtcSetGeometryBuffer(geometry.get(), RTC_BUFFER_TYPE_VERTEX, 0, RTC_FORMAT_FLOAT3, buffer.get(),
+                         0, sizeof(glm::vec3), point_count);
     copy_to_buffer(geometry.get(), kind, format, list);
-    attach(part.scene, geometry, id);
+    attach(part.scene.get(), geometry, id);
   };
   add(RTC_GEOMETRY_TYPE_GRID, block_geometry, RTC_BUFFER_TYPE_GRID, RTC_FORMAT_GRID,
       primitives.grids);
   add(RTC_GEOMETRY_TYPE_TRIANGLE, facet_geometry, RTC_BUFFER_TYPE_INDEX, RTC_FORMAT_UINT3,
       primitives.triangles);
-  rtcReleaseBuffer(buffer);
 }
 
 void leaf_bounds(const RTCBoundsFunctionArguments* arguments) {
@@ -211,15 +211,11 @@ void intersect_leaf(const RTCIntersectFunctionNArguments* arguments) {
 
 void build_exact_part(const LevelScene::Impl& level, LevelPart& part) {
   part.built_for = &level;
-  attach_primitives(level.device, part.scene, block_geometry, part.leaves.size(), &part,
+  attach_primitives(level.device, part.scene.get(), block_geometry, part.leaves.size(), &part,
                     leaf_bounds, intersect_leaf);
 }
 
 }  // namespace
-
-LevelPart::~LevelPart() {
-  if (scene != nullptr) rtcReleaseScene(scene);
-}
 
 std::shared_ptr<const LevelPart> build_part(const LevelScene::Impl& level, glm::ivec2 place,
                                             std::vector<Leaf> leaves) {
@@ -233,7 +229,8 @@ std::shared_ptr<const LevelPart> build_part(const LevelScene::Impl& level, glm::
   } else {
     build_fast_part(level, *part);
   }
-  commit(part->scene);
+  commit(part->scene.get());
+  check(level.device, "building a level");  // here, because Embree reports faults by thread
   part->built_for = nullptr;
   return part;
 }

@@ -112,11 +112,11 @@ LevelScene::Impl::Impl(const RayDevice& with, Level content, const glm::dvec3& o
   slack_m = static_cast<float>(16 * 0x1p-24 * glm::length(glm::max(glm::abs(a), glm::abs(b))));
   make_parts(previous);
   if (parts.size() == 1) {
-    scene = parts.front()->scene;
-    rtcRetainScene(scene);
+    rtcRetainScene(parts.front()->scene.get());
+    scene.reset(parts.front()->scene.get());
   } else {
     std::vector<RTCScene> scenes;
-    for (const auto& part : parts) scenes.push_back(part->scene);
+    for (const auto& part : parts) scenes.push_back(part->scene.get());
     scene = instance_all(device, scenes);
   }
   check(device, "building a level");
@@ -143,10 +143,6 @@ void LevelScene::Impl::make_parts(const Impl* previous) {
     const auto& [index, place] = missing[n];
     parts[index] = build_part(*this, place, std::move(leaves_of.find(place)->second));
   });
-}
-
-LevelScene::Impl::~Impl() {
-  if (scene != nullptr) rtcReleaseScene(scene);
 }
 
 LevelScene::LevelScene(const RayDevice& device, Level level, const glm::dvec3& p_DL,

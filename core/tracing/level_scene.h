@@ -67,11 +67,10 @@ struct GridBlock {
 /// A part of a level in Embree. Embree keeps pointers to it, so it must not move once built.
 struct LevelPart {
   LevelPart() = default;
-  ~LevelPart();
   LevelPart(const LevelPart&) = delete;
   LevelPart& operator=(const LevelPart&) = delete;
 
-  RTCScene scene = nullptr;
+  Owned<RTCScene> scene;
   glm::ivec2 place{0};  // column and row of the part
   std::vector<Leaf> leaves;
   std::vector<GridBlock> grids;  // by primitive
@@ -89,7 +88,6 @@ std::shared_ptr<const LevelPart> build_part(const LevelScene::Impl& level, glm::
 struct LevelScene::Impl : LevelView {
   Impl(const RayDevice& with, Level content, const glm::dvec3& origin, Tracing how,
        const Impl* previous);
-  ~Impl();
   Impl(const Impl&) = delete;
   Impl& operator=(const Impl&) = delete;
 
@@ -97,7 +95,7 @@ struct LevelScene::Impl : LevelView {
   Level level;
   glm::dvec3 p_DL{0};
   Tracing tracing = Tracing::Fast;
-  RTCScene scene = nullptr;  // that of the only part, or instances of all parts
+  Owned<RTCScene> scene;  // that of the only part, or instances of all parts
   std::vector<std::shared_ptr<const LevelPart>> parts;
 
   std::vector<std::int32_t> block_leaves;  // leaf_of_block

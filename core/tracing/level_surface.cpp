@@ -253,7 +253,6 @@ class BandDescent {
       return deviation_m > 0 && out_m(plane, t_out) > -deviation_m && give_up();
     }
     const double near_m = falls_to(deviation_m, plane, in_m, t_in, t_out);
-    if (near_m < never_m && deviation_m > 0) band_.is_exact = false;
     band_.near_m = std::min(band_.near_m, near_m);
     band_.far_m = falls_to(-deviation_m, plane, in_m, t_in, t_out);
     return band_.far_m < never_m;

@@ -43,7 +43,6 @@ class LevelSurface {
     double near_m = std::numeric_limits<double>::infinity();  ///< lower bound
     double far_m = std::numeric_limits<double>::infinity();   ///< upper bound
     bool is_certain = true;  ///< false if the reference may be hit anywhere, or not at all
-    bool is_exact = true;    ///< true if no leaf that matters deviates
   };
   /// Returns the band for [0, t_end_m]. It is not certain if the ray begins within the deviation of
   /// the ground, comes that low over a hole, or is low over a leaf that bridges holes of the DEM.

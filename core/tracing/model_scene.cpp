@@ -147,7 +147,7 @@ ModelScene::Impl::Impl(const RayDevice& with, Model content, Tracing how)
   slack_m = static_cast<float>(16 * 0x1p-24 * glm::length(high_m - low_m));
   for (std::uint32_t i = 0; i < model.mesh.triangles.size(); ++i)
     (textures_of(i).least_alpha > 0 ? cut : solid).push_back(i);
-  scene.reset(new_scene(device));
+  scene = new_scene(device);
   if (tracing == Tracing::Exact) {
     attach_primitives(device, scene.get(), 0, model.mesh.triangles.size(), this, triangle_bounds,
                       intersect_triangle);

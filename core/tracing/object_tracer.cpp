@@ -247,7 +247,7 @@ void ObjectTracer::Impl::moving_bounds(const RTCBoundsFunctionArguments* argumen
 }
 
 void ObjectTracer::Impl::build() {
-  scene.reset(new_scene(device));
+  scene = new_scene(device);
   const auto add = [&](unsigned id, std::size_t count, std::size_t steps,
                        RTCBoundsFunction bounds_of, RTCIntersectFunctionN intersect) {
     if (count == 0) return;

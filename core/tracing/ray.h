@@ -1,5 +1,6 @@
 #pragma once
 
+#include <algorithm>
 #include <chrono>
 #include <cstdint>
 #include <glm/vec3.hpp>
@@ -29,6 +30,14 @@ enum class Batch {
   ShadowRays,  ///< they are nearly parallel and begin at hits of earlier rays
   Scattered,   ///< they begin at hits of earlier rays and have any direction
 };
+
+/// Returns the first-order effect of a surface's vertical deviation on a range, m: exact if the
+/// ground is planar there.
+/// @param normal_z       of the surface's unit normal.
+/// @param cos_incidence  of the angle between ray and normal.
+inline float error_estimate_m(float deviation_m, float normal_z, float cos_incidence) {
+  return deviation_m == 0 ? 0 : deviation_m * normal_z / std::max(cos_incidence, 1e-6f);
+}
 
 /// First hit of a ray.
 struct Hit {

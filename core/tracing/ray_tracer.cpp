@@ -5,7 +5,6 @@
 #include <algorithm>
 #include <cmath>
 #include <glm/common.hpp>
-#include <mutex>
 #include <utility>
 
 #include "core/tracing/device.h"
@@ -25,24 +24,17 @@ struct RayTracer::Impl {
   std::vector<LevelScene> scenes;
   LevelSurface surface;
   std::vector<Target> targets;
-  // All levels in one scene, for rays that do not traverse them in order; built when the first such
-  // ray is traced. One element for each instance.
+  // All levels in one scene, for rays that do not traverse them in order. One element for each
+  // instance.
   struct PartPlace {
     std::uint32_t level = 0;
     const LevelPart* part = nullptr;
   };
-  mutable std::once_flag asked_for_all;
-  mutable RTCScene all = nullptr;
-  mutable Target everything;
+  Owned<RTCScene> all;
+  Target everything;
   std::vector<PartPlace> places;
 
   Impl(const RayDevice& device, std::vector<LevelScene> levels);
-  ~Impl() {
-    if (all != nullptr) rtcReleaseScene(all);
-  }
-  Impl(const Impl&) = delete;
-  Impl& operator=(const Impl&) = delete;
-
   const LevelScene::Impl& level(std::size_t number) const noexcept { return scenes[number].impl(); }
   // Returns the level and the part of a hit.
   PartPlace place_of(const Target& target, const FloatHit& hit) const noexcept {
@@ -50,7 +42,6 @@ struct RayTracer::Impl {
     const auto& parts = target.level->parts;
     return {target.number, parts[parts.size() == 1 ? 0 : hit.instance].get()};
   }
-  const Target& join_levels() const noexcept;
 
   bool ends_below(const Target& target, const GridRay& ray, double leave_m) const noexcept;
   bool from_behind(const Target& target, const LevelRay& ray, const FloatHit& hit) const noexcept;
@@ -84,7 +75,7 @@ Hit hit_of(const GridFrame& frame, const Crossing& crossing) noexcept {
 
 Target target_of(const LevelScene& scene, std::uint32_t number) {
   const LevelScene::Impl& level = scene.impl();
-  return {.scene = level.scene,
+  return {.scene = level.scene.get(),
           .level = &level,
           .number = number,
           .min_m = level.level.heights.min_m(),
@@ -111,15 +102,11 @@ RayTracer::Impl::Impl(const RayDevice& with, std::vector<LevelScene> levels)
     everything.max_m = std::fmax(everything.max_m, targets[i].max_m);
     everything.slack_m = std::max(everything.slack_m, targets[i].slack_m);
   }
-}
-
-const Target& RayTracer::Impl::join_levels() const noexcept {
-  std::call_once(asked_for_all, [this] {
-    std::vector<RTCScene> parts;
-    for (const PartPlace& place : places) parts.push_back(place.part->scene);
-    everything.scene = all = instance_all(device, parts);
-  });
-  return everything;
+  std::vector<RTCScene> parts;
+  for (const PartPlace& place : places) parts.push_back(place.part->scene.get());
+  all = instance_all(device, parts);
+  check(device, "joining the levels");
+  everything.scene = all.get();
 }
 
 // Returns whether the ray is below the surface where it leaves the target's box. Most rays are far
@@ -295,7 +282,7 @@ void RayTracer::Impl::escape_surface(std::span<Hit> hits, Packet<W>& packet) con
 template <int W>
 void RayTracer::Impl::trace_packet(Coherence coherence, Packet<W>& packet,
                                    std::span<Hit> hits) const noexcept {
-  if (!start_inside(packet)) return trace_target(join_levels(), coherence, hits, packet);
+  if (!start_inside(packet)) return trace_target(everything, coherence, hits, packet);
   for (const Target& target : targets) {
     trace_target(target, coherence, hits, packet);
     if (std::ranges::all_of(hits, [](const Hit& hit) { return static_cast<bool>(hit); })) return;
@@ -355,12 +342,11 @@ void RayTracer::bound_errors(std::span<const Ray> rays, std::span<const Hit> hit
     if (!band.is_certain) {
       bounds_m[i] = infinity;
     } else if (hits[i].object != 0) {
-      bounds_m[i] = band.near_m < range_m ? range_m - band.near_m + rounding_m : 0;
+      bounds_m[i] = std::max(range_m - band.near_m, 0.0) + rounding_m;
     } else if (!hits[i]) {
       bounds_m[i] = band.near_m < infinity ? infinity : 0;
     } else {
-      const double error_m = std::max(range_m - band.near_m, band.far_m - range_m);
-      bounds_m[i] = band.is_exact && error_m <= rounding_m ? 0 : error_m + rounding_m;
+      bounds_m[i] = std::max(range_m - band.near_m, band.far_m - range_m) + rounding_m;
     }
   }
 }

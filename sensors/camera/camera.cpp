@@ -4,6 +4,7 @@
 #include <tbb/task_arena.h>
 
 #include <algorithm>
+#include <array>
 #include <bit>
 #include <cmath>
 #include <glm/geometric.hpp>
@@ -15,6 +16,7 @@
 #include "core/error.h"
 #include "core/image/luminance.h"
 #include "sensors/camera/lens/pixel_patch.h"
+#include "sensors/camera/path_spread.h"
 
 namespace groundray {
 namespace {
@@ -42,13 +44,14 @@ glm::dvec2 on_disc(const glm::dvec2& u) {
 // their number. They share no random numbers, so that the choice does not bias the mean.
 enum class Paths : std::uint32_t { OfMean, OfPilot };
 
-// Returns the seed of the Sobol sequence of a pixel's paths in a frame.
-std::uint32_t sequence_of(const RandomKey& key, std::uint32_t pixel, Paths paths) {
+// Returns the seed of a Sobol net of a pixel's paths in a frame.
+std::uint32_t sequence_of(const RandomKey& key, std::uint32_t pixel, Paths paths,
+                          std::uint32_t net) {
   return random_bits({.seed = key.seed,
                       .sensor = key.sensor,
                       .frame = key.frame,
                       .pulse = pixel,
-                      .sub_ray = static_cast<std::uint32_t>(paths),
+                      .sub_ray = PathSums::nets * static_cast<std::uint32_t>(paths) + net,
                       .stream = RandomStream::Paths})[0];
 }
 
@@ -90,6 +93,194 @@ void check_camera(const CameraSpec& spec) {
   broken.throw_if_any();
 }
 
+// Image that is to be rendered.
+struct View {
+  const PathTracer& light;
+  const Trajectory& X_DC;
+  nanoseconds begin;
+  const RandomKey& key;
+  const std::function<void()>& check;
+};
+
+double luminance_at(const ImageF& image, int x, int y) {
+  const auto rgb = image.at(x, y);
+  return luminance({rgb[0], rgb[1], rgb[2]});
+}
+
+// Number of paths of each pixel.
+using PathCounts = Image<int>;
+
+// Light of an image and the spreads of its paths.
+struct Means {
+  ImageF radiance;
+  PathSpreads spreads;
+  ImageF coverage;
+
+  Means(int width, int height, std::size_t labels)
+      : radiance(width, height, 3),
+        spreads{ImageF(width, height, 1), ImageF(width, height, 3), ImageF(width, height, 3)},
+        coverage(labels == 0 ? ImageF() : ImageF(width, height, static_cast<int>(labels))) {}
+};
+
+// Renders the light of a block of rows.
+class Rows {
+ public:
+  Rows(const Camera& camera, const View& view, std::span<const std::uint16_t> labels, Paths paths,
+       int first, int end, Means& into)
+      : spec_(camera.spec()),
+        view_(view),
+        labels_(labels),
+        paths_(paths),
+        width_(spec_.size_px.x),
+        first_(first),
+        end_(end),
+        rays_(camera.lens(), first, end),
+        sums_(static_cast<std::size_t>(end - first) * static_cast<std::size_t>(width_)),
+        into_(into) {}
+
+  void render(const PathCounts& counts) {
+    for (int left = 0; left < width_; left += block_px) {  // block by block: coherent rays
+      for (int y = first_; y < end_; ++y) {
+        for (int x = left; x < std::min(left + block_px, width_); ++x) {
+          if (rays_.looks({x, y})) add_samples({x, y}, counts.at(x, y)[0]);
+        }
+      }
+    }
+    trace();
+    write_pixels();
+  }
+
+ private:
+  PathSums& sums_of(const glm::ivec2& pixel) {
+    return sums_[static_cast<std::size_t>(pixel.y - first_) * static_cast<std::size_t>(width_) +
+                 static_cast<std::size_t>(pixel.x)];
+  }
+  void add_samples(const glm::ivec2& pixel, int count);
+  void trace();
+  void write_pixels();
+
+  // Destination of a path.
+  struct Target {
+    glm::ivec2 pixel;
+    std::uint32_t slot;  // of its PathSums
+  };
+
+  const CameraSpec& spec_;
+  const View& view_;
+  std::span<const std::uint16_t> labels_;
+  Paths paths_;
+  int width_, first_, end_;
+  RayRows rays_;
+  std::vector<PathSums> sums_;
+  Means& into_;
+  std::vector<PathTracer::Sample> samples_;
+  std::vector<Target> targets_;  // one for each sample
+  std::vector<glm::vec3> radiance_;
+  std::vector<std::uint16_t> seen_;  // label of each sample's first hit
+  PathTracer::Workspace work_;
+};
+
+void Rows::add_samples(const glm::ivec2& pixel, int count) {
+  const PixelPatch patch = rays_.patch(pixel);
+  const auto number = static_cast<std::uint32_t>(pixel.y * width_ + pixel.x);
+  std::array<std::uint32_t, PathSums::nets> sequences;
+  for (std::uint32_t net = 0; net < PathSums::nets; ++net)
+    sequences[net] = sequence_of(view_.key, number, paths_, net);
+  const ShutterSpec& shutter = spec_.shutter;
+  for (int i = 0; i < count; ++i) {
+    const auto [net, index, slot] =
+        PathSums::place(static_cast<std::uint32_t>(i), static_cast<std::uint32_t>(count));
+    SobolPairs numbers(sequences[net], index);
+    auto direction = patch.direction(numbers.next() - 0.5);
+    const glm::dvec2 pupil = numbers.next();
+    const double share = numbers.next().x;
+    if (!direction) continue;
+    glm::dvec3 origin(0);
+    if (spec_.aperture && spec_.aperture->focus_m && direction->z > 0) {
+      const ApertureSpec& aperture = *spec_.aperture;
+      origin = glm::dvec3(on_disc(pupil) * (aperture.focal_length_m / aperture.f_number / 2), 0);
+      direction = glm::normalize(*direction - origin * (direction->z / *aperture.focus_m));
+    }
+    const nanoseconds time =
+        view_.begin + time_of(shutter.row_s * pixel.y + shutter.exposure_s * share);
+    const Pose X_DC = view_.X_DC.pose_at(time);
+    samples_.push_back(
+        {{X_DC * origin, X_DC.rotation * *direction, std::numeric_limits<double>::infinity(), time},
+         numbers});
+    targets_.push_back({pixel, slot});
+    if (samples_.size() == paths_at_once) trace();
+  }
+}
+
+void Rows::trace() {
+  radiance_.resize(samples_.size());
+  seen_.resize(labels_.empty() ? 0 : samples_.size());
+  view_.light.trace(samples_, radiance_, work_, seen_);
+  for (std::size_t i = 0; i < samples_.size(); ++i) {
+    const auto& [pixel, slot] = targets_[i];
+    sums_of(pixel).add(slot, glm::dvec3(radiance_[i]));
+    if (labels_.empty()) continue;
+    const auto label = std::ranges::lower_bound(labels_, seen_[i]);
+    if (label != labels_.end() && *label == seen_[i])
+      into_.coverage.at(pixel.x, pixel.y)[static_cast<std::size_t>(label - labels_.begin())] += 1;
+  }
+  samples_.clear();
+  targets_.clear();
+}
+
+void Rows::write_pixels() {
+  for (int y = first_; y < end_; ++y) {
+    for (int x = 0; x < width_; ++x) {
+      const PathSums& sums = sums_of({x, y});
+      const double count = sums.count();
+      if (count == 0) continue;
+      const glm::dvec3 mean = sums.mean(), between = sums.between_nets(),
+                       within = sums.within_nets();
+      for (glm::length_t k = 0; k < 3; ++k) {
+        const auto channel = static_cast<std::size_t>(k);
+        into_.radiance.at(x, y)[channel] = static_cast<float>(mean[k]);
+        into_.spreads.between.at(x, y)[channel] = static_cast<float>(between[k]);
+        into_.spreads.within.at(x, y)[channel] = static_cast<float>(within[k]);
+      }
+      into_.spreads.paths.at(x, y)[0] = static_cast<float>(count);
+      if (labels_.empty()) continue;
+      for (float& share : into_.coverage.at(x, y)) share /= static_cast<float>(count);
+    }
+  }
+}
+
+Means render(const Camera& camera, const View& view, const PathCounts& counts, Paths paths,
+             std::span<const std::uint16_t> labels) {
+  const int width = counts.width(), height = counts.height();
+  Means means(width, height, labels.size());
+  tbb::parallel_for(0, (height + block_px - 1) / block_px, [&](int block) {
+    if (view.check) view.check();
+    const int first = block * block_px;
+    Rows(camera, view, labels, paths, first, std::min(first + block_px, height), means)
+        .render(counts);
+  });
+  return means;
+}
+
+// Chooses numbers of paths, at most most_samples, that reduce the standard errors of the means to
+// the requested ones, estimated from a pilot.
+PathCounts counts_from_pilot(const Camera& camera, const View& view, const PathCounts& fewest) {
+  const Means pilot = render(camera, view, fewest, Paths::OfPilot, {});
+  const ImageF errors = standard_errors(pilot.spreads);
+  const SamplingSpec& sampling = camera.spec().sampling;
+  PathCounts counts = fewest;
+  for (int y = 0; y < counts.height(); ++y) {
+    for (int x = 0; x < counts.width(); ++x) {
+      double error = luminance_at(errors, x, y);
+      const double most = sampling.relative_error * luminance_at(pilot.radiance, x, y);
+      int& count = counts.at(x, y)[0];
+      for (; count < sampling.most_samples && !(error <= most); count *= 2)
+        error /= std::numbers::sqrt2;
+    }
+  }
+  return counts;
+}
+
 }  // namespace
 
 struct Camera::Directions {
@@ -129,190 +320,19 @@ nanoseconds Camera::middle_of(double row) const noexcept {
   return time_of(spec_.shutter.row_s * row + spec_.shutter.exposure_s / 2);
 }
 
-// Renders the light of a block of rows.
-class Camera::Rows {
- public:
-  Rows(const Camera& camera, const PathTracer& light, const Trajectory& X_DC, nanoseconds begin,
-       const RandomKey& key, std::span<const std::uint16_t> labels, int first, int end,
-       Exposure& into)
-      : spec_(camera.spec_),
-        light_(light),
-        X_DC_(X_DC),
-        begin_(begin),
-        key_(key),
-        labels_(labels),
-        width_(spec_.size_px.x),
-        first_(first),
-        end_(end),
-        rays_(camera.lens_, first, end),
-        sums_(static_cast<std::size_t>(end - first) * static_cast<std::size_t>(width_)),
-        into_(into) {}
-
-  void expose() {
-    const std::vector<glm::ivec2> pixels = looking();
-    const SamplingSpec& sampling = spec_.sampling;
-    std::vector<int> counts(pixels.size(), sampling.samples);
-    if (sampling.most_samples > sampling.samples) {
-      for (const glm::ivec2& pixel : pixels) add_samples(pixel, sampling.samples, Paths::OfPilot);
-      trace(Paths::OfPilot);
-      std::ranges::transform(pixels, counts.begin(),
-                             [&](const glm::ivec2& pixel) { return needed(sums_of(pixel)); });
-      std::ranges::fill(sums_, Sums{});
-    }
-    for (std::size_t i = 0; i < pixels.size(); ++i)
-      add_samples(pixels[i], counts[i], Paths::OfMean);
-    trace(Paths::OfMean);
-    write_pixels();
-  }
-
- private:
-  // Sums over the paths of a pixel.
-  struct Sums {
-    glm::dvec3 radiance{0}, squares{0};
-    int count = 0;
-    void add(const glm::dvec3& value) {
-      radiance += value;
-      squares += value * value;
-      ++count;
-    }
-    glm::dvec3 mean() const { return radiance / static_cast<double>(count); }
-    glm::dvec3 standard_error() const {
-      if (count < 2) return glm::dvec3(std::numeric_limits<double>::infinity());
-      const double n = count;
-      const glm::dvec3 spread = glm::max(squares / n - mean() * mean(), glm::dvec3(0));
-      return glm::sqrt(spread / (n - 1));
-    }
-  };
-
-  Sums& sums_of(const glm::ivec2& pixel) {
-    return sums_[static_cast<std::size_t>(pixel.y - first_) * static_cast<std::size_t>(width_) +
-                 static_cast<std::size_t>(pixel.x)];
-  }
-  // Returns the pixels that have a viewing direction, block by block, so that consecutive rays are
-  // coherent.
-  std::vector<glm::ivec2> looking() const {
-    std::vector<glm::ivec2> pixels;
-    for (int left = 0; left < width_; left += block_px) {
-      for (int y = first_; y < end_; ++y) {
-        for (int x = left; x < std::min(left + block_px, width_); ++x) {
-          if (rays_.looks({x, y})) pixels.emplace_back(x, y);
-        }
-      }
-    }
-    return pixels;
-  }
-  // Returns the number of paths, at most most_samples, that reduces the standard error of the mean
-  // to the requested one, estimated from the pilot.
-  int needed(const Sums& pilot) const {
-    const SamplingSpec& sampling = spec_.sampling;
-    double error = luminance(pilot.standard_error());
-    int count = sampling.samples;
-    while (count < sampling.most_samples &&
-           !(error <= sampling.relative_error * luminance(pilot.mean()))) {
-      count *= 2;
-      error /= std::numbers::sqrt2;
-    }
-    return count;
-  }
-  void add_samples(const glm::ivec2& pixel, int count, Paths paths);
-  void trace(Paths paths);
-  void write_pixels();
-
-  const CameraSpec& spec_;
-  const PathTracer& light_;
-  const Trajectory& X_DC_;
-  nanoseconds begin_;
-  const RandomKey& key_;
-  std::span<const std::uint16_t> labels_;
-  int width_, first_, end_;
-  RayRows rays_;
-  std::vector<Sums> sums_;
-  Exposure& into_;
-  std::vector<PathTracer::Sample> samples_;
-  std::vector<glm::ivec2> pixel_of_;  // of each sample
-  std::vector<glm::vec3> radiance_;
-  std::vector<std::uint16_t> seen_;  // label of each sample's first hit
-  PathTracer::Workspace work_;
-};
-
-void Camera::Rows::add_samples(const glm::ivec2& pixel, int count, Paths paths) {
-  const PixelPatch patch = rays_.patch(pixel);
-  const std::uint32_t sequence =
-      sequence_of(key_, static_cast<std::uint32_t>(pixel.y * width_ + pixel.x), paths);
-  const ShutterSpec& shutter = spec_.shutter;
-  for (int i = 0; i < count; ++i) {
-    SobolPairs numbers(sequence, static_cast<std::uint32_t>(i));
-    auto direction = patch.direction(numbers.next() - 0.5);
-    const glm::dvec2 pupil = numbers.next();
-    const double share = numbers.next().x;
-    if (!direction) continue;
-    glm::dvec3 origin(0);
-    if (spec_.aperture && spec_.aperture->focus_m && direction->z > 0) {
-      const ApertureSpec& aperture = *spec_.aperture;
-      origin = glm::dvec3(on_disc(pupil) * (aperture.focal_length_m / aperture.f_number / 2), 0);
-      direction = glm::normalize(*direction - origin * (direction->z / *aperture.focus_m));
-    }
-    const nanoseconds time = begin_ + time_of(shutter.row_s * pixel.y + shutter.exposure_s * share);
-    const Pose X_DC = X_DC_.pose_at(time);
-    samples_.push_back(
-        {{X_DC * origin, X_DC.rotation * *direction, std::numeric_limits<double>::infinity(), time},
-         numbers});
-    pixel_of_.push_back(pixel);
-    if (samples_.size() == paths_at_once) trace(paths);
-  }
-}
-
-void Camera::Rows::trace(Paths paths) {
-  radiance_.resize(samples_.size());
-  const bool is_labelled = !labels_.empty() && paths == Paths::OfMean;
-  seen_.resize(is_labelled ? samples_.size() : 0);
-  light_.trace(samples_, radiance_, work_, seen_);
-  for (std::size_t i = 0; i < samples_.size(); ++i) {
-    sums_of(pixel_of_[i]).add(glm::dvec3(radiance_[i]));
-    if (!is_labelled) continue;
-    const auto label = std::ranges::lower_bound(labels_, seen_[i]);
-    if (label != labels_.end() && *label == seen_[i])
-      into_.coverage.at(pixel_of_[i].x,
-                        pixel_of_[i].y)[static_cast<std::size_t>(label - labels_.begin())] += 1;
-  }
-  samples_.clear();
-  pixel_of_.clear();
-}
-
-void Camera::Rows::write_pixels() {
-  for (int y = first_; y < end_; ++y) {
-    for (int x = 0; x < width_; ++x) {
-      const Sums& sums = sums_of({x, y});
-      if (sums.count == 0) continue;
-      const glm::dvec3 mean = sums.mean(), error = sums.standard_error();
-      for (glm::length_t k = 0; k < 3; ++k) {
-        const auto channel = static_cast<std::size_t>(k);
-        into_.radiance.at(x, y)[channel] = static_cast<float>(mean[k]);
-        into_.standard_error.at(x, y)[channel] = static_cast<float>(error[k]);
-      }
-      into_.samples.at(x, y)[0] = static_cast<float>(sums.count);
-      if (labels_.empty()) continue;
-      for (float& share : into_.coverage.at(x, y)) share /= static_cast<float>(sums.count);
-    }
-  }
-}
-
 Exposure Camera::expose(const PathTracer& light, const Trajectory& X_DC, nanoseconds begin,
                         const RandomKey& key, std::span<const std::uint16_t> labels,
                         const std::function<void()>& check) const {
   check_cover(X_DC, begin);
-  const int width = spec_.size_px.x, height = spec_.size_px.y;
-  Exposure exposure{
-      ImageF(width, height, 3), ImageF(width, height, 3), ImageF(width, height, 1),
-      labels.empty() ? ImageF() : ImageF(width, height, static_cast<int>(labels.size()))};
-  tbb::parallel_for(0, (height + block_px - 1) / block_px, [&](int block) {
-    if (check) check();
-    const int first = block * block_px;
-    Rows(*this, light, X_DC, begin, key, labels, first, std::min(first + block_px, height),
-         exposure)
-        .expose();
-  });
-  return exposure;
+  const View view{light, X_DC, begin, key, check};
+  PathCounts counts(spec_.size_px.x, spec_.size_px.y, 1);
+  std::ranges::fill(counts.values(), spec_.sampling.samples);
+  if (spec_.sampling.most_samples > spec_.sampling.samples)
+    counts = counts_from_pilot(*this, view, counts);
+  Means means = render(*this, view, counts, Paths::OfMean, labels);
+  ImageF errors = standard_errors(means.spreads);
+  return {std::move(means.radiance), std::move(errors), std::move(means.spreads.paths),
+          std::move(means.coverage)};
 }
 
 void Camera::check_cover(const Trajectory& X_DC, nanoseconds begin) const {

@@ -18,13 +18,20 @@
 
 namespace groundray {
 
+/// Degrees of freedom of Student's t for intervals from standard errors: the radiance lies within
+/// t(p) standard errors of a pixel's mean with probability p. Pixels of two or three paths have
+/// one.
+/// @see docs/theory/camera_light.md, standard error
+inline constexpr int standard_error_freedom = 3;
+
 /// Light of an image: means over each pixel's square, the aperture and the exposure. A pixel at the
 /// boundary of the lens' field shows the mean over the positions that the lens images; a pixel
 /// whose centre has no viewing direction shows nothing.
 struct Exposure {
   ImageF
       radiance;  ///< linear sRGB, W/(m^2 sr), see docs/theory/sky.md; 0 without a viewing direction
-  ImageF standard_error;  ///< standard error of each channel; infinite for a single path
+  ImageF standard_error;  ///< standard error of each channel, of standard_error_freedom degrees of
+                          ///< freedom; infinite for a single path
   ImageF samples;         ///< number of paths of each pixel
   /// Fraction of each pixel that shows a label, one channel per requested label; 0 where a pixel
   /// has no viewing direction. Empty if no label was requested.
@@ -72,7 +79,6 @@ class Camera {
   void check_cover(const Trajectory& X_DC, std::chrono::nanoseconds begin) const;
 
  private:
-  class Rows;
   struct Directions;
 
   CameraSpec spec_;

@@ -130,7 +130,7 @@ PathTracer::PathTracer(const Scene& scene, const Sky& sky, int depth,
 }
 
 void PathTracer::trace(std::span<const Sample> samples, std::span<glm::vec3> radiance,
-                       Workspace& work, std::span<std::uint16_t> labels) const noexcept {
+                       Workspace& work, std::span<std::uint16_t> labels) const {
   work.paths.clear();
   work.rays.clear();
   for (std::uint32_t i = 0; i < samples.size(); ++i) {
@@ -163,7 +163,7 @@ void PathTracer::trace(std::span<const Sample> samples, std::span<glm::vec3> rad
 
 // Adds unoccluded direct light.
 void PathTracer::add_light(const Workspace::ShadowQueue& queue, Batch batch,
-                           std::span<glm::vec3> radiance, Workspace& work) const noexcept {
+                           std::span<glm::vec3> radiance, Workspace& work) const {
   work.light_hits.resize(queue.rays.size());
   scene_.trace(queue.rays, work.light_hits, batch);
   for (std::size_t k = 0; k < queue.lights.size(); ++k) {
@@ -202,7 +202,7 @@ glm::dvec3 PathTracer::emitted_by_sky(const glm::dvec3& direction,
 // and no lobe of a BSDF is much narrower. A constant dome is omitted: no density samples it better
 // than the BSDF's.
 void PathTracer::sample_direct(const Vertex& vertex, const Bsdf& bsdf, Workspace::Path& path,
-                               Workspace& work) const noexcept {
+                               Workspace& work) const {
   const auto enqueue = [&](Workspace::ShadowQueue& queue, const std::optional<Ray>& to_light,
                            const glm::dvec3& radiance, const auto& density) {
     if (!to_light) return;
@@ -243,7 +243,7 @@ void PathTracer::sample_direct(const Vertex& vertex, const Bsdf& bsdf, Workspace
 }
 
 void PathTracer::scatter(const Ray& ray, const Hit& hit, Workspace::Path path,
-                         Workspace& work) const noexcept {
+                         Workspace& work) const {
   const Vertex vertex(ray, hit, scene_.shading_normal_of(ray, hit, 0, Filtering::Fast));
   const Scatterer scatterer(bsdfs_, scene_.appearance_of(ray, hit, 0, Filtering::Fast),
                             path.numbers);

@@ -72,18 +72,17 @@ class PathTracer {
   /// @param labels  labels of each ray's first hit, as in Scene::truth_of, 0 for the sky; empty if
   ///        they are not requested.
   void trace(std::span<const Sample> samples, std::span<glm::vec3> radiance, Workspace& work,
-             std::span<std::uint16_t> labels = {}) const noexcept;
+             std::span<std::uint16_t> labels = {}) const;
 
  private:
   struct Vertex;
   glm::vec3 emitted(const Ray& ray, const Hit& hit, Workspace::Path& path) const noexcept;
   glm::dvec3 emitted_by_sky(const glm::dvec3& direction, double pdf_per_sr) const noexcept;
-  void scatter(const Ray& ray, const Hit& hit, Workspace::Path path,
-               Workspace& work) const noexcept;
+  void scatter(const Ray& ray, const Hit& hit, Workspace::Path path, Workspace& work) const;
   void sample_direct(const Vertex& vertex, const Bsdf& bsdf, Workspace::Path& path,
-                     Workspace& work) const noexcept;
+                     Workspace& work) const;
   void add_light(const Workspace::ShadowQueue& queue, Batch batch, std::span<glm::vec3> radiance,
-                 Workspace& work) const noexcept;
+                 Workspace& work) const;
 
   const Scene& scene_;
   const Sky& sky_;

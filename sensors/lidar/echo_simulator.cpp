@@ -229,7 +229,7 @@ double EchoSimulator::even_spacing_m() const {
 }
 
 void EchoSimulator::collect(const LitPulse& pulse, const RetroBrdfs& brdfs, double extinction_per_m,
-                            Workspace& work) const noexcept {
+                            Workspace& work) const {
   sort_hits(pulse.hits, work.order);
   const std::size_t count = work.order.size();
   work.arrivals.resize(count);
@@ -266,7 +266,7 @@ void EchoSimulator::collect(const LitPulse& pulse, const RetroBrdfs& brdfs, doub
 
 // Removes the return of the air behind each surface, which is not lit. It ends there abruptly,
 // which is exact except within the length of a pulse.
-void EchoSimulator::add_air(const LitPulse& pulse, Workspace& work) const noexcept {
+void EchoSimulator::add_air(const LitPulse& pulse, Workspace& work) const {
   constexpr double rounding = 1e-12;  // of the sum of all shares
   work.air_w.resize(air_w_.size());
   const auto share = shares_of(pulse);
@@ -300,7 +300,7 @@ double EchoSimulator::air_energy_j(const Detection& detection,
 }
 
 void EchoSimulator::receive(const LitPulse& pulse, const RetroBrdfs& brdfs, const RandomKey& key,
-                            Workspace& work) const noexcept {
+                            Workspace& work) const {
   collect(pulse, brdfs, atmosphere_.extinction_per_m(), work);
   if (air_w_.empty()) {
     receiver_.sample(work.arrivals, work.waveform);
@@ -316,7 +316,7 @@ void EchoSimulator::receive(const LitPulse& pulse, const RetroBrdfs& brdfs, cons
 }
 
 void EchoSimulator::attribute_echo(const LitPulse& pulse, const Detection& detection,
-                                   Workspace& work) const noexcept {
+                                   Workspace& work) const {
   Echo& echo = work.echoes.emplace_back();
   echo.detection = detection;
   const auto arrival_s = [&](const Arrival& a) { return receiver_.arrival_s(a.range_m); };
@@ -355,7 +355,7 @@ void EchoSimulator::attribute_echo(const LitPulse& pulse, const Detection& detec
 
 // Overwrites the arrivals, which are no longer needed.
 NoReturn EchoSimulator::reason_for_none(const LitPulse& pulse, const RetroBrdfs& brdfs,
-                                        Workspace& work) const noexcept {
+                                        Workspace& work) const {
   if (work.order.empty()) return NoReturn::Sky;
   const auto outside = [&](const Arrival& arrival) {
     return arrival.range_m < gate_.near_m || gate_.far_m < arrival.range_m;

@@ -133,7 +133,7 @@ class EchoSimulator {
   /// Finds the echoes of one pulse and stores them in `work`.
   /// @param brdfs  reflection of the surfaces.
   void receive(const LitPulse& pulse, const RetroBrdfs& brdfs, const RandomKey& key,
-               Workspace& work) const noexcept;
+               Workspace& work) const;
 
   /// Returns the intensity that the sensor reports for an echo.
   float intensity(const Detection& detection) const noexcept;
@@ -146,16 +146,14 @@ class EchoSimulator {
 
  private:
   void collect(const LitPulse& pulse, const RetroBrdfs& brdfs, double extinction_per_m,
-               Workspace& work) const noexcept;
+               Workspace& work) const;
   double sun_cosine(const glm::vec3& normal) const noexcept {
     if (!spec_.sun.direction) return 1;
     return std::max(glm::dot(glm::dvec3(normal), *spec_.sun.direction), 0.0);
   }
-  void add_air(const LitPulse& pulse, Workspace& work) const noexcept;
-  void attribute_echo(const LitPulse& pulse, const Detection& detection,
-                      Workspace& work) const noexcept;
-  NoReturn reason_for_none(const LitPulse& pulse, const RetroBrdfs& brdfs,
-                           Workspace& work) const noexcept;
+  void add_air(const LitPulse& pulse, Workspace& work) const;
+  void attribute_echo(const LitPulse& pulse, const Detection& detection, Workspace& work) const;
+  NoReturn reason_for_none(const LitPulse& pulse, const RetroBrdfs& brdfs, Workspace& work) const;
   double air_energy_j(const Detection& detection, const Workspace& work) const noexcept;
   void sample_air(const AtmosphereSpec& air);
 

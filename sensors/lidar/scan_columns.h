@@ -98,12 +98,8 @@ class ScanColumns {
         [](Row row) { return std::atan2(row.sin_incidence, row.cos_incidence); });
     act(self.label_, "label", [](Row row) { return row.surface.label; });
     act(self.instance_, "instance", [](Row row) { return row.surface.instance; });
-    // Converts the vertical deviation of the surface to a distance along the beam.
-    act(self.error_estimate_, "error_estimate", [](Row row) {
-      return row.deviation_m == 0
-                 ? 0
-                 : row.deviation_m * row.normal.z / std::max(row.cos_incidence, 1e-6f);
-    });
+    act(self.error_estimate_, "error_estimate",
+        [](Row row) { return error_estimate_m(row.deviation_m, row.normal.z, row.cos_incidence); });
   }
   template <typename Self, typename Act>
   static void for_light(Self& self, const Act& act) {

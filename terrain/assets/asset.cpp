@@ -9,6 +9,7 @@
 #include <vector>
 
 #include "core/error.h"
+#include "core/near_names.h"
 #include "terrain/assets/asset_builder.h"
 #include "terrain/assets/asset_kinds.h"
 
@@ -122,7 +123,10 @@ AssetKind asset_kind(std::string_view name) {
   for (std::size_t i = 0; i < names.size(); ++i) {
     if (names[i] == name) return static_cast<AssetKind>(i);
   }
-  throw Error("asset: unknown kind `{}`; must be one of {}", name, fmt::join(names, ", "));
+  const bool is_tree = name == "tree" || name == "trees";  // some have other names
+  throw Error("there is no asset '{}'; it must be one of {}{}", name, fmt::join(names, ", "),
+              is_tree ? "; did you mean 'conifer' or 'broadleaf_tree'?"
+                      : suggestion(name, {names.begin(), names.end()}));
 }
 
 Model make_asset(const AssetSpec& spec) {

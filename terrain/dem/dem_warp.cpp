@@ -13,6 +13,7 @@
 #include <limits>
 #include <utility>
 
+#include "core/io/text_lines.h"
 #include "terrain/dem/raster_input.h"
 
 namespace groundray {
@@ -78,7 +79,9 @@ std::vector<std::string> warp_options(GDALDataset& dataset, const std::string& t
                               &columns, &rows) != CE_None) {
     throw Error("it cannot be reprojected to {}: {}", target, CPLGetLastErrorMsg());
   }
-  const std::string cell_m = fmt::format("{}", std::stod(fmt::format("{:.1e}", gt[1])));
+  // Two digits. std::stod would depend on the locale.
+  const std::string cell_m =
+      fmt::format("{}", number_of<double>(fmt::format("{:.1e}", gt[1])).value());
   std::vector<std::string> options;
   if (!target.empty()) options = {"-t_srs", target};
   for (const char* word :
@@ -235,9 +238,9 @@ std::unique_ptr<WarpedHeights> reprojected(const HeightReader& raster, const Ras
   const char* const no_network[] = {"ALLOW_NETWORK_ACCESS=NO", nullptr};
   if (crs.SetFromUserInput(target.c_str(), no_network) != OGRERR_NONE) {
     throw Error(
-        "reproject_to = '{}' is not a CRS known to GDAL ({}); use utm, a code such as "
-        "EPSG:32631, or a PROJ string",
-        reproject_to, CPLGetLastErrorMsg());
+        "reproject_to = '{}' is not a CRS known to GDAL; use utm, a code such as EPSG:32631, or a "
+        "PROJ string",
+        reproject_to);
   }
   if (const std::string why = why_not_metric(crs); !why.empty()) {
     throw Error(

@@ -5,20 +5,19 @@
 #include <cpl_vsi.h>
 #include <cpl_vsi_virtual.h>
 #include <fmt/ranges.h>
-#include <sys/resource.h>
-#include <unistd.h>
 
 #include <algorithm>
 #include <array>
 #include <cstdlib>
 #include <exception>
-#include <limits>
 #include <memory>
 #include <regex>
 #include <string_view>
 #include <vector>
 
+#include "core/io/memory.h"
 #include "core/io/open_file.h"
+#include "core/near_names.h"
 
 namespace groundray {
 namespace {
@@ -112,23 +111,6 @@ void check_blocks(GDALDataset& dataset) {
       command(dataset.GetDescription(), "gdal_translate -co TILED=YES", "_tiled.tif"));
 }
 
-// Returns the memory that the machine can still give, and the process may still take.
-double available_bytes() {
-  double bytes = std::numeric_limits<double>::infinity();
-  std::ifstream machine = open_stream("/proc/meminfo");
-  for (std::string word; machine >> word;) {
-    if (word == "MemAvailable:" && machine >> bytes) bytes *= 1024;
-  }
-  rlimit limit{};
-  double pages = 0;
-  if (getrlimit(RLIMIT_AS, &limit) == 0 && limit.rlim_cur != RLIM_INFINITY &&
-      open_stream("/proc/self/statm") >> pages) {
-    const double used = pages * static_cast<double>(sysconf(_SC_PAGESIZE));
-    bytes = std::min(bytes, std::max(0.0, static_cast<double>(limit.rlim_cur) - used));
-  }
-  return bytes;
-}
-
 }  // namespace
 
 void register_drivers() {
@@ -159,10 +141,11 @@ std::string checked_file(const std::string& name) {
   }
   VSIStatBufL state;
   if (VSIStatExL(file.c_str(), &state, VSI_STAT_EXISTS_FLAG | VSI_STAT_NATURE_FLAG) != 0) {
-    throw Error("there is no such file");
+    throw Error("{}", file.starts_with("/vsi") ? "there is no such file" : why_no_file(file));
   }
   if (!VSI_ISREG(state.st_mode)) {
-    throw Error("it cannot be opened as a raster: it is not a regular file");
+    throw Error("it cannot be opened as a raster: {}",
+                VSI_ISDIR(state.st_mode) ? why_no_file(file) : "it is not a regular file");
   }
   return file;
 }
@@ -194,7 +177,7 @@ GDALDatasetUniquePtr open_input(const std::string& name) {
 }
 
 void check_memory(const std::filesystem::path& path, glm::ivec2 size, double bytes) {
-  const double available = available_bytes();
+  const double available = available_memory_bytes();
   if (bytes <= available) return;
   throw Error(
       "its {} x {} samples take {:.1f} GiB of memory, but {:.1f} GiB are available; crop it:{}",

@@ -108,22 +108,15 @@ bool is_of_a_certificate(const std::filesystem::path& file) {
 bool empty_folder(const std::filesystem::path& folder) {
   std::error_code fault;
   bool is_empty = true;
-  std::vector<std::filesystem::path> files;
-  for (const auto& entry : std::filesystem::directory_iterator(folder, fault)) {
-    files.push_back(entry.path());
-  }
-  for (const auto& file : files) {
-    is_empty &= is_of_a_certificate(file) && std::filesystem::remove(file, fault);
-  }
+  for (const std::string& name : names_in(folder, fault))
+    is_empty &= is_of_a_certificate(name) && std::filesystem::remove(folder / name, fault);
   return is_empty && !fault;
 }
 
 bool has_alien_files(const std::filesystem::path& folder) {
   std::error_code fault;
-  for (const auto& entry : std::filesystem::directory_iterator(folder, fault)) {
-    if (!is_of_a_certificate(entry.path())) return true;
-  }
-  return false;
+  const auto names = names_in(folder, fault);
+  return !std::ranges::all_of(names, is_of_a_certificate);
 }
 
 }  // namespace

@@ -1,6 +1,5 @@
 """Runs interrupted by a signal, a full disk or a changed file resume to the same bytes."""
 
-import hashlib
 import os
 import pty
 import random
@@ -12,7 +11,7 @@ import subprocess
 import time
 
 import pytest
-from dataset_runs import SCENE, command, files, generate, groundray, make_whole
+from dataset_runs import SCENE, as_cut_off, command, files, generate, groundray, make_whole
 
 IS_FULL = os.environ.get("GROUNDRAY_PROOF") == "full"
 
@@ -62,25 +61,6 @@ def test_a_run_killed_at_any_moment_resumes_to_the_same_bytes(whole, tmp_path):
         resumed(folder)
         assert files(folder / "out") == files(whole), k
         shutil.rmtree(folder)
-
-
-def as_cut_off(whole, out, frames):
-    """Makes the folder of a run that was killed after this number of frames."""
-    shutil.copytree(whole, out)
-    record = (out / "dataset.yaml").read_text()
-    head, rest = record.split("frames:\n")
-    entries = [line[4:] for line in rest.split("files:\n")[0].splitlines()]
-    pending = [re.sub(r"state: done.*", "state: pending}", entry) for entry in entries]
-    text = head + "frames:\n" + "".join(f"  - {entry}\n" for entry in pending)
-    digits = hashlib.sha256(text.encode()).hexdigest()
-    (out / "dataset.yaml").write_text(f'{text}sha256_above: "{digits}"\n')
-    lines = [f"{hashlib.sha256(e.encode()).hexdigest()[:16]} {e}\n" for e in entries[:frames]]
-    (out / "dataset.journal").write_text("".join(lines))
-    for entry in entries[frames:]:
-        sensor, number = re.match(r'\{sensor: "(\w+)", frame: (\d+)', entry).groups()
-        for file in out.glob(f"*/{sensor}/{int(number):06}*"):
-            file.unlink()
-    return lines
 
 
 def test_leftovers_of_a_killed_run_are_removed(whole, tmp_path):

@@ -98,7 +98,7 @@ def test_shards_of_different_runs_are_not_merged(whole, shards, tmp_path):
     refused(merge(out, *shards[:2]), "shard 3/3 is missing")
     refused(merge(out, *shards, shards[1]), "shard 2/3 is given twice")
     refused(merge(out, *shards, whole), "is complete, not a shard")
-    refused(merge(out, *shards[:2], tmp_path / "none"), "dataset.yaml")
+    refused(merge(out, *shards[:2], tmp_path / "none"), "none: there is no such file or folder")
     assert not out.exists()
     shutil.copytree(whole, out)
     refused(merge(out, *shards), "not empty")

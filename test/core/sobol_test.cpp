@@ -16,6 +16,7 @@ glm::dvec2 pair_of(std::uint32_t seed, std::uint32_t index, int pair) {
   return point;
 }
 
+// The first 2^m points, and any later 2^m of an aligned range.
 TEST(SobolPairs, PointsStratifyEveryElementaryInterval) {
   for (std::uint32_t seed = 1; seed <= 5; ++seed) {
     for (int pair = 0; pair < 4; ++pair) {
@@ -24,7 +25,7 @@ TEST(SobolPairs, PointsStratifyEveryElementaryInterval) {
         for (int a = 0; a <= m; ++a) {
           std::set<std::pair<int, int>> taken;
           for (std::uint32_t i = 0; i < count; ++i) {
-            const glm::dvec2 p = pair_of(7919 * seed, i, pair);
+            const glm::dvec2 p = pair_of(7919 * seed, (seed - 1) * count + i, pair);
             taken.emplace(static_cast<int>(std::ldexp(p.x, a)),
                           static_cast<int>(std::ldexp(p.y, m - a)));
           }

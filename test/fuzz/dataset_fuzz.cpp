@@ -19,20 +19,38 @@ namespace {
 
 namespace fs = std::filesystem;
 
-/// A folder of this process, removed when the process ends.
+/// A dataset's folder of this process, removed when the process ends. It has links to itself, to
+/// its parent and to nothing, and there are poses and calibrations in it and beside it.
 class Folder {
  public:
-  Folder() : path_(fs::temp_directory_path() / ("dataset_fuzz_" + std::to_string(getpid()))) {
-    fs::create_directories(path_);
+  Folder()
+      : root_(fs::temp_directory_path() / ("dataset_fuzz_" + std::to_string(getpid()))),
+        path_(root_ / "run") {
+    fs::create_directories(path_ / "lidar/top");
+    fs::create_directories(path_ / "camera");
+    for (const fs::path& place : {path_ / "poses", path_ / "calibration", root_})
+      write_lidar(place);
+    fs::create_directory_symlink("..", path_ / "lidar/front");
+    fs::create_directory_symlink(".", path_ / "camera/eye");
+    fs::create_symlink("../../dataset.yaml", path_ / "lidar/top/000000.ply");
+    fs::create_symlink("nowhere", path_ / "lidar/top/000001.ply");
   }
   ~Folder() {
     std::error_code ignored;
-    fs::remove_all(path_, ignored);
+    fs::remove_all(root_, ignored);
   }
   const fs::path& path() const { return path_; }
 
  private:
-  fs::path path_;
+  static void write_lidar(const fs::path& folder) {
+    fs::create_directories(folder);
+    for (const char* name : {"top", "front"}) {
+      std::ofstream(folder / (std::string(name) + ".tum")) << "0 0 0 0 0 0 0 1\n1 0 0 0 0 0 0 1\n";
+      std::ofstream(folder / (std::string(name) + ".yaml")) << "range_noise_sigma_m: 0\n";
+    }
+  }
+
+  fs::path root_, path_;
 };
 
 void require(bool holds) {
@@ -72,6 +90,24 @@ void read_record(const fs::path& folder) {
   }
 }
 
+// No sensor's files lie outside the dataset.
+void read_lidars(const fs::path& folder) {
+  for (const groundray::RecordedLidar& lidar : groundray::read_dataset(folder).lidars) {
+    require(lidar.name.find_first_of("/.") == std::string::npos);
+    for (const groundray::RecordedFrame& frame : lidar.frames)
+      require(frame.file.lexically_relative(folder).begin()->string() == "lidar");
+  }
+}
+
+template <typename Read>
+void read_or_reject(const Read& read) {
+  try {
+    read();
+  } catch (const groundray::Error&) {
+    // Rejected with a message.
+  }
+}
+
 }  // namespace
 
 /// Any line that is read from the bytes is unchanged after being written and read again. As a whole
@@ -82,11 +118,9 @@ extern "C" int LLVMFuzzerTestOneInput(const std::uint8_t* data, std::size_t size
   read_line(text);
   const fs::path record = folder.path() / groundray::dataset_file;
   std::ofstream(record, std::ios::binary) << text;
-  try {
-    read_record(folder.path());
-  } catch (const groundray::Error&) {
-    // Rejected with a message.
-  }
+  read_or_reject([] { read_record(folder.path()); });
+  read_or_reject([] { read_lidars(folder.path()); });
+  read_or_reject([] { groundray::verify(folder.path(), [](const std::string&) {}); });
   groundray::read_journal(record, [](const std::string& entry) { read_line(entry); });
   return 0;
 }

@@ -1,5 +1,6 @@
 """Damaged datasets: one error with the location, and nothing written."""
 
+import os
 import re
 import shutil
 
@@ -25,11 +26,19 @@ def test_missing_and_broken_datasets_are_reported(run, capsys):
         (text.replace("kind: lidar", "kind: sonar", 1), "must be lidar, camera or stereo"),
         ("", "must be a map"),
         ("frames: [", "dataset.yaml:2:1: "),
+        ("a: &a [1]\nb: [*a, *a]\n", "dataset.yaml:2:5: aliases (*name) are not allowed"),
     ):
         record.write_text(spoiled)
         assert rule in fails(capsys, run, "npz")
     record.unlink()
     assert "it contains no dataset.yaml" in fails(capsys, run, "npz")
+
+
+@pytest.mark.parametrize("name", ["calibration/front.yaml", "lidar/front/000001.ply"])
+def test_pipes_are_rejected(run, capsys, name):
+    (run / name).unlink()
+    os.mkfifo(run / name)
+    assert name in fails(capsys, run, "npz")
 
 
 @pytest.mark.parametrize("form", ["kitti", "npz", "mcap", "laz"])

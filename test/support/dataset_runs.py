@@ -2,6 +2,8 @@
 
 import hashlib
 import os
+import re
+import shutil
 import subprocess
 from pathlib import Path
 
@@ -84,3 +86,22 @@ def make_whole(folder):
     result = generate(folder)
     assert result.returncode == 0, result.stderr
     return folder / "out"
+
+
+def as_cut_off(whole, out, frames):
+    """Makes the folder of a run that was killed after this number of frames."""
+    shutil.copytree(whole, out)
+    record = (out / "dataset.yaml").read_text()
+    head, rest = record.split("frames:\n")
+    entries = [line[4:] for line in rest.split("files:\n")[0].splitlines()]
+    pending = [re.sub(r"state: done.*", "state: pending}", entry) for entry in entries]
+    text = head + "frames:\n" + "".join(f"  - {entry}\n" for entry in pending)
+    digits = hashlib.sha256(text.encode()).hexdigest()
+    (out / "dataset.yaml").write_text(f'{text}sha256_above: "{digits}"\n')
+    lines = [f"{hashlib.sha256(e.encode()).hexdigest()[:16]} {e}\n" for e in entries[:frames]]
+    (out / "dataset.journal").write_text("".join(lines))
+    for entry in entries[frames:]:
+        sensor, number = re.match(r'\{sensor: "(\w+)", frame: (\d+)', entry).groups()
+        for file in out.glob(f"*/{sensor}/{int(number):06}*"):
+            file.unlink()
+    return lines

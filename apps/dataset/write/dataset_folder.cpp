@@ -15,6 +15,7 @@
 
 #include "apps/dataset/dataset_text.h"
 #include "core/error.h"
+#include "core/io/open_file.h"
 
 namespace groundray {
 namespace {
@@ -39,9 +40,11 @@ std::string warning(const fs::path& folder, const std::string& why) {
 }  // namespace
 
 bool is_as_new(const fs::path& folder) {
-  return std::ranges::all_of(fs::directory_iterator(folder), [](const fs::directory_entry& entry) {
-    return entry.path().filename() == fmt::format("{}.part", dataset_file);
-  });
+  std::error_code fault;
+  const auto names = names_in(folder, fault);
+  if (fault) throw Error("{}: the folder cannot be read: {}", folder.string(), fault.message());
+  return std::ranges::all_of(
+      names, [](const auto& name) { return name == fmt::format("{}.part", dataset_file); });
 }
 
 void make_folder(const fs::path& folder) {

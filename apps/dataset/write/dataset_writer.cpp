@@ -31,7 +31,7 @@ constexpr std::string_view aside = ".part";  // suffix of temporary files
 std::string convergence_of(const fs::path& scan) {
   std::ifstream file = open_stream(scan);
   const std::string begin = fmt::format("comment {}", convergence_comment);
-  for (std::string line; std::getline(file, line) && line != "end_header";) {
+  for (std::string line; next_line(file, line) && line != "end_header";) {
     if (line.starts_with(begin)) return line.substr(begin.size());
   }
   return {};
@@ -47,8 +47,8 @@ bool is_aside(const std::string& name, const std::vector<std::string>& suffixes)
 
 void remove_asides(const fs::path& folder, const std::vector<std::string>& suffixes) {
   std::error_code ignored;
-  for (const fs::directory_entry& entry : fs::directory_iterator(folder, ignored))
-    if (is_aside(entry.path().filename().string(), suffixes)) fs::remove(entry.path(), ignored);
+  for (const std::string& name : names_in(folder, ignored))
+    if (is_aside(name, suffixes)) fs::remove(folder / name, ignored);
 }
 
 std::string shard_words(const std::optional<Shard>& shard) {

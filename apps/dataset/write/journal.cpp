@@ -86,7 +86,7 @@ std::size_t read_journal(const std::filesystem::path& path,
   std::ifstream file = open_stream(path);
   if (!file) fail_to("read", path);
   std::size_t unreadable = 0;
-  for (std::string line; std::getline(file, line);) {
+  for (std::string line; next_line(file, line);) {
     const std::size_t blank = line.find(' ');
     const std::string entry = blank == mark_digits ? line.substr(blank + 1) : "";
     if (!entry.empty() && line.starts_with(mark_of(entry)))

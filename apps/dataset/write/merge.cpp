@@ -307,13 +307,17 @@ Merged merge(const std::vector<fs::path>& shards, const fs::path& out, FolderUse
   for (const fs::path& shard : shards)
     locks.push_back(std::make_unique<FolderLock>(shard, FolderLock::Use::Read));
   const Joined joined = check_shards(shards);
+  std::error_code ignored;
+  for (const fs::path& shard : shards) {
+    if (fs::equivalent(shard, out, ignored))
+      throw Error("{}: it is one of the shards; choose a new folder with -o", out.string());
+  }
   make_folder(out);
   const FolderLock lock(out, FolderLock::Use::Write, messages.warn);
   check_out(out, use, joined.header);
   write_joined(shards, joined, out, pending_text);
   const std::uint64_t bytes = copy_shards(shards, joined, out, use, messages.progress);
   write_joined(shards, joined, out, [](SharedFrame& frame) { return std::move(frame.text); });
-  std::error_code ignored;
   fs::remove(out / journal_file, ignored);
   return {joined.frames, bytes};
 }

@@ -13,6 +13,7 @@
 #include "apps/dataset/write/dataset_folder.h"
 #include "apps/dataset/write/journal.h"
 #include "apps/scene/interruption.h"
+#include "core/io/open_file.h"
 #include "core/io/text_lines.h"
 #include "core/progress.h"
 
@@ -38,9 +39,14 @@ class DatasetCheck {
     check_record();
     std::error_code fault;
     const bool is_open = fs::exists(folder_ / journal_file, fault);
+    DatasetSummary now = summary_;
+    if (is_open) count_journal(folder_ / journal_file, now);
+    result_.done = now.done;
+    result_.asked_for = now.asked_for;
     if (is_open || fault) {
-      tell(journal_file,
-           "a run was interrupted; `groundray generate --resume` checks its frames and continues");
+      tell(journal_file, fmt::format("a run was interrupted, with {} of {} frames complete; "
+                                     "`groundray generate --resume` checks them and continues",
+                                     now.done, now.asked_for));
     } else if (summary_.done < summary_.asked_for) {
       tell("", fmt::format(
                    "incomplete: {} of {} frames are complete; `groundray generate --resume` adds "
@@ -48,7 +54,7 @@ class DatasetCheck {
                    summary_.done, summary_.asked_for));
     }
     // A run that is active or was interrupted has files that are not listed yet.
-    if (!is_open) find_strangers("");
+    if (!is_open) find_strangers("", Reached::Directly);
     return result_;
   }
 
@@ -116,26 +122,29 @@ class DatasetCheck {
     if (!text.is_intact()) tell(dataset_file, "changed since it was written, or truncated");
   }
 
-  // Reports unexpected files in a folder of the dataset and its subfolders.
-  void find_strangers(const std::string& path) {
+  enum class Reached { Directly, ByLink };
+
+  // Reports unexpected files in a folder of the dataset and its subfolders. Beyond links, which may
+  // lead anywhere, only expected folders are entered.
+  void find_strangers(const std::string& path, Reached how) {
     std::error_code fault;
-    fs::directory_iterator it(path.empty() ? folder_ : folder_ / path, fault);
-    std::vector<std::string> folders;
-    for (; !fault && it != fs::directory_iterator(); it.increment(fault)) {
+    std::vector<std::pair<std::string, Reached>> folders;
+    for (const std::string& name : names_in(path.empty() ? folder_ : folder_ / path, fault)) {
       stop_if_interrupted();
-      const std::string name = it->path().filename().string();
       std::string child = path.empty() ? name : fmt::format("{}/{}", path, name);
       std::error_code ignored;
-      const bool is_walked =
-          it->is_directory(ignored) && (!it->is_symlink(ignored) || expected_.has_folder(child));
+      const fs::path place = folder_ / child;
+      const Reached reached = fs::is_symlink(place, ignored) ? Reached::ByLink : how;
+      const bool is_walked = fs::is_directory(place, ignored) &&
+                             (reached == Reached::Directly || expected_.has_folder(child));
       if (is_walked) {
-        folders.push_back(std::move(child));
+        folders.emplace_back(std::move(child), reached);
       } else if (const auto words = expected_.fault_of(child)) {
         tell(child, *words);
       }
     }
     if (fault) tell(path, "the folder cannot be read: " + fault.message());
-    for (const std::string& each : folders) find_strangers(each);
+    for (const auto& [folder, reached] : folders) find_strangers(folder, reached);
   }
 
   const fs::path& folder_;

@@ -52,8 +52,12 @@ class ExpectedFiles {
 
 /// Result of checking a dataset.
 struct Verification {
-  std::size_t files = 0, faults = 0;  ///< numbers of checked files and of faults
-  std::uint64_t bytes = 0;            ///< size of these files
+  std::size_t files = 0, faults = 0;    ///< numbers of checked files and of faults
+  std::uint64_t bytes = 0;              ///< size of these files
+  std::size_t done = 0, asked_for = 0;  ///< numbers of finished frames, and of all
+
+  /// Returns true if frames are missing, and nothing else is wrong.
+  bool is_unfinished() const { return faults == 1 && done < asked_for; }
 };
 
 /// Reads every file of a dataset and compares it with its entry in dataset.yaml. Missing frames of

@@ -19,7 +19,7 @@ namespace fs = std::filesystem;
 
 bool has_faces(const fs::path& ply) {
   std::ifstream file = open_stream(ply);
-  for (std::string line; std::getline(file, line) && !line.starts_with("end_header");) {
+  for (std::string line; next_line(file, line) && !line.starts_with("end_header");) {
     if (line.starts_with("element face") && !line.starts_with("element face 0")) return true;
   }
   return false;

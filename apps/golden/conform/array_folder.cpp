@@ -8,6 +8,7 @@
 
 #include "apps/dataset/file_sum.h"
 #include "core/error.h"
+#include "core/near_names.h"
 
 namespace groundray::golden {
 namespace {
@@ -52,7 +53,8 @@ fs::path ArrayFolder::file(const std::string& name) const {
   const fs::path path = folder_ / name;
   std::error_code fault;
   const fs::path real = fs::canonical(path, fault);
-  if (fault) throw Error("{}: it is missing", path.string());
+  if (fault)
+    throw Error("{}: {}; docs/guide/gpu.md lists the files", path.string(), why_no_file(path));
   const fs::path inside = real.lexically_relative(fs::canonical(folder_, fault));
   if (fault || inside.empty() || *inside.begin() == "..")
     throw Error("{}: it leads out of the folder, to {}", path.string(), real.string());

@@ -5,6 +5,8 @@
 #include <algorithm>
 
 #include "apps/golden/conform/conform.h"
+#include "apps/scan/number_checks.h"
+#include "core/io/print_error.h"
 
 namespace groundray::golden {
 
@@ -13,20 +15,21 @@ namespace fs = std::filesystem;
 void publish(const Report& report, const fs::path& out) {
   for (const Section& section : report.sections) {
     if (report.sections.size() > 1) {
-      fmt::print("{} {}\n", section.verdict == Verdict::Passed ? "passed" : "FAILED",
+      print_text(stdout, "{} {}\n", section.verdict == Verdict::Passed ? "passed" : "FAILED",
                  section.title);
     }
-    if (!section.text.empty()) fmt::print("{}\n", section.text);
+    if (!section.text.empty()) print_text(stdout, "{}\n", section.text);
     for (const Measure& measure : section.measures) {
-      fmt::print("{}{}: {:.6g}{}{}{}\n", measure.verdict == Verdict::Failed ? "FAILED " : "",
-                 measure.name, measure.value, measure.unit.empty() ? "" : " ", measure.unit,
+      print_text(stdout, "{}{}: {:.6g}{}{}{}\n",
+                 measure.verdict == Verdict::Failed ? "FAILED " : "", measure.name, measure.value,
+                 measure.unit.empty() ? "" : " ", measure.unit,
                  measure.limit ? fmt::format(", at most {:.6g}", *measure.limit) : "");
     }
   }
   fs::create_directories(out);
   write_html(out / "report.html", report);
   write_json(out / "report.json", report);
-  fmt::print("see {}\n", (out / "report.html").string());
+  print_text(stdout, "see {}\n", (out / "report.html").string());
 }
 
 void PassesCommand::add_to(CLI::App* command) {
@@ -53,14 +56,16 @@ void PassesCommand::add_to(CLI::App* command) {
   command->add_option("--rays", settings.rays, "Number of rays")
       ->check(CLI::Range(std::size_t{1}, std::size_t{100'000'000}))
       ->capture_default_str();
-  command->add_option("--seed", settings.seed.value, "Seed of the rays")->capture_default_str();
+  command->add_option("--seed", settings.seed.value, "Seed of the rays")
+      ->check(whole())
+      ->capture_default_str();
 }
 
 void PassesCommand::run() {
   if (!viewpoint_m.empty()) settings.viewpoint_m = {viewpoint_m[0], viewpoint_m[1], viewpoint_m[2]};
   settings.commit = GROUNDRAY_COMMIT;
   write_pass_folder(dem, settings, out);
-  fmt::print("{}: judge another mesher or tracer with groundray-golden conform {} THEIRS\n",
+  print_text(stdout, "{}: judge another mesher or tracer with groundray-golden conform {} THEIRS\n",
              (out / "manifest.json").string(), out.string());
 }
 

@@ -1,4 +1,3 @@
-#include <unistd.h>
 
 #include <CLI/CLI.hpp>
 #include <algorithm>
@@ -22,13 +21,6 @@ namespace {
 
 // Lower limit: a sag of about 0.001 mm over 1 m. No ground is that flat, and smoothing takes long.
 constexpr double least_curvature_per_m = 1e-5, most_curvature_per_m = 1e3;
-
-// Returns the machine's memory: the system may end a process that takes more, without a message.
-std::size_t machine_bytes() {
-  const auto pages = sysconf(_SC_PHYS_PAGES), page_bytes = sysconf(_SC_PAGESIZE);
-  if (pages <= 0 || page_bytes <= 0) return std::numeric_limits<std::size_t>::max();
-  return static_cast<std::size_t>(pages) * static_cast<std::size_t>(page_bytes);
-}
 
 enum class FilterPreset { None, Ground, Air };
 

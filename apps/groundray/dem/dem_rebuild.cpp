@@ -15,6 +15,7 @@
 #include "apps/groundray/progress_stage.h"
 #include "apps/scene/interruption.h"
 #include "core/error.h"
+#include "core/io/print_error.h"
 #include "terrain/dem/dem_io.h"
 #include "terrain/dem/layers_io.h"
 
@@ -173,7 +174,7 @@ void rebuild_dem(const DemRequest& request) {
   stop_if_interrupted();
   write_output(request.output, report);
   print(report);
-  fmt::print("written to {}\n", request.output.dem.string());
+  print_text(stdout, "written to {}\n", request.output.dem.string());
 }
 
 }  // namespace groundray

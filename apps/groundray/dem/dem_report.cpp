@@ -13,6 +13,7 @@
 #include "apps/groundray/result_files.h"
 #include "core/image/png_io.h"
 #include "core/io/file_io.h"
+#include "core/io/print_error.h"
 #include "terrain/dem/layers_io.h"
 
 namespace groundray {
@@ -33,31 +34,35 @@ std::array<std::size_t, 5> sources_of(const DemLayers& layers) {
 void print_points(const char* what, const char* rows, const std::vector<PointTally>& tallies) {
   constexpr std::size_t most = 8;
   if (tallies.empty()) return;
-  fmt::print("{:<28} {:>12} {:>12}\n", what, rows, "points");
+  print_text(stdout, "{:<28} {:>12} {:>12}\n", what, rows, "points");
   PointTally sum{.name = fmt::format("all {}", tallies.size())};
   for (std::size_t i = 0; i < tallies.size(); ++i) {
     const PointTally& tally = tallies[i];
     sum.rows += tally.rows;
     sum.points += tally.points;
-    if (i < most) fmt::print("{:<28} {:>12} {:>12}\n", tally.name, tally.rows, tally.points);
+    if (i < most)
+      print_text(stdout, "{:<28} {:>12} {:>12}\n", tally.name, tally.rows, tally.points);
   }
-  if (tallies.size() > most) fmt::print("... and {} more\n", tallies.size() - most);
-  if (tallies.size() > 1) fmt::print("{:<28} {:>12} {:>12}\n", sum.name, sum.rows, sum.points);
+  if (tallies.size() > most) print_text(stdout, "... and {} more\n", tallies.size() - most);
+  if (tallies.size() > 1)
+    print_text(stdout, "{:<28} {:>12} {:>12}\n", sum.name, sum.rows, sum.points);
 }
 
 void print_fill(const FillTally& fill) {
   print_fates(fill);
-  if (fill.at_bound > 0) fmt::print("lines of sight limit {} filled samples\n", fill.at_bound);
+  if (fill.at_bound > 0)
+    print_text(stdout, "lines of sight limit {} filled samples\n", fill.at_bound);
   print_not_least(fill);
 }
 
 void print_errors(const std::vector<HeightErrors>& errors) {
-  fmt::print("{:<9} {:>9} {:>9} {:>9} {:>9} {:>9} {:>9} {:>7} {:>7} {:>7} {:>7}\n", "against",
-             "samples", "bias m", "RMSE m", "NMAD m", "95 % m", "most m", "z rms", "z mid", "1 sd",
-             "2 sd");
+  print_text(stdout, "{:<9} {:>9} {:>9} {:>9} {:>9} {:>9} {:>9} {:>7} {:>7} {:>7} {:>7}\n",
+             "against", "samples", "bias m", "RMSE m", "NMAD m", "95 % m", "most m", "z rms",
+             "z mid", "1 sd", "2 sd");
   for (const HeightErrors& e : errors) {
     if (e.samples == 0) continue;
-    fmt::print(
+    print_text(
+        stdout,
         "{:<9} {:>9} {:>9.4f} {:>9.4f} {:>9.4f} {:>9.4f} {:>9.4f} {:>7.3f} {:>7.3f} {:>6.1f}% "
         "{:>6.1f}%\n",
         e.of, e.samples, e.bias_m, e.rmse_m, e.nmad_m, e.p95_m, e.largest_m, e.normalised_rms,
@@ -208,18 +213,19 @@ void print(const DemReport& report) {
   print_points("scan", "rows", report.scans);
   print_points("stereo pair", "matched", report.pairs);
   if (const auto& ground = result.ground)
-    fmt::print("ground filter: {} points on the ground, {} above, {} below\n", ground->ground,
-               ground->above, ground->below);
+    print_text(stdout, "ground filter: {} points on the ground, {} above, {} below\n",
+               ground->ground, ground->above, ground->below);
   const FusionCounts& fusion = result.fusion;
-  fmt::print("fused: {} points, {} outside, {} unusable; {} cells without credible ground\n",
+  print_text(stdout,
+             "fused: {} points, {} outside, {} unusable; {} cells without credible ground\n",
              fusion.points, fusion.outside, fusion.unusable, fusion.without_ground);
   if (fusion.uncertain > 0)
-    fmt::print("{} cells exceed --most-sd-m and stay unmeasured\n", fusion.uncertain);
+    print_text(stdout, "{} cells exceed --most-sd-m and stay unmeasured\n", fusion.uncertain);
   if (const auto& bound = result.bound)
-    fmt::print("lines of sight bound {} samples; {} measured ones are above their bounds\n",
+    print_text(stdout, "lines of sight bound {} samples; {} measured ones are above their bounds\n",
                bound->samples, bound->broken);
   if (const auto& smooth = result.smoothed)
-    fmt::print("smoothed in {} rounds for curvatures of {:.3g} 1/m\n", smooth->rounds,
+    print_text(stdout, "smoothed in {} rounds for curvatures of {:.3g} 1/m\n", smooth->rounds,
                smooth->curvature_sd_per_m);
   if (result.filled) print_fill(tally_of(*result.filled));
   std::string sources;
@@ -227,11 +233,11 @@ void print(const DemReport& report) {
   for (std::size_t i = 0; i < source_words.size(); ++i)
     sources += fmt::format("{}{} {}", i == 0 ? "" : ", ", counts[i], source_words[i]);
   const glm::ivec2 samples = result.layers.frame.samples;
-  fmt::print("{} x {} samples: {}\n", samples.x, samples.y, sources);
+  print_text(stdout, "{} x {} samples: {}\n", samples.x, samples.y, sources);
   if (report.truth) print_errors(report.truth->errors);
   if (report.colour_m > 0)
-    fmt::print("the picture's most saturated colour is {:.3g} m\n", report.colour_m);
-  for (const std::string& note : report.notes) fmt::print("note: {}\n", note);
+    print_text(stdout, "the picture's most saturated colour is {:.3g} m\n", report.colour_m);
+  for (const std::string& note : report.notes) print_text(stdout, "note: {}\n", note);
 }
 
 void check_output(const DemOutput& output, std::span<const fs::path> inputs) {

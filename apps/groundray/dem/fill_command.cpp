@@ -15,6 +15,8 @@
 #include "apps/scan/word_option.h"
 #include "apps/scene/interruption.h"
 #include "core/error.h"
+#include "core/io/file_io.h"
+#include "core/io/print_error.h"
 #include "reconstruction/dem/fill/dem_fill.h"
 #include "terrain/dem/dem_io.h"
 #include "terrain/dem/layers_io.h"
@@ -52,19 +54,19 @@ std::string percent(double share) {
 
 void print_trials(const FilledHeights& filled) {
   if (filled.trials.empty()) return;
-  fmt::print("{:>28} {:>8} {:>11} {:>8} {:>9} {:>9} {:>9}\n", "kind of hole, cells", "tension",
-             "smoothness", "tried", "in 1 sd", "in 2 sd", "widened");
+  print_text(stdout, "{:>28} {:>8} {:>11} {:>8} {:>9} {:>9} {:>9}\n", "kind of hole, cells",
+             "tension", "smoothness", "tried", "in 1 sd", "in 2 sd", "widened");
   for (const TrialReport& trial : filled.trials) {
     const std::string kind =
         fmt::format("{}{}, {:.0f} to {:.0f}", trial.is_shadow ? "shadow, " : "",
                     trial.is_long ? "long" : "compact", trial.from_cells, trial.to_cells);
     if (trial.samples == 0) {
-      fmt::print("{:>28} {:>8g} {:>11g}  no ground for a trial\n", kind, trial.form.tension,
+      print_text(stdout, "{:>28} {:>8g} {:>11g}  no ground for a trial\n", kind, trial.form.tension,
                  trial.form.smoothness);
       continue;
     }
-    fmt::print("{:>28} {:>8g} {:>11g} {:>8} {:>9} {:>9} {:>9.2f}\n", kind, trial.form.tension,
-               trial.form.smoothness, trial.samples, percent(trial.within_1sd),
+    print_text(stdout, "{:>28} {:>8g} {:>11g} {:>8} {:>9} {:>9} {:>9.2f}\n", kind,
+               trial.form.tension, trial.form.smoothness, trial.samples, percent(trial.within_1sd),
                percent(trial.within_2sd), trial.widened_by);
   }
 }
@@ -81,9 +83,7 @@ struct FillCommandOptions {
   std::optional<double> tension, smoothness;
 
   void add_files() {
-    command
-        ->add_option("DEM", dem, "Raster of heights (GeoTIFF, VRT, HGT, ...)")
-        ->required();
+    command->add_option("DEM", dem, "Raster of heights (GeoTIFF, VRT, HGT, ...)")->required();
     command->add_option("-o,--output", out, "GeoTIFF to write: heights in metres, CRS as the DEM's")
         ->required();
     command->add_option("--sd-out", sd_out,
@@ -182,10 +182,10 @@ struct FillCommandOptions {
     print_fates(tally);
     if (method == RasterFill::Tension) print_trials(filled);
     if (!bound.empty()) {
-      fmt::print("{} filled samples are limited by a bound\n", tally.at_bound);
+      print_text(stdout, "{} filled samples are limited by a bound\n", tally.at_bound);
       print_not_least(tally);
     }
-    fmt::print("{} of {} missing samples filled; written to {}\n", filled.filled,
+    print_text(stdout, "{} of {} missing samples filled; written to {}\n", filled.filled,
                read.grid.hole_count(), out.string());
   }
 };

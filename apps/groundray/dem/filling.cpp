@@ -9,6 +9,7 @@
 #include "apps/groundray/command.h"
 #include "apps/scan/number_checks.h"
 #include "apps/scan/word_option.h"
+#include "core/io/print_error.h"
 
 namespace groundray {
 namespace {
@@ -71,16 +72,18 @@ FillTally tally_of(const FilledHeights& filled) {
 
 void print_fates(const FillTally& tally) {
   if (tally.fates.empty()) return;
-  fmt::print("{:>8} {:>12} {:>12}  result for blank areas\n", "holes", "samples", "farthest m");
+  print_text(stdout, "{:>8} {:>12} {:>12}  result for blank areas\n", "holes", "samples",
+             "farthest m");
   for (const FateTally& fate : tally.fates) {
-    fmt::print("{:>8} {:>12} {:>12.4g}  {}\n", fate.holes, fate.samples, fate.farthest_m,
+    print_text(stdout, "{:>8} {:>12} {:>12.4g}  {}\n", fate.holes, fate.samples, fate.farthest_m,
                description_of(fate.fate).sentence);
   }
 }
 
 void print_not_least(const FillTally& tally) {
   if (tally.not_least == 0) return;
-  fmt::print(
+  print_text(
+      stdout,
       "{} holes are filled below their bounds, but the surface may be far from the optimum: the "
       "search was stopped early\n",
       tally.not_least);

@@ -12,6 +12,7 @@
 #include "apps/groundray/progress_stage.h"
 #include "apps/scene/interruption.h"
 #include "core/error.h"
+#include "core/io/print_error.h"
 #include "core/progress.h"
 #include "reconstruction/mesh/measured_mesh_io.h"
 
@@ -204,7 +205,7 @@ void write(const MeshOutput& output, const RebuildReport& report) {
   stop_if_interrupted();
   write_output(output, report);
   print(report);
-  fmt::print("written to {}\n", output.mesh.string());
+  print_text(stdout, "written to {}\n", output.mesh.string());
 }
 
 }  // namespace

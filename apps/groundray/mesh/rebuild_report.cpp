@@ -10,6 +10,7 @@
 #include "apps/groundray/result_files.h"
 #include "core/error.h"
 #include "core/io/file_io.h"
+#include "core/io/print_error.h"
 #include "reconstruction/mesh/measured_mesh_io.h"
 
 namespace groundray {
@@ -51,14 +52,14 @@ void print_scans(const std::vector<ScanTally>& scans) {
   constexpr std::size_t most = 12;
   const auto print_row = [](const ScanTally& scan) {
     const bool is_linked = scan.accepted + scan.rejected > 0;
-    fmt::print("{:<24} {:>9} {:>9} {:>9} {:>9} {:>9}\n", scan.name, scan.rows, scan.used,
+    print_text(stdout, "{:<24} {:>9} {:>9} {:>9} {:>9} {:>9}\n", scan.name, scan.rows, scan.used,
                scan.other_returns + scan.crowded, is_linked ? fmt::to_string(scan.accepted) : "-",
                is_linked ? fmt::to_string(scan.rejected) : "-");
   };
-  fmt::print("{:<24} {:>9} {:>9} {:>9} {:>9} {:>9}\n", "scan", "rows", "returns", "left out",
-             "faces", "rejected");
+  print_text(stdout, "{:<24} {:>9} {:>9} {:>9} {:>9} {:>9}\n", "scan", "rows", "returns",
+             "left out", "faces", "rejected");
   for (std::size_t i = 0; i < std::min(most, scans.size()); ++i) print_row(scans[i]);
-  if (scans.size() > most) fmt::print("... and {} more\n", scans.size() - most);
+  if (scans.size() > most) print_text(stdout, "... and {} more\n", scans.size() - most);
   if (scans.size() > 1) print_row(sum_of(scans));
 }
 
@@ -78,7 +79,7 @@ void print_holes(const FilledMesh& holes) {
     std::ranges::replace(word, '_', ' ');
     left += fmt::format("{}{} {}", left.empty() ? ": " : ", ", counts[kind], word);
   }
-  fmt::print("holes: {} filled with {} triangles, {} left{}\n", holes.filled.size(),
+  print_text(stdout, "holes: {} filled with {} triangles, {} left{}\n", holes.filled.size(),
              patch_triangles(holes), holes.left.size(), left);
 }
 
@@ -86,22 +87,25 @@ void print_simplified(const MeshResult& result, const Simplified& simplified) {
   const TwoSidedError& error = simplified.error;
   const HausdorffDistance largest = error.largest();
   const std::size_t from = result.full_triangles, to = result.mesh.shape.triangles.size();
-  fmt::print("simplified: {} to {} triangles ({:.3g} %), {}\n", from, to, percent(to, from),
+  print_text(stdout, "simplified: {} to {} triangles ({:.3g} %), {}\n", from, to, percent(to, from),
              halt_sentences[static_cast<std::size_t>(simplified.halted_by)]);
   const MeshRepairs& repairs = simplified.repairs;
   if (repairs.dropped_triangles + repairs.cut_edges + repairs.parted_vertices > 0) {
-    fmt::print("repaired before: {} triangles dropped, {} edges cut open, {} vertices split\n",
+    print_text(stdout,
+               "repaired before: {} triangles dropped, {} edges cut open, {} vertices split\n",
                repairs.dropped_triangles, repairs.cut_edges, repairs.parted_vertices);
   }
-  fmt::print(
+  print_text(
+      stdout,
       "error, both ways: largest {:.4g} to {:.4g} m, mean {:.4g} m, root mean square {:.4g} m\n",
       largest.at_least_m, largest.at_most_m, error.mean_m(), error.rms_m());
   if (const auto& heights = simplified.vertical) {
-    fmt::print("error of heights: largest {:.4g} m, mean {:.4g} m, root mean square {:.4g} m",
+    print_text(stdout,
+               "error of heights: largest {:.4g} m, mean {:.4g} m, root mean square {:.4g} m",
                heights->largest_m, heights->mean_m, heights->rms_m);
     if (heights->aside_m > 0)
-      fmt::print("; the border moved inwards by up to {:.4g} m", heights->aside_m);
-    fmt::print("\n");
+      print_text(stdout, "; the border moved inwards by up to {:.4g} m", heights->aside_m);
+    print_text(stdout, "\n");
   }
 }
 
@@ -219,7 +223,8 @@ void print(const RebuildReport& report) {
   if (!report.scans.empty()) print_scans(report.scans);
   if (result.merged_scans > 1) {
     const MergeCounts& merged = result.merged;
-    fmt::print(
+    print_text(
+        stdout,
         "merged: {} redundant triangles and {} in visibility conflicts removed, {} clipped, {} "
         "left out; {} slits filled, {} gaps bridged, {} vertices moved\n",
         merged.redundant, merged.visibility_conflicts, merged.clipped, merged.left_out,
@@ -227,9 +232,10 @@ void print(const RebuildReport& report) {
   }
   if (result.holes) print_holes(*result.holes);
   if (result.simplified) print_simplified(result, *result.simplified);
-  fmt::print("mesh: {} triangles, {} vertices, {:.6g} m²\n", result.mesh.shape.triangles.size(),
-             result.mesh.shape.vertices_m.size(), result.area_m2);
-  for (const std::string& note : report.notes) fmt::print("note: {}\n", note);
+  print_text(stdout, "mesh: {} triangles, {} vertices, {:.6g} m²\n",
+             result.mesh.shape.triangles.size(), result.mesh.shape.vertices_m.size(),
+             result.area_m2);
+  for (const std::string& note : report.notes) print_text(stdout, "note: {}\n", note);
 }
 
 void check_output(const MeshOutput& output, std::span<const fs::path> inputs) {

@@ -7,7 +7,11 @@ dataset frame (east, north, up; W minus `origin_w_m`), B the body, S a lidar, C 
 
 from __future__ import annotations
 
+import difflib
+import errno
+import os
 import re
+import stat
 from collections.abc import Sequence
 from dataclasses import dataclass
 from decimal import Decimal, InvalidOperation
@@ -205,8 +209,19 @@ class _Map:
         return [_Map(self.path, each, f"{key}[{i}]") for i, each in enumerate(value)]
 
 
+def _refuse_aliases(text: str, path: Path) -> None:
+    """Rejects aliases, by which a few lines can stand for more values than memory holds."""
+    if "&" not in text or "*" not in text:
+        return
+    for event in yaml.parse(text, Loader=_LOADER):
+        if isinstance(event, yaml.AliasEvent):
+            place = f"{event.start_mark.line + 1}:{event.start_mark.column + 1}"
+            raise Error(f"{path}:{place}: aliases (*name) are not allowed: write the value out")
+
+
 def _load_yaml(text: str, path: Path) -> Any:
     try:
+        _refuse_aliases(text, path)
         return yaml.load(text, Loader=_LOADER)
     except yaml.YAMLError as fault:
         mark = getattr(fault, "problem_mark", None)
@@ -215,10 +230,18 @@ def _load_yaml(text: str, path: Path) -> Any:
         raise Error(f"{path}{place}: {problem}; was the file cut short or edited?") from None
 
 
+def _bytes_of(path: Path) -> bytes:
+    """Reads a regular file; a pipe may never begin, a device never end."""
+    with open(path, "rb", opener=lambda name, flags: os.open(name, flags | os.O_NONBLOCK)) as file:
+        if not stat.S_ISREG(os.fstat(file.fileno()).st_mode):
+            raise OSError(errno.ESPIPE, "it is a pipe or device, not a file")
+        return file.read()
+
+
 def read_text(path: Path) -> str:
     """Returns the text of one of a dataset's files. Raises Error if it cannot be read."""
     try:
-        return path.read_text(encoding="utf-8")
+        return _bytes_of(path).decode("utf-8").replace("\r\n", "\n")
     except OSError as fault:
         raise Error(f"{path}: cannot read it: {fault.strerror}; is the dataset complete?") from None
     except UnicodeDecodeError:
@@ -228,7 +251,7 @@ def read_text(path: Path) -> str:
 def read_listed(file: Path, what: str) -> bytes:
     """Returns the bytes of a finished frame's file. Raises Error if it cannot be read."""
     try:
-        return file.read_bytes()
+        return _bytes_of(file)
     except OSError as fault:
         rule = f"cannot read it: {fault.strerror}, although dataset.yaml lists {what} as done"
         raise Error(f"{file}: {rule}; was it removed?") from None
@@ -248,6 +271,16 @@ def _read_mount(calibration: _Map, key: str) -> Floats:
     return matrix_of(rotation_xyzw, mount.numbers("translation_m", 3))
 
 
+def _why_no_dataset(folder: Path) -> str:
+    if folder.is_file():
+        return "it is a file; give the folder that groundray generate wrote"
+    if folder.exists():
+        return "it contains no dataset.yaml; give an output of groundray generate"
+    names = [each.name for each in folder.parent.iterdir()] if folder.parent.is_dir() else []
+    near = difflib.get_close_matches(folder.name, sorted(names), n=1)
+    return "there is no such folder" + "".join(f"; did you mean '{name}'?" for name in near)
+
+
 class Dataset:
     """Contents of the `dataset.yaml` and the calibrations of a folder."""
 
@@ -259,9 +292,7 @@ class Dataset:
         self.folder = Path(folder)
         record = self.folder / "dataset.yaml"
         if not record.is_file():
-            raise Error(
-                f"{self.folder}: it contains no dataset.yaml; give an output of groundray generate"
-            )
+            raise Error(f"{self.folder}: {_why_no_dataset(self.folder)}")
         root = _read_map(record)
         if root.text("groundray_dataset") != "1":
             raise root.fault(

@@ -9,6 +9,7 @@
 #include <span>
 
 #include "core/error.h"
+#include "core/near_names.h"
 
 namespace groundray::yaml::calibration {
 namespace {

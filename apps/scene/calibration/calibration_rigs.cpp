@@ -11,6 +11,7 @@
 #include <span>
 
 #include "apps/scene/calibration/calibration_reader.h"
+#include "core/near_names.h"
 
 // Readers of files with several cameras and their poses.
 namespace groundray::yaml::calibration {

@@ -13,6 +13,7 @@
 #include "apps/scene/yaml_reader.h"
 #include "core/error.h"
 #include "core/io/text_lines.h"
+#include "core/near_names.h"
 
 namespace groundray {
 namespace {
@@ -70,7 +71,7 @@ void read_colmap_line(const std::vector<std::string_view>& words, const Node& at
     for (const ColmapModel& known : colmap_models) names.emplace_back(known.name);
     const std::string word(words.size() < 2 ? "" : words[1]);
     return faults.add(at, "", "the model '{}' must be one of {}{}", word, fmt::join(names, ", "),
-                      yaml::suggestion(word, names));
+                      suggestion(word, names));
   }
   const std::size_t count = words_of(model->parameters).size();
   std::vector<double> numbers;

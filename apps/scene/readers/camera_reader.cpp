@@ -11,6 +11,7 @@
 #include "apps/scene/readers/readers.h"
 #include "core/error.h"
 #include "core/image/image_io.h"
+#include "core/near_names.h"
 #include "sensors/camera/camera.h"
 #include "sensors/camera/imager.h"
 #include "sensors/camera/lens/lens.h"

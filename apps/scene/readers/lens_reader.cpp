@@ -10,6 +10,7 @@
 #include "apps/scene/readers/readers.h"
 #include "apps/scene/readers/scene_reader.h"
 #include "core/error.h"
+#include "core/near_names.h"
 
 namespace groundray::yaml {
 namespace {

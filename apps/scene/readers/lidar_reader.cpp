@@ -45,7 +45,13 @@ void read_pulse(Map& laser, PulseSpec& pulse, Faults& faults) {
 }
 
 void read_laser(Map laser, LightSpec& light, Faults& faults) {
-  laser.read_number("wavelength_nm", Need::Required, light.wavelength_nm, positive);
+  if (const Node* const at =
+          laser.read_number("wavelength_nm", Need::Required, light.wavelength_nm, positive)) {
+    const double given = light.wavelength_nm;
+    if (given < 400 || given > 2000)
+      faults.add(*at, "wavelength_nm", "is {}, but must be from 400 to 2000{}", at->text,
+                 given < 10 ? fmt::format(": {} um are {:.6g} nm", at->text, 1000 * given) : "");
+  }
   laser.read_scaled("pulse_energy_nj", Need::Required, 1e-9, light.optics.pulse_energy_j, positive);
   read_pulse(laser, light.pulse, faults);
   laser.read_number("efficiency", Need::Optional, light.optics.emitter_efficiency,

@@ -6,6 +6,7 @@
 #include "apps/scene/readers/readers.h"
 #include "apps/scene/readers/scene_reader.h"
 #include "core/error.h"
+#include "core/near_names.h"
 
 namespace groundray::yaml {
 namespace {
@@ -140,8 +141,8 @@ std::optional<Material> read_material(const Node& node, std::string_view key, co
     if (name.ends_with(".yaml")) return load_material(beside(path, name));
     const auto names = preset_names(folder);
     if (std::ranges::count(names, name) > 0) return load_material(folder / (name + ".yaml"));
-    faults.add(node, key, "{} is not in {}{}; it has {}", shown(node), folder.string(),
-               suggestion(name, names), fmt::join(names, ", "));
+    faults.add(node, key, "{} is not in {}, which has {}{}", shown(node), folder.string(),
+               fmt::join(names, ", "), suggestion(name, names));
   } catch (const Error& fault) {
     faults.add(node, key, "the material cannot be read:\n{}", fault.what());
   }

@@ -9,6 +9,7 @@
 #include "apps/scene/readers/readers.h"
 #include "apps/scene/readers/scene_reader.h"
 #include "core/error.h"
+#include "core/near_names.h"
 
 namespace groundray::yaml {
 namespace {
@@ -75,8 +76,8 @@ void read_source(Map& entry, std::string_view list, SensorKind kind, const fs::p
     // Presets of the other kind are reported by `read`.
     if (preset && (!is_file_name(node.text) || !fs::exists(place))) {
       const auto names = preset_names(preset_folder, kind);
-      faults.add(node, key, "{} is not in {}{}; it has {}", shown(node), preset_folder.string(),
-                 suggestion(node.text, names), fmt::join(names, ", "));
+      faults.add(node, key, "{} is not in {}, which has {}{}", shown(node), preset_folder.string(),
+                 fmt::join(names, ", "), suggestion(node.text, names));
       return;
     }
     mounted.text = read_file(place);
@@ -89,6 +90,7 @@ void read_source(Map& entry, std::string_view list, SensorKind kind, const fs::p
 MountedLidar read_mounted_lidar(Map entry, const fs::path& path, const fs::path& preset_folder,
                                 SensorNames& names, Faults& faults) {
   MountedLidar mounted;
+  mounted.where = faults.place(entry.node());
   mounted.name = read_name(entry, "lidar", names, faults);
   read_source(entry, "lidars", SensorKind::Lidar, path, preset_folder, mounted, faults,
               [&](const fs::path& place) { mounted.lidar = parse_lidar(mounted.text, place); });
@@ -143,6 +145,7 @@ void read_projected(Map& entry, const SensorNames& names, std::vector<std::strin
 MountedCamera read_mounted_camera(Map entry, const fs::path& path, const fs::path& preset_folder,
                                   SensorNames& names, Faults& faults) {
   MountedCamera mounted;
+  mounted.where = faults.place(entry.node());
   mounted.name = read_name(entry, "camera", names, faults);
   const std::size_t before = faults.count();
   read_source(entry, "cameras", SensorKind::Camera, path, preset_folder, mounted, faults,
@@ -185,6 +188,7 @@ bool are_in_step(const MountedCamera& a, const MountedCamera& b) {
 StereoSpec read_stereo_pair(Map entry, std::span<const MountedCamera> cameras, SensorNames& names,
                             Faults& faults) {
   StereoSpec pair;
+  pair.where = faults.place(entry.node());
   const auto camera = [&](const char* key, std::string& into) -> const MountedCamera* {
     if (const Node* at = entry.find(key, Need::Required))
       into = read_reference(*at, key, "camera", names, faults);

@@ -108,9 +108,11 @@ DrivenPath read_drive(Map drive, Faults& faults) {
   DrivenPath path;
   const auto waypoints = drive.list("waypoints_m", Need::Required);
   path.waypoints_m = read_points(waypoints, "waypoints_m", faults);
-  if (const Node* at = drive.find("waypoints_m", Need::Optional); at && waypoints.size() < 2) {
-    faults.add(*at, "waypoints_m", "has {} points, but a drive needs at least two",
-               waypoints.size());
+  if (const Node* at = drive.find("waypoints_m", Need::Optional)) {
+    path.where = faults.place(*at);
+    if (waypoints.size() < 2)
+      faults.add(*at, "waypoints_m", "has {} points, but a drive needs at least two",
+                 waypoints.size());
   }
   drive.read_number("speed_m_s", Need::Required, path.speed_m_s, positive);
   drive.read_number("height_m", Need::Required, path.height_m, not_negative);
@@ -125,7 +127,8 @@ std::variant<StandingObject, RecordedPath, DrivenPath> read_place(Map& entry, co
   auto drive = entry.map("drive", Need::Optional);
   if (recorded != nullptr && drive)
     with.faults.add(*recorded, "trajectory", "must not be given together with 'drive'");
-  if (recorded != nullptr) return RecordedPath{beside(with.path, tum)};
+  if (recorded != nullptr)
+    return RecordedPath{beside(with.path, tum), with.faults.place(*recorded)};
   if (drive) return read_drive(std::move(*drive), with.faults);
   return read_standing(entry);
 }
@@ -209,9 +212,8 @@ std::variant<RecordedPath, DrivenPath> read_platform(Map platform, const fs::pat
                                                      Faults& faults) {
   std::variant<RecordedPath, DrivenPath> result;
   std::string tum;
-  if (platform.read_text("trajectory", Need::Optional, tum)) {
-    result = RecordedPath{beside(path, tum)};
-  }
+  if (const Node* const at = platform.read_text("trajectory", Need::Optional, tum))
+    result = RecordedPath{beside(path, tum), faults.place(*at)};
   auto drive = platform.map("drive", Need::Optional);
   const bool recorded = platform.find("trajectory", Need::Optional) != nullptr;
   if (recorded == drive.has_value() && platform.node().kind == Node::Kind::Map) {
@@ -230,6 +232,7 @@ std::vector<ObjectSpec> read_objects(Map& root, const fs::path& path, const Data
   for (const Node& node : root.list("objects", Need::Optional)) {
     Map entry(node, "objects", faults);
     ObjectSpec& object = objects.emplace_back();
+    object.where = faults.place(node);
     entry.read_text("name", Need::Required, object.name);
     entry.read_whole("label", Need::Required, object.label);
     entry.read_number("scale", Need::Optional, object.scale, positive);
@@ -247,6 +250,7 @@ std::vector<ScatterLayer> read_scatter(Map& root, const fs::path& path, const Da
   UniqueNames names("layer", faults);
   for (const Node& node : root.list("scatter", Need::Optional)) {
     ScatterLayer layer = read_scatter_layer(Map(node, "scatter", faults), {path, folders, faults});
+    layer.where = faults.place(node);
     layer.scatter.layer = hash_of(layer.name);
     names.add(node, layer.name);
     for (const ScatterLayer& other : layers) {

@@ -6,6 +6,7 @@
 
 #include "apps/scene/readers/readers.h"
 #include "core/error.h"
+#include "core/near_names.h"
 
 namespace groundray::yaml {
 namespace {

@@ -10,6 +10,7 @@
 #include "apps/scene/readers/readers.h"
 #include "apps/scene/yaml_reader.h"
 #include "core/appearance/bsdf.h"
+#include "core/io/open_file.h"
 #include "sensors/lidar/lidar.h"
 
 namespace groundray::yaml {
@@ -160,6 +161,24 @@ void refuse_camera(const Node& node, const fs::path& path) {
   faults.throw_if_any();
 }
 
+// Rejects at once a file that is not a scene, because most of its keys would be unknown.
+void refuse_others(const Node& node, const fs::path& path) {
+  Faults faults(path);
+  Map root(node, "", faults);
+  if (root.find("groundray", Need::Optional) != nullptr) return;
+  for (const auto& [key, kind] :
+       {std::pair("groundray_lidar",
+                  "a lidar, which a scene names under "
+                  "'lidars'"),
+        {"groundray_camera", "a camera, which a scene names under 'cameras'"},
+        {"groundray_material", "a material"},
+        {"groundray_dataset", "the record of a dataset: give its folder"}}) {
+    if (const Node* const at = root.find(key, Need::Optional))
+      faults.add(*at, key, "this is no scene, but {}", kind);
+  }
+  faults.throw_if_any();
+}
+
 SensorKind kind_of(const fs::path& preset) {
   constexpr std::string_view key = "groundray_camera:";
   const std::string text = yaml::read_file(preset);
@@ -177,6 +196,7 @@ SceneSpec load_scene(const fs::path& path, const fs::path& preset_folder) {
 SceneSpec parse_scene(const std::string& text, const fs::path& path,
                       const fs::path& preset_folder) {
   const Node node = yaml::parse(text, path);
+  refuse_others(node, path);
   Faults faults(path);
   SceneSpec scene;
   scene.text = text;
@@ -234,9 +254,8 @@ CameraSpec parse_camera(const std::string& text, const fs::path& path) {
 std::vector<std::string> preset_names(const fs::path& preset_folder) {
   std::vector<std::string> names;
   std::error_code fault;
-  for (const fs::directory_entry& entry : fs::directory_iterator(preset_folder, fault)) {
-    if (entry.path().extension() == ".yaml") names.push_back(entry.path().stem().string());
-  }
+  for (const fs::path name : names_in(preset_folder, fault))
+    if (name.extension() == ".yaml") names.push_back(name.stem().string());
   if (fault) {
     throw Error("{}: the folder of presets cannot be read: {}", preset_folder.string(),
                 fault.message());

@@ -146,7 +146,8 @@ TerrainSpec read_terrain(Map terrain, const fs::path& path, const DataFolders& f
   spec.texture = read_ground_texture(terrain, path, faults);
   spec.cover = read_cover(terrain, path, folders, faults);
   read_path(terrain, "orthophoto", Need::Optional, path, spec.orthophoto);
-  read_path(terrain, "dem", Need::Required, path, spec.dem);
+  if (const Node* const dem = read_path(terrain, "dem", Need::Required, path, spec.dem))
+    spec.where = faults.place(*dem);
   terrain.read_number("nodata", Need::Optional, spec.options.nodata);
   terrain.read_text("reproject_to", Need::Optional, spec.options.reproject_to);
   terrain.read_whole("label", Need::Optional, spec.label);

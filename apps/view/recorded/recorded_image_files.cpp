@@ -19,6 +19,7 @@
 #include "core/image/image_io.h"
 #include "core/io/file_io.h"
 #include "core/io/npy_io.h"
+#include "core/io/open_file.h"
 
 namespace groundray {
 namespace {
@@ -261,8 +262,8 @@ void add_echoes(const fs::path& stem, std::vector<ImageChannel>& channels) {
   const std::string begin = stem.filename().string() + "_";
   std::map<std::string, fs::path> files;
   std::error_code ignored;
-  for (const auto& entry : fs::directory_iterator(stem.parent_path(), ignored)) {
-    const fs::path& path = entry.path();
+  for (const std::string& file : names_in(stem.parent_path(), ignored)) {
+    const fs::path path = stem.parent_path() / file;
     const std::string name = path.stem().string();
     if (path.extension() == ".npy" && name.starts_with(begin))
       files[name.substr(begin.size())] = path;

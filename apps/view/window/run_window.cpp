@@ -5,6 +5,7 @@
 #include <QApplication>
 #include <QStandardPaths>
 #include <QSurfaceFormat>
+#include <clocale>
 #include <cstdlib>
 
 #include "apps/view/window/style.h"
@@ -41,6 +42,7 @@ int run_window(int& argc, char** argv, const WindowStart& start) {
   QSurfaceFormat::setDefaultFormat(QVTKOpenGLNativeWidget::defaultFormat());
   QApplication::setAttribute(Qt::AA_EnableHighDpiScaling);
   const QApplication application(argc, argv);
+  std::setlocale(LC_NUMERIC, "C");  // Qt takes the user's, with which VTK writes commas
   set_style(*qApp);
   WindowStart begun = start;
   if (begun.settings.empty()) begun.settings = settings_file();

@@ -38,7 +38,13 @@ class Simplifier {
       : original_(mesh), options_(options), work_(work) {}
 
   Simplified operator()(const VerticalBound& stop) const {
-    return bounded_above(original_.equal(stop.error_m, stop.border_m));
+    VerticalRules::MayJoin may_join;
+    if (stop.may_join) {
+      may_join = [&](std::uint32_t a, std::uint32_t b) {
+        return stop.may_join(original_.sources()[a], original_.sources()[b]);
+      };
+    }
+    return bounded_above(original_.equal(stop.error_m, stop.border_m), may_join);
   }
   Simplified operator()(const DistanceBound& stop) const;
   Simplified operator()(const FaceBudget& stop) const;
@@ -50,7 +56,8 @@ class Simplifier {
   Simplified operator()(const CostKnee& stop) const;
 
  private:
-  Simplified bounded_above(const Tolerances& tolerances) const;
+  Simplified bounded_above(const Tolerances& tolerances,
+                           const VerticalRules::MayJoin& may_join = {}) const;
   DecimationState bounded_around(const Tolerances& tolerances, const Stage& stage) const;
   DecimationState free_piece() const { return original_.state(options_, original_.equal(0, 0)); }
   std::vector<CostStep> collapse_to(DecimationState& piece, std::size_t triangles,
@@ -91,14 +98,15 @@ bool Simplifier::keep_covered(const std::vector<VerticalDistance>& distances,
 // A vertex that a boundary withdrew from is stored with that boundary, but another boundary may
 // have come nearer. Each round therefore starts anew, and boundaries do not withdraw from vertices
 // that were too far in earlier rounds, nor, in the last round, from any.
-Simplified Simplifier::bounded_above(const Tolerances& tolerances) const {
+Simplified Simplifier::bounded_above(const Tolerances& tolerances,
+                                     const VerticalRules::MayJoin& may_join) const {
   const std::vector<glm::dvec3>& places_m = original_.surface().mesh().vertices_m;
   std::vector<bool> stay_covered(places_m.size());
   double begin = 0;
   for (std::size_t round = 1; round < most_rounds; ++round) {
     const double end = 0.9 + 0.1 * begin;
     DecimationState piece = original_.state(options_, tolerances);
-    VerticalRules rules(piece, tolerances.border_m, stay_covered, original_.rounding_m());
+    VerticalRules rules(piece, tolerances.border_m, stay_covered, original_.rounding_m(), may_join);
     EdgeCollapse collapse(piece, rules, 0);
     run(collapse, {work_, begin, end});
     const RemainingMesh remainder = remaining_mesh(piece.mesh);

@@ -2,6 +2,7 @@
 
 #include <cstddef>
 #include <cstdint>
+#include <functional>
 #include <numbers>
 #include <optional>
 #include <variant>
@@ -23,6 +24,9 @@ namespace groundray {
 struct VerticalBound {
   double error_m = 0;
   double border_m = 0;
+  /// Returns whether the result may have a new edge between two vertices of the mesh, given by
+  /// number; any, if it is empty.
+  std::function<bool(std::uint32_t, std::uint32_t)> may_join{};
 };
 
 /// Stopping criterion: no point of either surface may be farther than `error_m` from the other, nor

@@ -60,11 +60,12 @@ bool BorderGrid::has_any(const SurfaceMesh& mesh, const std::array<Entry, 3>& co
 }
 
 VerticalRules::VerticalRules(DecimationState& piece, std::optional<double> border_m,
-                             std::vector<bool> stay_covered, double rounding_m)
+                             std::vector<bool> stay_covered, double rounding_m, MayJoin may_join)
     : piece_(piece),
       border_m_(border_m),
       stay_covered_(std::move(stay_covered)),
       rounding_m_(rounding_m),
+      may_join_(std::move(may_join)),
       lists_(piece.triangles),
       borders_(piece.mesh),
       is_covered_(piece.samples.size()) {
@@ -246,6 +247,17 @@ bool VerticalRules::keeps_samples(const Star& star) {
   return true;
 }
 
+// Returns true if the edges that appear may: those from the tip to the ring, but for its neighbours
+// on the ring, and the boundary's.
+bool VerticalRules::may_have_edges(const Star& star, std::size_t to) const {
+  if (!may_join_) return true;
+  const auto joins = [&](std::uint32_t vertex) { return may_join_(star.ring[to], vertex); };
+  for (std::size_t i = 1; i < fan_.triangles; ++i) {
+    if (!joins(star.ring[(fan_.first + i) % star.ring.size()])) return false;
+  }
+  return !is_open_ || joins(to == 0 ? star.ring.back() : star.ring.front());
+}
+
 bool VerticalRules::allow(const Star& star, const FeatureLines::Crossing& crossing,
                           std::size_t to) {
   if (!set_fan(star, to)) return false;
@@ -259,7 +271,7 @@ bool VerticalRules::allow(const Star& star, const FeatureLines::Crossing& crossi
   placed_.emplace_back(star.centre, sector);
   if (!may_collapse(star, to)) return false;
   if (is_open_ && !keeps_border(star, to)) return false;
-  return keeps_samples(star);
+  return keeps_samples(star) && may_have_edges(star, to);
 }
 
 void VerticalRules::collapse(const Star& star, const FeatureLines::Crossing& crossing,

@@ -2,6 +2,7 @@
 
 #include <array>
 #include <cstdint>
+#include <functional>
 #include <glm/vec2.hpp>
 #include <glm/vec3.hpp>
 #include <limits>
@@ -68,13 +69,16 @@ class TriangleLists {
 /// with the boundary edge that represents it, at most `border_m` away horizontally.
 class VerticalRules final : public CollapseRules {
  public:
+  using MayJoin = std::function<bool(std::uint32_t, std::uint32_t)>;
+
   /// @param piece     all of its triangles have an area in plan view; must outlive this.
   /// @param border_m  permitted horizontal displacement of boundaries, including those between
   ///                  labels; each vertex's tolerance if it is not given.
   /// @param stay_covered  of each vertex: true if boundaries may withdraw from it by at most
   ///                      `rounding_m`, regardless of `border_m`; false for all if empty.
+  /// @param may_join  returns whether an edge may join two vertices; any if empty.
   VerticalRules(DecimationState& piece, std::optional<double> border_m,
-                std::vector<bool> stay_covered = {}, double rounding_m = 0);
+                std::vector<bool> stay_covered = {}, double rounding_m = 0, MayJoin may_join = {});
 
   bool allow(const Star& star, const FeatureLines::Crossing& crossing, std::size_t to) override;
   void collapse(const Star& star, const FeatureLines::Crossing& crossing, std::size_t to) override;
@@ -100,11 +104,13 @@ class VerticalRules final : public CollapseRules {
   bool keeps_line() const;
   bool keeps_border(const Star& star, std::size_t to);
   bool keeps_samples(const Star& star);
+  bool may_have_edges(const Star& star, std::size_t to) const;
 
   DecimationState& piece_;
   std::optional<double> border_m_;
   std::vector<bool> stay_covered_;
   double rounding_m_ = 0;
+  MayJoin may_join_;
   double least_m2_ = 0;  // twice the smallest permitted area, unless there are smaller triangles
   TriangleLists lists_;
   BorderGrid borders_;

@@ -101,7 +101,7 @@ double FiringCycle::pulse_time_s(std::int64_t pulse) const noexcept {
   return time_s(place.cycle, volleys_[place.volley]);
 }
 
-void FiringCycle::fill(NumberRange pulses, PulseBatch& batch, std::size_t row) const noexcept {
+void FiringCycle::fill(NumberRange pulses, PulseBatch& batch, std::size_t row) const {
   if (pulses.begin >= pulses.end) return;
   auto [cycle, v, shot] = place_of(pulses.begin);
   double cosine = fixed_cos_;

@@ -120,7 +120,7 @@ class FiringCycle {
 
   /// Writes pulses [begin, end) to the rows of `batch` from `row` on, and appends their volleys. A
   /// volley that the range cuts is written in part.
-  void fill(NumberRange pulses, PulseBatch& batch, std::size_t row) const noexcept;
+  void fill(NumberRange pulses, PulseBatch& batch, std::size_t row) const;
 
  private:
   struct Place {

@@ -42,7 +42,7 @@ std::int64_t ScanPattern::neighbour_stride() const noexcept {
 }
 
 void ScanPattern::fill(std::int64_t sweep, std::int64_t begin, std::int64_t end,
-                       PulseBatch& batch) const noexcept {
+                       PulseBatch& batch) const {
   assert(0 <= begin && begin <= end && end <= pulses(sweep));
   batch.reset(static_cast<std::size_t>(end - begin));
   std::visit(

@@ -37,8 +37,7 @@ class ScanPattern {
   /// into ranges gives the same pulses, bit for bit; a volley that is divided appears in both
   /// ranges.
   /// @param begin, end  0 <= begin <= end <= pulses(sweep)
-  void fill(std::int64_t sweep, std::int64_t begin, std::int64_t end,
-            PulseBatch& batch) const noexcept;
+  void fill(std::int64_t sweep, std::int64_t begin, std::int64_t end, PulseBatch& batch) const;
 
   /// Returns the stamp of a sweep: the time of its first firing since time 0, to the nearest
   /// nanosecond.

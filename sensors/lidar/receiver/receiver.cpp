@@ -314,7 +314,7 @@ Receiver::Timed Receiver::reported(const EchoTrace& trace, double threshold_w, d
 }
 
 void Receiver::detect(const Waveform& waveform, const RangeGate& gate, const PulseNoise& noise,
-                      Detections& found) const noexcept {
+                      Detections& found) const {
   found.clear();
   find_echoes(waveform, noise, found);
   if (spec_.noise) add_false_alarms(gate, noise, found);
@@ -327,7 +327,7 @@ void Receiver::detect(const Waveform& waveform, const RangeGate& gate, const Pul
 }
 
 void Receiver::find_echoes(const Waveform& waveform, const PulseNoise& noise,
-                           Detections& found) const noexcept {
+                           Detections& found) const {
   const double background = noise.background_w;
   const double threshold = threshold_w(background);
   const double floor_w =
@@ -368,7 +368,7 @@ void Receiver::find_echoes(const Waveform& waveform, const PulseNoise& noise,
 // the threshold by an exponentially distributed amount. The sensor takes it for an echo, so its
 // standard deviation is that of a peak of the same shape.
 void Receiver::add_false_alarms(const RangeGate& gate, const PulseNoise& noise,
-                                Detections& found) const noexcept {
+                                Detections& found) const {
   assert(std::isfinite(gate.far_m));
   const double sigma_w = noise_w(0, noise.background_w);
   const double threshold = threshold_w(noise.background_w);

@@ -93,15 +93,14 @@ class Receiver {
 
   /// Sets `waveform` to the received power, independent of the order of `arrivals`.
   /// @param kept  bins to keep even without a pulse, for Waveform::add.
-  void sample(std::span<const Arrival> arrivals, Waveform& waveform,
-              Bins kept = {}) const noexcept {
+  void sample(std::span<const Arrival> arrivals, Waveform& waveform, Bins kept = {}) const {
     sampler_.sample(arrivals, s_per_m_, kept, waveform);
   }
   /// Replaces `found` by the detections in a waveform, by range.
   /// @param gate  gate of reported ranges; detections outside are ignored and start no dead time.
   ///        Its far end must be finite if there is noise.
   void detect(const Waveform& waveform, const RangeGate& gate, const PulseNoise& noise,
-              Detections& found) const noexcept;
+              Detections& found) const;
 
  private:
   struct Timed;
@@ -112,10 +111,8 @@ class Receiver {
                   double normal) const noexcept;
   Timed reported(const EchoTrace& trace, double threshold_w, double background_w,
                  const glm::dvec2& normal) const noexcept;
-  void find_echoes(const Waveform& waveform, const PulseNoise& noise,
-                   Detections& found) const noexcept;
-  void add_false_alarms(const RangeGate& gate, const PulseNoise& noise,
-                        Detections& found) const noexcept;
+  void find_echoes(const Waveform& waveform, const PulseNoise& noise, Detections& found) const;
+  void add_false_alarms(const RangeGate& gate, const PulseNoise& noise, Detections& found) const;
 
   ReceiverSpec spec_;
   double response_sigma_s_;

@@ -230,7 +230,7 @@ void Waveform::lay_out(Bins kept, std::int64_t width) {
 }
 
 void PulseSampler::sample(std::span<const Arrival> arrivals, double s_per_m, Bins kept,
-                          Waveform& waveform) const noexcept {
+                          Waveform& waveform) const {
   waveform.interval_s_ = interval_s_;
   if (!std::ranges::is_sorted(arrivals, arrival_precedes)) {
     waveform.arrivals_.assign(arrivals.begin(), arrivals.end());

@@ -130,7 +130,7 @@ class PulseSampler {
   /// @param s_per_m  two-way time per metre of range.
   /// @param kept  bins to keep even without a pulse; rounded outwards.
   void sample(std::span<const Arrival> arrivals, double s_per_m, Bins kept,
-              Waveform& waveform) const noexcept;
+              Waveform& waveform) const;
 
  private:
   double interval_s_;

@@ -121,7 +121,7 @@ TEST(CloudFile, SuggestsConversionOfOtherFormats) {
   EXPECT_THAT(fault_of("a.pcap"), HasSubstr("packets are not read"));
   EXPECT_THAT(fault_of("a.xyz"),
               HasSubstr("the extension \".xyz\" is not one of the supported point files"));
-  EXPECT_THAT(fault_of("/no/a.ply"), HasSubstr("/no/a.ply: cannot be read"));
+  EXPECT_THAT(fault_of("/no/a.ply"), HasSubstr("/no/a.ply: there is no such file"));
 }
 
 TEST(CloudFile, RejectsGarbageInEveryFormat) {

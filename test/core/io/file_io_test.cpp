@@ -165,9 +165,17 @@ TEST(ReadText, ReturnsEveryByte) {
 TEST(ReadText, ReportsWhyAFileCannotBeRead) {
   const TemporaryFolder folder;
   EXPECT_THAT(message_of([&] { read_text(folder / "a"); }),
-              HasSubstr("a: cannot be read: No such file or directory; check its name"));
+              HasSubstr("a: there is no such file or folder"));
   EXPECT_THAT(message_of([&] { read_text(folder.path()); }),
-              HasSubstr("cannot be read: Is a directory"));
+              HasSubstr("it is a folder, but must be a file"));
+}
+
+TEST(CheckEnding, ComparesWithoutCaseAndNamesTheFirstEnding) {
+  EXPECT_NO_THROW(check_ending("x.TIF", {".tif", ".tiff"}));
+  EXPECT_EQ(message_of([] {
+              check_ending("x.png", {".tif", ".tiff"});
+            }),
+            "x.png: its name must end in .tif");
 }
 
 }  // namespace

@@ -5,6 +5,9 @@
 #include <sys/stat.h>
 #include <unistd.h>
 
+#include <fstream>
+#include <sstream>
+#include <string>
 #include <system_error>
 
 #include "core/error.h"
@@ -74,9 +77,9 @@ TEST(OpenFile, TakesRegularFilesAlone) {
   EXPECT_THAT([&] { read_text(folder / "zeros"); },
               ThrowsMessage<Error>(HasSubstr("zeros: cannot be read: it is a pipe or device")));
   EXPECT_THAT([&] { read_text(folder / "folder"); },
-              ThrowsMessage<Error>(HasSubstr("folder: cannot be read: Is a directory")));
+              ThrowsMessage<Error>(HasSubstr("folder: it is a folder, but must be a file")));
   EXPECT_THAT([&] { read_text(folder / "none"); },
-              ThrowsMessage<Error>(HasSubstr("none: cannot be read: No such file or directory")));
+              ThrowsMessage<Error>(HasSubstr("none: there is no such file or folder")));
   for (const char* name : {"pipe", "zeros", "folder", "none"})
     EXPECT_FALSE(open_stream(folder / name)) << name;
 }
@@ -89,6 +92,40 @@ TEST(OpenFile, FollowsLinksToRegularFiles) {
   std::string word;
   open_stream(folder / "b") >> word;
   EXPECT_EQ(word, "text");
+}
+
+TEST(NamesIn, AreSortedAndFaultsAreReported) {
+  const TemporaryFolder folder;
+  for (const char* name : {"b", "a", ".hidden"}) write_text(folder / name, "");
+  fs::create_directory(folder / "c");
+  fs::create_symlink("nowhere", folder / "d");
+  std::error_code fault;
+  EXPECT_THAT(names_in(folder / "", fault), ::testing::ElementsAre(".hidden", "a", "b", "c", "d"));
+  EXPECT_FALSE(fault);
+  EXPECT_TRUE(names_in(folder / "a", fault).empty());
+  EXPECT_EQ(fault, std::errc::not_a_directory);
+  EXPECT_TRUE(names_in(folder / "e", fault).empty());
+  EXPECT_EQ(fault, std::errc::no_such_file_or_directory);
+}
+
+TEST(NextLine, ReadsAsGetlineDoesExceptEndlessLines) {
+  for (const std::string text : {"", "\n", "a", "a\n", "a\n\nb", "a\r\n\0b\n"}) {
+    std::istringstream ours(text), theirs(text);
+    std::string line, expected;
+    while (std::getline(theirs, expected)) {
+      ASSERT_TRUE(next_line(ours, line));
+      EXPECT_EQ(line, expected);
+      EXPECT_EQ(ours.eof(), theirs.eof());
+    }
+    EXPECT_FALSE(next_line(ours, line));
+    EXPECT_TRUE(ours.eof() && ours.fail() && !ours.bad());
+  }
+  const TemporaryFolder folder;
+  write_text(folder / "sparse", "");
+  fs::resize_file(folder / "sparse", std::uintmax_t{1} << 40);
+  std::ifstream sparse = open_stream(folder / "sparse");
+  std::string line;
+  EXPECT_FALSE(next_line(sparse, line));
 }
 
 }  // namespace

@@ -160,8 +160,8 @@ TEST(LidarObjects, EachObjectReflectsByItsMaterial) {
   EXPECT_NEAR(amplitude_of(0.8) / amplitude_of(0.2), 4, 1e-5);
 }
 
-// Objects are exact, and at full resolution the ground is too.
-TEST(LidarObjects, ObjectsOnGroundAtFullResolutionHaveNoError) {
+// Objects are exact, and at full resolution the ground is too: the bound is the accuracy of ranges.
+TEST(LidarObjects, ObjectsOnGroundAtFullResolutionHaveNoErrorButTheRanges) {
   LidarSpec spec = vlp16();
   spec.error_bound = LidarSpec::ErrorBound::Report;
   const Scene scene = scene_of(Tracing::Fast, {box_model({1, 1, 1})}, {{{5, 0, 0.5}}}, {}, {}, 0);
@@ -170,7 +170,13 @@ TEST(LidarObjects, ObjectsOnGroundAtFullResolutionHaveNoError) {
   const auto instance = cloud.column<std::uint32_t>("instance");
   EXPECT_GT(std::ranges::count(instance, 1u), 100);
   EXPECT_GT(std::ranges::count(instance, 0u), 1000);
-  for (const float bound_m : cloud.column<float>("error_bound")) EXPECT_EQ(bound_m, 0);
+  const auto range_m = cloud.column<double>("range_true");
+  const auto bound_m = cloud.column<float>("error_bound");
+  for (std::size_t i = 0; i < cloud.rows(); ++i) {
+    const double accuracy_m = 1e-9 * range_m[i] + 1e-9;
+    EXPECT_GE(double{bound_m[i]}, accuracy_m * (1 - 1e-7));
+    EXPECT_LE(double{bound_m[i]}, 2 * accuracy_m);
+  }
 }
 
 }  // namespace

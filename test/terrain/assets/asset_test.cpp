@@ -638,7 +638,8 @@ TEST(Asset, RejectsMembersThatItsKindDoesNotHave) {
     asset_kind("pine");
     FAIL();
   } catch (const Error& error) {
-    EXPECT_THAT(error.what(), AllOf(HasSubstr("`pine`"), HasSubstr("conifer, broadleaf_tree")));
+    EXPECT_THAT(error.what(),
+                AllOf(HasSubstr("there is no asset 'pine'"), HasSubstr("conifer, broadleaf_tree")));
   }
 }
 

@@ -94,7 +94,7 @@ TEST_F(RasterInput, NamesOfFilesAreLocal) {
       {std::string(5000, 'a'), "its name has 5000 characters, more than the limit of 4096"},
       {folder_ / "pipe", "it is not a regular file"},
       {"/dev/zero", "it is not a regular file"},
-      {folder_.path(), "it is not a regular file"},
+      {folder_.path(), "it is a folder, but must be a file"},
   };
   for (const auto& [name, message] : cases) {
     EXPECT_THAT(error_of([&] { load_dem(name); }), HasSubstr(message));

@@ -16,6 +16,7 @@
 #include "core/image/exr_io.h"
 #include "core/image/image_io.h"
 #include "core/io/file_io.h"
+#include "core/io/memory.h"
 #include "core/io/text_lines.h"
 
 namespace groundray::golden {
@@ -26,6 +27,21 @@ using namespace std::string_view_literals;
 
 constexpr std::string_view png_magic = "\x89PNG";
 constexpr double nothing = std::numeric_limits<double>::quiet_NaN();
+constexpr std::int64_t most_pixels = 1 << 26, most_values = 1 << 29;
+
+// Checks the memory of values in double.
+void check_values(const std::string& name, std::int64_t width, std::int64_t height,
+                  std::size_t channels) {
+  const double values =
+      static_cast<double>(width * height) * static_cast<double>(std::max<std::size_t>(channels, 1));
+  if (width * height > most_pixels || values > most_values) {
+    throw Error(
+        "{}: it has {} x {} pixels of {} channels; an image that is compared may have at most {} "
+        "(8192 x 8192) and {} values: crop it or scale it down",
+        name, width, height, channels, most_pixels, most_values);
+  }
+  require_memory(name, "its values", 2 * sizeof(double) * values);  // split into channels
+}
 
 /// Splits an image with interleaved channels into single channels with these names.
 template <typename T, typename Convert>
@@ -54,6 +70,7 @@ std::vector<std::string> light_names(int channels) {
 
 Channels read_exr_channels(std::string_view bytes, const std::string& name) {
   const ExrFile file = parse_exr(bytes, name);
+  check_values(name, file.display_size_px.x, file.display_size_px.y, file.channels.size());
   Channels channels;
   for (const ExrChannel& channel : file.channels) {
     NamedChannel& to = channels.emplace_back(NamedChannel{
@@ -140,7 +157,7 @@ Channels read_png_channels(std::string_view bytes, const std::string& name, PngM
 /// @throws Error unless `bytes` has exactly the expected size.
 ImageF floats_after(std::string_view bytes, const std::string& name, std::int64_t width,
                     std::int64_t height, int channels, std::endian order) {
-  if (width <= 0 || height <= 0 || width > most_image_pixels / height ||
+  if (width <= 0 || height <= 0 || width > most_pixels / height ||
       bytes.size() != static_cast<std::size_t>(width * height * channels) * sizeof(float)) {
     throw Error(
         "{}: it has {} bytes of pixels; {} x {} of {} x 4 bytes are expected: it is truncated or "
@@ -203,7 +220,8 @@ Channels read_channels(const std::string& bytes, const std::string& name, PngMea
   if (bytes.starts_with("PIEH"sv)) return read_flo(bytes, name);
   if (bytes.starts_with("PF\n"sv) || bytes.starts_with("Pf\n"sv)) return read_pfm(bytes, name);
   if (bytes.starts_with("#?"sv)) {
-    const ImageF image = parse_image_f(bytes, name);
+    const ImageF image = parse_image_f(bytes, name, PictureOf::Light, most_pixels);
+    check_values(name, image.width(), image.height(), 3);
     return split(image, light_names(image.channels()), as_it_is<float>);
   }
   throw Error(
@@ -232,14 +250,17 @@ PngNumbers png_numbers(std::string_view bytes, const std::string& name) {
   numbers.is_deep =
       bytes.starts_with(png_magic) && bytes.size() > depth_at && bytes[depth_at] == 16;
   const auto copy = [&](const auto& image, double scale) {
+    // Grey becomes three equal channels.
+    check_values(name, image.width(), image.height(),
+                 static_cast<std::size_t>(std::max(image.channels(), 3)));
     numbers.values = {image.width(), image.height(), image.channels()};
     std::ranges::transform(image.values(), numbers.values.values().begin(),
                            [scale](auto value) { return std::round(scale * value); });
   };
   if (numbers.is_deep) {
-    copy(parse_heights(bytes, name), 65535);
+    copy(parse_heights(bytes, name, most_pixels), 65535);
   } else {
-    copy(parse_image8(bytes, name), 1);
+    copy(parse_image8(bytes, name, most_pixels), 1);
   }
   return numbers;
 }

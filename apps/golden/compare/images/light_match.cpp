@@ -19,6 +19,8 @@ namespace {
 constexpr std::size_t colour_channels = 3;
 // Relative rounding of values stored as floats; smaller differences count as none.
 constexpr double float_rounding = 1.2e-7;
+// Degrees of freedom of the standard errors of a camera's pixels, as in sensors/camera/camera.h.
+constexpr double standard_error_freedom = 3;
 
 /// Light of an image with its uncertainty.
 struct Light {
@@ -38,8 +40,8 @@ struct Light {
     return std::isfinite(light->values.at(x, y)[k]) && std::isfinite(variance(x, y, k));
   }
   double freedom(int x, int y) const {
-    return samples == nullptr ? std::numeric_limits<double>::infinity()
-                              : samples->values.at(x, y)[0] - 1;
+    if (samples == nullptr) return std::numeric_limits<double>::infinity();
+    return samples->values.at(x, y)[0] < 4 ? 1 : standard_error_freedom;
   }
 };
 

@@ -239,7 +239,7 @@ TEST(CameraFile, ReadsItsLensFromACalibration) {
                         "'camera': cam0, cam1"));
   EXPECT_THAT(said_of_calibrated("calibration: chain.yaml, camera: cam2"),
               HasSubstr("key 'camera': is 'cam2', but the calibration has cam0, cam1; did you mean "
-                        "'cam0'?"));
+                        "'cam0' or 'cam1'?"));
   EXPECT_THAT(said_of_calibrated("calibration: chian.yaml, camera: cam0"),
               AllOf(HasSubstr("key 'calibration': cannot be read:"), HasSubstr("chian.yaml")));
 }

@@ -170,7 +170,8 @@ TEST(SceneFile, SuggestsTheClosestKey) {
               HasSubstr(":4:1: key 'tracng': unknown; did you mean 'tracing'?"));
   EXPECT_THAT(complaint("yaw_deg: 90", "yaw: 90"),
               HasSubstr(":21:7: key 'yaw': unknown; did you mean 'yaw_deg'?"));
-  EXPECT_THAT(complaint("label: 40", "hue: 40"), ::testing::EndsWith(":9:3: key 'hue': unknown"));
+  EXPECT_THAT(complaint("label: 40", "hue: 40"),
+              HasSubstr(":9:3: key 'hue': unknown; the keys here are cover, dem, label,"));
 }
 
 TEST(SceneFile, ReportsAMisspeltKeyOnceAndNotAsMissing) {
@@ -243,8 +244,8 @@ TEST(SceneFile, RejectsValuesOutOfRange) {
 TEST(SceneFile, RejectsAnUnknownPresetAndListsThePresets) {
   EXPECT_THAT(complaint("velodyne_vlp16", "velodyne_vlp-16"),
               AllOf(HasSubstr(":18:13: key 'preset': 'velodyne_vlp-16' is not in "),
-                    HasSubstr("did you mean 'velodyne_vlp16'?; it has hesai_pandar64, hesai_qt128, "
-                              "hesai_xt32, ouster_os0_128")));
+                    HasSubstr("which has hesai_pandar64, hesai_qt128, hesai_xt32, ouster_os0_128"),
+                    HasSubstr("did you mean 'velodyne_vlp16'?")));
 }
 
 TEST(SceneFile, RequiresExactlyOnePathAndOneLidarSource) {
@@ -282,7 +283,7 @@ TEST(SceneFile, ReportsTheFaultsOfALidarFile) {
 
 TEST(SceneFile, RejectsInvalidYaml) {
   EXPECT_THAT(complaint("[[0, 0], [40, 10.5]]", "[[0, 0], [40, 10.5]"),
-              AllOf(StartsWith("scenes/prairie.yaml:"), HasSubstr(": not YAML: ")));
+              StartsWith("scenes/prairie.yaml:12:18: this '[' is not closed"));
   EXPECT_THAT(complaint("seed:", "seed: : :"), StartsWith("scenes/prairie.yaml:2:"));
   EXPECT_THAT([] { parse("# nothing\n"); },
               ThrowsMessage<Error>("scenes/prairie.yaml:1:1: the file is empty"));
@@ -311,7 +312,7 @@ TEST(SceneFile, ReportsAMissingFile) {
   EXPECT_THAT([&] { load_scene(folder / "none.yaml", ""); },
               ThrowsMessage<Error>(HasSubstr("none.yaml: there is no such file")));
   EXPECT_THAT([&] { load_scene(folder.path(), ""); },
-              ThrowsMessage<Error>(HasSubstr("there is no such file")));
+              ThrowsMessage<Error>(HasSubstr("it is a folder, but must be a file")));
 }
 
 constexpr const char* scene_physics =
@@ -361,7 +362,7 @@ TEST(SceneFile, RequiresAMaterialForALaserAndAnOverlapForFog) {
   EXPECT_THAT(scene_complaint(with(soil, ", pulse_fwhm_ns: 5", "")),
               HasSubstr("key 'lidars': 'top' is invalid: pulse"));
   EXPECT_THAT(scene_complaint(with(soil, "wavelength_nm: 905", "wavelength_nm: 2400")),
-              AllOf(HasSubstr("key 'lidars': 'top' is invalid: "), HasSubstr("2400")));
+              HasSubstr("key 'wavelength_nm': is 2400, but must be from 400 to 2000"));
   EXPECT_THAT(scene_complaint(with(text, "label: 40", "label: 40\n  material: dry_sol")),
               AllOf(HasSubstr("key 'material': 'dry_sol' is not in "),
                     HasSubstr("did you mean 'dry_soil'?")));
@@ -580,7 +581,7 @@ TEST(SceneFile, ReportsFaultsInCameras) {
                     HasSubstr("this is a camera, not a lidar: name it under 'cameras'")));
   EXPECT_THAT(complaint("preset: euroc_mav_cam1", "preset: euroc_cam1"),
               AllOf(HasSubstr("'euroc_cam1' is not in "),
-                    HasSubstr("it has action_camera, automotive_2mp3, euroc_mav_cam0"),
+                    HasSubstr("which has action_camera, automotive_2mp3, euroc_mav_cam0"),
                     Not(HasSubstr("velodyne"))));
   EXPECT_THAT(complaint("name: right", "name: top"),
               HasSubstr("key 'name': 'top' is taken by an earlier lidar: names must differ"));

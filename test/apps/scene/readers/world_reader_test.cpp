@@ -165,7 +165,7 @@ TEST(WorldReader, ReportsFaultsInObjects) {
            {"name: a, label: 1, at_m: [0, 0]", "exactly one of 'asset' and 'model'"},
            {"name: a, label: 1, asset: rock, model: a.obj, at_m: [0, 0]",
             "exactly one of 'asset' and 'model'"},
-           {"name: a, label: 1, asset: pine, at_m: [0, 0]", "unknown kind `pine`"},
+           {"name: a, label: 1, asset: pine, at_m: [0, 0]", "there is no asset 'pine'"},
            {"name: a, label: 1, asset: [rock], at_m: [0, 0]", "key 'asset'"},
            {"name: a, label: 1, asset: rock, size_m: -1, at_m: [0, 0]", "key 'size_m'"},
            {"name: a, label: 1, asset: rock, sag_m: 1, at_m: [0, 0]", "a rock has no sag_m"},
