@@ -9,7 +9,7 @@
 namespace groundray {
 namespace {
 
-constexpr int least_intervals = 16, most_intervals = 32'768;
+constexpr int least_intervals = 24, most_intervals = 32'768;
 // Gaussian beams end where the irradiance is 1e-8 of that on the axis.
 const double gaussian_reach = std::sqrt(4 * std::numbers::ln10);
 constexpr double planar = 1.0 / 256;      // of the resolution
@@ -25,7 +25,7 @@ double stretch_of(double k) {
   return std::sqrt(1 - cosine * cosine) / (nearness * nearness);
 }
 
-// Returns the step from a number of intervals to the next: 16, 24, 32, 48, 64, ...
+// Returns the step from a number of intervals to the next: 24, 32, 48, 64, ...
 int step_of(int intervals) {
   const int power = static_cast<int>(std::bit_floor(static_cast<unsigned>(intervals)));
   return power / 2;
@@ -61,7 +61,7 @@ PlaneQuadrature::PlaneQuadrature(BeamSpec::Profile profile, double spacing_m, do
   for (int intervals = least_intervals; intervals <= most_intervals;
        intervals += step_of(intervals)) {
     std::vector<Node>& table = tables_.emplace_back();
-    double sum = 0;
+    double sum = 0, moment = 0;
     for (int k = 1; k < intervals; ++k) {
       const double angle_rad = std::numbers::pi * k / intervals;
       const double sine = std::sin(angle_rad), along = reach_ * std::cos(angle_rad);
@@ -69,8 +69,12 @@ PlaneQuadrature::PlaneQuadrature(BeamSpec::Profile profile, double spacing_m, do
       const double share = sine * (gaussian ? std::exp(-2 * along * along) : sine);
       table.push_back({along, k % 2 == 0 ? across : -across, share});
       sum += share;
+      moment += share * table.back().across;
     }
-    for (Node& node : table) node.share /= sum;
+    for (Node& node : table) {
+      node.share /= sum;
+      node.across -= moment / sum;
+    }
   }
 }
 
@@ -85,9 +89,9 @@ std::optional<FootprintPlane> PlaneQuadrature::plane_of(const LaserBeam& beam,
   }
   const double span_m = far_m - near_m;
   if (!(span_m > resolution_m_) || !std::isfinite(far_m)) return {};
-  glm::vec3 sum(0);
-  for (const Hit& hit : hits) sum += hit.normal;
-  FootprintPlane plane{.normal = glm::normalize(glm::dvec3(sum))};
+  FootprintPlane plane;
+  for (const Hit& hit : hits) plane.normal += glm::dvec3(hit.normal);
+  plane.normal = glm::normalize(plane.normal);
   const double tolerance_m = planar * resolution_m_ + normal_rounding * span_m;
   const auto offset_m = [&](const Ray& ray, double slope, double range_m) {
     return glm::dot(plane.normal, ray.origin) + slope * range_m;
