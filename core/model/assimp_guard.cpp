@@ -1,6 +1,7 @@
 #include <fmt/format.h>
 
 #include <algorithm>
+#include <cmath>
 #include <cstdint>
 #include <cstring>
 #include <nlohmann/json.hpp>
@@ -18,6 +19,14 @@ namespace groundray {
 namespace {
 
 using nlohmann::json;
+
+/// Returns an index, a count or an enumerator, which may be written as 1.0.
+std::size_t whole(const json& number) {
+  const auto value = number.get<double>();
+  if (!(value >= 0 && value < 0x1p53 && value == std::floor(value)))
+    throw Error("{} must be a whole number", number.dump());
+  return static_cast<std::size_t>(value);
+}
 
 /// A node: its children, and the number of elements of its mesh.
 struct Node {
@@ -132,7 +141,7 @@ std::size_t components_of(const std::string& type) {
   return type == "VEC2" ? 2 : type == "VEC3" ? 3 : 4;
 }
 
-std::size_t bytes_of(int component_type) {
+std::size_t bytes_of(std::size_t component_type) {
   if (component_type == 5120 || component_type == 5121) return 1;
   return component_type == 5122 || component_type == 5123 ? 2 : 4;
 }
@@ -142,7 +151,7 @@ void check_views(const json& gltf) {
   const auto views = gltf.value("bufferViews", none), buffers = gltf.value("buffers", none);
   for (const json& view : views) {
     const double end = view.value("byteOffset", 0.0) + view.at("byteLength").get<double>();
-    const json& buffer = buffers.at(view.at("buffer").get<std::size_t>());
+    const json& buffer = buffers.at(whole(view.at("buffer")));
     if (!(view.value("byteOffset", 0.0) >= 0 && end <= buffer.at("byteLength").get<double>())) {
       throw Error("a view extends to byte {} of a buffer of {}", end,
                   buffer.at("byteLength").dump());
@@ -152,9 +161,9 @@ void check_views(const json& gltf) {
     if (accessor.contains("sparse"))
       throw Error("sparse accessors are not supported: export the model without them");
     if (!accessor.contains("bufferView")) continue;
-    const json& view = views.at(accessor.at("bufferView").get<std::size_t>());
+    const json& view = views.at(whole(accessor.at("bufferView")));
     const auto element = static_cast<double>(components_of(accessor.at("type").get<std::string>()) *
-                                             bytes_of(accessor.at("componentType").get<int>()));
+                                             bytes_of(whole(accessor.at("componentType"))));
     const double offset = accessor.value("byteOffset", 0.0);
     const double count = accessor.at("count").get<double>();
     const double end = offset + (count - 1) * view.value("byteStride", element) + element;
@@ -169,12 +178,12 @@ std::size_t triangles_of(const json& gltf) {
   std::size_t sum = 0;
   for (const json& mesh : gltf.value("meshes", json::array())) {
     for (const json& primitive : mesh.at("primitives")) {
-      const int mode = primitive.value("mode", 4);  // 4 triangles, 5 a strip, 6 a fan
+      // 4 triangles, 5 a strip, 6 a fan
+      const std::size_t mode = whole(primitive.value("mode", json(4)));
       const auto own = primitive.find("indices");
       const json& accessor =
           own != primitive.end() ? *own : primitive.at("attributes").at("POSITION");
-      const auto count =
-          gltf.at("accessors").at(accessor.get<std::size_t>()).at("count").get<std::size_t>();
+      const std::size_t count = whole(gltf.at("accessors").at(whole(accessor)).at("count"));
       if (mode == 4) sum += count / 3;
       if (mode > 4 && count > 2) sum += count - 2;
     }
@@ -213,7 +222,7 @@ std::vector<double> elements_of_meshes(const json& gltf) {
   const json none = json::array();
   const json accessors = gltf.value("accessors", none);
   const auto count = [&](const json& accessor) {
-    return accessors.at(accessor.get<std::size_t>()).at("count").get<double>();
+    return accessors.at(whole(accessor)).at("count").get<double>();
   };
   std::vector<double> sums;
   for (const json& mesh : gltf.value("meshes", none)) {
@@ -236,7 +245,7 @@ double check_nodes(const json& gltf) {
   for (const json& from : list) {
     Node& node = nodes.emplace_back();
     if (from.contains("mesh")) {
-      const auto mesh = from["mesh"].get<std::size_t>();
+      const auto mesh = whole(from["mesh"]);
       if (mesh >= meshes.size()) {
         throw Error("node {} has the mesh {}, but there are {}", nodes.size() - 1, mesh,
                     meshes.size());
@@ -244,7 +253,7 @@ double check_nodes(const json& gltf) {
       node.elements = meshes[mesh];
     }
     for (const json& child : from.value("children", none)) {
-      node.children.push_back(child.get<std::size_t>());
+      node.children.push_back(whole(child));
       if (node.children.back() < list.size()) continue;
       throw Error("node {} has the child {}, but there are {} nodes", nodes.size() - 1,
                   child.dump(), list.size());
@@ -255,7 +264,7 @@ double check_nodes(const json& gltf) {
   double elements = std::accumulate(meshes.begin(), meshes.end(), 0.0);
   for (const json& scene : gltf.value("scenes", none)) {
     for (const json& root : scene.value("nodes", none)) {
-      const auto number = root.get<std::size_t>();
+      const auto number = whole(root);
       if (number >= nodes.size())
         throw Error("a scene has the node {}, but there are {}", number, nodes.size());
       elements += walk.elements(number);

@@ -96,10 +96,11 @@ Georeference gltf_georeference(std::string_view bytes) {
     bytes = bytes.substr(20, length);
   }
   const json gltf = json::parse(bytes);
-  const std::size_t scene = gltf.value("scene", std::size_t{0});
+  const double number = gltf.value("scene", 0.0);
   Georeference georeference;
-  if (!gltf.contains("scenes") || scene >= gltf["scenes"].size()) return georeference;
-  const json& shown = gltf["scenes"][scene];
+  const json scenes = gltf.value("scenes", json::array());
+  if (!(number >= 0 && number < static_cast<double>(scenes.size()))) return georeference;
+  const json& shown = scenes.at(static_cast<std::size_t>(number));
   if (!shown.contains("extras") || !shown["extras"].is_object()) return georeference;
   const json& extras = shown["extras"];
   georeference.crs_name = extras.value("crs_name", "");

@@ -5,6 +5,7 @@
 #include <algorithm>
 #include <cmath>
 #include <glm/common.hpp>
+#include <mutex>
 #include <utility>
 
 #include "core/tracing/device.h"
@@ -24,14 +25,15 @@ struct RayTracer::Impl {
   std::vector<LevelScene> scenes;
   LevelSurface surface;
   std::vector<Target> targets;
-  // All levels in one scene, for rays that do not traverse them in order. One element for each
-  // instance.
+  // All levels in one scene, for rays that do not traverse them in order; built when the first such
+  // ray is traced, which is why tracing may throw. One element for each instance.
   struct PartPlace {
     std::uint32_t level = 0;
     const LevelPart* part = nullptr;
   };
-  Owned<RTCScene> all;
-  Target everything;
+  mutable std::once_flag asked_for_all;
+  mutable Owned<RTCScene> all;
+  mutable Target everything;
   std::vector<PartPlace> places;
 
   Impl(const RayDevice& device, std::vector<LevelScene> levels);
@@ -42,6 +44,8 @@ struct RayTracer::Impl {
     const auto& parts = target.level->parts;
     return {target.number, parts[parts.size() == 1 ? 0 : hit.instance].get()};
   }
+
+  const Target& join_levels() const;
 
   bool ends_below(const Target& target, const GridRay& ray, double leave_m) const noexcept;
   bool from_behind(const Target& target, const LevelRay& ray, const FloatHit& hit) const noexcept;
@@ -60,10 +64,10 @@ struct RayTracer::Impl {
   template <int W>
   void escape_surface(std::span<Hit> hits, Packet<W>& packet) const noexcept;
   template <int W>
-  void trace_packet(Coherence coherence, Packet<W>& packet, std::span<Hit> hits) const noexcept;
+  void trace_packet(Coherence coherence, Packet<W>& packet, std::span<Hit> hits) const;
   template <int W>
   void trace(std::span<const Ray> rays, std::span<Hit> hits, Batch batch,
-             std::span<GroundFacet> facets) const noexcept;
+             std::span<GroundFacet> facets) const;
 };
 
 namespace {
@@ -102,11 +106,17 @@ RayTracer::Impl::Impl(const RayDevice& with, std::vector<LevelScene> levels)
     everything.max_m = std::fmax(everything.max_m, targets[i].max_m);
     everything.slack_m = std::max(everything.slack_m, targets[i].slack_m);
   }
-  std::vector<RTCScene> parts;
-  for (const PartPlace& place : places) parts.push_back(place.part->scene.get());
-  all = instance_all(device, parts);
-  check(device, "joining the levels");
-  everything.scene = all.get();
+}
+
+const Target& RayTracer::Impl::join_levels() const {
+  std::call_once(asked_for_all, [this] {
+    std::vector<RTCScene> parts;
+    for (const PartPlace& place : places) parts.push_back(place.part->scene.get());
+    all = instance_all(device, parts);
+    check(device, "joining the levels");
+    everything.scene = all.get();
+  });
+  return everything;
 }
 
 // Returns whether the ray is below the surface where it leaves the target's box. Most rays are far
@@ -281,8 +291,8 @@ void RayTracer::Impl::escape_surface(std::span<Hit> hits, Packet<W>& packet) con
 
 template <int W>
 void RayTracer::Impl::trace_packet(Coherence coherence, Packet<W>& packet,
-                                   std::span<Hit> hits) const noexcept {
-  if (!start_inside(packet)) return trace_target(everything, coherence, hits, packet);
+                                   std::span<Hit> hits) const {
+  if (!start_inside(packet)) return trace_target(join_levels(), coherence, hits, packet);
   for (const Target& target : targets) {
     trace_target(target, coherence, hits, packet);
     if (std::ranges::all_of(hits, [](const Hit& hit) { return static_cast<bool>(hit); })) return;
@@ -291,7 +301,7 @@ void RayTracer::Impl::trace_packet(Coherence coherence, Packet<W>& packet,
 
 template <int W>
 void RayTracer::Impl::trace(std::span<const Ray> rays, std::span<Hit> hits, Batch batch,
-                            std::span<GroundFacet> facets) const noexcept {
+                            std::span<GroundFacet> facets) const {
   const Coherence coherence =
       batch == Batch::Scattered ? Coherence::Incoherent : Coherence::Coherent;
   Packet<W> packet;
@@ -323,7 +333,7 @@ RayTracer::RayTracer(RayTracer&&) noexcept = default;
 RayTracer& RayTracer::operator=(RayTracer&&) noexcept = default;
 
 void RayTracer::trace(std::span<const Ray> rays, std::span<Hit> hits, Batch batch,
-                      std::span<GroundFacet> facets) const noexcept {
+                      std::span<GroundFacet> facets) const {
   const FlushDenormals flush;
   with_packet_width(impl_->device,
                     [&](auto width) { impl_->trace<width>(rays, hits, batch, facets); });

@@ -78,8 +78,9 @@ class RayTracer {
   /// @param hits  one for each ray.
   /// @param batch   affects only the speed, not the hits.
   /// @param facets  empty or, in exact tracing, one for each ray: the facet of its hit.
+  /// @throws Error, the first time that rays are traced through all levels, for lack of memory.
   void trace(std::span<const Ray> rays, std::span<Hit> hits, Batch batch = Batch::Alike,
-             std::span<GroundFacet> facets = {}) const noexcept;
+             std::span<GroundFacet> facets = {}) const;
 
   /// Bounds the difference between each range and that on the reference surface, metres along the
   /// ray, for any mode of tracing. The bound is infinite where the reference may be hit much

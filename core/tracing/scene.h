@@ -52,8 +52,8 @@ struct Scene {
   /// Finds the first hit of each ray, on the ground or on an object.
   /// @param hits  one for each ray.
   /// @param batch  affects only the speed, not the hits.
-  void trace(std::span<const Ray> of, std::span<Hit> hits,
-             Batch batch = Batch::Alike) const noexcept {
+  /// @throws Error as RayTracer::trace.
+  void trace(std::span<const Ray> of, std::span<Hit> hits, Batch batch = Batch::Alike) const {
     rays.trace(of, hits, batch);
     objects.trace(of, hits);
   }

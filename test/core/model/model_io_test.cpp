@@ -552,6 +552,9 @@ TEST_F(ModelIo, RejectsFilesThatWouldCrashAssimp) {
   json = wedge_gltf(R"({"mesh":1})", buffer);
   EXPECT_THAT(error_of("a.glb", glb(json, wedge_binary())),
               HasSubstr("node 0 has the mesh 1, but there are 1"));
+  json = wedge_gltf(R"({"mesh":1e99})", buffer);
+  EXPECT_THAT(error_of("a.glb", glb(json, wedge_binary())),
+              HasSubstr("1e+99 must be a whole number"));
 }
 
 // Animations and skins have accessors of their own, which assimp would read.
