@@ -182,8 +182,6 @@ int main(int argc, char** argv) {
     return groundray::run(argc, argv);
   } catch (const std::bad_alloc&) {
     groundray::print_error("groundray-view: there is not enough memory\n");
-  } catch (const std::bad_alloc&) {
-    groundray::print_error("groundray-view: there is not enough memory\n");
   } catch (const std::exception& fault) {
     groundray::print_error("groundray-view: {}\n", fault.what());
   }
