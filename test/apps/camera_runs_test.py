@@ -257,7 +257,7 @@ def test_an_interrupt_stops_a_long_image_between_its_rows(tmp_path):
         time.sleep(0.005)
     time.sleep(0.5)
     run.send_signal(signal.SIGINT)
-    _, said = run.communicate(timeout=15)
+    _, said = run.communicate(timeout=60)
     assert run.returncode == 130, said
     assert not [p for p in out.glob("camera/*/*") if p.is_file()]
     states = [f["state"] for f in yaml.safe_load((out / "dataset.yaml").read_text())["frames"]]
