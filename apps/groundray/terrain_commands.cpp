@@ -54,9 +54,7 @@ struct TerrainOptions {
   std::vector<double> viewpoint_w_m;
 
   void add_dem(CLI::App* command) {
-    command
-        ->add_option("DEM", dem, "Raster of heights (GeoTIFF, VRT, HGT, ...)")
-        ->required();
+    command->add_option("DEM", dem, "Raster of heights (GeoTIFF, VRT, HGT, ...)")->required();
     command->add_option("--nodata", reading.nodata,
                         "Additional nodata value, besides the one that the file declares");
     command->add_option("--reproject-to", reading.reproject_to,

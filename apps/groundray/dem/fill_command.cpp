@@ -81,9 +81,7 @@ struct FillCommandOptions {
   std::optional<double> tension, smoothness;
 
   void add_files() {
-    command
-        ->add_option("DEM", dem, "Raster of heights (GeoTIFF, VRT, HGT, ...)")
-        ->required();
+    command->add_option("DEM", dem, "Raster of heights (GeoTIFF, VRT, HGT, ...)")->required();
     command->add_option("-o,--output", out, "GeoTIFF to write: heights in metres, CRS as the DEM's")
         ->required();
     command->add_option("--sd-out", sd_out,
