@@ -1,8 +1,8 @@
 #pragma once
 
+#include <algorithm>
 #include <cstddef>
 #include <cstdint>
-#include <cstring>
 #include <filesystem>
 #include <span>
 #include <string>
@@ -69,7 +69,8 @@ class ArrayFolder {
                   std::uint64_t most = 0, bool holes = false) const {
     RawNpy raw = read_raw(name, npy_type<T>(), shape, most, holes);
     Numbers<T> numbers{std::move(raw.shape), std::vector<T>(raw.bytes.size() / sizeof(T))};
-    std::memcpy(numbers.values.data(), raw.bytes.data(), raw.bytes.size());
+    std::ranges::copy(std::as_bytes(std::span(raw.bytes)),
+                      std::as_writable_bytes(std::span(numbers.values)).begin());
     return numbers;
   }
   /// Reads an array of any type.

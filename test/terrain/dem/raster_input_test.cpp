@@ -96,7 +96,8 @@ TEST_F(RasterInput, NamesOfFilesAreLocal) {
       {"/dev/zero", "it is not a regular file"},
       {folder_.path(), "it is a folder, but must be a file"},
   };
-  for (const auto& [name, message] : cases) {
+  for (const auto& [raster, message] : cases) {
+    const std::string& name = raster;  // clang with OpenMP captures no structured binding
     EXPECT_THAT(error_of([&] { load_dem(name); }), HasSubstr(message));
     EXPECT_THAT(error_of_text(vrt(source("sound.tif") + "<SourceFilename><![CDATA[" + name +
                                   "]]></SourceFilename>")),
