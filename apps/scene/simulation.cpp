@@ -328,9 +328,10 @@ Simulation build_simulation(SceneSpec spec, const Terrain::Progress& progress) {
       spec);
   std::vector<PlacedLidar> lidars = place_lidars(spec, X_DB);
   std::vector<PlacedCamera> cameras = place_cameras(spec, X_DB);
-  for (const auto& [mounted, lidar, X_DS, sweeps] : lidars) {
-    located(mounted.where, title("lidar", mounted.name),
-            [&] { check_place(X_DS, mounted.lidar.gate.far_m, terrain, run_time(spec)); });
+  for (const PlacedLidar& placed : lidars) {
+    located(placed.spec.where, title("lidar", placed.spec.name), [&] {
+      check_place(placed.X_DS, placed.spec.lidar.gate.far_m, terrain, run_time(spec));
+    });
   }
   for (const PlacedCamera& camera : cameras) {
     located(camera.spec.where, title("camera", camera.spec.name), [&] {

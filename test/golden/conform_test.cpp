@@ -256,7 +256,7 @@ TEST_F(Conform, EachMistakeHasOneMessage) {
   };
   const std::vector<Mistake> mistakes = {
       {"no manifest", [](auto& t) { fs::remove(t / "manifest.json"); },
-       "manifest.json: it is missing"},
+       "manifest.json: there is no such file"},
       {"no JSON", manifest("{"), "manifest.json: [json"},
       {"no classes", manifest(R"({"implementation": "x", "classes": []})"),
        "manifest.json: classes is empty: what is claimed?"},
@@ -277,7 +277,7 @@ TEST_F(Conform, EachMistakeHasOneMessage) {
          "rays": {"precision": "float", "delta_m": 0, "range_relative": 1, "range_absolute_m": 0}})"),
        "rays.range_relative must be a number from 0 to 0.001"},
       {"missing array", [](auto& t) { fs::remove(t / "level_00/key_m.npy"); },
-       "level_00/key_m.npy: it is missing"},
+       "level_00/key_m.npy: there is no such file"},
       {"folder for an array",
        [](auto& t) {
          fs::remove(t / "level_00/key_m.npy");

@@ -265,7 +265,7 @@ TEST(ReadExr, RejectsFilesThatAreNotOpenExr) {
   EXPECT_THAT(message_of(""), HasSubstr("a.exr: it is not an OpenEXR (.exr) image: it is empty"));
   EXPECT_THAT(message_of("\x89PNG"), HasSubstr("despite its name: convert it"));
   EXPECT_THAT([] { read_exr("/nowhere/a.exr"); },
-              ThrowsMessage<Error>(HasSubstr("/nowhere/a.exr: cannot be read")));
+              ThrowsMessage<Error>(HasSubstr("/nowhere/a.exr: there is no such file")));
 }
 
 // OpenEXR allocates a text of the declared size before it reads the text. The file was found by

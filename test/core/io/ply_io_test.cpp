@@ -297,7 +297,8 @@ TEST(ReadPly, RejectsBytesAfterTheLastRow) {
 }
 
 TEST(ReadPly, NamesAMissingFile) {
-  EXPECT_THAT(message_of([] { read_ply("/no/a.ply"); }), HasSubstr("/no/a.ply: cannot be read"));
+  EXPECT_THAT(message_of([] { read_ply("/no/a.ply"); }),
+              HasSubstr("/no/a.ply: there is no such file"));
 }
 
 TEST(WritePly, RejectsNamesThatTheHeaderCannotRepresent) {
