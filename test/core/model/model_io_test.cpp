@@ -573,7 +573,7 @@ TEST_F(ModelIo, ReadsNoFileOutsideItsFolder) {
     return bytes.replace(bytes.find("wedge.bin"), 9, uri);
   };
   for (const std::string uri : {"../wedge.bin", "%2e%2e/wedge.bin", "a/../../wedge.bin",
-                                 "..\\\\wedge.bin", "file:///wedge.bin"}) {
+                                "..\\\\wedge.bin", "file:///wedge.bin"}) {
     EXPECT_THAT(error_of("sub/a.gltf", with(uri)),
                 HasSubstr("only files in its own folder are read"))
         << uri;
