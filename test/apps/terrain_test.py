@@ -80,9 +80,11 @@ def check_against_whole(scans, whole):
     return moved / total
 
 
-def test_bounds_are_zero_at_full_resolution(whole):
+def test_bounds_are_the_accuracy_of_ranges_at_full_resolution(whole):
     for scan in whole:
-        assert (scan["error_bound"] == 0).all()
+        accuracy_m = 1e-9 * scan["range_true"] + 1e-9
+        assert (scan["error_bound"] >= accuracy_m).all(), "rounded up to a float"
+        np.testing.assert_allclose(scan["error_bound"], accuracy_m, rtol=1.2e-7)
         assert (scan["error_estimate"] == 0).all()
 
 

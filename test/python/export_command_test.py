@@ -1,5 +1,6 @@
 """The command groundray-export: it rejects invalid usage and leaves no partial files."""
 
+import copy
 import os
 import shutil
 import signal
@@ -38,7 +39,7 @@ def only(run, kind, frames=None):
     names = [each["name"] for each in sensors]
     listed = [each for each in record["frames"] if each["sensor"] in names]
     if frames is not None:
-        listed = [{**listed[0], "frame": i, "stamp_s": 0.001 * i} for i in range(frames)]
+        listed = [{**copy.deepcopy(listed[0]), "frame": i, "stamp_s": 0.001 * i} for i in range(frames)]
         for i in range(1, frames):
             file = run / f"lidar/bare-16/{i:06}.ply"
             file.unlink(missing_ok=True)

@@ -209,14 +209,17 @@ class _Map:
         return [_Map(self.path, each, f"{key}[{i}]") for i, each in enumerate(value)]
 
 
+def _place(mark: Any) -> str:
+    return f":{mark.line + 1}:{mark.column + 1}" if mark is not None else ""
+
+
 def _refuse_aliases(text: str, path: Path) -> None:
     """Rejects aliases, by which a few lines can stand for more values than memory holds."""
     if "&" not in text or "*" not in text:
         return
     for event in yaml.parse(text, Loader=_LOADER):
         if isinstance(event, yaml.AliasEvent):
-            place = f"{event.start_mark.line + 1}:{event.start_mark.column + 1}"
-            raise Error(f"{path}:{place}: aliases (*name) are not allowed: write the value out")
+            raise Error(f"{path}{_place(event.start_mark)}: aliases (*name) are not allowed: write the value out")
 
 
 def _load_yaml(text: str, path: Path) -> Any:
@@ -224,8 +227,7 @@ def _load_yaml(text: str, path: Path) -> Any:
         _refuse_aliases(text, path)
         return yaml.load(text, Loader=_LOADER)
     except yaml.YAMLError as fault:
-        mark = getattr(fault, "problem_mark", None)
-        place = f":{mark.line + 1}:{mark.column + 1}" if mark is not None else ""
+        place = _place(getattr(fault, "problem_mark", None))
         problem = getattr(fault, "problem", None) or "it is not YAML"
         raise Error(f"{path}{place}: {problem}; was the file cut short or edited?") from None
 
