@@ -39,7 +39,9 @@ def only(run, kind, frames=None):
     names = [each["name"] for each in sensors]
     listed = [each for each in record["frames"] if each["sensor"] in names]
     if frames is not None:
-        listed = [{**copy.deepcopy(listed[0]), "frame": i, "stamp_s": 0.001 * i} for i in range(frames)]
+        listed = [
+            {**copy.deepcopy(listed[0]), "frame": i, "stamp_s": 0.001 * i} for i in range(frames)
+        ]
         for i in range(1, frames):
             file = run / f"lidar/bare-16/{i:06}.ply"
             file.unlink(missing_ok=True)

@@ -219,7 +219,8 @@ def _refuse_aliases(text: str, path: Path) -> None:
         return
     for event in yaml.parse(text, Loader=_LOADER):
         if isinstance(event, yaml.AliasEvent):
-            raise Error(f"{path}{_place(event.start_mark)}: aliases (*name) are not allowed: write the value out")
+            place = _place(event.start_mark)
+            raise Error(f"{path}{place}: aliases (*name) are not allowed: write the value out")
 
 
 def _load_yaml(text: str, path: Path) -> Any:
