@@ -339,8 +339,13 @@ CheckedGltf check_gltf(std::string_view bytes, const std::filesystem::path& path
     strip(gltf);
     checked.is_binary = !chunk.empty();
     checked.bytes = file_of(gltf, chunk);
+  } catch (const json::parse_error& fault) {
+    throw Error("{}: it is not glTF: its JSON is invalid at byte {}; was the file cut short?",
+                path.string(), fault.byte);
   } catch (const json::exception& fault) {
-    throw Error("{}: {}", path.string(), fault.what());
+    std::string_view why = fault.what();  // begins with the exception's name in brackets
+    why.remove_prefix(why.find(' ') + 1);
+    throw Error("{}: it is not valid glTF: {}", path.string(), why);
   } catch (const Error& fault) {
     throw Error("{}: {}", path.string(), fault.what());
   }

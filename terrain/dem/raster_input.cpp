@@ -170,6 +170,9 @@ GDALDatasetUniquePtr open_input(const std::string& name) {
   if (dataset == nullptr) {
     std::string why = CPLGetLastErrorMsg();
     if (why.ends_with('.')) why.pop_back();
+    // GDAL begins with the file's name, sometimes twice; our messages begin with it, too.
+    while (why.starts_with(name + ":"))
+      why.erase(0, std::min(why.find_first_not_of(' ', name.size() + 1), why.size()));
     throw Error("it cannot be opened as a raster: {}; is it complete?", why);
   }
   if (dataset->GetRasterCount() > 0) check_blocks(*dataset);

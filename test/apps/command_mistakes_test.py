@@ -248,6 +248,12 @@ INPUTS = [
         ("notes.txt: it cannot be opened as a raster", "in none of the formats GTiff"),
     ),
     Mistake(
+        "a GeoTIFF of four bytes",
+        "groundray info cut.tif",
+        ("cut.tif: it cannot be opened as a raster: Cannot read TIFF header",),
+        files={"cut.tif": b"II*\0"},
+    ),
+    Mistake(
         "info about a folder",
         "groundray info mine",
         ("mine: it is neither the folder of a dataset nor a raster",),
@@ -383,6 +389,21 @@ INPUTS = [
         "groundray reconstruct mesh empty.npz -o out.ply",
         ("empty.npz",),
         files={"empty.npz": ""},
+    ),
+    Mistake(
+        "a glTF file of other bytes",
+        "groundray reconstruct simplify noise.glb -o out.ply --triangles 1",
+        ("noise.glb: it is not glTF: its JSON is invalid at byte 1", "was the file cut short?"),
+        files={"noise.glb": b"\x935K noise"},
+    ),
+    Mistake(
+        "a glTF file that names a view it does not have",
+        "groundray reconstruct simplify views.gltf -o out.ply --triangles 1",
+        ("views.gltf: it is not valid glTF: array index 0 is out of range",),
+        files={
+            "views.gltf": '{"asset": {"version": "2.0"}, "accessors": [{"bufferView": 0,'
+            ' "componentType": 5126, "type": "VEC3", "count": 4}]}'
+        },
     ),
     Mistake(
         "a DEM as a mesh",

@@ -170,6 +170,7 @@ INTERNALS = (
     ".cpp",
     "basic_",
     "bad_alloc",
+    "json.exception",
     "what()",
     " 0x",
 )
