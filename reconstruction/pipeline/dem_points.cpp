@@ -52,7 +52,7 @@ void append(const LidarPoint& point, std::uint32_t group, const PointNoise& nois
   to.origins.push_back(PointOrigin::Lidar);
 }
 
-std::size_t append(const StereoImages& images, const StereoOptions& options,
+StereoTally append(const StereoImages& images, const StereoOptions& options,
                    const PointNoise& noise, std::uint32_t group, MeasuredPoints& to) {
   const auto& [left, right] = images.views;
   const PinholePair pair = pinhole_pair(left, right);
@@ -60,7 +60,8 @@ std::size_t append(const StereoImages& images, const StereoOptions& options,
       match(resample(images.greys[0], pair, StereoSide::Left, left),
             resample(images.greys[1], pair, StereoSide::Right, right), options.matching);
   const std::size_t first = to.size();
-  append(stereo_points(pair, left, map, options.points), group, to);
+  const StereoPoints points = stereo_points(pair, left, map, options.points);
+  append(points, group, to);
   for (std::size_t i = first; i < to.size(); ++i) {
     const glm::dvec2 flat_m = glm::dvec2(to.p_m[i]) - glm::dvec2(left.X_DC.translation_m);
     const double pose_m =
@@ -68,8 +69,13 @@ std::size_t append(const StereoImages& images, const StereoOptions& options,
     to.bias_sd_m[i] = static_cast<float>(std::hypot(to.bias_sd_m[i], pose_m));
   }
   const auto disparities = map.disparity_px.values();
-  return static_cast<std::size_t>(
+  const auto matched = static_cast<std::uint64_t>(
       std::ranges::count_if(disparities, [](float d) { return !std::isnan(d); }));
+  return {.unmatched = map.unmatched,
+          .between = matched - points.size() - points.too_uncertain - points.out_of_limits,
+          .too_uncertain = points.too_uncertain,
+          .out_of_limits = points.out_of_limits,
+          .points = points.size()};
 }
 
 void append(const MeasuredPoints& points, MeasuredPoints& to) {

@@ -52,12 +52,25 @@ struct StereoOptions {
   StereoPointOptions points;
 };
 
+/// Numbers of pixels of a rectified left image by their use: the sum of all is the size of the
+/// image.
+struct StereoTally {
+  UnmatchedCounts unmatched;
+  std::uint64_t between = 0;        ///< matches between the rows and columns of points
+  std::uint64_t too_uncertain = 0;  ///< matches omitted by StereoPointOptions::most_relative_sd
+  std::uint64_t out_of_limits = 0;  ///< matches omitted by depth or confidence
+  std::uint64_t points = 0;
+
+  std::uint64_t matched() const noexcept {
+    return between + too_uncertain + out_of_limits + points;
+  }
+};
+
 /// Rectifies and matches two images and appends their points. The standard deviations of the poses
 /// (`noise`) are added to the bias that all points of a pair have in common.
 /// @param group  number of the pair of images among all scans and pairs.
-/// @return number of pixels with a match.
 /// @throws Error as pinhole_pair, resample, match and stereo_points; `to` is then unchanged.
-std::size_t append(const StereoImages& images, const StereoOptions& options,
+StereoTally append(const StereoImages& images, const StereoOptions& options,
                    const PointNoise& noise, std::uint32_t group, MeasuredPoints& to);
 
 /// Appends points.

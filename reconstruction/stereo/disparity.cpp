@@ -120,7 +120,7 @@ void keep_certain(const ImageF& start_px, const RefinedDisparity& refined,
     const double sd_px = std::hypot(
         options.sd_floor_px, options.sd_factor * static_cast<double>(refined.sd_px.values()[i]));
     if (!(sd_px <= options.most_sd_px)) {
-      ++map.unmatched.unrefined;
+      ++(std::isnan(sd_px) ? map.unmatched.unrefined : map.unmatched.uncertain);
       continue;
     }
     map.disparity_px.values()[i] = refined.disparity_px.values()[i];

@@ -59,7 +59,8 @@ struct UnmatchedCounts {
   std::uint64_t ambiguous = 0;     ///< no cost is the least, or outside the right camera's field
   std::uint64_t inconsistent = 0;  ///< fails the consistency check: mostly hidden on the right
   std::uint64_t speckle = 0;       ///< in a patch that is too small
-  std::uint64_t unrefined = 0;     ///< least squares end elsewhere, or texture is insufficient
+  std::uint64_t unrefined = 0;     ///< least squares end elsewhere, or the window has no texture
+  std::uint64_t uncertain = 0;     ///< sd above MatchOptions::most_sd_px
 };
 
 /// Disparities of the left image, u_left - u_right. All images have 1 channel.

@@ -26,6 +26,7 @@ from dem_runs import (
     coromandel,
     done,
     fractal,
+    made,
     nmad_of,
     points_file,
     refused,
@@ -36,6 +37,7 @@ from dem_runs import (
     write_dem,
 )
 from scipy.ndimage import map_coordinates
+from scipy.spatial import cKDTree
 from scipy.stats import chi2
 
 JACKSBORO = ROOT / "data/terrain/jacksboro.tif"
@@ -323,3 +325,58 @@ def test_scans_and_stereo_reproduce_the_ground(tmp_path, record_property, ground
         low, high = np.sqrt(chi2.ppf([0.025, 0.975], count) / count)
         assert 0.85 * low <= stereo["normalised_rms"] <= 1.15 * high
     judge(e, stated_m, name, record_property)
+
+
+def rough_ground(folder):
+    """Triangles half as wide as the cells, with waves from 0.3 m on: ground that bends in cells."""
+    size, cell = 1024, 0.125
+    x, y = np.meshgrid(np.arange(size) * cell, -np.arange(size) * cell)
+    waves = 0.4 * np.sin(0.15 * x + 0.07 * y) + 0.1 * np.sin(0.6 * x - 0.3 * y)
+    heights = 100 + waves + fractal(size, cell, 0.02, 0.3, 8, 9)
+    dem = write_dem(folder / "truth.tif", heights, 500000.03, 5600000.07, cell)
+    return Ground(dem, (500064, 5599936), ("--cell-m", "0.25"))
+
+
+SLOWLY = {"seconds": 2.02, "speed_m_s": 5, "noise_m": 0.005}  # up to 300 points per cell
+
+
+@pytest.mark.parametrize(
+    ("ground", "drive"),
+    [
+        (rough_ground, SLOWLY),
+        *([(prairie_of_1_m, {}), (fractal_ground, {}), (jacksboro_with_relief, {})] * IS_FULL),
+    ],
+)
+def test_stated_errors_are_correct_at_all_ranges(tmp_path, record_property, ground, drive):
+    """Of the triangles that were scanned. Near the sensor, noise averages out to a millimetre, and
+    what is left is how the ground bends within a cell. Beyond 20 m, most cells have a single point,
+    whose error is stated on the safe side."""
+    record_property("size", "full" if IS_FULL else "reduced")
+    known = ground(tmp_path)
+    path = scene(tmp_path, known.dem, known.middle, preset="ouster_os0_128", **drive)
+    done("generate", path, "-o", tmp_path / "data")
+    add_outliers(tmp_path / "data", 0.015, 2)
+    made(
+        *(tmp_path / "data", *known.cells, "--truth", known.dem, "--no-fill", "--sight", "none"),
+        *("-o", tmp_path / "dem.tif", "--report", tmp_path / "dem.json"),
+    )
+    dem, truth = Raster(tmp_path / "dem.tif", tmp_path), Raster(known.dem, tmp_path)
+    x, y = dem.places()
+    error = dem["elevation"] - triangle_heights(truth, x, y)
+    is_judged = (dem["source"] == 1) & ~np.isnan(error)
+    z = (error / np.sqrt(dem["variance"]))[is_judged]
+    origin_m = json.loads((tmp_path / "dem.json").read_text())["origin_w_m"]
+    poses = np.loadtxt(tmp_path / "data/poses/top.tum")
+    to_path = cKDTree(poses[:, 1:3] + origin_m[:2])
+    range_m, _ = to_path.query(np.column_stack([x[is_judged], y[is_judged]]))
+    name = ground.__name__.replace("_", " ")
+    for low, high in ((0, 3), (3, 5), (5, 10), (10, 20), (20, np.inf)):
+        near = z[(low <= range_m) & (range_m < high)]
+        assert len(near) > 1000
+        rms = np.sqrt(np.mean(near**2))
+        record_property(f"normalised RMS, {name}, {low} to {high} m", f"{rms:.3f} of {len(near)}")
+        if high <= 20:
+            off = abs(rms - 1)
+            margin = f"{off / 0.15} {off:.3g} 0.15"
+            record_property(f"margin: normalised RMS less 1, {name}, {low} to {high} m", margin)
+        assert 0.85 * (high <= 20) <= rms <= 1.15

@@ -206,7 +206,16 @@ def write_camera(folder, rate_hz):
     (folder / "camera.yaml").write_text(text)
 
 
-def scene(folder, dem, middle, seconds=0.52, preset="velodyne_vlp16", stereo=""):
+def scene(
+    folder,
+    dem,
+    middle,
+    seconds=0.52,
+    preset="velodyne_vlp16",
+    stereo="",
+    speed_m_s=20,
+    noise_m=NOISE_M,
+):
     x, y = middle
     write_camera(folder, rate_hz=50)
     texture = ", texture: {albedo: gravel.png, size_m: 8}" if stereo else ""
@@ -218,8 +227,8 @@ def scene(folder, dem, middle, seconds=0.52, preset="velodyne_vlp16", stereo="")
         f"terrain: {{dem: {dem}, material: dry_soil, label: 1{texture}}}\n"
         "platform:\n  drive:\n"
         f"    waypoints_m: [[{x - 10}, {y - 6}], [{x + 2}, {y + 6}], [{x + 20}, {y + 9}]]\n"
-        "    speed_m_s: 20\n    height_m: 0.5\n"
-        + LIDAR.format(preset=preset, noise=NOISE_M)
+        f"    speed_m_s: {speed_m_s}\n    height_m: 0.5\n"
+        + LIDAR.format(preset=preset, noise=noise_m)
         + stereo
     )
     return path

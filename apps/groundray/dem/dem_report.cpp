@@ -48,6 +48,49 @@ void print_points(const char* what, const char* rows, const std::vector<PointTal
     print_text(stdout, "{:<28} {:>12} {:>12}\n", sum.name, sum.rows, sum.points);
 }
 
+// Pixels of stereo pairs that became points, or why they did not.
+struct PixelUse {
+  const char* key;
+  const char* meaning;
+  std::uint64_t pixels;
+};
+using PixelUses = std::array<PixelUse, 10>;
+
+PixelUses uses_of(const StereoTally& tally) {
+  const UnmatchedCounts& none = tally.unmatched;
+  return {
+      {{"points", "points", tally.points},
+       {"between", "matched, between the rows and columns of points", tally.between},
+       {"too_uncertain", "matched, but farther than the disparity is precise", tally.too_uncertain},
+       {"out_of_limits", "matched, but beyond the limits of depth or confidence",
+        tally.out_of_limits},
+       {"unrefined", "too little texture, or least squares disagree", none.unrefined},
+       {"uncertain", "too little texture for the noise", none.uncertain},
+       {"speckle", "in a patch that is too small", none.speckle},
+       {"inconsistent", "another match from right to left, as where hidden on the right",
+        none.inconsistent},
+       {"ambiguous", "no single best match, or outside the right image", none.ambiguous},
+       {"unseen", "outside the left image", none.unseen}}};
+}
+
+void print_pixels(const std::vector<PointTally>& pairs) {
+  if (pairs.empty()) return;
+  PixelUses sum = uses_of({});
+  std::uint64_t all = 0;
+  for (const PointTally& pair : pairs) {
+    const PixelUses uses = uses_of(pair.pixels);
+    for (std::size_t i = 0; i < sum.size(); ++i) {
+      sum[i].pixels += uses[i].pixels;
+      all += uses[i].pixels;
+    }
+  }
+  print_text(stdout, "pixels of the pairs:\n");
+  for (const PixelUse& use : sum) {
+    print_text(stdout, "{:>12} {:>5.1f} %  {}\n", use.pixels,
+               100 * static_cast<double>(use.pixels) / static_cast<double>(all), use.meaning);
+  }
+}
+
 void print_fill(const FillTally& fill) {
   print_fates(fill);
   if (fill.at_bound > 0)
@@ -74,6 +117,13 @@ Json json_of(const std::vector<PointTally>& tallies, const char* rows) {
   Json all = Json::array();
   for (const PointTally& tally : tallies)
     all.push_back({{"name", tally.name}, {rows, tally.rows}, {"points", tally.points}});
+  return all;
+}
+
+Json json_of_pairs(const std::vector<PointTally>& pairs) {
+  Json all = json_of(pairs, "matched");
+  for (std::size_t i = 0; i < pairs.size(); ++i)
+    for (const PixelUse& use : uses_of(pairs[i].pixels)) all[i]["pixels"][use.key] = use.pixels;
   return all;
 }
 
@@ -179,7 +229,7 @@ void write_json(const fs::path& path, const ReportFacts& facts, const DemReport&
   json["crs"] = report.georeference.crs_name;
   json["frame"] = json_of(result.layers.frame);
   json["scans"] = json_of(report.scans, "rows");
-  json["pairs"] = json_of(report.pairs, "matched");
+  json["pairs"] = json_of_pairs(report.pairs);
   json["fused"] = json_of(result.fusion);
   for (const char* part : {"ground_filter", "sight", "smoothed", "filled", "truth"})
     json[part] = nullptr;
@@ -212,6 +262,7 @@ void print(const DemReport& report) {
   const DemResult& result = report.result;
   print_points("scan", "rows", report.scans);
   print_points("stereo pair", "matched", report.pairs);
+  print_pixels(report.pairs);
   if (const auto& ground = result.ground)
     print_text(stdout, "ground filter: {} points on the ground, {} above, {} below\n",
                ground->ground, ground->above, ground->below);

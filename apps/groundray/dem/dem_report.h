@@ -12,6 +12,7 @@
 #include "core/io/mesh_io.h"
 #include "reconstruction/dem/dem_layers.h"
 #include "reconstruction/pipeline/dem_pipeline.h"
+#include "reconstruction/pipeline/dem_points.h"
 #include "reconstruction/pipeline/dem_truth.h"
 
 namespace groundray {
@@ -23,6 +24,7 @@ struct PointTally {
   std::size_t points = 0;          ///< number of points passed on to the DEM
   bool is_noiseless = false;       ///< true if no standard deviation of ranges is known
   std::vector<std::string> notes;  ///< messages for the user
+  StereoTally pixels;              ///< of a stereo pair
 };
 
 /// DEM made from scans and stereo pairs, and the report on it.

@@ -118,12 +118,11 @@ PointTally add_points(const ImagePair& images, const StereoOptions& options,
   const RecordedFrame& right_frame = right.frames[images.right];
   check_poses(left, left_frame, noise.longest_pose_gap_s);
   check_poses(right, right_frame, noise.longest_pose_gap_s);
-  const std::size_t before = to.size();
-  const std::size_t matched =
+  const StereoTally tally =
       append({.views = {view_of(left, left_frame), view_of(right, right_frame)},
               .greys = read_images(images)},
              options, noise.points, group, to);
-  return {.name = images.name, .rows = matched, .points = to.size() - before};
+  return {.name = images.name, .rows = tally.matched(), .points = tally.points, .pixels = tally};
 }
 
 }  // namespace

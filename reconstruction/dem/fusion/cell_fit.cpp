@@ -4,6 +4,7 @@
 #include <cmath>
 #include <limits>
 
+#include "reconstruction/dem/fusion/bent_plane.h"
 #include "reconstruction/dem/fusion/float_lanes.h"
 
 namespace groundray {
@@ -173,7 +174,8 @@ std::optional<CellHeight> CellFit::operator()(std::span<const PackedPoint> point
     return inside * inside;
   };
   iterate(plane, neighbours, times, tukey_rounds, tukey);
-  return finish(plane, sum(plane, times, tukey), neighbours, step_m);
+  sum(plane, times, tukey);
+  return finish(plane, neighbours, step_m);
 }
 
 std::optional<CellHeight> CellFit::fit_few_points(const NeighbourSurface& neighbours,
@@ -239,27 +241,26 @@ void CellFit::compare(const SurfacePlane& plane, double bias_m2, CellHeight& fou
 // Sensitivities of the height at the sample; points_.size is its derivative by the height of each
 // point.
 struct CellFit::Levers {
-  Sums::Inverse inverse;
   double noise_m2 = 0, bias_m2 = 0;
   double bend_x = 0, bend_y = 0, bend_xy = 0;  // by second differences of the ground
 };
 
-CellFit::Levers CellFit::levers(const Sums& sums, const NeighbourSurface& neighbours,
-                                glm::dvec2 step_m) {
-  Levers found{.inverse = sums.inverse(neighbours)};
-  const Sums::Inverse& m = found.inverse;
-  const auto lever_h = static_cast<float>(m.hh), lever_x = static_cast<float>(m.hx),
-             lever_y = static_cast<float>(m.hy);
-  const auto per_x = static_cast<float>(1 / step_m.x), per_y = static_cast<float>(1 / step_m.y);
+// `per_term`: covariances of the height with the terms of the bent plane.
+CellFit::Levers CellFit::levers(const QuadricTerms& per_term, glm::dvec2 step_m) {
+  Levers found;
+  const glm::vec2 cells_per_m(1.0 / step_m);
+  std::array<float, 6> m;
+  for (std::size_t k = 0; k < m.size(); ++k) m[k] = static_cast<float>(per_term[k]);
   FloatLanes noise{}, bend_x{}, bend_y{}, bend_xy{};
   for (std::size_t i = 0; i < points_.padded; i += lanes) {
-    const FloatLanes x = load(&points_.x_m[i]), y = load(&points_.y_m[i]), u = x * per_x,
-                     v = y * per_y;
-    const FloatLanes lever = load(&points_.weight[i]) * (lever_h + lever_x * x + lever_y * y);
+    const std::array<FloatLanes, 6> by = bent_plane_functions(points_, i, cells_per_m);
+    FloatLanes lever = m[0] * by[0];
+    for (std::size_t k = 1; k < by.size(); ++k) lever += m[k] * by[k];
+    lever *= load(&points_.weight[i]);
     noise += lever * lever * load(&points_.variance_m2[i]);
-    bend_x += lever * curvature_profile(u);
-    bend_y += lever * curvature_profile(v);
-    bend_xy += lever * u * v;
+    bend_x += lever * by[3];
+    bend_xy += lever * by[4];
+    bend_y += lever * by[5];
     store(lever, &points_.size[i]);
   }
   found.noise_m2 = double{total(noise)};
@@ -273,29 +274,37 @@ CellFit::Levers CellFit::levers(const Sums& sums, const NeighbourSurface& neighb
   return found;
 }
 
-CellHeight CellFit::finish(const SurfacePlane& plane, const Sums& sums,
-                           const NeighbourSurface& neighbours, glm::dvec2 step_m) {
-  CellHeight found{.plane = plane};
-  const Levers by = levers(sums, neighbours, step_m);
-  const Sums::Inverse& m = by.inverse;
-  compare(plane, by.bias_m2, found);
-  const double inside = found.lidar + found.stereo;
-  const double known = m.xx * neighbours.information_xx + 2 * m.xy * neighbours.information_xy +
-                       m.yy * neighbours.information_yy;
-  const double freedom = inside - 3 + known;
+CellHeight CellFit::finish(const SurfacePlane& plane, const NeighbourSurface& neighbours,
+                           glm::dvec2 step_m) {
+  const SurfaceBend& bend = neighbours.bend_variance;
+  const bool is_dense = has_points_throughout(points_, step_m);
+  const BentPlane bent =
+      fit_bent_plane(points_, plane, neighbours, is_dense ? bend : SurfaceBend{}, step_m);
+  const QuadricTerms& t = bent.terms;
+  points_.unbend({t[3], t[4], t[5]}, step_m);
+  CellHeight found{.plane = {plane.height_m + t[0], plane.slope_x + t[1] / step_m.x,
+                             plane.slope_y + t[2] / step_m.y}};
+  const QuadricTerms& m = bent.covariance[0];
+  const Levers by = levers(m, step_m);
+  compare(found.plane, by.bias_m2, found);
+  const double inside = found.lidar + found.stereo, freedom = inside - bent.fitted;
   found.chi2 =
       inside > 1 && freedom > 0.1 ? found.chi2 / freedom : std::numeric_limits<double>::quiet_NaN();
-  const double lent_m2 = m.hx * m.hx * neighbours.information_xx +
-                         2 * m.hx * m.hy * neighbours.information_xy +
-                         m.hy * m.hy * neighbours.information_yy;
-  const SurfaceBend& bend = neighbours.bend_variance;
+  const double lean_x = m[1] / step_m.x, lean_y = m[2] / step_m.y;
+  const double lent_m2 = lean_x * lean_x * neighbours.information_xx +
+                         2 * lean_x * lean_y * neighbours.information_xy +
+                         lean_y * lean_y * neighbours.information_yy;
   const double bend_m2 = by.bend_x * by.bend_x * bend.xx + by.bend_y * by.bend_y * bend.yy +
                          by.bend_xy * by.bend_xy * bend.xy;
+  const double ground_m2 =
+      is_dense ? scatter_m2(points_, found.plane, bent.fitted, neighbours.within_m2, step_m)
+               : neighbours.within_m2;
   // The correction by the crest adds the points' noise a second time, but not the bias of groups,
   // which the neighbours share.
   const double again = 1 + 2 * own_crest_ * neighbours.crest_share * (by.bend_x + by.bend_y);
   const double misfit = found.chi2 > 1 ? found.chi2 : 1.0;
-  found.variance_m2 = again * again * by.noise_m2 * misfit + by.bias_m2 + lent_m2 + bend_m2;
+  found.variance_m2 =
+      again * again * by.noise_m2 * misfit + by.bias_m2 + lent_m2 + bend_m2 + ground_m2;
   return found;
 }
 

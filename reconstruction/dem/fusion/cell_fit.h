@@ -11,6 +11,7 @@
 #include "reconstruction/dem/fusion/cell_columns.h"
 #include "reconstruction/dem/fusion/neighbour_surface.h"
 #include "reconstruction/dem/fusion/packed_point.h"
+#include "reconstruction/dem/fusion/quadric.h"
 
 namespace groundray {
 
@@ -27,7 +28,8 @@ struct CellHeight {
 /// The bend of the neighbours' surface and the crest of the cell itself are subtracted from the
 /// points. The plane starts with the median height and the slope of the neighbours, whose
 /// information constrains the slope throughout. Weights are those of CellColumns, times Huber's and
-/// then Tukey's; the variance is that of the linear estimate with the last ones.
+/// then Tukey's. A last fit with these weights adds what bend is left, if points throughout the
+/// cell show it. The variance is that of this linear estimate and of the ground about it.
 ///
 /// Cells of one or two points are combined with the neighbours' surface instead: see fit_few.
 /// @see docs/theory/dem.md; Huber, Ronchetti, Robust statistics (2009), chapter 7.
@@ -60,8 +62,8 @@ class CellFit {
   void compare(const SurfacePlane& plane, double bias_m2, CellHeight& found);
   std::optional<CellHeight> fit_few_points(const NeighbourSurface& neighbours, glm::dvec2 step_m,
                                            double reference_m) const;
-  Levers levers(const Sums& sums, const NeighbourSurface& neighbours, glm::dvec2 step_m);
-  CellHeight finish(const SurfacePlane& plane, const Sums& sums, const NeighbourSurface& neighbours,
+  Levers levers(const QuadricTerms& per_term, glm::dvec2 step_m);
+  CellHeight finish(const SurfacePlane& plane, const NeighbourSurface& neighbours,
                     glm::dvec2 step_m);
 
   double outliers_per_m_ = 0;

@@ -70,6 +70,7 @@ struct NeighbourSurface {
   /// Inverse of the slopes' covariance.
   double information_xx = 0, information_xy = 0, information_yy = 0;
   SurfaceBend bend_variance;  ///< of each, m²
+  double within_m2 = 0;       ///< variance of the ground within a cell about a bent plane
   double scatter_m = 0;       ///< sd of these cells' heights about the surface, without noise
   /// Height of the cell's own guess above the surface, reduced according to its noise, and the
   /// factor of this reduction.

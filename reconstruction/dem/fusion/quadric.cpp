@@ -27,13 +27,7 @@ void add_moments(FloatLanes weight, const FloatLanes& u, const FloatLanes& v,
   }
 }
 
-// The normal equations.
-struct Equations {
-  QuadricMatrix matrix{};
-  QuadricTerms right{};
-};
-
-Equations equations(const QuadricPlaces& places) noexcept {
+NormalEquations equations(const QuadricPlaces& places) noexcept {
   Moments<4> moments{};
   Moments<2> heights{};
   for (std::size_t i = 0; i < quadric_places; i += lanes) {
@@ -44,7 +38,7 @@ Equations equations(const QuadricPlaces& places) noexcept {
   std::array<std::array<double, 5>, 5> sums{};
   for (std::size_t i = 0; i < sums.size(); ++i)
     for (std::size_t j = 0; i + j < sums.size(); ++j) sums[i][j] = double{total(moments[i][j])};
-  Equations found;
+  NormalEquations found;
   for (std::size_t a = 0; a < six; ++a) {
     found.right[a] = factor_of[a] * double{total(heights[power_u[a]][power_v[a]])};
     for (std::size_t b = 0; b <= a; ++b) {
@@ -106,13 +100,17 @@ QuadricMatrix QuadricFit::covariance() const noexcept {
   return inverse;
 }
 
-QuadricFit fit_quadric(const QuadricPlaces& places, const QuadricTerms& hold) noexcept {
-  Equations sums = equations(places);
-  for (std::size_t i = 0; i < six; ++i) sums.matrix[i][i] += hold[i];
-  factorise(sums.matrix);
+QuadricFit solve(const NormalEquations& sums) noexcept {
   QuadricFit fit{sums.right, sums.matrix};
+  factorise(fit.factor);
   solve_factorised(fit.factor, fit.terms);
   return fit;
+}
+
+QuadricFit fit_quadric(const QuadricPlaces& places, const QuadricTerms& hold) noexcept {
+  NormalEquations sums = equations(places);
+  for (std::size_t i = 0; i < six; ++i) sums.matrix[i][i] += hold[i];
+  return solve(sums);
 }
 
 void set_residuals(const QuadricPlaces& places, const QuadricTerms& t,

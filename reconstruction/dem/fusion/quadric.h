@@ -29,6 +29,14 @@ struct QuadricFit {
   QuadricMatrix covariance() const noexcept;
 };
 
+/// Normal equations for the terms of any six functions.
+struct NormalEquations {
+  QuadricMatrix matrix{};  ///< lower triangle of a positive matrix
+  QuadricTerms right{};
+};
+
+QuadricFit solve(const NormalEquations& sums) noexcept;
+
 /// Fits the surface by weighted least squares.
 /// @param hold  prior information on each term: 1 / variance about 0.
 QuadricFit fit_quadric(const QuadricPlaces& places, const QuadricTerms& hold) noexcept;

@@ -260,7 +260,7 @@ TEST(Disparity, CountsUnmatchedPixelsByReason) {
   const UnmatchedCounts& none = map.unmatched;
   EXPECT_EQ(none.unseen, 30U * size_px.y);
   EXPECT_EQ(none.unseen + none.ambiguous + none.inconsistent + none.speckle + none.unrefined +
-                static_cast<std::uint64_t>(given),
+                none.uncertain + static_cast<std::uint64_t>(given),
             static_cast<std::uint64_t>(size_px.x * size_px.y));
   for (int y = 0; y < size_px.y; ++y) {
     EXPECT_TRUE(std::isnan(map.disparity_px.at(29, y)[0]));

@@ -124,6 +124,15 @@ TEST(DemStereo, MeasuresLevelGround) {
   EXPECT_EQ(tally.name, "pair/000000");
   EXPECT_GT(tally.rows, 8000U);  // of 160 x 120 pixels, less 13 columns that only one camera sees
   ASSERT_GT(tally.points, 150U);
+  // Points are taken from every sixth row and column. No pixel is missing from the sum, which is
+  // the size of the rectified image.
+  EXPECT_NEAR(static_cast<double>(tally.rows), 36. * static_cast<double>(tally.points),
+              0.05 * static_cast<double>(tally.rows));
+  const StereoTally& pixels = tally.pixels;
+  const UnmatchedCounts& none = pixels.unmatched;
+  const std::uint64_t unmatched = none.unseen + none.ambiguous + none.inconsistent + none.speckle +
+                                  none.unrefined + none.uncertain;
+  EXPECT_EQ(pixels.matched() + unmatched, 160U * 120U);
   ASSERT_EQ(points.size(), tally.points + 3);
   EXPECT_EQ(points.bias_sd_m[0], 0);
   for (std::size_t i = 3; i < points.size(); ++i) {
