@@ -1,6 +1,7 @@
 """groundray-view without a window: pictures, and what it says of inputs that it cannot show."""
 
 import os
+import re
 import subprocess
 from pathlib import Path
 
@@ -131,6 +132,22 @@ def write_plate(path: Path, height_m: float) -> None:
         + "".join(f"{x} {y} {height_m}\n" for x, y in corners)
         + "3 0 1 2\n3 0 2 3\n"
     )
+
+
+def test_a_dataset_cannot_name_files_outside_it(tmp_path: Path) -> None:
+    """Names of sensors are parts of file names."""
+    folder = tmp_path / "data"
+    scene = ROOT / "data/scenes/first_light.yaml"
+    generate = [PROGRAM.with_name("groundray"), "generate", scene, "-o", folder]
+    subprocess.run(generate, check=True, capture_output=True)
+    dataset = folder / "dataset.yaml"
+    text = dataset.read_text()
+    name = re.search(r'^  - \{name: "(\w+)", kind: lidar', text, flags=re.MULTILINE)[1]
+    dataset.write_text(text.replace(f'name: "{name}", kind', f'name: "../data/lidar/{name}", kind'))
+    result = view(folder, "--screenshot", tmp_path / "out.png")
+    assert result.returncode == 1
+    assert f"is '../data/lidar/{name}', but is part of file names" in result.stderr
+    assert not (tmp_path / "out.png").exists()
 
 
 def test_distances_from_the_truth_are_printed_and_shown(tmp_path: Path) -> None:
