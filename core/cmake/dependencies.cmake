@@ -26,3 +26,5 @@ find_package(embree 4 QUIET)
 if(NOT embree_FOUND)
   find_package(embree 3.13 REQUIRED)
 endif()
+# For core/tracing/embree_adapter.h, in all that includes it.
+target_compile_definitions(embree INTERFACE GROUNDRAY_EMBREE=${embree_VERSION_MAJOR})

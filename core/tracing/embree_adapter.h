@@ -1,6 +1,7 @@
 #pragma once
 
 // All includes of Embree, and all differences between Embree 3.13 and Embree 4, are in this file.
+// GROUNDRAY_EMBREE, the major version, comes with the CMake target embree.
 #if GROUNDRAY_EMBREE >= 4
 #include <embree4/rtcore.h>
 #else

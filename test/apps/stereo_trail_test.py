@@ -39,7 +39,7 @@ def test_stereo_measures_the_ground_within_the_lidar_s_rings(trail, tmp_path):
     assert measured["both"] > measured["lidar"] + 2000
     error = both["elevation"] - triangle_heights(Raster(PRAIRIE, tmp_path), *both.places())
     # As of lidar and stereo in the closed loop: see reconstruct_dem_test.py. Errors of a pair are
-    # correlated, so the normalised ones of four pairs only have an upper limit.
+    # correlated, so the normalised ones of three pairs only have an upper limit.
     assert nmad_of(error[stereo]) < 0.008
     assert np.quantile(np.abs(error[stereo]), 0.95) < 0.05
     assert np.sqrt(np.mean(error[stereo] ** 2 / both["variance"][stereo])) < 1.15
@@ -47,7 +47,7 @@ def test_stereo_measures_the_ground_within_the_lidar_s_rings(trail, tmp_path):
 
 def test_the_report_says_why_pixels_are_no_points(trail):
     pairs = json.loads((trail / "both.json").read_text())["pairs"]
-    assert [pair["name"] for pair in pairs] == [f"pair/{i:06}" for i in range(4)]
+    assert [pair["name"] for pair in pairs] == [f"pair/{i:06}" for i in range(3)]
     sums = {}
     for pair in pairs:
         pixels = pair["pixels"]

@@ -48,7 +48,7 @@ TEST(DemPoints, AStereoPairMeasuresLevelGround) {
     });
   }
   MeasuredPoints points;
-  EXPECT_GT(append(images, {}, {}, 9, points), 8000U);
+  EXPECT_GT(append(images, {}, {}, 9, points).matched(), 8000U);
   ASSERT_GT(points.size(), 150U);
   // Four standard deviations: one in 16,000 normal errors exceeds them.
   for (std::size_t i = 0; i < points.size(); ++i)
