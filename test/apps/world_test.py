@@ -17,7 +17,7 @@ SCENE = SHIPPED.read_text().partition("\ncameras:\n")[0] + "\n"  # what lidars s
 
 
 def run(command, scene, folder):
-    text = scene.replace("../terrain/", f"{ROOT / 'data/terrain'}/")
+    text = scene.replace(": ../", f": {ROOT / 'data'}/")
     text = text.replace("file: rosette", f"file: {ROOT / 'data/scenes/rosette'}")
     text = re.sub(r"^duration_s: .*", "duration_s: 0.1", text, flags=re.M)
     (folder / "scene.yaml").write_text(text)

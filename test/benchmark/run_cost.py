@@ -43,7 +43,7 @@ lidars:
 def long_trail(folder: Path, frames: int) -> Path:
     """Writes a scene of this many frames, with vehicles slowed down accordingly."""
     text = (ROOT / "data/scenes/offroad_trail.yaml").read_text().split("lidars:")[0]
-    text = text.replace("../terrain", str(ROOT / "data/terrain"))
+    text = text.replace(": ../", f": {ROOT}/data/")
     text = text.replace("duration_s: 1", f"duration_s: {frames / 10 + 0.05}")
     speed = 40 / max(frames / 10, 5)
     text = re.sub(r"speed_m_s: 8", f"speed_m_s: {speed:.3g}", text)

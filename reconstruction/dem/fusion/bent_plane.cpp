@@ -5,8 +5,7 @@
 namespace groundray {
 namespace {
 
-constexpr int parts_across = 4;
-constexpr std::size_t parts = 16;
+constexpr std::size_t parts_across = 4, parts = parts_across * parts_across;
 // With fewer, or with points along a few lines, errors of single points would bend the plane.
 constexpr std::size_t enough_points = 32, enough_parts = 12;
 constexpr std::size_t slopes = 1, bends = 3;  // where the terms of slopes and of the bend begin
@@ -20,10 +19,11 @@ struct Part {
 
 std::size_t part_of(const CellColumns& points, std::size_t i, glm::dvec2 step_m) noexcept {
   const auto place = [](double cells) {
-    return std::clamp(static_cast<int>((cells + 0.5) * parts_across), 0, parts_across - 1);
+    constexpr double last = parts_across - 1;
+    return static_cast<std::size_t>(std::clamp((cells + 0.5) * parts_across, 0.0, last));
   };
-  return static_cast<std::size_t>(parts_across * place(double{points.y_m[i]} / std::abs(step_m.y)) +
-                                  place(double{points.x_m[i]} / std::abs(step_m.x)));
+  return parts_across * place(double{points.y_m[i]} / std::abs(step_m.y)) +
+         place(double{points.x_m[i]} / std::abs(step_m.x));
 }
 
 // Sums the normal equations of a bent plane, relative to the plane `about`.
