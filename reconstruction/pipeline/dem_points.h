@@ -59,7 +59,7 @@ struct StereoTally {
   std::uint64_t between = 0;        ///< matches between the rows and columns of points
   std::uint64_t too_uncertain = 0;  ///< matches omitted by StereoPointOptions::most_relative_sd
   std::uint64_t out_of_limits = 0;  ///< matches omitted by depth or confidence
-  std::uint64_t points = 0;
+  std::uint64_t points = 0;         ///< matches that became points
 
   std::uint64_t matched() const noexcept {
     return between + too_uncertain + out_of_limits + points;

@@ -42,13 +42,16 @@ def test_stereo_measures_the_ground_within_the_lidar_s_rings(trail, tmp_path):
     # correlated, so the normalised ones of three pairs only have an upper limit.
     assert nmad_of(error[stereo]) < 0.008
     assert np.quantile(np.abs(error[stereo]), 0.95) < 0.05
-    assert np.sqrt(np.mean(error[stereo] ** 2 / both["variance"][stereo])) < 1.15
+    assert 0.3 < np.sqrt(np.mean(error[stereo] ** 2 / both["variance"][stereo])) < 1.15
 
 
 def test_the_report_says_why_pixels_are_no_points(trail):
     pairs = json.loads((trail / "both.json").read_text())["pairs"]
     assert [pair["name"] for pair in pairs] == [f"pair/{i:06}" for i in range(3)]
     sums = {}
+    sizes = {sum(pair["pixels"].values()) for pair in pairs}
+    assert len(sizes) == 1  # that of the rectified image, about 640 x 480
+    assert sizes.pop() == pytest.approx(640 * 480, rel=0.2)
     for pair in pairs:
         pixels = pair["pixels"]
         used = ("points", "between", "too_uncertain", "out_of_limits")
@@ -56,7 +59,6 @@ def test_the_report_says_why_pixels_are_no_points(trail):
         assert pair["matched"] == sum(pixels[key] for key in used)
         # A point of each sixth row and column.
         assert pixels["between"] == pytest.approx(35 / 36 * pair["matched"], rel=0.02)
-        assert len({sum(pair["pixels"].values()) for pair in pairs}) == 1  # the image's size
         for key, count in pixels.items():
             sums[key] = sums.get(key, 0) + count
     said = (trail / "said.txt").read_text().split("pixels of the pairs:\n")[1]

@@ -61,16 +61,17 @@ PixelUses uses_of(const StereoTally& tally) {
   return {
       {{"points", "points", tally.points},
        {"between", "matched, between the rows and columns of points", tally.between},
-       {"too_uncertain", "matched, but farther than the disparity is precise", tally.too_uncertain},
+       {"too_uncertain", "matched, but the disparity is less certain than a tenth of itself",
+        tally.too_uncertain},
        {"out_of_limits", "matched, but beyond the limits of depth or confidence",
         tally.out_of_limits},
-       {"unrefined", "too little texture, or least squares disagree", none.unrefined},
+       {"unrefined", "no texture, or least squares disagree with the search", none.unrefined},
        {"uncertain", "too little texture for the noise", none.uncertain},
        {"speckle", "in a patch that is too small", none.speckle},
        {"inconsistent", "another match from right to left, as where hidden on the right",
         none.inconsistent},
-       {"ambiguous", "no single best match, or outside the right image", none.ambiguous},
-       {"unseen", "outside the left image", none.unseen}}};
+       {"ambiguous", "no single best match, or outside the right camera's field", none.ambiguous},
+       {"unseen", "outside the left camera's field", none.unseen}}};
 }
 
 void print_pixels(const std::vector<PointTally>& pairs) {

@@ -24,7 +24,7 @@ struct PointTally {
   std::size_t points = 0;          ///< number of points passed on to the DEM
   bool is_noiseless = false;       ///< true if no standard deviation of ranges is known
   std::vector<std::string> notes;  ///< messages for the user
-  StereoTally pixels;              ///< of a stereo pair
+  StereoTally pixels;              ///< use of a pair's pixels; all 0 for a scan
 };
 
 /// DEM made from scans and stereo pairs, and the report on it.

@@ -1,6 +1,8 @@
 #include "reconstruction/dem/fusion/bent_plane.h"
 
 #include <algorithm>
+#include <cmath>
+#include <numeric>
 
 namespace groundray {
 namespace {
@@ -67,6 +69,11 @@ BentPlane fit_bent_plane(const CellColumns& points, const SurfacePlane& about,
   const std::array<double, 3> bend{1 / (bend_m2.xx + least_bend_m2),
                                    1 / (bend_m2.xy + least_bend_m2),
                                    1 / (bend_m2.yy + least_bend_m2)};
+  // Rounding of the sums, which are floats, must not take information from the neighbours'.
+  for (std::size_t k = 1; k < sums.right.size(); ++k) {
+    const double mean = sums.matrix[k][0] / sums.matrix[0][0];
+    sums.matrix[k][k] = std::max(sums.matrix[k][k], sums.matrix[k][0] * mean);
+  }
   sums.matrix[slopes][slopes] += xx;
   sums.matrix[slopes + 1][slopes] += xy;
   sums.matrix[slopes + 1][slopes + 1] += yy;
@@ -85,17 +92,20 @@ BentPlane fit_bent_plane(const CellColumns& points, const SurfacePlane& about,
 
 bool has_points_throughout(const CellColumns& points, glm::dvec2 step_m) noexcept {
   if (points.count < enough_points) return false;
-  std::array<bool, parts> are_seen{};
+  std::array<std::size_t, parts> counts{};
   for (std::size_t i = 0; i < points.count; ++i)
-    if (points.weight[i] > 0) are_seen[part_of(points, i, step_m)] = true;
-  return static_cast<std::size_t>(std::ranges::count(are_seen, true)) >= enough_parts;
+    if (points.weight[i] > 0) ++counts[part_of(points, i, step_m)];
+  const auto seen = parts - static_cast<std::size_t>(std::ranges::count(counts, std::size_t{0}));
+  return seen >= enough_parts &&
+         std::accumulate(counts.begin(), counts.end(), std::size_t{0}) >= enough_points;
 }
 
 double scatter_m2(const CellColumns& points, const SurfacePlane& plane, double fitted,
                   double expected_m2, glm::dvec2 step_m) noexcept {
   constexpr double prior_points = 10;  // weight of the stated noise against the measured one
   std::array<Part, parts> sums{};
-  double square = 0, count = 0;
+  // Weights may be any multiple of 1 / variance, so the stated noise is summed with them.
+  double square = 0, stated = 0, count = 0;
   for (std::size_t i = 0; i < points.count; ++i) {
     const double weight = points.weight[i];
     if (!(weight > 0)) continue;
@@ -106,6 +116,7 @@ double scatter_m2(const CellColumns& points, const SurfacePlane& plane, double f
     part.weight += weight;
     part.off += weight * off;
     square += weight * off * off;
+    stated += weight * double{points.variance_m2[i]};
     ++count;
   }
   double weight = 0, between = 0, seen = 0;
@@ -116,7 +127,8 @@ double scatter_m2(const CellColumns& points, const SurfacePlane& plane, double f
     ++seen;
   }
   const double freedom = seen - fitted;  // at least 6 of enough_parts
-  const double noise = (square - between + prior_points) / (count - seen + prior_points);
+  const double noise =
+      (square - between + prior_points * stated / count) / (count - seen + prior_points);
   const double per_part_m2 = noise * seen / weight;  // noise of a part's mean
   const double measured_m2 = (between / freedom - noise) * seen / weight;
   // Variances of the measured and of the expected one.

@@ -3,7 +3,6 @@
 // Private to the library: planes with a bend, fitted to the points of a cell, and the scatter of
 // the ground about them.
 #include <array>
-#include <cmath>
 #include <cstddef>
 #include <glm/vec2.hpp>
 
@@ -34,20 +33,21 @@ struct BentPlane {
 /// Fits a bent plane by least squares with the points' present weights. The neighbours' slopes and
 /// their uncertainty constrain its slopes.
 /// @param about  plane that the result is relative to.
-/// @param bend_m2  variances of the bend about 0: with 0 the result is a plane.
+/// @param bend_m2  variances of the bend about 0: with 0 the result is a plane, to 1e-6 m.
 BentPlane fit_bent_plane(const CellColumns& points, const SurfacePlane& about,
                          const NeighbourSurface& neighbours, const SurfaceBend& bend_m2,
                          glm::dvec2 step_m) noexcept;
 
-/// Returns true if there are points with weight in all parts of the cell, enough to determine its
-/// bend.
+/// Returns true if at least 32 points have weight, in at least 12 of the cell's 4 x 4 parts: enough
+/// to determine its bend.
 bool has_points_throughout(const CellColumns& points, glm::dvec2 step_m) noexcept;
 
 /// Returns the variance of the ground about a plane, without the points' noise, from the means of
 /// the points in 4 x 4 parts of the cell. These scatter by the noise, whose size the scatter within
 /// the parts shows, and by the ground. If noise hides the ground, the result is near `expected_m2`.
 /// @param fitted  number of terms that were fitted to the points.
-/// @param expected_m2  variance in the surrounding cells, of which a factor of 2 is not known.
+/// @param expected_m2  variance as estimated from the surrounding cells, with a standard deviation
+///        of its own size.
 /// @see DerSimonian, Laird, Meta-analysis in clinical trials, Controlled Clinical Trials 7 (1986),
 ///      for the estimate of a variance between groups
 double scatter_m2(const CellColumns& points, const SurfacePlane& plane, double fitted,

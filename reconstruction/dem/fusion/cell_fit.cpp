@@ -302,6 +302,8 @@ CellHeight CellFit::finish(const SurfacePlane& plane, const NeighbourSurface& ne
   // The correction by the crest adds the points' noise a second time, but not the bias of groups,
   // which the neighbours share.
   const double again = 1 + 2 * own_crest_ * neighbours.crest_share * (by.bend_x + by.bend_y);
+  // The ground about the plane is part of the misfit, too: on the safe side, but of the noise of
+  // many points hardly anything is left to be multiplied.
   const double misfit = found.chi2 > 1 ? found.chi2 : 1.0;
   found.variance_m2 =
       again * again * by.noise_m2 * misfit + by.bias_m2 + lent_m2 + bend_m2 + ground_m2;

@@ -22,8 +22,9 @@ constexpr double bend_share = 1.5;
 // between samples, too. Found by trial on rolling ground, fractals, a real valley and triangles,
 // with 1 to 100 points per cell.
 constexpr double bend_rest = 1.15, slope_rest = 1.8;
-// Likewise, the variance of the ground within a cell about a bent plane. On rough ground, 0.006 to
-// 0.008 were measured: dense scans of fractals and of rolling ground in triangles of two cells.
+// Likewise, the variance of the ground within a cell about a bent plane. Dense scans of rough
+// ground (fractals, rolling ground in triangles of two cells) show 0.006 to 0.008 without their
+// noise.
 constexpr double within_rest = 0.0085;
 
 // Fewer cells do not determine a plane: their scatter about the first guess is used.

@@ -35,6 +35,7 @@ struct NormalEquations {
   QuadricTerms right{};
 };
 
+/// Solves the equations by Cholesky's factorisation.
 QuadricFit solve(const NormalEquations& sums) noexcept;
 
 /// Fits the surface by weighted least squares.

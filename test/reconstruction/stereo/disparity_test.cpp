@@ -268,6 +268,21 @@ TEST(Disparity, CountsUnmatchedPixelsByReason) {
   }
 }
 
+// With a limit that no disparity meets, all that had one are uncertain; the others stay as they
+// are.
+TEST(Disparity, CountsUncertainPixelsByTheirLimit) {
+  const Pair pair = pair_of({12, 0, 0});
+  const DisparityMap usual = match(pair.left, pair.right, {.range = {{0, 31}}});
+  const DisparityMap strict =
+      match(pair.left, pair.right, {.range = {{0, 31}}, .most_sd_px = 0.05});  // of a floor of 0.1
+  const auto given =
+      std::ranges::count_if(usual.disparity_px.values(), [](float d) { return !std::isnan(d); });
+  EXPECT_GT(given, 1000);
+  EXPECT_EQ(strict.unmatched.unrefined, usual.unmatched.unrefined);
+  EXPECT_EQ(strict.unmatched.uncertain,
+            usual.unmatched.uncertain + static_cast<std::uint64_t>(given));
+}
+
 // The range must be estimated, and there is none.
 TEST(Disparity, CountsUnmatchedPixelsWithoutARange) {
   RectifiedImage blank = seen_whole(ImageF(size_px.x, size_px.y, 1));

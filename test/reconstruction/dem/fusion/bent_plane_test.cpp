@@ -27,14 +27,16 @@ CellColumns points_on(const Ground& ground, std::uint32_t trial, std::size_t cou
   CellColumns points;
   points.count = count;
   points.padded = whole_lanes(count);
-  for (auto* const column : {&points.x_m, &points.y_m, &points.z_m, &points.weight})
+  for (auto* const column :
+       {&points.x_m, &points.y_m, &points.z_m, &points.weight, &points.variance_m2})
     column->assign(points.padded, 0);
   for (std::uint32_t i = 0; i < count; ++i) {
     const glm::dvec2 p = random_uniform({.seed = Seed{42}, .frame = trial, .pulse = i}) - 0.5;
     points.x_m[i] = static_cast<float>(p.x * step_m.x);
     points.y_m[i] = static_cast<float>(p.y * step_m.y);
     points.z_m[i] = static_cast<float>(ground(p) + noise_m * normal(trial, i));
-    points.weight[i] = static_cast<float>(1 / (sd_m * sd_m));
+    points.variance_m2[i] = static_cast<float>(sd_m * sd_m);
+    points.weight[i] = 1 / points.variance_m2[i];
   }
   return points;
 }
@@ -97,44 +99,89 @@ TEST(BentPlane, PointsAlongLinesAreNotThroughoutACell) {
   CellColumns points = points_on(bent_height, 0, 60, 0);
   EXPECT_TRUE(has_points_throughout(points, step_m));
   EXPECT_FALSE(has_points_throughout(points_on(bent_height, 0, 31, 0), step_m));
+  CellColumns outliers = points;
+  for (std::size_t i = 31; i < points.count; ++i) outliers.weight[i] = 0;
+  EXPECT_FALSE(has_points_throughout(outliers, step_m));
   for (std::size_t i = 0; i < points.count; ++i) {
     points.x_m[i] = static_cast<float>((i % 2 == 0 ? 0.3 : -0.2) * step_m.x);  // 2 of 4 columns
   }
   EXPECT_FALSE(has_points_throughout(points, step_m));
 }
 
-// Ground of the variance 1 mm² in waves that are longer than a part of the cell, whose means over
-// parts have (2 sin(pi / 8) / (pi / 4))² = 0.95 of it: the mean of many cells is that, whatever the
-// noise hides of a single one. 400 cells have 16 parts each, so that it is known to 3 %; what noise
-// adds is known to a few hundredths of its own variance per part.
-TEST(BentPlane, ScatterIsThatOfTheGroundWithoutNoise) {
-  for (const double noise_m : {0.0005, 0.002, 0.01}) {
-    double sum_m2 = 0;
-    constexpr std::uint32_t trials = 400;
-    for (std::uint32_t trial = 0; trial < trials; ++trial) {
-      const double phase = 2 * glm::pi<double>() * trial / trials;
-      const auto wave = [phase](glm::dvec2 p) {
-        return 1e-3 * std::sqrt(2.0) * std::sin(2 * glm::pi<double>() * p.x + phase);
-      };
-      CellColumns points = points_on(wave, trial, 160, noise_m);
-      for (float& weight : points.weight) weight *= static_cast<float>(std::pow(sd_m / noise_m, 2));
-      sum_m2 += scatter_m2(points, {}, 0, 1e-6, step_m);
-    }
-    EXPECT_NEAR(1e6 * sum_m2 / trials, 0.95, 0.15) << noise_m;
+// Sets the stated noise of the points.
+void state_noise(CellColumns& points, double noise_m) {
+  for (std::size_t i = 0; i < points.count; ++i) {
+    points.variance_m2[i] = static_cast<float>(noise_m * noise_m);
+    points.weight[i] = 1 / points.variance_m2[i];
   }
 }
 
-// A plane without any ground of its own: noise that is larger than stated is not taken for ground.
-TEST(BentPlane, NoiseIsNotScatterOfTheGround) {
-  for (const double stated : {1.0, 0.3}) {
-    double sum_m2 = 0;
-    for (std::uint32_t trial = 0; trial < 400; ++trial) {
-      CellColumns points = points_on([](glm::dvec2) { return 0.0; }, trial, 160, sd_m);
-      for (float& weight : points.weight) weight /= static_cast<float>(stated * stated);
-      sum_m2 += scatter_m2(points, {}, 0, 1e-9, step_m) / 400;
+// Ground of the variance 1 mm² in waves that are longer than a part of the cell, whose means over
+// parts have (sin(pi / 4) / (pi / 4))² = 0.81 of it. The noise of a part's mean, of ten points,
+// decides how far that counts against the expected variance: a blend by the inverse variances
+// (e + n)² / 8 of the measured variance and e² of the expected one. The measured one is known to
+// (0.81 + n) / sqrt(8 * 400), of which five standard errors are allowed.
+TEST(BentPlane, ScatterIsThatOfTheGroundUnlessNoiseHidesIt) {
+  for (const double noise_mm : {0.5, 2., 10.}) {
+    for (const double expected_mm2 : {0.25, 4.}) {
+      double sum_m2 = 0;
+      constexpr std::uint32_t trials = 400;
+      for (std::uint32_t trial = 0; trial < trials; ++trial) {
+        const double phase = 2 * glm::pi<double>() * trial / trials;
+        const auto wave = [phase](glm::dvec2 p) {
+          return 1e-3 * std::sqrt(2.0) * std::sin(2 * glm::pi<double>() * p.x + phase);
+        };
+        CellColumns points = points_on(wave, trial, 160, 1e-3 * noise_mm);
+        state_noise(points, 1e-3 * noise_mm);
+        sum_m2 += scatter_m2(points, {}, 0, 1e-6 * expected_mm2, step_m) / trials;
+      }
+      const double own_mm2 = noise_mm * noise_mm / 10, square = expected_mm2 * expected_mm2;
+      const double share = square / (square + std::pow(expected_mm2 + own_mm2, 2) / 8);
+      EXPECT_NEAR(1e6 * sum_m2, share * 0.81 + (1 - share) * expected_mm2,
+                  0.02 * expected_mm2 + share * (0.03 + 5 * (0.81 + own_mm2) / std::sqrt(3200)))
+          << noise_mm << " mm, " << expected_mm2 << " mm²";
     }
-    EXPECT_LT(sum_m2, 2e-9);  // a noise of 1e-4 / 10 per part, and 1e-9 expected
   }
+}
+
+// Weights are smaller than 1 / variance where points have a bias in common.
+TEST(BentPlane, ScatterDoesNotDependOnTheScaleOfWeights) {
+  CellColumns points =
+      points_on([](glm::dvec2 p) { return 2e-3 * std::sin(9 * p.x); }, 0, 160, 0.002);
+  state_noise(points, 0.002);
+  const double whole_m2 = scatter_m2(points, {}, 0, 1e-6, step_m);
+  EXPECT_GT(whole_m2, 1.05e-6);
+  for (float& weight : points.weight) weight /= 61;
+  EXPECT_NEAR(scatter_m2(points, {}, 0, 1e-6, step_m), whole_m2, 1e-5 * whole_m2);
+}
+
+// Noise that is three times larger than stated is not taken for ground: the mean of a part is off
+// by 3 mm.
+TEST(BentPlane, NoiseIsNotScatterOfTheGround) {
+  double sum_m2 = 0;
+  for (std::uint32_t trial = 0; trial < 400; ++trial) {
+    CellColumns points = points_on([](glm::dvec2) { return 0.0; }, trial, 160, sd_m);
+    state_noise(points, sd_m / 3);
+    sum_m2 += scatter_m2(points, {}, 0, 1e-6, step_m) / 400;
+  }
+  EXPECT_LT(sum_m2, 1.5e-6);
+}
+
+// One exact point in a corner of a wide cell: the rounding of 1e8 times its squares exceeds the
+// information on the slopes, which alone determines these.
+TEST(BentPlane, RoundingTakesNoInformationFromTheNeighbours) {
+  constexpr glm::dvec2 wide_m(5, 5);
+  CellColumns points = points_on([](glm::dvec2) { return 0.0; }, 0, 1, 0);
+  points.x_m[0] = points.y_m[0] = 0.45F * 5;
+  points.z_m[0] = 0.7F;
+  points.weight[0] = 1e8F;
+  NeighbourSurface neighbours;
+  neighbours.information_xx = neighbours.information_yy = 1;
+  const BentPlane got = fit_bent_plane(points, {}, neighbours, {}, wide_m);
+  const double slope_variance = got.covariance[1][1] / (wide_m.x * wide_m.x);
+  EXPECT_GT(slope_variance, 0.3);
+  EXPECT_LT(slope_variance, 1.01);
+  EXPECT_NEAR(got.covariance[0][0], 2 * std::pow(0.45 * 5, 2), 1);
 }
 
 }  // namespace
