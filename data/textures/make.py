@@ -4,9 +4,9 @@
     pip install numpy opencv-python-headless
     python3 make.py
 
-A photograph of 4 m by 4 m would have more kinds of detail; this one has no owner. The mean does not
-matter, because a texture only modulates a material (docs/reference/textures.md). The bytes depend
-on the PNG encoder, the grey values on NumPy's generator, which keeps its sequence for a seed.
+A generated texture needs no licence, unlike a photograph. The mean does not matter, because a
+texture only modulates a material (docs/reference/textures.md). Grey values may differ with the
+version of NumPy, and bytes with that of OpenCV; data/README.md names those that were used.
 """
 
 from pathlib import Path
