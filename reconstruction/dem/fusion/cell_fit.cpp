@@ -297,8 +297,7 @@ CellHeight CellFit::finish(const SurfacePlane& plane, const NeighbourSurface& ne
   const double bend_m2 = by.bend_x * by.bend_x * bend.xx + by.bend_y * by.bend_y * bend.yy +
                          by.bend_xy * by.bend_xy * bend.xy;
   const double ground_m2 =
-      is_dense ? scatter_m2(points_, found.plane, bent.fitted, neighbours.within_m2, step_m)
-               : neighbours.within_m2;
+      is_dense ? scatter_m2(points_, found.plane, bent.fitted, neighbours.within_m2, step_m) : 0;
   // The correction by the crest adds the points' noise a second time, but not the bias of groups,
   // which the neighbours share.
   const double again = 1 + 2 * own_crest_ * neighbours.crest_share * (by.bend_x + by.bend_y);
