@@ -10,7 +10,7 @@ namespace {
 constexpr std::size_t parts_across = 4, parts = parts_across * parts_across;
 // With fewer, or with points along a few lines, errors of single points would bend the plane.
 constexpr std::size_t enough_points = 32, enough_parts = 12;
-constexpr std::size_t slopes = 1, bends = 3;  // where the terms of slopes and of the bend begin
+constexpr std::size_t first_slope = 1, first_bend = 3;  // rows of the terms in the matrix
 constexpr double least_bend_m2 = 1e-12;
 
 // Sums over the points of a part of the cell, by weight.
@@ -74,19 +74,21 @@ BentPlane fit_bent_plane(const CellColumns& points, const SurfacePlane& about,
     const double mean = sums.matrix[k][0] / sums.matrix[0][0];
     sums.matrix[k][k] = std::max(sums.matrix[k][k], sums.matrix[k][0] * mean);
   }
-  sums.matrix[slopes][slopes] += xx;
-  sums.matrix[slopes + 1][slopes] += xy;
-  sums.matrix[slopes + 1][slopes + 1] += yy;
-  sums.right[slopes] += xx * rise_x + xy * rise_y;
-  sums.right[slopes + 1] += xy * rise_x + yy * rise_y;
-  for (std::size_t k = 0; k < bend.size(); ++k) sums.matrix[bends + k][bends + k] += bend[k];
+  sums.matrix[first_slope][first_slope] += xx;
+  sums.matrix[first_slope + 1][first_slope] += xy;
+  sums.matrix[first_slope + 1][first_slope + 1] += yy;
+  sums.right[first_slope] += xx * rise_x + xy * rise_y;
+  sums.right[first_slope + 1] += xy * rise_x + yy * rise_y;
+  for (std::size_t k = 0; k < bend.size(); ++k)
+    sums.matrix[first_bend + k][first_bend + k] += bend[k];
 
   const QuadricFit fit = solve(sums);
   BentPlane found{fit.terms, fit.covariance()};
   const QuadricMatrix& c = found.covariance;
-  found.fitted =
-      6 - c[slopes][slopes] * xx - 2 * c[slopes][slopes + 1] * xy - c[slopes + 1][slopes + 1] * yy;
-  for (std::size_t k = 0; k < bend.size(); ++k) found.fitted -= c[bends + k][bends + k] * bend[k];
+  found.fitted = 6 - c[first_slope][first_slope] * xx - 2 * c[first_slope][first_slope + 1] * xy -
+                 c[first_slope + 1][first_slope + 1] * yy;
+  for (std::size_t k = 0; k < bend.size(); ++k)
+    found.fitted -= c[first_bend + k][first_bend + k] * bend[k];
   return found;
 }
 
