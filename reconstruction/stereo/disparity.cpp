@@ -44,6 +44,8 @@ void check_match_options(const MatchOptions& options, Violations& broken) {
   broken.unless(options.speckle_px >= 0, "speckle_px = {} must be 0 or more", options.speckle_px);
   broken.unless(is_within(options.sd_factor, 0, 100), "sd_factor = {} must be 0 to 100",
                 options.sd_factor);
+  broken.unless(is_within(options.sd_bend_factor, 0, 100), "sd_bend_factor = {} must be 0 to 100",
+                options.sd_bend_factor);
   broken.unless(is_within(options.sd_floor_px, 0, 10), "sd_floor_px = {} must be 0 to 10",
                 options.sd_floor_px);
   broken.unless(options.most_sd_px > 0, "most_sd_px = {} must be above 0", options.most_sd_px);
@@ -118,7 +120,8 @@ void keep_certain(const ImageF& start_px, const RefinedDisparity& refined,
   for (std::size_t i = 0; i < start_px.values().size(); ++i) {
     if (std::isnan(start_px.values()[i])) continue;
     const double sd_px = std::hypot(
-        options.sd_floor_px, options.sd_factor * static_cast<double>(refined.sd_px.values()[i]));
+        options.sd_floor_px, options.sd_factor * static_cast<double>(refined.sd_px.values()[i]),
+        options.sd_bend_factor * static_cast<double>(refined.bend_px.values()[i]));
     if (!(sd_px <= options.most_sd_px)) {
       ++(std::isnan(sd_px) ? map.unmatched.unrefined : map.unmatched.uncertain);
       continue;

@@ -45,10 +45,11 @@ struct MatchOptions {
   enum class Smoothing { None, Guided };
   Smoothing smoothing = Smoothing::Guided;
   int window_px = 9;  ///< side of the least-squares window; odd, 5 to 31
-  /// Factor and floor of the stated standard deviation: the floor and the factor times that of
-  /// least squares are added in quadrature. See docs/theory/reconstruction_stereo.md for their
-  /// derivation.
+  /// The stated standard deviation: the floor, a factor times that of least squares, and a factor
+  /// times the error of planes where the surface bends within a window, are added in quadrature.
+  /// See docs/theory/reconstruction_stereo.md for their derivation.
   double sd_factor = 1.5;
+  double sd_bend_factor = 1;
   double sd_floor_px = 0.1;
   double most_sd_px = 0.4;  ///< less certain disparities are omitted
 };

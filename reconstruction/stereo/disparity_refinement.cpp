@@ -25,6 +25,10 @@ constexpr double steepest = 0.8;  // largest change of disparity from pixel to p
 // at pixels and little more between them.
 constexpr double noise_slope = 0.36;
 constexpr double least_texture = 0.1;  // least fraction of the slopes that is not noise
+// Error of a plane in the middle of a window, per root mean square deviation of the surface from
+// it: 1 / sqrt(2) for a surface of second degree that bends in one direction, with Gaussian
+// weights.
+constexpr double bend_share = 0.707;
 // Noise of rounding to 255 steps; no image is more accurate.
 constexpr double least_noise = 0.29 / 255;
 
@@ -100,7 +104,7 @@ struct Plane {
 };
 
 struct Refined {
-  double disparity_px = 0, sd_px = 0, explained = 0;
+  double disparity_px = 0, sd_px = 0, bend_px = 0, explained = 0;
 };
 
 class Refinement {
@@ -124,14 +128,14 @@ class Refinement {
       gain = fit->gain;
       if (!(std::abs(plane.at_px - start) <= most_shift_px)) return std::nullopt;
       if (std::abs(fit->shift_px) <= done_px)
-        return Refined{plane.at_px, fit->sd_px, fit->explained};
+        return Refined{plane.at_px, fit->sd_px, fit->bend_px, fit->explained};
     }
     return std::nullopt;
   }
 
  private:
   struct Fit {
-    double shift_px = 0, sd_px = 0, explained = 0, gain = 1;
+    double shift_px = 0, sd_px = 0, bend_px = 0, explained = 0, gain = 1;
   };
 
   template <typename Visit>
@@ -172,7 +176,7 @@ class Refinement {
   std::optional<Fit> fit_at(int x, int y, const Plane& plane, double begin_px, double gain) const {
     glm::dmat3 normal(0), spread(0);
     glm::dvec3 right_side(0);
-    double weights = 0, squares = 0, sum = 0;
+    double weights = 0, squares = 0, sum = 0, off_squares = 0;
     int count = 0;
     visit(x, y, [&](int dx, int dy, double weight) {
       const double given = start_px_.at(x + dx, y + dy)[0];
@@ -192,11 +196,14 @@ class Refinement {
       weights += weight;
       squares += weight * value * value;
       sum += weight * value;
+      off_squares += weight * off_px * off_px;
       ++count;
     });
     constexpr int least_count = 12;
     if (count < least_count) return std::nullopt;
-    return solve(normal, spread, right_side, squares, sum, weights);
+    std::optional<Fit> fit = solve(normal, spread, right_side, squares, sum, weights);
+    if (fit) fit->bend_px = bend_share * std::sqrt(off_squares / weights);
+    return fit;
   }
 
   static std::optional<Fit> solve(const glm::dmat3& normal, const glm::dmat3& spread,
@@ -218,8 +225,10 @@ class Refinement {
     const double information = 1 / back[2][2];
     const double texture = 1 - noise_slope * variance * weights / (gain * gain * information);
     if (!(texture > least_texture)) return std::nullopt;
-    return Fit{found.z / gain, std::sqrt(std::max(0.0, covariance[2][2])) / (gain * texture),
-               contrast > 0 ? std::max(0.0, 1 - residual / contrast) : 0, gain};
+    return Fit{.shift_px = found.z / gain,
+               .sd_px = std::sqrt(std::max(0.0, covariance[2][2])) / (gain * texture),
+               .explained = contrast > 0 ? std::max(0.0, 1 - residual / contrast) : 0,
+               .gain = gain};
   }
 
   const ImageF& start_px_;
@@ -234,7 +243,7 @@ class Refinement {
 RefinedDisparity refine(const ImageF& left, const ImageF& right, const ImageF& start_px,
                         int window_px) {
   const ImageF empty(left.width(), left.height(), 1);
-  RefinedDisparity result{empty, empty, empty};
+  RefinedDisparity result{empty, empty, empty, empty};
   const Refinement refinement(left, right, start_px, window_px);
   tbb::parallel_for(0, left.height(), [&](int y) {
     for (int x = 0; x < left.width(); ++x) {
@@ -242,6 +251,7 @@ RefinedDisparity refine(const ImageF& left, const ImageF& right, const ImageF& s
       result.disparity_px.at(x, y)[0] =
           refined ? static_cast<float>(refined->disparity_px) : no_disparity;
       result.sd_px.at(x, y)[0] = refined ? static_cast<float>(refined->sd_px) : no_disparity;
+      result.bend_px.at(x, y)[0] = refined ? static_cast<float>(refined->bend_px) : no_disparity;
       result.explained.at(x, y)[0] = refined ? static_cast<float>(refined->explained) : 0;
     }
   });

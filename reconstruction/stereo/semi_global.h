@@ -58,6 +58,7 @@ ImageF smooth_guided(const Image8& left, const SemiGlobalDisparity& found,
 struct RefinedDisparity {
   ImageF disparity_px;
   ImageF sd_px;      ///< formal: from the window's residuals and texture
+  ImageF bend_px;    ///< sd of the error of a plane where the surface bends within the window
   ImageF explained;  ///< fraction of the window's contrast that the fit explains; 0 for none
 };
 

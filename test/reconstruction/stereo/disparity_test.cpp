@@ -121,16 +121,17 @@ TEST(Disparity, DoesNotDependOnBrightnessOrContrast) {
   EXPECT_LT(errors.rms_px, spline_px);
 }
 
-// White noise is the model of the least squares, so their own standard deviation, without factor or
-// floor, must be that of the errors. Splines between pixels keep about 2/3 of the noise's variance,
-// hence the lower limit.
+// White noise is the model of the least squares, so their own standard deviation, without factors
+// or floor, must be that of the errors. Splines between pixels keep about 2/3 of the noise's
+// variance, hence the lower limit.
 TEST(Disparity, StatesTheEffectOfWhiteNoise) {
   for (const double noise : {0.01, 0.03}) {
     const Slant slant{14.4, 0.03, 0.06};
     const Pair pair = pair_of(slant, noise);
-    const Errors errors = errors_of(
-        match(pair.left, pair.right, {.range = {{0, 31}}, .sd_factor = 1, .sd_floor_px = 0}),
-        slant);
+    const DisparityMap map =
+        match(pair.left, pair.right,
+              {.range = {{0, 31}}, .sd_factor = 1, .sd_bend_factor = 0, .sd_floor_px = 0});
+    const Errors errors = errors_of(map, slant);
     EXPECT_GT(errors.count, 0.7 * size_px.x * size_px.y) << noise;
     EXPECT_GT(errors.normalised, 0.75) << noise;
     EXPECT_LT(errors.normalised, 1.3) << noise;
@@ -316,6 +317,31 @@ TEST(Disparity, IsZeroBetweenEqualImagesEvenAtTheBorder) {
     EXPECT_NEAR(disparity_px, 0, 1e-6);  // rounding of the coefficients, which are floats
 }
 
+// A plane through a parabola with weights of sd 2 px is off by half the second difference times the
+// mean square distance: 3.4 px², as windows end 4 px from the middle; 4 px² if they did not.
+TEST(Disparity, StatesTheErrorOfAPlaneWhereTheSurfaceBends) {
+  constexpr double bend_px = 0.02;
+  ImageF noise(30, 20, 1), start_px(30, 20, 1);
+  testing::add_noise(noise, 0.2, {4});
+  for (int y = 0; y < start_px.height(); ++y) {
+    for (int x = 0; x < start_px.width(); ++x)
+      start_px.at(x, y)[0] = static_cast<float>(0.5 * bend_px * (x - 15) * (x - 15));
+  }
+  double weights = 0, square = 0;
+  for (int i = -4; i <= 4; ++i) {
+    const double weight = std::exp(-0.5 * i * i / 4);
+    weights += weight;
+    square += weight * i * i;
+  }
+  const double off_px = 0.5 * bend_px * square / weights;
+  const RefinedDisparity bent = refine(noise, noise, start_px, 9);
+  // Windows that end have 14 % less of it than whole ones, whose factor is used.
+  EXPECT_NEAR(bent.bend_px.at(15, 10)[0], off_px, 0.2 * off_px);
+  EXPECT_LE(bent.bend_px.at(15, 10)[0], off_px);
+  std::ranges::fill(start_px.values(), 0.F);
+  EXPECT_NEAR(refine(noise, noise, start_px, 9).bend_px.at(15, 10)[0], 0, 1e-6);
+}
+
 std::vector<std::uint32_t> bits_of(const ImageF& image) {
   std::vector<std::uint32_t> bits;
   for (const float value : image.values()) bits.push_back(std::bit_cast<std::uint32_t>(value));
@@ -385,6 +411,7 @@ TEST(Disparity, RejectsInvalidImagesAndOptions) {
   expect_refused({.left_right_px = -1}, "left_right_px = -1");
   expect_refused({.speckle_px = -1}, "speckle_px = -1");
   expect_refused({.sd_factor = -1}, "sd_factor = -1");
+  expect_refused({.sd_bend_factor = 101}, "sd_bend_factor = 101");
   expect_refused({.most_sd_px = 0}, "most_sd_px = 0");
   expect_refused({.range = {{5, 5}}}, "range = 5 to 5 px");
   expect_refused({.range = {{0, 5000}}}, "range = 0 to 5000 px");

@@ -1,3 +1,4 @@
+#include <fmt/format.h>
 #include <gtest/gtest.h>
 
 #include <algorithm>
@@ -272,6 +273,7 @@ TEST(StereoPointsProof, StatedErrorsAreCorrectForRenderedPairs) {
     EXPECT_LT(residuals.outlier_share, 0.02) << shot.name;
     testing::record_margin("mismatches", residuals.outlier_share, 0.02);
     expect_stated(shot.name, residuals, 0);
+    ::testing::Test::RecordProperty(shot.name + ", rms", fmt::format("{:.2f}", rms(residuals, 0)));
     // Pixel-locking and the pair's other common errors, with a stated sd of 0.1 px.
     const double own_bias = bias_of(residuals);
     EXPECT_LT(std::abs(own_bias), 1) << shot.name;

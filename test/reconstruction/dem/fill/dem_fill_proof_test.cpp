@@ -10,6 +10,7 @@
 
 #include "reconstruction/dem/fill/dem_fill.h"
 #include "test/reconstruction/dem/holed_ground.h"
+#include "test/support/machine_speed.h"
 #include "test/support/margin.h"
 #include "test/support/terrain/sample_terrain.h"
 
@@ -31,7 +32,8 @@ std::size_t expect_swift(const std::vector<float>& holed_m, const std::vector<fl
   const FilledHeights filled = fill_dem(frame_of({side, side}), holed_m, most_m,
                                         {.farthest_m = 1000, .largest_share = 1, .form = form});
   const double cpu_s = static_cast<double>(std::clock() - begin) / CLOCKS_PER_SEC;
-  const double most_s = std::max(1.0, static_cast<double>(filled.filled) / 1e5);
+  const double most_s =
+      testing::slowness() * std::max(1.0, static_cast<double>(filled.filled) / 1e5);
   EXPECT_LE(cpu_s, most_s);
   testing::record_margin(what, cpu_s, most_s, "s");
   return filled.filled;

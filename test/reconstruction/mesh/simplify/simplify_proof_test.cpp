@@ -11,6 +11,7 @@
 #include "core/model/model.h"
 #include "reconstruction/mesh/simplify/simplify.h"
 #include "terrain/dem/dem_io.h"
+#include "test/support/machine_speed.h"
 #include "test/support/margin.h"
 #include "test/support/scans/stanford_bunny.h"
 #include "test/support/temporary_folder.h"
@@ -51,8 +52,8 @@ TimedResult simplify_timed(const TerrainCase& of) {
 
 // The evaluator is independent of the simplification.
 void expect_proved(const TerrainCase& of) {
-  constexpr double most_s = 2;
   SCOPED_TRACE(of.name);
+  const double most_s = 2 * testing::slowness();
   TimedResult timed = simplify_timed(of);
   if (testing::proof_size(0, 1) == 1) {  // other processes slow it down: one run of three suffices
     for (int i = 0; i < 2 && timed.took_s > most_s; ++i) timed = simplify_timed(of);
