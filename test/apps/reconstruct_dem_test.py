@@ -347,10 +347,10 @@ SLOWLY = {"seconds": 2.02, "speed_m_s": 5, "noise_m": 0.005}  # up to 300 points
         *([(prairie_of_1_m, {}), (fractal_ground, {}), (jacksboro_with_relief, {})] * IS_FULL),
     ],
 )
-def test_stated_errors_are_correct_near_the_sensor(tmp_path, record_property, ground, drive):
+def test_stated_errors_are_correct_at_all_ranges(tmp_path, record_property, ground, drive):
     """Of the triangles that were scanned. Near the sensor, noise averages out to a millimetre, and
-    what is left is how the ground bends within a cell. Farther off, most cells have too few points
-    to show that: their figures are recorded, and docs/theory/dem.md lists them."""
+    what is left is how the ground bends within a cell. Beyond 20 m most cells have a single point,
+    whose noise hides how smooth the ground is: errors are a fifth smaller than stated there."""
     record_property("size", "full" if IS_FULL else "reduced")
     known = ground(tmp_path)
     path = scene(tmp_path, known.dem, known.middle, preset="ouster_os0_128", **drive)
@@ -375,8 +375,8 @@ def test_stated_errors_are_correct_near_the_sensor(tmp_path, record_property, gr
         assert len(near) > 1000
         rms = np.sqrt(np.mean(near**2))
         record_property(f"normalised RMS, {name}, {low} to {high} m", f"{rms:.3f} of {len(near)}")
-        if high <= 5:
-            off = abs(rms - 1)
-            margin = f"{off / 0.15} {off:.3g} 0.15"
-            record_property(f"margin: normalised RMS less 1, {name}, {low} to {high} m", margin)
-            assert 0.85 <= rms <= 1.15
+        off = rms - 1
+        most = 0.15 if off > 0 or high <= 20 else 0.2
+        margin = f"{abs(off) / most} {abs(off):.3g} {most}"
+        record_property(f"margin: normalised RMS less 1, {name}, {low} to {high} m", margin)
+        assert abs(off) <= most

@@ -296,8 +296,10 @@ CellHeight CellFit::finish(const SurfacePlane& plane, const NeighbourSurface& ne
                          lean_y * lean_y * neighbours.information_yy;
   const double bend_m2 = by.bend_x * by.bend_x * bend.xx + by.bend_y * by.bend_y * bend.yy +
                          by.bend_xy * by.bend_xy * bend.xy;
+  // Without points throughout the cell only the neighbours show how far the ground is off a plane.
   const double ground_m2 =
-      is_dense ? scatter_m2(points_, found.plane, bent.fitted, neighbours.within_m2, step_m) : 0;
+      is_dense ? scatter_m2(points_, found.plane, bent.fitted, neighbours.within_m2, step_m)
+               : neighbours.within_m2;
   // The correction by the crest adds the points' noise a second time, but not the bias of groups,
   // which the neighbours share.
   const double again = 1 + 2 * own_crest_ * neighbours.crest_share * (by.bend_x + by.bend_y);
