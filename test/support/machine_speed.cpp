@@ -26,7 +26,8 @@ double factorise_membrane() {
       if (row > 0) entries.emplace_back(i, i - side, -1.0);
     }
   }
-  Eigen::SparseMatrix<double> membrane(side * side, side * side);
+  constexpr Eigen::Index samples = Eigen::Index{side} * side;
+  Eigen::SparseMatrix<double> membrane(samples, samples);
   membrane.setFromTriplets(entries.begin(), entries.end());
   return Eigen::SimplicialLDLT<Eigen::SparseMatrix<double>>(membrane).vectorD()[side];
 }
