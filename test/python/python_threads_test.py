@@ -132,7 +132,9 @@ def test_ctrl_c_ends_a_long_call(tmp_path):
         "except KeyboardInterrupt:\n"
         "    print('interrupted')\n"
     )
-    with python(tmp_path, script) as process:
+    # Jobs in the background of a shell script ignore Ctrl-C, and so would this process.
+    heed = {"preexec_fn": lambda: signal.signal(signal.SIGINT, signal.SIG_DFL)}
+    with python(tmp_path, script, **heed) as process:
         whole_s = float(process.stdout.readline())
         time.sleep(0.5)
         begin = time.monotonic()
