@@ -9,6 +9,7 @@
 #include <limits>
 #include <span>
 #include <string>
+#include <string_view>
 #include <utility>
 #include <vector>
 
@@ -50,6 +51,11 @@ CLI::Option* add_scaled(CLI::App* app, const std::string& name, Held& held, doub
   return app->add_option_function<double>(
       name, [&held, unit](const double& value) { held = value * unit; }, meaning);
 }
+
+/// Returns the option of a command or of its groups that has a long name, with its dashes; null if
+/// there is none. CLI11's own get_option allocates in functions that are noexcept, so that a lack
+/// of memory would end the program without a message.
+CLI::Option* option_of(CLI::App& command, std::string_view name);
 
 /// Returns the machine's memory: the system may end a process that takes more, without a message.
 std::size_t machine_bytes();

@@ -184,11 +184,11 @@ Command add_mesh(CLI::App& all) {
   options->surface.add(mesh, options->request);
   options->add_fill();
   options->stop.add(mesh, StopOptions::Need::None);
-  CLI::Option* unorganised = mesh->get_option("--unorganised");
+  CLI::Option* unorganised = option_of(*mesh, "--unorganised");
   for (const char* of_grids :
        {"--occlusion", "--grid", "--preset", "--incidence-deg", "--longest-m", "--noise-sds",
         "--merge-sds", "--apart-m", "--turned-deg"})
-    mesh->get_option(of_grids)->excludes(unorganised);
+    option_of(*mesh, of_grids)->excludes(unorganised);
   return {mesh, [options] { options->run_scans(); }};
 }
 

@@ -1,11 +1,25 @@
 #include <unistd.h>
 
 #include <CLI/CLI.hpp>
+#include <string>
+#include <string_view>
 
 #include "apps/groundray/command.h"
 #include "apps/scan/word_option.h"
 
 namespace groundray {
+
+CLI::Option* option_of(CLI::App& command, std::string_view name) {
+  for (CLI::Option* option : command.get_options()) {
+    for (const std::string& each : option->get_lnames())
+      if (name == "--" + each) return option;
+  }
+  for (CLI::App* group : command.get_subcommands({})) {
+    if (!group->get_name().empty()) continue;
+    if (CLI::Option* option = option_of(*group, name)) return option;
+  }
+  return nullptr;
+}
 
 std::size_t machine_bytes() {
   const auto pages = sysconf(_SC_PHYS_PAGES), page_bytes = sysconf(_SC_PAGESIZE);

@@ -150,7 +150,7 @@ struct DemCommandOptions {
   // Rejects options that would have no effect.
   void refuse(std::initializer_list<const char*> options, const char* why) const {
     for (const char* option : options) {
-      if (command->get_option(option)->count() > 0)
+      if (option_of(*command, option)->count() > 0)
         throw Error("{}: {}: omit one of them", option, why);
     }
   }
