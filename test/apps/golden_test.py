@@ -1,5 +1,6 @@
 """The golden suite for users: it passes, detects faults and locates them."""
 
+import importlib.util
 import json
 import os
 import shutil
@@ -37,6 +38,15 @@ def replace(file, old, new):
     text = file.read_text()
     assert text.count(old) == 1, f"{file} has '{old}' {text.count(old)} times"
     file.write_text(text.replace(old, new))
+
+
+def test_planted_faults_fit_the_sources():
+    """`./dev prove` plants them, which takes an hour; that their texts occur is known at once."""
+    spec = importlib.util.spec_from_file_location("find_faults", CASES / "find_faults.py")
+    found = importlib.util.module_from_spec(spec)
+    sys.modules[spec.name] = found  # for its dataclass
+    spec.loader.exec_module(found)
+    assert len(found.read_faults([])) > 50
 
 
 def failures(junit):
