@@ -26,8 +26,9 @@ constexpr double steepest = 0.8;  // largest change of disparity from pixel to p
 constexpr double noise_slope = 0.36;
 constexpr double least_texture = 0.1;  // least fraction of the slopes that is not noise
 // Error of a plane in the middle of a window, per root mean square deviation of the starting
-// disparities from it: 1 / sqrt(2) for a surface of second degree that bends in one direction, with
-// Gaussian weights. Less than that, found by trial, because these disparities have noise, too.
+// disparities from it: 0.82 for a surface of second degree that bends in one direction, with
+// weights that end at two standard deviations. Less than that, found by trial, because these
+// disparities have noise, too.
 constexpr double bend_share = 0.5;
 // Noise of rounding to 255 steps; no image is more accurate.
 constexpr double least_noise = 0.29 / 255;

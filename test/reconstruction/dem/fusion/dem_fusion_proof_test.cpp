@@ -147,8 +147,9 @@ TEST(DemFusionProof, ClosedLoopOnRollingGround) {
   EXPECT_LE(nmad_m, 0.8 * nmad(medians));
   EXPECT_LE(p95_m, 0.8 * quantile(sizes(medians), 0.95));
   EXPECT_NEAR(rms_sd, 1, 0.15);
-  // At the reduced size all ground is near a sensor, and smoother than what is stated for it.
-  EXPECT_NEAR(share_below(errors.in_sd, 1), 0.683, proof_size(0, 1) == 1 ? 0.07 : 0.085);
+  // At the reduced size with fewer boulders, the ground is smoother than stated: 76.0 %.
+  EXPECT_LE(share_below(errors.in_sd, 1), 0.683 + (proof_size(0, 1) == 1 ? 0.07 : 0.085));
+  EXPECT_GE(share_below(errors.in_sd, 1), 0.683 - 0.07);
   EXPECT_NEAR(share_below(errors.in_sd, 2), 0.954, 0.03);
   record_margin("NMAD of heights fused in a closed loop", nmad_m, 0.008, "m");
   record_margin("95 % error of heights fused in a closed loop", p95_m, 0.05, "m");
