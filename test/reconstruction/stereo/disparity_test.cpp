@@ -345,6 +345,27 @@ TEST(Disparity, StatesTheErrorOfAPlaneWhereTheSurfaceBends) {
   EXPECT_NEAR(refine(noise, noise, start_px, 9).bend_px.at(15, 10)[0], 0, 1e-6);
 }
 
+TEST(Disparity, AddsTheErrorOfBendsToTheStatedOne) {
+  const Pair pair = pair_of({14.4, 0.03, 0.06}, 0.01);
+  const auto stated = [&](double bend_factor) {
+    return match(pair.left, pair.right,
+                 {.range = {{0, 31}},
+                  .sd_factor = 0,
+                  .sd_bend_factor = bend_factor,
+                  .sd_floor_px = 0,
+                  .most_sd_px = 10})
+        .sd_px;
+  };
+  const ImageF once = stated(1), thrice = stated(3);
+  std::size_t count = 0;
+  for (std::size_t i = 0; i < once.values().size(); ++i) {
+    if (!(once.values()[i] > 0)) continue;  // NaN where there is no match
+    EXPECT_NEAR(thrice.values()[i] / once.values()[i], 3, 1e-6);
+    ++count;
+  }
+  EXPECT_GT(count, 0.7 * size_px.x * size_px.y);
+}
+
 std::vector<std::uint32_t> bits_of(const ImageF& image) {
   std::vector<std::uint32_t> bits;
   for (const float value : image.values()) bits.push_back(std::bit_cast<std::uint32_t>(value));
