@@ -6,11 +6,13 @@
 
 #include <algorithm>
 #include <cerrno>
+#include <cstdio>
 #include <string>
 #include <system_error>
 
 #include "core/error.h"
 #include "core/io/file_io.h"
+#include "core/io/print_error.h"
 
 namespace groundray {
 namespace {
@@ -82,7 +84,8 @@ ResultFiles::~ResultFiles() {
 }
 
 void ResultFiles::write(const fs::path& path, const std::function<void(const fs::path&)>& write) {
-  files_.push_back({.path = path, .aside = new_file_beside(path), .spare = {}});
+  files_.push_back({.path = path, .aside = {}, .spare = {}});
+  files_.back().aside = new_file_beside(path);  // after push_back, which may throw
   const std::string other = files_.back().aside.string();
   try {
     write(other);
@@ -98,6 +101,7 @@ void ResultFiles::write(const fs::path& path, const std::function<void(const fs:
 
 void ResultFiles::appear() {
   for (File& file : files_) spare(file);
+  const std::string done = printable(fmt::format("written to {}\n", files_.back().path.string()));
   for (std::size_t i = 0; i < files_.size(); ++i) {
     const File& file = files_[i];
     std::error_code fault;
@@ -110,6 +114,7 @@ void ResultFiles::appear() {
   for (const File& file : files_)
     if (!file.spare.empty()) fs::remove(file.spare, ignored);
   files_.clear();
+  std::fputs(done.c_str(), stdout);
 }
 
 // Gives an existing file at the path a second name.

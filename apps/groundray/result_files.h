@@ -30,9 +30,10 @@ class ResultFiles {
   void write(const std::filesystem::path& path,
              const std::function<void(const std::filesystem::path&)>& write);
 
-  /// Renames the files to their paths. If one cannot be renamed, the others are undone: paths have
-  /// their previous contents again. Without hard links in the file system, an overwritten file is
-  /// lost.
+  /// Renames the files to their paths, and prints that the last one is written. If one cannot be
+  /// renamed, the others are undone: paths have their previous contents again. Without hard links in
+  /// the file system, an overwritten file is lost. Call it last, because what fails afterwards
+  /// leaves the files.
   /// @throws Error naming the file that cannot be renamed, and any that could not be undone, with
   ///         the names under which their previous contents are kept.
   void appear();

@@ -14,6 +14,7 @@
 
 #include "apps/groundray/command.h"
 #include "apps/groundray/progress_stage.h"
+#include "apps/groundray/result_files.h"
 #include "apps/scene/interruption.h"
 #include "core/io/mesh_io.h"
 #include "core/io/print_error.h"
@@ -110,12 +111,16 @@ struct TerrainOptions {
 
   // Converts the DEM to a mesh, writes it, and prints its size.
   void mesh() const {
+    check_results({&out, 1}, {&dem, 1});
     const Dem read = load_dem(dem, reading);
     const TriangleMesh mesh = place(fewest ? few_triangles(read.grid) : nodes(read), read.grid);
     stop_if_interrupted();
-    write_mesh(out, mesh, {read.origin_w_m, read.crs_name, read.crs_wkt});
+    ResultFiles files;
+    files.write(out, [&](const std::filesystem::path& path) {
+      write_mesh(path, mesh, {read.origin_w_m, read.crs_name, read.crs_wkt});
+    });
     print_mesh(mesh, read.grid);
-    print_text(stdout, "written to {}\n", out.string());
+    files.appear();
   }
 
   TerrainMesh nodes(const Dem& read) const {

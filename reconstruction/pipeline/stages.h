@@ -23,21 +23,22 @@ struct PipelineControl {
 /// Names of stages and their durations, s.
 using StageSeconds = std::vector<std::pair<std::string, double>>;
 
-/// Appends the duration of a stage to a list when it ends.
+/// Appends a stage to a list, and sets its duration when it ends.
 class StageTimer {
  public:
-  StageTimer(StageSeconds& seconds, std::string stage)
-      : seconds_(seconds), stage_(std::move(stage)) {}
+  StageTimer(StageSeconds& seconds, std::string stage) : seconds_(seconds), at_(seconds.size()) {
+    seconds.emplace_back(std::move(stage), 0);  // here, because destructors must not allocate
+  }
   ~StageTimer() {
     const std::chrono::duration<double> spent = std::chrono::steady_clock::now() - begin_;
-    seconds_.emplace_back(std::move(stage_), spent.count());
+    seconds_[at_].second = spent.count();
   }
   StageTimer(const StageTimer&) = delete;
   StageTimer& operator=(const StageTimer&) = delete;
 
  private:
   StageSeconds& seconds_;
-  std::string stage_;
+  std::size_t at_;
   std::chrono::steady_clock::time_point begin_ = std::chrono::steady_clock::now();
 };
 

@@ -173,8 +173,6 @@ void rebuild_dem(const DemRequest& request) {
     report.truth = compare_with_truth(report.result.layers, files.georeference, place.truth->dem);
   stop_if_interrupted();
   write_output(request.output, report);
-  print(report);
-  print_text(stdout, "written to {}\n", request.output.dem.string());
 }
 
 }  // namespace groundray

@@ -257,8 +257,6 @@ void write_json(const fs::path& path, const ReportFacts& facts, const DemReport&
   write_text(path, json.dump(2) + "\n");
 }
 
-}  // namespace
-
 void print(const DemReport& report) {
   const DemResult& result = report.result;
   print_points("scan", "rows", report.scans);
@@ -291,6 +289,8 @@ void print(const DemReport& report) {
     print_text(stdout, "the picture's most saturated colour is {:.3g} m\n", report.colour_m);
   for (const std::string& note : report.notes) print_text(stdout, "note: {}\n", note);
 }
+
+}  // namespace
 
 void check_output(const DemOutput& output, std::span<const fs::path> inputs) {
   check_ending(output.dem, {".tif", ".tiff"});
@@ -329,6 +329,7 @@ void write_output(const DemOutput& output, DemReport& report) {
                 [&](const fs::path& path) { write_json(path, output.facts, report); });
   files.write(output.dem,
               [&](const fs::path& path) { write_layers(path, layers, report.georeference); });
+  print(report);
   files.appear();
 }
 

@@ -50,15 +50,12 @@ struct PictureScale {
 /// @param error_m  error of each sample, or empty.
 Image8 draw_dem(const DemLayers& layers, const std::vector<float>& error_m, PictureScale& scale);
 
-/// Prints a report as text.
-void print(const DemReport& report);
-
 /// Checks, before long computations, that the results can be written.
 /// @throws Error if not.
 void check_output(const DemOutput& output, std::span<const std::filesystem::path> inputs);
 
-/// Writes all requested results, with the report as JSON (docs/reference/formats.md): either all
-/// files appear, each complete, or none. Sets the picture's scale in the report.
+/// Writes all requested results, with the report as JSON (docs/reference/formats.md), and prints the
+/// report: either all files appear, each complete, or none. Sets the picture's scale in the report.
 /// @throws Error as the writers of the formats.
 void write_output(const DemOutput& output, DemReport& report);
 

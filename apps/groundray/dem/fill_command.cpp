@@ -160,14 +160,15 @@ struct FillCommandOptions {
     const Georeference place{.origin_w_m = read.origin_w_m, .crs_wkt = read.crs_wkt};
     const RasterLayer heights{"elevation", "m", filled.heights_m}, sds{"fill_sd", "m", filled.sd_m};
     ResultFiles files;
-    files.write(out, [&](const fs::path& path) {
-      write_layers(path, read.grid.frame(), place, {&heights, 1}, form);
-    });
     if (!sd_out.empty()) {
       files.write(sd_out, [&](const fs::path& path) {
         write_layers(path, read.grid.frame(), place, {&sds, 1}, {.is_point = form.is_point});
       });
     }
+    files.write(out, [&](const fs::path& path) {
+      write_layers(path, read.grid.frame(), place, {&heights, 1}, form);
+    });
+    print_result(read, filled);
     files.appear();
   }
 
@@ -178,6 +179,9 @@ struct FillCommandOptions {
     const FilledHeights filled = fill(read);
     stop_if_interrupted();
     write(read, filled);
+  }
+
+  void print_result(const Dem& read, const FilledHeights& filled) const {
     const FillTally tally = tally_of(filled);
     print_fates(tally);
     if (method == RasterFill::Tension) print_trials(filled);
@@ -185,8 +189,7 @@ struct FillCommandOptions {
       print_text(stdout, "{} filled samples are limited by a bound\n", tally.at_bound);
       print_not_least(tally);
     }
-    print_text(stdout, "{} of {} missing samples filled; written to {}\n", filled.filled,
-               read.grid.hole_count(), out.string());
+    print_text(stdout, "{} of {} missing samples filled\n", filled.filled, read.grid.hole_count());
   }
 };
 

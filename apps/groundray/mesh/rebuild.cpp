@@ -204,8 +204,6 @@ void note_left_out(const MeasuredMeshFile& file, RebuildReport& report) {
 void write(const MeshOutput& output, const RebuildReport& report) {
   stop_if_interrupted();
   write_output(output, report);
-  print(report);
-  print_text(stdout, "written to {}\n", output.mesh.string());
 }
 
 }  // namespace

@@ -65,16 +65,13 @@ struct RebuildReport {
   std::vector<std::string> notes;
 };
 
-/// Prints a report as text.
-void print(const RebuildReport& report);
-
 /// Checks, before long computations, that the results can be written, each to its own file.
 /// @param inputs  input files, which must not be overwritten.
 /// @throws Error naming the first fault.
 void check_output(const MeshOutput& output, std::span<const std::filesystem::path> inputs);
 
-/// Writes all requested results, with the report as JSON (docs/reference/formats.md); no file
-/// appears before all are complete.
+/// Writes all requested results, with the report as JSON (docs/reference/formats.md), and prints the
+/// report. No file appears before all are complete and the report is printed.
 /// @throws Error as the writers of the formats.
 void write_output(const MeshOutput& output, const RebuildReport& report);
 

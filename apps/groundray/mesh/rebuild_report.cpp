@@ -216,8 +216,6 @@ void write_occlusion(const fs::path& path, const OcclusionFaces& faces,
   write_ply(path, faces.shape, georeference, columns);
 }
 
-}  // namespace
-
 void print(const RebuildReport& report) {
   const MeshResult& result = report.result;
   if (!report.scans.empty()) print_scans(report.scans);
@@ -237,6 +235,8 @@ void print(const RebuildReport& report) {
              result.area_m2);
   for (const std::string& note : report.notes) print_text(stdout, "note: {}\n", note);
 }
+
+}  // namespace
 
 void check_output(const MeshOutput& output, std::span<const fs::path> inputs) {
   check_mesh_name(output.mesh);
@@ -260,6 +260,7 @@ void write_output(const MeshOutput& output, const RebuildReport& report) {
   files.write(output.mesh, [&](const fs::path& path) {
     write_measured_mesh(path, report.result.mesh, report.georeference);
   });
+  print(report);
   files.appear();
 }
 

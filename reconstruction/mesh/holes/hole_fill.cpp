@@ -197,7 +197,7 @@ class Filler {
       if (!candidate.is_done) candidate.patch.reset();
     }
     if (again.empty()) return false;
-    surface_ = SurfaceMesh();  // no longer used: leaves its memory to the next
+    surface_.clear();  // no longer used: leaves its memory to the next
     TriangleMesh mesh = mesh_.shape;
     std::vector<Candidate*> owners;  // of the bridge triangles
     for (Candidate* candidate : again) {

@@ -20,9 +20,16 @@ constexpr double narrow = 0.02;          // area of a slit relative to the squar
 // more is that surface's outline.
 constexpr double fold_share = 1.0 / 64;
 
-/// Returns the merged mesh's vertex for each crossing; `no_vertex` where there is no boundary.
-std::vector<std::uint32_t> put_on_border(StitchedMesh& stitched, const StitchedMesh& patch,
-                                         std::span<const BorderCrossing> crossings) {
+/// Vertices by the edges of a patch: see patch_edge().
+using EdgeVertices = std::unordered_map<std::uint64_t, std::uint32_t>;
+
+std::uint64_t patch_edge(std::uint32_t a, std::uint32_t b) {
+  return std::uint64_t{std::min(a, b)} << 32 | std::max(a, b);
+}
+
+/// Returns the merged mesh's vertex at each crossing; `no_vertex` where there is no boundary.
+EdgeVertices put_on_border(StitchedMesh& stitched, const StitchedMesh& patch,
+                           std::span<const BorderCrossing> crossings) {
   struct Stop {
     std::uint32_t from, to;
     double share;
@@ -63,7 +70,10 @@ std::vector<std::uint32_t> put_on_border(StitchedMesh& stitched, const StitchedM
   for (const Stop& stop : stops) {
     if (place_of[stop.crossing] > 0) vertices[stop.crossing] = added[place_of[stop.crossing] - 1];
   }
-  return vertices;
+  EdgeVertices at;
+  for (std::size_t i = 0; i < crossings.size(); ++i)
+    at[patch_edge(crossings[i].inside, crossings[i].outside)] = vertices[i];
+  return at;
 }
 
 /// Returns the half-edge of the boundary that begins at a vertex of a manifold; invalid if the
@@ -83,12 +93,9 @@ class Zippering {
       : quilt_(stitched),
         patch_(patch),
         covers_(found.covers),
-        numbers_(patch.vertices.size(), no_vertex) {
-    const std::vector<std::uint32_t> at = put_on_border(stitched, patch, found.crossings);
-    for (std::size_t i = 0; i < at.size(); ++i)
-      crossings_[key_of(found.crossings[i].inside, found.crossings[i].outside)] = at[i];
-    border_ = surface_of(stitched);
-  }
+        numbers_(patch.vertices.size(), no_vertex),
+        crossings_(put_on_border(stitched, patch, found.crossings)),
+        border_(surface_of(stitched)) {}
 
   ZipperingCounts run() {
     for (const glm::uvec3& t : patch_.triangles) add(t);
@@ -97,10 +104,6 @@ class Zippering {
   }
 
  private:
-  static std::uint64_t key_of(std::uint32_t a, std::uint32_t b) {
-    return std::uint64_t{std::min(a, b)} << 32 | std::max(a, b);
-  }
-
   void add(const glm::uvec3& t) {
     std::array<bool, 3> is_in{};
     int inside = 0;
@@ -123,8 +126,8 @@ class Zippering {
   /// Clips a triangle at the boundary.
   /// @param t  its first corner is the one that differs.
   void clip(const glm::uvec3& t, LoneCorner lone) {
-    const std::uint32_t leaving = crossings_.at(key_of(t.x, t.y));
-    const std::uint32_t coming = crossings_.at(key_of(t.z, t.x));
+    const std::uint32_t leaving = crossings_.at(patch_edge(t.x, t.y));
+    const std::uint32_t coming = crossings_.at(patch_edge(t.z, t.x));
     if (leaving == no_vertex || coming == no_vertex) {
       quilt_.triangles.emplace_back(taken(t.x), taken(t.y), taken(t.z));
       return;
@@ -192,8 +195,8 @@ class Zippering {
   const StitchedMesh& patch_;
   const std::vector<Cover>& covers_;
   std::vector<std::uint32_t> numbers_;
-  std::unordered_map<std::uint64_t, std::uint32_t> crossings_;
-  SurfaceMesh border_;  // of the merged mesh, before triangles are added
+  EdgeVertices crossings_;
+  const SurfaceMesh border_;  // of the merged mesh, before triangles are added
   ZipperingCounts counts_;
 };
 
