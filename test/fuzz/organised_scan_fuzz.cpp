@@ -9,6 +9,9 @@
 
 namespace {
 
+// Time and memory grow with the columns: a grid of 128 rows by 32,767 takes 0.6 s with sanitizers.
+constexpr int most_columns = 512;
+
 /// Reads numbers of any type one after the other from bytes; zeros after the last byte.
 class Numbers {
  public:
@@ -40,7 +43,7 @@ extern "C" int LLVMFuzzerTestOneInput(const std::uint8_t* data, std::size_t size
     const auto x = numbers.next<float>(), y = numbers.next<float>(), z = numbers.next<float>();
     returns.p_S.emplace_back(x, y, z);
     if ((kind & 1) != 0) returns.rings.push_back(numbers.next<std::int8_t>());
-    if ((kind & 2) != 0) returns.columns.push_back(numbers.next<std::int16_t>());
+    if ((kind & 2) != 0) returns.columns.push_back(numbers.next<std::int16_t>() % most_columns);
     if ((kind & 4) != 0) returns.times_s.push_back(numbers.next<float>());
     if ((kind & 8) != 0) returns.origins_m.emplace_back(numbers.next<float>(), 0, 0);
     if ((kind & 16) != 0) returns.sd_m.push_back(numbers.next<float>());
