@@ -173,6 +173,8 @@ def listed_results(build: Path) -> list[Path]:
 
 def read_cpp_results(file: Path, run: Run) -> None:
     for test in ET.parse(file).getroot().iter("testcase"):
+        if test.get("classname").startswith("Fake/"):  # a stand-in, which proves no claim
+            continue
         suite = suite_of(test.get("classname"))
         add_test(test, f"{suite}.{test.get('name').split('/')[0]}", run)
         run.days.add(date.fromisoformat(test.get("timestamp")[:10]))

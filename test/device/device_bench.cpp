@@ -171,7 +171,10 @@ void measure(std::string_view backend, const char* file) {
     const HostArrays::Use elsewhere(nullptr);
     expected = found;
   }
-  constexpr std::size_t reserve = std::size_t{16} << 20;
+  constexpr std::size_t reserve = std::size_t{16} << 20, most_bytes = std::size_t{1} << 31;
+  if (used + reserve > most_bytes)
+    throw std::runtime_error(fmt::format("{}: its arrays take {} MB of at most {}", file,
+                                         used >> 20, (most_bytes - reserve) >> 20));
   HostArrays arrays(used + reserve);
   const std::unique_ptr<KernelDevice> device = open_device(backend, arrays);
   fmt::print("{}\n{}: {} x {} samples, bound {} m, blocks of {} cells\n", device->name(), file,

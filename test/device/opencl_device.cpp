@@ -82,7 +82,11 @@ struct OpenCl {
     });
   }
 
-  // Returns the first device with double precision.
+  bool takes_spirv(cl_device_id device) const {
+    return text_of(device, CL_DEVICE_IL_VERSION).find("SPIR-V") == 0;
+  }
+
+  // Returns the first device with double precision that takes the kernels in either form.
   cl_device_id find_device() const {
     for (const auto platform : all<cl_platform_id>(clGetPlatformIDs)) {
       const auto list = [&](cl_uint count, cl_device_id* devices, cl_uint* found) {
@@ -91,10 +95,12 @@ struct OpenCl {
       for (const auto device : all<cl_device_id>(list)) {
         cl_device_fp_config doubles = 0;
         clGetDeviceInfo(device, CL_DEVICE_DOUBLE_FP_CONFIG, sizeof doubles, &doubles, nullptr);
-        if (doubles != 0) return device;
+        const bool takes_spir =
+            text_of(device, CL_DEVICE_EXTENSIONS).find("cl_khr_spir") != std::string::npos;
+        if (doubles != 0 && (takes_spirv(device) || takes_spir)) return device;
       }
     }
-    throw NoDevice("OpenCL finds no device with double precision");
+    throw NoDevice("OpenCL finds no device with double precision that takes SPIR-V or SPIR");
   }
 };
 
@@ -121,17 +127,17 @@ struct OpenClState : OpenCl {
 
   void build(const KernelCode& code) {
     cl_int status = CL_SUCCESS;
-    const bool takes_spirv = text_of(device, CL_DEVICE_IL_VERSION).find("SPIR-V") == 0;
-    const std::string& form = takes_spirv ? code.spirv : code.spir;
+    const bool is_spirv = takes_spirv(device);
+    const std::string& form = is_spirv ? code.spirv : code.spir;
     const std::size_t size = form.size();
-    if (takes_spirv) {
+    if (is_spirv) {
       program = clCreateProgramWithIL(context, form.data(), size, &status);
     } else {
       const auto* bytes = reinterpret_cast<const unsigned char*>(form.data());
       program = clCreateProgramWithBinary(context, 1, &device, &size, &bytes, nullptr, &status);
     }
     check(status, "the kernels");
-    const char* const options = takes_spirv ? "" : "-x spir -spir-std=1.2";
+    const char* const options = is_spirv ? "" : "-x spir -spir-std=1.2";
     if (clBuildProgram(program, 1, &device, options, nullptr, nullptr) == CL_SUCCESS) return;
     throw std::runtime_error(
         "OpenCL rejects the kernels: " +

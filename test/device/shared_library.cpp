@@ -19,7 +19,7 @@ SharedLibrary::SharedLibrary(const std::vector<std::string>& names) {
 
 void* SharedLibrary::address_of(const char* name) const {
   void* const address = dlsym(handle_, name);
-  if (address == nullptr) throw NoDevice(fmt::format("{} has no {}", name_, name));
+  if (address == nullptr) throw std::runtime_error(fmt::format("{} has no {}", name_, name));
   return address;
 }
 

@@ -38,11 +38,12 @@ void write_level(ArrayWriter& out, std::size_t number, const NodeLevel& level,
     return ArrayEntry{level_folder(number) + name, pass, static_cast<int>(number), unit, {},
                       rows_by_columns(level.size), {}};
   };
-  out.write(entry("key_m", "SaturatePass", "m"), level.key_m);
+  const char* const joining = number == 0 ? "DeviationPass" : "SaturatePass";
+  out.write(entry("key_m", joining, "m"), level.key_m);
   out.write(entry("deviation_m", "DeviationPass", "m"), level.deviation_m);
   out.write(entry("full_m", "DeviationPass", "m"), level.full_m);
-  out.write(entry("low_m", "SaturatePass", "m"), level.low_m);
-  out.write(entry("high_m", "SaturatePass", "m"), level.high_m);
+  out.write(entry("low_m", joining, "m"), level.low_m);
+  out.write(entry("high_m", joining, "m"), level.high_m);
   out.write(entry("state", "LeafPass", ""), states);
 }
 
@@ -85,8 +86,8 @@ void write_rays(ArrayWriter& out, const ReferenceRays& rays) {
   const std::uint64_t count = rays.rays.size();
   out.write({"rays/origin_m", "input", -1, "m", {}, {count, 3}, {}}, flat(origins_m));
   out.write({"rays/direction", "input", -1, "", {}, {count, 3}, {}}, flat(directions));
-  out.write({"rays/range_m", "TraceLevelPass", -1, "m", {}, {count}, {}}, rays.range_m);
-  out.write({"rays/triangle", "TraceLevelPass", -1, "", {}, {count}, {}}, rays.triangle);
+  out.write({"rays/range_m", "exact tracing", -1, "m", {}, {count}, {}}, rays.range_m);
+  out.write({"rays/triangle", "judge", -1, "", {}, {count}, {}}, rays.triangle);
   out.write({"rays/silhouette_m", "judge", -1, "m", {}, {count}, {}}, rays.silhouette_m);
   out.write({"rays/edge_m", "judge", -1, "m", {}, {count}, {}}, rays.edge_m);
 }
@@ -160,6 +161,8 @@ void write_pass_folder(const fs::path& dem_path, const PassSettings& settings,
   const Selection selection = select_nodes(lattice, windows, bound);
   const auto leaves = list_leaves(selection, windows, 0);
   const TerrainMesh mesh = build_terrain_mesh(grid, bound, settings.block_cells);
+  if (mesh.triangles.empty())
+    throw Error("{}: no three heights of any cell form a triangle", dem_path.string());
   const ReferenceRays rays = trace_reference_rays(grid, leaves, settings.block_cells, mesh,
                                                   sample_rays(grid, settings.rays, settings.seed));
 
