@@ -74,7 +74,7 @@ LIBRARIES = {
     r"assimp/": r"core/model/assimp_import\.cpp",
     r"embree": r"core/tracing/embree_adapter\.h",
     r"((gdal|ogr|cpl)_|tiffio\.h)": r"terrain/dem/(gdal_raster\.h|(band_file|dem_file|dem_io"
-    r"|dem_warp|drape_io|gdal_raster|layers_io|raster_input|tiled_tiff|vrt_check)\.cpp)",
+    r"|dem_warp|drape_io|gdal_raster|layers_io|local_files|raster_input|tiled_tiff|vrt_check)\.cpp)",
     r"opencv2/": r"(sensors/camera/picture|reconstruction/dem/fill/inpaint_fill"
     r"|reconstruction/stereo/semi_global)\.cpp",
     r"(CGAL|Eigen)/": r"reconstruction/(.*\.cpp|mesh/surface_cgal\.h)",
@@ -88,9 +88,9 @@ LIBRARIES = {
 
 # Files are opened by core/io/open_file.h: regular ones alone, and not through links to be written.
 CALLS = {
-    r"\bf(re)?open\(|\bcreat\(": r"core/io/open_file\.cpp|apps/groundray/run_log\.cpp",
-    r"std::[io]?fstream \w+[({]|\.open\([^)]*std::ios": r"core/io/open_file\.(h|cpp)",
-    r"\bO_CREAT\b": r"core/io/open_file\.cpp|apps/groundray/result_files\.cpp"
+    r"\bf(re)?open\(|\bcreat\(": r"core/io/open_file\.cpp",
+    r"std::[io]?fstream( \w+)?[({]|\.open\([^)]*std::ios": r"core/io/open_file\.(h|cpp)",
+    r"\bO_CREAT\b": r"core/io/open_file\.cpp|apps/groundray/(result_files|run_log)\.cpp"
     r"|apps/golden/suite/suite\.cpp",
 }
 

@@ -11,6 +11,8 @@
 #include <system_error>
 #include <utility>
 
+#include "core/folder_names.h"
+
 namespace groundray {
 namespace {
 
@@ -47,17 +49,14 @@ std::size_t edit_distance(std::string_view a, std::string_view b) {
 
 // Returns the names of a folder's files and folders, sorted; none if it cannot be read. Those with
 // control characters are left out, and so are all after the first 10,000.
-std::vector<std::string> names_in(const fs::path& folder) {
+std::vector<std::string> printable_names(const fs::path& folder) {
   constexpr std::size_t most = 10'000;
-  std::vector<std::string> names;
   std::error_code fault;
-  for (fs::directory_iterator it(folder, fault);
-       !fault && it != fs::directory_iterator() && names.size() < most; it.increment(fault)) {
-    std::string name = it->path().filename().string();
-    if (std::ranges::none_of(name, [](unsigned char c) { return std::iscntrl(c) != 0; }))
-      names.push_back(std::move(name));
-  }
-  std::ranges::sort(names);
+  std::vector<std::string> names = names_in(folder, fault);
+  std::erase_if(names, [](const std::string& name) {
+    return std::ranges::any_of(name, [](unsigned char c) { return std::iscntrl(c) != 0; });
+  });
+  if (names.size() > most) names.resize(most);
   return names;
 }
 
@@ -110,11 +109,14 @@ std::string suggestion(std::string_view word, const std::vector<std::string>& ca
 
 std::string why_no_file(const fs::path& path) {
   std::error_code ignored;
+  if (path.empty()) return "the name is empty";
+  if (path.string().find("://") != std::string::npos)
+    return "it is an address, but must be a file: download it first";
   if (fs::is_directory(path, ignored)) return "it is a folder, but must be a file";
   const fs::path folder = path.has_parent_path() ? path.parent_path() : ".";
   if (!fs::is_directory(folder, ignored))
     return fmt::format("there is no such file or folder, nor the folder {}", folder.string());
-  const std::vector<std::string> names = names_in(folder);
+  const std::vector<std::string> names = printable_names(folder);
   const std::string near = suggestion(path.filename().string(), names);
   return "there is no such file or folder" + (near.empty() ? files_like(path, names) : near);
 }

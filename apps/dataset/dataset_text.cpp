@@ -128,16 +128,18 @@ std::optional<std::string> DatasetText::next_entry() {
 }
 
 void DatasetText::read_end(std::string line) {
+  bool is_understood = true;
   do {
     if (const auto digits = between(line, sum_begin, quote)) {
       // Intact only if this is the last line, and complete.
-      is_intact_ = *digits == sum_.digits() && !file_.eof() && !next_line();
+      is_intact_ = is_understood && *digits == sum_.digits() && !file_.eof() && !next_line();
       return;
     }
     sum_.add(line + "\n");
     if (!line.starts_with(item)) continue;
-    if (auto file = parse_named_sum(std::string_view(line).substr(item.size())))
-      files_.push_back(std::move(*file));
+    auto file = parse_named_sum(std::string_view(line).substr(item.size()));
+    is_understood = is_understood && file;
+    if (file) files_.push_back(std::move(*file));
   } while (groundray::next_line(file_, line));
 }
 

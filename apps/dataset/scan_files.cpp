@@ -13,6 +13,7 @@
 #include "apps/dataset/range_conf.h"
 #include "apps/scene/yaml_reader.h"
 #include "core/error.h"
+#include "core/folder_names.h"
 #include "core/io/file_io.h"
 #include "core/io/open_file.h"
 #include "core/io/text_lines.h"

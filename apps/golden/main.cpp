@@ -39,7 +39,6 @@ namespace fs = std::filesystem;
 
 constexpr int done = 0;
 constexpr int failed = 1;
-constexpr int wrong_usage = 2;
 constexpr int interrupted = 130;
 
 void add_dem_flags(CLI::App* group, const std::string& prefix, DemOptions& options) {
@@ -184,6 +183,7 @@ struct CompareCommand {
 
   /// Compares the files, prints the figures, and writes report.html and report.json.
   Verdict run() const {
+    check_report_folder(out);
     Report report{.title = "A comparison by groundray",
                   .facts = {{"version", GROUNDRAY_VERSION},
                             {"reference", reference.string()},
@@ -212,6 +212,7 @@ void print(const Section& section) {
 
 int run_suite(const fs::path& folder, const std::vector<std::string>& filters,
               const SuiteOptions& options) {
+  check_report_folder(options.out);
   for (const char* name : {"report.html", "report.json", "junit.xml"})
     fs::remove(options.out / name);  // left by an earlier run
   Report report = run_cases(read_cases(folder, filters), options);
@@ -287,11 +288,7 @@ int run(int argc, char** argv) {
       "conform", "Judge another mesher or tracer, such as a GPU's, by the arrays of `passes`");
   conform.add_to(conform_command);
 
-  try {
-    app.parse(argc, argv);
-  } catch (const CLI::ParseError& error) {
-    return report_usage(app, error) ? done : wrong_usage;
-  }
+  if (const auto code = parse_arguments(app, argc, argv)) return *code;
   if (compare_command->parsed()) return compare.run() == Verdict::Failed ? failed : done;
   if (conform_command->parsed()) return conform.run() == Verdict::Failed ? failed : done;
   if (passes_command->parsed()) {

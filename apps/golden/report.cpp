@@ -6,8 +6,10 @@
 #include <cstddef>
 #include <nlohmann/json.hpp>
 #include <string>
+#include <system_error>
 #include <utility>
 
+#include "core/error.h"
 #include "core/io/file_io.h"
 
 namespace groundray::golden {
@@ -99,6 +101,12 @@ Histogram histogram_of(std::string title, std::string unit, const std::vector<do
     }
   }
   return histogram;
+}
+
+void check_report_folder(const std::filesystem::path& folder) {
+  std::error_code ignored;
+  if (std::filesystem::exists(folder / "dataset.yaml", ignored))
+    throw Error("{}: it is a dataset; choose another folder with -o", folder.string());
 }
 
 void write_json(const std::filesystem::path& path, const Report& report) {

@@ -89,6 +89,10 @@ void fail(Section& into, std::string name, double value, std::string unit, std::
 Histogram histogram_of(std::string title, std::string unit, const std::vector<double>& values,
                        double low, double high, std::size_t bins = 60);
 
+/// Checks, before long work, that reports may be written into a folder.
+/// @throws Error if it is a dataset, whose files are its own.
+void check_report_folder(const std::filesystem::path& folder);
+
 /// Writes a self-contained HTML file with all pictures and charts.
 /// @throws Error as write_whole.
 void write_html(const std::filesystem::path& path, const Report& report);

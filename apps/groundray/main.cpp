@@ -18,7 +18,6 @@ namespace {
 
 constexpr int done = 0;
 constexpr int failed = 1;
-constexpr int wrong_usage = 2;
 constexpr int interrupted = 130;
 
 int run(int argc, char** argv) {
@@ -46,11 +45,7 @@ int run(int argc, char** argv) {
   groundray::add_terrain_commands(app, commands);
   groundray::add_reconstruct_commands(app, commands);
 
-  try {
-    app.parse(argc, argv);
-  } catch (const CLI::ParseError& error) {
-    return groundray::report_usage(app, error) ? done : wrong_usage;
-  }
+  if (const auto code = groundray::parse_arguments(app, argc, argv)) return *code;
   for (const groundray::Command& command : commands)
     if (command.app->parsed()) command.run();
   return done;

@@ -32,6 +32,22 @@ void check_place(const fs::path& path) {
     throw Error("{}: no permission to write in the folder {}", path.string(), folder.string());
 }
 
+// Refuses to overwrite a file of a dataset: its record or, in a folder of it, a scan, say.
+void refuse_dataset_file(const fs::path& result, const fs::path& place) {
+  constexpr int deepest = 3;
+  std::error_code ignored;
+  if (!fs::exists(place, ignored)) return;
+  fs::path folder = place.parent_path();
+  const bool is_record = place.filename() == "dataset.yaml";
+  for (int depth = 0; depth <= deepest && folder.has_relative_path(); ++depth) {
+    if ((depth > 0 || is_record) && fs::exists(folder / "dataset.yaml", ignored)) {
+      throw Error("{}: it is a file of the dataset {}; choose another name", result.string(),
+                  folder.string());
+    }
+    folder = folder.parent_path();
+  }
+}
+
 // Returns a temporary name in the file's folder, with the same extension.
 fs::path beside(const fs::path& path, int number) {
   fs::path name = path.stem();
@@ -65,6 +81,7 @@ void check_results(std::span<const fs::path> results, std::span<const fs::path> 
     const fs::path place = fs::weakly_canonical(fs::absolute(result), ignored);
     if (std::ranges::find(places, place) != places.end())
       throw Error("{}: two results cannot have the same name", result.string());
+    refuse_dataset_file(result, place);
     places.push_back(place);
     for (const fs::path& input : inputs) {
       if (fs::equivalent(input, result, ignored)) {

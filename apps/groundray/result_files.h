@@ -10,7 +10,7 @@
 namespace groundray {
 
 /// Checks, before long computations, that the results can be written, each to its own file.
-/// @param inputs  input files, which must not be overwritten.
+/// @param inputs  input files, which must not be overwritten; nor must any file of a dataset.
 /// @throws Error naming the first fault.
 void check_results(std::span<const std::filesystem::path> results,
                    std::span<const std::filesystem::path> inputs);
@@ -31,8 +31,8 @@ class ResultFiles {
              const std::function<void(const std::filesystem::path&)>& write);
 
   /// Renames the files to their paths, and prints that the last one is written. If one cannot be
-  /// renamed, the others are undone: paths have their previous contents again. Without hard links in
-  /// the file system, an overwritten file is lost. Call it last, because what fails afterwards
+  /// renamed, the others are undone: paths have their previous contents again. Without hard links
+  /// in the file system, an overwritten file is lost. Call it last, because what fails afterwards
   /// leaves the files.
   /// @throws Error naming the file that cannot be renamed, and any that could not be undone, with
   ///         the names under which their previous contents are kept.

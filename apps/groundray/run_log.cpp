@@ -1,16 +1,40 @@
 #include "apps/groundray/run_log.h"
 
+#include <fcntl.h>
 #include <fmt/chrono.h>
 #include <fmt/format.h>
 
 #include <cerrno>
 #include <csignal>
+#include <filesystem>
+#include <fstream>
+#include <new>
 #include <nlohmann/json.hpp>
 #include <system_error>
+#include <utility>
 
 #include "core/error.h"
+#include "core/io/open_file.h"
+#include "core/io/print_error.h"
 
 namespace groundray {
+namespace {
+
+// Refuses a file whose content is not a log's, which the log would spoil: a scene, say.
+void refuse_other_text(const std::string& target) {
+  std::error_code ignored;
+  if (!std::filesystem::is_regular_file(target, ignored)) return;
+  constexpr std::string_view begin = R"({"event":)";
+  std::string found(begin.size(), '\0');
+  std::ifstream file = open_stream(target);
+  file.read(found.data(), static_cast<std::streamsize>(found.size()));
+  if (file.gcount() == 0 || found == begin) return;
+  throw Error(
+      "{}: it is not a log, to which lines are appended; choose another file with --log-json",
+      target);
+}
+
+}  // namespace
 
 RunLog::RunLog(const std::string& target) {
   if (target.empty()) return;
@@ -19,11 +43,18 @@ RunLog::RunLog(const std::string& target) {
     std::signal(SIGPIPE, SIG_IGN);  // a closed pipe must not end the run
     return;
   }
-  file_.reset(std::fopen(target.c_str(), "ab"));
-  if (!file_) {
-    throw Error("{}: cannot be written: {}; choose another file with --log-json", target,
-                std::generic_category().message(errno));
+  refuse_other_text(target);
+  // A pipe without a reader fails instead of waiting.
+  const int descriptor =
+      open(target.c_str(), O_WRONLY | O_APPEND | O_CREAT | O_NONBLOCK | O_NOCTTY | O_CLOEXEC, 0666);
+  if (descriptor < 0) {
+    throw Error(
+        "{}: cannot be written: {}; choose another file with --log-json", target,
+        errno == ENXIO ? "it is a pipe that nobody reads" : std::generic_category().message(errno));
   }
+  fcntl(descriptor, F_SETFL, O_APPEND);
+  file_.reset(fdopen(descriptor, "ab"));
+  if (!file_) throw std::bad_alloc();
   out_ = file_.get();
 }
 
@@ -63,8 +94,10 @@ void RunLog::write(std::string_view event, const Json& fields) {
   // Names of files may have any bytes: invalid UTF-8 is replaced.
   const std::string line = object.dump(-1, ' ', false, Json::error_handler_t::replace) + "\n";
   std::fwrite(line.data(), 1, line.size(), out_);
-  std::fflush(out_);
-  std::clearerr(out_);  // a log that cannot be written does not make the run fail
+  if (std::fflush(out_) != 0 && !std::exchange(has_failed_, true) && out_ != stdout)
+    print_error("groundray: the log cannot be written: {}\n",
+                std::generic_category().message(errno));
+  std::clearerr(out_);  // this does not make the run fail
 }
 
 double log_seconds(std::chrono::duration<double> time) {

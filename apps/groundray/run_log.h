@@ -20,7 +20,7 @@ class RunLog {
   using Json = nlohmann::ordered_json;
 
   /// @param target  file to append to, "-" for standard output, or empty for no log.
-  /// @throws Error if the file cannot be written.
+  /// @throws Error if the file cannot be written, is a pipe without a reader, or has other content.
   explicit RunLog(const std::string& target);
 
   /// Returns true if the log is written to standard output.
@@ -43,6 +43,7 @@ class RunLog {
   std::FILE* out_ = nullptr;
   std::mutex mutex_;
   std::size_t frames_ = 0, done_ = 0;
+  bool has_failed_ = false;
   std::chrono::steady_clock::time_point begin_ = std::chrono::steady_clock::now();
 };
 

@@ -1,6 +1,9 @@
+#include <sys/resource.h>
 #include <unistd.h>
 
 #include <CLI/CLI.hpp>
+#include <algorithm>
+#include <limits>
 #include <string>
 #include <string_view>
 
@@ -23,8 +26,13 @@ CLI::Option* option_of(CLI::App& command, std::string_view name) {
 
 std::size_t machine_bytes() {
   const auto pages = sysconf(_SC_PHYS_PAGES), page_bytes = sysconf(_SC_PAGESIZE);
-  if (pages <= 0 || page_bytes <= 0) return std::numeric_limits<std::size_t>::max();
-  return static_cast<std::size_t>(pages) * static_cast<std::size_t>(page_bytes);
+  std::size_t bytes = std::numeric_limits<std::size_t>::max();
+  if (pages > 0 && page_bytes > 0)
+    bytes = static_cast<std::size_t>(pages) * static_cast<std::size_t>(page_bytes);
+  rlimit limit{};
+  if (getrlimit(RLIMIT_AS, &limit) == 0 && limit.rlim_cur != RLIM_INFINITY)
+    bytes = std::min<std::size_t>(bytes, limit.rlim_cur);
+  return bytes;
 }
 
 ReportFacts facts_of(const std::string& command, std::span<const std::filesystem::path> inputs) {

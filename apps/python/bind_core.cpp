@@ -5,6 +5,7 @@
 #include <nanobind/stl/vector.h>
 
 #include <algorithm>
+#include <exception>
 #include <filesystem>
 
 #include "apps/python/binding/bind.h"
@@ -13,6 +14,7 @@
 #include "core/error.h"
 #include "core/io/file_io.h"
 #include "core/io/ply_io.h"
+#include "core/io/print_error.h"
 
 namespace groundray::python {
 namespace {
@@ -76,8 +78,19 @@ Raises groundray.Error if the file cannot be read.)");
 }  // namespace
 
 void bind_core(nb::module_& module) {
-  nb::exception<Error>(module, "Error", PyExc_RuntimeError).doc() =
+  nb::exception<Error> error(module, "Error", PyExc_RuntimeError);
+  error.doc() =
       "An invalid input or a failure: what is wrong, where, the rule and the likely fix, by line.";
+  // Names from files must not control the terminal that shows a traceback.
+  nb::register_exception_translator(
+      [](const std::exception_ptr& thrown, void* type) {
+        try {
+          std::rethrow_exception(thrown);
+        } catch (const Error& fault) {
+          PyErr_SetString(static_cast<PyObject*>(type), printable(fault.what()).c_str());
+        }
+      },
+      error.ptr());
   bind_points(module);
 }
 

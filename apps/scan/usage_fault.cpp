@@ -5,6 +5,7 @@
 
 #include <CLI/CLI.hpp>
 #include <algorithm>
+#include <regex>
 #include <string>
 #include <vector>
 
@@ -46,7 +47,11 @@ std::string words_for(const CLI::App& app, const CLI::ParseError& fault) {
   };
   const std::vector<std::string> commands = names_of_commands(command);
   const std::string list = fmt::format("the commands are {}", fmt::join(commands, ", "));
-  if (unknown.empty()) return commands.empty() ? fault.what() : "a command is missing; " + list;
+  if (unknown.empty() && !commands.empty()) return "a command is missing; " + list;
+  if (unknown.empty()) {
+    static const std::regex without_value("(--?[^ ]+): 1 required .* missing");
+    return std::regex_replace(fault.what(), without_value, "$1 needs a value");
+  }
   if (!commands.empty() && !is_option(unknown.front()))
     return fmt::format("there is no command '{}'{}; {}", unknown.front(),
                        suggestion(unknown.front(), commands), list);
@@ -58,11 +63,24 @@ std::string words_for(const CLI::App& app, const CLI::ParseError& fault) {
 
 }  // namespace
 
-bool report_usage(const CLI::App& app, const CLI::ParseError& fault) {
-  if (fault.get_exit_code() == static_cast<int>(CLI::ExitCodes::Success))
-    return app.exit(fault) == 0;
-  print_error("{}\nRun with --help for more information.\n", words_for(app, fault));
-  return false;
+std::optional<int> parse_arguments(CLI::App& app, int count, const char* const* arguments) {
+  constexpr int done = 0, wrong_usage = 2;
+  for (int i = 1; i < count; ++i) {
+    if (arguments[i][0] != '\0') continue;
+    print_error("argument {} is empty: is a variable of the shell not set?\n", i);
+    return wrong_usage;
+  }
+  try {
+    app.parse(count, arguments);
+  } catch (const CLI::ParseError& fault) {
+    if (fault.get_exit_code() == static_cast<int>(CLI::ExitCodes::Success)) {
+      app.exit(fault);
+      return done;
+    }
+    print_error("{}\nRun with --help for more information.\n", words_for(app, fault));
+    return wrong_usage;
+  }
+  return std::nullopt;
 }
 
 }  // namespace groundray

@@ -19,6 +19,7 @@
 #include "apps/scene/scene_place.h"
 #include "core/error.h"
 #include "core/image/image_io.h"
+#include "core/io/memory.h"
 #include "sensors/camera/imager.h"
 #include "sensors/camera/lens/stereo.h"
 #include "sensors/lidar/pattern/scan_pattern.h"
@@ -164,6 +165,16 @@ Trajectory lay_platform_path(const RecordedPath& path, const SceneSpec& spec,
 
 Trajectory lay_platform_path(const DrivenPath& path, const SceneSpec& spec, const Terrain& terrain,
                              std::chrono::nanoseconds& /*begin*/) {
+  // A pose for each 10 ms, of the platform and of each sensor; twice while the list grows.
+  const auto paths = static_cast<double>(2 + spec.lidars.size() + spec.cameras.size());
+  const double bytes = spec.duration_s / 0.01 * paths * sizeof(Trajectory::Sample);
+  const double available = available_memory_bytes();
+  if (bytes > available) {
+    throw Error(
+        "{}: the poses of a drive of {} s take {:.1f} GiB of memory, but {:.1f} GiB are available; "
+        "shorten duration_s",
+        path.where, spec.duration_s, bytes / 0x1p30, available / 0x1p30);
+  }
   return driven_path(path, terrain, run_time(spec));
 }
 
@@ -180,6 +191,7 @@ void check_place(const Trajectory& X_DS, double reach_m, const Terrain& terrain,
                  std::chrono::nanoseconds run) {
   bool in_reach = false;
   for (std::chrono::nanoseconds time{0}; time <= run; time += std::chrono::milliseconds(10)) {
+    stop_if_interrupted();
     const glm::dvec3 p_DS = X_DS.pose_at(time).translation_m;
     in_reach |= distance_m(terrain.frame(), p_DS) <= reach_m;
     const auto ground_m = terrain.ground().height_m_at(glm::dvec2(p_DS));
@@ -211,6 +223,7 @@ double largest_reach_m(const std::vector<PlacedLidar>& lidars,
                        const std::vector<PlacedCamera>& cameras) {
   double reach_m = 0;
   const auto look = [&](const Exposed& frame) {
+    stop_if_interrupted();
     const SensorBox box = sensor_box(frame);
     reach_m = std::max(reach_m, glm::distance(glm::dvec2(box.low_m), glm::dvec2(box.high_m)) / 2);
   };

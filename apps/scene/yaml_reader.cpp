@@ -199,6 +199,8 @@ void Faults::note(const Node& node, std::string_view key, const std::string& mes
 void Faults::throw_if_any() {
   if (faults_.empty()) return;
   std::ranges::stable_sort(faults_, {}, [](const Fault& f) { return std::pair(f.line, f.column); });
+  const auto [repeated, end] = std::ranges::unique(faults_, {}, &Fault::message);
+  faults_.erase(repeated, end);
   std::vector<std::string_view> messages;
   for (const Fault& fault : faults_ | std::views::take(most_listed)) {
     messages.push_back(fault.message);
@@ -264,7 +266,7 @@ const Node* Map::find(std::string_view key, Need need) {
   for (std::size_t i = 0; i < node_.items.size(); i += 2) {
     if (is_scalar(node_.items[i]) && node_.items[i].text == key) return &node_.items[i + 1];
   }
-  absent_.emplace_back(key);
+  if (std::ranges::find(absent_, key) == absent_.end()) absent_.emplace_back(key);
   if (need == Need::Required) missing_.emplace_back(key);
   return nullptr;
 }

@@ -195,7 +195,7 @@ void refuse_binary(std::string_view text, const std::filesystem::path& path) {
           ? fmt::format(", but a raster by its name: `groundray info {}` describes it, and a scene "
                         "file names it at terrain.dem",
                         path.string())
-          : ": it contains binary data");
+          : ": it contains binary data; save text as UTF-8");
 }
 
 }  // namespace groundray::yaml

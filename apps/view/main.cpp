@@ -153,11 +153,7 @@ int run(int argc, char** argv) {
   app.set_version_flag("--version", "groundray-view " GROUNDRAY_VERSION);
   Arguments arguments;
   add_options(app, arguments);
-  try {
-    app.parse(argc, argv);
-  } catch (const CLI::ParseError& fault) {
-    return report_usage(app, fault) ? done : wrong_usage;
-  }
+  if (const auto code = parse_arguments(app, argc, argv)) return *code;
   const std::string lonely = without_screenshot(arguments);
   if (!lonely.empty()) {
     print_error("groundray-view: {} needs --screenshot\n", lonely);

@@ -202,7 +202,7 @@ void append_rows(const PointCloud& columns, std::size_t first, std::size_t last,
 
 void write_mesh(const std::filesystem::path& path, const TriangleMesh& mesh,
                 const Georeference& georeference) {
-  const std::string form = path.extension().string();
+  const std::string form = file_ending(path);
   if (form == ".ply") return write_ply(path, mesh, georeference);
   if (form == ".obj") return write_obj(path, mesh, georeference);
   if (form == ".stl") return write_stl(path, mesh, georeference);

@@ -1,14 +1,12 @@
 #include "core/io/open_file.h"
 
-#include <dirent.h>
 #include <fcntl.h>
 #include <fmt/format.h>
 #include <sys/stat.h>
 #include <unistd.h>
 
-#include <algorithm>
 #include <cerrno>
-#include <string_view>
+#include <system_error>
 
 #include "core/error.h"
 #include "core/near_names.h"
@@ -79,23 +77,6 @@ bool next_line(std::istream& file, std::string& line) {
     line += static_cast<char>(c);
   }
   return true;
-}
-
-std::vector<std::string> names_in(const std::filesystem::path& folder, std::error_code& fault) {
-  const auto close_folder = [](DIR* open) { closedir(open); };
-  const std::unique_ptr<DIR, decltype(close_folder)> open(opendir(folder.c_str()), close_folder);
-  std::vector<std::string> names;
-  if (open != nullptr) {
-    errno = 0;
-    while (const dirent* const entry = readdir(open.get())) {
-      const std::string_view name = entry->d_name;
-      if (name != "." && name != "..") names.emplace_back(name);
-      errno = 0;
-    }
-  }
-  fault = {errno, std::generic_category()};
-  std::ranges::sort(names);
-  return names;
 }
 
 }  // namespace groundray

@@ -5,8 +5,6 @@
 #include <fstream>
 #include <memory>
 #include <string>
-#include <system_error>
-#include <vector>
 
 namespace groundray {
 
@@ -37,9 +35,5 @@ std::ifstream open_stream(const std::filesystem::path& path);
 /// file without line ends, ends the reading.
 /// @return false at the end, or if reading fails.
 bool next_line(std::istream& file, std::string& line);
-
-/// Returns the names in a folder, sorted; as many as could be read if `fault` is set. (Iterators of
-/// libstdc++ end the program if there is not enough memory.)
-std::vector<std::string> names_in(const std::filesystem::path& folder, std::error_code& fault);
 
 }  // namespace groundray

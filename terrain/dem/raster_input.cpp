@@ -18,11 +18,13 @@
 #include "core/io/memory.h"
 #include "core/io/open_file.h"
 #include "core/near_names.h"
+#include "terrain/dem/local_files.h"
 
 namespace groundray {
 namespace {
 
-// Formats of DEMs and photos that refer to no other file, besides VRT, which check_vrt reads first.
+// Formats of DEMs and photos that refer to no file in another folder, besides VRT, which check_vrt
+// reads first.
 constexpr std::array input_drivers{"GTiff",   "VRT",     "HFA",  "AAIGrid", "DTED", "PNG",
                                    "SRTMHGT", "USGSDEM", "EHdr", "ENVI",    "JPEG", "XYZ"};
 constexpr std::array local_systems{"/vsimem/", "/vsizip/", "/vsigzip/", "/vsitar/", "/vsisubfile/"};
@@ -111,16 +113,49 @@ void check_blocks(GDALDataset& dataset) {
       command(dataset.GetDescription(), "gdal_translate -co TILED=YES", "_tiled.tif"));
 }
 
+// Some formats name files that hold their samples or overviews, such as Erdas Imagine's .ige. A VRT
+// may read any raster, and check_vrt has read it.
+void check_files_beside(GDALDataset& dataset, const std::string& file) {
+  const CPLStringList files(dataset.GetFileList());
+  const std::filesystem::path folder = std::filesystem::path(file).parent_path();
+  for (int i = 0; i < files.size(); ++i) {
+    const std::filesystem::path other(files[i]);
+    const bool is_metadata =
+        std::string_view(files[i]).ends_with(".aux.xml");  // GDAL_PAM_PROXY_DIR
+    if (is_metadata || other.lexically_normal().parent_path() == folder.lexically_normal())
+      continue;
+    throw Error("it refers to {}, which is not in its folder", other.string());
+  }
+}
+
+// GDAL takes what a raw file lacks for heights of 0.
+void check_raw_size(GDALDataset& dataset, const std::string& file) {
+  constexpr std::string_view packed = "\x1f\x8b";
+  const GDALDataType type = dataset.GetRasterBand(1)->GetRasterDataType();
+  const double bytes = 1.0 * dataset.GetRasterXSize() * dataset.GetRasterYSize() *
+                       dataset.GetRasterCount() * GDALGetDataTypeSizeBytes(type);
+  VSIStatBufL state;
+  if (VSIStatL(file.c_str(), &state) != 0 || static_cast<double>(state.st_size) >= bytes) return;
+  std::string begin(packed.size(), '\0');
+  open_stream(file).read(begin.data(), static_cast<std::streamsize>(begin.size()));
+  if (begin == packed) return;
+  throw Error("it has {} bytes, but its header declares {:.0f}; is it complete?", state.st_size,
+              bytes);
+}
+
 }  // namespace
 
 void register_drivers() {
   GDALDriverManager& drivers = *GetGDALDriverManager();
   const bool is_first = drivers.GetDriverCount() == 0;
+  CPLSetConfigOption("GDAL_SKIP", "");  // or those that are needed may be missing
   GDALAllRegister();
   CPLSetConfigOption("GDAL_VRT_ENABLE_PYTHON", "NO");
+  CPLSetConfigOption("CPL_VSIL_GZIP_WRITE_PROPERTIES", "NO");  // a file beside the archive
   if (!is_first) return;
   remove_drivers(drivers);
   close_file_systems();
+  refuse_pipes_to_gdal();
 }
 
 std::string checked_file(const std::string& name) {
@@ -162,8 +197,8 @@ std::string checked_driver(const std::string& name) {
 }
 
 GDALDatasetUniquePtr open_input(const std::string& name) {
-  checked_file(name);
-  if (checked_driver(name) == "VRT") check_vrt(name);
+  const std::string file = checked_file(name), driver = checked_driver(name);
+  if (driver == "VRT") check_vrt(name);
   CPLErrorReset();
   GDALDatasetUniquePtr dataset(GDALDataset::Open(
       name.c_str(), GDAL_OF_RASTER | GDAL_OF_VERBOSE_ERROR, permitted_drivers().List()));
@@ -175,6 +210,8 @@ GDALDatasetUniquePtr open_input(const std::string& name) {
       why.erase(0, std::min(why.find_first_not_of(' ', name.size() + 1), why.size()));
     throw Error("it cannot be opened as a raster: {}; is it complete?", why);
   }
+  if (driver != "VRT") check_files_beside(*dataset, file);
+  if (driver == "ENVI" || driver == "EHdr") check_raw_size(*dataset, file);
   if (dataset->GetRasterCount() > 0) check_blocks(*dataset);
   return dataset;
 }

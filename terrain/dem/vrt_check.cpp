@@ -64,13 +64,16 @@ void for_each_node(const CPLXMLNode& root, const auto& take) {
   }
 }
 
-void check_class(const CPLXMLNode& node, const std::string& vrt) {
-  const std::string_view value = CPLGetXMLValue(&node, nullptr, "");
-  if (std::ranges::find(permitted_classes, value) != permitted_classes.end()) return;
+[[noreturn]] void refuse(std::string_view part, const std::string& vrt) {
   throw Error(
       "the VRT {} has a {}; only mosaics and warps of files are read; if you trust it, convert "
       "it:{}",
-      vrt, value, command(vrt, "gdal_translate", "_converted.tif"));
+      vrt, part, command(vrt, "gdal_translate", "_converted.tif"));
+}
+
+void check_class(const CPLXMLNode& node, const std::string& vrt) {
+  const std::string_view value = CPLGetXMLValue(&node, nullptr, "");
+  if (std::ranges::find(permitted_classes, value) == permitted_classes.end()) refuse(value, vrt);
 }
 
 // VRTs inside each other, and files that they refer to, each as often as it is referred to.
@@ -93,6 +96,7 @@ class VrtCheck {
     for_each_node(*xml, [&](const CPLXMLNode& node) {
       if (node.eType != CXT_Element && node.eType != CXT_Attribute) return;
       if (EQUAL(node.pszValue, "subClass")) check_class(node, path);
+      if (EQUAL(node.pszValue, "KernelFilteredSource")) refuse(node.pszValue, path);
       if (EQUAL(node.pszValue, "SourceFilename") || EQUAL(node.pszValue, "SourceDataset")) {
         add(source_name(node, path), path, level, extent);
       }

@@ -15,6 +15,7 @@
 #include <utility>
 
 #include "core/error.h"
+#include "core/folder_names.h"
 #include "core/io/file_io.h"
 #include "core/io/open_file.h"
 #include "core/io/text_lines.h"

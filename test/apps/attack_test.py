@@ -237,3 +237,29 @@ def test_a_clock_that_jumps_changes_nothing(tmp_path):
     assert 0 < max(elapsed_s) < 100
     years = {json.loads(line)["time"][:4] for line in log.read_text().splitlines()}
     assert max(map(int, years)) - min(map(int, years)) == 20
+
+
+def test_a_long_drive_is_refused_before_it_takes_all_memory(tmp_path):
+    scene = tmp_path / "scene.yaml"
+    text = SCENE.read_text().replace("../terrain", str(ROOT / "data/terrain"))
+    scene.write_text(re.sub(r"duration_s: [0-9.]+", "duration_s: 100000", text))
+    limit = (2 << 30, 2 << 30)
+    done = run("info", scene, preexec_fn=lambda: resource.setrlimit(resource.RLIMIT_AS, limit))
+    assert done.returncode == 1
+    assert "GiB are available; shorten duration_s" in done.stderr
+
+
+def test_empty_arguments_are_named():
+    done = run("info", "")
+    assert done.returncode == 2
+    assert done.stderr.startswith("argument 2 is empty")
+
+
+def test_a_log_waits_for_no_reader_and_reports_a_full_disk(tmp_path):
+    os.mkfifo(tmp_path / "pipe")
+    done = run("generate", SCENE, "-o", tmp_path / "a", "--log-json", tmp_path / "pipe")
+    assert done.returncode == 1
+    assert "it is a pipe that nobody reads" in done.stderr
+    done = run("generate", SCENE, "-o", tmp_path / "b", "--log-json", "/dev/full")
+    assert done.returncode == 0
+    assert done.stderr.count("the log cannot be written: No space left on device") == 1

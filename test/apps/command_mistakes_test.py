@@ -57,6 +57,32 @@ USAGE = [
     ),
     Mistake("no output", "groundray generate scene.yaml", ("--output is required",), code=2),
     Mistake(
+        "an output without a name",
+        "groundray generate scene.yaml -o",
+        ("--output needs a value",),
+        code=2,
+    ),
+    Mistake(
+        "a scene as its log",
+        GENERATE + " --log-json scene.yaml",
+        ("scene.yaml: it is not a log", "--log-json"),
+    ),
+    Mistake(
+        "a dataset's scan as a result",
+        f"groundray reconstruct mesh run -o out.ply --report {SCAN}",
+        (f"{SCAN}: it is a file of the dataset", "choose another name"),
+    ),
+    Mistake(
+        "a report into a dataset",
+        "groundray-golden compare hills.tif hills.tif -o run",
+        ("run: it is a dataset; choose another folder with -o",),
+    ),
+    Mistake(
+        "an address as a DEM",
+        "groundray info https://example.com/dem.tif",
+        ("it is an address, but must be a file: download it first",),
+    ),
+    Mistake(
         "two scenes",
         "groundray generate scene.yaml eye.yaml -o out",
         ("'eye.yaml' is one argument too many",),
@@ -197,7 +223,7 @@ OUTPUTS = [
     Mistake(
         "a mesh in a folder that does not exist",
         "groundray terrain mesh hills.tif -o no/out.ply --max-error-m 1",
-        ("no/out.ply: cannot be written: No such file or directory; create its folder first",),
+        ("no/out.ply: there is no folder no to write it in",),
     ),
     Mistake(
         "a DEM in place of its input",

@@ -4,6 +4,8 @@ The oracle of the network is a listener on this machine. GDAL's own gdalinfo con
 of the forms, so that the listener is known to notice.
 """
 
+import gzip
+import os
 import resource
 import shutil
 import socket
@@ -115,7 +117,7 @@ def scene(folder: Path, dem: str | Path, reproject_to: str) -> Path:
         f"groundray: 1\nseed: 1\nduration_s: 0.1\nterrain:\n  dem: {dem}\n"
         f"  reproject_to: {reproject_to}\nplatform:\n  drive:\n    speed_m_s: 1\n    height_m: 1\n"
         "    waypoints_m: [[429400, 5150650], [429420, 5150664]]\n"
-        "sensors:\n  - {name: a, type: lidar, preset: vlp_16}\n"
+        "lidars:\n  - {name: a, preset: velodyne_vlp16, mount: {translation_m: [0, 0, 1]}}\n"
     )
     return path
 
@@ -169,6 +171,8 @@ FORMS: dict[str, Form] = {
 
 # GDAL itself does not follow these, or gdalinfo does not.
 UNREACHED = ("VRT with CRS", "mask", "mask by VRT", "CRS", "positions")
+# What is said of a scene, which shows that its DEM was opened.
+IN_SCENES = {"CRS": ("key 'dem'", "a.wkt"), "positions": ("key 'waypoints_m'", "the DEM covers")}
 
 
 @pytest.mark.parametrize("form", FORMS)
@@ -193,6 +197,8 @@ def test_no_raster_reaches_the_network(form: str, tmp_path: Path, listener: List
     )
     assert listener.count == 0
     assert result.returncode in (0, 1), result.stderr
+    for word in IN_SCENES.get(form, ()):
+        assert word in result.stderr
     if form in UNREACHED:
         return
     subprocess.run(
@@ -213,6 +219,74 @@ def test_a_permitted_driver_opens_no_network(form: str, tmp_path: Path, listener
         [PROGRAM, "info", str(name)], capture_output=True, env=environment, timeout=LOCAL_TIMEOUT_S
     )
     assert listener.count == 0
+
+
+# Files that GDAL looks for beside a raster.
+BESIDE = (
+    *("dem.tif.aux.xml", "dem.tif.ovr", "dem.tif.msk", "dem.imd", "dem.IMD", "dem.RPB", "dem.aux"),
+    *("dem_rpc.txt", "dem_RPC.TXT", "dem.tfw", "dem.wld", "dem.prj", "METADATA.DIM"),
+)
+
+
+@pytest.mark.parametrize("make", [os.mkfifo, lambda path: path.symlink_to("/dev/zero")])
+@pytest.mark.parametrize("dem", ["dem.tif", "dem.asc"])
+def test_pipes_and_devices_beside_a_raster_are_ignored(dem: str, make: Callable, tmp_path: Path):
+    """Neither waits for a writer nor reads without end."""
+    form = "GTiff" if dem == "dem.tif" else "AAIGrid"
+    subprocess.run(["gdal_translate", "-q", "-of", form, PRAIRIE, tmp_path / dem], check=True)
+    alone = groundray("info", tmp_path / dem)
+    for name in BESIDE:
+        path = tmp_path / name.replace("dem.tif", dem)
+        path.unlink(missing_ok=True)
+        make(path)
+        result = groundray("info", tmp_path / dem, timeout=LOCAL_TIMEOUT_S)
+        path.unlink()
+        assert result.returncode == 0, (name, result.stderr)
+        if dem == "dem.tif":
+            assert result.stdout == alone.stdout, name
+
+
+def test_a_raster_refers_to_no_file_of_another_folder(tmp_path: Path) -> None:
+    """Erdas Imagine keeps large rasters in a second file, which may be named anywhere."""
+    (tmp_path / "inner").mkdir()
+    dem = tmp_path / "inner/dem.img"
+    subprocess.run(
+        ["gdal_translate", "-q", "-of", "HFA", "-co", "USE_SPILL=YES", PRAIRIE, dem], check=True
+    )
+    assert groundray("info", dem).returncode == 0
+    dem.write_bytes(dem.read_bytes().replace(b"dem.ige", b"../m.ig"))
+    (tmp_path / "inner/dem.ige").rename(tmp_path / "m.ig")
+    refused(dem, "it refers to ", "not in its folder")
+
+
+@pytest.mark.parametrize("driver", ["VRT", "MEM", "COG"])
+def test_needed_drivers_are_there_whatever_gdal_skips(driver: str) -> None:
+    """GDAL's setting for its own programs is not groundray's."""
+    environment = {**os.environ, "GDAL_SKIP": driver}
+    assert groundray("info", PRAIRIE, env=environment).returncode == 0
+
+
+def test_no_file_is_written_beside_an_archive(tmp_path: Path) -> None:
+    """GDAL would write the size of what is packed, and through links."""
+    packed, victim = tmp_path / "dem.tif.gz", tmp_path / "victim"
+    packed.write_bytes(gzip.compress(PRAIRIE.read_bytes()))
+    victim.write_text("precious")
+    for place in (tmp_path / "elsewhere", victim):
+        (tmp_path / "dem.tif.gz.properties").symlink_to(place)
+        assert groundray("info", f"/vsigzip/{packed}").returncode == 0
+        (tmp_path / "dem.tif.gz.properties").unlink()
+    assert victim.read_text() == "precious"
+    assert sorted(os.listdir(tmp_path)) == ["dem.tif.gz", "victim"]
+
+
+@pytest.mark.parametrize(("form", "name"), [("ENVI", "dem.img"), ("EHdr", "dem.bil")])
+def test_a_cut_raw_raster_is_refused(form: str, name: str, tmp_path: Path) -> None:
+    """GDAL takes what it lacks for heights of 0."""
+    path = tmp_path / name
+    subprocess.run(["gdal_translate", "-q", "-of", form, PRAIRIE, path], check=True)
+    assert groundray("info", path).returncode == 0
+    os.truncate(path, path.stat().st_size - 1)
+    refused(path, "is it complete?")
 
 
 def test_files_that_crashed_libraries_are_refused(tmp_path: Path) -> None:

@@ -190,11 +190,19 @@ def test_only_one_run_at_a_time_may_use_a_folder(tmp_path):
     assert generate(tmp_path, "--resume", scene=long).returncode == 0
 
 
-def test_an_interrupted_run_resumes_to_the_same_bytes(whole, tmp_path):
-    run = subprocess.Popen(command(tmp_path), stdout=subprocess.DEVNULL, stderr=subprocess.PIPE)
+@pytest.mark.parametrize("by", [signal.SIGINT, signal.SIGTERM, signal.SIGHUP])
+def test_an_interrupted_run_resumes_to_the_same_bytes(whole, tmp_path, by):
+    run = subprocess.Popen(
+        command(tmp_path),
+        stdout=subprocess.DEVNULL,
+        stderr=subprocess.PIPE,
+        preexec_fn=lambda: signal.signal(
+            by, signal.SIG_DFL
+        ),  # a job in the background ignores some
+    )
     while not (tmp_path / "out/lidar/top/000001.ply").exists() and run.poll() is None:
         time.sleep(0.002)
-    run.send_signal(signal.SIGINT)
+    run.send_signal(by)
     said = run.communicate(timeout=60)[1].decode()
     assert run.returncode == 130, said
     assert "continues with --resume" in said

@@ -111,6 +111,25 @@ SYNTAX = [
         "groundray generate scan.yaml -o out",
         "scan.yaml: not YAML: it contains binary data",
     ),
+    in_file(
+        "a scene in UTF-16",
+        "wide.yaml",
+        "groundray: 1\n".encode("utf-16"),
+        "groundray generate wide.yaml -o out",
+        "wide.yaml: not YAML: it contains binary data; save text as UTF-8",
+    ),
+    in_scene(
+        "a list's name in the singular",
+        "lidars:\n",
+        "lidar:\n",
+        "key 'lidar': unknown; did you mean 'lidars'?",
+    ),
+    in_scene(
+        "one lidar instead of a list",
+        "lidars:\n  - {name: top",
+        "lidars:\n  {name: top",
+        "key 'lidars': is a map, but must be a list",
+    ),
     in_scene(
         "a tab",
         "  dem: hills.tif",
@@ -276,7 +295,7 @@ VALUES = [
         "a negative duration",
         "duration_s: 0.3",
         "duration_s: -0.3",
-        "scene.yaml:3:13: key 'duration_s': is -0.3, but must be > 0 and at most 1e6",
+        "scene.yaml:3:13: key 'duration_s': is -0.3, but must be > 0 and at most 1e5",
     ),
     in_scene(
         "a duration of nothing",
@@ -295,7 +314,7 @@ VALUES = [
         "duration_s: 0.3",
         "duration_s: 300000000",
         "scene.yaml:3:13: key 'duration_s'",
-        "at most 1e6",
+        "at most 1e5",
     ),
     in_scene(
         "a duration shorter than a sweep",

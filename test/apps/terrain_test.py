@@ -10,6 +10,7 @@ from pathlib import Path
 
 import numpy as np
 import pytest
+from dem_runs import Raster, done, triangle_heights
 from plyfile import PlyData
 
 ROOT = Path(__file__).resolve().parents[2]
@@ -172,6 +173,7 @@ def test_mesh_rejects_invalid_options(tmp_path, arguments, words):
         ["-o", "m.ply", "--max-error-m", "1", "--viewpoint", "1,2,3"],
         ["-o", "m.ply", "--max-error-m", "1", "--angle-mrad", "1"],
         ["-o", "m.ply", "--max-error-m", "1", "--angle-mrad", "1", "--viewpoint", "1,2"],
+        ["-o", "m.ply", "--max-error-m=1", "--fewest", "--angle-mrad=1", "--viewpoint=1,2,3"],
     ],
 )
 def test_mesh_prints_its_usage(tmp_path, arguments):
@@ -232,3 +234,44 @@ def test_too_small_a_memory_limit_is_rejected_before_anything_is_written(tmp_pat
     assert result.returncode == 1
     assert "must be at least 1" in result.stderr
     assert not (tmp_path / "out").exists()
+
+
+@pytest.mark.parametrize("bound_m", [0.3, 2])
+def test_fewest_triangles_stay_within_the_bound(tmp_path, bound_m):
+    """At points of every triangle, by other programs' readers; the area is the DEM's."""
+    mesh, out = tmp_path / "few.ply", {}
+    for name, more in (("nodes", ()), ("few", ("--fewest",))):
+        out[name] = done(
+            *("terrain", "mesh", PRAIRIE, "--max-error-m", str(bound_m), *more),
+            *("-o", tmp_path / f"{name}.ply"),
+        )
+    file = PlyData.read(mesh)
+    (origin,) = (line for line in file.comments if line.startswith("origin_w "))
+    vertices = np.column_stack([file["vertex"][axis] for axis in "xyz"])
+    vertices += np.array(origin.split()[1:], float)
+    corners = vertices[np.vstack(file["face"]["vertex_indices"])]
+    fewer = len(corners), len(PlyData.read(tmp_path / "nodes.ply")["face"].data)
+    assert fewer[0] < 0.9 * fewer[1], fewer
+    assert f"{len(corners)} triangles" in out["few"]
+    truth = Raster(PRAIRIE, tmp_path)
+    shares = np.random.default_rng(1).dirichlet((1, 1, 1), (len(corners), 40))
+    points = np.einsum("tpk,tkc->tpc", shares, corners).reshape(-1, 3)
+    off_m = np.abs(points[:, 2] - triangle_heights(truth, points[:, 0], points[:, 1]))
+    largest_m = float(re.search(r"largest deviation ([0-9.e-]+) m", out["few"])[1])
+    rounding_m = 1e-5  # of the printed figure; heights are floats
+    assert 0.5 * bound_m < np.max(off_m) <= largest_m + rounding_m
+    assert largest_m <= bound_m
+    edges = corners[:, 1:, :2] - corners[:, :1, :2]
+    area = 0.5 * np.sum(edges[:, 0, 0] * edges[:, 1, 1] - edges[:, 0, 1] * edges[:, 1, 0])
+    rows, columns = truth.bands.shape[1:]
+    assert np.isclose(area, (rows - 1) * (columns - 1) * truth.cell**2, rtol=1e-9)
+
+
+def test_fewest_triangles_need_memory(tmp_path):
+    result = groundray(
+        *("terrain", "mesh", PRAIRIE, "--max-error-m", "1", "--fewest", "--memory-mb", "1"),
+        *("-o", tmp_path / "few.ply"),
+    )
+    assert result.returncode == 1
+    assert "MB" in result.stderr
+    assert not os.listdir(tmp_path)

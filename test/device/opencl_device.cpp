@@ -193,8 +193,9 @@ std::string OpenClDevice::name() const {
 
 void OpenClDevice::write(Memory to, std::span<const std::byte> bytes) {
   OpenClState& s = state_;
-  check(s.clEnqueueWriteBuffer(s.queue, to == Memory::Pass ? s.pass : s.arrays, CL_TRUE, 0,
-                               bytes.size(), bytes.data(), 0, nullptr, nullptr),
+  const bool is_pass = to == Memory::Pass;  // copied when the arrays, which come after it, are
+  check(s.clEnqueueWriteBuffer(s.queue, is_pass ? s.pass : s.arrays, is_pass ? CL_FALSE : CL_TRUE,
+                               0, bytes.size(), bytes.data(), 0, nullptr, nullptr),
         "copy to the device");
 }
 

@@ -212,6 +212,7 @@ def test_masked_heights_are_holes():
     terrain = groundray.Terrain(heights_m)
     assert np.isnan(terrain.heights_at([[9, 19 - 7]]))[0]
     assert (terrain.heights_at([[2, 2], [15.5, 3]]) == 3).all()
+    assert np.isnan(groundray.Terrain(list(heights_m)).heights_at([[9, 19 - 7]]))[0]
     whole = np.ma.array(np.full((20, 20), 3.0), mask=False)
     assert groundray.Terrain(whole).heights_at([[9, 12]])[0] == 3
     dem = np.ma.array(np.full((20, 20), 3.0, np.float32), mask=np.zeros((20, 20), bool))
@@ -227,6 +228,8 @@ def test_masked_values_are_rejected_elsewhere():
     down = [[0, 0, -1.0]] * 2
     with pytest.raises(groundray.Error, match="an array has masked values"):
         terrain.cast_rays(origins_m, down)
+    with pytest.raises(groundray.Error, match="an array has masked values"):
+        terrain.cast_rays(tuple(origins_m), down)
     origins_m.mask = False
     assert np.allclose(terrain.cast_rays(origins_m, down)["range_true_m"], [5, 6])
     with pytest.raises(groundray.Error, match="an array has masked values"):

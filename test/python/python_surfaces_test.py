@@ -196,11 +196,14 @@ def test_invalid_rays_are_reported():
     assert len(terrain.cast_rays(np.zeros((0, 3)), np.zeros((0, 3)))) == 0
 
 
+@pytest.mark.parametrize("fewest", [False, True])
 @pytest.mark.parametrize("max_error_m", [0.05, 0.5])
-def test_terrain_mesh_keeps_its_error_bound(max_error_m):
+def test_terrain_mesh_keeps_its_error_bound(max_error_m, fewest):
     heights = small_scene.heights_m()
     terrain = groundray.Terrain(heights, small_scene.CELL_M)
-    mesh = terrain.mesh(max_error_m)
+    mesh = terrain.mesh(max_error_m, fewest=fewest)
+    if fewest:
+        assert len(mesh.triangles) < len(terrain.mesh(max_error_m).triangles)
     corners = mesh.vertices_m[mesh.triangles]
     weights = np.random.default_rng(9).dirichlet([1, 1, 1], len(corners))
     places = np.einsum("nk,nkd->nd", weights, corners)

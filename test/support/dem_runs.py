@@ -88,7 +88,8 @@ sky:
 
 def groundray(*arguments, **options):
     return subprocess.run(
-        [PROGRAM, *map(str, arguments)], capture_output=True, text=True, timeout=900, **options
+        [PROGRAM, *map(str, arguments)],
+        **{"capture_output": True, "text": True, "timeout": 900} | options,
     )
 
 

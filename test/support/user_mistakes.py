@@ -184,6 +184,7 @@ def check_words(said: str, says: tuple[str, ...]) -> None:
         assert word not in said, f"{word!r} is in:\n{said}"
     lines = said.splitlines()
     assert 1 <= len(lines) <= 12, said
+    assert len(set(lines)) == len(lines), said
     assert max(map(len, lines)) <= 700, said
 
 

@@ -15,7 +15,7 @@
 
 #include "apps/dataset/dataset_text.h"
 #include "core/error.h"
-#include "core/io/open_file.h"
+#include "core/folder_names.h"
 
 namespace groundray {
 namespace {

@@ -15,6 +15,7 @@
 #include "apps/dataset/write/run_text.h"
 #include "apps/scene/interruption.h"
 #include "core/error.h"
+#include "core/folder_names.h"
 #include "core/io/file_io.h"
 #include "core/io/open_file.h"
 #include "core/io/tum_io.h"

@@ -13,7 +13,7 @@
 #include "apps/dataset/write/dataset_folder.h"
 #include "apps/dataset/write/journal.h"
 #include "apps/scene/interruption.h"
-#include "core/io/open_file.h"
+#include "core/folder_names.h"
 #include "core/io/text_lines.h"
 #include "core/progress.h"
 

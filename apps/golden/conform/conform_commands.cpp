@@ -81,6 +81,7 @@ void ConformCommand::add_to(CLI::App* command) {
 }
 
 Verdict ConformCommand::run() const {
+  check_report_folder(out);
   const Report report = judge_conformity(passes, theirs);
   publish(report, out);
   const bool passed = std::ranges::all_of(

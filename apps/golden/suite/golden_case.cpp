@@ -6,6 +6,7 @@
 
 #include "apps/scene/yaml_reader.h"
 #include "core/error.h"
+#include "core/folder_names.h"
 
 namespace groundray::golden {
 namespace {
@@ -147,12 +148,12 @@ std::vector<GoldenCase> read_cases(const std::filesystem::path& folder,
     throw Error("{}: the folder of cases does not exist; give one with --cases", folder.string());
   }
   std::vector<std::filesystem::path> folders;
-  for (const auto& entry : std::filesystem::directory_iterator(folder)) {
-    if (std::filesystem::exists(entry.path() / "case.yaml") &&
-        is_wanted(entry.path().filename().string(), filters)) {
-      folders.push_back(entry.path());
-    }
+  std::error_code fault;
+  for (const std::string& name : names_in(folder, fault)) {
+    if (std::filesystem::exists(folder / name / "case.yaml") && is_wanted(name, filters))
+      folders.push_back(folder / name);
   }
+  if (fault) throw Error("{}: cannot be read: {}", folder.string(), fault.message());
   for (const std::string& filter : filters) {
     if (std::ranges::none_of(folders, [&](const auto& each) {
           return each.filename().string().find(filter) != std::string::npos;
@@ -160,7 +161,6 @@ std::vector<GoldenCase> read_cases(const std::filesystem::path& folder,
       throw Error("{}: contains no case with '{}' in its name", folder.string(), filter);
   }
   if (folders.empty()) throw Error("{}: contains no case", folder.string());
-  std::ranges::sort(folders);
   std::vector<GoldenCase> cases;
   for (const auto& each : folders) cases.push_back(read_case(each));
   return cases;

@@ -54,8 +54,9 @@ Image8 draw_dem(const DemLayers& layers, const std::vector<float>& error_m, Pict
 /// @throws Error if not.
 void check_output(const DemOutput& output, std::span<const std::filesystem::path> inputs);
 
-/// Writes all requested results, with the report as JSON (docs/reference/formats.md), and prints the
-/// report: either all files appear, each complete, or none. Sets the picture's scale in the report.
+/// Writes all requested results, with the report as JSON (docs/reference/formats.md), and prints
+/// the report: either all files appear, each complete, or none. Sets the picture's scale in the
+/// report.
 /// @throws Error as the writers of the formats.
 void write_output(const DemOutput& output, DemReport& report);
 

@@ -70,8 +70,8 @@ struct RebuildReport {
 /// @throws Error naming the first fault.
 void check_output(const MeshOutput& output, std::span<const std::filesystem::path> inputs);
 
-/// Writes all requested results, with the report as JSON (docs/reference/formats.md), and prints the
-/// report. No file appears before all are complete and the report is printed.
+/// Writes all requested results, with the report as JSON (docs/reference/formats.md), and prints
+/// the report. No file appears before all are complete and the report is printed.
 /// @throws Error as the writers of the formats.
 void write_output(const MeshOutput& output, const RebuildReport& report);
 

@@ -90,9 +90,8 @@ struct type_caster<groundray::python::NumpyArgument<Array>> {
 
   bool from_python(handle source, std::uint8_t flags, cleanup_list* cleanup) noexcept {
     try {
-      if (!hasattr(source, "mask") || !hasattr(source, "filled"))
-        return read(source, flags, cleanup);
-      const object given = borrow(source);
+      const object given = whole(source);
+      if (!is_masked(given)) return read(source, flags, cleanup);
       const object any = module_::import_("numpy").attr("any")(given.attr("mask"));
       if (PyObject_IsTrue(any.ptr()) == 0) return read(given.attr("data"), flags, cleanup);
       if (is_raster) return read(holes_of(given), flags, cleanup);
@@ -108,6 +107,20 @@ struct type_caster<groundray::python::NumpyArgument<Array>> {
  private:
   static constexpr bool is_raster =
       std::is_same_v<std::remove_const_t<typename Array::Scalar>, float>;
+
+  static bool is_masked(handle source) {
+    return hasattr(source, "mask") && hasattr(source, "filled");
+  }
+
+  // Returns the array of a list of masked arrays; anything else as it is.
+  static object whole(handle source) {
+    if (isinstance<nanobind::list>(source) || isinstance<nanobind::tuple>(source)) {
+      for (const handle each : source) {
+        if (is_masked(each)) return module_::import_("numpy").attr("ma").attr("array")(source);
+      }
+    }
+    return borrow(source);
+  }
 
   static object holes_of(const object& masked) {
     const object numpy = module_::import_("numpy");

@@ -10,7 +10,7 @@
 #include "apps/scene/readers/readers.h"
 #include "apps/scene/yaml_reader.h"
 #include "core/appearance/bsdf.h"
-#include "core/io/open_file.h"
+#include "core/folder_names.h"
 #include "sensors/lidar/lidar.h"
 
 namespace groundray::yaml {
@@ -61,8 +61,8 @@ using yaml::Need;
 using yaml::Node;
 using yaml::Rule;
 
-constexpr Rule duration_rule{[](double value) { return value > 0 && value <= 1e6; },
-                             "must be > 0 and at most 1e6"};
+constexpr Rule duration_rule{[](double value) { return value > 0 && value <= 1e5; },
+                             "must be > 0 and at most 1e5"};
 
 // Checks that lidars, air and ground are compatible.
 void check_lidars(const SceneSpec& scene, const Node& node, std::span<const Node> entries,

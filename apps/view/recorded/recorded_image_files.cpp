@@ -15,11 +15,11 @@
 #include "apps/view/recorded/recorded_image.h"
 #include "apps/view/rendering/picture_file.h"
 #include "core/error.h"
+#include "core/folder_names.h"
 #include "core/image/exr_io.h"
 #include "core/image/image_io.h"
 #include "core/io/file_io.h"
 #include "core/io/npy_io.h"
-#include "core/io/open_file.h"
 
 namespace groundray {
 namespace {

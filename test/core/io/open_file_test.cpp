@@ -11,6 +11,7 @@
 #include <system_error>
 
 #include "core/error.h"
+#include "core/folder_names.h"
 #include "core/io/file_io.h"
 #include "test/support/temporary_folder.h"
 

@@ -149,7 +149,7 @@ TEST(SceneFile, ErrorListsFaultsInTheOrderOfTheFile) {
   EXPECT_THAT(
       [&] { parse(with(text, "rate_hz: 20", "rate_hz: often")); },
       ThrowsMessage<Error>(
-          "scenes/prairie.yaml:3:13: key 'duration_s': is -1, but must be > 0 and at most 1e6\n"
+          "scenes/prairie.yaml:3:13: key 'duration_s': is -1, but must be > 0 and at most 1e5\n"
           "scenes/prairie.yaml:13:5: key 'speed_km_h': unknown; did you mean 'speed_m_s'?\n"
           "scenes/prairie.yaml:22:14: key 'rate_hz': is 'often', but must be a number: write it "
           "without quotes or unit, in the unit of the key"));
