@@ -37,22 +37,25 @@ struct Tally {
 };
 
 // Adds a frame to the tally, and returns its entry in the log.
-RunLog::Json count(const Simulation& simulation, const MadeFrame& made, const WrittenFrame& written,
-                   Tally& tally) {
+LogFields count(const Simulation& simulation, const MadeFrame& made, const WrittenFrame& written,
+                Tally& tally) {
   const auto [sensor, number] = made.name;
-  RunLog::Json entry{{"sensor", ""},
-                     {"frame", number},
-                     {"tracing_s", log_seconds(made.making)},
-                     {"writing_s", log_seconds(written.writing)},
-                     {"writing_cpu_s", log_seconds(written.writing_cpu)}};
+  LogFields entry;
+  const auto add_common = [&](const std::string& name) {
+    entry.add("sensor", name);
+    entry.add("frame", made.name.number);
+    entry.add("tracing_s", log_seconds(made.making));
+    entry.add("writing_s", log_seconds(written.writing));
+    entry.add("writing_cpu_s", log_seconds(written.writing_cpu));
+  };
   if (const auto* scan = std::get_if<LidarScan>(&made.product)) {
     const PlacedLidar& lidar = simulation.lidars[sensor];
     tally.scanning += made.tracing;
     tally.points += scan->echoes.rows();
     tally.pulses += static_cast<std::uint64_t>(lidar.lidar.pattern().pulses(number));
     ++tally.scans;
-    entry["sensor"] = lidar.spec.name;
-    entry["points"] = scan->echoes.rows();
+    add_common(lidar.spec.name);
+    entry.add("points", scan->echoes.rows());
   } else {
     const MountedCamera& camera = simulation.cameras[sensor - simulation.lidars.size()].spec;
     const glm::ivec2 size_px = camera.camera.size_px;
@@ -63,10 +66,10 @@ RunLog::Json count(const Simulation& simulation, const MadeFrame& made, const Wr
     tally.exposing += made.making;
     tally.flows_left_out += written.flows_left_out;
     ++tally.images;
-    entry["sensor"] = camera.name;
-    entry["pixels"] = pixels;
+    add_common(camera.name);
+    entry.add("pixels", pixels);
   }
-  entry["bytes"] = written.bytes;
+  entry.add("bytes", written.bytes);
   return entry;
 }
 
@@ -110,13 +113,14 @@ void say(const Simulation& simulation, const fs::path& out, const FramePlan& pla
 
 void log_begin(const fs::path& scene, const fs::path& out, Seed seed,
                const std::optional<Shard>& shard, const FramePlan& plan, RunLog& log) {
-  RunLog::Json fields{{"version", GROUNDRAY_VERSION},
-                      {"scene", scene.string()},
-                      {"output", out.string()},
-                      {"seed", seed.value}};
-  if (shard) fields["shard"] = text_of(*shard);
-  fields["frames"] = plan.frames.size();
-  fields["there"] = plan.scans + plan.images - plan.frames.size();
+  LogFields fields;
+  fields.add("version", GROUNDRAY_VERSION);
+  fields.add("scene", scene.string());
+  fields.add("output", out.string());
+  fields.add("seed", seed.value);
+  if (shard) fields.add("shard", text_of(*shard));
+  fields.add("frames", plan.frames.size());
+  fields.add("there", plan.scans + plan.images - plan.frames.size());
   log.begun(plan.frames.size(), fields);
 }
 

@@ -9,7 +9,6 @@
 #include <filesystem>
 #include <fstream>
 #include <new>
-#include <nlohmann/json.hpp>
 #include <system_error>
 #include <utility>
 
@@ -58,41 +57,36 @@ RunLog::RunLog(const std::string& target) {
   out_ = file_.get();
 }
 
-void RunLog::begun(std::size_t frames, const Json& run) {
+void RunLog::begun(std::size_t frames, const LogFields& run) {
   const std::lock_guard lock(mutex_);
   frames_ = frames;
   write("begin", run);
 }
 
-void RunLog::frame_done(const Json& frame) {
+void RunLog::frame_done(LogFields frame) {
   const std::lock_guard lock(mutex_);
-  Json fields = frame;
-  fields["done"] = ++done_;
-  fields["frames"] = frames_;
-  write("frame", fields);
+  frame.add("done", ++done_);
+  frame.add("frames", frames_);
+  write("frame", frame);
 }
 
 void RunLog::ended(std::string_view how, const std::string& message) {
   const std::lock_guard lock(mutex_);
-  Json fields = Json::object();
-  if (!message.empty()) fields["message"] = message;
-  fields["done"] = done_;
-  fields["frames"] = frames_;
-  fields["elapsed_s"] = log_seconds(std::chrono::steady_clock::now() - begin_);
+  LogFields fields;
+  if (!message.empty()) fields.add("message", message);
+  fields.add("done", done_);
+  fields.add("frames", frames_);
+  fields.add("elapsed_s", log_seconds(std::chrono::steady_clock::now() - begin_));
   write(how, fields);
 }
 
-void RunLog::write(std::string_view event, const Json& fields) {
+void RunLog::write(std::string_view event, const LogFields& fields) {
   if (out_ == nullptr) return;
   const auto now = std::chrono::floor<std::chrono::milliseconds>(std::chrono::system_clock::now());
   const auto second = std::chrono::floor<std::chrono::seconds>(now);
-  Json object{
-      {"event", event},
-      {"time", fmt::format("{:%FT%T}.{:03}Z", fmt::gmtime(second.time_since_epoch().count()),
-                           (now - second).count())}};
-  object.update(fields);
-  // Names of files may have any bytes: invalid UTF-8 is replaced.
-  const std::string line = object.dump(-1, ' ', false, Json::error_handler_t::replace) + "\n";
+  const std::string line = fmt::format("{{\"event\":\"{}\",\"time\":\"{:%FT%T}.{:03}Z\"{}}}\n",
+                                       event, fmt::gmtime(second.time_since_epoch().count()),
+                                       (now - second).count(), fields.text());
   std::fwrite(line.data(), 1, line.size(), out_);
   if (std::fflush(out_) != 0 && !std::exchange(has_failed_, true) && out_ != stdout)
     print_error("groundray: the log cannot be written: {}\n",

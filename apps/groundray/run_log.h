@@ -1,10 +1,12 @@
 #pragma once
 
+#include <fmt/format.h>
+
 #include <chrono>
 #include <cstddef>
 #include <cstdio>
 #include <mutex>
-#include <nlohmann/json_fwd.hpp>
+#include <nlohmann/json.hpp>
 #include <string>
 #include <string_view>
 
@@ -12,13 +14,29 @@
 
 namespace groundray {
 
+/// Fields of a line of a log. They are kept as text, because the destructors of JSON's containers
+/// allocate, which ends the program if there is not enough memory.
+class LogFields {
+ public:
+  /// Adds a number or a text, whose bytes that are not UTF-8 are replaced.
+  template <typename Value>
+  void add(std::string_view key, const Value& value) {
+    using Json = nlohmann::json;
+    text_ += fmt::format(",\"{}\":{}", key,
+                         Json(value).dump(-1, ' ', false, Json::error_handler_t::replace));
+  }
+  /// Returns `,"key":value` for each field.
+  const std::string& text() const noexcept { return text_; }
+
+ private:
+  std::string text_;
+};
+
 /// Log of a run for programs: one JSON object per line (docs/reference/runs.md). Any number of
 /// threads may use it. Errors of the file after it was opened are ignored, because the run is more
 /// important.
 class RunLog {
  public:
-  using Json = nlohmann::ordered_json;
-
   /// @param target  file to append to, "-" for standard output, or empty for no log.
   /// @throws Error if the file cannot be written, is a pipe without a reader, or has other content.
   explicit RunLog(const std::string& target);
@@ -29,15 +47,15 @@ class RunLog {
   /// Records the start of a run.
   /// @param frames  number of frames to be made.
   /// @param run     more about it.
-  void begun(std::size_t frames, const Json& run);
+  void begun(std::size_t frames, const LogFields& run);
   /// Records a frame that has been written.
-  void frame_done(const Json& frame);
+  void frame_done(LogFields frame);
   /// @param how      "end", "interrupted" or "failed".
   /// @param message  text for the user, or empty.
   void ended(std::string_view how, const std::string& message);
 
  private:
-  void write(std::string_view event, const Json& fields);
+  void write(std::string_view event, const LogFields& fields);
 
   OwnedFile file_;
   std::FILE* out_ = nullptr;
