@@ -332,6 +332,13 @@ TEST(OpenCl, FindsFaultsOfKernels) {
     } catch (const testing::NoDevice& reason) {
       GTEST_SKIP() << reason.what();
     }
+    const std::string name = folder.path().filename();
+    ++faults;
+    // Only what a fault can change: compiling the other kernels takes seconds.
+    if (name == "contraction" || name == "hits_from_below" || name == "single_precision_of_rays") {
+      EXPECT_NE(difference_on(*device, arrays, shots.back()), "") << name;
+      continue;
+    }
     const MeshBound bound = bounds_of(floats).back();
     std::string found = difference_on(*device, arrays, floats, results_for(bound, 2));
     for (const std::vector<MeshBound>& bounds : {ties.tolerances, ties.angles}) {
@@ -340,10 +347,8 @@ TEST(OpenCl, FindsFaultsOfKernels) {
     }
     if (found.empty())
       found = difference_on(*device, arrays, floats, results_for_windows(bound, 2));
-    if (found.empty()) found = difference_on(*device, arrays, shots.back());
-    EXPECT_NE(found, "") << folder.path().filename();
-    fmt::print("{}: {}\n", folder.path().filename().string(), found);
-    ++faults;
+    EXPECT_NE(found, "") << name;
+    fmt::print("{}: {}\n", name, found);
   }
   EXPECT_EQ(faults, 9u);
 }
