@@ -33,8 +33,8 @@ class LogFields {
 };
 
 /// Log of a run for programs: one JSON object per line (docs/reference/runs.md). Any number of
-/// threads may use it. Errors of the file after it was opened are ignored, because the run is more
-/// important.
+/// threads may use it. The run goes on if the file cannot be written later, which is reported
+/// once.
 class RunLog {
  public:
   /// @param target  file to append to, "-" for standard output, or empty for no log.

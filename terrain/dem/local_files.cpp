@@ -8,7 +8,7 @@
 namespace groundray {
 namespace {
 
-// GDAL's own file system, but for what is no regular file.
+// GDAL's own file system, restricted to regular files.
 class RegularFiles final : public VSIFilesystemHandler {
  public:
   explicit RegularFiles(VSIFilesystemHandler& all) : all_(all) {}

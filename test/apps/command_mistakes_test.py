@@ -187,6 +187,15 @@ USAGE = [
         "groundray-golden passes hills.tif -o out --block-cells 7",
         ("block_cells = 7 must be a power of two from 2 to 64",),
     ),
+    Mistake(
+        "a DEM without triangles",
+        "groundray-golden passes thin.asc -o out",
+        ("thin.asc: no three heights of any cell form a triangle",),
+        files={
+            "thin.asc": "ncols 3\nnrows 3\nxllcorner 0\nyllcorner 0\ncellsize 1\n"
+            "NODATA_value -1\n5 -1 -1\n-1 -1 -1\n-1 -1 5\n"
+        },
+    ),
 ]
 
 OUTPUTS = [

@@ -314,6 +314,13 @@ subClass="VRTRawRasterBand"><SourceFilename relativeToVRT="1">secret.txt</Source
     assert "holes     0 samples" in result.stdout, result
 
 
+def test_filtered_sources_are_refused(tmp_path: Path) -> None:
+    """A kernel of any size would take any time."""
+    source = vrt(str(PRAIRIE)).replace("SimpleSource", "KernelFilteredSource")
+    (tmp_path / "dem.vrt").write_text(source)
+    refused(tmp_path / "dem.vrt", "has a KernelFilteredSource; only mosaics and warps of files")
+
+
 def test_a_raster_beyond_the_memory_is_refused(tmp_path: Path) -> None:
     """A file of 200 bytes that declares 8 GiB of heights is refused before they are allocated."""
     path = tmp_path / "dem.vrt"

@@ -146,6 +146,18 @@ def test_a_truncated_record_is_detected(whole, tmp_path):
         faulty(copy, "dataset.yaml")
 
 
+@pytest.mark.parametrize("path", ["x0", "calibration/../x"])
+def test_a_listed_file_that_no_run_has_is_detected(whole, tmp_path, path):
+    """Even if the record's own checksum fits."""
+    copy = tmp_path / "copy"
+    shutil.copytree(whole, copy)
+    above, _ = (whole / "dataset.yaml").read_text().rsplit("sha256_above", 1)
+    above += f'  - {{path: "{path}", bytes: 1, sha256: "{"0" * 64}"}}\n'
+    own = hashlib.sha256(above.encode()).hexdigest()
+    (copy / "dataset.yaml").write_text(f'{above}sha256_above: "{own}"\n')
+    faulty(copy, "dataset.yaml")
+
+
 def test_an_incomplete_run_is_reported(whole, tmp_path):
     copy = tmp_path / "copy"
     shutil.copytree(whole, copy)

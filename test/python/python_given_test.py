@@ -234,3 +234,10 @@ def test_masked_values_are_rejected_elsewhere():
     assert np.allclose(terrain.cast_rays(origins_m, down)["range_true_m"], [5, 6])
     with pytest.raises(groundray.Error, match="an array has masked values"):
         groundray.Mesh(CORNERS, np.ma.array([[0, 1, 2], [0, 2, 3]], mask=[[0, 0, 0], [1, 0, 0]]))
+
+
+def test_names_in_messages_do_not_control_the_terminal(tmp_path):
+    with pytest.raises(groundray.Error) as fault:
+        groundray.load_points(tmp_path / "a\x1b[2J.ply")
+    assert "a\\x1b[2J.ply" in str(fault.value)
+    assert "\x1b" not in str(fault.value)

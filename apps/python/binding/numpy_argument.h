@@ -90,7 +90,7 @@ struct type_caster<groundray::python::NumpyArgument<Array>> {
 
   bool from_python(handle source, std::uint8_t flags, cleanup_list* cleanup) noexcept {
     try {
-      const object given = whole(source);
+      const object given = unlisted(source);
       if (!is_masked(given)) return read(source, flags, cleanup);
       const object any = module_::import_("numpy").attr("any")(given.attr("mask"));
       if (PyObject_IsTrue(any.ptr()) == 0) return read(given.attr("data"), flags, cleanup);
@@ -113,7 +113,7 @@ struct type_caster<groundray::python::NumpyArgument<Array>> {
   }
 
   // Returns the array of a list of masked arrays; anything else as it is.
-  static object whole(handle source) {
+  static object unlisted(handle source) {
     if (isinstance<nanobind::list>(source) || isinstance<nanobind::tuple>(source)) {
       for (const handle each : source) {
         if (is_masked(each)) return module_::import_("numpy").attr("ma").attr("array")(source);

@@ -18,8 +18,9 @@ using BoundaryLoop = std::vector<SurfaceMesh::HalfedgeHandle>;
 /// Returns the vertices at which the half-edges of a loop begin.
 std::vector<std::uint32_t> vertices_of(const SurfaceMesh& surface, const BoundaryLoop& loop);
 
-/// Sets the successor of a boundary half-edge: another that begins where it ends. Their former
-/// neighbours become neighbours of each other, so that all boundaries stay closed.
+/// Makes `next` the successor of a boundary half-edge; it must begin where that one ends. The
+/// former successor of the one and predecessor of the other become neighbours, so that all
+/// boundaries stay closed.
 void link(SurfaceMesh& surface, SurfaceMesh::HalfedgeHandle half_edge,
           SurfaceMesh::HalfedgeHandle next);
 

@@ -247,8 +247,8 @@ bool VerticalRules::keeps_samples(const Star& star) {
   return true;
 }
 
-// Returns true if the edges that appear may: those from the tip to the ring, but for its neighbours
-// on the ring, and the boundary's.
+// Returns true if may_join_ permits each edge that the collapse adds: from the tip to all vertices
+// of the ring that are not next to it, and one along an open boundary.
 bool VerticalRules::may_have_edges(const Star& star, std::size_t to) const {
   if (!may_join_) return true;
   const auto joins = [&](std::uint32_t vertex) { return may_join_(star.ring[to], vertex); };
