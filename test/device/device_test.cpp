@@ -232,7 +232,8 @@ struct Ties {
     for (std::size_t level = 0; level < levels.size(); ++level) {
       const NodeLevel& nodes = levels[level];
       const glm::ivec2 node = nodes.size / 2;
-      const auto at = static_cast<std::size_t>(node.y * nodes.size.x + node.x);
+      const auto row = static_cast<std::size_t>(node.y), column = static_cast<std::size_t>(node.x);
+      const std::size_t at = row * static_cast<std::size_t>(nodes.size.x) + column;
       const double key_m = nodes.key_m[at];
       if (!(key_m > 0)) continue;
       tolerances.push_back(any);
