@@ -4,9 +4,9 @@
 
 FOLDERS lists, for each folder of a library, the folders whose headers it may include besides its
 own; an entry that nothing uses is an error. LIBRARIES lists where the headers of other libraries
-may be included, CALLS where files may be opened. IN_PASSES lists what passes, which run on devices,
-may include. Public headers include only the standard library, GLM and {fmt}; PRIVATE lists the
-headers that may include more. Run at the root of the tree.
+may be included, CALLS and PYTHON_CALLS where files may be opened. IN_PASSES lists what passes,
+which run on devices, may include. Public headers include only the standard library, GLM and {fmt};
+PRIVATE lists the headers that may include more. Run at the root of the tree.
 """
 
 import re
@@ -90,8 +90,16 @@ LIBRARIES = {
 CALLS = {
     r"\bf(re)?open\(|\bcreat\(": r"core/io/open_file\.cpp",
     r"std::[io]?fstream( \w+)?[({]|\.open\([^)]*std::ios": r"core/io/open_file\.(h|cpp)",
+    r"GDALDataset::Open|GDALOpen|VSIFOpen": r"terrain/dem/raster_input\.cpp",
+    r"CreateCopy\(": r"terrain/dem/layers_io\.cpp",
     r"\bO_CREAT\b": r"core/io/open_file\.cpp|apps/groundray/(result_files|run_log)\.cpp"
     r"|apps/golden/suite/suite\.cpp",
+}
+
+# The Python package reads files by dataset.py; exports write into a folder that they have made.
+PYTHON_CALLS = {
+    r"\b(?<!\.)open\(|\.read_(text|bytes)\(|np\.(load|fromfile)\(": "dataset.py",
+    r"\.open\(": "export/las.py export/mcap_file.py export/images.py dataset.py",
 }
 
 # The passes also run on devices, for which only these headers exist.
@@ -104,6 +112,7 @@ IN_PASSES = re.compile(
 IN_HEADERS = re.compile(r"glm/.*|fmt/.*|[a-z0-9_]+")
 PRIVATE = (
     "apps/scan/word_option.h",
+    "core/io/json_fault.h",
     "core/tracing/embree_adapter.h",
     "reconstruction/mesh/simplify/edge_collapse.h",
     "reconstruction/mesh/surface_cgal.h",
@@ -160,12 +169,25 @@ def faults_of(path: Path, used: set[tuple[str, str]]) -> list[str]:
     return faults
 
 
+def faults_of_python(path: Path, package: Path) -> list[str]:
+    text, name = path.read_text(), str(path.relative_to(package))
+    return [
+        f"{path}:{text.count(chr(10), 0, call.start()) + 1}: {call[0]}: read files by dataset.py"
+        for pattern, places in PYTHON_CALLS.items()
+        for call in re.finditer(pattern, text)
+        if name not in places.split()
+    ]
+
+
 def main() -> int:
     used: set[tuple[str, str]] = set()
     faults = []
     for root in ROOTS:
         for path in sorted([*Path(root).rglob("*.h"), *Path(root).rglob("*.cpp")]):
             faults += faults_of(path, used)
+    package = Path("apps/python/groundray")
+    for path in sorted(package.rglob("*.py")):
+        faults += faults_of_python(path, package)
     for folder, others in FOLDERS.items():
         faults += [
             f"{__file__}: FOLDERS: {folder} no longer includes {other}: delete it there"

@@ -2,7 +2,16 @@
 
 #include <fmt/ranges.h>
 
+#include <string_view>
+
 namespace groundray {
+
+std::string Error::without_nul(std::string message) {
+  constexpr std::string_view shown = "\\x00";
+  for (auto at = message.find('\0'); at != std::string::npos; at = message.find('\0', at))
+    message.replace(at, 1, shown);
+  return message;
+}
 
 void Violations::throw_if_any() const {
   if (faults_.empty()) return;

@@ -19,7 +19,11 @@ class Error : public std::runtime_error {
   template <typename... Args>
     requires(sizeof...(Args) > 0)
   explicit Error(fmt::format_string<Args...> format, Args&&... args)
-      : std::runtime_error(fmt::format(format, std::forward<Args>(args)...)) {}
+      : std::runtime_error(without_nul(fmt::format(format, std::forward<Args>(args)...))) {}
+
+ private:
+  /// Returns the message with `\x00` for each NUL, at which what() would end.
+  static std::string without_nul(std::string message);
 };
 
 /// Collects all broken rules of one subject, so that the user sees them at once.

@@ -254,11 +254,18 @@ std::optional<std::string> DatasetSummary::stem_of(const FrameEntry& entry) cons
 }
 
 void DatasetSummary::add(const FrameEntry& entry) {
-  ++done;
   const auto number = number_of(entry.sensor);
   if (!number) return;
-  ++sensors[*number].done;
-  for (const ProductSum& file : entry.files) sensors[*number].bytes += file.sum.bytes;
+  Sensor& sensor = sensors[*number];
+  if (entry.frame < 0 || entry.frame >= sensor.frames) return;
+  if (shard && !shard->has(static_cast<std::uint32_t>(*number), entry.frame, sensor.frames)) return;
+  const auto frame = static_cast<std::size_t>(entry.frame);
+  if (sensor.counted.size() <= frame) sensor.counted.resize(frame + 1);
+  if (sensor.counted[frame]) return;
+  sensor.counted[frame] = true;
+  ++done;
+  ++sensor.done;
+  for (const ProductSum& file : entry.files) sensor.bytes += file.sum.bytes;
 }
 
 DatasetSummary read_summary(const fs::path& folder) {

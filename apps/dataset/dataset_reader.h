@@ -118,7 +118,8 @@ struct DatasetSummary {
     std::int64_t frames = 0;        ///< number of frames of the whole run
     std::size_t asked_for = 0;      ///< number of frames of the shard, or of the whole run
     std::size_t done = 0;
-    std::uint64_t bytes = 0;  ///< size of its frames' files
+    std::uint64_t bytes = 0;    ///< size of its frames' files
+    std::vector<bool> counted;  ///< by frame
   };
   std::string version;
   std::uint64_t seed = 0;
@@ -131,7 +132,7 @@ struct DatasetSummary {
   /// Returns the common beginning of the paths of a frame's files, relative to the dataset; nothing
   /// for an unknown sensor.
   std::optional<std::string> stem_of(const FrameEntry& entry) const;
-  /// Counts a finished frame.
+  /// Counts a finished frame, once; nothing that is not a frame of one of the sensors.
   void add(const FrameEntry& entry);
 };
 

@@ -86,9 +86,9 @@ DatasetText::DatasetText(const fs::path& folder)
           "{}: a file, but a dataset is a folder: give the folder that `groundray generate` "
           "wrote",
           folder.string());
-    throw Error(
-        "{}: the folder contains no readable {} ({}): was it written by `groundray generate`?",
-        folder.string(), dataset_file, std::generic_category().message(why));
+    if (why != ENOENT) throw Error("{}: {}", path_.string(), why_not_read(path_, why));
+    throw Error("{}: the folder contains no {}: was it written by `groundray generate`?",
+                folder.string(), dataset_file);
   }
   while (const auto line = next_line()) {
     sum_.add(*line + "\n");

@@ -320,7 +320,9 @@ FrameRange parse_frames(std::string_view text, std::string_view option) {
   }
   if (text.empty()) fail();
   if (count == 0) range.end = range.first + 1;
-  if (range.step == 0 || range.first >= range.end) fail();
+  if (range.step == 0) fail();
+  if (range.first >= range.end)
+    throw Error("{}: '{}' has no frame: in A:B:STEP, A must be less than B", option, text);
   return range;
 }
 

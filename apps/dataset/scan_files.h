@@ -1,5 +1,7 @@
 #pragma once
 
+#include <fmt/format.h>
+
 #include <chrono>
 #include <cstddef>
 #include <filesystem>
@@ -67,6 +69,11 @@ struct ScanFile {
   double range_noise_sigma_m = 0;  ///< used if the scan itself has none
   bool is_range_grid = false;      ///< true for Stanford's range grids, with beams along z
 };
+
+/// Returns the first of several names, and how many there are besides.
+inline std::string first_and_count(std::string_view first, std::size_t count) {
+  return count > 1 ? fmt::format("{} and {} more", first, count - 1) : std::string(first);
+}
 
 /// Scans of a run.
 struct ScanFiles {

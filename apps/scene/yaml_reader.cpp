@@ -7,6 +7,7 @@
 
 #include <algorithm>
 #include <array>
+#include <cerrno>
 #include <charconv>
 #include <cmath>
 #include <fstream>
@@ -105,9 +106,11 @@ bool is_scalar(const Node& node) {
 // Returns a text as shown in messages: short, and on one line.
 std::string excerpt(std::string_view text) {
   constexpr std::size_t longest = 40;
-  std::string shown(text.substr(0, longest));
-  std::ranges::replace_if(
-      shown, [](unsigned char c) { return c < ' ' || c == 127; }, '?');
+  std::string shown;
+  for (const char c : text.substr(0, longest)) {
+    const bool is_control = (c >= 0 && c < ' ') || c == '\x7f';
+    shown += is_control ? fmt::format("\\x{:02x}", c) : std::string(1, c);
+  }
   return shown + (text.size() > longest ? "..." : "");
 }
 
@@ -152,8 +155,9 @@ std::string read_file(const std::filesystem::path& path) {
     throw Error("{}: larger than the limit of 16 MiB for a YAML file", path.string());
   }
   std::ifstream file = open_stream(path);
+  if (!file) throw Error("{}: {}", path.string(), why_not_read(path, errno));
   std::string text{std::istreambuf_iterator<char>(file), {}};
-  if (!file) throw Error("{}: cannot be read; check its permissions", path.string());
+  if (!file) throw Error("{}: {}", path.string(), why_not_read(path, EIO));
   return text;
 }
 
@@ -179,7 +183,7 @@ Node parse(const std::string& text, const std::filesystem::path& path) {
 }
 
 std::string shown(const Node& node) {
-  if (node.kind == Node::Kind::Null) return "empty";
+  if (node.kind == Node::Kind::Null || (is_scalar(node) && node.text.empty())) return "empty";
   if (node.kind == Node::Kind::List) return fmt::format("a list of {}", node.items.size());
   if (node.kind == Node::Kind::Map) return "a map";
   return fmt::format("'{}'", excerpt(node.text));
@@ -239,9 +243,11 @@ bool numbers(const Node& node, std::string_view key, std::span<double> into, Rul
 }
 
 bool is_text(const Node& node, std::string_view key, Faults& faults) {
-  const bool text = is_scalar(node) && !node.text.empty();
-  if (!text) faults.add(node, key, "is {}, but must be a text", shown(node));
-  return text;
+  const bool has_nul = is_scalar(node) && node.text.find('\0') != std::string::npos;
+  if (has_nul) faults.add(node, key, "{} has a NUL character (\\0): remove it", shown(node));
+  if (!is_scalar(node) || node.text.empty())
+    faults.add(node, key, "is {}, but must be a text", shown(node));
+  return is_scalar(node) && !node.text.empty() && !has_nul;
 }
 
 Map::Map(const Node& node, std::string_view key, Faults& faults) : node_(node), faults_(faults) {

@@ -21,11 +21,20 @@ OwnedFile try_to_open(const std::filesystem::path& path) {
   const int descriptor = open(path.c_str(), O_RDONLY | O_NONBLOCK | O_NOCTTY | O_CLOEXEC);
   if (descriptor < 0) return {};
   struct stat status {};
-  if (fstat(descriptor, &status) == 0 && S_ISREG(status.st_mode))
-    return OwnedFile(fdopen(descriptor, "rb"));
+  OwnedFile file;
+  int fault = ESPIPE;
+  if (fstat(descriptor, &status) != 0) {
+    fault = errno;
+  } else if (S_ISDIR(status.st_mode)) {
+    fault = EISDIR;
+  } else if (S_ISREG(status.st_mode)) {
+    file.reset(fdopen(descriptor, "rb"));
+    if (file) return file;
+    fault = errno;
+  }
   close(descriptor);
-  errno = S_ISDIR(status.st_mode) ? EISDIR : ESPIPE;
-  return {};
+  errno = fault;
+  return file;
 }
 
 }  // namespace
@@ -45,12 +54,14 @@ int create_file(const std::filesystem::path& path) {
 OwnedFile open_file(const std::filesystem::path& path) {
   OwnedFile file = try_to_open(path);
   if (file) return file;
-  const int fault = errno;
-  if (fault == ENOENT || fault == ENOTDIR || fault == EISDIR)
-    throw Error("{}: {}", path.string(), why_no_file(path));
-  throw Error("{}: cannot be read: {}; check its permissions", path.string(),
-              fault == ESPIPE ? "it is a pipe or device, not a file"
-                              : std::generic_category().message(fault));
+  throw Error("{}: {}", path.string(), why_not_read(path, errno));
+}
+
+std::string why_not_read(const std::filesystem::path& path, int fault) {
+  if (fault == ENOENT || fault == ENOTDIR || fault == EISDIR) return why_no_file(path);
+  if (fault == ESPIPE) return "it is a pipe or device, but must be a file";
+  return fmt::format("it cannot be read: {}; check its permissions",
+                     std::generic_category().message(fault));
 }
 
 std::ifstream open_stream(const std::filesystem::path& path) {

@@ -28,8 +28,11 @@ int create_file(const std::filesystem::path& path);
 OwnedFile open_file(const std::filesystem::path& path);
 
 /// Opens a regular file as a binary stream. For anything else, the stream has failed, and errno
-/// says why.
+/// says why: EISDIR for a folder, ESPIPE for a pipe, socket or device.
 std::ifstream open_stream(const std::filesystem::path& path);
+
+/// Returns in words why a file cannot be read, from the errno of the functions above.
+std::string why_not_read(const std::filesystem::path& path, int fault);
 
 /// Reads a line, without its end, as std::getline does; but a line of more than 64 MiB, as in a
 /// file without line ends, ends the reading.

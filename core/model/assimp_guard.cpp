@@ -12,6 +12,7 @@
 #include <vector>
 
 #include "core/error.h"
+#include "core/io/json_fault.h"
 #include "core/io/memory.h"
 #include "core/model/polygon_soup.h"
 
@@ -236,6 +237,20 @@ std::vector<double> elements_of_meshes(const json& gltf) {
   return sums;
 }
 
+/// Checks a node's placement, of which assimp reads as many numbers as it needs.
+void check_placement(const json& node, std::size_t number) {
+  for (const auto& [key, count] : {std::pair("matrix", 16U), std::pair("translation", 3U),
+                                   std::pair("rotation", 4U), std::pair("scale", 3U)}) {
+    const auto found = node.find(key);
+    if (found == node.end()) continue;
+    const bool is_sound = found->is_array() && found->size() == count &&
+                          std::ranges::all_of(*found, [](const json& value) {
+                            return value.is_number() && std::isfinite(value.get<float>());
+                          });
+    if (!is_sound) throw Error("node {}: its {} must be {} finite numbers", number, key, count);
+  }
+}
+
 /// Checks the nodes, and returns the number of elements of all meshes and their instances.
 double check_nodes(const json& gltf) {
   const json none = json::array();
@@ -243,6 +258,7 @@ double check_nodes(const json& gltf) {
   const std::vector<double> meshes = elements_of_meshes(gltf);
   std::vector<Node> nodes;
   for (const json& from : list) {
+    check_placement(from, nodes.size());
     Node& node = nodes.emplace_back();
     if (from.contains("mesh")) {
       const auto mesh = whole(from["mesh"]);
@@ -339,13 +355,8 @@ CheckedGltf check_gltf(std::string_view bytes, const std::filesystem::path& path
     strip(gltf);
     checked.is_binary = !chunk.empty();
     checked.bytes = file_of(gltf, chunk);
-  } catch (const json::parse_error& fault) {
-    throw Error("{}: it is not glTF: its JSON is invalid at byte {}; was the file cut short?",
-                path.string(), fault.byte);
   } catch (const json::exception& fault) {
-    std::string_view why = fault.what();  // begins with the exception's name in brackets
-    why.remove_prefix(why.find(' ') + 1);
-    throw Error("{}: it is not valid glTF: {}", path.string(), why);
+    throw Error("{}: it is not valid glTF: {}", path.string(), words_of(fault));
   } catch (const Error& fault) {
     throw Error("{}: {}", path.string(), fault.what());
   }

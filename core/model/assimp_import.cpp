@@ -259,6 +259,18 @@ class FilesBeside : public Assimp::IOSystem {
   std::string name_, bytes_;
 };
 
+/// Returns the first sentence of assimp's reason, without its marks of a format and its name for
+/// the file.
+std::string words_of_assimp(std::string why) {
+  for (const std::string_view mark : {"GLTF: ", "STL: "})
+    if (why.starts_with(mark)) why.erase(0, mark.size());
+  if (const auto at = why.find(" for model."); at != std::string::npos) why.resize(at);
+  for (char& c : why)
+    if (static_cast<unsigned char>(c) < ' ') c = ' ';
+  while (why.ends_with('.')) why.pop_back();
+  return why;
+}
+
 /// Reads a file of which assimp gets `bytes`.
 PolygonSoup read_scene(const std::filesystem::path& path, Form form, std::string_view ending,
                        std::string bytes) {
@@ -269,7 +281,11 @@ PolygonSoup read_scene(const std::filesystem::path& path, Form form, std::string
     const std::string inner = fmt::format("model{}", ending);
     importer.SetIOHandler(new FilesBeside(path.parent_path(), inner, std::move(bytes)));
     const aiScene* const scene = importer.ReadFile(inner, 0);
-    if (scene == nullptr) throw Error("{}: {}", name, importer.GetErrorString());
+    if (scene == nullptr) {
+      throw Error("{}: {} cannot be read: {}; was the file cut short?", name,
+                  form == Form::Stl ? "its STL" : "its glTF",
+                  words_of_assimp(importer.GetErrorString()));
+    }
     return SceneReader(*scene, form, name).read();
   } catch (const Error&) {
     throw;
@@ -282,8 +298,8 @@ PolygonSoup read_scene(const std::filesystem::path& path, Form form, std::string
 
 }  // namespace
 
-PolygonSoup read_stl(const std::filesystem::path& path) {
-  return read_scene(path, Form::Stl, ".stl", read_text(path));
+PolygonSoup read_stl(const std::filesystem::path& path, std::string bytes) {
+  return read_scene(path, Form::Stl, ".stl", std::move(bytes));
 }
 
 PolygonSoup read_gltf(const std::filesystem::path& path, std::string_view bytes) {

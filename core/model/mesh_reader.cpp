@@ -3,7 +3,6 @@
 #include <algorithm>
 #include <cmath>
 #include <cstdint>
-#include <fstream>
 #include <nlohmann/json.hpp>
 #include <string>
 #include <string_view>
@@ -12,8 +11,8 @@
 #include "core/error.h"
 #include "core/geometry/mesh.h"
 #include "core/io/file_io.h"
+#include "core/io/json_fault.h"
 #include "core/io/mesh_io.h"
-#include "core/io/open_file.h"
 #include "core/io/ply_io.h"
 #include "core/io/text_lines.h"
 #include "core/model/polygon_soup.h"
@@ -74,14 +73,12 @@ Georeference georeference_of(std::string_view text, std::string_view mark,
 
 /// Reads the georeference from the first 80 bytes: the header of a binary STL. A text STL has none
 /// there.
-Georeference stl_georeference(const fs::path& path) {
-  std::string header(80, ' ');
-  std::ifstream file = open_stream(path);
-  file.read(header.data(), static_cast<std::streamsize>(header.size()));
-  header.resize(std::min(header.find('\0'), header.size()));
+Georeference stl_georeference(const fs::path& path, std::string_view bytes) {
+  std::string_view header = bytes.substr(0, 80);
+  header = header.substr(0, header.find('\0'));
   Georeference georeference;
   try {
-    if (file && header.starts_with("origin_w ")) read_comment(header, georeference);
+    if (header.starts_with("origin_w ")) read_comment(header, georeference);
   } catch (const Error& fault) {
     throw Error("{}: the header: {}", path.string(), fault.what());
   }
@@ -121,7 +118,7 @@ MeshReading read_gltf_mesh(const fs::path& path) {
   try {
     reading.georeference = gltf_georeference(bytes);
   } catch (const json::exception& fault) {
-    throw Error("{}: the scene's extras: {}", path.string(), fault.what());
+    throw Error("{}: the scene's extras: {}", path.string(), words_of(fault));
   } catch (const Error& fault) {
     throw Error("{}: the scene's extras: {}", path.string(), fault.what());
   }
@@ -131,7 +128,11 @@ MeshReading read_gltf_mesh(const fs::path& path) {
 MeshReading read_mesh_file(const fs::path& path) {
   const std::string form = file_ending(path);
   if (form == ".gltf" || form == ".glb") return read_gltf_mesh(path);
-  if (form == ".stl") return {.soup = read_stl(path), .georeference = stl_georeference(path)};
+  if (form == ".stl") {
+    std::string bytes = read_text(path);
+    Georeference georeference = stl_georeference(path, bytes);
+    return {.soup = read_stl(path, std::move(bytes)), .georeference = std::move(georeference)};
+  }
   if (form == ".ply") {
     const std::string bytes = read_text(path);
     return {parse_ply_faces(bytes, path.string()),

@@ -106,7 +106,7 @@ ModelReading read_model_file(const fs::path& path) {
   const std::string ending = file_ending(path);
   if (ending == ".obj") return read_obj(path);
   if (ending == ".ply") return {.soup = parse_ply_faces(read_text(path), path.string())};
-  if (ending == ".stl") return {.soup = read_stl(path)};
+  if (ending == ".stl") return {.soup = read_stl(path, read_text(path))};
   if (ending == ".gltf" || ending == ".glb")
     return {.soup = read_gltf(path, read_text(path)), .up = UpAxis::Y};
   if (ending == ".dae") {

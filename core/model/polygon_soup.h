@@ -78,8 +78,9 @@ PolygonSoup parse_obj(std::string_view text, const std::string& name,
 PolygonSoup parse_ply_faces(std::string_view bytes, const std::string& name);
 
 /// Reads the triangles of a .stl through assimp.
+/// @param bytes  of the file.
 /// @throws Error if assimp cannot read the file.
-PolygonSoup read_stl(const std::filesystem::path& path);
+PolygonSoup read_stl(const std::filesystem::path& path, std::string bytes);
 
 /// Reads the polygons of a .gltf or .glb through assimp, in the file's axes, after check_gltf.
 /// Transforms of nodes are applied in double. assimp omits triangles whose indices are out of range

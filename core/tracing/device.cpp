@@ -4,6 +4,8 @@
 #include <tbb/parallel_for.h>
 #include <tbb/task_group.h>
 
+#include <new>
+
 #include "core/error.h"
 
 namespace groundray {
@@ -20,8 +22,10 @@ int native_width(RTCDevice device) {
 RayDevice::RayDevice(const std::string& config) {
   auto impl = std::make_shared<Impl>();
   impl->device = rtcNewDevice(config.c_str());
-  if (impl->device == nullptr)
+  if (impl->device == nullptr) {
+    if (rtcGetDeviceError(nullptr) == RTC_ERROR_OUT_OF_MEMORY) throw std::bad_alloc();
     throw Error("ray tracer: Embree cannot create a device with the settings '{}'", config);
+  }
   rtcSetDeviceMemoryMonitorFunction(
       impl->device,
       [](void* counter, ssize_t bytes, bool) {

@@ -6,6 +6,7 @@
 #include <limits>
 
 #include "core/error.h"
+#include "core/io/memory.h"
 
 namespace groundray {
 namespace {
@@ -136,6 +137,15 @@ void refuse_faults(const GridFrame& frame) {
 DemLayers unknown_layers(const GridFrame& frame) {
   const std::size_t count =
       static_cast<std::size_t>(frame.samples.x) * static_cast<std::size_t>(frame.samples.y);
+  constexpr std::size_t bytes_per_sample =
+      9 * sizeof(float) + 2 * sizeof(std::uint32_t) + sizeof(std::uint16_t) + sizeof(HeightSource);
+  const double bytes = static_cast<double>(count) * bytes_per_sample;
+  if (const double available = available_memory_bytes(); bytes > available) {
+    throw Error(
+        "a DEM of {} x {} samples takes {:.1f} GiB of memory, but {:.1f} GiB are available; choose "
+        "larger cells or a smaller area",
+        frame.samples.x, frame.samples.y, bytes / 0x1p30, available / 0x1p30);
+  }
   const std::vector<float> none(count, std::numeric_limits<float>::quiet_NaN());
   return {.frame = frame,
           .elevation_m = none,

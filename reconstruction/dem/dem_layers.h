@@ -54,6 +54,7 @@ struct DemLayers {
 };
 
 /// Returns layers without any information: no sample has a source, and all else is 0 or NaN.
+/// @throws Error if they exceed the available memory.
 DemLayers unknown_layers(const GridFrame& frame);
 
 /// Returns 1 for each value that meets a condition, else 0.

@@ -67,11 +67,13 @@ void check_lidar(const LidarSpec& spec) {
   broken.unless(gate.near_m >= 0 && gate.near_m < gate.far_m,
                 "range gate [{}, {}] m is empty or begins below 0: are near and far swapped?",
                 gate.near_m, gate.far_m);
-  broken.unless(spec.range_noise_sigma_m >= 0 && std::isfinite(spec.range_noise_sigma_m),
-                "range noise of {} m must be finite and not negative", spec.range_noise_sigma_m);
-  broken.unless(spec.angular_jitter_rad >= 0 && std::isfinite(spec.angular_jitter_rad),
-                "angular jitter of {} rad must be finite and not negative",
-                spec.angular_jitter_rad);
+  constexpr double most_noise_m = 1000, most_jitter_rad = 1;  // far beyond any data sheet
+  broken.unless(spec.range_noise_sigma_m >= 0 && spec.range_noise_sigma_m <= most_noise_m,
+                "range noise of {} m must be from 0 to {} m", spec.range_noise_sigma_m,
+                most_noise_m);
+  broken.unless(spec.angular_jitter_rad >= 0 && spec.angular_jitter_rad <= most_jitter_rad,
+                "angular jitter of {} rad must be from 0 to {} rad", spec.angular_jitter_rad,
+                most_jitter_rad);
   broken.unless(spec.light || spec.beam.sub_rays == 1,
                 "beam: {} sub-rays need light: echoes are detected by their energy",
                 spec.beam.sub_rays);

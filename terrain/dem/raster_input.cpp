@@ -8,6 +8,7 @@
 
 #include <algorithm>
 #include <array>
+#include <cmath>
 #include <cstdlib>
 #include <exception>
 #include <memory>
@@ -128,19 +129,67 @@ void check_files_beside(GDALDataset& dataset, const std::string& file) {
   }
 }
 
-// GDAL takes what a raw file lacks for heights of 0.
-void check_raw_size(GDALDataset& dataset, const std::string& file) {
+double samples_of(GDALDataset& dataset) {
+  return 1.0 * dataset.GetRasterXSize() * dataset.GetRasterYSize();
+}
+
+// Returns the bytes of all bands, in whole blocks if `in_blocks`.
+double bytes_of(GDALDataset& dataset, bool in_blocks) {
+  GDALRasterBand& band = *dataset.GetRasterBand(1);
+  double samples = samples_of(dataset);
+  if (in_blocks) {
+    glm::ivec2 block;
+    band.GetBlockSize(&block.x, &block.y);
+    samples = std::ceil(1.0 * dataset.GetRasterXSize() / block.x) * block.x *
+              std::ceil(1.0 * dataset.GetRasterYSize() / block.y) * block.y;
+  }
+  return samples * dataset.GetRasterCount() * GDALGetDataTypeSizeBytes(band.GetRasterDataType());
+}
+
+// GDAL takes what a file of samples lacks for heights of 0.
+void check_raw_size(const std::string& file, double bytes) {
   constexpr std::string_view packed = "\x1f\x8b";
-  const GDALDataType type = dataset.GetRasterBand(1)->GetRasterDataType();
-  const double bytes = 1.0 * dataset.GetRasterXSize() * dataset.GetRasterYSize() *
-                       dataset.GetRasterCount() * GDALGetDataTypeSizeBytes(type);
   VSIStatBufL state;
   if (VSIStatL(file.c_str(), &state) != 0 || static_cast<double>(state.st_size) >= bytes) return;
   std::string begin(packed.size(), '\0');
   open_stream(file).read(begin.data(), static_cast<std::streamsize>(begin.size()));
   if (begin == packed) return;
-  throw Error("it has {} bytes, but its header declares {:.0f}; is it complete?", state.st_size,
-              bytes);
+  throw Error("its samples take {:.0f} bytes by its header, but {} has {}; is it complete?", bytes,
+              std::filesystem::path(file).filename().string(), state.st_size);
+}
+
+// Erdas Imagine keeps the samples of large rasters beside the .img, in an .ige, uncompressed.
+void check_spill_file(GDALDataset& dataset) {
+  const CPLStringList files(dataset.GetFileList());
+  for (int i = 0; i < files.size(); ++i) {
+    if (!std::string_view(files[i]).ends_with(".ige")) continue;
+    constexpr double header_bytes = 26;
+    check_raw_size(files[i], header_bytes + bytes_of(dataset, true));
+  }
+}
+
+// GDAL searches all lines for each row, and reads what they lack as holes.
+void check_lines(GDALDataset& dataset, const std::string& file) {
+  constexpr double most_samples_per_byte = 64;
+  VSIStatBufL state;
+  if (VSIStatL(file.c_str(), &state) != 0) return;
+  const double samples = samples_of(dataset);
+  if (samples <= most_samples_per_byte * static_cast<double>(state.st_size)) return;
+  throw Error(
+      "its {} bytes of text are {} x {} samples, nearly all of them missing; does a line lie far "
+      "from the others?",
+      state.st_size, dataset.GetRasterXSize(), dataset.GetRasterYSize());
+}
+
+// Returns why GDAL opened no raster, without what is meant for its developers.
+std::string why_not_opened(const std::string& name) {
+  std::string why = CPLGetLastErrorMsg();
+  if (why.find("VSIFReadL") != std::string::npos) return "it ends too early";
+  if (why.ends_with('.')) why.pop_back();
+  // GDAL begins with the file's name, sometimes twice; our messages begin with it, too.
+  while (why.starts_with(name + ":"))
+    why.erase(0, std::min(why.find_first_not_of(' ', name.size() + 1), why.size()));
+  return why;
 }
 
 }  // namespace
@@ -151,6 +200,7 @@ void register_drivers() {
   CPLSetConfigOption("GDAL_SKIP", "");  // or those that are needed may be missing
   GDALAllRegister();
   CPLSetConfigOption("GDAL_VRT_ENABLE_PYTHON", "NO");
+  CPLSetConfigOption("GDAL_ERROR_ON_LIBJPEG_WARNING", "YES");  // or cut files are read
   CPLSetConfigOption("CPL_VSIL_GZIP_WRITE_PROPERTIES", "NO");  // a file beside the archive
   if (!is_first) return;
   remove_drivers(drivers);
@@ -189,6 +239,14 @@ std::string checked_driver(const std::string& name) {
   const CPLStringList drivers = permitted_drivers();
   GDALDriverH driver = GDALIdentifyDriverEx(name.c_str(), GDAL_OF_RASTER, drivers.List(), nullptr);
   if (driver != nullptr) return GDALGetDriverShortName(driver);
+  const std::string ending = std::filesystem::path(name).extension().string();
+  for (const char* other : {".ply", ".pcd", ".las", ".laz", ".npy", ".npz", ".bin", ".e57", ".obj",
+                            ".stl", ".glb", ".gltf"}) {
+    if (ending != other) continue;
+    throw Error(
+        "it is no raster, but a mesh or points by its name; `groundray reconstruct dem` makes a "
+        "raster of scans");
+  }
   throw Error(
       "it cannot be opened as a raster: it is in none of the formats {}; is it complete? Convert "
       "other formats, or name their GDAL driver in {} if you trust the file:{}",
@@ -203,16 +261,14 @@ GDALDatasetUniquePtr open_input(const std::string& name) {
   GDALDatasetUniquePtr dataset(GDALDataset::Open(
       name.c_str(), GDAL_OF_RASTER | GDAL_OF_VERBOSE_ERROR, permitted_drivers().List()));
   if (dataset == nullptr) {
-    std::string why = CPLGetLastErrorMsg();
-    if (why.ends_with('.')) why.pop_back();
-    // GDAL begins with the file's name, sometimes twice; our messages begin with it, too.
-    while (why.starts_with(name + ":"))
-      why.erase(0, std::min(why.find_first_not_of(' ', name.size() + 1), why.size()));
-    throw Error("it cannot be opened as a raster: {}; is it complete?", why);
+    throw Error("it cannot be opened as a raster: {}; is it complete?", why_not_opened(name));
   }
   if (driver != "VRT") check_files_beside(*dataset, file);
-  if (driver == "ENVI" || driver == "EHdr") check_raw_size(*dataset, file);
-  if (dataset->GetRasterCount() > 0) check_blocks(*dataset);
+  if (dataset->GetRasterCount() == 0) return dataset;
+  check_blocks(*dataset);
+  if (driver == "ENVI" || driver == "EHdr") check_raw_size(file, bytes_of(*dataset, false));
+  if (driver == "HFA") check_spill_file(*dataset);
+  if (driver == "XYZ") check_lines(*dataset, file);
   return dataset;
 }
 

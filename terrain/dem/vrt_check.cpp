@@ -20,6 +20,9 @@ namespace {
 constexpr int most_levels = 4;
 constexpr double most_sources = 1 << 20;
 constexpr vsi_l_offset most_bytes = vsi_l_offset{64} << 20;
+// Work for each sample of a VRT: sources that cover it, and samples of theirs that it is made of (a
+// mosaic of 1 m in cells of 60 m has 3600). The rest allows for excerpts and previews.
+constexpr double most_written = 64, most_read = 4096, rest = 1 << 28;
 
 // Bands that are mosaics or warps of files. Others are made by expressions, Python code, raw bytes
 // of any file or a decomposition of colours.
@@ -76,10 +79,19 @@ void check_class(const CPLXMLNode& node, const std::string& vrt) {
   if (std::ranges::find(permitted_classes, value) == permitted_classes.end()) refuse(value, vrt);
 }
 
-// VRTs inside each other, and files that they refer to, each as often as it is referred to.
+// Returns the product of the sides of a rectangle, such as SrcRect, that a source may have.
+double area(const CPLXMLNode& source, const char* rectangle, double without) {
+  const CPLXMLNode* node = CPLGetXMLNode(&source, rectangle);
+  if (node == nullptr) return without;
+  return CPLAtof(CPLGetXMLValue(node, "xSize", "0")) * CPLAtof(CPLGetXMLValue(node, "ySize", "0"));
+}
+
+// What reading a whole VRT takes, with all that it refers to, each as often as it is referred to.
 struct Extent {
   int levels = 1;
   double sources = 0;
+  double samples = 0;  // of the VRT
+  double written = 0, read = 0;
 };
 
 class VrtCheck {
@@ -93,14 +105,25 @@ class VrtCheck {
     }
     const Xml xml = parse(path);
     Extent extent;
+    if (const CPLXMLNode* root = CPLGetXMLNode(xml.get(), "=VRTDataset"); root != nullptr) {
+      extent.samples = CPLAtof(CPLGetXMLValue(root, "rasterXSize", "0")) *
+                       CPLAtof(CPLGetXMLValue(root, "rasterYSize", "0"));
+    }
+    int bands = 0;
     for_each_node(*xml, [&](const CPLXMLNode& node) {
       if (node.eType != CXT_Element && node.eType != CXT_Attribute) return;
       if (EQUAL(node.pszValue, "subClass")) check_class(node, path);
       if (EQUAL(node.pszValue, "KernelFilteredSource")) refuse(node.pszValue, path);
-      if (EQUAL(node.pszValue, "SourceFilename") || EQUAL(node.pszValue, "SourceDataset")) {
-        add(source_name(node, path), path, level, extent);
+      if (EQUAL(node.pszValue, "VRTRasterBand")) ++bands;
+    });
+    for_each_node(*xml, [&](const CPLXMLNode& node) {
+      for (const CPLXMLNode* part = node.psChild; part != nullptr; part = part->psNext) {
+        if (EQUAL(part->pszValue, "SourceFilename") || EQUAL(part->pszValue, "SourceDataset")) {
+          add(node, source_name(*part, path), path, level, extent);
+        }
       }
     });
+    refuse_work(path, extent, extent.samples * std::max(bands, 1));
     return known_[path] = extent;
   }
 
@@ -111,7 +134,21 @@ class VrtCheck {
                 most_levels);
   }
 
-  void add(const std::string& source, const std::string& vrt, int level, Extent& extent) {
+  static void refuse_work(const std::string& path, const Extent& extent, double samples) {
+    const auto refuse_more = [&](double count, double most, std::string_view what) {
+      if (count <= most * samples + rest) return;
+      throw Error(
+          "for {:.3g} samples of the VRT {}, {:.3g} samples {}, more than the limit of {} for "
+          "each; "
+          "do its sources overlap, or are its samples too coarse?",
+          samples, path, count, what, most);
+    };
+    refuse_more(extent.written, most_written, "are written");
+    refuse_more(extent.read, most_read, "of its sources are read");
+  }
+
+  void add(const CPLXMLNode& node, const std::string& source, const std::string& vrt, int level,
+           Extent& extent) {
     std::string driver;
     try {
       checked_file(source);
@@ -119,8 +156,14 @@ class VrtCheck {
     } catch (const Error& error) {
       throw Error("the VRT {} has the source {}: {}", vrt, source, error.what());
     }
-    const Extent inner = driver == "VRT" ? extent_of(source, level + 1) : Extent{0, 1};
+    const double written = area(node, "DstRect", extent.samples);
+    const double read = area(node, "SrcRect", extent.samples);
+    Extent inner{.levels = 0, .sources = 1, .samples = 1, .written = 0, .read = 1};
+    if (driver == "VRT") inner = extent_of(source, level + 1);
+    const double times = inner.samples > 0 ? read / inner.samples : 0;
     extent.levels = std::max(extent.levels, inner.levels + 1);
+    extent.written += written + times * inner.written;
+    extent.read += times * inner.read;
     extent.sources += inner.sources;
     if (extent.sources <= most_sources) return;
     throw Error("the VRT {} has more than {} sources, with those of its sources", vrt,

@@ -1,12 +1,22 @@
 """Mistakes in commands and their inputs: datasets, DEMs, meshes, scans and options."""
 
+import os
 import shutil
 
 import pytest
 from dataset_runs import as_cut_off
-from user_mistakes import GENERATE, Mistake, check, make_workshop, run, truncate
+from user_mistakes import GENERATE, Mistake, check, in_file, make_workshop, run, truncate
 
 SCAN = "run/lidar/top/000000.ply"
+CLOUD = """\
+ply
+format ascii 1.0
+element vertex {}
+property float x
+property float y
+property float z
+end_header
+"""
 
 
 def unfinish(folder, run="run"):
@@ -316,7 +326,7 @@ INPUTS = [
     Mistake(
         "verifying another folder",
         "groundray verify mine",
-        ("mine: the folder contains no readable dataset.yaml", "`groundray generate`"),
+        ("mine: the folder contains no dataset.yaml", "`groundray generate`"),
     ),
     Mistake(
         "verifying a misspelled folder",
@@ -426,9 +436,65 @@ INPUTS = [
         files={"empty.npz": ""},
     ),
     Mistake(
+        "a journal in whose place is a pipe",
+        "groundray info run",
+        ("run/dataset.journal: it is a pipe or device, but must be a file",),
+        prepare=lambda folder: os.mkfifo(folder / "run/dataset.journal"),
+    ),
+    in_file(
+        "a cloud without points",
+        "none.ply",
+        CLOUD.format(0),
+        "groundray reconstruct mesh none.ply -o out.ply --range-sd-m 0.01",
+        "none.ply: no scan has a return",
+    ),
+    in_file(
+        "a DEM of a cloud without points",
+        "none.ply",
+        CLOUD.format(1) + "nan nan nan\n",
+        "groundray reconstruct dem none.ply -o out.tif --cell-m 1 --range-sd-m 0.01",
+        "none.ply: no scan has a return and no stereo pair has a match",
+    ),
+    Mistake(
+        "frames in the wrong order",
+        "groundray reconstruct mesh run -o out.ply --frames 2:1",
+        ("--frames: '2:1' has no frame", "A must be less than B"),
+    ),
+    in_file(
+        "an STL that was cut short",
+        "cut.stl",
+        "solid\n",
+        "groundray reconstruct simplify cut.stl -o out.ply --triangles 1",
+        "cut.stl: its STL cannot be read: File is too small; was the file cut short?",
+    ),
+    in_file(
+        "a glTF of another version",
+        "new.gltf",
+        '{"asset": {"version": "9.0"}}',
+        "groundray reconstruct simplify new.gltf -o out.ply --triangles 1",
+        "new.gltf: its glTF cannot be read: Unsupported glTF version: 9.0",
+    ),
+    in_file(
+        "a glTF with a matrix of one number",
+        "matrix.gltf",
+        '{"asset": {"version": "2.0"}, "nodes": [{"matrix": [1]}]}',
+        "groundray reconstruct simplify matrix.gltf -o out.ply --triangles 1",
+        "matrix.gltf: node 0: its matrix must be 16 finite numbers",
+    ),
+    in_file(
+        "a glTF of other values",
+        "odd.gltf",
+        '{"asset": {"version": "2.0"}, "scenes": "all"}',
+        "groundray reconstruct simplify odd.gltf -o out.ply --triangles 1",
+        "odd.gltf: it is not valid glTF: a string stands where an object or a list must be",
+    ),
+    Mistake(
         "a glTF file of other bytes",
         "groundray reconstruct simplify noise.glb -o out.ply --triangles 1",
-        ("noise.glb: it is not glTF: its JSON is invalid at byte 1", "was the file cut short?"),
+        (
+            "noise.glb: it is not valid glTF: its JSON is invalid at byte 1",
+            "was the file cut short?",
+        ),
         files={"noise.glb": b"\x935K noise"},
     ),
     Mistake(

@@ -58,6 +58,59 @@ def copy(source, name):
     return lambda folder: shutil.copy(folder / source, folder / name)
 
 
+MODEL = "model: Two beams\n"
+MUCH_NOISE = "range_noise_sigma_m: 1e300\nangular_jitter_mrad: 5000\n"
+NAMES = [
+    in_scene(
+        "a preset without a name",
+        "file: head.yaml",
+        'preset: ""',
+        "scene.yaml:16:25: key 'preset': is empty, but must be a text",
+    ),
+    in_scene(
+        "a preset's name as a file",
+        "file: head.yaml",
+        "file: velodyne_vlp16",
+        "key 'file': there is no such file, but a preset of this name",
+        "write 'preset: velodyne_vlp16'",
+    ),
+    in_scene(
+        "a device as a lidar's file",
+        "file: head.yaml",
+        "file: /dev/zero",
+        "the lidar cannot be read",
+        "/dev/zero: it is a pipe or device, but must be a file",
+    ),
+    in_scene(
+        "a sensor's name of 300 letters",
+        "name: top",
+        "name: " + "t" * 300,
+        "key 'name': has 300 characters, but is used in file names: use at most 100",
+    ),
+    in_scene(
+        "a NUL in a name",
+        "dem: hills.tif",
+        'dem: "hills\\0.tif"',
+        "scene.yaml:5:8: key 'dem': 'hills\\x00.tif' has a NUL character",
+    ),
+    in_scene(
+        "a mesh as a DEM",
+        "dem: hills.tif",
+        "dem: ramp.obj",
+        "ramp.obj: it is no raster, but a mesh or points by its name",
+        "`groundray reconstruct dem` makes a raster of scans",
+    ),
+    Mistake(
+        "noise beyond all numbers",
+        GENERATE,
+        (
+            "scene.yaml:16:5: key 'lidars': 'top' is invalid",
+            "range noise of 1e+300 m must be from 0 to 1000 m",
+            "angular jitter of 5 rad must be from 0 to 1 rad",
+        ),
+        (("head.yaml", MODEL, MODEL + MUCH_NOISE),),
+    ),
+]
 SYNTAX = [
     Mistake(
         "a DEM as a scene",
@@ -886,7 +939,7 @@ FILES = [
         "there is no such file",
     ),
 ]
-MISTAKES = [*SYNTAX, *VALUES, *PLACES, *FILES]
+MISTAKES = [*NAMES, *SYNTAX, *VALUES, *PLACES, *FILES]
 
 
 @pytest.fixture(scope="module")

@@ -239,7 +239,7 @@ def test_an_unreadable_file_is_a_fault_and_all_others_are_reported(whole, tmp_pa
         "lidar/top/000001.ply: unreadable: Too many",
         "camera/eye/000000.exr: unreadable: Too many",
         "dataset.journal: ",
-        f"{loop}: the folder contains no readable dataset.yaml (Too many",
+        f"{loop}/dataset.yaml: it cannot be read: Too many",
         f"{whole}: {len(files(whole))} files",
     ):
         assert words in result.stdout, result.stdout

@@ -98,7 +98,9 @@ def test_exceptions_during_array_conversion_propagate(error):
 
 @pytest.mark.parametrize("error", [TypeError, ValueError])
 def test_arguments_that_are_not_arrays_are_reported(error):
-    with pytest.raises(TypeError, match=r"heights_at: places_m must be .*, but is a Failing"):
+    with pytest.raises(
+        TypeError, match=r"heights_at: places_m must be .*, but is a Failing: of its own"
+    ):
         groundray.Terrain(np.zeros((5, 5))).heights_at(Failing(error("of its own")))
 
 
@@ -220,6 +222,31 @@ def test_masked_heights_are_holes():
     dem.data[5:8, 5:8] = 99
     filled = groundray.fill_dem(dem, cell_m=1.0, reach="enclosed")
     assert np.allclose(filled["heights_m"], 3, atol=1e-3)
+
+
+@pytest.mark.parametrize("dtype", [">f4", ">f8", ">i2", ">u8", np.float16, np.longdouble])
+def test_numbers_may_have_any_form(dtype):
+    heights_m = np.arange(12).reshape(3, 4).astype(dtype)
+    assert groundray.Terrain(heights_m).heights_at([[1, 1]])[0] == 5  # the first row is north
+    down = np.array([[0, 0, -1]], dtype=dtype if np.dtype(dtype).kind != "u" else ">f4")
+    ground = groundray.Terrain(np.zeros((5, 5), np.float32))
+    rays = ground.cast_rays(np.array([[1, 1, 7]], dtype), down)
+    assert rays["range_true_m"][0] == 7
+
+
+def test_vertex_indices_may_have_another_byte_order_but_not_exceed_64_bits():
+    triangles = np.array([[0, 1, 2]], ">i4")
+    assert np.array_equal(groundray.Mesh(CORNERS, triangles).triangles, triangles)
+    with pytest.raises(groundray.Error, match="an integer of 18446744073709551615 is too large"):
+        groundray.Mesh(CORNERS, np.array([[0, 1, 2**64 - 1]], np.uint64))
+
+
+def test_a_dem_larger_than_memory_is_refused():
+    far = [[0, 0, 0], [1e5, 1e5, 0]]
+    with pytest.raises(
+        groundray.Error, match=r"a DEM of 10000\d x 10000\d samples takes 437\.\d GiB"
+    ):
+        groundray.fuse_points(far, far, [0.1, 0.1], cell_m=1.0)
 
 
 def test_masked_values_are_rejected_elsewhere():

@@ -84,7 +84,7 @@ void Journal::remove() noexcept {
 std::size_t read_journal(const std::filesystem::path& path,
                          const std::function<void(const std::string& entry)>& take) {
   std::ifstream file = open_stream(path);
-  if (!file) fail_to("read", path);
+  if (!file) throw Error("{}: {}", path.string(), why_not_read(path, errno));
   std::size_t unreadable = 0;
   for (std::string line; next_line(file, line);) {
     const std::size_t blank = line.find(' ');
@@ -94,23 +94,18 @@ std::size_t read_journal(const std::filesystem::path& path,
     else
       ++unreadable;
   }
-  if (file.bad()) fail_to("read", path);
+  if (file.bad()) throw Error("{}: {}", path.string(), why_not_read(path, EIO));
   return unreadable;
 }
 
 void count_journal(const std::filesystem::path& path, DatasetSummary& dataset) {
-  std::vector<std::vector<bool>> noted(dataset.sensors.size());  // by sensor and frame
   dataset.done = 0;
-  for (DatasetSummary::Sensor& sensor : dataset.sensors) sensor.done = sensor.bytes = 0;
+  for (DatasetSummary::Sensor& sensor : dataset.sensors) {
+    sensor.done = sensor.bytes = 0;
+    sensor.counted.clear();
+  }
   read_journal(path, [&](const std::string& text) {
-    const auto entry = parse_entry(text);
-    const auto sensor = entry ? dataset.number_of(entry->sensor) : std::nullopt;
-    if (!sensor || entry->frame < 0 || entry->frame >= dataset.sensors[*sensor].frames) return;
-    std::vector<bool>& frames = noted[*sensor];
-    const auto frame = static_cast<std::size_t>(entry->frame);
-    if (frames.size() <= frame) frames.resize(frame + 1);
-    if (!frames[frame]) dataset.add(*entry);
-    frames[frame] = true;
+    if (const auto entry = parse_entry(text)) dataset.add(*entry);
   });
 }
 

@@ -211,8 +211,8 @@ struct Copy {
 void copy_file(const Copy& copy) {
   std::ifstream file = open_stream(copy.from);
   if (const int fault = errno; !file && fault != ENOENT) {
-    throw Error("{}: cannot be read: {}; `groundray verify` lists all such files",
-                copy.from.string(), std::generic_category().message(fault));
+    throw Error("{}: {}; `groundray verify` lists all such files", copy.from.string(),
+                why_not_read(copy.from, fault));
   }
   std::vector<char> block(256 << 10);
   Sha256 sum;

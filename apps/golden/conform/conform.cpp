@@ -15,6 +15,7 @@
 #include "apps/golden/conform/pass_folder.h"
 #include "core/error.h"
 #include "core/io/file_io.h"
+#include "core/io/json_fault.h"
 
 namespace groundray::golden {
 namespace {
@@ -73,7 +74,7 @@ Claims read_claims(const ArrayFolder& theirs, double limit_m) {
     return claims;
   } catch (const nlohmann::json::exception& fault) {
     throw Error("{}: {}; see docs/guide/gpu.md", (theirs.path() / "manifest.json").string(),
-                fault.what());
+                words_of(fault));
   } catch (const Error& rule) {
     throw Error("{}: {}", (theirs.path() / "manifest.json").string(), rule.what());
   }

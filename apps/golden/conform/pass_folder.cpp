@@ -13,6 +13,7 @@
 #include "apps/golden/conform/reference_rays.h"
 #include "core/error.h"
 #include "core/io/file_io.h"
+#include "core/io/json_fault.h"
 #include "terrain/dem/dem_io.h"
 #include "terrain/lod/clipmap.h"
 #include "terrain/lod/deviation.h"
@@ -262,7 +263,7 @@ PassFolder read_pass_folder(const fs::path& folder) {
             tolerance(json, "silhouette_limit_m"), std::move(entries)};
   } catch (const nlohmann::json::exception& fault) {
     throw Error("{}: {}; is it a folder that groundray-golden passes has written?", path.string(),
-                fault.what());
+                words_of(fault));
   } catch (const Error& rule) {
     throw Error("{}: {}", path.string(), rule.what());
   }

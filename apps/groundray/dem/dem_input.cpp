@@ -143,14 +143,6 @@ void check_gap(const std::string& name, const Trajectory& path, std::chrono::nan
   }
 }
 
-void check_count(std::size_t points) {
-  if (points == 0)
-    throw Error("no scan has a return and no stereo pair has a match: a DEM cannot be computed");
-  if (points < 3)
-    throw Error("there {} only {} point{}: a DEM needs three or more", points == 1 ? "is" : "are",
-                points, points == 1 ? "" : "s");
-}
-
 std::vector<RecordedPair> find_pairs(const DemRequest& request, const ScanFiles& files) {
   const PairChoice& choice = request.pairs;
   if (!choice.are_any) return {};
@@ -267,6 +259,18 @@ std::vector<std::string> DemInput::notes() const {
 void DemInput::go_to(std::size_t block) noexcept {
   next_ = block;
   reader_.reset();
+}
+
+void DemInput::check_count(std::size_t points) const {
+  if (points >= 3) return;
+  const std::string where =
+      scans_.empty() ? "" : first_and_count(scans_.front().name, scans_.size()) + ": ";
+  if (points == 0) {
+    throw Error("{}no scan has a return and no stereo pair has a match: a DEM cannot be computed",
+                where);
+  }
+  throw Error("{}there {} only {} point{}: a DEM needs three or more", where,
+              points == 1 ? "is" : "are", points, points == 1 ? "" : "s");
 }
 
 Area DemInput::extent() {

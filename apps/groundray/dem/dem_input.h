@@ -73,6 +73,10 @@ class DemInput {
   /// @throws Error if there are fewer than three.
   Area extent();
 
+  /// Checks the number of points of all scans and pairs.
+  /// @throws Error unless there are three or more.
+  void check_count(std::size_t points) const;
+
   const std::vector<PointTally>& scans() const noexcept { return scans_; }
   const std::vector<PointTally>& pairs() const noexcept { return pairs_; }
   /// Notes for the user; complete after all points are read.
@@ -94,9 +98,5 @@ class DemInput {
   std::map<std::string, std::optional<double>> divergences_rad_;  // by the sensor's name
   std::vector<std::string> notes_;
 };
-
-/// Checks the number of points.
-/// @throws Error unless there are three or more.
-void check_count(std::size_t points);
 
 }  // namespace groundray

@@ -117,7 +117,7 @@ DemResult build(const DemRequest& request, const GridFrame& frame, DemInput& inp
   DemSources sources{.points = [&](MeasuredPoints& points) {
     LidarBlock block;
     if (!input.next(block)) {
-      check_count(count);
+      input.check_count(count);
       return false;
     }
     points = std::move(block.points);

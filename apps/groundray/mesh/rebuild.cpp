@@ -73,7 +73,11 @@ void check_halt_without_noise(const MeshRequest& request) {
 [[noreturn]] void fail_without_surface(const RebuildReport& report) {
   const bool has_points =
       std::ranges::any_of(report.scans, [](const ScanTally& scan) { return scan.used > 0; });
-  if (!has_points) throw Error("no scan has a return: all rows are missing or not finite");
+  if (!has_points && report.scans.empty()) throw Error("there are no scans");
+  if (!has_points) {
+    throw Error("{}: no scan has a return: all rows are missing or not finite",
+                first_and_count(report.scans.front().name, report.scans.size()));
+  }
   throw Error(
       "no two returns of any scan were linked as surface: are the poses and the unit right "
       "(--unit-m)? `--preset`, `--longest-m` and `--range-sd-m` define what is surface; unordered "

@@ -7,6 +7,7 @@
 #include <cstddef>
 #include <cstdint>
 #include <exception>
+#include <limits>
 #include <string>
 #include <string_view>
 #include <type_traits>
@@ -134,11 +135,13 @@ struct type_caster<groundray::python::NumpyArgument<Array>> {
     if ((flags & convert) == 0) return false;
     try {
       const object made = module_::import_("numpy").attr("asarray")(source);
-      if ((is_whole && !holds_whole(made)) || !take(made, flags, cleanup))
+      if ((is_whole && !holds_whole(made)) || !take(native(made), flags, cleanup))
         value = Argument(misfit(form_of(made)));
     } catch (python_error& error) {
       if (!error.matches(PyExc_TypeError) && !error.matches(PyExc_ValueError)) throw;
-      value = Argument(misfit(fmt::format("a {}", Py_TYPE(source.ptr())->tp_name)));
+      const std::string why =  // of its own, not of NumPy about values that are no numbers
+          hasattr(source, "__array__") ? fmt::format(": {}", str(error.value()).c_str()) : "";
+      value = Argument(misfit(fmt::format("a {}{}", Py_TYPE(source.ptr())->tp_name, why)));
     }
     return true;
   }
@@ -148,6 +151,22 @@ struct type_caster<groundray::python::NumpyArgument<Array>> {
     if (!caster.from_python(source, flags, cleanup)) return false;
     value = Argument(std::move(caster.value));
     return true;
+  }
+
+  // Returns an array of numbers in a form that the array's caster knows: in this machine's byte
+  // order, and double instead of long double.
+  static object native(const object& array) {
+    const str kind(array.attr("dtype").attr("kind"));
+    const bool is_wide = cast<int>(array.attr("dtype").attr("itemsize")) > 8;
+    if (kind.equal(str("f")) && is_wide) return array.attr("astype")("float64");
+    if (!kind.equal(str("f")) && !kind.equal(str("i")) && !kind.equal(str("u"))) return array;
+    if (is_whole && kind.equal(str("u")) && cast<std::size_t>(array.attr("size")) > 0) {
+      const object largest = array.attr("max")();
+      if (cast<std::uint64_t>(largest.attr("item")()) > std::numeric_limits<std::int64_t>::max())
+        throw groundray::Error("an integer of {} is too large", str(handle(largest)).c_str());
+    }
+    const object order = array.attr("dtype").attr("newbyteorder")("=");
+    return array.attr("astype")(order, arg("copy") = false);
   }
 
   // Returns true for integers, but not for floats and bools. Empty arrays pass: their type has no

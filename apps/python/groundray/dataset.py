@@ -241,14 +241,19 @@ def _bytes_of(path: Path) -> bytes:
         return file.read()
 
 
-def read_text(path: Path) -> str:
-    """Returns the text of one of a dataset's files. Raises Error if it cannot be read."""
+def read_text(path: Path, hint: str = "is the dataset complete?") -> str:
+    """Returns a file's text. Raises Error, with the hint, if it cannot be read."""
     try:
         return _bytes_of(path).decode("utf-8").replace("\r\n", "\n")
     except OSError as fault:
-        raise Error(f"{path}: cannot read it: {fault.strerror}; is the dataset complete?") from None
+        raise Error(f"{path}: cannot read it: {fault.strerror}; {hint}") from None
     except UnicodeDecodeError:
         raise Error(f"{path}: it is not UTF-8 text; is it damaged?") from None
+
+
+def read_yaml(path: Path, hint: str = "is the dataset complete?") -> Any:
+    """Returns a YAML file's content. Raises Error, with the hint, if it cannot be read."""
+    return _load_yaml(read_text(path, hint), path)
 
 
 def read_listed(file: Path, what: str) -> bytes:
@@ -261,7 +266,7 @@ def read_listed(file: Path, what: str) -> bytes:
 
 
 def _read_map(path: Path) -> _Map:
-    return _Map(path, _load_yaml(read_text(path), path))
+    return _Map(path, read_yaml(path))
 
 
 def _read_mount(calibration: _Map, key: str) -> Floats:

@@ -14,6 +14,7 @@
 
 #include "core/error.h"
 #include "core/io/file_io.h"
+#include "core/io/json_fault.h"
 #include "core/io/text_lines.h"
 #include "sensors/lidar/pattern/table_pattern.h"
 
@@ -187,7 +188,7 @@ SpinningPattern parse_ouster_metadata(std::string_view text, const std::filesyst
   try {
     root = json::parse(text);
   } catch (const json::exception& fault) {
-    throw Error("{}: not JSON: {}", path.string(), fault.what());
+    throw Error("{}: {}", path.string(), words_of(fault));
   }
   if (!root.is_object()) throw Error("{}: must be a JSON object of keys and values", path.string());
   Violations broken(path.string());

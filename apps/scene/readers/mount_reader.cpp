@@ -37,6 +37,8 @@ bool is_file_name(std::string_view name) {
   });
 }
 
+constexpr std::size_t most_letters = 100;  // a file system's limit is 255 bytes
+
 // Reads the name of a sensor or pair, which must be unique.
 std::string read_name(Map& entry, std::string_view kind, SensorNames& names, Faults& faults) {
   std::string name;
@@ -46,6 +48,10 @@ std::string read_name(Map& entry, std::string_view kind, SensorNames& names, Fau
     faults.add(*at, "name",
                "is {}, but is used in file names: use only letters, digits, '_' and '-'",
                shown(*at));
+  }
+  if (name.size() > most_letters) {
+    faults.add(*at, "name", "has {} characters, but is used in file names: use at most {}",
+               name.size(), most_letters);
   }
   if (const auto [first, fresh] = names.emplace(name, kind); !fresh) {
     faults.add(entry.node(), "name", "'{}' is taken by an earlier {}: names must differ", name,
@@ -83,6 +89,13 @@ void read_source(Map& entry, std::string_view list, SensorKind kind, const fs::p
     mounted.text = read_file(place);
     read(place);
   } catch (const Error& fault) {
+    std::error_code ignored;
+    if (file && is_file_name(node.text) && !fs::exists(beside(path, node.text), ignored) &&
+        fs::exists(preset_folder / (node.text + ".yaml"), ignored)) {
+      faults.add(node, key, "there is no such file, but a preset of this name: write 'preset: {}'",
+                 node.text);
+      return;
+    }
     faults.add(node, key, "the {} cannot be read:\n{}", word, fault.what());
   }
 }

@@ -27,8 +27,9 @@ constexpr double bend_rest = 1.15, slope_rest = 1.8;
 // noise.
 constexpr double within_rest = 0.0085;
 
-// Fewer cells do not determine a plane: their scatter about the first guess is used.
-constexpr int cells_for_plane = 8;
+// Fewer cells than twice the terms of a plane hardly determine one: their scatter about the first
+// guess is used, which exceeds that about a plane.
+constexpr int cells_for_plane = 6;
 
 // Cells of the window in row order. The centre, cells without ground and padding have no weight.
 struct Neighbours {

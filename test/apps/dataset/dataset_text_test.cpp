@@ -130,7 +130,7 @@ TEST(DatasetText, ReadsEarlierVersionsWithoutChecksums) {
 TEST(DatasetText, RejectsMissingFilesAndMissingFrameLists) {
   const testing::TemporaryFolder folder;
   const auto open = [&] { DatasetText text(folder.path()); };
-  EXPECT_THAT(open, ThrowsMessage<Error>(HasSubstr("contains no readable dataset.yaml")));
+  EXPECT_THAT(open, ThrowsMessage<Error>(HasSubstr("contains no dataset.yaml")));
   write_text(folder / "dataset.yaml", header);
   EXPECT_THAT(open, ThrowsMessage<Error>(HasSubstr("no frames are listed")));
 }

@@ -35,6 +35,12 @@ std::string source(const std::string& name) {
       name);
 }
 
+std::string scaled(const std::string& name, int from, int to) {
+  constexpr const char* text =
+      R"(<SimpleSource resampling="lanczos"><SourceFilename relativeToVRT="1">{}</SourceFilename><SrcRect xOff="0" yOff="0" xSize="{}" ySize="{}"/><DstRect xOff="0" yOff="0" xSize="{}" ySize="{}"/></SimpleSource>)";
+  return fmt::format(text, name, from, from, to, to);
+}
+
 std::string vrt(const std::string& content, const std::string& band = "") {
   return fmt::format(
       R"(<VRTDataset rasterXSize="8" rasterYSize="8"><VRTRasterBand dataType="Float32" band="1" {}>{}</VRTRasterBand></VRTDataset>)",
@@ -147,6 +153,68 @@ TEST_F(RasterInput, VrtsInsideVrtsAreLimited) {
   std::filesystem::resize_file(large, (std::uintmax_t{64} << 20) + 1);
   EXPECT_THAT(error_of([&] { load_dem(large); }),
               HasSubstr("has 67108865 bytes, more than the limit of 67108864"));
+}
+
+TEST_F(RasterInput, WorkOfVrtsIsLimited) {
+  const std::string overlapping =
+      R"(<VRTDataset rasterXSize="8192" rasterYSize="8192"><VRTRasterBand dataType="Float32" band="1">{}</VRTRasterBand></VRTDataset>)";
+  const auto copies = [](int count, const std::string& text) {
+    std::string all;
+    for (int i = 0; i < count; ++i) all += text;
+    return all;
+  };
+  // 69 x 8192^2 samples; 68 are within 64 for each sample and 2^28 more.
+  const auto vrt_of = [&](const std::string& content) {
+    return write("many.vrt", fmt::format(fmt::runtime(overlapping), content));
+  };
+  EXPECT_NO_THROW(check_vrt(vrt_of(copies(68, scaled("sound.tif", 8, 8192)))));
+  EXPECT_THAT(error_of([&] { check_vrt(vrt_of(copies(69, scaled("sound.tif", 8, 8192)))); }),
+              HasSubstr("many.vrt, 4.63e+09 samples are written, more than the limit of 64"));
+  // Of a VRT that is stretched, its own sources count as often.
+  write("inner.vrt", vrt(copies(60, scaled("sound.tif", 8, 8))));
+  EXPECT_THAT(error_of([&] { check_vrt(vrt_of(copies(2, scaled("inner.vrt", 8192, 8192)))); }),
+              HasSubstr("samples are written, more than the limit of 64"));
+  // A mosaic of 1 m in cells of 60 m, and one that is too coarse.
+  EXPECT_NO_THROW(check_vrt(vrt_of(scaled("sound.tif", 60 * 8192, 8192))));
+  EXPECT_THAT(error_of([&] { check_vrt(vrt_of(scaled("sound.tif", 70 * 8192, 8192))); }),
+              HasSubstr("samples of its sources are read, more than the limit of 4096"));
+}
+
+TEST_F(RasterInput, FewLinesOfTextMakeNoLargeRaster) {
+  EXPECT_THAT(
+      error_of([&] { load_dem(write("far.xyz", "0 0 1\n1 0 1\n0 1 2\n0 1000000000 2\n")); }),
+      HasSubstr("its 33 bytes of text are 2 x 1000000001 samples, nearly all of them "
+                "missing; does a line lie far from the others?"));
+  EXPECT_EQ(error_of([&] { load_dem(write("near.xyz", "0 0 1\n1 0 1\n0 1 2\n1 1 2\n")); }),
+            "no error");
+}
+
+TEST_F(RasterInput, CutFilesAreNotReadAsZeros) {
+  const std::string sound = (folder_ / "sound.tif").string();
+  const auto write_by_gdal = [&](const std::string& options, const std::string& name) {
+    const std::string command =
+        fmt::format("gdal_translate -q {} {} {}", options, sound, (folder_ / name).string());
+    ASSERT_EQ(std::system(command.c_str()), 0);
+  };
+  const auto cut = [&](const std::string& name, double share) {
+    const auto size = static_cast<double>(std::filesystem::file_size(folder_ / name));
+    std::filesystem::resize_file(folder_ / name, static_cast<std::uintmax_t>(share * size));
+  };
+  const auto error_of_file = [&](const std::string& name) {
+    return error_of([&] { load_dem(folder_ / name); });
+  };
+  write_by_gdal("-of JPEG -ot Byte -scale", "photo.jpg");
+  EXPECT_EQ(error_of_file("photo.jpg"), "no error");
+  cut("photo.jpg", 0.7);
+  EXPECT_THAT(error_of_file("photo.jpg"), HasSubstr("was the file cut short?"));
+  write_by_gdal("-of HFA -co USE_SPILL=YES", "spill.img");
+  EXPECT_EQ(error_of_file("spill.img"), "no error");
+  cut("spill.ige", 0.9);
+  EXPECT_THAT(error_of_file("spill.img"), HasSubstr("bytes by its header, but spill.ige has"));
+  write_by_gdal("-of HFA", "whole.img");
+  cut("whole.img", 0.9);
+  EXPECT_THAT(error_of_file("whole.img"),
+              HasSubstr("it cannot be opened as a raster: it ends too early; is it complete?"));
 }
 
 TEST_F(RasterInput, MemoryIsCheckedBeforeItIsTaken) {

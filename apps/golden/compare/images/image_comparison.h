@@ -40,7 +40,7 @@ Section compare_images(const ImageFile& reference, const ImageFile& other,
 /// Shift or reflection that brings an image much nearer to the reference.
 struct Misalignment {
   std::string what;       ///< "moved by (0.5, 0) px", "mirrored left to right"
-  double difference = 0;  ///< mean of |a - b| / (|a| + |b|) over pixels after the change
+  double difference = 0;  ///< mean of |a - b| / (|a| + |b|) over sampled pixels after the change
   double as_it_is = 0;    ///< same without the change
 };
 

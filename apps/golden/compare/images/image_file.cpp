@@ -29,7 +29,7 @@ constexpr std::string_view png_magic = "\x89PNG";
 constexpr double nothing = std::numeric_limits<double>::quiet_NaN();
 constexpr std::int64_t most_pixels = 1 << 26, most_values = 1 << 29;
 
-// Checks the memory of values in double.
+// Checks the memory of values in double, and of the comparison of one layer of three channels.
 void check_values(const std::string& name, std::int64_t width, std::int64_t height,
                   std::size_t channels) {
   const double values =
@@ -40,7 +40,10 @@ void check_values(const std::string& name, std::int64_t width, std::int64_t heig
         "(8192 x 8192) and {} values: crop it or scale it down",
         name, width, height, channels, most_pixels, most_values);
   }
-  require_memory(name, "its values", 2 * sizeof(double) * values);  // split into channels
+  constexpr double bytes_per_value = 2 * sizeof(double);  // interleaved and split into channels
+  constexpr double bytes_per_pixel = 100;                 // measured: errors, sorted and drawn
+  require_memory(name, "its values and errors",
+                 bytes_per_value * values + bytes_per_pixel * static_cast<double>(width * height));
 }
 
 /// Splits an image with interleaved channels into single channels with these names.

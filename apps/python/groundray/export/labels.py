@@ -6,10 +6,9 @@ from pathlib import Path
 from typing import Any
 
 import numpy as np
-import yaml
 from numpy.typing import NDArray
 
-from groundray.dataset import Dataset, Error
+from groundray.dataset import Dataset, Error, read_yaml
 
 Numbers = NDArray[np.uint32]
 
@@ -28,12 +27,7 @@ class LabelMap:
             self._read(file)
 
     def _read(self, file: Path) -> None:
-        try:
-            values = yaml.safe_load(file.read_text(encoding="utf-8"))
-        except OSError as fault:
-            raise Error(f"{file}: cannot read it: {fault.strerror}") from None
-        except (yaml.YAMLError, UnicodeDecodeError) as fault:
-            raise Error(f"{file}: it is not YAML: {fault}") from None
+        values = read_yaml(file, "give the file of labels")
         known = {"labels", "others", "instances"}
         if not isinstance(values, dict) or "labels" not in values or set(values) - known:
             raise Error(f"{file}: it must be a map of labels and, optionally, others and instances")

@@ -9,10 +9,9 @@ from pathlib import Path
 from typing import Any
 
 import numpy as np
-import yaml
 from numpy.typing import NDArray
 
-from groundray.dataset import Camera, Dataset, Error, Frame, Lidar
+from groundray.dataset import Camera, Dataset, Error, Frame, Lidar, read_yaml
 from groundray.export.images import (
     has_depths,
     has_pictures,
@@ -286,8 +285,8 @@ def _camera_info(dataset: Dataset, camera: Camera) -> dict[str, Any]:
         rule = f"camera {camera.name} has the lens {camera.lens_model}, unknown to CameraInfo"
         fix = "exclude it: name the others with --camera, or give --no-images"
         raise Error(f"{dataset.folder}: {rule} ({', '.join(_MODELS)}); {fix}")
+    read = read_yaml(file)
     try:
-        read = yaml.safe_load(file.read_text(encoding="utf-8"))
         values = {
             "height": int(read["image_height"]),
             "width": int(read["image_width"]),
@@ -297,7 +296,7 @@ def _camera_info(dataset: Dataset, camera: Camera) -> dict[str, Any]:
             "r": [float(each) for each in read["rectification_matrix"]["data"]],
             "p": [float(each) for each in read["projection_matrix"]["data"]],
         }
-    except (OSError, yaml.YAMLError, KeyError, TypeError, ValueError, UnicodeDecodeError) as fault:
+    except (KeyError, TypeError, ValueError) as fault:
         raise Error(f"{file}: it is not a camera_info of ROS: {fault!r}: is it damaged?") from None
     sizes = {name: len(values[name]) for name in ("k", "r", "p")}  # type: ignore[arg-type]
     if sizes != {"k": 9, "r": 9, "p": 12} or values["distortion_model"] not in _MODELS:

@@ -100,7 +100,7 @@ TEST(OusterMetadata, ListsEveryFault) {
                   HasSubstr("key 'lidar_origin_to_beam_origin_mm' must be a number"),
                   HasSubstr("key 'lidar_to_sensor_transform' is missing"))));
   EXPECT_THAT([] { parse_ouster_metadata("{", "m.json"); },
-              ThrowsMessage<Error>(HasSubstr("m.json: not JSON")));
+              ThrowsMessage<Error>(HasSubstr("m.json: its JSON is invalid at byte 2")));
   std::string text = flat_ouster;
   text.replace(text.find("[3, 0, -3]"), 10, "[3, 0]");
   EXPECT_THAT([&] { parse_ouster_metadata(text, "m.json"); },

@@ -244,6 +244,17 @@ TEST(Misalignment, DetectsShiftsAndMirrorings) {
   EXPECT_EQ(found(scaled), "nothing");
 }
 
+TEST(Misalignment, IsDetectedInLargeImagesBySomeOfTheirPixels) {
+  const auto shifted = [](double dx) {
+    return layer("Z", LayerKind::Depth, {2100, 2100}, 1,
+                 [&](int x, int y, int) { return scene(x - dx, y); });
+  };
+  const auto found = misalignment(shifted(0).values, shifted(1).values);
+  ASSERT_TRUE(found);
+  EXPECT_EQ(found->what, "moved by (-1, 0) px");
+  EXPECT_LT(found->difference, 1e-12);
+}
+
 TEST(Misalignment, IsNotDetectedInNoise) {
   std::mt19937 random(9);
   std::normal_distribution<double> normal(10, 1);
