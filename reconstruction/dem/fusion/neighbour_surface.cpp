@@ -27,9 +27,11 @@ constexpr double bend_rest = 1.15, slope_rest = 1.8;
 // noise.
 constexpr double within_rest = 0.0085;
 
-// Fewer cells than twice the terms of a plane hardly determine one: their scatter about the first
-// guess is used, which exceeds that about a plane.
-constexpr int cells_for_plane = 6;
+// Fewer cells do not determine a plane: their scatter about the first guess is used, which exceeds
+// that about a plane several times. It counts little where others are near; found by trial with
+// scans of dense and sparse rings.
+constexpr int cells_for_plane = 8;
+constexpr double guess_share = 0.05;
 
 // Cells of the window in row order. The centre, cells without ground and padding have no weight.
 struct Neighbours {
@@ -301,6 +303,8 @@ NeighbourSketch sketch_neighbours(const GroundGuess* guess, std::ptrdiff_t strid
     found.terms[i] = static_cast<float>(fit.terms[i]);
   }
   found.plane_m2 = static_cast<float>(plane_m2);
+  found.plane_counts = static_cast<float>((near.count < cells_for_plane ? guess_share : 1) *
+                                          std::max(0, near.count - 3));
   if (freedom < 1) return found;
   found.freedom = static_cast<float>(freedom);
   const Excess rough = excess(near, noise_m2, freedom);

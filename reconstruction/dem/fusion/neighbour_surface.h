@@ -47,6 +47,7 @@ struct NeighbourSketch {
   int cells = 0;                 ///< number of cells with ground
   std::array<float, 6> terms{};  ///< terms in cells; heights are relative to the first cell
   float plane_m2 = 0;            ///< variance of heights about a plane, without their noise
+  float plane_counts = 0;        ///< weight of that: cells in excess of a plane's terms, or fewer
   float rough_m2 = 0;            ///< the same about the second-degree surface; may be negative
   float rough_m4 = 0;            ///< variance of rough_m2
   float freedom = 0;             ///< cells in excess of that surface's terms

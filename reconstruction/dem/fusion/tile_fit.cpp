@@ -147,7 +147,7 @@ GroundScatter TilePoints::scatter(int column, int row) const noexcept {
   for (int r = row - rough_reach; r <= row + rough_reach; ++r) {
     for (int c = column - rough_reach; c <= column + rough_reach; ++c) {
       const NeighbourSketch& one = sketches_[index(c, r)];
-      const double more = std::max(0, one.cells - 3);
+      const double more = one.plane_counts;
       rough += double{one.freedom} * double{one.rough_m2};
       spread += std::pow(double{one.freedom}, 2) * double{one.rough_m4};
       freedom += double{one.freedom};
@@ -159,8 +159,6 @@ GroundScatter TilePoints::scatter(int column, int row) const noexcept {
       std::abs(rules_.step_m.x * rules_.step_m.y) * std::pow(expected_bend * rules_.slope_sd, 2);
   const double all = freedom + plane_counts + expected_counts;
   plane = (plane + expected_counts * expected_m2) / (cells + expected_counts);
-  // The variance of a further value where the scatter is known from few: that of Student's t.
-  plane *= 1 + 2 / std::max(1.0, cells / overlap - 2);
   const double half_m2 = 0.5 * (rough + plane_counts * plane + expected_counts * expected_m2) / all;
   const double hidden_m4 = at_0 * at_0 * overlap * spread / (all * all);
   return {plane, half_m2 + std::sqrt(half_m2 * half_m2 + hidden_m4)};
