@@ -4,8 +4,10 @@
 
 #include <algorithm>
 #include <array>
+#include <cmath>
 #include <cstdlib>
 #include <filesystem>
+#include <limits>
 #include <map>
 #include <memory>
 #include <string>
@@ -83,7 +85,11 @@ void check_class(const CPLXMLNode& node, const std::string& vrt) {
 double area(const CPLXMLNode& source, const char* rectangle, double without) {
   const CPLXMLNode* node = CPLGetXMLNode(&source, rectangle);
   if (node == nullptr) return without;
-  return CPLAtof(CPLGetXMLValue(node, "xSize", "0")) * CPLAtof(CPLGetXMLValue(node, "ySize", "0"));
+  const auto size = [node](const char* key) {
+    const double value = CPLAtof(CPLGetXMLValue(node, key, "0"));
+    return std::isfinite(value) ? std::abs(value) : std::numeric_limits<double>::infinity();
+  };
+  return size("xSize") * size("ySize");
 }
 
 // What reading a whole VRT takes, with all that it refers to, each as often as it is referred to.
@@ -136,7 +142,7 @@ class VrtCheck {
 
   static void refuse_work(const std::string& path, const Extent& extent, double samples) {
     const auto refuse_more = [&](double count, double most, std::string_view what) {
-      if (count <= most * samples + rest) return;
+      if (count <= most * samples + rest) return;  // false for NaN
       throw Error(
           "for {:.3g} samples of the VRT {}, {:.3g} samples {}, more than the limit of {} for "
           "each; "

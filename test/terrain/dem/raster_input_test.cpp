@@ -174,6 +174,9 @@ TEST_F(RasterInput, WorkOfVrtsIsLimited) {
   write("inner.vrt", vrt(copies(60, scaled("sound.tif", 8, 8))));
   EXPECT_THAT(error_of([&] { check_vrt(vrt_of(copies(2, scaled("inner.vrt", 8192, 8192)))); }),
               HasSubstr("samples are written, more than the limit of 64"));
+  const std::string back = copies(100, scaled("sound.tif", 8, -8192));
+  EXPECT_THAT(error_of([&] { check_vrt(vrt_of(back + copies(69, scaled("sound.tif", 8, 8192)))); }),
+              HasSubstr("samples are written, more than the limit of 64"));
   // A mosaic of 1 m in cells of 60 m, and one that is too coarse.
   EXPECT_NO_THROW(check_vrt(vrt_of(scaled("sound.tif", 60 * 8192, 8192))));
   EXPECT_THAT(error_of([&] { check_vrt(vrt_of(scaled("sound.tif", 70 * 8192, 8192))); }),
