@@ -10,7 +10,7 @@ namespace groundray {
 
 /// Returns what is wrong with a JSON file, in words for its author: nlohmann's own messages name
 /// its exceptions and functions.
-inline std::string words_of(const nlohmann::json::exception& fault) {
+inline std::string fault_in_words(const nlohmann::json::exception& fault) {
   constexpr int no_such_key = 403;
   if (const auto* parse = dynamic_cast<const nlohmann::json::parse_error*>(&fault))
     return fmt::format("its JSON is invalid at byte {}; was the file cut short?", parse->byte);

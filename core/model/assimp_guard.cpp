@@ -356,7 +356,7 @@ CheckedGltf check_gltf(std::string_view bytes, const std::filesystem::path& path
     checked.is_binary = !chunk.empty();
     checked.bytes = file_of(gltf, chunk);
   } catch (const json::exception& fault) {
-    throw Error("{}: it is not valid glTF: {}", path.string(), words_of(fault));
+    throw Error("{}: it is not valid glTF: {}", path.string(), fault_in_words(fault));
   } catch (const Error& fault) {
     throw Error("{}: {}", path.string(), fault.what());
   }

@@ -118,7 +118,7 @@ MeshReading read_gltf_mesh(const fs::path& path) {
   try {
     reading.georeference = gltf_georeference(bytes);
   } catch (const json::exception& fault) {
-    throw Error("{}: the scene's extras: {}", path.string(), words_of(fault));
+    throw Error("{}: the scene's extras: {}", path.string(), fault_in_words(fault));
   } catch (const Error& fault) {
     throw Error("{}: the scene's extras: {}", path.string(), fault.what());
   }

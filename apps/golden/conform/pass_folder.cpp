@@ -263,7 +263,7 @@ PassFolder read_pass_folder(const fs::path& folder) {
             tolerance(json, "silhouette_limit_m"), std::move(entries)};
   } catch (const nlohmann::json::exception& fault) {
     throw Error("{}: {}; is it a folder that groundray-golden passes has written?", path.string(),
-                words_of(fault));
+                fault_in_words(fault));
   } catch (const Error& rule) {
     throw Error("{}: {}", path.string(), rule.what());
   }

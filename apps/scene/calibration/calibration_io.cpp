@@ -188,7 +188,7 @@ SpinningPattern parse_ouster_metadata(std::string_view text, const std::filesyst
   try {
     root = json::parse(text);
   } catch (const json::exception& fault) {
-    throw Error("{}: {}", path.string(), words_of(fault));
+    throw Error("{}: {}", path.string(), fault_in_words(fault));
   }
   if (!root.is_object()) throw Error("{}: must be a JSON object of keys and values", path.string());
   Violations broken(path.string());
