@@ -134,12 +134,11 @@ void read_bytes(GDALDataset& dataset, std::vector<int> bands, Image8& image, int
     const CPLErr result = dataset.RasterIO(
         GF_Read, 0, row, width, rows, image.at(0, row).data() + channel, width, rows, GDT_Byte,
         static_cast<int>(bands.size()), bands.data(), pixel, pixel * width, 1, nullptr);
-    // Some drivers substitute what they could not read and report an error, but return success.
-    if (result != CE_None || CPLGetLastErrorType() == CE_Failure) {
+    if (const std::string fault = fault_of_read(result); !fault.empty()) {
       throw Error(
           "its pixels in rows {} to {} cannot all be read: {}; was the file cut short? "
           "Copy it again",
-          row, row + rows - 1, CPLGetLastErrorMsg());
+          row, row + rows - 1, fault);
     }
   }
 }

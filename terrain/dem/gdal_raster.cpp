@@ -237,12 +237,11 @@ void HeightReader::read(glm::ivec2 first, glm::ivec2 size, float* heights_m) con
     CPLErr result = read_strip(*band_, strip, strip.values, GDT_Float32);
     if (result == CE_None) result = cut_holes(mask_, strip);
     if (result == CE_None) result = cut_holes(alpha_, strip);
-    // Some drivers substitute what they could not read and report an error, but return success.
-    if (result != CE_None || CPLGetLastErrorType() == CE_Failure) {
+    if (const std::string fault = fault_of_read(result); !fault.empty()) {
       throw Error(
           "its samples in columns {} to {}, rows {} to {} cannot all be read: {}; was the file cut "
           "short? Copy it again",
-          first.x, first.x + size.x - 1, row, next - 1, CPLGetLastErrorMsg());
+          first.x, first.x + size.x - 1, row, next - 1, fault);
     }
     float* const strip_end = strip.values + strip.count();
     if (nodata_) std::replace(strip.values, strip_end, static_cast<float>(*nodata_), hole);

@@ -74,6 +74,10 @@ GDALDataset* (*open_any_vrt)(GDALOpenInfo*) = nullptr;
 GDALDataset* open_checked_vrt(GDALOpenInfo* info) {
   if (is_vrt(info) == 0) return nullptr;
   try {
+    // Overviews and masks beside a raster are opened by GDAL alone, uncounted.
+    const std::string ending = std::filesystem::path(info->pszFilename).extension().string();
+    if (EQUAL(ending.c_str(), ".ovr") || EQUAL(ending.c_str(), ".msk"))
+      throw Error("{}: overviews and masks must not be VRTs", info->pszFilename);
     check_vrt(info->pszFilename);
   } catch (const std::exception& error) {
     CPLError(CE_Failure, CPLE_AppDefined, "%s", error.what());
@@ -143,7 +147,10 @@ double bytes_of(GDALDataset& dataset, bool in_blocks) {
     samples = std::ceil(1.0 * dataset.GetRasterXSize() / block.x) * block.x *
               std::ceil(1.0 * dataset.GetRasterYSize() / block.y) * block.y;
   }
-  return samples * dataset.GetRasterCount() * GDALGetDataTypeSizeBytes(band.GetRasterDataType());
+  const char* bits = band.GetMetadataItem("NBITS", "IMAGE_STRUCTURE");
+  const double bytes = bits != nullptr ? CPLAtof(bits) / 8
+                                       : 1.0 * GDALGetDataTypeSizeBytes(band.GetRasterDataType());
+  return samples * dataset.GetRasterCount() * bytes;
 }
 
 // GDAL takes what a file of samples lacks for heights of 0.
@@ -173,8 +180,8 @@ void check_lines(GDALDataset& dataset, const std::string& file) {
   constexpr double most_samples_per_byte = 64;
   VSIStatBufL state;
   if (VSIStatL(file.c_str(), &state) != 0) return;
-  const double samples = samples_of(dataset);
-  if (samples <= most_samples_per_byte * static_cast<double>(state.st_size)) return;
+  const double samples = samples_of(dataset), bytes = static_cast<double>(state.st_size);
+  if (samples <= most_samples_per_byte * bytes && dataset.GetRasterYSize() <= bytes) return;
   throw Error(
       "its {} bytes of text are {} x {} samples, nearly all of them missing; does a line lie far "
       "from the others?",
@@ -200,7 +207,6 @@ void register_drivers() {
   CPLSetConfigOption("GDAL_SKIP", "");  // or those that are needed may be missing
   GDALAllRegister();
   CPLSetConfigOption("GDAL_VRT_ENABLE_PYTHON", "NO");
-  CPLSetConfigOption("GDAL_ERROR_ON_LIBJPEG_WARNING", "YES");  // or cut files are read
   CPLSetConfigOption("CPL_VSIL_GZIP_WRITE_PROPERTIES", "NO");  // a file beside the archive
   if (!is_first) return;
   remove_drivers(drivers);
@@ -270,6 +276,18 @@ GDALDatasetUniquePtr open_input(const std::string& name) {
   if (driver == "HFA") check_spill_file(*dataset);
   if (driver == "XYZ") check_lines(*dataset, file);
   return dataset;
+}
+
+std::string fault_of_read(CPLErr result) {
+  std::string why = CPLGetLastErrorMsg();
+  const bool is_cut = why.find("Premature end") != std::string::npos;
+  if (result == CE_None && CPLGetLastErrorType() != CE_Failure && !is_cut) return {};
+  // "dem.tif, band 1: IReadBlock failed at X offset 0, Y offset 1: TIFFReadEncodedTile() failed."
+  if (const auto at = why.find("Y offset "); at != std::string::npos)
+    why.erase(0, std::min(why.find(": ", at), why.size() - 2) + 2);
+  why.resize(std::min(why.find(" (this warning"), why.size()));
+  while (why.ends_with('.')) why.pop_back();
+  return why.empty() ? "GDAL gives no reason" : why;
 }
 
 void check_memory(const std::filesystem::path& path, glm::ivec2 size, double bytes) {

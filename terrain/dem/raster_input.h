@@ -32,6 +32,11 @@ std::string checked_file(const std::string& name);
 /// @throws Error if there is none.
 std::string checked_driver(const std::string& name);
 
+/// Returns why a read that follows CPLErrorReset() did not get all samples; empty if it did. Some
+/// drivers substitute what they cannot read, report an error and return success; libjpeg only warns
+/// of files that end too early.
+std::string fault_of_read(CPLErr result);
+
 /// @throws Error if `bytes` exceed what the machine and the limits of the process leave.
 /// @param size  size of the raster that takes them, for the message
 void check_memory(const std::filesystem::path& path, glm::ivec2 size, double bytes);

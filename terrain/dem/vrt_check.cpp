@@ -4,10 +4,8 @@
 
 #include <algorithm>
 #include <array>
-#include <cmath>
 #include <cstdlib>
 #include <filesystem>
-#include <limits>
 #include <map>
 #include <memory>
 #include <string>
@@ -69,6 +67,12 @@ void for_each_node(const CPLXMLNode& root, const auto& take) {
   }
 }
 
+// Calls `take` with a node and all below it.
+void for_each_below(const CPLXMLNode& node, const auto& take) {
+  take(node);
+  if (node.psChild != nullptr) for_each_node(*node.psChild, take);
+}
+
 [[noreturn]] void refuse(std::string_view part, const std::string& vrt) {
   throw Error(
       "the VRT {} has a {}; only mosaics and warps of files are read; if you trust it, convert "
@@ -81,15 +85,14 @@ void check_class(const CPLXMLNode& node, const std::string& vrt) {
   if (std::ranges::find(permitted_classes, value) == permitted_classes.end()) refuse(value, vrt);
 }
 
-// Returns the product of the sides of a rectangle, such as SrcRect, that a source may have.
-double area(const CPLXMLNode& source, const char* rectangle, double without) {
+// Returns the product of the sides of a rectangle, such as SrcRect, that a source may have; that of
+// the whole raster if it has none, or none that is above 0.
+double area(const CPLXMLNode& source, const char* rectangle, double whole) {
   const CPLXMLNode* node = CPLGetXMLNode(&source, rectangle);
-  if (node == nullptr) return without;
-  const auto size = [node](const char* key) {
-    const double value = CPLAtof(CPLGetXMLValue(node, key, "0"));
-    return std::isfinite(value) ? std::abs(value) : std::numeric_limits<double>::infinity();
-  };
-  return size("xSize") * size("ySize");
+  if (node == nullptr) return whole;
+  const auto size = [node](const char* key) { return CPLAtof(CPLGetXMLValue(node, key, "0")); };
+  const double width = size("xSize"), height = size("ySize");
+  return width > 0 && height > 0 ? width * height : whole;
 }
 
 // What reading a whole VRT takes, with all that it refers to, each as often as it is referred to.
@@ -111,25 +114,36 @@ class VrtCheck {
     }
     const Xml xml = parse(path);
     Extent extent;
-    if (const CPLXMLNode* root = CPLGetXMLNode(xml.get(), "=VRTDataset"); root != nullptr) {
-      extent.samples = CPLAtof(CPLGetXMLValue(root, "rasterXSize", "0")) *
-                       CPLAtof(CPLGetXMLValue(root, "rasterYSize", "0"));
-    }
-    int bands = 0;
+    const CPLXMLNode* root = CPLGetXMLNode(xml.get(), "=VRTDataset");
+    if (root == nullptr) return extent;          // GDAL reads none, either
+    const auto size = [root](const char* key) {  // as GDAL reads it: of "20e3", 20
+      return static_cast<double>(std::strtol(CPLGetXMLValue(root, key, "0"), nullptr, 10));
+    };
+    extent.samples = size("rasterXSize") * size("rasterYSize");
     for_each_node(*xml, [&](const CPLXMLNode& node) {
       if (node.eType != CXT_Element && node.eType != CXT_Attribute) return;
       if (EQUAL(node.pszValue, "subClass")) check_class(node, path);
       if (EQUAL(node.pszValue, "KernelFilteredSource")) refuse(node.pszValue, path);
-      if (EQUAL(node.pszValue, "VRTRasterBand")) ++bands;
+      // ROOT_PATH, for one, would let the sources of a source be other files than those checked.
+      if (EQUAL(node.pszValue, "OpenOptions")) refuse("source with OpenOptions", path);
     });
-    for_each_node(*xml, [&](const CPLXMLNode& node) {
-      for (const CPLXMLNode* part = node.psChild; part != nullptr; part = part->psNext) {
-        if (EQUAL(part->pszValue, "SourceFilename") || EQUAL(part->pszValue, "SourceDataset")) {
-          add(node, source_name(*part, path), path, level, extent);
+    // A band is read without the others.
+    Extent largest;
+    for (const CPLXMLNode* child = root->psChild; child != nullptr; child = child->psNext) {
+      extent.written = extent.read = 0;
+      for_each_below(*child, [&](const CPLXMLNode& node) {
+        for (const CPLXMLNode* part = node.psChild; part != nullptr; part = part->psNext) {
+          if (EQUAL(part->pszValue, "SourceFilename") || EQUAL(part->pszValue, "SourceDataset")) {
+            add(node, source_name(*part, path), path, level, extent);
+          }
         }
-      }
-    });
-    refuse_work(path, extent, extent.samples * std::max(bands, 1));
+      });
+      refuse_work(path, extent);
+      largest.written = std::max(largest.written, extent.written);
+      largest.read = std::max(largest.read, extent.read);
+    }
+    extent.written = largest.written;
+    extent.read = largest.read;
     return known_[path] = extent;
   }
 
@@ -140,7 +154,8 @@ class VrtCheck {
                 most_levels);
   }
 
-  static void refuse_work(const std::string& path, const Extent& extent, double samples) {
+  static void refuse_work(const std::string& path, const Extent& extent) {
+    const double samples = extent.samples;
     const auto refuse_more = [&](double count, double most, std::string_view what) {
       if (count <= most * samples + rest) return;  // false for NaN
       throw Error(

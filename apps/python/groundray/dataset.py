@@ -9,6 +9,7 @@ from __future__ import annotations
 
 import difflib
 import errno
+import math
 import os
 import re
 import stat
@@ -236,9 +237,20 @@ def _load_yaml(text: str, path: Path) -> Any:
 def _bytes_of(path: Path) -> bytes:
     """Reads a regular file; a pipe may never begin, a device never end."""
     with open(path, "rb", opener=lambda name, flags: os.open(name, flags | os.O_NONBLOCK)) as file:
-        if not stat.S_ISREG(os.fstat(file.fileno()).st_mode):
+        state = os.fstat(file.fileno())
+        if not stat.S_ISREG(state.st_mode):
             raise OSError(errno.ESPIPE, "it is a pipe or device, not a file")
+        if state.st_size > _available_bytes():
+            rule = f"its {state.st_size} bytes exceed the available memory"
+            raise OSError(errno.ENOMEM, rule)
         return file.read()
+
+
+def _available_bytes() -> float:
+    """Returns what the machine can still give, as the programs do; infinity if unknown."""
+    with open("/proc/meminfo", encoding="ascii") as lines:
+        found = re.search(r"MemAvailable: *(\d+) kB", lines.read())
+    return 1024 * float(found[1]) if found else math.inf
 
 
 def read_text(path: Path, hint: str = "is the dataset complete?") -> str:

@@ -128,6 +128,8 @@ TEST_F(RasterInput, VrtsHoldOnlyMosaicsAndWarpsOfRasters) {
       {vrt(code + "<subClass>VRTDerivedRasterBand</subClass>"), "has a VRTDerivedRasterBand"},
       {R"(<VRTDataset rasterXSize="8" rasterYSize="8" subClass="VRTPansharpenedDataset"/>)",
        "has a VRTPansharpenedDataset"},
+      {vrt(R"(<SimpleSource><SourceFilename relativeToVRT="1">sound.tif</SourceFilename><OpenOptions><OOI key="ROOT_PATH">/tmp</OOI></OpenOptions></SimpleSource>)"),
+       "dem.tif has a source with OpenOptions"},
       {vrt(source("gone.tif")), "gone.tif: there is no such file"},
       {vrt(source("notes.txt")), "notes.txt: it cannot be opened as a raster: it is in none of"},
       {"<VRTDataset rasterXSize=\"8\"", "dem.tif cannot be read: Parse error"},
@@ -174,6 +176,20 @@ TEST_F(RasterInput, WorkOfVrtsIsLimited) {
   write("inner.vrt", vrt(copies(60, scaled("sound.tif", 8, 8))));
   EXPECT_THAT(error_of([&] { check_vrt(vrt_of(copies(2, scaled("inner.vrt", 8192, 8192)))); }),
               HasSubstr("samples are written, more than the limit of 64"));
+  // What GDAL takes for the whole raster, for other sizes, or for no band.
+  const std::string whole =
+      R"(<SimpleSource><SourceFilename relativeToVRT="1">sound.tif</SourceFilename><DstRect/></SimpleSource>)";
+  EXPECT_THAT(error_of([&] { check_vrt(vrt_of(copies(69, whole))); }),
+              HasSubstr("samples are written, more than the limit of 64"));
+  EXPECT_THAT(
+      error_of_text(R"(<VRTDataset rasterXSize="8e4" rasterYSize="8e4"><VRTRasterBand>)" +
+                    copies(10, scaled("sound.tif", 8, 8192)) + "</VRTRasterBand></VRTDataset>"),
+      HasSubstr("for 64 samples of the VRT"));
+  EXPECT_THAT(error_of([&] {
+                check_vrt(vrt_of("<Metadata>" + copies(9, "<VRTRasterBand/>") + "</Metadata>" +
+                                 copies(69, scaled("sound.tif", 8, 8192))));
+              }),
+              HasSubstr("samples are written, more than the limit of 64"));
   const std::string back = copies(100, scaled("sound.tif", 8, -8192));
   EXPECT_THAT(error_of([&] { check_vrt(vrt_of(back + copies(69, scaled("sound.tif", 8, 8192)))); }),
               HasSubstr("samples are written, more than the limit of 64"));
@@ -209,7 +225,10 @@ TEST_F(RasterInput, CutFilesAreNotReadAsZeros) {
   write_by_gdal("-of JPEG -ot Byte -scale", "photo.jpg");
   EXPECT_EQ(error_of_file("photo.jpg"), "no error");
   cut("photo.jpg", 0.7);
-  EXPECT_THAT(error_of_file("photo.jpg"), HasSubstr("was the file cut short?"));
+  EXPECT_THAT(error_of_file("photo.jpg"), HasSubstr("cannot all be read: libjpeg: Premature end of "
+                                                    "JPEG file; was the file cut short?"));
+  write_by_gdal("-of HFA -ot Byte -scale -co USE_SPILL=YES -co NBITS=1", "mask.img");
+  EXPECT_EQ(error_of_file("mask.img"), "no error");
   write_by_gdal("-of HFA -co USE_SPILL=YES", "spill.img");
   EXPECT_EQ(error_of_file("spill.img"), "no error");
   cut("spill.ige", 0.9);
