@@ -259,10 +259,7 @@ void DatasetSummary::add(const FrameEntry& entry) {
   Sensor& sensor = sensors[*number];
   if (entry.frame < 0 || entry.frame >= sensor.frames) return;
   if (shard && !shard->has(static_cast<std::uint32_t>(*number), entry.frame, sensor.frames)) return;
-  const auto frame = static_cast<std::size_t>(entry.frame);
-  if (sensor.counted.size() <= frame) sensor.counted.resize(frame + 1);
-  if (sensor.counted[frame]) return;
-  sensor.counted[frame] = true;
+  if (!sensor.counted.insert(entry.frame).second) return;
   ++done;
   ++sensor.done;
   for (const ProductSum& file : entry.files) sensor.bytes += file.sum.bytes;

@@ -6,6 +6,7 @@
 #include <filesystem>
 #include <map>
 #include <optional>
+#include <set>
 #include <string>
 #include <string_view>
 #include <vector>
@@ -118,8 +119,8 @@ struct DatasetSummary {
     std::int64_t frames = 0;        ///< number of frames of the whole run
     std::size_t asked_for = 0;      ///< number of frames of the shard, or of the whole run
     std::size_t done = 0;
-    std::uint64_t bytes = 0;    ///< size of its frames' files
-    std::vector<bool> counted;  ///< by frame
+    std::uint64_t bytes = 0;         ///< size of its frames' files
+    std::set<std::int64_t> counted;  ///< numbers of its frames
   };
   std::string version;
   std::uint64_t seed = 0;
