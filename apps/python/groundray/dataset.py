@@ -224,10 +224,10 @@ def _refuse_aliases(text: str, path: Path) -> None:
             raise Error(f"{path}{place}: aliases (*name) are not allowed: write the value out")
 
 
-def _load_yaml(text: str, path: Path) -> Any:
+def _load_yaml(text: str, path: Path, loader: Any = _LOADER) -> Any:
     try:
         _refuse_aliases(text, path)
-        return yaml.load(text, Loader=_LOADER)
+        return yaml.load(text, Loader=loader)
     except yaml.YAMLError as fault:
         place = _place(getattr(fault, "problem_mark", None))
         problem = getattr(fault, "problem", None) or "it is not YAML"
@@ -264,8 +264,10 @@ def read_text(path: Path, hint: str = "is the dataset complete?") -> str:
 
 
 def read_yaml(path: Path, hint: str = "is the dataset complete?") -> Any:
-    """Returns a YAML file's content. Raises Error, with the hint, if it cannot be read."""
-    return _load_yaml(read_text(path, hint), path)
+    """Returns a YAML file's content, with numbers as such. Raises Error, with the hint, if it
+    cannot be read.
+    """
+    return _load_yaml(read_text(path, hint), path, yaml.SafeLoader)
 
 
 def read_listed(file: Path, what: str) -> bytes:
@@ -278,7 +280,7 @@ def read_listed(file: Path, what: str) -> bytes:
 
 
 def _read_map(path: Path) -> _Map:
-    return _Map(path, read_yaml(path))
+    return _Map(path, _load_yaml(read_text(path), path))
 
 
 def _read_mount(calibration: _Map, key: str) -> Floats:
