@@ -287,6 +287,7 @@ std::string fault_of_read(CPLErr result) {
     why.erase(0, std::min(why.find(": ", at), why.size() - 2) + 2);
   why.resize(std::min(why.find(" (this warning"), why.size()));
   while (why.ends_with('.')) why.pop_back();
+  if (why.ends_with("() failed")) why = "a block of it is incomplete or damaged";
   return why.empty() ? "GDAL gives no reason" : why;
 }
 

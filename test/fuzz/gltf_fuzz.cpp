@@ -8,6 +8,7 @@
 
 #include "core/error.h"
 #include "core/model/polygon_soup.h"
+#include "test/fuzz/model_check.h"
 
 namespace {
 
@@ -29,13 +30,7 @@ std::filesystem::path model_name() {
 extern "C" int LLVMFuzzerTestOneInput(const std::uint8_t* data, std::size_t size) {
   static const std::filesystem::path path = model_name();
   try {
-    const groundray::PolygonSoup soup =
-        groundray::read_gltf(path, {reinterpret_cast<const char*>(data), size});
-    groundray::ModelFaults faults;
-    const groundray::Model model = groundray::model_of(soup, faults);
-    const std::size_t vertices = model.mesh.vertices_m.size();
-    for (const glm::uvec3& t : model.mesh.triangles)
-      if (t.x >= vertices || t.y >= vertices || t.z >= vertices) __builtin_trap();
+    check_model(groundray::read_gltf(path, {reinterpret_cast<const char*>(data), size}));
   } catch (const groundray::Error&) {
   }
   return 0;

@@ -263,7 +263,7 @@ TEST_F(Conform, EachMistakeHasOneMessage) {
       {"other class", manifest(R"({"implementation": "x", "classes": ["fast"]})"),
        R"(class "fast" is unknown; the classes are bytes, mesh, bound, rays)"},
       {"no budget", manifest(R"({"implementation": "x", "classes": ["rays"]})"),
-       "key 'rays' is missing; see docs/guide/gpu.md"},
+       "key 'rays' is missing (see docs/guide/gpu.md)"},
       {"other precision", manifest(R"({"implementation": "x", "classes": ["rays"],
          "rays": {"precision": "half", "delta_m": 0}})"),
        R"(rays.precision = "half" must be "double" or "float")"},

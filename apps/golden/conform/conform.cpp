@@ -73,7 +73,7 @@ Claims read_claims(const ArrayFolder& theirs, double limit_m) {
     }
     return claims;
   } catch (const nlohmann::json::exception& fault) {
-    throw Error("{}: {}; see docs/guide/gpu.md", (theirs.path() / "manifest.json").string(),
+    throw Error("{}: {} (see docs/guide/gpu.md)", (theirs.path() / "manifest.json").string(),
                 fault_in_words(fault));
   } catch (const Error& rule) {
     throw Error("{}: {}", (theirs.path() / "manifest.json").string(), rule.what());

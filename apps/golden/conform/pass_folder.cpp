@@ -262,7 +262,7 @@ PassFolder read_pass_folder(const fs::path& folder) {
                        tolerance(settings, "angle_rad")),
             tolerance(json, "silhouette_limit_m"), std::move(entries)};
   } catch (const nlohmann::json::exception& fault) {
-    throw Error("{}: {}; is it a folder that groundray-golden passes has written?", path.string(),
+    throw Error("{}: {} (is it a folder that groundray-golden passes has written?)", path.string(),
                 fault_in_words(fault));
   } catch (const Error& rule) {
     throw Error("{}: {}", path.string(), rule.what());

@@ -27,9 +27,9 @@ constexpr double bend_rest = 1.15, slope_rest = 1.8;
 // noise.
 constexpr double within_rest = 0.0085;
 
-// Fewer cells do not determine a plane: their scatter about the first guess is used, which exceeds
-// that about a plane several times. It counts little where others are near; found by trial with
-// scans of dense and sparse rings.
+// In fewer cells, the scatter about a plane is too uncertain: that about the first guess is used,
+// which is often several times as large. It counts little where others are near; both numbers were
+// found by trial with dense and sparse rings.
 constexpr int cells_for_plane = 8;
 constexpr double guess_share = 0.05;
 

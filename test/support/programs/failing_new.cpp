@@ -1,5 +1,5 @@
-// Library for LD_PRELOAD that lets one call of `operator new` fail, for allocation_test.py. Calls
-// are told apart by their call stack, which is the same in every run, unlike their number.
+// Library for LD_PRELOAD that lets one call of `operator new` fail, for allocation_test.py. A
+// call is identified by its call stack, which is the same in every run, unlike its number.
 //
 //   NEW_CALLS=FILE  appends a line for each new call stack: its name, and the file of the program
 //   or

@@ -229,6 +229,10 @@ TEST_F(RasterInput, CutFilesAreNotReadAsZeros) {
                                                     "JPEG file; was the file cut short?"));
   write_by_gdal("-of HFA -ot Byte -scale -co USE_SPILL=YES -co NBITS=1", "mask.img");
   EXPECT_EQ(error_of_file("mask.img"), "no error");
+  write_by_gdal("-of GTiff", "cut.tif");
+  cut("cut.tif", 0.5);
+  EXPECT_THAT(error_of_file("cut.tif"), HasSubstr("cannot all be read: a block of it is incomplete "
+                                                  "or damaged; was the file cut short?"));
   write_by_gdal("-of HFA -co USE_SPILL=YES", "spill.img");
   EXPECT_EQ(error_of_file("spill.img"), "no error");
   cut("spill.ige", 0.9);
