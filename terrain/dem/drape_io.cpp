@@ -134,7 +134,7 @@ void read_bytes(GDALDataset& dataset, std::vector<int> bands, Image8& image, int
     const CPLErr result = dataset.RasterIO(
         GF_Read, 0, row, width, rows, image.at(0, row).data() + channel, width, rows, GDT_Byte,
         static_cast<int>(bands.size()), bands.data(), pixel, pixel * width, 1, nullptr);
-    if (const std::string fault = fault_of_read(result); !fault.empty()) {
+    if (const std::string fault = fault_of_read(result, dataset); !fault.empty()) {
       throw Error(
           "its pixels in rows {} to {} cannot all be read: {}; was the file cut short? "
           "Copy it again",

@@ -237,7 +237,7 @@ void HeightReader::read(glm::ivec2 first, glm::ivec2 size, float* heights_m) con
     CPLErr result = read_strip(*band_, strip, strip.values, GDT_Float32);
     if (result == CE_None) result = cut_holes(mask_, strip);
     if (result == CE_None) result = cut_holes(alpha_, strip);
-    if (const std::string fault = fault_of_read(result); !fault.empty()) {
+    if (const std::string fault = fault_of_read(result, *band_->GetDataset()); !fault.empty()) {
       throw Error(
           "its samples in columns {} to {}, rows {} to {} cannot all be read: {}; was the file cut "
           "short? Copy it again",

@@ -278,17 +278,24 @@ GDALDatasetUniquePtr open_input(const std::string& name) {
   return dataset;
 }
 
-std::string fault_of_read(CPLErr result) {
+std::string fault_of_read(CPLErr result, GDALDataset& dataset) {
   std::string why = CPLGetLastErrorMsg();
   const bool is_cut = why.find("Premature end") != std::string::npos;
   if (result == CE_None && CPLGetLastErrorType() != CE_Failure && !is_cut) return {};
-  // "dem.tif, band 1: IReadBlock failed at X offset 0, Y offset 1: TIFFReadEncodedTile() failed."
-  if (const auto at = why.find("Y offset "); at != std::string::npos)
-    why.erase(0, std::min(why.find(": ", at), why.size() - 2) + 2);
+  // "east.tif, band 1: IReadBlock failed at X offset 0, Y offset 1: TIFFReadEncodedTile() failed."
+  static const std::regex place(
+      R"re(^(.*), band \d+: IReadBlock failed at X offset \d+, Y offset \d+(: )?)re");
+  std::string file;
+  if (std::smatch parts; why.size() < most_name_bytes && std::regex_search(why, parts, place)) {
+    file = parts[1];
+    why = parts.suffix();
+  }
   why.resize(std::min(why.find(" (this warning"), why.size()));
   while (why.ends_with('.')) why.pop_back();
-  if (why.ends_with("() failed")) why = "a block of it is incomplete or damaged";
-  return why.empty() ? "GDAL gives no reason" : why;
+  if (why.empty() || why.ends_with("() failed")) why = "a block is incomplete or damaged";
+  // Of a VRT, the file is one of its sources.
+  const std::filesystem::path own = dataset.GetDescription();
+  return file.empty() || file == own || file == own.filename() ? why : file + ": " + why;
 }
 
 void check_memory(const std::filesystem::path& path, glm::ivec2 size, double bytes) {

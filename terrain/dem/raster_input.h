@@ -32,10 +32,11 @@ std::string checked_file(const std::string& name);
 /// @throws Error if there is none.
 std::string checked_driver(const std::string& name);
 
-/// Returns why a read that follows CPLErrorReset() did not get all samples; empty if it did. Some
-/// drivers substitute what they cannot read, report an error and return success; libjpeg only warns
-/// of files that end too early.
-std::string fault_of_read(CPLErr result);
+/// Returns why a read of a raster that follows CPLErrorReset() did not get all samples, with the
+/// name of the file if it is another (a source of a VRT); empty if it did. Some drivers substitute
+/// what they cannot read, report an error and return success; libjpeg only warns of files that end
+/// too early.
+std::string fault_of_read(CPLErr result, GDALDataset& dataset);
 
 /// @throws Error if `bytes` exceed what the machine and the limits of the process leave.
 /// @param size  size of the raster that takes them, for the message

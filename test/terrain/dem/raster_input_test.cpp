@@ -231,7 +231,7 @@ TEST_F(RasterInput, CutFilesAreNotReadAsZeros) {
   EXPECT_EQ(error_of_file("mask.img"), "no error");
   write_by_gdal("-of GTiff", "cut.tif");
   cut("cut.tif", 0.5);
-  EXPECT_THAT(error_of_file("cut.tif"), HasSubstr("cannot all be read: a block of it is incomplete "
+  EXPECT_THAT(error_of_file("cut.tif"), HasSubstr("cannot all be read: a block is incomplete "
                                                   "or damaged; was the file cut short?"));
   write_by_gdal("-of HFA -co USE_SPILL=YES", "spill.img");
   EXPECT_EQ(error_of_file("spill.img"), "no error");
