@@ -88,17 +88,20 @@ LIBRARIES = {
 
 # Files are opened by core/io/open_file.h: regular ones alone, and not through links to be written.
 CALLS = {
-    r"\bf(re)?open\(|\bcreat\(": r"core/io/open_file\.cpp",
+    r"\bf(re)?open\(|\bcreat\(|\bopenat\(|std::(basic_)?filebuf": r"core/io/open_file\.cpp",
     r"std::[io]?fstream( \w+)?[({]|\.open\([^)]*std::ios": r"core/io/open_file\.(h|cpp)",
     r"GDALDataset::Open|GDALOpen|VSIFOpen": r"terrain/dem/raster_input\.cpp",
     r"CreateCopy\(": r"terrain/dem/layers_io\.cpp",
-    r"\bO_CREAT\b": r"core/io/open_file\.cpp|apps/groundray/(result_files|run_log)\.cpp"
+    r"\bO_CREAT\b|\bopen\((?![^;]*\bO_DIRECTORY)[^;]*\bO_[A-Z]+": r"core/io/open_file\.cpp|apps/groundray/(result_files|run_log)\.cpp"
     r"|apps/golden/suite/suite\.cpp",
 }
 
 # The Python package reads files by dataset.py; exports write into a folder that they have made.
 PYTHON_CALLS = {
-    r"\b(?<!\.)open\(|\.read_(text|bytes)\(|np\.(load|fromfile)\(": "dataset.py",
+    r"\b(?<!\.)open\(|\.read_(text|bytes)\(|np\.(load|fromfile|memmap|loadtxt|genfromtxt)\(": (
+        "dataset.py"
+    ),
+    r"\bshutil\.copy|\bZipFile\(|\bTarFile\(": "",
     r"\.open\(": "export/las.py export/mcap_file.py export/images.py dataset.py",
 }
 
@@ -113,6 +116,7 @@ IN_HEADERS = re.compile(r"glm/.*|fmt/.*|[a-z0-9_]+")
 PRIVATE = (
     "apps/scan/word_option.h",
     "core/io/json_fault.h",
+    "core/model/gltf_json.h",
     "core/tracing/embree_adapter.h",
     "reconstruction/mesh/simplify/edge_collapse.h",
     "reconstruction/mesh/surface_cgal.h",

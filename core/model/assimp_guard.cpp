@@ -6,6 +6,7 @@
 #include <cstring>
 #include <nlohmann/json.hpp>
 #include <numeric>
+#include <optional>
 #include <set>
 #include <string>
 #include <utility>
@@ -14,20 +15,11 @@
 #include "core/error.h"
 #include "core/io/json_fault.h"
 #include "core/io/memory.h"
+#include "core/model/gltf_json.h"
 #include "core/model/polygon_soup.h"
 
 namespace groundray {
 namespace {
-
-using nlohmann::json;
-
-/// Returns an index, a count or an enumerator, which may be written as 1.0.
-std::size_t whole(const json& number) {
-  const auto value = number.get<double>();
-  if (!(value >= 0 && value < 0x1p53 && value == std::floor(value)))
-    throw Error("{} must be a whole number", number.dump());
-  return static_cast<std::size_t>(value);
-}
 
 /// A node: its children, and the number of elements of its mesh.
 struct Node {
@@ -57,9 +49,9 @@ class NodeWalk {
   const Tree& walk(std::size_t node, int levels_above) {
     Tree& tree = trees_[node];
     if (tree.state == Tree::State::Open)
-      throw Error("node {} contains itself: remove the child that leads back to it", node);
+      throw Error("nodes[{}] contains itself: remove the child that leads back to it", node);
     if (levels_above + tree.levels > most_levels)
-      throw Error("node {} and its descendants are nested more than {} deep", node, most_levels);
+      throw Error("nodes[{}] and its descendants are nested more than {} deep", node, most_levels);
     if (tree.state == Tree::State::Known) return tree;
     tree.state = Tree::State::Open;
     tree.elements = nodes_[node].elements;
@@ -70,7 +62,7 @@ class NodeWalk {
       tree.elements += below.elements;
     }
     if (tree.nodes > most_nodes)
-      throw Error("node {} has more than {:g} descendants", node, most_nodes);
+      throw Error("nodes[{}] has more than {:g} descendants", node, most_nodes);
     tree.state = Tree::State::Known;
     return tree;
   }
@@ -148,58 +140,71 @@ std::size_t bytes_of(std::size_t component_type) {
 }
 
 void check_views(const json& gltf) {
-  const json none = json::array();
-  const auto views = gltf.value("bufferViews", none), buffers = gltf.value("buffers", none);
-  for (const json& view : views) {
-    const double end = view.value("byteOffset", 0.0) + view.at("byteLength").get<double>();
-    const json& buffer = buffers.at(whole(view.at("buffer")));
-    if (!(view.value("byteOffset", 0.0) >= 0 && end <= buffer.at("byteLength").get<double>())) {
-      throw Error("a view extends to byte {} of a buffer of {}", end,
-                  buffer.at("byteLength").dump());
-    }
+  for_each_in(gltf, "bufferViews", [&](const json& view) {
+    const double start = json_number(view, "byteOffset", 0),
+                 end = start + json_number(view, "byteLength");
+    const double length =
+        json_number(referred(gltf, "buffers", json_whole(view, "buffer")), "byteLength");
+    if (!(start >= 0 && end <= length))
+      throw Error("it extends to byte {} of a buffer of {}", end, length);
+  });
+  for_each_in(gltf, "accessors", [&](const json& accessor) {
+    if (!accessor.contains("bufferView")) return;
+    const json& view = referred(gltf, "bufferViews", json_whole(accessor, "bufferView"));
+    const auto element = static_cast<double>(components_of(json_text(accessor, "type")) *
+                                             bytes_of(json_whole(accessor, "componentType")));
+    const double start = json_number(accessor, "byteOffset", 0),
+                 count = json_number(accessor, "count");
+    const double end = start + (count - 1) * json_number(view, "byteStride", element) + element;
+    const double length = json_number(view, "byteLength");
+    if (!(start >= 0 && count >= 1 && end <= length))
+      throw Error("it extends to byte {} of a view of {}", end, length);
+  });
+}
+
+/// Returns the indices of a primitive's accessors, by names.
+const json& attributes_of(const json& primitive) {
+  const auto found = primitive.find("attributes");
+  if (found == primitive.end() || !found->is_object()) throw Error("attributes must be an object");
+  return *found;
+}
+
+/// Calls visit(primitive) for each primitive of each mesh.
+void for_each_primitive(const json& gltf, const auto& visit) {
+  for_each_in(gltf, "meshes", [&](const json& mesh) {
+    for_each_in(mesh, "primitives", [&](const json& primitive) { visit(primitive); });
+  });
+}
+
+/// Returns the number of elements of an accessor of a mesh, an `index` of the file's list.
+std::size_t count_of(const json& gltf, std::size_t index) {
+  const json& accessor = referred(gltf, "accessors", index);
+  if (accessor.contains("sparse")) {
+    throw Error("accessors[{}] is sparse, which is not supported: export the model without", index);
   }
-  for (const json& accessor : gltf.value("accessors", none)) {
-    if (accessor.contains("sparse"))
-      throw Error("sparse accessors are not supported: export the model without them");
-    if (!accessor.contains("bufferView")) continue;
-    const json& view = views.at(whole(accessor.at("bufferView")));
-    const auto element = static_cast<double>(components_of(accessor.at("type").get<std::string>()) *
-                                             bytes_of(whole(accessor.at("componentType"))));
-    const double offset = accessor.value("byteOffset", 0.0);
-    const double count = accessor.at("count").get<double>();
-    const double end = offset + (count - 1) * view.value("byteStride", element) + element;
-    if (!(offset >= 0 && count >= 1 && end <= view.at("byteLength").get<double>())) {
-      throw Error("an accessor extends to byte {} of a view of {}", end,
-                  view.at("byteLength").dump());
-    }
-  }
+  return json_whole(accessor, "count");
 }
 
 std::size_t triangles_of(const json& gltf) {
   std::size_t sum = 0;
-  for (const json& mesh : gltf.value("meshes", json::array())) {
-    for (const json& primitive : mesh.at("primitives")) {
-      // 4 triangles, 5 a strip, 6 a fan
-      const std::size_t mode = whole(primitive.value("mode", json(4)));
-      const auto own = primitive.find("indices");
-      const json& accessor =
-          own != primitive.end() ? *own : primitive.at("attributes").at("POSITION");
-      const std::size_t count = whole(gltf.at("accessors").at(whole(accessor)).at("count"));
-      if (mode == 4) sum += count / 3;
-      if (mode > 4 && count > 2) sum += count - 2;
-    }
-  }
+  for_each_primitive(gltf, [&](const json& primitive) {
+    // 4 triangles, 5 a strip, 6 a fan
+    const std::size_t mode = json_whole(json_number(primitive, "mode", 4), "mode");
+    std::size_t count = count_of(gltf, json_whole(attributes_of(primitive), "POSITION"));
+    if (primitive.contains("indices")) count = count_of(gltf, json_whole(primitive, "indices"));
+    if (mode == 4) sum += count / 3;
+    if (mode > 4 && count > 2) sum += count - 2;
+  });
   return sum;
 }
 
 /// Checks that all buffers and images are in the file or named files of its folder, and that files
 /// hold what buffers declare.
 void check_uris(const json& gltf, std::size_t chunk_bytes, const std::filesystem::path& path) {
-  const json none = json::array();
   const auto is_embedded = [](const std::string& uri) { return uri.starts_with("data:"); };
-  for (const json& buffer : gltf.value("buffers", none)) {
-    const std::string uri = buffer.value("uri", "");
-    const auto declared = buffer.at("byteLength").get<double>();
+  for_each_in(gltf, "buffers", [&](const json& buffer) {
+    const std::string uri = json_text(buffer, "uri");
+    const double declared = json_number(buffer, "byteLength");
     double bytes = static_cast<double>(chunk_bytes);
     if (is_embedded(uri)) {
       bytes = 0.75 * static_cast<double>(uri.size());  // base64; the rest is checked by assimp
@@ -207,38 +212,38 @@ void check_uris(const json& gltf, std::size_t chunk_bytes, const std::filesystem
       std::error_code fault;
       bytes = static_cast<double>(
           std::filesystem::file_size(path.parent_path() / name_beside(uri), fault));
-      if (fault) throw Error("its buffer {:?} cannot be read: {}", uri, fault.message());
+      if (fault) throw Error("{:?} cannot be read: {}", uri, fault.message());
     }
     if (!(declared <= bytes))
-      throw Error("a buffer of {} bytes has {} in its file: is it truncated?", declared, bytes);
-  }
-  for (const json& image : gltf.value("images", none)) {
-    const std::string uri = image.value("uri", "");
+      throw Error("it has {} bytes, but its file holds {}: is it truncated?", declared, bytes);
+  });
+  for_each_in(gltf, "images", [&](const json& image) {
+    const std::string uri = json_text(image, "uri");
     if (!uri.empty() && !is_embedded(uri)) static_cast<void>(name_beside(uri));
-  }
+  });
 }
 
 /// Numbers of vertices and indices of each mesh, each counted as often as a primitive refers to it.
 std::vector<double> elements_of_meshes(const json& gltf) {
-  const json none = json::array();
-  const json accessors = gltf.value("accessors", none);
-  const auto count = [&](const json& accessor) {
-    return accessors.at(whole(accessor)).at("count").get<double>();
-  };
   std::vector<double> sums;
-  for (const json& mesh : gltf.value("meshes", none)) {
+  for_each_in(gltf, "meshes", [&](const json& mesh) {
     double& sum = sums.emplace_back(0);
-    for (const json& primitive : mesh.at("primitives")) {
+    for_each_in(mesh, "primitives", [&](const json& primitive) {
       sum += 1;
-      for (const json& accessor : primitive.at("attributes")) sum += count(accessor);
-      if (primitive.contains("indices")) sum += count(primitive["indices"]);
-    }
-  }
+      const json& attributes = attributes_of(primitive);
+      for (const auto& attribute : attributes.items()) {
+        const std::size_t accessor = json_whole(attributes, attribute.key().c_str());
+        sum += static_cast<double>(count_of(gltf, accessor));
+      }
+      if (primitive.contains("indices"))
+        sum += static_cast<double>(count_of(gltf, json_whole(primitive, "indices")));
+    });
+  });
   return sums;
 }
 
 /// Checks a node's placement, of which assimp reads as many numbers as it needs.
-void check_placement(const json& node, std::size_t number) {
+void check_placement(const json& node) {
   for (const auto& [key, count] : {std::pair("matrix", 16U), std::pair("translation", 3U),
                                    std::pair("rotation", 4U), std::pair("scale", 3U)}) {
     const auto found = node.find(key);
@@ -247,46 +252,52 @@ void check_placement(const json& node, std::size_t number) {
                           std::ranges::all_of(*found, [](const json& value) {
                             return value.is_number() && std::isfinite(value.get<float>());
                           });
-    if (!is_sound) throw Error("node {}: its {} must be {} finite numbers", number, key, count);
+    if (!is_sound) throw Error("{} must be {} finite numbers", key, count);
   }
+}
+
+/// Returns the nodes that an entry lists under `key`, of which the file has `count`.
+std::vector<std::size_t> nodes_in(const json& entry, const char* key, std::size_t count) {
+  std::vector<std::size_t> nodes;
+  for (const json& listed : json_list(entry, key)) {
+    if (!listed.is_number()) throw Error("{} must be numbers of nodes", key);
+    nodes.push_back(json_whole(listed.get<double>(), key));
+    if (nodes.back() >= count) throw Error("there is no nodes[{}]", nodes.back());
+  }
+  return nodes;
 }
 
 /// Checks the nodes, and returns the number of elements of all meshes and their instances.
 double check_nodes(const json& gltf) {
-  const json none = json::array();
-  const json list = gltf.value("nodes", none);
+  const std::size_t count = json_list(gltf, "nodes").size();
   const std::vector<double> meshes = elements_of_meshes(gltf);
   std::vector<Node> nodes;
-  for (const json& from : list) {
-    check_placement(from, nodes.size());
+  for_each_in(gltf, "nodes", [&](const json& from) {
+    check_placement(from);
     Node& node = nodes.emplace_back();
     if (from.contains("mesh")) {
-      const auto mesh = whole(from["mesh"]);
-      if (mesh >= meshes.size()) {
-        throw Error("node {} has the mesh {}, but there are {}", nodes.size() - 1, mesh,
-                    meshes.size());
-      }
+      const std::size_t mesh = json_whole(from, "mesh");
+      if (mesh >= meshes.size()) throw Error("there is no meshes[{}]", mesh);
       node.elements = meshes[mesh];
     }
-    for (const json& child : from.value("children", none)) {
-      node.children.push_back(whole(child));
-      if (node.children.back() < list.size()) continue;
-      throw Error("node {} has the child {}, but there are {} nodes", nodes.size() - 1,
-                  child.dump(), list.size());
-    }
-  }
+    node.children = nodes_in(from, "children", count);
+  });
   NodeWalk walk(nodes);
   for (std::size_t i = 0; i < nodes.size(); ++i) walk.elements(i);
   double elements = std::accumulate(meshes.begin(), meshes.end(), 0.0);
-  for (const json& scene : gltf.value("scenes", none)) {
-    for (const json& root : scene.value("nodes", none)) {
-      const auto number = whole(root);
-      if (number >= nodes.size())
-        throw Error("a scene has the node {}, but there are {}", number, nodes.size());
-      elements += walk.elements(number);
-    }
-  }
+  for_each_in(gltf, "scenes", [&](const json& scene) {
+    for (const std::size_t root : nodes_in(scene, "nodes", count)) elements += walk.elements(root);
+  });
   return elements;
+}
+
+/// Checks that the file is glTF 2.
+void check_version(const json& gltf) {
+  const auto asset = gltf.find("asset");
+  if (asset == gltf.end() || !asset->is_object())
+    throw Error("it has no asset with a version: is it glTF?");
+  if (const std::string version = json_text(*asset, "version"); !version.starts_with("2."))
+    throw Error("asset.version = {:?}, but only glTF 2.0 is read", version);
 }
 
 /// Removes what groundray does not use, so that assimp does not read it: animations, skins, cameras
@@ -309,7 +320,7 @@ void strip(json& gltf) {
   }
   if (gltf.contains("images")) {
     for (json& image : gltf["images"])  // without a slash in it, assimp crashes
-      if (image.value("mimeType", "").find('/') == std::string::npos) image.erase("mimeType");
+      if (json_text(image, "mimeType").find('/') == std::string::npos) image.erase("mimeType");
   }
   if (!gltf.contains("meshes")) return;
   for (json& mesh : gltf["meshes"]) {
@@ -347,6 +358,7 @@ CheckedGltf check_gltf(std::string_view bytes, const std::filesystem::path& path
     const std::string_view text = json_of(bytes);
     check_nesting(text);
     json gltf = json::parse(text);
+    check_version(gltf);
     const std::string_view chunk = second_chunk(bytes, text);
     check_uris(gltf, chunk.size(), path);
     check_views(gltf);

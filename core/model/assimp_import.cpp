@@ -262,7 +262,7 @@ class FilesBeside : public Assimp::IOSystem {
 /// Returns the first sentence of assimp's reason, without its marks of a format and its name for
 /// the file.
 std::string words_of_assimp(std::string why) {
-  for (const std::string_view mark : {"GLTF: ", "STL: "})
+  for (const std::string_view mark : {"GLTF: ", "GLTF2: ", "STL: "})
     if (why.starts_with(mark)) why.erase(0, mark.size());
   if (const auto at = why.find(" for model."); at != std::string::npos) why.resize(at);
   for (char& c : why)
@@ -282,9 +282,9 @@ PolygonSoup read_scene(const std::filesystem::path& path, Form form, std::string
     importer.SetIOHandler(new FilesBeside(path.parent_path(), inner, std::move(bytes)));
     const aiScene* const scene = importer.ReadFile(inner, 0);
     if (scene == nullptr) {
-      throw Error("{}: {} cannot be read: {}; was the file cut short?", name,
-                  form == Form::Stl ? "its STL" : "its glTF",
-                  words_of_assimp(importer.GetErrorString()));
+      throw Error("{}: {} cannot be read: {}{}", name, form == Form::Stl ? "its STL" : "its glTF",
+                  words_of_assimp(importer.GetErrorString()),
+                  form == Form::Stl ? "; was the file cut short?" : "");
     }
     return SceneReader(*scene, form, name).read();
   } catch (const Error&) {

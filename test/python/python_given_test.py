@@ -76,6 +76,12 @@ class Failing:
         raise self.error
 
 
+def test_reasons_of_a_failed_conversion_may_be_any_text():
+    terrain = groundray.Terrain(np.zeros((5, 5), np.float32))
+    with pytest.raises(TypeError, match=r"but is a Failing: an odd \\ud800 and \\x00 reason"):
+        terrain.heights_at(Failing(ValueError("an odd \ud800 and \0 reason")))
+
+
 @pytest.mark.parametrize("error", [MemoryError, KeyboardInterrupt, RuntimeError])
 def test_exceptions_during_array_conversion_propagate(error):
     terrain = groundray.Terrain(np.zeros((5, 5), np.float32))
@@ -237,7 +243,8 @@ def test_numbers_may_have_any_form(dtype):
 def test_vertex_indices_may_have_another_byte_order_but_not_exceed_64_bits():
     triangles = np.array([[0, 1, 2]], ">i4")
     assert np.array_equal(groundray.Mesh(CORNERS, triangles).triangles, triangles)
-    with pytest.raises(groundray.Error, match="an integer of 18446744073709551615 is too large"):
+    rule = r"triangles must be integers of shape \(n, 3\), but is one with 18446744073709551615"
+    with pytest.raises(TypeError, match=rule):
         groundray.Mesh(CORNERS, np.array([[0, 1, 2**64 - 1]], np.uint64))
 
 

@@ -135,12 +135,15 @@ struct type_caster<groundray::python::NumpyArgument<Array>> {
     if ((flags & convert) == 0) return false;
     try {
       const object made = module_::import_("numpy").attr("asarray")(source);
-      if ((is_whole && !holds_whole(made)) || !take(native(made), flags, cleanup))
+      if (const std::string over = excess_of(made); !over.empty()) {
+        value = Argument(misfit(fmt::format("one with {}, which exceeds 2^63 - 1", over)));
+      } else if ((is_whole && !holds_whole(made)) || !take(native(made), flags, cleanup)) {
         value = Argument(misfit(form_of(made)));
+      }
     } catch (python_error& error) {
       if (!error.matches(PyExc_TypeError) && !error.matches(PyExc_ValueError)) throw;
       const std::string why =  // of its own, not of NumPy about values that are no numbers
-          hasattr(source, "__array__") ? fmt::format(": {}", str(error.value()).c_str()) : "";
+          hasattr(source, "__array__") ? ": " + printable(str(error.value())) : "";
       value = Argument(misfit(fmt::format("a {}{}", Py_TYPE(source.ptr())->tp_name, why)));
     }
     return true;
@@ -153,6 +156,24 @@ struct type_caster<groundray::python::NumpyArgument<Array>> {
     return true;
   }
 
+  // Returns a text of Python as UTF-8, with escapes for surrogates and NUL.
+  static std::string printable(const object& text) {
+    const auto bytes = cast<nanobind::bytes>(
+        text.attr("replace")(str("\0", 1), "\\x00").attr("encode")("utf-8", "backslashreplace"));
+    return {bytes.c_str(), bytes.size()};
+  }
+
+  // Returns the largest of unsigned integers if a signed one cannot hold it; else an empty text.
+  static std::string excess_of(const object& array) {
+    if (!is_whole || !str(array.attr("dtype").attr("kind")).equal(str("u")) ||
+        cast<std::size_t>(array.attr("size")) == 0)
+      return {};
+    const object largest = array.attr("max")();
+    const bool is_held = cast<std::uint64_t>(largest.attr("item")()) <=
+                         std::uint64_t{std::numeric_limits<std::int64_t>::max()};
+    return is_held ? "" : str(handle(largest)).c_str();
+  }
+
   // Returns an array of numbers in a form that the array's caster knows: in this machine's byte
   // order, and double instead of long double.
   static object native(const object& array) {
@@ -160,11 +181,6 @@ struct type_caster<groundray::python::NumpyArgument<Array>> {
     const bool is_wide = cast<int>(array.attr("dtype").attr("itemsize")) > 8;
     if (kind.equal(str("f")) && is_wide) return array.attr("astype")("float64");
     if (!kind.equal(str("f")) && !kind.equal(str("i")) && !kind.equal(str("u"))) return array;
-    if (is_whole && kind.equal(str("u")) && cast<std::size_t>(array.attr("size")) > 0) {
-      const object largest = array.attr("max")();
-      if (cast<std::uint64_t>(largest.attr("item")()) > std::numeric_limits<std::int64_t>::max())
-        throw groundray::Error("an integer of {} is too large", str(handle(largest)).c_str());
-    }
     const object order = array.attr("dtype").attr("newbyteorder")("=");
     return array.attr("astype")(order, arg("copy") = false);
   }

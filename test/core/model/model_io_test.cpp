@@ -5,6 +5,7 @@
 #include <gtest/gtest.h>
 
 #include <algorithm>
+#include <array>
 #include <chrono>
 #include <cmath>
 #include <cstdint>
@@ -540,30 +541,64 @@ TEST_F(ModelIo, RejectsFilesThatWouldCrashAssimp) {
   std::string json = wedge_gltf(R"({"mesh":0})", buffer);
   json.replace(json.find(R"("count":4)"), 9, R"("count":9)");
   EXPECT_THAT(error_of("a.glb", glb(json, wedge_binary())),
-              HasSubstr("an accessor extends to byte 108 of a view of 48"));
+              HasSubstr("accessors[0]: it extends to byte 108 of a view of 48"));
   json = wedge_gltf(R"({"mesh":0})", R"(],"buffers":[{"byteLength":90}])");
   EXPECT_THAT(error_of("a.glb", glb(json, wedge_binary())),
-              HasSubstr("a view extends to byte 96 of a buffer of 90"));
+              HasSubstr("bufferViews[1]: it extends to byte 96 of a buffer of 90"));
   EXPECT_THAT(error_of("a.gltf", "{"), HasSubstr("a.gltf: "));
   json = wedge_gltf(R"({"mesh":0})", buffer);
   json.replace(json.find(R"("count":4)"), 9, R"("sparse":{"count":1},"count":4)");
   EXPECT_THAT(error_of("a.glb", glb(json, wedge_binary())),
-              HasSubstr("sparse accessors are not supported"));
+              HasSubstr("accessors[0] is sparse, which is not supported"));
   json = wedge_gltf(R"({"mesh":1})", buffer);
   EXPECT_THAT(error_of("a.glb", glb(json, wedge_binary())),
-              HasSubstr("node 0 has the mesh 1, but there are 1"));
+              HasSubstr("nodes[0]: there is no meshes[1]"));
   json = wedge_gltf(R"({"mesh":1e99})", buffer);
   EXPECT_THAT(error_of("a.glb", glb(json, wedge_binary())),
-              HasSubstr("1e+99 must be a whole number"));
+              HasSubstr("nodes[0]: mesh = 1e+99 must be a whole number"));
 }
 
-// Animations and skins have accessors of their own, which assimp would read.
+TEST_F(ModelIo, NamesTheFaultyValueOfAGltf) {
+  put("wedge.bin", wedge_binary());
+  const std::string good = wedge_gltf(R"({"mesh":0})", bin_file);
+  const auto fault_of = [&](const std::string& was, const std::string& is) {
+    std::string bytes = good;
+    bytes.replace(bytes.find(was), was.size(), is);
+    return error_of("a.gltf", bytes);
+  };
+  const std::vector<std::array<std::string, 3>> faults{
+      {R"("2.0")", "2", "version must be a text, but its type is number"},
+      {R"("2.0")", R"("1.0")", "asset.version = \"1.0\", but only glTF 2.0 is read"},
+      {"asset", "other", "it has no asset with a version: is it glTF?"},
+      {R"("count":12)", R"("count":"12")", "accessors[1]: count must be a number, but its type is string"},
+      {R"("count":12)", R"("more":12)", "accessors[1]: count is missing"},
+      {R"("count":12)", R"("count":1.5)", "meshes[0]: primitives[0]: count = 1.5 must be a whole"},
+      {R"("bufferView":1)", R"("bufferView":2)", "accessors[1]: there is no bufferViews[2]"},
+      {R"("buffer":0)", R"("buffer":9)", "bufferViews[0]: there is no buffers[9]"},
+      {R"("POSITION":0)", R"("NORMAL":0)", "meshes[0]: primitives[0]: POSITION is missing"},
+      {R"("indices":1)", R"("indices":7)", "meshes[0]: primitives[0]: there is no accessors[7]"},
+      {R"([{"uri":"wedge.bin","byteLength":96}])", "[3]", "buffers[0]: must be an object"},
+      {R"("scenes":[{"nodes":[0]}])", R"("scenes":[{"nodes":["a"]}])", "scenes[0]: nodes must be"},
+      {"wedge.bin", "\xff", ": it is not UTF-8"},
+      {R"("indices":1})", R"("indices":1)", "its JSON is invalid at byte"},
+  };
+  for (const auto& [was, is, words] : faults)
+    EXPECT_THAT(fault_of(was, is), HasSubstr(words)) << is;
+  EXPECT_THAT(error_of("a.gltf", good.substr(0, 99)), HasSubstr("was the file cut short?"));
+}
+
+// Animations, skins and morph targets have accessors of their own, which assimp would read.
 TEST_F(ModelIo, IgnoresWhatIsNotShown) {
   put("wedge.bin", wedge_binary());
   const std::string animated = wedge_gltf(
       R"({"mesh":0,"skin":0,"camera":7})", bin_file,
       R"(,"skins":[{"joints":[99]}],"animations":[{"samplers":[{"input":99}],"channels":[]}])");
   EXPECT_EQ(read("a.gltf", animated).mesh.triangles.size(), 4u);
+  std::string morphed = wedge_gltf(R"({"mesh":0})", bin_file, "", R"(,"targets":[{"POSITION":2}])");
+  const std::string indices = R"("count":12})";
+  morphed.insert(morphed.find(indices) + indices.size(),
+                 R"(,{"componentType":5126,"type":"VEC3","count":4,"sparse":{"count":1}})");
+  EXPECT_EQ(read("a.gltf", morphed).mesh.triangles.size(), 4u);
 }
 
 TEST_F(ModelIo, ReadsNoFileOutsideItsFolder) {
@@ -645,11 +680,11 @@ TEST_F(ModelIo, RejectsGltfNestedTooDeep) {
   std::string chain;
   for (int i = 1; i <= 20'000; ++i) chain += fmt::format(R"({{"children":[{}]}},)", i);
   EXPECT_THAT(error_of("a.gltf", wedge_gltf(chain + R"({"mesh":0})", bin_file)),
-              HasSubstr("node 1000 and its descendants are nested more than 1000 deep"));
+              HasSubstr("nodes[1000] and its descendants are nested more than 1000 deep"));
   EXPECT_THAT(error_of("a.gltf", wedge_gltf(R"({"mesh":0,"children":[0]})", bin_file)),
-              HasSubstr("node 0 contains itself"));
+              HasSubstr("nodes[0] contains itself"));
   EXPECT_THAT(error_of("a.gltf", wedge_gltf(R"({"mesh":0,"children":[7]})", bin_file)),
-              HasSubstr("node 0 has the child 7, but there are 1 nodes"));
+              HasSubstr("nodes[0]: there is no nodes[7]"));
 }
 
 TEST_F(ModelIo, RejectsAMissingBuffer) {

@@ -2,13 +2,12 @@
 
 from __future__ import annotations
 
-import shutil
 from collections.abc import Callable, Sequence
 from pathlib import Path
 
 import numpy as np
 
-from groundray.dataset import Camera, Dataset, Error, Frame
+from groundray.dataset import Camera, Dataset, Error, Frame, read_text
 from groundray.export.images import (
     has_depths,
     has_pictures,
@@ -66,9 +65,8 @@ def _write_camera(
     else:
         notes.tell(f"camera {camera.name} has no depths (product truth): there is no depth.txt")
     _write_path(dataset, camera, times_ns, folder / "groundtruth.txt")
-    shutil.copyfile(
-        dataset.folder / "calibration" / f"{camera.name}.yaml", folder / "calibration.yaml"
-    )
+    calibration = read_text(dataset.folder / "calibration" / f"{camera.name}.yaml")
+    (folder / "calibration.yaml").write_text(calibration, encoding="utf-8")
     if camera.pinhole_matrix() is None:
         notes.tell(f"TUM RGB-D cannot express the lens of {camera.name}: see calibration.yaml")
     if camera.row_s:
