@@ -1,6 +1,7 @@
 #include <cpl_minixml.h>
 #include <cpl_string.h>
 #include <cpl_vsi.h>
+#include <fmt/format.h>
 
 #include <algorithm>
 #include <array>
@@ -19,6 +20,7 @@ namespace {
 
 constexpr int most_levels = 4;
 constexpr double most_sources = 1 << 20;
+constexpr int most_gcps = 10'000;  // a fit may leave them out one by one
 constexpr vsi_l_offset most_bytes = vsi_l_offset{64} << 20;
 // Work for each sample of a VRT: sources that cover it, and samples of theirs that it is made of (a
 // mosaic of 1 m in cells of 60 m has 3600). The rest allows for excerpts and previews.
@@ -28,6 +30,10 @@ constexpr double most_written = 64, most_read = 4096, rest = 1 << 28;
 // of any file or a decomposition of colours.
 constexpr std::array permitted_classes{"VRTRasterBand", "VRTSourcedRasterBand", "VRTWarpedDataset",
                                        "VRTWarpedRasterBand"};
+
+// Transformers of warps whose work or memory has no limit: splines through any number of points,
+// arrays of positions, and sensor models above other rasters.
+constexpr std::array refused_transformers{"TPSTransformer", "GeoLocTransformer", "RPCTransformer"};
 
 using Xml = std::unique_ptr<CPLXMLNode, decltype(&CPLDestroyXMLNode)>;
 
@@ -75,8 +81,8 @@ void for_each_below(const CPLXMLNode& node, const auto& take) {
 
 [[noreturn]] void refuse(std::string_view part, const std::string& vrt) {
   throw Error(
-      "the VRT {} has a {}; only mosaics and warps of files are read; if you trust it, convert "
-      "it:{}",
+      "the VRT {} has a {}; only mosaics and warps of files are read, these by projections and "
+      "polynomials; if you trust it, convert it:{}",
       vrt, part, command(vrt, "gdal_translate", "_converted.tif"));
 }
 
@@ -120,9 +126,14 @@ class VrtCheck {
       return static_cast<double>(std::strtol(CPLGetXMLValue(root, key, "0"), nullptr, 10));
     };
     extent.samples = size("rasterXSize") * size("rasterYSize");
+    int gcps = 0;
     for_each_node(*xml, [&](const CPLXMLNode& node) {
       if (node.eType != CXT_Element && node.eType != CXT_Attribute) return;
       if (EQUAL(node.pszValue, "subClass")) check_class(node, path);
+      if (EQUAL(node.pszValue, "GCP") && ++gcps > most_gcps)
+        throw Error("the VRT {} has more than {} ground control points", path, most_gcps);
+      for (const char* transformer : refused_transformers)
+        if (EQUAL(node.pszValue, transformer)) refuse(fmt::format("warp by {}", transformer), path);
       if (EQUAL(node.pszValue, "KernelFilteredSource")) refuse(node.pszValue, path);
       // ROOT_PATH, for one, would let the sources of a source be other files than those checked.
       if (EQUAL(node.pszValue, "OpenOptions")) refuse("source with OpenOptions", path);

@@ -116,6 +116,14 @@ TEST_F(RasterInput, NamesOfFilesAreLocal) {
 TEST_F(RasterInput, VrtsHoldOnlyMosaicsAndWarpsOfRasters) {
   write("notes.txt", "no raster");
   const std::string code = "<PixelFunctionType>sum</PixelFunctionType>" + source("sound.tif");
+  const auto warped_by = [](const std::string& transformer) {
+    return R"(<VRTDataset rasterXSize="8" rasterYSize="8" subClass="VRTWarpedDataset">)"
+           R"(<GDALWarpOptions><SourceDataset relativeToVRT="1">sound.tif</SourceDataset>)"
+           "<Transformer>" +
+           transformer + "</Transformer></GDALWarpOptions></VRTDataset>";
+  };
+  std::string gcps;
+  for (int i = 0; i <= 10'000; ++i) gcps += R"(<GCP Pixel="0" Line="0" X="0" Y="0"/>)";
   struct Case {
     std::string text;
     std::string message;
@@ -130,6 +138,12 @@ TEST_F(RasterInput, VrtsHoldOnlyMosaicsAndWarpsOfRasters) {
        "has a VRTPansharpenedDataset"},
       {vrt(R"(<SimpleSource><SourceFilename relativeToVRT="1">sound.tif</SourceFilename><OpenOptions><OOI key="ROOT_PATH">/tmp</OOI></OpenOptions></SimpleSource>)"),
        "dem.tif has a source with OpenOptions"},
+      {warped_by("<TPSTransformer/>"), "has a warp by TPSTransformer; only mosaics and warps"},
+      {warped_by("<GeoLocTransformer/>"),
+       "has a warp by GeoLocTransformer; only mosaics and warps"},
+      {warped_by("<RPCTransformer/>"), "has a warp by RPCTransformer; only mosaics and warps"},
+      {warped_by("<GCPTransformer><GCPList>" + gcps + "</GCPList></GCPTransformer>"),
+       "has more than 10000 ground control points"},
       {vrt(source("gone.tif")), "gone.tif: there is no such file"},
       {vrt(source("notes.txt")), "notes.txt: it cannot be opened as a raster: it is in none of"},
       {"<VRTDataset rasterXSize=\"8\"", "dem.tif cannot be read: Parse error"},
