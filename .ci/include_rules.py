@@ -101,7 +101,7 @@ PYTHON_CALLS = {
     r"\b(?<!\.)open\(|\.read_(text|bytes)\(|np\.(load|fromfile|memmap|loadtxt|genfromtxt)\(": (
         "dataset.py"
     ),
-    r"\bshutil\.copy|\bZipFile\(|\bTarFile\(": "",
+    r"\bshutil\.copy|\bcopyfile(obj)?\(|\bZipFile\(|\bTarFile\(": "",
     r"\.open\(": "export/las.py export/mcap_file.py export/images.py dataset.py",
 }
 

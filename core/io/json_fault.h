@@ -14,6 +14,7 @@ inline std::string fault_in_words(const nlohmann::json::exception& fault) {
   constexpr int no_such_key = 403;
   std::string_view why = fault.what();
   if (const auto* parse = dynamic_cast<const nlohmann::json::parse_error*>(&fault)) {
+    why = why.substr(0, why.find("; last read"));  // what follows is the file's own text
     const char* reason = "";
     if (why.find("unexpected end of input") != why.npos || why.find("missing closing") != why.npos)
       reason = "; was the file cut short?";

@@ -1,13 +1,14 @@
 #include <fmt/format.h>
 
 #include <algorithm>
+#include <array>
 #include <cmath>
 #include <cstdint>
 #include <cstring>
+#include <map>
 #include <nlohmann/json.hpp>
 #include <numeric>
 #include <optional>
-#include <set>
 #include <string>
 #include <utility>
 #include <vector>
@@ -30,15 +31,19 @@ struct Node {
 /// Checks that the traversal of all nodes ends, as assimp assumes, and counts what it yields.
 class NodeWalk {
  public:
+  static constexpr double most_nodes = 1e6;
+
   explicit NodeWalk(const std::vector<Node>& nodes) : nodes_(nodes), trees_(nodes.size()) {}
 
   /// Returns the number of elements of a node and its descendants, each counted as often as it is a
   /// child.
   double elements(std::size_t node) { return walk(node, 0).elements; }
 
+  /// Returns the number of a node and its descendants, each counted as often as it is a child.
+  double nodes(std::size_t node) { return walk(node, 0).nodes; }
+
  private:
   static constexpr int most_levels = 1000;
-  static constexpr double most_nodes = 1e6;
 
   struct Tree {
     enum class State { New, Open, Known } state = State::New;
@@ -127,46 +132,40 @@ void check_nesting(std::string_view text) {
   }
 }
 
-std::size_t components_of(const std::string& type) {
-  if (type == "SCALAR") return 1;
-  if (type == "MAT4") return 16;
-  if (type == "MAT3") return 9;
-  return type == "VEC2" ? 2 : type == "VEC3" ? 3 : 4;
-}
-
-std::size_t bytes_of(std::size_t component_type) {
-  if (component_type == 5120 || component_type == 5121) return 1;
-  return component_type == 5122 || component_type == 5123 ? 2 : 4;
+/// Returns the bytes of an element of an accessor.
+double element_bytes(const json& accessor) {
+  static const std::map<std::string, int> components{
+      {"SCALAR", 1}, {"VEC2", 2}, {"VEC3", 3}, {"VEC4", 4}, {"MAT2", 4}, {"MAT3", 9}, {"MAT4", 16}};
+  static const std::map<std::size_t, int> bytes{{5120, 1}, {5121, 1}, {5122, 2},
+                                                {5123, 2}, {5125, 4}, {5126, 4}};
+  const auto type = components.find(json_text(accessor, "type"));
+  if (type == components.end())
+    throw Error("type must be SCALAR, VEC2, VEC3, VEC4, MAT2, MAT3 or MAT4");
+  const auto component = bytes.find(json_whole(accessor, "componentType"));
+  if (component == bytes.end()) throw Error("componentType must be 5120 to 5123, 5125 or 5126");
+  return type->second * component->second;
 }
 
 void check_views(const json& gltf) {
+  const auto number = [](const json& entry, const char* key, std::optional<double> absent = {}) {
+    return static_cast<double>(json_whole(entry, key, absent));
+  };
   for_each_in(gltf, "bufferViews", [&](const json& view) {
-    const double start = json_number(view, "byteOffset", 0),
-                 end = start + json_number(view, "byteLength");
+    const double end = number(view, "byteOffset", 0) + number(view, "byteLength");
     const double length =
-        json_number(referred(gltf, "buffers", json_whole(view, "buffer")), "byteLength");
-    if (!(start >= 0 && end <= length))
-      throw Error("it extends to byte {} of a buffer of {}", end, length);
+        number(referred(gltf, "buffers", json_whole(view, "buffer")), "byteLength");
+    if (end > length) throw Error("it extends to byte {} of a buffer of {}", end, length);
   });
   for_each_in(gltf, "accessors", [&](const json& accessor) {
     if (!accessor.contains("bufferView")) return;
     const json& view = referred(gltf, "bufferViews", json_whole(accessor, "bufferView"));
-    const auto element = static_cast<double>(components_of(json_text(accessor, "type")) *
-                                             bytes_of(json_whole(accessor, "componentType")));
-    const double start = json_number(accessor, "byteOffset", 0),
-                 count = json_number(accessor, "count");
-    const double end = start + (count - 1) * json_number(view, "byteStride", element) + element;
-    const double length = json_number(view, "byteLength");
-    if (!(start >= 0 && count >= 1 && end <= length))
-      throw Error("it extends to byte {} of a view of {}", end, length);
+    const double element = element_bytes(accessor), count = number(accessor, "count");
+    if (count < 1) throw Error("count must be at least 1");
+    const double end = number(accessor, "byteOffset", 0) +
+                       (count - 1) * number(view, "byteStride", element) + element;
+    const double length = number(view, "byteLength");
+    if (end > length) throw Error("it extends to byte {} of a view of {}", end, length);
   });
-}
-
-/// Returns the indices of a primitive's accessors, by names.
-const json& attributes_of(const json& primitive) {
-  const auto found = primitive.find("attributes");
-  if (found == primitive.end() || !found->is_object()) throw Error("attributes must be an object");
-  return *found;
 }
 
 /// Calls visit(primitive) for each primitive of each mesh.
@@ -180,22 +179,36 @@ void for_each_primitive(const json& gltf, const auto& visit) {
 std::size_t count_of(const json& gltf, std::size_t index) {
   const json& accessor = referred(gltf, "accessors", index);
   if (accessor.contains("sparse")) {
-    throw Error("accessors[{}] is sparse, which is not supported: export the model without", index);
+    throw Error(
+        "accessors[{}] is sparse, which is not read: export the model without sparse accessors",
+        index);
   }
   return json_whole(accessor, "count");
 }
 
 std::size_t triangles_of(const json& gltf) {
+  constexpr std::array<std::size_t, 7> least{1, 2, 2, 2, 3, 3, 3};  // vertices, by mode
   std::size_t sum = 0;
   for_each_primitive(gltf, [&](const json& primitive) {
     // 4 triangles, 5 a strip, 6 a fan
-    const std::size_t mode = json_whole(json_number(primitive, "mode", 4), "mode");
-    std::size_t count = count_of(gltf, json_whole(attributes_of(primitive), "POSITION"));
-    if (primitive.contains("indices")) count = count_of(gltf, json_whole(primitive, "indices"));
+    const std::size_t mode = json_whole(primitive, "mode", 4);
+    if (mode >= least.size()) throw Error("mode = {} must be 0 to 6", mode);
+    const json& own = primitive.contains("indices") ? primitive : primitive["attributes"];
+    const std::size_t count =
+        count_of(gltf, json_whole(own, &own == &primitive ? "indices" : "POSITION"));
+    if (count < least[mode]) throw Error("{} vertices are too few for its mode, {}", count, mode);
     if (mode == 4) sum += count / 3;
-    if (mode > 4 && count > 2) sum += count - 2;
+    if (mode > 4) sum += count - 2;
   });
   return sum;
+}
+
+/// Returns the address of an entry's data: part of the file, or the name of another.
+std::string uri_of(const json& entry) {
+  const std::string uri = json_text(entry, "uri");
+  const auto is_control = [](char c) { return static_cast<unsigned char>(c) < ' '; };
+  if (std::ranges::any_of(uri, is_control)) throw Error("its uri has control characters");
+  return uri;
 }
 
 /// Checks that all buffers and images are in the file or named files of its folder, and that files
@@ -203,8 +216,8 @@ std::size_t triangles_of(const json& gltf) {
 void check_uris(const json& gltf, std::size_t chunk_bytes, const std::filesystem::path& path) {
   const auto is_embedded = [](const std::string& uri) { return uri.starts_with("data:"); };
   for_each_in(gltf, "buffers", [&](const json& buffer) {
-    const std::string uri = json_text(buffer, "uri");
-    const double declared = json_number(buffer, "byteLength");
+    const std::string uri = uri_of(buffer);
+    const std::size_t declared = json_whole(buffer, "byteLength");
     double bytes = static_cast<double>(chunk_bytes);
     if (is_embedded(uri)) {
       bytes = 0.75 * static_cast<double>(uri.size());  // base64; the rest is checked by assimp
@@ -214,12 +227,18 @@ void check_uris(const json& gltf, std::size_t chunk_bytes, const std::filesystem
           std::filesystem::file_size(path.parent_path() / name_beside(uri), fault));
       if (fault) throw Error("{:?} cannot be read: {}", uri, fault.message());
     }
-    if (!(declared <= bytes))
-      throw Error("it has {} bytes, but its file holds {}: is it truncated?", declared, bytes);
+    if (static_cast<double>(declared) > bytes) {
+      throw Error("it has {} bytes, but its data {}: is it truncated?", declared,
+                  std::floor(bytes));
+    }
   });
   for_each_in(gltf, "images", [&](const json& image) {
-    const std::string uri = json_text(image, "uri");
+    const std::string uri = uri_of(image);
     if (!uri.empty() && !is_embedded(uri)) static_cast<void>(name_beside(uri));
+    if (!is_embedded(uri)) return;
+    const std::string_view type = std::string_view(uri).substr(5, uri.find_first_of(";,") - 5);
+    if (!type.empty() && type.find('/') == type.npos)  // assimp crashes
+      throw Error("its media type must be image/png or image/jpeg");
   });
 }
 
@@ -230,7 +249,7 @@ std::vector<double> elements_of_meshes(const json& gltf) {
     double& sum = sums.emplace_back(0);
     for_each_in(mesh, "primitives", [&](const json& primitive) {
       sum += 1;
-      const json& attributes = attributes_of(primitive);
+      const json& attributes = primitive["attributes"];
       for (const auto& attribute : attributes.items()) {
         const std::size_t accessor = json_whole(attributes, attribute.key().c_str());
         sum += static_cast<double>(count_of(gltf, accessor));
@@ -267,7 +286,7 @@ std::vector<std::size_t> nodes_in(const json& entry, const char* key, std::size_
   return nodes;
 }
 
-/// Checks the nodes, and returns the number of elements of all meshes and their instances.
+/// Checks the nodes, and returns the memory of all meshes, their instances and nodes.
 double check_nodes(const json& gltf) {
   const std::size_t count = json_list(gltf, "nodes").size();
   const std::vector<double> meshes = elements_of_meshes(gltf);
@@ -284,11 +303,18 @@ double check_nodes(const json& gltf) {
   });
   NodeWalk walk(nodes);
   for (std::size_t i = 0; i < nodes.size(); ++i) walk.elements(i);
-  double elements = std::accumulate(meshes.begin(), meshes.end(), 0.0);
+  // In assimp's structures and in those of the model.
+  constexpr double bytes_per_element = 100, bytes_per_node = 1200;
+  double elements = std::accumulate(meshes.begin(), meshes.end(), 0.0), shown = 0;
   for_each_in(gltf, "scenes", [&](const json& scene) {
-    for (const std::size_t root : nodes_in(scene, "nodes", count)) elements += walk.elements(root);
+    for (const std::size_t root : nodes_in(scene, "nodes", count)) {
+      elements += walk.elements(root);
+      shown += walk.nodes(root);
+      if (shown > NodeWalk::most_nodes)
+        throw Error("its nodes have more than {:g} descendants", NodeWalk::most_nodes);
+    }
   });
-  return elements;
+  return bytes_per_element * elements + bytes_per_node * shown;
 }
 
 /// Checks that the file is glTF 2.
@@ -296,37 +322,11 @@ void check_version(const json& gltf) {
   const auto asset = gltf.find("asset");
   if (asset == gltf.end() || !asset->is_object())
     throw Error("it has no asset with a version: is it glTF?");
-  if (const std::string version = json_text(*asset, "version"); !version.starts_with("2."))
-    throw Error("asset.version = {:?}, but only glTF 2.0 is read", version);
-}
-
-/// Removes what groundray does not use, so that assimp does not read it: animations, skins, cameras
-/// and others.
-void strip(json& gltf) {
-  static const std::set<std::string> used{"asset",       "scene",
-                                          "scenes",      "nodes",
-                                          "meshes",      "accessors",
-                                          "bufferViews", "buffers",
-                                          "textures",    "images",
-                                          "samplers",    "extensionsUsed",
-                                          "materials",   "extensionsRequired"};
-  json kept = json::object();
-  for (const auto& [key, value] : gltf.items())
-    if (used.contains(key)) kept[key] = value;
-  gltf = std::move(kept);
-  if (gltf.contains("nodes")) {
-    for (json& node : gltf["nodes"])
-      for (const char* key : {"skin", "camera", "weights", "extensions", "extras"}) node.erase(key);
-  }
-  if (gltf.contains("images")) {
-    for (json& image : gltf["images"])  // without a slash in it, assimp crashes
-      if (json_text(image, "mimeType").find('/') == std::string::npos) image.erase("mimeType");
-  }
-  if (!gltf.contains("meshes")) return;
-  for (json& mesh : gltf["meshes"]) {
-    mesh.erase("weights");
-    for (json& primitive : mesh.at("primitives")) primitive.erase("targets");
-  }
+  const auto version = asset->find("version");
+  if (version == asset->end() || !version->is_string())
+    throw Error("asset.version must be a text, such as \"2.0\"");
+  if (!version->get<std::string>().starts_with("2."))
+    throw Error("asset.version = {}, but only glTF 2 is read", version->dump());
 }
 
 /// Returns the file for assimp: JSON, or a .glb if there is a second chunk.
@@ -351,20 +351,19 @@ std::string file_of(const json& gltf, std::string_view chunk) {
 }  // namespace
 
 CheckedGltf check_gltf(std::string_view bytes, const std::filesystem::path& path) {
-  constexpr double bytes_per_element = 100;  // in assimp's structures and in those of the model
-  double elements = 0;
+  double bytes_taken = 0;
   CheckedGltf checked;
   try {
     const std::string_view text = json_of(bytes);
     check_nesting(text);
     json gltf = json::parse(text);
     check_version(gltf);
+    strip_gltf(gltf);
     const std::string_view chunk = second_chunk(bytes, text);
     check_uris(gltf, chunk.size(), path);
     check_views(gltf);
-    elements = check_nodes(gltf);
+    bytes_taken = check_nodes(gltf);
     checked.triangles = triangles_of(gltf);
-    strip(gltf);
     checked.is_binary = !chunk.empty();
     checked.bytes = file_of(gltf, chunk);
   } catch (const json::exception& fault) {
@@ -372,7 +371,7 @@ CheckedGltf check_gltf(std::string_view bytes, const std::filesystem::path& path
   } catch (const Error& fault) {
     throw Error("{}: {}", path.string(), fault.what());
   }
-  require_memory(path.string(), "its meshes and their instances", bytes_per_element * elements);
+  require_memory(path.string(), "its meshes and their instances", bytes_taken);
   return checked;
 }
 

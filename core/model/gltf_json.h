@@ -8,8 +8,8 @@
 
 #include "core/error.h"
 
-/// Values of a glTF file's JSON. All functions throw Error, with the name of the value and what it
-/// must be.
+/// Values of a glTF file's JSON. The functions throw Error, with the name of the value and what it
+/// must be. Entries must be objects.
 namespace groundray {
 
 using nlohmann::json;
@@ -31,8 +31,10 @@ inline std::size_t json_whole(double value, const char* key) {
   return static_cast<std::size_t>(value);
 }
 
-inline std::size_t json_whole(const json& entry, const char* key) {
-  return json_whole(json_number(entry, key), key);
+/// Returns a whole number of an entry, or `absent` if the entry has none.
+inline std::size_t json_whole(const json& entry, const char* key,
+                              std::optional<double> absent = {}) {
+  return json_whole(json_number(entry, key, absent), key);
 }
 
 /// Returns a text of an entry; an empty one if the entry has none.
@@ -54,10 +56,19 @@ inline const json& json_list(const json& entry, const char* key) {
   return *found;
 }
 
+/// Returns an object of an entry.
+inline const json& json_object(const json& entry, const char* key) {
+  const auto found = entry.find(key);
+  if (found == entry.end()) throw Error("{} is missing", key);
+  if (!found->is_object()) throw Error("{} must be an object", key);
+  return *found;
+}
+
 /// Calls visit(object) for each object of a list; faults are named by list and number.
-void for_each_in(const json& entry, const char* key, const auto& visit) {
+void for_each_in(auto& entry, const char* key, const auto& visit) {
+  if (json_list(entry, key).empty()) return;
   std::size_t at = 0;
-  for (const json& object : json_list(entry, key)) {
+  for (auto& object : *entry.find(key)) {
     try {
       if (!object.is_object())
         throw Error("must be an object, but its type is {}", object.type_name());
@@ -76,5 +87,9 @@ inline const json& referred(const json& gltf, const char* key, std::size_t index
   if (!entries[index].is_object()) throw Error("{}[{}] must be an object", key, index);
   return entries[index];
 }
+
+/// Removes what groundray does not use, so that assimp does not read it: animations, skins,
+/// cameras, extensions and others.
+void strip_gltf(json& gltf);
 
 }  // namespace groundray

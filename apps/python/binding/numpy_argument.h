@@ -136,14 +136,15 @@ struct type_caster<groundray::python::NumpyArgument<Array>> {
     try {
       const object made = module_::import_("numpy").attr("asarray")(source);
       if (const std::string over = excess_of(made); !over.empty()) {
-        value = Argument(misfit(fmt::format("one with {}, which exceeds 2^63 - 1", over)));
+        value = Argument(misfit(fmt::format("an array with {}, which exceeds 2^63 - 1", over)));
       } else if ((is_whole && !holds_whole(made)) || !take(native(made), flags, cleanup)) {
         value = Argument(misfit(form_of(made)));
       }
     } catch (python_error& error) {
       if (!error.matches(PyExc_TypeError) && !error.matches(PyExc_ValueError)) throw;
-      const std::string why =  // of its own, not of NumPy about values that are no numbers
-          hasattr(source, "__array__") ? ": " + printable(str(error.value())) : "";
+      std::string why;  // of its own, not of NumPy about values that are no numbers
+      if (hasattr(source, "__array__")) why = printable(str(error.value()));
+      if (!why.empty()) why.insert(0, ": ");
       value = Argument(misfit(fmt::format("a {}{}", Py_TYPE(source.ptr())->tp_name, why)));
     }
     return true;
