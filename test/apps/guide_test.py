@@ -51,17 +51,8 @@ def folders(tmp_path_factory: pytest.TempPathFactory) -> dict[str, Path]:
         folder = made[page] = tmp_path_factory.mktemp(Path(page).stem)
         leave_out = shutil.ignore_patterns("*.groundray")
         shutil.copytree(ROOT / "data", folder / "data", ignore=leave_out)
-        write_programs(folder / "bin")
     make_small_demo(made["README.md"])
     return made
-
-
-def write_programs(folder: Path) -> None:
-    """The commands that `pip install .` puts on the path."""
-    folder.mkdir()
-    program = folder / "groundray-export"
-    program.write_text(f'#!/bin/sh\nexec {sys.executable} -m groundray.export.command "$@"\n')
-    program.chmod(0o755)
 
 
 def make_small_demo(folder: Path) -> None:
@@ -91,7 +82,7 @@ def make_small_demo(folder: Path) -> None:
 
 def environment(folder: Path) -> dict[str, str]:
     """The shell's environment, with the programs and this Python first, without a display."""
-    first = [PROGRAMS, folder / "bin", Path(sys.executable).parent]
+    first = [PROGRAMS, Path(sys.executable).parent]
     path = os.pathsep.join([*map(str, first), os.environ["PATH"]])
     hidden = ("DISPLAY", "WAYLAND_DISPLAY")
     return {name: value for name, value in os.environ.items() if name not in hidden} | {

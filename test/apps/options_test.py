@@ -1,16 +1,13 @@
 """Options on pages of docs exist in the programs."""
 
 import functools
-import os
 import re
 import subprocess
-import sys
 from pathlib import Path
 
 from markdown_page import PAGES, ROOT, Page, name_of
 
 PROGRAMS = ROOT / "build/release/bin"
-PACKAGE = ROOT / "build/release/python"
 COMMANDS = {
     "groundray": [
         *("generate", "verify", "merge", "info"),
@@ -28,12 +25,8 @@ CALL = re.compile(r"(?<![\w/.-])(groundray(?:-golden|-view|-export)?)(?= )([^|;&
 
 @functools.cache
 def help_of(program: str, command: str) -> str:
-    called = [str(PROGRAMS / program), *command.split()]
-    if program == "groundray-export":
-        called = [sys.executable, "-m", "groundray.export.command"]
     result = subprocess.run(
-        [*called, "--help"],
-        env={**os.environ, "PYTHONPATH": str(PACKAGE)},
+        [PROGRAMS / program, *command.split(), "--help"],
         capture_output=True,
         text=True,
         timeout=60,

@@ -15,7 +15,7 @@ from export_runs import PACKAGE, export, fails, names_in, run_folder
 from groundray.export import clouds
 
 FORMS = ["kitti", "semantic-kitti", "tum", "pcd", "las", "laz", "npz", "mcap"]
-COMMAND = [sys.executable, "-m", "groundray.export.command"]
+COMMAND = [sys.executable, "-m", "groundray.export"]
 
 
 @pytest.fixture

@@ -169,7 +169,7 @@ def test_the_installed_program_runs(installed):
     reported = run(installed / "bin/groundray-export", "--help", PYTHONPATH=str(installed))
     assert reported.startswith("usage: groundray-export ")
     module = run(
-        *(sys.executable, "-P", "-m", "groundray.export.command", "--help"),
+        *(sys.executable, "-P", "-m", "groundray.export", "--help"),
         PYTHONPATH=str(installed),
     )
     assert module == reported

@@ -3,7 +3,6 @@
 import os
 import shutil
 import subprocess
-import sys
 from collections.abc import Callable
 from dataclasses import dataclass, field
 from pathlib import Path
@@ -11,7 +10,6 @@ from pathlib import Path
 from dataset_runs import ROOT
 
 BIN = Path(os.environ.get("GROUNDRAY", ROOT / "build/release/bin/groundray")).parent
-PACKAGE = ROOT / "build/release/python"
 
 LIDAR = """\
 groundray_lidar: 1
@@ -72,13 +70,10 @@ f 1 3 4
 
 
 def run(program: str, *arguments: str, cwd: Path) -> subprocess.CompletedProcess[str]:
-    called = [str(BIN / program)]
-    if program == "groundray-export":
-        called = [sys.executable, "-m", "groundray.export.command"]
     return subprocess.run(
-        [*called, *arguments],
+        [BIN / program, *arguments],
         cwd=cwd,
-        env={**os.environ, "PYTHONPATH": str(PACKAGE), "COLUMNS": "1000"},
+        env={**os.environ, "COLUMNS": "1000"},
         capture_output=True,
         text=True,
         timeout=120,

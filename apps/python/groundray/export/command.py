@@ -327,7 +327,3 @@ def main(arguments: Sequence[str] | None = None) -> int:
         print(f"note: {line}")
     print(f"{options.output}: {told}")
     return DONE
-
-
-if __name__ == "__main__":
-    sys.exit(main())
