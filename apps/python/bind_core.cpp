@@ -31,7 +31,8 @@ void bind_points(nb::module_& module) {
 
 points["range_true_m"] is a column as a NumPy array, a read-only view that keeps the table alive.
 Names are those of the files (docs/reference/formats.md) with their units:
-docs/guide/python.md lists them. dict(points) is a dict of all columns; len(points) counts rows.)")
+docs/guide/python.md lists them. dict(points) is a dict of all columns; len(points) counts rows.
+points[points["label"] == 10] and points[::2] select rows: Points of their own.)")
       .def("__len__", [](const Points& points) { return points.cloud.rows(); })
       .def(
           "__getitem__",
@@ -39,6 +40,13 @@ docs/guide/python.md lists them. dict(points) is a dict of all columns; len(poin
             return column_of(nb::cast<const Points&>(self), name, self);
           },
           "name"_a, "The column of this name, n values: a view.")
+      .def("__getitem__", &selected, "rows"_a.none(),
+           nb::sig("def __getitem__(self, rows: slice | collections.abc.Sequence[int] | "
+                   "numpy.typing.NDArray[typing.Any], /) -> Points"),
+           "The rows that a slice, a mask or indices select, in that order: a copy.")
+      .def_prop_ro("xyz_m", &xyz_of, nb::rv_policy::automatic,
+                   "The columns x_m, y_m, z_m as an array of n x 3, a copy: what Open3D, SciPy and "
+                   "others take.")
       .def("__contains__", &has, "name"_a)
       .def(
           "__iter__", [](const Points& points) { return nb::iter(nb::cast(names_of(points))); },

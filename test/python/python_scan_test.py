@@ -44,6 +44,53 @@ def test_scan_from_python_has_the_same_bytes_as_generate(made, sensor):
             assert scan[name].tobytes() == file[name].tobytes(), name
 
 
+def test_rows_are_selected_by_slices_masks_and_indices(lidar):
+    scan = lidar.scan(frame=0)
+    near = scan["range_true_m"] < np.median(scan["range_true_m"])
+    for rows in (near, np.flatnonzero(near), slice(None, None, -3), [4, -1, 4], slice(0, 0)):
+        part = scan[rows]
+        assert isinstance(part, groundray.Points)
+        assert part.columns == scan.columns
+        assert len(part) == len(scan["x_m"][rows])
+        for name in scan:
+            assert part[name].dtype == scan[name].dtype
+            assert part[name].tobytes() == scan[name][rows].tobytes(), name
+
+
+@pytest.mark.parametrize(
+    ("rows", "error", "words"),
+    [
+        (3, TypeError, r"one row is points\[i : i \+ 1\]"),
+        (None, TypeError, "selects rows by a slice, a mask or indices"),
+        ([0.5], IndexError, "integer or boolean arrays are valid indices"),
+        ([10**9], IndexError, "out of bounds"),
+        ([True, False], IndexError, "boolean index did not match"),
+        ("x", KeyError, "there is no column 'x'; there are x_m, y_m, z_m"),
+    ],
+)
+def test_rows_that_cannot_be_selected_are_explained(lidar, rows, error, words):
+    with pytest.raises(error, match=words):
+        lidar.scan(frame=0)[rows]
+
+
+def test_xyz_has_the_points_as_rows(lidar, tmp_path):
+    scan = lidar.scan(frame=0)
+    assert scan.xyz_m.dtype == scan["x_m"].dtype
+    assert np.array_equal(scan.xyz_m, np.stack([scan["x_m"], scan["y_m"], scan["z_m"]], axis=1))
+    assert scan[:0].xyz_m.shape == (0, 3)
+    (tmp_path / "flat.ply").write_text(
+        "ply\nformat ascii 1.0\nelement vertex 1\nproperty double x\nproperty double y\n"
+        "end_header\n1 2\n"
+    )
+    with pytest.raises(KeyError, match="there is no column 'z_m'; there are x_m, y_m"):
+        _ = groundray.load_points(tmp_path / "flat.ply").xyz_m
+    (tmp_path / "mixed.ply").write_text(
+        "ply\nformat ascii 1.0\nelement vertex 1\nproperty double x\nproperty float y\n"
+        "property int z\nend_header\n1 2 3\n"
+    )
+    assert groundray.load_points(tmp_path / "mixed.ply").xyz_m.tolist() == [[1, 2, 3]]
+
+
 def test_no_returns_and_waveforms_have_the_same_bytes_as_generate(made):
     folder, scene = made
     scan = scene.lidar("light").scan(frame=1)

@@ -5,6 +5,8 @@
 
 #include <algorithm>
 #include <array>
+#include <cstdint>
+#include <span>
 #include <string_view>
 #include <utility>
 #include <variant>
@@ -39,6 +41,12 @@ std::vector<std::string> names_of(const Points& points) {
   return names;
 }
 
+[[noreturn]] static void throw_missing(const Points& points, const std::string& name) {
+  const std::string text =
+      fmt::format("there is no column '{}'; there are {}", name, fmt::join(names_of(points), ", "));
+  throw nb::key_error(text.c_str());
+}
+
 AnyArray column_of(const Points& points, const std::string& name, nb::handle owner) {
   for (const PointCloud::Column& column : points.cloud.columns()) {
     if (name_with_unit(column.name) != name) continue;
@@ -46,9 +54,56 @@ AnyArray column_of(const Points& points, const std::string& name, nb::handle own
         [&](const auto& values) { return view(values.data(), {values.size()}, owner); },
         column.values);
   }
-  const std::string text =
-      fmt::format("there is no column '{}'; there are {}", name, fmt::join(names_of(points), ", "));
-  throw nb::key_error(text.c_str());
+  throw_missing(points, name);
+}
+
+AnyArray xyz_of(const Points& points) {
+  const std::vector<PointCloud::Column>& columns = points.cloud.columns();
+  std::array<const PointCloud::AnyValues*, 3> axes{};
+  for (const std::size_t axis : {0, 1, 2}) {
+    const std::string name(1, "xyz"[axis]);
+    const auto found = std::ranges::find(columns, name, &PointCloud::Column::name);
+    if (found == columns.end()) throw_missing(points, name_with_unit(name));
+    axes[axis] = &found->values;
+  }
+  const auto rows_of = [&]<typename T>(const PointCloud::Values<T>& /*of this type*/) {
+    std::vector<T> rows(3 * points.cloud.rows());
+    for (std::size_t axis = 0; axis < 3; ++axis) {
+      std::visit(
+          [&](const auto& values) {
+            for (std::size_t i = 0; i < values.size(); ++i)
+              rows[3 * i + axis] = static_cast<T>(values[i]);
+          },
+          *axes[axis]);
+    }
+    return array_of(std::move(rows), {points.cloud.rows(), 3});
+  };
+  const bool is_uniform =
+      axes[0]->index() == axes[1]->index() && axes[0]->index() == axes[2]->index();
+  return is_uniform ? std::visit(rows_of, *axes[0]) : rows_of(PointCloud::Values<double>());
+}
+
+Points selected(const Points& points, nb::handle rows) {
+  const nb::object numpy = nb::module_::import_("numpy");
+  const nb::object chosen = numpy.attr("arange")(points.cloud.rows())[rows];
+  using Indices = nb::ndarray<const std::int64_t, nb::ndim<1>, nb::c_contig, nb::device::cpu>;
+  Indices indices;
+  if (!nb::try_cast(chosen, indices)) {
+    throw nb::type_error(
+        "points[...] takes the name of a column, or selects rows by a slice, a mask or indices of "
+        "one dimension; one row is points[i : i + 1]");
+  }
+  Points part{PointCloud(indices.size())};
+  for (const PointCloud::Column& column : points.cloud.columns()) {
+    std::visit(
+        [&]<typename T>(const PointCloud::Values<T>& values) {
+          const std::span<T> into = part.cloud.add<T>(column.name);
+          for (std::size_t i = 0; i < into.size(); ++i)
+            into[i] = values[static_cast<std::size_t>(indices(i))];
+        },
+        column.values);
+  }
+  return part;
 }
 
 }  // namespace groundray::python

@@ -23,4 +23,14 @@ std::vector<std::string> names_of(const Points& points);
 /// @throws nanobind::key_error that lists the names, if there is no such column.
 AnyArray column_of(const Points& points, const std::string& name, nb::handle owner);
 
+/// Returns the columns x, y, z as rows of three values, a copy: of their type, or of doubles if
+/// they differ.
+/// @throws nanobind::key_error if they are not there.
+AnyArray xyz_of(const Points& points);
+
+/// Returns rows as a table of their own.
+/// @param rows  what selects elements of a NumPy array of one dimension: a slice, a mask, indices.
+/// @throws IndexError of NumPy, or nanobind::type_error if that selects no array of rows.
+Points selected(const Points& points, nb::handle rows);
+
 }  // namespace groundray::python
