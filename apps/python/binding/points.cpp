@@ -71,8 +71,10 @@ AnyArray xyz_of(const Points& points) {
     for (std::size_t axis = 0; axis < 3; ++axis) {
       std::visit(
           [&](const auto& values) {
-            for (std::size_t i = 0; i < values.size(); ++i)
-              rows[3 * i + axis] = static_cast<T>(values[i]);
+            for (std::size_t i = 0; i < values.size(); ++i) {
+              const double value = values[i];  // exact, whatever the column's type
+              rows[3 * i + axis] = static_cast<T>(value);
+            }
           },
           *axes[axis]);
     }
