@@ -472,7 +472,7 @@ INPUTS = [
         "new.gltf",
         '{"asset": {"version": "9.0"}}',
         "groundray reconstruct simplify new.gltf -o out.ply --triangles 1",
-        'new.gltf: asset.version = "9.0", but only glTF 2.0 is read',
+        'new.gltf: asset.version = "9.0", but only glTF 2 is read',
     ),
     in_file(
         "a glTF with a matrix of one number",
