@@ -168,13 +168,6 @@ void check_views(const json& gltf) {
   });
 }
 
-/// Calls visit(primitive) for each primitive of each mesh.
-void for_each_primitive(const json& gltf, const auto& visit) {
-  for_each_in(gltf, "meshes", [&](const json& mesh) {
-    for_each_in(mesh, "primitives", [&](const json& primitive) { visit(primitive); });
-  });
-}
-
 /// Returns the number of elements of an accessor of a mesh, an `index` of the file's list.
 std::size_t count_of(const json& gltf, std::size_t index) {
   const json& accessor = referred(gltf, "accessors", index);
@@ -189,16 +182,19 @@ std::size_t count_of(const json& gltf, std::size_t index) {
 std::size_t triangles_of(const json& gltf) {
   constexpr std::array<std::size_t, 7> least{1, 2, 2, 2, 3, 3, 3};  // vertices, by mode
   std::size_t sum = 0;
-  for_each_primitive(gltf, [&](const json& primitive) {
-    // 4 triangles, 5 a strip, 6 a fan
-    const std::size_t mode = json_whole(primitive, "mode", 4);
-    if (mode >= least.size()) throw Error("mode = {} must be 0 to 6", mode);
-    const json& own = primitive.contains("indices") ? primitive : primitive["attributes"];
-    const std::size_t count =
-        count_of(gltf, json_whole(own, &own == &primitive ? "indices" : "POSITION"));
-    if (count < least[mode]) throw Error("{} vertices are too few for its mode, {}", count, mode);
-    if (mode == 4) sum += count / 3;
-    if (mode > 4) sum += count - 2;
+  for_each_in(gltf, "meshes", [&](const json& mesh) {
+    for_each_in(mesh, "primitives", [&](const json& primitive) {
+      // 4 triangles, 5 a strip, 6 a fan
+      const std::size_t mode = json_whole(primitive, "mode", 4);
+      if (mode >= least.size()) throw Error("mode = {} must be 0 to 6", mode);
+      const std::size_t accessor = primitive.contains("indices")
+                                       ? json_whole(primitive, "indices")
+                                       : json_whole(primitive["attributes"], "POSITION");
+      const std::size_t count = count_of(gltf, accessor);
+      if (count < least[mode]) throw Error("{} vertices are too few for its mode, {}", count, mode);
+      if (mode == 4) sum += count / 3;
+      if (mode > 4) sum += count - 2;
+    });
   });
   return sum;
 }

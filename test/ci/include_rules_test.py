@@ -57,6 +57,8 @@ def test_an_include_against_a_rule_is_reported(tmp_path, source, include, rule):
         'std::ifstream file("a");',
         "file.open(path, std::ios::binary);",
         "open(path, O_CREAT | O_TRUNC);",
+        "const int file = ::open(path.c_str(), O_RDONLY | O_CLOEXEC);",
+        "std::filebuf buffer;",
     ],
 )
 def test_a_file_opened_elsewhere_is_reported(tmp_path, call):

@@ -7,7 +7,6 @@
 #include <cstddef>
 #include <cstdint>
 #include <exception>
-#include <limits>
 #include <string>
 #include <string_view>
 #include <type_traits>
@@ -72,6 +71,16 @@ std::string words_of(nanobind::shape<-1, columns> /*shape*/) {
   return fmt::format("(n, {})", columns);
 }
 
+/// Returns str(value) as printable UTF-8.
+std::string text_of(nanobind::handle value);
+
+/// Returns the shape and type of a NumPy array in words.
+std::string form_of(nanobind::handle array);
+
+/// Returns the largest of unsigned integers if a signed one of 64 bits cannot hold it; else an
+/// empty text.
+std::string excess_of(nanobind::handle array);
+
 }  // namespace groundray::python
 
 namespace nanobind::detail {
@@ -135,15 +144,16 @@ struct type_caster<groundray::python::NumpyArgument<Array>> {
     if ((flags & convert) == 0) return false;
     try {
       const object made = module_::import_("numpy").attr("asarray")(source);
-      if (const std::string over = excess_of(made); !over.empty()) {
+      const std::string over = is_whole ? groundray::python::excess_of(made) : "";
+      if (!over.empty()) {
         value = Argument(misfit(fmt::format("an array with {}, which exceeds 2^63 - 1", over)));
       } else if ((is_whole && !holds_whole(made)) || !take(native(made), flags, cleanup)) {
-        value = Argument(misfit(form_of(made)));
+        value = Argument(misfit(groundray::python::form_of(made)));
       }
     } catch (python_error& error) {
       if (!error.matches(PyExc_TypeError) && !error.matches(PyExc_ValueError)) throw;
       std::string why;  // of its own, not of NumPy about values that are no numbers
-      if (hasattr(source, "__array__")) why = printable(str(error.value()));
+      if (hasattr(source, "__array__")) why = groundray::python::text_of(error.value());
       if (!why.empty()) why.insert(0, ": ");
       value = Argument(misfit(fmt::format("a {}{}", Py_TYPE(source.ptr())->tp_name, why)));
     }
@@ -155,24 +165,6 @@ struct type_caster<groundray::python::NumpyArgument<Array>> {
     if (!caster.from_python(source, flags, cleanup)) return false;
     value = Argument(std::move(caster.value));
     return true;
-  }
-
-  // Returns a text of Python as UTF-8, with escapes for surrogates and NUL.
-  static std::string printable(const object& text) {
-    const auto bytes = cast<nanobind::bytes>(
-        text.attr("replace")(str("\0", 1), "\\x00").attr("encode")("utf-8", "backslashreplace"));
-    return {bytes.c_str(), bytes.size()};
-  }
-
-  // Returns the largest of unsigned integers if a signed one cannot hold it; else an empty text.
-  static std::string excess_of(const object& array) {
-    if (!is_whole || !str(array.attr("dtype").attr("kind")).equal(str("u")) ||
-        cast<std::size_t>(array.attr("size")) == 0)
-      return {};
-    const object largest = array.attr("max")();
-    const bool is_held = cast<std::uint64_t>(largest.attr("item")()) <=
-                         std::uint64_t{std::numeric_limits<std::int64_t>::max()};
-    return is_held ? "" : str(handle(largest)).c_str();
   }
 
   // Returns an array of numbers in a form that the array's caster knows: in this machine's byte
@@ -192,13 +184,6 @@ struct type_caster<groundray::python::NumpyArgument<Array>> {
     const str kind(array.attr("dtype").attr("kind"));
     return kind.equal(str("i")) || kind.equal(str("u")) ||
            cast<std::size_t>(array.attr("size")) == 0;
-  }
-
-  static std::string form_of(const object& array) {
-    // Of objects: an accessor would be taken for a string, not converted to one.
-    const object shape = array.attr("shape"), type = array.attr("dtype");
-    return fmt::format("shape {} and type {}", str(handle(shape)).c_str(),
-                       str(handle(type)).c_str());
   }
 
   static std::string misfit(std::string_view given) {

@@ -27,6 +27,12 @@ constexpr std::array<std::pair<std::string_view, std::string_view>, 19> units{{
     {"t", "s"},
 }};
 
+[[noreturn]] void throw_missing(const Points& points, const std::string& name) {
+  const std::string text =
+      fmt::format("there is no column '{}'; there are {}", name, fmt::join(names_of(points), ", "));
+  throw nb::key_error(text.c_str());
+}
+
 }  // namespace
 
 std::string name_with_unit(const std::string& column) {
@@ -39,12 +45,6 @@ std::vector<std::string> names_of(const Points& points) {
   for (const PointCloud::Column& column : points.cloud.columns())
     names.push_back(name_with_unit(column.name));
   return names;
-}
-
-[[noreturn]] static void throw_missing(const Points& points, const std::string& name) {
-  const std::string text =
-      fmt::format("there is no column '{}'; there are {}", name, fmt::join(names_of(points), ", "));
-  throw nb::key_error(text.c_str());
 }
 
 AnyArray column_of(const Points& points, const std::string& name, nb::handle owner) {
