@@ -34,18 +34,33 @@ Progress::~Progress() {
   if (terminal_ && !finished_) std::fputc('\n', out_);
 }
 
-void Progress::update(std::uint64_t done) {
+// Returns true if a new line is due, and begins the pause before the next.
+bool Progress::is_due() {
   constexpr std::chrono::milliseconds terminal_pause(100), plain_pause(5000);
-  if (out_ == nullptr || finished_) return;
   const auto now = steady_clock::now();
-  finished_ = done >= total_;
-  if (!finished_ && now - reported_ < (terminal_ ? terminal_pause : plain_pause)) return;
+  if (out_ == nullptr || finished_) return false;
+  if (now - reported_ < (terminal_ ? terminal_pause : plain_pause)) return false;
   reported_ = now;
-  const Seconds spent = now - begin_;
-  std::string line = fmt::format("{} {}/{}", label_, done, total_);
-  if (finished_) {
-    line += " in " + duration_text(spent);
-  } else if (done > 0) {
+  return true;
+}
+
+void Progress::show(const std::function<std::string()>& line) {
+  if (is_due()) draw(line());
+}
+
+void Progress::end(const std::string& line) {
+  if (out_ == nullptr || finished_) return;
+  finished_ = true;
+  draw(fmt::format("{} in {}", line, duration_text(steady_clock::now() - begin_)));
+}
+
+void Progress::update(std::uint64_t done) {
+  const std::string count = fmt::format("{} {}/{}", label_, done, total_);
+  if (done >= total_) return end(count);
+  if (!is_due()) return;
+  const Seconds spent = steady_clock::now() - begin_;
+  std::string line = count;
+  if (done > 0) {
     const Seconds left = spent * (static_cast<double>(total_ - done) / static_cast<double>(done));
     line += fmt::format(", {}, {} left", rate_text(static_cast<double>(done) / spent.count()),
                         duration_text(left));

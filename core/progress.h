@@ -4,6 +4,7 @@
 #include <cstddef>
 #include <cstdint>
 #include <cstdio>
+#include <functional>
 #include <string>
 
 namespace groundray {
@@ -25,8 +26,14 @@ class Progress {
 
   /// Records that `done` steps are complete.
   void update(std::uint64_t done);
+  /// Shows another line instead of the steps, if it is time for one.
+  /// @param line  returns the text: "scans 3/10, images 1/2, 3 s left".
+  void show(const std::function<std::string()>& line);
+  /// Shows the last line, whatever the time.
+  void end(const std::string& line);
 
  private:
+  bool is_due();
   void draw(const std::string& line);
 
   std::FILE* out_;

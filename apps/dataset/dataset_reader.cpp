@@ -142,7 +142,7 @@ void add_frame(const FrameEntry& entry, FrameLists& lists) {
 
 void read_frame(const yaml::Node& node, yaml::Faults& faults, FrameLists& lists) {
   yaml::Map frame(node, "frames", faults);
-  FrameEntry entry{.sensor = {}, .convergence = {}, .files = {}};
+  FrameEntry entry;
   std::uint64_t number = 0;
   double stamp_s = 0;
   frame.read_text("sensor", Need::Required, entry.sensor);

@@ -100,6 +100,14 @@ std::chrono::nanoseconds take_stamp(Scanner& scanner) {
   return std::chrono::nanoseconds(is_negative ? -count : count);
 }
 
+// Takes a mapping of plain values, if there is one at `key`.
+std::string take_mapping(Scanner& scanner, std::string_view key) {
+  if (!scanner.try_take(fmt::format(", {}: {{", key))) return {};
+  const std::string values = scanner.take_until('}');
+  scanner.take("}");
+  return fmt::format("{{{}}}", values);
+}
+
 std::string sum_text(const FileSum& sum) {
   return fmt::format("bytes: {}, sha256: \"{}\"}}", sum.bytes, sum.sha256);
 }
@@ -117,6 +125,7 @@ std::string text_of(const FrameEntry& entry) {
       fmt::format("{{sensor: \"{}\", frame: {}, stamp_s: {}, state: {}", entry.sensor, entry.frame,
                   seconds_text(entry.stamp), entry.is_done ? "done" : "pending");
   if (!entry.convergence.empty()) text += ", convergence: " + entry.convergence;
+  if (!entry.exposure.empty()) text += ", exposure: " + entry.exposure;
   for (const ProductSum& file : entry.files) {
     fmt::format_to(std::back_inserter(text), "{}\"{}\": {{{}",
                    &file == entry.files.data() ? ", files: {" : ", ", file.suffix,
@@ -138,10 +147,8 @@ std::optional<FrameEntry> parse_entry(std::string_view text) {
   scanner.take(", state: ");
   entry.is_done = scanner.try_take("done");
   if (!entry.is_done) scanner.take("pending");
-  if (scanner.try_take(", convergence: {")) {
-    entry.convergence = "{" + scanner.take_until('}') + "}";
-    scanner.take("}");
-  }
+  entry.convergence = take_mapping(scanner, "convergence");
+  entry.exposure = take_mapping(scanner, "exposure");
   if (scanner.try_take(", files: {")) {
     do {
       scanner.take("\"");

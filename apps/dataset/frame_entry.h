@@ -19,12 +19,13 @@ struct ProductSum {
 
 /// Entry of a frame in dataset.yaml (docs/reference/formats.md).
 struct FrameEntry {
-  std::string sensor;
+  std::string sensor = {};
   std::int64_t frame = 0;
   std::chrono::nanoseconds stamp{0};
   bool is_done = false;
-  std::string convergence;        ///< YAML mapping, or empty
-  std::vector<ProductSum> files;  ///< empty unless the frame is finished
+  std::string convergence = {};        ///< of a scan: YAML mapping, or empty
+  std::string exposure = {};           ///< of an image: YAML mapping, or empty
+  std::vector<ProductSum> files = {};  ///< empty unless the frame is finished
 };
 
 /// Returns a time in seconds with nine decimals, exactly.

@@ -8,21 +8,36 @@
 #include <cstdio>
 #include <exception>
 #include <nlohmann/json.hpp>
+#include <tuple>
 #include <variant>
 #include <vector>
 
 #include "apps/dataset/write/frame_maker.h"
+#include "apps/groundray/frame_progress.h"
 #include "apps/groundray/run_log.h"
 #include "apps/scene/interruption.h"
+#include "apps/scene/notes.h"
 #include "apps/scene/simulation.h"
 #include "core/error.h"
 #include "core/io/print_error.h"
-#include "core/progress.h"
 
 namespace groundray {
 namespace {
 
 namespace fs = std::filesystem;
+
+// Images of a camera of which more than 1 % is saturated.
+struct SaturatedImages {
+  std::uint64_t count = 0;
+  double most_share = 0;
+  std::int64_t most_image = 0;  // with the largest share
+
+  void add(std::int64_t image, double share) {
+    if (share <= 0.01) return;
+    ++count;
+    if (share > most_share) std::tie(most_share, most_image) = std::tie(share, image);
+  }
+};
 
 struct Tally {
   std::uint64_t scans = 0;
@@ -34,6 +49,7 @@ struct Tally {
   std::uint64_t points = 0;
   std::uint64_t pulses = 0;
   std::chrono::duration<double> scanning{0};
+  std::vector<SaturatedImages> saturated;  // by camera
 };
 
 // Adds a frame to the tally, and returns its entry in the log.
@@ -57,17 +73,20 @@ LogFields count(const Simulation& simulation, const MadeFrame& made, const Writt
     add_common(lidar.spec.name);
     entry.add("points", scan->echoes.rows());
   } else {
-    const MountedCamera& camera = simulation.cameras[sensor - simulation.lidars.size()].spec;
+    const std::size_t number_of_camera = sensor - simulation.lidars.size();
+    const MountedCamera& camera = simulation.cameras[number_of_camera].spec;
+    tally.saturated[number_of_camera].add(number, written.image.saturated_share);
     const glm::ivec2 size_px = camera.camera.size_px;
     const auto pixels =
         static_cast<std::uint64_t>(size_px.x) * static_cast<std::uint64_t>(size_px.y);
     tally.pixels += pixels;
     tally.paths += std::get<MadeImage>(made.product).paths;
     tally.exposing += made.making;
-    tally.flows_left_out += written.flows_left_out;
+    tally.flows_left_out += written.image.flows_left_out;
     ++tally.images;
     add_common(camera.name);
     entry.add("pixels", pixels);
+    if (gives_signal(camera.camera)) entry.add("saturated", written.image.saturated_share);
   }
   entry.add("bytes", written.bytes);
   return entry;
@@ -124,8 +143,27 @@ void log_begin(const fs::path& scene, const fs::path& out, Seed seed,
   log.begun(plan.frames.size(), fields);
 }
 
+// Returns a sentence for each camera with images of which more than 1 % is saturated.
+std::vector<std::string> saturation_notes(const Simulation& simulation, const Tally& tally) {
+  std::vector<std::string> notes;
+  for (std::size_t i = 0; i < tally.saturated.size(); ++i) {
+    const auto [images, most_share, most_image] = tally.saturated[i];
+    if (images == 0) continue;
+    const MountedCamera& camera = simulation.cameras[i].spec;
+    notes.push_back(fmt::format(
+        "camera '{}': {} with more than 1 % of the pixels saturated, {:.2g} % in image {}; {}",
+        camera.name, images == 1 ? "an image" : fmt::format("{} images", images), 100 * most_share,
+        most_image,
+        camera.camera.shutter.automatic
+            ? "choose a lower `target` or a shorter `shortest_us` in `shutter.automatic`"
+            : "choose a shorter `shutter.exposure_ms`, or `shutter: {automatic: {}}`"));
+  }
+  return notes;
+}
+
 void run(const fs::path& scene, const fs::path& out, const GenerateOptions& options, RunLog& log) {
   const Simulation simulation = load_simulation(scene, options.seed);
+  for (const std::string& note : notes_of(simulation)) print_error("note: {}\n", note);
   if (simulation.terrain.whole() == nullptr) {
     // Reports insufficient memory before anything is written.
     simulation.terrain.clipmap(sensor_box(first_frame(simulation)), simulation.reach_m);
@@ -137,14 +175,17 @@ void run(const fs::path& scene, const fs::path& out, const GenerateOptions& opti
   const FramePlan plan = plan_frames(simulation, dataset, options.shard);
   log_begin(scene, out, simulation.spec.seed, options.shard, plan, log);
   Tally tally;
+  tally.saturated.resize(simulation.cameras.size());
   try {
-    Progress progress(stderr, "frames", plan.frames.size());
-    make_frames(simulation, dataset, plan.frames,
-                [&](const MadeFrame& made, const WrittenFrame& written) {
-                  log.frame_done(count(simulation, made, written, tally));
-                  progress.update(tally.scans + tally.images);
-                });
-    progress.update(tally.scans + tally.images);  // also if there was nothing left to make
+    FrameProgress progress(stderr, simulation, plan);
+    make_frames(
+        simulation, dataset, plan.frames,
+        [&](const MadeFrame& made, const WrittenFrame& written) {
+          log.frame_done(count(simulation, made, written, tally));
+          progress.finished(made, written);
+        },
+        [&](const FrameName& frame, double share) { progress.begun(frame, share); });
+    if (tally.scans + tally.images == plan.frames.size()) progress.end();
   } catch (...) {
     try {
       dataset.close();
@@ -155,6 +196,8 @@ void run(const fs::path& scene, const fs::path& out, const GenerateOptions& opti
   }
   dataset.close();
   if (tally.scans + tally.images < plan.frames.size()) throw Interrupted{};
+  for (const std::string& note : saturation_notes(simulation, tally))
+    print_error("note: {}\n", note);
   say(simulation, out, plan, tally, log.takes_output() ? stderr : stdout);
 }
 

@@ -19,10 +19,13 @@
 #include "apps/dataset/dataset_reader.h"
 #include "apps/dataset/dataset_text.h"
 #include "apps/dataset/write/journal.h"
+#include "apps/groundray/estimate.h"
+#include "apps/scene/notes.h"
 #include "apps/scene/simulation.h"
 #include "core/error.h"
 #include "core/io/file_io.h"
 #include "core/io/print_error.h"
+#include "core/progress.h"
 #include "terrain/dem/dem_file.h"
 #include "terrain/dem/dem_io.h"
 #include "terrain/lod/certificate.h"
@@ -111,39 +114,6 @@ void print_levels(const Simulation& simulation) {
   print_text(stdout, "triangles {} in {:.0f} MiB\n", triangles, bytes / mib);
 }
 
-// Returns the least height of a sensor above the ground below it, at times 10 ms apart; infinite if
-// it is never above the DEM.
-double least_height_m(const Trajectory& X_DS, const Simulation& simulation) {
-  const Ground& ground = simulation.terrain.ground();
-  double least_m = std::numeric_limits<double>::infinity();
-  for (std::chrono::nanoseconds time{0}; time <= run_time(simulation.spec);
-       time += std::chrono::milliseconds(10)) {
-    const glm::dvec3 p_DS = X_DS.pose_at(time).translation_m;
-    if (const auto ground_m = ground.height_m_at(glm::dvec2(p_DS)))
-      least_m = std::min(least_m, p_DS.z - *ground_m);
-  }
-  return least_m;
-}
-
-// Warns of sensors that may be as near to the reference surface as that is to the traced one.
-void print_tolerance(const Simulation& simulation) {
-  const double tolerance_m = simulation.spec.terrain.detail.tolerance_m;
-  if (tolerance_m == 0) return;
-  const auto look = [&](const char* kind, const std::string& name, const Trajectory& X_DS) {
-    const double height_m = least_height_m(X_DS, simulation);
-    if (tolerance_m < height_m) return;
-    print_text(
-        stdout,
-        "note      tolerance_m = {} is not less than the height of {} '{}' above the ground, "
-        "{:.3g} "
-        "m: its error bounds can be infinite; choose a smaller one\n",
-        tolerance_m, kind, name, height_m);
-  };
-  for (const PlacedLidar& lidar : simulation.lidars) look("lidar", lidar.spec.name, lidar.X_DS);
-  for (const PlacedCamera& camera : simulation.cameras)
-    look("camera", camera.spec.name, camera.X_DC);
-}
-
 // The lowest layer is the terrain itself.
 void print_cover(const TerrainSpec& terrain, const GroundCover& cover) {
   for (std::size_t i = 0; i < cover.layers().size(); ++i) {
@@ -210,10 +180,8 @@ void print_lidar(const PlacedLidar& lidar) {
   const ScanPattern& pattern = lidar.lidar.pattern();
   const auto& light = lidar.spec.lidar.light;
   const double pulses = static_cast<double>(pattern.pulses(0)) * static_cast<double>(lidar.sweeps);
-  print_text(stdout, "lidar     {}: {}, {} scans of about {:.0f} pulses, {} {:.1f} MiB of PLY\n",
-             lidar.spec.name, lidar.spec.lidar.model, lidar.sweeps,
-             pulses / static_cast<double>(lidar.sweeps), light ? "for one echo each" : "at most",
-             pulses * (light ? 113 : 88) / (1 << 20));
+  print_text(stdout, "lidar     {}: {}, {} scans of about {:.0f} pulses\n", lidar.spec.name,
+             lidar.spec.lidar.model, lidar.sweeps, pulses / static_cast<double>(lidar.sweeps));
   if (!light || !light->sun.irradiance_w_m2_nm) return;
   print_text(stdout, "          sunlight {:.4g} W/(m2 nm) at {} nm, {}\n",
              *light->sun.irradiance_w_m2_nm, light->wavelength_nm,
@@ -226,12 +194,39 @@ void print_camera(const PlacedCamera& placed) {
   print_text(stdout, "camera    {}: {}, {} images of {} x {} px in {:.4g} ms\n", placed.spec.name,
              camera.model, placed.begins.size(), camera.size_px.x, camera.size_px.y,
              1e-6 * static_cast<double>(placed.camera.duration().count()));
+  const ShutterSpec& shutter = camera.shutter;
+  if (shutter.automatic) {
+    print_text(stdout, "          automatic exposure, {:.4g} to {:.4g} ms, gain up to {:.3g}\n",
+               1e3 * shutter.automatic->shortest_s, 1e3 * shutter.exposure_s,
+               shutter.automatic->most_gain);
+  }
   if (needs_light(camera)) {
     print_text(
         stdout,
         "          {} to {} paths a pixel of up to {} rays: {:.3g} M paths an image or more\n",
         camera.sampling.samples, camera.sampling.most_samples, camera.sampling.depth,
         1e-6 * pixels * camera.sampling.samples);
+  }
+}
+
+// Prints the time and the bytes of a run, and of one frame of each sensor.
+void print_estimate(const Simulation& simulation, const RunEstimate& estimate) {
+  const auto each = [](const char* kind, const std::string& name, std::size_t frames,
+                       const RunEstimate::Frame& frame) {
+    print_text(stdout, "          {}: {} {} of {} and {:.3g} MiB\n", name, frames, kind,
+               duration_text(frame.time), static_cast<double>(frame.bytes) / mib);
+  };
+  print_text(stdout, "time      about {} on this machine, with {} of preparation\n",
+             duration_text(estimate.total), duration_text(estimate.preparation));
+  print_text(stdout, "output    about {:.3g} MiB\n",
+             static_cast<double>(estimate.total_bytes) / mib);
+  for (std::size_t i = 0; i < estimate.scans.size(); ++i) {
+    const PlacedLidar& lidar = simulation.lidars[i];
+    each("scans", lidar.spec.name, static_cast<std::size_t>(lidar.sweeps), estimate.scans[i]);
+  }
+  for (std::size_t i = 0; i < estimate.images.size(); ++i) {
+    const PlacedCamera& camera = simulation.cameras[i];
+    each("images", camera.spec.name, camera.begins.size(), estimate.images[i]);
   }
 }
 
@@ -244,13 +239,15 @@ void print_scene(const Simulation& simulation) {
   print_frame(simulation.terrain.frame(), simulation.terrain.header().origin_w_m);
   if (simulation.terrain.whole() != nullptr) print_heights(*simulation.terrain.whole());
   print_levels(simulation);
-  print_tolerance(simulation);
   print_cover(simulation.spec.terrain, simulation.scene_objects.cover);
   print_content(simulation.scene_objects);
   print_materials(simulation);
   if (simulation.spec.sky) print_sky(*simulation.spec.sky);
   for (const PlacedLidar& lidar : simulation.lidars) print_lidar(lidar);
   for (const PlacedCamera& camera : simulation.cameras) print_camera(camera);
+  for (const std::string& note : notes_of(simulation)) print_text(stdout, "note      {}\n", note);
+  std::fflush(stdout);  // the measurement may take a while
+  print_estimate(simulation, estimate_run(simulation));
 }
 
 void print_dataset(const std::filesystem::path& folder) {

@@ -82,7 +82,7 @@ CameraImage make_image(const std::shared_ptr<SceneState>& state, std::size_t cam
   Channels channels(image);
   if (made.light) {
     image.labels = std::move(made.labels);
-    if (auto stages = simulate_imager(state->simulation, camera, frame, made.light->radiance))
+    if (auto stages = simulate_imager(state->simulation, camera, frame, made))
       channels.add_stages(*stages);
     channels.add_light(*made.light);
   }

@@ -83,8 +83,15 @@ MadeImage make_image(const Simulation& simulation, std::size_t camera, std::int6
   if (needs_light(spec)) {
     if (gives(spec, Product::Coverage)) made.labels = labels_of(scene);
     const PathTracer tracer(scene, *simulation.sky, spec.sampling.depth, simulation.air);
-    made.light = placed.camera.expose(tracer, placed.X_DC, placed.begins[number],
-                                      key_of(simulation, camera, image), made.labels, check);
+    const RandomKey key = key_of(simulation, camera, image);
+    made.exposure = {spec.shutter.exposure_s};
+    if (spec.shutter.automatic) {
+      made.exposure = choose_exposure(
+          spec, placed.camera.meter(tracer, placed.X_DC, placed.begins[number], key, check),
+          placed.pupil_sr);
+    }
+    made.light = placed.camera.expose(tracer, placed.X_DC, placed.begins[number], key, made.labels,
+                                      check, made.exposure.exposure_s);
     for (const float samples : made.light->samples.values())
       made.paths += static_cast<std::uint64_t>(samples);
   }
@@ -104,21 +111,22 @@ MadeImage make_image(const Simulation& simulation, std::size_t camera, std::int6
 }
 
 std::optional<ImagerStages> simulate_imager(const Simulation& simulation, std::size_t which,
-                                            std::int64_t image, const ImageF& radiance) {
+                                            std::int64_t image, const MadeImage& made) {
   const PlacedCamera& placed = simulation.cameras[which];
   const CameraSpec& camera = placed.spec.camera;
-  if (!gives_any(camera, {Product::Irradiance, Product::Photons, Product::Electrons, Product::Raw,
-                          Product::Picture}))
-    return std::nullopt;
+  if (!gives_signal(camera)) return std::nullopt;
   const RandomKey key = key_of(simulation, which, image);
-  const Imager imager(*camera.imager, camera.shutter.exposure_s);
+  ImagerSpec spec = *camera.imager;
+  spec.gain_dn_e *= made.exposure.gain;
+  const Imager imager(spec, made.exposure.exposure_s);
   ImagerStages stages;
-  stages.irradiance_w_m2 = irradiance(radiance, placed.pupil_sr);
+  stages.irradiance_w_m2 = irradiance(made.light->radiance, placed.pupil_sr);
   stages.photons = imager.photons(stages.irradiance_w_m2);
   stages.electrons = imager.electrons(stages.photons, key);
   stages.raw_dn = imager.digital(stages.electrons, key);
+  stages.saturated_share = imager.saturated_share(stages.electrons, stages.raw_dn);
   if (gives(camera, Product::Picture))
-    stages.picture = RawDeveloper(camera.picture, *camera.imager).develop(stages.raw_dn);
+    stages.picture = RawDeveloper(camera.picture, spec).develop(stages.raw_dn);
   return stages;
 }
 

@@ -9,6 +9,7 @@
 #include "apps/scene/simulation.h"
 #include "core/image/image.h"
 #include "core/tracing/scene.h"
+#include "sensors/camera/auto_exposure.h"
 #include "sensors/camera/camera.h"
 #include "sensors/camera/image_truth.h"
 #include "sensors/camera/picture.h"
@@ -60,6 +61,7 @@ struct MadeImage {
   std::optional<ImageTruth> truth;
   std::vector<std::uint16_t> labels;  ///< labels of the channels of the light's coverage
   std::uint64_t paths = 0;            ///< number of light paths traced
+  ExposureSetting exposure;           ///< exposure time and gain of the light
 };
 
 /// Renders an image and computes its truth, as far as its camera's products require.
@@ -81,12 +83,13 @@ struct ImagerStages {
   ImageF electrons;
   Image16 raw_dn;
   std::optional<Picture> picture;  ///< if the camera's products include it
+  double saturated_share = 0;      ///< fraction of the pixels that are saturated
 };
 
 /// Simulates the imager and develops the picture.
-/// @param radiance  Exposure::radiance of the image.
+/// @param made  image with light.
 /// @return nothing if no product of the camera comes from its imager.
 std::optional<ImagerStages> simulate_imager(const Simulation& simulation, std::size_t camera,
-                                            std::int64_t image, const ImageF& radiance);
+                                            std::int64_t image, const MadeImage& made);
 
 }  // namespace groundray

@@ -40,9 +40,10 @@ glm::dvec2 on_disc(const glm::dvec2& u) {
   return radius * glm::dvec2(std::cos(angle_rad), std::sin(angle_rad));
 }
 
-// Set of paths of a pixel: those that its light is the mean of, or those of the pilot that chooses
-// their number. They share no random numbers, so that the choice does not bias the mean.
-enum class Paths : std::uint32_t { OfMean, OfPilot };
+// Set of paths of a pixel: those that its light is the mean of, those of the pilot that chooses
+// their number, or those that measure the light for automatic exposure. They share no random
+// numbers, so that these choices do not bias the mean.
+enum class Paths : std::uint32_t { OfMean, OfPilot, OfMeter };
 
 // Returns the seed of a Sobol net of a pixel's paths in a frame.
 std::uint32_t sequence_of(const RandomKey& key, std::uint32_t pixel, Paths paths,
@@ -100,6 +101,7 @@ struct View {
   nanoseconds begin;
   const RandomKey& key;
   const std::function<void()>& check;
+  double exposure_s;  // with the same middle as the shutter's
 };
 
 double luminance_at(const ImageF& image, int x, int y) {
@@ -201,8 +203,8 @@ void Rows::add_samples(const glm::ivec2& pixel, int count) {
       origin = glm::dvec3(on_disc(pupil) * (aperture.focal_length_m / aperture.f_number / 2), 0);
       direction = glm::normalize(*direction - origin * (direction->z / *aperture.focus_m));
     }
-    const nanoseconds time =
-        view_.begin + time_of(shutter.row_s * pixel.y + shutter.exposure_s * share);
+    const double from_s = shutter.row_s * pixel.y + (shutter.exposure_s - view_.exposure_s) / 2;
+    const nanoseconds time = view_.begin + time_of(from_s + view_.exposure_s * share);
     const Pose X_DC = view_.X_DC.pose_at(time);
     samples_.push_back(
         {{X_DC * origin, X_DC.rotation * *direction, std::numeric_limits<double>::infinity(), time},
@@ -249,15 +251,23 @@ void Rows::write_pixels() {
   }
 }
 
+bool has_paths(const PathCounts& counts, int first, int end) {
+  const auto width = static_cast<std::size_t>(counts.width());
+  const std::span<const int> rows = std::span(counts.values())
+                                        .subspan(width * static_cast<std::size_t>(first),
+                                                 width * static_cast<std::size_t>(end - first));
+  return std::ranges::any_of(rows, [](int count) { return count > 0; });
+}
+
 Means render(const Camera& camera, const View& view, const PathCounts& counts, Paths paths,
              std::span<const std::uint16_t> labels) {
   const int width = counts.width(), height = counts.height();
   Means means(width, height, labels.size());
   tbb::parallel_for(0, (height + block_px - 1) / block_px, [&](int block) {
     if (view.check) view.check();
-    const int first = block * block_px;
-    Rows(camera, view, labels, paths, first, std::min(first + block_px, height), means)
-        .render(counts);
+    const int first = block * block_px, end = std::min(first + block_px, height);
+    if (!has_paths(counts, first, end)) return;
+    Rows(camera, view, labels, paths, first, end, means).render(counts);
   });
   return means;
 }
@@ -322,9 +332,12 @@ nanoseconds Camera::middle_of(double row) const noexcept {
 
 Exposure Camera::expose(const PathTracer& light, const Trajectory& X_DC, nanoseconds begin,
                         const RandomKey& key, std::span<const std::uint16_t> labels,
-                        const std::function<void()>& check) const {
+                        const std::function<void()>& check,
+                        std::optional<double> exposure_s) const {
   check_cover(X_DC, begin);
-  const View view{light, X_DC, begin, key, check};
+  const double shutter_s = spec_.shutter.exposure_s;
+  const View view{light, X_DC,  begin,
+                  key,   check, std::min(exposure_s.value_or(shutter_s), shutter_s)};
   PathCounts counts(spec_.size_px.x, spec_.size_px.y, 1);
   std::ranges::fill(counts.values(), spec_.sampling.samples);
   if (spec_.sampling.most_samples > spec_.sampling.samples)
@@ -333,6 +346,36 @@ Exposure Camera::expose(const PathTracer& light, const Trajectory& X_DC, nanosec
   ImageF errors = standard_errors(means.spreads);
   return {std::move(means.radiance), std::move(errors), std::move(means.spreads.paths),
           std::move(means.coverage)};
+}
+
+std::size_t Camera::checks() const noexcept {
+  const auto blocks = static_cast<std::size_t>((spec_.size_px.y + block_px - 1) / block_px);
+  return spec_.sampling.most_samples > spec_.sampling.samples ? 2 * blocks : blocks;
+}
+
+std::vector<MeteredPixel> Camera::meter(const PathTracer& light, const Trajectory& X_DC,
+                                        nanoseconds begin, const RandomKey& key,
+                                        const std::function<void()>& check) const {
+  constexpr double most_pixels = 3072;
+  constexpr int paths = 16;
+  check_cover(X_DC, begin);
+  const int width = spec_.size_px.x, height = spec_.size_px.y;
+  const auto step =
+      static_cast<int>(std::ceil(std::sqrt(double{1} * width * height / most_pixels)));
+  PathCounts counts(width, height, 1);
+  for (int y = step / 2; y < height; y += step)
+    for (int x = step / 2; x < width; x += step) counts.at(x, y)[0] = paths;
+  const View view{light, X_DC, begin, key, check, spec_.shutter.exposure_s};
+  const Means means = render(*this, view, counts, Paths::OfMeter, {});
+  std::vector<MeteredPixel> metered;
+  for (int y = step / 2; y < height; y += step) {
+    for (int x = step / 2; x < width; x += step) {
+      const auto rgb = means.radiance.at(x, y);
+      if (means.spreads.paths.at(x, y)[0] > 0)
+        metered.push_back({{x, y}, {rgb[0], rgb[1], rgb[2]}});
+    }
+  }
+  return metered;
 }
 
 void Camera::check_cover(const Trajectory& X_DC, nanoseconds begin) const {

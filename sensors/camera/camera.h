@@ -1,10 +1,13 @@
 #pragma once
 
 #include <chrono>
+#include <cstddef>
 #include <cstdint>
 #include <functional>
+#include <glm/vec2.hpp>
 #include <glm/vec3.hpp>
 #include <memory>
+#include <optional>
 #include <span>
 #include <vector>
 
@@ -38,6 +41,12 @@ struct Exposure {
   ImageF coverage;
 };
 
+/// Light of a pixel that automatic exposure measures.
+struct MeteredPixel {
+  glm::ivec2 pixel{0};
+  glm::vec3 radiance{0};  ///< linear sRGB, W/(m^2 sr)
+};
+
 /// Returns all labels that a scene can show, ascending; the first is 0, for the sky.
 std::vector<std::uint16_t> labels_of(const Scene& scene);
 
@@ -64,10 +73,25 @@ class Camera {
   /// @param labels  labels whose coverage is requested, ascending.
   /// @param check  called on any thread before each block of rows; an exception from it ends the
   ///        image.
+  /// @param exposure_s  exposure time of this image, up to that of the shutter, which is the
+  ///        default; the middle of each row's exposure is that of the shutter's.
   /// @throws Error if X_DC does not cover the exposure.
   Exposure expose(const PathTracer& light, const Trajectory& X_DC, std::chrono::nanoseconds begin,
                   const RandomKey& key, std::span<const std::uint16_t> labels = {},
-                  const std::function<void()>& check = {}) const;
+                  const std::function<void()>& check = {},
+                  std::optional<double> exposure_s = std::nullopt) const;
+
+  /// Returns how often `expose` calls `check`: nearly in proportion to its work, if the number of
+  /// paths per pixel is fixed.
+  std::size_t checks() const noexcept;
+
+  /// Measures the light of an image at up to about 3000 pixels of a square lattice, as a camera
+  /// does before an automatic exposure: with 16 paths per pixel, over the shutter's exposure time.
+  /// The paths are independent of those of `expose`. Parameters and errors are as there.
+  /// @return the pixels that have a viewing direction, row by row.
+  std::vector<MeteredPixel> meter(const PathTracer& light, const Trajectory& X_DC,
+                                  std::chrono::nanoseconds begin, const RandomKey& key,
+                                  const std::function<void()>& check = {}) const;
 
   /// Returns the time from the image's start to the end of the last row's exposure.
   std::chrono::nanoseconds duration() const noexcept;

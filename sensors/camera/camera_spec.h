@@ -12,11 +12,29 @@
 
 namespace groundray {
 
-/// Shutter, global or rolling: each row is exposed for `exposure_s` from its own start.
+/// Automatic exposure: the exposure time of each image follows from a measurement of its own light,
+/// up to ShutterSpec::exposure_s; the gain is increased only if that is still too dark.
+/// @see docs/theory/camera_imager.md
+struct AutoExposureSpec {
+  /// Level of an image, relative to white.
+  enum class Metering {
+    Percentile,  ///< `percentile` of the pixels' brightest channels
+    Mean,        ///< mean of the pixels' luminance
+  };
+  Metering metering = Metering::Percentile;
+  double percentile = 99;    ///< > 0 up to 100
+  double target = 0.9;       ///< requested level, > 0 up to 1
+  double shortest_s = 1e-5;  ///< shortest exposure time
+  double most_gain = 1;      ///< largest factor of ImagerSpec::gain_dn_e, 1 or more
+};
+
+/// Shutter, global or rolling: each row is exposed for `exposure_s` from its own start. Automatic
+/// exposures may be shorter; they have the same middle.
 struct ShutterSpec {
   double exposure_s = 0.005;
   /// Time from the start of a row to that of the next one below; 0 for a global shutter.
   double row_s = 0;
+  std::optional<AutoExposureSpec> automatic = {};  ///< requires an imager
 };
 
 /// Aperture of the lens, and its losses of light.
@@ -97,6 +115,12 @@ inline bool gives(const CameraSpec& camera, CameraProduct product) {
 /// Returns true if a product is computed from the light of the scene.
 constexpr bool is_of_light(CameraProduct product) {
   return product == CameraProduct::Radiance || product >= CameraProduct::Coverage;
+}
+
+/// Returns true if any product of the camera comes from its imager.
+inline bool gives_signal(const CameraSpec& camera) {
+  return std::ranges::any_of(camera.products,
+                             [](CameraProduct each) { return each >= CameraProduct::Irradiance; });
 }
 
 /// Returns true if any product of the camera is computed from the light of the scene.

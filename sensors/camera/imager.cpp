@@ -129,6 +129,11 @@ int channel_of(ColorFilter filter, glm::ivec2 pixel) noexcept {
   return corner[static_cast<std::size_t>(pixel.y % 2 * 2 + pixel.x % 2)];
 }
 
+double photons_per_w_m2(const ImagerSpec& imager, double exposure_s) {
+  return imager.pixel_pitch_m * imager.pixel_pitch_m * exposure_s * green_m /
+         (planck_j_s * light_m_s);
+}
+
 Imager::Imager(const ImagerSpec& spec, double exposure_s) : spec_(spec), exposure_s_(exposure_s) {
   Violations broken("imager");
   const auto positive = [&](const char* name, double value) {
@@ -169,8 +174,7 @@ Imager::Imager(const ImagerSpec& spec, double exposure_s) : spec_(spec), exposur
 ImageF Imager::photons(const ImageF& irradiance_w_m2) const {
   check_image(irradiance_w_m2, 3, "irradiance");
   ImageF photons(irradiance_w_m2.width(), irradiance_w_m2.height(), 1);
-  const double per_w_m2 =
-      spec_.pixel_pitch_m * spec_.pixel_pitch_m * exposure_s_ * green_m / (planck_j_s * light_m_s);
+  const double per_w_m2 = photons_per_w_m2(spec_, exposure_s_);
   for_each_pixel(photons.width(), photons.height(), [&](int x, int y, std::size_t pixel) {
     const auto light = irradiance_w_m2.at(x, y);
     const double w_m2 = spec_.filter == ColorFilter::Mono
@@ -212,6 +216,16 @@ Image16 Imager::digital(const ImageF& electrons, const RandomKey& key) const {
     digital.values()[pixel] = static_cast<std::uint16_t>(std::min(top_dn, std::max(0.0, dn)));
   });
   return digital;
+}
+
+double Imager::saturated_share(const ImageF& electrons, const Image16& digital) const {
+  const double top_dn = std::exp2(spec_.bits) - 1;
+  std::size_t saturated = 0;
+  for (std::size_t i = 0; i < electrons.values().size(); ++i)
+    saturated +=
+        electrons.values()[i] >= spec_.full_well_e || digital.values()[i] >= top_dn ? 1 : 0;
+  return static_cast<double>(saturated) /
+         static_cast<double>(std::max(electrons.values().size(), std::size_t{1}));
 }
 
 ImageF pupil_sr(const Lens& lens, const ApertureSpec& aperture, double pixel_pitch_m) {

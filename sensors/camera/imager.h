@@ -38,6 +38,9 @@ struct ImagerSpec {
   bool noise = true;  ///< true for random draws and fixed patterns, false for means of equal pixels
 };
 
+/// Returns the mean number of photons of 555 nm on a pixel for an irradiance of 1 W/m^2.
+double photons_per_w_m2(const ImagerSpec& imager, double exposure_s);
+
 /// Converts the irradiance of a sensor to digital numbers, stage by stage. Immutable; any number of
 /// threads may use one.
 /// @see EMVA Standard 1288, release 4.0 (2021); docs/theory/camera_imager.md for the equations.
@@ -59,6 +62,9 @@ class Imager {
   ImageF electrons(const ImageF& photons, const RandomKey& key) const;
   /// Returns the digital numbers read out of one channel of electrons.
   Image16 digital(const ImageF& electrons, const RandomKey& key) const;
+  /// Returns the fraction of the pixels that are full, or have the largest digital number.
+  /// @param electrons, digital  of the same image.
+  double saturated_share(const ImageF& electrons, const Image16& digital) const;
 
  private:
   ImagerSpec spec_;

@@ -38,6 +38,14 @@ std::string convergence_of(const fs::path& scan) {
   return {};
 }
 
+// Returns the contents of an image's file with its exposure as a mapping on one line.
+std::string exposure_of(const fs::path& file) {
+  std::string mapping;
+  std::ifstream lines = open_stream(file);
+  for (std::string line; next_line(lines, line);) mapping += (mapping.empty() ? "" : ", ") + line;
+  return fmt::format("{{{}}}", mapping);
+}
+
 // Returns true if a name is that of a temporary file of a frame, with one of the suffixes.
 bool is_aside(const std::string& name, const std::vector<std::string>& suffixes) {
   const std::size_t digits = std::min(name.find_first_not_of("0123456789"), name.size());
@@ -278,7 +286,7 @@ void DatasetWriter::write_sensors() {
 // Returns the entry of a frame that is not finished.
 FrameEntry DatasetWriter::entry_of(std::uint32_t sensor, std::int64_t frame) const {
   const std::chrono::nanoseconds stamp = exposed(simulation_, sensor, frame).begin;
-  return {sensors_[sensor].name, frame, stamp, false, {}, {}};
+  return {.sensor = sensors_[sensor].name, .frame = frame, .stamp = stamp};
 }
 
 std::string DatasetWriter::done_text(std::uint32_t sensor, std::int64_t frame,
@@ -287,6 +295,8 @@ std::string DatasetWriter::done_text(std::uint32_t sensor, std::int64_t frame,
   entry.is_done = true;
   if (sensor < simulation_.lidars.size())
     entry.convergence = convergence_of(product_path(sensor, frame, scan_suffix));
+  else if (std::ranges::count(sensors_[sensor].suffixes, exposure_suffix) > 0)
+    entry.exposure = exposure_of(product_path(sensor, frame, exposure_suffix));
   entry.files = std::move(files);
   return text_of(entry);
 }

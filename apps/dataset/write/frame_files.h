@@ -46,12 +46,21 @@ std::vector<ImagedEcho> show_echoes(const Simulation& simulation, std::size_t ca
                                     std::int64_t image, const OverlaidScan& shown,
                                     const PointCloud& echoes, const Scene& scene);
 
+/// Suffix of the file with an image's exposure time, its gain and the fraction of its pixels that
+/// are saturated; present if its camera has products of the imager.
+inline constexpr const char* exposure_suffix = "_exposure.yaml";
+
+/// Figures of a written image.
+struct ImageFigures {
+  std::uint64_t flows_left_out = 0;  ///< number of flows that exceed the range of KITTI's format
+  double saturated_share = 0;        ///< fraction of the pixels that are saturated
+};
+
 /// Simulates the imager if necessary, and writes all files of an image.
 /// @param echoes  positions of the echoes of each lidar that the camera shows, as show_echoes.
-/// @return number of flows that exceed the range of KITTI's format.
 /// @throws Error if a file cannot be written.
-std::uint64_t write_image(const Simulation& simulation, const DatasetWriter& dataset,
-                          std::size_t camera, std::int64_t image, const MadeImage& made,
-                          std::span<const std::vector<ImagedEcho>> echoes);
+ImageFigures write_image(const Simulation& simulation, const DatasetWriter& dataset,
+                         std::size_t camera, std::int64_t image, const MadeImage& made,
+                         std::span<const std::vector<ImagedEcho>> echoes);
 
 }  // namespace groundray

@@ -1,6 +1,7 @@
 #include "apps/dataset/write/frame_maker.h"
 
 #include <algorithm>
+#include <atomic>
 #include <ctime>
 #include <exception>
 #include <memory>
@@ -31,25 +32,6 @@ std::chrono::duration<double> thread_cpu() {
   return std::chrono::seconds(time.tv_sec) + std::chrono::nanoseconds(time.tv_nsec);
 }
 
-// Writes a frame and records it in the dataset.
-WrittenFrame write_frame(const Simulation& simulation, DatasetWriter& dataset,
-                         const MadeFrame& made) {
-  const auto begin = Clock::now();
-  const auto cpu_begin = thread_cpu();
-  const auto [sensor, number] = made.name;
-  WrittenFrame written;
-  if (const auto* scan = std::get_if<LidarScan>(&made.product)) {
-    write_scan(simulation, dataset, sensor, number, *scan);
-  } else {
-    written.flows_left_out = write_image(simulation, dataset, sensor - simulation.lidars.size(),
-                                         number, std::get<MadeImage>(made.product), made.echoes);
-  }
-  written.bytes = dataset.note(sensor, number);
-  written.writing = Clock::now() - begin;
-  written.writing_cpu = thread_cpu() - cpu_begin;
-  return written;
-}
-
 }  // namespace
 
 FramePlan plan_frames(const Simulation& simulation, const DatasetWriter& dataset,
@@ -63,8 +45,14 @@ FramePlan plan_frames(const Simulation& simulation, const DatasetWriter& dataset
       if (!dataset.has(sensor, number)) plan.frames.push_back({sensor, number});
     }
   }
-  std::ranges::stable_sort(plan.frames, {},
+  // Frames are listed by sensor, so the first of each differs in its sensor from the one before.
+  std::vector<FrameName> first, others;
+  for (const FrameName& name : plan.frames)
+    (first.empty() || first.back().sensor != name.sensor ? first : others).push_back(name);
+  std::ranges::stable_sort(others, {},
                            [&](const FrameName& name) { return part_of(simulation, name); });
+  plan.frames = std::move(first);
+  plan.frames.insert(plan.frames.end(), others.begin(), others.end());
   return plan;
 }
 
@@ -82,7 +70,12 @@ MadeFrame FrameMaker::make(const FrameName& name) {
     }
     const Scene& scene = scene_for_(exposed(simulation_, name.sensor, name.number));
     const auto traced_from = Clock::now();
-    made.product = make_image(simulation_, camera, name.number, scene, stop_if_interrupted);
+    const auto blocks = static_cast<double>(simulation_.cameras[camera].camera.checks());
+    std::atomic<std::size_t> begun = 0;
+    made.product = make_image(simulation_, camera, name.number, scene, [&] {
+      stop_if_interrupted();
+      if (watch_) watch_(name, std::min(1.0, static_cast<double>(begun++) / blocks));
+    });
     made.tracing = Clock::now() - traced_from;
   }
   made.making = Clock::now() - begin;
@@ -93,7 +86,10 @@ LidarScan FrameMaker::trace_scan(std::uint32_t sensor, std::int64_t frame,
                                  std::chrono::duration<double>& tracing) {
   const Scene& scene = scene_for_(exposed(simulation_, sensor, frame));
   const auto begin = Clock::now();
-  LidarScan scan = make_scan(simulation_, sensor, frame, scene);
+  LidarScan scan = make_scan(simulation_, sensor, frame, scene, [&](double share) {
+    if (watch_) watch_({sensor, frame}, share);
+    return true;
+  });
   tracing += Clock::now() - begin;
   return scan;
 }
@@ -111,10 +107,29 @@ const PointCloud& FrameMaker::echoes_of(const OverlaidScan& shown) {
       .first->second.second;
 }
 
+WrittenFrame write_frame(const Simulation& simulation, DatasetWriter& dataset,
+                         const MadeFrame& made) {
+  const auto begin = Clock::now();
+  const auto cpu_begin = thread_cpu();
+  const auto [sensor, number] = made.name;
+  WrittenFrame written;
+  if (const auto* scan = std::get_if<LidarScan>(&made.product)) {
+    write_scan(simulation, dataset, sensor, number, *scan);
+  } else {
+    written.image = write_image(simulation, dataset, sensor - simulation.lidars.size(), number,
+                                std::get<MadeImage>(made.product), made.echoes);
+  }
+  written.bytes = dataset.note(sensor, number);
+  written.writing = Clock::now() - begin;
+  written.writing_cpu = thread_cpu() - cpu_begin;
+  return written;
+}
+
 void make_frames(const Simulation& simulation, DatasetWriter& dataset,
                  const std::vector<FrameName>& frames,
-                 const std::function<void(const MadeFrame&, const WrittenFrame&)>& written) {
-  FrameMaker maker(simulation, dataset);
+                 const std::function<void(const MadeFrame&, const WrittenFrame&)>& written,
+                 const FrameWatch& watch) {
+  FrameMaker maker(simulation, dataset, watch);
   BackgroundWriter writer;
   bool was_scan = false;
   try {

@@ -17,6 +17,7 @@
 #include "core/image/flow_io.h"
 #include "core/image/luminance.h"
 #include "core/image/png_io.h"
+#include "core/io/file_io.h"
 #include "sensors/camera/image_truth.h"
 #include "sensors/camera/lidar_image.h"
 
@@ -113,14 +114,16 @@ glm::mat4 world_to_camera(const PlacedCamera& placed, nanoseconds begin) {
   return matrix;
 }
 
-std::vector<ExrAttribute> attributes_of(const PlacedCamera& placed, nanoseconds begin) {
+std::vector<ExrAttribute> attributes_of(const PlacedCamera& placed, nanoseconds begin,
+                                        const MadeImage& made) {
   const CameraSpec& camera = placed.spec.camera;
+  const double exposure_s = made.light ? made.exposure.exposure_s : camera.shutter.exposure_s;
   std::vector<ExrAttribute> attributes{
       {"cameraModel", camera.model},
       {"radianceUnit", "W/(m^2 sr), 683 lm/W"},
       {"pixelCentres", "whole"},
       {"whiteLuminance", static_cast<float>(luminous_efficacy_lm_w)},
-      {"expTime", static_cast<float>(camera.shutter.exposure_s)},
+      {"expTime", static_cast<float>(exposure_s)},
       {"worldToCamera", world_to_camera(placed, begin)}};
   if (camera.aperture)
     attributes.push_back({"aperture", static_cast<float>(camera.aperture->f_number)});
@@ -139,6 +142,11 @@ void write_stages(const CameraSpec& camera, const ImagerStages& stages,
   if (gives(camera, Product::Raw)) write_png(path_of("_raw.png"), stages.raw_dn);
   if (stages.picture)
     std::visit([&](const auto& image) { write_png(path_of(".png"), image); }, *stages.picture);
+}
+
+std::string exposure_text(const ExposureSetting& exposure, double saturated_share) {
+  return fmt::format("exposure_s: {:.9g}\ngain: {:.6g}\nsaturated: {:.6g}\n", exposure.exposure_s,
+                     exposure.gain, saturated_share);
 }
 
 // Returns the last scan that has begun by the middle of the image's time, or the first scan.
@@ -200,14 +208,15 @@ std::vector<std::string> image_suffixes(const MountedCamera& mounted) {
   add(Product::Electrons, "_electrons.exr");
   add(Product::Raw, "_raw.png");
   add(Product::Picture, ".png");
+  if (gives_signal(camera)) suffixes.emplace_back(exposure_suffix);
   for (const std::string& lidar : mounted.lidars) suffixes.push_back(echoes_suffix(lidar));
   if (std::ranges::any_of(camera.products, is_layer)) suffixes.emplace_back(".exr");
   return suffixes;
 }
 
-std::uint64_t write_image(const Simulation& simulation, const DatasetWriter& dataset,
-                          std::size_t which, std::int64_t image, const MadeImage& made,
-                          std::span<const std::vector<ImagedEcho>> echoes) {
+ImageFigures write_image(const Simulation& simulation, const DatasetWriter& dataset,
+                         std::size_t which, std::int64_t image, const MadeImage& made,
+                         std::span<const std::vector<ImagedEcho>> echoes) {
   const PlacedCamera& placed = simulation.cameras[which];
   const CameraSpec& camera = placed.spec.camera;
   const auto path_of = [&](std::string_view suffix) {
@@ -216,7 +225,7 @@ std::uint64_t write_image(const Simulation& simulation, const DatasetWriter& dat
   };
   for (std::size_t i = 0; i < echoes.size(); ++i)
     write_imaged_echoes(path_of(echoes_suffix(placed.spec.lidars[i])), echoes[i]);
-  std::uint64_t flows_left_out = 0;
+  ImageFigures written;
   Layers layers;
   if (made.light) add_light(*made.light, camera, made.labels, layers);
   std::optional<TruthInFile> in_file;
@@ -224,19 +233,22 @@ std::uint64_t write_image(const Simulation& simulation, const DatasetWriter& dat
     in_file.emplace(*made.truth);
     add_truth(*made.truth, *in_file, camera, layers);
     const ImageF& flow_px = made.truth->forward.offset_px;
-    flows_left_out =
+    written.flows_left_out =
         write_flows(camera, flow_px.width() > 0 ? flow_px : unknown_flow(camera.size_px), path_of);
   }
   if (made.light)
-    if (const auto stages = simulate_imager(simulation, which, image, made.light->radiance))
+    if (const auto stages = simulate_imager(simulation, which, image, made)) {
       write_stages(camera, *stages, path_of);
+      write_text(path_of(exposure_suffix), exposure_text(made.exposure, stages->saturated_share));
+      written.saturated_share = stages->saturated_share;
+    }
   write_png(path_of("_preview.png"), draw_image_preview(made.light ? &*made.light : nullptr,
                                                         made.truth ? &*made.truth : nullptr));
   if (!layers.all.empty()) {
     write_exr(path_of(".exr"), layers.all,
-              attributes_of(placed, placed.begins[static_cast<std::size_t>(image)]));
+              attributes_of(placed, placed.begins[static_cast<std::size_t>(image)], made));
   }
-  return flows_left_out;
+  return written;
 }
 
 }  // namespace groundray

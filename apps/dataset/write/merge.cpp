@@ -264,8 +264,7 @@ void write_joined(const std::vector<fs::path>& shards, const Joined& joined, con
 
 std::string pending_text(const SharedFrame& frame) {
   const FrameEntry& entry = frame.entry;
-  return text_of(FrameEntry{
-      entry.sensor, entry.frame, entry.stamp, /*is_done=*/false, /*convergence=*/{}, {}});
+  return text_of(FrameEntry{.sensor = entry.sensor, .frame = entry.frame, .stamp = entry.stamp});
 }
 
 // Returns the number of bytes that were copied or already in the folder.

@@ -14,6 +14,7 @@
 #include "apps/dataset/frame_entry.h"
 #include "apps/scene/calibration/camera_calibration.h"
 #include "apps/scene/fingerprint.h"
+#include "apps/scene/notes.h"
 #include "apps/scene/readers/scene_reader.h"
 #include "core/error.h"
 #include "core/io/file_io.h"
@@ -145,6 +146,9 @@ std::string run_header(const Simulation& simulation) {
     for (const Material& material : simulation.scene_objects.materials.all())
       text += fmt::format("  - {}\n", yaml_text(material.name));
   }
+  const std::vector<std::string> notes = notes_of(simulation);
+  if (!notes.empty()) text += "notes:\n";
+  for (const std::string& note : notes) text += fmt::format("  - {}\n", yaml_text(note));
   if (!simulation.scene_objects.groups.empty()) text += "objects:\n";
   for (const SceneObjects::Group& group : simulation.scene_objects.groups) {
     text += fmt::format("  - {{name: {}, label: {}, first_instance: {}, count: {}}}\n",

@@ -25,6 +25,9 @@ constexpr Rule time_rule{[](double value) { return value >= 0 && value <= 1e9; }
                          "must be from 0 to 1e9"};
 constexpr Rule exposure_rule{[](double value) { return value >= 1e-6 && value <= 3.6e6; },
                              "must be > 0: from 1e-6, a nanosecond, to 3.6e6, an hour"};
+constexpr Rule percentile_rule{[](double value) { return value > 0 && value <= 100; },
+                               "must be > 0 and at most 100"};
+constexpr double grey_target = 0.18;  // mean level that makes a scene of average reflectance grey
 constexpr Rule row_rule{[](double value) { return value >= 0 && value <= 1e6; },
                         "must be from 0 to 1e6"};
 
@@ -48,9 +51,30 @@ void read_int(Map& map, std::string_view key, Need need, int& into, int low, int
   }
 }
 
-void read_shutter(Map map, ShutterSpec& shutter) {
-  map.read_scaled("exposure_ms", Need::Optional, 1e-3, shutter.exposure_s, exposure_rule);
+void read_automatic(const Node& node, std::optional<AutoExposureSpec>& into, Faults& faults) {
+  if (node.kind == Node::Kind::Plain && node.text == "off") return into.reset();
+  AutoExposureSpec automatic = into.value_or(AutoExposureSpec{});
+  Map map(node, "automatic", faults);
+  map.read_choice("metering", Need::Optional, automatic.metering, {"percentile", "mean"});
+  map.read_number("percentile", Need::Optional, automatic.percentile, percentile_rule);
+  if (automatic.metering == AutoExposureSpec::Metering::Mean) automatic.target = grey_target;
+  map.read_number("target", Need::Optional, automatic.target, positive_share_rule);
+  map.read_scaled("shortest_us", Need::Optional, 1e-6, automatic.shortest_s, positive);
+  map.read_number("most_gain", Need::Optional, automatic.most_gain, at_least_one);
+  map.close();
+  into = automatic;
+}
+
+// An exposure time by itself is a fixed one, also where the camera's file has automatic exposure.
+void read_shutter(Map map, ShutterSpec& shutter, Faults& faults) {
+  const Node* const fixed =
+      map.read_scaled("exposure_ms", Need::Optional, 1e-3, shutter.exposure_s, exposure_rule);
   map.read_scaled("row_us", Need::Optional, 1e-6, shutter.row_s, row_rule);
+  if (const Node* const automatic = map.find("automatic", Need::Optional)) {
+    read_automatic(*automatic, shutter.automatic, faults);
+  } else if (fixed != nullptr) {
+    shutter.automatic.reset();
+  }
   map.close();
 }
 
@@ -201,7 +225,7 @@ void read_settings(Map& map, CameraSpec& camera, Faults& faults) {
   map.read_number("rate_hz", Need::Optional, camera.rate_hz, positive);
   map.read_scaled("first_ms", Need::Optional, 1e-3, camera.first_s, time_rule);
   if (auto shutter = map.map("shutter", Need::Optional))
-    read_shutter(std::move(*shutter), camera.shutter);
+    read_shutter(std::move(*shutter), camera.shutter, faults);
   if (auto aperture = map.map("aperture", Need::Optional))
     read_aperture(std::move(*aperture), camera.aperture);
   if (auto sampling = map.map("sampling", Need::Optional))
@@ -258,6 +282,15 @@ void complete_camera(const Node& node, CameraSpec& camera, Faults& faults) {
     const auto product = static_cast<CameraProduct>(i);
     if (gives(camera, product) && is_of_imager(product) && !camera.imager)
       faults.add(node, "products", "has '{}', which needs an 'imager'", products[i]);
+  }
+  if (camera.shutter.automatic && !camera.imager) {
+    faults.add(node, "shutter",
+               "has 'automatic' exposure, which needs an 'imager' to tell which light is white");
+  }
+  if (camera.shutter.automatic &&
+      camera.shutter.automatic->shortest_s > camera.shutter.exposure_s) {
+    faults.add(node, "shutter", "has a shortest_us of {:.6g}, but exposes for at most {:.6g} ms",
+               camera.shutter.automatic->shortest_s * 1e6, camera.shutter.exposure_s * 1e3);
   }
   if (camera.imager && !camera.aperture)
     faults.add(node, "imager", "needs an 'aperture', which determines how much light arrives");
