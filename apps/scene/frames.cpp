@@ -87,7 +87,7 @@ MadeImage make_image(const Simulation& simulation, std::size_t camera, std::int6
     made.exposure = {spec.shutter.exposure_s};
     if (spec.shutter.automatic) {
       made.exposure = choose_exposure(
-          spec, placed.camera.meter(tracer, placed.X_DC, placed.begins[number], key, check),
+          spec, placed.camera.meter(tracer, placed.X_DC, placed.begins[number], key),
           placed.pupil_sr);
     }
     made.light = placed.camera.expose(tracer, placed.X_DC, placed.begins[number], key, made.labels,

@@ -100,7 +100,7 @@ struct View {
   const Trajectory& X_DC;
   nanoseconds begin;
   const RandomKey& key;
-  const std::function<void()>& check;
+  std::function<void()> check;
   double exposure_s;  // with the same middle as the shutter's
 };
 
@@ -354,8 +354,7 @@ std::size_t Camera::checks() const noexcept {
 }
 
 std::vector<MeteredPixel> Camera::meter(const PathTracer& light, const Trajectory& X_DC,
-                                        nanoseconds begin, const RandomKey& key,
-                                        const std::function<void()>& check) const {
+                                        nanoseconds begin, const RandomKey& key) const {
   constexpr double most_pixels = 3072;
   constexpr int paths = 16;
   check_cover(X_DC, begin);
@@ -365,7 +364,7 @@ std::vector<MeteredPixel> Camera::meter(const PathTracer& light, const Trajector
   PathCounts counts(width, height, 1);
   for (int y = step / 2; y < height; y += step)
     for (int x = step / 2; x < width; x += step) counts.at(x, y)[0] = paths;
-  const View view{light, X_DC, begin, key, check, spec_.shutter.exposure_s};
+  const View view{light, X_DC, begin, key, {}, spec_.shutter.exposure_s};
   const Means means = render(*this, view, counts, Paths::OfMeter, {});
   std::vector<MeteredPixel> metered;
   for (int y = step / 2; y < height; y += step) {

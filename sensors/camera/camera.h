@@ -90,8 +90,7 @@ class Camera {
   /// The paths are independent of those of `expose`. Parameters and errors are as there.
   /// @return the pixels that have a viewing direction, row by row.
   std::vector<MeteredPixel> meter(const PathTracer& light, const Trajectory& X_DC,
-                                  std::chrono::nanoseconds begin, const RandomKey& key,
-                                  const std::function<void()>& check = {}) const;
+                                  std::chrono::nanoseconds begin, const RandomKey& key) const;
 
   /// Returns the time from the image's start to the end of the last row's exposure.
   std::chrono::nanoseconds duration() const noexcept;

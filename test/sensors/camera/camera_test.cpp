@@ -373,5 +373,58 @@ TEST(Camera, RejectsATrajectoryThatDoesNotCoverTheExposure) {
       ThrowsMessage<Error>(HasSubstr("exposed from 1.998000 s to 2.003000 s")));
 }
 
+// Seen from a camera that moves along an edge's normal, the edge is blurred over the distance of an
+// exposure, about its position in the middle of it.
+TEST(Camera, ShorterExposuresHaveTheSameMiddle) {
+  CameraSpec spec = pinhole(100, {40, 4}, 256);
+  spec.shutter.exposure_s = 0.1;
+  const Camera camera(spec);
+  const Scene scene = right_half(10);
+  const PathTracer light(scene, even_sky(), 1, std::nullopt);
+  const std::vector<std::uint16_t> labels{first_model_label};
+  const Trajectory path = gliding(looking({0, 0, 0}, ahead), {0, 10, 0});  // 10 px in 0.1 s
+  const auto shares = [&](double exposure_s) {
+    const ImageF coverage =
+        camera.expose(light, path, 0ns, {.seed = {5}}, labels, {}, exposure_s).coverage;
+    return std::vector<float>(coverage.values().begin(), coverage.values().begin() + 40);
+  };
+  const auto blurred = [](const std::vector<float>& row) {
+    return std::ranges::count_if(row, [](float share) { return share > 0 && share < 1; });
+  };
+  const std::vector<float> whole = shares(0.1), quarter = shares(0.025);
+  const auto sum = [](const std::vector<float>& row) {
+    return std::accumulate(row.begin(), row.end(), 0.0);
+  };
+  EXPECT_NEAR(sum(whole), sum(quarter), 0.05);  // the edge's mean position, px: 256 paths each
+  EXPECT_NEAR(static_cast<double>(blurred(whole)), 10, 1.01);
+  EXPECT_NEAR(static_cast<double>(blurred(quarter)), 2.5, 1.51);
+}
+
+TEST(Camera, MetersTheLightOfALattice) {
+  const Scene scene = scene_of(plane_ground(0, 0, -1000), {});
+  const PathTracer light(scene, even_sky(), 1, std::nullopt);
+  const Camera camera(pinhole(400, {400, 300}, 1));
+  const Trajectory path = gliding(looking(here, {0, 0, 1}), {});
+  const auto metered = camera.meter(light, path, 0ns, {.seed = {5}});
+  EXPECT_GT(metered.size(), 2000u);
+  EXPECT_LE(metered.size(), 3300u);
+  for (const MeteredPixel& each : metered) {
+    EXPECT_EQ(each.radiance, glm::vec3(2, 1, 0.5));
+    EXPECT_TRUE(each.pixel.x < 400 && each.pixel.y < 300);
+  }
+  // The same light whatever the number of threads, and other random numbers than the image's.
+  const Scene edge = right_half(10);
+  const PathTracer partly(edge, even_sky(), 1, std::nullopt);
+  const auto once = [&](int threads) {
+    tbb::task_arena arena(threads);
+    return arena.execute([&] {
+      return camera.meter(partly, gliding(looking(here, ahead), {}), 0ns, {.seed = {5}});
+    });
+  };
+  const auto one = once(1), four = once(4);
+  ASSERT_EQ(one.size(), four.size());
+  for (std::size_t i = 0; i < one.size(); ++i) EXPECT_EQ(one[i].radiance, four[i].radiance);
+}
+
 }  // namespace
 }  // namespace groundray::camera_test

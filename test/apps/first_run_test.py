@@ -1,0 +1,209 @@
+"""What a first run tells: notes on settings, automatic exposure, expected time and bytes."""
+
+import re
+
+import cv2
+import numpy as np
+import pytest
+import yaml
+from test.support.dataset_runs import CAMERA, SCENE, command, files, generate, groundray
+
+IMAGER = """\
+aperture: {f_number: 2, focal_length_mm: 0.12}
+imager:
+  {pixel_pitch_um: 3, filter: mono, quantum_efficiency: 0.6, full_well_e: 10000, gain_dn_e: 0.4,
+   read_noise_e: 3, bits: 12}
+products: [picture, raw]
+"""
+
+
+def written(folder, scene=SCENE, camera=CAMERA):
+    command(folder, scene=scene)
+    (folder / "camera.yaml").write_text(camera)
+    return folder / "scene.yaml"
+
+
+def run(folder, scene, *more, out="out"):
+    return groundray("generate", scene, "-o", folder / out, *more)
+
+
+def with_imager(shutter):
+    return CAMERA.split("shutter:")[0] + f"shutter: {shutter}\n" + IMAGER
+
+
+NOTES = [
+    ("drive: {waypoints", "drive: {waypoints", "", None),
+    (
+        "platform:",
+        "air: {fog_range_m: 300}\nplatform:",
+        "air: has no effect on lidar 'top', which has no link budget",
+        "air: hides surfaces beyond 300 m, but the sky above them remains clear",
+    ),
+    (
+        "mount: {translation_m: [0, 0, 1.5]}}",
+        "mount: {translation_m: [0, 0, 1.5]}, range_noise_sigma_m: 2}",
+        "lidar 'top': range_noise_sigma_m = 2 is more than data sheets state",
+        None,
+    ),
+    (
+        "mount: {translation_m: [0, 0, 1.5]}}",
+        "mount: {translation_m: [0, 0, 1.5]}, angular_jitter_mrad: 30}",
+        "lidar 'top': angular_jitter_mrad = 30 is more than half a degree",
+        None,
+    ),
+    (
+        "sampling: {samples: 2, most_samples: 2}",
+        "sampling: {samples: 2, most_samples: 8}",
+        "camera 'eye': without a relative_error every pixel takes the 8 paths",
+        None,
+    ),
+    (
+        "material: dry_soil}",
+        "material: dry_soil, detail: {tolerance_m: 3}}",
+        "tolerance_m = 3 is not less than the height of lidar 'top'",
+        None,
+    ),
+]
+
+
+@pytest.mark.parametrize(("before", "after", "note", "other"), NOTES)
+def test_settings_without_effect_are_noted(tmp_path, before, after, note, other):
+    assert before in SCENE
+    scene = written(tmp_path, SCENE.replace(before, after, 1))
+    info = groundray("info", scene)
+    assert info.returncode == 0, info.stderr
+    made = run(tmp_path, scene)
+    assert made.returncode == 0, made.stderr
+    listed = yaml.safe_load((tmp_path / "out/dataset.yaml").read_text()).get("notes", [])
+    if not note:
+        assert "\nnote " not in info.stdout and "note:" not in made.stderr and listed == []
+        return
+    for each in filter(None, (note, other)):
+        assert f"note      {each}" in info.stdout
+        assert f"note: {each}" in made.stderr
+        assert any(text.startswith(each) for text in listed)
+
+
+def test_a_lens_that_folds_inside_its_image_is_noted(tmp_path):
+    lens = "lens: {pinhole: {focal_px: [40, 40], centre_px: [23.5, 17.5]}}"
+    folded = (
+        "lens: {brown_conrady: {focal_px: [26, 26], centre_px: [23.5, 17.5], "
+        "coefficients: [-0.6, 0, 0, 0]}}"
+    )
+    assert lens in CAMERA
+    info = groundray("info", written(tmp_path, camera=CAMERA.replace(lens, folded)))
+    assert "note      camera 'eye': its distortion folds inside the image" in info.stdout
+
+
+def test_a_sky_that_nothing_sees_is_noted(tmp_path):
+    scene = SCENE.split("cameras:")[0]
+    info = groundray("info", written(tmp_path, scene))
+    assert "note      sky: has no effect, because there are no cameras" in info.stdout
+
+
+def test_saturated_images_are_noted(tmp_path):
+    made = run(tmp_path, written(tmp_path, camera=with_imager("{exposure_ms: 5}")))
+    assert made.returncode == 0, made.stderr
+    note = re.search(
+        r"note: camera 'eye': 3 images with more than 1 % .* saturated, (\d+) %", made.stderr
+    )
+    assert note, made.stderr
+    raw = cv2.imread(str(tmp_path / "out/camera/eye/000000_raw.png"), cv2.IMREAD_UNCHANGED)
+    share = np.mean(raw >= 4000)  # full wells are at 4000, less or more their read noise of 1.2
+    exposure = yaml.safe_load((tmp_path / "out/camera/eye/000000_exposure.yaml").read_text())
+    assert exposure["exposure_s"] == 0.005 and exposure["gain"] == 1
+    assert share / 2 < exposure["saturated"] < 1
+    entries = yaml.safe_load((tmp_path / "out/dataset.yaml").read_text())["frames"]
+    assert [each["exposure"] for each in entries if "exposure" in each][0] == exposure
+
+
+@pytest.mark.parametrize(
+    ("automatic", "level", "expected"),
+    [
+        ("{percentile: 95, target: 0.8}", lambda y: np.percentile(y, 95), 0.8),
+        ("{metering: mean}", np.mean, 0.18),
+        ("{metering: mean, target: 0.4}", np.mean, 0.4),
+    ],
+)
+def test_automatic_exposure_reaches_its_target(tmp_path, automatic, level, expected):
+    camera = (
+        with_imager(f"{{exposure_ms: 5, automatic: {automatic}}}")
+        + "picture: {encoding: linear, bits: 16}\n"
+    )
+    made = run(tmp_path, written(tmp_path, camera=camera.replace("samples: 2", "samples: 16")))
+    assert made.returncode == 0, made.stderr
+    assert "saturated" not in made.stderr
+    for number in range(3):
+        picture = cv2.imread(
+            str(tmp_path / f"out/camera/eye/{number:06}.png"), cv2.IMREAD_UNCHANGED
+        )
+        # Noise of paths and photons is wider than that of the metered pixels, with 16 paths each.
+        assert level(picture / 65535) == pytest.approx(expected, rel=0.1)
+
+
+def test_automatic_exposures_do_not_depend_on_threads_or_shards(tmp_path):
+    camera = with_imager("{exposure_ms: 5, automatic: {}}")
+    scene = written(tmp_path, camera=camera)
+    whole = run(tmp_path, scene)
+    assert whole.returncode == 0, whole.stderr
+    for part in "12":
+        assert run(tmp_path, scene, "--shard", f"{part}/2", out=part).returncode == 0
+    merged = groundray("merge", tmp_path / "1", tmp_path / "2", "-o", tmp_path / "merged")
+    assert merged.returncode == 0, merged.stderr
+    assert files(tmp_path / "merged") == files(tmp_path / "out")
+
+
+MISTAKES = [
+    ("{exposure_ms: 5, automatic: {percentile: 0}}", "automatic.percentile", "must be > 0"),
+    ("{exposure_ms: 5, automatic: {target: 2}}", "target", "at most 1"),
+    ("{exposure_ms: 5, automatic: {shortest_us: 9000}}", "shutter", "exposes for at most 5 ms"),
+    ("{exposure_ms: 5, automatic: {metering: spot}}", "metering", "percentile"),
+    ("{exposure_ms: 5, automatic: {most_gain: 0.5}}", "most_gain", "1 or more"),
+    ("{exposure_ms: 5, automatic: on}", "automatic", "map"),
+]
+
+
+@pytest.mark.parametrize(("shutter", "key", "rule"), MISTAKES)
+def test_mistakes_of_automatic_exposure(tmp_path, shutter, key, rule):
+    info = groundray("info", written(tmp_path, camera=with_imager(shutter)))
+    assert info.returncode == 1
+    assert key in info.stderr and rule in info.stderr
+    assert "camera.yaml:" in info.stderr or "scene.yaml:" in info.stderr
+
+
+def test_automatic_exposure_needs_an_imager(tmp_path):
+    camera = CAMERA.replace("{exposure_ms: 1}", "{exposure_ms: 1, automatic: {}}")
+    info = groundray("info", written(tmp_path, camera=camera))
+    assert info.returncode == 1
+    assert "has 'automatic' exposure, which needs an 'imager'" in info.stderr
+
+
+def test_an_exposure_time_by_itself_is_fixed(tmp_path):
+    scene = SCENE.replace(
+        "file: camera.yaml", "preset: realsense_d455_color\n    shutter: {exposure_ms: 2}"
+    )
+    info = groundray("info", written(tmp_path, scene))
+    assert info.returncode == 0, info.stderr
+    assert "automatic exposure" not in info.stdout
+    scene = SCENE.replace("file: camera.yaml", "preset: realsense_d455_color")
+    assert (
+        "automatic exposure, 0.01 to 5 ms, gain up to 8"
+        in groundray("info", written(tmp_path, scene)).stdout
+    )
+
+
+def test_info_states_the_bytes_of_a_run(tmp_path):
+    scene = written(tmp_path, SCENE.replace("file: camera.yaml", "preset: euroc_mav_cam0"))
+    info = groundray("info", scene)
+    assert info.returncode == 0, info.stderr
+    assert re.search(r"\ntime      about .* on this machine", info.stdout)
+    expected = float(re.search(r"\noutput    about ([\d.e+]+) MiB", info.stdout)[1]) * 2**20
+    assert run(tmp_path, scene).returncode == 0
+    written_bytes = sum(map(len, files(tmp_path / "out").values()))
+    assert written_bytes / 1.5 < expected < written_bytes * 1.5
+
+
+def test_progress_counts_scans_and_images(tmp_path):
+    made = generate(tmp_path)
+    assert made.returncode == 0, made.stderr
+    assert re.search(r"^scans 6/6, images 3/3 in ", made.stderr, re.MULTILINE)
