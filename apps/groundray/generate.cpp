@@ -151,7 +151,7 @@ std::vector<std::string> saturation_notes(const Simulation& simulation, const Ta
     if (images == 0) continue;
     const MountedCamera& camera = simulation.cameras[i].spec;
     notes.push_back(fmt::format(
-        "camera '{}': {} with more than 1 % of the pixels saturated, {:.2g} % in image {}; {}",
+        "camera '{}': {} with more than 1 % of the pixels saturated, {:.3g} % in image {}; {}",
         camera.name, images == 1 ? "an image" : fmt::format("{} images", images), 100 * most_share,
         most_image,
         camera.camera.shutter.automatic

@@ -29,7 +29,7 @@ void note_weather(const Simulation& simulation, Notes& notes) {
   for (const PlacedLidar& lidar : simulation.lidars) {
     if (has_light(lidar)) continue;
     notes.push_back(fmt::format(
-        "air: has no effect on lidar '{}', which has no link budget; give it a `laser` and a "
+        "weather: has no effect on lidar '{}', which has no link budget; give it a `laser` and a "
         "`receiver` (docs/reference/sensors.md#light)",
         lidar.spec.name));
   }
@@ -39,7 +39,7 @@ void note_weather(const Simulation& simulation, Notes& notes) {
   if (simulation.cameras.empty() || !spec.sky || range_m > thick_m) return;
   if (std::holds_alternative<AnalyticSky>(spec.sky->dome)) {
     notes.push_back(
-        fmt::format("air: hides surfaces beyond {:.4g} m, but the sky above them remains clear; "
+        fmt::format("weather: hides surfaces beyond {:.4g} m, but the sky above them remains clear; "
                     "give `sky` a `uniform` radiance or an image",
                     range_m));
   }
@@ -91,7 +91,7 @@ void note_cameras(const Simulation& simulation, Notes& notes) {
         std::holds_alternative<BrownConrady>(camera.lens) ? blind_share(placed.camera.lens()) : 0;
     if (blind > 0) {
       notes.push_back(fmt::format(
-          "camera '{}': its distortion folds inside the image, so about {:.2g} % of the pixels "
+          "camera '{}': its distortion folds inside the image, so about {:.3g} % of the pixels "
           "show nothing; are the coefficients in OpenCV's order, and is the image as large as in "
           "the calibration?",
           placed.spec.name, 100 * blind));

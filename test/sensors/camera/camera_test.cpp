@@ -404,7 +404,7 @@ TEST(Camera, MetersTheLightOfALattice) {
   const Scene scene = scene_of(plane_ground(0, 0, -1000), {});
   const PathTracer light(scene, even_sky(), 1, std::nullopt);
   const Camera camera(pinhole(400, {400, 300}, 1));
-  const Trajectory path = gliding(looking(here, {0, 0, 1}), {});
+  const Trajectory path = gliding(looking(here, {1, 0, 1}), {});
   const auto metered = camera.meter(light, path, 0ns, {.seed = {5}});
   EXPECT_GT(metered.size(), 2000u);
   EXPECT_LE(metered.size(), 3300u);
