@@ -19,6 +19,8 @@
 #include "apps/dataset/dataset_reader.h"
 #include "apps/dataset/dataset_text.h"
 #include "apps/dataset/write/journal.h"
+#include "apps/groundray/describe/file_facts.h"
+#include "apps/groundray/describe/named_facts.h"
 #include "apps/scene/simulation.h"
 #include "core/error.h"
 #include "core/io/file_io.h"
@@ -272,19 +274,33 @@ void print_dataset(const std::filesystem::path& folder) {
   }
 }
 
+void print_named(const std::string& name) {
+  const std::vector<Facts> all = named_facts(name);
+  if (all.empty()) {
+    throw Error(
+        "{}: there is no such file, preset, material or asset{}; `groundray list` lists the names",
+        name, named_suggestion(name));
+  }
+  for (const Facts& facts : all) {
+    if (&facts != all.data()) print_text(stdout, "\n");
+    print_facts(facts);
+  }
+}
+
 }  // namespace
 
 void print_info(const std::filesystem::path& file) {
   if (std::filesystem::exists(file / dataset_file)) return print_dataset(file);
   const std::string ending = file_ending(file);
-  if (ending == ".yaml" || ending == ".yml") return print_scene(load_simulation(file));
-  for (const char* other : {".ply", ".obj", ".stl", ".glb", ".gltf", ".pcd", ".npy", ".npz"}) {
-    if (ending == other && std::filesystem::exists(file))
-      throw Error(
-          "{}: a mesh or cloud by its name: `groundray-view` shows it; info describes DEMs, "
-          "scenes (.yaml) and datasets' folders",
-          file.string());
+  if (ending == ".yaml" || ending == ".yml") {
+    if (const auto facts = yaml_facts(file)) return print_facts(*facts);
+    return print_scene(load_simulation(file));
   }
+  const bool exists = std::filesystem::exists(file);
+  if (!exists && !file.has_extension() && !file.has_parent_path())
+    return print_named(file.string());
+  if (const auto kind = file_kind_of(file); kind && exists)
+    return print_facts(facts_of(file, *kind));
   try {
     print_dem(file);
   } catch (const Error&) {

@@ -35,13 +35,15 @@ int run(int argc, char** argv) {
   groundray::add_run_commands(app, commands);
 
   std::filesystem::path file;
-  auto* info = app.add_subcommand("info", "Describe a file and the resources that it needs");
+  auto* info = app.add_subcommand("info", "Describe a file, a dataset or a preset");
   info->add_option("FILE", file,
-                   "A DEM (GeoTIFF, HGT, ASCII grid, ...): size, CRS, cell, heights, holes, "
-                   "memory; a scene (.yaml): its expected output; or a dataset: its contents")
+                   "A DEM: size, CRS, cell, heights, holes, memory; a scene (.yaml): its expected "
+                   "output; a dataset: its contents; a lidar, camera or material (.yaml, or a name "
+                   "of `groundray list`); a mesh; a cloud or scan; an image")
       ->required();
 
   commands.push_back({info, [&] { groundray::print_info(file); }});
+  commands.push_back(groundray::add_list_command(app));
   groundray::add_terrain_commands(app, commands);
   groundray::add_reconstruct_commands(app, commands);
 
