@@ -2,8 +2,9 @@
 
 #include <algorithm>
 #include <array>
+#include <set>
 #include <string_view>
-#include <vector>
+#include <utility>
 
 #include "apps/groundray/describe/asset_facts.h"
 #include "apps/groundray/describe/material_facts.h"
@@ -11,7 +12,6 @@
 #include "apps/scene/readers/scene_reader.h"
 #include "apps/scene/simulation.h"
 #include "apps/scene/yaml_reader.h"
-#include "core/near_names.h"
 
 namespace groundray {
 namespace {
@@ -54,12 +54,12 @@ std::vector<Facts> named_facts(const std::string& name) {
   return all;
 }
 
-std::string named_suggestion(const std::string& name) {
-  std::vector<std::string> names(asset_names().begin(), asset_names().end());
+std::vector<std::string> names_of_data() {
+  std::set<std::string> names(asset_names().begin(), asset_names().end());
   for (const char* kind : data_kinds) {
-    for (std::string& each : preset_names(data_folder() / kind)) names.push_back(std::move(each));
+    for (std::string& name : preset_names(data_folder() / kind)) names.insert(std::move(name));
   }
-  return suggestion(name, names);
+  return {names.begin(), names.end()};
 }
 
 }  // namespace groundray

@@ -19,7 +19,8 @@ std::optional<Facts> yaml_facts(const std::filesystem::path& file);
 /// @throws Error as yaml_facts.
 std::vector<Facts> named_facts(const std::string& name);
 
-/// Returns "; did you mean 'x'?" for presets, materials and assets of similar names, or "".
-std::string named_suggestion(const std::string& name);
+/// Returns the names of all presets, materials and assets, sorted, each once.
+/// @throws Error if a folder of groundray's data cannot be read.
+std::vector<std::string> names_of_data();
 
 }  // namespace groundray
