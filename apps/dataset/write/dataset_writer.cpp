@@ -87,9 +87,10 @@ DatasetWriter::DatasetWriter(fs::path folder, const Simulation& simulation, Fold
                              RunPart part, FolderMessages messages)
     : folder_(std::move(folder)),
       simulation_(simulation),
-      part_{part.shard, checked_choice(part.choice, sensors_of(simulation))},
-      messages_(std::move(messages)),
-      header_(run_header(simulation, part_.choice)) {
+      part_(std::move(part)),
+      messages_(std::move(messages)) {
+  part_.choice = checked_choice(part_.choice, sensors_of(simulation));
+  header_ = run_header(simulation, part_.choice);
   const auto add = [&](const char* kind, const std::string& name, std::vector<std::string> suffixes,
                        std::int64_t frames) {
     std::vector<std::uint64_t> no_entries(static_cast<std::size_t>(frames));

@@ -9,6 +9,7 @@
 #include <variant>
 
 #include "apps/groundray/describe/file_facts.h"
+#include "core/error.h"
 #include "core/image/exr_io.h"
 #include "core/image/image_io.h"
 #include "core/io/file_io.h"
@@ -68,10 +69,19 @@ Facts exr_facts(const fs::path& file) {
   return facts;
 }
 
+// False for a damaged file, too, about which read_image8 has the better message.
+bool has_16_bits(const fs::path& file) {
+  try {
+    return inspect_dem(file).sample_type == "UInt16";
+  } catch (const Error&) {
+    return false;
+  }
+}
+
 // Values as stored: read_heights returns those of 16 bits as fractions.
 Facts picture_facts(const fs::path& file) {
   constexpr double most_of_16_bits = 65535;
-  const bool is_deep = inspect_dem(file).sample_type == "UInt16";
+  const bool is_deep = has_16_bits(file);
   const std::string form = file_ending(file) == ".png" ? "PNG" : "JPEG";
   Facts facts{{"kind", fmt::format("image, {} of {} bits", form, is_deep ? 16 : 8)}};
   const auto add = [&](const auto& image, double scale) {

@@ -23,7 +23,7 @@ TEST(FrameChoice, TextsRoundTrip) {
     ASSERT_TRUE(choice) << text;
     EXPECT_EQ(text_of(*choice), text);
   }
-  EXPECT_THAT(text_of({}), IsEmpty());
+  EXPECT_THAT(text_of(FrameChoice{}), IsEmpty());
 }
 
 TEST(FrameChoice, OtherTextsAreRejected) {
