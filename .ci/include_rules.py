@@ -93,7 +93,7 @@ CALLS = {
     r"GDALDataset::Open|GDALOpen|VSIFOpen": r"terrain/dem/raster_input\.cpp",
     r"CreateCopy\(": r"terrain/dem/layers_io\.cpp",
     r"\bO_CREAT\b|\bopen\((?![^;]*\bO_DIRECTORY)[^;]*\bO_[A-Z]+": r"core/io/open_file\.cpp"
-    r"|apps/groundray/(result_files|run_log)\.cpp|apps/golden/suite/suite\.cpp",
+    r"|apps/groundray/(result_files|run_controls|run_log)\.cpp|apps/golden/suite/suite\.cpp",
 }
 
 # The Python package reads files by dataset.py; exports write into a folder that they have made.

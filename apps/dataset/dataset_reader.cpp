@@ -253,12 +253,21 @@ std::optional<std::string> DatasetSummary::stem_of(const FrameEntry& entry) cons
   return fmt::format("{}/{}/{:06}", sensors[*number].kind, entry.sensor, entry.frame);
 }
 
+// The numbers of chosen frames are not consecutive from 0: their end is unknown here.
+bool DatasetSummary::has(const Sensor& sensor, std::int64_t frame) const noexcept {
+  if (frame < 0) return false;
+  if (text_of(part.choice).empty()) return frame < sensor.frames;
+  return part.choice.frames.contains(static_cast<std::size_t>(frame));
+}
+
 void DatasetSummary::add(const FrameEntry& entry) {
   const auto number = number_of(entry.sensor);
   if (!number) return;
   Sensor& sensor = sensors[*number];
-  if (entry.frame < 0 || entry.frame >= sensor.frames) return;
-  if (shard && !shard->has(static_cast<std::uint32_t>(*number), entry.frame, sensor.frames)) return;
+  if (!has(sensor, entry.frame)) return;
+  if (part.shard &&
+      !part.shard->has(static_cast<std::uint32_t>(*number), entry.frame, sensor.frames))
+    return;
   if (!sensor.counted.insert(entry.frame).second) return;
   ++done;
   ++sensor.done;
@@ -272,13 +281,15 @@ DatasetSummary read_summary(const fs::path& folder) {
   const yaml::Node node = yaml::parse(text.header(), path);
   yaml::Map root(node, "", faults);
   DatasetHead head = read_head(root, HeadUse::Run, {}, faults);
-  DatasetSummary summary{
-      .version = head.version, .seed = head.seed, .shard = text.shard(), .sensors = {}};
+  DatasetSummary summary{.version = head.version,
+                         .seed = head.seed,
+                         .part = {text.shard(), text.choice()},
+                         .sensors = {}};
   for (DatasetHead::Sensor& sensor : head.sensors) {
     const auto number = static_cast<std::uint32_t>(summary.sensors.size());
     const std::int64_t frames = sensor.frames;
-    const auto asked_for =
-        static_cast<std::size_t>(summary.shard ? summary.shard->share(number, frames) : frames);
+    const auto asked_for = static_cast<std::size_t>(
+        summary.part.shard ? summary.part.shard->share(number, frames) : frames);
     summary.asked_for += asked_for;
     summary.sensors.push_back({.name = std::move(sensor.name),
                                .kind = std::move(sensor.kind),

@@ -12,7 +12,7 @@
 #include <vector>
 
 #include "apps/dataset/frame_entry.h"
-#include "apps/dataset/shard.h"
+#include "apps/dataset/run_part.h"
 #include "core/geometry/trajectory.h"
 #include "core/io/mesh_io.h"
 #include "sensors/lidar/lidar_spec.h"
@@ -116,7 +116,7 @@ struct DatasetSummary {
   /// Lidar or camera.
   struct Sensor {
     std::string name, kind, model;  ///< name: also of its files; kind: "lidar" or "camera"
-    std::int64_t frames = 0;        ///< number of frames of the whole run
+    std::int64_t frames = 0;        ///< number of frames of the whole run, or of the choice
     std::size_t asked_for = 0;      ///< number of frames of the shard, or of the whole run
     std::size_t done = 0;
     std::uint64_t bytes = 0;         ///< size of its frames' files
@@ -124,8 +124,8 @@ struct DatasetSummary {
   };
   std::string version;
   std::uint64_t seed = 0;
-  std::optional<Shard> shard;
-  std::vector<Sensor> sensors;          ///< indexed by the sensor's number
+  RunPart part;
+  std::vector<Sensor> sensors;  ///< indexed by the sensor's number, unless sensors were chosen
   std::size_t asked_for = 0, done = 0;  ///< numbers of frames of all sensors
 
   /// Returns the number of the sensor of that name, if there is one.
@@ -133,6 +133,8 @@ struct DatasetSummary {
   /// Returns the common beginning of the paths of a frame's files, relative to the dataset; nothing
   /// for an unknown sensor.
   std::optional<std::string> stem_of(const FrameEntry& entry) const;
+  /// Returns true if a sensor has a frame of this number in the whole run or in the choice.
+  bool has(const Sensor& sensor, std::int64_t frame) const noexcept;
   /// Counts a finished frame, once; nothing that is not a frame of one of the sensors.
   void add(const FrameEntry& entry);
 };

@@ -24,7 +24,7 @@ namespace fs = std::filesystem;
 
 constexpr std::string_view frames_line = "frames:", files_line = "files:";
 constexpr std::string_view item = "  - ";
-constexpr std::string_view shard_begin = "shard: \"",
+constexpr std::string_view shard_begin = "shard: \"", choice_begin = "chosen: \"",
                            sum_key = "sha256_above:", sum_begin = "sha256_above: \"", quote = "\"";
 
 // Writes lines to a file and computes their checksum.
@@ -93,9 +93,7 @@ DatasetText::DatasetText(const fs::path& folder)
   while (const auto line = next_line()) {
     sum_.add(*line + "\n");
     if (*line == frames_line) return;
-    const auto shard = between(*line, shard_begin, quote);
-    if (shard) shard_ = parse_shard(*shard);
-    if (!shard || !shard_) header_ += *line + "\n";
+    if (!read_part(*line)) header_ += *line + "\n";
     if (header_.size() > most_header_bytes) {
       throw Error("{}: more than {} bytes precede the frames: is it a dataset's?", path_.string(),
                   most_header_bytes);
@@ -103,6 +101,18 @@ DatasetText::DatasetText(const fs::path& folder)
   }
   throw Error("{}: no frames are listed: it was truncated, or groundray did not write it",
               path_.string());
+}
+
+// Reads the line of a shard or of a choice; returns false for any other line.
+bool DatasetText::read_part(std::string_view line) {
+  if (const auto text = between(line, shard_begin, quote)) {
+    part_.shard = parse_shard(*text);
+    return part_.shard.has_value();
+  }
+  const auto text = between(line, choice_begin, quote);
+  const auto choice = text ? parse_choice(*text) : std::nullopt;
+  if (choice) part_.choice = *choice;
+  return choice.has_value();
 }
 
 std::optional<std::string> DatasetText::next_line() {
@@ -154,14 +164,15 @@ std::string first_difference(std::string_view text, std::string_view other) {
   return fmt::format("'{}' instead of '{}'", part(text), part(other));
 }
 
-void write_dataset_text(const fs::path& folder, std::string_view header,
-                        const std::optional<Shard>& shard,
+void write_dataset_text(const fs::path& folder, std::string_view header, const RunPart& part,
                         const std::function<std::optional<std::string>()>& next_entry,
                         const std::vector<NamedSum>& files) {
   write_whole(folder / dataset_file, [&](const fs::path& aside) {
     LineSink sink(aside);
     sink.write(header);
-    if (shard) sink.write(fmt::format("{}{}{}\n", shard_begin, text_of(*shard), quote));
+    if (part.shard) sink.write(fmt::format("{}{}{}\n", shard_begin, text_of(*part.shard), quote));
+    if (const std::string text = text_of(part.choice); !text.empty())
+      sink.write(fmt::format("{}{}{}\n", choice_begin, text, quote));
     sink.write(fmt::format("{}\n", frames_line));
     while (const auto entry = next_entry()) sink.write(fmt::format("{}{}\n", item, *entry));
     if (!files.empty()) sink.write(fmt::format("{}\n", files_line));

@@ -11,7 +11,7 @@
 
 #include "apps/dataset/file_sum.h"
 #include "apps/dataset/frame_entry.h"
-#include "apps/dataset/shard.h"
+#include "apps/dataset/run_part.h"
 
 namespace groundray {
 
@@ -26,10 +26,13 @@ class DatasetText {
   /// @throws Error if the folder has no such file, or it cannot be read or lists no frames.
   explicit DatasetText(const std::filesystem::path& folder);
 
-  /// Description of the run: all lines before the frames, except that of the shard.
+  /// Description of the run: all lines before the frames, except those of the shard and of the
+  /// choice.
   const std::string& header() const noexcept { return header_; }
   /// Shard of the run; nothing for a whole run.
-  const std::optional<Shard>& shard() const noexcept { return shard_; }
+  const std::optional<Shard>& shard() const noexcept { return part_.shard; }
+  /// Choice of sensors and frames; all by default.
+  const FrameChoice& choice() const noexcept { return part_.choice; }
 
   /// Returns the text of the next frame's entry; nothing after the last. Lines that are not entries
   /// are returned as well, and rejected by parse_entry, so that an altered line does not hide the
@@ -44,6 +47,7 @@ class DatasetText {
   bool is_intact() const noexcept { return is_intact_; }
 
  private:
+  bool read_part(std::string_view line);
   std::optional<std::string> next_line();
   void read_end(std::string line);
 
@@ -51,7 +55,7 @@ class DatasetText {
   std::ifstream file_;
   std::size_t line_ = 0;
   std::string header_;
-  std::optional<Shard> shard_;
+  RunPart part_;
   std::vector<NamedSum> files_;
   Sha256 sum_;
   bool is_in_frames_ = true, is_intact_ = false;
@@ -64,7 +68,7 @@ std::string first_difference(std::string_view text, std::string_view other);
 /// @param next_entry  returns entries as DatasetText::next_entry.
 /// @throws Error as write_whole.
 void write_dataset_text(const std::filesystem::path& folder, std::string_view header,
-                        const std::optional<Shard>& shard,
+                        const RunPart& part,
                         const std::function<std::optional<std::string>()>& next_entry,
                         const std::vector<NamedSum>& files);
 

@@ -244,7 +244,8 @@ int accept(const fs::path& folder, const std::vector<std::string>& names,
 int run(int argc, char** argv) {
   CLI::App app(
       "groundray-golden checks groundray's results for small scenes against closed forms, golden "
-      "files and statistics, and compares scans, images, DEMs and meshes from any source.");
+      "files and statistics, and compares scans, images, DEMs and meshes from any source.",
+      "groundray-golden");
   app.footer(
       "A first run:  groundray-golden run\n"
       "Exit codes:   0 all passed, 1 failed, 2 wrong usage, 130 interrupted");

@@ -1,6 +1,7 @@
 #include "apps/groundray/estimate.h"
 
 #include <fmt/format.h>
+#include <tbb/global_control.h>
 #include <unistd.h>
 
 #include <algorithm>
@@ -9,7 +10,6 @@
 #include <cstdlib>
 #include <filesystem>
 #include <system_error>
-#include <thread>
 #include <type_traits>
 #include <utility>
 #include <variant>
@@ -161,7 +161,8 @@ RunEstimate estimate_run(Simulation simulation) {
   // The scene is built for the first frame; the same frame again costs what any other does.
   const std::int64_t first = sample.frames(0) / 2;
   estimate.preparation = sample.cost_of(0, std::max<std::int64_t>(first - 1, 0)).preparing;
-  const double cores = std::max(1U, std::thread::hardware_concurrency());
+  const auto cores = static_cast<double>(
+      tbb::global_control::active_value(tbb::global_control::max_allowed_parallelism));
   const Seconds moving = [&] {
     return simulation.terrain.whole() == nullptr ? sample.cost_of(0, first).preparing : Seconds(0);
   }();

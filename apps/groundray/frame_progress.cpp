@@ -1,9 +1,9 @@
 #include "apps/groundray/frame_progress.h"
 
 #include <fmt/format.h>
+#include <tbb/global_control.h>
 
 #include <algorithm>
-#include <thread>
 
 namespace groundray {
 namespace {
@@ -44,7 +44,8 @@ void FrameProgress::begun(const FrameName& frame, double share) {
 }
 
 void FrameProgress::finished(const MadeFrame& made, const WrittenFrame& written) {
-  const double cores = std::max(1U, std::thread::hardware_concurrency());
+  const auto cores = static_cast<double>(
+      tbb::global_control::active_value(tbb::global_control::max_allowed_parallelism));
   const std::lock_guard lock(mutex_);
   Sensor& sensor = sensors_[made.name.sensor];
   ++sensor.done;

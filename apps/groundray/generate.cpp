@@ -100,7 +100,7 @@ void say_faults(const fs::path& out, const std::vector<std::string>& faults) {
 }
 
 void say(const Simulation& simulation, const fs::path& out, const FramePlan& plan,
-         const Tally& tally, std::FILE* to) {
+         const FrameChoice& choice, const Tally& tally, std::FILE* to) {
   if (tally.scans < plan.scans)
     print_text(to, "{} scans already existed\n", plan.scans - tally.scans);
   if (tally.images < plan.images)
@@ -121,23 +121,26 @@ void say(const Simulation& simulation, const fs::path& out, const FramePlan& pla
   }
   print_text(to, "dataset: {}\n", out.string());
   for (const PlacedLidar& lidar : simulation.lidars) {
+    if (!choice.has_sensor(lidar.spec.name)) continue;
     print_text(to, "  {}: scans and pictures (*_preview.png) in {}\n", lidar.spec.name,
                (out / "lidar" / lidar.spec.name).string());
   }
   for (const PlacedCamera& camera : simulation.cameras) {
+    if (!choice.has_sensor(camera.spec.name)) continue;
     print_text(to, "  {}: images and pictures (*_preview.png) in {}\n", camera.spec.name,
                (out / "camera" / camera.spec.name).string());
   }
 }
 
-void log_begin(const fs::path& scene, const fs::path& out, Seed seed,
-               const std::optional<Shard>& shard, const FramePlan& plan, RunLog& log) {
+void log_begin(const fs::path& scene, const fs::path& out, Seed seed, const RunPart& part,
+               const FramePlan& plan, RunLog& log) {
   LogFields fields;
   fields.add("version", GROUNDRAY_VERSION);
   fields.add("scene", scene.string());
   fields.add("output", out.string());
   fields.add("seed", seed.value);
-  if (shard) fields.add("shard", text_of(*shard));
+  if (part.shard) fields.add("shard", text_of(*part.shard));
+  if (const std::string text = text_of(part.choice); !text.empty()) fields.add("chosen", text);
   fields.add("frames", plan.frames.size());
   fields.add("there", plan.scans + plan.images - plan.frames.size());
   log.begun(plan.frames.size(), fields);
@@ -169,11 +172,11 @@ void run(const fs::path& scene, const fs::path& out, const GenerateOptions& opti
     simulation.terrain.clipmap(sensor_box(first_frame(simulation)), simulation.reach_m);
   }
   const auto warn = [](const std::string& warning) { print_error("{}\n", warning); };
-  DatasetWriter dataset(out, simulation, options.use, options.shard,
+  DatasetWriter dataset(out, simulation, options.use, options.part,
                         {.progress = stderr, .warn = warn});
   say_faults(out, dataset.faults());
-  const FramePlan plan = plan_frames(simulation, dataset, options.shard);
-  log_begin(scene, out, simulation.spec.seed, options.shard, plan, log);
+  const FramePlan plan = plan_frames(simulation, dataset);
+  log_begin(scene, out, simulation.spec.seed, options.part, plan, log);
   Tally tally;
   tally.saturated.resize(simulation.cameras.size());
   try {
@@ -198,7 +201,7 @@ void run(const fs::path& scene, const fs::path& out, const GenerateOptions& opti
   if (tally.scans + tally.images < plan.frames.size()) throw Interrupted{};
   for (const std::string& note : saturation_notes(simulation, tally))
     print_error("note: {}\n", note);
-  say(simulation, out, plan, tally, log.takes_output() ? stderr : stdout);
+  say(simulation, out, plan, options.part.choice, tally, log.takes_output() ? stderr : stdout);
 }
 
 }  // namespace

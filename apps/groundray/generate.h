@@ -4,7 +4,7 @@
 #include <optional>
 #include <string>
 
-#include "apps/dataset/shard.h"
+#include "apps/dataset/run_part.h"
 #include "apps/dataset/write/dataset_writer.h"
 #include "core/random.h"
 
@@ -14,8 +14,8 @@ namespace groundray {
 struct GenerateOptions {
   std::optional<Seed> seed;  ///< replaces the scene's own, for other noise and scattering
   FolderUse use = FolderUse::New;
-  std::optional<Shard> shard;  ///< part of the frames; nothing for all frames
-  std::string log;             ///< target, as for RunLog
+  RunPart part;     ///< shard, or chosen sensors and frames; all by default
+  std::string log;  ///< target, as for RunLog
 };
 
 /// Runs a scene and writes its dataset. Shows progress on standard error, and prints a summary on

@@ -19,12 +19,15 @@
 #include "apps/dataset/dataset_reader.h"
 #include "apps/dataset/dataset_text.h"
 #include "apps/dataset/write/journal.h"
+#include "apps/groundray/describe/file_facts.h"
+#include "apps/groundray/describe/named_facts.h"
 #include "apps/groundray/estimate.h"
 #include "apps/scene/notes.h"
 #include "apps/scene/simulation.h"
 #include "core/error.h"
 #include "core/io/file_io.h"
 #include "core/io/print_error.h"
+#include "core/near_names.h"
 #include "core/progress.h"
 #include "terrain/dem/dem_file.h"
 #include "terrain/dem/dem_io.h"
@@ -260,7 +263,9 @@ void print_dataset(const std::filesystem::path& folder) {
                  ? "; --resume of `groundray generate`, or of `groundray merge` if that was "
                    "interrupted, adds the rest"
                  : "");
-  if (dataset.shard) print_text(stdout, "shard     {}\n", text_of(*dataset.shard));
+  if (dataset.part.shard) print_text(stdout, "shard     {}\n", text_of(*dataset.part.shard));
+  if (const std::string chosen = text_of(dataset.part.choice); !chosen.empty())
+    print_text(stdout, "chosen    {}\n", chosen);
   print_text(stdout, "version   {}\nseed      {}\n", dataset.version, dataset.seed);
   for (const DatasetSummary::Sensor& sensor : dataset.sensors) {
     print_text(stdout, "{:<9} {}: {}, {} of {} frames, {:.1f} MiB\n", sensor.kind, sensor.name,
@@ -269,18 +274,45 @@ void print_dataset(const std::filesystem::path& folder) {
   }
 }
 
+// PNGs of 16 bits are DEMs, too, if a world file places them.
+bool is_dem(const std::filesystem::path& file) {
+  try {
+    const DemFile dem(file);
+    return true;
+  } catch (const Error&) {
+    return false;
+  }
+}
+
+void print_named(const std::string& name) {
+  const std::vector<Facts> all = named_facts(name);
+  if (all.empty()) {
+    throw Error(
+        "{}: there is no such file, preset, material or asset{}; `groundray list` lists the names",
+        name, suggestion(name, names_of_data()));
+  }
+  for (const Facts& facts : all) {
+    if (&facts != all.data()) print_text(stdout, "\n");
+    print_facts(facts);
+  }
+}
+
 }  // namespace
 
 void print_info(const std::filesystem::path& file) {
   if (std::filesystem::exists(file / dataset_file)) return print_dataset(file);
   const std::string ending = file_ending(file);
-  if (ending == ".yaml" || ending == ".yml") return print_scene(load_simulation(file));
-  for (const char* other : {".ply", ".obj", ".stl", ".glb", ".gltf", ".pcd", ".npy", ".npz"}) {
-    if (ending == other && std::filesystem::exists(file))
-      throw Error(
-          "{}: a mesh or cloud by its name: `groundray-view` shows it; info describes DEMs, "
-          "scenes (.yaml) and datasets' folders",
-          file.string());
+  if (ending == ".yaml" || ending == ".yml") {
+    if (const auto facts = yaml_facts(file)) return print_facts(*facts);
+    return print_scene(load_simulation(file));
+  }
+  const bool exists = std::filesystem::exists(file);
+  if (!exists && !file.has_extension() && !file.has_parent_path())
+    return print_named(file.string());
+  if (const auto kind = file_kind_of(file); kind && exists) {
+    print_facts(facts_of(file, *kind));
+    if (ending != ".png" || !is_dem(file)) return;
+    print_text(stdout, "\n");
   }
   try {
     print_dem(file);

@@ -87,9 +87,16 @@ struct RunOptions {
   fs::path scene, out;
   bool resume = false;
   std::optional<std::uint64_t> seed;
-  std::string shard, log;
+  std::string shard, log, frames;
+  std::vector<std::string> sensors;
   std::vector<fs::path> datasets;
 
+  // @throws Error as parse_frames.
+  RunPart part() const {
+    RunPart part{.shard = parse_shard(shard), .choice = {.sensors = sensors, .frames = {}}};
+    if (!frames.empty()) part.choice.frames = parse_frames(frames);
+    return part;
+  }
   FolderUse use() const { return resume ? FolderUse::Resume : FolderUse::New; }
 
   CLI::App* add_generate(CLI::App& app) {
@@ -106,11 +113,26 @@ struct RunOptions {
     command->add_flag("--resume", resume,
                       "Continue an interrupted run in its folder: check all existing files and "
                       "create those that are missing or changed");
+    auto* sensor = command
+                       ->add_option("--sensor", sensors,
+                                    "Make the frames of these sensors only; may be repeated")
+                       ->delimiter(',')
+                       ->allow_extra_args(false)
+                       ->type_name("NAME");
+    auto* range =
+        command
+            ->add_option("--frames", frames,
+                         "A:B:STEP, make these frames of each sensor only, from A to before B; or "
+                         "one number")
+            ->type_name("A:B:STEP");
     command
         ->add_option("--shard", shard,
                      "I/N, I from 1 to N: make shard I of N of the frames, in a separate folder; "
                      "`groundray merge` joins them")
-        ->check(check_shard);
+        ->check(check_shard)
+        ->type_name("I/N")
+        ->excludes(sensor)
+        ->excludes(range);
     command->add_option("--log-json", log,
                         "File that receives a line of JSON for each frame, or - for standard "
                         "output (docs/reference/runs.md)");
@@ -145,7 +167,7 @@ void add_run_commands(CLI::App& app, std::vector<Command>& commands) {
          generate(options->scene, options->out,
                   {.seed = options->seed ? std::optional(Seed{*options->seed}) : std::nullopt,
                    .use = options->use(),
-                   .shard = parse_shard(options->shard),
+                   .part = options->part(),
                    .log = options->log});
        }});
   commands.push_back({options->add_verify(app), [options] { verify_all(options->datasets); }});

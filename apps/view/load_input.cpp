@@ -5,7 +5,6 @@
 #include <algorithm>
 #include <array>
 #include <cmath>
-#include <fstream>
 #include <span>
 #include <string_view>
 #include <system_error>
@@ -19,7 +18,7 @@
 #include "apps/view/rendering/picture_file.h"
 #include "core/error.h"
 #include "core/io/file_io.h"
-#include "core/io/open_file.h"
+#include "core/io/ply_faces.h"
 #include "core/model/mesh_reader.h"
 #include "core/near_names.h"
 #include "terrain/dem/band_file.h"
@@ -31,18 +30,6 @@ namespace fs = std::filesystem;
 
 bool is_one_of(const std::string& text, std::initializer_list<std::string_view> words) {
   return std::ranges::find(words, text) != words.end();
-}
-
-// Returns true if the header of a PLY file declares faces.
-bool has_faces(const fs::path& path) {
-  std::ifstream file = open_stream(path);
-  std::string line;
-  for (int i = 0; i < 1000 && next_line(file, line); ++i) {
-    if (line.starts_with("end_header")) break;
-    if (line.starts_with("element face") || line.starts_with("element tristrips"))
-      return line.find_first_of("123456789", 12) != std::string::npos;
-  }
-  return false;
 }
 
 InputKind kind_of_raster(const fs::path& path) {

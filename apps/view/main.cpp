@@ -145,7 +145,7 @@ std::string without_screenshot(const Arguments& arguments) {
 }
 
 int run(int argc, char** argv) {
-  CLI::App app("groundray-view shows scenes, scans, meshes, DEMs and pictures.");
+  CLI::App app("groundray-view shows scenes, scans, meshes, DEMs and pictures.", "groundray-view");
   app.footer(
       "Look at the demo:  groundray-view data/scenes/offroad_trail.yaml\n"
       "A picture of it:   groundray-view data/scenes/offroad_trail.yaml --screenshot trail.png\n"

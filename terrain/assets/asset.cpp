@@ -11,6 +11,7 @@
 #include "core/error.h"
 #include "core/near_names.h"
 #include "terrain/assets/asset_builder.h"
+#include "terrain/assets/asset_defaults.h"
 #include "terrain/assets/asset_kinds.h"
 
 namespace groundray {
@@ -24,6 +25,7 @@ constexpr std::array<std::string_view, 12> names = {
 // that it does not have.
 struct KindRule {
   Model (*make)(AssetShape shape);
+  std::string_view size_is;
   double size_m = 0;
   double width_m = 0;
   double sag_m = 0;
@@ -38,22 +40,35 @@ struct KindRule {
 // inches are buried. Leaf area indices: Asner et al. (2003), mean of all biomes 4.5 +- 2.5 without
 // outliers, temperate evergreen forests from 5.1.
 constexpr std::array<KindRule, 12> rules = {{
-    {.make = make_rock, .size_m = 0.8, .has_variants = true},
-    {.make = make_stone, .size_m = 0.15, .has_variants = true},
-    {.make = make_grass_tuft, .size_m = 0.35, .has_variants = true},
-    {.make = make_shrub, .size_m = 1.2, .leaf_area_index = 3, .has_variants = true},
-    {.make = make_conifer, .size_m = 12, .leaf_area_index = 5.1, .has_variants = true},
-    {.make = make_broadleaf_tree, .size_m = 9, .leaf_area_index = 4.5, .has_variants = true},
-    {.make = make_fence_post, .size_m = 1.37, .width_m = 0.1},
-    {.make = make_wire, .size_m = 50, .width_m = 0.0101, .sag_m = 1},
-    {.make = make_vehicle, .size_m = 5.265, .has_detail = false},
-    {.make = make_person_cylinder, .size_m = 1.75, .width_m = 0.5},
+    {.make = make_rock, .size_is = "largest extent", .size_m = 0.8, .has_variants = true},
+    {.make = make_stone, .size_is = "largest extent", .size_m = 0.15, .has_variants = true},
+    {.make = make_grass_tuft, .size_is = "height", .size_m = 0.35, .has_variants = true},
+    {.make = make_shrub,
+     .size_is = "height",
+     .size_m = 1.2,
+     .leaf_area_index = 3,
+     .has_variants = true},
+    {.make = make_conifer,
+     .size_is = "height",
+     .size_m = 12,
+     .leaf_area_index = 5.1,
+     .has_variants = true},
+    {.make = make_broadleaf_tree,
+     .size_is = "height",
+     .size_m = 9,
+     .leaf_area_index = 4.5,
+     .has_variants = true},
+    {.make = make_fence_post, .size_is = "height", .size_m = 1.37, .width_m = 0.1},
+    {.make = make_wire, .size_is = "span", .size_m = 50, .width_m = 0.0101, .sag_m = 1},
+    {.make = make_vehicle, .size_is = "length", .size_m = 5.265, .has_detail = false},
+    {.make = make_person_cylinder, .size_is = "height", .size_m = 1.75, .width_m = 0.5},
     {.make = make_calibration_board,
+     .size_is = "height",
      .size_m = 0.8,
      .width_m = 0.6,
      .has_squares = true,
      .has_detail = false},
-    {.make = make_sphere_target, .size_m = 0.145},
+    {.make = make_sphere_target, .size_is = "diameter", .size_m = 0.145},
 }};
 
 const KindRule& rule_of(AssetKind kind) { return rules[static_cast<std::size_t>(kind)]; }
@@ -127,6 +142,21 @@ AssetKind asset_kind(std::string_view name) {
   throw Error("there is no asset '{}'; it must be one of {}{}", name, fmt::join(names, ", "),
               is_tree ? "; did you mean 'conifer' or 'broadleaf_tree'?"
                       : suggestion(name, {names.begin(), names.end()}));
+}
+
+AssetDefaults asset_defaults(AssetKind kind) {
+  const KindRule& rule = rule_of(kind);
+  const auto if_known = [](double value) {
+    return value > 0 ? std::optional(value) : std::nullopt;
+  };
+  return {.size_is = rule.size_is,
+          .size_m = rule.size_m,
+          .width_m = if_known(rule.width_m),
+          .sag_m = if_known(rule.sag_m),
+          .leaf_area_index = if_known(rule.leaf_area_index),
+          .has_squares = rule.has_squares,
+          .has_variants = rule.has_variants,
+          .has_detail = rule.has_detail};
 }
 
 Model make_asset(const AssetSpec& spec) {

@@ -34,7 +34,9 @@ def make_other_shard(folder):
 
 
 USAGE = [
-    Mistake("no command", "groundray", ("a command is missing", "generate, verify"), code=2),
+    Mistake(
+        "no command", "groundray terrain", ("a command is missing", "mesh, certify, fill"), code=2
+    ),
     Mistake(
         "help as a command",
         "groundray help",
@@ -304,19 +306,21 @@ INPUTS = [
         ("mine: it is neither the folder of a dataset nor a raster",),
     ),
     Mistake(
-        "info about a camera",
+        "info about a faulty camera",
         "groundray info eye.yaml",
-        ("eye.yaml:1:19", "this is no scene, but a camera", "'cameras'"),
+        ("eye.yaml:3:11: key 'size_px'", "must be > 0"),
+        (("eye.yaml", "size_px: [24, 18]", "size_px: [-24, 18]"),),
     ),
     Mistake(
-        "info about a mesh",
-        "groundray info ramp.obj",
-        ("ramp.obj: a mesh or cloud by its name", "`groundray-view` shows it"),
+        "info about a misspelled preset",
+        "groundray info velodyne_vlp61",
+        ("there is no such file, preset, material or asset", "did you mean 'velodyne_vlp16'"),
     ),
     Mistake(
-        "info about a scan",
-        f"groundray info {SCAN}",
-        ("000000.ply: a mesh or cloud by its name", "`groundray-view` shows it"),
+        "info about a bag",
+        "groundray info drive.mcap",
+        ("drive.mcap: a ROS bag", "`mcap info`"),
+        files={"drive.mcap": b"\x89MCAP0"},
     ),
     Mistake(
         "verifying a file",

@@ -60,8 +60,19 @@ void remove_asides(const fs::path& folder, const std::vector<std::string>& suffi
     if (is_aside(name, suffixes)) fs::remove(folder / name, ignored);
 }
 
-std::string shard_words(const std::optional<Shard>& shard) {
-  return shard ? fmt::format("shard {}", text_of(*shard)) : "all frames";
+std::string words_for(const std::optional<Shard>& shard, const FrameChoice& choice) {
+  if (shard) return fmt::format("shard {}", text_of(*shard));
+  const std::string text = text_of(choice);
+  return text.empty() ? "all frames" : fmt::format("the frames of {}", text);
+}
+
+std::vector<RunSensor> sensors_of(const Simulation& simulation) {
+  std::vector<RunSensor> sensors;
+  for (const PlacedLidar& lidar : simulation.lidars)
+    sensors.push_back({lidar.spec.name, lidar.sweeps});
+  for (const PlacedCamera& camera : simulation.cameras)
+    sensors.push_back({camera.spec.name, std::ssize(camera.begins)});
+  return sensors;
 }
 
 }  // namespace
@@ -81,12 +92,13 @@ struct DatasetWriter::Check {
 };
 
 DatasetWriter::DatasetWriter(fs::path folder, const Simulation& simulation, FolderUse use,
-                             std::optional<Shard> shard, FolderMessages messages)
+                             RunPart part, FolderMessages messages)
     : folder_(std::move(folder)),
       simulation_(simulation),
-      shard_(shard),
-      messages_(std::move(messages)),
-      header_(run_header(simulation)) {
+      part_(std::move(part)),
+      messages_(std::move(messages)) {
+  part_.choice = checked_choice(part_.choice, sensors_of(simulation));
+  header_ = run_header(simulation, part_.choice);
   const auto add = [&](const char* kind, const std::string& name, std::vector<std::string> suffixes,
                        std::int64_t frames) {
     std::vector<std::uint64_t> no_entries(static_cast<std::size_t>(frames));
@@ -117,6 +129,28 @@ bool DatasetWriter::has(std::uint32_t sensor, std::int64_t frame) const {
   return sensors_[sensor].entry_after[static_cast<std::size_t>(frame)] != 0;
 }
 
+bool DatasetWriter::lists_frame(std::uint32_t sensor, std::int64_t frame) const {
+  return lists(sensor) && part_.choice.frames.contains(static_cast<std::size_t>(frame));
+}
+
+bool DatasetWriter::includes(std::uint32_t sensor, std::int64_t frame) const {
+  return lists_frame(sensor, frame) &&
+         (!part_.shard || part_.shard->has(sensor, frame, frames(sensor)));
+}
+
+// Compares shards and choices before what else differs: a choice changes the sensors that are
+// listed.
+void DatasetWriter::check_part(const DatasetText& before) const {
+  if (text_of(before.choice()) == text_of(part_.choice) &&
+      (before.shard() == part_.shard || before.header() != header_))
+    return;
+  throw Error(
+      "{}: the folder contains {} of a run, but {} {} requested; use a separate folder for each "
+      "with -o",
+      folder_.string(), words_for(before.shard(), before.choice()),
+      words_for(part_.shard, part_.choice), part_.shard ? "is" : "are");
+}
+
 // Returns true if the folder has a dataset of this run to resume; throws if it has anything else.
 bool DatasetWriter::is_taken_up(FolderUse use) const {
   if (is_as_new(folder_)) return false;
@@ -126,17 +160,12 @@ bool DatasetWriter::is_taken_up(FolderUse use) const {
         folder_.string());
   }
   const DatasetText before(folder_);
+  check_part(before);
   if (before.header() != header_) {
     throw Error(
         "{}: the folder contains a dataset of another scene, DEM, trajectory, sensor, seed or "
         "version: {}; choose a new folder with -o or remove this one",
         (folder_ / dataset_file).string(), first_difference(before.header(), header_));
-  }
-  if (before.shard() != shard_) {
-    throw Error(
-        "{}: the folder contains {} of this run, but {} is requested; use a separate folder for "
-        "each with -o",
-        folder_.string(), shard_words(before.shard()), shard_words(shard_));
   }
   if (use == FolderUse::New) {
     throw Error(
@@ -256,7 +285,8 @@ void DatasetWriter::check(Check& check) const {
 
 void DatasetWriter::write_sensors() {
   for (const char* name : {"poses", "calibration"}) make_folder(folder_ / name);
-  for (const Sensor& sensor : sensors_) make_folder(sensor.folder);
+  for (const Sensor& sensor : sensors_)
+    if (part_.choice.has_sensor(sensor.name)) make_folder(sensor.folder);
   const auto note = [&](const std::string& path) {
     files_.push_back({path, sum_file(folder_ / path)});
   };
@@ -270,11 +300,13 @@ void DatasetWriter::write_sensors() {
     note(calibration);
   };
   for (const PlacedLidar& lidar : simulation_.lidars) {
+    if (!part_.choice.has_sensor(lidar.spec.name)) continue;
     write_calibration(lidar.spec.name, lidar.X_DS, "sensor S in D: t [s] x y z [m] qx qy qz qw",
                       calibration_text(lidar));
   }
   for (const PlacedCamera& camera : simulation_.cameras) {
     const std::string& name = camera.spec.name;
+    if (!part_.choice.has_sensor(name)) continue;
     write_calibration(name, camera.X_DC, "camera C in D: t [s] x y z [m] qx qy qz qw",
                       calibration_text(camera));
     for (const std::string& suffix :
@@ -317,16 +349,17 @@ void DatasetWriter::write_record() const {
   std::uint32_t sensor = 0;
   std::int64_t frame = 0;
   const auto next = [&]() -> std::optional<std::string> {
-    while (sensor < sensor_count() && frame == frames(sensor)) {
-      ++sensor;
-      frame = 0;
+    while (sensor < sensor_count() && (frame == frames(sensor) || !lists_frame(sensor, frame))) {
+      const bool is_last = frame == frames(sensor);
+      sensor += is_last ? 1 : 0;
+      frame = is_last ? 0 : frame + 1;
     }
     if (sensor == sensor_count()) return std::nullopt;
     const auto after = sensors_[sensor].entry_after[static_cast<std::size_t>(frame)];
     const std::int64_t number = frame++;
     return after > 0 ? journal_->at(after - 1) : text_of(entry_of(sensor, number));
   };
-  write_dataset_text(folder_, header_, shard_, next, files_);
+  write_dataset_text(folder_, header_, part_, next, files_);
 }
 
 void DatasetWriter::close() {

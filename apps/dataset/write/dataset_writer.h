@@ -9,8 +9,9 @@
 #include <string_view>
 #include <vector>
 
+#include "apps/dataset/dataset_text.h"
 #include "apps/dataset/frame_entry.h"
-#include "apps/dataset/shard.h"
+#include "apps/dataset/run_part.h"
 #include "apps/dataset/write/dataset_folder.h"
 #include "apps/dataset/write/journal.h"
 #include "apps/scene/simulation.h"
@@ -31,9 +32,9 @@ class DatasetWriter {
   /// files of an interrupted run.
   /// @param simulation  must outlive this.
   /// @throws Error if the folder cannot be written, another run uses it, or it has contents that
-  ///         `use` does not permit; Interrupted.
+  ///         `use` does not permit; as checked_choice; Interrupted.
   DatasetWriter(std::filesystem::path folder, const Simulation& simulation, FolderUse use,
-                std::optional<Shard> shard = std::nullopt, FolderMessages messages = {});
+                RunPart part = {}, FolderMessages messages = {});
 
   /// Returns the path of a product's file: `suffix` follows the frame's number.
   std::filesystem::path product_path(std::uint32_t sensor, std::int64_t frame,
@@ -42,6 +43,10 @@ class DatasetWriter {
   /// Returns the number of a sensor's frames in a whole run.
   std::int64_t frames(std::uint32_t sensor) const { return sensors_[sensor].frames; }
   std::uint32_t sensor_count() const { return static_cast<std::uint32_t>(sensors_.size()); }
+  /// Returns true if the run has chosen a sensor.
+  bool lists(std::uint32_t sensor) const { return part_.choice.has_sensor(sensors_[sensor].name); }
+  /// Returns true if a frame is in the part of the run that is made.
+  bool includes(std::uint32_t sensor, std::int64_t frame) const;
   /// Returns true if a frame is finished; its files are then exactly as written.
   bool has(std::uint32_t sensor, std::int64_t frame) const;
 
@@ -67,7 +72,9 @@ class DatasetWriter {
   };
   struct Check;
 
+  bool lists_frame(std::uint32_t sensor, std::int64_t frame) const;
   bool is_taken_up(FolderUse use) const;
+  void check_part(const DatasetText& before) const;
   void take_up();
   void take_entries(Journal& journal);
   void check_entries(Journal& journal);
@@ -80,7 +87,7 @@ class DatasetWriter {
 
   std::filesystem::path folder_;
   const Simulation& simulation_;
-  std::optional<Shard> shard_;
+  RunPart part_;
   FolderMessages messages_;
   std::string header_;  // part of dataset.yaml that describes the run
   std::vector<Sensor> sensors_;

@@ -34,13 +34,11 @@ std::chrono::duration<double> thread_cpu() {
 
 }  // namespace
 
-FramePlan plan_frames(const Simulation& simulation, const DatasetWriter& dataset,
-                      const std::optional<Shard>& shard) {
+FramePlan plan_frames(const Simulation& simulation, const DatasetWriter& dataset) {
   FramePlan plan;
   for (std::uint32_t sensor = 0; sensor < dataset.sensor_count(); ++sensor) {
-    const std::int64_t count = dataset.frames(sensor);
-    for (std::int64_t number = 0; number < count; ++number) {
-      if (shard && !shard->has(sensor, number, count)) continue;
+    for (std::int64_t number = 0; number < dataset.frames(sensor); ++number) {
+      if (!dataset.includes(sensor, number)) continue;
       ++(sensor < simulation.lidars.size() ? plan.scans : plan.images);
       if (!dataset.has(sensor, number)) plan.frames.push_back({sensor, number});
     }

@@ -10,7 +10,6 @@
 #include <variant>
 #include <vector>
 
-#include "apps/dataset/shard.h"
 #include "apps/dataset/write/dataset_writer.h"
 #include "apps/dataset/write/frame_files.h"
 #include "apps/scene/frames.h"
@@ -26,7 +25,7 @@ struct FrameName {
   std::int64_t number = 0;
 };
 
-/// Work of a run, or of a shard of it.
+/// Work of a run, or of a part of it.
 struct FramePlan {
   /// Frames that are not finished, in the order of their making. The first frame of each sensor
   /// comes first: it shows how long the others will take. All frames of each interval of 10 s are
@@ -38,9 +37,7 @@ struct FramePlan {
 };
 
 /// Plans the work of a run whose dataset may have finished frames.
-/// @param shard  part of the frames to be made; nothing for all.
-FramePlan plan_frames(const Simulation& simulation, const DatasetWriter& dataset,
-                      const std::optional<Shard>& shard);
+FramePlan plan_frames(const Simulation& simulation, const DatasetWriter& dataset);
 
 /// Frame in memory.
 struct MadeFrame {

@@ -79,7 +79,9 @@ class ShardTexts {
     for (std::size_t i = 0; i < texts_.size(); ++i) {
       const DatasetText& text = *texts_[i];
       const std::string name = folders_[i].string();
-      if (!text.shard()) throw Error("{}: the dataset is complete, not a shard", name);
+      if (!text.shard())
+        throw Error("{}: the dataset {}, not a shard", name,
+                    text_of(text.choice()).empty() ? "is complete" : "has chosen frames");
       if (text.header() != header()) {
         throw Error("{}: it belongs to another run than {}: {}", name, folders_[0].string(),
                     first_difference(text.header(), header()));
@@ -246,7 +248,7 @@ void check_out(const fs::path& out, FolderUse use, const std::string& header) {
         "{}: the folder is not empty; choose a new one with -o{}", out.string(),
         fs::exists(out / dataset_file) ? ", or continue a merge into it with --resume" : "");
   const DatasetText before(out);
-  if (before.header() != header || before.shard())
+  if (before.header() != header || before.shard() || !text_of(before.choice()).empty())
     throw Error("{}: the folder contains another dataset; choose a new one with -o", out.string());
 }
 
@@ -259,7 +261,7 @@ void write_joined(const std::vector<fs::path>& shards, const Joined& joined, con
     auto frame = texts.next();
     return frame ? std::optional(text_for(*frame)) : std::nullopt;
   };
-  write_dataset_text(out, joined.header, std::nullopt, next, joined.files);
+  write_dataset_text(out, joined.header, {}, next, joined.files);
 }
 
 std::string pending_text(const SharedFrame& frame) {

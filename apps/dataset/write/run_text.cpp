@@ -112,7 +112,7 @@ std::uint64_t fingerprint(const Simulation& simulation) {
 
 }  // namespace
 
-std::string run_header(const Simulation& simulation) {
+std::string run_header(const Simulation& simulation, const FrameChoice& choice) {
   const glm::dvec3 origin_m = simulation.terrain.header().origin_w_m;
   std::string text = fmt::format(
       "groundray_dataset: 1\nversion: {}\nseed: {}\ntracing: {}\ninputs: "
@@ -128,15 +128,19 @@ std::string run_header(const Simulation& simulation) {
   std::size_t number = 0;
   const auto add_sensor = [&](const auto& spec, const char* kind, const std::string& model,
                               auto frames) {
-    text += fmt::format(
-        "  - {{name: {}, kind: {}, number: {}, model: {}, source: {}, frames: {}}}\n",
-        yaml_text(spec.name), kind, number++, yaml_text(model), yaml_text(spec.source), frames);
+    const std::size_t own = number++;
+    if (!choice.has_sensor(spec.name)) return;
+    text +=
+        fmt::format("  - {{name: {}, kind: {}, number: {}, model: {}, source: {}, frames: {}}}\n",
+                    yaml_text(spec.name), kind, own, yaml_text(model), yaml_text(spec.source),
+                    choice.count(static_cast<std::int64_t>(frames)));
   };
   for (const PlacedLidar& lidar : simulation.lidars)
     add_sensor(lidar.spec, "lidar", lidar.spec.lidar.model, lidar.sweeps);
   for (const PlacedCamera& camera : simulation.cameras)
     add_sensor(camera.spec, "camera", camera.spec.camera.model, camera.begins.size());
   for (const StereoSpec& pair : simulation.spec.stereo) {
+    if (!choice.has_sensor(pair.left) || !choice.has_sensor(pair.right)) continue;
     text += fmt::format("  - {{name: {}, kind: stereo, left: {}, right: {}, images: {}}}\n",
                         yaml_text(pair.name), yaml_text(pair.left), yaml_text(pair.right),
                         pair.images == StereoSpec::Images::Rectified ? "rectified" : "as_mounted");

@@ -4,14 +4,15 @@
 #include <string>
 #include <vector>
 
+#include "apps/dataset/run_part.h"
 #include "apps/scene/simulation.h"
 
 namespace groundray {
 
 /// Returns the part of dataset.yaml that describes the run (docs/reference/formats.md). Runs with
-/// equal texts make equal frames.
+/// equal texts make equal frames. Only chosen sensors are listed.
 /// @throws Error if an image of the sky cannot be read.
-std::string run_header(const Simulation& simulation);
+std::string run_header(const Simulation& simulation, const FrameChoice& choice = {});
 
 /// Returns the text of calibration/<sensor>.yaml (docs/reference/formats.md).
 std::string calibration_text(const PlacedLidar& lidar);

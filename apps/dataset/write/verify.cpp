@@ -176,7 +176,7 @@ void ExpectedFiles::add_folders(const std::string& path) {
 
 bool ExpectedFiles::add(const FrameEntry& frame) {
   const auto sensor = dataset_.number_of(frame.sensor);
-  if (!sensor || frame.frame >= dataset_.sensors[*sensor].frames) return false;
+  if (!sensor || !dataset_.has(dataset_.sensors[*sensor], frame.frame)) return false;
   std::vector<Run>& runs = runs_[*sensor];
   if (!runs.empty() && frame.frame < runs.back().end) return false;
   Suffixes suffixes;
@@ -204,7 +204,7 @@ std::optional<std::string> ExpectedFiles::fault_of(std::string_view path) const 
   });
   const std::size_t digits = std::min(name.find_first_not_of("0123456789"), name.size());
   const auto number = number_of<std::int64_t>(name.substr(0, digits));
-  if (sensor == dataset_.sensors.end() || !number || *number >= sensor->frames ||
+  if (sensor == dataset_.sensors.end() || !number || !dataset_.has(*sensor, *number) ||
       fmt::format("{:06}", *number) != name.substr(0, digits))
     return std::string(no_file);
   const std::vector<Run>& runs = runs_[static_cast<std::size_t>(sensor - dataset_.sensors.begin())];

@@ -2,7 +2,6 @@
 
 #include <algorithm>
 #include <array>
-#include <fstream>
 #include <initializer_list>
 #include <optional>
 #include <string>
@@ -10,20 +9,12 @@
 
 #include "core/error.h"
 #include "core/io/file_io.h"
-#include "core/io/open_file.h"
+#include "core/io/ply_faces.h"
 
 namespace groundray::golden {
 namespace {
 
 namespace fs = std::filesystem;
-
-bool has_faces(const fs::path& ply) {
-  std::ifstream file = open_stream(ply);
-  for (std::string line; next_line(file, line) && !line.starts_with("end_header");) {
-    if (line.starts_with("element face") && !line.starts_with("element face 0")) return true;
-  }
-  return false;
-}
 
 /// Returns the kind by the file name, or nothing if the extension is unknown.
 std::optional<Subject> told_subject_of(const fs::path& file) {

@@ -100,7 +100,7 @@ TEST(DatasetReader, ReadsAnyNumberOfFrames) {
   write_dataset_text(folder.path(),
                      "groundray_dataset: 1\norigin_w_m: [4, 5, 6]\nsensors:\n"
                      "  - {name: top, kind: lidar, frames: 100000}\n",
-                     Shard{1, 2},
+                     {.shard = Shard{1, 2}, .choice = {}},
                      [&]() -> std::optional<std::string> {
                        if (next == frames) return std::nullopt;
                        FrameEntry entry{"top",         next, std::chrono::milliseconds(100 * next),

@@ -25,7 +25,7 @@ DatasetSummary read(const std::vector<std::string>& sensors,
   const testing::TemporaryFolder folder;
   std::string header = "groundray_dataset: 1\nversion: \"1\"\nseed: 7\nsensors:\n";
   for (const std::string& sensor : sensors) header += "  - {" + sensor + "}\n";
-  write_dataset_text(folder.path(), header, shard, [] { return std::nullopt; }, {});
+  write_dataset_text(folder.path(), header, {shard, {}}, [] { return std::nullopt; }, {});
   return read_summary(folder.path());
 }
 

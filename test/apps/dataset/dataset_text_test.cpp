@@ -28,7 +28,7 @@ const std::vector<NamedSum> files{{"poses/a.tum", {3, sha256_of("abc")}}};
 void write(const std::filesystem::path& folder, const std::optional<Shard>& shard = {}) {
   std::size_t next = 0;
   write_dataset_text(
-      folder, header, shard,
+      folder, header, {.shard = shard, .choice = {}},
       [&] { return next < entries.size() ? std::optional(entries[next++]) : std::nullopt; }, files);
 }
 

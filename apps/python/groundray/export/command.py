@@ -19,6 +19,7 @@ from groundray.export import clouds, kitti, las, ros_bag, tum
 from groundray.export.labels import LabelMap
 from groundray.export.notes import Notes, tell_of_columns, tell_of_products
 from groundray.export.scan import FullScale
+from groundray.export.shell_text import add_text_options
 
 DONE, FAILED, INTERRUPTED = 0, 1, 130  # argparse exits with 2 on wrong usage
 
@@ -80,6 +81,7 @@ def _parser() -> argparse.ArgumentParser:
         action="store_true",
         help="export finished frames if some are pending",
     )
+    add_text_options(parser)
     _add_choices(parser.add_argument_group("selection"))
     _add_points(parser.add_argument_group("points"))
     _add_others(parser.add_argument_group("other options"))

@@ -16,7 +16,7 @@ using ::testing::Optional;
 
 const DatasetSummary dataset{
     .version = {},
-    .shard = {},
+    .part = {},
     .sensors = {{.name = "top", .kind = "lidar", .model = {}, .frames = 2'000'000},
                 {.name = "eye", .kind = "camera", .model = {}, .frames = 10}}};
 

@@ -1,0 +1,54 @@
+#include "apps/groundray/describe/file_facts.h"
+
+#include <algorithm>
+#include <initializer_list>
+#include <string>
+#include <string_view>
+
+#include "core/error.h"
+#include "core/io/file_io.h"
+#include "core/io/ply_faces.h"
+
+namespace groundray {
+namespace {
+
+namespace fs = std::filesystem;
+
+[[noreturn]] void refuse_bag(const fs::path& file) {
+  const bool is_ros_1 = file_ending(file) == ".bag";
+  throw Error("{}: a ROS bag, which groundray writes but does not read: {} lists its topics",
+              file.string(),
+              is_ros_1 ? "`rosbag info`" : "`ros2 bag info`, or for .mcap `mcap info`,");
+}
+
+}  // namespace
+
+std::optional<FileKind> file_kind_of(const fs::path& file) {
+  const std::string ending = file_ending(file);
+  const auto is_one_of = [&](std::initializer_list<std::string_view> endings) {
+    return std::ranges::find(endings, ending) != endings.end();
+  };
+  if (ending == ".ply") return has_faces(file) ? FileKind::Mesh : FileKind::Cloud;
+  if (is_one_of({".obj", ".stl", ".gltf", ".glb"})) return FileKind::Mesh;
+  if (is_one_of({".pcd", ".npy", ".npz", ".bin", ".las", ".laz", ".e57", ".pcap", ".osf"}))
+    return FileKind::Cloud;
+  if (is_one_of({".png", ".jpg", ".jpeg", ".exr", ".hdr"})) return FileKind::Image;
+  if (is_one_of({".mcap", ".db3", ".bag"})) return FileKind::Bag;
+  return std::nullopt;
+}
+
+Facts facts_of(const fs::path& file, FileKind kind) {
+  switch (kind) {
+    case FileKind::Mesh:
+      return mesh_facts(file);
+    case FileKind::Cloud:
+      return cloud_facts(file);
+    case FileKind::Image:
+      return image_facts(file);
+    case FileKind::Bag:
+      break;
+  }
+  refuse_bag(file);
+}
+
+}  // namespace groundray
