@@ -2,7 +2,9 @@
 #include <fmt/ranges.h>
 #include <nanobind/stl/array.h>
 #include <nanobind/stl/filesystem.h>
+#include <nanobind/stl/map.h>
 #include <nanobind/stl/optional.h>
+#include <nanobind/stl/pair.h>
 #include <nanobind/stl/shared_ptr.h>
 #include <nanobind/stl/string.h>
 #include <nanobind/stl/vector.h>
@@ -14,14 +16,18 @@
 #include <filesystem>
 #include <glm/geometric.hpp>
 #include <limits>
+#include <map>
 #include <memory>
 #include <optional>
 #include <string>
+#include <utility>
 #include <vector>
 
+#include "apps/dataset/write/run_text.h"
 #include "apps/python/binding/bind.h"
 #include "apps/python/binding/long_call.h"
 #include "apps/python/binding/numpy_argument.h"
+#include "apps/python/binding/pickle.h"
 #include "apps/python/binding/points.h"
 #include "apps/python/cast.h"
 #include "apps/python/scene_state.h"
@@ -36,25 +42,39 @@ namespace {
 using nb::literals::operator""_a;
 using SharedScene = std::shared_ptr<SceneState>;
 
-SharedScene build(SceneSpec spec, std::optional<std::uint64_t> seed) {
-  return without_gil([&](const StopRequest& stop) {
-    if (seed) spec.seed = {*seed};
-    return std::make_shared<SceneState>(
-        build_simulation(std::move(spec), [&](double /*share*/) { stop.obey(); }));
-  });
+SharedScene build(SceneSpec spec, SceneSource source, std::optional<std::uint64_t> seed,
+                  const StopRequest& stop) {
+  if (seed) spec.seed = {*seed};
+  auto folder = use_given(source, spec);
+  Simulation simulation = build_simulation(std::move(spec), [&](double /*share*/) { stop.obey(); });
+  if (simulation.terrain.whole() != nullptr) folder.reset();
+  return std::make_shared<SceneState>(std::move(source), std::move(folder), std::move(simulation));
 }
 
 SharedScene open_scene(const std::filesystem::path& path, std::optional<std::uint64_t> seed) {
-  return build(
-      without_gil([&](const StopRequest&) { return load_scene(path, data_folder() / "sensors"); }),
-      seed);
+  return without_gil([&](const StopRequest& stop) {
+    return build(load_scene(path, data_folder() / "sensors"), {.path = path}, seed, stop);
+  });
 }
 
-SharedScene parse(const std::string& text, const std::filesystem::path& path,
-                  std::optional<std::uint64_t> seed) {
-  return build(without_gil([&](const StopRequest&) {
-                 return parse_scene(text, path, data_folder() / "sensors");
-               }),
+SharedScene parse(const std::string& text, SceneSource source, std::optional<std::uint64_t> seed) {
+  return without_gil([&](const StopRequest& stop) {
+    SceneSpec spec = parse_scene(text, source.path, data_folder() / "sensors");
+    return build(std::move(spec), std::move(source), seed, stop);
+  });
+}
+
+// Returns a terrain of its own that shares the heights of one that Python owns.
+std::shared_ptr<TerrainModel> shared_heights(const std::shared_ptr<TerrainModel>& terrain) {
+  return terrain ? std::make_shared<TerrainModel>(terrain->dem()) : nullptr;
+}
+
+SharedScene parse_given(const std::string& text, const std::filesystem::path& path,
+                        std::optional<std::uint64_t> seed,
+                        const std::shared_ptr<TerrainModel>& terrain,
+                        std::map<std::string, Mesh> meshes,
+                        std::map<std::string, std::string> trajectories) {
+  return parse(text, {path, shared_heights(terrain), std::move(meshes), std::move(trajectories)},
                seed);
 }
 
@@ -138,6 +158,65 @@ nb::list groups_of(const SceneState& state) {
   return all;
 }
 
+// ----- pickling
+
+nb::list scene_state(nb::handle self) {
+  const auto& scene = nb::cast<const SceneState&>(self);
+  nb::list inputs;
+  for (const auto& [name, fingerprint] : run_inputs(scene.simulation))
+    inputs.append(nb::make_tuple(name, fingerprint));
+  nb::list state;
+  state.append(GROUNDRAY_VERSION);
+  state.append(scene.simulation.spec.text);
+  state.append(std::filesystem::absolute(scene.source.path).string());
+  state.append(scene.simulation.spec.seed.value);
+  state.append(scene.source.terrain);
+  state.append(scene.source.meshes);
+  state.append(scene.source.trajectories);
+  state.append(inputs);
+  return state;
+}
+
+// Checks that the files which a pickled scene names are what they were.
+void check_inputs(const std::string& path, const Simulation& simulation,
+                  const std::vector<std::pair<std::string, std::uint64_t>>& pickled,
+                  bool has_terrain) {
+  const std::vector<RunInput> inputs = run_inputs(simulation);
+  for (std::size_t i = 0; i < inputs.size(); ++i) {
+    if (i == 0 && has_terrain) continue;  // heights are in the pickle, and no file's
+    if (i < pickled.size() && pickled[i].second == inputs[i].fingerprint) continue;
+    throw Error(
+        "{}: the pickled scene cannot be restored: its {} has changed since, as a file that the "
+        "scene names is another; bring that file back, or load the scene anew and pickle that",
+        path, inputs[i].name);
+  }
+}
+
+SharedScene restored_scene(const nb::tuple& values) {
+  constexpr std::size_t count = 8;
+  PickledState state("Scene", values, count);
+  const auto version = state.next<std::string>("version");
+  if (version != GROUNDRAY_VERSION)
+    throw Error("the scene was pickled by groundray {}, but this is {}: use the same for both",
+                version, GROUNDRAY_VERSION);
+  const auto text = state.next<std::string>("text");
+  const auto path = state.next<std::string>("path");
+  const auto seed = state.next<std::uint64_t>("seed");
+  SceneSource source{
+      .path = path,
+      .terrain = shared_heights(state.next<std::shared_ptr<TerrainModel>>("terrain")),
+      .meshes = state.next<std::map<std::string, Mesh>>("meshes"),
+      .trajectories = state.next<std::map<std::string, std::string>>("trajectories")};
+  const bool has_terrain = source.terrain != nullptr;
+  const auto inputs = state.next<std::vector<std::pair<std::string, std::uint64_t>>>("inputs");
+  SharedScene scene = parse(text, std::move(source), seed);
+  without_gil([&](const StopRequest&) {
+    check_inputs(path, scene->simulation, inputs, has_terrain);
+    return true;
+  });
+  return scene;
+}
+
 constexpr const char* cast_doc =
     R"(Casts rays through the scene on all cores and returns the first hit of each.
 
@@ -154,11 +233,15 @@ Raises groundray.Error for invalid rays.)";
 }  // namespace
 
 void bind_scene(nb::module_& module) {
-  nb::class_<SceneState>(module, "Scene", nb::is_weak_referenceable(),
-                         R"(A scene and everything that its file names, ready to run.
+  nb::class_<SceneState> type(module, "Scene", nb::is_weak_referenceable(),
+                              R"(A scene and everything that its file names, ready to run.
 
-See load_scene and scene. Immutable: any number of threads may use one.)")
-      .def_prop_ro(
+See load_scene and scene. Immutable: any number of threads may use one. Copies are the scene
+itself. Pickles hold the text of its file, its seed and what it has in memory, and load its files
+again: if one has changed, that is a groundray.Error.)");
+  add_pickling(type, "scene", &scene_state);
+  module.def("restore_scene", &restored_scene, "state"_a);
+  type.def_prop_ro(
           "lidars", [](const SceneState& scene) { return sensor_names(scene.simulation.lidars); },
           "Names, in the order of the file.")
       .def_prop_ro(
@@ -211,10 +294,14 @@ NaN outside of the DEM and in its holes. Objects are ignored.)")
 
 `seed` replaces the scene's own. Ctrl-C stops the certification of a large DEM.
 Raises groundray.Error, with a line for each fault: file, line, key, rule and likely fix.)");
-  module.def("parse_scene", &parse, "text"_a, "path"_a, "seed"_a = nb::none(),
+  module.def("parse_scene", &parse_given, "text"_a, "path"_a, "seed"_a = nb::none(),
+             "terrain"_a = nb::none(), "meshes"_a = std::map<std::string, Mesh>(),
+             "trajectories"_a = std::map<std::string, std::string>(),
              R"(Like load_scene, for the text of a scene file.
 
-`path` names the file in messages; files that the text names are relative to its folder.)");
+`path` names the file in messages; files that the text names are relative to its folder. `terrain`
+replaces the DEM that it names, `meshes` models and `trajectories`, in TUM format, those of these
+names.)");
 }
 
 }  // namespace groundray::python

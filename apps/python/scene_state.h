@@ -12,6 +12,7 @@
 #include <vector>
 
 #include "apps/python/binding/arrays.h"
+#include "apps/python/scene_source.h"
 #include "apps/scene/frames.h"
 #include "apps/scene/simulation.h"
 
@@ -55,8 +56,14 @@ class FrameSceneCache {
 
 /// Loaded scene and the scenes that its frames see. All Python objects of a scene share it.
 struct SceneState {
-  explicit SceneState(Simulation loaded) : simulation(std::move(loaded)), frames(simulation) {}
+  SceneState(SceneSource from, std::unique_ptr<const TemporaryFolder> kept, Simulation loaded)
+      : source(std::move(from)),
+        folder(std::move(kept)),
+        simulation(std::move(loaded)),
+        frames(simulation) {}
 
+  SceneSource source;
+  std::unique_ptr<const TemporaryFolder> folder;  ///< of files that are read while frames are made
   Simulation simulation;
   FrameSceneCache frames;
 };
