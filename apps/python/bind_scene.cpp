@@ -31,8 +31,10 @@
 #include "apps/python/binding/points.h"
 #include "apps/python/cast.h"
 #include "apps/python/scene_state.h"
+#include "apps/scene/edited_simulation.h"
 #include "apps/scene/readers/scene_reader.h"
 #include "apps/scene/simulation.h"
+#include "apps/scene/yaml_reader.h"
 #include "core/error.h"
 #include "terrain/terrain_scene.h"
 
@@ -45,10 +47,12 @@ using SharedScene = std::shared_ptr<SceneState>;
 SharedScene build(SceneSpec spec, SceneSource source, std::optional<std::uint64_t> seed,
                   const StopRequest& stop) {
   if (seed) spec.seed = {*seed};
-  auto folder = use_given(source, spec);
+  use_given(source, spec);
+  auto folder = use_terrain(source, spec);
   Simulation simulation = build_simulation(std::move(spec), [&](double /*share*/) { stop.obey(); });
   if (simulation.terrain.whole() != nullptr) folder.reset();
-  return std::make_shared<SceneState>(std::move(source), std::move(folder), std::move(simulation));
+  return std::make_shared<SceneState>(std::move(source), std::move(folder), std::move(simulation),
+                                      std::make_shared<GroundTracers>());
 }
 
 SharedScene open_scene(const std::filesystem::path& path, std::optional<std::uint64_t> seed) {
@@ -77,6 +81,59 @@ SharedScene parse_given(const std::string& text, const std::filesystem::path& pa
   return parse(text, {path, shared_heights(terrain), std::move(meshes), std::move(trajectories)},
                seed);
 }
+
+// Returns a scene file's value as dicts, lists and texts; plain scalars as groundray._scene.Plain.
+nb::object tree_of(const yaml::Node& node) {
+  switch (node.kind) {
+    case yaml::Node::Kind::Null:
+      return nb::none();
+    case yaml::Node::Kind::Plain:
+      return nb::module_::import_("groundray._scene").attr("Plain")(node.text);
+    case yaml::Node::Kind::Quoted:
+      return nb::cast(node.text);
+    case yaml::Node::Kind::List: {
+      nb::list items;
+      for (const yaml::Node& item : node.items) items.append(tree_of(item));
+      return items;
+    }
+    case yaml::Node::Kind::Map:
+      break;
+  }
+  nb::dict entries;
+  for (std::size_t i = 0; i + 1 < node.items.size(); i += 2)
+    entries[nb::cast(node.items[i].text)] = tree_of(node.items[i + 1]);
+  return entries;
+}
+
+SharedScene edited(const SharedScene& scene, const nb::kwargs& changes) {
+  const auto& [source, folder, base, frames] = *scene;
+  const nb::object edited_text = nb::module_::import_("groundray._scene").attr("edited_text");
+  const nb::object tree = tree_of(yaml::parse(base.spec.text, source.path));
+  const auto text = nb::cast<std::string>(edited_text(tree, base.spec.seed.value, changes));
+  return without_gil([&](const StopRequest&) {
+    SceneSpec spec = parse_scene(text, source.path, data_folder() / "sensors");
+    use_given(source, spec);
+    spec.terrain = base.spec.terrain;
+    return std::make_shared<SceneState>(source, folder, edited_simulation(std::move(spec), base),
+                                        frames.tracers());
+  });
+}
+
+constexpr const char* edited_doc =
+    R"(Returns a scene with changes, without rebuilding what does not depend on them.
+
+  seed            whole number
+  weather         dict: replaces the keys of `weather`; {} for a vacuum
+  sky             dict: replaces `sky`
+  sun             dict: replaces `sun` of `sky`
+  mounts          dict from names of lidars and cameras to dicts: replaces their `mount`
+  density_per_m2  dict from names of layers of `scatter` to numbers
+
+Keys and rules are those of a scene file (docs/reference/scene.md); frames are those of a scene file
+with these changes. Terrain is shared with this scene: its DEM is not read again, and the ground is
+not built again for tracing where both scenes trace it as a whole. Objects are shared unless
+scattered ones move, because of the density or the seed.
+Raises groundray.Error for other changes and as load_scene does.)";
 
 template <typename Placed>
 std::vector<std::string> sensor_names(const std::vector<Placed>& sensors) {
@@ -109,12 +166,7 @@ std::shared_ptr<const Scene> scene_for(SceneState& state, const SensorBox& box) 
   RayTracer rays =
       build_tracer(simulation.terrain.clipmap(box, std::max(reach_m, simulation.reach_m)),
                    float_frame_origin(middle), simulation.spec.tracing);
-  return std::make_shared<const Scene>(Scene{std::move(rays),
-                                             {.label = simulation.spec.terrain.label},
-                                             simulation.scene_objects.materials,
-                                             simulation.scene_objects.objects,
-                                             simulation.scene_objects.models,
-                                             simulation.scene_objects.cover});
+  return std::make_shared<const Scene>(scene_on(std::move(rays), simulation));
 }
 
 Points cast_in_scene(SceneState& state, const GivenPoints& origins_m, const GivenPoints& directions,
@@ -275,6 +327,19 @@ again: if one has changed, that is a groundray.Error.)");
       .def_prop_ro("objects", &groups_of,
                    nb::sig("def objects(self) -> list[dict[str, typing.Any]]"),
                    "Groups of objects: name, label, first instance and count.")
+      .def("edited", &edited, "changes"_a,
+           nb::sig("def edited(self, *, seed: int = ..., "
+                   "weather: collections.abc.Mapping[str, typing.Any] = ..., "
+                   "sky: collections.abc.Mapping[str, typing.Any] = ..., "
+                   "sun: collections.abc.Mapping[str, typing.Any] = ..., "
+                   "mounts: collections.abc.Mapping[str, "
+                   "collections.abc.Mapping[str, typing.Any]] = ..., "
+                   "density_per_m2: collections.abc.Mapping[str, float] = ...) -> Scene"),
+           edited_doc)
+      .def_prop_ro(
+          "grounds_built", [](const SceneState& scene) { return scene.frames.tracers()->built(); },
+          "Number of times that the ground was built for tracing, by this scene and all that it "
+          "was edited from or into. Ground that is served by tiles is not counted.")
       .def("heights_at", &ground_heights, "places_m"_a,
            R"(Heights of the ground's reference surface, n metres, in doubles.
 

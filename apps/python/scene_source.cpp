@@ -68,7 +68,7 @@ void put_trajectory(const SceneSource& source, auto& place) {
 
 }  // namespace
 
-std::unique_ptr<const TemporaryFolder> use_given(const SceneSource& source, SceneSpec& spec) {
+void use_given(const SceneSource& source, SceneSpec& spec) {
   put_trajectory(source, spec.platform);
   GivenModels models(source.meshes);
   for (ObjectSpec& object : spec.objects) {
@@ -79,8 +79,11 @@ std::unique_ptr<const TemporaryFolder> use_given(const SceneSource& source, Scen
     for (ModelSpec& model : layer.models)
       models.put_into(model, layer.where, fmt::format("layer '{}'", layer.name));
   }
+}
+
+std::shared_ptr<const TemporaryFolder> use_terrain(const SceneSource& source, SceneSpec& spec) {
   if (!source.terrain) return nullptr;
-  auto folder = std::make_unique<const TemporaryFolder>();
+  auto folder = std::make_shared<const TemporaryFolder>();
   spec.terrain.dem = folder->path() / "terrain.tif";
   write_dem(source.terrain->dem(), spec.terrain.dem);
   return folder;

@@ -35,10 +35,14 @@ struct SceneSource {
   std::map<std::string, std::string> trajectories;  ///< in TUM format
 };
 
-/// Puts what a scene has in memory in the place of the files that `spec` names.
-/// @return folder of files that terrain too large to be traced as a whole is read from, or null.
-/// @throws Error if a file cannot be written, or naming a mesh that is not valid as a model or has
-///         keys that only files may have.
-std::unique_ptr<const TemporaryFolder> use_given(const SceneSource& source, SceneSpec& spec);
+/// Puts the meshes and trajectories of a scene in the place of the files that `spec` names.
+/// @throws Error naming a mesh that is not valid as a model or has keys that only files may have.
+void use_given(const SceneSource& source, SceneSpec& spec);
+
+/// Puts a file of the terrain of a scene, if it has one, in the place of the DEM.
+/// @return the folder of that file, or null. Terrain too large to be traced as a whole is read from
+///         it as long as the scene exists.
+/// @throws Error if it cannot be written.
+std::shared_ptr<const TemporaryFolder> use_terrain(const SceneSource& source, SceneSpec& spec);
 
 }  // namespace groundray::python

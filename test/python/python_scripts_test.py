@@ -63,7 +63,8 @@ def test_the_examples_of_the_page_run(tmp_path):
         )
         assert (done.returncode, done.stderr) == (0, ""), block.text
         printed.append(done.stdout)
-    assert len(printed) == 3
-    on_crates = re.fullmatch(r"\{1: \d+, 70: (\d+), 71: (\d+)\}\n", printed[1])
+    assert len(printed) == 4
+    assert re.fullmatch(r"\d+ 1\n\d+ 1\n", printed[1])
+    on_crates = re.fullmatch(r"\{1: \d+, 70: (\d+), 71: (\d+)\}\n", printed[2])
     assert min(map(int, on_crates.groups())) > 10
-    assert [line.split()[0] for line in printed[2].splitlines()] == ["0.0", "0.100030464"]
+    assert [line.split()[0] for line in printed[3].splitlines()] == ["0.0", "0.100030464"]

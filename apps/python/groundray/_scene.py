@@ -3,13 +3,14 @@
 import math
 import numbers
 import os
-from collections.abc import Mapping
+import re
+from collections.abc import Callable, Mapping, Sequence
 from pathlib import Path
 from typing import Any
 
 import numpy as np
 
-from groundray._core import Mesh, Scene, Terrain, parse_scene
+from groundray._core import Error, Mesh, Scene, Terrain, parse_scene
 
 
 def scene(
@@ -96,6 +97,76 @@ def _tum(poses: Any) -> str:
     )
 
 
+class Plain(str):
+    """A scalar of a scene file that was written without quotes."""
+
+
+def edited_text(tree: dict[str, Any], seed: int, changes: Mapping[str, Any]) -> str:
+    """Returns the text of a scene with the changes of Scene.edited.
+
+    tree  the scene's file, as dicts and lists
+    seed  the scene's seed, which may differ from its file's
+    """
+    for name in changes.keys() - _EDITS.keys():
+        raise Error(
+            f"edited: '{name}' cannot be changed in a scene that is built, but only "
+            f"{', '.join(_EDITS)}: build another scene for it"
+        )
+    edited = {**tree, "seed": seed}
+    for name, change in changes.items():
+        if name != "seed" and not isinstance(change, Mapping):
+            raise Error(f"edited: '{name}' must be a dict, but is a {type(change).__name__}")
+        _EDITS[name](edited, change)
+    return to_yaml(edited)
+
+
+def _change_weather(scene: dict[str, Any], weather: Mapping[str, Any]) -> None:
+    scene.pop("weather", None)
+    if weather:
+        scene["weather"] = dict(weather)
+
+
+def _change_sun(scene: dict[str, Any], sun: Mapping[str, Any]) -> None:
+    if not isinstance(scene.get("sky"), dict):
+        raise Error("edited: 'sun' is that of the sky, but the scene has no 'sky'")
+    scene["sky"] = {**scene["sky"], "sun": dict(sun)}
+
+
+def _change_mounts(scene: dict[str, Any], mounts: Mapping[str, Mapping[str, Any]]) -> None:
+    _change_entries(scene, ("lidars", "cameras"), "lidar or camera", "mount", mounts)
+
+
+def _change_densities(scene: dict[str, Any], densities: Mapping[str, float]) -> None:
+    _change_entries(scene, ("scatter",), "layer", "density_per_m2", densities)
+
+
+def _change_entries(
+    scene: dict[str, Any], lists: Sequence[str], kind: str, key: str, changes: Mapping[str, Any]
+) -> None:
+    names = [entry["name"] for part in lists for entry in scene.get(part, [])]
+    for name in changes:
+        if name not in names:
+            raise Error(
+                f"edited: the scene has no {kind} '{name}'; it has {', '.join(names) or 'none'}"
+            )
+    for part in lists:
+        if part in scene:
+            scene[part] = [
+                {**entry, key: changes[entry["name"]]} if entry["name"] in changes else entry
+                for entry in scene[part]
+            ]
+
+
+_EDITS: dict[str, Callable[[dict[str, Any], Any], None]] = {
+    "seed": lambda scene, seed: scene.update(seed=seed),
+    "weather": _change_weather,
+    "sky": lambda scene, sky: scene.update(sky=dict(sky)),
+    "sun": _change_sun,
+    "mounts": _change_mounts,
+    "density_per_m2": _change_densities,
+}
+
+
 def to_yaml(value: Any, indent: int = 0) -> str:
     """Returns dicts, lists, texts, numbers and paths as YAML."""
     if isinstance(value, Mapping) and value:
@@ -131,6 +202,8 @@ def _flow(value: Any) -> str:
 def _scalar(value: Any) -> str:
     if value is None:
         return "null"
+    if isinstance(value, Plain) and _NUMBER_OR_WORD.fullmatch(value):
+        return str(value)
     if isinstance(value, bool):
         return "true" if value else "false"
     if isinstance(value, numbers.Integral):
@@ -157,5 +230,6 @@ def _text(text: str) -> str:
     return '"' + "".join(_ESCAPES.get(each, each) for each in text) + '"'
 
 
+_NUMBER_OR_WORD = re.compile(r"[-+.\w]+", re.ASCII)  # plain in any place, even in [ ] and { }
 _WORDS = {"null", "true", "false", "yes", "no", "on", "off", "y", "n"}
 _ESCAPES = {'"': '\\"', "\\": "\\\\", "\n": "\\n", "\t": "\\t", "\r": "\\r"}
