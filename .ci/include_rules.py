@@ -66,7 +66,7 @@ SEES = {
     "apps/dataset": "core sensors reconstruction apps apps/scan apps/scene",
     "apps/golden": "core terrain reconstruction apps apps/dataset apps/scan apps/scene",
     "apps/groundray": "core terrain sensors reconstruction apps apps/dataset apps/scan apps/scene",
-    "apps/python": "core terrain sensors reconstruction apps/golden apps/scene",
+    "apps/python": "core terrain sensors reconstruction apps/dataset apps/golden apps/scene",
     "apps/view": "core terrain sensors reconstruction apps apps/dataset apps/scan apps/scene",
 }
 

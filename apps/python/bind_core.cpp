@@ -10,6 +10,7 @@
 
 #include "apps/python/binding/bind.h"
 #include "apps/python/binding/long_call.h"
+#include "apps/python/binding/pickle.h"
 #include "apps/python/binding/points.h"
 #include "core/error.h"
 #include "core/io/file_io.h"
@@ -26,14 +27,28 @@ bool has(const Points& points, const std::string& name) {
   return std::ranges::find(names, name) != names.end();
 }
 
+nb::list points_state(nb::handle self) {
+  nb::list state;
+  add_points(nb::cast<const Points&>(self), self, state);
+  return state;
+}
+
+Points restored_points(const nb::tuple& values) {
+  constexpr std::size_t count = 2;
+  PickledState state("Points", values, count);
+  return read_points(state);
+}
+
 void bind_points(nb::module_& module) {
-  nb::class_<Points>(module, "Points", R"(A table of points: columns of equal length.
+  nb::class_<Points> type(module, "Points", R"(A table of points: columns of equal length.
 
 points["range_true_m"] is a column as a NumPy array, a read-only view that keeps the table alive.
 Names are those of the files (docs/reference/formats.md) with their units:
 docs/guide/python.md lists them. dict(points) is a dict of all columns; len(points) counts rows.
-points[points["label"] == 10] and points[::2] select rows: Points of their own.)")
-      .def("__len__", [](const Points& points) { return points.cloud.rows(); })
+points[points["label"] == 10] and points[::2] select rows: Points of their own.)");
+  add_pickling(type, "points", &points_state);
+  module.def("restore_points", &restored_points, "state"_a);
+  type.def("__len__", [](const Points& points) { return points.cloud.rows(); })
       .def(
           "__getitem__",
           [](nb::handle_t<Points> self, const std::string& name) {

@@ -18,6 +18,8 @@
 #include "apps/python/binding/enum_from_text.h"
 #include "apps/python/binding/long_call.h"
 #include "apps/python/binding/numpy_argument.h"
+#include "apps/python/binding/pickle.h"
+#include "apps/python/fused_dem.h"
 #include "apps/python/placed_returns.h"
 #include "core/error.h"
 #include "reconstruction/dem/dem_layers.h"
@@ -101,12 +103,6 @@ MeasuredPoints points_of(const std::vector<const Sweep*>& scans, std::optional<d
 
 // ----- fusion
 
-/// Fused DEM.
-struct FusedDem {
-  DemLayers layers;
-  FusionCounts counts;
-};
-
 using GivenArea = std::optional<std::array<double, 4>>;
 
 // Returns the grid of cells that covers the area, or by default all points.
@@ -161,6 +157,9 @@ void bind_fused(nb::module_& module) {
 
 Layers are rasters, rows x columns, the northernmost row first: read-only views.
 Sample (row, column) is at first_sample_m + (column, row) * step_m in the frame D.)");
+  add_pickling(type, "fused_dem",
+               [](nb::handle self) { return state_of(nb::handle_t<FusedDem>(self)); });
+  module.def("restore_fused_dem", &restored_dem, "state"_a);
   add_layer(type, "elevation_m", &DemLayers::elevation_m,
             "Heights of the ground; NaN where unknown.");
   add_layer(type, "variance_m2", &DemLayers::variance_m2,

@@ -21,6 +21,7 @@
 #include "apps/python/binding/long_call.h"
 #include "apps/python/binding/mesh.h"
 #include "apps/python/binding/numpy_argument.h"
+#include "apps/python/binding/pickle.h"
 #include "core/error.h"
 #include "core/geometry/mesh.h"
 #include "reconstruction/mesh/measured_mesh_io.h"
@@ -112,6 +113,61 @@ std::optional<AnyArray> known(nb::handle_t<Mesh> self, const std::vector<T> Meas
   return view(values.data(), {values.size()}, self);
 }
 
+// ----- pickling
+
+template <typename T>
+AnyArray all_of(const std::vector<T>& values, nb::handle owner) {
+  return view(values.data(), {values.size()}, owner);
+}
+
+nb::list mesh_state(nb::handle self) {
+  const auto& [measured, georeference] = nb::cast<const Mesh&>(self);
+  nb::list state;
+  state.append(view(measured.shape.vertices_m, self));
+  state.append(view(measured.shape.triangles, self));
+  state.append(all_of(measured.shape.levels, self));
+  state.append(all_of(measured.sd_m, self));
+  state.append(all_of(measured.labels, self));
+  state.append(all_of(measured.confidence, self));
+  add_georeference(georeference, state);
+  return state;
+}
+
+template <typename T>
+std::vector<glm::vec<3, T>> next_rows(PickledState& state, const char* name) {
+  const std::vector<T> values = state.next_array<T, 2>(name);
+  if (values.size() % 3 != 0) state.refuse(name, "must have rows of 3 values");
+  std::vector<glm::vec<3, T>> rows;
+  for (std::size_t i = 0; i < values.size(); i += 3)
+    rows.emplace_back(values[i], values[i + 1], values[i + 2]);
+  return rows;
+}
+
+template <typename T>
+std::vector<T> next_column(PickledState& state, const char* name, std::size_t count) {
+  std::vector<T> values = state.next_array<T>(name);
+  if (!values.empty() && values.size() != count)
+    state.refuse(name,
+                 fmt::format("has {} values, but must have {} or none", values.size(), count));
+  return values;
+}
+
+Mesh restored_mesh(const nb::tuple& values) {
+  constexpr std::size_t count = 9;
+  PickledState state("Mesh", values, count);
+  Mesh mesh;
+  auto& [shape, sd_m, labels, confidence] = mesh.measured;
+  shape.vertices_m = next_rows<double>(state, "vertices_m");
+  shape.triangles = next_rows<std::uint32_t>(state, "triangles");
+  shape.levels = state.next_array<std::uint8_t>("levels");
+  sd_m = next_column<float>(state, "sd_m", shape.vertices_m.size());
+  labels = next_column<std::uint16_t>(state, "labels", shape.vertices_m.size());
+  confidence = next_column<float>(state, "confidence", shape.vertices_m.size());
+  mesh.georeference = read_georeference(state);
+  check_mesh(shape, "the pickled Mesh", EmptyMesh::Allow);
+  return mesh;
+}
+
 constexpr const char* mesh_doc = R"(A triangle mesh with shared vertices, in the frame D.
 
   vertices_m  n x 3, metres
@@ -127,8 +183,10 @@ Raises groundray.Error for an invalid mesh.)";
 }  // namespace
 
 void bind_mesh(nb::module_& module) {
-  nb::class_<Mesh>(module, "Mesh", mesh_doc)
-      .def(
+  nb::class_<Mesh> type(module, "Mesh", mesh_doc);
+  add_pickling(type, "mesh", &mesh_state);
+  module.def("restore_mesh", &restored_mesh, "state"_a);
+  type.def(
           "__init__",
           [](Mesh* place, const GivenPoints& vertices_m, const GivenIndices& triangles,
              const std::optional<GivenNumbers>& sd_m, const std::optional<GivenNumbers>& labels,

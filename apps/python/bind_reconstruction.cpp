@@ -84,7 +84,6 @@ MeshAndFigures reconstruct_mesh(const std::vector<const Sweep*>& scans, const st
   linking.screening.noise_sds = noise_sds.value_or(linking.screening.noise_sds);
   MeshResult result = without_gil(
       [&](const StopRequest& stop) { return built_mesh(scans, linking, apart_m, stop); });
-  const DemHeader& header = scans.front()->state->simulation.terrain.header();
   const MergeCounts& counts = result.merged;
   nb::dict figures;
   figures["redundant"] = counts.redundant;
@@ -94,8 +93,7 @@ MeshAndFigures reconstruct_mesh(const std::vector<const Sweep*>& scans, const st
   figures["bridged"] = counts.bridged;
   figures["moved"] = counts.moved;
   figures["left_out"] = counts.left_out;
-  return {Mesh{std::move(result.mesh), {header.origin_w_m, header.crs_name, header.crs_wkt}},
-          std::move(figures)};
+  return {Mesh{std::move(result.mesh), scans.front()->source.georeference}, std::move(figures)};
 }
 
 // ----- mesh processing

@@ -23,6 +23,7 @@
 #include "apps/python/binding/bind.h"
 #include "apps/python/binding/long_call.h"
 #include "apps/python/binding/numpy_argument.h"
+#include "apps/python/binding/pickle.h"
 #include "apps/python/camera_image.h"
 #include "apps/python/scene_state.h"
 #include "apps/python/sweep.h"
@@ -49,6 +50,37 @@ AnyArray matrix_of(const Pose& X_AB) {
   return array_of(std::move(values), {4, 4});
 }
 
+// ----- pickling
+
+// Returns the sensor's scene and its index there.
+template <typename Sensor>
+nb::list sensor_state(nb::handle self) {
+  const auto& sensor = nb::cast<const Sensor&>(self);
+  return nb::list(nb::make_tuple(sensor.state, sensor.index));
+}
+
+template <typename Sensor>
+Sensor restored_sensor(const char* kind, const nb::tuple& values,
+                       std::size_t count_of(const Simulation&)) {
+  constexpr std::size_t count = 2;
+  PickledState state(kind, values, count);
+  Sensor sensor{state.next<std::shared_ptr<SceneState>>("scene"), state.next<std::size_t>("index")};
+  if (!sensor.state) state.refuse("scene", "is None");
+  if (sensor.index >= count_of(sensor.state->simulation))
+    state.refuse("index", "is that of no sensor of its scene");
+  return sensor;
+}
+
+SceneLidar restored_lidar(const nb::tuple& values) {
+  return restored_sensor<SceneLidar>(
+      "Lidar", values, [](const Simulation& simulation) { return simulation.lidars.size(); });
+}
+
+SceneCamera restored_camera(const nb::tuple& values) {
+  return restored_sensor<SceneCamera>(
+      "Camera", values, [](const Simulation& simulation) { return simulation.cameras.size(); });
+}
+
 // ----- lidars
 
 FrameTimes times_of(const SceneLidar& lidar) {
@@ -61,16 +93,8 @@ FrameTimes times_of(const SceneLidar& lidar) {
 Sweep scan(const SceneLidar& lidar, std::optional<double> t_s, std::optional<std::int64_t> frame) {
   const std::int64_t sweep = chosen_frame(times_of(lidar), t_s, frame);
   return without_gil([&](const StopRequest& stop) {
-    const auto scene = lidar.state->frames.of(exposed(lidar.placed(), sweep));
-    LidarScan scan = make_scan(lidar.state->simulation, lidar.index, sweep, *scene,
-                               [&](double) { return !stop.is_made(); });
-    return Sweep{{std::move(scan.echoes)},
-                 {std::move(scan.no_returns)},
-                 std::move(scan.waveforms),
-                 scan.convergence,
-                 sweep,
-                 lidar.state,
-                 lidar.index};
+    return make_sweep(*lidar.state, lidar.index, sweep,
+                      [&](double /*share*/) { return !stop.is_made(); });
   });
 }
 
@@ -90,8 +114,10 @@ Other Python threads keep running, and may scan too. Ctrl-C stops the sweep.
 Raises groundray.Error if no sweep begins at t_s.)";
 
 void bind_lidar(nb::module_& module) {
-  nb::class_<SceneLidar>(module, "Lidar", "A lidar on a scene's platform. See Scene.lidar.")
-      .def_prop_ro("name", [](const SceneLidar& lidar) { return lidar.placed().spec.name; })
+  nb::class_<SceneLidar> type(module, "Lidar", "A lidar on a scene's platform. See Scene.lidar.");
+  add_pickling(type, "lidar", &sensor_state<SceneLidar>);
+  module.def("restore_lidar", &restored_lidar, "state"_a);
+  type.def_prop_ro("name", [](const SceneLidar& lidar) { return lidar.placed().spec.name; })
       .def_prop_ro(
           "model", [](const SceneLidar& lidar) { return lidar.placed().spec.lidar.model; },
           "Make and model.")
@@ -121,24 +147,16 @@ Raises groundray.Error outside the scene's time.)")
 
 // ----- other data of a scan
 
-AnyArray field_of(nb::handle_t<Sweep> self, const auto WaveformRun::*field) {
-  const Waveforms& all = nb::cast<const Sweep&>(self).waveforms;
-  using Value = std::remove_cvref_t<decltype(WaveformRun{}.*field)>;
-  constexpr auto step = static_cast<std::int64_t>(sizeof(WaveformRun) / sizeof(Value));
-  return view(all.runs.empty() ? nullptr : &(all.runs.front().*field), {all.runs.size()}, self,
-              step);
-}
-
 nb::object waveforms_of(nb::handle_t<Sweep> self) {
   const auto& sweep = nb::cast<const Sweep&>(self);
   if (sweep.waveforms.interval_s == 0) return nb::none();
   nb::dict all;
   all["interval_s"] = sweep.waveforms.interval_s;
   all["power_w"] = view(sweep.waveforms.power_w.data(), {sweep.waveforms.power_w.size()}, self);
-  all["pulse"] = field_of(self, &WaveformRun::pulse);
-  all["count"] = field_of(self, &WaveformRun::count);
-  all["first_sample"] = field_of(self, &WaveformRun::first_sample);
-  all["start_s"] = field_of(self, &WaveformRun::start_s);
+  all["pulse"] = field_of(sweep.waveforms, &WaveformRun::pulse, self);
+  all["count"] = field_of(sweep.waveforms, &WaveformRun::count, self);
+  all["first_sample"] = field_of(sweep.waveforms, &WaveformRun::first_sample, self);
+  all["start_s"] = field_of(sweep.waveforms, &WaveformRun::start_s, self);
   return all;
 }
 
@@ -158,15 +176,17 @@ nb::object convergence_of(const Sweep& sweep) {
 }
 
 void bind_scan(nb::module_& module) {
-  nb::class_<Sweep, Points>(module, "Scan", R"(One sweep of a lidar: a row for each echo.
+  nb::class_<Sweep, Points> type(module, "Scan", R"(One sweep of a lidar: a row for each echo.
 
 scan["range_true_m"] is a column; see Points for access to columns, Lidar.scan for their
-meaning.)")
-      .def_ro("frame", &Sweep::frame, "The sweep's number, from 0.")
+meaning.)");
+  add_pickling(type, "scan", [](nb::handle self) { return state_of(nb::handle_t<Sweep>(self)); });
+  module.def("restore_scan", &restored_sweep, "state"_a);
+  type.def_ro("frame", &Sweep::frame, "The sweep's number, from 0.")
       .def_prop_ro(
-          "t_s", [](const Sweep& sweep) { return seconds_of(sweep.stamp()); },
+          "t_s", [](const Sweep& sweep) { return seconds_of(sweep.source.stamp); },
           "When the sweep began, in seconds of the scene's time; `time_s` counts from here.")
-      .def_prop_ro("sensor", [](const Sweep& sweep) { return sweep.placed().spec.name; })
+      .def_prop_ro("sensor", [](const Sweep& sweep) { return sweep.source.sensor; })
       .def_prop_ro(
           "no_returns",
           [](nb::handle_t<Sweep> self) {
@@ -193,7 +213,7 @@ and the differences between the echoes of the other pulses: range_rms_m and rang
 true_rms_m and true_max_m of range_true, share_rms and share_max of the share.)")
       .def("__repr__", [](const Sweep& sweep) {
         return fmt::format("<Scan {} of lidar '{}', {} s: {} echoes of {}>", sweep.frame,
-                           sweep.placed().spec.name, seconds_of(sweep.stamp()), sweep.cloud.rows(),
+                           sweep.source.sensor, seconds_of(sweep.source.stamp), sweep.cloud.rows(),
                            fmt::join(names_of(sweep), ", "));
       });
 }
@@ -211,7 +231,7 @@ CameraImage expose(const SceneCamera& camera, std::optional<double> t_s,
                    std::optional<std::int64_t> frame) {
   const std::int64_t image = chosen_frame(times_of(camera), t_s, frame);
   return without_gil([&](const StopRequest& stop) {
-    return make_image(camera.state, camera.index, image, [&] { stop.obey(); });
+    return make_image(*camera.state, camera.index, image, [&] { stop.obey(); });
   });
 }
 
@@ -255,8 +275,11 @@ AnyArray project(const SceneCamera& camera, const GivenPoints& points_m) {
 }
 
 void bind_camera(nb::module_& module) {
-  nb::class_<SceneCamera>(module, "Camera", "A camera on a scene's platform. See Scene.camera.")
-      .def_prop_ro("name", [](const SceneCamera& camera) { return camera.placed().spec.name; })
+  nb::class_<SceneCamera> type(module, "Camera",
+                               "A camera on a scene's platform. See Scene.camera.");
+  add_pickling(type, "camera", &sensor_state<SceneCamera>);
+  module.def("restore_camera", &restored_camera, "state"_a);
+  type.def_prop_ro("name", [](const SceneCamera& camera) { return camera.placed().spec.name; })
       .def_prop_ro(
           "model", [](const SceneCamera& camera) { return camera.placed().spec.camera.model; },
           "Make and model.")
@@ -327,11 +350,14 @@ AnyArray channel_of(nb::handle_t<CameraImage> self, const std::string& name) {
 }
 
 void bind_image(nb::module_& module) {
-  nb::class_<CameraImage>(module, "Image", R"(One image of a camera: channels of equal size.
+  nb::class_<CameraImage> type(module, "Image", R"(One image of a camera: channels of equal size.
 
 image["depth_m"] is a channel as a NumPy array, height x width or height x width x n, a
-read-only view that keeps the image alive. dict(image) is a dict of all channels.)")
-      .def("__getitem__", &channel_of, "name"_a, "The channel of this name: a view.")
+read-only view that keeps the image alive. dict(image) is a dict of all channels.)");
+  add_pickling(type, "image",
+               [](nb::handle self) { return state_of(nb::handle_t<CameraImage>(self)); });
+  module.def("restore_image", &restored_image, "state"_a);
+  type.def("__getitem__", &channel_of, "name"_a, "The channel of this name: a view.")
       .def("__len__", [](const CameraImage& image) { return image.channels.size(); })
       .def(
           "__contains__",
@@ -352,14 +378,11 @@ read-only view that keeps the image alive. dict(image) is a dict of all channels
           "Classes of the layers of `coverage`; 0 is the sky.")
       .def_ro("frame", &CameraImage::frame, "The image's number, from 0.")
       .def_prop_ro(
-          "t_s",
-          [](const CameraImage& image) {
-            return seconds_of(image.placed().begins[static_cast<std::size_t>(image.frame)]);
-          },
+          "t_s", [](const CameraImage& image) { return seconds_of(image.begin); },
           "When the exposure of its first row began, in seconds of the scene's time.")
-      .def_prop_ro("sensor", [](const CameraImage& image) { return image.placed().spec.name; })
+      .def_prop_ro("sensor", [](const CameraImage& image) { return image.sensor; })
       .def("__repr__", [](const CameraImage& image) {
-        return fmt::format("<Image {} of camera '{}': {}>", image.frame, image.placed().spec.name,
+        return fmt::format("<Image {} of camera '{}': {}>", image.frame, image.sensor,
                            fmt::join(names_of(image), ", "));
       });
 }

@@ -11,6 +11,7 @@
 #include <limits>
 #include <memory>
 #include <optional>
+#include <utility>
 #include <vector>
 
 #include "apps/python/binding/arrays.h"
@@ -18,6 +19,7 @@
 #include "apps/python/binding/long_call.h"
 #include "apps/python/binding/mesh.h"
 #include "apps/python/binding/numpy_argument.h"
+#include "apps/python/binding/pickle.h"
 #include "apps/python/binding/points.h"
 #include "apps/python/cast.h"
 #include "apps/python/terrain_model.h"
@@ -74,9 +76,7 @@ SharedTerrain open_terrain(const std::filesystem::path& path, std::optional<doub
 void save(const TerrainModel& terrain, const std::filesystem::path& path) {
   check_ending(path, {".tif", ".tiff"});
   without_gil([&](const StopRequest&) {
-    const Dem& dem = terrain.dem();
-    const RasterLayer layer{"elevation", "m", dem.grid.heights_m()};
-    write_layers(path, dem.grid.frame(), {dem.origin_w_m, dem.crs_name, dem.crs_wkt}, {&layer, 1});
+    write_dem(terrain.dem(), path);
     return true;
   });
 }
@@ -121,6 +121,42 @@ Mesh terrain_mesh(const TerrainModel& terrain, double max_error_m, bool fewest) 
   });
 }
 
+AnyArray heights_of(nb::handle self) {
+  const HeightGrid& grid = nb::cast<const TerrainModel&>(self).dem().grid;
+  return view(grid.heights_m().data(),
+              {static_cast<std::size_t>(grid.rows()), static_cast<std::size_t>(grid.columns())},
+              self);
+}
+
+// ----- pickling
+
+nb::list terrain_state(nb::handle self) {
+  const Dem& dem = nb::cast<const TerrainModel&>(self).dem();
+  const auto [samples, origin_m, step_m, cells_per_m] = dem.grid.frame();
+  nb::list state;
+  state.append(heights_of(self));
+  state.append(nb::make_tuple(samples.x, samples.y));
+  state.append(nb::make_tuple(origin_m.x, origin_m.y));
+  state.append(nb::make_tuple(step_m.x, step_m.y));
+  add_georeference({dem.origin_w_m, dem.crs_name, dem.crs_wkt}, state);
+  return state;
+}
+
+SharedTerrain restored_terrain(const nb::tuple& values) {
+  constexpr std::size_t count = 7;
+  PickledState state("Terrain", values, count);
+  auto heights_m = state.next_array<float, 2>("heights_m");
+  const auto [columns, rows] = state.next<std::array<int, 2>>("samples");
+  const auto first_m = state.next<Pair>("origin_m");
+  const auto step_m = state.next<Pair>("step_m");
+  HeightGrid grid({columns, rows}, {first_m[0], first_m[1]}, {step_m[0], step_m[1]},
+                  std::move(heights_m));
+  auto [origin_w_m, crs_name, crs_wkt] = read_georeference(state);
+  check_crs({origin_w_m, "", crs_wkt});
+  return std::make_shared<TerrainModel>(
+      Dem{std::move(grid), origin_w_m, std::move(crs_wkt), std::move(crs_name)});
+}
+
 constexpr const char* terrain_doc = R"(A DEM in memory: the reference surface that rays hit.
 
   heights_m       rows x columns, metres, the northernmost row first; NaN where unknown.
@@ -137,8 +173,10 @@ Immutable: any number of threads may use one. Raises groundray.Error naming ever
 }  // namespace
 
 void bind_terrain(nb::module_& module) {
-  nb::class_<TerrainModel>(module, "Terrain", terrain_doc)
-      .def(
+  nb::class_<TerrainModel> type(module, "Terrain", terrain_doc);
+  add_pickling(type, "terrain", &terrain_state);
+  module.def("restore_terrain", &restored_terrain, "state"_a);
+  type.def(
           "__init__",
           [](TerrainModel* place, const GivenRaster& heights_m, double cell_m,
              const Pair& south_west_w_m, const std::string& crs_wkt) {
@@ -148,14 +186,7 @@ void bind_terrain(nb::module_& module) {
           },
           "heights_m"_a, "cell_m"_a = 1.0, "south_west_w_m"_a = Pair{0, 0}, "crs_wkt"_a = "")
       .def_prop_ro(
-          "heights_m",
-          [](nb::handle_t<TerrainModel> self) {
-            const HeightGrid& grid = nb::cast<const TerrainModel&>(self).dem().grid;
-            return view(
-                grid.heights_m().data(),
-                {static_cast<std::size_t>(grid.rows()), static_cast<std::size_t>(grid.columns())},
-                self);
-          },
+          "heights_m", [](nb::handle_t<TerrainModel> self) { return heights_of(self); },
           "Heights of the samples, rows x columns, metres, as in the file: a view.")
       .def_prop_ro(
           "first_sample_m",

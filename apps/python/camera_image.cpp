@@ -1,8 +1,15 @@
 #include "apps/python/camera_image.h"
 
+#include <nanobind/stl/pair.h>
+#include <nanobind/stl/string.h>
+#include <nanobind/stl/vector.h>
+
+#include <algorithm>
+#include <limits>
 #include <utility>
 #include <variant>
 
+#include "apps/python/binding/pickle.h"
 #include "apps/scene/frames.h"
 
 namespace groundray::python {
@@ -13,7 +20,7 @@ using Product = CameraProduct;
 /// Moves the products of an image to channels.
 class Channels {
  public:
-  explicit Channels(CameraImage& into) : into_(into), camera_(into.placed().spec.camera) {}
+  Channels(const CameraSpec& camera, CameraImage& into) : into_(into), camera_(camera) {}
 
   void add_stages(ImagerStages& stages) {
     if (stages.picture)
@@ -71,22 +78,90 @@ class Channels {
   const CameraSpec& camera_;
 };
 
+// ----- pickling
+
+using Pixels = decltype(CameraImage::Channel::pixels);
+
+// Reads pixels of type T; returns false if the array has another type or form.
+template <typename T>
+bool read_pixels(nb::handle array, Pixels& into) {
+  nb::ndarray<const T, nb::ndim<3>, nb::c_contig, nb::device::cpu> given;
+  if (!nb::try_cast(array, given, false)) return false;
+  for (std::size_t axis = 0; axis < 3; ++axis) {
+    if (given.shape(axis) > std::numeric_limits<int>::max()) return false;
+  }
+  Image<T> pixels(static_cast<int>(given.shape(1)), static_cast<int>(given.shape(0)),
+                  static_cast<int>(given.shape(2)));
+  std::copy_n(given.data(), given.size(), pixels.values().begin());
+  into = std::move(pixels);
+  return true;
+}
+
+template <typename... T>
+bool read_any_pixels(nb::handle array, std::variant<Image<T>...>& into) {
+  return (read_pixels<T>(array, into) || ...);
+}
+
 }  // namespace
 
-CameraImage make_image(const std::shared_ptr<SceneState>& state, std::size_t camera,
-                       std::int64_t frame, const std::function<void()>& check) {
-  CameraImage image{.frame = frame, .state = state, .camera = camera};
-  const auto scene = state->frames.of(exposed(image.placed(), frame));
+CameraImage make_image(SceneState& state, std::size_t camera, std::int64_t frame,
+                       const std::function<void()>& check) {
+  const PlacedCamera& placed = state.simulation.cameras[camera];
+  const Exposed time = exposed(placed, frame);
+  CameraImage image{.frame = frame, .sensor = placed.spec.name, .begin = time.begin};
+  const auto scene = state.frames.of(time);
   check();
-  MadeImage made = groundray::make_image(state->simulation, camera, frame, *scene, check);
-  Channels channels(image);
+  MadeImage made = groundray::make_image(state.simulation, camera, frame, *scene, check);
+  Channels channels(placed.spec.camera, image);
   if (made.light) {
     image.labels = std::move(made.labels);
-    if (auto stages = simulate_imager(state->simulation, camera, frame, made))
+    if (auto stages = simulate_imager(state.simulation, camera, frame, made))
       channels.add_stages(*stages);
     channels.add_light(*made.light);
   }
   if (made.truth) channels.add_truth(*made.truth);
+  return image;
+}
+
+nb::list state_of(nb::handle_t<CameraImage> self) {
+  const auto& image = nb::cast<const CameraImage&>(self);
+  nb::list channels;
+  for (const CameraImage::Channel& channel : image.channels) {
+    const AnyArray array = std::visit(
+        [&](const auto& pixels) {
+          const Shape shape{static_cast<std::size_t>(pixels.height()),
+                            static_cast<std::size_t>(pixels.width()),
+                            static_cast<std::size_t>(pixels.channels())};
+          return view(pixels.values().data(), shape, self);
+        },
+        channel.pixels);
+    channels.append(nb::make_tuple(channel.name, array));
+  }
+  nb::list state;
+  state.append(channels);
+  state.append(image.labels);
+  state.append(image.frame);
+  state.append(image.sensor);
+  state.append(image.begin.count());
+  return state;
+}
+
+CameraImage restored_image(const nb::tuple& values) {
+  constexpr std::size_t count = 5;
+  PickledState state("Image", values, count);
+  CameraImage image;
+  for (const nb::handle each : state.next<nb::list>("channels")) {
+    std::pair<std::string, nb::object> channel;
+    if (!nb::try_cast(each, channel, false)) state.refuse("channels", "has no name and array");
+    const auto& [name, array] = channel;
+    image.channels.push_back({name, {}});
+    if (!read_any_pixels(array, image.channels.back().pixels))
+      state.refuse(name, "must be an array of height x width x channels");
+  }
+  image.labels = state.next<std::vector<std::uint16_t>>("labels");
+  image.frame = state.next<std::int64_t>("frame");
+  image.sensor = state.next<std::string>("sensor");
+  image.begin = std::chrono::nanoseconds(state.next<std::int64_t>("begin_ns"));
   return image;
 }
 

@@ -1,8 +1,9 @@
 #pragma once
 
+#include <chrono>
+#include <cstddef>
 #include <cstdint>
 #include <functional>
-#include <memory>
 #include <string>
 #include <variant>
 #include <vector>
@@ -21,16 +22,21 @@ struct CameraImage {
   std::vector<Channel> channels;
   std::vector<std::uint16_t> labels;  ///< labels of the layers of `coverage`
   std::int64_t frame = 0;
-  std::shared_ptr<const SceneState> state;
-  std::size_t camera = 0;  ///< index in the scene
-
-  const PlacedCamera& placed() const { return state->simulation.cameras[camera]; }
+  std::string sensor;
+  std::chrono::nanoseconds begin{0};  ///< of the exposure of its first row
 };
 
 /// Makes an image with all products that the camera's file requests.
 /// @param check  called repeatedly, on any thread; an exception from it ends the image.
 /// @throws Error as the functions that make the products.
-CameraImage make_image(const std::shared_ptr<SceneState>& state, std::size_t camera,
-                       std::int64_t frame, const std::function<void()>& check);
+CameraImage make_image(SceneState& state, std::size_t camera, std::int64_t frame,
+                       const std::function<void()>& check);
+
+/// Returns the values from which restored_image makes an equal image.
+nb::list state_of(nb::handle_t<CameraImage> self);
+
+/// Makes an image from a pickle.
+/// @throws Error naming the damaged value.
+CameraImage restored_image(const nb::tuple& values);
 
 }  // namespace groundray::python

@@ -23,11 +23,11 @@ std::vector<double> times_s(const Sweep& sweep) {
 // Returns the sensor's pose at each of these times. They are clamped, because as floats they may
 // lie just outside the trajectory.
 std::vector<Pose> poses_at(const Sweep& sweep, std::span<const double> all_s) {
-  const Trajectory& X_DS = sweep.placed().X_DS;
+  const Trajectory& X_DS = sweep.source.X_DS;
   std::vector<Pose> poses;
   poses.reserve(all_s.size());
   for (const double time_s : all_s) {
-    const nanoseconds time = sweep.stamp() + nanoseconds(std::llround(time_s * 1e9));
+    const nanoseconds time = sweep.source.stamp + nanoseconds(std::llround(time_s * 1e9));
     poses.push_back(X_DS.pose_at(std::clamp(time, X_DS.begin_time(), X_DS.end_time())));
   }
   return poses;
@@ -40,9 +40,8 @@ std::vector<glm::dvec3> points_as_fired(const Sweep& sweep, std::span<const Pose
   const auto z = sweep.cloud.column<float>("z");
   std::vector<glm::dvec3> p_S(sweep.cloud.rows());
   for (std::size_t i = 0; i < p_S.size(); ++i) p_S[i] = {x[i], y[i], z[i]};
-  const PlacedLidar& placed = sweep.placed();
-  if (placed.spec.lidar.points == LidarSpec::Points::AsFired) return p_S;
-  const Pose X_DS = placed.X_DS.pose_at(sweep.stamp());
+  if (sweep.source.points == LidarSpec::Points::AsFired) return p_S;
+  const Pose X_DS = sweep.source.X_DS.pose_at(sweep.source.stamp);
   for (std::size_t i = 0; i < p_S.size(); ++i) p_S[i] = inverse(poses[i]) * (X_DS * p_S[i]);
   return p_S;
 }
@@ -52,7 +51,7 @@ std::vector<float> sds_of(const Sweep& sweep, std::optional<double> range_sd_m) 
     const auto column = sweep.cloud.column<float>("range_sd");
     return {column.begin(), column.end()};
   }
-  const double sd_m = range_sd_m.value_or(sweep.placed().spec.lidar.range_noise_sigma_m);
+  const double sd_m = range_sd_m.value_or(sweep.source.range_noise_sigma_m);
   return std::vector<float>(sweep.cloud.rows(), static_cast<float>(sd_m));
 }
 
@@ -89,7 +88,8 @@ OrganisedScan organised(const Sweep& sweep, std::optional<double> range_sd_m, Re
   const auto labels = sweep.cloud.column<std::uint16_t>("label");
   returns.labels.assign(labels.begin(), labels.end());
   returns.sd_m = sds_of(sweep, range_sd_m);
-  return place(organise(returns, choice).scan, sweep.placed().X_DS, sweep.stamp(), returns.times_s);
+  return place(organise(returns, choice).scan, sweep.source.X_DS, sweep.source.stamp,
+               returns.times_s);
 }
 
 }  // namespace groundray::python

@@ -6,6 +6,7 @@
 #include <ranges>
 
 #include "core/error.h"
+#include "terrain/terrain_scene.h"
 
 namespace groundray::python {
 namespace {
@@ -24,6 +25,34 @@ std::int64_t nearest_frame(const FrameTimes& times, nanoseconds time) {
 }
 
 }  // namespace
+
+std::shared_ptr<const RayTracer> GroundTracers::of(const Simulation& simulation,
+                                                   const glm::dvec3& p_DL) {
+  const std::lock_guard lock(mutex_);
+  std::erase_if(all_, [](const auto& each) { return each.second.expired(); });
+  for (const auto& [at, tracer] : all_) {
+    if (at != p_DL) continue;
+    if (auto found = tracer.lock()) return found;
+  }
+  const HeightGrid& whole = *simulation.terrain.whole();
+  auto made = std::make_shared<const RayTracer>(
+      RayTracer({full_resolution_level(whole)}, p_DL, simulation.spec.tracing));
+  ++built_;
+  all_.emplace_back(p_DL, made);
+  return made;
+}
+
+int GroundTracers::built() const {
+  const std::lock_guard lock(mutex_);
+  return built_;
+}
+
+Scene scene_on(RayTracer ground, const Simulation& simulation) {
+  const SceneObjects& objects = simulation.scene_objects;
+  return {std::move(ground), {.label = simulation.spec.terrain.label},
+          objects.materials, objects.objects,
+          objects.models,    objects.cover};
+}
 
 FrameSceneCache::Key FrameSceneCache::key_of(const Exposed& frame) const {
   if (simulation_.terrain.whole() == nullptr) return {.X_DS = frame.X_DS, .begin = frame.begin};
@@ -45,11 +74,25 @@ std::shared_ptr<const Scene> FrameSceneCache::of(const Exposed& frame) {
   Entry& entry = entry_for(key);
   if (entry.key != key) {
     entry.key.reset();  // invalid while a scene is built
-    entry.scene = &entry.frames(frame);
+    build(entry, frame, key);
     entry.key = key;
   }
   ++entry.users;
   return {entry.scene, [this, &entry](const Scene*) { give_back(entry); }};
+}
+
+void FrameSceneCache::build(Entry& entry, const Exposed& frame, const Key& key) {
+  if (!key.p_DL) {
+    entry.scene = &entry.frames(frame);
+    return;
+  }
+  entry.whole.reset();  // first, because two would need twice the memory
+  entry.ground.reset();
+  entry.ground = tracers_->of(simulation_, *key.p_DL);
+  const auto levels = entry.ground->levels();
+  entry.whole =
+      scene_on(RayTracer(entry.ground->device(), {levels.begin(), levels.end()}), simulation_);
+  entry.scene = &*entry.whole;
 }
 
 // Releases an entry. Of the idle entries, only the last one released is kept for the next frame.

@@ -2,6 +2,7 @@
 
 #include <cmath>
 
+#include "terrain/dem/layers_io.h"
 #include "terrain/terrain_scene.h"
 
 namespace groundray::python {
@@ -18,6 +19,11 @@ const Scene& TerrainModel::scene() const {
         .terrain = {.label = 1}});
   });
   return *scene_;
+}
+
+void write_dem(const Dem& dem, const std::filesystem::path& path) {
+  const RasterLayer layer{"elevation", "m", dem.grid.heights_m()};
+  write_layers(path, dem.grid.frame(), {dem.origin_w_m, dem.crs_name, dem.crs_wkt}, {&layer, 1});
 }
 
 }  // namespace groundray::python

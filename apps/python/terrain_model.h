@@ -1,5 +1,6 @@
 #pragma once
 
+#include <filesystem>
 #include <memory>
 #include <mutex>
 #include <utility>
@@ -26,5 +27,9 @@ class TerrainModel {
   mutable std::once_flag once_;
   mutable std::unique_ptr<const Scene> scene_;
 };
+
+/// Writes a GeoTIFF of float32 heights. It appears only when complete.
+/// @throws Error as write_layers.
+void write_dem(const Dem& dem, const std::filesystem::path& path);
 
 }  // namespace groundray::python

@@ -35,17 +35,20 @@ auto parts(const ModelSource& source) {
   return std::tuple(file, metres_per_unit, up, broken, image, amplitude_m, middle, cell_m);
 }
 
-bool are_equal(const std::variant<AssetSpec, ModelSource>& a,
-               const std::variant<AssetSpec, ModelSource>& b) {
-  if (a.index() != b.index()) return false;
-  if (const auto* asset = std::get_if<AssetSpec>(&a))
-    return parts(*asset) == parts(std::get<AssetSpec>(b));
-  return parts(std::get<ModelSource>(a)) == parts(std::get<ModelSource>(b));
+auto parts(const GivenModel& given) { return std::tuple(given.model); }
+
+bool are_equal(const ModelSpec::Source& a, const ModelSpec::Source& b) {
+  const auto equals_b = [&]<typename T>(const T& source) {
+    const T* const other = std::get_if<T>(&b);
+    return other != nullptr && parts(source) == parts(*other);
+  };
+  return std::visit(equals_b, a);
 }
 
-Model make(const std::variant<AssetSpec, ModelSource>& source) {
-  if (const auto* asset = std::get_if<AssetSpec>(&source)) return make_asset(*asset);
-  const auto& [file, options, displacement] = std::get<ModelSource>(source);
+Model make(const AssetSpec& asset) { return make_asset(asset); }
+
+Model make(const ModelSource& source) {
+  const auto& [file, options, displacement] = source;
   Model model = read_model(file, options).model;
   if (!displacement) return model;
   const auto& [image, amplitude_m, middle, cell_m] = *displacement;
@@ -55,6 +58,8 @@ Model make(const std::variant<AssetSpec, ModelSource>& source) {
     throw Error("{}: {}", file.string(), fault.what());
   }
 }
+
+Model make(const GivenModel& given) { return *given.model; }
 
 // Checks that the surfaces to which materials are assigned exist.
 void check_names(const ModelSpec& spec, const Model& model) {
@@ -178,7 +183,8 @@ std::uint32_t ModelLibrary::load(const Source& source) {
   const auto found = std::ranges::find_if(
       sources_, [&](const Source& loaded) { return are_equal(loaded, source); });
   if (found == sources_.end()) {
-    shapes_.emplace_back(device_, make(source), tracing_);
+    Model model = std::visit([](const auto& of_kind) { return make(of_kind); }, source);
+    shapes_.emplace_back(device_, std::move(model), tracing_);
     sources_.push_back(source);
     return static_cast<std::uint32_t>(shapes_.size() - 1);
   }

@@ -3,7 +3,6 @@
 #include <cstddef>
 #include <cstdint>
 #include <string>
-#include <variant>
 #include <vector>
 
 #include "apps/scene/fingerprint.h"
@@ -62,7 +61,7 @@ class ModelLibrary {
   void add_to(Fingerprint& print) const;
 
  private:
-  using Source = std::variant<AssetSpec, ModelSource>;
+  using Source = ModelSpec::Source;
   std::uint32_t load(const Source& source);  // returns the index of the shape
 
   RayDevice device_;

@@ -17,7 +17,9 @@ namespace groundray {
 namespace {
 
 Trajectory read_recorded(const RecordedPath& path) {
-  return located(path.where, "key 'trajectory'", [&] { return read_tum(path.tum); });
+  return located(path.where, "key 'trajectory'", [&] {
+    return path.text.empty() ? read_tum(path.tum) : parse_tum(path.text, path.tum.string());
+  });
 }
 
 }  // namespace

@@ -5,6 +5,7 @@
 #include <glm/vec2.hpp>
 #include <glm/vec3.hpp>
 #include <map>
+#include <memory>
 #include <optional>
 #include <string>
 #include <variant>
@@ -35,6 +36,7 @@ namespace groundray {
 struct RecordedPath {
   std::filesystem::path tum;
   std::string where;
+  std::string text;  ///< content, if it is in memory: then there is no file
 };
 
 /// Path driven over the ground (see GroundPathSpec); waypoints in W, the CRS of the DEM.
@@ -61,9 +63,15 @@ struct ModelSource {
   std::optional<DisplacementSource> displacement;
 };
 
+/// Model in memory.
+struct GivenModel {
+  std::shared_ptr<const Model> model;
+};
+
 /// Model and its materials.
 struct ModelSpec {
-  std::variant<AssetSpec, ModelSource> source;
+  using Source = std::variant<AssetSpec, ModelSource, GivenModel>;
+  Source source;
   std::map<std::string, Material> materials;  ///< materials by surface name
   std::optional<Material> material;           ///< material of all other surfaces
 };

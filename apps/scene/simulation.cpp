@@ -14,6 +14,7 @@
 #include <variant>
 #include <vector>
 
+#include "apps/scene/edited_simulation.h"
 #include "apps/scene/interruption.h"
 #include "apps/scene/readers/scene_reader.h"
 #include "apps/scene/scene_place.h"
@@ -270,9 +271,47 @@ std::filesystem::path own_file() {
   return dladdr(&here, &info) != 0 && info.dli_fname != nullptr ? info.dli_fname : "";
 }
 
+// Returns true if two scenes that differ as edited_simulation permits scatter the same objects.
+bool has_same_placements(const SceneSpec& a, const SceneSpec& b) {
+  if (a.scatter.empty()) return true;
+  return a.seed.value == b.seed.value &&
+         std::ranges::equal(a.scatter, b.scatter, {}, &ScatterLayer::density_per_m2,
+                            &ScatterLayer::density_per_m2);
+}
+
 std::optional<AerialPerspective> air_of(const SceneSpec& spec) {
   const AerialPerspective air(spec.air);
   return air.extinction_per_m() == glm::dvec3(0) ? std::nullopt : std::optional(air);
+}
+
+// Builds everything on a terrain.
+// @param objects_of  returns the scene's objects.
+template <typename ObjectsOf>
+Simulation completed(SceneSpec spec, Terrain terrain, const ObjectsOf& objects_of) {
+  std::chrono::nanoseconds begin{0};
+  const Trajectory X_DB = extended(
+      std::visit([&](const auto& path) { return lay_platform_path(path, spec, terrain, begin); },
+                 spec.platform),
+      spec);
+  std::vector<PlacedLidar> lidars = place_lidars(spec, X_DB);
+  std::vector<PlacedCamera> cameras = place_cameras(spec, X_DB);
+  for (const PlacedLidar& placed : lidars) {
+    located(placed.spec.where, title("lidar", placed.spec.name), [&] {
+      check_place(placed.X_DS, placed.spec.lidar.gate.far_m, terrain, run_time(spec));
+    });
+  }
+  for (const PlacedCamera& camera : cameras) {
+    located(camera.spec.where, title("camera", camera.spec.name), [&] {
+      check_place(camera.X_DC, diagonal_m(terrain.frame()), terrain, run_time(spec));
+    });
+  }
+  const double reach_m = largest_reach_m(lidars, cameras);
+  SceneObjects objects = objects_of(spec, terrain, begin);
+  std::optional<Sky> sky = load_sky(spec);
+  const std::optional<AerialPerspective> air = air_of(spec);
+  return {std::move(spec),    std::move(terrain), begin,
+          std::move(lidars),  std::move(cameras), reach_m,
+          std::move(objects), std::move(sky),     air};
 }
 
 }  // namespace
@@ -334,30 +373,16 @@ Simulation build_simulation(SceneSpec spec, const Terrain::Progress& progress) {
     return Terrain(spec.terrain.dem, spec.terrain.options, spec.terrain.detail, progress,
                    spec.terrain.relief);
   });
-  std::chrono::nanoseconds begin{0};
-  const Trajectory X_DB = extended(
-      std::visit([&](const auto& path) { return lay_platform_path(path, spec, terrain, begin); },
-                 spec.platform),
-      spec);
-  std::vector<PlacedLidar> lidars = place_lidars(spec, X_DB);
-  std::vector<PlacedCamera> cameras = place_cameras(spec, X_DB);
-  for (const PlacedLidar& placed : lidars) {
-    located(placed.spec.where, title("lidar", placed.spec.name), [&] {
-      check_place(placed.X_DS, placed.spec.lidar.gate.far_m, terrain, run_time(spec));
-    });
-  }
-  for (const PlacedCamera& camera : cameras) {
-    located(camera.spec.where, title("camera", camera.spec.name), [&] {
-      check_place(camera.X_DC, diagonal_m(terrain.frame()), terrain, run_time(spec));
-    });
-  }
-  const double reach_m = largest_reach_m(lidars, cameras);
-  SceneObjects objects = build_scene_objects(spec, terrain, begin);
-  std::optional<Sky> sky = load_sky(spec);
-  const std::optional<AerialPerspective> air = air_of(spec);
-  return {std::move(spec),    std::move(terrain), begin,
-          std::move(lidars),  std::move(cameras), reach_m,
-          std::move(objects), std::move(sky),     air};
+  return completed(std::move(spec), std::move(terrain), build_scene_objects);
+}
+
+Simulation edited_simulation(SceneSpec spec, const Simulation& base) {
+  const bool are_same = has_same_placements(spec, base.spec);
+  return completed(std::move(spec), base.terrain,
+                   [&](const SceneSpec& edited, const Terrain& terrain, nanoseconds begin) {
+                     return are_same ? base.scene_objects
+                                     : build_scene_objects(edited, terrain, begin);
+                   });
 }
 
 }  // namespace groundray

@@ -168,6 +168,26 @@ void refuse_faults(const fs::path& path, const ModelFile& file) {
   broken.throw_if_any();
 }
 
+// Returns the model of a soup in O, in metres. The path begins error messages, and images are
+// beside it.
+ModelFile finished(const fs::path& path, PolygonSoup soup, BrokenParts broken) {
+  if (soup.surfaces.size() > std::numeric_limits<std::uint16_t>::max()) {
+    throw Error("{}: there are {} surfaces; there must be fewer than 2^16", path.string(),
+                soup.surfaces.size());
+  }
+  ModelFile file{.skipped = soup.skipped, .rounding_m = soup.rounding};
+  file.dropped.out_of_range = soup.omitted;
+  file.model = model_of(soup, file.dropped);
+  if (broken == BrokenParts::Refuse) refuse_faults(path, file);
+  if (file.model.mesh.triangles.empty()) {
+    throw Error("{}: there is no triangle{}", path.string(),
+                why_empty(file.dropped.total(), file.skipped));
+  }
+  take_surfaces(path, std::move(soup.surfaces), file.model);
+  check_model(file.model, path.string());
+  return file;
+}
+
 }  // namespace
 
 std::string name_beside(const std::string& written) {
@@ -184,23 +204,18 @@ ModelFile read_model(const fs::path& path, const ModelOptions& options) {
     throw Error("{}: metres_per_unit = {} must be positive", path.string(), scale);
   }
   ModelReading reading = read_model_file(path);
-  PolygonSoup& soup = reading.soup;
   turn_and_scale(reading, options);
-  if (soup.surfaces.size() > std::numeric_limits<std::uint16_t>::max()) {
-    throw Error("{}: there are {} surfaces; there must be fewer than 2^16", path.string(),
-                soup.surfaces.size());
+  return finished(path, std::move(reading.soup), options.broken);
+}
+
+Model model_from(const TriangleMesh& mesh, const std::string& name) {
+  PolygonSoup soup{.positions = mesh.vertices_m};
+  soup.surfaces.push_back({.looks = {.name = "default"}});
+  for (const glm::uvec3& triangle : mesh.triangles) {
+    soup.polygons.push_back({soup.corners.size(), 3, 0});
+    for (int k = 0; k < 3; ++k) soup.corners.push_back({.position = triangle[k]});
   }
-  ModelFile file{.skipped = soup.skipped, .rounding_m = soup.rounding};
-  file.dropped.out_of_range = soup.omitted;
-  file.model = model_of(soup, file.dropped);
-  if (options.broken == BrokenParts::Refuse) refuse_faults(path, file);
-  if (file.model.mesh.triangles.empty()) {
-    throw Error("{}: there is no triangle{}", path.string(),
-                why_empty(file.dropped.total(), file.skipped));
-  }
-  take_surfaces(path, std::move(soup.surfaces), file.model);
-  check_model(file.model, path.string());
-  return file;
+  return finished(name, std::move(soup), BrokenParts::Refuse).model;
 }
 
 }  // namespace groundray

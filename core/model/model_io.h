@@ -51,4 +51,10 @@ struct ModelFile {
 /// @see docs/reference/models.md for the data read from each format.
 ModelFile read_model(const std::filesystem::path& path, const ModelOptions& options);
 
+/// Returns triangles in memory, in O, as a model of one surface, "default": equal to that of a .ply
+/// file of the same vertices and triangles.
+/// @param name  begins error messages.
+/// @throws Error as read_model with BrokenParts::Refuse.
+Model model_from(const TriangleMesh& mesh, const std::string& name);
+
 }  // namespace groundray

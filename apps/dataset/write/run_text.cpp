@@ -79,38 +79,61 @@ void add_lens(const Lens& lens, Fingerprint& print) {
   }
 }
 
-std::uint64_t fingerprint(const Simulation& simulation) {
-  static_assert(sizeof(Trajectory::Sample) == 8 * sizeof(double),
-                "no padding, whose bytes are anything");
+std::uint64_t fingerprint_of(std::span<const char> text) {
   Fingerprint print;
-  print.add(std::span<const char>(simulation.terrain.fingerprint()));
-  for (const PlacedLidar& lidar : simulation.lidars) {
-    print.add(std::span(lidar.X_DS.samples()));
-    print.add(std::span<const char>(calibration_text(lidar)));
-    if (const auto* table = std::get_if<TablePattern>(&lidar.spec.lidar.pattern)) {
-      for (const auto& [time_s, azimuth_rad, elevation_rad, ring, origin_m] : table->shots) {
-        const std::array numbers{time_s, azimuth_rad, elevation_rad};
-        print.add(std::span<const double>(numbers));
-        print.add(std::span<const std::uint16_t>(&ring, 1));
-      }
+  print.add(text);
+  return print.value();
+}
+
+std::uint64_t fingerprint_of(const PlacedLidar& lidar) {
+  Fingerprint print;
+  print.add(std::span(lidar.X_DS.samples()));
+  print.add(std::span<const char>(calibration_text(lidar)));
+  if (const auto* table = std::get_if<TablePattern>(&lidar.spec.lidar.pattern)) {
+    for (const auto& [time_s, azimuth_rad, elevation_rad, ring, origin_m] : table->shots) {
+      const std::array numbers{time_s, azimuth_rad, elevation_rad};
+      print.add(std::span<const double>(numbers));
+      print.add(std::span<const std::uint16_t>(&ring, 1));
     }
   }
-  for (const PlacedCamera& camera : simulation.cameras) {
-    print.add(std::span(camera.X_DC.samples()));
-    print.add(std::span<const char>(calibration_text(camera)));
-    add_lens(camera.camera.lens(), print);
-  }
-  if (const auto& sky = simulation.spec.sky) {
-    if (const auto* environment = std::get_if<EnvironmentImage>(&sky->dome))
-      print.add(std::span<const char>(read_text(environment->image)));
-  }
-  for (const Material& material : simulation.scene_objects.materials.all())
-    print.add_all(fingerprint_of(material));
-  print.add(std::span<const char>(simulation.scene_objects.fingerprint));
+  return print.value();
+}
+
+std::uint64_t fingerprint_of(const PlacedCamera& camera) {
+  Fingerprint print;
+  print.add(std::span(camera.X_DC.samples()));
+  print.add(std::span<const char>(calibration_text(camera)));
+  add_lens(camera.camera.lens(), print);
+  return print.value();
+}
+
+std::uint64_t fingerprint(const Simulation& simulation) {
+  Fingerprint print;
+  for (const RunInput& input : run_inputs(simulation)) print.add_all(input.fingerprint);
   return print.value();
 }
 
 }  // namespace
+
+std::vector<RunInput> run_inputs(const Simulation& simulation) {
+  static_assert(sizeof(Trajectory::Sample) == 8 * sizeof(double),
+                "no padding, whose bytes are anything");
+  std::vector<RunInput> inputs{{"terrain", fingerprint_of(simulation.terrain.fingerprint())}};
+  for (const PlacedLidar& lidar : simulation.lidars)
+    inputs.push_back({fmt::format("lidar '{}'", lidar.spec.name), fingerprint_of(lidar)});
+  for (const PlacedCamera& camera : simulation.cameras)
+    inputs.push_back({fmt::format("camera '{}'", camera.spec.name), fingerprint_of(camera)});
+  if (const auto& sky = simulation.spec.sky) {
+    if (const auto* environment = std::get_if<EnvironmentImage>(&sky->dome))
+      inputs.push_back({"sky", fingerprint_of(read_text(environment->image))});
+  }
+  Fingerprint materials;
+  for (const Material& material : simulation.scene_objects.materials.all())
+    materials.add_all(groundray::fingerprint_of(material));
+  inputs.push_back({"materials", materials.value()});
+  inputs.push_back({"objects", fingerprint_of(simulation.scene_objects.fingerprint)});
+  return inputs;
+}
 
 std::string run_header(const Simulation& simulation, const FrameChoice& choice) {
   const glm::dvec3 origin_m = simulation.terrain.header().origin_w_m;

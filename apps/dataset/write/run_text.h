@@ -1,5 +1,6 @@
 #pragma once
 
+#include <cstdint>
 #include <filesystem>
 #include <string>
 #include <vector>
@@ -8,6 +9,17 @@
 #include "apps/scene/simulation.h"
 
 namespace groundray {
+
+/// Input of a run that files outside of the scene file determine.
+struct RunInput {
+  std::string name;  ///< such as "terrain" or "lidar 'roof'"
+  std::uint64_t fingerprint = 0;
+};
+
+/// Returns all inputs of a run, the terrain first, on which the others may depend. Runs with equal
+/// scene files, seeds and inputs make equal frames.
+/// @throws Error if an image of the sky cannot be read.
+std::vector<RunInput> run_inputs(const Simulation& simulation);
 
 /// Returns the part of dataset.yaml that describes the run (docs/reference/formats.md). Runs with
 /// equal texts make equal frames. Only chosen sensors are listed.

@@ -2,6 +2,7 @@
 
 #include <fmt/format.h>
 #include <fmt/ranges.h>
+#include <nanobind/stl/pair.h>
 
 #include <algorithm>
 #include <array>
@@ -31,6 +32,21 @@ constexpr std::array<std::pair<std::string_view, std::string_view>, 19> units{{
   const std::string text =
       fmt::format("there is no column '{}'; there are {}", name, fmt::join(names_of(points), ", "));
   throw nb::key_error(text.c_str());
+}
+
+// Adds a column of values of type T; returns false if the array has another type or form.
+template <typename T>
+bool add_column(const std::string& name, nb::handle array, PointCloud& to) {
+  nb::ndarray<const T, nb::ndim<1>, nb::c_contig, nb::device::cpu> values;
+  if (!nb::try_cast(array, values, false) || values.size() != to.rows()) return false;
+  std::copy_n(values.data(), values.size(), to.add<T>(name).begin());
+  return true;
+}
+
+template <typename... T>
+bool add_any_column(std::variant<PointCloud::Values<T>...> /*types*/, const std::string& name,
+                    nb::handle array, PointCloud& to) {
+  return (add_column<T>(name, array, to) || ...);
 }
 
 }  // namespace
@@ -106,6 +122,31 @@ Points selected(const Points& points, nb::handle rows) {
         column.values);
   }
   return part;
+}
+
+void add_points(const Points& points, nb::handle owner, nb::list& state) {
+  nb::list columns;
+  for (const PointCloud::Column& column : points.cloud.columns()) {
+    const AnyArray array =
+        std::visit([&](const auto& values) { return view(values.data(), {values.size()}, owner); },
+                   column.values);
+    columns.append(nb::make_tuple(column.name, array));
+  }
+  state.append(points.cloud.rows());
+  state.append(columns);
+}
+
+Points read_points(PickledState& state) {
+  Points points{PointCloud(state.next<std::size_t>("rows"))};
+  for (const nb::handle column : state.next<nb::list>("columns")) {
+    std::pair<std::string, nb::object> entry;
+    if (!nb::try_cast(column, entry, false)) state.refuse("columns", "has no name and array");
+    const auto& [name, array] = entry;
+    if (points.cloud.has(name)) state.refuse(name, "is there twice");
+    if (!add_any_column(PointCloud::AnyValues(), name, array, points.cloud))
+      state.refuse(name, fmt::format("must be an array of {} numbers", points.cloud.rows()));
+  }
+  return points;
 }
 
 }  // namespace groundray::python

@@ -4,6 +4,7 @@
 #include <vector>
 
 #include "apps/python/binding/arrays.h"
+#include "apps/python/binding/pickle.h"
 #include "core/io/point_cloud.h"
 
 namespace groundray::python {
@@ -32,5 +33,11 @@ AnyArray xyz_of(const Points& points);
 /// @param rows  what selects elements of a NumPy array of one dimension: a slice, a mask, indices.
 /// @throws IndexError of NumPy, or nanobind::type_error if that selects no array of rows.
 Points selected(const Points& points, nb::handle rows);
+
+/// Adds the two values of a table to the state of an object that `owner` keeps alive, and reads
+/// them.
+/// @throws Error naming the damaged column.
+void add_points(const Points& points, nb::handle owner, nb::list& state);
+Points read_points(PickledState& state);
 
 }  // namespace groundray::python

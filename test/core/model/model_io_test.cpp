@@ -240,6 +240,37 @@ TEST_F(ModelIo, MeshesWrittenByGroundrayRoundTripExactly) {
   }
 }
 
+TEST_F(ModelIo, TrianglesInMemoryGiveTheModelOfTheirFile) {
+  // The first vertex is unused, two are equal, and triangles refer to them out of order.
+  const TriangleMesh mesh{{{9, 9, 9}, {0, 0, 0}, {0.1, 0, 0}, {0, 1 / 3., 0}, {0, 0, 0}, {0, 0, 2}},
+                          {{3, 2, 1}, {4, 2, 5}, {5, 3, 4}},
+                          {}};
+  write_mesh(in("a.ply"), mesh, {});
+  const Model of_file = read_model(in("a.ply"), {}).model;
+  const Model model = model_from(mesh, "a mesh");
+  EXPECT_EQ(model.mesh.vertices_m, of_file.mesh.vertices_m);
+  EXPECT_EQ(model.mesh.vertices_m.size(), 4);
+  EXPECT_EQ(model.mesh.triangles, of_file.mesh.triangles);
+  EXPECT_EQ(model.surface_of, of_file.surface_of);
+  ASSERT_EQ(model.surfaces.size(), 1);
+  EXPECT_EQ(model.surfaces[0].name, of_file.surfaces[0].name);
+  EXPECT_TRUE(model.uv.empty() && model.normals.empty());
+}
+
+TEST_F(ModelIo, InvalidTrianglesInMemoryAreRejected) {
+  const std::vector<glm::dvec3> corners{{0, 0, 0}, {1, 0, 0}, {0, 1, 0}, {NAN, 0, 0}};
+  const auto message = [&](const glm::uvec3& triangle) {
+    return message_of([&] { model_from({corners, {{0, 1, 2}, triangle}, {}}, "a mesh"); });
+  };
+  EXPECT_THAT(message({0, 1, 9}), AllOf(HasSubstr("a mesh"), HasSubstr("missing vertex")));
+  EXPECT_THAT(message({0, 1, 3}), HasSubstr("1 polygons have a position or uv that is not finite"));
+  EXPECT_THAT(message({0, 1, 1}), HasSubstr("1 polygons or triangles have no area"));
+  EXPECT_THAT(message_of([&] {
+                model_from({corners, {}, {}}, "a mesh");
+              }),
+              HasSubstr("a mesh: there is no triangle"));
+}
+
 TEST_F(ModelIo, UnitsAndAxesComeFromTheFileOrTheCaller) {
   put("wedge.bin", wedge_binary());
   const std::string gltf = wedge_gltf(R"({"mesh":0})", bin_file);
