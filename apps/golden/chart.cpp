@@ -81,11 +81,15 @@ void add_across(const Axis& axis, const Frame& frame, Svg& svg) {
   svg.add_text(frame.left + frame.width / 2, frame.bottom() + 32, "middle", axis.label);
 }
 
+/// Returns the largest number of ticks of the vertical axis.
+int ticks_up(const Frame& frame) {
+  constexpr double px_each = 28;
+  return std::max(2, static_cast<int>(frame.height / px_each));
+}
+
 /// Adds the vertical axis; its label is centred at `label_x`.
 void add_up(const Axis& axis, const Frame& frame, double label_x, Svg& svg) {
-  constexpr double px_each = 35;
-  const auto most = std::max(2, static_cast<int>(frame.height / px_each));
-  const std::vector<double> ticks = ticks_between(axis.low, axis.high, most);
+  const std::vector<double> ticks = ticks_between(axis.low, axis.high, ticks_up(frame));
   for (const double tick : ticks) {
     const double y = frame.bottom() - frame.height * (tick - axis.low) / (axis.high - axis.low);
     svg.add_line(frame.left - tick_px, y, tick_px, 0, line_colour);
@@ -155,7 +159,7 @@ std::string histogram_svg(const Histogram& histogram) {
   Svg svg(510, 215, histogram.title);
   const auto& counts = histogram.counts;
   const std::uint64_t most = counts.empty() ? 0 : *std::ranges::max_element(counts);
-  for (const double tick : ticks_between(0, static_cast<double>(most), 5)) {
+  for (const double tick : ticks_between(0, static_cast<double>(most), ticks_up(frame))) {
     const double y = frame.bottom() - frame.height * tick / static_cast<double>(most);
     svg.add_line(frame.left, y, frame.width, 0, grid_colour);
   }

@@ -55,6 +55,24 @@ Json json_of(const Section& section) {
           {"histograms", json_of(section.histograms)}};
 }
 
+/// Returns the verdict as a sentence; empty if nothing had a limit.
+std::string verdict_sentence(const Section& section) {
+  const auto is_failed = [](const Measure& m) { return m.verdict == Verdict::Failed; };
+  const auto failures = std::ranges::count_if(section.measures, is_failed);
+  const auto held =
+      failures + std::ranges::count(section.measures, Verdict::Passed, &Measure::verdict);
+  if (held == 0) return {};
+  if (failures == 0)
+    return held == 1 ? "Passed: the limit is met."
+                     : fmt::format("Passed: all {} limits are met.", held);
+  const Measure& first = *std::ranges::find_if(section.measures, is_failed);
+  const std::string unit = first.unit.empty() ? "" : " " + first.unit;
+  std::string text = fmt::format("Failed: {} is {:.4g}{}", first.name, first.value, unit);
+  text += first.limit ? fmt::format(", but may be at most {:.4g}{}", *first.limit, unit)
+                      : fmt::format(" ({})", first.because);
+  return text + (failures == 1 ? "." : fmt::format("; {} of {} checks failed.", failures, held));
+}
+
 }  // namespace
 
 const char* word_of(Verdict verdict) {
@@ -70,21 +88,10 @@ Verdict verdict_of(const std::vector<Measure>& measures) {
   return any(Verdict::Passed) ? Verdict::Passed : Verdict::Told;
 }
 
-std::string verdict_sentence(const Section& section) {
-  const auto is_failed = [](const Measure& m) { return m.verdict == Verdict::Failed; };
-  const auto failures = std::ranges::count_if(section.measures, is_failed);
-  const auto held =
-      failures + std::ranges::count(section.measures, Verdict::Passed, &Measure::verdict);
-  if (held == 0) return "No limit was given, so there is no verdict.";
-  if (failures == 0)
-    return held == 1 ? "Passed: the limit is met."
-                     : fmt::format("Passed: all {} limits are met.", held);
-  const Measure& first = *std::ranges::find_if(section.measures, is_failed);
-  const std::string unit = first.unit.empty() ? "" : " " + first.unit;
-  std::string text = fmt::format("Failed: {} is {:.4g}{}", first.name, first.value, unit);
-  text += first.limit ? fmt::format(", but may be at most {:.4g}{}", *first.limit, unit)
-                      : fmt::format(" ({})", first.because);
-  return text + (failures == 1 ? "." : fmt::format("; {} of {} checks failed.", failures, held));
+std::string first_words(const Section& section) {
+  const std::string verdict = verdict_sentence(section);
+  if (verdict.empty()) return section.headline + " No limit was given, so there is no verdict.";
+  return section.headline.empty() ? verdict : verdict + " " + section.headline;
 }
 
 std::vector<Measure> main_measures(const Section& section) {

@@ -102,9 +102,9 @@ struct Report {
 /// Returns Failed if any measure failed, else Passed if any passed, else Told.
 Verdict verdict_of(const std::vector<Measure>& measures);
 
-/// Returns the verdict as a sentence, such as "Passed: all 3 limits are met." or "Failed: RMS is 2
-/// m, but may be at most 1 m."; states it if nothing had a limit.
-std::string verdict_sentence(const Section& section);
+/// Returns the verdict and the headline: "Failed: RMS is 2 m, but may be at most 1 m. The other's
+/// ..."; without limits, that there is no verdict follows the headline.
+std::string first_words(const Section& section);
 
 /// Returns the measures that `section.main` names, in its order; names without a measure are
 /// skipped.

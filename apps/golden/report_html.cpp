@@ -33,8 +33,8 @@ th, td { text-align: left; vertical-align: top; padding: .2rem .7rem .2rem 0;
   border-bottom: 1px solid #eaeef2; }
 th { font-weight: 600; border-bottom-color: #8c959f; }
 th.n { text-align: right; }
-td { overflow-wrap: anywhere; min-width: 2.5rem; }
-td.n { text-align: right; white-space: nowrap; overflow-wrap: normal; font-variant-numeric: tabular-nums; }
+td.long { overflow-wrap: anywhere; min-width: 9rem; }
+td.n { text-align: right; white-space: nowrap; font-variant-numeric: tabular-nums; }
 td.why, figcaption, .facts th { color: #57606a; }
 .text { white-space: pre-line; max-width: 60rem; }
 .v { white-space: nowrap; font-weight: 600; font-size: .85em; border-radius: .6em; padding: .05em .6em; }
@@ -91,7 +91,8 @@ class Page {
     if (report.facts.empty()) return;
     add("<div class=\"scroll\"><table class=\"facts\">\n");
     for (const auto& fact : report.facts)
-      add("<tr><th>{}</th><td>{}</td></tr>\n", escaped(fact.first), escaped(fact.second));
+      add("<tr><th>{}</th><td class=\"long\">{}</td></tr>\n", escaped(fact.first),
+          escaped(fact.second));
     add("</table></div>\n");
   }
 
@@ -117,8 +118,7 @@ class Page {
     add("<section id=\"s{}\">\n<h2>{} {}</h2>\n", index + 1, escaped(section.title),
         badge(section.verdict));
     if (!section.headline.empty()) {
-      add("<p class=\"headline\">{} {}</p>\n", escaped(verdict_sentence(section)),
-          escaped(section.headline));
+      add("<p class=\"headline\">{}</p>\n", escaped(first_words(section)));
     }
     section.main.empty() ? add_all(section) : add_by_weight(section);
     add("</section>\n");
@@ -137,10 +137,10 @@ class Page {
   void add_by_weight(const Section& section) {
     add_main(section);
     add_held(section);
+    add_text(section);
     add_pictures(section, {Shown::Errors});
     add_histograms(section);
-    add_text(section);
-    begin_details("All figures");
+    begin_details("Figures");
     add_told(section);
     end_details();
     if (!section.tables.empty()) {
@@ -230,16 +230,20 @@ class Page {
     for (const auto& row : table.rows) {
       add("<tr>");
       for (std::size_t i = 0; i < row.size(); ++i)
-        add("<td{}>{}</td>", i > 0 && is_short(row[i]) ? " class=\"n\"" : "", escaped(row[i]));
+        add("<td{}>{}</td>", i > 0 ? class_of(row[i]) : "", escaped(row[i]));
       add("</tr>\n");
     }
     add("</tbody>\n</table></div>\n");
   }
 
-  /// Returns true for numbers and short words, which are not broken into lines.
-  static bool is_short(const std::string& cell) {
-    constexpr std::size_t most = 16;
-    return cell.size() <= most;
+  /// Returns the class of a cell: numbers are aligned at the right and kept in one line, long texts
+  /// such as paths are broken anywhere.
+  static std::string_view class_of(std::string_view cell) {
+    constexpr std::size_t long_text = 24;
+    if (cell.size() > long_text) return " class=\"long\"";
+    const bool is_number = cell.empty() || cell.find_first_of("0123456789") <= 1 ||
+                           cell.starts_with("nan") || cell.starts_with("inf");
+    return is_number ? " class=\"n\"" : "";
   }
 
   void add_pictures(const Section& section, std::initializer_list<Shown> kinds) {

@@ -42,19 +42,21 @@ TEST(Report, OneFailedMeasureFailsTheSection) {
 }
 
 TEST(Report, VerdictsNameTheFirstFailure) {
-  Section section;
+  Section section{.headline = "They differ."};
   tell(section, "bias", 1, "m");
-  EXPECT_EQ(verdict_sentence(section), "No limit was given, so there is no verdict.");
+  EXPECT_EQ(first_words(section), "They differ. No limit was given, so there is no verdict.");
   hold(section, "RMS", 0.5, "m", 1, "given");
-  EXPECT_EQ(verdict_sentence(section), "Passed: the limit is met.");
+  EXPECT_EQ(first_words(section), "Passed: the limit is met. They differ.");
   hold(section, "largest", 0.75, "m", 1, "given");
-  EXPECT_EQ(verdict_sentence(section), "Passed: all 2 limits are met.");
+  EXPECT_EQ(first_words(section), "Passed: all 2 limits are met. They differ.");
   hold(section, "missing", 0.125, "", 0.1, "given");
-  EXPECT_EQ(verdict_sentence(section),
-            "Failed: missing is 0.125, but may be at most 0.1; 1 of 3 checks failed.");
+  EXPECT_EQ(first_words(section), "Failed: missing is 0.125, but may be at most 0.1. They differ.");
+  hold(section, "extra", 0.125, "", 0.1, "given");
+  EXPECT_EQ(first_words(section),
+            "Failed: missing is 0.125, but may be at most 0.1; 2 of 4 checks failed. They differ.");
   Section single;
   fail(single, "pairs", 0, "", "nothing is compared");
-  EXPECT_EQ(verdict_sentence(single), "Failed: pairs is 0 (nothing is compared).");
+  EXPECT_EQ(first_words(single), "Failed: pairs is 0 (nothing is compared).");
 }
 
 TEST(Report, MainFiguresKeepTheirOrder) {

@@ -220,7 +220,7 @@ void draw(const DemPair& pair, const glm::dvec3& origin_w_m, Section& into) {
   }
 }
 
-void write_headline(std::size_t samples, Section& into) {
+void write_dem_headline(std::size_t samples, Section& into) {
   into.main = {"height: mean error", "height: RMS error", std::string(nmad_name),
                "height: 95th percentile of its size", "height: largest error"};
   const std::vector<Measure> found = main_measures(into);
@@ -322,7 +322,7 @@ Section compare_dems(const Dem& reference, const Dem& other, const std::string& 
   tell_slopes(pair, section);
   suspect_shift(pair, samples, section);
   draw(pair, reference.origin_w_m, section);
-  write_headline(samples.size(), section);
+  write_dem_headline(samples.size(), section);
   section.verdict = verdict_of(section.measures);
   return section;
 }

@@ -266,22 +266,22 @@ void tell_reading(Section& into, const std::string& name, const MeshFile& file) 
     tell(into, name + ": coordinates rounded by up to", file.rounding_m, "m");
 }
 
-/// Warns if the largest distance is far beyond all others.
-void suspect_cover(const Way& there, const Way& back, const HausdorffDistance& both,
-                   Section& into) {
+/// Warns if the reference is far from the other at places, but not the other from the reference.
+void suspect_cover(const Way& there, const Way& back, Section& into) {
   constexpr double far = 10;
-  const double most_m = std::max(there.spread.percentile_m(0.95), back.spread.percentile_m(0.95));
-  const double gap_m = back.largest.at_least_m - there.largest.at_most_m;
-  if (!(both.at_least_m > far * most_m && gap_m > both.at_least_m / 2)) return;
+  const double most_m = there.spread.percentile_m(0.95);
+  if (!(back.largest.at_least_m > far * most_m &&
+        back.largest.at_least_m > 2 * there.largest.at_most_m))
+    return;
   into.text += fmt::format(
-      " The largest distance is {:.3g} times that which 95 % of the area does not exceed, and is "
-      "from the reference to the other: if the other does not cover all of the reference, compare "
-      "what it covers (--area, --ignore-beyond-m).",
-      both.at_least_m / most_m);
+      " THE OTHER SEEMS NOT TO COVER ALL OF THE REFERENCE: points of the reference are up to "
+      "{:.4g} m from it, though 95 % of its own area is within {:.2g} m of the reference. Restrict "
+      "the comparison to what it covers (--area, --ignore-beyond-m).",
+      back.largest.at_least_m, most_m);
 }
 
-void write_headline(const Way& there, const Way& back, const HausdorffDistance& both,
-                    const std::vector<double>& within_m, Section& into) {
+void write_mesh_headline(const Way& there, const Way& back, const HausdorffDistance& both,
+                         const std::vector<double>& within_m, Section& into) {
   into.headline = fmt::format(
       "The surfaces are at most {:.4g} m apart (Hausdorff distance); RMS {:.4g} m from the other "
       "to the reference, {:.4g} m from the reference to the other.",
@@ -338,8 +338,8 @@ Section compare_placed(const TriangleMesh& reference, const TriangleMesh& other,
   tell(section, "other: triangles", static_cast<double>(other.triangles.size()));
   tell(section, "reference: area", back.mean.area_m2, "m2");
   tell(section, "other: area", there.mean.area_m2, "m2");
-  suspect_cover(there, back, both, section);
-  write_headline(there, back, both, placed.fineness.within_m, section);
+  suspect_cover(there, back, section);
+  write_mesh_headline(there, back, both, placed.fineness.within_m, section);
   section.verdict = verdict_of(section.measures);
   return section;
 }

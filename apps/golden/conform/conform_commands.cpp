@@ -30,7 +30,7 @@ void publish(const Report& report, const fs::path& out) {
     }
     const std::vector<Measure> main = main_measures(section);
     if (!section.headline.empty()) {
-      print_text(stdout, "{} {}\n", verdict_sentence(section), section.headline);
+      print_text(stdout, "{}\n", first_words(section));
       std::ranges::for_each(main, print_measure);
       print_text(stdout, "\n");
     }

@@ -292,7 +292,7 @@ Section compare_scans(const Scan& reference, const Scan& other, const ScanOption
     add_sentences(section.text, notes);
   }
   if (options.scope.has_box() || options.scope.ignores())
-    section.text += " " + scope_text(options.scope, "the points in world coordinates");
+    section.text += " " + scope_text(options.scope, "the frame of the reference's points");
   tell_pairs(pairs, options.limits, section);
   tell_left_out(left, pairs, options.scope, section);
   if (pairs.returns.empty()) {
