@@ -129,7 +129,7 @@ constexpr double far = Scope::unbounded;
 TEST(MeshComparison, MeasuresDistancesWithinABox) {
   const TriangleMesh reference = sheet(10, 10, 0), other = sheet(6, 10, 0.1);
   const auto largest_m = [&](const Scope& scope) {
-    const Section section = compare_meshes(reference, other, "sheets", {}, scope);
+    const Section section = compare_meshes(reference, other, "sheets", {.step_m = 0.25}, scope);
     const double at_most_m = value_of(section, "Hausdorff distance, at most");
     EXPECT_NEAR(value_of(section, "Hausdorff distance, at least"), at_most_m, 2e-5);
     return at_most_m;
@@ -140,7 +140,7 @@ TEST(MeshComparison, MeasuresDistancesWithinABox) {
   for (const double end_m : {5.0, 6.0}) {
     const Scope scope = box({0.5, 1, -1}, {end_m, 9, 1});
     EXPECT_NEAR(largest_m(scope), 0.1, tolerance_m);
-    const Section section = compare_meshes(reference, other, "sheets", {}, scope);
+    const Section section = compare_meshes(reference, other, "sheets", {.step_m = 0.25}, scope);
     for (const char* way : {"other to reference", "reference to other"})
       EXPECT_NEAR(value_of(section, std::string(way) + ": RMS distance"), 0.1, 1e-9);
     for (const char* area : {"reference: area", "other: area"})
@@ -275,16 +275,18 @@ TEST_F(MeshFiles, WithoutAGeoreferenceAreShiftedByTheGivenOrigin) {
   const glm::dvec3 its_w_m = origin_w_m - glm::dvec3(7, -8, 9);
   constexpr double tolerance_m = 1e-6 * 35;  // relative to the diagonal, 20 sqrt(3) m
   const Section shifted =
-      compare_meshes(here, local, {}, {}, {.reference_w_m = {}, .other_w_m = its_w_m});
+      compare_meshes(here, local, {.step_m = 1}, {}, {.reference_w_m = {}, .other_w_m = its_w_m});
   EXPECT_LT(value_of(shifted, "Hausdorff distance, at most"), tolerance_m);
   EXPECT_THAT(shifted.text, Not(HasSubstr("has no georeference")));
   const Section swapped =
-      compare_meshes(local, here, {}, {}, {.reference_w_m = its_w_m, .other_w_m = {}});
+      compare_meshes(local, here, {.step_m = 1}, {}, {.reference_w_m = its_w_m, .other_w_m = {}});
   EXPECT_LT(value_of(swapped, "Hausdorff distance, at most"), tolerance_m);
-  EXPECT_THAT(compare_meshes(here, local).text, HasSubstr("(--origin gives its origin"));
+  EXPECT_THAT(compare_meshes(here, local, {.step_m = 1}).text,
+              HasSubstr("(--origin gives its origin"));
   // The upper hemisphere, by its heights in W.
-  const Section upper = compare_meshes(here, local, {}, box({-far, -far, 200}, {far, far, far}),
-                                       {.reference_w_m = {}, .other_w_m = its_w_m});
+  const Section upper =
+      compare_meshes(here, local, {.step_m = 1}, box({-far, -far, 200}, {far, far, far}),
+                     {.reference_w_m = {}, .other_w_m = its_w_m});
   EXPECT_NEAR(value_of(upper, "reference: area"), area_m2(ball) / 2, 1e-6);
   try {
     compare_meshes(here, local, {}, {}, {.reference_w_m = origin_w_m, .other_w_m = its_w_m});

@@ -1,3 +1,5 @@
+#define BOOST_ALLOW_DEPRECATED_HEADERS  // by Boost.Geometry itself
+
 #include "apps/golden/compare/scans/scan_scope.h"
 
 #include <algorithm>
