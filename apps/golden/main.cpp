@@ -2,30 +2,22 @@
 
 #include <CLI/CLI.hpp>
 #include <algorithm>
-#include <array>
 #include <cstdlib>
 #include <exception>
 #include <filesystem>
 #include <new>
-#include <optional>
 #include <string>
 #include <thread>
 #include <utility>
 #include <vector>
 
-#include "apps/golden/compare/dem_comparison.h"
-#include "apps/golden/compare/images/image_comparison.h"
-#include "apps/golden/compare/mesh_comparison.h"
-#include "apps/golden/compare/scans/scan_comparison.h"
-#include "apps/golden/compare/subject.h"
+#include "apps/golden/compare/compare_command.h"
 #include "apps/golden/conform/conform_commands.h"
 #include "apps/golden/report.h"
 #include "apps/golden/suite/checks.h"
 #include "apps/golden/suite/golden_case.h"
 #include "apps/golden/suite/suite.h"
-#include "apps/scan/scan_flags.h"
 #include "apps/scan/usage_fault.h"
-#include "apps/scan/word_option.h"
 #include "apps/scene/interruption.h"
 #include "apps/scene/simulation.h"
 #include "core/error.h"
@@ -40,160 +32,6 @@ namespace fs = std::filesystem;
 constexpr int done = 0;
 constexpr int failed = 1;
 constexpr int interrupted = 130;
-
-void add_dem_flags(CLI::App* group, const std::string& prefix, DemOptions& options) {
-  group->add_option("--" + prefix + "nodata", options.nodata,
-                    "Height that marks missing samples (nodata)");
-  group->add_option("--" + prefix + "reproject-to", options.reproject_to,
-                    "CRS to reproject to, such as EPSG:32631, or utm");
-}
-
-struct ImageFlags {
-  PngMeaning png = PngMeaning::Picture;
-  double depth_unit_m = 1;
-  std::vector<std::string> channels;
-
-  void add(CLI::App* group, const std::string& prefix) {
-    add_words(group, "--" + prefix + "png", png, "Meaning of a PNG's values",
-              Words<PngMeaning>{{"picture", PngMeaning::Picture},
-                                {"kitti_depth", PngMeaning::KittiDepth},
-                                {"millimetre_depth", PngMeaning::MillimetreDepth},
-                                {"kitti_flow", PngMeaning::KittiFlow},
-                                {"label", PngMeaning::Label}});
-    group->add_option("--" + prefix + "depth-unit-m", depth_unit_m, "Unit of depths, in metres")
-        ->check(CLI::PositiveNumber);
-    group
-        ->add_option("--" + prefix + "channels", channels,
-                     "THEIRS=OURS: maps channel names to those of docs/reference/formats.md")
-        ->delimiter(',');
-  }
-  ImageReading reading() const {
-    ImageReading reading{.png = png, .depth_unit_m = depth_unit_m, .names = {}};
-    for (const std::string& channel : channels) {
-      const std::size_t equals = channel.find('=');
-      if (equals == std::string::npos)
-        throw Error("--channels: '{}' must be THEIRS=OURS, such as nn.X=N.X", channel);
-      reading.names[channel.substr(0, equals)] = channel.substr(equals + 1);
-    }
-    return reading;
-  }
-};
-
-/// Command `compare`: compares a file with a reference and writes a report.
-struct CompareCommand {
-  fs::path reference, other;
-  fs::path out = "out/compare";
-  std::optional<Subject> subject;
-  std::array<ScanFlags, 2> scan;  // [0] other, [1] reference; likewise below
-  std::array<ImageFlags, 2> image;
-  DemReadings dem;
-  MeshFineness mesh;
-  PairingOptions pairing;
-  std::optional<double> tolerance_mrad;
-  ScanLimits limits;
-  Significance significance;
-
-  void add_scan(CLI::App* group) {
-    add_words(group, "--pair-by", pairing.rule, "Rule for pairing pulses",
-              Words<PairingRule>{{"best", PairingRule::Best},
-                                 {"pulse", PairingRule::Pulse},
-                                 {"ring_time", PairingRule::RingTime},
-                                 {"ring_azimuth", PairingRule::RingAzimuth},
-                                 {"direction", PairingRule::Direction}});
-    group
-        ->add_option("--pair-mrad", tolerance_mrad,
-                     "Largest angle between the directions of a pair")
-        ->check(CLI::PositiveNumber);
-    group
-        ->add_option("--pair-s", pairing.tolerance_s,
-                     "Largest difference between the times of a pair")
-        ->check(CLI::PositiveNumber);
-    group->add_option("--most-range-mean-m", limits.range_mean_m,
-                      "Fail if the magnitude of the mean range error is larger");
-    group->add_option("--most-range-rms-m", limits.range_rms_m,
-                      "Fail if the RMS range error is larger");
-    group->add_option("--most-range-p99-m", limits.range_p99_m,
-                      "Fail if the 99th percentile of range errors is larger");
-    group->add_option("--most-missing", limits.missing_share,
-                      "Fail if a larger fraction of returns is missing");
-    group->add_option("--most-extra", limits.extra_share,
-                      "Fail if a larger fraction of returns is extra");
-  }
-
-  Section compare() const {
-    switch (subject ? *subject : subject_of(reference, other)) {
-      case Subject::Scan: {
-        ScanOptions options{.reference = scan[1].reading(),
-                            .other = scan[0].reading(),
-                            .pairing = pairing,
-                            .limits = limits};
-        if (tolerance_mrad) options.pairing.tolerance_rad = *tolerance_mrad / 1000;
-        return compare_scans(reference, other, options);
-      }
-      case Subject::Image:
-        return compare_images(reference, other,
-                              {.reference = image[1].reading(),
-                               .other = image[0].reading(),
-                               .significance = significance});
-      case Subject::Dem:
-        return compare_dems(reference, other, dem);
-      case Subject::Mesh:
-        break;
-    }
-    return compare_meshes(reference, other, mesh);
-  }
-
-  void add_to(CLI::App* command) {
-    command->add_option("REFERENCE", reference, "File that is taken as the truth")->required();
-    command->add_option("OTHER", other, "File that is compared with it")->required();
-    add_words(command, "--as", subject, "Kind of both files, if their names do not show it",
-              Words<Subject>{{"scan", Subject::Scan},
-                             {"image", Subject::Image},
-                             {"dem", Subject::Dem},
-                             {"mesh", Subject::Mesh}});
-    command->add_option("-o,--output", out, "Folder for report.html and report.json")
-        ->capture_default_str();
-    CLI::App* scans = command->add_option_group("Scans");
-    scan[0].add(scans, "");
-    scan[1].add(scans, "reference-");
-    add_scan(scans);
-    CLI::App* images = command->add_option_group("Images");
-    image[0].add(images, "");
-    image[1].add(images, "reference-");
-    images
-        ->add_option("--share-beyond", significance.beyond_share,
-                     "Fraction of radiance values that may fail their test")
-        ->check(CLI::Range(0.0, 1.0));
-    CLI::App* dems = command->add_option_group("DEMs");
-    add_dem_flags(dems, "", dem.other);
-    add_dem_flags(dems, "reference-", dem.reference);
-    CLI::App* meshes = command->add_option_group("Meshes");
-    meshes
-        ->add_option("--tolerance-m", mesh.tolerance_m,
-                     "Permitted gap between the bounds of the largest distance")
-        ->check(CLI::PositiveNumber);
-    meshes->add_option("--step-m", mesh.step_m, "Spacing of the samples for mean distances")
-        ->check(CLI::PositiveNumber);
-    meshes
-        ->add_option("--within-m", mesh.within_m,
-                     "Report precision, completeness and F1 within this distance; may be repeated")
-        ->delimiter(',')
-        ->check(CLI::PositiveNumber);
-  }
-
-  /// Compares the files, prints the figures, and writes report.html and report.json.
-  Verdict run() const {
-    check_report_folder(out);
-    Report report{.title = "A comparison by groundray",
-                  .facts = {{"version", GROUNDRAY_VERSION},
-                            {"reference", reference.string()},
-                            {"other", other.string()}},
-                  .sections = {}};
-    report.sections.push_back(compare());
-    publish(report, out);
-    return report.sections.front().verdict;
-  }
-};
 
 fs::path own_folder() {
   std::error_code ignored;

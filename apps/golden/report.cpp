@@ -1,5 +1,7 @@
 #include "apps/golden/report.h"
 
+#include <fmt/format.h>
+
 #include <algorithm>
 #include <array>
 #include <cmath>
@@ -28,9 +30,9 @@ Json json_of(const Table& table) {
 }
 
 Json json_of(const Histogram& histogram) {
-  return {{"title", histogram.title}, {"unit", histogram.unit},     {"low", histogram.low},
-          {"high", histogram.high},   {"counts", histogram.counts}, {"below", histogram.below},
-          {"above", histogram.above}};
+  return {{"title", histogram.title}, {"unit", histogram.unit},      {"low", histogram.low},
+          {"high", histogram.high},   {"counts", histogram.counts},  {"below", histogram.below},
+          {"above", histogram.above}, {"counted", histogram.counted}};
 }
 
 Json json_of(const Section& section);
@@ -45,10 +47,30 @@ Json json_of(const std::vector<T>& all) {
 Json json_of(const Section& section) {
   return {{"title", section.title},
           {"verdict", word_of(section.verdict)},
+          {"headline", section.headline},
+          {"main", section.main},
           {"text", section.text},
           {"measures", json_of(section.measures)},
           {"tables", json_of(section.tables)},
           {"histograms", json_of(section.histograms)}};
+}
+
+/// Returns the verdict as a sentence; empty if nothing had a limit.
+std::string verdict_sentence(const Section& section) {
+  const auto is_failed = [](const Measure& m) { return m.verdict == Verdict::Failed; };
+  const auto failures = std::ranges::count_if(section.measures, is_failed);
+  const auto held =
+      failures + std::ranges::count(section.measures, Verdict::Passed, &Measure::verdict);
+  if (held == 0) return {};
+  if (failures == 0)
+    return held == 1 ? "Passed: the limit is met."
+                     : fmt::format("Passed: all {} limits are met.", held);
+  const Measure& first = *std::ranges::find_if(section.measures, is_failed);
+  const std::string unit = first.unit.empty() ? "" : " " + first.unit;
+  std::string text = fmt::format("Failed: {} is {:.4g}{}", first.name, first.value, unit);
+  text += first.limit ? fmt::format(", but may be at most {:.4g}{}", *first.limit, unit)
+                      : fmt::format(" ({})", first.because);
+  return text + (failures == 1 ? "." : fmt::format("; {} of {} checks failed.", failures, held));
 }
 
 }  // namespace
@@ -64,6 +86,21 @@ Verdict verdict_of(const std::vector<Measure>& measures) {
   };
   if (any(Verdict::Failed)) return Verdict::Failed;
   return any(Verdict::Passed) ? Verdict::Passed : Verdict::Told;
+}
+
+std::string first_words(const Section& section) {
+  const std::string verdict = verdict_sentence(section);
+  if (verdict.empty()) return section.headline + " No limit was given, so there is no verdict.";
+  return section.headline.empty() ? verdict : verdict + " " + section.headline;
+}
+
+std::vector<Measure> main_measures(const Section& section) {
+  std::vector<Measure> result;
+  for (const std::string& name : section.main) {
+    const auto found = std::ranges::find(section.measures, name, &Measure::name);
+    if (found != section.measures.end()) result.push_back(*found);
+  }
+  return result;
 }
 
 void tell(Section& into, std::string name, double value, std::string unit) {

@@ -12,6 +12,8 @@
 #include <utility>
 #include <vector>
 
+#include "apps/golden/chart.h"
+#include "apps/golden/html_text.h"
 #include "apps/golden/report.h"
 #include "core/image/png_io.h"
 #include "core/io/file_io.h"
@@ -31,6 +33,7 @@ th, td { text-align: left; vertical-align: top; padding: .2rem .7rem .2rem 0;
   border-bottom: 1px solid #eaeef2; }
 th { font-weight: 600; border-bottom-color: #8c959f; }
 th.n { text-align: right; }
+td.long { overflow-wrap: anywhere; min-width: 9rem; }
 td.n { text-align: right; white-space: nowrap; font-variant-numeric: tabular-nums; }
 td.why, figcaption, .facts th { color: #57606a; }
 .text { white-space: pre-line; max-width: 60rem; }
@@ -39,60 +42,28 @@ td.why, figcaption, .facts th { color: #57606a; }
 .told { color: #57606a; background: #eaeef2; }
 .row { display: flex; flex-wrap: wrap; gap: .6rem 2.4rem; align-items: flex-start; }
 .small { max-width: 24rem; }
+.scroll { overflow-x: auto; max-width: 100%; }
+.headline { font-size: 1.15rem; max-width: 60rem; }
+.cards { display: flex; flex-wrap: wrap; gap: .7rem; margin: 1rem 0; }
+.card { border: 1px solid #d0d7de; border-radius: .5rem; padding: .5rem .9rem; max-width: 15rem; }
+.card b { display: block; font-size: 1.35rem; font-variant-numeric: tabular-nums; }
+.card.failed { border-color: #9b1420; }
+.card span { color: #57606a; font-size: .87em; }
+.card.failed span { color: inherit; }
+details { margin: .8rem 0; } summary { cursor: pointer; font-weight: 600; }
 figure { margin: .6rem 0; max-width: 100%; }
 figure img { max-width: 100%; min-width: 15rem; border: 1px solid #d0d7de; image-rendering: pixelated; }
 figcaption { font-size: .87em; max-width: 34rem; }
-svg { max-width: 100%; height: auto; } svg text { font-family: system-ui, sans-serif; }
+svg { max-width: 100%; height: auto; } svg image { image-rendering: pixelated; } svg text { font-family: system-ui, sans-serif; }
 @media print { body { margin: 0; max-width: none; font-size: 10pt; }
-  figure, tr, svg, .small { break-inside: avoid; } h2, h3 { break-after: avoid; }
+  figure, tr, svg, .small, .card { break-inside: avoid; } h2, h3 { break-after: avoid; }
   .v { border: 1px solid currentColor; } }
 )";
-
-std::string escaped(std::string_view text) {
-  constexpr std::string_view special = "&<>\"'";
-  constexpr std::array entities{"&amp;", "&lt;", "&gt;", "&quot;", "&#39;"};
-  std::string result;
-  for (const char c : text) {
-    if (const std::size_t place = special.find(c); place != std::string_view::npos) {
-      result += entities[place];
-    } else {  // HTML permits no other control characters
-      result += static_cast<unsigned char>(c) < ' ' && c != '\n' && c != '\t' ? ' ' : c;
-    }
-  }
-  return result;
-}
-
-std::string number(double value) {
-  if (std::isnan(value)) return "not a number";
-  if (std::isinf(value)) return value < 0 ? "−∞" : "∞";
-  std::string text = value == std::floor(value) && std::abs(value) < 1e9
-                         ? fmt::format("{:.0f}", value)
-                         : fmt::format("{:.5g}", value);
-  if (text == "-0") text = "0";
-  if (text.starts_with('-')) text.replace(0, 1, "−");
-  return text;
-}
 
 std::string badge(Verdict verdict) {
   constexpr std::array texts{"passed", "FAILED", "for information"};
   return fmt::format("<span class=\"v {}\">{}</span>", word_of(verdict),
                      texts[static_cast<std::size_t>(verdict)]);
-}
-
-std::string base64(std::string_view bytes) {
-  constexpr std::string_view digits =
-      "ABCDEFGHIJKLMNOPQRSTUVWXYZabcdefghijklmnopqrstuvwxyz0123456789+/";
-  std::string result;
-  result.reserve((bytes.size() + 2) / 3 * 4);
-  for (std::size_t i = 0; i < bytes.size(); i += 3) {
-    const std::size_t count = std::min<std::size_t>(3, bytes.size() - i);
-    std::uint32_t group = 0;
-    for (std::size_t k = 0; k < 3; ++k)
-      group = group << 8 | (k < count ? static_cast<unsigned char>(bytes[i + k]) : 0u);
-    for (std::size_t k = 0; k < 4; ++k)
-      result += k <= count ? digits[group >> (18 - 6 * k) & 63] : '=';
-  }
-  return result;
 }
 
 /// Builds the page part by part.
@@ -118,15 +89,17 @@ class Page {
 
   void add_facts(const Report& report) {
     if (report.facts.empty()) return;
-    add("<table class=\"facts\">\n");
+    add("<div class=\"scroll\"><table class=\"facts\">\n");
     for (const auto& fact : report.facts)
-      add("<tr><th>{}</th><td>{}</td></tr>\n", escaped(fact.first), escaped(fact.second));
-    add("</table>\n");
+      add("<tr><th>{}</th><td class=\"long\">{}</td></tr>\n", escaped(fact.first),
+          escaped(fact.second));
+    add("</table></div>\n");
   }
 
   void add_summary(const Report& report) {
-    if (report.sections.empty()) return;
-    add("<table>\n<thead><tr><th>what</th><th>verdict</th><th>figures within their limits</th>"
+    if (report.sections.size() < 2) return;
+    add("<div class=\"scroll\"><table>\n<thead><tr><th>what</th><th>verdict</th><th>figures within "
+        "their limits</th>"
         "</tr></thead>\n<tbody>\n");
     for (std::size_t i = 0; i < report.sections.size(); ++i) {
       const Section& section = report.sections[i];
@@ -138,48 +111,98 @@ class Page {
           escaped(section.title), badge(section.verdict),
           passed + failed > 0 ? fmt::format("{} of {}", passed, passed + failed) : "");
     }
-    add("</tbody>\n</table>\n");
+    add("</tbody>\n</table></div>\n");
   }
 
   void add_section(const Section& section, std::size_t index) {
     add("<section id=\"s{}\">\n<h2>{} {}</h2>\n", index + 1, escaped(section.title),
         badge(section.verdict));
-    if (!section.text.empty()) add("<p class=\"text\">{}</p>\n", escaped(section.text));
-    add_measures(section);
-    for (const Table& table : section.tables) add_table(table);
-    add_figures(section);
+    if (!section.headline.empty()) {
+      add("<p class=\"headline\">{}</p>\n", escaped(first_words(section)));
+    }
+    section.main.empty() ? add_all(section) : add_by_weight(section);
     add("</section>\n");
   }
 
-  /// Adds figures with a limit or verdict in one table, the others in small tables by the prefix of
-  /// their names.
-  void add_measures(const Section& section) {
-    const auto is_held = [](const Measure& measure) {
-      return measure.limit || measure.verdict != Verdict::Told;
-    };
-    if (std::ranges::any_of(section.measures, is_held)) {
-      add("<table>\n<thead><tr><th>figure</th><th class=\"n\">value</th><th></th>"
-          "<th class=\"n\">at most</th><th>verdict</th><th>where the limit comes from</th></tr>"
-          "</thead>\n<tbody>\n");
-      for (const Measure& measure : section.measures) {
-        if (is_held(measure)) add_held(measure);
-      }
-      add("</tbody>\n</table>\n");
+  void add_all(const Section& section) {
+    add_text(section);
+    add_held(section);
+    add_told(section);
+    for (const Table& table : section.tables) add_table(table);
+    add_pictures(section, {Shown::Errors, Shown::Data});
+    add_histograms(section);
+  }
+
+  /// Adds what matters most first, and the rest collapsed.
+  void add_by_weight(const Section& section) {
+    add_main(section);
+    add_held(section);
+    add_text(section);
+    add_pictures(section, {Shown::Errors});
+    add_histograms(section);
+    begin_details("Figures");
+    add_told(section);
+    end_details();
+    if (!section.tables.empty()) {
+      begin_details("Tables");
+      for (const Table& table : section.tables) add_table(table);
+      end_details();
     }
-    std::vector<Measure> told;
-    std::ranges::remove_copy_if(section.measures, std::back_inserter(told), is_held);
-    add_told(told);
+    if (std::ranges::find(section.pictures, Shown::Data, &Picture::shown) == section.pictures.end())
+      return;
+    begin_details("Pictures of the data");
+    add_pictures(section, {Shown::Data});
+    end_details();
+  }
+
+  void begin_details(std::string_view summary) {
+    add("<details>\n<summary>{}</summary>\n", summary);
+  }
+
+  void end_details() { add("</details>\n"); }
+
+  void add_text(const Section& section) {
+    if (!section.text.empty()) add("<p class=\"text\">{}</p>\n", escaped(section.text));
+  }
+
+  void add_main(const Section& section) {
+    add("<div class=\"cards\">\n");
+    for (const Measure& measure : main_measures(section)) {
+      add("<div class=\"card{}\"><b>{}{}{}</b><span>{}</span></div>\n",
+          measure.verdict == Verdict::Failed ? " failed" : "", number_text(measure.value),
+          measure.unit.empty() ? "" : " ", escaped(measure.unit), escaped(measure.name));
+    }
+    add("</div>\n");
+  }
+
+  static bool is_held(const Measure& measure) {
+    return measure.limit || measure.verdict != Verdict::Told;
+  }
+
+  /// Adds a table of the figures with a limit or verdict.
+  void add_held(const Section& section) {
+    if (std::ranges::none_of(section.measures, is_held)) return;
+    add("<div class=\"scroll\"><table>\n<thead><tr><th>figure</th><th class=\"n\">value</th>"
+        "<th></th><th class=\"n\">at most</th><th>verdict</th><th>where the limit comes from</th>"
+        "</tr></thead>\n<tbody>\n");
+    for (const Measure& measure : section.measures) {
+      if (is_held(measure)) add_held(measure);
+    }
+    add("</tbody>\n</table></div>\n");
   }
 
   void add_held(const Measure& measure) {
     add("<tr><td>{}</td><td class=\"n\">{}</td><td>{}</td><td class=\"n\">{}</td><td>{}</td>"
         "<td class=\"why\">{}</td></tr>\n",
-        escaped(measure.name), number(measure.value), escaped(measure.unit),
-        measure.limit ? number(*measure.limit) : "", badge(measure.verdict),
+        escaped(measure.name), number_text(measure.value), escaped(measure.unit),
+        measure.limit ? number_text(*measure.limit) : "", badge(measure.verdict),
         escaped(measure.because));
   }
 
-  void add_told(const std::vector<Measure>& told) {
+  /// Adds the other figures in small tables by the prefix of their names.
+  void add_told(const Section& section) {
+    std::vector<Measure> told;
+    std::ranges::remove_copy_if(section.measures, std::back_inserter(told), is_held);
     if (told.empty()) return;
     add("<div class=\"row\">\n");
     std::optional<std::string> subject;
@@ -194,77 +217,62 @@ class Page {
         subject = of;
       }
       add("<tr><td>{}</td><td class=\"n\">{}</td><td>{}</td></tr>\n",
-          escaped(has_subject ? measure.name.substr(end + 2) : measure.name), number(measure.value),
-          escaped(measure.unit));
+          escaped(has_subject ? measure.name.substr(end + 2) : measure.name),
+          number_text(measure.value), escaped(measure.unit));
     }
     add("</tbody></table>\n</div>\n");
   }
 
   void add_table(const Table& table) {
-    add("<h3>{}</h3>\n<table>\n<thead><tr>", escaped(table.title));
+    add("<h3>{}</h3>\n<div class=\"scroll\"><table>\n<thead><tr>", escaped(table.title));
     for (const std::string& column : table.columns) add("<th>{}</th>", escaped(column));
     add("</tr></thead>\n<tbody>\n");
     for (const auto& row : table.rows) {
       add("<tr>");
       for (std::size_t i = 0; i < row.size(); ++i)
-        add("<td{}>{}</td>", i > 0 ? " class=\"n\"" : "", escaped(row[i]));
+        add("<td{}>{}</td>", i > 0 ? class_of(row[i]) : "", escaped(row[i]));
       add("</tr>\n");
     }
-    add("</tbody>\n</table>\n");
+    add("</tbody>\n</table></div>\n");
   }
 
-  void add_figures(const Section& section) {
-    if (!section.pictures.empty()) {
-      add("<div class=\"row\">\n");
-      for (const Picture& picture : section.pictures) {
-        add("<figure><img alt=\"{0}\" src=\"data:image/png;base64,{1}\"/>"
-            "<figcaption>{0}</figcaption></figure>\n",
-            escaped(picture.caption), base64(png_bytes(picture.image, picture.caption)));
-      }
-      add("</div>\n");
-    }
-    if (section.histograms.empty()) return;
+  /// Returns the class of a cell: numbers are aligned at the right and kept in one line, long texts
+  /// such as paths are broken anywhere.
+  static std::string_view class_of(std::string_view cell) {
+    constexpr std::size_t long_text = 24;
+    if (cell.size() > long_text) return " class=\"long\"";
+    const bool is_number = cell.empty() || cell.find_first_of("0123456789") <= 1 ||
+                           cell.starts_with("nan") || cell.starts_with("inf");
+    return is_number ? " class=\"n\"" : "";
+  }
+
+  void add_pictures(const Section& section, std::initializer_list<Shown> kinds) {
     add("<div class=\"row\">\n");
-    for (const Histogram& histogram : section.histograms) add_histogram(histogram);
+    for (const Shown kind : kinds) {
+      for (const Picture& picture : section.pictures) {
+        if (picture.shown == kind) add_picture(picture);
+      }
+    }
     add("</div>\n");
   }
 
-  void add_histogram(const Histogram& histogram) {
-    constexpr double left = 52, top = 10, width = 420, height = 140;
-    const auto& counts = histogram.counts;
-    const std::uint64_t most = counts.empty() ? 0 : *std::ranges::max_element(counts);
-    add("<figure><svg width=\"490\" height=\"190\" viewBox=\"0 0 490 190\" role=\"img\" "
-        "xmlns=\"http://www.w3.org/2000/svg\">\n<title>{}</title>\n<path fill=\"#2f6f9f\" d=\"",
-        escaped(histogram.title));
-    const double step = width / static_cast<double>(std::max<std::size_t>(counts.size(), 1));
-    for (std::size_t i = 0; i < counts.size(); ++i) {
-      if (counts[i] == 0) continue;
-      const double tall = height * static_cast<double>(counts[i]) / static_cast<double>(most);
-      add("M{:.2f} {:.2f}v-{:.2f}h{:.2f}v{:.2f}z", left + step * static_cast<double>(i),
-          top + height, tall, step * 0.92, tall);
+  void add_picture(const Picture& picture) {
+    const std::string caption = escaped(picture.caption);
+    if (picture.across || picture.up || picture.bar) {
+      add("<figure>{}<figcaption>{}</figcaption></figure>\n", picture_svg(picture), caption);
+      return;
     }
-    add("\"/>\n<path stroke=\"#8c959f\" fill=\"none\" d=\"M{0} {1}v{2}h{3}\"/>\n", left, top,
-        height, width);
-    add_label(left - 5, top + 8, "end", fmt::format("{}", most));
-    add_label(left - 5, top + height, "end", "0");
-    const std::array<double, 3> marks{
-        histogram.low, histogram.low + (histogram.high - histogram.low) / 2, histogram.high};
-    constexpr std::array anchors{"start", "middle", "end"};
-    for (std::size_t i = 0; i < marks.size(); ++i) {
-      add_label(left + width * static_cast<double>(i) / 2, top + height + 15, anchors[i],
-                number(marks[i]) + (histogram.unit.empty() ? "" : " " + histogram.unit));
-    }
-    if (histogram.below > 0)
-      add_label(left, top + height + 31, "start", fmt::format("{} below", histogram.below));
-    if (histogram.above > 0)
-      add_label(left + width, top + height + 31, "end", fmt::format("{} above", histogram.above));
-    add("</svg>\n<figcaption>{}</figcaption></figure>\n", escaped(histogram.title));
+    add("<figure><img alt=\"{0}\" src=\"data:image/png;base64,{1}\"/>"
+        "<figcaption>{0}</figcaption></figure>\n",
+        caption, base64(png_bytes(picture.image, picture.caption)));
   }
 
-  void add_label(double x, double y, std::string_view anchor, const std::string& text) {
-    add("<text x=\"{:.1f}\" y=\"{:.1f}\" font-size=\"11\" fill=\"#57606a\" "
-        "text-anchor=\"{}\">{}</text>\n",
-        x, y, anchor, escaped(text));
+  void add_histograms(const Section& section) {
+    if (section.histograms.empty()) return;
+    add("<div class=\"row\">\n");
+    for (const Histogram& histogram : section.histograms)
+      add("<figure>{}</figure>\n", histogram_svg(histogram));
+    add("</div>\n");
   }
 
   std::string html_;

@@ -268,6 +268,8 @@ class Reader {
     scan_.frame = fmt::format("Points of {} are {}, x forward, y left, z up.", scan_.name,
                               X_FS == none ? "taken as in the sensor's frame"
                                            : "transformed to the sensor's frame by its pose");
+    scan_.X_WS = {.rotation = X_FS.rotation,
+                  .translation_m = X_FS.translation_m + reading_.origin_w_m};
     return X_FS == none ? none : inverse(X_FS);
   }
 

@@ -24,6 +24,7 @@ struct ScanReading {
   std::optional<double> time_unit_s;       ///< default: by the column's name, or s for floats
   std::chrono::nanoseconds time_zero{};    ///< reading of the file's clock at the scan's stamp
   std::variant<Pose, FileViewpoint> X_FS;  ///< pose of the sensor in the points' frame, metres
+  glm::dvec3 origin_w_m{0};                ///< origin of the points' frame in W; its axes are W's
   std::vector<std::string> columns;        ///< names for unnamed columns, as read_cloud
 };
 
@@ -71,6 +72,7 @@ struct Scan {
   std::vector<std::string> unused;  ///< columns that were not recognised or not needed
   std::vector<std::string> notes;   ///< sentences for the user
   std::string frame;                ///< sentence about the points' frame
+  Pose X_WS;                        ///< of the sensor, as far as pose and origin are given
 
   /// Returns the values of the returns, or null if the file has none.
   const std::vector<double>* find(Quantity quantity) const {

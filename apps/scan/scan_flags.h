@@ -22,6 +22,8 @@ class ScanFlags {
   /// @throws Error if the pose's quaternion is not of length 1, or the time zero is out of range.
   ScanReading reading() const;
 
+  bool has_pose() const { return !pose_.empty(); }
+
  private:
   std::string whose_;  // the prefix
   double unit_m_ = 1;

@@ -321,6 +321,135 @@ def test_light_that_is_not_a_number_fails(tmp_path):
     assert "FAILED RGB: values that could be tested: 0 of 1800" in result.stdout
 
 
+def sheet(path, x_m, y_m, z_m, shift_m=(0, 0, 0)):
+    """A level rectangle from (0, 0) to (x, y), then shifted."""
+    corners = np.array([(0, 0, z_m), (x_m, 0, z_m), (x_m, y_m, z_m), (0, y_m, z_m)]) + shift_m
+    trimesh.Trimesh(corners, [(0, 1, 2), (0, 2, 3)], process=False).export(path)
+    return path
+
+
+def test_a_region_of_meshes_excludes_what_was_never_scanned(tmp_path):
+    """Sheets 0.1 m apart, of which the other ends 4 m before the reference does."""
+    reference, other = (sheet(tmp_path / f"{x}.ply", x, 10, z) for x, z in ((10, 0), (6, 0.1)))
+    largest = "Hausdorff distance, at most"
+    step = ["--step-m", 0.05]
+    whole, section, result = figures(reference, other, *step, out=tmp_path / "out")
+    assert whole[largest] == pytest.approx(np.hypot(4, 0.1), abs=1e-4)
+    assert "(--area, --ignore-beyond-m)" in section["text"]
+    assert result.stdout.startswith(section["headline"] + " No limit was given")
+    part, section, _ = figures(
+        reference, other, *step, "--area", 0, 0, 5, 10, "--heights-m", -1, 1, out=tmp_path / "out"
+    )
+    assert part[largest] == pytest.approx(0.1, abs=1e-4)
+    assert "at most 0.1 m apart" in section["headline"]
+    assert set(section["main"]) <= part.keys()
+    assert len(section["main"]) == 5
+    near, _, _ = figures(reference, other, *step, "--ignore-beyond-m", 0.5, out=tmp_path / "out")
+    left_out = "reference: left out, farther than 0.5 m from the other surface, share"
+    assert near[left_out] == pytest.approx(10 * (4 - np.sqrt(0.5**2 - 0.1**2)), abs=0.1)
+    assert near[largest] < 0.6
+
+
+def test_an_origin_makes_local_coordinates_comparable(tmp_path):
+    """STL has floats, in which world coordinates would be off by up to 0.25 m."""
+    origin = (435_000, 5_150_500, 200)
+    reference = sheet(tmp_path / "world.obj", 10, 10, 0, origin)
+    other = sheet(tmp_path / "local.stl", 10, 10, 0.125)
+    given = ["--reference-origin", "0,0,0", "--origin", ",".join(map(str, origin))]
+    place = ["--area", "435001,5150501,435009,5150509", "--step-m", 0.1]
+    figure, _, _ = figures(reference, other, *given, *place, out=tmp_path / "out")
+    assert figure["Hausdorff distance, at most"] == pytest.approx(0.125, abs=1e-4)
+    assert figure["reference: area"] == pytest.approx(64, rel=1e-6)
+    for wrong in ("nan,0,0", "1,2"):
+        result = compare(reference, other, "--origin", wrong, out=tmp_path / "bad")
+        assert result.returncode in (1, 2)
+        assert "--origin" in result.stderr + result.stdout
+
+
+def test_scans_in_world_coordinates_are_placed_by_origin_and_pose(scan, tmp_path):
+    """The sensor stands at (435010, 5150520, 200); the other's file is relative to an origin."""
+    direction, range_m, ring = scan
+    points = direction * range_m[:, None]
+    reference = write_ply(tmp_path / "sensor.ply", points, ring=ring)
+    other = write_ply(tmp_path / "local.ply", points + np.array([10, 20, 0]), ring=ring)
+    sensor = "435010,5150520,200"
+    options = [
+        *("--reference-origin", sensor, "--origin", "435000,5150500,200"),
+        *("--sensor-pose", f"{sensor},0,0,0,1"),
+    ]
+    figure, _, _ = figures(reference, other, *options, out=tmp_path / "out")
+    assert figure["pairs of returns"] == len(points)
+    assert figure["range error, largest magnitude"] < 1e-5
+    east = ["--area", 435010.01, 5150000, 436000, 5151000]  # no beam is that close to the border
+    half, _, _ = figures(reference, other, *options, *east, out=tmp_path / "out")
+    assert half["pairs of returns"] == np.count_nonzero(points[:, 0] > 0.01)
+
+
+def test_a_region_of_dems_is_in_their_reference_system(tmp_path):
+    """The north-west quarter of a DEM of which another is lifted by 0.25 m."""
+    lifted = tmp_path / "other.tif"
+    translate = ["gdal_translate", "-q", "-of", "GTiff", "-ot", "Float64"]
+    subprocess.run([*translate, "-a_offset", "0.25", DEM, lifted], check=True)
+    info = json.loads(subprocess.check_output(["gdalinfo", "-json", DEM]))
+    west, step, _, north, _, _ = info["geoTransform"]
+    columns, rows = info["size"]
+    size_m = np.array([columns, rows]) // 2 * step
+    area = [west, north - size_m[1], west + size_m[0], north]
+    figure, _, _ = figures(DEM, lifted, "--area", *area, out=tmp_path / "out")
+    assert figure["samples that both have"] == (columns // 2) * (rows // 2)
+    assert figure["height: mean error"] == pytest.approx(0.25, abs=1e-6)
+
+
+def test_a_rectangle_of_pixels_is_compared(tmp_path):
+    depth = np.random.default_rng(3).uniform(2, 30, (40, 60))
+    reference = write_exr(tmp_path / "reference.exr", Z=depth)
+    depth[:, 30:] += 1
+    other = write_exr(tmp_path / "other.exr", Z=depth)
+    left, section, _ = figures(reference, other, "--pixels", 5, 5, 25, 30, out=tmp_path / "out")
+    assert left["Z: in both"] == 25 * 30
+    assert left["Z: largest error"] == 0
+    assert section["headline"] == "All values that both images have are equal."
+    result = compare(reference, other, "--pixels", 50, 0, 11, 40, out=tmp_path / "bad")
+    assert result.returncode == 1
+    assert "must be COLUMN ROW WIDTH HEIGHT within the image of 60 x 40 px" in result.stderr
+
+
+@pytest.mark.parametrize(
+    ("options", "expected"),
+    [
+        (["--pixels", 0, 0, 1, 1], "--pixels is for images: omit it"),
+        (["--area", 5, 0, 1, 1], "must be W S E N, metres, with W < E and S < N"),
+        (["--area", 0, 0, "nan", 1], "must be W S E N"),
+        (["--heights-m", 2, 1], "must be LOW HIGH, metres, with LOW < HIGH"),
+        (["--area", 500, 500, 501, 501], "are outside the area and heights"),
+    ],
+)
+def test_invalid_regions_are_rejected(options, expected, scan, tmp_path):
+    direction, range_m, ring = scan
+    reference = write_ply(tmp_path / "reference.ply", direction * range_m[:, None], ring=ring)
+    result = compare(reference, reference, *options, out=tmp_path / "out")
+    assert result.returncode == 1
+    assert expected in result.stderr
+    assert not (tmp_path / "out").exists()
+
+
+def test_reports_are_self_contained_and_show_where_errors_are(scan, tmp_path):
+    direction, range_m, ring = scan
+    reference = write_ply(tmp_path / "reference.ply", direction * range_m[:, None], ring=ring)
+    range_m = np.where(ring == 3, range_m + 0.05, range_m)
+    other = write_ply(tmp_path / "other.ply", direction * range_m[:, None], ring=ring)
+    _, section, _ = figures(reference, other, "--most-range-rms-m", 0.1, out=tmp_path / "out")
+    html = (tmp_path / "out/report.html").read_text()
+    for part in (
+        *("Passed: the limit is met.", section["headline"], "azimuth, deg", "ring", "y, m"),
+        *("range error, m", "<details>"),
+    ):
+        assert part.replace("'", "&#39;") in html
+    assert html.index('class="cards"') < html.index("<image ") < html.index("<details>")
+    for absent in ("<script", "<link", 'src="http', 'href="http'):
+        assert absent not in html
+
+
 def test_images_of_different_sizes_are_rejected(tmp_path):
     a = write_exr(tmp_path / "a.exr", Z=np.ones((4, 5)))
     b = write_exr(tmp_path / "b.exr", Z=np.ones((5, 4)))

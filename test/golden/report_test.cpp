@@ -11,6 +11,7 @@
 #include <set>
 #include <string_view>
 
+#include "apps/golden/chart.h"
 #include "core/error.h"
 #include "core/image/image_io.h"
 #include "core/io/file_io.h"
@@ -22,7 +23,9 @@ namespace {
 using groundray::testing::TemporaryFolder;
 using ::testing::ElementsAre;
 using ::testing::HasSubstr;
+using ::testing::IsEmpty;
 using ::testing::Not;
+using ::testing::SizeIs;
 
 constexpr double infinity = std::numeric_limits<double>::infinity();
 constexpr double nan = std::numeric_limits<double>::quiet_NaN();
@@ -36,6 +39,60 @@ TEST(Report, OneFailedMeasureFailsTheSection) {
   EXPECT_EQ(verdict_of({told, told}), Verdict::Told);
   EXPECT_EQ(verdict_of({told, passed}), Verdict::Passed);
   EXPECT_EQ(verdict_of({passed, failed, told}), Verdict::Failed);
+}
+
+TEST(Report, VerdictsNameTheFirstFailure) {
+  Section section{.headline = "They differ."};
+  tell(section, "bias", 1, "m");
+  EXPECT_EQ(first_words(section), "They differ. No limit was given, so there is no verdict.");
+  hold(section, "RMS", 0.5, "m", 1, "given");
+  EXPECT_EQ(first_words(section), "Passed: the limit is met. They differ.");
+  hold(section, "largest", 0.75, "m", 1, "given");
+  EXPECT_EQ(first_words(section), "Passed: all 2 limits are met. They differ.");
+  hold(section, "missing", 0.125, "", 0.1, "given");
+  EXPECT_EQ(first_words(section), "Failed: missing is 0.125, but may be at most 0.1. They differ.");
+  hold(section, "extra", 0.125, "", 0.1, "given");
+  EXPECT_EQ(first_words(section),
+            "Failed: missing is 0.125, but may be at most 0.1; 2 of 4 checks failed. They differ.");
+  Section single;
+  fail(single, "pairs", 0, "", "nothing is compared");
+  EXPECT_EQ(first_words(single), "Failed: pairs is 0 (nothing is compared).");
+}
+
+TEST(Report, MainFiguresKeepTheirOrder) {
+  Section section{.main = {"b", "none", "a"}};
+  tell(section, "a", 1);
+  tell(section, "b", 2);
+  const std::vector<Measure> found = main_measures(section);
+  ASSERT_EQ(found.size(), 2u);
+  EXPECT_EQ(found[0].name, "b");
+  EXPECT_EQ(found[1].name, "a");
+}
+
+// Multiples of the step within the range, both ends included, as few as requested.
+TEST(Chart, TicksAreRoundNumbersWithinTheRange) {
+  EXPECT_THAT(ticks_between(0, 10, 6), ElementsAre(0, 2, 4, 6, 8, 10));
+  EXPECT_THAT(ticks_between(10, 0, 3), ElementsAre(0, 5, 10));
+  EXPECT_THAT(ticks_between(435'012, 435'987, 4), ElementsAre(435'200, 435'400, 435'600, 435'800));
+  EXPECT_THAT(ticks_between(-0.03, 0.03, 5), SizeIs(3));
+  EXPECT_THAT(ticks_between(1, 1, 5), IsEmpty());
+  EXPECT_THAT(ticks_between(0, infinity, 5), IsEmpty());
+  for (int i = 1; i < 400; ++i) {
+    const double low = std::sin(i) * std::pow(10, i % 13 - 6), high = low + std::pow(1.3, i % 60);
+    const std::vector<double> ticks = ticks_between(low, high, 7);
+    EXPECT_GE(ticks.size(), 2u) << low << " " << high;
+    EXPECT_LE(ticks.size(), 7u) << low << " " << high;
+    EXPECT_GE(ticks.front(), low - 1e-9 * (high - low));
+    EXPECT_LE(ticks.back(), high + 1e-9 * (high - low));
+  }
+}
+
+TEST(Chart, TickTextsHaveTheDecimalsOfTheirStep) {
+  EXPECT_EQ(tick_text(0.30000000000000004, 0.1), "0.3");
+  EXPECT_EQ(tick_text(435'200, 200), "435200");
+  EXPECT_EQ(tick_text(-0.02, 0.01), "−0.02");
+  EXPECT_EQ(tick_text(-1e-18, 0.01), "0.00");
+  EXPECT_EQ(tick_text(2e-7, 1e-7), "2e-07");
 }
 
 TEST(Report, HistogramsOfEmptyRangesCountValuesOutside) {
@@ -146,6 +203,42 @@ TEST(Report, PageIsSelfContained) {
             std::string::npos);
 }
 
+// A compared section: the headline, the main figures and the picture of the errors come first, and
+// the other figures, the tables and the pictures of the data are collapsed.
+TEST(Report, MainFiguresAndErrorsComeBeforeTheRest) {
+  const TemporaryFolder folder;
+  Report report = sample();
+  report.sections.resize(1);
+  Section& section = report.sections[0];
+  section.headline = "They differ by 1.2 mm.";
+  section.main = {"largest error"};
+  section.pictures.push_back(
+      {.caption = "where they differ",
+       .image = Image8(3, 2, 3),
+       .shown = Shown::Errors,
+       .across = Axis{"east, m", 0, 30},
+       .up = Axis{"north, m", 0, 20},
+       .bar = ColourBar{"error, m", {Colour(0), Colour(1)}, {{0.5, "7.5"}}}});
+  write_html(folder / "a.html", report);
+  const std::string html = read_text(folder / "a.html");
+  tinyxml2::XMLDocument document;
+  ASSERT_EQ(document.Parse(html.c_str()), tinyxml2::XML_SUCCESS) << document.ErrorStr();
+  std::vector<std::size_t> places;
+  for (const char* part :
+       {"Failed: largest error is 0.001235 m, but may be at most 0.001 m", "They differ by 1.2 mm.",
+        "class=\"card failed\"", "where they differ", "east, m", ">20<", "north, m", ">7.5<",
+        "error, m", "error &lt;mm&gt;", "it&#39;s &lt;b&gt;", "<details>", "ratio", "by class",
+        "difference &gt; 0"}) {
+    places.push_back(html.find(part));
+    EXPECT_NE(places.back(), std::string::npos) << part;
+  }
+  EXPECT_EQ(places[0] < places[1] && places[1] < places[2] && places[2] < places[3], true);
+  EXPECT_LT(places[3], places[11]);
+  for (const std::size_t late : {places[12], places[13], html.rfind("difference &gt; 0")})
+    EXPECT_GT(late, places[11]);
+  EXPECT_EQ(html.find("<script"), std::string::npos);
+}
+
 // The counts 1, 2, 1 and 0 give bars with heights of 1 : 2 : 1.
 TEST(Report, BarHeightsMatchCounts) {
   const TemporaryFolder folder;
@@ -182,6 +275,9 @@ TEST(Report, JsonContainsAllMeasures) {
   EXPECT_EQ(section["tables"][0]["rows"][0][0], "<grass>");
   EXPECT_EQ(section["histograms"][0]["counts"], (std::vector<int>{0, 1, 2, 1}));
   EXPECT_EQ(section["histograms"][0]["above"], 1);
+  EXPECT_EQ(section["histograms"][0]["counted"], "count");
+  EXPECT_EQ(section["headline"], "");
+  EXPECT_TRUE(section["main"].is_array());
   EXPECT_TRUE(json["sections"][1]["measures"].is_array());
 }
 

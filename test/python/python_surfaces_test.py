@@ -381,6 +381,22 @@ def test_comparison_from_python_matches_the_program(made, tmp_path):
     shifted = groundray.Terrain(small_scene.heights_m() + np.float32(0.25), small_scene.CELL_M)
     of_dems = groundray.compare(terrain, shifted)["figures"]
     assert any(abs(value - 0.25) < 1e-5 for value in of_dems.values())
+    part = groundray.compare(fine, coarse, area_m=[2, 2, 6, 6], heights_m=[-99, 99])
+    assert part["figures"]["reference: area"] < figures["reference: area"]
+    assert set(part["main"]) <= part["figures"].keys()
+    assert part["headline"]
+    assert part["figures"] == reported(
+        *(tmp_path, tmp_path / "fine.ply", tmp_path / "coarse.ply"),
+        *("--area", "2", "2", "6", "6", "--heights-m", "-99", "99"),
+    )
+    near = groundray.compare(terrain, shifted, ignore_beyond_m=0.3)["figures"]
+    assert near["left out, farther than 0.3 m from the other surface"] == 0
+    with pytest.raises(groundray.Error, match="no sample that both have is left"):
+        groundray.compare(terrain, shifted, ignore_beyond_m=0.2)
+    with pytest.raises(groundray.Error, match="must be W S E N"):
+        groundray.compare(files[0], files[1], area_m=[1, 0, 0, 1])
+    with pytest.raises(groundray.Error, match="compare: pixels requires images"):
+        groundray.compare(files[0], files[1], pixels=[0, 0, 1, 1])
     with pytest.raises(groundray.Error, match="of the same kind"):
         groundray.compare(files[0], folder / "ground.tif")
     with pytest.raises(TypeError):

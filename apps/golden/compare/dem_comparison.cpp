@@ -6,16 +6,17 @@
 #include <array>
 #include <cmath>
 #include <cstddef>
-#include <functional>
 #include <glm/geometric.hpp>
 #include <glm/mat3x3.hpp>
 #include <glm/matrix.hpp>
 #include <glm/trigonometric.hpp>
 #include <limits>
 #include <optional>
+#include <string_view>
 #include <utility>
 #include <vector>
 
+#include "apps/golden/compare/dem_pair.h"
 #include "apps/golden/compare/error_figures.h"
 #include "apps/golden/compare/images/difference_picture.h"
 #include "apps/golden/compare/images/image_file.h"
@@ -25,73 +26,8 @@
 namespace groundray::golden {
 namespace {
 
+constexpr std::string_view nmad_name = "height: NMAD, 1.4826 times the median of |error - median|";
 constexpr double no_height = std::numeric_limits<double>::quiet_NaN();
-constexpr double same_place = 1e-6;  // cells; rounding of geotransforms in text and floats
-
-/// Heights at the reference's samples, m; NaN in holes.
-struct Heights {
-  Image<double> m;
-
-  double operator()(int column, int row) const { return m.at(column, row)[0]; }
-  Cell cell(int x, int y) const {
-    const Heights& z = *this;
-    return {x, y, 1, 1, z(x, y), z(x + 1, y), z(x, y + 1), z(x + 1, y + 1)};
-  }
-};
-
-/// Heights of both DEMs at the reference's samples.
-struct DemPair {
-  GridFrame frame;
-  Heights reference, other;
-  std::size_t beyond = 0;        // samples outside the other's extent
-  std::size_t interpolated = 0;  // samples that lie between samples of the other
-
-  glm::ivec2 samples() const { return frame.samples; }
-};
-
-bool is_whole(glm::dvec2 at) { return at == glm::round(at); }
-
-/// Returns `at` with each coordinate that is within `same_place` of a whole number rounded to it.
-glm::dvec2 snapped(glm::dvec2 at) {
-  for (glm::length_t i = 0; i < 2; ++i) {
-    if (std::abs(at[i] - std::round(at[i])) <= same_place) at[i] = std::round(at[i]);
-  }
-  return at;
-}
-
-/// Returns the height of the surface at grid coordinates within the grid, m; NaN in a hole.
-double height_m_at(const HeightGrid& grid, glm::dvec2 at) {
-  if (is_whole(at)) return grid.height_m(static_cast<int>(at.x), static_cast<int>(at.y));
-  const Cell cell = grid.cell(std::min(static_cast<int>(at.x), grid.columns() - 2),
-                              std::min(static_cast<int>(at.y), grid.rows() - 2));
-  const FacetPlane plane = cell.plane(cell.half_at(at.x, at.y));
-  return plane.height_m + plane.u_slope_m * at.x + plane.v_slope_m * at.y;
-}
-
-DemPair paired(const Dem& reference, const Dem& other) {
-  const HeightGrid& grid = reference.grid;
-  const Heights none{Image<double>(grid.columns(), grid.rows(), 1)};
-  DemPair pair{grid.frame(), none, none};
-  std::ranges::copy(grid.heights_m(), pair.reference.m.values().begin());
-  std::ranges::fill(pair.other.m.values(), no_height);
-  const glm::dvec2 shift_m(reference.origin_w_m - other.origin_w_m);
-  const glm::ivec2 last = other.grid.frame().samples - 1;
-  for (int row = 0; row < grid.rows(); ++row) {
-    for (int column = 0; column < grid.columns(); ++column) {
-      const glm::dvec2 p = grid.frame().to_D({column, row}) + shift_m;
-      const glm::dvec2 at = snapped(other.grid.frame().to_grid(p));
-      if (!(0 <= at.x && at.x <= last.x && 0 <= at.y && at.y <= last.y)) {
-        ++pair.beyond;
-        continue;
-      }
-      if (!is_whole(at)) ++pair.interpolated;
-      pair.other.m.at(column, row)[0] = height_m_at(other.grid, at);
-    }
-  }
-  const double up_m = other.origin_w_m.z - reference.origin_w_m.z;
-  for (double& height_m : pair.other.m.values()) height_m += up_m;
-  return pair;
-}
 
 /// Returns the reference's slope along x and y of D by central differences, one-sided next to holes
 /// and edges; NaN if neither neighbour has a height.
@@ -121,7 +57,7 @@ std::vector<Sample> samples_of(const DemPair& pair) {
   for (int row = 0; row < pair.samples().y; ++row) {
     for (int column = 0; column < pair.samples().x; ++column) {
       const double error_m = pair.other(column, row) - pair.reference(column, row);
-      if (std::isnan(error_m)) continue;
+      if (std::isnan(error_m) || !pair.has(column, row)) continue;
       samples.push_back({column, row, error_m, gradient(pair, column, row)});
     }
   }
@@ -140,7 +76,7 @@ void tell_vertical(const DemPair& pair, const glm::dvec3& origin_w_m,
   const ErrorFigures figures = figures_of(errors_m);
   tell_errors(into, "height", "m", errors_m);
   tell(into, "height: median error", figures.median, "m");
-  tell(into, "height: NMAD, 1.4826 times the median of |error - median|", figures.nmad, "m");
+  tell(into, std::string(nmad_name), figures.nmad, "m");
   if (figures.largest == 0) return;
   const Sample& worst = samples[figures.worst];
   const glm::dvec2 p_W = pair.frame.to_D({worst.column, worst.row}) + glm::dvec2(origin_w_m);
@@ -183,6 +119,7 @@ void tell_slopes(const DemPair& pair, Section& into) {
   const GridFrame& frame = pair.frame;
   for (int row = 0; row + 1 < pair.samples().y; ++row) {
     for (int column = 0; column + 1 < pair.samples().x; ++column) {
+      if (!pair.has_cell(column, row)) continue;
       const Cell of_reference = pair.reference.cell(column, row);
       const Cell of_other = pair.other.cell(column, row);
       for (const Half half : {Half::Near, Half::Far}) {
@@ -200,9 +137,10 @@ void tell_slopes(const DemPair& pair, Section& into) {
   tell_sizes(into, "angle between triangles", "deg", angles_deg);
 }
 
-void tell_holes(const DemPair& pair, Section& into) {
+void tell_holes(const DemPair& pair, const Scope& scope, std::size_t compared, Section& into) {
   std::size_t only_reference = 0, only_other = 0, both = 0;
   for (std::size_t i = 0; i < pair.other.m.values().size(); ++i) {
+    if (pair.is_left_out[i]) continue;
     const bool is_hole = std::isnan(pair.reference.m.values()[i]),
                is_hole_of_other = std::isnan(pair.other.m.values()[i]);
     both += is_hole && is_hole_of_other ? 1 : 0;
@@ -214,6 +152,10 @@ void tell_holes(const DemPair& pair, Section& into) {
        "samples");
   tell(into, "holes in both", static_cast<double>(both), "samples");
   tell(into, "beyond the other's extent", static_cast<double>(pair.beyond), "samples");
+  if (scope.has_box())
+    tell(into, "outside the area and heights", static_cast<double>(pair.outside), "samples");
+  tell_ignored(into, "", static_cast<double>(pair.ignored),
+               static_cast<double>(pair.ignored + compared), "samples", scope);
 }
 
 /// Horizontal shift of the other DEM, fitted by least squares to e = c - slope . shift, and the
@@ -257,13 +199,37 @@ void suspect_shift(const DemPair& pair, const std::vector<Sample>& samples, Sect
       fit->shift_m.x, fit->shift_m.y, cells.x, cells.y, 100 * fit->explained);
 }
 
-void draw(const DemPair& pair, Section& into) {
+/// Draws both DEMs and their differences, with the positions of the edges in W.
+void draw(const DemPair& pair, const glm::dvec3& origin_w_m, Section& into) {
   const ImageLayer reference{"height", LayerKind::Number, {"height"}, pair.reference.m};
   const ImageLayer other{"height", LayerKind::Number, {"height"}, pair.other.m};
   Image<double> differences = pair.other.m;
-  std::ranges::transform(pair.other.m.values(), pair.reference.m.values(),
-                         differences.values().begin(), std::minus<>());
+  for (int row = 0; row < pair.samples().y; ++row) {
+    for (int column = 0; column < pair.samples().x; ++column) {
+      double& difference = differences.at(column, row)[0];
+      difference = pair.has(column, row) ? difference - pair.reference(column, row) : no_height;
+    }
+  }
   draw_layers(reference, other, differences, " m", into);
+  const glm::dvec2 first =
+      pair.frame.to_D({0, 0}) + glm::dvec2(origin_w_m) - pair.frame.step_m / 2.0;
+  const glm::dvec2 end = first + pair.frame.step_m * glm::dvec2(pair.samples());
+  for (Picture& picture : into.pictures) {
+    picture.across = Axis{"east, m", first.x, end.x};
+    picture.up = Axis{"north, m", end.y, first.y};
+  }
+}
+
+void write_dem_headline(std::size_t samples, Section& into) {
+  into.main = {"height: mean error", "height: RMS error", std::string(nmad_name),
+               "height: 95th percentile of its size", "height: largest error"};
+  const std::vector<Measure> found = main_measures(into);
+  into.headline = fmt::format(
+      "The other's heights differ from the reference's by {:.4g} m RMS and {:.4g} m on average, by "
+      "{:.4g} m at most, at {} samples.",
+      found[1].value, found[0].value, found[4].value, samples);
+  if (found[4].value == 0)
+    into.headline = fmt::format("The heights of all {} samples are equal.", samples);
 }
 
 void say_how(const DemPair& pair, const Dem& other, Section& into) {
@@ -299,17 +265,33 @@ void check_dem_crs(const Dem& reference, const Dem& other, const std::string& re
       warp_words(reference, reference_file), other_file);
 }
 
+[[noreturn]] void refuse_dems(const Dem& reference, const Dem& other, const DemPair& pair) {
+  if (pair.outside + pair.ignored > 0) {
+    throw Error(
+        "no sample that both have is left: {} of {} are outside the area and heights, and at {} "
+        "the "
+        "heights differ by more than the distance beyond which they are ignored",
+        pair.outside, pair.is_left_out.size(), pair.ignored);
+  }
+  const glm::dvec2 from = reference.grid.origin_m() + glm::dvec2(reference.origin_w_m);
+  const glm::dvec2 other_from = other.grid.origin_m() + glm::dvec2(other.origin_w_m);
+  throw Error(
+      "they do not overlap: the first sample of the reference is at east {} m, north {} m, that of "
+      "the other at east {} m, north {} m",
+      from.x, from.y, other_from.x, other_from.y);
+}
+
 }  // namespace
 
 Section compare_dems(const std::filesystem::path& reference, const std::filesystem::path& other,
-                     const DemReadings& readings) {
+                     const DemReadings& readings, const Scope& scope) {
   const Dem of_reference = load_dem(reference, readings.reference);
   const Dem of_other = load_dem(other, readings.other);
   check_dem_crs(of_reference, of_other, reference.string(), other.string());
   Section section;
   try {
     section = compare_dems(of_reference, of_other,
-                           fmt::format("{} against {}", other.string(), reference.string()));
+                           fmt::format("{} against {}", other.string(), reference.string()), scope);
   } catch (const Error& fault) {
     throw Error("{} cannot be compared with {}: {}", other.string(), reference.string(),
                 fault.what());
@@ -323,27 +305,24 @@ Section compare_dems(const std::filesystem::path& reference, const std::filesyst
   return section;
 }
 
-Section compare_dems(const Dem& reference, const Dem& other, const std::string& title) {
-  const DemPair pair = paired(reference, other);
+Section compare_dems(const Dem& reference, const Dem& other, const std::string& title,
+                     const Scope& scope) {
+  check_scope(scope);
+  const DemPair pair = paired(reference, other, scope);
   const std::vector<Sample> samples = samples_of(pair);
-  if (samples.empty()) {
-    const glm::dvec2 from = reference.grid.origin_m() + glm::dvec2(reference.origin_w_m);
-    const glm::dvec2 other_from = other.grid.origin_m() + glm::dvec2(other.origin_w_m);
-    throw Error(
-        "they do not overlap: the first sample of the reference is at east {} m, north {} m, that "
-        "of the other at east {} m, north {} m",
-        from.x, from.y, other_from.x, other_from.y);
-  }
+  if (samples.empty()) refuse_dems(reference, other, pair);
   Section section;
   section.title = title;
+  section.text = scope_text(scope, "W, the DEMs' coordinate reference system,");
   say_how(pair, other, section);
   tell(section, "samples that both have", static_cast<double>(samples.size()), "samples");
-  tell_holes(pair, section);
+  tell_holes(pair, scope, samples.size(), section);
   tell_vertical(pair, reference.origin_w_m, samples, section);
   tell_by_slope(samples, section);
   tell_slopes(pair, section);
   suspect_shift(pair, samples, section);
-  draw(pair, section);
+  draw(pair, reference.origin_w_m, section);
+  write_dem_headline(samples.size(), section);
   section.verdict = verdict_of(section.measures);
   return section;
 }

@@ -3,6 +3,7 @@
 #include <filesystem>
 #include <string>
 
+#include "apps/golden/compare/scope.h"
 #include "apps/golden/report.h"
 #include "terrain/dem/dem_io.h"
 
@@ -19,14 +20,18 @@ struct DemReadings {
 /// both on the reference's grid, and holes that only one of them has; warns if the other seems to
 /// be shifted. Nothing is checked against limits. A DEM without a CRS is assumed to be in the
 /// other's.
-/// @throws Error as load_dem, if the CRSs differ (the message shows a gdalwarp command that helps),
-///         or if the DEMs do not overlap.
+/// @param scope  its box is in W; a sample has the reference's height, or the other's in a hole of
+///               the reference. Its limit of distance is that of the difference of heights.
+/// @throws Error as check_scope; as load_dem, if the CRSs differ (the message shows a gdalwarp
+/// command that helps),
+///         or if the DEMs do not overlap, or not in the scope.
 Section compare_dems(const std::filesystem::path& reference, const std::filesystem::path& other,
-                     const DemReadings& readings = {});
+                     const DemReadings& readings = {}, const Scope& scope = {});
 
 /// As above, for DEMs in memory; their CRSs are not compared.
 /// @param title  title of the section.
-/// @throws Error if they do not overlap.
-Section compare_dems(const Dem& reference, const Dem& other, const std::string& title);
+/// @throws Error as check_scope, or if they do not overlap in the scope.
+Section compare_dems(const Dem& reference, const Dem& other, const std::string& title,
+                     const Scope& scope = {});
 
 }  // namespace groundray::golden

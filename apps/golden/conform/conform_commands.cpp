@@ -12,18 +12,32 @@ namespace groundray::golden {
 
 namespace fs = std::filesystem;
 
+namespace {
+
+void print_measure(const Measure& measure) {
+  print_text(stdout, "{}{}: {:.6g}{}{}{}\n", measure.verdict == Verdict::Failed ? "FAILED " : "",
+             measure.name, measure.value, measure.unit.empty() ? "" : " ", measure.unit,
+             measure.limit ? fmt::format(", at most {:.6g}", *measure.limit) : "");
+}
+
+}  // namespace
+
 void publish(const Report& report, const fs::path& out) {
   for (const Section& section : report.sections) {
     if (report.sections.size() > 1) {
       print_text(stdout, "{} {}\n", section.verdict == Verdict::Passed ? "passed" : "FAILED",
                  section.title);
     }
+    const std::vector<Measure> main = main_measures(section);
+    if (!section.headline.empty()) {
+      print_text(stdout, "{}\n", first_words(section));
+      std::ranges::for_each(main, print_measure);
+      print_text(stdout, "\n");
+    }
     if (!section.text.empty()) print_text(stdout, "{}\n", section.text);
     for (const Measure& measure : section.measures) {
-      print_text(stdout, "{}{}: {:.6g}{}{}{}\n",
-                 measure.verdict == Verdict::Failed ? "FAILED " : "", measure.name, measure.value,
-                 measure.unit.empty() ? "" : " ", measure.unit,
-                 measure.limit ? fmt::format(", at most {:.6g}", *measure.limit) : "");
+      if (std::ranges::find(main, measure.name, &Measure::name) == main.end())
+        print_measure(measure);
     }
   }
   fs::create_directories(out);

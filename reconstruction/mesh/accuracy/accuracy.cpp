@@ -37,11 +37,10 @@ struct Sample {
   double at_most_m = 0;
 };
 
-/// Takes the sample at a part's centroid. Over the part, the distance is at most that to one
+/// Adds the sample at a part's centroid to sums. Over the part, the distance is at most that to one
 /// triangle, which is convex and thus at most the linear interpolation between the corners.
-Sample take_sample(const ClosestPoint& to, const QuadratureTriangle& facet, const SurfacePart& part,
-                   std::uint32_t near, DistanceSums& sums) {
-  const NearestPoint nearest = to.nearest(part.middle, near);
+Sample add_sample(const ClosestPoint& to, const QuadratureTriangle& facet, const SurfacePart& part,
+                  const NearestPoint& nearest, DistanceSums& sums) {
   const double d_m = nearest.distance_m;
   const auto corners = part.corners(facet);
   const double a = to.distance_m(corners[0], nearest.triangle);
@@ -57,11 +56,23 @@ struct Lot : DistanceSums {
   AngleSpread turn;
   std::uint32_t near = 0;
   std::vector<double> bins_m2;
+  double ignored_m2 = 0;
+  double at_least_m = 0, at_most_m = 0;  // bounds of the largest distance
+  std::vector<DistanceSample> visited;   // for the visitor
   struct Largest {
     std::uint32_t triangle = 0;
     double distance_m = -1;
   };
   std::vector<Largest> largest;  // of each triangle of the batch
+
+  void take(const Lot& more) {
+    *this += more;
+    turn.add(more.turn);
+    ignored_m2 += more.ignored_m2;
+    at_least_m = std::max(at_least_m, more.at_least_m);
+    at_most_m = std::max(at_most_m, more.at_most_m);
+    for (std::size_t k = 0; k < more.bins_m2.size(); ++k) bins_m2[k] += more.bins_m2[k];
+  }
 
   void note(std::uint32_t triangle, double distance_m) {
     if (largest.empty() || largest.back().triangle != triangle) largest.push_back({triangle});
@@ -218,33 +229,45 @@ void MeshDistance::check_area() const {
       "over its area");
 }
 
-MeanDistance MeshDistance::mean(double step_m, const DistanceBins& bins) const {
+MeanDistance MeshDistance::mean(double step_m, const DistanceBins& bins, double ignore_beyond_m,
+                                const SampleVisitor& visit) const {
   const SurfaceParts parts(from_, step_m);
   check_area();
   Lot empty;
   if (bins.width_m > 0) empty.bins_m2.resize(bins.count + 1);
-  const auto visit = [&](const QuadratureTriangle& facet, const SurfacePart& part, Lot& lot) {
-    const NearestPoint nearest = take_sample(to_, facet, part, lot.near, lot).nearest;
+  const auto measure = [&](const QuadratureTriangle& facet, const SurfacePart& part, Lot& lot) {
+    const NearestPoint nearest = to_.nearest(part.middle, lot.near);
     lot.near = nearest.triangle;
-    lot.turn.add(facet.normal, QuadratureTriangle(to_.mesh(), nearest.triangle).normal,
-                 part.area_m2(facet));
+    const double part_m2 = part.area_m2(facet);
+    if (nearest.distance_m > ignore_beyond_m) {
+      lot.ignored_m2 += part_m2;
+      return;
+    }
+    const Sample sample = add_sample(to_, facet, part, nearest, lot);
+    lot.turn.add(facet.normal, QuadratureTriangle(to_.mesh(), nearest.triangle).normal, part_m2);
     lot.note(part.triangle, nearest.distance_m);
+    lot.at_least_m = std::max(lot.at_least_m, nearest.distance_m);
+    lot.at_most_m = std::max(lot.at_most_m, sample.at_most_m);
+    if (visit) lot.visited.push_back({origin_m_ + part.middle, nearest.distance_m, part_m2});
     if (lot.bins_m2.empty()) return;
     const double bin = std::min(nearest.distance_m / bins.width_m, static_cast<double>(bins.count));
-    lot.bins_m2[static_cast<std::size_t>(bin)] += part.area_m2(facet);
+    lot.bins_m2[static_cast<std::size_t>(bin)] += part_m2;
   };
   Lot total = empty;
   MeanDistance mean{.area_m2 = area_m2_};
   mean.largest_m.resize(from_.triangles.size());
-  parts.sum_up(empty, visit, [&](const Lot& lot) {
-    total += lot;
-    mean.turn.add(lot.turn);
-    for (std::size_t k = 0; k < lot.bins_m2.size(); ++k) total.bins_m2[k] += lot.bins_m2[k];
+  parts.sum_up(empty, measure, [&](const Lot& lot) {
+    total.take(lot);
     for (const Lot::Largest& each : lot.largest)
       mean.largest_m[each.triangle] = std::max(mean.largest_m[each.triangle], each.distance_m);
+    for (const DistanceSample& sample : lot.visited) visit(sample);
   });
   mean.samples = total.samples;
+  mean.turn = total.turn;
   mean.bins_m2 = std::move(total.bins_m2);
+  mean.ignored_m2 = total.ignored_m2;
+  mean.largest_at_least_m = std::max(0.0, total.at_least_m - rounding_m_);
+  mean.largest_at_most_m = total.at_most_m + rounding_m_;
   const DistanceSums::Means means = total.means(rounding_m_, parts.sum_rounding());
   mean.mean = means.mean;
   mean.rms = means.rms;
@@ -263,7 +286,7 @@ OneSidedError MeshDistance::error(const ErrorFineness& fineness) const {
   const double samples = fineness.samples;
   const SurfaceParts parts(from_, SurfaceParts::widened_m(from_, step_for_m(samples), samples));
   const auto visit = [&](const QuadratureTriangle& facet, const SurfacePart& part, ErrorLot& lot) {
-    const Sample sample = take_sample(to_, facet, part, lot.near, lot);
+    const Sample sample = add_sample(to_, facet, part, to_.nearest(part.middle, lot.near), lot);
     lot.near = sample.nearest.triangle;
     FarthestProbe& farthest = lot.farthest;
     if (sample.nearest.distance_m > farthest.probe.distance_m) {

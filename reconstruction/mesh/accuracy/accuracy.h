@@ -4,6 +4,7 @@
 #include <cstdint>
 #include <functional>
 #include <glm/vec3.hpp>
+#include <limits>
 #include <span>
 #include <vector>
 
@@ -64,6 +65,17 @@ struct BoundedLength {
   double at_least_m = 0, at_most_m = 0;
 };
 
+/// Sample of a surface, at the centroid of a part of it.
+struct DistanceSample {
+  glm::dvec3 p{0};
+  double distance_m = 0;  ///< to the other surface
+  double area_m2 = 0;     ///< of the part
+};
+
+/// Receives each sample that counts, in an order that does not depend on the number of threads; one
+/// call at a time.
+using SampleVisitor = std::function<void(const DistanceSample&)>;
+
 /// Area-weighted means over a surface of the distance to another surface.
 struct MeanDistance {
   BoundedLength mean, rms;
@@ -73,6 +85,9 @@ struct MeanDistance {
   std::size_t samples = 0;
   std::vector<double> bins_m2;    ///< area in each bin, then the area beyond the last bin
   std::vector<double> largest_m;  ///< of each triangle, the largest distance of its samples
+  double ignored_m2 = 0;          ///< area of the parts that were left out
+  /// Bounds of the largest distance from the parts that count.
+  double largest_at_least_m = 0, largest_at_most_m = 0;
 };
 
 /// Resolution of an error measurement.
@@ -121,9 +136,14 @@ class MeshDistance {
   /// parts are at most `step_m` long. The bounds follow from the distance being 1-Lipschitz and
   /// from the distance to a single triangle being convex. Upper bounds are tight; lower bounds are
   /// about 0.29 steps too low unless the distances themselves are small.
+  /// @param ignore_beyond_m  parts whose centroid is farther than this from the other surface are
+  ///                         left out of all results but `area_m2` and `ignored_m2`. If all are,
+  ///                         the means are NaN.
   /// @throws Error if the step is not positive or requires more than 1e9 samples, or the surface
   ///         has no area.
-  MeanDistance mean(double step_m, const DistanceBins& bins = {}) const;
+  MeanDistance mean(double step_m, const DistanceBins& bins = {},
+                    double ignore_beyond_m = std::numeric_limits<double>::infinity(),
+                    const SampleVisitor& visit = {}) const;
 
   /// Measures the largest distance and the means in one call; by default in a few microseconds per
   /// triangle of the finer surface.

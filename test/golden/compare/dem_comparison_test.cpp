@@ -190,6 +190,67 @@ std::string utm(int meridian_deg, int zone) {
          "\"Meter\",1.0]]";
 }
 
+// 30 x 20 samples, 2 m apart, at 100 m + x; the other is 0.1 m higher, and 7 m higher from x = 40 m
+// on, where it is as if it was never measured. East of 500,000 m.
+TEST(CompareDems, ComparesOnlyWhatIsInTheScope) {
+  Dem reference = dem({30, 20}, {0, 100}, 2, [](double x, double) { return 100 + x; });
+  Dem other =
+      dem({30, 20}, {0, 100}, 2, [](double x, double) { return 100.1 + x + (x < 40 ? 0 : 6.9); });
+  reference.origin_w_m = other.origin_w_m = {500'000, 0, 0};
+  constexpr double all = Scope::unbounded;
+  constexpr double rounding_m = 2e-5;  // of floats of 160 m
+  // x from 10 m to 30 m is 11 columns, y from 70 m to 90 m is 11 rows.
+  const Section inner = compare_dems(reference, other, "a",
+                                     {.low_m = {500'010, 70, -all}, .high_m = {500'030, 90, all}});
+  EXPECT_EQ(figure(inner, "samples that both have"), 121);
+  EXPECT_EQ(figure(inner, "outside the area and heights"), 600 - 121);
+  EXPECT_NEAR(figure(inner, "height: largest error"), 0.1, rounding_m);
+  EXPECT_EQ(figure(inner, "beyond the other's extent"), 0);
+  EXPECT_THAT(inner.text, HasSubstr("Only x from 500010 to 500030 m, y from 70 to 90 m of W"));
+  EXPECT_EQ(inner.main.size(), 5u);
+  EXPECT_EQ(main_measures(inner).size(), 5u);
+  EXPECT_THAT(inner.headline, HasSubstr("by 0.1 m at most, at 121 samples."));
+  // Heights from 120 m to 130 m are columns 10 to 15.
+  const Section heights =
+      compare_dems(reference, other, "a", {.low_m = {-all, -all, 120}, .high_m = {all, all, 130}});
+  EXPECT_EQ(figure(heights, "samples that both have"), 6 * 20);
+  // 20 columns are before x = 40 m, 10 behind.
+  const Section near = compare_dems(reference, other, "a", {.ignore_beyond_m = 0.5});
+  EXPECT_EQ(figure(near, "samples that both have"), 400);
+  EXPECT_NEAR(figure(near, "height: RMS error"), 0.1, rounding_m);
+  EXPECT_NEAR(figure(near, "slope of triangles: largest error"), 0, 1e-3);
+  const std::string left_out = "left out, farther than 0.5 m from the other surface";
+  EXPECT_EQ(figure(near, left_out), 200);
+  EXPECT_NEAR(figure(near, left_out + ", share"), 100.0 / 3, 1e-9);
+  EXPECT_THAT(
+      [&] {
+        compare_dems(reference, other, "a",
+                     {.low_m = {0, 0, -all}, .high_m = {1, 1, all}, .ignore_beyond_m = 1});
+      },
+      ThrowsMessage<Error>(HasSubstr("600 of 600 are outside the area and heights")));
+}
+
+// The picture of errors states the positions of the edges of its pixels in W.
+TEST(CompareDems, DrawErrorsWithPositions) {
+  Dem reference = dem({30, 20}, {0, 100}, 2, hills);
+  reference.origin_w_m = {1000, 2000, 0};
+  Dem other = changed(reference, [](std::vector<float>& heights) { heights[45] += 1; });
+  other.origin_w_m = reference.origin_w_m;
+  const Section section = compare_dems(reference, other, "a");
+  ASSERT_EQ(section.pictures.size(), 3u);
+  const Picture& errors = section.pictures.back();
+  EXPECT_EQ(errors.shown, Shown::Errors);
+  ASSERT_TRUE(errors.across && errors.up && errors.bar);
+  EXPECT_EQ(errors.across->low, 999);
+  EXPECT_EQ(errors.across->high, 999 + 60);
+  EXPECT_EQ(errors.up->low, 2101 - 40);
+  EXPECT_EQ(errors.up->high, 2101);
+  const auto at = errors.image.at(15, 1);  // sample 45 of rows of 30
+  const auto level = errors.image.at(0, 0);
+  EXPECT_LT(at[2], 60);      // red
+  EXPECT_GT(level[2], 240);  // white
+}
+
 TEST(CompareDems, ReadsFilesAndRejectsIncompatibleOnes) {
   const TemporaryFolder folder;
   write_asc(folder, "a", 500000, 5e6, "1 2 3\n4 5 6", utm(3, 31));

@@ -11,6 +11,8 @@
 
 #include "apps/colour_map.h"
 #include "apps/golden/compare/error_figures.h"
+#include "apps/golden/compare/error_map.h"
+#include "apps/golden/html_text.h"
 #include "core/image/srgb.h"
 
 namespace groundray::golden {
@@ -48,22 +50,6 @@ Image<double> largest(const Image<double>& image, int step) {
   return result;
 }
 
-std::vector<double> finite(const Image<double>& image) {
-  std::vector<double> values;
-  for (const double value : image.values()) {
-    if (std::isfinite(value)) values.push_back(value);
-  }
-  return values;
-}
-
-/// Returns a colour from blue at -1 through white at 0 to red at 1, by the square root of the
-/// magnitude; larger values are clamped.
-Colour signed_colour(double share) {
-  const double size = std::min(std::abs(share), 1.0);
-  const Colour full = share < 0 ? Colour(0.13, 0.30, 0.65) : Colour(0.70, 0.09, 0.17);
-  return glm::mix(Colour(0.97), full, std::sqrt(size));
-}
-
 std::string every_caption(int step) {
   return step > 1 ? fmt::format("; one pixel of {0} x {0}", step) : "";
 }
@@ -76,15 +62,32 @@ double shown(const ImageLayer& layer, std::span<const double> value) {
   return is_there ? size : std::numeric_limits<double>::quiet_NaN();
 }
 
+/// Returns a unit with its leading blank as the end of a label.
+std::string comma(const std::string& unit) { return unit.empty() ? "" : "," + unit; }
+
 struct Scale {
   double low = 0, high = 1;
   bool is_logarithmic = false;
 
+  double value_at(double share) const {
+    return is_logarithmic ? low * std::pow(high / low, share) : low + share * (high - low);
+  }
   double share(double value) const {
     if (is_logarithmic) return std::log(std::max(value, low) / low) / std::log(high / low);
     return (value - low) / (high - low);
   }
 };
+
+ColourBar bar_of(const Scale& scale, const std::string& label) {
+  ColourBar bar{.label = label, .colours = {}, .marks = {}};
+  constexpr int steps = 64, marks = 4;
+  for (int i = 0; i < steps; ++i) bar.colours.push_back(range_colour(1 - (i + 0.5) / steps));
+  for (int i = 0; i <= marks; ++i) {
+    const double share = static_cast<double>(i) / marks;
+    bar.marks.emplace_back(share, number_text(scale.value_at(share)));
+  }
+  return bar;
+}
 
 /// Returns the scale from the 1st to the 99th percentile. Depths are scaled logarithmically, so
 /// that near ones remain distinguishable; for light, each colour counts separately.
@@ -145,20 +148,18 @@ void draw_differences(const std::string& caption, const Image<double>& differenc
                       const std::string& unit, Section& into) {
   const int step = step_of(differences);
   const Image<double> values = largest(differences, step);
-  std::vector<double> sizes = finite(differences);
-  for (double& size : sizes) size = std::abs(size);
-  const double p99 = quantile(sizes, 0.99);
-  const double most = sizes.empty() ? 0 : *std::ranges::max_element(sizes);
-  const double scale = p99 > 0 ? p99 : most > 0 ? most : 1;
+  const auto all = differences.values();
+  const ErrorScale scale = error_scale_of({all.begin(), all.end()});
   Image8 picture = painted({values.width(), values.height()}, [&](int x, int y) {
     const double value = values.at(x, y)[0];
-    return std::isfinite(value) ? signed_colour(value / scale) : blank;
+    return std::isfinite(value) ? scale.colour(value) : blank;
   });
   into.pictures.push_back(
-      {fmt::format("{}, blue −{:.4g}{} to red {:.4g}{}, square-root scale; grey: no value{}",
-                   caption, scale, unit, scale, unit,
-                   step > 1 ? fmt::format("; the largest of {0} x {0} pixels", step) : ""),
-       std::move(picture)});
+      {.caption = caption + "; grey: no value" +
+                  (step > 1 ? fmt::format("; the largest of {0} x {0} pixels", step) : ""),
+       .image = std::move(picture),
+       .shown = Shown::Errors,
+       .bar = scale.bar("difference" + comma(unit))});
 }
 
 void draw_layers(const ImageLayer& reference, const ImageLayer& other,
@@ -166,24 +167,34 @@ void draw_layers(const ImageLayer& reference, const ImageLayer& other,
   const int step = step_of(reference.values);
   const Image<double> of_reference = every(reference.values, step);
   Scale scale = scale_of(reference, of_reference);
-  std::string range =
-      fmt::format(", {:.4g}{} (violet) to {:.4g}{} (yellow){}", scale.low, unit, scale.high, unit,
-                  scale.is_logarithmic ? ", logarithmic scale" : "");
-  if (reference.kind == LayerKind::Normal) range = ", directions as colours";
+  const bool has_bar = reference.kind != LayerKind::Normal && reference.kind != LayerKind::Colour;
+  std::string note;
+  if (reference.kind == LayerKind::Normal) note = ", directions as colours";
   if (reference.kind == LayerKind::Colour) {
     if (reference.name == "Picture") scale.high = 1;
-    range = reference.name == "Picture" ? "" : fmt::format(", white is {:.4g}", scale.high);
+    note = reference.name == "Picture" ? "" : fmt::format(", white is {:.4g}", scale.high);
   }
+  const auto add = [&](const std::string& whose, const Image<double>& values) {
+    Picture picture{.caption = reference.name + whose + note + every_caption(step),
+                    .image = painted(reference, values, scale)};
+    if (has_bar) picture.bar = bar_of(scale, reference.name + comma(unit));
+    into.pictures.push_back(std::move(picture));
+  };
   const bool are_equal = std::ranges::equal(
       reference.values.values(), other.values.values(),
       [](double a, double b) { return a == b || (std::isnan(a) && std::isnan(b)); });
-  into.pictures.push_back(
-      {reference.name + (are_equal ? ": both" : ": reference") + range + every_caption(step),
-       painted(reference, of_reference, scale)});
+  add(are_equal ? ": both" : ": reference", of_reference);
   if (are_equal) return;
-  into.pictures.push_back({reference.name + ": other, same scale" + every_caption(step),
-                           painted(reference, every(other.values, step), scale)});
+  add(": other", every(other.values, step));
   draw_differences(reference.name + ": other less reference", differences, unit, into);
+}
+
+void add_pixel_axes(const ImageLayer& layer, std::span<Picture> pictures) {
+  for (Picture& picture : pictures) {
+    const double first = layer.first_px.x, top = layer.first_px.y;
+    picture.across = Axis{"column, px", first, first + layer.values.width()};
+    picture.up = Axis{"row, px", top + layer.values.height(), top};
+  }
 }
 
 std::pair<double, double> finite_range(const std::vector<double>& values) {

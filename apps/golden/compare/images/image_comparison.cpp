@@ -10,6 +10,7 @@
 #include <limits>
 #include <string_view>
 #include <tuple>
+#include <utility>
 #include <vector>
 
 #include "apps/golden/compare/error_figures.h"
@@ -231,7 +232,72 @@ double similarity(const Moments& mean, double range) {
   return (2 * both + c1) * (2 * covariance + c2) / ((squares + c1) * (variances + c2));
 }
 
+/// Selects the figures that are shown first: the RMS error of each layer, then further ones while
+/// there is space. The headline states those of all layers.
+void write_headline(Section& into) {
+  constexpr std::size_t most = 5;
+  using Endings = std::array<std::string_view, 3>;
+  constexpr std::array<Endings, 4> groups{
+      Endings{": RMS error", ": RMS", ": share of equal pixels"},
+      Endings{": largest error", ": largest", ": largest"},
+      Endings{": mean error", ": mean", ": mean"},
+      Endings{": 95th percentile of its size", ": 95th percentile", ": 95th percentile"}};
+  std::vector<std::string> parts;
+  bool are_equal = true;
+  for (const Endings& group : groups) {
+    for (const Measure& measure : into.measures) {
+      const auto ends = [&](std::string_view end) { return measure.name.ends_with(end); };
+      if (std::ranges::none_of(group, ends)) continue;
+      if (into.main.size() < most) into.main.push_back(measure.name);
+      if (&group != &groups[0]) continue;
+      parts.push_back(fmt::format("{} {:.4g}{}{}", measure.name, measure.value,
+                                  measure.unit.empty() ? "" : " ", measure.unit));
+      are_equal = are_equal && measure.value == (measure.name.ends_with("pixels") ? 100 : 0);
+    }
+  }
+  if (parts.empty()) {
+    into.headline = "The images have no value in common.";
+  } else {
+    into.headline = are_equal ? "All values that both images have are equal."
+                              : fmt::format("{}.", fmt::join(parts, "; "));
+  }
+}
+
+/// @throws Error if the images differ in size.
+void check_sizes(const ImageFile& reference, const ImageFile& other) {
+  if (reference.size_px != other.size_px) {
+    throw Error(
+        "it has {} x {} px and the reference {} x {}; both must have the same pixels: render or "
+        "crop it to that size (scaling would change the values)",
+        other.size_px.x, other.size_px.y, reference.size_px.x, reference.size_px.y);
+  }
+}
+
 }  // namespace
+
+ImageFile cropped(const ImageFile& image, const PixelBox& box) {
+  const glm::ivec2 &first = box.first_px, &size = box.size_px, &whole_px = image.size_px;
+  const auto is_in = [](int from, int count, int all) {
+    return from >= 0 && count > 0 && from < all && count <= all - from;
+  };
+  if (!is_in(first.x, size.x, whole_px.x) || !is_in(first.y, size.y, whole_px.y)) {
+    throw Error(
+        "the pixels {} {} {} {} must be COLUMN ROW WIDTH HEIGHT within the image of {} x {} px, "
+        "not empty",
+        first.x, first.y, size.x, size.y, whole_px.x, whole_px.y);
+  }
+  ImageFile result{box.size_px, image.layers};
+  for (ImageLayer& layer : result.layers) {
+    const Image<double> whole = std::move(layer.values);
+    layer.first_px = box.first_px;
+    layer.values = Image<double>(size.x, size.y, whole.channels());
+    for (int y = 0; y < size.y; ++y) {
+      for (int x = 0; x < size.x; ++x)
+        std::ranges::copy(whole.at(first.x + x, first.y + y), layer.values.at(x, y).begin());
+    }
+  }
+  return result;
+}
 
 std::optional<Misalignment> misalignment(const Image<double>& reference,
                                          const Image<double>& other) {
@@ -250,9 +316,14 @@ std::optional<Misalignment> misalignment(const Image<double>& reference,
 
 Section compare_images(const std::filesystem::path& reference, const std::filesystem::path& other,
                        const ImageOptions& options) {
-  const ImageFile of_reference = read_image_file(reference, options.reference);
-  const ImageFile of_other = read_image_file(other, options.other);
+  ImageFile of_reference = read_image_file(reference, options.reference);
+  ImageFile of_other = read_image_file(other, options.other);
   try {
+    check_sizes(of_reference, of_other);
+    if (options.pixels) {
+      of_reference = cropped(of_reference, *options.pixels);
+      of_other = cropped(of_other, *options.pixels);
+    }
     return compare_images(of_reference, of_other, options.significance,
                           fmt::format("{} against {}", other.string(), reference.string()));
   } catch (const Error& fault) {
@@ -263,12 +334,7 @@ Section compare_images(const std::filesystem::path& reference, const std::filesy
 
 Section compare_images(const ImageFile& reference, const ImageFile& other,
                        const Significance& significance, const std::string& title) {
-  if (reference.size_px != other.size_px) {
-    throw Error(
-        "it has {} x {} px and the reference {} x {}; both must have the same pixels: render or "
-        "crop it to that size (scaling would change the values)",
-        other.size_px.x, other.size_px.y, reference.size_px.x, reference.size_px.y);
-  }
+  check_sizes(reference, other);
   Section section;
   section.title = title;
   say_what(reference, other, section);
@@ -292,6 +358,7 @@ Section compare_images(const ImageFile& reference, const ImageFile& other,
   tell_beyond_bound(reference, other, section);
   suspect_meaning(reference, other, section);
   suspect_alignment(reference, other, section);
+  write_headline(section);
   section.verdict = verdict_of(section.measures);
   return section;
 }

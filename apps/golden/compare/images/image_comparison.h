@@ -1,6 +1,7 @@
 #pragma once
 
 #include <filesystem>
+#include <glm/vec2.hpp>
 #include <optional>
 #include <string>
 
@@ -16,11 +17,23 @@ struct Significance {
   double beyond_share = 0;  ///< fraction of single values that may fail nevertheless
 };
 
-/// Reading options of both images, and significance of the tests of light.
+/// Rectangle of pixels.
+struct PixelBox {
+  glm::ivec2 first_px{0};  ///< column and row of its first pixel
+  glm::ivec2 size_px{0};   ///< width and height
+};
+
+/// Reading options of both images, significance of the tests of light, and the compared pixels, by
+/// default all.
 struct ImageOptions {
   ImageReading reference, other;
   Significance significance;
+  std::optional<PixelBox> pixels{};
 };
+
+/// Returns the pixels of an image within a rectangle.
+/// @throws Error if the rectangle is empty or reaches beyond the image.
+ImageFile cropped(const ImageFile& image, const PixelBox& box);
 
 /// Compares an image with a reference, layer by layer according to their kinds: errors of depth,
 /// angles between normals, bias and noise of light (with tests if there are standard errors),
@@ -28,7 +41,9 @@ struct ImageOptions {
 /// mirrored, or if its values seem to have another unit or meaning. Only the tests of light have
 /// limits; a layer without a pixel that has a value in both images fails, unless neither image has
 /// any.
-/// @throws Error as read_image_file, if the sizes differ, or if the images have no layer in common.
+/// @throws Error as read_image_file and cropped, if the sizes differ, or if the images have no
+/// layer
+///         in common.
 Section compare_images(const std::filesystem::path& reference, const std::filesystem::path& other,
                        const ImageOptions& options = {});
 

@@ -43,6 +43,7 @@ struct ImageLayer {
   LayerKind kind = LayerKind::Number;
   std::vector<std::string> channels;  ///< names in the file
   Image<double> values;
+  glm::ivec2 first_px{0};  ///< column and row in the file of the first pixel
 };
 
 /// Groups channels into layers by their names, ignoring case. Knows groundray's names and those of

@@ -102,7 +102,8 @@ void say_worst(const ImageLayer& reference, const ImageLayer& other, const Error
   };
   into.text +=
       fmt::format("{}: the largest error is in column {}, row {}:{} where the reference has{}.\n",
-                  reference.name, at.x, at.y, text(other), text(reference));
+                  reference.name, reference.first_px.x + at.x, reference.first_px.y + at.y,
+                  text(other), text(reference));
 }
 
 double share_percent(const std::vector<double>& values, const std::function<bool(double)>& is) {
@@ -324,9 +325,7 @@ void compare_numbers(const ImageLayer& reference, const ImageLayer& other, Secti
                      unit.empty() ? unit : " " + unit, into);
 }
 
-}  // namespace
-
-void compare_layers(const ImageLayer& reference, const ImageLayer& other, Section& into) {
+void compare_by_kind(const ImageLayer& reference, const ImageLayer& other, Section& into) {
   switch (reference.kind) {
     case LayerKind::Depth:
       return compare_depths(reference, other, into);
@@ -341,6 +340,14 @@ void compare_layers(const ImageLayer& reference, const ImageLayer& other, Sectio
     case LayerKind::Number:
       return compare_numbers(reference, other, into);
   }
+}
+
+}  // namespace
+
+void compare_layers(const ImageLayer& reference, const ImageLayer& other, Section& into) {
+  const std::size_t before = into.pictures.size();
+  compare_by_kind(reference, other, into);
+  add_pixel_axes(reference, std::span(into.pictures).subspan(before));
 }
 
 }  // namespace groundray::golden

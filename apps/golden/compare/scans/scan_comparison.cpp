@@ -12,6 +12,8 @@
 
 #include "apps/golden/compare/error_figures.h"
 #include "apps/golden/compare/scans/scan_errors.h"
+#include "apps/golden/compare/scans/scan_pictures.h"
+#include "apps/golden/compare/scans/scan_scope.h"
 #include "core/error.h"
 
 namespace groundray::golden {
@@ -19,6 +21,15 @@ namespace {
 
 double share(std::size_t part, std::size_t whole) {
   return whole == 0 ? 0 : static_cast<double>(part) / static_cast<double>(whole);
+}
+
+/// Fraction of the reference's returns, of those compared, that are missing; likewise for extra
+/// ones.
+double missing_share(const Pairs& pairs) {
+  return share(pairs.missing.size(), pairs.missing.size() + pairs.returns.size());
+}
+double extra_share(const Pairs& pairs) {
+  return share(pairs.extra.size(), pairs.extra.size() + pairs.returns.size());
 }
 
 /// Checks a figure if it has a limit, else only reports it.
@@ -87,20 +98,49 @@ Table table_of_columns(const Scan& reference, const Scan& other) {
   return table;
 }
 
-void tell_pairs(const Scan& reference, const Scan& other, const Pairs& pairs,
-                const ScanLimits& limits, Section& section) {
+void tell_pairs(const Pairs& pairs, const ScanLimits& limits, Section& section) {
   const auto count = [](std::size_t value) { return static_cast<double>(value); };
-  if (pairs.returns.empty() && reference.p_S.size() + other.p_S.size() > 0) {
+  if (pairs.returns.empty() && pairs.missing.size() + pairs.extra.size() > 0) {
     fail(section, "pairs of returns", 0, "", "without a pair, no range is compared");
   } else {
     tell(section, "pairs of returns", count(pairs.returns.size()));
   }
   tell(section, "missing returns", count(pairs.missing.size()));
-  tell_or_hold(section, "missing share of the reference's",
-               share(pairs.missing.size(), reference.p_S.size()), "", limits.missing_share);
+  tell_or_hold(section, "missing share of the reference's", missing_share(pairs), "",
+               limits.missing_share);
   tell(section, "extra returns", count(pairs.extra.size()));
-  tell_or_hold(section, "extra share of the other's", share(pairs.extra.size(), other.p_S.size()),
-               "", limits.extra_share);
+  tell_or_hold(section, "extra share of the other's", extra_share(pairs), "", limits.extra_share);
+}
+
+void tell_left_out(const LeftOut& left, const Pairs& pairs, const Scope& scope, Section& section) {
+  const auto count = [](std::size_t value) { return static_cast<double>(value); };
+  if (scope.has_box()) {
+    const std::string name = ": outside the area and heights";
+    tell(section, "reference" + name, count(left.outside_reference), "returns");
+    tell(section, "other" + name, count(left.outside_other), "returns");
+  }
+  const std::size_t both = pairs.returns.size();
+  tell_ignored(section, "reference", count(left.ignored_reference),
+               count(left.ignored_reference + both + pairs.missing.size()), "returns", scope);
+  tell_ignored(section, "other", count(left.ignored_other),
+               count(left.ignored_other + both + pairs.extra.size()), "returns", scope);
+}
+
+void write_headline(const Pairs& pairs, const ScanErrors& errors, Section& section) {
+  section.main = {"range error, mean", "range error, RMS",
+                  "range error, 95th percentile of magnitudes", "missing share of the reference's",
+                  "extra share of the other's"};
+  const ErrorFigures figures = figures_of(errors.range_m);
+  section.headline = figures.largest == 0
+                         ? fmt::format("All {} pairs of returns have equal ranges", figures.count)
+                         : fmt::format(
+                               "The other's ranges differ from the reference's by {:.4g} m RMS and "
+                               "{:.4g} m on average in {} pairs of returns",
+                               figures.rms, figures.mean, figures.count);
+  if (figures.count == 0) section.headline = "No returns are paired";
+  section.headline += fmt::format(
+      "; {:.2f} % of the reference's returns are missing, {:.2f} % of the other's are extra.",
+      100 * missing_share(pairs), 100 * extra_share(pairs));
 }
 
 double deviation_of(std::vector<double> values, double mean) {
@@ -226,23 +266,35 @@ Section compare_scans(const std::filesystem::path& reference, const std::filesys
 }
 
 Section compare_scans(const Scan& reference, const Scan& other, const ScanOptions& options) {
-  const Pairs pairs = pair_scans(reference, other, options.pairing);
+  check_scope(options.scope);
+  Pairs pairs = pair_scans(reference, other, options.pairing);
   const std::vector<std::string> doubts = doubts_about(reference, other);
   if (pairs.returns.empty() && !reference.p_S.empty() && !other.p_S.empty()) {
     refuse(reference, other, pairs, doubts);
+  }
+  const std::string pairing = pairing_text(reference, other, pairs);
+  const LeftOut left = leave_out(reference, other, options.scope, pairs);
+  if (pairs.returns.empty() && left.outside_reference + left.ignored_reference > 0) {
+    throw Error(
+        "{}: no pair of returns with {} is left: {} of the reference's are outside the area and "
+        "heights, and {} are ignored for their distance",
+        other.name, reference.name, left.outside_reference, left.ignored_reference);
   }
   const ScanErrors errors = errors_of(reference, other, pairs);
   const auto turn_rad = turn_between(reference, other, pairs);
   Section section{.title = fmt::format("Scan {} against {}", other.name, reference.name)};
   add_sentences(section.text, doubts);
   add_sentences(section.text, doubts_about(pairs, errors, turn_rad));
-  add_sentences(section.text, {pairing_text(reference, other, pairs)});
+  add_sentences(section.text, {pairing});
   const std::vector<std::string> frames{reference.frame, other.frame};
   for (const auto& notes : {pairs.notes, frames, reference.notes, other.notes,
                             doubts_about_ranges(reference), doubts_about_ranges(other)}) {
     add_sentences(section.text, notes);
   }
-  tell_pairs(reference, other, pairs, options.limits, section);
+  if (options.scope.has_box() || options.scope.ignores())
+    section.text += " " + scope_text(options.scope, "the frame of the reference's points");
+  tell_pairs(pairs, options.limits, section);
+  tell_left_out(left, pairs, options.scope, section);
   if (pairs.returns.empty()) {
     fail_ranges(options.limits, section);
   } else {
@@ -250,6 +302,7 @@ Section compare_scans(const Scan& reference, const Scan& other, const ScanOption
     tell_directions(errors, turn_rad, section);
     tell_intensities(reference, other, pairs, section);
     section.histograms.push_back(histogram_of_errors("Error of the range", "m", errors.range_m));
+    section.histograms.back().counted = "pairs of returns";
   }
   add_classes(reference, other, pairs, errors, section);
   if (!pairs.returns.empty()) {
@@ -257,6 +310,8 @@ Section compare_scans(const Scan& reference, const Scan& other, const ScanOption
   }
   section.tables.push_back(table_of_files(reference, other));
   section.tables.push_back(table_of_columns(reference, other));
+  draw_errors(reference, other, pairs, errors, section);
+  write_headline(pairs, errors, section);
   section.verdict = verdict_of(section.measures);
   return section;
 }

@@ -4,6 +4,7 @@
 #include <optional>
 
 #include "apps/golden/compare/scans/scan_pairing.h"
+#include "apps/golden/compare/scope.h"
 #include "apps/golden/report.h"
 #include "apps/scan/scan.h"
 
@@ -22,13 +23,16 @@ struct ScanOptions {
   ScanReading reference, other;
   PairingOptions pairing;
   ScanLimits limits;
+  Scope scope{};  ///< its box is in the W of the reference's sensor pose, as leave_out
 };
 
 /// Compares a scan with a reference, both as reported, with x, y and z in the sensor frame. Reports
 /// the pairing of returns; errors of range (other minus reference), of direction and across the
 /// beam; missing and extra returns, also by range, incidence and label; the relation of
 /// intensities; and signs of different units or frames. Deterministic.
-/// @throws Error as read_scan and pair_scans, or if both have returns and none could be paired.
+/// @throws Error as check_scope, read_scan and pair_scans, or if both have returns and none could
+/// be
+///         paired or the scope leaves out all pairs.
 Section compare_scans(const std::filesystem::path& reference, const std::filesystem::path& other,
                       const ScanOptions& options);
 

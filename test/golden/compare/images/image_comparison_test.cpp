@@ -97,6 +97,37 @@ TEST(CompareImages, ReportsNoErrorsOfLayersWithoutCommonPixels) {
   }
 }
 
+// 40 x 25 px; the error is 1 cm per column, so within columns 10 to 14 it is 10 to 14 cm.
+TEST(CompareImages, ComparesARectangleOfPixels) {
+  const auto depth = [](double slope) {
+    return image({layer("Z", LayerKind::Depth, {40, 25}, 1,
+                        [slope](int x, int, int) { return 10 + slope * x; })});
+  };
+  const PixelBox box{{10, 3}, {5, 7}};
+  const Section section = compare(cropped(depth(0), box), cropped(depth(0.01), box));
+  EXPECT_EQ(figure(section, "Z: in both"), 35);
+  EXPECT_NEAR(figure(section, "Z: mean error"), 0.12, 1e-12);
+  EXPECT_NEAR(figure(section, "Z: largest error"), 0.14, 1e-12);
+  EXPECT_THAT(section.text, HasSubstr("Z: the largest error is in column 14, row 3"));
+  EXPECT_THAT(section.headline, HasSubstr("Z: RMS error 0.1208 m"));
+  EXPECT_THAT(section.main, ElementsAre("Z: RMS error", "Z: largest error", "Z: mean error",
+                                        "Z: 95th percentile of its size"));
+  const Picture& errors = section.pictures.back();
+  EXPECT_EQ(errors.shown, Shown::Errors);
+  EXPECT_EQ(errors.across->low, 10);
+  EXPECT_EQ(errors.across->high, 15);
+  EXPECT_EQ(errors.up->low, 10);
+  EXPECT_EQ(errors.up->high, 3);
+  EXPECT_EQ(errors.bar->marks.back().second, "0.2");  // 0.14, rounded up
+  for (const PixelBox& wrong :
+       {PixelBox{{36, 0}, {5, 5}}, PixelBox{{0, 0}, {0, 5}}, PixelBox{{-1, 0}, {5, 5}},
+        PixelBox{{0, 24}, {5, 2}}, PixelBox{{2, 2}, {2147483647, 5}}}) {
+    EXPECT_THAT([&] { cropped(depth(0), wrong); },
+                ThrowsMessage<Error>(HasSubstr("must be COLUMN ROW WIDTH HEIGHT within the image "
+                                               "of 40 x 25 px")));
+  }
+}
+
 TEST(CompareImages, FindsNoDifferenceBetweenEqualImages) {
   const auto some = [](int x, int y, int k) { return std::sin(x + 2.0 * y + k) + 2; };
   const ImageFile one = image({layer("Z", LayerKind::Depth, {20, 20}, 1, some),

@@ -5,6 +5,8 @@
 #include <gtest/gtest.h>
 
 #include <algorithm>
+#include <array>
+#include <glm/geometric.hpp>
 #include <random>
 
 #include "core/error.h"
@@ -337,6 +339,77 @@ TEST(CompareScans, RejectsUnusableTolerances) {
   EXPECT_THAT(
       message_of([&] { compare_scans(scan, scan, {.pairing = {.rule = PairingRule::Pulse}}); }),
       HasSubstr("pairing by pulse number requires a usable column pulse"));
+}
+
+// The half with y < 0 is 0.5 m too far; the sensor stands at (100, 200, 0) in W. Ring 4 and above
+// have ranges of 9 m and more.
+TEST(CompareScans, ComparesOnlyWhatIsInTheScope) {
+  SampleReturns other = sample_returns();
+  std::size_t left = 0;
+  for (SampleReturn& r : other) {
+    if (r.direction.y < 0) r.range_m += 0.5;
+    left += r.direction.y >= 0 ? 1 : 0;
+  }
+  Scan a = scan_of(sample_returns(), {"ring", "time"}), b = scan_of(other, {"ring", "time"});
+  a.X_WS.translation_m = {100, 200, 0};
+  constexpr double all = Scope::unbounded;
+  const Scope box{.low_m = {-all, 200, -all}, .high_m = {all, all, all}};
+  const Section upper = compare_scans(a, b, {.scope = box});
+  EXPECT_EQ(value_of(upper, "pairs of returns"), left);
+  EXPECT_EQ(value_of(upper, "range error, largest magnitude"), 0);
+  EXPECT_EQ(value_of(upper, "reference: outside the area and heights"), 720 - left);
+  EXPECT_EQ(value_of(upper, "missing returns"), 0);
+  EXPECT_THAT(upper.text, HasSubstr("Only y from 200 to inf m of the frame of the reference"));
+  EXPECT_THAT(upper.headline, HasSubstr(fmt::format("All {} pairs of returns have equal", left)));
+  EXPECT_THAT(message_of([&] {
+                compare_scans(a, b, {.scope = {.low_m = {-1, -1, -1}, .high_m = {1, 1, 1}}});
+              }),
+              HasSubstr("720 of the reference's are outside the area and heights"));
+}
+
+// The other scan covers the front half only. Points of the rear are farther than 0.5 m from all of
+// its points, except near the border: an azimuth step is 0.07 rad, of 8 m to 18 m.
+TEST(CompareScans, LeavesOutWhatIsFarFromTheOtherScan) {
+  const SampleReturns reference = sample_returns();
+  SampleReturns other;
+  for (const SampleReturn& r : reference) {
+    if (r.direction.x > 0) other.push_back(r);
+  }
+  const Scan a = scan_of(reference, {"ring", "time"}), b = scan_of(other, {"ring", "time"});
+  std::size_t far = 0;
+  for (const glm::dvec3& p : a.p_S) {
+    const bool is_near =
+        std::ranges::any_of(b.p_S, [&](const glm::dvec3& q) { return glm::distance(p, q) <= 0.5; });
+    far += is_near ? 0 : 1;
+  }
+  const Section section = compare_scans(a, b, {.scope = {.ignore_beyond_m = 0.5}});
+  EXPECT_EQ(value_of(section, "pairs of returns"), other.size());
+  const std::string left_out = "reference: left out, farther than 0.5 m from the other surface";
+  EXPECT_EQ(value_of(section, left_out), far);
+  EXPECT_EQ(value_of(section, "missing returns"), 720 - other.size() - far);
+  EXPECT_NEAR(value_of(section, left_out + ", share"), 100. * static_cast<double>(far) / 720, 1e-9);
+  EXPECT_GT(far, 300u);
+}
+
+// One ring is 0.2 m off: only its row of the picture by ring is coloured.
+TEST(CompareScans, DrawErrorsByAzimuthAndRing) {
+  SampleReturns other = sample_returns();
+  for (SampleReturn& r : other) r.range_m += r.ring == 2 ? 0.2 : 0;
+  const Section section = compare(sample_returns(), other, {"ring", "time"});
+  ASSERT_EQ(section.pictures.size(), 2u);
+  const Picture& picture = section.pictures[0];
+  EXPECT_EQ(picture.up->label, "ring");
+  EXPECT_EQ(picture.up->low, -0.5);
+  EXPECT_EQ(picture.up->high, 7.5);
+  std::array<std::size_t, 8> red{};
+  const int row_px = picture.image.height() / 8;
+  for (int y = 0; y < picture.image.height(); ++y) {
+    for (int x = 0; x < picture.image.width(); ++x)
+      red[static_cast<std::size_t>(7 - y / row_px)] += picture.image.at(x, y)[2] < 100 ? 1 : 0;
+  }
+  for (std::size_t ring = 0; ring < red.size(); ++ring) EXPECT_EQ(red[ring] > 0, ring == 2) << ring;
+  const Section by_direction = compare(sample_returns(), other, {});
+  EXPECT_EQ(by_direction.pictures.at(0).up->label, "elevation, deg");
 }
 
 TEST(CompareScans, ComparesFilesOfDifferentFormats) {
