@@ -57,6 +57,9 @@ struct Layer {
   /// Texture, applied by the data's texture coordinates if the layer is coloured by no column or by
   /// an RGB column, which the texture shows in more detail; or null.
   vtkSmartPointer<vtkTexture> texture{};
+  /// White texture with alpha 0 or 255, applied by the data's texture coordinates whatever the
+  /// layer is coloured by: parts of alpha 0 are not drawn. Null if nothing is cut out.
+  vtkSmartPointer<vtkTexture> mask{};
 
   std::string coloured_by{};           ///< name of a column; empty for a single colour
   glm::vec3 colour{0.8f, 0.8f, 0.8f};  ///< sRGB, used if no column is selected

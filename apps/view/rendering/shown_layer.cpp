@@ -137,7 +137,11 @@ void ShownLayer::draw(vtkPolyDataMapper* mapper) {
   vtkActor& actor = *layer_.actor;
   actor.SetMapper(mapper);
   const bool textured = is_textured(*mapper);
-  actor.SetTexture(textured ? layer_.texture.Get() : nullptr);
+  const bool is_cut =
+      layer_.mask != nullptr && mapper->GetInput()->GetPointData()->GetTCoords() != nullptr;
+  actor.SetTexture(textured ? layer_.texture.Get() : is_cut ? layer_.mask.Get() : nullptr);
+  // Without this, VTK would blend surfaces with alpha, in an arbitrary order.
+  actor.SetForceOpaque(is_cut && layer_.opacity >= 1);
   const glm::vec3 colour = textured ? glm::vec3(1) : layer_.colour;
   actor.GetProperty()->SetColor(colour.r, colour.g, colour.b);
 }
