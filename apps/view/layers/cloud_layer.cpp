@@ -248,6 +248,7 @@ Layer cloud_layer(const CloudContent& content, const PointCloud& table) {
   Layer layer{.name = content.name, .kind = LayerKind::Cloud, .data = make_points(rows.size())};
   const glm::dvec3 origin = near_origin(content.p_m, rows);
   layer.origin_w_m = content.origin_w_m + origin;
+  layer.frame_w_m = content.origin_w_m;
   const auto places = coordinates(*layer.data);
   std::vector<float> height(rows.size()), number(rows.size());
   for (std::size_t i = 0; i < rows.size(); ++i) {

@@ -40,7 +40,8 @@ class CutOuts {
 
  private:
   struct Place {
-    glm::dvec2 first{0}, size{0};  // texture coordinates of the mask's lower left corner, and extent
+    glm::dvec2 first{0},
+        size{0};  // texture coordinates of the mask's lower left corner, and extent
   };
   std::vector<const Model*> models_;
   std::map<std::pair<std::size_t, std::size_t>, Place> places_;  // by model and surface

@@ -97,8 +97,7 @@ CutOuts cut_outs_of(const Simulation& simulation, const std::vector<Shown>& show
   static const Model unused;
   std::vector<const Model*> models(simulation.scene_objects.objects.models().size(), &unused);
   for (const Shown& one : shown)
-    models[one.place.model] =
-        &simulation.scene_objects.objects.models()[one.place.model].model();
+    models[one.place.model] = &simulation.scene_objects.objects.models()[one.place.model].model();
   return CutOuts(models);
 }
 
