@@ -76,7 +76,8 @@ void add_model(const Simulation& simulation, const Shown& shown,
     if (const auto uv = cut_outs.corners(shown.place.model, i)) {
       // Copies: a vertex may be shared with triangles that are not cut out.
       for (glm::length_t k = 0; k < 3; ++k) {
-        mesh.vertices_m.push_back(glm::dvec3(mesh.vertices_m[corner[k]]));
+        const glm::dvec3 p_m = mesh.vertices_m[corner[k]];
+        mesh.vertices_m.push_back(p_m);
         shapes.mask_uv.push_back((*uv)[static_cast<std::size_t>(k)]);
         corner[k] = static_cast<std::uint32_t>(mesh.vertices_m.size() - 1);
       }
