@@ -6,6 +6,7 @@
 #include <QDoubleSpinBox>
 #include <QFormLayout>
 #include <array>
+#include <utility>
 
 #include "apps/view/window/widgets.h"
 
@@ -43,10 +44,11 @@ void ask_for_origin(QWidget* parent, const std::string& layer, const glm::dvec3&
                      if (index > 0) fill(boxes, known[static_cast<std::size_t>(index - 1)].second);
                    });
   auto* buttons = new QDialogButtonBox(QDialogButtonBox::Ok | QDialogButtonBox::Cancel);
-  QObject::connect(buttons, &QDialogButtonBox::accepted, dialog, [dialog, boxes, done] {
-    done({boxes[0]->value(), boxes[1]->value(), boxes[2]->value()});
-    dialog->accept();
-  });
+  QObject::connect(buttons, &QDialogButtonBox::accepted, dialog,
+                   [dialog, boxes, done = std::move(done)] {
+                     done({boxes[0]->value(), boxes[1]->value(), boxes[2]->value()});
+                     dialog->accept();
+                   });
   QObject::connect(buttons, &QDialogButtonBox::rejected, dialog, &QDialog::reject);
   form->addRow(buttons);
   dialog->open();
