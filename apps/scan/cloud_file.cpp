@@ -7,6 +7,7 @@
 #include <array>
 #include <utility>
 
+#include "apps/scan/column_names.h"
 #include "core/error.h"
 #include "core/io/file_io.h"
 #include "core/io/npy_io.h"
@@ -102,7 +103,7 @@ bool holds_points(const NpyArray& array) {
 /// first array that holds points or is called x.
 std::size_t rows_of(const NpzFile& file) {
   for (const NpyArray& array : file.arrays) {
-    if (array.is_structured || holds_points(array) || lower(array.name) == "x") {
+    if (array.is_structured || holds_points(array) || find_column({array.name}, "x")) {
       return array.cloud.rows();
     }
   }

@@ -259,6 +259,16 @@ Opened open_any(const fs::path& path, const OpenLimits& limits, const std::stop_
   return opened;
 }
 
+bool place_input(Opened& opened, const FrameOrigin& origin) {
+  if (opened.kind != InputKind::Mesh && opened.kind != InputKind::Cloud) return false;
+  Layer& layer = opened.layers.front();
+  const bool is_named =
+      origin.input == opened.path.string() || origin.input == opened.path.filename().string();
+  if (!is_named && (!origin.input.empty() || layer.frame_w_m != glm::dvec3(0))) return false;
+  move_frame(layer, origin.origin_w_m);
+  return true;
+}
+
 Layer scan_layer(const RecordedDataset& dataset, const RecordedLidar& lidar,
                  const RecordedFrame& frame, const std::string& name) {
   const CloudFile file = read_cloud(frame.file, {});

@@ -56,6 +56,18 @@ struct Opened {
 Opened open_any(const std::filesystem::path& path, const OpenLimits& limits = {},
                 const std::stop_token& stop = {});
 
+/// Origin for the coordinates of meshes and clouds whose files state none.
+struct FrameOrigin {
+  std::string text;   ///< as requested, for messages
+  std::string input;  ///< path or file name; empty for all inputs that state no origin
+  glm::dvec3 origin_w_m{0};
+};
+
+/// Moves the layer of a mesh or cloud to the origin, if the request applies to the input.
+/// @return true if it does: without a name, to meshes and clouds whose file states no origin.
+/// @throws Error as move_frame.
+bool place_input(Opened& opened, const FrameOrigin& origin);
+
 /// Returns the type of an input without reading all of it. @throws Error as open_any.
 InputKind kind_of(const std::filesystem::path& path);
 

@@ -28,7 +28,8 @@ constexpr int wrong_usage = 2;
 struct Arguments {
   std::vector<std::filesystem::path> inputs;
   std::filesystem::path screenshot;
-  std::string size, look_from, look_at, follow, range;
+  std::string size, look_from, look_at, follow, range, clip;
+  std::vector<std::string> origins;
   std::filesystem::path compare_with;
   double tolerance_m = 0;
   int turntable = 0;
@@ -62,6 +63,14 @@ void add_options(CLI::App& app, Arguments& arguments) {
          "--tolerance-m", arguments.tolerance_m,
          "With --compare-with a mesh: print precision and completeness within this distance")
       ->check(CLI::PositiveNumber);
+  app.add_option(
+      "--origin", arguments.origins,
+      "X,Y,Z in map coordinates, m, at which meshes and clouds of local coordinates have "
+      "theirs of 0; INPUT=X,Y,Z for one file; may be repeated");
+  app.add_option("--clip", arguments.clip,
+                 "X0,Y0,Z0,X1,Y1,Z1: show only what is inside this box, in map coordinates, m");
+  app.add_flag("--eye-dome", arguments.still.view.has_eye_dome,
+               "Draw with eye-dome lighting, which shows the shape of clouds");
   app.add_flag("--wireframe", arguments.still.view.is_wireframe, "Draw surfaces as wireframes");
   app.add_flag("--no-legend", arguments.no_legend, "Omit the legend");
   app.add_option(
@@ -77,6 +86,9 @@ void read_spec(Arguments& arguments) {
   if (!arguments.look_at.empty()) spec.view.at_w_m = parse_place(arguments.look_at, "--look-at");
   if (!arguments.follow.empty()) spec.follow_w_m = parse_place(arguments.follow, "--follow");
   if (!arguments.range.empty()) spec.range = parse_range(arguments.range);
+  if (!arguments.clip.empty()) spec.view.clip = parse_box(arguments.clip);
+  for (const std::string& origin : arguments.origins)
+    spec.view.origins.push_back(parse_origin(origin));
   if (spec.view.from_w_m && spec.view.from_w_m == spec.view.at_w_m)
     throw Error("--look-from and --look-at are the same point: they must differ");
   spec.view.has_legend = !arguments.no_legend;
@@ -122,6 +134,7 @@ int take_stills(const Arguments& arguments) {
     inputs.push_back(open_any(input));
     for (const std::string& note : inputs.back().notes) print_error("note: {}\n", note);
   }
+  place_inputs(inputs, spec.view.origins);
   if (!arguments.compare_with.empty()) compare_inputs(inputs, arguments);
   View view(make_offscreen_window(spec.size_px));
   arrange(view, inputs, spec);

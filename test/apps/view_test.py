@@ -61,6 +61,9 @@ def write_inputs(folder: Path) -> list[Path]:
     points = np.random.default_rng(3).uniform(-5, 5, (500, 4)).astype(np.float32)
     np.save(folder / "cloud.npy", points)
     np.savez(folder / "cloud.npz", xyz=points[:, :3], intensity=points[:, 3])
+    # As groundray-export writes them.
+    named = {f"{axis}_m": points[:, i] for i, axis in enumerate("xyz")}
+    np.savez(folder / "own.npz", **named, range_m=points[:, 3], X_DS=np.eye(4), stamp_ns=5)
     points.tofile(folder / "cloud.bin")
     colours = np.random.default_rng(4).uniform(0, 255, (9, 16, 3))
     colours = cv2.resize(colours, (160, 90))

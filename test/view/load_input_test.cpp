@@ -93,6 +93,61 @@ TEST(Open, ReadsArraysAsClouds) {
   EXPECT_THAT(archive.notes, ::testing::Contains(HasSubstr("names")));  // holds no numbers
 }
 
+// Names and units as groundray-export and the Python package write them.
+TEST(Open, ReadsCloudsWithUnitsInTheirColumnNames) {
+  TemporaryFolder folder;
+  const std::vector<float> rows = {1, 2, 3, 40, -4, 5, 6, 50};
+  const std::vector<NpyField> fields = {
+      {"x_m", "<f4"}, {"y_m", "<f4"}, {"z_m", "<f4"}, {"range_true_m", "<f4"}};
+  write_npy(folder / "own.npy", fields, 2, std::as_bytes(std::span(rows)));
+  const Layer layer = open_any(folder / "own.npy").layers.at(0);
+  ASSERT_EQ(layer.points(), 2u);
+  EXPECT_EQ(layer.p_w_m(1), glm::dvec3(-4, 5, 6));
+  EXPECT_EQ(layer.find("x_m"), nullptr);
+  ASSERT_NE(layer.find("range_true_m"), nullptr);
+  EXPECT_EQ(layer.find("range_true_m")->unit, "m");
+}
+
+TEST(Open, IgnoresColoursThatAreAllBlack) {
+  TemporaryFolder folder;
+  for (const bool is_black : {true, false}) {
+    write_bytes(folder / "mesh.ply",
+                std::string("ply\nformat ascii 1.0\nelement vertex 3\nproperty float x\nproperty "
+                            "float y\nproperty float z\nproperty uchar red\nproperty uchar "
+                            "green\nproperty uchar blue\nelement face 1\nproperty list uchar int "
+                            "vertex_indices\nend_header\n0 0 0 0 0 0\n1 0 0 0 0 0\n0 1 0 0 0 ") +
+                    (is_black ? "0" : "1") + "\n3 0 1 2\n");
+    const Layer layer = open_any(folder / "mesh.ply").layers.at(0);
+    EXPECT_EQ(layer.coloured_by, is_black ? "" : "colour");
+    EXPECT_EQ(layer.find("colour") == nullptr, is_black);
+    const auto reports = ::testing::Contains(HasSubstr("all black"));
+    if (is_black) {
+      EXPECT_THAT(layer.facts, reports);
+    } else {
+      EXPECT_THAT(layer.facts, ::testing::Not(reports));
+    }
+  }
+}
+
+TEST(Open, PlacesLocalCoordinatesAtAnOrigin) {
+  const OpenedSamples& samples = OpenedSamples::get();
+  Opened cloud = open_any(samples["cloud.npy"]);
+  EXPECT_FALSE(place_input(cloud, {.text = "", .input = "other.npy", .origin_w_m = {1, 1, 1}}));
+  EXPECT_TRUE(place_input(cloud, {.text = "", .input = "", .origin_w_m = {5e5, 4e6, 100}}));
+  const Layer& layer = cloud.layers.at(0);
+  EXPECT_EQ(layer.p_w_m(0), glm::dvec3(500'001, 4'000'002, 103));
+  EXPECT_EQ(layer.value(*layer.find("height"), 0), 103);
+  EXPECT_EQ(layer.find("height")->range, glm::dvec2(103, 106));
+  // A file that states its origin is moved only if it is named.
+  Opened mesh = open_any(samples["mesh.ply"]);
+  EXPECT_EQ(mesh.layers.at(0).frame_w_m, glm::dvec3(500'000, 4'000'000, 7));
+  EXPECT_FALSE(place_input(mesh, {.text = "", .input = "", .origin_w_m = {1, 2, 3}}));
+  EXPECT_TRUE(place_input(mesh, {.text = "", .input = "mesh.ply", .origin_w_m = {1, 2, 3}}));
+  EXPECT_EQ(mesh.layers.at(0).p_w_m(1), glm::dvec3(2, 2, 3));
+  Opened dem = open_any(samples["hills.asc"]);
+  EXPECT_FALSE(place_input(dem, {.text = "", .input = "hills.asc", .origin_w_m = {1, 2, 3}}));
+}
+
 // Radiances of 1 and 2 get the same exposure factor; the second pixel is at the maximum brightness.
 TEST(Open, ExposesRadiance) {
   const Opened opened = open_any(OpenedSamples::get()["light.hdr"]);

@@ -142,6 +142,27 @@ TEST(Still, ParsesSizesAndPlaces) {
   }
 }
 
+TEST(Still, ParsesOriginsAndBoxes) {
+  const FrameOrigin of_all = parse_origin("1,2,3.5"), of_one = parse_origin("a=b.ply=-1,2,3");
+  EXPECT_EQ(of_all.input, "");
+  EXPECT_EQ(of_all.origin_w_m, glm::dvec3(1, 2, 3.5));
+  EXPECT_EQ(of_one.input, "a=b.ply");
+  EXPECT_EQ(of_one.origin_w_m, glm::dvec3(-1, 2, 3));
+  for (const char* const text : {"", "1,2", "a.ply", "a.ply=", "a.ply=1,2,x"}) {
+    EXPECT_THAT([&] { parse_origin(text); }, ThrowsMessage<Error>(HasSubstr("--origin"))) << text;
+  }
+  EXPECT_EQ(parse_box("1,2,3,4,5,6").high_w_m, glm::dvec3(4, 5, 6));
+  for (const char* const text : {"", "1,2,3", "1,2,3,4,5,inf", "1,2,3,4,5,3", "1,2,3,4,5,6,7"}) {
+    EXPECT_THAT([&] { parse_box(text); }, ThrowsMessage<Error>(HasSubstr("--clip"))) << text;
+  }
+}
+
+TEST(Still, ReportsOriginsThatApplyToNoInput) {
+  std::vector<Opened> inputs = jacksboro();
+  EXPECT_THAT([&] { place_inputs(inputs, {parse_origin("1,2,3")}); },
+              ThrowsMessage<Error>(HasSubstr("--origin 1,2,3: no input")));
+}
+
 TEST(Still, ReportsMissingLayersAndColumns) {
   EXPECT_THAT([] { still_of(jacksboro(), {.view = {.colour_by = {"depth"}}}); },
               ThrowsMessage<Error>(HasSubstr("terrain=height")));

@@ -267,6 +267,30 @@ TEST(RecordedImage, ReadsPicturesOf8And16Bits) {
   EXPECT_EQ(image.draw(*image.find("picture")).picture.at(0, 0)[0], 200);
 }
 
+// Exposure scales linear light: sRGB (IEC 61966-2-1) encodes 1/4 as 137 and 1/2 as 188.
+TEST(RecordedImage, ExposesLightAndPictures) {
+  const TemporaryFolder folder;
+  ImageF light(2, 1, 3);
+  std::ranges::copy(std::array{1.0F, 1.0F, 1.0F, 4.0F, 4.0F, 4.0F}, light.values().begin());
+  write_exr(folder / "light.exr", {{{"R", "G", "B"}, &light}});
+  const RecordedImage exr(folder / "light.exr");
+  EXPECT_EQ(automatic_exposure_ev(exr.channels()[0]), 0);
+  const DrawnChannel plain = exr.draw(0), bright = exr.draw(0, std::nullopt, 1);
+  EXPECT_NEAR(plain.legend.high, 4, 0.1);
+  EXPECT_NEAR(bright.legend.high, plain.legend.high / 2, 1e-12);
+  EXPECT_NEAR(plain.picture.at(0, 0)[0], 137, 2);
+  EXPECT_NEAR(bright.picture.at(0, 0)[0], 188, 2);
+  EXPECT_EQ(bright.picture.at(1, 0)[0], 255);
+  Image8 grey(2, 1, 3);
+  for (auto& byte : grey.values()) byte = 137;
+  write_png(folder / "grey.png", grey);
+  const RecordedImage png(folder / "grey.png");
+  EXPECT_EQ(png.draw(0).picture.at(0, 0)[0], 137);
+  EXPECT_NEAR(png.draw(0, std::nullopt, 1).picture.at(0, 0)[0], 188, 1);
+  EXPECT_NEAR(png.draw(0, std::nullopt, -20).picture.at(0, 0)[0], 0, 1);
+  EXPECT_NEAR(automatic_exposure_ev(png.channels()[0]), 2, 0.02);
+}
+
 // A lidar's echoes are dots of 3 x 3 px: hidden ones are omitted, and the nearest is on top.
 TEST(RecordedImage, ShowsPositionsOfEchoes) {
   const TemporaryFolder folder;

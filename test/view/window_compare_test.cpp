@@ -1,3 +1,4 @@
+#include <QComboBox>
 #include <QPushButton>
 #include <QTest>
 #include <string>
@@ -63,23 +64,67 @@ TEST_F(WindowCompareTest, ComparesWithTheTruth) {
   }
 }
 
-// The terrain's levels, and thus its surface, have changed since it was offered as the truth.
-TEST_F(WindowCompareTest, TerrainMatchesItselfAfterFollowingTheEye) {
+// The terrain's levels, and thus its surface, have changed since it was offered as the truth: the
+// data of the comparison are those that are shown. The DEM's own levels deviate from the samples.
+TEST_F(WindowCompareTest, TerrainIsComparedAsItIsShown) {
   Window& window = shown();
   open(SampleDataset::get().scene());
-  const auto before = window.view().find("scene.yaml/terrain")->data;
+  open(SampleDataset::get().scene().parent_path() / "hills.asc");
+  const auto before = window.view().find("hills.asc")->data;
   window.canvas().look({{300, 300, 400}, {80, 80, 50}});
   QTest::keyClick(&window, Qt::Key_1);
   settle();
-  ASSERT_NE(window.view().find("scene.yaml/terrain")->data, before);
+  ASSERT_NE(window.view().find("hills.asc")->data, before);
   ComparePanel& panel = window.compare_panel();
-  panel.choose("scene.yaml/terrain", "surface of scene.yaml/terrain");
+  panel.choose("hills.asc", "ground of scene.yaml");
   panel.compare_chosen();
   settle();
   EXPECT_EQ(dismiss_fault(), "");
+  EXPECT_EQ(panel.figures().value("points"),
+            std::to_string(window.view().find("hills.asc")->points()));
   ASSERT_NE(panel.figures().value("largest"), "");
-  EXPECT_LT(std::stod(panel.figures().value("largest")), 1e-6);
-  EXPECT_EQ(window.view().find("scene.yaml/terrain")->coloured_by, "deviation");
+  EXPECT_LT(metres(panel.figures().value("largest")), 1e-3);  // vertices are samples of the DEM
+  EXPECT_EQ(window.view().find("hills.asc")->coloured_by, "deviation");
+}
+
+QStringList texts(const ComparePanel& panel, const char* name) {
+  QStringList all;
+  const auto* box = panel.findChild<QComboBox*>(name);
+  for (int i = 0; i < box->count(); ++i) all << box->itemText(i);
+  return all;
+}
+
+TEST_F(WindowCompareTest, OffersScansAgainstTheGroundFirstAndNothingAgainstItself) {
+  Window& window = shown();
+  const ComparePanel& panel = window.compare_panel();
+  open(SampleDataset::get().scene());
+  // Neither a scene's terrain nor its post is a measurement.
+  EXPECT_EQ(texts(panel, "measured"), QStringList());
+  EXPECT_FALSE(panel.findChild<QPushButton*>("compare")->isEnabled());
+  const TemporaryFolder folder;
+  const TriangleMesh mesh{
+      .vertices_m = {{0, 0, 0}, {4, 0, 0}, {2, 3, 1}}, .triangles = {{0, 1, 2}}, .levels = {}};
+  write_ply(folder / "mesh.ply", mesh, {});
+  open(folder / "mesh.ply");
+  EXPECT_EQ(texts(panel, "measured"), QStringList("mesh.ply"));
+  EXPECT_EQ(
+      texts(panel, "truth"),
+      (QStringList{"ground of scene.yaml", "surface of scene.yaml/terrain",
+                   "surface of scene.yaml/objects/post", "surface of scene.yaml/objects/cart"}));
+  open(SampleDataset::get().path());
+  EXPECT_EQ(texts(panel, "measured"), (QStringList{"dataset/lidar/top", "mesh.ply"}));
+  EXPECT_EQ(panel.findChild<QComboBox*>("measured")->currentText(), "dataset/lidar/top");
+  EXPECT_EQ(panel.findChild<QComboBox*>("truth")->currentText(), "ground of scene.yaml");
+  EXPECT_EQ(texts(panel, "truth")[1], "surface of mesh.ply");
+  // The user's choice stays when more is opened.
+  window.compare_panel().choose("mesh.ply", "surface of scene.yaml/terrain");
+  EXPECT_FALSE(texts(panel, "truth").contains("surface of mesh.ply"));
+  open(SampleDataset::get().scene().parent_path() / "hills.asc");
+  EXPECT_EQ(panel.findChild<QComboBox*>("measured")->currentText(), "mesh.ply");
+  EXPECT_EQ(panel.findChild<QComboBox*>("truth")->currentText(), "surface of scene.yaml/terrain");
+  window.compare_panel().choose("hills.asc", "ground of scene.yaml");
+  EXPECT_FALSE(texts(panel, "truth").contains("heights of hills.asc"));
+  EXPECT_FALSE(texts(panel, "truth").contains("surface of hills.asc"));
 }
 
 }  // namespace

@@ -1,5 +1,6 @@
 #include <QAction>
 #include <QDialog>
+#include <QLabel>
 #include <QLineEdit>
 #include <QMenu>
 #include <QPushButton>
@@ -101,6 +102,30 @@ TEST_F(WindowFilesTest, CancelStopsLoadingOfAllFiles) {
   open(mesh);  // the window remains usable
   EXPECT_TRUE(has("mesh.ply"));
   EXPECT_FALSE(cancel->isVisible());
+}
+
+TEST_F(WindowFilesTest, ViewStatesWhatIsBeingOpened) {
+  const TemporaryFolder folder;
+  const auto slow = write_slow_scene(folder);
+  const auto mesh = write_mesh(folder / "mesh.ply");
+  Window& window = shown();
+  auto* hint = window.canvas().findChild<QLabel*>();
+  ASSERT_NE(hint, nullptr);
+  EXPECT_TRUE(hint->isVisible());
+  EXPECT_TRUE(hint->text().contains("Drop something here"));
+  window.open(slow);
+  EXPECT_FALSE(hint->text().contains("Drop"));
+  EXPECT_TRUE(hint->text().contains("Opening slow.yaml"));
+  EXPECT_TRUE(hint->isVisible());
+  window.cancel_opening();
+  EXPECT_TRUE(hint->text().contains("Drop something here"));
+  open(mesh);
+  EXPECT_FALSE(hint->isVisible());
+  window.open(slow);  // the mesh stays visible
+  EXPECT_FALSE(hint->isVisible());
+  window.cancel_opening();
+  window.close_all();
+  EXPECT_TRUE(hint->isVisible());
 }
 
 TEST_F(WindowFilesTest, MayBeClosedWhileLoading) {

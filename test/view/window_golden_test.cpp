@@ -180,7 +180,7 @@ TEST_F(WindowGoldenTest, TextsAreNotCutOff) {
   QTest::qWait(100);
   for (const QSize size : {QSize(1280, 720), QSize(1200, 760)}) {
     window_->resize(size);
-    for (const Qt::Key panel : {Qt::Key_N, Qt::Key_C}) {
+    for (const Qt::Key panel : {Qt::Key_N, Qt::Key_C, Qt::Key_B}) {
       QTest::keyClick(window_.get(), panel);
       settle();
       EXPECT_EQ(window_->size(), size) << "the panels need more";

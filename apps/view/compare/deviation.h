@@ -133,6 +133,7 @@ struct Truth {
   std::string name;  ///< name for display, unique among the truths that are offered
   /// Reference surface of a scene, that of a DEM file, or a displayed surface.
   std::variant<std::shared_ptr<const Simulation>, DemFile, Layer> what;
+  std::string layer{};  ///< name of the layer that shows it, which is not compared with it
 };
 
 /// Comparison of a layer with the truth.

@@ -16,6 +16,8 @@
 #include <set>
 #include <string_view>
 
+#include "apps/scan/column_names.h"
+
 namespace groundray {
 namespace {
 
@@ -33,9 +35,17 @@ const PointCloud::Column* find(const PointCloud& table, std::string_view name) {
   return found == table.columns().end() ? nullptr : &*found;
 }
 
-bool is_position(const std::string& name) {
-  constexpr std::array<std::string_view, 3> names = {"x", "y", "z"};
-  return std::ranges::find(names, lower(name)) != names.end();
+// Returns the columns of x, y and z under any of their names; null for each that is missing.
+std::array<const PointCloud::Column*, 3> position_columns(const PointCloud& table) {
+  std::vector<std::string> names;
+  for (const PointCloud::Column& column : table.columns()) names.push_back(column.name);
+  std::array<const PointCloud::Column*, 3> axes{};
+  for (std::size_t k = 0; k < 3; ++k) {
+    const auto found = find_column(names, std::string_view("xyz").substr(k, 1));
+    if (found)
+      axes[k] = &*std::ranges::find(table.columns(), found->name, &PointCloud::Column::name);
+  }
+  return axes;
 }
 
 // Returns true if a column of that name holds kinds.
@@ -66,13 +76,19 @@ std::string unit_of(std::string_view name) {
   for (const Unit& unit : units) {
     if (std::ranges::find(unit.names, small) != unit.names.end()) return std::string(unit.unit);
   }
+  constexpr std::array<std::pair<std::string_view, std::string_view>, 5> endings = {
+      {{"_m_s", "m/s"}, {"_m", "m"}, {"_s", "s"}, {"_w", "W"}, {"_rad", "rad"}}};
+  for (const auto& [ending, unit] : endings) {
+    if (small.ends_with(ending)) return std::string(unit);
+  }
   return "";
 }
 
 ColourScale scale_of(std::string_view name) {
   const std::string small = lower(name);
   if (small == "height" || small == "elevation") return ColourScale::Earth;
-  if (small.starts_with("range") || small == "ring" || small == "time") return ColourScale::Vivid;
+  if (small.starts_with("range") || small == "ring" || small.starts_with("time"))
+    return ColourScale::Vivid;
   for (const std::string_view part : {"signed", "deviation", "difference"}) {
     if (small.find(part) != std::string::npos) return ColourScale::Signed;
   }
@@ -126,6 +142,10 @@ void add_colour(Layer& layer, LayerColumn::Of of, const PointCloud& table,
   std::vector<std::uint8_t> rgb(3 * rows.size());
   for (std::size_t i = 0; i < rows.size(); ++i) {
     for (std::size_t k = 0; k < 3; ++k) rgb[3 * i + k] = colour_byte(*channels[k], rows[i]);
+  }
+  if (std::ranges::all_of(rgb, [](std::uint8_t byte) { return byte == 0; })) {
+    if (!rgb.empty()) layer.facts.emplace_back("its colours are all black, so they are not shown");
+    return;
   }
   add_colours(layer, {.name = "colour", .unit = "", .of = of}, rgb);
 }
@@ -183,8 +203,7 @@ std::vector<std::size_t> rows_kept(const CloudContent& content, std::size_t& bro
 }  // namespace
 
 std::vector<glm::dvec3> positions_of(const PointCloud& table) {
-  const std::array<const PointCloud::Column*, 3> axes = {find(table, "x"), find(table, "y"),
-                                                         find(table, "z")};
+  const std::array<const PointCloud::Column*, 3> axes = position_columns(table);
   if (std::ranges::find(axes, nullptr) != axes.end()) return {};
   std::vector<glm::dvec3> points(table.rows());
   for (std::size_t k = 0; k < 3; ++k) {
@@ -200,8 +219,9 @@ std::vector<glm::dvec3> positions_of(const PointCloud& table) {
 
 void add_table(Layer& layer, LayerColumn::Of of, const PointCloud& table,
                std::span<const std::size_t> rows) {
+  const auto axes = position_columns(table);
   for (const PointCloud::Column& column : table.columns()) {
-    if (is_position(column.name)) continue;
+    if (std::ranges::find(axes, &column) != axes.end()) continue;
     const std::vector<float> values = taken(column, rows);
     LayerColumn described{.name = column.name,
                           .unit = unit_of(column.name),
@@ -228,6 +248,7 @@ Layer cloud_layer(const CloudContent& content, const PointCloud& table) {
   Layer layer{.name = content.name, .kind = LayerKind::Cloud, .data = make_points(rows.size())};
   const glm::dvec3 origin = near_origin(content.p_m, rows);
   layer.origin_w_m = content.origin_w_m + origin;
+  layer.frame_w_m = content.origin_w_m;
   const auto places = coordinates(*layer.data);
   std::vector<float> height(rows.size()), number(rows.size());
   for (std::size_t i = 0; i < rows.size(); ++i) {

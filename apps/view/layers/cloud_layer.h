@@ -29,12 +29,13 @@ Layer cloud_layer(const CloudContent& content, const PointCloud& table);
 /// layer has.
 std::size_t table_row(const Layer& cloud, vtkIdType point);
 
-/// Returns the positions in a table from its columns x, y and z, in upper or lower case; empty if
-/// it lacks them.
+/// Returns the positions in a table from its columns x, y and z under any of the names that
+/// groundray reads (docs/reference/formats.md), such as x_m; empty if it lacks them.
 std::vector<glm::dvec3> positions_of(const PointCloud& table);
 
 /// Adds a table's columns to a layer, one value for each of `rows`, except x, y and z. Columns of
-/// kinds (label, class...) become categories; red, green and blue become "colour".
+/// kinds (label, class...) become categories; red, green and blue become "colour" unless all values
+/// are 0, which a fact reports.
 void add_table(Layer& layer, LayerColumn::Of of, const PointCloud& table,
                std::span<const std::size_t> rows);
 

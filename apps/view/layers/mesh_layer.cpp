@@ -49,6 +49,7 @@ Layer mesh_layer(const std::string& name, const TriangleMesh& mesh, const glm::d
   Layer layer{.name = name, .kind = LayerKind::Mesh, .data = make_points(count)};
   const glm::dvec3 centre = centre_of(mesh);
   layer.origin_w_m = origin_w_m + centre;
+  layer.frame_w_m = origin_w_m;
   const auto places = coordinates(*layer.data);
   std::vector<float> height(count);
   for (std::size_t i = 0; i < count; ++i) {

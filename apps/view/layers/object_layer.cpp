@@ -5,10 +5,12 @@
 #include <glm/geometric.hpp>
 #include <optional>
 
+#include "apps/view/layers/cut_out.h"
 #include "apps/view/layers/ground_colour.h"
 #include "apps/view/layers/mesh_layer.h"
 #include "apps/view/layers/scene_layers.h"
 #include "apps/view/rendering/colour_table.h"
+#include "apps/view/rendering/picture_file.h"
 
 namespace groundray {
 namespace {
@@ -42,10 +44,12 @@ std::vector<Shown> nearest(const Simulation& simulation, const SceneObjects::Gro
   return all;
 }
 
-// Values of each triangle.
-struct Cells {
+// Mesh of several objects, with values of each triangle and texture coordinates of each vertex.
+struct Shapes {
+  TriangleMesh mesh;
   std::vector<float> label, instance;
   std::vector<std::uint8_t> rgb;
+  std::vector<glm::vec2> mask_uv;
 };
 
 glm::dvec3 colour_of(const Simulation& simulation,
@@ -59,22 +63,43 @@ glm::dvec3 colour_of(const Simulation& simulation,
 }
 
 void add_model(const Simulation& simulation, const Shown& shown,
-               const std::optional<Materials::InColour>& colours, TriangleMesh& mesh,
-               Cells& cells) {
+               const std::optional<Materials::InColour>& colours, const CutOuts& cut_outs,
+               Shapes& shapes) {
   const Model& model = simulation.scene_objects.objects.models()[shown.place.model].model();
+  TriangleMesh& mesh = shapes.mesh;
   const auto first = static_cast<std::uint32_t>(mesh.vertices_m.size());
   for (const glm::dvec3& p : model.mesh.vertices_m)
     mesh.vertices_m.push_back(shown.place.p_DO + shown.place.R_DO * (shown.place.scale * p));
-  for (std::size_t i = 0; i < model.mesh.triangles.size(); ++i) {
-    mesh.triangles.push_back(model.mesh.triangles[i] + first);
+  shapes.mask_uv.resize(mesh.vertices_m.size(), cut_outs.opaque());
+  for (std::uint32_t i = 0; i < model.mesh.triangles.size(); ++i) {
+    glm::uvec3 corner = model.mesh.triangles[i] + first;
+    if (const auto uv = cut_outs.corners(shown.place.model, i)) {
+      // Copies: a vertex may be shared with triangles that are not cut out.
+      for (glm::length_t k = 0; k < 3; ++k) {
+        const glm::dvec3 p_m = mesh.vertices_m[corner[k]];
+        mesh.vertices_m.push_back(p_m);
+        shapes.mask_uv.push_back((*uv)[static_cast<std::size_t>(k)]);
+        corner[k] = static_cast<std::uint32_t>(mesh.vertices_m.size() - 1);
+      }
+    }
+    mesh.triangles.push_back(corner);
     const glm::u8vec3 rgb =
         shown_colour(colour_of(simulation, colours, shown.place.model, model.surface_of[i]));
-    for (glm::length_t k = 0; k < 3; ++k) cells.rgb.push_back(rgb[k]);
+    for (glm::length_t k = 0; k < 3; ++k) shapes.rgb.push_back(rgb[k]);
   }
   const std::size_t count = mesh.triangles.size();
-  cells.label.resize(count,
-                     static_cast<float>(simulation.scene_objects.models[shown.place.model].label));
-  cells.instance.resize(count, static_cast<float>(shown.number));
+  shapes.label.resize(count,
+                      static_cast<float>(simulation.scene_objects.models[shown.place.model].label));
+  shapes.instance.resize(count, static_cast<float>(shown.number));
+}
+
+// Returns the masks of the models that are shown.
+CutOuts cut_outs_of(const Simulation& simulation, const std::vector<Shown>& shown) {
+  static const Model unused;
+  std::vector<const Model*> models(simulation.scene_objects.objects.models().size(), &unused);
+  for (const Shown& one : shown)
+    models[one.place.model] = &simulation.scene_objects.objects.models()[one.place.model].model();
+  return CutOuts(models);
 }
 
 }  // namespace
@@ -84,18 +109,22 @@ Layer object_layer(const Simulation& simulation, std::size_t group, std::chrono:
   const SceneObjects::Group& entry = simulation.scene_objects.groups.at(group);
   const auto colours = material_colours(simulation);
   const std::vector<Shown> shown = nearest(simulation, entry, time, near_m, most_triangles);
-  TriangleMesh mesh;
-  Cells cells;
-  for (const Shown& one : shown) add_model(simulation, one, colours, mesh, cells);
-  Layer layer = mesh_layer(fmt::format("objects/{}", entry.name), mesh,
+  const CutOuts cut_outs = cut_outs_of(simulation, shown);
+  Shapes shapes;
+  for (const Shown& one : shown) add_model(simulation, one, colours, cut_outs, shapes);
+  Layer layer = mesh_layer(fmt::format("objects/{}", entry.name), shapes.mesh,
                            simulation.terrain.header().origin_w_m);
+  if (!cut_outs.empty()) {
+    set_texture_coordinates(*layer.data, shapes.mask_uv);
+    layer.mask = cut_outs.texture();
+  }
   constexpr auto of_cells = LayerColumn::Of::Cells;
   add_column(
       layer,
       {.name = "label", .unit = "", .of = of_cells, .categories = {{entry.label, entry.name}}},
-      cells.label);
-  add_column(layer, {.name = "instance", .unit = "", .of = of_cells}, cells.instance);
-  add_colours(layer, {.name = "colour", .unit = "", .of = of_cells}, cells.rgb);
+      shapes.label);
+  add_column(layer, {.name = "instance", .unit = "", .of = of_cells}, shapes.instance);
+  add_colours(layer, {.name = "colour", .unit = "", .of = of_cells}, shapes.rgb);
   layer.coloured_by = "colour";
   layer.facts.insert(layer.facts.begin(),
                      fmt::format("{} of {} objects", shown.size(), entry.count));

@@ -135,12 +135,13 @@ std::optional<std::size_t> RecordedImage::find(const std::string& name) const {
 }
 
 DrawnChannel RecordedImage::draw(std::size_t channel,
-                                 std::optional<std::pair<double, double>> range) const {
+                                 std::optional<std::pair<double, double>> range,
+                                 double exposure_ev) const {
   if (range && !(range->first < range->second)) {
     throw Error("a range of colours from {} to {} is empty: are its limits swapped?", range->first,
                 range->second);
   }
-  return draw_channel(channels_.at(channel), names_, range);
+  return draw_channel(channels_.at(channel), names_, range, exposure_ev);
 }
 
 std::vector<PixelValue> RecordedImage::values_at(glm::ivec2 pixel) const {

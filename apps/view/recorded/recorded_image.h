@@ -24,7 +24,7 @@ struct ImageChannel {
   /// Method of drawing.
   enum class Kind {
     Light,       ///< linear light, RGB or grey, exposed automatically
-    Picture,     ///< drawn as stored
+    AsStored,    ///< picture, drawn as stored
     Number,      ///< colour map; the last of three components, which is a position's height
     Distance,    ///< colour map on a logarithmic scale; near is bright
     Vector,      ///< x, y, z as red, green and blue; 0 is grey
@@ -91,9 +91,11 @@ class RecordedImage {
   /// Draws a channel.
   /// @param range  values at the ends of the colour map; by default chosen from the data: for
   ///               numbers, the 1 % and 99 % quantiles of the finite values.
+  /// @param exposure_ev  for light and pictures: brightens by this power of 2, in linear light.
   /// @throws Error if the range is empty.
   DrawnChannel draw(std::size_t channel,
-                    std::optional<std::pair<double, double>> range = std::nullopt) const;
+                    std::optional<std::pair<double, double>> range = std::nullopt,
+                    double exposure_ev = 0) const;
 
   /// Returns the values of all channels at a pixel; empty outside the image.
   std::vector<PixelValue> values_at(glm::ivec2 pixel) const;
@@ -121,7 +123,11 @@ std::vector<ImageChannel> read_file_channels(const std::filesystem::path& file);
 
 /// Draws a channel, as RecordedImage::draw.
 DrawnChannel draw_channel(const ImageChannel& channel, const RecordedNames& names,
-                          std::optional<std::pair<double, double>> range);
+                          std::optional<std::pair<double, double>> range, double exposure_ev);
+
+/// Returns the exposure at which 1 % of a picture's values exceed white: 0 for channels of light,
+/// which are exposed so anyway, for those of other kinds, and for black pictures.
+double automatic_exposure_ev(const ImageChannel& channel);
 
 /// Returns the name of a channel's number: a label, an instance or a material; empty if it has
 /// none.

@@ -120,14 +120,20 @@ ColourAt light_colours(const ImageChannel& channel, const ImageLegend& legend) {
   };
 }
 
-ColourAt picture_colours(const ImageChannel& channel) {
+// Returns the stored value of white.
+double full_of(const PixelValues& values) {
+  if (std::holds_alternative<Image8>(values)) return 255;
+  return std::holds_alternative<Image16>(values) ? 65535 : 1;
+}
+
+ColourAt picture_colours(const ImageChannel& channel, double exposure_ev) {
   const bool is_grey = components_of(channel.values) < 3;
-  const double full = std::holds_alternative<Image8>(channel.values)    ? 255
-                      : std::holds_alternative<Image16>(channel.values) ? 65535
-                                                                        : 1;
-  return [&channel, is_grey, full](glm::ivec2 pixel) {
+  const double full = full_of(channel.values), gain = std::exp2(exposure_ev);
+  return [&channel, is_grey, full, gain](glm::ivec2 pixel) {
     const auto value = [&](int k) {
-      return number_at(channel.values, pixel, is_grey ? 0 : k) / full;
+      const double stored = number_at(channel.values, pixel, is_grey ? 0 : k) / full;
+      if (gain == 1 || std::isnan(stored)) return stored;
+      return srgb_of_linear(std::clamp(gain * linear_of_srgb(stored), 0.0, 1.0));
     };
     return Colour(value(0), value(1), value(2));
   };
@@ -210,7 +216,7 @@ ImageLegend legend_of(const ImageChannel& channel, const RecordedNames& names,
     case Kind::Light:
     case Kind::Vector:
     case Kind::Flow:
-    case Kind::Picture:
+    case Kind::AsStored:
       break;
   }
   ImageLegend legend{.unit = channel.unit, .colours = {}, .categories = {}};
@@ -220,12 +226,13 @@ ImageLegend legend_of(const ImageChannel& channel, const RecordedNames& names,
     legend.high = *channel.full;
   else if (channel.kind == Kind::Light)
     legend.high = white_of(channel);
-  else if (channel.kind != Kind::Picture)
+  else if (channel.kind != Kind::AsStored)
     legend.high = usual_length(channel, channel.kind == Kind::Flow ? 2 : 3);
   return legend;
 }
 
-ColourAt channel_colours(const ImageChannel& channel, const ImageLegend& legend) {
+ColourAt channel_colours(const ImageChannel& channel, const ImageLegend& legend,
+                         double exposure_ev) {
   switch (channel.kind) {
     case Kind::Number:
     case Kind::Distance:
@@ -239,19 +246,26 @@ ColourAt channel_colours(const ImageChannel& channel, const ImageLegend& legend)
       return vector_colours(channel, legend);
     case Kind::Flow:
       return flow_colours(channel, legend);
-    case Kind::Picture:
+    case Kind::AsStored:
       break;
   }
-  return picture_colours(channel);
+  return picture_colours(channel, exposure_ev);
 }
 
 }  // namespace
 
+double automatic_exposure_ev(const ImageChannel& channel) {
+  if (channel.kind != Kind::AsStored) return 0;
+  const double white = linear_of_srgb(white_of(channel) / full_of(channel.values));
+  return white > 0 && std::isfinite(white) ? -std::log2(white) : 0;
+}
+
 DrawnChannel draw_channel(const ImageChannel& channel, const RecordedNames& names,
-                          std::optional<std::pair<double, double>> range) {
+                          std::optional<std::pair<double, double>> range, double exposure_ev) {
   const glm::ivec2 size_px = size_of(channel.values);
   DrawnChannel drawn{Image8(size_px.x, size_px.y, 3), legend_of(channel, names, range)};
-  const ColourAt colour_at = channel_colours(channel, drawn.legend);
+  if (channel.kind == Kind::Light) drawn.legend.high /= std::exp2(exposure_ev);
+  const ColourAt colour_at = channel_colours(channel, drawn.legend, exposure_ev);
   tbb::parallel_for(0, size_px.y, [&](int y) {
     for (int x = 0; x < size_px.x; ++x) paint(drawn.picture, x, y, colour_at({x, y}));
   });

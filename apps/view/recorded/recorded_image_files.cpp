@@ -12,14 +12,13 @@
 #include <system_error>
 #include <utility>
 
+#include "apps/view/recorded/echo_pixels.h"
 #include "apps/view/recorded/recorded_image.h"
 #include "apps/view/rendering/picture_file.h"
 #include "core/error.h"
-#include "core/folder_names.h"
 #include "core/image/exr_io.h"
 #include "core/image/image_io.h"
 #include "core/io/file_io.h"
-#include "core/io/npy_io.h"
 
 namespace groundray {
 namespace {
@@ -160,7 +159,7 @@ bool has_16_bits(std::string_view bytes) {
 
 ImageChannel picture_channel(const fs::path& path) {
   const std::string bytes = read_text(path);
-  ImageChannel channel{.name = "picture", .kind = Kind::Picture};
+  ImageChannel channel{.name = "picture", .kind = Kind::AsStored};
   if (has_16_bits(bytes))
     channel.values = parse_heights(bytes, path.string());
   else
@@ -239,17 +238,8 @@ void paint_dot(ImageF& image, double u_px, double v_px, double depth_m) {
 ImageChannel echoes_channel(const fs::path& path, const std::string& lidar, glm::ivec2 size_px) {
   ImageF shown(size_px.x, size_px.y, 1);
   std::ranges::fill(shown.values(), std::numeric_limits<float>::quiet_NaN());
-  const PointCloud echoes = read_npy(path).cloud;
-  try {
-    const auto u_px = echoes.column<double>("u_px"), v_px = echoes.column<double>("v_px"),
-               depth_m = echoes.column<double>("depth_m");
-    const auto is_visible = echoes.column<std::uint8_t>("is_visible");
-    for (std::size_t i = 0; i < echoes.rows(); ++i) {
-      if (is_visible[i] != 0) paint_dot(shown, u_px[i], v_px[i], depth_m[i]);
-    }
-  } catch (const Error& fault) {
-    throw Error("{}: it does not contain echoes in an image: {}", path.string(), fault.what());
-  }
+  for (const EchoPixel& echo : read_echo_pixels(path))
+    paint_dot(shown, echo.pixel.x, echo.pixel.y, echo.depth_m);
   return {.name = "echoes of " + lidar,
           .unit = "m",
           .kind = Kind::Distance,
@@ -259,16 +249,7 @@ ImageChannel echoes_channel(const fs::path& path, const std::string& lidar, glm:
 
 // Adds the channels of all lidars that have a file of echoes, sorted by name.
 void add_echoes(const fs::path& stem, std::vector<ImageChannel>& channels) {
-  const std::string begin = stem.filename().string() + "_";
-  std::map<std::string, fs::path> files;
-  std::error_code ignored;
-  for (const std::string& file : names_in(stem.parent_path(), ignored)) {
-    const fs::path path = stem.parent_path() / file;
-    const std::string name = path.stem().string();
-    if (path.extension() == ".npy" && name.starts_with(begin))
-      files[name.substr(begin.size())] = path;
-  }
-  for (const auto& [lidar, path] : files)
+  for (const auto& [lidar, path] : echo_files(stem))
     channels.push_back(echoes_channel(path, lidar, size_of(channels.front().values)));
 }
 
@@ -322,7 +303,7 @@ std::vector<ImageChannel> read_file_channels(const fs::path& file) {
     channels.push_back(picture_channel(file));
   else  // other rasters, such as GeoTIFF
     channels.push_back(
-        {.name = "picture", .kind = Kind::Picture, .values = read_picture(file).picture});
+        {.name = "picture", .kind = Kind::AsStored, .values = read_picture(file).picture});
   for (ImageChannel& channel : channels) channel.file = file.filename().string();
   return channels;
 }

@@ -79,6 +79,28 @@ void add_colours(Layer& layer, LayerColumn column, std::span<const std::uint8_t>
   put(layer, std::move(column));
 }
 
+void move_frame(Layer& layer, const glm::dvec3& origin_w_m) {
+  if (!std::isfinite(origin_w_m.x + origin_w_m.y + origin_w_m.z))
+    throw Error("layer '{}': the origin of its coordinates must be finite", layer.name);
+  const glm::dvec3 by_m = origin_w_m - layer.frame_w_m;
+  layer.frame_w_m = origin_w_m;
+  layer.origin_w_m += by_m;
+  layer.actor = nullptr;
+  const LayerColumn* const height = layer.find("height");
+  if (height == nullptr || height->of != LayerColumn::Of::Points || by_m.z == 0) return;
+  LayerColumn column = *height;
+  std::vector<float> values(layer.points());
+  for (std::size_t i = 0; i < values.size(); ++i) {
+    const double before_m = layer.value(column, static_cast<vtkIdType>(i));
+    values[i] = static_cast<float>(before_m + by_m.z);
+  }
+  auto data = vtkSmartPointer<vtkPolyData>::New();  // the old one may be in use elsewhere
+  data->ShallowCopy(layer.data);
+  layer.data = data;
+  layer.coarse = nullptr;
+  add_column(layer, std::move(column), values);
+}
+
 glm::dvec2 colour_range(std::span<const float> values, ColourScale scale) {
   std::vector<float> finite;
   finite.reserve(values.size());

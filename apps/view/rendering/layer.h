@@ -51,18 +51,24 @@ struct Layer {
   /// points are the rows.
   vtkSmartPointer<vtkPolyData> data;
   glm::dvec3 origin_w_m{0};  ///< origin of `data` in W, to keep millimetres of map coordinates
+  /// Origin, in W, of the frame in which the file states coordinates; move_frame() changes it.
+  glm::dvec3 frame_w_m{0};
   std::vector<LayerColumn> columns{};
   /// Same layer with less detail, drawn while a view moves; null: created by View.
   vtkSmartPointer<vtkPolyData> coarse{};
   /// Texture, applied by the data's texture coordinates if the layer is coloured by no column or by
   /// an RGB column, which the texture shows in more detail; or null.
   vtkSmartPointer<vtkTexture> texture{};
+  /// White texture with alpha 0 or 255, applied by the data's texture coordinates whatever the
+  /// layer is coloured by: parts of alpha 0 are not drawn. Null if nothing is cut out.
+  vtkSmartPointer<vtkTexture> mask{};
 
   std::string coloured_by{};           ///< name of a column; empty for a single colour
   glm::vec3 colour{0.8f, 0.8f, 0.8f};  ///< sRGB, used if no column is selected
   bool visible = true;
   double opacity = 1;  ///< 0 to 1
   bool wireframe = false;
+  bool is_clipped = true;  ///< false: drawn outside the view's clipping box, too
   double point_size_px = 2;
   double line_width_px = 1.5;
 
@@ -89,6 +95,11 @@ void add_column(Layer& layer, LayerColumn column, std::span<const float> values)
 /// Adds a column of colours.
 /// @param rgb  three sRGB bytes for each point or cell.
 void add_colours(Layer& layer, LayerColumn column, std::span<const std::uint8_t> rgb);
+
+/// Moves a layer, and its heights with it, so that its file's coordinates count from another point.
+/// @param origin_w_m  in W.
+/// @throws Error if it is not finite.
+void move_frame(Layer& layer, const glm::dvec3& origin_w_m);
 
 /// Returns the range that a column's colours span: all finite values, without 0.5 % at either end
 /// if these extend it to more than twice the rest. A range of ColourScale::Signed that contains 0

@@ -8,6 +8,7 @@
 #include <cmath>
 #include <glm/geometric.hpp>
 #include <glm/trigonometric.hpp>
+#include <glm/vector_relational.hpp>
 #include <string_view>
 #include <system_error>
 
@@ -121,6 +122,17 @@ Look requested_look(Look look, const ViewOptions& options) {
   return look;
 }
 
+void place_inputs(std::vector<Opened>& inputs, const std::vector<FrameOrigin>& origins) {
+  for (const FrameOrigin& origin : origins) {
+    bool is_used = false;
+    for (Opened& opened : inputs) is_used = place_input(opened, origin) || is_used;
+    if (!is_used)
+      throw Error("--origin {}: no input is a mesh or cloud {}", origin.text,
+                  origin.input.empty() ? "whose file states no origin; name one: INPUT=X,Y,Z"
+                                       : "of that path or file name");
+  }
+}
+
 void arrange(View& view, std::vector<Opened>& inputs, const StillSpec& spec) {
   for (Opened& opened : inputs) {
     for (const Layer& layer : opened.layers) {
@@ -160,6 +172,8 @@ void arrange(View& view, std::vector<Opened>& inputs, const StillSpec& spec) {
     }
   }
   view.set_legend_visible(spec.view.has_legend);
+  view.set_eye_dome(spec.view.has_eye_dome);
+  view.set_clip(spec.view.clip);
 }
 
 void write_still(View& view, const std::filesystem::path& file, glm::ivec2 size_px) {
@@ -200,6 +214,24 @@ glm::dvec2 parse_range(const std::string& text) {
       !((*numbers)[0] < (*numbers)[1]))
     throw Error("--range {}: it must be LOW,HIGH with LOW less than HIGH", text);
   return {(*numbers)[0], (*numbers)[1]};
+}
+
+FrameOrigin parse_origin(const std::string& text) {
+  const auto equals = text.rfind('=');
+  const bool has_name = equals != std::string::npos;
+  return {.text = text,
+          .input = has_name ? text.substr(0, equals) : "",
+          .origin_w_m = parse_place(has_name ? text.substr(equals + 1) : text, "--origin")};
+}
+
+ClipBox parse_box(const std::string& text) {
+  const auto n = parse_numbers<double, 6>(text, ',');
+  if (!n || !std::ranges::all_of(*n, [](double number) { return std::isfinite(number); }))
+    throw Error("--clip {}: it must be X0,Y0,Z0,X1,Y1,Z1 in metres, in map coordinates", text);
+  const ClipBox box{{(*n)[0], (*n)[1], (*n)[2]}, {(*n)[3], (*n)[4], (*n)[5]}};
+  if (!glm::all(glm::lessThan(box.low_w_m, box.high_w_m)))
+    throw Error("--clip {}: the box is empty: X0, Y0, Z0 must be less than X1, Y1, Z1", text);
+  return box;
 }
 
 glm::dvec3 parse_place(const std::string& text, const std::string& option) {

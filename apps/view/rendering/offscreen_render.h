@@ -18,7 +18,10 @@ struct ViewOptions {
   std::vector<std::string> colour_by;  ///< COLUMN for all layers that have it, or LAYER=COLUMN
   std::vector<std::string> hide;       ///< layers by name, or all those under a name in the tree
   std::optional<double> point_size_px;
-  bool is_wireframe = false;  ///< true to draw surfaces as wireframes
+  std::vector<FrameOrigin> origins;  ///< origins of meshes and clouds in local coordinates
+  std::optional<ClipBox> clip;       ///< nothing outside it is drawn
+  bool is_wireframe = false;         ///< true to draw surfaces as wireframes
+  bool has_eye_dome = false;         ///< true to draw with eye-dome lighting
   bool has_legend = true;
 };
 
@@ -34,6 +37,10 @@ struct StillSpec {
 /// Returns a viewpoint with the eye and the target of the options, if these state any; the picture
 /// is then upright or, seen from straight above or below, has north at the top.
 Look requested_look(Look look, const ViewOptions& options);
+
+/// Moves meshes and clouds to the requested origins.
+/// @throws Error if a request applies to no input.
+void place_inputs(std::vector<Opened>& inputs, const std::vector<FrameOrigin>& origins);
 
 /// Adds the inputs to the view, as the options state. The terrain of the first input, if it has
 /// one, is meshed for `follow_w_m` or the eye.
@@ -57,6 +64,11 @@ void write_turntable(View& view, const std::filesystem::path& folder, int pictur
 glm::ivec2 parse_size(const std::string& text);
 /// Parses `LOW,HIGH`. @throws Error naming the option if the text is invalid or the range is empty.
 glm::dvec2 parse_range(const std::string& text);
+/// Parses `X,Y,Z` or `INPUT=X,Y,Z`, m. @throws Error naming the option if the text is invalid.
+FrameOrigin parse_origin(const std::string& text);
+/// Parses the limits of a box: `X0,Y0,Z0,X1,Y1,Z1`, m. @throws Error naming the option if the text
+/// is invalid or the box is empty.
+ClipBox parse_box(const std::string& text);
 /// Parses `X,Y,Z`, m.
 /// @param option  name of the option, for the message.
 /// @throws Error if the text is invalid.

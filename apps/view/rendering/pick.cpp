@@ -43,7 +43,13 @@ double crossing_m(const std::array<glm::dvec3, 3>& corner, const glm::dvec3& dir
   return t_m > 0 ? t_m : infinity;
 }
 
-Candidate pick_triangle(const Layer& layer, std::size_t number, const PickRay& ray) {
+// Returns the box of a layer, or null if it is not clipped.
+const ClipBox* clip_of(const Layer& layer, const std::optional<ClipBox>& clip) {
+  return clip && layer.is_clipped ? &*clip : nullptr;
+}
+
+Candidate pick_triangle(const Layer& layer, std::size_t number, const PickRay& ray,
+                        const ClipBox* clip) {
   const auto places = coordinates(*layer.data);
   const auto corner = corners(*layer.data);
   const glm::dvec3 offset = layer.origin_w_m - ray.from_w_m;
@@ -51,7 +57,10 @@ Candidate pick_triangle(const Layer& layer, std::size_t number, const PickRay& r
     for (std::size_t i = range.begin(); i < range.end(); ++i) {
       std::array<glm::dvec3, 3> p;
       for (std::size_t k = 0; k < 3; ++k) p[k] = point_at(places, corner[3 * i + k]) + offset;
-      best = least(best, {crossing_m(p, ray.direction), 0, number, i});
+      const double t_m = crossing_m(p, ray.direction);
+      if (clip != nullptr && t_m < infinity && !clip->contains(ray.from_w_m + t_m * ray.direction))
+        continue;
+      best = least(best, {t_m, 0, number, i});
     }
     return best;
   };
@@ -64,7 +73,7 @@ Candidate pick_triangle(const Layer& layer, std::size_t number, const PickRay& r
 double slack_m(double depth_m) { return 0.002 * depth_m + 0.05; }
 
 Candidate pick_point(const Layer& layer, std::size_t number, const PickRay& ray, double near_px,
-                     double surface_m) {
+                     double surface_m, const ClipBox* clip) {
   const auto places = coordinates(*layer.data);
   const glm::dvec3 offset = layer.origin_w_m - ray.from_w_m;
   const double half_px = std::max(layer.point_size_px / 2, 0.5);
@@ -79,6 +88,7 @@ Candidate pick_point(const Layer& layer, std::size_t number, const PickRay& ray,
       if (!covers && !(off_px <= near_px)) continue;
       const double distance_m = glm::length(p);
       if (distance_m > surface_m + slack_m(surface_m)) continue;
+      if (clip != nullptr && !clip->contains(ray.from_w_m + p)) continue;
       best = least(best, {covers ? 0 : off_px, distance_m, number, i});
     }
     return best;
@@ -94,16 +104,17 @@ bool can_be_hit(const Layer& layer) {
 
 }  // namespace
 
-std::optional<Picked> pick(std::span<const Layer* const> layers, const PickRay& ray,
-                           double near_px) {
+std::optional<Picked> pick(std::span<const Layer* const> layers, const PickRay& ray, double near_px,
+                           const std::optional<ClipBox>& clip) {
   Candidate surface, cloud;
   for (std::size_t i = 0; i < layers.size(); ++i) {
     if (layers[i]->visible && can_be_hit(*layers[i]))
-      surface = least(surface, pick_triangle(*layers[i], i, ray));
+      surface = least(surface, pick_triangle(*layers[i], i, ray, clip_of(*layers[i], clip)));
   }
   for (std::size_t i = 0; i < layers.size(); ++i) {
     if (layers[i]->visible && layers[i]->kind == LayerKind::Cloud)
-      cloud = least(cloud, pick_point(*layers[i], i, ray, near_px, surface.first));
+      cloud = least(
+          cloud, pick_point(*layers[i], i, ray, near_px, surface.first, clip_of(*layers[i], clip)));
   }
   if (cloud.first < infinity) {
     const auto row = static_cast<vtkIdType>(cloud.row);
@@ -113,6 +124,23 @@ std::optional<Picked> pick(std::span<const Layer* const> layers, const PickRay& 
   if (surface.first == infinity) return std::nullopt;
   return Picked{layers[surface.layer]->name, LayerColumn::Of::Cells,
                 static_cast<vtkIdType>(surface.row), ray.from_w_m + surface.first * ray.direction};
+}
+
+Picked near_vertex(const Layer& layer, const Picked& picked, const PickRay& ray, double near_px) {
+  if (picked.of != LayerColumn::Of::Cells) return picked;
+  const auto corner = corners(*layer.data);
+  Picked nearest = picked;
+  double least_px = near_px;
+  for (std::size_t k = 0; k < 3; ++k) {
+    const vtkIdType row = corner[3 * static_cast<std::size_t>(picked.row) + k];
+    const glm::dvec3 p_w_m = layer.p_w_m(row);
+    const glm::dvec3 seen = ray.to_pixels * (p_w_m - ray.from_w_m);
+    const double off_px = glm::distance(glm::dvec2(seen) / seen.z, ray.pixel);
+    if (!(seen.z > 0) || off_px > least_px) continue;
+    least_px = off_px;
+    nearest = {picked.layer, LayerColumn::Of::Points, row, p_w_m};
+  }
+  return nearest;
 }
 
 }  // namespace groundray

@@ -9,6 +9,7 @@
 #include <span>
 #include <string>
 
+#include "apps/view/rendering/clip_box.h"
 #include "apps/view/rendering/layer.h"
 
 namespace groundray {
@@ -34,8 +35,14 @@ struct Picked {
 /// Returns the point of a cloud that is drawn over the pixel, unless a surface hides it; otherwise
 /// the first triangle of terrain, meshes and pictures that the ray hits. Among several points, the
 /// nearest to the eye whose square covers the pixel is chosen; if none does, the nearest to the
-/// pixel within `near_px`. Ties go to the first. Invisible layers are ignored.
-std::optional<Picked> pick(std::span<const Layer* const> layers, const PickRay& ray,
-                           double near_px);
+/// pixel within `near_px`. Ties go to the first. Invisible layers are ignored, as are points
+/// outside `clip` of layers that are clipped.
+std::optional<Picked> pick(std::span<const Layer* const> layers, const PickRay& ray, double near_px,
+                           const std::optional<ClipBox>& clip = std::nullopt);
+
+/// Returns the corner of the picked triangle that appears nearest to the pixel, as a point of the
+/// layer, if it is within `near_px`; otherwise `picked`.
+/// @param layer  layer of `picked`.
+Picked near_vertex(const Layer& layer, const Picked& picked, const PickRay& ray, double near_px);
 
 }  // namespace groundray

@@ -105,6 +105,30 @@ PictureFile read_raster_picture(const std::filesystem::path& path) {
   return shown;
 }
 
+// Returns a texture of an image's first channels; grey images have equal colours.
+vtkSmartPointer<vtkTexture> texture_of(const Image8& image, int components) {
+  const int channels = image.channels();
+  const auto pixels =
+      static_cast<std::size_t>(image.width()) * static_cast<std::size_t>(image.height());
+  const auto bytes = make_array<vtkUnsignedCharArray>("colours", pixels, components);
+  auto* to = bytes->GetPointer(0);
+  for (int y = image.height() - 1; y >= 0; --y) {
+    for (int x = 0; x < image.width(); ++x) {
+      const auto pixel = image.at(x, y);
+      for (std::size_t k = 0; k < static_cast<std::size_t>(components); ++k)
+        *to++ = pixel[channels >= 3 ? k : 0];
+    }
+  }
+  auto content = vtkSmartPointer<vtkImageData>::New();
+  content->SetDimensions(image.width(), image.height(), 1);
+  content->GetPointData()->SetScalars(bytes);
+  auto texture = vtkSmartPointer<vtkTexture>::New();
+  texture->SetInputData(content);
+  texture->SetColorModeToDirectScalars();
+  texture->SetWrap(vtkTexture::ClampToEdge);
+  return texture;
+}
+
 }  // namespace
 
 PictureFile read_picture(const std::filesystem::path& path) {
@@ -135,26 +159,15 @@ Image8 expose(const ImageF& light) {
 }
 
 vtkSmartPointer<vtkTexture> make_texture(const Image8& image) {
-  const int channels = image.channels();
-  const auto pixels =
-      static_cast<std::size_t>(image.width()) * static_cast<std::size_t>(image.height());
-  const auto bytes = make_array<vtkUnsignedCharArray>("colours", pixels, 3);
-  auto* to = bytes->GetPointer(0);
-  for (int y = image.height() - 1; y >= 0; --y) {
-    for (int x = 0; x < image.width(); ++x) {
-      const auto pixel = image.at(x, y);
-      for (std::size_t k = 0; k < 3; ++k) *to++ = pixel[channels >= 3 ? k : 0];
-    }
-  }
-  auto content = vtkSmartPointer<vtkImageData>::New();
-  content->SetDimensions(image.width(), image.height(), 1);
-  content->GetPointData()->SetScalars(bytes);
-  auto texture = vtkSmartPointer<vtkTexture>::New();
-  texture->SetInputData(content);
-  texture->SetColorModeToDirectScalars();
+  const auto texture = texture_of(image, 3);
   texture->InterpolateOn();
   texture->MipmapOn();
-  texture->SetWrap(vtkTexture::ClampToEdge);
+  return texture;
+}
+
+vtkSmartPointer<vtkTexture> make_mask(const Image8& image) {
+  const auto texture = texture_of(image, 4);
+  texture->InterpolateOff();
   return texture;
 }
 

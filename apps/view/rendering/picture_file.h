@@ -34,6 +34,10 @@ Image8 expose(const ImageF& light);
 /// @param image  of 1 to 4 channels.
 vtkSmartPointer<vtkTexture> make_texture(const Image8& image);
 
+/// Returns a texture that modulates colours, with unfiltered texels.
+/// @param image  of 4 channels; alpha is 0 or 255.
+vtkSmartPointer<vtkTexture> make_mask(const Image8& image);
+
 /// Sets the texture coordinates of the data, one pair for each point.
 void set_texture_coordinates(vtkPolyData& data, std::span<const glm::vec2> places);
 

@@ -2,6 +2,8 @@
 
 #include <vtkCellData.h>
 #include <vtkLookupTable.h>
+#include <vtkNew.h>
+#include <vtkPlane.h>
 #include <vtkPointData.h>
 #include <vtkProperty.h>
 
@@ -49,7 +51,8 @@ bool is_lit(LayerKind kind) { return kind == LayerKind::Terrain || kind == Layer
 
 }  // namespace
 
-ShownLayer::ShownLayer(Layer layer, const glm::dvec3& origin_w_m) : layer_(std::move(layer)) {
+ShownLayer::ShownLayer(Layer layer, const glm::dvec3& origin_w_m)
+    : layer_(std::move(layer)), view_origin_w_m_(origin_w_m) {
   check(layer_);
   full_ = make_mapper(layer_, *layer_.data);
   layer_.actor = vtkSmartPointer<vtkActor>::New();
@@ -64,6 +67,10 @@ bool ShownLayer::is_textured(vtkPolyDataMapper& mapper) const {
   const LayerColumn* const column = layer_.find(layer_.coloured_by);
   return layer_.texture != nullptr && (column == nullptr || column->is_rgb) &&
          mapper.GetInput()->GetPointData()->GetTCoords() != nullptr;
+}
+
+bool ShownLayer::is_cut(vtkPolyDataMapper& mapper) const {
+  return layer_.mask != nullptr && mapper.GetInput()->GetPointData()->GetTCoords() != nullptr;
 }
 
 void ShownLayer::paint(vtkPolyDataMapper& mapper) const {
@@ -81,8 +88,9 @@ void ShownLayer::paint(vtkPolyDataMapper& mapper) const {
   mapper.SetColorModeToMapScalars();
   mapper.SetLookupTable(make_colour_table(*column));
   mapper.UseLookupTableScalarRangeOn();
-  // Categories have no intermediate values.
-  mapper.SetInterpolateScalarsBeforeMapping(column->categories.empty() ? 1 : 0);
+  // Categories have no intermediate values; and VTK would look colours up in a texture, whose
+  // coordinates would replace those of a mask.
+  mapper.SetInterpolateScalarsBeforeMapping(column->categories.empty() && !is_cut(mapper) ? 1 : 0);
 }
 
 void ShownLayer::restyle() {
@@ -106,6 +114,26 @@ void ShownLayer::restyle() {
   draw(vtkPolyDataMapper::SafeDownCast(actor.GetMapper()));
 }
 
+void ShownLayer::clip(const std::optional<ClipBox>& box) {
+  planes_ = nullptr;
+  if (box && layer_.is_clipped) {
+    planes_ = vtkSmartPointer<vtkPlaneCollection>::New();
+    const glm::dvec3 low = box->low_w_m - view_origin_w_m_, high = box->high_w_m - view_origin_w_m_;
+    for (glm::length_t k = 0; k < 3; ++k) {
+      for (const auto& [corner, sign] : {std::pair(low, 1.0), {high, -1.0}}) {
+        glm::dvec3 inwards(0);
+        inwards[k] = sign;
+        const vtkNew<vtkPlane> plane;
+        plane->SetOrigin(corner.x, corner.y, corner.z);
+        plane->SetNormal(inwards.x, inwards.y, inwards.z);
+        planes_->AddItem(plane);
+      }
+    }
+  }
+  full_->SetClippingPlanes(planes_);
+  if (thin_ != nullptr) thin_->SetClippingPlanes(planes_);
+}
+
 std::size_t ShownLayer::elements() const {
   return layer_.kind == LayerKind::Cloud ? layer_.points() : layer_.triangles();
 }
@@ -125,6 +153,7 @@ void ShownLayer::thin_to(std::size_t elements) {
     // Clustered vertices no longer match their texture coordinates.
     if (!is_cloud && !serves && thin != layer_.data) thin->GetPointData()->SetTCoords(nullptr);
     thin_ = make_mapper(layer_, *thin);
+    thin_->SetClippingPlanes(planes_);
     thinned_to_ = elements;
     paint(*thin_);
   }
@@ -137,7 +166,10 @@ void ShownLayer::draw(vtkPolyDataMapper* mapper) {
   vtkActor& actor = *layer_.actor;
   actor.SetMapper(mapper);
   const bool textured = is_textured(*mapper);
-  actor.SetTexture(textured ? layer_.texture.Get() : nullptr);
+  const bool cut = is_cut(*mapper);
+  actor.SetTexture(textured ? layer_.texture.Get() : cut ? layer_.mask.Get() : nullptr);
+  // Without this, VTK would blend surfaces with alpha, in an arbitrary order.
+  actor.SetForceOpaque(cut && layer_.opacity >= 1);
   const glm::vec3 colour = textured ? glm::vec3(1) : layer_.colour;
   actor.GetProperty()->SetColor(colour.r, colour.g, colour.b);
 }

@@ -4,7 +4,7 @@
 #include <vtkCamera.h>
 #include <vtkLight.h>
 #include <vtkNew.h>
-#include <vtkUnsignedCharArray.h>
+#include <vtkTextProperty.h>
 
 #include <algorithm>
 #include <array>
@@ -15,9 +15,8 @@
 #include <glm/trigonometric.hpp>
 #include <utility>
 
-#include "apps/view/rendering/legend.h"
-#include "apps/view/rendering/moving_detail.h"
-#include "apps/view/rendering/shown_layer.h"
+#include "apps/view/rendering/eye_dome.h"
+#include "apps/view/rendering/view_impl.h"
 #include "core/error.h"
 
 // VTK's object factories. vtk_module_autoinit would define a macro with the path of the build tree,
@@ -29,8 +28,6 @@ namespace groundray {
 namespace {
 
 constexpr double near_px = 6, view_angle_deg = 40;
-constexpr int tile_px = 4096;
-constexpr glm::dvec3 sky{0.40, 0.50, 0.62}, haze{0.80, 0.83, 0.86};  // upper and lower background
 
 bool is_surface(const Layer& layer) {
   return layer.kind == LayerKind::Terrain || layer.kind == LayerKind::Mesh;
@@ -57,48 +54,22 @@ void add_lights(vtkRenderer& renderer) {
   renderer.AddLight(eye);
 }
 
-// Copies the window's pixels into a rectangle of a picture.
-void read_pixels(vtkRenderWindow& window, glm::ivec2 first_px, glm::ivec2 size_px, Image8& into) {
-  vtkNew<vtkUnsignedCharArray> bytes;
-  window.GetPixelData(0, 0, size_px.x - 1, size_px.y - 1, 1, bytes, 0);
-  const auto row = static_cast<std::size_t>(size_px.x) * 3;
-  for (int y = 0; y < size_px.y; ++y) {
-    const auto from = static_cast<std::size_t>(size_px.y - 1 - y) * row;
-    std::copy_n(bytes->GetPointer(0) + from, row, into.at(first_px.x, first_px.y + y).data());
-  }
-}
-
 }  // namespace
 
-struct View::Impl {
-  vtkSmartPointer<vtkRenderWindow> window;
-  vtkSmartPointer<vtkRenderer> renderer = vtkSmartPointer<vtkRenderer>::New();
-  std::vector<std::unique_ptr<ShownLayer>> layers;
-  std::unique_ptr<Legend> legend;
-  std::string legend_layer;  // layer whose legend is shown
-  std::optional<glm::dvec3> origin_w_m;
-  bool is_moving = false, is_legend_visible = true;
-  MovingDetail detail;
+ShownLayer* View::Impl::find(const std::string& name) const {
+  const auto found =
+      std::ranges::find_if(layers, [&](const auto& shown) { return shown->layer().name == name; });
+  return found == layers.end() ? nullptr : found->get();
+}
 
-  glm::dvec3 origin() const { return origin_w_m.value_or(glm::dvec3(0)); }
-  ShownLayer* find(const std::string& name) const {
-    const auto found = std::ranges::find_if(
-        layers, [&](const auto& shown) { return shown->layer().name == name; });
-    return found == layers.end() ? nullptr : found->get();
-  }
-  ShownLayer& at(const std::string& name) const {
-    if (ShownLayer* const shown = find(name)) return *shown;
-    throw Error("the view has no layer '{}'", name);
-  }
-  void update_legend() {
-    legend->show(find(legend_layer) ? &find(legend_layer)->layer() : nullptr);
-  }
-  void set_detail();
-  void fit(const std::array<double, 6>& bounds);
-  glm::dvec2 size_px() const { return {window->GetSize()[0], window->GetSize()[1]}; }
-  PickRay ray(int x_px, int y_px) const;
-  void draw_part(glm::ivec2 first_px, glm::ivec2 part_px, Image8& whole);
-};
+ShownLayer& View::Impl::at(const std::string& name) const {
+  if (ShownLayer* const shown = find(name)) return *shown;
+  throw Error("the view has no layer '{}'", name);
+}
+
+void View::Impl::update_legend() {
+  legend->show(find(legend_layer) ? &find(legend_layer)->layer() : nullptr);
+}
 
 // Distributes the detail permitted during motion among the layers, in proportion to their sizes.
 void View::Impl::set_detail() {
@@ -154,38 +125,12 @@ PickRay View::Impl::ray(int x_px, int y_px) const {
   return ray;
 }
 
-// Draws a rectangle of a picture with the corresponding part of the view frustum.
-void View::Impl::draw_part(glm::ivec2 first_px, glm::ivec2 part_px, Image8& whole) {
-  const glm::dvec2 size_px(whole.width(), whole.height());
-  vtkCamera& camera = *renderer->GetActiveCamera();
-  const double angle_deg = camera.GetViewAngle();
-  const glm::dvec2 middle_px = glm::dvec2(first_px) + glm::dvec2(part_px) / 2.0 - size_px / 2.0;
-  camera.SetViewAngle(
-      2 * glm::degrees(std::atan(std::tan(glm::radians(angle_deg) / 2) * part_px.y / size_px.y)));
-  camera.SetWindowCenter(2 * middle_px.x / part_px.x, -2 * middle_px.y / part_px.y);
-  const auto background = [&](double from_top) {
-    return glm::mix(sky, haze, from_top / size_px.y);
-  };
-  const glm::dvec3 upper = background(first_px.y), lower = background(first_px.y + part_px.y);
-  renderer->SetBackground2(upper.x, upper.y, upper.z);
-  renderer->SetBackground(lower.x, lower.y, lower.z);
-  legend->fit_to({whole.width(), whole.height()},
-                 {first_px.x, whole.height() - first_px.y - part_px.y});
-  window->SetSize(part_px.x, part_px.y);
-  window->Render();
-  read_pixels(*window, first_px, part_px, whole);
-  camera.SetViewAngle(angle_deg);
-  camera.SetWindowCenter(0, 0);
-  renderer->SetBackground2(sky.x, sky.y, sky.z);
-  renderer->SetBackground(haze.x, haze.y, haze.z);
-}
-
 View::View(const vtkSmartPointer<vtkRenderWindow>& window) : impl_(std::make_unique<Impl>()) {
   impl_->window = window;
   vtkRenderer& renderer = *impl_->renderer;
   renderer.GradientBackgroundOn();
-  renderer.SetBackground(haze.x, haze.y, haze.z);
-  renderer.SetBackground2(sky.x, sky.y, sky.z);
+  renderer.SetBackground(Impl::haze.x, Impl::haze.y, Impl::haze.z);
+  renderer.SetBackground2(Impl::sky.x, Impl::sky.y, Impl::sky.z);
   renderer.SetNearClippingPlaneTolerance(2e-4);
   add_lights(renderer);
   renderer.GetActiveCamera()->SetViewAngle(view_angle_deg);
@@ -195,7 +140,11 @@ View::View(const vtkSmartPointer<vtkRenderWindow>& window) : impl_(std::make_uni
   look({{-1, -1, 1}, {0, 0, 0}, {0, 0, 1}});
 }
 
-View::~View() { impl_->window->RemoveRenderer(impl_->renderer); }
+View::~View() {
+  // The renderer releases the resources of the passes that it has.
+  if (impl_->eye_dome != nullptr) impl_->renderer->SetPass(impl_->eye_dome);
+  impl_->window->RemoveRenderer(impl_->renderer);
+}
 
 Layer& View::add(Layer layer) {
   if (!impl_->origin_w_m) {
@@ -212,8 +161,10 @@ Layer& View::add(Layer layer) {
     layer.opacity = old.opacity;
     layer.wireframe = old.wireframe;
     layer.point_size_px = old.point_size_px;
+    layer.is_clipped = old.is_clipped;
   }
   auto shown = std::make_unique<ShownLayer>(std::move(layer), impl_->origin());
+  shown->clip(impl_->clip);
   impl_->renderer->AddActor(shown->layer().actor);
   ShownLayer& added = *shown;
   if (before != nullptr) {
@@ -306,6 +257,73 @@ void View::set_legend_visible(bool visible) {
   impl_->legend->set_visible(visible);
 }
 
+void View::set_eye_dome(bool on) {
+  if (on && impl_->eye_dome == nullptr) impl_->eye_dome = make_eye_dome_pass();
+  impl_->renderer->SetPass(on ? impl_->eye_dome.Get() : nullptr);
+}
+
+bool View::has_eye_dome() const { return impl_->renderer->GetPass() != nullptr; }
+
+void View::set_clip(const std::optional<ClipBox>& box) {
+  if (box && !glm::all(glm::lessThan(box->low_w_m, box->high_w_m)))
+    throw Error("the clipping box is empty: are its limits swapped?");
+  impl_->clip = box;
+  for (const auto& shown : impl_->layers) shown->clip(box);
+}
+
+const std::optional<ClipBox>& View::clip() const { return impl_->clip; }
+
+std::optional<ClipBox> View::bounds() const {
+  std::optional<ClipBox> all;
+  for (const Layer* const layer : layers()) {
+    if (!layer->visible || layer->kind == LayerKind::Sensors || layer->kind == LayerKind::Trail)
+      continue;
+    std::array<double, 6> of{};
+    layer->data->GetBounds(of.data());
+    if (of[0] > of[1]) continue;
+    const glm::dvec3 low = layer->origin_w_m + glm::dvec3(of[0], of[2], of[4]);
+    const glm::dvec3 high = layer->origin_w_m + glm::dvec3(of[1], of[3], of[5]);
+    all = all ? ClipBox{glm::min(all->low_w_m, low), glm::max(all->high_w_m, high)}
+              : ClipBox{low, high};
+  }
+  return all;
+}
+
+void View::set_clipped(const std::string& layer, bool clipped) {
+  impl_->at(layer).layer().is_clipped = clipped;
+  impl_->at(layer).clip(impl_->clip);
+}
+
+void View::set_label(const std::optional<ViewLabel>& label) {
+  if (impl_->label_actor == nullptr) {
+    impl_->label_actor = vtkSmartPointer<vtkTextActor>::New();
+    impl_->label_actor->GetPositionCoordinate()->SetCoordinateSystemToWorld();
+    vtkTextProperty& style = *impl_->label_actor->GetTextProperty();
+    style.SetFontSize(16);
+    style.BoldOn();
+    style.SetColor(1, 1, 1);
+    style.SetBackgroundColor(0.1, 0.11, 0.14);
+    style.SetBackgroundOpacity(0.8);
+    style.SetJustificationToCentered();
+    style.SetVerticalJustificationToBottom();
+    impl_->renderer->AddActor2D(impl_->label_actor);
+  }
+  impl_->label = label;
+  impl_->label_actor->SetInput(label ? label->text.c_str() : "");
+  impl_->place_label();
+}
+
+// Labels behind the eye would appear mirrored in the picture.
+void View::Impl::place_label() {
+  if (label_actor == nullptr) return;
+  glm::dvec3 from, ahead;
+  renderer->GetActiveCamera()->GetPosition(&from.x);
+  renderer->GetActiveCamera()->GetDirectionOfProjection(&ahead.x);
+  const glm::dvec3 place = label ? label->p_w_m - origin() : from;
+  label_actor->GetPositionCoordinate()->SetValue(place.x, place.y, place.z);
+  label_actor->SetVisibility(glm::dot(place - from, ahead) > 0 ? 1 : 0);
+}
+
 void View::fit() {
   std::array<double, 6> bounds{};
   impl_->renderer->ComputeVisiblePropBounds(bounds.data());
@@ -338,7 +356,13 @@ Look View::current_look() const {
 }
 
 std::optional<Picked> View::pick(int x_px, int y_px) const {
-  return groundray::pick(layers(), impl_->ray(x_px, y_px), near_px);
+  return groundray::pick(layers(), impl_->ray(x_px, y_px), near_px, impl_->clip);
+}
+
+std::optional<Picked> View::pick_vertex(int x_px, int y_px) const {
+  const PickRay ray = impl_->ray(x_px, y_px);
+  const auto picked = groundray::pick(layers(), ray, near_px, impl_->clip);
+  return picked ? near_vertex(*find(picked->layer), *picked, ray, near_px) : picked;
 }
 
 std::pair<glm::dvec3, glm::dvec3> View::line_of_sight(int x_px, int y_px) const {
@@ -349,38 +373,13 @@ std::pair<glm::dvec3, glm::dvec3> View::line_of_sight(int x_px, int y_px) const 
 void View::render() {
   impl_->legend->fit_to({impl_->window->GetSize()[0], impl_->window->GetSize()[1]});
   impl_->renderer->ResetCameraClippingRange();
+  impl_->place_label();
   const auto begin = std::chrono::steady_clock::now();
   impl_->window->Render();
   if (!impl_->is_moving) return;
   impl_->window->WaitForCompletion();
   impl_->detail.drawn(
       std::chrono::duration<double>(std::chrono::steady_clock::now() - begin).count());
-}
-
-Image8 View::picture(glm::ivec2 size_px) {
-  if (size_px.x < 1 || size_px.y < 1 || size_px.x > 65535 || size_px.y > 65535)
-    throw Error("a picture of {} x {} px: 1 x 1 to 65535 x 65535 px can be drawn", size_px.x,
-                size_px.y);
-  if (!is_offscreen(impl_->window)) {
-    View copy(make_offscreen_window(size_px));
-    copy.impl_->origin_w_m = impl_->origin_w_m;
-    for (const auto& shown : impl_->layers) copy.add(shown->layer());
-    copy.impl_->legend_layer = impl_->legend_layer;
-    copy.impl_->update_legend();
-    copy.set_legend_visible(impl_->is_legend_visible);
-    copy.impl_->renderer->GetActiveCamera()->DeepCopy(impl_->renderer->GetActiveCamera());
-    return copy.picture(size_px);
-  }
-  const glm::ivec2 tiles = (size_px - 1) / tile_px + 1;
-  const glm::ivec2 tile = (size_px - 1) / tiles + 1;
-  impl_->renderer->ResetCameraClippingRange();
-  Image8 whole(size_px.x, size_px.y, 3);
-  for (int y = 0; y < size_px.y; y += tile.y) {
-    for (int x = 0; x < size_px.x; x += tile.x)
-      impl_->draw_part({x, y}, glm::min(tile, size_px - glm::ivec2(x, y)), whole);
-  }
-  impl_->legend->fit_to(size_px);
-  return whole;
 }
 
 vtkRenderer* View::renderer() const { return impl_->renderer; }

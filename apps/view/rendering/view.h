@@ -12,6 +12,7 @@
 #include <utility>
 #include <vector>
 
+#include "apps/view/rendering/clip_box.h"
 #include "apps/view/rendering/layer.h"
 #include "apps/view/rendering/pick.h"
 #include "core/image/image.h"
@@ -25,6 +26,12 @@ struct Look {
   glm::dvec3 up{0, 0, 1};
 };
 
+/// Text at a point, in front of everything.
+struct ViewLabel {
+  std::string text;
+  glm::dvec3 p_w_m{0};
+};
+
 /// Returns a window that draws into memory. It needs neither display nor X server: it uses EGL
 /// without a surface, and Mesa's llvmpipe if there is no graphics card.
 /// @throws Error if the system has no such EGL, with the packages to install.
@@ -34,6 +41,8 @@ vtkSmartPointer<vtkRenderWindow> make_offscreen_window(glm::ivec2 size_px);
 bool is_offscreen(vtkRenderWindow* window);
 
 /// Layers in a render window, on or off screen. Not thread-safe.
+///
+/// view_impl.h has its private parts, for its sources.
 class View {
  public:
   /// Constructs an empty view in `window`, which must outlive this.
@@ -66,6 +75,21 @@ class View {
   /// Draws less detail while the view moves, to sustain the frame rate.
   void set_moving(bool moving);
   void set_legend_visible(bool visible);
+  /// Darkens what lies behind its neighbours in the picture, so that clouds show their shape.
+  void set_eye_dome(bool on);
+  bool has_eye_dome() const;
+
+  /// Hides what lies outside a box, in all layers that are clipped; std::nullopt shows everything.
+  /// @throws Error if the box is empty.
+  void set_clip(const std::optional<ClipBox>& box);
+  const std::optional<ClipBox>& clip() const;
+  /// Returns the extent of everything visible except sensors and trails; std::nullopt if there is
+  /// nothing.
+  std::optional<ClipBox> bounds() const;
+  /// Sets whether the box clips a layer.
+  void set_clipped(const std::string& layer, bool clipped);
+  /// Shows a text; std::nullopt for none.
+  void set_label(const std::optional<ViewLabel>& label);
 
   /// Looks from the south and above at everything that is visible, or at one layer.
   void fit();
@@ -77,6 +101,8 @@ class View {
   /// point of a cloud nearest to it within a few pixels, unless a surface hides it; otherwise the
   /// surface.
   std::optional<Picked> pick(int x_px, int y_px) const;
+  /// Returns the same but, if a corner of the picked triangle is within a few pixels, that corner.
+  std::optional<Picked> pick_vertex(int x_px, int y_px) const;
   /// Returns the origin in W and the direction of a pixel's line of sight.
   std::pair<glm::dvec3, glm::dvec3> line_of_sight(int x_px, int y_px) const;
 

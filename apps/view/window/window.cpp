@@ -52,6 +52,7 @@ Window::Window(WindowStart start) : start_(std::move(start)), recent_(start_.set
   build_workers();
   connect_canvas();
   view().set_legend_visible(start_.view.has_legend);
+  if (start_.view.clip) clip_->set_box(*start_.view.clip);
   build_actions();
   build_status_bar();
   status_clock_.setInterval(status_ms);
@@ -60,16 +61,20 @@ Window::Window(WindowStart start) : start_(std::move(start)), recent_(start_.set
   for (const std::string& request : start_.view.colour_by)
     unmatched_.insert("--colour-by " + request);
   for (const std::string& request : start_.view.hide) unmatched_.insert("--hide " + request);
+  for (const FrameOrigin& origin : start_.view.origins)
+    unmatched_.insert("--origin " + origin.text);
   for (const std::filesystem::path& input : start_.inputs) open(input);
 }
 
 Window::~Window() {
   status_clock_.stop();
   opening_.abandon();
+  echoes_.abandon();
 }
 
 void Window::build_hint() {
-  hint_ = new QLabel(hint, this);
+  hint_ = new QLabel(this);
+  show_hint({});
   hint_->setStyleSheet(
       "color: #e6eaf0; background: rgba(24, 28, 36, 170); border-radius: 10px; padding: 14px "
       "26px;");
@@ -77,6 +82,15 @@ void Window::build_hint() {
   hint_->setAttribute(Qt::WA_TransparentForMouseEvents);
   auto* over_canvas = new QVBoxLayout(canvas_);
   over_canvas->addWidget(hint_, 0, Qt::AlignCenter);
+}
+
+// States how to open something or, if a path is given, that it is being opened.
+void Window::show_hint(const std::filesystem::path& opening) {
+  const QString name = QString::fromStdString(opening.filename().string()).toHtmlEscaped();
+  hint_->setText(opening.empty()
+                     ? QString(hint)
+                     : "<p style='font-size: 16px'><b>Opening " + name + " ...</b></p>");
+  hint_->setVisible(documents_.empty());
 }
 
 void Window::build_status_bar() {
@@ -99,7 +113,8 @@ void Window::build_status_bar() {
 QDockWidget* Window::dock(const QString& title, QWidget* content, Side side) {
   auto* made = new QDockWidget(title, this);
   made->setObjectName(title);
-  made->setWidget(content == scan_ || content == compare_ ? scrolled(content) : content);
+  made->setWidget(content == scan_ || content == compare_ || content == clip_ ? scrolled(content)
+                                                                              : content);
   const Qt::DockWidgetArea area = side == Side::Left     ? Qt::LeftDockWidgetArea
                                   : side == Side::Bottom ? Qt::BottomDockWidgetArea
                                                          : Qt::RightDockWidgetArea;
@@ -116,8 +131,10 @@ void Window::build_docks() {
   timeline_ = new TimelinePanel(
       {.time_changed = [this](auto time) { go_to(time); },
        .options_changed = [this] { playback_->set_trail(timeline_->shows_trail()); }});
+  build_clip_panel();
   images_ = new ImagePanel({.camera_chosen = [this](auto& name) { playback_->set_camera(name); },
                             .clicked = [this](glm::ivec2 pixel) { click_pixel(pixel); },
+                            .echoes_wanted = [this] { update_echoes(); },
                             .failed = failed});
   scan_ = new ScanPanel({.take_place = [this] { canvas_->take_place(true); },
                          .show =
@@ -140,9 +157,11 @@ void Window::build_docks() {
   QDockWidget* picked = dock("Picked", build_picked(), Side::Right);
   QDockWidget* scan = dock("Scan here", scan_, Side::Right);
   QDockWidget* compare = dock("Compare", compare_, Side::Right);
+  QDockWidget* clip = dock("Clip", clip_, Side::Right);
   dock("Time", timeline_, Side::Bottom)->hide();
   tabifyDockWidget(picked, scan);
   tabifyDockWidget(scan, compare);
+  tabifyDockWidget(compare, clip);
   picked->raise();
   resizeDocks({docks_[layers_], picked}, {290, 330}, Qt::Horizontal);
   resizeDocks({docks_[layers_], status}, {height() - 270, 230}, Qt::Vertical);
@@ -190,7 +209,11 @@ void Window::connect_canvas() {
 
 void Window::build_workers() {
   const auto failed = [this](const std::string& message) { fault(message); };
-  const auto redraw = [this] { changed(); };
+  ruler_ = std::make_unique<Ruler>(view());
+  const auto redraw = [this] {
+    changed();
+    update_echoes();
+  };
   tracker_ = std::make_unique<TerrainTracker>(view(), TerrainTracker::Hooks{.changed =
                                                                                 [this] {
                                                                                   show_status();
@@ -270,7 +293,7 @@ void Window::fault(const std::string& message) {
 
 bool Window::is_busy() const {
   return opening_.is_running() || !queue_.empty() || tracker_->is_busy() || playback_->is_busy() ||
-         picker_->is_busy() || images_->is_busy() || scan_->is_scanning() ||
+         picker_->is_busy() || echoes_.is_running() || images_->is_busy() || scan_->is_scanning() ||
          compare_->is_comparing();
 }
 

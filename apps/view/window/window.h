@@ -15,7 +15,9 @@
 #include "apps/view/load_input.h"
 #include "apps/view/recorded/timeline.h"
 #include "apps/view/window/canvas.h"
+#include "apps/view/window/document.h"
 #include "apps/view/window/job.h"
+#include "apps/view/window/panels/clip_panel.h"
 #include "apps/view/window/panels/compare_panel.h"
 #include "apps/view/window/panels/fact_table.h"
 #include "apps/view/window/panels/image_panel.h"
@@ -25,10 +27,12 @@
 #include "apps/view/window/picker.h"
 #include "apps/view/window/playback.h"
 #include "apps/view/window/recent_files.h"
+#include "apps/view/window/ruler.h"
 #include "apps/view/window/run_window.h"
 #include "apps/view/window/style.h"
 #include "apps/view/window/terrain_tracker.h"
 
+class QAction;
 class QComboBox;
 class QLabel;
 class QMenu;
@@ -64,6 +68,7 @@ class Window : public QMainWindow {
   ImagePanel& image_panel() noexcept { return *images_; }
   ScanPanel& scan_panel() noexcept { return *scan_; }
   ComparePanel& compare_panel() noexcept { return *compare_; }
+  ClipPanel& clip_panel() noexcept { return *clip_; }
   const FactTable& status() const noexcept { return *status_; }
   const FactTable& picked() const noexcept { return *picked_; }
   TerrainTracker& tracker() noexcept { return *tracker_; }
@@ -73,18 +78,6 @@ class Window : public QMainWindow {
   void dropEvent(QDropEvent* event) override;
 
  private:
-  // Opened input.
-  struct Document {
-    std::filesystem::path path;
-    InputKind kind = InputKind::Mesh;
-    std::string name;  // first part of its layers' names
-    std::shared_ptr<TerrainFollower> follower;
-    std::string terrain;        // name of the terrain's layer
-    bool has_one_band = false;  // true if a DEM's heights are shown by a follower
-    std::shared_ptr<const Simulation> simulation;
-    std::shared_ptr<const RecordedDataset> dataset;  // null for a scene
-    std::shared_ptr<const Timeline> timeline;
-  };
   struct Loaded {
     Opened opened;
     std::shared_ptr<const Timeline> timeline;
@@ -93,6 +86,7 @@ class Window : public QMainWindow {
 
   // window.cpp
   void build_hint();
+  void show_hint(const std::filesystem::path& opening);
   void build_docks();
   void build_status_bar();
   QWidget* build_status();
@@ -115,6 +109,7 @@ class Window : public QMainWindow {
   void ask_for_picture();
   void ask_for_turntable();
   void fill_recent();
+  void ask_for_origin_of_selected();
   void look_along(const glm::dvec3& direction, const glm::dvec3& up);
   void toggle_wireframe();
   void close_selected();
@@ -139,6 +134,14 @@ class Window : public QMainWindow {
   void remove_layer(const std::string& name);
   void offer_comparisons();
   void show_documents();
+
+  // window_measures.cpp
+  void build_clip_panel();
+  void set_clip(const std::optional<ClipBox>& box);
+  void measure(bool on);
+  void measure_to(glm::ivec2 at_px);
+  void show_measured();
+  void update_echoes();
 
   // window_picking.cpp
   void show_legend_of(const std::string& layer);
@@ -175,12 +178,16 @@ class Window : public QMainWindow {
   ImagePanel* images_ = nullptr;
   ScanPanel* scan_ = nullptr;
   ComparePanel* compare_ = nullptr;
+  ClipPanel* clip_ = nullptr;
+  QAction* measures_ = nullptr;             // checked while clicks measure
   std::map<QWidget*, QDockWidget*> docks_;  // docks by content
   QTimer status_clock_;
   std::unique_ptr<TerrainTracker> tracker_;
   std::unique_ptr<Playback> playback_;
   std::unique_ptr<Picker> picker_;
-  Job opening_;
+  std::unique_ptr<Ruler> ruler_;
+  Job opening_, echoes_;
+  bool are_echoes_stale_ = false;  // requested again while they were projected
 };
 
 }  // namespace groundray

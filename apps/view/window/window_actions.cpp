@@ -8,6 +8,7 @@
 #include <glm/geometric.hpp>
 
 #include "apps/view/window/panels/dialogs.h"
+#include "apps/view/window/panels/origin_dialog.h"
 #include "apps/view/window/window.h"
 #include "core/error.h"
 
@@ -53,7 +54,7 @@ void Window::build_actions() {
   QMenu& panels = *menuBar()->addMenu("&Panels");
   for (QWidget* content :
        std::initializer_list<QWidget*>{layers_, status_->parentWidget(), picked_->parentWidget(),
-                                       timeline_, images_, scan_, compare_}) {
+                                       timeline_, images_, scan_, compare_, clip_}) {
     panels.addAction(docks_.at(content)->toggleViewAction());
   }
   QMenu& help = *menuBar()->addMenu("&Help");
@@ -109,6 +110,13 @@ void Window::build_view_actions(QMenu& menu, QToolBar& bar) {
     view().set_legend_visible(on);
     canvas_->draw();
   });
+  QAction* dome = action(menu, &bar, "&Eye-dome lighting", Qt::Key_Y, Icon::EyeDome, {});
+  dome->setCheckable(true);
+  connect(dome, &QAction::toggled, this, [this](bool on) {
+    view().set_eye_dome(on);
+    canvas_->draw();
+  });
+  dome->setChecked(start_.view.has_eye_dome);
   action(menu, nullptr, "&Full screen", Qt::Key_F11, {},
          [this] { setWindowState(windowState() ^ Qt::WindowFullScreen); });
 }
@@ -121,6 +129,12 @@ void Window::build_tool_actions(QMenu& menu, QToolBar& bar) {
   action(menu, &bar, "Sca&n here", Qt::Key_N, Icon::Scan, [this, show] { show(scan_); });
   action(menu, &bar, "&Compare with the truth", Qt::Key_C, Icon::Compare,
          [this, show] { show(compare_); });
+  measures_ = action(menu, &bar, "&Measure distances", Qt::Key_M, Icon::Measure, {});
+  measures_->setCheckable(true);
+  connect(measures_, &QAction::toggled, this, [this](bool on) { measure(on); });
+  action(menu, &bar, "Clip by a &box", Qt::Key_B, Icon::Clip, [this, show] { show(clip_); });
+  action(menu, nullptr, "Set the &origin of the selected layer...", QKeySequence("Ctrl+G"), {},
+         [this] { ask_for_origin_of_selected(); });
   menu.addSeparator();
   QAction* play = action(menu, nullptr, "&Play", Qt::Key_Space, {},
                          [this] { timeline_->play(!timeline_->is_playing()); });
@@ -191,6 +205,31 @@ void Window::fill_recent() {
           [this] { recent_.clear(); });
 }
 
+// Offers the origins of scenes and datasets, in whose frames other programs' files may be.
+void Window::ask_for_origin_of_selected() {
+  const std::string name = layers_->selected();
+  const auto document = std::ranges::find(documents_, document_of(name), &Document::name);
+  const bool is_movable = document != documents_.end() &&
+                          (document->kind == InputKind::Mesh || document->kind == InputKind::Cloud);
+  if (!is_movable) return fault("Select a mesh or a cloud first: only these may lack an origin.");
+  KnownOrigins known;
+  for (const Document& each : documents_) {
+    if (each.timeline != nullptr)
+      known.emplace_back(each.name, each.timeline->georeference().origin_w_m);
+  }
+  ask_for_origin(this, name, view().find(name)->frame_w_m, known,
+                 [this, name](const glm::dvec3& origin_w_m) {
+                   const Layer* const layer = view().find(name);
+                   if (layer == nullptr) return;
+                   Layer moved = *layer;
+                   move_frame(moved, origin_w_m);
+                   view().add(std::move(moved));
+                   picker_->clear();
+                   view().fit(name);
+                   canvas_->look(view().current_look());
+                 });
+}
+
 // Shows everything from a direction.
 void Window::look_along(const glm::dvec3& direction, const glm::dvec3& up) {
   view().fit();
@@ -234,6 +273,7 @@ void Window::escape() {
   if (scan_->is_scanning()) return scan_->cancel();
   if (compare_->is_comparing()) return compare_->cancel();
   if (opening_.is_running()) return cancel_opening();
+  if (measures_->isChecked()) return measures_->setChecked(false);
   timeline_->play(false);
   view().remove("picked/ray");
   images_->mark(std::nullopt);

@@ -28,8 +28,6 @@ std::vector<std::string> camera_names(const Timeline& timeline) {
   return names;
 }
 
-std::string document_of(const std::string& layer) { return layer.substr(0, layer.find('/')); }
-
 }  // namespace
 
 void Window::dragEnterEvent(QDragEnterEvent* event) {
@@ -69,6 +67,7 @@ void Window::open_next() {
   busy_->show();
   cancel_->show();
   message_->setText(text_of("opening {} ...", path.string()));
+  show_hint(path);
 }
 
 void Window::cancel_opening() {
@@ -146,6 +145,9 @@ void Window::take(Loaded loaded) {
                     .simulation = opened.simulation,
                     .dataset = opened.dataset,
                     .timeline = loaded.timeline};
+  for (const FrameOrigin& origin : start_.view.origins) {
+    if (place_input(opened, origin)) unmatched_.erase("--origin " + origin.text);
+  }
   name_layers(opened.layers, document.name);
   std::vector<std::string> names;
   for (Layer& layer : opened.layers) {
@@ -156,7 +158,6 @@ void Window::take(Loaded loaded) {
   documents_.push_back(document);
   recent_.add(opened.path);
   playback_->include_again(document.name + "/");
-  hint_->hide();
   if (!opened.notes.empty()) {
     statusBar()->showMessage(text_of("{}", fmt::join(opened.notes, "; ")), 15000);
   }
@@ -257,8 +258,8 @@ void Window::show_images() {
   images->show();
   QList<QDockWidget*> docks{images};
   QList<int> heights_px{height() * 45 / 100};
-  for (QDockWidget* tab :
-       {docks_.at(picked_->parentWidget()), docks_.at(scan_), docks_.at(compare_)}) {
+  for (QDockWidget* tab : {docks_.at(picked_->parentWidget()), docks_.at(scan_),
+                           docks_.at(compare_), docks_.at(clip_)}) {
     docks << tab;
     heights_px << height() * 45 / 100;
   }
@@ -317,27 +318,42 @@ void Window::close_all() {
   for (const Layer* layer : view().layers()) rest.push_back(layer->name);
   for (const std::string& layer : rest) remove_layer(layer);
   has_looked_ = false;
-  hint_->show();
+  ruler_->clear();
   changed();
   offer_comparisons();
   show_documents();
 }
 
+// Offers the most sensible pairs first. Layers of scenes are no measurements.
 void Window::offer_comparisons() {
-  std::vector<std::string> measured;
   std::vector<Truth> truths;
+  std::set<std::string> scenes;
   for (const Document& document : documents_) {
-    if (document.simulation != nullptr)
-      truths.push_back({"ground of " + document.name, document.simulation});
-    if (document.kind == InputKind::Dem) {
-      truths.push_back({"heights of " + document.name, Truth::DemFile{document.path}});
+    if (document.simulation == nullptr) continue;
+    scenes.insert(document.name);
+    truths.push_back({"ground of " + document.name, document.simulation, document.terrain});
+  }
+  for (const Document& document : documents_) {
+    if (document.kind == InputKind::Dem)
+      truths.push_back(
+          {"heights of " + document.name, Truth::DemFile{document.path}, document.name});
+  }
+  std::vector<std::string> measured, surfaces;
+  std::ptrdiff_t others = 0;  // number of surfaces that are no objects of scenes
+  for (const LayerKind kind : {LayerKind::Cloud, LayerKind::Mesh, LayerKind::Terrain}) {
+    for (const Layer* layer : view().layers()) {
+      if (layer->kind != kind) continue;
+      const bool is_of_scene = scenes.contains(document_of(layer->name));
+      if (!is_of_scene || kind == LayerKind::Cloud) measured.push_back(layer->name);
+      if (kind == LayerKind::Cloud) continue;
+      // Objects of scenes come last: they are many, and few are measured alone.
+      surfaces.insert(
+          is_of_scene && kind == LayerKind::Mesh ? surfaces.end() : surfaces.begin() + others++,
+          layer->name);
     }
   }
-  for (const Layer* layer : view().layers()) {
-    const bool is_surface = layer->kind == LayerKind::Mesh || layer->kind == LayerKind::Terrain;
-    if (is_surface || layer->kind == LayerKind::Cloud) measured.push_back(layer->name);
-    if (is_surface) truths.push_back({"surface of " + layer->name, Layer{.name = layer->name}});
-  }
+  for (const std::string& name : surfaces)
+    truths.push_back({"surface of " + name, Layer{.name = name}, name});
   compare_->offer(measured, std::move(truths));
 }
 
@@ -346,6 +362,7 @@ void Window::show_documents() {
   for (const Document& document : documents_) names << QString::fromStdString(document.name);
   setWindowTitle(names.empty() ? "groundray view" : names.join(", ") + " - groundray view");
   message_->setText(names.empty() ? "F1: mouse and keys" : names.join(", "));
+  show_hint({});
   busy_->hide();
   cancel_->hide();
 }

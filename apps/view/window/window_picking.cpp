@@ -39,6 +39,7 @@ void Window::show_legend_of(const std::string& layer) {
 
 void Window::click(glm::ivec2 at_px, Qt::KeyboardModifiers keys) {
   canvas_->makeCurrent();
+  if (measures_->isChecked() && keys == Qt::NoModifier) return measure_to(at_px);
   const auto picked = view().pick(at_px.x, at_px.y);
   if (!picked) return picker_->clear();
   if ((keys & Qt::ControlModifier) != 0 && tracker_->is_open()) {

@@ -36,11 +36,13 @@ FactTable::Facts facts_of(const Comparison& comparison) {
 }
 
 // Refills a box and keeps its selection.
-void fill(QComboBox& box, const std::vector<std::string>& names) {
+// Fills a box with names and numbers; keeps the selection if the user has made it.
+void fill(QComboBox& box, const std::vector<std::pair<std::string, int>>& names, bool is_chosen) {
+  const QSignalBlocker blocker(box);
   const QString before = box.currentText();
   box.clear();
-  for (const std::string& name : names) box.addItem(QString::fromStdString(name));
-  const int index = box.findText(before);
+  for (const auto& [name, number] : names) box.addItem(QString::fromStdString(name), number);
+  const int index = is_chosen ? box.findText(before) : -1;
   if (index >= 0) box.setCurrentIndex(index);
 }
 
@@ -118,6 +120,10 @@ ComparePanel::ComparePanel(Hooks hooks, QWidget* parent)
   build();
   connect(compare_, &QPushButton::clicked, this, [this] { compare_chosen(); });
   connect(cancel_, &QPushButton::clicked, this, [this] { cancel(); });
+  connect(layer_, qOverload<int>(&QComboBox::currentIndexChanged), this,
+          [this] { offer_truths(); });
+  connect(layer_, qOverload<int>(&QComboBox::activated), this, [this] { is_layer_chosen_ = true; });
+  connect(truth_, qOverload<int>(&QComboBox::activated), this, [this] { is_truth_chosen_ = true; });
   update_buttons();
 }
 
@@ -156,22 +162,35 @@ void ComparePanel::build() {
 
 void ComparePanel::offer(const std::vector<std::string>& layers, std::vector<Truth> truths) {
   truths_ = std::move(truths);
-  std::vector<std::string> names(truths_.size());
-  std::ranges::transform(truths_, names.begin(), &Truth::name);
-  fill(*layer_, layers);
-  fill(*truth_, names);
+  std::vector<std::pair<std::string, int>> names;
+  for (const std::string& layer : layers) names.emplace_back(layer, static_cast<int>(names.size()));
+  fill(*layer_, names, is_layer_chosen_);
+  offer_truths();
+}
+
+// Offers the truths that the selected layer does not show itself.
+void ComparePanel::offer_truths() {
+  const std::string layer = layer_->currentText().toStdString();
+  std::vector<std::pair<std::string, int>> names;
+  for (std::size_t i = 0; i < truths_.size(); ++i) {
+    if (truths_[i].layer.empty() || truths_[i].layer != layer)
+      names.emplace_back(truths_[i].name, static_cast<int>(i));
+  }
+  fill(*truth_, names, is_truth_chosen_);
   update_buttons();
 }
 
 void ComparePanel::choose(const std::string& layer, const std::string& truth) {
   for (const auto& [box, name] : {std::pair(layer_, layer), {truth_, truth}}) {
     const int index = box->findText(QString::fromStdString(name));
-    if (index >= 0) box->setCurrentIndex(index);
+    if (index < 0) continue;
+    box->setCurrentIndex(index);
+    (box == layer_ ? is_layer_chosen_ : is_truth_chosen_) = true;
   }
 }
 
 void ComparePanel::update_buttons() {
-  compare_->setEnabled(layer_->count() > 0 && !truths_.empty() && !is_comparing());
+  compare_->setEnabled(layer_->count() > 0 && truth_->count() > 0 && !is_comparing());
   cancel_->setEnabled(is_comparing());
   progress_->setVisible(is_comparing());
 }
@@ -190,11 +209,10 @@ Truth ComparePanel::chosen_truth(std::size_t index) const {
 
 void ComparePanel::compare_chosen() {
   const Layer* layer = hooks_.layer(layer_->currentText().toStdString());
-  const int index = truth_->currentIndex();
-  if (layer == nullptr || index < 0 || is_comparing()) return;
+  if (layer == nullptr || truth_->currentIndex() < 0 || is_comparing()) return;
   Truth truth;
   try {
-    truth = chosen_truth(static_cast<std::size_t>(index));
+    truth = chosen_truth(static_cast<std::size_t>(truth_->currentData().toInt()));
   } catch (const Error& error) {
     if (hooks_.failed) hooks_.failed(error.what());
     return;

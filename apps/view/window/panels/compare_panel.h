@@ -33,8 +33,10 @@ class ComparePanel : public QWidget {
 
   explicit ComparePanel(Hooks hooks, QWidget* parent = nullptr);
 
-  /// Offers layers and truths for selection, and keeps the present selection. A truth that is a
-  /// displayed surface needs only the layer's name: its data are taken when the comparison starts.
+  /// Offers layers and truths for selection, best first. Keeps what the user or choose() selected;
+  /// otherwise selects the first of each. A layer is not offered its own surface as the truth. A
+  /// truth that is a displayed surface needs only the layer's name: its data are taken when the
+  /// comparison starts.
   void offer(const std::vector<std::string>& layers, std::vector<Truth> truths);
   /// Selects by name; unknown names have no effect.
   void choose(const std::string& layer, const std::string& truth);
@@ -45,12 +47,14 @@ class ComparePanel : public QWidget {
 
  private:
   void build();
+  void offer_truths();
   void update_buttons();
   Truth chosen_truth(std::size_t index) const;
   void show_comparison(const Comparison& comparison);
 
   Hooks hooks_;
   std::vector<Truth> truths_;
+  bool is_layer_chosen_ = false, is_truth_chosen_ = false;
   QComboBox *layer_ = nullptr, *truth_ = nullptr;
   QDoubleSpinBox* tolerance_ = nullptr;
   QPushButton *compare_ = nullptr, *cancel_ = nullptr;

@@ -46,6 +46,8 @@ menu <i>File</i>.</p>
 <tr><td>T</td><td>surfaces as wireframe</td><td>L</td><td>legend</td></tr>
 <tr><td>Space</td><td>play, pause</td><td>, .</td><td>previous frame, next frame</td></tr>
 <tr><td>N</td><td>scan here</td><td>C</td><td>compare with the truth</td></tr>
+<tr><td>M</td><td>measure distances</td><td>B</td><td>clip by a box</td></tr>
+<tr><td>Y</td><td>eye-dome lighting</td><td>Ctrl+G</td><td>set the origin of a mesh or cloud</td></tr>
 <tr><td>Ctrl+O</td><td>open files</td><td>Ctrl+Shift+O</td><td>open a dataset's folder</td></tr>
 <tr><td>Ctrl+S</td><td>save a picture</td><td>Ctrl+T</td><td>save a turntable</td></tr>
 <tr><td>Delete</td><td>close the selected layer</td><td>Ctrl+W</td><td>close all</td></tr>
@@ -54,7 +56,11 @@ menu <i>File</i>.</p>
 </table>
 <h3>Images</h3>
 <p>Point at a pixel for its value; click for its ray and the surface that it hits. The wheel
-zooms, a double click shows all.</p>
+zooms, a double click shows all. The slider changes the exposure of light and pictures; <i>Echoes</i> shows
+the current scans over a camera's image.</p>
+<h3>Measure</h3>
+<p>Click two points: those of clouds and, near a corner of a triangle, that corner are exact; elsewhere the
+surface counts. A third click begins anew; Escape ends measuring.</p>
 <h3>Scan here</h3>
 <p>For a scene, or a DEM as bare ground: choose a sensor, press <i>Place it in the view</i>, press on the ground at
 its position and drag in its direction; then <i>Scan</i>.</p>

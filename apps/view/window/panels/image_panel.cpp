@@ -2,14 +2,18 @@
 
 #include <fmt/format.h>
 
+#include <QCheckBox>
 #include <QComboBox>
 #include <QHBoxLayout>
 #include <QLabel>
 #include <QPainter>
+#include <QSlider>
+#include <QToolButton>
 #include <QVBoxLayout>
 #include <algorithm>
 #include <cmath>
 
+#include "apps/view/rendering/colour_table.h"
 #include "apps/view/window/panels/picture_area.h"
 #include "apps/view/window/style.h"
 #include "apps/view/window/widgets.h"
@@ -21,6 +25,12 @@ constexpr int legend_margin_px = 6;
 constexpr int band_px = 12;
 constexpr int band_ticks = 5;
 constexpr int few_ticks = 3;  // if there is no room for more
+constexpr int steps_per_ev = 10;
+constexpr int most_ev = 10;
+
+bool has_exposure(const ImageChannel& channel) {
+  return channel.kind == ImageChannel::Kind::Light || channel.kind == ImageChannel::Kind::AsStored;
+}
 
 double value_at(const ImageLegend& legend, double share) {
   return legend.is_logarithmic && legend.low > 0
@@ -136,6 +146,14 @@ ImagePanel::ImagePanel(Hooks hooks, QWidget* parent) : QWidget(parent), hooks_(s
     channel_name_ = channel_->currentText().toStdString();
     redraw();
   });
+  connect(exposure_, &QSlider::valueChanged, this, [this] {
+    exposure_text_->setText(text_of("{:+.1f} EV", exposure_ev()));
+    redraw();
+  });
+  connect(echoes_, &QCheckBox::toggled, this, [this](bool on) {
+    if (!on) area_->show_dots({});
+    if (hooks_.echoes_wanted) hooks_.echoes_wanted();
+  });
 }
 
 void ImagePanel::build() {
@@ -156,7 +174,12 @@ void ImagePanel::build() {
   legend_ = new LegendStrip;
   values_ = named(wrapped_label(), "pixel_values");
   auto* row = new QHBoxLayout;
-  add_widgets(*row, {camera_, channel_});
+  echoes_ = named(new QCheckBox("Echoes"), "echoes",
+                  "The echoes of the current scans, coloured by distance from the camera, at the "
+                  "pixels that see them");
+  echoes_->hide();
+  add_widgets(*row, {camera_, channel_, echoes_});
+  build_exposure(*row);
   row->addStretch(1);
   auto* layout = new QVBoxLayout(this);
   layout->setContentsMargins(4, 4, 4, 4);
@@ -165,6 +188,48 @@ void ImagePanel::build() {
   layout->addWidget(title_);
   layout->addWidget(area_, 1);
   add_widgets(*layout, {legend_, values_});
+}
+
+void ImagePanel::build_exposure(QBoxLayout& row) {
+  exposure_ = named(new QSlider(Qt::Horizontal), "exposure", "Exposure: powers of 2 of brightness");
+  exposure_->setRange(-most_ev * steps_per_ev, most_ev * steps_per_ev);
+  exposure_->setMinimumWidth(60);
+  exposure_text_ = new QLabel("+0.0 EV");
+  auto* automatic =
+      named(new QToolButton, "automatic_exposure", "Expose so that 1 % of the values exceed white");
+  automatic->setText("Auto");
+  connect(automatic, &QToolButton::clicked, this, [this] {
+    if (image_ == nullptr) return;
+    const auto channel = static_cast<std::size_t>(channel_->currentIndex());
+    const double ev = automatic_exposure_ev(image_->channels()[channel]);
+    exposure_->setValue(static_cast<int>(std::lround(ev * steps_per_ev)));
+  });
+  exposed_ = new QWidget;
+  auto* layout = new QHBoxLayout(exposed_);
+  layout->setContentsMargins(0, 0, 0, 0);
+  add_widgets(*layout, {exposure_, exposure_text_, automatic});
+  exposed_->hide();
+  row.addWidget(exposed_, 1);
+}
+
+double ImagePanel::exposure_ev() const {
+  return static_cast<double>(exposure_->value()) / steps_per_ev;
+}
+
+bool ImagePanel::wants_echoes() const {
+  return echoes_->isChecked() && shown_ && shown_->timeline != nullptr;
+}
+
+void ImagePanel::show_echoes(const std::vector<EchoPixel>& echoes) {
+  std::vector<float> depths_m;
+  for (const EchoPixel& echo : echoes) depths_m.push_back(static_cast<float>(echo.depth_m));
+  const glm::dvec2 span_m = colour_range(depths_m, ColourScale::Vivid);
+  std::vector<PictureDot> dots;
+  for (const EchoPixel& echo : echoes) {
+    const double share = (echo.depth_m - span_m.x) / std::max(span_m.y - span_m.x, 1e-9);
+    dots.push_back({echo.pixel, colour_of(colour_on(ColourScale::Vivid, share))});
+  }
+  area_->show_dots(std::move(dots));
 }
 
 void ImagePanel::set_cameras(const std::vector<std::string>& names) {
@@ -192,12 +257,12 @@ void ImagePanel::show_image(const ImageSource& source) {
 
 void ImagePanel::read(const ImageSource& source) {
   source_ = source;
-  start([source, wanted = channel_name_] {
+  start([source, wanted = channel_name_, ev = exposure_ev()] {
     const auto image = source.is_frame
                            ? std::make_shared<const RecordedImage>(source.file, source.names)
                            : std::make_shared<const RecordedImage>(source.file);
     const std::size_t channel = image->find(wanted).value_or(0);
-    return Shown{source, image, channel, image->draw(channel)};
+    return Shown{source, image, channel, image->draw(channel, std::nullopt, ev)};
   });
 }
 
@@ -208,8 +273,8 @@ void ImagePanel::redraw() {
     return;
   }
   const std::size_t channel = image_->find(channel_name_).value_or(0);
-  start([source = *shown_, image = image_, channel] {
-    return Shown{source, image, channel, image->draw(channel)};
+  start([source = *shown_, image = image_, channel, ev = exposure_ev()] {
+    return Shown{source, image, channel, image->draw(channel, std::nullopt, ev)};
   });
 }
 
@@ -237,7 +302,10 @@ void ImagePanel::start(std::function<Shown()> work) {
 
 void ImagePanel::take(Shown shown) {
   const bool is_another = !shown_ || shown_->file != shown.source.file;
-  if (is_another) area_->mark(std::nullopt);  // it belongs to the previous image
+  if (is_another) {  // these belong to the previous image
+    area_->mark(std::nullopt);
+    area_->show_dots({});
+  }
   shown_ = std::move(shown.source);
   image_ = std::move(shown.image);
   is_filling_ = true;
@@ -250,10 +318,17 @@ void ImagePanel::take(Shown shown) {
   if (values_->text().isEmpty()) values_->setText("point at a pixel; a click shows its ray");
   is_filling_ = false;
   area_->show_picture(shown.drawn.picture);
-  const bool is_picture = image_->channels()[shown.channel].kind == ImageChannel::Kind::Picture;
+  show_controls(image_->channels()[shown.channel]);
+  const bool is_picture = image_->channels()[shown.channel].kind == ImageChannel::Kind::AsStored;
   legend_->show_legend(is_picture ? std::nullopt : std::optional(shown.drawn.legend));
   const glm::ivec2 size = image_->size_px();
   title_->setText(text_of("{}   {} x {} px", shown_->title, size.x, size.y));
+  if (is_another && hooks_.echoes_wanted) hooks_.echoes_wanted();
+}
+
+void ImagePanel::show_controls(const ImageChannel& channel) {
+  exposed_->setVisible(has_exposure(channel));
+  echoes_->setVisible(shown_->timeline != nullptr);
 }
 
 void ImagePanel::clear(const QString& why) {
@@ -271,7 +346,9 @@ void ImagePanel::show_nothing(const QString& why) {
   legend_->show_legend(std::nullopt);
   title_->clear();
   values_->clear();
-  channel_->hide();
+  for (QWidget* each : {static_cast<QWidget*>(channel_), static_cast<QWidget*>(echoes_), exposed_})
+    each->hide();
+  area_->show_dots({});
   is_filling_ = true;
   channel_->clear();
   is_filling_ = false;

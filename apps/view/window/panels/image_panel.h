@@ -9,11 +9,15 @@
 #include <string>
 #include <vector>
 
+#include "apps/view/recorded/echo_pixels.h"
 #include "apps/view/recorded/recorded_image.h"
 #include "apps/view/window/job.h"
 
+class QBoxLayout;
+class QCheckBox;
 class QComboBox;
 class QLabel;
+class QSlider;
 
 namespace groundray {
 
@@ -37,7 +41,9 @@ class ImagePanel : public QWidget {
   /// Callbacks; any may be empty.
   struct Hooks {
     std::function<void(const std::string&)> camera_chosen{};
-    std::function<void(glm::ivec2)> clicked{};         ///< a pixel of the displayed image
+    std::function<void(glm::ivec2)> clicked{};  ///< a pixel of the displayed image
+    /// Another image is shown, or the user switched echoes on or off.
+    std::function<void()> echoes_wanted{};
     std::function<void(const std::string&)> failed{};  ///< error message
   };
 
@@ -53,6 +59,10 @@ class ImagePanel : public QWidget {
   /// Shows a text instead of an image, and abandons any reading under way.
   void clear(const QString& why = {});
   void mark(std::optional<glm::dvec2> pixel);
+  /// Returns true if echoes are to be shown over the displayed image.
+  bool wants_echoes() const;
+  /// Shows echoes over the image, coloured by their distance from the camera.
+  void show_echoes(const std::vector<EchoPixel>& echoes);
 
   /// Returns the displayed image, or null.
   std::shared_ptr<const RecordedImage> image() const { return image_; }
@@ -70,10 +80,13 @@ class ImagePanel : public QWidget {
   };
 
   void build();
+  void build_exposure(QBoxLayout& row);
   void read(const ImageSource& source);
   void redraw();
   void start(std::function<Shown()> work);
   void take(Shown shown);
+  void show_controls(const ImageChannel& channel);
+  double exposure_ev() const;
   void show_nothing(const QString& why);
   void point_at(std::optional<glm::ivec2> pixel);
 
@@ -85,7 +98,10 @@ class ImagePanel : public QWidget {
   bool is_filling_ = false;
   bool is_stale_ = false;  // the job under way draws another channel than requested
   QComboBox *camera_ = nullptr, *channel_ = nullptr;
-  QLabel *title_ = nullptr, *values_ = nullptr;
+  QLabel *title_ = nullptr, *values_ = nullptr, *exposure_text_ = nullptr;
+  QWidget* exposed_ = nullptr;  // all widgets of the exposure
+  QSlider* exposure_ = nullptr;
+  QCheckBox* echoes_ = nullptr;
   PictureArea* area_ = nullptr;
   LegendStrip* legend_ = nullptr;
   Job job_;

@@ -122,6 +122,8 @@ QWidget* LayerPanel::build_looks() {
   form->addRow("Point size", point_size_);
   wireframe_ = named(new QCheckBox("Wireframe"), "wireframe");
   form->addRow("", wireframe_);
+  clipped_ = named(new QCheckBox("Clipped by the box"), "clipped");
+  form->addRow("", clipped_);
   facts_ = wrapped_label();
   facts_->setTextInteractionFlags(Qt::TextSelectableByMouse);
   form->addRow(facts_);
@@ -139,6 +141,8 @@ void LayerPanel::connect_looks() {
           [this](int share) { change([&] { view_.set_opacity(selected(), share / 100.0); }); });
   connect(wireframe_, &QCheckBox::toggled, this,
           [this](bool on) { change([&] { view_.set_wireframe(selected(), on); }); });
+  connect(clipped_, &QCheckBox::toggled, this,
+          [this](bool on) { change([&] { view_.set_clipped(selected(), on); }); });
   connect(point_size_, qOverload<double>(&QDoubleSpinBox::valueChanged), this,
           [this](double size) { change([&] { view_.set_point_size(selected(), size); }); });
   for (QDoubleSpinBox* box : {low_, high_}) {
@@ -247,6 +251,8 @@ void LayerPanel::show_looks() {
   opacity_->setValue(static_cast<int>(std::lround(layer->opacity * 100)));
   wireframe_->setChecked(layer->wireframe);
   wireframe_->setVisible(layer->kind == LayerKind::Terrain || layer->kind == LayerKind::Mesh);
+  clipped_->setChecked(layer->is_clipped);
+  clipped_->setVisible(view_.clip().has_value());
   point_size_->setValue(layer->point_size_px);
   point_size_->setEnabled(layer->kind == LayerKind::Cloud);
   facts_->setText(facts_text(*layer));

@@ -61,7 +61,7 @@ class LayerPanel : public QWidget {
   QDoubleSpinBox *low_ = nullptr, *high_ = nullptr;
   QWidget* range_ = nullptr;
   QSlider* opacity_ = nullptr;
-  QCheckBox* wireframe_ = nullptr;
+  QCheckBox *wireframe_ = nullptr, *clipped_ = nullptr;
   QDoubleSpinBox* point_size_ = nullptr;
   QLabel* facts_ = nullptr;
 };

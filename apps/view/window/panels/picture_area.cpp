@@ -5,6 +5,7 @@
 #include <QWheelEvent>
 #include <algorithm>
 #include <cmath>
+#include <utility>
 
 #include "apps/view/window/style.h"
 
@@ -54,6 +55,11 @@ void PictureArea::mark(std::optional<glm::dvec2> pixel) {
   update();
 }
 
+void PictureArea::show_dots(std::vector<PictureDot> dots) {
+  dots_ = std::move(dots);
+  update();
+}
+
 double PictureArea::scale() const {
   if (picture_.isNull()) return 1;
   return zoom_ * std::min(static_cast<double>(width()) / picture_.width(),
@@ -89,6 +95,11 @@ void PictureArea::paintEvent(QPaintEvent*) {
   }
   painter.setRenderHint(QPainter::SmoothPixmapTransform, scale() < 2);
   painter.drawImage(QRectF(corner(), scale() * QSizeF(picture_.size())), picture_);
+  const double side = std::clamp(0.8 * scale(), 3.0, 9.0);
+  for (const PictureDot& dot : dots_) {
+    const QPointF corner = place_of(dot.pixel) - QPointF(side / 2, side / 2);
+    painter.fillRect(QRectF(corner, QSizeF(side, side)), dot.colour);
+  }
   if (!mark_) return;
   const QPointF at = place_of(*mark_);
   for (const auto& [colour, width] : {std::pair(QColor(Qt::black), 3), {QColor(255, 140, 40), 1}}) {

@@ -1,15 +1,23 @@
 #pragma once
 
+#include <QColor>
 #include <QImage>
 #include <QPointF>
 #include <QWidget>
 #include <functional>
 #include <glm/vec2.hpp>
 #include <optional>
+#include <vector>
 
 #include "core/image/image.h"
 
 namespace groundray {
+
+/// Dot over a picture.
+struct PictureDot {
+  glm::dvec2 pixel{0};  ///< integers at pixel centres
+  QColor colour;
+};
 
 /// Picture scaled to the available room; the wheel zooms, dragging pans.
 class PictureArea : public QWidget {
@@ -27,6 +35,10 @@ class PictureArea : public QWidget {
   void clear(const QString& why = {});
   /// Marks a position in the picture; std::nullopt removes the mark.
   void mark(std::optional<glm::dvec2> pixel);
+
+  /// Shows dots over the picture; another picture leaves them.
+  void show_dots(std::vector<PictureDot> dots);
+  const std::vector<PictureDot>& dots() const noexcept { return dots_; }
 
   /// Returns the position of a pixel's centre in this widget.
   QPointF place_of(glm::dvec2 pixel) const;
@@ -54,6 +66,7 @@ class PictureArea : public QWidget {
   QPoint pressed_, dragged_;
   bool is_drag_ = false;
   std::optional<glm::dvec2> mark_;
+  std::vector<PictureDot> dots_;
 };
 
 }  // namespace groundray
