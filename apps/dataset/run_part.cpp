@@ -84,8 +84,9 @@ FrameChoice checked_choice(const FrameChoice& choice, const std::vector<RunSenso
                 suggestion(name, known), fmt::join(known, ", "));
   }
   FrameChoice checked{.sensors = {}, .frames = choice.frames};
-  std::int64_t chosen = 0, most = 0;
+  std::int64_t chosen = 0, all = 0, most = 0;
   for (const auto& [name, frames] : run) {
+    all += frames;
     if (!choice.has_sensor(name)) continue;
     checked.sensors.push_back(name);
     chosen += choice.count(frames);
@@ -94,6 +95,7 @@ FrameChoice checked_choice(const FrameChoice& choice, const std::vector<RunSenso
   if (chosen == 0)
     throw Error("--frames: {} includes no frame: those of {} are numbered from 0 to {}",
                 range_text(choice.frames), fmt::join(checked.sensors, ", "), most - 1);
+  if (chosen == all) return {};
   if (checked.sensors.size() == run.size()) checked.sensors.clear();
   return checked;
 }

@@ -65,18 +65,14 @@ class Svg {
   std::string text_;
 };
 
-double step_of(const std::vector<double>& ticks) {
-  return ticks.size() > 1 ? ticks[1] - ticks[0] : 1;
-}
-
 void add_across(const Axis& axis, const Frame& frame, Svg& svg) {
   constexpr double px_each = 75;
   const auto most = std::max(2, static_cast<int>(frame.width / px_each));
-  const std::vector<double> ticks = ticks_between(axis.low, axis.high, most);
-  for (const double tick : ticks) {
+  const Ticks ticks = ticks_between(axis.low, axis.high, most);
+  for (const double tick : ticks.values) {
     const double x = frame.left + frame.width * (tick - axis.low) / (axis.high - axis.low);
     svg.add_line(x, frame.bottom(), 0, tick_px, line_colour);
-    svg.add_text(x, frame.bottom() + tick_px + font_px, "middle", tick_text(tick, step_of(ticks)));
+    svg.add_text(x, frame.bottom() + tick_px + font_px, "middle", tick_text(tick, ticks.step));
   }
   svg.add_text(frame.left + frame.width / 2, frame.bottom() + 32, "middle", axis.label);
 }
@@ -89,11 +85,11 @@ int ticks_up(const Frame& frame) {
 
 /// Adds the vertical axis; its label is centred at `label_x`.
 void add_up(const Axis& axis, const Frame& frame, double label_x, Svg& svg) {
-  const std::vector<double> ticks = ticks_between(axis.low, axis.high, ticks_up(frame));
-  for (const double tick : ticks) {
+  const Ticks ticks = ticks_between(axis.low, axis.high, ticks_up(frame));
+  for (const double tick : ticks.values) {
     const double y = frame.bottom() - frame.height * (tick - axis.low) / (axis.high - axis.low);
     svg.add_line(frame.left - tick_px, y, tick_px, 0, line_colour);
-    svg.add_text(frame.left - tick_px - 3, y + 4, "end", tick_text(tick, step_of(ticks)));
+    svg.add_text(frame.left - tick_px - 3, y + 4, "end", tick_text(tick, ticks.step));
   }
   svg.add_upright(label_x, frame.top + frame.height / 2, axis.label);
 }
@@ -128,7 +124,7 @@ int enlargement(const Image8& image) {
 
 }  // namespace
 
-std::vector<double> ticks_between(double a, double b, int most) {
+Ticks ticks_between(double a, double b, int most) {
   const auto [low, high] = std::minmax(a, b);
   if (!(high > low) || !std::isfinite(high - low)) return {};
   const double raw = (high - low) / most;
@@ -138,8 +134,8 @@ std::vector<double> ticks_between(double a, double b, int most) {
     const double slack = 1e-9 * (high - low) / step;
     const double first = std::ceil(low / step - slack), last = std::floor(high / step + slack);
     if (last - first + 1 > most) continue;
-    std::vector<double> ticks;
-    for (double k = first; k <= last; ++k) ticks.push_back(k * step);
+    Ticks ticks{.values = {}, .step = step};
+    for (double k = first; k <= last; ++k) ticks.values.push_back(k * step);
     return ticks;
   }
   return {};
@@ -159,7 +155,7 @@ std::string histogram_svg(const Histogram& histogram) {
   Svg svg(510, 215, histogram.title);
   const auto& counts = histogram.counts;
   const std::uint64_t most = counts.empty() ? 0 : *std::ranges::max_element(counts);
-  for (const double tick : ticks_between(0, static_cast<double>(most), ticks_up(frame))) {
+  for (const double tick : ticks_between(0, static_cast<double>(most), ticks_up(frame)).values) {
     const double y = frame.bottom() - frame.height * tick / static_cast<double>(most);
     svg.add_line(frame.left, y, frame.width, 0, grid_colour);
   }

@@ -7,10 +7,16 @@
 
 namespace groundray::golden {
 
+/// Marks of an axis.
+struct Ticks {
+  std::vector<double> values;
+  double step = 1;  ///< from one to the next, also if there is only one
+};
+
 /// Returns the multiples of 1, 2 or 5 times a power of ten between two values, inclusive, at the
 /// smallest step for which there are at most `most`; none if the values are equal or not finite.
 /// @param most  at least 2.
-std::vector<double> ticks_between(double a, double b, int most);
+Ticks ticks_between(double a, double b, int most);
 
 /// Returns the text of one of several ticks: as many decimals as their step needs.
 std::string tick_text(double value, double step);

@@ -2,52 +2,23 @@
 
 #include <fmt/format.h>
 #include <tbb/global_control.h>
-#include <unistd.h>
 
 #include <algorithm>
-#include <cmath>
 #include <cstddef>
-#include <cstdlib>
-#include <filesystem>
-#include <system_error>
+#include <iterator>
 #include <type_traits>
 #include <utility>
 #include <variant>
 
 #include "apps/dataset/write/dataset_writer.h"
 #include "apps/dataset/write/frame_maker.h"
-#include "core/error.h"
-#include "sensors/camera/imager.h"
+#include "core/io/temporary_folder.h"
+#include "sensors/camera/auto_exposure.h"
 
 namespace groundray {
 namespace {
 
-namespace fs = std::filesystem;
 using Seconds = std::chrono::duration<double>;
-
-// Temporary folder, which is removed with its contents.
-class SampleFolder {
- public:
-  SampleFolder() {
-    std::string name = (fs::temp_directory_path() / "groundray-sample-XXXXXX").string();
-    if (mkdtemp(name.data()) == nullptr) {
-      throw Error("{}: no temporary folder can be created: {}", fs::temp_directory_path().string(),
-                  std::generic_category().message(errno));
-    }
-    path_ = name;
-  }
-  ~SampleFolder() {
-    std::error_code ignored;
-    fs::remove_all(path_, ignored);
-  }
-  SampleFolder(const SampleFolder&) = delete;
-  SampleFolder& operator=(const SampleFolder&) = delete;
-
-  const fs::path& path() const noexcept { return path_; }
-
- private:
-  fs::path path_;
-};
 
 // Cameras that together show a part of an image of another camera.
 struct Bands {
@@ -71,43 +42,53 @@ bool crop(LensModel& lens, int first_row) {
       lens);
 }
 
-PlacedCamera as_large_as(const PlacedCamera& whole, LensModel lens, glm::ivec2 size_px,
-                         std::size_t number) {
-  PlacedCamera part = whole;
-  CameraSpec& spec = part.spec.camera;
-  part.spec.name += fmt::format("-part{}", number);
-  part.spec.lidars.clear();
-  part.rectification.reset();
+ImageF rows_of(const ImageF& image, int first, int count) {
+  ImageF rows(image.width(), count, image.channels());
+  const auto values = static_cast<std::ptrdiff_t>(image.width()) * image.channels();
+  std::copy_n(image.values().begin() + values * first, values * count, rows.values().begin());
+  return rows;
+}
+
+// Returns the rows of a camera's image from `first` on as a camera.
+PlacedCamera band_of(const PlacedCamera& whole, LensModel lens, int first, int count) {
+  PlacedCamera band = whole;
+  CameraSpec& spec = band.spec.camera;
+  band.spec.name += fmt::format("-rows{}", first);
+  band.spec.lidars.clear();
+  band.rectification.reset();
   spec.lens = std::move(lens);
-  spec.size_px = size_px;
-  part.camera = Camera(spec);
-  if (whole.pupil_sr.width() > 0)
-    part.pupil_sr = pupil_sr(part.camera.lens(), *spec.aperture, spec.imager->pixel_pitch_m);
-  return part;
+  spec.size_px.y = count;
+  band.camera = Camera(spec);
+  if (whole.pupil_sr.width() > 0) band.pupil_sr = rows_of(whole.pupil_sr, first, count);
+  return band;
 }
 
 Bands bands_of(const PlacedCamera& whole) {
   constexpr int count = 4, rows = 16;  // EXR compresses 16 rows at a time
-  const glm::ivec2 size_px = whole.spec.camera.size_px;
+  const int height = whole.spec.camera.size_px.y;
+  LensModel lens = whole.spec.camera.lens;
   Bands bands;
-  LensModel first = whole.spec.camera.lens;
-  if (size_px.y <= count * rows) {
-    bands.cameras.push_back(as_large_as(whole, first, size_px, 0));
-  } else if (!crop(first, 0)) {
-    constexpr int reduction = 4;
-    const glm::ivec2 small_px = glm::max(size_px / reduction, glm::ivec2(1));
-    bands.cameras.push_back(as_large_as(whole, first, small_px, 0));
-    bands.scale = double{1} * size_px.x * size_px.y / (double{1} * small_px.x * small_px.y);
-  } else {
-    for (int i = 0; i < count; ++i) {
-      LensModel lens = whole.spec.camera.lens;
-      crop(lens, (2 * i + 1) * size_px.y / (2 * count) - rows / 2);
-      bands.cameras.push_back(
-          as_large_as(whole, std::move(lens), {size_px.x, rows}, static_cast<std::size_t>(i)));
-    }
-    bands.scale = double{1} * size_px.y / (count * rows);
+  if (height <= count * rows || !crop(lens, 0)) {
+    bands.cameras.push_back(band_of(whole, std::move(lens), 0, height));
+    return bands;
   }
+  for (int i = 0; i < count; ++i) {
+    const int first = (2 * i + 1) * height / (2 * count) - rows / 2;
+    lens = whole.spec.camera.lens;
+    crop(lens, first);
+    bands.cameras.push_back(band_of(whole, lens, first, rows));
+  }
+  bands.scale = double{1} * height / (count * rows);
   return bands;
+}
+
+// Gives a camera an exposure time and a gain.
+void fix_exposure(PlacedCamera& camera, const ExposureSetting& exposure) {
+  CameraSpec& spec = camera.spec.camera;
+  spec.shutter.automatic.reset();
+  spec.shutter.exposure_s = exposure.exposure_s;
+  if (spec.imager) spec.imager->gain_dn_e *= exposure.gain;
+  camera.camera = Camera(spec);
 }
 
 // Cost of frames of the sample, by stage.
@@ -122,6 +103,13 @@ struct Cost {
     preparing += made.making - made.tracing;
     writing += written.writing_cpu;
     bytes += written.bytes;
+  }
+  Cost& operator+=(const Cost& other) {
+    tracing += other.tracing;
+    preparing += other.preparing;
+    writing += other.writing;
+    bytes += other.bytes;
+    return *this;
   }
 };
 
@@ -139,10 +127,13 @@ class Sample {
     cost.add(made, write_frame(simulation_, dataset_, made));
     return cost;
   }
+  ExposureSetting exposure_of(std::uint32_t camera, std::int64_t image) {
+    return maker_.exposure_of({camera, image});
+  }
   std::int64_t frames(std::uint32_t sensor) const { return dataset_.frames(sensor); }
 
  private:
-  SampleFolder folder_;
+  TemporaryFolder folder_;
   const Simulation& simulation_;
   DatasetWriter dataset_;
   FrameMaker maker_;
@@ -151,47 +142,59 @@ class Sample {
 }  // namespace
 
 RunEstimate estimate_run(Simulation simulation) {
-  std::vector<Bands> parts;
-  for (const PlacedCamera& camera : simulation.cameras) parts.push_back(bands_of(camera));
-  simulation.cameras.clear();
-  for (const Bands& each : parts)
-    simulation.cameras.insert(simulation.cameras.end(), each.cameras.begin(), each.cameras.end());
+  const auto lidars = static_cast<std::uint32_t>(simulation.lidars.size());
+  const std::size_t cameras = simulation.cameras.size();
+  std::vector<double> scales;
+  std::vector<std::size_t> band_ends;  // in simulation.cameras, after the cameras themselves
+  for (std::size_t i = 0; i < cameras; ++i) {
+    Bands bands = bands_of(simulation.cameras[i]);
+    scales.push_back(bands.scale);
+    std::ranges::move(bands.cameras, std::back_inserter(simulation.cameras));
+    band_ends.push_back(simulation.cameras.size());
+  }
   Sample sample(simulation);
   RunEstimate estimate;
-  // The scene is built for the first frame; the same frame again costs what any other does.
-  const std::int64_t first = sample.frames(0) / 2;
-  estimate.preparation = sample.cost_of(0, std::max<std::int64_t>(first - 1, 0)).preparing;
-  const auto cores = static_cast<double>(
+  // The first frame includes building the scene.
+  const std::uint32_t first_sensor = lidars > 0 ? 0 : static_cast<std::uint32_t>(cameras);
+  const std::int64_t first = sample.frames(first_sensor) / 2;
+  estimate.preparation =
+      sample.cost_of(first_sensor, std::max<std::int64_t>(first - 1, 0)).preparing;
+  const Seconds moving = simulation.terrain.whole() == nullptr
+                             ? sample.cost_of(first_sensor, first).preparing
+                             : Seconds(0);
+  estimate.total = estimate.preparation;
+  // Files are compressed on one thread while the next frame is traced on all.
+  const auto threads = static_cast<double>(
       tbb::global_control::active_value(tbb::global_control::max_allowed_parallelism));
-  const Seconds moving = [&] {
-    return simulation.terrain.whole() == nullptr ? sample.cost_of(0, first).preparing : Seconds(0);
-  }();
-  const auto add = [&](const Cost& cost, double scale, std::int64_t frames,
+  const auto add = [&](const Cost& cost, Seconds once, double scale, std::int64_t frames,
                        std::vector<RunEstimate::Frame>& into) {
-    // Files are compressed on one thread while the next frame is traced on all.
     const RunEstimate::Frame frame{
-        moving + scale * (cost.tracing + cost.writing / cores),
+        moving + once + scale * (cost.tracing + cost.writing / threads),
         static_cast<std::uint64_t>(scale * static_cast<double>(cost.bytes))};
     into.push_back(frame);
     estimate.total += static_cast<double>(frames) * frame.time;
     estimate.total_bytes += static_cast<std::uint64_t>(frames) * frame.bytes;
   };
-  estimate.total = estimate.preparation;
-  std::uint32_t sensor = 0;
-  for (; sensor < simulation.lidars.size(); ++sensor) {
-    const std::int64_t frames = sample.frames(sensor);
-    add(sample.cost_of(sensor, frames / 2), 1, frames, estimate.scans);
+  for (std::uint32_t lidar = 0; lidar < lidars; ++lidar) {
+    const std::int64_t frames = sample.frames(lidar);
+    add(sample.cost_of(lidar, frames / 2), Seconds(0), 1, frames, estimate.scans);
   }
-  for (const Bands& each : parts) {
+  std::size_t band = cameras;
+  for (std::size_t camera = 0; camera < cameras; ++camera) {
+    const std::uint32_t sensor = lidars + static_cast<std::uint32_t>(camera);
     const std::int64_t frames = sample.frames(sensor);
-    Cost cost;
-    for (std::size_t i = 0; i < each.cameras.size(); ++i, ++sensor) {
-      const Cost band = sample.cost_of(sensor, frames / 2);
-      cost.tracing += band.tracing;
-      cost.writing += band.writing;
-      cost.bytes += band.bytes;
+    Seconds metering{0};
+    if (simulation.cameras[camera].spec.camera.shutter.automatic) {
+      const auto begin = std::chrono::steady_clock::now();
+      const ExposureSetting exposure = sample.exposure_of(sensor, frames / 2);
+      metering = std::chrono::steady_clock::now() - begin;
+      for (std::size_t i = band; i < band_ends[camera]; ++i)
+        fix_exposure(simulation.cameras[i], exposure);
     }
-    add(cost, each.scale, frames, estimate.images);
+    Cost cost;
+    for (; band < band_ends[camera]; ++band)
+      cost += sample.cost_of(lidars + static_cast<std::uint32_t>(band), frames / 2);
+    add(cost, metering, scales[camera], frames, estimate.images);
   }
   return estimate;
 }

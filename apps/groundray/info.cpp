@@ -21,6 +21,7 @@
 #include "apps/dataset/write/journal.h"
 #include "apps/groundray/describe/file_facts.h"
 #include "apps/groundray/describe/named_facts.h"
+#include "apps/groundray/describe/sensor_facts.h"
 #include "apps/groundray/estimate.h"
 #include "apps/scene/notes.h"
 #include "apps/scene/simulation.h"
@@ -197,12 +198,7 @@ void print_camera(const PlacedCamera& placed) {
   print_text(stdout, "camera    {}: {}, {} images of {} x {} px in {:.4g} ms\n", placed.spec.name,
              camera.model, placed.begins.size(), camera.size_px.x, camera.size_px.y,
              1e-6 * static_cast<double>(placed.camera.duration().count()));
-  const ShutterSpec& shutter = camera.shutter;
-  if (shutter.automatic) {
-    print_text(stdout, "          automatic exposure, {:.4g} to {:.4g} ms, gain up to {:.3g}\n",
-               1e3 * shutter.automatic->shortest_s, 1e3 * shutter.exposure_s,
-               shutter.automatic->most_gain);
-  }
+  if (camera.shutter.automatic) print_text(stdout, "          {}\n", exposure_text(camera.shutter));
   if (needs_light(camera)) {
     print_text(
         stdout,

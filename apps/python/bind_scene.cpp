@@ -57,7 +57,8 @@ SharedScene build(SceneSpec spec, SceneSource source, std::optional<std::uint64_
 
 SharedScene open_scene(const std::filesystem::path& path, std::optional<std::uint64_t> seed) {
   return without_gil([&](const StopRequest& stop) {
-    return build(load_scene(path, data_folder() / "sensors"), {.path = path}, seed, stop);
+    SceneSource source{.path = std::filesystem::absolute(path)};
+    return build(load_scene(path, data_folder() / "sensors"), std::move(source), seed, stop);
   });
 }
 
@@ -78,7 +79,9 @@ SharedScene parse_given(const std::string& text, const std::filesystem::path& pa
                         const std::shared_ptr<TerrainModel>& terrain,
                         std::map<std::string, Mesh> meshes,
                         std::map<std::string, std::string> trajectories) {
-  return parse(text, {path, shared_heights(terrain), std::move(meshes), std::move(trajectories)},
+  return parse(text,
+               {std::filesystem::absolute(path), shared_heights(terrain), std::move(meshes),
+                std::move(trajectories)},
                seed);
 }
 

@@ -115,8 +115,11 @@ CameraImage make_image(SceneState& state, std::size_t camera, std::int64_t frame
   Channels channels(placed.spec.camera, image);
   if (made.light) {
     image.labels = std::move(made.labels);
-    if (auto stages = simulate_imager(state.simulation, camera, frame, made))
+    image.exposure = made.exposure;
+    if (auto stages = simulate_imager(state.simulation, camera, frame, made)) {
+      image.saturated_share = stages->saturated_share;
       channels.add_stages(*stages);
+    }
     channels.add_light(*made.light);
   }
   if (made.truth) channels.add_truth(*made.truth);
@@ -143,11 +146,14 @@ nb::list state_of(nb::handle_t<CameraImage> self) {
   state.append(image.frame);
   state.append(image.sensor);
   state.append(image.begin.count());
+  state.append(image.exposure.exposure_s);
+  state.append(image.exposure.gain);
+  state.append(image.saturated_share);
   return state;
 }
 
 CameraImage restored_image(const nb::tuple& values) {
-  constexpr std::size_t count = 5;
+  constexpr std::size_t count = 8;
   PickledState state("Image", values, count);
   CameraImage image;
   for (const nb::handle each : state.next<nb::list>("channels")) {
@@ -162,6 +168,9 @@ CameraImage restored_image(const nb::tuple& values) {
   image.frame = state.next<std::int64_t>("frame");
   image.sensor = state.next<std::string>("sensor");
   image.begin = std::chrono::nanoseconds(state.next<std::int64_t>("begin_ns"));
+  image.exposure.exposure_s = state.next<double>("exposure_s");
+  image.exposure.gain = state.next<double>("gain");
+  image.saturated_share = state.next<std::optional<double>>("saturated_share");
   return image;
 }
 

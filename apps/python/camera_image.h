@@ -4,12 +4,14 @@
 #include <cstddef>
 #include <cstdint>
 #include <functional>
+#include <optional>
 #include <string>
 #include <variant>
 #include <vector>
 
 #include "apps/python/scene_state.h"
 #include "core/image/image.h"
+#include "sensors/camera/auto_exposure.h"
 
 namespace groundray::python {
 
@@ -23,7 +25,9 @@ struct CameraImage {
   std::vector<std::uint16_t> labels;  ///< labels of the layers of `coverage`
   std::int64_t frame = 0;
   std::string sensor;
-  std::chrono::nanoseconds begin{0};  ///< of the exposure of its first row
+  std::chrono::nanoseconds begin{0};           ///< of the exposure of its first row
+  ExposureSetting exposure = {};               ///< of its light; a time of 0 if it has none
+  std::optional<double> saturated_share = {};  ///< if it has products of the imager
 };
 
 /// Makes an image with all products that the camera's file requests.

@@ -8,6 +8,7 @@ NB_MODULE(_core, module) {
   groundray::python::bind_core(module);
   groundray::python::bind_mesh(module);
   groundray::python::bind_terrain(module);
+  groundray::python::bind_image(module);
   groundray::python::bind_sensors(module);
   groundray::python::bind_scene(module);
   groundray::python::bind_reconstruction(module);

@@ -3,29 +3,13 @@
 #include <fmt/format.h>
 
 #include <cerrno>
-#include <cstdlib>
-#include <cstring>
 #include <string>
-#include <system_error>
 #include <variant>
 
 #include "core/error.h"
 #include "core/model/model_io.h"
 
 namespace groundray::python {
-
-TemporaryFolder::TemporaryFolder() {
-  std::string name = (std::filesystem::temp_directory_path() / "groundray-XXXXXX").string();
-  if (mkdtemp(name.data()) == nullptr)
-    throw Error("no folder for temporary files can be made at {}: {}", name, std::strerror(errno));
-  path_ = name;
-}
-
-TemporaryFolder::~TemporaryFolder() {
-  std::error_code ignored;
-  std::filesystem::remove_all(path_, ignored);
-}
-
 namespace {
 
 // Models of the meshes of a scene, each made on first use.

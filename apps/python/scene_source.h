@@ -8,23 +8,9 @@
 #include "apps/python/binding/mesh.h"
 #include "apps/python/terrain_model.h"
 #include "apps/scene/scene_spec.h"
+#include "core/io/temporary_folder.h"
 
 namespace groundray::python {
-
-/// Folder for temporary files, which disappears with the object.
-class TemporaryFolder {
- public:
-  /// @throws Error if it cannot be made.
-  TemporaryFolder();
-  ~TemporaryFolder();
-  TemporaryFolder(const TemporaryFolder&) = delete;
-  TemporaryFolder& operator=(const TemporaryFolder&) = delete;
-
-  const std::filesystem::path& path() const { return path_; }
-
- private:
-  std::filesystem::path path_;
-};
 
 /// Origin of a scene besides the text of its file and its seed.
 struct SceneSource {

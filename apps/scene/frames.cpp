@@ -37,6 +37,14 @@ TruthRequest truth_request(const PlacedCamera& placed, std::size_t image) {
   return request;
 }
 
+ExposureSetting exposure_by(const PathTracer& tracer, const PlacedCamera& placed, std::size_t image,
+                            const RandomKey& key) {
+  const CameraSpec& spec = placed.spec.camera;
+  if (!spec.shutter.automatic) return {spec.shutter.exposure_s};
+  return choose_exposure(spec, placed.camera.meter(tracer, placed.X_DC, placed.begins[image], key),
+                         placed.pupil_sr);
+}
+
 }  // namespace
 
 const Scene& FrameSceneBuilder::operator()(const Exposed& frame) {
@@ -74,6 +82,15 @@ LidarScan make_scan(const Simulation& simulation, std::size_t lidar, std::int64_
   return make_scan(simulation, lidar, sweep, scene_for(exposed(simulation.lidars[lidar], sweep)));
 }
 
+ExposureSetting exposure_of(const Simulation& simulation, std::size_t camera, std::int64_t image,
+                            const Scene& scene) {
+  const PlacedCamera& placed = simulation.cameras[camera];
+  const PathTracer tracer(scene, *simulation.sky, placed.spec.camera.sampling.depth,
+                          simulation.air);
+  return exposure_by(tracer, placed, static_cast<std::size_t>(image),
+                     key_of(simulation, camera, image));
+}
+
 MadeImage make_image(const Simulation& simulation, std::size_t camera, std::int64_t image,
                      const Scene& scene, const std::function<void()>& check) {
   const PlacedCamera& placed = simulation.cameras[camera];
@@ -84,12 +101,7 @@ MadeImage make_image(const Simulation& simulation, std::size_t camera, std::int6
     if (gives(spec, Product::Coverage)) made.labels = labels_of(scene);
     const PathTracer tracer(scene, *simulation.sky, spec.sampling.depth, simulation.air);
     const RandomKey key = key_of(simulation, camera, image);
-    made.exposure = {spec.shutter.exposure_s};
-    if (spec.shutter.automatic) {
-      made.exposure = choose_exposure(
-          spec, placed.camera.meter(tracer, placed.X_DC, placed.begins[number], key),
-          placed.pupil_sr);
-    }
+    made.exposure = exposure_by(tracer, placed, number, key);
     made.light = placed.camera.expose(tracer, placed.X_DC, placed.begins[number], key, made.labels,
                                       check, made.exposure.exposure_s);
     for (const float samples : made.light->samples.values())

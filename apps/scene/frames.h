@@ -64,6 +64,12 @@ struct MadeImage {
   ExposureSetting exposure;           ///< exposure time and gain of the light
 };
 
+/// Returns the exposure time and gain of an image: those of its light, if they are automatic.
+/// @param scene  scene of this frame, from FrameSceneBuilder.
+/// @throws Error as Camera::meter and choose_exposure.
+ExposureSetting exposure_of(const Simulation& simulation, std::size_t camera, std::int64_t image,
+                            const Scene& scene);
+
 /// Renders an image and computes its truth, as far as its camera's products require.
 /// @param camera  index in Simulation::cameras.
 /// @param image   number of the image.

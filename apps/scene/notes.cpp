@@ -38,10 +38,10 @@ void note_weather(const Simulation& simulation, Notes& notes) {
   const double range_m = std::min(spec.air.visibility_m, spec.air.fog_range_m);
   if (simulation.cameras.empty() || !spec.sky || range_m > thick_m) return;
   if (std::holds_alternative<AnalyticSky>(spec.sky->dome)) {
-    notes.push_back(
-        fmt::format("weather: hides surfaces beyond {:.4g} m, but the sky above them remains clear; "
-                    "give `sky` a `uniform` radiance or an image",
-                    range_m));
+    notes.push_back(fmt::format(
+        "weather: hides surfaces beyond {:.4g} m, but the sky above them remains clear; "
+        "give `sky` a `uniform` radiance or an image",
+        range_m));
   }
 }
 

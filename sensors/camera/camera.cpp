@@ -362,13 +362,14 @@ std::vector<MeteredPixel> Camera::meter(const PathTracer& light, const Trajector
   const auto step =
       static_cast<int>(std::ceil(std::sqrt(double{1} * width * height / most_pixels)));
   PathCounts counts(width, height, 1);
-  for (int y = step / 2; y < height; y += step)
-    for (int x = step / 2; x < width; x += step) counts.at(x, y)[0] = paths;
+  const int left = std::min(step, width) / 2, top = std::min(step, height) / 2;
+  for (int y = top; y < height; y += step)
+    for (int x = left; x < width; x += step) counts.at(x, y)[0] = paths;
   const View view{light, X_DC, begin, key, {}, spec_.shutter.exposure_s};
   const Means means = render(*this, view, counts, Paths::OfMeter, {});
   std::vector<MeteredPixel> metered;
-  for (int y = step / 2; y < height; y += step) {
-    for (int x = step / 2; x < width; x += step) {
+  for (int y = top; y < height; y += step) {
+    for (int x = left; x < width; x += step) {
       const auto rgb = means.radiance.at(x, y);
       if (means.spreads.paths.at(x, y)[0] > 0)
         metered.push_back({{x, y}, {rgb[0], rgb[1], rgb[2]}});

@@ -1,6 +1,7 @@
 """What a first run tells: notes on settings, automatic exposure, expected time and bytes."""
 
 import re
+import time
 
 import cv2
 import numpy as np
@@ -144,11 +145,35 @@ def test_automatic_exposure_reaches_its_target(tmp_path, automatic, level, expec
         assert level(picture / 65535) == pytest.approx(expected, rel=0.1)
 
 
+def test_a_scene_keeps_the_level_of_its_camera_file(tmp_path):
+    """A scene that changes one key of automatic exposure leaves the others as they are."""
+    levels = []
+    for automatic, change in [
+        ("{metering: mean, target: 0.4}", "{most_gain: 2}"),
+        ("{metering: mean, target: 0.4}", "{metering: percentile}"),
+        ("{}", "{most_gain: 2}"),
+    ]:
+        camera = with_imager(f"{{exposure_ms: 5, automatic: {automatic}}}")
+        changed = SCENE.replace(
+            "    sampling:", f"    shutter: {{automatic: {change}}}\n    sampling:"
+        )
+        made = run(tmp_path, written(tmp_path, changed, camera), out=str(len(levels)))
+        assert made.returncode == 0, made.stderr
+        exposure = tmp_path / f"{len(levels)}/camera/eye/000000_exposure.yaml"
+        levels.append(yaml.safe_load(exposure.read_text())["exposure_s"])
+    assert levels[0] == pytest.approx(levels[1] * 0.4 / 0.18, rel=0.8)  # a mean of 0.4
+    assert levels[1] == levels[2]  # both have the default of percentiles
+
+
 def test_automatic_exposures_do_not_depend_on_threads_or_shards(tmp_path):
     camera = with_imager("{exposure_ms: 5, automatic: {}}")
     scene = written(tmp_path, camera=camera)
     whole = run(tmp_path, scene)
     assert whole.returncode == 0, whole.stderr
+    for threads in "12":
+        alone = run(tmp_path, scene, "--threads", threads, out=f"threads{threads}")
+        assert alone.returncode == 0, alone.stderr
+        assert files(tmp_path / f"threads{threads}") == files(tmp_path / "out")
     for part in "12":
         assert run(tmp_path, scene, "--shard", f"{part}/2", out=part).returncode == 0
     merged = groundray("merge", tmp_path / "1", tmp_path / "2", "-o", tmp_path / "merged")
@@ -205,6 +230,37 @@ def test_info_states_the_bytes_of_a_run(tmp_path):
     assert run(tmp_path, scene).returncode == 0
     written_bytes = sum(map(len, files(tmp_path / "out").values()))
     assert written_bytes / 1.5 < expected < written_bytes * 1.5
+
+
+def test_info_estimates_cameras_with_vignetting(tmp_path):
+    """Four bands of rows stand for the image, with the light of its rows."""
+    camera = with_imager("{exposure_ms: 5, automatic: {}}").replace(
+        "size_px: [48, 36]", "size_px: [48, 360]"
+    )
+    camera = camera.replace("centre_px: [23.5, 17.5]", "centre_px: [23.5, 179.5]")
+    camera = camera.replace("aperture: {", "aperture: {vignetting: [-0.9, 0, 0], ")
+    scene = written(tmp_path, camera=camera)
+    info = groundray("info", scene)
+    assert info.returncode == 0, info.stderr
+    expected = float(re.search(r" {10}eye: 3 images of .* and ([\d.e+]+) MiB", info.stdout)[1])
+    assert run(tmp_path, scene).returncode == 0
+    made = sum(map(len, files(tmp_path / "out/camera/eye").values())) / 3 / 2**20
+    assert made / 1.5 < expected < made * 1.5
+
+
+def test_info_states_the_time_of_a_run(tmp_path):
+    """Within a factor of 4: both share the machine with other tests."""
+    slow = "sampling: {samples: 256, most_samples: 256}"
+    scene = SCENE.replace("sampling: {samples: 2, most_samples: 2}", slow)
+    scene = written(tmp_path, scene.replace("file: camera.yaml", "preset: euroc_mav_cam0"))
+    info = groundray("info", scene)
+    assert info.returncode == 0, info.stderr
+    minutes, seconds = re.search(r"time      about (?:(\d+) min )?([\d.]+) s", info.stdout).groups()
+    expected_s = 60 * float(minutes or 0) + float(seconds)
+    begin = time.monotonic()
+    assert run(tmp_path, scene).returncode == 0
+    took_s = time.monotonic() - begin
+    assert took_s / 4 < expected_s < took_s * 4
 
 
 def test_progress_counts_scans_and_images(tmp_path):

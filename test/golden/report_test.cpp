@@ -10,6 +10,7 @@
 #include <regex>
 #include <set>
 #include <string_view>
+#include <tuple>
 
 #include "apps/golden/chart.h"
 #include "core/error.h"
@@ -71,19 +72,30 @@ TEST(Report, MainFiguresKeepTheirOrder) {
 
 // Multiples of the step within the range, both ends included, as few as requested.
 TEST(Chart, TicksAreRoundNumbersWithinTheRange) {
-  EXPECT_THAT(ticks_between(0, 10, 6), ElementsAre(0, 2, 4, 6, 8, 10));
-  EXPECT_THAT(ticks_between(10, 0, 3), ElementsAre(0, 5, 10));
-  EXPECT_THAT(ticks_between(435'012, 435'987, 4), ElementsAre(435'200, 435'400, 435'600, 435'800));
-  EXPECT_THAT(ticks_between(-0.03, 0.03, 5), SizeIs(3));
-  EXPECT_THAT(ticks_between(1, 1, 5), IsEmpty());
-  EXPECT_THAT(ticks_between(0, infinity, 5), IsEmpty());
+  EXPECT_THAT(ticks_between(0, 10, 6).values, ElementsAre(0, 2, 4, 6, 8, 10));
+  EXPECT_THAT(ticks_between(10, 0, 3).values, ElementsAre(0, 5, 10));
+  EXPECT_THAT(ticks_between(435'012, 435'987, 4).values,
+              ElementsAre(435'200, 435'400, 435'600, 435'800));
+  EXPECT_THAT(ticks_between(-0.03, 0.03, 5).values, SizeIs(3));
+  EXPECT_THAT(ticks_between(1, 1, 5).values, IsEmpty());
+  EXPECT_THAT(ticks_between(0, infinity, 5).values, IsEmpty());
   for (int i = 1; i < 400; ++i) {
     const double low = std::sin(i) * std::pow(10, i % 13 - 6), high = low + std::pow(1.3, i % 60);
-    const std::vector<double> ticks = ticks_between(low, high, 7);
+    const std::vector<double> ticks = ticks_between(low, high, 7).values;
     EXPECT_GE(ticks.size(), 2u) << low << " " << high;
     EXPECT_LE(ticks.size(), 7u) << low << " " << high;
     EXPECT_GE(ticks.front(), low - 1e-9 * (high - low));
     EXPECT_LE(ticks.back(), high + 1e-9 * (high - low));
+  }
+}
+
+// The step gives the decimals of a single tick.
+TEST(Chart, SingleTicksHaveAStepThatTellsThemApart) {
+  for (const auto& [low, high, text] :
+       {std::tuple(1234.3, 1234.9, "1234.5"), std::tuple(0.45, 0.55, "0.5")}) {
+    const Ticks ticks = ticks_between(low, high, 2);
+    ASSERT_EQ(ticks.values.size(), 1u);
+    EXPECT_EQ(tick_text(ticks.values[0], ticks.step), text);
   }
 }
 

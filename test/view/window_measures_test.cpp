@@ -212,7 +212,7 @@ TEST_F(WindowMeasuresTest, EchoesAreShownOverImages) {
   const QPoint at = panel.area().place_of(panel.area().dots().back().pixel).toPoint();
   EXPECT_EQ(panel.area().grab().toImage().pixelColor(at).rgb(),
             panel.area().dots().back().colour.rgb());
-  // Hidden scans have no dots; another time has others.
+  // Another time has other dots.
   const auto before = panel.area().dots().front().pixel;
   window.timeline_panel().go_to(std::chrono::milliseconds(480));
   settle();

@@ -80,6 +80,12 @@ MadeFrame FrameMaker::make(const FrameName& name) {
   return made;
 }
 
+ExposureSetting FrameMaker::exposure_of(const FrameName& image) {
+  const Scene& scene = scene_for_(exposed(simulation_, image.sensor, image.number));
+  return groundray::exposure_of(simulation_, image.sensor - simulation_.lidars.size(), image.number,
+                                scene);
+}
+
 LidarScan FrameMaker::trace_scan(std::uint32_t sensor, std::int64_t frame,
                                  std::chrono::duration<double>& tracing) {
   const Scene& scene = scene_for_(exposed(simulation_, sensor, frame));

@@ -68,6 +68,9 @@ class FrameMaker {
   /// @throws Error if there is too little memory, or a scan that an image shows cannot be read;
   ///         Interrupted.
   MadeFrame make(const FrameName& name);
+  /// Returns the exposure time and gain that `make` gives an image with light.
+  /// @throws Error as make.
+  ExposureSetting exposure_of(const FrameName& image);
 
  private:
   LidarScan trace_scan(std::uint32_t lidar, std::int64_t frame,

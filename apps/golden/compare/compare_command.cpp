@@ -173,6 +173,11 @@ void CompareCommand::check_options(Subject of) const {
   if (!pixels.empty() && !is_image) refuse("--pixels", "images");
   if (!origin_w_m[0].empty() && !is_placed) refuse("--origin", "scans and meshes");
   if (!origin_w_m[1].empty() && !is_placed) refuse("--reference-origin", "scans and meshes");
+  if (of == Subject::Scan && !origin_w_m[0].empty() && !scan[0].has_pose()) {
+    throw Error(
+        "--origin: a scan without --sensor-pose is placed by the pose of the reference, so its "
+        "origin has no effect: give both or neither");
+  }
   for (const std::vector<double>& origin : origin_w_m) {
     if (!std::ranges::all_of(origin, [](double x) { return std::isfinite(x); }))
       throw Error("--origin, --reference-origin: all numbers must be finite");

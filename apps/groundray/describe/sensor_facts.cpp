@@ -141,6 +141,13 @@ Facts facts_of(const LidarSpec& lidar) {
   return facts;
 }
 
+std::string exposure_text(const ShutterSpec& shutter) {
+  const double longest_ms = 1e3 * shutter.exposure_s;
+  if (!shutter.automatic) return fmt::format("exposure {:.4g} ms", longest_ms);
+  return fmt::format("automatic exposure, {:.4g} to {:.4g} ms, gain up to {:.3g}",
+                     1e3 * shutter.automatic->shortest_s, longest_ms, shutter.automatic->most_gain);
+}
+
 Facts facts_of(const CameraSpec& camera) {
   const glm::dvec2 view = view_deg(camera);
   Facts facts{{"kind", "camera"},
@@ -148,8 +155,8 @@ Facts facts_of(const CameraSpec& camera) {
               {"size", fmt::format("{} x {} px", camera.size_px.x, camera.size_px.y)},
               {"view", fmt::format("{:.4g} x {:.4g} deg", view.x, view.y)},
               {"lens", lens_text(camera.lens)},
-              {"images", fmt::format("{:.6g} Hz, {}, exposure {:.4g} ms", camera.rate_hz,
-                                     shutter_text(camera), camera.shutter.exposure_s * 1e3)}};
+              {"images", fmt::format("{:.6g} Hz, {}, {}", camera.rate_hz, shutter_text(camera),
+                                     exposure_text(camera.shutter))}};
   if (camera.aperture)
     facts.emplace_back("aperture", fmt::format("f/{:.4g}", camera.aperture->f_number));
   if (camera.imager) {

@@ -43,6 +43,8 @@ Facts facts_of(const LidarSpec& lidar);
 /// Describes a camera.
 Facts facts_of(const CameraSpec& camera);
 
+/// Returns the exposure time of images, or its limits if it is automatic.
+std::string exposure_text(const ShutterSpec& shutter);
 /// Returns the name of a lens model, as in a camera file.
 std::string lens_name(const CameraSpec& camera);
 /// Returns "mono", or the four pixels of the mosaic: "rggb".

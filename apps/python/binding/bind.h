@@ -8,6 +8,7 @@ namespace groundray::python {
 void bind_core(nanobind::module_& module);
 void bind_mesh(nanobind::module_& module);
 void bind_terrain(nanobind::module_& module);
+void bind_image(nanobind::module_& module);
 void bind_sensors(nanobind::module_& module);
 void bind_scene(nanobind::module_& module);
 void bind_reconstruction(nanobind::module_& module);

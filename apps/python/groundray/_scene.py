@@ -90,6 +90,8 @@ def _tum(poses: Any) -> str:
             "scene: 'trajectory' must be a path or an array of shape (n, 8): t, x, y, z, qx, qy, "
             f"qz, qw; its shape is {rows.shape}"
         )
+    if len(rows) == 0:
+        raise ValueError("scene: 'trajectory' has no poses")
     if not np.isfinite(rows).all():
         raise ValueError("scene: 'trajectory' has numbers that are not finite")
     return "".join(

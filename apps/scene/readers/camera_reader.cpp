@@ -52,12 +52,17 @@ void read_int(Map& map, std::string_view key, Need need, int& into, int low, int
 }
 
 void read_automatic(const Node& node, std::optional<AutoExposureSpec>& into, Faults& faults) {
-  if (node.kind == Node::Kind::Plain && node.text == "off") return into.reset();
+  if (node.text == "off") return into.reset();
   AutoExposureSpec automatic = into.value_or(AutoExposureSpec{});
+  const auto metering_before = automatic.metering;
   Map map(node, "automatic", faults);
   map.read_choice("metering", Need::Optional, automatic.metering, {"percentile", "mean"});
   map.read_number("percentile", Need::Optional, automatic.percentile, percentile_rule);
-  if (automatic.metering == AutoExposureSpec::Metering::Mean) automatic.target = grey_target;
+  if (automatic.metering != metering_before) {
+    automatic.target = automatic.metering == AutoExposureSpec::Metering::Mean
+                           ? grey_target
+                           : AutoExposureSpec{}.target;
+  }
   map.read_number("target", Need::Optional, automatic.target, positive_share_rule);
   map.read_scaled("shortest_us", Need::Optional, 1e-6, automatic.shortest_s, positive);
   map.read_number("most_gain", Need::Optional, automatic.most_gain, at_least_one);

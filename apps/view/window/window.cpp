@@ -52,7 +52,6 @@ Window::Window(WindowStart start) : start_(std::move(start)), recent_(start_.set
   build_workers();
   connect_canvas();
   view().set_legend_visible(start_.view.has_legend);
-  if (start_.view.clip) clip_->set_box(*start_.view.clip);
   build_actions();
   build_status_bar();
   status_clock_.setInterval(status_ms);

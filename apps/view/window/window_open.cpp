@@ -155,6 +155,9 @@ void Window::take(Loaded loaded) {
     if (layer.kind == LayerKind::Terrain) document.terrain = layer.name;
     view().add(std::move(layer));
   }
+  // After the first layer, whose origin is that of the view: the box may be far from it.
+  if (start_.view.clip) clip_->set_box(*start_.view.clip);
+  start_.view.clip.reset();
   documents_.push_back(document);
   recent_.add(opened.path);
   playback_->include_again(document.name + "/");

@@ -400,6 +400,18 @@ TEST(Camera, ShorterExposuresHaveTheSameMiddle) {
   EXPECT_NEAR(static_cast<double>(blurred(quarter)), 2.5, 1.51);
 }
 
+// A row or a column has pixels of the lattice, too.
+TEST(Camera, MetersImagesOfOneRowOrColumn) {
+  const Scene scene = scene_of(plane_ground(0, 0, -1000), {});
+  const PathTracer light(scene, even_sky(), 1, std::nullopt);
+  const Trajectory path = gliding(looking(here, {1, 0, 1}), {});
+  for (const glm::ivec2 size_px : {glm::ivec2(4096, 1), glm::ivec2(1, 4096), glm::ivec2(1, 1)}) {
+    const Camera camera(pinhole(1e4, size_px, 1));
+    const auto metered = camera.meter(light, path, 0ns, {.seed = {5}});
+    EXPECT_GE(metered.size(), size_px == glm::ivec2(1) ? 1u : 2000u);
+  }
+}
+
 TEST(Camera, MetersTheLightOfALattice) {
   const Scene scene = scene_of(plane_ground(0, 0, -1000), {});
   const PathTracer light(scene, even_sky(), 1, std::nullopt);
@@ -412,7 +424,7 @@ TEST(Camera, MetersTheLightOfALattice) {
     EXPECT_EQ(each.radiance, glm::vec3(2, 1, 0.5));
     EXPECT_TRUE(each.pixel.x < 400 && each.pixel.y < 300);
   }
-  // The same light whatever the number of threads, and other random numbers than the image's.
+  // The same light whatever the number of threads.
   const Scene edge = right_half(10);
   const PathTracer partly(edge, even_sky(), 1, std::nullopt);
   const auto once = [&](int threads) {
