@@ -367,15 +367,14 @@ std::vector<MeteredPixel> Camera::meter(const PathTracer& light, const Trajector
     for (int x = left; x < width; x += step) counts.at(x, y)[0] = paths;
   const View view{light, X_DC, begin, key, {}, spec_.shutter.exposure_s};
   const Means means = render(*this, view, counts, Paths::OfMeter, {});
-  std::vector<MeteredPixel> metered;
+  std::vector<MeteredPixel> all;
   for (int y = top; y < height; y += step) {
     for (int x = left; x < width; x += step) {
       const auto rgb = means.radiance.at(x, y);
-      if (means.spreads.paths.at(x, y)[0] > 0)
-        metered.push_back({{x, y}, {rgb[0], rgb[1], rgb[2]}});
+      if (means.spreads.paths.at(x, y)[0] > 0) all.push_back({{x, y}, {rgb[0], rgb[1], rgb[2]}});
     }
   }
-  return metered;
+  return all;
 }
 
 void Camera::check_cover(const Trajectory& X_DC, nanoseconds begin) const {
