@@ -20,6 +20,8 @@ namespace {
 
 using Seconds = std::chrono::duration<double>;
 
+constexpr std::size_t echo_row_bytes = 30;  // of write_imaged_echoes
+
 // Cameras that together show a part of an image of another camera.
 struct Bands {
   std::vector<PlacedCamera> cameras;
@@ -54,7 +56,6 @@ PlacedCamera band_of(const PlacedCamera& whole, LensModel lens, int first, int c
   PlacedCamera band = whole;
   CameraSpec& spec = band.spec.camera;
   band.spec.name += fmt::format("-rows{}", first);
-  band.spec.lidars.clear();
   band.rectification.reset();
   spec.lens = std::move(lens);
   spec.size_px.y = count;
@@ -77,6 +78,7 @@ Bands bands_of(const PlacedCamera& whole) {
     lens = whole.spec.camera.lens;
     crop(lens, first);
     bands.cameras.push_back(band_of(whole, lens, first, rows));
+    if (i > 0) bands.cameras.back().spec.lidars.clear();  // their echoes are listed once
   }
   bands.scale = double{1} * height / (count * rows);
   return bands;
@@ -94,9 +96,9 @@ void fix_exposure(PlacedCamera& camera, const ExposureSetting& exposure) {
 // Cost of frames of the sample, by stage.
 struct Cost {
   Seconds tracing{0};
-  Seconds preparing{0};  // the surroundings of the sensor, where they follow it
+  Seconds preparing{0};  // surroundings of the sensor, where they follow it; echoes in images
   Seconds writing{0};    // processor time
-  std::uint64_t bytes = 0;
+  std::uint64_t bytes = 0, echo_bytes = 0;  // of all files but the lists of echoes; of these
 
   void add(const MadeFrame& made, const WrittenFrame& written) {
     tracing += made.tracing;
@@ -109,6 +111,7 @@ struct Cost {
     preparing += other.preparing;
     writing += other.writing;
     bytes += other.bytes;
+    echo_bytes += other.echo_bytes;
     return *this;
   }
 };
@@ -125,6 +128,8 @@ class Sample {
     Cost cost;
     const MadeFrame made = maker_.make({sensor, frame});
     cost.add(made, write_frame(simulation_, dataset_, made));
+    for (const auto& echoes : made.echoes) cost.echo_bytes += echoes.size() * echo_row_bytes;
+    cost.bytes -= std::min(cost.bytes, cost.echo_bytes);
     return cost;
   }
   ExposureSetting exposure_of(std::uint32_t camera, std::int64_t image) {
@@ -159,6 +164,7 @@ RunEstimate estimate_run(Simulation simulation) {
   const std::int64_t first = sample.frames(first_sensor) / 2;
   estimate.preparation =
       sample.cost_of(first_sensor, std::max<std::int64_t>(first - 1, 0)).preparing;
+  // Where levels of the terrain follow the sensor, every scan and image moves them.
   const Seconds moving = simulation.terrain.whole() == nullptr
                              ? sample.cost_of(first_sensor, first).preparing
                              : Seconds(0);
@@ -170,7 +176,7 @@ RunEstimate estimate_run(Simulation simulation) {
                        std::vector<RunEstimate::Frame>& into) {
     const RunEstimate::Frame frame{
         moving + once + scale * (cost.tracing + cost.writing / threads),
-        static_cast<std::uint64_t>(scale * static_cast<double>(cost.bytes))};
+        static_cast<std::uint64_t>(scale * static_cast<double>(cost.bytes)) + cost.echo_bytes};
     into.push_back(frame);
     estimate.total += static_cast<double>(frames) * frame.time;
     estimate.total_bytes += static_cast<std::uint64_t>(frames) * frame.bytes;
@@ -194,7 +200,7 @@ RunEstimate estimate_run(Simulation simulation) {
     Cost cost;
     for (; band < band_ends[camera]; ++band)
       cost += sample.cost_of(lidars + static_cast<std::uint32_t>(band), frames / 2);
-    add(cost, metering, scales[camera], frames, estimate.images);
+    add(cost, metering + cost.preparing, scales[camera], frames, estimate.images);
   }
   return estimate;
 }
