@@ -86,7 +86,7 @@ def test_an_interrupted_run_logs_the_interruption(tmp_path):
 
 
 def test_frames_are_ordered_by_ten_seconds_and_then_by_sensor(tmp_path):
-    """The remaining time of a long run is estimated from all sensors: their first frames come first."""
+    """The time left of a long run is estimated from all sensors, whose first frames come first."""
     cameras = SCENE.split("cameras:")[1].replace(
         "{lidar: top, delay_ms: 20}\n    project: [top]", "X"
     )
