@@ -250,7 +250,7 @@ def test_info_estimates_cameras_with_vignetting(tmp_path):
 
 def test_info_states_the_time_of_a_run(tmp_path):
     """Within a factor of 4: both share the machine with other tests."""
-    slow = "sampling: {samples: 256, most_samples: 256}"
+    slow = "sampling: {samples: 4, most_samples: 4}"
     scene = SCENE.replace("sampling: {samples: 2, most_samples: 2}", slow)
     scene = written(tmp_path, scene.replace("file: camera.yaml", "preset: euroc_mav_cam0"))
     info = groundray("info", scene)

@@ -139,13 +139,24 @@ class PrintText(argparse.Action):
 
     def __init__(
         self,
-        *arguments: Any,
+        option_strings: Sequence[str],
+        dest: str,
         texts: dict[str, Callable[[argparse.ArgumentParser], str]],
-        **options: Any,
+        help: str | None = None,
+        metavar: str | None = None,
+        default: str = argparse.SUPPRESS,
     ) -> None:
         choices = None if len(texts) == 1 else tuple(texts)
         nargs = 0 if choices is None else None
-        super().__init__(*arguments, nargs=nargs, choices=choices, **options)
+        super().__init__(
+            option_strings,
+            dest,
+            nargs=nargs,
+            choices=choices,
+            help=help,
+            metavar=metavar,
+            default=default,
+        )
         self._texts = texts
 
     def __call__(
