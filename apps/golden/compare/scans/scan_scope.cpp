@@ -4,6 +4,7 @@
 
 #include <algorithm>
 #include <boost/geometry/core/cs.hpp>
+#include <boost/geometry/geometries/box.hpp>
 #include <boost/geometry/geometries/point.hpp>
 #include <boost/geometry/index/rtree.hpp>
 #include <boost/geometry/strategies/strategies.hpp>
@@ -16,9 +17,21 @@ namespace groundray::golden {
 namespace {
 
 using TreePoint = boost::geometry::model::point<double, 3, boost::geometry::cs::cartesian>;
+using TreeBox = boost::geometry::model::box<TreePoint>;
 using PointTree = boost::geometry::index::rtree<TreePoint, boost::geometry::index::rstar<16>>;
 
 TreePoint tree_point(const glm::dvec3& p) { return {p.x, p.y, p.z}; }
+
+/// Returns whether any point of the tree is within a distance of p.
+bool has_near(const PointTree& tree, const glm::dvec3& p, double distance_m) {
+  const TreeBox box(tree_point(p - distance_m), tree_point(p + distance_m));
+  const auto end = tree.qend();
+  return std::any_of(tree.qbegin(boost::geometry::index::intersects(box)), end,
+                     [&](const TreePoint& each) {
+                       const glm::dvec3 q(each.get<0>(), each.get<1>(), each.get<2>());
+                       return glm::distance(q, p) <= distance_m;
+                     });
+}
 
 /// Returns, for each return of a scan, whether one of another scan is within a distance.
 std::vector<bool> near_ones(const Scan& scan, const Scan& other, const Scope& scope) {
@@ -28,13 +41,8 @@ std::vector<bool> near_ones(const Scan& scan, const Scan& other, const Scope& sc
   points.reserve(other.p_S.size());
   for (const glm::dvec3& p : other.p_S) points.push_back(tree_point(p));
   const PointTree tree(points);
-  for (std::size_t i = 0; i < scan.p_S.size(); ++i) {
-    TreePoint nearest;
-    const auto found =
-        tree.query(boost::geometry::index::nearest(tree_point(scan.p_S[i]), 1), &nearest);
-    const glm::dvec3 q(nearest.get<0>(), nearest.get<1>(), nearest.get<2>());
-    is_near[i] = found > 0 && glm::distance(q, scan.p_S[i]) <= scope.ignore_beyond_m;
-  }
+  for (std::size_t i = 0; i < scan.p_S.size(); ++i)
+    is_near[i] = has_near(tree, scan.p_S[i], scope.ignore_beyond_m);
   return is_near;
 }
 
