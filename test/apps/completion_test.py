@@ -34,7 +34,7 @@ def printed(program, *arguments):
 
 def options_of(program, command):
     text = printed(program, *command.split(), "--help")
-    return set(re.findall(r"^(?:  ){1,2}(?:-\w(?: \w+)?, ?)?(--[a-z][\w-]*)", text, re.MULTILINE))
+    return set(re.findall(r"^(?:  ){1,4}(?:-\w(?: \w+)?, ?)?(--[a-z][\w-]*)", text, re.MULTILINE))
 
 
 def completed(program, line, folder):

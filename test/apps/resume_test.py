@@ -270,7 +270,7 @@ def test_memory_does_not_grow_with_the_number_of_frames(tmp_path):
     assert peaks[1] - peaks[0] < 10 * 1024, peaks
 
 
-def test_progress_shows_rate_and_remaining_time_on_a_terminal(tmp_path):
+def test_progress_counts_scans_and_images_on_a_terminal(tmp_path):
     master, slave = pty.openpty()
     run = subprocess.Popen(command(tmp_path), stdout=subprocess.DEVNULL, stderr=slave)
     os.close(slave)
@@ -282,8 +282,8 @@ def test_progress_shows_rate_and_remaining_time_on_a_terminal(tmp_path):
         pass  # the terminal goes with the run
     os.close(master)
     assert run.wait() == 0
-    assert re.search(rb"\rframes \d/9, [\d.e-]+/s, [\d.]+ s left", said), said
-    assert re.search(rb"\rframes 9/9 in [\d.]+ s *\r?\n$", said), said
+    assert re.search(rb"\rscans \d/6, images \d/3", said), said
+    assert re.search(rb"\rscans 6/6, images 3/3 in [\d.]+ s *\r?\n$", said), said
 
 
 def test_info_counts_the_frames_of_a_journal(whole, tmp_path):
