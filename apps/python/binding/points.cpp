@@ -44,8 +44,8 @@ bool add_column(const std::string& name, nb::handle array, PointCloud& to) {
 }
 
 template <typename... T>
-bool add_any_column(std::variant<PointCloud::Values<T>...> /*types*/, const std::string& name,
-                    nb::handle array, PointCloud& to) {
+bool add_any_column(const std::variant<PointCloud::Values<T>...>& /*types*/,
+                    const std::string& name, nb::handle array, PointCloud& to) {
   return (add_column<T>(name, array, to) || ...);
 }
 
