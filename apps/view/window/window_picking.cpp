@@ -1,5 +1,6 @@
 #include <fmt/format.h>
 
+#include <QAction>
 #include <QComboBox>
 #include <QDockWidget>
 #include <QLabel>
