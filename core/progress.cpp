@@ -55,11 +55,11 @@ void Progress::end(const std::string& line) {
 }
 
 void Progress::update(std::uint64_t done) {
-  const std::string count = fmt::format("{} {}/{}", label_, done, total_);
-  if (done >= total_) return end(count);
+  const auto count = [&] { return fmt::format("{} {}/{}", label_, done, total_); };
+  if (done >= total_) return end(count());
   if (!is_due()) return;
   const Seconds spent = steady_clock::now() - begin_;
-  std::string line = count;
+  std::string line = count();
   if (done > 0) {
     const Seconds left = spent * (static_cast<double>(total_ - done) / static_cast<double>(done));
     line += fmt::format(", {}, {} left", rate_text(static_cast<double>(done) / spent.count()),

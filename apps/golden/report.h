@@ -64,7 +64,7 @@ struct ColourBar {
   std::vector<std::pair<double, std::string>> marks;
 };
 
-/// What a picture shows.
+/// Content of a picture.
 enum class Shown {
   Data,   ///< one or both of the compared data
   Errors  ///< places of the differences between them

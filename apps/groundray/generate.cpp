@@ -122,12 +122,14 @@ void say(const Simulation& simulation, const fs::path& out, const FramePlan& pla
   print_text(to, "dataset: {}\n", out.string());
   for (const PlacedLidar& lidar : simulation.lidars) {
     if (!choice.has_sensor(lidar.spec.name)) continue;
-    print_text(to, "  {}: scans and pictures (*_preview.png) in {}\n", lidar.spec.name,
+    print_text(to, "  {}: scans and previews (*_preview.png) in {}\n", lidar.spec.name,
                (out / "lidar" / lidar.spec.name).string());
   }
   for (const PlacedCamera& camera : simulation.cameras) {
     if (!choice.has_sensor(camera.spec.name)) continue;
-    print_text(to, "  {}: images and pictures (*_preview.png) in {}\n", camera.spec.name,
+    const bool has_pictures = gives(camera.spec.camera, CameraProduct::Picture);
+    print_text(to, "  {}: images{} and previews (*_preview.png) in {}\n", camera.spec.name,
+               has_pictures ? ", pictures (*.png)" : "",
                (out / "camera" / camera.spec.name).string());
   }
 }

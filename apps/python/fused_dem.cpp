@@ -47,7 +47,7 @@ void read_layer(PickledState& state, const char* name, std::vector<T>& values) {
 void read_layer(PickledState& state, const char* name, std::vector<HeightSource>& values) {
   for (const std::uint8_t number : state.next_array<std::uint8_t>(name)) {
     if (number > static_cast<std::uint8_t>(HeightSource::Filled))
-      state.refuse(name, fmt::format("has the value {}, which is none", number));
+      state.refuse(name, fmt::format("has the value {}, which is not a source of heights", number));
     values.push_back(static_cast<HeightSource>(number));
   }
 }

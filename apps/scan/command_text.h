@@ -11,7 +11,7 @@ namespace groundray {
 
 /// Option or argument of a command.
 struct OptionText {
-  /// What completes its value.
+  /// Kind of words that complete its value.
   enum class Value {
     None,   ///< a flag, which has no value
     Words,  ///< one of `words`

@@ -102,7 +102,7 @@ void ErrorMap::add(glm::dvec2 at, double error) {
   if (!std::isfinite(now) || std::abs(error) > std::abs(now)) now = error;
 }
 
-void ErrorMap::add_lonely(glm::dvec2 at) {
+void ErrorMap::add_unpaired(glm::dvec2 at) {
   const glm::ivec2 cell = cell_of(at);
   if (cell.x < 0) return;
   double& now = errors_.at(cell.x, cell.y)[0];

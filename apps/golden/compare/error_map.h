@@ -37,7 +37,7 @@ class ErrorMap {
   /// Adds an error; does nothing outside the rectangle.
   void add(glm::dvec2 at, double error);
   /// Marks a cell that has no error yet, for a point without a partner.
-  void add_lonely(glm::dvec2 at);
+  void add_unpaired(glm::dvec2 at);
 
   /// Returns the picture, with axes and colour bar. Cells without an error are grey, those with
   /// lonely points alone black.

@@ -30,7 +30,7 @@ std::vector<HalfSpace> half_spaces(const Scope& scope) {
   return all;
 }
 
-/// Cuts off what of a convex polygon is outside a half-space.
+/// Returns the part of a convex polygon that is inside a half-space.
 Polygon cut(const Polygon& polygon, const HalfSpace& half) {
   Polygon result;
   for (std::size_t i = 0; i < polygon.size(); ++i) {

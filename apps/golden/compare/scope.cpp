@@ -32,8 +32,12 @@ std::string scope_text(const Scope& scope, const std::string& frame) {
   for (glm::length_t axis = 0; axis < 3; ++axis) {
     const double low_m = scope.low_m[axis], high_m = scope.high_m[axis];
     if (!std::isfinite(low_m) && !std::isfinite(high_m)) continue;
-    sides += fmt::format("{}{} from {} to {} m", sides.empty() ? "" : ", ",
-                         axes[static_cast<std::size_t>(axis)], low_m, high_m);
+    const std::string limits = !std::isfinite(high_m) ? fmt::format("of at least {}", low_m)
+                               : !std::isfinite(low_m)
+                                   ? fmt::format("of at most {}", high_m)
+                                   : fmt::format("from {} to {}", low_m, high_m);
+    sides += fmt::format("{}{} {} m", sides.empty() ? "" : ", ",
+                         axes[static_cast<std::size_t>(axis)], limits);
   }
   if (!sides.empty()) text += fmt::format("Only {} of {} is compared. ", sides, frame);
   if (scope.ignores()) {

@@ -46,8 +46,8 @@ TEST(ErrorMap, ShowsTheLargestErrorOfEachCell) {
   map.add({9.5, 0.5}, 2);
   map.add({10, 5}, 2);  // the upper edges belong to the last cells
   map.add({10.5, 0.5}, 99);
-  map.add_lonely({5.5, 2.5});
-  map.add_lonely({0.5, 4.5});
+  map.add_unpaired({5.5, 2.5});
+  map.add_unpaired({0.5, 4.5});
   const Picture picture = map.picture("errors", "x, m", "y, m", "error, m");
   ASSERT_EQ(picture.image.width() % 10, 0);
   ASSERT_EQ(picture.image.height() % 5, 0);

@@ -31,8 +31,7 @@ struct ScanOptions {
 /// beam; missing and extra returns, also by range, incidence and label; the relation of
 /// intensities; and signs of different units or frames. Deterministic.
 /// @throws Error as check_scope, read_scan and pair_scans, or if both have returns and none could
-/// be
-///         paired or the scope leaves out all pairs.
+///         be paired or the scope leaves out all pairs.
 Section compare_scans(const std::filesystem::path& reference, const std::filesystem::path& other,
                       const ScanOptions& options);
 

@@ -36,8 +36,8 @@ void fill(const Scan& reference, const Scan& other, const Pairs& pairs, const Sc
           const PlaceOf& place_of, ErrorMap& map) {
   for (std::size_t k = 0; k < pairs.returns.size(); ++k)
     map.add(place_of(reference, pairs.returns[k].first), errors.range_m[k]);
-  for (const std::uint32_t i : pairs.missing) map.add_lonely(place_of(reference, i));
-  for (const std::uint32_t j : pairs.extra) map.add_lonely(place_of(other, j));
+  for (const std::uint32_t i : pairs.missing) map.add_unpaired(place_of(reference, i));
+  for (const std::uint32_t j : pairs.extra) map.add_unpaired(place_of(other, j));
 }
 
 double azimuth_deg(const glm::dvec3& p_S) { return glm::degrees(std::atan2(p_S.y, p_S.x)); }

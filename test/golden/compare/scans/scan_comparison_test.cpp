@@ -359,7 +359,7 @@ TEST(CompareScans, ComparesOnlyWhatIsInTheScope) {
   EXPECT_EQ(value_of(upper, "range error, largest magnitude"), 0);
   EXPECT_EQ(value_of(upper, "reference: outside the area and heights"), 720 - left);
   EXPECT_EQ(value_of(upper, "missing returns"), 0);
-  EXPECT_THAT(upper.text, HasSubstr("Only y from 200 to inf m of the frame of the reference"));
+  EXPECT_THAT(upper.text, HasSubstr("Only y of at least 200 m of the frame of the reference"));
   EXPECT_THAT(upper.headline, HasSubstr(fmt::format("All {} pairs of returns have equal", left)));
   EXPECT_THAT(message_of([&] {
                 compare_scans(a, b, {.scope = {.low_m = {-1, -1, -1}, .high_m = {1, 1, 1}}});
