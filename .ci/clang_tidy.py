@@ -79,7 +79,8 @@ def run(*command: str) -> str:
 
 
 def common_settings(root: Path, clang_tidy: str) -> str:
-    packages = run("dpkg-query", "-W", "*-dev")
+    known = run("dpkg-query", "-W", "-f=${db:Status-Status} ${Package} ${Version}\n", "*-dev")
+    packages = "\n".join(line for line in known.splitlines() if line.startswith("installed "))
     texts = [(root / name).read_text() for name in (".clang-tidy", "test/requirements.txt")]
     return "\0".join([run(clang_tidy, "--version"), packages, *texts])
 

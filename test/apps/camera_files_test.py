@@ -267,8 +267,8 @@ def around(values, uv):
 
 def test_exactly_the_documented_files_are_written(out):
     of_images = {
-        "left": (".exr .flo .png _electrons.exr _flow.png _irradiance.exr _photons.exr"
-                 " _preview.png _raw.png _top.npy"),
+        "left": (".exr .flo .png _electrons.exr _exposure.yaml _flow.png _irradiance.exr"
+                 " _photons.exr _preview.png _raw.png _top.npy"),
         "eye": ".exr _preview.png _top.npy",
     }  # fmt: skip
     expected = {"dataset.yaml", "calibration/left.ros.yaml", "calibration/eye.ros.yaml"}
