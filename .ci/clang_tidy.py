@@ -81,8 +81,9 @@ def run(*command: str) -> str:
 def common_settings(root: Path, clang_tidy: str) -> str:
     known = run("dpkg-query", "-W", "-f=${db:Status-Status} ${Package} ${Version}\n", "*-dev")
     packages = "\n".join(line for line in known.splitlines() if line.startswith("installed "))
-    texts = [(root / name).read_text() for name in (".clang-tidy", "test/requirements.txt")]
-    return "\0".join([run(clang_tidy, "--version"), packages, *texts])
+    python_headers = re.findall("^nanobind==.*", (root / "test/requirements.txt").read_text(), re.M)
+    settings = (root / ".clang-tidy").read_text()
+    return "\0".join([run(clang_tidy, "--version"), packages, *python_headers, settings])
 
 
 def commands(build: Path, root: Path) -> dict[str, str]:
