@@ -105,7 +105,8 @@ std::vector<GroundCover::Point> points_under(const Drape& orthophoto, const Terr
           glm::mix(low, high, (glm::dvec2(column, row) + 0.5) / static_cast<double>(points_across));
       const auto height_m = terrain.ground().height_m_at(p_D);
       const auto facet = terrain.ground().facet_at(p_D);
-      if (height_m && facet) points.push_back({{p_D, *height_m}, frame.normal(*facet)});
+      if (height_m && facet)
+        points.push_back(GroundCover::on_facet({p_D, *height_m}, frame.normal(*facet)));
     }
   }
   return points;

@@ -94,10 +94,16 @@ double CoverLimits::share(double value) const noexcept {
   return std::min(rise(value - low, blend), rise(high - value, blend));
 }
 
+GroundCover::Point GroundCover::on_facet(const glm::dvec3& p_D, const glm::dvec3& normal) noexcept {
+  return {p_D, normal, std::acos(std::clamp(normal.z, -1.0, 1.0))};
+}
+
 GroundCover::GroundCover(std::vector<CoverLayer> layers, std::shared_ptr<const Drape> orthophoto,
                          std::span<const Point> points)
     : layers_(std::move(layers)), orthophoto_(std::move(orthophoto)) {
   check_layers(layers_);
+  depends_on_slope_ = !std::ranges::all_of(layers_, is_everywhere,
+                                           [](const CoverLayer& layer) { return layer.slope_rad; });
   if (orthophoto_ == nullptr) return;
   std::array<glm::dvec3, most_layers> sums{};
   std::array<double, most_layers> weights{};
@@ -124,11 +130,10 @@ GroundCover::GroundCover(std::vector<CoverLayer> layers, std::shared_ptr<const D
 
 GroundCover::Shares GroundCover::shares_at(const Point& point) const noexcept {
   Shares shares{};
-  const double slope_rad = std::acos(std::clamp(point.normal.z, -1.0, 1.0));
   double left = 1;
   for (std::size_t i = layers_.size(); i-- > 1 && left > 0;) {
     const CoverLayer& layer = layers_[i];
-    double share = layer.slope_rad.share(slope_rad) * layer.height_m.share(point.p_D.z);
+    double share = layer.slope_rad.share(point.slope_rad) * layer.height_m.share(point.p_D.z);
     if (share > 0 && layer.mask != nullptr) {
       const glm::dvec2 p_D(point.p_D);
       share *= layer.mask->covers(p_D)

@@ -55,7 +55,7 @@ struct CoverLimits {
 struct CoverLayer {
   std::uint16_t material = 0;         ///< index among the scene's materials
   std::uint16_t label = 0;            ///< semantic class
-  CoverLimits slope_rad{};            ///< of the facet that is hit
+  CoverLimits slope_rad{};            ///< of the ground (see Point)
   CoverLimits height_m{};             ///< in D
   std::shared_ptr<const Drape> mask;  ///< weight in its first channel, 0 to 1; 0 outside; or null
   std::optional<GroundTexture> texture;
@@ -68,11 +68,16 @@ class GroundCover {
  public:
   static constexpr std::size_t most_layers = 8;
 
-  /// A point of the ground: position in D and unit normal.
+  /// A point of the ground: position in D, unit normal of its facet, and slope, which decides on
+  /// the layers there.
   struct Point {
     glm::dvec3 p_D{0};
     glm::dvec3 normal{0, 0, 1};
+    double slope_rad = 0;
   };
+
+  /// Returns the point of a facet, with the facet's slope.
+  static Point on_facet(const glm::dvec3& p_D, const glm::dvec3& normal) noexcept;
 
   /// Constructs no layers: the ground is one material.
   GroundCover() = default;
@@ -88,6 +93,8 @@ class GroundCover {
               std::span<const Point> points);
 
   bool empty() const noexcept { return layers_.empty(); }
+  /// Returns whether slopes decide on a layer.
+  bool depends_on_slope() const noexcept { return depends_on_slope_; }
   std::span<const CoverLayer> layers() const noexcept { return layers_; }
 
   /// Share of each layer at a point: not negative, sum 1.
@@ -106,6 +113,7 @@ class GroundCover {
 
  private:
   std::vector<CoverLayer> layers_;
+  bool depends_on_slope_ = false;
   std::shared_ptr<const Drape> orthophoto_;
   std::array<glm::vec3, most_layers> means_{};  // of the orthophoto, by layer
 };

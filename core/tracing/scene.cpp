@@ -4,12 +4,20 @@
 #include <glm/geometric.hpp>
 #include <glm/gtc/quaternion.hpp>
 
+#include "core/tracing/ground_slope.h"
+
 namespace groundray {
 namespace {
 
 // Returns the point of the ground that a ray hit.
-GroundCover::Point ground_point(const Ray& ray, const Hit& hit) noexcept {
-  return {ray.origin + ray.direction * hit.range_m, glm::normalize(glm::dvec3(hit.normal))};
+GroundCover::Point ground_point(const Scene& scene, const Ray& ray, const Hit& hit) noexcept {
+  GroundCover::Point point = GroundCover::on_facet(ray.origin + ray.direction * hit.range_m,
+                                                   glm::normalize(glm::dvec3(hit.normal)));
+  if (scene.cover.depends_on_slope()) {
+    if (const auto slope_rad = ground_slope_rad(scene.rays, glm::dvec2(point.p_D)))
+      point.slope_rad = *slope_rad;
+  }
+  return point;
 }
 
 // Point of an object that a ray hit, in the object's frame O, and the surface patch that the ray
@@ -40,7 +48,7 @@ ModelPoint model_point(const ObjectTracer& objects, const Ray& ray, const Hit& h
 SurfaceTruth Scene::truth_of(const Ray& ray, const Hit& hit) const noexcept {
   if (hit.object == 0) {
     if (cover.empty()) return terrain;
-    const auto shares = cover.shares_at(ground_point(ray, hit));
+    const auto shares = cover.shares_at(ground_point(*this, ray, hit));
     const auto largest =
         static_cast<std::size_t>(std::ranges::max_element(shares) - shares.begin());
     const CoverLayer& layer = cover.layers()[largest];
@@ -74,7 +82,7 @@ Appearance Scene::appearance_of(const Ray& ray, const Hit& hit, double width_m,
     appearance.count = 1;
     return appearance;
   }
-  const GroundCover::Point point = ground_point(ray, hit);
+  const GroundCover::Point point = ground_point(*this, ray, hit);
   const SurfacePatch patch = surface_patch(width_m, ray.direction, point.normal);
   const auto shares = cover.shares_at(point);
   for (std::size_t i = 0; i < cover.layers().size(); ++i) {
@@ -88,7 +96,7 @@ Appearance Scene::appearance_of(const Ray& ray, const Hit& hit, double width_m,
 glm::dvec3 Scene::shading_normal_of(const Ray& ray, const Hit& hit, double width_m,
                                     Filtering filtering) const noexcept {
   if (hit.object == 0) {
-    const GroundCover::Point point = ground_point(ray, hit);
+    const GroundCover::Point point = ground_point(*this, ray, hit);
     if (cover.empty()) return point.normal;
     return cover.shading_normal_at(point, surface_patch(width_m, ray.direction, point.normal),
                                    filtering);

@@ -74,11 +74,10 @@ void add_ground_colour(Layer& terrain, const Simulation& simulation) {
   const glm::dvec3 offset = terrain.origin_w_m - simulation.terrain.header().origin_w_m;
   std::vector<std::uint8_t> rgb(3 * terrain.points());
   tbb::parallel_for(std::size_t{0}, terrain.points(), [&](std::size_t i) {
-    GroundCover::Point point;
-    point.p_D = offset + point_at(places, i);
-    for (int k = 0; k < 3; ++k)
-      point.normal[k] = normals.GetComponent(static_cast<vtkIdType>(i), k);
-    const glm::u8vec3 colour = colours->shown_at(point, point_patch_m);
+    glm::dvec3 normal;
+    normals.GetTuple(static_cast<vtkIdType>(i), &normal.x);
+    const glm::u8vec3 colour = colours->shown_at(
+        GroundCover::on_facet(offset + point_at(places, i), normal), point_patch_m);
     for (std::size_t k = 0; k < 3; ++k) rgb[3 * i + k] = colour[static_cast<glm::length_t>(k)];
   });
   add_colours(terrain, {.name = "colour", .unit = ""}, rgb);

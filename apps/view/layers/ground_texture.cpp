@@ -201,8 +201,9 @@ struct SquarePainter {
     const glm::dvec3 normal = shares.x * surface.normal(triangle, 0) +
                               shares.y * surface.normal(triangle, 1) +
                               shares.z * surface.normal(triangle, 2);
-    return ground.shown_at({offset_m + glm::dvec3(p, z), glm::normalize(normal)},
-                           squares.texel_of(square));
+    return ground.shown_at(
+        GroundCover::on_facet(offset_m + glm::dvec3(p, z), glm::normalize(normal)),
+        squares.texel_of(square));
   }
 
   // Returns the colour for a texel without ground: that of a neighbour with ground, since bilinear

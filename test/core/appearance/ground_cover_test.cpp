@@ -23,7 +23,7 @@ constexpr double degree = std::numbers::pi / 180;
 constexpr double float_error = 4e-7;
 
 GroundCover::Point on_slope(double slope_rad, double height_m = 0, glm::dvec2 p = {0, 0}) {
-  return {{p, height_m}, {std::sin(slope_rad), 0, std::cos(slope_rad)}};
+  return GroundCover::on_facet({p, height_m}, {std::sin(slope_rad), 0, std::cos(slope_rad)});
 }
 
 // An image of one row.
