@@ -28,7 +28,8 @@ struct LevelSamples {
   }
 };
 
-// Change of height per cell of the DEM along an axis; NaN if the sample is missing or alone.
+// Returns the change of height per cell of the DEM along an axis; NaN if too many samples are
+// missing.
 double gradient_m(const LevelSamples& samples, glm::ivec2 sample, glm::length_t axis) noexcept {
   const auto neighbour = [&](int step) {
     glm::ivec2 other = sample;

@@ -8,9 +8,10 @@
 namespace groundray {
 
 /// Returns the slope of the ground at `p` (D, metres) without the steps between facets, radians.
-/// Each sample of the finest level there has the gradient of central differences, at the window's
-/// boundary and beside missing samples of one-sided ones; between samples, gradients are
-/// interpolated bilinearly. Nothing outside the levels and in cells with a missing sample.
+/// Each sample of the finest level there has the gradient between its two neighbours along each
+/// axis, or, where one is missing or beyond the level, between the sample and the other; between
+/// samples, gradients are interpolated bilinearly. Nothing outside the levels, and where a corner
+/// of the cell has no gradient.
 std::optional<double> ground_slope_rad(const RayTracer& ground, glm::dvec2 p) noexcept;
 
 }  // namespace groundray

@@ -119,26 +119,38 @@ TEST(GroundSlope, UsesTheSamplesOfTheFinestLevelThere) {
   EXPECT_NEAR(ground_slope_rad(nested, far).value(), bowl.slope_rad(far), rounding(bowl, samples));
 }
 
-TEST(GroundSlope, NothingInCellsWithAMissingSample) {
+TEST(GroundSlope, BridgesSingleMissingSamples) {
   const Quadratic plane{.slope = {0.25, 0.5}};
   constexpr int samples = 9;
   std::vector<float> heights_m = heights_of(plane, {samples, samples}, 1, {8, 8});
-  heights_m[4 * samples + 4] = std::numeric_limits<float>::quiet_NaN();
-  const RayTracer tracer =
-      tracer_of({full_resolution_level({{samples, samples}, origin_m, step_m, heights_m})});
-  for (const double column : {3.5, 4.5}) {
-    for (const double row : {3.5, 4.5})
-      EXPECT_FALSE(ground_slope_rad(tracer, origin_m + glm::dvec2(column, row) * step_m));
+  const auto lose = [&](int column, int row) {
+    heights_m[static_cast<std::size_t>(row * samples + column)] =
+        std::numeric_limits<float>::quiet_NaN();
+  };
+  const auto slope_at = [&](double column, double row) {
+    const RayTracer tracer =
+        tracer_of({full_resolution_level({{samples, samples}, origin_m, step_m, heights_m})});
+    return ground_slope_rad(tracer, origin_m + glm::dvec2(column, row) * step_m);
+  };
+  lose(4, 4);
+  for (const double column : {2.5, 3.5, 4.5, 5.5}) {
+    for (const double row : {2.5, 3.5, 4.5, 5.5}) {
+      EXPECT_NEAR(slope_at(column, row).value(), plane.slope_rad({}), rounding(plane, samples))
+          << column << ' ' << row;
+    }
   }
-  for (const glm::dvec2 beside : {glm::dvec2{2.5, 4.5}, {5.5, 3.5}, {4.5, 2.5}, {3.5, 5.5}}) {
-    EXPECT_NEAR(ground_slope_rad(tracer, origin_m + beside * step_m).value(), plane.slope_rad({}),
-                rounding(plane, samples));
+  lose(5, 4);  // now neither has a gradient along x
+  for (const double column : {3.5, 4.5, 5.5}) {
+    EXPECT_FALSE(slope_at(column, 3.5)) << column;
+    EXPECT_FALSE(slope_at(column, 4.5)) << column;
   }
+  EXPECT_NEAR(slope_at(2.5, 4.5).value(), plane.slope_rad({}), rounding(plane, samples));
+  EXPECT_NEAR(slope_at(4.5, 2.5).value(), plane.slope_rad({}), rounding(plane, samples));
 }
 
 TEST(GroundSlope, DecidesOnLayersInsteadOfFacets) {
   constexpr int samples = 33;
-  constexpr double limit_rad = 0.2;
+  constexpr double limit_rad = 0.65;
   Scene scene{tracer_of({full_resolution_level(grid_of(bowl, samples))}), {}};
   scene.cover =
       GroundCover({{.label = 1}, {.label = 2, .slope_rad = {limit_rad, 2, 0}}}, nullptr, {});
