@@ -123,9 +123,8 @@ TEST(GroundSlope, BridgesSingleMissingSamples) {
   const Quadratic plane{.slope = {0.25, 0.5}};
   constexpr int samples = 9;
   std::vector<float> heights_m = heights_of(plane, {samples, samples}, 1, {8, 8});
-  const auto lose = [&](int column, int row) {
-    heights_m[static_cast<std::size_t>(row * samples + column)] =
-        std::numeric_limits<float>::quiet_NaN();
+  const auto lose = [&](std::size_t column, std::size_t row) {
+    heights_m[row * samples + column] = std::numeric_limits<float>::quiet_NaN();
   };
   const auto slope_at = [&](double column, double row) {
     const RayTracer tracer =
