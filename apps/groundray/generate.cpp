@@ -99,6 +99,10 @@ void say_faults(const fs::path& out, const std::vector<std::string>& faults) {
   if (faults.size() > most) print_error("and {} more\n", faults.size() - most);
 }
 
+std::string counted(std::size_t count, std::string_view noun) {
+  return fmt::format("{} {}{}", count, noun, count == 1 ? "" : "s");
+}
+
 void say(const Simulation& simulation, const fs::path& out, const FramePlan& plan,
          const FrameChoice& choice, const Tally& tally, std::FILE* to) {
   if (tally.scans < plan.scans)
@@ -106,14 +110,14 @@ void say(const Simulation& simulation, const fs::path& out, const FramePlan& pla
   if (tally.images < plan.images)
     print_text(to, "{} images already existed\n", plan.images - tally.images);
   if (tally.scans > 0) {
-    print_text(to, "{} scans, {} points of {} pulses, {:.2f} M pulses/s\n", tally.scans,
+    print_text(to, "{}, {} points of {} pulses, {:.3g} M pulses/s\n", counted(tally.scans, "scan"),
                tally.points, tally.pulses,
                1e-6 * static_cast<double>(tally.pulses) / tally.scanning.count());
   }
   if (tally.images > 0) {
-    print_text(to, "{} images, {:.1f} M pixels, {:.1f} M paths in {:.1f} s\n", tally.images,
-               1e-6 * static_cast<double>(tally.pixels), 1e-6 * static_cast<double>(tally.paths),
-               tally.exposing.count());
+    print_text(to, "{}, {:.3g} M pixels, {:.3g} M paths in {:.1f} s\n",
+               counted(tally.images, "image"), 1e-6 * static_cast<double>(tally.pixels),
+               1e-6 * static_cast<double>(tally.paths), tally.exposing.count());
   }
   if (tally.flows_left_out > 0) {
     print_text(to, "{} flows beyond 512 px are marked as unknown in KITTI's files\n",
@@ -157,8 +161,7 @@ std::vector<std::string> saturation_notes(const Simulation& simulation, const Ta
     const MountedCamera& camera = simulation.cameras[i].spec;
     notes.push_back(fmt::format(
         "camera '{}': {} with more than 1 % of the pixels saturated, {:.3g} % in image {}; {}",
-        camera.name, images == 1 ? "an image" : fmt::format("{} images", images), 100 * most_share,
-        most_image,
+        camera.name, counted(images, "image"), 100 * most_share, most_image,
         camera.camera.shutter.automatic
             ? "choose a lower `target` or a shorter `shortest_us` in `shutter.automatic`"
             : "choose a shorter `shutter.exposure_ms`, or `shutter: {automatic: {}}`"));

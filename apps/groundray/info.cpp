@@ -160,7 +160,7 @@ void print_content(const SceneObjects& content) {
 }
 
 std::string words_for(const ConstantSky& sky, const ClearAir& /*air*/) {
-  return fmt::format("uniform: ({}, {}, {}) W/(m2 sr)", sky.radiance.x, sky.radiance.y,
+  return fmt::format("constant: ({}, {}, {}) W/(m2 sr)", sky.radiance.x, sky.radiance.y,
                      sky.radiance.z);
 }
 std::string words_for(const EnvironmentImage& sky, const ClearAir& /*air*/) {

@@ -94,10 +94,14 @@ std::vector<Listed> entries_of(const fs::path& folder, const std::vector<std::st
   return entries;
 }
 
-void add_presets(std::vector<ListedGroup>& groups) {
+void add_lidars(std::vector<ListedGroup>& groups) {
   const fs::path folder = data_folder() / "sensors";
   groups.push_back({"lidar", "lidars (preset: NAME in an entry of lidars)",
                     entries_of(folder, preset_names(folder, SensorKind::Lidar), load_lidar)});
+}
+
+void add_cameras(std::vector<ListedGroup>& groups) {
+  const fs::path folder = data_folder() / "sensors";
   groups.push_back({"camera", "cameras (preset: NAME in an entry of cameras)",
                     entries_of(folder, preset_names(folder, SensorKind::Camera), load_camera)});
 }
@@ -141,7 +145,7 @@ void print_json(const std::vector<ListedGroup>& groups) {
 }
 
 // Kinds of what a scene file can name.
-enum class Listing { Presets, Materials, Assets };
+enum class Listing { Presets, Lidars, Cameras, Materials, Assets };
 
 struct ListOptions {
   std::optional<Listing> kind;  // all if there is none
@@ -152,6 +156,8 @@ struct ListOptions {
         "list", "List what a scene file can name: presets of sensors, materials, assets");
     add_words(command, "KIND", kind, "Kind to list (all)",
               Words<Listing>{{"presets", Listing::Presets},
+                             {"lidars", Listing::Lidars},
+                             {"cameras", Listing::Cameras},
                              {"materials", Listing::Materials},
                              {"assets", Listing::Assets}});
     command->add_flag("--json", as_json, "Print a list of JSON objects");
@@ -161,7 +167,9 @@ struct ListOptions {
   void run() const {
     std::vector<ListedGroup> groups;
     const auto includes = [&](Listing one) { return !kind || *kind == one; };
-    if (includes(Listing::Presets)) add_presets(groups);
+    const bool presets = includes(Listing::Presets);
+    if (presets || kind == Listing::Lidars) add_lidars(groups);
+    if (presets || kind == Listing::Cameras) add_cameras(groups);
     if (includes(Listing::Materials)) add_materials(groups);
     if (includes(Listing::Assets)) add_assets(groups);
     if (as_json) {

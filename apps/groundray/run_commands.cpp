@@ -113,12 +113,11 @@ struct RunOptions {
     command->add_flag("--resume", resume,
                       "Continue an interrupted run in its folder: check all existing files and "
                       "create those that are missing or changed");
-    auto* sensor = command
-                       ->add_option("--sensor", sensors,
-                                    "Make the frames of these sensors only; may be repeated")
-                       ->delimiter(',')
-                       ->allow_extra_args(false)
-                       ->type_name("NAME");
+    auto* sensor =
+        command->add_option("--sensor", sensors, "Make the frames of these sensors only: NAME,NAME")
+            ->delimiter(',')
+            ->allow_extra_args(false)
+            ->type_name("NAME");
     auto* range =
         command
             ->add_option("--frames", frames,

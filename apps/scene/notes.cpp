@@ -40,8 +40,38 @@ void note_weather(const Simulation& simulation, Notes& notes) {
   if (std::holds_alternative<AnalyticSky>(spec.sky->dome)) {
     notes.push_back(fmt::format(
         "weather: hides surfaces beyond {:.4g} m, but the sky above them remains clear; "
-        "give `sky` a `uniform` radiance or an image",
+        "give `sky` a `constant` radiance or an image",
         range_m));
+  }
+}
+
+// Notes lidars whose ranges are too long because they are calibrated for other air.
+void note_air(const Simulation& simulation, Notes& notes) {
+  const double air = simulation.spec.air.group_index;
+  for (const PlacedLidar& lidar : simulation.lidars) {
+    if (!has_light(lidar)) continue;
+    const double calibrated = lidar.spec.lidar.receiver->calibrated_group_index;
+    if (air == calibrated) continue;
+    notes.push_back(fmt::format(
+        "weather: with group_index = {}, lidar '{}' measures ranges {:.3g} mm per 100 m too {}, "
+        "because it is calibrated for {}; set `receiver: {{calibrated_group_index: {}}}` if it is "
+        "calibrated for this air",
+        air, lidar.spec.name, 1e5 * std::abs(air / calibrated - 1),
+        air > calibrated ? "long" : "short", calibrated, air));
+  }
+}
+
+// Notes heights that mark missing samples in many DEMs, and that no ground has.
+void note_heights(const Simulation& simulation, Notes& notes) {
+  constexpr double deepest_m = -9000, highest_m = 30'000;  // not on land of the Earth, Moon or Mars
+  const HeightGrid* const grid = simulation.terrain.whole();
+  if (grid == nullptr) return;
+  for (const double height_m : {grid->min_height_m(), grid->max_height_m()}) {
+    if (!(height_m < deepest_m || height_m > highest_m)) continue;
+    notes.push_back(
+        fmt::format("terrain: it has heights of {} m: if these mark missing samples, set "
+                    "`nodata: {}`",
+                    height_m, height_m));
   }
 }
 
@@ -142,6 +172,8 @@ void note_tolerance(const Simulation& simulation, Notes& notes) {
 std::vector<std::string> notes_of(const Simulation& simulation) {
   Notes notes;
   note_weather(simulation, notes);
+  note_air(simulation, notes);
+  note_heights(simulation, notes);
   note_sky(simulation, notes);
   note_noise(simulation, notes);
   note_cameras(simulation, notes);

@@ -7,6 +7,7 @@
 
 #include <algorithm>
 #include <cctype>
+#include <charconv>
 #include <cmath>
 #include <cstdarg>
 #include <cstdint>
@@ -14,6 +15,7 @@
 #include <memory>
 #include <mutex>
 #include <string_view>
+#include <system_error>
 
 #include "terrain/dem/raster_input.h"
 
@@ -56,6 +58,27 @@ GDALRasterBand& height_band(GDALDataset& dataset) {
                 command(name, "gdal_translate -srcwin 0 0 32768 32768", "_part.tif"));
   broken.throw_if_any();
   return band;
+}
+
+// Returns an EPSG code as a number; 0 if there is none.
+int number_of(const char* code) {
+  const std::string_view text = code == nullptr ? "" : code;
+  int number = 0;
+  const auto end = std::from_chars(text.data(), text.data() + text.size(), number);
+  return end.ec == std::errc() && end.ptr == text.data() + text.size() ? number : 0;
+}
+
+// Returns heights in metres above the same datum. Files identify a datum only by its code.
+OGRSpatialReference heights_in_metres(const OGRSpatialReference& crs) {
+  const char* const datum = crs.GetAttrValue("VERT_DATUM");
+  OGRSpatialReference heights;
+  heights.SetVertCS(fmt::format("{} height", datum == nullptr ? "unknown" : datum).c_str(), datum);
+  OGRSpatialReference told;  // the CRS's EPSG definition, which contains the datum's code
+  const int code = number_of(crs.GetAuthorityCode("VERT_CS"));
+  if (code == 0 || told.importFromEPSG(code) != OGRERR_NONE) return heights;
+  const int datum_code = number_of(told.GetAuthorityCode("VERT_DATUM"));
+  if (datum_code != 0) heights.SetAuthority("VERT_CS|VERT_DATUM", "EPSG", datum_code);
+  return heights;
 }
 
 // Returns the length of the band's unit of height, m.
@@ -184,6 +207,16 @@ std::string name_of(const OGRSpatialReference& crs) {
   const char* code = crs.GetAuthorityCode(nullptr);
   if (authority == nullptr || code == nullptr) return name == nullptr ? "unnamed" : name;
   return fmt::format("{} ({}:{})", name, authority, code);
+}
+
+OGRSpatialReference with_heights_in_metres(const OGRSpatialReference& crs) {
+  if (crs.IsCompound() == 0 || crs.GetTargetLinearUnits("VERT_CS") == 1) return crs;
+  const OGRSpatialReference heights = heights_in_metres(crs);
+  OGRSpatialReference plan = crs, both;
+  plan.StripVertical();
+  const std::string name = fmt::format("{} + {}", plan.GetName(), heights.GetName());
+  both.SetCompoundCS(name.c_str(), &plan, &heights);
+  return both;
 }
 
 std::string wkt_of(const OGRSpatialReference& crs) {

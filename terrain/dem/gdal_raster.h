@@ -47,6 +47,9 @@ RasterHeader read_header(GDALDataset& dataset, const char* placing = "gdalwarp -
 /// Returns the CRS's name for human readers: "NAD83 / UTM zone 15N (EPSG:26915)"; "local (no CRS)".
 std::string name_of(const OGRSpatialReference& crs);
 
+/// Returns the CRS with heights in metres above the same datum; unchanged without a vertical part.
+OGRSpatialReference with_heights_in_metres(const OGRSpatialReference& crs);
+
 /// Returns the CRS as WKT2:2019 on one line; empty if the CRS is empty.
 std::string wkt_of(const OGRSpatialReference& crs);
 

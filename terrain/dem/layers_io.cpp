@@ -4,13 +4,11 @@
 
 #include <algorithm>
 #include <array>
-#include <charconv>
 #include <cmath>
 #include <cstdint>
 #include <glm/common.hpp>
 #include <limits>
 #include <string_view>
-#include <system_error>
 #include <utility>
 #include <vector>
 
@@ -77,38 +75,6 @@ OGRSpatialReference crs_of(const Georeference& georeference) {
   return crs;
 }
 
-// Returns an EPSG code as a number; 0 if there is none.
-int number_of(const char* code) {
-  const std::string_view text = code == nullptr ? "" : code;
-  int number = 0;
-  const auto end = std::from_chars(text.data(), text.data() + text.size(), number);
-  return end.ec == std::errc() && end.ptr == text.data() + text.size() ? number : 0;
-}
-
-// Returns heights in metres above the same datum. Files identify a datum only by its code.
-OGRSpatialReference heights_in_metres(const OGRSpatialReference& crs) {
-  const char* const datum = crs.GetAttrValue("VERT_DATUM");
-  OGRSpatialReference heights;
-  heights.SetVertCS(fmt::format("{} height", datum == nullptr ? "unknown" : datum).c_str(), datum);
-  OGRSpatialReference told;  // the CRS's EPSG definition, which contains the datum's code
-  const int code = number_of(crs.GetAuthorityCode("VERT_CS"));
-  if (code == 0 || told.importFromEPSG(code) != OGRERR_NONE) return heights;
-  const int datum_code = number_of(told.GetAuthorityCode("VERT_DATUM"));
-  if (datum_code != 0) heights.SetAuthority("VERT_CS|VERT_DATUM", "EPSG", datum_code);
-  return heights;
-}
-
-// Changes the heights of a CRS, if it has any, to metres.
-void take_metres(OGRSpatialReference& crs) {
-  if (crs.IsCompound() == 0 || crs.GetTargetLinearUnits("VERT_CS") == 1) return;
-  const OGRSpatialReference heights = heights_in_metres(crs);
-  OGRSpatialReference plan = crs, both;
-  plan.StripVertical();
-  const std::string name = fmt::format("{} + {}", plan.GetName(), heights.GetName());
-  both.SetCompoundCS(name.c_str(), &plan, &heights);
-  crs = std::move(both);
-}
-
 void place(GDALDataset& dataset, const GridFrame& frame, const Georeference& georeference) {
   const glm::dvec2 first = frame.origin_m;
   const glm::dvec2 last = frame.to_D(frame.samples - 1);
@@ -118,8 +84,7 @@ void place(GDALDataset& dataset, const GridFrame& frame, const Georeference& geo
   std::array<double, 6> transform{west, step.x, 0, north, 0, -step.y};
   dataset.SetGeoTransform(transform.data());
   if (georeference.crs_wkt.empty()) return;
-  OGRSpatialReference crs = crs_of(georeference);
-  take_metres(crs);
+  OGRSpatialReference crs = with_heights_in_metres(crs_of(georeference));
   crs.SetAxisMappingStrategy(OAMS_TRADITIONAL_GIS_ORDER);
   dataset.SetSpatialRef(&crs);
 }

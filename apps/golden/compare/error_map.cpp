@@ -15,7 +15,6 @@ namespace groundray::golden {
 namespace {
 
 constexpr double none = std::numeric_limits<double>::quiet_NaN();
-constexpr double lonely = std::numeric_limits<double>::infinity();
 const Colour blank(0.85);
 const glm::ivec2 enough_px(600, 160);
 
@@ -83,7 +82,9 @@ ErrorMap::ErrorMap(glm::dvec2 low, glm::dvec2 high, glm::ivec2 cells)
     : low_(low),
       high_(widened(low, high)),
       cell_px_(glm::max(enough_px / cells, glm::ivec2(1))),
-      errors_(cells.x, cells.y, 1) {
+      errors_(cells.x, cells.y, 1),
+      paired_(cells.x, cells.y, 1),
+      lonely_(cells.x, cells.y, 1) {
   std::ranges::fill(errors_.values(), none);
 }
 
@@ -99,14 +100,21 @@ void ErrorMap::add(glm::dvec2 at, double error) {
   const glm::ivec2 cell = cell_of(at);
   if (cell.x < 0) return;
   double& now = errors_.at(cell.x, cell.y)[0];
-  if (!std::isfinite(now) || std::abs(error) > std::abs(now)) now = error;
+  if (std::isnan(now) || std::abs(error) > std::abs(now)) now = error;
+  paired_.at(cell.x, cell.y)[0] += 1;
 }
 
 void ErrorMap::add_unpaired(glm::dvec2 at) {
   const glm::ivec2 cell = cell_of(at);
-  if (cell.x < 0) return;
-  double& now = errors_.at(cell.x, cell.y)[0];
-  if (std::isnan(now)) now = lonely;
+  if (cell.x >= 0) lonely_.at(cell.x, cell.y)[0] += 1;
+}
+
+Colour ErrorMap::colour(glm::ivec2 cell, const ErrorScale& scale) const {
+  const double error = errors_.at(cell.x, cell.y)[0];
+  const float lonely = lonely_.at(cell.x, cell.y)[0], all = lonely + paired_.at(cell.x, cell.y)[0];
+  if (all == 0) return blank;
+  return (std::isnan(error) ? blank : scale.colour(error)) *
+         (1.0 - static_cast<double>(lonely / all));
 }
 
 Picture ErrorMap::picture(const std::string& caption, const std::string& across,
@@ -114,19 +122,15 @@ Picture ErrorMap::picture(const std::string& caption, const std::string& across,
   const auto values = errors_.values();
   const ErrorScale scale = error_scale_of({values.begin(), values.end()});
   Image8 image(errors_.width() * cell_px_.x, errors_.height() * cell_px_.y, 3);
-  bool has_lonely = false;
+  const bool has_lonely = std::ranges::any_of(lonely_.values(), [](float n) { return n > 0; });
   for (int y = 0; y < image.height(); ++y) {
     for (int x = 0; x < image.width(); ++x) {
-      const double error = errors_.at(x / cell_px_.x, y / cell_px_.y)[0];
-      has_lonely = has_lonely || std::isinf(error);
-      paint(image, x, y,
-            std::isnan(error)   ? blank
-            : std::isinf(error) ? Colour(0)
-                                : scale.colour(error));
+      paint(image, x, y, colour(glm::ivec2(x, y) / cell_px_, scale));
     }
   }
-  return {.caption = fmt::format("{}; the largest in each cell; grey: nothing{}", caption,
-                                 has_lonely ? ", black: missing or extra returns" : ""),
+  return {.caption =
+              fmt::format("{}; the largest in each cell; grey: nothing{}", caption,
+                          has_lonely ? "; darker: missing or extra returns, black if all are" : ""),
           .image = std::move(image),
           .shown = Shown::Errors,
           .across = Axis{across, low_.x, high_.x},

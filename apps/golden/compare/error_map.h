@@ -36,21 +36,23 @@ class ErrorMap {
 
   /// Adds an error; does nothing outside the rectangle.
   void add(glm::dvec2 at, double error);
-  /// Marks a cell that has no error yet, for a point without a partner.
+  /// Counts a point without a partner.
   void add_unpaired(glm::dvec2 at);
 
-  /// Returns the picture, with axes and colour bar. Cells without an error are grey, those with
-  /// lonely points alone black.
+  /// Returns the picture, with axes and colour bar. Cells are darkened by the share of points
+  /// without a partner, to black; cells without points are grey.
   /// @param across, up  labels of the axes; the first coordinate is across.
   Picture picture(const std::string& caption, const std::string& across, const std::string& up,
                   const std::string& bar) const;
 
  private:
   glm::ivec2 cell_of(glm::dvec2 at) const;
+  Colour colour(glm::ivec2 cell, const ErrorScale& scale) const;
 
   glm::dvec2 low_, high_;
   glm::ivec2 cell_px_{1};
-  Image<double> errors_;  ///< NaN: none; infinite: a lonely point
+  Image<double> errors_;          ///< NaN: none
+  Image<float> paired_, lonely_;  ///< numbers of points
 };
 
 }  // namespace groundray::golden

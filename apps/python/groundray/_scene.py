@@ -1,5 +1,6 @@
 """Scenes built in code."""
 
+import datetime
 import math
 import numbers
 import os
@@ -218,9 +219,12 @@ def _scalar(value: Any) -> str:
         return ".nan" if math.isnan(number) else (".inf" if number > 0 else "-.inf")
     if isinstance(value, str | os.PathLike):
         return _text(os.fspath(value))
+    if isinstance(value, datetime.datetime):  # yaml.safe_load makes one of `sun.utc`
+        utc = value.astimezone(datetime.UTC) if value.tzinfo else value
+        return _text(utc.replace(tzinfo=None).isoformat() + "Z")
     raise TypeError(
         f"scene: {value!r} is a {type(value).__name__}; allowed are dicts, lists, texts, numbers, "
-        "paths and arrays"
+        "times, paths and arrays"
     )
 
 

@@ -232,8 +232,8 @@ double similarity(const Moments& mean, double range) {
   return (2 * both + c1) * (2 * covariance + c2) / ((squares + c1) * (variances + c2));
 }
 
-/// Selects the figures that are shown first: the RMS error of each layer, then further ones while
-/// there is space. The headline states those of all layers.
+/// Selects the figures that are shown first: the RMS error of each layer, those that differ before
+/// others, then further ones while there is space. The headline states those of all layers.
 void write_headline(Section& into) {
   constexpr std::size_t most = 5;
   using Endings = std::array<std::string_view, 3>;

@@ -19,6 +19,8 @@
 namespace groundray::golden {
 namespace {
 
+constexpr const char* equal_labels = "share of equal labels";
+
 double share(std::size_t part, std::size_t whole) {
   return whole == 0 ? 0 : static_cast<double>(part) / static_cast<double>(whole);
 }
@@ -141,6 +143,10 @@ void write_headline(const Pairs& pairs, const ScanErrors& errors, Section& secti
   section.headline += fmt::format(
       "; {:.2f} % of the reference's returns are missing, {:.2f} % of the other's are extra.",
       100 * missing_share(pairs), 100 * extra_share(pairs));
+  const auto labels = std::ranges::find(section.measures, equal_labels, &Measure::name);
+  if (labels == section.measures.end() || labels->value == 100) return;
+  section.main[2] = equal_labels;
+  section.headline += fmt::format(" {:.4g} % of the labels are equal.", labels->value);
 }
 
 double deviation_of(std::vector<double> values, double mean) {
@@ -213,6 +219,18 @@ void tell_intensities(const Scan& reference, const Scan& other, const Pairs& pai
   }
   if (squares > 0) tell(section, "intensity, best factor to the reference's", products / squares);
   if (aa > 0 && bb > 0) tell(section, "intensity, correlation", ab / std::sqrt(aa * bb));
+}
+
+/// Reports the share of pairs with equal labels, if both scans have them.
+void tell_labels(const Scan& reference, const Scan& other, const Pairs& pairs, Section& section) {
+  const auto* const ours = reference.find(Quantity::Label);
+  const auto* const theirs = other.find(Quantity::Label);
+  if (ours == nullptr || theirs == nullptr) return;
+  const auto equal = std::ranges::count_if(pairs.returns, [&](const auto& pair) {
+    return (*ours)[pair.first] == (*theirs)[pair.second];
+  });
+  tell(section, equal_labels, 100 * share(static_cast<std::size_t>(equal), pairs.returns.size()),
+       "%");
 }
 
 /// Returns a histogram centred on the median; its half-width is the 99th percentile of the
@@ -301,6 +319,7 @@ Section compare_scans(const Scan& reference, const Scan& other, const ScanOption
     tell_ranges(errors, options.limits, section);
     tell_directions(errors, turn_rad, section);
     tell_intensities(reference, other, pairs, section);
+    tell_labels(reference, other, pairs, section);
     section.histograms.push_back(histogram_of_errors("Error of the range", "m", errors.range_m));
     section.histograms.back().counted = "pairs of returns";
   }
