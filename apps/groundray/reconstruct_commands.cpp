@@ -172,9 +172,10 @@ Command add_mesh(CLI::App& all) {
       all, "mesh",
       "Link scans into meshes, check them against other scans, and merge them into one");
   CLI::App* mesh = options->command;
-  mesh->add_option("INPUT", options->scans.choice.inputs,
-                   "A dataset folder; or scans (.ply .pcd .npy .npz .bin); or a .conf of "
-                   "Stanford's range scans")
+  mesh->add_option(
+          "INPUT", options->scans.choice.inputs,
+          "A dataset folder; or scans (.ply .pcd .npy .npz .bin, .las .laz .mcap); or a .conf of "
+          "Stanford's range scans")
       ->required();
   options->add_output();
   mesh->add_option("--occlusion", options->request.output.occlusion,

@@ -1,20 +1,29 @@
 #include <fmt/format.h>
 #include <fmt/ranges.h>
+#include <nanobind/ndarray.h>
+#include <nanobind/stl/filesystem.h>
+#include <nanobind/stl/map.h>
 #include <nanobind/stl/optional.h>
 #include <nanobind/stl/string.h>
 #include <nanobind/stl/vector.h>
 
 #include <algorithm>
 #include <cstddef>
+#include <filesystem>
+#include <map>
 #include <string>
 #include <variant>
 #include <vector>
 
+#include "apps/dataset/write/preview.h"
 #include "apps/python/binding/arrays.h"
 #include "apps/python/binding/bind.h"
 #include "apps/python/binding/numpy_argument.h"
 #include "apps/python/binding/pickle.h"
 #include "apps/python/camera_image.h"
+#include "core/image/exr_io.h"
+#include "core/image/image.h"
+#include "core/image/png_io.h"
 
 namespace groundray::python {
 namespace {
@@ -47,6 +56,39 @@ AnyArray channel_of(nb::handle_t<CameraImage> self, const std::string& name) {
       found->pixels);
 }
 
+// Linear RGB that Python gives, height x width x 3.
+using GivenPicture =
+    nb::ndarray<const float, nb::shape<-1, -1, 3>, nb::c_contig, nb::device::cpu, nb::ro>;
+
+ImageF image_of(const GivenPicture& pixels) {
+  ImageF image(static_cast<int>(pixels.shape(1)), static_cast<int>(pixels.shape(0)), 3);
+  std::copy_n(pixels.data(), pixels.size(), image.values().begin());
+  return image;
+}
+
+void bind_writers(nb::module_& module) {
+  module.def(
+      "write_radiance_png",
+      [](const std::filesystem::path& path, const GivenPicture& radiance,
+         const GivenPicture& exposed_for) {
+        write_png(path, draw_radiance(image_of(radiance), image_of(exposed_for)));
+      },
+      "path"_a, "radiance"_a, "exposed_for"_a,
+      "Writes linear RGB, height x width x 3, as a PNG file with the brightness that the preview "
+      "of `exposed_for` has.");
+  module.def(
+      "write_rgb_exr",
+      [](const std::filesystem::path& path, const GivenPicture& rgb,
+         const std::map<std::string, std::string>& attributes) {
+        std::vector<ExrAttribute> header;
+        for (const auto& [name, text] : attributes) header.push_back({name, text});
+        const ImageF image = image_of(rgb);
+        write_exr(path, {{{"R", "G", "B"}, &image}}, header);
+      },
+      "path"_a, "rgb"_a, "attributes"_a,
+      "Writes linear RGB, height x width x 3, as an OpenEXR file with attributes of text.");
+}
+
 }  // namespace
 
 void bind_image(nb::module_& module) {
@@ -56,6 +98,7 @@ image["depth_m"] is a channel as a NumPy array, height x width or height x width
 read-only view that keeps the image alive. dict(image) is a dict of all channels.)");
   add_pickling(type, "image",
                [](nb::handle self) { return state_of(nb::handle_t<CameraImage>(self)); });
+  bind_writers(module);
   module.def("restore_image", &restored_image, "state"_a);
   type.def("__getitem__", &channel_of, "name"_a, "The channel of this name: a view.")
       .def("__len__", [](const CameraImage& image) { return image.channels.size(); })

@@ -8,11 +8,15 @@
 #include <utility>
 
 #include "apps/scan/column_names.h"
+#include "apps/scan/python_module.h"
+#include "apps/scene/interruption.h"
 #include "core/error.h"
 #include "core/io/file_io.h"
+#include "core/io/memory.h"
 #include "core/io/npy_io.h"
 #include "core/io/pcd_reader.h"
 #include "core/io/ply_io.h"
+#include "core/near_names.h"
 
 namespace groundray {
 namespace {
@@ -167,29 +171,38 @@ CloudFile of_floats(std::string_view bytes, const Names& asked) {
   return file;
 }
 
-constexpr std::string_view las_advice =
-    R"py(convert it to PLY first, for instance by laspy and plyfile:
-  python3 -c "import laspy, numpy as np, plyfile; p = laspy.read('{0}'); n = ['x', 'y', 'z', 'intensity', 'return_number', 'classification'] + ['gps_time'] * ('gps_time' in p.point_format.dimension_names); a = np.rec.fromarrays([np.asarray(p[k]) for k in n], names=n); plyfile.PlyData([plyfile.PlyElement.describe(a, 'vertex')]).write('{1}')")py";
-
 /// Throws an Error that suggests how to convert a file in an unsupported format.
-[[noreturn]] void refuse(const std::filesystem::path& name, const std::string& ending) {
-  const std::string ply = std::filesystem::path(name).replace_extension(".ply").string();
-  if (ending == ".las" || ending == ".laz") {
-    throw Error("LAS is not read: {}", fmt::format(las_advice, name.string(), ply));
-  }
-  static constexpr std::array<std::pair<std::string_view, std::string_view>, 6> others{
-      {{".e57", "E57 is not read: save it as PLY by CloudCompare, or by pye57 and plyfile"},
+[[noreturn]] void refuse(const std::string& ending) {
+  static constexpr std::array<std::pair<std::string_view, std::string_view>, 8> others{
+      {{".las", "LAS is read from files alone, not from memory"},
+       {".laz", "LAZ is read from files alone, not from memory"},
+       {".mcap", "MCAP is read from files alone, not from memory"},
+       {".e57", "E57 is not read: save it as PLY by CloudCompare, or by pye57 and plyfile"},
        {".pcap", "packets are not read: decode them to PLY or PCD by the sensor's own tools"},
        {".bag", "ROS bags are not read: save the messages as PCD, as pcl_ros' bag_to_pcd does"},
        {".db3", "ROS bags are not read: save the messages as PCD, as pcl_ros' bag_to_pcd does"},
-       {".mcap", "ROS bags are not read: save the messages as PCD, as pcl_ros' bag_to_pcd does"},
        {".osf", "OSF is not read: save the scan as PLY or PCD by ouster-cli"}}};
   for (const auto& [other, advice] : others) {
     if (ending == other) throw Error("{}", advice);
   }
   throw Error(
-      "the extension {:?} is not one of the supported point files: .ply, .pcd, .npy, .npz, .bin",
+      "the extension {:?} is not one of the supported point files: .ply, .pcd, .npy, .npz, .bin, "
+      ".las, .laz, .mcap",
       ending);
+}
+
+/// Reads a file through groundray's Python package, whose module prints a line with the name of the
+/// format and then a NumPy array.
+CloudFile read_by_python(const std::filesystem::path& path) {
+  if (!std::filesystem::exists(path)) throw Error("{}: {}", path.string(), why_no_file(path));
+  const std::string printed =
+      run_python_module("groundray.foreign.cloud", {std::filesystem::absolute(path).string()}, path,
+                        {.most_bytes = available_memory_bytes() / 2, .check = stop_if_interrupted});
+  const std::size_t end = std::min(printed.find('\n'), printed.size());
+  const std::string_view rest = std::string_view(printed).substr(std::min(end + 1, printed.size()));
+  CloudFile file = of_npy(parse_npy(rest, path.string()), {});
+  file.form = printed.substr(0, end);
+  return file;
 }
 
 }  // namespace
@@ -205,7 +218,7 @@ CloudFile parse_cloud(std::string_view bytes, const std::string& name,
     if (ending == ".npy") return of_npy(array, columns);
     if (ending == ".npz") return of_npz(archive, columns);
     if (ending == ".bin") return of_floats(bytes, columns);
-    refuse(name, ending);
+    refuse(ending);
   } catch (const Error& rule) {
     throw Error("{}: {}", name, rule.what());
   }
@@ -213,6 +226,7 @@ CloudFile parse_cloud(std::string_view bytes, const std::string& name,
 
 CloudFile read_cloud(const std::filesystem::path& path, const std::vector<std::string>& columns) {
   const std::string ending = lower(path.extension().string());
+  if (ending == ".las" || ending == ".laz" || ending == ".mcap") return read_by_python(path);
   static constexpr std::array<std::string_view, 5> read{".ply", ".pcd", ".npy", ".npz", ".bin"};
   const bool is_read = std::ranges::find(read, ending) != read.end();
   return parse_cloud(is_read ? read_text(path) : "", path.string(), columns);

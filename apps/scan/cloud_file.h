@@ -29,13 +29,16 @@ struct CloudFile {
 };
 
 /// Reads a cloud in the format of the file's extension: .ply, .pcd, .npy, .npz, or .bin
-/// (little-endian floats, as KITTI's).
+/// (little-endian floats, as KITTI's). Those in .las, .laz and .mcap (PointCloud2 of one topic,
+/// which $GROUNDRAY_TOPIC chooses) are read by groundray's Python package, in a process of its own.
 /// @param columns  names for the columns of .bin and of arrays without names; empty for x, y, z and
 ///                 intensity. An empty name omits a column.
-/// @throws Error if it cannot be read, or is in a format that must be converted first: LAS, E57.
+/// @throws Error if it cannot be read, or is in a format that must be converted first: E57;
+///         and as run_python_module. Throws Interrupted if that is interrupted.
 CloudFile read_cloud(const std::filesystem::path& path, const std::vector<std::string>& columns);
 
-/// Parses a cloud in memory as read_cloud; the extension of `name` determines the format.
+/// Parses a cloud in memory as read_cloud; the extension of `name` determines the format, which may
+/// not be one that Python reads.
 CloudFile parse_cloud(std::string_view bytes, const std::string& name,
                       const std::vector<std::string>& columns);
 

@@ -38,8 +38,8 @@ InputKind kind_of_raster(const fs::path& path) {
   } catch (const Error& fault) {
     throw Error(
         "{}: it cannot be shown: it is not a scene (.yaml), a dataset's folder, a mesh (.ply, "
-        ".obj, .stl, .gltf, .glb), a cloud (.ply, .pcd, .npy, .npz, .bin), a picture (.png, .jpg, "
-        ".exr, .hdr), or a DEM ({})",
+        ".obj, .stl, .gltf, .glb), a cloud (.ply, .pcd, .npy, .npz, .bin, .las, .laz, .mcap), a "
+        "picture (.png, .jpg, .exr, .hdr), or a DEM ({})",
         path.string(), fault.what());
   }
 }
@@ -216,7 +216,7 @@ InputKind kind_of(const fs::path& path) {
   if (is_one_of(end, {".yaml", ".yml"})) return InputKind::Scene;
   if (end == ".ply") return has_faces(path) ? InputKind::Mesh : InputKind::Cloud;
   if (is_one_of(end, {".obj", ".stl", ".gltf", ".glb"})) return InputKind::Mesh;
-  if (is_one_of(end, {".pcd", ".npy", ".npz", ".bin", ".las", ".laz", ".e57"}))
+  if (is_one_of(end, {".pcd", ".npy", ".npz", ".bin", ".las", ".laz", ".mcap", ".e57"}))
     return InputKind::Cloud;
   if (is_one_of(end, {".png", ".jpg", ".jpeg", ".exr", ".hdr"})) return InputKind::Picture;
   return kind_of_raster(path);

@@ -317,12 +317,6 @@ INPUTS = [
         ("there is no such file, preset, material or asset", "did you mean 'velodyne_vlp16'"),
     ),
     Mistake(
-        "info about a bag",
-        "groundray info drive.mcap",
-        ("drive.mcap: a ROS bag", "`mcap info`"),
-        files={"drive.mcap": b"\x89MCAP0"},
-    ),
-    Mistake(
         "verifying a file",
         "groundray verify notes.txt",
         ("notes.txt: a file, but a dataset is a folder", "`groundray generate`"),

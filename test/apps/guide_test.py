@@ -24,7 +24,7 @@ from markdown_page import Block, Page
 
 ROOT = Path(__file__).resolve().parents[2]
 PROGRAMS = ROOT / "build/release/bin"
-PACKAGE = Path(os.environ.get("GROUNDRAY_PYTHON", ROOT / "build/release/python"))
+PACKAGE = Path(os.environ.get("GROUNDRAY_PACKAGE", ROOT / "build/release/python"))
 PAGES = ["docs/guide/guide.md", "README.md"]
 COMMANDS = ("sh", "console", "python")
 LEFT_OUT = 8  # blocks that are not run; a new one is a choice to make here, too

@@ -1,4 +1,4 @@
-"""`groundray info` of meshes, clouds, images and bags, compared with other software."""
+"""`groundray info` of meshes, clouds and images, compared with other software."""
 
 import re
 
@@ -172,9 +172,6 @@ def test_an_exr_is_described_by_its_channels(tmp_path):
 
 def test_what_is_not_read_is_named_with_what_reads_it(tmp_path):
     for name, words in {
-        "drive.mcap": ("a ROS bag", "`mcap info`"),
-        "drive.db3": ("a ROS bag", "`ros2 bag info`"),
-        "drive.bag": ("a ROS bag", "`rosbag info`"),
         "scan.e57": ("E57 is not read",),
     }.items():
         (tmp_path / name).write_bytes(b"x")

@@ -112,7 +112,6 @@ def test_pictures_keep_their_colours(tmp_path: Path) -> None:
         ("scan.npy", b"\x93NUMPY\x01\0", "scan.npy"),
         ("scan.npz", b"PK\x03\x04", "scan.npz"),
         ("scan.bin", b"12345", "scan.bin"),
-        ("scan.las", b"LASF", "laspy"),
         ("dataset.yaml", b"groundray_dataset: 99\n", "dataset.yaml"),
         ("scene.yaml", b"groundray: [", "scene.yaml"),
         ("notes.txt", b"hello", "it cannot be shown"),

@@ -15,7 +15,7 @@ import yaml
 
 ROOT = Path(__file__).resolve().parents[2]
 PROGRAM = Path(os.environ.get("GROUNDRAY", ROOT / "build/release/bin/groundray"))
-PACKAGE = Path(os.environ.get("GROUNDRAY_PYTHON", ROOT / "build/release/python"))
+PACKAGE = Path(os.environ.get("GROUNDRAY_PACKAGE", ROOT / "build/release/python"))
 if not (PACKAGE / "groundray").is_dir():
     pytest.skip(f"{PACKAGE} has no package groundray: build it first", allow_module_level=True)
 if str(PACKAGE) not in sys.path:

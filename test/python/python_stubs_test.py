@@ -75,7 +75,17 @@ groundray.simplify("mesh.ply")
 
 def test_the_package_passes_mypy(tmp_path):
     """Covers its Python files, including groundray-export."""
-    foreign = ("OpenEXR", "cv2", "laspy", "lazrs", "mcap", "mcap_ros2", "pyproj")  # some have types
+    foreign = (
+        "OpenEXR",
+        "cv2",
+        "laspy",
+        "lazrs",
+        "mcap",
+        "mcap_ros2",
+        "pyoidn",
+        "pyproj",
+        "rosbags",
+    )  # some have types
     settings = STRICT + "".join(
         f"[mypy-{name}.*]\nignore_missing_imports = True\n" for name in foreign
     )

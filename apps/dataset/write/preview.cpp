@@ -188,11 +188,11 @@ float image_quantile(const ImageF& image, double share) {
                      [](float value) { return std::isfinite(value) && value > 0; });
 }
 
-// Draws the radiance, with 1 % of its values clipped to white.
-ColourAt light_of(const Exposure& light) {
-  const float white = image_quantile(light.radiance, 0.99);
-  return [&light, white](int x, int y) {
-    const auto rgb = light.radiance.at(x, y);
+// Draws the radiance, so bright that 1 % of the values of `exposed_for` are clipped to white.
+ColourAt light_of(const ImageF& radiance, const ImageF& exposed_for) {
+  const float white = image_quantile(exposed_for, 0.99);
+  return [&radiance, white](int x, int y) {
+    const auto rgb = radiance.at(x, y);
     const auto encoded = [&](float value) {
       return srgb_of_linear(std::clamp(static_cast<double>(value / white), 0.0, 1.0));
     };
@@ -254,7 +254,7 @@ Image8 draw_preview(const PointCloud& scan, const PlacedLidar& lidar, const Grou
 
 Image8 draw_image_preview(const Exposure* light, const ImageTruth* truth) {
   std::vector<ColourAt> panels;
-  if (light != nullptr) panels.push_back(light_of(*light));
+  if (light != nullptr) panels.push_back(light_of(light->radiance, light->radiance));
   if (truth != nullptr) {
     for (const auto& panel : {depth_of(*truth), normal_of(*truth), label_of(*truth)})
       panels.push_back(panel);
@@ -276,6 +276,14 @@ Image8 draw_image_preview(const Exposure* light, const ImageTruth* truth) {
               panels[static_cast<std::size_t>(i)](x * stride, y * stride));
     }
   }
+  return picture;
+}
+
+Image8 draw_radiance(const ImageF& radiance, const ImageF& exposed_for) {
+  const ColourAt colour = light_of(radiance, exposed_for);
+  Image8 picture(radiance.width(), radiance.height(), 3);
+  for (int y = 0; y < picture.height(); ++y)
+    for (int x = 0; x < picture.width(); ++x) paint(picture, x, y, colour(x, y));
   return picture;
 }
 

@@ -21,4 +21,8 @@ Image8 draw_preview(const PointCloud& scan, const PlacedLidar& lidar, const Grou
 /// @param light, truth  one of them may be null.
 Image8 draw_image_preview(const Exposure* light, const ImageTruth* truth);
 
+/// Draws linear RGB at full size, as the preview draws radiance.
+/// @param exposed_for  radiance whose preview has the same brightness: 1 % of its values are white.
+Image8 draw_radiance(const ImageF& radiance, const ImageF& exposed_for);
+
 }  // namespace groundray

@@ -23,7 +23,8 @@ std::optional<Subject> told_subject_of(const fs::path& file) {
     return std::ranges::find(endings, ending) != endings.end();
   };
   if (ending == ".ply") return has_faces(file) ? Subject::Mesh : Subject::Scan;
-  if (is_one_of({".pcd", ".npy", ".npz", ".bin", ".las", ".laz", ".e57"})) return Subject::Scan;
+  if (is_one_of({".pcd", ".npy", ".npz", ".bin", ".las", ".laz", ".mcap", ".e57"}))
+    return Subject::Scan;
   if (is_one_of({".exr", ".png", ".hdr", ".jpg", ".jpeg", ".flo", ".pfm"})) return Subject::Image;
   if (is_one_of({".obj", ".glb", ".gltf", ".stl"})) return Subject::Mesh;
   if (is_one_of({".tif", ".tiff", ".asc", ".hgt", ".vrt", ".img", ".nc", ".dem"}))

@@ -41,9 +41,10 @@ struct DemCommandOptions {
 
   void add_files() {
     command
-        ->add_option("INPUT", scans.choice.inputs,
-                     "A dataset folder; or scans (.ply .pcd .npy .npz .bin); or a .conf of "
-                     "Stanford's range scans")
+        ->add_option(
+            "INPUT", scans.choice.inputs,
+            "A dataset folder; or scans (.ply .pcd .npy .npz .bin, .las .laz .mcap); or a .conf of "
+            "Stanford's range scans")
         ->required();
     DemOutput& output = request.output;
     command->add_option("-o,--output", output.dem, "GeoTIFF to write, a band for each layer")

@@ -5,7 +5,6 @@
 #include <string>
 #include <string_view>
 
-#include "core/error.h"
 #include "core/io/file_io.h"
 #include "core/io/ply_faces.h"
 
@@ -14,16 +13,10 @@ namespace {
 
 namespace fs = std::filesystem;
 
-[[noreturn]] void refuse_bag(const fs::path& file) {
-  const bool is_ros_1 = file_ending(file) == ".bag";
-  throw Error("{}: a ROS bag, which groundray writes but does not read: {} lists its topics",
-              file.string(),
-              is_ros_1 ? "`rosbag info`" : "`ros2 bag info`, or for .mcap `mcap info`,");
-}
-
 }  // namespace
 
 std::optional<FileKind> file_kind_of(const fs::path& file) {
+  if (fs::exists(file / "metadata.yaml")) return FileKind::Bag;
   const std::string ending = file_ending(file);
   const auto is_one_of = [&](std::initializer_list<std::string_view> endings) {
     return std::ranges::find(endings, ending) != endings.end();
@@ -48,7 +41,7 @@ Facts facts_of(const fs::path& file, FileKind kind) {
     case FileKind::Bag:
       break;
   }
-  refuse_bag(file);
+  return bag_facts(file);
 }
 
 }  // namespace groundray

@@ -17,7 +17,7 @@ from collections.abc import Sequence
 from dataclasses import dataclass
 from decimal import Decimal, InvalidOperation
 from pathlib import Path
-from typing import Any
+from typing import Any, BinaryIO
 
 import numpy as np
 import yaml
@@ -234,19 +234,25 @@ def _load_yaml(text: str, path: Path, loader: Any = _LOADER) -> Any:
         raise Error(f"{path}{place}: {problem}; was the file cut short or edited?") from None
 
 
+def open_regular(path: Path) -> BinaryIO:
+    """Opens a regular file to read; a pipe may never begin, a device never end. Raises OSError."""
+    opener = lambda name, flags: os.open(name, flags | os.O_NONBLOCK)  # noqa: E731
+    file = open(path, "rb", opener=opener)  # noqa: SIM115
+    if not stat.S_ISREG(os.fstat(file.fileno()).st_mode):
+        file.close()
+        raise OSError(errno.ESPIPE, "it is a pipe or device, not a file")
+    return file
+
+
 def _bytes_of(path: Path) -> bytes:
-    """Reads a regular file; a pipe may never begin, a device never end."""
-    with open(path, "rb", opener=lambda name, flags: os.open(name, flags | os.O_NONBLOCK)) as file:
-        state = os.fstat(file.fileno())
-        if not stat.S_ISREG(state.st_mode):
-            raise OSError(errno.ESPIPE, "it is a pipe or device, not a file")
-        if state.st_size > _available_bytes():
-            rule = f"its {state.st_size} bytes exceed the available memory"
-            raise OSError(errno.ENOMEM, rule)
+    with open_regular(path) as file:
+        size = os.fstat(file.fileno()).st_size
+        if size > available_bytes():
+            raise OSError(errno.ENOMEM, f"its {size} bytes exceed the available memory")
         return file.read()
 
 
-def _available_bytes() -> float:
+def available_bytes() -> float:
     """Returns what the machine can still give, as the programs do; infinity if unknown."""
     with open("/proc/meminfo", encoding="ascii") as lines:
         found = re.search(r"MemAvailable: *(\d+) kB", lines.read())

@@ -16,8 +16,9 @@ namespace groundray {
 namespace {
 
 const char* const open_filter =
-    "All supported files (*.yaml *.ply *.pcd *.bin *.npy *.npz *.obj *.stl *.glb *.gltf *.tif "
-    "*.tiff *.hgt *.asc *.vrt *.nc *.dem *.zip *.png *.jpg *.jpeg *.exr *.hdr);;Any file (*)";
+    "All supported files (*.yaml *.ply *.pcd *.bin *.npy *.npz *.las *.laz *.mcap *.obj *.stl "
+    "*.glb *.gltf *.tif *.tiff *.hgt *.asc *.vrt *.nc *.dem *.zip *.png *.jpg *.jpeg *.exr "
+    "*.hdr);;Any file (*)";
 
 }  // namespace
 

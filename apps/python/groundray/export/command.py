@@ -15,7 +15,7 @@ from pathlib import Path
 from types import FrameType
 
 from groundray.dataset import Camera, Dataset, Error, Lidar
-from groundray.export import clouds, kitti, las, ros_bag, tum
+from groundray.export import clouds, denoised, kitti, las, ros_bag, tum
 from groundray.export.labels import LabelMap
 from groundray.export.notes import Notes, tell_of_columns, tell_of_products
 from groundray.export.scan import FullScale
@@ -23,12 +23,12 @@ from groundray.export.shell_text import add_text_options
 
 DONE, FAILED, INTERRUPTED = 0, 1, 130  # argparse exits with 2 on wrong usage
 
-_FORMS = ("kitti", "semantic-kitti", "tum", "pcd", "las", "laz", "npz", "mcap")
+_FORMS = ("kitti", "semantic-kitti", "tum", "pcd", "las", "laz", "npz", "mcap", "denoised")
 _KITTI, _LAS = {"kitti", "semantic-kitti"}, {"las", "laz"}
 # Formats that an option applies to; options not listed apply to all.
 _ONLY_OF = {
-    "lidar": set(_FORMS) - {"tum"},
-    "camera": _KITTI | {"tum", "mcap"},
+    "lidar": set(_FORMS) - {"tum", "denoised"},
+    "camera": _KITTI | {"tum", "mcap", "denoised"},
     "no_images": _KITTI | {"mcap"},
     "intensity_full_scale": _KITTI | _LAS | {"mcap"},
     "sequence": _KITTI,
@@ -55,6 +55,7 @@ _PACKAGES = {
         "cv2": "opencv-python-headless",
         "OpenEXR": "openexr",
     },
+    "denoised": {"pyoidn": "pyoidn", "OpenEXR": "openexr"},
 }
 
 
@@ -175,7 +176,7 @@ def _export(options: argparse.Namespace, out: Path, dataset: Dataset, notes: Not
     cameras: list[Camera] = _chosen(dataset, "camera", options.camera)  # type: ignore[assignment]
     if options.no_images:
         cameras = []
-    if not lidars and options.to not in ("tum", "mcap"):
+    if not lidars and options.to not in ("tum", "mcap", "denoised"):
         raise Error(f"{dataset.folder}: it has no lidar, but {options.to} needs scans")
     full_scale = FullScale(options.intensity_full_scale)
     if lidars:
@@ -187,6 +188,8 @@ def _export(options: argparse.Namespace, out: Path, dataset: Dataset, notes: Not
         return kitti.write_kitti(dataset, lidars, cameras, settings, out, notes)
     if options.to == "tum":
         return tum.write_tum(dataset, cameras, options.depth_per_m or 5000, out, notes)
+    if options.to == "denoised":
+        return denoised.write_denoised(dataset, cameras, out, notes)
     if options.to == "pcd":
         columns = options.columns.split(",") if options.columns else []
         return clouds.write_pcd(dataset, lidars, columns, options.frame or "fired", out)
@@ -217,7 +220,8 @@ def _check_packages(form: str) -> None:
     ]
     if missing:
         rule = f"{form} needs {', '.join(missing)}, which is not installed"
-        raise Error(f"{rule}: pip install {' '.join(missing)}, or groundray[export]")
+        extra = "denoise" if form == "denoised" else "export"
+        raise Error(f"{rule}: pip install {' '.join(missing)}, or groundray[{extra}]")
 
 
 def _open(options: argparse.Namespace) -> Dataset:

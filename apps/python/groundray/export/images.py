@@ -37,7 +37,7 @@ def has_depths(dataset: Dataset, camera: Camera) -> bool:
     """Returns whether any image of the camera has depths; then all must have them."""
     files = (dataset.image_file(camera, frame, ".exr") for frame in camera.frames)
     first = next((file for file in files if file.is_file()), None)
-    return first is not None and "Z" in _channels(first, only_names=True)
+    return first is not None and "Z" in read_channels(first, only_names=True)
 
 
 def read_picture(dataset: Dataset, camera: Camera, frame: Frame) -> Picture:
@@ -75,7 +75,7 @@ def png_of(pixels: NDArray[np.uint16]) -> bytes:
 def read_depths_m(dataset: Dataset, camera: Camera, frame: Frame) -> NDArray[np.float32]:
     """Reads the depths Z along the optical axis: height x width; infinite for sky."""
     file = dataset.image_file(camera, frame, ".exr")
-    channels = _channels(file)
+    channels = read_channels(file)
     if "Z" not in channels:
         raise Error(f"{file}: it has no depths; add truth to the camera's products")
     depths_m = np.asarray(channels["Z"], dtype=np.float32)
@@ -100,7 +100,8 @@ def _quiet_library() -> Iterator[io.StringIO]:
         os.close(nowhere)
 
 
-def _channels(file: Path, *, only_names: bool = False) -> dict[str, Any]:
+def read_channels(file: Path, *, only_names: bool = False) -> dict[str, Any]:
+    """Reads the channels of an EXR file, or only their names. Raises Error if it is damaged."""
     import OpenEXR
 
     if not file.is_file():

@@ -7,6 +7,7 @@ from collections.abc import Sequence
 from groundray.dataset import Camera, Dataset, Lidar
 
 _OF_SCANS = {"pcd", "las", "laz", "npz"}
+_OF_CAMERAS = {"tum", "denoised"}
 _PRODUCTS = {
     "_no_returns.ply": "tables of pulses without an echo are not exported",
     "_wave.npy": "waveforms are not exported",
@@ -47,15 +48,15 @@ def tell_of_products(
     dataset: Dataset, form: str, lidars: Sequence[Lidar], cameras: Sequence[Camera], notes: Notes
 ) -> None:
     """Notes which files of the sensors are not exported."""
-    for lidar in lidars if form != "tum" else ():
+    for lidar in lidars if form not in _OF_CAMERAS else ():
         for suffix, sentence in _PRODUCTS.items():
             if any(dataset.scan_file(lidar, each, suffix).is_file() for each in lidar.frames[:1]):
                 notes.tell(sentence)
     if form in _OF_SCANS and dataset.cameras:
         notes.tell(f"{form} contains only scans: images are not exported")
-    elif form == "tum" and dataset.lidars:
-        notes.tell("tum contains only cameras: lidars are not exported")
-    if form in _OF_SCANS:
+    elif form in _OF_CAMERAS and dataset.lidars:
+        notes.tell(f"{form} contains only cameras: lidars are not exported")
+    if form in _OF_SCANS or form == "denoised":
         return
     for camera in cameras:
         if any(dataset.image_file(camera, each, ".exr").is_file() for each in camera.frames[:1]):
