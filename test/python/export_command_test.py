@@ -160,7 +160,8 @@ def test_kitti_rejects_non_pinhole_and_unpaired_cameras(run, capsys):
 def test_powers_need_an_explicit_full_scale(run, capsys):
     edit(run / "dataset.yaml", "intensity: reflectance", "intensity: power")
     line = fails(capsys, run, "las", "--lidar", "top")
-    assert "powers in watts, which have no full scale; give one with --intensity-full-scale" in line
+    assert "powers in watts, which have no full scale: give one with --intensity-full-scale" in line
+    assert "--lidar top if it is not that of all lidars" in line
     options = ["--lidar", "top", "--intensity-full-scale", "2"]
     assert export("las", run.parent / "las", *options, source=run) == 0
     assert export("npz", run.parent / "npz", source=run) == 0  # needs none

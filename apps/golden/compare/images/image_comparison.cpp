@@ -7,6 +7,7 @@
 #include <array>
 #include <cmath>
 #include <cstddef>
+#include <iterator>
 #include <limits>
 #include <string_view>
 #include <tuple>
@@ -245,16 +246,20 @@ void write_headline(Section& into) {
   std::vector<std::string> parts;
   bool are_equal = true;
   for (const Endings& group : groups) {
+    std::vector<std::string> equal;  // figures of layers that do not differ
     for (const Measure& measure : into.measures) {
       const auto ends = [&](std::string_view end) { return measure.name.ends_with(end); };
       if (std::ranges::none_of(group, ends)) continue;
-      if (into.main.size() < most) into.main.push_back(measure.name);
+      const bool is_equal = measure.value == (measure.name.ends_with("pixels") ? 100 : 0);
+      (is_equal ? equal : into.main).push_back(measure.name);
       if (&group != &groups[0]) continue;
       parts.push_back(fmt::format("{} {:.4g}{}{}", measure.name, measure.value,
                                   measure.unit.empty() ? "" : " ", measure.unit));
-      are_equal = are_equal && measure.value == (measure.name.ends_with("pixels") ? 100 : 0);
+      are_equal = are_equal && is_equal;
     }
+    std::ranges::move(equal, std::back_inserter(into.main));
   }
+  into.main.resize(std::min(into.main.size(), most));
   if (parts.empty()) {
     into.headline = "The images have no value in common.";
   } else {

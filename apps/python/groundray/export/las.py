@@ -19,6 +19,7 @@ from groundray.export.sensor_path import Floats, SensorPath
 
 _POINT_FORMAT = 6
 _MOST_RETURNS = 15  # limit of the four bits in point format 6
+_WEEK_S = 604800
 _NO_DAY = datetime.date(2000, 1, 1)  # constant, so that equal datasets yield equal files
 _GPS_ADJUSTED_S = 10**9
 _GPS_EPOCH_UNIX_S = 315964800  # 1980-01-06
@@ -175,6 +176,14 @@ def write_las(
     if not form.wkt:
         notes.tell("the dataset has no CRS: the files have none, and coordinates are those of W")
     if options.clock == "run":
+        latest_ns = max((f.stamp_ns for one in lidars for f in one.frames), default=0)
+        latest_s = (dataset.time_origin_ns + latest_ns) * 1e-9
+        if latest_s >= _WEEK_S:
+            raise Error(
+                f"{dataset.folder}: its clock reaches {latest_s:.0f} s, but GPS week time, as which "
+                f"--clock run marks it, ends at {_WEEK_S}: give --clock gps, if the trajectory's "
+                "clock counts from 1980, or --clock unix, if from 1970"
+            )
         notes.tell("times are seconds of the dataset's clock, marked as GPS week time; see --clock")
     if options.labels is None:
         notes.tell(

@@ -122,8 +122,11 @@ class FullScale:
         if self.chosen is not None:
             return self.chosen
         if lidar.intensity_scale not in _FULL_SCALES:
-            rule = "its intensities are powers in watts, which have no full scale"
-            raise Error(f"lidar {lidar.name}: {rule}; give one with --intensity-full-scale")
+            raise Error(
+                f"lidar {lidar.name}: its intensities are powers in watts, which have no full "
+                f"scale: give one with --intensity-full-scale, and --lidar {lidar.name} if it is "
+                "not that of all lidars; or record `receiver: {intensity: reflectance}`"
+            )
         return _FULL_SCALES[lidar.intensity_scale]
 
     def shares(self, lidar: Lidar, rows: NDArray[Any]) -> Floats:
