@@ -189,11 +189,11 @@ void open_dem(Opened& opened, const OpenLimits& limits, const std::stop_token& s
 }
 
 void open_picture(Opened& opened) {
-  PictureFile file = read_picture(opened.path);
-  opened.notes = std::move(file.notes);
-  opened.picture = std::make_shared<const Image8>(std::move(file.picture));
+  const auto file = std::make_shared<const PictureFile>(read_picture(opened.path));
+  opened.notes = file->notes;
+  opened.picture = std::shared_ptr<const Image8>(file, &file->picture);
   const Image8& picture = *opened.picture;
-  opened.layers.push_back(picture_layer(opened.path.filename().string(), picture));
+  opened.layers.push_back(picture_layer(opened.path.filename().string(), file));
   const glm::dvec3 centre(picture.width() / 2.0, picture.height() / 2.0, 0);
   const double back = 2.1 * std::max<double>(picture.height(), 0.75 * picture.width());
   opened.look = Look{centre + glm::dvec3(0, 0, back), centre, {0, 1, 0}};
