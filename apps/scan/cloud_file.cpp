@@ -5,6 +5,11 @@
 
 #include <algorithm>
 #include <array>
+#include <cmath>
+#include <glm/geometric.hpp>
+#include <glm/gtc/quaternion.hpp>
+#include <glm/mat3x3.hpp>
+#include <glm/matrix.hpp>
 #include <utility>
 
 #include "apps/scan/column_names.h"
@@ -124,6 +129,48 @@ void list_unread(const NpzFile& arrays, CloudFile& file) {
   }
 }
 
+/// Returns the numbers of an array of that name and shape, in C order; empty if there is none.
+std::vector<double> numbers_of(const NpzFile& file, std::string_view name,
+                               const std::vector<std::uint64_t>& shape) {
+  const auto found = std::ranges::find(file.arrays, name, &NpyArray::name);
+  if (found == file.arrays.end() || found->is_structured || found->shape != shape) return {};
+  const PointCloud& table = found->cloud;
+  std::vector<double> numbers(table.rows() * table.columns().size());
+  for (std::size_t k = 0; k < table.columns().size(); ++k) {
+    const auto copy = [&](const auto& values) {
+      for (std::size_t i = 0; i < values.size(); ++i)
+        numbers[i * table.columns().size() + k] = static_cast<double>(values[i]);
+    };
+    std::visit(copy, table.columns()[k].values);
+  }
+  return numbers;
+}
+
+constexpr std::string_view pose_name = "X_DS", origin_name = "origin_w_m";
+
+/// Returns the place that groundray-export writes; nothing if there is none, or if it is not a
+/// rigid transformation with a finite origin.
+std::optional<ScanPlace> place_of(const NpzFile& file) {
+  const std::vector<double> X = numbers_of(file, pose_name, {4, 4});
+  if (X.empty()) return std::nullopt;
+  const std::vector<double> origin = numbers_of(file, origin_name, {3});
+  constexpr double tolerance = 1e-6;
+  glm::dmat3 R;
+  for (glm::length_t row = 0; row < 3; ++row) {
+    for (glm::length_t column = 0; column < 3; ++column)
+      R[column][row] = X[static_cast<std::size_t>(4 * row + column)];
+  }
+  const glm::dmat3 excess = glm::transpose(R) * R - glm::dmat3(1);
+  bool is_rigid = std::abs(glm::determinant(R) - 1) <= tolerance && X[12] == 0 && X[13] == 0 &&
+                  X[14] == 0 && X[15] == 1;
+  for (glm::length_t k = 0; k < 3; ++k) is_rigid &= glm::length(excess[k]) <= tolerance;
+  ScanPlace place{.X_DS = {.rotation = glm::quat_cast(R), .translation_m = {X[3], X[7], X[11]}}};
+  if (!origin.empty()) place.origin_w_m = {origin[0], origin[1], origin[2]};
+  const glm::dvec3 sum_m = place.X_DS.translation_m + place.origin_w_m;
+  if (!is_rigid || !std::isfinite(sum_m.x + sum_m.y + sum_m.z)) return std::nullopt;
+  return place;
+}
+
 CloudFile of_npz(const NpzFile& arrays, const Names& asked) {
   if (arrays.arrays.size() == 1) {
     CloudFile file = of_npy(arrays.arrays[0], asked);
@@ -131,7 +178,9 @@ CloudFile of_npz(const NpzFile& arrays, const Names& asked) {
     return file;
   }
   CloudFile file{.form = "NumPy archive", .cloud = PointCloud(rows_of(arrays))};
+  file.place = place_of(arrays);
   for (const NpyArray& array : arrays.arrays) {
+    if (file.place && (array.name == pose_name || array.name == origin_name)) continue;
     if (array.cloud.rows() != file.cloud.rows()) {
       file.unread.push_back(fmt::format("{} (of {} rows)", array.name, array.cloud.rows()));
       continue;

@@ -2,6 +2,7 @@
 
 #include <cstdint>
 #include <filesystem>
+#include <glm/vec3.hpp>
 #include <optional>
 #include <string>
 #include <string_view>
@@ -18,6 +19,13 @@ struct ImageLayout {
   std::uint64_t rows = 0, columns = 0;
 };
 
+/// Place of a scan that groundray exported: columns x, y and z are in S, and columns world_x,
+/// world_y and world_z, if there are any, in D.
+struct ScanPlace {
+  Pose X_DS;                 ///< at the stamp of the scan
+  glm::dvec3 origin_w_m{0};  ///< origin of D, in W
+};
+
 /// Contents of a file of points, with its own names of columns.
 struct CloudFile {
   std::string form;  ///< name of the format: "PCD", "KITTI's, 4 floats a point"
@@ -26,6 +34,7 @@ struct CloudFile {
   std::vector<std::string> unread;    ///< other contents, and why they are no columns
   std::optional<Pose> X_FS;           ///< pose of the sensor in the points' frame, if stated
   ImageLayout image{};
+  std::optional<ScanPlace> place{};  ///< arrays X_DS and origin_w_m of a .npz, if it has them
 };
 
 /// Reads a cloud in the format of the file's extension: .ply, .pcd, .npy, .npz, or .bin

@@ -8,6 +8,8 @@
 #include <span>
 #include <string_view>
 #include <system_error>
+#include <utility>
+#include <variant>
 
 #include "apps/scene/interruption.h"
 #include "apps/scene/readers/scene_reader.h"
@@ -150,6 +152,37 @@ void open_mesh(Opened& opened, const OpenLimits& limits) {
   opened.layers.push_back(std::move(layer));
 }
 
+// Returns the truth of a scan's points in D, columns world_x_m, world_y_m and world_z_m; empty if
+// it lacks them.
+std::vector<glm::dvec3> true_positions(const PointCloud& table) {
+  std::vector<glm::dvec3> points(table.rows());
+  for (glm::length_t k = 0; k < 3; ++k) {
+    const std::string name = fmt::format("world_{}_m", "xyz"[k]);
+    if (!table.has(name)) return {};
+    const auto column = std::ranges::find(table.columns(), name, &PointCloud::Column::name);
+    std::visit(
+        [&](const auto& values) {
+          for (std::size_t i = 0; i < values.size(); ++i)
+            points[i][k] = static_cast<double>(values[i]);
+        },
+        column->values);
+  }
+  return points;
+}
+
+// Transforms the points of an exported scan from S to D. One pose does not suffice for a sensor
+// that moves during the scan.
+// @return method, as a fact of the layer.
+std::string place_scan(const ScanPlace& place, const PointCloud& table, CloudContent& content) {
+  content.origin_w_m = place.origin_w_m;
+  if (std::vector<glm::dvec3> p_DQ_m = true_positions(table); !p_DQ_m.empty()) {
+    content.p_m = std::move(p_DQ_m);
+    return "placed by world_x, world_y, world_z: the true points, without noise";
+  }
+  for (glm::dvec3& p_m : content.p_m) p_m = place.X_DS * p_m;
+  return "placed by X_DS, the sensor's pose at the stamp";
+}
+
 void open_cloud(Opened& opened, const OpenLimits& limits) {
   check_size(opened.path, limits);
   const CloudFile file = read_cloud(opened.path, {});
@@ -159,11 +192,14 @@ void open_cloud(Opened& opened, const OpenLimits& limits) {
   if (content.p_m.empty())
     throw Error("{}: {}: a cloud needs points with columns x, y and z", opened.path.string(),
                 file.cloud.rows() == 0 ? "it has no point" : "no columns x, y, z");
+  std::string placing;
+  if (file.place) placing = place_scan(*file.place, file.cloud, content);
   Layer layer = cloud_layer(content, file.cloud);
   if (layer.points() == 0)
     throw Error("{}: none of its {} points has a finite position", opened.path.string(),
                 content.p_m.size());
   layer.facts.push_back(file.form);
+  if (!placing.empty()) layer.facts.push_back(placing);
   for (const std::string& unread : file.unread) opened.notes.push_back(unread);
   opened.layers.push_back(std::move(layer));
 }
@@ -189,11 +225,11 @@ void open_dem(Opened& opened, const OpenLimits& limits, const std::stop_token& s
 }
 
 void open_picture(Opened& opened) {
-  PictureFile file = read_picture(opened.path);
-  opened.notes = std::move(file.notes);
-  opened.picture = std::make_shared<const Image8>(std::move(file.picture));
+  const auto file = std::make_shared<const PictureFile>(read_picture(opened.path));
+  opened.notes = file->notes;
+  opened.picture = std::shared_ptr<const Image8>(file, &file->picture);
   const Image8& picture = *opened.picture;
-  opened.layers.push_back(picture_layer(opened.path.filename().string(), picture));
+  opened.layers.push_back(picture_layer(opened.path.filename().string(), file));
   const glm::dvec3 centre(picture.width() / 2.0, picture.height() / 2.0, 0);
   const double back = 2.1 * std::max<double>(picture.height(), 0.75 * picture.width());
   opened.look = Look{centre + glm::dvec3(0, 0, back), centre, {0, 1, 0}};

@@ -69,6 +69,10 @@ void add_options(CLI::App& app, Arguments& arguments) {
       "theirs of 0; INPUT=X,Y,Z for one file; may be repeated");
   app.add_option("--clip", arguments.clip,
                  "X0,Y0,Z0,X1,Y1,Z1: show only what is inside this box, in map coordinates, m");
+  app.add_option("--exposure-ev", arguments.still.view.exposure_ev,
+                 "Brighten pictures by this power of 2, in linear light; light is exposed "
+                 "automatically at 0")
+      ->check(CLI::Range(-10.0, 10.0));
   app.add_flag("--eye-dome", arguments.still.view.has_eye_dome,
                "Draw with eye-dome lighting, which shows the shape of clouds");
   app.add_flag("--wireframe", arguments.still.view.is_wireframe, "Draw surfaces as wireframes");

@@ -1,12 +1,15 @@
-"""Draws view_levels.png and view_deviation.png of docs/pictures with groundray-view.
+"""Draws view*.png of docs/pictures with groundray-view.
 
     pip install pillow
+    cmake --build --preset release --target draw_window
     python3 docs/pictures/draw_view.py build/release/bin out/view
 
-The first is the ground of the demo, coloured by the levels of its clipmap. The second is a mesh
-from four scans of rough ground, with 2 cm of noise, coloured by its distance from that ground.
+view.png and view_compare.png are the window, which the program draw_window shows on an X server of
+its own (xvfb-run); all others need no display. They show the demo. view_deviation.png shows a mesh
+from four scans of rough ground, with 2 cm of noise: its distance from that ground.
 """
 
+import os
 import pathlib
 import subprocess
 import sys
@@ -44,9 +47,28 @@ def draw(programs: pathlib.Path, name: str, *arguments: object) -> None:
     subprocess.run(
         [program, *map(str, arguments), "--screenshot", file, "--size", "1280x640"], check=True
     )
-    # A third of the bytes; this method keeps the rare colours at the ends of scales.
-    picture = Image.open(file).quantize(256, method=Image.Quantize.MAXCOVERAGE, kmeans=2)
+    shrink(file)
+
+
+def shrink(file: pathlib.Path) -> None:
+    """Saves a third of the bytes; this method keeps the rare colours at the ends of scales."""
+    picture = Image.open(file).convert("RGB")
+    picture = picture.quantize(256, method=Image.Quantize.MAXCOVERAGE, kmeans=2)
     picture.save(file, optimize=True)
+
+
+def draw_window(programs: pathlib.Path, demo: pathlib.Path) -> None:
+    display = ["xvfb-run", "-a", "-s", "-screen 0 1600x1000x24"]
+    program = [programs / "draw_window", DEMO, demo, ROOT / "docs/pictures"]
+    environment = os.environ | {"GROUNDRAY_DATA": str(ROOT / "data")}
+    subprocess.run([*display, *program], check=True, env=environment)
+    for name in ("view.png", "view_compare.png"):
+        shrink(ROOT / "docs/pictures" / name)
+
+
+def draw_scan(programs: pathlib.Path, demo: pathlib.Path) -> None:
+    hidden = ["--hide", "sensors", "--hide", "path"]
+    draw(programs, "view_scan.png", DEMO, demo, *hidden, "--colour-by", "range")
 
 
 def draw_levels(programs: pathlib.Path) -> None:
@@ -69,6 +91,16 @@ def draw_deviation(programs: pathlib.Path, out: pathlib.Path) -> None:
     draw(programs, "view_deviation.png", mesh, *colours, *eye)
 
 
+def main() -> None:
+    programs, out = map(pathlib.Path, sys.argv[1:])
+    demo = out / "offroad_trail"
+    if not (demo / "dataset.yaml").exists():
+        subprocess.run([programs / "groundray", "generate", DEMO, "-o", demo], check=True)
+    draw_window(programs, demo)
+    draw_scan(programs, demo)
+    draw_levels(programs)
+    draw_deviation(programs, out)
+
+
 if __name__ == "__main__":
-    draw_levels(pathlib.Path(sys.argv[1]))
-    draw_deviation(pathlib.Path(sys.argv[1]), pathlib.Path(sys.argv[2]))
+    main()

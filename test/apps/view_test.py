@@ -96,6 +96,33 @@ def test_pictures_keep_their_colours(tmp_path: Path) -> None:
     assert np.abs(picture[100, 190] - bands[20, 50]).max() <= 6
 
 
+def srgb_of_linear(light: float) -> float:
+    """Returns the byte of IEC 61966-2-1."""
+    light = min(max(light, 0), 1)
+    return 255 * (12.92 * light if light <= 0.0031308 else 1.055 * light ** (1 / 2.4) - 0.055)
+
+
+def linear_of_srgb(byte: float) -> float:
+    share = byte / 255
+    return share / 12.92 if share <= 0.04045 else ((share + 0.055) / 1.055) ** 2.4
+
+
+@pytest.mark.parametrize("exposure_ev", [-2, 0, 1, 1.5])
+def test_exposure_brightens_pictures_in_linear_light(tmp_path: Path, exposure_ev: float) -> None:
+    """A picture of 8 bits, and light of which 1 is the 99 % quantile, in the centre of the view."""
+    cv2.imwrite(str(tmp_path / "grey.png"), np.full((40, 60, 3), 90, np.uint8))
+    light = np.ones((40, 60, 3), np.float32)
+    light[18:22, 28:32] = 0.25
+    cv2.imwrite(str(tmp_path / "light.hdr"), light)
+    for name, linear in (("grey.png", linear_of_srgb(90)), ("light.hdr", 0.25)):
+        picture = ["--screenshot", tmp_path / "out.png", "--size", "300x200"]
+        result = view(tmp_path / name, *picture, f"--exposure-ev={exposure_ev}")
+        assert result.returncode == 0, result.stderr
+        shown = cv2.imread(str(tmp_path / "out.png"))[100, 150].astype(float)
+        expected = srgb_of_linear(linear * 2**exposure_ev)
+        assert np.abs(shown - expected).max() <= 1.5, name  # RGBE's, the picture's and drawing's
+
+
 @pytest.mark.parametrize(
     ("name", "content", "said"),
     [
@@ -171,6 +198,7 @@ def test_options_are_checked(tmp_path: Path) -> None:
     assert view("--help").returncode == 0
     assert view("--version").stdout.startswith("groundray-view ")
     assert view("--no-such-option").returncode == 2
+    assert view(DEM, "--exposure-ev", 11).returncode == 2
     for lonely in (
         ("--turntable", 4),
         ("--range", "0,1"),

@@ -2,11 +2,12 @@
 
 import shutil
 import struct
+import subprocess
 
 import numpy as np
 import pytest
 import yaml
-from export_runs import export, pose_between, poses_between, run_folder, scans, world_of
+from export_runs import PROGRAM, export, pose_between, poses_between, run_folder, scans, world_of
 
 LIDARS = ["top", "front", "bare-16"]
 
@@ -86,6 +87,36 @@ def test_npz_files_have_every_column_with_its_unit_and_the_pose(tmp_path, lidar)
             np.testing.assert_allclose(read["X_DS"], pose_between(lidar, stamp_s), atol=1e-4)
             assert read["origin_w_m"].tolist() == record()["origin_w_m"]
             assert str(read["crs_wkt"]) == record()["crs_wkt"]
+
+
+def test_the_viewer_shows_npz_files_where_it_shows_the_dataset(tmp_path):
+    """Pictures from above, 6 cm a pixel, of a scan during which the lidar moved by 1.2 m."""
+    cv2 = pytest.importorskip("cv2", reason="pip install -r test/requirements.txt")
+    program = PROGRAM.with_name("groundray-view")
+    if not program.exists():
+        pytest.skip(f"{program} does not exist: build it first")
+    assert export("npz", tmp_path / "out", "--lidar", "bare-16") == 0
+    _, rows = next(iter(scans("bare-16")))
+    centre_m = np.add(record()["origin_w_m"], np.median(world_of(rows), axis=0))
+    eye_m = np.add(centre_m, [0, 0, 50])
+    run, file = run_folder(), tmp_path / "out/bare-16/000000.npz"
+    options = ["--look-from", ",".join(map(str, eye_m)), "--look-at", ",".join(map(str, centre_m))]
+    options += ["--size", "600x600", "--no-legend", "--point-size", 3]
+    options += ["--colour-by", "ring", "--range", "0,15"]
+    pictures = []
+    for inputs, hidden in (([run], ["lidar/top", "lidar/front"]), ([run, file], ["lidar"])):
+        command = [program, *inputs, *options, "--screenshot", tmp_path / "view.png"]
+        command += [f"--hide={each}" for each in (*hidden, "sensors", "path")]
+        command = [*map(str, command)]
+        done = subprocess.run(command, capture_output=True, text=True, timeout=120, check=False)
+        assert done.returncode == 0, done.stderr
+        pictures.append(cv2.imread(str(tmp_path / "view.png")).astype(int))
+    of_dataset, of_file = pictures
+    # The background depends on the row alone.
+    points = np.abs(of_dataset - of_dataset[:, :1]).max(axis=-1) > 20
+    assert points.sum() > 2000, points.sum()
+    # A point between two pixels may be drawn at either.
+    assert (np.abs(of_dataset - of_file).max(axis=-1) > 20).sum() < 0.01 * points.sum()
 
 
 @pytest.fixture(scope="module")

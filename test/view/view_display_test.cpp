@@ -2,17 +2,21 @@
 #include <gtest/gtest.h>
 #include <vtkPolyData.h>
 
+#include <algorithm>
 #include <array>
 #include <cmath>
 #include <cstdint>
 #include <glm/geometric.hpp>
 #include <glm/trigonometric.hpp>
+#include <memory>
 #include <vector>
 
 #include "apps/view/layers/mesh_layer.h"
 #include "apps/view/rendering/picture_file.h"
 #include "apps/view/rendering/view.h"
 #include "core/error.h"
+#include "core/image/exr_io.h"
+#include "test/support/temporary_folder.h"
 
 namespace groundray::view_display_test {
 namespace {
@@ -207,6 +211,88 @@ TEST(View, LabelsAreDrawnInFrontOfEverything) {
   EXPECT_FALSE(std::ranges::equal(with.values(), without.values()));
   view.set_label(std::nullopt);
   EXPECT_TRUE(std::ranges::equal(view.picture(size_px).values(), without.values()));
+}
+
+// sRGB, IEC 61966-2-1.
+double encoded(double linear) {
+  linear = std::clamp(linear, 0.0, 1.0);
+  return 255 * (linear <= 0.0031308 ? 12.92 * linear : 1.055 * std::pow(linear, 1 / 2.4) - 0.055);
+}
+
+double decoded(double byte) {
+  return byte <= 10 ? byte / 255 / 12.92 : std::pow((byte / 255 + 0.055) / 1.055, 2.4);
+}
+
+constexpr int picture_px = 48;  // width and height
+
+// Returns the colour of a picture's centre, seen from straight ahead.
+std::array<int, 3> centre_of(View& view) {
+  constexpr double middle = picture_px / 2.0;
+  view.look({{middle, middle, 90}, {middle, middle, 0}, {0, 1, 0}});
+  view.set_legend_visible(false);
+  const Image8 shown = view.picture(size_px);
+  const auto rgb = shown.at(size_px.x / 2, size_px.y / 2);
+  return {rgb[0], rgb[1], rgb[2]};
+}
+
+constexpr double drawing_tolerance = 1;  // of bytes: that of the picture is rounded twice
+
+TEST(Exposure, BrightensPicturesInLinearLight) {
+  const auto file = std::make_shared<PictureFile>();
+  file->picture = Image8(picture_px, picture_px, 3);
+  constexpr std::array<std::uint8_t, 3> colour = {55, 120, 5};
+  for (std::size_t i = 0; i < file->picture.values().size(); ++i)
+    file->picture.values()[i] = colour[i % 3];
+  View view(make_offscreen_window(size_px));
+  view.add(picture_layer("first", file));
+  for (const double exposure_ev : {0.0, 1.0, -1.0, 2.5, 0.0}) {
+    view.set_exposure(exposure_ev);
+    EXPECT_EQ(view.exposure_ev(), exposure_ev);
+    const auto shown = centre_of(view);
+    for (std::size_t k = 0; k < 3; ++k) {
+      const double expected = encoded(std::exp2(exposure_ev) * decoded(colour[k]));
+      EXPECT_NEAR(shown[k], expected, drawing_tolerance) << exposure_ev << " EV";
+    }
+  }
+}
+
+// 1 is the 99 % quantile of the light. Values above it become visible when the exposure is lowered.
+TEST(Exposure, KeepsTheRangeOfLight) {
+  const testing::TemporaryFolder folder;
+  for (const float centre : {0.25f, 3.0f}) {
+    ImageF light(picture_px, picture_px, 3);
+    std::ranges::fill(light.values(), 1.0f);
+    for (int y = picture_px / 2 - 2; y < picture_px / 2 + 2; ++y) {
+      for (int x = picture_px / 2 - 2; x < picture_px / 2 + 2; ++x)
+        std::ranges::fill(light.at(x, y), centre);
+    }
+    write_exr(folder / "light.exr", {{{"R", "G", "B"}, &light}});
+    View view(make_offscreen_window(size_px));
+    view.set_exposure(-2);  // layers that are added later have it, too
+    view.add(picture_layer(
+        "light", std::make_shared<const PictureFile>(read_picture(folder / "light.exr"))));
+    for (const double exposure_ev : {-2.0, 0.0, 1.0}) {
+      view.set_exposure(exposure_ev);
+      EXPECT_NEAR(centre_of(view)[0], encoded(std::exp2(exposure_ev) * static_cast<double>(centre)),
+                  drawing_tolerance)
+          << centre << " at " << exposure_ev << " EV";
+    }
+  }
+}
+
+TEST(Exposure, LeavesColoursOfNumbers) {
+  const testing::TemporaryFolder folder;
+  ImageF depth(picture_px, picture_px, 1);
+  std::ranges::fill(depth.values(), 7.0f);
+  write_exr(folder / "depth.exr", {{{"Z"}, &depth}});
+  View view(make_offscreen_window(size_px));
+  view.add(picture_layer("depth",
+                         std::make_shared<const PictureFile>(read_picture(folder / "depth.exr"))));
+  const auto before = centre_of(view);
+  view.set_exposure(3);
+  EXPECT_EQ(centre_of(view), before);
+  EXPECT_THAT([&] { view.set_exposure(std::nan("")); },
+              ThrowsMessage<Error>(HasSubstr("must be finite")));
 }
 
 }  // namespace

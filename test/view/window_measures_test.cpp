@@ -225,7 +225,7 @@ TEST_F(WindowMeasuresTest, EchoesAreShownOverImages) {
 
 // A grey of 55 in 255 is 0.038 of white in linear light: the exposure that makes it white is 4.7
 // EV.
-TEST_F(WindowMeasuresTest, ExposureBrightensPictures) {
+TEST_F(WindowMeasuresTest, ExposureBrightensPicturesInThePanelAndInTheView) {
   Window& window = shown();
   Image8 grey(32, 24, 3);
   for (auto& byte : grey.values()) byte = 55;
@@ -241,6 +241,8 @@ TEST_F(WindowMeasuresTest, ExposureBrightensPictures) {
   EXPECT_EQ(centre().red(), 55);
   slider->setValue(10);  // 1 EV: twice 0.0382 is 0.0764, which sRGB encodes as 78
   EXPECT_NEAR(centre().red(), 78, 1);
+  const Image8 in_view = window.view().picture({320, 240});  // looks straight at the picture
+  EXPECT_NEAR(in_view.at(160, 120)[0], 78, 1);
   panel.findChild<QToolButton*>("automatic_exposure")->click();
   EXPECT_NEAR(slider->value(), 47, 1);
   EXPECT_GT(centre().red(), 245);

@@ -8,6 +8,7 @@
 
 #include <cstddef>
 #include <cstdint>
+#include <functional>
 #include <glm/vec2.hpp>
 #include <glm/vec3.hpp>
 #include <map>
@@ -59,6 +60,9 @@ struct Layer {
   /// Texture, applied by the data's texture coordinates if the layer is coloured by no column or by
   /// an RGB column, which the texture shows in more detail; or null.
   vtkSmartPointer<vtkTexture> texture{};
+  /// Returns `texture` at an exposure in EV: 2 to this power times as bright, in linear light;
+  /// empty for textures that are no pictures of cameras.
+  std::function<vtkSmartPointer<vtkTexture>(double exposure_ev)> exposed{};
   /// White texture with alpha 0 or 255, applied by the data's texture coordinates whatever the
   /// layer is coloured by: parts of alpha 0 are not drawn. Null if nothing is cut out.
   vtkSmartPointer<vtkTexture> mask{};

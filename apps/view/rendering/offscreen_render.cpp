@@ -173,6 +173,7 @@ void arrange(View& view, std::vector<Opened>& inputs, const StillSpec& spec) {
   }
   view.set_legend_visible(spec.view.has_legend);
   view.set_eye_dome(spec.view.has_eye_dome);
+  view.set_exposure(spec.view.exposure_ev);
   view.set_clip(spec.view.clip);
 }
 

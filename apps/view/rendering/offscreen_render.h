@@ -20,6 +20,7 @@ struct ViewOptions {
   std::optional<double> point_size_px;
   std::vector<FrameOrigin> origins;  ///< origins of meshes and clouds in local coordinates
   std::optional<ClipBox> clip;       ///< nothing outside it is drawn
+  double exposure_ev = 0;            ///< brightens pictures by this power of 2
   bool is_wireframe = false;         ///< true to draw surfaces as wireframes
   bool has_eye_dome = false;         ///< true to draw with eye-dome lighting
   bool has_legend = true;

@@ -1,6 +1,7 @@
 #include "apps/view/rendering/picture_file.h"
 
 #include <fmt/format.h>
+#include <tbb/parallel_for.h>
 #include <vtkFloatArray.h>
 #include <vtkImageData.h>
 #include <vtkPointData.h>
@@ -10,6 +11,7 @@
 #include <array>
 #include <cmath>
 #include <cstdint>
+#include <utility>
 
 #include "apps/view/rendering/colour_table.h"
 #include "core/error.h"
@@ -17,25 +19,28 @@
 #include "core/image/image_io.h"
 #include "core/image/srgb.h"
 #include "core/io/file_io.h"
+#include "core/quantile.h"
 #include "terrain/dem/band_file.h"
 
 namespace groundray {
 namespace {
 
-// Returns the 99.5 % quantile of the pixels' brightest channels.
-float white_level(const ImageF& light) {
-  std::vector<float> brightest;
-  const auto channels = static_cast<std::size_t>(std::min(light.channels(), 3));
+// Returns the 99 % quantile of the positive values of the colours.
+double white_level(const ImageF& light) {
+  const auto colours = static_cast<std::size_t>(std::min(light.channels(), 3));
+  std::vector<double> values;
   for (int y = 0; y < light.height(); ++y) {
     for (int x = 0; x < light.width(); ++x) {
-      const float most = *std::ranges::max_element(light.at(x, y).first(channels));
-      if (std::isfinite(most)) brightest.push_back(most);
+      for (const float value : light.at(x, y).first(colours)) {
+        if (std::isfinite(value) && value > 0) values.push_back(static_cast<double>(value));
+      }
     }
   }
-  if (brightest.empty()) return 1;
-  const auto rank = static_cast<std::ptrdiff_t>(brightest.size() - 1 - brightest.size() / 200);
-  std::ranges::nth_element(brightest, brightest.begin() + rank);
-  return std::max(brightest[static_cast<std::size_t>(rank)], 1e-20f);
+  return values.empty() ? 1 : quantile(values, 0.99);
+}
+
+std::uint8_t encoded(double linear) {
+  return static_cast<std::uint8_t>(std::lround(255 * srgb_of_linear(std::clamp(linear, 0.0, 1.0))));
 }
 
 std::vector<float> floats_of(const ExrChannel& channel) {
@@ -48,19 +53,30 @@ std::vector<float> floats_of(const ExrChannel& channel) {
       channel.image);
 }
 
+PictureFile shown_light(ImageF light, const char* kind) {
+  const double white = white_level(light);
+  for (float& value : light.values())
+    value = static_cast<float>(static_cast<double>(value) / white);
+  Image8 picture = expose(light, 0);
+  return {.picture = std::move(picture),
+          .notes = {fmt::format("{}, exposed so that the brightest parts are white", kind)},
+          .light = std::move(light)};
+}
+
 PictureFile exr_colours(const ExrFile& file, const std::array<const ExrChannel*, 3>& rgb) {
   ImageF light(file.width, file.height, 3);
   for (std::size_t k = 0; k < 3; ++k) {
     const std::vector<float> values = floats_of(*rgb[k]);
     for (std::size_t i = 0; i < values.size(); ++i) light.values()[3 * i + k] = values[i];
   }
-  return {expose(light), {"radiance, exposed so that the brightest parts are white"}};
+  return shown_light(std::move(light), "radiance");
 }
 
 PictureFile exr_numbers(const ExrFile& file, const ExrChannel& channel) {
   const std::vector<float> values = floats_of(channel);
   const glm::dvec2 range = colour_range(values, ColourScale::Even);
-  PictureFile shown{Image8(file.width, file.height, 3), {}};
+  PictureFile shown{
+      .picture = Image8(file.width, file.height, 3), .notes = {}, .has_exposure = false};
   for (std::size_t i = 0; i < values.size(); ++i) {
     // If all values are equal, they are drawn as the middle of the scale.
     const double share =
@@ -94,7 +110,7 @@ PictureFile read_raster_picture(const std::filesystem::path& path) {
                 kind.samples.y, most_image_pixels);
   constexpr std::size_t most_pixels = std::size_t{1} << 24U;
   const RasterBands bands = read_bands(path, most_pixels, 3);
-  PictureFile shown{Image8(bands.samples.x, bands.samples.y, 3), {}};
+  PictureFile shown{.picture = Image8(bands.samples.x, bands.samples.y, 3), .notes = {}};
   for (std::size_t k = 0; k < 3; ++k) {
     const std::vector<float>& values = bands.bands[k].values;
     for (std::size_t i = 0; i < values.size(); ++i)
@@ -134,28 +150,41 @@ vtkSmartPointer<vtkTexture> texture_of(const Image8& image, int components) {
 PictureFile read_picture(const std::filesystem::path& path) {
   const std::string end = file_ending(path);
   if (end == ".exr") return read_exr_picture(path);
-  if (end == ".hdr")
-    return {expose(read_image_f(path)), {"light, exposed so that its brightest parts are white"}};
-  if (end == ".png" || end == ".jpg" || end == ".jpeg") return {read_image8(path), {}};
+  if (end == ".hdr") return shown_light(read_image_f(path), "light");
+  if (end == ".png" || end == ".jpg" || end == ".jpeg")
+    return {.picture = read_image8(path), .notes = {}};
   return read_raster_picture(path);
 }
 
-Image8 expose(const ImageF& light) {
-  const float white = white_level(light);
+Image8 expose(const ImageF& light, double exposure_ev) {
+  const double gain = std::exp2(exposure_ev);
   Image8 picture(light.width(), light.height(), light.channels() >= 3 ? 3 : 1);
-  for (int y = 0; y < light.height(); ++y) {
+  tbb::parallel_for(0, light.height(), [&](int y) {
     for (int x = 0; x < light.width(); ++x) {
       const auto from = light.at(x, y);
       const auto to = picture.at(x, y);
       for (std::size_t k = 0; k < to.size(); ++k) {
-        const double share = static_cast<double>(from[k]) / static_cast<double>(white);
-        to[k] = std::isfinite(share) ? static_cast<std::uint8_t>(std::lround(
-                                           255 * srgb_of_linear(std::clamp(share, 0.0, 1.0))))
-                                     : std::uint8_t{0};
+        const double value = gain * static_cast<double>(from[k]);
+        to[k] = std::isfinite(value) ? encoded(value) : std::uint8_t{0};
       }
     }
-  }
+  });
   return picture;
+}
+
+Image8 expose(const Image8& picture, double exposure_ev) {
+  if (exposure_ev == 0) return picture;
+  const double gain = std::exp2(exposure_ev);
+  std::array<std::uint8_t, 256> exposed{};
+  for (std::size_t i = 0; i < exposed.size(); ++i)
+    exposed[i] = encoded(gain * linear_of_srgb(static_cast<double>(i) / 255));
+  Image8 result = picture;
+  const auto channels = static_cast<std::size_t>(picture.channels());
+  const auto alpha = channels == 2 || channels == 4 ? channels - 1 : channels;
+  for (std::size_t i = 0; i < result.values().size(); ++i) {
+    if (i % channels != alpha) result.values()[i] = exposed[result.values()[i]];
+  }
+  return result;
 }
 
 vtkSmartPointer<vtkTexture> make_texture(const Image8& image) {
@@ -179,7 +208,8 @@ void set_texture_coordinates(vtkPolyData& data, std::span<const glm::vec2> place
   data.GetPointData()->SetTCoords(array);
 }
 
-Layer picture_layer(const std::string& name, const Image8& picture) {
+Layer picture_layer(const std::string& name, const std::shared_ptr<const PictureFile>& file) {
+  const Image8& picture = file->picture;
   Layer layer{.name = name, .kind = LayerKind::Picture, .data = make_points(4)};
   const auto width = static_cast<float>(picture.width());
   const auto height = static_cast<float>(picture.height());
@@ -190,6 +220,13 @@ Layer picture_layer(const std::string& name, const Image8& picture) {
   constexpr std::array<glm::vec2, 4> places = {glm::vec2(0, 0), {1, 0}, {1, 1}, {0, 1}};
   set_texture_coordinates(*layer.data, places);
   layer.texture = make_texture(picture);
+  if (file->has_exposure) {
+    layer.exposed = [file](double exposure_ev) {
+      const bool is_light = !file->light.values().empty();
+      return make_texture(is_light ? expose(file->light, exposure_ev)
+                                   : expose(file->picture, exposure_ev));
+    };
+  }
   layer.facts.push_back(fmt::format("{} x {} px, {} channels", picture.width(), picture.height(),
                                     picture.channels()));
   return layer;

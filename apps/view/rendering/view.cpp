@@ -163,6 +163,7 @@ Layer& View::add(Layer layer) {
     layer.point_size_px = old.point_size_px;
     layer.is_clipped = old.is_clipped;
   }
+  if (layer.exposed && impl_->exposure_ev != 0) layer.texture = layer.exposed(impl_->exposure_ev);
   auto shown = std::make_unique<ShownLayer>(std::move(layer), impl_->origin());
   shown->clip(impl_->clip);
   impl_->renderer->AddActor(shown->layer().actor);

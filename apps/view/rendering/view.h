@@ -79,6 +79,11 @@ class View {
   void set_eye_dome(bool on);
   bool has_eye_dome() const;
 
+  /// Brightens the pictures of all layers by a power of 2, in linear light.
+  /// @throws Error if it is not finite.
+  void set_exposure(double exposure_ev);
+  double exposure_ev() const;
+
   /// Hides what lies outside a box, in all layers that are clipped; std::nullopt shows everything.
   /// @throws Error if the box is empty.
   void set_clip(const std::optional<ClipBox>& box);

@@ -31,6 +31,7 @@ struct View::Impl {
   bool is_moving = false, is_legend_visible = true;
   MovingDetail detail;
   vtkSmartPointer<vtkRenderPass> eye_dome;  // null until it is first used
+  double exposure_ev = 0;
   std::optional<ClipBox> clip;
   std::optional<ViewLabel> label;
   vtkSmartPointer<vtkTextActor> label_actor;  // null until it is first used

@@ -85,4 +85,17 @@ Image8 View::picture(glm::ivec2 size_px) {
   return whole;
 }
 
+void View::set_exposure(double exposure_ev) {
+  if (!std::isfinite(exposure_ev)) throw Error("the exposure of a view must be finite");
+  if (exposure_ev == impl_->exposure_ev) return;
+  impl_->exposure_ev = exposure_ev;
+  for (const auto& shown : impl_->layers) {
+    if (!shown->layer().exposed) continue;
+    shown->layer().texture = shown->layer().exposed(exposure_ev);
+    shown->restyle();
+  }
+}
+
+double View::exposure_ev() const { return impl_->exposure_ev; }
+
 }  // namespace groundray

@@ -52,6 +52,7 @@ Window::Window(WindowStart start) : start_(std::move(start)), recent_(start_.set
   build_workers();
   connect_canvas();
   view().set_legend_visible(start_.view.has_legend);
+  images_->set_exposure(start_.view.exposure_ev);
   build_actions();
   build_status_bar();
   status_clock_.setInterval(status_ms);
@@ -134,6 +135,11 @@ void Window::build_docks() {
   images_ = new ImagePanel({.camera_chosen = [this](auto& name) { playback_->set_camera(name); },
                             .clicked = [this](glm::ivec2 pixel) { click_pixel(pixel); },
                             .echoes_wanted = [this] { update_echoes(); },
+                            .exposed =
+                                [this](double exposure_ev) {
+                                  view().set_exposure(exposure_ev);
+                                  canvas_->draw();
+                                },
                             .failed = failed});
   scan_ = new ScanPanel({.take_place = [this] { canvas_->take_place(true); },
                          .show =

@@ -56,8 +56,8 @@ menu <i>File</i>.</p>
 </table>
 <h3>Images</h3>
 <p>Point at a pixel for its value; click for its ray and the surface that it hits. The wheel
-zooms, a double click shows all. The slider changes the exposure of light and pictures; <i>Echoes</i> shows
-the current scans over a camera's image.</p>
+zooms, a double click shows all. The slider changes the exposure of light and pictures, also of those
+shown in the view; <i>Echoes</i> shows the current scans over a camera's image.</p>
 <h3>Measure</h3>
 <p>Click two points: those of clouds and, near a corner of a triangle, that corner are exact; elsewhere the
 surface counts. A third click begins anew; Escape ends measuring.</p>

@@ -148,6 +148,7 @@ ImagePanel::ImagePanel(Hooks hooks, QWidget* parent) : QWidget(parent), hooks_(s
   });
   connect(exposure_, &QSlider::valueChanged, this, [this] {
     exposure_text_->setText(text_of("{:+.1f} EV", exposure_ev()));
+    if (hooks_.exposed) hooks_.exposed(exposure_ev());
     redraw();
   });
   connect(echoes_, &QCheckBox::toggled, this, [this](bool on) {
@@ -191,7 +192,8 @@ void ImagePanel::build() {
 }
 
 void ImagePanel::build_exposure(QBoxLayout& row) {
-  exposure_ = named(new QSlider(Qt::Horizontal), "exposure", "Exposure: powers of 2 of brightness");
+  exposure_ = named(new QSlider(Qt::Horizontal), "exposure",
+                    "Exposure, in powers of 2, of images here and of pictures in the view");
   exposure_->setRange(-most_ev * steps_per_ev, most_ev * steps_per_ev);
   exposure_->setMinimumWidth(60);
   exposure_text_ = new QLabel("+0.0 EV");
@@ -201,8 +203,7 @@ void ImagePanel::build_exposure(QBoxLayout& row) {
   connect(automatic, &QToolButton::clicked, this, [this] {
     if (image_ == nullptr) return;
     const auto channel = static_cast<std::size_t>(channel_->currentIndex());
-    const double ev = automatic_exposure_ev(image_->channels()[channel]);
-    exposure_->setValue(static_cast<int>(std::lround(ev * steps_per_ev)));
+    set_exposure(automatic_exposure_ev(image_->channels()[channel]));
   });
   exposed_ = new QWidget;
   auto* layout = new QHBoxLayout(exposed_);
@@ -210,6 +211,10 @@ void ImagePanel::build_exposure(QBoxLayout& row) {
   add_widgets(*layout, {exposure_, exposure_text_, automatic});
   exposed_->hide();
   row.addWidget(exposed_, 1);
+}
+
+void ImagePanel::set_exposure(double exposure_ev) {
+  exposure_->setValue(static_cast<int>(std::lround(exposure_ev * steps_per_ev)));
 }
 
 double ImagePanel::exposure_ev() const {

@@ -44,6 +44,7 @@ class ImagePanel : public QWidget {
     std::function<void(glm::ivec2)> clicked{};  ///< a pixel of the displayed image
     /// Another image is shown, or the user switched echoes on or off.
     std::function<void()> echoes_wanted{};
+    std::function<void(double)> exposed{};             ///< the exposure has changed, EV
     std::function<void(const std::string&)> failed{};  ///< error message
   };
 
@@ -59,6 +60,8 @@ class ImagePanel : public QWidget {
   /// Shows a text instead of an image, and abandons any reading under way.
   void clear(const QString& why = {});
   void mark(std::optional<glm::dvec2> pixel);
+  /// Sets the exposure of light and pictures, rounded to 0.1 EV within -10 to 10 EV.
+  void set_exposure(double exposure_ev);
   /// Returns true if echoes are to be shown over the displayed image.
   bool wants_echoes() const;
   /// Shows echoes over the image, coloured by their distance from the camera.
