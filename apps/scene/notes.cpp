@@ -50,7 +50,7 @@ void note_air(const Simulation& simulation, Notes& notes) {
   const double air = simulation.spec.air.group_index;
   for (const PlacedLidar& lidar : simulation.lidars) {
     if (!has_light(lidar)) continue;
-    const double calibrated = lidar.spec.lidar.receiver->calibrated_group_index;
+    const double calibrated = lidar.spec.lidar.light->receiver.calibrated_group_index;
     if (air == calibrated) continue;
     notes.push_back(fmt::format(
         "weather: with group_index = {}, lidar '{}' measures ranges {:.3g} mm per 100 m too {}, "

@@ -45,6 +45,11 @@ def with_imager(shutter):
     return CAMERA.split("shutter:")[0] + f"shutter: {shutter}\n" + IMAGER
 
 
+MOUNTED = "preset: velodyne_vlp16, mount: {translation_m: [0, 0, 1.5]}"
+LIGHT = (
+    "laser: {wavelength_nm: 905, pulse_energy_nj: 300, pulse_fwhm_ns: 5}, "
+    "receiver: {aperture_mm: 20, threshold_w: 1.0e-8, timing: peak, returns: last}"
+)
 NOTES = [
     ("drive: {waypoints", "drive: {waypoints", "", None),
     (
@@ -52,6 +57,12 @@ NOTES = [
         "weather: {fog_range_m: 300}\nplatform:",
         "weather: has no effect on lidar 'top', which has no link budget",
         "weather: hides surfaces beyond 300 m, but the sky above them remains clear",
+    ),
+    (
+        f"lidars:\n  - {{name: top, {MOUNTED}}}",
+        f"weather: {{group_index: 1.0003}}\nlidars:\n  - {{name: top, {MOUNTED}, {LIGHT}}}",
+        "weather: with group_index = 1.0003, lidar 'top' measures ranges 30 mm per 100 m too long",
+        None,
     ),
     (
         "mount: {translation_m: [0, 0, 1.5]}}",
@@ -109,6 +120,25 @@ def test_a_lens_that_folds_inside_its_image_is_noted(tmp_path):
     assert lens in CAMERA
     info = groundray("info", written(tmp_path, camera=CAMERA.replace(lens, folded)))
     assert "note      camera 'eye': its distortion folds inside the image" in info.stdout
+
+
+def test_heights_that_mark_missing_samples_are_noted(tmp_path):
+    heights = np.full((8, 8), 300.0)
+    heights[2, 3] = -32767
+    rows = "\n".join(" ".join(map(str, row)) for row in heights)
+    head = "ncols 8\nnrows 8\nxllcorner 429430\nyllcorner 5150650\ncellsize 4\n"
+    (tmp_path / "dem.asc").write_text(f"{head}{rows}\n")
+    dem = re.search(r"dem: ([^,]+),", SCENE)[1]
+    scene = SCENE.replace(dem, "dem.asc").split("objects:")[0]
+    scene += "lidars: [{name: top, preset: velodyne_vlp16, mount: {translation_m: [0, 0, 1.5]}}]\n"
+    info = groundray("info", written(tmp_path, scene))
+    assert info.returncode == 0, info.stderr
+    note = (
+        "note      terrain: it has heights of -32767 m: if these mark missing samples, set `nodata:"
+    )
+    assert note in info.stdout
+    known = scene.replace("dem: dem.asc,", "dem: dem.asc, nodata: -32767,")
+    assert "terrain: it has heights" not in groundray("info", written(tmp_path, known)).stdout
 
 
 def test_a_sky_that_nothing_sees_is_noted(tmp_path):

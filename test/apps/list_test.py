@@ -47,6 +47,9 @@ def test_lists_all_presets_materials_and_assets():
 
 def test_each_kind_is_listed_alone():
     assert set(listed("presets")) == {path.stem for path in PRESETS}
+    assert set(listed("lidars")) | set(listed("cameras")) == set(listed("presets"))
+    assert {entry["kind"] for entry in listed("lidars").values()} == {"lidar"}
+    assert {entry["kind"] for entry in listed("cameras").values()} == {"camera"}
     assert set(listed("materials")) == {path.stem for path in MATERIALS}
     assert set(listed("assets")) == {kind for kind, *_ in kinds_of_assets()}
 

@@ -237,7 +237,7 @@ def test_compression_and_shift_change_neither_points_nor_order(tmp_path, everyth
         np.testing.assert_array_equal(one.data, other.data)
 
 
-def test_stamps_of_a_recorded_clock_keep_their_nanoseconds(tmp_path):
+def test_stamps_of_a_recorded_clock_keep_their_nanoseconds(tmp_path, capsys):
     run = shutil.copytree(run_folder(), tmp_path / "run")
     text = (run / "dataset.yaml").read_text()
     origin = "time_origin_s: 0.000000000\n"
@@ -248,6 +248,9 @@ def test_stamps_of_a_recorded_clock_keep_their_nanoseconds(tmp_path):
     for (time_ns, message), (begin_s, _) in zip(read, scans("front"), strict=True):
         assert time_ns == 1403636579_763555527 + round(begin_s * 1e9)
         assert stamp_ns(message) == time_ns
+    assert export("las", tmp_path / "las", source=run) == 1  # no week has so many seconds
+    assert "give --clock gps" in capsys.readouterr().err
+    assert export("las", tmp_path / "las", "--clock", "unix", source=run) == 0
     assert export("tum", tmp_path / "tum", "--camera", "left", source=run) == 0
     names = sorted(each.stem for each in (tmp_path / "tum/depth").iterdir())
     infos = of(list(messages(tmp_path / "out")), "/left/camera_info")

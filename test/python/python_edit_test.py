@@ -1,10 +1,12 @@
 """Edited scenes: the bytes of a scene file with that edit, without building the ground again."""
 
+import datetime
 import pickle
 
 import groundray
 import pytest
 import small_scene
+import yaml
 from groundray._scene import to_yaml
 
 SUN = {"azimuth_deg": 200, "elevation_deg": 35}
@@ -31,6 +33,15 @@ def frames(scene):
     scans = [scene.lidar(name).scan(frame=1) for name in scene.lidars]
     things = [*scans, scene.camera("eye").expose(frame=0)]
     return [(name, thing[name].tobytes()) for thing in things for name in thing]
+
+
+def test_times_of_a_loaded_file_are_accepted():
+    given = yaml.safe_load("sun: {utc: 2026-06-21T16:30:00Z}\n")
+    assert isinstance(given["sun"]["utc"], datetime.datetime)
+    assert to_yaml(given) == 'sun:\n  utc: "2026-06-21T16:30:00Z"\n'
+    offset = datetime.timezone(datetime.timedelta(hours=-5))
+    given["sun"]["utc"] = datetime.datetime(2026, 6, 21, 11, 30, tzinfo=offset)
+    assert "2026-06-21T16:30:00Z" in to_yaml(given)
 
 
 @pytest.fixture(scope="module")

@@ -63,10 +63,19 @@ TEST(ErrorMap, ShowsTheLargestErrorOfEachCell) {
   EXPECT_EQ(at(3, 3)[0], at(3, 3)[2]);  // grey
   EXPECT_EQ(picture.across->high, 10);
   EXPECT_EQ(picture.up->high, 5);
-  EXPECT_THAT(picture.caption, HasSubstr("black: missing or extra returns"));
+  EXPECT_THAT(picture.caption, HasSubstr("darker: missing or extra returns, black if all are"));
   ErrorMap other({0, 0}, {1, 1}, 10);
   other.add({0.5, 0.5}, 1);
   EXPECT_THAT(other.picture("", "", "", "").caption, Not(HasSubstr("black")));
+}
+
+TEST(ErrorMap, DarkensCellsByTheShareOfPointsWithoutAPartner) {
+  ErrorMap map({0, 0}, {2, 1}, glm::ivec2(2, 1));
+  for (const double x : {0.5, 1.5}) map.add({x, 0.5}, 1);
+  map.add_unpaired({1.5, 0.5});
+  const Picture picture = map.picture("", "", "", "");
+  const auto alone = picture.image.at(0, 0), half = picture.image.at(picture.image.width() - 1, 0);
+  for (std::size_t k = 0; k < 3; ++k) EXPECT_NEAR(half[k], alone[k] / 2.0, 1) << k;
 }
 
 TEST(ErrorMap, AcceptsASinglePoint) {

@@ -220,7 +220,12 @@ TEST_F(DemIo, ConvertsFeetToMetres) {
   // NAVD88 height (ftUS)
   Picture{.values = {1000, 1000, 1000, 1000, 1000, 1000}, .crs = "EPSG:26915+6360"}.save_tiff(
       tiff_);
-  EXPECT_EQ(load_dem(tiff_).grid.height_m(1, 1), static_cast<float>(1000 * 1200.0 / 3937));
+  const Dem dem = load_dem(tiff_);
+  EXPECT_EQ(dem.grid.height_m(1, 1), static_cast<float>(1000 * 1200.0 / 3937));
+  OGRSpatialReference crs;  // of the heights in memory
+  ASSERT_EQ(crs.SetFromUserInput(dem.crs_wkt.c_str()), OGRERR_NONE);
+  EXPECT_EQ(crs.GetTargetLinearUnits("VERT_CS"), 1);
+  EXPECT_THAT(dem.crs_wkt, HasSubstr("North American Vertical Datum 1988"));
 }
 
 TEST_F(DemIo, Reads64BitIntegers) {

@@ -24,6 +24,7 @@ using groundray::testing::SampleReturn;
 using groundray::testing::SampleReturns;
 using groundray::testing::scan_of;
 using groundray::testing::TemporaryFolder;
+using ::testing::Contains;
 using ::testing::HasSubstr;
 using ::testing::Not;
 
@@ -250,6 +251,21 @@ TEST(CompareScans, ReportsErrorsByRangeIncidenceAndLabel) {
   EXPECT_EQ(by_range->rows[0][0], "5 - 10");
   EXPECT_EQ(by_range->rows[1][0], "10 - 20");
   EXPECT_EQ(by_range->rows[1].back(), "0");
+}
+
+TEST(CompareScans, ReportsTheShareOfEqualLabels) {
+  const Names names{"ring", "time", "label"};
+  const SampleReturns reference = sample_returns();
+  const Section equal = compare(reference, reference, names);
+  EXPECT_EQ(value_of(equal, "share of equal labels"), 100);
+  EXPECT_THAT(equal.headline, Not(HasSubstr("labels")));
+  SampleReturns other = reference;
+  for (std::size_t i = 0; i < other.size(); i += 4) other[i].label += 1;
+  const Section section = compare(reference, other, names);
+  EXPECT_NEAR(value_of(section, "share of equal labels"), 75,
+              100.0 / static_cast<double>(other.size()));
+  EXPECT_THAT(section.headline, HasSubstr("% of the labels are equal."));
+  EXPECT_THAT(section.main, Contains("share of equal labels"));
 }
 
 TEST(CompareScans, ReportsTheScaleOfIntensities) {
