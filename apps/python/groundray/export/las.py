@@ -180,9 +180,9 @@ def write_las(
         latest_s = (dataset.time_origin_ns + latest_ns) * 1e-9
         if latest_s >= _WEEK_S:
             raise Error(
-                f"{dataset.folder}: its clock reaches {latest_s:.0f} s, but GPS week time, as which "
-                f"--clock run marks it, ends at {_WEEK_S}: give --clock gps, if the trajectory's "
-                "clock counts from 1980, or --clock unix, if from 1970"
+                f"{dataset.folder}: its clock reaches {latest_s:.0f} s, but GPS week time, as "
+                f"which --clock run marks it, ends at {_WEEK_S} s: give --clock gps if the "
+                "trajectory's clock counts from 1980, or --clock unix if from 1970"
             )
         notes.tell("times are seconds of the dataset's clock, marked as GPS week time; see --clock")
     if options.labels is None:
