@@ -308,6 +308,18 @@ TEST(Open, ScenesShowGroundObjectsAndSensors) {
   EXPECT_NE(opened.layers[0].find("colour"), nullptr);
 }
 
+TEST(Open, ScenesOfAircraftShowTheGroundBelow) {
+  TemporaryFolder folder;
+  std::string scene = testing::sample_scene();
+  scene.replace(scene.find("[0.2, 0, 1.6]"), 13, "[0.2, 0, 300]");
+  const Opened opened = open_any(testing::write_sample_scene(folder.path(), scene));
+  const glm::dvec3 at_D = opened.look->at_w_m - opened.simulation->terrain.header().origin_w_m;
+  const auto ground_m = opened.simulation->terrain.ground().height_m_at(glm::dvec2(at_D));
+  ASSERT_TRUE(ground_m);
+  EXPECT_NEAR(at_D.z, *ground_m, 1e-6);
+  EXPECT_GT(opened.look->from_w_m.z - opened.look->at_w_m.z, 90);
+}
+
 // Scans hold the true position of each echo; the points differ from it by range noise of 2 cm.
 TEST(Open, ScansOfDatasetsMatchTheTruth) {
   const Opened opened = open_any(SampleDataset::get().path());

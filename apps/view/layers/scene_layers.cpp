@@ -2,6 +2,7 @@
 
 #include <fmt/format.h>
 
+#include <algorithm>
 #include <array>
 #include <chrono>
 #include <cmath>
@@ -233,7 +234,13 @@ Look look_at_platform(const Simulation& simulation) {
   const Exposed frame = first_frame(simulation);
   const Pose X_DS = frame.X_DS->pose_at(frame.begin);
   const glm::dvec3 ahead = middle_of_run(simulation) - X_DS.translation_m;
-  return look_at(X_DS.translation_m + simulation.terrain.header().origin_w_m, ahead, 22);
+  constexpr double near_m = 22;
+  glm::dvec3 target = X_DS.translation_m;
+  const double height_m =
+      target.z - simulation.terrain.ground().height_m_at(glm::dvec2(target)).value_or(target.z);
+  if (height_m > near_m) target.z -= height_m;  // what an aircraft sees, not the aircraft
+  return look_at(target + simulation.terrain.header().origin_w_m, ahead,
+                 std::max(near_m, 1.5 * height_m));
 }
 
 }  // namespace groundray

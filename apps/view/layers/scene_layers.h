@@ -45,7 +45,8 @@ glm::dvec3 middle_of_run(const Simulation& simulation);
 /// @param distance_m  approximate distance from the target.
 Look look_at(const glm::dvec3& at_w_m, const glm::dvec3& ahead, double distance_m);
 
-/// Returns the recommended viewpoint on a scene's platform at the start of its run.
+/// Returns the recommended viewpoint on a scene's platform at the start of its run, or, if it flies
+/// high, on the ground below it.
 Look look_at_platform(const Simulation& simulation);
 
 }  // namespace groundray
