@@ -134,7 +134,14 @@ class _Form:
             unix_s = (self.dataset.time_origin_ns + scan.frame.stamp_ns) // 10**9
             leap_s = sum(since <= unix_s for since in _LEAP_SECONDS)
             begin_ns += (leap_s - _GPS_EPOCH_UNIX_S) * 10**9
-        return begin_ns * 1e-9 + scan.rows["time"].astype(float)
+        times_s = begin_ns * 1e-9 + scan.rows["time"].astype(float)
+        if self.options.clock == "run" and times_s.size > 0 and times_s.max() >= _WEEK_S:
+            raise Error(
+                f"{self.dataset.folder}: its clock reaches {times_s.max():.0f} s, but GPS week "
+                f"time, as which --clock run marks it, ends at {_WEEK_S} s: give --clock gps if "
+                "the trajectory's clock counts from 1980, or --clock unix if from 1970"
+            )
+        return times_s
 
 
 def _extra_name(column: str) -> str:
@@ -176,14 +183,6 @@ def write_las(
     if not form.wkt:
         notes.tell("the dataset has no CRS: the files have none, and coordinates are those of W")
     if options.clock == "run":
-        latest_ns = max((f.stamp_ns for one in lidars for f in one.frames), default=0)
-        latest_s = (dataset.time_origin_ns + latest_ns) * 1e-9
-        if latest_s >= _WEEK_S:
-            raise Error(
-                f"{dataset.folder}: its clock reaches {latest_s:.0f} s, but GPS week time, as "
-                f"which --clock run marks it, ends at {_WEEK_S} s: give --clock gps if the "
-                "trajectory's clock counts from 1980, or --clock unix if from 1970"
-            )
         notes.tell("times are seconds of the dataset's clock, marked as GPS week time; see --clock")
     if options.labels is None:
         notes.tell(
