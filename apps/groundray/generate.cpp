@@ -99,6 +99,12 @@ void say_faults(const fs::path& out, const std::vector<std::string>& faults) {
   if (faults.size() > most) print_error("and {} more\n", faults.size() - most);
 }
 
+std::string millions(double count) {
+  const double in_millions = 1e-6 * count;
+  return in_millions < 100 ? fmt::format("{:.3g} M", in_millions)
+                           : fmt::format("{:.0f} M", in_millions);
+}
+
 std::string counted(std::size_t count, std::string_view noun) {
   return fmt::format("{} {}{}", count, noun, count == 1 ? "" : "s");
 }
@@ -110,14 +116,14 @@ void say(const Simulation& simulation, const fs::path& out, const FramePlan& pla
   if (tally.images < plan.images)
     print_text(to, "{} images already existed\n", plan.images - tally.images);
   if (tally.scans > 0) {
-    print_text(to, "{}, {} points of {} pulses, {:.3g} M pulses/s\n", counted(tally.scans, "scan"),
+    print_text(to, "{}, {} points of {} pulses, {} pulses/s\n", counted(tally.scans, "scan"),
                tally.points, tally.pulses,
-               1e-6 * static_cast<double>(tally.pulses) / tally.scanning.count());
+               millions(static_cast<double>(tally.pulses) / tally.scanning.count()));
   }
   if (tally.images > 0) {
-    print_text(to, "{}, {:.3g} M pixels, {:.3g} M paths in {:.1f} s\n",
-               counted(tally.images, "image"), 1e-6 * static_cast<double>(tally.pixels),
-               1e-6 * static_cast<double>(tally.paths), tally.exposing.count());
+    print_text(to, "{}, {} pixels, {} paths in {:.1f} s\n", counted(tally.images, "image"),
+               millions(static_cast<double>(tally.pixels)),
+               millions(static_cast<double>(tally.paths)), tally.exposing.count());
   }
   if (tally.flows_left_out > 0) {
     print_text(to, "{} flows beyond 512 px are marked as unknown in KITTI's files\n",

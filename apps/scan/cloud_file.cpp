@@ -223,9 +223,9 @@ CloudFile of_floats(std::string_view bytes, const Names& asked) {
 /// Throws an Error that suggests how to convert a file in an unsupported format.
 [[noreturn]] void refuse(const std::string& ending) {
   static constexpr std::array<std::pair<std::string_view, std::string_view>, 8> others{
-      {{".las", "LAS is read from files alone, not from memory"},
-       {".laz", "LAZ is read from files alone, not from memory"},
-       {".mcap", "MCAP is read from files alone, not from memory"},
+      {{".las", "LAS can only be read from a file, not from memory"},
+       {".laz", "LAZ can only be read from a file, not from memory"},
+       {".mcap", "MCAP can only be read from a file, not from memory"},
        {".e57", "E57 is not read: save it as PLY by CloudCompare, or by pye57 and plyfile"},
        {".pcap", "packets are not read: decode them to PLY or PCD by the sensor's own tools"},
        {".bag", "ROS bags are not read: save the messages as PCD, as pcl_ros' bag_to_pcd does"},

@@ -25,11 +25,11 @@
 namespace groundray {
 namespace {
 
-constexpr int module_failed = 3, package_missing = 4;
+constexpr int module_failed = 3, package_missing = 4, lost = -1;
 constexpr std::string_view remedy =
     "`pip install groundray[export]` installs it; $GROUNDRAY_PYTHON names another interpreter";
 
-// A pipe, both of whose ends are closed at the end and by other programs that are started.
+// A pipe. Its ends are closed on destruction, and are not inherited by programs started meanwhile.
 struct Pipe {
   std::array<int, 2> ends{-1, -1};
 
@@ -49,7 +49,7 @@ struct Pipe {
   }
 };
 
-// A process, which is killed unless it has ended.
+// A child process; killed on destruction if it still runs.
 class Child {
  public:
   // Starts a program of PATH; standard input is empty. `fault` is an errno, or 0.
@@ -76,11 +76,15 @@ class Child {
 
   int fault() const { return fault_; }
 
-  // Returns the exit code, or 128 plus the number of the signal that ended it.
+  // Returns the exit code, 128 plus the number of the signal that ended it, or `lost`.
   int wait() {
+    const pid_t id = std::exchange(id_, 0);
     int status = 0;
-    while (waitpid(std::exchange(id_, 0), &status, 0) < 0 && errno == EINTR) {
-    }
+    pid_t ended;
+    do {
+      ended = waitpid(id, &status, 0);
+    } while (ended < 0 && errno == EINTR);
+    if (ended != id) return lost;
     return WIFEXITED(status) ? WEXITSTATUS(status) : 128 + WTERMSIG(status);
   }
 
@@ -105,6 +109,8 @@ bool read_both(Pipe& out, Pipe& err, std::string& printed, std::string& errors,
   while (out.ends[0] >= 0 || err.ends[0] >= 0) {
     std::array<pollfd, 2> both{{{out.ends[0], POLLIN, 0}, {err.ends[0], POLLIN, 0}}};
     const int ready = poll(both.data(), both.size(), wait_ms);
+    if (ready < 0 && errno != EINTR)
+      throw Error("waiting for Python failed: {}", std::generic_category().message(errno));
     if (limits.check) limits.check();
     if (ready <= 0) continue;
     if (both[0].revents != 0) read_some(out, printed);
@@ -124,7 +130,10 @@ std::string last_line(std::string_view text) {
 // Returns why the process failed, in one line.
 std::string reason_of(int code, const std::string& errors, const std::string& python) {
   const std::string line = last_line(errors);
-  if (code == module_failed) return line.empty() ? "reading was interrupted" : line;
+  if (code == lost) return fmt::format("the exit code of {} is lost: is SIGCHLD ignored?", python);
+  if (code == 128 + SIGINT || (code == module_failed && line.empty()))
+    return "reading was interrupted";
+  if (code == module_failed) return line;
   if (code == package_missing) return fmt::format("{} ({})", line, python);
   if (errors.find("No module named groundray") != std::string::npos ||
       errors.find("No module named 'groundray") != std::string::npos)

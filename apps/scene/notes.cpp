@@ -6,6 +6,7 @@
 #include <chrono>
 #include <glm/geometric.hpp>
 #include <limits>
+#include <set>
 #include <utility>
 #include <variant>
 
@@ -45,7 +46,7 @@ void note_weather(const Simulation& simulation, Notes& notes) {
   }
 }
 
-// Notes lidars whose ranges are too long because they are calibrated for other air.
+// Notes lidars whose ranges are too long or too short because they are calibrated for other air.
 void note_air(const Simulation& simulation, Notes& notes) {
   const double air = simulation.spec.air.group_index;
   for (const PlacedLidar& lidar : simulation.lidars) {
@@ -61,12 +62,13 @@ void note_air(const Simulation& simulation, Notes& notes) {
   }
 }
 
-// Notes heights that mark missing samples in many DEMs, and that no ground has.
+// Notes heights that mark missing samples in many DEMs, and that hardly any ground has.
 void note_heights(const Simulation& simulation, Notes& notes) {
-  constexpr double deepest_m = -9000, highest_m = 30'000;  // not on land of the Earth, Moon or Mars
+  // Only ocean trenches are deeper; the highest mountain of Mars has 22 km.
+  constexpr double deepest_m = -9000, highest_m = 30'000;
   const HeightGrid* const grid = simulation.terrain.whole();
   if (grid == nullptr) return;
-  for (const double height_m : {grid->min_height_m(), grid->max_height_m()}) {
+  for (const double height_m : std::set{grid->min_height_m(), grid->max_height_m()}) {
     if (!(height_m < deepest_m || height_m > highest_m)) continue;
     notes.push_back(
         fmt::format("terrain: it has heights of {} m: if these mark missing samples, set "

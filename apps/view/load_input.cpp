@@ -177,7 +177,7 @@ std::string place_scan(const ScanPlace& place, const PointCloud& table, CloudCon
   content.origin_w_m = place.origin_w_m;
   if (std::vector<glm::dvec3> p_DQ_m = true_positions(table); !p_DQ_m.empty()) {
     content.p_m = std::move(p_DQ_m);
-    return "placed by world_x, world_y, world_z: the true points, without noise";
+    return "placed by world_x_m, world_y_m, world_z_m: the true points, without noise";
   }
   for (glm::dvec3& p_m : content.p_m) p_m = place.X_DS * p_m;
   return "placed by X_DS, the sensor's pose at the stamp";

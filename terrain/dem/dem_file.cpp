@@ -43,8 +43,9 @@ struct DemFile::Opened {
     // The difference of two close numbers is exact, so it comes first.
     header.origin_m = (glm::dvec2(gt[0], gt[3]) - origin_w_m) + 0.5 * header.step_m;
     header.origin_w_m = glm::dvec3(origin_w_m, 0);
-    header.crs_wkt = wkt_of(with_heights_in_metres(from.crs));
-    header.crs_name = name_of(from.crs);
+    const OGRSpatialReference crs = with_heights_in_metres(from.crs);
+    header.crs_wkt = wkt_of(crs);
+    header.crs_name = name_of(crs);
   }
 
   std::filesystem::path path;

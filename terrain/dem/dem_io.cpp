@@ -38,6 +38,8 @@ bool is_same_crs(const std::string& wkt, const std::string& other) {
   OGRSpatialReference a, b;
   if (a.SetFromUserInput(wkt.c_str()) != OGRERR_NONE) return false;
   if (b.SetFromUserInput(other.c_str()) != OGRERR_NONE) return false;
+  a = with_heights_in_metres(a);  // as heights in memory are
+  b = with_heights_in_metres(b);
   if (a.IsCompound() != b.IsCompound()) {
     a.StripVertical();
     b.StripVertical();

@@ -258,6 +258,7 @@ void check_dem_crs(const Dem& reference, const Dem& other, const std::string& re
     return;
   const bool has_code = reference.crs_name.find("(EPSG:") != std::string::npos;
   if (has_code && reference.crs_name == other.crs_name) return;  // WKT differs between programs
+  if (is_same_crs(reference.crs_wkt, other.crs_wkt)) return;
   throw Error(
       "{}: its reference system is {} and that of {} is {}; they must be the same; run\n"
       "  gdalwarp {} -r bilinear '{}' other_as_reference.tif",

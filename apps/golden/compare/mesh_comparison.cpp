@@ -237,6 +237,7 @@ void check_mesh_crs(const std::filesystem::path& reference, const Georeference& 
                     const std::filesystem::path& other, const Georeference& of_other) {
   if (of_reference.crs_name.empty() || of_other.crs_name.empty()) return;
   if (of_reference.crs_name == of_other.crs_name) return;
+  if (is_same_crs(of_reference.crs_wkt, of_other.crs_wkt)) return;
   throw Error(
       "{}: its reference system is {} and that of {} is {}; they must be the same: reproject one "
       "of them first",

@@ -6,13 +6,15 @@
 
 #include "apps/groundray/describe/file_facts.h"
 #include "apps/scan/python_module.h"
+#include "apps/scene/interruption.h"
 #include "core/error.h"
 
 namespace groundray {
 
 Facts bag_facts(const std::filesystem::path& file) {
   const std::string printed =
-      run_python_module("groundray.foreign.bag", {std::filesystem::absolute(file).string()}, file);
+      run_python_module("groundray.foreign.bag", {std::filesystem::absolute(file).string()}, file,
+                        {.check = stop_if_interrupted});
   constexpr std::size_t name_width = 10;  // as print_facts writes lines, and the module, too
   Facts facts;
   for (std::string_view rest = printed; !rest.empty();) {

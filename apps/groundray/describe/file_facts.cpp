@@ -9,11 +9,8 @@
 #include "core/io/ply_faces.h"
 
 namespace groundray {
-namespace {
 
 namespace fs = std::filesystem;
-
-}  // namespace
 
 std::optional<FileKind> file_kind_of(const fs::path& file) {
   if (fs::exists(file / "metadata.yaml")) return FileKind::Bag;

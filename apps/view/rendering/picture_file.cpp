@@ -59,7 +59,7 @@ PictureFile shown_light(ImageF light, const char* kind) {
     value = static_cast<float>(static_cast<double>(value) / white);
   Image8 picture = expose(light, 0);
   return {.picture = std::move(picture),
-          .notes = {fmt::format("{}, exposed so that the brightest parts are white", kind)},
+          .notes = {fmt::format("{}, exposed so that 1 % of its values exceed white", kind)},
           .light = std::move(light)};
 }
 

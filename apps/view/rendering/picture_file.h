@@ -34,7 +34,8 @@ PictureFile read_picture(const std::filesystem::path& path);
 /// @param exposure_ev  brightens by this power of 2.
 Image8 expose(const ImageF& light, double exposure_ev);
 
-/// Brightens an sRGB picture by a power of 2 in linear light; a fourth channel stays as it is.
+/// Brightens an sRGB picture by a power of 2 in linear light; an alpha channel, the second of 2 or
+/// the fourth of 4, stays as it is.
 Image8 expose(const Image8& picture, double exposure_ev);
 
 /// Returns an image as a texture; its first row is at v = 1.

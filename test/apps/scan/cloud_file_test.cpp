@@ -117,7 +117,7 @@ TEST(CloudFile, SuggestsConversionOfOtherFormats) {
   EXPECT_THAT(fault_of("/no/a.las"), HasSubstr("/no/a.las: there is no such file"));
   for (const char* name : {"a.las", "a.LAZ", "a.mcap"}) {
     EXPECT_THAT(message_of([name] { parse_cloud("garbage", name, {}); }),
-                HasSubstr("is read from files alone, not from memory"));
+                HasSubstr("can only be read from a file, not from memory"));
   }
   EXPECT_THAT(fault_of("a.e57"), HasSubstr("a.e57: E57 is not read: save it as PLY"));
   EXPECT_THAT(fault_of("a.pcap"), HasSubstr("packets are not read"));

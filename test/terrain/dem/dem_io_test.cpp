@@ -227,6 +227,8 @@ TEST_F(DemIo, ConvertsFeetToMetres) {
   ASSERT_EQ(crs.SetFromUserInput(dem.crs_wkt.c_str()), OGRERR_NONE);
   EXPECT_EQ(crs.GetTargetLinearUnits("VERT_CS"), 1);
   EXPECT_THAT(dem.crs_wkt, HasSubstr("North American Vertical Datum 1988"));
+  EXPECT_THAT(dem.crs_name, Not(HasSubstr("ftUS")));
+  EXPECT_TRUE(is_same_crs("EPSG:26915+6360", dem.crs_wkt));
 }
 
 TEST_F(DemIo, Reads64BitIntegers) {

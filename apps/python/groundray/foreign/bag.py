@@ -6,6 +6,7 @@ the files themselves, not of metadata.yaml.
 
 from __future__ import annotations
 
+import os
 import sys
 from collections import Counter
 from collections.abc import Iterable
@@ -49,7 +50,8 @@ class Contents:
             yield f"begins    {_time_text(self.first_ns)}"
             yield f"duration  {_seconds_text(self.last_ns - self.first_ns)} s"
         for (topic, kind), count in sorted(self.topics.items()):
-            yield f"topic     {_one_line(topic)}: {_one_line(kind)}, {count} messages"
+            messages = "1 message" if count == 1 else f"{count} messages"
+            yield f"topic     {_one_line(topic)}: {_one_line(kind)}, {messages}"
 
 
 def _one_line(text: str) -> str:
@@ -87,6 +89,10 @@ def _read_mcap(file: Path, contents: Contents) -> str:
         if summary is None or summary.statistics is None:
             rule = "it has no statistics, so that all of it would have to be read"
             raise Error(f"{rule}; `mcap recover` writes a copy that has them")
+        if set(summary.statistics.channel_message_counts) - set(summary.channels):
+            raise Error(
+                "its summary does not list all channels; `mcap recover` writes a copy that does"
+            )
         for number, channel in summary.channels.items():
             schema = summary.schemas.get(channel.schema_id)
             kind = schema.name if schema else f"without a type ({channel.message_encoding})"
@@ -110,7 +116,12 @@ def _read_sqlite(file: Path, contents: Contents) -> None:
     with open_regular(file) as stream:
         if stream.read(16) != b"SQLite format 3\0":
             raise Error("it is not an SQLite file: it does not begin as one; is it compressed?")
-    base = sqlite3.connect(f"file:{quote(str(file.resolve()))}?mode=ro&immutable=1", uri=True)
+    log = file.with_name(file.name + "-wal")
+    if log.exists() and log.stat().st_size > 0:
+        rule = f"it has messages in a write-ahead log, {log.name}"
+        raise Error(f"{rule}; `sqlite3 {file.name} .tables` moves them into it")
+    place = quote(os.fsencode(file.resolve()))
+    base = sqlite3.connect(f"file:{place}?mode=ro&immutable=1", uri=True)
     try:
         made = dict(base.execute("SELECT name, sql FROM sqlite_master WHERE type = 'table'"))
         for name in ("topics", "messages"):  # a view could compute for ever
@@ -151,7 +162,7 @@ def _read_folder(folder: Path) -> Contents:
     """Describes the bag of a folder with metadata.yaml."""
     text = read_text(folder / "metadata.yaml", "is this the folder of a ROS 2 bag?")
     try:
-        record = yaml.safe_load(text)  # aliases, which writers use, are references, not copies
+        record = yaml.safe_load(text)
     except yaml.YAMLError as fault:
         mark = getattr(fault, "problem_mark", None)
         place = f", line {mark.line + 1}" if mark else ""
@@ -163,7 +174,11 @@ def _read_folder(folder: Path) -> Contents:
     names = facts.get("relative_file_paths")
     if not isinstance(names, list) or not all(isinstance(name, str) for name in names):
         raise Error("its metadata.yaml lists no relative_file_paths; was it cut short?")
-    contents = Contents(f"ROS 2 bag, {facts.get('storage_identifier', 'unknown')}")
+    storage, stated = facts.get("storage_identifier", "unknown"), facts.get("message_count")
+    if not isinstance(storage, str) or not isinstance(stated, int):
+        rule = "its metadata.yaml needs a storage_identifier that is a text"
+        raise Error(f"{rule}, and a message_count that is a whole number")
+    contents = Contents(f"ROS 2 bag, {_one_line(storage)}")
     contents.files = len(names)
     for name in names:
         file = folder / Path(name).name
@@ -179,7 +194,6 @@ def _read_folder(folder: Path) -> Contents:
             raise Error(f"{file.name}: {fault.strerror}; was the bag copied completely?") from None
         except Error as fault:
             raise Error(f"{file.name}: {fault}") from None
-    stated = facts.get("message_count")
     if stated != contents.topics.total():
         rule = f"its metadata.yaml states {stated} messages, but its files have"
         raise Error(f"{rule} {contents.topics.total()}; was the bag copied completely?")

@@ -21,7 +21,7 @@ from groundray.dataset import Error, open_regular
 from groundray.foreign.module import need, run
 
 _TYPE = "sensor_msgs/msg/PointCloud2"
-# Of sensor_msgs/msg/PointField, without the byte order.
+# NumPy types of PointField.datatype, without the byte order.
 _NUMBERS = {1: "i1", 2: "u1", 3: "i2", 4: "u2", 5: "i4", 6: "u4", 7: "f4", 8: "f8"}
 
 Table = NDArray[np.void]
@@ -67,6 +67,12 @@ def _choose_topic(file: Any, wanted: str | None) -> str:
     if summary is None:
         rule = "it has no summary: it is cut short, or was written without one"
         raise Error(f"{rule}; `mcap recover` writes a copy that has one")
+    if summary.statistics and set(summary.statistics.channel_message_counts) - set(
+        summary.channels
+    ):
+        raise Error(
+            "its summary does not list all channels; `mcap recover` writes a copy that does"
+        )
     topics = {
         each.topic
         for each in summary.channels.values()

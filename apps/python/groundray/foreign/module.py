@@ -63,7 +63,11 @@ def run(work: Callable[[list[str]], str]) -> int:
     except OSError as fault:
         print(fault.strerror or fault, file=sys.stderr)
         return FAILED
-    except Exception as fault:  # whatever a library raises for a damaged file
+    except SystemExit:
+        raise
+    except (
+        BaseException
+    ) as fault:  # whatever a library raises for a damaged file, Rust's panics too
         text = " ".join(str(fault).split())[:500] or type(fault).__name__
         if not isinstance(fault, Error):
             text = f"it cannot be read: {text}: is it damaged, or cut short?"
