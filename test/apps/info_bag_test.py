@@ -3,13 +3,16 @@
 import os
 import random
 import shutil
+import signal
 import sqlite3
+import subprocess
 import sys
+import time
 from itertools import pairwise
 
 import numpy as np
 import pytest
-from dataset_runs import groundray
+from dataset_runs import PROGRAM, groundray
 from export_runs import PACKAGE, export
 
 pytest.importorskip("rosbags", reason="pip install -r test/requirements.txt")
@@ -120,14 +123,22 @@ def test_an_exported_bag_has_the_topics_that_rosbags_finds(tmp_path):
     assert lines[1] == f"messages  {total} on {len(topics)} topics"
     assert lines[2] == f"begins    {begin_ns // 10**9}.{begin_ns % 10**9:09} s"
     assert lines[3] == f"duration  {span_ns // 10**9}.{span_ns % 10**9:09} s"
-    expected = [f"topic     {t}: {k}, {n} messages" for t, (k, n) in sorted(topics.items())]
+    counted = {t: f"{k}, {n} message{'' if n == 1 else 's'}" for t, (k, n) in topics.items()}
+    expected = [f"topic     {topic}: {text}" for topic, text in sorted(counted.items())]
     assert lines[4:] == expected
     (file,) = (tmp_path / "out").glob("*.mcap")
     assert described(file)[1:] == lines[1:]
 
 
 @pytest.mark.parametrize(
-    "name", ["-drive.mcap", "--help.mcap", "a b'c\"d$(touch gone)`e`;f.mcap", "öß\u4e2d.mcap"]
+    "name",
+    [
+        "-drive.mcap",
+        "--help.mcap",
+        "a b'c\"d$(touch gone)`e`;f.mcap",
+        "öß\u4e2d.mcap",
+        "\udcff.mcap",
+    ],
 )
 def test_any_name_of_a_file_is_only_a_name(tmp_path, name):
     write_mcap(tmp_path / name)
@@ -246,6 +257,63 @@ def test_a_folder_with_missing_or_cut_files_is_one_message(tmp_path):
     bomb = "".join(f"{b}: &{b} [{', '.join([f'*{a}'] * 9)}]\n" for a, b in pairwise("abcdefghijkl"))
     (folder / "metadata.yaml").write_text(f"a: &a [1]\n{bomb}")  # 9^11 numbers if written out
     assert "its metadata.yaml is not that of a ROS 2 bag" in refused(folder)
+
+
+def test_values_of_metadata_are_checked_before_they_are_printed(tmp_path):
+    write_rosbag(Ros2Writer(tmp_path / "drive"), 2)
+    file = tmp_path / "drive/metadata.yaml"
+    text = file.read_text()
+    assert "storage_identifier: sqlite3\n" in text
+    forged = 'storage_identifier: "x\\nmessages  999 on 1 topic"\n'
+    file.write_text(text.replace("storage_identifier: sqlite3\n", forged))
+    lines = described(tmp_path / "drive")
+    assert lines[0] == "kind      ROS 2 bag, x\\nmessages  999 on 1 topic"
+    assert lines[1:] == LINES + TOPICS
+    file.write_text(text.replace("storage_identifier: sqlite3\n", "storage_identifier: [1]\n"))
+    assert "needs a storage_identifier that is a text" in refused(tmp_path / "drive")
+
+
+def test_messages_that_the_file_or_its_summary_does_not_hold_are_not_forgotten(tmp_path):
+    write_rosbag(Ros2Writer(tmp_path / "drive"), 2)
+    (file,) = (tmp_path / "drive").glob("*.db3")
+    log = file.with_name(file.name + "-wal")
+    log.write_bytes(b"messages")
+    assert "it has messages in a write-ahead log, drive.db3-wal" in refused(file)
+    short = tmp_path / "short.mcap"
+    with short.open("wb") as stream:
+        writer = McapWriter(stream, repeat_channels=False, repeat_schemas=False)
+        writer.start(profile="ros2")
+        schema = writer.register_schema("std_msgs/msg/String", "ros2msg", b"string data")
+        writer.add_message(writer.register_channel("/a", "cdr", schema), 1, STRING, 1)
+        writer.finish()
+    assert "its summary does not list all channels" in refused(short)
+
+
+def test_an_interrupted_description_ends_with_its_module(tmp_path):
+    """A module that never ends: SIGINT to `groundray` alone ends both."""
+    folder = tmp_path / "package/groundray/foreign"
+    folder.mkdir(parents=True)
+    for each in (folder, folder.parent):
+        (each / "__init__.py").touch()
+    pid = tmp_path / "pid"
+    (folder / "bag.py").write_text(
+        f"import os, time\nopen({str(pid)!r}, 'w').write(str(os.getpid()))\ntime.sleep(300)\n"
+    )
+    command = [PROGRAM, "info", write_mcap(tmp_path / "drive.mcap")]
+    run = subprocess.Popen(command, env=environment(PYTHONPATH=str(tmp_path / "package")))
+    while not (pid.exists() and pid.read_text()):
+        time.sleep(0.01)
+    run.send_signal(signal.SIGINT)
+    assert run.wait(timeout=60) == 130
+    with pytest.raises(ProcessLookupError):
+        os.kill(int(pid.read_text()), 0)
+
+
+def test_a_lost_exit_code_is_no_success(tmp_path):
+    file = write_mcap(tmp_path / "drive.mcap")
+    file.write_bytes(file.read_bytes()[:-1])
+    line = refused(file, preexec_fn=lambda: signal.signal(signal.SIGCHLD, signal.SIG_IGN))
+    assert "is lost: is SIGCHLD ignored?" in line
 
 
 def test_views_pipes_and_devices_are_rejected_without_waiting(tmp_path):
