@@ -7,8 +7,11 @@
 #include <array>
 #include <cmath>
 #include <glm/geometric.hpp>
+#include <glm/gtc/matrix_access.hpp>
 #include <glm/gtc/quaternion.hpp>
+#include <glm/gtc/type_ptr.hpp>
 #include <glm/mat3x3.hpp>
+#include <glm/mat4x4.hpp>
 #include <glm/matrix.hpp>
 #include <utility>
 
@@ -151,20 +154,18 @@ constexpr std::string_view pose_name = "X_DS", origin_name = "origin_w_m";
 /// Returns the place that groundray-export writes; nothing if there is none, or if it is not a
 /// rigid transformation with a finite origin.
 std::optional<ScanPlace> place_of(const NpzFile& file) {
-  const std::vector<double> X = numbers_of(file, pose_name, {4, 4});
-  if (X.empty()) return std::nullopt;
+  const std::vector<double> pose = numbers_of(file, pose_name, {4, 4});
+  if (pose.empty()) return std::nullopt;
   const std::vector<double> origin = numbers_of(file, origin_name, {3});
   constexpr double tolerance = 1e-6;
-  glm::dmat3 R;
-  for (glm::length_t row = 0; row < 3; ++row) {
-    for (glm::length_t column = 0; column < 3; ++column)
-      R[column][row] = X[static_cast<std::size_t>(4 * row + column)];
-  }
-  const glm::dmat3 excess = glm::transpose(R) * R - glm::dmat3(1);
-  bool is_rigid = std::abs(glm::determinant(R) - 1) <= tolerance && X[12] == 0 && X[13] == 0 &&
-                  X[14] == 0 && X[15] == 1;
+  const glm::dmat4 matrix = glm::transpose(glm::make_mat4(pose.data()));  // stored row by row
+  const glm::dmat3 rotation(matrix);
+  const glm::dmat3 excess = glm::transpose(rotation) * rotation - glm::dmat3(1);
+  bool is_rigid = std::abs(glm::determinant(rotation) - 1) <= tolerance &&
+                  glm::row(matrix, 3) == glm::dvec4(0, 0, 0, 1);
   for (glm::length_t k = 0; k < 3; ++k) is_rigid &= glm::length(excess[k]) <= tolerance;
-  ScanPlace place{.X_DS = {.rotation = glm::quat_cast(R), .translation_m = {X[3], X[7], X[11]}}};
+  ScanPlace place{
+      .X_DS = {.rotation = glm::quat_cast(rotation), .translation_m = glm::dvec3(matrix[3])}};
   if (!origin.empty()) place.origin_w_m = {origin[0], origin[1], origin[2]};
   const glm::dvec3 sum_m = place.X_DS.translation_m + place.origin_w_m;
   if (!is_rigid || !std::isfinite(sum_m.x + sum_m.y + sum_m.z)) return std::nullopt;

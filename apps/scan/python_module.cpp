@@ -129,7 +129,7 @@ std::string last_line(std::string_view text) {
 
 // Returns why the process failed, in one line.
 std::string reason_of(int code, const std::string& errors, const std::string& python) {
-  const std::string line = last_line(errors);
+  std::string line = last_line(errors);
   if (code == lost) return fmt::format("the exit code of {} is lost: is SIGCHLD ignored?", python);
   if (code == 128 + SIGINT || (code == module_failed && line.empty()))
     return "reading was interrupted";

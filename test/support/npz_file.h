@@ -45,7 +45,9 @@ inline void write_npz(const std::filesystem::path& path,
     put(directory, bytes.size(), 4);
     directory += name;
     put(bytes, 0x04034b50, 4);
-    bytes += facts + name + content;
+    bytes += facts;
+    bytes += name;
+    bytes += content;
   }
   const std::size_t directory_at = bytes.size();
   bytes += directory;

@@ -21,6 +21,7 @@
 #include "core/model/model.h"
 #include "reconstruction/mesh/accuracy/accuracy.h"
 #include "reconstruction/mesh/accuracy/agreement.h"
+#include "terrain/dem/dem_io.h"
 
 namespace groundray::golden {
 namespace {
