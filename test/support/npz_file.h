@@ -26,7 +26,7 @@ inline void write_npz(const std::filesystem::path& path,
                       const std::vector<std::pair<std::string, std::string>>& arrays) {
   std::string bytes, directory;
   const auto put = [](std::string& to, std::uint64_t value, int count) {
-    for (int i = 0; i < count; ++i) to.push_back(static_cast<char>(value >> (8 * i) & 0xffU));
+    for (; count > 0; --count, value >>= 8U) to.push_back(static_cast<char>(value & 0xffU));
   };
   for (const auto& [array, content] : arrays) {
     const std::string name = array + ".npy";
