@@ -27,7 +27,8 @@ namespace {
 
 constexpr int module_failed = 3, package_missing = 4, lost = -1;
 constexpr std::string_view remedy =
-    "`pip install groundray[export]` installs it; $GROUNDRAY_PYTHON names another interpreter";
+    "`pip install '.[export]'` in groundray's sources installs it; $GROUNDRAY_PYTHON names another "
+    "interpreter";
 
 // A pipe. Its ends are closed on destruction, and are not inherited by programs started meanwhile.
 struct Pipe {

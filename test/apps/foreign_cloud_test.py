@@ -329,7 +329,7 @@ def test_without_the_package_the_message_says_what_to_install(tmp_path):
     result = run(VIEWER, file, "--screenshot", tmp_path / "out.png", GROUNDRAY_PYTHON="/no/python")
     assert result.returncode == 1
     assert "/no/python cannot be started (No such file or directory)" in result.stderr
-    assert "pip install groundray[export]" in result.stderr
+    assert "pip install '.[export]'" in result.stderr
     assert not (tmp_path / "out.png").exists()
     picture_of(Path(file), tmp_path)  # a name that begins with a dash is only a name
 

@@ -171,7 +171,10 @@ def test_without_python_the_message_says_what_to_install(tmp_path):
     nowhere = {"PATH": str(tmp_path)}
     line = refused(file, env=nowhere)
     assert "python3 cannot be started (No such file or directory)" in line
-    assert "`pip install groundray[export]` installs it; $GROUNDRAY_PYTHON names another" in line
+    assert (
+        "`pip install '.[export]'` in groundray's sources installs it; $GROUNDRAY_PYTHON names"
+        in line
+    )
     line = refused(file, env={**environment(), "GROUNDRAY_PYTHON": "/nowhere/python"})
     assert "/nowhere/python cannot be started" in line
 
@@ -180,17 +183,17 @@ def test_a_python_without_the_package_or_its_needs_is_named(tmp_path):
     file = write_mcap(tmp_path / "drive.mcap")
     line = refused(file, env=environment(PYTHONPATH=""))
     assert "groundray's Python package reads it, which " in line
-    assert f"{sys.executable} does not have: `pip install groundray[export]`" in line
+    assert f"{sys.executable} does not have: `pip install '.[export]'`" in line
     bare = tmp_path / "python"
     bare.write_text(f'#!/bin/sh\nexec {sys.executable} -S "$@"\n')
     bare.chmod(0o755)
     line = refused(file, env=environment(GROUNDRAY_PYTHON=str(bare)))
     assert "ModuleNotFoundError: No module named " in line
-    assert "pip install groundray[export]" in line
+    assert "pip install '.[export]'" in line
     # A Python that has everything but mcap.
     (tmp_path / "sitecustomize.py").write_text("import sys; sys.modules['mcap'] = None\n")
     line = refused(file, env=environment(PYTHONPATH=f"{PACKAGE}:{tmp_path}"))
-    assert "MCAP needs mcap, which this Python lacks: pip install groundray[export]" in line
+    assert "MCAP needs mcap, which this Python lacks: pip install mcap" in line
     old = tmp_path / "old"
     old.write_text("#!/bin/sh\necho 'unknown option -P' >&2\nexit 2\n")
     old.chmod(0o755)

@@ -210,8 +210,7 @@ def test_a_missing_package_is_one_message_with_the_remedy(run, tmp_path, capsys,
     )
     assert command.main([str(run), "--to", "denoised", "-o", str(tmp_path / "out")]) == 1
     assert capsys.readouterr().err == (
-        "groundray-export: denoised needs pyoidn, which is not installed: pip install pyoidn, or "
-        "groundray[denoise]\n"
+        "groundray-export: denoised needs pyoidn, which is not installed: pip install pyoidn\n"
     )
     assert names_in(tmp_path) == []
 

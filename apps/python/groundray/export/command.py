@@ -220,8 +220,7 @@ def _check_packages(form: str) -> None:
     ]
     if missing:
         rule = f"{form} needs {', '.join(missing)}, which is not installed"
-        extra = "denoise" if form == "denoised" else "export"
-        raise Error(f"{rule}: pip install {' '.join(missing)}, or groundray[{extra}]")
+        raise Error(f"{rule}: pip install {' '.join(missing)}")
 
 
 def _open(options: argparse.Namespace) -> Dataset:

@@ -27,9 +27,8 @@ def need(packages: Mapping[str, str], what: str) -> None:
     missing = [name for module, name in packages.items() if not importlib.util.find_spec(module)]
     if missing:
         names = ", ".join(missing)
-        raise LackingError(
-            f"{what} needs {names}, which this Python lacks: pip install groundray[export]"
-        )
+        install = " ".join(missing)
+        raise LackingError(f"{what} needs {names}, which this Python lacks: pip install {install}")
 
 
 def _limit_memory() -> None:
