@@ -71,8 +71,8 @@ void note_heights(const Simulation& simulation, Notes& notes) {
   for (const double height_m : std::set{grid->min_height_m(), grid->max_height_m()}) {
     if (!(height_m < deepest_m || height_m > highest_m)) continue;
     notes.push_back(
-        fmt::format("terrain: it has heights of {} m: if these mark missing samples, set "
-                    "`nodata: {}`",
+        fmt::format("terrain: it has heights of {} m: if these mark missing samples, set `nodata` "
+                    "to their value in the file, {} if that is in metres",
                     height_m, height_m));
   }
 }

@@ -135,7 +135,12 @@ def read_mcap(path: Path, wanted: str | None) -> tuple[str, Table]:
 
     parts: list[Table] = []
     with open_regular(path) as stream:
-        file = SeekingReader(stream, decoder_factories=[DecoderFactory()], record_size_limit=2**31)
+        file = SeekingReader(
+            stream,
+            validate_crcs=True,
+            decoder_factories=[DecoderFactory()],
+            record_size_limit=2**31,
+        )
         topic = _choose_topic(file, wanted)
         for message in _messages(file, topic):
             points = _points_of(message)
