@@ -133,7 +133,7 @@ def test_heights_that_mark_missing_samples_are_noted(tmp_path):
     scene += "lidars: [{name: top, preset: velodyne_vlp16, mount: {translation_m: [0, 0, 1.5]}}]\n"
     info = groundray("info", written(tmp_path, scene))
     assert info.returncode == 0, info.stderr
-    note = "note      terrain: it has heights of -32767 m: if these mark missing samples, set `nodata` to"
+    note = "note      terrain: it has heights of -32767 m: if these mark missing samples, set"
     assert note in info.stdout
     known = scene.replace("dem: dem.asc,", "dem: dem.asc, nodata: -32767,")
     assert "terrain: it has heights" not in groundray("info", written(tmp_path, known)).stdout
