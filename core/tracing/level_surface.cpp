@@ -130,6 +130,22 @@ double LevelSurface::clearance_m(const GridRay& ray, double t_m) const noexcept 
   return groundray::clearance_m(ray, cell.plane(cell.half_at(u, v)), t_m);
 }
 
+LevelSurface::PlainFacet LevelSurface::plain_facet_at(double u, double v) const noexcept {
+  const LevelView& all = *levels_.back();
+  if (!(all.first.x <= u && u < all.last.x && all.first.y <= v && v < all.last.y)) return {};
+  const int column = static_cast<int>(u), row = static_cast<int>(v);
+  const LevelScene::Impl& level = *levels_[level_at(column, row)];
+  const Leaf* leaf = level.leaf_at(column, row);
+  if (leaf == nullptr) return {};
+  const int exponent = level.deciding_exponent(*leaf), step = 1 << exponent;
+  if (leaf->coarser != 0 && step == leaf->step) return {};
+  const int west = leaf->column + ((column - leaf->column) & -step);
+  const int north = leaf->row + ((row - leaf->row) & -step);
+  if (west + step > level.last.x || north + step > level.last.y) return {};
+  const Half half = u - west + (v - north) > step ? Half::Far : Half::Near;
+  return {&level, {west, north, static_cast<std::int8_t>(exponent), half, leaf->deviation_m}};
+}
+
 namespace {
 
 // Returns the first t from t_in on at which a ray is `above_m` above both planes of a cell;
@@ -144,23 +160,6 @@ double rises_to(const Cell& cell, const GridRay& ray, double above_m, double t_i
     rise_m = rate > 0 ? std::max(rise_m, t_in + lacks_m / rate) : never_m;
   }
   return rise_m;
-}
-
-// Returns the same for a ray that begins, and stays until then, over one triangle of the cell; else
-// NaN.
-double rises_over_one(const Cell& cell, const GridRay& ray, double above_m) {
-  const Half half = cell.half_at(ray.u0, ray.v0);
-  const FacetPlane plane = cell.plane(half);
-  const double begins_m = clearance_m(ray, plane, 0);
-  const double rate = ray.dz - (plane.u_slope_m * ray.du + plane.v_slope_m * ray.dv);
-  if (!(begins_m >= 0)) return nan;
-  if (begins_m >= above_m) return 0;
-  if (!(rate > 0)) return nan;
-  const double rise_m = (above_m - begins_m) / rate;
-  const double u = ray.u0 + rise_m * ray.du, v = ray.v0 + rise_m * ray.dv;
-  const bool stays = cell.column <= u && u <= cell.column + cell.width && cell.row <= v &&
-                     v <= cell.row + cell.height && cell.half_at(u, v) == half;
-  return stays ? rise_m : nan;
 }
 
 }  // namespace
@@ -188,8 +187,6 @@ void LevelSurface::hit(const FacetRay& ray, const Leaf& leaf, Crossing& best) co
 LevelSurface::Escape LevelSurface::escape_surface(const FacetRay& ray,
                                                   double above_m) const noexcept {
   const double end_m = ray.far_m;
-  const double alone_m = rises_over_one(start(ray.grid, 0).cell, ray.grid, above_m);
-  if (alone_m <= end_m) return {alone_m, {}};
   Escape escape;
   Crossing best;
   walk(ray.grid, 0, end_m, cell_extent, [&](const Place& place, double t_in, double t_out) {

@@ -20,6 +20,14 @@ class LevelSurface {
   /// Beyond the boundary, the outermost facets are continued.
   double clearance_m(const GridRay& ray, double t_m) const noexcept;
 
+  /// Facet of an ordinary cell: a whole one, away from thinned sides.
+  struct PlainFacet {
+    const LevelScene::Impl* level = nullptr;  ///< null if there is none
+    Facet facet;
+  };
+  /// Returns the facet over a point in grid coordinates if it belongs to an ordinary cell.
+  PlainFacet plain_facet_at(double u, double v) const noexcept;
+
   /// Returns the first crossing from above on the cells that the ray passes in [t_begin_m,
   /// t_end_m].
   std::optional<Crossing> first_crossing(const FacetRay& ray, double t_begin_m,

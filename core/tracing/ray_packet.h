@@ -185,9 +185,20 @@ bool enter(const Target& target, std::span<const Hit> hits, Packet<W>& packet) n
   return any;
 }
 
-// Intersects each ray with the plane of the facet that Embree hit. `inside` becomes the
-// intersection's depth inside the facet (cells; its smallest barycentric coordinate), negative if
-// it lies outside or the plane is hit from behind.
+// Returns the depth inside its facet (cells; the smallest barycentric coordinate) of the point that
+// a ray reaches, negative if it lies outside.
+template <int W>
+double depth_inside(const Packet<W>& packet, std::size_t i, double range_m) noexcept {
+  const double side = packet.side[i];
+  // The far half is the near half rotated by 180 degrees: 1 - u, 1 - v.
+  const double offset = (1 - side) / 2;
+  const double u = (packet.u0[i] + range_m * packet.du[i] - packet.column[i]) * packet.per_step[i];
+  const double v = (packet.v0[i] + range_m * packet.dv[i] - packet.row[i]) * packet.per_step[i];
+  return std::min(std::min(offset + side * u, offset + side * v), side * (1 - (u + v)));
+}
+
+// Intersects each ray with the plane of the facet that Embree hit. `inside` becomes the depth of
+// the intersection inside the facet, negative if the plane is hit from behind.
 template <int W>
 void meet_planes(Packet<W>& packet) noexcept {
   for (std::size_t i = 0; i < W; ++i) {
@@ -197,17 +208,27 @@ void meet_planes(Packet<W>& packet) noexcept {
     const double closing =
         -(packet.dz[i] - (packet.u_slope_m[i] * packet.du[i] + packet.v_slope_m[i] * packet.dv[i]));
     const double range_m = above_m / closing;
-    const double side = packet.side[i];
-    // The far half is the near half rotated by 180 degrees: 1 - u, 1 - v.
-    const double offset = (1 - side) / 2;
-    const double u =
-        (packet.u0[i] + range_m * packet.du[i] - packet.column[i]) * packet.per_step[i];
-    const double v = (packet.v0[i] + range_m * packet.dv[i] - packet.row[i]) * packet.per_step[i];
-    const double inside =
-        std::min(std::min(offset + side * u, offset + side * v), side * (1 - (u + v)));
+    const double inside = depth_inside(packet, i, range_m);
     const double along_m = std::min(range_m - packet.enter_m[i], packet.leave_m[i] - range_m);
     packet.range_m[i] = range_m;
     packet.inside[i] = std::min(along_m, closing) > 0 ? inside : -1.0;
+  }
+}
+
+// Computes where rays that begin on the loaded facets or slightly above them are `above_m` above:
+// begin_m, or NaN for those that do not rise so far over their own facet.
+template <int W>
+void rise_over_planes(Packet<W>& packet, double above_m) noexcept {
+  for (std::size_t i = 0; i < W; ++i) {
+    const double begins_m =
+        packet.z_m[i] - (packet.height_m[i] + packet.u_slope_m[i] * packet.u0[i] +
+                         packet.v_slope_m[i] * packet.v0[i]);
+    const double rate =
+        packet.dz[i] - (packet.u_slope_m[i] * packet.du[i] + packet.v_slope_m[i] * packet.dv[i]);
+    const double rise_m = begins_m >= above_m ? 0.0 : (above_m - begins_m) / rate;
+    const bool ends_inside = depth_inside(packet, i, rise_m) >= 0;
+    const bool rises = begins_m >= 0 && rise_m >= 0 && rise_m <= packet.far_m[i] && ends_inside;
+    packet.begin_m[i] = rises ? rise_m : std::numeric_limits<double>::quiet_NaN();
   }
 }
 

@@ -275,17 +275,30 @@ bool RayTracer::Impl::start_inside(const Packet<W>& packet) const noexcept {
 }
 
 // Advances the start of rays that begin on the surface until it is so high above it that rounding
-// to float cannot place it below.
+// to float cannot place it below. Most rays rise that far over the facet that they leave.
 template <int W>
 void RayTracer::Impl::escape_surface(std::span<Hit> hits, Packet<W>& packet) const noexcept {
   const double above_m = 2.0 * everything.slack_m;
+  std::array<bool, W> plain{};
   for (std::size_t i = 0; i < W; ++i) {
-    const FacetRay ray = packet.facet_ray(static_cast<int>(i), surface.extent());
-    const auto [begin_m, crossing] = surface.escape_surface(ray, above_m);
-    packet.begin_m[i] = packet.inner_m[i] = begin_m;
-    if (!crossing || i >= hits.size()) continue;
-    hits[i] = hit_of(level(0).level.frame, *crossing);
-    packet.facets[i] = crossing->facet;
+    const auto [level, facet] = surface.plain_facet_at(packet.u0[i], packet.v0[i]);
+    plain[i] = level != nullptr;
+    if (plain[i]) packet.take(static_cast<int>(i), *level, facet);
+  }
+  packet.find_planes();
+  rise_over_planes(packet, above_m);
+  for (std::size_t i = 0; i < W; ++i) {
+    if (!plain[i] || std::isnan(packet.begin_m[i])) {
+      packet.begin_m[i] = 0;
+      const FacetRay ray = packet.facet_ray(static_cast<int>(i), surface.extent());
+      const auto [begin_m, crossing] = surface.escape_surface(ray, above_m);
+      packet.begin_m[i] = begin_m;
+      if (crossing && i < hits.size()) {
+        hits[i] = hit_of(level(0).level.frame, *crossing);
+        packet.facets[i] = crossing->facet;
+      }
+    }
+    packet.inner_m[i] = packet.begin_m[i];
   }
 }
 
