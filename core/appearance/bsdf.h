@@ -7,6 +7,7 @@
 
 #include "core/appearance/cosine_table.h"
 #include "core/appearance/material.h"
+#include "core/pack.h"
 
 namespace groundray {
 
@@ -35,9 +36,9 @@ struct CoatedBsdf {
   CosineTable<float> mirrored{};  ///< directional albedo of the specular reflection, by cosine
   double thrown_back = 0;  ///< fraction of the base's light that the coat reflects back inside
 
-  /// Returns the BRDF of the base, 1/sr, without the specular losses at entry and exit: f is this
-  /// times (1 - mirrored(cos_o)) (1 - mirrored(cos_i)).
-  glm::dvec3 base_per_sr() const noexcept;
+  /// Returns the BRDF of a base of albedo `of_base`, 1/sr, without the specular losses at entry and
+  /// exit: f is this times (1 - mirrored(cos_o)) (1 - mirrored(cos_i)).
+  glm::dvec3 base_per_sr(const glm::dvec3& of_base) const noexcept;
 };
 
 /// A rough metal (GGX), including light that is scattered by facets more than once (Kulla and
@@ -58,16 +59,22 @@ struct PlantLeafBsdf {
 /// A surface that reflects light only back to its source, for which `retro_brdf` is used.
 struct BlackBsdf {};
 
-/// A direction drawn by Bsdf::sample.
-struct BsdfSample {
-  glm::dvec3 wi{0, 0, 1};
-  glm::dvec3 weight{0};   ///< f |cos_i| / pdf; 0 if no light comes from wi: then end the path
-  double pdf_per_sr = 0;  ///< Bsdf::pdf_per_sr(wo, wi)
+/// A direction drawn by Bsdf::sample, or a pack of them.
+template <typename Real>
+struct BsdfSampleOf {
+  Vec3<Real> wi;
+  Vec3<Real> weight;  ///< f |cos_i| / pdf; 0 if no light comes from wi: then end the path
+  Real pdf_per_sr;    ///< Bsdf::pdf_per_sr(wo, wi)
 };
+using BsdfSample = BsdfSampleOf<double>;
 
 /// BSDF of a surface in three channels: linear sRGB, or one wavelength in all three. Plain data.
 /// Directions are unit vectors away from the surface, z = shading normal. Both sides of a surface
 /// are equal; only leaves transmit light.
+///
+/// `tint` is the colour of a texture, each channel >= 0: the surface's reflectance (of the base, if
+/// coated) is multiplied by it, and limited so that no more light leaves than arrives. Metals and
+/// retro-reflectors are not tinted.
 struct Bsdf {
   std::variant<LambertianBsdf, RoughDiffuseBsdf, CoatedBsdf, ConductorBsdf, PlantLeafBsdf,
                BlackBsdf>
@@ -75,25 +82,28 @@ struct Bsdf {
 
   /// Returns the BSDF f, 1/sr: radiance towards `wo` per irradiance from `wi`. Symmetric in `wo`
   /// and `wi`.
-  glm::dvec3 eval(const glm::dvec3& wo, const glm::dvec3& wi) const noexcept;
+  glm::dvec3 eval(const glm::dvec3& wo, const glm::dvec3& wi,
+                  const glm::dvec3& tint = glm::dvec3(1)) const noexcept;
+  Vec3<Pack> eval(const Vec3<Pack>& wo, const Vec3<Pack>& wi,
+                  const Vec3<Pack>& tint) const noexcept;
 
   /// Returns the density with which `sample` draws `wi`, 1/sr. Its integral is 1 minus the
   /// probability that `sample` returns a direction of density 0 (and weight 0).
-  double pdf_per_sr(const glm::dvec3& wo, const glm::dvec3& wi) const noexcept;
+  double pdf_per_sr(const glm::dvec3& wo, const glm::dvec3& wi,
+                    const glm::dvec3& tint = glm::dvec3(1)) const noexcept;
+  Pack pdf_per_sr(const Vec3<Pack>& wo, const Vec3<Pack>& wi,
+                  const Vec3<Pack>& tint) const noexcept;
 
   /// Draws a direction from which light arrives.
   /// @param u  uniform in [0, 1)^2.
-  BsdfSample sample(const glm::dvec3& wo, const glm::dvec2& u) const noexcept;
+  BsdfSample sample(const glm::dvec3& wo, const glm::dvec2& u,
+                    const glm::dvec3& tint = glm::dvec3(1)) const noexcept;
+  BsdfSampleOf<Pack> sample(const Vec3<Pack>& wo, const Vec2<Pack>& u,
+                            const Vec3<Pack>& tint) const noexcept;
 
   /// Returns the fraction of uniform illumination that is reflected to the side it came from, to
   /// 1e-3.
-  glm::dvec3 albedo() const noexcept;
-
-  /// Returns the surface with its reflectance (of the base, if coated) multiplied by the colour of
-  /// a texture. The product is limited so that no more light leaves than arrives. Metals and
-  /// retro-reflectors are unchanged.
-  /// @param factor  by channel, >= 0.
-  Bsdf tinted(const glm::dvec3& factor) const noexcept;
+  glm::dvec3 albedo(const glm::dvec3& tint = glm::dvec3(1)) const noexcept;
 };
 
 /// Returns the BSDF of a material for the colours of linear sRGB; colours out of gamut are clipped

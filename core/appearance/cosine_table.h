@@ -4,6 +4,9 @@
 #include <array>
 #include <cmath>
 #include <cstddef>
+#include <type_traits>
+
+#include "core/pack.h"
 
 namespace groundray {
 
@@ -31,9 +34,19 @@ class CosineTable {
   /// Returns the value at a cosine, which is clamped to [0, 1].
   T operator()(double cosine) const noexcept {
     const double place = std::sqrt(std::clamp(cosine, 0.0, 1.0)) * (size - 1);
-    const std::size_t i = std::min(static_cast<std::size_t>(place), size - 2);
-    const auto share = static_cast<float>(place - static_cast<double>(i));
-    return values_[i] * (1 - share) + values_[i + 1] * share;
+    const int i = std::min(static_cast<int>(place), static_cast<int>(size) - 2);
+    const auto share = static_cast<float>(place - i);
+    const T* const node = values_.data() + i;
+    return node[0] * (1 - share) + node[1] * share;
+  }
+
+  /// Returns the values at the cosines of a pack's lanes.
+  auto operator()(const Pack& cosine) const noexcept {
+    if constexpr (std::is_same_v<T, float>) {
+      return pack_of([&](std::size_t i) { return (*this)(double{cosine[i]}); });
+    } else {
+      return vectors_of([&](std::size_t i) { return (*this)(double{cosine[i]}); });
+    }
   }
 
   /// Returns the cosine-weighted mean over the hemisphere: twice the integral of value times

@@ -126,9 +126,10 @@ RetroBrdf retro(const CoatedBsdf& surface) {
   const double mirrored = mean_of([&](double cosine) { return double{surface.mirrored(cosine)}; });
   return {.rough = RoughRetro{.mirror = fresnel_reflectance(1, surface.refractive_index, 0),
                               .alpha = surface.alpha,
-                              .shared_per_sr = surface.base_per_sr().x,
+                              .shared_per_sr = surface.base_per_sr(surface.albedo).x,
                               .share = surface.mirrored},
-          .albedo = mirrored + pi * surface.base_per_sr().x * (1 - mirrored) * (1 - mirrored)};
+          .albedo = mirrored +
+                    pi * surface.base_per_sr(surface.albedo).x * (1 - mirrored) * (1 - mirrored)};
 }
 
 RetroBrdf retro(const ConductorBsdf& surface) {

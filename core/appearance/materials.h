@@ -35,12 +35,12 @@ class Materials {
     std::vector<glm::vec3> albedos;
 
     /// Returns the albedo of a material with a texture.
-    /// @param tint  as for Bsdf::tinted.
+    /// @param tint  as for Bsdf.
     glm::vec3 albedo(std::uint16_t material, const glm::vec3& tint) const noexcept {
       const Bsdf& bsdf = bsdfs[material];
       if (tint == glm::vec3(1) || std::holds_alternative<ConductorBsdf>(bsdf.surface))
         return albedos[material];
-      return glm::vec3(bsdf.tinted(glm::dvec3(tint)).albedo());
+      return glm::vec3(bsdf.albedo(glm::dvec3(tint)));
     }
   };
   /// Returns the BSDF and albedo of each material, computed at the first request.

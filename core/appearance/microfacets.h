@@ -1,10 +1,13 @@
 #pragma once
 
+#include <algorithm>
+#include <cmath>
 #include <glm/geometric.hpp>
-#include <glm/vec2.hpp>
 #include <glm/vec3.hpp>
+#include <numbers>
 
 #include "core/appearance/cosine_table.h"
+#include "core/elementary.h"
 
 // Private to this library: reflection by a rough surface of microfacets with the GGX distribution
 // of normals (Trowbridge and Reitz) and height-correlated Smith masking-shadowing. Directions are
@@ -13,27 +16,67 @@
 //      Understanding the masking-shadowing function in microfacet-based BRDFs (JCGT 2014).
 namespace groundray::ggx {
 
+/// Returns cos (1 + 2 Lambda), with Smith's Lambda, without a division by the cosine.
+template <typename Real>
+Real masked_cosine(const Real& cosine, double alpha) noexcept {
+  using std::sqrt;
+  return sqrt(cosine * cosine + alpha * alpha * (1.0 - cosine * cosine));
+}
+
 /// Returns the distribution of facet normals D(h), 1/sr: D(h) cos integrates to 1 over the
 /// hemisphere.
-double normals_per_sr(const glm::dvec3& h, double alpha) noexcept;
+template <typename Real>
+Real normals_per_sr(const Vec3<Real>& h, double alpha) noexcept {
+  const double alpha2 = alpha * alpha;
+  const Real spread = alpha2 * h.z * h.z + (h.x * h.x + h.y * h.y);
+  return alpha2 / (std::numbers::pi * spread * spread);
+}
 
 /// Returns D G2 / (4 cos_o cos_i), 1/sr: the BRDF of perfectly reflecting facets.
-double brdf_per_sr(const glm::dvec3& wo, const glm::dvec3& wi, double alpha) noexcept;
+template <typename Real>
+Real brdf_per_sr(const Vec3<Real>& wo, const Vec3<Real>& wi, double alpha) noexcept {
+  const Real normals = normals_per_sr(unit_of(wo + wi), alpha);
+  return normals / (2.0 * (wi.z * masked_cosine(wo.z, alpha) + wo.z * masked_cosine(wi.z, alpha)));
+}
 
 /// Returns brdf_per_sr times the cosine for light that returns to its source, 1/sr, as a function
 /// of the cosine of its angle to the normal.
-double retro_brdf_cos(double cosine, double alpha) noexcept;
+inline double retro_brdf_cos(double cosine, double alpha) noexcept {
+  const double alpha2 = alpha * alpha;
+  const double cos2 = cosine * cosine;
+  const double spread = alpha2 * cos2 + (1 - cos2);
+  return alpha2 / (4 * std::numbers::pi * spread * spread * masked_cosine(cosine, alpha));
+}
 
 /// Returns the direction into which a facet visible from `wo`, drawn by u in [0, 1)^2, reflects it.
 /// The direction may lie below the surface.
 /// @see Dupuy and Benyoub, Sampling visible GGX normals with spherical caps (HPG 2023).
-glm::dvec3 sample(const glm::dvec3& wo, double alpha, const glm::dvec2& u) noexcept;
+template <typename Real>
+Vec3<Real> sample(const Vec3<Real>& wo, double alpha, const Vec2<Real>& u) noexcept {
+  using std::max;
+  using std::sqrt;
+  const Vec3<Real> stretched = unit_of(Vec3<Real>(alpha * wo.x, alpha * wo.y, wo.z));
+  const Real z = (1.0 - u.y) * (1.0 + stretched.z) - stretched.z;
+  const Vec2<Real> across = on_circle(u.x) * sqrt(max(1.0 - z * z, Real(0.0)));
+  const Vec3<Real> normal = Vec3<Real>(across.x, across.y, z) + stretched;
+  const Vec3<Real> h =
+      unit_of(Vec3<Real>(alpha * normal.x, alpha * normal.y, max(normal.z, Real(1e-300))));
+  return h * (2.0 * dot_of(wo, h)) - wo;
+}
 
 /// Returns the density of `sample`, 1/sr.
-double pdf_per_sr(const glm::dvec3& wo, const glm::dvec3& wi, double alpha) noexcept;
+template <typename Real>
+Real pdf_per_sr(const Vec3<Real>& wo, const Vec3<Real>& wi, double alpha) noexcept {
+  const Real normals = normals_per_sr(unit_of(wo + wi), alpha);
+  return normals / (2.0 * (wo.z + masked_cosine(wo.z, alpha)));
+}
 
 /// Returns brdf_per_sr cos_i / pdf_per_sr of a sampled direction: at most 1; 0 below the surface.
-double sample_weight(const glm::dvec3& wo, const glm::dvec3& wi, double alpha) noexcept;
+inline double sample_weight(const glm::dvec3& wo, const glm::dvec3& wi, double alpha) noexcept {
+  if (!(wi.z > 0)) return 0;
+  const double masked_o = masked_cosine(wo.z, alpha);
+  return wi.z * (wo.z + masked_o) / (wi.z * masked_o + wo.z * masked_cosine(wi.z, alpha));
+}
 
 /// Returns the directional albedo of single scattering, by the cosine of incidence.
 /// @param fresnel  returns the reflectance of a facet by the cosine of incidence on it.
@@ -68,20 +111,35 @@ CosineTable<float> reflected_share(double alpha, Fresnel fresnel) {
 namespace groundray::oren_nayar {
 
 /// Returns the factor A.
-double scale(double roughness) noexcept;
+inline double scale(double roughness) noexcept {
+  return 1 / (1 + (0.5 - 2 / (3 * std::numbers::pi)) * roughness);
+}
 
 /// Returns the fraction of the incident light that leaves the surface, given the cosine of the
 /// angle of incidence.
-double share(double cosine, double roughness) noexcept;
+template <typename Real>
+Real share(const Real& cosine, double roughness) noexcept {
+  using std::max;
+  using std::min;
+  using std::sqrt;
+  const Real c = min(max(cosine, Real(0.0)), Real(1.0));
+  const Real s = sqrt(1.0 - c * c);
+  // tan(theta) (1 - s^3) of the paper, rewritten without the division by the cosine
+  const Real steep = s * c * (1.0 + s + s * s) / (1.0 + s);
+  const Real g = s * (angle_of_cosine(c) - s * c) + 2.0 / 3 * (steep - s);
+  return scale(roughness) * (1.0 + roughness * g / std::numbers::pi);
+}
 
 /// Returns the mean of `share` under uniform illumination.
-double mean_share(double roughness) noexcept;
+inline double mean_share(double roughness) noexcept {
+  return scale(roughness) * (1 + roughness * (2.0 / 3 - 28 / (15 * std::numbers::pi)));
+}
 
 /// Returns the albedo of the facets for which the whole surface has the given albedo under uniform
 /// illumination, multiple scattering included.
 template <typename Value>
 Value facet_albedo(const Value& albedo, double mean_share) noexcept {
-  return albedo / (mean_share + albedo * (1 - mean_share));
+  return albedo / (Value(mean_share) + albedo * Value(1 - mean_share));
 }
 
 }  // namespace groundray::oren_nayar

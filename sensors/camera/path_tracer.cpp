@@ -1,121 +1,129 @@
 #include "sensors/camera/path_tracer.h"
 
 #include <algorithm>
+#include <array>
 #include <cmath>
 #include <glm/geometric.hpp>
+#include <numeric>
 #include <utility>
 
 #include "core/appearance/normal_map.h"
 #include "core/error.h"
+#include "core/pack.h"
 
 namespace groundray {
 namespace {
 
 // Height above a surface at which rays start: more than the error of the range and rounding, which
 // could put them below.
-double lift_m(double range_m) { return 1e-6 + 2e-9 * range_m; }
-
-bool is_dark(const glm::vec3& light) { return std::max({light.r, light.g, light.b}) <= 0; }
+template <typename Real>
+Real lift_m(const Real& range_m) {
+  return 1e-6 + 2e-9 * range_m;
+}
 
 // Balance heuristic: weight of a contribution sampled with density `own` that another strategy
 // samples with density `other`. Camera rays, of density 0, have no other strategy.
 double balance_heuristic(double own, double other) { return own > 0 ? own / (own + other) : 1.0; }
 
 // Converts a density by area on a surface to a density by direction.
-double pdf_per_sr(double pdf_per_m2, const glm::dvec3& normal, const glm::dvec3& direction,
-                  double distance_m) {
-  const double cosine = std::abs(glm::dot(normal, direction));
-  return cosine > 0 ? pdf_per_m2 * distance_m * distance_m / cosine : 0;
+template <typename Real>
+Real pdf_per_sr(const Real& pdf_per_m2, const Vec3<Real>& normal, const Vec3<Real>& direction,
+                const Real& distance_m) {
+  using std::abs;
+  const Real cosine = abs(dot_of(normal, direction));
+  return select(cosine > 0.0, pdf_per_m2 * distance_m * distance_m / cosine, Real(0.0));
 }
 
-// Turns a shading normal that faces away from the camera until it does not, so that surfaces are
-// not black at grazing angles.
-glm::dvec3 towards_eye(const glm::dvec3& normal, const glm::dvec3& to_eye) {
-  const double cosine = glm::dot(normal, to_eye);
-  if (cosine >= least_shading_cosine) return normal;
-  return glm::normalize(normal + (least_shading_cosine - cosine) * to_eye);
+// Turns shading normals that face away from the camera until they do not, so that surfaces are not
+// black at grazing angles.
+Vec3<Pack> towards_eye(const Vec3<Pack>& normal, const Vec3<Pack>& to_eye) {
+  const Pack cosine = dot_of(normal, to_eye);
+  const Vec3<Pack> turned = unit_of(normal + to_eye * (least_shading_cosine - cosine));
+  return select(cosine >= least_shading_cosine, normal, turned);
 }
-
-// BSDF of the surface that a path hits, tinted by its textures.
-class Scatterer {
- public:
-  Scatterer(std::span<const Bsdf> bsdfs, const Appearance& seen, SobolPairs& numbers) {
-    std::uint32_t part = 0;
-    if (seen.count > 1) {  // choose one layer, with a probability equal to its share
-      double left = numbers.next().x;
-      while (part + 1 < seen.count && left >= static_cast<double>(seen.parts[part].share))
-        left -= static_cast<double>(seen.parts[part++].share);
-    }
-    const auto& [material, share, tint] = seen.parts[part];
-    bsdf_ = &bsdfs[material];
-    if (tint.color != glm::vec3(1)) bsdf_ = &tinted_.emplace(bsdf_->tinted(glm::dvec3(tint.color)));
-  }
-  Scatterer(const Scatterer&) = delete;
-  Scatterer& operator=(const Scatterer&) = delete;
-
-  const Bsdf& operator*() const { return *bsdf_; }
-
- private:
-  const Bsdf* bsdf_;
-  std::optional<Bsdf> tinted_;  // optional because a Bsdf is large and most surfaces have no tint
-};
 
 }  // namespace
 
-// Surface point of a path.
-struct PathTracer::Vertex {
-  // Orthonormal axes of a surface; z is `normal`. @see Duff et al., Building an orthonormal basis,
+// Surface points of a pack of paths, all of one material.
+struct PathTracer::Vertices {
+  // Orthonormal axes of surfaces; z is `normal`. @see Duff et al., Building an orthonormal basis,
   // revisited, JCGT 6(1) (2017).
   struct Axes {
-    glm::dvec3 x, y, z;
-    explicit Axes(const glm::dvec3& normal) : z(normal) {
-      const double sign = std::copysign(1.0, normal.z);
-      const double a = -1 / (sign + normal.z), b = normal.x * normal.y * a;
-      x = {1 + sign * normal.x * normal.x * a, sign * b, -sign * normal.x};
+    Vec3<Pack> x, y, z;
+    Axes() = default;
+    explicit Axes(const Vec3<Pack>& normal) : z(normal) {
+      const Pack sign = select(normal.z < 0.0, Pack(-1.0), Pack(1.0));
+      const Pack a = -1.0 / (sign + normal.z), b = normal.x * normal.y * a;
+      x = {1.0 + sign * normal.x * normal.x * a, sign * b, -sign * normal.x};
       y = {b, sign + normal.y * normal.y * a, -normal.y};
     }
-    glm::dvec3 into(const glm::dvec3& d) const {
-      return {glm::dot(d, x), glm::dot(d, y), glm::dot(d, z)};
+    Vec3<Pack> into(const Vec3<Pack>& d) const {
+      return {dot_of(d, x), dot_of(d, y), dot_of(d, z)};
     }
-    glm::dvec3 out_of(const glm::dvec3& d) const { return d.x * x + d.y * y + d.z * z; }
+    Vec3<Pack> out_of(const Vec3<Pack>& d) const { return x * d.x + y * d.y + z * d.z; }
   };
 
-  Vertex(const Ray& ray, const Hit& hit, const glm::dvec3& shading_normal)
-      : at(ray.origin + ray.direction * hit.range_m),
-        facet(glm::normalize(glm::dvec3(hit.normal))),
-        offset_m(lift_m(hit.range_m)),
-        far_m(ray.far_m),
-        time(ray.time),
-        axes(towards_eye(shading_normal, -ray.direction)),
-        to_eye(axes.into(-ray.direction)) {}
+  Vertices(std::span<const Workspace::Surface> surfaces, const Bsdf& surface, const Workspace& work)
+      : count(surfaces.size()), bsdf(surface), numbers(PackOfWords(0u), PackOfWords(0u)) {
+    std::array<const Ray*, pack_size> rays;
+    std::array<const Hit*, pack_size> hits;
+    std::array<const Workspace::Path*, pack_size> paths;
+    std::array<const Workspace::Surface*, pack_size> seen;
+    for (std::size_t lane = 0; lane < pack_size; ++lane) {
+      seen[lane] = &surfaces[std::min(lane, count - 1)];
+      rays[lane] = &work.rays[seen[lane]->path];
+      hits[lane] = &work.hits[seen[lane]->path];
+      paths[lane] = &work.paths[seen[lane]->path];
+      samples[lane] = paths[lane]->sample;
+      times[lane] = rays[lane]->time;
+    }
+    const Pack range_m = pack_of([&](std::size_t i) { return hits[i]->range_m; });
+    const Vec3<Pack> direction = vectors_of([&](std::size_t i) { return rays[i]->direction; });
+    at = vectors_of([&](std::size_t i) { return rays[i]->origin; }) + direction * range_m;
+    facet = unit_of(vectors_of([&](std::size_t i) { return hits[i]->normal; }));
+    offset_m = lift_m(range_m);
+    far_m = pack_of([&](std::size_t i) { return rays[i]->far_m; });
+    axes = Axes(towards_eye(vectors_of([&](std::size_t i) { return seen[i]->shading_normal; }),
+                            -direction));
+    to_eye = axes.into(-direction);
+    tint = vectors_of([&](std::size_t i) { return seen[i]->tint; });
+    throughput = vectors_of([&](std::size_t i) { return paths[i]->throughput; });
+    const auto words = [&](auto get) {
+      return PackOfWords([&](auto lane) { return get(paths[std::size_t{lane}]->numbers); });
+    };
+    numbers = {words([](const SobolPairs& n) { return n.seed(); }),
+               words([](const SobolPairs& n) { return n.index(); }),
+               words([](const SobolPairs& n) { return n.pairs(); })};
+  }
 
-  // Returns the origin of a ray that leaves to the side of a direction.
-  glm::dvec3 start(const glm::dvec3& direction) const {
-    return at + facet * std::copysign(offset_m, glm::dot(direction, facet));
+  // Returns the origins of rays that leave to the side of a direction.
+  Vec3<Pack> start(const Vec3<Pack>& direction) const {
+    return at + facet * copysign(offset_m, dot_of(direction, facet));
   }
-  // True if a direction is on the same side of the facet and of the shading normal; no other light
-  // passes.
-  bool lets_pass(const glm::dvec3& direction) const {
-    return glm::dot(direction, facet) * glm::dot(direction, axes.z) > 0;
-  }
-  std::optional<Ray> leave(const glm::dvec3& direction) const {
-    if (!lets_pass(direction)) return std::nullopt;
-    return Ray{start(direction), direction, far_m, time};
-  }
-  // Returns a shadow ray that ends before a point, by more than the error of its range.
-  std::optional<Ray> leave_for(const glm::dvec3& point) const {
-    const glm::dvec3 origin = start(point - at);
-    const double distance_m = glm::distance(origin, point);
-    const glm::dvec3 direction = (point - origin) / distance_m;
-    if (!(distance_m > 0) || !lets_pass(direction)) return std::nullopt;
-    return Ray{origin, direction, distance_m - lift_m(distance_m), time};
+  // True where a direction is on the same side of the facet and of the shading normal; no other
+  // light passes.
+  Pack::mask_type lets_pass(const Vec3<Pack>& direction) const {
+    return dot_of(direction, facet) * dot_of(direction, axes.z) > 0.0;
   }
 
-  glm::dvec3 at, facet;
-  double offset_m, far_m;
-  std::chrono::nanoseconds time;
+  std::size_t count;  // of lanes in use; those beyond repeat the last
+  const Bsdf& bsdf;
+  std::array<std::uint32_t, pack_size> samples;
+  std::array<std::chrono::nanoseconds, pack_size> times;
+  Vec3<Pack> at, facet;
+  Pack offset_m, far_m;
   Axes axes;          // z is the shading normal
-  glm::dvec3 to_eye;  // in `axes`
+  Vec3<Pack> to_eye;  // in `axes`
+  Vec3<Pack> tint, throughput;
+  SobolPairsOf<PackOfWords> numbers;
+};
+
+// Directions drawn to a light from a pack of surface points.
+struct PathTracer::LightSamples {
+  Vec3<Pack> direction;
+  Vec3<Pack> radiance;
+  Pack pdf_per_sr;  // 0 where there is none
+  Pack far_m;       // length of the shadow rays
 };
 
 PathTracer::PathTracer(const Scene& scene, const Sky& sky, int depth,
@@ -143,16 +151,22 @@ void PathTracer::trace(std::span<const Sample> samples, std::span<glm::vec3> rad
     scene_.trace(work.rays, work.hits, rays == 1 ? Batch::Alike : Batch::Scattered);
     for (std::size_t i = 0; rays == 1 && i < labels.size(); ++i)
       labels[i] = work.hits[i] ? scene_.truth_of(work.rays[i], work.hits[i]).label : 0;
+    for (std::size_t k = 0; k < work.paths.size(); ++k) {
+      Workspace::Path& path = work.paths[k];
+      radiance[path.sample] += emitted(work.rays[k], work.hits[k], path);
+    }
+    if (rays == depth_) return;
+    find_surfaces(work);
     work.next_paths.clear();
     work.next_rays.clear();
     for (Workspace::ShadowQueue* queue : {&work.of_sun, &work.of_others}) {
       queue->rays.clear();
       queue->lights.clear();
     }
-    for (std::size_t k = 0; k < work.paths.size(); ++k) {
-      Workspace::Path& path = work.paths[k];
-      radiance[path.sample] += emitted(work.rays[k], work.hits[k], path);
-      if (work.hits[k] && rays < depth_) scatter(work.rays[k], work.hits[k], path, work);
+    std::size_t begin = 0;
+    for (const std::size_t end : work.ends) {
+      for (; begin < end; begin = std::min(begin + pack_size, end))
+        scatter(std::span(work.by_material).subspan(begin, std::min(pack_size, end - begin)), work);
     }
     add_light(work.of_sun, Batch::ShadowRays, radiance, work);
     add_light(work.of_others, Batch::Scattered, radiance, work);
@@ -187,7 +201,8 @@ glm::vec3 PathTracer::emitted(const Ray& ray, const Hit& hit,
   if (!emitters_.any_shines()) return sum;
   const auto [shines, drawn_per_m2] = emitters_.glow_of(hit);
   const double share = balance_heuristic(
-      path.pdf_per_sr, pdf_per_sr(drawn_per_m2, hit.normal, ray.direction, hit.range_m));
+      path.pdf_per_sr,
+      pdf_per_sr(drawn_per_m2, glm::dvec3(hit.normal), ray.direction, hit.range_m));
   return sum + path.throughput * glm::vec3(shines * share);
 }
 
@@ -198,65 +213,128 @@ glm::dvec3 PathTracer::emitted_by_sky(const glm::dvec3& direction,
   return sky_.dome_radiance(direction) * balance_heuristic(pdf_per_sr, other);
 }
 
+// Looks up the surfaces that paths hit, ordered by material, so that packs of them share a BSDF.
+void PathTracer::find_surfaces(Workspace& work) const {
+  work.surfaces.clear();
+  work.ends.assign(bsdfs_.size(), 0);
+  for (std::uint32_t k = 0; k < work.paths.size(); ++k) {
+    const Ray& ray = work.rays[k];
+    const Hit& hit = work.hits[k];
+    if (!hit) continue;
+    const Appearance seen = scene_.appearance_of(ray, hit, 0, Filtering::Fast);
+    std::uint32_t part = 0;
+    if (seen.count > 1) {  // choose one layer, with a probability equal to its share
+      double left = work.paths[k].numbers.next().x;
+      while (part + 1 < seen.count && left >= static_cast<double>(seen.parts[part].share))
+        left -= static_cast<double>(seen.parts[part++].share);
+    }
+    const auto& [material, share, tint] = seen.parts[part];
+    work.surfaces.push_back(
+        {scene_.shading_normal_of(ray, hit, 0, Filtering::Fast), tint.color, k, material});
+    ++work.ends[material];
+  }
+  std::exclusive_scan(work.ends.begin(), work.ends.end(), work.ends.begin(), std::size_t{0});
+  work.by_material.resize(work.surfaces.size());
+  for (const Workspace::Surface& surface : work.surfaces)
+    work.by_material[work.ends[surface.material]++] = surface;
+}
+
+// Samples direct light at surface points and continues their paths.
+void PathTracer::scatter(std::span<const Workspace::Surface> surfaces, Workspace& work) const {
+  const Bsdf& bsdf = bsdfs_[surfaces.front().material];
+  Vertices vertices(surfaces, bsdf, work);
+  sample_direct(vertices, work);
+  const auto drawn = bsdf.sample(vertices.to_eye, vertices.numbers.next(), vertices.tint);
+  const Vec3<Pack> direction = vertices.axes.out_of(drawn.wi);
+  const Vec3<Pack> origin = vertices.start(direction);
+  const Vec3<Pack> throughput = vertices.throughput * drawn.weight;
+  const auto goes_on =
+      drawn.pdf_per_sr > 0.0 && vertices.lets_pass(direction) && largest_of(throughput) > 0.0;
+  for (std::size_t lane = 0; lane < vertices.count; ++lane) {
+    if (!goes_on[lane]) continue;
+    work.next_paths.push_back({vertices.samples[lane],
+                               static_cast<float>(drawn.pdf_per_sr[lane]),
+                               glm::vec3(vector_at(throughput, lane)),
+                               {vertices.numbers.seed()[lane], vertices.numbers.index()[lane],
+                                vertices.numbers.pairs()[lane]}});
+    work.next_rays.push_back({vector_at(origin, lane), vector_at(direction, lane),
+                              vertices.far_m[lane], vertices.times[lane]});
+  }
+}
+
+// Queues shadow rays to a light, with what they contribute if they are not occluded.
+void PathTracer::enqueue(const Vertices& vertices, const LightSamples& light, Strategies strategies,
+                         Workspace::ShadowQueue& queue) {
+  using std::abs;
+  const Vec3<Pack> wi = vertices.axes.into(light.direction);
+  Pack density = light.pdf_per_sr;
+  if (strategies == Strategies::Both)
+    density += vertices.bsdf.pdf_per_sr(vertices.to_eye, wi, vertices.tint);
+  const Vec3<Pack> weight =
+      vertices.bsdf.eval(vertices.to_eye, wi, vertices.tint) * (abs(wi.z) / density);
+  const Vec3<Pack> arrives = vertices.throughput * weight * light.radiance;
+  const Vec3<Pack> origin = vertices.start(light.direction);
+  const auto counts =
+      light.pdf_per_sr > 0.0 && vertices.lets_pass(light.direction) && largest_of(arrives) > 0.0;
+  for (std::size_t lane = 0; lane < vertices.count; ++lane) {
+    if (!counts[lane]) continue;
+    queue.rays.push_back({vector_at(origin, lane), vector_at(light.direction, lane),
+                          light.far_m[lane], vertices.times[lane]});
+    queue.lights.push_back({vertices.samples[lane], glm::vec3(vector_at(arrives, lane))});
+  }
+}
+
 // Next-event estimation. The sun is sampled here alone: hardly any path hits its disc by chance,
 // and no lobe of a BSDF is much narrower. A constant dome is omitted: no density samples it better
 // than the BSDF's.
-void PathTracer::sample_direct(const Vertex& vertex, const Bsdf& bsdf, Workspace::Path& path,
-                               Workspace& work) const {
-  const auto enqueue = [&](Workspace::ShadowQueue& queue, const std::optional<Ray>& to_light,
-                           const glm::dvec3& radiance, const auto& density) {
-    if (!to_light) return;
-    const glm::dvec3 wi = vertex.axes.into(to_light->direction);
-    const glm::dvec3 weight = bsdf.eval(vertex.to_eye, wi) * (std::abs(wi.z) / density(wi));
-    const glm::vec3 arrives = path.throughput * glm::vec3(weight * radiance);
-    if (is_dark(arrives)) return;
-    queue.rays.push_back(*to_light);
-    queue.lights.push_back({path.sample, arrives});
-  };
-  const auto with_own = [&](double pdf_per_sr) {
-    return [&, pdf_per_sr](const glm::dvec3& wi) {
-      return pdf_per_sr + bsdf.pdf_per_sr(vertex.to_eye, wi);
-    };
-  };
+void PathTracer::sample_direct(Vertices& vertices, Workspace& work) const {
   if (const auto& sun = sky_.sun(); sun && sun->is_up()) {
-    const auto drawn = sun->sample(path.numbers.next());
-    enqueue(work.of_sun, vertex.leave(drawn.direction), sun->radiance(drawn.direction),
-            [&](const glm::dvec3&) { return drawn.pdf_per_sr; });
+    const auto drawn = sun->draw(vertices.numbers.next());
+    const LightSamples to_sun{drawn.direction, drawn.radiance, Pack(1 / sun->solid_angle_sr()),
+                              vertices.far_m};
+    enqueue(vertices, to_sun, Strategies::LightAlone, work.of_sun);
   }
   if (!sky_.is_constant_dome()) {
-    const auto [direction, density] = sky_.sample_dome(path.numbers.next());
-    if (density > 0)
-      enqueue(work.of_others, vertex.leave(direction), sky_.dome_radiance(direction),
-              with_own(density));
+    const Vec2<Pack> u = vertices.numbers.next();
+    LightSamples to_dome{.far_m = vertices.far_m};
+    for (std::size_t lane = 0; lane < pack_size; ++lane) {
+      const auto [direction, density] = sky_.sample_dome({u.x[lane], u.y[lane]});
+      set_vector(to_dome.direction, lane, direction);
+      set_vector(to_dome.radiance, lane, sky_.dome_radiance(direction));
+      to_dome.pdf_per_sr[lane] = density;
+    }
+    enqueue(vertices, to_dome, Strategies::Both, work.of_others);
   }
-  if (!emitters_.any_is_drawn()) return;
-  const glm::dvec2 which = path.numbers.next();
-  const auto [point, normal, glow] = emitters_.draw(which, path.numbers.next(), vertex.time);
-  const auto ray = vertex.leave_for(point);
-  if (!ray) return;
-  const double distance_m = glm::distance(ray->origin, point);
-  const double density = pdf_per_sr(glow.pdf_per_m2, normal, ray->direction, distance_m);
-  if (!(density > 0)) return;
-  enqueue(work.of_others, ray,
-          air_ ? air_->through(glow.radiance, distance_m, glm::dvec3(0)) : glow.radiance,
-          with_own(density));
+  if (emitters_.any_is_drawn()) sample_emitters(vertices, work);
 }
 
-void PathTracer::scatter(const Ray& ray, const Hit& hit, Workspace::Path path,
-                         Workspace& work) const {
-  const Vertex vertex(ray, hit, scene_.shading_normal_of(ray, hit, 0, Filtering::Fast));
-  const Scatterer scatterer(bsdfs_, scene_.appearance_of(ray, hit, 0, Filtering::Fast),
-                            path.numbers);
-  const Bsdf& bsdf = *scatterer;
-  sample_direct(vertex, bsdf, path, work);
-  const auto [wi, weight, pdf_per_sr] = bsdf.sample(vertex.to_eye, path.numbers.next());
-  if (!(pdf_per_sr > 0)) return;
-  const auto onward = vertex.leave(vertex.axes.out_of(wi));
-  path.throughput *= glm::vec3(weight);
-  if (!onward || is_dark(path.throughput)) return;
-  path.pdf_per_sr = static_cast<float>(pdf_per_sr);
-  work.next_paths.push_back(path);
-  work.next_rays.push_back(*onward);
+void PathTracer::sample_emitters(Vertices& vertices, Workspace& work) const {
+  using std::sqrt;
+  const Vec2<Pack> which = vertices.numbers.next(), where = vertices.numbers.next();
+  std::array<Emitters::Point, pack_size> drawn;
+  for (std::size_t lane = 0; lane < pack_size; ++lane)
+    drawn[lane] = emitters_.draw({which.x[lane], which.y[lane]}, {where.x[lane], where.y[lane]},
+                                 vertices.times[lane]);
+  const Vec3<Pack> point = vectors_of([&](std::size_t i) { return drawn[i].p_DQ; });
+  const Vec3<Pack> from_start = point - vertices.start(point - vertices.at);
+  const Pack distance_m = sqrt(dot_of(from_start, from_start));
+  LightSamples light{.direction = from_start / distance_m,
+                     .radiance = vectors_of([&](std::size_t i) {
+                       const glm::dvec3& radiance = drawn[i].glow.radiance;
+                       return air_ ? air_->through(radiance, distance_m[i], glm::dvec3(0))
+                                   : radiance;
+                     }),
+                     // shadow rays end before the point, by more than the error of its range
+                     .far_m = distance_m - lift_m(distance_m)};
+  const Pack density = pdf_per_sr(pack_of([&](std::size_t i) { return drawn[i].glow.pdf_per_m2; }),
+                                  vectors_of([&](std::size_t i) { return drawn[i].normal; }),
+                                  light.direction, distance_m);
+  // A point nearly in the facet's plane may be on the other side of it than its direction.
+  const auto is_before =
+      dot_of(point - vertices.at, vertices.facet) * dot_of(light.direction, vertices.facet) > 0.0 &&
+      distance_m > 0.0;
+  light.pdf_per_sr = select(is_before, density, Pack(0.0));
+  enqueue(vertices, light, Strategies::Both, work.of_others);
 }
 
 }  // namespace groundray

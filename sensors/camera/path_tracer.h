@@ -50,6 +50,13 @@ class PathTracer {
       glm::vec3 throughput;
       SobolPairs numbers;
     };
+    /// Surface that a path hit.
+    struct Surface {
+      glm::dvec3 shading_normal;
+      glm::vec3 tint;
+      std::uint32_t path;
+      std::uint16_t material;
+    };
     /// Contribution of a shadow ray if that is not occluded.
     struct Light {
       std::uint32_t sample;
@@ -63,6 +70,8 @@ class PathTracer {
     std::vector<Path> paths, next_paths;
     std::vector<Ray> rays, next_rays;
     std::vector<Hit> hits, light_hits;
+    std::vector<Surface> surfaces, by_material;
+    std::vector<std::size_t> ends;  // of each material's surfaces
     ShadowQueue of_sun, of_others;
   };
 
@@ -75,12 +84,17 @@ class PathTracer {
              std::span<std::uint16_t> labels = {}) const;
 
  private:
-  struct Vertex;
+  struct Vertices;
+  struct LightSamples;
   glm::vec3 emitted(const Ray& ray, const Hit& hit, Workspace::Path& path) const noexcept;
   glm::dvec3 emitted_by_sky(const glm::dvec3& direction, double pdf_per_sr) const noexcept;
-  void scatter(const Ray& ray, const Hit& hit, Workspace::Path path, Workspace& work) const;
-  void sample_direct(const Vertex& vertex, const Bsdf& bsdf, Workspace::Path& path,
-                     Workspace& work) const;
+  void find_surfaces(Workspace& work) const;
+  void scatter(std::span<const Workspace::Surface> surfaces, Workspace& work) const;
+  void sample_direct(Vertices& vertices, Workspace& work) const;
+  void sample_emitters(Vertices& vertices, Workspace& work) const;
+  enum class Strategies { LightAlone, Both };  // that may find a light: see the balance heuristic
+  static void enqueue(const Vertices& vertices, const LightSamples& light, Strategies strategies,
+                      Workspace::ShadowQueue& queue);
   void add_light(const Workspace::ShadowQueue& queue, Batch batch, std::span<glm::vec3> radiance,
                  Workspace& work) const;
 

@@ -121,27 +121,22 @@ constexpr double limb_darkening[3][limb_powers] = {
 #include <sky/limb_darkening.inc>
 };
 
-// Returns the means of the channels' polynomials over the projected disc. The mean of mu^j is
-// 2 / (j + 2), because equal areas are equal steps of mu^2.
-glm::dvec3 mean_darkening() {
-  glm::dvec3 mean(0);
-  for (glm::length_t channel = 0; channel < 3; ++channel) {
-    for (int j = 0; j < limb_powers; ++j) mean[channel] += limb_darkening[channel][j] * 2 / (j + 2);
+// Returns the coefficients of each channel's radiance over its mean on the projected disc, in
+// powers of the cosine mu of the angle of emission. The mean of mu^j is 2 / (j + 2), because equal
+// areas are equal steps of mu^2.
+std::array<glm::dvec3, limb_powers> relative_limb(SunDisc disc) {
+  std::array<glm::dvec3, limb_powers> limb{};
+  if (disc == SunDisc::Uniform) {
+    limb[0] = glm::dvec3(1);
+    return limb;
   }
-  return mean;
-}
-
-// Returns each channel's radiance over its mean on the projected disc; mu is the cosine of the
-// angle of emission.
-glm::dvec3 relative_radiance(double mu) {
-  static const glm::dvec3 mean = mean_darkening();
-  glm::dvec3 here(0);
   for (glm::length_t channel = 0; channel < 3; ++channel) {
-    double power = 1;
-    for (int j = 0; j < limb_powers; ++j, power *= mu)
-      here[channel] += limb_darkening[channel][j] * power;
+    double mean = 0;
+    for (int j = 0; j < limb_powers; ++j) mean += limb_darkening[channel][j] * 2 / (j + 2);
+    for (int j = 0; j < limb_powers; ++j)
+      limb[static_cast<std::size_t>(j)][channel] = limb_darkening[channel][j] / mean;
   }
-  return here / mean;
+  return limb;
 }
 
 SunPosition position_of(const SunSpec& spec, const ClearAir& air) {
@@ -263,7 +258,7 @@ glm::dvec3 direct_irradiance_rgb(double elevation_rad, const ClearAir& air) {
   return glm::max(sum, glm::dvec3(0));  // the reddest light near the horizon is outside sRGB
 }
 
-Sun::Sun(const SunSpec& spec, const ClearAir& air) : air_(air), disc_(spec.disc) {
+Sun::Sun(const SunSpec& spec, const ClearAir& air) : air_(air) {
   check_air(air);
   const SunPosition position = position_of(spec, air);
   direction_ = position.direction;
@@ -279,7 +274,8 @@ Sun::Sun(const SunSpec& spec, const ClearAir& air) : air_(air), disc_(spec.disc)
   depth_ = disc_depth(radius_rad_);
   rim_squared_ = std::sin(radius_rad_) * std::sin(radius_rad_);
   // On a plane perpendicular to the rays, the disc has the cosine-weighted solid angle pi sin^2.
-  mean_radiance_ = irradiance_ / (pi * rim_squared_);
+  limb_ = relative_limb(spec.disc);
+  for (glm::dvec3& power : limb_) power *= irradiance_ / (pi * rim_squared_);
 }
 
 double Sun::solid_angle_sr() const noexcept { return 2 * pi * depth_; }
@@ -287,18 +283,12 @@ double Sun::solid_angle_sr() const noexcept { return 2 * pi * depth_; }
 glm::dvec3 Sun::radiance(const glm::dvec3& direction) const noexcept {
   const double depth = versine(direction, direction_);
   if (!is_up() || depth > depth_) return glm::dvec3(0);
-  if (disc_ == SunDisc::Uniform) return mean_radiance_;
-  const double off_center = depth * (2 - depth) / rim_squared_;  // sin^2 over that of the limb
-  return mean_radiance_ * relative_radiance(std::sqrt(std::max(1 - off_center, 0.0)));
+  return disc_radiance(depth * (2 - depth));
 }
 
 DirectionSample Sun::sample(const glm::dvec2& uniform) const noexcept {
   if (!is_up()) return {direction_, 0};
-  const double depth = uniform.x * depth_;
-  const double sine = std::sqrt(depth * (2 - depth));
-  const double turn = 2 * pi * uniform.y;
-  return {(1 - depth) * direction_ + sine * (std::cos(turn) * across_ + std::sin(turn) * up_),
-          1 / solid_angle_sr()};
+  return {draw(uniform).direction, 1 / solid_angle_sr()};
 }
 
 double Sun::pdf_per_sr(const glm::dvec3& direction) const noexcept {

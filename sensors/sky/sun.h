@@ -1,10 +1,16 @@
 #pragma once
 
+#include <algorithm>
+#include <array>
 #include <chrono>
+#include <cmath>
+#include <cstddef>
 #include <glm/vec2.hpp>
 #include <glm/vec3.hpp>
 #include <variant>
 
+#include "core/elementary.h"
+#include "core/pack.h"
 #include "sensors/sky/direction_sampler.h"
 
 namespace groundray {
@@ -125,21 +131,50 @@ class Sun {
   /// Returns the density, 1/sr, with which `sample` draws a unit direction.
   double pdf_per_sr(const glm::dvec3& direction) const noexcept;
 
+  /// A direction to the disc, or a pack of them, and the radiance from there.
+  template <typename Real>
+  struct Draw {
+    Vec3<Real> direction, radiance;
+  };
+  /// Draws as `sample`; the sun must be up.
+  template <typename Real>
+  Draw<Real> draw(const Vec2<Real>& uniform) const noexcept {
+    using std::sqrt;
+    const Real depth = uniform.x * depth_;
+    const Real sine2 = depth * (2.0 - depth);
+    const Vec2<Real> aside = on_circle(uniform.y) * sqrt(sine2);
+    return {Vec3<Real>(direction_) * (1.0 - depth) + Vec3<Real>(across_) * aside.x +
+                Vec3<Real>(up_) * aside.y,
+            disc_radiance(sine2)};
+  }
+
   const ClearAir& air() const noexcept { return air_; }
   double distance_au() const noexcept { return distance_au_; }
 
  private:
+  // Returns the radiance by the squared sine of the angle from the disc's centre.
+  template <typename Real>
+  Vec3<Real> disc_radiance(const Real& sine2) const noexcept {
+    using std::max;
+    using std::sqrt;
+    const Real mu = sqrt(max(1.0 - sine2 / rim_squared_, Real(0.0)));
+    Vec3<Real> radiance(limb_.back());
+    for (std::size_t j = limb_.size() - 1; j-- > 0;)
+      radiance = radiance * mu + Vec3<Real>(limb_[j]);
+    return radiance;
+  }
+
   ClearAir air_;
   glm::dvec3 direction_;
   double distance_au_;
   double elevation_rad_;
   double radius_rad_;
   glm::dvec3 irradiance_{0};
-  SunDisc disc_;
-  glm::dvec3 across_, up_;    // axes of the disc, perpendicular to direction_
-  double depth_;              // 1 - cos of the disc's radius
-  double rim_squared_;        // sin^2 of the disc's radius
-  glm::dvec3 mean_radiance_;  // over the projected disc
+  glm::dvec3 across_, up_;  // axes of the disc, perpendicular to direction_
+  double depth_;            // 1 - cos of the disc's radius
+  double rim_squared_;      // sin^2 of the disc's radius
+  // Coefficients of the radiance in powers of the cosine of the angle of emission.
+  std::array<glm::dvec3, 6> limb_{};
 };
 
 /// Returns the spectral irradiance, W/(m^2 nm), of a plane perpendicular to the sun's rays, for a
