@@ -47,6 +47,7 @@ Screw::Screw(const Pose& end) : axis_(0), along_m_(end.translation_m) {
 }
 
 Pose Screw::at(double s) const {
+  if (angle_rad_ == 0) return {{1, 0, 0, 0}, along_m_ * s};
   const double half = angle_rad_ * s / 2;
   const double sine = std::sin(half);
   const double cosine = std::cos(half);

@@ -96,8 +96,8 @@ Appearance Scene::appearance_of(const Ray& ray, const Hit& hit, double width_m,
 glm::dvec3 Scene::shading_normal_of(const Ray& ray, const Hit& hit, double width_m,
                                     Filtering filtering) const noexcept {
   if (hit.object == 0) {
+    if (cover.empty()) return glm::normalize(glm::dvec3(hit.normal));
     const GroundCover::Point point = ground_point(*this, ray, hit);
-    if (cover.empty()) return point.normal;
     return cover.shading_normal_at(point, surface_patch(width_m, ray.direction, point.normal),
                                    filtering);
   }

@@ -10,11 +10,12 @@
 #include <glm/geometric.hpp>
 #include <limits>
 #include <mutex>
-#include <numbers>
 #include <utility>
 
+#include "core/elementary.h"
 #include "core/error.h"
 #include "core/image/luminance.h"
+#include "core/pack.h"
 #include "sensors/camera/lens/pixel_patch.h"
 #include "sensors/camera/path_spread.h"
 
@@ -24,20 +25,19 @@ namespace {
 using std::chrono::nanoseconds;
 
 constexpr int block_px = 4;  // side of the blocks of pixels that are traced in succession
+constexpr int strip_px = 8;  // height of the strips that are rendered in parallel
 constexpr std::size_t paths_at_once = 4096;
 
 nanoseconds time_of(double seconds) { return nanoseconds(std::llround(seconds * 1e9)); }
 
 // Maps the unit square to the unit disc; preserves areas and adjacency.
 // @see Shirley and Chiu, A low distortion map between disk and square, JGT 2(3) (1997).
-glm::dvec2 on_disc(const glm::dvec2& u) {
-  const glm::dvec2 p = 2.0 * u - 1.0;
-  if (p.x == 0 && p.y == 0) return p;
-  constexpr double quarter = std::numbers::pi / 4;
-  const bool is_wide = std::abs(p.x) > std::abs(p.y);
-  const double radius = is_wide ? p.x : p.y;
-  const double angle_rad = is_wide ? quarter * (p.y / p.x) : quarter * (2 - p.x / p.y);
-  return radius * glm::dvec2(std::cos(angle_rad), std::sin(angle_rad));
+Vec2<Pack> on_disc(const Vec2<Pack>& u) {
+  const Vec2<Pack> p = u * Pack(2.0) - Vec2<Pack>(Pack(1.0));
+  const auto is_wide = abs(p.x) > abs(p.y);
+  const Pack radius = select(is_wide, p.x, p.y);
+  const Pack turn = select(is_wide, p.y / p.x / 8.0, 0.25 - p.x / p.y / 8.0);
+  return on_circle(select(radius == 0.0, Pack(0.0), turn)) * radius;
 }
 
 // Set of paths of a pixel: those that its light is the mean of, those of the pilot that chooses
@@ -141,10 +141,12 @@ class Rows {
         into_(into) {}
 
   void render(const PathCounts& counts) {
-    for (int left = 0; left < width_; left += block_px) {  // block by block: coherent rays
-      for (int y = first_; y < end_; ++y) {
-        for (int x = left; x < std::min(left + block_px, width_); ++x) {
-          if (rays_.looks({x, y})) add_samples({x, y}, counts.at(x, y)[0]);
+    for (int top = first_; top < end_; top += block_px) {  // block by block: coherent rays
+      for (int left = 0; left < width_; left += block_px) {
+        for (int y = top; y < std::min(top + block_px, end_); ++y) {
+          for (int x = left; x < std::min(left + block_px, width_); ++x) {
+            if (rays_.looks({x, y})) add_samples({x, y}, counts.at(x, y)[0]);
+          }
         }
       }
     }
@@ -189,28 +191,40 @@ void Rows::add_samples(const glm::ivec2& pixel, int count) {
   for (std::uint32_t net = 0; net < PathSums::nets; ++net)
     sequences[net] = sequence_of(view_.key, number, paths_, net);
   const ShutterSpec& shutter = spec_.shutter;
-  for (int i = 0; i < count; ++i) {
-    const auto [net, index, slot] =
-        PathSums::place(static_cast<std::uint32_t>(i), static_cast<std::uint32_t>(count));
-    SobolPairs numbers(sequences[net], index);
-    auto direction = patch.direction(numbers.next() - 0.5);
-    const glm::dvec2 pupil = numbers.next();
-    const double share = numbers.next().x;
-    if (!direction) continue;
-    glm::dvec3 origin(0);
-    if (spec_.aperture && spec_.aperture->focus_m && direction->z > 0) {
+  const double from_s = shutter.row_s * pixel.y + (shutter.exposure_s - view_.exposure_s) / 2;
+  for (int first = 0; first < count; first += static_cast<int>(pack_size)) {
+    std::array<PathSums::Place, pack_size> places;
+    for (std::size_t i = 0; i < pack_size; ++i)
+      places[i] = PathSums::place(
+          static_cast<std::uint32_t>(std::min(first + static_cast<int>(i), count - 1)),
+          static_cast<std::uint32_t>(count));
+    const PackOfWords seeds([&](auto i) { return sequences[places[std::size_t{i}].net]; });
+    const PackOfWords indices([&](auto i) { return places[std::size_t{i}].index; });
+    SobolPairsOf<PackOfWords> numbers(seeds, indices);
+    Vec3<Pack> direction = patch.directions(numbers.next() - Pack(0.5));
+    const Vec2<Pack> pupil = numbers.next();
+    const Pack share = numbers.next().x;
+    Vec3<Pack> origin(Pack(0.0));
+    if (spec_.aperture && spec_.aperture->focus_m) {
       const ApertureSpec& aperture = *spec_.aperture;
-      origin = glm::dvec3(on_disc(pupil) * (aperture.focal_length_m / aperture.f_number / 2), 0);
-      direction = glm::normalize(*direction - origin * (direction->z / *aperture.focus_m));
+      const Vec2<Pack> on_lens =
+          on_disc(pupil) * Pack(aperture.focal_length_m / aperture.f_number / 2);
+      const auto refracts = direction.z > 0.0;
+      origin = select(refracts, {on_lens.x, on_lens.y, Pack(0.0)}, origin);
+      direction = select(refracts, unit_of(direction - origin * (direction.z / *aperture.focus_m)),
+                         direction);
     }
-    const double from_s = shutter.row_s * pixel.y + (shutter.exposure_s - view_.exposure_s) / 2;
-    const nanoseconds time = view_.begin + time_of(from_s + view_.exposure_s * share);
-    const Pose X_DC = view_.X_DC.pose_at(time);
-    samples_.push_back(
-        {{X_DC * origin, X_DC.rotation * *direction, std::numeric_limits<double>::infinity(), time},
-         numbers});
-    targets_.push_back({pixel, slot});
-    if (samples_.size() == paths_at_once) trace();
+    for (std::size_t i = 0; i < pack_size && first + static_cast<int>(i) < count; ++i) {
+      const glm::dvec3 along = vector_at(direction, i);
+      if (along == glm::dvec3(0)) continue;
+      const nanoseconds time = view_.begin + time_of(from_s + view_.exposure_s * share[i]);
+      const Pose X_DC = view_.X_DC.pose_at(time);
+      samples_.push_back({{X_DC * vector_at(origin, i), X_DC.rotation * along,
+                           std::numeric_limits<double>::infinity(), time},
+                          {sequences[places[i].net], places[i].index, numbers.pairs()[i]}});
+      targets_.push_back({pixel, places[i].slot});
+      if (samples_.size() == paths_at_once) trace();
+    }
   }
 }
 
@@ -263,9 +277,9 @@ Means render(const Camera& camera, const View& view, const PathCounts& counts, P
              std::span<const std::uint16_t> labels) {
   const int width = counts.width(), height = counts.height();
   Means means(width, height, labels.size());
-  tbb::parallel_for(0, (height + block_px - 1) / block_px, [&](int block) {
+  tbb::parallel_for(0, (height + strip_px - 1) / strip_px, [&](int strip) {
     if (view.check) view.check();
-    const int first = block * block_px, end = std::min(first + block_px, height);
+    const int first = strip * strip_px, end = std::min(first + strip_px, height);
     if (!has_paths(counts, first, end)) return;
     Rows(camera, view, labels, paths, first, end, means).render(counts);
   });

@@ -26,6 +26,9 @@ constexpr int even_angles = 256;  // number of equal steps from the axis to the 
 template <typename Model>
 concept Closed = requires(const Model& model) { model.ray(Pixel<Dual>{}); };
 
+template <typename Model>
+concept Unlimited = requires { Model::images_all; };
+
 template <Closed Model>
 PixelRay closed_ray(const Model& model, const glm::dvec2& pixel) {
   const auto [x, y, z] = model.ray(Pixel<Dual>{{pixel.x, 1, 0}, {pixel.y, 0, 1}});
@@ -214,7 +217,7 @@ Lens::Lens(LensModel model, glm::ivec2 size_px)
   std::visit(
       [&]<typename Model>(const Model& kind) {
         limits_rad_.assign(azimuths, infinity);
-        if constexpr (!Closed<Model>) {
+        if constexpr (!Unlimited<Model>) {
           limits_rad_ = limits_of(kind);
           reach_px_ = reach_of(kind, limits_rad_);
         }
@@ -279,10 +282,14 @@ void Lens::fill(int begin, int end, std::span<PixelRay> rays) const {
       [&]<typename Model>(const Model& kind) {
         const auto width = static_cast<std::size_t>(size_px_.x);
         if constexpr (Closed<Model>) {
+          const double least_cosine = std::cos(std::min(least_limit_rad_, farthest_rad));
           for (std::size_t i = 0; i < rays.size(); ++i) {
             const auto column = static_cast<double>(i % width);
             const std::size_t row = i / width;
             rays[i] = closed_ray(kind, {column, begin + static_cast<double>(row)});
+            const glm::dvec3& direction = rays[i].direction;
+            if (!Unlimited<Model> && direction.z <= least_cosine && !images(direction))
+              rays[i] = {};
           }
           return;
         }

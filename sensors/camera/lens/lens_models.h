@@ -54,6 +54,15 @@ struct Pinhole {
   Pixel<T> image(const Direction<T>& p) const {
     return scale(p.x / p.z, p.y / p.z);
   }
+  /// Returns the direction of a pixel. Only models with a closed form define it.
+  template <typename T>
+  Direction<T> ray(const Pixel<T>& pixel) const {
+    using std::sqrt;
+    const T y = (pixel.v - scale.centre_px.y) / scale.focal_px.y;
+    const T x = (pixel.u - scale.centre_px.x) / scale.focal_px.x - scale.skew * y;
+    const T inverse = 1.0 / sqrt(x * x + y * y + 1.0);
+    return {x * inverse, y * inverse, inverse};
+  }
 };
 
 /// Returns the homography from the plane z = 1 to a sensor rotated by R_y(tau_y) R_x(tau_x), both
@@ -244,8 +253,9 @@ struct Equirectangular {
     return {(atan2(p.x, p.z) / (2 * std::numbers::pi) + 0.5) * size_px.x - 0.5,
             (asin(p.y) / std::numbers::pi + 0.5) * size_px.y - 0.5};
   }
-  /// Returns the direction of a pixel. Only models that have this closed form and image all
-  /// directions define it.
+  static constexpr bool images_all = true;  ///< only models without a limit define it
+
+  /// Returns the direction of a pixel, as Pinhole.
   template <typename T>
   Direction<T> ray(const Pixel<T>& pixel) const {
     using std::cos;

@@ -38,14 +38,26 @@ PixelPatch::PixelPatch(const Lens& lens, glm::dvec2 pixel, const PixelRay& ray,
   is_smooth_ = left_out * steepest < error_px / 2 * area_sr;  // half, as a margin for higher terms
 }
 
+template <typename Real>
+Vec3<Real> PixelPatch::by_series(const Vec2<Real>& offset_px) const noexcept {
+  const Real x = offset_px.x, y = offset_px.y;
+  const Vec3<Real> by_u = Vec3<Real>(ray_.by_u) + Vec3<Real>(by_uu_) * (x / 2.0);
+  const Vec3<Real> by_v = Vec3<Real>(ray_.by_v) + Vec3<Real>(by_vv_) * (y / 2.0);
+  return unit_of(Vec3<Real>(ray_.direction) + (by_u + Vec3<Real>(by_uv_) * y) * x + by_v * y);
+}
+
 std::optional<glm::dvec3> PixelPatch::direction(const glm::dvec2& offset_px) const noexcept {
-  if (is_smooth_) {
-    const double x = offset_px.x, y = offset_px.y;
-    return glm::normalize(ray_.direction + x * (ray_.by_u + x / 2 * by_uu_ + y * by_uv_) +
-                          y * (ray_.by_v + y / 2 * by_vv_));
-  }
+  if (is_smooth_) return by_series(offset_px);
   const auto ray = lens_->ray(pixel_ + offset_px);
   return ray ? std::optional(ray->direction) : std::nullopt;
+}
+
+Vec3<Pack> PixelPatch::directions(const Vec2<Pack>& offset_px) const noexcept {
+  if (is_smooth_) return by_series(offset_px);
+  Vec3<Pack> all;
+  for (std::size_t i = 0; i < pack_size; ++i)
+    set_vector(all, i, direction({offset_px.x[i], offset_px.y[i]}).value_or(glm::dvec3(0)));
+  return all;
 }
 
 RayRows::RayRows(const Lens& lens, int begin, int end)

@@ -5,6 +5,7 @@
 #include <optional>
 #include <vector>
 
+#include "core/pack.h"
 #include "sensors/camera/lens/lens.h"
 
 namespace groundray {
@@ -23,10 +24,15 @@ class PixelPatch {
   /// Returns the direction, unit, at `offset_px` from the pixel's centre, half a pixel at most;
   /// nullopt if it is not imaged.
   std::optional<glm::dvec3> direction(const glm::dvec2& offset_px) const noexcept;
+  /// Returns a pack of directions, zero for those that are not imaged.
+  Vec3<Pack> directions(const Vec2<Pack>& offset_px) const noexcept;
   /// Returns true if a Taylor series is accurate enough; direction() evaluates the lens otherwise.
   bool is_smooth() const noexcept { return is_smooth_; }
 
  private:
+  template <typename Real>
+  Vec3<Real> by_series(const Vec2<Real>& offset_px) const noexcept;
+
   const Lens* lens_;
   glm::dvec2 pixel_;
   PixelRay ray_;
