@@ -60,6 +60,10 @@ Real dot_of(const Vec3<Real>& a, const Vec3<Real>& b) noexcept {
   return a.x * b.x + a.y * b.y + a.z * b.z;
 }
 template <typename Real>
+Vec3<Real> cross_of(const Vec3<Real>& a, const Vec3<Real>& b) noexcept {
+  return {a.y * b.z - b.y * a.z, a.z * b.x - b.z * a.x, a.x * b.y - b.x * a.y};
+}
+template <typename Real>
 Vec3<Real> unit_of(const Vec3<Real>& v) noexcept {
   using std::sqrt;
   return v * (Real(1.0) / sqrt(dot_of(v, v)));

@@ -1,5 +1,6 @@
 #include "sensors/camera/camera.h"
 
+#include <tbb/enumerable_thread_specific.h>
 #include <tbb/parallel_for.h>
 #include <tbb/task_arena.h>
 
@@ -38,6 +39,17 @@ Vec2<Pack> on_disc(const Vec2<Pack>& u) {
   const Pack radius = select(is_wide, p.x, p.y);
   const Pack turn = select(is_wide, p.y / p.x / 8.0, 0.25 - p.x / p.y / 8.0);
   return on_circle(select(radius == 0.0, Pack(0.0), turn)) * radius;
+}
+
+// Rotates each lane's vector by the rotation of its pose.
+Vec3<Pack> rotated(const std::array<Pose, pack_size>& poses, const Vec3<Pack>& v) {
+  const Vec3<Pack> q = vectors_of([&](std::size_t i) {
+    const glm::dquat& rotation = poses[i].rotation;
+    return glm::dvec3(rotation.x, rotation.y, rotation.z);
+  });
+  const Pack w = pack_of([&](std::size_t i) { return poses[i].rotation.w; });
+  const Vec3<Pack> across = cross_of(q, v);
+  return v + (across * w + cross_of(q, across)) * Pack(2.0);
 }
 
 // Set of paths of a pixel: those that its light is the mean of, those of the pilot that chooses
@@ -124,26 +136,27 @@ struct Means {
         coverage(labels == 0 ? ImageF() : ImageF(width, height, static_cast<int>(labels))) {}
 };
 
-// Renders the light of a block of rows.
-class Rows {
+// Renders the light of strips of rows, one after the other: one object for each thread.
+class StripRenderer {
  public:
-  Rows(const Camera& camera, const View& view, std::span<const std::uint16_t> labels, Paths paths,
-       int first, int end, Means& into)
+  StripRenderer(const Camera& camera, const View& view, std::span<const std::uint16_t> labels,
+                Paths paths, Means& into)
       : spec_(camera.spec()),
         view_(view),
         labels_(labels),
         paths_(paths),
         width_(spec_.size_px.x),
-        first_(first),
-        end_(end),
-        rays_(camera.lens(), first, end),
-        sums_(static_cast<std::size_t>(end - first) * static_cast<std::size_t>(width_)),
+        rays_(camera.lens()),
         into_(into) {}
 
-  void render(const PathCounts& counts) {
-    for (int top = first_; top < end_; top += block_px) {  // block by block: coherent rays
+  void render(int first, int end, const PathCounts& counts) {
+    first_ = first;
+    end_ = end;
+    rays_.fill(first, end);
+    sums_.assign(static_cast<std::size_t>(end - first) * static_cast<std::size_t>(width_), {});
+    for (int top = first; top < end; top += block_px) {  // block by block: coherent rays
       for (int left = 0; left < width_; left += block_px) {
-        for (int y = top; y < std::min(top + block_px, end_); ++y) {
+        for (int y = top; y < std::min(top + block_px, end); ++y) {
           for (int x = left; x < std::min(left + block_px, width_); ++x) {
             if (rays_.looks({x, y})) add_samples({x, y}, counts.at(x, y)[0]);
           }
@@ -173,18 +186,17 @@ class Rows {
   const View& view_;
   std::span<const std::uint16_t> labels_;
   Paths paths_;
-  int width_, first_, end_;
+  int width_, first_ = 0, end_ = 0;
   RayRows rays_;
   std::vector<PathSums> sums_;
   Means& into_;
-  std::vector<PathTracer::Sample> samples_;
-  std::vector<Target> targets_;  // one for each sample
-  std::vector<glm::vec3> radiance_;
-  std::vector<std::uint16_t> seen_;  // label of each sample's first hit
   PathTracer::Workspace work_;
+  std::vector<Target> targets_;  // of the paths
+  std::vector<glm::vec3> radiance_;
+  std::vector<std::uint16_t> seen_;  // label of each path's first hit
 };
 
-void Rows::add_samples(const glm::ivec2& pixel, int count) {
+void StripRenderer::add_samples(const glm::ivec2& pixel, int count) {
   const PixelPatch patch = rays_.patch(pixel);
   const auto number = static_cast<std::uint32_t>(pixel.y * width_ + pixel.x);
   std::array<std::uint32_t, PathSums::nets> sequences;
@@ -214,25 +226,32 @@ void Rows::add_samples(const glm::ivec2& pixel, int count) {
       direction = select(refracts, unit_of(direction - origin * (direction.z / *aperture.focus_m)),
                          direction);
     }
+    std::array<nanoseconds, pack_size> times;
+    std::array<Pose, pack_size> poses;  // X_DC
+    for (std::size_t i = 0; i < pack_size; ++i) {
+      times[i] = view_.begin + time_of(from_s + view_.exposure_s * share[i]);
+      poses[i] = view_.X_DC.pose_at(times[i]);
+    }
+    const Vec3<Pack> begin =
+        vectors_of([&](std::size_t i) { return poses[i].translation_m; }) + rotated(poses, origin);
+    const Vec3<Pack> along = rotated(poses, direction);
+    const auto is_imaged = dot_of(direction, direction) > 0.0;
     for (std::size_t i = 0; i < pack_size && first + static_cast<int>(i) < count; ++i) {
-      const glm::dvec3 along = vector_at(direction, i);
-      if (along == glm::dvec3(0)) continue;
-      const nanoseconds time = view_.begin + time_of(from_s + view_.exposure_s * share[i]);
-      const Pose X_DC = view_.X_DC.pose_at(time);
-      samples_.push_back({{X_DC * vector_at(origin, i), X_DC.rotation * along,
-                           std::numeric_limits<double>::infinity(), time},
-                          {sequences[places[i].net], places[i].index, numbers.pairs()[i]}});
+      if (!is_imaged[i]) continue;
+      work_.add({vector_at(begin, i), vector_at(along, i), std::numeric_limits<double>::infinity(),
+                 times[i]},
+                {sequences[places[i].net], places[i].index, numbers.pairs()[i]});
       targets_.push_back({pixel, places[i].slot});
-      if (samples_.size() == paths_at_once) trace();
+      if (targets_.size() == paths_at_once) trace();
     }
   }
 }
 
-void Rows::trace() {
-  radiance_.resize(samples_.size());
-  seen_.resize(labels_.empty() ? 0 : samples_.size());
-  view_.light.trace(samples_, radiance_, work_, seen_);
-  for (std::size_t i = 0; i < samples_.size(); ++i) {
+void StripRenderer::trace() {
+  radiance_.resize(targets_.size());
+  seen_.resize(labels_.empty() ? 0 : targets_.size());
+  view_.light.trace(work_, radiance_, seen_);
+  for (std::size_t i = 0; i < targets_.size(); ++i) {
     const auto& [pixel, slot] = targets_[i];
     sums_of(pixel).add(slot, glm::dvec3(radiance_[i]));
     if (labels_.empty()) continue;
@@ -240,11 +259,10 @@ void Rows::trace() {
     if (label != labels_.end() && *label == seen_[i])
       into_.coverage.at(pixel.x, pixel.y)[static_cast<std::size_t>(label - labels_.begin())] += 1;
   }
-  samples_.clear();
   targets_.clear();
 }
 
-void Rows::write_pixels() {
+void StripRenderer::write_pixels() {
   for (int y = first_; y < end_; ++y) {
     for (int x = 0; x < width_; ++x) {
       const PathSums& sums = sums_of({x, y});
@@ -277,11 +295,13 @@ Means render(const Camera& camera, const View& view, const PathCounts& counts, P
              std::span<const std::uint16_t> labels) {
   const int width = counts.width(), height = counts.height();
   Means means(width, height, labels.size());
+  tbb::enumerable_thread_specific<StripRenderer> renderers(
+      [&] { return StripRenderer(camera, view, labels, paths, means); });
   tbb::parallel_for(0, (height + strip_px - 1) / strip_px, [&](int strip) {
     if (view.check) view.check();
     const int first = strip * strip_px, end = std::min(first + strip_px, height);
     if (!has_paths(counts, first, end)) return;
-    Rows(camera, view, labels, paths, first, end, means).render(counts);
+    renderers.local().render(first, end, counts);
   });
   return means;
 }
@@ -363,8 +383,8 @@ Exposure Camera::expose(const PathTracer& light, const Trajectory& X_DC, nanosec
 }
 
 std::size_t Camera::checks() const noexcept {
-  const auto blocks = static_cast<std::size_t>((spec_.size_px.y + block_px - 1) / block_px);
-  return spec_.sampling.most_samples > spec_.sampling.samples ? 2 * blocks : blocks;
+  const auto strips = static_cast<std::size_t>((spec_.size_px.y + strip_px - 1) / strip_px);
+  return spec_.sampling.most_samples > spec_.sampling.samples ? 2 * strips : strips;
 }
 
 std::vector<MeteredPixel> Camera::meter(const PathTracer& light, const Trajectory& X_DC,

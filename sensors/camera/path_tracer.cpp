@@ -83,8 +83,8 @@ struct PathTracer::Vertices {
     facet = unit_of(vectors_of([&](std::size_t i) { return hits[i]->normal; }));
     offset_m = lift_m(range_m);
     far_m = pack_of([&](std::size_t i) { return rays[i]->far_m; });
-    axes = Axes(towards_eye(vectors_of([&](std::size_t i) { return seen[i]->shading_normal; }),
-                            -direction));
+    axes = Axes(towards_eye(
+        unit_of(vectors_of([&](std::size_t i) { return seen[i]->shading_normal; })), -direction));
     to_eye = axes.into(-direction);
     tint = vectors_of([&](std::size_t i) { return seen[i]->tint; });
     throughput = vectors_of([&](std::size_t i) { return paths[i]->throughput; });
@@ -137,15 +137,9 @@ PathTracer::PathTracer(const Scene& scene, const Sky& sky, int depth,
   if (depth < 1 || depth > 64) throw Error("depth = {} must be from 1 to 64", depth);
 }
 
-void PathTracer::trace(std::span<const Sample> samples, std::span<glm::vec3> radiance,
-                       Workspace& work, std::span<std::uint16_t> labels) const {
-  work.paths.clear();
-  work.rays.clear();
-  for (std::uint32_t i = 0; i < samples.size(); ++i) {
-    work.paths.push_back({i, 0, glm::vec3(1), samples[i].numbers});
-    work.rays.push_back(samples[i].ray);
-    radiance[i] = glm::vec3(0);
-  }
+void PathTracer::trace(Workspace& work, std::span<glm::vec3> radiance,
+                       std::span<std::uint16_t> labels) const {
+  std::ranges::fill(radiance, glm::vec3(0));
   for (int rays = 1; rays <= depth_ && !work.paths.empty(); ++rays) {
     work.hits.resize(work.rays.size());
     scene_.trace(work.rays, work.hits, rays == 1 ? Batch::Alike : Batch::Scattered);
@@ -155,10 +149,8 @@ void PathTracer::trace(std::span<const Sample> samples, std::span<glm::vec3> rad
       Workspace::Path& path = work.paths[k];
       radiance[path.sample] += emitted(work.rays[k], work.hits[k], path);
     }
-    if (rays == depth_) return;
+    if (rays == depth_) break;
     find_surfaces(work);
-    work.next_paths.clear();
-    work.next_rays.clear();
     for (Workspace::ShadowQueue* queue : {&work.of_sun, &work.of_others}) {
       queue->rays.clear();
       queue->lights.clear();
@@ -172,7 +164,11 @@ void PathTracer::trace(std::span<const Sample> samples, std::span<glm::vec3> rad
     add_light(work.of_others, Batch::Scattered, radiance, work);
     std::swap(work.paths, work.next_paths);
     std::swap(work.rays, work.next_rays);
+    work.next_paths.clear();
+    work.next_rays.clear();
   }
+  work.paths.clear();
+  work.rays.clear();
 }
 
 // Adds unoccluded direct light.
@@ -221,6 +217,12 @@ void PathTracer::find_surfaces(Workspace& work) const {
     const Ray& ray = work.rays[k];
     const Hit& hit = work.hits[k];
     if (!hit) continue;
+    if (hit.object == 0 && scene_.cover.empty()) {
+      const std::uint16_t material = scene_.terrain.material;
+      work.surfaces.push_back({glm::dvec3(hit.normal), glm::vec3(1), k, material});
+      ++work.ends[material];
+      continue;
+    }
     const Appearance seen = scene_.appearance_of(ray, hit, 0, Filtering::Fast);
     std::uint32_t part = 0;
     if (seen.count > 1) {  // choose one layer, with a probability equal to its share

@@ -34,14 +34,15 @@ class PathTracer {
   PathTracer(const Scene& scene, const Sky& sky, int depth,
              const std::optional<AerialPerspective>& air);
 
-  /// Camera ray, and the random numbers of its path.
-  struct Sample {
-    Ray ray;
-    SobolPairs numbers;
-  };
-
-  /// Buffers of one thread; their content is private to the tracer.
+  /// Paths to be traced, and buffers of one thread; all but `add` is private to the tracer.
   struct Workspace {
+    /// Adds a path.
+    /// @param ray  of the camera.
+    void add(const Ray& ray, const SobolPairs& numbers) {
+      paths.push_back({static_cast<std::uint32_t>(paths.size()), 0, glm::vec3(1), numbers});
+      rays.push_back(ray);
+    }
+
     /// Path in progress.
     struct Path {
       std::uint32_t sample;
@@ -75,12 +76,12 @@ class PathTracer {
     ShadowQueue of_sun, of_others;
   };
 
-  /// Traces one path for each sample.
+  /// Traces the added paths, and removes them.
   /// @param radiance  radiance that arrives along each ray: linear sRGB, W/(m^2 sr), see
   ///        docs/theory/sky.md.
   /// @param labels  labels of each ray's first hit, as in Scene::truth_of, 0 for the sky; empty if
   ///        they are not requested.
-  void trace(std::span<const Sample> samples, std::span<glm::vec3> radiance, Workspace& work,
+  void trace(Workspace& work, std::span<glm::vec3> radiance,
              std::span<std::uint16_t> labels = {}) const;
 
  private:

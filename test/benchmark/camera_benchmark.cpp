@@ -180,13 +180,15 @@ const char* light_fault(const View& view, const Scene& simulation) {
   std::vector<Ray> rays;
   const auto all = pixel_rays(view);
   for (std::size_t i = 0; i < all.size(); i += 97) rays.push_back(all[i]);
-  std::vector<PathTracer::Sample> samples;
-  for (std::uint32_t i = 0; i < rays.size(); ++i)
-    samples.push_back({rays[i], SobolPairs(SobolPairs::mixed(i), 0)});
-  std::vector<glm::vec3> direct(rays.size()), bounced(rays.size());
-  PathTracer::Workspace work;
-  PathTracer(simulation, sky(), 2, std::nullopt).trace(samples, direct, work);
-  PathTracer(simulation, sky(), 3, std::nullopt).trace(samples, bounced, work);
+  const auto light_of = [&](int depth) {
+    PathTracer::Workspace work;
+    for (std::uint32_t i = 0; i < rays.size(); ++i)
+      work.add(rays[i], SobolPairs(SobolPairs::mixed(i), 0));
+    std::vector<glm::vec3> radiance(rays.size());
+    PathTracer(simulation, sky(), depth, std::nullopt).trace(work, radiance);
+    return radiance;
+  };
+  const auto direct = light_of(2), bounced = light_of(3);
   const auto expected = direct_light(simulation, rays);
   double sum = 0, squares = 0, more = 0, all_light = 0;
   for (std::size_t i = 0; i < rays.size(); ++i) {

@@ -60,11 +60,12 @@ Vec3<Pack> PixelPatch::directions(const Vec2<Pack>& offset_px) const noexcept {
   return all;
 }
 
-RayRows::RayRows(const Lens& lens, int begin, int end)
-    : lens_(lens), first_(std::max(begin - 1, 0)), end_(std::min(end + 1, lens.size_px().y)) {
+void RayRows::fill(int begin, int end) {
+  first_ = std::max(begin - 1, 0);
+  end_ = std::min(end + 1, lens_.size_px().y);
   const auto rows = static_cast<std::size_t>(end_ - first_);
-  rays_.resize(rows * static_cast<std::size_t>(lens.size_px().x));
-  lens.fill(first_, end_, rays_);
+  rays_.resize(rows * static_cast<std::size_t>(lens_.size_px().x));
+  lens_.fill(first_, end_, rays_);
 }
 
 const PixelRay& RayRows::ray(int x, int y) const noexcept {

@@ -43,7 +43,10 @@ class PixelPatch {
 /// Rays of a range of rows and of the rows next to it, private to this library.
 class RayRows {
  public:
-  RayRows(const Lens& lens, int begin, int end);
+  explicit RayRows(const Lens& lens) : lens_(lens) {}
+
+  /// Computes the rays of rows from `begin` to before `end`.
+  void fill(int begin, int end);
 
   /// Returns true if a pixel's centre has a viewing direction.
   bool looks(glm::ivec2 pixel) const noexcept {
@@ -55,7 +58,7 @@ class RayRows {
   const PixelRay& ray(int x, int y) const noexcept;
 
   const Lens& lens_;
-  int first_, end_;
+  int first_ = 0, end_ = 0;
   std::vector<PixelRay> rays_;
 };
 

@@ -130,14 +130,21 @@ Estimate estimate_of(std::span<const glm::vec3> values) {
   return result;
 }
 
-std::vector<glm::vec3> traced(const PathTracer& light,
-                              const std::vector<PathTracer::Sample>& samples) {
+// Camera ray, and the random numbers of its path.
+struct Sample {
+  Ray ray;
+  SobolPairs numbers;
+};
+
+std::vector<glm::vec3> traced(const PathTracer& light, const std::vector<Sample>& samples) {
   PathTracer::Workspace work;
   std::vector<glm::vec3> radiance(samples.size());
   constexpr std::size_t at_once = 4096;
   for (std::size_t i = 0; i < samples.size(); i += at_once) {
     const std::size_t count = std::min(at_once, samples.size() - i);
-    light.trace(std::span(samples).subspan(i, count), std::span(radiance).subspan(i, count), work);
+    for (const Sample& sample : std::span(samples).subspan(i, count))
+      work.add(sample.ray, sample.numbers);
+    light.trace(work, std::span(radiance).subspan(i, count));
   }
   return radiance;
 }
@@ -145,7 +152,7 @@ std::vector<glm::vec3> traced(const PathTracer& light,
 // Mean of a net of paths that begin with the same ray.
 Estimate light_along(const PathTracer& light, const Ray& ray, std::uint32_t paths,
                      std::uint32_t seed = 1) {
-  std::vector<PathTracer::Sample> samples;
+  std::vector<Sample> samples;
   for (std::uint32_t i = 0; i < paths; ++i) samples.push_back({ray, SobolPairs(seed, i)});
   return estimate_of(traced(light, samples));
 }
@@ -171,7 +178,7 @@ std::vector<Material> white_materials() {
 TEST(PathTracer, WhiteObjectsPassTheFurnaceTest) {
   constexpr double radiance = 3;
   const Sky sky = even_sky(radiance);
-  std::vector<PathTracer::Sample> samples;
+  std::vector<Sample> samples;
   for (std::uint32_t i = 0; i < 1 << 15; ++i) {
     const glm::dvec3 from = 5.0 * any_direction(1, i);
     samples.push_back({ray_to(from, 0.6 * any_direction(2, i)), SobolPairs(1, i)});
@@ -554,14 +561,15 @@ TEST(PathTracer, LabelsAreOfEachRaysFirstHit) {
                                 {rectangle({-1, -1}, {1, 1}), grey(0.5), {5, 0, 2}}},
                                grey(0.5), 0);
   const Sky sky = even_sky(1);
-  const std::vector<PathTracer::Sample> samples{{{{0, 0, 9}}, {1, 0}},
-                                                {{{5, 0, 9}}, {1, 1}},
-                                                {{{9, 9, 9}}, {1, 2}},
-                                                {{{0, 0, 9}, {0, 0, 1}}, {1, 3}}};
+  const std::vector<Sample> samples{{{{0, 0, 9}}, {1, 0}},
+                                    {{{5, 0, 9}}, {1, 1}},
+                                    {{{9, 9, 9}}, {1, 2}},
+                                    {{{0, 0, 9}, {0, 0, 1}}, {1, 3}}};
   PathTracer::Workspace work;
   std::vector<glm::vec3> radiance(4);
   std::vector<std::uint16_t> labels(4, 77);
-  PathTracer(scene, sky, 3, {}).trace(samples, radiance, work, labels);
+  for (const Sample& sample : samples) work.add(sample.ray, sample.numbers);
+  PathTracer(scene, sky, 3, {}).trace(work, radiance, labels);
   EXPECT_THAT(labels, ::testing::ElementsAre(1, 2, 9, 0));
 }
 
@@ -575,14 +583,15 @@ TEST(PathTracer, PathsDoNotDependOnTheirBatch) {
                  .sun = SunSpec{SunAngles{.azimuth_deg = 200, .elevation_deg = 30}}},
                 sky_with_a_lamp());
   const PathTracer light(scene, sky, 5, AerialPerspective({.visibility_m = 500}));
-  std::vector<PathTracer::Sample> samples;
+  std::vector<Sample> samples;
   for (std::uint32_t i = 0; i < 3000; ++i)
     samples.push_back({ray_to({4, 3, 2}, 2.0 * any_direction(8, i)), SobolPairs(3, i)});
   const auto together = traced(light, samples);
   PathTracer::Workspace work;
   glm::vec3 alone;
   for (std::size_t i = 0; i < samples.size(); ++i) {
-    light.trace({&samples[i], 1}, {&alone, 1}, work);
+    work.add(samples[i].ray, samples[i].numbers);
+    light.trace(work, {&alone, 1});
     ASSERT_EQ(alone, together[i]) << i;
   }
 }

@@ -26,7 +26,8 @@ TEST_P(PixelPatchOfLens, DirectionsProjectBackToTheirPositions) {
   std::uniform_real_distribution<double> unit(-0.5, 0.5);
   double worst_px = 0;
   for (int y = 0; y < lens.size_px().y; y += 3) {
-    const RayRows rows(lens, y, std::min(y + 3, lens.size_px().y));
+    RayRows rows(lens);
+    rows.fill(y, std::min(y + 3, lens.size_px().y));
     for (int x = y % 5; x < lens.size_px().x; x += 5) {
       const glm::ivec2 pixel(x, y + x % 3);
       if (pixel.y >= lens.size_px().y || !rows.looks(pixel)) continue;
