@@ -8,6 +8,7 @@ namespace groundray {
 namespace {
 
 constexpr int leaf_cells = Certificate::block_cells;
+constexpr double most_quad_bytes = 512 << 20;  // of a DEM at full resolution
 
 struct Content {
   bool any = false;
@@ -37,8 +38,11 @@ bool is_same(const Level& a, const Level& b) {
 }  // namespace
 
 Level full_resolution_level(const HeightGrid& grid) {
-  Level level{.frame = grid.frame(), .heights = grid.samples(), .leaf_cells = leaf_cells};
   const glm::ivec2 last(grid.columns() - 1, grid.rows() - 1);
+  Level level{.frame = grid.frame(),
+              .heights = grid.samples(),
+              .leaf_cells = leaf_cells,
+              .has_quads = quad_cell_bytes * last.x * last.y <= most_quad_bytes};
   for (int row = 0; row < last.y; row += leaf_cells) {
     for (int column = 0; column < last.x; column += leaf_cells) {
       const glm::ivec2 low(column, row);

@@ -58,14 +58,14 @@ inline FloatHit intersect_one(const Target& target, const LevelRay& ray, double 
 // Returns the facet of a hit.
 inline Facet facet_of(const LevelPart& part, const FloatHit& hit) noexcept {
   if (hit.geometry == facet_geometry) return part.triangles[hit.primitive].facet;
-  const GridBlock& grid = part.grids[hit.primitive];
-  const float u = hit.u * static_cast<float>(grid.columns);
-  const float v = hit.v * static_cast<float>(grid.rows);
-  const int column = std::clamp(static_cast<int>(u), 0, grid.columns - 1);
-  const int row = std::clamp(static_cast<int>(v), 0, grid.rows - 1);
+  const CellBlock& block = part.blocks[hit.primitive];
+  const float u = hit.u * static_cast<float>(block.columns);
+  const float v = hit.v * static_cast<float>(block.rows);
+  const int column = std::clamp(static_cast<int>(u), 0, block.columns - 1);
+  const int row = std::clamp(static_cast<int>(v), 0, block.rows - 1);
   const bool far_half = u - static_cast<float>(column) + (v - static_cast<float>(row)) > 1;
-  return {grid.column + (column << grid.step_exponent), grid.row + (row << grid.step_exponent),
-          grid.step_exponent, far_half ? Half::Far : Half::Near, grid.deviation_m};
+  return {block.column + (column << block.step_exponent), block.row + (row << block.step_exponent),
+          block.step_exponent, far_half ? Half::Far : Half::Near, block.deviation_m};
 }
 
 // Returns whether the plane of Embree's facet can be intersected directly.

@@ -18,7 +18,8 @@ namespace {
 // Embree's primitives, except for their vertices, gathered leaf by leaf. Each leaf has its own
 // vertices, so that a leaf of any step is one dense grid.
 struct Primitives {
-  std::vector<RTCGrid> grids;
+  std::vector<RTCGrid> grids;  // or
+  std::vector<glm::uvec4> quads;
   std::vector<glm::uvec3> triangles;
 };
 
@@ -79,26 +80,39 @@ std::pair<glm::ivec2, glm::ivec2> ordinary_cells(const LeafCells& cells) {
           {columns - inset(Leaf::East, narrow_x), rows - inset(Leaf::South, narrow_y)}};
 }
 
-void add_leaf(const LeafCells& cells, unsigned first_point, LevelPart& out,
-              Primitives& primitives) {
-  const Leaf& leaf = cells.leaf;
+// Adds a block of ordinary cells as one primitive; `size` is 1 for a quad.
+void add_block(const LeafCells& cells, unsigned first_point, glm::ivec2 low, glm::ivec2 size,
+               bool as_quad, LevelPart& out, Primitives& primitives) {
   const auto stride = static_cast<unsigned>(cells.columns + 1);
+  const unsigned nw =
+      first_point + static_cast<unsigned>(low.y) * stride + static_cast<unsigned>(low.x);
+  if (as_quad) {  // Embree splits it along the diagonal from its second corner to its fourth
+    primitives.quads.emplace_back(nw, nw + 1, nw + stride + 1, nw + stride);
+  } else {
+    primitives.grids.push_back({nw, stride, static_cast<unsigned short>(size.x + 1),
+                                static_cast<unsigned short>(size.y + 1)});
+  }
+  const int exponent = cells.level.deciding_exponent(cells.leaf);
+  out.blocks.push_back({cells.column(low.x), cells.row(low.y), static_cast<std::int8_t>(exponent),
+                        size.x << (cells.exponent - exponent),
+                        size.y << (cells.exponent - exponent), cells.leaf.deviation_m});
+}
+
+void add_leaf(const LeafCells& cells, unsigned first_point, bool as_quads, LevelPart& out,
+              Primitives& primitives) {
   const auto [low, high] = ordinary_cells(cells);
-  const glm::ivec2 size = glm::max(high - low, 0);
-  const bool has_grid = size.x > 0 && size.y > 0;
-  if (has_grid) {
-    const int exponent = cells.level.deciding_exponent(leaf);
-    primitives.grids.push_back(
-        {first_point + static_cast<unsigned>(low.y) * stride + static_cast<unsigned>(low.x), stride,
-         static_cast<unsigned short>(size.x + 1), static_cast<unsigned short>(size.y + 1)});
-    out.grids.push_back({cells.column(low.x), cells.row(low.y), static_cast<std::int8_t>(exponent),
-                         size.x << (cells.exponent - exponent),
-                         size.y << (cells.exponent - exponent), leaf.deviation_m});
+  const bool has_block = low.x < high.x && low.y < high.y;
+  if (has_block && as_quads) {
+    for (int j = low.y; j < high.y; ++j)
+      for (int i = low.x; i < high.x; ++i)
+        add_block(cells, first_point, {i, j}, glm::ivec2(1), true, out, primitives);
+  } else if (has_block) {
+    add_block(cells, first_point, low, high - low, false, out, primitives);
   }
   for (int j = 0; j < cells.rows; ++j) {
     for (int i = 0; i < cells.columns; ++i) {
-      if (has_grid && low.x <= i && i < high.x && low.y <= j && j < high.y) {
-        i = high.x - 1;  // covered by the grid
+      if (has_block && low.x <= i && i < high.x && low.y <= j && j < high.y) {
+        i = high.x - 1;  // covered by the block
         continue;
       }
       const Cell cell = cells.cell(i, j);
@@ -145,7 +159,7 @@ void build_fast_part(const LevelScene::Impl& level, LevelPart& part) {
   });
   Primitives primitives;
   for (std::size_t n = 0; n < leaves.size(); ++n)
-    add_leaf({level, leaves[n]}, first_points[n], part, primitives);
+    add_leaf({level, leaves[n]}, first_points[n], level.level.has_quads, part, primitives);
   const auto add = [&](RTCGeometryType type, unsigned id, auto kind, RTCFormat format,
                        const auto& list) {
     if (list.empty()) return;
@@ -157,6 +171,8 @@ void build_fast_part(const LevelScene::Impl& level, LevelPart& part) {
   };
   add(RTC_GEOMETRY_TYPE_GRID, block_geometry, RTC_BUFFER_TYPE_GRID, RTC_FORMAT_GRID,
       primitives.grids);
+  add(RTC_GEOMETRY_TYPE_QUAD, block_geometry, RTC_BUFFER_TYPE_INDEX, RTC_FORMAT_UINT4,
+      primitives.quads);
   add(RTC_GEOMETRY_TYPE_TRIANGLE, facet_geometry, RTC_BUFFER_TYPE_INDEX, RTC_FORMAT_UINT3,
       primitives.triangles);
 }

@@ -127,7 +127,8 @@ LevelScene::Impl::Impl(const RayDevice& with, Level content, const glm::dvec3& o
 void LevelScene::Impl::make_parts(const Impl* previous) {
   std::map<glm::ivec2, std::shared_ptr<const LevelPart>, PlaceOrder> known;
   if (previous != nullptr && previous->p_DL == p_DL && previous->tracing == tracing &&
-      previous->level.step == level.step && previous->level.part_cells == level.part_cells) {
+      previous->level.step == level.step && previous->level.part_cells == level.part_cells &&
+      previous->level.has_quads == level.has_quads) {
     for (const auto& part : previous->parts) known[part->place] = part;
   }
   auto leaves_of = by_part(level);

@@ -56,8 +56,8 @@ struct TriangleFacet {
   bool whole = false;  // true if it is half of an ordinary cell: its plane is intersected directly
 };
 
-/// Block of ordinary cells that a grid primitive of Embree represents.
-struct GridBlock {
+/// Block of ordinary cells that a grid or quad primitive of Embree represents.
+struct CellBlock {
   std::int32_t column = 0, row = 0;    // its first sample, in the DEM
   std::int8_t step_exponent = 0;       // of the cells used in double precision
   std::int32_t columns = 0, rows = 0;  // number of those cells
@@ -73,7 +73,7 @@ struct LevelPart {
   Owned<RTCScene> scene;
   glm::ivec2 place{0};  // column and row of the part
   std::vector<Leaf> leaves;
-  std::vector<GridBlock> grids;  // by primitive
+  std::vector<CellBlock> blocks;  // by primitive
   std::vector<TriangleFacet> triangles;
 
   float slack_m = 0;  // exact tracing only: padding of the leaves' bounding boxes

@@ -19,7 +19,6 @@ constexpr int unit_nodes = 2;  // windows are aligned to nodes of the next coars
 constexpr int part_cells = 32;
 constexpr int unit_cells = unit_nodes * Certificate::block_cells;
 constexpr int smallest_half = 2;  // least distance from the viewpoint to a window's side, units
-constexpr double bytes_per_cell = 40;  // measured on terrain without holes
 
 int ceil_div(int a, int b) { return (a + b - 1) / b; }
 
@@ -55,7 +54,9 @@ struct Clipmap::Plan {
   bool is_needed(int level) const;
   glm::ivec2 wanted_half(int level) const;
   void size_windows(int most_units);
+  double cells(int level) const;
   double bytes() const;
+  bool has_quads() const;
   Rectangle window(int level, const glm::dvec2& centre) const;
   glm::dvec2 centre(const SensorBox& sensors) const;
   MeshBound bound(const SensorBox& sensors) const;
@@ -164,15 +165,24 @@ void Clipmap::Plan::size_windows(int most_units) {
   }
 }
 
+// Returns the number of cells of a window at its largest.
+double Clipmap::Plan::cells(int level) const {
+  const glm::dvec2 side = glm::min(2 * unit_cells * half[static_cast<std::size_t>(level)],
+                                   lattice.cells(level) + unit_cells);
+  return side.x * side.y;
+}
+
 // Returns the memory of the windows at their largest.
 double Clipmap::Plan::bytes() const {
-  double cells = 0;
-  for (int level = finest; level <= outermost; ++level) {
-    const glm::dvec2 side = glm::min(2 * unit_cells * half[static_cast<std::size_t>(level)],
-                                     lattice.cells(level) + unit_cells);
-    cells += side.x * side.y;
-  }
-  return cells * bytes_per_cell;
+  double all = 0;
+  for (int level = finest; level <= outermost; ++level) all += cells(level);
+  return all * grid_cell_bytes;
+}
+
+// Returns whether the memory suffices for quads in the innermost window.
+bool Clipmap::Plan::has_quads() const {
+  return bytes() + cells(finest) * (quad_cell_bytes - grid_cell_bytes) <=
+         static_cast<double>(settings.memory_bytes);
 }
 
 glm::dvec2 Clipmap::Plan::centre(const SensorBox& sensors) const {
@@ -333,6 +343,7 @@ void Clipmap::select_leaves(const PassRunner& runner) {
                        .step = 1 << level,
                        .leaf_cells = Certificate::block_cells,
                        .part_cells = part_cells,
+                       .has_quads = level == plan_->finest && plan_->has_quads(),
                        .leaves = list_leaves(selection_, nodes, level, runner)});
   }
 }
