@@ -76,5 +76,18 @@ TEST(SobolPairs, IntegrateSmoothFunctionsMoreAccuratelyThanRandomNumbers) {
   EXPECT_LT(error_of(1024), error_of(16) / 200);  // 64^1.5 = 512, less logarithmic factors
 }
 
+TEST(SobolPairs, PacksHaveTheBitsOfSingleSequences) {
+  const auto seed = [](auto lane) { return std::uint32_t{lane} * 7919 + 3; };
+  const auto index = [](auto lane) { return std::uint32_t{lane} * 12345; };
+  SobolPairsOf<PackOfWords> all{PackOfWords(seed), PackOfWords(index)};
+  for (std::uint32_t pair = 0; pair < 1000; ++pair) {
+    const Vec2<Pack> found = all.next();
+    for (std::uint32_t lane = 0; lane < pack_size; ++lane) {
+      const glm::dvec2 expected = SobolPairs(seed(lane), index(lane), pair).next();
+      ASSERT_EQ(glm::dvec2(found.x[lane], found.y[lane]), expected) << pair;
+    }
+  }
+}
+
 }  // namespace
 }  // namespace groundray::sobol_test

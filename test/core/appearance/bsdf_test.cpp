@@ -500,6 +500,40 @@ TEST(Bsdf, TintMultipliesTheReflectanceOfAllButMetals) {
   }
 }
 
+TEST(Bsdf, PacksHaveTheBitsOfSingleDirections) {
+  for (const auto* materials : {&white_materials(), &coloured_materials()}) {
+    for (const Bsdf& bsdf : bsdfs_of(*materials)) {
+      for (std::uint32_t i = 0; i < 4000; i += pack_size) {
+        const auto of = [&](auto draw) {
+          return vectors_of(
+              [&](std::size_t lane) { return draw(i + static_cast<std::uint32_t>(lane)); });
+        };
+        const auto wo_of = [](std::uint32_t k) {  // some along the surface
+          return k % 64 == 0 ? glm::dvec3(1, 0, 0) : any_direction(1, k);
+        };
+        const auto wi_of = [](std::uint32_t k) { return any_direction(2, k); };
+        const auto tint_of = [](std::uint32_t k) { return glm::dvec3(2.0 * uniform(3, k), 1); };
+        const auto u_of = [](std::uint32_t k) { return glm::dvec3(uniform(4, k), 0); };
+        const Vec3<Pack> wo = of(wo_of), wi = of(wi_of), tint = of(tint_of), u = of(u_of);
+        const Vec3<Pack> f = bsdf.eval(wo, wi, tint);
+        const Pack density = bsdf.pdf_per_sr(wo, wi, tint);
+        const auto drawn = bsdf.sample(wo, {u.x, u.y}, tint);
+        for (std::size_t lane = 0; lane < pack_size; ++lane) {
+          const auto k = i + static_cast<std::uint32_t>(lane);
+          ASSERT_EQ(vector_at(f, lane), bsdf.eval(wo_of(k), wi_of(k), tint_of(k)));
+          ASSERT_EQ(density[lane], bsdf.pdf_per_sr(wo_of(k), wi_of(k), tint_of(k)));
+          const BsdfSample one = bsdf.sample(wo_of(k), glm::dvec2(u_of(k)), tint_of(k));
+          ASSERT_EQ(drawn.pdf_per_sr[lane], one.pdf_per_sr);
+          ASSERT_EQ(vector_at(drawn.weight, lane), one.weight);
+          if (one.pdf_per_sr > 0) {
+            ASSERT_EQ(vector_at(drawn.wi, lane), one.wi);
+          }
+        }
+      }
+    }
+  }
+}
+
 TEST(Bsdf, ColourRequiresTheVisibleRange) {
   EXPECT_THAT(
       [] {

@@ -69,11 +69,14 @@ std::vector<Ray> random_rays_in_world(const Dem& dem, std::size_t count, Seed se
   return rays;
 }
 
-RayTracer tracer(const HeightGrid& grid, Tracing tracing, const std::string& device = "") {
-  return {{full_resolution_level(grid)},
-          float_frame_origin({0, 0, grid.max_height_m()}),
-          tracing,
-          device};
+// How fast tracing holds cells in Embree.
+enum class Cells { Quads, Grids };
+
+RayTracer tracer(const HeightGrid& grid, Tracing tracing, const std::string& device = "",
+                 Cells cells = Cells::Quads) {
+  Level level = full_resolution_level(grid);
+  level.has_quads = cells == Cells::Quads;
+  return {{level}, float_frame_origin({0, 0, grid.max_height_m()}), tracing, device};
 }
 
 std::vector<Hit> trace(const RayTracer& tracer, const std::vector<Ray>& rays) {
@@ -193,21 +196,24 @@ TEST(RayTracerProof, FastTracingDiffersOnlyAtSilhouettes) {
   for (const auto& [name, dem] : terrains()) {
     const HeightGrid& grid = dem.grid;
     const auto rays = random_rays_in_world(dem, proof_size(100'000, 10'000'000), Seed{12});
-    const auto fast = trace(tracer(grid, Tracing::Fast), rays);
     const auto exact =
         trace(tracer(grid, Tracing::Exact), rays);  // equals the reference, as tested above
-    std::size_t different = 0;
-    for (std::size_t i = 0; i < rays.size(); ++i) {
-      if (fast[i].range_m == exact[i].range_m) continue;
-      ++different;
-      EXPECT_TRUE(passes_silhouette(grid, rays[i], fast[i], float_slack_m(grid)))
-          << name << " ray " << i
-          << fmt::format(": {} against {}", fast[i].range_m, exact[i].range_m);
+    for (const Cells cells : {Cells::Quads, Cells::Grids}) {
+      const auto fast = trace(tracer(grid, Tracing::Fast, "", cells), rays);
+      std::size_t different = 0;
+      for (std::size_t i = 0; i < rays.size(); ++i) {
+        if (fast[i].range_m == exact[i].range_m) continue;
+        ++different;
+        EXPECT_TRUE(passes_silhouette(grid, rays[i], fast[i], float_slack_m(grid)))
+            << name << " ray " << i
+            << fmt::format(": {} against {}", fast[i].range_m, exact[i].range_m);
+      }
+      EXPECT_LE(static_cast<double>(different), 5e-6 * static_cast<double>(rays.size())) << name;
+      testing::record_margin("different", static_cast<double>(different),
+                             5e-6 * static_cast<double>(rays.size()), "rays");
+      std::cout << fmt::format("{}, {}: {} of {} rays decided otherwise\n", name,
+                               cells == Cells::Quads ? "quads" : "grids", different, rays.size());
     }
-    EXPECT_LE(static_cast<double>(different), 5e-6 * static_cast<double>(rays.size())) << name;
-    testing::record_margin("different", static_cast<double>(different),
-                           5e-6 * static_cast<double>(rays.size()), "rays");
-    std::cout << fmt::format("{}: {} of {} rays decided otherwise\n", name, different, rays.size());
   }
 }
 
@@ -222,9 +228,11 @@ TEST(RayTracerProof, RaysAimedAtVerticesEdgesAndDiagonalsDoNotLeak) {
     rays[i].origin = targets[i] + back * (40 / steepness);
     rays[i].direction = glm::normalize(targets[i] - rays[i].origin);
   }
-  for (const Tracing tracing : {Tracing::Exact, Tracing::Fast}) {
+  for (const auto& [tracing, cells] :
+       {std::pair(Tracing::Exact, Cells::Quads), std::pair(Tracing::Fast, Cells::Quads),
+        std::pair(Tracing::Fast, Cells::Grids)}) {
     const double slack_m = tracing == Tracing::Exact ? 1e-9 : float_slack_m(grid);
-    const auto hits = trace(tracer(grid, tracing), rays);
+    const auto hits = trace(tracer(grid, tracing, "", cells), rays);
     std::size_t early = 0;
     for (std::size_t i = 0; i < rays.size(); ++i) {
       const double target_m = glm::length(targets[i] - rays[i].origin);
