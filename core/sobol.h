@@ -28,13 +28,16 @@ class SobolPairsOf {
 
   /// Returns the next pair of dimensions, in [0, 1)^2.
   Vec2<Real> next() noexcept {
-    pairs_ = pairs_ + Word(1u);
+    skip();
     const Word pair = mixed(Word(seed_ + 0x9e3779b9u * pairs_));
     const Word i = scrambled(index_, pair);
     const Word x = reversed_scramble(i, mixed(Word(pair ^ 0x68bc21ebu)));
     const Word y = reversed_scramble(second(i), mixed(Word(pair ^ 0x02e5be93u)));
     return {fraction(x), fraction(y)};
   }
+  /// Omits the next pair of dimensions.
+  void skip() noexcept { pairs_ = pairs_ + Word(1u); }
+
   const Word& seed() const noexcept { return seed_; }
   const Word& index() const noexcept { return index_; }
   const Word& pairs() const noexcept { return pairs_; }

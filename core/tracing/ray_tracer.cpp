@@ -119,11 +119,12 @@ const Target& RayTracer::Impl::join_levels() const {
   return everything;
 }
 
-// Returns whether the ray is below the surface where it leaves the target's box. Most rays are far
-// above it, which a single lookup shows.
+// Returns whether the ray is below the surface where it leaves the target's box. Most rays leave
+// through its top or are far above the surface, which a single lookup shows.
 bool RayTracer::Impl::ends_below(const Target& target, const GridRay& ray,
                                  double leave_m) const noexcept {
   const double z_m = ray.z0 + leave_m * ray.dz;
+  if (z_m >= target.max_m) return false;
   if (!target.is_all) {
     const Level& level = target.level->level;
     const double column = (ray.u0 + leave_m * ray.du - level.first.x) / level.step;

@@ -214,18 +214,19 @@ void StripRenderer::add_samples(const glm::ivec2& pixel, int count) {
     const PackOfWords indices([&](auto i) { return places[std::size_t{i}].index; });
     SobolPairsOf<PackOfWords> numbers(seeds, indices);
     Vec3<Pack> direction = patch.directions(numbers.next() - Pack(0.5));
-    const Vec2<Pack> pupil = numbers.next();
-    const Pack share = numbers.next().x;
     Vec3<Pack> origin(Pack(0.0));
     if (spec_.aperture && spec_.aperture->focus_m) {
       const ApertureSpec& aperture = *spec_.aperture;
       const Vec2<Pack> on_lens =
-          on_disc(pupil) * Pack(aperture.focal_length_m / aperture.f_number / 2);
+          on_disc(numbers.next()) * Pack(aperture.focal_length_m / aperture.f_number / 2);
       const auto refracts = direction.z > 0.0;
       origin = select(refracts, {on_lens.x, on_lens.y, Pack(0.0)}, origin);
       direction = select(refracts, unit_of(direction - origin * (direction.z / *aperture.focus_m)),
                          direction);
+    } else {
+      numbers.skip();  // a pupil changes no other random number
     }
+    const Pack share = numbers.next().x;
     std::array<nanoseconds, pack_size> times;
     std::array<Pose, pack_size> poses;  // X_DC
     for (std::size_t i = 0; i < pack_size; ++i) {
