@@ -50,14 +50,33 @@ TEST(Elementary, AnglesMatchLongDouble) {
   EXPECT_LT(worst, 3e-16L);
 }
 
+TEST(Elementary, AnglesOfSineAndCosineMatchLongDouble) {
+  long double worst = 0;
+  for (int i = 0; i < fractions; ++i) {
+    const double part = fraction(i), size = std::ldexp(1.0, i % 200 - 100);
+    for (const glm::dvec2 p : {size * glm::dvec2(part, 1), size * glm::dvec2(1, part)}) {
+      const auto expected = std::atan2(static_cast<long double>(p.x), p.y);
+      if (expected == 0) {
+        ASSERT_EQ(angle_of(p.x, p.y), 0);
+      } else {
+        worst = std::max(worst, std::abs(angle_of(p.x, p.y) / expected - 1));
+      }
+    }
+  }
+  EXPECT_LT(worst, 3e-16L);
+  EXPECT_TRUE(std::isnan(angle_of(0.0, 0.0)));
+}
+
 TEST(Elementary, PacksHaveTheBitsOfSingleNumbers) {
   for (int i = 0; i + 4 < fractions; i += 4) {
     const auto number = [&](std::size_t lane) { return fraction(i + static_cast<int>(lane)); };
     const Vec2<Pack> points = on_circle(pack_of(number));
     const Pack angles = angle_of_cosine(pack_of(number));
+    const Pack others = angle_of(pack_of(number), Pack(0.3));
     for (std::size_t lane = 0; lane < pack_size; ++lane) {
       ASSERT_EQ(glm::dvec2(points.x[lane], points.y[lane]), on_circle(number(lane))) << i;
       ASSERT_EQ(angles[lane], angle_of_cosine(number(lane))) << i;
+      ASSERT_EQ(others[lane], angle_of(number(lane), 0.3)) << i;
     }
   }
 }
