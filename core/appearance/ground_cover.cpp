@@ -7,6 +7,7 @@
 
 #include "core/appearance/normal_map.h"
 #include "core/appearance/texture.h"
+#include "core/elementary.h"
 #include "core/error.h"
 
 namespace groundray {
@@ -95,7 +96,7 @@ double CoverLimits::share(double value) const noexcept {
 }
 
 GroundCover::Point GroundCover::on_facet(const glm::dvec3& p_D, const glm::dvec3& normal) noexcept {
-  return {p_D, normal, std::acos(std::clamp(normal.z, -1.0, 1.0))};
+  return {p_D, normal, angle_of_cosine(std::clamp(normal.z, 0.0, 1.0))};
 }
 
 GroundCover::GroundCover(std::vector<CoverLayer> layers, std::shared_ptr<const Drape> orthophoto,
