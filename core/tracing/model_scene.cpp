@@ -31,17 +31,34 @@ ModelScene::Impl::Textures textures_of(const ModelSurface& surface) {
   return all;
 }
 
-// Rejects hits where a cut-out is transparent, decided in double because floats are too coarse.
-// Hits on triangles that the ray misses in double are kept, since it may hit a neighbour.
+// Returns whether a ray passes through a cut-out of a triangle. A triangle that the ray misses in
+// double has none, since the ray may hit its neighbour.
+bool is_cut_out(const ModelScene::Impl& model, std::uint32_t triangle, const ModelRay& ray) {
+  const glm::dvec3 edges = model.edges_of(triangle, ray);
+  return is_inside(edges) && !model.is_opaque(triangle, model.shares(edges));
+}
+
+// Rejects hits where a cut-out is transparent: in double wherever floats are too coarse.
 void filter_cut(const RTCFilterFunctionNArguments* arguments) {
   const auto& model = *static_cast<const ModelScene::Impl*>(arguments->geometryUserPtr);
   const auto& query = *reinterpret_cast<const ModelQuery*>(arguments->context);
-  for (unsigned i = 0; i < arguments->N; ++i) {
+  RTCRayN* const rays = arguments->ray;
+  RTCHitN* const hits = arguments->hit;
+  const unsigned count = arguments->N;
+  for (unsigned i = 0; i < count; ++i) {
     if (arguments->valid[i] == 0) continue;
-    const ModelRay& ray = query.rays[RTCRayN_id(arguments->ray, arguments->N, i)];
-    const std::uint32_t triangle = model.cut[RTCHitN_primID(arguments->hit, arguments->N, i)];
-    const glm::dvec3 edges = model.edges_of(triangle, ray);
-    if (is_inside(edges) && !model.is_opaque(triangle, model.shares(edges)))
+    const ModelRay& ray = query.rays[RTCRayN_id(rays, count, i)];
+    const unsigned primitive = RTCHitN_primID(hits, count, i);
+    const CutOut cut_out = model.cut_outs.at(
+        primitive, ray.origin,
+        {RTCHitN_u(hits, count, i),
+         RTCHitN_v(hits, count, i),
+         RTCRayN_tfar(rays, count, i),
+         {RTCHitN_Ng_x(hits, count, i), RTCHitN_Ng_y(hits, count, i), RTCHitN_Ng_z(hits, count, i)},
+         {RTCRayN_dir_x(rays, count, i), RTCRayN_dir_y(rays, count, i),
+          RTCRayN_dir_z(rays, count, i)}});
+    if (cut_out == CutOut::Opaque) continue;
+    if (cut_out == CutOut::Transparent || is_cut_out(model, model.cut[primitive], ray))
       arguments->valid[i] = 0;
   }
 }
@@ -147,6 +164,14 @@ ModelScene::Impl::Impl(const RayDevice& with, Model content, Tracing how)
   slack_m = static_cast<float>(16 * 0x1p-24 * glm::length(high_m - low_m));
   for (std::uint32_t i = 0; i < model.mesh.triangles.size(); ++i)
     (textures_of(i).least_alpha > 0 ? cut : solid).push_back(i);
+  if (tracing == Tracing::Fast && !cut.empty()) {
+    std::vector<FloatCutOuts::Source> sources;
+    for (const Textures& worn : textures) {
+      const bool cuts = worn.least_alpha > 0;
+      sources.push_back({cuts ? &worn.cut_by() : nullptr, worn.least_alpha});
+    }
+    cut_outs = FloatCutOuts(model, cut, sources, glm::length(high_m - low_m));
+  }
   scene = new_scene(device);
   if (tracing == Tracing::Exact) {
     attach_primitives(device, scene.get(), 0, model.mesh.triangles.size(), this, triangle_bounds,
@@ -219,7 +244,7 @@ bool ModelScene::Impl::is_opaque(std::uint32_t triangle, const glm::dvec3& share
   const Textures& worn = textures_of(triangle);
   if (worn.least_alpha == 0) return true;
   const glm::dvec2 uv = uv_at(triangle, shares);
-  const Texture& cut_by = worn.opacity ? *worn.opacity : *worn.albedo;
+  const Texture& cut_by = worn.cut_by();
   const float alpha = cut_by.has_alpha() ? cut_by.alpha(uv) : cut_by.color(uv).x;
   return alpha >= worn.least_alpha;
 }
