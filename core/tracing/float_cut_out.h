@@ -20,7 +20,7 @@ namespace groundray {
 
 /// Result of a cut-out test in float. All but `Unsure` hold in double, too: the ray passes inside
 /// the triangle, and the surface is opaque or transparent there.
-enum class CutOut { Opaque, Transparent, Unsure };
+enum class CutOut { Transparent, Opaque, Unsure };
 
 /// Embree's hit on a triangle: barycentric coordinates of the second and third corner, the normal,
 /// whose length is twice the triangle's area, and the direction of the ray.
@@ -59,12 +59,12 @@ class FloatCutOuts {
         std::min({hit.u, hit.v, 1 - hit.u - hit.v}) > error && error < most_error &&
         length > least_length &&
         std::max({std::abs(origin.x), std::abs(origin.y), std::abs(origin.z)}) < farthest_m_;
-    if (!is_known) return CutOut::Unsure;
+    if (!is_known) [[unlikely]] return CutOut::Unsure;
     const Alpha& alpha = alphas_[triangle.surface];
     const float over = alpha.at(triangle.corner + hit.u * triangle.by_u + hit.v * triangle.by_v) -
                        alpha.least;
     if (!(std::abs(over) > triangle.slope * error + triangle.rounding)) return CutOut::Unsure;
-    return over > 0 ? CutOut::Opaque : CutOut::Transparent;
+    return static_cast<CutOut>(over > 0);  // predicting a branch here would often fail
   }
 
   std::size_t memory_bytes() const noexcept;

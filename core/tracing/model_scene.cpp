@@ -1,6 +1,7 @@
 #include "core/tracing/model_scene.h"
 
 #include <algorithm>
+#include <bit>
 #include <cmath>
 #include <utility>
 
@@ -31,11 +32,13 @@ ModelScene::Impl::Textures textures_of(const ModelSurface& surface) {
   return all;
 }
 
-// Returns whether a ray passes through a cut-out of a triangle. A triangle that the ray misses in
-// double has none, since the ray may hit its neighbour.
-bool is_cut_out(const ModelScene::Impl& model, std::uint32_t triangle, const ModelRay& ray) {
+// Tests in double whether a ray passes through a cut-out of a triangle. One that the ray misses in
+// double counts as opaque, since the ray may hit its neighbour.
+CutOut cut_out_at(const ModelScene::Impl& model, std::uint32_t triangle,
+                  const ModelRay& ray) noexcept {
   const glm::dvec3 edges = model.edges_of(triangle, ray);
-  return is_inside(edges) && !model.is_opaque(triangle, model.shares(edges));
+  const bool passes = is_inside(edges) && !model.is_opaque(triangle, model.shares(edges));
+  return passes ? CutOut::Transparent : CutOut::Opaque;
 }
 
 // Rejects hits where a cut-out is transparent: in double wherever floats are too coarse.
@@ -45,11 +48,13 @@ void filter_cut(const RTCFilterFunctionNArguments* arguments) {
   RTCRayN* const rays = arguments->ray;
   RTCHitN* const hits = arguments->hit;
   const unsigned count = arguments->N;
-  for (unsigned i = 0; i < count; ++i) {
-    if (arguments->valid[i] == 0) continue;
+  unsigned lanes = 0;
+  for (unsigned i = 0; i < count; ++i) lanes |= (arguments->valid[i] & 1u) << i;
+  for (; lanes != 0; lanes &= lanes - 1) {
+    const auto i = static_cast<unsigned>(std::countr_zero(lanes));
     const ModelRay& ray = query.rays[RTCRayN_id(rays, count, i)];
     const unsigned primitive = RTCHitN_primID(hits, count, i);
-    const CutOut cut_out = model.cut_outs.at(
+    CutOut cut_out = model.cut_outs.at(
         primitive, ray.origin,
         {RTCHitN_u(hits, count, i),
          RTCHitN_v(hits, count, i),
@@ -57,9 +62,8 @@ void filter_cut(const RTCFilterFunctionNArguments* arguments) {
          {RTCHitN_Ng_x(hits, count, i), RTCHitN_Ng_y(hits, count, i), RTCHitN_Ng_z(hits, count, i)},
          {RTCRayN_dir_x(rays, count, i), RTCRayN_dir_y(rays, count, i),
           RTCRayN_dir_z(rays, count, i)}});
-    if (cut_out == CutOut::Opaque) continue;
-    if (cut_out == CutOut::Transparent || is_cut_out(model, model.cut[primitive], ray))
-      arguments->valid[i] = 0;
+    if (cut_out == CutOut::Unsure) cut_out = cut_out_at(model, model.cut[primitive], ray);
+    arguments->valid[i] = -static_cast<int>(cut_out);
   }
 }
 
@@ -252,9 +256,9 @@ bool ModelScene::Impl::is_opaque(std::uint32_t triangle, const glm::dvec3& share
 ModelCrossing ModelScene::Impl::intersect(std::uint32_t triangle,
                                           const ModelRay& ray) const noexcept {
   const glm::dvec3 edges = edges_of(triangle, ray);
-  ModelCrossing best;
-  take_nearer(*this, triangle, ray, edges, best);
-  if (!best) return best;
+  if (!is_inside(edges)) return {};
+  ModelCrossing best{range_m(triangle, ray), triangle};
+  if (!(best && best.t_m >= 0)) return {};
   if (edges.x == 0 || edges.y == 0 || edges.z == 0) return meet_beside(triangle, ray);
   for (std::uint32_t i = stars.next_twin(triangle); i != triangle; i = stars.next_twin(i))
     take_nearer(*this, i, ray, edges_of(i, ray), best);

@@ -83,8 +83,8 @@ struct ModelScene::Impl {
   }
   bool is_opaque(std::uint32_t triangle, const glm::dvec3& shares) const noexcept;
 
-  /// Intersects a ray in double with a triangle that Embree reported: a miss if the ray passes
-  /// beside it, starts behind it, or goes through a cut-out. Several triangles may be hit there at
+  /// Intersects a ray in double with a triangle that Embree reported, and that has no cut-out there:
+  /// a miss if the ray passes beside it or starts behind it. Several triangles may be hit there at
   /// once, because all their corners coincide or the ray hits a shared edge or corner. The nearest
   /// then counts and, of equally distant ones, the first, as in exact tracing.
   ModelCrossing intersect(std::uint32_t triangle, const ModelRay& ray) const noexcept;
