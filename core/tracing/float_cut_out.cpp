@@ -13,16 +13,19 @@ glm::dvec2 texels_at(const glm::vec2& uv, const glm::dvec2& size) {
 
 }  // namespace
 
-// Error of the barycentric coordinates, with e = 2^-24 times the diagonal of the model's box:
-// Rounding of the ray's origin and direction and of the vertices moves the line by up to 5 e
-// against the triangle, and rounding in Embree's edge functions is that of another 12 e. An edge
-// function thereby changes by 17 e times the edge's length, and its sum over three edges by three
-// times as much. Divided by the area across the ray, that is the error of a coordinate: in all 68
-// e times the longest edge; `reach` has 128 e. Double is as coarse as e / 8 if the origin is 2^26
-// diagonals away.
+// Error of the barycentric coordinates u and v, in units of 2^-24, for a box with diagonal D, a hit
+// at distance t from the float ray's origin, and a triangle with longest edge e:
+// - Rounding of the ray's origin and of the vertices moves the line by D against the triangle,
+//   rounding of its direction by t. Double adds less than D if the origin is within 2^24 D.
+// - Embree's edge function is dot(cross(c - a, c + a), direction) with corners relative to the
+//   origin, so |c + a| <= 2 (t + e). Without fused operations its terms round by 5 sqrt(2) + 3
+//   units of their product, and a coordinate, a ratio of edge functions, by twice as much: as if
+//   the line moved by 21 (t + e). Rounding of the corners adds t + e.
+// The sum is below 2 D + 32 (t + e). A line that moves by x changes a coordinate by x e over twice
+// the triangle's area across the ray.
 //
 // Error of alpha: it is continuous, even across the image's borders, and changes by at most 255 for
-// each texel along each axis. This bound needs no distinction of texels.
+// each texel along each axis. So nothing depends on which texels are interpolated.
 FloatCutOuts::FloatCutOuts(const Model& model, std::span<const std::uint32_t> triangles,
                            std::span<const Source> sources, double size_m)
     : alphas_(sources.size()), farthest_m_(0x1p24 * size_m) {
@@ -53,22 +56,21 @@ FloatCutOuts::FloatCutOuts(const Model& model, std::span<const std::uint32_t> tr
       const glm::vec2& uv = model.uv[corners[k]];
       at[static_cast<std::size_t>(k)] = texels_at(uv, size);
       largest = std::max({largest, std::abs(uv.x) * size.x, std::abs(uv.y) * size.y});
-      longest_m =
-          std::max(longest_m, glm::distance(model.mesh.vertices_m[corners[k]],
-                                            model.mesh.vertices_m[corners[(k + 1) % 3]]));
+      longest_m = std::max(longest_m, glm::distance(model.mesh.vertices_m[corners[k]],
+                                                    model.mesh.vertices_m[corners[(k + 1) % 3]]));
     }
     const glm::dvec2 by_u = at[1] - at[0], by_v = at[2] - at[0];
     const glm::dvec2 range = glm::abs(by_u) + glm::abs(by_v);
     const double far_error = 32 * 0x1p-24 * longest_m;
     const double near_error = 2 * 0x1p-24 * size_m * longest_m + far_error * longest_m;
-    const double rounding = 8 * 0x1p-24 * (size.x + size.y + range.x + range.y) +
-                            16 * 0x1p-53 * largest + 0x1p-20;
+    const double rounding =
+        8 * 0x1p-24 * (size.x + size.y + range.x + range.y) + 16 * 0x1p-53 * largest + 0x1p-20;
+    const bool is_sound = near_error > 1e-30 && rounding < 1;  // nothing under- or overflows
     triangles_.push_back(
         {glm::vec2(at[0] - glm::floor(at[0] / size) * size), glm::vec2(by_u), glm::vec2(by_v),
-         near_error > 1e-30 ? static_cast<float>(near_error) : std::numeric_limits<float>::infinity(),
-         static_cast<float>(far_error),
-         static_cast<float>(255 * (range.x + range.y)), static_cast<float>(255 * rounding),
-         surface});
+         is_sound ? static_cast<float>(near_error) : std::numeric_limits<float>::infinity(),
+         static_cast<float>(far_error), static_cast<float>(255 * (range.x + range.y)),
+         static_cast<float>(255 * rounding), surface});
   }
 }
 

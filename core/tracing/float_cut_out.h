@@ -59,10 +59,11 @@ class FloatCutOuts {
         std::min({hit.u, hit.v, 1 - hit.u - hit.v}) > error && error < most_error &&
         length > least_length &&
         std::max({std::abs(origin.x), std::abs(origin.y), std::abs(origin.z)}) < farthest_m_;
-    if (!is_known) [[unlikely]] return CutOut::Unsure;
+    if (!is_known) [[unlikely]]
+      return CutOut::Unsure;
     const Alpha& alpha = alphas_[triangle.surface];
-    const float over = alpha.at(triangle.corner + hit.u * triangle.by_u + hit.v * triangle.by_v) -
-                       alpha.least;
+    const float over =
+        alpha.at(triangle.corner + hit.u * triangle.by_u + hit.v * triangle.by_v) - alpha.least;
     if (!(std::abs(over) > triangle.slope * error + triangle.rounding)) return CutOut::Unsure;
     return static_cast<CutOut>(over > 0);  // predicting a branch here would often fail
   }

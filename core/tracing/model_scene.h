@@ -83,10 +83,10 @@ struct ModelScene::Impl {
   }
   bool is_opaque(std::uint32_t triangle, const glm::dvec3& shares) const noexcept;
 
-  /// Intersects a ray in double with a triangle that Embree reported, and that has no cut-out there:
-  /// a miss if the ray passes beside it or starts behind it. Several triangles may be hit there at
-  /// once, because all their corners coincide or the ray hits a shared edge or corner. The nearest
-  /// then counts and, of equally distant ones, the first, as in exact tracing.
+  /// Intersects a ray in double with a triangle that Embree reported, and that has no cut-out
+  /// there: a miss if the ray passes beside it or starts behind it. Several triangles may be hit
+  /// there at once, because all their corners coincide or the ray hits a shared edge or corner. The
+  /// nearest then counts and, of equally distant ones, the first, as in exact tracing.
   ModelCrossing intersect(std::uint32_t triangle, const ModelRay& ray) const noexcept;
   /// Intersects a ray with the triangles that share a corner with one that Embree reported.
   ModelCrossing meet_beside(std::uint32_t triangle, const ModelRay& ray) const noexcept;
