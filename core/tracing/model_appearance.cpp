@@ -69,7 +69,7 @@ void ModelScene::Impl::find_means() {
 }
 
 std::size_t ModelScene::texture_bytes() const noexcept {
-  std::size_t bytes = 0;
+  std::size_t bytes = impl_->cut_outs.memory_bytes();
   for (const auto& worn : impl_->textures) {
     for (const auto* texture : {&worn.albedo, &worn.normal, &worn.opacity}) {
       if (*texture) bytes += (*texture)->memory_bytes();

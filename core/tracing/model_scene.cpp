@@ -1,6 +1,7 @@
 #include "core/tracing/model_scene.h"
 
 #include <algorithm>
+#include <bit>
 #include <cmath>
 #include <utility>
 
@@ -31,18 +32,38 @@ ModelScene::Impl::Textures textures_of(const ModelSurface& surface) {
   return all;
 }
 
-// Rejects hits where a cut-out is transparent, decided in double because floats are too coarse.
-// Hits on triangles that the ray misses in double are kept, since it may hit a neighbour.
+// Tests in double whether a ray passes through a cut-out of a triangle. One that the ray misses in
+// double counts as opaque, since the ray may hit its neighbour.
+CutOut cut_out_at(const ModelScene::Impl& model, std::uint32_t triangle,
+                  const ModelRay& ray) noexcept {
+  const glm::dvec3 edges = model.edges_of(triangle, ray);
+  const bool passes = is_inside(edges) && !model.is_opaque(triangle, model.shares(edges));
+  return passes ? CutOut::Transparent : CutOut::Opaque;
+}
+
+// Rejects hits where a cut-out is transparent: in double wherever floats are too coarse.
 void filter_cut(const RTCFilterFunctionNArguments* arguments) {
   const auto& model = *static_cast<const ModelScene::Impl*>(arguments->geometryUserPtr);
   const auto& query = *reinterpret_cast<const ModelQuery*>(arguments->context);
-  for (unsigned i = 0; i < arguments->N; ++i) {
-    if (arguments->valid[i] == 0) continue;
-    const ModelRay& ray = query.rays[RTCRayN_id(arguments->ray, arguments->N, i)];
-    const std::uint32_t triangle = model.cut[RTCHitN_primID(arguments->hit, arguments->N, i)];
-    const glm::dvec3 edges = model.edges_of(triangle, ray);
-    if (is_inside(edges) && !model.is_opaque(triangle, model.shares(edges)))
-      arguments->valid[i] = 0;
+  RTCRayN* const rays = arguments->ray;
+  RTCHitN* const hits = arguments->hit;
+  const unsigned count = arguments->N;
+  unsigned lanes = 0;
+  for (unsigned i = 0; i < count; ++i) lanes |= (arguments->valid[i] & 1u) << i;
+  for (; lanes != 0; lanes &= lanes - 1) {
+    const auto i = static_cast<unsigned>(std::countr_zero(lanes));
+    const ModelRay& ray = query.rays[RTCRayN_id(rays, count, i)];
+    const unsigned primitive = RTCHitN_primID(hits, count, i);
+    CutOut cut_out = model.cut_outs.at(
+        primitive, ray.origin,
+        {RTCHitN_u(hits, count, i),
+         RTCHitN_v(hits, count, i),
+         RTCRayN_tfar(rays, count, i),
+         {RTCHitN_Ng_x(hits, count, i), RTCHitN_Ng_y(hits, count, i), RTCHitN_Ng_z(hits, count, i)},
+         {RTCRayN_dir_x(rays, count, i), RTCRayN_dir_y(rays, count, i),
+          RTCRayN_dir_z(rays, count, i)}});
+    if (cut_out == CutOut::Unsure) cut_out = cut_out_at(model, model.cut[primitive], ray);
+    arguments->valid[i] = -static_cast<int>(cut_out);
   }
 }
 
@@ -147,6 +168,14 @@ ModelScene::Impl::Impl(const RayDevice& with, Model content, Tracing how)
   slack_m = static_cast<float>(16 * 0x1p-24 * glm::length(high_m - low_m));
   for (std::uint32_t i = 0; i < model.mesh.triangles.size(); ++i)
     (textures_of(i).least_alpha > 0 ? cut : solid).push_back(i);
+  if (tracing == Tracing::Fast && !cut.empty()) {
+    std::vector<FloatCutOuts::Source> sources;
+    for (const Textures& worn : textures) {
+      const bool cuts = worn.least_alpha > 0;
+      sources.push_back({cuts ? &worn.cut_by() : nullptr, worn.least_alpha});
+    }
+    cut_outs = FloatCutOuts(model, cut, sources, glm::length(high_m - low_m));
+  }
   scene = new_scene(device);
   if (tracing == Tracing::Exact) {
     attach_primitives(device, scene.get(), 0, model.mesh.triangles.size(), this, triangle_bounds,
@@ -219,7 +248,7 @@ bool ModelScene::Impl::is_opaque(std::uint32_t triangle, const glm::dvec3& share
   const Textures& worn = textures_of(triangle);
   if (worn.least_alpha == 0) return true;
   const glm::dvec2 uv = uv_at(triangle, shares);
-  const Texture& cut_by = worn.opacity ? *worn.opacity : *worn.albedo;
+  const Texture& cut_by = worn.cut_by();
   const float alpha = cut_by.has_alpha() ? cut_by.alpha(uv) : cut_by.color(uv).x;
   return alpha >= worn.least_alpha;
 }
@@ -227,9 +256,9 @@ bool ModelScene::Impl::is_opaque(std::uint32_t triangle, const glm::dvec3& share
 ModelCrossing ModelScene::Impl::intersect(std::uint32_t triangle,
                                           const ModelRay& ray) const noexcept {
   const glm::dvec3 edges = edges_of(triangle, ray);
-  ModelCrossing best;
-  take_nearer(*this, triangle, ray, edges, best);
-  if (!best) return best;
+  if (!is_inside(edges)) return {};
+  ModelCrossing best{range_m(triangle, ray), triangle};
+  if (!(best && best.t_m >= 0)) return {};
   if (edges.x == 0 || edges.y == 0 || edges.z == 0) return meet_beside(triangle, ray);
   for (std::uint32_t i = stars.next_twin(triangle); i != triangle; i = stars.next_twin(i))
     take_nearer(*this, i, ray, edges_of(i, ray), best);

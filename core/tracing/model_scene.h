@@ -12,6 +12,7 @@
 #include "core/appearance/texture.h"
 #include "core/geometry/corner_stars.h"
 #include "core/tracing/embree_adapter.h"
+#include "core/tracing/float_cut_out.h"
 #include "core/tracing/object_tracer.h"
 
 namespace groundray {
@@ -45,10 +46,12 @@ struct ModelScene::Impl {
     std::optional<Texture> albedo, normal, opacity;
     float least_alpha = 0;  // the surface is cut out where alpha is less; 0 for nowhere
     glm::vec3 mean{0};      // of albedo, by area, over all triangles with this surface
+    const Texture& cut_by() const noexcept { return opacity ? *opacity : *albedo; }
   };
   std::vector<Textures> textures;  // by surface
   CornerStars stars;
   std::vector<std::uint32_t> solid, cut;  // triangles by primitive: without and with cut-outs
+  FloatCutOuts cut_outs;                  // of `cut`
   glm::dvec3 low_m{0}, high_m{0};         // bounding box of all triangles
   glm::dvec3 centre_m{0};                 // its centre: the origin of the scene's float coordinates
   double radius_m = 0;                    // of a ball round O's origin that contains the box
@@ -80,10 +83,10 @@ struct ModelScene::Impl {
   }
   bool is_opaque(std::uint32_t triangle, const glm::dvec3& shares) const noexcept;
 
-  /// Intersects a ray in double with a triangle that Embree reported: a miss if the ray passes
-  /// beside it, starts behind it, or goes through a cut-out. Several triangles may be hit there at
-  /// once, because all their corners coincide or the ray hits a shared edge or corner. The nearest
-  /// then counts and, of equally distant ones, the first, as in exact tracing.
+  /// Intersects a ray in double with a triangle that Embree reported, and that has no cut-out
+  /// there: a miss if the ray passes beside it or starts behind it. Several triangles may be hit
+  /// there at once, because all their corners coincide or the ray hits a shared edge or corner. The
+  /// nearest then counts and, of equally distant ones, the first, as in exact tracing.
   ModelCrossing intersect(std::uint32_t triangle, const ModelRay& ray) const noexcept;
   /// Intersects a ray with the triangles that share a corner with one that Embree reported.
   ModelCrossing meet_beside(std::uint32_t triangle, const ModelRay& ray) const noexcept;

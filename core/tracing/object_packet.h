@@ -179,8 +179,10 @@ void intersect(const ModelScene::Impl& model, std::uint32_t object,
   }
   if (model.tracing == Tracing::Exact) local.crossings.fill({});
   ModelQuery query{{}, local.rays.data(), local.enter_m.data(), local.crossings.data()};
+  // Coherent traversal tests each triangle with all lanes, which pays if most of them are valid.
+  const auto idle = std::ranges::count(local.valid, 0);
   intersect<W>(model.scene.get(), local.valid.data(), local.floats, query.context,
-               Coherence::Coherent);
+               idle <= W / 4 ? Coherence::Coherent : Coherence::Incoherent);
   for (std::size_t i = 0; i < W; ++i) {
     if (local.valid[i] == 0) continue;
     const auto crossing = crossing_of(model, local, i);
