@@ -43,6 +43,33 @@ ModelPoint model_point(const ObjectTracer& objects, const Ray& ray, const Hit& h
           {R_OD * patch.a_m / object.scale, R_OD * patch.b_m / object.scale}};
 }
 
+Appearance of_material(std::uint16_t material) noexcept {
+  Appearance appearance;
+  appearance.parts[0] = {material, 1, {}};
+  appearance.count = 1;
+  return appearance;
+}
+
+Appearance appearance_at(const Scene& scene, const Ray& ray, const Hit& hit, const ModelPoint& at,
+                         Filtering filtering) noexcept {
+  Appearance appearance = of_material(scene.truth_of(ray, hit).material);
+  if (at.model.has_albedo(hit.part))
+    appearance.parts[0].tint = at.model.tint(hit.part, at.p_O, at.patch_O, filtering);
+  return appearance;
+}
+
+Appearance appearance_at(const GroundCover& cover, const GroundCover::Point& point,
+                         const SurfacePatch& patch, Filtering filtering) noexcept {
+  Appearance appearance;
+  const auto shares = cover.shares_at(point);
+  for (std::size_t i = 0; i < cover.layers().size(); ++i) {
+    if (shares[i] == 0) continue;
+    appearance.parts[appearance.count++] = {cover.layers()[i].material, shares[i],
+                                            cover.tint_at(i, point, patch, filtering)};
+  }
+  return appearance;
+}
+
 }  // namespace
 
 SurfaceTruth Scene::truth_of(const Ray& ray, const Hit& hit) const noexcept {
@@ -67,42 +94,30 @@ bool Scene::is_plain() const noexcept {
 
 Appearance Scene::appearance_of(const Ray& ray, const Hit& hit, double width_m,
                                 Filtering filtering) const noexcept {
-  Appearance appearance;
   if (hit.object != 0) {
-    appearance.parts[0] = {truth_of(ray, hit).material, 1, {}};
-    appearance.count = 1;
-    const ModelScene& scene = objects.models()[objects.model_of(hit.object)];
-    if (!scene.has_albedo(hit.part)) return appearance;
-    const ModelPoint at = model_point(objects, ray, hit, width_m);
-    appearance.parts[0].tint = at.model.tint(hit.part, at.p_O, at.patch_O, filtering);
-    return appearance;
+    if (!objects.models()[objects.model_of(hit.object)].has_albedo(hit.part))
+      return of_material(truth_of(ray, hit).material);
+    return appearance_at(*this, ray, hit, model_point(objects, ray, hit, width_m), filtering);
   }
-  if (cover.empty()) {
-    appearance.parts[0] = {terrain.material, 1, {}};
-    appearance.count = 1;
-    return appearance;
-  }
+  if (cover.empty()) return of_material(terrain.material);
   const GroundCover::Point point = ground_point(*this, ray, hit);
-  const SurfacePatch patch = surface_patch(width_m, ray.direction, point.normal);
-  const auto shares = cover.shares_at(point);
-  for (std::size_t i = 0; i < cover.layers().size(); ++i) {
-    if (shares[i] == 0) continue;
-    appearance.parts[appearance.count++] = {cover.layers()[i].material, shares[i],
-                                            cover.tint_at(i, point, patch, filtering)};
-  }
-  return appearance;
+  return appearance_at(cover, point, surface_patch(width_m, ray.direction, point.normal),
+                       filtering);
 }
 
-glm::dvec3 Scene::shading_normal_of(const Ray& ray, const Hit& hit, double width_m,
-                                    Filtering filtering) const noexcept {
-  if (hit.object == 0) {
-    if (cover.empty()) return glm::normalize(glm::dvec3(hit.normal));
-    const GroundCover::Point point = ground_point(*this, ray, hit);
-    return cover.shading_normal_at(point, surface_patch(width_m, ray.direction, point.normal),
-                                   filtering);
+SeenSurface Scene::look_at(const Ray& ray, const Hit& hit, double width_m,
+                           Filtering filtering) const noexcept {
+  if (hit.object != 0) {
+    const ModelPoint at = model_point(objects, ray, hit, width_m);
+    return {
+        appearance_at(*this, ray, hit, at, filtering),
+        at.R_DO * at.model.shading_normal(hit.part, at.p_O, at.normal_O, at.patch_O, filtering)};
   }
-  const ModelPoint at = model_point(objects, ray, hit, width_m);
-  return at.R_DO * at.model.shading_normal(hit.part, at.p_O, at.normal_O, at.patch_O, filtering);
+  if (cover.empty()) return {of_material(terrain.material), glm::normalize(glm::dvec3(hit.normal))};
+  const GroundCover::Point point = ground_point(*this, ray, hit);
+  const SurfacePatch patch = surface_patch(width_m, ray.direction, point.normal);
+  return {appearance_at(cover, point, patch, filtering),
+          cover.shading_normal_at(point, patch, filtering)};
 }
 
 }  // namespace groundray

@@ -39,6 +39,14 @@ struct Appearance {
   std::uint32_t count = 0;
 };
 
+/// What light meets at a hit.
+struct SeenSurface {
+  Appearance appearance;
+  /// Unit, in D, on the side that the ray comes from. It affects light only: ranges and the normals
+  /// of hits are those of the facet.
+  glm::dvec3 shading_normal;
+};
+
 /// The world that sensors observe: everything that rays can hit, and its ground truth. Immutable
 /// once built.
 struct Scene {
@@ -71,11 +79,9 @@ struct Scene {
   Appearance appearance_of(const Ray& ray, const Hit& hit, double width_m,
                            Filtering filtering) const noexcept;
 
-  /// Returns the shading normal, unit, in D, on the side that the ray comes from. It affects light
-  /// only: ranges and the normals of hits are those of the facet.
-  /// @param width_m  as above.
-  glm::dvec3 shading_normal_of(const Ray& ray, const Hit& hit, double width_m,
-                               Filtering filtering) const noexcept;
+  /// Returns the same and the shading normal.
+  SeenSurface look_at(const Ray& ray, const Hit& hit, double width_m,
+                      Filtering filtering) const noexcept;
 };
 
 }  // namespace groundray

@@ -70,11 +70,7 @@ class RowTruth {
  public:
   RowTruth(const Camera& camera, const Scene& scene, const Materials::InColour& materials,
            const Trajectory& X_DC)
-      : camera_(camera),
-        scene_(scene),
-        materials_(materials),
-        X_DC_(X_DC),
-        is_plain_(scene.is_plain()) {}
+      : camera_(camera), scene_(scene), materials_(materials), X_DC_(X_DC) {}
 
   void fill(int row, const TruthRequest& request, ImageTruth& into);
 
@@ -84,14 +80,13 @@ class RowTruth {
   void write_sky(int x, int y, ImageTruth& into) const;
   void write_pixels(int y, ImageTruth& into) const;
   void write_surface(int x, int y, const Ray& ray, const Hit& hit, ImageTruth& into) const;
-  glm::vec3 albedo_of(const Ray& ray, const Hit& hit, std::uint16_t material) const;
+  glm::vec3 albedo_of(const Appearance& seen) const;
   void follow(int y, nanoseconds begin, Flow& flow);
 
   const Camera& camera_;
   const Scene& scene_;
   const Materials::InColour& materials_;
   const Trajectory& X_DC_;
-  bool is_plain_;                           // true if each material has a single albedo
   std::span<const glm::dvec3> directions_;  // viewing directions of the row, in C
   int first_ = 0, end_ = 0;                 // columns being processed
   // Pixels of these columns that have a viewing direction:
@@ -181,24 +176,26 @@ void RowTruth::write_surface(int x, int y, const Ray& ray, const Hit& hit, Image
   const glm::dvec3 normal = glm::normalize(glm::dvec3(hit.normal));
   put(into.p_DQ, x, y, p_DQ);
   put(into.normal, x, y, normal);
-  const bool is_bare = hit.object == 0 && scene_.cover.empty();  // no bump maps
-  put(into.shading_normal, x, y,
-      is_bare ? normal : scene_.shading_normal_of(ray, hit, 0, Filtering::Fast));
+  const SurfaceTruth surface = scene_.truth_of(ray, hit);
+  if (hit.object == 0 && scene_.cover.empty()) {  // no textures
+    put(into.shading_normal, x, y, normal);
+    put(into.albedo, x, y, materials_.albedos[surface.material]);
+  } else {
+    const auto [seen, shading_normal] = scene_.look_at(ray, hit, 0, Filtering::Fast);
+    put(into.shading_normal, x, y, shading_normal);
+    put(into.albedo, x, y, albedo_of(seen));
+  }
   const auto sine = static_cast<float>(glm::length(glm::cross(ray.direction, normal)));
   into.incidence_rad.at(x, y)[0] =
       std::atan2(sine, static_cast<float>(-glm::dot(ray.direction, normal)));
   put(into.velocity_m_s, x, y,
       hit.object == 0 ? glm::dvec3(0) : scene_.objects.velocity_m_s(hit.object, p_DQ, ray.time));
-  const SurfaceTruth surface = scene_.truth_of(ray, hit);
   into.label.at(x, y)[0] = surface.label;
   into.instance.at(x, y)[0] = surface.instance;
   into.material.at(x, y)[0] = surface.material + 1u;
-  put(into.albedo, x, y, albedo_of(ray, hit, surface.material));
 }
 
-glm::vec3 RowTruth::albedo_of(const Ray& ray, const Hit& hit, std::uint16_t material) const {
-  if (is_plain_) return materials_.albedos[material];
-  const Appearance seen = scene_.appearance_of(ray, hit, 0, Filtering::Fast);
+glm::vec3 RowTruth::albedo_of(const Appearance& seen) const {
   glm::vec3 albedo(0);
   for (std::uint32_t i = 0; i < seen.count; ++i) {
     const Appearance::Part& part = seen.parts[i];

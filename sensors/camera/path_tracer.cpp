@@ -223,7 +223,7 @@ void PathTracer::find_surfaces(Workspace& work) const {
       ++work.ends[material];
       continue;
     }
-    const Appearance seen = scene_.appearance_of(ray, hit, 0, Filtering::Fast);
+    const auto [seen, shading_normal] = scene_.look_at(ray, hit, 0, Filtering::Fast);
     std::uint32_t part = 0;
     if (seen.count > 1) {  // choose one layer, with a probability equal to its share
       double left = work.paths[k].numbers.next().x;
@@ -231,8 +231,7 @@ void PathTracer::find_surfaces(Workspace& work) const {
         left -= static_cast<double>(seen.parts[part++].share);
     }
     const auto& [material, share, tint] = seen.parts[part];
-    work.surfaces.push_back(
-        {scene_.shading_normal_of(ray, hit, 0, Filtering::Fast), tint.color, k, material});
+    work.surfaces.push_back({shading_normal, tint.color, k, material});
     ++work.ends[material];
   }
   std::exclusive_scan(work.ends.begin(), work.ends.end(), work.ends.begin(), std::size_t{0});

@@ -152,7 +152,7 @@ TEST(Scene, BumpsChangeOnlyTheShadingNormal) {
         EXPECT_EQ(plain.hit.range_m, bumped.hit.range_m);
         EXPECT_EQ(plain.hit.normal, bumped.hit.normal);
         const auto shaded = [](const Scene& scene, const Look& look) {
-          return scene.shading_normal_of(look.ray, look.hit, 0.01, Filtering::Exact);
+          return scene.look_at(look.ray, look.hit, 0.01, Filtering::Exact).shading_normal;
         };
         const glm::dvec3 facet = place.R_DO * glm::dvec3(1, 0, 0);
         EXPECT_LT(glm::distance(shaded(plain_scene, plain), facet), 1e-6);
@@ -174,9 +174,9 @@ TEST(Scene, VertexNormalsAreInterpolated) {
       const glm::dvec3 mixed =
           glm::normalize((1 - y) / 2 * glm::dvec3(left) + (1 + y) / 2 * glm::dvec3(right));
       const glm::dvec3 expected = from > 0 ? mixed : -mixed;
-      EXPECT_LT(
-          glm::distance(scene.shading_normal_of(look.ray, look.hit, 0, Filtering::Exact), expected),
-          1e-6);
+      EXPECT_LT(glm::distance(scene.look_at(look.ray, look.hit, 0, Filtering::Exact).shading_normal,
+                              expected),
+                1e-6);
     }
   }
 }

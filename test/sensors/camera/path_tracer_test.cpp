@@ -549,7 +549,7 @@ TEST(PathTracer, SmoothObjectsHaveNoDarkSilhouettes) {
     Hit hit;
     scene.trace({&ray, 1}, {&hit, 1});
     if (!hit) continue;
-    if (scene.shading_normal_of(ray, hit, 0, Filtering::Fast).z > 0) continue;
+    if (scene.look_at(ray, hit, 0, Filtering::Fast).shading_normal.z > 0) continue;
     ++away;
     EXPECT_GT(light_along(light, ray, 1 << 8).mean.g, 0.5) << i;
   }
