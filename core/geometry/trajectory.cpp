@@ -57,7 +57,9 @@ Trajectory::Place Trajectory::place_of(std::chrono::nanoseconds time) const {
 
 Pose Trajectory::pose_at(std::chrono::nanoseconds time) const {
   const auto [i, share, span_s] = place_of(time);
-  return span_s == 0 ? samples_[i].pose : samples_[i].pose * screws_[i].at(share);
+  const Pose& before = samples_[i].pose;
+  if (span_s == 0 || before == samples_[i + 1].pose) return before;
+  return before * screws_[i].at(share);
 }
 
 Velocity Trajectory::velocity_at(std::chrono::nanoseconds time) const {

@@ -3,6 +3,7 @@
 #include <tbb/parallel_for.h>
 
 #include <algorithm>
+#include <bit>
 #include <cmath>
 #include <glm/common.hpp>
 #include <limits>
@@ -52,10 +53,12 @@ double variance(double between, double within, double freedom_within, const Surr
 
 }  // namespace
 
+// All numbers are powers of two, so that shifts divide.
 PathSums::Place PathSums::place(std::uint32_t i, std::uint32_t count) noexcept {
   const std::uint32_t size = std::max(count / nets, 1U);
-  const std::uint32_t net = i / size, index = i % size;
-  return {net, index, net * most_parts + index * parts_of(count) / size};
+  const std::uint32_t net = i >> std::countr_zero(size), index = i & (size - 1);
+  const int shift = std::countr_zero(size) - std::countr_zero(parts_of(count));
+  return {net, index, net * most_parts + (index >> shift)};
 }
 
 PathSums::Sum PathSums::of_net(std::uint32_t net) const noexcept {
