@@ -22,8 +22,8 @@ namespace groundray {
 /// the triangle, and the surface is opaque or transparent there.
 enum class CutOut { Transparent, Opaque, Unsure };
 
-/// Embree's hit on a triangle: barycentric coordinates of the second and third corner, the normal,
-/// whose length is twice the triangle's area, and the direction of the ray.
+/// Embree's hit on a triangle: barycentric coordinates of the second and third corner, the ray's
+/// parameter there, the normal, whose length is twice the triangle's area, and the ray's direction.
 struct CutOutHit {
   float u, v, t;
   glm::vec3 normal, direction;

@@ -5,13 +5,11 @@
 #include <algorithm>
 #include <array>
 #include <chrono>
-#include <cmath>
 #include <cstddef>
 #include <cstdint>
 #include <glm/geometric.hpp>
 #include <glm/gtc/quaternion.hpp>
 #include <glm/mat3x3.hpp>
-#include <limits>
 
 #include "core/tracing/level_scene.h"
 #include "core/tracing/model_scene.h"
@@ -186,10 +184,9 @@ void intersect(const ModelScene::Impl& model, std::uint32_t object,
   for (std::size_t i = 0; i < W; ++i) {
     if (local.valid[i] == 0) continue;
     const auto crossing = crossing_of(model, local, i);
-    if (!crossing) continue;
     const bool is_nearer = crossing.t_m < packet.best_m[i] ||
                            (crossing.t_m == packet.best_m[i] && object < packet.object[i]);
-    if (!is_nearer) continue;
+    if (!crossing || !is_nearer) continue;
     const glm::dvec3 d_D(packet.dx[i], packet.dy[i], packet.dz[i]);
     const glm::dvec3 up =
         glm::normalize(glm::transpose(into[i]->per_D) * model.normal(crossing.triangle));
