@@ -85,7 +85,6 @@ Points cast_on_terrain(const TerrainModel& terrain, const GivenPoints& origins_m
                        const GivenPoints& directions, bool error_bound) {
   const GivenRays rays(origins_m, directions, {});
   return without_gil([&](const StopRequest& stop) {
-    rays.check();
     return Points{cast_rays(terrain.scene(), rays,
                             error_bound ? ErrorBounds::Report : ErrorBounds::Omit,
                             [&] { stop.obey(); })};
