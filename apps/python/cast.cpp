@@ -11,6 +11,7 @@
 #include <glm/common.hpp>
 #include <glm/geometric.hpp>
 #include <limits>
+#include <memory>
 #include <span>
 #include <string_view>
 #include <utility>
@@ -19,6 +20,7 @@
 #include "apps/python/incidence.h"
 #include "apps/python/ray_order.h"
 #include "core/error.h"
+#include "core/geometry/cell.h"
 
 namespace groundray::python {
 namespace {
@@ -54,12 +56,11 @@ template <typename T>
 std::span<T> add_column(PointCloud& cloud, std::string_view name) {
   const std::span<T> values = cloud.add<T>(name);
 #ifdef MADV_HUGEPAGE
-  constexpr std::uintptr_t page = 4096, large = std::uintptr_t{1} << 21U;
-  const auto begin = reinterpret_cast<std::uintptr_t>(values.data());
-  const std::uintptr_t first = (begin + page - 1) / page * page;
-  const std::uintptr_t last = (begin + values.size_bytes()) / page * page;
-  if (first + large <= last)  // a refusal is no fault
-    madvise(reinterpret_cast<void*>(first), last - first, MADV_HUGEPAGE);
+  constexpr std::size_t page = 4096, large = std::size_t{1} << 21U;
+  void* begin = values.data();
+  std::size_t bytes = values.size_bytes();
+  if (std::align(page, large, begin, bytes) != nullptr)
+    madvise(begin, bytes, MADV_HUGEPAGE);  // a refusal is no fault
 #endif
   return values;
 }
@@ -132,6 +133,25 @@ double medium_height_m(const RayTracer& ground) {
   return std::isnan(heights.min_m()) ? 0 : (heights.min_m() + heights.max_m()) / 2;
 }
 
+// Returns whether a point is on the ground or just above it, by the samples of the finest level.
+bool is_on_ground(const Level& finest, const glm::dvec3& p_D) {
+  constexpr double above_m = 0.1;
+  const HeightArray& heights_m = finest.heights;
+  const glm::dvec2 at = (finest.frame.to_grid(glm::dvec2(p_D)) - glm::dvec2(finest.first)) /
+                        static_cast<double>(finest.step);
+  const glm::ivec2 last = heights_m.size() - 1;
+  if (!(0 <= at.x && at.x <= last.x && 0 <= at.y && at.y <= last.y)) return false;
+  const glm::ivec2 first = glm::min(glm::ivec2(at), last - 1);
+  const Cell cell{.column = first.x,
+                  .row = first.y,
+                  .nw = heights_m(first.x, first.y),
+                  .ne = heights_m(first.x + 1, first.y),
+                  .sw = heights_m(first.x, first.y + 1),
+                  .se = heights_m(first.x + 1, first.y + 1)};
+  const FacetPlane plane = cell.plane(cell.half_at(at.x, at.y));
+  return p_D.z <= plane.height_m + plane.u_slope_m * at.x + plane.v_slope_m * at.y + above_m;
+}
+
 // Casts blocks of rays. Each thread has its own, to reuse the buffers.
 class BlockCaster {
  public:
@@ -175,7 +195,10 @@ class BlockCaster {
   void trace(std::span<const Ray> rays, std::span<Hit> hits) const {
     const auto kind_at = [&](std::size_t i) {
       const auto packet = rays.subspan(i, std::min(packet_rays, rays.size() - i));
-      return are_alike(packet) ? Batch::Alike : Batch::Scattered;
+      if (!are_alike(packet)) return Batch::Scattered;
+      return is_on_ground(scene_.rays.levels().front().level(), packet.front().origin)
+                 ? Batch::ShadowRays
+                 : Batch::Alike;
     };
     Batch kind = kind_at(0);
     for (std::size_t begin = 0, end = 0; begin < rays.size(); begin = end) {
