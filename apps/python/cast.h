@@ -21,6 +21,9 @@ class GivenRays {
   GivenRays(GivenPoints origins_m, GivenPoints directions, std::chrono::nanoseconds time);
 
   std::size_t size() const { return origins_m_.rows(); }
+  glm::dvec3 origin_m(std::size_t row) const { return row_of(origins_m_, row); }
+  /// Returns a direction as given.
+  glm::dvec3 direction(std::size_t row) const { return row_of(directions_, row); }
   /// Returns a ray with a unit direction.
   Ray operator[](std::size_t row) const;
   /// Returns the bounding box of the origins.
@@ -31,17 +34,23 @@ class GivenRays {
   void check() const;
 
  private:
+  static glm::dvec3 row_of(const GivenPoints& rows, std::size_t row) {
+    const double* const v = rows.data() + 3 * row;
+    return {v[0], v[1], v[2]};
+  }
+
   GivenPoints origins_m_, directions_;
   std::chrono::nanoseconds time_;
 };
 
-/// Casts rays on all cores.
-/// @param rays  rays that have been checked.
+/// Casts rays on all cores. Their order affects only the speed: neighbours that differ are sorted
+/// first.
 /// @param check  called repeatedly, on any thread; an exception from it ends the work.
 /// @return one row per ray: range_true, world_x world_y world_z, nx ny nz, incidence, label,
 ///         instance and error_estimate, as in a scan, and error_bound if requested. For a ray
 ///         without a hit the range is infinite; position, normal, incidence and error_estimate are
 ///         NaN.
+/// @throws Error as GivenRays::check.
 PointCloud cast_rays(const Scene& scene, const GivenRays& rays, ErrorBounds bounds,
                      const std::function<void()>& check);
 

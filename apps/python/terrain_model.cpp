@@ -7,18 +7,18 @@
 
 namespace groundray::python {
 
-const Scene& TerrainModel::scene() const {
-  std::call_once(once_, [&] {
+const Scene& TerrainModel::scene(Tracing tracing) const {
+  LateScene& late = tracing == Tracing::Exact ? exact_ : fast_;
+  std::call_once(late.once, [&] {
     const GridFrame& frame = dem_.grid.frame();
     const glm::dvec2 middle = (frame.to_D({0, 0}) + frame.to_D(frame.samples - 1)) / 2.0;
     const double low_m = dem_.grid.min_height_m();  // NaN without any height
-    scene_ = std::make_unique<const Scene>(Scene{
-        .rays =
-            RayTracer({full_resolution_level(dem_.grid)},
-                      float_frame_origin({middle, std::isnan(low_m) ? 0 : low_m}), Tracing::Exact),
+    late.scene = std::make_unique<const Scene>(Scene{
+        .rays = RayTracer({full_resolution_level(dem_.grid)},
+                          float_frame_origin({middle, std::isnan(low_m) ? 0 : low_m}), tracing),
         .terrain = {.label = 1}});
   });
-  return *scene_;
+  return *late.scene;
 }
 
 void write_dem(const Dem& dem, const std::filesystem::path& path) {
