@@ -2,7 +2,9 @@
 
 #include <algorithm>
 #include <array>
+#include <bit>
 #include <cmath>
+#include <cstddef>
 #include <glm/common.hpp>
 #include <limits>
 #include <utility>
@@ -177,23 +179,52 @@ void build_fast_part(const LevelScene::Impl& level, LevelPart& part) {
       primitives.triangles);
 }
 
-void leaf_bounds(const RTCBoundsFunctionArguments* arguments) {
+// Cells [begin, end) of a leaf that are one primitive of exact tracing. Few cells make tight boxes,
+// so that few rays are tested in vain.
+struct CellGroup {
+  glm::ivec2 begin{0}, end{0};
+};
+
+const Leaf& leaf_of(const LevelPart& part, unsigned primitive) {
+  return part.leaves[primitive >> (2 * part.groups_exponent)];
+}
+
+// Returns the group of a primitive in the given cells of its leaf; empty if it lies beyond the DEM.
+CellGroup group_of(const LevelPart& part, const LeafCells& cells, unsigned primitive) {
+  const unsigned mask = (1U << part.groups_exponent) - 1;
+  const glm::ivec2 place(primitive & mask, (primitive >> part.groups_exponent) & mask);
+  const int side = cells.level.leaf_cells * cells.leaf.step;
+  const int size = side >> (cells.exponent + part.groups_exponent);
+  const glm::ivec2 end(cells.columns, cells.rows);
+  return {glm::min(place * size, end), glm::min((place + 1) * size, end)};
+}
+
+void group_bounds(const RTCBoundsFunctionArguments* arguments) {
   const auto& part = *static_cast<const LevelPart*>(arguments->geometryUserPtr);
   const LevelScene::Impl& level = *part.built_for;
-  const LeafCells cells{level, part.leaves[arguments->primID]};
-  float low_m = std::numeric_limits<float>::infinity();
-  float high_m = -low_m;
-  for (int j = 0; j <= cells.rows; ++j) {
-    for (int i = 0; i <= cells.columns; ++i) {
-      low_m = std::min(low_m, cells.height_m({i, j}));
-      high_m = std::max(high_m, cells.height_m({i, j}));
+  const LeafCells cells{level, leaf_of(part, arguments->primID)};
+  const auto [begin, end] = group_of(part, cells, arguments->primID);
+  double low_m = std::numeric_limits<double>::infinity();
+  double high_m = -low_m;
+  for (int j = begin.y; j < end.y; ++j) {
+    for (int i = begin.x; i < end.x; ++i) {
+      const Cell cell = cells.cell(i, j);
+      for (const double corner_m : {cell.nw, cell.ne, cell.sw, cell.se}) {
+        low_m = std::min(low_m, corner_m);
+        high_m = std::max(high_m, corner_m);
+      }
     }
   }
-  const glm::dvec3 a = level.point_L(cells.column(0), cells.row(0), low_m);
-  const glm::dvec3 b = level.point_L(cells.column(cells.columns), cells.row(cells.rows), high_m);
+  RTCBounds& bounds = *arguments->bounds_o;
+  if (!(low_m <= high_m)) {  // Embree ignores primitives without valid bounds
+    bounds.lower_x = std::numeric_limits<float>::infinity();
+    bounds.upper_x = -bounds.lower_x;
+    return;
+  }
+  const glm::dvec3 a = level.point_L(cells.column(begin.x), cells.row(begin.y), low_m);
+  const glm::dvec3 b = level.point_L(cells.column(end.x), cells.row(end.y), high_m);
   const glm::vec3 low = glm::vec3(glm::min(a, b)) - part.slack_m;
   const glm::vec3 high = glm::vec3(glm::max(a, b)) + part.slack_m;
-  RTCBounds& bounds = *arguments->bounds_o;
   bounds.lower_x = low.x;
   bounds.lower_y = low.y;
   bounds.lower_z = low.z;
@@ -202,11 +233,15 @@ void leaf_bounds(const RTCBoundsFunctionArguments* arguments) {
   bounds.upper_z = high.z;
 }
 
-// Reports the first crossing over one leaf for each ray of a packet, in double.
-void intersect_leaf(const RTCIntersectFunctionNArguments* arguments) {
+// Reports the first crossing over one group for each ray of a packet, in double.
+void intersect_group(const RTCIntersectFunctionNArguments* arguments) {
   const auto& part = *static_cast<const LevelPart*>(arguments->geometryUserPtr);
   const auto& query = *reinterpret_cast<const ExactQuery*>(arguments->context);
-  const Leaf& leaf = part.leaves[arguments->primID];
+  const Leaf& leaf = leaf_of(part, arguments->primID);
+  const auto [number, cells] = query.surface->deciding_cells(leaf);
+  const auto [begin, end] = group_of(part, cells, arguments->primID);
+  const bool is_cell = begin + 1 == end;
+  const Cell cell = cells.cell(begin.x, begin.y);
   RTCRayN* const rays = RTCRayHitN_RayN(arguments->rayhit, arguments->N);
   RTCHitN* const hits = RTCRayHitN_HitN(arguments->rayhit, arguments->N);
   for (unsigned i = 0; i < arguments->N; ++i) {
@@ -215,7 +250,11 @@ void intersect_leaf(const RTCIntersectFunctionNArguments* arguments) {
     const LevelRay& ray = query.rays[lane];
     Crossing& best = query.crossings[lane];
     const double before_m = best.range_m;
-    query.surface->hit(ray.facet, leaf, best);
+    if (is_cell) {
+      hit_cell(ray.facet, cell, leaf, number, best);
+    } else {
+      hit_cells(ray.facet, cells, begin, end, number, best);
+    }
     if (!(best.range_m < before_m)) continue;
     // tfar only prunes: it may exceed the true range slightly, but is never less.
     float& far_m = RTCRayN_tfar(rays, arguments->N, i);
@@ -226,9 +265,15 @@ void intersect_leaf(const RTCIntersectFunctionNArguments* arguments) {
 }
 
 void build_exact_part(const LevelScene::Impl& level, LevelPart& part) {
+  const int most_cells = level.level.has_quads ? 1 : 2;
+  const int groups = std::max(level.leaf_cells / most_cells, 1);
+  part.groups_exponent = std::countr_zero(static_cast<unsigned>(groups));
   part.built_for = &level;
-  attach_primitives(level.device, part.scene.get(), block_geometry, part.leaves.size(), &part,
-                    leaf_bounds, intersect_leaf);
+  const std::size_t count = part.leaves.size() << (2 * part.groups_exponent);
+  if (count > std::numeric_limits<unsigned>::max())
+    throw Error("ray tracer: a level has {} boxes, more than Embree supports", count);
+  attach_primitives(level.device, part.scene.get(), block_geometry, count, &part, group_bounds,
+                    intersect_group);
 }
 
 }  // namespace

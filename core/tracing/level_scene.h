@@ -76,7 +76,8 @@ struct LevelPart {
   std::vector<CellBlock> blocks;  // by primitive
   std::vector<TriangleFacet> triangles;
 
-  float slack_m = 0;  // exact tracing only: padding of the leaves' bounding boxes
+  int groups_exponent = 0;  // exact tracing only: a leaf is 2^this x 2^this groups of cells
+  float slack_m = 0;        // exact tracing only: padding of the groups' bounding boxes
   const LevelScene::Impl* built_for = nullptr;  // only while it is being built
 };
 

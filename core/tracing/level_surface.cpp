@@ -175,13 +175,10 @@ std::optional<Crossing> LevelSurface::first_crossing(const FacetRay& ray, double
   return std::isinf(best.range_m) ? std::nullopt : std::optional(best);
 }
 
-void LevelSurface::hit(const FacetRay& ray, const Leaf& leaf, Crossing& best) const noexcept {
+LevelSurface::DecidingCells LevelSurface::deciding_cells(const Leaf& leaf) const noexcept {
   const std::uint32_t number = level_at(leaf.column, leaf.row);
   const LevelView& level = *levels_[number];
-  const LeafCells cells{level, leaf, level.deciding_exponent(leaf)};
-  const glm::ivec2 first(leaf.column, leaf.row);
-  const glm::ivec2 last(cells.column(cells.columns), cells.row(cells.rows));
-  hit_leaf(ray, part_over(ray, first, last - first), cells, number, best);
+  return {number, {level, leaf, level.deciding_exponent(leaf)}};
 }
 
 LevelSurface::Escape LevelSurface::escape_surface(const FacetRay& ray,

@@ -33,8 +33,12 @@ class LevelSurface {
   std::optional<Crossing> first_crossing(const FacetRay& ray, double t_begin_m,
                                          double t_end_m) const noexcept;
 
-  /// Replaces `best` by the first crossing from above on a leaf, if that is nearer.
-  void hit(const FacetRay& ray, const Leaf& leaf, Crossing& best) const noexcept;
+  /// Cells that decide on hits on a leaf, and the index of their level.
+  struct DecidingCells {
+    std::uint32_t level = 0;
+    LeafCells cells;
+  };
+  DecidingCells deciding_cells(const Leaf& leaf) const noexcept;
 
   /// Continuation of a ray that begins on the surface or slightly above it.
   struct Escape {

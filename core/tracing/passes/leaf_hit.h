@@ -98,18 +98,29 @@ inline void hit_cell(const FacetRay& ray, const Cell& cell, const Leaf& leaf, st
     best = {hit.range_m, hit.plane, leaf.deviation_m, facet};
 }
 
-/// Replaces `best` by the first hit of a ray on a leaf, within a part of the ray over it, if that
-/// is nearer.
-inline void hit_leaf(const FacetRay& ray, const RayPart& part, const LeafCells& cells,
-                     std::uint32_t level, Crossing& best) noexcept {
-  const glm::ivec2 first{cells.leaf.column, cells.leaf.row};
-  const glm::ivec2 last{cells.column(cells.columns), cells.row(cells.rows)};
-  walk_block(ray, part, first, last, cells.exponent, {cells.columns, cells.rows},
+/// Replaces `best` by the first hit of a ray on the cells [begin, end) of a leaf, within a part of
+/// the ray over them, if that is nearer.
+inline void hit_cells(const FacetRay& ray, const RayPart& part, const LeafCells& cells,
+                      glm::ivec2 begin, glm::ivec2 end, std::uint32_t level,
+                      Crossing& best) noexcept {
+  const glm::ivec2 first{cells.column(begin.x), cells.row(begin.y)};
+  const glm::ivec2 last{cells.column(end.x), cells.row(end.y)};
+  walk_block(ray, part, first, last, cells.exponent, {end.x - begin.x, end.y - begin.y},
              [&](int column, int row, const RayPart& over) {
                if (over.in_m > best.range_m) return true;
-               hit_cell(ray, cells.cell(column, row), cells.leaf, level, best);
+               hit_cell(ray, cells.cell(begin.x + column, begin.y + row), cells.leaf, level, best);
                return false;
              });
+}
+
+/// Replaces `best` by the first hit of a ray on the cells [begin, end) of a leaf, if that is
+/// nearer.
+inline void hit_cells(const FacetRay& ray, const LeafCells& cells, glm::ivec2 begin, glm::ivec2 end,
+                      std::uint32_t level, Crossing& best) noexcept {
+  const glm::ivec2 first{cells.column(begin.x), cells.row(begin.y)};
+  const glm::ivec2 last{cells.column(end.x), cells.row(end.y)};
+  hit_cells(ray, part_over(ray, first, {last.x - first.x, last.y - first.y}), cells, begin, end,
+            level, best);
 }
 
 }  // namespace groundray

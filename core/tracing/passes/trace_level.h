@@ -64,9 +64,10 @@ struct TraceLevelPass {
                [&](int column, int row, const RayPart& part) {
                  if (part.in_m > best.range_m) return true;
                  const Leaf* const leaf = level.leaf_of({column, row});
-                 if (leaf != nullptr && !passes_above(ray, part, high_m[leaf - level.leaves]))
-                   hit_leaf(ray, part, LeafCells{level, *leaf, level.deciding_exponent(*leaf)},
-                            number, best);
+                 if (leaf != nullptr && !passes_above(ray, part, high_m[leaf - level.leaves])) {
+                   const LeafCells cells{level, *leaf, level.deciding_exponent(*leaf)};
+                   hit_cells(ray, part, cells, {0, 0}, {cells.columns, cells.rows}, number, best);
+                 }
                  return false;
                });
     hits[index] = best;

@@ -35,7 +35,11 @@ void expect_exact_hits(const std::vector<Level>& levels, const HeightGrid& grid,
 TEST(TraceLevelPassProof, FindsTheHitsOfExactTracingAtFullResolution) {
   for (const int holes : {0, 60}) {
     const HeightGrid grid = with_holes(fractal(257, 5, 300, Seed{71}), holes, 5, Seed{72});
-    expect_exact_hits({full_resolution_level(grid)}, grid, Seed{73});
+    Level level = full_resolution_level(grid);
+    for (const bool has_quads : {false, true}) {  // the boxes of exact tracing depend on it
+      level.has_quads = has_quads;
+      expect_exact_hits({level}, grid, Seed{73});
+    }
   }
 }
 
