@@ -50,6 +50,9 @@ class Terrain {
   /// Returns the surface if it is traced as a whole, at full resolution; else null.
   const HeightGrid* whole() const noexcept { return std::get_if<HeightGrid>(&loaded_.content); }
 
+  /// Returns that surface as one level, with quads if the memory limit allows; there must be one.
+  Level whole_level() const;
+
   /// Returns about how many bytes tracing a DEM of `samples` columns and rows takes at full
   /// resolution.
   static double whole_bytes(glm::ivec2 samples) noexcept;

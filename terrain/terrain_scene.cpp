@@ -8,7 +8,6 @@ namespace groundray {
 namespace {
 
 constexpr int leaf_cells = Certificate::block_cells;
-constexpr double most_quad_bytes = 512 << 20;  // of a DEM at full resolution
 
 struct Content {
   bool any = false;

@@ -5,7 +5,11 @@
 
 namespace groundray {
 
-/// Returns the whole surface at full resolution as one level.
+/// Memory up to which a whole surface has quads, bytes: larger ones would take longer to build.
+inline constexpr double most_quad_bytes = 512 << 20;
+
+/// Returns the whole surface at full resolution as one level, with quads if they take at most
+/// most_quad_bytes.
 Level full_resolution_level(const HeightGrid& grid);
 
 /// Returns a tracer for the levels of a clipmap. Level scenes of `previous` with the same content

@@ -1,4 +1,5 @@
 """Measures what is wanted of the speed and writes the first table of docs/speed.md.
+
 Prints each figure and its ratio to what is wanted. Run by `./dev bench wanted`; takes some ten
 minutes.
 
