@@ -4,6 +4,7 @@
 #include <array>
 #include <cmath>
 #include <glm/common.hpp>
+#include <glm/vec4.hpp>
 #include <limits>
 #include <utility>
 
