@@ -9,10 +9,10 @@
 
 namespace groundray {
 
-/// Several numbers that are computed at once, one in each lane. Function templates over `Real`,
+/// Four numbers that are computed at once, one in each lane. Function templates over `Real`,
 /// which is double or Pack, compute the same bits for one number as for each lane; they choose by
 /// `select` instead of branches.
-using Pack = std::experimental::native_simd<double>;
+using Pack = std::experimental::simd<double, std::experimental::simd_abi::deduce_t<double, 4>>;
 inline constexpr std::size_t pack_size = Pack::size();
 using PackOfWords = std::experimental::rebind_simd_t<std::uint32_t, Pack>;
 

@@ -103,14 +103,11 @@ Terrain::Terrain(const std::filesystem::path& dem, const DemOptions& options,
     : detail_(detail), loaded_(load(DemFile(dem, options), detail, progress, relief)) {}
 
 Level Terrain::whole_level() const {
-  Level level = full_resolution_level(*whole());
-  level.has_quads &=
-      quad_cell_bytes * count(level.heights.size()) <= static_cast<double>(memory_bytes(detail_));
-  return level;
+  return full_resolution_level(*whole(), static_cast<double>(memory_bytes(detail_)));
 }
 
 double Terrain::whole_bytes(glm::ivec2 samples) noexcept {
-  const double with_quads = quad_cell_bytes * count(samples);
+  const double with_quads = quad_cell_bytes * count(samples - 1);
   return with_quads <= most_quad_bytes ? with_quads : whole_sample_bytes * count(samples);
 }
 

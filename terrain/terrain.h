@@ -53,8 +53,8 @@ class Terrain {
   /// Returns that surface as one level, with quads if the memory limit allows; there must be one.
   Level whole_level() const;
 
-  /// Returns about how many bytes tracing a DEM of `samples` columns and rows takes at full
-  /// resolution.
+  /// Returns about how many bytes fast tracing of a DEM of `samples` columns and rows takes at full
+  /// resolution, if the memory limit allows quads.
   static double whole_bytes(glm::ivec2 samples) noexcept;
 
   /// Returns the levels around the sensors, none of which is farther than `reach_m` from its

@@ -6,8 +6,6 @@
 #include <algorithm>
 #include <bit>
 #include <cmath>
-#include <glm/geometric.hpp>
-#include <limits>
 #include <mutex>
 #include <numbers>
 #include <utility>
@@ -24,8 +22,6 @@ using light_image::PathCounts;
 using light_image::Paths;
 using light_image::View;
 using std::chrono::nanoseconds;
-
-nanoseconds time_of(double seconds) { return nanoseconds(std::llround(seconds * 1e9)); }
 
 void check_camera(const CameraSpec& spec) {
   Violations broken("camera");
@@ -121,11 +117,12 @@ std::span<const glm::dvec3> Camera::directions() const {
 }
 
 nanoseconds Camera::duration() const noexcept {
-  return time_of(spec_.shutter.row_s * (spec_.size_px.y - 1) + spec_.shutter.exposure_s);
+  return light_image::nanoseconds_of(spec_.shutter.row_s * (spec_.size_px.y - 1) +
+                                     spec_.shutter.exposure_s);
 }
 
 nanoseconds Camera::middle_of(double row) const noexcept {
-  return time_of(spec_.shutter.row_s * row + spec_.shutter.exposure_s / 2);
+  return light_image::nanoseconds_of(spec_.shutter.row_s * row + spec_.shutter.exposure_s / 2);
 }
 
 Exposure Camera::expose(const PathTracer& light, const Trajectory& X_DC, nanoseconds begin,

@@ -21,8 +21,6 @@ using std::chrono::nanoseconds;
 constexpr int block_px = 4;  // side of the blocks of pixels that are traced in succession
 constexpr std::size_t paths_at_once = 4096;
 
-nanoseconds nanoseconds_of(double seconds) { return nanoseconds(std::llround(seconds * 1e9)); }
-
 // Maps the unit square to the unit disc; preserves areas and adjacency.
 // @see Shirley and Chiu, A low distortion map between disk and square, JGT 2(3) (1997).
 Vec2<Pack> on_disc(const Vec2<Pack>& u) {

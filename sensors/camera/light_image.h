@@ -1,6 +1,7 @@
 #pragma once
 
 #include <chrono>
+#include <cmath>
 #include <cstdint>
 #include <functional>
 #include <span>
@@ -12,6 +13,10 @@
 
 // Private to this library: the light of a camera's pixels by their paths.
 namespace groundray::light_image {
+
+inline std::chrono::nanoseconds nanoseconds_of(double seconds) {
+  return std::chrono::nanoseconds(std::llround(seconds * 1e9));
+}
 
 /// Set of paths of a pixel: those that its light is the mean of, those of the pilot that chooses
 /// their number, or those that measure the light for automatic exposure. They share no random
