@@ -24,7 +24,7 @@ long double turn_rad(double turn) { return 2 * std::numbers::pi_v<long double> *
 TEST(Elementary, PointsOnTheCircleMatchLongDouble) {
   long double worst = 0;
   for (int i = 0; i < fractions; ++i) {
-    const double turn = fraction(i);
+    const double turn = fraction(i) * 1.125 - 0.125;
     const glm::dvec2 found = on_circle(turn);
     worst = std::max({worst, std::abs(found.x - std::cos(turn_rad(turn))),
                       std::abs(found.y - std::sin(turn_rad(turn)))});
@@ -38,7 +38,6 @@ TEST(Elementary, QuartersOfATurnAreExact) {
   EXPECT_EQ(on_circle(0.5), glm::dvec2(-1, 0));
   EXPECT_EQ(on_circle(0.75), glm::dvec2(0, -1));
   EXPECT_EQ(on_circle(1.0), glm::dvec2(1, 0));
-  EXPECT_EQ(on_circle(-0.125), glm::dvec2(on_circle(0.125).x, -on_circle(0.125).y));
 }
 
 TEST(Elementary, AnglesMatchLongDouble) {
