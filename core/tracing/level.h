@@ -8,9 +8,11 @@
 
 namespace groundray {
 
-/// Memory of a cell of full resolution, bytes: samples, vertices, primitives and BVH, measured on
-/// terrain without holes.
-inline constexpr double grid_cell_bytes = 40, quad_cell_bytes = 150;
+/// Memory of a cell in grids, bytes: sample, vertices, primitives and BVH, measured on terrain
+/// without holes.
+inline constexpr double grid_cell_bytes = 40;
+/// Memory of a cell as a quad, likewise.
+inline constexpr double quad_cell_bytes = 150;
 
 /// Part of a terrain that one level scene holds: leaves of its quadtree, and their samples. Its
 /// window is the rectangle of those samples.
