@@ -112,7 +112,7 @@ IN_PASSES = re.compile(
     r"|terrain/lod/(lattice|passes/\w+)\.h"
 )
 
-IN_HEADERS = re.compile(r"glm/.*|fmt/.*|[a-z0-9_]+")
+IN_HEADERS = re.compile(r"glm/.*|fmt/.*|experimental/simd|[a-z0-9_]+")
 PRIVATE = (
     "apps/scan/word_option.h",
     "core/io/json_fault.h",

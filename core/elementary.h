@@ -1,8 +1,9 @@
 #pragma once
 
 // Elementary functions of packs of numbers, which make no calls, and of + - * / and square roots
-// alone, so that all machines compute the same bits. The C library takes 11.7 ns for a sine and a
-// cosine, and its bits differ between versions; on_circle takes 3 ns in a pack.
+// alone (and floor, which is exact), so that all machines compute the same bits. The C library
+// takes 11.7 ns for a sine and a cosine, and its bits differ between versions; on_circle takes 3 ns
+// in a pack.
 
 #include <algorithm>
 #include <cmath>
@@ -13,8 +14,8 @@
 namespace groundray {
 
 /// Returns the point of the unit circle at a fraction of a turn: (cos, sin) of 2 pi `turn`, to
-/// 2e-16.
-/// @param turn  0 to 1.
+/// 2.3e-16.
+/// @param turn  -1/8 to 1.
 template <typename Real>
 Vec2<Real> on_circle(const Real& turn) noexcept {
   using std::floor;

@@ -101,6 +101,7 @@ class SobolPairsOf {
   Word seed_, index_, pairs_;
 };
 
+/// One sequence.
 using SobolPairs = SobolPairsOf<std::uint32_t>;
 
 }  // namespace groundray

@@ -10,6 +10,7 @@
 #include "terrain/dem/byte_hash.h"
 #include "terrain/lod/deviation.h"
 #include "terrain/relief/refined_tiles.h"
+#include "terrain/terrain_scene.h"
 
 namespace groundray {
 namespace {
@@ -33,8 +34,12 @@ GridFrame frame_of(const DemHeader& header) {
 
 namespace {
 
+constexpr double whole_sample_bytes = 36;  // with grids, measured
+
+double count(glm::ivec2 samples) { return static_cast<double>(samples.x) * samples.y; }
+
 bool fits(glm::ivec2 samples, const TerrainDetail& detail) {
-  return Terrain::whole_bytes(samples) <= static_cast<double>(memory_bytes(detail));
+  return whole_sample_bytes * count(samples) <= static_cast<double>(memory_bytes(detail));
 }
 
 // Returns hashes of heights and grid, which identify the DEM.
@@ -97,9 +102,13 @@ Terrain::Terrain(const std::filesystem::path& dem, const DemOptions& options,
                  const std::optional<ReliefSpec>& relief)
     : detail_(detail), loaded_(load(DemFile(dem, options), detail, progress, relief)) {}
 
+Level Terrain::whole_level() const {
+  return full_resolution_level(*whole(), static_cast<double>(memory_bytes(detail_)));
+}
+
 double Terrain::whole_bytes(glm::ivec2 samples) noexcept {
-  constexpr double sample_bytes = 36;  // bytes, measured
-  return sample_bytes * samples.x * samples.y;
+  const double with_quads = quad_cell_bytes * count(samples - 1);
+  return with_quads <= most_quad_bytes ? with_quads : whole_sample_bytes * count(samples);
 }
 
 Clipmap Terrain::clipmap(const SensorBox& sensors, double reach_m) const {

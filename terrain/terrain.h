@@ -50,8 +50,11 @@ class Terrain {
   /// Returns the surface if it is traced as a whole, at full resolution; else null.
   const HeightGrid* whole() const noexcept { return std::get_if<HeightGrid>(&loaded_.content); }
 
-  /// Returns about how many bytes tracing a DEM of `samples` columns and rows takes at full
-  /// resolution.
+  /// Returns that surface as one level, with quads if the memory limit allows; there must be one.
+  Level whole_level() const;
+
+  /// Returns about how many bytes fast tracing of a DEM of `samples` columns and rows takes at full
+  /// resolution, if the memory limit allows quads.
   static double whole_bytes(glm::ivec2 samples) noexcept;
 
   /// Returns the levels around the sensors, none of which is farther than `reach_m` from its

@@ -8,7 +8,6 @@ namespace groundray {
 namespace {
 
 constexpr int leaf_cells = Certificate::block_cells;
-constexpr double most_quad_bytes = 512 << 20;  // of a DEM at full resolution
 
 struct Content {
   bool any = false;
@@ -31,18 +30,19 @@ Content content(const HeightGrid& grid, glm::ivec2 low, glm::ivec2 high) {
 
 // Heights are compared by address: clipmaps share those that did not change.
 bool is_same(const Level& a, const Level& b) {
-  return a.first == b.first && a.step == b.step &&
+  return a.first == b.first && a.step == b.step && a.has_quads == b.has_quads &&
          a.heights.heights_m().data() == b.heights.heights_m().data() && a.leaves == b.leaves;
 }
 
 }  // namespace
 
-Level full_resolution_level(const HeightGrid& grid) {
+Level full_resolution_level(const HeightGrid& grid, double memory_bytes) {
   const glm::ivec2 last(grid.columns() - 1, grid.rows() - 1);
-  Level level{.frame = grid.frame(),
-              .heights = grid.samples(),
-              .leaf_cells = leaf_cells,
-              .has_quads = quad_cell_bytes * last.x * last.y <= most_quad_bytes};
+  Level level{
+      .frame = grid.frame(),
+      .heights = grid.samples(),
+      .leaf_cells = leaf_cells,
+      .has_quads = quad_cell_bytes * last.x * last.y <= std::min(memory_bytes, most_quad_bytes)};
   for (int row = 0; row < last.y; row += leaf_cells) {
     for (int column = 0; column < last.x; column += leaf_cells) {
       const glm::ivec2 low(column, row);

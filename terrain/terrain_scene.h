@@ -5,8 +5,12 @@
 
 namespace groundray {
 
+/// Memory up to which a whole surface has quads, bytes: larger ones would take longer to build.
+inline constexpr double most_quad_bytes = 512 << 20;
+
 /// Returns the whole surface at full resolution as one level.
-Level full_resolution_level(const HeightGrid& grid);
+/// @param memory_bytes  limit: the level has quads if they take at most this and most_quad_bytes.
+Level full_resolution_level(const HeightGrid& grid, double memory_bytes = most_quad_bytes);
 
 /// Returns a tracer for the levels of a clipmap. Level scenes of `previous` with the same content
 /// are reused; only the others are built.

@@ -94,11 +94,10 @@ void print_levels(const Simulation& simulation) {
   const Exposed first = first_frame(simulation);
   const SensorBox sensors = sensor_box(first);
   const glm::dvec3 p_DL = float_frame_origin(first.X_DS->pose_at(first.begin).translation_m);
-  const RayTracer rays =
-      terrain.whole() != nullptr
-          ? RayTracer({full_resolution_level(*terrain.whole())}, p_DL, simulation.spec.tracing)
-          : build_tracer(terrain.clipmap(sensors, simulation.reach_m), p_DL,
-                         simulation.spec.tracing);
+  const RayTracer rays = terrain.whole() != nullptr
+                             ? RayTracer({terrain.whole_level()}, p_DL, simulation.spec.tracing)
+                             : build_tracer(terrain.clipmap(sensors, simulation.reach_m), p_DL,
+                                            simulation.spec.tracing);
   std::size_t triangles = 0;
   double bytes = static_cast<double>(rays.device().memory_bytes());
   print_text(stdout,

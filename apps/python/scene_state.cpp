@@ -34,9 +34,8 @@ std::shared_ptr<const RayTracer> GroundTracers::of(const Simulation& simulation,
     if (at != p_DL) continue;
     if (auto found = tracer.lock()) return found;
   }
-  const HeightGrid& whole = *simulation.terrain.whole();
   auto made = std::make_shared<const RayTracer>(
-      RayTracer({full_resolution_level(whole)}, p_DL, simulation.spec.tracing));
+      RayTracer({simulation.terrain.whole_level()}, p_DL, simulation.spec.tracing));
   ++built_;
   all_.emplace_back(p_DL, made);
   return made;

@@ -57,7 +57,7 @@ const Scene& FrameSceneBuilder::operator()(const Exposed& frame) {
     take(build_tracer(*clipmap_, p_DL, simulation_.spec.tracing, scene_ ? &scene_->rays : nullptr));
   } else if (!scene_ || p_DL != p_DL_) {
     scene_.reset();  // first, because two would need twice the memory
-    take({{full_resolution_level(*whole)}, p_DL, simulation_.spec.tracing});
+    take({{simulation_.terrain.whole_level()}, p_DL, simulation_.spec.tracing});
   }
   p_DL_ = p_DL;
   return *scene_;

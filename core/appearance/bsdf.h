@@ -66,6 +66,7 @@ struct BsdfSampleOf {
   Vec3<Real> weight;  ///< f |cos_i| / pdf; 0 if no light comes from wi: then end the path
   Real pdf_per_sr;    ///< Bsdf::pdf_per_sr(wo, wi)
 };
+/// One direction.
 using BsdfSample = BsdfSampleOf<double>;
 
 /// BSDF of a surface in three channels: linear sRGB, or one wavelength in all three. Plain data.

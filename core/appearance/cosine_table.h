@@ -31,9 +31,9 @@ class CosineTable {
     }
   }
 
-  /// Returns the value at a cosine, which is clamped to [0, 1].
+  /// Returns the value at a cosine, which is clamped to [0, 1]; at 0 for NaN.
   T operator()(double cosine) const noexcept {
-    const double place = std::sqrt(std::clamp(cosine, 0.0, 1.0)) * (size - 1);
+    const double place = std::sqrt(cosine > 0 ? std::min(cosine, 1.0) : 0.0) * (size - 1);
     const int i = std::min(static_cast<int>(place), static_cast<int>(size) - 2);
     const auto share = static_cast<float>(place - i);
     const T* const node = values_.data() + i;

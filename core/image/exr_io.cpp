@@ -124,6 +124,7 @@ void write_exr(const std::filesystem::path& path, const std::vector<ExrLayer>& l
                  layers.front().image);
   Imf::Header header(width, height);
   header.compression() = Imf::ZIP_COMPRESSION;
+  header.zipCompressionLevel() = 2;  // see docs/reference/formats.md: time and size of others
   for (const ExrAttribute& attribute : attributes) insert(header, attribute, broken);
   broken.throw_if_any();
   Imf::FrameBuffer pixels;

@@ -8,9 +8,12 @@
 
 namespace groundray {
 
-/// Memory of a cell of full resolution, bytes: samples, vertices, primitives and BVH, measured on
-/// terrain without holes.
-inline constexpr double grid_cell_bytes = 40, quad_cell_bytes = 140;
+/// Memory of a cell in grids, bytes: sample, vertices, primitives and BVH, measured on terrain
+/// without holes.
+inline constexpr double grid_cell_bytes = 40;
+/// Memory of a cell as a quad, likewise.
+inline constexpr double quad_cell_bytes = 150;
+
 /// Part of a terrain that one level scene holds: leaves of its quadtree, and their samples. Its
 /// window is the rectangle of those samples.
 struct Level {
@@ -24,7 +27,7 @@ struct Level {
   /// or 0 for a single part.
   int part_cells = 0;
   /// Whether Embree holds ordinary cells as quads, which are faster, instead of grids of up to a
-  /// leaf, which take less memory: see docs/speed.md.
+  /// leaf, which take less memory: see docs/theory/surface.md.
   bool has_quads = false;
   std::vector<Leaf> leaves;  ///< they tile the window except for that of the next finer level
 };

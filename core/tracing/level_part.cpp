@@ -6,6 +6,7 @@
 #include <cmath>
 #include <cstddef>
 #include <glm/common.hpp>
+#include <glm/vec4.hpp>
 #include <limits>
 #include <utility>
 

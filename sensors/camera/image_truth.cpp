@@ -10,7 +10,9 @@
 #include <utility>
 #include <vector>
 
+#include "core/elementary.h"
 #include "core/error.h"
+#include "core/pack.h"
 #include "sensors/camera/observation.h"
 
 namespace groundray {
@@ -78,6 +80,7 @@ class RowTruth {
   void look(int first, int end, const Ray& from, const glm::dmat3& R_DC);
   void bound(int row, ImageF& into);
   void write_sky(int x, int y, ImageTruth& into) const;
+  void write_incidence(int y, ImageF& into) const;
   void write_pixels(int y, ImageTruth& into) const;
   void write_surface(int x, int y, const Ray& ray, const Hit& hit, ImageTruth& into) const;
   glm::vec3 albedo_of(const Appearance& seen) const;
@@ -133,6 +136,19 @@ void RowTruth::fill(int row, const TruthRequest& request, ImageTruth& into) {
   }
 }
 
+// Writes the angle between each ray and the normal of the facet that it hit; NaN without a hit.
+void RowTruth::write_incidence(int y, ImageF& into) const {
+  for (std::size_t i = 0; i < rays_.size(); i += pack_size) {
+    const auto at = [&](std::size_t lane) { return std::min(i + lane, rays_.size() - 1); };
+    const Vec3<Pack> ray = vectors_of([&](std::size_t lane) { return rays_[at(lane)].direction; });
+    const Vec3<Pack> normal = vectors_of([&](std::size_t lane) { return hits_[at(lane)].normal; });
+    const Vec3<Pack> across = cross_of(ray, normal);
+    const Pack angle_rad = angle_of(sqrt(dot_of(across, across)), abs(dot_of(ray, normal)));
+    for (std::size_t lane = 0; lane < pack_size; ++lane)
+      into.at(columns_[at(lane)], y)[0] = static_cast<float>(angle_rad[lane]);
+  }
+}
+
 void RowTruth::write_pixels(int y, ImageTruth& into) const {
   int x = first_;
   for (std::size_t i = 0; i < rays_.size(); ++i) {
@@ -149,6 +165,7 @@ void RowTruth::write_pixels(int y, ImageTruth& into) const {
     into.is_valid.at(x++, y)[0] = 1;
   }
   while (x < end_) write_sky(x++, y, into);
+  write_incidence(y, into.incidence_rad);
 }
 
 void RowTruth::bound(int row, ImageF& into) {
@@ -176,8 +193,9 @@ void RowTruth::write_surface(int x, int y, const Ray& ray, const Hit& hit, Image
   const glm::dvec3 normal = glm::normalize(glm::dvec3(hit.normal));
   put(into.p_DQ, x, y, p_DQ);
   put(into.normal, x, y, normal);
-  const SurfaceTruth surface = scene_.truth_of(ray, hit);
-  if (hit.object == 0 && scene_.cover.empty()) {  // no textures
+  const bool is_bare = hit.object == 0 && scene_.cover.empty();  // no textures
+  const SurfaceTruth surface = is_bare ? scene_.terrain : scene_.truth_of(ray, hit);
+  if (is_bare) {
     put(into.shading_normal, x, y, normal);
     put(into.albedo, x, y, materials_.albedos[surface.material]);
   } else {
@@ -185,9 +203,6 @@ void RowTruth::write_surface(int x, int y, const Ray& ray, const Hit& hit, Image
     put(into.shading_normal, x, y, shading_normal);
     put(into.albedo, x, y, albedo_of(seen));
   }
-  const auto sine = static_cast<float>(glm::length(glm::cross(ray.direction, normal)));
-  into.incidence_rad.at(x, y)[0] =
-      std::atan2(sine, static_cast<float>(-glm::dot(ray.direction, normal)));
   put(into.velocity_m_s, x, y,
       hit.object == 0 ? glm::dvec3(0) : scene_.objects.velocity_m_s(hit.object, p_DQ, ray.time));
   into.label.at(x, y)[0] = surface.label;

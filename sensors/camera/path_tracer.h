@@ -77,7 +77,8 @@ class PathTracer {
   };
 
   /// Traces the added paths, and removes them.
-  /// @param radiance  radiance that arrives along each ray: linear sRGB, W/(m^2 sr), see
+  /// @param radiance  one for each path: radiance that arrives along each ray: linear sRGB, W/(m^2
+  /// sr), see
   ///        docs/theory/sky.md.
   /// @param labels  labels of each ray's first hit, as in Scene::truth_of, 0 for the sky; empty if
   ///        they are not requested.

@@ -46,10 +46,11 @@ def open3d_scene(folder: Path) -> o3d.t.geometry.RaycastingScene:
     return scene
 
 
-def main() -> None:
+def ratios() -> tuple[float, float]:
+    """Returns our rate by theirs, measured before and after theirs."""
     with tempfile.TemporaryDirectory() as name:
         folder = Path(name)
-        ours = [groundray_mrays_s(folder)]
+        before = groundray_mrays_s(folder)
         rays = np.fromfile(folder / "rays.f64").reshape(-1, 6).astype(np.float32)
         scene = open3d_scene(folder)
         hits = np.isfinite(scene.cast_rays(rays)["t_hit"].numpy()).mean()
@@ -60,10 +61,15 @@ def main() -> None:
             scene.cast_rays(rays)
             best = min(best, time.perf_counter() - begin)
         theirs = 1e-6 * len(rays) / best
-        ours.append(groundray_mrays_s(folder))
-    print(f"groundray, full scan    {ours[0]:6.2f} and {ours[1]:6.2f} Mrays/s (before and after)")
+        after = groundray_mrays_s(folder)
+    print(f"groundray, full scan    {before:6.2f} and {after:6.2f} Mrays/s (before and after)")
     print(f"Open3D, rays alone      {theirs:6.2f} Mrays/s (best of 10)")
-    print(f"ratio                   {min(ours) / theirs:6.2f} to {max(ours) / theirs:.2f}")
+    return before / theirs, after / theirs
+
+
+def main() -> None:
+    both = ratios()
+    print(f"ratio                   {min(both):6.2f} to {max(both):.2f}")
 
 
 if __name__ == "__main__":

@@ -7,6 +7,7 @@ and has 11 columns; Open3D has floats. Run by `./dev bench open3d`.
 
 import sys
 import time
+from collections.abc import Iterator
 from pathlib import Path
 
 import numpy as np
@@ -79,7 +80,8 @@ def seconds(cast) -> float:
     return time.process_time() - begin
 
 
-def main() -> None:
+def rates() -> Iterator[tuple[str, dict[str, float]]]:
+    """Yields kinds of rays and the rates of each way to cast them, Mrays/CPU-s, medians."""
     heights_m = hills()
     terrain = groundray.Terrain(heights_m)
     scene = open3d_scene(heights_m)
@@ -90,7 +92,6 @@ def main() -> None:
         "image": image_rays(np.array([30.0, 200, 40])),
         "random": random_rays(),
     }
-    print(f"{'Mrays/CPU-s, medians':22} {'exact':>14} {'fast':>14} {'Open3D':>7}")
     for name, (origins, directions) in kinds.items():
         unit = directions / np.linalg.norm(directions, axis=1, keepdims=True)
         floats = np.concatenate([origins, unit], 1).astype(np.float32)
@@ -106,7 +107,12 @@ def main() -> None:
         for _ in range(ROUNDS):  # in turn, so that all meet the same load
             for which, cast in casts.items():
                 spent[which].append(seconds(cast))
-        rate = {which: 1e-6 * COUNT / np.median(s) for which, s in spent.items()}
+        yield name, {which: 1e-6 * COUNT / float(np.median(s)) for which, s in spent.items()}
+
+
+def main() -> None:
+    print(f"{'Mrays/CPU-s, medians':22} {'exact':>14} {'fast':>14} {'Open3D':>7}")
+    for name, rate in rates():
         ours = (f"{rate[t]:6.2f} ({rate[t] / rate['Open3D']:4.2f} x)" for t in ("exact", "fast"))
         print(f"{name:22} {' '.join(ours)} {rate['Open3D']:7.2f}")
 

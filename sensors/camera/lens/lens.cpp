@@ -261,7 +261,10 @@ std::optional<PixelRay> Lens::ray(glm::dvec2 pixel) const noexcept {
         if constexpr (Closed<Model>) {
           const PixelRay ray = closed_ray(kind, pixel);
           const auto back = project(ray.direction);
-          return back && glm::distance(*back, pixel) < 1e-9 ? std::optional(ray) : std::nullopt;
+          // A direction's rounding moves its image by an ulp over the pixel's angle.
+          const double tolerance_px = 1e-9 + 1e-15 / std::sqrt(pixel_sr(ray));
+          return back && glm::distance(*back, pixel) < tolerance_px ? std::optional(ray)
+                                                                    : std::nullopt;
         }
         glm::dvec2 w(0);
         Imaged at;

@@ -500,6 +500,14 @@ TEST(Bsdf, TintMultipliesTheReflectanceOfAllButMetals) {
   }
 }
 
+TEST(Bsdf, DirectionsThatAreNotNumbersAreNoFault) {
+  const glm::dvec3 nan(std::numeric_limits<double>::quiet_NaN());
+  for (const Bsdf& bsdf : bsdfs_of(white_materials())) {
+    EXPECT_EQ(bsdf.pdf_per_sr({0, 0, 1}, nan) > 0, false);
+    EXPECT_EQ(bsdf.eval({0, 0, 1}, nan).x > 0, std::holds_alternative<PlantLeafBsdf>(bsdf.surface));
+  }
+}
+
 TEST(Bsdf, PacksHaveTheBitsOfSingleDirections) {
   for (const auto* materials : {&white_materials(), &coloured_materials()}) {
     for (const Bsdf& bsdf : bsdfs_of(*materials)) {
