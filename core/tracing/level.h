@@ -26,7 +26,7 @@ struct Level {
   /// Side, in cells of `step`, of the parts that are built and reused one by one; a power of two,
   /// or 0 for a single part.
   int part_cells = 0;
-  /// Whether Embree holds ordinary cells as quads, which are faster, instead of grids of up to a
+  /// True if Embree holds ordinary cells as quads, which are faster, instead of grids of up to a
   /// leaf, which take less memory: see docs/theory/surface.md.
   bool has_quads = false;
   std::vector<Leaf> leaves;  ///< they tile the window except for that of the next finer level

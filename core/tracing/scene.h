@@ -39,7 +39,7 @@ struct Appearance {
   std::uint32_t count = 0;
 };
 
-/// What light meets at a hit.
+/// Materials and shading normal at a hit.
 struct SeenSurface {
   Appearance appearance;
   /// Unit, in D, on the side that the ray comes from. It affects light only: ranges and the normals

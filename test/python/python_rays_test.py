@@ -4,7 +4,6 @@ import groundray
 import numpy as np
 import pytest
 import small_scene
-from groundray._scene import to_yaml
 
 MIDDLE_M = np.array([50.0, 40.0])  # of small_scene's ground
 
@@ -13,11 +12,7 @@ MIDDLE_M = np.array([50.0, 40.0])  # of small_scene's ground
 def grounds(tmp_path_factory):
     """The ground alone, with every ray decided in double; and a scene with an object on it."""
     folder = tmp_path_factory.mktemp("rays")
-    terrain = groundray.Terrain(small_scene.heights_m(), small_scene.CELL_M)
-    terrain.save(folder / "ground.tif")
-    spec = small_scene.spec(folder)
-    spec["terrain"]["dem"] = "ground.tif"
-    (folder / "scene.yaml").write_text(to_yaml(spec))
+    terrain = small_scene.write(folder)
     return {"terrain": terrain, "scene": groundray.load_scene(folder / "scene.yaml")}
 
 

@@ -17,11 +17,7 @@ from groundray._scene import to_yaml
 def made(tmp_path_factory):
     """A dataset made by the program, and the same scene in Python."""
     folder = tmp_path_factory.mktemp("python_scan")
-    terrain = groundray.Terrain(small_scene.heights_m(), small_scene.CELL_M)
-    terrain.save(folder / "ground.tif")
-    spec = small_scene.spec(folder)
-    spec["terrain"]["dem"] = "ground.tif"
-    (folder / "scene.yaml").write_text(to_yaml(spec))
+    small_scene.write(folder)
     small_scene.run("groundray", "generate", folder / "scene.yaml", "-o", folder / "out")
     return folder, groundray.load_scene(folder / "scene.yaml")
 

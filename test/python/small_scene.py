@@ -110,6 +110,19 @@ def spec(folder, *, camera=False):
     return all_of_it
 
 
+def write(folder):
+    """Writes ground.tif and scene.yaml, a scene on it; returns the terrain."""
+    import groundray  # here, because other users of this module need no package
+    from groundray._scene import to_yaml
+
+    terrain = groundray.Terrain(heights_m(), CELL_M)
+    terrain.save(folder / "ground.tif")
+    scene = spec(folder)
+    scene["terrain"]["dem"] = "ground.tif"
+    (folder / "scene.yaml").write_text(to_yaml(scene))
+    return terrain
+
+
 def run(program, *arguments):
     """Runs one of the build's programs; its output is shown if it fails."""
     command = [str(BIN / program), *map(str, arguments)]
