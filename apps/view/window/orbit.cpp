@@ -9,7 +9,7 @@ namespace groundray {
 namespace {
 
 constexpr double steepest_rad = std::numbers::pi / 2 - 1e-3;
-constexpr glm::dvec3 up{0, 0, 1};
+constexpr glm::dvec3 up_w{0, 0, 1};
 
 // Direction as azimuth, from east towards north, and elevation.
 struct Heading {
@@ -48,7 +48,7 @@ Look orbited(const Look& look, double yaw_rad, double pitch_rad) {
   const Heading sight = sight_of(look);
   const double distance_m = glm::distance(look.from_w_m, look.at_w_m);
   const glm::dvec3 ahead = direction_of({sight.yaw_rad + yaw_rad, sight.pitch_rad - pitch_rad});
-  return {look.at_w_m - distance_m * ahead, look.at_w_m, up};
+  return {look.at_w_m - distance_m * ahead, look.at_w_m, up_w};
 }
 
 Look panned(const Look& look, double right_m, double up_m) {
@@ -65,8 +65,8 @@ Look zoomed(const Look& look, double factor, const glm::dvec3& towards_w_m) {
 
 Look flown(const Look& look, const glm::dvec3& ahead_right_up_m) {
   const glm::dvec3 shift_m = ahead_right_up_m.x * direction_of(sight_of(look)) +
-                             ahead_right_up_m.y * right_of(look) + ahead_right_up_m.z * up;
-  return {look.from_w_m + shift_m, look.at_w_m + shift_m, up};
+                             ahead_right_up_m.y * right_of(look) + ahead_right_up_m.z * up_w;
+  return {look.from_w_m + shift_m, look.at_w_m + shift_m, up_w};
 }
 
 double metres_per_pixel(const Look& look, double view_angle_rad, double height_px) {
