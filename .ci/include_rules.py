@@ -4,7 +4,8 @@
 
 FOLDERS lists, for each folder of a library, the folders whose headers it may include besides its
 own; an entry that nothing uses is an error. LIBRARIES lists where the headers of other libraries
-may be included, CALLS and PYTHON_CALLS where files may be opened. IN_PASSES lists what passes,
+may be included, CALLS and PYTHON_CALLS where files may be opened, and INEXACT functions whose bits
+differ between C libraries. IN_PASSES lists what passes,
 which run on devices, may include. Public headers include only the standard library, GLM and {fmt};
 PRIVATE lists the headers that may include more. Run at the root of the tree.
 """
@@ -79,6 +80,7 @@ LIBRARIES = {
     r"|reconstruction/stereo/semi_global)\.cpp",
     r"(CGAL|Eigen)/": r"reconstruction/(.*\.cpp|mesh/surface_cgal\.h)",
     r"OpenMesh/": r"reconstruction/mesh/(surface_mesh\.h|simplify/edge_collapse\.h)",
+    r"sleef": r"core/math\.cpp",
     r"openssl/": r"apps/dataset/file_sum\.cpp",
     r"yaml-cpp/": r"apps/scene/yaml_reader\.cpp",
     r"(vtk|EGL/)": r"apps/view/.*",
@@ -95,6 +97,11 @@ CALLS = {
     r"\bO_CREAT\b|\bopen\((?![^;]*\bO_DIRECTORY)[^;]*\bO_[A-Z]+": r"core/io/open_file\.cpp"
     r"|apps/groundray/(result_files|run_controls|run_log)\.cpp|apps/golden/suite/suite\.cpp",
 }
+
+INEXACT = re.compile(
+    r"\bstd::(a?(sin|cos|tan)h?|atan2|exp[2m]?1?|log(2|10|1p)?|pow|cbrt|hypot|erfc?|polar|arg)\("
+    r"|\bglm::(a?(sin|cos|tan)h?|exp2?|log2?|pow|angleAxis|slerp|rotate)\("
+)
 
 # The Python package reads files by dataset.py; exports write into a folder that they have made.
 PYTHON_CALLS = {
@@ -170,6 +177,11 @@ def faults_of(path: Path, used: set[tuple[str, str]]) -> list[str]:
             if not re.fullmatch(places, str(path)):
                 line = text.count("\n", 0, call.start()) + 1
                 faults.append(f"{path}:{line}: {call[0]}: open files by core/io/open_file.h")
+    for call in INEXACT.finditer(text):
+        line = text.count("\n", 0, call.start()) + 1
+        faults.append(
+            f"{path}:{line}: {call[0]}: use core/math.h, whose bits are the same everywhere"
+        )
     return faults
 
 

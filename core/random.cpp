@@ -8,6 +8,8 @@
 #include <numbers>
 #include <utility>
 
+#include "core/math.h"
+
 namespace groundray {
 namespace {
 
@@ -37,9 +39,9 @@ glm::dvec2 random_uniform(const RandomKey& key) noexcept {
 
 glm::dvec2 random_normal(const RandomKey& key) noexcept {
   const glm::dvec2 u = random_uniform(key);
-  const double radius = std::sqrt(-2 * std::log(u.x));
+  const double radius = std::sqrt(-2 * math::log(u.x));
   const double angle_rad = 2 * std::numbers::pi * u.y;
-  return {radius * std::cos(angle_rad), radius * std::sin(angle_rad)};
+  return {radius * math::cos(angle_rad), radius * math::sin(angle_rad)};
 }
 
 namespace {
@@ -47,15 +49,15 @@ namespace {
 // Returns log(n!), for n above 9 by Stirling's series, whose first omitted term is less than 1e-12.
 double log_factorial(double n) noexcept {
   constexpr std::array<double, 10> small{1, 1, 2, 6, 24, 120, 720, 5040, 40320, 362880};
-  if (n < 10) return std::log(small[static_cast<std::size_t>(n)]);
+  if (n < 10) return math::log(small[static_cast<std::size_t>(n)]);
   const double m = n + 1, inverse = 1 / (m * m);
-  return (m - 0.5) * std::log(m) - m + 0.5 * std::log(2 * std::numbers::pi) +
+  return (m - 0.5) * math::log(m) - m + 0.5 * math::log(2 * std::numbers::pi) +
          (1.0 / 12 - inverse * (1.0 / 360 - inverse * (1.0 / 1260 - inverse / 1680))) / m;
 }
 
 // Samples by inversion of the cumulative distribution, for means below 10.
 double poisson_by_inversion(const RandomKey& key, double mean) noexcept {
-  double left = random_uniform(key).x, probability = std::exp(-mean), count = 0;
+  double left = random_uniform(key).x, probability = math::exp(-mean), count = 0;
   while (left > probability && probability > 0) {
     left -= probability;
     probability *= mean / ++count;
@@ -81,8 +83,8 @@ double random_poisson(RandomKey key, double mean) noexcept {
     const double count = std::floor((2 * a / rest + b) * u + mean + 0.43);
     if (rest >= 0.07 && v <= sure) return count;
     if (count < 0 || (rest < 0.013 && v > rest)) continue;
-    if (std::log(v * inverse_alpha / (a / (rest * rest) + b)) <=
-        count * std::log(mean) - mean - log_factorial(count))
+    if (math::log(v * inverse_alpha / (a / (rest * rest) + b)) <=
+        count * math::log(mean) - mean - log_factorial(count))
       return count;
   }
 }

@@ -9,6 +9,7 @@
 
 #include "core/error.h"
 #include "core/geometry/pose.h"
+#include "core/math.h"
 
 namespace groundray {
 namespace {
@@ -92,7 +93,7 @@ class Curve {
                      piece.t + 1.0 / pieces_per_segment);
     }
     const glm::dvec2 along = piece.cubic.velocity(t);
-    return {piece.cubic.at(t), std::atan2(along.y, along.x)};
+    return {piece.cubic.at(t), math::atan2(along.y, along.x)};
   }
 
  private:
@@ -112,10 +113,12 @@ class Vehicle {
   Vehicle(const Ground& ground, const GroundPathSpec& spec) : ground_(ground), spec_(spec) {}
 
   Pose stand_at(const Curve::Point& point, std::chrono::nanoseconds time) const {
-    const glm::dvec2 ahead = glm::dvec2(std::cos(point.heading_rad), std::sin(point.heading_rad)) *
-                             (spec_.footprint_m.x / 2);
-    const glm::dvec2 left = glm::dvec2(-std::sin(point.heading_rad), std::cos(point.heading_rad)) *
-                            (spec_.footprint_m.y / 2);
+    const glm::dvec2 ahead =
+        glm::dvec2(math::cos(point.heading_rad), math::sin(point.heading_rad)) *
+        (spec_.footprint_m.x / 2);
+    const glm::dvec2 left =
+        glm::dvec2(-math::sin(point.heading_rad), math::cos(point.heading_rad)) *
+        (spec_.footprint_m.y / 2);
     const double front_left = ground_m(point.p_m + ahead + left, "front left wheel", time);
     const double front_right = ground_m(point.p_m + ahead - left, "front right wheel", time);
     const double rear_left = ground_m(point.p_m - ahead + left, "rear left wheel", time);
@@ -126,8 +129,8 @@ class Vehicle {
         (front_left + front_right - rear_left - rear_right) / (2 * spec_.footprint_m.x);
     const double leftward =
         (front_left + rear_left - front_right - rear_right) / (2 * spec_.footprint_m.y);
-    const double pitch_rad = -std::atan(forward);
-    const double roll_rad = std::atan(leftward * std::cos(pitch_rad));
+    const double pitch_rad = -math::atan(forward);
+    const double roll_rad = math::atan(leftward * math::cos(pitch_rad));
     const double z_m = ground_m(point.p_m, "centre", time) + spec_.height_m;
     return {rotation_from_yaw_pitch_roll(point.heading_rad, pitch_rad, roll_rad), {point.p_m, z_m}};
   }

@@ -5,7 +5,9 @@
 #include <algorithm>
 #include <array>
 #include <cmath>
+#include <glm/geometric.hpp>
 #include <glm/gtc/quaternion.hpp>
+#include <glm/vec4.hpp>
 
 #include "core/error.h"
 #include "core/io/text_lines.h"
@@ -34,7 +36,7 @@ ConfScan bmesh(const std::vector<std::string_view>& words, const std::string& pl
     throw Error("{}: it must be `bmesh FILE tx ty tz qx qy qz qw`, with all numbers within {:.0e}",
                 place, farthest);
   }
-  const double norm = std::hypot(std::hypot(numbers[3], numbers[4]), numbers[5], numbers[6]);
+  const double norm = glm::length(glm::dvec4(numbers[3], numbers[4], numbers[5], numbers[6]));
   if (!(std::abs(norm - 1) <= most_off))
     throw Error("{}: the length of its quaternion is {:.6g}; it must be 1", place, norm);
   return {.file = std::string(words[1]), .X_DS = pose_of(numbers)};

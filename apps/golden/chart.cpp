@@ -12,6 +12,7 @@
 
 #include "apps/golden/html_text.h"
 #include "core/image/png_io.h"
+#include "core/math.h"
 
 namespace groundray::golden {
 namespace {
@@ -128,7 +129,7 @@ Ticks ticks_between(double a, double b, int most) {
   const auto [low, high] = std::minmax(a, b);
   if (!(high > low) || !std::isfinite(high - low)) return {};
   const double raw = (high - low) / most;
-  const double decade = std::pow(10.0, std::floor(std::log10(raw)));
+  const double decade = math::pow(10.0, std::floor(math::log10(raw)));
   for (const double digit : {1.0, 2.0, 5.0, 10.0, 20.0}) {
     const double step = digit * decade;
     const double slack = 1e-9 * (high - low) / step;
@@ -143,7 +144,7 @@ Ticks ticks_between(double a, double b, int most) {
 
 std::string tick_text(double value, double step) {
   if (std::abs(value) >= 1e7 || (value != 0 && step < 1e-4)) return number_text(value);
-  const auto decimals = static_cast<int>(std::max(0.0, std::ceil(-std::log10(step) - 1e-9)));
+  const auto decimals = static_cast<int>(std::max(0.0, std::ceil(-math::log10(step) - 1e-9)));
   std::string text = fmt::format("{:.{}f}", value, decimals);
   if (text.starts_with('-'))
     text.replace(0, 1, text.find_first_not_of("-0.") < text.size() ? "−" : "");

@@ -5,7 +5,6 @@
 
 #include <algorithm>
 #include <chrono>
-#include <cmath>
 #include <cstddef>
 #include <cstdio>
 #include <glm/trigonometric.hpp>
@@ -28,6 +27,7 @@
 #include "core/error.h"
 #include "core/io/file_io.h"
 #include "core/io/print_error.h"
+#include "core/math.h"
 #include "core/near_names.h"
 #include "core/progress.h"
 #include "terrain/dem/dem_file.h"
@@ -174,7 +174,7 @@ void print_sky(const SkySpec& spec) {
              std::visit([&](const auto& dome) { return words_for(dome, spec.air); }, spec.dome));
   if (!spec.sun) return;
   const Sun sun(*spec.sun, spec.air);
-  const double azimuth_deg = glm::degrees(std::atan2(sun.direction().x, sun.direction().y));
+  const double azimuth_deg = glm::degrees(math::atan2(sun.direction().x, sun.direction().y));
   print_text(stdout, "sun       elevation {:.2f}, azimuth {:.2f} degrees in W\n",
              glm::degrees(sun.elevation_rad()), azimuth_deg < 0 ? azimuth_deg + 360 : azimuth_deg);
 }

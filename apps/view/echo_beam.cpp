@@ -12,6 +12,7 @@
 #include <string_view>
 
 #include "core/error.h"
+#include "core/math.h"
 #include "sensors/lidar/beam/beam.h"
 #include "sensors/lidar/pattern/scan_pattern.h"
 
@@ -204,8 +205,8 @@ std::vector<glm::dvec3> ring_of(const EchoBeam& beam, double range_m, const glm:
     const double angle_rad =
         2 * std::numbers::pi * static_cast<double>(i % points) / static_cast<double>(points);
     ring.push_back(beam.origin_m + range_m * beam.direction +
-                   radius_m.x * std::cos(angle_rad) * beam.horizontal +
-                   radius_m.y * std::sin(angle_rad) * beam.vertical);
+                   radius_m.x * math::cos(angle_rad) * beam.horizontal +
+                   radius_m.y * math::sin(angle_rad) * beam.vertical);
   }
   return ring;
 }

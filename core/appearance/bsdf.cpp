@@ -8,6 +8,7 @@
 
 #include "core/appearance/microfacets.h"
 #include "core/elementary.h"
+#include "core/math.h"
 #include "core/sobol.h"
 
 namespace groundray {
@@ -378,7 +379,7 @@ glm::dvec3 Bsdf::albedo(const glm::dvec3& tint) const noexcept {
     const glm::dvec2 u = numbers.next();
     // Uniform illumination arrives with a density proportional to the cosine.
     const double sine = std::sqrt(u.x), azimuth_rad = 2 * std::numbers::pi * u.y;
-    const glm::dvec3 from(sine * std::cos(azimuth_rad), sine * std::sin(azimuth_rad),
+    const glm::dvec3 from(sine * math::cos(azimuth_rad), sine * math::sin(azimuth_rad),
                           std::sqrt(1 - u.x));
     sum += sample(from, numbers.next()).weight;
   }

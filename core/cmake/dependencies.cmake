@@ -21,6 +21,7 @@ find_library(GROUNDRAY_OPENCV_PHOTO opencv_photo REQUIRED)
 # CGAL is headers over these two; its CMake files would set flags for all sources and print.
 find_library(GROUNDRAY_GMP gmp REQUIRED)
 find_library(GROUNDRAY_MPFR mpfr REQUIRED)
+find_library(GROUNDRAY_SLEEF sleef REQUIRED)
 find_library(GROUNDRAY_OPENMESH OpenMeshCore REQUIRED)
 find_package(embree 4 QUIET)
 if(NOT embree_FOUND)

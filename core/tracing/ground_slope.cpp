@@ -5,6 +5,8 @@
 #include <glm/common.hpp>
 #include <glm/geometric.hpp>
 
+#include "core/math.h"
+
 namespace groundray {
 namespace {
 
@@ -61,7 +63,7 @@ std::optional<double> ground_slope_rad(const RayTracer& ground, glm::dvec2 p) no
               weight * gradient_m(samples, sample, axis) * samples.level.frame.cells_per_m[axis];
       }
     }
-    const double slope_rad = std::atan(glm::length(gradient));
+    const double slope_rad = math::atan(glm::length(gradient));
     return std::isnan(slope_rad) ? std::nullopt : std::optional(slope_rad);
   }
   return std::nullopt;

@@ -11,6 +11,7 @@
 #include <utility>
 
 #include "core/error.h"
+#include "core/math.h"
 #include "core/tracing/device.h"
 #include "core/tracing/object_packet.h"
 
@@ -172,9 +173,9 @@ auto ObjectTracer::Impl::stretches_of(const MovingObject& object) const -> std::
   const double ball_m = object.scale * model(object.model).radius_m;
   const auto add = [&](nanoseconds begin, nanoseconds end, const Pose& a, const Pose& b) {
     const double angle_rad =
-        2 * std::acos(std::min(std::abs(glm::dot(a.rotation, b.rotation)), 1.0));
+        2 * math::acos(std::min(std::abs(glm::dot(a.rotation, b.rotation)), 1.0));
     const double arc_m =
-        glm::distance(a.translation_m, b.translation_m) / 2 * std::tan(angle_rad / 4);
+        glm::distance(a.translation_m, b.translation_m) / 2 * math::tan(angle_rad / 4);
     const double pad_m = (ball_m + arc_m) * (1 + 1e-9);
     stretches.push_back({begin,
                          end,

@@ -7,6 +7,7 @@
 #include <limits>
 #include <utility>
 
+#include "core/math.h"
 #include "reconstruction/dem/fill/dem_fill.h"
 #include "reconstruction/dem/fill/sight_bound.h"
 #include "reconstruction/dem/ground/ground_filter.h"
@@ -207,7 +208,8 @@ void set_slopes(DemLayers& layers) {
       if (std::isnan(layers.elevation_m[static_cast<std::size_t>(i)])) continue;
       const float x = slope_along(layers, i, column, samples.x, 1, layers.frame.step_m.x);
       const float y = slope_along(layers, i, row, samples.y, samples.x, layers.frame.step_m.y);
-      layers.slope_rad[static_cast<std::size_t>(i)] = std::atan(std::hypot(x, y));
+      layers.slope_rad[static_cast<std::size_t>(i)] =
+          static_cast<float>(math::atan(math::hypot(x, y)));
     }
   }
 }
@@ -228,7 +230,7 @@ void bound_by_sight(const LidarBlock& block, double margin_m, DemLayers& layers)
   for (std::size_t i = 0; i < block.points.size(); ++i) {
     const glm::dvec3& end_m = block.points.p_m[i];
     if (!is_sound(layers, end_m, margin_m)) continue;
-    const glm::dvec3 up_m(0, 0, sds * std::hypot(block.points.sd_m[i], block.points.bias_sd_m[i]));
+    const glm::dvec3 up_m(0, 0, sds * math::hypot(block.points.sd_m[i], block.points.bias_sd_m[i]));
     lines.push_back({.origin_m = block.origins_m[i] + up_m, .end_m = end_m + up_m});
   }
   if (lines.empty()) return;

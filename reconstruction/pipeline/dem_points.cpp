@@ -5,6 +5,7 @@
 #include <glm/geometric.hpp>
 #include <glm/matrix.hpp>
 
+#include "core/math.h"
 #include "reconstruction/stereo/pinhole_pair.h"
 
 namespace groundray {
@@ -31,10 +32,10 @@ BeamErrors beam_errors(const glm::dvec3& beam_m, double range_sd_m, const PointN
       glm::dmat3(foot2_m2) + (squared(range_sd_m) - foot2_m2) * glm::outerProduct(along, along);
   BeamErrors errors{.noise = point_errors(covariance_m2)};
   errors.noise.across_sd_m =
-      static_cast<float>(std::hypot(errors.noise.across_sd_m, noise.across_sd_m));
+      static_cast<float>(math::hypot(errors.noise.across_sd_m, noise.across_sd_m));
   const double flat2 = std::max(0.0, 1 - squared(along.z));
   errors.bias_sd_m = static_cast<float>(
-      std::hypot(noise.position_sd_m, range_m * noise.attitude_sd_rad * std::sqrt(flat2)));
+      math::hypot(noise.position_sd_m, range_m * noise.attitude_sd_rad * std::sqrt(flat2)));
   return errors;
 }
 
@@ -65,8 +66,8 @@ StereoTally append(const StereoImages& images, const StereoOptions& options,
   for (std::size_t i = first; i < to.size(); ++i) {
     const glm::dvec2 flat_m = glm::dvec2(to.p_m[i]) - glm::dvec2(left.X_DC.translation_m);
     const double pose_m =
-        std::hypot(noise.position_sd_m, glm::length(flat_m) * noise.attitude_sd_rad);
-    to.bias_sd_m[i] = static_cast<float>(std::hypot(to.bias_sd_m[i], pose_m));
+        math::hypot(noise.position_sd_m, glm::length(flat_m) * noise.attitude_sd_rad);
+    to.bias_sd_m[i] = static_cast<float>(math::hypot(to.bias_sd_m[i], pose_m));
   }
   const auto disparities = map.disparity_px.values();
   const auto matched = static_cast<std::uint64_t>(

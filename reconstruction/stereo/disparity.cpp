@@ -2,6 +2,8 @@
 
 #include <algorithm>
 #include <cmath>
+#include <glm/geometric.hpp>
+#include <glm/vec3.hpp>
 
 #include "core/error.h"
 #include "reconstruction/stereo/semi_global.h"
@@ -119,9 +121,9 @@ void keep_certain(const ImageF& start_px, const RefinedDisparity& refined,
                   const MatchOptions& options, DisparityMap& map) {
   for (std::size_t i = 0; i < start_px.values().size(); ++i) {
     if (std::isnan(start_px.values()[i])) continue;
-    const double sd_px = std::hypot(
+    const double sd_px = glm::length(glm::dvec3(
         options.sd_floor_px, options.sd_factor * static_cast<double>(refined.sd_px.values()[i]),
-        options.sd_bend_factor * static_cast<double>(refined.bend_px.values()[i]));
+        options.sd_bend_factor * static_cast<double>(refined.bend_px.values()[i])));
     if (!(sd_px <= options.most_sd_px)) {
       ++(std::isnan(sd_px) ? map.unmatched.unrefined : map.unmatched.uncertain);
       continue;

@@ -10,6 +10,7 @@
 #include <optional>
 #include <vector>
 
+#include "core/math.h"
 #include "reconstruction/stereo/semi_global.h"
 
 namespace groundray {
@@ -113,7 +114,7 @@ class Refinement {
   Refinement(const ImageF& left, const ImageF& right, const ImageF& start_px, int window_px)
       : start_px_(start_px), left_(left), right_(right), image_(left), reach_(window_px / 2) {
     const double sd = std::max(0.5, window_px / 4.5);
-    for (int i = -reach_; i <= reach_; ++i) fall_.push_back(std::exp(-0.5 * i * i / (sd * sd)));
+    for (int i = -reach_; i <= reach_; ++i) fall_.push_back(math::exp(-0.5 * i * i / (sd * sd)));
   }
 
   std::optional<Refined> at(int x, int y) const {

@@ -12,6 +12,7 @@
 
 #include "core/error.h"
 #include "core/image/luminance.h"
+#include "core/math.h"
 
 namespace groundray {
 namespace {
@@ -22,13 +23,13 @@ constexpr double most_pixels = 1 << 26;
 constexpr int look_steps = 128;  // steps between the rays sampled along each side of an image
 
 double angle_deg(const glm::dvec3& a, const glm::dvec3& b) {
-  return glm::degrees(std::atan2(glm::length(glm::cross(a, b)), glm::dot(a, b)));
+  return glm::degrees(math::atan2(glm::length(glm::cross(a, b)), glm::dot(a, b)));
 }
 
 double turn_deg(const glm::dquat& a, const glm::dquat& b) {
   const glm::dquat turn = glm::conjugate(a) * b;
   const double sine = glm::length(glm::dvec3(turn.x, turn.y, turn.z));
-  return glm::degrees(2 * std::atan2(sine, std::abs(turn.w)));
+  return glm::degrees(2 * math::atan2(sine, std::abs(turn.w)));
 }
 
 void check_view(const char* name, const StereoView& view, Violations& broken) {
@@ -42,11 +43,11 @@ void check_view(const char* name, const StereoView& view, Violations& broken) {
 // (D).
 glm::dquat common_turn(const glm::dquat& half_way, const glm::dvec3& p_LR) {
   const glm::dvec3 towards = glm::conjugate(half_way) * p_LR;
-  const double quarters = std::round(std::atan2(towards.y, towards.x) * 2 / std::numbers::pi);
+  const double quarters = std::round(math::atan2(towards.y, towards.x) * 2 / std::numbers::pi);
   const double half_angle_rad = quarters * std::numbers::pi / 4;
   const glm::dquat rolled = quarters == 0 ? half_way
-                                          : half_way * glm::dquat(std::cos(half_angle_rad), 0, 0,
-                                                                  std::sin(half_angle_rad));
+                                          : half_way * glm::dquat(math::cos(half_angle_rad), 0, 0,
+                                                                  math::sin(half_angle_rad));
   // The least rotation that takes x to a unit vector other than its opposite.
   const glm::dvec3 v = glm::normalize(glm::conjugate(rolled) * p_LR);
   return glm::normalize(rolled * glm::normalize(glm::dquat(1 + v.x, 0, -v.z, v.y)));
@@ -157,7 +158,7 @@ constexpr double lobes = 3;
 
 double sinc(double x) {
   const double turn = std::numbers::pi * x;
-  return std::abs(turn) < 1e-8 ? 1 : std::sin(turn) / turn;
+  return std::abs(turn) < 1e-8 ? 1 : math::sin(turn) / turn;
 }
 
 // Returns the width of a pinhole's pixel on the axis in pixels of the camera, at least 1.
@@ -211,7 +212,7 @@ PinholePair pinhole_pair(const StereoView& left, const StereoView& right, double
   check_view("right", right, broken);
   broken.unless(most_field_rad > 0 && most_field_rad < std::numbers::pi,
                 "most_field_rad = {} must be above 0 and below pi", most_field_rad);
-  const glm::dquat half_way = glm::slerp(left.X_DC.rotation, right.X_DC.rotation, 0.5);
+  const glm::dquat half_way = half_way_between(left.X_DC.rotation, right.X_DC.rotation);
   check_mounting(left, right, half_way, broken);
   broken.throw_if_any();
 
@@ -227,7 +228,7 @@ PinholePair pinhole_pair(const StereoView& left, const StereoView& right, double
                    .baseline_m = glm::length(p_LR)};
   const auto field = [&](const StereoView& view) {
     return field_of(view, glm::normalize(glm::conjugate(R_DR) * view.X_DC.rotation),
-                    std::tan(most_field_rad / 2));
+                    math::tan(most_field_rad / 2));
   };
   const Field left_field = field(left), right_field = field(right);
   broken.unless(share_something(left_field, right_field),

@@ -5,6 +5,7 @@
 #include <glm/matrix.hpp>
 
 #include "core/error.h"
+#include "core/math.h"
 
 namespace groundray {
 namespace {
@@ -45,7 +46,8 @@ void check_stereo_inputs(const PinholePair& pair, const StereoView& left, const 
 // Errors of near points are correlated: on rendered pairs by half at 4 px, 0.3 at 8.
 double variance_together(double stride_px) {
   constexpr double alike_px = 6;
-  return 1 + 2 * std::exp(-stride_px / alike_px) + std::exp(-std::sqrt(2.0) * stride_px / alike_px);
+  return 1 + 2 * math::exp(-stride_px / alike_px) +
+         math::exp(-std::sqrt(2.0) * stride_px / alike_px);
 }
 
 double match_px(const DisparityMap& map, const StereoNoise& noise, int x, int y) {
@@ -90,7 +92,7 @@ StereoPoints stereo_points(const PinholePair& pair, const StereoView& left, cons
       if (!std::isfinite(disparity_px)) continue;
       const double sd_px = match_px(map, noise, x, y);
       if (!(disparity_px > 0) ||
-          !(std::hypot(sd_px, noise.bias_px) <= options.most_relative_sd * disparity_px)) {
+          !(math::hypot(sd_px, noise.bias_px) <= options.most_relative_sd * disparity_px)) {
         ++points.too_uncertain;
         continue;
       }
@@ -118,7 +120,7 @@ void append(const StereoPoints& points, std::uint32_t group, MeasuredPoints& to)
     to.bias_sd_m.push_back(std::abs(points.bias_m[i].z));
     to.lean.push_back(errors.lean);
     to.across_sd_m.push_back(  // including a pixel's square
-        static_cast<float>(std::hypot(errors.across_sd_m, footprint_m / std::sqrt(12.0))));
+        static_cast<float>(math::hypot(errors.across_sd_m, footprint_m / std::sqrt(12.0))));
     to.groups.push_back(group);
     to.origins.push_back(PointOrigin::Stereo);
   }

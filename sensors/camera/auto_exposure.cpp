@@ -8,6 +8,7 @@
 
 #include "core/error.h"
 #include "core/image/luminance.h"
+#include "core/math.h"
 #include "core/quantile.h"
 #include "sensors/camera/imager.h"
 #include "sensors/camera/picture.h"
@@ -67,7 +68,7 @@ ExposureSetting choose_exposure(const CameraSpec& camera, std::span<const Metere
   const double level = level_e_s(camera, metered, pupil_sr);
   if (!(level > 0)) return {longest_s, automatic.most_gain};
   // White is where the pixel is full, or its digital number is the largest.
-  const double top_e = (std::exp2(imager.bits) - 1 - imager.black_dn) / imager.gain_dn_e;
+  const double top_e = (math::exp2(imager.bits) - 1 - imager.black_dn) / imager.gain_dn_e;
   const double white_e = std::min(imager.full_well_e, top_e);
   const double exposure_s =
       std::clamp(automatic.target * white_e / level, automatic.shortest_s, longest_s);

@@ -14,6 +14,7 @@
 
 #include "core/error.h"
 #include "core/image/luminance.h"
+#include "core/math.h"
 #include "sensors/camera/camera_spec.h"
 #include "sensors/camera/lens/lens.h"
 
@@ -164,7 +165,7 @@ Imager::Imager(const ImagerSpec& spec, double exposure_s) : spec_(spec), exposur
                 "temperature_c = {} and reference_c = {} must be finite", spec.temperature_c,
                 spec.reference_c);
   broken.unless(8 <= spec.bits && spec.bits <= 16, "bits = {} must be from 8 to 16", spec.bits);
-  const double top_dn = std::exp2(spec.bits) - 1;
+  const double top_dn = math::exp2(spec.bits) - 1;
   broken.unless(0 <= spec.black_dn && spec.black_dn < top_dn,
                 "black_dn = {} must be 0 or more, and less than {}, the greatest value of {} bits",
                 spec.black_dn, top_dn, spec.bits);
@@ -189,7 +190,7 @@ ImageF Imager::electrons(const ImageF& photons, const RandomKey& key) const {
   check_image(photons, 1, "photons");
   ImageF electrons(photons.width(), photons.height(), 1);
   const double dark_e = spec_.dark_current_e_s * exposure_s_ *
-                        std::exp2((spec_.temperature_c - spec_.reference_c) / spec_.doubling_k);
+                        math::exp2((spec_.temperature_c - spec_.reference_c) / spec_.doubling_k);
   for_each_pixel(photons.width(), photons.height(), [&](int x, int y, std::size_t pixel) {
     double photo_e =
         spec_.quantum_efficiency[channel_of(spec_.filter, {x, y})] * photons.values()[pixel];
@@ -206,7 +207,7 @@ ImageF Imager::electrons(const ImageF& photons, const RandomKey& key) const {
 Image16 Imager::digital(const ImageF& electrons, const RandomKey& key) const {
   check_image(electrons, 1, "electrons");
   Image16 digital(electrons.width(), electrons.height(), 1);
-  const double top_dn = std::exp2(spec_.bits) - 1;
+  const double top_dn = math::exp2(spec_.bits) - 1;
   for_each_pixel(electrons.width(), electrons.height(), [&](int, int, std::size_t pixel) {
     double count = electrons.values()[pixel];
     if (spec_.noise && spec_.dsnu_e > 0) count += spec_.dsnu_e * fixed_pattern(key, pixel).y;
@@ -219,7 +220,7 @@ Image16 Imager::digital(const ImageF& electrons, const RandomKey& key) const {
 }
 
 double Imager::saturated_share(const ImageF& electrons, const Image16& digital) const {
-  const double top_dn = std::exp2(spec_.bits) - 1;
+  const double top_dn = math::exp2(spec_.bits) - 1;
   std::size_t saturated = 0;
   for (std::size_t i = 0; i < electrons.values().size(); ++i)
     saturated +=

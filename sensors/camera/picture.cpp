@@ -8,6 +8,7 @@
 
 #include "core/error.h"
 #include "core/image/srgb.h"
+#include "core/math.h"
 
 namespace groundray {
 namespace {
@@ -22,7 +23,7 @@ glm::dvec3 grey_gains(const ImagerSpec& imager) {
   return std::max({share.r, share.g, share.b}) / share;
 }
 
-double highest_code(int bits) { return std::exp2(bits) - 1; }
+double highest_code(int bits) { return math::exp2(bits) - 1; }
 
 // Returns the digital numbers from black to saturation, of the pixel or of its number.
 double white_dn(const ImagerSpec& imager) {
@@ -70,7 +71,7 @@ RawDeveloper::RawDeveloper(const PictureSpec& spec, const ImagerSpec& imager)
       "a full well of {} e is less than one digital number above black at {} DN/e: raise gain_dn_e",
       imager.full_well_e, imager.gain_dn_e);
   broken.throw_if_any();
-  const double raised = std::exp2(16 - bits_), top = highest_code(spec.bits);
+  const double raised = math::exp2(16 - bits_), top = highest_code(spec.bits);
   for (std::size_t channel = 0; channel < 3; ++channel) {
     const double gain = gains_[static_cast<glm::length_t>(channel)] / white;
     codes_[channel].resize(raised_values);

@@ -8,6 +8,7 @@
 #include <utility>
 
 #include "core/error.h"
+#include "core/math.h"
 
 namespace groundray {
 namespace {
@@ -253,14 +254,14 @@ void EchoSimulator::collect(const LitPulse& pulse, const RetroBrdfs& brdfs, doub
   };
   const double nearest_m = arrivals[0].range_m;
   if (extinction_per_m * (arrivals[count - 1].range_m - nearest_m) < small_exponent) {
-    const double to_nearest = std::exp(-extinction_per_m * nearest_m);  // one exponential for all
+    const double to_nearest = math::exp(-extinction_per_m * nearest_m);  // one exponential for all
     for (std::size_t k = 0; k < count; ++k) {
       const double exponent = extinction_per_m * (nearest_m - arrivals[k].range_m);
       receive(k, to_nearest * exp_of_small(exponent));
     }
   } else {
     for (std::size_t k = 0; k < count; ++k)
-      receive(k, std::exp(-extinction_per_m * arrivals[k].range_m));
+      receive(k, math::exp(-extinction_per_m * arrivals[k].range_m));
   }
 }
 
@@ -382,7 +383,7 @@ double EchoSimulator::reported_m(double range_m) const noexcept {
 }
 
 double EchoSimulator::reported_sd_m(double sd_m) const noexcept {
-  return std::hypot(sd_m, spec_.range_step_m / std::sqrt(12.0));
+  return math::hypot(sd_m, spec_.range_step_m / std::sqrt(12.0));
 }
 
 float EchoSimulator::intensity(const Detection& detection) const noexcept {
@@ -393,7 +394,7 @@ float EchoSimulator::intensity(const Detection& detection) const noexcept {
       detection.power_w * detection.range_m * detection.range_m / perpendicular_w_m2_;
   if (spec.scale == IntensitySpec::Scale::Reflectance) return static_cast<float>(reflectance);
   if (reflectance <= 1) return static_cast<float>(std::round(100 * reflectance));
-  const double above = std::log(reflectance) / std::log(spec.full_scale_reflectance);
+  const double above = math::log(reflectance) / math::log(spec.full_scale_reflectance);
   return static_cast<float>(std::min(std::round(101 + 154 * above), 255.0));
 }
 

@@ -5,6 +5,7 @@
 #include <cmath>
 
 #include "core/error.h"
+#include "core/math.h"
 
 namespace groundray {
 namespace {
@@ -15,7 +16,7 @@ int derived_limit(const LidarSpec& spec, double resolution_m) {
   constexpr int most = 1024;
   constexpr double tangent = 19.08;  // of 87 degrees
   const auto half_width_m = [&](int i) {
-    const double tilt = std::tan(0.5 * spec.beam.divergence_rad[i]);
+    const double tilt = math::tan(0.5 * spec.beam.divergence_rad[i]);
     return 0.5 * spec.beam.aperture_m[i] + (tilt > 0 ? tilt * spec.gate.far_m : 0);
   };
   const double steps = 2 * tangent * std::max(half_width_m(0), half_width_m(1)) / resolution_m;

@@ -4,12 +4,12 @@
 #include <tbb/task_arena.h>
 
 #include <algorithm>
-#include <cmath>
 #include <glm/geometric.hpp>
 #include <limits>
 #include <utility>
 
 #include "core/error.h"
+#include "core/math.h"
 #include "sensors/lidar/beam/pulse_tracer.h"
 #include "sensors/lidar/lidar.h"
 #include "sensors/lidar/scan_columns.h"
@@ -366,7 +366,7 @@ EchoRow Lidar::Sweep::row_of(const Echo& echo, const PulseTracer& cast, std::siz
   if (echo.second_share > 0) row.second_label = truth_at(cast, pulse, echo.second_hit).label;
   if (reports_range_sd(spec_)) {
     row.range_sd_m = static_cast<float>(lidar_.light_->reported_sd_m(
-        std::hypot(echo.detection.range_sd_m, spec_.range_noise_sigma_m)));
+        math::hypot(echo.detection.range_sd_m, spec_.range_noise_sigma_m)));
   }
   if (echo.kind == Echo::Kind::Surface) {
     row.velocity_m_s = velocity_m_s(cast.hits(pulse)[echo.hit], echo.p_DQ, axis.time);

@@ -9,6 +9,7 @@
 #include <span>
 #include <type_traits>
 
+#include "core/elementary.h"
 #include "core/io/point_cloud.h"
 #include "core/tracing/scene.h"
 #include "sensors/lidar/echo_simulator.h"
@@ -94,8 +95,9 @@ class ScanColumns {
     act(self.nx_, "nx", [](Row row) { return row.normal.x; });
     act(self.ny_, "ny", [](Row row) { return row.normal.y; });
     act(self.nz_, "nz", [](Row row) { return row.normal.z; });
-    act(self.incidence_, "incidence",
-        [](Row row) { return std::atan2(row.sin_incidence, row.cos_incidence); });
+    act(self.incidence_, "incidence", [](Row row) {
+      return static_cast<float>(angle_of<double>(row.sin_incidence, row.cos_incidence));
+    });
     act(self.label_, "label", [](Row row) { return row.surface.label; });
     act(self.instance_, "instance", [](Row row) { return row.surface.instance; });
     act(self.error_estimate_, "error_estimate",

@@ -4,6 +4,7 @@
 #include <numbers>
 
 #include "core/error.h"
+#include "core/math.h"
 
 namespace groundray {
 namespace {
@@ -32,7 +33,7 @@ void check_atmosphere(const AtmosphereSpec& spec, double wavelength_nm) {
 double haze_exponent(double visibility_km, HazeLaw law) noexcept {
   if (visibility_km > 50) return 1.6;
   if (visibility_km > 6) return 1.3;
-  if (law == HazeLaw::Kruse) return 0.585 * std::cbrt(visibility_km);
+  if (law == HazeLaw::Kruse) return 0.585 * math::cbrt(visibility_km);
   if (visibility_km > 1) return 0.16 * visibility_km + 0.34;
   if (visibility_km > 0.5) return visibility_km - 0.5;
   return 0;
@@ -42,10 +43,10 @@ double haze_exponent(double visibility_km, HazeLaw law) noexcept {
 
 double haze_extinction_per_m(double visibility_m, double wavelength_nm, HazeLaw law) noexcept {
   const double exponent = haze_exponent(visibility_m / 1000, law);
-  return 3.912 / visibility_m * std::pow(wavelength_nm / 550, -exponent);
+  return 3.912 / visibility_m * math::pow(wavelength_nm / 550, -exponent);
 }
 
-double fog_extinction_per_m(double fog_range_m) noexcept { return std::log(20.) / fog_range_m; }
+double fog_extinction_per_m(double fog_range_m) noexcept { return math::log(20.) / fog_range_m; }
 
 // Rasshofer et al. (2011).
 double fog_backscatter_per_m_sr(double fog_range_m) noexcept { return 0.046 / fog_range_m; }
@@ -53,7 +54,7 @@ double fog_backscatter_per_m_sr(double fog_range_m) noexcept { return 0.046 / fo
 // Carbonneau and Wisely (1998), as given by Kaushal and Kaddoum, IEEE Communications Surveys and
 // Tutorials 19 (2017), section IV.
 double rain_extinction_per_m(double rain_mm_h) noexcept {
-  const double decibels_per_km = 1.076 * std::pow(rain_mm_h, 0.67);
+  const double decibels_per_km = 1.076 * math::pow(rain_mm_h, 0.67);
   return decibels_per_km * std::numbers::ln10 / 10 / 1000;
 }
 
@@ -82,7 +83,7 @@ Atmosphere::Atmosphere(const AtmosphereSpec& spec, double wavelength_nm)
 }
 
 double Atmosphere::transmission(double range_m) const noexcept {
-  return std::exp(-extinction_per_m_ * range_m);
+  return math::exp(-extinction_per_m_ * range_m);
 }
 
 }  // namespace groundray

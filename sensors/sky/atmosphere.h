@@ -1,8 +1,9 @@
 #pragma once
 
-#include <glm/exponential.hpp>
 #include <glm/vec3.hpp>
 #include <limits>
+
+#include "core/math.h"
 
 namespace groundray {
 
@@ -63,7 +64,7 @@ class AerialPerspective {
   /// @param from_horizon  radiance of infinitely deep air in the same direction.
   glm::dvec3 through(const glm::dvec3& from_surface, double distance_m,
                      const glm::dvec3& from_horizon) const noexcept {
-    const glm::dvec3 left = glm::exp(-extinction_per_m_ * distance_m);
+    const glm::dvec3 left = math::exp(-extinction_per_m_ * distance_m);
     return from_surface * left + from_horizon * (1.0 - left);
   }
 

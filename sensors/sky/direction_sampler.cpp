@@ -8,6 +8,7 @@
 #include <utility>
 
 #include "core/error.h"
+#include "core/math.h"
 
 namespace groundray {
 namespace {
@@ -16,7 +17,7 @@ using std::numbers::pi;
 
 // Returns cos a - cos b without cancellation.
 double cosine_difference(double a_rad, double b_rad) {
-  return 2 * std::sin((a_rad + b_rad) / 2) * std::sin((b_rad - a_rad) / 2);
+  return 2 * math::sin((a_rad + b_rad) / 2) * math::sin((b_rad - a_rad) / 2);
 }
 
 // Interval of a cumulative sum that contains a fraction of the total, and the position in it.
@@ -63,9 +64,9 @@ LatLongGrid::LatLongGrid(int width, int height, double center_azimuth_rad)
 }
 
 LatLongPlace LatLongGrid::place(const glm::dvec3& direction) const noexcept {
-  const double azimuth = std::atan2(direction.x, direction.y);
+  const double azimuth = math::atan2(direction.x, direction.y);
   const double sine = std::sqrt(direction.x * direction.x + direction.y * direction.y);
-  const double polar = std::atan2(sine, direction.z);
+  const double polar = math::atan2(sine, direction.z);
   const double turns = (azimuth - center_azimuth_rad_) / (2 * pi) + 0.5;
   const double x = (turns - std::floor(turns)) * width_ - 0.5;
   const double y = polar / pi * height_ - 0.5;
@@ -96,7 +97,7 @@ glm::dvec3 LatLongGrid::direction(int column, int patch_row,
   const double cap = std::min(from_zenith, from_nadir);  // 1 - |cos|
   const double sine = std::sqrt(cap * (2 - cap));
   const double height = from_zenith < from_nadir ? 1 - from_zenith : from_nadir - 1;
-  return {sine * std::sin(azimuth), sine * std::cos(azimuth), height};
+  return {sine * math::sin(azimuth), sine * math::cos(azimuth), height};
 }
 
 double LatLongGrid::pixel_solid_angle_sr(int row) const noexcept {

@@ -13,6 +13,7 @@
 
 #include "core/error.h"
 #include "core/image/luminance.h"
+#include "core/math.h"
 
 namespace groundray {
 namespace {
@@ -81,8 +82,8 @@ std::vector<float> luminances(const ImageF& image) {
 // Returns the integral of (a + b theta) cos(theta) sin(theta) from `begin_rad` to `end_rad`.
 double cosine_integral(double a, double b, double begin_rad, double end_rad) {
   const auto primitive = [&](double theta) {
-    const double sine = std::sin(theta);
-    return a * sine * sine / 2 + b * (std::sin(2 * theta) / 8 - theta * std::cos(2 * theta) / 4);
+    const double sine = math::sin(theta);
+    return a * sine * sine / 2 + b * (math::sin(2 * theta) / 8 - theta * math::cos(2 * theta) / 4);
   };
   return primitive(end_rad) - primitive(begin_rad);
 }

@@ -12,6 +12,7 @@
 
 #include "core/error.h"
 #include "core/image/luminance.h"
+#include "core/math.h"
 
 namespace groundray {
 namespace {
@@ -27,11 +28,12 @@ static_assert(std::size(coefficient_table) ==
 // elevation.
 std::array<double, elevation_nodes> node_weights(double elevation_rad) {
   constexpr std::array<double, elevation_nodes> binomials{1, 5, 10, 10, 5, 1};
-  const double x = std::cbrt(elevation_rad / (std::numbers::pi / 2));
+  const double x = math::cbrt(elevation_rad / (std::numbers::pi / 2));
   std::array<double, elevation_nodes> weights;
   for (int i = 0; i < elevation_nodes; ++i) {
-    weights[static_cast<std::size_t>(i)] = binomials[static_cast<std::size_t>(i)] * std::pow(x, i) *
-                                           std::pow(1 - x, elevation_nodes - 1 - i);
+    weights[static_cast<std::size_t>(i)] = binomials[static_cast<std::size_t>(i)] *
+                                           math::pow(x, i) *
+                                           math::pow(1 - x, elevation_nodes - 1 - i);
   }
   return weights;
 }
@@ -60,7 +62,7 @@ void check_analytic_sky(double turbidity, const glm::dvec3& albedo, const glm::d
   broken.unless(sun.z >= 0,
                 "the sun is {:.3g} degrees below the horizon, but the model has no twilight: use a "
                 "constant sky or an environment image",
-                -glm::degrees(std::asin(std::clamp(sun.z, -1.0, 1.0))));
+                -glm::degrees(math::asin(std::clamp(sun.z, -1.0, 1.0))));
   broken.throw_if_any();
 }
 
@@ -73,11 +75,11 @@ glm::dvec3 irradiance_of(const HosekWilkie& model) {
   glm::dvec3 sum(0);
   for (int ring = 0; ring < rings; ++ring) {
     const double elevation = pi / 2 * (ring + 0.5) / rings;
-    const double level = std::cos(elevation), height = std::sin(elevation);
+    const double level = math::cos(elevation), height = math::sin(elevation);
     glm::dvec3 around(0);
     for (int sector = 0; sector < sectors; ++sector) {
       const double azimuth = 2 * pi * (sector + 0.5) / sectors;
-      around += model.radiance({level * std::sin(azimuth), level * std::cos(azimuth), height});
+      around += model.radiance({level * math::sin(azimuth), level * math::cos(azimuth), height});
     }
     sum += around * (height * level);
   }
@@ -100,7 +102,7 @@ ConstantSky checked_sky(const ConstantSky& sky) {
 HosekWilkie::HosekWilkie(double turbidity, const glm::dvec3& ground_albedo, const glm::dvec3& sun)
     : sun_(sun) {
   check_analytic_sky(turbidity, ground_albedo, sun);
-  const auto weights = node_weights(std::atan2(sun.z, std::hypot(sun.x, sun.y)));
+  const auto weights = node_weights(math::atan2(sun.z, math::hypot(sun.x, sun.y)));
   const int below = std::min(static_cast<int>(turbidity), turbidities - 1) - 1;
   const double above_share = turbidity - (below + 1);
   for (int parameter = 0; parameter < parameters; ++parameter) {
@@ -120,12 +122,13 @@ glm::dvec3 HosekWilkie::radiance(const glm::dvec3& direction) const noexcept {
   const auto& [a, b, c, d, e, f, g, h, i, mean] = coefficients_;
   const double cos_theta = std::max(direction.z, 0.0);
   const double cos_gamma = std::clamp(glm::dot(direction, sun_), -1.0, 1.0);
-  const double gamma = std::acos(cos_gamma);
+  const double gamma = math::acos(cos_gamma);
   const double cos2 = cos_gamma * cos_gamma;
-  const glm::dvec3 halo = (1 + cos2) / glm::pow(1.0 + i * i - 2.0 * i * cos_gamma, glm::dvec3(1.5));
-  const glm::dvec3 from_horizon = 1.0 + a * glm::exp(b / (cos_theta + 0.01));
+  const glm::dvec3 aside = 1.0 + i * i - 2.0 * i * cos_gamma;
+  const glm::dvec3 halo = (1 + cos2) / (aside * glm::sqrt(aside));
+  const glm::dvec3 from_horizon = 1.0 + a * math::exp(b / (cos_theta + 0.01));
   const glm::dvec3 from_sun =
-      c + d * glm::exp(e * gamma) + f * cos2 + g * halo + h * std::sqrt(cos_theta);
+      c + d * math::exp(e * gamma) + f * cos2 + g * halo + h * std::sqrt(cos_theta);
   return glm::max(from_horizon * from_sun * mean, glm::dvec3(0));
 }
 
@@ -147,9 +150,9 @@ DirectionSampler ClearSky::tabulated() const {
     const double polar = pi * (y + 0.5) / table_height;
     for (int x = 0; x < table_width; ++x) {
       const double azimuth = 2 * pi * ((x + 0.5) / table_width - 0.5);
-      const double level = std::sin(polar);
-      const glm::dvec3 direction(level * std::sin(azimuth), level * std::cos(azimuth),
-                                 std::cos(polar));
+      const double level = math::sin(polar);
+      const glm::dvec3 direction(level * math::sin(azimuth), level * math::cos(azimuth),
+                                 math::cos(polar));
       const double weight = luminance(radiance(direction));
       weights.push_back(static_cast<float>(direction.z < 0 ? weight : std::max(weight, least)));
     }
@@ -192,7 +195,7 @@ glm::dvec3 Sky::dome_radiance(const glm::dvec3& direction) const noexcept {
 }
 
 glm::dvec3 Sky::horizon_radiance(const glm::dvec3& direction) const noexcept {
-  const double level = std::hypot(direction.x, direction.y);
+  const double level = math::hypot(direction.x, direction.y);
   if (level == 0) return dome_radiance({0, 1, 0});
   return dome_radiance({direction.x / level, direction.y / level, 0});
 }
@@ -202,7 +205,7 @@ DirectionSample Sky::sample_dome(const glm::dvec2& uniform) const noexcept {
   if (const auto* sky = std::get_if<ClearSky>(&dome_)) return sky->sample(uniform);
   const double height = 1 - 2 * uniform.y, azimuth = 2 * pi * uniform.x;
   const double level = 2 * std::sqrt(uniform.y * (1 - uniform.y));
-  return {{level * std::sin(azimuth), level * std::cos(azimuth), height}, 1 / (4 * pi)};
+  return {{level * math::sin(azimuth), level * math::cos(azimuth), height}, 1 / (4 * pi)};
 }
 
 double Sky::dome_pdf_per_sr(const glm::dvec3& direction) const noexcept {

@@ -9,6 +9,7 @@
 #include <numbers>
 
 #include "core/error.h"
+#include "core/math.h"
 
 namespace groundray {
 namespace {
@@ -50,20 +51,20 @@ Geocentric geocentric_sun(double t) {  // centuries of terrestrial time since J2
   const double mean_longitude_deg = 280.46646 + (36000.76983 + 0.0003032 * t) * t;
   const double anomaly = glm::radians(357.52911 + (35999.05029 - 0.0001537 * t) * t);
   const double eccentricity = 0.016708634 - (0.000042037 + 0.0000001267 * t) * t;
-  const double center_deg = (1.914602 - (0.004817 + 0.000014 * t) * t) * std::sin(anomaly) +
-                            (0.019993 - 0.000101 * t) * std::sin(2 * anomaly) +
-                            0.000289 * std::sin(3 * anomaly);
+  const double center_deg = (1.914602 - (0.004817 + 0.000014 * t) * t) * math::sin(anomaly) +
+                            (0.019993 - 0.000101 * t) * math::sin(2 * anomaly) +
+                            0.000289 * math::sin(3 * anomaly);
   const double node = glm::radians(125.04 - 1934.136 * t);
-  const double nutation_deg = -0.00478 * std::sin(node);
+  const double nutation_deg = -0.00478 * math::sin(node);
   const double longitude =
       glm::radians(mean_longitude_deg + center_deg - 0.00569 + nutation_deg);  // with aberration
-  const double obliquity = glm::radians(23.4392911 - 0.0130042 * t + 0.00256 * std::cos(node));
+  const double obliquity = glm::radians(23.4392911 - 0.0130042 * t + 0.00256 * math::cos(node));
   const double distance_au = 1.000001018 * (1 - eccentricity * eccentricity) /
-                             (1 + eccentricity * std::cos(anomaly + glm::radians(center_deg)));
-  const double sine = std::sin(longitude);
-  return {{std::cos(longitude), sine * std::cos(obliquity), sine * std::sin(obliquity)},
+                             (1 + eccentricity * math::cos(anomaly + glm::radians(center_deg)));
+  const double sine = math::sin(longitude);
+  return {{math::cos(longitude), sine * math::cos(obliquity), sine * math::sin(obliquity)},
           distance_au,
-          nutation_deg * std::cos(obliquity)};
+          nutation_deg * math::cos(obliquity)};
 }
 
 struct Row {
@@ -79,7 +80,7 @@ constexpr Row spectrum_table[] = {
 // Returns the air mass of an ozone layer at a height of 22 km: Bird and Riordan, equation 2-10.
 double ozone_mass(double elevation_rad) {
   constexpr double height = 22.0 / 6370;
-  const double sine = std::max(std::sin(elevation_rad), 0.0);
+  const double sine = std::max(math::sin(elevation_rad), 0.0);
   return (1 + height) / std::sqrt(sine * sine + 2 * height);
 }
 
@@ -97,12 +98,12 @@ class Transmission {
   double of(const Row& row) const {
     const double um = row.wavelength_nm / 1000, um2 = um * um;
     const double rayleigh = pressure_mass_ / (um2 * um2 * (115.6406 - 1.3366 / um2));
-    const double aerosol = aerosol_ * std::pow(um, -1.3);
+    const double aerosol = aerosol_ * math::pow(um, -1.3);
     const double water = row.water * water_;
     const double mixed = row.mixed * pressure_mass_;
-    return std::exp(-rayleigh - aerosol - row.ozone * ozone_ -
-                    0.2385 * water / std::pow(1 + 20.07 * water, 0.45) -
-                    1.41 * mixed / std::pow(1 + 118.3 * mixed, 0.45));
+    return math::exp(-rayleigh - aerosol - row.ozone * ozone_ -
+                     0.2385 * water / math::pow(1 + 20.07 * water, 0.45) -
+                     1.41 * mixed / math::pow(1 + 118.3 * mixed, 0.45));
   }
 
  private:
@@ -165,7 +166,7 @@ double versine(const glm::dvec3& a, const glm::dvec3& b) {
 }
 
 double disc_depth(double radius_rad) {  // 1 - cos
-  const double sine = std::sin(radius_rad / 2);
+  const double sine = math::sin(radius_rad / 2);
   return 2 * sine * sine;
 }
 
@@ -174,13 +175,13 @@ double disc_depth(double radius_rad) {  // 1 - cos
 double refraction_rad(double elevation_rad, double pressure_hpa, double temperature_c) noexcept {
   const double degrees = glm::degrees(elevation_rad);
   if (degrees < -1) return 0;
-  const double arc_minutes = 1.02 / std::tan(glm::radians(degrees + 10.3 / (degrees + 5.11)));
+  const double arc_minutes = 1.02 / math::tan(glm::radians(degrees + 10.3 / (degrees + 5.11)));
   return glm::radians(arc_minutes / 60 * (pressure_hpa / 1010) * (283 / (273 + temperature_c)));
 }
 
 glm::dvec3 direction_of(double azimuth_rad, double elevation_rad) noexcept {
-  const double level = std::cos(elevation_rad);
-  return {level * std::sin(azimuth_rad), level * std::cos(azimuth_rad), std::sin(elevation_rad)};
+  const double level = math::cos(elevation_rad);
+  return {level * math::sin(azimuth_rad), level * math::cos(azimuth_rad), math::sin(elevation_rad)};
 }
 
 SunPosition sun_position(Time utc, const Place& place) {
@@ -197,14 +198,14 @@ SunPosition sun_position(Time utc, const Place& place) {
   // Axes: x towards the intersection of the local meridian and the equator, y east, z along the
   // Earth's axis.
   const glm::dvec3& s = sun.direction;
-  const double x = s.x * std::cos(meridian) + s.y * std::sin(meridian);
-  const double y = s.y * std::cos(meridian) - s.x * std::sin(meridian);
-  const double north = std::cos(latitude) * s.z - std::sin(latitude) * x;
-  const double up = std::cos(latitude) * x + std::sin(latitude) * s.z -
-                    std::sin(glm::radians(parallax_deg)) / sun.distance_au;
-  const double elevation = std::atan2(up, std::hypot(y, north));
+  const double x = s.x * math::cos(meridian) + s.y * math::sin(meridian);
+  const double y = s.y * math::cos(meridian) - s.x * math::sin(meridian);
+  const double north = math::cos(latitude) * s.z - math::sin(latitude) * x;
+  const double up = math::cos(latitude) * x + math::sin(latitude) * s.z -
+                    math::sin(glm::radians(parallax_deg)) / sun.distance_au;
+  const double elevation = math::atan2(up, math::hypot(y, north));
   const double lift = refraction_rad(elevation, place.pressure_hpa, place.temperature_c);
-  return {direction_of(std::atan2(y, north), std::min(elevation + lift, pi / 2)), sun.distance_au};
+  return {direction_of(math::atan2(y, north), std::min(elevation + lift, pi / 2)), sun.distance_au};
 }
 
 void check_air(const ClearAir& air) {
@@ -223,7 +224,7 @@ void check_air(const ClearAir& air) {
 
 double air_mass(double elevation_rad) noexcept {
   const double degrees = std::max(glm::degrees(elevation_rad), 0.0);
-  return 1 / (std::sin(glm::radians(degrees)) + 0.50572 * std::pow(degrees + 6.07995, -1.6364));
+  return 1 / (math::sin(glm::radians(degrees)) + 0.50572 * math::pow(degrees + 6.07995, -1.6364));
 }
 
 double direct_irradiance_w_m2_nm(double wavelength_nm, double elevation_rad, const ClearAir& air) {
@@ -263,8 +264,8 @@ Sun::Sun(const SunSpec& spec, const ClearAir& air) : air_(air) {
   const SunPosition position = position_of(spec, air);
   direction_ = position.direction;
   distance_au_ = position.distance_au;
-  elevation_rad_ = std::atan2(direction_.z, std::hypot(direction_.x, direction_.y));
-  radius_rad_ = std::asin(std::sin(radius_at_1_au_rad) / distance_au_);
+  elevation_rad_ = math::atan2(direction_.z, math::hypot(direction_.x, direction_.y));
+  radius_rad_ = math::asin(math::sin(radius_at_1_au_rad) / distance_au_);
   if (is_up()) {
     irradiance_ = direct_irradiance_rgb(elevation_rad(), air_) / (distance_au_ * distance_au_);
   }
@@ -272,7 +273,7 @@ Sun::Sun(const SunSpec& spec, const ClearAir& air) : air_(air) {
   across_ = glm::normalize(glm::cross(aside, direction_));
   up_ = glm::cross(direction_, across_);
   depth_ = disc_depth(radius_rad_);
-  rim_squared_ = std::sin(radius_rad_) * std::sin(radius_rad_);
+  rim_squared_ = math::sin(radius_rad_) * math::sin(radius_rad_);
   // On a plane perpendicular to the rays, the disc has the cosine-weighted solid angle pi sin^2.
   limb_ = relative_limb(spec.disc);
   for (glm::dvec3& power : limb_) power *= irradiance_ / (pi * rim_squared_);

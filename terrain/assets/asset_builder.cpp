@@ -8,6 +8,8 @@
 #include <utility>
 #include <vector>
 
+#include "core/math.h"
+
 namespace groundray {
 namespace {
 
@@ -126,7 +128,7 @@ void AssetBuilder::add_triangle(std::uint32_t a, std::uint32_t b, std::uint32_t 
 }
 
 void AssetBuilder::add_tube(std::span<const TubeRing> rings, int sides, std::uint16_t surface) {
-  const double widening = pi / (sides * std::sin(pi / sides));
+  const double widening = pi / (sides * math::sin(pi / sides));
   const bool is_pointed = rings.back().radius == 0;
   const std::size_t ring_count = rings.size() - (is_pointed ? 1 : 0);
   const auto k = static_cast<std::uint32_t>(sides);
@@ -144,7 +146,7 @@ void AssetBuilder::add_tube(std::span<const TubeRing> rings, int sides, std::uin
     if (i > 0) v += glm::distance(rings[i].p, rings[i - 1].p) / length;
     for (int s = 0; s < sides; ++s) {
       const double angle = 2 * pi * s / sides;
-      const glm::dvec3 out = side * std::cos(angle) + up * std::sin(angle);
+      const glm::dvec3 out = side * math::cos(angle) + up * math::sin(angle);
       // u runs from 1 to 0 and back around the tube, so that the image has no seam and vertices are
       // shared.
       const double u = std::abs(2.0 * s / sides - 1);
@@ -174,7 +176,7 @@ void AssetBuilder::add_cylinder(const glm::dvec3& foot, double height, double ra
   const auto first = static_cast<std::uint32_t>(model_.mesh.vertices_m.size());
   for (int s = 0; s < sides; ++s) {
     const double angle = 2 * pi * s / sides;
-    const glm::dvec3 out{std::cos(angle), std::sin(angle), 0};
+    const glm::dvec3 out{math::cos(angle), math::sin(angle), 0};
     const glm::dvec3 low = foot + radius * out, high = low + glm::dvec3(0, 0, height);
     const double u = std::abs(2.0 * s / sides - 1);
     const glm::dvec2 uv = (glm::dvec2(out) + 1.0) / 2.0;

@@ -5,6 +5,7 @@
 #include <cstddef>
 #include <glm/geometric.hpp>
 
+#include "core/math.h"
 #include "terrain/assets/asset_builder.h"
 #include "terrain/assets/asset_kinds.h"
 
@@ -20,20 +21,21 @@ void add_blade(AssetBuilder& builder, AssetRandom& random, std::uint16_t surface
   constexpr std::array<double, segment_count> half_width{0.8, 1.0, 0.65};
   const double towards = random.angle_rad();
   const double away = root_spread * std::sqrt(random.between(0, 1));
-  glm::dvec3 p{away * std::cos(towards), away * std::sin(towards), -root_depth};
+  glm::dvec3 p{away * math::cos(towards), away * math::sin(towards), -root_depth};
   const double azimuth = towards + 0.5 * random.normal();
-  const glm::dvec3 outward{std::cos(azimuth), std::sin(azimuth), 0};
+  const glm::dvec3 outward{math::cos(azimuth), math::sin(azimuth), 0};
   const double length = random.between(0.45, 1.05), width = widest * random.between(0.6, 1);
   const double lean = random.between(0.03, 0.45), bend = random.between(0.1, 1.1);
   const double twist = 0.5 * random.normal();
-  const glm::dvec3 across{-std::sin(azimuth), std::cos(azimuth), 0};
+  const glm::dvec3 across{-math::sin(azimuth), math::cos(azimuth), 0};
   std::array<std::uint32_t, std::size_t{2} * segment_count> pair{};
   for (std::size_t i = 0; i <= segment_count; ++i) {
     const double s = static_cast<double>(i) / segment_count;
     const double tilt = lean + bend * s * s;  // angle from the vertical, rad
-    const glm::dvec3 along{std::sin(tilt) * outward.x, std::sin(tilt) * outward.y, std::cos(tilt)};
+    const glm::dvec3 along{math::sin(tilt) * outward.x, math::sin(tilt) * outward.y,
+                           math::cos(tilt)};
     const glm::dvec3 face = glm::cross(across, along);
-    const glm::dvec3 side = across * std::cos(twist * s) + face * std::sin(twist * s);
+    const glm::dvec3 side = across * math::cos(twist * s) + face * math::sin(twist * s);
     const glm::dvec3 normal = glm::normalize(glm::cross(along, side));
     if (i == segment_count) {
       const std::uint32_t tip = builder.add_vertex(p, normal, {0.5, 1});

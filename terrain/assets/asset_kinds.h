@@ -6,6 +6,7 @@
 #include <numbers>
 #include <optional>
 
+#include "core/math.h"
 #include "core/model/model.h"
 #include "core/random.h"
 #include "terrain/assets/asset.h"
@@ -39,7 +40,7 @@ class AssetRandom {
     const double z = between(-1, 1);
     const double angle = angle_rad();
     const double r = std::sqrt(1 - z * z);
-    return {r * std::cos(angle), r * std::sin(angle), z};
+    return {r * math::cos(angle), r * math::sin(angle), z};
   }
 
  private:

@@ -13,6 +13,7 @@
 #include <vector>
 
 #include "core/image/srgb.h"
+#include "core/math.h"
 #include "terrain/assets/asset_builder.h"
 
 namespace groundray {
@@ -41,7 +42,7 @@ class Spray {
   }
 
   void draw(const Blade& blade) {
-    const glm::dvec2 along{std::cos(blade.angle_rad), std::sin(blade.angle_rad)};
+    const glm::dvec2 along{math::cos(blade.angle_rad), math::sin(blade.angle_rad)};
     const glm::dvec2 tip = blade.stalk + along * blade.length;
     const double margin = blade.half_width + 2.0 / image_size;
     const auto first = [&](double at) {
@@ -86,7 +87,7 @@ double rad(double deg) { return deg * std::numbers::pi / 180; }
 
 // Draws a twig with leaves on both sides and one at its end.
 void draw_twig(Spray& spray, const glm::dvec2& from, double angle_deg, double length) {
-  const glm::dvec2 along{std::cos(rad(angle_deg)), std::sin(rad(angle_deg))};
+  const glm::dvec2 along{math::cos(rad(angle_deg)), math::sin(rad(angle_deg))};
   spray.draw({from, rad(angle_deg), length, 0.01, 0.7});
   constexpr double spacing = 0.085, leaf = 0.19, half_width = 0.046;
   double shade = 0.86;
@@ -116,7 +117,7 @@ Image8 draw_leaves() {
 
 // Draws a shoot with needles on both sides.
 void draw_shoot(Spray& spray, const glm::dvec2& from, double angle_deg, double length) {
-  const glm::dvec2 along{std::cos(rad(angle_deg)), std::sin(rad(angle_deg))};
+  const glm::dvec2 along{math::cos(rad(angle_deg)), math::sin(rad(angle_deg))};
   spray.draw({from, rad(angle_deg), length, 0.012, 0.75});
   constexpr double spacing = 0.03, needle = 0.1;
   for (double s = 0.02; s < length; s += spacing) {

@@ -11,6 +11,7 @@
 #include <utility>
 #include <vector>
 
+#include "core/math.h"
 #include "terrain/assets/asset_builder.h"
 #include "terrain/assets/asset_kinds.h"
 
@@ -107,18 +108,18 @@ class RockRadius {
     for (int i = 0; i < face_count; ++i) {
       // Sunflower arrangement (golden angle) on the sphere, so that faces cover all sides.
       const double z = 1 - (2 * i + 1.0) / face_count, angle = i * pi * (3 - std::sqrt(5.0));
-      const glm::dvec3 even{std::sqrt(1 - z * z) * std::cos(angle),
-                            std::sqrt(1 - z * z) * std::sin(angle), z};
+      const glm::dvec3 even{std::sqrt(1 - z * z) * math::cos(angle),
+                            std::sqrt(1 - z * z) * math::sin(angle), z};
       const glm::dvec3 normal = glm::normalize(even + 0.28 * random.direction());
       faces_.push_back(normal / random.between(0.78, 1.04));
     }
     // Wave number of the longest waves, and ratio of successive wave numbers.
     constexpr double longest = 3, ratio = 1.25;
-    const double edge = std::acos(1 / std::sqrt(5.0)) / n;
+    const double edge = math::acos(1 / std::sqrt(5.0)) / n;
     const double shortest = 2 * pi / (3 * edge);
     for (double number = longest; number < shortest; number *= ratio) {
       for (int i = 0; i < 2; ++i) {
-        const double amplitude = shape.roughness * std::pow(number / longest, -1.5);
+        const double amplitude = shape.roughness * math::pow(number / longest, -1.5);
         waves_.push_back({random.direction() * number, random.angle_rad(), amplitude});
       }
     }
@@ -127,13 +128,13 @@ class RockRadius {
   double operator()(const glm::dvec3& direction) const {
     double sum = 0;
     for (const glm::dvec3& face : faces_) {
-      sum += std::pow(std::max(0.0, glm::dot(face, direction)), shape_.sharpness);
+      sum += math::pow(std::max(0.0, glm::dot(face, direction)), shape_.sharpness);
     }
     double noise = 0;
     for (const Wave& wave : waves_) {
-      noise += wave.amplitude * std::sin(glm::dot(wave.vector, direction) + wave.phase);
+      noise += wave.amplitude * math::sin(glm::dot(wave.vector, direction) + wave.phase);
     }
-    return std::pow(sum, -1 / shape_.sharpness) * std::exp(noise);
+    return math::pow(sum, -1 / shape_.sharpness) * math::exp(noise);
   }
 
  private:

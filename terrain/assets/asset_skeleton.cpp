@@ -5,6 +5,8 @@
 #include <glm/geometric.hpp>
 #include <limits>
 
+#include "core/math.h"
+
 namespace groundray {
 namespace {
 
@@ -19,7 +21,7 @@ std::vector<Goal> scatter_goals(const CrownShape& crown, AssetRandom& random) {
   while (goals.size() < static_cast<std::size_t>(crown.points)) {
     const glm::dvec3 direction = random.direction();
     // Denser towards the outside, where there is more light.
-    const double r = std::pow(random.between(0, 1), 0.28);
+    const double r = math::pow(random.between(0, 1), 0.28);
     const glm::dvec3 p = crown.center + crown.half * direction * r;
     if (p.z >= crown.lowest) goals.push_back({p});
   }

@@ -3,6 +3,7 @@
 #include <cmath>
 #include <vector>
 
+#include "core/math.h"
 #include "terrain/assets/asset_builder.h"
 #include "terrain/assets/asset_kinds.h"
 
@@ -19,7 +20,7 @@ int sides_of(double at_usual, double detail) {
 double catenary_parameter(double span_m, double sag_m) {
   const double h = span_m / 2;
   const auto sag = [&](double a) {
-    const double s = std::sinh(h / (2 * a));
+    const double s = math::sinh(h / (2 * a));
     return 2 * a * s * s;  // a (cosh - 1) without cancellation
   };
   double low = h * 1e-3, high = h;
@@ -54,7 +55,7 @@ Model make_person_cylinder(AssetShape shape) {
 
 Model make_wire(AssetShape shape) {
   const double a = catenary_parameter(shape.size_m, shape.sag_m);
-  const double half_length = a * std::sinh(shape.size_m / (2 * a));
+  const double half_length = a * math::sinh(shape.size_m / (2 * a));
   // A chord of length c deviates from the curve by at most c^2 / (8 a), which is a twentieth of the
   // diameter divided by `detail` here.
   const double chord = std::sqrt(8 * a * shape.width_m / 20 / shape.detail);
@@ -62,7 +63,7 @@ Model make_wire(AssetShape shape) {
   std::vector<TubeRing> rings;
   for (int i = -half_count; i <= half_count; ++i) {
     const double s = half_length * i / half_count;
-    const double x = a * std::asinh(s / a), half_sinh = std::sinh(x / (2 * a));
+    const double x = a * math::asinh(s / a), half_sinh = math::sinh(x / (2 * a));
     rings.push_back({{x, 0, 2 * a * half_sinh * half_sinh - shape.sag_m}, shape.width_m / 2});
   }
   rings.front().p = {-shape.size_m / 2, 0, 0};

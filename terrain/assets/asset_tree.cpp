@@ -10,6 +10,7 @@
 #include <numbers>
 #include <vector>
 
+#include "core/math.h"
 #include "terrain/assets/asset_builder.h"
 #include "terrain/assets/asset_kinds.h"
 #include "terrain/assets/asset_skeleton.h"
@@ -185,7 +186,7 @@ std::size_t scaled_count(double usual, double detail) {
 // Makes goals more numerous and, in proportion, closer together.
 void refine(CrownShape& crown, double detail) {
   crown.points = static_cast<int>(std::lround(crown.points * detail));
-  crown.reach *= std::pow(detail, -1.0 / 3);
+  crown.reach *= math::pow(detail, -1.0 / 3);
   crown.step = std::min(crown.step, crown.reach / 1.4);
 }
 
@@ -195,7 +196,8 @@ Model make_broadleaf_tree(AssetShape shape) {
   Plant plant;
   AssetRandom& random = shape.random;
   const double lean = random.angle_rad();
-  const glm::dvec3 fork{0.015 * std::cos(lean), 0.015 * std::sin(lean), random.between(0.26, 0.34)};
+  const glm::dvec3 fork{0.015 * math::cos(lean), 0.015 * math::sin(lean),
+                        random.between(0.26, 0.34)};
   CrownShape crown{.center = {0, 0, 0.62},
                    .half = {random.between(0.27, 0.33), random.between(0.27, 0.33), 0.35},
                    .points = 260,
@@ -226,7 +228,7 @@ Model make_shrub(AssetShape shape) {
   const double turn = random.angle_rad();
   for (int i = 0; i < stem_count; ++i) {
     const double angle = turn + 2 * std::numbers::pi * (i + random.between(-0.3, 0.3)) / stem_count;
-    const glm::dvec3 out{std::cos(angle), std::sin(angle), 0};
+    const glm::dvec3 out{math::cos(angle), math::sin(angle), 0};
     const glm::dvec3 head = out * random.between(0.12, 0.24) + glm::dvec3(0, 0, 0.2);
     add_stem(plant.wood, out * 0.03 - glm::dvec3(0, 0, 0.05), head, 0.07, random);
   }
@@ -248,8 +250,8 @@ struct Bough {
 
   glm::dvec3 at(double s) const {  // s from 0 to 1
     const double flat = length * s, sag = 0.25 * length * s * s;
-    return from + glm::dvec3(flat * std::cos(azimuth), flat * std::sin(azimuth),
-                             flat * std::tan(rise_rad) - sag + 0.5 * sag * s);
+    return from + glm::dvec3(flat * math::cos(azimuth), flat * math::sin(azimuth),
+                             flat * math::tan(rise_rad) - sag + 0.5 * sag * s);
   }
 };
 
@@ -258,9 +260,9 @@ std::vector<Bough> boughs_of_conifer(int count, AssetRandom& random) {
   std::vector<Bough> boughs;
   for (int i = 0; i < count; ++i) {
     // Closer together towards the top, where boughs are shorter.
-    const double t = std::pow((i + random.between(0.2, 0.8)) / count, 0.85);
+    const double t = math::pow((i + random.between(0.2, 0.8)) / count, 0.85);
     const double z = lowest + (0.97 - lowest) * t;
-    const double length = spread * (std::pow(1 - t, 0.85) + 0.05) * random.between(0.8, 1.1);
+    const double length = spread * (math::pow(1 - t, 0.85) + 0.05) * random.between(0.8, 1.1);
     boughs.push_back({{0, 0, z},
                       golden_rad * i + random.between(-0.4, 0.4),
                       length,
@@ -287,10 +289,10 @@ std::vector<Card> cards_on(const std::vector<Bough>& boughs, std::size_t count,
     const glm::dvec3 ahead = glm::normalize(bough.at(0.15 + 0.9 * s) - bough.at(0.05 + 0.9 * s));
     const glm::dvec3 left = glm::normalize(glm::cross(glm::dvec3(0, 0, 1), ahead));
     const double turn = (static_cast<double>(i % 3) - 1) * 0.8 + random.between(-0.3, 0.3);
-    const glm::dvec3 along =
-        ahead * std::cos(turn) + left * std::sin(turn) - glm::dvec3(0, 0, random.between(0, 0.35));
+    const glm::dvec3 along = ahead * math::cos(turn) + left * math::sin(turn) -
+                             glm::dvec3(0, 0, random.between(0, 0.35));
     const glm::dvec3 side =
-        left * std::cos(turn) - ahead * std::sin(turn) + glm::dvec3(0, 0, 0.45 * random.normal());
+        left * math::cos(turn) - ahead * math::sin(turn) + glm::dvec3(0, 0, 0.45 * random.normal());
     cards.push_back(card_on(base, along, side));
   }
   return cards;

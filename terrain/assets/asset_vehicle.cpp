@@ -8,6 +8,7 @@
 #include <numbers>
 #include <vector>
 
+#include "core/math.h"
 #include "terrain/assets/asset_builder.h"
 #include "terrain/assets/asset_kinds.h"
 
@@ -83,12 +84,12 @@ class Pickup {
 
   // Adds the upper arc of a wheel opening, from its rear to its front.
   static void add_arch(Profile& profile, double x) {
-    const double low = std::asin((sill - tyre_radius) / arch_radius);
+    const double low = math::asin((sill - tyre_radius) / arch_radius);
     constexpr int pieces = 10;
     for (int i = 0; i <= pieces; ++i) {
       const double angle = pi - low - (pi - 2 * low) * i / pieces;
-      profile.emplace_back(x + arch_radius * std::cos(angle),
-                           tyre_radius + arch_radius * std::sin(angle));
+      profile.emplace_back(x + arch_radius * math::cos(angle),
+                           tyre_radius + arch_radius * math::sin(angle));
     }
   }
 
@@ -161,7 +162,7 @@ class Pickup {
     for (int i = 0; i < sides; ++i) {
       // Starts at the ground, so that the wheel stands on a corner and its height is exact.
       const double angle = -pi / 2 - 2 * pi * i / sides;
-      const glm::dvec3 rim = center + radius * glm::dvec3(std::cos(angle), 0, std::sin(angle));
+      const glm::dvec3 rim = center + radius * glm::dvec3(math::cos(angle), 0, math::sin(angle));
       low.push_back(rim - glm::dvec3(0, half_width, 0));
       high.push_back(rim + glm::dvec3(0, half_width, 0));
     }

@@ -8,6 +8,7 @@
 #include <numbers>
 
 #include "core/error.h"
+#include "core/math.h"
 
 namespace groundray {
 namespace {
@@ -23,7 +24,7 @@ class WaveSum {
     for (std::size_t i = 0; i < turns_.size(); ++i) {
       const double angle_rad =
           2 * std::numbers::pi * static_cast<double>(i) / static_cast<double>(size_);
-      turns_[i] = {std::cos(angle_rad), std::sin(angle_rad)};
+      turns_[i] = {math::cos(angle_rad), math::sin(angle_rad)};
     }
   }
 
@@ -78,9 +79,9 @@ struct Waves {
   // Returns the power of a wave, up to a common factor.
   double power(int m, int n) const {
     if (m == 0 && n <= 0) return 0;
-    const double frequency = std::hypot(m * per_period_m.x, n * per_period_m.y);
+    const double frequency = math::hypot(m * per_period_m.x, n * per_period_m.y);
     if (frequency * spec.shortest_m > 1 || frequency * spec.longest_m < 1) return 0;
-    return std::pow(frequency, -2 * spec.hurst - 2);
+    return math::pow(frequency, -2 * spec.hurst - 2);
   }
   double whole_power() const {
     double sum = 0;

@@ -7,6 +7,8 @@
 #include <numbers>
 #include <tuple>
 
+#include "core/math.h"
+
 namespace groundray {
 namespace {
 
@@ -85,7 +87,7 @@ DartField::Run DartField::throw_into(glm::ivec2 cell) {
   double arrival_per_m2 = 0;
   for (std::uint32_t number = 0; number < max_darts; ++number) {
     const glm::dvec4 u = draw(lattice_, cell, number, DartDraw::Dart);
-    arrival_per_m2 -= std::log(u.x) / cell_m2;
+    arrival_per_m2 -= math::log(u.x) / cell_m2;
     if (!(arrival_per_m2 < lattice_.per_m2)) break;
     darts_.push_back({cell, number, {u.z, u.w}, arrival_per_m2, u.y});
   }

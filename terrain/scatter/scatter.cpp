@@ -12,6 +12,7 @@
 #include <utility>
 
 #include "core/error.h"
+#include "core/math.h"
 #include "terrain/scatter/dart_field.h"
 
 namespace groundray {
@@ -79,7 +80,7 @@ double darts_per_m2(double per_m2, double min_distance_m) {
 // cell, and cells have 2 to 8 darts if the distance permits. Sides that follow from the latter are
 // powers of two, so that a slightly higher density keeps the lattice.
 double cell_side_m(double darts_per_m2, double min_distance_m) {
-  return std::max(min_distance_m, std::exp2(std::floor(std::log2(8 / darts_per_m2) / 2)));
+  return std::max(min_distance_m, math::exp2(std::floor(math::log2(8 / darts_per_m2) / 2)));
 }
 
 Area area_of(const GridFrame& frame) {
@@ -182,7 +183,7 @@ std::optional<Scatter::Impl::Footing> Scatter::Impl::footing_at(glm::dvec2 p) co
   const glm::dvec2 at = ground.frame().to_grid(p);
   const double height_m = facet->height_m + facet->u_slope_m * at.x + facet->v_slope_m * at.y;
   const glm::dvec3 normal = ground.frame().normal(*facet);
-  const double slope_rad = std::atan2(glm::length(glm::dvec2(normal)), normal.z);
+  const double slope_rad = math::atan2(glm::length(glm::dvec2(normal)), normal.z);
   if (!spec.height_m.contains(height_m) || !spec.slope_deg.contains(slope_rad * 180 / pi)) {
     return std::nullopt;
   }
@@ -195,7 +196,7 @@ Placement Scatter::Impl::placed(const Dart& dart, const Footing& footing) const 
   Placement placement;
   placement.scale = share_in(spec.scale, u.x);
   placement.p_DO = footing.point - glm::dvec3(0, 0, spec.sink_m * placement.scale);
-  placement.R_DO = {std::cos(half_yaw_rad), 0, 0, std::sin(half_yaw_rad)};
+  placement.R_DO = {math::cos(half_yaw_rad), 0, 0, math::sin(half_yaw_rad)};
   if (spec.stance == Stance::OnSlope) placement.R_DO = tilt_to(footing.normal) * placement.R_DO;
   // The first one whose cumulative weight exceeds u.z: never one of weight 0.
   placement.prototype = static_cast<std::uint32_t>(std::ranges::upper_bound(shares_up_to, u.z) -

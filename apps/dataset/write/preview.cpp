@@ -16,6 +16,7 @@
 
 #include "apps/colour_map.h"
 #include "core/image/srgb.h"
+#include "core/math.h"
 
 namespace groundray {
 namespace {
@@ -42,7 +43,7 @@ struct RangeRows {
   std::vector<int> places;  // index of the band, by ring
   int height = rows_of_elevations;
   int band = 1;
-  float low_rad = 0, high_rad = 0;
+  double low_rad = 0, high_rad = 0;
 
   RangeRows(const PointCloud& scan, const PatternSpec& pattern) {
     if (const auto* spinning = std::get_if<SpinningPattern>(&pattern)) {
@@ -55,21 +56,21 @@ struct RangeRows {
       return;
     }
     for (std::size_t i = 0; i < scan.rows(); ++i) {
-      const float now_rad = elevation_rad(scan, i);
+      const double now_rad = elevation_rad(scan, i);
       low_rad = i == 0 ? now_rad : std::min(low_rad, now_rad);
       high_rad = i == 0 ? now_rad : std::max(high_rad, now_rad);
     }
   }
 
-  static float elevation_rad(const PointCloud& scan, std::size_t i) {
-    return std::atan2(scan.column<float>("z")[i],
-                      std::hypot(scan.column<float>("x")[i], scan.column<float>("y")[i]));
+  static double elevation_rad(const PointCloud& scan, std::size_t i) {
+    return math::atan2(scan.column<float>("z")[i],
+                       math::hypot(scan.column<float>("x")[i], scan.column<float>("y")[i]));
   }
   int row(const PointCloud& scan, std::size_t i) const {
     if (!places.empty()) return places[scan.column<std::uint16_t>("ring")[i]] * band;
-    const float span_rad = std::max(high_rad - low_rad, 1e-6f);
-    const float share = (high_rad - elevation_rad(scan, i)) / span_rad;
-    return std::min(static_cast<int>(share * static_cast<float>(height)), height - 1);
+    const double span_rad = std::max(high_rad - low_rad, 1e-6);
+    const double share = (high_rad - elevation_rad(scan, i)) / span_rad;
+    return std::min(static_cast<int>(share * height), height - 1);
   }
 };
 
@@ -79,7 +80,7 @@ void draw_ranges(Image8& image, const PointCloud& scan, const RangeRows& rows, d
   const auto range_m = scan.column<double>("range_true");
   for (std::size_t i = 0; i < scan.rows(); ++i) {
     if (std::isnan(range_m[i])) continue;
-    const double turn = 0.5 - std::atan2(y[i], x[i]) / (2 * std::numbers::pi);
+    const double turn = 0.5 - math::atan2(y[i], x[i]) / (2 * std::numbers::pi);
     const int column = std::min(static_cast<int>(turn * preview_width), preview_width - 1);
     for (int k = 0; k < rows.band; ++k)
       paint(image, column, rows.row(scan, i) + k, range_colour(range_m[i] / far_m));
@@ -207,8 +208,8 @@ ColourAt depth_of(const ImageTruth& truth) {
   return [&truth, near_m, far_m](int x, int y) {
     const float depth_m = truth.depth_m.at(x, y)[0];
     if (!std::isfinite(depth_m) || depth_m <= 0) return Colour(0);
-    const double span = std::log(static_cast<double>(std::max(far_m / near_m, 1.01f)));
-    return range_colour(std::log(static_cast<double>(depth_m / near_m)) / span);
+    const double span = math::log(static_cast<double>(std::max(far_m / near_m, 1.01f)));
+    return range_colour(math::log(static_cast<double>(depth_m / near_m)) / span);
   };
 }
 
@@ -227,7 +228,7 @@ ColourAt label_of(const ImageTruth& truth) {
     if (label == 0) return Colour(0);
     const double hue = label * 0.6180339887498949;
     const auto wave = [&](double shift) {
-      return 0.55 + 0.4 * std::cos(2 * std::numbers::pi * (hue + shift));
+      return 0.55 + 0.4 * math::cos(2 * std::numbers::pi * (hue + shift));
     };
     return Colour(wave(0), wave(1 / 3.0), wave(2 / 3.0));
   };

@@ -22,6 +22,7 @@
 #include "apps/golden/compare/images/image_file.h"
 #include "core/error.h"
 #include "core/geometry/cell.h"
+#include "core/math.h"
 
 namespace groundray::golden {
 namespace {
@@ -91,7 +92,7 @@ void tell_by_slope(const std::vector<Sample>& samples, Section& into) {
   constexpr std::array limits_deg{5.0, 10.0, 20.0, 30.0, 45.0, 90.0};
   std::array<std::vector<double>, limits_deg.size()> classes;
   for (const Sample& sample : samples) {
-    const double slope_deg = glm::degrees(std::atan(glm::length(sample.slope)));
+    const double slope_deg = glm::degrees(math::atan(glm::length(sample.slope)));
     for (std::size_t i = 0; i < limits_deg.size(); ++i) {
       if (slope_deg > limits_deg[i]) continue;
       classes[i].push_back(sample.error_m);
@@ -127,8 +128,8 @@ void tell_slopes(const DemPair& pair, Section& into) {
         const glm::dvec3 b = frame.normal(of_other.plane(half));
         if (std::isnan(a.z) || std::isnan(b.z)) continue;
         angles_deg.push_back(
-            glm::degrees(std::atan2(glm::length(glm::cross(a, b)), glm::dot(a, b))));
-        const auto slope = [](glm::dvec3 n) { return std::atan2(std::hypot(n.x, n.y), n.z); };
+            glm::degrees(math::atan2(glm::length(glm::cross(a, b)), glm::dot(a, b))));
+        const auto slope = [](glm::dvec3 n) { return math::atan2(math::hypot(n.x, n.y), n.z); };
         slopes_deg.push_back(glm::degrees(slope(b) - slope(a)));
       }
     }

@@ -7,6 +7,8 @@
 #include <limits>
 #include <utility>
 
+#include "core/math.h"
+
 namespace groundray::golden {
 namespace {
 
@@ -105,7 +107,7 @@ void tell_sizes(Section& into, const std::string& name, const std::string& unit,
 }
 
 double significance_of_one(double level, std::size_t tests) {
-  return -std::expm1(std::log1p(-level) / static_cast<double>(std::max<std::size_t>(tests, 1)));
+  return -math::expm1(math::log1p(-level) / static_cast<double>(std::max<std::size_t>(tests, 1)));
 }
 
 double normal_limit(double level, std::size_t tests) {

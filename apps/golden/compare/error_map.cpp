@@ -10,6 +10,7 @@
 
 #include "apps/golden/compare/error_figures.h"
 #include "apps/golden/html_text.h"
+#include "core/math.h"
 
 namespace groundray::golden {
 namespace {
@@ -20,7 +21,7 @@ const glm::ivec2 enough_px(600, 160);
 
 /// Returns the smallest of 1, 2, 4, 8 times a power of ten that is at least `value`.
 double rounded_up(double value) {
-  const double decade = std::pow(10.0, std::floor(std::log10(value)));
+  const double decade = math::pow(10.0, std::floor(math::log10(value)));
   for (const double digit : {1.0, 2.0, 4.0, 8.0}) {
     if (digit * decade >= value * (1 - 1e-9)) return digit * decade;
   }

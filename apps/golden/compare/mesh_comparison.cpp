@@ -17,6 +17,7 @@
 #include "core/error.h"
 #include "core/geometry/mesh.h"
 #include "core/io/mesh_io.h"
+#include "core/math.h"
 #include "core/model/mesh_reader.h"
 #include "core/model/model.h"
 #include "reconstruction/mesh/accuracy/accuracy.h"
@@ -32,7 +33,8 @@ constexpr std::size_t bin_count = 60;
 class AreaByDistance {
  public:
   void add(double distance_m, double area_m2) {
-    const double bin = bins_each * (std::log2(std::max(distance_m, least_m)) - std::log2(least_m));
+    const double bin =
+        bins_each * (math::log2(std::max(distance_m, least_m)) - math::log2(least_m));
     bins_m2_[std::min(static_cast<std::size_t>(bin), bins_m2_.size() - 1)] += area_m2;
     area_m2_ += area_m2;
   }
@@ -42,7 +44,7 @@ class AreaByDistance {
     std::size_t k = 0;
     while (k + 1 < bins_m2_.size() && below_m2 + bins_m2_[k] < share * area_m2_)
       below_m2 += bins_m2_[k++];
-    return k == 0 ? 0 : least_m * std::exp2((static_cast<double>(k) + 0.5) / bins_each);
+    return k == 0 ? 0 : least_m * math::exp2((static_cast<double>(k) + 0.5) / bins_each);
   }
 
  private:

@@ -2,7 +2,6 @@
 
 #include <algorithm>
 #include <array>
-#include <cmath>
 #include <glm/common.hpp>
 #include <glm/geometric.hpp>
 #include <limits>
@@ -10,6 +9,7 @@
 #include <utility>
 
 #include "apps/golden/conform/silhouettes.h"
+#include "core/math.h"
 #include "core/tracing/ray_tracer.h"
 
 namespace groundray::golden {
@@ -103,8 +103,9 @@ std::vector<Ray> sample_rays(const HeightGrid& grid, std::size_t count, Seed see
     const double elevation_rad = glm::mix(5.0, -60.0, turn.x * turn.x) * std::numbers::pi / 180;
     const double azimuth_rad = 2 * std::numbers::pi * turn.y;
     rays[i].origin = {p_m, ground_m + 0.5 + 49.5 * other.x * other.x};
-    rays[i].direction = {std::cos(elevation_rad) * std::cos(azimuth_rad),
-                         std::cos(elevation_rad) * std::sin(azimuth_rad), std::sin(elevation_rad)};
+    rays[i].direction = {math::cos(elevation_rad) * math::cos(azimuth_rad),
+                         math::cos(elevation_rad) * math::sin(azimuth_rad),
+                         math::sin(elevation_rad)};
   }
   return rays;
 }

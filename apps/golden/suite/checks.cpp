@@ -16,6 +16,7 @@
 #include "apps/golden/compare/images/difference_picture.h"
 #include "apps/golden/suite/columns.h"
 #include "core/error.h"
+#include "core/math.h"
 
 namespace groundray::golden {
 namespace {
@@ -131,8 +132,8 @@ std::uint64_t print_of_functions() {
   for (int i = 1; i <= 1000; ++i) {
     const double x = i / 1000.5;
     for (const double value :
-         {std::sin(9 * x), std::cos(9 * x), std::tan(x), std::asin(x), std::acos(x),
-          std::atan2(x, 0.3), std::exp(-5 * x), std::log(x), std::pow(x, 1.7), std::erf(x)}) {
+         {math::sin(9 * x), math::cos(9 * x), math::tan(x), math::asin(x), math::acos(x),
+          math::atan2(x, 0.3), math::exp(-5 * x), math::log(x), math::pow(x, 1.7), math::erf(x)}) {
       add(value);
     }
   }

@@ -19,6 +19,7 @@
 #include "core/io/npy_io.h"
 #include "core/io/ply_io.h"
 #include "core/io/tum_io.h"
+#include "core/math.h"
 
 namespace groundray::golden {
 namespace {
@@ -103,10 +104,10 @@ Columns read_pose_columns(const std::filesystem::path& file) {
 }
 
 double floor_of(double value) { return std::floor(value); }
-double cbrt_of(double value) { return std::cbrt(value); }
-double erf_of(double value) { return std::erf(value); }
+double cbrt_of(double value) { return math::cbrt(value); }
+double erf_of(double value) { return math::erf(value); }
 double mod_of(double x, double y) { return x - y * std::floor(x / y); }
-double hypot_of(double x, double y) { return std::hypot(x, y); }
+double hypot_of(double x, double y) { return math::hypot(x, y); }
 
 // muParser takes pointers to variables that it could modify.
 void define(mu::Parser& parser, const std::string& name, const std::vector<double>& values) {

@@ -17,6 +17,7 @@
 #include "apps/scene/readers/scene_reader.h"
 #include "apps/scene/yaml_reader.h"
 #include "core/error.h"
+#include "core/math.h"
 
 namespace groundray {
 namespace {
@@ -94,7 +95,7 @@ std::optional<double> calibrated_divergence_rad(const fs::path& dataset,
     // exp(-2 x^2) is 1/2 at x = sqrt(ln 2 / 2).
     if (is_half_maximum) width_rad /= std::sqrt(std::numbers::ln2 / 2);
   }
-  return std::hypot(width_rad, 4 * lidar.angular_jitter_rad);
+  return math::hypot(width_rad, 4 * lidar.angular_jitter_rad);
 }
 
 // Checks the poses and the distances of a scan's points.

@@ -2,7 +2,6 @@
 
 #include <algorithm>
 #include <array>
-#include <cmath>
 #include <memory>
 #include <utility>
 
@@ -10,6 +9,7 @@
 #include "core/error.h"
 #include "core/image/exr_io.h"
 #include "core/image/image_io.h"
+#include "core/math.h"
 #include "reconstruction/stereo/pinhole_pair.h"
 #include "sensors/camera/lens/lens.h"
 
@@ -64,7 +64,7 @@ void encode(ImageF& left, ImageF& right) {
   const float white = *at > 0 ? *at : 1;
   for (ImageF* image : {&left, &right}) {
     for (float& value : image->values())
-      value = std::pow(std::clamp(value / white, 0.0f, 1.0f), 1 / 2.2f);
+      value = static_cast<float>(math::pow(std::clamp(value / white, 0.0f, 1.0f), 1 / 2.2));
   }
 }
 

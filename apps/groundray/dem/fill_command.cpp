@@ -17,6 +17,7 @@
 #include "core/error.h"
 #include "core/io/file_io.h"
 #include "core/io/print_error.h"
+#include "core/math.h"
 #include "reconstruction/dem/fill/dem_fill.h"
 #include "terrain/dem/dem_io.h"
 #include "terrain/dem/layers_io.h"
@@ -122,7 +123,7 @@ struct FillCommandOptions {
     if (method == RasterFill::Cgal)
       return fill_dem_by_mesh(frame, heights_m, filling, limits.edges(), work);
     if (method == RasterFill::Gdal) {
-      const double farthest_cells = std::hypot(frame.samples.x, frame.samples.y);
+      const double farthest_cells = math::hypot(frame.samples.x, frame.samples.y);
       return take_filling(frame, heights_m, fill_by_gdal(frame.samples, heights_m, farthest_cells),
                           filling);
     }

@@ -12,6 +12,7 @@
 #include <vector>
 
 #include "apps/scene/readers/scene_reader.h"
+#include "core/math.h"
 #include "sensors/camera/lens/lens.h"
 #include "sensors/lidar/pattern/scan_pattern.h"
 
@@ -51,7 +52,7 @@ void add_light(const LightSpec& light, Facts& facts) {
 // Returns the angle from the axis of the ray of a position, or the lens's limit towards it.
 double angle_deg(const Lens& lens, const glm::dvec2& pixel, double azimuth_rad) {
   const auto ray = lens.ray(pixel);
-  return glm::degrees(ray ? std::acos(std::clamp(ray->direction.z, -1.0, 1.0))
+  return glm::degrees(ray ? math::acos(std::clamp(ray->direction.z, -1.0, 1.0))
                           : lens.limit_rad(azimuth_rad));
 }
 
@@ -73,10 +74,10 @@ LidarFigures figures_of(const LidarSpec& lidar) {
   std::vector<double> azimuths_deg;
   figures.elevation_deg = {90, -90};
   for (const glm::dvec3& direction : batch.direction) {
-    const double elevation_deg = glm::degrees(std::asin(std::clamp(direction.z, -1.0, 1.0)));
+    const double elevation_deg = glm::degrees(math::asin(std::clamp(direction.z, -1.0, 1.0)));
     figures.elevation_deg.x = std::min(figures.elevation_deg.x, elevation_deg);
     figures.elevation_deg.y = std::max(figures.elevation_deg.y, elevation_deg);
-    azimuths_deg.push_back(glm::degrees(std::atan2(direction.y, direction.x)));
+    azimuths_deg.push_back(glm::degrees(math::atan2(direction.y, direction.x)));
   }
   figures.azimuth_span_deg = span_deg(std::move(azimuths_deg));
   return figures;

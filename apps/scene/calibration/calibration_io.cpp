@@ -16,6 +16,7 @@
 #include "core/io/file_io.h"
 #include "core/io/json_fault.h"
 #include "core/io/text_lines.h"
+#include "core/math.h"
 #include "sensors/lidar/pattern/table_pattern.h"
 
 namespace groundray {
@@ -106,11 +107,11 @@ void place_in_sensor(const std::vector<double>& matrix, SpinningPattern& pattern
   const bool upright = std::abs(matrix[10] - 1) < tolerance &&
                        std::abs(matrix[0] - matrix[5]) < tolerance &&
                        std::abs(matrix[1] + matrix[4]) < tolerance &&
-                       std::abs(std::hypot(matrix[0], matrix[4]) - 1) < tolerance;
+                       std::abs(math::hypot(matrix[0], matrix[4]) - 1) < tolerance;
   broken.unless(upright && matrix[3] == 0 && matrix[7] == 0,
                 "key 'lidar_to_sensor_transform' must be a rotation about z and a translation "
                 "along z, in mm, row by row");
-  pattern.start_azimuth_rad = std::atan2(matrix[4], matrix[0]);
+  pattern.start_azimuth_rad = math::atan2(matrix[4], matrix[0]);
   for (Beam& beam : pattern.beams) beam.origin_m.z += matrix[11] / 1000;
 }
 

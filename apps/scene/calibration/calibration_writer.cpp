@@ -3,7 +3,6 @@
 
 #include <algorithm>
 #include <array>
-#include <cmath>
 #include <cstddef>
 #include <glm/gtc/quaternion.hpp>
 #include <glm/mat3x3.hpp>
@@ -13,6 +12,7 @@
 #include "apps/scene/calibration/camera_calibration.h"
 #include "core/error.h"
 #include "core/io/text_lines.h"
+#include "core/math.h"
 #include "sensors/camera/lens/lens.h"
 
 namespace groundray {
@@ -328,7 +328,7 @@ std::string basalt_text(std::span<const CameraCalibration> cameras) {
       const Lens known(camera.model, camera.size_px);
       double limit_rad = known.limit_rad(0);
       for (int i = 1; i < 360; ++i) limit_rad = std::min(limit_rad, known.limit_rad(i * 0.01745));
-      values.push_back(std::tan(limit_rad));
+      values.push_back(math::tan(limit_rad));
     }
     std::vector<std::string> pairs;
     for (std::size_t i = 0; i < keys.size(); ++i)

@@ -13,6 +13,7 @@
 #include "core/error.h"
 #include "core/io/file_io.h"
 #include "core/io/text_lines.h"
+#include "core/math.h"
 
 namespace groundray {
 namespace {
@@ -32,13 +33,13 @@ struct Laser {
 // Returns the beam along which the ROS driver computes points: see docs/reference/sensors.md.
 Beam beam_of(const Laser& laser) {
   const double a = laser.rotation_rad;
-  const double back_m = laser.up_m * std::sin(laser.elevation_rad);
+  const double back_m = laser.up_m * math::sin(laser.elevation_rad);
   Beam beam;
   beam.elevation_rad = laser.elevation_rad;
   beam.azimuth_offset_rad = a;
-  beam.origin_m = {-back_m * std::cos(a) - laser.left_m * std::sin(a),
-                   -back_m * std::sin(a) + laser.left_m * std::cos(a),
-                   laser.up_m * std::cos(laser.elevation_rad)};
+  beam.origin_m = {-back_m * math::cos(a) - laser.left_m * math::sin(a),
+                   -back_m * math::sin(a) + laser.left_m * math::cos(a),
+                   laser.up_m * math::cos(laser.elevation_rad)};
   return beam;
 }
 

@@ -16,6 +16,7 @@
 
 #include "apps/view/layers/cloud_layer.h"
 #include "apps/view/rendering/coarse_layer.h"
+#include "core/math.h"
 
 namespace groundray {
 namespace {
@@ -96,7 +97,7 @@ void add_slopes(Layer& surface) {
   tbb::parallel_for(std::size_t{0}, slope.size(), [&](std::size_t i) {
     const glm::dvec3 normal = twice_area_at(places, corner, 3 * i);
     slope[i] = static_cast<float>(
-        glm::degrees(std::atan2(std::hypot(normal.x, normal.y), std::abs(normal.z))));
+        glm::degrees(math::atan2(math::hypot(normal.x, normal.y), std::abs(normal.z))));
   });
   add_column(surface, {.name = "slope", .unit = "deg", .of = LayerColumn::Of::Cells}, slope);
 }

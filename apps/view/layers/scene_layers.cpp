@@ -14,6 +14,7 @@
 #include <utility>
 
 #include "apps/view/layers/line_layer.h"
+#include "core/math.h"
 #include "sensors/camera/lens/lens.h"
 #include "sensors/lidar/pattern/firing_cycle.h"
 #include "sensors/lidar/pattern/scan_pattern.h"
@@ -53,8 +54,8 @@ std::vector<glm::dvec3> limit_ring(const Lens& lens, double depth_m) {
   std::vector<glm::dvec3> ring;
   for (int i = 0; i <= 64; ++i) {
     const double azimuth = glm::radians(i * 360.0 / 64), off = lens.limit_rad(azimuth);
-    ring.push_back(depth_m * glm::dvec3(std::sin(off) * std::cos(azimuth),
-                                        std::sin(off) * std::sin(azimuth), std::cos(off)));
+    ring.push_back(depth_m * glm::dvec3(math::sin(off) * math::cos(azimuth),
+                                        math::sin(off) * math::sin(azimuth), math::cos(off)));
   }
   return ring;
 }
@@ -75,7 +76,7 @@ std::vector<Extent> extents(const ScanPattern& pattern) {
   pattern.fill(0, 0, pattern.pulses(0), batch);
   std::vector<Extent> found(sectors);
   for (const glm::dvec3& direction : batch.direction) {
-    const double turn = std::atan2(direction.y, direction.x) / glm::radians(360.0);
+    const double turn = math::atan2(direction.y, direction.x) / glm::radians(360.0);
     const auto sector = static_cast<std::size_t>((turn - std::floor(turn)) * sectors) % sectors;
     Extent& extent = found[sector];
     if (!extent.low || direction.z < extent.low->z) extent.low = direction;

@@ -14,6 +14,7 @@
 #include "apps/view/recorded/recorded_image.h"
 #include "apps/view/rendering/colour_table.h"
 #include "core/image/srgb.h"
+#include "core/math.h"
 #include "core/quantile.h"
 
 namespace groundray {
@@ -103,7 +104,7 @@ ColourAt number_colours(const ImageChannel& channel, const ImageLegend& legend) 
     const double value = number_at(channel.values, pixel, component);
     if (!std::isfinite(value) || (is_distance && value <= 0)) return Colour(0);
     const double share = legend.is_logarithmic
-                             ? std::log(value / legend.low) / std::log(legend.high / legend.low)
+                             ? math::log(value / legend.low) / math::log(legend.high / legend.low)
                              : (value - legend.low) / (legend.high - legend.low);
     return range_colour(is_distance ? share : 1 - share);
   };
@@ -128,7 +129,7 @@ double full_of(const PixelValues& values) {
 
 ColourAt picture_colours(const ImageChannel& channel, double exposure_ev) {
   const bool is_grey = components_of(channel.values) < 3;
-  const double full = full_of(channel.values), gain = std::exp2(exposure_ev);
+  const double full = full_of(channel.values), gain = math::exp2(exposure_ev);
   return [&channel, is_grey, full, gain](glm::ivec2 pixel) {
     const auto value = [&](int k) {
       const double stored = number_at(channel.values, pixel, is_grey ? 0 : k) / full;
@@ -150,7 +151,7 @@ ColourAt vector_colours(const ImageChannel& channel, const ImageLegend& legend) 
 // Returns the colour of a hue, in turns, and a saturation.
 Colour hue_colour(double turns, double saturation) {
   const auto wave = [&](double shift) {
-    return 1 - saturation * (0.5 - 0.5 * std::cos(2 * std::numbers::pi * (turns + shift)));
+    return 1 - saturation * (0.5 - 0.5 * math::cos(2 * std::numbers::pi * (turns + shift)));
   };
   return {wave(0), wave(-1 / 3.0), wave(1 / 3.0)};
 }
@@ -159,8 +160,8 @@ ColourAt flow_colours(const ImageChannel& channel, const ImageLegend& legend) {
   return [&channel, &legend](glm::ivec2 pixel) {
     const double u = number_at(channel.values, pixel, 0), v = number_at(channel.values, pixel, 1);
     if (!std::isfinite(u + v)) return Colour(0);
-    return hue_colour(std::atan2(v, u) / (2 * std::numbers::pi),
-                      std::min(std::hypot(u, v) / legend.high, 1.0));
+    return hue_colour(math::atan2(v, u) / (2 * std::numbers::pi),
+                      std::min(math::hypot(u, v) / legend.high, 1.0));
   };
 }
 
@@ -257,14 +258,14 @@ ColourAt channel_colours(const ImageChannel& channel, const ImageLegend& legend,
 double automatic_exposure_ev(const ImageChannel& channel) {
   if (channel.kind != Kind::AsStored) return 0;
   const double white = linear_of_srgb(white_of(channel) / full_of(channel.values));
-  return white > 0 && std::isfinite(white) ? -std::log2(white) : 0;
+  return white > 0 && std::isfinite(white) ? -math::log2(white) : 0;
 }
 
 DrawnChannel draw_channel(const ImageChannel& channel, const RecordedNames& names,
                           std::optional<std::pair<double, double>> range, double exposure_ev) {
   const glm::ivec2 size_px = size_of(channel.values);
   DrawnChannel drawn{Image8(size_px.x, size_px.y, 3), legend_of(channel, names, range)};
-  if (channel.kind == Kind::Light) drawn.legend.high /= std::exp2(exposure_ev);
+  if (channel.kind == Kind::Light) drawn.legend.high /= math::exp2(exposure_ev);
   const ColourAt colour_at = channel_colours(channel, drawn.legend, exposure_ev);
   tbb::parallel_for(0, size_px.y, [&](int y) {
     for (int x = 0; x < size_px.x; ++x) paint(drawn.picture, x, y, colour_at({x, y}));

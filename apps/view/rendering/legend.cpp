@@ -23,6 +23,7 @@
 #include <vector>
 
 #include "apps/view/rendering/colour_table.h"
+#include "core/math.h"
 
 namespace groundray {
 namespace {
@@ -39,7 +40,7 @@ struct Mark {
 std::vector<Mark> marks_in(glm::dvec2 range) {
   const double span = range.y - range.x;
   constexpr double wanted = 5;
-  const double power = std::pow(10, std::floor(std::log10(span / wanted)));
+  const double power = math::pow(10, std::floor(math::log10(span / wanted)));
   if (!std::isnormal(power) || !std::isfinite(span)) return {{0.5, fmt::format("{:.6g}", range.x)}};
   double step = 10 * power;
   for (const double factor : {5.0, 2.0, 1.0}) {
@@ -48,7 +49,7 @@ std::vector<Mark> marks_in(glm::dvec2 range) {
       break;
     }
   }
-  const int decimals = std::max(0, -static_cast<int>(std::floor(std::log10(step) + 1e-9)));
+  const int decimals = std::max(0, -static_cast<int>(std::floor(math::log10(step) + 1e-9)));
   const bool is_plain = decimals <= 5 && std::max(std::abs(range.x), std::abs(range.y)) < 1e7;
   std::vector<Mark> marks;
   const double first = std::ceil(range.x / step - 1e-9);

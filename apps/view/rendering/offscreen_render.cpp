@@ -14,6 +14,7 @@
 
 #include "core/error.h"
 #include "core/image/png_io.h"
+#include "core/math.h"
 
 namespace groundray {
 namespace {
@@ -117,7 +118,7 @@ Look requested_look(Look look, const ViewOptions& options) {
   look.from_w_m = options.from_w_m.value_or(look.from_w_m);
   look.at_w_m = options.at_w_m.value_or(look.at_w_m);
   const glm::dvec3 ahead = look.at_w_m - look.from_w_m;
-  const bool is_plumb = std::hypot(ahead.x, ahead.y) < 1e-6 * std::abs(ahead.z);
+  const bool is_plumb = math::hypot(ahead.x, ahead.y) < 1e-6 * std::abs(ahead.z);
   look.up = is_plumb ? glm::dvec3(0, 1, 0) : glm::dvec3(0, 0, 1);
   return look;
 }
@@ -194,8 +195,8 @@ void write_turntable(View& view, const std::filesystem::path& folder, int pictur
     const double turn = glm::radians(360.0 * i / pictures);
     Look now = begin;
     now.from_w_m =
-        begin.at_w_m + glm::dvec3(out.x * std::cos(turn) - out.y * std::sin(turn),
-                                  out.x * std::sin(turn) + out.y * std::cos(turn), out.z);
+        begin.at_w_m + glm::dvec3(out.x * math::cos(turn) - out.y * math::sin(turn),
+                                  out.x * math::sin(turn) + out.y * math::cos(turn), out.z);
     view.look(now);
     write_still(view, folder / fmt::format("{:04}.png", i), size_px);
   }

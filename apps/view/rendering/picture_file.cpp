@@ -19,6 +19,7 @@
 #include "core/image/image_io.h"
 #include "core/image/srgb.h"
 #include "core/io/file_io.h"
+#include "core/math.h"
 #include "core/quantile.h"
 #include "terrain/dem/band_file.h"
 
@@ -157,7 +158,7 @@ PictureFile read_picture(const std::filesystem::path& path) {
 }
 
 Image8 expose(const ImageF& light, double exposure_ev) {
-  const double gain = std::exp2(exposure_ev);
+  const double gain = math::exp2(exposure_ev);
   Image8 picture(light.width(), light.height(), light.channels() >= 3 ? 3 : 1);
   tbb::parallel_for(0, light.height(), [&](int y) {
     for (int x = 0; x < light.width(); ++x) {
@@ -174,7 +175,7 @@ Image8 expose(const ImageF& light, double exposure_ev) {
 
 Image8 expose(const Image8& picture, double exposure_ev) {
   if (exposure_ev == 0) return picture;
-  const double gain = std::exp2(exposure_ev);
+  const double gain = math::exp2(exposure_ev);
   std::array<std::uint8_t, 256> exposed{};
   for (std::size_t i = 0; i < exposed.size(); ++i)
     exposed[i] = encoded(gain * linear_of_srgb(static_cast<double>(i) / 255));

@@ -9,7 +9,6 @@
 #include <algorithm>
 #include <array>
 #include <chrono>
-#include <cmath>
 #include <glm/common.hpp>
 #include <glm/geometric.hpp>
 #include <glm/trigonometric.hpp>
@@ -18,6 +17,7 @@
 #include "apps/view/rendering/eye_dome.h"
 #include "apps/view/rendering/view_impl.h"
 #include "core/error.h"
+#include "core/math.h"
 
 // VTK's object factories. vtk_module_autoinit would define a macro with the path of the build tree,
 // which would keep clones in other folders from sharing objects in the compiler cache.
@@ -112,7 +112,7 @@ PickRay View::Impl::ray(int x_px, int y_px) const {
   const glm::dvec3 right = glm::normalize(glm::cross(ahead, up));
   const glm::dvec3 down = glm::cross(ahead, right);
   const glm::dvec2 size = size_px();
-  const double focal_px = size.y / 2 / std::tan(glm::radians(camera.GetViewAngle()) / 2);
+  const double focal_px = size.y / 2 / math::tan(glm::radians(camera.GetViewAngle()) / 2);
   const glm::dvec2 centre = size / 2.0;
   const glm::dvec2 pixel(x_px + 0.5, y_px + 0.5);
   const glm::dvec2 off = (pixel - centre) / focal_px;

@@ -10,6 +10,7 @@
 
 #include "apps/view/rendering/view_impl.h"
 #include "core/error.h"
+#include "core/math.h"
 
 namespace groundray {
 namespace {
@@ -36,7 +37,7 @@ void View::Impl::draw_part(glm::ivec2 first_px, glm::ivec2 part_px, Image8& whol
   const double angle_deg = camera.GetViewAngle();
   const glm::dvec2 middle_px = glm::dvec2(first_px) + glm::dvec2(part_px) / 2.0 - size_px / 2.0;
   camera.SetViewAngle(
-      2 * glm::degrees(std::atan(std::tan(glm::radians(angle_deg) / 2) * part_px.y / size_px.y)));
+      2 * glm::degrees(math::atan(math::tan(glm::radians(angle_deg) / 2) * part_px.y / size_px.y)));
   camera.SetWindowCenter(2 * middle_px.x / part_px.x, -2 * middle_px.y / part_px.y);
   const auto background = [&](double from_top) {
     return glm::mix(sky, haze, from_top / size_px.y);

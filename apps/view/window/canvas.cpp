@@ -15,6 +15,7 @@
 
 #include "apps/view/window/orbit.h"
 #include "apps/view/window/style.h"
+#include "core/math.h"
 
 namespace groundray {
 namespace {
@@ -151,7 +152,7 @@ void Canvas::drag(const Press& press, QPoint step) {
   const Look before = view_->current_look();
   const bool pans = press.button == Qt::MiddleButton || (press.keys & Qt::ShiftModifier) != 0;
   if (press.button == Qt::RightButton) {
-    look(zoomed(before, std::exp(0.01 * step.y()), before.at_w_m));
+    look(zoomed(before, math::exp(0.01 * step.y()), before.at_w_m));
   } else if (pans) {
     const double pixel_m = metres_per_pixel(before, view_angle_rad(*view_), height_px());
     look(panned(before, -step.x() * pixel_m, step.y() * pixel_m));
@@ -171,7 +172,7 @@ void Canvas::wheelEvent(QWheelEvent* event) {
       slant > 0.01
           ? before.from_w_m + direction * (glm::distance(before.at_w_m, before.from_w_m) / slant)
           : before.at_w_m;
-  look(zoomed(before, std::pow(zoom_step, steps), towards));
+  look(zoomed(before, math::pow(zoom_step, steps), towards));
   event->accept();
 }
 

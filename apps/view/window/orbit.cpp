@@ -1,9 +1,10 @@
 #include "apps/view/window/orbit.h"
 
 #include <algorithm>
-#include <cmath>
 #include <glm/geometric.hpp>
 #include <numbers>
+
+#include "core/math.h"
 
 namespace groundray {
 namespace {
@@ -17,29 +18,29 @@ struct Heading {
 };
 
 Heading heading_of(const glm::dvec3& direction) {
-  return {std::atan2(direction.y, direction.x),
-          std::atan2(direction.z, std::hypot(direction.x, direction.y))};
+  return {math::atan2(direction.y, direction.x),
+          math::atan2(direction.z, math::hypot(direction.x, direction.y))};
 }
 
 glm::dvec3 direction_of(const Heading& heading) {
   const double pitch_rad = std::clamp(heading.pitch_rad, -steepest_rad, steepest_rad);
-  return {std::cos(pitch_rad) * std::cos(heading.yaw_rad),
-          std::cos(pitch_rad) * std::sin(heading.yaw_rad), std::sin(pitch_rad)};
+  return {math::cos(pitch_rad) * math::cos(heading.yaw_rad),
+          math::cos(pitch_rad) * math::sin(heading.yaw_rad), math::sin(pitch_rad)};
 }
 
 // For a vertical line of sight, the up vector defines the yaw.
 Heading sight_of(const Look& look) {
   const glm::dvec3 ahead = look.at_w_m - look.from_w_m;
   Heading heading = heading_of(ahead);
-  if (std::hypot(ahead.x, ahead.y) <= 1e-9 * glm::length(ahead)) {
-    heading.yaw_rad = std::atan2(look.up.y, look.up.x);
+  if (math::hypot(ahead.x, ahead.y) <= 1e-9 * glm::length(ahead)) {
+    heading.yaw_rad = math::atan2(look.up.y, look.up.x);
   }
   return heading;
 }
 
 glm::dvec3 right_of(const Look& look) {
   const double yaw_rad = sight_of(look).yaw_rad;
-  return {std::sin(yaw_rad), -std::cos(yaw_rad), 0};
+  return {math::sin(yaw_rad), -math::cos(yaw_rad), 0};
 }
 
 }  // namespace
@@ -70,7 +71,7 @@ Look flown(const Look& look, const glm::dvec3& ahead_right_up_m) {
 }
 
 double metres_per_pixel(const Look& look, double view_angle_rad, double height_px) {
-  return 2 * glm::distance(look.from_w_m, look.at_w_m) * std::tan(view_angle_rad / 2) /
+  return 2 * glm::distance(look.from_w_m, look.at_w_m) * math::tan(view_angle_rad / 2) /
          std::max(1.0, height_px);
 }
 

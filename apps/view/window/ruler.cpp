@@ -2,10 +2,10 @@
 
 #include <fmt/format.h>
 
-#include <cmath>
 #include <glm/geometric.hpp>
 
 #include "apps/view/layers/line_layer.h"
+#include "core/math.h"
 
 namespace groundray {
 namespace {
@@ -17,7 +17,7 @@ std::string place_text(const glm::dvec3& p_w_m) {
   return fmt::format("{:.4f}, {:.4f}, {:.4f} m", p_w_m.x, p_w_m.y, p_w_m.z);
 }
 
-double horizontal_m(const glm::dvec3& d_m) { return std::hypot(d_m.x, d_m.y); }
+double horizontal_m(const glm::dvec3& d_m) { return math::hypot(d_m.x, d_m.y); }
 
 }  // namespace
 

@@ -3,6 +3,7 @@
 #include <limits>
 #include <vector>
 
+#include "core/math.h"
 #include "reconstruction/dem/fill/dem_fill.h"
 
 namespace groundray {
@@ -97,8 +98,8 @@ void add_boundary_variance(DemLayers& layers) {
   const NearestMeasured nearest(layers);
   for (std::size_t i = 0; i < layers.fill_sd_m.size(); ++i) {
     if (std::isnan(layers.fill_sd_m[i]) || nearest.of(i) == no_sample) continue;
-    const double sd_m = std::hypot(static_cast<double>(layers.fill_sd_m[i]),
-                                   std::sqrt(variance_about_m2(layers, nearest.of(i))));
+    const double sd_m = math::hypot(static_cast<double>(layers.fill_sd_m[i]),
+                                    std::sqrt(variance_about_m2(layers, nearest.of(i))));
     layers.fill_sd_m[i] = static_cast<float>(sd_m);
   }
 }

@@ -11,6 +11,7 @@
 #include <utility>
 
 #include "core/error.h"
+#include "core/math.h"
 #include "reconstruction/dem/fill/fill_calibration.h"
 #include "reconstruction/dem/fill/fill_error_model.h"
 #include "reconstruction/dem/fill/holdout_mask.h"
@@ -137,7 +138,7 @@ Filling::Filling(const GridFrame& frame, std::span<const float> heights_m,
 }
 
 int Filling::octave_of(const RasterHole& hole) const {
-  return static_cast<int>(std::log2(std::clamp(hole.farthest_m / cell_m_, 1.0, 1e9)));
+  return static_cast<int>(math::log2(std::clamp(hole.farthest_m / cell_m_, 1.0, 1e9)));
 }
 
 Filling::Shape Filling::shape_of(std::size_t hole) const {
@@ -196,7 +197,7 @@ void Filling::check_memory(std::span<const std::vector<std::uint32_t>> sets) con
   const bool may_be_smooth = !options_.form || options_.form->smoothness > 0;
   const double each = (may_be_smooth ? bytes_of_smooth : bytes_of_plate) *
                       (most_m_.empty() ? 1 : more_under_bounds) *
-                      std::log2(static_cast<double>(std::max<std::size_t>(largest, 2)));
+                      math::log2(static_cast<double>(std::max<std::size_t>(largest, 2)));
   const std::size_t bytes =
       fill_bytes_per_sample * heights_m_.size() +
       static_cast<std::size_t>(each * static_cast<double>(std::min(all, threads * largest)));
@@ -215,8 +216,8 @@ void Filling::try_kinds() {
     const FillTrial trial = try_filling(raster, kind.holes, options_.form, roughness_->usual_m());
     const ThinPlateEnergy untried{kind.shape.is_shadow || kind.shape.is_long ? 0 : usual_tension,
                                   0};
-    result_.trials.push_back({kind.shape.is_shadow, kind.shape.is_long, std::exp2(kind.first),
-                              std::exp2(kind.end),
+    result_.trials.push_back({kind.shape.is_shadow, kind.shape.is_long, math::exp2(kind.first),
+                              math::exp2(kind.end),
                               options_.form.value_or(trial.form.value_or(untried)), trial.samples,
                               trial.cover.within_1sd, trial.cover.within_2sd, trial.widened_by});
     models_.push_back(trial.model);

@@ -8,6 +8,7 @@
 #include <limits>
 #include <vector>
 
+#include "core/math.h"
 #include "reconstruction/dem/dem_layers.h"
 #include "reconstruction/dem/fill/sorted_holes.h"
 
@@ -124,7 +125,7 @@ Gain gain_of(std::span<const PieceErrors> pieces, std::size_t form, std::size_t 
   for (const PieceErrors& piece : pieces) {
     const double own = squares_of(piece.errors_m[form]), other = squares_of(piece.errors_m[on]);
     const double weight = std::min(static_cast<double>(piece.distances_cells.size()), most_weight);
-    const double log_ratio = weight * std::log((other + least_m2) / (own + least_m2));
+    const double log_ratio = weight * math::log((other + least_m2) / (own + least_m2));
     weights += weight;
     sum += log_ratio;
     squares += log_ratio * log_ratio;
@@ -236,7 +237,7 @@ void judge(std::span<const FillError> errors, FillTrial& trial) {
   trial.cover = {trial.cover.within_1sd / all, trial.cover.within_2sd / all,
                  std::sqrt(trial.cover.rms_sds / all)};
   trial.widened_by = std::max(trial.cover.rms_sds, 1.0);
-  trial.model->factors[0] += 2 * std::log(trial.widened_by);
+  trial.model->factors[0] += 2 * math::log(trial.widened_by);
 }
 
 }  // namespace

@@ -7,6 +7,8 @@
 #include <cstddef>
 #include <glm/common.hpp>
 
+#include "core/math.h"
+
 namespace groundray {
 namespace {
 
@@ -17,8 +19,8 @@ constexpr double usual_weight = 10;                             // weight of the
 constexpr double most_power = 6, most_roughness_power = 3;
 
 Eigen::Vector3d model_terms(double distance_cells, double roughness_m) {
-  return {1, std::log(std::max(distance_cells, 1e-3)),
-          std::log(std::max(roughness_m, least_roughness_m))};
+  return {1, math::log(std::max(distance_cells, 1e-3)),
+          math::log(std::max(roughness_m, least_roughness_m))};
 }
 
 // Squared error and the terms that explain it.
@@ -34,7 +36,7 @@ double misfit_of(const std::vector<Sample>& samples, const Eigen::Vector3d& fact
   double sum = usual_weight / 2 * (factors - usual).tail<2>().squaredNorm();
   for (const Sample& sample : samples) {
     const double log_variance = sample.terms.dot(factors);
-    sum += log_variance + sample.square_m2 * std::exp(-log_variance);
+    sum += log_variance + sample.square_m2 * math::exp(-log_variance);
   }
   return sum;
 }
@@ -43,8 +45,8 @@ double misfit_of(const std::vector<Sample>& samples, const Eigen::Vector3d& fact
 void level_model(const std::vector<Sample>& samples, Eigen::Vector3d& factors) {
   double sum = 0;
   for (const Sample& sample : samples)
-    sum += sample.square_m2 * std::exp(-sample.terms.dot(factors));
-  factors[0] += std::log(std::max(sum / static_cast<double>(samples.size()), 1e-12));
+    sum += sample.square_m2 * math::exp(-sample.terms.dot(factors));
+  factors[0] += math::log(std::max(sum / static_cast<double>(samples.size()), 1e-12));
 }
 
 // Takes one step of Fisher scoring, shortened until it is an improvement. Returns whether the
@@ -54,7 +56,7 @@ bool improve(const std::vector<Sample>& samples, const Eigen::Vector3d& usual,
   Eigen::Matrix3d information = Eigen::Vector3d(0, usual_weight, usual_weight).asDiagonal();
   Eigen::Vector3d slope = information * (usual - factors);
   for (const Sample& sample : samples) {
-    const double excess = sample.square_m2 * std::exp(-sample.terms.dot(factors)) - 1;
+    const double excess = sample.square_m2 * math::exp(-sample.terms.dot(factors)) - 1;
     information += sample.terms * sample.terms.transpose();
     slope += excess * sample.terms;
   }
@@ -76,7 +78,7 @@ constexpr double usual_terms = 8;
 
 double FillErrorModel::sd_m(double distance_cells, double roughness_m) const {
   const Eigen::Vector3d terms = model_terms(distance_cells, roughness_m);
-  return std::exp((terms[0] * factors[0] + terms[1] * factors[1] + terms[2] * factors[2]) / 2);
+  return math::exp((terms[0] * factors[0] + terms[1] * factors[1] + terms[2] * factors[2]) / 2);
 }
 
 std::optional<FillErrorModel> fit_error_model(std::span<const FillError> errors) {

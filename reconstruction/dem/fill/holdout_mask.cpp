@@ -8,6 +8,7 @@
 #include <limits>
 #include <utility>
 
+#include "core/math.h"
 #include "reconstruction/dem/fill/fill_error_model.h"
 
 namespace groundray {
@@ -105,7 +106,7 @@ constexpr int least_half_cells = 6, most_half_cells = 24;
 // See Roberts, The unreasonable effectiveness of quasirandom sequences (2018).
 double spread(std::uint32_t number, int sequence) {
   constexpr double root = 1.2207440846057596;  // solution of x^4 = x + 1
-  const double all = 0.5 + number / std::pow(root, sequence + 1);
+  const double all = 0.5 + number / math::pow(root, sequence + 1);
   return all - std::floor(all);
 }
 

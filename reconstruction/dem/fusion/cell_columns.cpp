@@ -5,6 +5,7 @@
 #include <cmath>
 #include <glm/ext/scalar_constants.hpp>
 
+#include "core/math.h"
 #include "reconstruction/dem/fusion/float_lanes.h"
 
 namespace groundray {
@@ -65,7 +66,7 @@ struct Choice {
 
 Choice given_one(double variance_m2, double with_m2, double sample_m2, double above_m) {
   const double gain = with_m2 / variance_m2;
-  return {std::exp(-0.5 * above_m * above_m / variance_m2) /
+  return {math::exp(-0.5 * above_m * above_m / variance_m2) /
               std::sqrt(2 * glm::pi<double>() * variance_m2),
           gain * above_m, sample_m2 - gain * with_m2};
 }
@@ -75,7 +76,7 @@ Choice given_both(const Joint& c, double a_m, double b_m) {
   const double gain_a = (c.bb * c.with[0] - c.ab * c.with[1]) / det,
                gain_b = (c.aa * c.with[1] - c.ab * c.with[0]) / det;
   const double square = (c.bb * a_m * a_m - 2 * c.ab * a_m * b_m + c.aa * b_m * b_m) / det;
-  return {std::exp(-0.5 * square) / (2 * glm::pi<double>() * std::sqrt(det)),
+  return {math::exp(-0.5 * square) / (2 * glm::pi<double>() * std::sqrt(det)),
           gain_a * a_m + gain_b * b_m, c.sample - gain_a * c.with[0] - gain_b * c.with[1]};
 }
 

@@ -3,6 +3,8 @@
 #include <algorithm>
 #include <cmath>
 
+#include "core/math.h"
+
 namespace groundray {
 namespace {
 
@@ -11,8 +13,8 @@ constexpr double improbable = 0.01;
 // Returns the smallest k such that a binomial variable of `points` trials is k or more with a
 // probability of at most `improbable`.
 std::uint32_t binomial_limit(std::uint32_t points, double share) {
-  double term = std::pow(1 - share, points);  // probability of exactly k
-  double tail = 1 - term;                     // probability of more than k
+  double term = math::pow(1 - share, points);  // probability of exactly k
+  double tail = 1 - term;                      // probability of more than k
   std::uint32_t k = 0;
   while (tail > improbable && k < points) {
     term *= share / (1 - share) * (points - k) / (k + 1);
@@ -55,7 +57,7 @@ void find_surfaces(std::span<const PackedPoint> ascending, double gap_m,
     const std::int64_t step = std::int64_t{ascending[i].height} - ascending[i - 1].height;
     if (step <= gap) continue;
     const double a = total_sd_m(ascending[i - 1]), b = total_sd_m(ascending[i]);
-    if (static_cast<double>(step) * PackedPoint::height_step_m <= gap_m + 3 * std::hypot(a, b))
+    if (static_cast<double>(step) * PackedPoint::height_step_m <= gap_m + 3 * math::hypot(a, b))
       continue;
     surfaces.push_back({begin, i});
     begin = i;

@@ -8,6 +8,7 @@
 #include <memory>
 #include <optional>
 
+#include "core/math.h"
 #include "reconstruction/dem/fusion/cell_fit.h"
 #include "reconstruction/dem/fusion/float_lanes.h"
 #include "reconstruction/dem/fusion/neighbour_surface.h"
@@ -104,7 +105,7 @@ std::size_t count_of(const PointParts& parts) {
 }
 
 double tallest_ground_m(const TileRules& rules) {
-  return rules.steepest_slope * std::hypot(rules.step_m.x, rules.step_m.y);
+  return rules.steepest_slope * math::hypot(rules.step_m.x, rules.step_m.y);
 }
 
 TilePoints::TilePoints(const PointParts& parts, glm::ivec2 size, const TileRules& rules)
@@ -149,14 +150,14 @@ GroundScatter TilePoints::scatter(int column, int row) const noexcept {
       const NeighbourSketch& one = sketches_[index(c, r)];
       const double more = one.plane_counts;
       rough += double{one.freedom} * double{one.rough_m2};
-      spread += std::pow(double{one.freedom}, 2) * double{one.rough_m4};
+      spread += math::pow(double{one.freedom}, 2) * double{one.rough_m4};
       freedom += double{one.freedom};
       plane += more * double{one.plane_m2};
       cells += more;
     }
   }
   const double expected_m2 =
-      std::abs(rules_.step_m.x * rules_.step_m.y) * std::pow(expected_bend * rules_.slope_sd, 2);
+      std::abs(rules_.step_m.x * rules_.step_m.y) * math::pow(expected_bend * rules_.slope_sd, 2);
   const double all = freedom + plane_counts + expected_counts;
   plane = (plane + expected_counts * expected_m2) / (cells + expected_counts);
   const double half_m2 = 0.5 * (rough + plane_counts * plane + expected_counts * expected_m2) / all;
@@ -369,7 +370,7 @@ void RowFit::set_ground(std::size_t at, const CellHeight& ground, double referen
                                           : HeightSource::Fused;
   layers.to_data_m[at] = 0;
   layers.slope_rad[at] =
-      static_cast<float>(std::atan(std::hypot(ground.plane.slope_x, ground.plane.slope_y)));
+      static_cast<float>(math::atan(math::hypot(ground.plane.slope_x, ground.plane.slope_y)));
 }
 
 }  // namespace

@@ -8,6 +8,8 @@
 #include <glm/common.hpp>
 #include <tuple>
 
+#include "core/math.h"
+
 namespace groundray {
 namespace {
 
@@ -241,8 +243,8 @@ Raster slope_of(const Raster& height_m, double cell_m) {
         return cells == 0 ? 0 : (second - first) / (cells * cell_m);
       };
       slope(column, row) = static_cast<float>(
-          std::hypot(rise(height_m(left, row), height_m(right, row), right - left),
-                     rise(height_m(column, below), height_m(column, above), above - below)));
+          math::hypot(rise(height_m(left, row), height_m(right, row), right - left),
+                      rise(height_m(column, below), height_m(column, above), above - below)));
     }
   });
   return slope;

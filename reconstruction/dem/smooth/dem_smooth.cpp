@@ -9,6 +9,7 @@
 #include <limits>
 
 #include "core/error.h"
+#include "core/math.h"
 
 namespace groundray {
 namespace {
@@ -176,7 +177,7 @@ double Smoothing::usual_curvature() const {
       squares.push_back(size * size);
       noise.push_back(0);
       for (std::size_t i = 0; i < row.size(); ++i)
-        noise.back() += std::pow(kind.factors[i] * sds_m_[row[i]], 2);
+        noise.back() += math::pow(kind.factors[i] * sds_m_[row[i]], 2);
     }
   }
   if (squares.empty()) return 1;

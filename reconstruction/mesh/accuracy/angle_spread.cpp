@@ -5,6 +5,7 @@
 #include <glm/geometric.hpp>
 
 #include "core/error.h"
+#include "core/math.h"
 
 namespace groundray {
 namespace {
@@ -15,13 +16,13 @@ constexpr std::size_t bin_count = 1601;
 
 std::size_t bin_of(double angle_rad) {
   if (angle_rad < least_rad) return 0;
-  const double bin = 1 + std::floor(bins_each * std::log2(angle_rad / least_rad));
+  const double bin = 1 + std::floor(bins_each * math::log2(angle_rad / least_rad));
   return std::min(static_cast<std::size_t>(bin), bin_count - 1);
 }
 
 double edge_rad(std::size_t bin) {
   if (bin == 0) return 0;
-  return least_rad * std::exp2((static_cast<double>(bin) - 1) / bins_each);
+  return least_rad * math::exp2((static_cast<double>(bin) - 1) / bins_each);
 }
 
 }  // namespace
@@ -74,7 +75,7 @@ double AngleSpread::percentile_rad(double share) const {
 }
 
 double angle_between(const glm::dvec3& a, const glm::dvec3& b) noexcept {
-  return std::atan2(glm::length(glm::cross(a, b)), glm::dot(a, b));
+  return math::atan2(glm::length(glm::cross(a, b)), glm::dot(a, b));
 }
 
 }  // namespace groundray

@@ -14,6 +14,7 @@
 
 #include "core/error.h"
 #include "core/geometry/mesh.h"
+#include "core/math.h"
 #include "core/model/model.h"
 #include "reconstruction/mesh/accuracy/surface_parts.h"
 
@@ -195,7 +196,7 @@ TrueSurface true_heights(std::function<double(double, double)> height_m, double 
                          std::function<glm::dvec2(double, double)> gradient) {
   if (!(steepest >= 0) || !std::isfinite(steepest))
     throw Error("true surface: steepest = {} must be 0 or more, and finite", steepest);
-  TrueSurface truth{.most_change = std::hypot(1, steepest)};
+  TrueSurface truth{.most_change = math::hypot(1, steepest)};
   truth.distance_m = [height = std::move(height_m)](const glm::dvec3& p) {
     return std::abs(p.z - height(p.x, p.y));
   };

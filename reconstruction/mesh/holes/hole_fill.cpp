@@ -3,7 +3,6 @@
 #include <tbb/parallel_for.h>
 
 #include <algorithm>
-#include <cmath>
 #include <glm/geometric.hpp>
 #include <limits>
 #include <mutex>
@@ -14,6 +13,7 @@
 
 #include "core/error.h"
 #include "core/geometry/mesh.h"
+#include "core/math.h"
 #include "reconstruction/mesh/holes/hole_patch.h"
 #include "reconstruction/mesh/holes/mesh_boundary.h"
 #include "reconstruction/mesh/holes/placed_patch.h"
@@ -264,7 +264,7 @@ class Filler {
           candidate.boundary, {}, [&](std::uint32_t v) { return glm::distance(vertices_m[v], p); });
       const double apart_m = glm::distance(vertices_m[nearest], p);
       if (!mesh_.sd_m.empty())
-        mesh_.sd_m.push_back(static_cast<float>(std::hypot(mesh_.sd_m[nearest], apart_m / 3)));
+        mesh_.sd_m.push_back(static_cast<float>(math::hypot(mesh_.sd_m[nearest], apart_m / 3)));
       if (!mesh_.labels.empty()) mesh_.labels.push_back(mesh_.labels[nearest]);
       if (!mesh_.confidence.empty()) mesh_.confidence.push_back(0);
     }

@@ -17,6 +17,7 @@
 #include <utility>
 #include <vector>
 
+#include "core/math.h"
 #include "reconstruction/mesh/merge/open_border.h"
 #include "reconstruction/mesh/merge/zippering.h"
 
@@ -255,7 +256,7 @@ class Bridging {
     const glm::dvec2 at = view.of(p(corner));
     const auto angle_to = [&](std::uint32_t v) {
       const glm::dvec2 along = view.of(p(v)) - at;
-      return std::atan2(along.y, along.x);
+      return math::atan2(along.y, along.x);
     };
     const double begin = angle_to(first);
     const auto turned_to = [&](std::uint32_t v) {

@@ -16,6 +16,7 @@
 
 #include "core/error.h"
 #include "core/geometry/mesh.h"
+#include "core/math.h"
 #include "core/model/model.h"
 #include "reconstruction/mesh/manifold_mesh.h"
 #include "reconstruction/mesh/merge/consensus.h"
@@ -139,7 +140,7 @@ class Merging {
  public:
   Merging(std::vector<const ScanMesh*> scans, const MergeLimits& limits, const RunControl& work)
       : scans_(std::move(scans)),
-        limits_{limits.noise_sds, limits.apart_m, std::cos(limits.turned_rad)},
+        limits_{limits.noise_sds, limits.apart_m, math::cos(limits.turned_rad)},
         interpolation_(limits.interpolation),
         origin_m_(middle_of(scans_)),
         work_(work) {

@@ -7,6 +7,7 @@
 #include <glm/geometric.hpp>
 #include <utility>
 
+#include "core/math.h"
 #include "core/model/model.h"
 #include "core/tracing/object_tracer.h"
 #include "core/tracing/ray_tracer.h"
@@ -75,7 +76,7 @@ class LongTriangles {
   }
 
   double margin_m(double sd_m, double other_sd_m) const {
-    return across * limits_.noise_sds * std::hypot(sd_m, other_sd_m) + limits_.apart_m;
+    return across * limits_.noise_sds * math::hypot(sd_m, other_sd_m) + limits_.apart_m;
   }
 
   std::vector<Passage> passed_by(const BeamSurface& other, std::size_t begin,

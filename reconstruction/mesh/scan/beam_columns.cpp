@@ -2,7 +2,6 @@
 
 #include <algorithm>
 #include <cmath>
-#include <complex>
 #include <glm/geometric.hpp>
 #include <numbers>
 #include <numeric>
@@ -10,6 +9,7 @@
 #include <utility>
 
 #include "core/error.h"
+#include "core/math.h"
 #include "reconstruction/mesh/scan/firing_lattice.h"
 
 namespace groundray {
@@ -126,29 +126,29 @@ bool goes_round(const Numbered& pulses, double slope, std::int64_t turn) {
 /// Returns the offset of each ring in columns; zeros if the offsets are not constant.
 std::vector<std::int64_t> aside(const Numbered& pulses, double slope) {
   const auto rows = static_cast<std::size_t>(pulses.rows);
-  std::vector<std::complex<double>> sum(rows);
+  std::vector<Phasor> sum(rows);
   const auto rest = [&](std::size_t i) {
     return pulses.azimuth_rad[i] - slope * static_cast<double>(pulses.number[i] - pulses.first);
   };
   for (std::size_t i = 0; i < pulses.number.size(); ++i)
-    sum[static_cast<std::size_t>(pulses.row[i])] += std::polar(1.0, rest(i));
+    sum[static_cast<std::size_t>(pulses.row[i])] += phasor_of(rest(i));
   std::vector<double> off;
   for (std::size_t i = 0; i < pulses.number.size(); ++i)
     off.push_back(
-        std::abs(wrapped(rest(i) - std::arg(sum[static_cast<std::size_t>(pulses.row[i])]))));
+        std::abs(wrapped(rest(i) - phase_rad(sum[static_cast<std::size_t>(pulses.row[i])]))));
   std::vector<std::int64_t> shift(rows, 0);
   if (upper_median(off) > 2 * std::abs(slope)) return shift;
   std::vector<double> turned;
   double zero = 0;
   for (int pass = 0; pass < 2; ++pass) {  // about the first ring, then about the median
     turned.clear();
-    for (const std::complex<double>& s : sum) {
-      if (s != 0.0) turned.push_back(wrapped(std::arg(s) - zero));
+    for (const Phasor& s : sum) {
+      if (s != 0.0) turned.push_back(wrapped(phase_rad(s) - zero));
     }
     if (!turned.empty()) zero += upper_median(turned);
   }
   for (std::size_t r = 0; r < rows; ++r) {
-    if (sum[r] != 0.0) shift[r] = std::llround(wrapped(std::arg(sum[r]) - zero) / slope);
+    if (sum[r] != 0.0) shift[r] = std::llround(wrapped(phase_rad(sum[r]) - zero) / slope);
   }
   return shift;
 }
@@ -225,7 +225,7 @@ double elevation_spread_rad(const OrganisedScan& scan) {
   for (std::size_t i = 0; i < scan.points_m.size(); ++i) {
     const glm::dvec3 way_m = scan.points_m[i] - scan.origins_m[i];
     if (!std::isnan(way_m.x))
-      elevations_rad.push_back(std::atan2(way_m.z, std::hypot(way_m.x, way_m.y)));
+      elevations_rad.push_back(math::atan2(way_m.z, math::hypot(way_m.x, way_m.y)));
   }
   if (elevations_rad.size() <= few_returns) return 0;
   const double median_rad = upper_median(elevations_rad);

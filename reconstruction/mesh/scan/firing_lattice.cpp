@@ -1,12 +1,11 @@
 #include "reconstruction/mesh/scan/firing_lattice.h"
 
-#include <complex>
 #include <utility>
+
+#include "core/math.h"
 
 namespace groundray {
 namespace {
-
-using Phasor = std::complex<double>;
 
 constexpr double most_steps = 1e6;       // in a turn, or over the whole range
 constexpr int most_missing = 16;         // at least one in this many pulses is present
@@ -14,7 +13,7 @@ constexpr std::size_t enough = 512;      // differences, to determine a ring's s
 constexpr double window_steps = 16;      // over which the phase is treated as constant
 constexpr std::size_t least_pulses = 6;  // to determine the phase of a window
 
-Phasor unit(double turns) { return std::polar(1.0, two_pi * (turns - std::round(turns))); }
+Phasor unit(double turns) { return phasor_of(two_pi * (turns - std::round(turns))); }
 
 /// Returns the mean cosine of the phases of differences with respect to a step.
 double coherence_of(std::span<const double> differences, double step) {
@@ -118,7 +117,7 @@ class PhaseTrack {
   /// Returns the position of a pulse in steps; its number is the nearest integer.
   double steps(std::size_t pulse) const {
     const double place = coordinates_[pulse] - first_;
-    const double ring = std::arg(ring_phase_[static_cast<std::size_t>(rings_[pulse])]) / two_pi;
+    const double ring = phase_rad(ring_phase_[static_cast<std::size_t>(rings_[pulse])]) / two_pi;
     return place / step_ - phase_at(place / width_ - 0.5) - ring;
   }
 
@@ -187,7 +186,7 @@ void PhaseTrack::factor() {
         ring_phase_[static_cast<std::size_t>(rings_[i])] += at[i] * std::conj(sum) / length;
     }
     for (Phasor& phase : ring_phase_) {
-      if (std::abs(phase) > 0) phase /= std::abs(phase);
+      if (phase != 0.0) phase /= std::sqrt(std::norm(phase));
     }
   }
   for (std::size_t w = 0; w < windows_; ++w) {
@@ -199,8 +198,8 @@ void PhaseTrack::unwrap() {
   double last = 0;
   bool begun = false;
   for (std::size_t w = 0; w < windows_; ++w) {
-    if (std::abs(phasor_[w]) > 0) {
-      const double turns = std::arg(phasor_[w]) / two_pi;
+    if (phasor_[w] != 0.0) {
+      const double turns = phase_rad(phasor_[w]) / two_pi;
       const double next = begun ? turns - std::round(turns - last) : turns;
       if (!begun) std::fill_n(phase_.begin(), w, next);
       begun = true;
@@ -242,7 +241,7 @@ FiringLattice number_firings(std::span<const double> coordinates,
     const double number = std::round(place);
     lattice.number.push_back(static_cast<std::int64_t>(number));
     lattice.off.push_back(static_cast<float>(place - number));
-    sum += std::cos(two_pi * (place - number));
+    sum += math::cos(two_pi * (place - number));
   }
   lattice.coherence = sum / static_cast<double>(coordinates.size());
   return lattice;

@@ -2,11 +2,14 @@
 
 #include <algorithm>
 #include <cmath>
+#include <complex>
 #include <cstddef>
 #include <cstdint>
 #include <numbers>
 #include <span>
 #include <vector>
+
+#include "core/math.h"
 
 namespace groundray {
 
@@ -17,6 +20,15 @@ inline constexpr double two_pi = 2 * std::numbers::pi;
 inline double wrapped(double angle_rad) {
   return angle_rad - two_pi * std::round(angle_rad / two_pi);
 }
+
+/// Complex number, whose phase is an angle.
+using Phasor = std::complex<double>;
+
+/// Returns the phasor of length 1 of an angle.
+inline Phasor phasor_of(double angle_rad) { return {math::cos(angle_rad), math::sin(angle_rad)}; }
+
+/// Returns the phase of a phasor, rad, from -pi to pi.
+inline double phase_rad(const Phasor& p) { return math::atan2(p.imag(), p.real()); }
 
 /// Returns the median of `values`, or the upper of two, and changes their order. There must be at
 /// least one value.

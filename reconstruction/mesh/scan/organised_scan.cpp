@@ -8,6 +8,7 @@
 #include <utility>
 
 #include "core/error.h"
+#include "core/math.h"
 #include "reconstruction/mesh/mesh_arrays.h"
 #include "reconstruction/mesh/scan/beam_columns.h"
 #include "reconstruction/mesh/scan/beam_rows.h"
@@ -66,12 +67,12 @@ Beams beams_of_returns(const ScanReturns& returns) {
     if (!is_position(p) || !is_position(origin) || p == glm::dvec3(0) || p == origin) continue;
     const glm::dvec3 way = p - origin;
     const double turn = 2 * std::numbers::pi;
-    double azimuth_rad = std::atan2(way.y, way.x);
+    double azimuth_rad = math::atan2(way.y, way.x);
     if (azimuth_rad < 0) azimuth_rad += turn;
     beams.source.push_back(static_cast<std::uint32_t>(i));
     beams.azimuth_rad.push_back(azimuth_rad < turn ? azimuth_rad : 0);
-    beams.plan_m.push_back(std::hypot(way.x, way.y));
-    beams.elevation_rad.push_back(std::atan2(way.z, beams.plan_m.back()));
+    beams.plan_m.push_back(math::hypot(way.x, way.y));
+    beams.elevation_rad.push_back(math::atan2(way.z, beams.plan_m.back()));
     beams.range_m.push_back(glm::length(way));
   }
   return beams;

@@ -10,6 +10,7 @@
 #include <numbers>
 
 #include "core/error.h"
+#include "core/math.h"
 #include "reconstruction/mesh/mesh_arrays.h"
 
 namespace groundray {
@@ -69,8 +70,8 @@ class Linker {
   Linker(const OrganisedScan& scan, const ScreeningLimits& limits)
       : scan_(scan),
         beams_(beams_of_scan(scan)),
-        secant_(1 / std::max(std::cos(limits.incidence_rad), 1e-12)),
-        tangent_(std::min(std::tan(limits.incidence_rad), 1e12)),
+        secant_(1 / std::max(math::cos(limits.incidence_rad), 1e-12)),
+        tangent_(std::min(math::tan(limits.incidence_rad), 1e12)),
         longest_m_(limits.longest_m),
         noise_sds_(limits.noise_sds),
         uses_right_(beams_.size()),
@@ -146,7 +147,7 @@ class Linker {
     const double along = glm::dot(apart_m, mean);
     const double across_m = std::sqrt(std::max(
         0.0, glm::dot(apart_m, apart_m) - along * along / std::max(glm::dot(mean, mean), 1e-300)));
-    const double sd_m = std::hypot(double{scan_.sd_m[p]}, double{scan_.sd_m[q]});
+    const double sd_m = math::hypot(double{scan_.sd_m[p]}, double{scan_.sd_m[q]});
     return length_m <= across_m * secant_ + noise_sds_ * sd_m;
   }
 
@@ -330,7 +331,7 @@ ScreeningLimits ScreeningLimits::strict() noexcept {
 }
 
 ScreeningLimits ScreeningLimits::object() noexcept {
-  return {.incidence_rad = std::acos(1.0 / 4), .longest_m = infinite_m};
+  return {.incidence_rad = math::acos(1.0 / 4), .longest_m = infinite_m};
 }
 
 ScanMesh link(const OrganisedScan& scan, const ScreeningLimits& limits) {

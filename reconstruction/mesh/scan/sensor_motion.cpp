@@ -2,12 +2,12 @@
 #include <Eigen/Core>
 #include <algorithm>
 #include <cmath>
-#include <complex>
 #include <cstddef>
 #include <cstdint>
 #include <numeric>
 #include <tuple>
 
+#include "core/math.h"
 #include "reconstruction/mesh/scan/beam_columns.h"
 #include "reconstruction/mesh/scan/firing_lattice.h"
 
@@ -64,8 +64,8 @@ class MotionFit {
     for (std::size_t i = 0; i < clock.size(); ++i) {
       const double a = places.azimuths_rad[i], m = places.distances_m[i];
       share_.push_back((clock[i] - first) / span - 0.5);
-      x_m_.push_back(m * std::cos(a));
-      y_m_.push_back(m * std::sin(a));
+      x_m_.push_back(m * math::cos(a));
+      y_m_.push_back(m * math::sin(a));
     }
     azimuth_rad_.assign(places.azimuths_rad.begin(), places.azimuths_rad.end());
     off_rad_.resize(clock.size());
@@ -94,10 +94,10 @@ class MotionFit {
   std::size_t ring(std::size_t i) const { return static_cast<std::size_t>(row_[i]); }
 
   void begin_rings() {
-    std::vector<std::complex<double>> sum(ring_rad_.size());
+    std::vector<Phasor> sum(ring_rad_.size());
     for (std::size_t i = 0; i < share_.size(); ++i)
-      sum[ring(i)] += std::polar(1.0, azimuth_rad_[i] - fit_[0] * share_[i]);
-    for (std::size_t r = 0; r < sum.size(); ++r) ring_rad_[r] = std::arg(sum[r]);
+      sum[ring(i)] += phasor_of(azimuth_rad_[i] - fit_[0] * share_[i]);
+    for (std::size_t r = 0; r < sum.size(); ++r) ring_rad_[r] = phase_rad(sum[r]);
   }
 
   void measure() {
@@ -105,7 +105,7 @@ class MotionFit {
     for (std::size_t i = 0; i < share_.size(); ++i) {
       const double x_m = x_m_[i] - fit_[1] - fit_[3] * share_[i];
       const double y_m = y_m_[i] - fit_[2] - fit_[4] * share_[i];
-      if (!is_still) azimuth_rad_[i] = std::atan2(y_m, x_m);
+      if (!is_still) azimuth_rad_[i] = math::atan2(y_m, x_m);
       off_rad_[i] = wrapped(azimuth_rad_[i] - fit_[0] * share_[i] - ring_rad_[ring(i)]);
     }
   }

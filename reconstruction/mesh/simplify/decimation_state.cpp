@@ -4,6 +4,8 @@
 #include <numbers>
 #include <utility>
 
+#include "core/math.h"
+
 namespace groundray {
 namespace {
 
@@ -15,7 +17,7 @@ struct Fold {
 
   Fold(const glm::dvec3& a, const glm::dvec3& b, const glm::dvec3& left, const glm::dvec3& right) {
     const glm::dvec3 n = glm::cross(b - a, left - a), m = glm::cross(right - a, b - a);
-    angle_rad = std::atan2(glm::length(glm::cross(n, m)), glm::dot(n, m));
+    angle_rad = math::atan2(glm::length(glm::cross(n, m)), glm::dot(n, m));
     const double of_left = std::abs(glm::dot(left - a, m)) / glm::length(m);
     const double of_right = std::abs(glm::dot(right - a, n)) / glm::length(n);
     depth_m = std::min(of_left, of_right);

@@ -5,6 +5,8 @@
 #include <glm/vec2.hpp>
 #include <limits>
 
+#include "core/math.h"
+
 namespace groundray {
 namespace {
 
@@ -189,7 +191,7 @@ std::size_t find_knee(const std::vector<CostStep>& steps) {
     if (!(so_far > 0)) knee = step.triangles;
     if (!(so_far > 0) || 2 * step.triangles > all || 1000 * step.triangles < all) continue;
     const auto left = static_cast<double>(std::max<std::size_t>(step.triangles, 1));
-    curve.emplace_back(std::log(left), std::log(so_far));
+    curve.emplace_back(math::log(left), math::log(so_far));
     triangles.push_back(step.triangles);
   }
   if (curve.size() < 3) return knee;

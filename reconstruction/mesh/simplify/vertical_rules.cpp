@@ -5,6 +5,8 @@
 #include <glm/common.hpp>
 #include <glm/geometric.hpp>
 
+#include "core/math.h"
+
 namespace groundray {
 
 BorderGrid::BorderGrid(const SurfaceMesh& mesh) {
@@ -144,8 +146,8 @@ std::size_t VerticalRules::nearest_sector(double x, double y) const noexcept {
   double least = -std::numeric_limits<double>::infinity();
   for (std::size_t i = 0; i < fan_.triangles; ++i) {
     const Spoke &a = spokes_[i], &b = spokes_[i + 1];
-    const double before = (a.x * y - a.y * x) / std::hypot(a.x, a.y);
-    const double after = (b.y * x - b.x * y) / std::hypot(b.x, b.y);
+    const double before = (a.x * y - a.y * x) / math::hypot(a.x, a.y);
+    const double after = (b.y * x - b.x * y) / math::hypot(b.x, b.y);
     if (std::min(before, after) <= least) continue;
     least = std::min(before, after);
     nearest = i;

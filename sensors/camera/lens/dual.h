@@ -2,6 +2,8 @@
 
 #include <cmath>
 
+#include "core/math.h"
+
 namespace groundray {
 
 /// Dual number: a value and its derivatives by two variables. Arithmetic propagates the derivatives
@@ -60,13 +62,13 @@ inline Dual sqrt(const Dual& a) {
 }
 inline Dual atan2(const Dual& y, const Dual& x) {
   const double square = x.value * x.value + y.value * y.value;
-  return {std::atan2(y.value, x.value), (x.value * y.dx - y.value * x.dx) / square,
+  return {math::atan2(y.value, x.value), (x.value * y.dx - y.value * x.dx) / square,
           (x.value * y.dy - y.value * x.dy) / square};
 }
-inline Dual sin(const Dual& a) { return a.chain(std::sin(a.value), std::cos(a.value)); }
-inline Dual cos(const Dual& a) { return a.chain(std::cos(a.value), -std::sin(a.value)); }
+inline Dual sin(const Dual& a) { return a.chain(math::sin(a.value), math::cos(a.value)); }
+inline Dual cos(const Dual& a) { return a.chain(math::cos(a.value), -math::sin(a.value)); }
 inline Dual asin(const Dual& a) {
-  return a.chain(std::asin(a.value), 1 / std::sqrt(1 - a.value * a.value));
+  return a.chain(math::asin(a.value), 1 / std::sqrt(1 - a.value * a.value));
 }
 /// @}
 

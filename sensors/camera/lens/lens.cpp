@@ -11,6 +11,7 @@
 
 #include "core/error.h"
 #include "core/image/image_io.h"
+#include "core/math.h"
 #include "sensors/camera/lens/lens_inverse.h"
 
 namespace groundray {
@@ -101,8 +102,8 @@ std::vector<double> reach_of(const Model& model, std::span<const double> limits_
     // here.
     const double far_px = 1.0002 * std::max(glm::length(a), glm::length(b)) + 0.05;
     if (!std::isfinite(far_px)) return unknown_px;
-    const int first = static_cast<int>(bin_of(std::atan2(a.y, a.x)));
-    const int last = static_cast<int>(bin_of(std::atan2(b.y, b.x)));
+    const int first = static_cast<int>(bin_of(math::atan2(a.y, a.x)));
+    const int last = static_cast<int>(bin_of(math::atan2(b.y, b.x)));
     const int up = (last - first + azimuths + azimuths / 2) % azimuths - azimuths / 2;
     if (std::abs(up) > azimuths / 8) return unknown_px;
     turned += up;
@@ -198,7 +199,7 @@ class RowFiller {
     const glm::dvec2 offset = pixel - centre_px_;
     const double distance_px = glm::length(offset);
     return distance_px <= least_reach_px_ ||
-           distance_px <= reach_px_[bin_of(std::atan2(offset.y, offset.x))];
+           distance_px <= reach_px_[bin_of(math::atan2(offset.y, offset.x))];
   }
 
   const Lens& lens_;
@@ -238,10 +239,10 @@ double Lens::limit_rad(double azimuth_rad) const noexcept {
 }
 
 bool Lens::images(const glm::dvec3& direction) const noexcept {
-  const double sine = std::hypot(direction.x, direction.y);
-  const double angle_rad = std::atan2(sine, direction.z);
+  const double sine = math::hypot(direction.x, direction.y);
+  const double angle_rad = math::atan2(sine, direction.z);
   return angle_rad < least_limit_rad_ ||
-         angle_rad < limit_rad(std::atan2(direction.y, direction.x));
+         angle_rad < limit_rad(math::atan2(direction.y, direction.x));
 }
 
 std::optional<glm::dvec2> Lens::project(const glm::dvec3& p_C) const noexcept {
@@ -285,7 +286,7 @@ void Lens::fill(int begin, int end, std::span<PixelRay> rays) const {
       [&]<typename Model>(const Model& kind) {
         const auto width = static_cast<std::size_t>(size_px_.x);
         if constexpr (Closed<Model>) {
-          const double least_cosine = std::cos(std::min(least_limit_rad_, farthest_rad));
+          const double least_cosine = math::cos(std::min(least_limit_rad_, farthest_rad));
           for (std::size_t i = 0; i < rays.size(); ++i) {
             const auto column = static_cast<double>(i % width);
             const std::size_t row = i / width;

@@ -8,6 +8,7 @@
 #include <limits>
 #include <numbers>
 
+#include "core/math.h"
 #include "sensors/camera/lens/lens.h"
 #include "sensors/camera/lens/lens_models.h"
 
@@ -71,7 +72,7 @@ inline PixelRay ray_at(const glm::dvec2& w, const Imaged& at) {
 
 // Returns the position of a direction in the chart.
 inline glm::dvec2 toward(double azimuth_rad, double angle_rad) {
-  return 2 * std::tan(angle_rad / 2) * glm::dvec2(std::cos(azimuth_rad), std::sin(azimuth_rad));
+  return 2 * math::tan(angle_rad / 2) * glm::dvec2(math::cos(azimuth_rad), math::sin(azimuth_rad));
 }
 
 template <typename Model>
@@ -81,7 +82,7 @@ class Inverse {
   Inverse(const Lens& lens, const Model& model, double least_limit_rad)
       : lens_(lens),
         model_(model),
-        sure_(2 * std::tan(std::min(least_limit_rad, farthest_rad) / 2)) {}
+        sure_(2 * math::tan(std::min(least_limit_rad, farthest_rad) / 2)) {}
 
   /// Iterates Newton's method from w, at most `steps` times, until the image is within coarse_px,
   /// or the tolerance if that is larger. Returns false if it leaves the imaged field or does not

@@ -4,6 +4,8 @@
 #include <cstddef>
 #include <iterator>
 
+#include "core/math.h"
+
 namespace groundray {
 namespace {
 
@@ -123,7 +125,7 @@ std::vector<double> radial_turns(const Polynomial& n, const Polynomial& d) {
 std::vector<double> turns(const BrownConrady& model) {
   const auto& k = model.k;
   std::vector<double> found = radial_turns({1, k[0], k[1], k[4]}, {1, k[5], k[6], k[7]});
-  for (double& turn : found) turn = std::atan(turn);
+  for (double& turn : found) turn = math::atan(turn);
   return found;
 }
 std::vector<double> turns(const KannalaBrandt& model) {
@@ -142,8 +144,8 @@ std::vector<double> turns(const Mei& model) {
   std::vector<double> found;
   for (const double radius : radial_turns({1, model.k[0], model.k[1]}, {1})) {
     // sin t = radius (cos t + xi)
-    const double sine = radius * model.xi / std::hypot(1, radius);
-    if (sine <= 1) found.push_back(std::atan(radius) + std::asin(sine));
+    const double sine = radius * model.xi / math::hypot(1, radius);
+    if (sine <= 1) found.push_back(math::atan(radius) + math::asin(sine));
   }
   return found;
 }
@@ -165,8 +167,8 @@ void check_lens(const LensModel& model, Violations& broken) {
 }
 
 glm::dmat3 sensor_homography(double tau_x_rad, double tau_y_rad) {
-  const double cx = std::cos(tau_x_rad), sx = std::sin(tau_x_rad);
-  const double cy = std::cos(tau_y_rad), sy = std::sin(tau_y_rad);
+  const double cx = math::cos(tau_x_rad), sx = math::sin(tau_x_rad);
+  const double cy = math::cos(tau_y_rad), sy = math::sin(tau_y_rad);
   // In glm's order, by columns: the rotation R, then OpenCV's [R33 0 -R13; 0 R33 -R23; 0 0 1].
   const glm::dmat3 turn(cy, 0, sy, sy * sx, cx, -cy * sx, -sy * cx, sx, cy * cx);
   const glm::dmat3 project(cy * cx, 0, 0, 0, cy * cx, 0, sy * cx, -sx, 1);

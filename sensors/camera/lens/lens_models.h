@@ -114,7 +114,7 @@ T angle_per_sine(const Direction<T>& p) {
   // Series near the axis, where the square root has no derivative; the next term is below 1e-25.
   if (value_of(square) < 1e-8 && value_of(p.z) > 0)
     return 1.0 + square * (1.0 / 6 + square * (3.0 / 40));
-  using std::atan2;
+  using math::atan2;
   using std::sqrt;
   const T sine = sqrt(square);
   return atan2(sine, p.z) / sine;
@@ -248,8 +248,8 @@ struct Equirectangular {
 
   template <typename T>
   Pixel<T> image(const Direction<T>& p) const {
-    using std::asin;
-    using std::atan2;
+    using math::asin;
+    using math::atan2;
     return {(atan2(p.x, p.z) / (2 * std::numbers::pi) + 0.5) * size_px.x - 0.5,
             (asin(p.y) / std::numbers::pi + 0.5) * size_px.y - 0.5};
   }
@@ -258,8 +258,8 @@ struct Equirectangular {
   /// Returns the direction of a pixel, as Pinhole.
   template <typename T>
   Direction<T> ray(const Pixel<T>& pixel) const {
-    using std::cos;
-    using std::sin;
+    using math::cos;
+    using math::sin;
     const T longitude = ((pixel.u + 0.5) / size_px.x - 0.5) * (2 * std::numbers::pi);
     const T latitude = ((pixel.v + 0.5) / size_px.y - 0.5) * std::numbers::pi;
     return {cos(latitude) * sin(longitude), sin(latitude), cos(latitude) * cos(longitude)};

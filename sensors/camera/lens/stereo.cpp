@@ -9,6 +9,7 @@
 #include <utility>
 
 #include "core/error.h"
+#include "core/math.h"
 #include "sensors/camera/lens/lens.h"
 
 namespace groundray {
@@ -19,13 +20,13 @@ constexpr double most_slant_deg = 45;
 constexpr double most_field_deg = 85;
 
 double angle_deg(const glm::dvec3& a, const glm::dvec3& b) {
-  return glm::degrees(std::atan2(glm::length(glm::cross(a, b)), glm::dot(a, b)));
+  return glm::degrees(math::atan2(glm::length(glm::cross(a, b)), glm::dot(a, b)));
 }
 
 double turn_deg(const glm::dquat& a, const glm::dquat& b) {
   const glm::dquat turn = glm::conjugate(a) * b;
   const double sine = glm::length(glm::dvec3(turn.x, turn.y, turn.z));
-  return glm::degrees(2 * std::atan2(sine, std::abs(turn.w)));
+  return glm::degrees(2 * math::atan2(sine, std::abs(turn.w)));
 }
 
 // Returns the smallest rotation that takes the x axis to a unit vector other than -x.
@@ -87,7 +88,7 @@ RectifiedPair rectified(const StereoCamera& left, const StereoCamera& right) {
   broken.unless(turned_deg <= most_turn_deg,
                 "the relative rotation of the cameras is {:.1f} deg, but must be at most {}",
                 turned_deg, most_turn_deg);
-  const glm::dquat R_BM = glm::slerp(left.X_BC.rotation, right.X_BC.rotation, 0.5);
+  const glm::dquat R_BM = half_way_between(left.X_BC.rotation, right.X_BC.rotation);
   const glm::dvec3 p_LR =
       glm::conjugate(R_BM) * (right.X_BC.translation_m - left.X_BC.translation_m);
   const double baseline_m = glm::length(p_LR);

@@ -12,6 +12,7 @@
 #include <utility>
 
 #include "core/error.h"
+#include "core/math.h"
 
 namespace groundray {
 namespace {
@@ -112,7 +113,7 @@ std::vector<double> uniform_radii(int count) {
 std::vector<double> gaussian_radii(int count) {
   const auto integral = [&](int j) {  // integral of -ln v from 0 to v, the energy fraction outside
     const double v = static_cast<double>(count - j) / count;
-    return v > 0 ? v - v * std::log(v) : 0;
+    return v > 0 ? v - v * math::log(v) : 0;
   };
   std::vector<double> radii;
   for (int j = 0; j < count; ++j) {
@@ -132,7 +133,7 @@ std::vector<Point> points_of(Layout layout, std::span<const int> tilt_shells,
                              std::span<const double> radii) {
   const auto at = [](double radius, double turns) {
     const double angle_rad = 2 * std::numbers::pi * turns;
-    return radius * glm::dvec2(std::cos(angle_rad), std::sin(angle_rad));
+    return radius * glm::dvec2(math::cos(angle_rad), math::sin(angle_rad));
   };
   const auto eighth_turn = [](const glm::dvec2& p) {
     return std::numbers::sqrt2 / 2 * glm::dvec2(p.x - p.y, p.x + p.y);
@@ -230,7 +231,9 @@ std::vector<glm::ivec2> nearest_pairs(std::span<const Point> points) {
 
 LaserBeam::LaserBeam(const BeamSpec& spec)
     : waist_m_(half(spec.aperture_m, spec)),
-      tangent_(half(2. * glm::tan(0.5 * spec.divergence_rad), spec)),
+      tangent_(half(2. * glm::dvec2(math::tan(0.5 * spec.divergence_rad.x),
+                                    math::tan(0.5 * spec.divergence_rad.y)),
+                    spec)),
       turn_(spec.turn),
       profile_(spec.profile) {
   check_beam_spec(spec);

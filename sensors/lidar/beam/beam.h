@@ -7,6 +7,8 @@
 #include <span>
 #include <vector>
 
+#include "core/math.h"
+
 namespace groundray {
 
 /// Cross-section of a laser beam and its sampling. Pairs are (horizontal, vertical).
@@ -105,8 +107,8 @@ class LaserBeam {
   /// Returns the radii w (1/e^2 or edge) at a distance along the axis. surface_patch()
   /// (core/geometry/footprint.h) projects a width onto a surface.
   glm::dvec2 radius_m(double range_m) const noexcept {
-    return {std::hypot(waist_m_.x, range_m * tangent_.x),
-            std::hypot(waist_m_.y, range_m * tangent_.y)};
+    return {math::hypot(waist_m_.x, range_m * tangent_.x),
+            math::hypot(waist_m_.y, range_m * tangent_.y)};
   }
 
  private:

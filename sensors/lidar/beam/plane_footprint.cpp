@@ -6,6 +6,8 @@
 #include <glm/geometric.hpp>
 #include <numbers>
 
+#include "core/math.h"
+
 namespace groundray {
 namespace {
 
@@ -64,9 +66,9 @@ PlaneQuadrature::PlaneQuadrature(BeamSpec::Profile profile, double spacing_m, do
     double sum = 0, moment = 0;
     for (int k = 1; k < intervals; ++k) {
       const double angle_rad = std::numbers::pi * k / intervals;
-      const double sine = std::sin(angle_rad), along = reach_ * std::cos(angle_rad);
+      const double sine = math::sin(angle_rad), along = reach_ * math::cos(angle_rad);
       const double across = gaussian ? 0.5 : sine / std::numbers::sqrt3;
-      const double share = sine * (gaussian ? std::exp(-2 * along * along) : sine);
+      const double share = sine * (gaussian ? math::exp(-2 * along * along) : sine);
       table.push_back({along, k % 2 == 0 ? across : -across, share});
       sum += share;
       moment += share * table.back().across;

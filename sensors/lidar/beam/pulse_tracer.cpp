@@ -6,6 +6,8 @@
 #include <glm/gtc/quaternion.hpp>
 #include <numbers>
 
+#include "core/math.h"
+
 namespace groundray {
 namespace {
 
@@ -67,7 +69,7 @@ void PulseTracer::add_sub_rays(std::size_t pulse, int level, const LaserBeam& be
     const auto number = begin_ + static_cast<std::int64_t>(pulse);
     const double angle_rad =
         2 * std::numbers::pi * random_uniform(key_of(key, number, RandomStream::BeamTurn)).x;
-    turn = {std::cos(angle_rad), std::sin(angle_rad)};
+    turn = {math::cos(angle_rad), math::sin(angle_rad)};
   }
   const auto lay = [&](const LaserBeam::SubRay& to) -> Ray {
     const glm::dvec3 along = axis.direction + to.slope.x * horizontal + to.slope.y * vertical;

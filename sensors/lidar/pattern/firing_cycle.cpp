@@ -7,6 +7,8 @@
 #include <numbers>
 #include <tuple>
 
+#include "core/math.h"
+
 namespace groundray {
 namespace {
 
@@ -59,8 +61,8 @@ double HeadTurn::angle_rad(double time_s) const noexcept {
 FiringCycle::FiringCycle(std::vector<Firing> firings, double period_s, const HeadTurn& head)
     : period_s_(period_s),
       head_(head),
-      fixed_cos_(std::cos(head.start_rad)),
-      fixed_sin_(std::sin(head.start_rad)) {
+      fixed_cos_(math::cos(head.start_rad)),
+      fixed_sin_(math::sin(head.start_rad)) {
   std::ranges::stable_sort(firings, {}, [](const Firing& firing) {
     return std::tuple(firing.sequence, firing.firing_time_s);
   });
@@ -111,8 +113,8 @@ void FiringCycle::fill(NumberRange pulses, PulseBatch& batch, std::size_t row) c
     const double time = time_s(cycle, volley);
     if (head_.rate_hz != 0) {
       const double angle_rad = head_.angle_rad(time);
-      cosine = std::cos(angle_rad);
-      sine = std::sin(angle_rad);
+      cosine = math::cos(angle_rad);
+      sine = math::sin(angle_rad);
     }
     const auto count = static_cast<int>(std::min<std::int64_t>(left, volley.end - shot));
     const auto first = static_cast<std::size_t>(shot);

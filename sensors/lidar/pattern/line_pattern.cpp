@@ -6,6 +6,7 @@
 #include <vector>
 
 #include "core/error.h"
+#include "core/math.h"
 
 namespace groundray {
 namespace {
@@ -81,7 +82,7 @@ double scan_angle_rad(const LinePattern& pattern, double part, bool back) {
   const double from = back ? pattern.to_rad : pattern.from_rad;
   const double to = back ? pattern.from_rad : pattern.to_rad;
   if (pattern.mirror == Mirror::Sine) {
-    return (from + to) / 2 + (from - to) / 2 * std::cos(pi * part);
+    return (from + to) / 2 + (from - to) / 2 * math::cos(pi * part);
   }
   if (pattern.mirror == Mirror::Triangle) return from + (to - from) * part;
   const double sweep_rad = std::copysign(4 * pi / pattern.facets, to - from);
@@ -89,8 +90,8 @@ double scan_angle_rad(const LinePattern& pattern, double part, bool back) {
 }
 
 FiringCycle::Firing firing_at(LinePattern::Plane plane, double angle_rad) {
-  const double cosine = std::cos(angle_rad);
-  const double sine = std::sin(angle_rad);
+  const double cosine = math::cos(angle_rad);
+  const double sine = math::sin(angle_rad);
   FiringCycle::Firing firing;
   if (plane == LinePattern::Plane::Upright) {
     firing.shot.direction = {cosine, 0, sine};

@@ -8,6 +8,7 @@
 #include <numbers>
 
 #include "core/error.h"
+#include "core/math.h"
 
 namespace groundray {
 namespace {
@@ -23,13 +24,13 @@ constexpr double sequence_tolerance = 1e-9;
 double greatest_angle_rad(const WedgePrism& prism, double angle_rad) {
   const double index = prism.refractive_index;
   if (prism.tilted == WedgePrism::Tilted::Exit) {
-    const double inside = std::asin(std::sin(angle_rad) / index) + prism.wedge_rad;
-    return std::asin(index * std::sin(inside)) - prism.wedge_rad;
+    const double inside = math::asin(math::sin(angle_rad) / index) + prism.wedge_rad;
+    return math::asin(index * math::sin(inside)) - prism.wedge_rad;
   }
   const double incidence = angle_rad + prism.wedge_rad;
   if (!(incidence < pi / 2)) return std::numeric_limits<double>::quiet_NaN();
-  const double inside = angle_rad + incidence - std::asin(std::sin(incidence) / index);
-  return std::asin(index * std::sin(inside));
+  const double inside = angle_rad + incidence - math::asin(math::sin(incidence) / index);
+  return math::asin(index * math::sin(inside));
 }
 
 void check_prisms(const RisleyPattern& pattern, Violations& broken) {
@@ -38,8 +39,8 @@ void check_prisms(const RisleyPattern& pattern, Violations& broken) {
                 most_prisms);
   double angle_rad = 0;
   for (const Beam& beam : pattern.beams) {
-    const double cosine = std::cos(beam.elevation_rad) * std::cos(beam.azimuth_offset_rad);
-    angle_rad = std::max(angle_rad, std::acos(std::clamp(cosine, -1., 1.)));
+    const double cosine = math::cos(beam.elevation_rad) * math::cos(beam.azimuth_offset_rad);
+    angle_rad = std::max(angle_rad, math::acos(std::clamp(cosine, -1., 1.)));
   }
   broken.unless(angle_rad < pi / 2, "beams: one is {} rad off the x axis and misses the prisms",
                 angle_rad);
@@ -110,9 +111,9 @@ struct Faces {
   Faces() = default;
   Faces(const WedgePrism& prism, double time_s) : index(prism.refractive_index) {
     const double base_rad = prism.base_rad + 2 * pi * turn_fraction(prism.rate_hz, time_s);
-    const double sine = std::sin(prism.wedge_rad);
-    const glm::dvec3 to_base(0, sine * std::cos(base_rad), sine * std::sin(base_rad));
-    const glm::dvec3 axis(std::cos(prism.wedge_rad), 0, 0);
+    const double sine = math::sin(prism.wedge_rad);
+    const glm::dvec3 to_base(0, sine * math::cos(base_rad), sine * math::sin(base_rad));
+    const glm::dvec3 axis(math::cos(prism.wedge_rad), 0, 0);
     if (prism.tilted == WedgePrism::Tilted::Exit) {
       exit = axis - to_base;
     } else {
@@ -124,7 +125,7 @@ struct Faces {
 // Returns the horizontal unit vector perpendicular to `direction`, to the left: towards increasing
 // azimuth.
 glm::dvec3 level_left(const glm::dvec3& direction) {
-  const double level = std::hypot(direction.x, direction.y);
+  const double level = math::hypot(direction.x, direction.y);
   return level > 0 ? glm::dvec3(-direction.y / level, direction.x / level, 0) : glm::dvec3(0, 1, 0);
 }
 

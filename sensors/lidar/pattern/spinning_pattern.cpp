@@ -6,6 +6,7 @@
 #include <set>
 
 #include "core/error.h"
+#include "core/math.h"
 
 namespace groundray {
 namespace {
@@ -104,11 +105,11 @@ FiringCycle spinning_cycle(const SpinningPattern& pattern) {
 }  // namespace
 
 FiringCycle::Firing firing_towards(double azimuth_rad, double elevation_rad) noexcept {
-  const double level = std::cos(elevation_rad);
-  const double cosine = std::cos(azimuth_rad);
-  const double sine = std::sin(azimuth_rad);
+  const double level = math::cos(elevation_rad);
+  const double cosine = math::cos(azimuth_rad);
+  const double sine = math::sin(azimuth_rad);
   FiringCycle::Firing firing;
-  firing.shot.direction = {level * cosine, level * sine, std::sin(elevation_rad)};
+  firing.shot.direction = {level * cosine, level * sine, math::sin(elevation_rad)};
   firing.horizontal = {-sine, cosine, 0};
   return firing;
 }

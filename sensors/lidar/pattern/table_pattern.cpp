@@ -14,6 +14,7 @@
 #include "core/error.h"
 #include "core/io/file_io.h"
 #include "core/io/text_lines.h"
+#include "core/math.h"
 #include "sensors/lidar/pattern/spinning_pattern.h"
 
 namespace groundray {
@@ -191,10 +192,10 @@ TablePattern::Shot pixel_shot(const PixelArray& pixels, int row, int column) {
     shot.azimuth_rad = left * pixels.horizontal_view_rad;
     shot.elevation_rad = up * pixels.vertical_view_rad;
   } else {
-    const double y = 2 * left * std::tan(pixels.horizontal_view_rad / 2);
-    const double z = 2 * up * std::tan(pixels.vertical_view_rad / 2);
-    shot.azimuth_rad = std::atan(y);
-    shot.elevation_rad = std::atan(z / std::hypot(1, y));
+    const double y = 2 * left * math::tan(pixels.horizontal_view_rad / 2);
+    const double z = 2 * up * math::tan(pixels.vertical_view_rad / 2);
+    shot.azimuth_rad = math::atan(y);
+    shot.elevation_rad = math::atan(z / math::hypot(1, y));
   }
   return shot;
 }

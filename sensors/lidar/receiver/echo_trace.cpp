@@ -2,6 +2,8 @@
 
 #include <cmath>
 
+#include "core/math.h"
+
 namespace groundray {
 namespace {
 
@@ -45,13 +47,13 @@ void EchoTrace::find_top() {
   if (i == 0 || i + 1 >= power_w_.size()) return;
   const double left = power_w_[i - 1] / peak_w_, right = power_w_[i + 1] / peak_w_;
   if (left <= 0 || right <= 0) return;
-  const double before = std::log(left), after = std::log(right);
+  const double before = math::log(left), after = math::log(right);
   const double curvature = -(before + after);
   const double slope = 0.5 * (after - before);
   if (!(curvature > std::abs(slope))) return;  // a corner of a plateau
   const double rise = 0.5 * slope * slope / curvature;
   peak_bin_ += slope / curvature;
-  peak_w_ = std::min(peak_w_ * std::exp(rise), ceiling_w_);
+  peak_w_ = std::min(peak_w_ * math::exp(rise), ceiling_w_);
   curvature_w_ = peak_w_ * curvature;
 }
 
@@ -61,8 +63,8 @@ EchoTrace::Crossing EchoTrace::crossing(std::size_t i, double level_w) const {
   const double line = (level_w - here) / (next - here);
   const Crossing straight{static_cast<double>(i) + line, std::abs(next - here)};
   if (std::min({before, here, next, after}) <= 0) return straight;
-  const double a = std::log(before / level_w), b = std::log(here / level_w);
-  const double c = std::log(next / level_w), d = std::log(after / level_w);
+  const double a = math::log(before / level_w), b = math::log(here / level_w);
+  const double c = math::log(next / level_w), d = math::log(after / level_w);
   if (std::max({std::abs(a - b), std::abs(b - c), std::abs(c - d)}) > steepest) return straight;
   // The cubic b + u (c1 + u (c2 + u c3)) through a, b, c, d at u = -1, 0, 1, 2.
   const double c1 = c - a / 3 - b / 2 - d / 6;
@@ -81,7 +83,7 @@ EchoTrace::Crossing EchoTrace::crossing(std::size_t i, double level_w) const {
 EchoTrace::Crossing EchoTrace::beside_peak(double level_w, double side) const {
   if (curvature_w_ == 0 || level_w >= peak_w_) return {peak_bin_, 0};
   const double curvature = curvature_w_ / peak_w_;
-  const double away = std::sqrt(2 * std::log(peak_w_ / level_w) / curvature);
+  const double away = std::sqrt(2 * math::log(peak_w_ / level_w) / curvature);
   return {peak_bin_ + side * away, level_w * curvature * away};
 }
 
@@ -132,7 +134,7 @@ EchoTrace::Extent EchoTrace::above(double level_w) const {
 double EchoTrace::edge(std::size_t below, std::size_t above, double level_w) const {
   const double outer_w = power_w_[below], inner_w = power_w_[above];
   if (!(inner_w < steepest_ratio * outer_w)) return (level_w - outer_w) / (inner_w - outer_w);
-  const double u = first_root(std::log(outer_w / level_w), std::log(inner_w / level_w),
+  const double u = first_root(math::log(outer_w / level_w), math::log(inner_w / level_w),
                               0.5 * curvature_w_ / peak_w_);
   return std::min(u, 1.0);
 }

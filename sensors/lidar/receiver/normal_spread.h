@@ -5,6 +5,8 @@
 #include <cmath>
 #include <numbers>
 
+#include "core/math.h"
+
 namespace groundray {
 
 /// Returns the standard deviation of a normal number of mean 0 and standard deviation `deviation`
@@ -13,9 +15,9 @@ inline double clamped_normal_deviation(double deviation, double lowest, double h
   constexpr double unmet_sigmas = 8;     // an end this far away has no effect: 1e-15
   constexpr double widest_spread = 1e4;  // in interval lengths: beyond it only the two ends matter
   const auto density = [](double z) {
-    return std::exp(-0.5 * z * z) * std::numbers::inv_sqrtpi / std::numbers::sqrt2;
+    return math::exp(-0.5 * z * z) * std::numbers::inv_sqrtpi / std::numbers::sqrt2;
   };
-  const auto share_below = [](double z) { return 0.5 * std::erfc(-z / std::numbers::sqrt2); };
+  const auto share_below = [](double z) { return 0.5 * math::erfc(-z / std::numbers::sqrt2); };
   if (!(highest > lowest)) return 0;
   if (-lowest >= unmet_sigmas * deviation && highest >= unmet_sigmas * deviation) return deviation;
   const double sigma = std::min(deviation, widest_spread * (highest - lowest));
@@ -55,7 +57,7 @@ double deviation_above(double least, const Value& value) noexcept {
   constexpr double reach = 5;  // the density falls by exp(-reach^2 / 2)
   const bool is_whole = least <= -reach;
   const double low = std::max(least, -reach);
-  const double high = std::hypot(std::max(low, 0.0), reach);
+  const double high = math::hypot(std::max(low, 0.0), reach);
   const double middle = is_whole ? 0 : 0.5 * (low + high), half = 0.5 * (high - low);
   const double origin = value(middle);  // so that only differences are squared
   double weights = 0, sum = 0, squares = 0;
@@ -73,7 +75,7 @@ double deviation_above(double least, const Value& value) noexcept {
   } else {
     for (const QuadratureNode& node : legendre_16) {
       for (const double z : {middle - half * node.position, middle + half * node.position})
-        add(z, node.weight * std::exp(0.5 * (middle * middle - z * z)));
+        add(z, node.weight * math::exp(0.5 * (middle * middle - z * z)));
     }
   }
   const double mean = sum / weights;

@@ -7,6 +7,7 @@
 #include <numbers>
 
 #include "core/error.h"
+#include "core/math.h"
 #include "sensors/lidar/receiver/normal_spread.h"
 
 namespace groundray {
@@ -85,7 +86,7 @@ class SoftTarget {
   double at(double range_m) const noexcept {
     const double seen =
         (range_m - overlap_.none_below_m) / (overlap_.full_from_m - overlap_.none_below_m);
-    return std::exp(-2 * extinction_per_m_ * range_m) * std::min(seen, 1.) / (range_m * range_m);
+    return math::exp(-2 * extinction_per_m_ * range_m) * std::min(seen, 1.) / (range_m * range_m);
   }
 
   void add_piece(double from, double to, Moments& sum) const noexcept {
@@ -109,7 +110,7 @@ class SoftTarget {
 }  // namespace
 
 double cone_solid_angle_sr(double angle_rad) noexcept {
-  const double s = std::sin(angle_rad / 4);
+  const double s = math::sin(angle_rad / 4);
   return 4 * pi * s * s;
 }
 

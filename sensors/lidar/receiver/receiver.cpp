@@ -6,6 +6,7 @@
 #include <numbers>
 
 #include "core/error.h"
+#include "core/math.h"
 #include "sensors/lidar/receiver/echo_trace.h"
 #include "sensors/lidar/receiver/normal_spread.h"
 
@@ -51,8 +52,8 @@ double correlated_share(double x) {
     return x * square * (1. / 6 - square / 20 + 3 * square * square / 280) *
            std::numbers::inv_sqrtpi;
   }
-  const double tail = std::exp(-x * x);
-  const double m0 = 0.5 * std::erf(x) / std::numbers::inv_sqrtpi;
+  const double tail = math::exp(-x * x);
+  const double m0 = 0.5 * math::erf(x) / std::numbers::inv_sqrtpi;
   const double m1 = 0.5 * (1 - tail);
   const double m3 = 0.5 * (1 - (1 + x * x) * tail);
   return (2 * m0 - 6 * m1 / x + 4 * m3 / (x * x * x)) * std::numbers::inv_sqrtpi;
@@ -217,7 +218,7 @@ Receiver::Receiver(const PulseSpec& pulse, const ReceiverSpec& spec)
   shot_w_ = 2 * photon_j * noise.excess_noise_factor * bandwidth_hz / noise.quantum_efficiency;
   crossings_hz_ = rice_rate_hz(response_sigma_s_);
   if (noise.false_alarm_rate_hz > 0) {
-    threshold_sigmas_ = std::sqrt(2 * std::log(crossings_hz_ / noise.false_alarm_rate_hz));
+    threshold_sigmas_ = std::sqrt(2 * math::log(crossings_hz_ / noise.false_alarm_rate_hz));
   }
 }
 
@@ -253,7 +254,7 @@ Receiver::Timed Receiver::timed(const EchoTrace& trace, double threshold_w, doub
       if (!spec_.noise) return {edge.bin};
       const double at_edge_w = noise_at(level_w), at_peak_w = spec_.fraction * noise_at(peak_w);
       const double apart = (trace.peak_bin() - edge.bin) / response_bins;
-      const double together = std::exp(-0.25 * apart * apart);
+      const double together = math::exp(-0.25 * apart * apart);
       const double variance_w2 =
           at_edge_w * at_edge_w + at_peak_w * at_peak_w - 2 * together * at_edge_w * at_peak_w;
       const double slope_w =
@@ -267,7 +268,7 @@ Receiver::Timed Receiver::timed(const EchoTrace& trace, double threshold_w, doub
                      right_w = trace.fall(peak_w).slope_w;
         const double noise_w = noise_at(peak_w);
         return {trace.peak_bin(),
-                0.5 * std::hypot(moved(noise_w, left_w), moved(noise_w, right_w))};
+                0.5 * math::hypot(moved(noise_w, left_w), moved(noise_w, right_w))};
       }
       return {trace.peak_bin(),
               moved(noise_at(peak_w), std::numbers::sqrt2 * response_bins * trace.curvature_w())};
@@ -374,7 +375,7 @@ void Receiver::add_false_alarms(const RangeGate& gate, const PulseNoise& noise,
   const double threshold = threshold_w(noise.background_w);
   const double sigmas = threshold / sigma_w;
   const double rate_hz = threshold_sigmas_ > 0 ? spec_.noise->false_alarm_rate_hz
-                                               : crossings_hz_ * std::exp(-0.5 * sigmas * sigmas);
+                                               : crossings_hz_ * math::exp(-0.5 * sigmas * sigmas);
   const double rate_per_m = rate_hz / m_per_s_;
   const double width_s = std::numbers::sqrt2 * spec_.response_fwhm_s;
   const std::size_t echoes = found.size();
@@ -384,7 +385,7 @@ void Receiver::add_false_alarms(const RangeGate& gate, const PulseNoise& noise,
   for (key.sub_ray = 0; key.sub_ray < most_alarms; ++key.sub_ray) {
     const glm::dvec2 uniform = random_uniform(key);
     if (1 - uniform.x > rate_per_m * (gate.far_m - range_m)) return;  // -ln u > 1 - u: beyond
-    range_m -= std::log(uniform.x) / rate_per_m;
+    range_m -= math::log(uniform.x) / rate_per_m;
     if (!(range_m < gate.far_m)) return;
     const auto hidden = [&](const Detection& echo) {
       return std::abs(range_m - echo.range_m) < m_per_s_ * echo.width_s;
@@ -392,7 +393,7 @@ void Receiver::add_false_alarms(const RangeGate& gate, const PulseNoise& noise,
     if (std::any_of(found.begin(), found.begin() + static_cast<std::ptrdiff_t>(echoes), hidden))
       continue;
     const double power_w =
-        std::min(std::sqrt(threshold * threshold - 2 * sigma_w * sigma_w * std::log(uniform.y)),
+        std::min(std::sqrt(threshold * threshold - 2 * sigma_w * sigma_w * math::log(uniform.y)),
                  spec_.saturation_w);
     const double time_s = range_m / m_per_s_ + offset_s_;
     const double sd_s = std::numbers::sqrt2 * response_sigma_s_ * sigma_w / power_w;

@@ -6,11 +6,12 @@
 #include <numbers>
 
 #include "core/error.h"
+#include "core/math.h"
 
 namespace groundray {
 namespace {
 
-const double cut_off_sigmas = std::sqrt(-2 * std::log(SystemPulse::cut_off));  // 5.678
+const double cut_off_sigmas = std::sqrt(-2 * math::log(SystemPulse::cut_off));  // 5.678
 constexpr int scan_steps = 4096;    // over a table's support, to find its peak and edges
 constexpr int halvings = 64;        // bisections of a bracket: to the last bit
 constexpr double sharp_sigmas = 9;  // beyond it a smooth ramp equals a sharp one: Phi(-9) = 1e-19
@@ -33,13 +34,15 @@ void check_pulse(const PulseSpec& spec) {
   broken.throw_if_any();
 }
 
-double normal_density(double x) { return std::exp(-0.5 * x * x) / std::sqrt(2 * std::numbers::pi); }
+double normal_density(double x) {
+  return math::exp(-0.5 * x * x) / std::sqrt(2 * std::numbers::pi);
+}
 
 // Returns max(x, 0) convolved with a Gaussian.
 double smooth_ramp(double x, double sigma) {
   if (std::abs(x) >= sharp_sigmas * sigma) return std::max(x, 0.0);
   const double z = x / sigma;
-  return x * 0.5 * std::erfc(-z / std::numbers::sqrt2) + sigma * normal_density(z);
+  return x * 0.5 * math::erfc(-z / std::numbers::sqrt2) + sigma * normal_density(z);
 }
 
 // Pulses begin at multiples of a vector of floats and are shifted within the first vector. Each
@@ -61,7 +64,7 @@ SystemPulse::SystemPulse(const PulseSpec& spec, double response_sigma_s)
     : sigma_s_(response_sigma_s) {
   check_pulse(spec);
   if (spec.shape.empty()) {
-    sigma_s_ = std::hypot(spec.fwhm_s / fwhm_per_sigma, response_sigma_s);
+    sigma_s_ = math::hypot(spec.fwhm_s / fwhm_per_sigma, response_sigma_s);
     end_s_ = cut_off_sigmas * sigma_s_;
     begin_s_ = -end_s_;
     peak_per_s_ = (*this)(0);
@@ -136,7 +139,7 @@ void SystemPulse::measure() {
 }
 
 double SystemPulse::rise_s(double fraction) const {
-  if (ramps_.empty()) return -sigma_s_ * std::sqrt(-2 * std::log(fraction));
+  if (ramps_.empty()) return -sigma_s_ * std::sqrt(-2 * math::log(fraction));
   const double level_per_s = fraction * peak_per_s_;
   const double step_s = (peak_s_ - begin_s_) / scan_steps;
   int k = 1;

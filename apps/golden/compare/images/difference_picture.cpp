@@ -14,6 +14,7 @@
 #include "apps/golden/compare/error_map.h"
 #include "apps/golden/html_text.h"
 #include "core/image/srgb.h"
+#include "core/math.h"
 
 namespace groundray::golden {
 namespace {
@@ -70,10 +71,10 @@ struct Scale {
   bool is_logarithmic = false;
 
   double value_at(double share) const {
-    return is_logarithmic ? low * std::pow(high / low, share) : low + share * (high - low);
+    return is_logarithmic ? low * math::pow(high / low, share) : low + share * (high - low);
   }
   double share(double value) const {
-    if (is_logarithmic) return std::log(std::max(value, low) / low) / std::log(high / low);
+    if (is_logarithmic) return math::log(std::max(value, low) / low) / math::log(high / low);
     return (value - low) / (high - low);
   }
 };

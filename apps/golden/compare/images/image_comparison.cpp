@@ -16,6 +16,7 @@
 
 #include "apps/golden/compare/error_figures.h"
 #include "core/error.h"
+#include "core/math.h"
 
 namespace groundray::golden {
 namespace {
@@ -198,7 +199,7 @@ std::array<double, window_px> weights() {
   double sum = 0;
   for (std::size_t i = 0; i < window_px; ++i) {
     const double off_px = static_cast<double>(i) - reach_px;
-    sum += result[i] = std::exp(-off_px * off_px / (2 * sigma_px * sigma_px));
+    sum += result[i] = math::exp(-off_px * off_px / (2 * sigma_px * sigma_px));
   }
   for (double& weight : result) weight /= sum;
   return result;

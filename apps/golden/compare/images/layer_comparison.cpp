@@ -16,6 +16,7 @@
 #include "apps/golden/compare/error_figures.h"
 #include "apps/golden/compare/images/difference_picture.h"
 #include "apps/golden/compare/images/image_comparison.h"
+#include "core/math.h"
 
 namespace groundray::golden {
 namespace {
@@ -148,7 +149,7 @@ void compare_depths(const ImageLayer& reference, const ImageLayer& other, Sectio
 
 double angle_deg(Pixel a, Pixel b) {
   const glm::dvec3 u(a[0], a[1], a[2]), v(b[0], b[1], b[2]);
-  return glm::degrees(std::atan2(glm::length(glm::cross(u, v)), glm::dot(u, v)));
+  return glm::degrees(math::atan2(glm::length(glm::cross(u, v)), glm::dot(u, v)));
 }
 
 void compare_normals(const ImageLayer& reference, const ImageLayer& other, Section& into) {
@@ -238,7 +239,7 @@ void compare_colours(const ImageLayer& reference, const ImageLayer& other, Secti
   const double white = name == "Picture" ? 1 : quantile(light, 0.99);
   if (white > 0) {
     tell(into, fmt::format("{}: PSNR, white being {:.4g}", name, white),
-         20 * std::log10(white / figures_of(each).rms), "dB");
+         20 * math::log10(white / figures_of(each).rms), "dB");
     tell(into, name + ": structural similarity (SSIM) of luminance, an aid to the eye",
          structural_similarity(luminance_of(reference), luminance_of(other), white));
   }
@@ -258,7 +259,7 @@ void compare_flows(const ImageLayer& reference, const ImageLayer& other, Section
     const glm::ivec2 at = errors.place(i);
     const Pixel a = reference.values.at(at.x, at.y), b = other.values.at(at.x, at.y);
     if (errors.all[i] > 3 && errors.all[i] > 0.05 * length_of(a)) ++outliers;
-    reversed_px += std::hypot(a[0] + b[0], a[1] + b[1]);
+    reversed_px += math::hypot(a[0] + b[0], a[1] + b[1]);
     error_px += errors.all[i];
   }
   const auto count = static_cast<double>(errors.all.size());

@@ -1,7 +1,6 @@
 #include "apps/golden/compare/scans/pulses.h"
 
 #include <algorithm>
-#include <cmath>
 #include <glm/geometric.hpp>
 #include <limits>
 #include <map>
@@ -9,13 +8,15 @@
 #include <numeric>
 #include <utility>
 
+#include "core/math.h"
+
 namespace groundray::golden {
 namespace {
 
 /// Returns the chord of an angle on the unit sphere, enlarged by a bound of its rounding error.
 double chord_of(double angle_rad) {
   constexpr double slack = 1 + 1e-12;
-  return 2 * std::sin(std::min(angle_rad, std::numbers::pi) / 2) * slack + 1e-15;
+  return 2 * math::sin(std::min(angle_rad, std::numbers::pi) / 2) * slack + 1e-15;
 }
 
 constexpr std::uint32_t no_first = std::numeric_limits<std::uint32_t>::max();
@@ -89,7 +90,7 @@ Pulses pulses_by(const Scan& scan, const std::vector<std::uint32_t>& groups,
 }  // namespace
 
 double angle_between(const glm::dvec3& a, const glm::dvec3& b) {
-  return std::atan2(glm::length(glm::cross(a, b)), glm::dot(a, b));
+  return math::atan2(glm::length(glm::cross(a, b)), glm::dot(a, b));
 }
 
 DirectionTree::DirectionTree(std::vector<glm::dvec3> directions)

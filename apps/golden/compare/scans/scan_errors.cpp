@@ -14,6 +14,7 @@
 
 #include "apps/golden/compare/error_figures.h"
 #include "apps/golden/compare/scans/pulses.h"
+#include "core/math.h"
 
 namespace groundray::golden {
 namespace {
@@ -71,11 +72,11 @@ Table table_of(std::string title, const std::string& what) {
 double start_of(int step) {
   static constexpr std::array<double, 3> digits{1, 2, 5};
   const int decade = step >= 0 ? step / 3 : -((2 - step) / 3);
-  return digits[static_cast<std::size_t>(step - 3 * decade)] * std::pow(10., decade);
+  return digits[static_cast<std::size_t>(step - 3 * decade)] * math::pow(10., decade);
 }
 
 int range_step(double range_m) {
-  int step = 3 * static_cast<int>(std::floor(std::log10(range_m)));
+  int step = 3 * static_cast<int>(std::floor(math::log10(range_m)));
   while (start_of(step) > range_m) --step;
   while (start_of(step + 1) <= range_m) ++step;
   return std::max(step, -1);  // all ranges below 1 m form one class

@@ -16,6 +16,7 @@
 
 #include "apps/golden/compare/scans/pulses.h"
 #include "core/error.h"
+#include "core/math.h"
 
 namespace groundray::golden {
 namespace {
@@ -61,7 +62,7 @@ std::vector<double> places_of(const Pulses& pulses, PairingRule rule) {
   if (rule == PairingRule::RingTime) return pulses.times;
   std::vector<double> azimuths;
   for (const glm::dvec3& d : pulses.directions) {
-    const double azimuth_rad = std::atan2(d.y, d.x);
+    const double azimuth_rad = math::atan2(d.y, d.x);
     azimuths.push_back(azimuth_rad < 0 ? azimuth_rad + full_turn_rad : azimuth_rad);
   }
   return azimuths;

@@ -1,7 +1,6 @@
 #include "apps/golden/compare/scans/scan_pictures.h"
 
 #include <algorithm>
-#include <cmath>
 #include <cstddef>
 #include <cstdint>
 #include <functional>
@@ -15,6 +14,7 @@
 
 #include "apps/golden/compare/error_figures.h"
 #include "apps/golden/compare/error_map.h"
+#include "core/math.h"
 
 namespace groundray::golden {
 namespace {
@@ -40,10 +40,10 @@ void fill(const Scan& reference, const Scan& other, const Pairs& pairs, const Sc
   for (const std::uint32_t j : pairs.extra) map.add_unpaired(place_of(other, j));
 }
 
-double azimuth_deg(const glm::dvec3& p_S) { return glm::degrees(std::atan2(p_S.y, p_S.x)); }
+double azimuth_deg(const glm::dvec3& p_S) { return glm::degrees(math::atan2(p_S.y, p_S.x)); }
 
 double elevation_deg(const glm::dvec3& p_S) {
-  return glm::degrees(std::atan2(p_S.z, std::hypot(p_S.x, p_S.y)));
+  return glm::degrees(math::atan2(p_S.z, math::hypot(p_S.x, p_S.y)));
 }
 
 /// Returns true if rings with larger numbers point lower.

@@ -17,6 +17,7 @@
 #include "apps/view/window/panels/picture_area.h"
 #include "apps/view/window/style.h"
 #include "apps/view/window/widgets.h"
+#include "core/math.h"
 
 namespace groundray {
 namespace {
@@ -34,7 +35,7 @@ bool has_exposure(const ImageChannel& channel) {
 
 double value_at(const ImageLegend& legend, double share) {
   return legend.is_logarithmic && legend.low > 0
-             ? legend.low * std::pow(legend.high / legend.low, share)
+             ? legend.low * math::pow(legend.high / legend.low, share)
              : legend.low + share * (legend.high - legend.low);
 }
 

@@ -8,6 +8,7 @@
 #include <utility>
 
 #include "apps/view/window/style.h"
+#include "core/math.h"
 
 namespace groundray {
 namespace {
@@ -152,7 +153,7 @@ void PictureArea::wheelEvent(QWheelEvent* event) {
   const QPointF middle(width() / 2.0, height() / 2.0);
   const QPointF from_middle = event->position() - middle - shift_;
   const double before = zoom_;
-  zoom_ = std::clamp(zoom_ * std::pow(1.2, event->angleDelta().y() / 120.0), 1.0, most_zoom);
+  zoom_ = std::clamp(zoom_ * math::pow(1.2, event->angleDelta().y() / 120.0), 1.0, most_zoom);
   shift_ -= from_middle * (zoom_ / before - 1);  // the point under the mouse stays in place
   if (zoom_ <= 1) shift_ = {};
   update();

@@ -12,13 +12,13 @@
 #include <QProgressBar>
 #include <QPushButton>
 #include <QVBoxLayout>
-#include <cmath>
 #include <exception>
 #include <glm/trigonometric.hpp>
 
 #include "apps/view/layers/cloud_layer.h"
 #include "apps/view/layers/line_layer.h"
 #include "apps/view/window/widgets.h"
+#include "core/math.h"
 
 namespace groundray {
 namespace {
@@ -216,8 +216,8 @@ void ScanPanel::place_at(const glm::dvec3& at_w_m, const glm::dvec3& towards_w_m
 
 void ScanPanel::put(const glm::dvec3& at_w_m, const glm::dvec3& towards_w_m) {
   const glm::dvec3 ahead = towards_w_m - at_w_m;
-  if (std::hypot(ahead.x, ahead.y) > 0) {
-    heading_->setValue(glm::degrees(std::atan2(ahead.y, ahead.x)));
+  if (math::hypot(ahead.x, ahead.y) > 0) {
+    heading_->setValue(glm::degrees(math::atan2(ahead.y, ahead.x)));
   }
   at_m_ = glm::dvec2(at_w_m - simulation_->terrain.header().origin_w_m);
   status_->clear();
