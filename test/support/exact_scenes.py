@@ -1,6 +1,6 @@
 """Datasets of the scenes of data/, with all rays traced exactly.
 
-exact_scenes.py make FOLDER [PROGRAM]      writes one of each scene to FOLDER
+exact_scenes.py make FOLDER PROGRAM        writes one of each scene to FOLDER
 exact_scenes.py compare FOLDER FOLDER      compares them byte by byte
 
 Run with the Python of the system: it needs no packages.
@@ -20,25 +20,32 @@ def scenes() -> list[Path]:
     return [file for file in files if "\ngroundray: 1\n" in "\n" + file.read_text()]
 
 
-def make(folder: Path, program: Path, *options: str, **variables: str) -> None:
-    """Writes a dataset of each scene to a folder of its name."""
+def make(
+    folder: Path, program: Path, files: list[Path], *options: str, **variables: str
+) -> list[str]:
+    """Writes a dataset of each scene of `files`; returns the standard error of each run."""
+    reports = []
     shutil.rmtree(folder, ignore_errors=True)
     (folder / "scenes").mkdir(parents=True)
     for part in DATA.iterdir():
         if part.name != "scenes":
             (folder / part.name).symlink_to(part)
-    for file in scenes():
+    for file in files:
         for other in file.parent.glob("*.yaml"):
             shutil.copy(other, folder / "scenes")
         scene = folder / "scenes" / file.name
         text = file.read_text()
         assert "\ntracing:" not in text, f"{file} chooses its tracing"
         scene.write_text(text.replace("groundray: 1\n", "groundray: 1\ntracing: exact\n", 1))
-        subprocess.run(
-            [program, "generate", scene, "-o", folder / "datasets" / file.stem, "--quiet", *options],
-            check=True,
+        done = subprocess.run(
+            [program, "generate", scene, "-o", folder / "datasets" / file.stem, *options],
             env={**os.environ, **variables},
+            capture_output=True,
+            text=True,
         )
+        assert done.returncode == 0, done.stderr
+        reports.append(done.stderr)
+    return reports
 
 
 def differences(one: Path, other: Path) -> list[str]:
@@ -53,14 +60,16 @@ def differences(one: Path, other: Path) -> list[str]:
         first, second = (files[name].read_bytes() for files in listed)
         if first != second:
             unequal = sum(a != b for a, b in zip(first, second, strict=False))
-            found.append(f"{name}: {unequal} of {len(first)} bytes differ, {len(second)} in the other")
+            found.append(
+                f"{name}: {unequal} of {len(first)} bytes differ; the other has {len(second)}"
+            )
     return sorted(found)
 
 
 def main() -> None:
     match sys.argv[1:]:
         case ["make", folder, program]:
-            make(Path(folder), Path(program))
+            make(Path(folder), Path(program), scenes())
         case ["compare", one, other]:
             found = differences(Path(one), Path(other))
             print("\n".join(found) or f"all files of {one} and {other} are equal")
