@@ -1,4 +1,5 @@
 #include <fmt/format.h>
+#include <gnu/libc-version.h>
 
 #include <CLI/CLI.hpp>
 #include <algorithm>
@@ -14,7 +15,6 @@
 #include "apps/golden/compare/compare_command.h"
 #include "apps/golden/conform/conform_commands.h"
 #include "apps/golden/report.h"
-#include "apps/golden/suite/checks.h"
 #include "apps/golden/suite/golden_case.h"
 #include "apps/golden/suite/suite.h"
 #include "apps/scan/usage_fault.h"
@@ -46,6 +46,21 @@ void print(const Section& section) {
     print_text(stdout, "       {}: {:.6g} {}, but at most {:.6g} because: {}\n", measure.name,
                measure.value, measure.unit, measure.limit.value_or(0), measure.because);
   }
+}
+
+// Returns the C library, compiler and processor of this program.
+std::string made_with() {
+#ifdef __clang__
+  const std::string compiler = fmt::format("clang {}", __clang_major__);
+#else
+  const std::string compiler = fmt::format("gcc {}", __GNUC__);
+#endif
+#ifdef __x86_64__
+  const char* const processor = "x86_64";
+#else
+  const char* const processor = "another processor";
+#endif
+  return fmt::format("glibc {}, {}, {}", gnu_get_libc_version(), compiler, processor);
 }
 
 int run_suite(const fs::path& folder, const std::vector<std::string>& filters,

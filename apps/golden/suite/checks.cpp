@@ -2,13 +2,10 @@
 
 #include <fmt/format.h>
 #include <fmt/ranges.h>
-#include <gnu/libc-version.h>
 
 #include <algorithm>
 #include <array>
-#include <bit>
 #include <cmath>
-#include <cstdint>
 #include <limits>
 #include <numeric>
 #include <vector>
@@ -16,7 +13,6 @@
 #include "apps/golden/compare/images/difference_picture.h"
 #include "apps/golden/suite/columns.h"
 #include "core/error.h"
-#include "core/math.h"
 
 namespace groundray::golden {
 namespace {
@@ -122,39 +118,13 @@ double number_of(const std::string& formula, std::size_t rows) {
   return evaluate(formula, one).front();
 }
 
-// FNV-1a hash of values that the C library's functions return. The library has several versions of
-// them, for processors with and without fused multiply-add.
-std::uint64_t print_of_functions() {
-  std::uint64_t print = 0xcbf29ce484222325;
-  const auto add = [&](double value) {
-    print = (print ^ std::bit_cast<std::uint64_t>(value)) * 0x100000001b3;
-  };
-  for (int i = 1; i <= 1000; ++i) {
-    const double x = i / 1000.5;
-    for (const double value :
-         {math::sin(9 * x), math::cos(9 * x), math::tan(x), math::asin(x), math::acos(x),
-          math::atan2(x, 0.3), math::exp(-5 * x), math::log(x), math::pow(x, 1.7), math::erf(x)}) {
-      add(value);
-    }
-  }
-  return print;
-}
-
 std::vector<std::string> names_of(const Columns& columns) {
   std::vector<std::string> names;
   for (const Columns::Column& column : columns.all) names.push_back(column.name);
   return names;
 }
 
-bool are_equal(double a, double b, Stored stored, Equal equal) {
-  if (a == b || (std::isnan(a) && std::isnan(b))) return true;
-  if (equal == Equal::Bits || stored == Stored::Whole) return false;
-  if (stored == Stored::Double)
-    return std::abs(a - b) <= 1e-12 * std::max(std::abs(a), std::abs(b));
-  const auto from = static_cast<float>(a);
-  const auto to = static_cast<float>(b);
-  return std::nextafter(from, to) == to;
-}
+bool are_equal(double a, double b) { return a == b || (std::isnan(a) && std::isnan(b)); }
 
 }  // namespace
 
@@ -199,23 +169,8 @@ void check_figure(const FigureCheck& check, const std::string& because, const Co
        apart, "", tolerance, because);
 }
 
-std::string made_with() {
-  return fmt::format("glibc {}, {} {}, {}, functions {:016x}", gnu_get_libc_version(),
-#ifdef __clang__
-                     "clang", __clang_major__,
-#else
-                     "gcc", __GNUC__,
-#endif
-#ifdef __x86_64__
-                     "x86_64",
-#else
-                     "another processor",
-#endif
-                     print_of_functions());
-}
-
-void check_equal(const Columns& columns, const Columns& stored, Equal equal,
-                 const std::string& because, Section& into) {
+void check_equal(const Columns& columns, const Columns& stored, const std::string& because,
+                 Section& into) {
   if (names_of(columns) != names_of(stored)) {
     throw Error("it has the columns {}; those stored are {}", fmt::join(names_of(columns), " "),
                 fmt::join(names_of(stored), " "));
@@ -230,7 +185,7 @@ void check_equal(const Columns& columns, const Columns& stored, Equal equal,
     double largest = 0;
     std::vector<double> apart(columns.rows);
     for (std::size_t i = 0; i < columns.rows; ++i) {
-      if (are_equal(column.values[i], expected.values[i], expected.stored, equal)) continue;
+      if (are_equal(column.values[i], expected.values[i])) continue;
       ++unequal;
       const double off = std::abs(column.values[i] - expected.values[i]);
       apart[i] = std::isfinite(off) ? off : std::numeric_limits<double>::infinity();

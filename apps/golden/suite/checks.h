@@ -22,20 +22,11 @@ void check_rows(const RowsCheck& check, const std::string& because, const Column
 void check_figure(const FigureCheck& check, const std::string& because, const Columns& columns,
                   Section& into);
 
-/// Returns the C library, compiler and processor of this program, with a hash of values that the
-/// library's functions return here. Files stored with the same text must match bit for bit.
-std::string made_with();
-
-/// Criterion for equality with stored values.
-enum class Equal {
-  Bits,   ///< equal values; NaN equals NaN
-  Nearly  ///< for another C library: doubles to 1e-12 relative, floats equal or adjacent
-};
-
-/// Compares a product with a stored one, column by column.
+/// Compares a product with a stored one, column by column: all values must be equal; NaN equals
+/// NaN.
 /// @throws Error if the names of their columns or their sizes differ.
-void check_equal(const Columns& columns, const Columns& stored, Equal equal,
-                 const std::string& because, Section& into);
+void check_equal(const Columns& columns, const Columns& stored, const std::string& because,
+                 Section& into);
 
 /// Number of runs, with different seeds, behind a stored mean and variance.
 inline constexpr int statistical_runs = 64;

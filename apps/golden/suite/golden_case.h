@@ -21,8 +21,7 @@ struct FigureCheck {
   std::string value, is, within;  ///< formulas; `is` and `within` may use only `rows`
 };
 
-/// Check that all columns equal those of a stored file: exactly, if that was stored with the same
-/// made_with().
+/// Check that all columns equal those of a stored file.
 struct ExactCheck {};
 
 /// Check that columns are samples of distributions with a stored mean and variance.

@@ -18,10 +18,6 @@ namespace {
 // run would be one of the stored ones.
 constexpr std::uint64_t first_seed = 0x676f6c64656e0000;
 
-std::filesystem::path note_of(const GoldenCase& golden) {
-  return golden.expected() / "made_with.txt";
-}
-
 // Copies a file atomically: an existing one remains if this fails.
 void copy_whole(const std::filesystem::path& from, const std::filesystem::path& to) {
   std::filesystem::create_directories(to.parent_path());
@@ -65,12 +61,6 @@ std::filesystem::path stored_moments(const GoldenCase& golden, const std::string
   return (golden.expected() / product).replace_extension(".moments.exr");
 }
 
-std::string stored_made_with(const GoldenCase& golden) {
-  std::string note = read_text(note_of(golden));
-  while (!note.empty() && note.back() == '\n') note.pop_back();
-  return note;
-}
-
 void store(const GoldenCase& golden,
            const std::function<std::filesystem::path(std::uint64_t seed)>& run) {
   const auto exact = checks_of<ExactCheck>(golden);
@@ -83,7 +73,6 @@ void store(const GoldenCase& golden,
     const std::filesystem::path dataset = run(0);
     for (const auto& check : exact)
       copy_whole(dataset / check.first, stored_file(golden, check.first));
-    write_text(note_of(golden), made_with() + "\n");
   }
   if (statistical.empty()) return;
   std::vector<Moments> moments;

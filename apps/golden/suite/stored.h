@@ -15,10 +15,6 @@ std::filesystem::path stored_file(const GoldenCase& golden, const std::string& p
 /// Returns the path of the EXR file with the mean and variance of a product.
 std::filesystem::path stored_moments(const GoldenCase& golden, const std::string& product);
 
-/// Returns made_with() of the program that stored the files.
-/// @throws Error if it is missing.
-std::string stored_made_with(const GoldenCase& golden);
-
 /// Stores present results as the expected ones of a case: the files of one run, and the moments of
 /// `statistical_runs` runs.
 /// @param run  makes the dataset with a given seed, or with the scene's own seed for 0, and returns

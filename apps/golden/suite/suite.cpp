@@ -123,8 +123,7 @@ struct Checker {
   void operator()(const RowsCheck& check) const { check_rows(check, because, rows, into); }
   void operator()(const FigureCheck& check) const { check_figure(check, because, rows, into); }
   void operator()(const ExactCheck&) const {
-    const Equal equal = stored_made_with(golden) == made_with() ? Equal::Bits : Equal::Nearly;
-    check_equal(whole, read_columns(stored_file(golden, product.product)), equal, because, into);
+    check_equal(whole, read_columns(stored_file(golden, product.product)), because, into);
   }
   void operator()(const StatisticalCheck& check) const {
     check_statistically(check, because, whole,
