@@ -67,20 +67,16 @@ void part_surfaces(const LitPulse& pulse, std::size_t begin, std::size_t end, do
   };
   const bool unresolved =
       work.arrivals[end - 1].range_m - work.arrivals[begin].range_m <= resolution_m;
-  LitSurface whole{.object = hit_of(begin).object};
+  LitSurface nearest{.object = hit_of(begin).object};
   std::size_t k = begin;
-  if (unresolved) {
-    for (; k < end && hit_of(k).object == whole.object; ++k) add(k, whole);
-  } else {
-    add(k++, whole);
-  }
-  work.surfaces.push_back(whole);
+  while (k < end && (unresolved || k == begin) && hit_of(k).object == nearest.object)
+    add(k++, nearest);
+  work.surfaces.push_back(nearest);
   for (; k < end; ++k) {
     const std::uint32_t object = hit_of(k).object;
     const auto continues = [&](const LitSurface& surface) {
-      return surface.object == object &&
-             (unresolved ||
-              are_joined(pulse, work.order[surface.last], work.order[k], resolution_m));
+      return surface.object == object && (unresolved || are_joined(pulse, work.order[surface.last],
+                                                                   work.order[k], resolution_m));
     };
     std::size_t at = work.surfaces.size();
     while (at > 0 && !continues(work.surfaces[at - 1])) --at;
