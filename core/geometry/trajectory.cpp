@@ -55,7 +55,7 @@ Trajectory::Place Trajectory::place_of(std::chrono::nanoseconds time) const {
       seconds(span)};
 }
 
-Pose Trajectory::pose_at(std::chrono::nanoseconds time) const {
+[[gnu::flatten]] Pose Trajectory::pose_at(std::chrono::nanoseconds time) const {
   const auto [i, share, span_s] = place_of(time);
   const Pose& before = samples_[i].pose;
   if (span_s == 0 || before == samples_[i + 1].pose) return before;

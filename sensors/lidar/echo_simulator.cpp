@@ -54,15 +54,30 @@ bool are_joined(const LitPulse& pulse, std::uint32_t near, std::uint32_t far, do
 void part_surfaces(const LitPulse& pulse, std::size_t begin, std::size_t end, double resolution_m,
                    EchoSimulator::Workspace& work) {
   work.surfaces.clear();
-  work.surface_of.resize(end - begin);
-  const bool unresolved =
-      begin < end && work.arrivals[end - 1].range_m - work.arrivals[begin].range_m <= resolution_m;
-  for (std::size_t k = begin; k < end; ++k) {
+  work.surface_of.assign(end - begin, 0);
+  if (begin == end) return;
+  const auto hit_of = [&](std::size_t k) -> const Hit& { return pulse.hits[work.order[k]]; };
+  const auto add = [&](std::size_t k, LitSurface& surface) {
     const double energy_j = work.arrivals[k].energy_j;
-    const std::uint32_t hit = work.order[k], object = pulse.hits[hit].object;
+    surface.last = k;
+    surface.energy_j += energy_j;
+    if (energy_j > surface.strongest_j) {
+      surface.strongest_j = energy_j;
+      surface.strongest = k;
+    }
+  };
+  const bool unresolved =
+      work.arrivals[end - 1].range_m - work.arrivals[begin].range_m <= resolution_m;
+  LitSurface nearest{.object = hit_of(begin).object};
+  std::size_t k = begin;
+  while (k < end && (unresolved || k == begin) && hit_of(k).object == nearest.object)
+    add(k++, nearest);
+  work.surfaces.push_back(nearest);
+  for (; k < end; ++k) {
+    const std::uint32_t object = hit_of(k).object;
     const auto continues = [&](const LitSurface& surface) {
-      return surface.object == object &&
-             (unresolved || are_joined(pulse, work.order[surface.last], hit, resolution_m));
+      return surface.object == object && (unresolved || are_joined(pulse, work.order[surface.last],
+                                                                   work.order[k], resolution_m));
     };
     std::size_t at = work.surfaces.size();
     while (at > 0 && !continues(work.surfaces[at - 1])) --at;
@@ -70,13 +85,7 @@ void part_surfaces(const LitPulse& pulse, std::size_t begin, std::size_t end, do
       work.surfaces.push_back({.object = object});
       at = work.surfaces.size();
     }
-    LitSurface& surface = work.surfaces[at - 1];
-    surface.last = k;
-    surface.energy_j += energy_j;
-    if (energy_j > surface.strongest_j) {
-      surface.strongest_j = energy_j;
-      surface.strongest = k;
-    }
+    add(k, work.surfaces[at - 1]);
     work.surface_of[k - begin] = static_cast<std::uint32_t>(at - 1);
   }
 }
@@ -236,29 +245,30 @@ void EchoSimulator::collect(const LitPulse& pulse, const RetroBrdfs& brdfs, doub
   work.arrivals.resize(count);
   work.sunlit = 0;
   if (count == 0) return;
+  work.seen.resize(count);
   Arrival* const arrivals = work.arrivals.data();
+  double* const seen = work.seen.data();
   const auto share = shares_of(pulse);
   for (std::size_t k = 0; k < count; ++k) {
     const std::uint32_t i = work.order[k];
     const Hit& hit = pulse.hits[i];
     const auto [retro_cos_per_sr, albedo] = brdfs.reflection_of(pulse.rays[i], hit, pulse.traced);
     arrivals[k] = {hit.range_m, retro_cos_per_sr};
-    work.sunlit += share(i) * albedo * sun_cosine(hit.normal);
+    seen[k] = share(i) * overlap_share(spec_.overlap, hit.range_m);
+    if (sun_w_ > 0) work.sunlit += share(i) * albedo * sun_cosine(hit.normal);
   }
   const auto receive = [&](std::size_t k, double transmission) {
-    Arrival& arrival = arrivals[k];
-    const double seen = share(work.order[k]) * overlap_share(spec_.overlap, arrival.range_m);
-    arrival.energy_j =
-        seen > 0 ? radar_.received_energy_j(seen, arrival.energy_j, arrival.range_m, transmission)
-                 : 0;
+    const auto [range_m, retro_cos_per_sr] = arrivals[k];
+    const double energy_j =
+        radar_.received_energy_j(seen[k], retro_cos_per_sr, range_m, transmission);
+    arrivals[k].energy_j = seen[k] > 0 ? energy_j : 0;
   };
   const double nearest_m = arrivals[0].range_m;
   if (extinction_per_m * (arrivals[count - 1].range_m - nearest_m) < small_exponent) {
     const double to_nearest = math::exp(-extinction_per_m * nearest_m);  // one exponential for all
-    for (std::size_t k = 0; k < count; ++k) {
-      const double exponent = extinction_per_m * (nearest_m - arrivals[k].range_m);
-      receive(k, to_nearest * exp_of_small(exponent));
-    }
+#pragma omp simd
+    for (std::size_t k = 0; k < count; ++k)
+      receive(k, to_nearest * exp_of_small(extinction_per_m * (nearest_m - arrivals[k].range_m)));
   } else {
     for (std::size_t k = 0; k < count; ++k)
       receive(k, math::exp(-extinction_per_m * arrivals[k].range_m));
@@ -333,7 +343,10 @@ void EchoSimulator::attribute_echo(const LitPulse& pulse, const Detection& detec
         detection.kind == Detection::Kind::FalseAlarm ? Echo::Kind::FalseAlarm : Echo::Kind::Air;
     return;
   }
-  glm::dvec3 normal(0);
+  // Sums are local, for the compiler cannot know that no hit is part of the echo.
+  double range_m = 0, bound_m = 0;
+  glm::dvec3 p_DQ(0), normal(0);
+  float deviation_m = 0;
   const double per_energy = 1 / best.energy_j;
   for (std::size_t k = 0; k < work.surface_of.size(); ++k) {
     if (work.surface_of[k] != best_number) continue;
@@ -341,13 +354,17 @@ void EchoSimulator::attribute_echo(const LitPulse& pulse, const Detection& detec
     const double weight = work.arrivals[first + k].energy_j * per_energy;
     const Ray& ray = pulse.rays[i];
     const Hit& hit = pulse.hits[i];
-    echo.range_m += weight * hit.range_m;
-    echo.p_DQ += weight * (ray.origin + ray.direction * hit.range_m);
+    range_m += weight * hit.range_m;
+    p_DQ += weight * (ray.origin + ray.direction * hit.range_m);
     normal += weight * glm::dvec3(hit.normal);
-    echo.deviation_m = std::max(echo.deviation_m, hit.deviation_m);
-    if (!pulse.bounds_m.empty()) echo.bound_m = std::max(echo.bound_m, pulse.bounds_m[i]);
+    deviation_m = std::max(deviation_m, hit.deviation_m);
+    if (!pulse.bounds_m.empty()) bound_m = std::max(bound_m, pulse.bounds_m[i]);
   }
+  echo.range_m = range_m;
+  echo.p_DQ = p_DQ;
   echo.normal = glm::vec3(glm::normalize(normal));
+  echo.deviation_m = deviation_m;
+  echo.bound_m = bound_m;
   echo.share = static_cast<float>(best.energy_j / (energy_j + air_j));
   echo.second_share = static_cast<float>(second.energy_j / (energy_j + air_j));
   echo.hit = work.order[best.strongest];

@@ -105,11 +105,12 @@ class EchoSimulator {
  public:
   /// Buffers of one thread, reused for every pulse.
   struct Workspace {
-    std::vector<std::uint32_t> order;       ///< sub-rays with a hit, by range
-    std::vector<Arrival> arrivals;          ///< in the same order
+    std::vector<std::uint32_t> order;  ///< sub-rays with a hit, by range
+    std::vector<Arrival> arrivals;     ///< in the same order
+    std::vector<double> seen;  ///< share of the pulse's energy that the receiver sees, likewise
     std::vector<LitSurface> surfaces;       ///< surfaces that contribute to an echo
     std::vector<std::uint32_t> surface_of;  ///< surface of each of the echo's arrivals
-    double sunlit = 0;  ///< mean over the sub-rays of albedo times the sun's cosine
+    double sunlit = 0;  ///< mean of albedo times the sun's cosine; 0 if no sunlight is received
     Waveform waveform;
     Detections detections;
     std::vector<Echo> echoes;         ///< echoes of the last pulse, by reported range

@@ -225,7 +225,13 @@ std::string wkt_of(const OGRSpatialReference& crs) {
   const char* options[] = {"FORMAT=WKT2_2019", "MULTILINE=NO", nullptr};
   crs.exportToWkt(&text, options);
   const std::unique_ptr<char, decltype(&VSIFree)> owner(text, &VSIFree);
-  return text == nullptr ? "" : text;
+  if (text == nullptr) return {};
+  // PROJ gives the datum of a local CRS no name before version 9.5, and this one since.
+  std::string wkt = text;
+  const std::string_view nameless = "EDATUM[\"";
+  const std::size_t at = wkt.find("EDATUM[\"\"");
+  if (at != std::string::npos) wkt.insert(at + nameless.size(), "Unknown engineering datum");
+  return wkt;
 }
 
 std::string shell_word(const std::string& word) {

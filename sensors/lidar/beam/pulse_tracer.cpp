@@ -59,8 +59,9 @@ void PulseTracer::lay_axes(const SweepPath& sweep, std::int64_t begin, const Set
 
 void PulseTracer::add_sub_rays(std::size_t pulse, int level, const LaserBeam& beam,
                                const RandomKey& key, Ray* out) const {
-  const Ray& axis = this->axis(pulse);
-  const glm::dvec3& horizontal = horizontals_[pulse];
+  // Copies, for the compiler cannot know that `out` is none of them.
+  const Ray axis = this->axis(pulse);
+  const glm::dvec3 horizontal = horizontals_[pulse];
   const glm::dvec3 vertical = glm::cross(axis.direction, horizontal);
   const auto sub_rays = beam.sub_rays(level);
   LaserBeam::Rotation turn;
@@ -71,13 +72,15 @@ void PulseTracer::add_sub_rays(std::size_t pulse, int level, const LaserBeam& be
         2 * std::numbers::pi * random_uniform(key_of(key, number, RandomStream::BeamTurn)).x;
     turn = {math::cos(angle_rad), math::sin(angle_rad)};
   }
-  const auto lay = [&](const LaserBeam::SubRay& to) -> Ray {
-    const glm::dvec3 along = axis.direction + to.slope.x * horizontal + to.slope.y * vertical;
-    return {axis.origin + to.offset_m.x * horizontal + to.offset_m.y * vertical,
-            along * to.per_length, axis.far_m, axis.time};
+  const auto lay = [&](const LaserBeam::SubRay& to, Ray& ray) {
+    ray.origin = axis.origin + to.offset_m.x * horizontal + to.offset_m.y * vertical;
+    ray.direction = axis.direction + to.slope.x * horizontal + to.slope.y * vertical;
+    ray.direction *= to.per_length;
+    ray.far_m = axis.far_m;
+    ray.time = axis.time;
   };
   for (std::size_t i = 0; i < sub_rays.size(); ++i)
-    out[i] = turns ? lay(beam.turned(level, i, turn)) : lay(sub_rays[i]);
+    turns ? lay(beam.turned(level, i, turn), out[i]) : lay(sub_rays[i], out[i]);
 }
 
 void PulseTracer::cast(const SweepPath& sweep, std::int64_t begin, std::int64_t end,

@@ -536,6 +536,11 @@ TEST_F(DrapeIo, RejectsPhotosThatCannotBeGeoreferenced) {
   file.crs = R"(LOCAL_CS["site grid",UNIT["metre",1]])";
   saved(file);
   EXPECT_EQ(photo_error({.crs_wkt = wkt_of(file.crs.c_str())}), "no error");
+  const std::string named =  // as the ground's is
+      R"(ENGCRS["site grid",EDATUM["Unknown engineering datum"],CS[Cartesian,2],)"
+      R"(AXIS["easting",east,ORDER[1],LENGTHUNIT["metre",1]],)"
+      R"(AXIS["northing",north,ORDER[2],LENGTHUNIT["metre",1]]])";
+  EXPECT_EQ(photo_error({.crs_wkt = named}), "no error");
   EXPECT_EQ(photo_error(), "no error");
   EXPECT_THAT(photo_error({.crs_wkt = wkt_of("EPSG:32632")}),
               AllOf(HasSubstr("site grid"), HasSubstr("WGS 84 / UTM zone 32N (EPSG:32632)")));
