@@ -339,6 +339,7 @@ void Lidar::Sweep::write(const Chunk& chunk, const ScanColumns& columns) const {
                         .bound_m = chunk.bounds_m.empty() ? 0 : chunk.bounds_m[at]});
     ++row;
   }
+  columns.complete(chunk.first_row, row);
 }
 
 EchoRow Lidar::Sweep::row_of(const Echo& echo, const PulseTracer& cast, std::size_t pulse,
@@ -404,6 +405,7 @@ void Lidar::Sweep::write_light() {
   tbb::parallel_for(std::size_t{0}, light_rows_.size(), [&](std::size_t chunk) {
     std::size_t row = light_rows_[chunk].first_row;
     for (const EchoRow& echo : light_rows_[chunk].rows) columns.write(row++, echo);
+    columns.complete(light_rows_[chunk].first_row, row);
   });
 }
 

@@ -6,11 +6,13 @@
 #include <cstdint>
 #include <glm/vec3.hpp>
 #include <limits>
+#include <numbers>
 #include <span>
 #include <type_traits>
 
 #include "core/elementary.h"
 #include "core/io/point_cloud.h"
+#include "core/pack.h"
 #include "core/tracing/scene.h"
 #include "sensors/lidar/echo_simulator.h"
 
@@ -62,7 +64,7 @@ class ScanColumns {
     if (spec.error_bound == LidarSpec::ErrorBound::Report) for_bounds(*this, add);
   }
 
-  /// Writes the values that have a column.
+  /// Writes the values that have a column. The angle of incidence awaits complete().
   void write(std::size_t row, const EchoRow& echo) const noexcept {
     const auto set = [&](const auto& column, const char* /*name*/, const auto& value) {
       column[row] = value(echo);
@@ -72,6 +74,24 @@ class ScanColumns {
     if (!range_sd_.empty()) for_noise(*this, set);
     if (!velocity_[0].empty()) for_motion(*this, set);
     if (!error_bound_.empty()) for_bounds(*this, set);
+  }
+
+  /// Completes rows [begin, end) once they are written: computes angles of incidence, which then
+  /// are tangents, in packs.
+  void complete(std::size_t begin, std::size_t end) const noexcept {
+    const auto complete_pack = [](float* angles) {
+      const Pack tangent(angles, std::experimental::element_aligned);
+      const Pack acute = angle_of(abs(tangent), Pack(1.0));
+      const Pack angle = select(tangent < 0.0, std::numbers::pi - acute, acute);
+      select(tangent == tangent, angle, tangent)
+          .copy_to(angles, std::experimental::element_aligned);
+    };
+    std::size_t row = begin;
+    for (; row + pack_size <= end; row += pack_size) complete_pack(&incidence_[row]);
+    std::array<float, pack_size> rest{};
+    std::copy_n(incidence_.begin() + row, end - row, rest.begin());
+    complete_pack(rest.data());
+    std::copy_n(rest.begin(), end - row, incidence_.begin() + row);
   }
 
  private:
@@ -95,9 +115,8 @@ class ScanColumns {
     act(self.nx_, "nx", [](Row row) { return row.normal.x; });
     act(self.ny_, "ny", [](Row row) { return row.normal.y; });
     act(self.nz_, "nz", [](Row row) { return row.normal.z; });
-    act(self.incidence_, "incidence", [](Row row) {
-      return static_cast<float>(angle_of<double>(row.sin_incidence, row.cos_incidence));
-    });
+    act(self.incidence_, "incidence",
+        [](Row row) { return row.sin_incidence / row.cos_incidence; });  // see complete()
     act(self.label_, "label", [](Row row) { return row.surface.label; });
     act(self.instance_, "instance", [](Row row) { return row.surface.instance; });
     act(self.error_estimate_, "error_estimate",
