@@ -77,6 +77,7 @@ class Camera:
     size_px: tuple[int, int]
     lens_model: str
     lens: dict[str, Any]
+    pinhole_matrix: Floats | None  # K, 3 x 3, px; None if the lens is not a pinhole
     exposure_s: float
     row_s: float
 
@@ -84,17 +85,6 @@ class Camera:
     def middle_ns(self) -> int:
         """Time from an image's stamp to the middle of its middle row's exposure."""
         return round((self.exposure_s + self.row_s * (self.size_px[1] - 1)) / 2 * 1e9)
-
-    def pinhole_matrix(self) -> Floats | None:
-        """Returns K, 3 x 3, px; None if the lens is not a pinhole."""
-        has_distortion = any(float(k) for k in self.lens.get("coefficients", []))
-        if self.lens_model not in ("pinhole", "brown_conrady") or has_distortion:
-            return None
-        f_u, f_v = (float(f) for f in self.lens["focal_px"])
-        c_u, c_v = (float(c) for c in self.lens["centre_px"])
-        return np.array(
-            [[f_u, f_u * float(self.lens.get("skew", 0)), c_u], [0, f_v, c_v], [0, 0, 1]]
-        )
 
 
 @dataclass(frozen=True)
@@ -404,11 +394,21 @@ class Dataset:
         return self.folder / "calibration" / f"{camera.name}.ros.yaml"
 
 
+def _pinhole_matrix(model: str, lens: _Map) -> Floats | None:
+    is_plain = "coefficients" not in lens.values or not any(lens.numbers("coefficients"))
+    if model not in ("pinhole", "brown_conrady") or not is_plain:
+        return None
+    (f_u, f_v), (c_u, c_v) = lens.numbers("focal_px", 2), lens.numbers("centre_px", 2)
+    skew = lens.numbers("skew", 1)[0] if "skew" in lens.values else 0.0
+    return np.array([[f_u, f_u * skew, c_u], [0, f_v, c_v], [0, 0, 1]])
+
+
 def _camera(name: str, number: int, frames: tuple[Frame, ...], calibration: _Map) -> Camera:
-    lens = _Map(calibration.path, calibration.get("lens"), "lens").values
-    if len(lens) != 1:
+    lenses = _Map(calibration.path, calibration.get("lens"), "lens").values
+    if len(lenses) != 1:
         raise calibration.fault("lens", "must have one key, the lens model")
-    ((lens_model, values),) = lens.items()
+    ((lens_model, values),) = lenses.items()
+    lens = _Map(calibration.path, {} if values is None else values, f"lens.{lens_model}")
     width, height = calibration.numbers("size_px", 2)
     exposure_s, row_s = calibration.seconds("exposure_s"), calibration.seconds("row_s")
     if not (1 <= width < 2**31 and 1 <= height < 2**31):
@@ -423,7 +423,8 @@ def _camera(name: str, number: int, frames: tuple[Frame, ...], calibration: _Map
         X_BC=_read_mount(calibration, "X_BC"),
         size_px=(int(width), int(height)),
         lens_model=lens_model,
-        lens=values if isinstance(values, dict) else {},
+        lens=lens.values,
+        pinhole_matrix=_pinhole_matrix(lens_model, lens),
         exposure_s=exposure_s,
         row_s=row_s,
     )

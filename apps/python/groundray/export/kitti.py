@@ -109,7 +109,7 @@ def _pinhole(dataset: Dataset, camera: Camera) -> Floats:
         rule = f"camera {camera.name} has no pictures"
         fix = "add picture to its products, or export with --no-images"
         raise Error(f"{dataset.folder}: {rule}; {fix}")
-    K = camera.pinhole_matrix()
+    K = camera.pinhole_matrix
     if K is None:
         rule = f"camera {camera.name} has the lens {camera.lens_model}, but KITTI needs pinholes"
         fix = "use a pinhole, set images: rectified for its pair, or export with --no-images"

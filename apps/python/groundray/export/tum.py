@@ -67,7 +67,7 @@ def _write_camera(
     _write_path(dataset, camera, times_ns, folder / "groundtruth.txt")
     calibration = read_text(dataset.folder / "calibration" / f"{camera.name}.yaml")
     (folder / "calibration.yaml").write_text(calibration, encoding="utf-8")
-    if camera.pinhole_matrix() is None:
+    if camera.pinhole_matrix is None:
         notes.tell(f"TUM RGB-D cannot express the lens of {camera.name}: see calibration.yaml")
     if camera.row_s:
         notes.tell(
