@@ -125,6 +125,16 @@ def test_broken_trajectories_are_reported(run, capsys, form):
         assert rule in line
 
 
+@pytest.mark.parametrize("form", ["kitti", "tum", "npz", "mcap"])
+@pytest.mark.parametrize("key", ["focal_px", "centre_px"])
+def test_lenses_without_a_key_are_reported(run, capsys, form, key):
+    file = run / "calibration/left.yaml"
+    file.write_text(re.sub(rf"\b{key}:", f"{key}x:", file.read_text(), count=1))
+    line = fails(capsys, run, form)
+    assert "calibration/left.yaml: lens." in line
+    assert f".{key} is missing" in line
+
+
 ABSURD = ["inf", "-inf", "nan", "1e30", "-1e30", "1e999999999", "5000000000", "soon"]
 
 
