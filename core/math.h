@@ -5,7 +5,7 @@
 /// Elementary functions with the same bits on every machine and with every C library, so that
 /// results are the same too; those of the C library differ between versions and processors. Within
 /// 1 unit in the last place (erfc 1.5) above 1e-300; special values are those of the C standard.
-/// Square roots, rounding, fma and remainders of <cmath> are exact everywhere.
+/// Square roots, rounding, fma and remainders of std are exact everywhere.
 namespace groundray::math {
 
 double sin(double angle_rad) noexcept;              ///< Returns the sine.
