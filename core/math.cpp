@@ -2,8 +2,8 @@
 
 #include <sleef.h>
 
-// Of SLEEF's functions, those named finz have bits of their own definition: they compute with fma
-// on every processor. 3.5.1 and 3.6.1 agree in all that are used here, but not in erf.
+// SLEEF's finz functions return the same bits on every processor; they compute with FMA. Versions
+// 3.5.1 and 3.6.1 agree in all that are used here; their erf differs, hence 1 - erfc.
 namespace groundray::math {
 
 double sin(double angle_rad) noexcept { return Sleef_finz_sind1_u10purecfma(angle_rad); }

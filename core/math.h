@@ -2,10 +2,11 @@
 
 #include <glm/vec3.hpp>
 
-/// Elementary functions with the same bits on every machine and with every C library, so that
-/// results are the same too; those of the C library differ between versions and processors. Within
-/// 1 unit in the last place (erfc 1.5) above 1e-300; special values are those of the C standard.
-/// Square roots, rounding, fma and remainders of std are exact everywhere.
+/// Elementary functions that return the same bits on every machine, so that results are the same;
+/// those of the C library differ between versions and processors. Within 1 unit in the last place
+/// (erfc 1.5) where the result is above 1e-300, |x| below 1e154 for asinh and 709.7 for sinh, and x
+/// below 1e307 for log1p; zeros, infinities and NaN as in the C standard. Square roots, rounding,
+/// fma and remainders of std are exact everywhere.
 namespace groundray::math {
 
 double sin(double angle_rad) noexcept;              ///< Returns the sine.
@@ -27,7 +28,7 @@ double log1p(double x) noexcept;                    ///< Returns log(1 + x), exa
 double pow(double base, double exponent) noexcept;  ///< Returns the base to the exponent's power.
 double cbrt(double x) noexcept;                     ///< Returns the cube root.
 double hypot(double x, double y) noexcept;          ///< Returns the length of (x, y).
-double erf(double x) noexcept;                      ///< Returns the error function, to 2e-16 of 1.
+double erf(double x) noexcept;                      ///< Returns the error function, to 2.3e-16.
 double erfc(double x) noexcept;                     ///< Returns 1 - erf(x), exact for large x too.
 
 /// Returns e to the power of each component.

@@ -27,7 +27,7 @@ Pose inverse(const Pose& X_AB);
 /// roll lowers the right side).
 glm::dquat rotation_from_yaw_pitch_roll(double yaw_rad, double pitch_rad, double roll_rad);
 
-/// Returns the rotation half-way from one to another, less than a full turn apart.
+/// Returns the rotation half-way between two, along the shorter way.
 glm::dquat half_way_between(const glm::dquat& one, const glm::dquat& other);
 
 /// Velocity of a frame B in a frame A.

@@ -55,6 +55,7 @@ Trajectory::Place Trajectory::place_of(std::chrono::nanoseconds time) const {
       seconds(span)};
 }
 
+// Inlined as a whole, because it is called for every pulse.
 [[gnu::flatten]] Pose Trajectory::pose_at(std::chrono::nanoseconds time) const {
   const auto [i, share, span_s] = place_of(time);
   const Pose& before = samples_[i].pose;

@@ -300,7 +300,7 @@ void EchoSimulator::attribute_echo(const LitPulse& pulse, const Detection& detec
         detection.kind == Detection::Kind::FalseAlarm ? Echo::Kind::FalseAlarm : Echo::Kind::Air;
     return;
   }
-  // Sums are local, for the compiler cannot know that no hit is part of the echo.
+  // Local sums: the echo could alias the hits, and the compiler would store and reload it.
   double range_m = 0, bound_m = 0;
   glm::dvec3 p_DQ(0), normal(0);
   float deviation_m = 0;

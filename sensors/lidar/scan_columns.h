@@ -76,8 +76,7 @@ class ScanColumns {
     if (!error_bound_.empty()) for_bounds(*this, set);
   }
 
-  /// Completes rows [begin, end) once they are written: computes angles of incidence, which then
-  /// are tangents, in packs.
+  /// Replaces the tangents of incidence that write() has left in rows [begin, end) by their angles.
   void complete(std::size_t begin, std::size_t end) const noexcept {
     const auto complete_pack = [](float* angles) {
       const Pack tangent(angles, std::experimental::element_aligned);

@@ -59,7 +59,7 @@ AssetKind asset_kind(std::string_view name);
 ///         have.
 void check_asset(const AssetSpec& spec);
 
-/// Generates an asset. Equal specifications give equal bytes with the same build and C library.
+/// Generates an asset. Equal specifications give equal bytes.
 /// @return the object in its frame O: x forward, z up, origin on the ground and centred below the
 ///         object. A wire's origin is midway between its ends. Rocks, plants and posts extend below
 ///         the ground, so that no gap appears on a slope. Leaves and blades are single-layer

@@ -3,7 +3,6 @@
 // is our own.
 #include <algorithm>
 #include <array>
-#include <cmath>
 #include <glm/geometric.hpp>
 #include <numbers>
 #include <vector>

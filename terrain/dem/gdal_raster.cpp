@@ -226,11 +226,12 @@ std::string wkt_of(const OGRSpatialReference& crs) {
   crs.exportToWkt(&text, options);
   const std::unique_ptr<char, decltype(&VSIFree)> owner(text, &VSIFree);
   if (text == nullptr) return {};
-  // PROJ gives the datum of a local CRS no name before version 9.5, and this one since.
+  // PROJ before 9.5 gives the datum of a local CRS no name; later versions give it this one.
   std::string wkt = text;
-  const std::string_view nameless = "EDATUM[\"";
-  const std::size_t at = wkt.find("EDATUM[\"\"");
-  if (at != std::string::npos) wkt.insert(at + nameless.size(), "Unknown engineering datum");
+  for (const char* const nameless : {R"(EDATUM[""])", R"(EDATUM["",)"}) {
+    const std::size_t at = wkt.find(nameless);
+    if (at != std::string::npos) wkt.insert(wkt.find('"', at) + 1, "Unknown engineering datum");
+  }
   return wkt;
 }
 

@@ -1,6 +1,5 @@
 #include "terrain/scatter/dart_field.h"
 
-#include <cmath>
 #include <glm/common.hpp>
 #include <glm/geometric.hpp>
 #include <limits>

@@ -57,16 +57,17 @@ struct Outcome {
   std::uint64_t sum = no_words;
 
   void take(double found, long double exact) {
-    worst_ulp = std::max(worst_ulp, static_cast<double>(std::abs(found - exact)) / ulp_of(found));
+    const double off = static_cast<double>(std::abs(found - exact)) / ulp_of(found);
+    if (!(off <= worst_ulp)) worst_ulp = off;  // NaN too
     add(sum, found);
   }
 };
 
-class Function : public testing::TestWithParam<Case> {};
+class ElementaryFunction : public testing::TestWithParam<Case> {};
 
 // The long doubles of the C library have 11 more bits. The sums were computed with SLEEF 3.5.1 by
 // GCC 12 on a processor with AVX-512; all other machines must reach them.
-TEST_P(Function, IsExactAndHasItsBits) {
+TEST_P(ElementaryFunction, IsWithinItsUlpsAndHasItsBits) {
   const Case& one = GetParam();
   Outcome outcome;
   std::uint64_t state = 88172645463325252U;
@@ -80,7 +81,7 @@ TEST_P(Function, IsExactAndHasItsBits) {
 
 #define GROUNDRAY_CASE(name) #name, math::name, std::name
 INSTANTIATE_TEST_SUITE_P(
-    Math, Function,
+    Math, ElementaryFunction,
     testing::Values(Case{GROUNDRAY_CASE(sin), -1e4, 1e4, 8743322948488029936U},
                     Case{GROUNDRAY_CASE(cos), -1e4, 1e4, 17414365559126413533U},
                     Case{GROUNDRAY_CASE(tan), -1e4, 1e4, 13200953458709303544U},
@@ -101,7 +102,7 @@ INSTANTIATE_TEST_SUITE_P(
     [](const auto& tested) { return tested.param.name; });
 #undef GROUNDRAY_CASE
 
-TEST(Math, AnglesOfPointsAreExactAndHaveTheirBits) {
+TEST(Math, AnglesOfPointsAreWithinTheirUlpsAndHaveTheirBits) {
   Outcome outcome;
   std::uint64_t state = 88172645463325252U;
   for (int i = 0; i < numbers; ++i) {
@@ -112,7 +113,7 @@ TEST(Math, AnglesOfPointsAreExactAndHaveTheirBits) {
   EXPECT_EQ(outcome.sum, 11532960130647298890U);
 }
 
-TEST(Math, PowersAreExactAndHaveTheirBits) {
+TEST(Math, PowersAreWithinTheirUlpsAndHaveTheirBits) {
   Outcome outcome;
   std::uint64_t state = 88172645463325252U;
   for (int i = 0; i < numbers; ++i) {
@@ -123,7 +124,7 @@ TEST(Math, PowersAreExactAndHaveTheirBits) {
   EXPECT_EQ(outcome.sum, 9490511596625498988U);
 }
 
-TEST(Math, LengthsAreExactAndHaveTheirBits) {
+TEST(Math, LengthsAreWithinTheirUlpsAndHaveTheirBits) {
   Outcome outcome;
   std::uint64_t state = 88172645463325252U;
   for (int i = 0; i < numbers; ++i) {

@@ -7,17 +7,19 @@ Run with the Python of the system: it needs no packages.
 """
 
 import os
+import re
 import shutil
 import subprocess
 import sys
 from pathlib import Path
 
 DATA = Path(__file__).resolve().parents[2] / "data"
+BEGIN = re.compile(r"^groundray: 1\b.*\n", re.MULTILINE)  # of a scene, not of a sensor's file
 
 
 def scenes() -> list[Path]:
     files = sorted((DATA / "scenes").glob("*.yaml"))
-    return [file for file in files if "\ngroundray: 1\n" in "\n" + file.read_text()]
+    return [file for file in files if BEGIN.search(file.read_text())]
 
 
 def make(
@@ -36,14 +38,16 @@ def make(
         scene = folder / "scenes" / file.name
         text = file.read_text()
         assert "\ntracing:" not in text, f"{file} chooses its tracing"
-        scene.write_text(text.replace("groundray: 1\n", "groundray: 1\ntracing: exact\n", 1))
+        scene.write_text(BEGIN.sub(r"\g<0>tracing: exact\n", text, count=1))
+        print(f"exact_scenes: {file.name}", file=sys.stderr, flush=True)
         done = subprocess.run(
             [program, "generate", scene, "-o", folder / "datasets" / file.stem, *options],
             env={**os.environ, **variables},
             capture_output=True,
             text=True,
         )
-        assert done.returncode == 0, done.stderr
+        if done.returncode != 0:
+            raise SystemExit(f"{file}: {done.stderr}")
         reports.append(done.stderr)
     return reports
 

@@ -150,14 +150,14 @@ GroundScatter TilePoints::scatter(int column, int row) const noexcept {
       const NeighbourSketch& one = sketches_[index(c, r)];
       const double more = one.plane_counts;
       rough += double{one.freedom} * double{one.rough_m2};
-      spread += math::pow(double{one.freedom}, 2) * double{one.rough_m4};
+      spread += double{one.freedom} * double{one.freedom} * double{one.rough_m4};
       freedom += double{one.freedom};
       plane += more * double{one.plane_m2};
       cells += more;
     }
   }
-  const double expected_m2 =
-      std::abs(rules_.step_m.x * rules_.step_m.y) * math::pow(expected_bend * rules_.slope_sd, 2);
+  const double bend = expected_bend * rules_.slope_sd;
+  const double expected_m2 = std::abs(rules_.step_m.x * rules_.step_m.y) * bend * bend;
   const double all = freedom + plane_counts + expected_counts;
   plane = (plane + expected_counts * expected_m2) / (cells + expected_counts);
   const double half_m2 = 0.5 * (rough + plane_counts * plane + expected_counts * expected_m2) / all;

@@ -176,8 +176,10 @@ double Smoothing::usual_curvature() const {
       const double size = derivative(kind, row);
       squares.push_back(size * size);
       noise.push_back(0);
-      for (std::size_t i = 0; i < row.size(); ++i)
-        noise.back() += math::pow(kind.factors[i] * sds_m_[row[i]], 2);
+      for (std::size_t i = 0; i < row.size(); ++i) {
+        const double sd = kind.factors[i] * sds_m_[row[i]];
+        noise.back() += sd * sd;
+      }
     }
   }
   if (squares.empty()) return 1;

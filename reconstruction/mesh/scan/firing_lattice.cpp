@@ -181,12 +181,12 @@ void PhaseTrack::factor() {
     std::ranges::fill(ring_phase_, Phasor(0));
     for (std::size_t i = 0; i < at.size(); ++i) {
       const Phasor sum = phasor_[window[i]];
-      const double length = std::abs(sum);
+      const double length = length_of(sum);
       if (length > 0)
         ring_phase_[static_cast<std::size_t>(rings_[i])] += at[i] * std::conj(sum) / length;
     }
     for (Phasor& phase : ring_phase_) {
-      if (phase != 0.0) phase /= std::sqrt(std::norm(phase));
+      if (phase != 0.0) phase /= length_of(phase);
     }
   }
   for (std::size_t w = 0; w < windows_; ++w) {

@@ -30,6 +30,9 @@ inline Phasor phasor_of(double angle_rad) { return {math::cos(angle_rad), math::
 /// Returns the phase of a phasor, rad, from -pi to pi.
 inline double phase_rad(const Phasor& p) { return math::atan2(p.imag(), p.real()); }
 
+/// Returns the length of a phasor.
+inline double length_of(const Phasor& p) { return std::sqrt(std::norm(p)); }
+
 /// Returns the median of `values`, or the upper of two, and changes their order. There must be at
 /// least one value.
 inline double upper_median(std::vector<double>& values) {

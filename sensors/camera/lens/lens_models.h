@@ -11,6 +11,7 @@
 #include <vector>
 
 #include "core/error.h"
+#include "core/math.h"
 #include "sensors/camera/lens/dual.h"
 
 // Lens models. Each is a struct of its parameters with a function `image`, which returns the pixel

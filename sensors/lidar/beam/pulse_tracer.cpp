@@ -59,7 +59,7 @@ void PulseTracer::lay_axes(const SweepPath& sweep, std::int64_t begin, const Set
 
 void PulseTracer::add_sub_rays(std::size_t pulse, int level, const LaserBeam& beam,
                                const RandomKey& key, Ray* out) const {
-  // Copies, for the compiler cannot know that `out` is none of them.
+  // Copies: `out` could alias them, and the compiler would reload them.
   const Ray axis = this->axis(pulse);
   const glm::dvec3 horizontal = horizontals_[pulse];
   const glm::dvec3 vertical = glm::cross(axis.direction, horizontal);

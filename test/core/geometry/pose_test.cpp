@@ -67,6 +67,18 @@ TEST(Pose, YawTurnsLeftPitchLowersTheNoseRollLowersTheRight) {
   EXPECT_LT(glm::length(turned(quarter, quarter, 0, {1, 0, 0}) - glm::dvec3(0, 0, -1)), 1e-15);
 }
 
+// About one axis, half of an angle; q and -q are the same rotation.
+TEST(Pose, HalfWayIsHalfTheAngleForBothSignsOfAQuaternion) {
+  const glm::dquat before = rotation_from_yaw_pitch_roll(0.3, 0, 0),
+                   after = rotation_from_yaw_pitch_roll(1.5, 0, 0),
+                   middle = rotation_from_yaw_pitch_roll(0.9, 0, 0);
+  for (const glm::dquat& other : {after, -after}) {
+    const glm::dquat found = half_way_between(before, other);
+    EXPECT_NEAR(std::abs(glm::dot(found, middle)), 1, 1e-15);
+    EXPECT_NEAR(glm::length(found), 1, 1e-15);
+  }
+}
+
 TEST(Screw, FollowsTheExponentialOfItsTwist) {
   for (std::uint32_t i = 0; i < 200; ++i) {
     const glm::dvec3 v = random_pose(i, 3).translation_m;
