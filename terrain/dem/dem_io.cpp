@@ -44,7 +44,7 @@ bool is_same_crs(const std::string& wkt, const std::string& other) {
     a.StripVertical();
     b.StripVertical();
   }
-  return a.IsSame(&b) != 0;
+  return a.IsSame(&b) != 0 || wkt_of(a) == wkt_of(b);
 }
 
 DemInfo inspect_dem(const std::filesystem::path& path) {

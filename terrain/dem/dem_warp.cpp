@@ -267,7 +267,7 @@ std::optional<OGRSpatialReference> crs_to_reach(const OGRSpatialReference& raste
   world.SetAxisMappingStrategy(OAMS_TRADITIONAL_GIS_ORDER);
   flatten(world);
   if (raster.IsLocal() || world.IsLocal()) {
-    if (raster.IsSame(&world) != 0) return std::nullopt;
+    if (raster.IsSame(&world) != 0 || wkt_of(raster) == wkt_of(world)) return std::nullopt;
     throw Error(
         "its CRS is {}, the ground's is {}: one of them is local, so there is no transformation "
         "between them; if they are the same, assign the ground's with gdal_edit.py -a_srs",

@@ -536,12 +536,15 @@ TEST_F(DrapeIo, RejectsPhotosThatCannotBeGeoreferenced) {
   file.crs = R"(LOCAL_CS["site grid",UNIT["metre",1]])";
   saved(file);
   EXPECT_EQ(photo_error({.crs_wkt = wkt_of(file.crs.c_str())}), "no error");
-  const std::string named =  // as the ground's is
-      R"(ENGCRS["site grid",EDATUM["Unknown engineering datum"],CS[Cartesian,2],)"
-      R"(AXIS["easting",east,ORDER[1],LENGTHUNIT["metre",1]],)"
-      R"(AXIS["northing",north,ORDER[2],LENGTHUNIT["metre",1]]])";
+  // The datum of a local CRS has no name in some versions of PROJ, but in DEMs always.
+  const Path dem = path_.parent_path() / "dem.tif";
+  GeoTiff{.size = {4, 4}, .values = noise({4, 4}, 1), .crs = file.crs}.save(dem);
+  const std::string named = load_dem(dem).crs_wkt;
+  EXPECT_THAT(named, HasSubstr("EDATUM[\"Unknown engineering datum\""));
   EXPECT_EQ(photo_error({.crs_wkt = named}), "no error");
-  EXPECT_EQ(photo_error(), "no error");
+  std::string nameless = named;
+  nameless.erase(nameless.find("Unknown engineering datum"), 25);
+  EXPECT_TRUE(is_same_crs(named, nameless));
   EXPECT_THAT(photo_error({.crs_wkt = wkt_of("EPSG:32632")}),
               AllOf(HasSubstr("site grid"), HasSubstr("WGS 84 / UTM zone 32N (EPSG:32632)")));
   EXPECT_THAT(photo_error({.crs_wkt = "EPSG:0"}), HasSubstr("'EPSG:0', is not known to GDAL"));
