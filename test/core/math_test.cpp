@@ -50,6 +50,7 @@ void add(std::uint64_t& sum, double value) {  // FNV-1a over words
 }
 
 constexpr int numbers = 1 << 16;
+constexpr std::uint64_t first_state = 88172645463325252U;
 constexpr std::uint64_t no_words = 14695981039346656037U;
 
 struct Outcome {
@@ -70,7 +71,7 @@ class ElementaryFunction : public testing::TestWithParam<Case> {};
 TEST_P(ElementaryFunction, IsWithinItsUlpsAndHasItsBits) {
   const Case& one = GetParam();
   Outcome outcome;
-  std::uint64_t state = 88172645463325252U;
+  std::uint64_t state = first_state;
   for (int i = 0; i < numbers; ++i) {
     const double x = one.low + (one.high - one.low) * share(state);
     outcome.take(one.function(x), one.exact(x));
@@ -102,37 +103,42 @@ INSTANTIATE_TEST_SUITE_P(
     [](const auto& tested) { return tested.param.name; });
 #undef GROUNDRAY_CASE
 
-TEST(Math, AnglesOfPointsAreWithinTheirUlpsAndHaveTheirBits) {
+// Compares a function of two numbers, each from -reach to reach, or from 0 where `is_positive`.
+template <typename Function, typename Exact>
+Outcome of_pairs(Function function, Exact exact, double first, double second, bool is_positive) {
   Outcome outcome;
-  std::uint64_t state = 88172645463325252U;
+  std::uint64_t state = first_state;
   for (int i = 0; i < numbers; ++i) {
-    const double y = 2 * share(state) - 1, x = 2 * share(state) - 1;
-    outcome.take(math::atan2(y, x), std::atan2(static_cast<long double>(y), x));
+    const double x = is_positive ? first * share(state) : first * (2 * share(state) - 1);
+    const double y = second * (2 * share(state) - 1);
+    outcome.take(function(x, y), exact(static_cast<long double>(x), static_cast<long double>(y)));
   }
-  EXPECT_LE(outcome.worst_ulp, 1);
-  EXPECT_EQ(outcome.sum, 11532960130647298890U);
+  return outcome;
 }
 
-TEST(Math, PowersAreWithinTheirUlpsAndHaveTheirBits) {
-  Outcome outcome;
-  std::uint64_t state = 88172645463325252U;
-  for (int i = 0; i < numbers; ++i) {
-    const double base = 1e4 * share(state), exponent = 40 * share(state) - 20;
-    outcome.take(math::pow(base, exponent), std::pow(static_cast<long double>(base), exponent));
-  }
-  EXPECT_LE(outcome.worst_ulp, 1);
-  EXPECT_EQ(outcome.sum, 9490511596625498988U);
+TEST(Math, FunctionsOfTwoNumbersAreWithinTheirUlpsAndHaveTheirBits) {
+  const Outcome angles = of_pairs(
+      math::atan2, [](auto y, auto x) { return std::atan2(y, x); }, 1, 1, false);
+  EXPECT_LE(angles.worst_ulp, 1);
+  EXPECT_EQ(angles.sum, 11532960130647298890U);
+  const Outcome powers = of_pairs(
+      math::pow, [](auto base, auto to) { return std::pow(base, to); }, 1e4, 20, true);
+  EXPECT_LE(powers.worst_ulp, 1);
+  EXPECT_EQ(powers.sum, 16699568151564011610U);
+  const Outcome lengths = of_pairs(
+      math::hypot, [](auto x, auto y) { return std::hypot(x, y); }, 1e5, 1e5, false);
+  EXPECT_LE(lengths.worst_ulp, 0.5001);
+  EXPECT_EQ(lengths.sum, 8190668888656596012U);
 }
 
-TEST(Math, LengthsAreWithinTheirUlpsAndHaveTheirBits) {
+TEST(Math, FunctionsReachTheEndsOfTheirRanges) {
   Outcome outcome;
-  std::uint64_t state = 88172645463325252U;
-  for (int i = 0; i < numbers; ++i) {
-    const double x = 2e5 * share(state) - 1e5, y = 2e5 * share(state) - 1e5;
-    outcome.take(math::hypot(x, y), std::hypot(static_cast<long double>(x), y));
+  for (const double sign : {-1., 1.}) {
+    outcome.take(math::asinh(sign * 1e154), std::asinh(sign * 1e154L));
+    outcome.take(math::sinh(sign * 709.7), std::sinh(static_cast<long double>(sign * 709.7)));
   }
-  EXPECT_LE(outcome.worst_ulp, 0.5001);
-  EXPECT_EQ(outcome.sum, 1558876984058939392U);
+  outcome.take(math::log1p(1e307), std::log1p(1e307L));
+  EXPECT_LE(outcome.worst_ulp, 1);
 }
 
 TEST(Math, ErrorFunctionIsThatOfTheCLibraryTo2em16) {
