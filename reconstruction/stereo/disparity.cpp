@@ -105,7 +105,7 @@ ImageF starts(const SearchedImage& left, const SearchedImage& right, const Match
   SemiGlobalDisparity found = semi_global(left.grey, right.grey, map.range, options);
   ImageF smooth;
   if (options.smoothing == MatchOptions::Smoothing::Guided)
-    smooth = smooth_guided(left.grey, found, map.range);
+    smooth = smooth_guided(left.grey, found);
   keep_consistent(left.seen, right.seen, options, found, map.unmatched);
   map.unmatched.speckle = remove_speckles(found.left_px, options.speckle_px);
   if (smooth.width() == 0) return found.left_px;

@@ -40,8 +40,7 @@ struct MatchOptions {
   double left_right_px = 1;  ///< largest difference in the left-right consistency check
   int speckle_px = 100;      ///< least number of pixels of a patch without jumps
   /// Starting values of least squares: the disparities found, or smoothed along the image's edges,
-  /// which omits two in five of the mismatches, mostly near edges. If OpenCV has no ximgproc, the
-  /// disparities found are always used.
+  /// which omits two in five of the mismatches, mostly near edges.
   enum class Smoothing { None, Guided };
   Smoothing smoothing = Smoothing::Guided;
   int window_px = 9;  ///< side of the least-squares window; odd, 5 to 31
@@ -72,9 +71,6 @@ struct DisparityMap {
   DisparityRange range;  ///< range searched; empty (0, 0) if the images have nothing in common
   UnmatchedCounts unmatched;
 };
-
-/// Returns true if OpenCV has ximgproc, so that Smoothing::Guided takes effect.
-bool has_guided_smoothing() noexcept;
 
 /// Matches the images of a pair: by semi-global matching from both sides, of which consistent
 /// disparities are kept, and then by least squares in a window on both original images, which also

@@ -7,9 +7,6 @@
 #include <opencv2/calib3d.hpp>
 #include <opencv2/core.hpp>
 #include <opencv2/imgproc.hpp>
-#ifdef GROUNDRAY_XIMGPROC
-#include <opencv2/ximgproc/disparity_filter.hpp>
-#endif
 
 #include "core/error.h"
 
@@ -162,36 +159,5 @@ std::optional<DisparityRange> common_range(const SearchedImage& left, const Sear
   if (least > most) return std::nullopt;
   return DisparityRange{(least - 1) * step, (most + 1) * step};
 }
-
-bool has_guided_smoothing() noexcept {
-#ifdef GROUNDRAY_XIMGPROC
-  return true;
-#else
-  return false;
-#endif
-}
-
-#ifdef GROUNDRAY_XIMGPROC
-ImageF smooth_guided(const Image8& left, const SemiGlobalDisparity& found,
-                     const DisparityRange& range) {
-  const int count = count_of(range);
-  const cv::Mat from_left = fixed(found.left_px, 1, 16 * (range.least_px - 1));
-  const cv::Mat from_right = fixed(found.right_px, -1, 16 * -(range.least_px + count));
-  const auto filter = cv::ximgproc::createDisparityWLSFilterGeneric(true);
-  // Chosen on Middlebury's Motorcycle, where twice these values or half of them are not much worse.
-  // OpenCV documents 8000 and 0.8 to 2.0 as typical.
-  filter->setLambda(200);
-  filter->setSigmaColor(0.8);
-  filter->setLRCthresh(24);  // 1.5 px
-  cv::Mat smooth;
-  filter->filter(from_left, mat_of(left), smooth, from_right,
-                 cv::Rect(0, 0, from_left.cols, from_left.rows));
-  return pixels_of(smooth, range);
-}
-#else
-ImageF smooth_guided(const Image8&, const SemiGlobalDisparity& found, const DisparityRange&) {
-  return found.left_px;
-}
-#endif
 
 }  // namespace groundray

@@ -49,10 +49,11 @@ std::optional<DisparityRange> common_range(const SearchedImage& left, const Sear
 /// by at most 1 px. @return number of pixels removed.
 std::uint64_t remove_speckles(ImageF& disparity_px, int pixels);
 
-/// Returns the left disparities smoothed along the image's edges, with holes filled; unchanged if
-/// OpenCV has no ximgproc.
-ImageF smooth_guided(const Image8& left, const SemiGlobalDisparity& found,
-                     const DisparityRange& range);
+/// Returns the left disparities smoothed along the image's edges by weighted least squares, with
+/// holes filled. Disparities that the right image does not confirm have no weight.
+/// @see Min, Choi, Lu, Ham, Sohn, Do, Fast global image smoothing based on weighted least squares,
+///      IEEE Transactions on Image Processing 23 (2014): rows and columns in turn
+ImageF smooth_guided(const Image8& left, const SemiGlobalDisparity& found);
 
 /// Disparities from least squares; NaN for none.
 struct RefinedDisparity {

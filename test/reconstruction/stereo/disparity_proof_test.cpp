@@ -120,7 +120,7 @@ TEST_F(MotorcycleProof, HasFewerBadPixelsThanOpenCv) {
   for (const int mode :
        {cv::StereoSGBM::MODE_SGBM, cv::StereoSGBM::MODE_HH, cv::StereoSGBM::MODE_SGBM_3WAY}) {
     const Score theirs = score_of(plain_sgbm(left_, right_, mode), truth_px_);
-    EXPECT_LT(sure.bad_percent(), theirs.bad_percent() / (has_guided_smoothing() ? 2 : 1)) << mode;
+    EXPECT_LT(sure.bad_percent(), theirs.bad_percent() / 2) << mode;
     EXPECT_LT(all.bad_percent(), theirs.bad_percent()) << mode;
     EXPECT_LT(all.bad_or_missing_percent(), theirs.bad_or_missing_percent()) << mode;
     testing::record_margin("bad-2.0", sure.bad_percent(), theirs.bad_percent(), "%");
