@@ -236,6 +236,8 @@ def main(arguments: Sequence[str] | None = None) -> int:
     before = signal.signal(signal.SIGTERM, signal.default_int_handler)
     try:
         code, told = _work(options)
+        print(told)
+        return code
     except KeyboardInterrupt:
         code, told = INTERRUPTED, "interrupted; the same command continues"
     except Error as fault:
@@ -245,8 +247,5 @@ def main(arguments: Sequence[str] | None = None) -> int:
         code, told = FAILED, f"{place}{fault.strerror or fault}"
     finally:
         signal.signal(signal.SIGTERM, before)
-    if code == DONE or options.command == "verify":
-        print(told)
-    else:
-        print(f"groundray-cluster: {told}", file=sys.stderr)
+    print(f"groundray-cluster: {told}", file=sys.stderr)
     return code

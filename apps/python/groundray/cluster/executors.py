@@ -9,7 +9,7 @@ import sys
 import threading
 from collections.abc import Iterator, Sequence
 from concurrent.futures import ThreadPoolExecutor, as_completed
-from typing import NamedTuple
+from typing import Any, NamedTuple
 
 from groundray.cluster.identity import Task
 from groundray.cluster.shard import make_shard
@@ -72,23 +72,20 @@ def run_dask(address: str, jobs: Sequence[Job], retries: int) -> Iterator[Outcom
     """Runs shards on the workers of a Dask scheduler, which repeats those of lost workers."""
     if importlib.util.find_spec("distributed") is None:
         raise Error("Dask is not installed: pip install 'dask[distributed]'")
-    from distributed import Client
-    from distributed import as_completed as completed
-
+    dask: Any = importlib.import_module("distributed")
     try:
-        client = Client(address, timeout=20)
+        client = dask.Client(address, timeout=20)
     except (OSError, ValueError) as fault:
         raise Error(f"{address}: no scheduler answers: {fault}") from None
     with client:
         futures = {client.submit(_on_worker, job, pure=False, retries=retries): job for job in jobs}
         try:
-            for future in completed(futures):
-                job, fault = futures[future], future.exception()
+            for future in dask.as_completed(futures):
+                job, error = futures[future], future.exception()
                 if future.status == "cancelled":
                     raise Error(f"{address}: lost the scheduler; run the same command again")
-                yield (
-                    Outcome(job, "failed", str(fault)) if fault else Outcome(job, *future.result())
-                )
+                state, message = ("failed", str(error)) if error else future.result()
+                yield Outcome(job, state, message)
         finally:
             client.cancel(list(futures))
 

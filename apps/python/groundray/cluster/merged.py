@@ -12,14 +12,14 @@ from itertools import islice
 
 from groundray.cluster.identity import COMMON, DATASET, RECORD, SCENE, log_of, marker_of, recorded
 from groundray.cluster.listing import Listed, Listing, closed, difference
-from groundray.cluster.shard import HEARTBEAT_S
+from groundray.cluster.shard import ATTEMPT, HEARTBEAT_S
 from groundray.cluster.store import FinalError, Object, Store, Sum
 from groundray.dataset import Error
 
 Tell = Callable[[str], None]
 
 _READERS = 8  # objects that are read at a time
-_LOG_LINES = 8  # of a failed shard
+_LOG_LINES = 6  # of a failed shard
 _PACE = 50  # shards that the rate is computed from
 
 
@@ -149,15 +149,15 @@ def status(store: Store, tell: Tell) -> str:
         if log is None or marker_of(shard) in objects:
             continue
         lines = (store.get(log.key) or b"").decode(errors="replace").splitlines()
-        state = next((each for each in reversed(lines) if each.startswith("# attempt")), "")
-        if ": failed" in state:
+        states = [each for each in lines if each.startswith(ATTEMPT)]
+        if states and ": failed: " in states[-1]:
             failed += 1
-            tell(f"shard {shard} failed:")
+            tell(f"shard {shard} failed in {len(states) // 2} attempts; the end of its log:")
             for line in lines[-_LOG_LINES:]:
                 tell(f"    {line}")
-        else:
+        elif states and states[-1].endswith(": begun"):
             running += 1
-            tell(f"shard {shard} {_heard(log)}: {state.removeprefix('# ')}")
+            tell(f"shard {shard} {_heard(log)}: {states[-1].removeprefix('# ')}")
     left = run.shards - len(times)
     text = f"{run.scene}, groundray {run.version}: {len(times)} of {run.shards} shards done"
     text += f", {running} running, {failed} failed, {left - running - failed} waiting"

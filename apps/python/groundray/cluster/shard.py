@@ -26,7 +26,10 @@ from groundray.dataset import Error
 _LIBC = ctypes.CDLL(None)  # loaded before any fork
 _PR_SET_PDEATHSIG = 1
 _MOST_LOG = 1 << 16  # bytes that are kept
+_MOST_REASON = 500  # characters of what groundray says
 _UPLOADS = 4  # at a time
+ATTEMPT = "# attempt"
+"""Beginning of a log's lines on attempts."""
 HEARTBEAT_S = 60.0
 """Time between two copies of the log of an attempt under way."""
 
@@ -46,7 +49,7 @@ def make_shard(task: Task, shard: int, stop: threading.Event | None = None) -> s
             _generate(task, shard, folder, log, stop or threading.Event())
             _upload(store, shard, folder / "out")
     except BaseException as fault:
-        log.end(f"failed: {str(fault) or 'interrupted'}")
+        log.end("interrupted" if isinstance(fault, KeyboardInterrupt) else f"failed: {fault}")
         raise
     log.end("done")
     return "made"
@@ -69,7 +72,7 @@ class _Log:
     @staticmethod
     def _line(state: str) -> bytes:
         place = f"{datetime.now(UTC):%Y-%m-%dT%H:%M:%SZ} on {platform.node()}"
-        return f"# attempt, {place}, process {os.getpid()}: {state}\n".encode()
+        return f"{ATTEMPT}, {place}, process {os.getpid()}: {state}\n".encode()
 
     def put(self, output: Path | None = None, end: bytes = b"") -> None:
         """Copies the log, with what the program has printed, to the store."""
@@ -152,8 +155,8 @@ def _generate(task: Task, shard: int, folder: Path, log: _Log, stop: threading.E
         log.put(output)
     if child.returncode == 0:
         return
-    last = output.read_text(errors="replace").strip().splitlines()[-1:]
-    why = last[0] if last and child.returncode > 0 else f"groundray ended by {child.returncode}"
+    said = output.read_text(errors="replace").rpartition("groundray: ")[2]
+    why = " ".join(said.split())[:_MOST_REASON]
     if child.returncode < 0:
         why = f"groundray was ended by {signal.Signals(-child.returncode).name}"
     raise (FinalError if child.returncode == 2 else Error)(why)
